@@ -60,16 +60,16 @@ pub struct Spot {
 impl Spot {
     /// The RMS radius with the image plane moved by `defocus` mm along the light.
     pub fn rms_at(&self, defocus: f64) -> f64 {
-        let place = |color: &MonochromaticSpot, i: usize| {
-            color.centroid[i].value + defocus * color.slopes.mean[i]
+        let place = |channel: &MonochromaticSpot, i: usize| {
+            channel.centroid[i].value + defocus * channel.slopes.mean[i]
         };
-        let colors = || self.shares.iter();
-        let center: [f64; 2] = [0, 1].map(|i| colors().map(|(c, s)| s * place(c, i)).sum());
-        let square = |color: &MonochromaticSpot| {
-            let off = [0, 1].map(|i| place(color, i) - center[i]);
-            color.rms_at(defocus).powi(2) + off[0] * off[0] + off[1] * off[1]
+        let channels = || self.shares.iter();
+        let center: [f64; 2] = [0, 1].map(|i| channels().map(|(c, s)| s * place(c, i)).sum());
+        let square = |channel: &MonochromaticSpot| {
+            let off = [0, 1].map(|i| place(channel, i) - center[i]);
+            channel.rms_at(defocus).powi(2) + off[0] * off[0] + off[1] * off[1]
         };
-        colors().map(|(color, share)| share * square(color)).sum::<f64>().sqrt()
+        channels().map(|(channel, share)| share * square(channel)).sum::<f64>().sqrt()
     }
 
     /// The shift of the image plane that gives the smallest RMS radius, in mm along the light; `None`
@@ -162,15 +162,15 @@ pub(super) fn combine_channels(
     }
     let shares: Vec<f64> = lit.iter().map(|(w, spot)| w * spot.area.value / sum).collect();
     let rays = lit.iter().map(|(_, spot)| spot.rms.rays).sum();
-    let colors = || lit.iter().map(|(_, spot)| spot).zip(&shares);
-    let center = [0, 1].map(|i| colors().map(|(c, share)| share * c.centroid[i].value).sum());
-    let center_error = [0, 1].map(|i| colors().map(|(c, share)| share * c.centroid[i].error).sum());
+    let shared = || lit.iter().map(|(_, spot)| spot).zip(&shares);
+    let center = [0, 1].map(|i| shared().map(|(c, share)| share * c.centroid[i].value).sum());
+    let center_error = [0, 1].map(|i| shared().map(|(c, share)| share * c.centroid[i].error).sum());
     let (mut square, mut error) = (0.0, 0.0);
-    for (color, share) in colors() {
-        let off: [f64; 2] = [0, 1].map(|i| color.centroid[i].value - center[i]);
-        square += share * (color.rms.value.powi(2) + off[0] * off[0] + off[1] * off[1]);
-        error += share * color.rms.value * color.rms.error;
-        error += share * (0..2).map(|i| off[i].abs() * color.centroid[i].error).sum::<f64>();
+    for (spot, share) in shared() {
+        let off: [f64; 2] = [0, 1].map(|i| spot.centroid[i].value - center[i]);
+        square += share * (spot.rms.value.powi(2) + off[0] * off[0] + off[1] * off[1]);
+        error += share * spot.rms.value * spot.rms.error;
+        error += share * (0..2).map(|i| off[i].abs() * spot.centroid[i].error).sum::<f64>();
     }
     let rms = square.sqrt();
     let error = if rms > 0.0 { error / rms } else { 0.0 };

@@ -149,18 +149,18 @@ impl SampledBundle {
             fates: Fates::default(),
             grazing: None,
         };
-        let color = launch.channel();
-        let falls = index_drops(&color.system);
-        let mut points = Vec::with_capacity(color.system.surfaces.len());
+        let channel = launch.channel();
+        let falls = index_drops(&channel.system);
+        let mut points = Vec::with_capacity(channel.system.surfaces.len());
         for ray in &bundle.rays {
             points.clear();
-            let landing = ray.map(|ray| color.tracer.visit(ray, |i, p| points.push((i, p))));
+            let landing = ray.map(|ray| channel.tracer.visit(ray, |i, p| points.push((i, p))));
             let imaged = landing.filter(|landing| landing.fate.is_imaged());
             bundle.landed.push(imaged.map(|landing| landing.ray.point));
             let Some(landing) = landing else { continue };
             bundle.fates.count(landing.fate);
             let reflected = matches!(landing.fate, Fate::TotalReflection(_)).then_some(0.0);
-            let leaving = exit_angles(&color.system, &points).filter(|(i, _)| falls.contains(i));
+            let leaving = exit_angles(&channel.system, &points).filter(|(i, _)| falls.contains(i));
             let angles = leaving.map(|(_, angle)| angle).chain(reflected);
             bundle.grazing = angles.chain(bundle.grazing).reduce(f64::min);
         }
@@ -205,7 +205,7 @@ fn smallest_spot(model: &RayModel, bundles: &[SampledBundle]) -> f64 {
 
 /// `√(Σ share |p_λ − p|²)` over the rays that arrive at both wavelengths, of the worst field.
 fn dispersion(model: &RayModel, bundles: &[SampledBundle]) -> f64 {
-    let weights: f64 = model.channels.iter().map(|color| color.weight).sum();
+    let weights: f64 = model.channels.iter().map(|channel| channel.weight).sum();
     let worst = |field: &FieldPoint| -> f64 {
         let of_field = |bundle: &&SampledBundle| bundle.field == *field;
         let primary = bundles.iter().filter(of_field).find(|s| s.wavelength == model.primary);
@@ -344,8 +344,11 @@ fn object(
     let Some((beam, fields)) = collimate_fields(model, &Beam::for_lens(lens, zoom)) else {
         return Some((distance, f64::INFINITY));
     };
-    let systems =
-        model.channels.iter().map(|color| (color.um, color.weight, color.system.clone())).collect();
+    let systems = model
+        .channels
+        .iter()
+        .map(|channel| (channel.um, channel.weight, channel.system.clone()))
+        .collect();
     // A lens that cannot be set up with an object at infinity needs the finite object.
     let Ok(far) = RayModel::from_systems(systems, model.primary, beam, model.aiming) else {
         return Some((distance, f64::INFINITY));

@@ -33,14 +33,14 @@ pub enum TracePurpose {
 
 impl TracePurpose {
     /// The largest shift of rays in the image plane that may be neglected, in mm.
-    fn tolerated_shift(self, facts: &EffectMeasurements) -> f64 {
+    fn tolerated_shift(self, measured: &EffectMeasurements) -> f64 {
         match self {
             Self::Trace => TRACE_TOLERANCE,
-            Self::Spot(share) | Self::Optimize(share) if facts.smallest_spot.is_finite() => {
-                share * facts.smallest_spot
+            Self::Spot(share) | Self::Optimize(share) if measured.smallest_spot.is_finite() => {
+                share * measured.smallest_spot
             }
             Self::Spot(_) | Self::Optimize(_) => 0.0,
-            Self::Layout => DRAWING_TOLERANCE * facts.length,
+            Self::Layout => DRAWING_TOLERANCE * measured.length,
         }
     }
 }
@@ -108,21 +108,21 @@ impl EffectPlan {
 
 /// Decides which effects to compute for a purpose, from the measurements and the user's settings.
 pub fn plan(
-    facts: &EffectMeasurements,
+    measured: &EffectMeasurements,
     purpose: TracePurpose,
     overrides: &EffectOverrides,
 ) -> EffectPlan {
-    let allowed = purpose.tolerated_shift(facts);
-    let (asphere, as_conic) = asphere(facts, allowed, overrides.get(Effect::Asphere));
-    let (grin, homogeneous) = grin(facts, allowed, overrides.get(Effect::GradientIndex));
-    let (clipping, unclipped) = clipping(facts, overrides.get(Effect::Clipping));
+    let allowed = purpose.tolerated_shift(measured);
+    let (asphere, as_conic) = asphere(measured, allowed, overrides.get(Effect::Asphere));
+    let (grin, homogeneous) = grin(measured, allowed, overrides.get(Effect::GradientIndex));
+    let (clipping, unclipped) = clipping(measured, overrides.get(Effect::Clipping));
     let decisions = vec![
-        dispersion(facts, allowed, overrides.get(Effect::Dispersion)),
+        dispersion(measured, allowed, overrides.get(Effect::Dispersion)),
         asphere,
         clipping,
-        reflection(facts, overrides.get(Effect::TotalReflection)),
-        aiming(facts, overrides.get(Effect::Aiming)),
-        object(facts, allowed, overrides.get(Effect::FiniteObject)),
+        reflection(measured, overrides.get(Effect::TotalReflection)),
+        aiming(measured, overrides.get(Effect::Aiming)),
+        object(measured, allowed, overrides.get(Effect::FiniteObject)),
         grin,
     ];
     EffectPlan { decisions, as_conic, unclipped, homogeneous }
@@ -154,32 +154,36 @@ fn lens_decision(
     }
 }
 
-fn dispersion(facts: &EffectMeasurements, allowed: f64, choice: EffectOverride) -> EffectDecision {
-    let decision = lens_decision(Effect::Dispersion, choice, facts.dispersion, allowed, "mm");
-    let reason = match facts.wavelengths {
+fn dispersion(
+    measured: &EffectMeasurements,
+    allowed: f64,
+    choice: EffectOverride,
+) -> EffectDecision {
+    let decision = lens_decision(Effect::Dispersion, choice, measured.dispersion, allowed, "mm");
+    let reason = match measured.wavelengths {
         1 => "there is one wavelength".to_owned(),
-        colors if facts.dispersion == 0.0 => {
-            format!("all {colors} wavelengths take the same path")
+        count if measured.dispersion == 0.0 => {
+            format!("all {count} wavelengths take the same path")
         }
-        colors => format!(
-            "the {colors} wavelengths land {:.3} um apart; {:.3} um may be neglected",
-            1e3 * facts.dispersion,
+        count => format!(
+            "the {count} wavelengths land {:.3} um apart; {:.3} um may be neglected",
+            1e3 * measured.dispersion,
             1e3 * allowed
         ),
     };
-    EffectDecision { reason, saved_share: 1.0 - 1.0 / facts.wavelengths as f64, ..decision }
+    EffectDecision { reason, saved_share: 1.0 - 1.0 / measured.wavelengths as f64, ..decision }
 }
 
 /// Keeps the aspheric terms of as few surfaces as are needed: the weakest are left out first, as long
 /// as together they may be neglected.
 fn asphere(
-    facts: &EffectMeasurements,
+    measured: &EffectMeasurements,
     allowed: f64,
     choice: EffectOverride,
 ) -> (EffectDecision, Vec<usize>) {
-    let total = facts.aspheres.iter().fold(0.0, |sum, (_, moved)| sum + moved);
+    let total = measured.aspheres.iter().fold(0.0, |sum, (_, moved)| sum + moved);
     let decision = lens_decision(Effect::Asphere, choice, total, allowed, "mm");
-    let mut weakest = facts.aspheres.clone();
+    let mut weakest = measured.aspheres.clone();
     weakest.sort_by(|a, b| a.1.total_cmp(&b.1));
     let (mut as_conic, mut residual) = (Vec::new(), 0.0);
     for (surface, moved) in weakest {
@@ -194,17 +198,18 @@ fn asphere(
         }
     }
     as_conic.sort_unstable();
-    let kept = facts.aspheres.iter().map(|(surface, _)| *surface).filter(|i| !as_conic.contains(i));
+    let kept =
+        measured.aspheres.iter().map(|(surface, _)| *surface).filter(|i| !as_conic.contains(i));
     let surfaces: Vec<usize> = kept.collect();
-    let reason = match facts.aspheres.len() {
+    let reason = match measured.aspheres.len() {
         0 => "no surface is aspheric".to_owned(),
         1 => format!("without the aspheric terms of a surface {}", shift_text(total, allowed)),
         all => {
             format!("without the aspheric terms of {all} surfaces {}", shift_text(total, allowed))
         }
     };
-    let aspheric = facts.aspheres.len() as f64;
-    let work = facts.surfaces as f64 + aspheric * (ASPHERE_COST - 1.0);
+    let aspheric = measured.aspheres.len() as f64;
+    let work = measured.surfaces as f64 + aspheric * (ASPHERE_COST - 1.0);
     let saved_share = aspheric * (ASPHERE_COST - 1.0) / work;
     let computed = !surfaces.is_empty();
     (EffectDecision { computed, surfaces, residual, reason, saved_share, ..decision }, as_conic)
@@ -224,11 +229,11 @@ const ASPHERE_COST: f64 = 15.0;
 
 /// Keeps the semi-diameters that a ray may reach, those that bound the iteration at an asphere, and
 /// every obstruction.
-fn clipping(facts: &EffectMeasurements, choice: EffectOverride) -> (EffectDecision, Vec<usize>) {
+fn clipping(measured: &EffectMeasurements, choice: EffectOverride) -> (EffectDecision, Vec<usize>) {
     let ratio = |rim: &RimClearance| {
         if rim.ray_height == 0.0 { 0.0 } else { rim.ray_height / rim.semi_diameter }
     };
-    let nearest = facts.rims.iter().map(ratio).fold(0.0, f64::max);
+    let nearest = measured.rims.iter().map(ratio).fold(0.0, f64::max);
     let decision =
         lens_decision(Effect::Clipping, choice, nearest, NEAR_RIM, "of the semi-diameter");
     let goes = |rim: &&RimClearance| match choice {
@@ -236,21 +241,21 @@ fn clipping(facts: &EffectMeasurements, choice: EffectOverride) -> (EffectDecisi
         EffectOverride::On => false,
         EffectOverride::Off => true,
     };
-    let unclipped: Vec<usize> = facts.rims.iter().filter(goes).map(|rim| rim.surface).collect();
-    let residual = facts.rims.iter().filter(goes).map(ratio).fold(0.0, f64::max);
-    let kept = facts.rims.iter().map(|rim| rim.surface).filter(|i| !unclipped.contains(i));
+    let unclipped: Vec<usize> = measured.rims.iter().filter(goes).map(|rim| rim.surface).collect();
+    let residual = measured.rims.iter().filter(goes).map(ratio).fold(0.0, f64::max);
+    let kept = measured.rims.iter().map(|rim| rim.surface).filter(|i| !unclipped.contains(i));
     let surfaces: Vec<usize> = kept.collect();
-    let obstructed = facts.rims.iter().filter(|rim| rim.obstructed).count();
+    let obstructed = measured.rims.iter().filter(|rim| rim.obstructed).count();
     let obstructing = match obstructed {
         0 => String::new(),
         1 => " and at an obstruction".to_owned(),
         all => format!(" and at {all} obstructions"),
     };
-    let reason = if facts.rims.is_empty() {
+    let reason = if measured.rims.is_empty() {
         "no surface has a semi-diameter or an obstruction".to_owned()
     } else {
-        let (clipped, rays) = (facts.fates.clipped, facts.fates.total());
-        let limiting = facts.rims.iter().filter(|rim| ratio(rim) > NEAR_RIM).count();
+        let (clipped, rays) = (measured.fates.clipped, measured.fates.total());
+        let limiting = measured.rims.iter().filter(|rim| ratio(rim) > NEAR_RIM).count();
         format!(
             "rays reach {:.0} % of a semi-diameter, and come near the rim at {limiting} surfaces; \
              {clipped} of {rays} are lost there{obstructing}",
@@ -264,29 +269,29 @@ fn clipping(facts: &EffectMeasurements, choice: EffectOverride) -> (EffectDecisi
 
 /// Keeps all gradient-index gaps or none, and reports the steps in each.
 fn grin(
-    facts: &EffectMeasurements,
+    measured: &EffectMeasurements,
     allowed: f64,
     choice: EffectOverride,
 ) -> (EffectDecision, Vec<usize>) {
-    let total = facts.grin_gaps.iter().fold(0.0, |sum, (_, moved)| sum + moved);
+    let total = measured.grin_gaps.iter().fold(0.0, |sum, (_, moved)| sum + moved);
     let decision = lens_decision(Effect::GradientIndex, choice, total, allowed, "mm");
     let goes = !decision.computed;
-    let all: Vec<usize> = facts.grin_gaps.iter().map(|(plan, _)| plan.surface).collect();
+    let all: Vec<usize> = measured.grin_gaps.iter().map(|(plan, _)| plan.surface).collect();
     let (homogeneous, surfaces) = if goes { (all, Vec::new()) } else { (Vec::new(), all) };
-    let reason = if facts.grin_gaps.is_empty() {
+    let reason = if measured.grin_gaps.is_empty() {
         "no gap has a refractive index that varies".to_owned()
     } else {
-        format!("without it {}; {}", shift_text(total, allowed), step_text(facts))
+        format!("without it {}; {}", shift_text(total, allowed), step_text(measured))
     };
-    let kicks: u32 = facts.grin_gaps.iter().map(|(plan, _)| plan.kicks).sum();
-    let saved_share = f64::from(kicks) / (facts.surfaces as f64 + f64::from(kicks));
+    let kicks: u32 = measured.grin_gaps.iter().map(|(plan, _)| plan.kicks).sum();
+    let saved_share = f64::from(kicks) / (measured.surfaces as f64 + f64::from(kicks));
     let computed = !surfaces.is_empty();
     let residual = if goes { total } else { 0.0 };
     (EffectDecision { computed, surfaces, residual, reason, saved_share, ..decision }, homogeneous)
 }
 
 /// The steps in every gradient-index gap, in words.
-fn step_text(facts: &EffectMeasurements) -> String {
+fn step_text(measured: &EffectMeasurements) -> String {
     let of = |(plan, _): &(GrinStepPlan, f64)| {
         format!(
             "behind surface {} in {} steps ({} evaluations of the index), accurate to {:.0e} mm",
@@ -296,13 +301,13 @@ fn step_text(facts: &EffectMeasurements) -> String {
             plan.error
         )
     };
-    facts.grin_gaps.iter().map(of).collect::<Vec<_>>().join(", ")
+    measured.grin_gaps.iter().map(of).collect::<Vec<_>>().join(", ")
 }
 
 /// The test is the sign of the number whose square root refraction needs anyway: it cannot be left
 /// out, and leaving it out would save nothing.
-fn reflection(facts: &EffectMeasurements, choice: EffectOverride) -> EffectDecision {
-    let nearest = facts.critical_angle.map_or(0.0, |angle| angle.to_radians().cos());
+fn reflection(measured: &EffectMeasurements, choice: EffectOverride) -> EffectDecision {
+    let nearest = measured.critical_angle.map_or(0.0, |angle| angle.to_radians().cos());
     let decision = lens_decision(
         Effect::TotalReflection,
         choice,
@@ -310,10 +315,10 @@ fn reflection(facts: &EffectMeasurements, choice: EffectOverride) -> EffectDecis
         NEAR_GRAZING,
         "of the critical sine",
     );
-    let reason = match facts.critical_angle {
+    let reason = match measured.critical_angle {
         None => "the index falls at no surface that rays leave".to_owned(),
-        Some(_) if facts.fates.total_reflection > 0 => {
-            let EffectMeasurements { fates, .. } = facts;
+        Some(_) if measured.fates.total_reflection > 0 => {
+            let EffectMeasurements { fates, .. } = measured;
             format!("{} of {} rays are totally reflected", fates.total_reflection, fates.total())
         }
         Some(angle) => format!("no ray leaves a surface at less than {angle:.1} degrees to it"),
@@ -324,11 +329,11 @@ fn reflection(facts: &EffectMeasurements, choice: EffectOverride) -> EffectDecis
         ""
     };
     let reason = reason + kept;
-    let computed = !facts.index_drops.is_empty();
+    let computed = !measured.index_drops.is_empty();
     EffectDecision {
         computed,
         residual: 0.0,
-        surfaces: facts.index_drops.clone(),
+        surfaces: measured.index_drops.clone(),
         reason,
         ..decision
     }
@@ -339,10 +344,10 @@ const CHIEF_RAYS: f64 = 20.0;
 /// The rays of a spot.
 const SPOT_RAYS: f64 = 100.0;
 
-fn aiming(facts: &EffectMeasurements, choice: EffectOverride) -> EffectDecision {
-    let miss = facts.chief_ray_miss.unwrap_or(f64::INFINITY);
+fn aiming(measured: &EffectMeasurements, choice: EffectOverride) -> EffectDecision {
+    let miss = measured.chief_ray_miss.unwrap_or(f64::INFINITY);
     let decision = lens_decision(Effect::Aiming, choice, miss, WIDE_AIMING_THRESHOLD, "stop radii");
-    let reason = match facts.chief_ray_miss {
+    let reason = match measured.chief_ray_miss {
         Some(miss) => format!(
             "the paraxial chief ray of the farthest field misses the centre of the stop by \
              {:.0} % of its radius",
@@ -354,15 +359,15 @@ fn aiming(facts: &EffectMeasurements, choice: EffectOverride) -> EffectDecision 
     EffectDecision { reason, saved_share, ..decision }
 }
 
-fn object(facts: &EffectMeasurements, allowed: f64, choice: EffectOverride) -> EffectDecision {
-    let moved = facts.finite_object.map_or(0.0, |(_, moved)| moved);
+fn object(measured: &EffectMeasurements, allowed: f64, choice: EffectOverride) -> EffectDecision {
+    let moved = measured.finite_object.map_or(0.0, |(_, moved)| moved);
     let decision = lens_decision(Effect::FiniteObject, choice, moved, allowed, "mm");
-    let reason = match facts.finite_object {
+    let reason = match measured.finite_object {
         None => "the object is at infinity".to_owned(),
         Some((distance, moved)) => {
             format!("from infinity instead of {distance} mm {}", shift_text(moved, allowed))
         }
     };
-    let computed = decision.computed && facts.finite_object.is_some();
+    let computed = decision.computed && measured.finite_object.is_some();
     EffectDecision { computed, reason, ..decision }
 }

@@ -100,18 +100,18 @@ impl RayModel {
             (Aperture::StopSemiDiameter(radius), Aiming::Paraxial | Aiming::Chief) => Some(radius),
             _ => None,
         };
-        let color = |(um, weight, mut system): (f64, f64, System<f64>)| {
+        let channel = |(um, weight, mut system): (f64, f64, System<f64>)| {
             let stop = system.stop.unwrap_or(0);
             rim.into_iter().for_each(|radius| system.surfaces[stop].semi_diameter = radius);
             let tracer = Tracer::new(&system)?;
             let open = Tracer::new(&system.cast::<Dual2>())?.without_rims();
             Ok(Channel { um, weight, system, tracer, unclipped: open })
         };
-        let colors: Result<Vec<_>, SystemError> = systems.into_iter().map(color).collect();
+        let channels: Result<Vec<_>, SystemError> = systems.into_iter().map(channel).collect();
         Ok(Self {
             beam,
             fields: Vec::new(),
-            channels: colors?,
+            channels: channels?,
             primary,
             first_order: first,
             aiming,
@@ -139,10 +139,10 @@ impl RayModel {
         if let Aperture::StopSemiDiameter(radius) = &mut model.beam.aperture {
             *radius = system.surfaces[self.stop()].semi_diameter;
         }
-        let color = &mut model.channels[wavelength];
-        color.tracer = Tracer::new(&system)?;
-        color.unclipped = Tracer::new(&system.cast::<Dual2>())?.without_rims();
-        color.system = system;
+        let channel = &mut model.channels[wavelength];
+        channel.tracer = Tracer::new(&system)?;
+        channel.unclipped = Tracer::new(&system.cast::<Dual2>())?.without_rims();
+        channel.system = system;
         Ok(model)
     }
 

@@ -61,12 +61,13 @@ impl TracedPupil<'_> {
             return None;
         }
         for limit in self.limits() {
-            let PupilLimit::Surface(surface, hurdle) = limit else { continue };
+            let PupilLimit::Surface(surface, ray_limit) = limit else { continue };
             let on_limit = self.radial_lines.iter().filter(|line| line.edge.limit == limit);
-            let moved = on_limit.filter_map(|s| self.edge_ray(cost, &frame, s, (surface, hurdle)));
+            let moved =
+                on_limit.filter_map(|s| self.edge_ray(cost, &frame, s, (surface, ray_limit)));
             let (rays, weights): (Vec<_>, Vec<f64>) = moved.unzip();
             let rays: Rays<f64> = rays.into_iter().collect();
-            total.add(&tracer.margin_gradient(surface, hurdle, &rays, &weights), 1.0);
+            total.add(&tracer.margin_gradient(surface, ray_limit, &rays, &weights), 1.0);
         }
         Some(total)
     }
@@ -97,14 +98,14 @@ impl TracedPupil<'_> {
         cost: &impl Integrand,
         frame: &PolarFrame,
         line: &RadialLine,
-        (surface, hurdle): (usize, RayLimit),
+        (surface, ray_limit): (usize, RayLimit),
     ) -> Option<(Ray<f64>, f64)> {
         let launch = &self.region.launch;
         let p = frame.point(line.azimuth, line.edge.radius);
         let ray = launch.ray(p)?;
-        let color = launch.channel();
-        let landed = color.tracer.land_at_edge(ray, surface, hurdle)?;
-        let slope = color.unclipped.margin(launch.dual_ray(p)?, surface, hurdle)?.slope;
+        let channel = launch.channel();
+        let landed = channel.tracer.land_at_edge(ray, surface, ray_limit)?;
+        let slope = channel.unclipped.margin(launch.dual_ray(p)?, surface, ray_limit)?.slope;
         let direction = frame.direction(line.azimuth);
         let outwards = slope[0] * direction[0] + slope[1] * direction[1];
         let measure = launch.area() * line.share * line.edge.radius;

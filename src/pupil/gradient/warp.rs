@@ -210,7 +210,7 @@ impl<'a, R: Real, C: Integrand> WarpEstimator<'a, R, C> {
             #[inline(always)]
             |[u, v]| self.ray(square, [Jet::variable(u, 0), Jet::variable(v, 1)]),
             #[inline(always)]
-            |points, abreast| weigh_limits(abreast, self.cost, disc, points),
+            |points, block| weigh_limits(block, self.cost, disc, points),
         );
         let surfaces = sum.surfaces.len();
         Some(SystemGradient::from_numbers(surfaces, sum.numbers().map(Real::value)))
@@ -273,22 +273,22 @@ fn fifth_power<R: Real>(v: R) -> R {
 /// Sets A and B of every limit and the derivative of the integrand.
 #[inline(always)]
 fn weigh_limits<R: Real>(
-    abreast: &mut JetBlock<R>,
+    block: &mut JetBlock<R>,
     cost: &impl Integrand,
     disc: Option<PolarFrame>,
     points: &[[R; 2]; LANES],
 ) {
-    let balance = LimitWeights::of(abreast, disc, points);
+    let balance = LimitWeights::of(block, disc, points);
     let mut value = [R::ZERO; LANES];
     let mut slope = [[R::ZERO; 2]; LANES];
     for j in 0..LANES {
-        let [x, y] = [abreast.landing[0][j], abreast.landing[1][j]];
+        let [x, y] = [block.landing[0][j], block.landing[1][j]];
         let by = cost.slope([x.value, y.value]);
         value[j] = cost.value([x.value, y.value]);
         slope[j] = [0, 1].map(|i| by[0] * x.slope[i] + by[1] * y.slope[i]);
-        (abreast.by_landing[0][j], abreast.by_landing[1][j]) = (by[0], by[1]);
+        (block.by_landing[0][j], block.by_landing[1][j]) = (by[0], by[1]);
     }
-    for (limit, by_limit) in abreast.limits.iter().zip(&mut abreast.by_limit) {
+    for (limit, by_limit) in block.limits.iter().zip(&mut block.by_limit) {
         for j in 0..LANES {
             by_limit[j] = balance.share(j, limit[j], value[j], slope[j]);
         }
@@ -297,7 +297,7 @@ fn weigh_limits<R: Real>(
 
 impl<R: Real> LimitWeights<R> {
     #[inline(always)]
-    fn of(abreast: &JetBlock<R>, disc: Option<PolarFrame>, points: &[[R; 2]; LANES]) -> Self {
+    fn of(block: &JetBlock<R>, disc: Option<PolarFrame>, points: &[[R; 2]; LANES]) -> Self {
         let far = [R::from_f64(1e30), R::ZERO, R::ZERO];
         let zero = [R::ZERO; LANES];
         let mut rim = [far; LANES];
@@ -305,13 +305,13 @@ impl<R: Real> LimitWeights<R> {
             rim = std::array::from_fn(|j| disc_limit(frame, points[j]));
         }
         let mut balance = Self { closest: rim, total: zero, drift: [[R::ZERO; 2]; LANES] };
-        for limit in &abreast.limits {
+        for limit in &block.limits {
             for (j, limit) in limit.iter().enumerate() {
                 let Jet { value, slope: [x, y], .. } = *limit;
                 balance.update_closest(j, [distance(value), x, y]);
             }
         }
-        for limit in &abreast.limits {
+        for limit in &block.limits {
             for (j, limit) in limit.iter().enumerate() {
                 let Jet { value, slope: [x, y], .. } = *limit;
                 balance.add(j, [distance(value), x, y]);
@@ -442,14 +442,14 @@ mod tests {
         let tracer = Tracer::new(system).unwrap();
         let ray = ray([Dual3::variable(x, 0), Dual3::variable(y, 1)]);
         let mut limits = Vec::new();
-        tracer.margins(ray, |i, hurdle, margin| {
+        tracer.margins(ray, |i, ray_limit, margin| {
             let surface = &system.surfaces[i];
             // A mirror sets no index.
             let before = system.index_before(i.min(4));
             let rarer = surface.index < before;
             let r = surface.semi_diameter;
             let n2 = before * before;
-            match (hurdle, surface.shape) {
+            match (ray_limit, surface.shape) {
                 (RayLimit::Rim, _) => limits.push(-margin / (r * r * Dual3::TWO)),
                 (RayLimit::Obstruction, _) => {
                     let h = surface.obstruction;
@@ -523,7 +523,7 @@ mod tests {
             let found = tracer.gradient(
                 &[p],
                 |[x, y]| ray([Jet::variable(x, 0), Jet::variable(y, 1)]),
-                |points, abreast| weigh_limits(abreast, &COST, None, points),
+                |points, block| weigh_limits(block, &COST, None, points),
             );
             let check = |name: String, found: f64, named| {
                 let (expected, size) = literal(named, p);

@@ -122,10 +122,10 @@ fn margin_with_slope(
     match limit {
         PupilLimit::Disc => Some((1.0 - p[0] * p[0] - p[1] * p[1], [-2.0 * p[0], -2.0 * p[1]])),
         PupilLimit::Unaimed => None,
-        PupilLimit::Surface(surface, hurdle) => {
-            let color = launch.channel();
-            let value = color.tracer.margin(launch.ray(p)?, surface, hurdle)?;
-            let slope = color.unclipped.margin(launch.dual_ray(p)?, surface, hurdle)?.slope;
+        PupilLimit::Surface(surface, ray_limit) => {
+            let channel = launch.channel();
+            let value = channel.tracer.margin(launch.ray(p)?, surface, ray_limit)?;
+            let slope = channel.unclipped.margin(launch.dual_ray(p)?, surface, ray_limit)?.slope;
             Some((value, slope))
         }
     }

@@ -27,7 +27,7 @@ pub struct DarkPupil {
 struct BlockedRay {
     ray: Ray<f64>,
     surface: usize,
-    constraint: RayLimit,
+    limit: RayLimit,
     /// The amount: in radii of the ideal pupil at a rim, in squared cosines at a surface that is
     /// missed or reflects totally.
     depth: f64,
@@ -52,12 +52,12 @@ impl Region<'_> {
 
 /// The limit that blocks the ray from a point of the pupil most; `None` if the ray passes.
 fn blocked_ray(launch: &Launch<'_>, p: [f64; 2], size: f64) -> Option<BlockedRay> {
-    let (ray, color) = (launch.ray(p)?, launch.channel());
+    let (ray, channel) = (launch.ray(p)?, launch.channel());
     let mut worst: Option<BlockedRay> = None;
-    color.tracer.margins(ray, |surface, hurdle, margin| {
-        let (depth, by_margin) = depth(&color.system, surface, hurdle, margin, size);
+    channel.tracer.margins(ray, |surface, limit, margin| {
+        let (depth, by_margin) = depth(&channel.system, surface, limit, margin, size);
         if worst.is_none_or(|worst| depth > worst.depth) {
-            worst = Some(BlockedRay { ray, surface, constraint: hurdle, depth, by_margin });
+            worst = Some(BlockedRay { ray, surface, limit, depth, by_margin });
         }
     });
     worst.filter(|worst| worst.depth > 0.0)
@@ -67,7 +67,7 @@ fn blocked_ray(launch: &Launch<'_>, p: [f64; 2], size: f64) -> Option<BlockedRay
 fn depth(
     system: &System<f64>,
     surface: usize,
-    hurdle: RayLimit,
+    limit: RayLimit,
     margin: f64,
     size: f64,
 ) -> (f64, f64) {
@@ -77,7 +77,7 @@ fn depth(
         let slope = -0.5 / (height * size);
         (sign * (height - edge) / size, if slope.is_finite() { slope } else { 0.0 })
     };
-    match hurdle {
+    match limit {
         RayLimit::Rim => {
             length(at.semi_diameter, (at.semi_diameter.powi(2) - margin).max(0.0).sqrt(), 1.0)
         }
@@ -99,7 +99,7 @@ fn depth(
 impl DarkPupil {
     /// The mean depth of the rays; 0 if none is blocked.
     pub fn depth(&self) -> f64 {
-        let sum: f64 = self.rays.iter().map(|stopped| stopped.depth).sum();
+        let sum: f64 = self.rays.iter().map(|ray| ray.depth).sum();
         sum / self.rays.len().max(1) as f64
     }
 
@@ -122,13 +122,13 @@ impl DarkPupil {
         let tracer = &region.launch.channel().tracer;
         let by_depth = -factor * self.ideal_area() / self.rays.len().max(1) as f64;
         let mut total = SystemGradient::zero(tracer.surfaces());
-        for (surface, hurdle) in self.constraints() {
-            let here = self.rays.iter().filter(|s| (s.surface, s.constraint) == (surface, hurdle));
+        for (surface, limit) in self.limits() {
+            let here = self.rays.iter().filter(|s| (s.surface, s.limit) == (surface, limit));
             let (rays, weights): (Vec<_>, Vec<f64>) =
                 here.map(|s| (s.ray, by_depth * s.by_margin)).unzip();
             let rays: Rays<f64> = rays.into_iter().collect();
-            let mut found = tracer.margin_gradient(surface, hurdle, &rays, &weights);
-            if hurdle == RayLimit::Rim {
+            let mut found = tracer.margin_gradient(surface, limit, &rays, &weights);
+            if limit == RayLimit::Rim {
                 // Directly, not by the square of a semi-diameter, which may be 0.
                 found.surfaces[surface].semi_diameter = -by_depth * rays.len() as f64 / self.size;
             }
@@ -138,12 +138,12 @@ impl DarkPupil {
     }
 
     /// The limits that block rays, each once.
-    fn constraints(&self) -> Vec<(usize, RayLimit)> {
+    fn limits(&self) -> Vec<(usize, RayLimit)> {
         let mut found = Vec::new();
-        for stopped in &self.rays {
-            let hurdle = (stopped.surface, stopped.constraint);
-            if !found.contains(&hurdle) {
-                found.push(hurdle);
+        for ray in &self.rays {
+            let limit = (ray.surface, ray.limit);
+            if !found.contains(&limit) {
+                found.push(limit);
             }
         }
         found

@@ -64,11 +64,11 @@ impl Launch<'_> {
         let mut probe = LimitProbe { failed: None, margin_at_limit: f64::NAN };
         let Some(ray) = self.ray(p) else { return probe };
         let mut deepest: Option<(PupilLimit, f64)> = None;
-        self.channel().tracer.margins(ray, |surface, hurdle, margin| {
-            if hurdle != RayLimit::Obstruction {
+        self.channel().tracer.margins(ray, |surface, ray_limit, margin| {
+            if ray_limit != RayLimit::Obstruction {
                 return;
             }
-            let limit = PupilLimit::Surface(surface, hurdle);
+            let limit = PupilLimit::Surface(surface, ray_limit);
             if limit == wanted {
                 probe.margin_at_limit = -margin;
             }
@@ -93,12 +93,12 @@ impl Launch<'_> {
             };
         };
         let mut probe = LimitProbe { failed: None, margin_at_limit: f64::NAN };
-        self.channel().tracer.margins(ray, |surface, hurdle, margin| {
-            let limit = PupilLimit::Surface(surface, hurdle);
+        self.channel().tracer.margins(ray, |surface, ray_limit, margin| {
+            let limit = PupilLimit::Surface(surface, ray_limit);
             if limit == wanted {
                 probe.margin_at_limit = margin;
             }
-            if probe.failed.is_none() && !(margin >= 0.0) && sees(hurdle) {
+            if probe.failed.is_none() && !(margin >= 0.0) && sees(ray_limit) {
                 probe.failed = Some((limit, if margin < 0.0 { margin } else { -1.0 }));
             }
         });
@@ -273,10 +273,10 @@ impl<'a> EdgeSearch<'a> {
     /// The margin of a ray at one limit; NaN if it does not get there.
     fn margin(&mut self, azimuth: f64, r: f64, limit: PupilLimit) -> f64 {
         self.rays += 1;
-        let PupilLimit::Surface(surface, hurdle) = limit else { return f64::NAN };
+        let PupilLimit::Surface(surface, ray_limit) = limit else { return f64::NAN };
         let ray = self.launch.ray(self.frame.point(azimuth, r));
         let tracer = &self.launch.channel().tracer;
-        ray.and_then(|ray| tracer.margin(ray, surface, hurdle)).unwrap_or(f64::NAN)
+        ray.and_then(|ray| tracer.margin(ray, surface, ray_limit)).unwrap_or(f64::NAN)
     }
 
     /// The radius at which one limit alone would end the pupil, by the secant method from a guess.
@@ -377,8 +377,8 @@ impl<'a> EdgeSearch<'a> {
             self.rays += 1;
             let mut found = Vec::new();
             if let Some(ray) = self.launch.ray(p) {
-                self.launch.channel().tracer.margins(ray, |surface, hurdle, margin| {
-                    found.push((PupilLimit::Surface(surface, hurdle), margin));
+                self.launch.channel().tracer.margins(ray, |surface, ray_limit, margin| {
+                    found.push((PupilLimit::Surface(surface, ray_limit), margin));
                 });
             }
             found
