@@ -31,7 +31,7 @@ impl ValueEnum for DescentMethod {
 
 impl ValueEnum for SearchMethod {
     fn value_variants<'a>() -> &'a [Self] {
-        &[Self::Restore, Self::Metropolis, Self::Brute]
+        &[Self::Restore, Self::Metropolis, Self::BruteForce]
     }
 
     fn to_possible_value(&self) -> Option<PossibleValue> {
@@ -40,7 +40,7 @@ impl ValueEnum for SearchMethod {
                 value("restore", "Descents that end at random and restart from the reservoir")
             }
             Self::Metropolis => value("metropolis", "Metropolis-Hastings with Langevin steps"),
-            Self::Brute => value("brute", "Each element added and removed once"),
+            Self::BruteForce => value("brute", "Each element added and removed once"),
         }
     }
 }

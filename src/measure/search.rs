@@ -89,7 +89,7 @@ pub fn compare_searches(
     let methods = vec![
         restore,
         row(SearchMethod::Metropolis, usual, None)?,
-        row(SearchMethod::Brute, usual, Some(share.max(1)))?,
+        row(SearchMethod::BruteForce, usual, Some(share.max(1)))?,
     ];
     let tolerances = TOLERANCES.map(|tolerance| row(SearchMethod::Restore, tolerance, None));
     let tolerances = tolerances.into_iter().collect::<Result<_, _>>()?;

@@ -152,7 +152,7 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
 /// The settings that a resumed run may not change.
 fn fixed_settings(settings: &SearchSettings) -> Result<Value, SearchError> {
     let mut fixed = settings.clone();
-    if fixed.method != SearchMethod::Brute {
+    if fixed.method != SearchMethod::BruteForce {
         (fixed.moves, fixed.gradients) = (None, None);
     }
     let unwritable = |error: serde_json::Error| SearchError::Corrupt {

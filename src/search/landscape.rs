@@ -1,6 +1,6 @@
 //! The problem that a search explores.
 
-use super::{MutationError, MutationKind, MutationWeights, Random};
+use super::{MutationError, MutationKind, MutationRecord, MutationWeights, Random, Refusal};
 use serde::{Serialize, de::DeserializeOwned};
 use std::fmt::Debug;
 
@@ -88,7 +88,7 @@ pub trait Landscape: Sync {
         kind: MutationKind,
         _random: &mut Random,
     ) -> Result<MutatedPoint<Self::Point>, MutationError> {
-        Err(MutationError { kind, why: "this landscape has no elements".to_owned() })
+        Err(MutationError::new(kind, Refusal::NoElement))
     }
 
     /// The loss and its gradient by all variables, in the units of Langevin steps; `None` where
@@ -123,7 +123,7 @@ pub struct MutatedPoint<P> {
     /// The kind of mutation.
     pub kind: MutationKind,
     /// The description of the mutation.
-    pub what: String,
+    pub record: MutationRecord,
     /// The logarithm of the ratio of the proposal densities, reverse over forward, times the
     /// determinant of the map, as Metropolis–Hastings needs it; `None` if the mutation is not
     /// reversible.

@@ -25,7 +25,10 @@ pub use bookkeeping::{
 };
 pub use error::SearchError;
 pub use landscape::{Landscape, LossGradient, MutatedPoint, SearchPoint};
-pub use mutation::{MutatedLens, MutationError, MutationKind, MutationWeights, mutate, propose};
+pub use mutation::{
+    MutatedLens, MutationError, MutationKind, MutationRecord, MutationWeights, Refusal,
+    StructureChange, mutate, propose,
+};
 pub use projection::{Projection, ProjectionError};
 pub use rules::{RuleError, SearchRules};
 pub use sampler::{

@@ -8,7 +8,7 @@
 use super::competing_clocks::KnownDensity;
 use super::{
     Landscape, LossGradient, MutatedPoint, MutationError, MutationKind, MutationWeights, Random,
-    Temperature,
+    Refusal, StructureChange, Temperature,
 };
 use rand::RngExt as _;
 use rand_distr::StandardNormal;
@@ -145,7 +145,7 @@ impl ToyLandscape {
         MutatedPoint {
             point,
             kind: MutationKind::AddSinglet,
-            what: "one more in front".to_owned(),
+            record: StructureChange::Text("a singlet more in front".to_owned()).into(),
             log_ratio,
         }
     }
@@ -153,8 +153,9 @@ impl ToyLandscape {
     fn remove(&self, gaps: &[f64]) -> MutatedPoint<Vec<f64>> {
         let range = self.pair[0];
         let log_ratio = Some(-(range[1] - range[0]).ln());
-        let (point, what) = (vec![gaps[1]], "the first one gone".to_owned());
-        MutatedPoint { point, kind: MutationKind::RemoveSinglet, what, log_ratio }
+        let change = StructureChange::Text("without the first singlet".to_owned());
+        let (point, record) = (vec![gaps[1]], change.into());
+        MutatedPoint { point, kind: MutationKind::RemoveSinglet, record, log_ratio }
     }
 
     fn shift(&self, gaps: &[f64], random: &mut Random) -> MutatedPoint<Vec<f64>> {
@@ -163,7 +164,7 @@ impl ToyLandscape {
         MutatedPoint {
             point,
             kind: MutationKind::Bend,
-            what: "shifted".to_owned(),
+            record: StructureChange::Text("shifted".to_owned()).into(),
             log_ratio: Some(0.0),
         }
     }
@@ -204,13 +205,12 @@ impl Landscape for ToyLandscape {
             self.remove(gaps)
         };
         let kind = mutated.kind;
-        let refused = |why: &str| MutationError { kind, why: why.to_owned() };
         if weights.of(kind) == 0.0 {
-            Err(refused("it is forbidden"))
+            Err(MutationError::new(kind, Refusal::Excluded))
         } else if self.contains(&mutated.point) {
             Ok(mutated)
         } else {
-            Err(refused("a gap would be out of its range"))
+            Err(MutationError::new(kind, Refusal::OutOfRange))
         }
     }
 
@@ -236,7 +236,7 @@ impl Landscape for ToyLandscape {
         match (kind, gaps.len()) {
             (MutationKind::AddSinglet, 1) => Ok(self.add(gaps, random)),
             (MutationKind::RemoveSinglet, 2) => Ok(self.remove(gaps)),
-            _ => Err(MutationError { kind, why: format!("there are {} singlets", gaps.len()) }),
+            _ => Err(MutationError::new(kind, Refusal::NoElement)),
         }
     }
 

@@ -4,12 +4,12 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use aplanat::files;
-use aplanat::lens::{Fields, Lens, Medium};
+use aplanat::lens::{Fields, Lens, Medium, SurfaceNumber};
 use aplanat::merit::ConstraintMargin;
 use aplanat::optimize::pareto::ParetoPoint;
 use aplanat::search::{
     DescentEnd, LineageNode, MutationKind, MutationStatistics, MutationWeights, OfferOutcome,
-    SearchMethod, SearchStatistics, SteerCommand, Temperature,
+    Refusal, SearchMethod, SearchStatistics, SteerCommand, StructureChange, Temperature,
 };
 use aplanat::session::{
     ChainPosition, CheckpointStatus, Command, DescentMark, FoundLens, HistorySample, RunId,
@@ -81,13 +81,17 @@ fn node(number: u64, kind: Option<MutationKind>) -> Arc<LineageNode<Arc<Lens>>> 
         parent: number.checked_sub(1),
         chain: 0,
         kind,
-        what: if number == 0 { "the start" } else { "a plate before surface 3" }.to_owned(),
-        before: kind.map(|_| 0.05),
-        mutated: 0.08,
-        descended: 0.02,
+        mutation: if number == 0 {
+            StructureChange::Start.into()
+        } else {
+            StructureChange::Split { surface: SurfaceNumber::new(2) }.into()
+        },
+        loss_before: kind.map(|_| 0.05),
+        start_loss: 0.08,
+        best_loss: 0.02,
         moves: 17,
         gradients: 340,
-        ended: Some(DescentEnd::Clock),
+        end: Some(DescentEnd::Regeneration),
         offer: Some(OfferOutcome::Entered),
         point: other(number),
     })
@@ -125,7 +129,7 @@ fn searching(standing: RunStatus) -> SessionView {
     });
     let mut statistics =
         SearchStatistics { moves: 60, gradients: 1200, ..SearchStatistics::default() };
-    let refused = [("no gap is wide enough before surface 3".to_owned(), 3)].into();
+    let refused = [(Refusal::NoAirGap, 3)].into();
     let tally = MutationStatistics {
         tried: 5,
         refused,
@@ -302,8 +306,9 @@ fn moves_are_counted_with_reasons() {
     harness.get_by_label("Weight of add singlet");
     harness.get_by_label("1 of 2");
     harness.get_by_label("17");
-    harness
-        .get_by_label_contains("Add singlet, 3 × refused: no gap is wide enough before surface 3");
+    harness.get_by_label_contains(
+        "Add singlet, 3 × refused: no air gap that the rules allow to change",
+    );
 }
 
 #[test]
@@ -311,7 +316,7 @@ fn every_lens_tells_where_it_came_from() {
     let mut harness = panel(searching(RunStatus::Stopped));
     press(&mut harness, "Family");
     harness.get_by_label("Family tree of 2 generations");
-    harness.get_by_label("add singlet: a plate before surface 3");
+    harness.get_by_label("add singlet: split the cemented surface 3");
     harness.get_by_label("the start");
     harness.get_by_label_contains(
         "merit 0.05 before, 0.08 after the mutation, 0.02 after the descent",

@@ -59,7 +59,7 @@ fn name(method: SearchMethod) -> &'static str {
     match method {
         SearchMethod::Restore => "RESTORE",
         SearchMethod::Metropolis => "Metropolis-Hastings",
-        SearchMethod::Brute => "brute force",
+        SearchMethod::BruteForce => "brute force",
     }
 }
 

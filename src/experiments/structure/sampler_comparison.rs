@@ -36,7 +36,7 @@ impl SamplerKind {
         own.settings.method = match self {
             Self::Restore | Self::Descent => SearchMethod::Restore,
             Self::Metropolis => SearchMethod::Metropolis,
-            Self::Brute => SearchMethod::Brute,
+            Self::Brute => SearchMethod::BruteForce,
         };
         if self == Self::Descent {
             own.settings = without_termination(&own.settings);

@@ -1,7 +1,7 @@
 //! The lineage of a search: the start, origin and outcome of every descent.
 
 use super::OfferOutcome;
-use crate::search::MutationKind;
+use crate::search::mutation::{MutationKind, MutationRecord, read_record};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeSet;
 
@@ -20,19 +20,24 @@ pub struct LineageNode<P> {
     /// The kind of mutation; `None` for the start.
     pub kind: Option<MutationKind>,
     /// The mutation that it began with.
-    pub what: String,
+    #[serde(rename = "what", deserialize_with = "read_record")]
+    pub mutation: MutationRecord,
     /// The loss before the mutation; `None` if there was no mutation.
-    pub before: Option<f64>,
+    #[serde(rename = "before")]
+    pub loss_before: Option<f64>,
     /// The loss after the mutation.
-    pub mutated: f64,
+    #[serde(rename = "mutated")]
+    pub start_loss: f64,
     /// The best loss of the descent so far.
-    pub descended: f64,
+    #[serde(rename = "descended")]
+    pub best_loss: f64,
     /// Local moves of the descent so far.
     pub moves: u64,
     /// Gradients of the descent so far.
     pub gradients: u64,
     /// The reason for the end of the descent; `None` while it is in progress.
-    pub ended: Option<DescentEnd>,
+    #[serde(rename = "ended")]
+    pub end: Option<DescentEnd>,
     /// The outcome of the offer to the reservoir; `None` while the descent is in progress.
     pub offer: Option<OfferOutcome>,
     /// The start of the descent while it is in progress, afterwards its best point.
@@ -44,13 +49,17 @@ pub struct LineageNode<P> {
 #[serde(rename_all = "snake_case")]
 pub enum DescentEnd {
     /// A random regeneration.
-    Clock,
+    #[serde(rename = "clock")]
+    Regeneration,
     /// The maximum number of moves was reached.
-    Longest,
+    #[serde(rename = "longest")]
+    MaxMoves,
     /// The loss was not finite.
-    Lost,
+    #[serde(rename = "lost")]
+    InfiniteLoss,
     /// A mutation was accepted; Metropolis–Hastings only.
-    Mutated,
+    #[serde(rename = "mutated")]
+    Mutation,
     /// The gradient budget was used up; brute force only.
     Budget,
 }

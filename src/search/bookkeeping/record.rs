@@ -16,7 +16,7 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
         L: Landscape<Point = P, Memory = M>,
     {
         match happening {
-            TurnEvent::Refused(refusal) => self.statistics.refuse(&refusal),
+            TurnEvent::Refused(error) => self.statistics.refuse(error),
             TurnEvent::Rejected(kind) => {
                 let tally = self.statistics.kind(kind);
                 tally.tried += 1;
@@ -49,25 +49,26 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
         if let Some(node) = self.tree.node_mut(number) {
             node.moves += 1;
             node.gradients += moved.gradients;
-            node.descended = moved.best;
+            node.best_loss = moved.best;
         }
     }
 
     /// Offers the best point of a descent to the reservoir and records the outcome; true if it is
     /// the best of all. Algorithm 1 offers the last point, which is worse if the descent ended with
     /// a bad move.
-    fn record_end(&mut self, entry: ReservoirEntry<P>, ended: DescentEnd) -> bool {
-        *self.statistics.ended.entry(ended).or_default() += 1;
+    fn record_end(&mut self, entry: ReservoirEntry<P>, end: DescentEnd) -> bool {
+        *self.statistics.ended.entry(end).or_default() += 1;
         let (number, loss, point) = (entry.number, entry.loss, entry.point.clone());
         let best = self.update_best(&entry);
         let offer = self.reservoir.offer(entry);
         let Some(node) = self.tree.node_mut(number) else { return best };
-        node.ended = Some(ended);
+        node.end = Some(end);
         node.offer = Some(offer);
-        node.descended = loss;
+        node.best_loss = loss;
         node.point = point;
         if let Some(kind) = node.kind {
-            let (moves, improved) = (node.moves, node.before.is_some_and(|before| loss < before));
+            let (moves, improved) =
+                (node.moves, node.loss_before.is_some_and(|before| loss < before));
             let tally = self.statistics.kind(kind);
             tally.ended += 1;
             tally.moves += moves;
@@ -96,7 +97,7 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
         L: Landscape<Point = P, Memory = M>,
     {
         let number = self.chains[chain].number;
-        let may_be_better = |loss: f64| loss < self.best.loss || self.best.outside > 0;
+        let may_be_better = |loss: f64| loss < self.best.loss || self.best.structure_violation > 0;
         let best = self.chains[chain].best().filter(|(_, loss)| may_be_better(*loss));
         let entry =
             best.map(|(point, loss)| ReservoirEntry::new(landscape, number, loss, point.clone()));

@@ -22,8 +22,8 @@ pub struct ReservoirEntry<P> {
     /// Its topology.
     pub topology: String,
     /// The distance of its structure from the permitted ones; 0 if it is permitted.
-    #[serde(default)]
-    pub outside: u64,
+    #[serde(default, rename = "outside")]
+    pub structure_violation: u64,
     /// The point.
     pub point: P,
 }
@@ -31,19 +31,21 @@ pub struct ReservoirEntry<P> {
 impl<P> ReservoirEntry<P> {
     /// The entry of a point of a landscape.
     pub fn new<L: Landscape<Point = P>>(landscape: &L, number: u64, loss: f64, point: P) -> Self {
-        let (topology, outside) =
-            (landscape.topology(&point), landscape.structure_violation(&point));
-        Self { number, loss, topology, outside, point }
+        let topology = landscape.topology(&point);
+        let structure_violation = landscape.structure_violation(&point);
+        Self { number, loss, topology, structure_violation, point }
     }
 
     /// Orders entries from best to worst: first by the structure violation, then by the loss.
     pub fn rank(&self, other: &Self) -> Ordering {
-        self.outside.cmp(&other.outside).then(self.loss.total_cmp(&other.loss))
+        self.structure_violation
+            .cmp(&other.structure_violation)
+            .then(self.loss.total_cmp(&other.loss))
     }
 
     /// True if it is better than another one.
     pub fn is_better_than(&self, other: &Self) -> bool {
-        (self.outside, self.loss) < (other.outside, other.loss)
+        (self.structure_violation, self.loss) < (other.structure_violation, other.loss)
     }
 }
 
@@ -56,13 +58,17 @@ pub enum OfferOutcome {
     /// Accepted in place of this generation.
     Replaced(u64),
     /// Rejected: the same point is already in the reservoir, under this generation.
-    Same(u64),
+    #[serde(rename = "same")]
+    AlreadyPresent(u64),
     /// Rejected: this generation has the same topology and is at least as good.
-    BehindTwin(u64),
+    #[serde(rename = "behind_twin")]
+    RejectedSameTopology(u64),
     /// Rejected: the reservoir is full and all its points are at least as good.
-    BehindAll,
+    #[serde(rename = "behind_all")]
+    RejectedWorse,
     /// Rejected: the loss is not finite.
-    Worthless,
+    #[serde(rename = "worthless")]
+    RejectedNonFinite,
 }
 
 impl OfferOutcome {
@@ -97,22 +103,22 @@ impl<P: Clone + PartialEq> Reservoir<P> {
     /// is better; otherwise it takes a free place, or that of the worst point if it is better.
     pub fn offer(&mut self, entry: ReservoirEntry<P>) -> OfferOutcome {
         if !entry.loss.is_finite() {
-            return OfferOutcome::Worthless;
+            return OfferOutcome::RejectedNonFinite;
         }
         if let Some(same) = self.entries.iter().find(|old| old.point == entry.point) {
-            return OfferOutcome::Same(same.number);
+            return OfferOutcome::AlreadyPresent(same.number);
         }
         let twin = self.entries.iter_mut().find(|old| old.topology == entry.topology);
         if let Some(twin) = twin.filter(|_| self.one_per_topology) {
-            return replace_if_better(twin, entry, OfferOutcome::BehindTwin);
+            return replace_if_better(twin, entry, OfferOutcome::RejectedSameTopology);
         }
         if self.entries.len() < self.size {
             self.entries.push(entry);
             return OfferOutcome::Entered;
         }
         let worst = self.entries.iter_mut().max_by(|a, b| a.rank(b));
-        worst.map_or(OfferOutcome::BehindAll, |worst| {
-            replace_if_better(worst, entry, |_| OfferOutcome::BehindAll)
+        worst.map_or(OfferOutcome::RejectedWorse, |worst| {
+            replace_if_better(worst, entry, |_| OfferOutcome::RejectedWorse)
         })
     }
 }

@@ -1,13 +1,9 @@
 //! Counters of a run.
 
 use super::DescentEnd;
-use crate::search::{MutationError, MutationKind};
+use crate::search::mutation::{MutationError, MutationKind, Refusal, read_counts};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-
-/// So many reasons are told apart for each kind; what comes later is counted together.
-const REASONS: usize = 24;
-const OTHER: &str = "other reasons";
 
 /// Counters of a run: moves, gradients, mutations and descents.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
@@ -36,7 +32,8 @@ pub struct MutationStatistics {
     /// Attempts.
     pub tried: u64,
     /// Refused attempts by reason.
-    pub refused: BTreeMap<String, u64>,
+    #[serde(deserialize_with = "read_counts")]
+    pub refused: BTreeMap<Refusal, u64>,
     /// Attempts rejected by the Metropolis–Hastings test.
     pub rejected: u64,
     /// Completed descents that began with this mutation.
@@ -62,11 +59,9 @@ impl SearchStatistics {
         self.kinds.entry(kind).or_default()
     }
 
-    pub(in crate::search) fn refuse(&mut self, refusal: &MutationError) {
-        let tally = self.kind(refusal.kind);
-        tally.tried += 1;
-        let known = tally.refused.contains_key(&refusal.why) || tally.refused.len() < REASONS;
-        let why = if known { &refusal.why } else { OTHER };
-        *tally.refused.entry(why.to_owned()).or_default() += 1;
+    pub(in crate::search) fn refuse(&mut self, error: MutationError) {
+        let statistics = self.kind(error.kind);
+        statistics.tried += 1;
+        *statistics.refused.entry(error.refusal).or_default() += 1;
     }
 }

@@ -26,7 +26,7 @@ pub use violations::describe_violation;
 
 use super::{
     Landscape, LossGradient, MutatedPoint, MutationError, MutationKind, MutationWeights, Random,
-    RuleError, SearchRules, element, mutation,
+    Refusal, RuleError, SearchRules, element, mutation,
 };
 use crate::lens::{Lens, LensError};
 use crate::merit::{Goal, Merit, MeritError};
@@ -299,8 +299,7 @@ impl Landscape for LensLandscape {
                 return Ok(lens);
             }
         }
-        let why = format!("none of {MAX_DRAWS} lenses that were drawn passes light");
-        Err(MutationError { kind: MutationKind::Global, why })
+        Err(MutationError::new(MutationKind::Global, Refusal::NoRandomLens))
     }
 
     fn mutate(
@@ -348,7 +347,7 @@ impl Landscape for LensLandscape {
     ) -> Result<MutatedPoint<Lens>, MutationError> {
         let rows = lens.surfaces.len();
         let Some(element) = element::elements(lens).get(element).copied() else {
-            return Err(MutationError::new(kind, "there is no such element"));
+            return Err(MutationError::new(kind, Refusal::NoElement));
         };
         // Only what lies between these surfaces may change, within the rules.
         let (first, last) = match kind {

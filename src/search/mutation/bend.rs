@@ -1,16 +1,18 @@
 //! Bends an element: all its curvatures change by the same amount, which preserves the power of a
 //! thin one.
 
-use super::distributions::{bernoulli, choose, sample_normal};
-use super::draft::{MutationContext, MutationDraft, ReverseMove, has_pickup};
+use super::distributions::{choose, curvature_deviation, random_projection_map, sample_normal};
+use super::draft::{MutationContext, MutationDraft, ReverseMove};
 use super::kind::MutationKind;
+use super::queries::has_pickup;
+use super::record::StructureChange;
+use super::refusal::Refusal;
 use crate::lens::{Lens, Parameter, Quantity};
 use crate::search::element::{Element, ElementKind, elements};
-use crate::search::projection::ProjectionMap;
 use crate::search::{Random, SearchRules};
 
 /// The elements that may be bent.
-pub(super) fn places(lens: &Lens, rules: &SearchRules) -> Result<Vec<Element>, String> {
+pub(super) fn sites(lens: &Lens, rules: &SearchRules) -> Result<Vec<Element>, Refusal> {
     let rows = lens.surfaces.len();
     let may = |e: &Element| {
         let glass = matches!(e.kind, ElementKind::Glass(_));
@@ -19,36 +21,32 @@ pub(super) fn places(lens: &Lens, rules: &SearchRules) -> Result<Vec<Element>, S
         glass && free && (e.first..=e.last).all(bends)
     };
     let found: Vec<_> = elements(lens).into_iter().filter(may).collect();
-    if found.is_empty() {
-        Err("no element whose curvatures are free".to_owned())
-    } else {
-        Ok(found)
-    }
+    if found.is_empty() { Err(Refusal::NoFreeCurvatures) } else { Ok(found) }
 }
 
 /// Bends an element.
 pub(super) fn draw(
-    scene: &MutationContext<'_>,
+    context: &MutationContext<'_>,
     random: &mut Random,
-) -> Result<MutationDraft, String> {
-    let places = places(&scene.lens, scene.rules)?;
-    let element = choose(&places, random).copied().ok_or("no place")?;
-    let by = sample_normal(scene.curvature_deviation(), random);
-    let mut draft = scene.start_draft(places.len());
+) -> Result<MutationDraft, Refusal> {
+    let sites = sites(&context.lens, context.rules)?;
+    let element = choose(&sites, random).copied().ok_or(Refusal::NoFreeCurvatures)?;
+    let by = sample_normal(curvature_deviation(context.scale), random);
+    let mut draft = context.start_draft(sites.len());
     for row in element.first..=element.last {
         draft.lens.surfaces[row].curvature += by;
         draft.origins[row].curvature = None;
         check_bounds(&draft.lens, row)?;
     }
     draft.map = random_projection_map(random);
-    draft.back = Some(ReverseMove::new(MutationKind::Bend, 0.0));
+    draft.reverse = Some(ReverseMove::new(MutationKind::Bend, 0.0));
     let Element { first, last, .. } = element;
-    draft.what = format!("bent the element of surfaces {first} to {last} by {by:.5}/mm");
+    draft.change = StructureChange::Bend { first: first.into(), last: last.into(), by };
     Ok(draft)
 }
 
 /// Refuses a curvature outside the bounds of its variable.
-fn check_bounds(lens: &Lens, row: usize) -> Result<(), String> {
+fn check_bounds(lens: &Lens, row: usize) -> Result<(), Refusal> {
     let curvature = lens.surfaces[row].curvature;
     let Some(variable) = lens.variable(Parameter::new(row, Quantity::Curvature)) else {
         return Ok(());
@@ -58,11 +56,5 @@ fn check_bounds(lens: &Lens, row: usize) -> Result<(), String> {
     if low && high {
         return Ok(());
     }
-    Err(format!("the curvature of surface {row} would leave the bounds of its variable"))
-}
-
-/// A random projection for a mutation that is its own reverse, so that each of the two undoes the
-/// other.
-pub(super) fn random_projection_map(random: &mut Random) -> ProjectionMap {
-    if bernoulli(0.5, random) { ProjectionMap::Nearest } else { ProjectionMap::AlongNormals }
+    Err(Refusal::CurvatureBounds)
 }

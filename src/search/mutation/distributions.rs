@@ -2,6 +2,7 @@
 
 use crate::lens::Lens;
 use crate::lens::glass::{self, Glass};
+use crate::search::projection::ProjectionMap;
 use crate::search::{Random, SearchRules};
 use rand::RngExt as _;
 use rand_distr::StandardNormal;
@@ -70,4 +71,20 @@ pub(super) fn usable_glasses(lens: &Lens, rules: &SearchRules) -> Vec<&'static G
         return glass::catalogue().iter().filter(reaches).collect();
     }
     rules.glasses.iter().filter_map(|name| glass::find(name)).filter(reaches).collect()
+}
+
+/// A random projection for a mutation that is its own reverse, so that each of the two undoes the
+/// other.
+pub(super) fn random_projection_map(random: &mut Random) -> ProjectionMap {
+    if bernoulli(0.5, random) { ProjectionMap::Nearest } else { ProjectionMap::AlongNormals }
+}
+
+/// The size of a lens of a scale relative to one of 50 mm, for which random lengths are defined.
+pub(super) fn size_ratio(scale: f64) -> f64 {
+    scale / 50.0
+}
+
+/// The standard deviation of a random curvature in 1/mm for a lens of a scale: 0.005 for 50 mm.
+pub(super) fn curvature_deviation(scale: f64) -> f64 {
+    0.25 / scale
 }

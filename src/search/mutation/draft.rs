@@ -1,8 +1,11 @@
 //! A lens under mutation: the origin of each parameter moves with its row.
 
-use super::add::{Neighbour, SingletParameters};
 use super::kind::MutationKind;
-use crate::lens::{Lens, Medium, Parameter, Quantity, Row, ZoomThickness, add_variable};
+use super::queries::{has_solve, is_gap, is_zoomed};
+use super::record::StructureChange;
+use super::singlet::SingletProposal;
+use super::spacing::SpacingChoice;
+use crate::lens::{Lens, Parameter, Quantity, Row, ZoomThickness, add_variable};
 use crate::search::SearchRules;
 use crate::search::projection::{ProjectionMap, RowOrigin, scale};
 
@@ -38,38 +41,20 @@ impl ReverseMove {
     }
 }
 
-/// A singlet that could be drawn for a lens of a scale.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct SingletProposal {
-    pub(super) singlet: SingletParameters,
-    pub(super) neighbour: Neighbour,
-    pub(super) scale: f64,
-}
-
-/// The choice whether the rest of the lens keeps its place when an element is added to a gap.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct SpacingChoice {
-    pub(super) gap: usize,
-    /// The length of the element with its air space, in mm.
-    pub(super) length: f64,
-    /// True if the rest of the lens keeps its place.
-    pub(super) keeps_rest: bool,
-}
-
 /// A mutated lens before projection and repair.
 #[derive(Debug)]
 pub(super) struct MutationDraft {
     pub(super) lens: Lens,
     pub(super) origins: Vec<RowOrigin>,
-    pub(super) what: String,
+    pub(super) change: StructureChange,
     /// Rows with new glass behind them.
     pub(super) fresh: Vec<usize>,
     /// Rows without a semi-diameter.
     pub(super) rimless: Vec<usize>,
     pub(super) map: ProjectionMap,
     /// The number of sites where the mutation could have been made.
-    pub(super) places: usize,
-    pub(super) back: Option<ReverseMove>,
+    pub(super) sites: usize,
+    pub(super) reverse: Option<ReverseMove>,
 }
 
 impl<'a> MutationContext<'a> {
@@ -77,85 +62,24 @@ impl<'a> MutationContext<'a> {
         Self { lens, rules, scale }
     }
 
-    /// The scale relative to a lens of 50 mm, for which random lengths are defined.
-    pub(super) fn size_ratio(&self) -> f64 {
-        self.scale / 50.0
-    }
-
-    /// The standard deviation of a random curvature in 1/mm: 0.005 for a lens of 50 mm.
-    pub(super) fn curvature_deviation(&self) -> f64 {
-        0.25 / self.scale
-    }
-
     /// The scale of the lens after a mutation; unchanged if it is projected.
     pub(super) fn scale_after(&self, mutated: &Lens) -> Option<f64> {
         if self.rules.projection { Some(self.scale) } else { scale(mutated).ok() }
     }
 
-    pub(super) fn start_draft(&self, places: usize) -> MutationDraft {
+    pub(super) fn start_draft(&self, sites: usize) -> MutationDraft {
         let origin = |row| RowOrigin { curvature: Some((row, 1.0)), gap: Some(row) };
         MutationDraft {
             lens: self.lens.clone(),
             origins: (0..self.lens.surfaces.len()).map(origin).collect(),
-            what: String::new(),
+            change: StructureChange::Start,
             fresh: Vec::new(),
             rimless: Vec::new(),
             map: ProjectionMap::Nearest,
-            places,
-            back: None,
+            sites,
+            reverse: None,
         }
     }
-}
-
-/// True if a quantity is the gap behind a row.
-pub(super) fn is_gap(quantity: Quantity) -> bool {
-    matches!(quantity, Quantity::Thickness | Quantity::ZoomThickness(_))
-}
-
-/// True if a quantity belongs to the medium behind a row: the index or a gradient-index
-/// coefficient.
-pub(super) fn is_of_medium(quantity: Quantity) -> bool {
-    matches!(quantity, Quantity::Index | Quantity::Grin(_))
-}
-
-/// True if a pickup reads or sets a quantity of a row that `is_it` selects.
-pub(super) fn has_pickup(lens: &Lens, row: usize, is_it: impl Fn(Quantity) -> bool) -> bool {
-    let concerned = |p: Parameter| p.surface == row && is_it(p.quantity);
-    lens.pickups.iter().any(|pickup| concerned(pickup.parameter) || concerned(pickup.source))
-}
-
-/// True if a gap has its own thickness at some zoom position.
-pub(super) fn is_zoomed(lens: &Lens, row: usize) -> bool {
-    lens.zoom.iter().any(|position| position.thicknesses.iter().any(|gap| gap.surface == row))
-}
-
-/// True if a surface is a plain sphere or plane.
-pub(super) fn is_plain(row: &Row) -> bool {
-    let figured = row.conic != 0.0 || row.asphere.iter().any(|a| *a != 0.0);
-    !figured && !row.hyperhemisphere && row.obstruction.is_none()
-}
-
-/// The minimum length of a gap over the zoom positions, positive along the light.
-pub(super) fn shortest_gap(lens: &Lens, row: usize) -> f64 {
-    let gaps = (0..lens.zoom_positions()).filter_map(|zoom| lens.thickness_at(row, zoom));
-    let sense = light_direction(lens, row);
-    gaps.fold(f64::INFINITY, |least, gap| least.min(sense * gap))
-}
-
-/// The sign of lengths behind a row: −1 where light travels towards −z.
-pub(super) fn light_direction(lens: &Lens, row: usize) -> f64 {
-    lens.light_direction(row)
-}
-
-/// True if the length of a gap is solved for focus.
-pub(super) fn has_solve(lens: &Lens, row: usize) -> bool {
-    lens.image_solve.is_some() && row + 1 == lens.surfaces.len()
-}
-
-/// The medium in the gap behind a row; behind a mirror that in front of it.
-pub(super) fn medium_after(lens: &Lens, row: usize) -> Medium {
-    let media = lens.surfaces[..=row].iter().rev().map(|row| &row.medium);
-    media.chain([&lens.object_medium]).find(|m| **m != Medium::Mirror).cloned().unwrap_or_default()
 }
 
 impl MutationDraft {
@@ -209,7 +133,7 @@ impl MutationDraft {
 
     /// Lengthens a gap by `by` mm along the light, at every zoom position.
     pub(super) fn lengthen(&mut self, row: usize, by: f64) {
-        let by = by * light_direction(&self.lens, row);
+        let by = by * self.lens.light_direction(row);
         self.lens.surfaces[row].thickness += by;
         for gap in self.lens.zoom.iter_mut().flat_map(|position| &mut position.thicknesses) {
             if gap.surface == row {

@@ -1,9 +1,10 @@
 //! Removes the first or last piece of a cemented group; air takes its place.
 
 use super::distributions::choose;
-use super::draft::{
-    MutationContext, MutationDraft, has_pickup, has_solve, is_gap, is_of_medium, light_direction,
-};
+use super::draft::{MutationContext, MutationDraft};
+use super::queries::{has_pickup, has_solve, is_gap, is_of_medium};
+use super::record::StructureChange;
+use super::refusal::Refusal;
 use crate::lens::Lens;
 use crate::search::element::{Element, ElementKind, elements, piece_count};
 use crate::search::{Random, SearchRules};
@@ -28,19 +29,16 @@ impl GroupEnd {
 }
 
 /// The pieces that may be removed.
-pub(super) fn places(lens: &Lens, rules: &SearchRules) -> Result<Vec<GroupEnd>, String> {
+pub(super) fn sites(lens: &Lens, rules: &SearchRules) -> Result<Vec<GroupEnd>, Refusal> {
     let least = rules.elements[0];
     if piece_count(lens) < least + 1 {
-        return Err(format!(
-            "the lens has {} elements, the rules ask for {least}",
-            piece_count(lens)
-        ));
+        return Err(Refusal::TooFewElements);
     }
     let groups = elements(lens).into_iter().filter(|e| matches!(e.kind, ElementKind::Glass(2..)));
     let layers = groups.flat_map(|group| [true, false].map(|front| GroupEnd { group, front }));
     let found: Vec<_> = layers.filter(|layer| may_go(lens, *layer, rules)).collect();
     if found.is_empty() {
-        return Err("no cemented group whose outer piece may go".to_owned());
+        return Err(Refusal::NoCementedGroup);
     }
     Ok(found)
 }
@@ -60,18 +58,18 @@ fn may_go(lens: &Lens, layer: GroupEnd, rules: &SearchRules) -> bool {
 
 /// Removes a piece.
 pub(super) fn draw(
-    scene: &MutationContext<'_>,
+    context: &MutationContext<'_>,
     random: &mut Random,
-) -> Result<MutationDraft, String> {
-    let places = places(&scene.lens, scene.rules)?;
-    let layer = choose(&places, random).copied().ok_or("no place")?;
-    let mut draft = scene.start_draft(places.len());
+) -> Result<MutationDraft, Refusal> {
+    let sites = sites(&context.lens, context.rules)?;
+    let layer = choose(&sites, random).copied().ok_or(Refusal::NoCementedGroup)?;
+    let mut draft = context.start_draft(sites.len());
     let outer = layer.outer();
-    let place = if layer.front { "front" } else { "rear" };
-    draft.what = format!("dropped the {place} piece of the group at surface {}", layer.group.first);
+    draft.change =
+        StructureChange::DropLayer { first: layer.group.first.into(), front: layer.front };
     let glass = if layer.front { outer } else { outer - 1 };
-    let length = scene.lens.surfaces[glass].thickness * light_direction(&scene.lens, glass);
-    if let Some(gap) = layer.gap().filter(|gap| !has_solve(&scene.lens, *gap)) {
+    let length = context.lens.surfaces[glass].thickness * context.lens.light_direction(glass);
+    if let Some(gap) = layer.gap().filter(|gap| !has_solve(&context.lens, *gap)) {
         draft.lengthen(gap, length);
     }
     remove_piece(&mut draft, layer);

@@ -1,9 +1,10 @@
 //! Exchanges a catalogue glass for one with a similar index and Abbe number.
 
-use super::bend::random_projection_map;
-use super::distributions::{choose, usable_glasses};
+use super::distributions::{choose, random_projection_map, usable_glasses};
 use super::draft::{MutationContext, MutationDraft, ReverseMove};
 use super::kind::MutationKind;
+use super::record::StructureChange;
+use super::refusal::Refusal;
 use crate::lens::glass::{self, Glass};
 use crate::lens::{Lens, Medium};
 use crate::search::element::{ElementKind, elements};
@@ -17,7 +18,7 @@ const INDEX_DEVIATION: f64 = 0.02;
 const ABBE_DEVIATION: f64 = 3.0;
 
 /// The rows with an exchangeable catalogue glass behind them.
-pub(super) fn places(lens: &Lens, rules: &SearchRules) -> Result<Vec<usize>, String> {
+pub(super) fn sites(lens: &Lens, rules: &SearchRules) -> Result<Vec<usize>, Refusal> {
     let rows = lens.surfaces.len();
     let elements = elements(lens).into_iter().filter(|e| matches!(e.kind, ElementKind::Glass(_)));
     let free: Vec<usize> = elements
@@ -31,13 +32,8 @@ pub(super) fn places(lens: &Lens, rules: &SearchRules) -> Result<Vec<usize>, Str
     if !found.is_empty() {
         return Ok(found);
     }
-    let none = "no glass of the catalogue that may be exchanged";
-    let graded = of(|medium| matches!(medium, Medium::Grin(_))).next();
-    Err(graded.map_or(none.to_owned(), |row| {
-        format!(
-            "{none}: the medium behind surface {row} is a gradient, which has no neighbour there"
-        )
-    }))
+    let is_grin = of(|medium| matches!(medium, Medium::Grin(_))).next().is_some();
+    Err(if is_grin { Refusal::OnlyGradients } else { Refusal::NoExchangeableGlass })
 }
 
 /// The relative probability of exchanging one glass for the other.
@@ -52,18 +48,18 @@ fn is_same(a: &Glass, b: &Glass) -> bool {
 
 /// Exchanges a glass.
 pub(super) fn draw(
-    scene: &MutationContext<'_>,
+    context: &MutationContext<'_>,
     random: &mut Random,
-) -> Result<MutationDraft, String> {
-    let places = places(&scene.lens, scene.rules)?;
-    let row = choose(&places, random).copied().ok_or("no place")?;
-    let Medium::Glass(name) = &scene.lens.surfaces[row].medium else {
-        return Err("no glass of the catalogue".to_owned());
+) -> Result<MutationDraft, Refusal> {
+    let sites = sites(&context.lens, context.rules)?;
+    let row = choose(&sites, random).copied().ok_or(Refusal::NoExchangeableGlass)?;
+    let Medium::Glass(name) = &context.lens.surfaces[row].medium else {
+        return Err(Refusal::NoExchangeableGlass);
     };
-    let old = glass::find(name).ok_or("an unknown glass")?;
-    let all = usable_glasses(&scene.lens, scene.rules);
+    let old = glass::find(name).ok_or(Refusal::NoExchangeableGlass)?;
+    let all = usable_glasses(&context.lens, context.rules);
     let choice: Vec<_> =
-        all.into_iter().filter(|glass| !is_cemented_to(&scene.lens, row, glass)).collect();
+        all.into_iter().filter(|glass| !is_cemented_to(&context.lens, row, glass)).collect();
     let weight =
         |from: &Glass, to: &Glass| if is_same(from, to) { 0.0 } else { glass_similarity(from, to) };
     let sum = |from: &Glass| choice.iter().map(|to| weight(from, to)).sum::<f64>();
@@ -72,16 +68,20 @@ pub(super) fn draw(
         left -= weight(old, to);
         left < 0.0
     });
-    let new = *chosen.ok_or_else(|| format!("no other glass of the rules is near {name}"))?;
-    let mut draft = scene.start_draft(places.len());
+    let new = *chosen.ok_or(Refusal::NoSimilarGlass)?;
+    let mut draft = context.start_draft(sites.len());
     draft.lens.surfaces[row].medium = Medium::Glass(new.full_name());
     draft.fresh = vec![row];
     draft.map = random_projection_map(random);
     let known = choice.iter().any(|glass| is_same(glass, old));
     // The similarity is symmetric, its normalization is not.
     let log = sum(old).ln() - sum(new).ln();
-    draft.back = known.then_some(ReverseMove::new(MutationKind::ExchangeGlass, log));
-    draft.what = format!("exchanged {name} behind surface {row} for {}", new.full_name());
+    draft.reverse = known.then_some(ReverseMove::new(MutationKind::ExchangeGlass, log));
+    draft.change = StructureChange::ExchangeGlass {
+        surface: row.into(),
+        from: name.clone(),
+        to: new.full_name(),
+    };
     Ok(draft)
 }
 

@@ -1,36 +1,31 @@
 //! Reverses an element with its media: an axial index gradient is expressed from its other end.
 
-use super::bend::random_projection_map;
-use super::distributions::choose;
-use super::draft::{
-    MutationContext, MutationDraft, ReverseMove, has_pickup, is_gap, is_of_medium, is_zoomed,
-};
+use super::distributions::{choose, random_projection_map};
+use super::draft::{MutationContext, MutationDraft, ReverseMove};
 use super::kind::MutationKind;
+use super::queries::{has_pickup, is_gap, is_of_medium, is_zoomed};
+use super::record::StructureChange;
+use super::refusal::Refusal;
 use crate::lens::{GradientIndex, Lens, Medium, Quantity, RADIAL_TERMS};
 use crate::search::element::{Element, ElementKind, elements};
 use crate::search::projection::RowOrigin;
 use crate::search::{Random, SearchRules};
 
 /// The elements that may be reversed.
-pub(super) fn places(lens: &Lens, rules: &SearchRules) -> Result<Vec<Element>, String> {
+pub(super) fn sites(lens: &Lens, rules: &SearchRules) -> Result<Vec<Element>, Refusal> {
     let rows = lens.surfaces.len();
     let may = |e: &Element| {
         let free = (e.first..=e.last).all(|row| rules.may_change(row, rows));
         matches!(e.kind, ElementKind::Glass(_)) && free
     };
-    let (mut found, mut graded) = (Vec::new(), None);
+    let (mut found, mut obstacle) = (Vec::new(), None);
     for element in elements(lens).into_iter().filter(may) {
         match (element.first..element.last).find_map(|row| why_not_reversible(lens, row)) {
             None => found.push(element),
-            why => graded = graded.or(why),
+            why => obstacle = obstacle.or(why),
         }
     }
-    if found.is_empty() {
-        let none = "no element that may be turned".to_owned();
-        Err(graded.map_or(none.clone(), |why| format!("{none}: {why}")))
-    } else {
-        Ok(found)
-    }
+    if found.is_empty() { Err(obstacle.unwrap_or(Refusal::NoReversibleElement)) } else { Ok(found) }
 }
 
 /// The gradient-index medium behind a row, if its index varies along the axis.
@@ -41,16 +36,15 @@ fn axial_gradient_behind(lens: &Lens, row: usize) -> Option<&GradientIndex> {
     }
 }
 
-/// Why what fills a gap cannot be turned, if so.
-fn why_not_reversible(lens: &Lens, row: usize) -> Option<String> {
+/// The reason that the medium behind a row cannot be reversed, if there is one.
+fn why_not_reversible(lens: &Lens, row: usize) -> Option<Refusal> {
     let gradient = axial_gradient_behind(lens, row)?;
-    let medium = format!("the medium behind surface {row} is a gradient along the axis");
     if is_zoomed(lens, row) {
-        Some(format!("{medium} whose length moves with the zoom"))
+        Some(Refusal::GradientZooms)
     } else if has_pickup(lens, row, |q| is_gap(q) || is_of_medium(q)) {
-        Some(format!("{medium}, and a pickup has to do with it"))
+        Some(Refusal::GradientHasPickup)
     } else if gradient.reversed(lens.surfaces[row].thickness).is_none() {
-        Some(format!("{medium}, which from its other end has no base that a glass has"))
+        Some(Refusal::GradientWithoutBase)
     } else {
         None
     }
@@ -58,12 +52,13 @@ fn why_not_reversible(lens: &Lens, row: usize) -> Option<String> {
 
 /// Reverses an element.
 pub(super) fn draw(
-    scene: &MutationContext<'_>,
+    context: &MutationContext<'_>,
     random: &mut Random,
-) -> Result<MutationDraft, String> {
-    let places = places(&scene.lens, scene.rules)?;
-    let Element { first, last, .. } = choose(&places, random).copied().ok_or("no place")?;
-    let mut draft = scene.start_draft(places.len());
+) -> Result<MutationDraft, Refusal> {
+    let sites = sites(&context.lens, context.rules)?;
+    let Element { first, last, .. } =
+        choose(&sites, random).copied().ok_or(Refusal::NoReversibleElement)?;
+    let mut draft = context.start_draft(sites.len());
     draft.lens.reverse_rows(first, last);
     for row in first..=last {
         let gap = if row < last { first + last - 1 - row } else { last };
@@ -75,8 +70,8 @@ pub(super) fn draw(
     mirrored.iter().for_each(|row| reverse_axial_gradient(&mut draft.lens, *row));
     draft.map = random_projection_map(random);
     // The projection changes the length of such a gap, so that a second reversal leads elsewhere.
-    draft.back = mirrored.is_empty().then_some(ReverseMove::new(MutationKind::Flip, 0.0));
-    draft.what = format!("turned the element of surfaces {first} to {last} around");
+    draft.reverse = mirrored.is_empty().then_some(ReverseMove::new(MutationKind::Flip, 0.0));
+    draft.change = StructureChange::Flip { first: first.into(), last: last.into() };
     Ok(draft)
 }
 

@@ -1,13 +1,13 @@
 //! Cements two neighbouring elements: their facing surfaces are replaced by one of the mean
 //! curvature, and the air gap is removed.
 
+use super::air_gap::SplitDraw;
 use super::distributions::choose;
-use super::draft::{
-    MutationContext, MutationDraft, ReverseMove, has_pickup, is_gap, is_of_medium, is_plain,
-    is_zoomed, light_direction,
-};
+use super::draft::{MutationContext, MutationDraft, ReverseMove};
 use super::kind::MutationKind;
-use super::split::SplitDraw;
+use super::queries::{has_pickup, is_gap, is_of_medium, is_plain, is_zoomed};
+use super::record::StructureChange;
+use super::refusal::Refusal;
 use crate::lens::{Lens, Parameter};
 use crate::search::element::{ElementKind, elements};
 use crate::search::{Random, SearchRules};
@@ -16,7 +16,7 @@ use crate::search::{Random, SearchRules};
 pub(super) const MAX_PIECES: usize = 3;
 
 /// The last surfaces of elements that may be cemented to the next one.
-pub(super) fn places(lens: &Lens, rules: &SearchRules) -> Result<Vec<usize>, String> {
+pub(super) fn sites(lens: &Lens, rules: &SearchRules) -> Result<Vec<usize>, Refusal> {
     let elements = elements(lens);
     let neighbours = elements.windows(2).filter(|pair| pair[0].last + 1 == pair[1].first);
     let small = neighbours.filter(|pair| match (pair[0].kind, pair[1].kind) {
@@ -26,9 +26,7 @@ pub(super) fn places(lens: &Lens, rules: &SearchRules) -> Result<Vec<usize>, Str
     let found: Vec<usize> =
         small.map(|pair| pair[0].last).filter(|row| may_join(lens, *row, rules)).collect();
     if found.is_empty() {
-        return Err("no two elements of different glass whose plain surfaces face each other \
-                    across a gap that does not move"
-            .to_owned());
+        return Err(Refusal::NoNeighbours);
     }
     Ok(found)
 }
@@ -45,23 +43,23 @@ fn may_join(lens: &Lens, row: usize, rules: &SearchRules) -> bool {
 
 /// Cements two elements.
 pub(super) fn draw(
-    scene: &MutationContext<'_>,
+    context: &MutationContext<'_>,
     random: &mut Random,
-) -> Result<MutationDraft, String> {
-    let places = places(&scene.lens, scene.rules)?;
-    let row = choose(&places, random).copied().ok_or("no place")?;
-    let [front, rear] = [row, row + 1].map(|r| scene.lens.surfaces[r].curvature);
+) -> Result<MutationDraft, Refusal> {
+    let sites = sites(&context.lens, context.rules)?;
+    let row = choose(&sites, random).copied().ok_or(Refusal::NoNeighbours)?;
+    let [front, rear] = [row, row + 1].map(|r| context.lens.surfaces[r].curvature);
     let cut = SplitDraw {
         difference: 0.5 * (front - rear),
-        air: scene.lens.surfaces[row].thickness * light_direction(&scene.lens, row),
+        air: context.lens.surfaces[row].thickness * context.lens.light_direction(row),
     };
-    let mut draft = scene.start_draft(places.len());
+    let mut draft = context.start_draft(sites.len());
     merge_surfaces(&mut draft, row, 0.5 * (front + rear));
-    let scale = scene.scale_after(&draft.lens);
-    let there = scale.and_then(|scale| cut.log_density(scene.rules, scale));
+    let scale = context.scale_after(&draft.lens);
+    let there = scale.and_then(|scale| cut.log_density(context.rules, scale));
     // The map to mean and half difference has the determinant 1/2.
-    draft.back = there.map(|draws| ReverseMove::new(MutationKind::Split, draws - 2f64.ln()));
-    draft.what = format!("glued surfaces {row} and {} together", row + 1);
+    draft.reverse = there.map(|draws| ReverseMove::new(MutationKind::Split, draws - 2f64.ln()));
+    draft.change = StructureChange::Glue { first: row.into() };
     Ok(draft)
 }
 
@@ -91,5 +89,5 @@ fn merge_surfaces(draft: &mut MutationDraft, row: usize, curvature: f64) {
 
 /// True if the surfaces on both sides of the gap behind a row may be cemented.
 pub(super) fn can_glue(lens: &Lens, row: usize, rules: &SearchRules) -> bool {
-    places(lens, rules).is_ok_and(|places| places.contains(&row))
+    sites(lens, rules).is_ok_and(|sites| sites.contains(&row))
 }

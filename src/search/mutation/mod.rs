@@ -7,6 +7,7 @@
 //! drawn or dropped, all others are mapped one to one, and semi-diameters are treated as dependent.
 
 mod add;
+mod air_gap;
 mod bend;
 mod distributions;
 mod draft;
@@ -15,38 +16,31 @@ mod exchange;
 mod flip;
 mod glue;
 mod kind;
+mod queries;
+mod record;
+mod refusal;
 mod remove;
 mod repair;
+mod singlet;
+mod spacing;
 mod split;
 mod stop;
 mod weights;
 
 pub use kind::MutationKind;
+pub(super) use record::read_record;
+pub use record::{MutationRecord, StructureChange};
+pub(super) use refusal::read_counts;
+pub use refusal::{MutationError, Refusal};
 pub use weights::MutationWeights;
 
 use super::projection::{ProjectionError, project, scale};
 use super::{MutatedPoint, Projection, Random, SearchRules};
 use crate::lens::Lens;
-use draft::{MutationContext, MutationDraft, ReverseMove, SingletProposal, SpacingChoice};
+use draft::{MutationContext, MutationDraft, ReverseMove};
 use rand::RngExt as _;
 use repair::repair;
-
-/// A mutation that does not apply to a lens.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[error("{kind}: {why}", kind = .kind.name())]
-pub struct MutationError {
-    /// The kind of mutation.
-    pub kind: MutationKind,
-    /// The reason.
-    pub why: String,
-}
-
-impl MutationError {
-    /// A mutation that does not apply, with the reason.
-    pub fn new(kind: MutationKind, why: impl Into<String>) -> Self {
-        Self { kind, why: why.into() }
-    }
-}
+use singlet::SingletProposal;
 
 /// A lens after a mutation.
 #[derive(Debug, Clone, PartialEq)]
@@ -55,8 +49,8 @@ pub struct MutatedLens {
     pub lens: Lens,
     /// The kind of mutation.
     pub kind: MutationKind,
-    /// The description of the mutation.
-    pub what: String,
+    /// The change.
+    pub change: StructureChange,
     /// The rows with new glass behind them.
     pub fresh: Vec<usize>,
     /// The projection to a paraxially equivalent lens; `None` if the rules do not ask for it.
@@ -68,12 +62,8 @@ pub struct MutatedLens {
 
 impl From<MutatedLens> for MutatedPoint<Lens> {
     fn from(mutant: MutatedLens) -> Self {
-        let MutatedLens { lens, kind, what, projection, log_ratio, .. } = mutant;
-        let what = match projection {
-            Some(projection) => format!("{what}; {projection}"),
-            None => what,
-        };
-        Self { point: lens, kind, what, log_ratio }
+        let MutatedLens { lens, kind, change, projection, log_ratio, .. } = mutant;
+        Self { point: lens, kind, record: MutationRecord { change, projection }, log_ratio }
     }
 }
 
@@ -94,7 +84,7 @@ pub fn propose(
             return mutate(kind, lens, rules, random);
         }
     }
-    Err(MutationError::new(MutationKind::MUTATIONS[0], "every kind of mutation has weight 0"))
+    Err(MutationError::new(MutationKind::MUTATIONS[0], Refusal::AllExcluded))
 }
 
 /// Makes a mutation of a kind at a uniformly random site.
@@ -107,34 +97,34 @@ pub fn mutate(
     rules: &SearchRules,
     random: &mut Random,
 ) -> Result<MutatedLens, MutationError> {
-    let refuse = |why: String| MutationError { kind, why };
+    let refuse = |refusal| MutationError { kind, refusal };
     let mutation = MUTATIONS.iter().find(|mutation| mutation.kind == kind);
-    let Some(mutation) = mutation else { return Err(refuse("is no change of a lens".into())) };
-    lens.check().map_err(|error| refuse(error.to_string()))?;
-    let resolved = lens.with_pickups().map_err(|error| refuse(error.to_string()))?;
+    let Some(mutation) = mutation else { return Err(refuse(Refusal::NotAMutation)) };
+    lens.check().map_err(|_| refuse(Refusal::InvalidLens))?;
+    let resolved = lens.with_pickups().map_err(|_| refuse(Refusal::InvalidLens))?;
     let size = match scale(&resolved) {
         Ok(size) => size,
         Err(ProjectionError::Afocal(_)) if !rules.projection => half_track(&resolved),
-        Err(why) => return Err(refuse(why.to_string())),
+        Err(error) => return Err(refuse(Refusal::from(&error))),
     };
-    let scene = MutationContext::new(resolved, rules, size);
-    let draft = (mutation.draw)(&scene, random).map_err(refuse)?;
-    complete(&scene, kind, draft).map_err(refuse)
+    let context = MutationContext::new(resolved, rules, size);
+    let draft = (mutation.draw)(&context, random).map_err(refuse)?;
+    complete(&context, kind, draft).map_err(refuse)
 }
 
 /// The implementation of a kind of mutation.
 struct MutationOperator {
     kind: MutationKind,
     /// Counts the sites of a lens where it could be made.
-    places: fn(&Lens, &SearchRules) -> Result<usize, String>,
-    draw: fn(&MutationContext<'_>, &mut Random) -> Result<MutationDraft, String>,
+    count_sites: fn(&Lens, &SearchRules) -> Result<usize, Refusal>,
+    draw: fn(&MutationContext<'_>, &mut Random) -> Result<MutationDraft, Refusal>,
 }
 
 macro_rules! mutations {
     ($($kind:ident: $module:ident,)*) => {
         [$(MutationOperator {
             kind: MutationKind::$kind,
-            places: |lens, rules| $module::places(lens, rules).map(|places| places.len()),
+            count_sites: |lens, rules| $module::sites(lens, rules).map(|sites| sites.len()),
             draw: $module::draw,
         },)*]
     };
@@ -160,24 +150,23 @@ fn half_track(lens: &Lens) -> f64 {
 
 /// Projects and repairs a draft.
 fn complete(
-    scene: &MutationContext<'_>,
+    context: &MutationContext<'_>,
     kind: MutationKind,
     draft: MutationDraft,
-) -> Result<MutatedLens, String> {
-    let MutationDraft { lens, origins, what, fresh, rimless, map, places, back } = draft;
-    let (mut lens, projection, stretch) = if scene.rules.projection {
-        let found = project(&scene.lens, &lens, &origins, scene.rules, map, back.is_some());
-        let found = found.map_err(|why| format!("{what}, but {why}"))?;
+) -> Result<MutatedLens, Refusal> {
+    let MutationDraft { lens, origins, change, fresh, rimless, map, sites, reverse } = draft;
+    let (mut lens, projection, stretch) = if context.rules.projection {
+        let found = project(&context.lens, &lens, &origins, context.rules, map, reverse.is_some());
+        let found = found.map_err(|error| Refusal::from(&error))?;
         (found.lens, Some(found.report), found.log_determinant)
     } else {
         (lens, None, Some(0.0))
     };
-    repair(&scene.lens, &mut lens, &rimless, scene.rules)
-        .map_err(|why| format!("{what}, but {why}"))?;
-    let log_ratio = back.zip(stretch).and_then(|(back, stretch)| {
-        log_ratio(scene.rules, &lens, kind, places, back).map(|log| log + stretch)
+    repair(&context.lens, &mut lens, &rimless, context.rules)?;
+    let log_ratio = reverse.zip(stretch).and_then(|(reverse, stretch)| {
+        log_ratio(context.rules, &lens, kind, sites, reverse).map(|log| log + stretch)
     });
-    Ok(MutatedLens { lens, kind, what, fresh, projection, log_ratio })
+    Ok(MutatedLens { lens, kind, change, fresh, projection, log_ratio })
 }
 
 /// The logarithm of the ratio of the proposal densities, reverse over forward, without the
@@ -186,33 +175,26 @@ fn log_ratio(
     rules: &SearchRules,
     lens: &Lens,
     kind: MutationKind,
-    places: usize,
-    back: ReverseMove,
+    sites: usize,
+    reverse: ReverseMove,
 ) -> Option<f64> {
-    let mutation = MUTATIONS.iter().find(|mutation| mutation.kind == back.kind)?;
-    let places_back = (mutation.places)(lens, rules).ok()?;
-    let choice = match back.spacing {
+    let mutation = MUTATIONS.iter().find(|mutation| mutation.kind == reverse.kind)?;
+    let reverse_sites = (mutation.count_sites)(lens, rules).ok()?;
+    let choice = match reverse.spacing {
         None => 1.0,
-        Some(room) => choice_probability(room, lens, rules)?,
+        Some(spacing) => spacing.probability(lens, rules)?,
     };
-    let drawn = match back.singlet {
+    let drawn = match reverse.singlet {
         None => 0.0,
         Some(SingletProposal { singlet, neighbour, scale }) => {
             singlet.log_density(lens, neighbour, rules, scale)?
         }
     };
-    let kinds = rules.weight(back.kind) / rules.weight(kind);
+    let kinds = rules.weight(reverse.kind) / rules.weight(kind);
     let log = kinds.ln()
-        + (places as f64 / places_back as f64).ln()
+        + (sites as f64 / reverse_sites as f64).ln()
         + choice.ln()
         + drawn
-        + back.log_density_ratio;
+        + reverse.log_density_ratio;
     log.is_finite().then_some(log)
-}
-
-/// The probability that the reverse mutation makes the same choice of spacing; `None` if it cannot.
-fn choice_probability(room: SpacingChoice, lens: &Lens, rules: &SearchRules) -> Option<f64> {
-    let keeps = add::keep_probability(lens, Some(room.gap), rules, room.length);
-    let chance = if room.keeps_rest { keeps } else { 1.0 - keeps };
-    (chance > 0.0).then_some(chance)
 }

@@ -1,29 +1,27 @@
 //! Removes a singlet: its glass becomes air, or the rest of the lens moves forward.
 
-use super::add::{self, KEEP_PROBABILITY, Neighbour, SingletParameters};
 use super::distributions::{bernoulli, choose, usable_glasses};
-use super::draft::{
-    MutationContext, MutationDraft, ReverseMove, SingletProposal, SpacingChoice, has_pickup,
-    has_solve, is_gap, is_plain, is_zoomed, light_direction,
-};
+use super::draft::{MutationContext, MutationDraft, ReverseMove};
 use super::kind::MutationKind;
+use super::queries::{has_pickup, has_solve, is_gap, is_plain, is_zoomed};
+use super::record::StructureChange;
+use super::refusal::Refusal;
+use super::singlet::{Neighbour, SingletParameters, SingletProposal};
+use super::spacing::{KEEP_PROBABILITY, SpacingChoice, has_choice};
 use crate::lens::glass;
 use crate::lens::{Lens, Medium, Object};
 use crate::search::element::{Element, elements, piece_count};
 use crate::search::{Random, SearchRules};
 
 /// The singlets that may be removed.
-pub(super) fn places(lens: &Lens, rules: &SearchRules) -> Result<Vec<Element>, String> {
+pub(super) fn sites(lens: &Lens, rules: &SearchRules) -> Result<Vec<Element>, Refusal> {
     let least = rules.elements[0];
     if piece_count(lens) < least + 1 {
-        return Err(format!(
-            "the lens has {} elements, the rules ask for {least}",
-            piece_count(lens)
-        ));
+        return Err(Refusal::TooFewElements);
     }
     let found: Vec<_> = elements(lens).into_iter().filter(|e| may_go(lens, e, rules)).collect();
     if found.is_empty() {
-        return Err("no singlet that may go: without the stop, and nothing follows it".to_owned());
+        return Err(Refusal::NoSinglet);
     }
     Ok(found)
 }
@@ -52,7 +50,7 @@ struct RemovalChoice {
 pub(super) fn log_chance(lens: &Lens, first: usize, kept: bool) -> f64 {
     let sides = sides(lens, first);
     let choice = match remaining_gap(lens, first) {
-        Some(gap) if add::has_choice(lens, gap) => {
+        Some(gap) if has_choice(lens, gap) => {
             if kept {
                 KEEP_PROBABILITY
             } else {
@@ -86,28 +84,26 @@ fn sides(lens: &Lens, first: usize) -> Vec<bool> {
 
 /// Removes a singlet.
 pub(super) fn draw(
-    scene: &MutationContext<'_>,
+    context: &MutationContext<'_>,
     random: &mut Random,
-) -> Result<MutationDraft, String> {
-    let places = places(&scene.lens, scene.rules)?;
-    let element = choose(&places, random).copied().ok_or("no place")?;
+) -> Result<MutationDraft, Refusal> {
+    let sites = sites(&context.lens, context.rules)?;
+    let element = choose(&sites, random).copied().ok_or(Refusal::NoSinglet)?;
     let first = element.first;
-    let front =
-        choose(&sides(&scene.lens, first), random).copied().ok_or("nothing would be left")?;
+    let front = choose(&sides(&context.lens, first), random).copied().ok_or(Refusal::NoSinglet)?;
     let choice =
-        remaining_gap(&scene.lens, first).is_some_and(|gap| add::has_choice(&scene.lens, gap));
+        remaining_gap(&context.lens, first).is_some_and(|gap| has_choice(&context.lens, gap));
     let way = RemovalChoice { front, keeps_rest: choice && bernoulli(KEEP_PROBABILITY, random) };
-    let mut draft = scene.start_draft(places.len());
+    let mut draft = context.start_draft(sites.len());
     remove_singlet(&mut draft, first, way);
-    let surfaces = first + 1;
-    draft.what = format!("removed the singlet of surfaces {first} and {surfaces}");
-    draft.back = reverse_move(scene, &draft.lens, first, way);
+    draft.change = StructureChange::RemoveSinglet { first: first.into() };
+    draft.reverse = reverse_move(context, &draft.lens, first, way);
     Ok(draft)
 }
 
 fn remove_singlet(draft: &mut MutationDraft, first: usize, way: RemovalChoice) {
     let last = first + 1;
-    let length = draft.lens.surfaces[first].thickness * light_direction(&draft.lens, first);
+    let length = draft.lens.surfaces[first].thickness * draft.lens.light_direction(first);
     if first == 0 {
         let gone = length + draft.lens.surfaces[last].thickness;
         if let Object::Finite(distance) = &mut draft.lens.object {
@@ -125,7 +121,7 @@ fn remove_singlet(draft: &mut MutationDraft, first: usize, way: RemovalChoice) {
                 draft.move_gap(last, gap);
             }
             if way.keeps_rest {
-                draft.lengthen(gap, dropped * light_direction(&draft.lens, gap));
+                draft.lengthen(gap, dropped * draft.lens.light_direction(gap));
             }
         }
         if way.keeps_rest {
@@ -139,12 +135,12 @@ fn remove_singlet(draft: &mut MutationDraft, first: usize, way: RemovalChoice) {
 
 /// The reverse: adding the same singlet at the same place.
 fn reverse_move(
-    scene: &MutationContext<'_>,
+    context: &MutationContext<'_>,
     small: &Lens,
     first: usize,
     way: RemovalChoice,
 ) -> Option<ReverseMove> {
-    let (lens, rules, last) = (&scene.lens, scene.rules, first + 1);
+    let (lens, rules, last) = (&context.lens, context.rules, first + 1);
     let glasses = usable_glasses(lens, rules);
     let Medium::Glass(name) = &lens.surfaces[first].medium else { return None };
     let known = glass::find(name)?;
@@ -156,14 +152,14 @@ fn reverse_move(
     if !made || moves || !plain || finite {
         return None;
     }
-    let length = |row: usize| lens.surfaces[row].thickness * light_direction(lens, row);
+    let length = |row: usize| lens.surfaces[row].thickness * lens.light_direction(row);
     let singlet = SingletParameters {
         curvatures: [first, last].map(|row| lens.surfaces[row].curvature),
         thickness: length(first),
         air: length(beside),
     };
-    let scale = scene.scale_after(small)?;
-    let gap = first.checked_sub(1).filter(|gap| add::has_choice(small, *gap));
+    let scale = context.scale_after(small)?;
+    let gap = first.checked_sub(1).filter(|gap| has_choice(small, *gap));
     let log = -(glasses.len() as f64).ln() - log_chance(lens, first, way.keeps_rest);
     let row = if way.front { beside } else { first };
     let neighbour = Neighbour { row, behind: way.front };

@@ -5,6 +5,7 @@
 //! thickness of its glass and of the air beside it. Existing rims shrink only where their surfaces
 //! would cross.
 
+use super::refusal::Refusal;
 use crate::lens::{Lens, System};
 use crate::paraxial::Beam;
 use crate::pupil::{Aiming, RayModel};
@@ -43,7 +44,7 @@ pub(super) fn repair(
     lens: &mut Lens,
     rimless: &[usize],
     rules: &SearchRules,
-) -> Result<(), String> {
+) -> Result<(), Refusal> {
     check_vertex_order(lens)?;
     check_limits(before, lens, rules)?;
     for row in rimless {
@@ -61,13 +62,13 @@ pub(super) fn repair(
 }
 
 /// Checks that no vertex lies in front of the previous one.
-fn check_vertex_order(lens: &Lens) -> Result<(), String> {
+fn check_vertex_order(lens: &Lens) -> Result<(), Refusal> {
     for row in 0..lens.surfaces.len() - 1 {
         let sense = lens.light_direction(row);
         for zoom in 0..lens.zoom_positions() {
             let gap = sense * lens.thickness_at(row, zoom).unwrap_or(0.0);
             if !(gap >= 0.0) {
-                return Err(format!("surfaces {row} and {} would cross on the axis", row + 1));
+                return Err(Refusal::CrossingSurfaces);
             }
         }
     }
@@ -75,7 +76,7 @@ fn check_vertex_order(lens: &Lens) -> Result<(), String> {
 }
 
 /// Checks the limits of the rules on the whole lens.
-fn check_limits(before: &Lens, lens: &Lens, rules: &SearchRules) -> Result<(), String> {
+fn check_limits(before: &Lens, lens: &Lens, rules: &SearchRules) -> Result<(), Refusal> {
     let last = |lens: &Lens, zoom| lens.thickness_at(lens.surfaces.len() - 1, zoom).unwrap_or(0.0);
     let track = |lens: &Lens, zoom| {
         let rows = 0..lens.surfaces.len();
@@ -83,15 +84,15 @@ fn check_limits(before: &Lens, lens: &Lens, rules: &SearchRules) -> Result<(), S
     };
     for zoom in 0..lens.zoom_positions() {
         let (long, was) = (track(lens, zoom), track(before, zoom));
-        if let Some(most) = rules.track.filter(|most| long > most.max(was)) {
-            return Err(format!("the lens would be {long:.3} mm long, the rules allow {most}"));
+        if rules.track.is_some_and(|most| long > most.max(was)) {
+            return Err(Refusal::TooLong);
         }
         if lens.image_solve.is_some() {
             continue;
         }
         let (back, was) = (last(lens, zoom).abs(), last(before, zoom).abs());
-        if let Some(least) = rules.back_focus.filter(|least| back < least.min(was)) {
-            return Err(format!("the back focus would be {back:.3} mm, the rules ask for {least}"));
+        if rules.back_focus.is_some_and(|least| back < least.min(was)) {
+            return Err(Refusal::BackFocusTooShort);
         }
     }
     Ok(())
@@ -163,7 +164,7 @@ fn clear_height(lens: &Lens, gap: usize, floor: f64) -> Option<f64> {
 
 /// The largest height at each surface of rays that reach the image, over all zoom positions and
 /// fields.
-fn ray_extents(lens: &Lens) -> Result<Vec<f64>, String> {
+fn ray_extents(lens: &Lens) -> Result<Vec<f64>, Refusal> {
     let mut extents = vec![0.0; lens.surfaces.len() + 1];
     let mut heights = extents.clone();
     let mut lit = false;
@@ -177,7 +178,7 @@ fn ray_extents(lens: &Lens) -> Result<Vec<f64>, String> {
             }
         }
     }
-    if lit { Ok(extents) } else { Err("no light would get through".to_owned()) }
+    if lit { Ok(extents) } else { Err(Refusal::NoLight) }
 }
 
 /// Traces a ray and, if it reaches the image without travelling backwards, widens the extents; true
@@ -199,12 +200,12 @@ fn widen_extents(
 }
 
 /// The ray model at the primary wavelength, with the aiming that wide fields need.
-fn primary_bench(lens: &Lens, zoom: usize) -> Result<RayModel, String> {
+fn primary_bench(lens: &Lens, zoom: usize) -> Result<RayModel, Refusal> {
     let um = lens.wavelengths[lens.primary()].um;
-    let system: System<f64> = lens.resolve(zoom, um).map_err(|error| error.to_string())?;
+    let system: System<f64> = lens.resolve(zoom, um).map_err(|_| Refusal::InvalidLens)?;
     let beam = Beam::for_lens(lens, zoom);
     let bench = RayModel::from_systems(vec![(um, 1.0, system)], 0, beam, Aiming::Paraxial);
-    let mut bench = bench.map_err(|error| error.to_string())?;
+    let mut bench = bench.map_err(|_| Refusal::InvalidLens)?;
     bench.choose_aiming();
     Ok(bench)
 }

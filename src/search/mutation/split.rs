@@ -1,28 +1,20 @@
 //! Splits a cemented interface into an air gap between two surfaces of similar curvature.
 
-use super::distributions::{ShiftedExponential, choose, normal_log_density, sample_normal};
-use super::draft::{
-    MutationContext, MutationDraft, ReverseMove, has_pickup, is_of_medium, is_plain,
-    light_direction,
-};
+use super::air_gap::SplitDraw;
+use super::distributions::choose;
+use super::draft::{MutationContext, MutationDraft, ReverseMove};
 use super::glue;
 use super::kind::MutationKind;
+use super::queries::{has_pickup, is_of_medium, is_plain};
+use super::record::StructureChange;
+use super::refusal::Refusal;
 use crate::lens::{Lens, Medium, Parameter, Quantity, Row};
 use crate::search::element::{ElementKind, elements};
 use crate::search::projection::ProjectionMap;
 use crate::search::{Random, SearchRules};
 
-/// The random numbers of a new air gap.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct SplitDraw {
-    /// Half the difference of the curvatures in front and behind.
-    pub(super) difference: f64,
-    /// The air space between them.
-    pub(super) air: f64,
-}
-
 /// The cemented interfaces that may be split.
-pub(super) fn places(lens: &Lens, rules: &SearchRules) -> Result<Vec<usize>, String> {
+pub(super) fn sites(lens: &Lens, rules: &SearchRules) -> Result<Vec<usize>, Refusal> {
     let rows = lens.surfaces.len();
     let cemented = elements(lens).into_iter().filter(|e| matches!(e.kind, ElementKind::Glass(_)));
     let inner = cemented.flat_map(|element| element.first + 1..element.last);
@@ -30,52 +22,31 @@ pub(super) fn places(lens: &Lens, rules: &SearchRules) -> Result<Vec<usize>, Str
         .filter(|row| rules.may_change(*row, rows) && is_plain(&lens.surfaces[*row]))
         .filter(|row| !has_pickup(lens, *row, |q| q == Quantity::Curvature))
         .collect();
-    if found.is_empty() { Err("no plain cemented interface".to_owned()) } else { Ok(found) }
-}
-
-impl SplitDraw {
-    fn air_distribution(rules: &SearchRules, scale: f64) -> ShiftedExponential {
-        ShiftedExponential::new(rules.air_center, 0.5 * scale / 50.0)
-    }
-
-    /// A tenth of that of a new element: the two parts have strong power.
-    fn curvature_deviation(scale: f64) -> f64 {
-        0.025 / scale
-    }
-
-    fn draw(scene: &MutationContext<'_>, random: &mut Random) -> Self {
-        let difference = sample_normal(Self::curvature_deviation(scene.scale), random);
-        Self { difference, air: Self::air_distribution(scene.rules, scene.scale).draw(random) }
-    }
-
-    pub(super) fn log_density(&self, rules: &SearchRules, scale: f64) -> Option<f64> {
-        let air = Self::air_distribution(rules, scale).log_density(self.air)?;
-        Some(air + normal_log_density(self.difference, Self::curvature_deviation(scale)))
-    }
+    if found.is_empty() { Err(Refusal::NoCementedInterface) } else { Ok(found) }
 }
 
 /// Splits a cemented interface.
 pub(super) fn draw(
-    scene: &MutationContext<'_>,
+    context: &MutationContext<'_>,
     random: &mut Random,
-) -> Result<MutationDraft, String> {
-    let places = places(&scene.lens, scene.rules)?;
-    let row = choose(&places, random).copied().ok_or("no place")?;
-    let cut = SplitDraw::draw(scene, random);
-    let mut draft = scene.start_draft(places.len());
+) -> Result<MutationDraft, Refusal> {
+    let sites = sites(&context.lens, context.rules)?;
+    let row = choose(&sites, random).copied().ok_or(Refusal::NoCementedInterface)?;
+    let cut = SplitDraw::draw(context.rules, context.scale, random);
+    let mut draft = context.start_draft(sites.len());
     insert_air_gap(&mut draft, row, cut);
     draft.map = ProjectionMap::AlongNormals;
-    draft.what = format!("split the cemented surface {row}");
-    let there = cut.log_density(scene.rules, scene.scale);
+    draft.change = StructureChange::Split { surface: row.into() };
+    let there = cut.log_density(context.rules, context.scale);
     let back = |there: f64| ReverseMove::new(MutationKind::Glue, 2f64.ln() - there);
-    draft.back = there.filter(|_| glue::can_glue(&draft.lens, row, scene.rules)).map(back);
+    draft.reverse = there.filter(|_| glue::can_glue(&draft.lens, row, context.rules)).map(back);
     Ok(draft)
 }
 
 /// Replaces a surface by two.
 fn insert_air_gap(draft: &mut MutationDraft, row: usize, cut: SplitDraw) {
     let joint = draft.lens.surfaces[row].clone();
-    let sense = light_direction(&draft.lens, row);
+    let sense = draft.lens.light_direction(row);
     let rear = Row {
         curvature: joint.curvature - cut.difference,
         stop: false,

@@ -2,11 +2,11 @@
 //! same.
 
 use super::distributions::choose;
-use super::draft::{
-    MutationContext, MutationDraft, ReverseMove, has_pickup, is_gap, is_zoomed, light_direction,
-    medium_after, shortest_gap,
-};
+use super::draft::{MutationContext, MutationDraft, ReverseMove};
 use super::kind::MutationKind;
+use super::queries::{has_pickup, is_gap, is_zoomed, medium_after, shortest_gap};
+use super::record::StructureChange;
+use super::refusal::Refusal;
 use crate::lens::{Aperture, Lens, Medium, Object, Row};
 use crate::paraxial::{Beam, first_order};
 use crate::search::element::glass_gaps;
@@ -37,26 +37,26 @@ fn stop_gaps(bare: &Lens, rules: &SearchRules) -> Vec<usize> {
 }
 
 /// The lens without its stop.
-fn remove_stop(scene: &MutationContext<'_>) -> Result<MutationDraft, String> {
-    let mut draft = scene.start_draft(1);
-    let stop = scene.lens.stop().ok_or("there is no stop")?;
-    if !scene.rules.may_change(stop, scene.lens.surfaces.len()) {
-        return Err("the rules keep the stop where it is".to_owned());
+fn remove_stop(context: &MutationContext<'_>) -> Result<MutationDraft, Refusal> {
+    let mut draft = context.start_draft(1);
+    let stop = context.lens.stop().ok_or(Refusal::NoStop)?;
+    if !context.rules.may_change(stop, context.lens.surfaces.len()) {
+        return Err(Refusal::FixedStop);
     }
-    let Some(plane) = plane_stop(&scene.lens) else {
+    let Some(plane) = plane_stop(&context.lens) else {
         draft.lens.surfaces[stop].stop = false;
         return Ok(draft);
     };
     let near = [plane.checked_sub(1), Some(plane)];
-    if near.into_iter().flatten().any(|row| has_pickup(&scene.lens, row, is_gap)) {
-        return Err("a pickup has to do with a gap at the stop".to_owned());
+    if near.into_iter().flatten().any(|row| has_pickup(&context.lens, row, is_gap)) {
+        return Err(Refusal::StopHasPickup);
     }
-    if plane + 1 == scene.lens.surfaces.len() {
-        return Err("the stop is the last surface".to_owned());
+    if plane + 1 == context.lens.surfaces.len() {
+        return Err(Refusal::StopIsLast);
     }
     match (plane.checked_sub(1), &mut draft.lens.object) {
         (Some(before), _) => draft.add_gap(before, plane),
-        (None, Object::Finite(distance)) => *distance += scene.lens.surfaces[plane].thickness,
+        (None, Object::Finite(distance)) => *distance += context.lens.surfaces[plane].thickness,
         (None, Object::Infinity) => {}
     }
     draft.remove(plane);
@@ -64,29 +64,29 @@ fn remove_stop(scene: &MutationContext<'_>) -> Result<MutationDraft, String> {
 }
 
 /// The gaps to which the stop may move.
-pub(super) fn places(lens: &Lens, rules: &SearchRules) -> Result<Vec<usize>, String> {
-    let scene = MutationContext::new(lens.clone(), rules, 1.0);
-    remove_stop(&scene).map(|bare| stop_gaps(&bare.lens, rules))
+pub(super) fn sites(lens: &Lens, rules: &SearchRules) -> Result<Vec<usize>, Refusal> {
+    let context = MutationContext::new(lens.clone(), rules, 1.0);
+    remove_stop(&context).map(|bare| stop_gaps(&bare.lens, rules))
 }
 
 /// Moves the stop.
 pub(super) fn draw(
-    scene: &MutationContext<'_>,
+    context: &MutationContext<'_>,
     random: &mut Random,
-) -> Result<MutationDraft, String> {
-    let old = plane_stop(&scene.lens);
-    let mut draft = remove_stop(scene)?;
-    let gaps = stop_gaps(&draft.lens, scene.rules);
-    let gap = choose(&gaps, random).copied().ok_or("no other air gap for the stop")?;
-    draft.places = gaps.len();
+) -> Result<MutationDraft, Refusal> {
+    let old = plane_stop(&context.lens);
+    let mut draft = remove_stop(context)?;
+    let gaps = stop_gaps(&draft.lens, context.rules);
+    let gap = choose(&gaps, random).copied().ok_or(Refusal::NoGapForStop)?;
+    draft.sites = gaps.len();
     let (room, share) = (shortest_gap(&draft.lens, gap), random.random::<f64>());
-    draft.back = reverse_move(scene.rules, &draft.lens, old, gap);
+    draft.reverse = reverse_move(context.rules, &draft.lens, old, gap);
     insert_stop(&mut draft, gap, share * room);
-    rescale_aperture(&scene.lens, &mut draft.lens)?;
+    rescale_aperture(&context.lens, &mut draft.lens)?;
     let at = gap + 1;
     draft.rimless =
         draft.lens.surfaces[at].semi_diameter.is_none().then_some(at).into_iter().collect();
-    draft.what = format!("moved the stop {:.3} mm behind surface {gap}", share * room);
+    draft.change = StructureChange::MoveStop { surface: gap.into(), distance: share * room };
     Ok(draft)
 }
 
@@ -107,7 +107,7 @@ fn reverse_move(
 
 /// Inserts a stop `length` mm behind a row.
 fn insert_stop(draft: &mut MutationDraft, gap: usize, length: f64) {
-    let sense = light_direction(&draft.lens, gap);
+    let sense = draft.lens.light_direction(gap);
     let row = Row { medium: medium_after(&draft.lens, gap), stop: true, ..Row::default() };
     draft.insert(gap + 1, row);
     draft.move_gap(gap, gap + 1);
@@ -118,7 +118,7 @@ fn insert_stop(draft: &mut MutationDraft, gap: usize, length: f64) {
 
 /// If the aperture is the size of the stop, sets it to the height of the axial beam at the new
 /// stop.
-fn rescale_aperture(before: &Lens, lens: &mut Lens) -> Result<(), String> {
+fn rescale_aperture(before: &Lens, lens: &mut Lens) -> Result<(), Refusal> {
     let mut widest = None;
     for zoom in 0..lens.zoom_positions() {
         let Aperture::StopSemiDiameter(radius) = before.aperture_at(zoom) else { continue };
@@ -140,18 +140,18 @@ fn rescale_aperture(before: &Lens, lens: &mut Lens) -> Result<(), String> {
 }
 
 /// The ratio of the heights of an axial ray at the new stop and at the old one.
-fn axial_height_ratio(before: &Lens, lens: &Lens, zoom: usize) -> Result<f64, String> {
+fn axial_height_ratio(before: &Lens, lens: &Lens, zoom: usize) -> Result<f64, Refusal> {
     let um = lens.wavelengths[lens.primary()].um;
     let height = |lens: &Lens| {
-        let system = lens.resolve(zoom, um).map_err(|error| error.to_string())?;
+        let system = lens.resolve(zoom, um).map_err(|_| Refusal::InvalidLens)?;
         let beam = Beam { aperture: Aperture::StopSemiDiameter(1.0), ..Beam::for_lens(lens, zoom) };
-        let first = first_order(&system, &beam).map_err(|error| error.to_string())?;
+        let first = first_order(&system, &beam).map_err(|_| Refusal::InvalidLens)?;
         // With a stop of 1 mm, the start height is the inverse of the height at the stop of a ray
         // from 1 mm.
-        Ok::<f64, String>(first.marginal.heights[0].hypot(first.marginal.start_slope))
+        Ok::<f64, Refusal>(first.marginal.heights[0].hypot(first.marginal.start_slope))
     };
     let (old, new) = (height(before)?, height(lens)?);
     let ratio = old / new;
     let sound = ratio.is_finite() && ratio > 0.0;
-    sound.then_some(ratio).ok_or_else(|| "the axial beam has no height there".to_owned())
+    sound.then_some(ratio).ok_or(Refusal::NoAxialHeight)
 }

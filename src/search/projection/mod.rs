@@ -23,12 +23,12 @@ use super::element::glass_gaps;
 use crate::lens::{Lens, LensError, Parameter, ParameterKind, Quantity, add_variables};
 pub(super) use model::scale;
 use model::{MarginalRayModel, ProjectionCoordinate};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use solve::{CoordinateBounds, ProjectionSolution};
 use std::fmt::{self, Display};
 
 /// The outcome of a projection.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Projection {
     /// The number of Newton steps.
     pub steps: usize,

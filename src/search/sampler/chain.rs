@@ -4,11 +4,11 @@
 //! a list of events. So all chains can take their turns in parallel, and their events are applied
 //! in the order of the chains.
 
-use super::metropolis::{GradientScale, LangevinState};
+use super::langevin::{GradientScale, LangevinState};
 use super::{SearchMethod, SearchSettings, Temperature};
 use crate::search::{
-    DescentEnd, Landscape, MutatedPoint, MutationError, MutationKind, MutationWeights, Random,
-    Reservoir, ReservoirEntry,
+    DescentEnd, Landscape, MutatedPoint, MutationError, MutationKind, MutationRecord,
+    MutationWeights, Random, Refusal, Reservoir, ReservoirEntry, StructureChange,
 };
 use rand::RngExt as _;
 use serde::{Deserialize, Serialize};
@@ -117,7 +117,7 @@ pub(in crate::search) enum TurnEvent<P> {
 pub(in crate::search) struct NewDescent<P> {
     pub(in crate::search) parent: Option<u64>,
     pub(in crate::search) kind: Option<MutationKind>,
-    pub(in crate::search) what: String,
+    pub(in crate::search) record: MutationRecord,
     pub(in crate::search) before: Option<f64>,
     pub(in crate::search) loss: f64,
     pub(in crate::search) point: P,
@@ -152,15 +152,17 @@ impl<L: Landscape> RoundContext<'_, L> {
         }
         match self.settings.method {
             SearchMethod::Metropolis => self.metropolis_turn(chain, most, &mut turn),
-            SearchMethod::Restore | SearchMethod::Brute => self.descend(chain, most, &mut turn),
+            SearchMethod::Restore | SearchMethod::BruteForce => {
+                self.descend(chain, most, &mut turn)
+            }
         }
         turn
     }
 
     fn begin_descent(&self, chain: &mut Chain<L::Point, L::Memory>, turn: &mut TurnEvents<L>) {
         let birth = match (self.settings.method, chain.task) {
-            (SearchMethod::Brute, None) => None,
-            (SearchMethod::Brute, Some(task)) => self.start_job(task, &mut chain.random, turn),
+            (SearchMethod::BruteForce, None) => None,
+            (SearchMethod::BruteForce, Some(task)) => self.start_job(task, &mut chain.random, turn),
             _ => self.regenerate(&mut chain.random, turn),
         };
         match birth {
@@ -181,7 +183,7 @@ impl<L: Landscape> RoundContext<'_, L> {
         for _ in 0..MAX_ATTEMPTS {
             match self.try_start(random) {
                 Ok(birth) => return Some(birth),
-                Err(refusal) => turn.push(TurnEvent::Refused(refusal)),
+                Err(error) => turn.push(TurnEvent::Refused(error)),
             }
         }
         None
@@ -191,9 +193,8 @@ impl<L: Landscape> RoundContext<'_, L> {
         let anywhere = random.random::<f64>() < self.settings.gamma;
         if anywhere && self.pinned.is_none() && self.weights.of(MutationKind::Global) > 0.0 {
             let point = self.landscape.draw(random)?;
-            let what = "drawn from anywhere".to_owned();
-            let drawn = MutatedPoint { point, kind: MutationKind::Global, what, log_ratio: None };
-            return self.new_descent(None, drawn);
+            let (kind, record) = (MutationKind::Global, StructureChange::RandomDraw.into());
+            return self.new_descent(None, MutatedPoint { point, kind, record, log_ratio: None });
         }
         let parent = self.choose_parent(random)?;
         let mutated = self.landscape.mutate(&parent.point, self.weights, random)?;
@@ -207,10 +208,7 @@ impl<L: Landscape> RoundContext<'_, L> {
     ) -> Result<&ReservoirEntry<L::Point>, MutationError> {
         let entries = self.reservoir.entries();
         let any = || (!entries.is_empty()).then(|| &entries[random.random_range(0..entries.len())]);
-        let empty = || MutationError {
-            kind: MutationKind::Global,
-            why: "the reservoir is empty".to_owned(),
-        };
+        let empty = || MutationError::new(MutationKind::Global, Refusal::EmptyReservoir);
         self.pinned.or_else(any).ok_or_else(empty)
     }
 
@@ -224,7 +222,7 @@ impl<L: Landscape> RoundContext<'_, L> {
         let start = self.start;
         let mutated = self.landscape.mutate_at(&start.point, task.element, task.kind, random);
         let birth = mutated.and_then(|new| self.new_descent(Some((start.number, start.loss)), new));
-        birth.map_err(|refusal| turn.push(TurnEvent::Refused(refusal))).ok()
+        birth.map_err(|error| turn.push(TurnEvent::Refused(error))).ok()
     }
 
     pub(in crate::search) fn new_descent(
@@ -234,12 +232,11 @@ impl<L: Landscape> RoundContext<'_, L> {
     ) -> Result<NewDescent<L::Point>, MutationError> {
         let loss = self.landscape.loss(&new.point);
         if !loss.is_finite() {
-            let why = "the loss behind it is no number".to_owned();
-            return Err(MutationError { kind: new.kind, why });
+            return Err(MutationError::new(new.kind, Refusal::NoLoss));
         }
         let (parent, before) = parent.unzip();
-        let MutatedPoint { point, kind, what, .. } = new;
-        Ok(NewDescent { parent, kind: Some(kind), what, before, loss, point })
+        let MutatedPoint { point, kind, record, .. } = new;
+        Ok(NewDescent { parent, kind: Some(kind), record, before, loss, point })
     }
 
     /// A local move, and the end of the descent if it ends after it: lines 2 to 8 of algorithm 1.
@@ -275,15 +272,15 @@ impl<L: Landscape> RoundContext<'_, L> {
         let SearchSettings { termination, c, longest, .. } = *self.settings;
         let chance = termination.chance(self.temperature, c, before, tour.loss);
         if !tour.loss.is_finite() {
-            Some(DescentEnd::Lost)
+            Some(DescentEnd::InfiniteLoss)
         } else if let Some(task) = task {
             // A descent whose moves take no gradients would never use up its budget.
             let spent = tour.gradients >= task.budget || tour.moves >= task.budget;
             spent.then_some(DescentEnd::Budget)
         } else if random.random::<f64>() < chance {
-            Some(DescentEnd::Clock)
+            Some(DescentEnd::Regeneration)
         } else {
-            (tour.moves >= longest as u64).then_some(DescentEnd::Longest)
+            (tour.moves >= longest as u64).then_some(DescentEnd::MaxMoves)
         }
     }
 }

@@ -5,79 +5,12 @@
 //! Here a descent is the part of the chain between two accepted mutations. After the maximum number
 //! of moves of a descent it is recorded and continues as a new one.
 
-use super::LangevinSettings;
 use super::chain::{
     Chain, ChainDescent, LocalMove, NewDescent, RoundContext, TurnEvent, TurnEvents, end_descent,
 };
-use crate::search::{DescentEnd, Landscape, LossGradient, Random};
+use super::langevin::{LangevinProposal, LangevinState, has_finite_squares};
+use crate::search::{DescentEnd, Landscape, LossGradient, StructureChange};
 use rand::RngExt as _;
-use rand_distr::StandardNormal;
-use serde::{Deserialize, Serialize};
-
-/// The state of a Langevin chain: topology, variables and gradient.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(in crate::search) struct LangevinState {
-    topology: String,
-    values: Vec<f64>,
-    gradient: Vec<f64>,
-}
-
-/// The mean square of all gradients that a chain has evaluated for one topology. It is kept between
-/// visits to the topology: a mean that restarted with each visit would depend on where the visit
-/// began, and the adaptation would never fade.
-#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-pub(in crate::search) struct GradientScale {
-    square: Vec<f64>,
-    count: u64,
-}
-
-impl GradientScale {
-    /// Adds a gradient to the running mean.
-    fn add_gradient(&mut self, gradient: &[f64]) {
-        if self.square.len() != gradient.len() {
-            *self = Self { square: vec![0.0; gradient.len()], count: 0 };
-        }
-        self.count += 1;
-        let part = 1.0 / self.count as f64;
-        for (v, g) in self.square.iter_mut().zip(gradient) {
-            *v += (g * g - *v) * part;
-        }
-    }
-
-    /// The variances `ε M` of all variables.
-    fn variances(&self, settings: &LangevinSettings) -> Vec<f64> {
-        self.square.iter().map(|v| settings.epsilon / (v.sqrt() + settings.floor)).collect()
-    }
-}
-
-/// The Langevin proposal distribution: normal, with these variances, around a mean that is shifted
-/// downhill by `drift` × variance × gradient.
-struct LangevinProposal {
-    variances: Vec<f64>,
-    drift: f64,
-}
-
-impl LangevinProposal {
-    /// The mean of a step.
-    fn mean(&self, from: &[f64], gradient: &[f64]) -> Vec<f64> {
-        let place = |i: usize| from[i] - self.drift * self.variances[i] * gradient[i];
-        (0..from.len()).map(place).collect()
-    }
-
-    fn sample(&self, from: &[f64], gradient: &[f64], random: &mut Random) -> Vec<f64> {
-        let mut noise = |v: &f64| v.sqrt() * random.sample::<f64, _>(StandardNormal);
-        let mean = self.mean(from, gradient).into_iter().zip(&self.variances);
-        mean.map(|(place, variance)| place + noise(variance)).collect()
-    }
-
-    /// The logarithm of the density of a step from one place to another, up to a constant that the
-    /// reverse step shares.
-    fn log_density(&self, from: &[f64], gradient: &[f64], to: &[f64]) -> f64 {
-        let mean = self.mean(from, gradient);
-        let each = |i: usize| (to[i] - mean[i]).powi(2) / self.variances[i];
-        -0.5 * (0..from.len()).map(each).sum::<f64>()
-    }
-}
 
 impl<L: Landscape> RoundContext<'_, L> {
     /// One turn of Metropolis–Hastings: a mutation or a Langevin step, accepted or rejected.
@@ -165,11 +98,11 @@ impl<L: Landscape> RoundContext<'_, L> {
         let birth = mutated.and_then(|new| self.new_descent(Some((chain.number, before)), new));
         let birth = match birth {
             Ok(birth) => birth,
-            Err(refusal) => return turn.push(TurnEvent::Refused(refusal)),
+            Err(error) => return turn.push(TurnEvent::Refused(error)),
         };
         let chance = ratio.map(|ratio| self.temperature.log_ratio(before, birth.loss) + ratio);
         if chance.is_some_and(|chance| chain.random.random::<f64>().ln() < chance) {
-            end_descent(chain, DescentEnd::Mutated, turn);
+            end_descent(chain, DescentEnd::Mutation, turn);
             chain.tour = Some(ChainDescent::new(birth.point.clone(), birth.loss));
             turn.push(TurnEvent::Started(birth));
         } else {
@@ -185,14 +118,9 @@ fn continue_as_new_descent<P: Clone, M>(
     turn: &mut Vec<TurnEvent<P>>,
 ) {
     let (parent, loss) = (Some(chain.number), next.loss);
-    let (point, what) = (next.point.clone(), "goes on".to_owned());
-    end_descent(chain, DescentEnd::Longest, turn);
-    let birth = NewDescent { parent, kind: None, what, before: Some(loss), loss, point };
+    let (point, record) = (next.point.clone(), StructureChange::Continuation.into());
+    end_descent(chain, DescentEnd::MaxMoves, turn);
+    let birth = NewDescent { parent, kind: None, record, before: Some(loss), loss, point };
     turn.push(TurnEvent::Started(birth));
     chain.tour = Some(next);
-}
-
-/// True if the squares of all components are finite.
-fn has_finite_squares(gradient: &[f64]) -> bool {
-    gradient.iter().all(|g| (g * g).is_finite())
 }

@@ -2,6 +2,7 @@
 
 pub(super) mod chain;
 pub mod competing_clocks;
+mod langevin;
 mod metropolis;
 mod run;
 mod settings;

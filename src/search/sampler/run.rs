@@ -8,7 +8,7 @@ use super::chain::{BruteForceJob, Chain, ChainDescent, NewDescent, RoundContext}
 use super::{SearchMethod, SearchSettings, Temperature};
 use crate::search::{
     Landscape, Lineage, LineageNode, MutationKind, MutationWeights, Random, Reservoir,
-    ReservoirEntry, SearchError, SearchPoint, SearchStatistics,
+    ReservoirEntry, SearchError, SearchPoint, SearchStatistics, StructureChange,
 };
 use rand::SeedableRng as _;
 use rayon::prelude::*;
@@ -186,14 +186,16 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
         let waits = |chain: &Chain<P, M>| chain.tour.is_none() && chain.task.is_none();
         if self.stopped {
             Some(RunEnd::Stopped)
-        } else if method == SearchMethod::Brute
+        } else if method == SearchMethod::BruteForce
             && self.tasks.is_empty()
             && self.chains.iter().all(waits)
         {
             Some(RunEnd::Done)
         } else if reached(moves, self.statistics.moves) {
             Some(RunEnd::Moves)
-        } else if method != SearchMethod::Brute && reached(gradients, self.statistics.gradients) {
+        } else if method != SearchMethod::BruteForce
+            && reached(gradients, self.statistics.gradients)
+        {
             Some(RunEnd::Gradients)
         } else {
             (self.statistics.idle >= MAX_IDLE_ROUNDS).then_some(RunEnd::Stuck)
@@ -241,7 +243,7 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
     /// among its jobs.
     fn gradient_budgets(&self) -> Vec<usize> {
         let SearchSettings { method, gradients, .. } = self.settings;
-        let limit = gradients.filter(|_| method != SearchMethod::Brute);
+        let limit = gradients.filter(|_| method != SearchMethod::BruteForce);
         let left = limit.map_or(u64::MAX, |limit| limit.saturating_sub(self.statistics.gradients));
         let count = self.chains.len().max(1) as u64;
         let share = |i: u64| left / count + u64::from(i < left % count);
@@ -249,20 +251,20 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
     }
 
     /// The lineage node of a new descent.
-    pub(in crate::search) fn new_node(&self, chain: usize, birth: NewDescent<P>) -> LineageNode<P> {
-        let NewDescent { parent, kind, what, before, loss, point } = birth;
+    pub(in crate::search) fn new_node(&self, chain: usize, start: NewDescent<P>) -> LineageNode<P> {
+        let NewDescent { parent, kind, record, before, loss, point } = start;
         LineageNode {
             number: self.tree.total(),
             parent,
             chain,
             kind,
-            what,
-            before,
-            mutated: loss,
-            descended: loss,
+            mutation: record,
+            loss_before: before,
+            start_loss: loss,
+            best_loss: loss,
             moves: 0,
             gradients: 0,
-            ended: None,
+            end: None,
             offer: None,
             point,
         }
@@ -273,7 +275,7 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
         NewDescent {
             parent: None,
             kind: None,
-            what: "the start".to_owned(),
+            record: StructureChange::Start.into(),
             before: None,
             loss,
             point,
@@ -285,7 +287,7 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
         let count = match self.settings.method {
             SearchMethod::Restore => 1,
             SearchMethod::Metropolis => self.chains.len(),
-            SearchMethod::Brute => 0,
+            SearchMethod::BruteForce => 0,
         };
         for i in 0..count {
             if i > 0 {
@@ -317,7 +319,8 @@ fn new_chains<P, M>(settings: &SearchSettings) -> Vec<Chain<P, M>> {
 
 /// The jobs of brute force, which divide the gradients by twice the number of elements.
 fn brute_force_jobs(elements: usize, settings: &SearchSettings) -> VecDeque<BruteForceJob> {
-    let Some(gradients) = settings.gradients.filter(|_| settings.method == SearchMethod::Brute)
+    let Some(gradients) =
+        settings.gradients.filter(|_| settings.method == SearchMethod::BruteForce)
     else {
         return VecDeque::new();
     };

@@ -108,7 +108,7 @@ impl SearchSettings {
                 return wrong(name, format_short(size), "more than 0");
             }
         }
-        if self.method == SearchMethod::Brute && self.gradients.is_none() {
+        if self.method == SearchMethod::BruteForce && self.gradients.is_none() {
             return wrong("gradients", "none".to_owned(), "a number, which brute force divides");
         }
         Ok(())
@@ -126,7 +126,8 @@ pub enum SearchMethod {
     Metropolis,
     /// Brute force: adds an element after each element of the start and removes each one, with
     /// equally long descents.
-    Brute,
+    #[serde(rename = "brute")]
+    BruteForce,
 }
 
 /// Langevin steps (4.10) with a diagonal preconditioner `M`: `θ' = θ − ε M ∇L min(1, 1/(2 T)) + √(ε

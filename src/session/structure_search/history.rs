@@ -106,6 +106,6 @@ fn sample(run: &SearchRunOn<LensLandscape>, round: u64) -> HistorySample {
 
 fn mark_of(run: &SearchRunOn<LensLandscape>, number: u64, round: u64) -> Option<DescentMark> {
     let node = run.lineage().node(number)?;
-    let LineageNode { chain, kind, mutated: merit, .. } = *node;
+    let LineageNode { chain, kind, start_loss: merit, .. } = *node;
     Some(DescentMark { round, number, chain, kind, merit, entered: false })
 }

@@ -202,7 +202,7 @@ impl StructureSearchSnapshot {
         let old = std::mem::take(&mut self.lineage);
         let known = |number: u64| {
             let place = old.binary_search_by_key(&number, |node| node.number).ok()?;
-            old.get(place).filter(|node| node.ended.is_some()).cloned()
+            old.get(place).filter(|node| node.end.is_some()).cloned()
         };
         let nodes = run.lineage().nodes().iter();
         let family =
@@ -228,13 +228,13 @@ fn to_shared(node: &LineageNode<Lens>) -> LineageNode<Arc<Lens>> {
         parent: node.parent,
         chain: node.chain,
         kind: node.kind,
-        what: node.what.clone(),
-        before: node.before,
-        mutated: node.mutated,
-        descended: node.descended,
+        mutation: node.mutation.clone(),
+        loss_before: node.loss_before,
+        start_loss: node.start_loss,
+        best_loss: node.best_loss,
         moves: node.moves,
         gradients: node.gradients,
-        ended: node.ended,
+        end: node.end,
         offer: node.offer,
         point: Arc::new(node.point.clone()),
     }

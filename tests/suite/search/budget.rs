@@ -34,7 +34,7 @@ fn a_budget_is_used_up_and_not_exceeded() {
             let made = run.statistics().gradients;
             assert_eq!((over, made), (RunEnd::Gradients, gradients), "{method:?}");
         }
-        let (run, over) = whole(&of(SearchMethod::Brute, gradients));
+        let (run, over) = whole(&of(SearchMethod::BruteForce, gradients));
         assert_eq!(over, RunEnd::Done);
         assert!(run.statistics().gradients <= gradients, "{:?}", run.statistics());
         assert!(run.statistics().gradients + 4 > gradients, "{:?}", run.statistics());
@@ -43,7 +43,7 @@ fn a_budget_is_used_up_and_not_exceeded() {
 
 #[test]
 fn threads_share_what_is_left_alike() {
-    for method in [SearchMethod::Restore, SearchMethod::Metropolis, SearchMethod::Brute] {
+    for method in [SearchMethod::Restore, SearchMethod::Metropolis, SearchMethod::BruteForce] {
         let on = |threads: usize| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             pool.install(|| whole(&of(method, 137)).0)
@@ -74,7 +74,7 @@ fn a_run_that_is_taken_up_again_shares_what_is_left_alike() {
     let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("search").join("budget");
     fs::create_dir_all(&folder).unwrap();
     let path = folder.join("run.json");
-    for method in [SearchMethod::Restore, SearchMethod::Metropolis, SearchMethod::Brute] {
+    for method in [SearchMethod::Restore, SearchMethod::Metropolis, SearchMethod::BruteForce] {
         let settings = of(method, 137);
         let (undisturbed, _) = whole(&settings);
         let mut run = begin(&settings);

@@ -9,7 +9,7 @@ use aplanat::search::{
 use std::collections::BTreeSet;
 
 const METHODS: [SearchMethod; 3] =
-    [SearchMethod::Restore, SearchMethod::Metropolis, SearchMethod::Brute];
+    [SearchMethod::Restore, SearchMethod::Metropolis, SearchMethod::BruteForce];
 
 pub(super) fn settings(method: SearchMethod) -> SearchSettings {
     SearchSettings {
@@ -68,20 +68,21 @@ fn metropolis_walks_to_better_structures() {
     let statistics = run.statistics();
     assert!(statistics.rejected > 0 && statistics.rejected < statistics.moves / 2);
     assert!(
-        statistics.ended[&DescentEnd::Mutated] > 0 && statistics.ended[&DescentEnd::Longest] > 0
+        statistics.ended[&DescentEnd::Mutation] > 0 && statistics.ended[&DescentEnd::MaxMoves] > 0
     );
 }
 
 #[test]
 fn brute_force_tries_each_element_once_each_way() {
-    let mut run = begin(&SearchSettings { gradients: Some(400), ..settings(SearchMethod::Brute) });
+    let mut run =
+        begin(&SearchSettings { gradients: Some(400), ..settings(SearchMethod::BruteForce) });
     assert_eq!(to_the_end(&mut run, &Rugged::default()), RunEnd::Done);
     // Two elements, one more and one less for each, a hundred gradients for each.
     let nodes = &run.lineage().nodes()[1..];
     assert_eq!(nodes.len(), 4);
     for node in nodes {
-        assert_eq!((node.gradients, node.ended), (100, Some(DescentEnd::Budget)), "{node:?}");
-        assert_eq!((node.parent, node.before), (Some(0), Some(run.start().loss)));
+        assert_eq!((node.gradients, node.end), (100, Some(DescentEnd::Budget)), "{node:?}");
+        assert_eq!((node.parent, node.loss_before), (Some(0), Some(run.start().loss)));
     }
     let tried = [MutationKind::AddSinglet, MutationKind::RemoveSinglet]
         .map(|k| run.statistics().kinds[&k].tried);
@@ -136,19 +137,19 @@ fn the_tree_tells_every_descent() {
     let tree = run.lineage();
     assert_eq!(tree.total(), born.len() as u64);
     for node in tree.nodes() {
-        assert_eq!(node.ended.is_some(), ended.contains(&node.number));
-        assert_eq!(node.offer.is_some(), node.ended.is_some() || node.number == 0);
-        assert!(node.descended <= node.mutated && node.gradients == 5 * node.moves);
+        assert_eq!(node.end.is_some(), ended.contains(&node.number));
+        assert_eq!(node.offer.is_some(), node.end.is_some() || node.number == 0);
+        assert!(node.best_loss <= node.start_loss && node.gradients == 5 * node.moves);
         assert!(node.parent.is_none_or(|parent| parent < node.number));
         let drawn = node.kind == Some(MutationKind::Global) || node.number == 0;
-        assert_eq!(node.before.is_none(), drawn);
+        assert_eq!(node.loss_before.is_none(), drawn);
     }
     let statistics = run.statistics();
     let tallies = statistics.kinds.values();
     let [ends, tried, refused] = tallies.fold([0; 3], |[a, b, c], tally| {
         [a + tally.ended, b + tally.tried, c + tally.refused.values().sum::<u64>()]
     });
-    let of_start = u64::from(tree.node(0).is_none_or(|start| start.ended.is_some()));
+    let of_start = u64::from(tree.node(0).is_none_or(|start| start.end.is_some()));
     assert_eq!(ends + of_start, ended.len() as u64);
     assert_eq!(tried - refused, born.len() as u64 - 1);
     assert_eq!(statistics.moves, 800 - 4 * statistics.idle);
@@ -192,14 +193,14 @@ fn a_start_that_is_worth_nothing_is_refused() {
 #[test]
 fn descents_into_nothing_end_and_are_not_taken() {
     for fault in [Fault::DescentLost, Fault::DescentInfinite] {
-        for method in [SearchMethod::Restore, SearchMethod::Brute] {
+        for method in [SearchMethod::Restore, SearchMethod::BruteForce] {
             let landscape = Rugged::with(fault);
             let mut run = SearchRun::new(&landscape, START, &settings(method)).unwrap();
             rounds(&mut run, &landscape, 100);
             assert!(run.best().loss <= run.start().loss);
-            assert!(run.statistics().ended[&DescentEnd::Lost] > 3);
+            assert!(run.statistics().ended[&DescentEnd::InfiniteLoss] > 3);
             assert!(run.reservoir().entries().iter().all(|entry| entry.loss.is_finite()));
-            assert!(run.lineage().nodes().iter().all(|node| node.descended.is_finite()));
+            assert!(run.lineage().nodes().iter().all(|node| node.best_loss.is_finite()));
         }
     }
 }
@@ -214,7 +215,7 @@ fn a_search_without_mutations_comes_to_an_end() {
         assert_eq!(run.lineage().total(), 1);
         assert!(run.statistics().kinds[&MutationKind::AddSinglet].refused.len() <= 2);
         let mut brute =
-            SearchRun::new(&landscape, START, &self::settings(SearchMethod::Brute)).unwrap();
+            SearchRun::new(&landscape, START, &self::settings(SearchMethod::BruteForce)).unwrap();
         assert_eq!(to_the_end(&mut brute, &landscape), RunEnd::Done);
     }
 }
@@ -266,7 +267,7 @@ fn settings_that_make_no_sense_are_refused_by_name() {
         ("c", SearchSettings { c: -0.1, ..good.clone() }),
         ("c", SearchSettings { c: f64::INFINITY, ..good.clone() }),
         ("reheat", SearchSettings { reheat: 0.0, ..good.clone() }),
-        ("gradients", SearchSettings { method: SearchMethod::Brute, gradients: None, ..good }),
+        ("gradients", SearchSettings { method: SearchMethod::BruteForce, gradients: None, ..good }),
     ];
     for (name, settings) in wrong {
         let error = SearchRun::new(&Rugged::default(), START, &settings).unwrap_err();
@@ -282,8 +283,7 @@ fn a_pinned_branch_is_what_regenerations_begin_from() {
     let landscape = Rugged::default();
     let mut run = begin(&settings(SearchMethod::Restore));
     rounds(&mut run, &landscape, 150);
-    let pinned =
-        run.lineage().nodes().iter().rev().find(|node| node.ended.is_some()).unwrap().number;
+    let pinned = run.lineage().nodes().iter().rev().find(|node| node.end.is_some()).unwrap().number;
     run.steer(&landscape, SteerCommand::Pin(pinned)).unwrap();
     let born = run.lineage().total();
     rounds(&mut run, &landscape, 150);

@@ -25,7 +25,7 @@ fn after(rounds: usize, settings: &SearchSettings) -> SearchRunOn<Rugged> {
 #[test]
 fn a_run_goes_on_bit_for_bit() {
     let path = folder("resume").join("run.json");
-    for method in [SearchMethod::Restore, SearchMethod::Metropolis, SearchMethod::Brute] {
+    for method in [SearchMethod::Restore, SearchMethod::Metropolis, SearchMethod::BruteForce] {
         for value in [None, Some(0.0), Some(f64::INFINITY)] {
             let temperature = value.and_then(Temperature::new);
             let settings = SearchSettings { temperature, remembered: 30, ..settings(method) };
@@ -88,7 +88,7 @@ fn ends_may_move_and_nothing_else() {
 #[test]
 fn brute_force_has_divided_its_gradients() {
     let path = folder("brute").join("run.json");
-    let first = settings(SearchMethod::Brute);
+    let first = settings(SearchMethod::BruteForce);
     after(3, &first).save(&Rugged::default(), &path).unwrap();
     let more = SearchSettings { gradients: Some(40_000), ..first };
     let error = SearchRun::<_, super::rugged::Momentum>::load(&Rugged::default(), &more, &path)

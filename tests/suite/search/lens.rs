@@ -134,7 +134,7 @@ fn searches_at_both_ends_of_their_settings_stay_finite() {
         with(&|s| s.gamma = 1.0),
         with(&|s| (s.c, s.chains) = (0.0, 1)),
         with(&|s| s.method = aplanat::search::SearchMethod::Metropolis),
-        with(&|s| s.method = aplanat::search::SearchMethod::Brute),
+        with(&|s| s.method = aplanat::search::SearchMethod::BruteForce),
     ] {
         let run = whole(&lens, &plan);
         assert!(run.best().loss.is_finite() && run.best().loss <= run.start().loss);
@@ -163,7 +163,7 @@ fn forbidden_kinds_are_not_tried_and_elements_are_counted() {
         assert!(
             (3..=4).contains(&aplanat::search::element::piece_count(&node.point)),
             "{}",
-            node.what
+            node.mutation
         );
     }
 }
@@ -189,7 +189,7 @@ fn numbers_that_are_not_flagged_stay_as_they_are() {
     let mut kept = 0;
     for node in run.lineage().nodes() {
         for variable in node.point.variables.iter().filter(held) {
-            assert_eq!(node.point.get(variable.parameter), variable.min, "{}", node.what);
+            assert_eq!(node.point.get(variable.parameter), variable.min, "{}", node.mutation);
             kept += 1;
         }
     }

@@ -2,6 +2,7 @@
 
 use aplanat::search::{
     Landscape, LossGradient, MutatedPoint, MutationError, MutationKind, MutationWeights, Random,
+    Refusal, StructureChange,
 };
 use rand::RngExt as _;
 use rand_distr::StandardNormal;
@@ -68,19 +69,19 @@ impl Rugged {
         kind: MutationKind,
         noise: f64,
     ) -> Result<MutatedPoint<Spot>, MutationError> {
-        let refused = |why: &str| Err(MutationError { kind, why: why.to_owned() });
         let elements = match kind {
             MutationKind::AddSinglet if spot.elements < 8 => spot.elements + 1,
             MutationKind::RemoveSinglet if spot.elements > 1 => spot.elements - 1,
             MutationKind::Bend => spot.elements,
-            _ => return refused("there are too many or too few"),
+            _ => return Err(MutationError::new(kind, Refusal::TooManyElements)),
         };
         if self.fault == Fault::AllRefused {
-            return refused("nothing applies");
+            return Err(MutationError::new(kind, Refusal::NoAirGap));
         }
         let x = if self.fault == Fault::AllWorthless { f64::INFINITY } else { spot.x + noise };
-        let what = format!("{} at {elements}", kind.name());
-        Ok(MutatedPoint { point: Spot { elements, x }, kind, what, log_ratio: Some(0.0) })
+        let change = StructureChange::Text(format!("{} at {elements}", kind.name()));
+        let (point, record) = (Spot { elements, x }, change.into());
+        Ok(MutatedPoint { point, kind, record, log_ratio: Some(0.0) })
     }
 }
 
@@ -124,10 +125,7 @@ impl Landscape for Rugged {
 
     fn draw(&self, random: &mut Random) -> Result<Spot, MutationError> {
         if self.fault == Fault::AllRefused {
-            return Err(MutationError {
-                kind: MutationKind::Global,
-                why: "nothing to draw".to_owned(),
-            });
+            return Err(MutationError::new(MutationKind::Global, Refusal::NoRandomLens));
         }
         Ok(Spot { elements: random.random_range(1..=8), x: random.random_range(-4.0..4.0) })
     }
@@ -146,8 +144,7 @@ impl Landscape for Rugged {
             left < 0.0
         });
         let noise = random.sample::<f64, _>(StandardNormal);
-        let forbidden =
-            MutationError { kind: MutationKind::Bend, why: "all are forbidden".to_owned() };
+        let forbidden = MutationError::new(MutationKind::Bend, Refusal::AllExcluded);
         self.mutated(spot, drawn.ok_or(forbidden)?, noise)
     }
 

@@ -157,7 +157,7 @@ fn too_many_elements_become_fewer() {
     let found = run(&lens, &plan, |_, _| ControlFlow::Continue(())).unwrap();
     assert_eq!(landscape.structure_violation(&found.best().point), 0);
     assert_eq!(found.statistics().gradients, 600);
-    assert!(found.reservoir().entries().iter().any(|entry| entry.outside == 0));
+    assert!(found.reservoir().entries().iter().any(|entry| entry.structure_violation == 0));
     let asked = SearchRules::default().admit_element_count(12);
     assert_eq!(
         (asked.elements, SearchRules::default().admit_element_count(7).elements),

@@ -86,7 +86,7 @@ fn faint(ui: &Ui) -> Color32 {
 /// The position of each generation: in the order of birth, the better the lower.
 fn node_positions(shown: &[&Generation], rect: Rect) -> Vec<Pos2> {
     let height = |node: &Generation| {
-        let merit = node.descended;
+        let merit = node.best_loss;
         if merit > 0.0 && merit.is_finite() { Some(merit.log10()) } else { None }
     };
     let heights = shown.iter().filter_map(|node| height(node));

@@ -3,7 +3,7 @@
 use egui::{DragValue, Grid, RichText, Ui};
 
 use super::mutation_style;
-use crate::search::{MutationKind, MutationStatistics, SteerCommand};
+use crate::search::{MutationKind, MutationStatistics, Refusal, SteerCommand};
 use crate::session::{SessionView, StructureSearchCommand, StructureSearchSnapshot};
 use crate::studio::actions::Actions;
 use crate::studio::number;
@@ -82,9 +82,9 @@ fn refusal_cell(ui: &mut Ui, kind: MutationKind, tally: &MutationStatistics) {
     }
 }
 
-fn most_common_refusal(tally: &MutationStatistics) -> Option<(&str, u64)> {
+fn most_common_refusal(tally: &MutationStatistics) -> Option<(Refusal, u64)> {
     let most = tally.refused.iter().max_by_key(|(_, count)| **count);
-    most.map(|(why, count)| (why.as_str(), *count))
+    most.map(|(refusal, count)| (*refusal, *count))
 }
 
 /// The commonest reason of each kind, in words.

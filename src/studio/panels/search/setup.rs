@@ -61,7 +61,7 @@ const METHODS: [(SearchMethod, &str, &str); 3] = [
         "Noisy gradient steps and reversible mutations, each accepted or rejected",
     ),
     (
-        SearchMethod::Brute,
+        SearchMethod::BruteForce,
         "Brute force",
         "Every insertion and removal of one element, each optimized with the same budget",
     ),
@@ -75,7 +75,7 @@ impl SearchSetup {
         if self.design_glasses_only {
             quest.plan.rules.glasses = glasses(&view.lens);
         }
-        if quest.plan.settings.method == SearchMethod::Brute {
+        if quest.plan.settings.method == SearchMethod::BruteForce {
             quest.plan.settings.gradients = Some(self.brute_force_gradients);
         }
         quest
@@ -200,7 +200,7 @@ impl SearchSetup {
 
     fn limit_rows(&mut self, ui: &mut Ui) {
         let Self { request: quest, disabled: asleep, brute_force_gradients: gradients, .. } = self;
-        if quest.plan.settings.method == SearchMethod::Brute {
+        if quest.plan.settings.method == SearchMethod::BruteForce {
             ui.weak("Gradients");
             let hint = "The budget that is divided among all mutations";
             drag(ui, "Gradients of brute force", gradients, 1..=u64::MAX, 100.0, hint);

@@ -147,42 +147,41 @@ fn change_text(name: &str, old: f64, new: f64, unit: &str) -> String {
 
 /// The mutation with which a generation began.
 pub(super) fn mutation_text<P>(node: &LineageNode<P>) -> String {
-    let what = &node.what;
     match node.kind {
-        Some(kind) => format!("{}: {what}", kind.name()),
-        None => what.clone(),
+        Some(kind) => format!("{}: {}", kind.name(), node.mutation),
+        None => node.mutation.to_string(),
     }
 }
 
 /// The merits, the moves, the end and the place in the reservoir of a generation.
 pub(super) fn outcome_text<P>(node: &LineageNode<P>) -> String {
-    let before = node.before.map(|before| format!("{} before, ", merit_text(before)));
+    let before = node.loss_before.map(|before| format!("{} before, ", merit_text(before)));
     let merits = format!(
         "merit {}{} after the mutation, {} after the descent",
         before.unwrap_or_default(),
-        merit_text(node.mutated),
-        merit_text(node.descended)
+        merit_text(node.start_loss),
+        merit_text(node.best_loss)
     );
-    let end = match node.ended {
+    let end = match node.end {
         None => "not finished",
-        Some(DescentEnd::Clock) => "ended by its clock",
-        Some(DescentEnd::Longest) => "ended at the maximum length",
-        Some(DescentEnd::Lost) => "ended without light",
-        Some(DescentEnd::Mutated) => "ended by an accepted mutation",
+        Some(DescentEnd::Regeneration) => "ended by its clock",
+        Some(DescentEnd::MaxMoves) => "ended at the maximum length",
+        Some(DescentEnd::InfiniteLoss) => "ended without light",
+        Some(DescentEnd::Mutation) => "ended by an accepted mutation",
         Some(DescentEnd::Budget) => "ended by its budget of gradients",
     };
     let kept = match node.offer {
         None => String::new(),
         Some(OfferOutcome::Entered) => "; retained".to_owned(),
         Some(OfferOutcome::Replaced(other)) => format!("; retained in place of lens {other}"),
-        Some(OfferOutcome::Same(other)) => format!("; the same as lens {other}"),
-        Some(OfferOutcome::BehindTwin(other)) => {
+        Some(OfferOutcome::AlreadyPresent(other)) => format!("; the same as lens {other}"),
+        Some(OfferOutcome::RejectedSameTopology(other)) => {
             format!("; not retained: lens {other} of the same pattern is at least as good")
         }
-        Some(OfferOutcome::BehindAll) => "; not retained: all retained lenses are at least as \
+        Some(OfferOutcome::RejectedWorse) => "; not retained: all retained lenses are at least as \
             good"
             .to_owned(),
-        Some(OfferOutcome::Worthless) => "; not retained: no merit".to_owned(),
+        Some(OfferOutcome::RejectedNonFinite) => "; not retained: no merit".to_owned(),
     };
     let (moves, gradients) = (counted(node.moves, "move"), counted(node.gradients, "gradient"));
     let chain = node.chain + 1;
