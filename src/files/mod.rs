@@ -6,6 +6,7 @@
 
 mod atomic;
 mod bundled;
+mod checkpoint;
 mod convert;
 mod error;
 mod grayscale;
@@ -20,6 +21,7 @@ pub mod zemax;
 
 pub use atomic::{check_writable, write_atomic};
 pub use bundled::{BundledLens, bundled_lenses};
+pub use checkpoint::{CheckpointError, CheckpointFormat};
 pub use convert::{Conversion, convert};
 pub use error::FileError;
 pub use grayscale::{GrayscaleImage, read_grayscale};

@@ -8,8 +8,9 @@ use super::clock::Stopwatch;
 use crate::lens::Lens;
 use crate::merit::MeritError;
 use crate::search::lens_landscape::{LensLandscape, SearchPlan, SearchSetupError};
-use crate::search::{SearchError, SearchMethod, SearchRun, SearchSettings};
+use crate::search::{SearchMethod, SearchSettings};
 use serde::Serialize;
+use std::ops::ControlFlow;
 
 /// The fractions of the time after which the merit is recorded.
 const MARKS: [f64; 4] = [0.125, 0.25, 0.5, 1.0];
@@ -137,19 +138,20 @@ fn run_seed(
     seconds: f64,
     found: &mut [Vec<f64>],
 ) -> Result<u64, SearchSetupError> {
-    let landscape = plan.landscape(lens)?;
-    let settings = plan.settings(&landscape);
-    let mut run = SearchRun::new(&landscape, landscape.start().clone(), &settings)
-        .map_err(|cause: SearchError| SearchSetupError::from(cause))?;
+    let (landscape, mut run) = plan.begin(lens)?;
     let watch = Stopwatch::start();
     let mut best: Vec<Lens> = Vec::new();
-    while best.len() < MARKS.len() {
-        let over = run.end_reason().is_some();
-        if over || watch.seconds() >= MARKS[best.len()] * seconds {
+    let end = run.advance(&landscape, |run, _| {
+        let passed =
+            MARKS[best.len()..].iter().take_while(|mark| watch.seconds() >= *mark * seconds);
+        for _ in 0..passed.count() {
             best.push(run.best().point.clone());
-        } else {
-            run.round(&landscape);
         }
+        if best.len() < MARKS.len() { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
+    });
+    // A run that has ended stays as it is until the last mark.
+    if end.is_continue() {
+        best.resize(MARKS.len(), run.best().point.clone());
     }
     for (merits, lens) in found.iter_mut().zip(&best) {
         merits.push(merit_of(&landscape, lens).unwrap_or(f64::INFINITY));

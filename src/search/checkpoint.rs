@@ -1,26 +1,19 @@
 //! Checkpoints: a run as a file, which resumes later bit for bit as if it had not been interrupted.
 
 use super::{Landscape, SearchError, SearchMethod, SearchPoint, SearchRun, SearchSettings};
-use crate::files;
+use crate::files::{CheckpointError, CheckpointFormat};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::collections::BTreeSet;
-use std::fs;
 use std::path::Path;
 
-/// The version of the file format.
-const VERSION: u32 = 1;
+/// The format of the file. Version 1 described mutations and refusals as text.
+const FORMAT: CheckpointFormat = CheckpointFormat { key: "aplanat_search", version: 2 };
 
 /// The field of [`Landscape::fingerprint`] that holds the start of the search, if there is one.
 const START: &str = "start";
 /// The maximum number of characters of a value in a message.
 const SHOWN: usize = 60;
-
-/// The header that all versions of the file share.
-#[derive(Deserialize)]
-struct CheckpointHeader {
-    aplanat_search: u32,
-}
 
 #[derive(Serialize)]
 struct CheckpointContent<'a, R> {
@@ -69,18 +62,15 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
     where
         L: Landscape<Point = P, Memory = M>,
     {
-        let about = landscape.fingerprint();
-        let written =
-            CheckpointContent { aplanat_search: VERSION, landscape: &about, run: self, beside };
-        let file = path.display().to_string();
-        let unproven = |what: String| SearchError::RoundTripFailed { file: file.clone(), what };
-        let bytes = serde_json::to_vec(&written).map_err(|error| unproven(error.to_string()))?;
-        let read: Result<StoredCheckpoint<Self>, _> = serde_json::from_slice(&bytes);
-        let read = read.map_err(|error| unproven(error.to_string()))?;
-        if read.run != *self {
-            return Err(unproven("it reads back as another run".to_owned()));
-        }
-        Ok(files::write_atomic(path, &bytes)?)
+        let fingerprint = landscape.fingerprint();
+        let content = CheckpointContent {
+            aplanat_search: FORMAT.version,
+            landscape: &fingerprint,
+            run: self,
+            beside,
+        };
+        FORMAT.write(path, &content, |read: &StoredCheckpoint<Self>| read.run == *self)?;
+        Ok(())
     }
 
     /// Loads a run, which continues where it was saved, on the same landscape and with the same
@@ -100,18 +90,10 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
     {
         settings.check()?;
         let file = path.display().to_string();
-        let unreadable = |source| files::FileError::Unreadable { file: file.clone(), source };
-        let bytes = fs::read(path).map_err(unreadable)?;
-        let corrupt = |what: String| SearchError::Corrupt { file: file.clone(), what };
-        let head: CheckpointHeader =
-            serde_json::from_slice(&bytes).map_err(|e| corrupt(e.to_string()))?;
-        if head.aplanat_search != VERSION {
-            let (found, expected) = (head.aplanat_search, VERSION);
-            return Err(SearchError::UnsupportedVersion { file, found, expected });
+        let mut read: StoredCheckpoint<Self> = FORMAT.read(path)?;
+        if let Err(what) = read.run.check_consistency() {
+            return Err(CheckpointError::Corrupt { file, what }.into());
         }
-        let mut read: StoredCheckpoint<Self> =
-            serde_json::from_slice(&bytes).map_err(|e| corrupt(e.to_string()))?;
-        read.run.check_consistency().map_err(corrupt)?;
         let about = landscape.fingerprint();
         // The start is compared first: much else follows from it.
         let (start, own_start) = (&read.landscape[START], &about[START]);
@@ -135,13 +117,13 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
     /// Checks the consistency of a run that was read.
     fn check_consistency(&self) -> Result<(), String> {
         self.settings.check().map_err(|error| error.to_string())?;
-        let numbers = self.tree.nodes().iter().map(|node| node.number);
+        let numbers = self.lineage.nodes().iter().map(|node| node.number);
         if self.chains.len() != self.settings.chains {
             let [found, expected] = [self.chains.len(), self.settings.chains];
             return Err(format!("found {found} chains; expected {expected}"));
         }
         if !numbers.clone().is_sorted_by(|a, b| a < b)
-            || numbers.last().is_some_and(|last| last >= self.tree.total())
+            || numbers.last().is_some_and(|last| last >= self.lineage.total())
         {
             return Err("the generations are out of order".to_owned());
         }
@@ -155,11 +137,11 @@ fn fixed_settings(settings: &SearchSettings) -> Result<Value, SearchError> {
     if fixed.method != SearchMethod::BruteForce {
         (fixed.moves, fixed.gradients) = (None, None);
     }
-    let unwritable = |error: serde_json::Error| SearchError::Corrupt {
+    let corrupt = |error: serde_json::Error| CheckpointError::Corrupt {
         file: "settings".to_owned(),
         what: error.to_string(),
     };
-    serde_json::to_value(fixed).map_err(unwritable)
+    Ok(serde_json::to_value(fixed).map_err(corrupt)?)
 }
 
 /// The first difference of two values: its path and both values. Scalars are compared before arrays

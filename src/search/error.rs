@@ -1,6 +1,6 @@
 //! Errors of starting, steering, saving and loading a search.
 
-use crate::files::FileError;
+use crate::files::CheckpointError;
 
 /// Errors of starting, steering, saving and loading a search.
 #[derive(Debug, thiserror::Error)]
@@ -16,7 +16,7 @@ pub enum SearchError {
         expected: &'static str,
     },
     /// The start has no finite loss.
-    #[error("the search cannot begin: the loss of the start is {loss}; expected a number")]
+    #[error("the search cannot start: the loss of the start is {loss}; expected a finite number")]
     InvalidStart {
         /// Its loss.
         loss: f64,
@@ -29,35 +29,9 @@ pub enum SearchError {
         /// The number of generations so far.
         born: u64,
     },
-    /// The file cannot be read or written.
+    /// A checkpoint cannot be written or read.
     #[error(transparent)]
-    File(#[from] FileError),
-    /// A checkpoint would not read back unchanged.
-    #[error("{file}: not saved, since it would not read back as it is: {what}")]
-    RoundTripFailed {
-        /// The file.
-        file: String,
-        /// The difference.
-        what: String,
-    },
-    /// The file is not a checkpoint, or is damaged.
-    #[error("{file}: no sound checkpoint of a search: {what}")]
-    Corrupt {
-        /// The file.
-        file: String,
-        /// The problem and its position.
-        what: String,
-    },
-    /// A checkpoint of a version that this program cannot read.
-    #[error("{file}: a checkpoint of version {found}; expected version {expected}")]
-    UnsupportedVersion {
-        /// The file.
-        file: String,
-        /// Its version.
-        found: u32,
-        /// The newest version that can be read.
-        expected: u32,
-    },
+    Checkpoint(#[from] CheckpointError),
     /// A checkpoint of a search from another start.
     #[error(
         "{file}: a checkpoint of another search, from another lens: {name} is {found} there and \

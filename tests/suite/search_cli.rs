@@ -84,9 +84,9 @@ fn search_says_what_is_wrong_with_its_arguments() {
     wrong(&["--max-diameter=-3"], &["--max-diameter", "more than 0"]);
     wrong(&["--max-diameter", "-3"], &["--max-diameter", "found -3", "more than 0"]);
     wrong(&["--max-track", "-1e308"], &["--max-track", "found -1.0000e308"]);
-    wrong(&["--max-diameter", "1"], &["no lens keeps", "semi-diameters of 0.5 mm"]);
-    wrong(&["--max-track", "1"], &["no lens keeps", "a track of 1 mm"]);
-    wrong(&["--min-back-focus", "1000"], &["no lens keeps", "a back focus of 1000"]);
+    wrong(&["--max-diameter", "1"], &["no lens can satisfy", "semi-diameters of at most 0.5 mm"]);
+    wrong(&["--max-track", "1"], &["no lens can satisfy", "a track of at most 1 mm"]);
+    wrong(&["--min-back-focus", "1000"], &["no lens can satisfy", "a back focus of 1000"]);
     wrong(&["--focal-length", "1e308"], &["--focal-length", "1.0000e308"]);
     wrong(&["--heights", "-7"], &["--heights", "--focal-length"]);
     wrong(&["--minutes", "-1"], &["--minutes", "found -1", "more than 0"]);

@@ -13,7 +13,7 @@ use super::input::{self, LensFile};
 use super::output::{Output, ShortNumber, print_note};
 use super::output_paths;
 use super::progress::{progress_bar, stop_flag};
-use crate::files;
+use crate::files::{self, CheckpointError};
 use crate::lens::Lens;
 use crate::measure::Stopwatch;
 use crate::search::lens_landscape::{LandscapeError, LensLandscape, SearchPlan, finalize};
@@ -21,6 +21,7 @@ use crate::search::{FoundPoint, RunEnd, SearchError, SearchMethod, SearchRun, Se
 use report::SearchReport;
 use result::StartAgainstBest;
 use serde::Serialize;
+use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -213,23 +214,27 @@ impl SearchArgs {
         let stop = stop_flag();
         let bar = progress_bar(run.settings().gradients.unwrap_or(0) as usize);
         let mut saved = 0.0;
-        let ended = loop {
-            if let Some(over) = run.end_reason() {
-                break SearchEnd::Run(over);
-            }
-            if is_raised(&stop) {
-                break SearchEnd::Interrupted;
-            }
-            if self.minutes.is_some_and(|minutes| watch.seconds() >= 60.0 * minutes) {
-                break SearchEnd::Time;
-            }
-            run.round(landscape);
+        let flow = run.advance(landscape, |run, _| {
             bar.set_position(run.statistics().gradients);
             bar.set_message(format!("merit {}", ShortNumber(run.best().loss)));
             if watch.seconds() - saved >= self.checkpoint_every {
-                self.save(landscape, run)?;
+                if let Err(error) = self.save(landscape, run) {
+                    return ControlFlow::Break(Err(error));
+                }
                 saved = watch.seconds();
             }
+            let is_late = |minutes: f64| watch.seconds() >= 60.0 * minutes;
+            if is_raised(&stop) {
+                ControlFlow::Break(Ok(SearchEnd::Interrupted))
+            } else if self.minutes.is_some_and(is_late) {
+                ControlFlow::Break(Ok(SearchEnd::Time))
+            } else {
+                ControlFlow::Continue(())
+            }
+        });
+        let ended = match flow {
+            ControlFlow::Continue(end) => SearchEnd::Run(end),
+            ControlFlow::Break(stopped) => stopped?,
         };
         bar.finish_and_clear();
         self.save(landscape, run)?;
@@ -301,8 +306,10 @@ fn landscape_error(file: &str, cause: LandscapeError) -> CliError {
 /// The error of settings or of a checkpoint.
 fn search_error(cause: SearchError) -> CliError {
     match cause {
-        SearchError::File(error) => CliError::File(error),
-        SearchError::RoundTripFailed { .. } => CliError::Failed(cause.to_string()),
+        SearchError::Checkpoint(CheckpointError::File(error)) => CliError::File(error),
+        SearchError::Checkpoint(CheckpointError::RoundTripFailed { .. }) => {
+            CliError::Failed(cause.to_string())
+        }
         cause => CliError::Input(cause.to_string()),
     }
 }

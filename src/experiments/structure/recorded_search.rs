@@ -4,8 +4,9 @@ use crate::experiments::sharpness_vs_light::ProgressSpan;
 use crate::experiments::{ExperimentError, ProgressFn, report_progress};
 use crate::lens::Lens;
 use crate::search::lens_landscape::{LensLandscape, SearchPlan};
-use crate::search::{MutationKind, SearchRun, SearchRunOn};
+use crate::search::{MutationKind, RunEnd, SearchRunOn};
 use rayon::prelude::*;
+use std::ops::ControlFlow;
 
 /// The number of gradients between two reports of progress.
 const SLICE: u64 = 100;
@@ -35,10 +36,8 @@ pub(super) struct RoundRecord {
 
 impl RecordedSearch {
     pub(super) fn new(start: &Lens, plan: &SearchPlan) -> Result<Self, ExperimentError> {
-        let landscape = plan.landscape(start).map_err(ExperimentError::from_error)?;
-        let settings = plan.settings(&landscape);
-        let run = SearchRun::new(&landscape, landscape.start().clone(), &settings);
-        Ok(Self { run: run.map_err(ExperimentError::from_error)?, landscape, marks: Vec::new() })
+        let (landscape, run) = plan.begin(start).map_err(ExperimentError::from_error)?;
+        Ok(Self { landscape, run, marks: Vec::new() })
     }
 
     /// The loss of the starting lens.
@@ -87,25 +86,34 @@ impl RecordedSearch {
     }
 
     fn advance(&mut self) {
-        let until = self.run.statistics().gradients + SLICE;
-        while self.run.end_reason().is_none() && self.run.statistics().gradients < until {
-            self.run.round(&self.landscape);
-            self.marks.push(self.record());
-        }
+        let Self { landscape, run, marks } = self;
+        let until = run.statistics().gradients + SLICE;
+        let flow = run.advance(landscape, |run, _| {
+            marks.push(RoundRecord::new(run));
+            if run.statistics().gradients < until {
+                ControlFlow::Continue(())
+            } else {
+                ControlFlow::Break(())
+            }
+        });
+        // Whether the run has ended is asked of the run itself.
+        let _: ControlFlow<(), RunEnd> = flow;
     }
+}
 
-    fn record(&self) -> RoundRecord {
-        let done = self.run.statistics();
-        let chain = &self.run.chains()[0];
+impl RoundRecord {
+    fn new(run: &SearchRunOn<LensLandscape>) -> Self {
+        let done = run.statistics();
+        let chain = &run.chains()[0];
         let generation = chain.generation();
-        RoundRecord {
+        Self {
             gradients: done.gradients,
             moves: done.moves,
             better: done.better,
-            best: self.run.best().loss,
+            best: run.best().loss,
             loss: chain.position().map(|(_, loss)| loss),
             generation,
-            kind: self.run.lineage().node(generation).and_then(|node| node.kind),
+            kind: run.lineage().node(generation).and_then(|node| node.kind),
         }
     }
 }

@@ -73,13 +73,14 @@ pub struct Lineage<P> {
     next: u64,
     remembered: usize,
     /// The total when the tree was last pruned.
-    tidied: u64,
+    #[serde(rename = "tidied")]
+    last_pruned: u64,
 }
 
 impl<P> Lineage<P> {
     /// An empty lineage that remembers up to `remembered` generations besides ancestors.
     pub(in crate::search) fn new(remembered: usize) -> Self {
-        Self { nodes: Vec::new(), next: 0, remembered, tidied: 0 }
+        Self { nodes: Vec::new(), next: 0, remembered, last_pruned: 0 }
     }
 
     /// The remembered generations, sorted by number.
@@ -122,10 +123,10 @@ impl<P> Lineage<P> {
         held: impl Iterator<Item = u64>,
         living: impl Iterator<Item = u64>,
     ) {
-        if self.next - self.tidied <= self.remembered as u64 {
+        if self.next - self.last_pruned <= self.remembered as u64 {
             return;
         }
-        self.tidied = self.next;
+        self.last_pruned = self.next;
         let lines = held
             .flat_map(|number| self.ancestry(number).take(MAX_ANCESTRY).map(|node| node.number));
         let kept: BTreeSet<u64> = lines.chain(living).collect();

@@ -9,32 +9,32 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
     pub(in crate::search) fn record<L>(
         &mut self,
         chain: usize,
-        happening: TurnEvent<P>,
+        event: TurnEvent<P>,
         landscape: &L,
         events: &mut Vec<SearchEvent>,
     ) where
         L: Landscape<Point = P, Memory = M>,
     {
-        match happening {
+        match event {
             TurnEvent::Refused(error) => self.statistics.refuse(error),
             TurnEvent::Rejected(kind) => {
                 let tally = self.statistics.kind(kind);
                 tally.tried += 1;
                 tally.rejected += 1;
             }
-            TurnEvent::Started(birth) => {
-                if let Some(kind) = birth.kind {
+            TurnEvent::Started(started) => {
+                if let Some(kind) = started.kind {
                     self.statistics.kind(kind).tried += 1;
                 }
-                let number = self.tree.add(self.new_node(chain, birth));
-                self.chains[chain].number = number;
+                let number = self.lineage.add(self.new_node(chain, started));
+                self.chains[chain].generation = number;
                 events.push(SearchEvent::Started(number));
             }
-            TurnEvent::Moved(moved) => self.record_move(self.chains[chain].number, moved),
-            TurnEvent::Ended { ended, point, loss } => {
-                let number = self.chains[chain].number;
+            TurnEvent::Moved(moved) => self.record_move(self.chains[chain].generation, moved),
+            TurnEvent::Ended { end, point, loss } => {
+                let number = self.chains[chain].generation;
                 events.push(SearchEvent::Ended(number));
-                if self.record_end(ReservoirEntry::new(landscape, number, loss, point), ended) {
+                if self.record_end(ReservoirEntry::new(landscape, number, loss, point), end) {
                     events.push(SearchEvent::NewBest(number));
                 }
             }
@@ -46,7 +46,7 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
         self.statistics.gradients += moved.gradients;
         self.statistics.better += u64::from(moved.loss < self.start.loss);
         self.statistics.rejected += u64::from(moved.rejected);
-        if let Some(node) = self.tree.node_mut(number) {
+        if let Some(node) = self.lineage.node_mut(number) {
             node.moves += 1;
             node.gradients += moved.gradients;
             node.best_loss = moved.best;
@@ -61,7 +61,7 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
         let (number, loss, point) = (entry.number, entry.loss, entry.point.clone());
         let best = self.update_best(&entry);
         let offer = self.reservoir.offer(entry);
-        let Some(node) = self.tree.node_mut(number) else { return best };
+        let Some(node) = self.lineage.node_mut(number) else { return best };
         node.end = Some(end);
         node.offer = Some(offer);
         node.best_loss = loss;
@@ -96,7 +96,7 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
     ) where
         L: Landscape<Point = P, Memory = M>,
     {
-        let number = self.chains[chain].number;
+        let number = self.chains[chain].generation;
         let may_be_better = |loss: f64| loss < self.best.loss || self.best.structure_violation > 0;
         let best = self.chains[chain].best().filter(|(_, loss)| may_be_better(*loss));
         let entry =
@@ -110,7 +110,7 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
     pub(in crate::search) fn prune_lineage(&mut self) {
         let held = self.reservoir.entries().iter().chain(&self.pinned).chain([&self.best]);
         let held = held.map(|entry| entry.number);
-        let living = self.chains.iter().map(|chain| chain.number);
-        self.tree.prune(held, living);
+        let living = self.chains.iter().map(|chain| chain.generation);
+        self.lineage.prune(held, living);
     }
 }

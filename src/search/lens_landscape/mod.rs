@@ -50,7 +50,7 @@ pub enum LandscapeError {
     #[error(transparent)]
     Rule(#[from] RuleError),
     /// Constraints that no lens can satisfy.
-    #[error("no lens keeps these limits: {0}")]
+    #[error("no lens can satisfy these constraints: {0}")]
     Impossible(String),
     /// A setting is invalid.
     #[error("{what} is {found}; expected {expected}")]

@@ -4,8 +4,8 @@ use super::{DescentSettings, LandscapeError, LensLandscape};
 use crate::lens::Lens;
 use crate::merit::Goal;
 use crate::search::{
-    MutationKind, SearchError, SearchEvent, SearchRules, SearchRun, SearchRunOn, SearchSettings,
-    Temperature,
+    MutationKind, RunEnd, SearchError, SearchEvent, SearchRules, SearchRun, SearchRunOn,
+    SearchSettings, Temperature,
 };
 use serde::{Deserialize, Serialize};
 use std::ops::ControlFlow;
@@ -74,6 +74,20 @@ impl SearchPlan {
         Ok(landscape)
     }
 
+    /// The landscape of the search, and the run before its first round.
+    ///
+    /// # Errors
+    /// Those of [`SearchPlan::landscape`], and a start without a finite loss.
+    pub fn begin(
+        &self,
+        lens: &Lens,
+    ) -> Result<(LensLandscape, SearchRunOn<LensLandscape>), SearchSetupError> {
+        let landscape = self.landscape(lens)?;
+        let start = landscape.start().clone();
+        let run = SearchRun::new(&landscape, start, &self.settings(&landscape))?;
+        Ok((landscape, run))
+    }
+
     /// The settings, with the default temperature of the landscape if none is given, and without
     /// random draws if the rules exclude them.
     pub fn settings(&self, landscape: &LensLandscape) -> SearchSettings {
@@ -94,14 +108,8 @@ pub fn run(
     plan: &SearchPlan,
     mut watch: impl FnMut(&SearchRunOn<LensLandscape>, &[SearchEvent]) -> ControlFlow<()>,
 ) -> Result<SearchRunOn<LensLandscape>, SearchSetupError> {
-    let landscape = plan.landscape(lens)?;
-    let start = landscape.start().clone();
-    let mut run = SearchRun::new(&landscape, start, &plan.settings(&landscape))?;
-    while run.end_reason().is_none() {
-        let events = run.round(&landscape);
-        if watch(&run, &events).is_break() {
-            break;
-        }
-    }
+    let (landscape, mut run) = plan.begin(lens)?;
+    // The end of the run and a break of `watch` both leave the run as it is.
+    let _: ControlFlow<(), RunEnd> = run.advance(&landscape, &mut watch);
     Ok(run)
 }

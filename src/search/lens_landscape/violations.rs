@@ -66,8 +66,8 @@ impl LensLandscape {
         }
         let (most, light, rim) = (format_short(most), format_limit(light), format_limit(rim));
         Err(LandscapeError::Impossible(format!(
-            "semi-diameters of {most} mm at most; the light that is asked for, {light} mm^2, needs \
-             {rim} mm at the first surface"
+            "semi-diameters of at most {most} mm; the required light of {light} mm^2 needs {rim} mm at \
+             the first surface"
         )))
     }
 
@@ -96,7 +96,7 @@ impl LensLandscape {
         }
         let [most, least, room, thin] = [most, least, room, thin].map(format_limit);
         Err(LandscapeError::Impossible(format!(
-            "a track of {most} mm at most; {pieces} pieces of glass of {thin} mm and a back focus \
+            "a track of at most {most} mm; {pieces} pieces of glass of {thin} mm and a back focus \
              of {room} mm need {least} mm"
         )))
     }

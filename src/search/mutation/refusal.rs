@@ -86,7 +86,7 @@ pub enum Refusal {
     #[error("there is no stop")]
     NoStop,
     /// The rules do not permit the stop to move.
-    #[error("the rules keep the stop where it is")]
+    #[error("the rules do not allow the stop to move")]
     FixedStop,
     /// A pickup refers to a gap at the stop.
     #[error("a pickup refers to a gap at the stop")]
@@ -104,13 +104,13 @@ pub enum Refusal {
     #[error("the lens cannot be resolved")]
     InvalidLens,
     /// The lens is afocal, so there is no focal length to preserve.
-    #[error("the lens is afocal: it has no focal length to keep")]
+    #[error("the lens is afocal: it has no focal length to preserve")]
     Afocal,
     /// The projection has too few independent parameters.
-    #[error("the parameters that may move cannot keep focal length and focus apart")]
+    #[error("the variable parameters cannot preserve focal length and focus independently")]
     SingularProjection,
     /// The projection would move parameters out of their bounds.
-    #[error("parameters would have to pass their bounds to keep the focus")]
+    #[error("parameters would have to leave their bounds to preserve the focus")]
     ProjectionBounds,
     /// The projection does not converge.
     #[error("the projection does not converge")]
@@ -128,7 +128,7 @@ pub enum Refusal {
     #[error("no light would get through")]
     NoLight,
     /// No random lens transmits light.
-    #[error("no lens that was drawn passes light")]
+    #[error("no random lens transmits light")]
     NoRandomLens,
     /// All kinds of mutation have weight 0.
     #[error("every kind of mutation has weight 0")]
@@ -137,7 +137,7 @@ pub enum Refusal {
     #[error("it is excluded")]
     Excluded,
     /// The kind does not change a lens.
-    #[error("it is no change of a lens")]
+    #[error("it does not change a lens")]
     NotAMutation,
     /// The point has no such element.
     #[error("there is no such element")]

@@ -46,8 +46,8 @@ impl Display for Projection {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { steps, curvature, distance, .. } = self;
         let ending = if *steps == 1 { "" } else { "s" };
-        write!(f, "kept in focus in {steps} step{ending}, ")?;
-        write!(f, "curvatures by {curvature:.1e}/mm, gaps by {distance:.1e} mm at most")
+        write!(f, "projected in {steps} step{ending}: curvatures changed by at most ")?;
+        write!(f, "{curvature:.1e}/mm, gaps by at most {distance:.1e} mm")
     }
 }
 
@@ -55,16 +55,16 @@ impl Display for Projection {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ProjectionError {
     /// The lens is afocal at this zoom position.
-    #[error("the lens is afocal at zoom position {0}: it has no focal length to keep")]
+    #[error("the lens is afocal at zoom position {0}: it has no focal length to preserve")]
     Afocal(usize),
     /// The variable parameters cannot satisfy all constraints independently.
-    #[error("the numbers that may move cannot keep focal length and focus apart")]
+    #[error("the variable parameters cannot preserve focal length and focus independently")]
     Singular,
     /// Parameters would have to leave their bounds: how many have reached them, and of how many.
-    #[error("numbers would have to pass their bounds ({0} of {1} have reached them)")]
+    #[error("parameters would have to leave their bounds ({0} of {1} have reached them)")]
     Bounds(usize, usize),
     /// No convergence within this number of steps.
-    #[error("it needs more than {0} steps")]
+    #[error("no convergence within {0} steps")]
     Steps(usize),
     /// The lens cannot be resolved.
     #[error(transparent)]

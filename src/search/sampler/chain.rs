@@ -22,9 +22,12 @@ const MAX_ATTEMPTS: usize = 16;
 pub struct Chain<P, M> {
     pub(in crate::search) random: Random,
     /// The generation of the current descent, or of the last one.
-    pub(in crate::search) number: u64,
-    pub(in crate::search) tour: Option<ChainDescent<P, M>>,
-    pub(in crate::search) task: Option<BruteForceJob>,
+    #[serde(rename = "number")]
+    pub(in crate::search) generation: u64,
+    #[serde(rename = "tour")]
+    pub(in crate::search) descent: Option<ChainDescent<P, M>>,
+    #[serde(rename = "task")]
+    pub(in crate::search) job: Option<BruteForceJob>,
     pub(in crate::search) scales: BTreeMap<String, GradientScale>,
 }
 
@@ -38,7 +41,8 @@ pub struct ChainDescent<P, M> {
     pub(in crate::search) best_loss: f64,
     pub(in crate::search) moves: u64,
     pub(in crate::search) gradients: u64,
-    pub(in crate::search) walk: Option<LangevinState>,
+    #[serde(rename = "walk")]
+    pub(in crate::search) langevin: Option<LangevinState>,
 }
 
 /// A mutation that the brute-force method descends from.
@@ -53,17 +57,17 @@ pub(in crate::search) struct BruteForceJob {
 impl<P: Clone, M> Chain<P, M> {
     /// The generation of the current descent, or of the last one.
     pub fn generation(&self) -> u64 {
-        self.number
+        self.generation
     }
 
     /// The current point and its loss; `None` between two descents.
     pub fn position(&self) -> Option<(&P, f64)> {
-        self.tour.as_ref().map(|tour| (&tour.point, tour.loss))
+        self.descent.as_ref().map(|descent| (&descent.point, descent.loss))
     }
 
     /// The best point of the current descent and its loss; `None` between two descents.
     pub fn best(&self) -> Option<(&P, f64)> {
-        self.tour.as_ref().map(|tour| (&tour.best, tour.best_loss))
+        self.descent.as_ref().map(|descent| (&descent.best, descent.best_loss))
     }
 }
 
@@ -71,7 +75,7 @@ impl<P: Clone, M: Default> ChainDescent<P, M> {
     pub(in crate::search) fn new(point: P, loss: f64) -> Self {
         let best = point.clone();
         let memory = M::default();
-        Self { point, loss, memory, best, best_loss: loss, moves: 0, gradients: 0, walk: None }
+        Self { point, loss, memory, best, best_loss: loss, moves: 0, gradients: 0, langevin: None }
     }
 
     /// Moves to a point, whose loss may be infinite or NaN, and keeps track of the best one.
@@ -109,7 +113,7 @@ pub(in crate::search) enum TurnEvent<P> {
     /// The descent made a local move.
     Moved(LocalMove),
     /// The descent ended; with its best point.
-    Ended { ended: DescentEnd, point: P, loss: f64 },
+    Ended { end: DescentEnd, point: P, loss: f64 },
 }
 
 /// The start of a descent.
@@ -143,34 +147,34 @@ impl<L: Landscape> RoundContext<'_, L> {
         chain: &mut Chain<L::Point, L::Memory>,
         most: usize,
     ) -> TurnEvents<L> {
-        let mut turn = Vec::new();
+        let mut events = Vec::new();
         if most == 0 {
-            return turn;
+            return events;
         }
-        if chain.tour.is_none() {
-            self.begin_descent(chain, &mut turn);
+        if chain.descent.is_none() {
+            self.begin_descent(chain, &mut events);
         }
         match self.settings.method {
-            SearchMethod::Metropolis => self.metropolis_turn(chain, most, &mut turn),
+            SearchMethod::Metropolis => self.metropolis_turn(chain, most, &mut events),
             SearchMethod::Restore | SearchMethod::BruteForce => {
-                self.descend(chain, most, &mut turn)
+                self.descend(chain, most, &mut events)
             }
         }
-        turn
+        events
     }
 
-    fn begin_descent(&self, chain: &mut Chain<L::Point, L::Memory>, turn: &mut TurnEvents<L>) {
-        let birth = match (self.settings.method, chain.task) {
+    fn begin_descent(&self, chain: &mut Chain<L::Point, L::Memory>, events: &mut TurnEvents<L>) {
+        let started = match (self.settings.method, chain.job) {
             (SearchMethod::BruteForce, None) => None,
-            (SearchMethod::BruteForce, Some(task)) => self.start_job(task, &mut chain.random, turn),
-            _ => self.regenerate(&mut chain.random, turn),
+            (SearchMethod::BruteForce, Some(job)) => self.start_job(job, &mut chain.random, events),
+            _ => self.regenerate(&mut chain.random, events),
         };
-        match birth {
-            Some(birth) => {
-                chain.tour = Some(ChainDescent::new(birth.point.clone(), birth.loss));
-                turn.push(TurnEvent::Started(birth));
+        match started {
+            Some(started) => {
+                chain.descent = Some(ChainDescent::new(started.point.clone(), started.loss));
+                events.push(TurnEvent::Started(started));
             }
-            None => chain.task = None,
+            None => chain.job = None,
         }
     }
 
@@ -178,12 +182,12 @@ impl<L: Landscape> RoundContext<'_, L> {
     fn regenerate(
         &self,
         random: &mut Random,
-        turn: &mut TurnEvents<L>,
+        events: &mut TurnEvents<L>,
     ) -> Option<NewDescent<L::Point>> {
         for _ in 0..MAX_ATTEMPTS {
             match self.try_start(random) {
-                Ok(birth) => return Some(birth),
-                Err(error) => turn.push(TurnEvent::Refused(error)),
+                Ok(started) => return Some(started),
+                Err(error) => events.push(TurnEvent::Refused(error)),
             }
         }
         None
@@ -215,14 +219,15 @@ impl<L: Landscape> RoundContext<'_, L> {
     /// Starts the descent of a brute-force job.
     fn start_job(
         &self,
-        task: BruteForceJob,
+        job: BruteForceJob,
         random: &mut Random,
-        turn: &mut TurnEvents<L>,
+        events: &mut TurnEvents<L>,
     ) -> Option<NewDescent<L::Point>> {
         let start = self.start;
-        let mutated = self.landscape.mutate_at(&start.point, task.element, task.kind, random);
-        let birth = mutated.and_then(|new| self.new_descent(Some((start.number, start.loss)), new));
-        birth.map_err(|error| turn.push(TurnEvent::Refused(error))).ok()
+        let mutated = self.landscape.mutate_at(&start.point, job.element, job.kind, random);
+        let started =
+            mutated.and_then(|new| self.new_descent(Some((start.number, start.loss)), new));
+        started.map_err(|error| events.push(TurnEvent::Refused(error))).ok()
     }
 
     pub(in crate::search) fn new_descent(
@@ -244,43 +249,43 @@ impl<L: Landscape> RoundContext<'_, L> {
         &self,
         chain: &mut Chain<L::Point, L::Memory>,
         most: usize,
-        turn: &mut TurnEvents<L>,
+        events: &mut TurnEvents<L>,
     ) {
-        let Some(tour) = &mut chain.tour else { return };
-        let before = tour.loss;
-        let left = chain.task.map_or(u64::MAX, |task| task.budget.saturating_sub(tour.gradients));
+        let Some(descent) = &mut chain.descent else { return };
+        let before = descent.loss;
+        let left = chain.job.map_or(u64::MAX, |job| job.budget.saturating_sub(descent.gradients));
         let most = most.min(usize::try_from(left).unwrap_or(usize::MAX)).max(1);
         let (point, loss, gradients) =
-            self.landscape.descend_within(&tour.point, &mut tour.memory, most);
-        tour.moves += 1;
-        tour.gradients += gradients as u64;
-        tour.move_to(point, loss);
-        let (best, gradients) = (tour.best_loss, gradients as u64);
-        turn.push(TurnEvent::Moved(LocalMove { loss, best, gradients, rejected: false }));
-        if let Some(ended) = self.descent_end(tour, before, chain.task, &mut chain.random) {
-            end_descent(chain, ended, turn);
+            self.landscape.descend_within(&descent.point, &mut descent.memory, most);
+        descent.moves += 1;
+        descent.gradients += gradients as u64;
+        descent.move_to(point, loss);
+        let (best, gradients) = (descent.best_loss, gradients as u64);
+        events.push(TurnEvent::Moved(LocalMove { loss, best, gradients, rejected: false }));
+        if let Some(end) = self.descent_end(descent, before, chain.job, &mut chain.random) {
+            end_descent(chain, end, events);
         }
     }
 
     fn descent_end(
         &self,
-        tour: &ChainDescent<L::Point, L::Memory>,
+        descent: &ChainDescent<L::Point, L::Memory>,
         before: f64,
-        task: Option<BruteForceJob>,
+        job: Option<BruteForceJob>,
         random: &mut Random,
     ) -> Option<DescentEnd> {
         let SearchSettings { termination, c, longest, .. } = *self.settings;
-        let chance = termination.chance(self.temperature, c, before, tour.loss);
-        if !tour.loss.is_finite() {
+        let chance = termination.chance(self.temperature, c, before, descent.loss);
+        if !descent.loss.is_finite() {
             Some(DescentEnd::InfiniteLoss)
-        } else if let Some(task) = task {
+        } else if let Some(job) = job {
             // A descent whose moves take no gradients would never use up its budget.
-            let spent = tour.gradients >= task.budget || tour.moves >= task.budget;
+            let spent = descent.gradients >= job.budget || descent.moves >= job.budget;
             spent.then_some(DescentEnd::Budget)
         } else if random.random::<f64>() < chance {
             Some(DescentEnd::Regeneration)
         } else {
-            (tour.moves >= longest as u64).then_some(DescentEnd::MaxMoves)
+            (descent.moves >= longest as u64).then_some(DescentEnd::MaxMoves)
         }
     }
 }
@@ -288,11 +293,11 @@ impl<L: Landscape> RoundContext<'_, L> {
 /// Ends the current descent.
 pub(in crate::search) fn end_descent<P: Clone, M>(
     chain: &mut Chain<P, M>,
-    ended: DescentEnd,
-    turn: &mut Vec<TurnEvent<P>>,
+    end: DescentEnd,
+    events: &mut Vec<TurnEvent<P>>,
 ) {
-    chain.task = None;
-    if let Some(tour) = chain.tour.take() {
-        turn.push(TurnEvent::Ended { ended, point: tour.best, loss: tour.best_loss });
+    chain.job = None;
+    if let Some(descent) = chain.descent.take() {
+        events.push(TurnEvent::Ended { end, point: descent.best, loss: descent.best_loss });
     }
 }

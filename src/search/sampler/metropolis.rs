@@ -18,27 +18,27 @@ impl<L: Landscape> RoundContext<'_, L> {
         &self,
         chain: &mut Chain<L::Point, L::Memory>,
         most: usize,
-        turn: &mut TurnEvents<L>,
+        events: &mut TurnEvents<L>,
     ) {
-        if chain.tour.is_none() {
+        if chain.descent.is_none() {
             return;
         }
         if chain.random.random::<f64>() < self.settings.metropolis.mutation {
-            self.mutation_step(chain, turn);
+            self.mutation_step(chain, events);
             return;
         }
         let (accepted, gradients) = self.langevin_step(chain, most as u64);
-        let Some(tour) = &mut chain.tour else { return };
-        tour.moves += 1;
-        tour.gradients += gradients;
-        let (loss, best) = (tour.loss, tour.best_loss);
-        turn.push(TurnEvent::Moved(LocalMove { loss, best, gradients, rejected: !accepted }));
-        if tour.moves >= self.settings.longest as u64 {
+        let Some(descent) = &mut chain.descent else { return };
+        descent.moves += 1;
+        descent.gradients += gradients;
+        let (loss, best) = (descent.loss, descent.best_loss);
+        events.push(TurnEvent::Moved(LocalMove { loss, best, gradients, rejected: !accepted }));
+        if descent.moves >= self.settings.longest as u64 {
             let next = ChainDescent {
-                walk: tour.walk.clone(),
-                ..ChainDescent::new(tour.point.clone(), loss)
+                langevin: descent.langevin.clone(),
+                ..ChainDescent::new(descent.point.clone(), loss)
             };
-            continue_as_new_descent(chain, next, turn);
+            continue_as_new_descent(chain, next, events);
         }
     }
 
@@ -52,61 +52,64 @@ impl<L: Landscape> RoundContext<'_, L> {
     /// A Langevin step: true if it was accepted, and the gradients it took. The first step of a
     /// descent takes two gradients; if the budget has only one left, the point stays.
     fn langevin_step(&self, chain: &mut Chain<L::Point, L::Memory>, most: u64) -> (bool, u64) {
-        let Chain { tour: Some(tour), random, scales, .. } = chain else { return (false, 0) };
-        let first = u64::from(tour.walk.is_none());
-        let Some(mut walk) = tour.walk.take().or_else(|| self.initial_state(&tour.point)) else {
+        let Chain { descent: Some(descent), random, scales, .. } = chain else { return (false, 0) };
+        let first = u64::from(descent.langevin.is_none());
+        let Some(mut state) =
+            descent.langevin.take().or_else(|| self.initial_state(&descent.point))
+        else {
             return (false, 1);
         };
         if first >= most {
-            tour.walk = Some(walk);
+            descent.langevin = Some(state);
             return (false, first);
         }
-        let scale = scales.entry(walk.topology.clone()).or_default();
-        if scale.square.len() != walk.gradient.len() {
-            scale.add_gradient(&walk.gradient);
+        let scale = scales.entry(state.topology.clone()).or_default();
+        if scale.square.len() != state.gradient.len() {
+            scale.add_gradient(&state.gradient);
         }
         let steps = LangevinProposal {
             variances: scale.variances(&self.settings.metropolis),
             drift: (0.5 / self.temperature.value()).min(1.0),
         };
-        let values = steps.sample(&walk.values, &walk.gradient, random);
-        let point = self.landscape.with_values(&tour.point, &values);
+        let values = steps.sample(&state.values, &state.gradient, random);
+        let point = self.landscape.with_values(&descent.point, &values);
         let next = point.and_then(|point| Some((self.landscape.loss_gradient(&point)?, point)));
         let mut accepted = false;
         if let Some((slope, point)) = next.filter(|(slope, _)| has_finite_squares(&slope.gradient))
         {
-            let way = steps.log_density(&walk.values, &walk.gradient, &values);
-            let back = steps.log_density(&values, &slope.gradient, &walk.values);
-            let chance = self.temperature.log_ratio(tour.loss, slope.loss) + back - way;
+            let forward = steps.log_density(&state.values, &state.gradient, &values);
+            let reverse = steps.log_density(&values, &slope.gradient, &state.values);
+            let chance = self.temperature.log_ratio(descent.loss, slope.loss) + reverse - forward;
             accepted = random.random::<f64>().ln() < chance;
             if accepted {
-                (walk.values, walk.gradient) = (values, slope.gradient);
-                tour.move_to(point, slope.loss);
+                (state.values, state.gradient) = (values, slope.gradient);
+                descent.move_to(point, slope.loss);
             }
         }
-        scale.add_gradient(&walk.gradient);
-        tour.walk = Some(walk);
+        scale.add_gradient(&state.gradient);
+        descent.langevin = Some(state);
         (accepted, first + 1)
     }
 
     /// Proposes a mutation, which begins the next descent if it is accepted.
-    fn mutation_step(&self, chain: &mut Chain<L::Point, L::Memory>, turn: &mut TurnEvents<L>) {
-        let Some(tour) = &chain.tour else { return };
-        let before = tour.loss;
-        let mutated = self.landscape.mutate(&tour.point, self.weights, &mut chain.random);
+    fn mutation_step(&self, chain: &mut Chain<L::Point, L::Memory>, events: &mut TurnEvents<L>) {
+        let Some(descent) = &chain.descent else { return };
+        let before = descent.loss;
+        let mutated = self.landscape.mutate(&descent.point, self.weights, &mut chain.random);
         let ratio = mutated.as_ref().ok().and_then(|new| new.log_ratio);
-        let birth = mutated.and_then(|new| self.new_descent(Some((chain.number, before)), new));
-        let birth = match birth {
-            Ok(birth) => birth,
-            Err(error) => return turn.push(TurnEvent::Refused(error)),
+        let started =
+            mutated.and_then(|new| self.new_descent(Some((chain.generation, before)), new));
+        let started = match started {
+            Ok(started) => started,
+            Err(error) => return events.push(TurnEvent::Refused(error)),
         };
-        let chance = ratio.map(|ratio| self.temperature.log_ratio(before, birth.loss) + ratio);
+        let chance = ratio.map(|ratio| self.temperature.log_ratio(before, started.loss) + ratio);
         if chance.is_some_and(|chance| chain.random.random::<f64>().ln() < chance) {
-            end_descent(chain, DescentEnd::Mutation, turn);
-            chain.tour = Some(ChainDescent::new(birth.point.clone(), birth.loss));
-            turn.push(TurnEvent::Started(birth));
+            end_descent(chain, DescentEnd::Mutation, events);
+            chain.descent = Some(ChainDescent::new(started.point.clone(), started.loss));
+            events.push(TurnEvent::Started(started));
         } else {
-            turn.extend(birth.kind.map(TurnEvent::Rejected));
+            events.extend(started.kind.map(TurnEvent::Rejected));
         }
     }
 }
@@ -115,12 +118,12 @@ impl<L: Landscape> RoundContext<'_, L> {
 fn continue_as_new_descent<P: Clone, M>(
     chain: &mut Chain<P, M>,
     next: ChainDescent<P, M>,
-    turn: &mut Vec<TurnEvent<P>>,
+    events: &mut Vec<TurnEvent<P>>,
 ) {
-    let (parent, loss) = (Some(chain.number), next.loss);
+    let (parent, loss) = (Some(chain.generation), next.loss);
     let (point, record) = (next.point.clone(), StructureChange::Continuation.into());
-    end_descent(chain, DescentEnd::MaxMoves, turn);
-    let birth = NewDescent { parent, kind: None, record, before: Some(loss), loss, point };
-    turn.push(TurnEvent::Started(birth));
-    chain.tour = Some(next);
+    end_descent(chain, DescentEnd::MaxMoves, events);
+    let started = NewDescent { parent, kind: None, record, before: Some(loss), loss, point };
+    events.push(TurnEvent::Started(started));
+    chain.descent = Some(next);
 }

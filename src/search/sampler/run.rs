@@ -14,6 +14,7 @@ use rand::SeedableRng as _;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, VecDeque};
+use std::ops::ControlFlow;
 
 /// The number of consecutive rounds without a move that ends a run.
 const MAX_IDLE_ROUNDS: u64 = 100;
@@ -30,12 +31,14 @@ pub struct SearchRun<P, M> {
     pub(in crate::search) pinned: Option<ReservoirEntry<P>>,
     pub(in crate::search) stopped: bool,
     pub(in crate::search) chains: Vec<Chain<P, M>>,
-    pub(in crate::search) tree: Lineage<P>,
+    #[serde(rename = "tree")]
+    pub(in crate::search) lineage: Lineage<P>,
     pub(in crate::search) start: ReservoirEntry<P>,
     pub(in crate::search) best: ReservoirEntry<P>,
     pub(in crate::search) reservoir: Reservoir<P>,
     pub(in crate::search) statistics: SearchStatistics,
-    tasks: VecDeque<BruteForceJob>,
+    #[serde(rename = "tasks")]
+    jobs: VecDeque<BruteForceJob>,
 }
 
 /// An event of a round.
@@ -91,7 +94,7 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
         if !loss.is_finite() {
             return Err(SearchError::InvalidStart { loss });
         }
-        let tasks = brute_force_jobs(landscape.element_count(&start), settings);
+        let jobs = brute_force_jobs(landscape.element_count(&start), settings);
         let start = ReservoirEntry::new(landscape, 0, loss, start);
         let mut reservoir = Reservoir::new(settings.reservoir, settings.one_per_topology);
         let offer = reservoir.offer(start.clone());
@@ -101,15 +104,15 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
             pinned: None,
             stopped: false,
             chains: new_chains(settings),
-            tree: Lineage::new(settings.remembered),
+            lineage: Lineage::new(settings.remembered),
             best: start.clone(),
             reservoir,
             statistics: SearchStatistics::default(),
-            tasks,
+            jobs,
             settings: settings.clone(),
             start,
         };
-        run.tree
+        run.lineage
             .add(LineageNode { offer: Some(offer), ..run.new_node(0, run.descent_from_start()) });
         run.start_chains();
         Ok(run)
@@ -166,7 +169,7 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
 
     /// The lineage.
     pub fn lineage(&self) -> &Lineage<P> {
-        &self.tree
+        &self.lineage
     }
 
     /// The chains.
@@ -183,11 +186,11 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
     pub fn end_reason(&self) -> Option<RunEnd> {
         let reached = |limit: Option<u64>, count| limit.is_some_and(|limit| count >= limit);
         let SearchSettings { method, moves, gradients, .. } = self.settings;
-        let waits = |chain: &Chain<P, M>| chain.tour.is_none() && chain.task.is_none();
+        let waits = |chain: &Chain<P, M>| chain.descent.is_none() && chain.job.is_none();
         if self.stopped {
             Some(RunEnd::Stopped)
         } else if method == SearchMethod::BruteForce
-            && self.tasks.is_empty()
+            && self.jobs.is_empty()
             && self.chains.iter().all(waits)
         {
             Some(RunEnd::Done)
@@ -211,7 +214,7 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
             return Vec::new();
         }
         self.assign_jobs();
-        let shared = RoundContext {
+        let context = RoundContext {
             landscape,
             settings: &self.settings,
             temperature: self.temperature,
@@ -222,12 +225,12 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
         };
         let shares = self.gradient_budgets();
         let chains = self.chains.par_iter_mut().zip(shares);
-        let turns: Vec<_> = chains.map(|(chain, most)| shared.turn(chain, most)).collect();
+        let turns: Vec<_> = chains.map(|(chain, most)| context.turn(chain, most)).collect();
         let moves = self.statistics.moves;
         let mut events = Vec::new();
         for (chain, turn) in turns.into_iter().enumerate() {
-            for happening in turn {
-                self.record(chain, happening, landscape, &mut events);
+            for event in turn {
+                self.record(chain, event, landscape, &mut events);
             }
             self.update_best_from_chain(chain, landscape, &mut events);
         }
@@ -236,6 +239,28 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
         self.statistics.idle = if moved { 0 } else { self.statistics.idle + 1 };
         self.prune_lineage();
         events
+    }
+
+    /// Advances the run until it ends or `watch` breaks, which is called after every round with the
+    /// events of the round. The end of the run takes precedence over a break in the same round.
+    pub fn advance<L, B>(
+        &mut self,
+        landscape: &L,
+        mut watch: impl FnMut(&Self, &[SearchEvent]) -> ControlFlow<B>,
+    ) -> ControlFlow<B, RunEnd>
+    where
+        L: Landscape<Point = P, Memory = M>,
+    {
+        loop {
+            if let Some(end) = self.end_reason() {
+                return ControlFlow::Continue(end);
+            }
+            let events = self.round(landscape);
+            let flow = watch(self, &events);
+            if self.end_reason().is_none() {
+                flow?;
+            }
+        }
     }
 
     /// The gradient budget of each chain in its turn: an equal part of the remaining gradients, far
@@ -254,7 +279,7 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
     pub(in crate::search) fn new_node(&self, chain: usize, start: NewDescent<P>) -> LineageNode<P> {
         let NewDescent { parent, kind, record, before, loss, point } = start;
         LineageNode {
-            number: self.tree.total(),
+            number: self.lineage.total(),
             parent,
             chain,
             kind,
@@ -291,17 +316,18 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
         };
         for i in 0..count {
             if i > 0 {
-                self.chains[i].number = self.tree.add(self.new_node(i, self.descent_from_start()));
+                self.chains[i].generation =
+                    self.lineage.add(self.new_node(i, self.descent_from_start()));
             }
-            self.chains[i].tour =
+            self.chains[i].descent =
                 Some(ChainDescent::new(self.start.point.clone(), self.start.loss));
         }
     }
 
     fn assign_jobs(&mut self) {
         for chain in &mut self.chains {
-            if chain.tour.is_none() && chain.task.is_none() {
-                chain.task = self.tasks.pop_front();
+            if chain.descent.is_none() && chain.job.is_none() {
+                chain.job = self.jobs.pop_front();
             }
         }
     }
@@ -312,7 +338,13 @@ fn new_chains<P, M>(settings: &SearchSettings) -> Vec<Chain<P, M>> {
     let mut random = Random::seed_from_u64(settings.seed);
     let mut next = || {
         random.long_jump();
-        Chain { random: random.clone(), number: 0, tour: None, task: None, scales: BTreeMap::new() }
+        Chain {
+            random: random.clone(),
+            generation: 0,
+            descent: None,
+            job: None,
+            scales: BTreeMap::new(),
+        }
     };
     (0..settings.chains).map(|_| next()).collect()
 }

@@ -2,8 +2,11 @@
 
 use super::chain::settings;
 use super::rugged::{Fault, Rugged, START};
+use aplanat::files::CheckpointError;
+use aplanat::search::lens_landscape::LensLandscape;
 use aplanat::search::{
-    SearchError, SearchMethod, SearchRun, SearchRunOn, SearchSettings, SteerCommand, Temperature,
+    MutationKind, Refusal, SearchError, SearchMethod, SearchRun, SearchRunOn, SearchSettings,
+    SteerCommand, Temperature,
 };
 use serde_json::Value;
 use std::fs;
@@ -120,13 +123,20 @@ fn a_damaged_file_is_refused() {
     damaged.push(vec![0xff; 100]);
     for bytes in damaged {
         let error = load(&bytes);
-        let told = matches!(&error, SearchError::Corrupt { what, .. } if !what.is_empty());
+        let told = matches!(&error, SearchError::Checkpoint(CheckpointError::Corrupt { what, .. }) if !what.is_empty());
         assert!(told && error.to_string().contains("bad.json"), "{error}");
     }
-    let newer = text.replacen("\"aplanat_search\":1", "\"aplanat_search\":2", 1);
+    let newer = text.replacen("\"aplanat_search\":2", "\"aplanat_search\":3", 1);
     let error = load(newer.as_bytes());
     assert!(
-        matches!(error, SearchError::UnsupportedVersion { found: 2, expected: 1, .. }),
+        matches!(
+            error,
+            SearchError::Checkpoint(CheckpointError::UnsupportedVersion {
+                found: 3,
+                expected: 2,
+                ..
+            })
+        ),
         "{error}"
     );
     let missing = SearchRun::<_, super::rugged::Momentum>::load(
@@ -134,7 +144,7 @@ fn a_damaged_file_is_refused() {
         &first,
         &folder.join("none"),
     );
-    assert!(matches!(missing, Err(SearchError::File(_))));
+    assert!(matches!(missing, Err(SearchError::Checkpoint(CheckpointError::File(_)))));
 }
 
 #[test]
@@ -145,7 +155,37 @@ fn what_cannot_be_written_leaves_what_was_there() {
     let path = folder.join("run.json");
     run.save(&Rugged::default(), &path).unwrap();
     let value: Value = serde_json::from_slice(&fs::read(&path).unwrap()).unwrap();
-    assert_eq!(value["aplanat_search"], 1);
+    assert_eq!(value["aplanat_search"], 2);
     let left = fs::read_dir(&folder).unwrap().count();
     assert_eq!(left, 1, "something was left beside it");
+}
+
+/// A checkpoint of version 1 describes mutations and refusals as text.
+#[test]
+fn a_checkpoint_of_version_1_resumes() {
+    let path = PathBuf::from("tests/files/search_checkpoint_v1.json");
+    let saved: Value = serde_json::from_slice(&fs::read(&path).unwrap()).unwrap();
+    let about = &saved["landscape"];
+    let landscape = LensLandscape::new(
+        &serde_json::from_value(about["start"].clone()).unwrap(),
+        &serde_json::from_value(about["goal"].clone()).unwrap(),
+        &serde_json::from_value(about["rules"].clone()).unwrap(),
+        &serde_json::from_value(about["local"].clone()).unwrap(),
+    );
+    let light = serde_json::from_value(about["light"].clone()).unwrap();
+    let landscape = landscape.unwrap().with_reference_light(light).unwrap();
+    let settings: SearchSettings =
+        serde_json::from_value(saved["run"]["settings"].clone()).unwrap();
+    let more = SearchSettings { gradients: None, ..settings };
+    let mut run: SearchRunOn<LensLandscape> = SearchRun::load(&landscape, &more, &path).unwrap();
+    let texts: Vec<String> =
+        run.lineage().nodes().iter().map(|node| node.mutation.to_string()).collect();
+    assert_eq!(texts[0], "the start");
+    assert!(texts[1].starts_with("removed the singlet of surfaces 8 and 9;"), "{}", texts[1]);
+    let glue = &run.statistics().kinds[&MutationKind::Glue];
+    assert_eq!(glue.refused, [(Refusal::Other, 1)].into());
+    run.round(&landscape);
+    let copy = folder("version_1").join("run.json");
+    run.save(&landscape, &copy).unwrap();
+    assert!(SearchRun::load(&landscape, &more, &copy).unwrap() == run);
 }

@@ -223,7 +223,7 @@ fn the_family_tells_how_a_lens_was_projected() {
     let mut random = seeded(3);
     let new = mutate(MutationKind::AddSinglet, &lens, &SearchRules::default(), &mut random);
     let told: MutatedPoint<Lens> = new.unwrap().into();
-    assert!(told.record.to_string().contains("; kept in focus in"), "{}", told.record);
+    assert!(told.record.to_string().contains("; projected in"), "{}", told.record);
     let rules = SearchRules { projection: false, ..SearchRules::default() };
     let new = mutate(MutationKind::AddSinglet, &lens, &rules, &mut random);
     let told: MutatedPoint<Lens> = new.unwrap().into();

@@ -117,7 +117,10 @@ fn limits_that_no_lens_keeps_are_refused() {
     let lens = triplet();
     let refusal = |rules| under(&lens, rules).unwrap_err();
     let narrow = refusal(SearchRules { semi_diameter: Some(5.0), ..SearchRules::default() });
-    assert!(narrow.contains("semi-diameters of 5 mm") && narrow.contains("18."), "{narrow}");
+    assert!(
+        narrow.contains("semi-diameters of at most 5 mm") && narrow.contains("18."),
+        "{narrow}"
+    );
     let short = refusal(SearchRules { track: Some(1.0), ..SearchRules::default() });
     assert!(short.contains("a track of 1 mm"), "{short}");
     let long = refusal(SearchRules { back_focus: Some(1000.0), ..SearchRules::default() });
