@@ -290,7 +290,10 @@ fn a_search_that_cannot_begin_says_why() {
     explore(&mut session, StructureSearchCommand::Start(Box::new(impossible)));
     stands(&mut session, RunStatus::Failed);
     let failed = session.view().structure_search.run.error.unwrap();
-    assert!(failed.starts_with("no lens can satisfy these constraints: a track of at most 10 mm"), "{failed}");
+    assert!(
+        failed.starts_with("no lens can satisfy these constraints: a track of at most 10 mm"),
+        "{failed}"
+    );
 
     let file = folder("foreign");
     std::fs::write(&file, "{\"aplanat\": 1}").unwrap();
