@@ -8,7 +8,7 @@ use crate::lens::Lens;
 use crate::measure::time_ms;
 use crate::merit::PupilEdge;
 use crate::optimize::DescentMethod;
-use crate::optimize::pareto::{Front, ParetoError, ParetoPoint, ParetoSettings, ParetoSweep};
+use crate::optimize::pareto::{ParetoError, ParetoPoint, ParetoSettings, ParetoSweep};
 use crate::report::ParetoReport;
 use serde::Serialize;
 use std::fmt::{self, Display};
@@ -115,51 +115,30 @@ impl ParetoArgs {
 
 /// The printed result.
 #[derive(Serialize)]
-struct ParetoSweepReport {
+struct ParetoSweepReport<'a> {
     ms: f64,
     stopped: bool,
     hypervolume: f64,
     tried: usize,
-    start: FrontPoint,
-    front: Vec<FrontPoint>,
-    biased: Option<BiasedSweep>,
+    start: &'a ParetoPoint,
+    front: &'a [ParetoPoint],
+    biased: Option<BiasedSweep<'a>>,
     files: Vec<String>,
 }
 
 #[derive(Serialize)]
-struct BiasedSweep {
+struct BiasedSweep<'a> {
     ms: f64,
     hypervolume: f64,
     dominated: usize,
-    front: Vec<FrontPoint>,
+    front: &'a [ParetoPoint],
 }
 
-#[derive(Serialize)]
-struct FrontPoint {
-    spot: f64,
-    spot_error: f64,
-    light: f64,
-    light_error: f64,
-    weight: Option<f64>,
-    rays: usize,
-}
-
-impl FrontPoint {
-    fn of(design: &ParetoPoint) -> Self {
-        let ParetoPoint { spot, spot_error, light, light_error, weight, rays, .. } = *design;
-        Self { spot, spot_error, light, light_error, weight, rays }
-    }
-
-    fn all(front: &Front) -> Vec<Self> {
-        front.points().iter().map(Self::of).collect()
-    }
-}
-
-impl ParetoSweepReport {
+impl<'a> ParetoSweepReport<'a> {
     fn new(
-        sweep: &ParetoSweep,
+        sweep: &'a ParetoSweep,
         ms: f64,
-        biased: Option<&(ParetoSweep, f64)>,
+        biased: Option<&'a (ParetoSweep, f64)>,
         stopped: bool,
     ) -> Self {
         let ours = sweep.front().points();
@@ -168,15 +147,15 @@ impl ParetoSweepReport {
             ms: *ms,
             hypervolume: other.hypervolume(),
             dominated: other.front().points().iter().filter(beaten).count(),
-            front: FrontPoint::all(other.front()),
+            front: other.front().points(),
         });
         Self {
             ms,
             stopped,
             hypervolume: sweep.hypervolume(),
             tried: sweep.evaluated().len(),
-            start: FrontPoint::of(&sweep.start),
-            front: FrontPoint::all(sweep.front()),
+            start: &sweep.start,
+            front: sweep.front().points(),
             biased,
             files: Vec::new(),
         }
@@ -186,7 +165,7 @@ impl ParetoSweepReport {
 /// The number of lenses in the printed table; the files have all of them.
 const MAX_LISTED: usize = 20;
 
-impl Display for ParetoSweepReport {
+impl Display for ParetoSweepReport<'_> {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { ms, hypervolume, tried, front, .. } = self;
         let stopped = if self.stopped { ", stopped" } else { "" };
@@ -207,7 +186,7 @@ impl Display for ParetoSweepReport {
             "rays",
         ]);
         let every = count.div_ceil(MAX_LISTED).max(1);
-        for point in std::iter::once(&self.start).chain(front.iter().step_by(every)) {
+        for point in std::iter::once(self.start).chain(front.iter().step_by(every)) {
             let blur =
                 point.weight.map_or("start".to_owned(), |w| format!("{:.1}", 1e3 * w.sqrt()));
             table.row([

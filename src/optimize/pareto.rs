@@ -56,9 +56,10 @@ impl Default for ParetoSettings {
 }
 
 /// A lens with its sharpness and light.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ParetoPoint {
-    /// The ray model of the lens cannot be set up.
+    /// The lens.
+    #[serde(skip)]
     pub lens: Lens,
     /// The weight β that it was found with, in mm²; `None` for the starting lens.
     pub weight: Option<f64>,
@@ -71,6 +72,7 @@ pub struct ParetoPoint {
     /// Its estimated error, in mm².
     pub light_error: f64,
     /// True if light gets through at every field; without light there is no spot.
+    #[serde(skip)]
     pub has_light: bool,
     /// The number of rays that these numbers are computed from.
     pub rays: usize,

@@ -7,6 +7,7 @@
 use super::ray::{ParaxialRay, paraxial_grins, paraxial_ray, signed_indices};
 use crate::lens::{Aperture, FieldKind, Lens, Object, System};
 use crate::math::Real;
+use serde::Serialize;
 
 /// The use of a lens: the position of the object, the system aperture and the size of the field.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -62,7 +63,7 @@ pub enum ParaxialError {
 }
 
 /// The entrance or exit pupil: an image of the stop.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct ParaxialPupil<R> {
     /// The position in mm, of the entrance pupil from the first vertex, of the exit pupil from the
     /// last vertex before the image; `None` at infinity (telecentric).
@@ -75,9 +76,10 @@ pub struct ParaxialPupil<R> {
 ///
 /// Data that do not exist are `None`: the focal length of an afocal lens, the position of a pupil at
 /// infinity, the magnification of an object at infinity.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FirstOrder<R> {
     /// The power in 1/mm, positive for a converging lens.
+    #[serde(skip)]
     pub power: R,
     /// The equivalent focal length `1/power`, in mm.
     pub efl: Option<R>,
@@ -112,9 +114,11 @@ pub struct FirstOrder<R> {
     /// `n = n₀ + n₁ r²` (Marchand 1978, chapter 9).
     pub petzval_sum: R,
     /// The marginal ray, from the axial object point through the rim of the stop.
+    #[serde(skip)]
     pub marginal: ParaxialRay<R>,
     /// The chief ray, from the edge of the field through the centre of the stop; `None` for a field of
     /// 90 degrees or more, or for a collimated beam and a pupil at infinity.
+    #[serde(skip)]
     pub chief: Option<ParaxialRay<R>>,
 }
 

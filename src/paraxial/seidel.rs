@@ -10,11 +10,12 @@ use super::first_order::FirstOrder;
 use super::ray::signed_indices;
 use crate::lens::{Surface, System};
 use crate::math::Real;
+use serde::Serialize;
 
 /// The third-order wave aberrations of a surface or a lens, in mm, and its first-order chromatic
 /// ones: `W = S₁/8 r⁴ + S₂/2 h r³ cos φ + S₃/2 h² r² cos² φ + (S₃ + S₄)/4 h² r² + S₅/2 h³ r cos φ`
 /// at the pupil coordinate `r` and the field coordinate `h`, both 1 at the edge.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct SeidelSums<R> {
     /// Spherical aberration, positive where undercorrected.
     pub s1: R,
@@ -47,7 +48,7 @@ impl<R: Real> SeidelSums<R> {
 }
 
 /// The third-order sums of a lens.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Seidel<R> {
     /// The sums of each surface, without the image plane.
     pub surfaces: Vec<SeidelSums<R>>,

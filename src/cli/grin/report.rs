@@ -2,7 +2,9 @@
 
 use super::straight_rays::StraightRayResult;
 use crate::cli::output::{ShortNumber, TextTable};
-use crate::grin_design::{self, FieldScore, GrinOptimizer, LimitCheck, ViewResult};
+use crate::grin_design::{
+    self, FieldDifference, FieldScore, GrinOptimizer, LimitCheck, ViewResult,
+};
 use crate::measure::MemoryUse;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -23,7 +25,7 @@ pub(super) struct GrinReport {
     stopped: bool,
     loss: f64,
     views: Vec<ViewSummary>,
-    error: Option<FieldErrorReport>,
+    error: Option<FieldDifference>,
     pub(super) lines: Option<StraightRayResult>,
     index: [f64; 2],
     slope: f64,
@@ -50,14 +52,6 @@ struct ViewSummary {
     rays: usize,
     excluded: BTreeMap<&'static str, usize>,
     retrace_error: f64,
-}
-
-#[derive(Serialize)]
-struct FieldErrorReport {
-    relative: f64,
-    without_offset: f64,
-    offset: f64,
-    of_contrast: Option<f64>,
 }
 
 /// A manufacturing limit and the extreme of the field.
@@ -106,12 +100,7 @@ impl GrinReport {
             excluded: result.counts.excluded().collect(),
             retrace_error: result.retrace_error,
         };
-        let error = task.difference(best)?.map(|difference| FieldErrorReport {
-            relative: difference.relative,
-            without_offset: difference.without_offset,
-            offset: difference.offset,
-            of_contrast: Some(difference.relative_to_contrast).filter(|part| part.is_finite()),
-        });
+        let error = task.difference(best)?;
         let extremes = task.extremes(best);
         let (integrator, step) = runner.tracing();
         Ok(Self {
@@ -152,21 +141,7 @@ impl Display for GrinReport {
         let [low, high] = self.index.map(|index| format!("{index:.6}"));
         writeln!(f, "index {low} to {high}, slope at most {:.4} / mm", self.slope)?;
         self.limits.iter().try_for_each(|limit| writeln!(f, "{limit}"))?;
-        if let Some(FieldErrorReport { relative, without_offset, offset, of_contrast }) =
-            &self.error
-        {
-            write!(f, "relative error from the exact field {relative:.2e}; {without_offset:.2e} ")?;
-            writeln!(f, "without the offset of {offset:.1e} in the square of the index")?;
-            match of_contrast {
-                Some(part) => {
-                    writeln!(
-                        f,
-                        "which is {part:.4} of the difference between the exact field and the start"
-                    )?;
-                }
-                None => writeln!(f, "the exact field is the one at the start: nothing to find")?,
-            }
-        }
+        self.error.iter().try_for_each(|error| write_error(error, f))?;
         self.lines.iter().try_for_each(|lines| write!(f, "{lines}"))?;
         if let Some(MemoryUse { before_mb, peak_mb }) = &self.memory {
             write!(f, "memory {:.1} MB more than the {before_mb:.1} before", peak_mb - before_mb)?;
@@ -194,4 +169,16 @@ impl Display for GrinReport {
         write!(f, "{table}")?;
         self.files.iter().try_for_each(|file| writeln!(f, "written: {file}"))
     }
+}
+
+/// Writes the error of the field relative to the exact one.
+fn write_error(error: &FieldDifference, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+    let FieldDifference { relative, without_offset, offset, relative_to_contrast } = error;
+    write!(f, "relative error from the exact field {relative:.2e}; {without_offset:.2e} ")?;
+    writeln!(f, "without the offset of {offset:.1e} in the square of the index")?;
+    if !relative_to_contrast.is_finite() {
+        return writeln!(f, "the exact field is the one at the start: nothing to find");
+    }
+    let part = format!("{relative_to_contrast:.4} of the difference");
+    writeln!(f, "which is {part} between the exact field and the start")
 }

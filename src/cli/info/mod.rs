@@ -8,7 +8,7 @@ use super::input::{LensFile, LoadedLens};
 use super::output::{Output, ShortNumber, TextTable, or_dash};
 use crate::effects::EffectDecision;
 use crate::lens::{Lens, SurfaceNumber};
-use crate::paraxial::{Beam, FirstOrder, ParaxialPupil, SeidelSums, first_order, seidel};
+use crate::paraxial::{Beam, FirstOrder, Seidel, SeidelSums, first_order, seidel};
 use checks::{LensCheck, checks};
 use serde::Serialize;
 use std::fmt::{self, Display};
@@ -83,69 +83,15 @@ struct ZoomReport {
     zoom: usize,
     #[serde(skip_serializing_if = "String::is_empty")]
     zoom_name: String,
-    efl: Option<f64>,
-    bfl: Option<f64>,
-    ffl: Option<f64>,
-    front_principal_plane: Option<f64>,
-    rear_principal_plane: Option<f64>,
-    f_number: Option<f64>,
-    working_f_number: Option<f64>,
-    entrance_pupil: PupilJson,
-    exit_pupil: PupilJson,
+    #[serde(flatten)]
+    first_order: FirstOrder<f64>,
     stop_surface: Option<usize>,
-    stop_semi_diameter: f64,
     total_track: f64,
-    paraxial_image: Option<f64>,
-    image_defocus: Option<f64>,
-    magnification: Option<f64>,
-    lagrange: Option<f64>,
-    petzval_sum: f64,
-    seidel: Option<SeidelJson>,
+    seidel: Option<Seidel<f64>>,
     #[serde(skip)]
     no_seidel: &'static str,
     checks: Vec<LensCheck>,
     effects: Vec<EffectDecision>,
-}
-
-#[derive(Serialize, Clone)]
-struct PupilJson {
-    position: Option<f64>,
-    diameter: Option<f64>,
-}
-
-impl PupilJson {
-    fn new(pupil: ParaxialPupil<f64>) -> Self {
-        Self { position: pupil.position, diameter: pupil.diameter }
-    }
-}
-
-#[derive(Serialize, Clone)]
-struct SeidelJson {
-    total: SeidelSumsJson,
-    surfaces: Vec<SeidelSumsJson>,
-}
-
-#[derive(Serialize, Clone)]
-struct SeidelSumsJson {
-    s1: f64,
-    s2: f64,
-    s3: f64,
-    s4: f64,
-    s5: f64,
-    c1: f64,
-    c2: f64,
-}
-
-impl SeidelSumsJson {
-    fn new(sums: &SeidelSums<f64>) -> Self {
-        let SeidelSums { s1, s2, s3, s4, s5, c1, c2 } = *sums;
-        Self { s1, s2, s3, s4, s5, c1, c2 }
-    }
-
-    fn row(&self, name: String) -> impl Iterator<Item = String> {
-        let sums = [self.s1, self.s2, self.s3, self.s4, self.s5, self.c1, self.c2];
-        std::iter::once(name).chain(sums.map(|sum| format!("{sum:.6}")))
-    }
 }
 
 impl ZoomReport {
@@ -159,24 +105,10 @@ impl ZoomReport {
         Ok(Self {
             zoom,
             zoom_name: lens.zoom.get(zoom).map(|z| z.name.clone()).unwrap_or_default(),
-            efl: data.efl,
-            bfl: data.bfl,
-            ffl: data.ffl,
-            front_principal_plane: data.front_principal_plane,
-            rear_principal_plane: data.rear_principal_plane,
-            f_number: data.f_number,
-            working_f_number: data.working_f_number,
-            entrance_pupil: PupilJson::new(data.entrance_pupil),
-            exit_pupil: PupilJson::new(data.exit_pupil),
             stop_surface: system.stop,
-            stop_semi_diameter: data.stop_semi_diameter,
             total_track: system.image_position(),
-            paraxial_image: data.paraxial_image,
-            image_defocus: data.image_defocus,
-            magnification: data.magnification,
-            lagrange: data.lagrange,
-            petzval_sum: data.petzval_sum,
-            seidel: seidel_keys(opened, zoom, &data)?,
+            seidel: seidel_sums(opened, zoom, &data)?,
+            first_order: data,
             no_seidel: if system.has_grin() {
                 "those of a gradient-index medium are not implemented"
             } else {
@@ -189,20 +121,23 @@ impl ZoomReport {
 }
 
 /// The Seidel sums, with colour between the two outer wavelengths.
-fn seidel_keys(
+fn seidel_sums(
     opened: &LoadedLens,
     zoom: usize,
     data: &FirstOrder<f64>,
-) -> Result<Option<SeidelJson>, CliError> {
+) -> Result<Option<Seidel<f64>>, CliError> {
     let system = opened.system(zoom, None)?;
     let um = opened.lens.wavelengths.iter().map(|w| w.um);
     let (short, long) = (um.clone().fold(f64::INFINITY, f64::min), um.fold(0.0, f64::max));
     let outer = (opened.system(zoom, Some(short))?, opened.system(zoom, Some(long))?);
-    let sums = seidel(&system, data, Some((&outer.0, &outer.1)));
-    Ok(sums.map(|sums| SeidelJson {
-        total: SeidelSumsJson::new(&sums.total),
-        surfaces: sums.surfaces.iter().map(SeidelSumsJson::new).collect(),
-    }))
+    Ok(seidel(&system, data, Some((&outer.0, &outer.1))))
+}
+
+/// A row of the table of Seidel sums.
+fn seidel_row(name: String, sums: &SeidelSums<f64>) -> impl Iterator<Item = String> {
+    let SeidelSums { s1, s2, s3, s4, s5, c1, c2 } = *sums;
+    let cells = [s1, s2, s3, s4, s5, c1, c2].map(|sum| format!("{sum:.6}"));
+    std::iter::once(name).chain(cells)
 }
 
 impl Display for InfoReport {
@@ -233,24 +168,26 @@ fn radii_text(radii: &[Option<f64>], none: &str) -> String {
 type FirstOrderRow = (&'static str, fn(&ZoomReport) -> String);
 
 const FIRST_ORDER: [FirstOrderRow; 18] = [
-    ("focal length", |p| or_dash(p.efl)),
-    ("back focal point, from the last vertex", |p| or_dash(p.bfl)),
-    ("front focal point, from the first vertex", |p| or_dash(p.ffl)),
-    ("front principal plane, from the first vertex", |p| or_dash(p.front_principal_plane)),
-    ("rear principal plane, from the last vertex", |p| or_dash(p.rear_principal_plane)),
-    ("f-number", |p| or_dash(p.f_number)),
-    ("working f-number", |p| or_dash(p.working_f_number)),
-    ("entrance pupil, from the first vertex", |p| or_dash(p.entrance_pupil.position)),
-    ("entrance pupil diameter", |p| or_dash(p.entrance_pupil.diameter)),
-    ("exit pupil, from the last vertex", |p| or_dash(p.exit_pupil.position)),
-    ("exit pupil diameter", |p| or_dash(p.exit_pupil.diameter)),
-    ("stop semi-diameter", |p| ShortNumber(p.stop_semi_diameter).to_string()),
+    ("focal length", |p| or_dash(p.first_order.efl)),
+    ("back focal point, from the last vertex", |p| or_dash(p.first_order.bfl)),
+    ("front focal point, from the first vertex", |p| or_dash(p.first_order.ffl)),
+    ("front principal plane, from the first vertex", |p| {
+        or_dash(p.first_order.front_principal_plane)
+    }),
+    ("rear principal plane, from the last vertex", |p| or_dash(p.first_order.rear_principal_plane)),
+    ("f-number", |p| or_dash(p.first_order.f_number)),
+    ("working f-number", |p| or_dash(p.first_order.working_f_number)),
+    ("entrance pupil, from the first vertex", |p| or_dash(p.first_order.entrance_pupil.position)),
+    ("entrance pupil diameter", |p| or_dash(p.first_order.entrance_pupil.diameter)),
+    ("exit pupil, from the last vertex", |p| or_dash(p.first_order.exit_pupil.position)),
+    ("exit pupil diameter", |p| or_dash(p.first_order.exit_pupil.diameter)),
+    ("stop semi-diameter", |p| ShortNumber(p.first_order.stop_semi_diameter).to_string()),
     ("first vertex to image plane", |p| ShortNumber(p.total_track).to_string()),
-    ("paraxial image, from the last vertex", |p| or_dash(p.paraxial_image)),
-    ("image plane behind the paraxial image", |p| or_dash(p.image_defocus)),
-    ("magnification", |p| or_dash(p.magnification)),
-    ("Lagrange invariant", |p| or_dash(p.lagrange)),
-    ("Petzval sum, 1/mm", |p| ShortNumber(p.petzval_sum).to_string()),
+    ("paraxial image, from the last vertex", |p| or_dash(p.first_order.paraxial_image)),
+    ("image plane behind the paraxial image", |p| or_dash(p.first_order.image_defocus)),
+    ("magnification", |p| or_dash(p.first_order.magnification)),
+    ("Lagrange invariant", |p| or_dash(p.first_order.lagrange)),
+    ("Petzval sum, 1/mm", |p| ShortNumber(p.first_order.petzval_sum).to_string()),
 ];
 
 impl InfoReport {
@@ -290,9 +227,9 @@ impl ZoomReport {
         };
         let mut table = TextTable::new(&[[title.as_str()].as_slice(), &columns].concat());
         for (i, sums) in seidel.surfaces.iter().enumerate() {
-            table.row(sums.row(format!("surface {}", SurfaceNumber::new(i))));
+            table.row(seidel_row(format!("surface {}", SurfaceNumber::new(i)), sums));
         }
-        table.row(seidel.total.row("sum".to_owned()));
+        table.row(seidel_row("sum".to_owned(), &seidel.total));
         table
     }
 }

@@ -6,6 +6,7 @@ use crate::grin_design::field::GrinField;
 use crate::grin_design::field::index_bounds::IndexBound;
 use crate::grin_design::task::{FieldRepresentation, GrinTask};
 use crate::math::Vec3;
+use serde::Serialize;
 
 /// Points along a side of the bounding box of the domain.
 const LATTICE: usize = 40;
@@ -17,7 +18,7 @@ const RADIAL: usize = 400;
 const ROUNDING_DIFFERENCE: f64 = 1e-26;
 
 /// The difference between two fields over the domain.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct FieldDifference {
     /// `‖η - η*‖ / ‖η*‖`.
     pub relative: f64,
@@ -27,6 +28,7 @@ pub struct FieldDifference {
     pub offset: f64,
     /// `‖η - η*‖ / ‖η* - η₀‖` with the initial field `η₀`: 1 for an optimisation that found
     /// nothing, infinite where the reference is the initial field up to rounding.
+    #[serde(rename = "of_contrast")]
     pub relative_to_contrast: f64,
 }
 

@@ -2,6 +2,7 @@
 
 mod bad_input;
 mod mutations;
+mod old_files;
 mod round_trip;
 mod volume;
 mod zemax;
