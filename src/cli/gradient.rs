@@ -82,8 +82,8 @@ impl GradientArgs {
         opened.check_zoom(self.zoom)?;
         let refuse = |source| CliError::RayModel { file: opened.file.clone(), source };
         let lens = limited_by_stop(&self.selected_lens(&opened)?).map_err(refuse)?;
-        let bench = RayModel::from_lens(&lens, 0).map_err(refuse)?;
-        let (found, ms) = time_ms(|| self.differentiate(&bench));
+        let model = RayModel::from_lens(&lens, 0).map_err(refuse)?;
+        let (found, ms) = time_ms(|| self.differentiate(&model));
         let found = found.map_err(|cause| CliError::Failed(format!("{}: {cause}", opened.file)))?;
         output.print(&GradientReport::new(self, &lens, &found, ms))
     }
@@ -99,18 +99,18 @@ impl GradientArgs {
     }
 
     /// The sum over the fields, each with the mean over the wavelengths by weight.
-    fn differentiate(&self, bench: &RayModel) -> Result<IntegralDerivative, DerivativeError> {
+    fn differentiate(&self, model: &RayModel) -> Result<IntegralDerivative, DerivativeError> {
         let accuracy = Accuracy { tolerance: self.error.0, max_rays: self.rays };
-        let mut found = IntegralDerivative::new(bench);
-        for field in &bench.fields {
-            let regions: Result<Vec<_>, _> = (0..bench.channels.len())
-                .map(|wavelength| bench.launch(*field, wavelength).map(Region::new))
+        let mut found = IntegralDerivative::new(model);
+        for field in &model.fields {
+            let regions: Result<Vec<_>, _> = (0..model.channels.len())
+                .map(|wavelength| model.launch(*field, wavelength).map(Region::new))
                 .collect();
             let regions = regions?;
-            let cost = self.cost(bench, &regions);
-            for (region, color) in regions.iter().zip(&bench.channels) {
+            let cost = self.cost(model, &regions);
+            for (region, color) in regions.iter().zip(&model.channels) {
                 let (estimator, reason) = match self.method.estimator() {
-                    Some(asked) => (asked, "chosen by --method".to_owned()),
+                    Some(chosen) => (chosen, "chosen by --method".to_owned()),
                     None => choose_estimator(region, accuracy)?,
                 };
                 let derivative = differentiate(region, &cost, estimator, accuracy)?;
@@ -126,12 +126,12 @@ impl GradientArgs {
     }
 
     /// The integrand about the centroid of all wavelengths.
-    fn cost(&self, bench: &RayModel, regions: &[Region<'_>]) -> QuadraticIntegrand {
+    fn cost(&self, model: &RayModel, regions: &[Region<'_>]) -> QuadraticIntegrand {
         if self.term == Integral::Throughput {
             return QuadraticIntegrand::throughput();
         }
         let (mut area, mut sum) = (0.0, [0.0; 2]);
-        for (region, color) in regions.iter().zip(&bench.channels) {
+        for (region, color) in regions.iter().zip(&model.channels) {
             let light = region.trace_pupil(VALUE_ORDER).moments;
             area += color.weight * light.area;
             sum = [0, 1].map(|i| sum[i] + color.weight * light.area * light.centroid[i]);
@@ -155,9 +155,9 @@ struct IntegralDerivative {
 }
 
 impl IntegralDerivative {
-    fn new(bench: &RayModel) -> Self {
-        let zero = || Slopes::zero(bench.channels[0].tracer.surfaces());
-        let weights = bench.channels.iter().map(|color| color.weight).sum();
+    fn new(model: &RayModel) -> Self {
+        let zero = || Slopes::zero(model.channels[0].tracer.surfaces());
+        let weights = model.channels.iter().map(|color| color.weight).sum();
         let planned = (DerivativeEstimator::Boundary, String::new());
         Self { value: 0.0, value_error: 0.0, by: zero(), error: zero(), rays: 0, weights, planned }
     }
@@ -232,10 +232,10 @@ impl DerivativeColumns {
 }
 
 impl GradientReport {
-    fn new(asked: &GradientArgs, lens: &Lens, found: &IntegralDerivative, ms: f64) -> Self {
+    fn new(args: &GradientArgs, lens: &Lens, found: &IntegralDerivative, ms: f64) -> Self {
         let (estimator, reason) = &found.planned;
         Self {
-            term: asked.term,
+            term: args.term,
             method: estimator.name(),
             reason: reason.clone(),
             value: found.value,
@@ -244,7 +244,7 @@ impl GradientReport {
             ms,
             d: DerivativeColumns::new(lens, &found.by),
             d_error: DerivativeColumns::new(lens, &found.error),
-            unit: if asked.term == Integral::Spot { "mm^4" } else { "mm^2" },
+            unit: if args.term == Integral::Spot { "mm^4" } else { "mm^2" },
             coefficients: lens.surfaces.iter().map(|row| coefficient_labels(&row.medium)).collect(),
         }
     }

@@ -59,10 +59,10 @@ impl LoadedLens {
     }
 
     /// The lens with its beam and aiming at a zoom position.
-    pub(super) fn bench(&self, zoom: usize) -> Result<RayModel, CliError> {
+    pub(super) fn ray_model(&self, zoom: usize) -> Result<RayModel, CliError> {
         self.check_zoom(zoom)?;
-        let bench = RayModel::from_lens(&self.lens, zoom);
-        bench.map_err(|source| CliError::RayModel { file: self.file.clone(), source })
+        let model = RayModel::from_lens(&self.lens, zoom);
+        model.map_err(|source| CliError::RayModel { file: self.file.clone(), source })
     }
 
     /// The field point at this height (mm) or angle (degrees), as the lens defines its fields.

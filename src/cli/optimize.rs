@@ -209,7 +209,7 @@ struct VariableComparison {
 }
 
 impl OptimizeReport {
-    fn new(asked: &OptimizeArgs, lens: &Lens, best: &Lens, found: OptimizeOutcome<'_>) -> Self {
+    fn new(args: &OptimizeArgs, lens: &Lens, best: &Lens, found: OptimizeOutcome<'_>) -> Self {
         let OptimizeOutcome { search, ms, light, before, after } = found;
         let merit = |terms: &[TermValue]| terms.iter().map(|t| t.weight * t.value).sum();
         let refusals = || search.steps.iter().filter_map(|step| step.refused.as_ref());
@@ -219,7 +219,7 @@ impl OptimizeReport {
             after: best.get(v.parameter),
         };
         Self {
-            method: value_name(&asked.method),
+            method: value_name(&args.method),
             steps: search.steps.len(),
             ended: search.ended,
             ms,
@@ -231,7 +231,7 @@ impl OptimizeReport {
             last_refusal: refusals().next_back().cloned(),
             terms: TermComparison::compare(&before, &after),
             variables: lens.variables.iter().map(variable).collect(),
-            out: asked.out.display().to_string(),
+            out: args.out.display().to_string(),
         }
     }
 }

@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 
 /// Refuses a path that is not a folder and cannot become one.
 pub(super) fn check_folder(folder: &Path) -> Result<(), CliError> {
-    let there = folder.ancestors().find(|part| part.exists());
-    match there {
+    let existing = folder.ancestors().find(|part| part.exists());
+    match existing {
         Some(part) if !part.is_dir() => {
             let (folder, part) = (folder.display(), part.display());
             Err(CliError::Input(format!("{folder}: {part} is a file; expected a folder")))

@@ -130,7 +130,7 @@ impl Display for TraceReport {
             table.row(start.into_iter().chain(numbers).chain([remark.unwrap_or_default()]));
         }
         let Fates { imaged, missed, clipped, total_reflection, turned, trapped } = self.fates;
-        let kept = match turned + trapped {
+        let lost_in_grin = match turned + trapped {
             0 => String::new(),
             _ => format!(", {turned} turned back and {trapped} trapped by a gradient"),
         };
@@ -138,7 +138,7 @@ impl Display for TraceReport {
         writeln!(
             f,
             "{} um, zoom position {}: {imaged} imaged, {clipped} clipped, {missed} missed, \
-             {total_reflection} totally reflected{kept}",
+             {total_reflection} totally reflected{lost_in_grin}",
             self.wavelength_um, self.zoom
         )
     }

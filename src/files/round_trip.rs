@@ -3,7 +3,7 @@
 
 use super::FileError;
 use super::probe_rays::ProbeLaunch;
-use crate::lens::{Lens, LensError};
+use crate::lens::{Lens, LensError, SurfaceNumber};
 use crate::trace::{Fate, Ray, Tracer};
 use serde::Serialize;
 use std::fmt;
@@ -40,7 +40,7 @@ pub(super) fn check_round_trip(
     // A single configuration is not a zoom lens in a foreign file.
     let positions = lens.zoom_positions();
     if back.zoom_positions() != positions {
-        let what = format!("{} zoom positions in place of {positions}", back.zoom_positions());
+        let what = format!("{} zoom positions instead of {positions}", back.zoom_positions());
         return Err(FileError::RoundTripFailed { file: file.to_owned(), what });
     }
     for zoom in 0..positions {
@@ -75,7 +75,7 @@ fn compare(
     let (a, b) = (written.trace(ray), read.trace(ray));
     proof.rays += 1;
     if a.fate != b.fate {
-        return Err(format!("{:?} in place of {:?}", b.fate, a.fate));
+        return Err(format!("{} instead of {}", fate_text(b.fate), fate_text(a.fate)));
     }
     if a.fate != Fate::Imaged {
         return Ok(());
@@ -85,4 +85,10 @@ fn compare(
     let apart = apart.dot(apart).sqrt().max((a.opl - b.opl).abs());
     proof.worst_mm = proof.worst_mm.max(apart);
     if apart <= TOLERANCE { Ok(()) } else { Err(format!("ends {apart} mm apart")) }
+}
+
+/// A fate with its surface: `missed at surface 1`.
+fn fate_text(fate: Fate) -> String {
+    let place = fate.surface().map(|index| format!(" at surface {}", SurfaceNumber::new(index)));
+    format!("{}{}", fate.name(), place.unwrap_or_default())
 }

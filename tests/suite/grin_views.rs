@@ -203,7 +203,7 @@ fn wrong_pictures_are_refused_with_their_file() {
     let whole = Scrap::picture("whole.png", [64, 64], |x, y| (x * y % 251) as u8);
     let bytes = std::fs::read(&whole.0).unwrap();
     let torn = Scrap::new("torn.png", &bytes[..bytes.len() / 2]);
-    says(refused(torn.drawing()), &["torn.png", "picture"]);
+    says(refused(torn.drawing()), &["torn.png", "image"]);
     says(refused(TargetImage::Scene(f64::NAN)), &["goal, drawing, scene", "NaN"]);
 }
 

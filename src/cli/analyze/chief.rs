@@ -14,11 +14,11 @@ pub(super) struct DistortionJson {
     f_theta: Option<Estimate>,
 }
 
-pub(super) fn distortions(task: &AnalysisRun) -> Vec<AtField<DistortionJson>> {
+pub(super) fn distortions(run: &AnalysisRun) -> Vec<AtField<DistortionJson>> {
     let at = |field: &crate::lens::FieldPoint| {
-        let (result, ms) = time_ms(|| distortion(&task.bench, *field, task.bench.primary));
+        let (result, ms) = time_ms(|| distortion(&run.model, *field, run.model.primary));
         let keys = result.map(|d| {
-            let height = task.single_ray_estimate(d.height, ms);
+            let height = run.single_ray_estimate(d.height, ms);
             let relative =
                 |value| Estimate { value, error: height.error / d.ideal.abs(), ..height };
             DistortionJson {
@@ -30,7 +30,7 @@ pub(super) fn distortions(task: &AnalysisRun) -> Vec<AtField<DistortionJson>> {
         });
         AtField::new(*field, keys)
     };
-    task.fields.iter().map(at).collect()
+    run.fields.iter().map(at).collect()
 }
 
 impl TextLines for DistortionJson {
@@ -52,13 +52,13 @@ pub(super) struct FieldCurvatureJson {
     sagittal: Option<Estimate>,
 }
 
-pub(super) fn curvatures(task: &AnalysisRun) -> Vec<AtField<FieldCurvatureJson>> {
+pub(super) fn curvatures(run: &AnalysisRun) -> Vec<AtField<FieldCurvatureJson>> {
     // Rays cross at the focus at a small angle, so rounding across the axis is enlarged along it.
-    let cone = task.bench.first_order.working_f_number.unwrap_or(1.0).abs().max(1.0);
+    let cone = run.model.first_order.working_f_number.unwrap_or(1.0).abs().max(1.0);
     let at = |field: &crate::lens::FieldPoint| {
-        let (result, ms) = time_ms(|| field_curvature(&task.bench, *field, task.bench.primary));
+        let (result, ms) = time_ms(|| field_curvature(&run.model, *field, run.model.primary));
         let estimate = |value: f64| {
-            let one = task.single_ray_estimate(value, ms);
+            let one = run.single_ray_estimate(value, ms);
             Estimate { error: one.error * cone, ..one }
         };
         let keys = result.map(|c| FieldCurvatureJson {
@@ -67,7 +67,7 @@ pub(super) fn curvatures(task: &AnalysisRun) -> Vec<AtField<FieldCurvatureJson>>
         });
         AtField::new(*field, keys)
     };
-    task.fields.iter().map(at).collect()
+    run.fields.iter().map(at).collect()
 }
 
 impl TextLines for FieldCurvatureJson {

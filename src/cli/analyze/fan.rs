@@ -34,25 +34,25 @@ struct FanPointJson {
     surface: Option<usize>,
 }
 
-pub(super) fn fans(task: &AnalysisRun) -> Vec<AtField<FanJson>> {
+pub(super) fn fans(run: &AnalysisRun) -> Vec<AtField<FanJson>> {
     let at = |field: &crate::lens::FieldPoint| {
-        let (result, milliseconds) = time_ms(|| fan(&task.bench, *field, POINTS));
+        let (result, milliseconds) = time_ms(|| fan(&run.model, *field, POINTS));
         let keys = |fans: Vec<Fan>| FanJson {
-            error: task.rounding(),
+            error: run.rounding(),
             rays: 2 * POINTS * fans.len(),
             milliseconds,
-            colors: fans.iter().map(|fan| ColorFanJson::new(task, fan)).collect(),
+            colors: fans.iter().map(|fan| ColorFanJson::new(run, fan)).collect(),
         };
         AtField::new(*field, result.map(keys))
     };
-    task.fields.iter().map(at).collect()
+    run.fields.iter().map(at).collect()
 }
 
 impl ColorFanJson {
-    fn new(task: &AnalysisRun, fan: &Fan) -> Self {
+    fn new(run: &AnalysisRun, fan: &Fan) -> Self {
         let keys = |points: &[FanPoint]| points.iter().map(FanPointJson::new).collect();
         Self {
-            wavelength_um: task.bench.channels[fan.wavelength].um,
+            wavelength_um: run.model.channels[fan.wavelength].um,
             tangential: keys(&fan.tangential),
             sagittal: keys(&fan.sagittal),
         }

@@ -24,14 +24,12 @@ struct FocusPosition {
     rms: Option<Estimate>,
 }
 
-pub(super) fn through_focus(
-    task: &AnalysisRun,
-) -> Result<Vec<AtField<ThroughFocusJson>>, CliError> {
-    let step = focus_step(task);
+pub(super) fn through_focus(run: &AnalysisRun) -> Result<Vec<AtField<ThroughFocusJson>>, CliError> {
+    let step = focus_step(run);
     let mut columns = Vec::new();
     for i in -STEPS..=STEPS {
         let defocus = f64::from(i) * step;
-        columns.push((defocus, spots(task, defocus)?));
+        columns.push((defocus, spots(run, defocus)?));
     }
     let at = |(i, field): (usize, &crate::lens::FieldPoint)| {
         let position = |(defocus, spots): &(f64, Vec<Result<Estimate, AnalysisError>>)| {
@@ -45,23 +43,23 @@ pub(super) fn through_focus(
             if lit { Ok(keys) } else { Err(dark.unwrap_or(AnalysisError::NoLight)) },
         )
     };
-    Ok(task.fields.iter().enumerate().map(at).collect())
+    Ok(run.fields.iter().enumerate().map(at).collect())
 }
 
 /// The RMS radii of all fields at a displaced image plane.
 fn spots(
-    task: &AnalysisRun,
+    run: &AnalysisRun,
     defocus: f64,
 ) -> Result<Vec<Result<Estimate, AnalysisError>>, CliError> {
-    let mut moved = task.opened.clone();
-    shift_image(&mut moved.lens, task.zoom, defocus);
-    let mut bench = moved.bench(task.zoom)?;
-    bench.aiming = task.bench.aiming;
+    let mut moved = run.opened.clone();
+    shift_image(&mut moved.lens, run.zoom, defocus);
+    let mut model = moved.ray_model(run.zoom)?;
+    model.aiming = run.model.aiming;
     let spot = |field: &crate::lens::FieldPoint| {
-        let (result, ms) = time_ms(|| crate::analysis::spot(&bench, *field, task.accuracy));
+        let (result, ms) = time_ms(|| crate::analysis::spot(&model, *field, run.accuracy));
         result.map(|spot| Estimate { milliseconds: Some(ms), ..spot.rms })
     };
-    Ok(task.fields.iter().map(spot).collect())
+    Ok(run.fields.iter().map(spot).collect())
 }
 
 /// Displaces the image plane along z by the number that determines its position.
@@ -84,15 +82,15 @@ fn shift_image(lens: &mut Lens, zoom: usize, defocus: f64) {
 
 /// The step of the displacement, a round number over which the spot of the sharpest field changes by
 /// about its own size.
-fn focus_step(task: &AnalysisRun) -> f64 {
+fn focus_step(run: &AnalysisRun) -> f64 {
     let rms = |field: &AtField<spot::SpotJson>| match &field.outcome {
         FieldOutcome::Lit(lit) => Some(lit.rms()),
         FieldOutcome::Dark { .. } => None,
     };
-    let smallest = spot::spots(task).iter().filter_map(rms).fold(f64::INFINITY, f64::min);
-    let first = &task.bench.first_order;
+    let smallest = spot::spots(run).iter().filter_map(rms).fold(f64::INFINITY, f64::min);
+    let first = &run.model.first_order;
     let f_number = first.working_f_number.unwrap_or(1.0).abs();
-    let airy = 1.22 * task.primary_um() * 1e-3 * f_number;
+    let airy = 1.22 * run.primary_um() * 1e-3 * f_number;
     let step = f_number * if smallest.is_finite() { smallest.max(airy) } else { airy };
     let power = 10f64.powf(step.log10().floor());
     power * (step / power).round().max(1.0)

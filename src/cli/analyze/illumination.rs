@@ -15,16 +15,16 @@ pub(super) struct IlluminationJson {
     dark: Option<String>,
 }
 
-pub(super) fn illuminations(task: &AnalysisRun) -> Vec<AtField<IlluminationJson>> {
+pub(super) fn illuminations(run: &AnalysisRun) -> Vec<AtField<IlluminationJson>> {
     // The reference is the first field of the lens, even if it is not selected.
-    let first = task.bench.fields.first().copied();
-    let alone = first.is_some_and(|first| task.fields == [first]);
-    let asked = if alone { Vec::new() } else { task.fields.clone() };
-    let listed = task.fields == task.bench.fields;
-    let fields = if listed { asked } else { first.into_iter().chain(asked).collect() };
+    let first = run.model.fields.first().copied();
+    let alone = first.is_some_and(|first| run.fields == [first]);
+    let selected = if alone { Vec::new() } else { run.fields.clone() };
+    let listed = run.fields == run.model.fields;
+    let fields = if listed { selected } else { first.into_iter().chain(selected).collect() };
     let skipped = usize::from(!listed && !alone);
-    let bench = RayModel { fields, ..task.bench.clone() };
-    let (results, ms) = time_ms(|| illumination(&bench, bench.primary, task.accuracy));
+    let model = RayModel { fields, ..run.model.clone() };
+    let (results, ms) = time_ms(|| illumination(&model, model.primary, run.accuracy));
     let dark = results.iter().all(|light| light.error.is_some());
     let found = |light: &Illumination| match light.error {
         Some(why) if dark => AtField::new(light.field, Err(why)),

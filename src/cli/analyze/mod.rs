@@ -62,16 +62,16 @@ enum AnalysisKind {
 
 impl AnalyzeArgs {
     pub(super) fn run(&self, output: &Output) -> Result<(), CliError> {
-        let task = AnalysisRun::new(self)?;
+        let run = AnalysisRun::new(self)?;
         match self.what {
-            AnalysisKind::Spot => output.print(&task.report(spot::spots(&task))?),
-            AnalysisKind::Fan => output.print(&task.report(fan::fans(&task))?),
-            AnalysisKind::Distortion => output.print(&task.report(chief::distortions(&task))?),
-            AnalysisKind::FieldCurvature => output.print(&task.report(chief::curvatures(&task))?),
+            AnalysisKind::Spot => output.print(&run.report(spot::spots(&run))?),
+            AnalysisKind::Fan => output.print(&run.report(fan::fans(&run))?),
+            AnalysisKind::Distortion => output.print(&run.report(chief::distortions(&run))?),
+            AnalysisKind::FieldCurvature => output.print(&run.report(chief::curvatures(&run))?),
             AnalysisKind::Illumination => {
-                output.print(&task.report(illumination::illuminations(&task))?)
+                output.print(&run.report(illumination::illuminations(&run))?)
             }
-            AnalysisKind::ThroughFocus => output.print(&task.report(focus::through_focus(&task)?)?),
+            AnalysisKind::ThroughFocus => output.print(&run.report(focus::through_focus(&run)?)?),
         }
     }
 }
@@ -80,7 +80,7 @@ impl AnalyzeArgs {
 struct AnalysisRun {
     what: AnalysisKind,
     opened: LoadedLens,
-    bench: RayModel,
+    model: RayModel,
     /// The selected fields.
     fields: Vec<FieldPoint>,
     zoom: usize,
@@ -90,22 +90,22 @@ struct AnalysisRun {
 impl AnalysisRun {
     fn new(analyze: &AnalyzeArgs) -> Result<Self, CliError> {
         let opened = analyze.lens.open()?;
-        let bench = opened.bench(analyze.zoom)?;
+        let model = opened.ray_model(analyze.zoom)?;
         let fields = match analyze.field {
             Some(y) => vec![opened.field_at(y, analyze.zoom)?],
-            None => bench.fields.clone(),
+            None => model.fields.clone(),
         };
         let accuracy = Accuracy { tolerance: analyze.error.0, ..Accuracy::default() };
-        Ok(Self { what: analyze.what, opened, bench, fields, zoom: analyze.zoom, accuracy })
+        Ok(Self { what: analyze.what, opened, model, fields, zoom: analyze.zoom, accuracy })
     }
 
     fn primary_um(&self) -> f64 {
-        self.bench.channels[self.bench.primary].um
+        self.model.channels[self.model.primary].um
     }
 
     /// The rounding error in `f64` of a length from one ray, in mm.
     fn rounding(&self) -> f64 {
-        let system = &self.bench.channels[self.bench.primary].system;
+        let system = &self.model.channels[self.model.primary].system;
         16.0 * f64::EPSILON * system.total_track()
     }
 
@@ -123,14 +123,14 @@ impl AnalysisRun {
         if let Some(reason) = common_reason(&fields) {
             return Err(self.no_light(reason));
         }
-        let first = &self.bench.first_order;
+        let first = &self.model.first_order;
         let um = self.primary_um();
         Ok(AnalysisReport {
             analysis: self.what,
             zoom: self.zoom,
             wavelength_um: um,
             tolerance: self.accuracy.tolerance,
-            field_kind: self.bench.beam.field,
+            field_kind: self.model.beam.field,
             airy_radius: first.working_f_number.map(|f| 1.22 * um * 1e-3 * f),
             fields,
         })
@@ -140,9 +140,9 @@ impl AnalysisRun {
     fn no_light(&self, reason: &str) -> CliError {
         let mut ends: BTreeMap<Fate, usize> = BTreeMap::new();
         let mut fates = Fates::default();
-        let color = &self.bench.channels[self.bench.primary];
+        let color = &self.model.channels[self.model.primary];
         for field in &self.fields {
-            let Ok(launch) = self.bench.launch(*field, self.bench.primary) else { continue };
+            let Ok(launch) = self.model.launch(*field, self.model.primary) else { continue };
             let grid = crate::pupil::pattern_points(crate::pupil::PupilPattern::Square(16));
             for ray in grid.into_iter().filter_map(|p| launch.ray(p)) {
                 let fate = color.tracer.trace(ray).fate;

@@ -33,12 +33,12 @@ enum ColorSpotJson {
     },
 }
 
-pub(super) fn spots(task: &AnalysisRun) -> Vec<AtField<SpotJson>> {
+pub(super) fn spots(run: &AnalysisRun) -> Vec<AtField<SpotJson>> {
     let at = |field: &crate::lens::FieldPoint| {
-        let result = with_time(|| spot(&task.bench, *field, task.accuracy), note_time);
-        AtField::new(*field, result.map(|spot| SpotJson::new(task, &spot)))
+        let result = with_time(|| spot(&run.model, *field, run.accuracy), note_time);
+        AtField::new(*field, result.map(|spot| SpotJson::new(run, &spot)))
     };
-    task.fields.iter().map(at).collect()
+    run.fields.iter().map(at).collect()
 }
 
 /// Enters the milliseconds into all numbers of a spot, which come from the same rays.
@@ -56,8 +56,8 @@ impl SpotJson {
         self.rms.value
     }
 
-    fn new(task: &AnalysisRun, spot: &Spot) -> Self {
-        let colors = task.bench.channels.iter().zip(&spot.channels);
+    fn new(run: &AnalysisRun, spot: &Spot) -> Self {
+        let colors = run.model.channels.iter().zip(&spot.channels);
         Self {
             rms: spot.rms,
             radius: spot.radius,

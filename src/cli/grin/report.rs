@@ -66,9 +66,9 @@ struct LimitReport {
 }
 
 impl From<LimitCheck> for LimitReport {
-    fn from(kept: LimitCheck) -> Self {
-        let LimitCheck { name, value, limit, margin, at } = kept;
-        Self { name, value, limit, margin, kept: kept.is_satisfied(), at: [at.x, at.y, at.z] }
+    fn from(check: LimitCheck) -> Self {
+        let LimitCheck { name, value, limit, margin, at } = check;
+        Self { name, value, limit, margin, kept: check.is_satisfied(), at: [at.x, at.y, at.z] }
     }
 }
 

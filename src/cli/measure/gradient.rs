@@ -1,11 +1,10 @@
 //! `measure gradient`: accuracy of aperture-aware derivatives against time.
 
-use super::plot::{self, Color, ErrorChart, ErrorCurve, LegendEntry, Stroke};
+use super::plot::{self, Color, ErrorChart, ErrorCurve, LegendEntry, PlotArgs, Stroke};
 use crate::cli::error::CliError;
-use crate::cli::input::{LensFile, check_output_file};
+use crate::cli::input::LensFile;
 use crate::cli::output::{Output, ShortNumber, TextTable};
 use crate::cli::progress::with_bar;
-use crate::files;
 use crate::measure::{
     GradientBenchmark, GradientCost, GradientCurves, GradientRow, Integral, Machine, Precision,
     measure_gradients,
@@ -14,7 +13,6 @@ use crate::pupil::DerivativeEstimator;
 use image::ImageError;
 use serde::Serialize;
 use std::fmt::{self, Display};
-use std::path::PathBuf;
 
 /// Error against milliseconds of every estimator of derivatives over a moving pupil
 #[derive(Debug, clap::Args)]
@@ -31,25 +29,21 @@ pub(super) struct MeasureGradientArgs {
     #[arg(long, value_name = "N", default_value_t = 0)]
     zoom: usize,
 
-    /// Draws the curves, each the largest error of all kinds of numbers
-    #[arg(long, value_name = "FILE.png")]
-    plot: Option<PathBuf>,
+    #[command(flatten)]
+    plot: PlotArgs,
 }
 
 impl MeasureGradientArgs {
     pub(super) fn run(&self, output: &Output) -> Result<(), CliError> {
         let opened = self.lens.open()?;
-        self.plot.iter().try_for_each(|path| check_output_file(path, &["png"]))?;
-        opened.bench(self.zoom)?;
+        self.plot.check()?;
+        opened.ray_model(self.zoom)?;
         self.field.map(|y| opened.field_at(y, self.zoom)).transpose()?;
         let measured = with_bar("curves", |report| {
             measure_gradients(&opened.lens, self.zoom, self.field, report)
         });
         let measured = measured.map_err(|e| CliError::Input(format!("{}: {e}", opened.file)))?;
-        if let Some(path) = &self.plot {
-            let png = draw_curves(&measured, &opened.lens.name);
-            files::write_atomic(path, &png.map_err(|e| CliError::Failed(e.to_string()))?)?;
-        }
+        self.plot.write(|| draw_curves(&measured, &opened.lens.name))?;
         output.print(&MeasureGradientReport {
             machine: Machine::detect(),
             lens: opened.file,

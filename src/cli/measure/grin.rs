@@ -1,12 +1,10 @@
 //! `measure grin`: ray tracing in gradient-index fields: accuracy against time, cost, memory.
 
-use super::plot::{self, Color, ErrorChart, ErrorCurve, LegendEntry, Stroke};
+use super::plot::{self, Color, ErrorChart, ErrorCurve, LegendEntry, PlotArgs, Stroke};
 use crate::cli::error::CliError;
 use crate::cli::grin::load_task;
-use crate::cli::input::check_output_file;
 use crate::cli::output::{Output, TextTable};
 use crate::cli::progress::with_bar;
-use crate::files;
 use crate::grin::Integrator;
 use crate::measure::{
     GrinBenchmark, GrinCost, GrinCurves, GrinMemory, GrinRow, GrinStarts, Machine, MemoryUse,
@@ -16,7 +14,6 @@ use crate::plot::PALETTE;
 use image::ImageError;
 use serde::Serialize;
 use std::fmt::{self, Display};
-use std::path::PathBuf;
 
 /// Error of exits and gradients against milliseconds for every integrator, and the cost of a gradient
 /// in time and memory
@@ -27,21 +24,17 @@ pub(super) struct MeasureGrinArgs {
     #[arg(value_name = "TASK", default_value = "luneburg")]
     task: String,
 
-    /// Draws the errors of exits of the exact field and of the first grid
-    #[arg(long, value_name = "FILE.png")]
-    plot: Option<PathBuf>,
+    #[command(flatten)]
+    plot: PlotArgs,
 }
 
 impl MeasureGrinArgs {
     pub(super) fn run(&self, output: &Output) -> Result<(), CliError> {
         let task = load_task(&self.task)?;
-        self.plot.iter().try_for_each(|path| check_output_file(path, &["png"]))?;
+        self.plot.check()?;
         let measured = with_bar("curves", |report| measure_grin(&task, report));
         let measured = measured.map_err(|e| CliError::Input(format!("{}: {e}", self.task)))?;
-        if let Some(path) = &self.plot {
-            let png = draw_curves(&measured, &task.name);
-            files::write_atomic(path, &png.map_err(|e| CliError::Failed(e.to_string()))?)?;
-        }
+        self.plot.write(|| draw_curves(&measured, &task.name))?;
         output.print(&MeasureGrinReport { machine: Machine::detect(), task: task.name, measured })
     }
 }

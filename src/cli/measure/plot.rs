@@ -1,9 +1,38 @@
 //! Curves of error against time: one log-log chart, or two side by side.
 
+use crate::cli::error::CliError;
+use crate::cli::input::check_output_file;
+use crate::files;
 use crate::plot::{Axis, BLACK, Canvas, Chart as Axes, Legend, TextAlign};
 use image::ImageError;
+use std::path::PathBuf;
 
 pub(super) use crate::plot::{Color, Stroke};
+
+/// The option of a picture of the curves.
+#[derive(Debug, clap::Args)]
+pub(super) struct PlotArgs {
+    /// Draws the curves
+    #[arg(long, value_name = "FILE.png")]
+    plot: Option<PathBuf>,
+}
+
+impl PlotArgs {
+    /// Refuses a file that cannot be written.
+    pub(super) fn check(&self) -> Result<(), CliError> {
+        self.plot.iter().try_for_each(|path| check_output_file(path, &["png"]))
+    }
+
+    /// Writes the picture, if it is wanted.
+    pub(super) fn write(
+        &self,
+        picture: impl FnOnce() -> Result<Vec<u8>, ImageError>,
+    ) -> Result<(), CliError> {
+        let Some(path) = &self.plot else { return Ok(()) };
+        let png = picture().map_err(|error| CliError::Failed(error.to_string()))?;
+        Ok(files::write_atomic(path, &png)?)
+    }
+}
 
 const SIZE: [u32; 2] = [1800, 900];
 const TOP: f64 = 120.0;

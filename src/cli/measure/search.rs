@@ -26,7 +26,7 @@ pub(super) struct MeasureSearchArgs {
     seeds: u64,
 
     #[command(flatten)]
-    asked: SearchPlanArgs,
+    plan_args: SearchPlanArgs,
 }
 
 impl MeasureSearchArgs {
@@ -40,8 +40,8 @@ impl MeasureSearchArgs {
             return Err(CliError::Input("--seeds: found 0; expected 1 or more".into()));
         }
         let opened = self.lens.open()?;
-        let plan = self.asked.plan(&opened.lens)?;
-        let lens = self.asked.start_lens(&opened.lens)?;
+        let plan = self.plan_args.plan(&opened.lens)?;
+        let lens = self.plan_args.start_lens(&opened.lens)?;
         let found = compare_searches(&lens, &plan, SearchBudget { seconds, seeds })
             .map_err(|cause| CliError::Input(format!("{}: {cause}", opened.file)))?;
         output.print(&MeasureSearchReport { machine: Machine::detect(), found })

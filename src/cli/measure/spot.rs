@@ -1,18 +1,16 @@
 //! `measure spot`: accuracy of a spot against time.
 
-use super::plot::{self, Color, ErrorChart, ErrorCurve, LegendEntry, Stroke};
+use super::plot::{self, Color, ErrorChart, ErrorCurve, LegendEntry, PlotArgs, Stroke};
 use crate::cli::error::CliError;
-use crate::cli::input::{LensFile, check_output_file};
+use crate::cli::input::LensFile;
 use crate::cli::output::{Output, ShortNumber, TextTable};
 use crate::cli::progress::with_bar;
-use crate::files;
 use crate::measure::{
     Machine, Precision, PupilClipping, PupilSampling, SpotCurves, SpotRow, measure_spot_curves,
 };
 use image::ImageError;
 use serde::Serialize;
 use std::fmt::{self, Display};
-use std::path::PathBuf;
 
 /// Error against milliseconds of every sampling of a pupil, clear and clipped, in f32 and f64
 #[derive(Debug, clap::Args)]
@@ -29,9 +27,8 @@ pub(super) struct MeasureSpotArgs {
     #[arg(long, value_name = "N", default_value_t = 0)]
     zoom: usize,
 
-    /// Draws the curves
-    #[arg(long, value_name = "FILE.png")]
-    plot: Option<PathBuf>,
+    #[command(flatten)]
+    plot: PlotArgs,
 }
 
 /// The default field relative to the farthest one: neither the axis nor the corner.
@@ -40,20 +37,17 @@ const DEFAULT_ZONE: f64 = 0.7;
 impl MeasureSpotArgs {
     pub(super) fn run(&self, output: &Output) -> Result<(), CliError> {
         let opened = self.lens.open()?;
-        self.plot.iter().try_for_each(|path| check_output_file(path, &["png"]))?;
-        let bench = opened.bench(self.zoom)?;
+        self.plot.check()?;
+        let model = opened.ray_model(self.zoom)?;
         let field =
-            opened.field_at(self.field.unwrap_or(DEFAULT_ZONE * bench.beam.edge), self.zoom)?;
+            opened.field_at(self.field.unwrap_or(DEFAULT_ZONE * model.beam.edge), self.zoom)?;
         let curves = with_bar("curves", |report| {
             measure_spot_curves(&opened.lens, self.zoom, field, report)
         });
         let curves = curves
             .map_err(|e| CliError::Input(format!("{}, field {}: {e}", opened.file, field.y)))?;
-        if let Some(path) = &self.plot {
-            let title = format!("{}, field {}", opened.lens.name, ShortNumber(field.y));
-            let png = draw_curves(&curves, &title).map_err(|e| CliError::Failed(e.to_string()))?;
-            files::write_atomic(path, &png)?;
-        }
+        let title = format!("{}, field {}", opened.lens.name, ShortNumber(field.y));
+        self.plot.write(|| draw_curves(&curves, &title))?;
         output.print(&MeasureSpotReport {
             machine: Machine::detect(),
             lens: opened.file,

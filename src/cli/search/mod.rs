@@ -76,7 +76,7 @@ pub(super) struct SearchArgs {
     finish: bool,
 
     #[command(flatten)]
-    asked: SearchPlanArgs,
+    plan_args: SearchPlanArgs,
 }
 
 /// Maximum number of gradients if neither it nor a duration is given.
@@ -101,7 +101,7 @@ impl SearchArgs {
         self.check()?;
         let opened = self.lens.open()?;
         let plan = self.plan(&opened.lens)?;
-        let lens = self.asked.start_lens(&opened.lens)?;
+        let lens = self.plan_args.start_lens(&opened.lens)?;
         let refused = |cause: LandscapeError| landscape_error(&opened.file, cause);
         let landscape = plan.landscape(&lens).map_err(refused)?;
         let start_breaks = landscape.violations(landscape.start()).map_err(refused)?;
@@ -167,12 +167,12 @@ impl SearchArgs {
         self.reservoir_dir.iter().try_for_each(|folder| output_paths::check_folder(folder))?;
         let out = self.out.as_deref().map(|path| ("--out", path));
         let checkpoint = self.checkpoint.as_deref().map(|path| ("--checkpoint", path));
-        let read = std::iter::once(("the lens", self.lens.path())).chain(self.asked.files());
+        let read = std::iter::once(("the lens", self.lens.path())).chain(self.plan_args.files());
         output_paths::check_distinct(&[out, checkpoint], read)
     }
 
     fn plan(&self, lens: &Lens) -> Result<SearchPlan, CliError> {
-        let mut plan = self.asked.plan(lens)?;
+        let mut plan = self.plan_args.plan(lens)?;
         plan.settings.method = self.method;
         plan.settings.seed = self.seed;
         let usual = if self.minutes.is_none() { Some(DEFAULT_ITERATIONS) } else { None };

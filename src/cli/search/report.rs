@@ -80,7 +80,7 @@ impl SearchReport {
     pub(super) fn new(searched: SearchResults<'_>) -> Self {
         let SearchResults { landscape, run, ended, resumed, idle, ms, gradients, .. } = searched;
         let statistics = run.statistics();
-        let kept = |FoundPoint { entry, running }: FoundPoint<'_, _>| ReservoirRow {
+        let row = |FoundPoint { entry, running }: FoundPoint<'_, _>| ReservoirRow {
             generation: entry.number,
             merit: entry.loss,
             topology: entry.topology.clone(),
@@ -110,7 +110,7 @@ impl SearchReport {
             start_breaks: ViolatedLimit::all(searched.start_breaks),
             compared: searched.compared,
             figures_ms: searched.compared_ms,
-            reservoir: run.found_points().into_iter().map(kept).collect(),
+            reservoir: run.found_points().into_iter().map(row).collect(),
             mutations: mutations.collect(),
             ended_by: statistics.ended.clone(),
             files: searched.stored,

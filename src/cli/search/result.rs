@@ -98,7 +98,7 @@ impl StartAgainstBest {
 impl FinishedReport {
     pub(super) fn write(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let FinalizedLens { glasses, unlisted, gradients, figures, confirmed, .. } = &self.finished;
-        let (kept, light) = (&self.finished.limits, &self.finished.light);
+        let (limits, light) = (&self.finished.limits, &self.finished.light);
         let verdict =
             if self.failures.is_empty() { "satisfies every constraint" } else { "NOT finished" };
         writeln!(f, "\nfinished: {verdict}")?;
@@ -134,7 +134,7 @@ impl FinishedReport {
         writeln!(f, "{table}")?;
         let mut table =
             TextTable::new(&["constraint", "place", "zoom", "value", "min", "max", "margin"]);
-        for limit in kept.iter().chain(light) {
+        for limit in limits.iter().chain(light) {
             table.row(limits::cells(limit).into_iter().chain([format!("{:.4}", limit.slack())]));
         }
         write!(f, "{table}")

@@ -48,13 +48,13 @@ pub fn read(text: &str, file: &str) -> Result<(Lens, ConversionReport), FileErro
 }
 
 fn parse_lens(text: &str) -> Result<(Lens, ConversionReport), ParseError> {
-    let (draft, mut report) = parse::parse(text)?;
-    if draft.surfaces.is_empty() {
+    let (file, mut report) = parse::parse(text)?;
+    if file.surfaces.is_empty() {
         let expected = "SURF lines: is this a Zemax lens file?".to_owned();
         let found = "no SURF line".to_owned();
         return Err(ParseError { place: "the whole file".to_owned(), found, expected });
     }
-    let lens = build::build(&draft, &mut report)?;
+    let lens = build::build(&file, &mut report)?;
     Ok((lens, report))
 }
 

@@ -122,8 +122,8 @@ fn an_export_that_would_trace_differently_is_not_written() {
     let target = folder.join("a.zmx");
     fs::write(&target, "old").unwrap();
     let error = files::save(&lens, &target).unwrap_err().to_string();
-    assert!(error.contains("does not trace like the lens when it is read back"), "{error}");
-    assert!(error.contains("Missed(0) in place of Imaged"), "{error}");
+    assert!(error.contains("read back, it does not trace like the lens"), "{error}");
+    assert!(error.contains("missed at surface 1 instead of imaged"), "{error}");
     assert_eq!(fs::read_to_string(&target).unwrap(), "old");
     lens.aperture = Aperture::ObjectNa(0.5);
     assert!(files::save(&lens, &target).is_ok());

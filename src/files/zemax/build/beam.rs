@@ -9,27 +9,27 @@ use crate::paraxial::{Beam, first_order};
 
 /// The aperture of the whole lens.
 pub(super) fn aperture(
-    draft: &ZemaxFile,
+    file: &ZemaxFile,
     stop: usize,
     object_medium: &Medium,
 ) -> Result<Aperture, ParseError> {
     let wrong = |line: usize, found: String, expected: &str| {
         Err(ParseError { place: format!("line {line}"), found, expected: expected.to_owned() })
     };
-    let Some((aperture, line)) = draft.aperture else {
-        let line = draft.surfaces[0].line;
+    let Some((aperture, line)) = file.aperture else {
+        let line = file.surfaces[0].line;
         return wrong(line, "no aperture before it".to_owned(), "ENPD, FNUM, OBNA or FLOA");
     };
     match aperture {
-        ApertureLine::Diameter(v) if v > 0.0 => Ok(Aperture::EntrancePupilDiameter(v * draft.unit)),
+        ApertureLine::Diameter(v) if v > 0.0 => Ok(Aperture::EntrancePupilDiameter(v * file.unit)),
         ApertureLine::FNumber { value, .. } if value > 0.0 => Ok(Aperture::FNumber(value)),
         ApertureLine::ObjectNa(v) if v > 0.0 => Ok(Aperture::ObjectNa(v)),
         ApertureLine::ObjectConeDegrees(v) if v > 0.0 && v < 90.0 => {
             Ok(Aperture::ObjectNa(index(object_medium) * v.to_radians().sin()))
         }
-        ApertureLine::FloatByStop => match draft.surfaces[stop].semi_diameter {
-            Some(given) => Ok(Aperture::StopSemiDiameter(given.value * draft.unit)),
-            None => wrong(line, "FLOA and no DIAM on the stop".to_owned(), "a DIAM there"),
+        ApertureLine::FloatByStop => match file.surfaces[stop].semi_diameter {
+            Some(given) => Ok(Aperture::StopSemiDiameter(given.value * file.unit)),
+            None => wrong(line, "FLOA and no DIAM on the stop".to_owned(), "a DIAM on the stop"),
         },
         other => wrong(line, format!("{other:?}"), "a number above 0, a cone below 90 degrees"),
     }
@@ -37,8 +37,8 @@ pub(super) fn aperture(
 
 /// Replaces an f-number for an object at infinity by the entrance pupil diameter if the object is at a
 /// finite distance, where an f-number here means the working one.
-pub(super) fn infinite_f_number(draft: &ZemaxFile, lens: &mut Lens, report: &mut ConversionReport) {
-    let Some((ApertureLine::FNumber { value, working: false }, line)) = draft.aperture else {
+pub(super) fn infinite_f_number(file: &ZemaxFile, lens: &mut Lens, report: &mut ConversionReport) {
+    let Some((ApertureLine::FNumber { value, working: false }, line)) = file.aperture else {
         return;
     };
     if lens.object == Object::Infinity {
@@ -63,14 +63,14 @@ fn index(medium: &Medium) -> f64 {
 }
 
 /// The field points: the number that the file states, or in older files up to the last that is not 0.
-pub(super) fn fields(draft: &ZemaxFile) -> Result<Fields, ParseError> {
-    let lines = &draft.fields;
+pub(super) fn fields(file: &ZemaxFile) -> Result<Fields, ParseError> {
+    let lines = &file.fields;
     let (kind, line) = lines.kind.unwrap_or((0, 0));
     let given = lines.x.len().max(lines.y.len()).max(1);
     let last = |values: &[f64]| values.iter().rposition(|v| *v != 0.0).map_or(1, |i| i + 1);
     let count = lines.count.unwrap_or(last(&lines.x).max(last(&lines.y))).min(given);
     let at = |values: &[f64], i: usize, default: f64| values.get(i).copied().unwrap_or(default);
-    let scale = if matches!(kind, 0 | 4) { 1.0 } else { draft.unit };
+    let scale = if matches!(kind, 0 | 4) { 1.0 } else { file.unit };
     let values: Vec<FieldPoint> = (0..count)
         .map(|i| FieldPoint {
             x: at(&lines.x, i, 0.0) * scale,
@@ -96,10 +96,10 @@ const PADDING: (f64, f64) = (0.55, 1.0);
 
 /// The wavelengths: the number that the file states, or all before the unused ones.
 pub(super) fn wavelengths(
-    draft: &ZemaxFile,
+    file: &ZemaxFile,
     report: &mut ConversionReport,
 ) -> Result<Vec<Wavelength>, ParseError> {
-    let lines = &draft.waves;
+    let lines = &file.waves;
     let mut numbered = lines.numbered.clone();
     numbered.sort_by_key(|(index, ..)| *index);
     let mut all: Vec<(f64, f64)> =
@@ -115,7 +115,7 @@ pub(super) fn wavelengths(
         report.amend(*line, ConversionOutcome::Preserved, "beyond the number of wavelengths");
     }
     if all.is_empty() {
-        let place = format!("line {}", draft.surfaces[0].line);
+        let place = format!("line {}", file.surfaces[0].line);
         let found = "no wavelengths before it".to_owned();
         return Err(ParseError { place, found, expected: "WAVM lines".to_owned() });
     }

@@ -15,15 +15,15 @@ use crate::files::report::{ConversionOutcome, ConversionReport};
 use crate::lens::{Lens, Medium, Object, Row};
 
 /// Builds the lens; the report receives everything that cannot be represented.
-pub(super) fn build(draft: &ZemaxFile, report: &mut ConversionReport) -> Result<Lens, ParseError> {
-    check_complete(draft)?;
-    coordinate_breaks::check_breaks(&draft.surfaces)?;
-    let stop = stop(draft)?;
-    let object = object(draft)?;
-    let object_medium = object_medium(draft, report)?;
-    let surfaces = rows(draft, stop, report)?;
-    let aperture = beam::aperture(draft, stop, &object_medium)?;
-    let (name, source, notes, zoom_names) = split_notes(draft);
+pub(super) fn build(file: &ZemaxFile, report: &mut ConversionReport) -> Result<Lens, ParseError> {
+    check_complete(file)?;
+    coordinate_breaks::check_breaks(&file.surfaces)?;
+    let stop = stop(file)?;
+    let object = object(file)?;
+    let object_medium = object_medium(file, report)?;
+    let surfaces = rows(file, stop, report)?;
+    let aperture = beam::aperture(file, stop, &object_medium)?;
+    let (name, source, notes, zoom_names) = split_notes(file);
     let mut lens = Lens {
         name,
         source,
@@ -31,31 +31,31 @@ pub(super) fn build(draft: &ZemaxFile, report: &mut ConversionReport) -> Result<
         object,
         object_medium,
         aperture,
-        fields: beam::fields(draft)?,
-        wavelengths: beam::wavelengths(draft, report)?,
+        fields: beam::fields(file)?,
+        wavelengths: beam::wavelengths(file, report)?,
         surfaces,
         zoom: Vec::new(),
         variables: Vec::new(),
         pickups: Vec::new(),
         image_solve: None,
     };
-    report_image(draft, report);
-    zoom::add_positions(draft, &mut lens, &zoom_names, report)?;
-    solve::add_solves(draft, &mut lens, report);
-    beam::infinite_f_number(draft, &mut lens, report);
+    report_image(file, report);
+    zoom::add_positions(file, &mut lens, &zoom_names, report)?;
+    solve::add_solves(file, &mut lens, report);
+    beam::infinite_f_number(file, &mut lens, report);
     Ok(lens)
 }
 
 /// Refuses a truncated file.
-fn check_complete(draft: &ZemaxFile) -> Result<(), ParseError> {
-    let surfaces = &draft.surfaces;
+fn check_complete(file: &ZemaxFile) -> Result<(), ParseError> {
+    let surfaces = &file.surfaces;
     let wrong = |line, found: String, expected: &str| {
         Err(ParseError { place: format!("line {line}"), found, expected: expected.to_owned() })
     };
     for (number, surface) in surfaces.iter().enumerate() {
         let curvature = surface.curvature.is_some() || number == 0;
-        for (there, keyword) in [(curvature, "CURV"), (surface.thickness.is_some(), "DISZ")] {
-            if !there {
+        for (is_given, keyword) in [(curvature, "CURV"), (surface.thickness.is_some(), "DISZ")] {
+            if !is_given {
                 let found = format!("surface {number} without {keyword}");
                 return wrong(surface.line, found, "all its lines; is the file truncated?");
             }
@@ -75,8 +75,8 @@ fn check_complete(draft: &ZemaxFile) -> Result<(), ParseError> {
 }
 
 /// The surface of the file that is the stop.
-fn stop(draft: &ZemaxFile) -> Result<usize, ParseError> {
-    let surfaces = &draft.surfaces;
+fn stop(file: &ZemaxFile) -> Result<usize, ParseError> {
+    let surfaces = &file.surfaces;
     let numbered = surfaces.iter().enumerate();
     let mut stops = numbered.filter_map(|(number, surface)| Some((number, surface.stop?)));
     let wrong = |place: String, found: String| {
@@ -102,8 +102,8 @@ fn stop(draft: &ZemaxFile) -> Result<usize, ParseError> {
 /// Object distances from this on are infinite.
 const INFINITE_DISTANCE: f64 = 1e10;
 
-fn object(draft: &ZemaxFile) -> Result<Object, ParseError> {
-    let (distance, line) = draft.surfaces[0].thickness.unwrap_or((f64::INFINITY, 0));
+fn object(file: &ZemaxFile) -> Result<Object, ParseError> {
+    let (distance, line) = file.surfaces[0].thickness.unwrap_or((f64::INFINITY, 0));
     if distance.abs() >= INFINITE_DISTANCE {
         return Ok(Object::Infinity);
     }
@@ -112,12 +112,12 @@ fn object(draft: &ZemaxFile) -> Result<Object, ParseError> {
         let found = "an object at the first surface".to_owned();
         return Err(ParseError { place: format!("line {line}"), found, expected });
     }
-    Ok(Object::Finite(distance * draft.unit))
+    Ok(Object::Finite(distance * file.unit))
 }
 
-fn object_medium(draft: &ZemaxFile, report: &mut ConversionReport) -> Result<Medium, ParseError> {
-    let (medium, outcome, note) = glass::medium(&draft.surfaces, 0, &draft.catalogues)?;
-    if let Some(glass) = &draft.surfaces[0].glass {
+fn object_medium(file: &ZemaxFile, report: &mut ConversionReport) -> Result<Medium, ParseError> {
+    let (medium, outcome, note) = glass::medium(&file.surfaces, 0, &file.catalogues)?;
+    if let Some(glass) = &file.surfaces[0].glass {
         if medium == Medium::Mirror {
             report.amend(glass.line, ConversionOutcome::Dropped, "the object cannot be a mirror");
             return Ok(Medium::Air);
@@ -128,32 +128,32 @@ fn object_medium(draft: &ZemaxFile, report: &mut ConversionReport) -> Result<Med
 }
 
 fn rows(
-    draft: &ZemaxFile,
+    file: &ZemaxFile,
     stop: usize,
     report: &mut ConversionReport,
 ) -> Result<Vec<Row>, ParseError> {
     // The medium of the current gap; a coordinate break has the same on both sides.
     let mut gap = Medium::Air;
-    let mut rows = Vec::with_capacity(draft.surfaces.len() - 2);
-    for number in 1..draft.surfaces.len() - 1 {
-        let (medium, outcome, note) = glass::medium(&draft.surfaces, number, &draft.catalogues)?;
-        if let Some(glass) = &draft.surfaces[number].glass {
+    let mut rows = Vec::with_capacity(file.surfaces.len() - 2);
+    for number in 1..file.surfaces.len() - 1 {
+        let (medium, outcome, note) = glass::medium(&file.surfaces, number, &file.catalogues)?;
+        if let Some(glass) = &file.surfaces[number].glass {
             report.amend(glass.line, outcome, note);
         }
         let medium =
-            if coordinate_breaks::is_break(&draft.surfaces[number]) { gap.clone() } else { medium };
-        let medium = gradient::medium(&draft.surfaces[number], draft.unit).unwrap_or(medium);
+            if coordinate_breaks::is_break(&file.surfaces[number]) { gap.clone() } else { medium };
+        let medium = gradient::medium(&file.surfaces[number], file.unit).unwrap_or(medium);
         if medium != Medium::Mirror {
             gap = medium.clone();
         }
-        rows.push(row::row(draft, number, stop, medium, report)?);
+        rows.push(row::row(file, number, stop, medium, report)?);
     }
     Ok(rows)
 }
 
 /// Reports the properties of object and image that are lost, since both are planes here.
-fn report_image(draft: &ZemaxFile, report: &mut ConversionReport) {
-    for surface in [draft.surfaces.first(), draft.surfaces.last()].into_iter().flatten() {
+fn report_image(file: &ZemaxFile, report: &mut ConversionReport) {
+    for surface in [file.surfaces.first(), file.surfaces.last()].into_iter().flatten() {
         if let Some((curvature, line)) = surface.curvature
             && curvature != 0.0
         {
@@ -186,7 +186,7 @@ fn report_image(draft: &ZemaxFile, report: &mut ConversionReport) {
             );
         }
     }
-    if let Some(glass) = draft.surfaces.last().and_then(|surface| surface.glass.as_ref()) {
+    if let Some(glass) = file.surfaces.last().and_then(|surface| surface.glass.as_ref()) {
         report.amend(
             glass.line,
             ConversionOutcome::Dropped,
@@ -196,16 +196,16 @@ fn report_image(draft: &ZemaxFile, report: &mut ConversionReport) {
 }
 
 /// Name, source, notes and names of the zoom positions, as this program exports them.
-fn split_notes(draft: &ZemaxFile) -> (String, String, String, Vec<String>) {
+fn split_notes(file: &ZemaxFile) -> (String, String, String, Vec<String>) {
     let mut source = String::new();
     let mut zoom = Vec::new();
     let mut notes: Vec<&str> = Vec::new();
-    for note in &draft.notes {
+    for note in &file.notes {
         match (note.strip_prefix(super::SOURCE), note.strip_prefix(super::ZOOM_NAME)) {
             (Some(text), _) if source.is_empty() => text.clone_into(&mut source),
-            (_, Some(text)) if draft.configurations > 1 => zoom.push(text.to_owned()),
+            (_, Some(text)) if file.configurations > 1 => zoom.push(text.to_owned()),
             _ => notes.push(note),
         }
     }
-    (draft.name.clone(), source, notes.join("\n").trim().to_owned(), zoom)
+    (file.name.clone(), source, notes.join("\n").trim().to_owned(), zoom)
 }

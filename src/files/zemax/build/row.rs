@@ -12,13 +12,13 @@ const INFINITE: f64 = 1e18;
 
 /// The row of surface `number`.
 pub(super) fn row(
-    draft: &ZemaxFile,
+    file: &ZemaxFile,
     number: usize,
     stop: usize,
     medium: Medium,
     report: &mut ConversionReport,
 ) -> Result<Row, ParseError> {
-    let surface = &draft.surfaces[number];
+    let surface = &file.surfaces[number];
     let form = if coordinate_breaks::is_break(surface) {
         let note = "this run of coordinate breaks has no effect; read as planes";
         report.amend(surface.kind.1, ConversionOutcome::Approximated, note);
@@ -29,7 +29,7 @@ pub(super) fn row(
     if let Some((line, note)) = form.note {
         report.amend(line, ConversionOutcome::Used, note);
     }
-    let unit = draft.unit;
+    let unit = file.unit;
     let scaled =
         form.asphere.iter().zip((4..).step_by(2)).map(|(a, power)| a * unit.powi(1 - power));
     Ok(Row {
@@ -38,7 +38,7 @@ pub(super) fn row(
         asphere: scaled.collect(),
         thickness: thickness(surface, number)? * unit,
         medium,
-        semi_diameter: semi_diameter(draft, number, stop, report).map(|radius| radius * unit),
+        semi_diameter: semi_diameter(file, number, stop, report).map(|radius| radius * unit),
         obstruction: surface.obstruction.map(|(radius, _)| radius * unit),
         stop: number == stop,
         hyperhemisphere: false,
@@ -59,17 +59,17 @@ fn thickness(surface: &ZemaxSurface, number: usize) -> Result<f64, ParseError> {
 /// The clipping radius. In the file only circular apertures clip: a fixed semi-diameter is drawn there
 /// and clips here, an automatic one is wide enough for every ray and is not read.
 fn semi_diameter(
-    draft: &ZemaxFile,
+    file: &ZemaxFile,
     number: usize,
     stop: usize,
     report: &mut ConversionReport,
 ) -> Option<f64> {
-    let surface = &draft.surfaces[number];
+    let surface = &file.surfaces[number];
     if let Some((radius, _)) = surface.clip {
         return Some(radius);
     }
     let given = surface.semi_diameter?;
-    let floating = matches!(draft.aperture, Some((ApertureLine::FloatByStop, _)));
+    let floating = matches!(file.aperture, Some((ApertureLine::FloatByStop, _)));
     if floating && number == stop {
         return None; // it is the aperture of the lens
     }

@@ -6,19 +6,19 @@ use crate::files::zemax::gradient;
 use crate::lens::{Lens, Parameter, Pickup, Quantity, Variable};
 
 /// Adds variables, pickups and the focus solve to the lens.
-pub(super) fn add_solves(draft: &ZemaxFile, lens: &mut Lens, report: &mut ConversionReport) {
+pub(super) fn add_solves(file: &ZemaxFile, lens: &mut Lens, report: &mut ConversionReport) {
     for row in 0..lens.surfaces.len() {
-        let surface = &draft.surfaces[row + 1];
+        let surface = &file.surfaces[row + 1];
         add_focus_solve(surface, row, lens, report);
         match surface.curvature_solve {
             CurvatureSolve::Fixed => {}
             CurvatureSolve::Variable => add_variable(lens, row, Quantity::Curvature),
             CurvatureSolve::Pickup(line) => {
-                let offset = line.offset / draft.unit;
+                let offset = line.offset / file.unit;
                 add_pickup(lens, row, Quantity::Curvature, PickupLine { offset, ..line }, report);
             }
         }
-        thickness(draft, row, lens, report);
+        thickness(file, row, lens, report);
         if surface.variable_conic.is_some() {
             add_variable(lens, row, Quantity::Conic);
         }
@@ -60,8 +60,8 @@ fn add_variable(lens: &mut Lens, surface: usize, quantity: Quantity) {
     }
 }
 
-fn thickness(draft: &ZemaxFile, row: usize, lens: &mut Lens, report: &mut ConversionReport) {
-    let surface = &draft.surfaces[row + 1];
+fn thickness(file: &ZemaxFile, row: usize, lens: &mut Lens, report: &mut ConversionReport) {
+    let surface = &file.surfaces[row + 1];
     let solved = lens.image_solve.is_some() && row + 1 == lens.surfaces.len();
     if solved {
         let pickup = surface.thickness_pickup.map(|pickup| pickup.line);
@@ -72,13 +72,13 @@ fn thickness(draft: &ZemaxFile, row: usize, lens: &mut Lens, report: &mut Conver
         return;
     }
     if let Some(line) = surface.thickness_pickup {
-        let offset = line.offset * draft.unit;
+        let offset = line.offset * file.unit;
         add_pickup(lens, row, Quantity::Thickness, PickupLine { offset, ..line }, report);
         return;
     }
     let Some((low, high, line)) = surface.variable_thickness else { return };
     add_variable(lens, row, Quantity::Thickness);
-    let (low, high) = (low * draft.unit, high * draft.unit);
+    let (low, high) = (low * file.unit, high * file.unit);
     let value = lens.surfaces[row].thickness;
     if low < high && (low..=high).contains(&value) {
         if let Some(variable) = lens.variables.last_mut() {

@@ -10,21 +10,21 @@ use std::collections::BTreeMap;
 
 /// Adds zoom positions to the lens, if the file has more than one configuration.
 pub(super) fn add_positions(
-    draft: &ZemaxFile,
+    file: &ZemaxFile,
     lens: &mut Lens,
     names: &[String],
     report: &mut ConversionReport,
 ) -> Result<(), ParseError> {
-    if draft.configurations < 2 {
+    if file.configurations < 2 {
         return Ok(());
     }
-    check_complete(draft)?;
+    check_complete(file)?;
     let name = |i: usize| names.get(i).cloned().unwrap_or_default();
-    lens.zoom = (0..draft.configurations)
+    lens.zoom = (0..file.configurations)
         .map(|i| ZoomPosition { name: name(i), ..ZoomPosition::default() })
         .collect();
-    for operand in &draft.operands {
-        if let Err(why) = apply(draft.unit, lens, operand) {
+    for operand in &file.operands {
+        if let Err(why) = apply(file.unit, lens, operand) {
             report.amend(operand.line, ConversionOutcome::Dropped, why);
         }
     }
@@ -32,13 +32,13 @@ pub(super) fn add_positions(
 }
 
 /// Refuses an operand without a value for each configuration.
-fn check_complete(draft: &ZemaxFile) -> Result<(), ParseError> {
+fn check_complete(file: &ZemaxFile) -> Result<(), ParseError> {
     let mut values: BTreeMap<(&str, usize), (usize, usize)> = BTreeMap::new();
-    for operand in &draft.operands {
+    for operand in &file.operands {
         let (count, line) = values.entry((&operand.name, operand.target)).or_default();
         (*count, *line) = (*count + 1, operand.line);
     }
-    let configurations = draft.configurations;
+    let configurations = file.configurations;
     for ((name, target), (count, line)) in values {
         if count < configurations {
             let found =

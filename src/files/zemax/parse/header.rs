@@ -7,25 +7,25 @@ use crate::files::zemax::line::ZemaxLine;
 
 /// Reads a line of the header; `None` for other lines.
 pub(super) fn read(
-    draft: &mut ZemaxFile,
+    file: &mut ZemaxFile,
     line: &ZemaxLine<'_>,
 ) -> Result<Option<LineOutcome>, ParseError> {
     let verdict = match line.keyword {
         "MODE" => mode(line)?,
-        "UNIT" => unit(draft, line)?,
-        "NAME" => text(&mut draft.name, line.rest),
-        "NOTE" => note(draft, line),
-        "ENPD" | "FNUM" | "OBNA" | "FLOA" => aperture(draft, line)?,
+        "UNIT" => unit(file, line)?,
+        "NAME" => text(&mut file.name, line.rest),
+        "NOTE" => note(file, line),
+        "ENPD" | "FNUM" | "OBNA" | "FLOA" => aperture(file, line)?,
         "GCAT" => {
-            draft.catalogues = line.fields.iter().map(|&name| name.to_owned()).collect();
+            file.catalogues = line.fields.iter().map(|&name| name.to_owned()).collect();
             used()
         }
         "ENVD" => environment(line)?,
-        "FTYP" => field_type(draft, line)?,
-        "XFLN" | "YFLN" | "FWGN" | "XFLD" | "YFLD" | "FWGT" => field_values(draft, line)?,
-        "WAVM" | "WAVL" | "WAVN" | "WWGT" | "WWGN" => waves(draft, line)?,
+        "FTYP" => field_type(file, line)?,
+        "XFLN" | "YFLN" | "FWGN" | "XFLD" | "YFLD" | "FWGT" => field_values(file, line)?,
+        "WAVM" | "WAVL" | "WAVN" | "WWGT" | "WWGN" => waves(file, line)?,
         "PWAV" => {
-            draft.waves.primary = Some((line.count(0)?, line.number));
+            file.waves.primary = Some((line.count(0)?, line.number));
             used()
         }
         "VDXN" | "VDYN" | "VCXN" | "VCYN" | "VANN" | "VDXF" | "VDYF" | "VCXF" | "VCYF" => {
@@ -44,10 +44,10 @@ fn text(to: &mut String, rest: &str) -> LineOutcome {
 }
 
 /// `NOTE 0 text`; the number is the kind of note.
-fn note(draft: &mut ZemaxFile, line: &ZemaxLine<'_>) -> LineOutcome {
+fn note(file: &mut ZemaxFile, line: &ZemaxLine<'_>) -> LineOutcome {
     let (kind, text) = line.rest.split_once(char::is_whitespace).unwrap_or((line.rest, ""));
     let numbered = kind.parse::<u32>().is_ok();
-    draft.notes.push(if numbered { text.trim().to_owned() } else { line.rest.to_owned() });
+    file.notes.push(if numbered { text.trim().to_owned() } else { line.rest.to_owned() });
     used()
 }
 
@@ -60,8 +60,8 @@ fn mode(line: &ZemaxLine<'_>) -> Result<LineOutcome, ParseError> {
     Err(line.malformed(format!("`{}`", line.source_text()), expected))
 }
 
-fn unit(draft: &mut ZemaxFile, line: &ZemaxLine<'_>) -> Result<LineOutcome, ParseError> {
-    draft.unit = match line.word(0)?.to_ascii_uppercase().as_str() {
+fn unit(file: &mut ZemaxFile, line: &ZemaxLine<'_>) -> Result<LineOutcome, ParseError> {
+    file.unit = match line.word(0)?.to_ascii_uppercase().as_str() {
         "MM" => 1.0,
         "CM" => 10.0,
         "IN" | "INCH" => 25.4,
@@ -72,8 +72,8 @@ fn unit(draft: &mut ZemaxFile, line: &ZemaxLine<'_>) -> Result<LineOutcome, Pars
     Ok(used())
 }
 
-fn aperture(draft: &mut ZemaxFile, line: &ZemaxLine<'_>) -> Result<LineOutcome, ParseError> {
-    if draft.aperture.is_some() {
+fn aperture(file: &mut ZemaxFile, line: &ZemaxLine<'_>) -> Result<LineOutcome, ParseError> {
+    if file.aperture.is_some() {
         return Ok(dropped("a second aperture; the first one is used"));
     }
     let kind = line.number_or(1, 0.0)?;
@@ -84,7 +84,7 @@ fn aperture(draft: &mut ZemaxFile, line: &ZemaxLine<'_>) -> Result<LineOutcome, 
         "OBNA" => ApertureLine::ObjectNa(line.number(0)?),
         _ => ApertureLine::FloatByStop,
     };
-    draft.aperture = Some((aperture, line.number));
+    file.aperture = Some((aperture, line.number));
     Ok(used())
 }
 
@@ -99,15 +99,15 @@ fn environment(line: &ZemaxLine<'_>) -> Result<LineOutcome, ParseError> {
     })
 }
 
-fn field_type(draft: &mut ZemaxFile, line: &ZemaxLine<'_>) -> Result<LineOutcome, ParseError> {
+fn field_type(file: &mut ZemaxFile, line: &ZemaxLine<'_>) -> Result<LineOutcome, ParseError> {
     let kind = line.count(0)?;
     if kind > 4 {
         return Err(line.malformed(format!("field type {kind}"), "0 to 4"));
     }
-    draft.fields.kind = Some((kind, line.number));
+    file.fields.kind = Some((kind, line.number));
     // Older files have one or two words; a count of 0 means that it is not stated.
-    draft.fields.count = line.count_if_any(2).filter(|count| *count > 0);
-    draft.waves.count = line.count_if_any(3).filter(|count| *count > 0);
+    file.fields.count = line.count_if_any(2).filter(|count| *count > 0);
+    file.waves.count = line.count_if_any(3).filter(|count| *count > 0);
     Ok(match (kind, line.number_or(1, 0.0)? != 0.0) {
         (_, true) => dropped(
             "telecentric object space: chief rays pass through the centre of the stop in this program",
@@ -117,8 +117,8 @@ fn field_type(draft: &mut ZemaxFile, line: &ZemaxLine<'_>) -> Result<LineOutcome
     })
 }
 
-fn field_values(draft: &mut ZemaxFile, line: &ZemaxLine<'_>) -> Result<LineOutcome, ParseError> {
-    let fields = &mut draft.fields;
+fn field_values(file: &mut ZemaxFile, line: &ZemaxLine<'_>) -> Result<LineOutcome, ParseError> {
+    let fields = &mut file.fields;
     let values = line.numbers()?;
     match line.keyword {
         "XFLN" => fields.x = values,
@@ -131,8 +131,8 @@ fn field_values(draft: &mut ZemaxFile, line: &ZemaxLine<'_>) -> Result<LineOutco
     Ok(used())
 }
 
-fn waves(draft: &mut ZemaxFile, line: &ZemaxLine<'_>) -> Result<LineOutcome, ParseError> {
-    let waves = &mut draft.waves;
+fn waves(file: &mut ZemaxFile, line: &ZemaxLine<'_>) -> Result<LineOutcome, ParseError> {
+    let waves = &mut file.waves;
     match line.keyword {
         "WAVM" => {
             let (um, weight) = (line.number(1)?, line.number_or(2, 1.0)?);

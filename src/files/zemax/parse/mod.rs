@@ -46,12 +46,12 @@ pub(super) fn parse(text: &str) -> Result<(ZemaxFile, ConversionReport), ParseEr
             note,
         });
     }
-    Ok((reader.draft, reader.report))
+    Ok((reader.file, reader.report))
 }
 
 #[derive(Default)]
 struct ZemaxReader {
-    draft: ZemaxFile,
+    file: ZemaxFile,
     report: ConversionReport,
     /// True while lines belong to the last surface.
     in_surface: bool,
@@ -63,7 +63,7 @@ impl ZemaxReader {
     fn read(&mut self, line: &ZemaxLine<'_>) -> Result<LineOutcome, ParseError> {
         if line.keyword == "SURF" {
             self.in_surface = true;
-            return surface::begin(&mut self.draft, line);
+            return surface::begin(&mut self.file, line);
         }
         if line.keyword == "MNUM" {
             (self.in_surface, self.in_table) = (false, true);
@@ -75,11 +75,11 @@ impl ZemaxReader {
         if self.in_table && OTHER_OPERANDS.contains(&line.keyword) {
             return Ok(self.other_operand());
         }
-        if let Some(verdict) = header::read(&mut self.draft, line)? {
+        if let Some(verdict) = header::read(&mut self.file, line)? {
             self.in_surface = false;
             return Ok(verdict);
         }
-        match self.draft.surfaces.last_mut() {
+        match self.file.surfaces.last_mut() {
             Some(surface) if self.in_surface => surface::read(surface, line),
             None if surface::KEYWORDS.contains(&line.keyword) => {
                 Err(line
@@ -90,9 +90,9 @@ impl ZemaxReader {
     }
 
     fn configurations(&mut self, line: &ZemaxLine<'_>) -> Result<LineOutcome, ParseError> {
-        self.draft.configurations = line.count(0)?.max(1);
-        if self.draft.configurations > MAX_CONFIGURATIONS {
-            let found = format!("{} configurations", self.draft.configurations);
+        self.file.configurations = line.count(0)?.max(1);
+        if self.file.configurations > MAX_CONFIGURATIONS {
+            let found = format!("{} configurations", self.file.configurations);
             return Err(line.malformed(found, &format!("at most {MAX_CONFIGURATIONS}")));
         }
         Ok(used())
@@ -107,15 +107,15 @@ impl ZemaxReader {
             variable: line.number_or(3, 0.0)? == 1.0,
             line: line.number,
         };
-        if operand.configuration == 0 || operand.configuration > self.draft.configurations {
+        if operand.configuration == 0 || operand.configuration > self.file.configurations {
             return Ok(dropped("no such configuration"));
         }
-        self.draft.operands.push(operand);
+        self.file.operands.push(operand);
         Ok(used())
     }
 
     fn other_operand(&self) -> LineOutcome {
-        if self.draft.configurations == 1 {
+        if self.file.configurations == 1 {
             return preserved();
         }
         dropped("only thicknesses, aperture and fields can differ between zoom positions")

@@ -13,17 +13,14 @@ pub(super) const KEYWORDS: &[&str] = &[
 ];
 
 /// `SURF k`: surfaces come in order, from 0.
-pub(super) fn begin(
-    draft: &mut ZemaxFile,
-    line: &ZemaxLine<'_>,
-) -> Result<LineOutcome, ParseError> {
-    let expected = draft.surfaces.len();
+pub(super) fn begin(file: &mut ZemaxFile, line: &ZemaxLine<'_>) -> Result<LineOutcome, ParseError> {
+    let expected = file.surfaces.len();
     if line.count(0)? != expected {
         return Err(
             line.malformed(format!("`{}`", line.source_text()), &format!("SURF {expected}"))
         );
     }
-    draft.surfaces.push(ZemaxSurface { line: line.number, ..ZemaxSurface::default() });
+    file.surfaces.push(ZemaxSurface { line: line.number, ..ZemaxSurface::default() });
     Ok(used())
 }
 
@@ -194,7 +191,7 @@ fn thickness_pickup(
     line: &ZemaxLine<'_>,
 ) -> Result<LineOutcome, ParseError> {
     if line.number_or(3, 0.0)? != 0.0 {
-        return Ok(approximated("a pickup from another column is kept at its present value"));
+        return Ok(approximated("a pickup from another column is replaced by its present value"));
     }
     surface.thickness_pickup = Some(PickupLine {
         surface: line.count(0)?,

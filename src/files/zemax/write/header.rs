@@ -2,7 +2,7 @@
 
 use super::{ZemaxWriter, number, numbers, one_line};
 use crate::files::report::ConversionOutcome;
-use crate::files::zemax::glass as there;
+use crate::files::zemax::glass as zemax_glass;
 use crate::files::zemax::{SOURCE, ZOOM_NAME};
 use crate::lens::glass;
 use crate::lens::{Aperture, FieldKind, Medium, Object};
@@ -54,14 +54,14 @@ impl ZemaxWriter {
         self.line(text);
     }
 
-    /// The makers of the glasses, in order of appearance.
+    /// The manufacturers of the glasses, in order of appearance.
     fn catalogues(&mut self) {
         let mut makers: Vec<&str> = Vec::new();
         let rows = self.lens.surfaces.iter().map(|row| &row.medium);
         for medium in std::iter::once(&self.lens.object_medium).chain(rows) {
             let Medium::Glass(name) = medium else { continue };
-            // Materials without a maker are in the general catalogue of the other program.
-            let own = glass::find(name).filter(|glass| !there::is_general(glass));
+            // Materials without a manufacturer are in the general catalogue of the other program.
+            let own = glass::find(name).filter(|glass| !zemax_glass::is_general(glass));
             let maker = own.map_or("MISC", |glass| glass.manufacturer.as_str());
             if !makers.contains(&maker) {
                 makers.push(maker);

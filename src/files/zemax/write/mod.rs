@@ -175,9 +175,9 @@ impl ZemaxWriter {
         }
         for pickup in &lens.pickups {
             let like = pickup.parameter.quantity == pickup.source.quantity;
-            let there =
+            let is_supported =
                 matches!(pickup.parameter.quantity, Quantity::Curvature | Quantity::Thickness);
-            if !(like && there) {
+            if !(like && is_supported) {
                 let what = format!("pickup: {} from the {}", pickup.parameter, pickup.source);
                 self.record(
                     ConversionOutcome::Approximated,

@@ -2,7 +2,7 @@
 
 use super::{ZemaxWriter, number, numbers, one_line};
 use crate::files::report::ConversionOutcome;
-use crate::files::zemax::glass as there;
+use crate::files::zemax::glass as zemax_glass;
 use crate::files::zemax::gradient;
 use crate::lens::glass;
 use crate::lens::{
@@ -187,7 +187,7 @@ impl ZemaxWriter {
         let bare: String = glass.name.split_whitespace().collect();
         let values = numbers([glass.nd, glass.vd]);
         self.surface_line(format!("GLAS {bare} 0 0 {values} 0 0 0 0 0 0"));
-        if there::is_general(glass) {
+        if zemax_glass::is_general(glass) {
             let note = "a material without a maker: its data in the other program may differ";
             self.record(ConversionOutcome::Approximated, format!("glass {place}: {name}"), note);
         }
