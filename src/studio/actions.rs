@@ -61,7 +61,7 @@ impl Actions {
         self.0.extend(actions.into_iter().map(Into::into));
     }
 
-    /// All requests so far.
+    /// All requests in order.
     pub fn as_slice(&self) -> &[UiAction] {
         &self.0
     }

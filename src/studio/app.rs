@@ -125,7 +125,7 @@ impl Studio {
         }
     }
 
-    /// Asks for a path, starting from the one that is most likely meant.
+    /// Asks for a path, starting from the most likely one.
     pub(super) fn ask_path(&mut self, context: &Context, view: &SessionView, request: FileRequest) {
         self.file_dialog.ask(context, request, likely_path(view, request).as_deref());
     }

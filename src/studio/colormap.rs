@@ -1,4 +1,4 @@
-//! Colours for numbers: even steps of a number look like even steps of lightness.
+//! Colour maps: even steps of a number appear as even steps of lightness.
 
 use super::palette::to_byte;
 

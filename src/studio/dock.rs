@@ -26,12 +26,12 @@ impl std::fmt::Debug for Dock {
 
 impl Dock {
     /// All panels, arranged as they were left or as usual.
-    pub fn new(backing: RenderBackend, left: Option<Tree<PanelKind>>) -> Self {
+    pub fn new(backend: RenderBackend, left: Option<Tree<PanelKind>>) -> Self {
         let whole = |tree: &Tree<PanelKind>| {
             PanelKind::ALL.iter().all(|kind| tree.tiles.find_pane(kind).is_some())
         };
         let tree = left.filter(whole).unwrap_or_else(default_arrangement);
-        Self { tree, panels: PanelKind::ALL.map(|kind| (kind, kind.panel(backing))).into() }
+        Self { tree, panels: PanelKind::ALL.map(|kind| (kind, kind.panel(backend))).into() }
     }
 
     /// The arrangement of the panels.

@@ -1,5 +1,5 @@
-//! The window of an experiment: how far it is, then what the figure claims with its numbers, its
-//! pictures, and a button to keep them.
+//! The window of an experiment: its progress, then its claims with their numbers, its pictures, and
+//! a button to save them.
 
 use egui::{
     Align, Button, ColorImage, Context, Grid, Id, Image, Layout, ProgressBar, RichText, ScrollArea,
@@ -51,7 +51,7 @@ fn duration_text(study: &Experiment) -> String {
 }
 
 impl ExperimentWindow {
-    /// Shows an experiment, where there is one.
+    /// Shows the experiment, if there is one.
     pub(super) fn ui(
         &mut self,
         context: &Context,
@@ -186,7 +186,7 @@ fn value_text(claim: &Claim) -> String {
     format!("{}{error} {}", short(claim.value), claim.unit)
 }
 
-/// A number with few digits, whatever its size.
+/// A number with few digits, at any magnitude.
 fn short(value: f64) -> String {
     let size = value.abs();
     if size > 0.0 && !(1e-3..1e6).contains(&size) {

@@ -1,5 +1,5 @@
-//! Asking for a file: the desktop's own dialog in a thread of its own, so that the window goes on
-//! meanwhile, or a line to type a path into where the desktop has no dialog.
+//! File dialogs: the desktop's own, in a thread of its own so that the window stays responsive, or
+//! a text field for a path if the desktop has no dialog.
 
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
@@ -22,15 +22,15 @@ pub enum FileRequest {
     ExportFront,
     /// To write the data and pictures of an experiment into it.
     ExperimentFolder,
-    /// To go on with a search over structure.
+    /// To resume a search over structure.
     OpenSearch,
     /// To save a search over structure to it.
     SaveSearch,
     /// To write the lens of a generation of a search.
     ExportSearchLens(u64),
-    /// To read a task or a volume from it, and look at the gradient-index field.
+    /// To read a task or a volume of a gradient-index field.
     OpenField,
-    /// To write the gradient-index field, with so many nodes along a side.
+    /// To write the gradient-index field, with this number of nodes along a side.
     SaveField(usize),
 }
 

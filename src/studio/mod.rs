@@ -4,6 +4,7 @@
 
 mod actions;
 mod app;
+mod cached;
 pub mod colormap;
 pub mod dock;
 pub mod draw;
@@ -33,19 +34,19 @@ use crate::files;
 use crate::lens::{Lens, blank};
 use crate::session::{Command, Session};
 
-/// Opens the studio on a file, or on the first lens that comes with the program, and stays until
+/// Opens the studio on a file, or on the first lens that comes with the program, and returns once
 /// the window is closed.
 ///
 /// # Errors
-/// Where no window can open: see [`StudioError`]. A file that cannot be read is said in the window.
+/// No window can open: see [`StudioError`]. A file that cannot be read is reported in the window.
 pub fn run(path: Option<&Path>) -> Result<(), StudioError> {
-    window::open_window(Persistence::Enabled, |context, backing| {
+    window::open_window(Persistence::Enabled, |context, backend| {
         let wake = context.egui_ctx.clone();
         let mut session = Session::new(first_lens(), move || wake.request_repaint())?;
         if let Some(folder) = eframe::storage_dir("aplanat") {
             session.set_save_folder(folder.join("searches"));
         }
-        let mut studio = Studio::new(session, backing, Persistence::Enabled, context.storage);
+        let mut studio = Studio::new(session, backend, Persistence::Enabled, context.storage);
         if let Some(path) = path {
             studio.apply(&context.egui_ctx, Command::Open(path.to_owned()));
         }

@@ -2,7 +2,7 @@
 
 /// The digits of a number in a cell; the value itself keeps all of them.
 const DIGITS: i32 = 7;
-/// Most digits of a number that stands among others close to it.
+/// The largest number of digits of a number that is shown among others close to it.
 const MAX_DIGITS: i32 = 10;
 
 /// A number with seven digits, without trailing zeros.

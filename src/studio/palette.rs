@@ -1,11 +1,11 @@
-//! The colours of drawings: legible on dark and on light, and told apart by colour-blind eyes.
+//! The colours of drawings: legible on dark and on light, and distinguishable for the colour-blind.
 
 use egui::Color32;
 
 use super::draw::Rgba;
 
-/// Colours of fields in their order: blue, green, red, then what is left of the set of Okabe and
-/// Ito (2008), which people with every kind of colour blindness can tell apart.
+/// Colours of fields in their order: blue, green, red, then the rest of the set of Okabe and Ito
+/// (2008), which people with every kind of colour blindness can distinguish.
 const FIELDS_DARK: [[u8; 3]; 7] = [
     [86, 180, 233],
     [0, 190, 130],
@@ -25,9 +25,9 @@ const FIELDS_LIGHT: [[u8; 3]; 7] = [
     [90, 90, 90],
 ];
 
-/// Colours of what limits a pupil, in the order in which limits turn up: after the bright set of
-/// Paul Tol (2021), told apart by people with every kind of colour blindness. None stands for a
-/// field.
+/// Colours of the limits of a pupil, in the order in which limits appear: after the bright set of
+/// Paul Tol (2021), distinguishable for people with every kind of colour blindness. None is the
+/// colour of a field.
 const LIMITS_DARK: [[u8; 3]; 8] = [
     [238, 119, 51],
     [51, 187, 238],
@@ -118,7 +118,7 @@ impl Palette {
         [r, g, b, 255]
     }
 
-    /// The colour of what limits a pupil, by the order in which limits have turned up.
+    /// The colour of a limit of a pupil, by the order in which limits appear.
     pub fn limit(&self, index: usize) -> Rgba {
         let set = if self.dark { LIMITS_DARK } else { LIMITS_LIGHT };
         let [r, g, b] = set[index % set.len()];

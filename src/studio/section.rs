@@ -1,8 +1,8 @@
 //! The section of a lens in the y-z plane: glass with joined edges, the stop as ticks, mirrors,
 //! axis.
 //!
-//! An element reaches to the larger of its two semi-diameters; the smaller surface goes on flat,
-//! as lenses are ground. A surface without a semi-diameter is drawn as far as its rays go.
+//! An element extends to the larger of its two semi-diameters; the smaller surface continues flat,
+//! as lenses are ground. A surface without a semi-diameter is drawn up to its outermost rays.
 
 use glam::DVec2;
 
@@ -23,7 +23,8 @@ pub struct LensSection<'a> {
 }
 
 impl<'a> LensSection<'a> {
-    /// The section of a system. `reached` says how far from the axis rays meet each surface.
+    /// The section of a system. `reached` holds the largest height of the rays at each surface, in
+    /// mm.
     pub fn new(system: &'a System<f64>, reached: &[f64]) -> Self {
         Self { system, vertices: system.vertex_positions(), heights: heights(system, reached) }
     }
@@ -40,14 +41,13 @@ impl<'a> LensSection<'a> {
     pub fn draw_glass(&self, scene: &mut Scene, palette: &Palette, fresh: &[usize]) {
         for (left, medium) in self.elements() {
             let height = self.heights[left].max(self.heights[left + 1]);
-            let mut colour =
-                if fresh.contains(&left) { palette.added_glass } else { palette.glass };
-            colour[3] = glass_alpha(colour[3], medium);
-            scene.strip(&self.curve(left, height), &self.curve(left + 1, height), colour);
+            let mut color = if fresh.contains(&left) { palette.added_glass } else { palette.glass };
+            color[3] = glass_alpha(color[3], medium);
+            scene.strip(&self.curve(left, height), &self.curve(left + 1, height), color);
         }
     }
 
-    /// Draws what lies above the rays: rims, mirrors, stop and axis.
+    /// Draws the outlines above the rays: rims, mirrors, stop and axis.
     pub fn draw_outlines(&self, scene: &mut Scene, palette: &Palette) {
         self.draw_axis(scene, palette);
         for (left, _) in self.elements() {
@@ -80,9 +80,9 @@ impl<'a> LensSection<'a> {
     }
 
     /// Draws the rims alone, in one colour: a lens to compare with.
-    pub fn draw_ghost(&self, scene: &mut Scene, colour: Rgba) {
+    pub fn draw_ghost(&self, scene: &mut Scene, color: Rgba) {
         for (left, _) in self.elements() {
-            scene.outline(&self.rim(left), 1.0, colour);
+            scene.outline(&self.rim(left), 1.0, color);
         }
     }
 

@@ -1,7 +1,7 @@
-//! A line to type into that loses nothing: what is typed stays until it is accepted or given up.
+//! A one-line text field whose text is kept until it is accepted or discarded.
 //!
-//! Enter, Tab and a click elsewhere end the typing, Escape gives it up. A text that was refused
-//! stays where it was typed, marked, with the reason beside it.
+//! Enter, Tab and a click elsewhere end the editing, Escape discards it. A rejected text remains in
+//! its field, marked, with the reason as a tooltip.
 
 use egui::text::{CCursor, CCursorRange};
 use egui::text_edit::TextEditState;
@@ -37,7 +37,7 @@ pub struct TextInput<'a> {
     pub value: &'a str,
     /// The hint in an empty field.
     pub hint: &'a str,
-    /// Numbers stand at the right.
+    /// The alignment: numbers to the right.
     pub align: Align,
     /// The frame of the field.
     pub placement: InputPlacement,
@@ -48,7 +48,7 @@ pub struct TextInput<'a> {
 pub enum InputPlacement {
     /// In a table, whose lines are frame enough.
     Table,
-    /// By itself, with a frame that says where one can type.
+    /// A form, in which every field has a frame of its own.
     Form,
 }
 
@@ -81,7 +81,7 @@ impl EditBuffers {
         InputResponse { response, submitted: typed }
     }
 
-    /// Says why what was typed into a field cannot be taken; it stays there.
+    /// Marks the text of a field as rejected, for a reason.
     pub fn reject(&mut self, field: Id, why: String) {
         if let Some(draft) = self.buffers.iter_mut().find(|draft| draft.input == field) {
             draft.error = Some(why);
@@ -144,7 +144,7 @@ impl EditBuffers {
         Some(draft.text.clone())
     }
 
-    /// A refused text goes once the value below it changes, by undo for example.
+    /// Discards a rejected text once the value below it changes, by undo for example.
     fn discard_stale(&mut self, ui: &Ui, field: Id, shown: &str) {
         if !ui.memory(|memory| memory.has_focus(field)) {
             self.buffers.retain(|draft| draft.input != field || draft.original == shown);
@@ -169,7 +169,7 @@ impl EditBuffers {
     }
 }
 
-/// The colour of what was refused.
+/// The colour of rejected texts and errors.
 pub fn error_color(ui: &Ui) -> Color32 {
     ui.visuals().error_fg_color
 }

@@ -1,4 +1,4 @@
-//! The question before something is lost that is in no file: the lens, or the field that was formed.
+//! The question before unsaved changes are discarded: of the lens, or of the optimized field.
 
 use super::app::Studio;
 use super::file_dialog::FileRequest;
@@ -54,12 +54,12 @@ enum UnsavedAnswer {
 
 impl Studio {
     /// True if the action would discard unsaved changes.
-    pub(super) fn would_discard(&self, then: &PendingAction) -> bool {
-        then.discards().iter().any(|lost| self.is_unsaved(*lost))
+    pub(super) fn would_discard(&self, action: &PendingAction) -> bool {
+        action.discards().iter().any(|document| self.is_unsaved(*document))
     }
 
-    fn is_unsaved(&self, lost: UnsavedDocument) -> bool {
-        match lost {
+    fn is_unsaved(&self, document: UnsavedDocument) -> bool {
+        match document {
             UnsavedDocument::Lens => self.session.is_dirty(),
             UnsavedDocument::Field => {
                 self.session.view().grin.run.snapshot.is_some_and(|run| run.is_unsaved())
@@ -67,21 +67,22 @@ impl Studio {
         }
     }
 
-    /// Does something, at once or after a question for each thing that would be lost, those up to the
-    /// one that was answered apart.
+    /// Runs an action, at once or after a question for each document with unsaved changes that it
+    /// would discard, except those up to the one that is already answered.
     pub(super) fn run_or_ask(
         &mut self,
         context: &Context,
-        then: PendingAction,
+        action: PendingAction,
         answered: Option<UnsavedDocument>,
     ) {
-        let losses = then.discards();
-        let done = losses.iter().position(|lost| Some(*lost) == answered).map_or(0, |i| i + 1);
-        if let Some(lost) = losses[done..].iter().find(|lost| self.is_unsaved(**lost)) {
-            self.pending = Some(PendingState::Asking(*lost, then));
+        let losses = action.discards();
+        let done =
+            losses.iter().position(|document| Some(*document) == answered).map_or(0, |i| i + 1);
+        if let Some(document) = losses[done..].iter().find(|document| self.is_unsaved(**document)) {
+            self.pending = Some(PendingState::Asking(*document, action));
             return context.request_repaint();
         }
-        match then {
+        match action {
             PendingAction::Run(command) => self.apply(context, command),
             PendingAction::Quit => {
                 self.closing = true;
@@ -94,11 +95,15 @@ impl Studio {
     pub(super) fn unsaved_dialog(&mut self, context: &Context, view: &SessionView) {
         match self.pending.take() {
             None => {}
-            Some(PendingState::Saving(lost, then)) => self.continue_when_saved(context, lost, then),
-            Some(PendingState::Asking(lost, then)) => {
-                match ask_about_unsaved(context, view, lost) {
-                    None => self.pending = Some(PendingState::Asking(lost, then)),
-                    Some(answer) => self.on_unsaved_answer(context, view, (lost, then), answer),
+            Some(PendingState::Saving(document, action)) => {
+                self.continue_when_saved(context, document, action)
+            }
+            Some(PendingState::Asking(document, action)) => {
+                match ask_about_unsaved(context, view, document) {
+                    None => self.pending = Some(PendingState::Asking(document, action)),
+                    Some(answer) => {
+                        self.on_unsaved_answer(context, view, (document, action), answer)
+                    }
                 }
             }
         }
@@ -108,22 +113,22 @@ impl Studio {
         &mut self,
         context: &Context,
         view: &SessionView,
-        (lost, then): (UnsavedDocument, PendingAction),
+        (document, action): (UnsavedDocument, PendingAction),
         answer: UnsavedAnswer,
     ) {
         context.request_repaint();
         match answer {
             UnsavedAnswer::Cancel => {}
-            UnsavedAnswer::Discard => self.run_or_ask(context, then, Some(lost)),
+            UnsavedAnswer::Discard => self.run_or_ask(context, action, Some(document)),
             UnsavedAnswer::Save => {
-                self.pending = Some(PendingState::Saving(lost, then));
-                self.save_document(context, view, lost);
+                self.pending = Some(PendingState::Saving(document, action));
+                self.save_document(context, view, document);
             }
         }
     }
 
-    fn save_document(&mut self, context: &Context, view: &SessionView, lost: UnsavedDocument) {
-        match lost {
+    fn save_document(&mut self, context: &Context, view: &SessionView, document: UnsavedDocument) {
+        match document {
             UnsavedDocument::Lens if view.path.is_some() => {
                 self.apply(context, Command::Save(None))
             }
@@ -138,18 +143,18 @@ impl Studio {
         }
     }
 
-    /// Goes on once it is saved; gives up where no file was chosen or it could not be saved.
+    /// Continues once the document is saved; gives up if no file was chosen or writing failed.
     fn continue_when_saved(
         &mut self,
         context: &Context,
-        lost: UnsavedDocument,
-        then: PendingAction,
+        document: UnsavedDocument,
+        action: PendingAction,
     ) {
-        let is_writing = lost == UnsavedDocument::Field && self.session.view().grin.writing;
-        if !self.is_unsaved(lost) {
-            self.run_or_ask(context, then, Some(lost));
+        let is_writing = document == UnsavedDocument::Field && self.session.view().grin.writing;
+        if !self.is_unsaved(document) {
+            self.run_or_ask(context, action, Some(document));
         } else if self.file_dialog.is_open() || is_writing {
-            self.pending = Some(PendingState::Saving(lost, then));
+            self.pending = Some(PendingState::Saving(document, action));
         }
     }
 }
@@ -157,9 +162,9 @@ impl Studio {
 fn ask_about_unsaved(
     context: &Context,
     view: &SessionView,
-    lost: UnsavedDocument,
+    document: UnsavedDocument,
 ) -> Option<UnsavedAnswer> {
-    let (heading, text) = match lost {
+    let (heading, text) = match document {
         UnsavedDocument::Lens => {
             let name = &view.lens.name;
             ("Save the changes first?", format!("{name} has unsaved changes."))

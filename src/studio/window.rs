@@ -55,8 +55,8 @@ pub enum Persistence {
 /// The content of a window, or an error.
 pub type AppResult = Result<Box<dyn App>, Box<dyn std::error::Error + Send + Sync>>;
 
-/// Opens a window and stays until it is closed. `start` makes what the window shows; it may be
-/// called a second time when the first renderer fails.
+/// Opens a window and returns once it is closed. `start` makes its content; it may be called a
+/// second time when the first renderer fails.
 pub fn open_window(
     memory: Persistence,
     start: impl Fn(&CreationContext<'_>, RenderBackend) -> AppResult,
@@ -86,7 +86,7 @@ impl From<eframe::Error> for StudioError {
     }
 }
 
-/// A library's message without the place in its source and without what it left unfilled.
+/// A library's message without the place in its source and without unfilled placeholders.
 fn without_source_location(message: &str) -> String {
     let after_place = message.split_once(".rs:").and_then(|(_, rest)| rest.split_once(": "));
     after_place.map_or(message, |(_, rest)| rest).trim_end_matches(": {}").to_owned()
@@ -98,7 +98,7 @@ fn open_with(
     start: &impl Fn(&CreationContext<'_>, RenderBackend) -> AppResult,
 ) -> eframe::Result {
     let create = |context: &CreationContext<'_>| {
-        let backing = match &context.wgpu_render_state {
+        let backend = match &context.wgpu_render_state {
             Some(state) => {
                 report_errors(state);
                 install_gpu_cache(state);
@@ -107,7 +107,7 @@ fn open_with(
             None => RenderBackend::Software,
         };
         theme::apply(&context.egui_ctx);
-        start(context, backing)
+        start(context, backend)
     };
     eframe::run_native("Aplanat", options(renderer, memory), Box::new(create))
 }
@@ -142,7 +142,7 @@ fn wgpu_setup() -> WgpuSetup {
     WgpuSetup::CreateNew(setup)
 }
 
-/// Logs what goes wrong on the graphics card, which would otherwise end the program.
+/// Logs errors of the graphics card, which would otherwise end the program.
 fn report_errors(state: &RenderState) {
     state.device.on_uncaptured_error(Arc::new(|error| log::error!("graphics card: {error}")));
     state.device.set_device_lost_callback(|reason, message| {

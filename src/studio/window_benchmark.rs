@@ -56,8 +56,8 @@ pub struct WindowMetrics {
 pub fn measure_window() -> Result<WindowMetrics, StudioError> {
     let figures = Arc::new(Mutex::new(WindowMetrics::default()));
     let shared = Arc::clone(&figures);
-    window::open_window(Persistence::Disabled, move |context, backing| {
-        start_benchmark(context, backing, &shared)
+    window::open_window(Persistence::Disabled, move |context, backend| {
+        start_benchmark(context, backend, &shared)
     })?;
     let found = figures.lock().unwrap_or_else(PoisonError::into_inner).clone();
     Ok(found)
@@ -65,12 +65,12 @@ pub fn measure_window() -> Result<WindowMetrics, StudioError> {
 
 fn start_benchmark(
     context: &CreationContext<'_>,
-    backing: RenderBackend,
+    backend: RenderBackend,
     figures: &Arc<Mutex<WindowMetrics>>,
 ) -> AppResult {
     let wake = context.egui_ctx.clone();
     let session = Session::new(first_lens(), move || wake.request_repaint())?;
-    let mut studio = Studio::new(session, backing, Persistence::Disabled, None);
+    let mut studio = Studio::new(session, backend, Persistence::Disabled, None);
     studio.close_without_asking();
     let renderer = context.wgpu_render_state.as_ref().map_or_else(
         || "OpenGL".to_owned(),
@@ -98,13 +98,13 @@ enum BenchmarkPhase {
     Opening,
     /// It is being drawn.
     FirstDrawing,
-    /// So many frames until the drawings are there.
+    /// The number of frames until the drawings are complete.
     Settling(usize),
-    /// So many frames are still to be repainted; the processor time when that began.
+    /// The number of frames still to be repainted; the processor time at the first one.
     Repainting(usize, Option<f64>),
-    /// So many frames until the window is left alone.
+    /// The number of frames until the window is left idle.
     SettlingIdle(usize),
-    /// Another thread looks on.
+    /// Another thread measures the idle window.
     Idle,
 }
 
@@ -121,7 +121,7 @@ impl App for WindowBenchmark {
 }
 
 impl WindowBenchmark {
-    /// Does what belongs to this frame and tells what comes next.
+    /// Does the work of this frame and returns the next phase.
     fn advance(&mut self, context: &Context) -> BenchmarkPhase {
         if !matches!(self.phase, BenchmarkPhase::Idle) {
             context.request_repaint();
@@ -193,7 +193,7 @@ impl WindowBenchmark {
         ms
     }
 
-    /// Leaves the window alone, looks at the processor time meanwhile, and closes it.
+    /// Leaves the window idle, measures its processor time meanwhile, and closes it.
     fn measure_idle(&self, context: &Context) {
         let (figures, window) = (Arc::clone(&self.metrics), context.clone());
         let look = move || {

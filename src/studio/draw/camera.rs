@@ -18,7 +18,7 @@ pub struct BoundingBox {
 }
 
 impl BoundingBox {
-    /// The box around all finite points; none where there is none.
+    /// The bounding box of all finite points; `None` without any.
     pub fn around(points: impl IntoIterator<Item = DVec2>) -> Option<Self> {
         let mut finite = points.into_iter().filter(|point| point.is_finite());
         let first = finite.next()?;

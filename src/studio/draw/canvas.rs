@@ -18,37 +18,29 @@ use wgpu::{
 };
 
 use super::{Camera, Scene, gpu, software};
+use crate::studio::cached::{ByAddress, Cached};
 
 /// The renderer of the scenes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RenderBackend {
-    /// The graphics card, or software that stands in for one.
+    /// The graphics card, or a software adapter in its place.
     Gpu,
     /// The processor, where the window has come up without wgpu.
     Software,
 }
 
-/// All on which a drawn picture depends.
-#[derive(Clone, Debug)]
+/// The key of a drawn scene.
+#[derive(Clone, Debug, PartialEq)]
 struct CanvasKey {
-    scene: Arc<Scene>,
+    scene: ByAddress<Scene>,
     camera: Camera,
     size: [u32; 2],
-}
-
-impl PartialEq for CanvasKey {
-    /// The scene is compared by its address, which cannot be another's while the key holds it.
-    fn eq(&self, other: &Self) -> bool {
-        Arc::ptr_eq(&self.scene, &other.scene)
-            && self.camera == other.camera
-            && self.size == other.size
-    }
 }
 
 /// A place in the window that shows a scene.
 pub struct SceneCanvas {
     name: &'static str,
-    texture: Option<(CanvasKey, TextureHandle)>,
+    texture: Cached<CanvasKey, TextureHandle>,
 }
 
 impl std::fmt::Debug for SceneCanvas {
@@ -60,7 +52,7 @@ impl std::fmt::Debug for SceneCanvas {
 impl SceneCanvas {
     /// A canvas; no two of one window share a name.
     pub const fn new(name: &'static str) -> Self {
-        Self { name, texture: None }
+        Self { name, texture: Cached::new() }
     }
 
     /// Shows a scene in a part of the window. The camera counts the window's real pixels.
@@ -68,7 +60,7 @@ impl SceneCanvas {
         &mut self,
         ui: &Ui,
         rect: Rect,
-        backing: RenderBackend,
+        backend: RenderBackend,
         scene: &Arc<Scene>,
         camera: Camera,
     ) {
@@ -78,8 +70,8 @@ impl SceneCanvas {
         if size.contains(&0) {
             return;
         }
-        let key = CanvasKey { scene: Arc::clone(scene), camera, size };
-        match backing {
+        let key = CanvasKey { scene: scene.into(), camera, size };
+        match backend {
             RenderBackend::Gpu => {
                 let callback =
                     Callback::new_paint_callback(rect, SceneCallback { name: self.name, key });
@@ -90,17 +82,14 @@ impl SceneCanvas {
     }
 
     fn show_texture(&mut self, ui: &Ui, rect: Rect, key: CanvasKey) {
-        if self.texture.as_ref().is_none_or(|(drawn, _)| *drawn != key) {
+        let texture = self.texture.get(key, |key| {
             let picture = software::draw(&key.scene, key.camera, key.size);
             let size = key.size.map(|n| n as usize);
             let image = ColorImage::from_rgba_premultiplied(size, &picture.rgba);
-            let texture = ui.ctx().load_texture(self.name, image, TextureOptions::NEAREST);
-            self.texture = Some((key, texture));
-        }
-        if let Some((_, texture)) = &self.texture {
-            let all = Rect::from_min_max(Pos2::ZERO, egui::pos2(1.0, 1.0));
-            ui.painter().image(texture.id(), rect, all, egui::Color32::WHITE);
-        }
+            ui.ctx().load_texture(self.name, image, TextureOptions::NEAREST)
+        });
+        let all = Rect::from_min_max(Pos2::ZERO, egui::pos2(1.0, 1.0));
+        ui.painter().image(texture.id(), rect, all, egui::Color32::WHITE);
     }
 }
 
@@ -125,8 +114,8 @@ impl CallbackTrait for SceneCallback {
         encoder: &mut CommandEncoder,
         resources: &mut CallbackResources,
     ) -> Vec<CommandBuffer> {
-        if let Some(easel) = resources.get_mut::<GpuCache>() {
-            easel.refresh(device, encoder, self);
+        if let Some(cache) = resources.get_mut::<GpuCache>() {
+            cache.refresh(device, encoder, self);
         }
         Vec::new()
     }
@@ -137,8 +126,8 @@ impl CallbackTrait for SceneCallback {
         pass: &mut RenderPass<'static>,
         resources: &CallbackResources,
     ) {
-        if let Some(easel) = resources.get::<GpuCache>() {
-            easel.show(pass, self.name);
+        if let Some(cache) = resources.get::<GpuCache>() {
+            cache.show(pass, self.name);
         }
     }
 }
@@ -152,31 +141,31 @@ struct GpuCache {
 
 /// Lets the canvases of a window use its graphics card.
 pub fn install_gpu_cache(state: &RenderState) {
-    let easel = GpuCache {
+    let cache = GpuCache {
         renderer: gpu::SceneRenderer::new(&state.device),
         pipeline: show_pipeline(&state.device, state.target_format),
         textures: HashMap::new(),
     };
-    state.renderer.write().callback_resources.insert(easel);
+    state.renderer.write().callback_resources.insert(cache);
 }
 
 impl GpuCache {
-    fn refresh(&mut self, device: &Device, encoder: &mut CommandEncoder, wish: &SceneCallback) {
-        if self.textures.get(wish.name).is_some_and(|(key, _)| *key == wish.key) {
+    fn refresh(&mut self, device: &Device, encoder: &mut CommandEncoder, callback: &SceneCallback) {
+        if self.textures.get(callback.name).is_some_and(|(key, _)| *key == callback.key) {
             return;
         }
-        let CanvasKey { scene, camera, size } = &wish.key;
+        let CanvasKey { scene, camera, size } = &callback.key;
         let texture = self.renderer.draw(device, encoder, scene, *camera, *size);
         let view = texture.create_view(&TextureViewDescriptor::default());
         let group = device.create_bind_group(&BindGroupDescriptor {
-            label: Some(wish.name),
+            label: Some(callback.name),
             layout: &self.pipeline.get_bind_group_layout(0),
             entries: &[BindGroupEntry {
                 binding: 0,
                 resource: BindingResource::TextureView(&view),
             }],
         });
-        self.textures.insert(wish.name, (wish.key.clone(), group));
+        self.textures.insert(callback.name, (callback.key.clone(), group));
     }
 
     fn show(&self, pass: &mut RenderPass<'static>, name: &str) {

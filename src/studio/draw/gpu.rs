@@ -23,7 +23,7 @@ use wgpu::{
 
 use super::{Camera, Rgba, RgbaImage, Scene, Segment, TriangleVertex};
 
-/// Drawings keep colours as a person picks them: blending happens on the stored values.
+/// Drawings keep colours as sRGB values: blending uses the stored values.
 pub const FORMAT: TextureFormat = TextureFormat::Rgba8Unorm;
 
 /// An error of drawing on the graphics card.
@@ -62,9 +62,9 @@ struct ViewUniform {
 
 impl ViewUniform {
     fn new(camera: Camera, size: [u32; 2]) -> Self {
-        let (centre, scale) = camera.to_f32();
+        let (center, scale) = camera.to_f32();
         let [width, height] = size.map(|n| n as f32);
-        Self { center: centre, size: Vec2::new(width, height), scale, padding: 0.0 }
+        Self { center, size: Vec2::new(width, height), scale, padding: 0.0 }
     }
 }
 
@@ -224,7 +224,7 @@ fn render_target(device: &Device, [width, height]: [u32; 2]) -> Texture {
     })
 }
 
-/// A buffer with some shapes and their number; none where there are none.
+/// A vertex buffer with the number of its elements; `None` without elements.
 fn vertex_buffer<T: Pod>(device: &Device, shapes: &[T]) -> Option<(Buffer, u32)> {
     let count = u32::try_from(shapes.len()).ok().filter(|&count| count > 0)?;
     let buffer = device.create_buffer_init(&BufferInitDescriptor {

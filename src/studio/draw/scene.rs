@@ -4,7 +4,7 @@ use glam::{DVec2, Vec2};
 
 use super::BoundingBox;
 
-/// Red, green, blue and alpha as a person picks them: sRGB, colour not multiplied by alpha.
+/// Red, green, blue and alpha: sRGB, colour not multiplied by alpha.
 pub type Rgba = [u8; 4];
 
 /// One corner of a filled triangle.
@@ -49,54 +49,54 @@ impl Scene {
     }
 
     /// One line from end to end.
-    pub fn line(&mut self, from: DVec2, to: DVec2, width: f32, colour: Rgba) {
+    pub fn line(&mut self, from: DVec2, to: DVec2, width: f32, color: Rgba) {
         let (from, to) = (from.as_vec2(), to.as_vec2());
         if from.is_finite() && to.is_finite() {
-            self.segments.push(Segment { from, to, width, color: colour });
+            self.segments.push(Segment { from, to, width, color });
         }
     }
 
     /// Lines from point to point; points in line with their neighbours need no joint.
-    pub fn polyline(&mut self, points: &[DVec2], width: f32, colour: Rgba) {
+    pub fn polyline(&mut self, points: &[DVec2], width: f32, color: Rgba) {
         let Some(&(mut start)) = points.first() else { return };
         for (i, &end) in points.iter().enumerate().skip(1) {
             let goes_on = points.get(i + 1).is_some_and(|&next| is_straight(start, end, next));
             if !goes_on && start != end {
-                self.line(start, end, width, colour);
+                self.line(start, end, width, color);
                 start = end;
             }
         }
     }
 
     /// Lines from point to point and back to the first.
-    pub fn outline(&mut self, points: &[DVec2], width: f32, colour: Rgba) {
-        self.polyline(points, width, colour);
+    pub fn outline(&mut self, points: &[DVec2], width: f32, color: Rgba) {
+        self.polyline(points, width, color);
         if let (Some(&last), Some(&first)) = (points.last(), points.first()) {
-            self.polyline(&[last, first], width, colour);
+            self.polyline(&[last, first], width, color);
         }
     }
 
     /// A round dot.
-    pub fn dot(&mut self, at: DVec2, diameter: f32, colour: Rgba) {
-        self.line(at, at, diameter, colour);
+    pub fn dot(&mut self, at: DVec2, diameter: f32, color: Rgba) {
+        self.line(at, at, diameter, color);
     }
 
     /// The area between two curves with the same number of points: a lens between its surfaces.
-    pub fn strip(&mut self, left: &[DVec2], right: &[DVec2], colour: Rgba) {
+    pub fn strip(&mut self, left: &[DVec2], right: &[DVec2], color: Rgba) {
         for (l, r) in left.windows(2).zip(right.windows(2)) {
-            self.triangle([l[0], r[0], l[1]], colour);
-            self.triangle([l[1], r[0], r[1]], colour);
+            self.triangle([l[0], r[0], l[1]], color);
+            self.triangle([l[1], r[0], r[1]], color);
         }
     }
 
-    fn triangle(&mut self, corners: [DVec2; 3], colour: Rgba) {
-        let corners = corners.map(|at| TriangleVertex { position: at.as_vec2(), color: colour });
+    fn triangle(&mut self, corners: [DVec2; 3], color: Rgba) {
+        let corners = corners.map(|at| TriangleVertex { position: at.as_vec2(), color });
         if corners.iter().all(|corner| corner.position.is_finite()) {
             self.vertices.extend(corners);
         }
     }
 
-    /// The smallest upright box around everything; none where nothing is drawn.
+    /// The bounding box of everything; `None` for an empty scene.
     pub fn bounds(&self) -> Option<BoundingBox> {
         let corners = self.vertices.iter().map(|corner| corner.position);
         let ends = self.segments.iter().flat_map(|segment| [segment.from, segment.to]);

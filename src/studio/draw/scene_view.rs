@@ -1,5 +1,5 @@
-//! A scene to look around in: drag to move, wheel to zoom, double click or *Fit* to see it all,
-//! and a scale bar.
+//! A scene that can be navigated: drag to move, wheel to zoom, double click or *Fit* to see it all,
+//! with a scale bar.
 
 use std::sync::Arc;
 
@@ -12,12 +12,12 @@ use super::{BoundingBox, Camera, RenderBackend, Scene, SceneCanvas, round_length
 
 /// Free room around a fitted scene.
 const MARGIN: f64 = 24.0; // points
-/// The scale bar is at most this share of the width, and at most so long.
+/// The largest length of the scale bar: a share of the width, and a number of points.
 const BAR: (f32, f32) = (0.25, 160.0); // share, points
 /// The magnification for one notch of the wheel.
 const NOTCH: f64 = 1.2;
 
-/// A part of a panel that shows a scene; it remembers where one looks.
+/// A navigable scene in a panel; it keeps its camera.
 #[derive(Debug)]
 pub struct SceneView {
     canvas: SceneCanvas,
@@ -36,24 +36,24 @@ impl SceneView {
         self.user_camera = None;
     }
 
-    /// Shows a scene in all the room that is left. `whole` is what *fit* shows.
+    /// Shows a scene in all the room that is left. `whole` is the extent that *Fit* shows.
     pub fn show(
         &mut self,
         ui: &mut Ui,
-        backing: RenderBackend,
+        backend: RenderBackend,
         scene: &Arc<Scene>,
         whole: BoundingBox,
         label: &str,
     ) -> SceneResponse {
-        self.show_over(ui, backing, (scene, whole), label, |_, _| {})
+        self.show_over(ui, backend, (scene, whole), label, |_, _| {})
     }
 
-    /// The same over something else: `below` paints what lies under the scene, which then has no
-    /// background of its own.
+    /// Shows a scene over something else: `below` paints under the scene, which has no background
+    /// of its own.
     pub fn show_over(
         &mut self,
         ui: &mut Ui,
-        backing: RenderBackend,
+        backend: RenderBackend,
         (scene, whole): (&Arc<Scene>, BoundingBox),
         label: &str,
         below: impl FnOnce(&Ui, &SceneResponse),
@@ -66,7 +66,7 @@ impl SceneView {
         let camera = self.navigate(ui, &response, fitted, size, per_point);
         let shown = SceneResponse { response, camera, per_point };
         below(ui, &shown);
-        self.canvas.show(ui, rect, backing, scene, camera);
+        self.canvas.show(ui, rect, backend, scene, camera);
         // The camera counts real pixels, the bar points.
         scale_bar(ui, rect, camera.scale / per_point);
         shown
@@ -155,7 +155,7 @@ fn zoom_factor(ui: &Ui) -> f64 {
     })
 }
 
-/// Draws a bar of a round length and says how long it is. `scale` is in points per mm.
+/// Draws a scale bar of a round length with its label. `scale` is in points per mm.
 fn scale_bar(ui: &Ui, rect: Rect, scale: f64) {
     let room = (BAR.0 * rect.width()).min(BAR.1);
     let length = round_length_below(f64::from(room) / scale);

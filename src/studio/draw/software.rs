@@ -18,14 +18,14 @@ const DOT: f32 = 1e-3; // px
 
 /// Draws a scene into a picture of `size` pixels.
 pub fn draw(scene: &Scene, camera: Camera, size: [u32; 2]) -> RgbaImage {
-    let mut paper = PixelBuffer::new(size, camera, scene.background);
+    let mut pixels = PixelBuffer::new(size, camera, scene.background);
     for corners in scene.vertices.chunks_exact(3) {
-        paper.triangle(corners);
+        pixels.triangle(corners);
     }
     for segment in &scene.segments {
-        paper.segment(segment);
+        pixels.segment(segment);
     }
-    paper.image
+    pixels.image
 }
 
 struct PixelBuffer {
@@ -36,19 +36,19 @@ struct PixelBuffer {
 impl PixelBuffer {
     fn new(size: [u32; 2], camera: Camera, background: Rgba) -> Self {
         let pixels = size[0] as usize * size[1] as usize;
-        let colour = to_bytes(premultiplied(background));
-        Self { image: RgbaImage { size, rgba: colour.repeat(pixels) }, camera }
+        let color = to_bytes(premultiplied(background));
+        Self { image: RgbaImage { size, rgba: color.repeat(pixels) }, camera }
     }
 
     fn triangle(&mut self, corners: &[TriangleVertex]) {
         let points = [corners[0].position, corners[1].position, corners[2].position]
             .map(|at| self.to_px(at));
-        let colour = premultiplied(corners[0].color);
+        let color = premultiplied(corners[0].color);
         let [a, b, c] = points;
         for row in self.rows(a.y.min(b.y).min(c.y), a.y.max(b.y).max(c.y)) {
             if let Some((from, to)) = triangle_span(points, row as f32 + 0.5) {
                 for column in self.columns(from, to) {
-                    self.blend(column, row, colour);
+                    self.blend(column, row, color);
                 }
             }
         }
@@ -57,21 +57,21 @@ impl PixelBuffer {
     fn segment(&mut self, segment: &Segment) {
         let (a, b) = (self.to_px(segment.from), self.to_px(segment.to));
         let half = 0.5 * segment.width;
-        let colour = premultiplied(segment.color);
+        let color = premultiplied(segment.color);
         for row in self.rows(a.y.min(b.y) - half - 1.0, a.y.max(b.y) + half + 1.0) {
             let y = row as f32 + 0.5;
             let (from, to) = segment_span(a, b, half, y);
             for column in self.columns(from, to) {
                 let pixel = Vec2::new(column as f32 + 0.5, y);
-                self.blend(column, row, colour * segment_coverage(pixel, a, b, half));
+                self.blend(column, row, color * segment_coverage(pixel, a, b, half));
             }
         }
     }
 
     fn to_px(&self, mm: Vec2) -> Vec2 {
-        let (centre, scale) = self.camera.to_f32();
+        let (center, scale) = self.camera.to_f32();
         let [width, height] = self.image.size.map(|n| n as f32);
-        let d = (mm - centre) * scale;
+        let d = (mm - center) * scale;
         Vec2::new(0.5 * width + d.x, 0.5 * height - d.y)
     }
 
@@ -155,14 +155,14 @@ fn overlap(x: f32, low: f32, high: f32) -> f32 {
     ((x + 0.5).min(high) - (x - 0.5).max(low)).max(0.0)
 }
 
-fn premultiplied(colour: Rgba) -> Vec4 {
-    let [red, green, blue, alpha] = colour.map(|byte| f32::from(byte) / 255.0);
+fn premultiplied(color: Rgba) -> Vec4 {
+    let [red, green, blue, alpha] = color.map(|byte| f32::from(byte) / 255.0);
     Vec4::new(red * alpha, green * alpha, blue * alpha, alpha)
 }
 
-fn to_bytes(colour: Vec4) -> [u8; 4] {
+fn to_bytes(color: Vec4) -> [u8; 4] {
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "clamped")]
-    colour.to_array().map(|x| (x.clamp(0.0, 1.0) * 255.0).round() as u8)
+    color.to_array().map(|x| (x.clamp(0.0, 1.0) * 255.0).round() as u8)
 }
 
 #[cfg(test)]

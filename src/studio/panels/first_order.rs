@@ -38,7 +38,7 @@ impl Panel for FirstOrderPanel {
     }
 }
 
-/// A name, a value with its unit, and what it means.
+/// A name, a value with its unit, and an explanation.
 struct DataLine(&'static str, String, &'static str);
 
 fn data(ui: &mut Ui, lens: &Lens, first: &FirstOrder<f64>) {
@@ -119,7 +119,7 @@ fn mm(value: Option<f64>) -> String {
     )
 }
 
-/// The columns of the sums and what they stand for.
+/// The columns of the sums with their explanations.
 const SUMS: [(&str, &str); 7] = [
     ("S1", "Spherical aberration"),
     ("S2", "Coma"),
@@ -178,7 +178,7 @@ fn numbers(ui: &mut Ui, sums: &SeidelSums<f64>, largest: &[f64; 7]) {
     ui.end_row();
 }
 
-/// At most five signs after the sign, so that columns stay narrow.
+/// A number with at most five characters besides its sign, so that columns stay narrow.
 fn fixed(value: f64) -> String {
     let size = value.abs();
     if size >= 1e5 || (size < 1e-3 && size > 0.0) {
@@ -190,7 +190,7 @@ fn fixed(value: f64) -> String {
     }
 }
 
-/// Red for what adds, blue for what takes away.
+/// The tint of a contribution: red for positive, blue for negative.
 fn tint(ui: &Ui, share: f64) -> Color32 {
     let color =
         if share > 0.0 { ui.visuals().error_fg_color } else { ui.visuals().hyperlink_color };

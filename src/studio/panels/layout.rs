@@ -1,7 +1,7 @@
 //! The lens in section, with its rays.
 //!
-//! While a search runs, its current lens is shown as it bends, over the outlines of the design; glass
-//! that the design does not have is tinted.
+//! While a search runs, its current lens is shown over the outlines of the design; glass that the
+//! design does not have is tinted.
 
 use std::sync::Arc;
 
@@ -15,6 +15,7 @@ use crate::lens::{System, added_glass};
 use crate::math::Vec3;
 use crate::session::{Analyses, AnalysisResults, Command, SessionView};
 use crate::studio::actions::Actions;
+use crate::studio::cached::{ByAddress, Cached};
 use crate::studio::draw::{BoundingBox, RenderBackend, Rgba, Scene, SceneResponse, SceneView};
 use crate::studio::number;
 use crate::studio::palette::{Palette, color32};
@@ -27,15 +28,14 @@ const NEAR: f64 = 6.0;
 /// The panel.
 #[derive(Debug)]
 pub struct LayoutPanel {
-    backing: RenderBackend,
+    backend: RenderBackend,
     scene_view: SceneView,
-    drawing: Option<LayoutDrawing>,
+    drawing: Cached<LayoutKey, Option<LayoutDrawing>>,
 }
 
-/// What is drawn, and from what it was.
+/// The scene of a lens, with what its legend and its tooltips need.
 #[derive(Debug)]
 struct LayoutDrawing {
-    source: LayoutKey,
     scene: Arc<Scene>,
     full_view: BoundingBox,
     system: System<f64>,
@@ -47,32 +47,20 @@ struct LayoutDrawing {
     added_glass: usize,
 }
 
-/// All on which a drawing depends.
-#[derive(Debug, Clone)]
+/// The key of a drawing.
+#[derive(Debug, PartialEq)]
 struct LayoutKey {
     /// The results that are drawn.
-    results: Arc<AnalysisResults>,
+    results: ByAddress<AnalysisResults>,
     /// The design, drawn faintly below the lens of a search.
-    reference: Option<Arc<AnalysisResults>>,
+    reference: Option<ByAddress<AnalysisResults>>,
     palette: Palette,
-}
-
-impl PartialEq for LayoutKey {
-    /// Results are compared by address, which cannot be another's while they are held.
-    fn eq(&self, other: &Self) -> bool {
-        let ghost = match (&self.reference, &other.reference) {
-            (Some(a), Some(b)) => Arc::ptr_eq(a, b),
-            (None, None) => true,
-            _ => false,
-        };
-        ghost && Arc::ptr_eq(&self.results, &other.results) && self.palette == other.palette
-    }
 }
 
 impl LayoutPanel {
     /// An empty panel.
-    pub const fn new(backing: RenderBackend) -> Self {
-        Self { backing, scene_view: SceneView::new("layout"), drawing: None }
+    pub const fn new(backend: RenderBackend) -> Self {
+        Self { backend, scene_view: SceneView::new("layout"), drawing: Cached::new() }
     }
 }
 
@@ -84,10 +72,12 @@ impl Panel for LayoutPanel {
     fn ui(&mut self, ui: &mut Ui, view: &SessionView, actions: &mut Actions) {
         self.refresh(ui, view);
         self.header(ui, view, actions);
-        let Some(drawing) = &self.drawing else { return show_missing_results(ui, view) };
+        let Some(Some(drawing)) = self.drawing.last() else {
+            return show_missing_results(ui, view);
+        };
         let label = format!("Section of {}", view.lens.name);
-        let shown =
-            self.scene_view.show(ui, self.backing, &drawing.scene, drawing.full_view, &label);
+        let (scene, full_view) = (&drawing.scene, drawing.full_view);
+        let shown = self.scene_view.show(ui, self.backend, scene, full_view, &label);
         let near = drawing.highlight_surface(ui, view, &shown);
         if shown.response.clicked() && near != view.selected {
             actions.push(Command::Select(near));
@@ -98,12 +88,13 @@ impl Panel for LayoutPanel {
 impl LayoutPanel {
     fn refresh(&mut self, ui: &Ui, view: &SessionView) {
         let Some(source) = LayoutKey::of(ui, view) else {
-            self.drawing = None;
-            return;
+            return self.drawing.clear();
         };
-        if self.drawing.as_ref().is_none_or(|drawing| drawing.source != source) {
-            self.drawing = LayoutDrawing::new(source);
-        }
+        self.drawing.get(source, LayoutDrawing::new);
+    }
+
+    fn drawing(&self) -> Option<&LayoutDrawing> {
+        self.drawing.last()?.as_ref()
     }
 
     fn header(&mut self, ui: &mut Ui, view: &SessionView, actions: &mut Actions) {
@@ -119,7 +110,7 @@ impl LayoutPanel {
         });
     }
 
-    /// The colours of the fields, and what became of the rays.
+    /// The colours of the fields, and the number of lost rays.
     fn legend(&self, ui: &mut Ui, view: &SessionView) {
         let palette = Palette::for_visuals(ui.visuals());
         let fields = view.lens.fields_at(view.settings.zoom);
@@ -129,7 +120,7 @@ impl LayoutPanel {
             ui.label(RichText::new(field_name(fields.kind, *field)).color(color));
             ui.add_space(4.0);
         }
-        let Some(drawing) = &self.drawing else { return };
+        let Some(drawing) = self.drawing() else { return };
         if let Some(text) = losses_text(drawing.fates) {
             let color = color32(palette.lost_ray);
             swatch(ui, color);
@@ -189,21 +180,25 @@ fn zoom_position(ui: &mut Ui, view: &SessionView, actions: &mut Actions) {
 
 impl LayoutKey {
     fn of(ui: &Ui, view: &SessionView) -> Option<Self> {
-        let shown = Arc::clone(displayed_results(view)?.0);
-        let ghost = view.results.clone().filter(|design| !Arc::ptr_eq(design, &shown));
-        Some(Self { results: shown, reference: ghost, palette: Palette::for_visuals(ui.visuals()) })
+        let shown = displayed_results(view)?.0;
+        let reference = view.results.as_ref().filter(|design| !Arc::ptr_eq(design, shown));
+        Some(Self {
+            results: shown.into(),
+            reference: reference.map(Into::into),
+            palette: Palette::for_visuals(ui.visuals()),
+        })
     }
 }
 
 impl LayoutDrawing {
-    fn new(source: LayoutKey) -> Option<Self> {
+    fn new(source: &LayoutKey) -> Option<Self> {
         let numbers = source.results.analyses.as_ref().ok()?;
         let (bench, layout) = (&numbers.bench.value, &numbers.layout.value);
         let palette = source.palette;
         let system = bench.channels[bench.primary].system.clone();
         let section = LensSection::new(&system, &layout.ray_heights);
         let mut scene = Scene::on(palette.background);
-        if let Some(Ok(design)) = source.reference.as_ref().map(|ghost| &ghost.analyses) {
+        if let Some(Ok(design)) = source.reference.as_ref().map(|reference| &reference.analyses) {
             draw_reference(&mut scene, design, &palette);
         }
         let fresh =
@@ -221,7 +216,6 @@ impl LayoutDrawing {
             fields_without_rays: layout.errors.clone(),
             added_glass: fresh.len(),
             system,
-            source,
         })
     }
 

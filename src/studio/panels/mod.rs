@@ -94,12 +94,12 @@ impl PanelKind {
     ];
 
     /// A new panel of this kind.
-    pub fn panel(self, backing: RenderBackend) -> Box<dyn Panel> {
+    pub fn panel(self, backend: RenderBackend) -> Box<dyn Panel> {
         match self {
-            Self::Layout => Box::new(LayoutPanel::new(backing)),
-            Self::Slice => Box::new(GrinPanel::new(backing)),
+            Self::Layout => Box::new(LayoutPanel::new(backend)),
+            Self::Slice => Box::new(GrinPanel::new(backend)),
             Self::Prescription => Box::new(PrescriptionPanel::default()),
-            Self::Spot => Box::new(SpotPanel::new(backing)),
+            Self::Spot => Box::new(SpotPanel::new(backend)),
             Self::Pupil => Box::new(PupilPanel::default()),
             Self::Optimizer => Box::new(OptimizerPanel::default()),
             Self::Pareto => Box::new(ParetoPanel::default()),
@@ -123,7 +123,7 @@ fn is_dark(view: &SessionView) -> bool {
     view.results.is_some() && design_results(view).is_none()
 }
 
-/// The results that drawings show: those of the search where there are any, else the design's.
+/// The results that drawings show: those of the previewed lens if there are any, else the design's.
 fn displayed_results(view: &SessionView) -> Option<(&Arc<AnalysisResults>, &Analyses)> {
     let results = view.preview_results.as_ref().or(view.results.as_ref())?;
     Some((results, results.analyses.as_ref().ok()?))
@@ -149,7 +149,7 @@ fn add_variables_edit(lens: &Lens, kinds: &[ParameterKind]) -> Edit {
     Edit::SetVariables(freed.variables)
 }
 
-/// The relative error of a number, as it stands behind it.
+/// The relative error of a number, as a suffix.
 fn relative_error(estimate: Estimate) -> String {
     let share = (estimate.error / estimate.value).abs();
     if !share.is_finite() {
@@ -161,7 +161,7 @@ fn relative_error(estimate: Estimate) -> String {
     }
 }
 
-/// Says why there are no numbers, where there are none.
+/// Shows why there are no results.
 fn show_missing_results(ui: &mut Ui, view: &SessionView) {
     let why = match view.results.as_deref().map(|results| &results.analyses) {
         Some(Err(why)) => capitalize(why),

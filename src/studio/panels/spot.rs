@@ -18,11 +18,12 @@ use crate::analysis::{Estimate, Spot};
 use crate::lens::Fields;
 use crate::session::{Analyses, AnalysisResults, Command, SessionView};
 use crate::studio::actions::Actions;
+use crate::studio::cached::{ByAddress, Cached};
 use crate::studio::draw::{Camera, RenderBackend, Scene, SceneCanvas};
 use crate::studio::number;
 use crate::studio::palette::{Palette, color32};
 
-/// The errors that can be asked for, and what they are called.
+/// The tolerances that can be chosen, with their names.
 const TOLERANCES: [(f64, &str); 3] = [(1e-2, "1 %"), (1e-3, "0.1 %"), (1e-6, "1e-6")];
 
 /// The field of a cell above, three lines of numbers below.
@@ -31,34 +32,24 @@ const WORDS: CellLayout = CellLayout { above: 20.0, below: 47.0 };
 /// The panel.
 #[derive(Debug)]
 pub struct SpotPanel {
-    backing: RenderBackend,
+    backend: RenderBackend,
     canvas: SceneCanvas,
-    drawing: Option<(SpotKey, Arc<Scene>)>,
+    scene: Cached<SpotKey, Arc<Scene>>,
 }
 
-/// All on which the drawn dots depend.
-#[derive(Debug)]
+/// The key of the drawn dots.
+#[derive(Debug, PartialEq)]
 struct SpotKey {
-    results: Arc<AnalysisResults>,
+    results: ByAddress<AnalysisResults>,
     cells: Vec<Rect>,
     palette: Palette,
     per_point: f32,
 }
 
-impl PartialEq for SpotKey {
-    /// Results are compared by address, which cannot be another's while they are held.
-    fn eq(&self, other: &Self) -> bool {
-        Arc::ptr_eq(&self.results, &other.results)
-            && self.cells == other.cells
-            && self.palette == other.palette
-            && self.per_point == other.per_point
-    }
-}
-
 impl SpotPanel {
     /// An empty panel.
-    pub const fn new(backing: RenderBackend) -> Self {
-        Self { backing, canvas: SceneCanvas::new("spots"), drawing: None }
+    pub const fn new(backend: RenderBackend) -> Self {
+        Self { backend, canvas: SceneCanvas::new("spots"), scene: Cached::new() }
     }
 }
 
@@ -97,16 +88,12 @@ impl SpotPanel {
         let palette = Palette::for_visuals(ui.visuals());
         let relative = |cell: &Rect| WORDS.picture(*cell).translate(-rect.min.to_vec2());
         let cells = cells.iter().map(relative).collect();
-        let source = SpotKey { results: Arc::clone(results), cells, palette, per_point };
-        if self.drawing.as_ref().is_none_or(|(drawn, _)| *drawn != source) {
-            let scene = Arc::new(scene(ui, &source, numbers));
-            self.drawing = Some((source, scene));
-        }
-        let Some((_, scene)) = &self.drawing else { return };
+        let source = SpotKey { results: results.into(), cells, palette, per_point };
+        let scene = self.scene.get(source, |key| Arc::new(scene(ui, key, numbers)));
         // The scene is in points from the upper left corner, y up.
-        let centre = DVec2::new(f64::from(rect.width()), -f64::from(rect.height())) / 2.0;
-        let camera = Camera { center: centre, scale: per_point.into() };
-        self.canvas.show(ui, rect, self.backing, scene, camera);
+        let center = DVec2::new(f64::from(rect.width()), -f64::from(rect.height())) / 2.0;
+        let camera = Camera { center, scale: per_point.into() };
+        self.canvas.show(ui, rect, self.backend, scene, camera);
     }
 }
 
@@ -143,7 +130,7 @@ fn tolerance(ui: &mut Ui, view: &SessionView, actions: &mut Actions) {
     }
 }
 
-/// Half of what the side of every picture shows, in mm.
+/// Half of the width of every spot drawing, in mm.
 fn half_width(numbers: &Analyses) -> f64 {
     let lit = numbers.spots.value.iter().filter_map(|spot| spot.as_ref().ok());
     let widest = lit.map(|spot| spot.radius.value).fold(0.0, f64::max);
@@ -157,10 +144,9 @@ fn scene(ui: &Ui, source: &SpotKey, numbers: &Analyses) -> Scene {
     let mut scene = Scene::on(background);
     let half = half_width(numbers);
     for (field, cell) in source.cells.iter().enumerate() {
-        let centre = DVec2::new(cell.center().x.into(), -f64::from(cell.center().y));
+        let center = DVec2::new(cell.center().x.into(), -f64::from(cell.center().y));
         let scale = 0.5 * f64::from(cell.width()) / half;
-        let frame =
-            SpotFrame { center: centre, half: 0.5 * f64::from(cell.width()), palette, scale };
+        let frame = SpotFrame { center, half: 0.5 * f64::from(cell.width()), palette, scale };
         frame.draw(&mut scene);
         if let Some(airy) = numbers.airy {
             frame.draw_airy(&mut scene, airy, source.per_point);

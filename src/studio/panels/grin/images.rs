@@ -1,6 +1,4 @@
-//! The images of all views that make one, each beside the picture that is wanted.
-
-use std::sync::Arc;
+//! The images of all views that make one, each beside its target.
 
 use egui::{
     Color32, ColorImage, Image as Shown, RichText, TextureHandle, TextureOptions, Ui, vec2,
@@ -9,20 +7,15 @@ use egui::{
 use super::text;
 use crate::grin_design::ViewImage;
 use crate::session::{GrinAnalysis, GrinRun, SessionView};
+use crate::studio::cached::{ByAddress, Cached};
 
-/// The images as the graphics card has them.
+/// The images as textures.
 #[derive(Default)]
 pub(super) struct ViewImages {
-    cached: Option<CachedImages>,
+    pairs: Cached<ByAddress<Result<GrinAnalysis, String>>, Vec<ImagePair>>,
 }
 
-/// What is drawn, and from what it was.
-struct CachedImages {
-    source: Arc<Result<GrinAnalysis, String>>,
-    pairs: Vec<ImagePair>,
-}
-
-/// A picture and what the light makes of it, of a view.
+/// The target image and the resulting image of a view.
 struct ImagePair {
     view: usize,
     textures: [TextureHandle; 2],
@@ -41,12 +34,8 @@ impl ViewImages {
             ui.weak("Tracing all views…");
             return;
         };
-        let Ok(sighting) = source.as_ref() else { return };
-        if !self.cached.as_ref().is_some_and(|old| Arc::ptr_eq(&old.source, source)) {
-            let pairs = image_pairs(ui, sighting);
-            self.cached = Some(CachedImages { source: Arc::clone(source), pairs });
-        }
-        let Some(CachedImages { pairs, .. }) = &self.cached else { return };
+        let Ok(analysis) = source.as_ref() else { return };
+        let pairs = self.pairs.get(source.into(), |_| image_pairs(ui, analysis));
         if pairs.is_empty() {
             ui.weak("No view of this task makes an image.");
             return;
@@ -54,7 +43,7 @@ impl ViewImages {
         for pair in pairs {
             let name = run.document.task.as_ref().and_then(|task| task.views.get(pair.view));
             let name = name.map_or("", |view| view.name.as_str());
-            ui.label(text::image_text(name, &sighting.views.value[pair.view]));
+            ui.label(text::image_text(name, &analysis.views.value[pair.view]));
             pair.ui(ui, name);
         }
     }
@@ -78,8 +67,8 @@ impl ImagePair {
     }
 }
 
-fn image_pairs(ui: &Ui, sighting: &GrinAnalysis) -> Vec<ImagePair> {
-    let views = sighting.views.value.iter().enumerate();
+fn image_pairs(ui: &Ui, analysis: &GrinAnalysis) -> Vec<ImagePair> {
+    let views = analysis.views.value.iter().enumerate();
     let images = views.filter_map(|(view, seen)| Some((view, seen.image.as_ref()?)));
     let pair = |(view, image): (usize, &ViewImage)| {
         // Both to one scale: the brightest of the picture is white.

@@ -18,11 +18,11 @@ const STRIP: f32 = 14.0;
 const MARKS: usize = 5;
 const PIECES: usize = 64;
 
-/// Contours, and what labels stand on: seen on every colour of a slice.
+/// Contours, and the background of labels: visible on every colour of a slice.
 pub(super) const CONTOUR: Rgba = [0, 0, 0, 120];
 pub(super) const LABEL_BACKGROUND: Color32 = Color32::from_black_alpha(150);
 
-/// Rays of views in their order, on dark and on light, and told apart by colour-blind eyes.
+/// Rays of views in their order, on dark and on light, distinguishable for the colour-blind.
 const BRIGHT_RAYS: [Rgba; 6] = [
     [255, 255, 255, 255],
     [255, 170, 60, 255],

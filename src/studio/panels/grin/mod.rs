@@ -31,8 +31,8 @@ const INTRODUCTION: &str = "Which field of refractive index bends light as a tas
     task and press Optimize: the slice shows the field and its rays while they improve. A volume \
     from a file can be inspected in the same way.";
 
-/// The width of the numbers beside the picture; with less room than the second number they stand
-/// below it, and with less height than the third there are none.
+/// The width of the side panel; with less room than the second number it is below the drawing, and
+/// with less height than the third it is hidden.
 const SIDE_WIDTH: f32 = 330.0;
 const MIN_WIDTH: f32 = 640.0;
 const MIN_HEIGHT: f32 = 240.0;
@@ -40,7 +40,7 @@ const MIN_HEIGHT: f32 = 240.0;
 /// A page of the numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 enum GrinPage {
-    /// The light of every view, and what the tracing costs.
+    /// The results of every view, and the cost of the tracing.
     #[default]
     Light,
     /// The loss against the steps.
@@ -65,7 +65,7 @@ pub struct GrinPanel {
     picture: SlicePicture,
     images: ViewImages,
     page: GrinPage,
-    /// A place that was clicked, whatever slice is shown.
+    /// A pinned point, in any slice.
     pinned: Option<Vec3<f64>>,
     /// The document that was shown last.
     shown_run: Option<u64>,
@@ -73,10 +73,10 @@ pub struct GrinPanel {
 
 impl GrinPanel {
     /// An empty panel.
-    pub fn new(backing: RenderBackend) -> Self {
+    pub fn new(backend: RenderBackend) -> Self {
         Self {
             tasks: TaskMenu::new(),
-            picture: SlicePicture::new(backing),
+            picture: SlicePicture::new(backend),
             images: ViewImages::default(),
             page: GrinPage::default(),
             pinned: None,
@@ -112,7 +112,7 @@ impl Panel for GrinPanel {
 }
 
 impl GrinPanel {
-    /// Turns to what is newly open.
+    /// Turns to the page of a newly opened document.
     fn sync_page(&mut self, view: &SessionView) {
         let number = view.grin.run.id.map(|run| run.number);
         if number != self.shown_run {
@@ -128,7 +128,7 @@ impl GrinPanel {
         }
     }
 
-    /// The numbers, beside the picture or below it, where there is room.
+    /// The side panel, beside the drawing or below it, if there is room.
     fn side_panel(&mut self, ui: &mut Ui, view: &SessionView, run: &GrinRun) {
         let frame = Frame::new().inner_margin(Margin { left: 8, top: 2, ..Margin::ZERO });
         let side = if ui.available_width() >= MIN_WIDTH {

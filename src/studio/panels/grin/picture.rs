@@ -12,11 +12,12 @@ use super::{legend, text};
 use crate::grin_design::RayPath;
 use crate::math::Vec3;
 use crate::session::{SessionView, Slice};
+use crate::studio::cached::{ByAddress, Cached};
 use crate::studio::draw::{BoundingBox, RenderBackend, Rgba, Scene, SceneResponse, SceneView};
 use crate::studio::number;
 use crate::studio::palette::{Palette, color32};
 
-/// Two labels of contours are at least so far apart, in points.
+/// The smallest distance of two contour labels, in points.
 const LABEL_SPACING: egui::Vec2 = egui::vec2(44.0, 16.0);
 /// The room around the whole slice and its rays, as a share of their size.
 const ROOM: f64 = 0.01;
@@ -24,15 +25,13 @@ const ROOM: f64 = 0.01;
 /// The drawing of a slice.
 #[derive(Debug)]
 pub(super) struct SlicePicture {
-    backing: RenderBackend,
+    backend: RenderBackend,
     scene_view: SceneView,
-    drawing: Option<SliceDrawing>,
+    drawing: Cached<(ByAddress<Result<Slice, String>>, bool), SliceDrawing>,
 }
 
-/// What is drawn, and from what it was.
+/// The scene and the colours of a slice.
 struct SliceDrawing {
-    slice: Arc<Result<Slice, String>>,
-    dark: bool,
     scene: Arc<Scene>,
     full_view: BoundingBox,
     colors: TextureHandle,
@@ -45,8 +44,8 @@ impl std::fmt::Debug for SliceDrawing {
 }
 
 impl SlicePicture {
-    pub(super) const fn new(backing: RenderBackend) -> Self {
-        Self { backing, scene_view: SceneView::new("slice"), drawing: None }
+    pub(super) const fn new(backend: RenderBackend) -> Self {
+        Self { backend, scene_view: SceneView::new("slice"), drawing: Cached::new() }
     }
 
     /// Shows the whole slice again.
@@ -64,12 +63,8 @@ impl SlicePicture {
     ) {
         let Some(source) = &view.grin.slice else { return };
         let dark = ui.visuals().dark_mode;
-        let is_drawn = |old: &SliceDrawing| Arc::ptr_eq(&old.slice, source) && old.dark == dark;
-        if !self.drawing.as_ref().is_some_and(is_drawn) {
-            self.drawing = Some(SliceDrawing::new(ui, Arc::clone(source), slice));
-        }
+        let drawing = self.drawing.get((source.into(), dark), |_| SliceDrawing::new(ui, slice));
         legend::ray_legend(ui, slice);
-        let Some(drawing) = &self.drawing else { return };
         let all = ui.available_rect_before_wrap();
         let split = (all.right() - legend::WIDTH).max(all.left() + 1.0);
         let room = Rect::from_min_max(all.min, pos2(split, all.bottom()));
@@ -77,7 +72,7 @@ impl SlicePicture {
             let label = text::slice_name(slice);
             let drawn = (&drawing.scene, drawing.full_view);
             let below = |ui: &Ui, shown: &SceneResponse| drawing.paint_colors(ui, shown, slice);
-            let shown = self.scene_view.show_over(ui, self.backing, drawn, &label, below);
+            let shown = self.scene_view.show_over(ui, self.backend, drawn, &label, below);
             contour_labels(ui, &shown, slice);
             probe(ui, &shown, slice, pinned);
         });
@@ -86,12 +81,12 @@ impl SlicePicture {
 }
 
 impl SliceDrawing {
-    fn new(ui: &Ui, source: Arc<Result<Slice, String>>, slice: &Slice) -> Self {
+    fn new(ui: &Ui, slice: &Slice) -> Self {
         let dark = ui.visuals().dark_mode;
         let scene = scene(slice, &Palette::for_visuals(ui.visuals()), dark);
         let colors = ui.ctx().load_texture("slice", image(slice, dark), TextureOptions::LINEAR);
         let whole = full_view(slice);
-        Self { slice: source, dark, scene: Arc::new(scene), full_view: whole, colors }
+        Self { scene: Arc::new(scene), full_view: whole, colors }
     }
 
     /// The colours of the cells, under the scene.
@@ -136,8 +131,8 @@ fn full_view(slice: &Slice) -> BoundingBox {
 /// Contours, the boundary of the space, and rays.
 fn scene(slice: &Slice, palette: &Palette, dark: bool) -> Scene {
     let mut scene = Scene::on([0; 4]);
-    let line = |scene: &mut Scene, pieces: &[[[f64; 2]; 2]], width: f32, colour: Rgba| {
-        pieces.iter().for_each(|[a, b]| scene.line((*a).into(), (*b).into(), width, colour));
+    let line = |scene: &mut Scene, pieces: &[[[f64; 2]; 2]], width: f32, color: Rgba| {
+        pieces.iter().for_each(|[a, b]| scene.line((*a).into(), (*b).into(), width, color));
     };
     for contour in &slice.contours {
         line(&mut scene, &contour.pieces, 1.0, legend::CONTOUR);
@@ -159,15 +154,15 @@ fn draw_ray_path(scene: &mut Scene, slice: &Slice, way: &RayPath, [ray, lost, ri
     let seen = |point: &Vec3<f64>| DVec2::from(slice.settings.plane.project(*point));
     let points: Vec<DVec2> = way.points.iter().map(seen).collect();
     let counts = way.excluded().is_none();
-    let colour = if counts { ray } else { lost };
+    let color = if counts { ray } else { lost };
     scene.polyline(&points, 2.8, rim);
-    scene.polyline(&points, 1.3, colour);
+    scene.polyline(&points, 1.3, color);
     if let Some(end) = points.last() {
-        scene.dot(*end, if counts { 3.5 } else { 6.0 }, colour);
+        scene.dot(*end, if counts { 3.5 } else { 6.0 }, color);
     }
 }
 
-/// The level of each contour, on it, where there is room.
+/// Labels each contour with its level, if there is room.
 fn contour_labels(ui: &Ui, shown: &SceneResponse, slice: &Slice) {
     let rect = shown.response.rect;
     let painter = ui.painter_at(rect);

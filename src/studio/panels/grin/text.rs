@@ -49,9 +49,9 @@ fn loss_unit(run: &GrinRun) -> &'static str {
 
 /// The numbers of all light.
 pub(super) fn light_page(ui: &mut Ui, view: &SessionView, run: &GrinRun) {
-    let sighting = view.grin.analysis.as_deref();
-    match sighting {
-        Some(Ok(sighting)) => view_rows(ui, run, sighting),
+    let analysis = view.grin.analysis.as_deref();
+    match analysis {
+        Some(Ok(analysis)) => view_rows(ui, run, analysis),
         Some(Err(why)) => {
             ui.colored_label(ui.visuals().error_fg_color, why);
         }
@@ -117,10 +117,10 @@ fn cost_rows(ui: &mut Ui, run: &GrinRun) {
     }
 }
 
-/// Every view: what its light does, how well that is known.
-fn view_rows(ui: &mut Ui, run: &GrinRun, sighting: &GrinAnalysis) {
+/// The results of every view, with their accuracy.
+fn view_rows(ui: &mut Ui, run: &GrinRun, analysis: &GrinAnalysis) {
     let names = run.document.task.iter().flat_map(|task| &task.views);
-    for (view, seen) in names.zip(&sighting.views.value) {
+    for (view, seen) in names.zip(&analysis.views.value) {
         ui.horizontal_wrapped(|ui| {
             ui.strong(&view.name);
             ui.label(result_text(seen));
@@ -134,7 +134,7 @@ fn view_rows(ui: &mut Ui, run: &GrinRun, sighting: &GrinAnalysis) {
         ui.add(Label::new(RichText::new(tracing_text(seen)).small().weak()).wrap());
         ui.add_space(3.0);
     }
-    let text = format!("All light in {:.0} ms", sighting.views.ms);
+    let text = format!("All light in {:.0} ms", analysis.views.ms);
     ui.label(RichText::new(text).small().weak()).on_hover_text(
         "Evaluated with the same rays each time; about once a second during an optimization",
     );
@@ -185,7 +185,7 @@ fn exclusions_text(counts: RayCounts) -> String {
     }
 }
 
-/// A reason as a person reads it.
+/// A reason without underscores.
 fn plain(reason: &str) -> String {
     reason.replace('_', " ")
 }

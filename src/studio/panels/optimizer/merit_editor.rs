@@ -31,7 +31,7 @@ struct MeritRow {
     weighted: WeightedTerm,
 }
 
-/// Both ways to treat the edge of the pupil, each with what it means.
+/// Both treatments of the pupil edge, each with its explanation.
 const EDGES: [(PupilEdge, &str, &str); 2] = [
     (
         PupilEdge::Moving,
@@ -47,7 +47,7 @@ const EDGES: [(PupilEdge, &str, &str); 2] = [
 ];
 
 impl MeritEditor {
-    /// Proposes what a designer would ask of a lens first, once for each lens.
+    /// Sets the default goal of a lens, once for each lens.
     pub(super) fn sync(&mut self, view: &SessionView) {
         let lens = Some((view.lens.name.clone(), view.path.clone(), view.lens.zoom.len()));
         if self.lens == lens {
@@ -58,9 +58,9 @@ impl MeritEditor {
             pupil: PupilEdge::default(),
             zoom_ratios: Vec::new(),
         });
-        let aim = |weighted: WeightedTerm| MeritRow { active: true, weighted };
+        let row = |weighted: WeightedTerm| MeritRow { active: true, weighted };
         *self = Self {
-            terms: goal.terms.into_iter().map(aim).collect(),
+            terms: goal.terms.into_iter().map(row).collect(),
             edge: self.edge,
             zoom_ratios: goal.zoom_ratios,
             lens,
@@ -78,7 +78,7 @@ impl MeritEditor {
 
     /// The terms that count.
     fn active_terms(&self) -> impl Iterator<Item = WeightedTerm> {
-        self.terms.iter().filter(|aim| aim.active).map(|aim| aim.weighted)
+        self.terms.iter().filter(|row| row.active).map(|row| row.weighted)
     }
 
     /// The choice of how the edge of the pupil is treated.
@@ -97,7 +97,7 @@ impl MeritEditor {
         &mut self,
         ui: &mut Ui,
         view: &SessionView,
-        drafts: &mut EditBuffers,
+        buffers: &mut EditBuffers,
         actions: &mut Actions,
     ) {
         self.warnings(ui, &view.lens, actions);
@@ -112,8 +112,8 @@ impl MeritEditor {
                 heading(ui, "Now", "Its value for the best lens so far");
             }
             ui.end_row();
-            for (i, aim) in self.terms.iter_mut().enumerate() {
-                if aim.ui(ui, view, drafts) {
+            for (i, row) in self.terms.iter_mut().enumerate() {
+                if row.ui(ui, view, buffers) {
                     unwanted = Some(i);
                 }
                 ui.end_row();
@@ -169,7 +169,7 @@ impl MeritEditor {
     fn add_menu(&mut self, ui: &mut Ui, view: &SessionView) {
         ui.menu_button("Add a term", |ui| {
             let there =
-                |term: Term| self.terms.iter().any(|aim| aim.weighted.term.name() == term.name());
+                |term: Term| self.terms.iter().any(|row| row.weighted.term.name() == term.name());
             let every = terms::default_terms(view).into_iter();
             let missing: Vec<WeightedTerm> = every.filter(|new| !there(new.term)).collect();
             for weighted in missing {
@@ -207,19 +207,19 @@ fn heading(ui: &mut Ui, text: &str, what: &str) {
 }
 
 impl MeritRow {
-    /// Shows it; says whether it is to go.
-    fn ui(&mut self, ui: &mut Ui, view: &SessionView, drafts: &mut EditBuffers) -> bool {
+    /// Shows the row; true if it is to be removed.
+    fn ui(&mut self, ui: &mut Ui, view: &SessionView, buffers: &mut EditBuffers) -> bool {
         let term = self.weighted.term;
         ui.checkbox(&mut self.active, title(term)).on_hover_text(hint(term));
         let name = format!("Weight of {}", title(term));
-        number_field(ui, drafts, &name, &mut self.weighted.weight, 58.0);
+        number_field(ui, buffers, &name, &mut self.weighted.weight, 58.0);
         ui.horizontal(|ui| {
             ui.spacing_mut().item_spacing.x = 2.0;
             let targets = targets(&mut self.weighted.term);
             let width = if targets.len() > 1 { 54.0 } else { 70.0 };
             for (what, value) in targets {
                 let name = format!("{what} of {}", title(term));
-                number_field(ui, drafts, &name, value, width);
+                number_field(ui, buffers, &name, value, width);
             }
             ui.weak(unit(term));
             self.field_choice(ui, view);
@@ -263,7 +263,7 @@ impl MeritRow {
 }
 
 /// A number that belongs to the panel itself.
-fn number_field(ui: &mut Ui, drafts: &mut EditBuffers, name: &str, value: &mut f64, width: f32) {
+fn number_field(ui: &mut Ui, buffers: &mut EditBuffers, name: &str, value: &mut f64, width: f32) {
     let id = Id::unique(("optimizer", name));
     let shown = number::format_digits(*value, 4);
     let field = TextInput {
@@ -275,14 +275,14 @@ fn number_field(ui: &mut Ui, drafts: &mut EditBuffers, name: &str, value: &mut f
     };
     let layout = Arrange::left_to_right(Align::Center);
     let size = vec2(width, ui.spacing().interact_size.y);
-    let entry = ui.allocate_ui_with_layout(size, layout, |ui| drafts.show(ui, id, field));
+    let entry = ui.allocate_ui_with_layout(size, layout, |ui| buffers.show(ui, id, field));
     let Some(text) = entry.inner.submitted else { return };
     match evaluate(&text, *value) {
         Ok(new) if new.is_finite() => {
             *value = new;
-            drafts.accept(id);
+            buffers.accept(id);
         }
-        Ok(new) => drafts.reject(id, format!("{name} is {new}; expected a finite number")),
-        Err(why) => drafts.reject(id, why.to_string()),
+        Ok(new) => buffers.reject(id, format!("{name} is {new}; expected a finite number")),
+        Err(why) => buffers.reject(id, why.to_string()),
     }
 }

@@ -1,4 +1,5 @@
-//! The search for a better lens: what it aims at, how it goes, and what becomes of its result.
+//! The optimizer: its goal, its controls, its progress, and the choice to take or discard the
+//! result.
 //!
 //! The search works on its own copy. The design changes only when its result is taken.
 
@@ -28,7 +29,7 @@ const NO_VARIABLES: &str = "No number is variable: click the badge beside one in
 pub struct OptimizerPanel {
     method: DescentMethod,
     merit: MeritEditor,
-    drafts: EditBuffers,
+    buffers: EditBuffers,
 }
 
 impl Panel for OptimizerPanel {
@@ -50,12 +51,12 @@ impl Panel for OptimizerPanel {
             ui.colored_label(ui.visuals().warn_fg_color, NO_VARIABLES);
         }
         ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
-            self.merit.ui(ui, view, &mut self.drafts, actions);
+            self.merit.ui(ui, view, &mut self.buffers, actions);
         });
     }
 
     fn is_typing(&self, context: &Context) -> bool {
-        self.drafts.is_typing(context)
+        self.buffers.is_typing(context)
     }
 }
 
@@ -115,10 +116,10 @@ impl OptimizerPanel {
         }
     }
 
-    fn method(&mut self, ui: &mut Ui, under_way: bool) {
+    fn method(&mut self, ui: &mut Ui, active: bool) {
         ui.horizontal(|ui| {
             ui.weak("Method");
-            ui.add_enabled_ui(!under_way, |ui| method_menu(ui, &mut self.method));
+            ui.add_enabled_ui(!active, |ui| method_menu(ui, &mut self.method));
         });
     }
 }
@@ -135,10 +136,10 @@ pub(super) fn method_menu(ui: &mut Ui, chosen: &mut DescentMethod) {
 
 /// The status of the optimization, and spot, focal length and light before and after it.
 fn progress(ui: &mut Ui, view: &SessionView, search: &OptimizationSnapshot) {
-    let standing = status_text(view.optimization.status);
+    let status = status_text(view.optimization.status);
     let step = search.progress.as_ref().map_or(0, |progress| progress.step);
     ui.horizontal(|ui| {
-        ui.strong(standing);
+        ui.strong(status);
         ui.label(format!("after step {step}"));
         if let (Some(first), Some(last)) = (search.history.first(), search.progress.as_ref()) {
             ui.separator();

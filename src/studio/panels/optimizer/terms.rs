@@ -1,4 +1,4 @@
-//! What each term of a goal is called, measured in and explained by, and what it begins with.
+//! The title, the unit, the explanation and the default of every term.
 
 use crate::merit::{self, LensFigures, Term, WeightedTerm};
 use crate::session::{Analyses, SessionView};
@@ -94,7 +94,7 @@ pub(super) const fn unit(term: Term) -> &'static str {
     }
 }
 
-/// The targets of a term and what they are called.
+/// The targets of a term with their names.
 pub(super) fn targets(term: &mut Term) -> Vec<(&'static str, &mut f64)> {
     match term {
         Term::Spot | Term::SpotIntegral | Term::Throughput | Term::Distortion => Vec::new(),
@@ -170,7 +170,7 @@ fn mean_square(numbers: &Analyses) -> Option<f64> {
     (!squares.is_empty()).then(|| squares.iter().sum::<f64>() / squares.len() as f64)
 }
 
-/// A term with numbers as a person would write them.
+/// A term with numbers rounded to four digits.
 fn rounded(mut weighted: WeightedTerm) -> WeightedTerm {
     let short = |value: f64| number::format_digits(value, 4).parse().unwrap_or(value);
     weighted.weight = short(weighted.weight);

@@ -26,7 +26,7 @@ const INTRODUCTION: &str = "How sharp can this lens be for how much light? The s
     that no other lens beats in both.\n\
     Click a point to show its lens, double-click to take it. The design does not change meanwhile.";
 
-/// The height of what is said about the lens that was clicked: buttons and two lines.
+/// The height of the bar of the selected lens: buttons and two lines.
 const SELECTION_HEIGHT: f32 = 62.0;
 
 /// The panel.
@@ -55,8 +55,8 @@ impl Panel for ParetoPanel {
             self.selected = None;
         }
         self.buttons(ui, view, actions);
-        let under_way = view.pareto.run.is_active();
-        ui.add_enabled_ui(!under_way, |ui| self.setup.ui(ui, view));
+        let active = view.pareto.run.is_active();
+        ui.add_enabled_ui(!active, |ui| self.setup.ui(ui, view));
         text::variables_label(ui, view);
         if let Some(why) = &view.pareto.run.error {
             let why = capitalize(why);
@@ -151,7 +151,7 @@ impl ParetoPanel {
         self.selected = Some(design);
     }
 
-    /// The lens that was clicked: its numbers, its neighbours, what to do with it.
+    /// The bar of the selected lens: its neighbours, its actions and its numbers.
     fn selection_bar(
         &mut self,
         ui: &mut Ui,
@@ -190,7 +190,7 @@ impl ParetoPanel {
         text::selection_label(ui, run, self.selected.as_ref());
     }
 
-    /// The lenses of the front on both sides of the one that was clicked, or the ends of the front.
+    /// The lenses of the front on both sides of the selected one, or the ends of the front.
     fn neighbours(&self, run: &ParetoRun) -> [Option<ParetoPoint>; 2] {
         let designs = run.main.front.points();
         let Some(chosen) = &self.selected else {

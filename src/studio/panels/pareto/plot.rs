@@ -15,7 +15,7 @@ use crate::session::{ParetoRun, RunView, SessionView};
 
 /// The distance in points within which the pointer picks a lens.
 const NEAR: f32 = 14.0;
-/// The room around what is shown, as a share of it.
+/// The margin around the shown range, as a share of it.
 const MARGIN: f64 = 0.06;
 
 /// A lens that was clicked.
@@ -111,8 +111,8 @@ fn nearest<'a>(
     near.min_by(|a, b| distance(a).total_cmp(&distance(b)))
 }
 
-/// The range of both axes that shows all fronts, the start and the design. What was tried on the
-/// way may lie far outside.
+/// The range of both axes that shows all fronts, the start and the design; lenses tried on the way
+/// may lie far outside.
 fn bounds(view: &SessionView, run: &ParetoRun) -> [RangeInclusive<f64>; 2] {
     let legs = std::iter::once(&run.main).chain(&run.biased);
     let legs = legs.chain(earlier_runs(view).map(|run| &run.main));
@@ -131,8 +131,8 @@ fn bounds(view: &SessionView, run: &ParetoRun) -> [RangeInclusive<f64>; 2] {
 
 /// The spot and the light of the design.
 fn design_point(view: &SessionView) -> Option<[f64; 2]> {
-    let judged = view.design_score.as_deref()?;
-    Some(plot_point(judged.score.as_ref().ok()?))
+    let scored = view.design_score.as_deref()?;
+    Some(plot_point(scored.score.as_ref().ok()?))
 }
 
 /// The colours of the plot.

@@ -9,7 +9,7 @@ use crate::session::{Command, SessionView};
 use crate::studio::panels::design_results;
 use crate::studio::panels::optimizer::method_menu;
 
-/// The settings that a person sees.
+/// The settings of the panel.
 #[derive(Debug, Default)]
 pub(super) struct ParetoSetup {
     settings: ParetoSettings,
@@ -17,7 +17,7 @@ pub(super) struct ParetoSetup {
 }
 
 impl ParetoSetup {
-    /// The wish for a sweep.
+    /// The command that starts a sweep.
     pub(super) fn command(&self) -> Command {
         Command::StartPareto { settings: self.settings.clone(), compare: self.compare }
     }

@@ -1,4 +1,4 @@
-//! The numbers of a front in words: how far it is, how much it covers, what a lens on it is worth.
+//! The texts of a Pareto front: progress, hypervolume, and the numbers of a lens.
 
 use egui::{Label, RichText, Ui};
 
@@ -48,13 +48,13 @@ fn variables_by_kind(lens: &Lens) -> String {
 
 /// The progress of the run.
 pub(super) fn progress_text(run: &ParetoRun, status: RunStatus) -> String {
-    let standing = status_text(status);
+    let status = status_text(status);
     let leg = run.current_pass();
     let kept = if run.biased.is_some() { ", fixed rays" } else { "" };
     let rate = leg.done as f64 / leg.seconds;
     let rate = if rate.is_finite() { format!(", {rate:.0} steps/s") } else { String::new() };
     let (done, total, seconds) = (leg.done, leg.total, leg.seconds);
-    format!("{standing}{kept}: {done} of {total} steps{rate}, {seconds:.1} s")
+    format!("{status}{kept}: {done} of {total} steps{rate}, {seconds:.1} s")
 }
 
 /// The number of lenses, and the hypervolume of the fronts.

@@ -56,13 +56,13 @@ impl ParameterStatus {
     }
 }
 
-/// The badge beside a number. A press frees or fixes the number, or opens the menu where something
-/// else decides it; the right button always opens the menu.
+/// Shows the badge beside a number. A click varies or fixes the number, or opens the menu if it is
+/// picked up or solved; a right click always opens the menu.
 pub(super) fn show(
     ui: &mut Ui,
     lens: &Lens,
     parameter: Parameter,
-    drafts: &mut EditBuffers,
+    buffers: &mut EditBuffers,
     actions: &mut Actions,
 ) {
     let decides = ParameterStatus::of(lens, parameter);
@@ -76,11 +76,11 @@ pub(super) fn show(
     let popup = if simple { Popup::context_menu(&button) } else { Popup::menu(&button) };
     popup
         .close_behavior(PopupCloseBehavior::CloseOnClickOutside)
-        .show(|ui| menu.ui(ui, drafts, actions));
+        .show(|ui| menu.ui(ui, buffers, actions));
     button.on_hover_text(decides.hint());
 }
 
-/// The edit that frees a fixed number and fixes a free one.
+/// The edit that makes a fixed number variable, and a variable fixed.
 pub(super) fn toggle_edit(decides: ParameterStatus, parameter: Parameter) -> Edit {
     match decides {
         ParameterStatus::Variable(_) => Edit::RemoveVariable(parameter),
@@ -121,14 +121,16 @@ struct StatusMenu<'a> {
 }
 
 impl StatusMenu<'_> {
-    fn ui(&self, ui: &mut Ui, drafts: &mut EditBuffers, actions: &mut Actions) {
+    fn ui(&self, ui: &mut Ui, buffers: &mut EditBuffers, actions: &mut Actions) {
         ui.set_width(210.0);
         ui.strong(super::table::parameter_name(self.parameter));
         self.choices(ui, actions);
         match self.status {
-            ParameterStatus::Variable(variable) => self.bounds_lines(ui, variable, drafts, actions),
-            ParameterStatus::Pickup(pickup) => self.pickup_lines(ui, pickup, drafts, actions),
-            ParameterStatus::ImageSolve(offset) => self.offset_line(ui, offset, drafts, actions),
+            ParameterStatus::Variable(variable) => {
+                self.bounds_lines(ui, variable, buffers, actions)
+            }
+            ParameterStatus::Pickup(pickup) => self.pickup_lines(ui, pickup, buffers, actions),
+            ParameterStatus::ImageSolve(offset) => self.offset_line(ui, offset, buffers, actions),
             ParameterStatus::Fixed => {}
         }
     }
@@ -161,7 +163,7 @@ impl StatusMenu<'_> {
         }
     }
 
-    /// The edits that leave the number to nobody.
+    /// The edits that make the number fixed.
     fn release_edits(&self) -> Vec<Edit> {
         match self.status {
             ParameterStatus::Fixed => Vec::new(),
@@ -171,7 +173,8 @@ impl StatusMenu<'_> {
         }
     }
 
-    /// A pickup from the same number of the row before that keeps the value if it can.
+    /// A pickup from the same number of the row before, scaled so that the value is unchanged if
+    /// possible.
     fn new_pickup(&self) -> Option<Pickup> {
         let Parameter { surface, quantity } = self.parameter;
         let other = if surface == 0 { 1 } else { surface - 1 };
@@ -190,7 +193,7 @@ impl StatusMenu<'_> {
         &self,
         ui: &mut Ui,
         variable: Variable,
-        drafts: &mut EditBuffers,
+        buffers: &mut EditBuffers,
         actions: &mut Actions,
     ) {
         ui.separator();
@@ -205,10 +208,10 @@ impl StatusMenu<'_> {
         let limit = |text: &str| {
             if text.trim().is_empty() { Some(None) } else { parse_value(text).map(Some) }
         };
-        if let Some(min) = self.number_line(ui, "Minimum", variable.min, drafts, limit) {
+        if let Some(min) = self.number_line(ui, "Minimum", variable.min, buffers, limit) {
             actions.push(Edit::AddVariable(Variable { min, ..variable }));
         }
-        if let Some(max) = self.number_line(ui, "Maximum", variable.max, drafts, limit) {
+        if let Some(max) = self.number_line(ui, "Maximum", variable.max, buffers, limit) {
             actions.push(Edit::AddVariable(Variable { max, ..variable }));
         }
     }
@@ -217,23 +220,23 @@ impl StatusMenu<'_> {
         &self,
         ui: &mut Ui,
         pickup: Pickup,
-        drafts: &mut EditBuffers,
+        buffers: &mut EditBuffers,
         actions: &mut Actions,
     ) {
         ui.separator();
         let row = |text: &str| text.trim().parse().ok().filter(|n| (1..=1000).contains(n));
         let surface = Some((pickup.source.surface + 1) as f64);
         let mut set = |pickup: Pickup| actions.push(Edit::SetPickup(pickup));
-        if let Some(number) = self.number_line(ui, "From surface", surface, drafts, row) {
+        if let Some(number) = self.number_line(ui, "From surface", surface, buffers, row) {
             let number: usize = number;
             set(Pickup { source: Parameter { surface: number - 1, ..pickup.source }, ..pickup });
         }
-        if let Some(scale) = self.number_line(ui, "Scale", Some(pickup.scale), drafts, parse_value)
+        if let Some(scale) = self.number_line(ui, "Scale", Some(pickup.scale), buffers, parse_value)
         {
             set(Pickup { scale, ..pickup });
         }
         if let Some(offset) =
-            self.number_line(ui, "Offset", Some(pickup.offset), drafts, parse_value)
+            self.number_line(ui, "Offset", Some(pickup.offset), buffers, parse_value)
         {
             set(Pickup { offset, ..pickup });
         }
@@ -243,12 +246,12 @@ impl StatusMenu<'_> {
         &self,
         ui: &mut Ui,
         offset: f64,
-        drafts: &mut EditBuffers,
+        buffers: &mut EditBuffers,
         actions: &mut Actions,
     ) {
         ui.separator();
         if let Some(offset) =
-            self.number_line(ui, "Displaced by, mm", Some(offset), drafts, parse_value)
+            self.number_line(ui, "Displaced by, mm", Some(offset), buffers, parse_value)
         {
             actions.push(Edit::SetImageSolve(Some(offset)));
         }
@@ -260,7 +263,7 @@ impl StatusMenu<'_> {
         ui: &mut Ui,
         name: &str,
         shown: Option<f64>,
-        drafts: &mut EditBuffers,
+        buffers: &mut EditBuffers,
         read: impl Fn(&str) -> Option<T>,
     ) -> Option<T> {
         let id = Id::unique((self.parameter, name));
@@ -274,13 +277,13 @@ impl StatusMenu<'_> {
                 align: Align::Max,
                 placement: InputPlacement::Form,
             };
-            drafts.show(ui, id, field)
+            buffers.show(ui, id, field)
         });
         let text = entry.inner.submitted?;
         let read = read(&text);
         match read {
-            Some(_) => drafts.accept(id),
-            None => drafts.reject(id, format!("`{text}` is not a valid number here")),
+            Some(_) => buffers.accept(id),
+            None => buffers.reject(id, format!("`{text}` is not a valid number here")),
         }
         read
     }

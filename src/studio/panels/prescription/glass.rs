@@ -87,7 +87,7 @@ pub(super) fn parse_medium(text: &str) -> Medium {
     }
 }
 
-/// Glasses whose names go on like what was typed, then those that contain it.
+/// Glasses whose names begin with the text, then those that contain it.
 pub(super) fn suggestions(text: &str) -> Vec<String> {
     let wanted = text.trim().to_uppercase();
     if wanted.is_empty() || wanted.starts_with(['.', '1']) {

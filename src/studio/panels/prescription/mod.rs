@@ -1,8 +1,9 @@
-//! The prescription: a row a surface, a cell a number, and a badge that says what decides it.
+//! The prescription: a row per surface, a cell per number, and a badge with the status of the
+//! number.
 //!
 //! Rows are counted as designers do: the object is row 0, the first surface row 1, the image the
-//! last one. What is typed is tried on the lens at once; what the lens cannot be stays in its cell
-//! with the reason, and the lens is what it was.
+//! last one. An edit that would make the lens invalid is rejected: its text remains in the cell
+//! with the reason, and the lens is unchanged.
 
 mod actions;
 mod badge;

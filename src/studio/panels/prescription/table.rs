@@ -90,7 +90,7 @@ impl TableColumn {
         !matches!(self, Self::Glass | Self::Comment)
     }
 
-    /// The number in a row of this column; none where it holds text.
+    /// The number in a row of this column; `None` for text.
     fn parameter(self, view: &SessionView, surface: usize) -> Option<Parameter> {
         let quantity = match self {
             Self::Radius => Quantity::Curvature,
@@ -399,7 +399,7 @@ impl PrescriptionTable<'_> {
         self.text_cell(ui, (TableColumn::Glass, OBJECT), cell, edit);
     }
 
-    /// A cell: what is typed becomes an edit, if the lens can be that.
+    /// Shows a cell: its text becomes an edit, if the lens stays valid.
     fn text_cell(
         &mut self,
         ui: &mut Ui,
@@ -428,7 +428,7 @@ impl PrescriptionTable<'_> {
         entry.response
     }
 
-    /// Wishes for an edit, if the lens can be that; otherwise the cell says why not.
+    /// Asks for an edit if the lens stays valid; otherwise the cell shows the reason.
     fn try_edit(&mut self, id: Id, edit: Result<Edit, String>) -> bool {
         let tried = edit.and_then(|edit| {
             let lens = apply_edit(&self.view.lens, &edit);
@@ -448,7 +448,7 @@ impl PrescriptionTable<'_> {
     }
 }
 
-/// Stands for the row of the object where a surface is named.
+/// The row of the object, in place of the index of a surface.
 const OBJECT: usize = usize::MAX;
 
 /// The field of the first radius.
@@ -480,7 +480,7 @@ fn typed_edit(lens: &Lens, parameter: Parameter, text: &str) -> Result<Edit, Str
     }
 }
 
-/// The columns of a lens: those of aspheres only where there are some.
+/// The columns of a lens: asphere columns only if it has aspheres.
 fn columns(lens: &Lens) -> Vec<TableColumn> {
     let mut columns = vec![
         TableColumn::Radius,
@@ -527,7 +527,7 @@ fn row_label(surface: usize) -> String {
     format!("Row of surface {}", surface + 1)
 }
 
-/// A value that nobody can type.
+/// Shows a value that cannot be edited.
 fn read_only_cell(ui: &mut Ui, text: &str, room: f32) {
     ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
         ui.add_space(room + 5.0);

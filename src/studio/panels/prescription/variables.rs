@@ -1,4 +1,4 @@
-//! Freeing and fixing many numbers at once.
+//! Adding and removing many variables at once.
 
 use egui::{Button, Ui};
 
@@ -42,7 +42,7 @@ pub(super) fn menu(ui: &mut Ui, lens: &Lens, actions: &mut Actions) {
     );
 }
 
-/// Frees the gaps without glass and leaves the others as they are.
+/// Adds the air gaps to the variables.
 fn add_air_gaps_edit(lens: &Lens) -> Edit {
     let mut edit = add_variables_edit(lens, &[ParameterKind::Thicknesses]);
     if let Edit::SetVariables(variables) = &mut edit {

@@ -1,5 +1,4 @@
-//! Which rays of each field get through, and what ends the others: the outline of every pupil, each
-//! side in the colour of what limits it.
+//! The pupil of each field: its outline, each side in the colour of what limits it.
 //!
 //! All pupils are drawn to one scale in the plane through the first vertex. The numbers below each
 //! are integrals over it, with their error, their rays and their time.
@@ -27,7 +26,7 @@ use picture::{PupilPicture, PupilWindow};
 /// fit in one.
 const WORDS: CellLayout = CellLayout { above: 20.0, below: 62.0 };
 const LINE: f32 = 14.0;
-/// The scale bar is at most this share of a picture's width, to stand in its corner.
+/// The largest share of a drawing's width that the scale bar takes.
 const BAR: f64 = 0.3;
 
 /// The panel.
@@ -116,7 +115,7 @@ fn header(ui: &mut Ui, view: &SessionView, pupils: &session::FieldPupils, action
     });
 }
 
-/// The choice of the wavelength; its name where there is no choice.
+/// The choice of the wavelength; only its name if there is one.
 fn wavelength(ui: &mut Ui, view: &SessionView, shown: usize, actions: &mut Actions) {
     let palette = Palette::for_visuals(ui.visuals());
     let waves = &view.lens.wavelengths;
@@ -175,7 +174,7 @@ impl PupilView<'_> {
         limit.surface().is_some() && limit.surface() == self.view.selected
     }
 
-    /// Points a limit's surface out, or no longer.
+    /// Selects the surface of a limit, or clears the selection.
     fn select(&self, limit: PupilLimit, actions: &mut Actions) {
         let surface = limit.surface();
         let wanted = surface.filter(|surface| self.view.selected != Some(*surface));

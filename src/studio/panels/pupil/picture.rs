@@ -1,4 +1,4 @@
-//! One pupil in its square: what gets through, by what it ends, and the ideal pupil around it.
+//! The drawing of one pupil: its area, its limits, and the ideal pupil around it.
 
 use egui::{Align2, Color32, Mesh, Pos2, Rect, Shape, Stroke, TextStyle, Ui};
 use glam::DVec2;
@@ -17,7 +17,7 @@ const LARGER: f64 = 1.6;
 const ROOM: f64 = 1.16;
 /// A side shorter than this, in points, bears no number.
 const SHORT: f32 = 26.0;
-/// The number stands inside a pupil that reaches so far inwards, in points.
+/// The inward extent of a pupil, in points, above which the number is inside.
 const DEEP: f32 = 22.0;
 
 /// The part of the plane that each drawing shows, all to one scale.
@@ -67,7 +67,7 @@ fn union(a: Option<BoundingBox>, b: Option<BoundingBox>) -> Option<BoundingBox> 
     BoundingBox::around([a, b].into_iter().flatten().flat_map(|bounds| [bounds.min, bounds.max]))
 }
 
-/// The box around what gets through.
+/// The bounding box of the pupil.
 fn lit_box(pupil: &FieldPupil) -> Option<BoundingBox> {
     match &pupil.shape {
         PupilShape::Outlined(outline) => {
@@ -131,7 +131,7 @@ impl<'a> PupilPicture<'a> {
         near.filter(|(distance, _)| *distance < NEAR).map(|(_, limit)| limit)
     }
 
-    /// Paints the picture; `color` and `bold` tell how a limit is drawn.
+    /// Paints the pupil; `color` and `bold` give the style of a limit.
     pub(super) fn paint(
         &self,
         ui: &Ui,
@@ -217,7 +217,7 @@ impl<'a> PupilPicture<'a> {
         }
     }
 
-    /// The number of a side's surface at its middle: inside where there is room, else outside.
+    /// Draws the number of a side's surface at its middle: inside if there is room, else outside.
     fn side_number(&self, ui: &Ui, side: &OutlineSide, center: [f64; 2], color: Color32) {
         let Some(surface) = side.limit.surface() else { return };
         #[expect(clippy::cast_possible_truncation, reason = "a length on the screen")]

@@ -266,7 +266,7 @@ fn color(ui: &Ui, kind: SensitivityKind, change: f64) -> Color32 {
     color32(if better { palette.better } else { palette.worse })
 }
 
-/// An arrow up or down, as long as its share of the largest says.
+/// Draws an arrow up or down, with a length by its share of the largest.
 fn arrow(ui: &Ui, middle: Pos2, share: f64, color: Color32) {
     #[expect(clippy::cast_possible_truncation, reason = "a length on the screen")]
     let length = ARROW * (0.35 + 0.65 * share.abs().min(1.0)) as f32;

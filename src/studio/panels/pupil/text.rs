@@ -1,4 +1,4 @@
-//! The words around a pupil: its field, its numbers, and what is wrong where no light gets through.
+//! The texts around a pupil: its field, its numbers, and the reason why it is dark.
 
 use std::sync::Arc;
 

@@ -79,7 +79,7 @@ fn start_button(
     }
 }
 
-/// The offer to go on with the search that was left when the program was closed.
+/// Offers to resume the search that was unfinished when the program was closed.
 pub(super) fn unfinished_search(ui: &mut Ui, view: &SessionView, actions: &mut Actions) {
     let known = &view.structure_search;
     let Some(left) = known

@@ -101,7 +101,7 @@ fn node_positions(shown: &[&Generation], rect: Rect) -> Vec<Pos2> {
     shown.iter().enumerate().map(place).collect()
 }
 
-/// The ancestors of a lens in words, the youngest first; the one that was clicked.
+/// Shows the ancestors of a lens in words, the youngest first; the clicked one, if any.
 pub(super) fn ancestors(
     ui: &mut Ui,
     view: &SessionView,

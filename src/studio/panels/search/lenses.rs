@@ -1,4 +1,4 @@
-//! The lenses that the search keeps, as cards, and what can be done with the one that was clicked.
+//! The retained lenses as cards, and the buttons of the selected one.
 
 use std::sync::Arc;
 
@@ -23,7 +23,7 @@ const CARD: Vec2 = vec2(148.0, 112.0);
 /// The part of a card for its words.
 const WORDS: f32 = 30.0;
 
-/// Shows the lenses that are kept, best first, the best one first of all; the one that was clicked.
+/// Shows the retained lenses, the best first; the clicked one, if any.
 pub(super) fn cards(
     ui: &mut Ui,
     view: &SessionView,

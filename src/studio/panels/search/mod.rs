@@ -1,6 +1,6 @@
 //! The search over structure, live: elements appear, split, fuse and vanish while the merit falls.
 //!
-//! Every lens that the search keeps can be looked at beside the design, traced back through its
+//! Every lens that the search retains can be compared with the design, traced back through its
 //! ancestors, pinned, taken or exported. The search works on its own copy.
 
 mod controls;
@@ -31,9 +31,9 @@ const INTRODUCTION: &str = "Which lens of another structure is better? Chains de
     every pattern of glass and air.\n\
     The design does not change until one of their lenses is taken.";
 
-/// The height of what is said about the lens that was clicked: buttons and two lines.
+/// The height of the bar of the selected lens: buttons and two lines.
 const SELECTION_HEIGHT: f32 = 62.0;
-/// With less height than this, it stands above the page and moves with it.
+/// With less height than this, the bar is above the page and scrolls with it.
 const MIN_HEIGHT: f32 = 240.0;
 
 /// A part of the panel.
@@ -103,7 +103,7 @@ impl Panel for SearchPanel {
 }
 
 impl SearchPanel {
-    /// Turns to what is new: a search that has just begun, or the setup where there is none.
+    /// Turns to the page of a search that has just begun, or to the setup if there is none.
     fn sync_page(&mut self, view: &SessionView) {
         let number = view.structure_search.run.id.map(|run| run.number);
         if number != self.shown_run {
@@ -130,8 +130,8 @@ impl SearchPanel {
     }
 
     fn setup_page(&mut self, ui: &mut Ui, view: &SessionView) {
-        let under_way = view.structure_search.run.is_active();
-        if under_way {
+        let active = view.structure_search.run.is_active();
+        if active {
             ui.label(RichText::new("These settings apply to the next search.").small().weak());
         } else if view.structure_search.run.snapshot.is_none() {
             ui.label(INTRODUCTION);
@@ -139,7 +139,7 @@ impl SearchPanel {
         self.setup.ui(ui, view);
     }
 
-    /// The merit, and the lenses that are kept.
+    /// The merit history and the retained lenses.
     fn lenses_page(
         &mut self,
         ui: &mut Ui,
@@ -186,8 +186,7 @@ impl SearchPanel {
         }
     }
 
-    /// What to do with the lens that was clicked, and how it stands beside the design: below the
-    /// page, or above it where there is little room.
+    /// The bar of the selected lens: below the page, or above it if there is little room.
     fn selection_bar(
         &mut self,
         ui: &mut Ui,

@@ -109,7 +109,7 @@ fn mark_point(mark: &DescentMark) -> Option<[f64; 2]> {
     Some([mark.round as f64, decade(mark.merit)?])
 }
 
-/// Every mutation where it led; what was kept in the end is larger.
+/// Every mutation at the merit to which it led; those of retained lenses are larger.
 fn mutation_marks(plot: &mut PlotUi<'_>, run: &StructureSearchSnapshot, visuals: &egui::Visuals) {
     for kind in mutation_style::kinds() {
         for (entered, radius) in [(false, 2.6), (true, 4.8)] {
@@ -125,7 +125,7 @@ fn mutation_marks(plot: &mut PlotUi<'_>, run: &StructureSearchSnapshot, visuals:
     }
 }
 
-/// Tells what the mark under the pointer is; its generation where it was clicked.
+/// Describes the mark under the pointer; its generation if it was clicked.
 fn hovered_mark(ui: &Ui, run: &StructureSearchSnapshot, shown: &PlotResponse<()>) -> Option<u64> {
     let pointer = shown.response.hover_pos()?;
     let on_screen = |mark: &DescentMark| {
@@ -195,7 +195,7 @@ fn elements_plot(ui: &mut Ui, run: &StructureSearchSnapshot, chain: usize) {
     shown.response.widget_info(|| WidgetInfo::labeled(Role::Image, true, &label));
 }
 
-/// A number stays what it was until the next moment.
+/// The corners of a step curve: a value holds until the next sample.
 fn step_curve(steps: &[[f64; 2]]) -> Vec<[f64; 2]> {
     let mut stairs: Vec<[f64; 2]> = Vec::with_capacity(2 * steps.len());
     for step in steps {

@@ -11,7 +11,7 @@ use crate::search::element::piece_count;
 use crate::search::{MutationKind, SearchMethod, SearchRules, SearchSettings};
 use crate::session::{SessionView, StructureSearchRequest};
 
-/// The settings that a person sees.
+/// The settings of the panel.
 #[derive(Debug)]
 pub(super) struct SearchSetup {
     request: StructureSearchRequest,
@@ -25,7 +25,7 @@ pub(super) struct SearchSetup {
     disabled: DisabledValues,
 }
 
-/// Values of limits that do not count at the moment.
+/// Values that reappear when an inactive limit is switched on.
 #[derive(Debug)]
 struct DisabledValues {
     minutes: f64,
@@ -36,15 +36,16 @@ struct DisabledValues {
 
 impl Default for SearchSetup {
     fn default() -> Self {
-        let asleep = DisabledValues { minutes: 10.0, moves: 1000, open: 30.0, focal_length: 50.0 };
-        let mut quest = StructureSearchRequest::default();
-        quest.plan.settings = SearchSettings { gradients: None, ..quest.plan.settings };
+        let disabled =
+            DisabledValues { minutes: 10.0, moves: 1000, open: 30.0, focal_length: 50.0 };
+        let mut request = StructureSearchRequest::default();
+        request.plan.settings = SearchSettings { gradients: None, ..request.plan.settings };
         Self {
-            request: quest,
+            request,
             element_count_edited: false,
             design_glasses_only: false,
             brute_force_gradients: 10_000,
-            disabled: asleep,
+            disabled,
         }
     }
 }
@@ -70,15 +71,15 @@ const METHODS: [(SearchMethod, &str, &str); 3] = [
 impl SearchSetup {
     /// The request for a search from the present design.
     pub(super) fn request(&self, view: &SessionView) -> StructureSearchRequest {
-        let mut quest = self.request.clone();
-        quest.plan.light = light::matching_fields(quest.plan.light, &view.lens);
+        let mut request = self.request.clone();
+        request.plan.light = light::matching_fields(request.plan.light, &view.lens);
         if self.design_glasses_only {
-            quest.plan.rules.glasses = glasses(&view.lens);
+            request.plan.rules.glasses = glasses(&view.lens);
         }
-        if quest.plan.settings.method == SearchMethod::BruteForce {
-            quest.plan.settings.gradients = Some(self.brute_force_gradients);
+        if request.plan.settings.method == SearchMethod::BruteForce {
+            request.plan.settings.gradients = Some(self.brute_force_gradients);
         }
-        quest
+        request
     }
 
     pub(super) fn ui(&mut self, ui: &mut Ui, view: &SessionView) {
@@ -171,18 +172,18 @@ impl SearchSetup {
     }
 
     fn merit_rows(&mut self, ui: &mut Ui, lens: &Lens) {
-        let quest = &mut self.request;
+        let request = &mut self.request;
         ui.weak("Light");
-        light::shares(ui, &mut quest.plan.light, lens);
+        light::shares(ui, &mut request.plan.light, lens);
         ui.end_row();
         ui.weak("Focal length");
         let hint = "The target, if it is not the focal length of the design";
-        let asleep = &mut self.disabled;
+        let disabled = &mut self.disabled;
         optional(
             ui,
             "Another focal length",
-            &mut quest.plan.focal_length,
-            &mut asleep.focal_length,
+            &mut request.plan.focal_length,
+            &mut disabled.focal_length,
             hint,
             |ui, value| {
                 length(ui, "Focal length of the search", value, -10_000.0..=10_000.0);
@@ -192,15 +193,22 @@ impl SearchSetup {
         ui.weak("Rims");
         let hint = "Remove the stop and open every semi-diameter as far as the neighbouring \
             surfaces and this value allow: the search then decides what limits the beam";
-        optional(ui, "Open them up to", &mut quest.open, &mut asleep.open, hint, |ui, value| {
-            length(ui, "Largest rim at the start", value, 0.1..=10_000.0);
-        });
+        optional(
+            ui,
+            "Open them up to",
+            &mut request.open,
+            &mut disabled.open,
+            hint,
+            |ui, value| {
+                length(ui, "Largest rim at the start", value, 0.1..=10_000.0);
+            },
+        );
         ui.end_row();
     }
 
     fn limit_rows(&mut self, ui: &mut Ui) {
-        let Self { request: quest, disabled: asleep, brute_force_gradients: gradients, .. } = self;
-        if quest.plan.settings.method == SearchMethod::BruteForce {
+        let Self { request, disabled, brute_force_gradients: gradients, .. } = self;
+        if request.plan.settings.method == SearchMethod::BruteForce {
             ui.weak("Gradients");
             let hint = "The budget that is divided among all mutations";
             drag(ui, "Gradients of brute force", gradients, 1..=u64::MAX, 100.0, hint);
@@ -208,7 +216,7 @@ impl SearchSetup {
         }
         ui.weak("Ends after");
         let hint = "The time limit of the search";
-        optional(ui, "minutes", &mut quest.minutes, &mut asleep.minutes, hint, |ui, value| {
+        optional(ui, "minutes", &mut request.minutes, &mut disabled.minutes, hint, |ui, value| {
             drag(ui, "Minutes of the search", value, 0.1..=100_000.0, 0.1, hint);
         });
         ui.end_row();
@@ -217,8 +225,8 @@ impl SearchSetup {
         optional(
             ui,
             "moves",
-            &mut quest.plan.settings.moves,
-            &mut asleep.moves,
+            &mut request.plan.settings.moves,
+            &mut disabled.moves,
             hint,
             |ui, value| {
                 drag(ui, "Moves of the search", value, 1..=u64::MAX, 10.0, hint);
@@ -330,7 +338,7 @@ pub(super) fn optional<T: Copy>(
     ui: &mut Ui,
     name: &str,
     value: &mut Option<T>,
-    asleep: &mut T,
+    disabled: &mut T,
     hint: &str,
     field: impl FnOnce(&mut Ui, &mut T),
 ) {
@@ -338,9 +346,9 @@ pub(super) fn optional<T: Copy>(
         let mut there = value.is_some();
         if ui.checkbox(&mut there, name).on_hover_text(hint).changed() {
             if let Some(value) = *value {
-                *asleep = value;
+                *disabled = value;
             }
-            *value = there.then_some(*asleep);
+            *value = there.then_some(*disabled);
         }
         if let Some(value) = value {
             field(ui, value);

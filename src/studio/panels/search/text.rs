@@ -1,4 +1,4 @@
-//! A search in words: how it stands, how fast it is, what a lens is worth beside the design.
+//! The texts of a search: its status, its rate, and the lenses compared with the design.
 
 use egui::{Label, Ui};
 
@@ -33,9 +33,9 @@ pub(super) fn status_text(run: &StructureSearchSnapshot, status: RunStatus) -> S
         Some(EndReason::Sampler(RunEnd::Stuck)) => ": no mutation applies",
         Some(EndReason::Sampler(RunEnd::Stopped)) | None => "",
     };
-    let standing = text::status_text(status);
+    let status = text::status_text(status);
     let (from, to) = (merit_text(run.start.merit), merit_text(run.best.merit));
-    format!("{standing}{why}, merit {from} to {to}")
+    format!("{status}{why}, merit {from} to {to}")
 }
 
 /// The work done so far, and its rate.
@@ -70,7 +70,7 @@ fn duration_text(seconds: f64) -> String {
     }
 }
 
-/// That a lens breaks so many limits.
+/// The number of limits that a lens violates.
 pub(super) fn violations_text(lens: &str, count: usize) -> String {
     let limits = if count == 1 { "limit" } else { "limits" };
     format!("The {lens} violates {count} {limits}; an exported lens has to satisfy them")
@@ -95,7 +95,7 @@ pub(super) fn checkpoint_text(checkpoint: &CheckpointStatus) -> (String, bool) {
 pub(super) fn lens_text(found: &FoundLens) -> String {
     let merit = merit_text(found.merit);
     let elements = found.elements;
-    let design = found.score.as_ref().map(|judged| &judged.score);
+    let design = found.score.as_ref().map(|scored| &scored.score);
     match design {
         Some(Ok(ParetoPoint { spot, light, .. })) => {
             let [spot, light] = [1e3 * spot, *light].map(|v| number::format_digits(v, 3));
@@ -135,8 +135,8 @@ pub(super) fn comparison(
     );
 }
 
-fn scored_design(judged: &ScoredLens) -> Option<&ParetoPoint> {
-    judged.score.as_ref().ok()
+fn scored_design(scored: &ScoredLens) -> Option<&ParetoPoint> {
+    scored.score.as_ref().ok()
 }
 
 fn change_text(name: &str, old: f64, new: f64, unit: &str) -> String {

@@ -5,20 +5,21 @@ use std::sync::Arc;
 use egui::{ColorImage, TextureHandle, TextureOptions, Ui, Vec2};
 
 use crate::lens::{Lens, added_glass};
+use crate::studio::cached::ByAddress;
 use crate::studio::draw::{BoundingBox, Camera, Scene, software};
 use crate::studio::palette::Palette;
 use crate::studio::section::LensSection;
 use glam::DVec2;
 
-/// So many drawings are kept.
+/// The number of drawings that are cached.
 const CAPACITY: usize = 64;
-/// The free room around a lens, in pixels.
+/// The margin around a lens, in pixels.
 const MARGIN: f64 = 4.0;
 
-/// The drawings so far.
+/// The cached drawings.
 #[derive(Default)]
 pub(super) struct Thumbnails {
-    /// The one that was used last stands last.
+    /// The most recently used one is the last.
     cached: Vec<Thumbnail>,
 }
 
@@ -33,26 +34,18 @@ struct Thumbnail {
     texture: Option<TextureHandle>,
 }
 
-/// All on which a drawing depends.
+/// The key of a drawing.
+#[derive(PartialEq)]
 struct ThumbnailKey {
-    lens: Arc<Lens>,
-    design: Arc<Lens>,
+    lens: ByAddress<Lens>,
+    design: ByAddress<Lens>,
     palette: Palette,
     size: [u32; 2],
 }
 
-impl PartialEq for ThumbnailKey {
-    /// Lenses are compared by address, which cannot be another's while they are held.
-    fn eq(&self, other: &Self) -> bool {
-        Arc::ptr_eq(&self.lens, &other.lens)
-            && Arc::ptr_eq(&self.design, &other.design)
-            && self.palette == other.palette
-            && self.size == other.size
-    }
-}
-
 impl Thumbnails {
-    /// The drawing of a lens beside the design; none of one that cannot be traced.
+    /// The drawing of a lens, with glass tinted that the design does not have; `None` if it cannot
+    /// be traced.
     pub(super) fn texture(
         &mut self,
         ui: &Ui,
@@ -64,8 +57,7 @@ impl Thumbnails {
         let palette = Palette::for_visuals(ui.visuals());
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]
         let size = [size.x, size.y].map(|length| (length * per_point).round() as u32);
-        let key =
-            ThumbnailKey { lens: Arc::clone(lens), design: Arc::clone(design), palette, size };
+        let key = ThumbnailKey { lens: lens.into(), design: design.into(), palette, size };
         let known = self.cached.iter().position(|drawn| drawn.key == key);
         let drawn = known.map(|place| self.cached.remove(place));
         let drawn = drawn.unwrap_or_else(|| Thumbnail { texture: draw(ui, &key), key });
@@ -86,7 +78,7 @@ fn draw(ui: &Ui, key: &ThumbnailKey) -> Option<TextureHandle> {
     section.draw_glass(&mut scene, palette, &added_glass(lens, design));
     section.draw_outlines(&mut scene, palette);
     let BoundingBox { min, max } = section.bounds()?;
-    // The axis goes on a little beyond both ends.
+    // The axis extends a little beyond both ends.
     let ends = 0.05 * DVec2::new(max.x - min.x, 0.0);
     let whole = BoundingBox { min: min - ends, max: max + ends };
     let camera = Camera::fit(whole, DVec2::new(size[0].into(), size[1].into()), MARGIN);
