@@ -1,41 +1,40 @@
 //! A lens in section, as every figure of the thesis shows it: glass, stop, rays.
 
-use crate::lens::System;
+use crate::lens::{LensSection, System};
 use crate::plot::{BLACK, Canvas, Chart, Color, GREY, Stroke};
 use crate::pupil::Launch;
 
-/// Points of a surface on each side of the axis.
-const POINTS: i32 = 24;
+/// Straight pieces of a surface.
+const PIECES: u32 = 48;
 /// How far the blades of a stop reach beyond its opening, in semi-diameters of the largest surface.
 const BLADE: f64 = 1.1;
 
 /// A system in its section through the axis, `z` to the right and `y` upwards, in mm.
 pub(super) struct SectionPlot<'a> {
-    system: &'a System<f64>,
-    vertices: Vec<f64>,
+    section: LensSection<'a>,
     reach: f64,
 }
 
 impl<'a> SectionPlot<'a> {
     pub(super) fn new(system: &'a System<f64>) -> Self {
-        let vertices = system.vertex_positions();
         let sizes = system.surfaces.iter().map(|surface| surface.semi_diameter);
         let reach = sizes.filter(|size| size.is_finite()).fold(0.0, f64::max);
-        Self { system, vertices, reach }
+        Self { section: LensSection::new(system, &[]), reach }
     }
 
     /// The corners of what is drawn: `z` and `y`.
     pub(super) fn extent(&self) -> [[f64; 2]; 2] {
         let high = BLADE * self.reach;
-        let image = self.vertices.last().copied().unwrap_or(0.0);
+        let image = self.section.image_position();
         [[-self.reach, image], [-high, high]]
     }
 
     /// Draws the surfaces, the edges of the glass, the blades of the stop and the image plane.
     pub(super) fn draw(&self, canvas: &mut Canvas, chart: &Chart) {
-        let last = self.system.surfaces.len() - 1;
+        let system = self.section.system();
+        let last = self.section.image();
         for i in 0..last {
-            if self.system.stop == Some(i) && self.system.index_before(i) == self.index_behind(i) {
+            if system.stop == Some(i) && system.index_before(i) == self.index_behind(i) {
                 self.draw_blades(canvas, chart, i);
                 continue;
             }
@@ -44,7 +43,7 @@ impl<'a> SectionPlot<'a> {
                 self.draw_edges(canvas, chart, i);
             }
         }
-        let image = self.vertices[last];
+        let image = self.section.image_position();
         let ends = [[image, -self.reach], [image, self.reach]];
         canvas.curve(&chart.to_pixels(&ends), BLACK, Stroke::Dashed);
     }
@@ -70,17 +69,11 @@ impl<'a> SectionPlot<'a> {
     }
 
     fn index_behind(&self, surface: usize) -> f64 {
-        self.system.surfaces[surface].index
+        self.section.system().surfaces[surface].index
     }
 
     fn arc(&self, surface: usize) -> Vec<[f64; 2]> {
-        let (row, vertex) = (&self.system.surfaces[surface], self.vertices[surface]);
-        let height = row.semi_diameter.min(self.reach);
-        let at = |i: i32| {
-            let y = height * f64::from(i) / f64::from(POINTS);
-            row.shape.sag(y * y).map(|(sag, _)| [vertex + sag, y])
-        };
-        (-POINTS..=POINTS).filter_map(at).collect()
+        self.section.surface(surface, PIECES)
     }
 
     /// From the rim of a surface to that of the next one.
@@ -94,7 +87,8 @@ impl<'a> SectionPlot<'a> {
     }
 
     fn draw_blades(&self, canvas: &mut Canvas, chart: &Chart, surface: usize) {
-        let (opening, z) = (self.system.surfaces[surface].semi_diameter, self.vertices[surface]);
+        let opening = self.section.system().surfaces[surface].semi_diameter;
+        let z = self.section.vertices()[surface];
         for side in [-1.0, 1.0] {
             let blade = [[z, side * opening], [z, side * BLADE * self.reach]];
             let blade = chart.to_pixels(&blade);

@@ -19,7 +19,7 @@ use crate::studio::cached::{ByAddress, Cached};
 use crate::studio::draw::{BoundingBox, RenderBackend, Rgba, Scene, SceneResponse, SceneView};
 use crate::studio::number;
 use crate::studio::palette::{Palette, color32};
-use crate::studio::section::LensSection;
+use crate::studio::section::SectionDrawing;
 use crate::trace::Fates;
 
 /// The distance in points within which the pointer picks a surface.
@@ -196,7 +196,7 @@ impl LayoutDrawing {
         let (bench, layout) = (&numbers.bench.value, &numbers.layout.value);
         let palette = source.palette;
         let system = bench.channels[bench.primary].system.clone();
-        let section = LensSection::new(&system, &layout.ray_heights);
+        let section = SectionDrawing::new(&system, &layout.ray_heights);
         let mut scene = Scene::on(palette.background);
         if let Some(Ok(design)) = source.reference.as_ref().map(|reference| &reference.analyses) {
             draw_reference(&mut scene, design, &palette);
@@ -227,12 +227,12 @@ impl LayoutDrawing {
         view: &SessionView,
         shown: &SceneResponse,
     ) -> Option<usize> {
-        let section = LensSection::new(&self.system, &self.reached);
+        let section = SectionDrawing::new(&self.system, &self.reached);
         let count = self.system.surfaces.len();
         let near = shown.pointer().and_then(|(at, mm)| section.surface_near(at, NEAR * mm));
         let selected = view.selected.filter(|surface| *surface < count && near != view.selected);
         for surface in selected.into_iter().chain(near) {
-            let curve = section.outline_of(surface);
+            let curve = section.surface(surface);
             let curve = curve.into_iter().map(|mm| shown.to_screen(mm)).collect();
             let stroke = Stroke::new(2.5, ui.visuals().selection.stroke.color);
             ui.painter_at(shown.response.rect).line(curve, stroke);
@@ -266,7 +266,8 @@ impl LayoutDrawing {
 fn draw_reference(scene: &mut Scene, design: &Analyses, palette: &Palette) {
     let bench = &design.bench.value;
     let system = &bench.channels[bench.primary].system;
-    LensSection::new(system, &design.layout.value.ray_heights).draw_ghost(scene, palette.faint);
+    SectionDrawing::new(system, &design.layout.value.ray_heights)
+        .draw_reference(scene, palette.faint);
 }
 
 /// The lowest and the highest place of the image plane that rays reach, with some room.
@@ -278,20 +279,25 @@ fn image_extent(layout: &RayLayout) -> Option<(f64, f64)> {
     Some((min.y - room, max.y + room))
 }
 
-fn draw_image(scene: &mut Scene, section: &LensSection<'_>, layout: &RayLayout, palette: &Palette) {
-    let z = section.image();
+fn draw_image(
+    scene: &mut Scene,
+    section: &SectionDrawing<'_>,
+    layout: &RayLayout,
+    palette: &Palette,
+) {
+    let z = section.image_position();
     let (low, high) = image_extent(layout).unwrap_or_default();
-    let reach = low.abs().max(high.abs()).max(section.highest());
+    let reach = low.abs().max(high.abs()).max(section.max_height());
     let (low, high) = (low.min(-0.4 * reach), high.max(0.4 * reach));
     scene.line(DVec2::new(z, low), DVec2::new(z, high), 1.5, palette.strong);
 }
 
 /// The extent that *Fit* shows: the lens, the image and the starts of the rays.
-fn full_view(section: &LensSection<'_>, layout: &RayLayout) -> Option<BoundingBox> {
+fn full_view(section: &SectionDrawing<'_>, layout: &RayLayout) -> Option<BoundingBox> {
     let lens = section.bounds()?;
-    let z = section.image();
+    let z = section.image_position();
     let ends = image_extent(layout).map(|(low, high)| [DVec2::new(z, low), DVec2::new(z, high)]);
-    let high = 1.4 * section.highest();
+    let high = 1.4 * section.max_height();
     let starts = layout.rays.iter().filter_map(|ray| ray.path.points.first());
     let starts = starts.map(|start| DVec2::new(start.z, start.y.clamp(-high, high)));
     BoundingBox::around(

@@ -8,7 +8,7 @@ use crate::lens::{Lens, added_glass};
 use crate::studio::cached::ByAddress;
 use crate::studio::draw::{BoundingBox, Camera, Scene, software};
 use crate::studio::palette::Palette;
-use crate::studio::section::LensSection;
+use crate::studio::section::SectionDrawing;
 use glam::DVec2;
 
 /// The number of drawings that are cached.
@@ -73,7 +73,7 @@ impl Thumbnails {
 fn draw(ui: &Ui, key: &ThumbnailKey) -> Option<TextureHandle> {
     let ThumbnailKey { lens, design, palette, size } = key;
     let system = lens.resolve(0, lens.wavelengths[lens.primary()].um).ok()?;
-    let section = LensSection::new(&system, &[]);
+    let section = SectionDrawing::new(&system, &[]);
     let mut scene = Scene::on([0, 0, 0, 0]);
     section.draw_glass(&mut scene, palette, &added_glass(lens, design));
     section.draw_outlines(&mut scene, palette);

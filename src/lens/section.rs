@@ -1,0 +1,152 @@
+//! The section of a lens in the y-z plane, as points that anything can draw.
+//!
+//! An element extends to the larger of its two semi-diameters; the smaller surface continues flat,
+//! as lenses are ground. A surface without a semi-diameter extends to its outermost rays, or else as
+//! far as the largest surface.
+
+use super::System;
+
+/// The section of a system. Points are `[z, y]` in mm from the first vertex.
+#[derive(Clone, Debug)]
+pub struct LensSection<'a> {
+    system: &'a System<f64>,
+    vertices: Vec<f64>,
+    heights: Vec<f64>,
+}
+
+impl<'a> LensSection<'a> {
+    /// The section of a system. `ray_heights` holds the largest height of the rays at each surface,
+    /// in mm; it may be empty.
+    pub fn new(system: &'a System<f64>, ray_heights: &[f64]) -> Self {
+        let heights = heights(system, ray_heights);
+        Self { system, vertices: system.vertex_positions(), heights }
+    }
+
+    /// The system.
+    pub const fn system(&self) -> &'a System<f64> {
+        self.system
+    }
+
+    /// The position of every vertex on the axis, the image plane last.
+    pub fn vertices(&self) -> &[f64] {
+        &self.vertices
+    }
+
+    /// The height to which every surface extends, in mm.
+    pub fn heights(&self) -> &[f64] {
+        &self.heights
+    }
+
+    /// The z of the image plane, in mm.
+    pub fn image_position(&self) -> f64 {
+        self.vertices.last().copied().unwrap_or(0.0)
+    }
+
+    /// The largest height of the lens above the axis, without the image plane, in mm.
+    pub fn max_height(&self) -> f64 {
+        self.heights.iter().take(self.image()).copied().fold(0.0, f64::max)
+    }
+
+    /// The index of the image plane.
+    pub const fn image(&self) -> usize {
+        self.vertices.len().saturating_sub(1)
+    }
+
+    /// The elements: the index of the front surface, and the refractive index.
+    pub fn elements(&self) -> impl Iterator<Item = (usize, f64)> {
+        let filled = self.system.surfaces.iter().take(self.image()).enumerate();
+        filled.filter(|(_, s)| !s.mirror && s.index != 1.0).map(|(i, s)| (i, s.index))
+    }
+
+    /// The front and the back of the element behind a surface, from below to above, each in this
+    /// number of straight pieces.
+    pub fn element(&self, front: usize, pieces: u32) -> [Vec<[f64; 2]>; 2] {
+        let height = self.heights[front].max(self.heights[front + 1]);
+        [front, front + 1].map(|surface| self.curve(surface, height, pieces))
+    }
+
+    /// A surface from its lower rim to its upper one, in this number of straight pieces.
+    pub fn surface(&self, surface: usize, pieces: u32) -> Vec<[f64; 2]> {
+        self.curve(surface, self.heights[surface], pieces)
+    }
+
+    /// The point of a surface at a height, flat beyond its own semi-diameter.
+    pub fn point(&self, surface: usize, height: f64) -> [f64; 2] {
+        let ground = height.abs().min(self.heights[surface]);
+        let sag = self.system.surfaces[surface].shape.clamped_sag(ground);
+        [self.vertices[surface] + sag, height]
+    }
+
+    /// The surface that passes nearest to a point, no farther than `within` mm along the axis.
+    pub fn surface_near(&self, [z, y]: [f64; 2], within: f64) -> Option<usize> {
+        let distance = |i: &usize| (self.point(*i, y)[0] - z).abs();
+        let reaches = |i: &usize| y.abs() <= self.heights[*i] + within;
+        (0..self.heights.len())
+            .filter(reaches)
+            .min_by(|a, b| distance(a).total_cmp(&distance(b)))
+            .filter(|i| distance(i) <= within)
+    }
+
+    fn curve(&self, surface: usize, height: f64, pieces: u32) -> Vec<[f64; 2]> {
+        let share = |i: u32| 2.0 * f64::from(i) / f64::from(pieces) - 1.0;
+        (0..=pieces).map(|i| self.point(surface, height * share(i))).collect()
+    }
+}
+
+fn heights(system: &System<f64>, ray_heights: &[f64]) -> Vec<f64> {
+    let written = |i: usize| Some(system.surfaces[i].semi_diameter).filter(|h| h.is_finite());
+    let rays = |i: usize| ray_heights.get(i).copied().filter(|h| *h > 0.0 && h.is_finite());
+    let known: Vec<Option<f64>> =
+        (0..system.surfaces.len()).map(|i| written(i).or_else(|| rays(i))).collect();
+    let highest = known.iter().flatten().copied().fold(0.0, f64::max);
+    let otherwise = if highest > 0.0 { highest } else { 1.0 };
+    known.into_iter().map(|height| height.unwrap_or(otherwise)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lens::{Shape, Surface};
+
+    fn surface(curvature: f64, thickness: f64, index: f64, semi_diameter: f64) -> Surface<f64> {
+        let shape = Shape::Sphere { curvature };
+        let obstruction = 0.0;
+        Surface {
+            shape,
+            thickness,
+            index,
+            semi_diameter,
+            obstruction,
+            mirror: false,
+            hyperhemisphere: false,
+            grin: None,
+        }
+    }
+
+    fn singlet() -> System<f64> {
+        let mut surfaces = vec![
+            surface(0.02, 5.0, 1.5, 10.0),
+            surface(-0.02, 95.0, 1.0, 8.0),
+            surface(0.0, 0.0, 1.0, f64::INFINITY),
+        ];
+        surfaces[2].shape = Shape::Plane;
+        System { index_before: 1.0, surfaces, stop: Some(1) }
+    }
+
+    #[test]
+    fn an_element_reaches_to_its_larger_semi_diameter() {
+        let system = singlet();
+        let section = LensSection::new(&system, &[]);
+        let [_, back] = section.element(0, 96);
+        let rim = back.last().copied().unwrap_or_default();
+        assert_eq!(rim[1], 10.0);
+        assert!((rim[0] - (5.0 - 0.02 * 64.0 / (1.0 + (1.0_f64 - 0.0256).sqrt()))).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_surface_without_semi_diameter_reaches_as_far_as_its_rays() {
+        let system = singlet();
+        assert_eq!(LensSection::new(&system, &[9.0, 9.0, 3.0]).heights, [10.0, 8.0, 3.0]);
+        assert_eq!(LensSection::new(&system, &[]).heights, [10.0, 8.0, 10.0]);
+    }
+}
