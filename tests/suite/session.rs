@@ -133,7 +133,6 @@ fn every_edit(lens: &Lens) -> Vec<Edit> {
     let row = Row { curvature: 0.01, thickness, ..Row::default() };
     vec![
         Edit::Set { parameter: GAP, value: 0.2 },
-        Edit::set_radius(0, 16.0),
         Edit::SetSemiDiameter { surface: 0, value: None },
         Edit::SetAsphere { surface: 0, terms: vec![1e-7, 2e-10] },
         Edit::SetMedium { surface: 0, medium: Medium::Model { nd: 1.6, vd: 50.0 } },
@@ -231,6 +230,13 @@ fn every_kind_of_edit_is_undone_and_redone_exactly() {
         assert_eq!(session.lens(), after);
     }
     assert!(session.view().redo.is_none() && session.is_dirty());
+}
+
+#[test]
+fn a_radius_of_zero_or_infinity_is_a_plane() {
+    for (radius, value) in [(16.0, 0.0625), (-4.0, -0.25), (0.0, 0.0), (f64::INFINITY, 0.0)] {
+        assert_eq!(Edit::set_radius(0, radius), Edit::Set { parameter: CURVATURE, value });
+    }
 }
 
 #[test]
