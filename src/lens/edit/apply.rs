@@ -30,13 +30,13 @@ impl Lens {
             Edit::Set { parameter, value } => self.write(*parameter, *value)?,
             Edit::SetSemiDiameter { surface, value } => self.set_semi_diameter(*surface, *value)?,
             Edit::SetAsphere { surface, terms } => {
-                self.row_mut(*surface)?.asphere.clone_from(terms)
+                self.row_mut(*surface)?.asphere.clone_from(terms);
             }
             Edit::SetMedium { surface, medium } => self.set_medium(*surface, medium)?,
             Edit::SetObjectMedium(medium) => self.object_medium.clone_from(medium),
             Edit::SetStop(surface) => self.move_stop(*surface)?,
             Edit::SetHyperhemisphere { surface, hyper } => {
-                self.row_mut(*surface)?.hyperhemisphere = *hyper
+                self.row_mut(*surface)?.hyperhemisphere = *hyper;
             }
             Edit::SetComment { surface, text } => self.row_mut(*surface)?.comment.clone_from(text),
             Edit::SetRow { surface, row } => rows::replace(self, *surface, row)?,
