@@ -1,7 +1,7 @@
 //! The points of a spot diagram.
 //!
-//! They illustrate a spot; its RMS radius comes from a quadrature over the pupil (see [`super::spot`])
-//! and not from these rays.
+//! They illustrate a spot; its RMS radius comes from a quadrature over the pupil (see
+//! [`spot`](super::spot())) and not from these rays.
 
 use crate::pupil::{Launch, PupilPattern, RayModel, pattern_points};
 use crate::trace::{Fates, TraceSink};
