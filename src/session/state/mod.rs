@@ -258,10 +258,8 @@ impl Session {
 
     /// Requests the analysis of the lens that is shown in place of the design, if it is another one.
     fn sync_preview(&mut self) {
-        let Some((source, lens)) = self.previewed() else {
-            self.preview_request = None;
-            return;
-        };
+        // A chain of a search has no lens for a moment now and then: its last analysis stays valid.
+        let Some((source, lens)) = self.previewed() else { return };
         let last = self.preview_request.as_ref();
         let same_source = last.is_some_and(|last| last.source == source);
         let same_lens = last
