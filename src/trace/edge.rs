@@ -36,29 +36,51 @@ impl<R: Real> Tracer<R> {
     /// The margin of a ray at one limit, regardless of the rims in front; `None` for a ray that does
     /// not get there.
     pub fn margin(&self, ray: Ray<R>, surface: usize, limit: RayLimit) -> Option<R> {
-        let (p, k) = self.state_before(ray, surface)?;
-        Some(self.propagate(surface, p, k).margin(limit))
+        if self.grin_gaps.is_empty() {
+            let (p, k) = self.state_before::<false>(ray, surface)?;
+            Some(self.propagate::<false>(surface, p, k).margin(limit))
+        } else {
+            let (p, k) = self.state_before::<true>(ray, surface)?;
+            Some(self.propagate::<true>(surface, p, k).margin(limit))
+        }
     }
 
     /// The landing of a ray on the edge, whose margin at a limit is zero. The cosine that vanishes
     /// there is set to zero, because the root of its rounding error would cost half of the digits;
     /// rims clip nothing. `None` for a ray that does not arrive.
     pub fn land_at_edge(&self, ray: Ray<R>, surface: usize, limit: RayLimit) -> Option<Vec3<R>> {
+        if self.grin_gaps.is_empty() {
+            self.edge_landing::<false>(ray, surface, limit)
+        } else {
+            self.edge_landing::<true>(ray, surface, limit)
+        }
+    }
+
+    fn edge_landing<const GRIN: bool>(
+        &self,
+        ray: Ray<R>,
+        surface: usize,
+        limit: RayLimit,
+    ) -> Option<Vec3<R>> {
         let mut k = optical_direction(ray.direction, self.index_before);
         let mut point = ray.point;
         for i in 0..self.interfaces.len() {
             let limit = (i == surface).then_some(limit);
-            (point, k) = self.propagate(i, point, k).cross_at_edge(limit)?;
+            (point, k) = self.propagate::<GRIN>(i, point, k).cross_at_edge(limit)?;
         }
         point.is_finite().then_some(point)
     }
 
     /// Point and optical direction of a ray in front of a surface, in the frame of the surface before.
-    fn state_before(&self, ray: Ray<R>, surface: usize) -> Option<(Vec3<R>, Vec3<R>)> {
+    fn state_before<const GRIN: bool>(
+        &self,
+        ray: Ray<R>,
+        surface: usize,
+    ) -> Option<(Vec3<R>, Vec3<R>)> {
         let mut k = optical_direction(ray.direction, self.index_before);
         let mut point = ray.point;
         for i in 0..surface {
-            (point, k) = self.propagate(i, point, k).cross_at_edge(None)?;
+            (point, k) = self.propagate::<GRIN>(i, point, k).cross_at_edge(None)?;
         }
         Some((point, k))
     }
@@ -129,7 +151,7 @@ impl Tracer<f64> {
         let mut total = SystemGradient::zero(self.interfaces.len());
         let mut seeds = vec![AdjointSeed::default(); rays.len()];
         for (i, (seed, weight)) in seeds.iter_mut().zip(weights).enumerate() {
-            let Some((p, k)) = self.state_before(rays.get(i), surface) else { continue };
+            let Some((p, k)) = self.state_before::<true>(rays.get(i), surface) else { continue };
             *seed = if self.touches_grin(surface) {
                 self.margin_seed::<GRIN_INPUTS>(surface, limit, (p, k), *weight, &mut total)
             } else {

@@ -276,16 +276,16 @@ impl<R: Real> WarpTracer<R> {
                 // Constant inside the loops, so that these have no branch.
                 match limit {
                     LimitFunction::Rim => {
-                        interface.limit_values(LimitFunction::Rim, &block, &slants, lanes)
+                        interface.limit_values(LimitFunction::Rim, &block, &slants, lanes);
                     }
                     LimitFunction::Obstruction => {
                         interface.limit_values(LimitFunction::Obstruction, &block, &slants, lanes);
                     }
                     LimitFunction::Angle => {
-                        interface.limit_values(LimitFunction::Angle, &block, &slants, lanes)
+                        interface.limit_values(LimitFunction::Angle, &block, &slants, lanes);
                     }
                     LimitFunction::ConicEdge => {
-                        interface.limit_values(LimitFunction::ConicEdge, &block, &slants, lanes)
+                        interface.limit_values(LimitFunction::ConicEdge, &block, &slants, lanes);
                     }
                 }
             }

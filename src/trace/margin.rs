@@ -39,11 +39,23 @@ impl<R: Real> Tracer<R> {
     /// an asphere that is missed, and the component of the normal along the axis at an equator. A
     /// surface that a GRIN medium touches is treated as an asphere, and the side of the medium as a
     /// rim.
-    pub fn margins(&self, ray: Ray<R>, mut visit: impl FnMut(usize, RayLimit, R)) {
+    pub fn margins(&self, ray: Ray<R>, visit: impl FnMut(usize, RayLimit, R)) {
+        if self.grin_gaps.is_empty() {
+            self.margins_loop::<false>(ray, visit);
+        } else {
+            self.margins_loop::<true>(ray, visit);
+        }
+    }
+
+    fn margins_loop<const GRIN: bool>(
+        &self,
+        ray: Ray<R>,
+        mut visit: impl FnMut(usize, RayLimit, R),
+    ) {
         let mut k = optical_direction(ray.direction, self.index_before);
         let mut point = ray.point;
         for i in 0..self.interfaces.len() {
-            let arrived = self.propagate(i, point, k);
+            let arrived = self.propagate::<GRIN>(i, point, k);
             arrived.margins(i, &mut visit);
             let Some(behind) = arrived.cross_at_edge(None) else { return };
             (point, k) = behind;
@@ -82,6 +94,7 @@ impl<R: Real> PropagatedRay<'_, R> {
     }
 
     /// The margin at one limit of the surface; see [`Tracer::margins`].
+    #[inline(always)]
     pub(super) fn margin(&self, limit: RayLimit) -> R {
         let (surface, met) = (self.surface, &self.met);
         match limit {
@@ -100,6 +113,7 @@ impl<R: Real> PropagatedRay<'_, R> {
     }
 
     /// `(k·N)²`, negative if no point of the ray lies on the surface.
+    #[inline(always)]
     fn miss_margin(&self, passes_by: bool) -> R {
         let square = match self.closed_form_miss_margin() {
             Some(margin) if self.surface.form == SurfaceForm::Plane => return margin,
@@ -114,6 +128,7 @@ impl<R: Real> PropagatedRay<'_, R> {
 
     /// The margin at a miss of a straight ray: at a plane the component of `k` along the axis, at a
     /// sphere or conic the discriminant.
+    #[inline(always)]
     fn closed_form_miss_margin(&self) -> Option<R> {
         let start = self.closed_form_start()?;
         Some(match self.surface.form {
@@ -122,16 +137,19 @@ impl<R: Real> PropagatedRay<'_, R> {
         })
     }
 
+    #[inline(always)]
     fn reflection_margin(&self) -> R {
         self.met.a * self.met.a + self.indices.dn2 * self.met.m
     }
 
     /// The component of the normal along the axis, negative behind the equator.
+    #[inline(always)]
     fn equator_margin(&self) -> R {
         self.met.normal.z - self.surface.min_normal_z
     }
 
     /// True if the far half of a sphere or conic is not part of the surface.
+    #[inline(always)]
     fn has_equator(&self) -> bool {
         self.has_closed_form()
             && self.surface.form != SurfaceForm::Plane
@@ -139,25 +157,30 @@ impl<R: Real> PropagatedRay<'_, R> {
     }
 
     /// True if the ray meets the surface behind its equator.
+    #[inline(always)]
     fn is_behind_equator(&self) -> bool {
         self.has_equator() && self.equator_margin() < R::ZERO
     }
 
+    #[inline(always)]
     fn has_closed_form(&self) -> bool {
         self.closed_form_start().is_some()
     }
 }
 
 impl<R: Real> Interface<R> {
+    #[inline(always)]
     fn rim_margin(&self, p: Vec3<R>) -> R {
         self.rim2 - (p.x * p.x + p.y * p.y)
     }
 
+    #[inline(always)]
     fn obstruction_margin(&self, p: Vec3<R>) -> R {
         p.x * p.x + p.y * p.y - self.obstruction2
     }
 
     /// `(k·N)²` at the intersection of a straight ray with a sphere or conic, negative for a miss.
+    #[inline(always)]
     fn discriminant(&self, p: Vec3<R>, k: Vec3<R>) -> R {
         let c = self.curvature;
         let axial = self.conic * p.z;

@@ -96,16 +96,19 @@ impl<'a, R: Real> PropagatedRay<'a, R> {
     }
 
     /// True if no GRIN medium touches the surface.
+    #[inline(always)]
     pub(super) fn is_straight(&self) -> bool {
         self.start.is_some()
     }
 
     /// The margin at the side of the glass; see [`super::RayLimit::Side`].
+    #[inline(always)]
     pub(super) fn side_margin(&self) -> Option<R> {
         self.side
     }
 
     /// True for a ray that a GRIN medium loses elsewhere than at the side of the glass.
+    #[inline(always)]
     pub(super) fn is_lost_inside(&self) -> bool {
         self.lost.is_some_and(|cause| cause != CLIPPED)
     }
@@ -215,10 +218,16 @@ impl<R: Real> Tracer<R> {
         }
     }
 
-    /// Propagates a ray from the frame of the surface before to a surface.
+    /// Propagates a ray from the frame of the surface before to a surface. `GRIN` must be true for a
+    /// lens with GRIN media; loops are compiled apart for others, since both in one cost registers.
     #[inline(always)]
-    pub(super) fn propagate(&self, i: usize, p: Vec3<R>, k: Vec3<R>) -> PropagatedRay<'_, R> {
-        if self.touches_grin(i) {
+    pub(super) fn propagate<const GRIN: bool>(
+        &self,
+        i: usize,
+        p: Vec3<R>,
+        k: Vec3<R>,
+    ) -> PropagatedRay<'_, R> {
+        if GRIN && self.touches_grin(i) {
             return self.site(i).propagate(p, k);
         }
         let surface = &self.interfaces[i];

@@ -105,13 +105,9 @@ impl<R: Real> Tracer<R> {
             (optical_direction(ray.direction, self.index_before), self.index_before);
         let (opl, first_backward_surface) = (R::ZERO, None);
         let mut traced = TracedRay { fate: Fate::Imaged, ray, opl, first_backward_surface };
-        for (i, surface) in self.interfaces[..surfaces].iter().enumerate() {
+        for i in 0..surfaces {
             let p = traced.ray.point;
-            let arrived = if GRIN {
-                self.propagate(i, p, k)
-            } else {
-                PropagatedRay::straight(surface, Vec3::new(p.x, p.y, p.z - surface.gap), k)
-            };
+            let arrived = self.propagate::<GRIN>(i, p, k);
             let Some(behind) = traced.cross(i, p, &arrived, &mut visit) else {
                 (k, index) = (arrived.k, arrived.indices.before);
                 break;

@@ -77,7 +77,8 @@ impl<R: Real> AdjointBlock<R> {
         }
         let mut front = ProfileGradient::default();
         if let Some(gap) = site.before {
-            self.retrace_gap(gap, j, point, &at, surface.gap, &mut front);
+            let end = Vec3::new(point.x, point.y, point.z + surface.gap);
+            self.retrace_gap(gap, j, end, &at, &mut front);
             self.by_index_behind[j] = at.back.by_dn2 * surface.index_behind * R::TWO;
         } else {
             let lambda = at.step_multiplier(self.by_opl[j] * surface.n2);
@@ -87,18 +88,17 @@ impl<R: Real> AdjointBlock<R> {
         (front, behind)
     }
 
-    /// The adjoint of the propagation through a GRIN medium to a point of the surface.
+    /// The adjoint of the propagation through a GRIN medium to a point of the surface, `x` in the frame
+    /// of the surface before.
     fn retrace_gap(
         &mut self,
         gap: &GrinGap<R>,
         j: usize,
-        point: Vec3<R>,
+        x: Vec3<R>,
         at: &SagRefractionAdjoint<R>,
-        thickness: R,
         by: &mut ProfileGradient<R>,
     ) {
         let back = &at.back;
-        let x = Vec3::new(point.x, point.y, point.z + thickness);
         let end = RayState { x, v: back.k, path: R::ZERO };
         let by_path = self.by_opl[j];
         // The index in front belongs to the end of the gap.
