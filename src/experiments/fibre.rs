@@ -4,7 +4,7 @@
 //! hyperbolic secant, which refocuses at one, three and five times that distance; the parabolic
 //! profile has no focus, so it is compared at those planes where its own blur is smallest.
 
-use super::grin_solution::{plot_medium, solve};
+use super::grin_solution::solve;
 use super::{
     Claim, DataTable, Effort, Experiment, ExperimentError, ExperimentOutcome, NamedPlot, ProgressFn,
 };
@@ -15,6 +15,7 @@ use crate::grin::{
 use crate::grin_design::{self, GrinField, GrinTask};
 use crate::math::Vec3;
 use crate::plot::{Axis, Canvas, Chart, Legend, PALETTE, Stroke};
+use crate::report::plot_grin_field;
 use std::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_2, SQRT_2};
 
 pub(super) const EXPERIMENT: Experiment = Experiment {
@@ -69,7 +70,7 @@ fn run(_: Effort, progress: &mut ProgressFn<'_>) -> Result<ExperimentOutcome, Ex
     let says = "relative difference from the hyperbolic secant";
     outcome.claims.push(Claim::at_most(says, relative, NEAR));
     outcome.tables.push(table);
-    outcome.pictures = plot_medium(&task, best);
+    outcome.pictures = plot_grin_field(&task, best);
     outcome
         .pictures
         .push(NamedPlot { name: "misses", canvas: draw_focus_errors(&task, best, &rays)? });

@@ -6,9 +6,10 @@
 //! both errors are reported. This explains the remark of the figure that the difference is largest
 //! at the boundary.
 
-use super::grin_solution::{plot_medium, solve};
+use super::grin_solution::solve;
 use super::{Claim, DataTable, Effort, Experiment, ExperimentError, ExperimentOutcome, ProgressFn};
 use crate::grin_design::{self, FieldDifference, GrinOptimizer, GrinTask, RefinementLevel};
+use crate::report::plot_grin_field;
 
 pub(super) const EXPERIMENT: Experiment = Experiment {
     id: "5.8",
@@ -64,7 +65,7 @@ fn run(
         ));
         outcome.rays += usize::try_from(optimizer.rays_traced()).unwrap_or(usize::MAX);
         table.push_row(row(case, &optimizer, found, judged.views[0].spot));
-        let pictures = plot_medium(&task, optimizer.best());
+        let pictures = plot_grin_field(&task, optimizer.best());
         let names = PICTURES[i];
         outcome.pictures.extend(pictures.into_iter().zip(names).map(|(mut picture, name)| {
             picture.name = name;

@@ -27,13 +27,12 @@ mod structure;
 mod vignetting;
 mod zoom;
 
-pub use grin_displays::plot_view;
-pub use grin_solution::plot_medium;
-pub use outcome::{Claim, ClaimRelation, DataTable, ExperimentOutcome, NamedPlot, TableCell};
+pub use outcome::{Claim, ClaimRelation, DataTable, ExperimentOutcome, TableCell};
 pub use report::{ExperimentReport, PhaseTiming};
 
 use crate::files;
 use crate::lens::Lens;
+use crate::plot::NamedPlot;
 use serde::{Deserialize, Serialize};
 use std::ops::ControlFlow;
 

@@ -1,7 +1,7 @@
 //! The outcome of an experiment: claims with limits, tables, plots.
 
 use crate::lens::Lens;
-use crate::plot::Canvas;
+use crate::plot::NamedPlot;
 use serde::Serialize;
 use std::fmt::{self, Display};
 
@@ -200,15 +200,6 @@ impl Display for TableCell {
             Self::Word(word) => f.write_str(word),
         }
     }
-}
-
-/// A plot with its name.
-#[derive(Debug, Clone, PartialEq)]
-pub struct NamedPlot {
-    /// The name, as a part of a file name.
-    pub name: &'static str,
-    /// The image.
-    pub canvas: Canvas,
 }
 
 #[cfg(test)]

@@ -15,7 +15,7 @@
 //! too, but it depends more on the contrast than on the method: a constant index reaches 0.0088 on
 //! the data of the table. The error relative to the contrast measures the reconstruction.
 
-use super::grin_solution::{plot_medium, solve};
+use super::grin_solution::solve;
 use super::{
     Claim, DataTable, Effort, Experiment, ExperimentError, ExperimentOutcome, NamedPlot,
     ProgressFn, TableCell, report_progress,
@@ -29,6 +29,7 @@ use crate::math::Vec3;
 use crate::plot::{
     Axis, BLACK, Canvas, Chart, Color, GREY, Legend, PALETTE, Stroke, TextAlign, gray_level,
 };
+use crate::report::plot_grin_field;
 use rayon::prelude::*;
 use std::ops::ControlFlow;
 
@@ -120,7 +121,7 @@ fn run(
     outcome.pictures.push(NamedPlot { name: "errors", canvas: chart(&rows) });
     outcome.pictures.push(NamedPlot { name: "sections", canvas: sections(&rows) });
     if let Some(row) = rows.last() {
-        let light = plot_medium(&row.task, &row.adjoint.medium).into_iter().nth(1);
+        let light = plot_grin_field(&row.task, &row.adjoint.medium).into_iter().nth(1);
         outcome
             .pictures
             .extend(light.map(|NamedPlot { canvas, .. }| NamedPlot { name: "light", canvas }));

@@ -37,6 +37,15 @@ pub enum Stroke {
 #[derive(Debug, Clone, PartialEq)]
 pub struct Canvas(RgbImage);
 
+/// A plot with its name.
+#[derive(Debug, Clone, PartialEq)]
+pub struct NamedPlot {
+    /// The name, as a part of a file name.
+    pub name: &'static str,
+    /// The image.
+    pub canvas: Canvas,
+}
+
 impl Canvas {
     /// A white image of this width and height.
     pub fn new([width, height]: [u32; 2]) -> Self {

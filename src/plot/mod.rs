@@ -9,7 +9,7 @@ mod font;
 mod image_row;
 mod legend;
 
-pub use canvas::{Canvas, Stroke, TextAlign};
+pub use canvas::{Canvas, NamedPlot, Stroke, TextAlign};
 pub use chart::{Axis, Chart};
 pub use color::{BLACK, Color, GREY, GRID, PALETTE, diverging, gray_level};
 pub use image_row::{draw_image_row, gray_levels};

@@ -11,7 +11,8 @@ use super::file_dialog::FileRequest;
 use super::number;
 use super::palette::{Palette, color32};
 use super::text::capitalize;
-use crate::experiments::{ALL, Claim, Effort, Experiment, ExperimentReport, NamedPlot};
+use crate::experiments::{ALL, Claim, Effort, Experiment, ExperimentReport};
+use crate::plot::NamedPlot;
 use crate::session::{Command, ExperimentRun, ExperimentStatus};
 
 /// The pictures of the experiment that is shown, as textures.

@@ -9,10 +9,11 @@ use super::input::{check_output_file, read_json};
 use super::output::Output;
 use super::output_paths::check_distinct;
 use super::progress::{progress_bar, stop_flag};
-use crate::experiments::{plot_medium, plot_view};
+
 use crate::files;
 use crate::grin_design::{self, GrinField, GrinOptimizer, GrinTask};
 use crate::measure::{Stopwatch, peak_megabytes, processor_ms};
+use crate::report::{plot_grin_field, plot_grin_image};
 use report::{GrinCostSummary, GrinReport};
 use serde::Serialize;
 use std::fmt::{self, Display};
@@ -101,7 +102,7 @@ impl GrinArgs {
             written.extend(files.iter().map(|file| file.display().to_string()));
         }
         if let Some(folder) = &self.png {
-            for picture in plot_medium(task, best) {
+            for picture in plot_grin_field(task, best) {
                 let path = folder.join(format!("{}.png", picture.name));
                 files::write_atomic(&path, &picture.canvas.png().map_err(|error| failed(&error))?)?;
                 written.push(path.display().to_string());
@@ -109,7 +110,7 @@ impl GrinArgs {
             let seen = task.report_views(best).map_err(|error| failed(&error))?;
             for (i, (view, seen)) in task.views.iter().zip(&seen).enumerate() {
                 let Some(image) = &seen.image else { continue };
-                let canvas = plot_view(&view.name, image, seen.result.psnr.unwrap_or(0.0));
+                let canvas = plot_grin_image(&view.name, image, seen.result.psnr.unwrap_or(0.0));
                 let path = folder.join(format!("view-{}.png", i + 1));
                 files::write_atomic(&path, &canvas.png().map_err(|error| failed(&error))?)?;
                 written.push(path.display().to_string());

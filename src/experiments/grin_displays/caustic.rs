@@ -8,12 +8,12 @@
 use super::{COLUMNS, EvaluatedField, independent_task, solve_and_evaluate, task};
 use crate::experiments::grin_solution::solve;
 use crate::experiments::{
-    Claim, DataTable, Effort, Experiment, ExperimentError, ExperimentOutcome, NamedPlot,
-    ProgressFn, plot_medium,
+    Claim, DataTable, Effort, Experiment, ExperimentError, ExperimentOutcome, NamedPlot, ProgressFn,
 };
 use crate::grin::{GrinTracer, RayExit, plan_tracing};
 use crate::grin_design::{GrinField, GrinTask, LightGoal};
 use crate::plot::{Canvas, draw_image_row, gray_levels};
+use crate::report::plot_grin_field;
 
 pub(in crate::experiments) const EXPERIMENT: Experiment = Experiment {
     id: "5.7",
@@ -67,7 +67,7 @@ const FAR: [&str; 2] = ["far", "far-section"];
 
 fn pictures_of(evaluated: &EvaluatedField, [image, section]: [&'static str; 2]) -> Vec<NamedPlot> {
     let mut pictures = evaluated.pictures(&[image]);
-    let of_medium = plot_medium(evaluated.optimizer.task(), evaluated.optimizer.best());
+    let of_medium = plot_grin_field(evaluated.optimizer.task(), evaluated.optimizer.best());
     pictures
         .extend(of_medium.into_iter().last().map(|picture| NamedPlot { name: section, ..picture }));
     pictures

@@ -5,20 +5,15 @@
 
 pub(super) mod caustic;
 pub(super) mod display;
-mod image_plots;
 pub(super) mod multifocal;
 pub(super) mod resolution;
 
-pub use image_plots::plot_view;
-
 use super::grin_solution::{solve, solve_from};
-use super::{
-    Claim, DataTable, Effort, ExperimentError, ExperimentOutcome, NamedPlot, ProgressFn,
-    plot_medium,
-};
+use super::{Claim, DataTable, Effort, ExperimentError, ExperimentOutcome, NamedPlot, ProgressFn};
 use crate::grin_design::{
     self, GrinField, GrinOptimizer, GrinTask, LightGoal, LightSource, ViewReport,
 };
+use crate::report::{plot_grin_field, plot_grin_image};
 
 /// The rays along a side of a beam in the evaluation, relative to the optimization.
 const FINER: f64 = 1.57;
@@ -156,7 +151,7 @@ impl EvaluatedField {
         let images = self.views.iter().filter_map(|views| Some((views, views.image.as_ref()?)));
         let picture = |((views, image), name): ((&ViewReport, _), &&'static str)| {
             let quality = views.result.psnr.unwrap_or(f64::NAN);
-            let canvas = plot_view(name, image, quality);
+            let canvas = plot_grin_image(name, image, quality);
             NamedPlot { name, canvas }
         };
         images.zip(names).map(picture).collect()
@@ -180,7 +175,7 @@ fn outcome_of(
     let mut claims = evaluated.claims(quality, correlation);
     claims.extend(evaluated.manufacturability());
     let mut pictures = evaluated.pictures(names);
-    pictures.extend(plot_medium(evaluated.optimizer.task(), evaluated.optimizer.best()));
+    pictures.extend(plot_grin_field(evaluated.optimizer.task(), evaluated.optimizer.best()));
     ExperimentOutcome {
         claims,
         tables: vec![table],
