@@ -6,7 +6,7 @@
 
 use super::clock::time_ms;
 use super::grin_starts::GrinStarts;
-use super::memory::{MemoryUse, peak_megabytes};
+use super::process::{MemoryUse, peak_megabytes};
 use super::spot::Precision;
 use crate::grin::field::{GridError, HessianDiagonal, RegularGrid, Trilinear};
 use crate::grin::{

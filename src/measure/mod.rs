@@ -10,7 +10,6 @@ mod gradient;
 mod grin;
 mod grin_starts;
 mod machine;
-mod memory;
 mod optimize;
 mod process;
 mod rates;
@@ -30,9 +29,8 @@ pub use grin::{
 };
 pub use grin_starts::GrinStarts;
 pub use machine::Machine;
-pub use memory::{MemoryUse, peak_megabytes};
 pub use optimize::{StepCosts, StepRow, measure_step_costs};
-pub use process::{age_ms, processor_ms};
+pub use process::{MemoryUse, age_ms, peak_megabytes, processor_ms};
 pub use rates::RateStatistics;
 pub use rounding::{Rounding, measure_rounding};
 pub use search::{MeritQuantiles, SearchBenchmark, SearchBudget, SearchRow, compare_searches};

@@ -1,7 +1,7 @@
 //! Throughput of the tracer in ray-surfaces per second, with the rounding error of each precision.
 
 use super::double_gauss::{bundle, double_gauss};
-use super::memory::{MemoryUse, peak_megabytes};
+use super::process::{MemoryUse, peak_megabytes};
 use super::rates::{RateStatistics, TimedCase, time_interleaved};
 use super::rounding::{Rounding, measure_rounding};
 use crate::lens::{LensError, Shape, System, SystemError, glass::line};

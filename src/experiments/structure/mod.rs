@@ -7,9 +7,8 @@
 //! gradients. A gradient costs the same for all of them: one merit with all its derivatives at one
 //! lens. A step of damped least squares counts as many as it tries.
 
-pub(super) mod brute_force;
+pub(super) mod baselines;
 pub(super) mod front_with_mutations;
-pub(super) mod metropolis;
 pub(super) mod overview_figure;
 pub(super) mod projection;
 mod recorded_search;
