@@ -1,11 +1,10 @@
 //! Search over structure: a Markov chain that mixes descent with adding, removing, gluing and
 //! splitting elements (Teh, *Computational Lens Design*, chapter 4).
 //!
-//! A [`Landscape`] says what a point is, how a descent moves it, how it mutates and what it is
-//! worth; the samplers know nothing of lenses, so that a toy problem tests exactly the text that
-//! searches lenses. All of a run follows from its seed and settings: chains are as many as the
-//! settings say, whatever the number of threads, and whatever is remembered between two moves can
-//! be written down and read again.
+//! A [`Landscape`] defines the points of a search, their loss, descent and mutations. The samplers
+//! do not depend on lenses, so that a toy problem tests the same code that searches lenses. A run
+//! is determined by its seed and settings, independent of the number of threads, and its complete
+//! state can be saved between two rounds and resumed.
 
 mod bookkeeping;
 mod checkpoint;

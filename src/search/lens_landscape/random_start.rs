@@ -2,14 +2,13 @@
 
 use super::focal_length::focal_length_of;
 use super::open_apertures::with_open_rims;
+use super::variables::MAX_CURVATURE;
 use crate::lens::{Lens, Medium, Parameter, Quantity, paraxial_image_distance};
 use crate::search::{Random, SearchRules};
 use rand::RngExt as _;
 
 /// The maximum random gap, relative to the focal length.
 const MAX_GAP: f64 = 0.2;
-/// The maximum random curvature, times the focal length.
-const MAX_CURVATURE: f64 = 4.0;
 /// The maximum factor by which a random lens is scaled to the focal length.
 const MAX_RESCALING: f64 = 4.0;
 

@@ -19,7 +19,7 @@ pub(super) struct VariableRules {
 }
 
 /// The maximum curvature, times the focal length.
-const MAX_CURVATURE: f64 = 4.0;
+pub(super) const MAX_CURVATURE: f64 = 4.0;
 /// The minimum semi-diameter, relative to the focal length.
 const MIN_SEMI_DIAMETER: f64 = 0.02;
 /// The permitted range of the index of a model glass.

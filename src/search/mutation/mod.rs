@@ -25,14 +25,12 @@ mod singlet;
 mod spacing;
 mod split;
 mod stop;
-mod weights;
 
-pub use kind::MutationKind;
+pub use kind::{MutationKind, MutationWeights};
 pub(super) use record::read_record;
 pub use record::{MutationRecord, StructureChange};
 pub(super) use refusal::read_counts;
 pub use refusal::{MutationError, Refusal};
-pub use weights::MutationWeights;
 
 use super::projection::{ProjectionError, project, scale};
 use super::{MutatedPoint, Projection, Random, SearchRules};

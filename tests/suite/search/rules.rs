@@ -122,7 +122,7 @@ fn limits_that_no_lens_keeps_are_refused() {
         "{narrow}"
     );
     let short = refusal(SearchRules { track: Some(1.0), ..SearchRules::default() });
-    assert!(short.contains("a track of 1 mm"), "{short}");
+    assert!(short.contains("a track of at most 1 mm"), "{short}");
     let long = refusal(SearchRules { back_focus: Some(1000.0), ..SearchRules::default() });
     assert!(long.contains("back focus of 1000 mm"), "{long}");
     // What is hard but may be possible is not refused.
