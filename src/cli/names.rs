@@ -12,8 +12,8 @@ pub(super) fn value_name(value: &impl ValueEnum) -> String {
     value.to_possible_value().map(|value| value.get_name().to_owned()).unwrap_or_default()
 }
 
-fn value(name: &'static str, help: &'static str) -> Option<PossibleValue> {
-    Some(PossibleValue::new(name).help(help))
+fn value(name: &'static str, help: &'static str) -> PossibleValue {
+    PossibleValue::new(name).help(help)
 }
 
 impl ValueEnum for DescentMethod {
@@ -22,10 +22,10 @@ impl ValueEnum for DescentMethod {
     }
 
     fn to_possible_value(&self) -> Option<PossibleValue> {
-        match self {
+        Some(match self {
             Self::DampedLeastSquares => value("dls", "Damped least squares"),
             Self::Adam => value("adam", "Adam: first order, with moments"),
-        }
+        })
     }
 }
 
@@ -35,13 +35,13 @@ impl ValueEnum for SearchMethod {
     }
 
     fn to_possible_value(&self) -> Option<PossibleValue> {
-        match self {
+        Some(match self {
             Self::Restore => {
                 value("restore", "Descents that end at random and restart from the reservoir")
             }
             Self::Metropolis => value("metropolis", "Metropolis-Hastings with Langevin steps"),
             Self::BruteForce => value("brute", "Each element added and removed once"),
-        }
+        })
     }
 }
 
@@ -59,7 +59,7 @@ impl ValueEnum for ParameterKind {
     }
 
     fn to_possible_value(&self) -> Option<PossibleValue> {
-        match self {
+        Some(match self {
             Self::Curvatures => value("curvatures", "All curvatures that refract or reflect"),
             Self::Thicknesses => {
                 value("thicknesses", "All gaps; a gap that zooms, at each zoom position")
@@ -71,7 +71,7 @@ impl ValueEnum for ParameterKind {
             Self::GrinCoefficients => {
                 value("gradients", "All coefficients of gradient-index media of the file")
             }
-        }
+        })
     }
 }
 
@@ -81,9 +81,9 @@ impl ValueEnum for Integral {
     }
 
     fn to_possible_value(&self) -> Option<PossibleValue> {
-        match self {
+        Some(match self {
             Self::Spot => value("spot", "The squared distance from the centroid of the spot"),
             Self::Throughput => value("throughput", "Minus one: the transmitted light"),
-        }
+        })
     }
 }

@@ -4,7 +4,7 @@ use super::CliArgs;
 use super::help::TOPICS;
 use crate::files::json;
 use clap::error::ErrorKind;
-use clap::{Command, CommandFactory, Parser};
+use clap::{Arg, Command, CommandFactory, Parser};
 use std::collections::BTreeSet;
 
 const README: &str = include_str!("../../README.md");
@@ -26,7 +26,7 @@ fn commands() -> Vec<(Vec<String>, Command)> {
 
 /// The long options of a command.
 fn options(command: &Command) -> BTreeSet<String> {
-    let own = command.get_arguments().filter_map(|argument| argument.get_long());
+    let own = command.get_arguments().filter_map(Arg::get_long);
     own.map(|name| format!("--{name}")).collect()
 }
 
