@@ -77,7 +77,7 @@ impl ExperimentWindow {
             ui.separator();
             match &trial.status {
                 ExperimentStatus::Running { done, doing } => {
-                    running(ui, study, *done, doing, actions)
+                    running(ui, study, *done, doing, actions);
                 }
                 ExperimentStatus::Done(report) => self.report(ui, trial.number, report, actions),
                 ExperimentStatus::Stopped => {

@@ -135,7 +135,7 @@ fn edit_menu(ui: &mut Ui, view: &SessionView, actions: &mut Actions) {
         [("Undo", &view.undo, UNDO, Command::Undo), ("Redo", &view.redo, REDO, Command::Redo)];
     for (name, title, key, command) in steps {
         let text =
-            title.as_ref().map_or_else(|| name.to_owned(), |title| format!("{name}: {}", title));
+            title.as_ref().map_or_else(|| name.to_owned(), |title| format!("{name}: {title}"));
         ui.add_enabled_ui(title.is_some(), |ui| {
             if item(ui, &text, Some(&key)) {
                 actions.push(command);
@@ -170,7 +170,7 @@ fn undo_buttons(ui: &mut Ui, view: &SessionView, actions: &mut Actions) {
     for (name, title, command) in steps {
         let button = ui.add_enabled(title.is_some(), Button::new(name));
         let hint =
-            title.as_ref().map_or_else(|| name.to_owned(), |title| format!("{name}: {}", title));
+            title.as_ref().map_or_else(|| name.to_owned(), |title| format!("{name}: {title}"));
         if button.on_hover_text(hint).clicked() {
             actions.push(command);
         }

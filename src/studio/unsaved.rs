@@ -96,13 +96,13 @@ impl Studio {
         match self.pending.take() {
             None => {}
             Some(PendingState::Saving(document, action)) => {
-                self.continue_when_saved(context, document, action)
+                self.continue_when_saved(context, document, action);
             }
             Some(PendingState::Asking(document, action)) => {
                 match ask_about_unsaved(context, view, document) {
                     None => self.pending = Some(PendingState::Asking(document, action)),
                     Some(answer) => {
-                        self.on_unsaved_answer(context, view, (document, action), answer)
+                        self.on_unsaved_answer(context, view, (document, action), answer);
                     }
                 }
             }
@@ -130,11 +130,11 @@ impl Studio {
     fn save_document(&mut self, context: &Context, view: &SessionView, document: UnsavedDocument) {
         match document {
             UnsavedDocument::Lens if view.path.is_some() => {
-                self.apply(context, Command::Save(None))
+                self.apply(context, Command::Save(None));
             }
             UnsavedDocument::Lens => self.file_dialog.ask(context, FileRequest::Save, None),
             UnsavedDocument::Field => {
-                // What goes on changing is never saved as it is.
+                // A field that still changes is paused before it is saved.
                 if view.grin.run.status == RunStatus::Running {
                     self.apply(context, Command::Grin(GrinCommand::Pause));
                 }

@@ -127,7 +127,7 @@ impl StatusMenu<'_> {
         self.choices(ui, actions);
         match self.status {
             ParameterStatus::Variable(variable) => {
-                self.bounds_lines(ui, variable, buffers, actions)
+                self.bounds_lines(ui, variable, buffers, actions);
             }
             ParameterStatus::Pickup(pickup) => self.pickup_lines(ui, pickup, buffers, actions),
             ParameterStatus::ImageSolve(offset) => self.offset_line(ui, offset, buffers, actions),

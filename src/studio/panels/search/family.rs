@@ -8,8 +8,8 @@ use egui::{
     vec2,
 };
 
-use super::thumbnail::Thumbnails;
-use super::{lenses, mutation_style, text};
+use super::lenses::Thumbnails;
+use super::{lenses, moves, text};
 use crate::lens::Lens;
 use crate::search::{LineageNode, OfferOutcome};
 use crate::session::{SessionView, StructureSearchSnapshot};
@@ -56,7 +56,7 @@ pub(super) fn tree(ui: &mut Ui, run: &StructureSearchSnapshot, number: u64) -> O
     for (node, at) in shown.iter().zip(&places) {
         let kept = node.offer.is_some_and(OfferOutcome::is_accepted);
         let radius = if kept { 4.2 } else { 2.4 };
-        painter.circle_filled(*at, radius, mutation_style::color(ui.visuals(), node.kind));
+        painter.circle_filled(*at, radius, moves::color(ui.visuals(), node.kind));
     }
     if let Some(at) = place_of(number) {
         painter.circle_stroke(at, 6.5, Stroke::new(1.5, ui.visuals().strong_text_color()));
@@ -139,7 +139,7 @@ fn generation_text(ui: &mut Ui, node: &Generation) {
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing.x = 4.0;
         if let Some(kind) = node.kind {
-            mutation_style::symbol(ui, kind);
+            moves::symbol(ui, kind);
         }
         ui.add(Label::new(RichText::new(format!("Lens {}", node.number)).strong()));
         ui.add(Label::new(text::mutation_text(node)).wrap());

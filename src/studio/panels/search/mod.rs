@@ -6,14 +6,11 @@
 mod controls;
 mod family;
 mod lenses;
-mod light;
 mod limits;
 mod moves;
-mod mutation_style;
 mod plot;
 mod setup;
 mod text;
-mod thumbnail;
 
 use egui::{Button, Frame, Margin, Panel as Side, RichText, ScrollArea, Ui};
 
@@ -21,8 +18,8 @@ use super::Panel;
 use crate::session::{Command, SessionView, StructureSearchSnapshot, StructureSearchView};
 use crate::studio::actions::Actions;
 use crate::studio::text::capitalize;
+use lenses::Thumbnails;
 use setup::SearchSetup;
-use thumbnail::Thumbnails;
 
 /// The introduction that is shown before the first search.
 const INTRODUCTION: &str = "Which lens of another structure is better? Chains descend from the \

@@ -4,7 +4,7 @@
 use egui::{Id, PointerButton, RichText, Role, Ui, WidgetInfo, vec2};
 use egui_plot::{Line, LineStyle, Plot, PlotPoint, PlotPoints, PlotResponse, PlotUi, Points};
 
-use super::{mutation_style, text};
+use super::{moves, text};
 use crate::session::{DescentMark, HistorySample, SessionView, StructureSearchSnapshot};
 use crate::studio::panels::decade_name;
 
@@ -111,14 +111,14 @@ fn mark_point(mark: &DescentMark) -> Option<[f64; 2]> {
 
 /// Every mutation at the merit to which it led; those of retained lenses are larger.
 fn mutation_marks(plot: &mut PlotUi<'_>, run: &StructureSearchSnapshot, visuals: &egui::Visuals) {
-    for kind in mutation_style::kinds() {
+    for kind in moves::kinds() {
         for (entered, radius) in [(false, 2.6), (true, 4.8)] {
             let of_kind = run.history.marks.iter();
             let of_kind = of_kind.filter(|m| m.kind == Some(kind) && m.entered == entered);
             let places: Vec<[f64; 2]> = of_kind.filter_map(mark_point).collect();
             if !places.is_empty() {
-                let color = mutation_style::color(visuals, Some(kind));
-                let points = Points::new(kind.name(), places).shape(mutation_style::shape(kind));
+                let color = moves::color(visuals, Some(kind));
+                let points = Points::new(kind.name(), places).shape(moves::shape(kind));
                 plot.points(points.radius(radius).color(color));
             }
         }
@@ -213,9 +213,9 @@ fn step_curve(steps: &[[f64; 2]]) -> Vec<[f64; 2]> {
 fn legend(ui: &mut Ui, run: &StructureSearchSnapshot) {
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing.x = 4.0;
-        for kind in mutation_style::kinds() {
+        for kind in moves::kinds() {
             if run.history.marks.iter().any(|mark| mark.kind == Some(kind)) {
-                mutation_style::symbol(ui, kind);
+                moves::symbol(ui, kind);
                 ui.label(RichText::new(kind.name()).small());
                 ui.add_space(4.0);
             }

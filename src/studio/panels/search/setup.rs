@@ -5,7 +5,7 @@ use std::ops::RangeInclusive;
 use egui::emath::Numeric;
 use egui::{ComboBox, DragValue, Grid, Label, RichText, Ui};
 
-use super::{light, limits, mutation_style};
+use super::{limits, moves};
 use crate::lens::{Lens, Medium};
 use crate::search::element::piece_count;
 use crate::search::{MutationKind, SearchMethod, SearchRules, SearchSettings};
@@ -72,7 +72,7 @@ impl SearchSetup {
     /// The request for a search from the present design.
     pub(super) fn request(&self, view: &SessionView) -> StructureSearchRequest {
         let mut request = self.request.clone();
-        request.plan.light = light::matching_fields(request.plan.light, &view.lens);
+        request.plan.light = limits::matching_fields(request.plan.light, &view.lens);
         if self.design_glasses_only {
             request.plan.rules.glasses = glasses(&view.lens);
         }
@@ -174,7 +174,7 @@ impl SearchSetup {
     fn merit_rows(&mut self, ui: &mut Ui, lens: &Lens) {
         let request = &mut self.request;
         ui.weak("Light");
-        light::shares(ui, &mut request.plan.light, lens);
+        limits::shares(ui, &mut request.plan.light, lens);
         ui.end_row();
         ui.weak("Focal length");
         let hint = "The target, if it is not the focal length of the design";
@@ -251,7 +251,7 @@ impl SearchSetup {
 /// The weight of a kind of mutation.
 fn weight_field(ui: &mut Ui, weights: &mut Vec<(MutationKind, f64)>, kind: MutationKind) {
     ui.horizontal(|ui| {
-        mutation_style::symbol(ui, kind);
+        moves::symbol(ui, kind);
         ui.label(kind.name());
     });
     let listed = weights.iter().find(|(other, _)| *other == kind);

@@ -101,7 +101,7 @@ pub(super) fn lens_text(found: &FoundLens) -> String {
             let [spot, light] = [1e3 * spot, *light].map(|v| number::format_digits(v, 3));
             format!("{spot} µm, {light} mm²\n{elements} elements, {merit}")
         }
-        Some(Err(why)) => format!("{elements} elements, {merit}\n{}", why),
+        Some(Err(why)) => format!("{elements} elements, {merit}\n{why}"),
         None => format!("{elements} elements, {merit}\ndescent not finished"),
     }
 }
