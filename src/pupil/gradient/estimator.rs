@@ -3,7 +3,7 @@
 //! pupil.
 
 use super::{PupilDerivative, QuadraticIntegrand, WarpSampling};
-use crate::lens::{RADIAL_TERMS, SystemError};
+use crate::lens::{RADIAL_TERMS, SurfaceNumber, SystemError};
 use crate::pupil::launch::LaunchError;
 use crate::pupil::ray_model::Aiming;
 use crate::pupil::region::{Accuracy, PupilMoments, Region, RegionKind};
@@ -215,22 +215,23 @@ impl Region<'_> {
         let Some(ray) = launch.ray([0.0; 2]) else {
             return ("no ray through the centre of the stop is found".to_owned(), NEARER);
         };
-        let (found, remedy) = match launch.channel().tracer.trace(ray).fate {
+        let fate = launch.channel().tracer.trace(ray).fate;
+        let (found, remedy) = match fate {
             Fate::Imaged => {
                 return ("only single rays do".to_owned(), "enlarge the semi-diameters");
             }
-            Fate::Clipped(i) => (
-                format!("is clipped by surface {i}"),
-                "enlarge its semi-diameter or take a field nearer to the axis",
-            ),
-            Fate::Missed(i) => (format!("misses surface {i}"), FLATTEN),
-            Fate::TotalReflection(i) => (format!("is totally reflected at surface {i}"), FLATTEN),
-            Fate::Turned(i) | Fate::Trapped(i) => (
-                format!("does not leave the gradient before surface {i}"),
+            Fate::Clipped(_) => {
+                ("is clipped by", "enlarge its semi-diameter or take a field nearer to the axis")
+            }
+            Fate::Missed(_) => ("misses", FLATTEN),
+            Fate::TotalReflection(_) => ("is totally reflected at", FLATTEN),
+            Fate::Turned(_) | Fate::Trapped(_) => (
+                "does not leave the gradient before",
                 "weaken it or take a field nearer to the axis",
             ),
         };
-        (format!("the ray through the centre {found}"), remedy)
+        let surface = SurfaceNumber::new(fate.surface().unwrap_or_default());
+        (format!("the ray through the centre {found} surface {surface}"), remedy)
     }
 
     /// Raises the order of quadrature.
