@@ -6,7 +6,7 @@ use crate::pupil::Launch;
 
 /// Straight pieces of a surface.
 const PIECES: u32 = 48;
-/// How far the blades of a stop reach beyond its opening, in semi-diameters of the largest surface.
+/// The outer end of the blades of a stop, in multiples of the largest semi-diameter.
 const BLADE: f64 = 1.1;
 
 /// A system in its section through the axis, `z` to the right and `y` upwards, in mm.
