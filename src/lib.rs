@@ -61,7 +61,7 @@ pub mod search;
 // Charts and images as PNG; knows nothing of what it draws.
 pub mod plot;
 
-// Results written as files: the front of sharpness against light as a table, a plot and lenses.
+// Results as files and drawings: the front of sharpness against light, GRIN fields and images.
 pub mod report;
 
 // The figures and tables of the thesis as studies that check their own claims.

@@ -22,7 +22,7 @@ pub(super) fn add_light_term(context: &EvaluationContext<'_>, term: Term, sum: &
     match term {
         Term::Throughput => light_loss(&mean_area(context, sum.level), 1.0, 0.0, sum),
         Term::ThroughputLoss(full) => {
-            light_loss(&mean_area(context, sum.level), 1.0 / full, 1.0, sum)
+            light_loss(&mean_area(context, sum.level), 1.0 / full, 1.0, sum);
         }
         Term::Light(share) => light_shortfall(context, share, sum),
         Term::RelativeIllumination { field, min } => illumination(context, field, min, sum),

@@ -341,7 +341,7 @@ impl Merit {
             match weighted.term {
                 Term::Spot => spot::add_spot(context, spot::Normalization::PupilArea, sum)?,
                 Term::SpotIntegral => {
-                    spot::add_spot(context, spot::Normalization::Unnormalized, sum)?
+                    spot::add_spot(context, spot::Normalization::Unnormalized, sum)?;
                 }
                 Term::Distortion => spot::add_distortion(context, sum)?,
                 Term::FocalLength(target) => {

@@ -396,7 +396,7 @@ impl SweepChain {
         };
         match search {
             Ok(search) => {
-                self.active = Some(ActiveDescent { weight, search, remaining_steps: left })
+                self.active = Some(ActiveDescent { weight, search, remaining_steps: left });
             }
             Err(cause) => self.refused = Some(cause.to_string()),
         }

@@ -197,7 +197,7 @@ impl MutationGain {
         let chart = Chart::new([120.0, 200.0], [840.0, 880.0], x, y);
         chart.draw(&mut canvas, FILE);
         let mut legend = Legend::new([130.0, 20.0]);
-        for (label, points, color) in sets.iter() {
+        for (label, points, color) in &sets {
             legend.marker(&mut canvas, label, *color);
             canvas.markers(&chart.to_pixels(points), *color);
         }
