@@ -4,7 +4,7 @@ use crate::experiments::sharpness_vs_light::ProgressSpan;
 use crate::experiments::{ExperimentError, ProgressFn, report_progress};
 use crate::lens::Lens;
 use crate::search::lens_landscape::{LensLandscape, SearchPlan};
-use crate::search::{MutationKind, RunEnd, SearchRunOn};
+use crate::search::{MutationKind, SearchRunOn};
 use rayon::prelude::*;
 use std::ops::ControlFlow;
 
@@ -96,8 +96,9 @@ impl RecordedSearch {
                 ControlFlow::Break(())
             }
         });
-        // Whether the run has ended is asked of the run itself.
-        let _: ControlFlow<(), RunEnd> = flow;
+        match flow {
+            ControlFlow::Continue(_) | ControlFlow::Break(()) => {}
+        }
     }
 }
 

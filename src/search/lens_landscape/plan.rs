@@ -4,8 +4,8 @@ use super::{DescentSettings, LandscapeError, LensLandscape};
 use crate::lens::Lens;
 use crate::merit::Goal;
 use crate::search::{
-    MutationKind, RunEnd, SearchError, SearchEvent, SearchRules, SearchRun, SearchRunOn,
-    SearchSettings, Temperature,
+    MutationKind, SearchError, SearchEvent, SearchRules, SearchRun, SearchRunOn, SearchSettings,
+    Temperature,
 };
 use serde::{Deserialize, Serialize};
 use std::ops::ControlFlow;
@@ -109,7 +109,7 @@ pub fn run(
     mut watch: impl FnMut(&SearchRunOn<LensLandscape>, &[SearchEvent]) -> ControlFlow<()>,
 ) -> Result<SearchRunOn<LensLandscape>, SearchSetupError> {
     let (landscape, mut run) = plan.begin(lens)?;
-    // The end of the run and a break of `watch` both leave the run as it is.
-    let _: ControlFlow<(), RunEnd> = run.advance(&landscape, &mut watch);
-    Ok(run)
+    match run.advance(&landscape, &mut watch) {
+        ControlFlow::Continue(_) | ControlFlow::Break(()) => Ok(run),
+    }
 }

@@ -98,8 +98,8 @@ pub fn mutate(
     let refuse = |refusal| MutationError { kind, refusal };
     let mutation = MUTATIONS.iter().find(|mutation| mutation.kind == kind);
     let Some(mutation) = mutation else { return Err(refuse(Refusal::NotAMutation)) };
-    lens.check().map_err(|_| refuse(Refusal::InvalidLens))?;
-    let resolved = lens.with_pickups().map_err(|_| refuse(Refusal::InvalidLens))?;
+    lens.check().map_err(|error| refuse(error.into()))?;
+    let resolved = lens.with_pickups().map_err(|error| refuse(error.into()))?;
     let size = match scale(&resolved) {
         Ok(size) => size,
         Err(ProjectionError::Afocal(_)) if !rules.projection => half_track(&resolved),

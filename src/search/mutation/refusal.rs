@@ -1,6 +1,9 @@
 //! The reasons that a mutation does not apply.
 
 use super::kind::MutationKind;
+use crate::lens::LensError;
+use crate::paraxial::ParaxialError;
+use crate::pupil::RayModelError;
 use crate::search::projection::ProjectionError;
 use serde::de::value::{Error, StringDeserializer};
 use serde::{Deserialize, Deserializer, Serialize, de::IntoDeserializer as _};
@@ -165,6 +168,24 @@ impl From<&ProjectionError> for Refusal {
             ProjectionError::Steps(_) => Self::ProjectionSteps,
             ProjectionError::Lens(_) => Self::InvalidLens,
         }
+    }
+}
+
+impl From<LensError> for Refusal {
+    fn from(_: LensError) -> Self {
+        Self::InvalidLens
+    }
+}
+
+impl From<ParaxialError> for Refusal {
+    fn from(_: ParaxialError) -> Self {
+        Self::InvalidLens
+    }
+}
+
+impl From<RayModelError> for Refusal {
+    fn from(_: RayModelError) -> Self {
+        Self::InvalidLens
     }
 }
 

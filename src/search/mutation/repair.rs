@@ -169,9 +169,9 @@ fn ray_extents(lens: &Lens) -> Result<Vec<f64>, Refusal> {
     let mut heights = extents.clone();
     let mut lit = false;
     for zoom in 0..lens.zoom_positions() {
-        let bench = primary_bench(lens, zoom)?;
+        let model = primary_ray_model(lens, zoom)?;
         for field in &lens.fields_at(zoom).values {
-            let Ok(launch) = bench.launch(*field, 0) else { continue };
+            let Ok(launch) = model.launch(*field, 0) else { continue };
             let rays = FAN.iter().filter_map(|point| launch.ray(*point));
             for ray in rays {
                 lit |= widen_extents(&mut extents, &mut heights, &launch.channel().tracer, ray);
@@ -200,12 +200,11 @@ fn widen_extents(
 }
 
 /// The ray model at the primary wavelength, with the aiming that wide fields need.
-fn primary_bench(lens: &Lens, zoom: usize) -> Result<RayModel, Refusal> {
+fn primary_ray_model(lens: &Lens, zoom: usize) -> Result<RayModel, Refusal> {
     let um = lens.wavelengths[lens.primary()].um;
-    let system: System<f64> = lens.resolve(zoom, um).map_err(|_| Refusal::InvalidLens)?;
+    let system: System<f64> = lens.resolve(zoom, um)?;
     let beam = Beam::for_lens(lens, zoom);
-    let bench = RayModel::from_systems(vec![(um, 1.0, system)], 0, beam, Aiming::Paraxial);
-    let mut bench = bench.map_err(|_| Refusal::InvalidLens)?;
-    bench.choose_aiming();
-    Ok(bench)
+    let mut model = RayModel::from_systems(vec![(um, 1.0, system)], 0, beam, Aiming::Paraxial)?;
+    model.choose_aiming();
+    Ok(model)
 }

@@ -143,9 +143,9 @@ fn rescale_aperture(before: &Lens, lens: &mut Lens) -> Result<(), Refusal> {
 fn axial_height_ratio(before: &Lens, lens: &Lens, zoom: usize) -> Result<f64, Refusal> {
     let um = lens.wavelengths[lens.primary()].um;
     let height = |lens: &Lens| {
-        let system = lens.resolve(zoom, um).map_err(|_| Refusal::InvalidLens)?;
+        let system = lens.resolve(zoom, um)?;
         let beam = Beam { aperture: Aperture::StopSemiDiameter(1.0), ..Beam::for_lens(lens, zoom) };
-        let first = first_order(&system, &beam).map_err(|_| Refusal::InvalidLens)?;
+        let first = first_order(&system, &beam)?;
         // With a stop of 1 mm, the start height is the inverse of the height at the stop of a ray
         // from 1 mm.
         Ok::<f64, Refusal>(first.marginal.heights[0].hypot(first.marginal.start_slope))

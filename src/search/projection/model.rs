@@ -204,10 +204,10 @@ impl MarginalRayModel {
             for reach in reaches {
                 match *reach {
                     CoordinateEffect::Curvature { row, factor } => {
-                        curvatures[row] += *z * R::from_f64(factor)
+                        curvatures[row] += *z * R::from_f64(factor);
                     }
                     CoordinateEffect::Gap { zoom, row, factor } => {
-                        gaps[zoom][row] += *z * R::from_f64(factor)
+                        gaps[zoom][row] += *z * R::from_f64(factor);
                     }
                 }
             }
@@ -301,7 +301,7 @@ fn sum_effects<R: Real>(
     for reach in reaches {
         match *reach {
             CoordinateEffect::Curvature { row, factor } => {
-                sum += by_curvature[row] * R::from_f64(factor)
+                sum += by_curvature[row] * R::from_f64(factor);
             }
             CoordinateEffect::Gap { zoom, row, factor } if zoom == at_zoom => {
                 sum += by_gap[row] * R::from_f64(factor);
@@ -322,7 +322,7 @@ fn effects_of(lens: &Lens, parameter: Parameter, factor: f64) -> Vec<CoordinateE
         match moved.quantity {
             Quantity::Curvature => found.push(CoordinateEffect::Curvature { row, factor }),
             Quantity::ZoomThickness(zoom) => {
-                found.push(CoordinateEffect::Gap { zoom, row, factor })
+                found.push(CoordinateEffect::Gap { zoom, row, factor });
             }
             Quantity::Thickness => {
                 let shared = |zoom: &usize| !has_own(lens, *zoom, row);

@@ -157,7 +157,7 @@ impl<L: Landscape> RoundContext<'_, L> {
         match self.settings.method {
             SearchMethod::Metropolis => self.metropolis_turn(chain, most, &mut events),
             SearchMethod::Restore | SearchMethod::BruteForce => {
-                self.descend(chain, most, &mut events)
+                self.descend(chain, most, &mut events);
             }
         }
         events

@@ -40,7 +40,7 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
     {
         match steer {
             SteerCommand::Pin(number) => {
-                self.pinned = Some(self.best_of_generation(landscape, number)?)
+                self.pinned = Some(self.best_of_generation(landscape, number)?);
             }
             SteerCommand::Unpin => self.pinned = None,
             SteerCommand::Weight(kind, weight) => {
@@ -51,7 +51,7 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
             }
             SteerCommand::Temperature(temperature) => self.temperature = temperature,
             SteerCommand::Reheat => {
-                self.temperature = self.temperature.scale_by(self.settings.reheat)
+                self.temperature = self.temperature.scale_by(self.settings.reheat);
             }
             SteerCommand::Stop => self.stopped = true,
             SteerCommand::Resume => self.stopped = false,
