@@ -7,18 +7,18 @@
 mod double;
 mod dual;
 pub mod expression;
+mod format;
 mod jet;
 mod lanes;
 pub mod quadrature;
 mod real;
-mod shown;
 mod vec3;
 
 pub use double::DoubleDouble;
 pub use dual::Dual;
+pub(crate) use format::format_short;
 pub use jet::Jet;
 pub use lanes::SimdWidth;
 pub(crate) use lanes::run_vectorized;
 pub use real::Real;
-pub(crate) use shown::format_short;
 pub use vec3::Vec3;

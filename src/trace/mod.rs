@@ -9,9 +9,9 @@
 //! several intersections counts: the one with `σ k·N > 0`. The sign of `N` does not: light that
 //! reaches the front lens of a fisheye from behind still travels forwards.
 //!
-//! A gap is a propagator ([`propagation`]): straight lines in a homogeneous medium, steps of an
-//! integrator in a GRIN medium ([`grin_gap`]). Derivatives are forward, by dual numbers in place of
-//! plain ones, or backward, by the adjoint of a block of rays ([`adjoint`]).
+//! A gap is a propagator (`propagation`): straight lines in a homogeneous medium, steps of an
+//! integrator in a GRIN medium (`grin_gap`). Derivatives are forward, by dual numbers in place of
+//! plain ones, or backward, by the adjoint of a block of rays (`adjoint`).
 
 mod adjoint;
 mod asphere;
