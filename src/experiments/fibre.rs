@@ -134,14 +134,15 @@ fn draw_focus_errors(
         curves.push((format!("parabolic, focus {}", i + 1), points(heights(rays, plane)?), color));
         let space = view.space.unwrap_or(task.space);
         let plan = crate::grin::plan_tracing(
-            best.field(),
+            best.index_field(),
             &space.region(),
             task.launch,
             rays,
             task.tolerance,
         );
         let setup = plan.map_err(ExperimentError::from_error)?.setup;
-        let tracer = GrinTracer::new(best.field(), setup).map_err(ExperimentError::from_error)?;
+        let tracer =
+            GrinTracer::new(best.index_field(), setup).map_err(ExperimentError::from_error)?;
         let found = tracer.trace_batch(rays).iter().map(|exit| radius(exit.x)).collect();
         curves.push((format!("optimised, focus {}", i + 1), points(found), color));
     }

@@ -214,7 +214,7 @@ fn found(task: &GrinTask, medium: GrinField) -> Result<ReconstructedPlume, Exper
         let (i, j, k) = (n % VOXELS, n / VOXELS % VOXELS, n / VOXELS / VOXELS);
         let p = Vec3::new(at(low.x, high.x, i), at(low.y, high.y, j), at(low.z, high.z, k));
         let index = exact.sample(p).index;
-        ((medium.field().sample(p).index - index) / index).powi(2)
+        ((medium.index_field().sample(p).index - index) / index).powi(2)
     };
     let squares: Vec<f64> = (0..VOXELS.pow(3)).into_par_iter().map(square).collect();
     let frobenius = squares.iter().sum::<f64>().sqrt();
@@ -337,7 +337,7 @@ fn sections(rows: &[PlumeRow]) -> Canvas {
         canvas.text([corner(0)[0], corner(0)[1] - 26.0], &title, GREY, TextAlign::Left);
         let exact = row.task.exact.as_ref().and_then(|exact| exact.field::<f64>().ok());
         let exact = exact.as_deref();
-        let found = METHODS.iter().map(|(_, of)| Some(of(row).medium.field()));
+        let found = METHODS.iter().map(|(_, of)| Some(of(row).medium.index_field()));
         for (column, field) in [exact].into_iter().chain(found).enumerate() {
             if let Some(field) = field {
                 canvas.raster(corner(column), CELLS, 2, &section_levels(row, field));

@@ -41,7 +41,7 @@ fn plot_profile(task: &GrinTask, medium: &GrinField) -> Canvas {
         let index = |x: f64| field.sample(Vec3::new(x, 0.0, 0.0)).index;
         (0..=POINTS).map(|i| [at(i), index(at(i))]).collect()
     };
-    let found = along(medium.field());
+    let found = along(medium.index_field());
     let exact = task.exact.as_ref().and_then(|exact| exact.field::<f64>().ok());
     let exact = exact.map(|field| along(&*field)).unwrap_or_default();
     let mut canvas = Canvas::new([1000, 760]);
@@ -55,7 +55,7 @@ fn plot_profile(task: &GrinTask, medium: &GrinField) -> Canvas {
 }
 
 fn plot_section(task: &GrinTask, medium: &GrinField) -> Canvas {
-    let field = medium.field();
+    let field = medium.index_field();
     let [low, high] = task.space.corners();
     let region = task.space.region();
     let extremes = task.extremes(medium);

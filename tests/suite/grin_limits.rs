@@ -66,7 +66,7 @@ fn grin_limits_of_the_index_are_kept_by_every_kind_of_field() {
         let task = greedy(field, method, nodes);
         let (first, runner) = (GrinOptimizer::new(&task).unwrap(), solved(&task));
         let best = runner.best();
-        let indices: Vec<f64> = anywhere().map(|p| best.field().sample(p).index).collect();
+        let indices: Vec<f64> = anywhere().map(|p| best.index_field().sample(p).index).collect();
         let low = indices.iter().copied().fold(f64::INFINITY, f64::min);
         let high = indices.iter().copied().fold(0.0, f64::max);
         println!("{field:?}: index {low:.9} to {high:.9}");
@@ -110,7 +110,7 @@ fn grin_a_broken_limit_is_told_with_its_place() {
     let kept = poor.limit_checks(&poor.extremes(found.best()));
     let over = kept[1].value - 1.1;
     assert!(!kept[1].is_satisfied() && over > 0.01 && kept[1].margin == -over, "{kept:?}");
-    let there = found.best().field().sample(kept[1].at).index;
+    let there = found.best().index_field().sample(kept[1].at).index;
     assert!((there - kept[1].value).abs() < 1e-12 && kept[0].is_satisfied());
 }
 

@@ -117,7 +117,7 @@ fn images_are_the_same_bits_on_one_thread_and_on_two() {
             pool.install(|| {
                 let medium = solved(&task);
                 let bits: Vec<u64> =
-                    medium.field().parameters().iter().map(|v| v.to_bits()).collect();
+                    medium.index_field().parameters().iter().map(|v| v.to_bits()).collect();
                 (bits, images(&task, &medium))
             })
         };

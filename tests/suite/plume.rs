@@ -167,7 +167,7 @@ fn grin_a_plume_in_one_voxel_does_as_well_as_it_can() {
     let after = runner.score(runner.best()).unwrap().loss;
     assert!(after.is_finite() && after <= before, "{before} {after}");
     let lines = StraightRays::new(&task).unwrap().reconstruct_by_gradients(2, 5).unwrap();
-    assert!(lines.field().parameters().iter().all(|index| *index == 1.0003));
+    assert!(lines.index_field().parameters().iter().all(|index| *index == 1.0003));
 }
 
 #[test]
@@ -229,7 +229,7 @@ fn grin_a_plume_that_is_chaotic_is_told_and_nothing_becomes_nan() {
     assert_eq!(told + counts.valid(), 1200);
     assert!(judged.views[0].retrace_error.is_finite());
     while !runner.step().unwrap().finished {}
-    assert!(runner.best().field().parameters().iter().all(|index| index.is_finite()));
+    assert!(runner.best().index_field().parameters().iter().all(|index| index.is_finite()));
     std::fs::remove_dir_all(folder).unwrap();
 }
 
@@ -344,7 +344,7 @@ fn steepest(medium: &GrinField, space: Domain) -> f64 {
     let at = |i: usize| 2.0 * (i as f64 + 0.5) / 61.0 - 1.0;
     let place = |n: usize| Vec3::new(at(n % 61), at(n / 61 % 61), at(n / 61 / 61));
     let inside = (0..61 * 61 * 61).map(place).filter(|p| space.region().level(*p) < 0.0);
-    inside.map(|p| length(medium.field().sample(p).gradient)).fold(0.0, f64::max)
+    inside.map(|p| length(medium.index_field().sample(p).gradient)).fold(0.0, f64::max)
 }
 
 #[test]

@@ -114,7 +114,7 @@ impl GrinReport {
             slope: extremes.slope,
             limits: task.limit_checks(&extremes).into_iter().map(LimitReport::from).collect(),
             nodes: best.nodes(),
-            parameters: best.field().parameters().len(),
+            parameters: best.index_field().parameters().len(),
             steps: runner.steps(),
             rays: runner.rays_traced(),
             integrator: integrator.name(),

@@ -126,9 +126,11 @@ impl ExitBeam {
     fn behind(task: &GrinTask, medium: &GrinField) -> Result<Self, ExperimentError> {
         let task = independent_task(task);
         let (space, rays) = task.scoring_rays(&task.views[0]);
-        let plan = plan_tracing(medium.field(), &space.region(), task.launch, &rays, TOLERANCE);
+        let plan =
+            plan_tracing(medium.index_field(), &space.region(), task.launch, &rays, TOLERANCE);
         let setup = plan.map_err(ExperimentError::from_error)?.setup;
-        let tracer = GrinTracer::new(medium.field(), setup).map_err(ExperimentError::from_error)?;
+        let tracer =
+            GrinTracer::new(medium.index_field(), setup).map_err(ExperimentError::from_error)?;
         let exits = tracer.trace_batch(&rays);
         let arrived = exits.iter().filter(|exit| exit.fate.has_arrived() && exit.v.z > 0.0);
         let back = space.corners()[1].z;

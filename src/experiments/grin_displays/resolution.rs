@@ -166,7 +166,7 @@ fn table(rows: &[ResolutionRow]) -> DataTable {
         table.push_row([
             row.kind.name().into(),
             row.nodes().into(),
-            row.optimizer.current().field().parameters().len().into(),
+            row.optimizer.current().index_field().parameters().len().into(),
             row.quality().into(),
             row.image().map_or(f64::NAN, ViewImage::correlation).into(),
             row.optimizer.steps().into(),

@@ -111,13 +111,13 @@ pub struct RotationalProfile<R> {
 /// A polynomial without a constant term and its first two derivatives.
 #[inline(always)]
 fn polynomial<R: Real>(terms: &[R], s: R) -> [R; 3] {
-    let (mut value, mut slope, mut half_bend) = (R::ZERO, R::ZERO, R::ZERO);
+    let (mut value, mut slope, mut half_curvature) = (R::ZERO, R::ZERO, R::ZERO);
     for term in terms.iter().rev().copied().chain([R::ZERO]) {
-        half_bend = half_bend * s + slope;
+        half_curvature = half_curvature * s + slope;
         slope = slope * s + value;
         value = value * s + term;
     }
-    [value, slope, half_bend + half_bend]
+    [value, slope, half_curvature + half_curvature]
 }
 
 /// `u` and its first and second derivatives with respect to r² and z.
@@ -251,8 +251,8 @@ pub struct ProfileGradient<R> {
     pub terms: [R; PROFILE_TERMS],
 }
 
-fn add<R: Real>(base: R, [value, slope, bend]: [R; 3]) -> [R; 3] {
-    [base + value, slope, bend]
+fn add<R: Real>(base: R, [value, slope, curvature]: [R; 3]) -> [R; 3] {
+    [base + value, slope, curvature]
 }
 
 /// Adds `value sᵏ + slope k sᵏ⁻¹` for each power k from 1 on.

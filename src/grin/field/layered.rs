@@ -5,7 +5,7 @@
 
 use super::{FieldResolution, Hessian, IndexField, IndexSample, IndexSamples};
 use crate::grin::lanes::{LANES, LaneScalars, LaneVectors, get, put};
-use crate::math::{Real, SimdWidth, Vec3, run_vectorized};
+use crate::math::{Real, Vec3};
 use std::fmt::Debug;
 
 /// The coordinate that a profile depends on.
@@ -90,6 +90,15 @@ pub trait ProfileFunction<R: Real>: Debug + Send + Sync {
     }
 }
 
+/// A scaled coordinate clamped to `cut`, from which on a profile is constant, and the factor of its
+/// derivatives: 1 before the cut, 0 beyond it.
+#[inline(always)]
+pub(super) fn clamp_coordinate<R: Real>(q: R, cut: f64) -> (R, R) {
+    let cut = R::from_f64(cut);
+    let inside = q < cut;
+    (R::select(inside, q, cut), R::select(inside, R::ONE, R::ZERO))
+}
+
 /// A field `η = f(s)`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ProfileField<P> {
@@ -119,12 +128,12 @@ impl<P> ProfileField<P> {
 impl<P> ProfileField<P> {
     /// The Hessian where the coordinate has the gradient `ds`.
     #[inline(always)]
-    fn hessian_from<R: Real>(&self, ds: Vec3<R>, slope: R, bend: R) -> Hessian<R> {
+    fn hessian_from<R: Real>(&self, ds: Vec3<R>, slope: R, curvature: R) -> Hessian<R> {
         let squares = Vec3::new(ds.x * ds.x, ds.y * ds.y, ds.z * ds.z);
         let products = Vec3::new(ds.y * ds.z, ds.z * ds.x, ds.x * ds.y);
         Hessian {
-            diagonal: squares * bend + self.coordinate.hessian_diagonal() * slope,
-            mixed: products * bend,
+            diagonal: squares * curvature + self.coordinate.hessian_diagonal() * slope,
+            mixed: products * curvature,
         }
     }
 
@@ -159,45 +168,32 @@ impl<R: Real, P: ProfileFunction<R>> IndexField<R> for ProfileField<P> {
         IndexSample { index: f.value, gradient: ds * f.slope }
     }
 
-    fn sample_block(&self, at: &LaneVectors<R>, out: &mut IndexSamples<R>) {
-        run_vectorized(
-            SimdWidth::Bits512,
-            #[inline(always)]
-            || {
-                let profiled = self.profile_block(at);
-                for lane in 0..LANES {
-                    let (_, ds) = self.coordinate.value_and_gradient(get(at, lane));
-                    let gradient = ds * profiled.slope[lane];
-                    out.put(lane, IndexSample { index: profiled.value[lane], gradient });
-                }
-            },
-        );
+    #[inline(always)]
+    fn sample_lanes(&self, at: &LaneVectors<R>, out: &mut IndexSamples<R>) {
+        let profile = self.profile_block(at);
+        for lane in 0..LANES {
+            let (_, ds) = self.coordinate.value_and_gradient(get(at, lane));
+            let gradient = ds * profile.slope[lane];
+            out.put(lane, IndexSample { index: profile.value[lane], gradient });
+        }
     }
 
-    fn sample_block_with_hessians(
+    #[inline(always)]
+    fn hessian_lanes(
         &self,
         at: &LaneVectors<R>,
         times: &LaneVectors<R>,
         out: &mut IndexSamples<R>,
         product: &mut LaneVectors<R>,
     ) {
-        run_vectorized(
-            SimdWidth::Bits512,
-            #[inline(always)]
-            || {
-                let profiled = self.profile_block(at);
-                for lane in 0..LANES {
-                    let (slope, bend) = (profiled.slope[lane], profiled.curvature[lane]);
-                    let (_, ds) = self.coordinate.value_and_gradient(get(at, lane));
-                    out.put(
-                        lane,
-                        IndexSample { index: profiled.value[lane], gradient: ds * slope },
-                    );
-                    let hessian = self.hessian_from(ds, slope, bend);
-                    put(product, lane, hessian.times(get(times, lane)));
-                }
-            },
-        );
+        let profile = self.profile_block(at);
+        for lane in 0..LANES {
+            let (slope, curvature) = (profile.slope[lane], profile.curvature[lane]);
+            let (_, ds) = self.coordinate.value_and_gradient(get(at, lane));
+            out.put(lane, IndexSample { index: profile.value[lane], gradient: ds * slope });
+            let hessian = self.hessian_from(ds, slope, curvature);
+            put(product, lane, hessian.times(get(times, lane)));
+        }
     }
 
     #[inline(always)]

@@ -3,6 +3,7 @@
 //! Luneburg, *Mathematical Theory of Optics* (1944). In units of its radius every ray is `x(σ) = x₀
 //! cos σ + v₀ sin σ`, so at `σ = π/2` it is at `v₀`: an exact test.
 
+use super::layered::clamp_coordinate;
 use super::{ProfileFunction, ProfileSample};
 use crate::math::Real;
 
@@ -27,9 +28,7 @@ impl<R: Real> Luneburg<R> {
     #[inline(always)]
     fn clamped_square(&self, s: R) -> (R, R) {
         let [radius] = self.radius;
-        let (q, cut) = (s / (radius * radius), R::from_f64(CUT));
-        let inside = q < cut;
-        (R::select(inside, q, cut), R::select(inside, R::ONE, R::ZERO))
+        clamp_coordinate(s / (radius * radius), CUT)
     }
 }
 

@@ -115,11 +115,7 @@ pub trait IndexField<R: Real>: Debug + Send + Sync {
         run_vectorized(
             SimdWidth::Bits512,
             #[inline(always)]
-            || {
-                for lane in 0..LANES {
-                    out.put(lane, self.sample(get(at, lane)));
-                }
-            },
+            || self.sample_lanes(at, out),
         );
     }
 
@@ -134,14 +130,7 @@ pub trait IndexField<R: Real>: Debug + Send + Sync {
         run_vectorized(
             SimdWidth::Bits512,
             #[inline(always)]
-            || {
-                for lane in 0..LANES {
-                    let x = get(at, lane);
-                    let (sample, hessian) = self.sample_and_hessian(x);
-                    out.put(lane, sample);
-                    put(product, lane, hessian.times(get(times, lane)));
-                }
-            },
+            || self.hessian_lanes(at, times, out, product),
         );
     }
 
@@ -156,12 +145,47 @@ pub trait IndexField<R: Real>: Debug + Send + Sync {
         run_vectorized(
             SimdWidth::Bits512,
             #[inline(always)]
-            || {
-                for (lane, weight) in weight.iter().enumerate() {
-                    self.accumulate(get(at, lane), *weight, get(pull, lane), gradient);
-                }
-            },
+            || self.accumulate_lanes(at, weight, pull, gradient),
         );
+    }
+
+    /// The loop of [`Self::sample_block`], to be overridden where lanes can share work.
+    #[inline(always)]
+    fn sample_lanes(&self, at: &LaneVectors<R>, out: &mut IndexSamples<R>) {
+        for lane in 0..LANES {
+            out.put(lane, self.sample(get(at, lane)));
+        }
+    }
+
+    /// The loop of [`Self::sample_block_with_hessians`], to be overridden where lanes can share
+    /// work.
+    #[inline(always)]
+    fn hessian_lanes(
+        &self,
+        at: &LaneVectors<R>,
+        times: &LaneVectors<R>,
+        out: &mut IndexSamples<R>,
+        product: &mut LaneVectors<R>,
+    ) {
+        for lane in 0..LANES {
+            let (sample, hessian) = self.sample_and_hessian(get(at, lane));
+            out.put(lane, sample);
+            put(product, lane, hessian.times(get(times, lane)));
+        }
+    }
+
+    /// The loop of [`Self::accumulate_block`], to be overridden where lanes can share work.
+    #[inline(always)]
+    fn accumulate_lanes(
+        &self,
+        at: &LaneVectors<R>,
+        weight: &LaneScalars<R>,
+        pull: &LaneVectors<R>,
+        gradient: &mut [R],
+    ) {
+        for (lane, weight) in weight.iter().enumerate() {
+            self.accumulate(get(at, lane), *weight, get(pull, lane), gradient);
+        }
     }
 }
 

@@ -3,6 +3,7 @@
 //! With `v_z` constant along a ray, `x(σ) = x₀ cos(n₀ g σ) + v₀ sin(n₀ g σ)/(n₀ g)` across the axis
 //! (Marchand, *Gradient Index Optics*, 1978).
 
+use super::layered::clamp_coordinate;
 use super::{ProfileFunction, ProfileSample};
 use crate::math::Real;
 
@@ -25,9 +26,7 @@ impl<R: Real> Parabolic<R> {
     #[inline(always)]
     fn clamped_square(&self, s: R) -> (R, R) {
         let [_, g] = self.parameters;
-        let (q, cut) = (g * g * s, R::from_f64(CUT));
-        let inside = q < cut;
-        (R::select(inside, q, cut), R::select(inside, R::ONE, R::ZERO))
+        clamp_coordinate(g * g * s, CUT)
     }
 }
 

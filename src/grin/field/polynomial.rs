@@ -23,31 +23,31 @@ impl<R: Real> ProfileFunction<R> for Polynomial<R> {
     /// Horner's rule for the value and both derivatives.
     #[inline(always)]
     fn evaluate(&self, s: R) -> ProfileSample<R> {
-        let (mut value, mut slope, mut half_bend) = (R::ZERO, R::ZERO, R::ZERO);
+        let (mut value, mut slope, mut half_curvature) = (R::ZERO, R::ZERO, R::ZERO);
         for &c in self.coefficients.iter().rev() {
-            half_bend = half_bend * s + slope;
+            half_curvature = half_curvature * s + slope;
             slope = slope * s + value;
             value = value * s + c;
         }
-        ProfileSample { value, slope, curvature: half_bend + half_bend }
+        ProfileSample { value, slope, curvature: half_curvature + half_curvature }
     }
 
     /// Applies each coefficient to all rays before the next.
     #[inline(always)]
     fn evaluate_block(&self, s: &LaneScalars<R>, out: &mut ProfileSamples<R>) {
-        let ProfileSamples { value, slope, curvature: bend } = out;
-        for column in [&mut *value, &mut *slope, &mut *bend] {
+        let ProfileSamples { value, slope, curvature } = out;
+        for column in [&mut *value, &mut *slope, &mut *curvature] {
             *column = [R::ZERO; LANES];
         }
         for &c in self.coefficients.iter().rev() {
             for lane in 0..LANES {
-                bend[lane] = bend[lane] * s[lane] + slope[lane];
+                curvature[lane] = curvature[lane] * s[lane] + slope[lane];
                 slope[lane] = slope[lane] * s[lane] + value[lane];
                 value[lane] = value[lane] * s[lane] + c;
             }
         }
-        for bend in bend {
-            *bend = *bend + *bend;
+        for curvature in curvature {
+            *curvature = *curvature + *curvature;
         }
     }
 

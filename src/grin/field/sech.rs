@@ -3,6 +3,7 @@
 //! `η = n₀ / cosh(a r)` (Mikaelian 1951; Marchand, *Gradient Index Optics*, 1978): parallel light
 //! meets the axis at `π/2a`, `3π/2a`, …
 
+use super::layered::clamp_coordinate;
 use super::{ProfileFunction, ProfileSample};
 use crate::math::Real;
 
@@ -48,10 +49,8 @@ impl<R: Real> Sech<R> {
     /// its derivatives.
     fn cosh_parts(&self, s: R) -> (R, R, [R; 3]) {
         let [_, a] = self.parameters;
-        let (q, cut) = (a * a * s, R::from_f64(CUT));
-        let inside = q < cut;
-        let q = R::select(inside, q, cut);
-        (q, R::select(inside, R::ONE, R::ZERO), cosh_root(q))
+        let (q, inside) = clamp_coordinate(a * a * s, CUT);
+        (q, inside, cosh_root(q))
     }
 }
 
@@ -69,8 +68,8 @@ impl<R: Real> ProfileFunction<R> for Sech<R> {
         let (_, on, [c, c1, c2]) = self.cosh_parts(s);
         let (value, square) = (axis / c, on * a * a);
         let slope = -(value * c1 / c * square);
-        let bend = value * square * square * (R::TWO * c1 * c1 / c - c2) / c;
-        ProfileSample { value, slope, curvature: bend }
+        let curvature = value * square * square * (R::TWO * c1 * c1 / c - c2) / c;
+        ProfileSample { value, slope, curvature }
     }
 
     /// With respect to `q = a² s`: `df/dq = -n₀ c'/c²`, and `f' = a² df/dq`.

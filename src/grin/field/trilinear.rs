@@ -14,7 +14,7 @@ use super::{
     FieldResolution, GridError, Hessian, IndexField, IndexSample, IndexSamples, RegularGrid,
 };
 use crate::grin::lanes::{LANES, LaneScalars, LaneVectors, get, put};
-use crate::math::{Real, SimdWidth, Vec3, run_vectorized};
+use crate::math::{Real, Vec3};
 
 /// The diagonal of the Hessian of a trilinear field.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
@@ -344,6 +344,40 @@ impl<R: Real> Trilinear<R> {
         }
         all
     }
+}
+
+impl<R: Real> IndexField<R> for Trilinear<R> {
+    fn parameters(&self) -> &[R] {
+        &self.values
+    }
+
+    fn parameters_mut(&mut self) -> &mut [R] {
+        &mut self.values
+    }
+
+    fn sample(&self, at: Vec3<R>) -> IndexSample<R> {
+        let place = self.grid.locate(at, 2);
+        self.to_sample(&interpolate(&self.corners(place.first), place.t))
+    }
+
+    fn hessian(&self, at: Vec3<R>) -> Hessian<R> {
+        let place = self.grid.locate(at, 2);
+        let blend = interpolate(&self.corners(place.first), place.t);
+        let diagonal = match self.diagonal {
+            HessianDiagonal::Exact => Vec3::default(),
+            HessianDiagonal::Smoothed => second_differences(&blend, self.outer(&place), place.t),
+        };
+        self.to_hessian(blend.mixed, diagonal)
+    }
+
+    fn accumulate(&self, at: Vec3<R>, weight: R, pull: Vec3<R>, gradient: &mut [R]) {
+        let place = self.grid.locate(at, 2);
+        self.add_to_corners(place.first, &self.corner_shares(place.t, weight, pull), gradient);
+    }
+
+    fn resolution(&self) -> FieldResolution {
+        FieldResolution { voxel: Some(self.grid.smallest_spacing()), continuous_force: false }
+    }
 
     #[inline(always)]
     fn sample_lanes(&self, at: &LaneVectors<R>, out: &mut IndexSamples<R>) {
@@ -399,75 +433,5 @@ impl<R: Real> Trilinear<R> {
         for lane in 0..LANES {
             self.add_to_corners(places.first[lane], &gather(&all, lane), gradient);
         }
-    }
-}
-
-impl<R: Real> IndexField<R> for Trilinear<R> {
-    fn parameters(&self) -> &[R] {
-        &self.values
-    }
-
-    fn parameters_mut(&mut self) -> &mut [R] {
-        &mut self.values
-    }
-
-    fn sample(&self, at: Vec3<R>) -> IndexSample<R> {
-        let place = self.grid.locate(at, 2);
-        self.to_sample(&interpolate(&self.corners(place.first), place.t))
-    }
-
-    fn hessian(&self, at: Vec3<R>) -> Hessian<R> {
-        let place = self.grid.locate(at, 2);
-        let blend = interpolate(&self.corners(place.first), place.t);
-        let diagonal = match self.diagonal {
-            HessianDiagonal::Exact => Vec3::default(),
-            HessianDiagonal::Smoothed => second_differences(&blend, self.outer(&place), place.t),
-        };
-        self.to_hessian(blend.mixed, diagonal)
-    }
-
-    fn accumulate(&self, at: Vec3<R>, weight: R, pull: Vec3<R>, gradient: &mut [R]) {
-        let place = self.grid.locate(at, 2);
-        self.add_to_corners(place.first, &self.corner_shares(place.t, weight, pull), gradient);
-    }
-
-    fn resolution(&self) -> FieldResolution {
-        FieldResolution { voxel: Some(self.grid.smallest_spacing()), continuous_force: false }
-    }
-
-    fn sample_block(&self, at: &LaneVectors<R>, out: &mut IndexSamples<R>) {
-        run_vectorized(
-            SimdWidth::Bits512,
-            #[inline(always)]
-            || self.sample_lanes(at, out),
-        );
-    }
-
-    fn sample_block_with_hessians(
-        &self,
-        at: &LaneVectors<R>,
-        times: &LaneVectors<R>,
-        out: &mut IndexSamples<R>,
-        product: &mut LaneVectors<R>,
-    ) {
-        run_vectorized(
-            SimdWidth::Bits512,
-            #[inline(always)]
-            || self.hessian_lanes(at, times, out, product),
-        );
-    }
-
-    fn accumulate_block(
-        &self,
-        at: &LaneVectors<R>,
-        weight: &LaneScalars<R>,
-        pull: &LaneVectors<R>,
-        gradient: &mut [R],
-    ) {
-        run_vectorized(
-            SimdWidth::Bits512,
-            #[inline(always)]
-            || self.accumulate_lanes(at, weight, pull, gradient),
-        );
     }
 }

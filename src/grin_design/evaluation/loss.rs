@@ -72,8 +72,8 @@ impl ViewRays {
         if let Some(ring) = &self.ring {
             return ring.residuals(exit);
         }
-        let aim = self.targets[ray];
-        (exit.x - aim.x, exit.v - aim.v)
+        let target = self.targets[ray];
+        (exit.x - target.x, exit.v - target.v)
     }
 
     /// The weight of a squared residual in direction.
@@ -223,28 +223,28 @@ impl ViewRays {
 /// The loss of a field with its gradient; views of weight 0 are skipped.
 pub(in crate::grin_design) fn evaluate(
     field: &dyn IndexField<f64>,
-    shots: &[ViewRays],
-    hold: &FieldPenalties,
+    views: &[ViewRays],
+    penalties: &FieldPenalties,
 ) -> Result<LossEvaluation, GrinTaskError> {
     let mut gradient = vec![0.0; field.parameters().len()];
-    let (mut loss, mut views) = (hold.add_gradient(field, &mut gradient), Vec::new());
-    for shot in shots.iter().filter(|shot| shot.has_weight()) {
-        let result = shot.add_gradient(field, &mut gradient)?;
-        loss += shot.weight * result.loss;
-        views.push(result);
+    let (mut loss, mut results) = (penalties.add_gradient(field, &mut gradient), Vec::new());
+    for view in views.iter().filter(|view| view.has_weight()) {
+        let result = view.add_gradient(field, &mut gradient)?;
+        loss += view.weight * result.loss;
+        results.push(result);
     }
-    Ok(LossEvaluation { loss, gradient, views })
+    Ok(LossEvaluation { loss, gradient, views: results })
 }
 
 /// The same as rows of a least-squares problem: the loss is the sum of their squares.
 pub(in crate::grin_design) fn evaluate_rows(
     field: &dyn IndexField<f64>,
-    shots: &[ViewRays],
-    hold: &FieldPenalties,
+    views: &[ViewRays],
+    penalties: &FieldPenalties,
 ) -> Result<Vec<(f64, Vec<f64>)>, GrinTaskError> {
-    let mut all = hold.residual_rows(field);
-    for shot in shots.iter().filter(|shot| shot.has_weight()) {
-        all.extend(shot.residual_rows(field)?);
+    let mut all = penalties.residual_rows(field);
+    for view in views.iter().filter(|view| view.has_weight()) {
+        all.extend(view.residual_rows(field)?);
     }
     Ok(all)
 }
@@ -279,19 +279,19 @@ mod tests {
     /// differences.
     fn slopes(task: &GrinTask) -> Option<[f64; 2]> {
         let wave = |p: Vec3<f64>| 1.1 + 0.02 * (2.0 * p.x + p.y).sin() * (p.z - 0.4 * p.x).cos();
-        let medium = GrinField::from_function(task.field, 6, wave).ok()?;
-        let setups = plan_views(task, medium.field(), RaySet::Scoring).ok()?;
-        let shots = view_rays(task, &measure_targets(task).ok()?, &setups, RaySet::Scoring).ok()?;
-        let hold = FieldPenalties::new(task);
-        let count = medium.field().parameters().len();
+        let field = GrinField::from_function(task.field, 6, wave).ok()?;
+        let setups = plan_views(task, field.index_field(), RaySet::Scoring).ok()?;
+        let views = view_rays(task, &measure_targets(task).ok()?, &setups, RaySet::Scoring).ok()?;
+        let penalties = FieldPenalties::new(task);
+        let count = field.index_field().parameters().len();
         let change: Vec<f64> = (0..count).map(|i| (0.7 * i as f64).sin()).collect();
         let moved = |by: f64| {
-            let mut other = medium.clone();
+            let mut other = field.clone();
             let numbers = other.parameters_mut().iter_mut().zip(&change);
             numbers.for_each(|(value, change)| *value += by * change);
-            Some(evaluate(other.field(), &shots, &hold).ok()?.loss)
+            Some(evaluate(other.index_field(), &views, &penalties).ok()?.loss)
         };
-        let found = evaluate(medium.field(), &shots, &hold).ok()?;
+        let found = evaluate(field.index_field(), &views, &penalties).ok()?;
         let adjoint = found.gradient.iter().zip(&change).map(|(g, c)| g * c).sum();
         let step = 1e-6;
         Some([adjoint, (moved(step)? - moved(-step)?) / (2.0 * step)])

@@ -65,12 +65,12 @@ pub struct StraightRays {
 impl StraightRay {
     fn new(
         field: &dyn IndexField<f64>,
-        shot: &ViewRays,
+        view: &ViewRays,
         tracer: &StraightTracer<'_>,
         ray: usize,
     ) -> Option<Self> {
-        let aim: RayTarget = *shot.targets.get(ray)?;
-        let (states, exit) = tracer.trace_path(&shot.rays[ray]);
+        let target: RayTarget = *view.targets.get(ray)?;
+        let (states, exit) = tracer.trace_path(&view.rays[ray]);
         let entry = states.first()?;
         let (way, speed) = (exit.x - entry.x, length(entry.v));
         let whole = length(way);
@@ -78,14 +78,14 @@ impl StraightRay {
             return None;
         }
         let index = field.sample(entry.x).index;
-        let (turn, weight) = (index / speed, aim.direction.sqrt());
+        let (turn, weight) = (index / speed, target.direction.sqrt());
         Some(Self {
             from: entry.x,
             direction: way * (1.0 / whole),
             length: whole,
             steps: states.len().max(1),
             gains: [turn * weight, turn / speed],
-            measured: [(aim.v - exit.v) * weight, aim.x - exit.x],
+            measured: [(target.v - exit.v) * weight, target.x - exit.x],
         })
     }
 
@@ -155,25 +155,25 @@ impl StraightRays {
             (None, InitialField::Volume(_)) => 1.0,
         };
         let nodes = task.levels.iter().map(|level| level.nodes).max().unwrap_or(2);
-        let even = GrinField::from_function(task.field, nodes, |_| ambient)?;
-        let setups = plan_views(task, even.field(), RaySet::Scoring)?;
-        let shots = view_rays(task, &measure_targets(task)?, &setups, RaySet::Scoring)?;
-        let mut chords = Vec::new();
-        for shot in &shots {
-            let tracer = GrinTracer::new(even.field(), shot.setup.clone())?;
-            chords.extend(
-                (0..shot.rays.len())
-                    .filter_map(|ray| StraightRay::new(even.field(), shot, &tracer, ray)),
+        let uniform = GrinField::from_function(task.field, nodes, |_| ambient)?;
+        let setups = plan_views(task, uniform.index_field(), RaySet::Scoring)?;
+        let views = view_rays(task, &measure_targets(task)?, &setups, RaySet::Scoring)?;
+        let mut rays: Vec<StraightRay> = Vec::new();
+        for view in &views {
+            let tracer = GrinTracer::new(uniform.index_field(), view.setup.clone())?;
+            rays.extend(
+                (0..view.rays.len())
+                    .filter_map(|ray| StraightRay::new(uniform.index_field(), view, &tracer, ray)),
             );
         }
-        if chords.is_empty() {
+        if rays.is_empty() {
             return Err(invalid("views", "none with the goal `like`", "light that was measured"));
         }
         let weight = task.edge.map_or(0.0, |edge| edge.weight);
         let places = if weight > 0.0 { task.space.surface_points(SURFACE) } else { Vec::new() };
         // The weight is relative to the mean over the rays, here to their sum.
-        let firm = (weight * chords.len() as f64 / SURFACE as f64).sqrt();
-        Ok(Self { rays: chords, task: task.clone(), ambient, edge: (places, firm) })
+        let root_weight = (weight * rays.len() as f64 / SURFACE as f64).sqrt();
+        Ok(Self { rays, task: task.clone(), ambient, edge: (places, root_weight) })
     }
 
     /// The number of rays.
@@ -196,34 +196,34 @@ impl StraightRays {
         let shape = GrinField::from_function(self.task.field, nodes, |_| 0.0)?;
         let ranges = shape.parameter_ranges(self.task.space, self.task.limits, self.task.edge);
         let limits = ParameterBounds { ranges, max_change: f64::INFINITY };
-        let (places, firm) = &self.edge;
-        let mut right: Vec<f64> = self.rows(|chord| chord.measured.map(|m| chord.transverse(m)));
+        let (places, root_weight) = &self.edge;
+        let mut right: Vec<f64> = self.rows(|ray| ray.measured.map(|m| ray.transverse(m)));
         right.resize(right.len() + places.len(), 0.0);
         let forward = |u: &[f64]| {
-            let medium = with_parameters(&shape, u);
-            let mut rows = self.rows(|chord| chord.deflection(medium.field()));
-            rows.extend(places.iter().map(|p| firm * medium.field().sample(*p).index));
+            let field = with_parameters(&shape, u);
+            let mut rows = self.rows(|ray| ray.deflection(field.index_field()));
+            rows.extend(places.iter().map(|p| root_weight * field.index_field().sample(*p).index));
             rows
         };
         let back = |rows: &[f64]| {
             let mut sum =
-                self.transpose(shape.field().parameters().len(), rows, |chord, seeds, sum| {
-                    chord.deflection_adjoint(shape.field(), seeds, sum);
+                self.transpose(shape.index_field().parameters().len(), rows, |ray, seeds, sum| {
+                    ray.deflection_adjoint(shape.index_field(), seeds, sum);
                 });
             for (p, row) in places.iter().zip(&rows[6 * self.rays.len()..]) {
-                shape.field().accumulate(*p, firm * row, Vec3::default(), &mut sum);
+                shape.index_field().accumulate(*p, root_weight * row, Vec3::default(), &mut sum);
             }
             let held = limits.ranges.iter().map(|[low, high]| low >= high);
             sum.iter_mut().zip(held).filter(|(_, held)| *held).for_each(|(g, _)| *g = 0.0);
             sum
         };
         let field = |u: &[f64]| {
-            let mut medium = with_parameters(&shape, u);
-            medium.parameters_mut().iter_mut().for_each(|value| *value += self.ambient);
-            limits.project(medium.parameters_mut());
-            medium
+            let mut field = with_parameters(&shape, u);
+            field.parameters_mut().iter_mut().for_each(|value| *value += self.ambient);
+            limits.project(field.parameters_mut());
+            field
         };
-        let unknowns = shape.field().parameters().len();
+        let unknowns = shape.index_field().parameters().len();
         let found = cgls(unknowns, &right, steps, forward, back, |u| visit(&field(u)));
         Ok(field(&found))
     }
@@ -247,11 +247,11 @@ impl StraightRays {
                 self.rays.iter().map(|c| component(c.measured[0], axis)).collect();
             let forward = |u: &[f64]| -> Vec<f64> {
                 let volume = with_values(&shape, u);
-                self.rays.par_iter().map(|chord| chord.turning(&volume)).collect()
+                self.rays.par_iter().map(|ray| ray.turning(&volume)).collect()
             };
             let back = |rows: &[f64]| {
-                let add = |chord: &StraightRay, ray: usize, sum: &mut [f64]| {
-                    chord.turning_adjoint(&shape, rows[ray], sum);
+                let add = |ray: &StraightRay, n: usize, sum: &mut [f64]| {
+                    ray.turning_adjoint(&shape, rows[n], sum);
                 };
                 self.accumulate(grid.node_count(), add)
             };
@@ -266,8 +266,8 @@ impl StraightRays {
 
     /// Six numbers per ray.
     fn rows(&self, of: impl Fn(&StraightRay) -> [Vec3<f64>; 2] + Sync) -> Vec<f64> {
-        let rows = |chord: &StraightRay| {
-            let [a, b] = of(chord);
+        let rows = |ray: &StraightRay| {
+            let [a, b] = of(ray);
             [a.x, a.y, a.z, b.x, b.y, b.z]
         };
         self.rays.par_iter().flat_map_iter(rows).collect()
@@ -280,9 +280,9 @@ impl StraightRays {
         rows: &[f64],
         add: impl Fn(&StraightRay, [Vec3<f64>; 2], &mut [f64]) + Sync,
     ) -> Vec<f64> {
-        self.accumulate(unknowns, |chord, ray, sum| {
-            let [a, b, c, d, e, f] = std::array::from_fn(|i| rows[6 * ray + i]);
-            add(chord, [Vec3::new(a, b, c), Vec3::new(d, e, f)], sum);
+        self.accumulate(unknowns, |ray, n, sum| {
+            let [a, b, c, d, e, f] = std::array::from_fn(|i| rows[6 * n + i]);
+            add(ray, [Vec3::new(a, b, c), Vec3::new(d, e, f)], sum);
         })
     }
 
@@ -293,9 +293,9 @@ impl StraightRays {
         add: impl Fn(&StraightRay, usize, &mut [f64]) + Sync,
     ) -> Vec<f64> {
         let size = self.rays.len().div_ceil(PARTS).max(1);
-        let part = |(first, chords): (usize, &[StraightRay])| {
+        let part = |(first, rays): (usize, &[StraightRay])| {
             let mut sum = vec![0.0; unknowns];
-            chords.iter().enumerate().for_each(|(i, c)| add(c, first * size + i, &mut sum));
+            rays.iter().enumerate().for_each(|(i, c)| add(c, first * size + i, &mut sum));
             sum
         };
         let parts: Vec<Vec<f64>> = self.rays.par_chunks(size).enumerate().map(part).collect();
@@ -308,9 +308,9 @@ impl StraightRays {
 }
 
 fn with_parameters(shape: &GrinField, parameters: &[f64]) -> GrinField {
-    let mut medium = shape.clone();
-    medium.parameters_mut().copy_from_slice(parameters);
-    medium
+    let mut field = shape.clone();
+    field.parameters_mut().copy_from_slice(parameters);
+    field
 }
 
 fn with_values(shape: &Trilinear<f64>, values: &[f64]) -> Trilinear<f64> {

@@ -51,15 +51,14 @@ impl GrinTask {
         let measured = |view: &LightView| {
             let LightGoal::Like { field, .. } = &view.goal else { return Ok(None) };
             let space = view.space.unwrap_or(self.space);
-            let sent = view.source.rays(space, RaySet::Scoring);
-            let exits = trace_reference(self, view, field, &sent)?;
-            let told = |exit: &&RayExit<f64>| is_valid(exit);
-            let angle = |exit: &RayExit<f64>, sent: &SourceRay| {
-                let chord = length(unit(exit.v) - unit(sent.ray.v));
+            let sources = view.source.rays(space, RaySet::Scoring);
+            let exits = trace_reference(self, view, field, &sources)?;
+            let angle = |exit: &RayExit<f64>, source: &SourceRay| {
+                let chord = length(unit(exit.v) - unit(source.ray.v));
                 2.0 * (0.5 * chord).min(1.0).asin()
             };
-            let pairs = exits.iter().zip(&sent).filter(|(exit, _)| told(exit));
-            let deflection = pairs.map(|(exit, sent)| angle(exit, sent)).fold(0.0, f64::max);
+            let pairs = exits.iter().zip(&sources).filter(|(exit, _)| is_valid(exit));
+            let deflection = pairs.map(|(exit, source)| angle(exit, source)).fold(0.0, f64::max);
             Ok(Some(ViewMeasurement {
                 view: view.name.clone(),
                 deflection,
@@ -75,12 +74,12 @@ fn trace_reference(
     task: &GrinTask,
     view: &LightView,
     field: &ReferenceField,
-    sent: &[SourceRay],
+    sources: &[SourceRay],
 ) -> Result<Vec<RayExit<f64>>, GrinTaskError> {
     let space = view.space.unwrap_or(task.space);
     let place = format!("view {}", view.name);
     let field = field.field().map_err(|source| GrinTaskError::Field { place, source })?;
-    let rays: Vec<GrinRay<f64>> = sent.iter().map(|sent| sent.ray).collect();
+    let rays: Vec<GrinRay<f64>> = sources.iter().map(|source| source.ray).collect();
     let finer = FINER * task.tolerance;
     let setup = plan_tracing(&*field, &space.region(), task.launch, &rays, finer)?.setup;
     let tracer = GrinTracer::new(&*field, setup)?;
@@ -95,31 +94,31 @@ pub(super) fn trace_targets(
     task: &GrinTask,
     view: &LightView,
     field: &ReferenceField,
-    sent: &[SourceRay],
+    sources: &[SourceRay],
     direction: f64,
 ) -> Result<Vec<RayTarget>, GrinTaskError> {
-    let exits = trace_reference(task, view, field, sent)?;
+    let exits = trace_reference(task, view, field, sources)?;
     if !exits.iter().any(is_valid) {
         let found = "no ray that leaves the field";
         return Err(invalid(format!("view {}", view.name), found, "light that tells something"));
     }
-    let aim = |exit: &RayExit<f64>| {
+    let target = |exit: &RayExit<f64>| {
         let measured = is_valid(exit);
         RayTarget { x: exit.x, v: exit.v, direction, measured }
     };
-    Ok(exits.iter().map(aim).collect())
+    Ok(exits.iter().map(target).collect())
 }
 
 /// Measures the targets of all views whose rays are the same in every step.
 pub(in crate::grin_design) fn measure_targets(
     task: &GrinTask,
 ) -> Result<MeasuredTargets, GrinTaskError> {
-    let aims = |view: &LightView| match &view.goal {
+    let targets = |view: &LightView| match &view.goal {
         LightGoal::Like { field, direction } if !view.source.is_resampled() => {
-            let sent = view.source.rays(view.space.unwrap_or(task.space), RaySet::Scoring);
-            trace_targets(task, view, field, &sent, *direction).map(Some)
+            let sources = view.source.rays(view.space.unwrap_or(task.space), RaySet::Scoring);
+            trace_targets(task, view, field, &sources, *direction).map(Some)
         }
         _ => Ok(None),
     };
-    task.views.iter().map(aims).collect()
+    task.views.iter().map(targets).collect()
 }

@@ -38,7 +38,7 @@ impl GrinTask {
     pub fn scoring_rays(&self, view: &LightView) -> (Domain, Vec<GrinRay<f64>>) {
         let space = view.space.unwrap_or(self.space);
         let rays = view.source.rays(space, RaySet::Scoring);
-        (space, rays.into_iter().map(|sent| sent.ray).collect())
+        (space, rays.into_iter().map(|source| source.ray).collect())
     }
 }
 
@@ -46,11 +46,11 @@ impl GrinTask {
 pub(in crate::grin_design) fn plan_views(
     task: &GrinTask,
     field: &dyn IndexField<f64>,
-    draw: RaySet,
+    set: RaySet,
 ) -> Result<Vec<GrinSetup<f64>>, GrinTaskError> {
     let setup = |view: &LightView| {
         let space = view.space.unwrap_or(task.space);
-        let rays: Vec<GrinRay<f64>> = view.source.rays(space, draw).iter().map(|s| s.ray).collect();
+        let rays: Vec<GrinRay<f64>> = view.source.rays(space, set).iter().map(|s| s.ray).collect();
         let mut setup = match task.tracing {
             Some(tracing) => tie_to_voxels(task, field, space, tracing),
             None => plan_tracing(field, &space.region(), task.launch, &rays, task.tolerance)?.setup,
@@ -79,22 +79,22 @@ fn tie_to_voxels(
 /// The rays of every view with their targets.
 pub(in crate::grin_design) fn view_rays(
     task: &GrinTask,
-    known: &MeasuredTargets,
+    measured: &MeasuredTargets,
     setups: &[GrinSetup<f64>],
-    draw: RaySet,
+    set: RaySet,
 ) -> Result<Vec<ViewRays>, GrinTaskError> {
-    let shot =
-        |((view, setup), known): ((&LightView, &GrinSetup<f64>), &Option<Vec<RayTarget>>)| {
+    let of_view =
+        |((view, setup), measured): ((&LightView, &GrinSetup<f64>), &Option<Vec<RayTarget>>)| {
             let space = view.space.unwrap_or(task.space);
-            let RayBundle { rays, aims, unmeasured } =
-                ray_bundle(task, view, known.as_deref(), draw)?;
+            let RayBundle { rays, targets, unmeasured } =
+                ray_bundle(task, view, measured.as_deref(), set)?;
             let lost = space.diameter() * space.diameter();
             let (setup, weight, screen) = (setup.clone(), view.weight, image_screen(view, space)?);
             // The difference of images has no unit.
             let lost = if screen.is_some() { 1.0 } else { lost };
             Ok(ViewRays {
                 rays,
-                targets: aims,
+                targets,
                 setup,
                 weight,
                 lost_penalty: lost,
@@ -103,19 +103,20 @@ pub(in crate::grin_design) fn view_rays(
                 unmeasured,
             })
         };
-    task.views.iter().zip(setups).zip(known).map(shot).collect()
+    task.views.iter().zip(setups).zip(measured).map(of_view).collect()
 }
 
 /// Replaces the rays of the views by those of another step.
 pub(in crate::grin_design) fn resample_views(
     task: &GrinTask,
-    known: &MeasuredTargets,
-    shots: &mut [ViewRays],
-    draw: RaySet,
+    measured: &MeasuredTargets,
+    views: &mut [ViewRays],
+    set: RaySet,
 ) -> Result<(), GrinTaskError> {
-    for ((view, shot), known) in task.views.iter().zip(shots).zip(known) {
-        let beam = ray_bundle(task, view, known.as_deref(), draw)?;
-        (shot.rays, shot.targets, shot.unmeasured) = (beam.rays, beam.aims, beam.unmeasured);
+    for ((view, of_view), measured) in task.views.iter().zip(views).zip(measured) {
+        let bundle = ray_bundle(task, view, measured.as_deref(), set)?;
+        (of_view.rays, of_view.targets, of_view.unmeasured) =
+            (bundle.rays, bundle.targets, bundle.unmeasured);
     }
     Ok(())
 }
@@ -123,44 +124,46 @@ pub(in crate::grin_design) fn resample_views(
 /// The rays of a view with a known target, and the number of others.
 struct RayBundle {
     rays: Vec<GrinRay<f64>>,
-    aims: Vec<RayTarget>,
+    targets: Vec<RayTarget>,
     unmeasured: usize,
 }
 
 fn ray_bundle(
     task: &GrinTask,
     view: &LightView,
-    known: Option<&[RayTarget]>,
-    draw: RaySet,
+    measured: Option<&[RayTarget]>,
+    set: RaySet,
 ) -> Result<RayBundle, GrinTaskError> {
     let space = view.space.unwrap_or(task.space);
-    let sent = view.source.rays(space, draw);
-    let mut aims = match known {
-        Some(known) => known.to_vec(),
-        None => ray_targets(task, view, space, &sent)?,
+    let sources = view.source.rays(space, set);
+    let mut targets = match measured {
+        Some(measured) => measured.to_vec(),
+        None => ray_targets(task, view, space, &sources)?,
     };
-    let is_measured = |i: usize| aims.get(i).is_none_or(|aim| aim.measured);
-    let measured = sent.iter().enumerate().filter(|(i, _)| is_measured(*i));
-    let rays: Vec<GrinRay<f64>> = measured.map(|(_, sent)| sent.ray).collect();
-    let unmeasured = sent.len() - rays.len();
-    aims.retain(|aim| aim.measured);
-    Ok(RayBundle { rays, aims, unmeasured })
+    let is_measured = |i: usize| targets.get(i).is_none_or(|target| target.measured);
+    let measured = sources.iter().enumerate().filter(|(i, _)| is_measured(*i));
+    let rays: Vec<GrinRay<f64>> = measured.map(|(_, source)| source.ray).collect();
+    let unmeasured = sources.len() - rays.len();
+    targets.retain(|target| target.measured);
+    Ok(RayBundle { rays, targets, unmeasured })
 }
 
 fn ray_targets(
     task: &GrinTask,
     view: &LightView,
     space: Domain,
-    sent: &[SourceRay],
+    sources: &[SourceRay],
 ) -> Result<Vec<RayTarget>, GrinTaskError> {
     let at = |x| RayTarget { x, v: Vec3::default(), direction: 0.0, measured: true };
     Ok(match &view.goal {
         LightGoal::Image { .. } | LightGoal::Far { .. } | LightGoal::Ring { .. } => Vec::new(),
-        LightGoal::Point([x, y, z]) => vec![at(Vec3::new(*x, *y, *z)); sent.len()],
+        LightGoal::Point([x, y, z]) => vec![at(Vec3::new(*x, *y, *z)); sources.len()],
         LightGoal::Antipode => {
             let reach = 0.5 * space.diameter();
-            sent.iter().map(|sent| at(sent.antipode * reach)).collect()
+            sources.iter().map(|source| at(source.antipode * reach)).collect()
         }
-        LightGoal::Like { field, direction } => trace_targets(task, view, field, sent, *direction)?,
+        LightGoal::Like { field, direction } => {
+            trace_targets(task, view, field, sources, *direction)?
+        }
     })
 }

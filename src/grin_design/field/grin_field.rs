@@ -110,7 +110,7 @@ impl GrinField {
         kind: FieldRepresentation,
         nodes: usize,
     ) -> Result<Self, GridError> {
-        let mut finer = Self::from_function(kind, nodes, |p| self.field().sample(p).index)?;
+        let mut finer = Self::from_function(kind, nodes, |p| self.index_field().sample(p).index)?;
         if let (Self::Radial(coarse, _), Self::Radial(fine, _)) = (self, &mut finer) {
             let spacing = fine.profile.knot_spacing().unwrap_or(1.0);
             for (i, c) in fine.parameters_mut().iter_mut().enumerate() {
@@ -132,7 +132,7 @@ impl GrinField {
     }
 
     /// The field for tracing.
-    pub fn field(&self) -> &dyn IndexField<f64> {
+    pub fn index_field(&self) -> &dyn IndexField<f64> {
         match self {
             Self::Trilinear(field) => field,
             Self::Tricubic(field) => field,
@@ -212,7 +212,7 @@ impl GrinField {
                 RegularGrid::new([nodes; 3], low, (high - low) * (1.0 / (nodes - 1) as f64))?
             }
         };
-        let index = |n| self.field().sample(self.nearest_covered(grid.node(n))).index;
+        let index = |n| self.index_field().sample(self.nearest_covered(grid.node(n))).index;
         Ok(Volume { grid, values: (0..grid.node_count()).map(index).collect() })
     }
 
@@ -236,15 +236,15 @@ mod tests {
 
     #[test]
     fn a_volume_goes_on_with_the_index_at_the_end_of_a_spline() {
-        let mut medium =
+        let mut field =
             GrinField::from_function(FieldRepresentation::Cylinder { radius: 1.0 }, 8, |_| 1.5)
                 .unwrap();
-        for (i, coefficient) in medium.parameters_mut().iter_mut().enumerate() {
+        for (i, coefficient) in field.parameters_mut().iter_mut().enumerate() {
             *coefficient -= 0.05 * i as f64;
         }
-        let edge = medium.field().sample(Vec3::new(1.0, 0.0, 0.0)).index;
+        let edge = field.index_field().sample(Vec3::new(1.0, 0.0, 0.0)).index;
         let space = Domain::Rod { radius: 1.5, from: 0.0, to: 4.0 };
-        let values = medium.volume(space, 9).unwrap().values;
+        let values = field.volume(space, 9).unwrap().values;
         let least = values.iter().copied().fold(f64::INFINITY, f64::min);
         assert!((least - edge).abs() < 1e-12 && edge < 1.25, "{least} {edge}");
     }

@@ -48,7 +48,7 @@ impl GrinField {
         spaces: &[Domain],
         bound: IndexBound,
     ) -> LocatedValue {
-        let value = |p: Vec3<f64>| bound.signed(self.field().sample(p).index);
+        let value = |p: Vec3<f64>| bound.signed(self.index_field().sample(p).index);
         let of_space = |space: &Domain| {
             if let Self::Trilinear(field) = self {
                 return highest_value(field.grid(), *space, &value);
@@ -99,7 +99,7 @@ impl GrinField {
     /// True if the field is a spline with a coefficient beyond a range.
     fn has_loose_coefficients(&self, [low, high]: [f64; 2]) -> bool {
         let within = |value: &f64| (low..=high).contains(value);
-        !matches!(self, Self::Trilinear(_)) && !self.field().parameters().iter().all(within)
+        !matches!(self, Self::Trilinear(_)) && !self.index_field().parameters().iter().all(within)
     }
 
     fn is_radial(&self) -> bool {
@@ -126,7 +126,7 @@ impl GrinField {
         spaces: &[Domain],
         [low, high]: [f64; 2],
     ) -> Vec<(WeightedMean, IndexBound)> {
-        let parameters = self.field().parameters();
+        let parameters = self.index_field().parameters();
         let is_broken =
             |mean: WeightedMean| match mean.iter().map(|(i, w)| w * parameters[*i]).sum::<f64>() {
                 found if found > high + TOLERANCE => Some((mean, IndexBound::High)),
@@ -167,7 +167,7 @@ impl GrinField {
         [low, high]: [f64; 2],
     ) {
         let beyond = |value: f64| value - value.clamp(low, high);
-        let parameters = self.field().parameters();
+        let parameters = self.index_field().parameters();
         let mut shares = vec![1.0_f64; parameters.len()];
         for (mean, bound) in broken {
             let excess = |i: usize| bound.signed(beyond(parameters[i])).max(0.0);
@@ -256,11 +256,11 @@ mod tests {
 
     /// A field with variations so strong that it exceeds its range inside and outside the domain.
     fn wild(kind: FieldRepresentation) -> GrinField {
-        let mut medium = GrinField::from_function(kind, 9, |_| 1.3).unwrap();
+        let mut field = GrinField::from_function(kind, 9, |_| 1.3).unwrap();
         let wave = |i: usize| 1.3 + 3.0 * (0.7 * i as f64).sin();
-        let numbers = medium.parameters_mut().iter_mut().enumerate();
+        let numbers = field.parameters_mut().iter_mut().enumerate();
         numbers.for_each(|(i, value)| *value = wave(i));
-        medium
+        field
     }
 
     #[test]
@@ -280,7 +280,7 @@ mod tests {
                 let t = f64::from(i);
                 let side = |golden: f64| 2.0 * (t * golden).fract() - 1.0;
                 let p = Vec3::new(side(0.8191725), side(0.6710436), side(0.5497005));
-                let index = kept.field().sample(p).index;
+                let index = kept.index_field().sample(p).index;
                 let inside = p.dot(p) <= 1.0;
                 assert!(!inside || (1.0 - 1e-9..=1.6 + 1e-9).contains(&index), "{kind:?} {index}");
             }
@@ -292,26 +292,30 @@ mod tests {
     #[test]
     fn a_steep_field_that_keeps_its_range_in_the_space_is_left_alone() {
         let fish_eye = |p: Vec3<f64>| 2.0 / (1.0 + p.dot(p));
-        let medium =
+        let field =
             GrinField::from_function(FieldRepresentation::Tricubic { half: 1.1 }, 17, fish_eye)
                 .unwrap();
         let range = [0.999, 2.5];
-        assert!(medium.has_loose_coefficients(range), "it is below it outside");
-        assert_eq!(medium.limit_index(&[Domain::Ball { radius: 1.0 }], range), medium);
+        assert!(field.has_loose_coefficients(range), "it is below it outside");
+        assert_eq!(field.limit_index(&[Domain::Ball { radius: 1.0 }], range), field);
     }
 
     #[test]
     fn only_what_counts_at_a_broken_place_is_taken_back() {
-        let mut medium =
+        let mut field =
             GrinField::from_function(FieldRepresentation::Tricubic { half: 1.0 }, 9, |_| 1.5)
                 .unwrap();
-        let last = medium.parameters_mut().len() - 1;
-        medium.parameters_mut()[0] = 100.0;
-        medium.parameters_mut()[last] = 1.7;
-        let kept = medium.limit_index(&[Domain::Cube { half: 1.0 }], [1.0, 1.6]);
-        let parameters = kept.field().parameters();
+        let last = field.parameters_mut().len() - 1;
+        field.parameters_mut()[0] = 100.0;
+        field.parameters_mut()[last] = 1.7;
+        let kept = field.limit_index(&[Domain::Cube { half: 1.0 }], [1.0, 1.6]);
+        let parameters = kept.index_field().parameters();
         assert!(parameters[0] < 100.0 && parameters[0] > 1.6, "{}", parameters[0]);
-        assert_eq!(parameters[1..], medium.field().parameters()[1..], "far away nothing changes");
+        assert_eq!(
+            parameters[1..],
+            field.index_field().parameters()[1..],
+            "far away nothing changes"
+        );
         let (most, _) = kept.extreme_index(&[Domain::Cube { half: 1.0 }], IndexBound::High);
         assert!(most <= 1.6 + 1e-9 && most > 1.59, "{most}");
     }

@@ -32,7 +32,7 @@ impl GrinField {
         }
         let region = space.region();
         let inside = |p: Vec3<f64>| region.level(p) <= 0.0;
-        let slope = |p: Vec3<f64>| length(self.field().sample(p).gradient);
+        let slope = |p: Vec3<f64>| length(self.index_field().sample(p).gradient);
         let hill = FieldObjective { inside: &inside, value: &slope };
         let (steepest, at) =
             find_maximum(&self.sample_points(space), self.sample_spacing(space), &hill);
@@ -52,8 +52,8 @@ impl GrinField {
         if steepest > limit {
             let margin = MARGINS[usize::from(!matches!(self, Self::Trilinear(_)))];
             let factor = (1.0 - margin) * limit / steepest;
-            let draw = |value: &mut f64| *value = towards + factor * (*value - towards);
-            flat.parameters_mut().iter_mut().for_each(draw);
+            let scale = |value: &mut f64| *value = towards + factor * (*value - towards);
+            flat.parameters_mut().iter_mut().for_each(scale);
         }
         flat
     }

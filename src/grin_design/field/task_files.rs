@@ -110,9 +110,9 @@ fn check_index_range(
     spaces: &[Domain],
     expected: [f64; 2],
 ) -> Result<(), ReferenceFieldError> {
-    let medium = GrinField::Trilinear(volume.clone());
+    let field = GrinField::Trilinear(volume.clone());
     let [low, high] =
-        [IndexBound::Low, IndexBound::High].map(|bound| medium.extreme_index(spaces, bound));
+        [IndexBound::Low, IndexBound::High].map(|bound| field.extreme_index(spaces, bound));
     let beyond = [(low, expected[0] - low.0), (high, high.0 - expected[1])];
     match beyond.into_iter().find(|(_, by)| *by > SINGLE_PRECISION) {
         None => Ok(()),

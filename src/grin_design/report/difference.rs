@@ -52,10 +52,10 @@ impl GrinTask {
     /// A volume that has not been read.
     pub fn difference(
         &self,
-        medium: &GrinField,
+        field: &GrinField,
     ) -> Result<Option<FieldDifference>, ReferenceFieldError> {
         let Some(exact) = &self.exact else { return Ok(None) };
-        self.difference_from(medium, &*exact.field::<f64>()?).map(Some)
+        self.difference_from(field, &*exact.field::<f64>()?).map(Some)
     }
 
     /// The difference from another field.
@@ -64,19 +64,19 @@ impl GrinTask {
     /// An initial volume that has not been read.
     pub fn difference_from(
         &self,
-        medium: &GrinField,
+        field: &GrinField,
         exact: &dyn IndexField<f64>,
     ) -> Result<FieldDifference, ReferenceFieldError> {
         let start = self.start.index()?;
-        Ok(difference(medium.field(), exact, &*start, &self.comparison_points()))
+        Ok(difference(field.index_field(), exact, &*start, &self.comparison_points()))
     }
 
     /// The range of the index over the domain, and its largest gradient.
-    pub fn extremes(&self, medium: &GrinField) -> FieldExtremes {
+    pub fn extremes(&self, field: &GrinField) -> FieldExtremes {
         let spaces = self.spaces();
         let [low, high] =
-            [IndexBound::Low, IndexBound::High].map(|bound| medium.extreme_index(&spaces, bound));
-        let slope = medium.locate_max_slope(self.space);
+            [IndexBound::Low, IndexBound::High].map(|bound| field.extreme_index(&spaces, bound));
+        let slope = field.locate_max_slope(self.space);
         FieldExtremes { low: low.0, high: high.0, slope: slope.0, at: [low.1, high.1, slope.1] }
     }
 

@@ -63,8 +63,8 @@ impl GrinTask {
     ///
     /// # Errors
     /// A domain without extent.
-    pub fn volume(&self, medium: &GrinField, nodes: usize) -> Result<Volume, GridError> {
-        let mut volume = medium.volume(self.space, nodes)?;
+    pub fn volume(&self, field: &GrinField, nodes: usize) -> Result<Volume, GridError> {
+        let mut volume = field.volume(self.space, nodes)?;
         let clamp = |value: &mut f64| *value = value.clamp(self.limits.low, self.limits.high);
         volume.values.iter_mut().for_each(clamp);
         Ok(volume)

@@ -59,15 +59,15 @@ impl GrinTask {
     /// A domain without extent.
     pub fn ray_paths(
         &self,
-        medium: &GrinField,
+        field: &GrinField,
         plane: SlicePlane,
         count: usize,
     ) -> Result<Vec<RayPaths>, GrinTaskError> {
-        let setups = plan_views(self, medium.field(), RaySet::Scoring)?;
+        let setups = plan_views(self, field.index_field(), RaySet::Scoring)?;
         let of_view = |(view, setup): (usize, GrinSetup<f64>)| {
             let (space, rays) = self.scoring_rays(&self.views[view]);
             let (rays, off) = choose_rays(&rays, plane, space, count);
-            let tracer = GrinTracer::new(medium.field(), setup)?;
+            let tracer = GrinTracer::new(field.index_field(), setup)?;
             let way = |ray: &GrinRay<f64>| {
                 let (states, exit) = tracer.trace_path(ray);
                 let flat = exit.fate.has_arrived() && !is_valid(&exit);

@@ -53,39 +53,39 @@ impl GrinTask {
     ///
     /// # Errors
     /// A reference volume that has not been read, or a domain without extent.
-    pub fn report_views(&self, medium: &GrinField) -> Result<Vec<ViewReport>, GrinTaskError> {
-        let field = medium.field();
+    pub fn report_views(&self, field: &GrinField) -> Result<Vec<ViewReport>, GrinTaskError> {
+        let field = field.index_field();
         let setups = plan_views(self, field, RaySet::Scoring)?;
         view_rays(self, &measure_targets(self)?, &setups, RaySet::Scoring)?
             .iter()
-            .map(|shot| report_view(shot, field))
+            .map(|view| report_view(view, field))
             .collect()
     }
 }
 
-fn report_view(shot: &ViewRays, field: &dyn IndexField<f64>) -> Result<ViewReport, GrinTaskError> {
-    let GrinSetup { integrator, step, .. } = shot.setup;
-    let exits = GrinTracer::new(field, shot.setup.clone())?.trace_batch(&shot.rays);
-    let image = shot.screen.as_ref().map(|screen| ViewImage {
+fn report_view(view: &ViewRays, field: &dyn IndexField<f64>) -> Result<ViewReport, GrinTaskError> {
+    let GrinSetup { integrator, step, .. } = view.setup;
+    let exits = GrinTracer::new(field, view.setup.clone())?.trace_batch(&view.rays);
+    let image = view.screen.as_ref().map(|screen| ViewImage {
         pixels: screen.pixels,
         half: screen.half,
         target: screen.wanted.clone(),
         formed: ViewRays::image(screen, &exits),
     });
-    let (error, sample) = step_error(shot, field, &exits)?;
-    Ok(ViewReport { result: shot.result(&exits, 0.0), image, integrator, step, error, sample })
+    let (error, sample) = step_error(view, field, &exits)?;
+    Ok(ViewReport { result: view.result(&exits, 0.0), image, integrator, step, error, sample })
 }
 
 /// The largest change of exits when the step is halved, over a sample of the rays, and the size of
 /// the sample.
 fn step_error(
-    shot: &ViewRays,
+    view: &ViewRays,
     field: &dyn IndexField<f64>,
     exits: &[RayExit<f64>],
 ) -> Result<(Option<f64>, usize), GrinTaskError> {
-    let stride = shot.rays.len().div_ceil(SAMPLE).max(1);
-    let rays: Vec<GrinRay<f64>> = shot.rays.iter().step_by(stride).copied().collect();
-    let halved = GrinSetup { step: 0.5 * shot.setup.step, ..shot.setup.clone() };
+    let stride = view.rays.len().div_ceil(SAMPLE).max(1);
+    let rays: Vec<GrinRay<f64>> = view.rays.iter().step_by(stride).copied().collect();
+    let halved = GrinSetup { step: 0.5 * view.setup.step, ..view.setup.clone() };
     let finer = GrinTracer::new(field, halved)?.trace_batch(&rays);
     let pairs = exits.iter().step_by(stride).zip(&finer);
     let both = pairs.filter(|(a, b)| is_valid(a) && is_valid(b));

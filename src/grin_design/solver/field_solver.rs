@@ -24,8 +24,8 @@ pub(super) enum FieldSolver {
 /// The loss as a function of the parameters of a field.
 pub(super) struct LossFunction<'a> {
     pub(super) shape: &'a GrinField,
-    pub(super) shots: &'a [ViewRays],
-    pub(super) hold: &'a FieldPenalties,
+    pub(super) views: &'a [ViewRays],
+    pub(super) penalties: &'a FieldPenalties,
     pub(super) limits: &'a ParameterBounds,
 }
 
@@ -41,17 +41,17 @@ pub(super) struct SolverStep {
 
 impl LossFunction<'_> {
     fn field(&self, parameters: &[f64]) -> GrinField {
-        let mut medium = self.shape.clone();
-        medium.parameters_mut().copy_from_slice(parameters);
-        medium
+        let mut field = self.shape.clone();
+        field.parameters_mut().copy_from_slice(parameters);
+        field
     }
 
     fn evaluate(&self, parameters: &[f64]) -> Result<LossEvaluation, GrinTaskError> {
-        evaluate(self.field(parameters).field(), self.shots, self.hold)
+        evaluate(self.field(parameters).index_field(), self.views, self.penalties)
     }
 
     fn rows(&self, parameters: &[f64]) -> Result<ResidualRows, GrinTaskError> {
-        evaluate_rows(self.field(parameters).field(), self.shots, self.hold)
+        evaluate_rows(self.field(parameters).index_field(), self.views, self.penalties)
     }
 }
 

@@ -81,9 +81,9 @@ impl GrinOptimizer {
     /// A task that is invalid, or a file that has not been read.
     pub fn new(task: &GrinTask) -> Result<Self, GrinTaskError> {
         task.check()?;
-        let known = measure_targets(task)?;
+        let measured = measure_targets(task)?;
         let current = GrinField::initial(task, task.levels[0].nodes)?;
-        let setups = plan_views(task, current.field(), RaySet::Step(0))?;
+        let setups = plan_views(task, current.index_field(), RaySet::Step(0))?;
         let mut runner = Self {
             task: task.clone(),
             penalties: FieldPenalties::new(task),
@@ -95,8 +95,8 @@ impl GrinOptimizer {
             best_loss: f64::INFINITY,
             limits: ParameterBounds::uniform(0, [0.0; 2], 0.0),
             solver: FieldSolver::new(task.method, 0),
-            views: view_rays(task, &known, &setups, RaySet::Step(0))?,
-            measured: known,
+            views: view_rays(task, &measured, &setups, RaySet::Step(0))?,
+            measured,
             current,
             setups,
             finished: false,
@@ -186,22 +186,22 @@ impl GrinOptimizer {
     ///
     /// # Errors
     /// As [`Self::step`].
-    pub fn score(&self, medium: &GrinField) -> Result<FieldScore, GrinTaskError> {
-        let mut gradient = vec![0.0; medium.field().parameters().len()];
-        self.score_with(medium, |shot| shot.add_gradient(medium.field(), &mut gradient))
+    pub fn score(&self, field: &GrinField) -> Result<FieldScore, GrinTaskError> {
+        let mut gradient = vec![0.0; field.index_field().parameters().len()];
+        self.score_with(field, |view| view.add_gradient(field.index_field(), &mut gradient))
     }
 
     fn score_with(
         &self,
-        medium: &GrinField,
+        field: &GrinField,
         of: impl FnMut(&ViewRays) -> Result<ViewResult, GrinTaskError>,
     ) -> Result<FieldScore, GrinTaskError> {
-        let setups = plan_views(&self.task, medium.field(), RaySet::Scoring)?;
-        let shots = view_rays(&self.task, &self.measured, &setups, RaySet::Scoring)?;
-        let views: Vec<ViewResult> = shots.iter().map(of).collect::<Result<_, _>>()?;
-        let weighted = shots.iter().zip(&views).map(|(shot, view)| shot.weighted(view.loss));
-        let loss = self.penalties.value(medium.field()) + weighted.sum::<f64>();
-        Ok(FieldScore { loss, views })
+        let setups = plan_views(&self.task, field.index_field(), RaySet::Scoring)?;
+        let views = view_rays(&self.task, &self.measured, &setups, RaySet::Scoring)?;
+        let results: Vec<ViewResult> = views.iter().map(of).collect::<Result<_, _>>()?;
+        let weighted = views.iter().zip(&results).map(|(view, result)| view.weighted(result.loss));
+        let loss = self.penalties.value(field.index_field()) + weighted.sum::<f64>();
+        Ok(FieldScore { loss, views: results })
     }
 
     fn progress(&self, loss: f64, counts: RayCounts) -> GrinProgress {
@@ -219,13 +219,13 @@ impl GrinOptimizer {
 
     /// Chooses the tracing setups again; true if they have changed.
     fn replan(&mut self) -> Result<bool, GrinTaskError> {
-        let draw = RaySet::Step(self.steps);
-        let new = plan_views(&self.task, self.current.field(), draw)?;
+        let set = RaySet::Step(self.steps);
+        let new = plan_views(&self.task, self.current.index_field(), set)?;
         let is_finer = |(new, old): (&GrinSetup<f64>, &GrinSetup<f64>)| new.step < 0.99 * old.step;
         let changed = new.iter().zip(&self.setups).any(is_finer);
         if changed {
             self.setups = new;
-            self.views = view_rays(&self.task, &self.measured, &self.setups, draw)?;
+            self.views = view_rays(&self.task, &self.measured, &self.setups, set)?;
             self.solver.restart();
         }
         Ok(changed)
@@ -241,25 +241,26 @@ impl GrinOptimizer {
             resample_views(&self.task, &self.measured, &mut self.views, RaySet::Step(self.steps))?;
         }
         let share = self.level_steps as f64 / self.task.levels[self.level].steps.max(1) as f64;
-        let mut parameters = self.current.field().parameters().to_vec();
-        let Self { current: shape, views: shots, penalties: hold, limits, solver: descent, .. } =
-            self;
-        let step =
-            descent.step(&mut parameters, &LossFunction { shape, shots, hold, limits }, share)?;
+        let mut parameters = self.current.index_field().parameters().to_vec();
+        let Self { current: shape, views, penalties, limits, solver, .. } = self;
+        let step = solver.step(
+            &mut parameters,
+            &LossFunction { shape, views, penalties, limits },
+            share,
+        )?;
         shape.parameters_mut().copy_from_slice(&parameters);
-        let wanted = self.views.iter().filter(|shot| shot.has_weight()).map(ViewRays::ray_count);
+        let wanted = self.views.iter().filter(|view| view.has_weight()).map(ViewRays::ray_count);
         self.rays += (step.evaluations * wanted.sum::<usize>()) as u64;
         Ok(step)
     }
 
     /// Replaces the best field by the current one if that is better.
     fn update_best(&mut self) -> Result<(), GrinTaskError> {
-        let medium = self.manufacturable();
-        let field = medium.field();
-        let loss = self.score_with(&medium, |shot| shot.trace_result(field))?.loss;
+        let field = self.manufacturable();
+        let loss = self.score_with(&field, |view| view.trace_result(field.index_field()))?.loss;
         if loss < self.best_loss {
             self.best_loss = loss;
-            self.best = medium;
+            self.best = field;
         }
         Ok(())
     }
@@ -289,9 +290,9 @@ impl GrinOptimizer {
         self.level += 1;
         self.current = self.current.refine(self.task.field, self.task.levels[self.level].nodes)?;
         self.begin_level()?;
-        let draw = RaySet::Step(self.steps);
-        self.setups = plan_views(&self.task, self.current.field(), draw)?;
-        self.views = view_rays(&self.task, &self.measured, &self.setups, draw)?;
+        let set = RaySet::Step(self.steps);
+        self.setups = plan_views(&self.task, self.current.index_field(), set)?;
+        self.views = view_rays(&self.task, &self.measured, &self.setups, set)?;
         self.update_best()
     }
 

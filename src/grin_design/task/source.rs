@@ -30,8 +30,8 @@ pub(in crate::grin_design) struct SourceRay {
 
 impl SourceDirections {
     /// Unit vectors.
-    fn unit_vectors(&self, draw: RaySet) -> Vec<Vec3<f64>> {
-        match (self, draw) {
+    fn unit_vectors(&self, set: RaySet) -> Vec<Vec3<f64>> {
+        match (self, set) {
             (Self::Given(list), _) => {
                 list.iter().map(|[x, y, z]| unit(Vec3::new(*x, *y, *z))).collect()
             }
@@ -86,25 +86,25 @@ impl LightSource {
     }
 
     /// The rays.
-    pub(in crate::grin_design) fn rays(&self, space: Domain, draw: RaySet) -> Vec<SourceRay> {
+    pub(in crate::grin_design) fn rays(&self, space: Domain, set: RaySet) -> Vec<SourceRay> {
         match self {
             Self::Parallel { directions, radius, rays } => {
-                let all = directions.unit_vectors(draw).into_iter().enumerate();
+                let all = directions.unit_vectors(set).into_iter().enumerate();
                 let back = space.diameter();
                 all.flat_map(|(k, d)| disc(k, d, *radius, *rays, back)).collect()
             }
             Self::Points { directions, radius, cone, rays } => {
-                let all = directions.unit_vectors(draw).into_iter().enumerate();
+                let all = directions.unit_vectors(set).into_iter().enumerate();
                 all.flat_map(|(k, d)| ray_cone(k, d, *radius, radians(*cone), *rays)).collect()
             }
             Self::Fan { height, z, rays } => {
                 let at = |i: usize| Vec3::new(height * (i as f64 + 0.5) / *rays as f64, 0.0, *z);
                 let v = Vec3::new(0.0, 0.0, 1.0);
-                let sent = |x| SourceRay { ray: GrinRay { x, v }, antipode: -x };
-                (0..*rays).map(|i| sent(at(i))).collect()
+                let source_ray = |x| SourceRay { ray: GrinRay { x, v }, antipode: -x };
+                (0..*rays).map(|i| source_ray(at(i))).collect()
             }
             Self::Beam { direction: [x, y, z], half, rays, fresh } => {
-                let first = match draw {
+                let first = match set {
                     RaySet::Step(step) if *fresh => (step + 1) * rays * rays,
                     RaySet::Step(_) | RaySet::Scoring => 0,
                 };

@@ -156,12 +156,12 @@ impl SliceRaster {
 
 /// A quantity at a point.
 fn value(document: &GrinDocument, field: &GrinField, quantity: SliceQuantity, p: Vec3<f64>) -> f64 {
-    let sample = field.field().sample(p);
+    let sample = field.index_field().sample(p);
     let less = |other: &dyn IndexField<f64>| sample.index - other.sample(p).index;
     match quantity {
         SliceQuantity::Index => sample.index,
         SliceQuantity::Slope => sample.gradient.dot(sample.gradient).sqrt(),
-        SliceQuantity::Change => less(document.start.field()),
+        SliceQuantity::Change => less(document.start.index_field()),
         SliceQuantity::Error => {
             document.reference.as_ref().map_or(f64::NAN, |exact| less(&**exact))
         }
@@ -233,11 +233,11 @@ fn profile(document: &GrinDocument, field: &GrinField, plane: SlicePlane) -> Ind
         let points = (0..=POINTS).map(at).filter(seen).map(index);
         points.filter(|[_, index]| index.is_finite()).collect()
     };
-    let start = document.task.as_ref().map(|_| of(document.start.field()));
+    let start = document.task.as_ref().map(|_| of(document.start.index_field()));
     let exact = document.reference.as_ref().map(|exact| of(&**exact));
     IndexProfile {
         along: if radius.is_some() { "r" } else { across.name() },
-        current: of(field.field()),
+        current: of(field.index_field()),
         start: start.unwrap_or_default(),
         reference: exact.unwrap_or_default(),
     }

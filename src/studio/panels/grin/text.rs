@@ -300,7 +300,7 @@ pub(super) fn probe_text(subject: &GrinDocument, medium: &GrinField, point: Vec3
     if !subject.contains(point) {
         return format!("{place}\noutside the field");
     }
-    let sample = medium.field().sample(point);
+    let sample = medium.index_field().sample(point);
     let g = sample.gradient;
     let slope = format_digits(g.dot(g).sqrt(), 4);
     let parts = [g.x, g.y, g.z].map(|part| format_digits(part, 3)).join(", ");
