@@ -2,6 +2,7 @@
 //! who knows widgets, where `unsafe` may stand, and that every file begins with its idea.
 #![expect(clippy::unwrap_used, reason = "a test that cannot read the source should fail")]
 
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -184,4 +185,91 @@ fn functions(text: &str) -> Vec<(String, usize)> {
         }
     }
     found
+}
+
+/// The names of the types and traits that a text defines at the top level of a module.
+fn defined_types(text: &str) -> impl Iterator<Item = &str> {
+    text.lines().filter_map(|line| {
+        let line = line.trim_start();
+        let item = line.strip_prefix("pub").map_or(line, |rest| {
+            rest.strip_prefix('(').and_then(|rest| rest.split_once(')')).map_or(rest, |(_, r)| r)
+        });
+        let (keyword, rest) = item.trim_start().split_once(' ')?;
+        let is_type = matches!(keyword, "struct" | "enum" | "trait");
+        let end = rest.find(|c: char| !c.is_alphanumeric() && c != '_').unwrap_or(rest.len());
+        (is_type && end > 0).then(|| &rest[..end])
+    })
+}
+
+#[test]
+fn a_type_name_means_one_thing() {
+    let mut rooms: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
+    let mut count: BTreeMap<String, usize> = BTreeMap::new();
+    for (path, text) in sources() {
+        let room = path.split('/').nth(1).unwrap_or_default().to_owned();
+        for name in defined_types(&text) {
+            rooms.entry(name.to_owned()).or_default().insert(room.clone());
+            *count.entry(name.to_owned()).or_default() += 1;
+        }
+    }
+    assert!(count.len() > 500, "only {} types were found", count.len());
+    let often: Vec<_> = count.iter().filter(|(_, times)| **times > 2).collect();
+    let wide: Vec<_> = rooms.iter().filter(|(_, rooms)| rooms.len() > 2).collect();
+    assert!(often.is_empty() && wide.is_empty(), "defined too often: {often:?} {wide:?}");
+}
+
+#[test]
+fn errors_are_called_errors() {
+    for (path, text) in sources() {
+        let lines: Vec<&str> = text.lines().collect();
+        for (i, line) in lines.iter().enumerate() {
+            let derives = line.trim_start().starts_with("#[derive(");
+            let is_error = derives && (line.contains("Error)") || line.contains("Error,"));
+            let Some(item) = lines[i..].iter().find(|line| defined_types(line).next().is_some())
+            else {
+                continue;
+            };
+            let name = defined_types(item).next().unwrap_or_default();
+            assert!(!is_error || name.ends_with("Error"), "{path}: the error {name}");
+        }
+    }
+}
+
+/// Whether a doc comment begins as a bare clause ("How far a run is.") instead of naming the thing.
+fn is_bare_clause(line: &str) -> bool {
+    let text = line.trim_start();
+    let Some(text) = text.strip_prefix("///").or_else(|| text.strip_prefix("//!")) else {
+        return false;
+    };
+    let first = text.split_whitespace().next().unwrap_or_default();
+    ["What", "How", "Where", "Which", "Whether", "Why", "When", "Who"].contains(&first)
+}
+
+#[test]
+fn documentation_names_the_thing() {
+    let mut bare = Vec::new();
+    let mut all = 0;
+    for (path, text) in sources() {
+        let mut before = "";
+        for (i, line) in text.lines().enumerate() {
+            let is_doc = |line: &str| {
+                let line = line.trim_start();
+                line.starts_with("///") || line.starts_with("//!")
+            };
+            if is_doc(line) && !is_doc(before) {
+                all += 1;
+                if is_bare_clause(line) {
+                    bare.push(format!("{path}:{}: {}", i + 1, line.trim()));
+                }
+            }
+            before = line;
+        }
+    }
+    // "Where light enters" can be the best title of a section; a habit of it is not.
+    assert!(
+        bare.len() * 50 < all,
+        "{} of {all} begin as bare clauses:\n{}",
+        bare.len(),
+        bare.join("\n")
+    );
 }
