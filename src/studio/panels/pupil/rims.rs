@@ -102,8 +102,9 @@ fn title(ui: &mut Ui, shown: &PupilView<'_>, all: &RimSensitivities, felt: &[usi
         ui.strong("+0.1 mm of semi-diameter").on_hover_text(HINT);
         let others = remaining_surfaces(felt, shown.results.lens.surfaces.len());
         if !others.is_empty() {
-            let text = format!("no ray is limited by {others}");
-            ui.label(RichText::new(text).small().weak());
+            let text = format!("inactive: {others}");
+            ui.label(RichText::new(text).small().weak())
+                .on_hover_text("No ray is limited by the rims of these surfaces");
         }
         ui.with_layout(Arrange::right_to_left(Align::Center), |ui| {
             let cost = format!("{} rays in {:.2} ms", all.rays, shown.pupils.rims.ms);
