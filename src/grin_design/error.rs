@@ -23,7 +23,7 @@ pub enum GrinTaskError {
         /// The position in the task.
         place: String,
         /// The cause.
-        source: ReferenceFieldError,
+        source: Box<ReferenceFieldError>,
     },
     /// A target image is not available.
     #[error("{place}: {source}")]
@@ -31,7 +31,7 @@ pub enum GrinTaskError {
         /// The position in the task.
         place: String,
         /// The cause.
-        source: FileError,
+        source: Box<FileError>,
     },
     /// A resolution of which no field can be made.
     #[error("levels: {0}")]

@@ -165,7 +165,9 @@ pub(super) fn image_screen(
     };
     let screen = Screen::new(screen_face(view, space), direction, half, (drawing, pixels));
     let place = || format!("view {}", view.name);
-    screen.map(Some).map_err(|source| GrinTaskError::Picture { place: place(), source })
+    screen
+        .map(Some)
+        .map_err(|source| GrinTaskError::Picture { place: place(), source: Box::new(source) })
 }
 
 #[cfg(test)]

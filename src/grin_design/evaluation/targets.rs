@@ -78,7 +78,8 @@ fn trace_reference(
 ) -> Result<Vec<RayExit<f64>>, GrinTaskError> {
     let space = view.space.unwrap_or(task.space);
     let place = format!("view {}", view.name);
-    let field = field.field().map_err(|source| GrinTaskError::Field { place, source })?;
+    let field =
+        field.field().map_err(|source| GrinTaskError::Field { place, source: Box::new(source) })?;
     let rays: Vec<GrinRay<f64>> = sources.iter().map(|source| source.ray).collect();
     let finer = FINER * task.tolerance;
     let setup = plan_tracing(&*field, &space.region(), task.launch, &rays, finer)?.setup;

@@ -97,7 +97,10 @@ impl GrinField {
     /// Too few nodes, or a volume that has not been read.
     pub fn initial(task: &GrinTask, nodes: usize) -> Result<Self, GrinTaskError> {
         let place = "start".to_owned();
-        let index = task.start.index().map_err(|source| GrinTaskError::Field { place, source })?;
+        let index = task
+            .start
+            .index()
+            .map_err(|source| GrinTaskError::Field { place, source: Box::new(source) })?;
         Ok(Self::from_function(task.field, nodes, index)?)
     }
 

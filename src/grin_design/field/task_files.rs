@@ -33,17 +33,22 @@ impl GrinTask {
             let range = [self.limits.low, self.limits.high];
             read_volume(file, self.space)
                 .and_then(|volume| check_index_range(file, volume, &self.spaces(), range))
-                .map_err(|source| GrinTaskError::Field { place: "start".to_owned(), source })?;
+                .map_err(|source| GrinTaskError::Field {
+                    place: "start".to_owned(),
+                    source: Box::new(source),
+                })?;
         }
         if let Some(ReferenceField::Volume(file)) = &self.exact {
-            read_volume(file, self.space)
-                .map_err(|source| GrinTaskError::Field { place: "exact".to_owned(), source })?;
+            read_volume(file, self.space).map_err(|source| GrinTaskError::Field {
+                place: "exact".to_owned(),
+                source: Box::new(source),
+            })?;
         }
         for view in &self.views {
             if let LightGoal::Like { field: ReferenceField::Volume(file), .. } = &view.goal {
                 let place = format!("view {}", view.name);
                 read_volume(file, view.space.unwrap_or(self.space))
-                    .map_err(|source| GrinTaskError::Field { place, source })?;
+                    .map_err(|source| GrinTaskError::Field { place, source: Box::new(source) })?;
             }
         }
         Ok(())
@@ -54,7 +59,8 @@ impl GrinTask {
 fn read_image(image: &TargetImage, pixels: usize, place: &str) -> Result<(), GrinTaskError> {
     let TargetImage::File(file) = image else { return Ok(()) };
     let read = file.read(read_grayscale).and_then(|_| image.render(pixels));
-    let refused = |source| GrinTaskError::Picture { place: place.to_owned(), source };
+    let refused =
+        |source| GrinTaskError::Picture { place: place.to_owned(), source: Box::new(source) };
     read.map(|_| ()).map_err(refused)
 }
 
