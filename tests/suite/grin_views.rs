@@ -73,7 +73,7 @@ fn of_picture(wanted: TargetImage) -> GrinTask {
 }
 
 /// The pixels of an image file.
-fn pixels(image: TargetImage) -> Vec<f64> {
+fn pixels(image: &TargetImage) -> Vec<f64> {
     of_picture(image.clone()).read_files().unwrap();
     image.render(8).unwrap()
 }
@@ -166,12 +166,12 @@ fn a_persons_own_picture_is_made_whatever_its_size() {
 #[test]
 fn a_small_or_transparent_picture_is_a_picture() {
     let one = Scrap::picture("one.png", [1, 1], |_, _| 7);
-    let wanted = pixels(one.drawing());
+    let wanted = pixels(&one.drawing());
     assert!(wanted.iter().all(|value| (value - 1.0).abs() < 1e-12));
     let scrap = Scrap::new("half.png", &[]);
     let half = |x: u32, _: u32| image::LumaA([200_u8, if x < 4 { 255 } else { 0 }]);
     image::GrayAlphaImage::from_fn(8, 8, half).save(&scrap.0).unwrap();
-    let wanted = pixels(scrap.drawing());
+    let wanted = pixels(&scrap.drawing());
     assert!(
         wanted
             .iter()

@@ -279,7 +279,11 @@ impl Session {
 
     /// The analyses of the lens that is shown in place of the design, maybe of one step before.
     fn preview_results(&self) -> Option<Arc<AnalysisResults>> {
-        let (source, _) = self.previewed()?;
+        let chain = self.structure_search.previewed_run().filter(|_| self.preview_lens.is_none());
+        let source = match chain {
+            Some(id) => PreviewSource::Run(id),
+            None => self.previewed()?.0,
+        };
         let is_current = self.preview_request.as_ref().is_some_and(|last| last.source == source);
         let latest = self.preview_analysis.latest().filter(|_| is_current);
         latest.filter(|results| results.version == self.preview_version)

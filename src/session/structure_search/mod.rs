@@ -150,6 +150,13 @@ impl StructureSearchState {
         Some((view.id?, Arc::clone(&position.lens)))
     }
 
+    /// The search with a chain that is shown in place of the design; between two descents the chain
+    /// has no lens.
+    pub(super) fn previewed_run(&self) -> Option<RunId> {
+        let view = self.run.view();
+        view.id.filter(|_| self.previewed_chain.is_some() && view.is_active())
+    }
+
     /// Shows the design again.
     pub(super) fn end_preview(&mut self) {
         self.previewed_chain = None;
