@@ -73,7 +73,8 @@ fn an_old_checkpoint_is_resumed() {
         let rows = report["mutations"].as_array().unwrap();
         rows.iter().find(|row| row["kind"] == kind).unwrap()["refused"].clone()
     };
-    assert_eq!(refused(&idle, "split"), json!({"no plain cemented interface": 1}));
+    // Earlier versions recorded the reasons as text: the count remains, under its own name.
+    assert_eq!(refused(&idle, "split"), json!({"other": 1}));
     let more = done_json(&[&base[..], &["--iterations", "40"]].concat(), "");
     assert_eq!((&more["resumed"], &more["gradients"]), (&true.into(), &28.into()));
 }
