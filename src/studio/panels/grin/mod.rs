@@ -27,9 +27,9 @@ use images::ViewImages;
 use picture::SlicePicture;
 
 /// The introduction that is shown before a document is open.
-const INTRODUCTION: &str = "Which field of refractive index bends light as a task asks? Open a \
-    task and press Optimize: the slice shows the field and its rays while they improve. A volume \
-    from a file can be inspected in the same way.";
+const INTRODUCTION: &str = "A task prescribes where light must go; the optimizer finds the \
+    field of refractive index that sends it there. Open a task and press Optimize: the slice shows \
+    the field and its rays. A volume from a file can be inspected in the same way.";
 
 /// The width of the side panel; with less room than the second number it is below the drawing, and
 /// with less height than the third it is hidden.
