@@ -140,7 +140,7 @@ fn run_seed(
 ) -> Result<u64, SearchSetupError> {
     let (landscape, mut run) = plan.begin(lens)?;
     let watch = Stopwatch::start();
-    let mut best: Vec<Lens> = Vec::new();
+    let mut best = Vec::new();
     let end = run.advance(&landscape, |run, _| {
         let passed =
             MARKS[best.len()..].iter().take_while(|mark| watch.seconds() >= *mark * seconds);

@@ -51,7 +51,7 @@ fn run(
     let mut found = vec![RecordedSearch::new(&start, &plan)?];
     let part = ProgressSpan { from: 0.0, to: 1.0, name: "search" };
     run_to_end(&mut found, part, progress)?;
-    let best = OverviewLens::of("found", found[0].run.best().point.clone())?;
+    let best = OverviewLens::of("found", found[0].run.best().point.as_ref().clone())?;
     let designs = [OverviewLens::of("start, 1962", own)?, before, best, mark];
     let mut outcome = ExperimentOutcome {
         claims: claims(&designs, &found[0], effort),

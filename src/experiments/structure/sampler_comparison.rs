@@ -230,7 +230,7 @@ impl LensComparison {
     fn best(&self) -> Option<(String, crate::lens::Lens)> {
         let all = self.searches.iter().flat_map(|(_, searches)| searches);
         let best = all.min_by(|a, b| a.run.best().loss.total_cmp(&b.run.best().loss))?;
-        Some((self.subject.file.to_owned(), best.run.best().point.clone()))
+        Some((self.subject.file.to_owned(), best.run.best().point.as_ref().clone()))
     }
 }
 

@@ -13,6 +13,7 @@ use crate::pupil::{PupilPattern, RayModel, Region};
 use crate::search::element::{ElementKind, elements};
 use crate::search::{Landscape as _, SearchRules};
 use serde::Serialize;
+use std::sync::Arc;
 
 /// The maximum number of rounds, each with tighter limits.
 const ROUNDS: i32 = 6;
@@ -109,7 +110,7 @@ pub fn finalize(landscape: &LensLandscape, lens: &Lens) -> Result<FinalizedLens,
     let (mut lens, glasses, unlisted) = with_catalogue_glasses(lens, &landscape.rules)?;
     for round in 0..ROUNDS {
         let tight = landscape.tighten(round);
-        let (mut memory, mut at) = (DescentState::default(), lens.clone());
+        let (mut memory, mut at) = (DescentState::default(), Arc::new(lens.clone()));
         let mut best = tight.loss(&at);
         for _ in 0..MOVES {
             let (there, loss, _) = tight.descend(&at, &mut memory);

@@ -32,6 +32,7 @@ use crate::lens::{Lens, LensError};
 use crate::merit::{Goal, Merit, MeritError};
 use crate::optimize::{DescentState, SegmentResult, SegmentSettings, run_segment};
 use crate::pupil::{RayModelError, limited_by_stop};
+use std::sync::Arc;
 use variables::VariableRules;
 
 /// The reasons that a lens cannot be the start of a search.
@@ -67,7 +68,7 @@ pub enum LandscapeError {
 /// The landscape of lenses with a goal as the loss.
 #[derive(Debug, Clone)]
 pub struct LensLandscape {
-    start: Lens,
+    start: Arc<Lens>,
     goal: Goal,
     rules: SearchRules,
     local: DescentSettings,
@@ -112,7 +113,7 @@ impl LensLandscape {
         }
         Ok(Self {
             light: merit.initial_light().to_vec(),
-            start,
+            start: Arc::new(start),
             goal: goal.clone(),
             rules,
             local: local.clone(),
@@ -164,7 +165,7 @@ impl LensLandscape {
     }
 
     /// The start: limited by its stop, with fixed parameters marked by equal bounds.
-    pub fn start(&self) -> &Lens {
+    pub fn start(&self) -> &Arc<Lens> {
         &self.start
     }
 
@@ -226,10 +227,10 @@ impl LensLandscape {
     /// A local move of at most `most` steps: the new lens, its loss, and the number of gradients.
     fn try_move(
         &self,
-        lens: &Lens,
+        lens: &Arc<Lens>,
         memory: &mut DescentState,
         most: usize,
-    ) -> Result<(Lens, f64, usize), MeritError> {
+    ) -> Result<(Arc<Lens>, f64, usize), MeritError> {
         let DescentSettings { method, steps, rate, tolerance, coarse, .. } = self.local;
         let is_coarse = memory.steps < self.local.coarse_steps;
         let merit = self.merit(lens, if is_coarse { coarse } else { tolerance })?;
@@ -240,11 +241,11 @@ impl LensLandscape {
         match self.evaluate(&there) {
             Ok(after) if after < before || is_coarse => {
                 memory.grow_step();
-                Ok((there, after, gradients))
+                Ok((Arc::new(there), after, gradients))
             }
             Ok(after) if after < (1.0 + SLACK) * before => {
                 memory.shrink_step();
-                Ok((there, after, gradients))
+                Ok((Arc::new(there), after, gradients))
             }
             Ok(_) | Err(_) => {
                 memory.restart_slower();
@@ -262,30 +263,30 @@ const SLACK: f64 = 0.05;
 const MAX_DRAWS: usize = 200;
 
 impl Landscape for LensLandscape {
-    type Point = Lens;
+    type Point = Arc<Lens>;
     type Memory = DescentState;
 
-    fn loss(&self, lens: &Lens) -> f64 {
+    fn loss(&self, lens: &Arc<Lens>) -> f64 {
         self.evaluate(lens).unwrap_or(f64::INFINITY)
     }
 
-    fn descend(&self, lens: &Lens, memory: &mut DescentState) -> (Lens, f64, usize) {
+    fn descend(&self, lens: &Arc<Lens>, memory: &mut DescentState) -> (Arc<Lens>, f64, usize) {
         self.descend_within(lens, memory, usize::MAX)
     }
 
     fn descend_within(
         &self,
-        lens: &Lens,
+        lens: &Arc<Lens>,
         memory: &mut DescentState,
         most: usize,
-    ) -> (Lens, f64, usize) {
+    ) -> (Arc<Lens>, f64, usize) {
         match self.try_move(lens, memory, most) {
             Ok(moved) => moved,
             Err(_) => (lens.clone(), f64::INFINITY, 0),
         }
     }
 
-    fn draw(&self, random: &mut Random) -> Result<Lens, MutationError> {
+    fn draw(&self, random: &mut Random) -> Result<Arc<Lens>, MutationError> {
         let free = self.with_variables(&self.start);
         for _ in 0..MAX_DRAWS {
             let Some(mut lens) =
@@ -294,7 +295,7 @@ impl Landscape for LensLandscape {
                 continue;
             };
             lens.variables.clone_from(&self.start.variables);
-            let lens = variables::clamp_to_bounds(&lens);
+            let lens = Arc::new(variables::clamp_to_bounds(&lens));
             if self.loss(&lens).is_finite() {
                 return Ok(lens);
             }
@@ -304,21 +305,21 @@ impl Landscape for LensLandscape {
 
     fn mutate(
         &self,
-        lens: &Lens,
+        lens: &Arc<Lens>,
         weights: &MutationWeights,
         random: &mut Random,
-    ) -> Result<MutatedPoint<Lens>, MutationError> {
+    ) -> Result<MutatedPoint<Arc<Lens>>, MutationError> {
         let own =
             MutationKind::MUTATIONS.map(|kind| (kind, self.rules.weight(kind) * weights.of(kind)));
         let rules = SearchRules { weights: own.to_vec(), ..self.rules.clone() };
         mutation::propose(lens, &rules, random).map(Into::into)
     }
 
-    fn topology(&self, lens: &Lens) -> String {
+    fn topology(&self, lens: &Arc<Lens>) -> String {
         element::topology(lens)
     }
 
-    fn structure_violation(&self, lens: &Lens) -> u64 {
+    fn structure_violation(&self, lens: &Arc<Lens>) -> u64 {
         let [min, max] = self.rules.elements;
         let pieces = element::piece_count(lens);
         (min.saturating_sub(pieces) + pieces.saturating_sub(max)) as u64
@@ -334,17 +335,17 @@ impl Landscape for LensLandscape {
         })
     }
 
-    fn element_count(&self, lens: &Lens) -> usize {
+    fn element_count(&self, lens: &Arc<Lens>) -> usize {
         element::elements(lens).len()
     }
 
     fn mutate_at(
         &self,
-        lens: &Lens,
+        lens: &Arc<Lens>,
         element: usize,
         kind: MutationKind,
         random: &mut Random,
-    ) -> Result<MutatedPoint<Lens>, MutationError> {
+    ) -> Result<MutatedPoint<Arc<Lens>>, MutationError> {
         let rows = lens.surfaces.len();
         let Some(element) = element::elements(lens).get(element).copied() else {
             return Err(MutationError::new(kind, Refusal::NoElement));
@@ -359,11 +360,11 @@ impl Landscape for LensLandscape {
         mutation::mutate(kind, lens, &rules, random).map(Into::into)
     }
 
-    fn loss_gradient(&self, lens: &Lens) -> Option<LossGradient> {
+    fn loss_gradient(&self, lens: &Arc<Lens>) -> Option<LossGradient> {
         langevin_units::loss_gradient(self, lens)
     }
 
-    fn with_values(&self, lens: &Lens, values: &[f64]) -> Option<Lens> {
-        langevin_units::with_values(self, lens, values)
+    fn with_values(&self, lens: &Arc<Lens>, values: &[f64]) -> Option<Arc<Lens>> {
+        langevin_units::with_values(self, lens, values).map(Arc::new)
     }
 }

@@ -39,6 +39,7 @@ use draft::{MutationContext, MutationDraft, ReverseMove};
 use rand::RngExt as _;
 use repair::repair;
 use singlet::SingletProposal;
+use std::sync::Arc;
 
 /// A lens after a mutation.
 #[derive(Debug, Clone, PartialEq)]
@@ -58,10 +59,10 @@ pub struct MutatedLens {
     pub log_ratio: Option<f64>,
 }
 
-impl From<MutatedLens> for MutatedPoint<Lens> {
+impl From<MutatedLens> for MutatedPoint<Arc<Lens>> {
     fn from(mutant: MutatedLens) -> Self {
         let MutatedLens { lens, kind, change, projection, log_ratio, .. } = mutant;
-        Self { point: lens, kind, record: MutationRecord { change, projection }, log_ratio }
+        Self { point: Arc::new(lens), kind, record: MutationRecord { change, projection }, log_ratio }
     }
 }
 

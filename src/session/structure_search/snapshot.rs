@@ -179,15 +179,15 @@ impl StructureSearchSnapshot {
 
     /// Takes over the retained lenses, with scores of new ones, and the best lens.
     fn update_retained(&mut self, run: &SearchRunOn<LensLandscape>) {
-        let known = |entry: &ReservoirEntry<Lens>| {
+        let known = |entry: &ReservoirEntry<Arc<Lens>>| {
             let mut known = self.reservoir.iter().chain([&self.start, &self.best]);
             let same = |found: &&Arc<FoundLens>| found.matches(entry) && found.score.is_some();
             known.find(same).cloned()
         };
-        let kept = |entry: &ReservoirEntry<Lens>| {
+        let retained = |entry: &ReservoirEntry<Arc<Lens>>| {
             known(entry).unwrap_or_else(|| Arc::new(FoundLens::from_entry(entry).scored()))
         };
-        let mut reservoir: Vec<_> = run.reservoir().entries().iter().map(kept).collect();
+        let mut reservoir: Vec<_> = run.reservoir().entries().iter().map(retained).collect();
         reservoir.sort_by(|a, b| a.merit.total_cmp(&b.merit));
         self.reservoir = reservoir;
         if let Some(same) = self.reservoir.iter().find(|found| found.matches(run.best())) {
@@ -205,48 +205,28 @@ impl StructureSearchSnapshot {
             old.get(place).filter(|node| node.end.is_some()).cloned()
         };
         let nodes = run.lineage().nodes().iter();
-        let family =
-            nodes.map(|node| known(node.number).unwrap_or_else(|| Arc::new(to_shared(node))));
-        self.lineage = family.collect();
+        let shared = nodes.map(|node| known(node.number).unwrap_or_else(|| Arc::new(node.clone())));
+        self.lineage = shared.collect();
     }
 }
 
 /// The positions of the chains.
 fn positions(run: &SearchRunOn<LensLandscape>) -> Vec<Option<ChainPosition>> {
-    let place = |chain: &Chain<Lens, _>| {
+    let place = |chain: &Chain<Arc<Lens>, _>| {
         let (lens, merit) = chain.position()?;
         let (number, elements) = (chain.generation(), piece_count(lens));
-        Some(ChainPosition { number, merit, elements, lens: Arc::new(lens.clone()) })
+        Some(ChainPosition { number, merit, elements, lens: Arc::clone(lens) })
     };
     run.chains().iter().map(place).collect()
 }
 
-/// A generation with a shared lens.
-fn to_shared(node: &LineageNode<Lens>) -> LineageNode<Arc<Lens>> {
-    LineageNode {
-        number: node.number,
-        parent: node.parent,
-        chain: node.chain,
-        kind: node.kind,
-        mutation: node.mutation.clone(),
-        loss_before: node.loss_before,
-        start_loss: node.start_loss,
-        best_loss: node.best_loss,
-        moves: node.moves,
-        gradients: node.gradients,
-        end: node.end,
-        offer: node.offer,
-        point: Arc::new(node.point.clone()),
-    }
-}
-
 impl FoundLens {
-    fn from_entry(entry: &ReservoirEntry<Lens>) -> Self {
+    fn from_entry(entry: &ReservoirEntry<Arc<Lens>>) -> Self {
         Self {
             number: entry.number,
             merit: entry.loss,
             elements: piece_count(&entry.point),
-            lens: Arc::new(entry.point.clone()),
+            lens: Arc::clone(&entry.point),
             score: None,
         }
     }
@@ -256,7 +236,7 @@ impl FoundLens {
         self
     }
 
-    fn matches(&self, entry: &ReservoirEntry<Lens>) -> bool {
+    fn matches(&self, entry: &ReservoirEntry<Arc<Lens>>) -> bool {
         self.number == entry.number && self.merit == entry.loss
     }
 }
