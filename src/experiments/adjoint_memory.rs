@@ -6,8 +6,8 @@
 //! the time of both.
 
 use super::{
-    Claim, DataTable, Effort, Experiment, ExperimentError, ExperimentOutcome, NamedPlot,
-    ProgressFn, report_progress,
+    Claim, DataTable, Effort, Experiment, ExperimentError, ExperimentOutcome, ExperimentResult,
+    NamedPlot, ProgressFn, report_progress,
 };
 use crate::grin::field::{HessianDiagonal, Luneburg, ProfileField, RegularGrid, Trilinear};
 use crate::grin::{
@@ -40,10 +40,7 @@ struct AdjointMemoryRow {
     difference: f64,
 }
 
-fn run(
-    effort: Effort,
-    progress: &mut ProgressFn<'_>,
-) -> Result<ExperimentOutcome, ExperimentError> {
+fn run(effort: Effort, progress: &mut ProgressFn<'_>) -> ExperimentResult {
     let nodes = effort.select([17, 33, 65, 129].as_slice(), &[17, 33]);
     let side = effort.select(64, 16);
     let (mut outcome, mut rows) = (ExperimentOutcome::default(), Vec::new());
@@ -66,7 +63,7 @@ fn run(
     Ok(outcome)
 }
 
-fn measure(nodes: usize, fineness: f64, side: usize) -> Result<AdjointMemoryRow, ExperimentError> {
+fn measure(nodes: usize, fineness: f64, side: usize) -> ExperimentResult<AdjointMemoryRow> {
     let lens = ProfileField::sphere(Luneburg::new(1.0));
     let grid = RegularGrid::cube(nodes, 1.1).map_err(ExperimentError::from_error)?;
     let sampled = Trilinear::from_function(grid, |p| lens.sample(p).index);

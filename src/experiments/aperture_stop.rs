@@ -11,8 +11,8 @@
 
 use super::section::SectionPlot;
 use super::{
-    Claim, DataTable, Effort, Experiment, ExperimentError, ExperimentOutcome, NamedPlot,
-    ProgressFn, report_progress,
+    Claim, DataTable, Effort, Experiment, ExperimentError, ExperimentOutcome, ExperimentResult,
+    NamedPlot, ProgressFn, report_progress,
 };
 use crate::lens::{
     Aperture, FieldKind, FieldPoint, Fields, Lens, Medium, Object, Row, Wavelength,
@@ -57,10 +57,7 @@ const HIGH_ORDER: usize = 8;
 /// The stop counts as a pinhole below this fraction of its initial semi-diameter.
 const PINHOLE: f64 = 0.1;
 
-fn run(
-    effort: Effort,
-    progress: &mut ProgressFn<'_>,
-) -> Result<ExperimentOutcome, ExperimentError> {
+fn run(effort: Effort, progress: &mut ProgressFn<'_>) -> ExperimentResult {
     let steps = effort.select(STEPS, FEW_STEPS);
     let mut outcome = ExperimentOutcome::default();
     let start = StopObjective::at(START, HIGH_ORDER)?;
@@ -85,7 +82,7 @@ enum GradientKind {
 }
 
 /// The two singlets with a stop of this semi-diameter.
-fn lens(radius: f64) -> Result<Lens, ExperimentError> {
+fn lens(radius: f64) -> ExperimentResult<Lens> {
     let row = |(i, [curvature, thickness, semi_diameter, index]): (usize, &[f64; 4])| Row {
         curvature: *curvature,
         thickness: *thickness,
@@ -115,7 +112,7 @@ fn lens(radius: f64) -> Result<Lens, ExperimentError> {
     Ok(lens)
 }
 
-fn model(radius: f64) -> Result<RayModel, ExperimentError> {
+fn model(radius: f64) -> ExperimentResult<RayModel> {
     RayModel::from_lens(&lens(radius)?, 0).map_err(ExperimentError::from_error)
 }
 
@@ -132,7 +129,7 @@ struct StopObjective {
 }
 
 impl StopObjective {
-    fn at(radius: f64, order: usize) -> Result<Self, ExperimentError> {
+    fn at(radius: f64, order: usize) -> ExperimentResult<Self> {
         let model = model(radius)?;
         let region = Region::new(model.launch(AXIS, 0).map_err(ExperimentError::from_error)?);
         let lit = region.trace_pupil(order);
@@ -171,7 +168,7 @@ impl StopDescent {
         gradient: GradientKind,
         steps: usize,
         progress: &mut ProgressFn<'_>,
-    ) -> Result<Self, ExperimentError> {
+    ) -> ExperimentResult<Self> {
         let (name, done) = match gradient {
             GradientKind::Unbiased => ("descent by the unbiased gradient", 0.0),
             GradientKind::Biased => ("descent by the biased gradient", 0.5),
@@ -214,7 +211,7 @@ fn claims(
     unbiased: &StopDescent,
     biased: &StopDescent,
     rays: &mut usize,
-) -> Result<Vec<Claim>, ExperimentError> {
+) -> ExperimentResult<Vec<Claim>> {
     let step = 1e-4 * START;
     let [below, above] = [
         StopObjective::at(START - step, HIGH_ORDER)?,
@@ -304,7 +301,7 @@ fn radii(unbiased: &StopDescent, biased: &StopDescent) -> Canvas {
 }
 
 /// The lens at the start and at both ends.
-fn lenses(unbiased: &StopDescent, biased: &StopDescent) -> Result<Canvas, ExperimentError> {
+fn lenses(unbiased: &StopDescent, biased: &StopDescent) -> ExperimentResult<Canvas> {
     let mut canvas = Canvas::new([1800, 720]);
     let panels = [
         ("start", START, BLACK),

@@ -8,8 +8,8 @@
 //! image or end at the surface of the arc.
 
 use super::{
-    Claim, DataTable, Effort, Experiment, ExperimentError, ExperimentOutcome, NamedPlot,
-    ProgressFn, TableCell, lens, report_progress,
+    Claim, DataTable, Effort, Experiment, ExperimentError, ExperimentOutcome, ExperimentResult,
+    NamedPlot, ProgressFn, TableCell, lens, report_progress,
 };
 use crate::lens::FieldPoint;
 use crate::math::Vec3;
@@ -43,10 +43,7 @@ const ASKEW: [f64; 2] = [0.31, 0.17];
 /// The largest deviation of the area of a bitmap, in standard errors.
 const SIGMAS: f64 = 4.0;
 
-fn run(
-    effort: Effort,
-    progress: &mut ProgressFn<'_>,
-) -> Result<ExperimentOutcome, ExperimentError> {
+fn run(effort: Effort, progress: &mut ProgressFn<'_>) -> ExperimentResult {
     let (fields, cells): (usize, usize) = effort.select((13, 400), (5, 150));
     let model = RayModel::from_lens(&lens(LENS)?, 0).map_err(ExperimentError::from_error)?;
     let mut pupils = Vec::new();
@@ -80,7 +77,7 @@ struct MappedPupil {
 }
 
 impl MappedPupil {
-    fn at(model: &RayModel, angle: f64, cells: usize) -> Result<Self, ExperimentError> {
+    fn at(model: &RayModel, angle: f64, cells: usize) -> ExperimentResult<Self> {
         let field = FieldPoint { x: 0.0, y: angle, weight: 1.0 };
         let launch = model.launch(field, model.primary).map_err(ExperimentError::from_error)?;
         let region = Region::new(launch);

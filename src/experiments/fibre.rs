@@ -6,7 +6,8 @@
 
 use super::grin_solution::solve;
 use super::{
-    Claim, DataTable, Effort, Experiment, ExperimentError, ExperimentOutcome, NamedPlot, ProgressFn,
+    Claim, DataTable, Effort, Experiment, ExperimentError, ExperimentOutcome, ExperimentResult,
+    NamedPlot, ProgressFn,
 };
 use crate::grin::field::{Parabolic, ProfileField};
 use crate::grin::{
@@ -36,7 +37,7 @@ const REFINED: usize = 4;
 /// The number of steps of a ray from focus to focus.
 const STEPS: f64 = 40.0;
 
-fn run(_: Effort, progress: &mut ProgressFn<'_>) -> Result<ExperimentOutcome, ExperimentError> {
+fn run(_: Effort, progress: &mut ProgressFn<'_>) -> ExperimentResult {
     let builtin = grin_design::find_builtin("fibre");
     let task = builtin.ok_or_else(|| ExperimentError::Failed("no task `fibre`".to_owned()))?.task();
     let task = task.map_err(ExperimentError::from_error)?;
@@ -83,7 +84,7 @@ fn parabolic() -> ProfileField<Parabolic<f64>> {
 }
 
 /// The distance of each ray from the axis of the parabolic fibre at a plane.
-fn heights(rays: &[GrinRay<f64>], plane: f64) -> Result<Vec<f64>, ExperimentError> {
+fn heights(rays: &[GrinRay<f64>], plane: f64) -> ExperimentResult<Vec<f64>> {
     let region = GrinRegion::rod(1.5, -1.0, plane);
     let setup = GrinSetup {
         integrator: Integrator::BlanesMoan,
@@ -98,7 +99,7 @@ fn heights(rays: &[GrinRay<f64>], plane: f64) -> Result<Vec<f64>, ExperimentErro
 }
 
 /// The plane near a focus of the parabolic fibre where its blur is smallest, and that blur.
-fn parabola(rays: &[GrinRay<f64>], order: f64) -> Result<(f64, f64), ExperimentError> {
+fn parabola(rays: &[GrinRay<f64>], order: f64) -> ExperimentResult<(f64, f64)> {
     // Its rays cross the axis at η(r) π/2 times an odd number, r the height where they start.
     let (mut from, mut to) = (0.9 * FRAC_PI_2 * order, SQRT_2 * FRAC_PI_2 * order);
     let mut best = (from, f64::INFINITY);
@@ -122,7 +123,7 @@ fn draw_focus_errors(
     task: &GrinTask,
     best: &GrinField,
     rays: &[GrinRay<f64>],
-) -> Result<Canvas, ExperimentError> {
+) -> ExperimentResult<Canvas> {
     let mut curves = Vec::new();
     for (i, view) in task.views.iter().enumerate() {
         let order = (2 * i + 1) as f64;

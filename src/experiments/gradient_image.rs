@@ -10,8 +10,8 @@
 //! compared to many digits. Figure 3.5 of the thesis shows a trademark in its place.
 
 use super::{
-    Claim, DataTable, Effort, Experiment, ExperimentError, ExperimentOutcome, NamedPlot,
-    ProgressFn, lens, report_progress,
+    Claim, DataTable, Effort, Experiment, ExperimentError, ExperimentOutcome, ExperimentResult,
+    NamedPlot, ProgressFn, lens, report_progress,
 };
 use crate::lens::{Aperture, FieldKind, FieldPoint, Object, System};
 use crate::math::Real;
@@ -57,16 +57,13 @@ const AGREEMENT: f64 = 1e-4;
 /// hardly limits these pixels.
 const NEARLY: f64 = 0.05;
 
-fn run(
-    effort: Effort,
-    progress: &mut ProgressFn<'_>,
-) -> Result<ExperimentOutcome, ExperimentError> {
+fn run(effort: Effort, progress: &mut ProgressFn<'_>) -> ExperimentResult {
     let side = effort.select(40, 10);
     let camera = SensorView::new(effort.select(SAMPLES, FEW_SAMPLES))?;
     let mut pixels = Vec::with_capacity(side * side);
     for row in 0..side {
         report_progress(progress, row as f64 / side as f64, "pixels")?;
-        let line: Result<Vec<Pixel>, ExperimentError> = (0..side)
+        let line: ExperimentResult<Vec<Pixel>> = (0..side)
             .into_par_iter()
             .map(|column| camera.pixel(place(row, column, side)))
             .collect();
@@ -165,7 +162,7 @@ struct Pixel {
 }
 
 impl SensorView {
-    fn new(samples: usize) -> Result<Self, ExperimentError> {
+    fn new(samples: usize) -> ExperimentResult<Self> {
         let lens = lens(LENS)?;
         let forwards = lens.resolve(0, UM).map_err(ExperimentError::from_error)?;
         let rear = lens.surfaces.len() - 1;
@@ -197,7 +194,7 @@ impl SensorView {
         })
     }
 
-    fn pixel(&self, [x, y]: [f64; 2]) -> Result<Pixel, ExperimentError> {
+    fn pixel(&self, [x, y]: [f64; 2]) -> ExperimentResult<Pixel> {
         let field = FieldPoint { x, y, weight: 1.0 };
         let launch = self.model.launch(field, 0).map_err(ExperimentError::from_error)?;
         let anchor = launch.to_fixed();
@@ -236,11 +233,7 @@ impl SensorView {
 }
 
 /// The ray model of a reversed lens.
-fn reversed_model(
-    system: System<f64>,
-    object: Object,
-    radius: f64,
-) -> Result<RayModel, ExperimentError> {
+fn reversed_model(system: System<f64>, object: Object, radius: f64) -> ExperimentResult<RayModel> {
     let aperture = Aperture::StopSemiDiameter(radius);
     let edge = HALF * std::f64::consts::SQRT_2;
     let beam = Beam { object, aperture, field: FieldKind::ObjectHeight, edge };

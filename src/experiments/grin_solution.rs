@@ -1,6 +1,6 @@
 //! Solving a GRIN task with progress.
 
-use super::{ExperimentError, ProgressFn, report_progress};
+use super::{ExperimentError, ExperimentResult, ProgressFn, report_progress};
 use crate::grin_design::{GrinOptimizer, GrinTask};
 
 /// Solves a task; it is the part `from` to `to` of the whole work.
@@ -8,7 +8,7 @@ pub(super) fn solve(
     task: &GrinTask,
     [from, to]: [f64; 2],
     progress: &mut ProgressFn<'_>,
-) -> Result<GrinOptimizer, ExperimentError> {
+) -> ExperimentResult<GrinOptimizer> {
     report_progress(progress, from, &task.name)?;
     let optimizer = GrinOptimizer::new(task).map_err(ExperimentError::from_error)?;
     solve_from(optimizer, [from, to], progress)
@@ -19,7 +19,7 @@ pub(super) fn solve_from(
     mut optimizer: GrinOptimizer,
     [from, to]: [f64; 2],
     progress: &mut ProgressFn<'_>,
-) -> Result<GrinOptimizer, ExperimentError> {
+) -> ExperimentResult<GrinOptimizer> {
     let name = optimizer.task().name.clone();
     let mut done = from;
     loop {

@@ -7,7 +7,10 @@
 //! at the boundary.
 
 use super::grin_solution::solve;
-use super::{Claim, DataTable, Effort, Experiment, ExperimentError, ExperimentOutcome, ProgressFn};
+use super::{
+    Claim, DataTable, Effort, Experiment, ExperimentError, ExperimentOutcome, ExperimentResult,
+    ProgressFn,
+};
 use crate::grin_design::{self, FieldDifference, GrinOptimizer, GrinTask, RefinementLevel};
 use crate::report::plot_grin_field;
 
@@ -38,10 +41,7 @@ const CASES: [KnownLensCase; 4] = [
     KnownLensCase { name: "maxwell", limits: [[1.5e-2, 5e-3]; 2], small: &[] },
 ];
 
-fn run(
-    effort: Effort,
-    progress: &mut ProgressFn<'_>,
-) -> Result<ExperimentOutcome, ExperimentError> {
+fn run(effort: Effort, progress: &mut ProgressFn<'_>) -> ExperimentResult {
     let mut outcome = ExperimentOutcome::default();
     let mut table = DataTable::new(
         "lenses",
@@ -83,7 +83,7 @@ const PICTURES: [[&str; 2]; 4] = [
     ["maxwell-profile", "maxwell-section"],
 ];
 
-fn task(case: &KnownLensCase, effort: Effort) -> Result<GrinTask, ExperimentError> {
+fn task(case: &KnownLensCase, effort: Effort) -> ExperimentResult<GrinTask> {
     let builtin = grin_design::find_builtin(case.name);
     let builtin =
         builtin.ok_or_else(|| ExperimentError::Failed(format!("no task `{}`", case.name)))?;

@@ -76,7 +76,7 @@ pub struct Experiment {
     ///
     /// # Errors
     /// The progress callback asked it to stop, or its lens or task cannot be evaluated.
-    pub run: fn(Effort, &mut ProgressFn<'_>) -> Result<ExperimentOutcome, ExperimentError>,
+    pub run: fn(Effort, &mut ProgressFn<'_>) -> ExperimentResult,
 }
 
 /// Returns the experiment of a figure or table.
@@ -116,6 +116,9 @@ impl Effort {
     }
 }
 
+/// The result of an experiment or of one of its steps.
+pub type ExperimentResult<T = ExperimentOutcome> = Result<T, ExperimentError>;
+
 /// The error of an experiment without an outcome.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum ExperimentError {
@@ -135,11 +138,7 @@ impl ExperimentError {
 }
 
 /// Reports the progress; an error if the caller stops the experiment.
-fn report_progress(
-    progress: &mut ProgressFn<'_>,
-    done: f64,
-    doing: &str,
-) -> Result<(), ExperimentError> {
+fn report_progress(progress: &mut ProgressFn<'_>, done: f64, doing: &str) -> ExperimentResult<()> {
     match progress(ExperimentProgress { done, doing }) {
         ControlFlow::Continue(()) => Ok(()),
         ControlFlow::Break(()) => Err(ExperimentError::Stopped),
@@ -147,7 +146,7 @@ fn report_progress(
 }
 
 /// Loads a lens of the bundled library.
-fn lens(name: &str) -> Result<Lens, ExperimentError> {
+fn lens(name: &str) -> ExperimentResult<Lens> {
     let bundled = files::bundled_lenses().iter().find(|bundled| bundled.name == name);
     let bundled =
         bundled.ok_or_else(|| ExperimentError::Failed(format!("no lens `{name}` is bundled")))?;

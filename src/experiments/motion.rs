@@ -9,8 +9,8 @@
 use super::pareto_front::{ANGLES, plan};
 use super::sharpness_vs_light::{ProgressSpan, focal_length, run_sweep, with_field_angles};
 use super::{
-    Claim, DataTable, Effort, Experiment, ExperimentError, ExperimentOutcome, NamedPlot,
-    ProgressFn, lens,
+    Claim, DataTable, Effort, Experiment, ExperimentError, ExperimentOutcome, ExperimentResult,
+    NamedPlot, ProgressFn, lens,
 };
 use crate::lens::Lens;
 use crate::optimize::pareto::ParetoPoint;
@@ -40,10 +40,7 @@ const COMPARED: f64 = 4.0;
 /// The minimum ratio of the exposure times.
 const TIMES: f64 = 2.0;
 
-fn run(
-    effort: Effort,
-    progress: &mut ProgressFn<'_>,
-) -> Result<ExperimentOutcome, ExperimentError> {
+fn run(effort: Effort, progress: &mut ProgressFn<'_>) -> ExperimentResult {
     let start = with_field_angles(lens(LENS)?, &ANGLES);
     let part = ProgressSpan { from: 0.0, to: 1.0, name: "front of sharpness and light" };
     let designs = run_sweep(&start, &plan(effort), part, progress)?;
@@ -77,7 +74,7 @@ struct Exposure {
 }
 
 impl Exposure {
-    fn of(design: &ParetoPoint, rays: &mut usize) -> Result<Self, ExperimentError> {
+    fn of(design: &ParetoPoint, rays: &mut usize) -> ExperimentResult<Self> {
         let focal = focal_length(&design.lens)?;
         let spot = spot(&design.lens, rays)?;
         *rays += design.rays;
@@ -104,7 +101,7 @@ impl Exposure {
     }
 }
 
-fn spot(lens: &Lens, rays: &mut usize) -> Result<Vec<[f64; 2]>, ExperimentError> {
+fn spot(lens: &Lens, rays: &mut usize) -> ExperimentResult<Vec<[f64; 2]>> {
     let model = RayModel::from_lens(lens, 0).map_err(ExperimentError::from_error)?;
     let launch =
         model.launch(model.fields[0], model.primary).map_err(ExperimentError::from_error)?;

@@ -16,7 +16,8 @@ use super::sharpness_vs_light::{
     with_scaled_aperture,
 };
 use super::{
-    Claim, Effort, Experiment, ExperimentError, ExperimentOutcome, NamedPlot, ProgressFn, lens,
+    Claim, Effort, Experiment, ExperimentError, ExperimentOutcome, ExperimentResult, NamedPlot,
+    ProgressFn, lens,
 };
 use crate::lens::Lens;
 use crate::optimize::pareto::{Front, ParetoPoint};
@@ -54,10 +55,7 @@ pub(super) fn plan(effort: Effort) -> WeightSweep {
     WeightSweep::new(4.0, effort.select(14, 8), 1200)
 }
 
-fn run(
-    effort: Effort,
-    progress: &mut ProgressFn<'_>,
-) -> Result<ExperimentOutcome, ExperimentError> {
+fn run(effort: Effort, progress: &mut ProgressFn<'_>) -> ExperimentResult {
     let mut outcome = ExperimentOutcome::default();
     let lenses = [
         ("rudolph", "double_gauss_rudolph_50", PUBLISHED.as_slice()),
@@ -89,7 +87,7 @@ impl FrontStudy {
         effort: Effort,
         [from, to]: [f64; 2],
         progress: &mut ProgressFn<'_>,
-    ) -> Result<Self, ExperimentError> {
+    ) -> ExperimentResult<Self> {
         let openings = effort.select(OPENINGS.as_slice(), &ONE_OPENING);
         let plan = plan(effort);
         let middle = from + 0.6 * (to - from);
@@ -128,7 +126,7 @@ impl FrontStudy {
         name: &str,
         authors: &[PublishedValues],
         rays: &mut usize,
-    ) -> Result<Vec<Claim>, ExperimentError> {
+    ) -> ExperimentResult<Vec<Claim>> {
         let Self { start, unbiased, biased } = self;
         let [front, other] = [unbiased, biased].map(|front| front.relative_hypervolume(start));
         let beaten = |design: &&ParetoPoint| unbiased.points().iter().any(|u| u.dominates(design));
@@ -154,7 +152,7 @@ impl FrontStudy {
             return Ok(claims);
         }
         let all = unbiased.points().iter().map(|design| field_views(&design.lens, rays));
-        let all = all.collect::<Result<Vec<_>, ExperimentError>>()?;
+        let all = all.collect::<ExperimentResult<Vec<_>>>()?;
         for theirs in authors {
             let better = all.iter().filter(|views| dominates_published(views, theirs)).count();
             let says = format!("{name}: designs better than `{}` at every field", theirs.0);
@@ -164,7 +162,7 @@ impl FrontStudy {
     }
 
     /// Draws the plane of blur and light, and the lenses at the ends of the front with their spots.
-    fn draw(&self, name: &str, authors: &[PublishedValues]) -> Result<Canvas, ExperimentError> {
+    fn draw(&self, name: &str, authors: &[PublishedValues]) -> ExperimentResult<Canvas> {
         let mut canvas = Canvas::new([1900, 1000]);
         let um = |design: &ParetoPoint| [1e3 * design.spot, design.light];
         let points = |front: &Front| front.points().iter().map(um).collect::<Vec<_>>();
@@ -232,7 +230,7 @@ pub(super) fn draw_lens_and_spots(
     name: &str,
     lens: &Lens,
     top: f64,
-) -> Result<(), ExperimentError> {
+) -> ExperimentResult<()> {
     let model = RayModel::from_lens(lens, 0).map_err(ExperimentError::from_error)?;
     let section = SectionPlot::new(&model.channels[0].system);
     let [z, y] = section.extent();

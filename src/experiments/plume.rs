@@ -17,8 +17,8 @@
 
 use super::grin_solution::solve;
 use super::{
-    Claim, DataTable, Effort, Experiment, ExperimentError, ExperimentOutcome, NamedPlot,
-    ProgressFn, TableCell, report_progress,
+    Claim, DataTable, Effort, Experiment, ExperimentError, ExperimentOutcome, ExperimentResult,
+    NamedPlot, ProgressFn, TableCell, report_progress,
 };
 use crate::grin::IndexField;
 use crate::grin_design::{
@@ -99,10 +99,7 @@ struct PlumeRow {
     left_out: usize,
 }
 
-fn run(
-    effort: Effort,
-    progress: &mut ProgressFn<'_>,
-) -> Result<ExperimentOutcome, ExperimentError> {
+fn run(effort: Effort, progress: &mut ProgressFn<'_>) -> ExperimentResult {
     let cases: Vec<&'static PlumeCase> =
         CASES.iter().filter(|case| effort == Effort::Full || is_extreme(case)).collect();
     let (mut outcome, mut rows) = (ExperimentOutcome::default(), Vec::new());
@@ -134,7 +131,7 @@ fn is_extreme(case: &PlumeCase) -> bool {
     case.times == 1.0 || case.times == 1000.0
 }
 
-fn task(case: &PlumeCase, effort: Effort) -> Result<GrinTask, ExperimentError> {
+fn task(case: &PlumeCase, effort: Effort) -> ExperimentResult<GrinTask> {
     let builtin = grin_design::find_builtin(case.task);
     let builtin =
         builtin.ok_or_else(|| ExperimentError::Failed(format!("no task `{}`", case.task)))?;
@@ -158,7 +155,7 @@ fn row(
     effort: Effort,
     at: impl Fn(f64) -> f64,
     progress: &mut ProgressFn<'_>,
-) -> Result<PlumeRow, ExperimentError> {
+) -> ExperimentResult<PlumeRow> {
     let (nodes, steps) = (adjoint.medium.nodes(), effort.select(60, 25));
     let doing = format!("{}, by straight rays", task.name);
     report_progress(progress, at(0.7), &doing)?;
@@ -204,7 +201,7 @@ fn error(task: &GrinTask, medium: &GrinField) -> f64 {
     difference.map_or(f64::NAN, |difference| difference.relative_to_contrast)
 }
 
-fn found(task: &GrinTask, medium: GrinField) -> Result<ReconstructedPlume, ExperimentError> {
+fn found(task: &GrinTask, medium: GrinField) -> ExperimentResult<ReconstructedPlume> {
     let exact =
         task.exact.as_ref().ok_or_else(|| ExperimentError::Failed("no exact field".to_owned()))?;
     let exact = exact.field::<f64>().map_err(ExperimentError::from_error)?;

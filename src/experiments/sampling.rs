@@ -11,8 +11,8 @@
 
 use super::histogram::{HistogramGrid, deviation_in_sigmas, pool, total_variation};
 use super::{
-    Claim, DataTable, Effort, Experiment, ExperimentError, ExperimentOutcome, NamedPlot,
-    ProgressFn, TableCell, report_progress,
+    Claim, DataTable, Effort, Experiment, ExperimentError, ExperimentOutcome, ExperimentResult,
+    NamedPlot, ProgressFn, TableCell, report_progress,
 };
 use crate::plot::{Axis, BLACK, Canvas, Chart, Legend, PALETTE, Stroke, TextAlign, gray_level};
 use crate::search::competing_clocks::{CompetingClocks, Regeneration, RegenerationRate};
@@ -112,7 +112,7 @@ struct ToyStudy {
 }
 
 impl ToyStudy {
-    fn new(singlets: usize) -> Result<Self, ExperimentError> {
+    fn new(singlets: usize) -> ExperimentResult<Self> {
         let toy =
             if singlets == 1 { ToyLandscape::one_singlet() } else { ToyLandscape::two_singlets() };
         let cold = || ExperimentError::Failed(format!("{TEMPERATURE} is no valid temperature"));
@@ -127,9 +127,9 @@ impl ToyStudy {
         &self,
         process: SamplingProcess,
         [chains, descents]: [usize; 2],
-    ) -> Result<ProcessSamples, ExperimentError> {
+    ) -> ExperimentResult<ProcessSamples> {
         let chain = |seed: usize| self.chain(process, seed as u64, descents);
-        let chains: Result<Vec<ChainHistogram>, ExperimentError> =
+        let chains: ExperimentResult<Vec<ChainHistogram>> =
             (0..chains).into_par_iter().map(chain).collect();
         let chains = chains?;
         let times: Vec<Vec<f64>> = chains.iter().map(|chain| chain.times.clone()).collect();
@@ -148,7 +148,7 @@ impl ToyStudy {
         process: SamplingProcess,
         seed: u64,
         descents: usize,
-    ) -> Result<ChainHistogram, ExperimentError> {
+    ) -> ExperimentResult<ChainHistogram> {
         let random = Random::seed_from_u64(seed);
         let SamplingProcess { rate, regeneration } = process;
         let clocks = CompetingClocks::new(&self.toy, self.temperature, rate, regeneration, random);
@@ -210,10 +210,7 @@ impl TargetComparison {
     }
 }
 
-fn run(
-    effort: Effort,
-    progress: &mut ProgressFn<'_>,
-) -> Result<ExperimentOutcome, ExperimentError> {
+fn run(effort: Effort, progress: &mut ProgressFn<'_>) -> ExperimentResult {
     let work = effort.select([CHAINS, DESCENTS], [FEW_CHAINS, FEW_DESCENTS]);
     let mut outcome = ExperimentOutcome::default();
     let mut table = DataTable::new("processes", &COLUMNS);

@@ -1,7 +1,7 @@
 //! Shared parts of figures 3.6 to 3.10: lenses optimised for sharpness and light together (3.26),
 //! and the sharpness and light of their fields.
 
-use super::{DataTable, ExperimentError, ProgressFn, TableCell, report_progress};
+use super::{DataTable, ExperimentError, ExperimentResult, ProgressFn, TableCell, report_progress};
 use crate::analysis::{AnalysisError, Estimate, field_quality};
 use crate::lens::{Aperture, FieldKind, FieldPoint, Fields, Lens};
 use crate::merit::{PupilEdge, Term, WeightedTerm};
@@ -93,7 +93,7 @@ pub(super) fn run_sweep(
     plan: &WeightSweep,
     part: ProgressSpan<'_>,
     progress: &mut ProgressFn<'_>,
-) -> Result<Vec<ParetoPoint>, ExperimentError> {
+) -> ExperimentResult<Vec<ParetoPoint>> {
     let settings =
         ParetoSettings { rims: plan.rims, pupil: plan.pupil, ..ParetoSettings::default() };
     let start = ParetoSweep::new(lens, &settings).map_err(ExperimentError::from_error)?.start;
@@ -132,10 +132,7 @@ pub(super) struct FieldView {
 }
 
 /// The sharpness and light of every field of a lens; adds the rays traced to `rays`.
-pub(super) fn field_views(
-    lens: &Lens,
-    rays: &mut usize,
-) -> Result<Vec<FieldView>, ExperimentError> {
+pub(super) fn field_views(lens: &Lens, rays: &mut usize) -> ExperimentResult<Vec<FieldView>> {
     let model = RayModel::from_lens(lens, 0).map_err(ExperimentError::from_error)?;
     model.fields.iter().map(|field| field_view(&model, *field, rays)).collect()
 }
@@ -145,7 +142,7 @@ pub(super) fn field_view(
     model: &RayModel,
     field: FieldPoint,
     rays: &mut usize,
-) -> Result<FieldView, ExperimentError> {
+) -> ExperimentResult<FieldView> {
     let quality = field_quality(model, field, REPORTED);
     let rms = match quality.spot {
         Err(AnalysisError::NoRays(why)) => return Err(ExperimentError::from_error(why)),
@@ -166,7 +163,7 @@ pub(super) fn mean_blur_and_light(views: &[FieldView]) -> [f64; 2] {
 }
 
 /// The focal length of a lens, in mm.
-pub(super) fn focal_length(lens: &Lens) -> Result<f64, ExperimentError> {
+pub(super) fn focal_length(lens: &Lens) -> ExperimentResult<f64> {
     let model = RayModel::from_lens(lens, 0).map_err(ExperimentError::from_error)?;
     model.first_order.efl.ok_or_else(|| ExperimentError::Failed(format!("{} is afocal", lens.name)))
 }
@@ -176,7 +173,7 @@ pub(super) fn table(
     name: &'static str,
     designs: &[(&str, &ParetoPoint)],
     rays: &mut usize,
-) -> Result<DataTable, ExperimentError> {
+) -> ExperimentResult<DataTable> {
     let columns = [
         "design",
         "beta_mm2",

@@ -11,8 +11,8 @@ use super::sharpness_vs_light::{
     with_field_angles,
 };
 use super::{
-    Claim, DataTable, Effort, Experiment, ExperimentError, ExperimentOutcome, NamedPlot,
-    ProgressFn, lens,
+    Claim, DataTable, Effort, Experiment, ExperimentError, ExperimentOutcome, ExperimentResult,
+    NamedPlot, ProgressFn, lens,
 };
 use crate::analysis::{Illumination, illumination};
 use crate::lens::{Lens, Parameter, Quantity, Variable};
@@ -36,10 +36,7 @@ const LENS: &str = "double_gauss_rudolph_50";
 const FIELDS: usize = 21;
 const ACCURACY: Accuracy = Accuracy { tolerance: 1e-5, max_rays: 100_000 };
 
-fn run(
-    effort: Effort,
-    progress: &mut ProgressFn<'_>,
-) -> Result<ExperimentOutcome, ExperimentError> {
+fn run(effort: Effort, progress: &mut ProgressFn<'_>) -> ExperimentResult {
     let start = with_fixed_stop(with_field_angles(lens(LENS)?, &ANGLES));
     // Weights near the sharpness of the biased design are enough.
     let plan = WeightSweep::new(2.0, effort.select(14, 8), 1200);
@@ -90,7 +87,7 @@ struct IlluminatedLens {
 }
 
 impl IlluminatedLens {
-    fn of(design: &ParetoPoint, rays: &mut usize) -> Result<Self, ExperimentError> {
+    fn of(design: &ParetoPoint, rays: &mut usize) -> ExperimentResult<Self> {
         let views = field_views(&design.lens, rays)?;
         let last = ANGLES[ANGLES.len() - 1];
         let angles: Vec<f64> = (0..FIELDS).map(|i| last * i as f64 / (FIELDS - 1) as f64).collect();

@@ -9,8 +9,8 @@ use super::sharpness_vs_light::{
     ProgressSpan, WeightSweep, field_view, mean_blur_and_light, monochromatic, run_sweep,
 };
 use super::{
-    Claim, DataTable, Effort, Experiment, ExperimentError, ExperimentOutcome, NamedPlot,
-    ProgressFn, lens,
+    Claim, DataTable, Effort, Experiment, ExperimentError, ExperimentOutcome, ExperimentResult,
+    NamedPlot, ProgressFn, lens,
 };
 use crate::lens::{
     Aperture, FieldKind, FieldPoint, Fields, Lens, at_zoom, paraxial_image_distance,
@@ -30,10 +30,7 @@ pub(super) const EXPERIMENT: Experiment = Experiment {
 /// The positions compared: those of the search, and one midway between each two.
 const POSITIONS: [f64; 5] = [0.0, 0.5, 1.0, 1.5, 2.0];
 
-fn run(
-    effort: Effort,
-    progress: &mut ProgressFn<'_>,
-) -> Result<ExperimentOutcome, ExperimentError> {
+fn run(effort: Effort, progress: &mut ProgressFn<'_>) -> ExperimentResult {
     let mut outcome = ExperimentOutcome::default();
     let lenses = [("nikkor", "zoom_nikkor_28_80"), ("tamron", "zoom_tamron_28_75_f28")];
     let count = effort.select(lenses.len(), 1);
@@ -65,15 +62,13 @@ struct ZoomRange {
 }
 
 impl ZoomRange {
-    fn of(lens: &Lens, rays: &mut usize) -> Result<Self, ExperimentError> {
+    fn of(lens: &Lens, rays: &mut usize) -> ExperimentResult<Self> {
         let mut range = Self { points: Vec::new(), focal_lengths: Vec::new() };
         for place in POSITIONS {
             let model = RayModel::from_lens(&lens_between(lens, place)?, 0)
                 .map_err(ExperimentError::from_error)?;
             let views = model.fields.iter().map(|field| field_view(&model, *field, rays));
-            range
-                .points
-                .push(mean_blur_and_light(&views.collect::<Result<Vec<_>, ExperimentError>>()?));
+            range.points.push(mean_blur_and_light(&views.collect::<ExperimentResult<Vec<_>>>()?));
             range.focal_lengths.push(model.first_order.efl.unwrap_or(f64::NAN));
         }
         Ok(range)
@@ -102,7 +97,7 @@ fn best_design(
     designs: &[ParetoPoint],
     before: &ZoomRange,
     rays: &mut usize,
-) -> Result<(Lens, ZoomRange), ExperimentError> {
+) -> ExperimentResult<(Lens, ZoomRange)> {
     let mut best: Option<(Lens, ZoomRange)> = None;
     for design in designs {
         let range = ZoomRange::of(&design.lens, rays)?;
@@ -121,7 +116,7 @@ fn parabola([a, b, c]: [f64; 3], t: f64) -> f64 {
 
 /// The lens at a position of its range, whole numbers for its own positions, as a lens without
 /// zoom.
-fn lens_between(lens: &Lens, place: f64) -> Result<Lens, ExperimentError> {
+fn lens_between(lens: &Lens, place: f64) -> ExperimentResult<Lens> {
     let positions = [0, 1, 2].map(|zoom| at_zoom(lens, zoom));
     let benches = [0, 1, 2].map(|zoom| RayModel::from_lens(&positions[zoom], 0));
     let mut single = positions[0].clone();

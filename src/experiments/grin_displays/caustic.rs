@@ -8,7 +8,8 @@
 use super::{COLUMNS, EvaluatedField, independent_task, solve_and_evaluate, task};
 use crate::experiments::grin_solution::solve;
 use crate::experiments::{
-    Claim, DataTable, Effort, Experiment, ExperimentError, ExperimentOutcome, NamedPlot, ProgressFn,
+    Claim, DataTable, Effort, Experiment, ExperimentError, ExperimentOutcome, ExperimentResult,
+    NamedPlot, ProgressFn,
 };
 use crate::grin::{GrinTracer, RayExit, plan_tracing};
 use crate::grin_design::{GrinField, GrinTask, LightGoal};
@@ -38,10 +39,7 @@ const TOLERANCE: f64 = 1e-3;
 const CELLS: usize = 96;
 const ROOM: f64 = 1.6;
 
-fn run(
-    effort: Effort,
-    progress: &mut ProgressFn<'_>,
-) -> Result<ExperimentOutcome, ExperimentError> {
+fn run(effort: Effort, progress: &mut ProgressFn<'_>) -> ExperimentResult {
     let mut outcome = ExperimentOutcome::default();
     let mut table = DataTable::new("views", &COLUMNS);
     let [least, less] = LEAST;
@@ -78,7 +76,7 @@ fn rings(
     outcome: &mut ExperimentOutcome,
     effort: Effort,
     progress: &mut ProgressFn<'_>,
-) -> Result<(), ExperimentError> {
+) -> ExperimentResult<()> {
     let task = task("caustic", effort, 2)?;
     let optimizer = solve(&task, [2.0 / 3.0, 1.0], progress)?;
     let beam = ExitBeam::behind(&task, optimizer.best())?;
@@ -123,7 +121,7 @@ struct ExitBeam {
 
 impl ExitBeam {
     /// The light of the first view, which travels along z.
-    fn behind(task: &GrinTask, medium: &GrinField) -> Result<Self, ExperimentError> {
+    fn behind(task: &GrinTask, medium: &GrinField) -> ExperimentResult<Self> {
         let task = independent_task(task);
         let (space, rays) = task.scoring_rays(&task.views[0]);
         let plan =

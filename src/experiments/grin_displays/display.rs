@@ -5,9 +5,7 @@
 //! coefficients, most of which few rays cross, and destroy the result of the coarse level.
 
 use super::{outcome_of, solve_and_evaluate, task};
-use crate::experiments::{
-    Claim, Effort, Experiment, ExperimentError, ExperimentOutcome, ProgressFn,
-};
+use crate::experiments::{Claim, Effort, Experiment, ExperimentResult, ProgressFn};
 
 pub(in crate::experiments) const EXPERIMENT: Experiment = Experiment {
     id: "5.4",
@@ -22,10 +20,7 @@ const NODES: [usize; 2] = [33, 9];
 /// The minimum quality in dB and the minimum correlation.
 const LEAST: [[f64; 2]; 2] = [[24.0, 0.97], [14.0, 0.75]];
 
-fn run(
-    effort: Effort,
-    progress: &mut ProgressFn<'_>,
-) -> Result<ExperimentOutcome, ExperimentError> {
+fn run(effort: Effort, progress: &mut ProgressFn<'_>) -> ExperimentResult {
     let task = task("display", effort, 2)?;
     let evaluated = solve_and_evaluate(&task, [0.0, 1.0], progress)?;
     let [nodes, few] = NODES;

@@ -9,7 +9,10 @@ pub(super) mod multifocal;
 pub(super) mod resolution;
 
 use super::grin_solution::{solve, solve_from};
-use super::{Claim, DataTable, Effort, ExperimentError, ExperimentOutcome, NamedPlot, ProgressFn};
+use super::{
+    Claim, DataTable, Effort, ExperimentError, ExperimentOutcome, ExperimentResult, NamedPlot,
+    ProgressFn,
+};
 use crate::grin_design::{
     self, GrinField, GrinOptimizer, GrinTask, LightGoal, LightSource, ViewReport,
 };
@@ -23,7 +26,7 @@ const LEFT_OUT: f64 = 1e-3;
 const ROUNDING: f64 = 1e-9;
 
 /// A built-in task.
-fn builtin(name: &str) -> Result<GrinTask, ExperimentError> {
+fn builtin(name: &str) -> ExperimentResult<GrinTask> {
     let builtin = grin_design::find_builtin(name)
         .ok_or_else(|| ExperimentError::Failed(format!("no task `{name}`")))?;
     builtin.task().map_err(ExperimentError::from_error)
@@ -68,14 +71,14 @@ fn solve_and_evaluate(
     task: &GrinTask,
     part: [f64; 2],
     progress: &mut ProgressFn<'_>,
-) -> Result<EvaluatedField, ExperimentError> {
+) -> ExperimentResult<EvaluatedField> {
     let optimizer = solve(task, part, progress)?;
     let views = evaluate(task, optimizer.best())?;
     Ok(EvaluatedField { optimizer, views })
 }
 
 /// Evaluates a field with rays that its optimization has not used.
-fn evaluate(task: &GrinTask, medium: &GrinField) -> Result<Vec<ViewReport>, ExperimentError> {
+fn evaluate(task: &GrinTask, medium: &GrinField) -> ExperimentResult<Vec<ViewReport>> {
     independent_task(task).report_views(medium).map_err(ExperimentError::from_error)
 }
 
@@ -186,7 +189,7 @@ fn outcome_of(
 }
 
 /// A built-in task at full effort; for a test its first levels.
-fn task(name: &str, effort: Effort, levels: usize) -> Result<GrinTask, ExperimentError> {
+fn task(name: &str, effort: Effort, levels: usize) -> ExperimentResult<GrinTask> {
     let task = builtin(name)?;
     Ok(if effort == Effort::Full { task } else { reduced(task, levels) })
 }

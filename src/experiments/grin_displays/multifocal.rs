@@ -7,9 +7,7 @@
 //! less exact than those of one plane.
 
 use super::{EvaluatedField, outcome_of, solve_and_evaluate, task};
-use crate::experiments::{
-    Claim, Effort, Experiment, ExperimentError, ExperimentOutcome, ProgressFn,
-};
+use crate::experiments::{Claim, Effort, Experiment, ExperimentResult, ProgressFn};
 
 pub(in crate::experiments) const EXPERIMENT: Experiment = Experiment {
     id: "5.6",
@@ -25,10 +23,7 @@ const LEAST: [[f64; 2]; 2] = [[23.0, 0.9], [16.0, 0.6]];
 /// The tolerance of the claim in a test: a coarse field is too smooth for a sharp image.
 const BLURRED: f64 = 0.5;
 
-fn run(
-    effort: Effort,
-    progress: &mut ProgressFn<'_>,
-) -> Result<ExperimentOutcome, ExperimentError> {
+fn run(effort: Effort, progress: &mut ProgressFn<'_>) -> ExperimentResult {
     let task = task("multifocal", effort, 2)?;
     let evaluated = solve_and_evaluate(&task, [0.0, 1.0], progress)?;
     let [least, less] = LEAST;

@@ -8,8 +8,8 @@
 
 use super::{builtin, evaluate, reduced, solve_from};
 use crate::experiments::{
-    Claim, DataTable, Effort, Experiment, ExperimentError, ExperimentOutcome, NamedPlot,
-    ProgressFn, report_progress,
+    Claim, DataTable, Effort, Experiment, ExperimentError, ExperimentOutcome, ExperimentResult,
+    NamedPlot, ProgressFn, report_progress,
 };
 use crate::grin_design::{FieldRepresentation, GrinOptimizer, GrinTask, ViewImage, ViewReport};
 use crate::plot::{Axis, Canvas, Chart, Legend, PALETTE, Stroke, draw_image_row, gray_levels};
@@ -82,10 +82,7 @@ impl ResolutionRow {
     }
 }
 
-fn run(
-    effort: Effort,
-    progress: &mut ProgressFn<'_>,
-) -> Result<ExperimentOutcome, ExperimentError> {
+fn run(effort: Effort, progress: &mut ProgressFn<'_>) -> ExperimentResult {
     let full = builtin("display")?;
     let task = if effort == Effort::Full { full } else { reduced(full, 2) };
     let count = KINDS.len() * task.levels.len();
@@ -112,7 +109,7 @@ fn find(
     levels: usize,
     part: [f64; 2],
     progress: &mut ProgressFn<'_>,
-) -> Result<ResolutionRow, ExperimentError> {
+) -> ExperimentResult<ResolutionRow> {
     let mut task = task.clone();
     task.views.truncate(1);
     task.levels.truncate(levels);

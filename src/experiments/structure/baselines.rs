@@ -12,7 +12,7 @@
 //! merit as the search, which spends its gradients on many structures.
 
 use super::sampler_comparison::{SamplerComparison, SamplerKind};
-use crate::experiments::{Effort, Experiment, ExperimentError, ExperimentOutcome, ProgressFn};
+use crate::experiments::{Effort, Experiment, ExperimentResult, ProgressFn};
 
 pub(in crate::experiments) const METROPOLIS: Experiment = Experiment {
     id: "4.4",
@@ -30,18 +30,12 @@ pub(in crate::experiments) const BRUTE_FORCE: Experiment = Experiment {
     run: run_brute_force,
 };
 
-fn run_metropolis(
-    effort: Effort,
-    progress: &mut ProgressFn<'_>,
-) -> Result<ExperimentOutcome, ExperimentError> {
+fn run_metropolis(effort: Effort, progress: &mut ProgressFn<'_>) -> ExperimentResult {
     let samplers = &[SamplerKind::Restore, SamplerKind::Metropolis];
     compare(samplers, &samplers[1..], effort, progress)
 }
 
-fn run_brute_force(
-    effort: Effort,
-    progress: &mut ProgressFn<'_>,
-) -> Result<ExperimentOutcome, ExperimentError> {
+fn run_brute_force(effort: Effort, progress: &mut ProgressFn<'_>) -> ExperimentResult {
     let samplers =
         &[SamplerKind::Restore, SamplerKind::Brute, SamplerKind::Metropolis, SamplerKind::Descent];
     compare(samplers, &samplers[1..3], effort, progress)
@@ -52,7 +46,7 @@ fn compare(
     rivals: &'static [SamplerKind],
     effort: Effort,
     progress: &mut ProgressFn<'_>,
-) -> Result<ExperimentOutcome, ExperimentError> {
+) -> ExperimentResult {
     let (lenses, seeds, gradients) = effort.comparison_size();
     SamplerComparison { samplers, rivals, lenses, seeds, gradients }.run(progress)
 }

@@ -10,8 +10,8 @@ use super::{at_heights, rules};
 use crate::experiments::pareto_front::draw_lens_and_spots;
 use crate::experiments::sharpness_vs_light::{self, ProgressSpan};
 use crate::experiments::{
-    Claim, Effort, Experiment, ExperimentError, ExperimentOutcome, NamedPlot, ProgressFn,
-    report_progress,
+    Claim, Effort, Experiment, ExperimentError, ExperimentOutcome, ExperimentResult, NamedPlot,
+    ProgressFn, report_progress,
 };
 use crate::lens::Lens;
 use crate::merit::{PupilEdge, Term, WeightedTerm};
@@ -35,10 +35,7 @@ const SWEEP_SHARE: f64 = 0.4;
 /// The relative accuracy of the numbers of a design.
 const EVALUATION_TOLERANCE: f64 = 1e-4;
 
-fn run(
-    effort: Effort,
-    progress: &mut ProgressFn<'_>,
-) -> Result<ExperimentOutcome, ExperimentError> {
+fn run(effort: Effort, progress: &mut ProgressFn<'_>) -> ExperimentResult {
     let start = at_heights(FILE)?;
     let settings = ParetoSettings {
         points: effort.select(8, 2),
@@ -67,7 +64,7 @@ fn run_sweep(
     start: &Lens,
     settings: &ParetoSettings,
     progress: &mut ProgressFn<'_>,
-) -> Result<ParetoSweep, ExperimentError> {
+) -> ExperimentResult<ParetoSweep> {
     let mut sweep = ParetoSweep::new(start, settings).map_err(ExperimentError::from_error)?;
     let mut done = 0.0;
     loop {
@@ -105,7 +102,7 @@ impl MutationGain {
         chosen: &[(ParetoPoint, f64)],
         gradients: u64,
         progress: &mut ProgressFn<'_>,
-    ) -> Result<Self, ExperimentError> {
+    ) -> ExperimentResult<Self> {
         let mut searches = Vec::new();
         for sampler in [SamplerKind::Restore, SamplerKind::Descent] {
             for (i, (design, weight)) in chosen.iter().enumerate() {
@@ -123,9 +120,8 @@ impl MutationGain {
                 .map_err(ExperimentError::from_error)
         };
         let (mutated, descended) = searches.split_at(chosen.len());
-        let [found, longer] = [mutated, descended].map(|side| {
-            side.iter().zip(chosen).map(judged).collect::<Result<Vec<_>, ExperimentError>>()
-        });
+        let [found, longer] = [mutated, descended]
+            .map(|side| side.iter().zip(chosen).map(judged).collect::<ExperimentResult<Vec<_>>>());
         let (found, longer) = (found?, longer?);
         Ok(Self {
             mutated: extend_front(sweep.front(), &found),
@@ -181,7 +177,7 @@ impl MutationGain {
     }
 
     /// Draws the plane of blur and light, and the lenses at the ends of the front with their spots.
-    fn draw(&self, sweep: &ParetoSweep) -> Result<Canvas, ExperimentError> {
+    fn draw(&self, sweep: &ParetoSweep) -> ExperimentResult<Canvas> {
         let mut canvas = Canvas::new([2020, 1000]);
         let um = |design: &ParetoPoint| [1e3 * design.spot, design.light];
         let points = |front: &Front| front.points().iter().map(um).collect::<Vec<_>>();
@@ -227,7 +223,7 @@ fn extend_front(front: &Front, found: &[ParetoPoint]) -> Front {
 
 /// The search that continues the sweep at a weight: the same objective and the same bounds of
 /// semi-diameters.
-fn plan(start: &ParetoPoint, weight: f64, gradients: u64) -> Result<SearchPlan, ExperimentError> {
+fn plan(start: &ParetoPoint, weight: f64, gradients: u64) -> ExperimentResult<SearchPlan> {
     let goal = weighted_sum_goal(&start.lens, start.light, PupilEdge::Moving);
     let mut goal = goal.map_err(ExperimentError::from_error)?;
     goal.terms.push(WeightedTerm { term: Term::Throughput, weight });

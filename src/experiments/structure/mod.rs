@@ -16,7 +16,7 @@ mod relaxed_limits;
 mod sampler_comparison;
 
 use super::sharpness_vs_light::{focal_length, with_field_angles};
-use super::{ExperimentError, lens};
+use super::{ExperimentError, ExperimentResult, lens};
 use crate::lens::{Lens, at_zoom};
 use crate::merit::Goal;
 use crate::pupil::limited_by_stop;
@@ -43,7 +43,7 @@ const STUDY_LENSES: [StudyLens; 4] = [
 
 /// A lens of the library at four image heights, in one colour, focused at infinity, limited by its
 /// stop.
-fn at_heights(file: &str) -> Result<Lens, ExperimentError> {
+fn at_heights(file: &str) -> ExperimentResult<Lens> {
     let single = at_zoom(&lens(file)?, 0);
     let focal = focal_length(&single)?;
     let angles = HEIGHTS.map(|height| (height / focal).atan().to_degrees());
@@ -57,7 +57,7 @@ fn rules() -> SearchRules {
 
 /// A search from a lens with one chain, as in the thesis, over a number of gradients: sharp spots,
 /// all of the light, the relaxed limits.
-fn plan(start: &Lens, rules: SearchRules, gradients: u64) -> Result<SearchPlan, ExperimentError> {
+fn plan(start: &Lens, rules: SearchRules, gradients: u64) -> ExperimentResult<SearchPlan> {
     let usual = Goal::with_limits(start, &rules.goal_limits(), None, 1.0)
         .map_err(ExperimentError::from_error)?;
     let kept = relaxed_limits::relax_limits(start, &usual).map_err(ExperimentError::from_error)?;

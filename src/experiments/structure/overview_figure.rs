@@ -12,8 +12,8 @@ use super::{at_heights, rules};
 use crate::experiments::section::SectionPlot;
 use crate::experiments::sharpness_vs_light::ProgressSpan;
 use crate::experiments::{
-    Claim, DataTable, Effort, Experiment, ExperimentError, ExperimentOutcome, NamedPlot,
-    ProgressFn, TableCell,
+    Claim, DataTable, Effort, Experiment, ExperimentError, ExperimentOutcome, ExperimentResult,
+    NamedPlot, ProgressFn, TableCell,
 };
 use crate::lens::Lens;
 use crate::plot::{Axis, BLACK, Canvas, Chart, PALETTE, TextAlign};
@@ -38,10 +38,7 @@ const MORE: f64 = 1.02;
 /// The relative accuracy of the numbers.
 const EVALUATION_TOLERANCE: f64 = 1e-4;
 
-fn run(
-    effort: Effort,
-    progress: &mut ProgressFn<'_>,
-) -> Result<ExperimentOutcome, ExperimentError> {
+fn run(effort: Effort, progress: &mut ProgressFn<'_>) -> ExperimentResult {
     let own = at_heights("double_gauss_nikkor_s_50")?;
     let start = with_open_apertures(&own, OPENED);
     let mark = OverviewLens::of("reference, 1980", at_heights("double_gauss_canon_fd50_f12")?)?;
@@ -81,7 +78,7 @@ struct OverviewLens {
 }
 
 impl OverviewLens {
-    fn of(name: &'static str, lens: Lens) -> Result<Self, ExperimentError> {
+    fn of(name: &'static str, lens: Lens) -> ExperimentResult<Self> {
         let figures =
             LensSummary::new(&lens, EVALUATION_TOLERANCE).map_err(ExperimentError::from_error)?;
         Ok(Self { name, lens, figures })
@@ -168,7 +165,7 @@ fn search(search: &RecordedSearch) -> DataTable {
 }
 
 /// Draws every lens with its rays and its numbers.
-fn draw(designs: &[OverviewLens]) -> Result<Canvas, ExperimentError> {
+fn draw(designs: &[OverviewLens]) -> ExperimentResult<Canvas> {
     let mut canvas = Canvas::new([1340, 60 + 330 * designs.len() as u32]);
     for (i, design) in designs.iter().enumerate() {
         draw_design(&mut canvas, design, 60.0 + 330.0 * i as f64)?;
@@ -176,11 +173,7 @@ fn draw(designs: &[OverviewLens]) -> Result<Canvas, ExperimentError> {
     Ok(canvas)
 }
 
-fn draw_design(
-    canvas: &mut Canvas,
-    design: &OverviewLens,
-    top: f64,
-) -> Result<(), ExperimentError> {
+fn draw_design(canvas: &mut Canvas, design: &OverviewLens, top: f64) -> ExperimentResult<()> {
     let model = RayModel::from_lens(&design.lens, 0).map_err(ExperimentError::from_error)?;
     let section = SectionPlot::new(&model.channels[0].system);
     let [z, y] = section.extent();

@@ -14,7 +14,7 @@ use super::recorded_search::{RecordedSearch, RoundRecord, run_to_end};
 use super::{STUDY_LENSES, StudyLens, at_heights, plan, rules};
 use crate::experiments::sharpness_vs_light::ProgressSpan;
 use crate::experiments::{
-    Claim, DataTable, Effort, Experiment, ExperimentError, ExperimentOutcome, NamedPlot,
+    Claim, DataTable, Effort, Experiment, ExperimentOutcome, ExperimentResult, NamedPlot,
     ProgressFn, TableCell,
 };
 use crate::optimize::DescentMethod;
@@ -48,10 +48,7 @@ const THESIS: [[[f64; 2]; 2]; 4] = [
 /// With and without.
 const SIDES: [(bool, &str); 2] = [(true, "projection"), (false, "no projection")];
 
-fn run(
-    effort: Effort,
-    progress: &mut ProgressFn<'_>,
-) -> Result<ExperimentOutcome, ExperimentError> {
+fn run(effort: Effort, progress: &mut ProgressFn<'_>) -> ExperimentResult {
     // A test covers only the lens of the plot, and one number of gradients.
     let lenses = effort.select(0..STUDY_LENSES.len(), 3..STUDY_LENSES.len());
     let (seeds, read) = (effort.select(24, 1), effort.select(&READ[..], &[200]));
@@ -106,7 +103,7 @@ impl ProjectionComparison {
         gradients: u64,
         part: ProgressSpan<'_>,
         progress: &mut ProgressFn<'_>,
-    ) -> Result<Self, ExperimentError> {
+    ) -> ExperimentResult<Self> {
         let start = at_heights(subject.file)?;
         let mut all = Vec::new();
         for (projection, _) in SIDES {

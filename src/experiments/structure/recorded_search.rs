@@ -1,7 +1,7 @@
 //! Searches with a record of their progress after every round.
 
 use crate::experiments::sharpness_vs_light::ProgressSpan;
-use crate::experiments::{ExperimentError, ProgressFn, report_progress};
+use crate::experiments::{ExperimentError, ExperimentResult, ProgressFn, report_progress};
 use crate::lens::Lens;
 use crate::search::lens_landscape::{LensLandscape, SearchPlan};
 use crate::search::{MutationKind, SearchRunOn};
@@ -35,7 +35,7 @@ pub(super) struct RoundRecord {
 }
 
 impl RecordedSearch {
-    pub(super) fn new(start: &Lens, plan: &SearchPlan) -> Result<Self, ExperimentError> {
+    pub(super) fn new(start: &Lens, plan: &SearchPlan) -> ExperimentResult<Self> {
         let (landscape, run) = plan.begin(start).map_err(ExperimentError::from_error)?;
         Ok(Self { landscape, run, marks: Vec::new() })
     }
@@ -124,7 +124,7 @@ pub(super) fn run_to_end(
     searches: &mut [RecordedSearch],
     part: ProgressSpan<'_>,
     progress: &mut ProgressFn<'_>,
-) -> Result<(), ExperimentError> {
+) -> ExperimentResult<()> {
     loop {
         let done: f64 =
             searches.iter().map(RecordedSearch::done).sum::<f64>() / searches.len() as f64;

@@ -4,7 +4,7 @@ use super::recorded_search::{RecordedSearch, run_to_end};
 use super::{STUDY_LENSES, StudyLens, at_heights, plan, rules};
 use crate::experiments::sharpness_vs_light::ProgressSpan;
 use crate::experiments::{
-    Claim, DataTable, Effort, ExperimentError, ExperimentOutcome, NamedPlot, ProgressFn, TableCell,
+    Claim, DataTable, Effort, ExperimentOutcome, ExperimentResult, NamedPlot, ProgressFn, TableCell,
 };
 use crate::plot::{Axis, BLACK, Canvas, Chart, PALETTE, Stroke, TextAlign};
 use crate::search::lens_landscape::SearchPlan;
@@ -82,10 +82,7 @@ impl SamplerComparison {
         (0.8 * self.seeds as f64).floor()
     }
 
-    pub(super) fn run(
-        &self,
-        progress: &mut ProgressFn<'_>,
-    ) -> Result<ExperimentOutcome, ExperimentError> {
+    pub(super) fn run(&self, progress: &mut ProgressFn<'_>) -> ExperimentResult {
         let mut outcome = ExperimentOutcome::default();
         let mut comparisons = Vec::new();
         for (i, subject) in self.subjects().iter().enumerate() {
@@ -118,7 +115,7 @@ impl SamplerComparison {
         subject: StudyLens,
         part: ProgressSpan<'_>,
         progress: &mut ProgressFn<'_>,
-    ) -> Result<LensComparison, ExperimentError> {
+    ) -> ExperimentResult<LensComparison> {
         let start = at_heights(subject.file)?;
         let plan = plan(&start, rules(), self.gradients)?;
         let mut all = Vec::new();
