@@ -4,10 +4,9 @@
 //! hyperbolic secant, which refocuses at one, three and five times that distance; the parabolic
 //! profile has no focus, so it is compared at those planes where its own blur is smallest.
 
-use super::grin_solution::solve;
 use super::{
     Claim, DataTable, Effort, Experiment, ExperimentError, ExperimentOutcome, ExperimentResult,
-    NamedPlot, ProgressFn,
+    NamedPlot, ProgressFn, solve,
 };
 use crate::grin::field::{Parabolic, ProfileField};
 use crate::grin::{

@@ -6,10 +6,9 @@
 //! both errors are reported. This explains the remark of the figure that the difference is largest
 //! at the boundary.
 
-use super::grin_solution::solve;
 use super::{
     Claim, DataTable, Effort, Experiment, ExperimentError, ExperimentOutcome, ExperimentResult,
-    ProgressFn,
+    ProgressFn, solve,
 };
 use crate::grin_design::{self, FieldDifference, GrinOptimizer, GrinTask, RefinementLevel};
 use crate::report::plot_grin_field;

@@ -12,7 +12,6 @@ mod entrance_pupil;
 mod fibre;
 mod gradient_image;
 mod grin_displays;
-mod grin_solution;
 mod histogram;
 mod known_lenses;
 mod motion;
@@ -31,6 +30,7 @@ pub use outcome::{Claim, ClaimRelation, DataTable, ExperimentOutcome, TableCell}
 pub use report::{ExperimentReport, PhaseTiming};
 
 use crate::files;
+use crate::grin_design::{GrinOptimizer, GrinTask};
 use crate::lens::Lens;
 use crate::plot::NamedPlot;
 use serde::{Deserialize, Serialize};
@@ -151,4 +151,34 @@ fn lens(name: &str) -> ExperimentResult<Lens> {
     let bundled =
         bundled.ok_or_else(|| ExperimentError::Failed(format!("no lens `{name}` is bundled")))?;
     files::json::read(bundled.text, name).map_err(ExperimentError::from_error)
+}
+
+/// Solves a task; it is the part `from` to `to` of the whole work.
+fn solve(
+    task: &GrinTask,
+    [from, to]: [f64; 2],
+    progress: &mut ProgressFn<'_>,
+) -> ExperimentResult<GrinOptimizer> {
+    report_progress(progress, from, &task.name)?;
+    let optimizer = GrinOptimizer::new(task).map_err(ExperimentError::from_error)?;
+    solve_from(optimizer, [from, to], progress)
+}
+
+/// Continues an optimizer to its end; it is the part `from` to `to` of the whole work.
+fn solve_from(
+    mut optimizer: GrinOptimizer,
+    [from, to]: [f64; 2],
+    progress: &mut ProgressFn<'_>,
+) -> ExperimentResult<GrinOptimizer> {
+    let name = optimizer.task().name.clone();
+    let mut done = from;
+    loop {
+        let step = optimizer.step().map_err(ExperimentError::from_error)?;
+        let share = step.step as f64 / step.max_steps.max(1) as f64;
+        done = if step.finished { to } else { done.max(from + share.min(1.0) * (to - from)) };
+        report_progress(progress, done, &name)?;
+        if step.finished {
+            return Ok(optimizer);
+        }
+    }
 }

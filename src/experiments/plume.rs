@@ -15,10 +15,9 @@
 //! too, but it depends more on the contrast than on the method: a constant index reaches 0.0088 on
 //! the data of the table. The error relative to the contrast measures the reconstruction.
 
-use super::grin_solution::solve;
 use super::{
     Claim, DataTable, Effort, Experiment, ExperimentError, ExperimentOutcome, ExperimentResult,
-    NamedPlot, ProgressFn, TableCell, report_progress,
+    NamedPlot, ProgressFn, TableCell, report_progress, solve,
 };
 use crate::grin::IndexField;
 use crate::grin_design::{

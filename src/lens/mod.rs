@@ -7,7 +7,6 @@
 //! and medium of a row belong to the gap behind its surface; the last thickness leads to the image
 //! plane, which has no row. The curvature is stored, the radius is displayed.
 
-mod blank;
 mod check;
 mod diff;
 mod edit;
@@ -16,14 +15,15 @@ pub mod glass;
 mod grin;
 mod parameter;
 mod resolve;
-mod reversed;
 mod rows;
 mod section;
 mod surface_number;
 mod system;
 mod variables;
 
-pub use blank::blank;
+pub use crate::grin::field::{
+    AXIAL_TERMS, PROFILE_TERMS, ProfileCoefficients, ProfileLaw, RADIAL_TERMS, RotationalProfile,
+};
 pub use check::LensError;
 pub use diff::added_glass;
 pub use edit::{Edit, EditError, EditedCell, apply_edit};
@@ -34,10 +34,6 @@ pub use section::LensSection;
 pub use surface_number::{MediumPlace, SurfaceNumber};
 pub use system::{Shape, Surface, System, SystemError};
 pub use variables::{ParameterKind, add_variable, add_variables, at_zoom};
-
-pub use crate::grin::field::{
-    AXIAL_TERMS, PROFILE_TERMS, ProfileCoefficients, ProfileLaw, RADIAL_TERMS, RotationalProfile,
-};
 
 use serde::{Deserialize, Serialize};
 
@@ -303,5 +299,37 @@ impl Lens {
     /// The variable of a parameter; `None` if the parameter is not a variable.
     pub fn variable(&self, parameter: Parameter) -> Option<&Variable> {
         self.variables.iter().find(|v| v.parameter == parameter)
+    }
+}
+
+/// A new lens: a plane-parallel plate of N-BK7 whose front is the stop, and one field on the axis.
+pub fn blank() -> Lens {
+    let row = |thickness: f64, medium: Medium, stop: bool| Row {
+        thickness,
+        medium,
+        stop,
+        semi_diameter: Some(10.0),
+        ..Row::default()
+    };
+    Lens {
+        name: "New lens".to_owned(),
+        source: String::new(),
+        notes: String::new(),
+        object: Object::Infinity,
+        object_medium: Medium::Air,
+        aperture: Aperture::EntrancePupilDiameter(10.0),
+        fields: Fields {
+            kind: FieldKind::Angle,
+            values: vec![FieldPoint { x: 0.0, y: 0.0, weight: 1.0 }],
+        },
+        wavelengths: vec![Wavelength { um: 0.5875618, weight: 1.0, primary: true }],
+        surfaces: vec![
+            row(5.0, Medium::Glass("SCHOTT N-BK7".to_owned()), true),
+            row(50.0, Medium::Air, false),
+        ],
+        zoom: Vec::new(),
+        variables: Vec::new(),
+        pickups: Vec::new(),
+        image_solve: None,
     }
 }

@@ -10,9 +10,8 @@
 //! decides which rays belong to the pupil; a difference of two integrals has no significant digit
 //! in `f32`.
 
-use super::clock::time_ms;
-use super::rates::{TimedCase, time_interleaved};
 use super::spot::Precision;
+use super::timing::{TimedCase, time_interleaved, time_median};
 use crate::lens::{FieldPoint, Lens, Shape, Surface, System, SystemError};
 use crate::math::{Real, Vec3};
 use crate::pupil::{
@@ -21,7 +20,7 @@ use crate::pupil::{
     WarpSampling, choose_estimator, differentiate,
 };
 use crate::trace::{
-    AdjointSeed, ImagePoints, Ray, Rays, SurfaceParameter, SystemGradient, TraceSink, Tracer,
+    AdjointSeed, ImagePoints, Rays, SurfaceParameter, SystemGradient, TraceSink, Tracer,
 };
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use serde::Serialize;
@@ -200,8 +199,7 @@ const DIFFERENCE_ORDERS: usize = 6;
 /// The numbers of samples of the warp field along its curve, and the number of tries of each.
 const SAMPLES: [usize; 5] = [256, 1024, 4096, 16_384, 65_536];
 const TRIES: u32 = 4;
-/// A result is timed repeatedly up to this total time in ms, or this many times.
-const LONG_ENOUGH: f64 = 5.0;
+/// The maximum number of times that a result is timed.
 const OFTEN_ENOUGH: usize = 15;
 /// The numbers of inert planes added to the gaps, to measure the cost of more parameters.
 const PLANES: [usize; 4] = [0, 6, 12, 24];
@@ -450,15 +448,8 @@ impl<'a> GradientScene<'a> {
         &self,
         work: impl Fn() -> Option<DerivativeWithRays> + Sync,
     ) -> Option<(DerivativeWithRays, f64)> {
-        self.pool.install(|| {
-            let (result, first) = time_ms(&work);
-            let mut times = vec![first];
-            while times.len() < OFTEN_ENOUGH && times.iter().sum::<f64>() < LONG_ENOUGH {
-                times.push(time_ms(|| black_box(work())).1);
-            }
-            times.sort_by(f64::total_cmp);
-            Some((result?, times[times.len() / 2]))
-        })
+        let (result, ms) = self.pool.install(|| time_median(1..=OFTEN_ENOUGH, &work));
+        Some((result?, ms))
     }
 
     /// Computes a derivative, including the search for the edge of the pupil.
@@ -511,8 +502,7 @@ impl<'a> GradientScene<'a> {
         let mut weights = Vec::with_capacity(nodes.points.len());
         let mut rays = Rays::<f32>::with_capacity(nodes.points.len());
         for (p, weight) in nodes.points.iter().zip(&nodes.weights) {
-            let Ray { point, direction } = region.launch.ray(*p)?;
-            rays.push(Ray { point: Vec3::from_f64(point), direction: Vec3::from_f64(direction) });
+            rays.push(region.launch.ray(*p)?.cast());
             weights.push(scale * weight);
         }
         let mut points = ImagePoints::default();

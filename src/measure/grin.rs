@@ -4,10 +4,10 @@
 //! All on one thread. The reference is the same field traced with very fine steps. A grid has an
 //! interpolation error that smaller steps do not reduce; it is reported with the curves.
 
-use super::clock::time_ms;
 use super::grin_starts::GrinStarts;
-use super::process::{MemoryUse, peak_megabytes};
+use super::machine::{MemoryUse, peak_megabytes};
 use super::spot::Precision;
+use super::timing::time_ms;
 use crate::grin::field::{GridError, HessianDiagonal, RegularGrid, Trilinear};
 use crate::grin::{
     EndCondition, GrinRay, GrinRegion, GrinSetup, GrinSetupError, GrinTracer, IndexField,

@@ -4,21 +4,18 @@
 //! that a busy machine slows all of them alike and ratios remain meaningful. A rate is the median
 //! of many short repetitions, reported with the slowest and the fastest.
 
-mod clock;
 mod double_gauss;
 mod gradient;
 mod grin;
 mod grin_starts;
 mod machine;
 mod optimize;
-mod process;
-mod rates;
 mod rounding;
 mod search;
 mod spot;
+mod timing;
 mod trace;
 
-pub use clock::{Stopwatch, time_ms};
 pub use double_gauss::double_gauss;
 pub use gradient::{
     GradientBenchmark, GradientBenchmarkError, GradientCost, GradientCurves, GradientRow, Integral,
@@ -28,14 +25,13 @@ pub use grin::{
     GrinBenchmark, GrinBenchmarkError, GrinCost, GrinCurves, GrinMemory, GrinRow, measure_grin,
 };
 pub use grin_starts::GrinStarts;
-pub use machine::Machine;
+pub use machine::{Machine, MemoryUse, age_ms, peak_megabytes, processor_ms};
 pub use optimize::{StepCosts, StepRow, measure_step_costs};
-pub use process::{MemoryUse, age_ms, peak_megabytes, processor_ms};
-pub use rates::RateStatistics;
 pub use rounding::{Rounding, measure_rounding};
 pub use search::{MeritQuantiles, SearchBenchmark, SearchBudget, SearchRow, compare_searches};
 pub use spot::{
     Precision, PupilClipping, PupilSampling, SpotCurves, SpotCurvesError, SpotRow,
     measure_spot_curves,
 };
+pub use timing::{RateStatistics, Stopwatch, time_ms};
 pub use trace::{BenchmarkError, Throughput, TraceRow, measure_throughput};

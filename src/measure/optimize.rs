@@ -1,8 +1,7 @@
 //! The cost of a step of the local optimizers.
 
-use super::clock::time_ms;
 use super::double_gauss::double_gauss;
-use super::rates::RateStatistics;
+use super::timing::{RateStatistics, time_ms};
 use super::trace::BenchmarkError;
 use crate::lens::{Lens, Parameter, Quantity, Variable};
 use crate::merit::{Goal, PupilEdge, Term, WeightedTerm};

@@ -2,7 +2,7 @@
 
 use super::double_gauss::bundle;
 use crate::lens::{System, SystemError};
-use crate::math::{DoubleDouble, Real, Vec3};
+use crate::math::{DoubleDouble, Real};
 use crate::trace::{Ray, Tracer};
 use serde::Serialize;
 
@@ -32,13 +32,11 @@ pub fn measure_rounding<R: Real>(
     let mut sum = Rounding { rays, ..Rounding::default() };
     let mut compared = 0;
     for i in 0..rays {
-        let ray = bundle.get(i);
-        let got = fast.trace(cast_ray(ray));
+        let rounded: Ray<R> = bundle.get(i).cast();
+        let got = fast.trace(rounded);
         // Both start from the same rounded ray, which leaves the error of the tracing alone.
-        let want = exact.trace(cast_ray(Ray::<f64> {
-            point: cast_ray::<R>(ray).point.value(),
-            direction: cast_ray::<R>(ray).direction.value(),
-        }));
+        let same = Ray { point: rounded.point.value(), direction: rounded.direction.value() };
+        let want = exact.trace(same.cast());
         if got.fate != want.fate {
             sum.other_fates += 1;
         } else if got.fate.is_imaged() {
@@ -52,10 +50,6 @@ pub fn measure_rounding<R: Real>(
     }
     let mean = |square: f64| (square / f64::from(compared.max(1))).sqrt();
     Ok(Rounding { point_rms_mm: mean(sum.point_rms_mm), path_rms_mm: mean(sum.path_rms_mm), ..sum })
-}
-
-fn cast_ray<R: Real>(ray: Ray<f64>) -> Ray<R> {
-    Ray { point: Vec3::from_f64(ray.point), direction: Vec3::from_f64(ray.direction) }
 }
 
 /// The difference of two numbers, without first rounding the exact one.

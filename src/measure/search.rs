@@ -4,7 +4,7 @@
 //! Every lens compared is evaluated anew with the same fine sampling, so that a search with a
 //! coarse one does not look better than it is.
 
-use super::clock::Stopwatch;
+use super::timing::Stopwatch;
 use crate::lens::Lens;
 use crate::merit::MeritError;
 use crate::search::lens_landscape::{LensLandscape, SearchPlan, SearchSetupError};

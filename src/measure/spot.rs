@@ -4,14 +4,14 @@
 //! summation. A random sampling, or one that depends on the position of a grid, is represented by
 //! the RMS error of several tries. The reference is the split boundary at its highest order.
 
-use super::clock::time_ms;
+use super::timing::time_median;
 use crate::lens::{Aperture, FieldPoint, Lens, Surface};
 use crate::math::Real;
 use crate::pupil::{
     Accuracy, Aiming, Launch, LaunchError, Nodes, PupilPattern, RayModel, RayModelError, Region,
     RegionKind, converge,
 };
-use crate::trace::{ImagePoints, Ray, Rays, TraceSink, Tracer};
+use crate::trace::{ImagePoints, Rays, TraceSink, Tracer};
 use serde::Serialize;
 
 /// The sampling of a pupil.
@@ -130,8 +130,7 @@ const TRIES: u32 = 8;
 /// The radius of the disc relative to that of the beam, so that the stop and not the disc limits
 /// it.
 const MARGIN: f64 = 1.3;
-/// A result is timed repeatedly up to this total time in ms, or this many times.
-const LONG_ENOUGH: f64 = 5.0;
+/// The maximum number of times that a result is timed.
 const OFTEN_ENOUGH: usize = 25;
 
 /// Measures all curves of a field at the primary wavelength, at a zoom position. `report` receives
@@ -262,17 +261,9 @@ impl<'a> SpotScene<'a> {
         step: usize,
         attempt: u32,
     ) -> Option<(SampledRms, f64)> {
-        let (mut result, first) = time_ms(|| self.sample(method, precision, step, attempt));
-        let mut times = vec![first];
-        let enough =
-            |times: &[f64]| times.len() >= OFTEN_ENOUGH || times.iter().sum::<f64>() >= LONG_ENOUGH;
-        while times.len() < 3 || !enough(&times) {
-            let (again, ms) = time_ms(|| self.sample(method, precision, step, attempt));
-            result = again;
-            times.push(ms);
-        }
-        times.sort_by(f64::total_cmp);
-        Some((result?, times[times.len() / 2]))
+        let sample = || self.sample(method, precision, step, attempt);
+        let (result, ms) = time_median(3..=OFTEN_ENOUGH, sample);
+        Some((result?, ms))
     }
 
     /// Computes the RMS radius by a sampling, including the search for its points.
@@ -318,7 +309,7 @@ impl<'a> SpotScene<'a> {
         let mut rays = Rays::with_capacity(nodes.points.len());
         for (p, weight) in nodes.points.iter().zip(&nodes.weights) {
             if let Some(ray) = region.launch.ray(*p) {
-                rays.push(round_ray(ray));
+                rays.push(ray.cast());
                 weights.push(*weight);
             }
         }
@@ -326,14 +317,6 @@ impl<'a> SpotScene<'a> {
         self.single.trace_batch(&rays, &mut points);
         let arrived = weights.iter().copied().enumerate();
         rms(arrived.filter(|(i, _)| points.fate(*i).is_imaged()), &points, nodes.mirrored)
-    }
-}
-
-/// The ray with every number rounded.
-fn round_ray<R: Real>(ray: Ray<f64>) -> Ray<R> {
-    Ray {
-        point: crate::math::Vec3::from_f64(ray.point),
-        direction: crate::math::Vec3::from_f64(ray.direction),
     }
 }
 

@@ -1,9 +1,9 @@
 //! Throughput of the tracer in ray-surfaces per second, with the rounding error of each precision.
 
 use super::double_gauss::{bundle, double_gauss};
-use super::process::{MemoryUse, peak_megabytes};
-use super::rates::{RateStatistics, TimedCase, time_interleaved};
+use super::machine::{MemoryUse, peak_megabytes};
 use super::rounding::{Rounding, measure_rounding};
+use super::timing::{RateStatistics, TimedCase, time_interleaved};
 use crate::lens::{LensError, Shape, System, SystemError, glass::line};
 use crate::math::{Real, Vec3};
 use crate::merit::MeritError;

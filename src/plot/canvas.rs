@@ -1,6 +1,6 @@
 //! Lines, markers, letters and rasters on a white image.
 
-use super::color::Color;
+use super::color::{BLACK, Color, GREY, gray_level};
 use super::font::glyph;
 use image::{ImageError, ImageFormat, Rgb, RgbImage};
 use std::io::Cursor;
@@ -162,4 +162,32 @@ impl Canvas {
 
 fn length(from: [f64; 2], to: [f64; 2]) -> f64 {
     (to[0] - from[0]).hypot(to[1] - from[1])
+}
+
+/// The approximate side of an image, in pixels.
+const IMAGE_SIDE: usize = 384;
+const IMAGE_MARGIN: f64 = 40.0;
+const IMAGE_TOP: f64 = 110.0;
+
+/// Brightness as grey levels, from black at 0 to white at `peak`, rows from the top; `values` has
+/// its rows of `columns` from the bottom.
+pub fn gray_levels(values: &[f64], columns: usize, peak: f64) -> Vec<Color> {
+    let rows = values.chunks(columns.max(1)).rev();
+    rows.flatten().map(|value| gray_level(value / peak)).collect()
+}
+
+/// Draws square images of `pixels` to a side in a row, each under its name.
+pub fn draw_image_row(title: &str, pixels: usize, images: &[(String, Vec<Color>)]) -> Canvas {
+    let cell = (IMAGE_SIDE / pixels.max(1)).max(1);
+    let side = (cell * pixels) as f64;
+    let width = IMAGE_MARGIN + images.len() as f64 * (side + IMAGE_MARGIN);
+    let mut canvas =
+        Canvas::new([width.max(640.0) as u32, (IMAGE_TOP + side + IMAGE_MARGIN) as u32]);
+    canvas.text([IMAGE_MARGIN, 30.0], title, BLACK, TextAlign::Left);
+    for (i, (name, colors)) in images.iter().enumerate() {
+        let left = IMAGE_MARGIN + i as f64 * (side + IMAGE_MARGIN);
+        canvas.text([left + 0.5 * side, IMAGE_TOP - 36.0], name, GREY, TextAlign::Middle);
+        canvas.raster([left, IMAGE_TOP], pixels, cell, colors);
+    }
+    canvas
 }

@@ -1,7 +1,7 @@
-//! A chart: two axes, and the mapping from two quantities to pixels.
+//! A chart: two axes, the mapping from two quantities to pixels, and a legend.
 
-use super::canvas::{Canvas, TextAlign};
-use super::color::{BLACK, GRID};
+use super::canvas::{Canvas, Stroke, TextAlign};
+use super::color::{BLACK, Color, GRID};
 
 /// The approximate number of ticks of a linear axis.
 const TICKS: f64 = 5.0;
@@ -9,6 +9,7 @@ const TICKS: f64 = 5.0;
 const END_TOLERANCE: f64 = 1e-6;
 /// The distance of tick labels from an axis, in pixels.
 const PADDING: f64 = 10.0;
+/// Half the height of a letter, in pixels: ticks and samples are centred on their names.
 const HALF_LETTER: f64 = 7.0;
 
 /// An axis that ends at ticks.
@@ -174,6 +175,44 @@ impl Chart {
         for side in corners.windows(2) {
             canvas.line(side[0], side[1], BLACK);
         }
+    }
+}
+
+/// The distance between two entries, in pixels.
+const ENTRY_HEIGHT: f64 = 28.0;
+/// The length of the sample of a curve, and the distance of a name from its sample, in pixels.
+const SAMPLE_LENGTH: f64 = 50.0;
+const SAMPLE_GAP: f64 = 12.0;
+
+/// A column of entries, drawn one by one from the top.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Legend {
+    corner: [f64; 2],
+}
+
+impl Legend {
+    /// An empty legend with its upper left corner at a position in pixels.
+    pub fn new(corner: [f64; 2]) -> Self {
+        Self { corner }
+    }
+
+    /// Draws the next entry: a curve and its name.
+    pub fn curve(&mut self, canvas: &mut Canvas, name: &str, color: Color, stroke: Stroke) {
+        let [x, y] = [self.corner[0], self.corner[1] + HALF_LETTER];
+        canvas.curve(&[[x, y], [x + SAMPLE_LENGTH, y]], color, stroke);
+        self.name(canvas, name, SAMPLE_LENGTH);
+    }
+
+    /// Draws the next entry: a marker and its name.
+    pub fn marker(&mut self, canvas: &mut Canvas, name: &str, color: Color) {
+        canvas.markers(&[[self.corner[0], self.corner[1] + HALF_LETTER]], color);
+        self.name(canvas, name, 0.0);
+    }
+
+    fn name(&mut self, canvas: &mut Canvas, name: &str, sample: f64) {
+        let [x, y] = self.corner;
+        canvas.text([x + sample + SAMPLE_GAP, y], name, BLACK, TextAlign::Left);
+        self.corner[1] += ENTRY_HEIGHT;
     }
 }
 

@@ -6,11 +6,7 @@ mod canvas;
 mod chart;
 mod color;
 mod font;
-mod image_row;
-mod legend;
 
-pub use canvas::{Canvas, NamedPlot, Stroke, TextAlign};
-pub use chart::{Axis, Chart};
+pub use canvas::{Canvas, NamedPlot, Stroke, TextAlign, draw_image_row, gray_levels};
+pub use chart::{Axis, Chart, Legend};
 pub use color::{BLACK, Color, GREY, GRID, PALETTE, diverging, gray_level};
-pub use image_row::{draw_image_row, gray_levels};
-pub use legend::Legend;

@@ -17,6 +17,11 @@ pub struct Ray<R> {
 }
 
 impl Ray<f64> {
+    /// The same ray in another number type.
+    pub fn cast<R: Real>(&self) -> Ray<R> {
+        Ray { point: Vec3::from_f64(self.point), direction: Vec3::from_f64(self.direction) }
+    }
+
     /// Checks that the ray is finite and that its direction has length 1 within 1e-9.
     ///
     /// # Errors

@@ -6,10 +6,9 @@
 //! brighter than others.
 
 use super::{COLUMNS, EvaluatedField, independent_task, solve_and_evaluate, task};
-use crate::experiments::grin_solution::solve;
 use crate::experiments::{
     Claim, DataTable, Effort, Experiment, ExperimentError, ExperimentOutcome, ExperimentResult,
-    NamedPlot, ProgressFn,
+    NamedPlot, ProgressFn, solve,
 };
 use crate::grin::{GrinTracer, RayExit, plan_tracing};
 use crate::grin_design::{GrinField, GrinTask, LightGoal};

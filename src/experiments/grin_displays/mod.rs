@@ -8,10 +8,9 @@ pub(super) mod display;
 pub(super) mod multifocal;
 pub(super) mod resolution;
 
-use super::grin_solution::{solve, solve_from};
 use super::{
     Claim, DataTable, Effort, ExperimentError, ExperimentOutcome, ExperimentResult, NamedPlot,
-    ProgressFn,
+    ProgressFn, solve, solve_from,
 };
 use crate::grin_design::{
     self, GrinField, GrinOptimizer, GrinTask, LightGoal, LightSource, ViewReport,

@@ -1,6 +1,6 @@
 //! Uniform cubic B-splines, and a profile made of them.
 
-use super::cell::{floor_cell, to_index};
+use super::grid::{floor_cell, to_index};
 use super::{ProfileFunction, ProfileSample, ProfileSamples};
 use crate::grin::lanes::{LANES, LaneScalars};
 use crate::math::Real;

@@ -4,7 +4,6 @@
 //! [`ProfileFunction`] of its own.
 
 mod bspline;
-mod cell;
 mod graded;
 mod grid;
 mod layered;

@@ -2,8 +2,8 @@
 
 use super::outcome::{RayCounts, count_rays, is_valid};
 use super::penalties::FieldPenalties;
-use super::ring::RingTarget;
 use super::screen::Screen;
+use super::targets::RingTarget;
 use super::views::ViewRays;
 use crate::grin::{GrinRay, GrinTracer, IndexField, RayAdjoint, RayExit};
 use crate::grin_design::GrinTaskError;

@@ -3,7 +3,6 @@
 pub(super) mod loss;
 pub(super) mod outcome;
 pub(super) mod penalties;
-mod ring;
 pub(super) mod screen;
 mod straight_rays;
 pub(super) mod targets;

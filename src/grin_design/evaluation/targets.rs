@@ -1,4 +1,5 @@
-//! Simulated measurements: the exits of the rays of a view from a reference field.
+//! The targets of rays: simulated measurements, which are their exits from a reference field, and
+//! rings.
 //!
 //! The reference field is traced with the settings for its own kind, and to a tighter tolerance
 //! than the field under optimisation, so that the optimisation does not reproduce its own tracing
@@ -9,7 +10,7 @@ use super::outcome::{RayCounts, count_rays, is_valid};
 use crate::grin::{GrinRay, GrinTracer, RayAdjoint, RayExit, plan_tracing};
 use crate::grin_design::GrinTaskError;
 use crate::grin_design::task::checks::invalid;
-use crate::grin_design::task::geometry::{length, unit};
+use crate::grin_design::task::geometry::{length, radians, unit};
 use crate::grin_design::task::source::{RaySet, SourceRay};
 use crate::grin_design::task::{GrinTask, LightGoal, LightView, ReferenceField};
 use crate::math::Vec3;
@@ -122,4 +123,48 @@ pub(in crate::grin_design) fn measure_targets(
         _ => Ok(None),
     };
     task.views.iter().map(targets).collect()
+}
+
+/// A shorter vector has no direction.
+const MIN_LENGTH: f64 = 1e-9;
+
+/// Two rings about the direction of a beam.
+#[derive(Debug, Clone)]
+pub(super) struct RingTarget {
+    direction: Vec3<f64>,
+    radius: f64,
+    /// The sine of the angular radius of the far ring.
+    sine: f64,
+    /// The weight of a squared difference in direction.
+    pub(super) direction_weight: f64,
+}
+
+impl RingTarget {
+    /// `angle` is the angular radius of the far ring in degrees.
+    pub(super) fn new(direction: Vec3<f64>, radius: f64, angle: f64, far: f64) -> Self {
+        Self { direction, radius, sine: radians(angle).sin(), direction_weight: far }
+    }
+
+    /// The distance vector of a ray from the nearest point of the near ring, and of its unit
+    /// direction from that of the far ring. A ray on the axis has no nearest point: the centre
+    /// counts instead.
+    pub(super) fn residuals(&self, exit: &RayExit<f64>) -> (Vec3<f64>, Vec3<f64>) {
+        let across = |v: Vec3<f64>| v - self.direction * v.dot(self.direction);
+        let (x, v) = (across(exit.x), across(unit(exit.v)));
+        let outwards = if length(x) > MIN_LENGTH { unit(x) } else { Vec3::default() };
+        let onwards = if length(v) > MIN_LENGTH { unit(v) } else { outwards };
+        (x - outwards * self.radius, v - onwards * self.sine)
+    }
+
+    /// The derivative with respect to a velocity of a quantity that depends on its direction.
+    pub(super) fn by_velocity(v: Vec3<f64>, by_direction: Vec3<f64>) -> Vec3<f64> {
+        let d = unit(v);
+        (by_direction - d * d.dot(by_direction)) * (1.0 / length(v))
+    }
+}
+
+/// The rings of a view.
+pub(super) fn ring_target(view: &LightView) -> Option<RingTarget> {
+    let LightGoal::Ring { radius, angle, far, .. } = view.goal else { return None };
+    Some(RingTarget::new(view.source.axis()?, radius, angle, far))
 }

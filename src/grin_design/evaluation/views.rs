@@ -1,8 +1,7 @@
 //! The rays of the views of a task, with their targets and tracing setups.
 
-use super::ring::{RingTarget, ring_target};
 use super::screen::{Screen, image_screen, screen_face};
-use super::targets::{MeasuredTargets, RayTarget, trace_targets};
+use super::targets::{MeasuredTargets, RayTarget, RingTarget, ring_target, trace_targets};
 use crate::grin::{EndCondition, GrinRay, GrinSetup, IndexField, LastStep, plan_tracing};
 use crate::grin_design::GrinTaskError;
 use crate::grin_design::task::source::{RaySet, SourceRay};

@@ -8,7 +8,6 @@
 
 mod descent_settings;
 mod finalize;
-mod focal_length;
 mod langevin_units;
 mod open_apertures;
 mod plan;
@@ -100,7 +99,7 @@ impl LensLandscape {
         let mut start = limited_by_stop(lens)?;
         variables::freeze_others(&mut start);
         start.check()?;
-        let size = focal_length::reference_length(&start);
+        let size = summary::reference_length(&start);
         let asked = goal.terms.iter().find_map(|w| match w.term {
             crate::merit::Term::FocalLength(focal) => Some(focal),
             _ => None,

@@ -1,7 +1,7 @@
 //! Random lenses: `p_global` of (4.14).
 
-use super::focal_length::focal_length_of;
 use super::open_apertures::with_open_rims;
+use super::summary::focal_length_of;
 use super::variables::MAX_CURVATURE;
 use crate::lens::{Lens, Medium, Parameter, Quantity, paraxial_image_distance};
 use crate::search::{Random, SearchRules};

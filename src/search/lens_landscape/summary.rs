@@ -1,8 +1,8 @@
-//! The summary of a lens: sharpness and light of every field, and its size.
+//! The summary of a lens: sharpness and light of every field, its focal length and its size.
 
-use super::focal_length::focal_length_of;
 use crate::analysis::{Estimate, field_qualities};
 use crate::lens::{Lens, at_zoom};
+use crate::paraxial::{Beam, first_order};
 use crate::pupil::{Accuracy, RayModel, RayModelError};
 use crate::search::element;
 use serde::Serialize;
@@ -73,4 +73,16 @@ impl LensSummary {
     pub fn rays(&self) -> usize {
         self.fields.iter().map(|f| f.spot.map_or(0, |spot| spot.rays)).sum()
     }
+}
+
+/// The focal length of a lens at its first zoom position, in mm; `None` for an afocal one.
+pub(super) fn focal_length_of(lens: &Lens) -> Option<f64> {
+    let system = lens.resolve(0, lens.wavelengths[lens.primary()].um).ok()?;
+    let efl = first_order(&system, &Beam::for_lens(lens, 0)).ok()?.efl?;
+    efl.is_finite().then_some(efl)
+}
+
+/// The reference length of a lens: its focal length, or its track if it is afocal.
+pub(super) fn reference_length(lens: &Lens) -> f64 {
+    focal_length_of(lens).map_or_else(|| lens.total_track(), f64::abs).max(f64::MIN_POSITIVE)
 }

@@ -1,13 +1,13 @@
 //! Cements two neighbouring elements: their facing surfaces are replaced by one of the mean
 //! curvature, and the air gap is removed.
 
-use super::air_gap::SplitDraw;
 use super::distributions::choose;
 use super::draft::{MutationContext, MutationDraft, ReverseMove};
 use super::kind::MutationKind;
 use super::queries::{has_pickup, is_gap, is_of_medium, is_plain, is_zoomed};
 use super::record::StructureChange;
 use super::refusal::Refusal;
+use super::split::SplitDraw;
 use crate::lens::{Lens, Parameter};
 use crate::search::element::{ElementKind, elements};
 use crate::search::{Random, SearchRules};

@@ -7,7 +7,6 @@
 //! drawn or dropped, all others are mapped one to one, and semi-diameters are treated as dependent.
 
 mod add;
-mod air_gap;
 mod bend;
 mod distributions;
 mod draft;
@@ -62,7 +61,12 @@ pub struct MutatedLens {
 impl From<MutatedLens> for MutatedPoint<Arc<Lens>> {
     fn from(mutant: MutatedLens) -> Self {
         let MutatedLens { lens, kind, change, projection, log_ratio, .. } = mutant;
-        Self { point: Arc::new(lens), kind, record: MutationRecord { change, projection }, log_ratio }
+        Self {
+            point: Arc::new(lens),
+            kind,
+            record: MutationRecord { change, projection },
+            log_ratio,
+        }
     }
 }
 

@@ -1,7 +1,6 @@
 //! Splits a cemented interface into an air gap between two surfaces of similar curvature.
 
-use super::air_gap::SplitDraw;
-use super::distributions::choose;
+use super::distributions::{ShiftedExponential, choose, normal_log_density, sample_normal};
 use super::draft::{MutationContext, MutationDraft, ReverseMove};
 use super::glue;
 use super::kind::MutationKind;
@@ -65,4 +64,34 @@ fn insert_air_gap(draft: &mut MutationDraft, row: usize, cut: SplitDraw) {
     front.thickness = sense * cut.air;
     draft.origins[row].curvature = None;
     draft.inherit_variables(&[row, row + 1]);
+}
+
+/// The random numbers of a new air gap.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct SplitDraw {
+    /// Half the difference of the curvatures in front and behind.
+    pub(super) difference: f64,
+    /// The air space between them.
+    pub(super) air: f64,
+}
+
+impl SplitDraw {
+    fn air_distribution(rules: &SearchRules, scale: f64) -> ShiftedExponential {
+        ShiftedExponential::new(rules.air_center, 0.5 * scale / 50.0)
+    }
+
+    /// A tenth of that of a new element: the two parts have strong power.
+    fn curvature_deviation(scale: f64) -> f64 {
+        0.025 / scale
+    }
+
+    pub(super) fn draw(rules: &SearchRules, scale: f64, random: &mut Random) -> Self {
+        let difference = sample_normal(Self::curvature_deviation(scale), random);
+        Self { difference, air: Self::air_distribution(rules, scale).draw(random) }
+    }
+
+    pub(super) fn log_density(&self, rules: &SearchRules, scale: f64) -> Option<f64> {
+        let air = Self::air_distribution(rules, scale).log_density(self.air)?;
+        Some(air + normal_log_density(self.difference, Self::curvature_deviation(scale)))
+    }
 }

@@ -1,6 +1,6 @@
 //! The measured cost of each effect: the time of the spots of a lens with it and without it.
 
-use super::settings::AnalysisSettings;
+use super::AnalysisSettings;
 use crate::analysis;
 use crate::effects;
 use crate::effects::{Effect, EffectMeasurements, EffectOverride, EffectPlan, TracePurpose};

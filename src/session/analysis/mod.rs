@@ -5,24 +5,21 @@
 
 mod effect_timing;
 mod pupils;
-mod settings;
 
 pub use effect_timing::measure_effect_costs;
 pub use pupils::FieldPupils;
-pub use settings::AnalysisSettings;
 
 use super::clock::{Timed, now, time};
 use super::run::{LatestRequestWorker, WorkerOutput, catch_panic};
-use crate::analysis;
 use crate::analysis::{
-    AnalysisError, Distortion, Fan, FieldCurvature, Illumination, RayLayout, Spot, SpotPoints,
+    self, AnalysisError, Distortion, Fan, FieldCurvature, Illumination, RayLayout, Spot, SpotPoints,
 };
-use crate::effects;
-use crate::effects::{EffectPlan, TracePurpose};
+use crate::effects::{self, EffectOverrides, EffectPlan, TracePurpose};
 use crate::lens::{FieldPoint, Lens};
 use crate::paraxial::{FirstOrder, Seidel};
 use crate::pupil::{Accuracy, RayModel, RayModelError};
 use pupils::{field_pupils, for_each_field};
+use serde::{Deserialize, Serialize};
 use std::io;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -251,4 +248,34 @@ fn spot_with_time(
         number.milliseconds = Some(ms);
     }
     Ok(spot)
+}
+
+/// The settings of the analyses.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct AnalysisSettings {
+    /// The relative error allowed of the numbers.
+    pub tolerance: f64,
+    /// The index of the zoom position.
+    pub zoom: usize,
+    /// The number of rays of each field in the layout.
+    pub rays: usize,
+    /// The effects that are not left to the plan.
+    pub overrides: EffectOverrides,
+    /// True if the pupils are computed, because a panel shows them.
+    pub pupils: bool,
+    /// The index of the wavelength of the pupils; `None` for the primary one.
+    pub pupil_wavelength: Option<usize>,
+}
+
+impl Default for AnalysisSettings {
+    fn default() -> Self {
+        Self {
+            tolerance: 1e-3,
+            zoom: 0,
+            rays: 15,
+            overrides: EffectOverrides::default(),
+            pupils: false,
+            pupil_wavelength: None,
+        }
+    }
 }

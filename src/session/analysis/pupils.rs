@@ -1,6 +1,6 @@
 //! The pupils of all fields, each with its time.
 
-use super::settings::AnalysisSettings;
+use super::AnalysisSettings;
 use crate::analysis;
 use crate::analysis::{Estimate, FieldPupil, RimSensitivities};
 use crate::lens::FieldPoint;

@@ -1,6 +1,6 @@
 //! The open document: a design task of a gradient-index field, or a volume.
 
-use super::slice_settings::{MAX_RAYS, SliceQuantity, SliceSettings};
+use super::slice::{MAX_RAYS, SliceQuantity, SliceSettings};
 use crate::files;
 use crate::grin::field::Trilinear;
 use crate::grin::{GrinRegion, IndexField};

@@ -4,27 +4,25 @@
 //! Three threads share the work: one takes the steps of the design, one computes slices, one traces
 //! all light of the task. Nothing is open at first, and nothing is computed while no panel shows it.
 
-mod command;
 mod contour;
 mod document;
 mod engine;
 mod slice;
-mod slice_settings;
 
-pub use command::GrinCommand;
 pub use contour::Contour;
 pub use document::{DocumentSource, GrinDocument};
 pub(super) use engine::GrinExport;
 pub use engine::{GrinRun, LossSample, MAX_NODES};
-pub use slice::{IndexProfile, Slice};
-pub use slice_settings::{SliceQuantity, SliceSettings};
+pub use slice::{IndexProfile, Slice, SliceQuantity, SliceSettings};
 
 use super::clock::{Throttle, Timed, time};
 use super::run::{BackgroundRun, LatestRequestWorker, RunEvent, RunStatus, RunView};
 use crate::grin_design::{GrinField, ViewReport};
 use engine::{GrinEngine, GrinRequest};
-use slice::{SliceRequest, compute_slice};
+use serde::{Deserialize, Serialize};
+use slice::{SliceRequest, SliceSettings, compute_slice};
 use std::io;
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -223,4 +221,35 @@ fn analyze(document: &Arc<GrinDocument>, field: Arc<GrinField>) -> Result<GrinAn
     let Timed { value, ms } = time(|| task.report_views(&field));
     let value = value.map_err(|why| why.to_string())?;
     Ok(GrinAnalysis { document: Arc::clone(document), field, views: Timed { value, ms } })
+}
+
+/// A command for the gradient-index field that is open.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum GrinCommand {
+    /// Opens a task or a volume from a file in place of the open document.
+    OpenFile(PathBuf),
+    /// Opens a built-in task.
+    OpenBuiltin(String),
+    /// Starts the design of the field from its beginning.
+    Start,
+    /// Pauses the design after its current step.
+    Pause,
+    /// Resumes the design.
+    Resume,
+    /// Stops the design and evaluates the current field; the best one remains.
+    Stop,
+    /// Writes the best field: `.npz`, or `.json` with the numbers beside it in `.raw`.
+    Save {
+        /// The file.
+        path: PathBuf,
+        /// The number of nodes along a side, for a field that is a spline in one coordinate.
+        nodes: usize,
+    },
+    /// Closes the document.
+    Close,
+    /// Sets the slice to show.
+    SetSlice(SliceSettings),
+    /// Sets whether a panel shows the field; otherwise no slices and images are computed.
+    SetActive(bool),
 }

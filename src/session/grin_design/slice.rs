@@ -2,7 +2,6 @@
 
 use super::contour::{Contour, contours, level_set};
 use super::document::GrinDocument;
-use super::slice_settings::{SliceQuantity, SliceSettings};
 use crate::grin::IndexField;
 use crate::grin_design::{
     FieldDifference, FieldRepresentation, GrinField, RayPaths, SlicePlane, SpatialAxis,
@@ -10,6 +9,7 @@ use crate::grin_design::{
 use crate::math::Vec3;
 use crate::session::clock::time;
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
 /// The number of cells along the longer side of a slice.
@@ -264,6 +264,61 @@ impl Slice {
     /// The axes that point right and up.
     pub const fn axes(&self) -> [SpatialAxis; 2] {
         self.settings.plane.axis.across()
+    }
+}
+
+/// The maximum number of rays of each view in a slice.
+pub(super) const MAX_RAYS: usize = 60;
+
+/// The quantity that a slice shows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum SliceQuantity {
+    /// The refractive index.
+    Index,
+    /// The absolute value of its gradient, in 1/mm.
+    Slope,
+    /// The index minus that of the initial field.
+    Change,
+    /// The index minus that of the reference field.
+    Error,
+}
+
+impl SliceQuantity {
+    /// Every quantity.
+    pub const ALL: [Self; 4] = [Self::Index, Self::Slope, Self::Change, Self::Error];
+
+    /// The name of the quantity with its unit.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Index => "index",
+            Self::Slope => "gradient of the index, 1/mm",
+            Self::Change => "index minus the initial one",
+            Self::Error => "index minus the reference",
+        }
+    }
+
+    /// True if zero is in the middle of the scale of the quantity.
+    pub const fn is_difference(self) -> bool {
+        matches!(self, Self::Change | Self::Error)
+    }
+}
+
+/// The settings of a slice.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct SliceSettings {
+    /// The plane of the slice.
+    pub plane: SlicePlane,
+    /// The quantity that it shows.
+    pub quantity: SliceQuantity,
+    /// The maximum number of rays of each view.
+    pub rays: usize,
+}
+
+impl Default for SliceSettings {
+    fn default() -> Self {
+        let plane = SlicePlane { axis: SpatialAxis::Y, depth: 0.0 };
+        Self { plane, quantity: SliceQuantity::Index, rays: 11 }
     }
 }
 

@@ -3,15 +3,20 @@
 //!
 //! The search works on its own copy. The design changes only when its result is taken.
 
-mod history;
 mod merit_editor;
 mod terms;
 
-use egui::{ComboBox, Context, Frame, Margin, Panel as Side, RichText, ScrollArea, Ui};
+use egui::{
+    ComboBox, Context, Frame, Margin, Panel as Side, RichText, Role, ScrollArea, Ui, WidgetInfo,
+    vec2,
+};
+use egui_plot::{Line, Plot, PlotPoints};
 
-use super::{Panel, mean_pupil_area};
+use super::{Panel, decade_name, mean_pupil_area};
 use crate::optimize::DescentMethod;
-use crate::session::{Analyses, Command, OptimizationSnapshot, RunStatus, SessionView};
+use crate::session::{
+    Analyses, Command, MeritSample, OptimizationSnapshot, RunStatus, SessionView,
+};
 use crate::studio::actions::Actions;
 use crate::studio::number;
 use crate::studio::panels::widgets::{ActionButton, action_buttons, main_button};
@@ -45,7 +50,7 @@ impl Panel for OptimizerPanel {
             let frame = Frame::new().inner_margin(Margin { right: 10, ..Margin::ZERO });
             let plot = Side::bottom("merit history").frame(frame).show_separator_line(false);
             let room = (0.45 * ui.available_height()).min(HISTORY);
-            plot.exact_size(room).show(ui, |ui| history::plot(ui, search));
+            plot.exact_size(room).show(ui, |ui| history_plot(ui, search));
         }
         if view.lens.variables.is_empty() {
             ui.colored_label(ui.visuals().warn_fg_color, NO_VARIABLES);
@@ -186,4 +191,33 @@ fn mean_spot(numbers: &Analyses) -> Option<f64> {
     let lit = numbers.spots.value.iter().filter_map(|spot| spot.as_ref().ok());
     let radii: Vec<f64> = lit.map(|spot| spot.rms.value).collect();
     (!radii.is_empty()).then(|| radii.iter().sum::<f64>() / radii.len() as f64)
+}
+
+/// Plots the merit of the current and of the best lens, decades up and steps across.
+fn history_plot(ui: &mut Ui, search: &OptimizationSnapshot) {
+    let decade = |value: f64| if value > 0.0 { value.log10() } else { f64::NAN };
+    let curve = |merit: fn(&MeritSample) -> f64| -> PlotPoints<'static> {
+        let points = search.history.iter().map(|point| [point.step as f64, decade(merit(point))]);
+        points.filter(|[_, y]| y.is_finite()).collect()
+    };
+    let (current, best) = (curve(|point| point.current), curve(|point| point.best));
+    let visuals = ui.visuals();
+    let (weak, strong) = (visuals.weak_text_color(), visuals.hyperlink_color);
+    let plot = Plot::new("merit history")
+        .height(ui.available_height())
+        .allow_drag(false)
+        .allow_zoom(false)
+        .allow_scroll(false)
+        .allow_boxed_zoom(false)
+        .y_axis_min_width(40.0)
+        .grid_color(visuals.widgets.noninteractive.bg_stroke.color)
+        .grid_spacing(18.0..=120.0)
+        .set_margin_fraction(vec2(0.01, 0.08))
+        .y_axis_formatter(|mark, _| decade_name(mark.value));
+    let shown = plot.show(ui, |plot| {
+        plot.line(Line::new("current", current).color(weak).width(1.0));
+        plot.line(Line::new("best", best).color(strong).width(2.0));
+    });
+    let text = "Merit against steps";
+    shown.response.widget_info(|| WidgetInfo::labeled(Role::Image, true, text));
 }

@@ -1,7 +1,9 @@
-//! Timing of several methods in turn.
+//! The clock of the benchmarks, and the timing of several methods in turn.
 
-use super::clock::Stopwatch;
 use serde::Serialize;
+use std::hint::black_box;
+use std::ops::RangeInclusive;
+use std::time::Instant;
 
 /// The rate of a piece of work over many repetitions: the median, the slowest and the fastest.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -60,4 +62,49 @@ fn repetition_count(turn: &mut dyn FnMut(), seconds: f64) -> u32 {
     let watch = Stopwatch::start();
     turn();
     (seconds / watch.seconds().max(1e-9)).ceil().clamp(1.0, 1e9) as u32
+}
+
+/// A stopwatch that has been started.
+#[derive(Debug, Clone, Copy)]
+pub struct Stopwatch(Instant);
+
+impl Stopwatch {
+    /// Starts a stopwatch.
+    #[expect(clippy::disallowed_methods, reason = "measuring is what this floor is for")]
+    pub fn start() -> Self {
+        Self(Instant::now())
+    }
+
+    /// The seconds since the start.
+    pub fn seconds(self) -> f64 {
+        self.0.elapsed().as_secs_f64()
+    }
+}
+
+/// Runs `work`; returns its result and the milliseconds that it took.
+pub fn time_ms<T>(work: impl FnOnce() -> T) -> (T, f64) {
+    let watch = Stopwatch::start();
+    let result = work();
+    (result, 1e3 * watch.seconds())
+}
+
+/// A result is timed repeatedly up to this total time, in milliseconds.
+const LONG_ENOUGH: f64 = 5.0;
+
+/// Runs `work` repeatedly for a few milliseconds, but not less and not more often than `counts`
+/// says; returns its last result and the median of its times, in milliseconds.
+pub(super) fn time_median<T>(
+    counts: RangeInclusive<usize>,
+    mut work: impl FnMut() -> T,
+) -> (T, f64) {
+    let (mut result, first) = time_ms(&mut work);
+    let mut times = vec![first];
+    let is_short = |times: &[f64]| times.iter().sum::<f64>() < LONG_ENOUGH;
+    while times.len() < *counts.start() || (times.len() < *counts.end() && is_short(&times)) {
+        let (again, ms) = time_ms(|| black_box(work()));
+        result = again;
+        times.push(ms);
+    }
+    times.sort_by(f64::total_cmp);
+    (result, times[times.len() / 2])
 }
