@@ -86,13 +86,13 @@ fn measure(nodes: usize, fineness: f64, side: usize) -> ExperimentResult<Adjoint
     let taped = tracer.tape_gradient(&rays, &exits, &seeds);
     let norm = |v: &mut dyn Iterator<Item = f64>| v.map(|v| v * v).sum::<f64>().sqrt();
     let off = norm(&mut adjoint.iter().zip(&taped.parameters).map(|(a, b)| a - b));
-    let [kept, gradients] = tracer.gradient_bytes(rays.len());
+    let [ray_bytes, gradients] = tracer.gradient_bytes(rays.len());
     let steps: f64 = exits.iter().map(|exit| f64::from(exit.steps)).sum();
     Ok(AdjointMemoryRow {
         nodes,
         steps: steps / rays.len() as f64,
         tape: taped.bytes,
-        rays: kept,
+        rays: ray_bytes,
         gradients,
         difference: off / norm(&mut adjoint.iter().copied()),
     })

@@ -132,19 +132,19 @@ impl StopObjective {
     fn at(radius: f64, order: usize) -> ExperimentResult<Self> {
         let model = model(radius)?;
         let region = Region::new(model.launch(AXIS, 0).map_err(ExperimentError::from_error)?);
-        let lit = region.trace_pupil(order);
+        let nodes = region.trace_pupil(order);
         let cost = QuadraticIntegrand::spread([0.0; 2]);
         let failed =
             || ExperimentError::Failed(format!("the pupil of a stop of {radius} mm has no edge"));
-        let unbiased = lit.boundary_derivative(&cost).ok_or_else(failed)?;
-        let biased = lit.biased_derivative(&cost);
+        let unbiased = nodes.boundary_derivative(&cost).ok_or_else(failed)?;
+        let biased = nodes.biased_derivative(&cost);
         let by_radius = |by: &crate::trace::SystemGradient<f64>| by.surfaces[STOP].semi_diameter;
         Ok(Self {
-            blur: lit.moments.spread,
-            area: lit.moments.area,
+            blur: nodes.moments.spread,
+            area: nodes.moments.area,
             unbiased: by_radius(&unbiased),
             biased: by_radius(&biased),
-            rays: region.rays + lit.rays_traced,
+            rays: region.rays + nodes.rays_traced,
         })
     }
 

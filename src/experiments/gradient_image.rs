@@ -208,8 +208,8 @@ impl SensorView {
         let nodes = region.pattern_nodes(PupilPattern::Sobol { count: SCATTERED, seed: 1 });
         let mut rays = region.rays + lit.rays_traced + warp.rays + nodes.points.len();
         let mut difference = [0.0; 2];
-        for (i, benches) in self.perturbed.iter().enumerate() {
-            let ends = benches.each_ref().map(|model| follow_pupil(&region.kind, anchor, model));
+        for (i, models) in self.perturbed.iter().enumerate() {
+            let ends = models.each_ref().map(|model| follow_pupil(&region.kind, anchor, model));
             rays += ends[0].rays_traced + ends[1].rays_traced;
             let [low, high] = ends.map(|lit| lit.integral(&self.chart));
             difference[i] = (high - low) / (2.0 * STEPS[i]);

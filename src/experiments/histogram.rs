@@ -91,14 +91,17 @@ pub(super) fn total_variation(a: &[f64], b: &[f64]) -> f64 {
 pub(super) fn deviation_in_sigmas(chains: &[Vec<f64>], shares: &[f64]) -> f64 {
     // All bins except one, which follows from the sum, with those of small probability merged.
     let large: Vec<usize> = (0..shares.len()).filter(|bin| shares[*bin] >= SMALL).collect();
-    let kept = if large.len() == shares.len() { &large[1..] } else { &large };
+    let compared = if large.len() == shares.len() { &large[1..] } else { &large };
     let excess = |chain: &Vec<f64>| {
         let weight: f64 = chain.iter().sum();
-        DVector::from_iterator(kept.len(), kept.iter().map(|i| chain[*i] - shares[*i] * weight))
+        DVector::from_iterator(
+            compared.len(),
+            compared.iter().map(|i| chain[*i] - shares[*i] * weight),
+        )
     };
     let excesses: Vec<DVector<f64>> = chains.iter().map(excess).collect();
     let n = chains.len() as f64;
-    let k = kept.len();
+    let k = compared.len();
     let mean = excesses.iter().sum::<DVector<f64>>() / n;
     let spread = excesses.iter().map(|r| (r - &mean) * (r - &mean).transpose());
     let mut covariance = spread.sum::<DMatrix<f64>>() / (n - 1.0);

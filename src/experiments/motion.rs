@@ -86,16 +86,16 @@ impl Exposure {
         })
     }
 
-    /// The contrast at a frequency in line pairs per mm of a target whose image moves by `way` in
-    /// mm.
-    fn contrast(&self, frequency: f64, way: f64) -> f64 {
+    /// The contrast at a frequency in line pairs per mm of a target whose image moves by `distance`,
+    /// in mm.
+    fn contrast(&self, frequency: f64, distance: f64) -> f64 {
         let (mut sum, mut light) = (0.0, 0.0);
         for [x, weight] in &self.spot {
             // The spot is symmetric.
             sum += weight * (2.0 * PI * frequency * x).cos();
             light += weight;
         }
-        let phase = PI * frequency * way;
+        let phase = PI * frequency * distance;
         let smear = if phase == 0.0 { 1.0 } else { phase.sin() / phase };
         (sum / light * smear).abs()
     }
@@ -107,13 +107,13 @@ fn spot(lens: &Lens, rays: &mut usize) -> ExperimentResult<Vec<[f64; 2]>> {
         model.launch(model.fields[0], model.primary).map_err(ExperimentError::from_error)?;
     let region = Region::new(launch);
     // On the axis all azimuths are equivalent: the nodes of one are rotated through half a turn.
-    let lit = region.trace_pupil(ORDER);
-    *rays += region.rays + lit.rays_traced;
+    let nodes = region.trace_pupil(ORDER);
+    *rays += region.rays + nodes.rays_traced;
     let turn = |i: usize| {
-        let radius = lit.landed.sink.x[i].hypot(lit.landed.sink.y[i]);
+        let radius = nodes.landed.sink.x[i].hypot(nodes.landed.sink.y[i]);
         (0..AZIMUTHS).map(move |k| radius * (PI * (k as f64 + 0.5) / AZIMUTHS as f64).cos())
     };
-    let places = lit.landed.arrivals().flat_map(|(i, weight)| turn(i).map(move |x| [x, weight]));
+    let places = nodes.landed.arrivals().flat_map(|(i, weight)| turn(i).map(move |x| [x, weight]));
     Ok(places.collect())
 }
 

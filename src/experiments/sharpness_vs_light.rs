@@ -49,7 +49,7 @@ pub(super) struct WeightSweep {
     /// The treatment of the pupil edge in derivatives.
     pub(super) pupil: PupilEdge,
     /// The factors by which a semi-diameter may shrink and grow.
-    pub(super) rims: [f64; 2],
+    pub(super) semi_diameter_factors: [f64; 2],
 }
 
 /// The largest weight in mm²: large enough to retain the marginal rays of a lens that is not sharp
@@ -63,7 +63,7 @@ impl WeightSweep {
         let last = (weights - 1).max(1) as f64;
         let beta = |i: usize| LARGEST * 10f64.powf(-decades * i as f64 / last);
         let betas = (0..weights).map(beta).collect();
-        Self { betas, steps, pupil: PupilEdge::Moving, rims: [0.25, 1.3] }
+        Self { betas, steps, pupil: PupilEdge::Moving, semi_diameter_factors: [0.25, 1.3] }
     }
 
     /// The usual optimization with biased derivatives: all weights are equivalent, so there is only
@@ -94,8 +94,11 @@ pub(super) fn run_sweep(
     part: ProgressSpan<'_>,
     progress: &mut ProgressFn<'_>,
 ) -> ExperimentResult<Vec<ParetoPoint>> {
-    let settings =
-        ParetoSettings { rims: plan.rims, pupil: plan.pupil, ..ParetoSettings::default() };
+    let settings = ParetoSettings {
+        semi_diameter_factors: plan.semi_diameter_factors,
+        pupil: plan.pupil,
+        ..ParetoSettings::default()
+    };
     let start = ParetoSweep::new(lens, &settings).map_err(ExperimentError::from_error)?.start;
     let goal = weighted_sum_goal(&start.lens, start.light, plan.pupil)
         .map_err(ExperimentError::from_error)?;

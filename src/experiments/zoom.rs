@@ -38,7 +38,7 @@ fn run(effort: Effort, progress: &mut ProgressFn<'_>) -> ExperimentResult {
         let zoom = monochromatic(lens(file)?);
         let weights = effort.select(10, 4);
         let plan = WeightSweep {
-            rims: [1.0, 1.0],
+            semi_diameter_factors: [1.0, 1.0],
             ..WeightSweep::new(4.0, weights, effort.select(800, 60))
         };
         let [from, to] = [i, i + 1].map(|part| part as f64 / count as f64);
@@ -118,14 +118,14 @@ fn parabola([a, b, c]: [f64; 3], t: f64) -> f64 {
 /// zoom.
 fn lens_between(lens: &Lens, place: f64) -> ExperimentResult<Lens> {
     let positions = [0, 1, 2].map(|zoom| at_zoom(lens, zoom));
-    let benches = [0, 1, 2].map(|zoom| RayModel::from_lens(&positions[zoom], 0));
+    let models = [0, 1, 2].map(|zoom| RayModel::from_lens(&positions[zoom], 0));
     let mut single = positions[0].clone();
     for i in 0..single.surfaces.len() {
         let gaps = [0, 1, 2].map(|zoom| positions[zoom].surfaces[i].thickness);
         single.surfaces[i].thickness = parabola(gaps, place);
     }
     let (mut behind, mut radii, mut focal) = ([0.0; 3], [0.0; 3], [0.0; 3]);
-    for (zoom, model) in benches.into_iter().enumerate() {
+    for (zoom, model) in models.into_iter().enumerate() {
         let model = model.map_err(ExperimentError::from_error)?;
         let system = &model.channels[model.primary].system;
         let last = system.surfaces.len() - 2;

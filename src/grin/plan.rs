@@ -60,11 +60,11 @@ pub fn plan_tracing<F: IndexField<f64> + ?Sized>(
 ) -> Result<TracingPlan, GrinSetupError> {
     let stride = rays.len().div_ceil(SAMPLE).max(1);
     let sample: Vec<GrinRay<f64>> = rays.iter().step_by(stride).copied().collect();
-    let way = sample.iter().map(|ray| straight_path(region, ray)).fold(0.0, f64::max);
-    let way = if way > 0.0 { way } else { 1.0 };
+    let path = sample.iter().map(|ray| straight_path(region, ray)).fold(0.0, f64::max);
+    let path = if path > 0.0 { path } else { 1.0 };
     let mut reasons = Vec::new();
     let (integrator, last) = choose_integrator(field, &mut reasons);
-    let longest = longest_step(field, integrator, &sample, way, &mut reasons);
+    let longest = longest_step(field, integrator, &sample, path, &mut reasons);
     let setup = |step: f64| GrinSetup {
         integrator,
         step,
@@ -72,13 +72,13 @@ pub fn plan_tracing<F: IndexField<f64> + ?Sized>(
         end: EndCondition::Boundary {
             region: region.clone(),
             last,
-            limit: (MAX_RELATIVE_LENGTH * way / step).clamp(64.0, f64::from(u32::MAX)) as u32,
+            limit: (MAX_RELATIVE_LENGTH * path / step).clamp(64.0, f64::from(u32::MAX)) as u32,
         },
         screen: None,
     };
     // Where the force jumps, the error does not decrease further once a voxel has several steps.
     let finest = if field.resolution().continuous_force {
-        way / MAX_STEPS
+        path / MAX_STEPS
     } else {
         longest / MAX_STEPS_PER_VOXEL
     };
@@ -87,7 +87,7 @@ pub fn plan_tracing<F: IndexField<f64> + ?Sized>(
     let (mut least, mut stalled) = (f64::INFINITY, 0);
     for _ in 0..TRIES {
         error = exit_change(field, &setup(step), &setup(0.5 * step), &sample)?;
-        stalled = if error < (0.5 * least).max(CHAOTIC_ERROR * way) { 0 } else { stalled + 1 };
+        stalled = if error < (0.5 * least).max(CHAOTIC_ERROR * path) { 0 } else { stalled + 1 };
         least = least.min(error);
         if error <= tolerance || step <= finest || stalled == MAX_STALLED {
             break;
@@ -130,10 +130,10 @@ fn longest_step<F: IndexField<f64> + ?Sized>(
     field: &F,
     integrator: Integrator,
     rays: &[GrinRay<f64>],
-    way: f64,
+    path: f64,
     reasons: &mut Vec<String>,
 ) -> f64 {
-    let free = way / if integrator.order() > 2 { 4.0 } else { 32.0 };
+    let free = path / if integrator.order() > 2 { 4.0 } else { 32.0 };
     let Some(voxel) = field.resolution().voxel else { return free };
     // The ray moves by η times the step.
     let index = rays.iter().map(|ray| field.sample(ray.x).index).fold(1.0, f64::max);

@@ -243,8 +243,8 @@ fn distance<R: Real>(face: &Face<R>, p: Vec3<R>) -> R {
     if length > R::ZERO { face.level(p) / length } else { face.level(p) }
 }
 
-/// The distance that rounding may cause at a point reached along `way`.
-pub(super) fn rounding_error<R: Real>(at: Vec3<R>, way: Vec3<R>) -> R {
-    let size = at.dot(at).sqrt() + way.dot(way).sqrt();
+/// The distance that rounding may cause at a point reached along `displacement`.
+pub(super) fn rounding_error<R: Real>(at: Vec3<R>, displacement: Vec3<R>) -> R {
+    let size = at.dot(at).sqrt() + displacement.dot(displacement).sqrt();
     R::from_f64(1e3 * R::EPSILON) * size
 }

@@ -19,11 +19,11 @@ pub fn added_glass(lens: &Lens, own: &Lens) -> Vec<usize> {
     let size = own.total_track();
     let costs = costs(&rows, &old, size);
     let (mut i, mut j) = (rows.len(), old.len());
-    let mut fresh = Vec::new();
+    let mut added = Vec::new();
     while i > 0 {
         if costs[i][j] == costs[i - 1][j] + NEW {
             i -= 1;
-            fresh.push(rows[i].surface);
+            added.push(rows[i].surface);
         } else if j > 0 && costs[i][j] == costs[i][j - 1] + NEW {
             j -= 1;
         } else {
@@ -31,8 +31,8 @@ pub fn added_glass(lens: &Lens, own: &Lens) -> Vec<usize> {
             j = j.saturating_sub(1);
         }
     }
-    fresh.reverse();
-    fresh
+    added.reverse();
+    added
 }
 
 /// An element: the glass after a surface.
@@ -122,8 +122,8 @@ mod tests {
             (vec![("A", 0.02), ("C", 0.05), ("B", 0.01), ("A", -0.03)], vec![2]),
             (vec![("A", 0.3), ("A", 0.02), ("B", 0.01), ("D", 0.0)], vec![0, 6]),
         ];
-        for (glasses, fresh) in cases {
-            assert_eq!(added_glass(&lens(&glasses), &own), fresh, "{glasses:?}");
+        for (glasses, added) in cases {
+            assert_eq!(added_glass(&lens(&glasses), &own), added, "{glasses:?}");
         }
         assert_eq!(added_glass(&lens(&[]), &own), [0; 0]);
         assert_eq!(added_glass(&own, &lens(&[])), [0, 2, 4]);

@@ -527,9 +527,9 @@ impl<'a> GradientScene<'a> {
         let rays: Rays<f64> = nodes.points.iter().filter_map(|p| region.launch.ray(*p)).collect();
         let tracer = &self.model.channels[0].tracer;
         let sampling = WarpSampling { count: COST_SAMPLES, seed: 1 };
-        let fresh = || self.launch().map(Region::new);
+        let new_region = || self.launch().map(Region::new);
         let along = |differentiated: bool| {
-            let region = fresh()?;
+            let region = new_region()?;
             let lit = region.trace_pupil(COST_ORDER);
             if differentiated {
                 lit.boundary_derivative(&spot)
@@ -542,7 +542,7 @@ impl<'a> GradientScene<'a> {
             Box::new(|| drop(black_box(along(false)))),
             Box::new(|| drop(black_box(along(true)))),
             Box::new(|| {
-                drop(black_box(fresh().map(|r| r.difference_derivative(&spot, COST_ORDER))));
+                drop(black_box(new_region().map(|r| r.difference_derivative(&spot, COST_ORDER))));
             }),
             Box::new(|| tracer.trace_batch(&rays, &mut points)),
             Box::new(|| drop(black_box(region.warp_derivative(&spot, sampling)))),

@@ -169,7 +169,7 @@ pub fn measure_grin(
     let scene = pool.install(|| GrinBenchmarkScene::new(task))?;
     let all = 4 + COSTS.len() + MEMORY.len();
     let mut done = 0;
-    let mut tell = || {
+    let mut report_part = || {
         done += 1;
         report(done, all);
     };
@@ -180,20 +180,20 @@ pub fn measure_grin(
         costs: vec![],
         memory: vec![],
     };
-    tell();
+    report_part();
     for made in
         [BenchmarkField::Exact, BenchmarkField::Tricubic(NODES), BenchmarkField::Trilinear(NODES)]
     {
         measured.fields.push(pool.install(|| scene.curves(made))?);
-        tell();
+        report_part();
     }
     for (made, precision) in COSTS {
         measured.costs.push(pool.install(|| scene.cost(made, precision))?);
-        tell();
+        report_part();
     }
     for (nodes, per_voxel) in MEMORY {
         measured.memory.push(pool.install(|| scene.memory(nodes, per_voxel))?);
-        tell();
+        report_part();
     }
     Ok(measured)
 }

@@ -101,7 +101,8 @@ pub struct SpotCurves {
     /// The reference RMS radius of the clipped pupil, in mm; `None` if no light gets through.
     pub rms_clipped: Option<f64>,
     /// The fraction of the disc that transmits light.
-    pub lit: f64,
+    #[serde(rename = "lit")]
+    pub transmitted: f64,
     /// The points of the curves.
     pub rows: Vec<SpotRow>,
 }
@@ -144,7 +145,8 @@ pub fn measure_spot_curves(
     field: FieldPoint,
     mut report: impl FnMut(usize, usize),
 ) -> Result<SpotCurves, SpotCurvesError> {
-    let mut curves = SpotCurves { rms_clear: 0.0, rms_clipped: None, lit: 1.0, rows: Vec::new() };
+    let mut curves =
+        SpotCurves { rms_clear: 0.0, rms_clipped: None, transmitted: 1.0, rows: Vec::new() };
     let (mut done, all) = (0, 4 * PupilSampling::ALL.len());
     for pupil in [PupilClipping::Clear, PupilClipping::Clipped] {
         let model = ray_model(lens, zoom, pupil)?;
@@ -159,7 +161,7 @@ pub fn measure_spot_curves(
             PupilClipping::Clear => curves.rms_clear = rms,
             PupilClipping::Clipped => {
                 curves.rms_clipped = Some(rms);
-                curves.lit = area / std::f64::consts::PI;
+                curves.transmitted = area / std::f64::consts::PI;
             }
         }
         for precision in [Precision::F32, Precision::F64] {

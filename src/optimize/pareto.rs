@@ -38,7 +38,8 @@ pub struct ParetoSettings {
     /// The relative error allowed for the radius of each spot during the sweep.
     pub tolerance: f64,
     /// The factors by which a semi-diameter may shrink and grow.
-    pub rims: [f64; 2],
+    #[serde(rename = "rims")]
+    pub semi_diameter_factors: [f64; 2],
 }
 
 impl Default for ParetoSettings {
@@ -50,7 +51,7 @@ impl Default for ParetoSettings {
             blur: [4e-5, 3.5e-3],
             pupil: PupilEdge::Moving,
             tolerance: 1e-3,
-            rims: [0.25, 1.3],
+            semi_diameter_factors: [0.25, 1.3],
         }
     }
 }
@@ -249,7 +250,7 @@ impl ParetoSweep {
     /// A lens without a merit, or a setting out of its range.
     pub fn new(lens: &Lens, settings: &ParetoSettings) -> Result<Self, ParetoError> {
         settings.check()?;
-        let lens = with_sweep_variables(&limited_by_stop(lens)?, settings.rims);
+        let lens = with_sweep_variables(&limited_by_stop(lens)?, settings.semi_diameter_factors);
         lens.check()?;
         let start = ParetoPoint::evaluate(&lens, None, EVALUATION_TOLERANCE)?;
         let goal = weighted_sum_goal(&lens, start.light, settings.pupil)?;
@@ -323,7 +324,7 @@ impl ParetoSettings {
         let refuse =
             |what, found: String, expected| Err(ParetoError::Settings { what, found, expected });
         let [low, high] = self.blur;
-        let [narrow, wide] = self.rims;
+        let [narrow, wide] = self.semi_diameter_factors;
         if self.points == 0 || self.points > 1000 {
             return refuse("the number of points", self.points.to_string(), "1 to 1000");
         }
@@ -334,7 +335,11 @@ impl ParetoSettings {
             return refuse("the blur", format!("{low} to {high}"), "0 < smallest <= largest < 1");
         }
         if !(narrow > 0.0 && narrow <= 1.0 && wide >= 1.0 && wide.is_finite()) {
-            return refuse("the range of rims", format!("{narrow} to {wide}"), "0 < a <= 1 <= b");
+            return refuse(
+                "the range of semi-diameters",
+                format!("{narrow} to {wide}"),
+                "0 < a <= 1 <= b",
+            );
         }
         if !(self.tolerance > 0.0 && self.tolerance < 1.0) {
             return refuse("the tolerance", self.tolerance.to_string(), "between 0 and 1");

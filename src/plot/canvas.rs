@@ -87,19 +87,19 @@ impl Canvas {
 
     /// Draws a polyline three pixels wide.
     pub fn curve(&mut self, points: &[[f64; 2]], color: Color, stroke: Stroke) {
-        let mut way = 0.0;
+        let mut arc = 0.0;
         for pair in points.windows(2) {
             let (from, to) = (pair[0], pair[1]);
             let length = length(from, to);
             let steps = length.ceil().max(1.0);
             for i in 0..=steps as i32 {
                 let t = f64::from(i) / steps;
-                let drawn = stroke == Stroke::Solid || (way + t * length) % DASH_PERIOD < DASH;
+                let drawn = stroke == Stroke::Solid || (arc + t * length) % DASH_PERIOD < DASH;
                 if drawn {
                     self.square([0, 1].map(|k| from[k] + t * (to[k] - from[k])), 1, color);
                 }
             }
-            way += length;
+            arc += length;
         }
     }
 

@@ -22,12 +22,12 @@ pub enum SearchError {
         loss: f64,
     },
     /// A generation that does not exist or is no longer remembered.
-    #[error("generation {number} is not remembered, of {born} so far")]
+    #[error("generation {number} is not remembered, of {total} so far")]
     UnknownGeneration {
         /// The requested number.
         number: u64,
         /// The number of generations so far.
-        born: u64,
+        total: u64,
     },
     /// A checkpoint cannot be written or read.
     #[error(transparent)]

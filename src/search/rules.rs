@@ -19,7 +19,7 @@ pub struct SearchRules {
     /// The number of surfaces at the front and at the rear that mutations leave unchanged. They are
     /// counted from the ends, so that they stay the same while elements are added and removed
     /// between them.
-    pub kept: [usize; 2],
+    pub fixed_ends: [usize; 2],
     /// Relative frequencies of the kinds of mutation; a kind that is not listed has weight 1, and
     /// weight 0 excludes it.
     pub weights: Vec<(MutationKind, f64)>,
@@ -49,7 +49,7 @@ impl Default for SearchRules {
         Self {
             elements: [2, 8],
             glasses: Vec::new(),
-            kept: [0, 0],
+            fixed_ends: [0, 0],
             weights: Vec::new(),
             projection: true,
             glass_center: [1.0, 30.0],
@@ -89,13 +89,13 @@ impl SearchRules {
     /// `rows` surfaces.
     #[must_use]
     pub fn restricted_to(mut self, first: usize, last: usize, rows: usize) -> Self {
-        self.kept = [first, rows.saturating_sub(last + 1)];
+        self.fixed_ends = [first, rows.saturating_sub(last + 1)];
         self
     }
 
     /// True if mutations may change a surface of a lens with `rows` surfaces.
     pub fn may_change(&self, surface: usize, rows: usize) -> bool {
-        surface >= self.kept[0] && surface + self.kept[1] < rows
+        surface >= self.fixed_ends[0] && surface + self.fixed_ends[1] < rows
     }
 
     /// The same rules with the default range of elements widened to include `pieces`; a range that
@@ -132,12 +132,12 @@ impl SearchRules {
         Ok(Self { glasses, ..self.clone() })
     }
 
-    /// Checks that a lens with `rows` surfaces has as many as `kept` names.
+    /// Checks that a lens with `rows` surfaces has as many as stay fixed at its ends.
     ///
     /// # Errors
     /// More surfaces are named than there are.
     pub fn check_fixed_ends(&self, rows: usize) -> Result<(), RuleError> {
-        let [front, rear] = self.kept;
+        let [front, rear] = self.fixed_ends;
         if front <= rows && rear <= rows - front {
             return Ok(());
         }

@@ -113,15 +113,15 @@ fn open_with(
 }
 
 fn options(renderer: Renderer, memory: Persistence) -> NativeOptions {
-    let kept = memory == Persistence::Enabled;
+    let persists = memory == Persistence::Enabled;
     NativeOptions {
         viewport: egui::ViewportBuilder::default()
             .with_title("Aplanat")
-            .with_app_id(if kept { "aplanat" } else { "aplanat-measure" })
+            .with_app_id(if persists { "aplanat" } else { "aplanat-measure" })
             .with_inner_size([1280.0, 800.0])
             .with_min_inner_size([480.0, 320.0]),
         renderer,
-        persist_window: kept,
+        persist_window: persists,
         dithering: false,
         wgpu_options: WgpuConfiguration {
             wgpu_setup: wgpu_setup(),

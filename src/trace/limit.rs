@@ -260,14 +260,14 @@ impl<R: Real> WarpTracer<R> {
         let mut limits = self.limits.iter().zip(&mut workspace.jets.limits).peekable();
         for (i, interface) in self.forward.interfaces.iter().enumerate() {
             // Local, so that the compiler knows that it does not overlap the block.
-            let mut kept = [[Jet::ZERO; BLOCK]; 2];
+            let mut crossings = [[Jet::ZERO; BLOCK]; 2];
             block.cross_with(
                 interface,
                 i as u32,
                 #[inline(always)]
-                |j, met| (kept[0][j], kept[1][j]) = (met.s, met.a),
+                |j, met| (crossings[0][j], crossings[1][j]) = (met.s, met.a),
             );
-            let [distances, slants] = kept;
+            let [distances, slants] = crossings;
             for (to, from) in workspace.distances[i].iter_mut().zip(&distances) {
                 *to = first_order(*from);
             }

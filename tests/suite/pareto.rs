@@ -83,7 +83,7 @@ fn settings_without_meaning_and_lenses_without_light_are_refused() {
         ParetoSettings { steps: 0, ..ParetoSettings::default() },
         ParetoSettings { blur: [0.0, 1e-3], ..ParetoSettings::default() },
         ParetoSettings { blur: [f64::NAN, 1e-3], ..ParetoSettings::default() },
-        ParetoSettings { rims: [1.1, 1.3], ..ParetoSettings::default() },
+        ParetoSettings { semi_diameter_factors: [1.1, 1.3], ..ParetoSettings::default() },
         ParetoSettings { tolerance: 0.0, ..ParetoSettings::default() },
     ] {
         let refused = ParetoSweep::new(&lens(), &settings).unwrap_err();

@@ -602,8 +602,8 @@ fn a_beam_limited_by_the_stop_is_as_wide_as_before_in_one_step() {
     lens.aperture = Aperture::FNumber(5.6);
     let mut session = session(lens);
     let entrance = |session: &Session| {
-        let bench = RayModel::from_lens(session.lens(), 0).unwrap();
-        bench.first_order.f_number.unwrap()
+        let model = RayModel::from_lens(session.lens(), 0).unwrap();
+        model.first_order.f_number.unwrap()
     };
     let before = entrance(&session);
     session.apply(Command::LimitByStop);
@@ -618,8 +618,8 @@ fn what_rims_do_is_computed_with_the_pupils() {
     let settings = AnalysisSettings { pupils: true, ..AnalysisSettings::default() };
     let numbers = analyze(&double_gauss(), &settings).unwrap();
     let pupils = numbers.pupils.unwrap().value;
-    assert_eq!(pupils.rims.value.len(), pupils.fields.len());
-    let all = pupils.all_rims.unwrap();
+    assert_eq!(pupils.sensitivities.value.len(), pupils.fields.len());
+    let all = pupils.mean_sensitivities.unwrap();
     let felt: Vec<usize> =
         (0..all.surfaces.len()).filter(|i| all.surfaces[*i].is_significant()).collect();
     assert_eq!(felt, [0, 5, 10], "front, stop and rear");
@@ -666,7 +666,7 @@ fn an_effect_that_is_switched_off_is_not_computed() {
     wait(&mut session, "the numbers", |view, _| view.is_current());
     let results = session.results().unwrap();
     let numbers = results.analyses.as_ref().unwrap();
-    assert_eq!((numbers.bench.value.channels.len(), numbers.spot_points.value.len()), (1, 3));
+    assert_eq!((numbers.ray_model.value.channels.len(), numbers.spot_points.value.len()), (1, 3));
     assert_eq!(numbers.layout.value.fates.clipped, 0);
     assert!(!session.view().dirty && session.view().undo.is_none(), "the design is what it was");
     session.apply(Command::SetEffect(Effect::Clipping, EffectOverride::Auto));
@@ -674,7 +674,7 @@ fn an_effect_that_is_switched_off_is_not_computed() {
     wait(&mut session, "the numbers", |view, _| view.is_current());
     let results = session.results().unwrap();
     let numbers = results.analyses.as_ref().unwrap();
-    assert!(numbers.bench.value.channels.len() == 3 && numbers.layout.value.fates.clipped > 0);
+    assert!(numbers.ray_model.value.channels.len() == 3 && numbers.layout.value.fates.clipped > 0);
 }
 
 #[test]
@@ -705,7 +705,7 @@ fn every_number_of_every_library_lens_is_there_in_time() {
              fans {:.2}, illumination {:.2}, distortion {:.2}, curvature {:.2}",
             bundled.name,
             numbers.plan.ms,
-            numbers.bench.ms,
+            numbers.ray_model.ms,
             numbers.layout.ms,
             numbers.spot_points.ms,
             numbers.spots.ms,

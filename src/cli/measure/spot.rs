@@ -73,7 +73,9 @@ fn draw_curves(curves: &SpotCurves, title: &str) -> Result<Vec<u8>, ImageError> 
     let chart = |pupil| {
         let name = match pupil {
             PupilClipping::Clear => "clear pupil".to_owned(),
-            PupilClipping::Clipped => format!("clipped pupil, {:.0} % lit", 100.0 * curves.lit),
+            PupilClipping::Clipped => {
+                format!("clipped pupil, {:.0} % lit", 100.0 * curves.transmitted)
+            }
         };
         let curve = |(method, color), (precision, stroke)| {
             let mine = |row: &&SpotRow| {
@@ -114,7 +116,7 @@ impl Display for MeasureSpotReport {
             let (title, rms) = match pupil {
                 PupilClipping::Clear => ("clear pupil".to_owned(), Some(curves.rms_clear)),
                 PupilClipping::Clipped => {
-                    let lit = 100.0 * curves.lit;
+                    let lit = 100.0 * curves.transmitted;
                     (format!("clipped pupil, {lit:.1} % of the disc lit"), curves.rms_clipped)
                 }
             };

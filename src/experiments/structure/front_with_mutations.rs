@@ -227,8 +227,9 @@ fn plan(start: &ParetoPoint, weight: f64, gradients: u64) -> ExperimentResult<Se
     let goal = weighted_sum_goal(&start.lens, start.light, PupilEdge::Moving);
     let mut goal = goal.map_err(ExperimentError::from_error)?;
     goal.terms.push(WeightedTerm { term: Term::Throughput, weight });
-    let rims = start.lens.surfaces.iter().filter_map(|row| row.semi_diameter);
-    let widest = ParetoSettings::default().rims[1] * rims.fold(0.0, f64::max);
+    let semi_diameters = start.lens.surfaces.iter().filter_map(|row| row.semi_diameter);
+    let widest =
+        ParetoSettings::default().semi_diameter_factors[1] * semi_diameters.fold(0.0, f64::max);
     let rules = SearchRules { semi_diameter: Some(widest), ..rules() };
     let default = SearchPlan::default();
     let settings = crate::search::SearchSettings {

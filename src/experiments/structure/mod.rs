@@ -59,18 +59,18 @@ fn rules() -> SearchRules {
 fn plan(start: &Lens, rules: SearchRules, gradients: u64) -> ExperimentResult<SearchPlan> {
     let usual = Goal::with_limits(start, &rules.goal_limits(), None, 1.0)
         .map_err(ExperimentError::from_error)?;
-    let kept = relax_limits(start, &usual).map_err(ExperimentError::from_error)?;
+    let relaxed = relax_limits(start, &usual).map_err(ExperimentError::from_error)?;
     let default = SearchPlan::default();
     let settings = SearchSettings { chains: 1, gradients: Some(gradients), ..default.settings };
-    Ok(SearchPlan { goal: Some(kept), rules, settings, ..default })
+    Ok(SearchPlan { goal: Some(relaxed), rules, settings, ..default })
 }
 
 /// The goal with each limit of a thickness, an edge or a steepness relaxed to the value of the lens
 /// if that violates it.
 fn relax_limits(lens: &Lens, goal: &Goal) -> Result<Goal, MeritError> {
     let found = constraint_margins(lens, goal.terms.iter().map(|w| w.term))?;
-    let loosened = |w: &WeightedTerm| WeightedTerm { term: relax_term(w.term, &found), ..*w };
-    Ok(Goal { terms: goal.terms.iter().map(loosened).collect(), ..goal.clone() })
+    let relaxed_term = |w: &WeightedTerm| WeightedTerm { term: relax_term(w.term, &found), ..*w };
+    Ok(Goal { terms: goal.terms.iter().map(relaxed_term).collect(), ..goal.clone() })
 }
 
 fn relax_term(term: Term, found: &[ConstraintMargin]) -> Term {
@@ -97,14 +97,14 @@ mod tests {
         for subject in STUDY_LENSES {
             let lens = at_heights(subject.file).unwrap();
             let usual = Goal::with_limits(&lens, &rules().goal_limits(), None, 1.0).unwrap();
-            let kept = relax_limits(&lens, &usual).unwrap();
+            let relaxed = relax_limits(&lens, &usual).unwrap();
             let terms = |goal: &Goal| goal.terms.iter().map(|w| w.term).collect::<Vec<_>>();
-            let room = |goal: &Goal| {
+            let slack = |goal: &Goal| {
                 let found = constraint_margins(&lens, terms(goal).into_iter()).unwrap();
                 found.iter().map(ConstraintMargin::slack).fold(f64::INFINITY, f64::min)
             };
-            assert!(room(&kept) >= 0.0, "{}: {}", subject.name, room(&kept));
-            assert_eq!(room(&usual) >= 0.0, terms(&usual) == terms(&kept), "{}", subject.name);
+            assert!(slack(&relaxed) >= 0.0, "{}: {}", subject.name, slack(&relaxed));
+            assert_eq!(slack(&usual) >= 0.0, terms(&usual) == terms(&relaxed), "{}", subject.name);
         }
     }
 }

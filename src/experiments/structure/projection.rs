@@ -160,11 +160,11 @@ impl ProjectionComparison {
     fn rows(&self, table: &mut DataTable, gradients: u64, thesis: [f64; 2]) {
         for (side, (_, name)) in SIDES.iter().enumerate() {
             let [mean, least, most] = self.share(side, gradients);
-            let born = |search: &RecordedSearch| {
+            let generations_of = |search: &RecordedSearch| {
                 let seen = search.marks.iter().take_while(|mark| mark.gradients <= gradients);
                 seen.map(|mark| mark.generation + 1).max().unwrap_or(1) as f64
             };
-            let generations = self.sides[side].iter().map(born).sum::<f64>();
+            let generations = self.sides[side].iter().map(generations_of).sum::<f64>();
             let generations = generations / self.sides[side].len() as f64;
             let words = [self.subject.name, *name].map(TableCell::from);
             let mutants = self.share_of_mutants(side, gradients);

@@ -72,8 +72,8 @@ impl StraightRay {
         let target: RayTarget = *view.targets.get(ray)?;
         let (states, exit) = tracer.trace_path(&view.rays[ray]);
         let entry = states.first()?;
-        let (way, speed) = (exit.x - entry.x, length(entry.v));
-        let whole = length(way);
+        let (chord, speed) = (exit.x - entry.x, length(entry.v));
+        let whole = length(chord);
         if !(whole > 0.0 && is_valid(&exit)) {
             return None;
         }
@@ -81,7 +81,7 @@ impl StraightRay {
         let (turn, weight) = (index / speed, target.direction.sqrt());
         Some(Self {
             from: entry.x,
-            direction: way * (1.0 / whole),
+            direction: chord * (1.0 / whole),
             length: whole,
             steps: states.len().max(1),
             gains: [turn * weight, turn / speed],

@@ -77,11 +77,11 @@ impl GrinField {
             if !kept.has_loose_coefficients(range) {
                 return kept;
             }
-            let broken = kept.violations(spaces, range);
-            if broken.is_empty() {
+            let violations = kept.violations(spaces, range);
+            if violations.is_empty() {
                 return kept;
             }
-            kept.project_coefficients(&broken, range);
+            kept.project_coefficients(&violations, range);
         }
         let clamp = |value: &mut f64| *value = value.clamp(range[0], range[1]);
         kept.parameters_mut().iter_mut().for_each(clamp);
@@ -163,13 +163,13 @@ impl GrinField {
     /// range.
     fn project_coefficients(
         &mut self,
-        broken: &[(WeightedMean, IndexBound)],
+        violations: &[(WeightedMean, IndexBound)],
         [low, high]: [f64; 2],
     ) {
         let beyond = |value: f64| value - value.clamp(low, high);
         let parameters = self.index_field().parameters();
         let mut shares = vec![1.0_f64; parameters.len()];
-        for (mean, bound) in broken {
+        for (mean, bound) in violations {
             let excess = |i: usize| bound.signed(beyond(parameters[i])).max(0.0);
             let over: f64 = mean.iter().map(|(i, weight)| weight * excess(*i)).sum();
             let found: f64 = mean.iter().map(|(i, weight)| weight * parameters[*i]).sum();

@@ -178,10 +178,10 @@ fn path_points(
     let before = length(first.x - ray.x).min(LEAD_IN * size);
     let mut points = vec![first.x - direction * before];
     let stride = states.len().div_ceil(MAX_POINTS).max(1);
-    let kept: Vec<RayState<f64>> = states.iter().step_by(stride).copied().collect();
+    let thinned: Vec<RayState<f64>> = states.iter().step_by(stride).copied().collect();
     let between = if states.len() < MAX_POINTS / POINTS_BETWEEN { POINTS_BETWEEN } else { 1 };
-    points.extend(kept.first().map(|state| state.x));
-    for pair in kept.windows(2) {
+    points.extend(thinned.first().map(|state| state.x));
+    for pair in thinned.windows(2) {
         points.extend((1..=between).map(|i| hermite(pair, i as f64 / between as f64)));
     }
     points.extend(exit_point(exit, space));

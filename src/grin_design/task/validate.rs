@@ -112,14 +112,14 @@ impl GrinTask {
     }
 
     fn check_method(&self) -> Result<(), GrinTaskError> {
-        let fresh = self.views.iter().any(|view| view.source.is_resampled());
+        let resampled = self.views.iter().any(|view| view.source.is_resampled());
         let most = self.levels.iter().map(|level| self.field.parameter_count(level.nodes)).max();
         match self.method {
             GrinMethod::Adam { rate, fall } => {
                 check_positive("method, adam, rate", rate, "a rate, the index of a step,")?;
                 check_positive("method, adam, fall", fall, "a factor")
             }
-            GrinMethod::Lbfgs | GrinMethod::LeastSquares if fresh => {
+            GrinMethod::Lbfgs | GrinMethod::LeastSquares if resampled => {
                 let expected = "rays that stay the same: only adam may see new ones in every step";
                 let i = self.views.iter().position(|view| view.source.is_resampled()).unwrap_or(0);
                 let part = if self.views[i].source.axis().is_some() { "" } else { ", directions" };

@@ -129,11 +129,11 @@ impl<P> Lineage<P> {
         self.last_pruned = self.next;
         let lines = held
             .flat_map(|number| self.ancestry(number).take(MAX_ANCESTRY).map(|node| node.number));
-        let kept: BTreeSet<u64> = lines.chain(living).collect();
-        let others = self.nodes.iter().filter(|node| !kept.contains(&node.number)).count();
+        let needed: BTreeSet<u64> = lines.chain(living).collect();
+        let others = self.nodes.iter().filter(|node| !needed.contains(&node.number)).count();
         let mut surplus = others.saturating_sub(self.remembered);
         self.nodes.retain(|node| {
-            let stays = surplus == 0 || kept.contains(&node.number);
+            let stays = surplus == 0 || needed.contains(&node.number);
             surplus -= usize::from(!stays);
             stays
         });

@@ -27,7 +27,8 @@ pub struct DescentSettings {
     /// The number of steps with the coarse tolerance.
     pub coarse_steps: usize,
     /// True to vary semi-diameters.
-    pub rims: bool,
+    #[serde(rename = "rims")]
+    pub semi_diameters: bool,
     /// True to vary the indices of model glasses.
     pub indices: bool,
 }
@@ -41,7 +42,7 @@ impl Default for DescentSettings {
             tolerance: 1e-2,
             coarse: 1e-2,
             coarse_steps: 0,
-            rims: true,
+            semi_diameters: true,
             indices: false,
         }
     }

@@ -275,12 +275,12 @@ fn nearest_glass(
 fn cross_check(lens: &Lens, figures: &LensSummary) -> Result<Vec<CrossCheck>, LandscapeError> {
     let mut all = Vec::new();
     for first in &figures.fields {
-        let bench = RayModel::from_lens(lens, first.zoom)?;
-        let field = bench.fields[first.field];
-        let total: f64 = bench.channels.iter().map(|color| color.weight).sum();
+        let model = RayModel::from_lens(lens, first.zoom)?;
+        let field = model.fields[first.field];
+        let total: f64 = model.channels.iter().map(|color| color.weight).sum();
         let (mut light, mut sum, mut mean, mut square) = (0.0, 0.0, [0.0; 2], 0.0);
-        for (i, color) in bench.channels.iter().enumerate() {
-            let Ok(launch) = bench.launch(field, i) else { continue };
+        for (i, color) in model.channels.iter().enumerate() {
+            let Ok(launch) = model.launch(field, i) else { continue };
             let region = Region::new(launch);
             let moments = region.moments(&region.pattern_nodes(CROSS_CHECK_PATTERN));
             let share = color.weight / total;

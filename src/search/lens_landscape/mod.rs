@@ -42,7 +42,7 @@ pub enum LandscapeError {
     Lens(#[from] LensError),
     /// The ray model cannot be set up.
     #[error(transparent)]
-    Bench(#[from] RayModelError),
+    RayModel(#[from] RayModelError),
     /// The merit function cannot be evaluated.
     #[error(transparent)]
     Merit(#[from] MeritError),
@@ -104,7 +104,8 @@ impl LensLandscape {
             crate::merit::Term::FocalLength(focal) => Some(focal),
             _ => None,
         });
-        let freedom = VariableRules { size, rims: local.rims, indices: local.indices };
+        let freedom =
+            VariableRules { size, semi_diameters: local.semi_diameters, indices: local.indices };
         let merit =
             Merit::new(&variables::with_variables(&start, &rules, freedom), goal, local.tolerance)?;
         if merit.variables().is_empty() {
@@ -355,7 +356,7 @@ impl Landscape for LensLandscape {
             _ => (element.first.saturating_sub(1), element.last + 1),
         };
         let mut rules = self.rules.clone().restricted_to(first, last.min(rows - 1), rows);
-        rules.kept = [0, 1].map(|end| rules.kept[end].max(self.rules.kept[end]));
+        rules.fixed_ends = [0, 1].map(|end| rules.fixed_ends[end].max(self.rules.fixed_ends[end]));
         mutation::mutate(kind, lens, &rules, random).map(Into::into)
     }
 

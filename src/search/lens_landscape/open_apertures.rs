@@ -125,14 +125,14 @@ fn conic_shape(row: &Row) -> Shape<f64> {
 fn contact_height(before: &Row, behind: &Row, gap: f64) -> f64 {
     let [before, behind] = [before, behind].map(conic_shape);
     let end = before.edge().min(behind.edge()).min(FAR);
-    let room = |height: f64| gap + behind.clamped_sag(height) - before.clamped_sag(height);
-    if room(end) >= 0.0 {
+    let edge_gap = |height: f64| gap + behind.clamped_sag(height) - before.clamped_sag(height);
+    if edge_gap(end) >= 0.0 {
         return f64::INFINITY;
     }
     let (mut open, mut shut) = (0.0, end);
     for _ in 0..BISECTIONS {
         let middle = 0.5 * (open + shut);
-        *(if room(middle) > 0.0 { &mut open } else { &mut shut }) = middle;
+        *(if edge_gap(middle) > 0.0 { &mut open } else { &mut shut }) = middle;
     }
     open
 }

@@ -52,10 +52,10 @@ impl LensSummary {
         let mut fields = Vec::new();
         let mut focal_lengths = Vec::new();
         for zoom in 0..lens.zoom_positions() {
-            let bench = RayModel::from_lens(lens, zoom)?;
+            let model = RayModel::from_lens(lens, zoom)?;
             focal_lengths.push(focal_length_of(&at_zoom(lens, zoom)));
-            for (i, quality) in field_qualities(&bench, accuracy).into_iter().enumerate() {
-                let (x, y) = (bench.fields[i].x, bench.fields[i].y);
+            for (i, quality) in field_qualities(&model, accuracy).into_iter().enumerate() {
+                let (x, y) = (model.fields[i].x, model.fields[i].y);
                 let (spot, light) = (quality.spot.ok(), quality.light);
                 fields.push(FieldSummary { zoom, field: i, x, y, spot, light });
             }

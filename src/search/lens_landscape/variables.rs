@@ -13,7 +13,7 @@ pub(super) struct VariableRules {
     /// The reference length: the focal length of the start, in mm.
     pub(super) size: f64,
     /// True to vary semi-diameters.
-    pub(super) rims: bool,
+    pub(super) semi_diameters: bool,
     /// True to vary the indices of model glasses.
     pub(super) indices: bool,
 }
@@ -65,7 +65,7 @@ pub(super) fn with_variables(lens: &Lens, rules: &SearchRules, freedom: Variable
     let mut wanted = shape_parameters(lens);
     for i in 0..lens.surfaces.len() {
         let mut add = |quantity| wanted.push(Parameter::new(i, quantity));
-        if freedom.rims {
+        if freedom.semi_diameters {
             add(Quantity::SemiDiameter);
         }
         if freedom.indices {

@@ -26,10 +26,10 @@ impl LensLandscape {
     pub fn violations(&self, lens: &Lens) -> Result<Vec<ConstraintMargin>, LandscapeError> {
         let dark =
             |light: &ConstraintMargin| -light.slack() > LIGHT_TOLERANCE * light.min.unwrap_or(0.0);
-        let mut broken = self.limits(lens)?;
-        broken.retain(|limit| limit.slack() < 0.0);
-        broken.extend(self.light_margins(lens)?.into_iter().filter(dark));
-        Ok(broken)
+        let mut violated = self.limits(lens)?;
+        violated.retain(|limit| limit.slack() < 0.0);
+        violated.extend(self.light_margins(lens)?.into_iter().filter(dark));
+        Ok(violated)
     }
 
     /// The values of the terms of the goal, by the same rays as in a search: the loss is the sum of
@@ -78,7 +78,7 @@ impl LensLandscape {
             Term::TotalTrack(max) => Some(max),
             _ => None,
         });
-        let room = self.find_in_goal(|term| match term {
+        let back_focus = self.find_in_goal(|term| match term {
             Term::BackFocus(min) => Some(min.max(0.0)),
             _ => None,
         });
@@ -88,16 +88,16 @@ impl LensLandscape {
         });
         let folded = self.start.surfaces.iter().any(|row| row.medium == Medium::Mirror);
         let Some(most) = most.filter(|_| !folded) else { return Ok(()) };
-        let (room, thin, pieces) =
-            (room.unwrap_or(0.0), thin.unwrap_or(0.0), self.rules.elements[0]);
-        let least = pieces as f64 * thin + room;
+        let (back_focus, thin, pieces) =
+            (back_focus.unwrap_or(0.0), thin.unwrap_or(0.0), self.rules.elements[0]);
+        let least = pieces as f64 * thin + back_focus;
         if most >= least {
             return Ok(());
         }
-        let [most, least, room, thin] = [most, least, room, thin].map(format_limit);
+        let [most, least, back_focus, thin] = [most, least, back_focus, thin].map(format_limit);
         Err(LandscapeError::Impossible(format!(
             "a track of at most {most} mm; {pieces} pieces of glass of {thin} mm and a back focus \
-             of {room} mm need {least} mm"
+             of {back_focus} mm need {least} mm"
         )))
     }
 

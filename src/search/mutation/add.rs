@@ -38,7 +38,7 @@ pub(super) fn sites(lens: &Lens, rules: &SearchRules) -> Result<Vec<SingletSite>
     let glass = glass_gaps(lens);
     let rows = lens.surfaces.len();
     let mut found = Vec::new();
-    if rules.kept[0] == 0 && !glass[0] {
+    if rules.fixed_ends[0] == 0 && !glass[0] {
         found.push(SingletSite { gap: None, behind: false });
     }
     for row in (0..rows).filter(|row| !glass[row + 1] && rules.may_change(*row, rows)) {
@@ -82,14 +82,14 @@ pub(super) fn draw(
         random,
     );
     let keeping = keep_probability(&context.lens, site.gap, context.rules, singlet.length());
-    let kept = bernoulli(keeping, random);
+    let keeps_rest = bernoulli(keeping, random);
     let mut draft = context.start_draft(sites.len());
-    let first = insert(&mut draft, site, glass, singlet, kept)?;
+    let first = insert(&mut draft, site, glass, singlet, keeps_rest)?;
     draft.map = ProjectionMap::AlongNormals;
-    draft.fresh = vec![first];
+    draft.new_glass = vec![first];
     draft.rimless = vec![first, first + 1];
     draft.change = StructureChange::AddSinglet { glass: glass.full_name(), first: first.into() };
-    let chosen = if kept { keeping } else { 1.0 - keeping };
+    let chosen = if keeps_rest { keeping } else { 1.0 - keeping };
     let there = singlet
         .log_density(&context.lens, site.neighbour(), context.rules, context.scale)
         .map(|log| log - (glasses.len() as f64).ln() + chosen.ln());
@@ -97,7 +97,7 @@ pub(super) fn draw(
     draft.reverse = there.filter(|_| !finite).map(|there| {
         ReverseMove::new(
             MutationKind::RemoveSinglet,
-            remove::log_chance(&draft.lens, first, kept) - there,
+            remove::log_chance(&draft.lens, first, keeps_rest) - there,
         )
     });
     Ok(draft)
@@ -109,7 +109,7 @@ fn insert(
     site: SingletSite,
     glass: &Glass,
     singlet: SingletParameters,
-    kept: bool,
+    keeps_rest: bool,
 ) -> Result<usize, Refusal> {
     let first = site.gap.map_or(0, |gap| gap + 1);
     let (sense, air) = match site.gap {
@@ -140,7 +140,7 @@ fn insert(
                 draft.lens.surfaces[gap].thickness = sense * singlet.air;
                 new.push(gap);
             }
-            if kept {
+            if keeps_rest {
                 draft.lengthen(rest, -singlet.length());
             }
         }

@@ -48,7 +48,7 @@ pub(super) struct MutationDraft {
     pub(super) origins: Vec<RowOrigin>,
     pub(super) change: StructureChange,
     /// Rows with new glass behind them.
-    pub(super) fresh: Vec<usize>,
+    pub(super) new_glass: Vec<usize>,
     /// Rows without a semi-diameter.
     pub(super) rimless: Vec<usize>,
     pub(super) map: ProjectionMap,
@@ -73,7 +73,7 @@ impl<'a> MutationContext<'a> {
             lens: self.lens.clone(),
             origins: (0..self.lens.surfaces.len()).map(origin).collect(),
             change: StructureChange::Start,
-            fresh: Vec::new(),
+            new_glass: Vec::new(),
             rimless: Vec::new(),
             map: ProjectionMap::Nearest,
             sites,

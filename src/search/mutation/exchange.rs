@@ -71,7 +71,7 @@ pub(super) fn draw(
     let new = *chosen.ok_or(Refusal::NoSimilarGlass)?;
     let mut draft = context.start_draft(sites.len());
     draft.lens.surfaces[row].medium = Medium::Glass(new.full_name());
-    draft.fresh = vec![row];
+    draft.new_glass = vec![row];
     draft.map = random_projection_map(random);
     let known = choice.iter().any(|glass| is_same(glass, old));
     // The similarity is symmetric, its normalization is not.

@@ -50,7 +50,7 @@ pub struct MutatedLens {
     /// The change.
     pub change: StructureChange,
     /// The rows with new glass behind them.
-    pub fresh: Vec<usize>,
+    pub new_glass: Vec<usize>,
     /// The projection to a paraxially equivalent lens; `None` if the rules do not ask for it.
     pub projection: Option<Projection>,
     /// The logarithm of the ratio of the proposal densities, reverse over forward, times the
@@ -157,7 +157,7 @@ fn complete(
     kind: MutationKind,
     draft: MutationDraft,
 ) -> Result<MutatedLens, Refusal> {
-    let MutationDraft { lens, origins, change, fresh, rimless, map, sites, reverse } = draft;
+    let MutationDraft { lens, origins, change, new_glass, rimless, map, sites, reverse } = draft;
     let (mut lens, projection, stretch) = if context.rules.projection {
         let found = project(&context.lens, &lens, &origins, context.rules, map, reverse.is_some());
         let found = found.map_err(|error| Refusal::from(&error))?;
@@ -169,7 +169,7 @@ fn complete(
     let log_ratio = reverse.zip(stretch).and_then(|(reverse, stretch)| {
         log_ratio(context.rules, &lens, kind, sites, reverse).map(|log| log + stretch)
     });
-    Ok(MutatedLens { lens, kind, change, fresh, projection, log_ratio })
+    Ok(MutatedLens { lens, kind, change, new_glass, projection, log_ratio })
 }
 
 /// The logarithm of the ratio of the proposal densities, reverse over forward, without the

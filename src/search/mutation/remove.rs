@@ -47,11 +47,11 @@ struct RemovalChoice {
 }
 
 /// The logarithm of the probability of one way of removing the singlet at row `first`.
-pub(super) fn log_chance(lens: &Lens, first: usize, kept: bool) -> f64 {
+pub(super) fn log_chance(lens: &Lens, first: usize, keeps_rest: bool) -> f64 {
     let sides = sides(lens, first);
     let choice = match remaining_gap(lens, first) {
         Some(gap) if has_choice(lens, gap) => {
-            if kept {
+            if keeps_rest {
                 KEEP_PROBABILITY
             } else {
                 1.0 - KEEP_PROBABILITY
@@ -93,15 +93,16 @@ pub(super) fn draw(
     let front = choose(&sides(&context.lens, first), random).copied().ok_or(Refusal::NoSinglet)?;
     let choice =
         remaining_gap(&context.lens, first).is_some_and(|gap| has_choice(&context.lens, gap));
-    let way = RemovalChoice { front, keeps_rest: choice && bernoulli(KEEP_PROBABILITY, random) };
+    let removal =
+        RemovalChoice { front, keeps_rest: choice && bernoulli(KEEP_PROBABILITY, random) };
     let mut draft = context.start_draft(sites.len());
-    remove_singlet(&mut draft, first, way);
+    remove_singlet(&mut draft, first, removal);
     draft.change = StructureChange::RemoveSinglet { first: first.into() };
-    draft.reverse = reverse_move(context, &draft.lens, first, way);
+    draft.reverse = reverse_move(context, &draft.lens, first, removal);
     Ok(draft)
 }
 
-fn remove_singlet(draft: &mut MutationDraft, first: usize, way: RemovalChoice) {
+fn remove_singlet(draft: &mut MutationDraft, first: usize, removal: RemovalChoice) {
     let last = first + 1;
     let length = draft.lens.surfaces[first].thickness * draft.lens.light_direction(first);
     if first == 0 {
@@ -111,20 +112,22 @@ fn remove_singlet(draft: &mut MutationDraft, first: usize, way: RemovalChoice) {
         }
     } else {
         let gap = first - 1;
-        let dropped = draft.lens.surfaces[if way.front { gap } else { last }].thickness;
+        let dropped = draft.lens.surfaces[if removal.front { gap } else { last }].thickness;
         let both = is_zoomed(&draft.lens, gap) && is_zoomed(&draft.lens, last);
-        if way.keeps_rest && (both || is_zoomed(&draft.lens, if way.front { gap } else { last })) {
+        if removal.keeps_rest
+            && (both || is_zoomed(&draft.lens, if removal.front { gap } else { last }))
+        {
             // The removed gap has several lengths, which are added position by position.
             draft.add_gap(gap, last);
         } else {
-            if way.front {
+            if removal.front {
                 draft.move_gap(last, gap);
             }
-            if way.keeps_rest {
+            if removal.keeps_rest {
                 draft.lengthen(gap, dropped * draft.lens.light_direction(gap));
             }
         }
-        if way.keeps_rest {
+        if removal.keeps_rest {
             draft.lengthen(gap, length);
         }
     }
@@ -138,14 +141,14 @@ fn reverse_move(
     context: &MutationContext<'_>,
     small: &Lens,
     first: usize,
-    way: RemovalChoice,
+    removal: RemovalChoice,
 ) -> Option<ReverseMove> {
     let (lens, rules, last) = (&context.lens, context.rules, first + 1);
     let glasses = usable_glasses(lens, rules);
     let Medium::Glass(name) = &lens.surfaces[first].medium else { return None };
     let known = glass::find(name)?;
     let made = glasses.iter().any(|glass| std::ptr::eq(*glass, known));
-    let beside = if way.front { first.checked_sub(1)? } else { last };
+    let beside = if removal.front { first.checked_sub(1)? } else { last };
     let moves = [first, beside].iter().any(|row| is_zoomed(lens, *row)) || has_solve(lens, beside);
     let plain = is_plain(&lens.surfaces[first]) && is_plain(&lens.surfaces[last]);
     let finite = first == 0 && lens.object != Object::Infinity;
@@ -160,16 +163,14 @@ fn reverse_move(
     };
     let scale = context.scale_after(small)?;
     let gap = first.checked_sub(1).filter(|gap| has_choice(small, *gap));
-    let log = -(glasses.len() as f64).ln() - log_chance(lens, first, way.keeps_rest);
-    let row = if way.front { beside } else { first };
-    let neighbour = Neighbour { row, behind: way.front };
-    let room =
-        gap.map(|gap| SpacingChoice { gap, length: singlet.length(), keeps_rest: way.keeps_rest });
+    let log = -(glasses.len() as f64).ln() - log_chance(lens, first, removal.keeps_rest);
+    let row = if removal.front { beside } else { first };
+    let neighbour = Neighbour { row, behind: removal.front };
+    let spacing = gap.map(|gap| SpacingChoice {
+        gap,
+        length: singlet.length(),
+        keeps_rest: removal.keeps_rest,
+    });
     let singlet = Some(SingletProposal { singlet, neighbour, scale });
-    Some(ReverseMove {
-        kind: MutationKind::AddSinglet,
-        log_density_ratio: log,
-        spacing: room,
-        singlet,
-    })
+    Some(ReverseMove { kind: MutationKind::AddSinglet, log_density_ratio: log, spacing, singlet })
 }

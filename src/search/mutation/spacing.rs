@@ -35,19 +35,19 @@ pub(super) fn keep_probability(
     rules: &SearchRules,
     length: f64,
 ) -> f64 {
-    let room = |gap: usize| has_choice(lens, gap) && has_room(lens, gap, rules, length);
-    if gap.is_some_and(room) { KEEP_PROBABILITY } else { 0.0 }
+    let fits = |gap: usize| has_choice(lens, gap) && gap_fits(lens, gap, rules, length);
+    if gap.is_some_and(fits) { KEEP_PROBABILITY } else { 0.0 }
 }
 
 /// True if a gap has room for a length, on the axis and at the edge.
-pub(super) fn has_room(lens: &Lens, gap: usize, rules: &SearchRules, length: f64) -> bool {
+pub(super) fn gap_fits(lens: &Lens, gap: usize, rules: &SearchRules, length: f64) -> bool {
     let left = shortest_gap(lens, gap) - length;
     if gap + 1 == lens.surfaces.len() {
         return left >= rules.back_focus.unwrap_or(0.0);
     }
     let [front, rear] = [gap, gap + 1].map(|row| &lens.surfaces[row]);
-    let rims = [front, rear].map(|row| row.semi_diameter.unwrap_or(f64::INFINITY));
-    let rim = rims[0].min(rims[1]);
+    let semi_diameters = [front, rear].map(|row| row.semi_diameter.unwrap_or(f64::INFINITY));
+    let rim = semi_diameters[0].min(semi_diameters[1]);
     let narrower = if rim.is_finite() {
         lens.light_direction(gap) * (sag(front.curvature, rim) - sag(rear.curvature, rim))
     } else {

@@ -79,14 +79,14 @@ pub(super) fn draw(
     let gaps = stop_gaps(&draft.lens, context.rules);
     let gap = choose(&gaps, random).copied().ok_or(Refusal::NoGapForStop)?;
     draft.sites = gaps.len();
-    let (room, share) = (shortest_gap(&draft.lens, gap), random.random::<f64>());
+    let (gap_length, share) = (shortest_gap(&draft.lens, gap), random.random::<f64>());
     draft.reverse = reverse_move(context.rules, &draft.lens, old, gap);
-    insert_stop(&mut draft, gap, share * room);
+    insert_stop(&mut draft, gap, share * gap_length);
     rescale_aperture(&context.lens, &mut draft.lens)?;
     let at = gap + 1;
     draft.rimless =
         draft.lens.surfaces[at].semi_diameter.is_none().then_some(at).into_iter().collect();
-    draft.change = StructureChange::MoveStop { surface: gap.into(), distance: share * room };
+    draft.change = StructureChange::MoveStop { surface: gap.into(), distance: share * gap_length };
     Ok(draft)
 }
 

@@ -32,9 +32,9 @@ fn block(
     multipliers: &DVector<f64>,
     jacobian: &DMatrix<f64>,
 ) -> DMatrix<f64> {
-    let (count, kept) = (at.len(), jacobian.nrows());
-    let mut block = DMatrix::identity(count + kept, count + kept);
-    for i in 0..kept {
+    let (count, constraints) = (at.len(), jacobian.nrows());
+    let mut block = DMatrix::identity(count + constraints, count + constraints);
+    for i in 0..constraints {
         block[(count + i, count + i)] = 0.0;
     }
     let mut lifted: Vec<Dual<f64, 1>> = at.iter().map(|z| Dual::constant(*z)).collect();
@@ -46,7 +46,7 @@ fn block(
             block[(row, column)] -= by.slope[0];
         }
     }
-    block.view_mut((0, count), (count, kept)).copy_from(&(-jacobian.transpose()));
-    block.view_mut((count, 0), (kept, count)).copy_from(jacobian);
+    block.view_mut((0, count), (count, constraints)).copy_from(&(-jacobian.transpose()));
+    block.view_mut((count, 0), (constraints, count)).copy_from(jacobian);
     block
 }

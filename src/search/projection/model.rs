@@ -164,10 +164,10 @@ impl MarginalRayModel {
         let mut jacobian = DMatrix::zeros(self.constraints(), at.len());
         for (zoom, gaps) in gaps.iter().enumerate() {
             let ray = self.ray(zoom, &curvatures, gaps);
-            for kept in 0..self.constraints_per_zoom() {
-                let seed = if kept == 0 { (0.0, self.scale) } else { (1.0, 0.0) };
+            for constraint in 0..self.constraints_per_zoom() {
+                let seed = if constraint == 0 { (0.0, self.scale) } else { (1.0, 0.0) };
                 let (by_curvature, by_gap) = self.adjoint(zoom, &ray, &curvatures, gaps, seed);
-                let row = zoom * self.constraints_per_zoom() + kept;
+                let row = zoom * self.constraints_per_zoom() + constraint;
                 for (column, reaches) in self.effects.iter().enumerate() {
                     jacobian[(row, column)] = sum_effects(reaches, zoom, &by_curvature, &by_gap);
                 }

@@ -190,8 +190,8 @@ fn polish(
         let change = largest(&(&next - &at));
         at = next;
         if change <= 1e-13 * (1.0 + largest(&at)) {
-            let kept = largest(&problem.residual(&at)) <= 1e2 * problem.tolerance();
-            return kept.then_some((at, multipliers));
+            let satisfied = largest(&problem.residual(&at)) <= 1e2 * problem.tolerance();
+            return satisfied.then_some((at, multipliers));
         }
     }
     None

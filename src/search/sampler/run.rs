@@ -156,10 +156,10 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
     /// The result so far, best first: the points of the reservoir, preceded by the best point if
     /// its descent is still in progress.
     pub fn found_points(&self) -> Vec<FoundPoint<'_, P>> {
-        let kept = self.reservoir.entries();
-        let running = kept.iter().all(|entry| self.best.is_better_than(entry));
+        let entries = self.reservoir.entries();
+        let running = entries.iter().all(|entry| self.best.is_better_than(entry));
         let mut found: Vec<_> =
-            kept.iter().map(|entry| FoundPoint { entry, running: false }).collect();
+            entries.iter().map(|entry| FoundPoint { entry, running: false }).collect();
         found.sort_by(|a, b| a.entry.rank(b.entry));
         if running {
             found.insert(0, FoundPoint { entry: &self.best, running });

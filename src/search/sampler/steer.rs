@@ -71,7 +71,7 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
         let living = self.chains.iter().find(|chain| chain.generation == number);
         let living = living.and_then(|chain| chain.best());
         let node = self.lineage.node(number).map(|node| (&node.point, node.best_loss));
-        let forgotten = SearchError::UnknownGeneration { number, born: self.lineage.total() };
+        let forgotten = SearchError::UnknownGeneration { number, total: self.lineage.total() };
         let (point, loss) = living.or(node).ok_or(forgotten)?;
         Ok(ReservoirEntry::new(landscape, number, loss, point.clone()))
     }

@@ -131,10 +131,10 @@ impl Termination {
         match self {
             Self::Ratio if temperature.value() > 0.0 => {
                 let old = temperature.log_density(before);
-                let kept = temperature.log_density(after) - log_sum(old, c.ln());
+                let survival = temperature.log_density(after) - log_sum(old, c.ln());
                 // Both vanish only if `C` is 0: then nothing was lost.
-                let kept = if kept.is_nan() { 1.0 } else { kept.exp() };
-                (1.0 - kept).max(0.0)
+                let survival = if survival.is_nan() { 1.0 } else { survival.exp() };
+                (1.0 - survival).max(0.0)
             }
             Self::Ratio | Self::Relative => (1.0 - ratio / (1.0 + c)).max(0.0),
             Self::Clocks => {

@@ -84,7 +84,7 @@ impl EffectOnOff {
 fn spots_of(lens: &Lens, settings: &AnalysisSettings, plan: &EffectPlan) -> usize {
     let accuracy = Accuracy { tolerance: settings.tolerance, max_rays: MAX_RAYS };
     effects::build_ray_model(lens, settings.zoom, plan)
-        .map_or(0, |bench| analysis::spots(&bench, accuracy).len())
+        .map_or(0, |model| analysis::spots(&model, accuracy).len())
 }
 
 /// The limit of rays for a spot: without an effect, a spot may never reach its tolerance.

@@ -43,7 +43,7 @@ pub struct AnalysisResults {
 #[derive(Debug, Clone)]
 pub struct Analyses {
     /// The lens with its beam, ready for tracing.
-    pub bench: Timed<Arc<RayModel>>,
+    pub ray_model: Timed<Arc<RayModel>>,
     /// The Seidel sums; `None` without a chief ray.
     pub seidel: Timed<Option<Seidel<f64>>>,
     /// The effects that are computed, each with the reason.
@@ -71,7 +71,7 @@ pub struct Analyses {
 impl Analyses {
     /// First-order data at the primary wavelength.
     pub fn first_order(&self) -> &FirstOrder<f64> {
-        &self.bench.value.first_order
+        &self.ray_model.value.first_order
     }
 }
 
@@ -174,11 +174,11 @@ fn analyze_unless(
         Ok(value) => Timed { value, ms: plan.ms },
         Err(error) => return Some(Err(error.to_string())),
     };
-    let bench = time(|| effects::build_ray_model(lens, settings.zoom, &plan.value));
-    match bench.value {
+    let ray_model = time(|| effects::build_ray_model(lens, settings.zoom, &plan.value));
+    match ray_model.value {
         Ok(value) => {
-            let bench = Timed { value: Arc::new(value), ms: bench.ms };
-            Analyses::of(bench, plan, settings, interrupted).map(Ok)
+            let ray_model = Timed { value: Arc::new(value), ms: ray_model.ms };
+            Analyses::of(ray_model, plan, settings, interrupted).map(Ok)
         }
         Err(error) => Some(Err(error.to_string())),
     }
@@ -195,13 +195,13 @@ const FAN_POINTS: usize = 65;
 impl Analyses {
     /// Computes all analyses, those that are looked at first in front. `None` if interrupted.
     fn of(
-        bench: Timed<Arc<RayModel>>,
+        ray_model: Timed<Arc<RayModel>>,
         plan: Timed<EffectPlan>,
         settings: &AnalysisSettings,
         interrupted: impl Fn() -> bool,
     ) -> Option<Self> {
         let go_on = || (!interrupted()).then_some(());
-        let b = Arc::clone(&bench.value);
+        let b = Arc::clone(&ray_model.value);
         let accuracy = Accuracy { tolerance: settings.tolerance, ..Accuracy::default() };
         let layout = time(|| analysis::ray_layout(&b, settings.rays));
         go_on()?;
@@ -224,7 +224,7 @@ impl Analyses {
             curvature: time(|| {
                 for_each_field(&b, |field| analysis::field_curvature(&b, field, b.primary))
             }),
-            bench,
+            ray_model,
             plan,
             layout,
             spot_points: scatter,
@@ -238,11 +238,11 @@ impl Analyses {
 
 /// The spot of a field, with the time of its estimates.
 fn spot_with_time(
-    bench: &RayModel,
+    ray_model: &RayModel,
     field: FieldPoint,
     accuracy: Accuracy,
 ) -> Result<Spot, AnalysisError> {
-    let Timed { value, ms } = time(|| analysis::spot(bench, field, accuracy));
+    let Timed { value, ms } = time(|| analysis::spot(ray_model, field, accuracy));
     let mut spot = value?;
     for number in [&mut spot.rms, &mut spot.radius] {
         number.milliseconds = Some(ms);

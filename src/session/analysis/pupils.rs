@@ -18,46 +18,47 @@ pub struct FieldPupils {
     /// The area of the pupil on the axis, in mm²; `None` if that pupil is dark.
     pub axis: Option<Estimate>,
     /// The sensitivities of each field to the semi-diameters, or the reason why they are unknown.
-    pub rims: Timed<Vec<Result<RimSensitivities, DerivativeError>>>,
+    pub sensitivities: Timed<Vec<Result<RimSensitivities, DerivativeError>>>,
     /// The mean sensitivities of all fields with light.
-    pub all_rims: Option<RimSensitivities>,
+    pub mean_sensitivities: Option<RimSensitivities>,
 }
 
 /// The pupils of all fields at the wavelength of the settings, or the primary one.
 pub(super) fn field_pupils(
-    bench: &RayModel,
+    model: &RayModel,
     settings: &AnalysisSettings,
     accuracy: Accuracy,
 ) -> FieldPupils {
-    let chosen = settings.pupil_wavelength.filter(|chosen| *chosen < bench.channels.len());
-    let wavelength = chosen.unwrap_or(bench.primary);
-    let pupil = |field: FieldPoint| time(|| analysis::pupil(bench, field, wavelength, accuracy));
-    let fields = for_each_field(bench, pupil);
+    let chosen = settings.pupil_wavelength.filter(|chosen| *chosen < model.channels.len());
+    let wavelength = chosen.unwrap_or(model.primary);
+    let pupil = |field: FieldPoint| time(|| analysis::pupil(model, field, wavelength, accuracy));
+    let fields = for_each_field(model, pupil);
     let on_axis =
         |pupil: &&Timed<FieldPupil>| pupil.value.field.x == 0.0 && pupil.value.field.y == 0.0;
     let axis = fields.iter().find(on_axis).cloned();
     let axis = axis.unwrap_or_else(|| pupil(FieldPoint { x: 0.0, y: 0.0, weight: 1.0 }));
-    let rims = time(|| {
-        for_each_field(bench, |field| {
-            analysis::rim_sensitivities(bench, field, wavelength, accuracy)
+    let sensitivities = time(|| {
+        for_each_field(model, |field| {
+            analysis::rim_sensitivities(model, field, wavelength, accuracy)
         })
     });
-    let known = rims.value.iter().zip(&bench.fields);
-    let known = known.filter_map(|(rims, field)| Some((field.weight, rims.as_ref().ok()?)));
-    let all_rims = analysis::mean_rim_sensitivities(&known.collect::<Vec<_>>());
+    let known = sensitivities.value.iter().zip(&model.fields);
+    let known = known
+        .filter_map(|(sensitivities, field)| Some((field.weight, sensitivities.as_ref().ok()?)));
+    let mean_sensitivities = analysis::mean_rim_sensitivities(&known.collect::<Vec<_>>());
     FieldPupils {
         wavelength,
         fields,
         axis: axis.value.extent.map(|light| light.area),
-        rims,
-        all_rims,
+        sensitivities,
+        mean_sensitivities,
     }
 }
 
 /// Calls a function for each field in parallel; the results are in the order of the fields.
 pub(super) fn for_each_field<T: Send>(
-    bench: &RayModel,
+    model: &RayModel,
     of: impl Fn(FieldPoint) -> T + Sync,
 ) -> Vec<T> {
-    bench.fields.par_iter().map(|field| of(*field)).collect()
+    model.fields.par_iter().map(|field| of(*field)).collect()
 }

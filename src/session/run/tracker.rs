@@ -133,7 +133,7 @@ mod tests {
         Failed, Finished, Idle, Paused, Pausing, Running, Starting, Stopped, Stopping,
     };
 
-    fn tell(tracker: &mut RunTracker, number: u64, status: RunStatus) -> RunStatus {
+    fn report_status(tracker: &mut RunTracker, number: u64, status: RunStatus) -> RunStatus {
         let _: Option<RunEvent<()>> = tracker.receive(ThreadMessage::Status(number, status));
         tracker.status()
     }
@@ -145,12 +145,16 @@ mod tests {
         let number = tracker.start(false);
         assert_eq!(tracker.status(), Starting);
         assert!(tracker.request(Pausing));
-        assert_eq!(tell(&mut tracker, number, Running), Pausing);
+        assert_eq!(report_status(&mut tracker, number, Running), Pausing);
         assert!(tracker.request(Starting));
-        assert_eq!(tell(&mut tracker, number, Paused), Starting);
-        assert_eq!(tell(&mut tracker, number, Running), Running);
+        assert_eq!(report_status(&mut tracker, number, Paused), Starting);
+        assert_eq!(report_status(&mut tracker, number, Running), Running);
         assert!(tracker.request(Stopping) && !tracker.request(Pausing));
-        assert_eq!(tell(&mut tracker, number, Finished), Finished, "it ended before it could stop");
+        assert_eq!(
+            report_status(&mut tracker, number, Finished),
+            Finished,
+            "it ended before it could stop"
+        );
         assert!(!tracker.request(Stopping));
     }
 
@@ -159,7 +163,7 @@ mod tests {
         let mut tracker = RunTracker::default();
         let first = tracker.start(false);
         let second = tracker.start(false);
-        assert_eq!(tell(&mut tracker, first, Stopped), Starting);
+        assert_eq!(report_status(&mut tracker, first, Stopped), Starting);
         let event = tracker.receive::<()>(ThreadMessage::Failed(second, "no lens".to_owned()));
         assert_eq!(event, Some(RunEvent::Failed("no lens".to_owned())));
         assert_eq!((tracker.status(), tracker.error()), (Failed, Some("no lens")));
@@ -171,13 +175,13 @@ mod tests {
     fn a_run_that_is_kept_stays_until_the_next_one_has_started() {
         let mut tracker = RunTracker::default();
         let first = tracker.start(true);
-        assert_eq!(tell(&mut tracker, first, Paused), Paused);
+        assert_eq!(report_status(&mut tracker, first, Paused), Paused);
         let second = tracker.start(true);
         assert_eq!((tracker.status(), tracker.current()), (Paused, Some(first)));
         tracker.receive::<()>(ThreadMessage::Failed(second, "no task".to_owned()));
         assert_eq!((tracker.status(), tracker.error()), (Paused, Some("no task")));
         let third = tracker.start(true);
-        assert_eq!(tell(&mut tracker, third, Stopped), Stopped);
+        assert_eq!(report_status(&mut tracker, third, Stopped), Stopped);
         assert_eq!(tracker.current(), Some(third));
     }
 }

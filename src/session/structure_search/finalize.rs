@@ -67,10 +67,10 @@ fn report(finished: &FinalizedLens) -> String {
         format!("{number:>6} {spot:>12.3} {again:>14.3} {light:>12.2}")
     };
     let limit = |limit: &ConstraintMargin| {
-        let (name, value, room) = (limit.term.replace('_', " "), limit.value, limit.slack());
+        let (name, value, margin) = (limit.term.replace('_', " "), limit.value, limit.slack());
         let surface =
             limit.surface.map_or_else(|| "-".to_owned(), |i| SurfaceNumber::new(i).to_string());
-        format!("{name:<16} {surface:>8} {value:>12.4} {room:>12.4}")
+        format!("{name:<16} {surface:>8} {value:>12.4} {margin:>12.4}")
     };
     let mut lines: Vec<String> = finished.glasses.iter().map(glass).collect();
     lines.extend(finished.unlisted.iter().map(unlisted));

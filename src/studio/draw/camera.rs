@@ -43,8 +43,8 @@ impl Camera {
     pub fn fit(bounds: BoundingBox, size: DVec2, margin: f64) -> Self {
         let extent = bounds.max - bounds.min;
         let extent = if extent.max_element() > 0.0 { extent } else { DVec2::ONE };
-        let room = (size - 2.0 * margin).max(DVec2::ONE);
-        let scale = (room / extent.max(DVec2::splat(1e-12))).min_element();
+        let available = (size - 2.0 * margin).max(DVec2::ONE);
+        let scale = (available / extent.max(DVec2::splat(1e-12))).min_element();
         Self { center: bounds.min.midpoint(bounds.max), scale: scale.clamp(MIN_SCALE, MAX_SCALE) }
     }
 

@@ -157,8 +157,8 @@ fn zoom_factor(ui: &Ui) -> f64 {
 
 /// Draws a scale bar of a round length with its label. `scale` is in points per mm.
 fn scale_bar(ui: &Ui, rect: Rect, scale: f64) {
-    let room = (BAR.0 * rect.width()).min(BAR.1);
-    let length = round_length_below(f64::from(room) / scale);
+    let available = (BAR.0 * rect.width()).min(BAR.1);
+    let length = round_length_below(f64::from(available) / scale);
     #[expect(clippy::cast_possible_truncation, reason = "at most 160 points")]
     let width = (length * scale) as f32;
     let left = rect.left_bottom() + egui::vec2(10.0, -10.0);

@@ -29,7 +29,7 @@ impl Panel for FirstOrderPanel {
             ui.add_space(6.0);
             ScrollArea::horizontal().show(ui, |ui| match &numbers.seidel.value {
                 Some(seidel) => sums(ui, &results.lens, seidel),
-                None if numbers.bench.value.has_grin() => drop(ui.weak(
+                None if numbers.ray_model.value.has_grin() => drop(ui.weak(
                     "No third-order sums: those of a gradient-index medium are not implemented",
                 )),
                 None => drop(ui.weak("No third-order sums: the lens has no paraxial chief ray")),

@@ -193,18 +193,18 @@ impl LayoutKey {
 impl LayoutDrawing {
     fn new(source: &LayoutKey) -> Option<Self> {
         let numbers = source.results.analyses.as_ref().ok()?;
-        let (bench, layout) = (&numbers.bench.value, &numbers.layout.value);
+        let (model, layout) = (&numbers.ray_model.value, &numbers.layout.value);
         let palette = source.palette;
-        let system = bench.channels[bench.primary].system.clone();
+        let system = model.channels[model.primary].system.clone();
         let section = SectionDrawing::new(&system, &layout.ray_heights);
         let mut scene = Scene::on(palette.background);
         if let Some(Ok(design)) = source.reference.as_ref().map(|reference| &reference.analyses) {
             draw_reference(&mut scene, design, &palette);
         }
-        let fresh =
+        let added =
             source.reference.as_ref().map(|design| added_glass(&source.results.lens, &design.lens));
-        let fresh = fresh.unwrap_or_default();
-        section.draw_glass(&mut scene, &palette, &fresh);
+        let added = added.unwrap_or_default();
+        section.draw_glass(&mut scene, &palette, &added);
         layout.rays.iter().for_each(|ray| draw_ray(&mut scene, ray, &palette));
         section.draw_outlines(&mut scene, &palette);
         draw_image(&mut scene, &section, layout, &palette);
@@ -214,7 +214,7 @@ impl LayoutDrawing {
             reached: layout.ray_heights.clone(),
             fates: layout.fates,
             fields_without_rays: layout.errors.clone(),
-            added_glass: fresh.len(),
+            added_glass: added.len(),
             system,
         })
     }
@@ -264,8 +264,8 @@ impl LayoutDrawing {
 
 /// The outlines of the design, to compare with.
 fn draw_reference(scene: &mut Scene, design: &Analyses, palette: &Palette) {
-    let bench = &design.bench.value;
-    let system = &bench.channels[bench.primary].system;
+    let model = &design.ray_model.value;
+    let system = &model.channels[model.primary].system;
     SectionDrawing::new(system, &design.layout.value.ray_heights)
         .draw_reference(scene, palette.faint);
 }
@@ -275,8 +275,8 @@ fn image_extent(layout: &RayLayout) -> Option<(f64, f64)> {
     let arrived = layout.rays.iter().filter(|ray| ray.path.fate.is_imaged());
     let ends = arrived.filter_map(|ray| Some(DVec2::splat(ray.path.points.last()?.y)));
     let BoundingBox { min, max } = BoundingBox::around(ends)?;
-    let room = 0.06 * (max.y - min.y);
-    Some((min.y - room, max.y + room))
+    let margin = 0.06 * (max.y - min.y);
+    Some((min.y - margin, max.y + margin))
 }
 
 fn draw_image(

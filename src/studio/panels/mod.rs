@@ -137,7 +137,7 @@ fn pupil_share(spot: Option<&Spot>) -> f64 {
 
 /// The light of a lens: the mean area of its pupils in mm², over fields and wavelengths by weight.
 fn mean_pupil_area(numbers: &Analyses) -> f64 {
-    let fields = numbers.spots.value.iter().zip(&numbers.bench.value.fields);
+    let fields = numbers.spots.value.iter().zip(&numbers.ray_model.value.fields);
     let parts = fields.map(|(spot, field)| (field.weight, ImageQuality::of_spot(spot)));
     ImageQuality::mean(&parts.collect::<Vec<_>>()).light.value
 }

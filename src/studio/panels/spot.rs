@@ -202,7 +202,7 @@ impl SpotFrame {
         field: usize,
         per_point: f32,
     ) {
-        let colors = &numbers.bench.value.channels;
+        let colors = &numbers.ray_model.value.channels;
         let mut scatters: Vec<_> =
             numbers.spot_points.value.iter().filter(|scatter| scatter.field == field).collect();
         let um = |wavelength: usize| colors[wavelength].um;

@@ -26,7 +26,7 @@ impl<R: Real> Tracer<R> {
     #[inline(never)]
     pub(super) fn backward_grin(
         &self,
-        way: &mut AdjointBlock<R>,
+        adjoint: &mut AdjointBlock<R>,
         i: usize,
         sink: &mut impl GradientSink<R>,
     ) {
@@ -34,26 +34,26 @@ impl<R: Real> Tracer<R> {
         let mut by_front: GrinTermColumns<R> = [[R::ZERO; BLOCK]; PROFILE_TERMS];
         let mut by_behind = by_front;
         for j in 0..BLOCK {
-            if way.block.code[j] > R::ZERO {
+            if adjoint.block.code[j] > R::ZERO {
                 continue;
             }
-            let (front, behind) = way.retrace_grin(&site, j);
+            let (front, behind) = adjoint.retrace_grin(&site, j);
             for k in 0..PROFILE_TERMS {
                 (by_front[k][j], by_behind[k][j]) = (front.terms[k], behind.terms[k]);
             }
             if site.behind.is_some() {
-                way.by_index_behind[j] = behind.base;
+                adjoint.by_index_behind[j] = behind.base;
             }
             if site.before.is_some() {
-                way.by_index_before[j] = front.base;
+                adjoint.by_index_before[j] = front.base;
             }
         }
-        way.accumulate(site.surface, i, sink);
+        adjoint.accumulate(site.surface, i, sink);
         let front = i.checked_sub(1).filter(|_| site.before.is_some());
         let behind = site.behind.map(|_| i);
         for (gap, columns) in [(front, by_front), (behind, by_behind)] {
             for (k, lanes) in columns.iter().enumerate().filter(|_| gap.is_some()) {
-                sink.add_lanes(gap, SurfaceParameter::GrinTerm(k), &way.mask_lost(lanes));
+                sink.add_lanes(gap, SurfaceParameter::GrinTerm(k), &adjoint.mask_lost(lanes));
             }
         }
     }

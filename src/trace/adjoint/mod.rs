@@ -343,28 +343,28 @@ impl<R: Real> Tracer<R> {
         seeds: &impl SeedSource<R>,
         sink: &mut impl GradientSink<R>,
     ) {
-        let mut way = AdjointBlock::new(block);
-        self.seed_landing(&mut way, count, seeds, sink);
+        let mut adjoint = AdjointBlock::new(block);
+        self.seed_landing(&mut adjoint, count, seeds, sink);
         for (i, (interface, distance)) in self.interfaces.iter().zip(distances).enumerate().rev() {
-            way.s = *distance;
+            adjoint.s = *distance;
             if self.touches_grin(i) {
-                self.backward_grin(&mut way, i, sink);
+                self.backward_grin(&mut adjoint, i, sink);
                 continue;
             }
             let limits = seeds.limit_adjoint(i);
             // A factor that is known to be 1 costs nothing.
             if interface.sense > R::ZERO {
-                way.retrace_surface(&Interface { sense: R::ONE, ..*interface }, limits);
+                adjoint.retrace_surface(&Interface { sense: R::ONE, ..*interface }, limits);
             } else {
-                way.retrace_surface(&Interface { sense: -R::ONE, ..*interface }, limits);
+                adjoint.retrace_surface(&Interface { sense: -R::ONE, ..*interface }, limits);
             }
-            way.accumulate(interface, i, sink);
+            adjoint.accumulate(interface, i, sink);
             if limits.is_some() {
-                let lanes = way.mask_lost(&way.by_semi_diameter);
+                let lanes = adjoint.mask_lost(&adjoint.by_semi_diameter);
                 sink.add_lanes(Some(i), SurfaceParameter::SemiDiameter, &lanes);
             }
         }
-        self.add_launch_index(&way, sink);
+        self.add_launch_index(&adjoint, sink);
     }
 
     /// The adjoint of the landing; the direction cosines are `k / n'`. In front of a GRIN medium, where
@@ -372,7 +372,7 @@ impl<R: Real> Tracer<R> {
     #[inline(always)]
     fn seed_landing(
         &self,
-        way: &mut AdjointBlock<R>,
+        adjoint: &mut AdjointBlock<R>,
         count: usize,
         seeds: &impl SeedSource<R>,
         sink: &mut impl GradientSink<R>,
@@ -382,14 +382,14 @@ impl<R: Real> Tracer<R> {
         let inverse = if last.is_some() { R::ONE } else { R::ONE / index };
         let mut by_index = [R::ZERO; BLOCK];
         for (j, by_index) in by_index.iter_mut().enumerate().take(count) {
-            if way.block.code[j] > R::ZERO {
+            if adjoint.block.code[j] > R::ZERO {
                 continue;
             }
             let seed = seeds.seed(j);
-            let (_, k) = way.block.state(j);
+            let (_, k) = adjoint.block.state(j);
             let direction = seed.direction * inverse;
-            way.set(j, seed.point, direction);
-            way.by_opl[j] = seed.opl;
+            adjoint.set(j, seed.point, direction);
+            adjoint.by_opl[j] = seed.opl;
             if last.is_none() {
                 *by_index = -(direction.dot(k) * inverse);
             }
@@ -400,12 +400,12 @@ impl<R: Real> Tracer<R> {
 
     /// The adjoint of the launch: the first optical direction is the index times the direction.
     #[inline(always)]
-    fn add_launch_index(&self, way: &AdjointBlock<R>, sink: &mut impl GradientSink<R>) {
+    fn add_launch_index(&self, adjoint: &AdjointBlock<R>, sink: &mut impl GradientSink<R>) {
         let inverse = R::ONE / self.index_before;
         let lanes = std::array::from_fn(|j| {
-            let (_, k) = way.block.state(j);
-            let by_index = way.by_k(j).dot(k) * inverse;
-            R::select(way.block.code[j] > R::ZERO, R::ZERO, by_index)
+            let (_, k) = adjoint.block.state(j);
+            let by_index = adjoint.by_k(j).dot(k) * inverse;
+            R::select(adjoint.block.code[j] > R::ZERO, R::ZERO, by_index)
         });
         sink.add_lanes(None, SurfaceParameter::Index, &lanes);
     }

@@ -77,7 +77,7 @@ fn each_kind_changes_the_pattern_as_it_says() {
     };
     for seed in 0..12 {
         let (_, count, mutant) = after(MutationKind::AddSinglet, seed);
-        assert_eq!((count, mutant.fresh.len()), (8, 1));
+        assert_eq!((count, mutant.new_glass.len()), (8, 1));
         assert_eq!(mutant.lens.surfaces.len(), lens.surfaces.len() + 2);
         let (_, count, _) = after(MutationKind::RemoveSinglet, seed);
         assert_eq!(count, 6);
@@ -111,7 +111,7 @@ fn limits_of_the_rules_are_reasons() {
     for kind in [MutationKind::RemoveSinglet, MutationKind::DropLayer] {
         assert_eq!(refused(kind, least.clone()).refusal, Refusal::TooFewElements);
     }
-    let held = SearchRules { kept: [13, 0], ..SearchRules::default() };
+    let held = SearchRules { fixed_ends: [13, 0], ..SearchRules::default() };
     for kind in MutationKind::MUTATIONS {
         assert!(mutate(kind, &lens, &held, &mut seeded(1)).is_err(), "{kind:?}");
     }
@@ -172,7 +172,9 @@ fn only_listed_glasses_are_used() {
     let mut random = seeded(3);
     for _ in 0..20 {
         let mutant = mutate(MutationKind::AddSinglet, &lens, &rules, &mut random).unwrap();
-        let Medium::Glass(name) = &mutant.lens.surfaces[mutant.fresh[0]].medium else { panic!() };
+        let Medium::Glass(name) = &mutant.lens.surfaces[mutant.new_glass[0]].medium else {
+            panic!()
+        };
         assert!(glasses.contains(name), "{name}");
     }
     let unknown = SearchRules { glasses: vec!["NO SUCH".to_owned()], ..generous() };
@@ -349,9 +351,9 @@ fn a_hundred_thousand_mutations_leave_a_lens() {
 
 /// The share of its axial pupil that a lens lets through at the wavelength of its focal length.
 fn clear(lens: &Lens) -> f64 {
-    let bench = RayModel::from_lens(lens, 0).unwrap();
+    let model = RayModel::from_lens(lens, 0).unwrap();
     let axis = FieldPoint { x: 0.0, y: 0.0, weight: 1.0 };
-    Region::new(bench.launch(axis, bench.primary).unwrap()).trace_pupil(4).signed_area()
+    Region::new(model.launch(axis, model.primary).unwrap()).trace_pupil(4).signed_area()
 }
 
 /// A new element shall not be punished for light that only its rims took away.

@@ -105,7 +105,7 @@ fn a_distance_alone_cannot_keep_the_focal_length() {
     let mut lens = bundled("singlet_la1131");
     lens.surfaces[1].thickness -= 10.0;
     lens.surfaces.push(Row { thickness: 10.0, ..Row::default() });
-    let rules = SearchRules { kept: [2, 0], ..generous() };
+    let rules = SearchRules { fixed_ends: [2, 0], ..generous() };
     let refusal = mutate(MutationKind::AddSinglet, &lens, &rules, &mut seeded(1)).unwrap_err();
     assert_eq!(refusal.refusal, Refusal::SingularProjection);
 }
@@ -209,7 +209,7 @@ fn a_zoom_lens_keeps_every_position() {
         let mutant = mutate(MutationKind::AddSinglet, &lens, &generous(), &mut random).unwrap();
         assert_equivalent(&lens, &mutant);
         let glass = mutant
-            .fresh
+            .new_glass
             .iter()
             .all(|row| matches!(mutant.lens.surfaces[*row].medium, Medium::Glass(_)));
         made += usize::from(glass);

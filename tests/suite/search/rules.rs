@@ -24,8 +24,8 @@ fn every_rule_is_checked_by_name() {
     let (nan, infinite) = (f64::NAN, f64::INFINITY);
     let bad: [(&str, &str, SearchRules); 22] = [
         ("elements", "[4, 2]", SearchRules { elements: [4, 2], ..usual() }),
-        ("kept", "[3, 5]", SearchRules { kept: [3, 5], ..usual() }),
-        ("kept", "7 of the lens", SearchRules { kept: [usize::MAX, usize::MAX], ..usual() }),
+        ("kept", "[3, 5]", SearchRules { fixed_ends: [3, 5], ..usual() }),
+        ("kept", "7 of the lens", SearchRules { fixed_ends: [usize::MAX, usize::MAX], ..usual() }),
         ("bend", "-1", SearchRules { weights: vec![(MutationKind::Bend, -1.0)], ..usual() }),
         ("flip", "NaN", SearchRules { weights: vec![(MutationKind::Flip, nan)], ..usual() }),
         (
@@ -62,7 +62,7 @@ fn every_rule_is_checked_by_name() {
         }
         assert!(refusal.len() < 250, "{refusal}");
     }
-    assert!(under(&triplet(), SearchRules { kept: [3, 4], ..usual() }).is_ok());
+    assert!(under(&triplet(), SearchRules { fixed_ends: [3, 4], ..usual() }).is_ok());
 }
 
 #[test]

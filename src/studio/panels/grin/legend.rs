@@ -105,13 +105,13 @@ pub(super) fn ray_legend(ui: &mut Ui, slice: &Slice) {
         ui.spacing_mut().item_spacing.x = 4.0;
         ui.label(RichText::new(text::slice_text(slice)).small().color(weak));
         let task = slice.document.task.as_ref();
-        for ways in slice.paths.iter().filter(|ways| !ways.paths.is_empty()) {
-            let name = task.and_then(|task| task.views.get(ways.view)).map(|view| &view.name);
+        for bundle in slice.paths.iter().filter(|bundle| !bundle.paths.is_empty()) {
+            let name = task.and_then(|task| task.views.get(bundle.view)).map(|view| &view.name);
             ui.add_space(4.0);
-            swatch(ui, color32(ray_color(ways.view, dark)));
-            let text = text::rays_text(name.map_or("", String::as_str), ways);
-            ui.label(RichText::new(text).small()).on_hover_text(text::distance_text(ways));
-            if let Some(text) = text::excluded_text(ways) {
+            swatch(ui, color32(ray_color(bundle.view, dark)));
+            let text = text::rays_text(name.map_or("", String::as_str), bundle);
+            ui.label(RichText::new(text).small()).on_hover_text(text::distance_text(bundle));
+            if let Some(text) = text::excluded_text(bundle) {
                 swatch(ui, lost);
                 ui.label(RichText::new(text).small().color(lost)).on_hover_text(
                     "Excluded rays are drawn to their end, which is marked by a dot",

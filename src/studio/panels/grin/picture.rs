@@ -19,8 +19,8 @@ use crate::studio::palette::{Palette, color32};
 
 /// The smallest distance of two contour labels, in points.
 const LABEL_SPACING: egui::Vec2 = egui::vec2(44.0, 16.0);
-/// The room around the whole slice and its rays, as a share of their size.
-const ROOM: f64 = 0.01;
+/// The margin around the whole slice and its rays, as a share of their size.
+const MARGIN: f64 = 0.01;
 
 /// The drawing of a slice.
 #[derive(Debug)]
@@ -67,8 +67,8 @@ impl SlicePicture {
         legend::ray_legend(ui, slice);
         let all = ui.available_rect_before_wrap();
         let split = (all.right() - legend::WIDTH).max(all.left() + 1.0);
-        let room = Rect::from_min_max(all.min, pos2(split, all.bottom()));
-        ui.scope_builder(UiBuilder::new().max_rect(room), |ui| {
+        let drawing = Rect::from_min_max(all.min, pos2(split, all.bottom()));
+        ui.scope_builder(UiBuilder::new().max_rect(drawing), |ui| {
             let label = text::slice_name(slice);
             let drawn = (&drawing.scene, drawing.full_view);
             let below = |ui: &Ui, shown: &SceneResponse| drawing.paint_colors(ui, shown, slice);
@@ -117,15 +117,18 @@ fn image(slice: &Slice, dark: bool) -> ColorImage {
 
 /// The extent that *Fit* shows: the slice, and its rays from before they enter to their screens.
 fn full_view(slice: &Slice) -> BoundingBox {
-    let rays =
-        slice.paths.iter().flat_map(|ways| &ways.paths).filter(|way| way.excluded().is_none());
-    let ends = rays.flat_map(|way| way.points.first().into_iter().chain(way.points.last()));
+    let rays = slice
+        .paths
+        .iter()
+        .flat_map(|bundle| &bundle.paths)
+        .filter(|path| path.excluded().is_none());
+    let ends = rays.flat_map(|path| path.points.first().into_iter().chain(path.points.last()));
     let ends = ends.map(|end| DVec2::from(slice.settings.plane.project(*end)));
     let corners = slice.frame.map(DVec2::from);
     let BoundingBox { min, max } = BoundingBox::around(corners.into_iter().chain(ends))
         .unwrap_or(BoundingBox { min: corners[0], max: corners[1] });
-    let room = ROOM * (max - min);
-    BoundingBox { min: min - room, max: max + room }
+    let margin = MARGIN * (max - min);
+    BoundingBox { min: min - margin, max: max + margin }
 }
 
 /// Contours, the boundary of the space, and rays.
@@ -141,19 +144,19 @@ fn scene(slice: &Slice, palette: &Palette, dark: bool) -> Scene {
     let [[left, low], [right, high]] = slice.frame;
     let corners = [[left, low], [right, low], [right, high], [left, high]].map(DVec2::from);
     scene.outline(&corners, 1.0, palette.faint);
-    for ways in &slice.paths {
+    for bundle in &slice.paths {
         let colours =
-            [legend::ray_color(ways.view, dark), palette.lost_ray, legend::ray_outline(dark)];
-        ways.paths.iter().for_each(|way| draw_ray_path(&mut scene, slice, way, colours));
+            [legend::ray_color(bundle.view, dark), palette.lost_ray, legend::ray_outline(dark)];
+        bundle.paths.iter().for_each(|path| draw_ray_path(&mut scene, slice, path, colours));
     }
     scene
 }
 
 /// A ray with a rim, legible on every colour; an excluded one in red to the dot where it ends.
-fn draw_ray_path(scene: &mut Scene, slice: &Slice, way: &RayPath, [ray, lost, rim]: [Rgba; 3]) {
+fn draw_ray_path(scene: &mut Scene, slice: &Slice, path: &RayPath, [ray, lost, rim]: [Rgba; 3]) {
     let seen = |point: &Vec3<f64>| DVec2::from(slice.settings.plane.project(*point));
-    let points: Vec<DVec2> = way.points.iter().map(seen).collect();
-    let counts = way.excluded().is_none();
+    let points: Vec<DVec2> = path.points.iter().map(seen).collect();
+    let counts = path.excluded().is_none();
     let color = if counts { ray } else { lost };
     scene.polyline(&points, 2.8, rim);
     scene.polyline(&points, 1.3, color);

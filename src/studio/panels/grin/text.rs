@@ -267,22 +267,22 @@ pub(super) fn slice_text(slice: &Slice) -> String {
 }
 
 /// The rays of a view that are drawn.
-pub(super) fn rays_text(name: &str, ways: &RayPaths) -> String {
-    format!("{name}: {}", counted(ways.paths.len() as u64, "ray"))
+pub(super) fn rays_text(name: &str, bundle: &RayPaths) -> String {
+    format!("{name}: {}", counted(bundle.paths.len() as u64, "ray"))
 }
 
 /// The largest distance of the rays from the slice.
-pub(super) fn distance_text(ways: &RayPaths) -> String {
+pub(super) fn distance_text(bundle: &RayPaths) -> String {
     format!(
         "Projected onto the slice; straight rays would stay within {} mm of it",
-        format_digits(ways.distance, 2)
+        format_digits(bundle.distance, 2)
     )
 }
 
 /// Those of them that do not count, by reason.
-pub(super) fn excluded_text(ways: &RayPaths) -> Option<String> {
+pub(super) fn excluded_text(bundle: &RayPaths) -> Option<String> {
     let mut reasons: Vec<(&str, usize)> = Vec::new();
-    for reason in ways.paths.iter().filter_map(RayPath::excluded) {
+    for reason in bundle.paths.iter().filter_map(RayPath::excluded) {
         match reasons.iter_mut().find(|(known, _)| *known == reason) {
             Some((_, count)) => *count += 1,
             None => reasons.push((reason, 1)),

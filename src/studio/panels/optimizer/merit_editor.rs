@@ -157,7 +157,9 @@ impl MeritEditor {
         }
         let rim = |v: &crate::lens::Variable| v.parameter.quantity == Quantity::SemiDiameter;
         if !lens.variables.iter().any(rim) {
-            let what = format!("{asked}: no semi-diameter is variable, so the rims cannot change.");
+            let what = format!(
+                "{asked}: no semi-diameter is variable, so the clear apertures cannot change."
+            );
             let hint = "Make every semi-diameter of the prescription variable, as one undo step";
             if warning_with_fix(ui, &what, "Vary the semi-diameters", hint) {
                 actions.push(add_variables_edit(lens, &[ParameterKind::SemiDiameters]));

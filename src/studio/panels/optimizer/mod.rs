@@ -49,8 +49,8 @@ impl Panel for OptimizerPanel {
             progress(ui, view, search);
             let frame = Frame::new().inner_margin(Margin { right: 10, ..Margin::ZERO });
             let plot = Side::bottom("merit history").frame(frame).show_separator_line(false);
-            let room = (0.45 * ui.available_height()).min(HISTORY);
-            plot.exact_size(room).show(ui, |ui| history_plot(ui, search));
+            let height = (0.45 * ui.available_height()).min(HISTORY);
+            plot.exact_size(height).show(ui, |ui| history_plot(ui, search));
         }
         if view.lens.variables.is_empty() {
             ui.colored_label(ui.visuals().warn_fg_color, NO_VARIABLES);

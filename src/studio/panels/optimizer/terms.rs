@@ -155,11 +155,11 @@ pub(super) fn default_terms(view: &SessionView) -> Vec<WeightedTerm> {
 
 /// The area of the pupil on the axis in mm², the mean over wavelengths.
 fn on_axis(numbers: &Analyses) -> Option<f64> {
-    let bench = &numbers.bench.value;
+    let model = &numbers.ray_model.value;
     let spots = numbers.spots.value.iter().flatten();
     let spot = spots.into_iter().find(|spot| spot.field.x == 0.0 && spot.field.y == 0.0)?;
-    let weights: f64 = bench.channels.iter().map(|color| color.weight).sum();
-    let lit = spot.channels.iter().zip(&bench.channels);
+    let weights: f64 = model.channels.iter().map(|color| color.weight).sum();
+    let lit = spot.channels.iter().zip(&model.channels);
     let area = lit.filter_map(|(spot, color)| Some(color.weight * spot.as_ref().ok()?.light.value));
     Some(area.sum::<f64>() / weights)
 }

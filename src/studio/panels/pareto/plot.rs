@@ -124,8 +124,8 @@ fn bounds(view: &SessionView, run: &ParetoRun) -> [RangeInclusive<f64>; 2] {
         let (low, high) = values
             .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), value| (l.min(value), h.max(value)));
         // A single point has no range of its own.
-        let room = (MARGIN * (high - low)).max(0.02 * high.abs()).max(f64::MIN_POSITIVE);
-        low - room..=high + room
+        let margin = (MARGIN * (high - low)).max(0.02 * high.abs()).max(f64::MIN_POSITIVE);
+        low - margin..=high + margin
     })
 }
 

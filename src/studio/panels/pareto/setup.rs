@@ -44,7 +44,7 @@ const BLUR: &str = "The transverse error of a ray at the rim of the pupil at whi
     sharpness are worth the same: the root of the weight. A small blur gives sharp lenses, a \
     large one bright lenses.";
 const COMPARE: &str = "Repeats the sweep with derivatives at fixed rays, as most programs compute \
-    them: they ignore how the rims change the light. Its front is drawn in grey.";
+    them: they ignore how the semi-diameters change the light. Its front is drawn in grey.";
 
 fn count(ui: &mut Ui, name: &str, value: &mut usize, range: RangeInclusive<usize>, hint: &str) {
     let drag = DragValue::new(value).range(range).speed(0.5);

@@ -25,7 +25,7 @@ pub(super) fn variables_label(ui: &mut Ui, view: &SessionView) {
     ui.add(Label::new(RichText::new(text).small().weak()).wrap()).on_hover_text(
         "If the lens has no variables, all curvatures and gaps are varied; the focal length and \
          the thicknesses of glass and air are constrained. The aperture becomes the semi-diameter \
-         of the stop, so that the rims alone limit the beam.",
+         of the stop, so that the semi-diameters alone limit the beam.",
     );
 }
 
@@ -50,11 +50,11 @@ fn variables_by_kind(lens: &Lens) -> String {
 pub(super) fn progress_text(run: &ParetoRun, status: RunStatus) -> String {
     let status = status_text(status);
     let leg = run.current_pass();
-    let kept = if run.biased.is_some() { ", fixed rays" } else { "" };
+    let biased = if run.biased.is_some() { ", fixed rays" } else { "" };
     let rate = leg.done as f64 / leg.seconds;
     let rate = if rate.is_finite() { format!(", {rate:.0} steps/s") } else { String::new() };
     let (done, total, seconds) = (leg.done, leg.total, leg.seconds);
-    format!("{status}{kept}: {done} of {total} steps{rate}, {seconds:.1} s")
+    format!("{status}{biased}: {done} of {total} steps{rate}, {seconds:.1} s")
 }
 
 /// The number of lenses, and the hypervolume of the fronts.
@@ -62,10 +62,10 @@ pub(super) fn hypervolume_label(ui: &mut Ui, run: &ParetoRun) {
     let main = &run.main;
     let (lenses, tried) = (main.front.points().len(), main.evaluated.len());
     let volume = main.hypervolume;
-    let kept = run.biased.as_ref();
-    let kept = kept.map(|leg| format!(", {:.4} with fixed rays", leg.hypervolume));
+    let biased = run.biased.as_ref();
+    let biased = biased.map(|leg| format!(", {:.4} with fixed rays", leg.hypervolume));
     let text = format!("{lenses} lenses on the front, {tried} tried; hypervolume {volume:.4}");
-    ui.label(text + &kept.unwrap_or_default()).on_hover_text(
+    ui.label(text + &biased.unwrap_or_default()).on_hover_text(
         "The area that the front covers in the plane of spot and light, against twice the spot of \
          the lens at the start, in multiples of the start's spot times its light: larger is better",
     );

@@ -294,8 +294,8 @@ impl PrescriptionTable<'_> {
 
     /// The gap behind a surface as it was traced.
     fn traced_gap(&self, surface: usize) -> Option<f64> {
-        let bench = &design_results(self.view)?.bench.value;
-        bench.channels[bench.primary].system.surfaces.get(surface).map(|s| s.thickness)
+        let model = &design_results(self.view)?.ray_model.value;
+        model.channels[model.primary].system.surfaces.get(surface).map(|s| s.thickness)
     }
 
     /// The largest height at which the drawn rays meet a surface.
@@ -408,8 +408,8 @@ impl PrescriptionTable<'_> {
         edit: impl Fn(&str) -> Result<Edit, String>,
     ) -> Response {
         let id = cell_id(column, row);
-        let room = if column.has_badge() { badge::WIDTH } else { 0.0 };
-        let size = vec2(ui.available_width() - room, ui.available_height());
+        let badge_width = if column.has_badge() { badge::WIDTH } else { 0.0 };
+        let size = vec2(ui.available_width() - badge_width, ui.available_height());
         let layout = Layout::left_to_right(Align::Center);
         let entry = ui.allocate_ui_with_layout(size, layout, |ui| self.buffers.show(ui, id, cell));
         let entry = entry.inner;
@@ -502,7 +502,7 @@ fn header(mut row: TableRow<'_, '_>, columns: &[TableColumn]) {
     });
     for column in columns {
         row.col(|ui| {
-            let room = if column.has_badge() { badge::WIDTH } else { 0.0 };
+            let badge_width = if column.has_badge() { badge::WIDTH } else { 0.0 };
             let left = matches!(column, TableColumn::Glass | TableColumn::Comment);
             let layout = if left {
                 Layout::left_to_right(Align::Center)
@@ -510,7 +510,7 @@ fn header(mut row: TableRow<'_, '_>, columns: &[TableColumn]) {
                 Layout::right_to_left(Align::Center)
             };
             ui.with_layout(layout, |ui| {
-                ui.add_space(room + 5.0);
+                ui.add_space(badge_width + 5.0);
                 ui.weak(column.title()).on_hover_text(column.hint());
             });
         });
@@ -528,9 +528,9 @@ fn row_label(surface: usize) -> String {
 }
 
 /// Shows a value that cannot be edited.
-fn read_only_cell(ui: &mut Ui, text: &str, room: f32) {
+fn read_only_cell(ui: &mut Ui, text: &str, badge_width: f32) {
     ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-        ui.add_space(room + 5.0);
+        ui.add_space(badge_width + 5.0);
         ui.weak(text);
     });
 }

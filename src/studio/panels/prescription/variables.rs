@@ -70,16 +70,16 @@ mod tests {
         let mut lens = files::parse(bundled.text.as_bytes(), bundled.name).unwrap().lens;
         let stop = lens.stop().unwrap();
         lens.variables.truncate(1);
-        let kept = lens.variables[0];
+        let first = lens.variables[0];
         let variables = |edit| if let Edit::SetVariables(all) = edit { all } else { Vec::new() };
         let radii = variables(add_variables_edit(&lens, &[ParameterKind::Curvatures]));
-        assert_eq!(radii[0], kept);
+        assert_eq!(radii[0], first);
         assert_eq!(radii.len(), lens.surfaces.len() - 1, "all but the stop in air");
         assert!(radii.iter().all(|variable| variable.parameter.surface != stop));
         let air = lens.surfaces.iter().filter(|row| row.medium == Medium::Air).count();
         assert_eq!(variables(add_air_gaps_edit(&lens)).len(), 1 + air);
-        let rims = add_variables_edit(&lens, &[ParameterKind::SemiDiameters]);
-        assert_eq!(variables(rims).len(), 1 + lens.surfaces.len());
+        let semi_diameters = add_variables_edit(&lens, &[ParameterKind::SemiDiameters]);
+        assert_eq!(variables(semi_diameters).len(), 1 + lens.surfaces.len());
         assert_eq!(variables(remove_variables_edit(&lens, Quantity::Curvature)).len(), 0);
     }
 }

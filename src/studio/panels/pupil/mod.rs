@@ -4,7 +4,7 @@
 //! are integrals over it, with their error, their rays and their time.
 
 mod picture;
-mod rims;
+mod sensitivities;
 mod text;
 
 use egui::{
@@ -57,12 +57,13 @@ impl Panel for PupilPanel {
         header(ui, view, pupils, actions);
         let shown = PupilView { known_limits: &self.known_limits, view, results, numbers, pupils };
         let all = ui.available_rect_before_wrap();
-        let (above, below) = all.split_top_bottom_at_y(all.bottom() - rims::height(ui, &shown));
+        let (above, below) =
+            all.split_top_bottom_at_y(all.bottom() - sensitivities::height(ui, &shown));
         ui.scope_builder(UiBuilder::new().max_rect(above), |ui| {
             shown.legend(ui, actions);
             shown.pictures(ui, actions);
         });
-        show_within(ui, below, |ui| rims::show_table(ui, &shown, actions));
+        show_within(ui, below, |ui| sensitivities::show_table(ui, &shown, actions));
     }
 }
 
@@ -152,13 +153,13 @@ struct PupilView<'a> {
 }
 
 impl PupilView<'_> {
-    fn bench(&self) -> &RayModel {
-        &self.numbers.bench.value
+    fn ray_model(&self) -> &RayModel {
+        &self.numbers.ray_model.value
     }
 
     /// The name of a limit.
     fn limit_name(&self, limit: PupilLimit) -> String {
-        self.bench().limit_name(limit)
+        self.ray_model().limit_name(limit)
     }
 
     fn limit_color(&self, palette: &Palette, limit: PupilLimit) -> egui::Color32 {

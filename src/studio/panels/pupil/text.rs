@@ -129,7 +129,9 @@ impl PupilView<'_> {
         let who = match limit {
             PupilLimit::Disc if outline.is_clear() => return "clear disc".to_owned(),
             PupilLimit::Disc => "pupil".to_owned(),
-            PupilLimit::Surface(i, RayLimit::Rim) if i == self.bench().stop() => "stop".to_owned(),
+            PupilLimit::Surface(i, RayLimit::Rim) if i == self.ray_model().stop() => {
+                "stop".to_owned()
+            }
             PupilLimit::Surface(i, RayLimit::Rim) => (i + 1).to_string(),
             PupilLimit::Surface(i, RayLimit::Obstruction) => format!("{} obstructs", i + 1),
             PupilLimit::Surface(i, RayLimit::Miss | RayLimit::Equator) => {
@@ -164,7 +166,7 @@ impl PupilView<'_> {
         else {
             return "Dark: no ray can be started. Give the stop a size.".to_owned();
         };
-        if self.bench().stop_radius() == 0.0 {
+        if self.ray_model().stop_radius() == 0.0 {
             return "Dark: the stop has no size. Give it a semi-diameter.".to_owned();
         }
         let surface = surface + 1;

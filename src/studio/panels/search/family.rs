@@ -54,8 +54,8 @@ pub(super) fn tree(ui: &mut Ui, run: &StructureSearchSnapshot, number: u64) -> O
         }
     }
     for (node, at) in shown.iter().zip(&places) {
-        let kept = node.offer.is_some_and(OfferOutcome::is_accepted);
-        let radius = if kept { 4.2 } else { 2.4 };
+        let accepted = node.offer.is_some_and(OfferOutcome::is_accepted);
+        let radius = if accepted { 4.2 } else { 2.4 };
         painter.circle_filled(*at, radius, moves::color(ui.visuals(), node.kind));
     }
     if let Some(at) = place_of(number) {

@@ -40,10 +40,10 @@ pub(super) fn cards(
     let is_kept = run.reservoir.iter().any(same);
     let best = (!is_kept).then_some(&run.best);
     let shown: Vec<&Arc<FoundLens>> = best.into_iter().chain(&run.reservoir).collect();
-    let room = ui.available_width();
+    let width = ui.available_width();
     let gap = 4.0;
-    let columns = ((room + gap) / (CARD.x + gap)).floor().max(1.0);
-    let size = vec2((room - gap * (columns - 1.0)) / columns, CARD.y);
+    let columns = ((width + gap) / (CARD.x + gap)).floor().max(1.0);
+    let size = vec2((width - gap * (columns - 1.0)) / columns, CARD.y);
     let mut clicked = None;
     ui.spacing_mut().item_spacing = vec2(gap, gap);
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small number")]

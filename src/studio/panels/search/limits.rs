@@ -130,7 +130,8 @@ pub(super) fn sampler_section(ui: &mut Ui, plan: &mut SearchPlan) {
             ui.end_row();
             ui.weak("Also variable");
             ui.horizontal(|ui| {
-                ui.checkbox(&mut local.rims, "rims").on_hover_text("Semi-diameters are variable");
+                ui.checkbox(&mut local.semi_diameters, "semi-diameters")
+                    .on_hover_text("Semi-diameters are variable");
                 let hint = "Indices of model glasses are variable; catalogue glasses are not";
                 ui.checkbox(&mut local.indices, "model glasses").on_hover_text(hint);
             });

@@ -152,7 +152,7 @@ impl SearchSetup {
         });
         ui.end_row();
         ui.weak("Fixed ends").on_hover_text("Surfaces that mutations do not change");
-        fixed_ends(ui, &mut rules.kept, view.lens.surfaces.len());
+        fixed_ends(ui, &mut rules.fixed_ends, view.lens.surfaces.len());
         ui.end_row();
         ui.weak("New glass");
         ui.horizontal(|ui| {

@@ -170,7 +170,7 @@ pub(super) fn outcome_text<P>(node: &LineageNode<P>) -> String {
         Some(DescentEnd::Mutation) => "ended by an accepted mutation",
         Some(DescentEnd::Budget) => "ended by its budget of gradients",
     };
-    let kept = match node.offer {
+    let offer = match node.offer {
         None => String::new(),
         Some(OfferOutcome::Entered) => "; retained".to_owned(),
         Some(OfferOutcome::Replaced(other)) => format!("; retained in place of lens {other}"),
@@ -185,5 +185,5 @@ pub(super) fn outcome_text<P>(node: &LineageNode<P>) -> String {
     };
     let (moves, gradients) = (counted(node.moves, "move"), counted(node.gradients, "gradient"));
     let chain = node.chain + 1;
-    format!("{merits}\n{moves}, {gradients} in chain {chain}: {end}{kept}")
+    format!("{merits}\n{moves}, {gradients} in chain {chain}: {end}{offer}")
 }

@@ -48,7 +48,7 @@ enum SensitivityKind {
 /// A group of two columns: all fields, or one.
 struct FieldColumns<'a> {
     name: String,
-    rims: Result<&'a RimSensitivities, String>,
+    sensitivities: Result<&'a RimSensitivities, String>,
 }
 
 /// The content of the table.
@@ -63,30 +63,30 @@ struct SensitivityTable<'a> {
 
 /// The height of the table below the pupils; 0 without sensitivities.
 pub(super) fn height(ui: &Ui, shown: &PupilView<'_>) -> f32 {
-    let Some(all) = &shown.pupils.all_rims else { return 0.0 };
+    let Some(all) = &shown.pupils.mean_sensitivities else { return 0.0 };
     let whole = TITLE
         + HEAD
         + ROW * limiting_surfaces(&SensitivityTable::new(shown, all), all).len().max(1) as f32
         + 8.0;
-    let room = ui.available_height() - PICTURES;
+    let height = ui.available_height() - PICTURES;
     // Where there is little room the pictures come first, and the title stands for the table.
-    if room < TITLE + HEAD + 1.5 * ROW { TITLE + 4.0 } else { whole.min(room) }
+    if height < TITLE + HEAD + 1.5 * ROW { TITLE + 4.0 } else { whole.min(height) }
 }
 
 /// The table below the pictures, as high as there is room.
 pub(super) fn show_table(ui: &mut Ui, shown: &PupilView<'_>, actions: &mut Actions) {
-    let Some(all) = &shown.pupils.all_rims else { return };
-    let room = ui.available_height();
+    let Some(all) = &shown.pupils.mean_sensitivities else { return };
+    let height = ui.available_height();
     let table = SensitivityTable::new(shown, all);
     let felt = limiting_surfaces(&table, all);
     ui.separator();
     ui.spacing_mut().item_spacing.y = 1.0;
     title(ui, shown, all, &felt);
-    if room < TITLE + HEAD {
+    if height < TITLE + HEAD {
         return;
     }
     if felt.is_empty() {
-        ui.weak("No rim limits the beam: the ideal entrance pupil does.");
+        ui.weak("No semi-diameter limits the beam: the ideal entrance pupil does.");
         return;
     }
     table.show(ui, &felt, actions);
@@ -104,10 +104,10 @@ fn title(ui: &mut Ui, shown: &PupilView<'_>, all: &RimSensitivities, felt: &[usi
         if !others.is_empty() {
             let text = format!("inactive: {others}");
             ui.label(RichText::new(text).small().weak())
-                .on_hover_text("No ray is limited by the rims of these surfaces");
+                .on_hover_text("No ray is limited by the semi-diameters of these surfaces");
         }
         ui.with_layout(Arrange::right_to_left(Align::Center), |ui| {
-            let cost = format!("{} rays in {:.2} ms", all.rays, shown.pupils.rims.ms);
+            let cost = format!("{} rays in {:.2} ms", all.rays, shown.pupils.sensitivities.ms);
             ui.label(RichText::new(cost).small().weak());
         });
     });
@@ -116,10 +116,14 @@ fn title(ui: &mut Ui, shown: &PupilView<'_>, all: &RimSensitivities, felt: &[usi
 impl<'a> SensitivityTable<'a> {
     fn new(shown: &'a PupilView<'_>, all: &'a RimSensitivities) -> Self {
         let fields = shown.results.lens.fields_at(shown.results.settings.zoom);
-        let mut groups = vec![FieldColumns { name: "All fields".to_owned(), rims: Ok(all) }];
-        for (point, rims) in fields.values.iter().zip(&shown.pupils.rims.value) {
+        let mut groups =
+            vec![FieldColumns { name: "All fields".to_owned(), sensitivities: Ok(all) }];
+        for (point, sensitivities) in fields.values.iter().zip(&shown.pupils.sensitivities.value) {
             let name = field_name(fields.kind, *point);
-            groups.push(FieldColumns { name, rims: rims.as_ref().map_err(ToString::to_string) });
+            groups.push(FieldColumns {
+                name,
+                sensitivities: sensitivities.as_ref().map_err(ToString::to_string),
+            });
         }
         let mut table =
             Self { groups, area: all.area, largest: [0.0; 2], selected: shown.view.selected };
@@ -129,15 +133,15 @@ impl<'a> SensitivityTable<'a> {
     }
 
     fn largest_of(&self, kind: SensitivityKind) -> f64 {
-        let known = self.groups.iter().filter_map(|group| group.rims.as_ref().ok());
-        let effects = known.flat_map(|rims| &rims.surfaces);
+        let known = self.groups.iter().filter_map(|group| group.sensitivities.as_ref().ok());
+        let effects = known.flat_map(|sensitivities| &sensitivities.surfaces);
         effects.map(|effect| self.change(effect, kind).value.abs()).fold(0.0, f64::max)
     }
 
     /// True if the rim limits the rays of some field.
     fn limits_rays(&self, surface: usize) -> bool {
-        let mut known = self.groups.iter().filter_map(|group| group.rims.as_ref().ok());
-        known.any(|rims| rims.surfaces[surface].is_significant())
+        let mut known = self.groups.iter().filter_map(|group| group.sensitivities.as_ref().ok());
+        known.any(|sensitivities| sensitivities.surfaces[surface].is_significant())
     }
 
     /// The change for one step: of the light in per cent, of the radius in µm.
@@ -153,7 +157,7 @@ impl<'a> SensitivityTable<'a> {
         ScrollArea::horizontal().auto_shrink([false, false]).show(ui, |ui| {
             ui.spacing_mut().item_spacing = vec2(0.0, 0.0);
             let mut table = TableBuilder::new(ui)
-                .id_salt(("rims", self.groups.len()))
+                .id_salt(("sensitivities", self.groups.len()))
                 .auto_shrink([false, false])
                 .striped(true)
                 .sense(Sense::click())
@@ -206,8 +210,8 @@ impl<'a> SensitivityTable<'a> {
 
     fn cell(&self, ui: &Ui, group: &FieldColumns<'_>, surface: usize, kind: SensitivityKind) {
         let rect = ui.max_rect();
-        let Ok(rims) = &group.rims else { return };
-        let change = self.change(&rims.surfaces[surface], kind);
+        let Ok(sensitivities) = &group.sensitivities else { return };
+        let change = self.change(&sensitivities.surfaces[surface], kind);
         let felt = change.value.abs() > change.error;
         let color =
             if felt { color(ui, kind, change.value) } else { ui.visuals().weak_text_color() };
@@ -224,8 +228,8 @@ impl<'a> SensitivityTable<'a> {
 
     /// A rim in one sentence.
     fn summary(&self, surface: usize) -> String {
-        let Ok(rims) = &self.groups[0].rims else { return String::new() };
-        let of = |kind| signed(self.change(&rims.surfaces[surface], kind).value);
+        let Ok(sensitivities) = &self.groups[0].sensitivities else { return String::new() };
+        let of = |kind| signed(self.change(&sensitivities.surfaces[surface], kind).value);
         format!(
             "Rim of surface {} by 0.1 mm: light {} %, RMS {} µm",
             surface + 1,
@@ -236,10 +240,10 @@ impl<'a> SensitivityTable<'a> {
 
     /// A rim with the errors of its numbers.
     fn details(&self, surface: usize) -> String {
-        let line = |group: &FieldColumns<'_>| match &group.rims {
-            Ok(rims) => {
+        let line = |group: &FieldColumns<'_>| match &group.sensitivities {
+            Ok(sensitivities) => {
                 let of = |kind, unit| {
-                    let change = self.change(&rims.surfaces[surface], kind);
+                    let change = self.change(&sensitivities.surfaces[surface], kind);
                     if change.value == 0.0 && change.error == 0.0 {
                         return "none".to_owned();
                     }
