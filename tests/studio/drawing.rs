@@ -57,7 +57,7 @@ fn distances(a: &RgbaImage, b: &RgbaImage) -> Vec<u8> {
 
 #[test]
 #[ignore = "needs a GPU or a software Vulkan driver"]
-fn the_card_draws_what_the_processor_draws() {
+fn the_gpu_draws_the_same_as_the_software_renderer() {
     let device = pollster::block_on(gpu::headless_device()).unwrap();
     let scene = lens_scene();
     assert_eq!(scene.segments.len(), 20_000 + 2 * 82 + 3);
@@ -73,7 +73,7 @@ fn the_card_draws_what_the_processor_draws() {
 
 #[test]
 #[ignore = "needs a GPU or a software Vulkan driver"]
-fn the_card_draws_an_empty_scene() {
+fn the_gpu_draws_an_empty_scene() {
     let device = pollster::block_on(gpu::headless_device()).unwrap();
     let scene = Scene::on([10, 20, 30, 255]);
     let picture = gpu::render_image(&device, &scene, camera(), [33, 7]).unwrap();

@@ -22,7 +22,7 @@ fn harness(purpose: FileRequest, near: &str) -> Harness<'static, State> {
 }
 
 #[test]
-fn a_typed_path_is_given_once_confirmed() {
+fn a_typed_path_is_returned_after_confirmation() {
     let mut harness = harness(FileRequest::Save, "");
     harness.run();
     harness.get_by_label("Path").type_text("better");
@@ -35,7 +35,7 @@ fn a_typed_path_is_given_once_confirmed() {
 }
 
 #[test]
-fn a_question_can_be_left_unanswered() {
+fn a_confirmation_can_be_cancelled() {
     let mut harness = harness(FileRequest::Open, "lens.json");
     harness.run();
     harness.get_by_label("Cancel").click();

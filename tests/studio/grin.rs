@@ -78,7 +78,7 @@ fn opened(name: &str, to_its_end: bool) -> GrinView {
 }
 
 #[test]
-fn without_a_task_the_panel_says_what_to_do_and_asks_for_nothing() {
+fn without_a_task_the_panel_shows_instructions() {
     let mut harness = panel(GrinView::default());
     harness.get_by_label_contains("Open a task and press Optimize");
     assert_eq!(harness.state().commands, []);
@@ -96,7 +96,7 @@ fn without_a_task_the_panel_says_what_to_do_and_asks_for_nothing() {
 }
 
 #[test]
-fn a_task_is_worked_on_turned_and_saved_by_buttons() {
+fn a_grin_design_is_run_turned_and_saved_by_buttons() {
     let ready = opened("luneburg-radial", false);
     let sight = ready.slice_settings;
     let mut harness = panel(ready.clone());
@@ -146,7 +146,7 @@ fn a_task_is_worked_on_turned_and_saved_by_buttons() {
 }
 
 #[test]
-fn a_found_field_has_its_numbers_curves_and_places() {
+fn a_designed_field_shows_values_curves_and_positions() {
     let found = opened("luneburg-radial", true);
     let mut harness = panel(found);
     harness.get_by_label_contains("Finished: step ");
@@ -179,7 +179,7 @@ fn a_found_field_has_its_numbers_curves_and_places() {
 }
 
 #[test]
-fn images_stand_beside_their_pictures() {
+fn images_are_shown_beside_their_targets() {
     let mut harness = panel(opened("display", false));
     harness.get_by_label("face: 11 rays");
     press(&mut harness, "Images");

@@ -51,7 +51,7 @@ fn edits(commands: &[Command]) -> Vec<&Edit> {
 }
 
 #[test]
-fn a_typed_radius_is_wished_for_at_enter() {
+fn a_typed_radius_is_committed_by_enter() {
     let mut harness = prescription();
     type_into(&mut harness, "Radius of surface 1", "15*1.1", Key::Enter);
     let wanted = Edit::set_radius(0, 15.0 * 1.1);
@@ -60,7 +60,7 @@ fn a_typed_radius_is_wished_for_at_enter() {
 }
 
 #[test]
-fn a_typed_thickness_is_wished_for_at_tab() {
+fn a_typed_thickness_is_committed_by_tab() {
     let mut harness = prescription();
     type_into(&mut harness, "Thickness of surface 2", "*2", Key::Tab);
     let parameter = Parameter::new(1, Quantity::Thickness);
@@ -71,7 +71,7 @@ fn a_typed_thickness_is_wished_for_at_tab() {
 }
 
 #[test]
-fn what_is_no_number_stays_in_its_cell_with_the_reason() {
+fn an_invalid_number_stays_in_its_cell_with_the_reason() {
     let mut harness = prescription();
     type_into(&mut harness, "Radius of surface 3", "abc", Key::Enter);
     assert_eq!(harness.state().commands, []);
@@ -81,7 +81,7 @@ fn what_is_no_number_stays_in_its_cell_with_the_reason() {
 }
 
 #[test]
-fn a_glass_that_nobody_makes_is_refused_with_its_surface() {
+fn an_unknown_glass_is_refused_with_its_surface() {
     let mut harness = prescription();
     type_into(&mut harness, "Glass of surface 3", "SCHOTT BK7", Key::Enter);
     assert_eq!(harness.state().commands, []);
@@ -89,7 +89,7 @@ fn a_glass_that_nobody_makes_is_refused_with_its_surface() {
 }
 
 #[test]
-fn escape_gives_up_what_was_typed() {
+fn escape_discards_a_typed_value() {
     let mut harness = prescription();
     type_into(&mut harness, "Radius of surface 1", "99", Key::Escape);
     assert_eq!(harness.state().commands, []);
@@ -120,7 +120,7 @@ fn the_object_can_come_near() {
 }
 
 #[test]
-fn a_badge_frees_and_fixes() {
+fn a_badge_toggles_a_variable() {
     let mut harness = prescription();
     harness.get_by_label("Radius of surface 1 variable").click();
     harness.run();
@@ -136,7 +136,7 @@ fn a_badge_frees_and_fixes() {
 }
 
 #[test]
-fn a_key_frees_the_number_under_the_cursor() {
+fn a_key_toggles_the_variable_under_the_cursor() {
     let mut harness = prescription();
     harness.get_by_label("Conic of surface 1").focus();
     harness.run();
@@ -211,7 +211,7 @@ fn optimizer(view: SessionView) -> Harness<'static, PanelState<OptimizerPanel>> 
 }
 
 #[test]
-fn optimize_wishes_for_a_search_with_the_terms_of_the_panel() {
+fn optimize_requests_a_run_with_the_terms_of_the_panel() {
     let mut harness = optimizer(view());
     type_into(&mut harness, "Weight of Spot", "3", Key::Enter);
     harness.get_by_label("Focal length").click();
@@ -241,7 +241,7 @@ fn goal_of(commands: &[Command]) -> &Goal {
 }
 
 #[test]
-fn more_light_is_asked_for_in_a_few_clicks() {
+fn a_light_term_is_added_in_a_few_clicks() {
     let mut lens = double_gauss();
     lens.aperture = Aperture::EntrancePupilDiameter(10.9);
     let mut harness = optimizer(crate::harness::view_of(lens.clone()));
@@ -268,7 +268,7 @@ fn more_light_is_asked_for_in_a_few_clicks() {
 }
 
 #[test]
-fn a_new_term_begins_with_what_the_lens_has() {
+fn a_new_term_starts_at_the_value_of_the_lens() {
     let mut harness = optimizer(view());
     for term in ["F-number", "Relative illumination", "Throughput"] {
         press(&mut harness, "Add a term");
@@ -287,7 +287,7 @@ fn a_new_term_begins_with_what_the_lens_has() {
 }
 
 #[test]
-fn kept_rays_are_said_to_be_blind_to_light() {
+fn fixed_rays_are_described_as_ignoring_light() {
     let mut harness = optimizer(view());
     assert!(harness.query_by_label_contains("Fixed rays carry no information").is_none());
     press(&mut harness, "Fixed rays");
@@ -306,7 +306,7 @@ fn a_semi_diameter_is_freed_by_its_badge() {
 }
 
 #[test]
-fn a_search_can_be_held_stepped_ended_and_taken() {
+fn an_optimization_can_be_paused_stepped_stopped_and_accepted() {
     let cases = [
         (RunStatus::Running, "Pause", Command::Pause),
         (RunStatus::Running, "Stop", Command::Stop),
@@ -368,7 +368,7 @@ fn pupils(lens: Lens) -> Harness<'static, PanelState<PupilPanel>> {
 }
 
 #[test]
-fn pupils_show_what_limits_them_with_area_and_error() {
+fn pupils_show_limits_area_and_error() {
     let harness = pupils(double_gauss());
     harness.get_by_label("Pupil of field 1: stop, surface 6 100 %");
     harness.get_by_label(
@@ -382,7 +382,7 @@ fn pupils_show_what_limits_them_with_area_and_error() {
 }
 
 #[test]
-fn a_limit_of_the_pupil_points_its_surface_out_and_no_longer() {
+fn clicking_a_pupil_limit_selects_and_deselects_its_surface() {
     let mut harness = pupils(double_gauss());
     for wanted in [Some(10), None] {
         harness.get_by_label("Rim of surface 11").click();
@@ -392,7 +392,7 @@ fn a_limit_of_the_pupil_points_its_surface_out_and_no_longer() {
 }
 
 #[test]
-fn rims_tell_what_a_tenth_of_a_millimetre_would_do() {
+fn sensitivities_predict_the_effect_of_a_tenth_of_a_millimetre() {
     let mut harness = pupils(double_gauss());
     for surface in [1, 6, 11] {
         harness.get_by_label_contains(&format!("Rim of surface {surface} by 0.1 mm: light +"));
@@ -405,7 +405,7 @@ fn rims_tell_what_a_tenth_of_a_millimetre_would_do() {
 }
 
 #[test]
-fn a_click_on_the_edge_of_a_pupil_points_its_surface_out() {
+fn a_click_on_a_pupil_edge_selects_its_surface() {
     let mut harness = pupils(double_gauss());
     // The rim of surface 1 is the lower edge of the third pupil: the first thing above its bottom.
     let picture = harness.get_by_label_contains("Pupil of field 3").rect();
@@ -434,7 +434,7 @@ fn the_wavelength_of_pupils_can_be_chosen() {
 }
 
 #[test]
-fn a_dark_pupil_says_what_ends_its_rays_and_what_to_do() {
+fn a_pupil_without_light_names_the_limits_and_a_remedy() {
     let mut lens = double_gauss();
     lens.fields.values[2].y = 40.0;
     let harness = pupils(lens);
@@ -444,7 +444,7 @@ fn a_dark_pupil_says_what_ends_its_rays_and_what_to_do() {
 }
 
 #[test]
-fn a_ragged_pupil_is_told_in_pieces() {
+fn an_irregular_pupil_is_reported_in_pieces() {
     let mut lens = double_gauss();
     let row = |curvature, thickness, medium, limit: f64| Row {
         curvature,
@@ -467,7 +467,7 @@ fn a_ragged_pupil_is_told_in_pieces() {
 }
 
 #[test]
-fn the_layout_tells_how_many_rays_are_lost_and_how() {
+fn the_layout_counts_lost_rays_by_fate() {
     let mut harness = panel_harness(LayoutPanel::new(RenderBackend::Software), view());
     harness.run();
     harness.get_by_label_contains("clipped of 45 rays");
@@ -475,7 +475,7 @@ fn the_layout_tells_how_many_rays_are_lost_and_how() {
 }
 
 #[test]
-fn first_order_data_are_there_by_name() {
+fn first_order_data_are_labelled() {
     let mut harness = panel_harness(FirstOrderPanel, view());
     harness.run();
     for text in ["Focal length", "49.389 mm", "Petzval radius", "Seidel sums, µm"] {
@@ -550,7 +550,7 @@ fn pareto_front(view: SessionView) -> Harness<'static, PanelState<ParetoPanel>> 
 }
 
 #[test]
-fn a_front_is_wished_for_with_the_settings_of_the_panel() {
+fn a_sweep_is_requested_with_the_settings_of_the_panel() {
     let mut harness = pareto_front(view());
     harness.get_by_label_contains("How sharp can this lens be for how much light?");
     harness.get_by_label("Compare with fixed rays").click();
@@ -562,7 +562,7 @@ fn a_front_is_wished_for_with_the_settings_of_the_panel() {
 }
 
 #[test]
-fn a_sweep_can_be_held_ended_exported_and_forgotten() {
+fn a_sweep_can_be_paused_stopped_exported_and_dismissed() {
     let cases = [
         (RunStatus::Running, "Pause", Command::PausePareto),
         (RunStatus::Paused, "Resume", Command::ResumePareto),
@@ -581,7 +581,7 @@ fn a_sweep_can_be_held_ended_exported_and_forgotten() {
 }
 
 #[test]
-fn lenses_of_the_front_are_stepped_through_and_taken() {
+fn front_lenses_are_browsed_and_accepted() {
     let view = fronts(RunStatus::Finished);
     let run = view.pareto.run.snapshot.clone().unwrap();
     let designs = run.main.front.points();
@@ -624,7 +624,7 @@ fn a_click_on_a_point_shows_its_lens() {
 }
 
 #[test]
-fn a_front_that_failed_says_why_and_a_dark_lens_cannot_begin_one() {
+fn a_failed_sweep_shows_its_reason() {
     let mut failed = view();
     failed.pareto.run.error = Some("surface 3 is steeper than a hemisphere".to_owned());
     pareto_front(failed).get_by_label("Surface 3 is steeper than a hemisphere");

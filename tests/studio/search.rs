@@ -175,7 +175,7 @@ fn searching(standing: RunStatus) -> SessionView {
 }
 
 #[test]
-fn a_search_is_wished_for_as_the_panel_says() {
+fn a_search_is_requested_with_the_settings_of_the_panel() {
     let mut harness = panel(view());
     harness.get_by_label_contains("Which lens of another structure is better?");
     press(&mut harness, "Paraxial projection");
@@ -193,7 +193,7 @@ fn a_search_is_wished_for_as_the_panel_says() {
 }
 
 #[test]
-fn every_field_may_keep_a_share_of_its_own() {
+fn each_field_may_keep_its_own_share_of_light() {
     let mut harness = panel(view());
     assert!(harness.query_by_label("Least light").is_some());
     press(&mut harness, "each field separately");
@@ -219,7 +219,7 @@ fn one_field() -> Fields {
 }
 
 #[test]
-fn limits_weights_and_the_sampler_are_there_by_name() {
+fn search_settings_are_labelled() {
     let mut harness = panel(view());
     for (part, fields) in [
         ("Manufacturing limits", ["Least glass on the axis", "Steepness", "set"].as_slice()),
@@ -235,7 +235,7 @@ fn limits_weights_and_the_sampler_are_there_by_name() {
 }
 
 #[test]
-fn a_search_can_be_held_ended_saved_and_forgotten() {
+fn a_search_can_be_paused_stopped_saved_and_dismissed() {
     let cases = [
         (RunStatus::Running, "Pause", StructureSearchCommand::Pause),
         (RunStatus::Paused, "Resume", StructureSearchCommand::Resume),
@@ -270,7 +270,7 @@ fn a_search_can_be_held_ended_saved_and_forgotten() {
 }
 
 #[test]
-fn a_lens_that_is_kept_is_compared_pinned_taken_and_exported() {
+fn a_retained_lens_is_compared_pinned_accepted_and_exported() {
     let mut harness = panel(searching(RunStatus::Running));
     harness.get_by_label_contains("Click a lens or a mark");
     harness.get_by_label_contains("Lens 1: 10 µm, 90 mm², 6 elements").click();
@@ -312,7 +312,7 @@ fn moves_are_counted_with_reasons() {
 }
 
 #[test]
-fn every_lens_tells_where_it_came_from() {
+fn the_family_page_shows_the_lineage_of_a_lens() {
     let mut harness = panel(searching(RunStatus::Stopped));
     press(&mut harness, "Family");
     harness.get_by_label("Family tree of 2 generations");
@@ -330,7 +330,7 @@ fn every_lens_tells_where_it_came_from() {
 }
 
 #[test]
-fn without_a_search_the_panel_says_what_is_missing() {
+fn without_a_search_the_panel_names_what_is_missing() {
     let mut failed = view();
     failed.structure_search.run.error = Some("surface 3 is steeper than a hemisphere".to_owned());
     panel(failed).get_by_label("Surface 3 is steeper than a hemisphere");

@@ -56,7 +56,7 @@ fn press(harness: &mut Window, name: &str) {
 }
 
 #[test]
-fn a_field_is_not_lost_without_a_question() {
+fn an_unsaved_field_is_not_discarded_without_confirmation() {
     let mut harness = formed();
     press(&mut harness, "Start over");
     harness.get_by_label("Save the field first?");
@@ -72,7 +72,7 @@ fn a_field_is_not_lost_without_a_question() {
 }
 
 #[test]
-fn a_field_that_is_in_a_file_is_replaced_at_once() {
+fn a_saved_field_is_replaced_without_confirmation() {
     let mut harness = formed();
     let path = std::env::temp_dir().join(format!("aplanat-{}-field.npz", std::process::id()));
     tell(&mut harness, GrinCommand::Save { path: path.clone(), nodes: 5 });

@@ -107,7 +107,7 @@ fn keys_undo_and_redo() {
 }
 
 #[test]
-fn a_refused_text_does_not_stand_in_the_way_of_undo() {
+fn a_refused_entry_does_not_block_undo() {
     let mut harness = window();
     type_radius(&mut harness, "*1.1");
     type_radius(&mut harness, "abc");
@@ -121,7 +121,7 @@ fn a_refused_text_does_not_stand_in_the_way_of_undo() {
 }
 
 #[test]
-fn changes_are_not_lost_without_a_question() {
+fn unsaved_changes_are_not_discarded_without_confirmation() {
     let mut harness = window();
     type_radius(&mut harness, "15");
     let lens = harness.state().session().lens().clone();
@@ -139,7 +139,7 @@ fn changes_are_not_lost_without_a_question() {
 }
 
 #[test]
-fn a_search_bends_the_shown_lens_and_its_result_is_one_step() {
+fn an_optimization_changes_the_preview_and_is_accepted_as_one_step() {
     let mut harness = window();
     let before = spots(&harness);
     harness.get_by_label("Optimize").click();
@@ -166,7 +166,7 @@ fn a_search_bends_the_shown_lens_and_its_result_is_one_step() {
 }
 
 #[test]
-fn a_search_over_structure_shows_its_lenses_and_one_is_taken_as_one_step() {
+fn a_structure_search_shows_lenses_and_one_is_accepted_as_one_step() {
     let mut harness = window();
     harness.get_by_label("Search").click();
     harness.run_steps(3);
@@ -273,7 +273,7 @@ fn an_experiment_runs_from_the_menu_and_shows_its_claims_and_pictures() {
 }
 
 #[test]
-fn nothing_repaints_while_nothing_changes() {
+fn an_idle_window_does_not_repaint() {
     let mut harness = window();
     harness.get_by_label("Radius of surface 1").focus();
     harness.run();
@@ -282,7 +282,7 @@ fn nothing_repaints_while_nothing_changes() {
 }
 
 #[test]
-fn a_field_is_looked_at_only_while_its_panel_is_shown() {
+fn a_field_is_analysed_only_while_its_panel_is_shown() {
     let mut harness = window();
     let forming = |harness: &Harness<'_, Studio>| harness.state().session().view().grin;
     assert!(!forming(&harness).is_active && forming(&harness).run.snapshot.is_none());

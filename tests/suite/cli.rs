@@ -98,14 +98,14 @@ fn help_is_printed_for_commands_and_topics() {
 }
 
 #[test]
-fn without_a_display_it_says_what_works() {
+fn without_a_display_the_message_names_what_works() {
     refused(1, &[], "", &["window", "aplanat info LENS", "aplanat --help"]);
     refused(1, &[LENS], "", &["window", "aplanat optimize"]);
     refused(1, &["measure", "window"], "", &["window"]);
 }
 
 #[test]
-fn wrong_usage_is_wrong_input() {
+fn wrong_usage_has_the_exit_status_of_invalid_input() {
     refused(2, &["info"], "", &["LENS"]);
     refused(2, &["tarce"], "", &["tarce", "subcommand"]);
     refused(2, &["info", LENS, "--zoom", "one"], "", &["one"]);
@@ -160,7 +160,7 @@ fn info_gives_first_order_data() {
 
 /// What is not known of a gradient-index medium is said, and everything else is there.
 #[test]
-fn a_lens_with_a_gradient_has_every_page() {
+fn every_panel_shows_a_lens_with_a_gradient_index() {
     const WOOD: &str = "lenses/wood_lens_60.json";
     let info = done_json(&["info", WOOD], "");
     assert_eq!(info["seidel"], Value::Null);
@@ -272,7 +272,7 @@ fn estimate(value: &Value) -> f64 {
 }
 
 #[test]
-fn analyze_gives_every_number_its_error_and_cost() {
+fn analyze_prints_every_number_with_error_and_cost() {
     let check = |value: &Value, keys: &[&str]| {
         keys.iter().for_each(|key| assert!(estimate(&value[key]).is_finite()));
     };
@@ -302,7 +302,7 @@ fn analyze_gives_every_number_its_error_and_cost() {
 }
 
 #[test]
-fn a_tolerance_is_kept() {
+fn a_spot_meets_its_tolerance() {
     let rms = |error: &str| {
         let field = &analyzed("spot", &["--field", "17", "--error", error])[0]["rms"];
         (estimate(field), field["error"].as_f64().unwrap())
@@ -346,7 +346,7 @@ fn gradient(lens: &str) -> (f64, Vec<f64>) {
 }
 
 #[test]
-fn a_gradient_is_what_a_changed_file_shows() {
+fn gradients_agree_with_differences_of_edited_files() {
     // The rims clip this field, and the pupil moves with the curvature.
     let lens = std::fs::read_to_string(LENS).unwrap();
     let changed = |name: &str, step: f64| {
@@ -362,7 +362,7 @@ fn a_gradient_is_what_a_changed_file_shows() {
 }
 
 #[test]
-fn a_gradient_that_does_not_exist_is_refused_by_name() {
+fn an_unknown_parameter_is_refused_by_name() {
     refused(2, &["gradient", LENS, "--term", "distortion"], "", &["distortion", "throughput"]);
     refused(2, &["gradient", LENS, "--method", "guess"], "", &["guess", "boundary"]);
     refused(2, &["gradient", LENS, "--field", "200"], "", &["200", "180"]);
@@ -500,7 +500,7 @@ fn ctrl_c_saves_the_best_so_far() {
 }
 
 #[test]
-fn convert_goes_both_ways_and_says_what_was_lost() {
+fn convert_works_both_ways_and_reports_losses() {
     let (zemax, native) = (Scratch::new("convert.zmx"), Scratch::new("convert.json"));
     let there = done_json(&["convert", LENS, zemax.path()], "");
     has_keys(&there["export"], &["format", "report", "proof"]);
@@ -515,7 +515,7 @@ fn convert_goes_both_ways_and_says_what_was_lost() {
 }
 
 #[test]
-fn convert_refuses_what_is_no_lens_and_where_it_cannot_write() {
+fn convert_refuses_invalid_lenses_and_unwritable_paths() {
     let out = Scratch::new("refused.json");
     let picture = Scratch::new("picture.zmx");
     std::fs::write(&picture.0, b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR\0\0\0\x01\0\0\0\x01").unwrap();
@@ -554,7 +554,7 @@ fn experiment_lists_all_and_refuses_others() {
 }
 
 #[test]
-fn measure_trace_has_a_rate_for_every_way() {
+fn measure_trace_has_a_rate_for_every_method() {
     let measured = done_json(&["measure", "trace", "--turns", "1"], "");
     has_keys(&measured["machine"], &["processor", "cores", "lane_bits", "optimised"]);
     let rows = measured["rows"].as_array().unwrap();
@@ -568,7 +568,7 @@ fn measure_trace_has_a_rate_for_every_way() {
 }
 
 #[test]
-fn measure_trace_tells_what_derivatives_cost() {
+fn measure_trace_reports_the_cost_of_derivatives() {
     let measured = done_json(&["measure", "trace", "--turns", "1"], "");
     assert!(measured["gradient_over_forward"].as_f64().unwrap() > 0.0);
     if cfg!(target_os = "linux") {
@@ -645,7 +645,7 @@ fn measure_optimize_has_a_cost_for_every_search() {
 
 #[cfg(unix)]
 #[test]
-fn a_closed_pipe_is_no_failure() {
+fn a_closed_pipe_is_not_an_error() {
     let mut command = Command::new(env!("CARGO_BIN_EXE_aplanat"));
     command.args(["info", LENS]).stdout(Stdio::piped()).stderr(Stdio::piped());
     let mut child = command.spawn().unwrap();
@@ -655,7 +655,7 @@ fn a_closed_pipe_is_no_failure() {
 }
 
 #[test]
-fn a_grin_task_is_worked_on_and_written_as_a_volume() {
+fn a_grin_task_is_optimized_and_written_as_a_volume() {
     let volume = Scratch::new("fibre.npz");
     let report = done_json(&["grin", "fibre", "--out", volume.path(), "--nodes", "9"], "");
     has_keys(&report, &["loss", "views", "error", "index", "rays", "steps", "ms", "memory"]);

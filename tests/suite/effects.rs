@@ -132,7 +132,7 @@ fn forcing_an_effect_off_changes_no_more_than_its_number() {
 }
 
 #[test]
-fn an_effect_that_is_left_out_is_not_there() {
+fn an_excluded_effect_is_not_modelled() {
     let um = 0.5875618;
     let phone = lens("phone_us7558005_1");
     let choices =
@@ -158,7 +158,7 @@ fn an_effect_that_is_left_out_is_not_there() {
 }
 
 #[test]
-fn a_figuring_that_moves_no_ray_is_left_out_and_one_that_does_is_not() {
+fn negligible_asphere_terms_are_dropped_and_others_kept() {
     let mut lens = lens("double_gauss_rudolph_50");
     lens.surfaces[3].asphere = vec![1e-14];
     lens.surfaces[8].asphere = vec![1e-6];
@@ -174,7 +174,7 @@ fn a_figuring_that_moves_no_ray_is_left_out_and_one_that_does_is_not() {
 }
 
 #[test]
-fn a_far_object_is_at_infinity_and_a_near_one_is_not() {
+fn distant_objects_count_as_infinite() {
     let mut lens = lens("double_gauss_rudolph_50");
     for (distance, finite) in [(1e9, false), (500.0, true)] {
         lens.object = Object::Finite(distance);
@@ -189,7 +189,7 @@ fn a_far_object_is_at_infinity_and_a_near_one_is_not() {
 }
 
 #[test]
-fn a_rim_that_no_ray_reaches_goes_and_the_others_stay() {
+fn unreached_semi_diameters_are_dropped_and_others_kept() {
     let mut lens = lens("double_gauss_rudolph_50");
     lens.surfaces[0].semi_diameter = Some(50.0);
     let auto = planned(&lens, 0, TASK, &EffectOverrides::default());
@@ -199,7 +199,7 @@ fn a_rim_that_no_ray_reaches_goes_and_the_others_stay() {
 }
 
 #[test]
-fn the_plan_aims_where_the_pupil_does() {
+fn the_plan_aims_as_the_ray_model_does() {
     for (name, lens) in library() {
         for zoom in 0..lens.zoom_positions() {
             let auto = planned(&lens, zoom, TASK, &EffectOverrides::default());
@@ -210,7 +210,7 @@ fn the_plan_aims_where_the_pupil_does() {
 }
 
 #[test]
-fn a_plan_survives_lenses_through_which_nothing_passes() {
+fn an_effect_plan_exists_for_lenses_without_light() {
     let mut lens = lens("double_gauss_rudolph_50");
     lens.surfaces[0].semi_diameter = Some(0.0);
     let auto = planned(&lens, 0, TASK, &EffectOverrides::default());

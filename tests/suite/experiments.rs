@@ -46,14 +46,14 @@ fn column(table: &DataTable, name: &str) -> Vec<f64> {
 }
 
 #[test]
-fn experiments_have_names_of_their_own() {
+fn experiment_ids_are_unique() {
     let ids: BTreeSet<&str> = ALL.iter().map(|study| study.id).collect();
     assert_eq!(ids.len(), ALL.len());
     assert!(experiments::find("no such figure").is_none());
 }
 
 #[test]
-fn an_experiment_stops_when_it_is_told_to() {
+fn an_experiment_stops_on_request() {
     for study in ALL {
         let mut asked = 0;
         let ended = (study.run)(Effort::Small, &mut |_| {
@@ -85,7 +85,7 @@ fn the_pupil_gains_corners_and_loses_area() {
 }
 
 #[test]
-fn images_have_derivatives_that_the_biased_ones_miss() {
+fn image_derivatives_include_terms_missing_from_biased_ones() {
     let outcome = outcome("3.5");
     let names = ["by_stop_boundary_mm", "by_stop_difference_mm", "by_stop_biased_mm"];
     let [boundary, difference, biased] = names.map(|name| column(&outcome.tables[0], name));
@@ -94,14 +94,14 @@ fn images_have_derivatives_that_the_biased_ones_miss() {
 }
 
 #[test]
-fn a_front_by_unbiased_gradients_dominates_the_biased_designs() {
+fn the_unbiased_front_dominates_the_biased_designs() {
     let outcome = outcome("3.6");
     assert!(outcome.lenses.len() > 4);
     assert!(outcome.lenses.iter().all(|(_, lens)| lens.check().is_ok()));
 }
 
 #[test]
-fn a_bright_lens_shows_sharper_what_moves() {
+fn a_fast_lens_resolves_moving_targets_better() {
     let outcome = outcome("3.8");
     let [dark, bright] =
         ["dark_moving", "bright_moving"].map(|name| column(&outcome.tables[1], name));
@@ -109,7 +109,7 @@ fn a_bright_lens_shows_sharper_what_moves() {
 }
 
 #[test]
-fn a_corner_is_brighter_by_gradients_that_see_it() {
+fn unbiased_gradients_reduce_vignetting_in_the_corner() {
     let outcome = outcome("3.9");
     let [biased, unbiased] =
         ["biased_cone", "unbiased_cone"].map(|name| column(&outcome.tables[0], name));
@@ -117,7 +117,7 @@ fn a_corner_is_brighter_by_gradients_that_see_it() {
 }
 
 #[test]
-fn zoom_lenses_get_better_between_their_positions_too() {
+fn zoom_lenses_improve_between_their_positions() {
     let outcome = outcome("3.10");
     let [start, now] = ["start_blur_mm", "blur_mm"].map(|name| column(&outcome.tables[0], name));
     assert!(start.iter().zip(&now).all(|(start, now)| now < start));
@@ -166,7 +166,7 @@ fn mutations_lead_beyond_the_front_of_one_structure() {
 }
 
 #[test]
-fn a_search_makes_the_lens_of_1962_sharper() {
+fn a_search_sharpens_the_lens_of_1962() {
     let outcome = outcome("teaser");
     let found = rows_with(&outcome.tables[0], "design", "found");
     assert_eq!(column(&found, "rms_mm").len(), 4);
@@ -194,7 +194,7 @@ fn the_adjoint_keeps_as_much_for_many_steps_as_for_few() {
 }
 
 #[test]
-fn a_display_shows_a_picture_to_each_of_two_beams() {
+fn a_display_forms_one_image_per_beam() {
     let outcome = outcome("5.4");
     let [correlation, light] =
         ["correlation", "light"].map(|name| column(&outcome.tables[0], name));
@@ -202,7 +202,7 @@ fn a_display_shows_a_picture_to_each_of_two_beams() {
 }
 
 #[test]
-fn finer_fields_show_sharper_pictures() {
+fn finer_fields_form_sharper_images() {
     let outcome = outcome("5.5");
     let tricubic = rows_with(&outcome.tables[0], "field", "tricubic");
     let quality = column(&tricubic, "quality_db");
@@ -210,7 +210,7 @@ fn finer_fields_show_sharper_pictures() {
 }
 
 #[test]
-fn a_multifocal_display_has_its_own_picture_on_every_screen() {
+fn a_multifocal_display_forms_a_different_image_on_each_screen() {
     let outcome = outcome("5.6");
     assert_eq!(column(&outcome.tables[0], "quality_db").len(), 3);
 }
@@ -223,7 +223,7 @@ fn caustics_are_rings_near_and_far() {
 }
 
 #[test]
-fn known_lenses_are_found_again() {
+fn known_grin_lenses_are_recovered() {
     let outcome = outcome("5.8");
     let relative = column(&outcome.tables[0], "relative");
     let shape = column(&outcome.tables[0], "without_offset");

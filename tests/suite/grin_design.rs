@@ -50,7 +50,7 @@ fn small() -> GrinTask {
 }
 
 #[test]
-fn grin_tasks_that_come_with_the_program_are_sound_and_round_trip() {
+fn grin_builtin_tasks_are_valid_and_round_trip() {
     assert!(BUILTIN_TASKS.len() >= 5 && grin_design::find_builtin("no such task").is_none());
     for builtin in BUILTIN_TASKS {
         let task = builtin.task().unwrap();
@@ -64,7 +64,7 @@ fn grin_tasks_that_come_with_the_program_are_sound_and_round_trip() {
 }
 
 #[test]
-fn grin_luneburg_is_found_as_a_function_of_the_radius() {
+fn grin_luneburg_is_recovered_as_a_radial_profile() {
     let runner = solved(&builtin("luneburg-radial"));
     let found = runner.task().difference(runner.best()).unwrap().unwrap();
     println!("luneburg-radial: {found:?}, {} rays", runner.rays_traced());
@@ -74,7 +74,7 @@ fn grin_luneburg_is_found_as_a_function_of_the_radius() {
 }
 
 #[test]
-fn grin_a_grid_finds_the_shape_better_than_the_level() {
+fn grin_a_grid_recovers_the_shape_better_than_the_constant() {
     let mut task = builtin("luneburg");
     task.levels =
         vec![RefinementLevel { nodes: 5, steps: 80 }, RefinementLevel { nodes: 9, steps: 100 }];
@@ -95,7 +95,7 @@ fn grin_a_grid_finds_the_shape_better_than_the_level() {
 }
 
 #[test]
-fn grin_a_fibre_focuses_three_times_and_is_the_secant() {
+fn grin_the_designed_fibre_is_the_hyperbolic_secant() {
     let runner = solved(&builtin("fibre"));
     let spots: Vec<f64> =
         runner.score(runner.best()).unwrap().views.iter().map(|view| view.spot).collect();
@@ -148,7 +148,7 @@ fn grin_descent_by_lbfgs_focuses_a_beam_within_its_limits() {
 }
 
 #[test]
-fn grin_light_as_from_another_field_finds_that_field() {
+fn grin_a_simulated_measurement_recovers_its_field() {
     let mut task = builtin("luneburg-radial");
     task.views[0].goal =
         LightGoal::Like { field: ReferenceField::Luneburg { radius: 1.0 }, direction: 1.0 };
@@ -159,7 +159,7 @@ fn grin_light_as_from_another_field_finds_that_field() {
 }
 
 #[test]
-fn grin_a_search_that_is_stopped_early_has_a_best_field() {
+fn grin_a_design_stopped_early_has_a_best_field() {
     let mut runner = GrinOptimizer::new(&builtin("luneburg-radial")).unwrap();
     let first = runner.score(runner.best()).unwrap().loss;
     for step in 1..=3 {
@@ -175,7 +175,7 @@ fn grin_a_search_that_is_stopped_early_has_a_best_field() {
 }
 
 #[test]
-fn grin_rays_that_cannot_count_are_told_by_reason() {
+fn grin_excluded_rays_are_counted_by_reason() {
     // Light wider than the ball: some of it passes by, some grazes.
     let mut task = small();
     task.field = FieldRepresentation::Trilinear { half: 3.0 };
@@ -198,7 +198,7 @@ fn grin_rays_that_cannot_count_are_told_by_reason() {
 }
 
 #[test]
-fn grin_chaotic_rays_are_found_by_their_way_back_and_counted() {
+fn grin_chaotic_rays_are_detected_by_retracing_and_counted() {
     let folder = std::env::temp_dir().join(format!("aplanat-{}-chaos.npz", std::process::id()));
     let grid = aplanat::grin::field::RegularGrid::cube(33, 1.0).unwrap();
     let values = (0..33 * 33 * 33).map(|i| 1.0 + 3.0 * (f64::from(i) * 0.754878).fract());
@@ -226,7 +226,7 @@ fn refused(change: impl FnOnce(&mut GrinTask)) -> String {
 }
 
 #[test]
-fn grin_tasks_that_make_no_sense_are_refused_by_name() {
+fn grin_invalid_tasks_are_refused_by_name() {
     let says = |found: String, words: &[&str]| {
         words.iter().for_each(|word| assert!(found.contains(word), "`{found}`: no `{word}`"));
     };
@@ -287,7 +287,7 @@ fn grin_a_single_voxel_works_and_one_without_free_nodes_is_refused() {
 }
 
 #[test]
-fn grin_a_display_comes_nearer_to_both_of_its_pictures() {
+fn grin_a_display_approaches_both_target_images() {
     let mut task = builtin("display");
     task.levels =
         vec![RefinementLevel { nodes: 5, steps: 20 }, RefinementLevel { nodes: 9, steps: 20 }];

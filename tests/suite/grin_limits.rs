@@ -61,7 +61,7 @@ fn anywhere() -> impl Iterator<Item = Vec3<f64>> {
 }
 
 #[test]
-fn grin_limits_of_the_index_are_kept_by_every_kind_of_field() {
+fn grin_every_kind_of_field_respects_index_limits() {
     for (field, method, nodes) in FIELDS {
         let task = greedy(field, method, nodes);
         let (first, runner) = (GrinOptimizer::new(&task).unwrap(), solved(&task));
@@ -87,7 +87,7 @@ fn grin_limits_of_the_index_are_kept_by_every_kind_of_field() {
 }
 
 #[test]
-fn grin_a_limit_of_the_slope_leaves_those_of_the_index_kept() {
+fn grin_a_slope_limit_preserves_index_limits() {
     for (field, method, nodes) in [FIELDS[0], FIELDS[3]] {
         let mut task = greedy(field, method, nodes);
         task.limits.slope = Some(0.06);
@@ -101,7 +101,7 @@ fn grin_a_limit_of_the_slope_leaves_those_of_the_index_kept() {
 }
 
 #[test]
-fn grin_a_broken_limit_is_told_with_its_place() {
+fn grin_a_violated_limit_is_reported_with_its_position() {
     let task = greedy(FieldRepresentation::Sphere { radius: 1.0 }, GrinMethod::LeastSquares, 9);
     let found = solved(&task);
     // The same field by the eye of a maker who can make less.

@@ -85,7 +85,7 @@ fn refused(drawing: TargetImage) -> String {
 }
 
 #[test]
-fn a_screen_far_away_shows_what_is_seen_at_infinity() {
+fn a_distant_screen_equals_one_at_infinity() {
     let far = quick("caustic-far", 15);
     let medium = solved(&far);
     let LightGoal::Far { drawing, angle, pixels } = far.views[0].goal.clone() else {
@@ -126,7 +126,7 @@ fn images_are_the_same_bits_on_one_thread_and_on_two() {
 }
 
 #[test]
-fn every_goal_across_a_beam_is_come_nearer_to() {
+fn every_beam_goal_is_approached() {
     for name in ["multifocal", "caustic-near", "caustic-far", "caustic"] {
         let mut runner = GrinOptimizer::new(&quick(name, 25)).unwrap();
         let before = runner.score(runner.best()).unwrap();
@@ -139,7 +139,7 @@ fn every_goal_across_a_beam_is_come_nearer_to() {
 }
 
 #[test]
-fn a_persons_own_picture_is_made_whatever_its_size() {
+fn target_images_of_any_size_are_accepted() {
     // A white disc in the upper half of a tall picture.
     let disc = |x: u32, y: u32| {
         let r = (f64::from(x) - 18.0).hypot(f64::from(y) - 18.0);
@@ -164,7 +164,7 @@ fn a_persons_own_picture_is_made_whatever_its_size() {
 }
 
 #[test]
-fn a_small_or_transparent_picture_is_a_picture() {
+fn small_and_transparent_images_are_read() {
     let one = Scrap::picture("one.png", [1, 1], |_, _| 7);
     let wanted = pixels(&one.drawing());
     assert!(wanted.iter().all(|value| (value - 1.0).abs() < 1e-12));
@@ -181,7 +181,7 @@ fn a_small_or_transparent_picture_is_a_picture() {
 }
 
 #[test]
-fn wrong_pictures_are_refused_with_their_file() {
+fn invalid_images_are_refused_with_their_file() {
     let says = |found: String, words: &[&str]| {
         words.iter().for_each(|word| assert!(found.contains(word), "`{found}`: no `{word}`"));
     };
@@ -240,7 +240,7 @@ fn wrong_goals_across_a_beam_are_refused_by_name() {
 }
 
 #[test]
-fn a_beam_that_misses_the_space_is_told_and_changes_nothing() {
+fn a_beam_that_misses_the_domain_is_reported_and_changes_nothing() {
     for name in ["caustic-near", "caustic-far", "caustic"] {
         let mut task = quick(name, 3);
         task.views[0].space = Some(Domain::Rod { radius: 0.2, from: -0.5, to: 0.5 });

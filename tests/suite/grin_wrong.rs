@@ -252,7 +252,7 @@ fn search() -> Vec<Row> {
 }
 
 #[test]
-fn grin_every_wrong_value_of_a_task_is_refused_in_its_own_words() {
+fn grin_every_invalid_value_of_a_task_has_its_own_message() {
     for (name, place, value, words) in [field(), light(), pictures(), search()].concat() {
         let found = refusal(name, place, Some(value.clone())).unwrap_or_default();
         let all = words.iter().all(|word| found.contains(word));
@@ -276,7 +276,7 @@ fn start(name: &str, bytes: &[u8], words: &[&str]) {
 }
 
 #[test]
-fn grin_volumes_that_cannot_be_are_refused_with_what_was_found() {
+fn grin_impossible_volumes_are_refused_with_the_value_found() {
     start("empty.npz", b"", &["an empty file", ".npz", "PK"]);
     start("text.npz", b"hello there", &["`hello there`", "header of a volume"]);
     start("one.npz", b"\x93NUMPY\x01\x00", &["a single array of NumPy", ".npz"]);
@@ -303,7 +303,7 @@ fn grin_volumes_that_cannot_be_are_refused_with_what_was_found() {
 }
 
 #[test]
-fn grin_options_that_cannot_be_are_refused_before_any_work() {
+fn grin_invalid_options_are_refused_before_any_work() {
     refused(2, &["grin", "fibre", "--out", "no/such/folder/a.npz"], "", &["no/such/folder"]);
     refused(2, &["grin", "fibre", "--minutes", "nan"], "", &["--minutes", "more than 0"]);
     refused(2, &["grin", "fibre", "--iterations", "-1"], "", &["-1"]);

@@ -133,7 +133,7 @@ fn every_lens_has_its_stated_focal_length() {
 }
 
 #[test]
-fn every_lens_is_the_same_after_writing_and_reading() {
+fn every_lens_round_trips() {
     for bundled in bundled_lenses() {
         let lens = opened(bundled);
         let text = json::write(&lens);
@@ -173,7 +173,7 @@ fn half_beam(lens: &Lens, zoom: usize) -> f64 {
 }
 
 #[test]
-fn light_on_the_axis_goes_through_every_lens_at_every_zoom_position() {
+fn axial_light_passes_every_lens_at_every_zoom_position() {
     for bundled in bundled_lenses() {
         let lens = opened(bundled);
         for zoom in 0..lens.zoom_positions() {

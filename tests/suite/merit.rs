@@ -111,7 +111,7 @@ fn every_term_has_the_derivative_of_its_value() {
 }
 
 #[test]
-fn every_term_knows_that_the_pupil_moves() {
+fn every_term_includes_the_motion_of_the_pupil() {
     for name in ["double_gauss_rudolph_50", "double_gauss_nikkor_s_50"] {
         let mut lens = bundled(name);
         lens.variables.clear();
@@ -156,7 +156,7 @@ fn half_dark() -> Lens {
 }
 
 #[test]
-fn dark_pupils_have_a_derivative_that_leads_back_to_light() {
+fn pupils_without_light_have_a_derivative_towards_light() {
     let lens = half_dark();
     for term in [Term::Throughput, Term::ThroughputLoss(200.0), Term::Light(0.8)] {
         check(&lens, term, PupilEdge::Moving, |quantity| 0.02 * step(quantity));

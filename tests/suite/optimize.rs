@@ -54,7 +54,7 @@ fn adam_sharpens_the_double_gauss() {
 
 /// A goal that asks for light gets sharpness without paying with it; one that does not, clips.
 #[test]
-fn sharpness_is_not_bought_with_light() {
+fn sharpness_is_not_gained_by_vignetting() {
     for method in [DescentMethod::DampedLeastSquares, DescentMethod::Adam] {
         let (before, after, light) = improve(method, 120, 1);
         assert!(after < 0.75 * before && light > 0.97, "{method:?}");
@@ -64,7 +64,7 @@ fn sharpness_is_not_bought_with_light() {
 }
 
 #[test]
-fn bounds_hold_and_a_lens_without_variables_is_refused() {
+fn bounds_hold_and_lenses_without_variables_are_refused() {
     let mut lens = bundled("achromat_ac254_100");
     lens.variables.clear();
     let goal = Goal::default_for(&lens).unwrap();
@@ -90,7 +90,7 @@ fn bounds_hold_and_a_lens_without_variables_is_refused() {
 /// Somewhere on its way this search proposes a lens in which a ray dies: the step is shortened, the
 /// ray and the number are named, and no lens on the way is ever invalid.
 #[test]
-fn a_step_that_kills_a_ray_is_shortened_and_says_so() {
+fn a_step_that_loses_a_ray_is_shortened_and_reported() {
     let mut lens = bundled("double_gauss_rudolph_50");
     let goal = Goal {
         terms: vec![WeightedTerm { term: Term::BackFocus(400.0), weight: 1.0 }, spot()],
@@ -147,7 +147,7 @@ fn a_lens_without_light_has_no_merit() {
 
 /// Light that was asked for is found again from darkness, of all fields and of some.
 #[test]
-fn a_dark_lens_that_is_asked_for_light_finds_the_way_back() {
+fn a_lens_without_light_recovers_under_a_light_term() {
     let sound = bundled("double_gauss_rudolph_50");
     let goal = Goal::default_for(&sound).unwrap();
     let full = Merit::new(&sound, &goal, 1e-3).unwrap().light();
@@ -169,7 +169,7 @@ fn a_dark_lens_that_is_asked_for_light_finds_the_way_back() {
 
 /// What follows a variable is written into every lens on the way, so that a table shows it.
 #[test]
-fn pickups_follow_the_search() {
+fn pickups_follow_the_optimization() {
     let mut lens = bundled("double_gauss_rudolph_50");
     let (front, back) = (Quantity::Curvature, Parameter::new(10, Quantity::Curvature));
     lens.variables.retain(|v| v.parameter != back);

@@ -30,7 +30,7 @@ fn swept(pupil: PupilEdge) -> ParetoSweep {
 }
 
 #[test]
-fn a_front_that_sees_light_covers_more_than_one_that_does_not() {
+fn the_unbiased_front_has_a_larger_hypervolume() {
     let [ours, biased] = [PupilEdge::Moving, PupilEdge::Frozen].map(swept);
     let [a, b] = [&ours, &biased].map(ParetoSweep::hypervolume);
     println!("hypervolume {a:.4}, biased {b:.4}");
@@ -62,7 +62,7 @@ fn a_front_is_the_same_on_one_thread_and_on_two() {
 }
 
 #[test]
-fn a_front_drops_what_is_beaten() {
+fn a_front_drops_dominated_points() {
     let start = ParetoPoint::evaluate(&lens(), None, 1e-4).unwrap();
     let design = |spot: f64, light: f64| ParetoPoint { spot, light, ..start.clone() };
     let mut front = Front::default();

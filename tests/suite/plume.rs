@@ -72,7 +72,7 @@ fn densities() -> Vec<f64> {
 }
 
 #[test]
-fn grin_a_volume_of_ones_own_is_found_in_any_precision() {
+fn grin_a_custom_volume_is_recovered_in_any_precision() {
     let folder = folder("own-volume");
     let q = densities();
     let map = |scale: f64| format!(r#""offset": 1.0003, "scale": {scale},"#);
@@ -105,7 +105,7 @@ fn grin_a_volume_of_ones_own_is_found_in_any_precision() {
 }
 
 #[test]
-fn grin_a_volume_that_is_wrong_is_refused_with_its_reason() {
+fn grin_an_invalid_volume_is_refused_with_a_reason() {
     let folder = folder("wrong-volume");
     let refused = |path: PathBuf| {
         let task = with_truth(&small(), ReferenceField::Volume(path.into()));
@@ -138,7 +138,7 @@ fn grin_a_volume_that_is_wrong_is_refused_with_its_reason() {
 }
 
 #[test]
-fn grin_a_volume_without_contrast_is_found_at_once() {
+fn grin_a_uniform_volume_is_recovered_at_once() {
     let folder = folder("empty-volume");
     let path = folder.join("air.npz");
     let grid = RegularGrid::cube(2, 1.0).unwrap();
@@ -156,7 +156,7 @@ fn grin_a_volume_without_contrast_is_found_at_once() {
 }
 
 #[test]
-fn grin_a_plume_in_one_voxel_does_as_well_as_it_can() {
+fn grin_a_plume_of_one_voxel_does_not_increase_the_loss() {
     let mut task = small();
     task.field = FieldRepresentation::Trilinear { half: 1.0 };
     task.edge = None;
@@ -204,7 +204,7 @@ fn wild() -> ReferenceField {
 }
 
 #[test]
-fn grin_a_plume_that_is_chaotic_is_told_and_nothing_becomes_nan() {
+fn grin_a_chaotic_plume_is_reported_and_stays_finite() {
     let folder = folder("wild");
     let path = folder.join("wild.npz");
     let exact = wild().field::<f64>().unwrap();
@@ -234,7 +234,7 @@ fn grin_a_plume_that_is_chaotic_is_told_and_nothing_becomes_nan() {
 }
 
 #[test]
-fn grin_rays_that_a_measurement_loses_are_left_out_and_counted() {
+fn grin_rays_lost_by_a_measurement_are_excluded_and_counted() {
     let mut task = with_truth(&small(), wild());
     task.views[0].source =
         LightSource::Parallel { directions: SourceDirections::Around(4), radius: 0.95, rays: 30 };
@@ -258,7 +258,7 @@ fn grin_rays_that_a_measurement_loses_are_left_out_and_counted() {
 }
 
 #[test]
-fn grin_rays_that_a_field_traps_are_told_as_trapped() {
+fn grin_trapped_rays_are_reported() {
     // Every ray of a fish-eye without a boundary is a circle, here within the cube.
     let folder = folder("fish-eye");
     let path = folder.join("fish-eye.npz");
@@ -348,7 +348,7 @@ fn steepest(medium: &GrinField, space: Domain) -> f64 {
 }
 
 #[test]
-fn grin_no_place_is_steeper_than_a_maker_allows() {
+fn grin_the_slope_limit_holds_everywhere() {
     let free = small();
     let radial = |mut task: GrinTask| {
         task.field = FieldRepresentation::Sphere { radius: 1.0 };

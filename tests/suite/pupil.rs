@@ -304,7 +304,7 @@ fn limits_have_names() {
 }
 
 #[test]
-fn a_stop_of_size_zero_is_dark() {
+fn a_stop_of_size_zero_passes_no_light() {
     let rows = [(0.01, 5.0, 1.5, 20.0), (-0.01, 10.0, 1.0, 20.0), (0.0, 80.0, 1.0, 0.0)];
     for aiming in [Aiming::Paraxial, Aiming::Chief, Aiming::Stop] {
         let model = model(system(&rows, 2), Aperture::StopSemiDiameter(0.0), 5.0, aiming);
@@ -314,7 +314,7 @@ fn a_stop_of_size_zero_is_dark() {
 }
 
 #[test]
-fn a_sliver_that_a_rim_cuts_off_is_seen() {
+fn a_sliver_cut_off_by_a_semi_diameter_is_found() {
     // The rim's shadow cuts off at most 0.2 % of the radius, and no ray of the first look is in it.
     for cut in [0.01, 0.002, 0.0005] {
         let rows = [(0.0, 100.0, 1.0, f64::INFINITY), (0.0, 50.0, 1.0, 60.0)];
@@ -336,7 +336,7 @@ fn a_sliver_that_a_rim_cuts_off_is_seen() {
 }
 
 #[test]
-fn a_rim_of_size_zero_is_dark() {
+fn a_semi_diameter_of_zero_passes_no_light() {
     for edge in [0.0, 3.0] {
         let rows = [(0.01, 5.0, 1.5, 20.0), (-0.01, 90.0, 1.0, 0.0)];
         for aperture in [Aperture::StopSemiDiameter(5.0), Aperture::EntrancePupilDiameter(10.0)] {
@@ -348,7 +348,7 @@ fn a_rim_of_size_zero_is_dark() {
 }
 
 #[test]
-fn a_beam_that_nothing_limits_is_endless() {
+fn a_beam_without_limits_has_no_finite_edge() {
     let rows = [(0.0, 10.0, 1.5, f64::INFINITY), (0.0, 10.0, 1.0, f64::INFINITY)];
     let mut model = model(system(&rows, 0), Aperture::StopSemiDiameter(1.0), 5.0, Aiming::Paraxial);
     let color = &mut model.channels[0];
@@ -359,7 +359,7 @@ fn a_beam_that_nothing_limits_is_endless() {
 }
 
 #[test]
-fn a_pupil_in_two_pieces_is_told_and_sampled() {
+fn a_pupil_in_two_pieces_is_detected_and_sampled() {
     // Strong spherical aberration: a small hole where a zone crosses the axis lets the middle and
     // that zone through, but not what lies between.
     let rows = [(0.02, 8.0, 1.5, 14.0), (-0.02, 44.4, 1.0, 14.0), (0.0, 5.0, 1.0, 0.12)];
@@ -396,7 +396,7 @@ fn lit(model: &RayModel, field: FieldPoint, tolerance: f64) -> aplanat::analysis
 }
 
 #[test]
-fn an_annular_pupil_is_one_piece_that_no_point_sees() {
+fn an_annular_pupil_is_connected_but_not_star_shaped() {
     for inner in [0.02, 0.1, 0.4, 0.75, 0.95] {
         for aiming in [Aiming::Paraxial, Aiming::Chief, Aiming::Stop] {
             let mut lens = system(&[(0.0, 50.0, 1.0, 5.0)], 0);
@@ -420,7 +420,7 @@ fn assert_ring(region: &Region<'_>) {
 }
 
 #[test]
-fn a_shadow_smaller_than_the_first_look_is_found() {
+fn an_obstruction_smaller_than_the_first_grid_is_found() {
     for inner in [0.05, 0.01, 1e-3, 1e-6] {
         for away in [0.0, 0.043, 0.51, 0.93, 0.9999] {
             for turn in [0.0f64, 0.2, 2.9] {
@@ -456,7 +456,7 @@ fn a_shadow_smaller_than_the_first_look_is_found() {
 }
 
 #[test]
-fn a_shadow_that_bites_the_edge_leaves_a_pupil_that_is_split_where_one_point_sees_it() {
+fn a_shadow_across_the_edge_splits_a_star_shaped_pupil() {
     let mut split = 0;
     for (inner, away) in
         [(2.0, 2.5), (2.0, 2.9), (0.5, 1.3), (0.02, 1.01), (0.2, 1.1), (2.0, 2.0), (0.5, 0.9)]
@@ -496,7 +496,7 @@ fn a_shadow_across_a_narrow_pupil_leaves_two_pieces() {
 }
 
 #[test]
-fn an_obstruction_as_wide_as_the_beam_is_dark() {
+fn an_obstruction_as_wide_as_the_beam_passes_no_light() {
     let (model, field) = shadowed(1.5, 0.2, 0.0);
     assert!(Region::new(model.launch(field, 0).unwrap()).is_dark());
 }
@@ -534,7 +534,7 @@ fn aimed_rays_cross_the_stop_where_they_should() {
 }
 
 #[test]
-fn a_fisheye_takes_light_from_behind_it() {
+fn a_fisheye_accepts_fields_beyond_90_degrees() {
     let lens = aplanat::files::open("lenses/fisheye_minolta_16_f28.json").unwrap().lens;
     let model = RayModel::from_lens(&lens, 0).unwrap();
     assert_eq!(model.aiming, Aiming::Chief);

@@ -44,7 +44,7 @@ fn a_front_is_written_with_every_lens() {
 }
 
 #[test]
-fn a_folder_that_is_a_file_is_named() {
+fn an_output_folder_that_is_a_file_is_named() {
     let start = ParetoPoint::evaluate(&bundled("double_gauss_rudolph_50"), None, 1e-3).unwrap();
     let front = Front::default();
     let survey = ParetoReport { name: "", start: &start, front: &front, tried: &[], biased: None };

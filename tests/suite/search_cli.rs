@@ -18,7 +18,7 @@ fn lasting(mut report: Value) -> Value {
 /// Kills a search at moments that have nothing to do with what it does, again and again; what it
 /// comes to in the end is what it would have come to undisturbed.
 #[test]
-fn a_search_that_is_killed_twenty_times_ends_as_if_it_had_not_been() {
+fn a_search_killed_twenty_times_ends_with_the_same_result() {
     let base = ["search", LENS, "--seed", "3", "--chains", "2", "--iterations", "1200"];
     let whole = done_json(&base, "");
     let checkpoint = Scratch::new("killed.json");
@@ -156,7 +156,7 @@ fn a_search_writes_its_lens_and_its_reservoir() {
 }
 
 #[test]
-fn samplers_race() {
+fn samplers_are_compared() {
     let report = done_json(&["measure", "search", LENS, "--seconds", "0.2", "--seeds", "1"], "");
     for rows in [&report["methods"], &report["tolerances"]] {
         for row in rows.as_array().unwrap() {
@@ -171,7 +171,7 @@ fn samplers_race() {
 
 /// No file that is read, or written by another argument, is written over.
 #[test]
-fn files_of_a_search_are_files_of_their_own() {
+fn search_files_have_distinct_names() {
     let copy = Scratch::with("own.json", &std::fs::read_to_string(LENS).unwrap());
     let other = Scratch::new("other-own.json");
     let wrong = |arguments: &[&str], words: &[&str]| {
@@ -191,7 +191,7 @@ fn files_of_a_search_are_files_of_their_own() {
 }
 
 #[test]
-fn a_search_says_what_is_not_kept() {
+fn a_search_lists_violated_constraints() {
     let base = ["search", LENS, "--iterations", "60", "--max-track", "90", "--elements", "4..5"];
     let report = done_json(&base, "");
     let start = report["start_breaks"].as_array().unwrap();

@@ -47,7 +47,7 @@ fn both(effect: &RimSensitivity) -> [analysis::Estimate; 2] {
 }
 
 #[test]
-fn what_a_rim_does_is_what_a_larger_one_shows() {
+fn semi_diameter_sensitivities_agree_with_differences() {
     let lens = double_gauss();
     for field in 0..3 {
         let rims = of(&lens, field, 1e-6).unwrap();
@@ -69,7 +69,7 @@ fn what_a_rim_does_is_what_a_larger_one_shows() {
 }
 
 #[test]
-fn fields_together_have_the_mean_light_and_the_root_mean_square() {
+fn combined_fields_have_mean_light_and_rms_spot() {
     let lens = double_gauss();
     let [axis, edge] = [0, 2].map(|field| of(&lens, field, 1e-3).unwrap());
     let both = analysis::mean_rim_sensitivities(&[(1.0, &axis), (3.0, &edge)]).unwrap();
@@ -84,7 +84,7 @@ fn fields_together_have_the_mean_light_and_the_root_mean_square() {
 }
 
 #[test]
-fn a_dark_field_has_no_derivative_and_says_why() {
+fn a_field_without_light_has_no_derivative_but_a_reason() {
     let mut lens = double_gauss();
     lens.fields.values[2].y = 40.0;
     assert!(matches!(of(&lens, 2, 1e-3), Err(DerivativeError::Dark(..))));

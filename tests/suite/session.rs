@@ -258,7 +258,7 @@ fn consecutive_edits_of_one_cell_are_one_step() {
 }
 
 #[test]
-fn refused_edits_leave_the_design_and_say_why() {
+fn refused_edits_keep_the_design_and_give_a_reason() {
     let cases = [
         (Edit::Set { parameter: GAP, value: f64::NAN }, "thickness after surface 2 is NaN"),
         (
@@ -306,7 +306,7 @@ fn wired() -> Lens {
 }
 
 #[test]
-fn what_names_a_row_follows_it_when_rows_come_and_go() {
+fn references_to_rows_follow_insertions_and_deletions() {
     let mut session = session(wired());
     let before = Arc::clone(session.lens());
     session.apply(Edit::InsertRow { at: 3, row: Row::default() }.into());
@@ -347,7 +347,7 @@ fn a_row_that_changes_nothing_changes_no_focal_length_wherever_it_is_put() {
 }
 
 #[test]
-fn a_group_turned_twice_is_what_it_was() {
+fn flipping_a_group_twice_restores_it() {
     let mut lens = wired();
     let asphere = Parameter::new(4, Quantity::Asphere(1));
     lens.surfaces[4].asphere = vec![1e-6, -2e-9];
@@ -373,7 +373,7 @@ fn a_group_turned_twice_is_what_it_was() {
 }
 
 #[test]
-fn a_scaled_lens_has_the_scaled_focal_length_and_goes_back() {
+fn scaling_a_lens_scales_the_focal_length_and_is_reversible() {
     for bundled in files::bundled_lenses() {
         let lens = lens(bundled.name);
         let um = lens.wavelengths[lens.primary()].um;
@@ -389,7 +389,7 @@ fn a_scaled_lens_has_the_scaled_focal_length_and_goes_back() {
 }
 
 #[test]
-fn the_image_plane_stays_where_it_was_when_the_solve_goes() {
+fn removing_a_solve_keeps_the_image_plane() {
     let mut lens = wired();
     lens.image_solve = Some(0.25);
     let um = lens.wavelengths[lens.primary()].um;
@@ -403,7 +403,7 @@ fn the_image_plane_stays_where_it_was_when_the_solve_goes() {
 }
 
 #[test]
-fn a_search_runs_beside_the_design_and_its_result_is_one_step() {
+fn a_search_runs_on_a_copy_and_its_result_is_one_undo_step() {
     let mut session = session(double_gauss());
     let before = Arc::clone(session.lens());
     session.apply(OPTIMIZE);
@@ -421,7 +421,7 @@ fn a_search_runs_beside_the_design_and_its_result_is_one_step() {
 }
 
 #[test]
-fn the_double_gauss_gets_better_in_the_background() {
+fn a_background_optimization_improves_the_double_gauss() {
     let lens = double_gauss();
     let goal = Goal::default_for(&lens).unwrap();
     let mut session = Session::new(lens, || {}).unwrap();
@@ -440,7 +440,7 @@ fn the_double_gauss_gets_better_in_the_background() {
 }
 
 #[test]
-fn a_discarded_search_leaves_the_design_alone() {
+fn a_discarded_optimization_leaves_the_design_unchanged() {
     let mut session = session(double_gauss());
     let before = session.view();
     session.apply(OPTIMIZE);
@@ -473,7 +473,7 @@ fn a_result_taken_after_an_edit_keeps_the_edit() {
 }
 
 #[test]
-fn pause_holds_and_step_advances_by_one() {
+fn a_paused_run_advances_by_single_steps() {
     let steps = Arc::new(AtomicUsize::new(0));
     let mut session = Session::with_optimizer(double_gauss(), toy(600, &steps), || {}).unwrap();
     session.apply(OPTIMIZE);
@@ -495,7 +495,7 @@ fn pause_holds_and_step_advances_by_one() {
 }
 
 #[test]
-fn a_search_that_breaks_says_so_and_the_next_one_works() {
+fn a_failed_search_is_reported_and_the_next_one_works() {
     let mut session = session(Lens { name: "breaks".into(), ..double_gauss() });
     session.apply(OPTIMIZE);
     wait(&mut session, "the failure", |view, _| {
@@ -514,7 +514,7 @@ fn a_search_that_breaks_says_so_and_the_next_one_works() {
 }
 
 #[test]
-fn the_threads_end_when_the_session_is_dropped() {
+fn threads_end_when_the_session_is_dropped() {
     let alive = Arc::new(());
     let steps = Arc::new(AtomicUsize::new(0));
     let held = Arc::clone(&alive);
@@ -614,7 +614,7 @@ fn a_beam_limited_by_the_stop_is_as_wide_as_before_in_one_step() {
 }
 
 #[test]
-fn what_rims_do_is_computed_with_the_pupils() {
+fn sensitivities_are_computed_with_the_pupils() {
     let settings = AnalysisSettings { pupils: true, ..AnalysisSettings::default() };
     let numbers = analyze(&double_gauss(), &settings).unwrap();
     let pupils = numbers.pupils.unwrap().value;
@@ -627,7 +627,7 @@ fn what_rims_do_is_computed_with_the_pupils() {
 }
 
 #[test]
-fn a_slow_window_holds_nothing_up_and_is_not_woken_too_often() {
+fn a_slow_window_delays_no_run_and_wakes_rarely() {
     let steps = Arc::new(AtomicUsize::new(0));
     let woken = Arc::new(AtomicUsize::new(0));
     let count = Arc::clone(&woken);
@@ -678,7 +678,7 @@ fn an_effect_that_is_switched_off_is_not_computed() {
 }
 
 #[test]
-fn when_there_is_time_the_cost_of_each_effect_is_measured() {
+fn effect_costs_are_measured_when_idle() {
     let mut session = session(double_gauss());
     wait(&mut session, "the measured plan", |view, _| {
         let numbers = view.results.as_ref().and_then(|results| results.analyses.as_ref().ok());
@@ -695,7 +695,7 @@ fn when_there_is_time_the_cost_of_each_effect_is_measured() {
 }
 
 #[test]
-fn every_number_of_every_library_lens_is_there_in_time() {
+fn every_library_lens_is_analysed_in_time() {
     for bundled in files::bundled_lenses() {
         let lens = lens(bundled.name);
         let settings = AnalysisSettings::default();
@@ -721,7 +721,7 @@ fn every_number_of_every_library_lens_is_there_in_time() {
 }
 
 #[test]
-fn a_design_is_saved_and_opened() {
+fn a_grin_design_is_saved_and_opened() {
     let folder = std::env::temp_dir().join(format!("aplanat-session-{}", std::process::id()));
     std::fs::create_dir_all(&folder).unwrap();
     let path = folder.join("lens.json");

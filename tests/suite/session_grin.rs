@@ -85,7 +85,7 @@ fn refused(session: &mut Session, path: &Path) -> String {
 }
 
 #[test]
-fn a_field_that_is_formed_in_the_background_has_the_bits_of_a_headless_one() {
+fn a_background_design_is_bit_identical_to_a_headless_one() {
     let folder = folder("forming");
     let path = folder.join("task.json");
     let task = coarse(
@@ -148,7 +148,7 @@ fn a_field_that_is_formed_in_the_background_has_the_bits_of_a_headless_one() {
 }
 
 #[test]
-fn nothing_is_computed_before_something_is_open_and_looked_at() {
+fn nothing_is_computed_before_a_document_is_open_and_shown() {
     let mut session = session();
     form(&mut session, GrinCommand::SetActive(true));
     form(&mut session, GrinCommand::Start);
@@ -222,7 +222,7 @@ fn slices_turn_and_show_every_quantity_with_rays_and_the_exact_field() {
 }
 
 #[test]
-fn images_of_a_display_stand_beside_their_pictures() {
+fn display_images_are_shown_beside_their_targets() {
     let folder = folder("display");
     let path = folder.join("task.json");
     let mut task = coarse("display", &[RefinementLevel { nodes: 4, steps: 2 }]);
@@ -291,7 +291,7 @@ fn volume(counts: [usize; 3], value: impl Fn(usize) -> f64) -> Volume {
 }
 
 #[test]
-fn a_volume_is_looked_at_and_written_in_the_other_format() {
+fn a_volume_is_shown_and_written_in_the_other_format() {
     let folder = folder("volume");
     let path = folder.join("volume.npz");
     let known = volume([3, 4, 5], |n| 1.0 + 0.01 * n as f64);
@@ -317,7 +317,7 @@ fn a_volume_is_looked_at_and_written_in_the_other_format() {
 }
 
 #[test]
-fn what_is_no_task_and_no_volume_is_refused_by_name_and_what_is_open_stays() {
+fn invalid_grin_files_are_refused_and_the_open_document_stays() {
     let folder = folder("refused");
     let mut session = session();
     form(&mut session, GrinCommand::OpenBuiltin("fibre".into()));

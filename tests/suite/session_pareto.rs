@@ -56,7 +56,7 @@ fn run(session: &Session) -> Arc<ParetoRun> {
 }
 
 #[test]
-fn a_front_fills_is_held_goes_on_and_ends_while_the_design_stays() {
+fn a_sweep_pauses_resumes_and_ends_without_changing_the_design() {
     let mut session = session(double_gauss());
     session.apply(start(NEVER, false));
     assert_eq!(session.view().pareto.run.status, RunStatus::Starting);
@@ -85,7 +85,7 @@ fn a_front_fills_is_held_goes_on_and_ends_while_the_design_stays() {
 }
 
 #[test]
-fn a_lens_of_the_front_is_looked_at_and_taken_as_one_step() {
+fn a_front_lens_is_previewed_and_accepted_as_one_undo_step() {
     let mut session = session(double_gauss());
     session.apply(start(SOON, false));
     stands(&mut session, RunStatus::Finished);
@@ -125,7 +125,7 @@ fn a_lens_of_the_front_is_looked_at_and_taken_as_one_step() {
 }
 
 #[test]
-fn kept_pupils_follow_and_earlier_runs_stay() {
+fn a_biased_sweep_follows_and_earlier_sweeps_remain() {
     let mut session = session(double_gauss());
     session.apply(start(SOON, true));
     stands(&mut session, RunStatus::Finished);
@@ -163,7 +163,7 @@ fn kept_pupils_follow_and_earlier_runs_stay() {
 }
 
 #[test]
-fn a_sweep_that_cannot_begin_says_why() {
+fn a_sweep_that_cannot_start_gives_a_reason() {
     let mut session = session(double_gauss());
     let settings = ParetoSettings { points: 0, ..ParetoSettings::default() };
     session.apply(Command::StartPareto { settings, compare: false });

@@ -58,7 +58,7 @@ fn folder(name: &str) -> PathBuf {
 }
 
 #[test]
-fn a_search_goes_on_is_held_and_ends_while_the_design_stays() {
+fn a_search_runs_pauses_and_ends_without_changing_the_design() {
     let mut session = session(double_gauss());
     start(&mut session, None);
     assert_eq!(session.view().structure_search.run.status, RunStatus::Starting);
@@ -88,7 +88,7 @@ fn a_search_goes_on_is_held_and_ends_while_the_design_stays() {
 }
 
 #[test]
-fn the_same_seed_finds_the_same_and_every_lens_has_its_line() {
+fn the_same_seed_gives_the_same_result_and_full_lineages() {
     let [first, second] = [(), ()].map(|()| {
         let mut session = session(double_gauss());
         start(&mut session, Some(60));
@@ -113,7 +113,7 @@ fn the_same_seed_finds_the_same_and_every_lens_has_its_line() {
 }
 
 #[test]
-fn a_person_steers_a_search_between_two_rounds() {
+fn the_user_steers_a_search_between_rounds() {
     let mut session = session(double_gauss());
     start(&mut session, None);
     wait(&mut session, "some moves", |view, _| moves(view) > 2);
@@ -163,7 +163,7 @@ fn the_layout_follows_a_chain() {
 }
 
 #[test]
-fn a_lens_that_was_found_is_taken_as_one_step() {
+fn a_found_lens_is_accepted_as_one_undo_step() {
     let mut session = session(double_gauss());
     start(&mut session, Some(20));
     stands(&mut session, RunStatus::Finished);
@@ -186,7 +186,7 @@ fn a_lens_that_was_found_is_taken_as_one_step() {
 }
 
 #[test]
-fn a_search_that_was_left_goes_on_as_if_it_had_never_ended() {
+fn a_search_left_unfinished_resumes_unchanged() {
     let folder = folder("left");
     let mut whole = session(double_gauss());
     start(&mut whole, Some(60));
@@ -223,7 +223,7 @@ fn a_search_that_was_left_goes_on_as_if_it_had_never_ended() {
 }
 
 #[test]
-fn a_forgotten_search_with_light_of_its_own_for_each_field_goes_on() {
+fn a_dismissed_search_with_light_per_field_can_be_resumed() {
     let folder = folder("forgotten");
     let mut first = session(double_gauss());
     first.set_save_folder(&folder);
@@ -247,7 +247,7 @@ fn a_forgotten_search_with_light_of_its_own_for_each_field_goes_on() {
 }
 
 #[test]
-fn a_person_chooses_where_a_search_is_saved() {
+fn the_user_chooses_where_a_search_is_saved() {
     let folder = folder("place");
     let mut session = session(double_gauss());
     let [before, behind] = ["a.json", "b.json"].map(|name| folder.join(name));
@@ -273,7 +273,7 @@ fn a_person_chooses_where_a_search_is_saved() {
 }
 
 #[test]
-fn a_search_that_cannot_begin_says_why() {
+fn a_search_that_cannot_start_gives_a_reason() {
     let mut session = session(double_gauss());
     let mut wrong = quest(None);
     wrong.plan.settings.chains = 0;
@@ -322,7 +322,7 @@ fn export(rules: impl Fn(&mut SearchRules), path: &Path) -> Session {
 }
 
 #[test]
-fn a_lens_is_exported_once_every_limit_is_kept() {
+fn a_lens_is_exported_only_when_every_limit_holds() {
     let folder = folder("export");
     std::fs::create_dir_all(&folder).unwrap();
     let path = folder.join("made.json");
@@ -337,7 +337,7 @@ fn a_lens_is_exported_once_every_limit_is_kept() {
 }
 
 #[test]
-fn a_lens_that_cannot_be_made_is_refused_by_name() {
+fn an_impossible_lens_is_refused_with_the_limit() {
     let path = folder("refused.json");
     let session = export(|rules| rules.track = Some(40.0), &path);
     let said = session.view().messages.last().unwrap().clone();

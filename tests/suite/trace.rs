@@ -205,7 +205,7 @@ fn an_obstruction_clips_inside_and_its_edge_passes() {
 }
 
 #[test]
-fn obstructed_rays_end_alike_in_blocks_and_alone() {
+fn obstructed_rays_have_the_same_fate_in_blocks_and_singly() {
     let (clear, system) = (system(), obstructed(1.0));
     let tracer = Tracer::new(&system).unwrap();
     let rays = some_rays(5000);

@@ -53,7 +53,7 @@ pub(super) fn compare(
 }
 
 #[test]
-fn aperture_gradients_of_all_numbers_are_those_of_differences_with_the_edge_found_anew() {
+fn aperture_gradients_agree_with_differences_of_recomputed_pupils() {
     let mut worst = Worst::default();
     for (name, zoom, fields) in CASES {
         let model = model(name, zoom);
@@ -83,7 +83,7 @@ fn beyond(found: &PupilDerivative, exact: &SystemGradient<f64>, slot: SurfacePar
 }
 
 #[test]
-fn aperture_gradients_are_as_good_as_asked_for_and_as_stated() {
+fn aperture_gradients_meet_the_requested_and_stated_accuracy() {
     for case in cases() {
         let model = case.model();
         let region = Region::new(case.launch(&model));
@@ -114,7 +114,7 @@ fn aperture_gradients_are_as_good_as_asked_for_and_as_stated() {
 }
 
 #[test]
-fn aperture_gradients_stop_where_the_rays_run_out_and_say_so() {
+fn aperture_gradients_report_an_exhausted_ray_budget() {
     let case = &cases()[2];
     let model = case.model();
     let region = Region::new(case.launch(&model));
@@ -133,7 +133,7 @@ fn aperture_gradients_stop_where_the_rays_run_out_and_say_so() {
 }
 
 #[test]
-fn an_aperture_in_one_piece_calls_for_its_boundary() {
+fn a_connected_pupil_selects_the_boundary_estimator() {
     for case in cases() {
         let model = case.model();
         let region = Region::new(case.launch(&model));

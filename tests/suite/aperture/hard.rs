@@ -158,7 +158,7 @@ fn aperture_gradients_converge_where_a_grazing_edge_meets_a_rim() {
 }
 
 #[test]
-fn aperture_gradients_with_two_limits_at_once_share_them() {
+fn aperture_gradients_split_coincident_limits() {
     // Two rims of the same size in a beam along the axis: the pupil shrinks with either, and grows
     // with both together alone.
     let rows = [(0.0, 5.0, 1.0, 4.0), (0.0, 10.0, 1.0, 4.0)];
@@ -227,7 +227,7 @@ fn aperture_gradients_hold_for_planes_and_equal_indices_in_a_collimated_beam() {
 }
 
 #[test]
-fn aperture_gradients_of_no_light_are_an_error_that_says_what_to_do() {
+fn aperture_gradients_without_light_are_an_error_with_a_remedy() {
     let rows = [(0.0, 50.0, 1.0, 4.0), (0.02, 5.0, 1.5, 5.0), (0.0, 50.0, 1.0, 5.0)];
     let clipped = model(system(&rows, 0));
     let closed = model(system(&[(0.0, 5.0, 1.0, 0.0)], 0));
@@ -434,7 +434,7 @@ fn aperture_gradients_by_the_warp_field_are_the_same_in_single_precision() {
 }
 
 #[test]
-fn an_aperture_of_one_axial_ray_is_dark_and_rays_along_the_axis_are_harmless() {
+fn a_zero_aperture_passes_no_light_and_axial_rays_are_finite() {
     // Fields on the axis: every estimator meets the axial ray or its neighbourhood.
     let rows = [(0.02, 5.0, 1.5, 10.0), (-0.02, 50.0, 1.0, 10.0)];
     let mut single = system(&rows, 0);

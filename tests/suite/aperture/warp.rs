@@ -160,7 +160,7 @@ fn region(model: &RayModel) -> Region<'_> {
 }
 
 #[test]
-fn aperture_gradients_where_a_disc_ends_the_beam_have_no_motion_of_it() {
+fn aperture_gradients_of_a_fixed_disc_have_no_edge_motion() {
     // Nothing clips: all of the derivative is that of fixed rays.
     let mut system = cases()[3].system();
     system.surfaces.iter_mut().for_each(|surface| surface.semi_diameter = f64::INFINITY);

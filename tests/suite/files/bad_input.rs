@@ -15,7 +15,7 @@ fn refusal(bytes: &[u8], name: &str) -> String {
 }
 
 #[test]
-fn a_file_that_is_not_there_is_named() {
+fn a_missing_file_is_named() {
     let error = files::open("no/such/lens.json").unwrap_err();
     assert!(matches!(error, FileError::Unreadable { .. }));
     assert!(error.to_string().starts_with("no/such/lens.json: cannot be read: "), "{error}");
@@ -23,7 +23,7 @@ fn a_file_that_is_not_there_is_named() {
 }
 
 #[test]
-fn what_is_no_lens_is_called_what_it_is() {
+fn files_that_are_not_lenses_are_identified() {
     let picture = b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR\0\0\0\x01\0\0\0\x01\x08\x02\0\0\0\x90wS\xDE";
     let text = refusal(picture, "scan.zmx");
     assert!(text.starts_with("scan.zmx: found a PNG picture; expected a lens"), "{text}");
@@ -42,7 +42,7 @@ fn what_is_no_lens_is_called_what_it_is() {
 }
 
 #[test]
-fn a_native_file_cut_anywhere_is_refused() {
+fn a_native_file_truncated_anywhere_is_refused() {
     let text = files::bundled_lenses()[0].text.trim_end();
     for end in (1..text.len()).step_by(7) {
         let message = refusal(&text.as_bytes()[..end], "a.json");
@@ -54,7 +54,7 @@ fn a_native_file_cut_anywhere_is_refused() {
 type Spoil = fn(&mut Lens);
 
 #[test]
-fn lenses_that_make_no_sense_are_refused_on_reading_and_on_writing() {
+fn invalid_lenses_are_refused_on_reading_and_writing() {
     let folder = folder("senseless");
     let wrong: [(&str, Spoil); 9] = [
         ("the lens has no surfaces", |lens| lens.surfaces.clear()),
@@ -87,7 +87,7 @@ fn lenses_that_make_no_sense_are_refused_on_reading_and_on_writing() {
 }
 
 #[test]
-fn a_target_that_cannot_be_written_keeps_what_it_was() {
+fn a_failed_write_leaves_the_existing_file() {
     let folder = folder("unwritable");
     let lens = double_gauss();
     let error = files::save(&lens, folder.join("no/such/folder/a.json")).unwrap_err();

@@ -87,7 +87,7 @@ fn seeds() -> Vec<Vec<u8>> {
 }
 
 #[test]
-fn no_spoiled_file_stops_the_program() {
+fn no_damaged_file_causes_a_panic() {
     let seeds = seeds();
     let mut random = Random(2);
     let (mut lenses, mut messages) = (0, 0);

@@ -23,7 +23,7 @@ fn without_bounds(mut lens: Lens) -> Lens {
 }
 
 #[test]
-fn every_library_lens_goes_through_zemax_and_comes_back() {
+fn every_library_lens_round_trips_through_zemax() {
     let folder = folder("round-trip");
     for (name, lens) in library() {
         let target = folder.join(format!("{name}.zmx"));
@@ -46,7 +46,7 @@ fn every_library_lens_goes_through_zemax_and_comes_back() {
 }
 
 #[test]
-fn every_foreign_file_is_the_same_after_export_and_import() {
+fn every_foreign_file_round_trips() {
     let folder = folder("foreign");
     for name in FOREIGN {
         let lens = files::parse(&foreign(name), name).unwrap().lens;
@@ -63,7 +63,7 @@ fn every_foreign_file_is_the_same_after_export_and_import() {
 }
 
 #[test]
-fn obstructions_go_through_both_formats() {
+fn obstructions_round_trip_in_both_formats() {
     let folder = folder("obstructions");
     let (_, mut lens) = library().next().unwrap();
     lens.surfaces[0].obstruction = Some(0.1 + 0.7);
@@ -82,7 +82,7 @@ fn obstructions_go_through_both_formats() {
 }
 
 #[test]
-fn what_an_export_cannot_hold_is_in_its_report() {
+fn losses_of_an_export_are_reported() {
     let folder = folder("losses");
     let (_, mut lens) = library().next().unwrap();
     let conic = |surface| Parameter::new(surface, Quantity::Conic);
@@ -105,7 +105,7 @@ fn what_an_export_cannot_hold_is_in_its_report() {
 }
 
 #[test]
-fn an_export_that_would_trace_differently_is_not_written() {
+fn an_export_that_traces_differently_is_refused() {
     let folder = folder("not-proven");
     let (_, mut lens) = library().next().unwrap();
     // The front of an immersion objective, object at the aplanatic point: steep rays leave through

@@ -16,7 +16,7 @@ fn example() -> Volume {
 }
 
 #[test]
-fn grin_volumes_come_back_bit_for_bit() {
+fn grin_volumes_round_trip_bit_for_bit() {
     let folder = folder("volume");
     for name in ["lens.npz", "lens.json"] {
         let path = folder.join(name);
@@ -43,7 +43,7 @@ fn grin_volumes_of_numpy_are_read_in_any_order_and_precision() {
 }
 
 #[test]
-fn grin_volumes_that_are_wrong_say_where() {
+fn grin_invalid_volumes_name_the_place() {
     let folder = folder("wrong volume");
     let refusal = |name: &str, bytes: &[u8]| {
         let path = folder.join(name);

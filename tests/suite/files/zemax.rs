@@ -94,7 +94,7 @@ fn the_achromat_is_what_its_file_says() {
 }
 
 #[test]
-fn the_report_says_what_became_of_every_line() {
+fn the_import_report_covers_every_line() {
     let text = achromat();
     let report = open(text.as_bytes()).unwrap().report.unwrap();
     assert_eq!(report.rows.len(), text.lines().count());
@@ -181,7 +181,7 @@ fn configurations_solves_and_pickups_are_read() {
 }
 
 #[test]
-fn apertures_fields_and_objects_are_read_in_every_kind() {
+fn every_kind_of_aperture_field_and_object_is_read() {
     let finite = achromat().replace("DISZ INFINITY", "DISZ 200");
     let with = |from: &str, to: &str| lens(&finite.replacen(from, to, 1));
     assert_eq!(with("ENPD 16.0", "OBNA 0.05 0").aperture, Aperture::ObjectNa(0.05));
@@ -258,7 +258,7 @@ fn obscurations_and_inner_radii_obstruct() {
 }
 
 #[test]
-fn solves_that_cannot_be_kept_are_frozen_and_said_so() {
+fn unsupported_solves_are_frozen_and_reported() {
     let cases = [
         (
             "CURV -2.4330900243309004E-2 1 0 0",

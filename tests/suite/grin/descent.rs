@@ -68,7 +68,7 @@ fn rows(
 }
 
 #[test]
-fn grin_luneburg_is_found_again_from_its_focus() {
+fn grin_luneburg_is_recovered_from_its_focus() {
     let region = GrinRegion::ball(1.0);
     let setup = until(Integrator::BlanesMoan, 0.12, region, LastStep::Fractional);
     let rays = fan(60, 0.995, -1.5);
@@ -143,7 +143,7 @@ fn grin_the_best_fibre_is_the_hyperbolic_secant() {
 }
 
 #[test]
-fn grin_descent_keeps_to_its_limits_and_says_when_it_ends() {
+fn grin_descent_respects_limits_and_reports_its_end() {
     // A valley along (1, 1) whose lowest point lies below the range.
     let evaluate = |p: &[f64]| {
         let (a, b) = (p[0] + p[1] - 1.0, p[0] - p[1]);

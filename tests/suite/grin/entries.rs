@@ -42,7 +42,7 @@ fn exact(ray: &GrinRay<f64>) -> (Vec3<f64>, Vec3<f64>) {
 }
 
 #[test]
-fn grin_a_ray_used_as_given_takes_no_notice_of_the_jump_it_enters_by() {
+fn grin_an_as_given_ray_ignores_the_index_jump_at_entry() {
     let field = fibre();
     let rays = slanted();
     for (last, tolerance) in [(LastStep::Fractional, 1e-9), (LastStep::BrokenLine, 2e-2)] {
@@ -65,7 +65,7 @@ fn grin_a_ray_used_as_given_takes_no_notice_of_the_jump_it_enters_by() {
 
 /// The three ways to come in differ by what they make of the same jump.
 #[test]
-fn grin_each_way_to_enter_a_jump_is_what_its_name_says() {
+fn grin_each_launch_mode_treats_the_index_jump_as_documented() {
     let field = fibre();
     let rays = slanted();
     let exits = |launch| {
@@ -196,7 +196,7 @@ fn off(single: &LossAndGradient<f32>, double: &LossAndGradient<f64>) -> [f64; 3]
 /// fall to the other side than in double precision, whatever the step; a digit beside it, or in a
 /// field that is smooth, only digits are lost. The way back is that of the same numbers everywhere.
 #[test]
-fn grin_single_precision_along_grid_planes_loses_digits_and_no_ray() {
+fn grin_single_precision_along_grid_planes_loses_no_ray() {
     let (half, odd) = (1.0 / 32.0, 0.487 / 16.0);
     for (name, step, shift) in [
         ("on planes, half a voxel a step", half, 0.0),

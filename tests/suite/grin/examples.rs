@@ -32,7 +32,7 @@ fn sharpest(mut lens: Lens, free: &[Parameter]) -> Lens {
 }
 
 #[test]
-fn grin_example_a_gradient_along_the_axis_takes_spherical_aberration_away() {
+fn grin_example_an_axial_gradient_corrects_spherical_aberration() {
     let graded = bundled("axial_gradient_singlet_50");
     let image = Parameter::new(1, Quantity::Thickness);
     let mut glass = graded.clone();

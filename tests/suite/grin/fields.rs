@@ -50,7 +50,7 @@ fn grin_gradients_and_hessians_are_the_derivatives_of_the_index() {
 }
 
 #[test]
-fn grin_deposits_are_the_transpose_of_the_derivative_by_the_parameters() {
+fn grin_accumulation_is_the_transpose_of_the_parameter_derivative() {
     type Slope = Dual<f64, 1>;
     for kind in kinds() {
         let plain = kind.field::<f64>(|_, value| value);
@@ -147,7 +147,7 @@ fn grin_lenses_have_their_textbook_indices() {
 }
 
 #[test]
-fn grin_a_tricubic_field_comes_near_a_function_with_the_fourth_order() {
+fn grin_tricubic_interpolation_converges_with_fourth_order() {
     let f = |p: Vec3<f64>| 1.5 / (1.0 + 0.4 * p.dot(p));
     let worst = |cells: usize| {
         let field = Tricubic::approximate(cells, 1.0, f).unwrap();
@@ -159,7 +159,7 @@ fn grin_a_tricubic_field_comes_near_a_function_with_the_fourth_order() {
 }
 
 #[test]
-fn grin_volumes_that_hold_nothing_are_refused_and_one_voxel_is_enough() {
+fn grin_empty_volumes_are_refused_and_one_voxel_suffices() {
     let low = vec3([0.0; 3]);
     let grid = |n| RegularGrid::new([n, 2, 2], low, vec3([1.0; 3])).unwrap();
     let few = |found| GridError::TooFew { axis: 'x', found, least: 2 };
@@ -179,7 +179,7 @@ fn grin_volumes_that_hold_nothing_are_refused_and_one_voxel_is_enough() {
 }
 
 #[test]
-fn grin_no_field_panics_or_loses_its_numbers_far_away() {
+fn grin_every_field_is_finite_far_away() {
     for kind in kinds() {
         let field = kind.field::<f64>(|_, value| value);
         for p in [[1e3, -1e3, 1e3], [1e200, 0.0, 0.0], [f64::NAN; 3], [f64::INFINITY; 3]] {

@@ -195,7 +195,7 @@ fn grin_the_same_bits_on_any_number_of_threads_and_one_by_one() {
 }
 
 #[test]
-fn grin_a_path_shows_every_step_and_ends_at_the_exit() {
+fn grin_a_path_has_every_step_and_ends_at_the_exit() {
     let (field, setup, rays) = trilinear();
     let tracer = GrinTracer::new(&*field, setup).unwrap();
     let (points, exit) = tracer.trace_path(&rays[150]);

@@ -62,7 +62,7 @@ fn limited<R: Clone>(end: &EndCondition<R>, limit: u32) -> EndCondition<R> {
 }
 
 #[test]
-fn grin_grazing_rays_say_how_flat_they_leave() {
+fn grin_grazing_rays_report_their_exit_angle() {
     let field = ProfileField::sphere(Luneburg::new(1.0));
     for last in [LastStep::Fractional, LastStep::BrokenLine] {
         for integrator in [Integrator::LeapfrogDkd, Integrator::BlanesMoan] {
@@ -108,7 +108,7 @@ fn grin_rays_along_grid_planes_end_where_rays_beside_them_do() {
 }
 
 #[test]
-fn grin_a_step_longer_than_a_voxel_is_still_exactly_undone() {
+fn grin_a_step_longer_than_a_voxel_is_exactly_reversible() {
     let field = rough::<f64>(33, 0.02);
     let setup = until(Integrator::LeapfrogDkd, 0.317, GrinRegion::cube(1.0), LastStep::BrokenLine);
     let outcome = trace(&field, setup, &beam(8, 0.8, -1.0));
@@ -148,7 +148,7 @@ fn grin_chaotic_rays_lose_their_gradient_and_are_counted() {
 }
 
 #[test]
-fn grin_a_ray_that_turns_back_is_told_from_one_that_goes_through() {
+fn grin_reflected_and_transmitted_rays_are_distinguished() {
     // The index falls towards +z: a mirage.
     let field = ProfileField::axial(Polynomial { coefficients: vec![1.2, -0.3] });
     let region = GrinRegion::block(vec3([-9.0, -9.0, -1.0]), vec3([9.0, 9.0, 1.0]));
@@ -247,7 +247,7 @@ fn grin_an_empty_field_and_a_single_voxel_leave_straight_rays_straight() {
 }
 
 #[test]
-fn grin_setups_that_make_no_sense_are_refused() {
+fn grin_invalid_setups_are_refused() {
     let field = ProfileField::sphere(Luneburg::new(1.0));
     let refused = |setup: GrinSetup<f64>| GrinTracer::new(&field, setup).unwrap_err();
     assert_eq!(refused(steps(Integrator::Pefrl, 0.0, 3)), GrinSetupError::Step(0.0));
@@ -259,7 +259,7 @@ fn grin_setups_that_make_no_sense_are_refused() {
 }
 
 #[test]
-fn grin_rays_that_are_no_numbers_or_overflow_are_told() {
+fn grin_nan_and_overflowing_rays_are_reported() {
     let field = ProfileField::sphere(Polynomial { coefficients: vec![1.0, 0.0, 0.5, 1e3] });
     let setup = until(Integrator::LeapfrogDkd, 0.5, GrinRegion::ball(1e30), LastStep::Fractional);
     let ray = |x: f64, v: f64| GrinRay { x: vec3([x, 0.0, 0.0]), v: vec3([v, 0.0, 0.3]) };

@@ -72,7 +72,7 @@ fn layers() -> Lens {
 }
 
 #[test]
-fn grin_lens_a_ray_that_cannot_go_on_turns_round() {
+fn grin_lens_a_ray_that_turns_back_has_its_own_fate() {
     let system = system(&layers());
     let tracer = Tracer::new(&system).unwrap();
     // n sin θ = 1.53 is the index 1.7 mm behind the face; 1.19 is lower than any.
@@ -95,7 +95,7 @@ fn grin_lens_a_ray_that_cannot_go_on_turns_round() {
 }
 
 #[test]
-fn grin_lens_light_where_there_is_no_index_ends_by_name() {
+fn grin_lens_rays_outside_the_valid_index_end_with_a_fate() {
     // Far outside any glass the polynomial falls to zero and below.
     for law in [ProfileLaw::Index, ProfileLaw::Square] {
         let mut system = system(&half_pitch(0.5));
@@ -223,7 +223,7 @@ fn agree(region: &Region<'_>, cost: &QuadraticIntegrand) -> SystemGradient<f64> 
 }
 
 #[test]
-fn grin_lens_the_edge_of_a_pupil_moves_with_every_number() {
+fn grin_lens_the_pupil_edge_depends_on_every_parameter() {
     let lens = clipped();
     let model = RayModel::with_aiming(&lens, 0, Aiming::Paraxial).unwrap();
     let region = Region::new(model.launch(lens.fields.values[1], 0).unwrap());
@@ -359,7 +359,7 @@ fn grin_lens_a_search_finds_the_term_in_r4_that_sharpens_a_rod() {
 }
 
 #[test]
-fn grin_lens_files_are_exact_and_say_what_is_wrong() {
+fn grin_lens_files_round_trip_and_name_errors() {
     for mut lens in [
         busy("square", &[-0.03, 5e-4], &[0.02, 0.1 + 0.2 - 0.3]),
         busy("sech", &[0.1], &[]),
@@ -439,7 +439,7 @@ fn grin_lens_effects_say_what_a_gradient_costs_and_leave_out_none() {
 }
 
 #[test]
-fn grin_lens_met_from_behind_light_retraces_its_way() {
+fn grin_lens_reversed_rays_retrace_their_path() {
     let system = system(&busy("square", &[-0.03, 5e-4], &[0.02, 0.003]));
     let there = Tracer::new(&system).unwrap().trace(ray(0.2, 0.7, 0.03, -0.05));
     assert!(there.fate.is_imaged());

@@ -55,7 +55,7 @@ fn grin_luneburg_focuses_with_the_order_of_each_integrator() {
 }
 
 #[test]
-fn grin_every_path_through_luneburg_to_its_focus_is_equally_long() {
+fn grin_all_optical_paths_to_a_luneburg_focus_are_equal() {
     let field = ProfileField::sphere(Luneburg::new(1.0));
     let plane: Vec<_> = onto_unit_ball()
         .iter()
@@ -164,7 +164,7 @@ fn luneburg_by_start(field: &dyn IndexField<f64>, integrator: Integrator, count:
 }
 
 #[test]
-fn grin_the_trilinear_adjoint_is_wrong_for_the_lens_and_smooth_fields_are_right() {
+fn grin_trilinear_adjoints_are_inaccurate_and_smooth_ones_exact() {
     let index = |p: Vec3<f64>| (2.0 - p.dot(p).min(1.9)).sqrt();
     let mut trilinear =
         Trilinear::from_function(RegularGrid::cube(65, 1.1).unwrap(), index).unwrap();

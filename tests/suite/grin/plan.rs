@@ -56,7 +56,7 @@ fn grin_the_plan_for_a_grid_keeps_within_voxels_and_says_so() {
 }
 
 #[test]
-fn grin_the_plan_does_without_rays_and_in_chaos() {
+fn grin_the_plan_works_without_rays_and_for_chaotic_rays() {
     let field = ProfileField::sphere(Luneburg::new(1.0));
     let empty =
         plan_tracing(&field, &GrinRegion::ball(1.0), LaunchMode::AsGiven, &[], 1e-6).unwrap();

@@ -27,7 +27,7 @@ fn whole(settings: &SearchSettings) -> (SearchRunOn<Rugged>, RunEnd) {
 }
 
 #[test]
-fn a_budget_is_used_up_and_not_exceeded() {
+fn a_gradient_budget_is_used_up_and_not_exceeded() {
     for gradients in [1, 2, 3, 4, 7, 19, 20, 21, 50, 137, 1000] {
         for method in [SearchMethod::Restore, SearchMethod::Metropolis] {
             let (run, over) = whole(&of(method, gradients));
@@ -42,7 +42,7 @@ fn a_budget_is_used_up_and_not_exceeded() {
 }
 
 #[test]
-fn threads_share_what_is_left_alike() {
+fn the_remaining_budget_is_divided_independently_of_threads() {
     for method in [SearchMethod::Restore, SearchMethod::Metropolis, SearchMethod::BruteForce] {
         let on = |threads: usize| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
@@ -70,7 +70,7 @@ fn moves_are_shortened_only_at_the_end() {
 }
 
 #[test]
-fn a_run_that_is_taken_up_again_shares_what_is_left_alike() {
+fn a_resumed_run_distributes_the_remaining_budget_alike() {
     let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("search").join("budget");
     fs::create_dir_all(&folder).unwrap();
     let path = folder.join("run.json");
@@ -88,7 +88,7 @@ fn a_run_that_is_taken_up_again_shares_what_is_left_alike() {
 }
 
 #[test]
-fn the_best_point_is_always_among_what_was_found() {
+fn the_best_point_is_always_among_the_results() {
     let mut run = begin(&of(SearchMethod::Restore, 2000));
     let mut running = 0;
     while run.end_reason().is_none() {

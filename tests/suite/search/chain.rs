@@ -92,7 +92,7 @@ fn brute_force_tries_each_element_once_each_way() {
 }
 
 #[test]
-fn threads_do_not_matter() {
+fn results_do_not_depend_on_threads() {
     for method in METHODS {
         let on = |threads: usize| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
@@ -119,7 +119,7 @@ fn chains_and_seeds_matter() {
 }
 
 #[test]
-fn the_tree_tells_every_descent() {
+fn the_lineage_lists_every_descent() {
     let mut run = begin(&settings(SearchMethod::Restore));
     let (mut born, mut ended) = (BTreeSet::from([0]), BTreeSet::new());
     let mut best = run.best().loss;
@@ -156,7 +156,7 @@ fn the_tree_tells_every_descent() {
 }
 
 #[test]
-fn a_long_run_remembers_little_but_all_ancestors() {
+fn a_long_run_stores_few_generations_but_all_ancestors() {
     let settings = SearchSettings {
         remembered: 20,
         moves: Some(8000),
@@ -182,7 +182,7 @@ fn a_long_run_remembers_little_but_all_ancestors() {
 }
 
 #[test]
-fn a_start_that_is_worth_nothing_is_refused() {
+fn a_start_without_finite_loss_is_refused() {
     for (fault, loss) in [(Fault::NotANumber, "NaN"), (Fault::Infinite, "inf")] {
         let refused = SearchRun::new(&Rugged::with(fault), START, &SearchSettings::default());
         let message = refused.unwrap_err().to_string();
@@ -191,7 +191,7 @@ fn a_start_that_is_worth_nothing_is_refused() {
 }
 
 #[test]
-fn descents_into_nothing_end_and_are_not_taken() {
+fn descents_to_infinite_loss_end_and_are_rejected() {
     for fault in [Fault::DescentLost, Fault::DescentInfinite] {
         for method in [SearchMethod::Restore, SearchMethod::BruteForce] {
             let landscape = Rugged::with(fault);
@@ -221,7 +221,7 @@ fn a_search_without_mutations_comes_to_an_end() {
 }
 
 #[test]
-fn every_temperature_is_sound() {
+fn every_temperature_gives_finite_densities() {
     for value in [0.0, 1e-300, 1e300, f64::INFINITY] {
         for method in METHODS {
             let temperature = Temperature::new(value);
@@ -234,7 +234,7 @@ fn every_temperature_is_sound() {
 }
 
 #[test]
-fn flat_and_huge_losses_are_sound() {
+fn flat_and_huge_losses_stay_finite() {
     for fault in [Fault::Flat, Fault::Huge] {
         for method in METHODS {
             let landscape = Rugged::with(fault);
@@ -247,7 +247,7 @@ fn flat_and_huge_losses_are_sound() {
 }
 
 #[test]
-fn a_reservoir_and_a_chain_of_one_search_too() {
+fn a_reservoir_of_one_and_a_single_chain_work() {
     let one = SearchSettings { reservoir: 1, chains: 1, ..settings(SearchMethod::Restore) };
     let mut run = begin(&one);
     to_the_end(&mut run, &Rugged::default());
@@ -256,7 +256,7 @@ fn a_reservoir_and_a_chain_of_one_search_too() {
 }
 
 #[test]
-fn settings_that_make_no_sense_are_refused_by_name() {
+fn invalid_settings_are_refused_by_name() {
     let good = SearchSettings::default();
     let wrong = [
         ("chains", SearchSettings { chains: 0, ..good.clone() }),
@@ -279,7 +279,7 @@ fn settings_that_make_no_sense_are_refused_by_name() {
 }
 
 #[test]
-fn a_pinned_branch_is_what_regenerations_begin_from() {
+fn regenerations_begin_from_the_pinned_lens() {
     let landscape = Rugged::default();
     let mut run = begin(&settings(SearchMethod::Restore));
     rounds(&mut run, &landscape, 150);
@@ -319,7 +319,7 @@ fn a_forbidden_kind_is_not_tried() {
 }
 
 #[test]
-fn heat_and_stop_are_obeyed() {
+fn reheat_and_stop_commands_take_effect() {
     let landscape = Rugged::default();
     let mut run = begin(&settings(SearchMethod::Restore));
     let first = run.temperature().value();
@@ -336,7 +336,7 @@ fn heat_and_stop_are_obeyed() {
 }
 
 #[test]
-fn the_best_point_of_a_living_descent_can_be_pinned() {
+fn the_best_point_of_an_active_descent_can_be_pinned() {
     let landscape = Rugged::default();
     let mut run = begin(&SearchSettings { c: 0.0, ..settings(SearchMethod::Restore) });
     rounds(&mut run, &landscape, 3);

@@ -26,7 +26,7 @@ fn after(rounds: usize, settings: &SearchSettings) -> SearchRunOn<Rugged> {
 }
 
 #[test]
-fn a_run_goes_on_bit_for_bit() {
+fn a_resumed_run_is_bit_identical() {
     let path = folder("resume").join("run.json");
     for method in [SearchMethod::Restore, SearchMethod::Metropolis, SearchMethod::BruteForce] {
         for value in [None, Some(0.0), Some(f64::INFINITY)] {
@@ -44,7 +44,7 @@ fn a_run_goes_on_bit_for_bit() {
 }
 
 #[test]
-fn a_hand_on_the_run_is_in_its_file() {
+fn steering_commands_are_stored_in_the_checkpoint() {
     let path = folder("steered").join("run.json");
     let landscape = Rugged::default();
     let mut run = after(40, &settings(SearchMethod::Restore));
@@ -56,7 +56,7 @@ fn a_hand_on_the_run_is_in_its_file() {
 }
 
 #[test]
-fn ends_may_move_and_nothing_else() {
+fn a_resumed_run_may_only_change_its_limits() {
     let path = folder("settings").join("run.json");
     let landscape = Rugged::default();
     let first = settings(SearchMethod::Restore);
@@ -89,7 +89,7 @@ fn ends_may_move_and_nothing_else() {
 }
 
 #[test]
-fn brute_force_has_divided_its_gradients() {
+fn brute_force_divides_its_gradients() {
     let path = folder("brute").join("run.json");
     let first = settings(SearchMethod::BruteForce);
     after(3, &first).save(&Rugged::default(), &path).unwrap();
@@ -148,7 +148,7 @@ fn a_damaged_file_is_refused() {
 }
 
 #[test]
-fn what_cannot_be_written_leaves_what_was_there() {
+fn a_failed_save_leaves_the_existing_file() {
     let folder = folder("unwritable");
     let run = after(5, &settings(SearchMethod::Restore));
     assert!(run.save(&Rugged::default(), &folder).is_err());

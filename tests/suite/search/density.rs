@@ -35,7 +35,7 @@ fn a_density_follows_the_printed_formula() {
 }
 
 #[test]
-fn chances_follow_the_printed_formulas() {
+fn probabilities_follow_the_printed_formulas() {
     let (temperature, c) = (at(1.3), 0.05);
     for (before, after) in [(0.9, 0.9), (0.9, 1.1), (0.9, 0.88), (0.9, 0.5), (4.0, 3.9)] {
         let [old, new] = [before, after].map(|loss| temperature.density(loss));
@@ -51,13 +51,13 @@ fn chances_follow_the_printed_formulas() {
 }
 
 #[test]
-fn a_descent_that_stands_still_at_one_half_lasts_eleven_moves() {
+fn a_stationary_descent_at_density_one_half_lasts_eleven_moves() {
     let chance = Termination::Ratio.chance(Temperature::at_half_density(0.7), 0.05, 0.7, 0.7);
     assert!((1.0 / chance - 11.0).abs() < 1e-9);
 }
 
 #[test]
-fn far_below_its_constant_a_descent_ends_unless_it_is_relative() {
+fn far_below_the_constant_only_the_ratio_rule_ends_a_descent() {
     // A mutation of fifteen times the loss, and a move that takes a third of it away.
     let temperature = Temperature::at_half_density(1.0);
     let chance = |rule: Termination| rule.chance(temperature, 0.05, 15.0, 10.0);
@@ -66,7 +66,7 @@ fn far_below_its_constant_a_descent_ends_unless_it_is_relative() {
 }
 
 #[test]
-fn without_heat_only_the_order_of_losses_is_left() {
+fn at_zero_temperature_only_the_order_of_losses_matters() {
     for rule in RULES {
         let chance = |before, after| rule.chance(at(0.0), 0.25, before, after);
         assert_eq!(chance(2.0, 1.0), 0.0, "{rule:?}");
@@ -79,7 +79,7 @@ fn without_heat_only_the_order_of_losses_is_left() {
 }
 
 #[test]
-fn with_endless_heat_every_move_is_as_good() {
+fn at_infinite_temperature_ends_do_not_depend_on_losses() {
     for rule in RULES {
         let chance = |before, after| rule.chance(at(f64::INFINITY), 0.25, before, after);
         for (before, after) in [(1.0, 1.0), (1.0, 1e300), (1e300, -1e300)] {
@@ -89,7 +89,7 @@ fn with_endless_heat_every_move_is_as_good() {
 }
 
 #[test]
-fn a_chance_is_one_whatever_the_numbers_are() {
+fn termination_probabilities_are_valid_for_extreme_losses() {
     let losses = [
         0.0,
         5e-324,
@@ -121,7 +121,7 @@ fn a_chance_is_one_whatever_the_numbers_are() {
 }
 
 #[test]
-fn a_temperature_survives_its_file() {
+fn a_temperature_round_trips() {
     for value in [0.0, 0.1 + 0.2, 1e-300, f64::MAX, f64::INFINITY] {
         let text = serde_json::to_string(&at(value)).unwrap();
         assert_eq!(serde_json::from_str::<Temperature>(&text).unwrap(), at(value), "{text}");

@@ -66,7 +66,7 @@ fn rules(name: &str) -> SearchRules {
 }
 
 #[test]
-fn no_gradient_is_taken_for_afocal() {
+fn no_grin_lens_is_refused_as_afocal() {
     for name in EXAMPLES {
         let lens = bundled(name);
         let mut random = seeded(21);
@@ -88,7 +88,7 @@ fn no_gradient_is_taken_for_afocal() {
 }
 
 #[test]
-fn a_hundred_mutations_in_a_row_keep_a_lens_with_gradients_a_lens() {
+fn a_hundred_mutations_keep_a_grin_lens_valid() {
     let mut starts: Vec<(Lens, SearchRules)> =
         EXAMPLES.map(|name| (bundled(name), rules(name))).into();
     starts.push((busy(), generous()));
@@ -134,7 +134,7 @@ fn flipped(lens: &Lens, row: usize) -> Lens {
 }
 
 #[test]
-fn a_gradient_along_the_axis_is_turned_with_its_element() {
+fn flipping_an_element_reverses_its_axial_grin() {
     for (radial, axial) in [
         (vec![-2e-4], vec![]),
         (vec![], vec![-0.004]),
@@ -167,7 +167,7 @@ fn a_gradient_along_the_axis_is_turned_with_its_element() {
 }
 
 #[test]
-fn what_turning_an_element_has_no_way_back_is_said_to_have_none() {
+fn irreversible_flips_have_no_density_ratio() {
     let ratio = |axial: &[f64]| {
         let (lens, row) = triplet(&[-2e-4], axial);
         let rules = generous().restricted_to(row, row + 1, lens.surfaces.len());
@@ -185,7 +185,7 @@ fn refused(kind: MutationKind, lens: &Lens) -> Refusal {
 }
 
 #[test]
-fn what_cannot_be_done_with_a_gradient_is_refused_by_name() {
+fn unsupported_operations_on_grin_media_are_refused_by_name() {
     let lens = bundled("axial_gradient_singlet_50");
     assert_eq!(refused(MutationKind::ExchangeGlass, &lens), Refusal::OnlyGradients);
     // The dispersion of a glass stays at its own end.
@@ -230,7 +230,7 @@ fn flagged(lens: &Lens) -> Vec<(Quantity, f64)> {
 }
 
 #[test]
-fn flagged_coefficients_go_where_their_medium_goes() {
+fn variable_coefficients_move_with_their_medium() {
     // Without the plane of the stop the second element faces the third.
     let (mut lens, row) = triplet(&[-2e-4], &[-0.004]);
     lens.surfaces.remove(row - 1);
@@ -307,7 +307,7 @@ fn a_search_from_a_lens_with_gradients_finds_a_better_one() {
 }
 
 #[test]
-fn a_finished_lens_keeps_its_gradients() {
+fn a_finalized_lens_keeps_its_gradient_indices() {
     let (lens, row) = triplet(&[-2e-4], &[-0.004]);
     let landscape = SearchPlan::default().landscape(&lens).unwrap();
     let done = finalize(&landscape, landscape.start()).unwrap();
@@ -318,7 +318,7 @@ fn a_finished_lens_keeps_its_gradients() {
 }
 
 #[test]
-fn nothing_is_opened_where_a_gradient_is_not_known() {
+fn apertures_are_not_opened_where_the_index_is_unknown() {
     let (lens, row) = triplet(&[-2e-4], &[-0.004]);
     let open = with_open_apertures(&lens, 30.0);
     let rims = |lens: &Lens| -> Vec<f64> {

@@ -72,7 +72,7 @@ fn the_start_is_that_of_the_thesis() {
 
 /// A move must be repeatable from what a checkpoint keeps.
 #[test]
-fn a_move_depends_on_lens_and_memory_alone() {
+fn a_move_depends_only_on_lens_and_memory() {
     let lens = wide_open();
     let landscape = plan(1).landscape(&lens).unwrap();
     let (mut at, mut memory) = (landscape.start().clone(), DescentState::default());
@@ -118,7 +118,7 @@ fn a_search_is_the_same_on_one_thread_and_on_two() {
 }
 
 #[test]
-fn searches_at_both_ends_of_their_settings_stay_finite() {
+fn searches_with_extreme_settings_stay_finite() {
     let lens = triplet();
     let base = plan(120);
     let with = |change: &dyn Fn(&mut SearchSettings)| {
@@ -170,7 +170,7 @@ fn forbidden_kinds_are_not_tried_and_elements_are_counted() {
 
 /// A person who flags some numbers holds the others of their kind, wherever mutations carry them.
 #[test]
-fn numbers_that_are_not_flagged_stay_as_they_are() {
+fn parameters_that_are_not_variable_stay_fixed() {
     let mut lens = triplet();
     let rows = lens.surfaces.len();
     lens.variables.clear();
@@ -198,7 +198,7 @@ fn numbers_that_are_not_flagged_stay_as_they_are() {
 }
 
 #[test]
-fn a_start_without_light_is_refused_or_led_to_light() {
+fn a_start_without_light_is_refused_or_recovered() {
     let mut lens = wide_open();
     let stop = lens.stop().unwrap();
     let sharp = vec![WeightedTerm { term: Term::Spot, weight: 1.0 }];
@@ -214,7 +214,7 @@ fn a_start_without_light_is_refused_or_led_to_light() {
 }
 
 #[test]
-fn a_merit_beyond_all_numbers_is_refused() {
+fn an_overflowing_merit_is_refused() {
     let lens = wide_open();
     let terms = vec![WeightedTerm { term: Term::FocalLength(-1e200), weight: 1e200 }];
     let absurd = Goal { terms, pupil: PupilEdge::Moving, zoom_ratios: Vec::new() };
@@ -257,7 +257,7 @@ fn lenses_from_anywhere_have_the_focal_length_and_pass_light() {
 
 /// Model glasses become those of a catalogue, and limits are kept, not only penalised.
 #[test]
-fn a_finished_lens_can_be_made() {
+fn a_finalized_lens_satisfies_all_manufacturing_limits() {
     let mut lens = triplet();
     lens.variables.clear();
     lens.surfaces[0].medium = Medium::Model { nd: 1.6204, vd: 60.3 };
@@ -282,7 +282,7 @@ fn a_finished_lens_can_be_made() {
 }
 
 #[test]
-fn adam_and_coarse_beginnings_descend_too() {
+fn adam_and_coarse_tolerances_descend() {
     let lens = wide_open();
     for local in [
         DescentSettings { method: DescentMethod::Adam, ..DescentSettings::default() },
@@ -301,7 +301,7 @@ fn adam_and_coarse_beginnings_descend_too() {
 }
 
 #[test]
-fn every_field_may_be_asked_for_its_own_light() {
+fn light_can_be_requested_per_field() {
     let lens = wide_open();
     let asking = |light: &[f64]| {
         let plan = SearchPlan { light: light.to_vec(), ..plan(1) };

@@ -40,7 +40,7 @@ fn assert_apart(system: &System<f64>, gap: usize) {
 }
 
 #[test]
-fn every_kind_on_every_lens_leaves_a_lens_or_a_reason() {
+fn every_mutation_of_every_lens_gives_a_lens_or_a_reason() {
     for entry in files::bundled_lenses() {
         let lens = bundled(entry.name);
         let mut random = seeded(1);
@@ -69,7 +69,7 @@ fn the_pattern_of_glass_and_air_is_read_from_the_rows() {
 }
 
 #[test]
-fn each_kind_changes_the_pattern_as_it_says() {
+fn each_mutation_changes_the_topology_as_documented() {
     let lens = bundled("double_gauss_nikkor_s_50");
     let after = |kind: MutationKind, seed: u64| {
         let mutant = mutate(kind, &lens, &generous(), &mut seeded(seed)).unwrap();
@@ -97,7 +97,7 @@ fn each_kind_changes_the_pattern_as_it_says() {
 }
 
 #[test]
-fn limits_of_the_rules_are_reasons() {
+fn violated_rules_give_reasons() {
     let lens = bundled("double_gauss_nikkor_s_50");
     let refused = |kind: MutationKind, rules: SearchRules| {
         mutate(kind, &lens, &rules, &mut seeded(1)).unwrap_err()
@@ -123,7 +123,7 @@ fn limits_of_the_rules_are_reasons() {
 }
 
 #[test]
-fn the_only_element_stays() {
+fn the_only_element_is_not_removed() {
     let lens = bundled("singlet_la1131");
     let rules = SearchRules { elements: [0, 8], ..SearchRules::default() };
     let refusal = mutate(MutationKind::RemoveSinglet, &lens, &rules, &mut seeded(1)).unwrap_err();
@@ -213,7 +213,7 @@ fn aspheres_and_mirrors_survive() {
 }
 
 #[test]
-fn what_follows_another_number_goes_on_following_it() {
+fn pickups_hold_after_mutations() {
     let mut lens = bundled("double_gauss_rudolph_50");
     lens.variables.clear();
     add_variables(&mut lens, &[ParameterKind::Curvatures]);
@@ -343,7 +343,7 @@ fn chain(name: &str, moves: usize) {
 }
 
 #[test]
-fn a_hundred_thousand_mutations_leave_a_lens() {
+fn a_hundred_thousand_mutations_keep_a_lens_valid() {
     chain("double_gauss_nikkor_s_50", 40_000);
     chain("cooke_triplet_100_f27", 40_000);
     chain("achromat_ac254_100", 20_000);
@@ -358,7 +358,7 @@ fn clear(lens: &Lens) -> f64 {
 
 /// A new element shall not be punished for light that only its rims took away.
 #[test]
-fn a_new_element_lets_the_light_through() {
+fn a_new_element_clips_no_light() {
     for name in
         ["double_gauss_canon_ef50_f18", "double_gauss_nikkor_s_50", "double_gauss_rudolph_50"]
     {

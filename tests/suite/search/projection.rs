@@ -56,7 +56,7 @@ fn a_mutated_lens_focuses_as_before() {
 }
 
 #[test]
-fn a_solved_focus_stays_solved() {
+fn a_focus_solve_stays_in_effect() {
     let mut lens = bundled("double_gauss_rudolph_50");
     lens.image_solve = Some(-0.05);
     lens.variables.clear();
@@ -91,7 +91,7 @@ fn every_mutation_of_the_double_gauss_is_projected_in_a_few_steps() {
 }
 
 #[test]
-fn an_afocal_lens_has_nothing_to_keep() {
+fn an_afocal_lens_has_no_projection() {
     let mut lens = bundled("singlet_la1131");
     lens.surfaces[0].curvature = 0.0;
     let refusal = mutate(MutationKind::AddSinglet, &lens, &generous(), &mut seeded(1)).unwrap_err();
@@ -101,7 +101,7 @@ fn an_afocal_lens_has_nothing_to_keep() {
 }
 
 #[test]
-fn a_distance_alone_cannot_keep_the_focal_length() {
+fn one_thickness_cannot_preserve_the_focal_length() {
     let mut lens = bundled("singlet_la1131");
     lens.surfaces[1].thickness -= 10.0;
     lens.surfaces.push(Row { thickness: 10.0, ..Row::default() });
@@ -111,7 +111,7 @@ fn a_distance_alone_cannot_keep_the_focal_length() {
 }
 
 #[test]
-fn numbers_at_their_bounds_stop_the_projection() {
+fn parameters_at_their_bounds_refuse_the_projection() {
     let mut lens = bundled("double_gauss_rudolph_50");
     lens.variables.clear();
     add_variables(&mut lens, &[ParameterKind::Curvatures, ParameterKind::Thicknesses]);
@@ -201,7 +201,7 @@ fn the_determinant_of_the_projection_agrees_with_differences() {
 }
 
 #[test]
-fn a_zoom_lens_keeps_every_position() {
+fn mutations_preserve_the_focus_at_every_zoom_position() {
     let lens = bundled("zoom_nikkor_28_80");
     let mut random = seeded(7);
     let mut made = 0;
@@ -218,7 +218,7 @@ fn a_zoom_lens_keeps_every_position() {
 }
 
 #[test]
-fn the_family_tells_how_a_lens_was_projected() {
+fn the_lineage_shows_the_projection_of_a_lens() {
     let lens = bundled("double_gauss_nikkor_s_50");
     let mut random = seeded(3);
     let new = mutate(MutationKind::AddSinglet, &lens, &SearchRules::default(), &mut random);

@@ -35,7 +35,7 @@ fn a_full_reservoir_gives_up_its_worst() {
 }
 
 #[test]
-fn a_twin_replaces_only_its_twin_and_only_if_it_is_better() {
+fn a_point_replaces_one_of_the_same_topology_only_if_better() {
     let mut reservoir = Reservoir::new(3, true);
     reservoir.offer(entry(0, 1.0, "a"));
     reservoir.offer(entry(1, 9.0, "b"));
@@ -46,7 +46,7 @@ fn a_twin_replaces_only_its_twin_and_only_if_it_is_better() {
 }
 
 #[test]
-fn topologies_may_not_matter() {
+fn one_per_topology_can_be_switched_off() {
     let mut reservoir = Reservoir::new(2, false);
     assert_eq!(reservoir.offer(entry(0, 1.0, "a")), OfferOutcome::Entered);
     assert_eq!(reservoir.offer(entry(1, 2.0, "a")), OfferOutcome::Entered);
@@ -77,7 +77,7 @@ fn a_reservoir_of_one_holds_the_best() {
 }
 
 #[test]
-fn what_is_worth_nothing_does_not_enter() {
+fn points_of_infinite_loss_are_not_retained() {
     let mut reservoir = Reservoir::new(2, true);
     for loss in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
         assert_eq!(reservoir.offer(entry(0, loss, "a")), OfferOutcome::RejectedNonFinite);

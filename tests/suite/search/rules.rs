@@ -85,15 +85,15 @@ fn glasses_are_known_by_short_names_too() {
 
 /// The glasses of a finished lens are those of the list, but those that are not to be touched.
 #[test]
-fn a_list_of_glasses_binds_what_the_start_is_made_of() {
+fn a_glass_list_applies_to_the_start() {
     let mut lens = triplet();
     for (row, glass) in [(0, "SCHOTT N-SK16"), (2, "SCHOTT SF2"), (5, "SCHOTT N-LAK9")] {
         assert!(matches!(lens.surfaces[row].medium, Medium::Model { .. }));
         lens.surfaces[row].medium = Medium::Glass(glass.to_owned());
     }
     let glasses = ["N-LAK9", "F2", "N-SSK2"].map(str::to_owned).to_vec();
-    let finished = |kept| {
-        let rules = SearchRules { glasses: glasses.clone(), kept, ..SearchRules::default() };
+    let finished = |fixed_ends| {
+        let rules = SearchRules { glasses: glasses.clone(), fixed_ends, ..SearchRules::default() };
         let landscape = under(&lens, rules).unwrap();
         finalize(&landscape, &lens).unwrap()
     };
@@ -113,7 +113,7 @@ fn a_list_of_glasses_binds_what_the_start_is_made_of() {
 }
 
 #[test]
-fn limits_that_no_lens_keeps_are_refused() {
+fn unsatisfiable_limits_are_refused() {
     let lens = triplet();
     let refusal = |rules| under(&lens, rules).unwrap_err();
     let narrow = refusal(SearchRules { semi_diameter: Some(5.0), ..SearchRules::default() });
@@ -146,7 +146,7 @@ fn a_merit_is_the_sum_of_its_terms() {
 
 /// From a lens with too many elements a search goes towards those that may be.
 #[test]
-fn too_many_elements_become_fewer() {
+fn an_excess_of_elements_is_reduced() {
     let lens = bundled("double_gauss_nikkor_s_50");
     let rules = SearchRules { elements: [1, 5], ..SearchRules::default() };
     let settings =

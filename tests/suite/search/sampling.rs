@@ -39,7 +39,7 @@ fn target(toy: &ToyLandscape, gaps: &Vec<f64>) -> f64 {
 }
 
 #[test]
-fn the_gradient_of_the_toy_is_one() {
+fn the_toy_gradient_agrees_with_differences() {
     let toy = ToyLandscape::one_or_two_singlets();
     for gaps in [vec![43.0], vec![12.0, 31.0], vec![40.0, 2.0]] {
         let slope = toy.loss_gradient(&gaps).unwrap();
@@ -70,7 +70,7 @@ fn no_density_is_lost_by_gradient_steps() {
 }
 
 #[test]
-fn the_exact_rate_keeps_the_balance_everywhere() {
+fn the_exact_rate_satisfies_the_balance_equation() {
     // Arrivals and regenerations make up for what leaves: π (1 + κ) = πP + C μ with C = ∫ π κ.
     let toy = ToyLandscape::one_singlet();
     let c = 6.0;
@@ -84,7 +84,7 @@ fn the_exact_rate_keeps_the_balance_everywhere() {
 }
 
 #[test]
-fn two_clocks_give_every_place_its_time() {
+fn competing_clocks_give_the_expected_occupation_times() {
     // With endless heat the printed rate is C everywhere: a time of 1/(1 + C) on average, and the
     // part C/(1 + C) of all places regenerates.
     let toy = ToyLandscape::one_singlet();
