@@ -43,6 +43,13 @@ pub struct TextInput<'a> {
     pub placement: InputPlacement,
 }
 
+impl<'a> TextInput<'a> {
+    /// A cell of a table, without a hint.
+    pub fn in_table(name: &'a str, value: &'a str, align: Align) -> Self {
+        Self { name, value, hint: "", align, placement: InputPlacement::Table }
+    }
+}
+
 /// The surroundings of a field, which decide its frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum InputPlacement {

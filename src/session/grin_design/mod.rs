@@ -20,7 +20,7 @@ use super::run::{BackgroundRun, LatestRequestWorker, RunEvent, RunStatus, RunVie
 use crate::grin_design::{GrinField, ViewReport};
 use engine::{GrinEngine, GrinRequest};
 use serde::{Deserialize, Serialize};
-use slice::{SliceRequest, SliceSettings, compute_slice};
+use slice::{SliceRequest, compute_slice};
 use std::io;
 use std::path::PathBuf;
 use std::sync::Arc;

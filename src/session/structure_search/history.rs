@@ -5,6 +5,7 @@ use crate::search::element::piece_count;
 use crate::search::lens_landscape::LensLandscape;
 use crate::search::{Chain, LineageNode, MutationKind, SearchEvent, SearchRunOn};
 use serde::{Deserialize, Serialize};
+use std::sync::Arc;
 
 /// The maximum number of samples; beyond it every second one is dropped.
 const MAX_SAMPLES: usize = 1500;
@@ -99,8 +100,9 @@ impl SearchHistory {
 }
 
 fn sample(run: &SearchRunOn<LensLandscape>, round: u64) -> HistorySample {
-    let place =
-        |chain: &Chain<Lens, _>| chain.position().map(|(lens, merit)| (merit, piece_count(lens)));
+    let place = |chain: &Chain<Arc<Lens>, _>| {
+        chain.position().map(|(lens, merit)| (merit, piece_count(lens)))
+    };
     HistorySample { round, best: run.best().loss, chains: run.chains().iter().map(place).collect() }
 }
 

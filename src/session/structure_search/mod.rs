@@ -17,7 +17,6 @@ use super::run::{BackgroundRun, RunEvent, RunId, RunView};
 use crate::lens::Lens;
 use crate::search::SteerCommand;
 use engine::{EngineRequest, StructureSearchEngine, StructureSearchInput};
-use request::StructureSearchRequest;
 use serde::{Deserialize, Serialize};
 use std::fs;
 use std::io;

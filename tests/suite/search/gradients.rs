@@ -16,6 +16,7 @@ use aplanat::search::{
     Landscape, MutationKind, Refusal, SearchRules, SearchRunOn, SearchSettings, mutate, propose,
 };
 use std::ops::ControlFlow;
+use std::sync::Arc;
 
 const EXAMPLES: [&str; 3] = ["grin_rod_melles_griot", "wood_lens_60", "axial_gradient_singlet_50"];
 
@@ -314,7 +315,7 @@ fn a_finalized_lens_keeps_its_gradient_indices() {
     assert_eq!(done.gradients, [row]);
     assert_eq!(done.lens.surfaces[row].medium, lens.surfaces[row].medium);
     assert_eq!(done.glasses.len(), 2, "the model glasses are exchanged, and they alone");
-    assert!(landscape.loss(&done.lens).is_finite());
+    assert!(landscape.loss(&Arc::new(done.lens)).is_finite());
 }
 
 #[test]

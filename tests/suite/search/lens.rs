@@ -17,6 +17,7 @@ use aplanat::search::{
 };
 use std::f64::consts::PI;
 use std::ops::ControlFlow;
+use std::sync::Arc;
 
 /// The double Gauss at four image heights in one colour, everything free, rims as open as it leaves
 /// room for, at most 20 mm: the start of Teh's chapter 4.
@@ -81,7 +82,8 @@ fn a_move_depends_only_on_lens_and_memory() {
     for _ in 0..14 {
         let written = serde_json::to_string(&(&at, &memory)).unwrap();
         let (there, found, gradients) = landscape.descend(&at, &mut memory);
-        let (read, mut remembered): (Lens, DescentState) = serde_json::from_str(&written).unwrap();
+        let (read, mut remembered): (Arc<Lens>, DescentState) =
+            serde_json::from_str(&written).unwrap();
         let again = landscape.descend(&read, &mut remembered);
         assert_eq!((&there, found.to_bits()), (&again.0, again.1.to_bits()));
         assert_eq!((memory.clone(), gradients), (remembered, again.2));

@@ -9,6 +9,7 @@ use aplanat::lens::{Medium, Object};
 use aplanat::paraxial::{paraxial_ray, signed_indices};
 use aplanat::search::{MutatedLens, MutatedPoint, MutationKind, Refusal, SearchRules, mutate};
 use nalgebra::DMatrix;
+use std::sync::Arc;
 
 /// Height and `nu` of the marginal ray at the image, at every zoom position.
 fn kept(lens: &Lens) -> Vec<[f64; 2]> {
@@ -222,10 +223,10 @@ fn the_lineage_shows_the_projection_of_a_lens() {
     let lens = bundled("double_gauss_nikkor_s_50");
     let mut random = seeded(3);
     let new = mutate(MutationKind::AddSinglet, &lens, &SearchRules::default(), &mut random);
-    let told: MutatedPoint<Lens> = new.unwrap().into();
-    assert!(told.record.to_string().contains("; projected in"), "{}", told.record);
+    let point: MutatedPoint<Arc<Lens>> = new.unwrap().into();
+    assert!(point.record.to_string().contains("; projected in"), "{}", point.record);
     let rules = SearchRules { projection: false, ..SearchRules::default() };
     let new = mutate(MutationKind::AddSinglet, &lens, &rules, &mut random);
-    let told: MutatedPoint<Lens> = new.unwrap().into();
-    assert_eq!(told.record.projection, None);
+    let point: MutatedPoint<Arc<Lens>> = new.unwrap().into();
+    assert_eq!(point.record.projection, None);
 }

@@ -67,8 +67,8 @@ impl SlicePicture {
         legend::ray_legend(ui, slice);
         let all = ui.available_rect_before_wrap();
         let split = (all.right() - legend::WIDTH).max(all.left() + 1.0);
-        let drawing = Rect::from_min_max(all.min, pos2(split, all.bottom()));
-        ui.scope_builder(UiBuilder::new().max_rect(drawing), |ui| {
+        let area = Rect::from_min_max(all.min, pos2(split, all.bottom()));
+        ui.scope_builder(UiBuilder::new().max_rect(area), |ui| {
             let label = text::slice_name(slice);
             let drawn = (&drawing.scene, drawing.full_view);
             let below = |ui: &Ui, shown: &SceneResponse| drawing.paint_colors(ui, shown, slice);

@@ -18,7 +18,7 @@ use crate::studio::number;
 use crate::studio::palette::{Palette, color32};
 use crate::studio::panels::design_results;
 use crate::studio::text::capitalize;
-use crate::studio::text_input::{EditBuffers, InputPlacement, TextInput as Cell};
+use crate::studio::text_input::{EditBuffers, TextInput as Cell};
 
 /// The height of a row, in points.
 const ROW: f32 = 21.0;
@@ -254,13 +254,7 @@ impl PrescriptionTable<'_> {
         let limit = column == TableColumn::SemiDiameter;
         let (name, shown) = (parameter_name(parameter), self.value_text(parameter));
         let hint = if limit { self.reached_text(surface) } else { String::new() };
-        let cell = Cell {
-            name: &name,
-            value: &shown,
-            hint: &hint,
-            align: Align::Max,
-            placement: InputPlacement::Table,
-        };
+        let cell = Cell { hint: &hint, ..Cell::in_table(&name, &shown, Align::Max) };
         let place = (column, surface);
         let lens = Arc::clone(&self.view.lens);
         let response = self.text_cell(ui, place, cell, |text| typed_edit(&lens, parameter, text));
@@ -317,13 +311,7 @@ impl PrescriptionTable<'_> {
         let medium = &self.view.lens.surfaces[surface].medium;
         let (name, shown) =
             (format!("Glass of surface {}", surface + 1), glass::format_medium(medium));
-        let cell = Cell {
-            name: &name,
-            value: &shown,
-            hint: "",
-            align: Align::Min,
-            placement: InputPlacement::Table,
-        };
+        let cell = Cell::in_table(&name, &shown, Align::Min);
         let edit = move |text: &str| Edit::SetMedium { surface, medium: glass::parse_medium(text) };
         let field = self.text_cell(ui, (TableColumn::Glass, surface), cell, |text| Ok(edit(text)));
         self.suggest_glasses(&field, edit);
@@ -352,13 +340,7 @@ impl PrescriptionTable<'_> {
     fn comment_cell(&mut self, ui: &mut Ui, surface: usize) {
         let shown = self.view.lens.surfaces[surface].comment.clone();
         let name = format!("Remark on surface {}", surface + 1);
-        let cell = Cell {
-            name: &name,
-            value: &shown,
-            hint: "",
-            align: Align::Min,
-            placement: InputPlacement::Table,
-        };
+        let cell = Cell::in_table(&name, &shown, Align::Min);
         let edit = |text: &str| Ok(Edit::SetComment { surface, text: text.to_owned() });
         self.text_cell(ui, (TableColumn::Comment, surface), cell, edit);
     }
@@ -369,13 +351,7 @@ impl PrescriptionTable<'_> {
             Object::Finite(distance) => distance,
         };
         let shown = number::format_number(old);
-        let cell = Cell {
-            name: "Object distance",
-            value: &shown,
-            hint: "",
-            align: Align::Max,
-            placement: InputPlacement::Table,
-        };
+        let cell = Cell::in_table("Object distance", &shown, Align::Max);
         let object = |distance: f64| {
             if distance.is_infinite() { Object::Infinity } else { Object::Finite(distance) }
         };
@@ -388,13 +364,7 @@ impl PrescriptionTable<'_> {
 
     fn object_medium_cell(&mut self, ui: &mut Ui) {
         let shown = glass::format_medium(&self.view.lens.object_medium);
-        let cell = Cell {
-            name: "Medium of the object",
-            value: &shown,
-            hint: "",
-            align: Align::Min,
-            placement: InputPlacement::Table,
-        };
+        let cell = Cell::in_table("Medium of the object", &shown, Align::Min);
         let edit = |text: &str| Ok(Edit::SetObjectMedium(glass::parse_medium(text)));
         self.text_cell(ui, (TableColumn::Glass, OBJECT), cell, edit);
     }
