@@ -6,8 +6,8 @@
 //! the time of both.
 
 use super::{
-    Claim, DataTable, Effort, Experiment, ExperimentError, ExperimentOutcome, ExperimentResult,
-    NamedPlot, ProgressFn, report_progress,
+    Claim, DataTable, Effort, Experiment, ExperimentOutcome, ExperimentResult, NamedPlot,
+    ProgressFn, report_progress,
 };
 use crate::grin::field::{HessianDiagonal, Luneburg, ProfileField, RegularGrid, Trilinear};
 use crate::grin::{
@@ -65,12 +65,12 @@ fn run(effort: Effort, progress: &mut ProgressFn<'_>) -> ExperimentResult {
 
 fn measure(nodes: usize, fineness: f64, side: usize) -> ExperimentResult<AdjointMemoryRow> {
     let lens = ProfileField::sphere(Luneburg::new(1.0));
-    let grid = RegularGrid::cube(nodes, 1.1).map_err(ExperimentError::from_error)?;
+    let grid = RegularGrid::cube(nodes, 1.1)?;
     let sampled = Trilinear::from_function(grid, |p| lens.sample(p).index);
-    let mut field = sampled.map_err(ExperimentError::from_error)?;
+    let mut field = sampled?;
     field.diagonal = HessianDiagonal::Exact;
     let tracer = GrinTracer::new(&field, setup(0.974 * grid.spacing().x / fineness));
-    let tracer = tracer.map_err(ExperimentError::from_error)?;
+    let tracer = tracer?;
     let at = |i: usize| 0.6 * (2.0 * (i as f64 + 0.5137) / side as f64 - 1.0);
     let ray = |n: usize| GrinRay {
         x: Vec3::new(at(n % side), at(n / side), -1.5),

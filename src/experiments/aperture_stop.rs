@@ -106,14 +106,14 @@ fn lens(radius: f64) -> ExperimentResult<Lens> {
         pickups: Vec::new(),
         image_solve: None,
     };
-    let system = lens.resolve(0, lens.wavelengths[0].um).map_err(ExperimentError::from_error)?;
+    let system = lens.resolve(0, lens.wavelengths[0].um)?;
     let gap = paraxial_image_distance(&system, Object::Infinity) + BEHIND_FOCUS;
     lens.surfaces[SURFACES.len() - 1].thickness = gap;
     Ok(lens)
 }
 
 fn model(radius: f64) -> ExperimentResult<RayModel> {
-    RayModel::from_lens(&lens(radius)?, 0).map_err(ExperimentError::from_error)
+    Ok(RayModel::from_lens(&lens(radius)?, 0)?)
 }
 
 /// The objective at a radius of the stop.
@@ -131,7 +131,7 @@ struct StopObjective {
 impl StopObjective {
     fn at(radius: f64, order: usize) -> ExperimentResult<Self> {
         let model = model(radius)?;
-        let region = Region::new(model.launch(AXIS, 0).map_err(ExperimentError::from_error)?);
+        let region = Region::new(model.launch(AXIS, 0)?);
         let nodes = region.trace_pupil(order);
         let cost = QuadraticIntegrand::spread([0.0; 2]);
         let failed =
@@ -316,7 +316,7 @@ fn lenses(unbiased: &StopDescent, biased: &StopDescent) -> ExperimentResult<Canv
         let (x, y) = (Axis::linear("z, mm", z), Axis::linear("y, mm", y));
         let chart = Chart::new([left, 110.0], [left + 480.0, 600.0], x, y).with_equal_scales();
         chart.draw(&mut canvas, &format!("{name}: stop {radius:.3} mm"));
-        let launch = model.launch(AXIS, 0).map_err(ExperimentError::from_error)?;
+        let launch = model.launch(AXIS, 0)?;
         for ray in -4..=4 {
             section.draw_ray(&mut canvas, &chart, &launch, [0.0, 0.24 * f64::from(ray)], color);
         }

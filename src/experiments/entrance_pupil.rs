@@ -45,7 +45,7 @@ const SIGMAS: f64 = 4.0;
 
 fn run(effort: Effort, progress: &mut ProgressFn<'_>) -> ExperimentResult {
     let (fields, cells): (usize, usize) = effort.select((13, 400), (5, 150));
-    let model = RayModel::from_lens(&lens(LENS)?, 0).map_err(ExperimentError::from_error)?;
+    let model = RayModel::from_lens(&lens(LENS)?, 0)?;
     let mut pupils = Vec::new();
     for i in 0..fields {
         let angle = EDGE * i as f64 / (fields - 1) as f64;
@@ -79,7 +79,7 @@ struct MappedPupil {
 impl MappedPupil {
     fn at(model: &RayModel, angle: f64, cells: usize) -> ExperimentResult<Self> {
         let field = FieldPoint { x: 0.0, y: angle, weight: 1.0 };
-        let launch = model.launch(field, model.primary).map_err(ExperimentError::from_error)?;
+        let launch = model.launch(field, model.primary)?;
         let region = Region::new(launch);
         let dark = || ExperimentError::Failed(format!("the pupil at {angle} degrees has no edge"));
         let outline = region.outline(POINTS).ok_or_else(dark)?;

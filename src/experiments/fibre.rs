@@ -5,14 +5,14 @@
 //! profile has no focus, so it is compared at those planes where its own blur is smallest.
 
 use super::{
-    Claim, DataTable, Effort, Experiment, ExperimentError, ExperimentOutcome, ExperimentResult,
-    NamedPlot, ProgressFn, solve,
+    Claim, DataTable, Effort, Experiment, ExperimentOutcome, ExperimentResult, NamedPlot,
+    ProgressFn, builtin_task, solve,
 };
 use crate::grin::field::{Parabolic, ProfileField};
 use crate::grin::{
     EndCondition, GrinRay, GrinRegion, GrinSetup, GrinTracer, Integrator, LastStep, LaunchMode,
 };
-use crate::grin_design::{self, GrinField, GrinTask};
+use crate::grin_design::{GrinField, GrinTask};
 use crate::math::Vec3;
 use crate::plot::{Axis, Canvas, Chart, Legend, PALETTE, Stroke};
 use crate::report::plot_grin_field;
@@ -37,12 +37,10 @@ const REFINED: usize = 4;
 const STEPS: f64 = 40.0;
 
 fn run(_: Effort, progress: &mut ProgressFn<'_>) -> ExperimentResult {
-    let builtin = grin_design::find_builtin("fibre");
-    let task = builtin.ok_or_else(|| ExperimentError::Failed("no task `fibre`".to_owned()))?.task();
-    let task = task.map_err(ExperimentError::from_error)?;
+    let task = builtin_task("fibre")?;
     let optimizer = solve(&task, [0.0, 1.0], progress)?;
     let best = optimizer.best();
-    let spots = optimizer.score(best).map_err(ExperimentError::from_error)?.views;
+    let spots = optimizer.score(best)?.views;
     let (_, rays) = task.scoring_rays(&task.views[0]);
     let mut outcome = ExperimentOutcome {
         rays: optimizer.rays_traced() as usize,
@@ -65,7 +63,7 @@ fn run(_: Effort, progress: &mut ProgressFn<'_>) -> ExperimentResult {
             format!("focus {}: blur of the parabolic fibre, relative to the optimised one", i + 1);
         outcome.claims.push(Claim::at_least(says, spot / view.spot, BETTER));
     }
-    let difference = task.difference(best).map_err(ExperimentError::from_error)?;
+    let difference = task.difference(best)?;
     let relative = difference.map_or(f64::NAN, |difference| difference.relative);
     let says = "relative difference from the hyperbolic secant";
     outcome.claims.push(Claim::at_most(says, relative, NEAR));
@@ -93,7 +91,7 @@ fn heights(rays: &[GrinRay<f64>], plane: f64) -> ExperimentResult<Vec<f64>> {
         screen: None,
     };
     let field = parabolic();
-    let tracer = GrinTracer::new(&field, setup).map_err(ExperimentError::from_error)?;
+    let tracer = GrinTracer::new(&field, setup)?;
     Ok(tracer.trace_batch(rays).iter().map(|exit| exit.x.x).collect())
 }
 
@@ -140,9 +138,8 @@ fn draw_focus_errors(
             rays,
             task.tolerance,
         );
-        let setup = plan.map_err(ExperimentError::from_error)?.setup;
-        let tracer =
-            GrinTracer::new(best.index_field(), setup).map_err(ExperimentError::from_error)?;
+        let setup = plan?.setup;
+        let tracer = GrinTracer::new(best.index_field(), setup)?;
         let found = tracer.trace_batch(rays).iter().map(|exit| radius(exit.x)).collect();
         curves.push((format!("optimised, focus {}", i + 1), points(found), color));
     }

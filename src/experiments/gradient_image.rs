@@ -164,11 +164,10 @@ struct Pixel {
 impl SensorView {
     fn new(samples: usize) -> ExperimentResult<Self> {
         let lens = lens(LENS)?;
-        let forwards = lens.resolve(0, UM).map_err(ExperimentError::from_error)?;
+        let forwards = lens.resolve(0, UM)?;
         let rear = lens.surfaces.len() - 1;
         let object = Object::Finite(forwards.surfaces[rear].thickness);
-        let focal =
-            RayModel::from_lens(&lens, 0).map_err(ExperimentError::from_error)?.first_order.efl;
+        let focal = RayModel::from_lens(&lens, 0)?.first_order.efl;
         let focal =
             focal.ok_or_else(|| ExperimentError::Failed("the lens is afocal".to_owned()))?;
         let system = forwards.reversed(DISTANCE);
@@ -196,7 +195,7 @@ impl SensorView {
 
     fn pixel(&self, [x, y]: [f64; 2]) -> ExperimentResult<Pixel> {
         let field = FieldPoint { x, y, weight: 1.0 };
-        let launch = self.model.launch(field, 0).map_err(ExperimentError::from_error)?;
+        let launch = self.model.launch(field, 0)?;
         let anchor = launch.to_fixed();
         let region = Region::new(launch);
         let lit = region.trace_pupil(ORDER);
@@ -237,8 +236,7 @@ fn reversed_model(system: System<f64>, object: Object, radius: f64) -> Experimen
     let aperture = Aperture::StopSemiDiameter(radius);
     let edge = HALF * std::f64::consts::SQRT_2;
     let beam = Beam { object, aperture, field: FieldKind::ObjectHeight, edge };
-    RayModel::from_systems(vec![(UM, 1.0, system)], 0, beam, Aiming::Paraxial)
-        .map_err(ExperimentError::from_error)
+    Ok(RayModel::from_systems(vec![(UM, 1.0, system)], 0, beam, Aiming::Paraxial)?)
 }
 
 /// The pupil of the same pixel tracked to a perturbed lens.

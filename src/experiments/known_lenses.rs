@@ -8,9 +8,9 @@
 
 use super::{
     Claim, DataTable, Effort, Experiment, ExperimentError, ExperimentOutcome, ExperimentResult,
-    ProgressFn, solve,
+    ProgressFn, builtin_task, solve,
 };
-use crate::grin_design::{self, FieldDifference, GrinOptimizer, GrinTask, RefinementLevel};
+use crate::grin_design::{FieldDifference, GrinOptimizer, GrinTask, RefinementLevel};
 use crate::report::plot_grin_field;
 
 pub(super) const EXPERIMENT: Experiment = Experiment {
@@ -51,10 +51,10 @@ fn run(effort: Effort, progress: &mut ProgressFn<'_>) -> ExperimentResult {
         let span = [i, i + 1].map(|part| part as f64 / cases.len() as f64);
         let task = task(case, effort)?;
         let optimizer = solve(&task, span, progress)?;
-        let found = task.difference(optimizer.best()).map_err(ExperimentError::from_error)?;
+        let found = task.difference(optimizer.best())?;
         let found = found
             .ok_or_else(|| ExperimentError::Failed(format!("{}: no exact field", case.name)))?;
-        let judged = optimizer.score(optimizer.best()).map_err(ExperimentError::from_error)?;
+        let judged = optimizer.score(optimizer.best())?;
         outcome.claims.extend(claims(case, effort, found));
         let left_out = judged.views.iter().map(|v| v.counts.fates.total() - v.counts.valid());
         outcome.claims.push(Claim::at_most(
@@ -83,10 +83,7 @@ const PICTURES: [[&str; 2]; 4] = [
 ];
 
 fn task(case: &KnownLensCase, effort: Effort) -> ExperimentResult<GrinTask> {
-    let builtin = grin_design::find_builtin(case.name);
-    let builtin =
-        builtin.ok_or_else(|| ExperimentError::Failed(format!("no task `{}`", case.name)))?;
-    let mut task = builtin.task().map_err(ExperimentError::from_error)?;
+    let mut task = builtin_task(case.name)?;
     if effort == Effort::Small && !case.small.is_empty() {
         task.levels = case.small.to_vec();
     }

@@ -29,10 +29,17 @@ mod zoom;
 pub use outcome::{Claim, ClaimRelation, DataTable, ExperimentOutcome, TableCell};
 pub use report::{ExperimentReport, PhaseTiming};
 
-use crate::files;
-use crate::grin_design::{GrinOptimizer, GrinTask};
-use crate::lens::Lens;
+use crate::files::{self, FileError};
+use crate::grin::GrinSetupError;
+use crate::grin::field::GridError;
+use crate::grin_design::{self, GrinOptimizer, GrinTask, GrinTaskError, ReferenceFieldError};
+use crate::lens::{Lens, LensError};
+use crate::merit::MeritError;
+use crate::optimize::pareto::ParetoError;
 use crate::plot::NamedPlot;
+use crate::pupil::{LaunchError, RayModelError};
+use crate::search::MutationError;
+use crate::search::lens_landscape::SearchSetupError;
 use serde::{Deserialize, Serialize};
 use std::ops::ControlFlow;
 
@@ -130,12 +137,31 @@ pub enum ExperimentError {
     Failed(String),
 }
 
-impl ExperimentError {
-    /// Wraps an error of another module.
-    fn from_error(error: impl std::fmt::Display) -> Self {
-        Self::Failed(error.to_string())
-    }
+/// Lets `?` end an experiment with the text of an error of another module.
+macro_rules! fail_on {
+    ($($error:ident),+ $(,)?) => {
+        $(impl From<$error> for ExperimentError {
+            fn from(error: $error) -> Self {
+                Self::Failed(error.to_string())
+            }
+        })+
+    };
 }
+
+fail_on!(
+    FileError,
+    GridError,
+    GrinSetupError,
+    GrinTaskError,
+    LaunchError,
+    LensError,
+    MeritError,
+    MutationError,
+    ParetoError,
+    RayModelError,
+    ReferenceFieldError,
+    SearchSetupError,
+);
 
 /// Reports the progress; an error if the caller stops the experiment.
 fn report_progress(progress: &mut ProgressFn<'_>, done: f64, doing: &str) -> ExperimentResult<()> {
@@ -145,12 +171,18 @@ fn report_progress(progress: &mut ProgressFn<'_>, done: f64, doing: &str) -> Exp
     }
 }
 
+/// A built-in task of field design.
+fn builtin_task(name: &str) -> ExperimentResult<GrinTask> {
+    let builtin = grin_design::find_builtin(name);
+    Ok(builtin.ok_or_else(|| ExperimentError::Failed(format!("no task `{name}`")))?.task()?)
+}
+
 /// Loads a lens of the bundled library.
 fn lens(name: &str) -> ExperimentResult<Lens> {
     let bundled = files::bundled_lenses().iter().find(|bundled| bundled.name == name);
     let bundled =
         bundled.ok_or_else(|| ExperimentError::Failed(format!("no lens `{name}` is bundled")))?;
-    files::json::read(bundled.text, name).map_err(ExperimentError::from_error)
+    Ok(files::json::read(bundled.text, name)?)
 }
 
 /// Solves a task; it is the part `from` to `to` of the whole work.
@@ -160,7 +192,7 @@ fn solve(
     progress: &mut ProgressFn<'_>,
 ) -> ExperimentResult<GrinOptimizer> {
     report_progress(progress, from, &task.name)?;
-    let optimizer = GrinOptimizer::new(task).map_err(ExperimentError::from_error)?;
+    let optimizer = GrinOptimizer::new(task)?;
     solve_from(optimizer, [from, to], progress)
 }
 
@@ -173,7 +205,7 @@ fn solve_from(
     let name = optimizer.task().name.clone();
     let mut done = from;
     loop {
-        let step = optimizer.step().map_err(ExperimentError::from_error)?;
+        let step = optimizer.step()?;
         let share = step.step as f64 / step.max_steps.max(1) as f64;
         done = if step.finished { to } else { done.max(from + share.min(1.0) * (to - from)) };
         report_progress(progress, done, &name)?;

@@ -102,9 +102,8 @@ impl Exposure {
 }
 
 fn spot(lens: &Lens, rays: &mut usize) -> ExperimentResult<Vec<[f64; 2]>> {
-    let model = RayModel::from_lens(lens, 0).map_err(ExperimentError::from_error)?;
-    let launch =
-        model.launch(model.fields[0], model.primary).map_err(ExperimentError::from_error)?;
+    let model = RayModel::from_lens(lens, 0)?;
+    let launch = model.launch(model.fields[0], model.primary)?;
     let region = Region::new(launch);
     // On the axis all azimuths are equivalent: the nodes of one are rotated through half a turn.
     let nodes = region.trace_pupil(ORDER);

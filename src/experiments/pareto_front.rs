@@ -16,8 +16,7 @@ use super::sharpness_vs_light::{
     with_scaled_aperture,
 };
 use super::{
-    Claim, Effort, Experiment, ExperimentError, ExperimentOutcome, ExperimentResult, NamedPlot,
-    ProgressFn, lens,
+    Claim, Effort, Experiment, ExperimentOutcome, ExperimentResult, NamedPlot, ProgressFn, lens,
 };
 use crate::lens::Lens;
 use crate::optimize::pareto::{Front, ParetoPoint};
@@ -231,14 +230,14 @@ pub(super) fn draw_lens_and_spots(
     lens: &Lens,
     top: f64,
 ) -> ExperimentResult<()> {
-    let model = RayModel::from_lens(lens, 0).map_err(ExperimentError::from_error)?;
+    let model = RayModel::from_lens(lens, 0)?;
     let section = SectionPlot::new(&model.channels[0].system);
     let [z, y] = section.extent();
     let (x, y) = (Axis::linear("", z), Axis::linear("", y));
     let chart = Chart::new([960.0, top], [1460.0, top + 220.0], x, y).with_equal_scales();
     canvas.text([960.0, top - 40.0], name, BLACK, TextAlign::Left);
     for (i, field) in model.fields.iter().enumerate() {
-        let launch = model.launch(*field, model.primary).map_err(ExperimentError::from_error)?;
+        let launch = model.launch(*field, model.primary)?;
         let color = PALETTE[i % PALETTE.len()];
         for ray in -2..=2 {
             section.draw_ray(canvas, &chart, &launch, [0.0, 0.45 * f64::from(ray)], color);

@@ -17,11 +17,11 @@
 
 use super::{
     Claim, DataTable, Effort, Experiment, ExperimentError, ExperimentOutcome, ExperimentResult,
-    NamedPlot, ProgressFn, TableCell, report_progress, solve,
+    NamedPlot, ProgressFn, TableCell, builtin_task, report_progress, solve,
 };
 use crate::grin::IndexField;
 use crate::grin_design::{
-    self, GrinField, GrinTask, LightSource, RefinementLevel, SourceDirections, StraightRays,
+    GrinField, GrinTask, LightSource, RefinementLevel, SourceDirections, StraightRays,
     ViewMeasurement,
 };
 use crate::math::Vec3;
@@ -107,7 +107,7 @@ fn run(effort: Effort, progress: &mut ProgressFn<'_>) -> ExperimentResult {
         let task = task(case, effort)?;
         let optimizer = solve(&task, [at(0.0), at(0.7)], progress)?;
         outcome.rays += usize::try_from(optimizer.rays_traced()).unwrap_or(usize::MAX);
-        let judged = optimizer.score(optimizer.best()).map_err(ExperimentError::from_error)?;
+        let judged = optimizer.score(optimizer.best())?;
         let left_out = judged.views.iter().map(|v| v.counts.total() - v.counts.valid()).sum();
         let adjoint = found(&task, optimizer.best().clone())?;
         rows.push(row(case, task, (adjoint, left_out), effort, at, progress)?);
@@ -131,10 +131,7 @@ fn is_extreme(case: &PlumeCase) -> bool {
 }
 
 fn task(case: &PlumeCase, effort: Effort) -> ExperimentResult<GrinTask> {
-    let builtin = grin_design::find_builtin(case.task);
-    let builtin =
-        builtin.ok_or_else(|| ExperimentError::Failed(format!("no task `{}`", case.task)))?;
-    let mut task = builtin.task().map_err(ExperimentError::from_error)?;
+    let mut task = builtin_task(case.task)?;
     if effort == Effort::Small {
         task.levels = FEW.to_vec();
         for view in &mut task.views {
@@ -158,7 +155,7 @@ fn row(
     let (nodes, steps) = (adjoint.medium.nodes(), effort.select(60, 25));
     let doing = format!("{}, by straight rays", task.name);
     report_progress(progress, at(0.7), &doing)?;
-    let chords = StraightRays::new(&task).map_err(ExperimentError::from_error)?;
+    let chords = StraightRays::new(&task)?;
     let (mut best, mut last, mut step): (Option<(f64, GrinField)>, _, _) = (None, f64::NAN, 0);
     let (mut count, mut ended) = (0, Ok(()));
     let visit = |medium: &GrinField| {
@@ -170,15 +167,14 @@ fn row(
         ended = report_progress(progress, at(0.7 + 0.2 * count as f64 / steps as f64), &doing);
         if ended.is_ok() { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
     };
-    let end = chords.reconstruct(nodes, steps, visit).map_err(ExperimentError::from_error)?;
+    let end = chords.reconstruct(nodes, steps, visit)?;
     ended?;
     let best = best.map_or(end, |(_, medium)| medium);
     let doing = format!("{}, by gradients along straight rays", task.name);
     report_progress(progress, at(0.9), &doing)?;
-    let gradients =
-        chords.reconstruct_by_gradients(nodes, steps).map_err(ExperimentError::from_error)?;
-    let measured = task.measurements().map_err(ExperimentError::from_error)?.into_iter().next();
-    let even = GrinField::initial(&task, nodes).map_err(ExperimentError::from_error)?;
+    let gradients = chords.reconstruct_by_gradients(nodes, steps)?;
+    let measured = task.measurements()?.into_iter().next();
+    let even = GrinField::initial(&task, nodes)?;
     Ok(PlumeRow {
         case,
         measured: measured
@@ -203,7 +199,7 @@ fn error(task: &GrinTask, medium: &GrinField) -> f64 {
 fn found(task: &GrinTask, medium: GrinField) -> ExperimentResult<ReconstructedPlume> {
     let exact =
         task.exact.as_ref().ok_or_else(|| ExperimentError::Failed("no exact field".to_owned()))?;
-    let exact = exact.field::<f64>().map_err(ExperimentError::from_error)?;
+    let exact = exact.field::<f64>()?;
     let [low, high] = task.space.corners();
     let at = |low: f64, high: f64, i: usize| low + (high - low) * i as f64 / (VOXELS - 1) as f64;
     let square = |n: usize| {

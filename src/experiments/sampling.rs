@@ -152,7 +152,7 @@ impl ToyStudy {
         let random = Random::seed_from_u64(seed);
         let SamplingProcess { rate, regeneration } = process;
         let clocks = CompetingClocks::new(&self.toy, self.temperature, rate, regeneration, random);
-        let mut clocks = clocks.map_err(ExperimentError::from_error)?;
+        let mut clocks = clocks?;
         let nothing = || vec![0.0; self.grid.bin_count()];
         let mut chain =
             ChainHistogram { times: nothing(), counts: nothing(), steps: 0, clamped: 0 };

@@ -99,9 +99,8 @@ pub(super) fn run_sweep(
         pupil: plan.pupil,
         ..ParetoSettings::default()
     };
-    let start = ParetoSweep::new(lens, &settings).map_err(ExperimentError::from_error)?.start;
-    let goal = weighted_sum_goal(&start.lens, start.light, plan.pupil)
-        .map_err(ExperimentError::from_error)?;
+    let start = ParetoSweep::new(lens, &settings)?.start;
+    let goal = weighted_sum_goal(&start.lens, start.light, plan.pupil)?;
     let total = (plan.betas.len() * plan.steps) as f64;
     let mut designs = vec![start];
     for (i, beta) in plan.betas.iter().enumerate() {
@@ -109,7 +108,7 @@ pub(super) fn run_sweep(
         goal.terms.push(WeightedTerm { term: Term::Throughput, weight: *beta });
         let begin = &designs[designs.len() - 1].lens;
         let search = start_annealed(begin, &goal, SEARCH_TOLERANCE, plan.steps);
-        let mut search = search.map_err(ExperimentError::from_error)?;
+        let mut search = search?;
         for step in 0..plan.steps {
             let done = (i * plan.steps + step) as f64 / total;
             report_progress(progress, part.from + (part.to - part.from) * done, part.name)?;
@@ -119,7 +118,7 @@ pub(super) fn run_sweep(
         }
         search.verify_best();
         let design = ParetoPoint::evaluate(search.best(), Some(*beta), EVALUATION_TOLERANCE);
-        designs.push(design.map_err(ExperimentError::from_error)?);
+        designs.push(design?);
     }
     Ok(designs)
 }
@@ -136,7 +135,7 @@ pub(super) struct FieldView {
 
 /// The sharpness and light of every field of a lens; adds the rays traced to `rays`.
 pub(super) fn field_views(lens: &Lens, rays: &mut usize) -> ExperimentResult<Vec<FieldView>> {
-    let model = RayModel::from_lens(lens, 0).map_err(ExperimentError::from_error)?;
+    let model = RayModel::from_lens(lens, 0)?;
     model.fields.iter().map(|field| field_view(&model, *field, rays)).collect()
 }
 
@@ -148,7 +147,7 @@ pub(super) fn field_view(
 ) -> ExperimentResult<FieldView> {
     let quality = field_quality(model, field, REPORTED);
     let rms = match quality.spot {
-        Err(AnalysisError::NoRays(why)) => return Err(ExperimentError::from_error(why)),
+        Err(AnalysisError::NoRays(why)) => return Err(ExperimentError::Failed(why.to_string())),
         Err(_) => Estimate::new(0.0, 0.0, 0),
         Ok(rms) => rms,
     };
@@ -167,7 +166,7 @@ pub(super) fn mean_blur_and_light(views: &[FieldView]) -> [f64; 2] {
 
 /// The focal length of a lens, in mm.
 pub(super) fn focal_length(lens: &Lens) -> ExperimentResult<f64> {
-    let model = RayModel::from_lens(lens, 0).map_err(ExperimentError::from_error)?;
+    let model = RayModel::from_lens(lens, 0)?;
     model.first_order.efl.ok_or_else(|| ExperimentError::Failed(format!("{} is afocal", lens.name)))
 }
 

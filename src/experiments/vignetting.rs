@@ -92,7 +92,7 @@ impl IlluminatedLens {
         let last = ANGLES[ANGLES.len() - 1];
         let angles: Vec<f64> = (0..FIELDS).map(|i| last * i as f64 / (FIELDS - 1) as f64).collect();
         let model = RayModel::from_lens(&with_field_angles(design.lens.clone(), &angles), 0);
-        let model = model.map_err(ExperimentError::from_error)?;
+        let model = model?;
         let light = illumination(&model, model.primary, ACCURACY);
         *rays += light.iter().map(|field| field.cone.rays).sum::<usize>();
         Ok(Self { lens: design.lens.clone(), views, light })

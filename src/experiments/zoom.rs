@@ -65,8 +65,7 @@ impl ZoomRange {
     fn of(lens: &Lens, rays: &mut usize) -> ExperimentResult<Self> {
         let mut range = Self { points: Vec::new(), focal_lengths: Vec::new() };
         for place in POSITIONS {
-            let model = RayModel::from_lens(&lens_between(lens, place)?, 0)
-                .map_err(ExperimentError::from_error)?;
+            let model = RayModel::from_lens(&lens_between(lens, place)?, 0)?;
             let views = model.fields.iter().map(|field| field_view(&model, *field, rays));
             range.points.push(mean_blur_and_light(&views.collect::<ExperimentResult<Vec<_>>>()?));
             range.focal_lengths.push(model.first_order.efl.unwrap_or(f64::NAN));
@@ -126,7 +125,7 @@ fn lens_between(lens: &Lens, place: f64) -> ExperimentResult<Lens> {
     }
     let (mut behind, mut radii, mut focal) = ([0.0; 3], [0.0; 3], [0.0; 3]);
     for (zoom, model) in models.into_iter().enumerate() {
-        let model = model.map_err(ExperimentError::from_error)?;
+        let model = model?;
         let system = &model.channels[model.primary].system;
         let last = system.surfaces.len() - 2;
         behind[zoom] =
@@ -139,7 +138,7 @@ fn lens_between(lens: &Lens, place: f64) -> ExperimentResult<Lens> {
     // The same corner of the image at every focal length.
     let height = |field: &FieldPoint| focal[0] * field.y.to_radians().tan();
     let heights: Vec<f64> = positions[0].fields.values.iter().map(height).collect();
-    let model = RayModel::from_lens(&single, 0).map_err(ExperimentError::from_error)?;
+    let model = RayModel::from_lens(&single, 0)?;
     let now = model.first_order.efl.unwrap_or(f64::NAN);
     let field =
         |height: f64| FieldPoint { x: 0.0, y: (height / now).atan().to_degrees(), weight: 1.0 };

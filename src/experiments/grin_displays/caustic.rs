@@ -125,9 +125,8 @@ impl ExitBeam {
         let (space, rays) = task.scoring_rays(&task.views[0]);
         let plan =
             plan_tracing(medium.index_field(), &space.region(), task.launch, &rays, TOLERANCE);
-        let setup = plan.map_err(ExperimentError::from_error)?.setup;
-        let tracer =
-            GrinTracer::new(medium.index_field(), setup).map_err(ExperimentError::from_error)?;
+        let setup = plan?.setup;
+        let tracer = GrinTracer::new(medium.index_field(), setup)?;
         let exits = tracer.trace_batch(&rays);
         let arrived = exits.iter().filter(|exit| exit.fate.has_arrived() && exit.v.z > 0.0);
         let back = space.corners()[1].z;

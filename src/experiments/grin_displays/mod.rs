@@ -9,12 +9,10 @@ pub(super) mod multifocal;
 pub(super) mod resolution;
 
 use super::{
-    Claim, DataTable, Effort, ExperimentError, ExperimentOutcome, ExperimentResult, NamedPlot,
-    ProgressFn, solve, solve_from,
+    Claim, DataTable, Effort, ExperimentOutcome, ExperimentResult, NamedPlot, ProgressFn,
+    builtin_task, solve, solve_from,
 };
-use crate::grin_design::{
-    self, GrinField, GrinOptimizer, GrinTask, LightGoal, LightSource, ViewReport,
-};
+use crate::grin_design::{GrinField, GrinOptimizer, GrinTask, LightGoal, LightSource, ViewReport};
 use crate::report::{plot_grin_field, plot_grin_image};
 
 /// The rays along a side of a beam in the evaluation, relative to the optimization.
@@ -23,13 +21,6 @@ const FINER: f64 = 1.57;
 const LEFT_OUT: f64 = 1e-3;
 /// The tolerance of the lowest index for rounding.
 const ROUNDING: f64 = 1e-9;
-
-/// A built-in task.
-fn builtin(name: &str) -> ExperimentResult<GrinTask> {
-    let builtin = grin_design::find_builtin(name)
-        .ok_or_else(|| ExperimentError::Failed(format!("no task `{name}`")))?;
-    builtin.task().map_err(ExperimentError::from_error)
-}
 
 /// The task reduced for a test: its first levels only, fewer rays, coarser images.
 fn reduced(mut task: GrinTask, levels: usize) -> GrinTask {
@@ -78,7 +69,7 @@ fn solve_and_evaluate(
 
 /// Evaluates a field with rays that its optimization has not used.
 fn evaluate(task: &GrinTask, medium: &GrinField) -> ExperimentResult<Vec<ViewReport>> {
-    independent_task(task).report_views(medium).map_err(ExperimentError::from_error)
+    Ok(independent_task(task).report_views(medium)?)
 }
 
 /// The columns of the table of views.
@@ -189,6 +180,6 @@ fn outcome_of(
 
 /// A built-in task at full effort; for a test its first levels.
 fn task(name: &str, effort: Effort, levels: usize) -> ExperimentResult<GrinTask> {
-    let task = builtin(name)?;
+    let task = builtin_task(name)?;
     Ok(if effort == Effort::Full { task } else { reduced(task, levels) })
 }

@@ -6,10 +6,10 @@
 //! rough fields it misleads the optimization, and the smoothed one is better. A spline has no
 //! jumps.
 
-use super::{builtin, evaluate, reduced, solve_from};
+use super::{evaluate, reduced, solve_from};
 use crate::experiments::{
     Claim, DataTable, Effort, Experiment, ExperimentError, ExperimentOutcome, ExperimentResult,
-    NamedPlot, ProgressFn, report_progress,
+    NamedPlot, ProgressFn, builtin_task, report_progress,
 };
 use crate::grin_design::{FieldRepresentation, GrinOptimizer, GrinTask, ViewImage, ViewReport};
 use crate::plot::{Axis, Canvas, Chart, Legend, PALETTE, Stroke, draw_image_row, gray_levels};
@@ -83,7 +83,7 @@ impl ResolutionRow {
 }
 
 fn run(effort: Effort, progress: &mut ProgressFn<'_>) -> ExperimentResult {
-    let full = builtin("display")?;
+    let full = builtin_task("display")?;
     let task = if effort == Effort::Full { full } else { reduced(full, 2) };
     let count = KINDS.len() * task.levels.len();
     let mut rows = Vec::new();
@@ -117,7 +117,7 @@ fn find(
     let nodes = task.levels[levels - 1].nodes;
     task.name = format!("{}, {nodes} nodes", kind.name());
     report_progress(progress, part[0], &task.name)?;
-    let optimizer = GrinOptimizer::new(&task).map_err(ExperimentError::from_error)?;
+    let optimizer = GrinOptimizer::new(&task)?;
     let optimizer =
         if kind == InterpolationKind::Exact { optimizer.with_exact_hessian() } else { optimizer };
     let optimizer = solve_from(optimizer, part, progress)?;

@@ -10,8 +10,8 @@ use super::{at_heights, rules};
 use crate::experiments::pareto_front::draw_lens_and_spots;
 use crate::experiments::sharpness_vs_light::{self, ProgressSpan};
 use crate::experiments::{
-    Claim, Effort, Experiment, ExperimentError, ExperimentOutcome, ExperimentResult, NamedPlot,
-    ProgressFn, report_progress,
+    Claim, Effort, Experiment, ExperimentOutcome, ExperimentResult, NamedPlot, ProgressFn,
+    report_progress,
 };
 use crate::lens::Lens;
 use crate::merit::{PupilEdge, Term, WeightedTerm};
@@ -65,7 +65,7 @@ fn run_sweep(
     settings: &ParetoSettings,
     progress: &mut ProgressFn<'_>,
 ) -> ExperimentResult<ParetoSweep> {
-    let mut sweep = ParetoSweep::new(start, settings).map_err(ExperimentError::from_error)?;
+    let mut sweep = ParetoSweep::new(start, settings)?;
     let mut done = 0.0;
     loop {
         report_progress(progress, SWEEP_SHARE * done, "the front without mutations")?;
@@ -117,11 +117,10 @@ impl MutationGain {
         let rays = searches.iter().map(RecordedSearch::rays).sum();
         let judged = |(search, (_, weight)): (&RecordedSearch, &(ParetoPoint, f64))| {
             ParetoPoint::evaluate(&search.run.best().point, Some(*weight), EVALUATION_TOLERANCE)
-                .map_err(ExperimentError::from_error)
         };
         let (mutated, descended) = searches.split_at(chosen.len());
         let [found, longer] = [mutated, descended]
-            .map(|side| side.iter().zip(chosen).map(judged).collect::<ExperimentResult<Vec<_>>>());
+            .map(|side| side.iter().zip(chosen).map(judged).collect::<Result<Vec<_>, _>>());
         let (found, longer) = (found?, longer?);
         Ok(Self {
             mutated: extend_front(sweep.front(), &found),
@@ -225,7 +224,7 @@ fn extend_front(front: &Front, found: &[ParetoPoint]) -> Front {
 /// semi-diameters.
 fn plan(start: &ParetoPoint, weight: f64, gradients: u64) -> ExperimentResult<SearchPlan> {
     let goal = weighted_sum_goal(&start.lens, start.light, PupilEdge::Moving);
-    let mut goal = goal.map_err(ExperimentError::from_error)?;
+    let mut goal = goal?;
     goal.terms.push(WeightedTerm { term: Term::Throughput, weight });
     let semi_diameters = start.lens.surfaces.iter().filter_map(|row| row.semi_diameter);
     let widest =

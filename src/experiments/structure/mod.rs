@@ -15,7 +15,7 @@ mod recorded_search;
 mod sampler_comparison;
 
 use super::sharpness_vs_light::{focal_length, with_field_angles};
-use super::{ExperimentError, ExperimentResult, lens};
+use super::{ExperimentResult, lens};
 use crate::lens::{Lens, at_zoom};
 use crate::merit::{ConstraintMargin, Goal, MeritError, Term, WeightedTerm, constraint_margins};
 use crate::pupil::limited_by_stop;
@@ -46,7 +46,7 @@ fn at_heights(file: &str) -> ExperimentResult<Lens> {
     let single = at_zoom(&lens(file)?, 0);
     let focal = focal_length(&single)?;
     let angles = HEIGHTS.map(|height| (height / focal).atan().to_degrees());
-    limited_by_stop(&with_field_angles(single, &angles)).map_err(ExperimentError::from_error)
+    Ok(limited_by_stop(&with_field_angles(single, &angles))?)
 }
 
 /// The search rules for the four lenses: the largest of them has ten elements.
@@ -57,9 +57,8 @@ fn rules() -> SearchRules {
 /// A search from a lens with one chain, as in the thesis, over a number of gradients: sharp spots,
 /// all of the light, the relaxed limits.
 fn plan(start: &Lens, rules: SearchRules, gradients: u64) -> ExperimentResult<SearchPlan> {
-    let usual = Goal::with_limits(start, &rules.goal_limits(), None, 1.0)
-        .map_err(ExperimentError::from_error)?;
-    let relaxed = relax_limits(start, &usual).map_err(ExperimentError::from_error)?;
+    let usual = Goal::with_limits(start, &rules.goal_limits(), None, 1.0)?;
+    let relaxed = relax_limits(start, &usual)?;
     let default = SearchPlan::default();
     let settings = SearchSettings { chains: 1, gradients: Some(gradients), ..default.settings };
     Ok(SearchPlan { goal: Some(relaxed), rules, settings, ..default })

@@ -12,8 +12,8 @@ use super::{at_heights, rules};
 use crate::experiments::section::SectionPlot;
 use crate::experiments::sharpness_vs_light::ProgressSpan;
 use crate::experiments::{
-    Claim, DataTable, Effort, Experiment, ExperimentError, ExperimentOutcome, ExperimentResult,
-    NamedPlot, ProgressFn, TableCell,
+    Claim, DataTable, Effort, Experiment, ExperimentOutcome, ExperimentResult, NamedPlot,
+    ProgressFn, TableCell,
 };
 use crate::lens::Lens;
 use crate::plot::{Axis, BLACK, Canvas, Chart, PALETTE, TextAlign};
@@ -79,8 +79,7 @@ struct OverviewLens {
 
 impl OverviewLens {
     fn of(name: &'static str, lens: Lens) -> ExperimentResult<Self> {
-        let figures =
-            LensSummary::new(&lens, EVALUATION_TOLERANCE).map_err(ExperimentError::from_error)?;
+        let figures = LensSummary::new(&lens, EVALUATION_TOLERANCE)?;
         Ok(Self { name, lens, figures })
     }
 
@@ -174,7 +173,7 @@ fn draw(designs: &[OverviewLens]) -> ExperimentResult<Canvas> {
 }
 
 fn draw_design(canvas: &mut Canvas, design: &OverviewLens, top: f64) -> ExperimentResult<()> {
-    let model = RayModel::from_lens(&design.lens, 0).map_err(ExperimentError::from_error)?;
+    let model = RayModel::from_lens(&design.lens, 0)?;
     let section = SectionPlot::new(&model.channels[0].system);
     let [z, y] = section.extent();
     let (x, y) = (Axis::linear("", z), Axis::linear("", y));
@@ -185,7 +184,7 @@ fn draw_design(canvas: &mut Canvas, design: &OverviewLens, top: f64) -> Experime
     let title = format!("{name}: {} elements, {topology}", figures.elements);
     canvas.text([60.0, top - 30.0], &title, BLACK, TextAlign::Left);
     for (i, field) in model.fields.iter().enumerate() {
-        let launch = model.launch(*field, model.primary).map_err(ExperimentError::from_error)?;
+        let launch = model.launch(*field, model.primary)?;
         let color = PALETTE[i % PALETTE.len()];
         for ray in -2..=2 {
             section.draw_ray(canvas, &chart, &launch, [0.0, 0.45 * f64::from(ray)], color);

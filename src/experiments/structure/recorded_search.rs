@@ -1,7 +1,7 @@
 //! Searches with a record of their progress after every round.
 
 use crate::experiments::sharpness_vs_light::ProgressSpan;
-use crate::experiments::{ExperimentError, ExperimentResult, ProgressFn, report_progress};
+use crate::experiments::{ExperimentResult, ProgressFn, report_progress};
 use crate::lens::Lens;
 use crate::search::lens_landscape::{LensLandscape, SearchPlan};
 use crate::search::{MutationKind, SearchRunOn};
@@ -36,7 +36,7 @@ pub(super) struct RoundRecord {
 
 impl RecordedSearch {
     pub(super) fn new(start: &Lens, plan: &SearchPlan) -> ExperimentResult<Self> {
-        let (landscape, run) = plan.begin(start).map_err(ExperimentError::from_error)?;
+        let (landscape, run) = plan.begin(start)?;
         Ok(Self { landscape, run, marks: Vec::new() })
     }
 
