@@ -3,7 +3,7 @@
 use egui::{Button, Checkbox, DragValue, Label, ProgressBar, RichText, Ui};
 
 use super::setup::SearchSetup;
-use super::text;
+use super::{ShownSearch, text};
 use crate::search::lens_landscape::describe_violation;
 use crate::search::{SteerCommand, Temperature};
 use crate::session::{
@@ -121,7 +121,8 @@ fn violations(ui: &mut Ui, run: &StructureSearchSnapshot) {
 }
 
 /// The progress of the search.
-pub(super) fn progress(ui: &mut Ui, view: &SessionView, run: &StructureSearchSnapshot) {
+pub(super) fn progress(ui: &mut Ui, search: ShownSearch<'_>) {
+    let ShownSearch { view, run } = search;
     let text = text::status_text(run, view.structure_search.run.status);
     match run.fraction_done() {
         Some(done) => {
@@ -145,24 +146,15 @@ pub(super) fn progress(ui: &mut Ui, view: &SessionView, run: &StructureSearchSna
 }
 
 /// The live controls: the temperature, and the chain that is previewed.
-pub(super) fn live_controls(
-    ui: &mut Ui,
-    view: &SessionView,
-    run: &StructureSearchSnapshot,
-    actions: &mut Actions,
-) {
+pub(super) fn live_controls(ui: &mut Ui, search: ShownSearch<'_>, actions: &mut Actions) {
     ui.horizontal_wrapped(|ui| {
-        temperature(ui, view, run, actions);
-        preview_choice(ui, view, run, actions);
+        temperature(ui, search, actions);
+        preview_choice(ui, search, actions);
     });
 }
 
-fn temperature(
-    ui: &mut Ui,
-    view: &SessionView,
-    run: &StructureSearchSnapshot,
-    actions: &mut Actions,
-) {
+fn temperature(ui: &mut Ui, search: ShownSearch<'_>, actions: &mut Actions) {
+    let ShownSearch { view, run } = search;
     ui.weak("Temperature").on_hover_text(
         "The merit at which the density of a lens is 1/e. At a higher temperature, descents from \
          worse lenses last longer",
@@ -188,12 +180,8 @@ fn temperature(
     }
 }
 
-fn preview_choice(
-    ui: &mut Ui,
-    view: &SessionView,
-    run: &StructureSearchSnapshot,
-    actions: &mut Actions,
-) {
+fn preview_choice(ui: &mut Ui, search: ShownSearch<'_>, actions: &mut Actions) {
+    let ShownSearch { view, run } = search;
     let mut follows = view.structure_search.previewed_chain.is_some();
     let chain = view.structure_search.previewed_chain.unwrap_or(0);
     let hint = "Show the current lens of a chain in place of the design, in all panels";

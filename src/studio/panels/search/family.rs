@@ -9,10 +9,10 @@ use egui::{
 };
 
 use super::lenses::Thumbnails;
-use super::{lenses, moves, text};
+use super::{ShownSearch, lenses, moves, text};
 use crate::lens::Lens;
 use crate::search::{LineageNode, OfferOutcome};
-use crate::session::{SessionView, StructureSearchSnapshot};
+use crate::session::StructureSearchSnapshot;
 
 /// The number of last generations that the tree shows, besides the line of the selected one.
 const MAX_NODES: usize = 80;
@@ -104,11 +104,11 @@ fn node_positions(shown: &[&Generation], rect: Rect) -> Vec<Pos2> {
 /// Shows the ancestors of a lens in words, the youngest first; the clicked one, if any.
 pub(super) fn ancestors(
     ui: &mut Ui,
-    view: &SessionView,
-    run: &StructureSearchSnapshot,
+    search: ShownSearch<'_>,
     number: u64,
     thumbnails: &mut Thumbnails,
 ) -> Option<u64> {
+    let ShownSearch { view, run } = search;
     let mut clicked = None;
     let generations: Vec<&Generation> = run.ancestry(number).collect();
     if generations.is_empty() {

@@ -8,12 +8,10 @@ use egui::{
 };
 use glam::DVec2;
 
-use super::text;
+use super::{ShownSearch, text};
 use crate::lens::{Lens, added_glass};
 use crate::search::SteerCommand;
-use crate::session::{
-    Command, FoundLens, SessionView, StructureSearchCommand, StructureSearchSnapshot,
-};
+use crate::session::{Command, FoundLens, SessionView, StructureSearchCommand};
 use crate::studio::actions::Actions;
 use crate::studio::cached::ByAddress;
 use crate::studio::draw::{BoundingBox, Camera, Scene, software};
@@ -30,11 +28,11 @@ const WORDS: f32 = 30.0;
 /// Shows the retained lenses, the best first; the clicked one, if any.
 pub(super) fn cards(
     ui: &mut Ui,
-    view: &SessionView,
-    run: &StructureSearchSnapshot,
+    search: ShownSearch<'_>,
     chosen: Option<u64>,
     thumbnails: &mut Thumbnails,
 ) -> Option<u64> {
+    let ShownSearch { view, run } = search;
     let same =
         |found: &Arc<FoundLens>| (found.number, found.merit) == (run.best.number, run.best.merit);
     let is_kept = run.reservoir.iter().any(same);
@@ -130,11 +128,11 @@ pub(super) fn paint(
 /// Buttons to accept, pin or export a lens; true if the design is to be shown again.
 pub(super) fn lens_buttons(
     ui: &mut Ui,
-    view: &SessionView,
-    run: &StructureSearchSnapshot,
+    search: ShownSearch<'_>,
     number: u64,
     actions: &mut Actions,
 ) -> bool {
+    let ShownSearch { view, run } = search;
     let exporting = view.structure_search.exporting.contains(&number);
     let take = format!("Make lens {number} the design, as one undo step");
     let pin = if run.pinned == Some(number) {

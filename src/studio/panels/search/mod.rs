@@ -66,6 +66,13 @@ pub struct SearchPanel {
     shown_run: Option<u64>,
 }
 
+/// A search that the panel shows, and the session that it belongs to.
+#[derive(Debug, Clone, Copy)]
+struct ShownSearch<'a> {
+    view: &'a SessionView,
+    run: &'a StructureSearchSnapshot,
+}
+
 impl Panel for SearchPanel {
     fn title(&self) -> &'static str {
         "Search"
@@ -79,22 +86,23 @@ impl Panel for SearchPanel {
             let why = capitalize(why);
             ui.colored_label(ui.visuals().error_fg_color, why);
         }
-        let run = view.structure_search.run.snapshot.clone();
-        if let Some(run) = run.as_deref() {
-            controls::progress(ui, view, run);
+        let run = view.structure_search.run.snapshot.as_deref();
+        let search = run.map(|run| ShownSearch { view, run });
+        if let Some(search) = search {
+            controls::progress(ui, search);
         } else if view.structure_search.run.is_active() {
             ui.weak("Preparing…");
         }
-        self.pages(ui, run.is_some());
-        if let (SearchPage::Lenses | SearchPage::Family, Some(run)) = (self.page, run.as_deref()) {
-            self.selection_bar(ui, view, run, actions);
+        self.pages(ui, search.is_some());
+        if let (SearchPage::Lenses | SearchPage::Family, Some(search)) = (self.page, search) {
+            self.selection_bar(ui, search, actions);
         }
         let scroll = ScrollArea::vertical().id_salt(self.page as u8).auto_shrink([false, false]);
-        scroll.show(ui, |ui| match (self.page, run.as_deref()) {
+        scroll.show(ui, |ui| match (self.page, search) {
             (SearchPage::Setup, _) | (_, None) => self.setup_page(ui, view),
-            (SearchPage::Lenses, Some(run)) => self.lenses_page(ui, view, run, actions),
-            (SearchPage::Moves, Some(run)) => moves::table(ui, view, run, actions),
-            (SearchPage::Family, Some(run)) => self.family_page(ui, view, run, actions),
+            (SearchPage::Lenses, Some(search)) => self.lenses_page(ui, search, actions),
+            (SearchPage::Moves, Some(search)) => moves::table(ui, search, actions),
+            (SearchPage::Family, Some(search)) => self.family_page(ui, search, actions),
         });
     }
 }
@@ -137,34 +145,21 @@ impl SearchPanel {
     }
 
     /// The merit history and the retained lenses.
-    fn lenses_page(
-        &mut self,
-        ui: &mut Ui,
-        view: &SessionView,
-        run: &StructureSearchSnapshot,
-        actions: &mut Actions,
-    ) {
-        controls::live_controls(ui, view, run, actions);
-        let clicked = plot::plots(ui, view, run, self.selected_number());
+    fn lenses_page(&mut self, ui: &mut Ui, search: ShownSearch<'_>, actions: &mut Actions) {
+        controls::live_controls(ui, search, actions);
         let chosen = self.selected_number();
-        let clicked =
-            clicked.or_else(|| lenses::cards(ui, view, run, chosen, &mut self.thumbnails));
-        self.select(view, clicked, actions);
+        let clicked = plot::plots(ui, search, chosen);
+        let clicked = clicked.or_else(|| lenses::cards(ui, search, chosen, &mut self.thumbnails));
+        self.select(search.view, clicked, actions);
     }
 
     /// The line of the lens that was clicked, or of the best one.
-    fn family_page(
-        &mut self,
-        ui: &mut Ui,
-        view: &SessionView,
-        run: &StructureSearchSnapshot,
-        actions: &mut Actions,
-    ) {
-        let number = self.selected_number().unwrap_or(run.best.number);
-        let clicked = family::tree(ui, run, number);
+    fn family_page(&mut self, ui: &mut Ui, search: ShownSearch<'_>, actions: &mut Actions) {
+        let number = self.selected_number().unwrap_or(search.run.best.number);
+        let clicked = family::tree(ui, search.run, number);
         let clicked =
-            clicked.or_else(|| family::ancestors(ui, view, run, number, &mut self.thumbnails));
-        self.select(view, clicked, actions);
+            clicked.or_else(|| family::ancestors(ui, search, number, &mut self.thumbnails));
+        self.select(search.view, clicked, actions);
     }
 
     /// The generation that was clicked.
@@ -184,38 +179,26 @@ impl SearchPanel {
     }
 
     /// The bar of the selected lens: below the page, or above it if there is little room.
-    fn selection_bar(
-        &mut self,
-        ui: &mut Ui,
-        view: &SessionView,
-        run: &StructureSearchSnapshot,
-        actions: &mut Actions,
-    ) {
+    fn selection_bar(&mut self, ui: &mut Ui, search: ShownSearch<'_>, actions: &mut Actions) {
         if ui.available_height() < MIN_HEIGHT {
-            return self.selection(ui, view, run, actions);
+            return self.selection(ui, search, actions);
         }
         let frame = Frame::new().inner_margin(Margin { top: 4, ..Margin::ZERO });
         let side = Side::bottom("chosen lens of the search").frame(frame);
         let side = side.show_separator_line(false).exact_size(SELECTION_HEIGHT);
-        side.show(ui, |ui| self.selection(ui, view, run, actions));
+        side.show(ui, |ui| self.selection(ui, search, actions));
     }
 
-    fn selection(
-        &mut self,
-        ui: &mut Ui,
-        view: &SessionView,
-        run: &StructureSearchSnapshot,
-        actions: &mut Actions,
-    ) {
+    fn selection(&mut self, ui: &mut Ui, search: ShownSearch<'_>, actions: &mut Actions) {
         let number = self.selected_number();
-        let lens = number.and_then(|number| run.lens_by_number(number));
+        let lens = number.and_then(|number| search.run.lens_by_number(number));
         let (Some(number), Some(_)) = (number, lens) else {
             ui.weak("Click a lens or a mark to compare it with the design.");
             return;
         };
-        if lenses::lens_buttons(ui, view, run, number, actions) {
+        if lenses::lens_buttons(ui, search, number, actions) {
             self.selected = None;
         }
-        text::comparison(ui, view, run, number);
+        text::comparison(ui, search, number);
     }
 }

@@ -3,8 +3,9 @@
 use egui::{Color32, DragValue, Grid, RichText, Sense, Shape, Stroke, Ui, Visuals, pos2, vec2};
 use egui_plot::MarkerShape;
 
+use super::ShownSearch;
 use crate::search::{MutationKind, MutationStatistics, Refusal, SteerCommand};
-use crate::session::{SessionView, StructureSearchCommand, StructureSearchSnapshot};
+use crate::session::{StructureSearchCommand, StructureSearchSnapshot};
 use crate::studio::actions::Actions;
 use crate::studio::number;
 use crate::studio::palette::{Palette, color32};
@@ -21,12 +22,7 @@ const HEADINGS: [(&str, &str); 7] = [
 ];
 
 /// The table of all kinds.
-pub(super) fn table(
-    ui: &mut Ui,
-    view: &SessionView,
-    run: &StructureSearchSnapshot,
-    actions: &mut Actions,
-) {
+pub(super) fn table(ui: &mut Ui, search: ShownSearch<'_>, actions: &mut Actions) {
     Grid::new("moves").num_columns(HEADINGS.len()).spacing([9.0, 3.0]).striped(true).show(
         ui,
         |ui| {
@@ -38,21 +34,16 @@ pub(super) fn table(
             }
             ui.end_row();
             for kind in kinds() {
-                row(ui, view, run, kind, actions);
+                row(ui, search, kind, actions);
                 ui.end_row();
             }
         },
     );
-    refusal_summary(ui, run);
+    refusal_summary(ui, search.run);
 }
 
-fn row(
-    ui: &mut Ui,
-    view: &SessionView,
-    run: &StructureSearchSnapshot,
-    kind: MutationKind,
-    actions: &mut Actions,
-) {
+fn row(ui: &mut Ui, search: ShownSearch<'_>, kind: MutationKind, actions: &mut Actions) {
+    let ShownSearch { view, run } = search;
     ui.horizontal(|ui| {
         ui.spacing_mut().item_spacing.x = 4.0;
         symbol(ui, kind);

@@ -4,8 +4,8 @@
 use egui::{Id, PointerButton, RichText, Role, Ui, WidgetInfo, vec2};
 use egui_plot::{Line, LineStyle, Plot, PlotPoint, PlotPoints, PlotResponse, PlotUi, Points};
 
-use super::{moves, text};
-use crate::session::{DescentMark, HistorySample, SessionView, StructureSearchSnapshot};
+use super::{ShownSearch, moves, text};
+use crate::session::{DescentMark, HistorySample, StructureSearchSnapshot};
 use crate::studio::panels::decade_name;
 
 /// The distance in points within which the pointer picks a mark.
@@ -16,12 +16,8 @@ const STRIP: f32 = 44.0;
 const AXIS: f32 = 40.0;
 
 /// Shows both; the generation of the mark that was clicked, if one was.
-pub(super) fn plots(
-    ui: &mut Ui,
-    view: &SessionView,
-    run: &StructureSearchSnapshot,
-    chosen: Option<u64>,
-) -> Option<u64> {
+pub(super) fn plots(ui: &mut Ui, search: ShownSearch<'_>, chosen: Option<u64>) -> Option<u64> {
+    let ShownSearch { view, run } = search;
     let chain = view.structure_search.previewed_chain.unwrap_or(0);
     let height = (0.3 * ui.available_height()).clamp(80.0, 260.0);
     let clicked = merit_plot(ui, run, chain, chosen, height);

@@ -2,12 +2,12 @@
 
 use egui::{Label, Ui};
 
+use super::ShownSearch;
 use crate::optimize::pareto::ParetoPoint;
 use crate::search::element::piece_count;
 use crate::search::{DescentEnd, LineageNode, OfferOutcome, RunEnd};
 use crate::session::{
-    CheckpointStatus, EndReason, FoundLens, RunStatus, ScoredLens, SessionView,
-    StructureSearchSnapshot,
+    CheckpointStatus, EndReason, FoundLens, RunStatus, ScoredLens, StructureSearchSnapshot,
 };
 use crate::studio::number;
 use crate::studio::panels::optimizer::changes_text;
@@ -107,12 +107,8 @@ pub(super) fn lens_text(found: &FoundLens) -> String {
 }
 
 /// A lens beside the design: sharpness, light, elements.
-pub(super) fn comparison(
-    ui: &mut Ui,
-    view: &SessionView,
-    run: &StructureSearchSnapshot,
-    number: u64,
-) {
+pub(super) fn comparison(ui: &mut Ui, search: ShownSearch<'_>, number: u64) {
+    let ShownSearch { view, run } = search;
     let Some(lens) = run.lens_by_number(number) else { return };
     let mut parts = Vec::new();
     let found = run.reservoir.iter().chain([&run.best, &run.start]);
