@@ -1,6 +1,7 @@
 //! Widgets that several panels share.
 
 use egui::{Button, Color32, RichText, Sense, Ui, vec2};
+use egui_plot::Plot;
 
 use crate::studio::actions::{Actions, UiAction};
 
@@ -49,6 +50,12 @@ pub(super) fn main_button(
     let button = Button::new(RichText::new(text).strong()).fill(fill);
     let button = ui.add_enabled(enabled, button).on_hover_text(hint);
     button.on_disabled_hover_text(reason).clicked()
+}
+
+/// A plot that can be neither moved nor zoomed.
+pub(super) fn fixed_plot(name: &str, height: f32) -> Plot<'static> {
+    let plot = Plot::new(name).height(height).allow_drag(false).allow_scroll(false);
+    plot.allow_zoom(false).allow_boxed_zoom(false)
 }
 
 /// A small square of a colour, as in a legend.

@@ -6,6 +6,7 @@ use egui_plot::{AxisHints, Corner, Legend, Line, LineStyle, Plot, VLine};
 use super::text;
 use crate::session::{GrinRun, LossSample, SessionView};
 use crate::studio::panels::decade_name;
+use crate::studio::panels::widgets::fixed_plot;
 
 /// The share of width and height that counts as a corner.
 const NEAR: f64 = 0.4;
@@ -39,12 +40,7 @@ fn free_corner<'a>(curves: impl Iterator<Item = &'a [[f64; 2]]>) -> Corner {
 
 /// A plot that only shows, in all the room that is left.
 fn plot(ui: &Ui, name: &str, legend: Corner) -> Plot<'static> {
-    Plot::new(name.to_owned())
-        .height(ui.available_height().max(120.0))
-        .allow_drag(false)
-        .allow_zoom(false)
-        .allow_scroll(false)
-        .allow_boxed_zoom(false)
+    fixed_plot(name, ui.available_height().max(120.0))
         .y_axis_min_width(44.0)
         .grid_color(ui.visuals().widgets.noninteractive.bg_stroke.color)
         .grid_spacing(18.0..=110.0)

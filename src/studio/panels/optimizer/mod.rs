@@ -10,7 +10,7 @@ use egui::{
     ComboBox, Context, Frame, Margin, Panel as Side, RichText, Role, ScrollArea, Ui, WidgetInfo,
     vec2,
 };
-use egui_plot::{Line, Plot, PlotPoints};
+use egui_plot::{Line, PlotPoints};
 
 use super::{Panel, decade_name, mean_pupil_area};
 use crate::optimize::DescentMethod;
@@ -19,7 +19,7 @@ use crate::session::{
 };
 use crate::studio::actions::Actions;
 use crate::studio::number;
-use crate::studio::panels::widgets::{ActionButton, action_buttons, main_button};
+use crate::studio::panels::widgets::{ActionButton, action_buttons, fixed_plot, main_button};
 use crate::studio::text::{capitalize, status_text};
 use crate::studio::text_input::EditBuffers;
 use merit_editor::MeritEditor;
@@ -203,12 +203,7 @@ fn history_plot(ui: &mut Ui, search: &OptimizationSnapshot) {
     let (current, best) = (curve(|point| point.current), curve(|point| point.best));
     let visuals = ui.visuals();
     let (weak, strong) = (visuals.weak_text_color(), visuals.hyperlink_color);
-    let plot = Plot::new("merit history")
-        .height(ui.available_height())
-        .allow_drag(false)
-        .allow_zoom(false)
-        .allow_scroll(false)
-        .allow_boxed_zoom(false)
+    let plot = fixed_plot("merit history", ui.available_height())
         .y_axis_min_width(40.0)
         .grid_color(visuals.widgets.noninteractive.bg_stroke.color)
         .grid_spacing(18.0..=120.0)

@@ -7,6 +7,7 @@ use egui_plot::{Line, LineStyle, Plot, PlotPoint, PlotPoints, PlotResponse, Plot
 use super::{ShownSearch, moves, text};
 use crate::session::{DescentMark, HistorySample, StructureSearchSnapshot};
 use crate::studio::panels::decade_name;
+use crate::studio::panels::widgets::fixed_plot;
 
 /// The distance in points within which the pointer picks a mark.
 const NEAR: f32 = 10.0;
@@ -26,13 +27,8 @@ pub(super) fn plots(ui: &mut Ui, search: ShownSearch<'_>, chosen: Option<u64>) -
     clicked
 }
 
-fn plot(name: &str, height: f32) -> Plot<'_> {
-    Plot::new(name)
-        .height(height)
-        .allow_drag(false)
-        .allow_zoom(false)
-        .allow_scroll(false)
-        .allow_boxed_zoom(false)
+fn plot(name: &str, height: f32) -> Plot<'static> {
+    fixed_plot(name, height)
         .show_crosshair(false)
         .label_formatter(|_| None)
         .y_axis_min_width(AXIS)
