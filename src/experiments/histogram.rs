@@ -144,9 +144,9 @@ mod tests {
 
     #[test]
     fn the_test_accepts_its_density_as_often_as_it_says() {
-        let surprises = (0..200).map(|seed| deviation_in_sigmas(&chains(1.0, seed), &[0.1; 10]));
-        let surprises: Vec<f64> = surprises.collect();
-        let above = |z: f64| surprises.iter().filter(|value| **value > z).count();
+        let deviations = (0..200).map(|seed| deviation_in_sigmas(&chains(1.0, seed), &[0.1; 10]));
+        let deviations: Vec<f64> = deviations.collect();
+        let above = |z: f64| deviations.iter().filter(|value| **value > z).count();
         // A sixth is above one standard deviation, a fortieth above two.
         assert!(
             (18..=50).contains(&above(1.0)) && above(2.0) <= 14,

@@ -96,8 +96,8 @@ impl Exposure {
             light += weight;
         }
         let phase = PI * frequency * distance;
-        let smear = if phase == 0.0 { 1.0 } else { phase.sin() / phase };
-        (sum / light * smear).abs()
+        let motion_contrast = if phase == 0.0 { 1.0 } else { phase.sin() / phase };
+        (sum / light * motion_contrast).abs()
     }
 }
 
@@ -167,9 +167,9 @@ impl ExposurePair {
     fn lenses(&self) -> DataTable {
         let columns = ["lens", "spot_mm", "light_mm2", "brightness", "exposure"];
         let mut table = DataTable::new("lenses", &columns);
-        let shots =
+        let exposures =
             [("darkest", &self.dark, self.exposure_ratio), ("brightest", &self.bright, 1.0)];
-        for (name, shot, exposure) in shots {
+        for (name, shot, exposure) in exposures {
             let numbers = [shot.design.spot, shot.design.light, shot.brightness, exposure];
             table.push_row(std::iter::once(name.into()).chain(numbers.map(Into::into)));
         }

@@ -128,9 +128,10 @@ impl FrontStudy {
     ) -> ExperimentResult<Vec<Claim>> {
         let Self { start, unbiased, biased } = self;
         let [front, other] = [unbiased, biased].map(|front| front.relative_hypervolume(start));
-        let beaten = |design: &&ParetoPoint| unbiased.points().iter().any(|u| u.dominates(design));
+        let is_dominated =
+            |design: &&ParetoPoint| unbiased.points().iter().any(|u| u.dominates(design));
         let lit = biased.points().iter().filter(|design| design.light >= MIN_LIGHT * start.light);
-        let left = lit.filter(|design| !beaten(design)).count();
+        let left = lit.filter(|design| !is_dominated(design)).count();
         let mut claims = vec![
             Claim::at_least(
                 format!(

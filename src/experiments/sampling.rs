@@ -272,7 +272,7 @@ fn claims(study: &ToyStudy, found: &[ProcessSamples]) -> Vec<Claim> {
     let exact = &found[0];
     let printed = found.iter().filter(|sampled| sampled.process.is_printed());
     let least = |values: &mut dyn Iterator<Item = f64>| values.fold(f64::INFINITY, f64::min);
-    let surprise = least(&mut printed.clone().map(|sampled| sampled.by_time.sigmas));
+    let deviation = least(&mut printed.clone().map(|sampled| sampled.by_time.sigmas));
     let reservoir = printed.filter(|sampled| sampled.process.regeneration == RESERVOIR);
     let distance = least(&mut reservoir.map(|sampled| sampled.by_time.distance));
     vec![
@@ -284,7 +284,7 @@ fn claims(study: &ToyStudy, found: &[ProcessSamples]) -> Vec<Claim> {
             found[1].by_time.sigmas,
             UNLIKELY,
         ),
-        Claim::at_least(says("printed rate, smallest deviation by time"), surprise, UNLIKELY),
+        Claim::at_least(says("printed rate, smallest deviation by time"), deviation, UNLIKELY),
         Claim::at_least(
             says("printed rate, reservoir: smallest total variation by time"),
             distance,

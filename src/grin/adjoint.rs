@@ -127,7 +127,7 @@ impl<R: Real, F: IndexField<R> + ?Sized> GrinTracer<'_, R, F> {
             self.refill_backward(&mut block, lane, (&mut queue, clock), chunk);
         }
         let mut soonest = block.earliest_due();
-        let mut boarded = true;
+        let mut loaded = true;
         // An empty seat is never due.
         while soonest != u64::MAX {
             run_vectorized(
@@ -136,12 +136,12 @@ impl<R: Real, F: IndexField<R> + ?Sized> GrinTracer<'_, R, F> {
                 || self.undo_block(&mut block, &mut scratch, gradient),
             );
             clock += 1;
-            if boarded {
+            if loaded {
                 // Only the first step backwards may be a shortened one.
                 block.set_full_step(self.setup.step);
             }
-            boarded = clock >= soonest;
-            if !boarded {
+            loaded = clock >= soonest;
+            if !loaded {
                 continue;
             }
             for lane in 0..LANES {

@@ -66,14 +66,14 @@ fn costs(rows: &[GlassPiece<'_>], old: &[GlassPiece<'_>], size: f64) -> Vec<Vec<
     let mut costs = vec![vec![0.0; old.len() + 1]; rows.len() + 1];
     for i in 0..=rows.len() {
         for j in 0..=old.len() {
-            let gone = if j > 0 { costs[i][j - 1] + NEW } else { f64::INFINITY };
+            let removed = if j > 0 { costs[i][j - 1] + NEW } else { f64::INFINITY };
             let new = if i > 0 { costs[i - 1][j] + NEW } else { f64::INFINITY };
             let same = if i > 0 && j > 0 {
                 costs[i - 1][j - 1] + difference(&rows[i - 1], &old[j - 1], size)
             } else {
                 f64::INFINITY
             };
-            let least = gone.min(new).min(same);
+            let least = removed.min(new).min(same);
             costs[i][j] = if least.is_finite() { least } else { 0.0 };
         }
     }

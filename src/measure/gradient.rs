@@ -548,12 +548,12 @@ impl<'a> GradientScene<'a> {
             Box::new(|| drop(black_box(region.warp_derivative(&spot, sampling)))),
             Box::new(|| drop(black_box(region.warp_derivative_in::<f32>(&spot, sampling)))),
         ];
-        let mut contestants: Vec<TimedCase<'_>> = turns
+        let mut cases: Vec<TimedCase<'_>> = turns
             .iter_mut()
             .map(|turn| TimedCase { work: 1.0, repetition: Box::new(turn) })
             .collect();
-        let rates = time_interleaved(&mut contestants, TURNS, TURN);
-        drop(contestants);
+        let rates = time_interleaved(&mut cases, TURNS, TURN);
+        drop(cases);
         drop(turns);
         // The fastest repetitions: slower ones were disturbed by other processes.
         let seconds: Vec<f64> = rates.iter().map(|rate| 1.0 / rate.max).collect();

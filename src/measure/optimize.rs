@@ -71,8 +71,8 @@ pub fn measure_step_costs(steps: usize) -> Result<StepCosts, BenchmarkError> {
 
 /// The lens with all curvatures of refracting surfaces and all thicknesses as variables.
 fn with_all_variables(mut lens: Lens) -> Lens {
-    let bent = |i: usize| (!lens.surfaces[i].stop).then_some((i, Quantity::Curvature));
-    let curvatures = (0..lens.surfaces.len()).filter_map(bent);
+    let curvature = |i: usize| (!lens.surfaces[i].stop).then_some((i, Quantity::Curvature));
+    let curvatures = (0..lens.surfaces.len()).filter_map(curvature);
     let thicknesses = (0..lens.surfaces.len()).map(|i| (i, Quantity::Thickness));
     let variable =
         |(i, quantity)| Variable { parameter: Parameter::new(i, quantity), min: None, max: None };

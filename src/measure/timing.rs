@@ -39,18 +39,18 @@ pub(super) struct TimedCase<'a> {
 /// Times all cases in turn, `turns` times each for at least `seconds`; returns their rates in units
 /// of work per second.
 pub(super) fn time_interleaved(
-    contestants: &mut [TimedCase<'_>],
+    cases: &mut [TimedCase<'_>],
     turns: usize,
     seconds: f64,
 ) -> Vec<RateStatistics> {
     let repeats: Vec<u32> =
-        contestants.iter_mut().map(|c| repetition_count(&mut c.repetition, seconds)).collect();
-    let mut rates = vec![Vec::with_capacity(turns); contestants.len()];
+        cases.iter_mut().map(|c| repetition_count(&mut c.repetition, seconds)).collect();
+    let mut rates = vec![Vec::with_capacity(turns); cases.len()];
     for _ in 0..turns {
-        for ((contestant, repeats), rates) in contestants.iter_mut().zip(&repeats).zip(&mut rates) {
+        for ((case, repeats), rates) in cases.iter_mut().zip(&repeats).zip(&mut rates) {
             let watch = Stopwatch::start();
-            (0..*repeats).for_each(|_| (contestant.repetition)());
-            rates.push(f64::from(*repeats) * contestant.work / watch.seconds());
+            (0..*repeats).for_each(|_| (case.repetition)());
+            rates.push(f64::from(*repeats) * case.work / watch.seconds());
         }
     }
     rates.into_iter().map(RateStatistics::of).collect()

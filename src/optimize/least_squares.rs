@@ -82,8 +82,8 @@ impl LeastSquaresOptimizer {
         }
         let damping = Damping::Marquardt(self.damping.damping);
         let step = damped_step(&normal, &half_gradient, &active, damping)?;
-        let promised = predicted_decrease(&normal, &half_gradient, &step);
-        Some((step.as_slice().to_vec(), promised))
+        let predicted = predicted_decrease(&normal, &half_gradient, &step);
+        Some((step.as_slice().to_vec(), predicted))
     }
 
     fn differentiate(&mut self) {
@@ -101,7 +101,7 @@ impl LeastSquaresOptimizer {
             if self.state.evaluations >= self.max_evaluations {
                 return 0.0;
             }
-            let Some((step, promised)) = self.proposal() else {
+            let Some((step, predicted)) = self.proposal() else {
                 self.damping.raise();
                 continue;
             };
@@ -111,7 +111,7 @@ impl LeastSquaresOptimizer {
                 self.state.advance(&step, DerivativeLevel::Normal, |v| v < before);
             if let Some(sum) = sum {
                 self.sum = sum;
-                let gain = (before - self.state.value) / promised.max(f64::MIN_POSITIVE);
+                let gain = (before - self.state.value) / predicted.max(f64::MIN_POSITIVE);
                 if accepted < 1.0 {
                     self.damping.raise();
                 } else {

@@ -421,18 +421,18 @@ impl SweepChain {
 /// # Errors
 /// A lens without first-order data.
 pub fn weighted_sum_goal(lens: &Lens, light: f64, pupil: PupilEdge) -> Result<Goal, MeritError> {
-    let sensible = Goal::default_for(lens)?;
+    let default_goal = Goal::default_for(lens)?;
     let mut terms = vec![WeightedTerm { term: Term::SpotIntegral, weight: 1.0 }];
     // The integral of a spot is its mean square radius times the light, so the other terms are
     // scaled by the light too.
     let others =
-        sensible.terms.into_iter().filter(|w| !matches!(w.term, Term::Spot | Term::Light(_)));
+        default_goal.terms.into_iter().filter(|w| !matches!(w.term, Term::Spot | Term::Light(_)));
     terms.extend(others.map(|w| WeightedTerm { weight: light * w.weight, ..w }));
     terms.push(WeightedTerm { term: Term::Steepness(MAX_STEEPNESS), weight: light });
     // No field may go dark: an empty spot would be the sharpest of all.
-    let worth = terms[0].weight * light * goal_size(lens).powi(2);
-    terms.push(WeightedTerm { term: Term::Light(MIN_LIGHT), weight: worth });
-    Ok(Goal { terms, pupil, zoom_ratios: sensible.zoom_ratios })
+    let light_term = terms[0].weight * light * goal_size(lens).powi(2);
+    terms.push(WeightedTerm { term: Term::Light(MIN_LIGHT), weight: light_term });
+    Ok(Goal { terms, pupil, zoom_ratios: default_goal.zoom_ratios })
 }
 
 /// The spot radius in mm at which a violated minimum of light outweighs sharpness.

@@ -115,11 +115,11 @@ fn run_experiment(
     output: &WorkerOutput<ExperimentRequest, ExperimentRun>,
 ) {
     let ExperimentRequest { number, experiment, effort, ref cancelled } = *request;
-    let unwanted = || output.is_interrupted() || cancelled.load(Ordering::Relaxed);
+    let is_cancelled = || output.is_interrupted() || cancelled.load(Ordering::Relaxed);
     let show = |status| output.publish(ExperimentRun { number, experiment, status });
     let mut throttle = Throttle::new(INTERVAL);
     let mut watch = |ExperimentProgress { done, doing }: ExperimentProgress<'_>| {
-        if unwanted() {
+        if is_cancelled() {
             return ControlFlow::Break(());
         }
         if throttle.ready() {

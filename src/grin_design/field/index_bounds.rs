@@ -146,10 +146,10 @@ impl GrinField {
             Self::Tricubic(field) => {
                 let grid = field.grid();
                 let [nx, ny, nz] = grid.counts().map(|count| count - 3);
-                let is_loose = |i: &usize| !(low..=high).contains(&parameters[*i]);
+                let is_out_of_range = |i: &usize| !(low..=high).contains(&parameters[*i]);
                 let of_cell = |n: usize| {
                     let cell = SplineCell { grid, at: [n % nx, n / nx % ny, n / nx / ny] };
-                    let counts = cell.coefficients().any(|i| is_loose(&i))
+                    let counts = cell.coefficients().any(|i| is_out_of_range(&i))
                         && spaces.iter().any(|space| cell.touches(*space));
                     let points = if counts { 64 } else { 0 };
                     (0..points).filter_map(move |point| is_broken(cell.control_point(point)))
@@ -255,7 +255,7 @@ mod tests {
     use crate::grin_design::task::FieldRepresentation;
 
     /// A field with variations so strong that it exceeds its range inside and outside the domain.
-    fn wild(kind: FieldRepresentation) -> GrinField {
+    fn out_of_range(kind: FieldRepresentation) -> GrinField {
         let mut field = GrinField::from_function(kind, 9, |_| 1.3).unwrap();
         let wave = |i: usize| 1.3 + 3.0 * (0.7 * i as f64).sin();
         let numbers = field.parameters_mut().iter_mut().enumerate();
@@ -271,11 +271,11 @@ mod tests {
             FieldRepresentation::Sphere { radius: 1.0 },
             FieldRepresentation::Cylinder { radius: 1.0 },
         ] {
-            let wild = wild(kind);
+            let out_of_range = out_of_range(kind);
             let before = [IndexBound::Low, IndexBound::High]
-                .map(|bound| wild.extreme_index(&[space], bound).0);
+                .map(|bound| out_of_range.extreme_index(&[space], bound).0);
             assert!(before[0] < 0.95 && before[1] > 1.65, "{kind:?}: {before:?}");
-            let kept = wild.limit_index(&[space], range);
+            let kept = out_of_range.limit_index(&[space], range);
             for i in 0..40_000 {
                 let t = f64::from(i);
                 let side = |golden: f64| 2.0 * (t * golden).fract() - 1.0;
@@ -285,7 +285,7 @@ mod tests {
                 assert!(!inside || (1.0 - 1e-9..=1.6 + 1e-9).contains(&index), "{kind:?} {index}");
             }
             assert_eq!(kept.limit_index(&[space], range), kept, "once is enough");
-            assert_eq!(wild.limit_index(&[space], [-9.0, 9.0]), wild, "{kind:?}");
+            assert_eq!(out_of_range.limit_index(&[space], [-9.0, 9.0]), out_of_range, "{kind:?}");
         }
     }
 

@@ -68,12 +68,12 @@ impl GrinTask {
             let (space, rays) = self.scoring_rays(&self.views[view]);
             let (rays, off) = choose_rays(&rays, plane, space, count);
             let tracer = GrinTracer::new(field.index_field(), setup)?;
-            let way = |ray: &GrinRay<f64>| {
+            let path = |ray: &GrinRay<f64>| {
                 let (states, exit) = tracer.trace_path(ray);
                 let flat = exit.fate.has_arrived() && !is_valid(&exit);
                 RayPath { points: path_points(ray, &states, &exit, space), fate: exit.fate, flat }
             };
-            Ok(RayPaths { view, paths: rays.iter().map(way).collect(), distance: off })
+            Ok(RayPaths { view, paths: rays.iter().map(path).collect(), distance: off })
         };
         setups.into_iter().enumerate().map(of_view).collect()
     }
@@ -90,8 +90,8 @@ fn choose_rays(
     let [low, high] = space.corners();
     let (centre, reach) = ((low + high) * 0.5, 0.5 * space.diameter());
     let nearest = |ray: &GrinRay<f64>| {
-        let way = ray.v * ((centre - ray.x).dot(ray.v) / ray.v.dot(ray.v));
-        ray.x + way
+        let path = ray.v * ((centre - ray.x).dot(ray.v) / ray.v.dot(ray.v));
+        ray.x + path
     };
     let off = |ray: &GrinRay<f64>| {
         let slope = plane.axis.component(ray.v).abs() / length(ray.v);
@@ -171,8 +171,8 @@ fn path_points(
     let size = space.diameter();
     let direction = ray.v * (1.0 / length(ray.v));
     let Some(first) = states.first() else {
-        let way = (-ray.x.dot(direction)).max(0.0);
-        let ends = [way - 0.5 * size, way + 0.5 * size].map(|t| ray.x + direction * t.max(0.0));
+        let path = (-ray.x.dot(direction)).max(0.0);
+        let ends = [path - 0.5 * size, path + 0.5 * size].map(|t| ray.x + direction * t.max(0.0));
         return ends.into_iter().filter(|p| p.is_finite()).collect();
     };
     let before = length(first.x - ray.x).min(LEAD_IN * size);

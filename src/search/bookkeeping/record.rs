@@ -18,9 +18,9 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
         match event {
             TurnEvent::Refused(error) => self.statistics.refuse(error),
             TurnEvent::Rejected(kind) => {
-                let tally = self.statistics.kind(kind);
-                tally.tried += 1;
-                tally.rejected += 1;
+                let statistics = self.statistics.kind(kind);
+                statistics.tried += 1;
+                statistics.rejected += 1;
             }
             TurnEvent::Started(started) => {
                 if let Some(kind) = started.kind {
@@ -69,11 +69,11 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
         if let Some(kind) = node.kind {
             let (moves, improved) =
                 (node.moves, node.loss_before.is_some_and(|before| loss < before));
-            let tally = self.statistics.kind(kind);
-            tally.ended += 1;
-            tally.moves += moves;
-            tally.improved += u64::from(improved);
-            tally.entered += u64::from(offer.is_accepted());
+            let statistics = self.statistics.kind(kind);
+            statistics.ended += 1;
+            statistics.moves += moves;
+            statistics.improved += u64::from(improved);
+            statistics.entered += u64::from(offer.is_accepted());
         }
         best
     }
@@ -110,7 +110,7 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
     pub(in crate::search) fn prune_lineage(&mut self) {
         let held = self.reservoir.entries().iter().chain(&self.pinned).chain([&self.best]);
         let held = held.map(|entry| entry.number);
-        let living = self.chains.iter().map(|chain| chain.generation);
-        self.lineage.prune(held, living);
+        let active = self.chains.iter().map(|chain| chain.generation);
+        self.lineage.prune(held, active);
     }
 }

@@ -108,9 +108,9 @@ impl<P: Clone + PartialEq> Reservoir<P> {
         if let Some(same) = self.entries.iter().find(|old| old.point == entry.point) {
             return OfferOutcome::AlreadyPresent(same.number);
         }
-        let twin = self.entries.iter_mut().find(|old| old.topology == entry.topology);
-        if let Some(twin) = twin.filter(|_| self.one_per_topology) {
-            return replace_if_better(twin, entry, OfferOutcome::RejectedSameTopology);
+        let same_topology = self.entries.iter_mut().find(|old| old.topology == entry.topology);
+        if let Some(same_topology) = same_topology.filter(|_| self.one_per_topology) {
+            return replace_if_better(same_topology, entry, OfferOutcome::RejectedSameTopology);
         }
         if self.entries.len() < self.size {
             self.entries.push(entry);

@@ -93,12 +93,12 @@ impl FinalizedLens {
     /// manufactured.
     pub fn failures(&self) -> Vec<String> {
         let limits = self.limits.iter().chain(&self.light).filter(|limit| limit.slack() < 0.0);
-        let doubts = self.confirmed.iter().filter(|field| !field.agrees);
-        let doubt = |field: &CrossCheck| {
+        let disagreements = self.confirmed.iter().filter(|field| !field.agrees);
+        let disagreement = |field: &CrossCheck| {
             let CrossCheck { zoom, field, .. } = field;
             format!("field {field} at zoom {zoom}: two samplings of the pupil disagree")
         };
-        limits.map(describe_violation).chain(doubts.map(doubt)).collect()
+        limits.map(describe_violation).chain(disagreements.map(disagreement)).collect()
     }
 }
 

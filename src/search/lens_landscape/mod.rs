@@ -207,7 +207,7 @@ impl LensLandscape {
     /// The reference for losses: that of the start without the penalties of the manufacturing
     /// limits, which a search reduces first.
     pub fn loss_scale(&self) -> f64 {
-        let worth = || {
+        let optical_merit = || {
             let merit = self.merit(&self.start, self.local.tolerance).ok()?;
             let terms = merit.terms(&merit.values(&self.with_variables(&self.start))).ok()?;
             let optical = |name: &str| ["spot", "spot_integral", "light"].contains(&name);
@@ -215,7 +215,7 @@ impl LensLandscape {
                 terms.iter().filter(|t| optical(t.term)).map(|t| t.weight * t.value).sum();
             (sum > 0.0).then_some(sum)
         };
-        worth().unwrap_or_else(|| self.loss(&self.start))
+        optical_merit().unwrap_or_else(|| self.loss(&self.start))
     }
 
     /// The loss of a lens with its own pupils.

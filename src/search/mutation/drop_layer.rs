@@ -79,15 +79,15 @@ pub(super) fn draw(
 fn remove_piece(draft: &mut MutationDraft, layer: GroupEnd) {
     let outer = layer.outer();
     let inner = if layer.front { outer + 1 } else { outer - 1 };
-    let gone = draft.lens.surfaces[outer].clone();
+    let removed = draft.lens.surfaces[outer].clone();
     if !layer.front {
         draft.drop_parameters(inner, is_of_medium);
         draft.move_gap(outer, inner);
-        draft.lens.surfaces[inner].medium = gone.medium;
+        draft.lens.surfaces[inner].medium = removed.medium;
     }
-    if gone.stop {
+    if removed.stop {
         let rim = &mut draft.lens.surfaces[inner];
-        (rim.stop, rim.semi_diameter) = (true, gone.semi_diameter);
+        (rim.stop, rim.semi_diameter) = (true, removed.semi_diameter);
     }
     draft.remove(outer);
     draft.inherit_variables(&[]);

@@ -106,9 +106,9 @@ fn remove_singlet(draft: &mut MutationDraft, first: usize, removal: RemovalChoic
     let last = first + 1;
     let length = draft.lens.surfaces[first].thickness * draft.lens.light_direction(first);
     if first == 0 {
-        let gone = length + draft.lens.surfaces[last].thickness;
+        let removed_length = length + draft.lens.surfaces[last].thickness;
         if let Object::Finite(distance) = &mut draft.lens.object {
-            *distance += gone;
+            *distance += removed_length;
         }
     } else {
         let gap = first - 1;

@@ -68,11 +68,11 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
     where
         L: Landscape<Point = P, Memory = M>,
     {
-        let living = self.chains.iter().find(|chain| chain.generation == number);
-        let living = living.and_then(|chain| chain.best());
+        let active = self.chains.iter().find(|chain| chain.generation == number);
+        let active = active.and_then(|chain| chain.best());
         let node = self.lineage.node(number).map(|node| (&node.point, node.best_loss));
         let forgotten = SearchError::UnknownGeneration { number, total: self.lineage.total() };
-        let (point, loss) = living.or(node).ok_or(forgotten)?;
+        let (point, loss) = active.or(node).ok_or(forgotten)?;
         Ok(ReservoirEntry::new(landscape, number, loss, point.clone()))
     }
 }

@@ -127,8 +127,8 @@ fn answer(
 ) -> Option<AnalysisResults> {
     let start = now();
     let recent = published.is_some_and(|last| start.duration_since(last) < MAX_GAP);
-    let overtaken = || recent && start.elapsed() > YIELD_AGE && output.is_interrupted();
-    let interrupted = || output.is_closed() || overtaken();
+    let is_superseded = || recent && start.elapsed() > YIELD_AGE && output.is_interrupted();
+    let interrupted = || output.is_closed() || is_superseded();
     let AnalysisRequest { version, lens, settings } = request;
     let computed = catch_panic(|| Ok(analyze_unless(&lens, &settings, interrupted)));
     let analyses = computed.unwrap_or_else(|why| Some(Err(why)))?;
@@ -200,21 +200,21 @@ impl Analyses {
         settings: &AnalysisSettings,
         interrupted: impl Fn() -> bool,
     ) -> Option<Self> {
-        let go_on = || (!interrupted()).then_some(());
+        let unless_interrupted = || (!interrupted()).then_some(());
         let b = Arc::clone(&ray_model.value);
         let accuracy = Accuracy { tolerance: settings.tolerance, ..Accuracy::default() };
         let layout = time(|| analysis::ray_layout(&b, settings.rays));
-        go_on()?;
+        unless_interrupted()?;
         let scatter = time(|| analysis::spot_points(&b));
-        go_on()?;
+        unless_interrupted()?;
         let spots = time(|| for_each_field(&b, |field| spot_with_time(&b, field, accuracy)));
-        go_on()?;
+        unless_interrupted()?;
         let pupils = settings.pupils.then(|| time(|| field_pupils(&b, settings, accuracy)));
-        go_on()?;
+        unless_interrupted()?;
         let fans = time(|| for_each_field(&b, |field| analysis::fan(&b, field, FAN_POINTS)));
-        go_on()?;
+        unless_interrupted()?;
         let illumination = time(|| analysis::illumination(&b, b.primary, accuracy));
-        go_on()?;
+        unless_interrupted()?;
         Some(Self {
             seidel: time(|| b.seidel()),
             airy: analysis::airy_radius(&b),

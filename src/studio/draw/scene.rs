@@ -60,8 +60,8 @@ impl Scene {
     pub fn polyline(&mut self, points: &[DVec2], width: f32, color: Rgba) {
         let Some(&(mut start)) = points.first() else { return };
         for (i, &end) in points.iter().enumerate().skip(1) {
-            let goes_on = points.get(i + 1).is_some_and(|&next| is_straight(start, end, next));
-            if !goes_on && start != end {
+            let continues = points.get(i + 1).is_some_and(|&next| is_straight(start, end, next));
+            if !continues && start != end {
                 self.line(start, end, width, color);
                 start = end;
             }

@@ -179,13 +179,13 @@ pub(super) fn slice_controls(
     actions: &mut Actions,
 ) {
     let old = view.grin.slice_settings;
-    let mut sight = old;
+    let mut settings = old;
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing.x = 4.0;
-        plane_choice(ui, run, &mut sight);
-        quantity_choice(ui, run, &mut sight);
+        plane_choice(ui, run, &mut settings);
+        quantity_choice(ui, run, &mut settings);
         if run.document.task.is_some() {
-            let drag = DragValue::new(&mut sight.rays).range(0..=60).speed(0.1).suffix(" rays");
+            let drag = DragValue::new(&mut settings.rays).range(0..=60).speed(0.1).suffix(" rays");
             ui.add(drag)
                 .on_hover_text(
                     "Rays of each view in the drawing: those nearest to the slice, projected onto \
@@ -199,37 +199,37 @@ pub(super) fn slice_controls(
             }
         });
     });
-    if sight != old {
-        actions.push(GrinCommand::SetSlice(sight));
+    if settings != old {
+        actions.push(GrinCommand::SetSlice(settings));
     }
 }
 
-fn plane_choice(ui: &mut Ui, run: &GrinRun, sight: &mut SliceSettings) {
+fn plane_choice(ui: &mut Ui, run: &GrinRun, settings: &mut SliceSettings) {
     ui.weak("Slice across");
     for axis in SpatialAxis::ALL {
         let [right, up] = axis.across();
         let hint =
             format!("Across {}: {} points right, {} up", axis.name(), right.name(), up.name());
-        let button = Button::selectable(sight.plane.axis == axis, axis.name());
+        let button = Button::selectable(settings.plane.axis == axis, axis.name());
         let button = ui.add(button).on_hover_text(hint);
-        if button.clicked() && sight.plane.axis != axis {
-            sight.plane = SlicePlane { axis, depth: run.document.middle(axis) };
+        if button.clicked() && settings.plane.axis != axis {
+            settings.plane = SlicePlane { axis, depth: run.document.middle(axis) };
         }
     }
-    let [low, high] = run.document.depth_range(sight.plane.axis);
+    let [low, high] = run.document.depth_range(settings.plane.axis);
     ui.spacing_mut().slider_width = 120.0;
-    let name = format!("{} =", sight.plane.axis.name());
+    let name = format!("{} =", settings.plane.axis.name());
     ui.weak(name);
-    let slider = Slider::new(&mut sight.plane.depth, low..=high).suffix(" mm");
+    let slider = Slider::new(&mut settings.plane.depth, low..=high).suffix(" mm");
     let slider = ui.add(slider.step_by((high - low) / 200.0).max_decimals(4));
     slider.on_hover_text("Position of the slice").accessible_name("Depth of the slice");
 }
 
-fn quantity_choice(ui: &mut Ui, run: &GrinRun, sight: &mut SliceSettings) {
+fn quantity_choice(ui: &mut Ui, run: &GrinRun, settings: &mut SliceSettings) {
     let combo = ComboBox::from_id_salt("quantity of the slice").width(180.0);
-    let combo = combo.selected_text(sight.quantity.name()).show_ui(ui, |ui| {
+    let combo = combo.selected_text(settings.quantity.name()).show_ui(ui, |ui| {
         for quantity in SliceQuantity::ALL.into_iter().filter(|of| run.document.supports(*of)) {
-            ui.selectable_value(&mut sight.quantity, quantity, quantity.name());
+            ui.selectable_value(&mut settings.quantity, quantity, quantity.name());
         }
     });
     combo.response.on_hover_text("Quantity of the colours").accessible_name(

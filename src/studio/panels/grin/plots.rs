@@ -26,7 +26,7 @@ fn free_corner<'a>(curves: impl Iterator<Item = &'a [[f64; 2]]>) -> Corner {
         (Corner::LeftBottom, [0.0, 0.0]),
         (Corner::LeftTop, [0.0, 1.0]),
     ];
-    let crowd = |[x, y]: [f64; 2]| {
+    let overlaps = |[x, y]: [f64; 2]| {
         let is_near = |p: &&[f64; 2]| {
             (share(p[0], across) - x).abs() < NEAR && (share(p[1], up) - y).abs() < NEAR
         };
@@ -34,7 +34,7 @@ fn free_corner<'a>(curves: impl Iterator<Item = &'a [[f64; 2]]>) -> Corner {
     };
     corners
         .into_iter()
-        .min_by_key(|(_, at)| crowd(*at))
+        .min_by_key(|(_, at)| overlaps(*at))
         .map_or(Corner::RightTop, |(corner, _)| corner)
 }
 

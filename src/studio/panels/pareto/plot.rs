@@ -100,7 +100,7 @@ fn nearest<'a>(
     transform: &PlotTransform,
 ) -> Option<(&'a ParetoPoint, Pos2)> {
     let earlier = earlier_runs(view).flat_map(|run| run.main.front.points());
-    let biased = run.biased.iter().flat_map(|leg| leg.front.points());
+    let biased = run.biased.iter().flat_map(|pass| pass.front.points());
     let all = run.main.front.points().iter().chain(biased).chain(earlier);
     let on_screen = |design: &'a ParetoPoint| {
         let [x, y] = plot_point(design);
@@ -116,7 +116,7 @@ fn nearest<'a>(
 fn bounds(view: &SessionView, run: &ParetoRun) -> [RangeInclusive<f64>; 2] {
     let legs = std::iter::once(&run.main).chain(&run.biased);
     let legs = legs.chain(earlier_runs(view).map(|run| &run.main));
-    let mut points: Vec<[f64; 2]> = legs.flat_map(|leg| plot_points(&leg.front)).collect();
+    let mut points: Vec<[f64; 2]> = legs.flat_map(|pass| plot_points(&pass.front)).collect();
     points.push(plot_point(&run.start));
     points.extend(design_point(view));
     [0, 1].map(|axis| {

@@ -49,11 +49,11 @@ fn variables_by_kind(lens: &Lens) -> String {
 /// The progress of the run.
 pub(super) fn progress_text(run: &ParetoRun, status: RunStatus) -> String {
     let status = status_text(status);
-    let leg = run.current_pass();
+    let pass = run.current_pass();
     let biased = if run.biased.is_some() { ", fixed rays" } else { "" };
-    let rate = leg.done as f64 / leg.seconds;
+    let rate = pass.done as f64 / pass.seconds;
     let rate = if rate.is_finite() { format!(", {rate:.0} steps/s") } else { String::new() };
-    let (done, total, seconds) = (leg.done, leg.total, leg.seconds);
+    let (done, total, seconds) = (pass.done, pass.total, pass.seconds);
     format!("{status}{biased}: {done} of {total} steps{rate}, {seconds:.1} s")
 }
 
@@ -63,7 +63,7 @@ pub(super) fn hypervolume_label(ui: &mut Ui, run: &ParetoRun) {
     let (lenses, tried) = (main.front.points().len(), main.evaluated.len());
     let volume = main.hypervolume;
     let biased = run.biased.as_ref();
-    let biased = biased.map(|leg| format!(", {:.4} with fixed rays", leg.hypervolume));
+    let biased = biased.map(|pass| format!(", {:.4} with fixed rays", pass.hypervolume));
     let text = format!("{lenses} lenses on the front, {tried} tried; hypervolume {volume:.4}");
     ui.label(text + &biased.unwrap_or_default()).on_hover_text(
         "The area that the front covers in the plane of spot and light, against twice the spot of \

@@ -78,18 +78,18 @@ pub(super) fn show_table(ui: &mut Ui, shown: &PupilView<'_>, actions: &mut Actio
     let Some(all) = &shown.pupils.mean_sensitivities else { return };
     let height = ui.available_height();
     let table = SensitivityTable::new(shown, all);
-    let felt = limiting_surfaces(&table, all);
+    let significant = limiting_surfaces(&table, all);
     ui.separator();
     ui.spacing_mut().item_spacing.y = 1.0;
-    title(ui, shown, all, &felt);
+    title(ui, shown, all, &significant);
     if height < TITLE + HEAD {
         return;
     }
-    if felt.is_empty() {
+    if significant.is_empty() {
         ui.weak("No semi-diameter limits the beam: the ideal entrance pupil does.");
         return;
     }
-    table.show(ui, &felt, actions);
+    table.show(ui, &significant, actions);
 }
 
 /// The surfaces at whose rim some ray ends.
@@ -97,10 +97,10 @@ fn limiting_surfaces(table: &SensitivityTable<'_>, all: &RimSensitivities) -> Ve
     (0..all.surfaces.len()).filter(|i| table.limits_rays(*i)).collect()
 }
 
-fn title(ui: &mut Ui, shown: &PupilView<'_>, all: &RimSensitivities, felt: &[usize]) {
+fn title(ui: &mut Ui, shown: &PupilView<'_>, all: &RimSensitivities, significant: &[usize]) {
     ui.horizontal(|ui| {
         ui.strong("+0.1 mm of semi-diameter").on_hover_text(HINT);
-        let others = remaining_surfaces(felt, shown.results.lens.surfaces.len());
+        let others = remaining_surfaces(significant, shown.results.lens.surfaces.len());
         if !others.is_empty() {
             let text = format!("inactive: {others}");
             ui.label(RichText::new(text).small().weak())
@@ -153,7 +153,7 @@ impl<'a> SensitivityTable<'a> {
         Estimate::new(scale * number.value, scale * number.error, number.rays)
     }
 
-    fn show(&self, ui: &mut Ui, felt: &[usize], actions: &mut Actions) {
+    fn show(&self, ui: &mut Ui, significant: &[usize], actions: &mut Actions) {
         ScrollArea::horizontal().auto_shrink([false, false]).show(ui, |ui| {
             ui.spacing_mut().item_spacing = vec2(0.0, 0.0);
             let mut table = TableBuilder::new(ui)
@@ -167,7 +167,7 @@ impl<'a> SensitivityTable<'a> {
                 table = table.column(Width::exact(CELL));
             }
             table.header(HEAD, |row| self.head(row)).body(|mut body| {
-                for surface in felt {
+                for surface in significant {
                     body.row(ROW, |row| self.row(row, *surface, actions));
                 }
             });
@@ -212,16 +212,19 @@ impl<'a> SensitivityTable<'a> {
         let rect = ui.max_rect();
         let Ok(sensitivities) = &group.sensitivities else { return };
         let change = self.change(&sensitivities.surfaces[surface], kind);
-        let felt = change.value.abs() > change.error;
-        let color =
-            if felt { color(ui, kind, change.value) } else { ui.visuals().weak_text_color() };
+        let significant = change.value.abs() > change.error;
+        let color = if significant {
+            color(ui, kind, change.value)
+        } else {
+            ui.visuals().weak_text_color()
+        };
         let font = TextStyle::Small.resolve(ui.style());
-        let text = if felt { signed(change.value) } else { "·".to_owned() };
+        let text = if significant { signed(change.value) } else { "·".to_owned() };
         let at = rect.right_center() - vec2(ARROW + 5.0, 0.0);
-        let ink = if felt { ui.visuals().text_color() } else { color };
+        let ink = if significant { ui.visuals().text_color() } else { color };
         ui.painter().text(at, Align2::RIGHT_CENTER, text, font, ink);
         let share = change.value / self.largest[kind as usize];
-        if felt && share.is_finite() {
+        if significant && share.is_finite() {
             arrow(ui, pos2(rect.right() - 0.5 * ARROW - 2.0, rect.center().y), share, color);
         }
     }
@@ -309,9 +312,9 @@ fn signed(value: f64) -> String {
 }
 
 /// The surfaces that are not among some, as the window counts them: `2 to 5, 7 to 10`.
-fn remaining_surfaces(felt: &[usize], count: usize) -> String {
+fn remaining_surfaces(significant: &[usize], count: usize) -> String {
     let mut ranges: Vec<RangeInclusive<usize>> = Vec::new();
-    for surface in (0..count).filter(|i| !felt.contains(i)).map(|i| i + 1) {
+    for surface in (0..count).filter(|i| !significant.contains(i)).map(|i| i + 1) {
         match ranges.last_mut() {
             Some(range) if range.end() + 1 == surface => *range = *range.start()..=surface,
             _ => ranges.push(surface..=surface),

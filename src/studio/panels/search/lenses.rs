@@ -35,8 +35,8 @@ pub(super) fn cards(
     let ShownSearch { view, run } = search;
     let same =
         |found: &Arc<FoundLens>| (found.number, found.merit) == (run.best.number, run.best.merit);
-    let is_kept = run.reservoir.iter().any(same);
-    let best = (!is_kept).then_some(&run.best);
+    let is_retained = run.reservoir.iter().any(same);
+    let best = (!is_retained).then_some(&run.best);
     let shown: Vec<&Arc<FoundLens>> = best.into_iter().chain(&run.reservoir).collect();
     let width = ui.available_width();
     let gap = 4.0;

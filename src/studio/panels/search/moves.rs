@@ -56,26 +56,26 @@ fn row(ui: &mut Ui, search: ShownSearch<'_>, kind: MutationKind, actions: &mut A
     if drag.changed() {
         actions.push(StructureSearchCommand::Control(SteerCommand::Weight(kind, weight)));
     }
-    let tally = run.statistics.kinds.get(&kind).cloned().unwrap_or_default();
-    ui.label(tally.tried.to_string());
-    refusal_cell(ui, kind, &tally);
-    ui.label(format!("{} of {}", tally.improved, tally.ended));
-    ui.label(tally.entered.to_string());
-    let life = tally.mean_moves().map(|moves| number::format_digits(moves, 3));
+    let statistics = run.statistics.kinds.get(&kind).cloned().unwrap_or_default();
+    ui.label(statistics.tried.to_string());
+    refusal_cell(ui, kind, &statistics);
+    ui.label(format!("{} of {}", statistics.improved, statistics.ended));
+    ui.label(statistics.entered.to_string());
+    let life = statistics.mean_moves().map(|moves| number::format_digits(moves, 3));
     ui.label(life.unwrap_or_else(|| "–".to_owned()));
 }
 
-fn refusal_cell(ui: &mut Ui, kind: MutationKind, tally: &MutationStatistics) {
-    let refused: u64 = tally.refused.values().sum();
-    let label = ui.label((refused + tally.rejected).to_string());
-    if let Some((why, count)) = most_common_refusal(tally) {
+fn refusal_cell(ui: &mut Ui, kind: MutationKind, statistics: &MutationStatistics) {
+    let refused: u64 = statistics.refused.values().sum();
+    let label = ui.label((refused + statistics.rejected).to_string());
+    if let Some((why, count)) = most_common_refusal(statistics) {
         label
             .on_hover_text(format!("{} was refused {count} times: {why}", capitalize(kind.name())));
     }
 }
 
-fn most_common_refusal(tally: &MutationStatistics) -> Option<(Refusal, u64)> {
-    let most = tally.refused.iter().max_by_key(|(_, count)| **count);
+fn most_common_refusal(statistics: &MutationStatistics) -> Option<(Refusal, u64)> {
+    let most = statistics.refused.iter().max_by_key(|(_, count)| **count);
     most.map(|(refusal, count)| (*refusal, *count))
 }
 
@@ -83,8 +83,8 @@ fn most_common_refusal(tally: &MutationStatistics) -> Option<(Refusal, u64)> {
 fn refusal_summary(ui: &mut Ui, run: &StructureSearchSnapshot) {
     ui.add_space(6.0);
     for kind in kinds() {
-        let tally = run.statistics.kinds.get(&kind);
-        if let Some((why, count)) = tally.and_then(most_common_refusal) {
+        let statistics = run.statistics.kinds.get(&kind);
+        if let Some((why, count)) = statistics.and_then(most_common_refusal) {
             let text = format!("{}, {count} × refused: {}", kind.name(), why);
             ui.label(RichText::new(capitalize(&text)).small().weak());
         }
