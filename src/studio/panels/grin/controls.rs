@@ -232,8 +232,8 @@ fn quantity_choice(ui: &mut Ui, run: &GrinRun, settings: &mut SliceSettings) {
             ui.selectable_value(&mut settings.quantity, quantity, quantity.name());
         }
     });
-    combo.response.on_hover_text("Quantity of the colours").accessible_name(
-        "Quantity of the \
-        slice",
-    );
+    combo
+        .response
+        .on_hover_text("Quantity of the colours")
+        .accessible_name("Quantity of the slice");
 }

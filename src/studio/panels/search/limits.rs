@@ -4,8 +4,8 @@ use egui::{ComboBox, DragValue, Grid, Ui};
 
 use super::setup::{drag, length, optional};
 use crate::lens::{FieldPoint, Lens};
-use crate::search::lens_landscape::SearchPlan;
-use crate::search::{SearchRules, Termination};
+use crate::search::lens_landscape::{DescentSettings, SearchPlan};
+use crate::search::{SearchRules, SearchSettings, Termination};
 use crate::studio::panels::field_name;
 
 /// The limits of the factory.
@@ -62,82 +62,79 @@ fn optional_limits(ui: &mut Ui, rules: &mut SearchRules) {
 
 const ENDS: [(Termination, &str, &str); 3] = [
     (Termination::Ratio, "by density", "Descents from bad lenses end early (algorithm 1)"),
-    (
-        Termination::Relative,
-        "by improvement",
-        "The rate of improvement counts, not the merit at \
-        the start",
-    ),
+    (Termination::Relative, "by improvement", RELATIVE),
     (Termination::Clocks, "by two clocks", "Competing clocks (section 4.4.1)"),
 ];
 
+const RELATIVE: &str = "The rate of improvement counts, not the merit at the start";
+
 /// The settings of the sampler.
 pub(super) fn sampler_section(ui: &mut Ui, plan: &mut SearchPlan) {
-    let (settings, local) = (&mut plan.settings, &mut plan.local);
     ui.collapsing("Sampler", |ui| {
         Grid::new("sampler").num_columns(2).spacing([8.0, 3.0]).show(ui, |ui| {
-            ui.weak("Descents end");
-            let name = ENDS.iter().find(|(end, ..)| *end == settings.termination);
-            let combo =
-                ComboBox::from_id_salt("termination").selected_text(name.map_or("", |e| e.1));
-            let combo = combo.show_ui(ui, |ui| {
-                for (end, name, hint) in ENDS {
-                    ui.selectable_value(&mut settings.termination, end, name).on_hover_text(hint);
-                }
-            });
-            combo.response.accessible_name("How descents end");
-            ui.end_row();
-            ui.weak("C");
-            drag(
-                ui,
-                "C",
-                &mut settings.c,
-                0.0..=10.0,
-                0.002,
-                "A larger value makes descents shorter",
-            );
-            ui.end_row();
-            ui.weak("γ");
-            let hint = "The probability that a descent starts from a random lens instead of a \
-                retained one";
-            drag(ui, "Gamma", &mut settings.gamma, 0.0..=1.0, 0.002, hint);
-            ui.end_row();
-            ui.weak("Longest descent");
-            let hint = "Maximum moves per descent";
-            drag(ui, "Longest descent", &mut settings.longest, 1..=1_000_000, 1.0, hint);
-            ui.end_row();
-            ui.weak("Retained lenses");
-            ui.horizontal(|ui| {
-                let hint = "The size of the reservoir of lenses that are mutated";
-                drag(ui, "Retained lenses", &mut settings.reservoir, 1..=100, 0.05, hint);
-                let hint = "At most one of each pattern of glass and air";
-                let one = &mut settings.one_per_topology;
-                ui.checkbox(one, "one of each pattern").on_hover_text(hint);
-            });
-            ui.end_row();
-            ui.weak("Steps per move");
-            drag(ui, "Steps per move", &mut local.steps, 1..=1000, 0.1, "Gradient steps per move");
-            ui.end_row();
-            ui.weak("Spot tolerance");
-            ui.horizontal(|ui| {
-                let mut percent = 100.0 * local.tolerance;
-                let hint = "The relative error of the radius of a spot: smaller costs more rays";
-                if drag(ui, "Error of spots", &mut percent, 1e-3..=50.0, 0.01, hint) {
-                    local.tolerance = percent / 100.0;
-                }
-                ui.weak("%");
-            });
-            ui.end_row();
-            ui.weak("Also variable");
-            ui.horizontal(|ui| {
-                ui.checkbox(&mut local.semi_diameters, "semi-diameters")
-                    .on_hover_text("Semi-diameters are variable");
-                let hint = "Indices of model glasses are variable; catalogue glasses are not";
-                ui.checkbox(&mut local.indices, "model glasses").on_hover_text(hint);
-            });
-            ui.end_row();
+            termination_row(ui, &mut plan.settings.termination);
+            descent_rows(ui, &mut plan.settings);
+            move_rows(ui, &mut plan.local);
         });
     });
+}
+
+fn termination_row(ui: &mut Ui, chosen: &mut Termination) {
+    ui.weak("Descents end");
+    let name = ENDS.iter().find(|(end, ..)| end == chosen).map_or("", |(_, name, _)| name);
+    let combo = ComboBox::from_id_salt("termination").selected_text(name).show_ui(ui, |ui| {
+        for (end, name, hint) in ENDS {
+            ui.selectable_value(chosen, end, name).on_hover_text(hint);
+        }
+    });
+    combo.response.accessible_name("How descents end");
+    ui.end_row();
+}
+
+fn descent_rows(ui: &mut Ui, settings: &mut SearchSettings) {
+    ui.weak("C");
+    drag(ui, "C", &mut settings.c, 0.0..=10.0, 0.002, "A larger value makes descents shorter");
+    ui.end_row();
+    ui.weak("γ");
+    let hint = "The probability that a descent starts from a random lens instead of a retained one";
+    drag(ui, "Gamma", &mut settings.gamma, 0.0..=1.0, 0.002, hint);
+    ui.end_row();
+    ui.weak("Longest descent");
+    let hint = "Maximum moves per descent";
+    drag(ui, "Longest descent", &mut settings.longest, 1..=1_000_000, 1.0, hint);
+    ui.end_row();
+    ui.weak("Retained lenses");
+    ui.horizontal(|ui| {
+        let hint = "The size of the reservoir of lenses that are mutated";
+        drag(ui, "Retained lenses", &mut settings.reservoir, 1..=100, 0.05, hint);
+        let hint = "At most one of each pattern of glass and air";
+        ui.checkbox(&mut settings.one_per_topology, "one of each pattern").on_hover_text(hint);
+    });
+    ui.end_row();
+}
+
+fn move_rows(ui: &mut Ui, local: &mut DescentSettings) {
+    ui.weak("Steps per move");
+    drag(ui, "Steps per move", &mut local.steps, 1..=1000, 0.1, "Gradient steps per move");
+    ui.end_row();
+    ui.weak("Spot tolerance");
+    ui.horizontal(|ui| {
+        let mut percent = 100.0 * local.tolerance;
+        let hint = "The relative error of the radius of a spot: smaller costs more rays";
+        if drag(ui, "Error of spots", &mut percent, 1e-3..=50.0, 0.01, hint) {
+            local.tolerance = percent / 100.0;
+        }
+        ui.weak("%");
+    });
+    ui.end_row();
+    ui.weak("Also variable");
+    ui.horizontal(|ui| {
+        let hint = "Semi-diameters are variable";
+        ui.checkbox(&mut local.semi_diameters, "semi-diameters").on_hover_text(hint);
+        let hint = "Indices of model glasses are variable; catalogue glasses are not";
+        ui.checkbox(&mut local.indices, "model glasses").on_hover_text(hint);
+    });
+    ui.end_row();
 }
 
 /// One share for all fields, or one for each of them; more than nothing, 1 for as much as at the start.
@@ -147,13 +144,8 @@ pub(super) fn shares(ui: &mut Ui, light: &mut Vec<f64>, lens: &Lens) {
     ui.vertical(|ui| {
         ui.horizontal(|ui| {
             if let [all] = &mut light[..] {
-                share(
-                    ui,
-                    "Least light",
-                    all,
-                    "Every field retains at least this share of its \
-                    light",
-                );
+                let hint = "Every field retains at least this share of its light";
+                share(ui, "Least light", all, hint);
             }
             ui.weak("of the light at the start");
         });
@@ -170,7 +162,7 @@ pub(super) fn shares(ui: &mut Ui, light: &mut Vec<f64>, lens: &Lens) {
     });
 }
 
-/// As many shares as a lens has fields, or one, as a search wants them.
+/// As many shares as a lens has fields, or one for all of them.
 pub(super) fn matching_fields(mut light: Vec<f64>, lens: &Lens) -> Vec<f64> {
     match_length(&mut light, common_fields(lens).len());
     light
@@ -179,13 +171,8 @@ pub(super) fn matching_fields(mut light: Vec<f64>, lens: &Lens) -> Vec<f64> {
 fn field_shares(ui: &mut Ui, light: &mut [f64], fields: &[FieldPoint], lens: &Lens) {
     for (value, field) in light.iter_mut().zip(fields) {
         let name = field_name(lens.fields.kind, *field);
-        share(
-            ui,
-            &format!("Least light at {name}"),
-            value,
-            "This field retains at least this \
-            share of its light",
-        );
+        let hint = "This field retains at least this share of its light";
+        share(ui, &format!("Least light at {name}"), value, hint);
         ui.weak(format!("at {name}"));
     }
 }

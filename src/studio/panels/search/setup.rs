@@ -115,8 +115,7 @@ impl SearchSetup {
                 &mut settings.seed,
                 0..=u64::MAX,
                 0.1,
-                "The same seed gives the same \
-                search",
+                "The same seed gives the same search",
             );
             ui.weak("seed,");
             let hint = "Parallel descents that share the retained lenses";
@@ -138,15 +137,8 @@ impl SearchSetup {
             let fewest =
                 drag(ui, "Fewest elements", min, 1..=*max, 0.05, "Minimum number of elements");
             ui.weak("to");
-            let most = drag(
-                ui,
-                "Most elements",
-                max,
-                *min..=40,
-                0.05,
-                "Maximum number of \
-                elements",
-            );
+            let most =
+                drag(ui, "Most elements", max, *min..=40, 0.05, "Maximum number of elements");
             self.element_count_edited |= fewest || most;
             ui.weak(format!("({} now)", piece_count(&view.lens)));
         });
