@@ -64,11 +64,11 @@ pub mod plot;
 // Results as files and drawings: the front of sharpness against light, GRIN fields and images.
 pub mod report;
 
-// The figures and tables of the thesis as studies that check their own claims.
-pub mod experiments;
-
 // Benchmarks: accuracy against time, throughput, memory.
 pub mod measure;
+
+// The figures and tables of the thesis as studies that check their own claims.
+pub mod experiments;
 
 // One open design: commands, undo, background worker, events. Knows no widgets.
 pub mod session;

@@ -17,7 +17,7 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, clap::Args)]
 #[command(after_long_help = include_str!("help/experiment.txt"))]
 pub(super) struct ExperimentArgs {
-    /// The number of the figure or table; absent: lists all of them
+    /// The number of the figure or table, or `all`; absent: lists all of them
     #[arg(value_name = "FIGURE")]
     id: Option<String>,
 
@@ -32,8 +32,22 @@ const STEPS: f64 = 1000.0;
 impl ExperimentArgs {
     pub(super) fn run(&self, output: &Output) -> Result<(), CliError> {
         let Some(id) = &self.id else { return output.print(&ExperimentList(experiments::ALL)) };
-        let study = experiments::find(id).ok_or_else(|| unknown_experiment(id))?;
+        let studies = selected_studies(id)?;
         self.out.iter().try_for_each(|folder| create_folder(folder))?;
+        let mut runs = Vec::new();
+        for study in studies {
+            runs.push(StudyRun { study, report: self.run_study(study) });
+        }
+        if let [StudyRun { report: Ok(report), .. }] = &runs[..] {
+            output.print(report)?;
+        } else if runs.len() > 1 {
+            output.print(&StudyRuns(&runs))?;
+        }
+        failures(&runs)
+    }
+
+    /// Runs a study and writes its files.
+    fn run_study(&self, study: &'static Study) -> Result<ExperimentReport, CliError> {
         let mut parts = PhaseTimer::new();
         let mut bar = progress_display();
         let mut watch = |progress: ExperimentProgress<'_>| {
@@ -41,20 +55,82 @@ impl ExperimentArgs {
             bar(progress)
         };
         let (outcome, ms) = time_ms(|| (study.run)(Effort::Full, &mut watch));
-        let mut report =
-            ExperimentReport::new(study, outcome.map_err(|ended| failure(study, &ended))?, ms);
+        let outcome = outcome.map_err(|ended| failure(study, &ended))?;
+        let mut report = ExperimentReport::new(study, outcome, ms);
         report.parts = parts.into_phases();
         if let Some(folder) = &self.out {
             report.write(folder)?;
         }
-        output.print(&report)?;
-        check_claims(&report)
+        Ok(report)
     }
+}
+
+/// The study of a figure, or every study for `all`.
+fn selected_studies(id: &str) -> Result<&'static [Study], CliError> {
+    if id == "all" {
+        return Ok(experiments::ALL);
+    }
+    experiments::find(id).map(std::slice::from_ref).ok_or_else(|| unknown_experiment(id))
+}
+
+/// A study with its report, or the reason why it has none.
+struct StudyRun {
+    study: &'static Study,
+    report: Result<ExperimentReport, CliError>,
+}
+
+impl StudyRun {
+    /// The number of claims that hold and that of all claims; without a report both are 0.
+    fn claim_counts(&self) -> [usize; 2] {
+        let Ok(report) = &self.report else { return [0, 0] };
+        let all = report.outcome.claims.len();
+        [all - report.outcome.failed().count(), all]
+    }
+}
+
+/// Several studies, one line each.
+struct StudyRuns<'a>(&'a [StudyRun]);
+
+impl Serialize for StudyRuns<'_> {
+    fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_seq(self.0.iter().filter_map(|run| run.report.as_ref().ok()))
+    }
+}
+
+impl Display for StudyRuns<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mut table = TextTable::new(&["figure", "title", "claims that hold", "s"]);
+        for run in self.0 {
+            let [hold, all] = run.claim_counts();
+            let seconds = run.report.as_ref().map_or(f64::NAN, |report| 1e-3 * report.ms);
+            let claims = format!("{hold} of {all}");
+            table.row([
+                run.study.id.into(),
+                run.study.title.into(),
+                claims,
+                format!("{seconds:.1}"),
+            ]);
+        }
+        write!(f, "{table}")
+    }
+}
+
+/// Fails if a study has no result or a claim does not hold.
+fn failures(runs: &[StudyRun]) -> Result<(), CliError> {
+    let failed: Vec<String> = runs
+        .iter()
+        .filter_map(|run| match &run.report {
+            Ok(report) => check_claims(report).err(),
+            Err(error) => Some(CliError::Failed(error.to_string())),
+        })
+        .map(|error| error.to_string())
+        .collect();
+    if failed.is_empty() { Ok(()) } else { Err(CliError::Failed(failed.join("\n"))) }
 }
 
 fn unknown_experiment(id: &str) -> CliError {
     let known: Vec<&str> = experiments::ALL.iter().map(|study| study.id).collect();
-    CliError::Input(format!("no experiment `{id}`; expected one of {}", known.join(", ")))
+    CliError::Input(format!("no experiment `{id}`; expected `all` or one of {}", known.join(", ")))
 }
 
 fn failure(study: &Study, ended: &ExperimentError) -> CliError {
@@ -135,14 +211,15 @@ struct ExperimentEntry {
     id: &'static str,
     title: &'static str,
     claim: &'static str,
+    omits: &'static str,
     seconds: f64,
 }
 
 impl Serialize for ExperimentList {
     fn serialize<S: serde::Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         let entry = |study: &Study| {
-            let Study { id, title, claim, seconds, .. } = *study;
-            ExperimentEntry { id, title, claim, seconds }
+            let Study { id, title, claim, omits, seconds, .. } = *study;
+            ExperimentEntry { id, title, claim, omits, seconds }
         };
         serializer.collect_seq(self.0.iter().map(entry))
     }
@@ -171,8 +248,8 @@ fn check_claims(report: &ExperimentReport) -> Result<(), CliError> {
 
 impl Display for ExperimentReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { id, title, claim, ms, outcome, files, .. } = self;
-        writeln!(f, "{id}: {title}\n{claim}.\n")?;
+        let Self { id, title, claim, omits, ms, outcome, files, .. } = self;
+        writeln!(f, "{id}: {title}\n{claim}.\nLeft out: {omits}.\n")?;
         let mut table = TextTable::new(&["claim", "found", "error", "expected", ""]);
         for claim in &outcome.claims {
             table.row(cells(claim));

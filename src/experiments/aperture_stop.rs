@@ -25,6 +25,7 @@ pub(super) const EXPERIMENT: Experiment = Experiment {
     id: "3.3",
     title: "An aperture stop optimised for sharpness alone",
     claim: "The unbiased gradient closes the stop to a pinhole; the biased one leaves it unchanged",
+    omits: "nothing of the figure",
     seconds: 1.0,
     run,
 };

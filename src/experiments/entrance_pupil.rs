@@ -22,6 +22,7 @@ pub(super) const EXPERIMENT: Experiment = Experiment {
     id: "3.4",
     title: "The entrance pupil of a double Gauss lens by its limits",
     claim: "Off the axis the pupil is no disc: more and more limits form its edge, with corners",
+    omits: "nothing of the figure",
     seconds: 2.0,
     run,
 };

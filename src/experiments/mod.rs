@@ -77,6 +77,8 @@ pub struct Experiment {
     pub title: &'static str,
     /// The claim, in one sentence.
     pub claim: &'static str,
+    /// The parts of the figure that the study leaves out, and what replaces them.
+    pub omits: &'static str,
     /// The approximate time at full effort on two cores, in seconds.
     pub seconds: f64,
     /// Runs the experiment.

@@ -36,6 +36,7 @@ pub(super) const EXPERIMENT: Experiment = Experiment {
     id: "5.10",
     title: "A plume of gas reconstructed from its deflections, by curved and by straight rays",
     claim: "Curved rays reconstruct the plume at any strength, straight rays only a weak one",
+    omits: "the measured gas, which a synthetic one replaces; the renderings of its isosurfaces",
     seconds: 120.0,
     run,
 };

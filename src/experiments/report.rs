@@ -16,6 +16,8 @@ pub struct ExperimentReport {
     pub title: &'static str,
     /// The claim, in one sentence.
     pub claim: &'static str,
+    /// The parts of the figure that the study leaves out.
+    pub omits: &'static str,
     /// The time of the run, in milliseconds.
     pub ms: f64,
     /// The times of its phases, if they were measured.
@@ -43,9 +45,9 @@ pub struct PhaseTiming {
 impl ExperimentReport {
     /// The report of an experiment that took `ms` milliseconds.
     pub fn new(study: &Experiment, outcome: ExperimentOutcome, ms: f64) -> Self {
-        let Experiment { id, title, claim, .. } = *study;
+        let Experiment { id, title, claim, omits, .. } = *study;
         let holds = outcome.failed().next().is_none();
-        Self { id, title, claim, ms, parts: Vec::new(), holds, outcome, files: Vec::new() }
+        Self { id, title, claim, omits, ms, parts: Vec::new(), holds, outcome, files: Vec::new() }
     }
 
     /// Writes the report into a folder: tables as CSV, plots as PNG, lenses as lens files, all

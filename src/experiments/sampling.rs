@@ -25,6 +25,7 @@ pub(super) const EXPERIMENT: Experiment = Experiment {
     id: "4.1",
     title: "A test of the sampling by RESTORE, on a toy problem of one and of two singlets",
     claim: "Weighted by time, it samples its target with the exact rate, not with the printed one",
+    omits: "nothing of the figure",
     seconds: 10.0,
     run,
 };

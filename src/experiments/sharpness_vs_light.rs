@@ -66,6 +66,14 @@ impl WeightSweep {
         Self { betas, steps, pupil: PupilEdge::Moving, semi_diameter_factors: [0.25, 1.3] }
     }
 
+    /// The sweep down its weights and up again: a search that comes from sharper lenses ends in other
+    /// designs than one that comes from brighter ones.
+    pub(super) fn and_back(mut self) -> Self {
+        let up: Vec<f64> = self.betas.iter().rev().skip(1).copied().collect();
+        self.betas.extend(up);
+        self
+    }
+
     /// The usual optimization with biased derivatives: all weights are equivalent, so there is only
     /// one.
     pub(super) fn biased(&self) -> Self {

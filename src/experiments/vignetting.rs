@@ -2,8 +2,8 @@
 //! gradients, which include the light off the axis, and with one by biased gradients, which do not.
 //!
 //! Both searches begin with the same lens and a fixed stop, so that the difference is not just a
-//! larger aperture. From the unbiased front the lens with the brightest corner is chosen among
-//! those that are at least as sharp as the biased one.
+//! larger aperture. From the unbiased front the least sharp lens is chosen that is still at least as
+//! sharp as the biased one: by its blur alone, so that the claims about its light can fail.
 
 use super::pareto_front::ANGLES;
 use super::sharpness_vs_light::{
@@ -27,6 +27,8 @@ pub(super) const EXPERIMENT: Experiment = Experiment {
     title: "Vignetting with the same stop",
     claim: "At the same sharpness the corner is brighter with unbiased gradients than with biased \
             ones",
+    omits: "the design of OpticStudio, for which a biased search stands; the images are \
+            brightness profiles without blur",
     seconds: 5.0,
     run,
 };
@@ -46,16 +48,11 @@ fn run(effort: Effort, progress: &mut ProgressFn<'_>) -> ExperimentResult {
     let with = run_sweep(&start, &plan, part, progress)?;
     let mut rays = 0;
     let biased = IlluminatedLens::of(&without[without.len() - 1], &mut rays)?;
-    let mut unbiased: Option<IlluminatedLens> = None;
-    for design in with.iter().filter(|design| design.spot <= biased.blur()) {
-        let lit = IlluminatedLens::of(design, &mut rays)?;
-        if unbiased.as_ref().is_none_or(|best| lit.corner()[0] > best.corner()[0]) {
-            unbiased = Some(lit);
-        }
-    }
-    let none =
-        || ExperimentError::Failed("no unbiased design is as sharp as the biased one".to_owned());
-    let pair = [biased, unbiased.ok_or_else(none)?];
+    let as_sharp = with[1..].iter().filter(|design| design.spot <= biased.blur());
+    let unbiased = as_sharp.max_by(|a, b| a.spot.total_cmp(&b.spot)).ok_or_else(|| {
+        ExperimentError::Failed("no unbiased design is as sharp as the biased one".to_owned())
+    })?;
+    let pair = [biased, IlluminatedLens::of(unbiased, &mut rays)?];
     Ok(ExperimentOutcome {
         claims: claims(&pair),
         tables: vec![table(&pair)],
@@ -125,23 +122,16 @@ fn ratio([a, da]: [f64; 2], [b, db]: [f64; 2]) -> [f64; 2] {
 }
 
 fn claims([biased, unbiased]: &[IlluminatedLens; 2]) -> Vec<Claim> {
-    let [sharp, _] = ratio([unbiased.blur(), 0.0], [biased.blur(), 0.0]);
     let [corner, corner_error] = ratio(unbiased.corner(), biased.corner());
     let [axis, axis_error] = ratio(unbiased.cone(0), biased.cone(0));
     let [relative, relative_error] = unbiased.relative();
-    let [before, _] = biased.relative();
+    let [gain, gain_error] = ratio([relative, relative_error], biased.relative());
     vec![
-        Claim::at_most("blur, unbiased over biased", sharp, 1.0),
         Claim::at_least("illumination of the corner, unbiased over biased", corner, 1.1)
             .with_error(corner_error),
         Claim::at_least("illumination of the axis, unbiased over biased", axis, 0.9)
             .with_error(axis_error),
-        Claim::at_least(
-            "corner over axis with the unbiased gradient, against the biased one",
-            relative,
-            before,
-        )
-        .with_error(relative_error),
+        Claim::at_least("corner over axis, unbiased over biased", gain, 1.0).with_error(gain_error),
     ]
 }
 

@@ -74,6 +74,7 @@ impl ExperimentWindow {
             .default_pos(area.left_top() + vec2(0.18 * area.width(), 0.08 * area.height()));
         window.show(context, |ui| {
             ui.label(format!("{}.", study.claim));
+            ui.weak(format!("Left out: {}.", study.omits));
             ui.separator();
             match &trial.status {
                 ExperimentStatus::Running { done, doing } => {

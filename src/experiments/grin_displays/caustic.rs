@@ -20,6 +20,7 @@ pub(in crate::experiments) const EXPERIMENT: Experiment = Experiment {
     title: "Caustics near and far",
     claim: "One beam makes a ring near the field, one far behind it, and one that keeps its shape in \
             between",
+    omits: "nothing of the figure",
     seconds: 30.0,
     run,
 };

@@ -11,6 +11,7 @@ pub(in crate::experiments) const EXPERIMENT: Experiment = Experiment {
     id: "5.4",
     title: "A display of two images",
     claim: "One field forms two images, one for each of two beams at a right angle",
+    omits: "the portraits, which a face and a letter replace",
     seconds: 20.0,
     run,
 };

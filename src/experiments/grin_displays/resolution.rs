@@ -18,6 +18,7 @@ pub(in crate::experiments) const EXPERIMENT: Experiment = Experiment {
     id: "5.5",
     title: "Effect of the resolution of a field",
     claim: "The finer the field, the closer its image is to the target",
+    omits: "the portrait, which a face replaces",
     seconds: 40.0,
     run,
 };
