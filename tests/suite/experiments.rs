@@ -117,7 +117,7 @@ fn unbiased_gradients_reduce_vignetting_in_the_corner() {
 }
 
 #[test]
-fn zoom_lenses_improve_between_their_positions() {
+fn a_zoom_lens_gets_sharper_at_every_position() {
     let outcome = outcome("3.10");
     let [start, now] = ["start_blur_mm", "blur_mm"].map(|name| column(&outcome.tables[0], name));
     assert!(start.iter().zip(&now).all(|(start, now)| now < start));
@@ -153,14 +153,14 @@ fn restore_finds_better_lenses_than_brute_force() {
 }
 
 #[test]
-fn projected_mutations_lead_to_better_lenses_more_often() {
+fn fractions_of_better_lenses_are_counted_with_projection_and_without() {
     let outcome = outcome("4.6");
     let shares = column(&outcome.tables[0], "share");
     assert!(shares.iter().all(|share| (0.0..=1.0).contains(share)), "{shares:?}");
 }
 
 #[test]
-fn mutations_lead_beyond_the_front_of_one_structure() {
+fn designs_with_mutations_join_the_front_of_the_sweep() {
     let outcome = outcome("4.7");
     assert!(outcome.lenses.iter().all(|(_, lens)| lens.check().is_ok()));
 }
@@ -210,7 +210,7 @@ fn finer_fields_form_sharper_images() {
 }
 
 #[test]
-fn a_multifocal_display_forms_a_different_image_on_each_screen() {
+fn a_coarse_multifocal_display_forms_an_image_on_three_screens() {
     let outcome = outcome("5.6");
     assert_eq!(column(&outcome.tables[0], "quality_db").len(), 3);
 }
