@@ -7,8 +7,8 @@
 //! `aplanat measure grin` measures the time of both.
 
 use super::{
-    Claim, DataTable, Effort, Experiment, ExperimentOutcome, ExperimentResult, NamedPlot,
-    ProgressFn, report_progress,
+    Claim, DataTable, Effort, Experiment, ExperimentError, ExperimentOutcome, ExperimentResult,
+    NamedPlot, ProgressFn, report_progress,
 };
 use crate::grin::field::{HessianDiagonal, Luneburg, ProfileField, RegularGrid, Trilinear};
 use crate::grin::{

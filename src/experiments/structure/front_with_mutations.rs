@@ -122,7 +122,7 @@ impl MutationGain {
                 let plan = sampler.plan(&plan(&sweep.start, *weight, effort.gradients)?, seed);
                 searches.push(RecordedSearch::new(&design.lens, &plan)?);
             }
-            Ok::<(), ExperimentError>(())
+            ExperimentResult::<()>::Ok(())
         };
         add(SamplerKind::Descent, FIRST_SEED)?;
         (0..effort.seeds).try_for_each(|i| add(SamplerKind::Restore, FIRST_SEED + i))?;
@@ -228,7 +228,7 @@ fn evaluate_best(
     chosen: &[(ParetoPoint, f64)],
 ) -> ExperimentResult<Vec<ParetoPoint>> {
     let evaluate = |(search, (_, weight)): (&RecordedSearch, &(ParetoPoint, f64))| {
-        ParetoPoint::evaluate(&search.run.best().point, Some(*weight), EVALUATION_TOLERANCE)
+        Ok(ParetoPoint::evaluate(&search.run.best().point, Some(*weight), EVALUATION_TOLERANCE)?)
     };
     searches.iter().zip(chosen).map(evaluate).collect()
 }
