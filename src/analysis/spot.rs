@@ -274,27 +274,42 @@ fn spot_moments(region: &Region<'_>, nodes: &Nodes) -> Option<[f64; 8]> {
 const EDGE_RAYS: usize = 128;
 
 /// The largest distance of a ray from a point, over rays at the edge and those of a quadrature
-/// inside it. The error is the change if only every other edge ray is used.
+/// inside it. The error is by how much the distance may rise between two edge rays.
 fn geometric_radius<'a>(
     lit: impl Iterator<Item = &'a LitChannel<'a>>,
     center: [f64; 2],
     rms_error: f64,
 ) -> Estimate {
-    let (mut all, mut half, mut rays) = (0.0f64, 0.0f64, 0);
+    let (mut radius, mut most, mut rays) = (0.0f64, 0.0f64, 0);
     for (region, spot) in lit {
         let inside = region.nodes(2.min(region.orders() - 1));
         let edge = edge_points(region);
         rays += spot.rms.rays + inside.points.len() + edge.len();
-        let far = farthest_ray(region, &inside.points, center);
-        let (even, odd): (Vec<_>, Vec<_>) =
-            edge.iter().copied().enumerate().partition(|(i, _)| i % 2 == 0);
-        let strip = |list: Vec<(usize, [f64; 2])>| list.into_iter().map(|(_, p)| p).collect();
-        let (even, odd): (Vec<[f64; 2]>, Vec<[f64; 2]>) = (strip(even), strip(odd));
-        let far_even = far.max(farthest_ray(region, &even, center));
-        all = all.max(far_even).max(farthest_ray(region, &odd, center));
-        half = half.max(far_even);
+        let far = ray_distances(region, &inside.points, center).into_iter().fold(0.0, f64::max);
+        let edge = ray_distances(region, &edge, center);
+        let peak = edge.iter().copied().fold(far, f64::max);
+        radius = radius.max(peak);
+        most = most.max(peak + rise_between(&edge, region.launch.is_symmetric()));
     }
-    Estimate::new(all, (all - half).max(rms_error), rays)
+    Estimate::new(radius, (most - radius).max(rms_error), rays)
+}
+
+/// By how much the largest of some distances around an edge may be exceeded between two of them: a
+/// quarter of the fall to the lower of its second neighbours, which is more than a parabola or a
+/// corner between them rises. Half an edge goes on as its mirror image.
+fn rise_between(edge: &[f64], half: bool) -> f64 {
+    let count = edge.len();
+    if count < 5 {
+        return 0.0;
+    }
+    let peak = (0..count).max_by(|a, b| edge[*a].total_cmp(&edge[*b])).unwrap_or(0);
+    // The last point of a whole edge is the first one again.
+    let neighbours = if half {
+        [peak.abs_diff(2), (count - 1) - (count - 1).abs_diff(peak + 2)]
+    } else {
+        [(peak + count - 3) % (count - 1), (peak + 2) % (count - 1)]
+    };
+    0.25 * (edge[peak] - edge[neighbours[0]].min(edge[neighbours[1]]))
 }
 
 /// Points just inside the edge of a pupil.
@@ -315,8 +330,9 @@ fn edge_points(region: &Region<'_>) -> Vec<[f64; 2]> {
     }
 }
 
-fn farthest_ray(region: &Region<'_>, points: &[[f64; 2]], [x, y]: [f64; 2]) -> f64 {
+/// The distances of the image points of some rays from a point, of those that arrive.
+fn ray_distances(region: &Region<'_>, points: &[[f64; 2]], [x, y]: [f64; 2]) -> Vec<f64> {
     let (launched, landed) = region.launch.trace_points(points);
     let arrived = (0..launched.len()).filter(|i| landed.fate(*i).is_imaged());
-    arrived.map(|i| (landed.x[i] - x).hypot(landed.y[i] - y)).fold(0.0, f64::max)
+    arrived.map(|i| (landed.x[i] - x).hypot(landed.y[i] - y)).collect()
 }

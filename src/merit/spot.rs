@@ -259,24 +259,26 @@ fn lost_chief_error(context: &EvaluationContext<'_>, field: usize, fate: Fate) -
     MeritError::RayLost { ray: 0, field, zoom: context.zoom.zoom, um, fate }
 }
 
-/// The quantity proportional to the paraxial image height, per field: `tan θ`, or the object height
-/// in mm.
+/// The vector proportional to the paraxial image point, per field: `tan θ` along the direction of the
+/// field, or the object height in mm.
 fn paraxial_heights(context: &EvaluationContext<'_>) -> Result<Vec<[f64; 2]>, MeritError> {
     let refuse = |why| Err(MeritError::DoesNotApply { term: "distortion", why });
-    let convert = |v: f64| match (context.zoom.field_kind, context.zoom.object) {
-        (FieldKind::Angle, Object::Infinity) => Some(v.to_radians().tan()),
-        (FieldKind::ObjectHeight, _) => Some(v),
-        (FieldKind::ImageHeight, _) | (FieldKind::Angle, Object::Finite(_)) => None,
-    };
     let mut heights = Vec::new();
     for field in &context.sampling.fields {
-        if context.zoom.field_kind == FieldKind::Angle && field.x.hypot(field.y) >= 89.0 {
-            return refuse("a field of 90 degrees or more has no image at f tan(theta)");
-        }
-        let (Some(x), Some(y)) = (convert(field.x), convert(field.y)) else {
-            return refuse("the fields are neither angles of a distant object nor object heights");
+        let size = field.x.hypot(field.y);
+        let stretch = match (context.zoom.field_kind, context.zoom.object) {
+            (FieldKind::Angle, Object::Infinity) if size >= 89.0 => {
+                return refuse("a field of 90 degrees or more has no image at f tan(theta)");
+            }
+            (FieldKind::Angle, Object::Infinity) if size > 0.0 => size.to_radians().tan() / size,
+            (FieldKind::Angle, Object::Infinity) | (FieldKind::ObjectHeight, _) => 1.0,
+            (FieldKind::ImageHeight, _) | (FieldKind::Angle, Object::Finite(_)) => {
+                return refuse(
+                    "the fields are neither angles of a distant object nor object heights",
+                );
+            }
         };
-        heights.push([x, y]);
+        heights.push([stretch * field.x, stretch * field.y]);
     }
     Ok(heights)
 }

@@ -5,6 +5,7 @@
 mod analysis;
 mod aperture;
 mod cli;
+mod closed_forms;
 mod effects;
 mod experiments;
 mod files;

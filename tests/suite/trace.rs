@@ -24,6 +24,7 @@ fn rows(lens: &Reference) -> Vec<Value> {
 
 #[test]
 fn reference_lens_rays_land_where_they_must() {
+    let mut compared = 0;
     for lens in reference::lenses() {
         let mut worst: f64 = 0.0;
         for row in rows(&lens) {
@@ -38,6 +39,7 @@ fn reference_lens_rays_land_where_they_must() {
                 let allowed = 16.0 * unit + 2.0 * EPSILON * size;
                 let error = (got - exact).abs() / allowed.max(f64::MIN_POSITIVE);
                 worst = worst.max(error);
+                compared += 1;
                 assert!(error <= 1.0, "{}: {got:e} instead of {exact:e} in {row}", lens.id());
             };
             for ((exact, unit, got), size) in [(point, size.max(1.0)), (direction, 1.0)] {
@@ -52,11 +54,13 @@ fn reference_lens_rays_land_where_they_must() {
         }
         println!("{}: worst ray {worst:.2} of 16 units", lens.id());
     }
+    assert_eq!(compared, 2128);
 }
 
 /// Every derivative `[dx, dy, dOPL]` of the reference rays, by the backward pass.
 #[test]
 fn reference_lens_rays_have_the_right_derivatives() {
+    let mut compared = 0;
     for lens in reference::lenses() {
         let mut worst: f64 = 0.0;
         for row in rows(&lens) {
@@ -75,30 +79,35 @@ fn reference_lens_rays_have_the_right_derivatives() {
                     opl,
                     ..AdjointSeed::default()
                 });
-                worst = worst.max(worst_derivative(lens.id(), &gradient, derivatives, output));
+                let (error, count) = worst_derivative(lens.id(), &gradient, derivatives, output);
+                worst = worst.max(error);
+                compared += count;
             }
         }
         println!("{}: worst derivative {worst:.1e}", lens.id());
     }
+    assert_eq!(compared, 3339);
 }
 
-/// The largest error of the derivatives of one output, relative to the largest of them.
+/// The largest error of the derivatives of one output, relative to the largest of them, and how many
+/// were compared.
 fn worst_derivative(
     lens: &str,
     gradient: &SystemGradient<f64>,
     derivatives: &serde_json::Map<String, Value>,
     output: usize,
-) -> f64 {
+) -> (f64, usize) {
     let exact = |row: &Value| number(&row[output]);
     let largest = derivatives.values().fold(1e-9, |m: f64, row| m.max(exact(row).abs()));
-    let mut worst: f64 = 0.0;
+    let (mut worst, mut compared): (f64, usize) = (0.0, 0);
     for (name, row) in derivatives {
         let Some(got) = super::hard_cases::parameter(gradient, name) else { continue };
         let error = (got - exact(row)).abs() / largest;
         assert!(error < 1e-9, "{lens} {name}: {got:e} instead of {:e}", exact(row));
         worst = worst.max(error);
+        compared += 1;
     }
-    worst
+    (worst, compared)
 }
 
 /// Rays over the pupil of a library lens at half of its field.
@@ -490,5 +499,31 @@ fn a_reversed_lens_leads_rays_back_to_where_they_came_from() {
             assert!((e.x / e.z + 0.01).hypot(e.y / e.z) < 1e-10, "{name}: {e:?}");
         }
         assert!(arrived > 10, "{name}: {arrived}");
+    }
+}
+
+/// A hyperhemisphere is the whole of a sphere or ellipsoid; a hyperboloid has a second sheet, which
+/// belongs to no surface.
+#[test]
+fn the_second_sheet_of_a_hyperboloid_is_no_surface() {
+    let fate = |conic: f64, hyperhemisphere: bool, z: f64| {
+        let surface = Surface {
+            shape: Shape::Conic { curvature: 0.1, conic },
+            hyperhemisphere,
+            ..crate::aperture::image()
+        };
+        let system = System { index_before: 1.0, surfaces: vec![surface], stop: None };
+        let direction = Vec3::new(0.0, 0.9992_f64, 0.04);
+        let direction = direction * (1.0 / direction.dot(direction).sqrt());
+        Tracer::new(&system).unwrap().trace(Ray { point: Vec3::new(0.0, -60.0, z), direction }).fate
+    };
+    // z = r²/10/(1 + √(1 + 3 r²/100)) has its other sheet below z = −2·10/3, the sphere its far
+    // half above z = 10.
+    for whole in [false, true] {
+        assert_eq!(fate(-4.0, whole, -20.0), Fate::Missed(0));
+        assert_eq!(fate(-1.5, whole, -90.0), Fate::Missed(0));
+        let far = if whole { Fate::Imaged } else { Fate::Missed(0) };
+        assert_eq!(fate(0.0, whole, 12.0), far);
+        assert_eq!(fate(-0.5, whole, 20.0), far);
     }
 }

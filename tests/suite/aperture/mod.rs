@@ -2,6 +2,7 @@
 
 mod boundary;
 mod estimators;
+mod fields;
 mod hard;
 mod warp;
 

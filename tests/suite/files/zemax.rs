@@ -187,9 +187,9 @@ fn every_kind_of_aperture_field_and_object_is_read() {
     assert_eq!(with("ENPD 16.0", "OBNA 0.05 0").aperture, Aperture::ObjectNa(0.05));
     let cone = with("ENPD 16.0", "OBNA 3 1").aperture;
     assert_eq!(cone, Aperture::ObjectNa(3.0_f64.to_radians().sin()));
-    assert_eq!(with("ENPD 16.0", "FNUM 5 1").aperture, Aperture::FNumber(5.0));
+    assert_eq!(with("ENPD 16.0", "FNUM 5.0 1").aperture, Aperture::FNumber(5.0));
     // The f-number for an object at infinity is that of the pupil.
-    let Aperture::EntrancePupilDiameter(pupil) = with("ENPD 16.0", "FNUM 5 0").aperture else {
+    let Aperture::EntrancePupilDiameter(pupil) = with("ENPD 16.0", "FNUM 5.0 0").aperture else {
         panic!("a pupil diameter");
     };
     assert!((pupil - 80.5879 / 5.0).abs() < 1e-4);
@@ -340,6 +340,63 @@ fn a_truncated_file_is_never_another_lens() {
         match open(&text.as_bytes()[..end]) {
             Ok(opened) => assert_eq!(opened.lens, whole, "{end}"),
             Err(error) => assert!(!error.to_string().is_empty()),
+        }
+    }
+}
+
+#[test]
+fn of_two_apertures_the_narrower_clips() {
+    for apertures in ["  CLAP 0 8.6 0\r\n  FLAP 0 6.5 0", "  CLAP 0 6.5 0\r\n  FLAP 0 8.6 0"] {
+        let lens = changed("  CLAP 0 8.6 0", apertures).unwrap().lens;
+        assert_eq!(lens.surfaces[0].semi_diameter, Some(6.5), "{apertures}");
+    }
+}
+
+#[test]
+fn a_thickness_follows_thicknesses_alone() {
+    let read = |pickup: &str| changed("  DISZ 2.2", &format!("  DISZ 2.2\r\n  {pickup}")).unwrap();
+    // The fourth number names the column of the source; 0 is its own.
+    let own = read("PZUP 1 0.2 1.1 0").lens;
+    assert_eq!(own.pickups.len(), 1);
+    let pickup = own.pickups[0];
+    assert_eq!(pickup.source, Parameter::new(0, Quantity::Thickness));
+    assert_eq!((pickup.scale, pickup.offset), (0.2, 1.1));
+    let other = read("PZUP 1 0.2 1.1 1");
+    assert!(other.lens.pickups.is_empty());
+    assert_eq!(other.lens.surfaces[1].thickness, 2.2);
+    let report = other.report.unwrap();
+    assert_eq!(outcome(&report, "PZUP").0, ConversionOutcome::Approximated);
+}
+
+#[test]
+fn the_f_number_of_a_finite_object_is_written_as_a_working_one() {
+    let mut lens = lens(&achromat().replace("DISZ INFINITY", "DISZ 200"));
+    lens.aperture = Aperture::FNumber(5.0);
+    let folder = super::folder("working-f-number");
+    let target = folder.join("a.zmx");
+    for (object, line) in [(Object::Finite(200.0), "FNUM 5.0 1"), (Object::Infinity, "FNUM 5.0 0")]
+    {
+        lens.object = object;
+        files::save(&lens, &target).unwrap();
+        let bytes = std::fs::read(&target).unwrap();
+        let units: Vec<u16> =
+            bytes.chunks(2).map(|pair| u16::from_le_bytes([pair[0], pair[1]])).collect();
+        let text = String::from_utf16(&units).unwrap();
+        assert!(text.lines().any(|written| written.trim() == line), "no {line} in {text}");
+        assert_eq!(files::open(&target).unwrap().lens.aperture, Aperture::FNumber(5.0));
+    }
+    std::fs::remove_dir_all(folder).unwrap();
+}
+
+#[test]
+fn heights_of_fields_have_the_unit_of_lengths_and_angles_have_none() {
+    let finite = achromat().replace("DISZ INFINITY", "DISZ 200");
+    for (unit, mm) in [("MM", 1.0), ("IN", 25.4), ("CM", 10.0)] {
+        for (kind, factor) in [(0, 1.0), (1, mm), (2, mm), (3, mm)] {
+            let text = finite.replace("UNIT MM", &format!("UNIT {unit}"));
+            let lens = lens(&text.replace("FTYP 0 0 3", &format!("FTYP {kind} 0 3")));
+            let heights: Vec<f64> = lens.fields.values.iter().map(|field| field.y).collect();
+            assert_eq!(heights, [0.0, 1.5 * factor, 2.5 * factor], "{unit}, kind {kind}");
         }
     }
 }

@@ -9,6 +9,7 @@ mod gradients;
 mod lens;
 mod mutations;
 mod projection;
+mod proposal_density;
 mod reservoir;
 mod rugged;
 mod rules;

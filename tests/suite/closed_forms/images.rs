@@ -1,0 +1,137 @@
+//! Spots and wavefronts of surfaces that focus perfectly, seen out of focus.
+
+use super::{FOCAL, assert_near, beam, field, paraboloid, system, thin_lens};
+use crate::aperture::image;
+use crate::reference::lenses;
+use aplanat::analysis::{airy_radius, illumination, path_differences, spot};
+use aplanat::lens::{FieldPoint, Shape, Surface, System};
+use aplanat::pupil::{Accuracy, Aiming, RayModel};
+
+const ACCURACY: Accuracy = Accuracy { tolerance: 1e-11, max_rays: 400_000 };
+const UM: f64 = 0.5875618;
+
+fn model(systems: Vec<(f64, f64, System<f64>)>, diameter: f64, edge: f64) -> RayModel {
+    RayModel::from_systems(systems, 0, beam(diameter, edge), Aiming::Paraxial).unwrap()
+}
+
+/// A ray at the height h of a paraboloid mirror meets the axis in its focus at the angle u with
+/// tan u = 4 f h/(4 f² − h²).
+fn slope(height: f64) -> f64 {
+    4.0 * FOCAL * height / (4.0 * FOCAL * FOCAL - height * height)
+}
+
+/// The mean of tan² u over the disc of radius R: 4 a/R² (a/(a − R²) − 1 + ln(1 − R²/a)) with
+/// a = 4 f².
+fn mean_square_slope(radius: f64) -> f64 {
+    let (a, square) = (4.0 * FOCAL * FOCAL, radius * radius);
+    4.0 * a / square * (a / (a - square) - 1.0 + (-square / a).ln_1p())
+}
+
+#[test]
+fn the_spot_of_a_paraboloid_out_of_focus_is_its_cone() {
+    let (radius, defocus) = (25.0, 0.2);
+    let model = model(vec![(UM, 1.0, paraboloid(defocus))], 2.0 * radius, 0.0);
+    let got = spot(&model, field(0.0, 0.0), ACCURACY).unwrap();
+    assert_near(got.rms.value, defocus * mean_square_slope(radius).sqrt(), 1e-12);
+    assert_near(got.radius.value, defocus * slope(radius), 2e-9);
+    assert_near(got.light.value, std::f64::consts::PI * radius * radius, 1e-12);
+}
+
+#[test]
+fn a_spot_weighs_its_wavelengths() {
+    // The first wavelength is in focus, the second is not: only the share of the second counts.
+    let (radius, defocus) = (25.0, 0.2);
+    let blurred = defocus * mean_square_slope(radius).sqrt();
+    for (first, second) in [(3.0, 1.0), (1.0, 3.0), (0.0, 2.0)] {
+        let systems = vec![(UM, first, paraboloid(0.0)), (0.6, second, paraboloid(defocus))];
+        let got = spot(&model(systems, 2.0 * radius, 0.0), field(0.0, 0.0), ACCURACY).unwrap();
+        let share: f64 = second / (first + second);
+        assert_near(got.rms.value, share.sqrt() * blurred, 1e-12);
+        assert_near(got.channels[1].unwrap().rms.value, blurred, 1e-12);
+    }
+}
+
+#[test]
+fn the_radius_of_a_spot_does_not_depend_on_the_azimuth_of_its_field() {
+    let model = model(vec![(UM, 1.0, paraboloid(0.05))], 50.0, 1.0);
+    let at = |degrees: f64| {
+        let (sin, cos) = degrees.to_radians().sin_cos();
+        spot(&model, field(sin, cos), ACCURACY).unwrap().radius
+    };
+    // The farthest ray lies in the plane of symmetry, where an edge ray is traced.
+    let exact = at(0.0);
+    let mut inexact = 0;
+    for step in 1..60 {
+        let got = at(f64::from(step) * 1.37);
+        let error = (got.value - exact.value).abs();
+        let stated = got.error + exact.error + 1e-9 * exact.value;
+        assert!(error <= stated, "step {step}: {got:?} instead of {exact:?}");
+        assert!(got.error < 3e-3 * got.value, "{got:?}");
+        inexact += usize::from(error > 1e-6 * exact.value);
+    }
+    assert!(inexact > 20, "{inexact}");
+}
+
+#[test]
+fn the_airy_radius_is_the_first_zero_of_the_diffraction_pattern() {
+    // J₁(π r/(λ N)) = 0 at π r/(λ N) = 3.8317; f/4 gives 2.8668 µm in yellow light.
+    let thin = system(thin_lens(FOCAL, FOCAL).to_vec(), 0);
+    let radius = airy_radius(&model(vec![(UM, 1.0, thin)], 25.0, 0.0)).unwrap();
+    assert_near(radius, 3.831705970207512 / std::f64::consts::PI * UM * 1e-3 * 4.0, 1e-3);
+}
+
+#[test]
+fn the_wavefront_in_glass_counts_the_index() {
+    // An ellipsoid of eccentricity 1/n focuses parallel light into its far focus, in the glass.
+    let (index, focus, defocus, radius) = (1.5, 150.0, 0.05, 20.0);
+    let curvature = index / ((index - 1.0) * focus);
+    let shape = Shape::Conic { curvature, conic: -1.0 / (index * index) };
+    let front = Surface { shape, index, thickness: focus + defocus, ..image() };
+    let model = model(vec![(UM, 1.0, system(vec![front], 0))], 2.0 * radius, 0.0);
+    let points = [[0.0, 0.3], [0.5, 0.5], [0.0, -1.0]];
+    let found = path_differences(&model, field(0.0, 0.0), 0, &points).unwrap();
+    for (p, found) in points.iter().zip(found) {
+        let height = radius * p[0].hypot(p[1]);
+        let (sag, _) = shape.sag(height * height).unwrap();
+        let cosine = (focus - sag) / (focus - sag).hypot(height);
+        let sphere = focus + defocus;
+        let side = (sphere * sphere - defocus * defocus * (1.0 - cosine * cosine)).sqrt();
+        let longer = defocus * (1.0 - cosine) - (sphere - side);
+        let exact = index * longer / (UM * 1e-3);
+        assert!(exact.abs() > 0.005, "{exact} waves is too little to see");
+        assert!((found.unwrap() - exact).abs() < 1e-8, "{p:?}: {found:?} instead of {exact}");
+    }
+}
+
+#[test]
+fn the_error_of_the_illumination_covers_its_error() {
+    let (mut compared, mut inexact) = (0, 0);
+    for lens in lenses() {
+        let model = lens.clipped_model();
+        let at = |tolerance| {
+            illumination(&model, lens.primary(), Accuracy { tolerance, ..ACCURACY })
+                .into_iter()
+                .filter_map(|light| light.relative.filter(|share| share.value > 0.0))
+        };
+        for tolerance in [0.3, 1e-1, 1e-2, 1e-4] {
+            for (rough, exact) in at(tolerance).zip(at(ACCURACY.tolerance)).skip(1) {
+                let error = (rough.value - exact.value).abs();
+                let stated = rough.error + exact.error;
+                assert!(error <= stated, "{}: {error:e}, stated {stated:e}", lens.id());
+                compared += 1;
+                inexact += usize::from(error > 1e-9);
+            }
+        }
+    }
+    println!("{compared} illuminations, {inexact} of them with an error above 1e-9");
+    assert!(compared >= 60 && inexact >= 10, "{compared}, {inexact}");
+}
+
+#[test]
+fn light_of_a_field_has_no_weight() {
+    // A weight of a field belongs to means over fields: the spot of the field itself has none.
+    let model = model(vec![(UM, 1.0, paraboloid(0.1))], 50.0, 0.5);
+    let heavy = FieldPoint { weight: 7.0, ..field(0.0, 0.5) };
+    let [light, heavy] = [field(0.0, 0.5), heavy].map(|f| spot(&model, f, ACCURACY).unwrap());
+    assert_eq!((light.rms, light.light), (heavy.rms, heavy.light));
+}
