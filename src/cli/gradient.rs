@@ -10,7 +10,7 @@ use crate::lens::{
 use crate::measure::{Integral, time_ms};
 use crate::pupil::{
     Accuracy, DerivativeError, DerivativeEstimator, PupilDerivative, QuadraticIntegrand, RayModel,
-    Region, choose_estimator, differentiate, limited_by_stop,
+    Region, choose_estimator, differentiate,
 };
 use crate::trace::{SurfaceGradient, SystemGradient as Slopes};
 use clap::ValueEnum;
@@ -81,8 +81,9 @@ impl GradientArgs {
         let opened = self.lens.open()?;
         opened.check_zoom(self.zoom)?;
         let refuse = |source| CliError::RayModel { file: opened.file.clone(), source };
-        let lens = limited_by_stop(&self.selected_lens(&opened)?).map_err(refuse)?;
+        let mut lens = self.selected_lens(&opened)?;
         let model = RayModel::from_lens(&lens, 0).map_err(refuse)?;
+        lens.surfaces[model.stop()].semi_diameter = Some(model.stop_radius());
         let (found, ms) = time_ms(|| self.differentiate(&model));
         let found = found.map_err(|cause| CliError::Failed(format!("{}: {cause}", opened.file)))?;
         output.print(&GradientReport::new(self, &lens, &found, ms))
@@ -151,6 +152,8 @@ struct IntegralDerivative {
     error: Slopes<f64>,
     rays: usize,
     weights: f64,
+    /// True if every derivative of every field and wavelength is within the tolerance.
+    reached: bool,
     planned: (DerivativeEstimator, String),
 }
 
@@ -159,7 +162,16 @@ impl IntegralDerivative {
         let zero = || Slopes::zero(model.channels[0].tracer.surfaces());
         let weights = model.channels.iter().map(|color| color.weight).sum();
         let planned = (DerivativeEstimator::Boundary, String::new());
-        Self { value: 0.0, value_error: 0.0, by: zero(), error: zero(), rays: 0, weights, planned }
+        Self {
+            value: 0.0,
+            value_error: 0.0,
+            by: zero(),
+            error: zero(),
+            rays: 0,
+            weights,
+            reached: true,
+            planned,
+        }
     }
 
     fn add(&mut self, derivative: &PupilDerivative, share: f64, (value, error): (f64, f64)) {
@@ -168,6 +180,7 @@ impl IntegralDerivative {
         self.by.add(&derivative.gradient, share);
         self.error.add(&derivative.error, share.abs());
         self.rays += derivative.rays;
+        self.reached &= derivative.reached;
     }
 }
 
@@ -179,6 +192,7 @@ struct GradientReport {
     reason: String,
     value: f64,
     error: f64,
+    reached: bool,
     rays: usize,
     ms: f64,
     d: DerivativeColumns,
@@ -240,6 +254,7 @@ impl GradientReport {
             reason: reason.clone(),
             value: found.value,
             error: found.value_error,
+            reached: found.reached,
             rays: found.rays,
             ms,
             d: DerivativeColumns::new(lens, &found.by),
@@ -254,7 +269,16 @@ impl Display for GradientReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { value, error, rays, ms, d, d_error, method, reason, unit, .. } = self;
         writeln!(f, "{} {unit} ± {error:.1e}   {rays} rays, {ms:.3} ms", ShortNumber(*value))?;
-        writeln!(f, "{method}: {reason}\n")?;
+        writeln!(f, "{method}: {reason}")?;
+        if !self.reached {
+            let why = match *method {
+                "difference" => "the steps of differences have a fixed size",
+                "warp" => "--rays allows no more samples",
+                _ => "the orders of quadrature, or --rays, do not go higher",
+            };
+            writeln!(f, "the tolerance was not reached by every derivative: {why}")?;
+        }
+        writeln!(f)?;
         let names = ["surface", "d/d curvature", "d/d thickness", "d/d semi-diameter", "d/d index"];
         let mut table = TextTable::new(&names);
         for i in 0..d.curvature.len() {

@@ -164,6 +164,7 @@ impl PupilDerivative {
             gradient: SystemGradient::zero(surfaces),
             error: SystemGradient::zero(surfaces),
             rays: 0,
+            reached: false,
         }
     }
 }

@@ -254,7 +254,8 @@ impl Region<'_> {
             rays += last;
             now.rays = rays;
             now.add_order_error(before.as_ref());
-            if now.reaches(asked.tolerance) {
+            now.reached = now.reaches(asked.tolerance);
+            if now.reached {
                 return Ok(now);
             }
             before = Some(now);
@@ -282,7 +283,8 @@ impl Region<'_> {
             _ => lit.boundary_derivative(cost).ok_or(DerivativeError::Unbounded)?,
         };
         let error = SystemGradient::zero(by.surfaces.len());
-        let mut found = PupilDerivative { error, gradient: by, rays: lit.rays_traced };
+        let mut found =
+            PupilDerivative { error, gradient: by, rays: lit.rays_traced, reached: false };
         found.drop_rounding(ROUNDING, natural);
         Ok(found)
     }
@@ -308,7 +310,8 @@ impl Region<'_> {
             let excess = found.excess(asked.tolerance, |slot| NOTABLE * natural(slot));
             let wanted = (count as f64 * (excess * excess).clamp(LEAST, MOST)) as usize;
             let next = wanted.min(asked.max_rays.saturating_sub(rays + overhead + REPLICATES));
-            if excess <= 1.0 || (next as f64) < LEAST * count as f64 {
+            found.reached = excess <= 1.0;
+            if found.reached || (next as f64) < LEAST * count as f64 {
                 return Ok(found);
             }
             count = next;

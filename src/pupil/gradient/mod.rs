@@ -93,6 +93,8 @@ pub struct PupilDerivative {
     pub error: SystemGradient<f64>,
     /// The number of rays traced.
     pub rays: usize,
+    /// True if the errors are within the tolerance that was asked for.
+    pub reached: bool,
 }
 
 impl PupilDerivative {

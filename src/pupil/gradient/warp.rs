@@ -146,6 +146,7 @@ fn derivative(replicates: &[SystemGradient<f64>], rays: usize) -> PupilDerivativ
         gradient: SystemGradient::from_numbers(surfaces, numbers.clone().map(mean)),
         error: SystemGradient::from_numbers(surfaces, numbers.map(error)),
         rays,
+        reached: false,
     }
 }
 
