@@ -63,7 +63,8 @@ impl SpotJson {
             radius: spot.radius,
             centroid_x: spot.centroid[0],
             centroid_y: spot.centroid[1],
-            reached: spot.channels.iter().flatten().all(|color| color.converged),
+            reached: spot.is_fully_lit
+                && spot.channels.iter().flatten().all(|color| color.converged),
             colors: colors.map(|(color, spot)| ColorSpotJson::new(color.um, spot)).collect(),
         }
     }
@@ -104,7 +105,9 @@ impl TextLines for SpotJson {
             estimate_text("centroid x", &self.centroid_x),
             estimate_text("centroid y", &self.centroid_y),
         ];
-        if !self.reached {
+        if self.colors.iter().any(|color| matches!(color, ColorSpotJson::Dark { .. })) {
+            lines.push("these numbers leave out the wavelengths without light below".to_owned());
+        } else if !self.reached {
             lines.push("the tolerance was not reached".to_owned());
         }
         lines.extend(self.colors.iter().map(ColorSpotJson::line));

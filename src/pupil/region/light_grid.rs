@@ -15,6 +15,10 @@ const SCANS: [(usize, f64); 3] = [(25, 120.0), (101, 13.0), (301, 1.7)];
 /// most `MAX_ZOOMS` times.
 const ENOUGH_LIT: usize = 12;
 const MAX_ZOOMS: usize = 14;
+/// The largest number of moves of a grid along with light that it cuts, and the part of a grid in
+/// which light is narrow enough for a move without doubling.
+const MAX_MOVES: usize = 12;
+const FILLED: f64 = 0.5;
 /// Light through a narrower opening, in pupil coordinates, is a single ray: a semi-diameter of zero
 /// lets one through on the axis.
 const NARROWEST_PUPIL: f64 = 1e-9;
@@ -57,25 +61,56 @@ impl LightGrid {
             if closer.count() == 0 {
                 break;
             }
-            grid = closer;
+            // The tips of a crescent may be too thin for the coarser cells.
+            grid = closer.follow(launch, rays);
         }
         (grid.half > NARROWEST_PUPIL).then_some(grid)
     }
 
-    /// Doubles a grid about the axis until it holds light, and all of it.
+    /// Doubles a grid about the axis until it holds light, and all of it. Light at the edge of a
+    /// grid that slips between the cells of a larger one is followed in its own cells.
     fn scan(launch: &Launch<'_>, cells: usize, widest: f64, rays: &mut usize) -> Option<Self> {
         let disc = launch.model.ends_at_disc();
         let mut half = if disc { 1.0 } else { FIRST_REACH };
+        let mut cut: Option<Self> = None;
         loop {
             let grid = Self::sample(launch, cells, [0.0; 2], half);
             *rays += grid.rays;
             let largest = disc || 2.0 * half > widest;
-            let holds = grid.count() > 0 && !grid.touches_its_edge();
-            if holds || largest {
-                return (grid.count() > 0).then_some(grid);
+            if grid.count() > 0 {
+                if disc || !grid.touches_its_edge() {
+                    return Some(grid);
+                }
+                cut = Some(grid);
+            } else if cut.is_some() {
+                break;
+            }
+            if largest {
+                break;
             }
             half *= 2.0;
         }
+        cut.map(|grid| grid.follow(launch, rays))
+    }
+
+    /// The grid moved along with light that goes on beyond its edge, and doubled while the light
+    /// fills it; one whose light still touches the edge if it is not held in `MAX_MOVES`.
+    fn follow(self, launch: &Launch<'_>, rays: &mut usize) -> Self {
+        let mut grid = self;
+        for _ in 0..MAX_MOVES {
+            if !grid.touches_its_edge() {
+                break;
+            }
+            let (center, reach) = grid.bounding_square();
+            let half = if reach > FILLED * grid.half { 2.0 * grid.half } else { grid.half };
+            let moved = Self::sample(launch, grid.cells, center, half);
+            *rays += moved.rays;
+            if moved.count() == 0 {
+                break;
+            }
+            grid = moved;
+        }
+        grid
     }
 
     fn sample(launch: &Launch<'_>, cells: usize, center: [f64; 2], half: f64) -> Self {
