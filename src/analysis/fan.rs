@@ -9,7 +9,8 @@ use crate::trace::Fate;
 /// A ray of a fan.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FanPoint {
-    /// Its coordinate along the section, −1 to 1 between the rims of the pupil.
+    /// Its coordinate along the section, −1 to 1 between the rims of the stop, or of the disc of
+    /// the entrance pupil if that limits the beam.
     pub pupil: f64,
     /// The distance of its image point from that of the chief ray, x and y in mm; `None` if it is
     /// lost.
@@ -39,7 +40,7 @@ pub fn fan(model: &RayModel, field: FieldPoint, count: usize) -> Result<Vec<Fan>
     let one = |wavelength: usize| {
         let launch = model.launch(field, wavelength).map_err(AnalysisError::NoRays)?;
         let point = |pupil: f64, p: [f64; 2]| {
-            let landing = launch.ray(p).map(|ray| launch.channel().tracer.trace(ray));
+            let landing = launch.ray_through_stop(p).map(|ray| launch.channel().tracer.trace(ray));
             let arrived = landing.filter(|landing| landing.fate.is_imaged());
             let error = |at: crate::math::Vec3<f64>| [at.x - chief[0], at.y - chief[1]];
             FanPoint {

@@ -46,7 +46,7 @@ pub fn ray_layout(model: &RayModel, count: usize) -> RayLayout {
         match model.launch(*point, model.primary) {
             Ok(launch) => {
                 for pupil in pupil_coordinates(count) {
-                    if let Some(ray) = launch.ray([0.0, pupil]) {
+                    if let Some(ray) = launch.ray_through_stop([0.0, pupil]) {
                         let mut path = launch.channel().tracer.polyline(ray);
                         layout.count(&path);
                         extend_backwards(model, &mut path.points, ray.direction);

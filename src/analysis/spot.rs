@@ -155,12 +155,12 @@ pub(super) fn combine_channels(
     let weighted = || model.channels.iter().map(|channel| channel.weight).zip(channels);
     let lit: Vec<(f64, &MonochromaticSpot)> =
         weighted().filter_map(|(w, channel)| Some((w, &channel.as_ref().ok()?.1))).collect();
-    let sum: f64 = lit.iter().map(|(weight, spot)| weight * spot.area.value).sum();
+    let sum: f64 = lit.iter().map(|(weight, spot)| weight * spot.light.value).sum();
     if !(sum > 0.0) {
         let reason = channels.iter().find_map(|channel| channel.as_ref().err().copied());
         return Err(reason.unwrap_or(AnalysisError::NoLight));
     }
-    let shares: Vec<f64> = lit.iter().map(|(w, spot)| w * spot.area.value / sum).collect();
+    let shares: Vec<f64> = lit.iter().map(|(w, spot)| w * spot.light.value / sum).collect();
     let rays = lit.iter().map(|(_, spot)| spot.rms.rays).sum();
     let shared = || lit.iter().map(|(_, spot)| spot).zip(&shares);
     let center = [0, 1].map(|i| shared().map(|(c, share)| share * c.centroid[i].value).sum());
@@ -217,14 +217,18 @@ fn monochromatic_spot(region: &Region<'_>, accuracy: Accuracy) -> Option<Monochr
             [rms, rms, rms, *area, any, any, any, any]
         },
     )?;
-    let estimate = |k: usize, least: f64| {
-        Estimate::new(found.values[k], found.errors[k].max(least), found.rays)
+    let neglected = region.launch.model.neglected;
+    let estimate = |k: usize, least: f64, neglected: f64| {
+        Estimate::new(found.values[k], found.errors[k].max(least) + neglected, found.rays)
     };
-    let area = estimate(3, f64::EPSILON);
+    let rms = estimate(0, rounding, neglected.shift);
+    let area = estimate(3, f64::EPSILON, neglected.light * found.values[3]);
     let scale = region.launch.area();
+    let reached = neglected.light <= accuracy.tolerance
+        && neglected.shift <= (accuracy.tolerance * rms.value).max(rounding);
     Some(MonochromaticSpot {
-        rms: estimate(0, rounding),
-        centroid: [estimate(1, rounding), estimate(2, rounding)],
+        rms,
+        centroid: [1, 2].map(|k| estimate(k, rounding, neglected.shift)),
         area,
         light: Estimate::new(scale * area.value, scale * area.error, area.rays),
         slopes: ArrivalSlopes {
@@ -232,7 +236,7 @@ fn monochromatic_spot(region: &Region<'_>, accuracy: Accuracy) -> Option<Monochr
             covariance: found.values[5],
             mean: [found.values[6], found.values[7]],
         },
-        converged: found.converged,
+        converged: found.converged && reached,
     })
 }
 

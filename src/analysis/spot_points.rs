@@ -4,7 +4,7 @@
 //! [`spot`](super::spot())) and not from these rays.
 
 use crate::pupil::{Launch, PupilPattern, RayModel, pattern_points};
-use crate::trace::{Fates, TraceSink};
+use crate::trace::{Fates, ImagePoints, Rays, TraceSink};
 
 /// The image points of one field at one wavelength.
 #[derive(Debug, Clone, Default)]
@@ -37,8 +37,10 @@ pub fn spot_points(model: &RayModel) -> Vec<SpotPoints> {
 }
 
 fn points_of(launch: &Launch<'_>, points: &[[f64; 2]]) -> SpotPoints {
-    let (launched, landed) = launch.trace_points(points);
-    let arrived = (0..launched.len()).filter(|i| landed.fate(*i).is_imaged());
+    let rays: Rays<f64> = points.iter().filter_map(|p| launch.ray_through_stop(*p)).collect();
+    let mut landed = ImagePoints::default();
+    launch.channel().tracer.trace_batch(&rays, &mut landed);
+    let arrived = (0..rays.len()).filter(|i| landed.fate(*i).is_imaged());
     SpotPoints {
         points: arrived.map(|i| [landed.x[i], landed.y[i]]).collect(),
         fates: landed.fates(),

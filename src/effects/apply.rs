@@ -27,19 +27,25 @@ pub fn build_ray_model(
     };
     let systems: Result<Vec<_>, LensError> = wavelengths.iter().map(resolve).collect();
     let primary = if one { 0 } else { primary };
-    let aiming = if plan.computes(Effect::Aiming) { Aiming::Chief } else { Aiming::Paraxial };
+    let aimed = plan.computes(Effect::Aiming);
+    let model = |systems, beam| -> Result<RayModel, RayModelError> {
+        let aiming = if aimed { Aiming::Chief } else { Aiming::Paraxial };
+        let model = RayModel::from_systems(systems, primary, beam, aiming)?;
+        Ok(if aimed { model.limited_by_stop()? } else { model })
+    };
     let beam = Beam::for_lens(lens, zoom);
-    let mut model = RayModel::from_systems(systems?, primary, beam, aiming)?;
-    model.fields.clone_from(&lens.fields_at(zoom).values);
+    let mut built = model(systems?, beam)?;
+    built.fields.clone_from(&lens.fields_at(zoom).values);
     if lens.object != Object::Infinity
         && !plan.computes(Effect::FiniteObject)
-        && let Some((beam, fields)) = collimate_fields(&model, &beam)
+        && let Some((beam, fields)) = collimate_fields(&built, &beam)
     {
-        let systems = model.channels.into_iter().map(|c| (c.um, c.weight, c.system)).collect();
-        model = RayModel::from_systems(systems, primary, beam, aiming)?;
-        model.fields = fields;
+        let systems = built.channels.into_iter().map(|c| (c.um, c.weight, c.system)).collect();
+        built = model(systems, beam)?;
+        built.fields = fields;
     }
-    Ok(model)
+    built.neglected = plan.neglected();
+    Ok(built)
 }
 
 /// Removes from a resolved lens what a plan leaves out: aspheric terms, semi-diameters and

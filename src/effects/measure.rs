@@ -4,6 +4,7 @@
 //! move and how near they come to a rim, are smooth over the pupil. The root mean square of a shift
 //! bounds the change of the RMS radius of a spot, by the triangle inequality.
 
+use super::aiming::{AimingDifference, CoarseSpot, aiming_difference};
 use super::simplify::{collimate_fields, reduce_to_conic};
 use crate::lens::{FieldPoint, Lens, Object, Shape, System};
 use crate::math::Vec3;
@@ -38,9 +39,8 @@ pub struct EffectMeasurements {
     /// The smallest angle of any refracted ray with a surface at which the index drops, in degrees;
     /// 0 is total reflection. `None` if the index drops nowhere.
     pub critical_angle: Option<f64>,
-    /// The distance of the paraxial chief ray of the farthest field from the centre of the stop, in
-    /// stop radii; `None` if the ray does not reach the stop.
-    pub chief_ray_miss: Option<f64>,
+    /// The difference that aiming at the paraxial entrance pupil makes.
+    pub paraxial_aiming: AimingDifference,
     /// The distance of a finite object and the shift of rays if it is moved to infinity, both in mm.
     pub finite_object: Option<(f64, f64)>,
     /// The gradient-index gaps, each with the shift of rays if its gradient is left out, in mm.
@@ -65,18 +65,18 @@ pub struct RimClearance {
 
 /// The rings of points inside the pupil, of equal areas.
 const RINGS: usize = 3;
+/// Patterns of rays that look for light beyond the beam, which rims may have to stop: their rings
+/// and their radii, in radii of the pupil.
+const STRAY: [(usize, f64); 2] = [(3, 1.6), (7, 4.0)];
 /// The points on the rim of the pupil.
 const ON_RIM: usize = 24;
-/// The radius of the sampled disc, in radii of the paraxial pupil, if no disc limits the beam.
-const REACH: f64 = 1.6;
 
 /// Measures the effects of a lens at a zoom position.
 ///
 /// # Errors
 /// A lens or an aperture through which no ray can be traced.
 pub fn measure_effects(lens: &Lens, zoom: usize) -> Result<EffectMeasurements, RayModelError> {
-    let mut model = RayModel::with_aiming(lens, zoom, Aiming::Paraxial)?;
-    let miss = model.choose_aiming();
+    let model = RayModel::from_lens(lens, zoom)?;
     let system = &model.channels[model.primary].system;
     let bundles: Vec<SampledBundle> = model
         .fields
@@ -94,10 +94,32 @@ pub fn measure_effects(lens: &Lens, zoom: usize) -> Result<EffectMeasurements, R
         fates: bundles.iter().fold(Fates::default(), |sum, bundle| add_fates(sum, bundle.fates)),
         index_drops: index_drops(system),
         critical_angle: bundles.iter().filter_map(|bundle| bundle.grazing).reduce(f64::min),
-        chief_ray_miss: miss,
+        paraxial_aiming: paraxial_aiming(lens, zoom, &model, &bundles)?,
         finite_object: object(lens, zoom, &model, &bundles),
         grin_gaps: grin_gaps(&model, &bundles)?,
     })
+}
+
+/// The largest difference of any field and wavelength; unknown if the real beam of one is not found.
+fn paraxial_aiming(
+    lens: &Lens,
+    zoom: usize,
+    model: &RayModel,
+    bundles: &[SampledBundle],
+) -> Result<AimingDifference, RayModelError> {
+    let paraxial = RayModel::with_aiming(lens, zoom, Aiming::Paraxial)?;
+    let all = model.fields.len() * model.channels.len();
+    if bundles.len() < all {
+        return Ok(AimingDifference::UNKNOWN);
+    }
+    let of_bundle = |bundle: &SampledBundle| {
+        let spot = CoarseSpot::new(&bundle.landed);
+        let launch = model.launch(bundle.field, bundle.wavelength).ok();
+        spot.zip(launch).map(|(spot, launch)| aiming_difference(&launch, &paraxial, spot))
+    };
+    // A field without light is dark either way.
+    let found = bundles.par_iter().filter_map(of_bundle);
+    Ok(found.reduce(AimingDifference::default, AimingDifference::worst))
 }
 
 fn add_fates(a: Fates, b: Fates) -> Fates {
@@ -112,11 +134,9 @@ fn add_fates(a: Fates, b: Fates) -> Fates {
 }
 
 /// The sampled points of the pupil; those inside come first.
-fn sample_points(model: &RayModel) -> Vec<[f64; 2]> {
-    let reach = if model.ends_at_disc() { 1.0 } else { REACH };
+fn sample_points() -> Vec<[f64; 2]> {
     let rim = (0..ON_RIM).map(|i| (TAU * i as f64 / ON_RIM as f64).sin_cos().into());
-    let inside = pattern_points(PupilPattern::HexapolarInside(RINGS)).into_iter();
-    inside.map(|p| p.map(|v| v * reach)).chain(rim).collect()
+    pattern_points(PupilPattern::HexapolarInside(RINGS)).into_iter().chain(rim).collect()
 }
 
 /// The sampled rays of one field at one wavelength.
@@ -135,7 +155,7 @@ struct SampledBundle {
 impl SampledBundle {
     /// The rays of a field at all wavelengths; a field without rays is dark and has none.
     fn of_field(model: &RayModel, field: FieldPoint) -> Vec<Self> {
-        let places = sample_points(model);
+        let places = sample_points();
         let launches = (0..model.channels.len()).filter_map(|w| model.launch(field, w).ok());
         launches.map(|launch| Self::new(&launch, &places)).collect()
     }
@@ -279,19 +299,25 @@ fn without_rims(model: &RayModel) -> System<f64> {
     system
 }
 
-/// The clearance at each rim, for the rays that arrive through the lens [`without_rims`].
+/// The clearance at each rim, for the rays that fill the stop and arrive through the lens
+/// [`without_rims`], and for those beyond the beam that do.
 fn rims(model: &RayModel) -> Result<Vec<RimClearance>, RayModelError> {
-    let tracer = Tracer::new(&without_rims(model))?;
-    let count = tracer.surfaces();
+    let limited = without_rims(model);
+    let mut open = limited.clone();
+    if !is_aspheric(&open, model.stop()) {
+        // Rounding must not decide whether rays at its rim pass.
+        open.surfaces[model.stop()].semi_diameter = f64::INFINITY;
+    }
+    let (open, limited) = (Tracer::new(&open)?, Tracer::new(&limited)?);
+    let (beam, beyond) = (sample_points(), stray_points());
     let reached = |field: &FieldPoint| -> Vec<f64> {
-        let mut reached = vec![0.0; count];
-        for launch in (0..model.channels.len()).filter_map(|w| model.launch(*field, w).ok()) {
-            for ray in sample_points(model).into_iter().filter_map(|p| launch.ray(p)) {
-                let mut heights = vec![0.0; count];
-                let landing = tracer.visit(ray, |i, p| heights[i] = p.x.hypot(p.y));
-                if landing.fate.is_imaged() {
-                    reached.iter_mut().zip(heights).for_each(|(r, h)| *r = h.max(*r));
-                }
+        let mut reached = vec![0.0; open.surfaces()];
+        for wavelength in 0..model.channels.len() {
+            if let Ok(launch) = model.launch_at_stop(*field, wavelength) {
+                raise_heights(&mut reached, &launch, &beam, &open);
+            }
+            if let Ok(launch) = model.launch(*field, wavelength) {
+                raise_heights(&mut reached, &launch, &beyond, &limited);
             }
         }
         reached
@@ -306,7 +332,33 @@ fn rims(model: &RayModel) -> Result<Vec<RimClearance>, RayModelError> {
         obstructed: system.surfaces[surface].obstruction > 0.0,
     };
     let clips = |rim: &RimClearance| rim.semi_diameter.is_finite() || rim.obstructed;
-    Ok((0..count).map(rim).filter(clips).collect())
+    Ok((0..system.surfaces.len()).map(rim).filter(clips).collect())
+}
+
+/// The points beyond the beam from which rays may arrive if no rim stops them.
+fn stray_points() -> Vec<[f64; 2]> {
+    let pattern = |(rings, reach): (usize, f64)| {
+        pattern_points(PupilPattern::HexapolarInside(rings))
+            .into_iter()
+            .map(move |p| p.map(|v| v * reach))
+    };
+    STRAY.into_iter().flat_map(pattern).collect()
+}
+
+/// Raises the heights at each surface to those of the rays of some pupil points that arrive.
+fn raise_heights(
+    reached: &mut [f64],
+    launch: &Launch<'_>,
+    points: &[[f64; 2]],
+    tracer: &Tracer<f64>,
+) {
+    for ray in points.iter().filter_map(|p| launch.ray(*p)) {
+        let mut heights = vec![0.0; reached.len()];
+        let landing = tracer.visit(ray, |i, p| heights[i] = p.x.hypot(p.y));
+        if landing.fate.is_imaged() {
+            reached.iter_mut().zip(heights).for_each(|(r, h)| *r = h.max(*r));
+        }
+    }
 }
 
 fn index_drops(system: &System<f64>) -> Vec<usize> {
@@ -350,10 +402,10 @@ fn object(
         .map(|channel| (channel.um, channel.weight, channel.system.clone()))
         .collect();
     // A lens that cannot be set up with an object at infinity needs the finite object.
-    let Ok(far) = RayModel::from_systems(systems, model.primary, beam, model.aiming) else {
-        return Some((distance, f64::INFINITY));
-    };
-    let places = sample_points(model);
+    let far = RayModel::from_systems(systems, model.primary, beam, model.aiming);
+    let far = far.and_then(|far| Ok(far.limited_by_stop()?));
+    let Ok(far) = far else { return Some((distance, f64::INFINITY)) };
+    let places = sample_points();
     let mut most: f64 = 0.0;
     for (field, parallel) in model.fields.iter().zip(fields) {
         let mut here =

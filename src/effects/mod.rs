@@ -8,12 +8,14 @@
 //!
 //! Every effect can be forced on or off ([`EffectOverrides`]).
 
+mod aiming;
 mod apply;
 mod effect;
 mod measure;
 mod plan;
 mod simplify;
 
+pub use aiming::AimingDifference;
 pub use apply::{build_ray_model, simplify};
 pub use effect::{Effect, EffectOverride, EffectOverrides};
 pub use measure::{EffectMeasurements, RimClearance, measure_effects};

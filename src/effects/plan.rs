@@ -1,9 +1,10 @@
 //! The decisions: a pure function of the measurements.
 
+use super::aiming::AimingDifference;
 use super::effect::{Effect, EffectOverride, EffectOverrides};
 use super::measure::{EffectMeasurements, RimClearance};
 use crate::lens::SurfaceNumber;
-use crate::pupil::WIDE_AIMING_THRESHOLD;
+use crate::pupil::Neglected;
 use crate::trace::GrinStepPlan;
 use serde::{Deserialize, Serialize};
 
@@ -92,6 +93,9 @@ pub struct EffectPlan {
     /// Surfaces followed by a gradient-index gap that is traced as homogeneous, by index.
     #[serde(rename = "even")]
     pub homogeneous: Vec<usize>,
+    /// The largest relative change of light by rays aimed at the paraxial entrance pupil; 0 if they
+    /// are aimed at the stop.
+    pub aiming_light: f64,
 }
 
 impl EffectPlan {
@@ -103,6 +107,13 @@ impl EffectPlan {
     /// True if an effect is computed.
     pub fn computes(&self, effect: Effect) -> bool {
         self.decision(effect).is_none_or(|decision| decision.computed)
+    }
+
+    /// The changes by all that is left out together.
+    pub fn neglected(&self) -> Neglected {
+        let shifts = self.decisions.iter().filter(|decision| decision.unit == "mm");
+        let shift = shifts.map(|decision| decision.residual).sum();
+        Neglected { shift, light: self.aiming_light }
     }
 }
 
@@ -121,11 +132,15 @@ pub fn plan(
         asphere,
         clipping,
         reflection(measured, overrides.get(Effect::TotalReflection)),
-        aiming(measured, overrides.get(Effect::Aiming)),
+        aiming(measured, allowed, overrides.get(Effect::Aiming)),
         object(measured, allowed, overrides.get(Effect::FiniteObject)),
         grin,
     ];
-    EffectPlan { decisions, as_conic, unclipped, homogeneous }
+    let mut plan = EffectPlan { decisions, as_conic, unclipped, homogeneous, aiming_light: 0.0 };
+    if !plan.computes(Effect::Aiming) {
+        plan.aiming_light = measured.paraxial_aiming.light;
+    }
+    plan
 }
 
 /// A decision that rests on one number and concerns the lens as a whole.
@@ -344,16 +359,22 @@ const CHIEF_RAYS: f64 = 20.0;
 /// The rays of a spot.
 const SPOT_RAYS: f64 = 100.0;
 
-fn aiming(measured: &EffectMeasurements, choice: EffectOverride) -> EffectDecision {
-    let miss = measured.chief_ray_miss.unwrap_or(f64::INFINITY);
-    let decision = lens_decision(Effect::Aiming, choice, miss, WIDE_AIMING_THRESHOLD, "stop radii");
-    let reason = match measured.chief_ray_miss {
-        Some(miss) => format!(
-            "the paraxial chief ray of the farthest field misses the centre of the stop by \
-             {:.0} % of its radius",
-            100.0 * miss
-        ),
-        None => "the paraxial chief ray of the farthest field does not reach the stop".to_owned(),
+/// The change of light counts as the same part of the smallest spot, so that one number compares
+/// with the tolerance.
+fn aiming(measured: &EffectMeasurements, allowed: f64, choice: EffectOverride) -> EffectDecision {
+    let AimingDifference { shift, light } = measured.paraxial_aiming;
+    let as_shift = |light: f64| if light == 0.0 { 0.0 } else { light * measured.smallest_spot };
+    let decision = lens_decision(Effect::Aiming, choice, shift.max(as_shift(light)), allowed, "mm");
+    let reason = if shift.is_finite() {
+        format!(
+            "aimed at the paraxial entrance pupil, chief rays or spots would change by {:.3} um, \
+             light by up to {:.2} %; {:.3} um may be neglected",
+            1e3 * shift,
+            100.0 * light,
+            1e3 * allowed
+        )
+    } else {
+        "rays aimed at the paraxial entrance pupil do not reach the stop".to_owned()
     };
     let saved_share = CHIEF_RAYS / (CHIEF_RAYS + SPOT_RAYS);
     EffectDecision { reason, saved_share, ..decision }

@@ -36,8 +36,8 @@ pub(super) struct Configuration {
     pub(super) is_glass: Vec<bool>,
     /// The systems, one per wavelength.
     systems: Vec<System<f64>>,
-    /// The aperture that limits the beam.
-    aperture: Aperture,
+    /// The surface that is the stop.
+    stop: usize,
     bindings: Vec<Vec<ParameterBinding>>,
     /// The distance of the image plane from the paraxial focus in mm, if the last gap is solved
     /// for.
@@ -58,15 +58,13 @@ pub(super) struct ResolvedSystems {
 
 impl Configuration {
     pub(super) fn new(lens: &Lens, zoom: usize) -> Result<Self, MeritError> {
-        let aperture = lens.aperture_at(zoom);
+        let stop = StopLimit::new(lens, zoom)?;
         let mut systems = Vec::new();
         let mut bindings = Vec::new();
         for wavelength in &lens.wavelengths {
             let mut system = lens.resolve(zoom, wavelength.um)?;
-            if let (Some(stop), Aperture::StopSemiDiameter(radius)) = (system.stop, aperture) {
-                system.surfaces[stop].semi_diameter = radius;
-            }
-            let bound = bind_parameters(lens, zoom, wavelength.um, &mut system);
+            system.surfaces[stop.surface].semi_diameter = stop.radius;
+            let bound = bind_parameters(lens, zoom, wavelength.um, &stop, &mut system);
             bindings.push(bound);
             systems.push(system);
         }
@@ -86,7 +84,7 @@ impl Configuration {
             object: lens.object,
             field_kind: lens.fields_at(zoom).kind,
             is_glass: (0..lens.surfaces.len()).map(glass).collect(),
-            aperture,
+            stop: stop.surface,
             focus_offset: lens.image_solve,
             variables: lens.variables.len(),
             bindings,
@@ -113,8 +111,7 @@ impl Configuration {
         systems
     }
 
-    /// The ray model of the lens with its semi-diameters; a stop that defines the aperture has that
-    /// semi-diameter.
+    /// The ray model of the lens with its semi-diameters, limited by its stop.
     pub(super) fn ray_model(
         &self,
         systems: &ResolvedSystems,
@@ -125,9 +122,7 @@ impl Configuration {
         let channels = weighted.map(|(w, system)| (w.um, w.weight, system.clone())).collect();
         let mut beam = Beam::for_lens(lens, self.zoom);
         let primary = &systems.clipped[self.primary];
-        if let (Some(stop), Aperture::StopSemiDiameter(_)) = (primary.stop, self.aperture) {
-            beam.aperture = Aperture::StopSemiDiameter(primary.surfaces[stop].semi_diameter);
-        }
+        beam.aperture = Aperture::StopSemiDiameter(primary.surfaces[self.stop].semi_diameter);
         Ok(RayModel::from_systems(channels, self.primary, beam, aiming)?)
     }
 
@@ -254,12 +249,36 @@ fn unclip(surface: &mut Surface<f64>) {
 /// The radius up to which an asphere is extended, in semi-diameters.
 const ASPHERE_MARGIN: f64 = 1.2;
 
+/// The rim of the stop, which limits the beam at a zoom position.
+struct StopLimit {
+    surface: usize,
+    /// Its radius in mm. An aperture that is given as a pupil, a cone or a focal ratio keeps the stop
+    /// that it fills at the start.
+    radius: f64,
+    /// True if the radius follows the semi-diameter of the surface.
+    follows_rim: bool,
+}
+
+impl StopLimit {
+    fn new(lens: &Lens, zoom: usize) -> Result<Self, MeritError> {
+        let surface = lens.stop().unwrap_or(0);
+        let own = lens.zoom.get(zoom).is_some_and(|position| position.aperture.is_some());
+        if let Aperture::StopSemiDiameter(radius) = lens.aperture_at(zoom) {
+            return Ok(Self { surface, radius, follows_rim: !own });
+        }
+        let filled = RayModel::with_aiming(lens, zoom, Aiming::Paraxial)?.filled_stop_radius();
+        let rim = lens.surfaces[surface].semi_diameter.unwrap_or(f64::INFINITY);
+        Ok(Self { surface, radius: filled.min(rim), follows_rim: rim <= filled })
+    }
+}
+
 /// The bindings of the variables at a wavelength; surfaces of `system` are promoted to shapes that
 /// have the numbers bound.
 fn bind_parameters(
     lens: &Lens,
     zoom: usize,
     um: f64,
+    stop: &StopLimit,
     system: &mut System<f64>,
 ) -> Vec<ParameterBinding> {
     let mut bindings = Vec::new();
@@ -276,7 +295,7 @@ fn bind_parameters(
                 Quantity::ZoomThickness(z) if z == zoom => SurfaceParameter::Thickness,
                 Quantity::Index => SurfaceParameter::Index,
                 Quantity::Grin(k) => SurfaceParameter::GrinTerm(k),
-                Quantity::SemiDiameter if !has_own_aperture(lens, zoom, surface) => {
+                Quantity::SemiDiameter if surface != stop.surface || stop.follows_rim => {
                     SurfaceParameter::SemiDiameter
                 }
                 Quantity::Thickness | Quantity::ZoomThickness(_) | Quantity::SemiDiameter => {
@@ -307,12 +326,6 @@ fn bind_parameters(
 fn has_own_gap(lens: &Lens, zoom: usize, surface: usize) -> bool {
     let position = lens.zoom.get(zoom);
     position.is_some_and(|p| p.thicknesses.iter().any(|gap| gap.surface == surface))
-}
-
-/// True if the surface is the stop and the zoom position defines its size by an aperture of its
-/// own.
-fn has_own_aperture(lens: &Lens, zoom: usize, surface: usize) -> bool {
-    lens.surfaces[surface].stop && lens.zoom.get(zoom).is_some_and(|z| z.aperture.is_some())
 }
 
 /// The derivative of the index of a gap by its nd.

@@ -46,6 +46,14 @@ impl FieldSource {
         }
     }
 
+    /// The distance along the axis from the first vertex at which rays start, in mm.
+    pub(super) fn distance(&self) -> f64 {
+        match self {
+            Self::Collimated { .. } => 0.0,
+            Self::Point { from, .. } | Self::Slopes { from } => from.z.abs(),
+        }
+    }
+
     /// The intersection of the ray with the plane through the first vertex, in mm.
     pub(super) fn at_vertex<R: Real>(&self, q: [R; 2]) -> [R; 2] {
         let Ray { point, direction } = self.ray(q);

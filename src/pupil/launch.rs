@@ -28,6 +28,8 @@ pub enum LaunchError {
     NoWavelength,
 }
 
+/// The distance inside the rim of the stop at which rays at the rim are aimed, in its radii.
+const INSIDE_RIM: f64 = 1e-9;
 /// A field beyond this angle, in degrees, is wide.
 const WIDE: f64 = 45.0;
 
@@ -71,6 +73,19 @@ impl RayModel {
     /// A field without rays: see [`LaunchError`].
     pub fn launch(&self, field: FieldPoint, wavelength: usize) -> Result<Launch<'_>, LaunchError> {
         Launch::new(self, field, wavelength, self.aiming)
+    }
+
+    /// The rays of a field at a wavelength, each aimed at its point of the real stop, whatever the
+    /// aiming of the model.
+    ///
+    /// # Errors
+    /// A field without rays: see [`LaunchError`].
+    pub fn launch_at_stop(
+        &self,
+        field: FieldPoint,
+        wavelength: usize,
+    ) -> Result<Launch<'_>, LaunchError> {
+        Launch::new(self, field, wavelength, Aiming::Stop)
     }
 }
 
@@ -146,6 +161,19 @@ impl<'a> Launch<'a> {
     /// The ray at these pupil coordinates; `None` if none was found that crosses the stop there.
     pub fn ray(&self, p: [f64; 2]) -> Option<Ray<f64>> {
         Some(self.source.ray(self.ray_coordinates(p)?))
+    }
+
+    /// The ray that crosses the real stop at a point of it, in stop radii, if its rim limits the
+    /// beam; else, and if no such ray is found, that at these pupil coordinates.
+    pub fn ray_through_stop(&self, p: [f64; 2]) -> Option<Ray<f64>> {
+        if self.aiming == Aiming::Chief && !self.model.ends_at_disc() {
+            // Rounding must not decide whether a ray at the rim passes.
+            let inside = p.map(|v| v * (1.0 - INSIDE_RIM));
+            if let Some(found) = self.aim(inside) {
+                return Some(self.source.ray(found.q));
+            }
+        }
+        self.ray(p)
     }
 
     /// The intersection of the ray at these pupil coordinates with the plane in which pupils are

@@ -13,7 +13,6 @@
 //! Pupil coordinates `(px, py)` have length 1 at the rim of the paraxial entrance pupil, or of the
 //! stop if every ray is aimed at it.
 
-mod aiming_choice;
 mod field_source;
 mod gauss_rules;
 mod gradient;
@@ -21,17 +20,17 @@ mod launch;
 mod patterns;
 mod ray_aiming;
 mod ray_model;
+mod real_beam;
 mod region;
 mod stop_limited;
 
-pub use aiming_choice::WIDE_AIMING_THRESHOLD;
 pub use gradient::{
     DerivativeError, DerivativeEstimator, Integrand, PupilDerivative, QuadraticIntegrand,
     WarpSampling, choose_estimator, differentiate,
 };
 pub use launch::{FixedLaunch, Launch, LaunchError};
 pub use patterns::{PupilPattern, pattern_points};
-pub use ray_model::{Aiming, Channel, Dual2, RayModel, RayModelError};
+pub use ray_model::{Aiming, Channel, Dual2, Neglected, RayModel, RayModelError};
 pub use region::{
     Accuracy, Annulus, Boundary, BoundaryArc, ConvergedValues, DarkPupil, EdgePoint, Nodes,
     OutlineSide, PolarFrame, PupilLimit, PupilMoments, PupilOutline, Region, RegionKind,

@@ -32,6 +32,8 @@ const HALVINGS: usize = 12;
 /// An offset that Newton steps do not reduce counts as rounding if it is below this part of the
 /// stop.
 const ROUNDING: f64 = 1e-10;
+/// The rounding error of a point on a ray, relative to the distance of the object point.
+const PATH_ROUNDING: f64 = 16.0 * f64::EPSILON;
 
 /// The ray of a source that crosses `surface` at `target`, in mm, searched from the ray coordinates
 /// `guess`.
@@ -51,7 +53,7 @@ pub(super) fn aim_at(
         }
         let step = solve_2x2(here.slopes, here.offset)?;
         let Some(there) = search.line_search(&here, step) else { break };
-        let done = there.size >= 0.5 * here.size && there.size <= ROUNDING * search.scale();
+        let done = there.size >= 0.5 * here.size && there.size <= search.tolerance();
         if there.size < here.size {
             here = there;
         }
@@ -59,7 +61,7 @@ pub(super) fn aim_at(
             break;
         }
     }
-    let arrived = here.size <= ROUNDING * search.scale();
+    let arrived = here.size <= search.tolerance();
     arrived.then_some(AimedRay { q: here.q, slopes: here.slopes, shift: [0.0; 2] })
 }
 
@@ -88,6 +90,12 @@ impl AimSolver<'_> {
         if stop > 0.0 { stop } else { beam.max(f64::MIN_POSITIVE) }
     }
 
+    /// The offset in mm below which differences are rounding: of the stop, and of the path from a
+    /// far object point.
+    fn tolerance(&self) -> f64 {
+        ROUNDING * self.scale() + PATH_ROUNDING * self.source.distance()
+    }
+
     fn evaluate(&self, q: [f64; 2]) -> Option<AimOffset> {
         let ray = self.source.ray([Dual2::variable(q[0], 0), Dual2::variable(q[1], 1)]);
         let landing = self.model.channels[self.wavelength].unclipped.trace_to(ray, self.surface);
@@ -105,7 +113,7 @@ impl AimSolver<'_> {
         for _ in 0..HALVINGS {
             let q = [here.q[0] - factor * step[0], here.q[1] - factor * step[1]];
             if let Some(there) = self.evaluate(q)
-                && (there.size < here.size || here.size <= ROUNDING * self.scale())
+                && (there.size < here.size || here.size <= self.tolerance())
             {
                 return Some(there);
             }

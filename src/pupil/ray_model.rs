@@ -15,7 +15,8 @@ pub enum Aiming {
     /// Exact on the axis, accurate for narrow fields.
     Paraxial,
     /// As `Paraxial`, but shifted and scaled so that the chief ray and its neighbours cross the
-    /// stop at the right points: needed for wide fields, at the cost of one search per field.
+    /// stop at the right points, at the cost of one search per field and wavelength. A beam that
+    /// the rim of the stop limits has the same rays either way.
     Chief,
     /// The ray goes through that point of the real stop; each ray and wavelength is searched for by
     /// itself.
@@ -34,6 +35,15 @@ pub enum RayModelError {
     /// Its aperture has no meaning for it.
     #[error(transparent)]
     Undefined(#[from] ParaxialError),
+}
+
+/// The changes of results by the effects that a model leaves out.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Neglected {
+    /// The root mean square shift of rays in the image plane, in mm.
+    pub shift: f64,
+    /// The relative change of the light of a field.
+    pub light: f64,
 }
 
 /// A lens at one wavelength.
@@ -67,6 +77,8 @@ pub struct RayModel {
     pub first_order: FirstOrder<f64>,
     /// The map from pupil coordinates to rays.
     pub aiming: Aiming,
+    /// What is left out: part of the errors of results.
+    pub neglected: Neglected,
 }
 
 impl RayModel {
@@ -115,6 +127,7 @@ impl RayModel {
             primary,
             first_order: first,
             aiming,
+            neglected: Neglected::default(),
         })
     }
 

@@ -8,7 +8,8 @@ use crate::trace::Tracer;
 /// The same lens limited by its stop: an aperture given as a pupil or a cone becomes the
 /// semi-diameter of the stop that its paraxial marginal ray touches, or that of the stop's rim if
 /// that is smaller; separately at every zoom position. A lens without a stop has it at the first
-/// surface.
+/// surface. The focal ratio stays what it was; the real beam changes as far as the real marginal
+/// ray of the lens as given does not cross the stop there ([`RayModel::filled_stop_radius`]).
 ///
 /// The pupil is then what the semi-diameters of the lens let through and nothing else, and has a
 /// derivative by each of them.
@@ -46,7 +47,9 @@ impl RayModel {
     /// # Errors
     /// Numbers that cannot be traced.
     pub fn limited_by_stop(&self) -> Result<Self, SystemError> {
-        let (stop, radius) = (self.stop(), self.stop_radius());
+        let stop = self.stop();
+        let rim = self.channels[self.primary].system.surfaces[stop].semi_diameter;
+        let radius = rim.min(self.filled_stop_radius());
         let channel = |channel: &Channel| {
             let mut system = channel.system.clone();
             let rim = &mut system.surfaces[stop].semi_diameter;

@@ -362,6 +362,45 @@ fn gradients_agree_with_differences_of_edited_files() {
 }
 
 #[test]
+fn a_gradient_says_whether_its_tolerance_was_reached() {
+    let boundary = ["gradient", LENS, "--field", "20"];
+    assert_eq!(done_json(&boundary, "")["reached"], true);
+    assert!(!done(&boundary, "").contains("not reached"));
+    let few = [&boundary[..], &["--method", "warp", "--rays", "4000"]].concat();
+    assert_eq!(done_json(&few, "")["reached"], false);
+    assert!(done(&few, "").contains("the tolerance was not reached by every derivative: --rays"));
+}
+
+#[test]
+fn a_gradient_and_a_spot_are_of_the_same_beam() {
+    // The aperture is a focal ratio, and the beam off the axis is bounded by stop and rims.
+    let lens = "lenses/cooke_triplet_100_f27.json";
+    let value = |term: &str| {
+        let report = done_json(&["gradient", lens, "--field", "14", "--term", term], "");
+        report["value"].as_f64().unwrap()
+    };
+    let rms = (value("spot") / -value("throughput")).sqrt();
+    let spot = done_json(&["analyze", lens, "spot", "--field", "14", "--error", "1e-7"], "");
+    let exact = spot["fields"][0]["rms"]["value"].as_f64().unwrap();
+    assert!((rms / exact - 1.0).abs() < 1e-6, "{rms} {exact}");
+}
+
+#[test]
+fn a_wavelength_without_light_is_told_and_the_tolerance_not_reached() {
+    // Beyond the corner of its field only blue light gets through this lens.
+    let lens = "lenses/wide_nikkor_28_f35.json";
+    let beyond = ["analyze", lens, "spot", "--field", "38.47"];
+    let report = done_json(&beyond, "");
+    assert_eq!(report["fields"][0]["reached"], false);
+    let told = done(&beyond, "");
+    assert!(told.contains("leave out the wavelengths without light"), "{told}");
+    assert!(told.contains("0.6562725 um: no light"), "{told}");
+    let corner = done_json(&["analyze", lens, "spot", "--field", "37.65"], "");
+    assert_eq!(corner["fields"][0]["reached"], true);
+    assert_eq!(done_json(&["gradient", lens, "--field", "37.65"], "")["reached"], true);
+}
+
+#[test]
 fn an_unknown_parameter_is_refused_by_name() {
     refused(2, &["gradient", LENS, "--term", "distortion"], "", &["distortion", "throughput"]);
     refused(2, &["gradient", LENS, "--method", "guess"], "", &["guess", "boundary"]);

@@ -22,6 +22,7 @@ mod paraxial;
 mod pareto;
 mod plume;
 mod pupil;
+mod real_beam;
 mod reference;
 mod report;
 mod search;

@@ -53,8 +53,7 @@ fn spots(
 ) -> Result<Vec<Result<Estimate, AnalysisError>>, CliError> {
     let mut moved = run.opened.clone();
     shift_image(&mut moved.lens, run.zoom, defocus);
-    let mut model = moved.ray_model(run.zoom)?;
-    model.aiming = run.model.aiming;
+    let model = moved.ray_model(run.zoom)?;
     let spot = |field: &crate::lens::FieldPoint| {
         let (result, ms) = time_ms(|| crate::analysis::spot(&model, *field, run.accuracy));
         result.map(|spot| Estimate { milliseconds: Some(ms), ..spot.rms })

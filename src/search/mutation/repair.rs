@@ -8,7 +8,7 @@
 use super::refusal::Refusal;
 use crate::lens::{Lens, System};
 use crate::paraxial::Beam;
-use crate::pupil::{Aiming, RayModel};
+use crate::pupil::{Aiming, RayModel, RayModelError};
 use crate::search::SearchRules;
 use crate::search::element::glass_gaps;
 use crate::trace::{Ray, Tracer};
@@ -199,12 +199,11 @@ fn widen_extents(
     arrived
 }
 
-/// The ray model at the primary wavelength, with the aiming that wide fields need.
+/// The ray model at the primary wavelength.
 fn primary_ray_model(lens: &Lens, zoom: usize) -> Result<RayModel, Refusal> {
     let um = lens.wavelengths[lens.primary()].um;
     let system: System<f64> = lens.resolve(zoom, um)?;
     let beam = Beam::for_lens(lens, zoom);
-    let mut model = RayModel::from_systems(vec![(um, 1.0, system)], 0, beam, Aiming::Paraxial)?;
-    model.choose_aiming();
-    Ok(model)
+    let model = RayModel::from_systems(vec![(um, 1.0, system)], 0, beam, Aiming::Chief)?;
+    Ok(model.limited_by_stop().map_err(RayModelError::from)?)
 }

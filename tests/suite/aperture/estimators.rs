@@ -14,6 +14,10 @@ use std::path::PathBuf;
 
 /// Of the largest of a kind of numbers; what central differences leave of fifteen digits.
 const TOLERANCE: f64 = 1e-7;
+/// A kind of numbers whose largest derivative is below this is rounding of differences, which leaves
+/// ten digits of the integral: the stop of the phone lens is its first surface, and moving a rim
+/// along a beam does not change the area that it cuts out.
+const FLOOR: f64 = 1e-3;
 const ORDER: usize = 8;
 
 /// Lens, zoom position and fields, in parts of the farthest one: spheres, conics and aspheres, and
@@ -67,7 +71,7 @@ fn aperture_gradients_agree_with_differences_of_recomputed_pupils() {
                 let differences = region.difference_derivative(&cost, ORDER).unwrap();
                 let found = lit.boundary_derivative(&cost).unwrap();
                 let what = format!("{term} of {name}, zoom {zoom}, field {part}");
-                compare(&mut worst, (TOLERANCE, 0.0), [&found, &differences.gradient], &what);
+                compare(&mut worst, (TOLERANCE, FLOOR), [&found, &differences.gradient], &what);
             }
         }
     }
