@@ -10,6 +10,9 @@
 //! the Gaussian pupil", JOSA A 5 (1988), for the clear disc; a clipped pupil is split where one
 //! limit takes over from another, so that the integrand is smooth on every part.
 //!
+//! A real beam ([`RayModel::from_lens`]) is what the rims of a lens let through, that of the stop
+//! among them, and its chief rays cross the centre of the stop; coordinates only name its rays.
+//!
 //! Pupil coordinates `(px, py)` have length 1 at the rim of the paraxial entrance pupil, or of the
 //! stop if every ray is aimed at it.
 
