@@ -15,13 +15,12 @@ pub(super) struct ActionButton<'a> {
 }
 
 impl<'a> ActionButton<'a> {
-    pub(super) fn new(
-        text: &'a str,
-        enabled: bool,
-        action: impl Into<UiAction>,
-        hint: &'a str,
-    ) -> Self {
-        Self { text, enabled, action: action.into(), hint }
+    pub(super) fn new(text: &'a str, enabled: bool, action: impl Into<UiAction>) -> Self {
+        Self { text, enabled, action: action.into(), hint: "" }
+    }
+
+    pub(super) fn hint(self, hint: &'a str) -> Self {
+        Self { hint, ..self }
     }
 }
 

@@ -137,17 +137,13 @@ fn run_controls(ui: &mut Ui, view: &SessionView, run: &GrinRun, actions: &mut Ac
     let active = view.grin.run.is_active() && !run.is_ready();
     let buttons = [
         if view.grin.run.status == RunStatus::Paused && !run.is_ready() {
-            ActionButton::new("Resume", active, GrinCommand::Resume, "Resume the optimization")
+            ActionButton::new("Resume", active, GrinCommand::Resume).hint("Resume the optimization")
         } else {
             let hint = "Pause the optimization after its current step";
-            ActionButton::new("Pause", active, GrinCommand::Pause, hint)
+            ActionButton::new("Pause", active, GrinCommand::Pause).hint(hint)
         },
-        ActionButton::new(
-            "Stop",
-            active,
-            GrinCommand::Stop,
-            "Stop the optimization and show its best field",
-        ),
+        ActionButton::new("Stop", active, GrinCommand::Stop)
+            .hint("Stop the optimization and show its best field"),
     ];
     action_buttons(ui, buttons, actions);
 }

@@ -75,35 +75,20 @@ impl OptimizerPanel {
             self.start_button(ui, view, active, actions);
             let buttons = [
                 if paused {
-                    ActionButton::new("Resume", active, Command::Resume, "Resume the optimization")
+                    ActionButton::new("Resume", active, Command::Resume)
+                        .hint("Resume the optimization")
                 } else {
                     let hint = "Pause the optimization after its current step";
-                    ActionButton::new("Pause", active, Command::Pause, hint)
+                    ActionButton::new("Pause", active, Command::Pause).hint(hint)
                 },
-                ActionButton::new(
-                    "Step",
-                    paused,
-                    Command::Step,
-                    "Take one step of the paused optimization",
-                ),
-                ActionButton::new(
-                    "Stop",
-                    active,
-                    Command::Stop,
-                    "Stop the optimization and retain its result for inspection",
-                ),
-                ActionButton::new(
-                    "Take",
-                    has_result,
-                    Command::AcceptResult,
-                    "Make the best lens the design, as one undo step",
-                ),
-                ActionButton::new(
-                    "Discard",
-                    has_result,
-                    Command::DiscardResult,
-                    "Stop the optimization and discard its result",
-                ),
+                ActionButton::new("Step", paused, Command::Step)
+                    .hint("Take one step of the paused optimization"),
+                ActionButton::new("Stop", active, Command::Stop)
+                    .hint("Stop the optimization and retain its result for inspection"),
+                ActionButton::new("Take", has_result, Command::AcceptResult)
+                    .hint("Make the best lens the design, as one undo step"),
+                ActionButton::new("Discard", has_result, Command::DiscardResult)
+                    .hint("Stop the optimization and discard its result"),
             ];
             action_buttons(ui, buttons, actions);
         });

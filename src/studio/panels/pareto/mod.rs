@@ -86,24 +86,21 @@ impl ParetoPanel {
                         (JSON)";
             let buttons = [
                 if view.pareto.run.status == RunStatus::Paused {
-                    ActionButton::new("Resume", active, Command::ResumePareto, "Resume the sweep")
+                    ActionButton::new("Resume", active, Command::ResumePareto)
+                        .hint("Resume the sweep")
                 } else {
                     let hint = "Pause the sweep after its current slice";
-                    ActionButton::new("Pause", active, Command::PausePareto, hint)
+                    ActionButton::new("Pause", active, Command::PausePareto).hint(hint)
                 },
-                ActionButton::new(
-                    "Stop",
-                    active,
-                    Command::StopPareto,
-                    "Stop the sweep and retain its front",
-                ),
-                ActionButton::new("Export…", run.is_some(), FileRequest::ExportFront, hint),
+                ActionButton::new("Stop", active, Command::StopPareto)
+                    .hint("Stop the sweep and retain its front"),
+                ActionButton::new("Export…", run.is_some(), FileRequest::ExportFront).hint(hint),
                 ActionButton::new(
                     "Clear",
                     run.is_some() || view.pareto.run.error.is_some(),
                     Command::ClearPareto,
-                    "Dismiss this front and all earlier ones",
-                ),
+                )
+                .hint("Dismiss this front and all earlier ones"),
             ];
             action_buttons(ui, buttons, actions);
             if run.is_some() && ui.button("Fit").on_hover_text("Show the whole front").clicked() {

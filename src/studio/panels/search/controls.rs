@@ -25,36 +25,24 @@ pub(super) fn buttons(ui: &mut Ui, view: &SessionView, setup: &SearchSetup, acti
         let buttons = [
             if search.run.status == RunStatus::Paused {
                 let command = StructureSearchCommand::Resume;
-                ActionButton::new("Resume", active, command, "Resume the search")
+                ActionButton::new("Resume", active, command).hint("Resume the search")
             } else {
                 let command = StructureSearchCommand::Pause;
                 let hint = "Pause the search after its current round";
-                ActionButton::new("Pause", active, command, hint)
+                ActionButton::new("Pause", active, command).hint(hint)
             },
-            ActionButton::new(
-                "Stop",
-                active,
-                StructureSearchCommand::Stop,
-                "Stop the search and retain its lenses",
-            ),
-            ActionButton::new(
-                "Open…",
-                !active,
-                FileRequest::OpenSearch,
-                "Resume a search from its file",
-            ),
-            ActionButton::new(
-                "Save to…",
-                true,
-                FileRequest::SaveSearch,
-                "Choose the file in which the search is saved every few seconds",
-            ),
+            ActionButton::new("Stop", active, StructureSearchCommand::Stop)
+                .hint("Stop the search and retain its lenses"),
+            ActionButton::new("Open…", !active, FileRequest::OpenSearch)
+                .hint("Resume a search from its file"),
+            ActionButton::new("Save to…", true, FileRequest::SaveSearch)
+                .hint("Choose the file in which the search is saved every few seconds"),
             ActionButton::new(
                 "Clear",
                 search.run.snapshot.is_some() || search.run.error.is_some(),
                 StructureSearchCommand::Clear,
-                "Dismiss this search; its file is retained",
-            ),
+            )
+            .hint("Dismiss this search; its file is retained"),
         ];
         action_buttons(ui, buttons, actions);
     });

@@ -138,19 +138,21 @@ pub(super) fn lens_buttons(
     let pin = if run.pinned == Some(number) {
         let command = StructureSearchCommand::Control(SteerCommand::Unpin);
         let hint = "Start new descents from any retained lens again";
-        ActionButton::new("Unpin", view.structure_search.run.is_active(), command, hint)
+        ActionButton::new("Unpin", view.structure_search.run.is_active(), command).hint(hint)
     } else {
         let command = StructureSearchCommand::Control(SteerCommand::Pin(number));
         let hint = "Start every new descent from this lens";
-        ActionButton::new("Pin", view.structure_search.run.is_active(), command, hint)
+        ActionButton::new("Pin", view.structure_search.run.is_active(), command).hint(hint)
     };
     let buttons = [
-        ActionButton::new("Take", true, StructureSearchCommand::Accept(number), &take),
+        ActionButton::new("Take", true, StructureSearchCommand::Accept(number)).hint(&take),
         pin,
         ActionButton::new(
             if exporting { "Finalizing…" } else { "Export…" },
             !exporting,
             FileRequest::ExportSearchLens(number),
+        )
+        .hint(
             "Replace model glasses by catalogue glasses, satisfy all manufacturing limits, and \
              write the lens; if a limit cannot be satisfied, it is named and nothing is written",
         ),
