@@ -107,7 +107,7 @@ impl ParetoReport<'_> {
             ("start".to_owned(), BLACK),
             (format!("front, {}", volume(self.front)), PALETTE[1]),
         ];
-        lines.extend(self.biased.map(|front| (format!("pupils kept, {}", volume(front)), GREY)));
+        lines.extend(self.biased.map(|front| (format!("fixed pupils, {}", volume(front)), GREY)));
         let mut legend = Legend::new([MARGINS[0] + 18.0, MARGINS[1] + 12.0]);
         for (text, color) in &lines {
             legend.marker(canvas, text, *color);

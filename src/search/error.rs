@@ -21,8 +21,8 @@ pub enum SearchError {
         /// Its loss.
         loss: f64,
     },
-    /// A generation that does not exist or is no longer remembered.
-    #[error("generation {number} is not remembered, of {total} so far")]
+    /// A generation that does not exist or is no longer stored.
+    #[error("generation {number} is not stored; there are {total} so far")]
     UnknownGeneration {
         /// The requested number.
         number: u64,

@@ -438,9 +438,9 @@ fn a_pupil_without_light_names_the_limits_and_a_remedy() {
     let mut lens = double_gauss();
     lens.fields.values[2].y = 40.0;
     let harness = pupils(lens);
-    harness.get_by_label("Pupil of field 3: dark");
+    harness.get_by_label("Pupil of field 3: no light");
     harness
-        .get_by_label_contains("Dark: surface 1 clips 90 of 127 rays, the chief ray among them.");
+        .get_by_label_contains("No light: surface 1 clips 90 of 127 rays, the chief ray among them.");
 }
 
 #[test]
@@ -463,7 +463,7 @@ fn an_irregular_pupil_is_reported_in_pieces() {
     lens.fields.values.truncate(1);
     lens.variables.clear();
     let harness = pupils(lens);
-    harness.get_by_label("ragged: 2 pieces");
+    harness.get_by_label("irregular: 2 pieces");
 }
 
 #[test]

@@ -142,7 +142,7 @@ fn the_user_steers_a_search_between_rounds() {
     });
     explore(&mut session, StructureSearchCommand::Control(SteerCommand::Pin(1_000_000)));
     wait(&mut session, "a refusal", |view, _| {
-        let refused = "generation 1000000 is not remembered";
+        let refused = "generation 1000000 is not stored";
         view.messages.last().is_some_and(|said| said.text.starts_with(refused))
     });
     assert_eq!(session.view().structure_search.run.status, RunStatus::Running);

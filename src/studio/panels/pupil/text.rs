@@ -65,7 +65,7 @@ impl PupilView<'_> {
         match &pupil.value.shape {
             PupilShape::Outlined(outline) => self.shares(ui, outline),
             PupilShape::Irregular { pieces, .. } => {
-                let text = format!("ragged: {}", pieces_text(*pieces));
+                let text = format!("irregular: {}", pieces_text(*pieces));
                 ui.label(RichText::new(text).small().color(ui.visuals().warn_fg_color))
                     .on_hover_text(
                         "The edge is not visible from any one point and cannot be followed: dots \
@@ -148,7 +148,7 @@ impl PupilView<'_> {
     pub(super) fn message(&self, ui: &mut Ui, picture: Rect, pupil: &FieldPupil) {
         let text = match &pupil.shape {
             PupilShape::Outlined(_) | PupilShape::Irregular { .. } => return,
-            PupilShape::Dark(loss) => self.darkness_text(loss),
+            PupilShape::Dark(loss) => self.missing_light_text(loss),
             PupilShape::Unbounded => {
                 "No beam: nothing limits it. Give the stop a semi-diameter.".to_owned()
             }
@@ -161,13 +161,13 @@ impl PupilView<'_> {
         });
     }
 
-    fn darkness_text(&self, loss: &RayLoss) -> String {
+    fn missing_light_text(&self, loss: &RayLoss) -> String {
         let Some((fate, surface)) = loss.main_fate.and_then(|fate| Some((fate, fate.surface()?)))
         else {
-            return "Dark: no ray can be started. Give the stop a size.".to_owned();
+            return "No light: no ray can be started. Give the stop a size.".to_owned();
         };
         if self.ray_model().stop_radius() == 0.0 {
-            return "Dark: the stop has no size. Give it a semi-diameter.".to_owned();
+            return "No light: the stop has no size. Give it a semi-diameter.".to_owned();
         }
         let surface = surface + 1;
         let (what, repair) = match fate {
@@ -182,7 +182,7 @@ impl PupilView<'_> {
         };
         let chief = if loss.includes_chief { ", the chief ray among them" } else { "" };
         format!(
-            "Dark: surface {surface} {what} {} of {} rays{chief}. {repair}",
+            "No light: surface {surface} {what} {} of {} rays{chief}. {repair}",
             loss.count, loss.rays
         )
     }
@@ -197,9 +197,9 @@ impl PupilView<'_> {
                 };
                 outline.limits_by_share().into_iter().map(part).collect::<Vec<_>>().join(", ")
             }
-            PupilShape::Irregular { pieces, .. } => format!("ragged, {}", pieces_text(*pieces)),
-            PupilShape::Dark(_) => "dark".to_owned(),
-            PupilShape::Unbounded => "endless".to_owned(),
+            PupilShape::Irregular { pieces, .. } => format!("irregular, {}", pieces_text(*pieces)),
+            PupilShape::Dark(_) => "no light".to_owned(),
+            PupilShape::Unbounded => "unbounded".to_owned(),
             PupilShape::NoRays(_) => "no rays".to_owned(),
         }
     }
