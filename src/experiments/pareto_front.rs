@@ -165,38 +165,56 @@ impl FrontStudy {
 
     /// Draws the plane of blur and light, and the lenses at the ends of the front with their spots.
     fn draw(&self, name: &str, authors: &[PublishedValues]) -> ExperimentResult<Canvas> {
-        let mut canvas = Canvas::new([1900, 1000]);
-        let um = |design: &ParetoPoint| [1e3 * design.spot, design.light];
-        let points = |front: &Front| front.points().iter().map(um).collect::<Vec<_>>();
-        let sets: [(&str, Vec<[f64; 2]>, Color); 4] = [
-            ("start", vec![um(&self.start)], BLACK),
-            ("biased gradient", points(&self.biased), PALETTE[1]),
-            ("unbiased gradient", points(&self.unbiased), PALETTE[0]),
+        let sets = [
+            ("start", design_points([&self.start]), BLACK),
+            ("biased gradient", design_points(self.biased.points()), PALETTE[1]),
+            ("unbiased gradient", design_points(self.unbiased.points()), PALETTE[0]),
             ("the authors' program", authors.iter().map(published_means).collect(), GREY),
         ];
-        let all = || sets.iter().flat_map(|set| &set.1);
-        let x = Axis::linear("blur (rms), um", all().map(|p| p[0]).chain([0.0]));
-        let y = Axis::linear("area of the pupil, mm^2", all().map(|p| p[1]).chain([0.0]));
-        let chart = Chart::new([120.0, 200.0], [840.0, 880.0], x, y);
-        chart.draw(&mut canvas, name);
-        let mut legend = Legend::new([130.0, 20.0]);
-        for (label, points, color) in sets.iter().filter(|s| !s.1.is_empty()) {
-            legend.marker(&mut canvas, label, *color);
-            canvas.markers(&chart.to_pixels(points), *color);
-        }
         let front = self.unbiased.points();
         let shown = [
             ("sharpest", front.first()),
             ("brightest", front.last()),
             ("biased, sharpest", self.biased.points().first()),
         ];
-        for (i, (name, design)) in shown.into_iter().enumerate() {
-            if let Some(design) = design {
-                draw_lens_and_spots(&mut canvas, name, &design.lens, 90.0 + 310.0 * i as f64)?;
-            }
-        }
-        Ok(canvas)
+        draw_fronts(1900, name, &sets, shown)
     }
+}
+
+/// Points in the plane of blur and light, with their name and colour.
+pub(super) type DesignSet<'a> = (&'a str, Vec<[f64; 2]>, Color);
+
+/// Blur in um and light in mm² of designs.
+pub(super) fn design_points<'a>(
+    designs: impl IntoIterator<Item = &'a ParetoPoint>,
+) -> Vec<[f64; 2]> {
+    designs.into_iter().map(|design| [1e3 * design.spot, design.light]).collect()
+}
+
+/// Draws the plane of blur and light, and some lenses with their spots beside it.
+pub(super) fn draw_fronts(
+    width: u32,
+    title: &str,
+    sets: &[DesignSet<'_>],
+    shown: [(&str, Option<&ParetoPoint>); 3],
+) -> ExperimentResult<Canvas> {
+    let mut canvas = Canvas::new([width, 1000]);
+    let all = || sets.iter().flat_map(|(_, points, _)| points);
+    let x = Axis::linear("blur (rms), um", all().map(|p| p[0]).chain([0.0]));
+    let y = Axis::linear("area of the pupil, mm^2", all().map(|p| p[1]).chain([0.0]));
+    let chart = Chart::new([120.0, 200.0], [840.0, 880.0], x, y);
+    chart.draw(&mut canvas, title);
+    let mut legend = Legend::new([130.0, 20.0]);
+    for (label, points, color) in sets.iter().filter(|(_, points, _)| !points.is_empty()) {
+        legend.marker(&mut canvas, label, *color);
+        canvas.markers(&chart.to_pixels(points), *color);
+    }
+    for (i, (name, design)) in shown.into_iter().enumerate() {
+        if let Some(design) = design {
+            draw_lens_and_spots(&mut canvas, name, &design.lens, 90.0 + 310.0 * i as f64)?;
+        }
+    }
+    Ok(canvas)
 }
 
 /// The front of some designs.
@@ -227,7 +245,7 @@ fn published_means((_, rms, area): &PublishedValues) -> [f64; 2] {
 const SPOT: f64 = 0.1;
 
 /// Draws a lens with its rays, and the spots of its fields beside it.
-pub(super) fn draw_lens_and_spots(
+fn draw_lens_and_spots(
     canvas: &mut Canvas,
     name: &str,
     lens: &Lens,

@@ -8,7 +8,7 @@
 use super::recorded_search::{RecordedSearch, run_to_end};
 use super::sampler_comparison::SamplerKind;
 use super::{at_heights, mean_and_variance, rules};
-use crate::experiments::pareto_front::draw_lens_and_spots;
+use crate::experiments::pareto_front::{design_points, draw_fronts};
 use crate::experiments::sharpness_vs_light::{self, ProgressSpan};
 use crate::experiments::{
     Claim, Effort, Experiment, ExperimentOutcome, ExperimentResult, NamedPlot, ProgressFn,
@@ -17,7 +17,7 @@ use crate::experiments::{
 use crate::lens::Lens;
 use crate::merit::{PupilEdge, Term, WeightedTerm};
 use crate::optimize::pareto::{Front, ParetoPoint, ParetoSettings, ParetoSweep, weighted_sum_goal};
-use crate::plot::{Axis, BLACK, Canvas, Chart, Color, Legend, PALETTE};
+use crate::plot::{BLACK, Canvas, PALETTE};
 use crate::search::SearchRules;
 use crate::search::lens_landscape::SearchPlan;
 
@@ -188,37 +188,20 @@ impl MutationGain {
 
     /// Draws the plane of blur and light, and the lenses at the ends of the front with their spots.
     fn draw(&self, sweep: &ParetoSweep) -> ExperimentResult<Canvas> {
-        let mut canvas = Canvas::new([2020, 1000]);
-        let um = |design: &ParetoPoint| [1e3 * design.spot, design.light];
-        let points = |front: &Front| front.points().iter().map(um).collect::<Vec<_>>();
-        let sets: [(&str, Vec<[f64; 2]>, Color); 4] = [
-            ("start", vec![um(&sweep.start)], BLACK),
-            ("with mutations", self.mutated.iter().flat_map(points).collect(), PALETTE[0]),
-            ("descent without mutations", points(&self.descended), PALETTE[2]),
-            ("without mutations", points(sweep.front()), PALETTE[1]),
+        let mutated = self.mutated.iter().flat_map(Front::points);
+        let sets = [
+            ("start", design_points([&sweep.start]), BLACK),
+            ("with mutations", design_points(mutated), PALETTE[0]),
+            ("descent without mutations", design_points(self.descended.points()), PALETTE[2]),
+            ("without mutations", design_points(sweep.front().points()), PALETTE[1]),
         ];
-        let all = || sets.iter().flat_map(|set| &set.1);
-        let x = Axis::linear("blur (rms), um", all().map(|p| p[0]).chain([0.0]));
-        let y = Axis::linear("area of the pupil, mm^2", all().map(|p| p[1]).chain([0.0]));
-        let chart = Chart::new([120.0, 200.0], [840.0, 880.0], x, y);
-        chart.draw(&mut canvas, FILE);
-        let mut legend = Legend::new([130.0, 20.0]);
-        for (label, points, color) in &sets {
-            legend.marker(&mut canvas, label, *color);
-            canvas.markers(&chart.to_pixels(points), *color);
-        }
         let found = &self.found;
         let shown = [
             ("start", Some(&sweep.start)),
             ("mutated, sharpest", found.iter().min_by(|a, b| a.spot.total_cmp(&b.spot))),
             ("mutated, brightest", found.iter().max_by(|a, b| a.light.total_cmp(&b.light))),
         ];
-        for (i, (name, design)) in shown.into_iter().enumerate() {
-            if let Some(design) = design {
-                draw_lens_and_spots(&mut canvas, name, &design.lens, 90.0 + 310.0 * i as f64)?;
-            }
-        }
-        Ok(canvas)
+        draw_fronts(2020, FILE, &sets, shown)
     }
 }
 
