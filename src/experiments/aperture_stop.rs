@@ -15,7 +15,7 @@ use super::{
     NamedPlot, ProgressFn, report_progress,
 };
 use crate::lens::{
-    Aperture, FieldKind, FieldPoint, Fields, Lens, Medium, Object, Row, Wavelength,
+    Aperture, FieldKind, FieldPoint, Fields, Lens, Medium, Object, Row, blank,
     paraxial_image_distance,
 };
 use crate::plot::{Axis, BLACK, Canvas, Chart, Color, Legend, PALETTE, Stroke};
@@ -94,18 +94,10 @@ fn lens(radius: f64) -> ExperimentResult<Lens> {
     };
     let mut lens = Lens {
         name: "Two singlets and a stop".to_owned(),
-        source: String::new(),
-        notes: String::new(),
-        object: Object::Infinity,
-        object_medium: Medium::Air,
         aperture: Aperture::StopSemiDiameter(radius),
         fields: Fields { kind: FieldKind::Angle, values: vec![AXIS] },
-        wavelengths: vec![Wavelength { um: 0.5875618, weight: 1.0, primary: true }],
         surfaces: SURFACES.iter().enumerate().map(row).collect(),
-        zoom: Vec::new(),
-        variables: Vec::new(),
-        pickups: Vec::new(),
-        image_solve: None,
+        ..blank()
     };
     let system = lens.resolve(0, lens.wavelengths[0].um)?;
     let gap = paraxial_image_distance(&system, Object::Infinity) + BEHIND_FOCUS;

@@ -322,7 +322,7 @@ pub fn blank() -> Lens {
             kind: FieldKind::Angle,
             values: vec![FieldPoint { x: 0.0, y: 0.0, weight: 1.0 }],
         },
-        wavelengths: vec![Wavelength { um: 0.5875618, weight: 1.0, primary: true }],
+        wavelengths: vec![Wavelength { um: glass::line::D, weight: 1.0, primary: true }],
         surfaces: vec![
             row(5.0, Medium::Glass("SCHOTT N-BK7".to_owned()), true),
             row(50.0, Medium::Air, false),

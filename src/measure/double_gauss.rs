@@ -1,8 +1,6 @@
 //! The lens on which speed is measured: a double Gauss.
 
-use crate::lens::{
-    Aperture, FieldKind, FieldPoint, Fields, Lens, Medium, Object, Row, Wavelength, glass::line,
-};
+use crate::lens::{Aperture, FieldKind, FieldPoint, Fields, Lens, Medium, Row, blank};
 use crate::math::Vec3;
 use crate::trace::{Ray, Rays};
 
@@ -41,20 +39,13 @@ pub fn double_gauss() -> Lens {
         name: "Double Gauss 100 mm f/3".to_owned(),
         source: "the double Gauss of many textbooks and of the Zemax samples, indices at 588 nm"
             .into(),
-        notes: String::new(),
-        object: Object::Infinity,
-        object_medium: Medium::Air,
         aperture: Aperture::EntrancePupilDiameter(ENTRANCE_PUPIL_DIAMETER),
         fields: Fields {
             kind: FieldKind::Angle,
             values: [0.0, 5.0, 10.0, 14.0].map(field).to_vec(),
         },
-        wavelengths: vec![Wavelength { um: line::D, weight: 1.0, primary: true }],
         surfaces: SURFACES.iter().enumerate().map(row).collect(),
-        zoom: Vec::new(),
-        variables: Vec::new(),
-        pickups: Vec::new(),
-        image_solve: None,
+        ..blank()
     }
 }
 
@@ -78,6 +69,7 @@ pub(super) fn bundle(count: usize) -> Rays<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::lens::glass::line;
     use crate::paraxial::{Beam, first_order};
 
     #[test]
