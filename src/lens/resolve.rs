@@ -88,7 +88,7 @@ impl Lens {
             check_lowest_index(i, &surface)?;
             surfaces.push(surface);
         }
-        surfaces.push(image_plane(current));
+        surfaces.push(Surface::plane(0.0, current));
         Ok(System { index_before, surfaces, stop: self.stop() })
     }
 }
@@ -117,20 +117,6 @@ fn check_lowest_index(i: usize, surface: &Surface<f64>) -> Result<(), LensError>
     }
     let why = format!("falls to the index {lowest:.4} inside; expected 1 or more everywhere");
     Err(SystemError::Grin { surface: i.into(), why }.into())
-}
-
-/// The image plane: an unlimited plane without refraction.
-fn image_plane(index: f64) -> Surface<f64> {
-    Surface {
-        shape: Shape::Plane,
-        thickness: 0.0,
-        index,
-        semi_diameter: f64::INFINITY,
-        obstruction: 0.0,
-        mirror: false,
-        hyperhemisphere: false,
-        grin: None,
-    }
 }
 
 fn index(medium: &Medium, place: MediumPlace, um: f64, before: f64) -> Result<f64, LensError> {

@@ -110,17 +110,7 @@ mod tests {
 
     fn surface(curvature: f64, thickness: f64, index: f64, semi_diameter: f64) -> Surface<f64> {
         let shape = Shape::Sphere { curvature };
-        let obstruction = 0.0;
-        Surface {
-            shape,
-            thickness,
-            index,
-            semi_diameter,
-            obstruction,
-            mirror: false,
-            hyperhemisphere: false,
-            grin: None,
-        }
+        Surface { shape, semi_diameter, ..Surface::plane(thickness, index) }
     }
 
     fn singlet() -> System<f64> {

@@ -302,6 +302,20 @@ impl<R: Real> System<R> {
 }
 
 impl<R: Real> Surface<R> {
+    /// A plane without apertures, with a homogeneous medium behind it.
+    pub fn plane(thickness: R, index: R) -> Self {
+        Self {
+            shape: Shape::Plane,
+            thickness,
+            index,
+            semi_diameter: R::from_f64(f64::INFINITY),
+            obstruction: R::ZERO,
+            mirror: false,
+            hyperhemisphere: false,
+            grin: None,
+        }
+    }
+
     fn check(&self, i: usize) -> Result<(), SystemError> {
         let (curvature, conic, terms) = self.shape.numbers();
         check_finite("curvature", i, curvature.value())?;

@@ -365,13 +365,7 @@ mod tests {
         let terms = [R::ZERO; crate::lens::ASPHERE_TERMS];
         Surface {
             shape: Shape::simplest(R::from_f64(curvature), R::ZERO, terms),
-            thickness: R::from_f64(thickness),
-            index: R::from_f64(index),
-            semi_diameter: R::from_f64(f64::INFINITY),
-            obstruction: R::ZERO,
-            mirror: false,
-            hyperhemisphere: false,
-            grin: None,
+            ..Surface::plane(R::from_f64(thickness), R::from_f64(index))
         }
     }
 

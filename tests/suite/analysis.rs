@@ -240,8 +240,8 @@ fn field_curvature_near_the_axis_follows_the_seidel_sums() {
 fn an_error_estimate_covers_the_error() {
     let (mut worst, mut count) = (0.0f64, 0);
     let lenses = lenses();
-    let benches = lenses.iter().flat_map(|lens| [lens.open_model(), lens.clipped_model()]);
-    for model in benches {
+    let models = lenses.iter().flat_map(|lens| [lens.open_model(), lens.clipped_model()]);
+    for model in models {
         for field in &model.fields {
             let Ok(exact) = spot(&model, *field, ACCURACY) else { continue };
             for tolerance in [1e-1, 1e-2, 1e-3, 1e-5] {

@@ -70,13 +70,10 @@ impl<R: Real> Lift<'_, R> {
                 |key: &str, default| self.number(&format!("s{i}.{key}"), get(s, key, default));
             surfaces.push(Surface {
                 shape: self.shape(s, i)?,
-                thickness: own("t", 0.0),
-                index: own("n", 1.0),
                 semi_diameter: R::from_f64(get(s, "sd", f64::INFINITY)),
-                obstruction: R::ZERO,
                 mirror: s["mirror"] == true,
                 hyperhemisphere: s["hyper"] == true,
-                grin: None,
+                ..Surface::plane(own("t", 0.0), own("n", 1.0))
             });
         }
         let index_before = self.number("n0", get(input, "n0", 1.0));

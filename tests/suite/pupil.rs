@@ -159,13 +159,8 @@ fn a_clipped_pupil_takes_72_rays_for_six_digits() {
 fn system(rows: &[(f64, f64, f64, f64)], stop: usize) -> System<f64> {
     let surface = |(curvature, thickness, index, semi_diameter): (f64, f64, f64, f64)| Surface {
         shape: Shape::simplest(curvature, 0.0, [0.0; ASPHERE_TERMS]),
-        thickness,
-        index,
         semi_diameter,
-        obstruction: 0.0,
-        mirror: false,
-        hyperhemisphere: false,
-        grin: None,
+        ..Surface::plane(thickness, index)
     };
     let image = surface((0.0, 0.0, 1.0, f64::INFINITY));
     let surfaces = rows.iter().copied().map(surface).chain([image]).collect();

@@ -159,13 +159,9 @@ fn surface(row: &Value, wavelength: usize) -> Surface<f64> {
     }
     Surface {
         shape: Shape::simplest(curvature, number(&row["k"]), terms),
-        thickness: row["t"].as_f64().unwrap_or(0.0),
-        index: number(&row["n"][wavelength]),
         semi_diameter: row["sd"].as_f64().unwrap_or(f64::INFINITY),
-        obstruction: 0.0,
         mirror: row["mirror"].as_bool().unwrap_or(false),
-        hyperhemisphere: false,
-        grin: None,
+        ..Surface::plane(row["t"].as_f64().unwrap_or(0.0), number(&row["n"][wavelength]))
     }
 }
 

@@ -701,7 +701,7 @@ fn every_library_lens_is_analysed_in_time() {
         let settings = AnalysisSettings::default();
         let numbers = analyze(&lens, &settings).unwrap();
         println!(
-            "{:32} plan {:.2}, bench {:.2}, layout {:.2}, dots {:.2}, spots {:.2}, \
+            "{:32} plan {:.2}, ray model {:.2}, layout {:.2}, dots {:.2}, spots {:.2}, \
              fans {:.2}, illumination {:.2}, distortion {:.2}, curvature {:.2}",
             bundled.name,
             numbers.plan.ms,

@@ -176,16 +176,8 @@ fn obstructed(radius: f64) -> System<f64> {
 
 #[test]
 fn an_obstruction_clips_inside_and_its_edge_passes() {
-    let plane = |obstruction: f64| Surface {
-        shape: Shape::Plane,
-        thickness: 1.0,
-        index: 1.5,
-        semi_diameter: 4.0,
-        obstruction,
-        mirror: false,
-        hyperhemisphere: false,
-        grin: None,
-    };
+    let plane =
+        |obstruction: f64| Surface { semi_diameter: 4.0, obstruction, ..Surface::plane(1.0, 1.5) };
     let surfaces = vec![plane(0.0), plane(2.0), plane(0.0)];
     let tracer = Tracer::new(&System { index_before: 1.0, surfaces, stop: None }).unwrap();
     let below = f64::from_bits(2.0_f64.to_bits() - 1);
@@ -355,18 +347,8 @@ fn a_reversed_ray_returns_to_its_start() {
 /// vertex.
 fn reversed(system: &System<f64>) -> System<f64> {
     let count = system.surfaces.len();
-    let plane = |thickness: f64, index: f64| Surface {
-        shape: Shape::Plane,
-        thickness,
-        index,
-        semi_diameter: f64::INFINITY,
-        obstruction: 0.0,
-        mirror: false,
-        hyperhemisphere: false,
-        grin: None,
-    };
     let image_index = system.surfaces[count - 1].index;
-    let mut surfaces = vec![plane(system.surfaces[count - 2].thickness, image_index)];
+    let mut surfaces = vec![Surface::plane(system.surfaces[count - 2].thickness, image_index)];
     for i in (0..count - 1).rev() {
         let (c, k, terms) = system.surfaces[i].shape.numbers();
         let thickness = i.checked_sub(1).map_or(0.0, |before| system.surfaces[before].thickness);
@@ -377,7 +359,7 @@ fn reversed(system: &System<f64>) -> System<f64> {
             ..system.surfaces[i]
         });
     }
-    surfaces.push(plane(0.0, system.index_before));
+    surfaces.push(Surface::plane(0.0, system.index_before));
     System { index_before: image_index, surfaces, stop: None }
 }
 

@@ -27,13 +27,8 @@ type Row = (f64, f64, f64, f64);
 fn system(rows: &[Row], stop: usize) -> System<f64> {
     let surface = |(curvature, thickness, index, semi_diameter): Row| Surface {
         shape: Shape::simplest(curvature, 0.0, [0.0; 7]),
-        thickness,
-        index,
         semi_diameter,
-        obstruction: 0.0,
-        mirror: false,
-        hyperhemisphere: false,
-        grin: None,
+        ..Surface::plane(thickness, index)
     };
     let image = (0.0, 0.0, 1.0, f64::INFINITY);
     let surfaces = rows.iter().copied().chain([image]).map(surface).collect();

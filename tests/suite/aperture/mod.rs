@@ -50,19 +50,19 @@ impl Case {
             thickness: t[i],
             index: n[i],
             semi_diameter: sd[i],
-            ..image()
+            ..Surface::plane(0.0, 1.0)
         };
-        let surfaces = (0..c.len()).map(row).chain([image()]).collect();
+        let surfaces = (0..c.len()).map(row).chain([Surface::plane(0.0, 1.0)]).collect();
         let stop = lens["stop_surface"].as_u64().map(|_| count(&lens["stop_surface"]) - 1);
         System { index_before: number(&lens["index_before_first"]), surfaces, stop }
     }
 
     pub(crate) fn model(&self) -> RayModel {
-        self.bench_of(self.system())
+        self.model_of(self.system())
     }
 
     /// A changed system with the field of the case.
-    pub(crate) fn bench_of(&self, system: System<f64>) -> RayModel {
+    pub(crate) fn model_of(&self, system: System<f64>) -> RayModel {
         let edge = self.number("field_deg");
         let rim = system.surfaces[system.stop.unwrap_or(0)].semi_diameter;
         let beam = Beam {
@@ -108,17 +108,4 @@ pub(crate) fn group(gradient: &SystemGradient<f64>, name: &str) -> Vec<f64> {
 pub(crate) fn exact(values: &Value, name: &str) -> Vec<Option<f64>> {
     let list = values[name].as_array().unwrap();
     list.iter().map(|value| (!value.is_null()).then(|| number(value))).collect()
-}
-
-pub(crate) fn image() -> Surface<f64> {
-    Surface {
-        shape: Shape::Plane,
-        thickness: 0.0,
-        index: 1.0,
-        semi_diameter: f64::INFINITY,
-        obstruction: 0.0,
-        mirror: false,
-        hyperhemisphere: false,
-        grin: None,
-    }
 }

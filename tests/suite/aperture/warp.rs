@@ -1,6 +1,6 @@
 //! The warp field against the exact derivatives, and where it has to stay finite.
 
-use super::{Case, GROUPS, cases, exact, group, image};
+use super::{Case, GROUPS, cases, exact, group};
 use aplanat::lens::{Aperture, FieldKind, FieldPoint, Object, Shape, Surface, System};
 use aplanat::paraxial::Beam;
 use aplanat::pupil::{
@@ -207,7 +207,7 @@ fn aperture_gradients_scale_with_the_lens() {
             surface.thickness *= scale;
             surface.semi_diameter *= scale;
         }
-        let model = case.bench_of(system);
+        let model = case.model_of(system);
         let launch = case.launch(&model);
         let cost = QuadraticIntegrand {
             center: [0.0, case.number("centroid_y") * scale],
@@ -239,15 +239,15 @@ fn aperture_gradients_move_the_shadow_of_an_obstruction() {
     let changed = |change: fn(&mut Surface<f64>)| {
         let mut system = case.system();
         change(&mut system.surfaces[0]);
-        case.bench_of(system)
+        case.model_of(system)
     };
     let obstructed = changed(|surface| surface.obstruction = 3.0);
-    let benches = [case.model(), changed(|surface| surface.semi_diameter = 3.0)];
+    let models = [case.model(), changed(|surface| surface.semi_diameter = 3.0)];
     for cost in [case.spot().0, case.throughput().0] {
         let region = Region::new(case.launch(&obstructed));
         let found = region.warp_derivative(&cost, WarpSampling { count: 8192, seed: 6 }).unwrap();
         let [mut exact, shadow] = [0, 1].map(|i| {
-            let region = Region::new(case.launch(&benches[i]));
+            let region = Region::new(case.launch(&models[i]));
             region.trace_pupil(10).boundary_derivative(&cost).unwrap()
         });
         let rim = exact.surfaces[0].semi_diameter;
@@ -268,9 +268,9 @@ fn aperture_gradients_move_the_shadow_of_an_obstruction() {
 fn system(rows: &[(f64, f64, f64, f64)]) -> System<f64> {
     let surface = |&(curvature, thickness, index, semi_diameter): &(f64, f64, f64, f64)| {
         let shape = Shape::simplest(curvature, 0.0, [0.0; 7]);
-        Surface { shape, thickness, index, semi_diameter, ..image() }
+        Surface { shape, thickness, index, semi_diameter, ..Surface::plane(0.0, 1.0) }
     };
-    let surfaces = rows.iter().map(surface).chain([image()]).collect();
+    let surfaces = rows.iter().map(surface).chain([Surface::plane(0.0, 1.0)]).collect();
     System { index_before: 1.0, surfaces, stop: Some(0) }
 }
 
