@@ -25,11 +25,6 @@ impl<'a, R: Real, F: IndexField<R> + ?Sized> GrinTracer<'a, R, F> {
         Ok(Self { field, setup, ops })
     }
 
-    /// The settings.
-    pub fn setup(&self) -> &GrinSetup<R> {
-        &self.setup
-    }
-
     /// One step of length `h`.
     pub(super) fn advance(&self, state: RayState<R>, h: R) -> RayState<R> {
         let RayState { mut x, mut v, mut path } = state;

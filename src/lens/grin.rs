@@ -72,11 +72,6 @@ impl GradientIndex {
         }
     }
 
-    /// True if the index is the same everywhere, so that the medium is homogeneous.
-    pub fn is_constant(&self) -> bool {
-        self.terms().iter().all(|term| *term == 0.0)
-    }
-
     /// True if the index varies along the axis.
     pub fn is_axial(&self) -> bool {
         self.axial.iter().any(|term| *term != 0.0)

@@ -23,14 +23,6 @@ impl SurfaceNumber {
     pub const fn index(self) -> usize {
         self.index
     }
-
-    /// The index of the surface with this number as it is displayed; `None` for the object.
-    pub const fn from_displayed(number: usize) -> Option<Self> {
-        match number.checked_sub(1) {
-            Some(index) => Some(Self { index }),
-            None => None,
-        }
-    }
 }
 
 impl From<usize> for SurfaceNumber {
@@ -78,8 +70,6 @@ mod tests {
     fn the_first_surface_is_number_one() {
         let first = SurfaceNumber::new(0);
         assert_eq!((first.to_string(), format!("{first:>3}")), ("1".into(), "  1".into()));
-        assert_eq!(SurfaceNumber::from_displayed(1), Some(first));
-        assert_eq!(SurfaceNumber::from_displayed(0), None);
         assert_eq!(serde_json::to_string(&first).unwrap(), "0");
     }
 }

@@ -68,16 +68,6 @@ pub fn paraxial_ray<R: Real>(system: &System<R>, height: R, slope: R) -> Paraxia
 }
 
 impl<R: Real> ParaxialRay<R> {
-    /// The same ray with every height and slope multiplied by `factor`.
-    #[must_use]
-    pub fn scaled(&self, factor: R) -> Self {
-        Self {
-            start_slope: self.start_slope * factor,
-            heights: self.heights.iter().map(|y| *y * factor).collect(),
-            slopes: self.slopes.iter().map(|u| *u * factor).collect(),
-        }
-    }
-
     /// The slope in front of a surface.
     pub fn slope_before(&self, surface: usize) -> R {
         if surface == 0 { self.start_slope } else { self.slopes[surface - 1] }

@@ -39,11 +39,6 @@ impl Element {
     pub fn is_singlet(&self) -> bool {
         self.kind == ElementKind::Glass(1)
     }
-
-    /// True if a surface belongs to it.
-    pub fn contains(&self, surface: usize) -> bool {
-        (self.first..=self.last).contains(&surface)
-    }
 }
 
 /// For each gap, beginning with the object space, true if it is filled with glass; a mirror keeps

@@ -43,8 +43,7 @@ pub use score::ScoredLens;
 pub use slot::Slot;
 pub use state::{Session, SessionEvent};
 pub use structure_search::{
-    ChainPosition, CheckpointStatus, DescentMark, EndReason, FoundLens, HistorySample,
-    SearchHistory, StructureSearchCommand, StructureSearchRequest, StructureSearchSnapshot,
-    StructureSearchView,
+    CheckpointStatus, DescentMark, EndReason, FoundLens, HistorySample, SearchHistory,
+    StructureSearchCommand, StructureSearchRequest, StructureSearchSnapshot, StructureSearchView,
 };
 pub use view::{Message, SessionView, Severity};

@@ -100,11 +100,6 @@ impl EditBuffers {
         self.buffers.retain(|draft| draft.input != field);
     }
 
-    /// Gives everything up, as for another lens.
-    pub fn clear(&mut self) {
-        self.buffers.clear();
-    }
-
     /// The reason why the last rejected text cannot be accepted.
     pub fn last_error(&self) -> Option<&str> {
         self.buffers.iter().rev().find_map(|draft| draft.error.as_deref())

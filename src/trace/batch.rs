@@ -90,16 +90,6 @@ impl<R: Real> Rays<R> {
     }
 }
 
-impl Rays<f64> {
-    /// Checks every ray; see [`Ray::check`].
-    ///
-    /// # Errors
-    /// The first ray that cannot be traced.
-    pub fn check(&self) -> Result<(), SystemError> {
-        (0..self.len()).try_for_each(|i| self.get(i).check(i))
-    }
-}
-
 impl<R: Real> FromIterator<Ray<R>> for Rays<R> {
     fn from_iter<I: IntoIterator<Item = Ray<R>>>(rays: I) -> Self {
         let rays = rays.into_iter();

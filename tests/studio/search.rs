@@ -12,8 +12,8 @@ use aplanat::search::{
     Refusal, SearchMethod, SearchStatistics, SteerCommand, StructureChange, Temperature,
 };
 use aplanat::session::{
-    ChainPosition, CheckpointStatus, Command, DescentMark, FoundLens, HistorySample, RunId,
-    RunKind, RunStatus, RunView, ScoredLens, SearchHistory, SessionView, StructureSearchCommand,
+    CheckpointStatus, Command, DescentMark, FoundLens, HistorySample, RunId, RunKind, RunStatus,
+    RunView, ScoredLens, SearchHistory, SessionView, StructureSearchCommand,
     StructureSearchRequest, StructureSearchSnapshot,
 };
 use aplanat::studio::file_dialog::FileRequest;
@@ -139,14 +139,13 @@ fn searching(standing: RunStatus) -> SessionView {
         ..MutationStatistics::default()
     };
     statistics.kinds.insert(MutationKind::AddSinglet, tally);
-    let place = ChainPosition { number: 1, merit: 0.03, elements: 6, lens: other(1) };
     let run = StructureSearchSnapshot {
         request: Arc::default(),
         start: found(0, 0.1),
         best: found(1, 0.02),
         reservoir: vec![found(1, 0.02), found(0, 0.1)],
         pinned: None,
-        chains: vec![Some(place), None],
+        chains: vec![Some(other(1)), None],
         statistics,
         temperature: Temperature::new(0.15).unwrap(),
         weights: MutationWeights::default(),

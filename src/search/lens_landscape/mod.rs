@@ -169,11 +169,6 @@ impl LensLandscape {
         &self.start
     }
 
-    /// The goal.
-    pub fn goal(&self) -> &Goal {
-        &self.goal
-    }
-
     /// The rules.
     pub fn rules(&self) -> &SearchRules {
         &self.rules

@@ -9,9 +9,7 @@ mod snapshot;
 pub(super) use engine::StructureSearchReport;
 pub use history::{DescentMark, HistorySample, SearchHistory};
 pub use request::StructureSearchRequest;
-pub use snapshot::{
-    ChainPosition, CheckpointStatus, EndReason, FoundLens, StructureSearchSnapshot,
-};
+pub use snapshot::{CheckpointStatus, EndReason, FoundLens, StructureSearchSnapshot};
 
 use super::run::{BackgroundRun, RunEvent, RunId, RunView};
 use crate::lens::Lens;
@@ -146,8 +144,8 @@ impl StructureSearchState {
     pub(super) fn previewed(&self) -> Option<(RunId, Arc<Lens>)> {
         let view = self.run.view();
         let search = view.snapshot.as_ref().filter(|_| view.is_active())?;
-        let position = search.chains.get(self.previewed_chain?)?.as_ref()?;
-        Some((view.id?, Arc::clone(&position.lens)))
+        let lens = search.chains.get(self.previewed_chain?)?.as_ref()?;
+        Some((view.id?, Arc::clone(lens)))
     }
 
     /// The search with a chain that is shown in place of the design; between two descents the chain

@@ -27,8 +27,8 @@ pub struct StructureSearchSnapshot {
     pub reservoir: Vec<Arc<FoundLens>>,
     /// The generation from which all new descents start; `None` if they start from any retained lens.
     pub pinned: Option<u64>,
-    /// The position of each chain; `None` while a chain looks for its next start.
-    pub chains: Vec<Option<ChainPosition>>,
+    /// The lens of each chain; `None` while a chain looks for its next start.
+    pub chains: Vec<Option<Arc<Lens>>>,
     /// The counts of moves, gradients and mutations so far.
     pub statistics: SearchStatistics,
     /// The present temperature.
@@ -88,19 +88,6 @@ pub struct FoundLens {
     pub lens: Arc<Lens>,
     /// Its sharpness and light; `None` for a lens of a descent that still runs.
     pub score: Option<ScoredLens>,
-}
-
-/// The position of a chain.
-#[derive(Debug, Clone)]
-pub struct ChainPosition {
-    /// The generation whose descent the chain carries out.
-    pub number: u64,
-    /// The merit of the lens.
-    pub merit: f64,
-    /// The number of elements of the lens.
-    pub elements: usize,
-    /// The lens.
-    pub lens: Arc<Lens>,
 }
 
 impl StructureSearchSnapshot {
@@ -172,7 +159,8 @@ impl StructureSearchSnapshot {
         self.temperature = run.temperature();
         self.weights = run.weights().clone();
         self.pinned = run.pinned().map(|entry| entry.number);
-        self.chains = positions(run);
+        let lens = |chain: &Chain<_, _>| chain.position().map(|(lens, _)| Arc::clone(lens));
+        self.chains = run.chains().iter().map(lens).collect();
         self.update_retained(run);
         self.update_lineage(run);
     }
@@ -208,16 +196,6 @@ impl StructureSearchSnapshot {
         let shared = nodes.map(|node| known(node.number).unwrap_or_else(|| Arc::new(node.clone())));
         self.lineage = shared.collect();
     }
-}
-
-/// The positions of the chains.
-fn positions(run: &SearchRunOn<LensLandscape>) -> Vec<Option<ChainPosition>> {
-    let place = |chain: &Chain<Arc<Lens>, _>| {
-        let (lens, merit) = chain.position()?;
-        let (number, elements) = (chain.generation(), piece_count(lens));
-        Some(ChainPosition { number, merit, elements, lens: Arc::clone(lens) })
-    };
-    run.chains().iter().map(place).collect()
 }
 
 impl FoundLens {
