@@ -1,5 +1,5 @@
-//! The rules of the house, read from its own text: the order of the floors, who reads the clock,
-//! who knows widgets, where `unsafe` may stand, and that every file begins with its idea.
+//! The rules of the architecture, checked on the source text: the order of the modules, access to
+//! the clock and to widgets, permitted `unsafe`, and the documentation of files and items.
 #![expect(clippy::unwrap_used, reason = "a test that cannot read the source should fail")]
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -45,7 +45,7 @@ fn code(text: &str) -> impl Iterator<Item = &str> {
     text.lines().filter(|line| !line.trim_start().starts_with("//"))
 }
 
-/// Whether a text names something as a whole word.
+/// True if a text contains a name as a whole word.
 fn names(text: &str, word: &str) -> bool {
     let is_letter = |c: char| c.is_alphanumeric() || c == '_';
     text.match_indices(word).any(|(at, _)| {
@@ -235,7 +235,7 @@ fn errors_are_called_errors() {
     }
 }
 
-/// Whether a doc comment begins as a bare clause ("How far a run is.") instead of naming the thing.
+/// True if a doc comment begins as a bare clause ("How far a run is.") instead of naming the thing.
 fn is_bare_clause(line: &str) -> bool {
     let text = line.trim_start();
     let Some(text) = text.strip_prefix("///").or_else(|| text.strip_prefix("//!")) else {

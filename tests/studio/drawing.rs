@@ -49,7 +49,7 @@ fn camera() -> Camera {
     Camera { center: DVec2::new(22.3, 0.7), scale: 9.7 }
 }
 
-/// How far each pixel of one picture is from the other's, in the worst of its four channels.
+/// The largest difference of each pixel of two images over its four channels.
 fn distances(a: &RgbaImage, b: &RgbaImage) -> Vec<u8> {
     let pixels = a.rgba.chunks_exact(4).zip(b.rgba.chunks_exact(4));
     pixels.map(|(p, q)| p.iter().zip(q).map(|(x, y)| x.abs_diff(*y)).max().unwrap()).collect()

@@ -1,4 +1,4 @@
-//! The panel of the gradient-index slice by what a screen reader calls its parts, on real sessions.
+//! The panel of the gradient-index slice, driven by its accessibility labels, on real sessions.
 
 use std::time::Duration;
 
@@ -30,7 +30,7 @@ fn press(harness: &mut Bench, name: &str) {
     harness.run();
 }
 
-/// What was asked of the field.
+/// The commands for the field.
 fn asked(harness: &Bench) -> Vec<GrinCommand> {
     let commands = harness.state().commands.iter();
     let asked = commands.filter_map(|command| match command {
@@ -52,7 +52,7 @@ fn wait(session: &mut Session, what: &str, enough: impl Fn(&GrinView) -> bool) {
     panic!("{what} never happened");
 }
 
-/// Whether everything that can be seen of the field is there.
+/// True if everything that is shown of the field has been computed.
 fn is_seen(forming: &GrinView) -> bool {
     let GrinView { run, slice: Some(slice), analysis: Some(sighting), .. } = forming else {
         return false;

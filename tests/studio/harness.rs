@@ -1,4 +1,4 @@
-//! What the tests of panels share: a lens, a view of it with its numbers, a panel in a harness.
+//! Helpers of the panel tests: a lens, a view of it with its numbers, a panel in a harness.
 
 use std::sync::Arc;
 

@@ -1,5 +1,5 @@
-//! What the window shows: every shader is valid, and the graphics card draws what the processor
-//! draws.
+//! Tests of the window: every shader is valid, the GPU draws the same as the software renderer, and
+//! panels show a view and push commands.
 #![expect(clippy::unwrap_used, reason = "a test that cannot prepare its case should fail")]
 #![expect(clippy::print_stdout, reason = "`--nocapture` shows how near the two drawings are")]
 

@@ -1,4 +1,4 @@
-//! Panels by what a screen reader calls their parts: they show a view and write down commands.
+//! Panels, driven by their accessibility labels: they show a view and push commands.
 
 use std::sync::Arc;
 
@@ -439,8 +439,9 @@ fn a_pupil_without_light_names_the_limits_and_a_remedy() {
     lens.fields.values[2].y = 40.0;
     let harness = pupils(lens);
     harness.get_by_label("Pupil of field 3: no light");
-    harness
-        .get_by_label_contains("No light: surface 1 clips 90 of 127 rays, the chief ray among them.");
+    harness.get_by_label_contains(
+        "No light: surface 1 clips 90 of 127 rays, the chief ray among them.",
+    );
 }
 
 #[test]

@@ -1,4 +1,4 @@
-//! The panel of the search over structure by what a screen reader calls its parts.
+//! The panel of the structure search, driven by its accessibility labels.
 
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -34,7 +34,7 @@ fn press(harness: &mut Harness<'_, PanelState<SearchPanel>>, name: &str) {
     harness.run();
 }
 
-/// What was asked of the search.
+/// The commands for the search.
 fn asked(harness: &Harness<'_, PanelState<SearchPanel>>) -> Vec<StructureSearchCommand> {
     let commands = harness.state().commands.iter();
     let asked = commands.filter_map(|command| match command {

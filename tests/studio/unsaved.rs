@@ -1,4 +1,4 @@
-//! What was formed is not thrown away without a question.
+//! Unsaved changes are not discarded without confirmation.
 
 use std::time::Duration;
 

@@ -1,4 +1,4 @@
-//! The whole window on a real session, without a display: what is typed reaches every panel.
+//! The whole window on a real session, without a display: a typed value reaches every panel.
 
 use std::time::Duration;
 
@@ -14,7 +14,7 @@ use egui_kittest::kittest::Queryable;
 
 use crate::harness::double_gauss;
 
-/// How long numbers may take on a slow and busy machine.
+/// The maximum time of an analysis on a slow and busy machine.
 const DEADLINE: Duration = Duration::from_mins(1);
 const PAUSE: Duration = Duration::from_millis(5);
 

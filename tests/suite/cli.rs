@@ -1,5 +1,5 @@
-//! The program as other programs see it: every subcommand with right and wrong input, its exit
-//! status, the keys of its JSON, the words of its errors.
+//! The command line from outside: every subcommand with valid and invalid input, its exit status,
+//! the keys of its JSON, its error messages.
 
 use serde_json::{Value, json};
 use std::io::Write as _;
@@ -26,7 +26,7 @@ fn text(bytes: &[u8]) -> String {
     String::from_utf8(bytes.to_vec()).unwrap()
 }
 
-/// What it prints when it does its work.
+/// The output of a successful run.
 pub(super) fn done(arguments: &[&str], input: &str) -> String {
     let output = aplanat(arguments, input);
     let errors = text(&output.stderr);
@@ -39,7 +39,7 @@ pub(super) fn done_json(arguments: &[&str], input: &str) -> Value {
     serde_json::from_str(&out).unwrap_or_else(|e| panic!("{arguments:?}: {e} in {out}"))
 }
 
-/// What it says when it ends with this status, which must contain these words.
+/// The message of a run that ends with this status; it must contain these words.
 pub(super) fn refused(status: i32, arguments: &[&str], input: &str, words: &[&str]) {
     let output = aplanat(arguments, input);
     let errors = text(&output.stderr);
@@ -158,7 +158,7 @@ fn info_gives_first_order_data() {
     assert!(done(&["info", LENS], "").contains("focal length"));
 }
 
-/// What is not known of a gradient-index medium is said, and everything else is there.
+/// Unknown quantities of a gradient-index medium are named, and all others are printed.
 #[test]
 fn every_panel_shows_a_lens_with_a_gradient_index() {
     const WOOD: &str = "lenses/wood_lens_60.json";

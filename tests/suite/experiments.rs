@@ -1,5 +1,5 @@
-//! Every experiment at small effort: its claims hold, its data and pictures are there, it can be
-//! stopped; and the checks can fail.
+//! Every experiment at small effort: its claims hold, its data and plots exist, it can be stopped;
+//! and the checks can fail.
 
 use aplanat::experiments::{
     self, ALL, DataTable, Effort, ExperimentError, ExperimentOutcome, TableCell,

@@ -1,5 +1,5 @@
-//! Design tasks in gradient-index fields: lenses found again, limits kept, wrong tasks refused by
-//! name, and the same field on any number of threads.
+//! Design tasks in gradient-index fields: known lenses recovered, limits respected, invalid tasks
+//! refused by name, and the same field on any number of threads.
 
 use aplanat::grin::{GrinFate, LaunchMode};
 use aplanat::grin_design::{
@@ -217,7 +217,7 @@ fn grin_chaotic_rays_are_detected_by_retracing_and_counted() {
     assert!(counts.fates.count_of(GrinFate::Chaotic) > 0 && judged.loss.is_finite());
 }
 
-/// What a task is refused for.
+/// The error with which a task is refused.
 fn refused(change: impl FnOnce(&mut GrinTask)) -> String {
     let mut task = small();
     change(&mut task);

@@ -1,5 +1,5 @@
-//! What a maker can make: whatever the field is made of, what is found keeps every limit, and every
-//! limit is told with the value that stands against it.
+//! Manufacturing limits: a designed field of any representation respects every limit, and every
+//! limit is reported with its value.
 
 use aplanat::files::{Volume, write_volume};
 use aplanat::grin::field::RegularGrid;

@@ -1,5 +1,5 @@
-//! Pictures that light makes behind a field: near and at infinity, of a person's own, of no light, by
-//! beams that miss, and the same on any number of threads.
+//! Images behind a field: near and at infinity, custom targets, targets without light, beams that
+//! miss the domain, and the same result on any number of threads.
 
 use aplanat::grin::GrinFate;
 use aplanat::grin_design::{
@@ -78,7 +78,7 @@ fn pixels(image: &TargetImage) -> Vec<f64> {
     image.render(8).unwrap()
 }
 
-/// What is wrong with a task of this picture.
+/// The error of a task with this target image.
 fn refused(drawing: TargetImage) -> String {
     let task = of_picture(drawing);
     task.check().and_then(|()| task.read_files()).unwrap_err().to_string()

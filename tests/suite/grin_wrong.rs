@@ -1,12 +1,11 @@
-//! Wrong tasks and volumes: each is refused before any work, with what is wrong, where it stands and
-//! what is expected there.
+//! Invalid tasks and volumes: each is refused before any work, with the error, its place and the
+//! valid values.
 
 use super::cli::{Scratch, done, done_json, refused};
 use aplanat::grin_design::{self, GrinOptimizer};
 use serde_json::{Value, json};
 
-/// What a task that comes with the program is refused for once a value in it is another one, or is
-/// taken out.
+/// The error with which a built-in task is refused after a value in it is replaced or removed.
 fn refusal(name: &str, place: &str, value: Option<Value>) -> Option<String> {
     let task = grin_design::find_builtin(name).unwrap().task().unwrap();
     let mut task = serde_json::to_value(&task).unwrap();
@@ -28,7 +27,7 @@ fn refusal(name: &str, place: &str, value: Option<Value>) -> Option<String> {
 /// A task, a place in it, what stands there instead, and the words that tell it.
 type Row = (&'static str, &'static str, Value, &'static [&'static str]);
 
-/// What is wrong with the field and its space.
+/// Errors of the field and its domain.
 fn field() -> Vec<Row> {
     vec![
         ("luneburg", "/aplanat_grin", json!(2), &["aplanat_grin: found 2; expected 1"]),
@@ -64,7 +63,7 @@ fn field() -> Vec<Row> {
     ]
 }
 
-/// What is wrong with the light.
+/// Errors of the light.
 fn light() -> Vec<Row> {
     vec![
         ("luneburg", "/views", json!([]), &["views: found none", "at least one"]),
@@ -130,7 +129,7 @@ fn light() -> Vec<Row> {
     ]
 }
 
-/// What is wrong with pictures.
+/// Errors of target images.
 fn pictures() -> Vec<Row> {
     vec![
         (
@@ -178,7 +177,7 @@ fn pictures() -> Vec<Row> {
     ]
 }
 
-/// What is wrong with the search.
+/// Errors of the optimization.
 fn search() -> Vec<Row> {
     vec![
         ("display", "/method", json!("lbfgs"), &["views, number 0, source, fresh", "only adam"]),
@@ -266,7 +265,7 @@ fn grin_every_invalid_value_of_a_task_has_its_own_message() {
     }
 }
 
-/// What a task is refused for that begins with a file of these bytes.
+/// The error of a task that starts from a file with these bytes.
 fn start(name: &str, bytes: &[u8], words: &[&str]) {
     let file = Scratch::new(name);
     std::fs::write(&file.0, bytes).unwrap();

@@ -106,7 +106,7 @@ fn outputs<R: Real>(landing: &TracedRay<R>) -> [R; 7] {
     [p.x, p.y, p.z, d.x, d.y, d.z, landing.opl]
 }
 
-/// What was found wrong, and the worst error in units of each family.
+/// The failures, and the worst error in units of each family.
 #[derive(Default)]
 struct Report {
     wrong: Vec<String>,

@@ -1,5 +1,4 @@
-//! Every lens that comes with the program opens, has the focal length that its source states,
-//! and survives being written and read.
+//! Every lens of the library opens, has the focal length that its source states, and round-trips.
 
 use aplanat::files::{self, BundledLens, bundled_lenses, json};
 use aplanat::lens::{

@@ -1,4 +1,4 @@
-//! Local search on real lenses.
+//! Local optimization of real lenses.
 
 use super::merit::{bundled, vary};
 use aplanat::lens::{self, Lens, Parameter, ParameterKind, Pickup, Quantity};
@@ -167,7 +167,7 @@ fn a_lens_without_light_recovers_under_a_light_term() {
     }
 }
 
-/// What follows a variable is written into every lens on the way, so that a table shows it.
+/// Pickups are applied to every intermediate lens, so that a table shows them.
 #[test]
 fn pickups_follow_the_optimization() {
     let mut lens = bundled("double_gauss_rudolph_50");

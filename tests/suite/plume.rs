@@ -1,5 +1,5 @@
-//! Plumes found again from how they bend light: a person's own volume, straight lines beside curved
-//! rays, slopes that a maker can make, and the hard cases.
+//! Plumes reconstructed from the deflection of light: a custom volume, straight rays beside curved
+//! rays, slope limits, and hard cases.
 
 use crate::grin::length;
 use aplanat::files::{Volume, write_volume};
@@ -304,7 +304,7 @@ fn grin_a_plume_below_vacuum_is_refused() {
     assert!(error.unwrap_err().to_string().contains("limits, low"));
 }
 
-/// Where light leaves the plume, in one number type.
+/// The exits of rays from the plume, in one number type.
 fn exits<R: Real>() -> Vec<Vec3<f64>> {
     let exact = ReferenceField::Plume { ambient: 1.3, contrast: -0.3, half: 1.0 };
     let field = exact.field::<R>().unwrap();

@@ -1,4 +1,4 @@
-//! A front is written as a table, a picture and lenses that read back as they were found.
+//! A front is written as a table, a plot and lenses that read back unchanged.
 
 use super::merit::bundled;
 use aplanat::files;

@@ -1,4 +1,4 @@
-//! The search as other programs see it: its keys, its refusals, and runs that are killed.
+//! The search command from outside: its keys, its errors, and runs that are killed.
 
 use super::cli::{Scratch, done, done_json, has_keys, refused};
 use serde_json::Value;

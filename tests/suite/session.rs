@@ -1,4 +1,4 @@
-//! A session keeps its design valid, whatever the commands, and its background threads in order.
+//! A session: its design stays valid under any commands, and its background threads behave.
 
 use aplanat::effects::{Effect, EffectOverride};
 use aplanat::experiments::{self, Effort, Experiment};

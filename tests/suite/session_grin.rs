@@ -75,7 +75,7 @@ fn slice(session: &mut Session) -> Slice {
     forming(session).slice.unwrap().as_ref().as_ref().unwrap().clone()
 }
 
-/// What the session refuses to open.
+/// Files that the session refuses to open.
 fn refused(session: &mut Session, path: &Path) -> String {
     open(session, path);
     let said = session.view().messages.last().cloned().unwrap();

@@ -1,4 +1,4 @@
-//! What must hold for any ray, and the real rays of `lenses.json`.
+//! Properties of every ray, and the real rays of `lenses.json`.
 
 use super::merit::bundled;
 use super::reference::{self, Reference, number, numbers};

@@ -1,5 +1,5 @@
-//! Pupils at which estimators break: tangent rays, total reflection, several pieces, no light, one
-//! ray, numbers of any size.
+//! Pupils at which estimators may fail: tangent rays, total reflection, several pieces, no light, a
+//! single ray, extreme scales.
 
 use super::cases;
 use super::estimators::compare;

@@ -1,4 +1,4 @@
-//! The warp field against the exact derivatives, and where it has to stay finite.
+//! The warp field against exact derivatives, and the cases in which it must stay finite.
 
 use super::{Case, GROUPS, cases, exact, group};
 use aplanat::lens::{Aperture, FieldKind, FieldPoint, Object, Shape, Surface, System};

@@ -1,5 +1,4 @@
-//! Whatever a person can give by mistake ends in a message with file, place, found and expected,
-//! and nothing is lost.
+//! Every user error ends in a message with file, place, found and expected, and no file is lost.
 
 use super::folder;
 use aplanat::files::{self, FileError, json};

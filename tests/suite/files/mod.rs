@@ -1,4 +1,4 @@
-//! Files of every kind: what is read, what is refused and how, and that nothing is lost.
+//! Files of every kind: reading, refusal with a message, and lossless round trips.
 
 mod bad_input;
 mod mutations;

@@ -1,9 +1,9 @@
-//! Ten thousand spoiled files: none stops the program, and each ends in a lens or a message.
+//! Ten thousand damaged files: none causes a panic, and each gives a lens or a message.
 
 use super::{FOREIGN, foreign};
 use aplanat::files::{self, json, zemax};
 
-/// How many files in all.
+/// The number of files.
 const FILES: usize = 10_000;
 
 /// A generator of 64 random bits (Steele and others, `SplitMix64`, 2014).
@@ -22,7 +22,7 @@ impl Random {
     }
 }
 
-/// What damaged and hostile files contain.
+/// The contents of damaged and hostile files.
 const WORDS: [&str; 24] = [
     "NaN",
     "1e308",

@@ -1,4 +1,4 @@
-//! A lens that goes out and comes back is the same lens, to the last bit.
+//! A lens that is written and read again is identical, to the last bit.
 
 use super::{FOREIGN, folder, foreign};
 use aplanat::files::{self, ConversionOutcome, json};

@@ -1,4 +1,4 @@
-//! Volumes: both formats bring back every bit, and what is wrong is named.
+//! Volumes: both formats round-trip every bit, and errors are named.
 
 use super::folder;
 use aplanat::files::{Volume, read_volume, write_volume};

@@ -1,4 +1,4 @@
-//! What a Zemax file means, keyword by keyword, on files of our own.
+//! The meaning of a Zemax file, keyword by keyword, on files written for the tests.
 
 use super::foreign;
 use aplanat::files::{self, ConversionOutcome, ConversionReport, FileError, OpenedLens};

@@ -1,4 +1,4 @@
-//! Lenses found again from what they do to rays.
+//! Gradient-index lenses recovered from their effect on rays.
 
 use super::{until, vec3};
 use aplanat::grin::field::{BSpline, ProfileField, ProfileFunction};
@@ -40,7 +40,7 @@ fn error(field: &ProfileField<BSpline<f64>>, exact: impl Fn(f64) -> f64) -> f64 
     (difference / norm).sqrt()
 }
 
-/// What each ray misses the target by, and how that changes with each parameter: one adjoint for
+/// The residual of each ray, and its derivative by each parameter: one adjoint for
 /// each row. The last row holds `η` at the rim.
 fn rows(
     field: &ProfileField<BSpline<f64>>,

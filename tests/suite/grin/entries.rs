@@ -1,5 +1,5 @@
-//! Rays that enter a field whose index jumps at its boundary, used as they are given; and single
-//! precision where every step ends on a plane of the grid.
+//! Rays that enter a field with an index jump at its boundary, used as given; and single precision
+//! when every step ends on a plane of the grid.
 
 use super::{bowl, length, until, vec3};
 use aplanat::grin::field::{Parabolic, ProfileField, RegularGrid, Tricubic, Trilinear};
@@ -30,7 +30,7 @@ fn slanted() -> Vec<GrinRay<f64>> {
     vec![ray(0.1, 0.0, 0.0, 0.0), ray(0.5, -0.2, 0.03, 0.05), ray(-0.4, 0.6, -0.1, 0.08)]
 }
 
-/// What the equations say of a ray that comes with `|v| = 1`, whatever the index is: `x″ = −(n g)² x`
+/// The solution for a ray that enters with `|v| = 1`, whatever the index is: `x″ = −(n g)² x`
 /// across the axis and `v_z` constant.
 fn exact(ray: &GrinRay<f64>) -> (Vec3<f64>, Vec3<f64>) {
     let entry = ray.x + ray.v * ((-1.0 - ray.x.z) / ray.v.z);
@@ -97,8 +97,8 @@ fn outcome(
     GrinTracer::new(field, setup).unwrap().loss_and_gradient(rays, |_, exit| bowl(exit))
 }
 
-/// What enters by a jump as given depends on the field inside alone; that is what the adjoint says,
-/// with a curved boundary as with a plane one.
+/// A ray that enters across an index jump as given depends on the field inside alone; the adjoint
+/// agrees, with a curved boundary as with a plane one.
 #[test]
 fn grin_the_gradient_of_rays_used_as_given_across_a_jump_agrees_with_differences() {
     let rays = slanted();
@@ -179,7 +179,7 @@ fn traced<R: Real>(
     outcome
 }
 
-/// How far exits and gradients of single precision are off, and its retrace error in steps.
+/// The errors of exits and gradients in single precision, and the retrace error in steps.
 fn off(single: &LossAndGradient<f32>, double: &LossAndGradient<f64>) -> [f64; 3] {
     let place = |e: &RayExit<f32>| Vec3::new(e.x.x, e.x.y, e.x.z).value();
     let pairs = single.exits.iter().zip(&double.exits);

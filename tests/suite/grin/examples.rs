@@ -1,5 +1,5 @@
-//! The example lenses with gradients: what each is there to show; and gradients that light passes on
-//! its way back from a mirror.
+//! The example lenses with gradient indices: the property that each demonstrates; and gradients
+//! traversed again behind a mirror.
 
 use super::lens::{lens_of, ray, system};
 use crate::merit::bundled;
@@ -117,7 +117,7 @@ fn grin_example_first_order_data_behind_a_mirror_are_those_of_rays_near_the_axis
     }
 }
 
-/// What a plate adds to the Petzval sum does not depend on which way light goes through it.
+/// The contribution of a plate to the Petzval sum does not depend on the direction of the light.
 #[test]
 fn grin_example_the_petzval_sum_of_a_plate_is_the_same_both_ways() {
     let sum =

@@ -1,5 +1,5 @@
-//! Every field: its derivatives against forward differentiation of its own value, its block forms
-//! against its single ones, and what it does where it should not be asked.
+//! Every field: its derivatives against forward differentiation of its value, its block methods
+//! against its single ones, and its values outside the domain.
 
 use super::{Kind, vec3};
 use crate::grin::kinds;

@@ -1,5 +1,5 @@
-//! Hard cases: each ray ends with a fate that says what happened, never with a panic, and what is
-//! not finite is never passed on.
+//! Hard cases: each ray ends with a fate, never with a panic, and non-finite values are not passed
+//! on.
 
 use super::{beam, bowl, length, steps, until, vec3};
 use aplanat::grin::field::{

@@ -1,5 +1,5 @@
-//! Gradients in a prescription where it gets difficult: rays that turn, leave through the side or
-//! never arrive, gaps of no length, strong gradients, clipped pupils, single precision, files.
+//! Hard cases of gradients in a prescription: rays that turn, leave through the side or never
+//! arrive, gaps of zero length, strong gradients, clipped pupils, single precision, files.
 
 use super::lens::{busy, lens_of, ray, system};
 use aplanat::effects::{self, Effect, EffectOverride, EffectOverrides, TracePurpose};

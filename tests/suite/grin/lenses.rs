@@ -1,4 +1,4 @@
-//! Lenses with a closed form: what a ray must do, to which order, and what its gradient must be.
+//! Lenses with a closed form: the path of a ray, the order of convergence, and the gradient.
 
 use super::{length, steps, until, vec3};
 use aplanat::grin::field::{

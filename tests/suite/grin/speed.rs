@@ -1,5 +1,6 @@
-//! How fast rays are: printed, not judged, since another process may be in the way. In a release
-//! build on one thread: `cargo test --release --no-default-features --test suite -- grin_speed --nocapture`.
+//! The speed of rays, printed without a limit, since other processes may interfere. In a release
+//! build on one thread: `cargo test --release --no-default-features --test suite -- grin_speed
+//! --nocapture`.
 #![expect(clippy::disallowed_methods, reason = "it measures time and decides nothing by it")]
 
 use super::{bowl, until, vec3};

@@ -1,5 +1,5 @@
-//! A budget of gradients is used up and never exceeded, on any number of threads, taken up again or
-//! not; the best point of a descent that goes on is among what was found.
+//! A budget of gradients is used up and never exceeded, on any number of threads, resumed or not;
+//! the best point of an active descent is among the results.
 
 use super::chain::settings;
 use super::rugged::{Rugged, START, STEPS};

@@ -1,5 +1,5 @@
-//! Runs on a rugged landscape: what they find, that threads do not matter, that nothing stops them
-//! but what should, and a hand on them.
+//! Runs on a rugged landscape: their results, independence of threads, their end, and steering
+//! commands.
 
 use super::rugged::{Fault, Rugged, START, Spot};
 use aplanat::search::{

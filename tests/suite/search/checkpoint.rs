@@ -1,4 +1,4 @@
-//! A run goes on from its file as if it had never ended, and what is no such file is refused.
+//! A run resumes from its file unchanged, and other files are refused.
 
 use super::chain::settings;
 use super::rugged::{Fault, Rugged, START};

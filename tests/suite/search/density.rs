@@ -1,4 +1,4 @@
-//! From a loss to a density, and from densities to the chance that a descent ends.
+//! From a loss to a density, and from densities to the probability that a descent ends.
 
 use aplanat::search::{Temperature, Termination};
 

@@ -1,5 +1,5 @@
-//! Lenses with gradient-index media in the search over structure: every mutation keeps the focus and
-//! leaves a lens or an honest reason, and a search finds something better.
+//! Lenses with gradient-index media in the structure search: every mutation preserves the focus and
+//! gives a lens or a reason, and a search improves a lens.
 
 use super::mutations::assert_lens;
 use super::projection::assert_equivalent;

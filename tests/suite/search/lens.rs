@@ -1,5 +1,5 @@
-//! Lenses as a landscape: what a start is worth, how it descends, and that a whole search keeps what
-//! it must keep, hard cases among them.
+//! The landscape of lenses: the loss of a start, its descent, and the constraints that a whole
+//! search satisfies, with hard cases.
 
 use super::super::merit::bundled;
 use super::seeded;

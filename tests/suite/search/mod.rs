@@ -1,5 +1,6 @@
-//! Search over structure: mutations and their paraxial projection; chains, their budget, reservoir,
-//! family tree and checkpoints, and what they sample; lenses as what is searched, and their rules.
+//! The structure search: mutations and their paraxial projection; chains with budget, reservoir,
+//! lineage and checkpoints, and the distribution that they sample; the landscape of lenses and its
+//! rules.
 
 mod budget;
 mod chain;

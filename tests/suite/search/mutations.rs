@@ -1,5 +1,5 @@
-//! Every kind of mutation on every lens that comes with the program: what it does, when it does not
-//! apply, and that nothing but a lens comes out of it.
+//! Every kind of mutation on every lens of the library: its effect, its refusals, and the validity
+//! of its result.
 
 use super::{generous, seeded};
 use crate::merit::bundled;
@@ -309,7 +309,7 @@ fn without_projection_numbers_stay() {
     }
 }
 
-/// What a lens takes in memory, roughly: everything in it that could grow.
+/// The approximate memory of a lens: everything in it that could grow.
 fn size(lens: &Lens) -> usize {
     let zoom: usize = lens.zoom.iter().map(|position| position.thicknesses.len()).sum();
     let text: usize = lens.surfaces.iter().map(|row| row.comment.len()).sum();

@@ -1,5 +1,5 @@
-//! That a mutated lens focuses as the one before, when it cannot, and by how much the map to it
-//! stretches volumes.
+//! The projection: a mutated lens focuses as the one before, the refusals, and the determinant of
+//! the map.
 
 use super::{generous, seeded};
 use crate::merit::bundled;

@@ -1,4 +1,4 @@
-//! A landscape of several structures with several minima each, and what can go wrong in one.
+//! A landscape of several structures with several minima each, with options that make it fail.
 
 use aplanat::search::{
     Landscape, LossGradient, MutatedPoint, MutationError, MutationKind, MutationWeights, Random,
@@ -19,7 +19,7 @@ pub(super) struct Spot {
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub(super) struct Momentum(f64);
 
-/// What is wrong with a landscape.
+/// The defects of a landscape.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 pub(super) enum Fault {
     #[default]

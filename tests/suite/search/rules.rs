@@ -1,5 +1,4 @@
-//! Rules that make no sense, limits that no lens keeps, limits that a lens breaks, and glasses that
-//! are allowed.
+//! Invalid rules, unsatisfiable limits, violated limits, and permitted glasses.
 
 use super::super::merit::bundled;
 use aplanat::lens::{Lens, Medium};

@@ -1,4 +1,5 @@
-//! What the samplers sample, on the toy of thin singlets, where everything can be computed.
+//! The distributions of the samplers, on the toy problem of thin singlets, where they can be
+//! computed.
 
 use aplanat::search::competing_clocks::{
     CompetingClocks, KnownDensity, Regeneration, RegenerationRate,
@@ -154,7 +155,7 @@ fn walked(
     sums.iter().map(|sum| sum / (0.8 * rounds as f64)).collect()
 }
 
-/// How far the mean of independent numbers is from what it should be, in its standard deviations.
+/// The deviation of the mean of independent numbers from its expectation, in standard errors.
 fn deviation(values: &[f64], expected: f64) -> f64 {
     let count = values.len() as f64;
     let mean = values.iter().sum::<f64>() / count;
