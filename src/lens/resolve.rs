@@ -1,6 +1,6 @@
 //! Resolves a lens to plain numbers: applies pickups, looks up glasses, solves the image distance.
 
-use super::system::{Shape, Surface, System};
+use super::system::{Surface, System};
 use super::{Lens, LensError, Medium, MediumPlace, Object, Parameter, Pickup, Row, SystemError};
 use super::{glass, grin};
 use crate::math::Real;

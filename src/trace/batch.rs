@@ -12,7 +12,6 @@ use super::interface::{Interface, Intersection, Refraction, SurfaceForm};
 use super::propagation::PropagatedRay;
 use super::single::{Ray, optical_direction};
 use super::{Fates, Tracer};
-use crate::lens::SystemError;
 use crate::math::Real;
 use crate::math::Vec3;
 use crate::math::{SimdWidth, run_vectorized};
