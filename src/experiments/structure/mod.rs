@@ -86,6 +86,14 @@ fn relax_term(term: Term, found: &[ConstraintMargin]) -> Term {
     }
 }
 
+/// The mean of some values and the variance of this mean.
+fn mean_and_variance(values: &[f64]) -> [f64; 2] {
+    let count = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / count;
+    let square = values.iter().map(|value| (value - mean).powi(2)).sum::<f64>();
+    [mean, square / (count * (count - 1.0).max(1.0))]
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -106,12 +114,4 @@ mod tests {
             assert_eq!(slack(&usual) >= 0.0, terms(&usual) == terms(&relaxed), "{}", subject.name);
         }
     }
-}
-
-/// The mean of some values and the variance of this mean.
-fn mean_and_variance(values: &[f64]) -> [f64; 2] {
-    let count = values.len() as f64;
-    let mean = values.iter().sum::<f64>() / count;
-    let square = values.iter().map(|value| (value - mean).powi(2)).sum::<f64>();
-    [mean, square / (count * (count - 1.0).max(1.0))]
 }
