@@ -48,6 +48,20 @@ impl<R: Real> Shape<R> {
         }
     }
 
+    /// The simplest form with these numbers; `terms` are the coefficients of r⁴, r⁶, …, at most
+    /// [`ASPHERE_TERMS`].
+    ///
+    /// # Errors
+    /// [`SystemError::TooManyTerms`], which names `surface`.
+    pub fn new(curvature: R, conic: R, terms: &[R], surface: usize) -> Result<Self, SystemError> {
+        if terms.len() > ASPHERE_TERMS {
+            return Err(SystemError::TooManyTerms { surface: surface.into(), found: terms.len() });
+        }
+        let mut all = [R::ZERO; ASPHERE_TERMS];
+        all[..terms.len()].copy_from_slice(terms);
+        Ok(Self::simplest(curvature, conic, all))
+    }
+
     /// The curvature at the vertex in 1/mm, the conic constant and the coefficients of r⁴ to r¹⁶; zero
     /// where the form has none.
     pub fn numbers(&self) -> (R, R, [R; ASPHERE_TERMS]) {

@@ -109,3 +109,7 @@ pub(crate) fn exact(values: &Value, name: &str) -> Vec<Option<f64>> {
     let list = values[name].as_array().unwrap();
     list.iter().map(|value| (!value.is_null()).then(|| number(value))).collect()
 }
+
+pub(crate) fn image() -> Surface<f64> {
+    Surface::plane(0.0, 1.0)
+}
