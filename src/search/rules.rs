@@ -19,6 +19,7 @@ pub struct SearchRules {
     /// The number of surfaces at the front and at the rear that mutations leave unchanged. They are
     /// counted from the ends, so that they stay the same while elements are added and removed
     /// between them.
+    #[serde(rename = "kept")]
     pub fixed_ends: [usize; 2],
     /// Relative frequencies of the kinds of mutation; a kind that is not listed has weight 1, and
     /// weight 0 excludes it.
