@@ -78,6 +78,7 @@ fn the_saving_by_an_asphere_counts_intersections() {
 }
 
 /// What `info` prints of the effects of a lens, and the milliseconds that it took.
+#[expect(clippy::disallowed_methods, reason = "times of the program are compared with it")]
 fn info(name: &str) -> (serde_json::Value, f64) {
     let start = Instant::now();
     let path = format!("lenses/{name}.json");

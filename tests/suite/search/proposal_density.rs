@@ -42,7 +42,8 @@ fn singlet() -> Lens {
     let (n, d) = (1.5, 2.0);
     let mut curvature = 1.0 / FOCAL;
     for _ in 0..20 {
-        curvature = (1.0 / ((n - 1.0) * FOCAL) + (n - 1.0) * d * curvature * curvature / n) / 2.0;
+        let thickness_part = (n - 1.0) * d * curvature * curvature / n;
+        curvature = f64::midpoint(1.0 / ((n - 1.0) * FOCAL), thickness_part);
     }
     let (front, rear) = (Medium::Index(n), Medium::Air);
     lens(vec![plain(curvature, d, front), plain(-curvature, 98.0, rear)])
