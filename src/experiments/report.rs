@@ -5,7 +5,7 @@ use super::{Experiment, ExperimentOutcome};
 use crate::files::{self, FileError, json};
 use serde::Serialize;
 use std::io;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// The report of a run of an experiment.
 #[derive(Debug, Clone, Serialize)]
@@ -48,6 +48,14 @@ impl ExperimentReport {
         let Experiment { id, title, claim, omits, .. } = *study;
         let holds = outcome.failed().next().is_none();
         Self { id, title, claim, omits, ms, parts: Vec::new(), holds, outcome, files: Vec::new() }
+    }
+
+    /// The files of an earlier report of this experiment that remain in a folder into which this one
+    /// was written.
+    pub fn stale_files(&self, folder: &Path) -> Vec<PathBuf> {
+        let written: Vec<PathBuf> = self.files.iter().map(|name| folder.join(name)).collect();
+        let prefix = format!("{}-", self.id);
+        files::stale_files(folder, &written, |name| name.starts_with(&prefix))
     }
 
     /// Writes the report into a folder: tables as CSV, plots as PNG, lenses as lens files, all

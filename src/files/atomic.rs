@@ -2,6 +2,7 @@
 //! then renamed over it.
 
 use super::FileError;
+use super::identity::{folder_of, resolve_links};
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, Write as _};
 use std::path::{Path, PathBuf};
@@ -13,8 +14,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 /// [`FileError::Unwritable`]: the target is a folder or read-only, or the system refuses a step.
 pub fn write_atomic(path: &Path, bytes: &[u8]) -> Result<(), FileError> {
     let unwritable = |source| FileError::Unwritable { file: path.display().to_string(), source };
-    // A link is kept: the file behind it is replaced.
-    let target = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
+    // A link is kept: the file behind it is replaced, or made if it is missing.
+    let target = resolve_links(path).map_err(unwritable)?;
     check_replaceable(&target).map_err(unwritable)?;
     let beside = temporary_path(&target).map_err(unwritable)?;
     let written = write_and_rename(&beside, &target, bytes);
@@ -31,7 +32,7 @@ pub fn write_atomic(path: &Path, bytes: &[u8]) -> Result<(), FileError> {
 /// [`FileError::Unwritable`], as from [`write_atomic`].
 pub fn check_writable(path: &Path) -> Result<(), FileError> {
     let unwritable = |source| FileError::Unwritable { file: path.display().to_string(), source };
-    let target = fs::canonicalize(path).unwrap_or_else(|_| path.to_owned());
+    let target = resolve_links(path).map_err(unwritable)?;
     check_replaceable(&target).map_err(unwritable)?;
     let beside = temporary_path(&target).map_err(unwritable)?;
     let made = OpenOptions::new().write(true).create_new(true).open(&beside);
@@ -42,6 +43,7 @@ pub fn check_writable(path: &Path) -> Result<(), FileError> {
 fn check_replaceable(target: &Path) -> io::Result<()> {
     match fs::metadata(target) {
         Ok(data) if data.is_dir() => Err(io::Error::other("it is a folder")),
+        Ok(data) if !data.is_file() => Err(io::Error::other("it is a device or a pipe")),
         Ok(data) if data.permissions().readonly() => {
             Err(io::Error::new(io::ErrorKind::PermissionDenied, "it is read-only"))
         }
@@ -73,8 +75,7 @@ fn write_and_rename(beside: &Path, target: &Path, bytes: &[u8]) -> io::Result<()
 
 /// Synchronizes the rename to the disk, where the system can.
 fn sync_folder(target: &Path) {
-    let folder = target.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    if let Ok(folder) = File::open(folder) {
+    if let Ok(folder) = File::open(folder_of(target)) {
         drop(folder.sync_all());
     }
 }

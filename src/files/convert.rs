@@ -1,6 +1,6 @@
 //! Conversion of a lens file into another format.
 
-use super::{ConversionReport, FileError, SaveReport, SelfCheck};
+use super::{ConversionReport, FileError, OpenedLens, SaveReport, SelfCheck};
 use serde::Serialize;
 use std::fmt;
 use std::path::Path;
@@ -23,9 +23,18 @@ pub struct Conversion {
 /// # Errors
 /// Those of [`open`](super::open) and [`save`](super::save).
 pub fn convert(from: impl AsRef<Path>, to: impl AsRef<Path>) -> Result<Conversion, FileError> {
-    let opened = super::open(from)?;
-    let export = super::save(&opened.lens, to)?;
-    Ok(Conversion { import: opened.report, checks: opened.checks, export })
+    super::open(from)?.convert_to(to)
+}
+
+impl OpenedLens {
+    /// Writes the lens to a file of any known format.
+    ///
+    /// # Errors
+    /// Those of [`save`](super::save).
+    pub fn convert_to(self, to: impl AsRef<Path>) -> Result<Conversion, FileError> {
+        let export = super::save(&self.lens, to)?;
+        Ok(Conversion { import: self.report, checks: self.checks, export })
+    }
 }
 
 impl fmt::Display for Conversion {

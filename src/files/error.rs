@@ -23,6 +23,24 @@ pub enum FileError {
         /// The error of the system.
         source: io::Error,
     },
+    /// The file is too long, or is no file but a device.
+    #[error("{file}: found {found}; expected {expected}")]
+    Unsuitable {
+        /// The file.
+        file: String,
+        /// Its kind or size.
+        found: String,
+        /// The accepted kind or size.
+        expected: String,
+    },
+    /// Another program writes the file.
+    #[error("{file}: in use by {holder}; expected a file that no other program writes")]
+    InUse {
+        /// The file.
+        file: String,
+        /// The process that holds it.
+        holder: String,
+    },
     /// The content is not a lens.
     #[error("{file}: found {found}; expected {expected}")]
     NotALens {

@@ -1,6 +1,6 @@
 //! Grayscale images from PNG and JPEG files of any size.
 
-use super::FileError;
+use super::{FileError, MAX_DATA_BYTES, read_file};
 use image::{ImageReader, Limits};
 use std::io::Cursor;
 use std::path::Path;
@@ -28,8 +28,7 @@ pub struct GrayscaleImage {
 /// is black everywhere.
 pub fn read_grayscale(path: &Path) -> Result<GrayscaleImage, FileError> {
     let file = path.display().to_string();
-    let bytes = std::fs::read(path)
-        .map_err(|source| FileError::Unreadable { file: file.clone(), source })?;
+    let bytes = read_file(path, MAX_DATA_BYTES)?;
     let wrong = |found: String, expected: String| {
         let (file, place) = (file.clone(), "image".to_owned());
         FileError::Malformed { file, place, found, expected }

@@ -5,12 +5,16 @@
 //! every file is written beside its target and renamed, so that a failure leaves the target unchanged.
 
 mod atomic;
+mod bounded;
 mod bundled;
 mod checkpoint;
 mod convert;
 mod error;
+mod folder;
 mod grayscale;
+mod identity;
 pub mod json;
+mod lock;
 mod probe_rays;
 mod report;
 mod round_trip;
@@ -20,15 +24,22 @@ mod volume;
 pub mod zemax;
 
 pub use atomic::{check_writable, write_atomic};
+pub use bounded::{MAX_DATA_BYTES, MAX_LENS_BYTES, read_bounded, read_file};
 pub use bundled::{BundledLens, bundled_lenses};
 pub use checkpoint::{CheckpointError, CheckpointFormat};
 pub use convert::{Conversion, convert};
 pub use error::FileError;
+pub use folder::{own_files, stale_files};
 pub use grayscale::{GrayscaleImage, read_grayscale};
+pub use identity::FileIdentity;
+pub use lock::FileLock;
 pub use report::{ConversionOutcome, ConversionReport, ConversionRow};
 pub use round_trip::RoundTripCheck;
 pub use self_check::SelfCheck;
-pub use volume::{Volume, read_volume, write_volume};
+pub use text::decode_unicode;
+pub use volume::{
+    MAX_VOLUME_BYTES, Volume, is_npz, raw_path, read_volume, volume_files, write_volume,
+};
 
 use crate::lens::Lens;
 use serde::Serialize;
@@ -76,13 +87,11 @@ const READABLE: &str = "a lens: JSON with the key `aplanat`, or Zemax .zmx";
 /// Reads a lens from a file of any known format.
 ///
 /// # Errors
-/// A file that cannot be read, and those of [`parse`].
+/// A file that cannot be read or is too long, and those of [`parse`].
 pub fn open(path: impl AsRef<Path>) -> Result<OpenedLens, FileError> {
     let path = path.as_ref();
     let file = path.display().to_string();
-    let bytes = std::fs::read(path)
-        .map_err(|source| FileError::Unreadable { file: file.clone(), source })?;
-    parse(&bytes, &file)
+    parse(&read_file(path, MAX_LENS_BYTES)?, &file)
 }
 
 /// Reads a lens from the bytes of a file. `name` is its name in messages, and its extension decides
@@ -99,8 +108,7 @@ pub fn parse(bytes: &[u8], name: &str) -> Result<OpenedLens, FileError> {
     let format = format_by_content(&text).or_else(|| format_by_extension(Path::new(name)));
     match format.ok_or_else(|| nothing("text that is not a lens".to_owned()))? {
         LensFormat::Native => {
-            text::require_unicode(bytes).map_err(|wrong| wrong.in_file(name))?;
-            let lens = json::read(&text, name)?;
+            let lens = json::read(&decode_unicode(bytes, name)?, name)?;
             Ok(OpenedLens { lens, format: LensFormat::Native, report: None, checks: Vec::new() })
         }
         LensFormat::Zemax => {
@@ -153,6 +161,17 @@ pub fn save(lens: &Lens, path: impl AsRef<Path>) -> Result<SaveReport, FileError
     Ok(SaveReport { format, report, proof })
 }
 
+/// The error of a file that would not be read back; nobody has seen its lines.
+fn unreadable_export(file: &str, error: &FileError) -> FileError {
+    let what = match error {
+        FileError::Malformed { found, expected, .. } => {
+            format!("its text would have {found}; expected {expected}")
+        }
+        error => error.to_string(),
+    };
+    FileError::RoundTripFailed { file: file.to_owned(), what }
+}
+
 /// The bytes of a Zemax file, checked by reading it back and tracing it.
 fn checked_zemax(
     lens: &Lens,
@@ -161,7 +180,7 @@ fn checked_zemax(
     let unusable = |source| FileError::Lens { file: file.to_owned(), source };
     let (text, report) = zemax::write(lens).map_err(unusable)?;
     let bytes = text::encode_utf16(&text);
-    let back = parse(&bytes, file)?;
+    let back = parse(&bytes, file).map_err(|error| unreadable_export(file, &error))?;
     let proof = round_trip::check_round_trip(lens, &back.lens, file)?;
     Ok((bytes, report, proof))
 }

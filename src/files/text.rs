@@ -1,6 +1,6 @@
 //! Decoding of text files: the encoding is guessed from the bytes, and binary files are recognized.
 
-use super::error::ParseError;
+use super::error::{FileError, ParseError};
 use encoding_rs::{Encoding, UTF_8, UTF_16BE, UTF_16LE, WINDOWS_1252};
 
 /// The first bytes of common binary files, and their kinds.
@@ -46,7 +46,7 @@ pub(super) fn decode(bytes: &[u8]) -> String {
 }
 
 /// Refuses 8-bit encodings, whose letters depend on the country.
-pub(super) fn require_unicode(bytes: &[u8]) -> Result<(), ParseError> {
+fn require_unicode(bytes: &[u8]) -> Result<(), ParseError> {
     if encoding(bytes).1 != WINDOWS_1252 {
         return Ok(());
     }
@@ -54,6 +54,15 @@ pub(super) fn require_unicode(bytes: &[u8]) -> Result<(), ParseError> {
     let line = bytes[..good].split(|byte| *byte == b'\n').count();
     let found = format!("the byte {:#04x}", bytes.get(good).copied().unwrap_or_default());
     Err(ParseError { place: format!("line {line}"), found, expected: "UTF-8 text".to_owned() })
+}
+
+/// Decodes the text of a JSON file; `name` is its name in messages.
+///
+/// # Errors
+/// [`FileError::Malformed`] for an 8-bit encoding, with the line of the first byte that is not UTF-8.
+pub fn decode_unicode(bytes: &[u8], name: &str) -> Result<String, FileError> {
+    require_unicode(bytes).map_err(|wrong| wrong.in_file(name))?;
+    Ok(decode(bytes))
 }
 
 /// Encodes little-endian UTF-16 with a byte order mark.

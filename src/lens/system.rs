@@ -220,7 +220,10 @@ pub enum SystemError {
         why: String,
     },
     /// The start or the direction of a ray is not valid.
-    #[error("ray {ray}: {found}; expected a finite start and a direction of length 1 within 1e-9")]
+    #[error(
+        "ray {ray}: {found}; expected a start of finite numbers up to 1e100 mm and a direction of \
+         length 1 within 1e-9"
+    )]
     Ray {
         /// The index of the ray in its batch.
         ray: usize,

@@ -230,6 +230,12 @@ impl Merit {
         sampled.iter().map(|spot| spot.area).sum::<f64>() / sampled.len().max(1) as f64
     }
 
+    /// True if no light gets through at any spot; false for a goal without spots.
+    pub fn is_dark(&self) -> bool {
+        let sampled = self.spot_samplings();
+        !sampled.is_empty() && sampled.iter().all(|spot| !(spot.area > 0.0))
+    }
+
     /// The merit at these values of the variables.
     pub fn value(&self, values: &[f64]) -> Result<f64, MeritError> {
         self.evaluate(values, DerivativeLevel::Value).map(|sum| sum.value)

@@ -33,7 +33,8 @@ const MARGINS: [f64; 4] = [110.0, 110.0, 40.0, 90.0];
 
 impl ParetoReport<'_> {
     /// Writes the report into a folder, which is created if it does not exist. Returns the files,
-    /// the table first. Files of the same names are replaced, all others stay.
+    /// the table first. Files of the same names are replaced, all others stay, see
+    /// [`ParetoReport::stale_files`].
     ///
     /// # Errors
     /// A folder or a file that cannot be written; files written before remain.
@@ -52,6 +53,24 @@ impl ParetoReport<'_> {
         // The table names the other files, so it is written after them.
         files::write_atomic(&written[0], self.table().as_bytes())?;
         Ok(written)
+    }
+
+    /// True for the name of a file of a report, of this one or of another.
+    pub fn is_own_file(name: &str) -> bool {
+        let numbered = |set: &str| {
+            let number = name.strip_prefix(set).and_then(|rest| rest.strip_suffix(".json"));
+            number.is_some_and(|n| n.len() >= 3 && n.bytes().all(|c| c.is_ascii_digit()))
+        };
+        let fixed = ["front.csv", "front.png", "start.json"];
+        fixed.contains(&name) || ["front_", "biased_"].into_iter().any(numbered)
+    }
+
+    /// The files of an earlier report that remain in a folder into which this one was written.
+    pub fn stale_files(&self, folder: &Path) -> Vec<PathBuf> {
+        let fixed = ["front.csv", "front.png"].map(str::to_owned);
+        let names = self.lenses().into_iter().map(|(name, _)| name).chain(fixed);
+        let written: Vec<PathBuf> = names.map(|name| folder.join(name)).collect();
+        files::stale_files(folder, &written, Self::is_own_file)
     }
 
     /// The numbers as comma-separated values, a line for every lens: the start, the front, the

@@ -1,15 +1,23 @@
 //! Checkpoints: a run as a file, which resumes later bit for bit as if it had not been interrupted.
+//!
+//! The losses of a file are not trusted: those of its best points are computed again.
 
-use super::{Landscape, SearchError, SearchMethod, SearchPoint, SearchRun, SearchSettings};
+use super::{
+    Landscape, ReservoirEntry, SearchError, SearchMethod, SearchPoint, SearchRun, SearchSettings,
+};
 use crate::files::{CheckpointError, CheckpointFormat};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::collections::BTreeSet;
 use std::path::Path;
 
-/// The format of the file. Version 1 described mutations and refusals as text.
-const FORMAT: CheckpointFormat = CheckpointFormat { key: "aplanat_search", version: 2 };
+/// The format of the checkpoints of searches. Version 1 described mutations and refusals as text;
+/// version 3 added the checksum.
+pub const SEARCH_CHECKPOINT: CheckpointFormat =
+    CheckpointFormat { key: "aplanat_search", version: 3, first_with_checksum: 3 };
 
+/// The relative difference of two losses that may be rounding.
+const LOSS_ROUNDING: f64 = 1e-6;
 /// The field of [`Landscape::fingerprint`] that holds the start of the search, if there is one.
 const START: &str = "start";
 /// The maximum number of characters of a value in a message.
@@ -64,18 +72,21 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
     {
         let fingerprint = landscape.fingerprint();
         let content = CheckpointContent {
-            aplanat_search: FORMAT.version,
+            aplanat_search: SEARCH_CHECKPOINT.version,
             landscape: &fingerprint,
             run: self,
             beside,
         };
-        FORMAT.write(path, &content, |read: &StoredCheckpoint<Self>| read.run == *self)?;
-        Ok(())
+        let is_same = |read: &StoredCheckpoint<Self>| read.run == *self;
+        Ok(SEARCH_CHECKPOINT.write(path, &content, is_same)?)
     }
 
     /// Loads a run, which continues where it was saved, on the same landscape and with the same
     /// settings. Only the limits [`SearchSettings::moves`] and [`SearchSettings::gradients`] may
     /// differ, except for brute force, which has already divided its gradients.
+    ///
+    /// The best points are judged anew: a loss that the landscape does not confirm is replaced by
+    /// the computed one.
     ///
     /// # Errors
     /// The file cannot be read, is damaged, has an unknown version, or belongs to another search;
@@ -90,7 +101,7 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
     {
         settings.check()?;
         let file = path.display().to_string();
-        let mut read: StoredCheckpoint<Self> = FORMAT.read(path)?;
+        let mut read: StoredCheckpoint<Self> = SEARCH_CHECKPOINT.read(path)?;
         if let Err(what) = read.run.check_consistency() {
             return Err(CheckpointError::Corrupt { file, what }.into());
         }
@@ -111,7 +122,37 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
             }
         }
         read.run.settings = settings.clone();
-        Ok(read.run)
+        let mut run = read.run;
+        run.judge_anew(landscape);
+        if run.start.loss.is_finite() {
+            return Ok(run);
+        }
+        let what = format!("the loss of the start is {}", run.start.loss);
+        Err(CheckpointError::Corrupt { file, what }.into())
+    }
+
+    /// Computes the losses of the best points again, and finds the best of them.
+    fn judge_anew<L>(&mut self, landscape: &L)
+    where
+        L: Landscape<Point = P, Memory = M>,
+    {
+        for chain in &mut self.chains {
+            if let Some(descent) = &mut chain.descent {
+                let confirmed = confirmed_loss(landscape, &descent.best, descent.best_loss);
+                descent.best_loss = confirmed;
+            }
+        }
+        let single = [&mut self.start, &mut self.best].into_iter().chain(&mut self.pinned);
+        for entry in single.chain(self.reservoir.entries_mut()) {
+            let loss = confirmed_loss(landscape, &entry.point, entry.loss);
+            *entry = ReservoirEntry::new(landscape, entry.number, loss, entry.point.clone());
+        }
+        self.reservoir.remove_non_finite();
+        let others = self.reservoir.entries().iter().chain([&self.start]);
+        if let Some(best) = others.min_by(|a, b| a.rank(b)).filter(|e| e.is_better_than(&self.best))
+        {
+            self.best = best.clone();
+        }
     }
 
     /// Checks the consistency of a run that was read.
@@ -129,6 +170,13 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
         }
         Ok(())
     }
+}
+
+/// The loss of a point: the stored one if it is that of the landscape but for rounding.
+fn confirmed_loss<L: Landscape>(landscape: &L, point: &L::Point, stored: f64) -> f64 {
+    let loss = landscape.loss(point);
+    let is_same = (loss - stored).abs() <= LOSS_ROUNDING * loss.abs().max(stored.abs());
+    if is_same { stored } else { loss }
 }
 
 /// The settings that a resumed run may not change.

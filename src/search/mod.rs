@@ -22,6 +22,7 @@ pub use bookkeeping::{
     DescentEnd, Lineage, LineageNode, MutationStatistics, OfferOutcome, Reservoir, ReservoirEntry,
     SearchStatistics,
 };
+pub use checkpoint::SEARCH_CHECKPOINT;
 pub use error::SearchError;
 pub use landscape::{Landscape, LossGradient, MutatedPoint, SearchPoint};
 pub use mutation::{

@@ -115,7 +115,14 @@ pub(super) struct ParetoRequest {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum ParetoExport {
     /// The folder and the number of files.
-    Written(PathBuf, usize),
+    Written {
+        /// The folder.
+        folder: PathBuf,
+        /// The number of files that were written.
+        files: usize,
+        /// The number of files of an earlier front that remain.
+        stale: usize,
+    },
     /// The reason of the failure.
     Failed(String),
 }
@@ -179,9 +186,14 @@ impl Engine for ParetoEngine {
     }
 
     fn handle(&mut self, folder: PathBuf) -> Result<Option<RunStatus>, String> {
-        let written = self.snapshot().report().write(&folder);
+        let snapshot = self.snapshot();
+        let written = snapshot.report().write(&folder);
         self.sender.report(match written {
-            Ok(files) => ParetoExport::Written(folder, files.len()),
+            Ok(files) => ParetoExport::Written {
+                stale: snapshot.report().stale_files(&folder).len(),
+                files: files.len(),
+                folder,
+            },
             Err(why) => ParetoExport::Failed(why.to_string()),
         });
         Ok(None)

@@ -7,6 +7,9 @@ use crate::lens::SystemError;
 use crate::math::Real;
 use crate::math::Vec3;
 
+/// The largest coordinate of a start, in mm; the squares of larger ones would not be finite.
+const LARGEST_START: f64 = 1e100;
+
 /// A straight ray.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Ray<R> {
@@ -29,9 +32,13 @@ impl Ray<f64> {
     pub fn check(&self, number: usize) -> Result<(), SystemError> {
         let refuse = |found: String| Err(SystemError::Ray { ray: number, found });
         let (p, d) = (self.point, self.direction);
-        let sizes = [p.x, p.y, p.z].map(f64::abs);
-        if !(p.is_finite() && d.is_finite()) || sizes.iter().any(|v| *v > 1e100) {
-            return refuse(format!("start {p:?}, direction {d:?}"));
+        let start = [("x", p.x), ("y", p.y), ("z", p.z)];
+        if let Some((name, found)) = start.into_iter().find(|(_, v)| !(v.abs() <= LARGEST_START)) {
+            return refuse(format!("{name} is {found:e}"));
+        }
+        let direction = [("L", d.x), ("M", d.y), ("N", d.z)];
+        if let Some((name, found)) = direction.into_iter().find(|(_, v)| !v.is_finite()) {
+            return refuse(format!("{name} is {found}"));
         }
         let length = d.dot(d).sqrt();
         if (length - 1.0).abs() > 1e-9 {

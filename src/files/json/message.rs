@@ -1,14 +1,19 @@
 //! Errors of the JSON parser in the words of a lens file: place, found and expected.
 
+use super::strict::Strict;
 use crate::files::error::ParseError;
 use serde::de::DeserializeOwned;
 use serde_json::{Deserializer, Error, Value};
+
+/// An expected object, in messages.
+const OBJECT: &str = "an object with its keys: {\"key\": ...}";
 
 /// Parses JSON. An error names the line, the column and the keys that lead to the place, such as
 /// `views[0].source`, where list positions count from 0.
 pub(super) fn parse<T: DeserializeOwned>(text: &str) -> Result<T, ParseError> {
     let mut deserializer = Deserializer::from_str(text);
-    let value = serde_path_to_error::deserialize(&mut deserializer).map_err(|error| {
+    let strict = Strict(&mut deserializer);
+    let value = serde_path_to_error::deserialize(strict).map_err(|error| {
         let keys = error.path().to_string();
         translate(error.inner(), &keys, text)
     })?;
@@ -58,13 +63,14 @@ fn found_and_expected(message: &str) -> (String, String) {
     let (found, expected) = message.split_once(", expected ").unwrap_or((message, "it"));
     let found = match found.strip_prefix("missing field ") {
         Some(key) => format!("no key {key}"),
+        None if found == "sequence" => "a list".to_owned(),
         None => found
             .replace("unit variant", "a name alone")
             .replace("unknown field", "the unknown key")
             .replace("unknown variant", "the unknown name"),
     };
     let expected = match expected {
-        of if of.starts_with("struct ") => "an object with its keys: {\"key\": ...}",
+        of if of.starts_with("struct ") => OBJECT,
         "f64" => "a number",
         "usize" | "u64" | "u32" => "a whole number, 0 or more",
         "a sequence" => "a list",

@@ -17,6 +17,7 @@ mod layout;
 mod lens;
 mod medium;
 mod message;
+mod strict;
 mod surface;
 
 pub use layout::pretty;

@@ -9,11 +9,16 @@ mod npy;
 mod npz;
 mod raw;
 
-use super::FileError;
 use super::error::ParseError;
+use super::{FileError, MAX_LENS_BYTES, read_file};
 use crate::grin::field::RegularGrid;
 use crate::math::Vec3;
 use std::path::{Path, PathBuf};
+
+/// The maximum number of nodes of a volume.
+const MAX_NODES: u64 = 1 << 28;
+/// The maximum size of a file of a volume, in bytes: all nodes with 8 bytes each, and the rest.
+pub const MAX_VOLUME_BYTES: u64 = 8 * MAX_NODES + 1_000_000;
 
 /// Samples on a regular grid.
 #[derive(Debug, Clone, PartialEq)]
@@ -27,11 +32,11 @@ pub struct Volume {
 /// Reads a volume.
 ///
 /// # Errors
-/// A file that cannot be read or is malformed; see [`FileError`].
+/// A file that cannot be read, is malformed, or holds more numbers than its header says; see
+/// [`FileError`].
 pub fn read_volume(path: &Path) -> Result<Volume, FileError> {
     let file = path.display().to_string();
-    let bytes = std::fs::read(path)
-        .map_err(|source| FileError::Unreadable { file: file.clone(), source })?;
+    let bytes = read_file(path, MAX_VOLUME_BYTES)?;
     if bytes.starts_with(b"PK") {
         return npz::read(&bytes).map_err(|malformed| malformed.in_file(&file));
     }
@@ -43,6 +48,13 @@ pub fn read_volume(path: &Path) -> Result<Volume, FileError> {
         return Err(ParseError { place, found, expected: expected.to_owned() }.in_file(&file));
     }
     raw::read(path, &bytes)
+}
+
+/// The files that a volume is read from: the file itself, and the numbers that its header names.
+pub fn volume_files(path: &Path) -> Vec<PathBuf> {
+    let header = read_file(path, MAX_LENS_BYTES).ok();
+    let data = header.and_then(|header| raw::data_path(path, &header));
+    std::iter::once(path.to_owned()).chain(data).collect()
 }
 
 /// The beginning of a file that is not a volume, for a message.
@@ -65,12 +77,21 @@ fn describe_start(bytes: &[u8]) -> String {
 /// A file that cannot be written; the targets are unchanged, except that the numbers of a `.raw` file
 /// are replaced before its header.
 pub fn write_volume(path: &Path, volume: &Volume) -> Result<Vec<PathBuf>, FileError> {
-    let is_npz = path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("npz"));
-    if !is_npz {
+    if !is_npz(path) {
         return raw::write(path, volume);
     }
     npz::write(path, volume)?;
     Ok(vec![path.to_owned()])
+}
+
+/// True for a path in `NumPy`'s format.
+pub fn is_npz(path: &Path) -> bool {
+    path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("npz"))
+}
+
+/// The file of the numbers that is written beside a JSON header.
+pub fn raw_path(header: &Path) -> PathBuf {
+    header.with_extension("raw")
 }
 
 /// Checks that there is one finite value for each node; `place` is their place in a message.

@@ -1,7 +1,8 @@
 //! One array in `NumPy`'s format (NEP 1): a magic string, a Python dictionary as header, and the numbers.
 
-use super::decode;
+use super::{MAX_NODES, decode};
 use crate::files::error::ParseError;
+use std::io::Read;
 
 /// An array of numbers in row-major order: the last index runs fastest.
 #[derive(Debug, Clone, PartialEq)]
@@ -11,53 +12,78 @@ pub(super) struct NpyArray {
 }
 
 const MAGIC: &[u8] = b"\x93NUMPY";
+/// The maximum number of bytes of a header.
+const MAX_HEADER: u64 = 65_536;
 
-/// Reads an array; `name` is its name in messages.
-pub(super) fn read(name: &str, bytes: &[u8]) -> Result<NpyArray, ParseError> {
+/// Reads an array; `name` is its name in messages. The header comes first, and no more numbers are
+/// read than it says: a small archive may hold a long row of them.
+pub(super) fn read(name: &str, mut from: impl Read) -> Result<NpyArray, ParseError> {
     let wrong = |found: String, expected: &str| ParseError {
         place: format!("array {name}"),
         found,
         expected: expected.to_owned(),
     };
-    let (header, data) = split_header(bytes)
+    let header = read_header(&mut from)
         .ok_or_else(|| wrong("no array header".into(), "NumPy's .npy format"))?;
-    let entry = |key| header_entry(header, key).unwrap_or_default();
+    let entry = |key| header_entry(&header, key).unwrap_or_default();
     let kind = entry("descr").trim_matches(['\'', '"']);
-    let numbers: Vec<f64> = match kind {
-        "<f8" => decode(data, f64::from_le_bytes),
-        "<f4" => decode(data, |b| f64::from(f32::from_le_bytes(b))),
-        "<i8" => decode(data, |b| i64::from_le_bytes(b) as f64),
-        "<i4" => decode(data, |b| f64::from(i32::from_le_bytes(b))),
-        _ => return Err(wrong(format!("numbers of type {kind}"), "<f8, <f4, <i8 or <i4")),
-    };
+    let numbers = NumberFormat::of(kind)
+        .ok_or_else(|| wrong(format!("numbers of type {kind}"), "<f8, <f4, <i8 or <i4"))?;
     let shape = parse_shape(entry("shape"))
         .ok_or_else(|| wrong(format!("shape {}", entry("shape")), "a tuple of counts"))?;
-    let count = shape.iter().try_fold(1_usize, |product, n| product.checked_mul(*n));
-    if count != Some(numbers.len()) {
-        return Err(wrong(
-            format!("{} numbers for {shape:?}", numbers.len()),
-            "one for each element",
-        ));
+    let count = shape.iter().try_fold(1_u64, |product, n| product.checked_mul(*n as u64));
+    let count = count.filter(|count| *count <= MAX_NODES).ok_or_else(|| {
+        wrong(format!("shape {shape:?}"), &format!("at most {MAX_NODES} numbers"))
+    })?;
+    let (mut data, bytes) = (Vec::new(), count * numbers.bytes as u64);
+    let read = from.take(bytes + 1).read_to_end(&mut data);
+    read.map_err(|error| wrong(error.to_string(), "an undamaged archive"))?;
+    if data.len() as u64 != bytes {
+        let found = if data.len() as u64 > bytes { "more".into() } else { data.len().to_string() };
+        let expected = format!("{bytes}: one number for each element");
+        return Err(wrong(format!("{found} bytes of numbers for {shape:?}"), &expected));
     }
+    let values = (numbers.decode)(&data);
     let values =
-        if entry("fortran_order") == "True" { to_row_major(&shape, &numbers) } else { numbers };
+        if entry("fortran_order") == "True" { to_row_major(&shape, &values) } else { values };
     Ok(NpyArray { shape, values })
 }
 
-/// The header and the bytes of the numbers.
-fn split_header(bytes: &[u8]) -> Option<(&str, &[u8])> {
-    let rest = bytes.strip_prefix(MAGIC)?;
-    let (version, rest) = rest.split_at_checked(2)?;
+/// A format of numbers.
+struct NumberFormat {
+    /// The number of bytes of one number.
+    bytes: usize,
+    decode: fn(&[u8]) -> Vec<f64>,
+}
+
+impl NumberFormat {
+    /// The format by `NumPy`'s name; `None` for others.
+    fn of(kind: &str) -> Option<Self> {
+        let (bytes, decode): (_, fn(&[u8]) -> Vec<f64>) = match kind {
+            "<f8" => (8, |data| decode(data, f64::from_le_bytes)),
+            "<f4" => (4, |data| decode(data, |b| f64::from(f32::from_le_bytes(b)))),
+            "<i8" => (8, |data| decode(data, |b| i64::from_le_bytes(b) as f64)),
+            "<i4" => (4, |data| decode(data, |b| f64::from(i32::from_le_bytes(b)))),
+            _ => return None,
+        };
+        Some(Self { bytes, decode })
+    }
+}
+
+/// Reads the header, which leaves the numbers.
+fn read_header(from: &mut impl Read) -> Option<String> {
+    let mut start = [0; 8];
+    from.read_exact(&mut start).ok()?;
+    let [version, _] = start.strip_prefix(MAGIC)? else { return None };
     // The length of the header has 2 bytes in version 1 and 4 in later versions.
-    let (length, rest) = if version[0] == 1 {
-        let (length, rest) = rest.split_first_chunk()?;
-        (u32::from(u16::from_le_bytes(*length)), rest)
-    } else {
-        let (length, rest) = rest.split_first_chunk()?;
-        (u32::from_le_bytes(*length), rest)
-    };
-    let (header, data) = rest.split_at_checked(length as usize)?;
-    Some((std::str::from_utf8(header).ok()?, data))
+    let mut length = [0; 4];
+    let bytes = if *version == 1 { 2 } else { 4 };
+    from.read_exact(&mut length[..bytes]).ok()?;
+    let length = u64::from(u32::from_le_bytes(length));
+    let mut header = String::new();
+    let is_plausible = length <= MAX_HEADER;
+    is_plausible.then(|| from.take(length).read_to_string(&mut header).ok())??;
+    (header.len() as u64 == length).then_some(header)
 }
 
 /// The text of an entry of the header, a dictionary of strings, words and tuples.

@@ -5,9 +5,9 @@ use super::{Volume, checked_volume};
 use crate::files::FileError;
 use crate::files::error::ParseError;
 use crate::files::write_atomic;
-use std::io::{Cursor, Read as _, Write as _};
+use std::io::{Cursor, Write as _};
 use std::path::Path;
-use zip::result::ZipResult;
+use zip::result::{ZipError, ZipResult};
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipArchive, ZipWriter};
 
@@ -25,18 +25,14 @@ pub(super) fn read(bytes: &[u8]) -> Result<Volume, ParseError> {
 }
 
 fn read_array(bytes: &[u8], name: &str) -> Result<NpyArray, ParseError> {
-    let content = || -> ZipResult<Vec<u8>> {
-        let mut archive = ZipArchive::new(Cursor::new(bytes))?;
-        let mut content = Vec::new();
-        archive.by_name(&format!("{name}.npy"))?.read_to_end(&mut content)?;
-        Ok(content)
-    };
-    let content = content().map_err(|error| ParseError {
+    let missing = |error: ZipError| ParseError {
         place: format!("array {name}"),
         found: error.to_string(),
         expected: "the arrays index, low and spacing".to_owned(),
-    })?;
-    npy::read(name, &content)
+    };
+    let mut archive = ZipArchive::new(Cursor::new(bytes)).map_err(missing)?;
+    let content = archive.by_name(&format!("{name}.npy")).map_err(missing)?;
+    npy::read(name, content)
 }
 
 fn read_triple(bytes: &[u8], name: &str) -> Result<[f64; 3], ParseError> {

@@ -3,13 +3,14 @@
 //! The value at a node is `offset + scale * number`, with the defaults 0 and 1. For example, densities
 //! stored as bytes become an index by `"scale": -1.176e-6, "offset": 1.0003`.
 
-use super::{Volume, checked_volume, decode};
-use crate::files::FileError;
+use super::{MAX_NODES, Volume, checked_volume, decode, raw_path};
 use crate::files::error::ParseError;
-use crate::files::json;
-use crate::files::write_atomic;
+use crate::files::{FileError, json, read_file, write_atomic};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
+
+/// The number of values up to which a message counts those that are too many.
+const COUNTED_NODES: u64 = 1000;
 
 /// The header: grid, number format and scale.
 #[derive(Debug, Serialize, Deserialize)]
@@ -83,6 +84,21 @@ impl SampleFormat {
     }
 }
 
+impl RawHeader {
+    /// The number of bytes of the numbers, at most that of the largest volume, and at least those
+    /// that a message counts.
+    fn data_bytes(&self) -> u64 {
+        let nodes = self.counts.iter().try_fold(1_u64, |all, n| all.checked_mul(*n as u64));
+        nodes.unwrap_or(u64::MAX).clamp(COUNTED_NODES, MAX_NODES) * self.numbers.bytes() as u64
+    }
+}
+
+/// The file of the numbers that a header names; `None` if it is not a header.
+pub(super) fn data_path(path: &Path, header: &[u8]) -> Option<PathBuf> {
+    let header: RawHeader = serde_json::from_slice(header).ok()?;
+    Some(path.with_file_name(header.data))
+}
+
 pub(super) fn read(path: &Path, bytes: &[u8]) -> Result<Volume, FileError> {
     let file = path.display().to_string();
     let header: RawHeader = json::read_json(&String::from_utf8_lossy(bytes), &file)?;
@@ -91,9 +107,7 @@ pub(super) fn read(path: &Path, bytes: &[u8]) -> Result<Volume, FileError> {
         let place = "aplanat_volume".to_owned();
         return Err(ParseError { place, found, expected: "1".to_owned() }.in_file(&file));
     }
-    let data = path.with_file_name(&header.data);
-    let bytes = std::fs::read(&data)
-        .map_err(|source| FileError::Unreadable { file: data.display().to_string(), source })?;
+    let bytes = read_file(&path.with_file_name(&header.data), header.data_bytes())?;
     let RawHeader { numbers, offset, scale, .. } = header;
     let place = header.data.display().to_string();
     if bytes.len() % numbers.bytes() != 0 {
@@ -108,7 +122,7 @@ pub(super) fn read(path: &Path, bytes: &[u8]) -> Result<Volume, FileError> {
 
 /// Writes a header and the numbers beside it; returns both paths.
 pub(super) fn write(path: &Path, volume: &Volume) -> Result<Vec<PathBuf>, FileError> {
-    let data = path.with_extension("raw");
+    let data = raw_path(path);
     let (low, spacing) = (volume.grid.low(), volume.grid.spacing());
     let header = RawHeader {
         aplanat_volume: 1,

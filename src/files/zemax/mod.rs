@@ -20,6 +20,9 @@ use super::report::ConversionReport;
 use crate::lens::Lens;
 use std::path::Path;
 
+/// Thicknesses from this on are infinite, which is accepted for the object only.
+const INFINITE_GAP: f64 = 1e18;
+
 /// The beginning of the note with the source of the lens.
 const SOURCE: &str = "Source: ";
 

@@ -9,7 +9,7 @@ use crate::grin_design::task::{
     Domain, GrinTask, InitialField, LightGoal, ReferenceField, TargetImage, VolumeFile,
 };
 use crate::grin_design::{GrinTaskError, ReferenceFieldError};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// The relative rounding error of an index stored with four bytes.
 const SINGLE_PRECISION: f64 = 5e-7;
@@ -52,6 +52,32 @@ impl GrinTask {
             }
         }
         Ok(())
+    }
+}
+
+impl GrinTask {
+    /// The paths of all files that the task is made from, with those that their headers name.
+    pub fn files(&self) -> Vec<PathBuf> {
+        let mut volumes: Vec<&VolumeFile> = Vec::new();
+        let mut paths: Vec<PathBuf> = Vec::new();
+        for view in &self.views {
+            match &view.goal {
+                LightGoal::Image { drawing: TargetImage::File(file), .. }
+                | LightGoal::Far { drawing: TargetImage::File(file), .. } => {
+                    paths.push(file.path().to_owned());
+                }
+                LightGoal::Like { field: ReferenceField::Volume(file), .. } => volumes.push(file),
+                _ => {}
+            }
+        }
+        if let InitialField::Volume(file) = &self.start {
+            volumes.push(file);
+        }
+        if let Some(ReferenceField::Volume(file)) = &self.exact {
+            volumes.push(file);
+        }
+        paths.extend(volumes.into_iter().flat_map(|file| files::volume_files(file.path())));
+        paths
     }
 }
 

@@ -89,6 +89,16 @@ impl<P: Clone + PartialEq> Reservoir<P> {
         &self.entries
     }
 
+    /// Its points, to be judged anew.
+    pub(in crate::search) fn entries_mut(&mut self) -> &mut [ReservoirEntry<P>] {
+        &mut self.entries
+    }
+
+    /// Removes the points without a finite loss, which no point may have.
+    pub(in crate::search) fn remove_non_finite(&mut self) {
+        self.entries.retain(|entry| entry.loss.is_finite());
+    }
+
     /// The best point, the first among equals; `None` if the reservoir is empty.
     pub fn best(&self) -> Option<&ReservoirEntry<P>> {
         self.entries.iter().min_by(|a, b| a.rank(b))

@@ -49,6 +49,9 @@ pub enum LandscapeError {
     /// A rule is invalid.
     #[error(transparent)]
     Rule(#[from] RuleError),
+    /// No light gets through the start.
+    #[error("no light gets through; expected a lens that forms an image")]
+    NoLight,
     /// Constraints that no lens can satisfy.
     #[error("no lens can satisfy these constraints: {0}")]
     Impossible(String),

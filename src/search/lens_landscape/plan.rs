@@ -57,7 +57,7 @@ impl SearchPlan {
     /// The landscape of the search.
     ///
     /// # Errors
-    /// The lens has no merit, rules or settings are invalid, or no lens can satisfy the
+    /// The lens has no merit or no light, rules or settings are invalid, or no lens can satisfy the
     /// constraints.
     pub fn landscape(&self, lens: &Lens) -> Result<LensLandscape, LandscapeError> {
         let (common, each) = match self.light[..] {
@@ -71,6 +71,9 @@ impl SearchPlan {
         let landscape =
             LensLandscape::new(lens, &goal, &rules, &self.local)?.with_field_light(each)?;
         landscape.check_feasible()?;
+        if landscape.merit(landscape.start(), self.local.tolerance)?.is_dark() {
+            return Err(LandscapeError::NoLight);
+        }
         Ok(landscape)
     }
 

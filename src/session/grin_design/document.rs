@@ -63,7 +63,8 @@ impl GrinDocument {
         source: &DocumentSource,
     ) -> Result<(Self, Option<GrinOptimizer>), String> {
         let file = path.display().to_string();
-        let bytes = std::fs::read(path).map_err(|why| format!("{file}: cannot be read: {why}"))?;
+        let bytes =
+            files::read_file(path, files::MAX_VOLUME_BYTES).map_err(|why| why.to_string())?;
         let text = std::str::from_utf8(&bytes).ok().filter(|_| !bytes.starts_with(b"PK"));
         let json: Option<Value> = text.and_then(|text| serde_json::from_str(text).ok());
         let has = |key: &str| json.as_ref().is_some_and(|json| json.get(key).is_some());

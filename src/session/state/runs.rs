@@ -97,8 +97,13 @@ impl Session {
 
     fn post_pareto_export(&mut self, export: ParetoExport) {
         match export {
-            ParetoExport::Written(folder, files) => {
-                let text = format!("{files} files of the front written to {}", folder.display());
+            ParetoExport::Written { folder, files, stale } => {
+                let remain = match stale {
+                    0 => String::new(),
+                    _ => format!("; {stale} files of an earlier front remain there"),
+                };
+                let place = folder.display();
+                let text = format!("{files} files of the front written to {place}{remain}");
                 self.post(Severity::Note, text);
                 self.events.push(SessionEvent::Saved(folder));
             }

@@ -2,12 +2,13 @@
 
 use super::request::{CheckpointSidecar, LensSearch, StructureSearchRequest};
 use super::snapshot::{EndReason, StructureSearchSnapshot};
+use crate::files::FileLock;
 use crate::lens::Lens;
 use crate::merit::ConstraintMargin;
 use crate::search::SteerCommand;
 use crate::session::clock::{Throttle, Timed, time};
 use crate::session::run::{Engine, EventSender, RunKind, RunStatus, catch_panic};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::thread;
 use std::time::Duration;
@@ -54,6 +55,8 @@ pub(super) struct StructureSearchEngine {
     state: StructureSearchSnapshot,
     sidecar: CheckpointSidecar,
     saves: Throttle,
+    /// The exclusive use of the checkpoint, from the first time that it is saved or loaded.
+    lock: Option<FileLock>,
     /// True after an error, when the search is not to be saved any more.
     is_broken: bool,
     sender: EventSender<StructureSearchReport>,
@@ -64,17 +67,18 @@ impl StructureSearchEngine {
         input: StructureSearchInput,
         sender: &EventSender<StructureSearchReport>,
     ) -> Result<Self, String> {
-        let (search, request, mut sidecar, path) = match input {
+        let (search, request, mut sidecar, path, lock) = match input {
             StructureSearchInput::New { lens, request, path } => {
                 let search = LensSearch::new(&lens, &request).map_err(|why| why.to_string())?;
                 let minutes = request.minutes;
                 let sidecar = CheckpointSidecar { minutes, ..CheckpointSidecar::default() };
-                (search, *request, sidecar, path)
+                (search, *request, sidecar, path, None)
             }
             StructureSearchInput::Saved(path) => {
+                let lock = FileLock::acquire(&path).map_err(|why| why.to_string())?;
                 let (search, request, sidecar) =
                     LensSearch::resume(&path).map_err(|why| why.to_string())?;
-                (search, request, sidecar, Some(path))
+                (search, request, sidecar, Some(path), Some(lock))
             }
         };
         let mut state = StructureSearchSnapshot::new(request, &search.run, path);
@@ -82,7 +86,7 @@ impl StructureSearchEngine {
         sidecar.history.begin(&search.run);
         let mut saves = Throttle::new(SAVE_INTERVAL);
         saves.ready();
-        Ok(Self { search, state, sidecar, saves, is_broken: false, sender: sender.clone() })
+        Ok(Self { search, state, sidecar, saves, lock, is_broken: false, sender: sender.clone() })
     }
 
     /// The reason to end the search, if there is one.
@@ -107,6 +111,7 @@ impl StructureSearchEngine {
     }
 
     fn save_to(&mut self, path: PathBuf) {
+        self.lock = None;
         self.state.checkpoint.path = Some(path);
         self.state.checkpoint.moves = None;
         self.save();
@@ -128,16 +133,21 @@ impl StructureSearchEngine {
 
     /// Writes the checkpoint if there is a file for it; the reason if that failed.
     fn try_save(&mut self) -> Option<String> {
-        let moves = self.search.run.statistics().moves;
-        let path = self.state.checkpoint.path.as_ref()?;
-        let made = path.parent().map_or(Ok(()), std::fs::create_dir_all);
-        let saved = made
-            .map_err(|why| format!("{}: {why}", path.display()))
-            .and_then(|()| self.search.save(path, &self.sidecar).map_err(|why| why.to_string()));
+        let path = self.state.checkpoint.path.clone()?;
+        let saved = self.lock_and_save(&path);
         if saved.is_ok() {
-            self.state.checkpoint.moves = Some(moves);
+            self.state.checkpoint.moves = Some(self.search.run.statistics().moves);
         }
         saved.err()
+    }
+
+    fn lock_and_save(&mut self, path: &Path) -> Result<(), String> {
+        let made = path.parent().map_or(Ok(()), std::fs::create_dir_all);
+        made.map_err(|why| format!("{}: {why}", path.display()))?;
+        if self.lock.is_none() {
+            self.lock = Some(FileLock::acquire(path).map_err(|why| why.to_string())?);
+        }
+        self.search.save(path, &self.sidecar).map_err(|why| why.to_string())
     }
 
     /// Finalizes a lens in a thread of its own, for which the end of the program does not wait.

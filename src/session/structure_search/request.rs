@@ -2,18 +2,18 @@
 
 use super::finalize::LensFinalizer;
 use super::history::SearchHistory;
-use crate::files::FileError;
+use crate::files::CheckpointError;
 use crate::lens::Lens;
 use crate::merit::{ConstraintMargin, Goal};
 use crate::search::lens_landscape::{
     DescentSettings, LandscapeError, LensLandscape, SearchPlan, with_open_apertures,
 };
 use crate::search::{
-    SearchError, SearchEvent, SearchRules, SearchRun, SearchRunOn, SearchSettings, SteerCommand,
+    SEARCH_CHECKPOINT, SearchError, SearchEvent, SearchRules, SearchRun, SearchRunOn,
+    SearchSettings, SteerCommand,
 };
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
-use std::fs;
 use std::path::Path;
 
 /// A specification of a search over lens structures.
@@ -38,8 +38,6 @@ pub(super) enum StructureSearchError {
     Landscape(#[from] LandscapeError),
     #[error(transparent)]
     Search(#[from] SearchError),
-    #[error(transparent)]
-    File(#[from] FileError),
     #[error("{file}: no checkpoint of a search over lenses: {what}")]
     Foreign { file: String, what: String },
 }
@@ -165,9 +163,8 @@ impl LensSearch {
 }
 
 fn read(path: &Path) -> Result<SavedSearch, StructureSearchError> {
-    let file = path.display().to_string();
-    let bytes =
-        fs::read(path).map_err(|source| FileError::Unreadable { file: file.clone(), source })?;
-    serde_json::from_slice(&bytes)
-        .map_err(|error| StructureSearchError::Foreign { file, what: error.to_string() })
+    SEARCH_CHECKPOINT.read(path).map_err(|error| match error {
+        CheckpointError::Corrupt { file, what } => StructureSearchError::Foreign { file, what },
+        error => SearchError::from(error).into(),
+    })
 }

@@ -2,13 +2,10 @@
 
 use crate::files::error::ParseError;
 use crate::files::report::{ConversionOutcome, ConversionReport};
-use crate::files::zemax::coordinate_breaks;
 use crate::files::zemax::file::{ApertureLine, ZemaxFile, ZemaxSurface};
 use crate::files::zemax::shape::{self, ZemaxShape};
+use crate::files::zemax::{INFINITE_GAP, coordinate_breaks};
 use crate::lens::{Medium, Row};
-
-/// Thicknesses from this on are infinite, which is accepted for the object only.
-const INFINITE: f64 = 1e18;
 
 /// The row of surface `number`.
 pub(super) fn row(
@@ -48,7 +45,7 @@ pub(super) fn row(
 
 fn thickness(surface: &ZemaxSurface, number: usize) -> Result<f64, ParseError> {
     let (thickness, line) = surface.thickness.unwrap_or((0.0, surface.line));
-    if thickness.abs() < INFINITE {
+    if thickness.abs() < INFINITE_GAP {
         return Ok(thickness);
     }
     let found = format!("an infinite thickness after surface {number}");

@@ -8,14 +8,16 @@ mod surface;
 mod table;
 
 use crate::files::report::{ConversionOutcome, ConversionReport};
-use crate::lens::{Lens, LensError, Quantity, ZoomThickness};
+use crate::files::zemax::INFINITE_GAP;
+use crate::lens::{Lens, LensError, Parameter, Quantity, ZoomThickness};
 
 /// The text of the file, and the report of everything that is not exact.
 ///
 /// # Errors
-/// An invalid lens.
+/// An invalid lens, or a gap that the format cannot hold.
 pub fn write(lens: &Lens) -> Result<(String, ConversionReport), LensError> {
     lens.check()?;
+    check_thicknesses(lens)?;
     let mut export = ZemaxWriter {
         lens: lens.with_pickups()?,
         text: String::new(),
@@ -28,6 +30,24 @@ pub fn write(lens: &Lens) -> Result<(String, ConversionReport), LensError> {
     export.table();
     export.report_losses();
     Ok((export.text, export.report))
+}
+
+/// Refuses gaps that the other program takes for infinite ones.
+fn check_thicknesses(lens: &Lens) -> Result<(), LensError> {
+    let gaps = lens.surfaces.iter().enumerate();
+    let gaps = gaps.map(|(i, row)| (Parameter::new(i, Quantity::Thickness), row.thickness));
+    let zoomed = lens.zoom.iter().enumerate().flat_map(|(zoom, position)| {
+        let named = move |surface| Parameter::new(surface, Quantity::ZoomThickness(zoom));
+        position.thicknesses.iter().map(move |gap| (named(gap.surface), gap.thickness))
+    });
+    match gaps.chain(zoomed).find(|(_, thickness)| !(thickness.abs() < INFINITE_GAP)) {
+        Some((gap, found)) => Err(LensError::InvalidNumber {
+            what: gap.to_string(),
+            found,
+            expected: "less than 1e18 mm, from which on a gap of a .zmx file is infinite",
+        }),
+        None => Ok(()),
+    }
 }
 
 /// A file that is being written.
@@ -96,7 +116,7 @@ impl ZemaxWriter {
             row.thickness = gap.unwrap_or(row.thickness);
         }
         self.lens.zoom.clear();
-        let moves = |p: crate::lens::Parameter| matches!(p.quantity, Quantity::ZoomThickness(_));
+        let moves = |p: Parameter| matches!(p.quantity, Quantity::ZoomThickness(_));
         self.lens.variables.retain(|variable| !moves(variable.parameter));
         self.lens.pickups.retain(|pickup| !moves(pickup.parameter) && !moves(pickup.source));
         let note = "one position is written as a lens that does not zoom";
