@@ -1,8 +1,9 @@
 //! `convert`: conversion between file formats, with a report of every loss.
 
 use super::error::CliError;
-use super::input::check_output_file;
+use super::input::LoadedLens;
 use super::output::Output;
+use super::output_paths::OutputPaths;
 use crate::files;
 use std::path::PathBuf;
 
@@ -21,7 +22,11 @@ pub(super) struct ConvertArgs {
 
 impl ConvertArgs {
     pub(super) fn run(&self, output: &Output) -> Result<(), CliError> {
-        check_output_file(&self.to, &["json", "zmx"])?;
-        output.print(&files::convert(&self.from, &self.to)?)
+        let mut paths = OutputPaths::reading([("the lens", self.from.as_path())]);
+        paths.file("OUT", Some(&self.to), &["json", "zmx"])?;
+        let opened = files::open(&self.from)?;
+        let file = self.from.display().to_string();
+        LoadedLens { lens: opened.lens.clone(), file }.check_traceable()?;
+        output.print(&opened.convert_to(&self.to)?)
     }
 }

@@ -81,6 +81,11 @@ impl CliError {
         }
     }
 
+    /// The error of a lens without light.
+    pub(super) fn no_light(file: &str) -> Self {
+        Self::Input(format!("{file}: no light gets through; expected a lens that forms an image"))
+    }
+
     /// True if the reader of standard output has closed it.
     pub(super) fn is_closed_pipe(&self) -> bool {
         matches!(self, Self::Output(error) if error.kind() == io::ErrorKind::BrokenPipe)

@@ -1,7 +1,9 @@
 //! `experiment`: the figures and tables of the thesis.
 
 use super::error::CliError;
-use super::output::{Output, ShortNumber, TextTable};
+use super::failures::Failures;
+use super::output::{Output, ShortNumber, TextTable, print_note};
+use super::output_paths::{OutputPaths, stale_note};
 use crate::experiments::{
     self, Claim, Effort, Experiment as Study, ExperimentError, ExperimentProgress,
     ExperimentReport, PhaseTiming,
@@ -11,7 +13,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 use std::fmt::{self, Display};
 use std::ops::ControlFlow;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// A figure or table of the thesis: its data, its pictures, and its claims checked
 #[derive(Debug, clap::Args)]
@@ -33,21 +35,26 @@ impl ExperimentArgs {
     pub(super) fn run(&self, output: &Output) -> Result<(), CliError> {
         let Some(id) = &self.id else { return output.print(&ExperimentList(experiments::ALL)) };
         let studies = selected_studies(id)?;
-        self.out.iter().try_for_each(|folder| create_folder(folder))?;
-        let mut runs = Vec::new();
+        OutputPaths::default().folder("--out", self.out.as_deref(), |_| false)?;
+        let (mut runs, mut failed) = (Vec::new(), Failures::default());
         for study in studies {
-            runs.push(StudyRun { study, report: self.run_study(study) });
+            runs.push(StudyRun { study, report: self.run_study(study, &mut failed) });
         }
         if let [StudyRun { report: Ok(report), .. }] = &runs[..] {
-            output.print(report)?;
+            failed.note(output.print(report));
         } else if runs.len() > 1 {
-            output.print(&StudyRuns(&runs))?;
+            failed.note(output.print(&StudyRuns(&runs)));
         }
-        failures(&runs)
+        failed.note(failures(&runs));
+        failed.into_result()
     }
 
-    /// Runs a study and writes its files.
-    fn run_study(&self, study: &'static Study) -> Result<ExperimentReport, CliError> {
+    /// Runs a study and writes its files; a file that cannot be written is noted.
+    fn run_study(
+        &self,
+        study: &'static Study,
+        failed: &mut Failures,
+    ) -> Result<ExperimentReport, CliError> {
         let mut parts = PhaseTimer::new();
         let mut bar = progress_display();
         let mut watch = |progress: ExperimentProgress<'_>| {
@@ -59,7 +66,9 @@ impl ExperimentArgs {
         let mut report = ExperimentReport::new(study, outcome, ms);
         report.parts = parts.into_phases();
         if let Some(folder) = &self.out {
-            report.write(folder)?;
+            failed.note(report.write(folder));
+            let stale = report.stale_files(folder);
+            stale_note(&stale).iter().for_each(|note| print_note(format!("note: {note}")));
         }
         Ok(report)
     }
@@ -135,13 +144,6 @@ fn unknown_experiment(id: &str) -> CliError {
 
 fn failure(study: &Study, ended: &ExperimentError) -> CliError {
     CliError::Failed(format!("experiment {}: {ended}", study.id))
-}
-
-/// Creates a folder, before the work begins.
-pub(super) fn create_folder(folder: &Path) -> Result<(), CliError> {
-    std::fs::create_dir_all(folder).map_err(|error| {
-        CliError::Input(format!("{}: {error}; expected a folder", folder.display()))
-    })
 }
 
 /// A bar with the progress of an experiment and the name of its phase.

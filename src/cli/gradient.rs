@@ -85,7 +85,14 @@ impl GradientArgs {
         let model = RayModel::from_lens(&lens, 0).map_err(refuse)?;
         lens.surfaces[model.stop()].semi_diameter = Some(model.stop_radius());
         let (found, ms) = time_ms(|| self.differentiate(&model));
-        let found = found.map_err(|cause| CliError::Failed(format!("{}: {cause}", opened.file)))?;
+        let found = found.map_err(|cause| {
+            let text = format!("{}: {cause}", opened.file);
+            if matches!(cause, DerivativeError::Dark(..)) {
+                CliError::Input(text)
+            } else {
+                CliError::Failed(text)
+            }
+        })?;
         output.print(&GradientReport::new(self, &lens, &found, ms))
     }
 

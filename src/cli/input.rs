@@ -1,12 +1,11 @@
-//! The input of subcommands: lenses, fields, tolerances, JSON, and the files that will be written.
+//! The input of subcommands: lenses, fields, tolerances and JSON.
 
 use super::error::CliError;
 use super::output::print_note;
-use crate::files::{self, ConversionOutcome, FileError, json};
+use crate::files::{self, ConversionOutcome, json};
 use crate::lens::{FieldKind, FieldPoint, Lens, System};
 use crate::pupil::RayModel;
 use serde::de::DeserializeOwned;
-use std::io::Read as _;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
@@ -65,6 +64,17 @@ impl LoadedLens {
         model.map_err(|source| CliError::RayModel { file: self.file.clone(), source })
     }
 
+    /// Refuses a lens through which no rays can be traced at some zoom position.
+    pub(super) fn check_traceable(&self) -> Result<(), CliError> {
+        (0..self.lens.zoom_positions()).try_for_each(|zoom| {
+            self.lens
+                .wavelengths
+                .iter()
+                .try_for_each(|w| self.system(zoom, Some(w.um)).map(drop))?;
+            self.ray_model(zoom).map(drop)
+        })
+    }
+
     /// The field point at this height (mm) or angle (degrees), as the lens defines its fields.
     pub(super) fn field_at(&self, y: f64, zoom: usize) -> Result<FieldPoint, CliError> {
         let angle = self.lens.fields_at(zoom).kind == FieldKind::Angle;
@@ -108,37 +118,20 @@ impl FromStr for Tolerance {
     }
 }
 
-/// Reads JSON from a file, or from standard input if the path is `-`.
+/// Reads JSON that describes a design from a file, or from standard input if the path is `-`.
 pub(super) fn read_json<T: DeserializeOwned>(path: &Path) -> Result<T, CliError> {
-    let file = display_name(path);
-    let unreadable = |source| FileError::Unreadable { file: file.clone(), source };
-    let text = if path == Path::new("-") {
-        let mut text = String::new();
-        std::io::stdin().read_to_string(&mut text).map_err(unreadable)?;
-        text
-    } else {
-        std::fs::read_to_string(path).map_err(unreadable)?
-    };
-    Ok(json::read_json(&text, &file)?)
+    read_long_json(path, files::MAX_LENS_BYTES)
 }
 
-/// Refuses a target that cannot be written, before the work begins.
-pub(super) fn check_output_file(path: &Path, extensions: &[&str]) -> Result<(), CliError> {
-    let file = path.display();
-    let extension = path.extension().and_then(|e| e.to_str()).unwrap_or_default();
-    if !extensions.contains(&extension.to_ascii_lowercase().as_str()) {
-        let expected = extensions.join("` or `.");
-        let text = format!("{file}: found the extension `{extension}`; expected `.{expected}`");
-        return Err(CliError::Input(text));
-    }
-    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
-    let folder = folder.unwrap_or(Path::new("."));
-    if path.is_dir() || !folder.is_dir() {
-        let found = if path.is_dir() { "a folder of that name" } else { "no such folder" };
-        let text = format!("{file}: found {found}; expected a file in a folder that exists");
-        return Err(CliError::Input(text));
-    }
-    files::check_writable(path).map_err(|error| CliError::Input(error.to_string()))
+/// Reads JSON of at most `max` bytes from a file, or from standard input if the path is `-`.
+pub(super) fn read_long_json<T: DeserializeOwned>(path: &Path, max: u64) -> Result<T, CliError> {
+    let file = display_name(path);
+    let bytes = if path == Path::new("-") {
+        files::read_bounded(std::io::stdin().lock(), &file, max)?
+    } else {
+        files::read_file(path, max)?
+    };
+    Ok(json::read_json(&files::decode_unicode(&bytes, &file)?, &file)?)
 }
 
 /// The name of a file in messages.

@@ -12,6 +12,7 @@ mod analyze;
 mod convert;
 mod error;
 mod experiment;
+mod failures;
 mod gradient;
 mod grin;
 mod help;
@@ -53,7 +54,9 @@ struct CliArgs {
     command: Option<CliCommand>,
 }
 
-const AFTER_HELP: &str = "Exit status: 0 done, 1 the work failed, 2 the input is wrong.\n\
+const AFTER_HELP: &str = "Exit status: 0 done, 1 the work failed, 2 the input is wrong, also where a \
+    lens lets no light\nthrough. Ctrl-C, SIGTERM and SIGHUP end a long command, which saves what it \
+    found.\n\
     Lengths in mm, angles in degrees, wavelengths in um. Texts count surfaces as the \
     window does: 0 is\nthe object, 1 the first surface; JSON counts from 0. See `aplanat help \
     conventions` and `aplanat help\nlens-file`.";

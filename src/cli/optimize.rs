@@ -1,12 +1,14 @@
 //! `optimize`: local optimization, which saves the best lens however it ends.
 
 use super::error::CliError;
+use super::failures::Failures;
 use super::input::{self, LensFile, LoadedLens, Tolerance};
 use super::names::value_name;
-use super::output::{Output, ShortNumber};
+use super::output::{Output, ShortNumber, write_saved};
+use super::output_paths::OutputPaths;
 use super::progress::{progress_bar, stop_flag};
 use super::terms::TermComparison;
-use crate::files::{self, json};
+use crate::files::{self, FileError, json};
 use crate::lens::{Lens, ParameterKind, add_variables};
 use crate::measure::time_ms;
 use crate::merit::{Goal, Merit, MeritError, TermValue};
@@ -62,9 +64,8 @@ fn default_steps(method: DescentMethod) -> usize {
 
 impl OptimizeArgs {
     pub(super) fn run(&self, output: &Output) -> Result<(), CliError> {
+        self.check_paths()?;
         let opened = self.lens.open()?;
-        input::check_output_file(&self.out, &["json", "zmx"])?;
-        self.history.iter().try_for_each(|path| input::check_output_file(path, &["json"]))?;
         let mut lens = opened.lens.clone();
         add_variables(&mut lens, &self.vary);
         let refuse = |source| merit_error(&opened, source);
@@ -72,22 +73,36 @@ impl OptimizeArgs {
         let started = start(self.method, &lens, &goal, self.error.0);
         let mut optimizer = started.map_err(refuse)?;
         let before = optimizer.terms().map_err(refuse)?;
-        let light = |lens: &Lens| Merit::new(lens, &goal, self.error.0).map(|m| m.light());
-        let light_before = light(&lens).map_err(refuse)?;
+        let merit = |lens: &Lens| Merit::new(lens, &goal, self.error.0).map_err(refuse);
+        let at_start = merit(&lens)?;
+        if at_start.is_dark() {
+            return Err(CliError::no_light(&opened.file));
+        }
         let (search, ms) = time_ms(|| self.search(optimizer.as_mut()));
         // The lens is saved before anything else is computed from it.
         let best = Lens { variables: opened.lens.variables.clone(), ..optimizer.best().clone() };
-        files::save(&best, &self.out)?;
+        let mut failures = Failures::default();
+        let saved = failures.note(files::save(&best, &self.out)).is_some();
+        failures.note(self.write_history(&search));
         let after = optimizer.terms().map_err(refuse)?;
-        let light = [light_before, light(optimizer.best()).map_err(refuse)?];
-        if let Some(path) = &self.history {
-            files::write_atomic(
-                path,
-                json::pretty(&StepHistory { steps: &search.steps }).as_bytes(),
-            )?;
-        }
-        let found = OptimizeOutcome { search: &search, ms, light, before, after };
-        output.print(&OptimizeReport::new(self, &lens, &best, found))
+        let light = [at_start.light(), merit(optimizer.best())?.light()];
+        let found = OptimizeOutcome { search: &search, ms, light, before, after, saved };
+        failures.note(output.print(&OptimizeReport::new(self, &lens, &best, found)));
+        failures.into_result()
+    }
+
+    fn check_paths(&self) -> Result<(), CliError> {
+        let goal = self.goal.as_deref().map(|path| ("--goal", path));
+        let mut paths =
+            OutputPaths::reading([("the lens", self.lens.path())].into_iter().chain(goal));
+        paths.file("--out", Some(&self.out), &["json", "zmx"])?;
+        paths.file("--history", self.history.as_deref(), &["json"])
+    }
+
+    fn write_history(&self, search: &OptimizeRun) -> Result<(), FileError> {
+        let Some(path) = &self.history else { return Ok(()) };
+        let text = json::pretty(&StepHistory { steps: &search.steps });
+        files::write_atomic(path, text.as_bytes())
     }
 
     fn goal(&self, lens: &Lens) -> Result<Goal, GoalError> {
@@ -181,6 +196,8 @@ struct OptimizeOutcome<'a> {
     light: [f64; 2],
     before: Vec<TermValue>,
     after: Vec<TermValue>,
+    /// True if the best lens was saved.
+    saved: bool,
 }
 
 /// The printed result.
@@ -198,7 +215,10 @@ struct OptimizeReport {
     last_refusal: Option<String>,
     terms: Vec<TermComparison>,
     variables: Vec<VariableComparison>,
-    out: String,
+    out: Option<String>,
+    /// The best lens, if it could not be saved.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    lens: Option<Lens>,
 }
 
 #[derive(Serialize)]
@@ -210,7 +230,7 @@ struct VariableComparison {
 
 impl OptimizeReport {
     fn new(args: &OptimizeArgs, lens: &Lens, best: &Lens, found: OptimizeOutcome<'_>) -> Self {
-        let OptimizeOutcome { search, ms, light, before, after } = found;
+        let OptimizeOutcome { search, ms, light, before, after, saved } = found;
         let merit = |terms: &[TermValue]| terms.iter().map(|t| t.weight * t.value).sum();
         let refusals = || search.steps.iter().filter_map(|step| step.refused.as_ref());
         let variable = |v: &crate::lens::Variable| VariableComparison {
@@ -231,7 +251,8 @@ impl OptimizeReport {
             last_refusal: refusals().next_back().cloned(),
             terms: TermComparison::compare(&before, &after),
             variables: lens.variables.iter().map(variable).collect(),
-            out: args.out.display().to_string(),
+            out: saved.then(|| args.out.display().to_string()),
+            lens: (!saved).then(|| best.clone()),
         }
     }
 }
@@ -242,7 +263,7 @@ const LIGHT_TERMS: [&str; 5] =
 
 impl Display for OptimizeReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { steps, ms, merit_before, merit_after, out, .. } = self;
+        let Self { steps, ms, merit_before, merit_after, .. } = self;
         let ended = match self.ended {
             OptimizeEnd::Finished => "converged",
             OptimizeEnd::Steps => "the maximum number of steps was reached",
@@ -270,6 +291,7 @@ impl Display for OptimizeReport {
         }
         writeln!(f)?;
         let table = TermComparison::table(&self.terms);
-        writeln!(f, "{table}\nsaved as {out}")
+        writeln!(f, "{table}")?;
+        write_saved(f, self.out.as_deref(), self.lens.as_ref())
     }
 }

@@ -2,6 +2,7 @@
 
 use super::error::CliError;
 use crate::files::json;
+use crate::lens::Lens;
 use serde::Serialize;
 use std::fmt::{self, Display};
 use std::io::{Write as _, stderr, stdout};
@@ -24,6 +25,17 @@ impl Output {
         out.write_all(text.as_bytes())?;
         Ok(out.flush()?)
     }
+}
+
+/// Writes the file of the best lens, or the lens itself if it could not be saved.
+pub(super) fn write_saved(
+    f: &mut fmt::Formatter<'_>,
+    out: Option<&str>,
+    unsaved: Option<&Lens>,
+) -> fmt::Result {
+    out.map_or(Ok(()), |out| writeln!(f, "saved as {out}"))?;
+    let Some(lens) = unsaved else { return Ok(()) };
+    write!(f, "the lens could not be saved; this is its file:\n\n{}", json::write(lens))
 }
 
 /// Prints a note on standard error.

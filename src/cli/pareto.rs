@@ -1,8 +1,10 @@
 //! `pareto`: the front of sharpness against light.
 
 use super::error::CliError;
+use super::failures::Failures;
 use super::input::{LensFile, Tolerance};
-use super::output::{Output, ShortNumber, TextTable};
+use super::output::{Output, ShortNumber, TextTable, print_note};
+use super::output_paths::{OutputPaths, stale_note};
 use super::progress::{progress_bar, stop_flag};
 use crate::lens::Lens;
 use crate::measure::time_ms;
@@ -49,12 +51,9 @@ pub(super) struct ParetoArgs {
 
 impl ParetoArgs {
     pub(super) fn run(&self, output: &Output) -> Result<(), CliError> {
+        let mut paths = OutputPaths::reading([("the lens", self.lens.path())]);
+        paths.folder("--out", self.out.as_deref(), ParetoReport::is_own_file)?;
         let opened = self.lens.open()?;
-        if let Some(folder) = &self.out {
-            std::fs::create_dir_all(folder).map_err(|error| {
-                CliError::Input(format!("{}: {error}; expected a folder", folder.display()))
-            })?;
-        }
         let stop = stop_flag();
         let refuse = |cause: ParetoError| CliError::Input(format!("{}: {cause}", opened.file));
         let search = |pupil| self.search(&opened.lens, pupil, &stop).map_err(refuse);
@@ -62,6 +61,7 @@ impl ParetoArgs {
         let biased = if self.no_biased { None } else { Some(search(PupilEdge::Frozen)?) };
         let mut report =
             ParetoSweepReport::new(&sweep, ms, biased.as_ref(), stop.load(Ordering::Relaxed));
+        let mut failures = Failures::default();
         if let Some(folder) = &self.out {
             let survey = ParetoReport {
                 name: &opened.lens.name,
@@ -70,10 +70,12 @@ impl ParetoArgs {
                 tried: sweep.evaluated(),
                 biased: biased.as_ref().map(|(sweep, _)| sweep.front()),
             };
-            let written = survey.write(folder)?;
-            report.files = written.iter().map(|path| path.display().to_string()).collect();
+            report.files = failures.note(survey.write(folder)).unwrap_or_default();
+            report.stale = survey.stale_files(folder);
+            stale_note(&report.stale).iter().for_each(|note| print_note(format!("note: {note}")));
         }
-        output.print(&report)
+        failures.note(output.print(&report));
+        failures.into_result()
     }
 
     fn search(
@@ -123,7 +125,10 @@ struct ParetoSweepReport<'a> {
     start: &'a ParetoPoint,
     front: &'a [ParetoPoint],
     biased: Option<BiasedSweep<'a>>,
-    files: Vec<String>,
+    files: Vec<PathBuf>,
+    /// Files of an earlier front in the same folder.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    stale: Vec<PathBuf>,
 }
 
 #[derive(Serialize)]
@@ -158,6 +163,7 @@ impl<'a> ParetoSweepReport<'a> {
             front: sweep.front().points(),
             biased,
             files: Vec::new(),
+            stale: Vec::new(),
         }
     }
 }
@@ -200,7 +206,9 @@ impl Display for ParetoSweepReport<'_> {
         }
         write!(f, "{table}")?;
         match self.files.first() {
-            Some(first) => write!(f, "\n{} files, the table is {first}", self.files.len()),
+            Some(first) => {
+                writeln!(f, "\n{} files, the table is {}", self.files.len(), first.display())
+            }
             None => Ok(()),
         }
     }

@@ -1,17 +1,45 @@
-//! Progress and interruption of a long run: a bar on standard error, and Ctrl-C.
+//! Progress and interruption of a long run: a bar on standard error, and the signals that end it.
 
 use indicatif::{ProgressBar, ProgressStyle};
+#[cfg(unix)]
+use signal_hook::consts::{SIGHUP, SIGTERM};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// A flag that Ctrl-C raises; a second Ctrl-C has no further effect.
+/// A flag that is raised by Ctrl-C, by a request to terminate, and by the end of the terminal; once
+/// it is raised, further signals have no effect.
 pub(super) fn stop_flag() -> Arc<AtomicBool> {
     let flag = Arc::new(AtomicBool::new(false));
     let raised = Arc::clone(&flag);
     if let Err(error) = ctrlc::set_handler(move || raised.store(true, Ordering::Relaxed)) {
         log::warn!("Ctrl-C will not save the best lens: {error}");
     }
+    #[cfg(unix)]
+    raise_on_signals(&flag);
     flag
+}
+
+/// Raises a flag at the signals that end a run besides Ctrl-C. A run under `nohup` ignores the end
+/// of its terminal.
+#[cfg(unix)]
+fn raise_on_signals(flag: &Arc<AtomicBool>) {
+    let hang_up = (!ignores_hang_up()).then_some(SIGHUP);
+    for signal in [SIGTERM].into_iter().chain(hang_up) {
+        if let Err(error) = signal_hook::flag::register(signal, Arc::clone(flag)) {
+            log::warn!("signal {signal} will not save the best lens: {error}");
+        }
+    }
+}
+
+/// True if this process was started so that it ignores the end of its terminal, where the system
+/// tells.
+#[cfg(unix)]
+fn ignores_hang_up() -> bool {
+    let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let mask = status.lines().find_map(|line| line.strip_prefix("SigIgn:"));
+    let mask = mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok());
+    // Signal 1 is the lowest bit.
+    mask.is_some_and(|mask| mask >> (SIGHUP - 1) & 1 == 1)
 }
 
 /// A bar on standard error, shown if that is a terminal.

@@ -3,6 +3,7 @@
 use super::error::CliError;
 use super::input::{self, LensFile};
 use super::output::{Output, ShortNumber, TextTable};
+use crate::files::MAX_DATA_BYTES;
 use crate::lens::SurfaceNumber;
 use crate::math::Vec3;
 use crate::trace::{Fates, Ray, TracedRay, Tracer};
@@ -25,7 +26,7 @@ pub(super) struct TraceArgs {
 impl TraceArgs {
     pub(super) fn run(&self, output: &Output) -> Result<(), CliError> {
         let opened = self.lens.open()?;
-        let request: RayRequest = input::read_json(&self.rays)?;
+        let request: RayRequest = input::read_long_json(&self.rays, MAX_DATA_BYTES)?;
         let wavelength_um = request.wavelength_um.unwrap_or_else(|| opened.primary_um());
         let zoom = request.zoom.unwrap_or(0);
         let system = opened.system(zoom, Some(wavelength_um))?;

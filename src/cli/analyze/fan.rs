@@ -1,7 +1,7 @@
 //! Transverse ray errors along the two sections of the pupil.
 
 use super::{AnalysisRun, AtField, TextLines};
-use crate::analysis::{Fan, FanPoint, fan};
+use crate::analysis::{AnalysisError, Fan, FanPoint, fan};
 use crate::cli::output::{ShortNumber, or_dash};
 use crate::measure::time_ms;
 use serde::Serialize;
@@ -43,7 +43,13 @@ pub(super) fn fans(run: &AnalysisRun) -> Vec<AtField<FanJson>> {
             milliseconds,
             colors: fans.iter().map(|fan| ColorFanJson::new(run, fan)).collect(),
         };
-        AtField::new(*field, result.map(keys))
+        let lit = result.and_then(|fans| {
+            let mut points = fans.iter().flat_map(|fan| fan.tangential.iter().chain(&fan.sagittal));
+            // The ray through the centre alone carries no light.
+            let dark = points.all(|point| point.error.is_none() || point.pupil == 0.0);
+            if dark { Err(AnalysisError::NoLight) } else { Ok(fans) }
+        });
+        AtField::new(*field, lit.map(keys))
     };
     run.fields.iter().map(at).collect()
 }

@@ -4,15 +4,16 @@ mod report;
 mod straight_rays;
 
 use super::error::CliError;
-use super::experiment::create_folder;
-use super::input::{check_output_file, read_json};
-use super::output::Output;
-use super::output_paths::check_distinct;
+use super::failures::Failures;
+use super::input::read_json;
+use super::output::{Output, print_note};
+use super::output_paths::{OutputPaths, stale_note};
 use super::progress::{progress_bar, stop_flag};
 
 use crate::files;
 use crate::grin_design::{self, GrinField, GrinOptimizer, GrinTask};
 use crate::measure::{Stopwatch, peak_megabytes, processor_ms};
+use crate::plot::Canvas;
 use crate::report::{plot_grin_field, plot_grin_image};
 use report::{GrinCostSummary, GrinReport};
 use serde::Serialize;
@@ -66,11 +67,8 @@ impl GrinArgs {
         if self.show {
             return output.print(&TaskFile(task));
         }
-        self.out.iter().try_for_each(|path| check_output_file(path, &["npz", "json"]))?;
-        self.png.iter().try_for_each(|folder| create_folder(folder))?;
-        let out = self.out.as_deref().map(|path| ("--out", path));
-        check_distinct(&[out], std::iter::once(("the task itself", Path::new(name))))?;
         self.check()?;
+        self.check_paths(name, &task)?;
         let refuse = |error| CliError::Input(format!("{}: {error}", source_name(name)));
         let lines =
             self.lines.then(|| StraightRaySolver::new(source_name(name), &task)).transpose()?;
@@ -82,39 +80,62 @@ impl GrinArgs {
             !worked.map_err(|error| CliError::Failed(format!("{}: {error}", source_name(name))))?;
         let ms = 1e3 * clock.seconds();
         let processor_ms = processor_ms().zip(before).map(|(now, before)| now - before);
+        // The field is saved before anything else is computed from it.
+        let mut failures = Failures::default();
+        let volume = failures.note(self.write_volume(&task, runner.best())).unwrap_or_default();
+        let images = failures.note(self.write_images(&task, runner.best())).unwrap_or_default();
         let mut report =
             GrinReport::new(&runner, &GrinCostSummary { ms, processor_ms, memory, stopped })
                 .map_err(|error| CliError::Failed(format!("{}: {error}", source_name(name))))?;
         let nodes = runner.best().nodes();
-        report.lines =
-            lines.map(|lines| lines.solve(source_name(name), &task, nodes)).transpose()?;
-        report.files = self.write(&task, runner.best())?;
-        output.print(&report)
+        let lines = lines.map(|lines| lines.solve(source_name(name), &task, nodes));
+        report.lines = lines.and_then(|lines| failures.note(lines));
+        if let Some(folder) = &self.png {
+            report.stale = files::stale_files(folder, &images, is_image_name);
+            stale_note(&report.stale).iter().for_each(|note| print_note(format!("note: {note}")));
+        }
+        report.files = volume.into_iter().chain(images).collect();
+        failures.note(output.print(&report));
+        failures.into_result()
     }
 
-    /// Writes volume and images; returns the paths.
-    fn write(&self, task: &GrinTask, best: &GrinField) -> Result<Vec<String>, CliError> {
-        let failed = |error: &dyn std::error::Error| CliError::Failed(error.to_string());
-        let mut written = Vec::new();
-        if let Some(path) = &self.out {
-            let volume = task.volume(best, self.nodes).map_err(|error| failed(&error))?;
-            let files = files::write_volume(path, &volume)?;
-            written.extend(files.iter().map(|file| file.display().to_string()));
+    /// Refuses to write over the files of the task.
+    fn check_paths(&self, name: &str, task: &GrinTask) -> Result<(), CliError> {
+        let inputs = task_inputs(name, task);
+        let mut paths = OutputPaths::reading(inputs.iter().map(|(name, path)| (*name, &**path)));
+        let out = self.out.as_deref();
+        paths.file("--out", out, &["npz", "json"])?;
+        if let Some(header) = out.filter(|path| !files::is_npz(path)) {
+            paths.take("the numbers of --out", &files::raw_path(header))?;
         }
-        if let Some(folder) = &self.png {
-            for picture in plot_grin_field(task, best) {
-                let path = folder.join(format!("{}.png", picture.name));
-                files::write_atomic(&path, &picture.canvas.png().map_err(|error| failed(&error))?)?;
-                written.push(path.display().to_string());
-            }
-            let seen = task.report_views(best).map_err(|error| failed(&error))?;
-            for (i, (view, seen)) in task.views.iter().zip(&seen).enumerate() {
-                let Some(image) = &seen.image else { continue };
-                let canvas = plot_grin_image(&view.name, image, seen.result.psnr.unwrap_or(0.0));
-                let path = folder.join(format!("view-{}.png", i + 1));
-                files::write_atomic(&path, &canvas.png().map_err(|error| failed(&error))?)?;
-                written.push(path.display().to_string());
-            }
+        paths.folder("--png", self.png.as_deref(), is_image_name)
+    }
+
+    /// Writes the volume; returns the paths.
+    fn write_volume(&self, task: &GrinTask, best: &GrinField) -> Result<Vec<PathBuf>, CliError> {
+        let Some(path) = &self.out else { return Ok(Vec::new()) };
+        let volume = task.volume(best, self.nodes).map_err(|error| failed(&error))?;
+        Ok(files::write_volume(path, &volume)?)
+    }
+
+    /// Writes the images; returns the paths.
+    fn write_images(&self, task: &GrinTask, best: &GrinField) -> Result<Vec<PathBuf>, CliError> {
+        let Some(folder) = &self.png else { return Ok(Vec::new()) };
+        let mut written = Vec::new();
+        let mut write = |name: String, canvas: &Canvas| -> Result<(), CliError> {
+            let path = folder.join(name);
+            files::write_atomic(&path, &canvas.png().map_err(|error| failed(&error))?)?;
+            written.push(path);
+            Ok(())
+        };
+        for picture in plot_grin_field(task, best) {
+            write(format!("{}.png", picture.name), &picture.canvas)?;
+        }
+        let seen = task.report_views(best).map_err(|error| failed(&error))?;
+        for (i, (view, seen)) in task.views.iter().zip(&seen).enumerate() {
+            let Some(image) = &seen.image else { continue };
+            let canvas = plot_grin_image(&view.name, image, seen.result.psnr.unwrap_or(0.0));
+            write(format!("view-{}.png", i + 1), &canvas)?;
         }
         Ok(written)
     }
@@ -157,6 +178,22 @@ impl GrinArgs {
             }
         }
     }
+}
+
+/// True for the name of an image that the command writes.
+fn is_image_name(name: &str) -> bool {
+    let is_view = name.starts_with("view-") && name.ends_with(".png");
+    is_view || ["profile.png", "section.png"].contains(&name)
+}
+
+fn failed(error: &dyn std::error::Error) -> CliError {
+    CliError::Failed(error.to_string())
+}
+
+/// The files that a task is read from, each with the name that messages use.
+pub(super) fn task_inputs(name: &str, task: &GrinTask) -> Vec<(&'static str, PathBuf)> {
+    let named = task.files().into_iter().map(|path| ("a file of the task", path));
+    std::iter::once(("the task itself", PathBuf::from(name))).chain(named).collect()
 }
 
 /// Loads a task by its name or from a file.

@@ -9,6 +9,7 @@ use crate::measure::MemoryUse;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fmt::{self, Display};
+use std::path::PathBuf;
 
 /// The cost of a search.
 pub(super) struct GrinCostSummary {
@@ -39,7 +40,10 @@ pub(super) struct GrinReport {
     ms: f64,
     processor_ms: Option<f64>,
     memory: Option<MemoryUse>,
-    pub(super) files: Vec<String>,
+    pub(super) files: Vec<PathBuf>,
+    /// Images of an earlier run in the same folder.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub(super) stale: Vec<PathBuf>,
 }
 
 /// The result of a view.
@@ -123,6 +127,7 @@ impl GrinReport {
             processor_ms: cost.processor_ms,
             memory: cost.memory,
             files: Vec::new(),
+            stale: Vec::new(),
         })
     }
 }
@@ -167,7 +172,7 @@ impl Display for GrinReport {
             ]);
         }
         write!(f, "{table}")?;
-        self.files.iter().try_for_each(|file| writeln!(f, "written: {file}"))
+        self.files.iter().try_for_each(|file| writeln!(f, "written: {}", file.display()))
     }
 }
 

@@ -2,6 +2,7 @@
 
 use super::plot::{self, Color, ErrorChart, ErrorCurve, LegendEntry, PlotArgs, Stroke};
 use crate::cli::error::CliError;
+use crate::cli::failures::Failures;
 use crate::cli::input::LensFile;
 use crate::cli::output::{Output, ShortNumber, TextTable};
 use crate::cli::progress::with_bar;
@@ -36,19 +37,21 @@ pub(super) struct MeasureGradientArgs {
 impl MeasureGradientArgs {
     pub(super) fn run(&self, output: &Output) -> Result<(), CliError> {
         let opened = self.lens.open()?;
-        self.plot.check()?;
+        self.plot.check([("the lens", self.lens.path())])?;
         opened.ray_model(self.zoom)?;
         self.field.map(|y| opened.field_at(y, self.zoom)).transpose()?;
         let measured = with_bar("curves", |report| {
             measure_gradients(&opened.lens, self.zoom, self.field, report)
         });
         let measured = measured.map_err(|e| CliError::Input(format!("{}: {e}", opened.file)))?;
-        self.plot.write(|| draw_curves(&measured, &opened.lens.name))?;
-        output.print(&MeasureGradientReport {
+        let mut failures = Failures::default();
+        failures.note(self.plot.write(|| draw_curves(&measured, &opened.lens.name)));
+        failures.note(output.print(&MeasureGradientReport {
             machine: Machine::detect(),
             lens: opened.file,
             measured,
-        })
+        }));
+        failures.into_result()
     }
 }
 

@@ -2,7 +2,8 @@
 
 use super::plot::{self, Color, ErrorChart, ErrorCurve, LegendEntry, PlotArgs, Stroke};
 use crate::cli::error::CliError;
-use crate::cli::grin::load_task;
+use crate::cli::failures::Failures;
+use crate::cli::grin::{load_task, task_inputs};
 use crate::cli::output::{Output, TextTable};
 use crate::cli::progress::with_bar;
 use crate::grin::Integrator;
@@ -31,11 +32,18 @@ pub(super) struct MeasureGrinArgs {
 impl MeasureGrinArgs {
     pub(super) fn run(&self, output: &Output) -> Result<(), CliError> {
         let task = load_task(&self.task)?;
-        self.plot.check()?;
+        let inputs = task_inputs(&self.task, &task);
+        self.plot.check(inputs.iter().map(|(name, path)| (*name, &**path)))?;
         let measured = with_bar("curves", |report| measure_grin(&task, report));
         let measured = measured.map_err(|e| CliError::Input(format!("{}: {e}", self.task)))?;
-        self.plot.write(|| draw_curves(&measured, &task.name))?;
-        output.print(&MeasureGrinReport { machine: Machine::detect(), task: task.name, measured })
+        let mut failures = Failures::default();
+        failures.note(self.plot.write(|| draw_curves(&measured, &task.name)));
+        failures.note(output.print(&MeasureGrinReport {
+            machine: Machine::detect(),
+            task: task.name,
+            measured,
+        }));
+        failures.into_result()
     }
 }
 

@@ -1,11 +1,11 @@
 //! Curves of error against time: one log-log chart, or two side by side.
 
 use crate::cli::error::CliError;
-use crate::cli::input::check_output_file;
+use crate::cli::output_paths::OutputPaths;
 use crate::files;
 use crate::plot::{Axis, BLACK, Canvas, Chart as Axes, Legend, TextAlign};
 use image::ImageError;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 pub(super) use crate::plot::{Color, Stroke};
 
@@ -18,9 +18,12 @@ pub(super) struct PlotArgs {
 }
 
 impl PlotArgs {
-    /// Refuses a file that cannot be written.
-    pub(super) fn check(&self) -> Result<(), CliError> {
-        self.plot.iter().try_for_each(|path| check_output_file(path, &["png"]))
+    /// Refuses a file that cannot be written, or is one of those that are read.
+    pub(super) fn check<'a>(
+        &self,
+        read: impl IntoIterator<Item = (&'static str, &'a Path)>,
+    ) -> Result<(), CliError> {
+        OutputPaths::reading(read).file("--plot", self.plot.as_deref(), &["png"])
     }
 
     /// Writes the picture, if it is wanted.

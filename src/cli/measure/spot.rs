@@ -2,6 +2,7 @@
 
 use super::plot::{self, Color, ErrorChart, ErrorCurve, LegendEntry, PlotArgs, Stroke};
 use crate::cli::error::CliError;
+use crate::cli::failures::Failures;
 use crate::cli::input::LensFile;
 use crate::cli::output::{Output, ShortNumber, TextTable};
 use crate::cli::progress::with_bar;
@@ -37,7 +38,7 @@ const DEFAULT_ZONE: f64 = 0.7;
 impl MeasureSpotArgs {
     pub(super) fn run(&self, output: &Output) -> Result<(), CliError> {
         let opened = self.lens.open()?;
-        self.plot.check()?;
+        self.plot.check([("the lens", self.lens.path())])?;
         let model = opened.ray_model(self.zoom)?;
         let field =
             opened.field_at(self.field.unwrap_or(DEFAULT_ZONE * model.beam.edge), self.zoom)?;
@@ -46,14 +47,19 @@ impl MeasureSpotArgs {
         });
         let curves = curves
             .map_err(|e| CliError::Input(format!("{}, field {}: {e}", opened.file, field.y)))?;
+        if curves.rms_clipped.is_none() {
+            return Err(CliError::no_light(&opened.file));
+        }
         let title = format!("{}, field {}", opened.lens.name, ShortNumber(field.y));
-        self.plot.write(|| draw_curves(&curves, &title))?;
-        output.print(&MeasureSpotReport {
+        let mut failures = Failures::default();
+        failures.note(self.plot.write(|| draw_curves(&curves, &title)));
+        failures.note(output.print(&MeasureSpotReport {
             machine: Machine::detect(),
             lens: opened.file,
             y: field.y,
             curves,
-        })
+        }));
+        failures.into_result()
     }
 }
 

@@ -8,12 +8,12 @@ mod result;
 pub(super) use plan_args::SearchPlanArgs;
 
 use super::error::CliError;
-use super::experiment::create_folder;
-use super::input::{self, LensFile};
+use super::failures::Failures;
+use super::input::LensFile;
 use super::output::{Output, ShortNumber, print_note};
-use super::output_paths;
+use super::output_paths::{OutputPaths, stale_note};
 use super::progress::{progress_bar, stop_flag};
-use crate::files::{self, CheckpointError};
+use crate::files::{self, CheckpointError, FileLock};
 use crate::lens::Lens;
 use crate::measure::Stopwatch;
 use crate::search::lens_landscape::{LandscapeError, LensLandscape, SearchPlan, finalize};
@@ -99,33 +99,30 @@ enum SearchEnd {
 impl SearchArgs {
     pub(super) fn run(&self, output: &Output) -> Result<(), CliError> {
         self.check()?;
+        self.check_paths()?;
         let opened = self.lens.open()?;
+        let _lock = self.checkpoint.as_deref().map(FileLock::acquire).transpose()?;
         let plan = self.plan(&opened.lens)?;
         let lens = self.plan_args.start_lens(&opened.lens)?;
         let refused = |cause: LandscapeError| landscape_error(&opened.file, cause);
         let landscape = plan.landscape(&lens).map_err(refused)?;
         let start_breaks = landscape.violations(landscape.start()).map_err(refused)?;
         let (mut run, resumed) = self.start_or_resume(&landscape, &plan, &opened.file)?;
-        self.reservoir_dir.iter().try_for_each(|folder| create_folder(folder))?;
         limits::warn(&start_breaks);
         let idle = resumed.then(|| nothing_to_do(&run)).flatten();
         idle.iter().for_each(print_note);
         let watch = Stopwatch::start();
         let before = run.statistics().gradients;
-        let ended = self.run_rounds(&landscape, &mut run, watch)?;
+        let mut failures = Failures::default();
+        let ended = self.run_rounds(&landscape, &mut run, watch, &mut failures);
         let ms = 1e3 * watch.seconds();
-        let best = lens_to_write(&run.best().point, &opened.lens);
-        if let Some(path) = &self.out {
-            files::save(&best, path)?;
-        }
-        let stored = self.write_reservoir(&run, &opened.lens)?;
-        let finished = if self.finish {
-            Some(finalize(&landscape, &run.best().point).map_err(refused)?)
-        } else {
-            None
-        };
-        if let (Some(path), Some(finished)) = (&self.out, &finished) {
-            files::save(&lens_to_write(&finished.lens, &opened.lens), path)?;
+        let mut unsaved = self.save_best(&run.best().point, &opened.lens, &mut failures);
+        let stored = failures.note(self.write_reservoir(&run, &opened.lens)).unwrap_or_default();
+        let stale = self.stale_files(&stored);
+        let finished = self.finish.then(|| finalize(&landscape, &run.best().point));
+        let finished = finished.and_then(|lens| failures.note(lens.map_err(refused)));
+        if let Some(finished) = &finished {
+            unsaved = self.save_best(&finished.lens, &opened.lens, &mut failures);
         }
         let printed = Stopwatch::start();
         let compared = StartAgainstBest::new(&landscape, &run.best().point).map_err(refused)?;
@@ -141,11 +138,14 @@ impl SearchArgs {
             compared,
             compared_ms: 1e3 * printed.seconds(),
             stored,
-            out: self.out.as_deref(),
+            stale,
+            out: self.out.as_deref().filter(|_| unsaved.is_none()),
+            unsaved,
             finished,
         });
-        output.print(&report)?;
-        report.check_finished()
+        failures.note(output.print(&report));
+        failures.note(report.check_finished());
+        failures.into_result()
     }
 
     fn check(&self) -> Result<(), CliError> {
@@ -162,13 +162,15 @@ impl SearchArgs {
         if self.iterations == Some(0) {
             return wrong("--iterations", 0.0, "1 or more");
         }
-        self.out.iter().try_for_each(|path| input::check_output_file(path, &["json", "zmx"]))?;
-        self.checkpoint.iter().try_for_each(|path| input::check_output_file(path, &["json"]))?;
-        self.reservoir_dir.iter().try_for_each(|folder| output_paths::check_folder(folder))?;
-        let out = self.out.as_deref().map(|path| ("--out", path));
-        let checkpoint = self.checkpoint.as_deref().map(|path| ("--checkpoint", path));
+        Ok(())
+    }
+
+    fn check_paths(&self) -> Result<(), CliError> {
         let read = std::iter::once(("the lens", self.lens.path())).chain(self.plan_args.files());
-        output_paths::check_distinct(&[out, checkpoint], read)
+        let mut paths = OutputPaths::reading(read);
+        paths.file("--out", self.out.as_deref(), &["json", "zmx"])?;
+        paths.file("--checkpoint", self.checkpoint.as_deref(), &["json"])?;
+        paths.folder("--reservoir-dir", self.reservoir_dir.as_deref(), is_reservoir_name)
     }
 
     fn plan(&self, lens: &Lens) -> Result<SearchPlan, CliError> {
@@ -204,41 +206,45 @@ impl SearchArgs {
         Ok((run, false))
     }
 
-    /// Runs rounds until the run ends, the time limit or Ctrl-C.
+    /// Runs rounds until the run ends, the time limit or Ctrl-C. A checkpoint that cannot be saved
+    /// is said once and tried again; the failure of the last one is noted.
     fn run_rounds(
         &self,
         landscape: &LensLandscape,
         run: &mut SearchRunOn<LensLandscape>,
         watch: Stopwatch,
-    ) -> Result<SearchEnd, CliError> {
+        failures: &mut Failures,
+    ) -> SearchEnd {
         let stop = stop_flag();
         let bar = progress_bar(run.settings().gradients.unwrap_or(0) as usize);
-        let mut saved = 0.0;
+        let (mut saved, mut is_failing) = (0.0, false);
         let flow = run.advance(landscape, |run, _| {
             bar.set_position(run.statistics().gradients);
             bar.set_message(format!("merit {}", ShortNumber(run.best().loss)));
             if watch.seconds() - saved >= self.checkpoint_every {
-                if let Err(error) = self.save(landscape, run) {
-                    return ControlFlow::Break(Err(error));
+                let failure = self.save(landscape, run).err();
+                if let Some(error) = failure.as_ref().filter(|_| !is_failing) {
+                    bar.suspend(|| print_note(format!("note: the search goes on: {error}")));
                 }
+                is_failing = failure.is_some();
                 saved = watch.seconds();
             }
             let is_late = |minutes: f64| watch.seconds() >= 60.0 * minutes;
             if is_raised(&stop) {
-                ControlFlow::Break(Ok(SearchEnd::Interrupted))
+                ControlFlow::Break(SearchEnd::Interrupted)
             } else if self.minutes.is_some_and(is_late) {
-                ControlFlow::Break(Ok(SearchEnd::Time))
+                ControlFlow::Break(SearchEnd::Time)
             } else {
                 ControlFlow::Continue(())
             }
         });
         let ended = match flow {
             ControlFlow::Continue(end) => SearchEnd::Run(end),
-            ControlFlow::Break(stopped) => stopped?,
+            ControlFlow::Break(end) => end,
         };
         bar.finish_and_clear();
-        self.save(landscape, run)?;
-        Ok(ended)
+        failures.note(self.save(landscape, run));
+        ended
     }
 
     fn save(
@@ -250,12 +256,27 @@ impl SearchArgs {
         run.save(landscape, path).map_err(search_error)
     }
 
+    /// Saves the best lens, if there is a file for it; the lens if that fails.
+    fn save_best(&self, best: &Lens, opened: &Lens, failures: &mut Failures) -> Option<Lens> {
+        let best = lens_to_write(best, opened);
+        let path = self.out.as_ref()?;
+        failures.note(files::save(&best, path)).is_none().then_some(best)
+    }
+
+    /// The lenses of an earlier run in the folder of the reservoir.
+    fn stale_files(&self, stored: &[PathBuf]) -> Vec<PathBuf> {
+        let Some(folder) = &self.reservoir_dir else { return Vec::new() };
+        let stale = files::stale_files(folder, stored, is_reservoir_name);
+        stale_note(&stale).iter().for_each(|note| print_note(format!("note: {note}")));
+        stale
+    }
+
     /// Writes the lenses of the reservoir, best first; returns the paths.
     fn write_reservoir(
         &self,
         run: &SearchRunOn<LensLandscape>,
         opened: &Lens,
-    ) -> Result<Vec<String>, CliError> {
+    ) -> Result<Vec<PathBuf>, CliError> {
         let Some(folder) = &self.reservoir_dir else { return Ok(Vec::new()) };
         let mut files = Vec::new();
         for (i, FoundPoint { entry, running }) in run.found_points().into_iter().enumerate() {
@@ -263,10 +284,18 @@ impl SearchArgs {
             let name = format!("{:02}_generation_{}{running}.json", i + 1, entry.number);
             let path = folder.join(name);
             files::save(&lens_to_write(&entry.point, opened), &path)?;
-            files.push(path.display().to_string());
+            files.push(path);
         }
         Ok(files)
     }
+}
+
+/// True for the name of a file of a lens of the reservoir.
+fn is_reservoir_name(name: &str) -> bool {
+    let generation = |rest: &str| rest.starts_with(|c: char| c.is_ascii_digit());
+    let place = name.trim_start_matches(|c: char| c.is_ascii_digit());
+    let rest = place.strip_prefix("_generation_").is_some_and(generation);
+    place.len() < name.len() && rest && name.ends_with(".json")
 }
 
 /// A lens with the variables of the file that was read, not those of the search.

@@ -4,13 +4,14 @@ use super::SearchEnd;
 use super::limits::ViolatedLimit;
 use super::result::{FinishedReport, StartAgainstBest};
 use crate::cli::error::CliError;
-use crate::cli::output::{ShortNumber, TextTable};
+use crate::cli::output::{ShortNumber, TextTable, write_saved};
+use crate::lens::Lens;
 use crate::merit::ConstraintMargin;
 use crate::search::lens_landscape::{FinalizedLens, LensLandscape};
 use crate::search::{FoundPoint, MutationStatistics, RunEnd, SearchRunOn};
 use serde::Serialize;
 use std::fmt::{self, Display};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Everything that the report is made from.
 pub(super) struct SearchResults<'a> {
@@ -27,8 +28,11 @@ pub(super) struct SearchResults<'a> {
     pub(super) start_breaks: Vec<ConstraintMargin>,
     pub(super) compared: StartAgainstBest,
     pub(super) compared_ms: f64,
-    pub(super) stored: Vec<String>,
+    pub(super) stored: Vec<PathBuf>,
+    pub(super) stale: Vec<PathBuf>,
     pub(super) out: Option<&'a Path>,
+    /// The best lens, if it could not be saved.
+    pub(super) unsaved: Option<Lens>,
     pub(super) finished: Option<FinalizedLens>,
 }
 
@@ -56,9 +60,13 @@ pub(super) struct SearchReport {
     reservoir: Vec<ReservoirRow>,
     mutations: Vec<MutationRow>,
     ended_by: std::collections::BTreeMap<crate::search::DescentEnd, u64>,
-    files: Vec<String>,
+    files: Vec<PathBuf>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    stale: Vec<PathBuf>,
     finished: Option<FinishedReport>,
     out: Option<String>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    lens: Option<Lens>,
 }
 
 #[derive(Serialize)]
@@ -114,8 +122,10 @@ impl SearchReport {
             mutations: mutations.collect(),
             ended_by: statistics.ended.clone(),
             files: searched.stored,
+            stale: searched.stale,
             finished,
             out: searched.out.map(|path| path.display().to_string()),
+            lens: searched.unsaved,
         }
     }
 
@@ -172,12 +182,13 @@ impl Display for SearchReport {
             finished.write(f)?;
         }
         if let Some(first) = self.files.first() {
+            let first = first.display();
             writeln!(f, "\n{} retained lenses, the best is {first}", self.files.len())?;
         }
-        match &self.out {
-            Some(out) => writeln!(f, "\nsaved as {out}"),
-            None => Ok(()),
+        if self.out.is_some() || self.lens.is_some() {
+            writeln!(f)?;
         }
+        write_saved(f, self.out.as_deref(), self.lens.as_ref())
     }
 }
 
