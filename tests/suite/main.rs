@@ -5,6 +5,8 @@
 mod analysis;
 mod aperture;
 mod cli;
+mod cli_failures;
+mod cli_files;
 mod closed_forms;
 mod effects;
 mod experiments;

@@ -78,3 +78,20 @@ fn an_old_checkpoint_is_resumed() {
     let more = done_json(&[&base[..], &["--iterations", "40"]].concat(), "");
     assert_eq!((&more["resumed"], &more["gradients"]), (&true.into(), &28.into()));
 }
+
+/// A merit that the lens does not have is corrected.
+#[test]
+fn an_old_checkpoint_with_a_wrong_digit_tells_the_truth() {
+    let mut file: Value = serde_json::from_str(&text("old_checkpoint.json")).unwrap();
+    file["run"]["best"]["loss"] = json!(0.0024163391142644257);
+    let checkpoint = Scratch::with("wrong-digit.json", &file.to_string());
+    let lens = "lenses/cooke_triplet_100_f27.json";
+    let rules = "tests/files/old_rules.json";
+    let base = ["search", lens, "--rules", rules, "--checkpoint", checkpoint.path()];
+    let idle = done_json(&[&base[..], &["--iterations", "12"]].concat(), "");
+    let terms = idle["terms"].as_array().unwrap();
+    let part =
+        |term: &Value| term["weight"].as_f64().unwrap() * term["after"]["value"].as_f64().unwrap();
+    let (sum, best) = (terms.iter().map(part).sum::<f64>(), idle["merit_best"].as_f64().unwrap());
+    assert!((sum / best - 1.0).abs() < 1e-9, "{sum} {best}");
+}

@@ -126,14 +126,14 @@ fn a_damaged_file_is_refused() {
         let told = matches!(&error, SearchError::Checkpoint(CheckpointError::Corrupt { what, .. }) if !what.is_empty());
         assert!(told && error.to_string().contains("bad.json"), "{error}");
     }
-    let newer = text.replacen("\"aplanat_search\":2", "\"aplanat_search\":3", 1);
+    let newer = text.replacen("\"aplanat_search\":3", "\"aplanat_search\":4", 1);
     let error = load(newer.as_bytes());
     assert!(
         matches!(
             error,
             SearchError::Checkpoint(CheckpointError::UnsupportedVersion {
-                found: 3,
-                expected: 2,
+                found: 4,
+                expected: 3,
                 ..
             })
         ),
@@ -147,6 +147,59 @@ fn a_damaged_file_is_refused() {
     assert!(matches!(missing, Err(SearchError::Checkpoint(CheckpointError::File(_)))));
 }
 
+/// A digit that is another one makes a sound file with other numbers.
+#[test]
+fn one_wrong_digit_is_noticed() {
+    let folder = folder("digits");
+    let (good, bad) = (folder.join("good.json"), folder.join("bad.json"));
+    let first = settings(SearchMethod::Restore);
+    after(30, &first).save(&Rugged::default(), &good).unwrap();
+    let bytes = fs::read(&good).unwrap();
+    let digits: Vec<usize> = (0..bytes.len()).filter(|i| bytes[*i].is_ascii_digit()).collect();
+    let mut count = 0;
+    for at in digits.iter().step_by(digits.len() / 150) {
+        let mut damaged = bytes.clone();
+        damaged[*at] = if bytes[*at] == b'7' { b'8' } else { b'7' };
+        fs::write(&bad, damaged).unwrap();
+        let loaded: Result<SearchRunOn<Rugged>, _> =
+            SearchRun::load(&Rugged::default(), &first, &bad);
+        let error = loaded.err().map(|error| error.to_string()).unwrap_or_default();
+        assert!(error.contains("bad.json"), "a wrong digit at {at} is taken: {error}");
+        count += 1;
+    }
+    assert!(count > 100, "{count}");
+}
+
+/// A file of an older version has no checksum; what it says of its best point is not believed.
+#[test]
+fn the_best_points_of_a_file_are_judged_anew() {
+    let path = folder("judged").join("run.json");
+    let (landscape, first) = (Rugged::default(), settings(SearchMethod::Restore));
+    let run = after(60, &first);
+    run.save(&landscape, &path).unwrap();
+    let mut file: Value = serde_json::from_slice(&fs::read(&path).unwrap()).unwrap();
+    file["aplanat_search"] = 2.into();
+    file.as_object_mut().unwrap().remove("checksum");
+    let load = |file: &Value| -> SearchRunOn<Rugged> {
+        fs::write(&path, file.to_string()).unwrap();
+        SearchRun::load(&landscape, &first, &path).unwrap()
+    };
+    assert!(load(&file) == run, "an old file is read as it is");
+    let mut wrong = file.clone();
+    wrong["run"]["best"]["loss"] = (-1e3).into();
+    assert!(load(&wrong) == run);
+    let mut wrong = file.clone();
+    wrong["run"]["reservoir"]["entries"][0]["loss"] = (-1e3).into();
+    assert!(load(&wrong) == run);
+    let mut wrong = file;
+    wrong["run"]["best"]["point"] = wrong["run"]["start"]["point"].clone();
+    let judged = load(&wrong);
+    let best = judged.best();
+    assert_eq!(best.loss, aplanat::search::Landscape::loss(&landscape, &best.point));
+    let retained = judged.reservoir().best().unwrap();
+    assert!(best.loss <= retained.loss.min(judged.start().loss));
+}
+
 #[test]
 fn a_failed_save_leaves_the_existing_file() {
     let folder = folder("unwritable");
@@ -155,7 +208,7 @@ fn a_failed_save_leaves_the_existing_file() {
     let path = folder.join("run.json");
     run.save(&Rugged::default(), &path).unwrap();
     let value: Value = serde_json::from_slice(&fs::read(&path).unwrap()).unwrap();
-    assert_eq!(value["aplanat_search"], 2);
+    assert_eq!(value["aplanat_search"], 3);
     let left = fs::read_dir(&folder).unwrap().count();
     assert_eq!(left, 1, "something was left beside it");
 }

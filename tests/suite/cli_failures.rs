@@ -1,0 +1,260 @@
+//! What a command does when something fails on its way: the result is still saved where it can be
+//! and printed, a checkpoint has one writer, and every request to end saves what was found.
+
+use super::cli::{done_json, has_keys, refused};
+use super::cli_files::Folder;
+use serde_json::{Value, json};
+use std::fs;
+use std::path::Path;
+use std::process::{Child, Command, Output, Stdio};
+use std::time::Duration;
+
+const LENS: &str = "lenses/cooke_triplet_100_f27.json";
+
+/// A command that runs while the test goes on.
+struct Running(Option<Child>);
+
+impl Running {
+    fn start(arguments: &[&str]) -> Self {
+        Self::of(Command::new(env!("CARGO_BIN_EXE_aplanat")).args(arguments))
+    }
+
+    fn of(command: &mut Command) -> Self {
+        let command = command.stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
+        Self(Some(command.spawn().unwrap()))
+    }
+
+    fn id(&self) -> String {
+        self.0.as_ref().unwrap().id().to_string()
+    }
+
+    /// Waits until a file exists, and then a little longer.
+    fn wait_for(&self, path: &str) {
+        let exists = |_: &u32| !Path::new(path).exists();
+        (0..600).take_while(exists).for_each(|_| std::thread::sleep(Duration::from_millis(100)));
+        assert!(Path::new(path).exists(), "{path}");
+        std::thread::sleep(Duration::from_millis(300));
+    }
+
+    fn signal(&self, name: &str) {
+        assert!(Command::new("kill").args([name, &self.id()]).status().unwrap().success());
+    }
+
+    fn output(mut self) -> Output {
+        self.0.take().unwrap().wait_with_output().unwrap()
+    }
+}
+
+impl Drop for Running {
+    fn drop(&mut self) {
+        if let Some(child) = &mut self.0 {
+            drop(child.kill());
+            drop(child.wait());
+        }
+    }
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8(bytes.to_vec()).unwrap()
+}
+
+/// A search that takes a while and is saved after every round.
+fn long_search(checkpoint: &str, more: &[&str]) -> Vec<String> {
+    let base = ["search", LENS, "--iterations", "100000000", "--chains", "1", "--checkpoint"];
+    let all = [&base[..], &[checkpoint, "--checkpoint-every", "0", "--json"], more].concat();
+    all.into_iter().map(str::to_owned).collect()
+}
+
+fn start_search(checkpoint: &str, more: &[&str]) -> Running {
+    let arguments = long_search(checkpoint, more);
+    let running = Running::start(&arguments.iter().map(String::as_str).collect::<Vec<_>>());
+    running.wait_for(checkpoint);
+    running
+}
+
+/// The search goes on without its checkpoint, says so once, and ends with its result.
+#[cfg(unix)]
+#[test]
+fn a_search_survives_the_loss_of_its_checkpoint() {
+    let (lost, kept) = (Folder::new("lost"), Folder::new("kept"));
+    let (checkpoint, out) = (lost.path("sub/run.json"), kept.path("best.json"));
+    fs::create_dir(lost.path("sub")).unwrap();
+    let running = start_search(&checkpoint, &["--out", &out]);
+    fs::remove_dir_all(lost.path("sub")).unwrap();
+    std::thread::sleep(Duration::from_secs(1));
+    running.signal("-INT");
+    let output = running.output();
+    let said = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    assert_eq!(said.matches("the search goes on").count(), 1, "{said}");
+    assert!(said.contains("error: ") && said.contains("run.json: cannot be written"), "{said}");
+    let report: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!((&report["ended"], &report["out"]), (&"interrupted".into(), &out.into()));
+    has_keys(&done_json(&["info", &kept.path("best.json")], ""), &["efl"]);
+}
+
+/// A checkpoint that can be written again is.
+#[cfg(unix)]
+#[test]
+fn a_checkpoint_is_tried_again() {
+    let folder = Folder::new("again");
+    let checkpoint = folder.path("sub/run.json");
+    fs::create_dir(folder.path("sub")).unwrap();
+    let running = start_search(&checkpoint, &[]);
+    fs::remove_dir_all(folder.path("sub")).unwrap();
+    std::thread::sleep(Duration::from_millis(500));
+    fs::create_dir(folder.path("sub")).unwrap();
+    running.wait_for(&checkpoint);
+    running.signal("-INT");
+    let output = running.output();
+    assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
+}
+
+/// A lens that cannot be saved is printed.
+#[cfg(unix)]
+#[test]
+fn a_lens_that_cannot_be_saved_is_printed() {
+    let (lost, kept) = (Folder::new("lost-out"), Folder::new("kept-run"));
+    fs::create_dir(lost.path("sub")).unwrap();
+    let out = lost.path("sub/best.json");
+    let running = start_search(&kept.path("run.json"), &["--out", &out]);
+    fs::remove_dir_all(lost.path("sub")).unwrap();
+    running.signal("-INT");
+    let output = running.output();
+    assert_eq!(output.status.code(), Some(1), "{}", text(&output.stderr));
+    let report: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert_eq!(report["out"], Value::Null);
+    let lens = kept.file("printed.json", &report["lens"].to_string());
+    has_keys(&done_json(&["info", &lens], ""), &["efl"]);
+}
+
+/// A terminal or a disk that takes no results does not keep them from the file.
+#[cfg(target_os = "linux")]
+#[test]
+fn results_are_saved_whatever_happens_to_the_output() {
+    let folder = Folder::new("full");
+    let (out, history) = (folder.path("out.json"), folder.path("history.json"));
+    let full = || fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
+    let mut command = Command::new(env!("CARGO_BIN_EXE_aplanat"));
+    command.args(["optimize", LENS, "--vary", "curvatures", "--steps", "2", "--out", &out]);
+    command.args(["--history", &history]).stdout(full());
+    let output = command.stderr(Stdio::piped()).output().unwrap();
+    assert_eq!(output.status.code(), Some(1));
+    assert!(text(&output.stderr).contains("standard output: "), "{}", text(&output.stderr));
+    aplanat::files::open(&out).unwrap();
+    assert!(Path::new(&history).exists());
+}
+
+#[cfg(unix)]
+#[test]
+fn a_checkpoint_has_one_writer() {
+    let folder = Folder::new("locked");
+    let checkpoint = folder.path("run.json");
+    let running = start_search(&checkpoint, &[]);
+    let link = folder.path("link.json");
+    std::os::unix::fs::symlink("run.json", &link).unwrap();
+    let holder = format!("in use by process {}", running.id());
+    for path in [&checkpoint, &link] {
+        let arguments = long_search(path, &[]);
+        let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+        refused(2, &arguments, "", &[path, &holder]);
+    }
+    running.signal("-KILL");
+    running.output();
+    let again = start_search(&checkpoint, &[]);
+    again.signal("-INT");
+    assert_eq!(again.output().status.code(), Some(0));
+    assert_eq!(folder.names(), ["link.json", "run.json"], "the lock is gone with its holder");
+}
+
+/// A command ends as it does for Ctrl-C: with its result, saved.
+#[cfg(unix)]
+fn ends_with_its_result(arguments: &[&str], signal: &str) -> Value {
+    let mut said = String::new();
+    // A busy machine may need longer until the work begins.
+    for seconds in [2, 8, 30] {
+        let running = Running::start(&[arguments, &["--json"]].concat());
+        std::thread::sleep(Duration::from_secs(seconds));
+        running.signal(signal);
+        let output = running.output();
+        said = text(&output.stderr);
+        if output.status.code() == Some(0) {
+            return serde_json::from_slice(&output.stdout).unwrap();
+        }
+    }
+    panic!("{arguments:?} {signal}: {said}");
+}
+
+#[cfg(unix)]
+#[test]
+fn every_request_to_end_saves_what_was_found() {
+    let folder = Folder::new("signals");
+    for signal in ["-TERM", "-HUP"] {
+        let out = folder.path("lens.json");
+        let optimize = ["optimize", LENS, "--vary", "curvatures", "--error", "1e-9", "--out", &out];
+        let endless = ["--method", "adam", "--steps", "100000000"];
+        let report = ends_with_its_result(&[&optimize[..], &endless].concat(), signal);
+        assert_eq!(report["ended"], "stopped");
+        fs::remove_file(&out).unwrap();
+        let search = ["search", LENS, "--iterations", "100000000", "--out", &out];
+        assert_eq!(ends_with_its_result(&search, signal)["ended"], "interrupted");
+        fs::remove_file(&out).unwrap();
+        let front = folder.path("front");
+        let pareto = ["pareto", LENS, "--points", "1000", "--steps", "100000", "--out", &front];
+        assert_eq!(ends_with_its_result(&pareto, signal)["stopped"], true);
+        assert!(Path::new(&front).join("front.csv").exists());
+        fs::remove_dir_all(&front).unwrap();
+        let field = folder.path("field.npz");
+        let grin = ["grin", "luneburg", "--out", &field];
+        assert_eq!(ends_with_its_result(&grin, signal)["stopped"], true);
+        fs::remove_file(&field).unwrap();
+    }
+}
+
+/// A run under `nohup` outlives its terminal.
+#[cfg(target_os = "linux")]
+#[test]
+fn an_ignored_end_of_the_terminal_stays_ignored() {
+    let folder = Folder::new("nohup");
+    let checkpoint = folder.path("run.json");
+    let search = long_search(&checkpoint, &[]).join(" ");
+    let line = format!("trap '' HUP; exec {} {search}", env!("CARGO_BIN_EXE_aplanat"));
+    let mut running = Running::of(Command::new("sh").args(["-c", &line]));
+    running.wait_for(&checkpoint);
+    running.signal("-HUP");
+    std::thread::sleep(Duration::from_secs(1));
+    assert!(running.0.as_mut().unwrap().try_wait().unwrap().is_none(), "it ended");
+    running.signal("-TERM");
+    assert_eq!(running.output().status.code(), Some(0));
+}
+
+/// A lens whose rims let no light through is wrong input to everything that needs light.
+#[test]
+fn a_lens_without_light_is_wrong_input_everywhere() {
+    let folder = Folder::new("dark");
+    let singlet = fs::read_to_string("lenses/singlet_la1131.json").unwrap();
+    let mut lens: Value = serde_json::from_str(&singlet).unwrap();
+    for surface in lens["surfaces"].as_array_mut().unwrap() {
+        surface["semi_diameter"] = json!(0.0);
+    }
+    let dark = folder.file("dark.json", &lens.to_string());
+    let out = folder.path("out.json");
+    let commands: [&[&str]; 10] = [
+        &["analyze", &dark, "spot"],
+        &["analyze", &dark, "fan"],
+        &["analyze", &dark, "illumination"],
+        &["analyze", &dark, "through-focus"],
+        &["gradient", &dark],
+        &["optimize", &dark, "--vary", "curvatures", "--out", &out],
+        &["pareto", &dark, "--points", "2"],
+        &["search", &dark, "--iterations", "4"],
+        &["measure", "spot", &dark],
+        &["measure", "gradient", &dark],
+    ];
+    for command in commands {
+        refused(2, command, "", &["dark.json", "no light"]);
+    }
+    assert!(!Path::new(&out).exists());
+    let checks = done_json(&["info", &dark], "")["checks"].clone();
+    assert!(checks.to_string().contains("no light"), "{checks}");
+}

@@ -1,0 +1,296 @@
+//! The files of a command: nothing that is read is written over, folders name what is left of an
+//! earlier result, and what is no lens file is refused before it is read whole.
+
+use super::cli::{Scratch, done, done_json, has_keys, refused};
+use serde_json::{Value, json};
+use std::fs;
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+
+const LENS: &str = "lenses/singlet_la1131.json";
+
+/// A folder of its own for a test, empty, and removed at its end.
+pub(super) struct Folder(PathBuf);
+
+impl Folder {
+    pub(super) fn new(name: &str) -> Self {
+        let path = std::env::temp_dir().join(format!("aplanat-{}-{name}", std::process::id()));
+        drop(fs::remove_dir_all(&path));
+        fs::create_dir_all(&path).unwrap();
+        Self(path)
+    }
+
+    /// The path of a file in it.
+    pub(super) fn path(&self, name: &str) -> String {
+        self.0.join(name).to_str().unwrap().to_owned()
+    }
+
+    /// A copy of a lens in it.
+    pub(super) fn lens(&self, name: &str, lens: &str) -> String {
+        fs::copy(lens, self.0.join(name)).unwrap();
+        self.path(name)
+    }
+
+    /// A file with this text in it.
+    pub(super) fn file(&self, name: &str, text: &str) -> String {
+        fs::write(self.0.join(name), text).unwrap();
+        self.path(name)
+    }
+
+    /// The names of its files, sorted.
+    pub(super) fn names(&self) -> Vec<String> {
+        let entries = fs::read_dir(&self.0).unwrap();
+        let names = entries.map(|entry| entry.unwrap().file_name().into_string().unwrap());
+        let mut names: Vec<String> = names.collect();
+        names.sort();
+        names
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        drop(fs::remove_dir_all(&self.0));
+    }
+}
+
+#[test]
+fn optimize_writes_over_nothing_that_it_reads() {
+    let folder = Folder::new("own-optimize");
+    let lens = folder.lens("lens.json", LENS);
+    let goal = folder.file("goal.json", r#"{"terms": [{"term": "spot", "weight": 1.0}]}"#);
+    let out = folder.path("out.json");
+    let detour = folder.path("./lens.json");
+    let wrong = |out: &str, more: &[&str], words: &[&str]| {
+        let base = ["optimize", &lens, "--vary", "curvatures", "--steps", "1", "--out", out];
+        refused(2, &[&base[..], more].concat(), "", words);
+        assert_eq!(fs::read(&lens).unwrap(), fs::read(LENS).unwrap());
+    };
+    wrong(&lens, &[], &["--out", "is the lens; expected another file"]);
+    wrong(&detour, &[], &["--out", "is the lens"]);
+    wrong(&out, &["--history", &lens], &["--history", "is the lens"]);
+    wrong(&out, &["--history", &out], &["--history", "is --out"]);
+    wrong(&goal, &["--goal", &goal], &["--out", "is --goal"]);
+    #[cfg(unix)]
+    {
+        let (link, twin) = (folder.path("link.json"), folder.path("twin.json"));
+        std::os::unix::fs::symlink("lens.json", &link).unwrap();
+        fs::hard_link(&lens, &twin).unwrap();
+        wrong(&link, &[], &["--out", "is the lens"]);
+        wrong(&twin, &[], &["--out", "is the lens"]);
+        wrong(&out, &["--history", &link], &["--history", "is the lens"]);
+    }
+    assert!(!Path::new(&out).exists());
+}
+
+#[test]
+fn no_command_writes_over_what_it_reads() {
+    let folder = Folder::new("own-others");
+    let lens = folder.lens("start.json", LENS);
+    refused(2, &["convert", &lens, &lens], "", &["OUT", "is the lens"]);
+    let same = folder.path(".");
+    refused(2, &["pareto", &lens, "--out", &same], "", &["--out", "start.json is the lens"]);
+    let stored = folder.lens("01_generation_5.json", LENS);
+    let search = ["search", &stored, "--iterations", "4", "--reservoir-dir", &same];
+    refused(2, &search, "", &["--reservoir-dir", "is the lens"]);
+    let values = fs::read("tests/files/old_volume.raw").unwrap();
+    fs::write(folder.path("values.raw"), &values).unwrap();
+    let header = fs::read_to_string("tests/files/old_volume.json").unwrap();
+    let header = folder.file("header.json", &header.replace("old_volume.raw", "values.raw"));
+    let task = done(&["grin", "luneburg", "--show"], "");
+    let mut task: Value = serde_json::from_str(&task).unwrap();
+    task["exact"] = json!({"volume": header});
+    let task = folder.file("task.json", &task.to_string());
+    let grin = |out: &str, words: &[&str]| refused(2, &["grin", &task, "--out", out], "", words);
+    grin(&task, &["--out", "the task itself"]);
+    grin(&header, &["--out", "a file of the task"]);
+    grin(&folder.path("values.json"), &["the numbers of --out", "a file of the task"]);
+    #[cfg(unix)]
+    {
+        let plot = folder.path("plot.png");
+        std::os::unix::fs::symlink("start.json", &plot).unwrap();
+        refused(2, &["measure", "spot", &lens, "--plot", &plot], "", &["--plot", "is the lens"]);
+    }
+    assert_eq!(fs::read(&lens).unwrap(), fs::read(LENS).unwrap());
+    assert_eq!(fs::read(&stored).unwrap(), fs::read(LENS).unwrap());
+    assert_eq!(fs::read(folder.path("values.raw")).unwrap(), values);
+}
+
+#[cfg(unix)]
+#[test]
+fn a_checkpoint_is_written_through_a_link_to_nothing() {
+    let folder = Folder::new("dangling");
+    let link = folder.path("link.json");
+    std::os::unix::fs::symlink("run.json", &link).unwrap();
+    let search = ["search", LENS, "--iterations", "4", "--checkpoint", &link];
+    assert_eq!(done_json(&search, "")["resumed"], false);
+    assert!(fs::symlink_metadata(&link).unwrap().is_symlink());
+    assert_eq!(folder.names(), ["link.json", "run.json"]);
+    assert_eq!(done_json(&search, "")["resumed"], true);
+    std::os::unix::fs::symlink("loop.json", folder.path("loop.json")).unwrap();
+    let circle = ["search", LENS, "--checkpoint", &folder.path("loop.json")];
+    refused(2, &circle, "", &["loop.json", "a link that leads to itself"]);
+}
+
+#[test]
+fn a_folder_names_what_is_left_of_an_earlier_result() {
+    let folder = Folder::new("stale");
+    let own = folder.path("front_notes.json");
+    fs::write(&own, "{}").unwrap();
+    let old = folder.lens("front_900.json", LENS);
+    let biased = folder.lens("biased_001.json", LENS);
+    let front = ["pareto", LENS, "--points", "2", "--steps", "2", "--no-biased", "--error", "1%"];
+    let all = folder.path("");
+    let front = [&front[..], &["--out", &all]].concat();
+    let report = done_json(&front, "");
+    assert_eq!(report["stale"], json!([biased, old]));
+    fs::remove_file(&old).unwrap();
+    fs::remove_file(&biased).unwrap();
+    assert_eq!(done_json(&front, "").get("stale"), None);
+    let older = folder.lens("09_generation_77.json", LENS);
+    let search = ["search", LENS, "--iterations", "8", "--reservoir-dir", &all];
+    assert_eq!(done_json(&search, "")["stale"], json!([older]));
+    assert!(Path::new(&own).exists() && Path::new(&older).exists());
+}
+
+#[cfg(unix)]
+#[test]
+fn devices_pipes_and_endless_files_are_refused() {
+    refused(2, &["info", "/dev/zero"], "", &["/dev/zero", "a device"]);
+    refused(2, &["trace", LENS, "--rays", "/dev/zero"], "", &["/dev/zero", "a device"]);
+    let folder = Folder::new("endless");
+    let pipe = folder.path("pipe.json");
+    std::process::Command::new("mkfifo").arg(&pipe).status().unwrap();
+    refused(2, &["info", &pipe], "", &["a named pipe", "expected a file"]);
+    refused(2, &["optimize", LENS, "--goal", &pipe, "--out", "x.json"], "", &["a named pipe"]);
+    refused(2, &["optimize", LENS, "--out", &pipe], "", &["a device or a pipe"]);
+    let long = folder.path("long.json");
+    fs::File::create(&long).unwrap().set_len(64_000_001).unwrap();
+    refused(2, &["info", &long], "", &["long.json", "more than 64 MB"]);
+    // A pipe of the shell has an end.
+    let read = format!("{} info /dev/stdin", env!("CARGO_BIN_EXE_aplanat"));
+    let line = format!("cat {LENS} | {read}");
+    let piped = std::process::Command::new("sh").args(["-c", &line]).output().unwrap();
+    assert!(piped.status.success(), "{}", String::from_utf8_lossy(&piped.stderr));
+}
+
+/// A megabyte of zeros packs into a kilobyte.
+#[test]
+fn an_archive_is_unpacked_only_as_far_as_its_header_says() {
+    let folder = Folder::new("bomb");
+    let path = folder.path("bomb.npz");
+    let header = |shape: &str| {
+        let text = format!("{{'descr': '<f8', 'fortran_order': False, 'shape': {shape}, }}\n");
+        [b"\x93NUMPY\x01\0", &(text.len() as u16).to_le_bytes()[..], text.as_bytes()].concat()
+    };
+    let refusal = |shape: &str, numbers: usize| {
+        let mut archive = zip::ZipWriter::new(fs::File::create(&path).unwrap());
+        let options = zip::write::SimpleFileOptions::default();
+        archive.start_file("index.npy", options).unwrap();
+        archive.write_all(&header(shape)).unwrap();
+        archive.write_all(&vec![0; 8 * numbers]).unwrap();
+        archive.finish().unwrap();
+        aplanat::files::read_volume(Path::new(&path)).unwrap_err().to_string()
+    };
+    let text = refusal("(2, 2, 2)", 1_000_000);
+    assert!(text.contains("array index: found more bytes of numbers for [2, 2, 2]"), "{text}");
+    assert!(refusal("(2, 2, 2)", 7).contains("found 56 bytes of numbers for [2, 2, 2]"));
+    let text = refusal("(4000, 4000, 4000)", 8);
+    assert!(text.contains("[4000, 4000, 4000]; expected at most 268435456 numbers"), "{text}");
+}
+
+#[test]
+fn raw_numbers_are_read_only_as_far_as_the_header_says() {
+    let folder = Folder::new("raw-bomb");
+    fs::File::create(folder.path("long.raw")).unwrap().set_len(1 << 40).unwrap();
+    let header = r#"{"aplanat_volume": 1, "counts": [2, 2, 2], "low": [0, 0, 0],
+        "spacing": [1, 1, 1], "numbers": "f64", "data": "long.raw"}"#;
+    let header = folder.file("long.json", header);
+    let text = aplanat::files::read_volume(Path::new(&header)).unwrap_err().to_string();
+    assert!(text.contains("long.raw: found more than 8000 bytes"), "{text}");
+}
+
+#[test]
+fn convert_refuses_what_info_refuses() {
+    let folder = Folder::new("convert");
+    let mut lens: Value = serde_json::from_str(&fs::read_to_string(LENS).unwrap()).unwrap();
+    lens["wavelengths"] = json!([{"um": 50.0}]);
+    let glass = folder.file("glass.json", &lens.to_string());
+    lens["wavelengths"] = json!([{"um": 0.6, "primary": true}, {"um": 50.0}]);
+    let outer = folder.file("outer.json", &lens.to_string());
+    for (lens, words) in [(&glass, "has no index at 50 um"), (&outer, "has no index at 50 um")] {
+        refused(2, &["info", lens], "", &[lens, words]);
+        for out in ["out.json", "out.zmx"].map(|name| folder.path(name)) {
+            refused(2, &["convert", lens, &out], "", &[lens, words]);
+            assert!(!Path::new(&out).exists());
+        }
+    }
+}
+
+#[test]
+fn a_gap_that_a_file_cannot_hold_is_named_by_its_surface() {
+    let folder = Folder::new("gap");
+    let mut lens: Value = serde_json::from_str(&fs::read_to_string(LENS).unwrap()).unwrap();
+    lens["surfaces"][0]["thickness"] = json!(1e99);
+    let far = folder.file("far.json", &lens.to_string());
+    let out = folder.path("far.zmx");
+    let words = ["far.zmx: thickness after surface 1 is", "expected less than 1e18 mm"];
+    refused(2, &["convert", &far, &out], "", &words);
+}
+
+#[test]
+fn a_list_is_no_object() {
+    let rules = Scratch::with("list-rules.json", "[]");
+    let words = ["list-rules.json, line 1", "a list", "expected an object"];
+    refused(2, &["search", LENS, "--iterations", "4", "--rules", rules.path()], "", &words);
+    refused(2, &["trace", LENS, "--rays", "-"], "[0.5, 0, []]", &["a list", "an object"]);
+    let rays = r#"{"rays": [[0, 0, -1, 0, 0, 1]]}"#;
+    let words = ["rays[0]", "a list", "an object"];
+    refused(2, &["trace", LENS, "--rays", "-"], rays, &words);
+}
+
+#[test]
+fn messages_name_the_number_and_its_place() {
+    let rays = |ray: Value| json!({"rays": [ray]}).to_string();
+    let far = json!({"x": 1e161, "y": 0, "z": 0, "L": 0, "M": 0, "N": 1});
+    let words = ["ray 0: x is 1e161; expected a start of finite numbers up to 1e100 mm"];
+    refused(2, &["trace", LENS, "--rays", "-"], &rays(far), &words);
+    let text = "{\"rays\": [{\"x\": 0, \"y\": 0, \"z\": 0, \"L\": 0, \"M\": NaN, \"N\": 1}]}";
+    let words = ["line 1, column 49, rays[0].M: found `NaN`"];
+    refused(2, &["trace", LENS, "--rays", "-"], text, &words);
+    let goal = Scratch::new("latin-goal.json");
+    fs::write(&goal.0, b"{\"terms\":\n [{\"term\": \"sp\xf6t\"}]}").unwrap();
+    let out = Scratch::new("latin-out.json");
+    let arguments = ["optimize", LENS, "--goal", goal.path(), "--out", out.path()];
+    refused(2, &arguments, "", &["latin-goal.json, line 2: found the byte 0xf6", "UTF-8"]);
+}
+
+/// A sphere that light enters from the side, beyond its equator.
+#[test]
+fn a_lens_file_has_hyperhemispheres() {
+    let folder = Folder::new("hyper");
+    let lens = |hyper: bool| {
+        json!({"aplanat": 1, "object": "infinity", "aperture": {"entrance_pupil_diameter": 2.0},
+            "fields": {"kind": "angle", "values": [{"y": 0.0}]}, "wavelengths": [{"um": 0.5}],
+            "surfaces": [{"curvature": 0.1, "thickness": 18.0, "glass": {"index": 1.5},
+                "semi_diameter": 10.0, "stop": true, "hyper": hyper},
+                {"thickness": 2.0, "glass": {"index": 1.5}}]})
+        .to_string()
+    };
+    let ray = json!({"rays": [{"x": 19, "y": 0, "z": 10.62, "L": -0.96, "M": 0, "N": 0.28}]});
+    let met = |hyper: bool| {
+        let lens = folder.file("ball.json", &lens(hyper));
+        done_json(&["trace", &lens, "--rays", "-"], &ray.to_string())["rays"][0].clone()
+    };
+    assert_eq!((&met(false)["fate"], &met(false)["surface"]), (&"missed".into(), &0.into()));
+    assert_eq!(met(true)["fate"], "imaged");
+    let whole = folder.file("whole.json", &lens(true));
+    let back = folder.path("back.json");
+    done(&["convert", &whole, &back], "");
+    assert!(aplanat::files::open(&back).unwrap().lens.surfaces[0].hyperhemisphere);
+    let report = done_json(&["convert", &whole, &folder.path("whole.zmx")], "");
+    has_keys(&report["export"], &["report"]);
+    let rows = report["export"]["report"]["rows"].as_array().unwrap();
+    let lost = |row: &&Value| row["text"] == "hyperhemisphere of surface 1";
+    assert_eq!(rows.iter().find(lost).unwrap()["outcome"], "dropped");
+    assert!(done(&["help", "lens-file"], "").contains("hyperhemisphere"));
+}
