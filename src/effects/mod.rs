@@ -19,4 +19,4 @@ pub use aiming::AimingDifference;
 pub use apply::{build_ray_model, simplify};
 pub use effect::{Effect, EffectOverride, EffectOverrides};
 pub use measure::{EffectMeasurements, RimClearance, measure_effects};
-pub use plan::{EffectDecision, EffectPlan, TracePurpose, plan};
+pub use plan::{EffectCost, EffectDecision, EffectPlan, TracePurpose, plan};

@@ -70,13 +70,19 @@ pub struct EffectDecision {
     pub unit: &'static str,
     /// The reason, in a sentence.
     pub reason: String,
-    /// The part of the time of tracing that leaving the effect out saves or would save, counted in
-    /// ray-surface intersections, 0 to 1.
+    /// The time that the effect takes; `None` until it is measured.
+    #[serde(flatten)]
+    pub cost: Option<EffectCost>,
+}
+
+/// The time that an effect takes, measured by runs with it and without it.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct EffectCost {
+    /// The part of the time with the effect that leaving it out saves; negative if it costs time.
     #[serde(rename = "saves")]
     pub saved_share: f64,
-    /// The same in milliseconds for the task; the engine reads no clock, so the caller that does
-    /// fills this in.
-    pub saved_ms: Option<f64>,
+    /// The same in milliseconds.
+    pub saved_ms: f64,
 }
 
 /// The decisions for a lens.
@@ -164,8 +170,7 @@ fn lens_decision(
         residual: if computed { 0.0 } else { error },
         unit,
         reason: String::new(),
-        saved_share: 0.0,
-        saved_ms: None,
+        cost: None,
     }
 }
 
@@ -186,7 +191,7 @@ fn dispersion(
             1e3 * allowed
         ),
     };
-    EffectDecision { reason, saved_share: 1.0 - 1.0 / measured.wavelengths as f64, ..decision }
+    EffectDecision { reason, ..decision }
 }
 
 /// Keeps the aspheric terms of as few surfaces as are needed: the weakest are left out first, as long
@@ -223,11 +228,8 @@ fn asphere(
             format!("without the aspheric terms of {all} surfaces {}", shift_text(total, allowed))
         }
     };
-    let aspheric = measured.aspheres.len() as f64;
-    let work = measured.surfaces as f64 + aspheric * (ASPHERE_COST - 1.0);
-    let saved_share = aspheric * (ASPHERE_COST - 1.0) / work;
     let computed = !surfaces.is_empty();
-    (EffectDecision { computed, surfaces, residual, reason, saved_share, ..decision }, as_conic)
+    (EffectDecision { computed, surfaces, residual, reason, ..decision }, as_conic)
 }
 
 /// The shift of rays in words.
@@ -238,9 +240,6 @@ fn shift_text(moved: f64, allowed: f64) -> String {
     let [moved, allowed] = [moved, allowed].map(|mm| 1e3 * mm);
     format!("rays would land {moved:.3} um away; {allowed:.3} um may be neglected")
 }
-
-/// The cost of an intersection with an asphere, in intersections with a sphere.
-const ASPHERE_COST: f64 = 15.0;
 
 /// Keeps the semi-diameters that a ray may reach, those that bound the iteration at an asphere, and
 /// every obstruction.
@@ -298,11 +297,9 @@ fn grin(
     } else {
         format!("without it {}; {}", shift_text(total, allowed), step_text(measured))
     };
-    let kicks: u32 = measured.grin_gaps.iter().map(|(plan, _)| plan.kicks).sum();
-    let saved_share = f64::from(kicks) / (measured.surfaces as f64 + f64::from(kicks));
     let computed = !surfaces.is_empty();
     let residual = if goes { total } else { 0.0 };
-    (EffectDecision { computed, surfaces, residual, reason, saved_share, ..decision }, homogeneous)
+    (EffectDecision { computed, surfaces, residual, reason, ..decision }, homogeneous)
 }
 
 /// The steps in every gradient-index gap, in words.
@@ -354,11 +351,6 @@ fn reflection(measured: &EffectMeasurements, choice: EffectOverride) -> EffectDe
     }
 }
 
-/// The cost of a search for the chief ray, in rays of a spot: some Newton steps with derivatives.
-const CHIEF_RAYS: f64 = 20.0;
-/// The rays of a spot.
-const SPOT_RAYS: f64 = 100.0;
-
 /// The change of light counts as the same part of the smallest spot, so that one number compares
 /// with the tolerance.
 fn aiming(measured: &EffectMeasurements, allowed: f64, choice: EffectOverride) -> EffectDecision {
@@ -376,8 +368,7 @@ fn aiming(measured: &EffectMeasurements, allowed: f64, choice: EffectOverride) -
     } else {
         "rays aimed at the paraxial entrance pupil do not reach the stop".to_owned()
     };
-    let saved_share = CHIEF_RAYS / (CHIEF_RAYS + SPOT_RAYS);
-    EffectDecision { reason, saved_share, ..decision }
+    EffectDecision { reason, ..decision }
 }
 
 fn object(measured: &EffectMeasurements, allowed: f64, choice: EffectOverride) -> EffectDecision {

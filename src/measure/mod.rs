@@ -5,6 +5,7 @@
 //! of many short repetitions, reported with the slowest and the fastest.
 
 mod double_gauss;
+mod effects;
 mod gradient;
 mod grin;
 mod grin_starts;
@@ -17,6 +18,7 @@ mod timing;
 mod trace;
 
 pub use double_gauss::double_gauss;
+pub use effects::EffectTask;
 pub use gradient::{
     GradientBenchmark, GradientBenchmarkError, GradientCost, GradientCurves, GradientRow, Integral,
     ParameterClass, measure_gradients,

@@ -26,9 +26,7 @@ mod structure_search;
 mod undo;
 mod view;
 
-pub use analysis::{
-    Analyses, AnalysisResults, AnalysisSettings, FieldPupils, analyze, measure_effect_costs,
-};
+pub use analysis::{Analyses, AnalysisResults, AnalysisSettings, FieldPupils, analyze};
 pub use clock::Timed;
 pub use command::Command;
 pub use experiment::{ExperimentRun, ExperimentStatus};

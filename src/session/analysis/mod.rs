@@ -3,10 +3,8 @@
 //! A newer request replaces one that has not begun, and interrupts one that has between two analyses.
 //! Results carry the version of the design that they belong to and the time of each analysis.
 
-mod effect_timing;
 mod pupils;
 
-pub use effect_timing::measure_effect_costs;
 pub use pupils::FieldPupils;
 
 use super::clock::{Timed, now, time};
@@ -16,6 +14,7 @@ use crate::analysis::{
 };
 use crate::effects::{self, EffectOverrides, EffectPlan, TracePurpose};
 use crate::lens::{FieldPoint, Lens};
+use crate::measure::EffectTask;
 use crate::paraxial::{FirstOrder, Seidel};
 use crate::pupil::{Accuracy, RayModel, RayModelError};
 use pupils::{field_pupils, for_each_field};
@@ -147,7 +146,10 @@ fn measure(mut results: AnalysisResults, output: &AnalysisOutput) {
     }
     let (lens, settings) = (&results.lens, &results.settings);
     let plan = catch_panic(|| {
-        measure_effect_costs(lens, settings, || output.is_interrupted()).transpose()
+        let AnalysisSettings { zoom, tolerance, ref overrides, .. } = *settings;
+        let task = EffectTask { lens, zoom, tolerance, overrides };
+        let facts = task.measure_effects().map_err(|why| why.to_string())?;
+        Ok(task.measure_costs(&facts, || output.is_interrupted()))
     });
     if let Ok(Some(plan)) = plan {
         analyses.plan.value = plan;

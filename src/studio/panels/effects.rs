@@ -4,7 +4,7 @@
 use egui::{Align, Color32, ComboBox, Frame, Layout, Margin, RichText, ScrollArea, Ui};
 
 use super::{Panel, displayed_results, show_missing_results};
-use crate::effects::{EffectDecision, EffectOverride, EffectPlan};
+use crate::effects::{EffectCost, EffectDecision, EffectOverride, EffectPlan};
 use crate::session::{Command, SessionView};
 use crate::studio::actions::Actions;
 use crate::studio::number;
@@ -46,7 +46,7 @@ fn table(ui: &mut Ui, plan: &EffectPlan, view: &SessionView, actions: &mut Actio
             ui.label(RichText::new(reason).small());
             ui.label(RichText::new(reason_text(decision)).small().weak()).on_hover_text(
                 "The error if the effect is left out, the limit above which it is needed, and the \
-                 share of the tracing time that leaving it out saves",
+                 measured share of the time of the spots that leaving it out saves",
             );
         });
     }
@@ -96,12 +96,12 @@ const fn override_name(choice: EffectOverride) -> &'static str {
 /// The number that the decision rests on, its limit, and the time at stake.
 fn reason_text(decision: &EffectDecision) -> String {
     let digits = |value: f64| number::format_digits(value, 3);
-    let EffectDecision { error, limit, unit, saved_share, .. } = decision;
+    let EffectDecision { error, limit, unit, cost, .. } = decision;
     let rests = format!("{} {unit}, limit {} {unit}", digits(*error), digits(*limit));
-    if *saved_share <= 0.0 {
+    let Some(EffectCost { saved_share, saved_ms }) = *cost else { return rests };
+    if saved_share == 0.0 {
         return rests;
     }
     let verb = if decision.computed { "would save" } else { "saves" };
-    let time = decision.saved_ms.map(|ms| format!(" ({ms:.2} ms)")).unwrap_or_default();
-    format!("{rests}; {verb} {:.0} % of tracing{time}", 100.0 * saved_share)
+    format!("{rests}; {verb} {:.0} % of the spots ({saved_ms:.2} ms)", 100.0 * saved_share)
 }
