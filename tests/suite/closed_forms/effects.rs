@@ -1,11 +1,13 @@
 //! The decisions about effects, from measurements that are known in advance.
 
 use super::{FOCAL, assert_near, lens, row};
+use crate::merit::bundled;
 use aplanat::effects::{
     Effect, EffectMeasurements, EffectOverrides, TracePurpose, measure_effects, plan,
 };
 use aplanat::files;
 use aplanat::lens::{Aperture, Lens, Medium, Row};
+use aplanat::measure::EffectTask;
 use std::process::Command;
 use std::time::Instant;
 
@@ -52,29 +54,19 @@ fn aspheres_left_out_stay_below_the_limit_together() {
 }
 
 #[test]
-fn the_saving_by_an_asphere_counts_intersections() {
-    // Of ten surfaces: none saves nothing, all save most of the work, and each saves more.
-    let shares: Vec<f64> = (0..=10)
-        .map(|count| {
-            let aspheres: Vec<_> = (0..count).map(|surface| (surface, 1.0)).collect();
-            let plan = plan(
-                &measured(&aspheres, 1.0),
-                TracePurpose::Spot(1e-3),
-                &EffectOverrides::default(),
-            );
-            plan.decision(Effect::Asphere).unwrap().saved_share
-        })
-        .collect();
-    assert_eq!(shares[0], 0.0);
-    // An asphere costs several spheres: with one in ten, a fifth of the work or more.
-    assert!(shares[1] > 0.2 && shares[10] > 0.75 && shares[10] < 1.0, "{shares:?}");
-    assert!(shares.windows(2).all(|pair| pair[0] < pair[1]), "{shares:?}");
-    // The share of w work units per asphere among ten surfaces is n (w − 1)/(10 + n (w − 1)).
-    let extra = |n: f64, share: f64| 10.0 * share / (n * (1.0 - share));
-    for n in 2..=10_u32 {
-        let n = f64::from(n);
-        assert_near(extra(n, shares[n as usize]), extra(1.0, shares[1]), 1e-12);
-    }
+fn an_effect_costs_time_only_where_it_is_computed() {
+    let spherical = bundled("singlet_la1131");
+    let aspheric = bundled("phone_us7558005_1");
+    let asphere_cost = |lens: &Lens| {
+        let overrides = EffectOverrides::default();
+        let task = EffectTask { lens, zoom: 0, tolerance: 1e-6, overrides: &overrides };
+        let facts = task.measure_effects().unwrap();
+        let plan = task.measure_costs(&facts, || false).unwrap();
+        plan.decision(Effect::Asphere).unwrap().cost.unwrap()
+    };
+    assert_eq!(asphere_cost(&spherical).saved_ms, 0.0);
+    let cost = asphere_cost(&aspheric);
+    assert!(cost.saved_ms > 0.0 && cost.saved_share < 1.0, "{cost:?}");
 }
 
 /// What `info` prints of the effects of a lens, and the milliseconds that it took.
