@@ -28,14 +28,6 @@ impl Running {
         self.0.as_ref().unwrap().id().to_string()
     }
 
-    /// Waits until a file exists, and then a little longer.
-    fn wait_for(&self, path: &str) {
-        let exists = |_: &u32| !Path::new(path).exists();
-        (0..600).take_while(exists).for_each(|_| std::thread::sleep(Duration::from_millis(100)));
-        assert!(Path::new(path).exists(), "{path}");
-        std::thread::sleep(Duration::from_millis(300));
-    }
-
     fn signal(&self, name: &str) {
         assert!(Command::new("kill").args([name, &self.id()]).status().unwrap().success());
     }
@@ -54,6 +46,14 @@ impl Drop for Running {
     }
 }
 
+/// Waits until a file exists, and then a little longer.
+fn wait_for(path: &str) {
+    let exists = |_: &u32| !Path::new(path).exists();
+    (0..600).take_while(exists).for_each(|_| std::thread::sleep(Duration::from_millis(100)));
+    assert!(Path::new(path).exists(), "{path}");
+    std::thread::sleep(Duration::from_millis(300));
+}
+
 fn text(bytes: &[u8]) -> String {
     String::from_utf8(bytes.to_vec()).unwrap()
 }
@@ -68,7 +68,7 @@ fn long_search(checkpoint: &str, more: &[&str]) -> Vec<String> {
 fn start_search(checkpoint: &str, more: &[&str]) -> Running {
     let arguments = long_search(checkpoint, more);
     let running = Running::start(&arguments.iter().map(String::as_str).collect::<Vec<_>>());
-    running.wait_for(checkpoint);
+    wait_for(checkpoint);
     running
 }
 
@@ -104,7 +104,7 @@ fn a_checkpoint_is_tried_again() {
     fs::remove_dir_all(folder.path("sub")).unwrap();
     std::thread::sleep(Duration::from_millis(500));
     fs::create_dir(folder.path("sub")).unwrap();
-    running.wait_for(&checkpoint);
+    wait_for(&checkpoint);
     running.signal("-INT");
     let output = running.output();
     assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
@@ -220,7 +220,7 @@ fn an_ignored_end_of_the_terminal_stays_ignored() {
     let search = long_search(&checkpoint, &[]).join(" ");
     let line = format!("trap '' HUP; exec {} {search}", env!("CARGO_BIN_EXE_aplanat"));
     let mut running = Running::of(Command::new("sh").args(["-c", &line]));
-    running.wait_for(&checkpoint);
+    wait_for(&checkpoint);
     running.signal("-HUP");
     std::thread::sleep(Duration::from_secs(1));
     assert!(running.0.as_mut().unwrap().try_wait().unwrap().is_none(), "it ended");

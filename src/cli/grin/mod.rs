@@ -182,8 +182,8 @@ impl GrinArgs {
 
 /// True for the name of an image that the command writes.
 fn is_image_name(name: &str) -> bool {
-    let is_view = name.starts_with("view-") && name.ends_with(".png");
-    is_view || ["profile.png", "section.png"].contains(&name)
+    let Some(stem) = name.strip_suffix(".png") else { return false };
+    stem.starts_with("view-") || ["profile", "section"].contains(&stem)
 }
 
 fn failed(error: &dyn std::error::Error) -> CliError {

@@ -292,10 +292,11 @@ impl SearchArgs {
 
 /// True for the name of a file of a lens of the reservoir.
 fn is_reservoir_name(name: &str) -> bool {
-    let generation = |rest: &str| rest.starts_with(|c: char| c.is_ascii_digit());
-    let place = name.trim_start_matches(|c: char| c.is_ascii_digit());
-    let rest = place.strip_prefix("_generation_").is_some_and(generation);
-    place.len() < name.len() && rest && name.ends_with(".json")
+    let Some(stem) = name.strip_suffix(".json") else { return false };
+    let starts_with_digit = |text: &str| text.starts_with(|c: char| c.is_ascii_digit());
+    let after_place = stem.trim_start_matches(|c: char| c.is_ascii_digit());
+    starts_with_digit(stem)
+        && after_place.strip_prefix("_generation_").is_some_and(starts_with_digit)
 }
 
 /// A lens with the variables of the file that was read, not those of the search.

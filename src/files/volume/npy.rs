@@ -59,14 +59,14 @@ struct NumberFormat {
 impl NumberFormat {
     /// The format by `NumPy`'s name; `None` for others.
     fn of(kind: &str) -> Option<Self> {
-        let (bytes, decode): (_, fn(&[u8]) -> Vec<f64>) = match kind {
-            "<f8" => (8, |data| decode(data, f64::from_le_bytes)),
-            "<f4" => (4, |data| decode(data, |b| f64::from(f32::from_le_bytes(b)))),
-            "<i8" => (8, |data| decode(data, |b| i64::from_le_bytes(b) as f64)),
-            "<i4" => (4, |data| decode(data, |b| f64::from(i32::from_le_bytes(b)))),
-            _ => return None,
-        };
-        Some(Self { bytes, decode })
+        let format = |bytes, decode| Some(Self { bytes, decode });
+        match kind {
+            "<f8" => format(8, |data| decode(data, f64::from_le_bytes)),
+            "<f4" => format(4, |data| decode(data, |b| f64::from(f32::from_le_bytes(b)))),
+            "<i8" => format(8, |data| decode(data, |b| i64::from_le_bytes(b) as f64)),
+            "<i4" => format(4, |data| decode(data, |b| f64::from(i32::from_le_bytes(b)))),
+            _ => None,
+        }
     }
 }
 
