@@ -38,6 +38,8 @@ pub(super) struct Configuration {
     systems: Vec<System<f64>>,
     /// The surface that is the stop.
     stop: usize,
+    /// The semi-diameter of that surface where the beam fills less of it.
+    stop_rim: Option<f64>,
     bindings: Vec<Vec<ParameterBinding>>,
     /// The distance of the image plane from the paraxial focus in mm, if the last gap is solved
     /// for.
@@ -50,8 +52,10 @@ pub(super) struct Configuration {
 pub(super) struct ResolvedSystems {
     /// The systems, one per wavelength, without the semi-diameters, so that no rim clips.
     pub(super) unclipped: Vec<System<f64>>,
-    /// The systems, one per wavelength, with their semi-diameters.
+    /// The systems, one per wavelength, with their semi-diameters and a stop as wide as the beam.
     pub(super) clipped: Vec<System<f64>>,
+    /// The system at the primary wavelength with the semi-diameters to which its parts are made.
+    pub(super) manufactured: System<f64>,
     /// The derivatives of the last gap by the variables, if it is solved for.
     focus_slopes: Option<DVector<f64>>,
 }
@@ -85,6 +89,7 @@ impl Configuration {
             field_kind: lens.fields_at(zoom).kind,
             is_glass: (0..lens.surfaces.len()).map(glass).collect(),
             stop: stop.surface,
+            stop_rim: lens.surfaces[stop.surface].semi_diameter.filter(|_| !stop.follows_rim),
             focus_offset: lens.image_solve,
             variables: lens.variables.len(),
             bindings,
@@ -101,14 +106,15 @@ impl Configuration {
                 *binding.target.value_mut(system, binding.surface) = value;
             }
         }
-        let mut systems = ResolvedSystems { unclipped: Vec::new(), clipped, focus_slopes: None };
-        if let Some(offset) = self.focus_offset {
-            self.solve_focus(&mut systems, offset);
-        }
-        systems.unclipped.clone_from(&systems.clipped);
-        let surfaces = systems.unclipped.iter_mut().flat_map(|system| &mut system.surfaces);
+        let focus_slopes = self.focus_offset.map(|offset| self.solve_focus(&mut clipped, offset));
+        let mut unclipped = clipped.clone();
+        let surfaces = unclipped.iter_mut().flat_map(|system| &mut system.surfaces);
         surfaces.for_each(unclip);
-        systems
+        let mut manufactured = clipped[self.primary].clone();
+        if let Some(rim) = self.stop_rim {
+            manufactured.surfaces[self.stop].semi_diameter = rim;
+        }
+        ResolvedSystems { unclipped, clipped, manufactured, focus_slopes }
     }
 
     /// The ray model of the lens with its semi-diameters, limited by its stop.
@@ -126,22 +132,21 @@ impl Configuration {
         Ok(RayModel::from_systems(channels, self.primary, beam, aiming)?)
     }
 
-    fn solve_focus(&self, systems: &mut ResolvedSystems, offset: f64) {
-        let primary = &systems.clipped[self.primary];
+    /// Moves the image plane of the systems to the focus, and returns the derivatives of the last
+    /// gap by the variables.
+    fn solve_focus(&self, systems: &mut [System<f64>], offset: f64) -> DVector<f64> {
+        let primary = &systems[self.primary];
         let gap = paraxial_image_distance(primary, self.object) + offset;
         let slope = |variable| {
-            paraxial_image_distance(
-                &self.system_along_without_focus(primary, variable),
-                self.object,
-            )
-            .slope[0]
+            let along = self.system_along_without_focus(primary, variable);
+            paraxial_image_distance(&along, self.object).slope[0]
         };
-        systems.focus_slopes =
-            Some(DVector::from_iterator(self.variables, (0..self.variables).map(slope)));
-        for system in &mut systems.clipped {
+        let slopes = DVector::from_iterator(self.variables, (0..self.variables).map(slope));
+        for system in systems {
             let last = system.surfaces.len() - 2;
             system.surfaces[last].thickness = gap;
         }
+        slopes
     }
 
     fn system_along_without_focus(&self, primary: &System<f64>, variable: usize) -> System<Dual1> {
@@ -156,7 +161,7 @@ impl Configuration {
 
     /// The system at the primary wavelength with its derivative along one variable.
     pub(super) fn system_along(&self, systems: &ResolvedSystems, variable: usize) -> System<Dual1> {
-        let mut system = self.system_along_without_focus(&systems.clipped[self.primary], variable);
+        let mut system = self.system_along_without_focus(&systems.manufactured, variable);
         if let Some(focus) = &systems.focus_slopes {
             let last = system.surfaces.len() - 2;
             system.surfaces[last].thickness.slope[0] = focus[variable];

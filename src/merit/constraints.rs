@@ -133,7 +133,7 @@ pub fn constraint_margins(
                 term: term.name(),
                 surface: quantity.surface(),
                 zoom: number,
-                value: quantity.length(&systems.clipped[zoom.primary]),
+                value: quantity.length(&systems.manufactured),
                 min,
                 max,
             };
@@ -153,7 +153,7 @@ impl Configuration {
 
     /// The surfaces with a finite semi-diameter.
     fn clipping_surfaces(&self, found: &ResolvedSystems) -> Vec<usize> {
-        let surfaces = &found.clipped[self.primary].surfaces;
+        let surfaces = &found.manufactured.surfaces;
         (0..self.is_glass.len()).filter(|i| surfaces[*i].semi_diameter.is_finite()).collect()
     }
 }
@@ -177,7 +177,7 @@ impl MinimumThickness {
             let zoom = Configuration::new(lens, number)?;
             let values: Vec<f64> =
                 lens.variables.iter().map(|v| lens.get(v.parameter).unwrap_or(0.0)).collect();
-            let system = &zoom.at(&values).clipped[zoom.primary];
+            let system = &zoom.at(&values).manufactured;
             for gap in 0..zoom.is_glass.len() - 1 {
                 let center = ConstrainedQuantity::Center(gap).length(system);
                 let rim = if zoom.is_glass[gap] { EdgeRadius::Larger } else { EdgeRadius::Smaller };
@@ -312,7 +312,7 @@ impl BoundedLength<'_> {
     }
 
     fn value(&self) -> f64 {
-        self.quantity.length(&self.context.systems.clipped[self.context.zoom.primary])
+        self.quantity.length(&self.context.systems.manufactured)
     }
 
     fn residual(&self, r: f64, sum: &mut SumOfSquares) {

@@ -18,6 +18,8 @@ pub const SEARCH_CHECKPOINT: CheckpointFormat =
 
 /// The relative difference of two losses that may be rounding.
 const LOSS_ROUNDING: f64 = 1e-6;
+/// The relative difference of two numbers of a search up to which they are the same.
+const NUMBER_ROUNDING: f64 = 1e-12;
 /// The field of [`Landscape::fingerprint`] that holds the start of the search, if there is one.
 const START: &str = "start";
 /// The maximum number of characters of a value in a message.
@@ -83,7 +85,8 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
 
     /// Loads a run, which continues where it was saved, on the same landscape and with the same
     /// settings. Only the limits [`SearchSettings::moves`] and [`SearchSettings::gradients`] may
-    /// differ, except for brute force, which has already divided its gradients.
+    /// differ, except for brute force, which has already divided its gradients. Without a
+    /// temperature in `settings` the run keeps its own.
     ///
     /// The best points are judged anew: a loss that the landscape does not confirm is replaced by
     /// the computed one.
@@ -101,10 +104,12 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
     {
         settings.check()?;
         let file = path.display().to_string();
-        let mut read: StoredCheckpoint<Self> = SEARCH_CHECKPOINT.read(path)?;
+        let read: StoredCheckpoint<Self> = SEARCH_CHECKPOINT.read(path)?;
         if let Err(what) = read.run.check_consistency() {
             return Err(CheckpointError::Corrupt { file, what }.into());
         }
+        let temperature = settings.temperature.or(read.run.settings.temperature);
+        let settings = SearchSettings { temperature, ..settings.clone() };
         let about = landscape.fingerprint();
         // The start is compared first: much else follows from it.
         let (start, own_start) = (&read.landscape[START], &about[START]);
@@ -114,15 +119,15 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
         }
         let pairs = [
             ("landscape", read.landscape, about),
-            ("settings", fixed_settings(read.run.settings())?, fixed_settings(settings)?),
+            ("settings", fixed_settings(read.run.settings())?, fixed_settings(&settings)?),
         ];
         for (name, found, expected) in pairs {
             if let Some((name, found, expected)) = first_difference(name, &found, &expected) {
                 return Err(SearchError::OtherSearch { file, name, found, expected });
             }
         }
-        read.run.settings = settings.clone();
         let mut run = read.run;
+        run.settings = settings;
         run.judge_anew(landscape);
         if run.start.loss.is_finite() {
             return Ok(run);
@@ -211,8 +216,18 @@ fn first_difference(name: &str, a: &Value, b: &Value) -> Option<(String, String,
             let mut pairs = a.iter().zip(b).enumerate();
             pairs.find_map(|(i, (a, b))| first_difference(&format!("{name}[{i}]"), a, b))
         }
-        _ => (a != b).then(|| (name.to_owned(), abbreviate(a), abbreviate(b))),
+        _ => (!is_same_scalar(a, b)).then(|| (name.to_owned(), abbreviate(a), abbreviate(b))),
     }
+}
+
+/// True for equal values, and for numbers that differ by rounding: some are computed from the start,
+/// and another build may round them otherwise.
+fn is_same_scalar(a: &Value, b: &Value) -> bool {
+    let (Value::Number(x), Value::Number(y)) = (a, b) else { return a == b };
+    let (Some(p), Some(q)) = (x.as_f64(), y.as_f64()) else { return a == b };
+    let rounded =
+        x.is_f64() && y.is_f64() && (p - q).abs() <= NUMBER_ROUNDING * p.abs().max(q.abs());
+    rounded || a == b
 }
 
 fn is_nested(value: &Value) -> bool {

@@ -190,19 +190,20 @@ impl SearchArgs {
         plan: &SearchPlan,
         file: &str,
     ) -> Result<(SearchRunOn<LensLandscape>, bool), CliError> {
-        let settings = plan.settings(landscape);
         if let Some(path) = self.checkpoint.as_deref().filter(|path| path.exists()) {
-            let run: SearchRunOn<LensLandscape> =
-                SearchRun::load(landscape, &settings, path).map_err(search_error)?;
+            let run = plan.resume(landscape, path).map_err(search_error)?;
             let done = run.statistics().gradients;
             print_note(format!("{}: resumes after {done} gradients", path.display()));
             return Ok((run, true));
         }
         let start = landscape.start().clone();
-        let run = SearchRun::new(landscape, start, &settings).map_err(|cause| match cause {
-            SearchError::InvalidStart { .. } => CliError::Input(format!("{file}: {cause}")),
-            cause => search_error(cause),
-        })?;
+        let run =
+            SearchRun::new(landscape, start, &plan.settings(landscape)).map_err(
+                |cause| match cause {
+                    SearchError::InvalidStart { .. } => CliError::Input(format!("{file}: {cause}")),
+                    cause => search_error(cause),
+                },
+            )?;
         Ok((run, false))
     }
 

@@ -9,6 +9,7 @@ use crate::search::{
 };
 use serde::{Deserialize, Serialize};
 use std::ops::ControlFlow;
+use std::path::Path;
 
 /// Everything that a search of a lens depends on besides the lens.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -89,6 +90,20 @@ impl SearchPlan {
         let start = landscape.start().clone();
         let run = SearchRun::new(&landscape, start, &self.settings(&landscape))?;
         Ok((landscape, run))
+    }
+
+    /// The run of a checkpoint, which keeps its temperature if none is given.
+    ///
+    /// # Errors
+    /// Those of [`SearchRun::load`].
+    pub fn resume(
+        &self,
+        landscape: &LensLandscape,
+        path: &Path,
+    ) -> Result<SearchRunOn<LensLandscape>, SearchError> {
+        let temperature = self.settings.temperature;
+        let settings = SearchSettings { temperature, ..self.settings(landscape) };
+        SearchRun::load(landscape, &settings, path)
     }
 
     /// The settings, with the default temperature of the landscape if none is given, and without
