@@ -111,7 +111,7 @@ pub fn spot(
         field,
         rms: pooled.rms,
         centroid: pooled.centroid,
-        radius: geometric_radius(lit(), center, pooled.rms.error),
+        radius: geometric_radius(lit(), center, pooled.rms.error, model.neglected.ray_shift),
         light: pooled.light,
         is_fully_lit: pooled.is_fully_lit,
         shares: lit().map(|(_, spot)| *spot).zip(pooled.shares).collect(),
@@ -169,8 +169,8 @@ pub(super) fn combine_channels(
     for (spot, share) in shared() {
         let off: [f64; 2] = [0, 1].map(|i| spot.centroid[i].value - center[i]);
         square += share * (spot.rms.value.powi(2) + off[0] * off[0] + off[1] * off[1]);
-        error += share * spot.rms.value * spot.rms.error;
-        error += share * (0..2).map(|i| off[i].abs() * spot.centroid[i].error).sum::<f64>();
+        error += share * product(spot.rms.value, spot.rms.error);
+        error += share * (0..2).map(|i| product(off[i].abs(), spot.centroid[i].error)).sum::<f64>();
     }
     let rms = square.sqrt();
     let error = if rms > 0.0 { error / rms } else { 0.0 };
@@ -181,6 +181,11 @@ pub(super) fn combine_channels(
         is_fully_lit: weighted().all(|(weight, channel)| weight == 0.0 || channel.is_ok()),
         shares,
     })
+}
+
+/// A distance times an error, which may be infinite; 0 for no distance.
+fn product(distance: f64, error: f64) -> f64 {
+    if distance == 0.0 { 0.0 } else { distance * error }
 }
 
 /// The mean area of the pupils over the wavelengths by weight; a dark one counts as 0.
@@ -278,11 +283,13 @@ fn spot_moments(region: &Region<'_>, nodes: &Nodes) -> Option<[f64; 8]> {
 const EDGE_RAYS: usize = 128;
 
 /// The largest distance of a ray from a point, over rays at the edge and those of a quadrature
-/// inside it. The error is by how much the distance may rise between two edge rays.
+/// inside it. The error is by how much the distance may rise between two edge rays, and the shift of
+/// a ray by what is left out.
 fn geometric_radius<'a>(
     lit: impl Iterator<Item = &'a LitChannel<'a>>,
     center: [f64; 2],
     rms_error: f64,
+    ray_shift: f64,
 ) -> Estimate {
     let (mut radius, mut most, mut rays) = (0.0f64, 0.0f64, 0);
     for (region, spot) in lit {
@@ -295,7 +302,7 @@ fn geometric_radius<'a>(
         radius = radius.max(peak);
         most = most.max(peak + rise_between(&edge, region.launch.is_symmetric()));
     }
-    Estimate::new(radius, (most - radius).max(rms_error), rays)
+    Estimate::new(radius, (most - radius).max(rms_error) + ray_shift, rays)
 }
 
 /// By how much the largest of some distances around an edge may be exceeded between two of them: a

@@ -1,8 +1,10 @@
 //! `gradient`: an integral over the pupil and its derivatives with respect to all numbers of a lens.
 
+use super::effects::{AllowedSetting, EffectArgs, EffectReport, EffectRule};
 use super::error::CliError;
 use super::input::{LensFile, LoadedLens, Tolerance};
 use super::output::{Output, ShortNumber, TextTable};
+use crate::effects::{self, Effect, EffectOverride, EffectPlan, TracePurpose};
 use crate::lens::{
     Fields, Lens, Medium, MediumPlace, PROFILE_TERMS, ProfileLaw, RADIAL_TERMS, SurfaceNumber,
     at_zoom,
@@ -47,7 +49,18 @@ pub(super) struct GradientArgs {
     /// Maximum number of rays for one field and wavelength
     #[arg(long, default_value_t = 2_000_000, value_name = "N")]
     rays: usize,
+
+    #[command(flatten)]
+    effects: EffectArgs,
 }
+
+/// The rule for the pupil whose derivatives are asked for.
+const PUPIL_OF_THE_STOP: EffectRule = EffectRule {
+    effect: Effect::Aiming,
+    allowed: AllowedSetting::AlwaysOn,
+    reason: "the pupil has a derivative by the semi-diameter of the stop only where the real stop \
+             limits it",
+};
 
 /// The estimators of derivatives of an integral whose region moves with the lens.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -78,11 +91,15 @@ impl Method {
 
 impl GradientArgs {
     pub(super) fn run(&self, output: &Output) -> Result<(), CliError> {
+        let choices = self.effects.choices(&[PUPIL_OF_THE_STOP])?;
         let opened = self.lens.open()?;
         opened.check_zoom(self.zoom)?;
         let refuse = |source| CliError::RayModel { file: opened.file.clone(), source };
         let mut lens = self.selected_lens(&opened)?;
-        let model = RayModel::from_lens(&lens, 0).map_err(refuse)?;
+        let measured = effects::measure_effects(&lens, 0).map_err(refuse)?;
+        let plan = choices.plan(&measured, TracePurpose::Exact);
+        let model = effects::build_ray_model(&lens, 0, &plan).map_err(refuse)?;
+        remove_omitted(&mut lens, &plan);
         lens.surfaces[model.stop()].semi_diameter = Some(model.stop_radius());
         let (found, ms) = time_ms(|| self.differentiate(&model));
         let found = found.map_err(|cause| {
@@ -93,7 +110,8 @@ impl GradientArgs {
                 CliError::Failed(text)
             }
         })?;
-        output.print(&GradientReport::new(self, &lens, &found, ms))
+        let effects = EffectReport::uncounted(plan.decisions);
+        output.print(&GradientReport::new(self, &lens, &found, ms, effects))
     }
 
     /// The lens at the selected zoom position and field.
@@ -145,6 +163,25 @@ impl GradientArgs {
             sum = [0, 1].map(|i| sum[i] + color.weight * light.area * light.centroid[i]);
         }
         QuadraticIntegrand::spread(if area > 0.0 { sum.map(|s| s / area) } else { [0.0; 2] })
+    }
+}
+
+/// Removes the numbers from a lens that have no derivative because their effect is left out.
+/// A semi-diameter that no ray reaches has one, which is 0.
+fn remove_omitted(lens: &mut Lens, plan: &EffectPlan) {
+    let clipping = plan.decision(Effect::Clipping).map(|decision| decision.choice);
+    for (i, row) in lens.surfaces.iter_mut().enumerate() {
+        if plan.as_conic.contains(&i) {
+            row.asphere.clear();
+        }
+        if plan.homogeneous.contains(&i)
+            && let Medium::Grin(gradient) = &row.medium
+        {
+            row.medium = gradient.base.clone();
+        }
+        if plan.unclipped.contains(&i) && clipping == Some(EffectOverride::Off) {
+            row.semi_diameter = None;
+        }
     }
 }
 
@@ -204,6 +241,8 @@ struct GradientReport {
     ms: f64,
     d: DerivativeColumns,
     d_error: DerivativeColumns,
+    #[serde(flatten)]
+    effects: EffectReport,
     #[serde(skip)]
     unit: &'static str,
     /// The labels of the gradient-index coefficients behind each surface.
@@ -253,7 +292,13 @@ impl DerivativeColumns {
 }
 
 impl GradientReport {
-    fn new(args: &GradientArgs, lens: &Lens, found: &IntegralDerivative, ms: f64) -> Self {
+    fn new(
+        args: &GradientArgs,
+        lens: &Lens,
+        found: &IntegralDerivative,
+        ms: f64,
+        effects: EffectReport,
+    ) -> Self {
         let (estimator, reason) = &found.planned;
         Self {
             term: args.term,
@@ -266,6 +311,7 @@ impl GradientReport {
             ms,
             d: DerivativeColumns::new(lens, &found.by),
             d_error: DerivativeColumns::new(lens, &found.error),
+            effects,
             unit: if args.term == Integral::Spot { "mm^4" } else { "mm^2" },
             coefficients: lens.surfaces.iter().map(|row| coefficient_labels(&row.medium)).collect(),
         }
@@ -300,7 +346,8 @@ impl Display for GradientReport {
             table.row(std::iter::once(SurfaceNumber::new(i).to_string()).chain(cells));
         }
         write!(f, "{table}")?;
-        self.write_gradients(f)
+        self.write_gradients(f)?;
+        write!(f, "\n{}", self.effects)
     }
 }
 

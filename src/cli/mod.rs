@@ -10,6 +10,7 @@
 
 mod analyze;
 mod convert;
+mod effects;
 mod error;
 mod experiment;
 mod failures;

@@ -1,5 +1,6 @@
 //! `optimize`: local optimization, which saves the best lens however it ends.
 
+use super::effects::{DesignEffects, EffectArgs, EffectReport};
 use super::error::CliError;
 use super::failures::Failures;
 use super::input::{self, LensFile, LoadedLens, Tolerance};
@@ -52,6 +53,9 @@ pub(super) struct OptimizeArgs {
     /// A file for the history of all steps, as JSON
     #[arg(long, value_name = "FILE")]
     history: Option<PathBuf>,
+
+    #[command(flatten)]
+    effects: EffectArgs,
 }
 
 /// Steps where --steps is absent.
@@ -65,8 +69,9 @@ fn default_steps(method: DescentMethod) -> usize {
 impl OptimizeArgs {
     pub(super) fn run(&self, output: &Output) -> Result<(), CliError> {
         self.check_paths()?;
+        let design = DesignEffects::new(&self.effects)?;
         let opened = self.lens.open()?;
-        let mut lens = opened.lens.clone();
+        let mut lens = design.working_lens(&opened.lens);
         add_variables(&mut lens, &self.vary);
         let refuse = |source| merit_error(&opened, source);
         let goal = self.goal(&lens).map_err(|e| e.or_else(refuse))?;
@@ -78,15 +83,17 @@ impl OptimizeArgs {
         if at_start.is_dark() {
             return Err(CliError::no_light(&opened.file));
         }
+        let effects = design.report(&opened.lens, &opened.file)?;
         let (search, ms) = time_ms(|| self.search(optimizer.as_mut()));
         // The lens is saved before anything else is computed from it.
-        let best = Lens { variables: opened.lens.variables.clone(), ..optimizer.best().clone() };
+        let Lens { variables, wavelengths, .. } = opened.lens.clone();
+        let best = Lens { variables, wavelengths, ..optimizer.best().clone() };
         let mut failures = Failures::default();
         let saved = failures.note(files::save(&best, &self.out)).is_some();
         failures.note(self.write_history(&search));
         let after = optimizer.terms().map_err(refuse)?;
         let light = [at_start.light(), merit(optimizer.best())?.light()];
-        let found = OptimizeOutcome { search: &search, ms, light, before, after, saved };
+        let found = OptimizeOutcome { search: &search, ms, light, before, after, saved, effects };
         failures.note(output.print(&OptimizeReport::new(self, &lens, &best, found)));
         failures.into_result()
     }
@@ -198,6 +205,7 @@ struct OptimizeOutcome<'a> {
     after: Vec<TermValue>,
     /// True if the best lens was saved.
     saved: bool,
+    effects: EffectReport,
 }
 
 /// The printed result.
@@ -215,6 +223,8 @@ struct OptimizeReport {
     last_refusal: Option<String>,
     terms: Vec<TermComparison>,
     variables: Vec<VariableComparison>,
+    #[serde(flatten)]
+    effects: EffectReport,
     out: Option<String>,
     /// The best lens, if it could not be saved.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -230,7 +240,7 @@ struct VariableComparison {
 
 impl OptimizeReport {
     fn new(args: &OptimizeArgs, lens: &Lens, best: &Lens, found: OptimizeOutcome<'_>) -> Self {
-        let OptimizeOutcome { search, ms, light, before, after, saved } = found;
+        let OptimizeOutcome { search, ms, light, before, after, saved, effects } = found;
         let merit = |terms: &[TermValue]| terms.iter().map(|t| t.weight * t.value).sum();
         let refusals = || search.steps.iter().filter_map(|step| step.refused.as_ref());
         let variable = |v: &crate::lens::Variable| VariableComparison {
@@ -251,6 +261,7 @@ impl OptimizeReport {
             last_refusal: refusals().next_back().cloned(),
             terms: TermComparison::compare(&before, &after),
             variables: lens.variables.iter().map(variable).collect(),
+            effects,
             out: saved.then(|| args.out.display().to_string()),
             lens: (!saved).then(|| best.clone()),
         }
@@ -292,6 +303,7 @@ impl Display for OptimizeReport {
         writeln!(f)?;
         let table = TermComparison::table(&self.terms);
         writeln!(f, "{table}")?;
+        writeln!(f, "{}", self.effects)?;
         write_saved(f, self.out.as_deref(), self.lens.as_ref())
     }
 }

@@ -1,5 +1,6 @@
 //! `pareto`: the front of sharpness against light.
 
+use super::effects::{DesignEffects, EffectArgs, EffectReport};
 use super::error::CliError;
 use super::failures::Failures;
 use super::input::{LensFile, Tolerance};
@@ -47,24 +48,31 @@ pub(super) struct ParetoArgs {
     /// Omits the comparison with biased derivatives, which hold the transmitted rays fixed
     #[arg(long)]
     no_biased: bool,
+
+    #[command(flatten)]
+    effects: EffectArgs,
 }
 
 impl ParetoArgs {
     pub(super) fn run(&self, output: &Output) -> Result<(), CliError> {
         let mut paths = OutputPaths::reading([("the lens", self.lens.path())]);
         paths.folder("--out", self.out.as_deref(), ParetoReport::is_own_file)?;
+        let design = DesignEffects::new(&self.effects)?;
         let opened = self.lens.open()?;
+        let lens = design.working_lens(&opened.lens);
         let stop = stop_flag();
         let refuse = |cause: ParetoError| CliError::Input(format!("{}: {cause}", opened.file));
-        let search = |pupil| self.search(&opened.lens, pupil, &stop).map_err(refuse);
+        let search = |pupil| self.search(&lens, pupil, &stop).map_err(refuse);
+        let effects = design.report(&opened.lens, &opened.file)?;
         let (sweep, ms) = search(PupilEdge::Moving)?;
         let biased = if self.no_biased { None } else { Some(search(PupilEdge::Frozen)?) };
-        let mut report =
-            ParetoSweepReport::new(&sweep, ms, biased.as_ref(), stop.load(Ordering::Relaxed));
+        let stopped = stop.load(Ordering::Relaxed);
+        let mut report = ParetoSweepReport::new(&sweep, ms, biased.as_ref(), stopped, effects);
         let mut failures = Failures::default();
         if let Some(folder) = &self.out {
             let survey = ParetoReport {
                 name: &opened.lens.name,
+                wavelengths: &opened.lens.wavelengths,
                 start: &sweep.start,
                 front: sweep.front(),
                 tried: sweep.evaluated(),
@@ -125,6 +133,8 @@ struct ParetoSweepReport<'a> {
     start: &'a ParetoPoint,
     front: &'a [ParetoPoint],
     biased: Option<BiasedSweep<'a>>,
+    #[serde(flatten)]
+    effects: EffectReport,
     files: Vec<PathBuf>,
     /// Files of an earlier front in the same folder.
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -145,6 +155,7 @@ impl<'a> ParetoSweepReport<'a> {
         ms: f64,
         biased: Option<&'a (ParetoSweep, f64)>,
         stopped: bool,
+        effects: EffectReport,
     ) -> Self {
         let ours = sweep.front().points();
         let beaten = |design: &&ParetoPoint| ours.iter().any(|ours| ours.dominates(design));
@@ -162,6 +173,7 @@ impl<'a> ParetoSweepReport<'a> {
             start: &sweep.start,
             front: sweep.front().points(),
             biased,
+            effects,
             files: Vec::new(),
             stale: Vec::new(),
         }
@@ -204,7 +216,7 @@ impl Display for ParetoSweepReport<'_> {
                 point.rays.to_string(),
             ]);
         }
-        write!(f, "{table}")?;
+        write!(f, "{table}\n{}", self.effects)?;
         match self.files.first() {
             Some(first) => {
                 writeln!(f, "\n{} files, the table is {}", self.files.len(), first.display())

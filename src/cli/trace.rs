@@ -1,10 +1,12 @@
 //! `trace`: rays given as JSON.
 
+use super::effects::{AllowedSetting, EffectArgs, EffectChoices, EffectReport, EffectRule};
 use super::error::CliError;
-use super::input::{self, LensFile};
+use super::input::{self, LensFile, LoadedLens};
 use super::output::{Output, ShortNumber, TextTable};
+use crate::effects::{self, Effect, TracePurpose};
 use crate::files::MAX_DATA_BYTES;
-use crate::lens::SurfaceNumber;
+use crate::lens::{SurfaceNumber, System};
 use crate::math::Vec3;
 use crate::trace::{Fates, Ray, TracedRay, Tracer};
 use serde::{Deserialize, Serialize};
@@ -21,15 +23,54 @@ pub(super) struct TraceArgs {
     /// The rays as JSON, `-` for standard input
     #[arg(long, value_name = "FILE")]
     rays: PathBuf,
+
+    #[command(flatten)]
+    effects: EffectArgs,
 }
+
+/// The rules for given rays, which need not be those of the beam that a plan is measured on.
+const GIVEN_RAYS: [EffectRule; 6] = [
+    EffectRule {
+        effect: Effect::Dispersion,
+        allowed: AllowedSetting::AlwaysOff,
+        reason: "the rays have one wavelength",
+    },
+    EffectRule {
+        effect: Effect::Asphere,
+        allowed: AllowedSetting::OnUnlessOff,
+        reason: "given rays need not be those of the beam",
+    },
+    EffectRule {
+        effect: Effect::Clipping,
+        allowed: AllowedSetting::OnUnlessOff,
+        reason: "given rays need not be those of the beam",
+    },
+    EffectRule {
+        effect: Effect::Aiming,
+        allowed: AllowedSetting::AlwaysOff,
+        reason: "the rays are given, and none is aimed",
+    },
+    EffectRule {
+        effect: Effect::FiniteObject,
+        allowed: AllowedSetting::AlwaysOff,
+        reason: "the rays begin where they are given",
+    },
+    EffectRule {
+        effect: Effect::GradientIndex,
+        allowed: AllowedSetting::OnUnlessOff,
+        reason: "given rays need not be those of the beam",
+    },
+];
 
 impl TraceArgs {
     pub(super) fn run(&self, output: &Output) -> Result<(), CliError> {
+        let choices = self.effects.choices(&GIVEN_RAYS)?;
         let opened = self.lens.open()?;
         let request: RayRequest = input::read_long_json(&self.rays, MAX_DATA_BYTES)?;
         let wavelength_um = request.wavelength_um.unwrap_or_else(|| opened.primary_um());
         let zoom = request.zoom.unwrap_or(0);
-        let system = opened.system(zoom, Some(wavelength_um))?;
+        let mut system = opened.system(zoom, Some(wavelength_um))?;
+        let effects = simplify_as_asked(&mut system, &opened, zoom, &choices)?;
         let refuse = |source| CliError::Rays { file: input::display_name(&self.rays), source };
         let tracer = Tracer::new(&system).map_err(refuse)?;
         let rays: Vec<Ray<f64>> = request.rays.into_iter().map(Ray::from).collect();
@@ -39,8 +80,26 @@ impl TraceArgs {
         let mut fates = Fates::default();
         let landings = landings.inspect(|landing| fates.count(landing.fate));
         let rays = landings.map(|landing| TracedRayJson::new(&landing, last)).collect();
-        output.print(&TraceReport { wavelength_um, zoom, fates, rays })
+        output.print(&TraceReport { wavelength_um, zoom, fates, rays, effects })
     }
+}
+
+/// Removes the effects that are switched off from a system. Without such a switch nothing is left
+/// out, and there is no plan to report.
+fn simplify_as_asked(
+    system: &mut System<f64>,
+    opened: &LoadedLens,
+    zoom: usize,
+    choices: &EffectChoices,
+) -> Result<Option<EffectReport>, CliError> {
+    if !choices.leave_out_any() {
+        return Ok(None);
+    }
+    let refuse = |source| CliError::RayModel { file: opened.file.clone(), source };
+    let measured = effects::measure_effects(&opened.lens, zoom).map_err(refuse)?;
+    let plan = choices.plan(&measured, TracePurpose::Trace);
+    effects::simplify(system, &plan);
+    Ok(Some(EffectReport::uncounted(plan.decisions)))
 }
 
 /// The rays of the input, with their conditions.
@@ -79,6 +138,8 @@ struct TraceReport {
     zoom: usize,
     fates: Fates,
     rays: Vec<TracedRayJson>,
+    #[serde(flatten)]
+    effects: Option<EffectReport>,
 }
 
 #[derive(Serialize)]
@@ -141,6 +202,10 @@ impl Display for TraceReport {
             "{} um, zoom position {}: {imaged} imaged, {clipped} clipped, {missed} missed, \
              {total_reflection} totally reflected{lost_in_grin}",
             self.wavelength_um, self.zoom
-        )
+        )?;
+        match &self.effects {
+            Some(effects) => write!(f, "\n{effects}"),
+            None => writeln!(f, "every effect of the lens is computed for these rays"),
+        }
     }
 }

@@ -3,7 +3,7 @@
 use super::effect::Effect;
 use super::plan::EffectPlan;
 use super::simplify::{collimate_fields, reduce_to_conic};
-use crate::lens::{Lens, LensError, Object, System, Wavelength};
+use crate::lens::{FieldPoint, Lens, LensError, Object, System, Wavelength};
 use crate::paraxial::Beam;
 use crate::pupil::{Aiming, RayModel, RayModelError};
 
@@ -14,6 +14,20 @@ use crate::pupil::{Aiming, RayModel, RayModelError};
 pub fn build_ray_model(
     lens: &Lens,
     zoom: usize,
+    plan: &EffectPlan,
+) -> Result<RayModel, RayModelError> {
+    build_ray_model_at(lens, zoom, &lens.fields_at(zoom).values, plan)
+}
+
+/// The ray model of a lens for some fields, in the unit of its own, with the effects that a plan
+/// computes. The fields of the model are angles where a finite object is moved to infinity.
+///
+/// # Errors
+/// A lens or an aperture through which no ray can be traced.
+pub fn build_ray_model_at(
+    lens: &Lens,
+    zoom: usize,
+    fields: &[FieldPoint],
     plan: &EffectPlan,
 ) -> Result<RayModel, RayModelError> {
     let primary = lens.primary();
@@ -35,7 +49,7 @@ pub fn build_ray_model(
     };
     let beam = Beam::for_lens(lens, zoom);
     let mut built = model(systems?, beam)?;
-    built.fields.clone_from(&lens.fields_at(zoom).values);
+    built.fields = fields.to_vec();
     if lens.object != Object::Infinity
         && !plan.computes(Effect::FiniteObject)
         && let Some((beam, fields)) = collimate_fields(&built, &beam)

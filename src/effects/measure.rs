@@ -76,7 +76,19 @@ const ON_RIM: usize = 24;
 /// # Errors
 /// A lens or an aperture through which no ray can be traced.
 pub fn measure_effects(lens: &Lens, zoom: usize) -> Result<EffectMeasurements, RayModelError> {
-    let model = RayModel::from_lens(lens, zoom)?;
+    measure_effects_at(lens, zoom, &lens.fields_at(zoom).values)
+}
+
+/// Measures the effects of a lens at a zoom position on some fields, in the unit of its own.
+///
+/// # Errors
+/// A lens or an aperture through which no ray can be traced.
+pub fn measure_effects_at(
+    lens: &Lens,
+    zoom: usize,
+    fields: &[FieldPoint],
+) -> Result<EffectMeasurements, RayModelError> {
+    let model = RayModel { fields: fields.to_vec(), ..RayModel::from_lens(lens, zoom)? };
     let system = &model.channels[model.primary].system;
     let bundles: Vec<SampledBundle> = model
         .fields
@@ -134,7 +146,7 @@ fn add_fates(a: Fates, b: Fates) -> Fates {
 }
 
 /// The sampled points of the pupil; those inside come first.
-fn sample_points() -> Vec<[f64; 2]> {
+pub(super) fn sample_points() -> Vec<[f64; 2]> {
     let rim = (0..ON_RIM).map(|i| (TAU * i as f64 / ON_RIM as f64).sin_cos().into());
     pattern_points(PupilPattern::HexapolarInside(RINGS)).into_iter().chain(rim).collect()
 }

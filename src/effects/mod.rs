@@ -16,7 +16,7 @@ mod plan;
 mod simplify;
 
 pub use aiming::AimingDifference;
-pub use apply::{build_ray_model, simplify};
+pub use apply::{build_ray_model, build_ray_model_at, simplify};
 pub use effect::{Effect, EffectOverride, EffectOverrides};
-pub use measure::{EffectMeasurements, RimClearance, measure_effects};
+pub use measure::{EffectMeasurements, RimClearance, measure_effects, measure_effects_at};
 pub use plan::{EffectCost, EffectDecision, EffectPlan, TracePurpose, plan};

@@ -2,7 +2,7 @@
 
 use super::aiming::AimingDifference;
 use super::effect::{Effect, EffectOverride, EffectOverrides};
-use super::measure::{EffectMeasurements, RimClearance};
+use super::measure::{EffectMeasurements, RimClearance, sample_points};
 use crate::lens::SurfaceNumber;
 use crate::pupil::Neglected;
 use crate::trace::GrinStepPlan;
@@ -28,8 +28,9 @@ pub enum TracePurpose {
     Spot(f64),
     /// A drawing.
     Layout,
-    /// Optimization, with spots accurate to this part of the smallest one.
-    Optimize(f64),
+    /// Numbers whose change no shift of rays bounds, as derivatives, light and the merit of a lens
+    /// that will change: nothing that moves a ray may be left out.
+    Exact,
 }
 
 impl TracePurpose {
@@ -37,10 +38,10 @@ impl TracePurpose {
     fn tolerated_shift(self, measured: &EffectMeasurements) -> f64 {
         match self {
             Self::Trace => TRACE_TOLERANCE,
-            Self::Spot(share) | Self::Optimize(share) if measured.smallest_spot.is_finite() => {
+            Self::Spot(share) if measured.smallest_spot.is_finite() => {
                 share * measured.smallest_spot
             }
-            Self::Spot(_) | Self::Optimize(_) => 0.0,
+            Self::Spot(_) | Self::Exact => 0.0,
             Self::Layout => DRAWING_TOLERANCE * measured.length,
         }
     }
@@ -118,8 +119,18 @@ impl EffectPlan {
     /// The changes by all that is left out together.
     pub fn neglected(&self) -> Neglected {
         let shifts = self.decisions.iter().filter(|decision| decision.unit == "mm");
-        let shift = shifts.map(|decision| decision.residual).sum();
-        Neglected { shift, light: self.aiming_light }
+        let shift: f64 = shifts.map(|decision| decision.residual).sum();
+        let ray_shift = shift * (sample_points().len() as f64).sqrt();
+        Neglected { shift, ray_shift, light: self.aiming_light }
+    }
+
+    /// The effects that the user left out although the lens calls for them and that no shift of rays
+    /// measures; [`EffectPlan::neglected`] does not count them.
+    pub fn unmeasured(&self) -> impl Iterator<Item = Effect> {
+        let lost = |decision: &&EffectDecision| {
+            decision.choice == EffectOverride::Off && decision.needed && decision.unit != "mm"
+        };
+        self.decisions.iter().filter(lost).map(|decision| decision.effect)
     }
 }
 

@@ -42,6 +42,8 @@ pub enum RayModelError {
 pub struct Neglected {
     /// The root mean square shift of rays in the image plane, in mm.
     pub shift: f64,
+    /// The largest shift of a single ray there, in mm.
+    pub ray_shift: f64,
     /// The relative change of the light of a field.
     pub light: f64,
 }

@@ -5,6 +5,7 @@
 //! `biased_001.json` … if a front with frozen pupils is reported with it.
 
 use crate::files::{self, FileError};
+use crate::lens::{Lens, Wavelength};
 use crate::optimize::pareto::{Front, ParetoPoint};
 use crate::plot::{Axis, BLACK, Canvas, Chart, Color, GREY, GRID, Legend, PALETTE, Stroke};
 use std::io;
@@ -15,6 +16,8 @@ use std::path::{Path, PathBuf};
 pub struct ParetoReport<'a> {
     /// The name of the lens.
     pub name: &'a str,
+    /// The wavelengths that the lenses of the report are written with.
+    pub wavelengths: &'a [Wavelength],
     /// The starting lens.
     pub start: &'a ParetoPoint,
     /// The front.
@@ -47,7 +50,8 @@ impl ParetoReport<'_> {
         files::write_atomic(&written[1], &plot)?;
         for (name, design) in self.lenses() {
             let path = folder.join(name);
-            files::save(&design.lens, &path)?;
+            let wavelengths = self.wavelengths.to_vec();
+            files::save(&Lens { wavelengths, ..design.lens.clone() }, &path)?;
             written.push(path);
         }
         // The table names the other files, so it is written after them.

@@ -66,6 +66,7 @@ impl ParetoRun {
     fn report(&self) -> ParetoReport<'_> {
         ParetoReport {
             name: &self.lens.name,
+            wavelengths: &self.lens.wavelengths,
             start: &self.start,
             front: &self.main.front,
             tried: &self.main.evaluated,

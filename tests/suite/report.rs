@@ -19,7 +19,8 @@ fn a_front_is_written_with_every_lens() {
     let folder = std::env::temp_dir().join(format!("aplanat-front-{}", std::process::id()));
     let biased = Some(sweep.front());
     let (start, front, tried) = (&sweep.start, sweep.front(), sweep.evaluated());
-    let survey = ParetoReport { name: "test", start, front, tried, biased };
+    let wavelengths = &start.lens.wavelengths;
+    let survey = ParetoReport { name: "test", wavelengths, start, front, tried, biased };
     let written = survey.write(&folder.join("new")).unwrap();
     let designs = front.points();
     assert!(designs.len() > 1);
@@ -47,8 +48,10 @@ fn a_front_is_written_with_every_lens() {
 fn an_output_folder_that_is_a_file_is_named() {
     let start = ParetoPoint::evaluate(&bundled("double_gauss_rudolph_50"), None, 1e-3).unwrap();
     let front = Front::default();
-    let survey = ParetoReport { name: "", start: &start, front: &front, tried: &[], biased: None };
+    let (name, wavelengths, tried) = ("", &start.lens.wavelengths[..], &[][..]);
+    let (start, front, biased) = (&start, &front, None);
+    let survey = ParetoReport { name, wavelengths, start, front, tried, biased };
     let why = survey.write("Cargo.toml".as_ref()).unwrap_err().to_string();
     assert!(why.starts_with("Cargo.toml: cannot be written"), "{why}");
-    assert_eq!(front.relative_hypervolume(&start), 0.0);
+    assert_eq!(front.relative_hypervolume(start), 0.0);
 }

@@ -1,6 +1,6 @@
 //! Results from chief rays: distortion and field curvature.
 
-use super::{AnalysisRun, AtField, TextLines, estimate_text};
+use super::{AnalysisRun, AtField, SelectedField, TextLines, estimate_text};
 use crate::analysis::{Estimate, distortion, field_curvature};
 use crate::measure::time_ms;
 use serde::Serialize;
@@ -15,10 +15,12 @@ pub(super) struct DistortionJson {
 }
 
 pub(super) fn distortions(run: &AnalysisRun) -> Vec<AtField<DistortionJson>> {
-    let at = |field: &crate::lens::FieldPoint| {
-        let (result, ms) = time_ms(|| distortion(&run.model, *field, run.model.primary));
+    let at = |field: &SelectedField| {
+        let (result, ms) = time_ms(|| distortion(&run.model, field.traced, run.model.primary));
         let keys = result.map(|d| {
             let height = run.single_ray_estimate(d.height, ms);
+            let error = height.error + run.model.neglected.ray_shift;
+            let height = Estimate { error, ..height };
             let relative =
                 |value| Estimate { value, error: height.error / d.ideal.abs(), ..height };
             DistortionJson {
@@ -28,7 +30,7 @@ pub(super) fn distortions(run: &AnalysisRun) -> Vec<AtField<DistortionJson>> {
                 f_theta: d.f_theta.map(relative),
             }
         });
-        AtField::new(*field, keys)
+        AtField::new(field, keys)
     };
     run.fields.iter().map(at).collect()
 }
@@ -55,8 +57,8 @@ pub(super) struct FieldCurvatureJson {
 pub(super) fn curvatures(run: &AnalysisRun) -> Vec<AtField<FieldCurvatureJson>> {
     // Rays cross at the focus at a small angle, so rounding across the axis is enlarged along it.
     let cone = run.model.first_order.working_f_number.unwrap_or(1.0).abs().max(1.0);
-    let at = |field: &crate::lens::FieldPoint| {
-        let (result, ms) = time_ms(|| field_curvature(&run.model, *field, run.model.primary));
+    let at = |field: &SelectedField| {
+        let (result, ms) = time_ms(|| field_curvature(&run.model, field.traced, run.model.primary));
         let estimate = |value: f64| {
             let one = run.single_ray_estimate(value, ms);
             Estimate { error: one.error * cone, ..one }
@@ -65,7 +67,7 @@ pub(super) fn curvatures(run: &AnalysisRun) -> Vec<AtField<FieldCurvatureJson>> 
             tangential: c.tangential.map(estimate),
             sagittal: c.sagittal.map(estimate),
         });
-        AtField::new(*field, keys)
+        AtField::new(field, keys)
     };
     run.fields.iter().map(at).collect()
 }

@@ -1,6 +1,6 @@
 //! Transverse ray errors along the two sections of the pupil.
 
-use super::{AnalysisRun, AtField, TextLines};
+use super::{AnalysisRun, AtField, SelectedField, TextLines};
 use crate::analysis::{AnalysisError, Fan, FanPoint, fan};
 use crate::cli::output::{ShortNumber, or_dash};
 use crate::measure::time_ms;
@@ -35,10 +35,10 @@ struct FanPointJson {
 }
 
 pub(super) fn fans(run: &AnalysisRun) -> Vec<AtField<FanJson>> {
-    let at = |field: &crate::lens::FieldPoint| {
-        let (result, milliseconds) = time_ms(|| fan(&run.model, *field, POINTS));
+    let at = |field: &SelectedField| {
+        let (result, milliseconds) = time_ms(|| fan(&run.model, field.traced, POINTS));
         let keys = |fans: Vec<Fan>| FanJson {
-            error: run.rounding(),
+            error: run.rounding() + run.model.neglected.ray_shift,
             rays: 2 * POINTS * fans.len(),
             milliseconds,
             colors: fans.iter().map(|fan| ColorFanJson::new(run, fan)).collect(),
@@ -49,7 +49,7 @@ pub(super) fn fans(run: &AnalysisRun) -> Vec<AtField<FanJson>> {
             let dark = points.all(|point| point.error.is_none() || point.pupil == 0.0);
             if dark { Err(AnalysisError::NoLight) } else { Ok(fans) }
         });
-        AtField::new(*field, lit.map(keys))
+        AtField::new(field, lit.map(keys))
     };
     run.fields.iter().map(at).collect()
 }
@@ -83,7 +83,7 @@ impl TextLines for FanJson {
 
     fn lines(&self) -> Vec<String> {
         let Self { error, rays, milliseconds, colors } = self;
-        let mut lines = vec![format!("{rays} rays, {milliseconds:.3} ms, rounding {error:.0e} mm")];
+        let mut lines = vec![format!("{rays} rays, {milliseconds:.3} ms, error {error:.0e} mm")];
         for color in colors {
             lines.push(format!("{} um", color.wavelength_um));
             lines.push("   pupil   tangential dy  sagittal dx  sagittal dy".to_owned());

@@ -1,10 +1,11 @@
 //! Through focus: the spot at displaced image planes.
 
-use super::{AnalysisRun, AtField, FieldOutcome, TextLines, estimate_text, spot};
+use super::{AnalysisRun, AtField, FieldOutcome, SelectedField, TextLines, estimate_text, spot};
 use crate::analysis::{AnalysisError, Estimate};
 use crate::cli::error::CliError;
 use crate::cli::output::ShortNumber;
-use crate::lens::{Lens, Parameter, Quantity};
+use crate::effects::build_ray_model_at;
+use crate::lens::{FieldPoint, Lens, Parameter, Quantity};
 use crate::measure::time_ms;
 use serde::Serialize;
 
@@ -31,7 +32,7 @@ pub(super) fn through_focus(run: &AnalysisRun) -> Result<Vec<AtField<ThroughFocu
         let defocus = f64::from(i) * step;
         columns.push((defocus, spots(run, defocus)?));
     }
-    let at = |(i, field): (usize, &crate::lens::FieldPoint)| {
+    let at = |(i, field): (usize, &SelectedField)| {
         let position = |(defocus, spots): &(f64, Vec<Result<Estimate, AnalysisError>>)| {
             FocusPosition { defocus: *defocus, rms: spots[i].ok() }
         };
@@ -39,7 +40,7 @@ pub(super) fn through_focus(run: &AnalysisRun) -> Result<Vec<AtField<ThroughFocu
         let lit = columns.iter().any(|(_, spots)| spots[i].is_ok());
         let keys = ThroughFocusJson { positions: columns.iter().map(position).collect() };
         AtField::new(
-            *field,
+            field,
             if lit { Ok(keys) } else { Err(dark.unwrap_or(AnalysisError::NoLight)) },
         )
     };
@@ -53,12 +54,14 @@ fn spots(
 ) -> Result<Vec<Result<Estimate, AnalysisError>>, CliError> {
     let mut moved = run.opened.clone();
     shift_image(&mut moved.lens, run.zoom, defocus);
-    let model = moved.ray_model(run.zoom)?;
-    let spot = |field: &crate::lens::FieldPoint| {
+    let fields: Vec<FieldPoint> = run.fields.iter().map(|field| field.given).collect();
+    let model = build_ray_model_at(&moved.lens, run.zoom, &fields, &run.plan)
+        .map_err(|source| CliError::RayModel { file: moved.file.clone(), source })?;
+    let spot = |field: &FieldPoint| {
         let (result, ms) = time_ms(|| crate::analysis::spot(&model, *field, run.accuracy));
         result.map(|spot| Estimate { milliseconds: Some(ms), ..spot.rms })
     };
-    Ok(run.fields.iter().map(spot).collect())
+    Ok(model.fields.iter().map(spot).collect())
 }
 
 /// Displaces the image plane along z by the number that determines its position.

@@ -1,7 +1,8 @@
 //! The illumination of the fields.
 
-use super::{AnalysisRun, AtField, TextLines, estimate_text};
+use super::{AnalysisRun, AtField, SelectedField, TextLines, estimate_text};
 use crate::analysis::{Estimate, Illumination, illumination};
+use crate::lens::FieldPoint;
 use crate::measure::time_ms;
 use crate::pupil::RayModel;
 use serde::Serialize;
@@ -17,30 +18,32 @@ pub(super) struct IlluminationJson {
 
 pub(super) fn illuminations(run: &AnalysisRun) -> Vec<AtField<IlluminationJson>> {
     // The reference is the first field of the lens, even if it is not selected.
-    let first = run.model.fields.first().copied();
-    let alone = first.is_some_and(|first| run.fields == [first]);
-    let selected = if alone { Vec::new() } else { run.fields.clone() };
-    let listed = run.fields == run.model.fields;
-    let fields = if listed { selected } else { first.into_iter().chain(selected).collect() };
-    let skipped = usize::from(!listed && !alone);
+    let first = run.model.fields.first();
+    let selected: Vec<FieldPoint> = run.fields.iter().map(|field| field.traced).collect();
+    let skipped = usize::from(first != selected.first());
+    let fields = first.into_iter().take(skipped).chain(&selected).copied().collect();
     let model = RayModel { fields, ..run.model.clone() };
     let (results, ms) = time_ms(|| illumination(&model, model.primary, run.accuracy));
     let dark = results.iter().all(|light| light.error.is_some());
-    let found = |light: &Illumination| match light.error {
-        Some(why) if dark => AtField::new(light.field, Err(why)),
-        _ => keys(light, ms),
+    let found = |(field, light): (&SelectedField, &Illumination)| match light.error {
+        Some(why) if dark => AtField::new(field, Err(why)),
+        _ => keys(field, light, ms),
     };
-    results.iter().skip(skipped).map(found).collect()
+    run.fields.iter().zip(&results[skipped..]).map(found).collect()
 }
 
-fn keys(light: &Illumination, milliseconds: f64) -> AtField<IlluminationJson> {
+fn keys(
+    field: &SelectedField,
+    light: &Illumination,
+    milliseconds: f64,
+) -> AtField<IlluminationJson> {
     let milliseconds = Some(milliseconds);
     let keys = IlluminationJson {
         cone: Estimate { milliseconds, ..light.cone },
         relative: light.relative.map(|e| Estimate { milliseconds, ..e }),
         dark: light.error.map(|dark| dark.to_string()),
     };
-    AtField::new(light.field, Ok(keys))
+    AtField::new(field, Ok(keys))
 }
 
 impl TextLines for IlluminationJson {

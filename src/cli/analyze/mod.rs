@@ -6,10 +6,12 @@ mod focus;
 mod illumination;
 mod spot;
 
+use super::effects::{AllowedSetting, EffectArgs, EffectReport, EffectRule};
 use super::error::CliError;
 use super::input::{LensFile, LoadedLens, Tolerance};
 use super::output::{Output, ShortNumber};
 use crate::analysis::{AnalysisError, Estimate};
+use crate::effects::{self, Effect, EffectPlan, TracePurpose};
 use crate::lens::{FieldKind, FieldPoint, SurfaceNumber};
 use crate::measure::time_ms;
 use crate::pupil::{Accuracy, RayModel};
@@ -40,6 +42,9 @@ pub(super) struct AnalyzeArgs {
     /// The zoom position, counted from 0
     #[arg(long, value_name = "N", default_value_t = 0)]
     zoom: usize,
+
+    #[command(flatten)]
+    effects: EffectArgs,
 }
 
 /// The analyses.
@@ -58,6 +63,47 @@ enum AnalysisKind {
     Illumination,
     /// RMS radius at displaced image planes
     ThroughFocus,
+}
+
+/// The rule for results at one wavelength.
+const ONE_WAVELENGTH: EffectRule = EffectRule {
+    effect: Effect::Dispersion,
+    allowed: AllowedSetting::AlwaysOff,
+    reason: "only the primary wavelength is traced",
+};
+/// The rule for image heights compared with ideal ones.
+const OBJECT_IN_PLACE: EffectRule = EffectRule {
+    effect: Effect::FiniteObject,
+    allowed: AllowedSetting::AlwaysOn,
+    reason: "the ideal heights are those of the object where it is",
+};
+
+impl AnalysisKind {
+    /// The effects that the analysis does not leave to the plan.
+    fn effect_rules(self) -> &'static [EffectRule] {
+        match self {
+            Self::Spot | Self::Fan | Self::ThroughFocus => &[],
+            Self::Distortion => &[ONE_WAVELENGTH, OBJECT_IN_PLACE],
+            Self::FieldCurvature | Self::Illumination => &[ONE_WAVELENGTH],
+        }
+    }
+
+    /// The purpose that effects are planned for.
+    fn purpose(self, tolerance: f64) -> TracePurpose {
+        match self {
+            Self::Spot | Self::ThroughFocus => TracePurpose::Spot(tolerance),
+            Self::Fan | Self::Distortion => TracePurpose::Trace,
+            Self::FieldCurvature | Self::Illumination => TracePurpose::Exact,
+        }
+    }
+
+    /// The report of the effects: a shift of rays bounds the errors of some analyses only.
+    fn effect_report(self, plan: EffectPlan) -> EffectReport {
+        match self {
+            Self::FieldCurvature | Self::Illumination => EffectReport::uncounted(plan.decisions),
+            _ => EffectReport::counted(plan),
+        }
+    }
 }
 
 impl AnalyzeArgs {
@@ -80,23 +126,45 @@ impl AnalyzeArgs {
 struct AnalysisRun {
     what: AnalysisKind,
     opened: LoadedLens,
+    plan: EffectPlan,
     model: RayModel,
     /// The selected fields.
-    fields: Vec<FieldPoint>,
+    fields: Vec<SelectedField>,
     zoom: usize,
     accuracy: Accuracy,
 }
 
+/// A selected field.
+#[derive(Debug, Clone, Copy)]
+struct SelectedField {
+    /// The field in the unit of the lens.
+    given: FieldPoint,
+    /// The field in the unit of the ray model, an angle where a finite object is moved to infinity.
+    traced: FieldPoint,
+}
+
 impl AnalysisRun {
     fn new(analyze: &AnalyzeArgs) -> Result<Self, CliError> {
+        let choices = analyze.effects.choices(analyze.what.effect_rules())?;
         let opened = analyze.lens.open()?;
-        let model = opened.ray_model(analyze.zoom)?;
-        let fields = match analyze.field {
-            Some(y) => vec![opened.field_at(y, analyze.zoom)?],
-            None => model.fields.clone(),
-        };
+        let AnalyzeArgs { what, zoom, .. } = *analyze;
+        opened.check_zoom(zoom)?;
+        let listed = &opened.lens.fields_at(zoom).values;
+        let chosen = analyze.field.map(|y| opened.field_at(y, zoom)).transpose()?;
+        let extra = chosen.filter(|field| !listed.contains(field));
+        let all: Vec<FieldPoint> = listed.iter().copied().chain(extra).collect();
+        let refuse = |source| CliError::RayModel { file: opened.file.clone(), source };
+        let measured = effects::measure_effects_at(&opened.lens, zoom, &all).map_err(refuse)?;
+        let plan = choices.plan(&measured, what.purpose(analyze.error.0));
+        let model = effects::build_ray_model_at(&opened.lens, zoom, &all, &plan).map_err(refuse)?;
+        let pairs = all.iter().zip(&model.fields);
+        let pairs = pairs.map(|(given, traced)| SelectedField { given: *given, traced: *traced });
+        let is_selected = |field: &SelectedField| chosen.is_none_or(|only| only == field.given);
+        let mut fields: Vec<SelectedField> = pairs.filter(is_selected).collect();
+        // Of two equal fields one is enough.
+        fields.truncate(chosen.map_or(fields.len(), |_| 1));
         let accuracy = Accuracy { tolerance: analyze.error.0, ..Accuracy::default() };
-        Ok(Self { what: analyze.what, opened, model, fields, zoom: analyze.zoom, accuracy })
+        Ok(Self { what, opened, plan, model, fields, zoom, accuracy })
     }
 
     fn primary_um(&self) -> f64 {
@@ -130,9 +198,10 @@ impl AnalysisRun {
             zoom: self.zoom,
             wavelength_um: um,
             tolerance: self.accuracy.tolerance,
-            field_kind: self.model.beam.field,
+            field_kind: self.opened.lens.fields_at(self.zoom).kind,
             airy_radius: first.working_f_number.map(|f| 1.22 * um * 1e-3 * f),
             fields,
+            effects: self.what.effect_report(self.plan.clone()),
         })
     }
 
@@ -142,7 +211,7 @@ impl AnalysisRun {
         let mut fates = Fates::default();
         let color = &self.model.channels[self.model.primary];
         for field in &self.fields {
-            let Ok(launch) = self.model.launch(*field, self.model.primary) else { continue };
+            let Ok(launch) = self.model.launch(field.traced, self.model.primary) else { continue };
             let grid = crate::pupil::pattern_points(crate::pupil::PupilPattern::Square(16));
             for ray in grid.into_iter().filter_map(|p| launch.ray(p)) {
                 let fate = color.tracer.trace(ray).fate;
@@ -179,6 +248,8 @@ struct AnalysisReport<T> {
     field_kind: FieldKind,
     airy_radius: Option<f64>,
     fields: Vec<AtField<T>>,
+    #[serde(flatten)]
+    effects: EffectReport,
 }
 
 /// The result at a field.
@@ -199,12 +270,12 @@ enum FieldOutcome<T> {
 }
 
 impl<T> AtField<T> {
-    fn new(field: FieldPoint, result: Result<T, AnalysisError>) -> Self {
+    fn new(field: &SelectedField, result: Result<T, AnalysisError>) -> Self {
         let outcome = match result {
             Ok(lit) => FieldOutcome::Lit(lit),
             Err(dark) => FieldOutcome::Dark { dark: dark.to_string() },
         };
-        Self { x: field.x, y: field.y, outcome }
+        Self { x: field.given.x, y: field.given.y, outcome }
     }
 }
 
@@ -235,7 +306,7 @@ impl<T: TextLines> Display for AnalysisReport<T> {
                 FieldOutcome::Dark { dark } => writeln!(f, "  {dark}")?,
             }
         }
-        Ok(())
+        write!(f, "\n{}", self.effects)
     }
 }
 

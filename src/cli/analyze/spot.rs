@@ -1,6 +1,6 @@
 //! The spot of a field.
 
-use super::{AnalysisRun, AtField, TextLines, estimate_text, with_time};
+use super::{AnalysisRun, AtField, SelectedField, TextLines, estimate_text, with_time};
 use crate::analysis::{AnalysisError, Estimate, MonochromaticSpot, Spot, spot};
 use serde::Serialize;
 
@@ -34,9 +34,9 @@ enum ColorSpotJson {
 }
 
 pub(super) fn spots(run: &AnalysisRun) -> Vec<AtField<SpotJson>> {
-    let at = |field: &crate::lens::FieldPoint| {
-        let result = with_time(|| spot(&run.model, *field, run.accuracy), note_time);
-        AtField::new(*field, result.map(|spot| SpotJson::new(run, &spot)))
+    let at = |field: &SelectedField| {
+        let result = with_time(|| spot(&run.model, field.traced, run.accuracy), note_time);
+        AtField::new(field, result.map(|spot| SpotJson::new(run, &spot)))
     };
     run.fields.iter().map(at).collect()
 }

@@ -3,6 +3,7 @@
 mod checks;
 mod effects;
 
+use super::effects::{EffectArgs, EffectChoices, decision_text};
 use super::error::CliError;
 use super::input::{LensFile, LoadedLens};
 use super::output::{Output, ShortNumber, TextTable, or_dash};
@@ -23,10 +24,14 @@ pub(super) struct InfoArgs {
     /// Only this zoom position, counted from 0; absent: all of them
     #[arg(long, value_name = "N")]
     zoom: Option<usize>,
+
+    #[command(flatten)]
+    effects: EffectArgs,
 }
 
 impl InfoArgs {
     pub(super) fn run(&self, output: &Output) -> Result<(), CliError> {
+        let choices = self.effects.choices(&[])?;
         let opened = self.lens.open()?;
         let zooms = match self.zoom {
             Some(zoom) => {
@@ -36,7 +41,7 @@ impl InfoArgs {
             None => 0..opened.lens.zoom_positions(),
         };
         let positions: Vec<ZoomReport> =
-            zooms.map(|zoom| ZoomReport::new(&opened, zoom)).collect::<Result<_, _>>()?;
+            zooms.map(|zoom| ZoomReport::new(&opened, zoom, &choices)).collect::<Result<_, _>>()?;
         output.print(&InfoReport::new(&opened, positions))
     }
 }
@@ -95,13 +100,13 @@ struct ZoomReport {
 }
 
 impl ZoomReport {
-    fn new(opened: &LoadedLens, zoom: usize) -> Result<Self, CliError> {
+    fn new(opened: &LoadedLens, zoom: usize, choices: &EffectChoices) -> Result<Self, CliError> {
         let lens = &opened.lens;
         let system = opened.system(zoom, None)?;
         let undefined = |source| CliError::Paraxial { file: opened.file.clone(), source };
         let data = first_order(&system, &Beam::for_lens(lens, zoom)).map_err(undefined)?;
         let media: Vec<_> = lens.surfaces.iter().map(|row| row.medium.clone()).collect();
-        let (facts, effects) = effects::decisions(opened, zoom)?;
+        let (facts, effects) = effects::decisions(opened, zoom, choices)?;
         Ok(Self {
             zoom,
             zoom_name: lens.zoom.get(zoom).map(|z| z.name.clone()).unwrap_or_default(),
@@ -209,7 +214,7 @@ impl ZoomReport {
         let zoom = self.zoom;
         let mut lines =
             vec![format!("effects on spots good to {}, zoom {zoom}", effects::SPOT_TOLERANCE)];
-        lines.extend(self.effects.iter().map(effects::decision_text));
+        lines.extend(self.effects.iter().map(decision_text));
         lines.push(format!("\nchecks, zoom {zoom}"));
         lines.extend(self.checks.iter().map(LensCheck::line));
         if self.checks.is_empty() {

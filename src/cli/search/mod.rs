@@ -7,6 +7,7 @@ mod result;
 
 pub(super) use plan_args::SearchPlanArgs;
 
+use super::effects::{DesignEffects, EffectArgs};
 use super::error::CliError;
 use super::failures::Failures;
 use super::input::LensFile;
@@ -77,6 +78,9 @@ pub(super) struct SearchArgs {
 
     #[command(flatten)]
     plan_args: SearchPlanArgs,
+
+    #[command(flatten)]
+    effects: EffectArgs,
 }
 
 /// Maximum number of gradients if neither it nor a duration is given.
@@ -100,10 +104,15 @@ impl SearchArgs {
     pub(super) fn run(&self, output: &Output) -> Result<(), CliError> {
         self.check()?;
         self.check_paths()?;
+        let design = self.design_effects()?;
         let opened = self.lens.open()?;
         let _lock = self.checkpoint.as_deref().map(FileLock::acquire).transpose()?;
         let plan = self.plan(&opened.lens)?;
-        let lens = self.plan_args.start_lens(&opened.lens)?;
+        let start = self.plan_args.start_lens(&opened.lens)?;
+        let lens = design.working_lens(&start);
+        let effects = design.report(&start, &opened.file)?;
+        let Lens { wavelengths, .. } = start;
+        let original = Lens { wavelengths, ..opened.lens.clone() };
         let refused = |cause: LandscapeError| landscape_error(&opened.file, cause);
         let landscape = plan.landscape(&lens).map_err(refused)?;
         let start_breaks = landscape.violations(landscape.start()).map_err(refused)?;
@@ -116,13 +125,13 @@ impl SearchArgs {
         let mut failures = Failures::default();
         let ended = self.run_rounds(&landscape, &mut run, watch, &mut failures);
         let ms = 1e3 * watch.seconds();
-        let mut unsaved = self.save_best(&run.best().point, &opened.lens, &mut failures);
-        let stored = failures.note(self.write_reservoir(&run, &opened.lens)).unwrap_or_default();
+        let mut unsaved = self.save_best(&run.best().point, &original, &mut failures);
+        let stored = failures.note(self.write_reservoir(&run, &original)).unwrap_or_default();
         let stale = self.stale_files(&stored);
         let finished = self.finish.then(|| finalize(&landscape, &run.best().point));
         let finished = finished.and_then(|lens| failures.note(lens.map_err(refused)));
         if let Some(finished) = &finished {
-            unsaved = self.save_best(&finished.lens, &opened.lens, &mut failures);
+            unsaved = self.save_best(&finished.lens, &original, &mut failures);
         }
         let printed = Stopwatch::start();
         let compared = StartAgainstBest::new(&landscape, &run.best().point).map_err(refused)?;
@@ -142,6 +151,7 @@ impl SearchArgs {
             out: self.out.as_deref().filter(|_| unsaved.is_none()),
             unsaved,
             finished,
+            effects,
         });
         failures.note(output.print(&report));
         failures.note(report.check_finished());
@@ -171,6 +181,14 @@ impl SearchArgs {
         paths.file("--out", self.out.as_deref(), &["json", "zmx"])?;
         paths.file("--checkpoint", self.checkpoint.as_deref(), &["json"])?;
         paths.folder("--reservoir-dir", self.reservoir_dir.as_deref(), is_reservoir_name)
+    }
+
+    fn design_effects(&self) -> Result<DesignEffects, CliError> {
+        if self.plan_args.has_wavelength() {
+            let reason = "--wavelength leaves one wavelength";
+            return DesignEffects::at_one_wavelength(&self.effects, reason);
+        }
+        DesignEffects::new(&self.effects)
     }
 
     fn plan(&self, lens: &Lens) -> Result<SearchPlan, CliError> {
@@ -258,8 +276,8 @@ impl SearchArgs {
     }
 
     /// Saves the best lens, if there is a file for it; the lens if that fails.
-    fn save_best(&self, best: &Lens, opened: &Lens, failures: &mut Failures) -> Option<Lens> {
-        let best = lens_to_write(best, opened);
+    fn save_best(&self, best: &Lens, original: &Lens, failures: &mut Failures) -> Option<Lens> {
+        let best = lens_to_write(best, original);
         let path = self.out.as_ref()?;
         failures.note(files::save(&best, path)).is_none().then_some(best)
     }
@@ -276,7 +294,7 @@ impl SearchArgs {
     fn write_reservoir(
         &self,
         run: &SearchRunOn<LensLandscape>,
-        opened: &Lens,
+        original: &Lens,
     ) -> Result<Vec<PathBuf>, CliError> {
         let Some(folder) = &self.reservoir_dir else { return Ok(Vec::new()) };
         let mut files = Vec::new();
@@ -284,7 +302,7 @@ impl SearchArgs {
             let running = if running { "_running" } else { "" };
             let name = format!("{:02}_generation_{}{running}.json", i + 1, entry.number);
             let path = folder.join(name);
-            files::save(&lens_to_write(&entry.point, opened), &path)?;
+            files::save(&lens_to_write(&entry.point, original), &path)?;
             files.push(path);
         }
         Ok(files)
@@ -300,11 +318,12 @@ fn is_reservoir_name(name: &str) -> bool {
         && after_place.strip_prefix("_generation_").is_some_and(starts_with_digit)
 }
 
-/// A lens with the variables of the file that was read, not those of the search.
-fn lens_to_write(lens: &Lens, opened: &Lens) -> Lens {
-    let same = lens.surfaces.len() == opened.surfaces.len();
-    let variables = if same { opened.variables.clone() } else { Vec::new() };
-    let written = Lens { variables, ..lens.clone() };
+/// A lens with the variables and wavelengths of the original one, not those of the search.
+fn lens_to_write(lens: &Lens, original: &Lens) -> Lens {
+    let same = lens.surfaces.len() == original.surfaces.len();
+    let variables = if same { original.variables.clone() } else { Vec::new() };
+    let wavelengths = original.wavelengths.clone();
+    let written = Lens { variables, wavelengths, ..lens.clone() };
     if written.check().is_ok() { written } else { Lens { variables: Vec::new(), ..written } }
 }
 

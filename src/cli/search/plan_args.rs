@@ -175,6 +175,11 @@ impl SearchPlanArgs {
         goal.into_iter().chain(self.rules.as_deref().map(|path| ("--rules", path)))
     }
 
+    /// True if one wavelength replaces those of the lens.
+    pub(in crate::cli) fn has_wavelength(&self) -> bool {
+        self.wavelength.is_some()
+    }
+
     /// The plan of a search of this lens.
     pub(in crate::cli) fn plan(&self, lens: &Lens) -> Result<SearchPlan, CliError> {
         let rules = self.rules(lens)?;

@@ -3,6 +3,7 @@
 use super::SearchEnd;
 use super::limits::ViolatedLimit;
 use super::result::{FinishedReport, StartAgainstBest};
+use crate::cli::effects::EffectReport;
 use crate::cli::error::CliError;
 use crate::cli::output::{ShortNumber, TextTable, write_saved};
 use crate::lens::Lens;
@@ -34,6 +35,7 @@ pub(super) struct SearchResults<'a> {
     /// The best lens, if it could not be saved.
     pub(super) unsaved: Option<Lens>,
     pub(super) finished: Option<FinalizedLens>,
+    pub(super) effects: EffectReport,
 }
 
 /// The printed result.
@@ -59,6 +61,8 @@ pub(super) struct SearchReport {
     figures_ms: f64,
     reservoir: Vec<ReservoirRow>,
     mutations: Vec<MutationRow>,
+    #[serde(flatten)]
+    effects: EffectReport,
     ended_by: std::collections::BTreeMap<crate::search::DescentEnd, u64>,
     files: Vec<PathBuf>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -120,6 +124,7 @@ impl SearchReport {
             figures_ms: searched.compared_ms,
             reservoir: run.found_points().into_iter().map(row).collect(),
             mutations: mutations.collect(),
+            effects: searched.effects,
             ended_by: statistics.ended.clone(),
             files: searched.stored,
             stale: searched.stale,
@@ -178,6 +183,7 @@ impl Display for SearchReport {
         self.compared.write_terms(f)?;
         self.write_reservoir(f)?;
         self.write_mutations(f)?;
+        write!(f, "\n{}", self.effects)?;
         if let Some(finished) = &self.finished {
             finished.write(f)?;
         }
