@@ -7,7 +7,7 @@ use clap::CommandFactory;
 use serde::Serialize;
 use std::fmt::{self, Display};
 
-/// Prints the help of a command or of a topic: lens-file, conventions, packages
+/// Prints the help of a command or of a topic: lens-file, conventions, effects, packages
 #[derive(Debug, clap::Args)]
 pub(super) struct HelpArgs {
     /// A command, or one of the topics; all commands where it is absent
@@ -16,9 +16,10 @@ pub(super) struct HelpArgs {
 }
 
 /// Texts that belong to no command, by name.
-pub(super) const TOPICS: [(&str, &str); 3] = [
+pub(super) const TOPICS: [(&str, &str); 4] = [
     ("lens-file", include_str!("help/lens-file.txt")),
     ("conventions", include_str!("help/conventions.txt")),
+    ("effects", include_str!("help/effects.txt")),
     ("packages", include_str!("help/packages.txt")),
 ];
 

@@ -7,7 +7,7 @@ use aplanat::effects::{
 };
 use aplanat::files;
 use aplanat::lens::{FieldKind, Lens, Object, Row, Shape};
-use aplanat::pupil::{Accuracy, RayModel};
+use aplanat::pupil::{Accuracy, Aiming, RayModel};
 
 const TASK: TracePurpose = TracePurpose::Spot(1e-3);
 
@@ -250,4 +250,31 @@ fn an_effect_plan_exists_for_lenses_without_light() {
     let auto = planned(&lens, 0, TASK, &EffectOverrides::default());
     let text = serde_json::to_string(&auto).unwrap();
     assert!(text.contains("\"effect\":\"dispersion\""), "{text}");
+}
+
+#[test]
+fn numbers_that_no_shift_bounds_are_planned_exactly() {
+    let mut lens = lens("double_gauss_rudolph_50");
+    lens.surfaces[8].asphere = vec![1e-14];
+    lens.object = Object::Finite(1e9);
+    let auto = planned(&lens, 0, TASK, &EffectOverrides::default());
+    assert!(!auto.computes(Effect::Asphere) && !auto.computes(Effect::FiniteObject));
+    let exact = planned(&lens, 0, TracePurpose::Exact, &EffectOverrides::default());
+    for decision in &exact.decisions {
+        assert!(decision.computed || !(decision.error > 0.0) || decision.unit != "mm");
+    }
+    assert_eq!(exact.neglected().shift, 0.0);
+    assert!(exact.computes(Effect::Asphere) && exact.computes(Effect::FiniteObject));
+}
+
+#[test]
+fn beams_that_are_not_aimed_are_not_searched_for() {
+    let lens = lens("cooke_triplet_100_f27");
+    let off = planned(&lens, 0, TASK, &forced(Effect::Aiming, EffectOverride::Off));
+    let model = build_ray_model(&lens, 0, &off).unwrap();
+    assert_eq!(model.aiming, Aiming::Paraxial);
+    assert!(model.neglected.shift > 0.0 && model.neglected.ray_shift > model.neglected.shift);
+    assert_eq!(off.unmeasured().count(), 0);
+    let open = planned(&lens, 0, TASK, &forced(Effect::Clipping, EffectOverride::Off));
+    assert_eq!(open.unmeasured().collect::<Vec<_>>(), [Effect::Clipping]);
 }
