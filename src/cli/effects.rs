@@ -99,6 +99,17 @@ impl EffectRule {
         )
     }
 
+    /// Refuses a setting that the command cannot follow.
+    fn check(&self, setting: EffectOverride) -> Result<(), CliError> {
+        if !self.forbids(setting) {
+            return Ok(());
+        }
+        let (name, reason) = (option_name(self.effect), self.reason);
+        let verb = if setting == EffectOverride::Off { "off" } else { "on" };
+        let text = format!("--effects: {name} cannot be switched {verb} here: {reason}");
+        Err(CliError::Input(text))
+    }
+
     /// The setting that is planned for the user's one.
     fn setting(&self, chosen: EffectOverride) -> EffectOverride {
         match (self.allowed, chosen) {
@@ -116,8 +127,10 @@ impl EffectRule {
                 (decision.needed, decision.residual) = (false, 0.0);
                 self.reason.clone_into(&mut decision.reason);
             }
-            AllowedSetting::OnUnlessOff if decision.choice == EffectOverride::Off => {}
-            _ => decision.reason = format!("{}; {}", self.reason, decision.reason),
+            _ if decision.computed => {
+                decision.reason = format!("{}; {}", self.reason, decision.reason);
+            }
+            _ => {}
         }
     }
 }
@@ -140,16 +153,13 @@ impl EffectArgs {
             let allowed = |e: &Effect| !rule_of(*e).is_some_and(|r| r.forbids(switch.setting));
             Effect::ALL.into_iter().filter(allowed).for_each(|e| chosen.set(e, switch.setting));
         }
-        for EffectSwitch { effect, setting } in &self.effects {
-            let Some(effect) = *effect else { continue };
-            if let Some(rule) = rule_of(effect).filter(|rule| rule.forbids(*setting)) {
-                let verb = if *setting == EffectOverride::Off { "off" } else { "on" };
-                return Err(CliError::Input(format!(
-                    "--effects: {} cannot be switched {verb} here: {}",
-                    option_name(effect),
-                    rule.reason
-                )));
+        let named = self.effects.iter().filter_map(|switch| Some((switch.effect?, switch)));
+        for (i, (effect, EffectSwitch { setting, .. })) in named.clone().enumerate() {
+            if named.clone().take(i).any(|(other, _)| other == effect) {
+                let text = format!("--effects: {} is switched twice", option_name(effect));
+                return Err(CliError::Input(text));
             }
+            rule_of(effect).map_or(Ok(()), |rule| rule.check(*setting))?;
             chosen.set(effect, *setting);
         }
         Ok(EffectChoices { chosen, rules })

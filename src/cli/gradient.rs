@@ -14,7 +14,7 @@ use crate::pupil::{
     Accuracy, DerivativeError, DerivativeEstimator, PupilDerivative, QuadraticIntegrand, RayModel,
     Region, choose_estimator, differentiate,
 };
-use crate::trace::{SurfaceGradient, SystemGradient as Slopes};
+use crate::trace::{SurfaceGradient, SurfaceParameter, SystemGradient as Slopes};
 use clap::ValueEnum;
 use serde::Serialize;
 use std::fmt::{self, Display};
@@ -46,7 +46,7 @@ pub(super) struct GradientArgs {
     #[arg(long, default_value = "1e-6", value_name = "TOLERANCE")]
     error: Tolerance,
 
-    /// Maximum number of rays for one field and wavelength
+    /// Number of rays for one field and wavelength beyond which the accuracy is not raised
     #[arg(long, default_value_t = 2_000_000, value_name = "N")]
     rays: usize,
 
@@ -110,6 +110,12 @@ impl GradientArgs {
                 CliError::Failed(text)
             }
         })?;
+        if found.least_rays > self.rays {
+            return Err(CliError::Input(format!(
+                "--rays: found {}; expected at least {}, without which no error is known",
+                self.rays, found.least_rays
+            )));
+        }
         let effects = EffectReport::uncounted(plan.decisions);
         output.print(&GradientReport::new(self, &lens, &found, ms, effects))
     }
@@ -140,6 +146,7 @@ impl GradientArgs {
                     None => choose_estimator(region, accuracy)?,
                 };
                 let derivative = differentiate(region, &cost, estimator, accuracy)?;
+                found.least_rays = found.least_rays.max(least_rays(&derivative, region));
                 let light = region.trace_pupil(VALUE_ORDER).moments;
                 let coarse = cost.integrate(&region.trace_pupil(VALUE_ORDER - 1).moments);
                 let value = cost.integrate(&light);
@@ -164,6 +171,15 @@ impl GradientArgs {
         }
         QuadraticIntegrand::spread(if area > 0.0 { sum.map(|s| s / area) } else { [0.0; 2] })
     }
+}
+
+/// The smallest limit of rays with which a derivative without an error would have one, which takes
+/// a second order of about twice the rays; 0 if it has one.
+fn least_rays(derivative: &PupilDerivative, region: &Region<'_>) -> usize {
+    if derivative.error.largest(SurfaceParameter::Curvature).is_finite() {
+        return 0;
+    }
+    3 * derivative.rays - 2 * region.rays
 }
 
 /// Removes the numbers from a lens that have no derivative because their effect is left out.
@@ -195,6 +211,8 @@ struct IntegralDerivative {
     by: Slopes<f64>,
     error: Slopes<f64>,
     rays: usize,
+    /// The smallest limit of rays that gives every derivative an error; 0 if all have one.
+    least_rays: usize,
     weights: f64,
     /// True if every derivative of every field and wavelength is within the tolerance.
     reached: bool,
@@ -212,6 +230,7 @@ impl IntegralDerivative {
             by: zero(),
             error: zero(),
             rays: 0,
+            least_rays: 0,
             weights,
             reached: true,
             planned,

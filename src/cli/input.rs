@@ -111,9 +111,9 @@ impl FromStr for Tolerance {
             Some(digits) => (digits, 0.01),
             None => (text, 1.0),
         };
-        match digits.trim().parse::<f64>() {
-            Ok(value) if value > 0.0 && value.is_finite() => Ok(Self(value * unit)),
-            _ => Err("expected more than 0, as in `0.1%` or `1e-3`".to_owned()),
+        match digits.trim().parse::<f64>().map(|value| value * unit) {
+            Ok(value) if value > 0.0 && value < 1.0 => Ok(Self(value)),
+            _ => Err("expected more than 0 and less than 100%, as in `0.1%` or `1e-3`".to_owned()),
         }
     }
 }

@@ -5,7 +5,7 @@ use super::error::CliError;
 use super::failures::Failures;
 use super::input::{self, LensFile, LoadedLens, Tolerance};
 use super::names::value_name;
-use super::output::{Output, ShortNumber, write_saved};
+use super::output::{Output, ShortNumber, or_dash, write_saved};
 use super::output_paths::OutputPaths;
 use super::progress::{progress_bar, stop_flag};
 use super::terms::TermComparison;
@@ -14,6 +14,7 @@ use crate::lens::{Lens, ParameterKind, add_variables};
 use crate::measure::time_ms;
 use crate::merit::{Goal, Merit, MeritError, TermValue};
 use crate::optimize::{DescentMethod, OptimizationProgress, Optimizer, start};
+use crate::paraxial::{Beam, first_order};
 use serde::Serialize;
 use std::fmt::{self, Display};
 use std::path::PathBuf;
@@ -219,6 +220,8 @@ struct OptimizeReport {
     merit_after: f64,
     light_before: f64,
     light_after: f64,
+    /// The focal length at each zoom position before and after, in mm.
+    focal_lengths: Vec<FocalLengths>,
     refused_steps: usize,
     last_refusal: Option<String>,
     terms: Vec<TermComparison>,
@@ -229,6 +232,33 @@ struct OptimizeReport {
     /// The best lens, if it could not be saved.
     #[serde(skip_serializing_if = "Option::is_none")]
     lens: Option<Lens>,
+}
+
+/// The focal length of a lens at a zoom position, in mm; `None` for an afocal one.
+#[derive(Serialize)]
+struct FocalLengths {
+    before: Option<f64>,
+    after: Option<f64>,
+}
+
+impl FocalLengths {
+    /// The focal lengths of two lenses at every zoom position.
+    fn compare(before: &Lens, after: &Lens) -> Vec<Self> {
+        let of = |lens: &Lens, zoom| {
+            let system = lens.resolve(zoom, lens.wavelengths[lens.primary()].um).ok()?;
+            first_order(&system, &Beam::for_lens(lens, zoom)).ok()?.efl
+        };
+        let pair = |zoom| Self { before: of(before, zoom), after: of(after, zoom) };
+        (0..before.zoom_positions()).map(pair).collect()
+    }
+}
+
+impl Display for FocalLengths {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "focal length {} -> {} mm", or_dash(self.before), or_dash(self.after))?;
+        let Some((before, after)) = self.before.zip(self.after) else { return Ok(()) };
+        write!(f, " ({:+.2} %)", 100.0 * (after / before - 1.0))
+    }
 }
 
 #[derive(Serialize)]
@@ -257,6 +287,7 @@ impl OptimizeReport {
             merit_after: merit(&after),
             light_before: light[0],
             light_after: light[1],
+            focal_lengths: FocalLengths::compare(lens, best),
             refused_steps: refusals().count(),
             last_refusal: refusals().next_back().cloned(),
             terms: TermComparison::compare(&before, &after),
@@ -293,6 +324,7 @@ impl Display for OptimizeReport {
             "light {} -> {} mm^2 ({change:+.1} %), mean over the spots",
             light[0], light[1]
         )?;
+        self.focal_lengths.iter().try_for_each(|focal| writeln!(f, "{focal}"))?;
         let asks = self.terms.iter().any(|term| LIGHT_TERMS.contains(&term.term));
         if change < -1.0 && !asks {
             writeln!(

@@ -62,13 +62,17 @@ impl OutputPaths {
 /// Refuses a path that is not a folder and cannot become one.
 fn check_folder(folder: &Path) -> Result<(), CliError> {
     let existing = folder.ancestors().find(|part| part.exists());
-    match existing {
-        Some(part) if !part.is_dir() => {
-            let (folder, part) = (folder.display(), part.display());
-            Err(CliError::Input(format!("{folder}: {part} is a file; expected a folder")))
-        }
-        _ => Ok(()),
+    if let Some(part) = existing.filter(|part| !part.is_dir()) {
+        let (folder, part) = (folder.display(), part.display());
+        return Err(CliError::Input(format!("{folder}: {part} is a file; expected a folder")));
     }
+    let parent = folder.parent().filter(|parent| !parent.as_os_str().is_empty());
+    if let Some(parent) = parent.filter(|parent| !parent.exists()) {
+        let (folder, parent) = (folder.display(), parent.display());
+        let text = format!("{folder}: found no folder {parent}; expected one that exists");
+        return Err(CliError::Input(text));
+    }
+    Ok(())
 }
 
 /// Refuses a target that cannot be written.

@@ -205,7 +205,10 @@ impl Display for TraceReport {
         )?;
         match &self.effects {
             Some(effects) => write!(f, "\n{effects}"),
-            None => writeln!(f, "every effect of the lens is computed for these rays"),
+            None => writeln!(
+                f,
+                "every effect of the lens is computed: given rays need not be those of the beam"
+            ),
         }
     }
 }

@@ -6,7 +6,7 @@ use crate::paraxial::{Beam, FirstOrder, first_order};
 use crate::trace::Ray;
 
 /// Rays for each field point and zoom position.
-const RAYS: usize = 200;
+pub(super) const RAYS: usize = 200;
 
 /// The start of the rays of a zoom position.
 pub(super) struct ProbeLaunch {
@@ -34,8 +34,17 @@ impl ProbeLaunch {
 
     /// The rays of one field point, distributed evenly over the pupil.
     pub(super) fn rays(&self, field: FieldPoint) -> impl Iterator<Item = Ray<f64>> {
+        self.many_rays(field, RAYS)
+    }
+
+    /// A number of rays of one field point, distributed evenly over the pupil.
+    pub(super) fn many_rays(
+        &self,
+        field: FieldPoint,
+        count: usize,
+    ) -> impl Iterator<Item = Ray<f64>> {
         let origin = self.origin(field);
-        sunflower().map(move |(x, y)| {
+        sunflower(count).map(move |(x, y)| {
             let (z, radius) = self.pupil;
             let target = Vec3::new(x * radius, y * radius, z);
             match origin {
@@ -94,10 +103,10 @@ fn launch_point(target: Vec3<f64>, direction: Vec3<f64>) -> Vec3<f64> {
 }
 
 /// Points distributed evenly over the unit disc, on a golden-angle spiral.
-fn sunflower() -> impl Iterator<Item = (f64, f64)> {
+fn sunflower(count: usize) -> impl Iterator<Item = (f64, f64)> {
     let golden = std::f64::consts::PI * (3.0 - 5.0_f64.sqrt());
-    (0..RAYS).map(move |i| {
-        let radius = ((i as f64 + 0.5) / RAYS as f64).sqrt();
+    (0..count).map(move |i| {
+        let radius = ((i as f64 + 0.5) / count as f64).sqrt();
         let (sin, cos) = (golden * i as f64).sin_cos();
         (radius * cos, radius * sin)
     })

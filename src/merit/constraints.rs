@@ -89,6 +89,9 @@ pub struct ConstraintMargin {
     pub surface: Option<usize>,
     /// The zoom position, counted from 0.
     pub zoom: usize,
+    /// The wavelength in micrometres if light is limited.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub um: Option<f64>,
     /// Its value: in mm, or a ratio for a steepness or for light.
     pub value: f64,
     /// The lower bound.
@@ -98,12 +101,14 @@ pub struct ConstraintMargin {
 }
 
 impl ConstraintMargin {
-    /// The constrained surface or field, as it is displayed; `None` for the whole lens.
+    /// The constrained surface, or the field with the wavelength, as it is displayed; `None` for the
+    /// whole lens.
     pub fn place(&self) -> Option<String> {
         let index = self.surface?;
-        let is_field = self.term == "light";
-        let surface = || format!("surface {}", SurfaceNumber::new(index));
-        Some(if is_field { format!("field {index}") } else { surface() })
+        Some(match self.um {
+            Some(um) => format!("field {index} at {um} um"),
+            None => format!("surface {}", SurfaceNumber::new(index)),
+        })
     }
 
     /// The distance to the nearest bound, negative if the constraint is violated.
@@ -133,6 +138,7 @@ pub fn constraint_margins(
                 term: term.name(),
                 surface: quantity.surface(),
                 zoom: number,
+                um: None,
                 value: quantity.length(&systems.manufactured),
                 min,
                 max,

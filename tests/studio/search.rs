@@ -103,6 +103,7 @@ fn thin(value: f64) -> ConstraintMargin {
         term: "glass_edge",
         surface: Some(2),
         zoom: 0,
+        um: None,
         value,
         min: Some(0.8),
         max: None,

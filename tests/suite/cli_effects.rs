@@ -101,6 +101,7 @@ fn rays_without_an_effect_are_those_through_a_lens_without_it() {
     assert_eq!(off, run(&command, bare.path(), "all=auto"));
     assert_ne!(off, run(&command, ASPHERE, "all=on"));
     let base = edited("base.json", WOOD, |file| {
+        file["variables"] = json!([]);
         for row in file["surfaces"].as_array_mut().unwrap() {
             if let Some(base) = row["glass"]["gradient"].get("base").cloned() {
                 row["glass"] = base;
@@ -278,8 +279,8 @@ fn what_no_error_counts_is_said() {
 fn a_switch_that_cannot_be_followed_is_refused_by_name() {
     let refuse = |command: &[&str], switches: &str, words: &[&str]| {
         let arguments = [command, &["--effects", switches]].concat();
-        let effect = switches.split('=').next().unwrap();
-        refused(2, &arguments, "", &[&["--effects", effect], words].concat());
+        let effect = switches.split('=').next().unwrap().replace('_', "-");
+        refused(2, &arguments, "", &[&["--effects", effect.as_str()], words].concat());
     };
     let out = Scratch::new("refused.json");
     let optimize = ["optimize", GAUSS, "--out", out.path()];
@@ -303,6 +304,7 @@ fn a_switch_that_cannot_be_followed_is_refused_by_name() {
     refuse(&["info", GAUSS], "colour=off", &["no effect `colour`", "dispersion, asphere"]);
     refuse(&["info", GAUSS], "aiming=maybe", &["aiming=auto"]);
     refuse(&["info", GAUSS], "aiming", &["aiming=auto"]);
+    refuse(&["info", GAUSS], "aiming=on,all=on,aiming=on", &["switched twice"]);
     assert!(!out.0.exists());
 }
 

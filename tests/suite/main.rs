@@ -5,6 +5,7 @@
 mod analysis;
 mod aperture;
 mod cli;
+mod cli_arguments;
 mod cli_effects;
 mod cli_failures;
 mod cli_files;

@@ -96,7 +96,7 @@ fn search_says_what_is_wrong_with_its_arguments() {
     wrong(&["--gamma", "-1e300"], &["gamma", "-1e300", "0 to 1"]);
     wrong(&["--temperature", "nan"], &["0 or more"]);
     wrong(&["--temperature", "-1"], &["0 or more"]);
-    wrong(&["--error", "200%"], &["tolerance is 2", "less than 1"]);
+    wrong(&["--error", "200%"], &["--error", "less than 100%"]);
     wrong(&["--method", "brute", "--chains", "0"], &["chains", "1 or more"]);
     wrong(&["--method", "metropolis", "--c", "-1"], &["setting c"]);
     wrong(&["--light", "-1"], &["--light", "found -1"]);

@@ -12,6 +12,7 @@ pub(super) struct SpotJson {
     centroid_x: Estimate,
     centroid_y: Estimate,
     reached: bool,
+    radius_reached: bool,
     colors: Vec<ColorSpotJson>,
 }
 
@@ -58,6 +59,7 @@ impl SpotJson {
 
     fn new(run: &AnalysisRun, spot: &Spot) -> Self {
         let colors = run.model.channels.iter().zip(&spot.channels);
+        let allowed = (run.accuracy.tolerance * spot.radius.value).max(run.rounding());
         Self {
             rms: spot.rms,
             radius: spot.radius,
@@ -65,6 +67,7 @@ impl SpotJson {
             centroid_y: spot.centroid[1],
             reached: spot.is_fully_lit
                 && spot.channels.iter().flatten().all(|color| color.converged),
+            radius_reached: spot.radius.error <= allowed,
             colors: colors.map(|(color, spot)| ColorSpotJson::new(color.um, spot)).collect(),
         }
     }
@@ -109,6 +112,9 @@ impl TextLines for SpotJson {
             lines.push("these numbers leave out the wavelengths without light below".to_owned());
         } else if !self.reached {
             lines.push("the tolerance was not reached".to_owned());
+        }
+        if !self.radius_reached {
+            lines.push("the tolerance was not reached by the geometric radius".to_owned());
         }
         lines.extend(self.colors.iter().map(ColorSpotJson::line));
         lines

@@ -144,6 +144,9 @@ impl GrinArgs {
         if self.minutes.is_some_and(|minutes| !(minutes > 0.0)) {
             return Err(CliError::Input("--minutes: expected more than 0".into()));
         }
+        if self.iterations == Some(0) {
+            return Err(CliError::Input("--iterations: found 0; expected 1 or more".into()));
+        }
         if !(2..=513).contains(&self.nodes) {
             let text = format!("--nodes: found {}; expected 2 to 513", self.nodes);
             return Err(CliError::Input(text));

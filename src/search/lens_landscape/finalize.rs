@@ -163,6 +163,7 @@ impl LensLandscape {
             term: "light",
             surface: Some(spot.field),
             zoom: spot.zoom,
+            um: Some(spot.um),
             value: spot.area,
             min: Some(share * before),
             max: None,

@@ -15,7 +15,7 @@ impl LensLandscape {
     pub(super) fn element_count_margin(&self, lens: &Lens) -> ConstraintMargin {
         let [min, max] = self.rules.elements.map(|count| Some(count as f64));
         let value = element::piece_count(lens) as f64;
-        ConstraintMargin { term: "elements", surface: None, zoom: 0, value, min, max }
+        ConstraintMargin { term: "elements", surface: None, zoom: 0, um: None, value, min, max }
     }
 
     /// All constraints that a lens violates, including the number of its elements and the light of
