@@ -18,7 +18,7 @@ use crate::paraxial::{Beam, first_order};
 use serde::Serialize;
 use std::fmt::{self, Display};
 use std::path::PathBuf;
-use std::sync::atomic::Ordering;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Optimizes the variables of a lens; Ctrl-C ends it and saves the best lens so far
 #[derive(Debug, clap::Args)]
@@ -70,6 +70,7 @@ fn default_steps(method: DescentMethod) -> usize {
 impl OptimizeArgs {
     pub(super) fn run(&self, output: &Output) -> Result<(), CliError> {
         self.check_paths()?;
+        let stop = stop_flag();
         let design = DesignEffects::new(&self.effects)?;
         let opened = self.lens.open()?;
         let mut lens = design.working_lens(&opened.lens);
@@ -85,10 +86,10 @@ impl OptimizeArgs {
             return Err(CliError::no_light(&opened.file));
         }
         let effects = design.report(&opened.lens, &opened.file)?;
-        let (search, ms) = time_ms(|| self.search(optimizer.as_mut()));
+        let (search, ms) = time_ms(|| self.search(optimizer.as_mut(), &stop));
         // The lens is saved before anything else is computed from it.
         let Lens { variables, wavelengths, .. } = opened.lens.clone();
-        let best = Lens { variables, wavelengths, ..optimizer.best().clone() };
+        let best = Lens { wavelengths, variables, ..optimizer.best().clone() };
         let mut failures = Failures::default();
         let saved = failures.note(files::save(&best, &self.out)).is_some();
         failures.note(self.write_history(&search));
@@ -121,9 +122,8 @@ impl OptimizeArgs {
     }
 
     /// Steps until convergence, the maximum number of steps or Ctrl-C.
-    fn search(&self, optimizer: &mut dyn Optimizer) -> OptimizeRun {
+    fn search(&self, optimizer: &mut dyn Optimizer, stop: &AtomicBool) -> OptimizeRun {
         let most = self.steps.unwrap_or(default_steps(self.method));
-        let stop = stop_flag();
         let bar = progress_bar(most);
         let mut search = OptimizeRun { steps: Vec::new(), ended: OptimizeEnd::Steps };
         while search.steps.len() < most {

@@ -65,9 +65,10 @@ pub struct RimClearance {
 
 /// The rings of points inside the pupil, of equal areas.
 const RINGS: usize = 3;
-/// Patterns of rays that look for light beyond the beam, which rims may have to stop: their rings
-/// and their radii, in radii of the pupil.
-const STRAY: [(usize, f64); 2] = [(3, 1.6), (7, 4.0)];
+/// Square grids of rays that look for light beyond the beam, which rims may have to stop: cells along
+/// a side, and half a side in radii of the pupil. They are those that the search for the pupil begins
+/// with, so that it finds no light that they miss.
+const STRAY: [(usize, f64); 2] = [(25, 1.6), (25, 3.2)];
 /// The points on the rim of the pupil.
 const ON_RIM: usize = 24;
 
@@ -321,7 +322,7 @@ fn rims(model: &RayModel) -> Result<Vec<RimClearance>, RayModelError> {
         open.surfaces[model.stop()].semi_diameter = f64::INFINITY;
     }
     let (open, limited) = (Tracer::new(&open)?, Tracer::new(&limited)?);
-    let (beam, beyond) = (sample_points(), stray_points());
+    let beam = sample_points();
     let reached = |field: &FieldPoint| -> Vec<f64> {
         let mut reached = vec![0.0; open.surfaces()];
         for wavelength in 0..model.channels.len() {
@@ -329,6 +330,7 @@ fn rims(model: &RayModel) -> Result<Vec<RimClearance>, RayModelError> {
                 raise_heights(&mut reached, &launch, &beam, &open);
             }
             if let Ok(launch) = model.launch(*field, wavelength) {
+                let beyond = stray_points(launch.is_symmetric());
                 raise_heights(&mut reached, &launch, &beyond, &limited);
             }
         }
@@ -347,14 +349,16 @@ fn rims(model: &RayModel) -> Result<Vec<RimClearance>, RayModelError> {
     Ok((0..system.surfaces.len()).map(rim).filter(clips).collect())
 }
 
-/// The points beyond the beam from which rays may arrive if no rim stops them.
-fn stray_points() -> Vec<[f64; 2]> {
-    let pattern = |(rings, reach): (usize, f64)| {
-        pattern_points(PupilPattern::HexapolarInside(rings))
-            .into_iter()
-            .map(move |p| p.map(|v| v * reach))
+/// The points beyond the beam from which rays may arrive if no rim stops them; those of one half if
+/// the other is its mirror image.
+fn stray_points(half: bool) -> Vec<[f64; 2]> {
+    let grid = |(cells, reach): (usize, f64)| {
+        let step = 2.0 * reach / cells as f64;
+        let at = move |i: usize| step * (i as f64 - 0.5 * (cells - 1) as f64);
+        let columns = if half { cells / 2..cells } else { 0..cells };
+        columns.flat_map(move |column| (0..cells).map(move |row| [at(column), at(row)]))
     };
-    STRAY.into_iter().flat_map(pattern).collect()
+    STRAY.into_iter().flat_map(grid).collect()
 }
 
 /// Raises the heights at each surface to those of the rays of some pupil points that arrive.

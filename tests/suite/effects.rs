@@ -6,7 +6,7 @@ use aplanat::effects::{
     build_ray_model, measure_effects, plan, simplify,
 };
 use aplanat::files;
-use aplanat::lens::{FieldKind, Lens, Object, Row, Shape};
+use aplanat::lens::{FieldKind, FieldPoint, Lens, Object, Row, Shape};
 use aplanat::pupil::{Accuracy, Aiming, RayModel};
 
 const TASK: TracePurpose = TracePurpose::Spot(1e-3);
@@ -277,4 +277,16 @@ fn beams_that_are_not_aimed_are_not_searched_for() {
     assert_eq!(off.unmeasured().count(), 0);
     let open = planned(&lens, 0, TASK, &forced(Effect::Clipping, EffectOverride::Off));
     assert_eq!(open.unmeasured().collect::<Vec<_>>(), [Effect::Clipping]);
+}
+
+#[test]
+fn a_rim_that_holds_back_light_far_from_the_beam_is_kept() {
+    // Without it, islands of light beyond the beam reach the image at this field.
+    let mut lens = lens("cooke_triplet_100_f27");
+    lens.fields.values = vec![FieldPoint { x: 0.0, y: 14.0, weight: 1.0 }];
+    let auto = planned(&lens, 0, TASK, &EffectOverrides::default());
+    let on = planned(&lens, 0, TASK, &forced(Effect::Clipping, EffectOverride::On));
+    let rms = |plan| exact(&build_ray_model(&lens, 0, plan).unwrap())[0].as_ref().unwrap().rms;
+    let (auto, on) = (rms(&auto), rms(&on));
+    assert!((auto.value - on.value).abs() <= auto.error + on.error, "{auto:?} {on:?}");
 }

@@ -104,6 +104,7 @@ impl SearchArgs {
     pub(super) fn run(&self, output: &Output) -> Result<(), CliError> {
         self.check()?;
         self.check_paths()?;
+        let stop = stop_flag();
         let design = self.design_effects()?;
         let opened = self.lens.open()?;
         let _lock = self.checkpoint.as_deref().map(FileLock::acquire).transpose()?;
@@ -123,7 +124,7 @@ impl SearchArgs {
         let watch = Stopwatch::start();
         let before = run.statistics().gradients;
         let mut failures = Failures::default();
-        let ended = self.run_rounds(&landscape, &mut run, watch, &mut failures);
+        let ended = self.run_rounds(&landscape, &mut run, &stop, watch, &mut failures);
         let ms = 1e3 * watch.seconds();
         let mut unsaved = self.save_best(&run.best().point, &original, &mut failures);
         let stored = failures.note(self.write_reservoir(&run, &original)).unwrap_or_default();
@@ -231,10 +232,10 @@ impl SearchArgs {
         &self,
         landscape: &LensLandscape,
         run: &mut SearchRunOn<LensLandscape>,
+        stop: &AtomicBool,
         watch: Stopwatch,
         failures: &mut Failures,
     ) -> SearchEnd {
-        let stop = stop_flag();
         let bar = progress_bar(run.settings().gradients.unwrap_or(0) as usize);
         let (mut saved, mut is_failing) = (0.0, false);
         let flow = run.advance(landscape, |run, _| {
@@ -249,7 +250,7 @@ impl SearchArgs {
                 saved = watch.seconds();
             }
             let is_late = |minutes: f64| watch.seconds() >= 60.0 * minutes;
-            if is_raised(&stop) {
+            if is_raised(stop) {
                 ControlFlow::Break(SearchEnd::Interrupted)
             } else if self.minutes.is_some_and(is_late) {
                 ControlFlow::Break(SearchEnd::Time)
@@ -323,7 +324,7 @@ fn lens_to_write(lens: &Lens, original: &Lens) -> Lens {
     let same = lens.surfaces.len() == original.surfaces.len();
     let variables = if same { original.variables.clone() } else { Vec::new() };
     let wavelengths = original.wavelengths.clone();
-    let written = Lens { variables, wavelengths, ..lens.clone() };
+    let written = Lens { wavelengths, variables, ..lens.clone() };
     if written.check().is_ok() { written } else { Lens { variables: Vec::new(), ..written } }
 }
 
