@@ -7,6 +7,7 @@
 //! GRIN media are the exception: there every ray takes steps of its own.
 
 use super::asphere;
+use super::asphere_crossing;
 use super::fate::{self, CLIPPED, Fate, MISSED, TOTAL_REFLECTION};
 use super::interface::{Interface, Intersection, Refraction, SurfaceForm};
 use super::propagation::PropagatedRay;
@@ -286,7 +287,8 @@ impl<R: Real> Tracer<R> {
     /// own.
     #[inline(always)]
     pub(super) fn mask(&self, block: &mut RayBlock<R>, count: usize) {
-        if !self.grin_gaps.is_empty() {
+        let is_asphere = |i: &Interface<R>| i.form == SurfaceForm::Asphere;
+        if !self.grin_gaps.is_empty() || self.interfaces.iter().any(is_asphere) {
             block.code[count..].fill(R::ONE);
         }
     }
@@ -525,7 +527,11 @@ impl<R: Real> RayBlock<R> {
                 );
             }
             SurfaceForm::Asphere if R::ORDER > 0 => {
-                self.cross_form(interface, number, |i, _, p, k| i.intersect_asphere(p, k), keep);
+                let lost = self.code.map(|code| code > R::ZERO);
+                let meet = |i: &Interface<R>, j: usize, p, k| {
+                    if lost[j] { i.approach_asphere(p, k) } else { i.intersect_asphere(p, k) }
+                };
+                self.cross_form(interface, number, meet, keep);
             }
             SurfaceForm::Asphere => {
                 let s = self.asphere_distances(interface);
@@ -556,7 +562,7 @@ impl<R: Real> RayBlock<R> {
             if !(trusted[j] > R::ZERO) && !(self.code[j] > R::ZERO) {
                 let (p, k) = rays.get(j);
                 let (p, k, start) = (p.value(), k.value(), -before[j].value());
-                let found = asphere::isolate_crossing(interface.value(), p, k, start);
+                let found = asphere_crossing::isolate_crossing(interface.value(), p, k, start);
                 s[j] = R::from_f64(found.unwrap_or(f64::NAN));
             }
         }

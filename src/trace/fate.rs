@@ -7,7 +7,7 @@ use serde::Serialize;
 pub enum Fate {
     /// The ray reaches the last surface.
     Imaged,
-    /// The ray misses the surface.
+    /// The ray misses the surface, or an asphere is so wild that no intersection is found.
     Missed(u32),
     /// The ray meets the surface outside the semi-diameter or inside the obstruction, or it leaves the
     /// GRIN medium in front through its side.

@@ -11,6 +11,7 @@
 //! ```
 
 use super::asphere;
+use super::asphere_crossing;
 use super::propagation::LocalIndices;
 use crate::lens::{ASPHERE_TERMS, Shape, System};
 use crate::math::Real;
@@ -250,8 +251,28 @@ impl<R: Real> Interface<R> {
     }
 
     pub(super) fn intersect_asphere(&self, p: Vec3<R>, k: Vec3<R>) -> Intersection<R> {
+        self.intersect_asphere_by(p, k, asphere_crossing::find_crossing)
+    }
+
+    /// The point at which Newton's iteration ends, for a ray that is lost already: a point of the
+    /// asphere as a rule, at a small and bounded cost.
+    pub(super) fn approach_asphere(&self, p: Vec3<R>, k: Vec3<R>) -> Intersection<R> {
+        self.intersect_asphere_by(p, k, |surface, p, k, _| {
+            Some(asphere_crossing::newton_end(&surface, p, k))
+        })
+    }
+
+    /// The intersection near the one that `find` returns from the surface, a point of the ray, its
+    /// direction, and the parameter of its start.
+    #[inline(always)]
+    fn intersect_asphere_by(
+        &self,
+        p: Vec3<R>,
+        k: Vec3<R>,
+        find: impl Fn(Interface<f64>, Vec3<f64>, Vec3<f64>, f64) -> Option<f64>,
+    ) -> Intersection<R> {
         let (start, before) = self.closest_approach(p, k);
-        let s = asphere::find_crossing(self.value(), start.value(), k.value(), -before.value());
+        let s = find(self.value(), start.value(), k.value(), -before.value());
         let mut s = R::from_f64(s.unwrap_or(f64::NAN));
         for _ in 0..R::ORDER {
             let (f, slope) = self.height_above(start + k * s, k);

@@ -15,6 +15,7 @@
 
 mod adjoint;
 mod asphere;
+mod asphere_crossing;
 mod batch;
 mod edge;
 mod fate;
