@@ -104,7 +104,7 @@ impl GradientArgs {
         let (found, ms) = time_ms(|| self.differentiate(&model));
         let found = found.map_err(|cause| {
             let text = format!("{}: {cause}", opened.file);
-            if matches!(cause, DerivativeError::Dark(..)) {
+            if matches!(cause, DerivativeError::Dark(..) | DerivativeError::Launch(_)) {
                 CliError::Input(text)
             } else {
                 CliError::Failed(text)

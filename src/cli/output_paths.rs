@@ -32,7 +32,8 @@ impl OutputPaths {
     }
 
     /// Adds a folder that will be filled, if there is one, and creates it. Of the files that it
-    /// already contains, `is_own` recognizes by their names those that may be written over.
+    /// already contains, `is_own` recognizes by their names those that may be written over; no other
+    /// file that is read or written may have such a name there.
     pub(super) fn folder(
         &mut self,
         name: &'static str,
@@ -41,6 +42,14 @@ impl OutputPaths {
     ) -> Result<(), CliError> {
         let Some(folder) = folder else { return Ok(()) };
         check_folder(folder)?;
+        let place = FileIdentity::of(folder);
+        let is_taken = |(_, file): &&(_, FileIdentity)| file.name_in(&place).is_some_and(&is_own);
+        if let Some((other, file)) = self.taken.iter().find(is_taken) {
+            let taken = file.name_in(&place).unwrap_or_default();
+            let folder = folder.join(taken);
+            let text = format!("{name}: {} is {other}; expected another file", folder.display());
+            return Err(CliError::Input(text));
+        }
         files::own_files(folder, is_own).iter().try_for_each(|file| self.take(name, file))?;
         std::fs::create_dir_all(folder).map_err(|error| {
             CliError::Input(format!("{}: {error}; expected a folder", folder.display()))

@@ -4,7 +4,7 @@ use super::effects::{DesignEffects, EffectArgs, EffectReport};
 use super::error::CliError;
 use super::failures::Failures;
 use super::input::{LensFile, Tolerance};
-use super::output::{Output, ShortNumber, TextTable, print_note};
+use super::output::{Output, ShortNumber, TextTable, print_note, write_saved};
 use super::output_paths::{OutputPaths, stale_note};
 use super::progress::{progress_bar, stop_flag};
 use crate::lens::Lens;
@@ -78,7 +78,10 @@ impl ParetoArgs {
                 tried: sweep.evaluated(),
                 biased: biased.as_ref().map(|(sweep, _)| sweep.front()),
             };
-            report.files = failures.note(survey.write(folder)).unwrap_or_default();
+            match failures.note(survey.write(folder)) {
+                Some(files) => report.files = files,
+                None => report.unsaved = sweep.front().points().iter().map(|p| &p.lens).collect(),
+            }
             report.stale = survey.stale_files(folder);
             stale_note(&report.stale).iter().for_each(|note| print_note(format!("note: {note}")));
         }
@@ -139,6 +142,9 @@ struct ParetoSweepReport<'a> {
     /// Files of an earlier front in the same folder.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     stale: Vec<PathBuf>,
+    /// The lenses of the front, if they could not all be saved.
+    #[serde(rename = "lenses", skip_serializing_if = "Vec::is_empty")]
+    unsaved: Vec<&'a Lens>,
 }
 
 #[derive(Serialize)]
@@ -176,6 +182,7 @@ impl<'a> ParetoSweepReport<'a> {
             effects,
             files: Vec::new(),
             stale: Vec::new(),
+            unsaved: Vec::new(),
         }
     }
 }
@@ -217,11 +224,9 @@ impl Display for ParetoSweepReport<'_> {
             ]);
         }
         write!(f, "{table}\n{}", self.effects)?;
-        match self.files.first() {
-            Some(first) => {
-                writeln!(f, "\n{} files, the table is {}", self.files.len(), first.display())
-            }
-            None => Ok(()),
+        if let Some(first) = self.files.first() {
+            writeln!(f, "\n{} files, the table is {}", self.files.len(), first.display())?;
         }
+        self.unsaved.iter().try_for_each(|lens| write_saved(f, None, Some(lens)))
     }
 }

@@ -23,6 +23,12 @@ impl FileIdentity {
         Self { number: file_number(&path), path }
     }
 
+    /// The name of the file, if it lies in a folder.
+    pub fn name_in(&self, folder: &Self) -> Option<&str> {
+        let lies_there = self.path.parent() == Some(&folder.path);
+        self.path.file_name().filter(|_| lies_there)?.to_str()
+    }
+
     /// True if both are one file, whatever their paths; two names of a file that is linked twice
     /// are the same file too.
     pub fn is_same(&self, other: &Self) -> bool {

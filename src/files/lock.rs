@@ -7,7 +7,7 @@
 use super::FileError;
 use super::identity::{file_number, resolve_links};
 use std::fs::{self, File, OpenOptions, TryLockError};
-use std::io::{self, Read as _, Write as _};
+use std::io::{self, Read as _, Seek as _, Write as _};
 use std::path::{Path, PathBuf};
 
 /// The maximum number of attempts to lock a file that its holder removes at the same moment.
@@ -39,6 +39,10 @@ impl FileLock {
             let mut file = open(&beside).map_err(unwritable)?;
             match file.try_lock() {
                 Ok(()) if is_current(&file, &beside) => {
+                    if !is_lock(&mut file) {
+                        let text = format!("{} is no lock of this program", beside.display());
+                        return Err(unwritable(io::Error::other(text)));
+                    }
                     write_holder(&mut file);
                     return Ok(Self { locked: file, path: beside });
                 }
@@ -91,10 +95,20 @@ fn open_file_number(_file: &File) -> Option<[u64; 2]> {
     None
 }
 
+/// True if a file contains nothing but the number of a process: anything else must not be written
+/// over or removed.
+fn is_lock(file: &mut File) -> bool {
+    let mut bytes = Vec::new();
+    let read = file.take(MAX_NUMBER + 1).read_to_end(&mut bytes);
+    let is_short = bytes.len() as u64 <= MAX_NUMBER;
+    read.is_ok() && is_short && bytes.iter().all(u8::is_ascii_digit)
+}
+
 /// Writes the number of this process. A disk without room for it does not matter: the lock holds.
 fn write_holder(file: &mut File) {
     let number = std::process::id().to_string();
-    drop(file.set_len(0).and_then(|()| file.write_all(number.as_bytes())));
+    let emptied = file.set_len(0).and_then(|()| file.rewind());
+    drop(emptied.and_then(|()| file.write_all(number.as_bytes())));
 }
 
 /// The process that holds the lock, as text.

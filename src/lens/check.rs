@@ -9,6 +9,9 @@ use std::fmt;
 /// The expected value of a number that is not otherwise limited.
 const FINITE: &str = "a finite number";
 
+/// The maximum number of surfaces of a lens.
+const MAX_SURFACES: usize = 1000;
+
 /// A fault of a lens that makes it impossible to trace.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum LensError {
@@ -96,6 +99,10 @@ impl Lens {
     pub fn check(&self) -> Result<(), LensError> {
         if self.surfaces.is_empty() {
             return Err(SystemError::NoSurfaces.into());
+        }
+        if self.surfaces.len() > MAX_SURFACES {
+            let text = format!("{} surfaces; expected at most {MAX_SURFACES}", self.surfaces.len());
+            return Err(LensError::Inconsistent(text));
         }
         self.check_stop()?;
         self.check_rows()?;

@@ -45,17 +45,17 @@ impl ParetoReport<'_> {
         let unwritable =
             |source| FileError::Unwritable { file: folder.display().to_string(), source };
         std::fs::create_dir_all(folder).map_err(unwritable)?;
-        let plot = self.plot().png().map_err(|why| unwritable(io::Error::other(why)))?;
         let mut written = vec![folder.join("front.csv"), folder.join("front.png")];
-        files::write_atomic(&written[1], &plot)?;
+        // The picture can be drawn again from the table, and the table be computed from the lenses.
         for (name, design) in self.lenses() {
             let path = folder.join(name);
             let wavelengths = self.wavelengths.to_vec();
             files::save(&Lens { wavelengths, ..design.lens.clone() }, &path)?;
             written.push(path);
         }
-        // The table names the other files, so it is written after them.
         files::write_atomic(&written[0], self.table().as_bytes())?;
+        let plot = self.plot().png().map_err(|why| unwritable(io::Error::other(why)))?;
+        files::write_atomic(&written[1], &plot)?;
         Ok(written)
     }
 

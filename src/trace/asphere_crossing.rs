@@ -300,3 +300,76 @@ struct IntervalEnd {
 /// The number of intervals after which a ray counts as one that misses. Hardly a ray needs a hundred,
 /// whatever the numbers of the surface.
 const MAX_INTERVALS: u32 = 5_000;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lens::{ASPHERE_TERMS, Shape, Surface, System};
+    use crate::trace::interface::interfaces;
+
+    /// A surface of a semi-diameter of 3 mm, from its curvature, conic constant and first terms.
+    fn surface(curvature: f64, conic: f64, first: &[f64]) -> Interface<f64> {
+        let mut terms = [0.0; ASPHERE_TERMS];
+        terms[..first.len()].copy_from_slice(first);
+        let shape = Shape::Asphere { curvature, conic, terms };
+        let plane = Surface::plane(0.0, 1.5);
+        let surfaces = vec![Surface { shape, semi_diameter: 3.0, ..plane }];
+        interfaces(&System { index_before: 1.0, surfaces, stop: None })[0]
+    }
+
+    /// A ray that crosses the vertex plane at a point, with two direction cosines.
+    fn ray(surface: Interface<f64>, [x, y]: [f64; 2], [l, m]: [f64; 2]) -> RayAtAsphere {
+        let k = Vec3::new(l, m, (1.0 - l * l - m * m).sqrt());
+        let p = Vec3::new(x, y, 0.0) - k * (0.4 / k.z);
+        let across = l.hypot(m);
+        RayAtAsphere { surface, p, k, across, slant: p.x * l + p.y * m, start: 0.0 }
+    }
+
+    /// The mean and the largest number of intervals of rays through a square of this half side.
+    fn cost(surface: Interface<f64>, half: f64) -> (f64, u32) {
+        let (mut sum, mut most) = (0, 0);
+        for i in 0..1000 {
+            // A sequence of four coordinates that fills the square and the directions evenly.
+            let at = |step: f64| 2.0 * (f64::from(i) * step).fract() - 1.0;
+            let point = [half * at(0.856_674_8), half * at(0.733_891_8)];
+            let ray = ray(surface, point, [0.6 * at(0.628_706_7), 0.6 * at(0.538_597_4)]);
+            let mut search = CrossingSearch { ray: &ray, budget: MAX_INTERVALS };
+            assert!(search.nearest_crossing().is_ok());
+            sum += MAX_INTERVALS - search.budget;
+            most = most.max(MAX_INTERVALS - search.budget);
+        }
+        (f64::from(sum) / 1000.0, most)
+    }
+
+    #[test]
+    fn no_surface_takes_many_intervals_of_a_ray() {
+        let phone = [0.123_512, 0.076_650_2, -0.050_375_5, 0.108_034];
+        let cases: [(f64, f64, &[f64], f64, f64); 6] = [
+            // Conics that end 8 µm and 0.2 nm from the axis.
+            (0.127, 1e6, &phone, 0.008, 20.0),
+            (4e9, 14.8, &phone, 6e-11, 20.0),
+            // Cones with a sharp tip, in part with a wave.
+            (4.33e8, -11_778.5, &[1.5e-9, -0.0727], 3.0, 250.0),
+            (-9.58e8, -1194.7, &[-1.517], 3.0, 250.0),
+            // A small ball that rays touch, and a wall.
+            (-35.66, -0.1476, &[2e-9], 0.04, 60.0),
+            (0.0, 0.0, &[1e6, -1e5, 1e4], 3.0, 250.0),
+        ];
+        for (curvature, conic, terms, half, limit) in cases {
+            let (mean, most) = cost(surface(curvature, conic, terms), half);
+            assert!(
+                mean < limit,
+                "{curvature}, {conic}: {mean} intervals of a ray, at most {most}"
+            );
+        }
+    }
+
+    /// A ray whose crossing is not known misses, and is not sent to one behind its start.
+    #[test]
+    fn a_search_without_intervals_decides_nothing() {
+        let ray = ray(surface(4.33e8, -11_778.5, &[0.0, -0.0727]), [1.0, 1.0], [0.5, 0.1]);
+        let decide = |budget: u32| CrossingSearch { ray: &ray, budget }.nearest_crossing();
+        assert!(matches!(decide(MAX_INTERVALS), Ok(Some(_))));
+        assert!((0..5).all(|budget| decide(budget).is_err()));
+    }
+}

@@ -128,6 +128,49 @@ fn a_lens_that_cannot_be_saved_is_printed() {
     has_keys(&done_json(&["info", &lens], ""), &["efl"]);
 }
 
+/// Makes a file that cannot be replaced.
+#[cfg(unix)]
+fn protect(path: &str) {
+    fs::write(path, "").unwrap();
+    let mut permissions = fs::metadata(path).unwrap().permissions();
+    permissions.set_readonly(true);
+    fs::set_permissions(path, permissions).unwrap();
+}
+
+fn failed_json(arguments: &[&str], words: &[&str]) -> Value {
+    let output = Running::start(&[arguments, &["--json"]].concat()).output();
+    let said = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    assert!(words.iter().all(|word| said.contains(word)), "{said}");
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+/// The lenses of a front that cannot be saved are printed; those of a reservoir that could be saved
+/// are the result of this run, not of an earlier one.
+#[cfg(unix)]
+#[test]
+fn a_folder_that_cannot_be_filled_loses_no_lens() {
+    let folder = Folder::new("half-full");
+    let all = folder.path("");
+    protect(&folder.path("front_001.json"));
+    let front = ["pareto", LENS, "--points", "2", "--steps", "2", "--no-biased", "--error", "1%"];
+    let report = failed_json(&[&front[..], &["--out", &all]].concat(), &["front_001.json"]);
+    let lenses = report["lenses"].as_array().unwrap();
+    assert_eq!(lenses.len(), report["front"].as_array().unwrap().len());
+    let printed = folder.file("printed.json", &lenses[0].to_string());
+    has_keys(&done_json(&["info", &printed], ""), &["efl"]);
+    let search = ["search", LENS, "--iterations", "8", "--reservoir-dir", &all];
+    let files = done_json(&search, "")["files"].as_array().unwrap().clone();
+    let [kept, .., lost] = files.iter().map(|file| file.as_str().unwrap()).collect::<Vec<_>>()[..]
+    else {
+        panic!("{files:?}");
+    };
+    protect(lost);
+    let report = failed_json(&search, &[lost]);
+    assert_eq!(report["files"][0], kept);
+    assert!(!report["stale"].to_string().contains(kept), "{report}");
+}
+
 /// A terminal or a disk that takes no results does not keep them from the file.
 #[cfg(target_os = "linux")]
 #[test]
@@ -253,6 +296,14 @@ fn a_lens_without_light_is_wrong_input_everywhere() {
     ];
     for command in commands {
         refused(2, command, "", &["dark.json", "no light"]);
+    }
+    let mut aside: Value = serde_json::from_str(&singlet).unwrap();
+    aside["fields"] = json!({"kind": "angle", "values": [{"y": 95.0}]});
+    let aside = folder.file("aside.json", &aside.to_string());
+    let checks = done_json(&["info", &aside], "")["checks"].clone();
+    assert!(checks.to_string().contains("field x 0, y 95: no ray"), "{checks}");
+    for command in [&["analyze", &aside, "spot"][..], &["gradient", &aside]] {
+        refused(2, command, "", &["aside.json", "no ray"]);
     }
     assert!(!Path::new(&out).exists());
     let checks = done_json(&["info", &dark], "")["checks"].clone();

@@ -115,6 +115,35 @@ fn no_command_writes_over_what_it_reads() {
     assert_eq!(fs::read(folder.path("values.raw")).unwrap(), values);
 }
 
+/// A folder is filled with files of certain names, which nothing else may have.
+#[test]
+fn a_folder_and_a_file_in_it_do_not_share_a_name() {
+    let folder = Folder::new("own-names");
+    let (all, best) = (folder.path(""), folder.path("02_generation_0.json"));
+    let search = ["search", LENS, "--iterations", "4", "--reservoir-dir", &all];
+    let refuse = |more: &[&str], words: &[&str]| {
+        refused(2, &[&search[..], more].concat(), "", words);
+    };
+    refuse(&["--out", &best], &["--reservoir-dir", "02_generation_0.json is --out"]);
+    refuse(&["--checkpoint", &best], &["02_generation_0.json is --checkpoint"]);
+    assert!(folder.names().is_empty());
+}
+
+/// The lock beside a checkpoint is the program's own file; a file of that name that is not stays.
+#[test]
+fn a_file_with_the_name_of_a_lock_is_kept() {
+    let folder = Folder::new("no-lock");
+    let own = folder.file(".run.json.lock", "my notes");
+    let checkpoint = folder.path("run.json");
+    let search = ["search", LENS, "--iterations", "4", "--checkpoint", &checkpoint];
+    refused(2, &search, "", &["run.json", ".run.json.lock is no lock of this program"]);
+    assert_eq!(fs::read_to_string(&own).unwrap(), "my notes");
+    // The number of a process that is no more.
+    fs::write(&own, "4194304").unwrap();
+    done(&search, "");
+    assert_eq!(folder.names(), ["run.json"]);
+}
+
 #[cfg(unix)]
 #[test]
 fn a_checkpoint_is_written_through_a_link_to_nothing() {
@@ -224,6 +253,41 @@ fn convert_refuses_what_info_refuses() {
             assert!(!Path::new(&out).exists());
         }
     }
+}
+
+#[test]
+fn a_lens_of_too_many_surfaces_is_refused() {
+    let folder = Folder::new("many");
+    let mut lens: Value = serde_json::from_str(&fs::read_to_string(LENS).unwrap()).unwrap();
+    let plane = json!({"thickness": 0.001, "semi_diameter": 30.0});
+    let rows = lens["surfaces"].as_array_mut().unwrap();
+    rows.splice(0..0, vec![plane; 999]);
+    let many = folder.file("many.json", &lens.to_string());
+    refused(2, &["info", &many], "", &["many.json", "1001 surfaces; expected at most 1000"]);
+}
+
+#[test]
+fn a_search_whose_first_gradient_is_no_number_is_refused() {
+    let folder = Folder::new("sharp");
+    let triplet = fs::read_to_string("lenses/cooke_triplet_100_f27.json").unwrap();
+    let mut lens: Value = serde_json::from_str(&triplet).unwrap();
+    lens["surfaces"][0]["curvature"] = json!(1e90);
+    let sharp = folder.file("sharp.json", &lens.to_string());
+    let words = ["sharp.json", "the term `spot` is not finite"];
+    refused(2, &["search", &sharp, "--free", "--iterations", "4"], "", &words);
+}
+
+#[test]
+fn an_aperture_wider_than_the_stop_is_named() {
+    let folder = Folder::new("wide");
+    let mut lens: Value = serde_json::from_str(&fs::read_to_string(LENS).unwrap()).unwrap();
+    lens["aperture"] = json!({"entrance_pupil_diameter": 3000.0});
+    let wide = folder.file("wide.json", &lens.to_string());
+    let checks = done_json(&["info", &wide], "")["checks"].clone();
+    assert_eq!(checks[0]["surface"], 0);
+    let found = checks[0]["found"].as_str().unwrap();
+    assert!(found.contains("a stop of 1500 mm, but its semi-diameter is 12.7 mm"), "{found}");
+    assert_eq!(done_json(&["info", LENS], "")["checks"], json!([]));
 }
 
 #[test]

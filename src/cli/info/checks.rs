@@ -1,8 +1,15 @@
-//! Warnings about a lens that cannot be manufactured: negative gaps, semi-diameters beyond the surface.
+//! Warnings about a lens that cannot be manufactured or used as written: negative gaps, semi-diameters
+//! beyond the surface, an aperture beyond the stop, fields without rays.
 
-use crate::lens::{Medium, SurfaceNumber, System};
+use crate::cli::output::ShortNumber;
+use crate::lens::{FieldPoint, Medium, SurfaceNumber, System};
+use crate::pupil::RayModel;
 use crate::trace::Fates;
 use serde::Serialize;
+
+/// The largest ratio of the stop that the aperture asks for to its semi-diameter that is within what
+/// prescriptions round.
+const LARGEST_STOP: f64 = 1.05;
 
 /// A warning about a lens.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -24,10 +31,17 @@ impl LensCheck {
     }
 }
 
-/// Checks the gaps and semi-diameters of a lens, and the fates of its rays.
-pub(super) fn checks(system: &System<f64>, media: &[Medium], fates: Fates) -> Vec<LensCheck> {
+/// Checks the gaps and semi-diameters of a lens, its fields, and the fates of its rays.
+pub(super) fn checks(
+    system: &System<f64>,
+    media: &[Medium],
+    model: &RayModel,
+    fates: Fates,
+) -> Vec<LensCheck> {
     let rows = media.len();
     let mut checks: Vec<LensCheck> = (0..rows).filter_map(|i| rim(system, i)).collect();
+    checks.extend(stop(system, model));
+    checks.extend(model.fields.iter().filter_map(|field| field_without_rays(model, field)));
     // Behind a mirror gaps are negative, and the edge thickness has another meaning.
     let straight = media.iter().position(|m| *m == Medium::Mirror).unwrap_or(rows);
     checks.extend((0..straight.min(rows - 1)).filter_map(|i| gap(system, i)));
@@ -48,6 +62,28 @@ fn rim(system: &System<f64>, i: usize) -> Option<LensCheck> {
     }
     let found = format!("the semi-diameter {sd} mm is beyond the edge of the surface");
     Some(LensCheck { surface: Some(i), found })
+}
+
+/// Checks that the beam that the aperture asks for fits through the rim of the stop.
+fn stop(system: &System<f64>, model: &RayModel) -> Option<LensCheck> {
+    let (surface, asked) = (model.stop(), model.stop_radius());
+    let rim = system.surfaces.get(surface)?.semi_diameter;
+    if asked <= LARGEST_STOP * rim {
+        return None;
+    }
+    let found = format!(
+        "the aperture asks for a stop of {} mm, but its semi-diameter is {rim} mm, which clips",
+        ShortNumber(asked)
+    );
+    Some(LensCheck { surface: Some(surface), found })
+}
+
+/// Checks that rays of a field can be launched at all wavelengths.
+fn field_without_rays(model: &RayModel, field: &FieldPoint) -> Option<LensCheck> {
+    let mut launches = (0..model.channels.len()).map(|channel| model.launch(*field, channel));
+    let error = launches.find_map(Result::err)?;
+    let [x, y] = [field.x, field.y].map(ShortNumber);
+    Some(LensCheck { surface: None, found: format!("field x {x}, y {y}: {error}") })
 }
 
 /// Checks the thickness of a gap on the axis and at the edge.

@@ -119,7 +119,7 @@ impl ZoomReport {
             } else {
                 "there is no chief ray"
             },
-            checks: checks(&system, &media, facts.fates),
+            checks: checks(&system, &media, &opened.ray_model(zoom)?, facts.fates),
             effects,
         })
     }

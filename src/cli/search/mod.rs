@@ -127,7 +127,7 @@ impl SearchArgs {
         let ended = self.run_rounds(&landscape, &mut run, &stop, watch, &mut failures);
         let ms = 1e3 * watch.seconds();
         let mut unsaved = self.save_best(&run.best().point, &original, &mut failures);
-        let stored = failures.note(self.write_reservoir(&run, &original)).unwrap_or_default();
+        let stored = self.write_reservoir(&run, &original, &mut failures);
         let stale = self.stale_files(&stored);
         let finished = self.finish.then(|| finalize(&landscape, &run.best().point));
         let finished = finished.and_then(|lens| failures.note(lens.map_err(refused)));
@@ -291,22 +291,26 @@ impl SearchArgs {
         stale
     }
 
-    /// Writes the lenses of the reservoir, best first; returns the paths.
+    /// Writes the lenses of the reservoir, best first, until one fails; returns the paths.
     fn write_reservoir(
         &self,
         run: &SearchRunOn<LensLandscape>,
         original: &Lens,
-    ) -> Result<Vec<PathBuf>, CliError> {
-        let Some(folder) = &self.reservoir_dir else { return Ok(Vec::new()) };
+        failures: &mut Failures,
+    ) -> Vec<PathBuf> {
+        let Some(folder) = &self.reservoir_dir else { return Vec::new() };
         let mut files = Vec::new();
         for (i, FoundPoint { entry, running }) in run.found_points().into_iter().enumerate() {
             let running = if running { "_running" } else { "" };
             let name = format!("{:02}_generation_{}{running}.json", i + 1, entry.number);
             let path = folder.join(name);
-            files::save(&lens_to_write(&entry.point, original), &path)?;
+            let saved = files::save(&lens_to_write(&entry.point, original), &path);
+            if failures.note(saved).is_none() {
+                break;
+            }
             files.push(path);
         }
-        Ok(files)
+        files
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::{DescentSettings, LandscapeError, LensLandscape};
 use crate::lens::Lens;
-use crate::merit::Goal;
+use crate::merit::{DerivativeLevel, Goal};
 use crate::search::{
     MutationKind, SearchError, SearchEvent, SearchRules, SearchRun, SearchRunOn, SearchSettings,
     Temperature,
@@ -72,9 +72,13 @@ impl SearchPlan {
         let landscape =
             LensLandscape::new(lens, &goal, &rules, &self.local)?.with_field_light(each)?;
         landscape.check_feasible()?;
-        if landscape.merit(landscape.start(), self.local.tolerance)?.is_dark() {
+        let start = landscape.with_variables(landscape.start());
+        let merit = landscape.merit(&start, self.local.tolerance)?;
+        if merit.is_dark() {
             return Err(LandscapeError::NoLight);
         }
+        // Without the gradient of its start a search would only try mutations for ever.
+        merit.evaluate(&merit.values(&start), DerivativeLevel::Gradient)?;
         Ok(landscape)
     }
 

@@ -4,7 +4,9 @@
 //! then their events are applied in the order of the chains. So a run is a function of its
 //! landscape, start and settings, on any number of threads.
 
-use super::chain::{BruteForceJob, Chain, ChainDescent, NewDescent, RoundContext};
+use super::chain::{
+    BruteForceJob, Chain, ChainDescent, LocalMove, NewDescent, RoundContext, TurnEvent,
+};
 use super::{SearchMethod, SearchSettings, Temperature};
 use crate::search::{
     Landscape, Lineage, LineageNode, MutationKind, MutationWeights, Random, Reservoir,
@@ -73,7 +75,7 @@ pub enum RunEnd {
     Gradients,
     /// All brute-force jobs are done.
     Done,
-    /// No descent could be started for a hundred rounds.
+    /// For a hundred rounds no descent could be started, or none could compute a gradient.
     Stuck,
 }
 
@@ -226,7 +228,11 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
         let shares = self.gradient_budgets();
         let chains = self.chains.par_iter_mut().zip(shares);
         let turns: Vec<_> = chains.map(|(chain, most)| context.turn(chain, most)).collect();
-        let moves = self.statistics.moves;
+        let is_progress = |m: &LocalMove| m.gradients > 0 || m.loss.is_finite();
+        let moved = turns
+            .iter()
+            .flatten()
+            .any(|event| matches!(event, TurnEvent::Moved(local_move) if is_progress(local_move)));
         let mut events = Vec::new();
         for (chain, turn) in turns.into_iter().enumerate() {
             for event in turn {
@@ -235,7 +241,6 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
             self.update_best_from_chain(chain, landscape, &mut events);
         }
         self.statistics.rounds += 1;
-        let moved = self.statistics.moves > moves;
         self.statistics.idle = if moved { 0 } else { self.statistics.idle + 1 };
         self.prune_lineage();
         events

@@ -206,6 +206,17 @@ fn descents_to_infinite_loss_end_and_are_rejected() {
 }
 
 #[test]
+fn a_search_without_gradients_comes_to_an_end() {
+    let landscape = Rugged::with(Fault::WithoutGradient);
+    let settings =
+        SearchSettings { moves: None, gradients: Some(1000), ..settings(SearchMethod::Restore) };
+    let mut run = SearchRun::new(&landscape, START, &settings).unwrap();
+    rounds(&mut run, &landscape, 200);
+    assert_eq!(run.end_reason(), Some(RunEnd::Stuck));
+    assert_eq!(run.statistics().gradients, 0);
+}
+
+#[test]
 fn a_search_without_mutations_comes_to_an_end() {
     for fault in [Fault::AllRefused, Fault::AllWorthless] {
         let landscape = Rugged::with(fault);

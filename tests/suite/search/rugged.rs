@@ -30,6 +30,8 @@ pub(super) enum Fault {
     /// A descent leads to what is worth nothing.
     DescentLost,
     DescentInfinite,
+    /// No descent can compute a gradient.
+    WithoutGradient,
     /// No mutation and no draw applies.
     AllRefused,
     /// All mutations lead to what is worth nothing.
@@ -118,6 +120,7 @@ impl Landscape for Rugged {
         let loss = match self.fault {
             Fault::DescentLost => f64::NAN,
             Fault::DescentInfinite => f64::INFINITY,
+            Fault::WithoutGradient => return (spot.clone(), f64::INFINITY, 0),
             _ => self.loss(&next),
         };
         (next, loss, steps)
