@@ -30,7 +30,8 @@ impl FileLock {
     ///
     /// # Errors
     /// [`FileError::InUse`] if it is locked, with its holder; [`FileError::Unwritable`] if nothing
-    /// can be written in its folder.
+    /// can be written in its folder; [`FileError::Unsuitable`] if another file has the name of the
+    /// lock.
     pub fn acquire(path: &Path) -> Result<Self, FileError> {
         let name = path.display().to_string();
         let unwritable = |source| FileError::Unwritable { file: name.clone(), source };
@@ -40,8 +41,7 @@ impl FileLock {
             match file.try_lock() {
                 Ok(()) if is_current(&file, &beside) => {
                     if !is_lock(&mut file) {
-                        let text = format!("{} is no lock of this program", beside.display());
-                        return Err(unwritable(io::Error::other(text)));
+                        return Err(foreign_lock(&beside));
                     }
                     write_holder(&mut file);
                     return Ok(Self { locked: file, path: beside });
@@ -93,6 +93,15 @@ fn open_file_number(file: &File) -> Option<[u64; 2]> {
 #[cfg(not(unix))]
 fn open_file_number(_file: &File) -> Option<[u64; 2]> {
     None
+}
+
+/// The error of a file that has the name of a lock and is none.
+fn foreign_lock(path: &Path) -> FileError {
+    FileError::Unsuitable {
+        file: path.display().to_string(),
+        found: "a file that is no lock of this program".to_owned(),
+        expected: "no file of this name".to_owned(),
+    }
 }
 
 /// True if a file contains nothing but the number of a process: anything else must not be written

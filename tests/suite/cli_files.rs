@@ -136,7 +136,7 @@ fn a_file_with_the_name_of_a_lock_is_kept() {
     let own = folder.file(".run.json.lock", "my notes");
     let checkpoint = folder.path("run.json");
     let search = ["search", LENS, "--iterations", "4", "--checkpoint", &checkpoint];
-    refused(2, &search, "", &["run.json", ".run.json.lock is no lock of this program"]);
+    refused(2, &search, "", &[".run.json.lock: found a file that is no lock"]);
     assert_eq!(fs::read_to_string(&own).unwrap(), "my notes");
     // The number of a process that is no more.
     fs::write(&own, "4194304").unwrap();
