@@ -32,15 +32,17 @@ impl LensCheck {
 }
 
 /// Checks the gaps and semi-diameters of a lens, its fields, and the fates of its rays.
+/// `stop_radius` is the radius in mm of the stop that the aperture asks for.
 pub(super) fn checks(
     system: &System<f64>,
     media: &[Medium],
     model: &RayModel,
+    stop_radius: f64,
     fates: Fates,
 ) -> Vec<LensCheck> {
     let rows = media.len();
     let mut checks: Vec<LensCheck> = (0..rows).filter_map(|i| rim(system, i)).collect();
-    checks.extend(stop(system, model));
+    checks.extend(stop(system, stop_radius));
     checks.extend(model.fields.iter().filter_map(|field| field_without_rays(model, field)));
     // Behind a mirror gaps are negative, and the edge thickness has another meaning.
     let straight = media.iter().position(|m| *m == Medium::Mirror).unwrap_or(rows);
@@ -64,9 +66,10 @@ fn rim(system: &System<f64>, i: usize) -> Option<LensCheck> {
     Some(LensCheck { surface: Some(i), found })
 }
 
-/// Checks that the beam that the aperture asks for fits through the rim of the stop.
-fn stop(system: &System<f64>, model: &RayModel) -> Option<LensCheck> {
-    let (surface, asked) = (model.stop(), model.stop_radius());
+/// Checks that the beam that the aperture asks for, `asked` mm wide at the stop from the axis, fits
+/// through the rim there.
+fn stop(system: &System<f64>, asked: f64) -> Option<LensCheck> {
+    let surface = system.stop?;
     let rim = system.surfaces.get(surface)?.semi_diameter;
     if asked <= LARGEST_STOP * rim {
         return None;

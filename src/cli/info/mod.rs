@@ -107,6 +107,8 @@ impl ZoomReport {
         let data = first_order(&system, &Beam::for_lens(lens, zoom)).map_err(undefined)?;
         let media: Vec<_> = lens.surfaces.iter().map(|row| row.medium.clone()).collect();
         let (facts, effects) = effects::decisions(opened, zoom, choices)?;
+        let model = opened.ray_model(zoom)?;
+        let checks = checks(&system, &media, &model, data.stop_semi_diameter, facts.fates);
         Ok(Self {
             zoom,
             zoom_name: lens.zoom.get(zoom).map(|z| z.name.clone()).unwrap_or_default(),
@@ -119,7 +121,7 @@ impl ZoomReport {
             } else {
                 "there is no chief ray"
             },
-            checks: checks(&system, &media, &opened.ray_model(zoom)?, facts.fates),
+            checks,
             effects,
         })
     }
