@@ -18,11 +18,14 @@ fn value(name: &'static str, help: &'static str) -> PossibleValue {
 
 impl ValueEnum for DescentMethod {
     fn value_variants<'a>() -> &'a [Self] {
-        &[Self::DampedLeastSquares, Self::Adam]
+        &Self::ALL
     }
 
     fn to_possible_value(&self) -> Option<PossibleValue> {
         Some(match self {
+            Self::TrustRegion => {
+                value("trust-region", "A trust region with secant second derivatives")
+            }
             Self::DampedLeastSquares => value("dls", "Damped least squares"),
             Self::Adam => value("adam", "Adam: first order, with moments"),
         })

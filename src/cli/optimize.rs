@@ -13,7 +13,7 @@ use crate::files::{self, FileError, json};
 use crate::lens::{Lens, ParameterKind, add_variables};
 use crate::measure::time_ms;
 use crate::merit::{Goal, Merit, MeritError, TermValue};
-use crate::optimize::{DescentMethod, OptimizationProgress, Optimizer, start};
+use crate::optimize::{DescentMethod, OptimizationEnd, OptimizationProgress, Optimizer, start};
 use crate::paraxial::{Beam, first_order};
 use serde::Serialize;
 use std::fmt::{self, Display};
@@ -32,10 +32,11 @@ pub(super) struct OptimizeArgs {
     out: PathBuf,
 
     /// The optimization method
-    #[arg(long, value_enum, default_value_t = DescentMethod::DampedLeastSquares)]
+    #[arg(long, value_enum, default_value_t = DescentMethod::TrustRegion)]
     method: DescentMethod,
 
-    /// Maximum number of steps; absent: 100 for dls, 2000 for adam
+    /// Maximum number of steps; absent: 1000 for trust-region, 100 for dls,
+    /// 2000 for adam
     #[arg(long, value_name = "N")]
     steps: Option<usize>,
 
@@ -62,6 +63,7 @@ pub(super) struct OptimizeArgs {
 /// Steps where --steps is absent.
 fn default_steps(method: DescentMethod) -> usize {
     match method {
+        DescentMethod::TrustRegion => 1000,
         DescentMethod::DampedLeastSquares => 100,
         DescentMethod::Adam => 2000,
     }
@@ -215,6 +217,9 @@ struct OptimizeReport {
     method: String,
     steps: usize,
     ended: OptimizeEnd,
+    /// The reason for which the method ended by itself.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    reason: Option<OptimizationEnd>,
     ms: f64,
     merit_before: f64,
     merit_after: f64,
@@ -282,6 +287,7 @@ impl OptimizeReport {
             method: value_name(&args.method),
             steps: search.steps.len(),
             ended: search.ended,
+            reason: search.steps.last().and_then(|step| step.end),
             ms,
             merit_before: merit(&before),
             merit_after: merit(&after),
@@ -306,10 +312,11 @@ const LIGHT_TERMS: [&str; 5] =
 impl Display for OptimizeReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { steps, ms, merit_before, merit_after, .. } = self;
-        let ended = match self.ended {
-            OptimizeEnd::Finished => "converged",
-            OptimizeEnd::Steps => "the maximum number of steps was reached",
-            OptimizeEnd::Stopped => "stopped",
+        let ended = match (self.ended, self.reason) {
+            (OptimizeEnd::Finished, Some(reason)) => reason.text(),
+            (OptimizeEnd::Finished, None) => "converged",
+            (OptimizeEnd::Steps, _) => "the maximum number of steps was reached",
+            (OptimizeEnd::Stopped, _) => "stopped",
         };
         writeln!(f, "{steps} steps in {:.3} s: {ended}", 1e-3 * ms)?;
         if let Some(refusal) = &self.last_refusal {

@@ -96,7 +96,7 @@ impl ParetoArgs {
         stop: &AtomicBool,
     ) -> Result<(ParetoSweep, f64), ParetoError> {
         let steps = match self.method {
-            DescentMethod::DampedLeastSquares => 100,
+            DescentMethod::TrustRegion | DescentMethod::DampedLeastSquares => 100,
             DescentMethod::Adam => 500,
         };
         let settings = ParetoSettings {

@@ -56,6 +56,8 @@ pub fn measure_step_costs(steps: usize) -> Result<StepCosts, BenchmarkError> {
     let searches = [
         ("adam_clear", DescentMethod::Adam, &clear),
         ("adam_clipped", DescentMethod::Adam, &clipped),
+        ("trust_region_clear", DescentMethod::TrustRegion, &clear),
+        ("trust_region_clipped", DescentMethod::TrustRegion, &clipped),
         ("dls_clear", DescentMethod::DampedLeastSquares, &clear),
         ("dls_clipped", DescentMethod::DampedLeastSquares, &clipped),
     ];

@@ -11,7 +11,7 @@ use crate::lens::{
     paraxial_image_distance,
 };
 use crate::paraxial::Beam;
-use crate::pupil::{Aiming, RayModel};
+use crate::pupil::{Aiming, RayModel, filled_stop_radius};
 use crate::trace::{SurfaceParameter, SystemGradient};
 use nalgebra::DVector;
 
@@ -38,8 +38,8 @@ pub(super) struct Configuration {
     systems: Vec<System<f64>>,
     /// The surface that is the stop.
     stop: usize,
-    /// The semi-diameter of that surface where the beam fills less of it.
-    stop_rim: Option<f64>,
+    /// The beam that fills the stop as far as its aperture says; `None` if the stop is the aperture.
+    filling_beam: Option<Beam>,
     bindings: Vec<Vec<ParameterBinding>>,
     /// The distance of the image plane from the paraxial focus in mm, if the last gap is solved
     /// for.
@@ -58,17 +58,22 @@ pub(super) struct ResolvedSystems {
     pub(super) manufactured: System<f64>,
     /// The derivatives of the last gap by the variables, if it is solved for.
     focus_slopes: Option<DVector<f64>>,
+    /// The derivatives of the radius of the stop by the variables, if a beam fills it in part.
+    stop_slopes: Option<DVector<f64>>,
 }
 
 impl Configuration {
     pub(super) fn new(lens: &Lens, zoom: usize) -> Result<Self, MeritError> {
-        let stop = StopLimit::new(lens, zoom)?;
+        let stop = lens.stop().unwrap_or(0);
+        let beam = Beam::for_lens(lens, zoom);
         let mut systems = Vec::new();
         let mut bindings = Vec::new();
         for wavelength in &lens.wavelengths {
             let mut system = lens.resolve(zoom, wavelength.um)?;
-            system.surfaces[stop.surface].semi_diameter = stop.radius;
-            let bound = bind_parameters(lens, zoom, wavelength.um, &stop, &mut system);
+            if let Aperture::StopSemiDiameter(radius) = beam.aperture {
+                system.surfaces[stop].semi_diameter = radius;
+            }
+            let bound = bind_parameters(lens, zoom, wavelength.um, &mut system);
             bindings.push(bound);
             systems.push(system);
         }
@@ -88,8 +93,8 @@ impl Configuration {
             object: lens.object,
             field_kind: lens.fields_at(zoom).kind,
             is_glass: (0..lens.surfaces.len()).map(glass).collect(),
-            stop: stop.surface,
-            stop_rim: lens.surfaces[stop.surface].semi_diameter.filter(|_| !stop.follows_rim),
+            stop,
+            filling_beam: (!matches!(beam.aperture, Aperture::StopSemiDiameter(_))).then_some(beam),
             focus_offset: lens.image_solve,
             variables: lens.variables.len(),
             bindings,
@@ -98,7 +103,10 @@ impl Configuration {
     }
 
     /// The systems at some values of the variables.
-    pub(super) fn at(&self, values: &[f64]) -> ResolvedSystems {
+    ///
+    /// # Errors
+    /// An aperture that defines no beam for the lens.
+    pub(super) fn at(&self, values: &[f64]) -> Result<ResolvedSystems, MeritError> {
         let mut clipped = self.systems.clone();
         for (system, bindings) in clipped.iter_mut().zip(&self.bindings) {
             for binding in bindings {
@@ -107,14 +115,32 @@ impl Configuration {
             }
         }
         let focus_slopes = self.focus_offset.map(|offset| self.solve_focus(&mut clipped, offset));
+        let manufactured = clipped[self.primary].clone();
+        let stop_slopes = self.fill_stop(&mut clipped)?;
         let mut unclipped = clipped.clone();
         let surfaces = unclipped.iter_mut().flat_map(|system| &mut system.surfaces);
         surfaces.for_each(unclip);
-        let mut manufactured = clipped[self.primary].clone();
-        if let Some(rim) = self.stop_rim {
-            manufactured.surfaces[self.stop].semi_diameter = rim;
+        Ok(ResolvedSystems { unclipped, clipped, manufactured, focus_slopes, stop_slopes })
+    }
+
+    /// Limits the stop to what the beam fills of it, and returns the derivatives of its radius by
+    /// the variables; `None` if its own rim is smaller.
+    fn fill_stop(&self, systems: &mut [System<f64>]) -> Result<Option<DVector<f64>>, MeritError> {
+        let Some(beam) = &self.filling_beam else { return Ok(None) };
+        let primary = &systems[self.primary];
+        let radius = filled_stop_radius(primary, beam)?;
+        if primary.surfaces[self.stop].semi_diameter <= radius {
+            return Ok(None);
         }
-        ResolvedSystems { unclipped, clipped, manufactured, focus_slopes }
+        let slope = |variable| {
+            let along = self.system_along_without_focus(primary, variable);
+            filled_stop_radius(&along, beam).map_or(0.0, |radius| radius.slope[0])
+        };
+        let slopes = DVector::from_iterator(self.variables, (0..self.variables).map(slope));
+        for system in systems {
+            system.surfaces[self.stop].semi_diameter = radius;
+        }
+        Ok(Some(slopes))
     }
 
     /// The ray model of the lens with its semi-diameters, limited by its stop.
@@ -185,6 +211,11 @@ impl Configuration {
                 SurfaceParameter::AsphereTerm(term) => surface.terms[term],
                 SurfaceParameter::Thickness => surface.thickness,
                 SurfaceParameter::Index => surface.index,
+                SurfaceParameter::SemiDiameter
+                    if binding.surface == self.stop && systems.stop_slopes.is_some() =>
+                {
+                    0.0
+                }
                 SurfaceParameter::SemiDiameter => surface.semi_diameter,
                 SurfaceParameter::GrinTerm(k) => surface.grin_terms[k],
             };
@@ -193,6 +224,9 @@ impl Configuration {
         if let Some(focus) = &systems.focus_slopes {
             let last = gradient.surfaces.len() - 2;
             by_variable.axpy(gradient.surfaces[last].thickness, focus, 1.0);
+        }
+        if let Some(stop) = &systems.stop_slopes {
+            by_variable.axpy(gradient.surfaces[self.stop].semi_diameter, stop, 1.0);
         }
         by_variable
     }
@@ -254,36 +288,12 @@ fn unclip(surface: &mut Surface<f64>) {
 /// The radius up to which an asphere is extended, in semi-diameters.
 const ASPHERE_MARGIN: f64 = 1.2;
 
-/// The rim of the stop, which limits the beam at a zoom position.
-struct StopLimit {
-    surface: usize,
-    /// Its radius in mm. An aperture that is given as a pupil, a cone or a focal ratio keeps the stop
-    /// that it fills at the start.
-    radius: f64,
-    /// True if the radius follows the semi-diameter of the surface.
-    follows_rim: bool,
-}
-
-impl StopLimit {
-    fn new(lens: &Lens, zoom: usize) -> Result<Self, MeritError> {
-        let surface = lens.stop().unwrap_or(0);
-        let own = lens.zoom.get(zoom).is_some_and(|position| position.aperture.is_some());
-        if let Aperture::StopSemiDiameter(radius) = lens.aperture_at(zoom) {
-            return Ok(Self { surface, radius, follows_rim: !own });
-        }
-        let filled = RayModel::with_aiming(lens, zoom, Aiming::Paraxial)?.filled_stop_radius();
-        let rim = lens.surfaces[surface].semi_diameter.unwrap_or(f64::INFINITY);
-        Ok(Self { surface, radius: filled.min(rim), follows_rim: rim <= filled })
-    }
-}
-
 /// The bindings of the variables at a wavelength; surfaces of `system` are promoted to shapes that
 /// have the numbers bound.
 fn bind_parameters(
     lens: &Lens,
     zoom: usize,
     um: f64,
-    stop: &StopLimit,
     system: &mut System<f64>,
 ) -> Vec<ParameterBinding> {
     let mut bindings = Vec::new();
@@ -300,7 +310,7 @@ fn bind_parameters(
                 Quantity::ZoomThickness(z) if z == zoom => SurfaceParameter::Thickness,
                 Quantity::Index => SurfaceParameter::Index,
                 Quantity::Grin(k) => SurfaceParameter::GrinTerm(k),
-                Quantity::SemiDiameter if surface != stop.surface || stop.follows_rim => {
+                Quantity::SemiDiameter if !has_own_aperture(lens, zoom, surface) => {
                     SurfaceParameter::SemiDiameter
                 }
                 Quantity::Thickness | Quantity::ZoomThickness(_) | Quantity::SemiDiameter => {
@@ -331,6 +341,12 @@ fn bind_parameters(
 fn has_own_gap(lens: &Lens, zoom: usize, surface: usize) -> bool {
     let position = lens.zoom.get(zoom);
     position.is_some_and(|p| p.thicknesses.iter().any(|gap| gap.surface == surface))
+}
+
+/// True if the surface is the stop and the zoom position defines its size by an aperture of its
+/// own.
+fn has_own_aperture(lens: &Lens, zoom: usize, surface: usize) -> bool {
+    lens.surfaces[surface].stop && lens.zoom.get(zoom).is_some_and(|z| z.aperture.is_some())
 }
 
 /// The derivative of the index of a gap by its nd.

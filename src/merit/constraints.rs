@@ -132,7 +132,7 @@ pub fn constraint_margins(
         let zoom = Configuration::new(lens, number)?;
         let values: Vec<f64> =
             lens.variables.iter().map(|v| lens.get(v.parameter).unwrap_or(0.0)).collect();
-        let systems = zoom.at(&values);
+        let systems = zoom.at(&values)?;
         for term in &terms {
             let margin = |Constraint { quantity, min, max }: Constraint| ConstraintMargin {
                 term: term.name(),
@@ -183,7 +183,7 @@ impl MinimumThickness {
             let zoom = Configuration::new(lens, number)?;
             let values: Vec<f64> =
                 lens.variables.iter().map(|v| lens.get(v.parameter).unwrap_or(0.0)).collect();
-            let system = &zoom.at(&values).manufactured;
+            let system = &zoom.at(&values)?.manufactured;
             for gap in 0..zoom.is_glass.len() - 1 {
                 let center = ConstrainedQuantity::Center(gap).length(system);
                 let rim = if zoom.is_glass[gap] { EdgeRadius::Larger } else { EdgeRadius::Smaller };

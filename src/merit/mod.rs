@@ -287,7 +287,7 @@ impl Merit {
         let mut sums = vec![SumOfSquares::zero(values.len(), level); self.goal.terms.len()];
         let positions = self.zooms.iter().zip(&self.samplings).zip(&self.initial_areas);
         for ((zoom, sampling), start) in positions {
-            let systems = zoom.at(values);
+            let systems = zoom.at(values)?;
             if self.needs_pupil_edges() {
                 let model = zoom.ray_model(&systems, &self.lens, sampling.aiming)?;
                 let light = sampling.trace_pupils(&model, true);

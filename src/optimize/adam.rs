@@ -7,7 +7,7 @@
 //! a cosine (Loshchilov and Hutter, "SGDR", ICLR 2017), so that its cost is known in advance.
 
 use super::state::OptimizerState;
-use super::{OptimizationProgress, Optimizer};
+use super::{OptimizationEnd, OptimizationProgress, Optimizer};
 use crate::lens::Lens;
 use crate::merit::{DerivativeLevel, Merit, MeritError, TermValue};
 use crate::solve::AdamMoments;
@@ -126,13 +126,13 @@ impl AdamOptimizer {
 impl Optimizer for AdamOptimizer {
     fn step(&mut self) -> OptimizationProgress {
         if self.has_ended() {
-            return self.state.progress(0.0, true);
+            return self.state.progress(0.0, Some(OptimizationEnd::NoGain));
         }
         let accepted = match self.schedule {
             LearningRate::ReduceOnPlateau => self.plateau_step(),
             LearningRate::CosineAnnealing(steps) => self.annealed_step(steps),
         };
-        let progress = self.state.progress(accepted, false);
+        let progress = self.state.progress(accepted, None);
         if self.state.resample_if_due() && self.schedule == LearningRate::ReduceOnPlateau {
             self.differentiate();
         }

@@ -5,7 +5,7 @@
 //! lowers it (Marquardt 1963; Nielsen 1999 for the update).
 
 use super::state::OptimizerState;
-use super::{OptimizationProgress, Optimizer};
+use super::{OptimizationEnd, OptimizationProgress, Optimizer};
 use crate::lens::Lens;
 use crate::merit::{DerivativeLevel, Merit, MeritError, SumOfSquares, TermValue};
 use crate::solve::{Damping, NielsenDamping, damped_step, predicted_decrease};
@@ -129,7 +129,7 @@ impl LeastSquaresOptimizer {
 impl Optimizer for LeastSquaresOptimizer {
     fn step(&mut self) -> OptimizationProgress {
         if self.idle >= PATIENCE || self.state.has_ended() {
-            return self.state.progress(0.0, true);
+            return self.state.progress(0.0, Some(OptimizationEnd::NoGain));
         }
         let before = self.state.value;
         let accepted = self.descend();
@@ -139,7 +139,7 @@ impl Optimizer for LeastSquaresOptimizer {
         if finished {
             self.verify_best();
         }
-        let progress = self.state.progress(accepted, finished);
+        let progress = self.state.progress(accepted, finished.then_some(OptimizationEnd::NoGain));
         if self.state.resample_if_due() {
             self.differentiate();
         }

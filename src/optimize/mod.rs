@@ -8,6 +8,7 @@ mod least_squares;
 pub mod pareto;
 mod segment;
 mod state;
+mod trust_region;
 
 pub use segment::{DescentState, SegmentResult, SegmentSettings, run_segment};
 
@@ -46,6 +47,32 @@ pub struct OptimizationProgress {
     pub refused: Option<String>,
     /// True if further steps would change nothing.
     pub finished: bool,
+    /// The reason why the optimizer has ended, if it has.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub end: Option<OptimizationEnd>,
+}
+
+/// The reason why an optimizer has ended by itself.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum OptimizationEnd {
+    /// The gradient is a millionth of what it was, apart from variables at their bounds.
+    Gradient,
+    /// No step promises a gain above the tolerance of the spots.
+    Tolerance,
+    /// Several steps have gained nothing.
+    NoGain,
+}
+
+impl OptimizationEnd {
+    /// The reason in words.
+    pub fn text(self) -> &'static str {
+        match self {
+            Self::Gradient => "the gradient has vanished",
+            Self::Tolerance => "nothing can be gained at the tolerance of the spots",
+            Self::NoGain => "several steps have gained nothing",
+        }
+    }
 }
 
 /// The method of a local optimizer.
@@ -55,16 +82,22 @@ pub enum DescentMethod {
     /// First order, with moments (Kingma and Ba, ICLR 2015).
     Adam,
     /// Damped least squares (Levenberg 1944; Marquardt 1963).
-    #[default]
     DampedLeastSquares,
+    /// A trust region with secant second derivatives (Dennis, Gay, Welsch 1981).
+    #[default]
+    TrustRegion,
 }
 
 impl DescentMethod {
+    /// All methods, the default one first.
+    pub const ALL: [Self; 3] = [Self::TrustRegion, Self::DampedLeastSquares, Self::Adam];
+
     /// The name of the method in menus.
     pub fn name(self) -> &'static str {
         match self {
             Self::Adam => "Adam",
             Self::DampedLeastSquares => "Damped least squares",
+            Self::TrustRegion => "Trust region",
         }
     }
 }
@@ -86,6 +119,9 @@ pub fn start(
         }
         DescentMethod::DampedLeastSquares => {
             Box::new(least_squares::LeastSquaresOptimizer::new(merit, lens)?)
+        }
+        DescentMethod::TrustRegion => {
+            Box::new(trust_region::TrustRegionOptimizer::new(merit, lens, tolerance)?)
         }
     })
 }

@@ -395,7 +395,7 @@ impl SweepChain {
         }
         let search = match self.method {
             DescentMethod::Adam => start_annealed(&self.lens, &goal, self.tolerance, left),
-            DescentMethod::DampedLeastSquares => {
+            DescentMethod::TrustRegion | DescentMethod::DampedLeastSquares => {
                 start(self.method, &self.lens, &goal, self.tolerance)
             }
         };

@@ -5,6 +5,7 @@
 use super::DescentMethod;
 use super::least_squares::LeastSquaresOptimizer;
 use super::state::OptimizerState;
+use super::trust_region::TrustRegionOptimizer;
 use crate::lens::Lens;
 use crate::merit::{DerivativeLevel, Merit, MeritError};
 use crate::solve::{AdamMoments, NielsenDamping};
@@ -91,6 +92,11 @@ pub fn run_segment(
         DescentMethod::Adam => {
             state.rescale(&sum);
             adam(state, sum.gradient.as_slice(), asked, memory)
+        }
+        DescentMethod::TrustRegion => {
+            let mut search = TrustRegionOptimizer::resume(state, &sum, 0.0);
+            search.take_steps(asked.steps);
+            search.into_state()
         }
         DescentMethod::DampedLeastSquares => {
             let mut search = LeastSquaresOptimizer::resume(state, sum, memory.damping);

@@ -1,7 +1,7 @@
 //! The state shared by all local optimizers: scaled variables with bounds, the best lens, and steps
 //! that never make the lens invalid.
 
-use super::OptimizationProgress;
+use super::{OptimizationEnd, OptimizationProgress};
 use crate::lens::{ASPHERE_TERMS, Lens, Medium, Quantity, RADIAL_TERMS, Variable};
 use crate::merit::{DerivativeLevel, Merit, MeritError, SumOfSquares, TermValue};
 use crate::solve::AdamMoments;
@@ -33,7 +33,7 @@ pub(super) struct OptimizerState {
     verified: Lens,
     verified_value: f64,
     /// The number of verifications since then that found no better lens.
-    failed_verifications: usize,
+    pub(super) failed_verifications: usize,
     pub(super) steps: usize,
     /// The number of successful evaluations of the merit; failed ones cost little.
     pub(super) evaluations: usize,
@@ -115,7 +115,7 @@ impl OptimizerState {
     }
 
     /// The variables after a fraction of a step, clamped to their bounds.
-    fn proposal(&self, step: &[f64], fraction: f64) -> Vec<f64> {
+    pub(super) fn proposal(&self, step: &[f64], fraction: f64) -> Vec<f64> {
         let moved = |i: usize| {
             let value = self.values[i] + fraction * step[i] * self.scales[i];
             clamp(&self.merit.variables()[i], value)
@@ -124,7 +124,7 @@ impl OptimizerState {
     }
 
     /// The merit at some values; an error if the lens that they define is invalid.
-    fn evaluate(
+    pub(super) fn evaluate(
         &self,
         values: &[f64],
         detail: DerivativeLevel,
@@ -139,7 +139,7 @@ impl OptimizerState {
         self.merit.evaluate(values, detail)
     }
 
-    fn accept_step(&mut self, values: Vec<f64>, value: f64) {
+    pub(super) fn accept_step(&mut self, values: Vec<f64>, value: f64) {
         self.values = values;
         self.value = value;
         self.current = self.merit.lens(&self.values);
@@ -150,7 +150,7 @@ impl OptimizerState {
     }
 
     /// Records the reason for which a step was rejected and the variable that it moved most.
-    fn record_refusal(&mut self, step: &[f64], cause: &MeritError) {
+    pub(super) fn record_refusal(&mut self, step: &[f64], cause: &MeritError) {
         let most = (0..step.len()).max_by(|a, b| step[*a].abs().total_cmp(&step[*b].abs()));
         let parameter = most.map(|i| self.merit.variables()[i].parameter.to_string());
         let parameter = parameter.unwrap_or_default();
@@ -211,7 +211,11 @@ impl OptimizerState {
         self.value = self.merit.value(&self.values).unwrap_or(self.best_value);
     }
 
-    pub(super) fn progress(&mut self, accepted: f64, finished: bool) -> OptimizationProgress {
+    pub(super) fn progress(
+        &mut self,
+        accepted: f64,
+        end: Option<OptimizationEnd>,
+    ) -> OptimizationProgress {
         self.steps += 1;
         OptimizationProgress {
             step: self.steps,
@@ -219,8 +223,56 @@ impl OptimizerState {
             best: self.best_value,
             accepted,
             refused: self.refused.take(),
-            finished,
+            finished: end.is_some(),
+            end,
         }
+    }
+
+    /// The range by which each scaled variable may change.
+    pub(super) fn room(&self) -> Vec<[f64; 2]> {
+        let range = |i: usize| {
+            let (variable, value) = (&self.merit.variables()[i], self.values[i]);
+            let low = variable.min.map_or(f64::NEG_INFINITY, |min| (min - value).min(0.0));
+            let high = variable.max.map_or(f64::INFINITY, |max| (max - value).max(0.0));
+            [low / self.scales[i], high / self.scales[i]]
+        };
+        (0..self.values.len()).map(range).collect()
+    }
+
+    /// Evaluates the current lens with newly found rays. As long as the merit agrees with that of
+    /// the earlier rays to a relative tolerance, those stay. Otherwise the new ones take their
+    /// place; if the lens is then worse than the one verified last, that lens becomes the current
+    /// one. Returns the merit if the rays have changed.
+    pub(super) fn check_rays(&mut self, tolerance: f64) -> Option<SumOfSquares> {
+        let fresh = self.with_own_rays(&self.current);
+        let value = fresh.as_ref().map_or(f64::INFINITY, |(_, sum)| sum.value);
+        let is_same = (value - self.value).abs() <= tolerance * self.value.abs();
+        let is_better = value <= self.verified_value;
+        if is_better {
+            self.verified.clone_from(&self.current);
+            self.verified_value = value;
+        }
+        if is_same {
+            self.best.clone_from(&self.current);
+            self.best_value = self.value;
+            return None;
+        }
+        self.best.clone_from(&self.verified);
+        self.best_value = self.verified_value;
+        self.failed_verifications = if is_better { 0 } else { self.failed_verifications + 1 };
+        let (merit, sum) = if is_better { fresh } else { self.with_own_rays(&self.verified) }?;
+        self.current.clone_from(&self.verified);
+        self.values = merit.values(&self.current);
+        (self.merit, self.value) = (merit, sum.value);
+        Some(sum)
+    }
+
+    /// The merit function with the rays of a lens, and its value there.
+    fn with_own_rays(&self, lens: &Lens) -> Option<(Merit, SumOfSquares)> {
+        let mut merit = self.merit.clone();
+        merit.resample(lens).ok()?;
+        let sum = merit.evaluate(&merit.values(lens), DerivativeLevel::Normal).ok()?;
+        Some((merit, sum))
     }
 
     /// True for each variable at a bound that a descent would cross.

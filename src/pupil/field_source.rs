@@ -64,7 +64,7 @@ impl FieldSource {
 
 /// A ray from a point, or from the first vertex plane towards a point behind it.
 #[inline(always)]
-fn from_point<R: Real>(from: Vec3<R>, along: Vec3<R>) -> Ray<R> {
+pub(super) fn from_point<R: Real>(from: Vec3<R>, along: Vec3<R>) -> Ray<R> {
     let direction = along * (R::ONE / along.dot(along).sqrt());
     let point = if from.z > R::ZERO { from - direction * (from.z / direction.z) } else { from };
     Ray { point, direction }

@@ -34,6 +34,7 @@ pub use gradient::{
 pub use launch::{FixedLaunch, Launch, LaunchError};
 pub use patterns::{PupilPattern, pattern_points};
 pub use ray_model::{Aiming, Channel, Dual2, Neglected, RayModel, RayModelError};
+pub use real_beam::filled_stop_radius;
 pub use region::{
     Accuracy, Annulus, Boundary, BoundaryArc, ConvergedValues, DarkPupil, EdgePoint, Nodes,
     OutlineSide, PolarFrame, PupilLimit, PupilMoments, PupilOutline, Region, RegionKind,

@@ -1,8 +1,11 @@
 //! The beam of a lens: the rays that cross its stop, wherever the first-order pupil lies.
 
-use super::field_source::{field_source, paraxial_map};
-use super::ray_model::{Aiming, Dual2, RayModel, RayModelError};
-use crate::lens::{Aperture, FieldPoint, Lens};
+use super::field_source::from_point;
+use super::ray_model::{Aiming, RayModel, RayModelError};
+use crate::lens::{Aperture, Lens, Object, System};
+use crate::math::{Real, Vec3};
+use crate::paraxial::{Beam, FirstOrder, first_order};
+use crate::trace::{Ray, Tracer};
 
 impl RayModel {
     /// A lens at a zoom position with its real beam: the rays that fill the stop and pass every
@@ -18,21 +21,59 @@ impl RayModel {
     /// height at which the real marginal ray of the field on the axis crosses the stop at the
     /// primary wavelength. That of the paraxial ray if the real one does not get there.
     pub fn filled_stop_radius(&self) -> f64 {
-        let paraxial = self.stop_radius();
-        if matches!(self.beam.aperture, Aperture::StopSemiDiameter(_)) || paraxial == 0.0 {
-            return paraxial;
-        }
-        self.marginal_stop_height().unwrap_or(paraxial)
+        let system = &self.channels[self.primary].system;
+        filled_stop_radius(system, &self.beam).unwrap_or_else(|_| self.stop_radius())
     }
+}
 
-    /// The height of the real marginal ray of the field on the axis at the stop, in mm.
-    fn marginal_stop_height(&self) -> Option<f64> {
-        let axis = FieldPoint { x: 0.0, y: 0.0, weight: 1.0 };
-        let source = field_source(self, axis)?;
-        let q = paraxial_map(self, &source).map([0.0, 1.0]);
-        let open = &self.channels[self.primary].unclipped;
-        let landing = open.trace_to(source.ray(q.map(Dual2::constant)), self.stop());
-        let height = landing.ray.point.y.value.abs();
-        (landing.fate.is_imaged() && height > 0.0 && height.is_finite()).then_some(height)
+/// The radius of the stop in mm that a beam fills: as given, or the height at which the real
+/// marginal ray of the point on the axis crosses the stop; that of the paraxial ray if the real one
+/// does not get there.
+///
+/// # Errors
+/// An aperture without meaning for the system, or numbers that cannot be traced.
+pub fn filled_stop_radius<R: Real>(system: &System<R>, beam: &Beam) -> Result<R, RayModelError> {
+    if let Aperture::StopSemiDiameter(radius) = beam.aperture {
+        return Ok(R::from_f64(radius));
     }
+    let first = first_order(system, beam)?;
+    let tracer = Tracer::new(system)?.without_rims();
+    let ray = marginal_ray(&first, beam.object);
+    let height = stop_height(&tracer, system.stop.unwrap_or(0), ray);
+    Ok(height.unwrap_or(first.stop_semi_diameter))
+}
+
+/// The real ray from the point on the axis to the rim of the paraxial entrance pupil.
+fn marginal_ray<R: Real>(first: &FirstOrder<R>, object: Object) -> Ray<R> {
+    let pupil = first.entrance_pupil;
+    let height = first.marginal.heights[0].abs();
+    let radius = pupil.diameter.map_or(height, |diameter| R::from_f64(0.5) * diameter);
+    match (object, pupil.position) {
+        (Object::Infinity, _) => Ray {
+            point: Vec3::new(R::ZERO, radius, R::ZERO),
+            direction: Vec3::new(R::ZERO, R::ZERO, R::ONE),
+        },
+        (Object::Finite(distance), Some(position)) => {
+            let along = position + R::from_f64(distance);
+            let sense = if along > R::ZERO { R::ONE } else { -R::ONE };
+            from_axial_point(distance, Vec3::new(R::ZERO, radius * sense, along * sense))
+        }
+        (Object::Finite(distance), None) => {
+            let slope = first.marginal.start_slope.abs();
+            from_axial_point(distance, Vec3::new(R::ZERO, slope, R::ONE))
+        }
+    }
+}
+
+/// The ray from the object's point on the axis, `distance` in front of the first vertex.
+fn from_axial_point<R: Real>(distance: f64, along: Vec3<R>) -> Ray<R> {
+    from_point(Vec3::new(R::ZERO, R::ZERO, R::from_f64(-distance)), along)
+}
+
+/// The height of a ray at the stop in mm; `None` if it does not get there.
+fn stop_height<R: Real>(tracer: &Tracer<R>, stop: usize, ray: Ray<R>) -> Option<R> {
+    let landing = tracer.trace_to(ray, stop);
+    let height = landing.ray.point.y.abs();
+    let reached = landing.fate.is_imaged() && height.value() > 0.0 && height.value().is_finite();
+    reached.then_some(height)
 }

@@ -8,6 +8,7 @@ mod bounds;
 mod cgls;
 mod lbfgs;
 mod levenberg_marquardt;
+mod trust_region;
 
 pub use adam::{Adam, AdamMoments};
 pub use bounds::ParameterBounds;
@@ -17,6 +18,7 @@ pub use levenberg_marquardt::{
     Damping, LevenbergMarquardt, LevenbergMarquardtStep, NielsenDamping, ResidualRows, damped_step,
     predicted_decrease,
 };
+pub use trust_region::{LeastSquaresPoint, TrustRegion, TrustRegionStep};
 
 /// The scalar product.
 fn dot(a: &[f64], b: &[f64]) -> f64 {

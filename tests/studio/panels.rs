@@ -190,6 +190,7 @@ fn searching(standing: RunStatus) -> SessionView {
         accepted: 1.0,
         refused,
         finished: false,
+        end: None,
     };
     let search = OptimizationSnapshot {
         request: Arc::new(task),
@@ -221,7 +222,7 @@ fn optimize_requests_a_run_with_the_terms_of_the_panel() {
     let [Command::Optimize { method, goal }] = harness.state().commands.as_slice() else {
         panic!("{:?}", harness.state().commands);
     };
-    assert_eq!(*method, DescentMethod::DampedLeastSquares);
+    assert_eq!(*method, DescentMethod::TrustRegion);
     assert_eq!(goal.terms[0].weight, 3.0);
     assert!(goal.terms.iter().all(|weighted| weighted.term.name() != "focal_length"));
 }

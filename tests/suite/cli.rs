@@ -451,7 +451,7 @@ fn a_front_is_written_with_all_its_lenses() {
 #[test]
 fn optimize_makes_the_lens_better_and_saves_it() {
     let (out, history) = (Scratch::new("better.json"), Scratch::new("history.json"));
-    for method in ["dls", "adam"] {
+    for method in ["trust-region", "dls", "adam"] {
         let arguments = [
             "optimize",
             LENS,

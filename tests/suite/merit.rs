@@ -2,7 +2,8 @@
 
 use aplanat::files;
 use aplanat::lens::{
-    Aperture, FieldPoint, Lens, Medium, Parameter, Pickup, Quantity, Row, Variable,
+    Aperture, FieldKind, FieldPoint, Lens, Medium, Object, Parameter, Pickup, Quantity, Row,
+    Variable,
 };
 use aplanat::merit::{DerivativeLevel, Goal, Merit, PupilEdge, Term, WeightedTerm};
 
@@ -137,6 +138,27 @@ fn every_term_includes_the_motion_of_the_pupil() {
             Term::SemiDiameter { min: 5.0, max: 6.0 },
         ];
         for term in moving {
+            check(&lens, term, PupilEdge::Moving, |quantity| 0.02 * step(quantity));
+        }
+    }
+}
+
+/// An aperture that is a pupil, a cone or a focal ratio fills a stop that changes with the lens.
+#[test]
+fn derivatives_include_the_stop_that_a_beam_fills() {
+    let distant = |aperture| Lens { aperture, ..bundled("cooke_triplet_100_f27") };
+    let mut near = distant(Aperture::ObjectNa(0.05));
+    near.object = Object::Finite(200.0);
+    near.fields.kind = FieldKind::ObjectHeight;
+    let lenses =
+        [distant(Aperture::FNumber(4.0)), distant(Aperture::EntrancePupilDiameter(20.0)), near];
+    for mut lens in lenses {
+        lens.variables.clear();
+        for surface in 0..lens.surfaces.len() {
+            vary(&mut lens, surface, Quantity::Curvature);
+            vary(&mut lens, surface, Quantity::Thickness);
+        }
+        for term in [Term::Spot, Term::Throughput, Term::Light(1.01)] {
             check(&lens, term, PupilEdge::Moving, |quantity| 0.02 * step(quantity));
         }
     }

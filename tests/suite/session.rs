@@ -53,6 +53,7 @@ impl Optimizer for Toy {
             accepted: 1.0,
             refused: None,
             finished,
+            end: None,
         }
     }
 

@@ -117,7 +117,7 @@ impl OptimizerPanel {
 pub(super) fn method_menu(ui: &mut Ui, chosen: &mut DescentMethod) {
     let combo = ComboBox::from_id_salt("method").selected_text(chosen.name()).width(160.0);
     let combo = combo.show_ui(ui, |ui| {
-        for method in [DescentMethod::DampedLeastSquares, DescentMethod::Adam] {
+        for method in DescentMethod::ALL {
             ui.selectable_value(chosen, method, method.name());
         }
     });
@@ -131,6 +131,9 @@ fn progress(ui: &mut Ui, view: &SessionView, search: &OptimizationSnapshot) {
     ui.horizontal(|ui| {
         ui.strong(status);
         ui.label(format!("after step {step}"));
+        if let Some(end) = search.progress.as_ref().and_then(|progress| progress.end) {
+            ui.label(end.text());
+        }
         if let (Some(first), Some(last)) = (search.history.first(), search.progress.as_ref()) {
             ui.separator();
             ui.label(format!("merit {:.3e} to {:.3e}", first.current, last.best));

@@ -1,0 +1,436 @@
+//! A trust-region method for sums of squares, with a secant approximation of the second derivatives
+//! of the residuals.
+//!
+//! Half the Hessian of `Σ r²` is `JᵀJ + Σ r ∇²r`. The Gauss-Newton model leaves out the second part
+//! and stalls where residuals stay large. The augmented model adds a symmetric matrix `S` in its
+//! place, which is corrected after every trial so that the model reproduces the change of the
+//! gradient (Dennis, Gay, Welsch, *An adaptive nonlinear least-squares algorithm*, ACM TOMS 7
+//! (1981) 348). The model that predicted the last trial better makes the next step, as far as the
+//! trust region reaches in units of the measured effect of every parameter (Moré 1978).
+
+use nalgebra::{DMatrix, DVector, SymmetricEigen};
+
+/// A sum of squares at one point, with its derivatives.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LeastSquaresPoint {
+    /// `Σ r²`.
+    pub value: f64,
+    /// `Jᵀr`, half the gradient.
+    pub half_gradient: DVector<f64>,
+    /// `JᵀJ`.
+    pub normal: DMatrix<f64>,
+}
+
+/// The matrix that a step takes for half the Hessian.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum HessianModel {
+    /// `JᵀJ`.
+    GaussNewton,
+    /// `JᵀJ + S`.
+    Augmented,
+}
+
+/// A proposed step.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TrustRegionStep {
+    /// The change of every parameter.
+    pub change: DVector<f64>,
+    /// The decrease of the sum of squares that the model predicts.
+    pub predicted: f64,
+}
+
+/// The state of the method between two trials.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TrustRegion {
+    /// The largest length of a step in scaled parameters; `None` before the first one.
+    radius: Option<f64>,
+    /// The scale of every parameter: the root of the largest diagonal entry of `JᵀJ` so far.
+    scales: DVector<f64>,
+    /// `S`.
+    secant: DMatrix<f64>,
+    model: HessianModel,
+}
+
+/// The decrease relative to the predicted one from which a trial is accepted.
+const ACCEPTED: f64 = 1e-4;
+/// Below this ratio the region shrinks, above the other one it grows.
+const POOR: f64 = 0.25;
+const GOOD: f64 = 0.75;
+const GROWTH: f64 = 3.0;
+/// The range of the factor by which a rejected step shrinks the region.
+const SHRINKAGE: [f64; 2] = [0.1, 0.5];
+/// A model is replaced by the other one if that was better by this factor.
+const MODEL_ADVANTAGE: f64 = 1.5;
+/// The smallest scale relative to the largest one.
+const SMALLEST_SCALE: f64 = 1e-8;
+/// The radius relative to the length of the first gradient below which no step is worth taking.
+const SMALLEST_RADIUS: f64 = 1e-12;
+
+impl TrustRegion {
+    /// The method before its first step for `count` parameters.
+    pub fn new(count: usize) -> Self {
+        Self {
+            radius: None,
+            scales: DVector::zeros(count),
+            secant: DMatrix::zeros(count, count),
+            model: HessianModel::GaussNewton,
+        }
+    }
+
+    /// True if the region is so small that no step would change anything.
+    pub fn is_exhausted(&self, point: &LeastSquaresPoint) -> bool {
+        self.radius.is_some_and(|radius| radius <= SMALLEST_RADIUS * point.value.max(0.0).sqrt())
+    }
+
+    /// The step from a point; every parameter may change by the range in `room`. `None` at a
+    /// minimum of the model.
+    pub fn propose(
+        &mut self,
+        point: &LeastSquaresPoint,
+        room: &[[f64; 2]],
+    ) -> Option<TrustRegionStep> {
+        self.update_scales(&point.normal);
+        let radius = *self.radius.get_or_insert(point.value.max(0.0).sqrt());
+        let hessian = self.hessian(point, self.model);
+        let change = self.bounded_step(&hessian, &point.half_gradient, room, radius);
+        let predicted = decrease(&hessian, &point.half_gradient, &change);
+        (predicted > 0.0).then_some(TrustRegionStep { change, predicted })
+    }
+
+    /// The largest decrease that the Gauss-Newton model promises within bounds, however long the
+    /// step.
+    pub fn attainable_decrease(&self, point: &LeastSquaresPoint, room: &[[f64; 2]]) -> f64 {
+        let gradient = &point.half_gradient;
+        let change = self.bounded_step(&point.normal, gradient, room, f64::INFINITY);
+        decrease(&point.normal, gradient, &change)
+    }
+
+    /// The norm of half the gradient in scaled parameters, without those that their range holds.
+    pub fn projected_gradient(&mut self, point: &LeastSquaresPoint, room: &[[f64; 2]]) -> f64 {
+        self.update_scales(&point.normal);
+        let held = |slope: f64, [low, high]: [f64; 2]| {
+            (slope > 0.0 && low >= 0.0) || (slope < 0.0 && high <= 0.0)
+        };
+        let slopes = point.half_gradient.iter().zip(room).zip(self.scales.iter());
+        let square = |((slope, room), scale): ((&f64, &[f64; 2]), &f64)| {
+            if held(*slope, *room) { 0.0 } else { (slope / scale).powi(2) }
+        };
+        slopes.map(square).sum::<f64>().sqrt()
+    }
+
+    /// Takes note of a trial that could not be evaluated.
+    pub fn note_failure(&mut self, step: &TrustRegionStep) {
+        self.radius = Some(SHRINKAGE[1] * self.length(&step.change));
+    }
+
+    /// Takes note of a trial; true if it is accepted.
+    pub fn note_trial(
+        &mut self,
+        step: &TrustRegionStep,
+        from: &LeastSquaresPoint,
+        to: &LeastSquaresPoint,
+    ) -> bool {
+        let decrease = from.value - to.value;
+        let ratio = decrease / step.predicted;
+        let accepted = ratio > ACCEPTED && to.value < from.value;
+        self.choose_model(step, from, decrease);
+        // A rejected trial is too far away to tell the second derivatives here.
+        if accepted {
+            let gradient_change = &to.half_gradient - &from.half_gradient;
+            self.update_secant(&step.change, &gradient_change, &to.normal);
+        }
+        self.update_radius(step, from, ratio, to.value);
+        accepted
+    }
+
+    /// Takes note that the function has changed a little; `shorter` if its steps were too long.
+    pub fn note_other_function(&mut self, shorter: bool) {
+        if let Some(radius) = self.radius.as_mut().filter(|_| shorter) {
+            *radius *= SHRINKAGE[1];
+        }
+    }
+
+    fn hessian(&self, point: &LeastSquaresPoint, model: HessianModel) -> DMatrix<f64> {
+        match model {
+            HessianModel::GaussNewton => point.normal.clone(),
+            HessianModel::Augmented => &point.normal + &self.secant,
+        }
+    }
+
+    fn length(&self, change: &DVector<f64>) -> f64 {
+        change.component_mul(&self.scales).norm()
+    }
+
+    fn update_scales(&mut self, normal: &DMatrix<f64>) {
+        let effects = normal.diagonal().map(|d| d.max(0.0).sqrt());
+        let least = SMALLEST_SCALE * effects.max().max(f64::MIN_POSITIVE.sqrt());
+        self.scales.zip_apply(&effects, |scale, effect| *scale = scale.max(effect).max(least));
+    }
+
+    /// Changes the model if the other one would have predicted the trial better.
+    fn choose_model(&mut self, step: &TrustRegionStep, from: &LeastSquaresPoint, real: f64) {
+        let other = match self.model {
+            HessianModel::GaussNewton => HessianModel::Augmented,
+            HessianModel::Augmented => HessianModel::GaussNewton,
+        };
+        let hessian = self.hessian(from, other);
+        let predicted = decrease(&hessian, &from.half_gradient, &step.change);
+        if MODEL_ADVANTAGE * (real - predicted).abs() < (real - step.predicted).abs() {
+            self.model = other;
+        }
+    }
+
+    /// Corrects `S` so that `(normal + S) change` is the change of half the gradient. `S` is scaled
+    /// down first where it exceeds what was found.
+    fn update_secant(
+        &mut self,
+        change: &DVector<f64>,
+        gradient_change: &DVector<f64>,
+        normal: &DMatrix<f64>,
+    ) {
+        let curvature = change.dot(gradient_change);
+        let limit = 1e-12 * change.norm() * gradient_change.norm();
+        if !(curvature.abs() > limit) || !gradient_change.iter().all(|v| v.is_finite()) {
+            return;
+        }
+        let found = gradient_change - normal * change;
+        let stored = change.dot(&(&self.secant * change));
+        let size = (change.dot(&found) / stored).abs();
+        if size < 1.0 {
+            self.secant *= size;
+        }
+        let missing = found - &self.secant * change;
+        let y = gradient_change / curvature;
+        self.secant.ger(1.0, &missing, &y, 1.0);
+        self.secant.ger(1.0, &y, &missing, 1.0);
+        self.secant.ger(-missing.dot(change), &y, &y, 1.0);
+    }
+
+    fn update_radius(
+        &mut self,
+        step: &TrustRegionStep,
+        from: &LeastSquaresPoint,
+        ratio: f64,
+        value: f64,
+    ) {
+        let length = self.length(&step.change);
+        let radius = self.radius.unwrap_or(length);
+        let radius = if ratio >= GOOD {
+            radius.max(GROWTH * length)
+        } else if ratio >= POOR {
+            radius
+        } else if ratio > 0.0 {
+            SHRINKAGE[1] * length
+        } else {
+            // The minimum of the parabola through the value and slope here and the value there.
+            let slope = 2.0 * from.half_gradient.dot(&step.change);
+            let factor = -0.5 * slope / (value - from.value - slope);
+            let [least, most] = SHRINKAGE;
+            if factor.is_finite() { factor.clamp(least, most) * length } else { least * length }
+        };
+        self.radius = Some(radius);
+    }
+
+    /// The minimum of the model within the trust region and the bounds: the way to the minimum for
+    /// the free parameters is followed to the first bound, where that parameter is fixed, and the
+    /// minimum is found again for the others.
+    fn bounded_step(
+        &self,
+        hessian: &DMatrix<f64>,
+        gradient: &DVector<f64>,
+        room: &[[f64; 2]],
+        radius: f64,
+    ) -> DVector<f64> {
+        let mut change = DVector::zeros(gradient.len());
+        let held = |i: &usize| {
+            let [low, high] = room[*i];
+            (gradient[*i] >= 0.0 && low >= 0.0) || (gradient[*i] <= 0.0 && high <= 0.0)
+        };
+        let mut free: Vec<usize> = (0..gradient.len()).filter(|i| !held(i)).collect();
+        while !free.is_empty() {
+            let target = self.free_minimum(hessian, gradient, &change, &free, radius);
+            let way = |k: usize| target[k] - change[free[k]];
+            let reach = |k: usize| {
+                let [low, high] = room[free[k]];
+                let bound = if way(k) < 0.0 { low } else { high };
+                if way(k) == 0.0 { f64::INFINITY } else { (bound - change[free[k]]) / way(k) }
+            };
+            let first = (0..free.len()).min_by(|a, b| reach(*a).total_cmp(&reach(*b)));
+            let Some((first, fraction)) = first.map(|k| (k, reach(k))).filter(|(_, t)| *t < 1.0)
+            else {
+                free.iter().zip(target.iter()).for_each(|(i, value)| change[*i] = *value);
+                break;
+            };
+            let steps: Vec<f64> = (0..free.len()).map(|k| fraction.max(0.0) * way(k)).collect();
+            free.iter().zip(steps).for_each(|(i, step)| change[*i] += step);
+            free.remove(first);
+        }
+        change
+    }
+
+    /// The values of the free parameters at the minimum of the model within the trust region, the
+    /// others staying where they are.
+    fn free_minimum(
+        &self,
+        hessian: &DMatrix<f64>,
+        gradient: &DVector<f64>,
+        change: &DVector<f64>,
+        free: &[usize],
+        radius: f64,
+    ) -> DVector<f64> {
+        let mut fixed = change.clone();
+        free.iter().for_each(|i| fixed[*i] = 0.0);
+        let remaining = (radius * radius - self.length(&fixed).powi(2)).max(0.0).sqrt();
+        let slope = gradient + hessian * &fixed;
+        let pick =
+            |all: &DVector<f64>| DVector::from_iterator(free.len(), free.iter().map(|i| all[*i]));
+        let scales = pick(&self.scales);
+        let inner = DMatrix::from_fn(free.len(), free.len(), |i, j| {
+            hessian[(free[i], free[j])] / (scales[i] * scales[j])
+        });
+        minimize_in_ball(inner, &pick(&slope).component_div(&scales), remaining)
+            .component_div(&scales)
+    }
+}
+
+/// `-(2 gᵀd + dᵀHd)`.
+fn decrease(hessian: &DMatrix<f64>, half_gradient: &DVector<f64>, change: &DVector<f64>) -> f64 {
+    -(2.0 * half_gradient.dot(change) + change.dot(&(hessian * change)))
+}
+
+/// The minimum of `2 gᵀd + dᵀHd` with `|d| ≤ radius`, by the eigenvectors of `H`; directions without
+/// curvature are left alone if the radius is infinite.
+fn minimize_in_ball(hessian: DMatrix<f64>, gradient: &DVector<f64>, radius: f64) -> DVector<f64> {
+    let SymmetricEigen { eigenvectors, eigenvalues } = SymmetricEigen::new(hessian);
+    let slopes = eigenvectors.tr_mul(gradient);
+    let largest = eigenvalues.amax();
+    let flat = 1e-14 * largest;
+    let step = |shift: f64| {
+        slopes.zip_map(&eigenvalues, |slope, value| {
+            let value = value + shift;
+            if value > flat { -slope / value } else { 0.0 }
+        })
+    };
+    let least = eigenvalues.min();
+    let newton = step(0.0);
+    if least > flat && newton.norm() <= radius || radius == f64::INFINITY {
+        return eigenvectors * newton;
+    }
+    // The length falls with the shift: bisection in its logarithm above the least eigenvalue.
+    let base = (-least).max(0.0);
+    let (mut low, mut high) =
+        (1e-16 * largest, gradient.norm() / radius.max(f64::MIN_POSITIVE) + largest);
+    for _ in 0..200 {
+        let middle = (low * high).sqrt();
+        if step(base + middle).norm() > radius {
+            low = middle;
+        } else {
+            high = middle;
+        }
+        if high <= low * (1.0 + 1e-6) {
+            break;
+        }
+    }
+    let mut found = step(base + high);
+    let missing = radius * radius - found.norm_squared();
+    // The hard case: the gradient has no part along the direction of least curvature.
+    if least < -flat && missing > 0.01 * radius * radius {
+        let lowest = eigenvalues.imin();
+        found[lowest] += if slopes[lowest] > 0.0 { -missing.sqrt() } else { missing.sqrt() };
+    }
+    eigenvectors * found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const WIDE: [f64; 2] = [f64::NEG_INFINITY, f64::INFINITY];
+
+    /// Minimizes residuals with their Jacobian; returns the last point and the number of trials.
+    fn minimize(
+        start: &[f64],
+        room: impl Fn(&DVector<f64>) -> Vec<[f64; 2]>,
+        rows: impl Fn(&DVector<f64>) -> (DVector<f64>, DMatrix<f64>),
+        trials: usize,
+    ) -> (DVector<f64>, f64, usize) {
+        let evaluate = |x: &DVector<f64>| {
+            let (residuals, jacobian) = rows(x);
+            LeastSquaresPoint {
+                value: residuals.norm_squared(),
+                half_gradient: jacobian.tr_mul(&residuals),
+                normal: jacobian.tr_mul(&jacobian),
+            }
+        };
+        let mut x = DVector::from_column_slice(start);
+        let mut point = evaluate(&x);
+        let mut region = TrustRegion::new(x.len());
+        for trial in 0..trials {
+            let Some(step) = region.propose(&point, &room(&x)) else {
+                return (x, point.value, trial);
+            };
+            let there = &x + &step.change;
+            let to = evaluate(&there);
+            if region.note_trial(&step, &point, &to) {
+                (x, point) = (there, to);
+            }
+            if point.half_gradient.norm() < 1e-12 {
+                return (x, point.value, trial);
+            }
+        }
+        (x, point.value, trials)
+    }
+
+    fn rosenbrock(x: &DVector<f64>) -> (DVector<f64>, DMatrix<f64>) {
+        let residuals = DVector::from_vec(vec![10.0 * (x[1] - x[0] * x[0]), 1.0 - x[0]]);
+        (residuals, DMatrix::from_row_slice(2, 2, &[-20.0 * x[0], 10.0, -1.0, 0.0]))
+    }
+
+    #[test]
+    fn it_follows_a_curved_valley() {
+        let (x, value, trials) = minimize(&[-1.2, 1.0], |_| vec![WIDE; 2], rosenbrock, 100);
+        assert!(value < 1e-24 && (x[0] - 1.0).abs() < 1e-11, "{x} {value} after {trials}");
+    }
+
+    #[test]
+    fn it_ends_at_a_bound() {
+        let room = |x: &DVector<f64>| vec![[-5.0 - x[0], 0.5 - x[0]], WIDE];
+        let (x, value, _) = minimize(&[-1.2, 1.0], room, rosenbrock, 100);
+        assert!((x[0] - 0.5).abs() < 1e-12 && (x[1] - 0.25).abs() < 1e-9, "{x}");
+        assert!((value - 0.25).abs() < 1e-12, "{value}");
+    }
+
+    /// Residuals that stay large: the method of Gauss and Newton alone does not converge here.
+    fn brown_dennis(x: &DVector<f64>) -> (DVector<f64>, DMatrix<f64>) {
+        let mut residuals = DVector::zeros(20);
+        let mut jacobian = DMatrix::zeros(20, 4);
+        for i in 0..20 {
+            let t = (i + 1) as f64 / 5.0;
+            let (a, b) = (x[0] + t * x[1] - t.exp(), x[2] + x[3] * t.sin() - t.cos());
+            residuals[i] = a * a + b * b;
+            let row = [2.0 * a, 2.0 * a * t, 2.0 * b, 2.0 * b * t.sin()];
+            row.into_iter().enumerate().for_each(|(j, slope)| jacobian[(i, j)] = slope);
+        }
+        (residuals, jacobian)
+    }
+
+    #[test]
+    fn it_converges_where_residuals_stay_large() {
+        // The minimum by Moré, Garbow, Hillstrom (ACM TOMS 7 (1981) 17), problem 16.
+        let (_, value, trials) =
+            minimize(&[25.0, 5.0, -5.0, -1.0], |_| vec![WIDE; 4], brown_dennis, 60);
+        assert!((value - 85822.2).abs() < 0.1, "{value} after {trials}");
+    }
+
+    #[test]
+    fn a_singular_hessian_and_a_minimum_at_the_start_do_no_harm() {
+        let twins = |x: &DVector<f64>| {
+            let residual = DVector::from_vec(vec![x[0] + x[1] - 1.0]);
+            (residual, DMatrix::from_row_slice(1, 2, &[1.0, 1.0]))
+        };
+        let (x, value, _) = minimize(&[3.0, 0.0], |_| vec![WIDE; 2], twins, 20);
+        assert!(value < 1e-20 && x.iter().all(|v| v.is_finite()), "{x}");
+        let (_, value, trials) = minimize(&[0.5, 0.5], |_| vec![WIDE; 2], twins, 20);
+        assert_eq!((value, trials), (0.0, 0));
+    }
+}
