@@ -70,7 +70,7 @@ pub struct Stopwatch(Instant);
 
 impl Stopwatch {
     /// Starts a stopwatch.
-    #[expect(clippy::disallowed_methods, reason = "measuring is what this floor is for")]
+    #[expect(clippy::disallowed_methods, reason = "measuring is what this module is for")]
     pub fn start() -> Self {
         Self(Instant::now())
     }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use aplanat::effects::{Effect, EffectOverride};
 use aplanat::lens::{Aperture, Edit, Lens, Medium, Object, Parameter, Quantity, Row, Variable};
 use aplanat::merit::{Goal, PupilEdge, Term};
-use aplanat::optimize::{DescentMethod, OptimizationProgress, pareto};
+use aplanat::optimize::{DescentMethod, OptimizationEnd, OptimizationProgress, pareto};
 use aplanat::session::{
     Command, OptimizationRequest, OptimizationSnapshot, ParetoPass, ParetoRun, ParetoView, RunId,
     RunKind, RunStatus, RunView, SessionView,
@@ -189,8 +189,8 @@ fn searching(standing: RunStatus) -> SessionView {
         best: 0.25,
         accepted: 1.0,
         refused,
-        finished: false,
-        end: None,
+        finished: standing == RunStatus::Finished,
+        end: (standing == RunStatus::Finished).then_some(OptimizationEnd::Tolerance),
     };
     let search = OptimizationSnapshot {
         request: Arc::new(task),
@@ -329,6 +329,16 @@ fn a_refused_step_names_parameter_and_ray_counted_as_in_the_table() {
     let harness = optimizer(searching(RunStatus::Running));
     harness.get_by_label("Ray 4 is lost: clipped at surface 3");
     harness.get_by_label("after step 7");
+}
+
+/// The reason stands on a line of its own, so that it does not widen the panel.
+#[test]
+fn a_finished_optimization_says_why_it_ended() {
+    let harness = optimizer(searching(RunStatus::Finished));
+    let reason = "Ended: nothing can be gained at the tolerance of the spots.";
+    let (reason, status) =
+        (harness.get_by_label(reason).rect(), harness.get_by_label("after step 7").rect());
+    assert!(reason.top() >= status.bottom(), "{reason:?} {status:?}");
 }
 
 #[test]

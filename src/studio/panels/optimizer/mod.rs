@@ -128,17 +128,17 @@ pub(super) fn method_menu(ui: &mut Ui, chosen: &mut DescentMethod) {
 fn progress(ui: &mut Ui, view: &SessionView, search: &OptimizationSnapshot) {
     let status = status_text(view.optimization.status);
     let step = search.progress.as_ref().map_or(0, |progress| progress.step);
-    ui.horizontal(|ui| {
+    ui.horizontal_wrapped(|ui| {
         ui.strong(status);
         ui.label(format!("after step {step}"));
-        if let Some(end) = search.progress.as_ref().and_then(|progress| progress.end) {
-            ui.label(end.text());
-        }
         if let (Some(first), Some(last)) = (search.history.first(), search.progress.as_ref()) {
             ui.separator();
             ui.label(format!("merit {:.3e} to {:.3e}", first.current, last.best));
         }
     });
+    if let Some(end) = search.progress.as_ref().and_then(|progress| progress.end) {
+        ui.weak(format!("Ended: {}.", end.text()));
+    }
     ui.label(changes_text(view).join(", ")).on_hover_text(
         "Mean RMS radius of the spots, focal length and mean area of the pupils, of the design \
          and of the optimized lens",
