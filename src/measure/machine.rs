@@ -55,26 +55,30 @@ const TICKS: f64 = 100.0;
 
 /// The milliseconds since the process started, to a hundredth of a second; `None` if unknown.
 pub fn age_ms() -> Option<f64> {
-    let stat = fs::read_to_string("/proc/self/stat").ok()?;
-    // The name in brackets may contain blanks; the start is the 20th number behind it.
-    let (_, numbers) = stat.rsplit_once(')')?;
-    let begun: f64 = numbers.split_whitespace().nth(19)?.parse().ok()?;
+    let [begun] = process_ticks([19])?;
     let uptime = fs::read_to_string("/proc/uptime").ok()?;
     let now: f64 = uptime.split_whitespace().next()?.parse().ok()?;
     Some(1e3 * (now - begun / TICKS))
 }
 
-/// The processor time of all threads that exist now, in milliseconds; `None` if unknown.
+/// The processor time of the process in milliseconds, threads that have ended included, to a
+/// hundredth of a second; `None` if unknown.
 pub fn processor_ms() -> Option<f64> {
-    let mut sum = 0.0;
-    for thread in fs::read_dir("/proc/self/task").ok()? {
-        let path = thread.ok()?.path().join("schedstat");
-        // A thread may have ended since it was listed.
-        let Ok(text) = fs::read_to_string(path) else { continue };
-        let nanoseconds: f64 = text.split_whitespace().next()?.parse().ok()?;
-        sum += 1e-6 * nanoseconds;
+    let [user, system] = process_ticks([11, 12])?;
+    Some(1e3 * (user + system) / TICKS)
+}
+
+/// Numbers of this process by their places behind its name, in clock ticks.
+fn process_ticks<const N: usize>(places: [usize; N]) -> Option<[f64; N]> {
+    let stat = fs::read_to_string("/proc/self/stat").ok()?;
+    // The name in brackets may contain blanks.
+    let (_, numbers) = stat.rsplit_once(')')?;
+    let numbers: Vec<&str> = numbers.split_whitespace().collect();
+    let mut found = [0.0; N];
+    for (value, place) in found.iter_mut().zip(places) {
+        *value = numbers.get(place)?.parse().ok()?;
     }
-    Some(sum)
+    Some(found)
 }
 
 /// The memory of a piece of work, in megabytes.
