@@ -19,6 +19,7 @@ mod grin;
 mod help;
 mod info;
 mod input;
+mod library;
 mod measure;
 mod names;
 mod optimize;
@@ -74,6 +75,7 @@ enum CliCommand {
     Search(Box<search::SearchArgs>),
     Grin(grin::GrinArgs),
     Convert(convert::ConvertArgs),
+    Library(library::LibraryArgs),
     Experiment(experiment::ExperimentArgs),
     Measure(measure::MeasureArgs),
     Help(help::HelpArgs),
@@ -91,6 +93,7 @@ impl CliCommand {
             Self::Search(search) => search.run(output),
             Self::Grin(grin) => grin.run(output),
             Self::Convert(convert) => convert.run(output),
+            Self::Library(library) => library.run(output),
             Self::Experiment(experiment) => experiment.run(output),
             Self::Measure(measure) => measure.run(output),
             Self::Help(help) => help.run(output),

@@ -78,11 +78,18 @@ pub(super) fn or_dash(value: Option<f64>) -> String {
 #[derive(Debug, Default)]
 pub(super) struct TextTable {
     rows: Vec<Vec<String>>,
+    /// Further columns that are aligned to the left.
+    left: &'static [usize],
 }
 
 impl TextTable {
     pub(super) fn new(head: &[&str]) -> Self {
-        Self { rows: vec![head.iter().map(|cell| (*cell).to_owned()).collect()] }
+        Self { rows: vec![head.iter().map(|cell| (*cell).to_owned()).collect()], left: &[] }
+    }
+
+    /// Aligns further columns to the left, which are counted from 0.
+    pub(super) fn left(self, columns: &'static [usize]) -> Self {
+        Self { left: columns, ..self }
     }
 
     pub(super) fn row(&mut self, cells: impl IntoIterator<Item = String>) {
@@ -101,7 +108,7 @@ impl Display for TextTable {
         let widths = self.widths();
         for row in &self.rows {
             let cells = row.iter().zip(&widths).enumerate().map(|(i, (cell, width))| match i {
-                0 => format!("{cell:<width$}"),
+                i if i == 0 || self.left.contains(&i) => format!("{cell:<width$}"),
                 _ => format!("{cell:>width$}"),
             });
             writeln!(f, "{}", cells.collect::<Vec<_>>().join("  ").trim_end())?;

@@ -14,6 +14,7 @@ mod folder;
 mod grayscale;
 mod identity;
 pub mod json;
+mod library;
 mod lock;
 mod probe_rays;
 mod report;
@@ -32,6 +33,10 @@ pub use error::FileError;
 pub use folder::{own_files, stale_files};
 pub use grayscale::{GrayscaleImage, read_grayscale};
 pub use identity::FileIdentity;
+pub use library::{
+    LensScaleError, LibraryLens, LibraryQuery, LibraryQueryError, ShortRange, StatedAperture,
+    StatedField, library_lenses, scale_to_focal_length,
+};
 pub use lock::FileLock;
 pub use report::{ConversionOutcome, ConversionReport, ConversionRow};
 pub use round_trip::RoundTripCheck;

@@ -100,6 +100,7 @@ fn the_embedded_lenses_are_those_of_the_folder() {
     let folder: BTreeSet<String> = std::fs::read_dir("lenses")
         .unwrap()
         .map(|entry| entry.unwrap().file_name().into_string().unwrap())
+        .filter(|name| name.ends_with(".json"))
         .collect();
     assert_eq!(embedded, folder);
     assert_eq!(embedded.len(), bundled_lenses().len());
