@@ -6,7 +6,7 @@ use crate::lens::{
     Aperture, Fields, Lens, Medium, Object, Pickup, Row, Variable, Wavelength, ZoomPosition,
 };
 use serde::de::value::MapAccessDeserializer;
-use serde::de::{Error as _, MapAccess, Visitor};
+use serde::de::{Error as _, MapAccess, Unexpected, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::fmt;
 
@@ -69,8 +69,8 @@ impl<'de> Deserialize<'de> for Lens {
     fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
         let keys = LensJson::deserialize(from)?;
         if keys.aplanat != VERSION {
-            let found = format!("version {}, expected {VERSION}", keys.aplanat);
-            return Err(D::Error::custom(found));
+            let found = Unexpected::Unsigned(keys.aplanat);
+            return Err(D::Error::invalid_value(found, &format!("version {VERSION}").as_str()));
         }
         Ok(Self {
             name: keys.name,
@@ -125,7 +125,7 @@ impl<'de> Visitor<'de> for ObjectVisitor {
         if text == "infinity" {
             Ok(Object::Infinity)
         } else {
-            Err(E::invalid_value(serde::de::Unexpected::Str(text), &self))
+            Err(E::invalid_value(Unexpected::Str(text), &self))
         }
     }
 

@@ -3,7 +3,7 @@
 use super::serialize_numbers;
 use crate::lens::{GradientIndex, Medium, ProfileLaw};
 use serde::de::value::MapAccessDeserializer;
-use serde::de::{Error as _, MapAccess, Visitor};
+use serde::de::{Error as _, MapAccess, Unexpected, Visitor};
 use serde::ser::SerializeMap;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::fmt;
@@ -103,9 +103,9 @@ impl<'de> Visitor<'de> for MediumVisitor {
             (Some(nd), Some(vd), None, None) => Ok(Medium::Model { nd, vd }),
             (None, None, Some(index), None) => Ok(Medium::Index(index)),
             (None, None, None, Some(keys)) => Ok(Medium::Grin(Box::new(keys.into()))),
-            _ => Err(A::Error::custom(
-                "a glass with other keys, expected {\"nd\", \"vd\"}, {\"index\"} or \
-                 {\"gradient\"}",
+            _ => Err(A::Error::invalid_value(
+                Unexpected::Other("a glass with other keys"),
+                &"{\"nd\", \"vd\"}, {\"index\"} or {\"gradient\"}",
             )),
         }
     }

@@ -17,6 +17,7 @@ mod layout;
 mod lens;
 mod medium;
 mod message;
+mod mismatch;
 mod strict;
 mod surface;
 
@@ -24,7 +25,7 @@ pub use layout::pretty;
 
 use super::error::{FileError, ParseError};
 use crate::lens::Lens;
-use serde::de::{DeserializeOwned, IgnoredAny};
+use serde::de::DeserializeOwned;
 use serde::ser::SerializeMap;
 use serde::{Deserialize, Deserializer, Serializer};
 
@@ -62,8 +63,6 @@ pub fn write(lens: &Lens) -> String {
 struct VersionProbe {
     #[serde(default)]
     aplanat: Option<serde_json::Value>,
-    #[serde(flatten)]
-    _rest: IgnoredAny,
 }
 
 impl VersionProbe {
@@ -213,6 +212,32 @@ mod tests {
         );
         assert!(changed("5.5", "1e999").contains("line 7"), "{}", changed("5.5", "1e999"));
         assert!(changed("5.5", "\"NaN\"").contains("string \"NaN\"; expected a number"));
+    }
+
+    #[test]
+    fn a_value_of_another_type_is_named_in_the_words_of_json() {
+        let type_names =
+            ["struct ", "f64", "usize", "sequence", "boolean", "variant", "VersionProbe"];
+        for (from, to, expected) in [
+            ("\"name\": \"Achromat\"", "\"name\": 5", "name: found 5; expected a string"),
+            ("\"stop\": true", "\"stop\": 1", "found 1; expected true or false"),
+            ("[1e-7]", "{}", "asphere: found an object; expected a list"),
+            ("{\"y\": 5.0}", "[5.0]", "found a list; expected an object with its keys"),
+            ("\"y\": 5.0", "\"x\": 1, \"x\": 2", "found the key `x` twice; expected it once"),
+            ("{\"entrance_pupil_diameter\": 16.0}", "5", "expected a name, or an object with one"),
+            ("\"thickness\": 5.5,", "5.5,", "expected JSON (key must be a string"),
+        ] {
+            let text = changed(from, to);
+            assert!(text.contains(expected), "{text}");
+            assert!(!type_names.iter().any(|name| text.contains(name)), "{text}");
+        }
+        for text in ["[]", "5", "null"] {
+            assert!(
+                message(text).contains("expected an object with its keys"),
+                "{}",
+                message(text)
+            );
+        }
     }
 
     #[test]

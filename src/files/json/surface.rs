@@ -4,7 +4,7 @@ use super::medium::is_air;
 use super::required_number;
 use crate::lens::{Medium, Row};
 use serde::de::value::MapAccessDeserializer;
-use serde::de::{Error as _, MapAccess, Visitor};
+use serde::de::{Error, MapAccess, Unexpected, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::fmt;
 
@@ -60,11 +60,12 @@ fn is_false(value: &bool) -> bool {
 
 impl RowJson {
     /// The curvature, from either of the two keys.
-    fn curvature(&self) -> Result<f64, &'static str> {
+    fn curvature<E: Error>(&self) -> Result<f64, E> {
+        let refuse = |found, expected: &str| E::invalid_value(Unexpected::Other(found), &expected);
         match (self.curvature, self.radius) {
-            (Some(_), Some(_)) => Err("both `curvature` and `radius`, expected one of them"),
+            (Some(_), Some(_)) => Err(refuse("both `curvature` and `radius`", "one of them")),
             (None, Some(0.0)) => {
-                Err("a `radius` of 0, expected another number, or none for a plane")
+                Err(refuse("a `radius` of 0", "another number, or none for a plane"))
             }
             (None, Some(radius)) => Ok(1.0 / radius),
             (curvature, None) => Ok(curvature.unwrap_or(0.0)),
@@ -109,7 +110,7 @@ impl<'de> Visitor<'de> for RowVisitor {
     fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<Row, A::Error> {
         let keys = RowJson::deserialize(MapAccessDeserializer::new(map))?;
         Ok(Row {
-            curvature: keys.curvature().map_err(A::Error::custom)?,
+            curvature: keys.curvature()?,
             conic: keys.conic,
             asphere: keys.asphere,
             thickness: keys.thickness,

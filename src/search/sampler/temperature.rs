@@ -99,8 +99,10 @@ impl<'de> Deserialize<'de> for Temperature {
             NumberOrWord::Word(word) if word == "infinite" => Ok(Self(f64::INFINITY)),
             NumberOrWord::Word(word) => Err(format!("`{word}`")),
         };
-        let expected = "expected a temperature, 0 or more, or \"infinite\"";
-        found.map_err(|found| serde::de::Error::custom(format!("found {found}; {expected}")))
+        let expected = "a temperature, 0 or more, or \"infinite\"";
+        found.map_err(|found| {
+            serde::de::Error::invalid_value(serde::de::Unexpected::Other(&found), &expected)
+        })
     }
 }
 
