@@ -12,6 +12,7 @@ mod image_quality;
 mod mtf;
 mod pupil;
 mod ray_layout;
+mod reference_sphere;
 mod semi_diameters;
 mod spot;
 mod spot_points;
@@ -19,17 +20,18 @@ mod wavefront;
 
 pub use distortion::{Distortion, FieldCurvature, distortion, field_curvature};
 pub use fan::{Fan, FanPoint, fan};
-pub use illumination::{Illumination, illumination};
+pub use illumination::{Illumination, energy_irradiance, illumination, irradiance};
 pub use image_quality::{ImageQuality, field_qualities, field_quality, image_quality};
-pub use mtf::{MtfPoint, mtf};
+pub use mtf::{MtfCurve, MtfPoint, TransferValue, geometric_mtf, polychromatic_geometric_mtf};
 pub use pupil::{FieldPupil, PupilExtent, PupilShape, RayLoss, pupil};
 pub use ray_layout::{LayoutRay, RayLayout, ray_layout};
+pub use reference_sphere::ReferenceForm;
 pub use semi_diameters::{
     RimSensitivities, RimSensitivity, mean_rim_sensitivities, rim_sensitivities,
 };
 pub use spot::{MonochromaticSpot, Spot, airy_radius, rounding_error, spot, spots};
 pub use spot_points::{SpotPoints, spot_points};
-pub use wavefront::{Wavefront, path_differences, wavefront};
+pub use wavefront::{PathError, Wavefront, path_differences, wavefront};
 
 use crate::lens::FieldPoint;
 use crate::pupil::{LaunchError, RayModel, Region, RegionKind};

@@ -91,7 +91,7 @@ impl IlluminatedLens {
         let model = RayModel::from_lens(&with_field_angles(design.lens.clone(), &angles), 0);
         let model = model?;
         let light = illumination(&model, model.primary, ACCURACY);
-        *rays += light.iter().map(|field| field.cone.rays).sum::<usize>();
+        *rays += light.iter().map(|field| field.irradiance.rays).sum::<usize>();
         Ok(Self { lens: design.lens.clone(), views, light })
     }
 
@@ -100,19 +100,19 @@ impl IlluminatedLens {
         mean_blur_and_light(&self.views)[0]
     }
 
-    /// The solid angle of the light at a field, projected, in squared direction cosines, and its
-    /// error.
-    fn cone(&self, field: usize) -> [f64; 2] {
-        [self.light[field].cone.value, self.light[field].cone.error]
+    /// The irradiance at the image of a field over the radiance of the white target, and its error.
+    fn irradiance(&self, field: usize) -> [f64; 2] {
+        let Illumination { irradiance, .. } = self.light[field];
+        [irradiance.value, irradiance.error]
     }
 
     fn corner(&self) -> [f64; 2] {
-        self.cone(FIELDS - 1)
+        self.irradiance(FIELDS - 1)
     }
 
     /// The relative illumination of the corner, and its error.
     fn relative(&self) -> [f64; 2] {
-        ratio(self.corner(), self.cone(0))
+        ratio(self.corner(), self.irradiance(0))
     }
 }
 
@@ -123,7 +123,7 @@ fn ratio([a, da]: [f64; 2], [b, db]: [f64; 2]) -> [f64; 2] {
 
 fn claims([biased, unbiased]: &[IlluminatedLens; 2]) -> Vec<Claim> {
     let [corner, corner_error] = ratio(unbiased.corner(), biased.corner());
-    let [axis, axis_error] = ratio(unbiased.cone(0), biased.cone(0));
+    let [axis, axis_error] = ratio(unbiased.irradiance(0), biased.irradiance(0));
     let [relative, relative_error] = unbiased.relative();
     let [gain, gain_error] = ratio([relative, relative_error], biased.relative());
     vec![
@@ -138,18 +138,19 @@ fn claims([biased, unbiased]: &[IlluminatedLens; 2]) -> Vec<Claim> {
 fn table(pair: &[IlluminatedLens; 2]) -> DataTable {
     let columns = [
         "field_deg",
-        "biased_cone",
-        "biased_cone_error",
-        "unbiased_cone",
-        "unbiased_cone_error",
+        "biased_irradiance",
+        "biased_irradiance_error",
+        "unbiased_irradiance",
+        "unbiased_irradiance_error",
         "biased_relative",
         "unbiased_relative",
     ];
     let mut table = DataTable::new("illumination", &columns);
     for field in 0..FIELDS {
-        let cones = pair.each_ref().map(|lit| lit.cone(field));
-        let relative = pair.each_ref().map(|lit| ratio(lit.cone(field), lit.cone(0))[0]);
-        let numbers = [pair[0].light[field].field.y].into_iter().chain(cones.concat());
+        let irradiances = pair.each_ref().map(|lit| lit.irradiance(field));
+        let relative =
+            pair.each_ref().map(|lit| ratio(lit.irradiance(field), lit.irradiance(0))[0]);
+        let numbers = [pair[0].light[field].field.y].into_iter().chain(irradiances.concat());
         table.push_row(numbers.chain(relative).map(Into::into));
     }
     table
@@ -162,14 +163,14 @@ const KINDS: [(&str, Color); 2] =
 /// lenses.
 fn draw(pair: &[IlluminatedLens; 2]) -> Canvas {
     let mut canvas = Canvas::new([1200, 1000]);
-    let brightest = pair.iter().map(|lit| lit.cone(0)[0]).fold(0.0, f64::max);
+    let brightest = pair.iter().map(|lit| lit.irradiance(0)[0]).fold(0.0, f64::max);
     let x = Axis::linear("field, deg", ANGLES);
     let y = Axis::linear("illumination", [0.0, 1.0]);
     let chart = Chart::new([120.0, 190.0], [1140.0, 690.0], x, y);
     chart.draw(&mut canvas, "illumination relative to the brighter axis");
     let mut legend = Legend::new([130.0, 20.0]);
     for (i, ((name, color), lit)) in KINDS.into_iter().zip(pair).enumerate() {
-        let share = |field: usize| lit.cone(field)[0] / brightest;
+        let share = |field: usize| lit.irradiance(field)[0] / brightest;
         let curve: Vec<[f64; 2]> = (0..FIELDS)
             .map(|field| chart.to_pixel([lit.light[field].field.y, share(field)]))
             .collect();

@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use std::sync::OnceLock;
 
 /// The largest number of nodes.
-const LARGEST: usize = 96;
+const LARGEST: usize = 224;
 
 /// Nodes and weights on the interval from 0 to 1.
 pub(super) type GaussRule = Vec<(f64, f64)>;

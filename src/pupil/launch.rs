@@ -7,7 +7,7 @@
 
 use super::field_source::{FieldSource, GRAZING, PupilMap, field_source, paraxial_map};
 use super::ray_aiming::{AimedRay, aim_at};
-use super::ray_model::{Aiming, Channel, Dual2, RayModel};
+use super::ray_model::{Aiming, Channel, Dual2, PupilMeasure, RayModel};
 use crate::lens::{FieldKind, FieldPoint};
 use crate::math::Real;
 use crate::trace::{ImagePoints, Ray, Rays, TracedRay};
@@ -156,6 +156,18 @@ impl<'a> Launch<'a> {
             FieldSource::Point { from, through } => area * (from.z / (through - from.z)).powi(2),
             FieldSource::Slopes { from } => area * from.z * from.z,
         }
+    }
+
+    /// The area of the arriving beam that a unit of pupil coordinates stands for at a point, relative
+    /// to that at the chief ray: the weight of a ray in the measure of the model. It is 1 unless
+    /// every ray is aimed at the stop; 0 if no ray was found that crosses the stop there.
+    pub fn beam_share(&self, p: [f64; 2]) -> f64 {
+        if self.aiming != Aiming::Stop || self.model.measure == PupilMeasure::Coordinates {
+            return 1.0;
+        }
+        let Some([x, y]) = self.dual_ray_coordinates(p) else { return 0.0 };
+        let [[a, b], [c, d]] = self.map.columns;
+        ((x.slope[0] * y.slope[1] - x.slope[1] * y.slope[0]) / (a * d - b * c)).abs()
     }
 
     /// The ray at these pupil coordinates; `None` if none was found that crosses the stop there.

@@ -23,6 +23,17 @@ pub enum Aiming {
     Stop,
 }
 
+/// The measure of integrals over a pupil.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum PupilMeasure {
+    /// Equal areas of the arriving beam weigh alike: the energy of a beam of uniform irradiance.
+    #[default]
+    ArrivingBeam,
+    /// Equal areas of pupil coordinates weigh alike. It differs from the arriving beam only where
+    /// every ray is aimed at the stop, and serves comparison with tables made so.
+    Coordinates,
+}
+
 /// The reason why a lens cannot be traced.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum RayModelError {
@@ -81,6 +92,8 @@ pub struct RayModel {
     pub aiming: Aiming,
     /// What is left out: part of the errors of results.
     pub neglected: Neglected,
+    /// The measure of integrals over a pupil.
+    pub measure: PupilMeasure,
 }
 
 impl RayModel {
@@ -130,6 +143,7 @@ impl RayModel {
             first_order: first,
             aiming,
             neglected: Neglected::default(),
+            measure: PupilMeasure::default(),
         })
     }
 

@@ -19,6 +19,7 @@ mod grin_limits;
 mod grin_views;
 mod grin_wrong;
 mod hard_cases;
+mod images;
 mod lens_library;
 mod library;
 mod merit;

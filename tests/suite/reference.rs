@@ -4,7 +4,7 @@ use aplanat::lens::{
     ASPHERE_TERMS, Aperture, FieldKind, FieldPoint, Object, Shape, Surface, System,
 };
 use aplanat::paraxial::Beam;
-use aplanat::pupil::{Aiming, RayModel};
+use aplanat::pupil::{Aiming, PupilMeasure, RayModel};
 use serde_json::Value;
 use std::path::PathBuf;
 
@@ -130,7 +130,9 @@ impl Reference {
 
     fn with_fields(&self, model: RayModel) -> RayModel {
         let field = |y: f64| FieldPoint { x: 0.0, y, weight: 1.0 };
-        RayModel { fields: self.fields().into_iter().map(field).collect(), ..model }
+        // The file weighs the coordinates of its pupils alike.
+        let measure = PupilMeasure::Coordinates;
+        RayModel { fields: self.fields().into_iter().map(field).collect(), measure, ..model }
     }
 
     /// The lens at a wavelength, clipped by nothing.

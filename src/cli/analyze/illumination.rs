@@ -1,7 +1,7 @@
 //! The illumination of the fields.
 
 use super::{AnalysisRun, AtField, SelectedField, TextLines, estimate_text};
-use crate::analysis::{Estimate, Illumination, illumination};
+use crate::analysis::{Estimate, Illumination, energy_irradiance, illumination};
 use crate::lens::FieldPoint;
 use crate::measure::time_ms;
 use crate::pupil::RayModel;
@@ -10,8 +10,13 @@ use serde::Serialize;
 /// The light at a field; a field without light has 0 and the reason.
 #[derive(Serialize)]
 pub(super) struct IlluminationJson {
-    cone: Estimate,
+    irradiance: Estimate,
     relative: Option<Estimate>,
+    /// The irradiance from the energy of the field element.
+    energy: Option<Estimate>,
+    point: [f64; 2],
+    cone: Estimate,
+    relative_cone: Option<Estimate>,
     #[serde(skip_serializing_if = "Option::is_none")]
     dark: Option<String>,
 }
@@ -27,32 +32,44 @@ pub(super) fn illuminations(run: &AnalysisRun) -> Vec<AtField<IlluminationJson>>
     let dark = results.iter().all(|light| light.error.is_some());
     let found = |(field, light): (&SelectedField, &Illumination)| match light.error {
         Some(why) if dark => AtField::new(field, Err(why)),
-        _ => keys(field, light, ms),
+        _ => keys(run, field, light, ms),
     };
     run.fields.iter().zip(&results[skipped..]).map(found).collect()
 }
 
 fn keys(
+    run: &AnalysisRun,
     field: &SelectedField,
     light: &Illumination,
     milliseconds: f64,
 ) -> AtField<IlluminationJson> {
-    let milliseconds = Some(milliseconds);
+    let timed = |estimate, milliseconds| Estimate { milliseconds: Some(milliseconds), ..estimate };
+    let primary = run.model.primary;
+    let (energy, energy_ms) =
+        time_ms(|| energy_irradiance(&run.model, field.traced, primary, run.accuracy));
     let keys = IlluminationJson {
-        cone: Estimate { milliseconds, ..light.cone },
-        relative: light.relative.map(|e| Estimate { milliseconds, ..e }),
+        irradiance: timed(light.irradiance, milliseconds),
+        relative: light.relative.map(|e| timed(e, milliseconds)),
+        energy: energy.ok().map(|e| timed(e, energy_ms)),
+        point: light.point,
+        cone: timed(light.cone, milliseconds),
+        relative_cone: light.relative_cone.map(|e| timed(e, milliseconds)),
         dark: light.error.map(|dark| dark.to_string()),
     };
     AtField::new(field, Ok(keys))
 }
 
 impl TextLines for IlluminationJson {
-    const TITLE: &'static str = "illumination at the primary wavelength: area of the cone in direction cosines, and \
-         against the first field";
+    const TITLE: &'static str = "illumination at the primary wavelength: irradiance at the centroid \
+         of the spot over the radiance of a uniform scene, and against the first field; the cone is \
+         that of the rays of one field";
 
     fn lines(&self) -> Vec<String> {
-        let mut lines = vec![estimate_text("cone", &self.cone)];
+        let mut lines = vec![estimate_text("irradiance", &self.irradiance)];
         lines.extend(self.relative.iter().map(|e| estimate_text("relative", e)));
+        lines.extend(self.energy.iter().map(|e| estimate_text("by energy", e)));
+        lines.push(estimate_text("cone", &self.cone));
+        lines.extend(self.relative_cone.iter().map(|e| estimate_text("relative cone", e)));
         lines.extend(self.dark.clone());
         lines
     }

@@ -26,5 +26,7 @@ pub use moments::PupilMoments;
 pub use nodes::Nodes;
 pub(super) use nodes::RadialLine;
 pub use outline::{OutlineSide, PupilOutline};
-pub use quadrature::{Accuracy, ConvergedValues, TracedNodes, converge};
+pub use quadrature::{
+    Accuracy, ConvergedList, ConvergedValues, TracedNodes, converge, converge_list,
+};
 pub use traced_pupil::TracedPupil;

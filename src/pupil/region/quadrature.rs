@@ -43,9 +43,10 @@ pub struct ConvergedValues<const K: usize> {
 }
 
 /// The numbers of nodes along the radius and along half a turn, for the clear disc.
-const CLEAR_ORDERS: [usize; 16] = [3, 4, 5, 6, 7, 8, 10, 12, 16, 20, 24, 32, 40, 48, 64, 80];
+const CLEAR_ORDERS: [usize; 19] =
+    [3, 4, 5, 6, 7, 8, 10, 12, 16, 20, 24, 32, 40, 48, 64, 80, 112, 144, 192];
 /// The numbers of nodes along an arc and along the radius, for a pupil with a boundary.
-const STAR_ORDERS: [(usize, usize); 12] = [
+const STAR_ORDERS: [(usize, usize); 15] = [
     (4, 3),
     (6, 4),
     (8, 5),
@@ -58,6 +59,9 @@ const STAR_ORDERS: [(usize, usize); 12] = [
     (56, 28),
     (72, 40),
     (96, 56),
+    (112, 80),
+    (144, 112),
+    (192, 144),
 ];
 /// The number of points of the lowest order for an irregular pupil, sampled by a low-discrepancy
 /// sequence.
@@ -187,7 +191,7 @@ impl Region<'_> {
             match self.launch.ray(*p) {
                 Some(ray) => {
                     rays.push(ray);
-                    landed.weights.push(*weight);
+                    landed.weights.push(*weight * self.launch.beam_share(*p));
                 }
                 None => landed.lost += 1,
             }
@@ -225,6 +229,19 @@ fn sampling_error(change: f64, error_before: f64) -> f64 {
     (2.0 * change).max(least)
 }
 
+/// A list of converged numbers with their errors and their cost.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ConvergedList {
+    /// The numbers at the highest order used.
+    pub values: Vec<f64>,
+    /// The change of each by the last raising of the order.
+    pub errors: Vec<f64>,
+    /// The number of rays traced.
+    pub rays: usize,
+    /// True if the errors are within the tolerance; otherwise the orders or the rays ran out.
+    pub converged: bool,
+}
+
 /// Raises the order until each of some numbers changes by less than the tolerance times its scale;
 /// `None` if no light gets through. `numbers` computes them from nodes, `scales` gives the scale of
 /// each.
@@ -234,32 +251,54 @@ pub fn converge<const K: usize>(
     mut numbers: impl FnMut(&Nodes) -> Option<[f64; K]>,
     scales: impl Fn(&[f64; K]) -> [f64; K],
 ) -> Option<ConvergedValues<K>> {
+    let array = |list: &[f64]| -> [f64; K] { std::array::from_fn(|k| list[k]) };
+    let numbers = |nodes: &Nodes| numbers(nodes).map(|values| values.to_vec());
+    let found = converge_list(region, accuracy, numbers, |list| scales(&array(list)).to_vec())?;
+    let ConvergedList { values, errors, rays, converged } = found;
+    Some(ConvergedValues { values: array(&values), errors: array(&errors), rays, converged })
+}
+
+/// The same for a list of numbers, all from the same rays.
+pub fn converge_list(
+    region: &Region<'_>,
+    accuracy: Accuracy,
+    mut numbers: impl FnMut(&Nodes) -> Option<Vec<f64>>,
+    scales: impl Fn(&[f64]) -> Vec<f64>,
+) -> Option<ConvergedList> {
     let mut rays = region.rays;
-    let mut before: Option<ConvergedValues<K>> = None;
+    let mut before: Option<ConvergedList> = None;
     for order in 0..region.orders() {
         let nodes = region.nodes(order);
         let cost = nodes.points.len() + nodes.rays;
-        let has_error = before.is_some_and(|b| b.errors.iter().all(|e| e.is_finite()));
+        let has_error = before.as_ref().is_some_and(|b| b.errors.iter().all(|e| e.is_finite()));
         if has_error && rays + cost > accuracy.max_rays {
             break;
         }
         rays += cost;
         let Some(values) = numbers(&nodes) else { continue };
-        let mut now =
-            ConvergedValues { values, errors: [f64::INFINITY; K], rays, converged: false };
-        if let Some(before) = before {
-            let scales = scales(&values);
-            now.errors = std::array::from_fn(|k| (values[k] - before.values[k]).abs());
-            if matches!(region.kind, RegionKind::Irregular { annulus: None, .. }) {
-                now.errors =
-                    std::array::from_fn(|k| sampling_error(now.errors[k], before.errors[k]));
-            }
-            now.converged = (0..K).all(|k| now.errors[k] <= accuracy.tolerance * scales[k].abs());
-        }
-        if now.converged {
+        let errors = before.map_or_else(
+            || vec![f64::INFINITY; values.len()],
+            |last| last.changes(region, &values),
+        );
+        let allowed = scales(&values).into_iter().map(|scale| accuracy.tolerance * scale.abs());
+        let converged = errors.iter().zip(allowed).all(|(error, allowed)| *error <= allowed);
+        let now = ConvergedList { values, errors, rays, converged };
+        if converged {
             return Some(now);
         }
         before = Some(now);
     }
     before
+}
+
+impl ConvergedList {
+    /// The errors of the numbers at the next order, from their changes.
+    fn changes(&self, region: &Region<'_>, values: &[f64]) -> Vec<f64> {
+        let sampled = matches!(region.kind, RegionKind::Irregular { annulus: None, .. });
+        let change = |k: usize| (values[k] - self.values[k]).abs();
+        let error = |k: usize| {
+            if sampled { sampling_error(change(k), self.errors[k]) } else { change(k) }
+        };
+        (0..values.len()).map(error).collect()
+    }
 }

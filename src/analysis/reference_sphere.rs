@@ -1,0 +1,171 @@
+//! The reference sphere: where paths are compared, and where the light of a pupil is counted.
+//!
+//! The sphere lies about the image point of the chief ray and goes through the centre of the paraxial
+//! exit pupil (Welford, *Aberrations of Optical Systems*, 1986, section 7.2). With `off` the image
+//! point of a ray from the centre `C`, `d` its direction, `a = off·d`, `b² = off² − a²` and σ = 1 for
+//! a sphere in front of the image, −1 behind it, the ray leaves the image point for the sphere at
+//! `−a + σ b²/(R + √(R² − b²))` beyond the chief ray: no difference of two radii. Its point `Q` of
+//! the sphere has the direction cosines `(C − Q)/σR = (d √(R² − b²) + σ(a d − off))/R`. For an exit
+//! pupil at infinity they are those of the ray, and the path is `−a`.
+
+use super::AnalysisError;
+use crate::math::{Real, Vec3};
+use crate::pupil::{Launch, Region};
+use crate::trace::{Ray, TraceSink as _};
+use serde::Serialize;
+
+/// The form of a reference sphere.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ReferenceForm {
+    /// A sphere with this radius in mm through the centre of the paraxial exit pupil, positive if it
+    /// lies in front of the image.
+    ExitPupil(f64),
+    /// A sphere with this radius in mm, ten focal lengths, in place of one through an exit pupil so
+    /// near the image that rays miss it.
+    Replaced(f64),
+    /// A sphere of infinite radius: the exit pupil is at infinity.
+    Infinite,
+    /// A plane across the chief ray: the lens is afocal.
+    Plane,
+}
+
+/// The reference sphere of a field, with the chief ray that ends at its centre.
+#[derive(Debug, Clone)]
+pub(super) struct ReferenceSphere {
+    pub(super) center: Vec3<f64>,
+    direction: Vec3<f64>,
+    path: f64,
+    pub(super) form: ReferenceForm,
+    index: f64,
+    /// The wavelength, in mm.
+    pub(super) wavelength: f64,
+}
+
+/// A ray on the reference sphere.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct SphereRay<R> {
+    /// The path difference from the chief ray, in wavelengths.
+    pub(super) waves: R,
+    /// The direction cosines across the axis of the line from its point of the sphere to the centre.
+    pub(super) cosines: [R; 2],
+}
+
+/// A sphere closer to the image than this many errors of its rays is replaced.
+const CLEAR_OF_RAYS: f64 = 4.0;
+/// The radius of the sphere in its place, in focal lengths.
+const REPLACED: f64 = 10.0;
+
+impl ReferenceSphere {
+    /// The sphere of a launch about the image point of its chief ray.
+    pub(super) fn new(launch: &Launch<'_>) -> Option<Self> {
+        Self::about(launch, [0.0, 0.0])
+    }
+
+    /// The sphere of a pupil: about the image point of the chief ray, or of the ray at the centroid
+    /// of the pupil if the chief ray is lost; away from the image if the exit pupil lies there.
+    pub(super) fn for_region(region: &Region<'_>) -> Result<Self, AnalysisError> {
+        let nodes = region.nodes(1.min(region.orders().saturating_sub(1)));
+        let (launched, landed) = region.launch.trace_points(&nodes.points);
+        let lit: Vec<usize> =
+            (0..launched.len()).filter(|ray| landed.fate(*ray).is_imaged()).collect();
+        let centroid = || {
+            let weight = |ray: &usize| nodes.weights[launched[*ray]];
+            let total: f64 = lit.iter().map(weight).sum();
+            let mean = |i: usize| {
+                let part = |ray: &usize| weight(ray) * nodes.points[launched[*ray]][i] / total;
+                lit.iter().map(part).sum()
+            };
+            [if nodes.mirrored { 0.0 } else { mean(0) }, mean(1)]
+        };
+        let sphere = Self::new(&region.launch).or_else(|| Self::about(&region.launch, centroid()));
+        let mut sphere = sphere.ok_or(AnalysisError::NoChief)?;
+        let off = |ray: &usize| {
+            (landed.x[*ray] - sphere.center.x).hypot(landed.y[*ray] - sphere.center.y)
+        };
+        let farthest = lit.iter().map(off).fold(0.0, f64::max);
+        sphere.keep_clear_of(farthest, &region.launch);
+        Ok(sphere)
+    }
+
+    fn about(launch: &Launch<'_>, p: [f64; 2]) -> Option<Self> {
+        let chief = launch.unclipped_landing(p)?;
+        let path = launch.optical_path_to(launch.ray(p)?) + chief.opl.value;
+        let system = &launch.channel().system;
+        let (center, direction) = (chief.ray.point.value(), chief.ray.direction.value());
+        let last = system.surfaces.len().checked_sub(2)?;
+        let first_order = &launch.model.first_order;
+        let form = match (first_order.efl, first_order.exit_pupil.position) {
+            (None, _) => ReferenceForm::Plane,
+            (Some(_), None) => ReferenceForm::Infinite,
+            (Some(_), Some(z)) => {
+                let away = center - Vec3::new(0.0, 0.0, z - system.surfaces[last].thickness);
+                let sense = if away.z * direction.z < 0.0 { -1.0 } else { 1.0 };
+                ReferenceForm::ExitPupil(sense * away.dot(away).sqrt())
+            }
+        };
+        let index = system.surfaces[last].index;
+        let wavelength = launch.channel().um * 1e-3;
+        Some(Self { center, direction, path, form, index, wavelength })
+    }
+
+    /// Replaces a sphere that rays with errors up to `farthest` may miss.
+    fn keep_clear_of(&mut self, farthest: f64, launch: &Launch<'_>) {
+        if let ReferenceForm::ExitPupil(radius) = self.form
+            && radius.abs() < CLEAR_OF_RAYS * farthest
+        {
+            let focal = launch.model.first_order.efl.unwrap_or(1.0).abs();
+            self.form = ReferenceForm::Replaced(REPLACED * focal.max(farthest));
+        }
+    }
+
+    /// The same sphere with twice the radius; the same one if that is infinite.
+    pub(super) fn doubled(&self) -> Self {
+        let form = match self.form {
+            ReferenceForm::ExitPupil(radius) => ReferenceForm::ExitPupil(2.0 * radius),
+            ReferenceForm::Replaced(radius) => ReferenceForm::Replaced(2.0 * radius),
+            ReferenceForm::Infinite | ReferenceForm::Plane => self.form,
+        };
+        Self { form, ..self.clone() }
+    }
+
+    /// A ray at the image on the sphere, from its optical path up to the image; `None` if it misses
+    /// the sphere.
+    #[inline(always)]
+    pub(super) fn project<R: Real>(&self, ray: Ray<R>, path: R) -> Option<SphereRay<R>> {
+        let off = ray.point - Vec3::from_f64(self.center);
+        let d = ray.direction;
+        let a = off.dot(d);
+        let (beyond, to_center) = match self.form {
+            ReferenceForm::ExitPupil(signed) | ReferenceForm::Replaced(signed) => {
+                let (radius, sense) = (R::from_f64(signed.abs()), R::from_f64(signed.signum()));
+                let square = off.dot(off) - a * a;
+                let rest = radius * radius - square;
+                if !(rest >= R::ZERO) {
+                    return None;
+                }
+                let root = rest.sqrt();
+                let scale = R::ONE / radius;
+                let cosines = d * (root * scale) + (d * a - off) * (sense * scale);
+                (sense * square / (radius + root) - a, cosines)
+            }
+            ReferenceForm::Infinite => (-a, d),
+            ReferenceForm::Plane => {
+                let chief = Vec3::from_f64(self.direction);
+                (-(off.dot(chief) / d.dot(chief)), d)
+            }
+        };
+        let difference = R::from_f64(self.path) - path - R::from_f64(self.index) * beyond;
+        let waves = difference * R::from_f64(1.0 / self.wavelength);
+        Some(SphereRay { waves, cosines: [to_center.x, to_center.y] })
+    }
+
+    /// The rounding error of a path, in wavelengths.
+    pub(super) fn rounding(&self) -> f64 {
+        let radius = match self.form {
+            ReferenceForm::ExitPupil(radius) | ReferenceForm::Replaced(radius) => radius.abs(),
+            ReferenceForm::Infinite | ReferenceForm::Plane => 0.0,
+        };
+        8.0 * f64::EPSILON * self.path.abs().max(radius) / self.wavelength
+    }
+}
