@@ -48,7 +48,8 @@ pub(super) struct OptimizeArgs {
     #[arg(long, value_enum, value_delimiter = ',', value_name = "KINDS")]
     vary: Vec<ParameterKind>,
 
-    /// The merit function, as JSON; absent: sharp spots at the present focal length
+    /// The merit function, as JSON; absent: that of the lens file, or else sharp spots at the
+    /// present focal length
     #[arg(long, value_name = "FILE")]
     goal: Option<PathBuf>,
 
@@ -119,7 +120,7 @@ impl OptimizeArgs {
     fn goal(&self, lens: &Lens) -> Result<Goal, GoalError> {
         match &self.goal {
             Some(path) => input::read_json(path).map_err(GoalError::Failure),
-            None => Goal::default_for(lens).map_err(GoalError::Merit),
+            None => Goal::of_lens(lens).map_err(GoalError::Merit),
         }
     }
 

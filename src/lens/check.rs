@@ -1,6 +1,6 @@
 //! Checks of a lens as written, before anything is computed from it.
 
-use super::{Aperture, FieldKind, Lens, Medium, MediumPlace, Object};
+use super::{Aperture, FieldKind, Goal, Lens, Medium, MediumPlace, Object};
 use super::{Parameter, Quantity, Row, SurfaceNumber, SystemError};
 use crate::lens::glass;
 use crate::math::format_short;
@@ -78,7 +78,7 @@ fn suggestion(similar: &[String]) -> String {
     }
 }
 
-fn check_number(
+pub(super) fn check_number(
     what: impl fmt::Display,
     found: f64,
     right: bool,
@@ -111,7 +111,8 @@ impl Lens {
         self.check_fields()?;
         self.check_zoom()?;
         self.check_variables()?;
-        self.check_pickups()
+        self.check_pickups()?;
+        self.merit.as_ref().map_or(Ok(()), Goal::check_numbers)
     }
 
     fn check_stop(&self) -> Result<(), LensError> {

@@ -12,6 +12,7 @@ mod diff;
 mod edit;
 mod geometry;
 pub mod glass;
+mod goal;
 mod grin;
 mod parameter;
 mod resolve;
@@ -27,6 +28,7 @@ pub use crate::grin::field::{
 pub use check::LensError;
 pub use diff::added_glass;
 pub use edit::{Edit, EditError, EditedCell, apply_edit};
+pub use goal::{Goal, PupilEdge, Term, WeightedTerm};
 pub use grin::{GradientIndex, ParaxialGrin};
 pub use parameter::{Parameter, Quantity};
 pub use resolve::paraxial_image_distance;
@@ -70,6 +72,8 @@ pub struct Lens {
     /// The displacement in mm of the image plane from the paraxial image, to which the last
     /// thickness is solved; `None` if the last thickness is as written.
     pub image_solve: Option<f64>,
+    /// The merit function; `None` for the one that the program proposes.
+    pub merit: Option<Goal>,
 }
 
 /// The position of the object.
@@ -331,5 +335,6 @@ pub fn blank() -> Lens {
         variables: Vec::new(),
         pickups: Vec::new(),
         image_solve: None,
+        merit: None,
     }
 }

@@ -60,6 +60,14 @@ pub struct LensFigures {
 }
 
 impl Goal {
+    /// The merit function of a lens: its own, or else the default one.
+    ///
+    /// # Errors
+    /// As [`Goal::default_for`].
+    pub fn of_lens(lens: &Lens) -> Result<Self, MeritError> {
+        lens.merit.clone().map_or_else(|| Self::default_for(lens), Ok)
+    }
+
     /// The default goal for a lens: sharp spots at its focal length and with its light, thicknesses
     /// of glass and air that can be manufactured or are no smaller than they are, and a track at
     /// most a fifth longer than it is.

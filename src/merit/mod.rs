@@ -22,9 +22,9 @@ mod sampling;
 mod spot;
 mod sum;
 
+pub use crate::lens::{Goal, PupilEdge, Term, WeightedTerm};
 pub use constraints::{ConstraintMargin, constraint_margins};
 pub use defaults::{GoalLimits, LensFigures, MAX_STEEPNESS, default_terms};
-pub use goal::{Goal, PupilEdge, Term, WeightedTerm};
 pub use sampling::SpotSampling;
 
 use crate::lens::{Lens, LensError, SurfaceNumber, Variable};

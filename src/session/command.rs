@@ -109,6 +109,12 @@ pub enum Command {
     ClearMessages,
 }
 
+impl From<StructureSearchCommand> for Command {
+    fn from(command: StructureSearchCommand) -> Self {
+        Self::StructureSearch(command)
+    }
+}
+
 impl From<Edit> for Command {
     fn from(edit: Edit) -> Self {
         Self::Edit(edit)

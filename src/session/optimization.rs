@@ -92,6 +92,11 @@ impl OptimizationEngine {
         };
         Ok(Self { optimizer, state, stride: 1 })
     }
+
+    /// A lens with the merit function that it was optimized for.
+    fn with_goal(&self, lens: &Lens) -> Lens {
+        Lens { merit: Some(self.state.request.goal.clone()), ..lens.clone() }
+    }
 }
 
 impl Engine for OptimizationEngine {
@@ -131,8 +136,8 @@ impl Engine for OptimizationEngine {
 
     fn snapshot(&mut self) -> OptimizationSnapshot {
         OptimizationSnapshot {
-            best: Arc::new(self.optimizer.best().clone()),
-            current: Arc::new(self.optimizer.current().clone()),
+            best: Arc::new(self.with_goal(self.optimizer.best())),
+            current: Arc::new(self.with_goal(self.optimizer.current())),
             best_terms: self.optimizer.terms().unwrap_or_default(),
             ..self.state.clone()
         }

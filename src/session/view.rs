@@ -9,6 +9,7 @@ use super::run::RunView;
 use super::score::ScoredLens;
 use super::structure_search::StructureSearchView;
 use crate::lens::{Lens, blank};
+use crate::merit::Goal;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -48,6 +49,9 @@ pub struct SessionView {
     pub redo: Option<String>,
     /// The file of the design; `None` if it was never saved.
     pub path: Option<PathBuf>,
+    /// The merit function of the design: its own, or else the one that was proposed when the design
+    /// was opened; `None` if none can be proposed for it.
+    pub goal: Option<Arc<Goal>>,
     /// True if the design differs from its file.
     pub dirty: bool,
     /// The settings of the analyses.
@@ -74,6 +78,7 @@ impl Default for SessionView {
             undo: None,
             redo: None,
             path: None,
+            goal: None,
             dirty: false,
             settings: AnalysisSettings::default(),
             selected: None,

@@ -219,9 +219,14 @@ fn optimize_requests_a_run_with_the_terms_of_the_panel() {
     harness.run();
     harness.get_by_label("Optimize").click();
     harness.run();
-    let [Command::Optimize { method, goal }] = harness.state().commands.as_slice() else {
-        panic!("{:?}", harness.state().commands);
+    let commands = harness.state().commands.as_slice();
+    let [Command::Edit(first), Command::Edit(second), Command::Optimize { method, goal }] =
+        commands
+    else {
+        panic!("{commands:?}");
     };
+    assert!(matches!(first, Edit::SetMerit(Some(written)) if written.terms[0].weight == 3.0));
+    assert_eq!(*second, Edit::SetMerit(Some(goal.clone())), "the design has what is optimized");
     assert_eq!(*method, DescentMethod::TrustRegion);
     assert_eq!(goal.terms[0].weight, 3.0);
     assert!(goal.terms.iter().all(|weighted| weighted.term.name() != "focal_length"));
@@ -253,7 +258,9 @@ fn a_light_term_is_added_in_a_few_clicks() {
     press(&mut harness, "Optimize");
     let commands = &harness.state().commands;
     assert!(commands.contains(&Command::LimitByStop));
-    let [Edit::SetVariables(freed)] = edits(commands)[..] else { panic!("{commands:?}") };
+    let [Edit::SetMerit(_), Edit::SetVariables(freed)] = edits(commands)[..] else {
+        panic!("{commands:?}")
+    };
     let rims = freed.iter().filter(|v| v.parameter.quantity == Quantity::SemiDiameter).count();
     assert_eq!(rims, double_gauss().surfaces.len());
     let goal = goal_of(commands);

@@ -275,14 +275,16 @@ fn a_retained_lens_is_compared_pinned_accepted_and_exported() {
     harness.get_by_label_contains("Click a lens or a mark");
     harness.get_by_label_contains("Lens 1: 10 µm, 90 mm², 6 elements").click();
     harness.run();
-    let preview = Command::Preview(Some(Box::new(Lens::clone(&other(1)))));
-    assert_eq!(harness.state().commands, [preview]);
+    let lens = Box::new(Lens::clone(&other(1)));
+    let choose = StructureSearchCommand::Choose { number: 1, lens: lens.clone() };
+    let preview = Command::Preview(Some(lens));
+    assert_eq!(harness.state().commands, [choose.clone().into(), preview]);
     harness.get_by_label_contains("Lens 1: RMS 50 to 10 µm (-80 %), light 90 to 90 mm² (0 %)");
     for button in ["Pin", "Take", "Export…"] {
         press(&mut harness, button);
     }
     let pin = StructureSearchCommand::Control(SteerCommand::Pin(1));
-    assert_eq!(asked(&harness), [pin, StructureSearchCommand::Accept(1)]);
+    assert_eq!(asked(&harness), [choose.clone(), pin, StructureSearchCommand::Accept(1)]);
     assert_eq!(harness.state().requests, [FileRequest::ExportSearchLens(1)]);
     press(&mut harness, "Back to the design");
     assert_eq!(harness.state().commands.last(), Some(&Command::Preview(None)));
@@ -296,7 +298,7 @@ fn a_retained_lens_is_compared_pinned_accepted_and_exported() {
     harness.get_by_label_contains("Lens 1, pinned: 10 µm").click();
     harness.run();
     press(&mut harness, "Unpin");
-    assert_eq!(asked(&harness), [StructureSearchCommand::Control(SteerCommand::Unpin)]);
+    assert_eq!(asked(&harness), [choose, StructureSearchCommand::Control(SteerCommand::Unpin)]);
 }
 
 #[test]
@@ -361,4 +363,35 @@ fn without_a_search_the_panel_names_what_is_missing() {
         .map(|bundled| files::parse(bundled.text.as_bytes(), bundled.name).unwrap().lens);
     let zoom = zooms.into_iter().find(|lens| lens.zoom_positions() > 1).unwrap();
     panel(view_of(zoom)).get_by_label_contains("A zoom lens");
+}
+
+#[test]
+fn a_card_that_was_clicked_stays_the_lens_that_was_clicked() {
+    let mut view = searching(RunStatus::Running);
+    let mut run =
+        StructureSearchSnapshot::clone(view.structure_search.run.snapshot.as_ref().unwrap());
+    let descending = |merit: f64| {
+        let mut lens = Lens::clone(&other(0));
+        lens.surfaces[0].thickness += merit;
+        let lens = Arc::new(lens);
+        Arc::new(FoundLens { lens, score: None, ..FoundLens::clone(&found(0, merit)) })
+    };
+    run.best = descending(0.01);
+    let clicked = Arc::clone(&run.best.lens);
+    view.structure_search.run.snapshot = Some(Arc::new(run.clone()));
+    let mut harness = panel(view);
+    harness.get_by_label_contains("Lens 0: 50 µm");
+    harness.get_by_label_contains("Lens 0, best so far: 6 elements, 0.01").click();
+    harness.run();
+    run.best = descending(0.005);
+    harness.state_mut().view.structure_search.run.snapshot = Some(Arc::new(run));
+    harness.run();
+    press(&mut harness, "Take");
+    let chosen = asked(&harness);
+    let [StructureSearchCommand::Choose { number: 0, lens }, StructureSearchCommand::Accept(0)] =
+        chosen.as_slice()
+    else {
+        panic!("{chosen:?}");
+    };
+    assert_eq!(**lens, *clicked, "neither the start nor the lens of a moment later");
 }

@@ -495,6 +495,36 @@ fn optimize_aims_at_a_goal() {
 }
 
 #[test]
+fn optimize_uses_the_merit_function_of_the_file() {
+    let mut lens: Value = serde_json::from_str(&std::fs::read_to_string(LENS).unwrap()).unwrap();
+    lens["merit"] = json!({"terms": [{"term": {"focal_length": 52.0}, "weight": 1.0}]});
+    let (file, out) =
+        (Scratch::with("merit.json", &lens.to_string()), Scratch::new("merit-out.json"));
+    done(&["optimize", file.path(), "--out", out.path(), "--vary", "curvatures"], "");
+    let efl = done_json(&["info", out.path()], "")["efl"].as_f64().unwrap();
+    assert!((efl - 52.0).abs() < 1e-3, "{efl}");
+    let saved: Value = serde_json::from_str(&std::fs::read_to_string(out.path()).unwrap()).unwrap();
+    assert_eq!(saved["merit"]["terms"], lens["merit"]["terms"], "the result has it, too");
+    for (merit, words) in [
+        (
+            json!({"terms": [{"term": "sharpness", "weight": 1.0}]}),
+            ["merit.terms[0].term", "sharp"],
+        ),
+        (json!({"terms": [], "edge": 1}), ["merit.edge", "unknown key"]),
+        (json!(null), ["merit", "found null"]),
+        (json!({"terms": [{"term": "spot", "weight": -1.0}]}), ["`spot`", "zero or more"]),
+        (
+            json!({"terms": [{"term": {"air_center": {"min": 2.0, "max": 1.0}}, "weight": 1.0}]}),
+            ["`air_center`", "minimum"],
+        ),
+    ] {
+        lens["merit"] = merit;
+        let wrong = Scratch::with("wrong-merit.json", &lens.to_string());
+        refused(2, &["info", wrong.path()], "", &words);
+    }
+}
+
+#[test]
 fn optimize_refuses_before_it_works() {
     let out = Scratch::new("never.json");
     let mut lens: Value = serde_json::from_str(&std::fs::read_to_string(LENS).unwrap()).unwrap();

@@ -7,7 +7,7 @@ use aplanat::lens::{
     Aperture, Edit, FieldKind, FieldPoint, Fields, Lens, Medium, Object, Parameter, Pickup,
     Quantity, Row, Variable, ZoomPosition, ZoomThickness,
 };
-use aplanat::merit::{Goal, MeritError, PupilEdge, TermValue};
+use aplanat::merit::{Goal, MeritError, PupilEdge, Term, TermValue, WeightedTerm};
 use aplanat::optimize::{DescentMethod, OptimizationProgress, Optimizer};
 use aplanat::pupil::RayModel;
 use aplanat::session::{
@@ -95,6 +95,12 @@ const OPTIMIZE: Command = Command::Optimize {
     goal: Goal { terms: Vec::new(), zoom_ratios: Vec::new(), pupil: PupilEdge::Moving },
 };
 
+/// A merit function of the spots alone.
+fn spot_goal() -> Goal {
+    let terms = vec![WeightedTerm { term: Term::Spot, weight: 2.5 }];
+    Goal { terms, zoom_ratios: Vec::new(), pupil: PupilEdge::Frozen }
+}
+
 /// Waits until something has happened in the background.
 fn wait(
     session: &mut Session,
@@ -167,6 +173,7 @@ fn every_edit(lens: &Lens) -> Vec<Edit> {
         Edit::RemoveZoom(0),
         Edit::SetVariables(vec![Variable { parameter: CURVATURE, min: None, max: None }]),
         Edit::Replace(Box::new(aplanat::lens::blank())),
+        Edit::SetMerit(Some(spot_goal())),
     ]
 }
 
@@ -203,6 +210,7 @@ fn kind(edit: &Edit) -> usize {
         Edit::RemoveZoom(_) => 27,
         Edit::SetVariables(_) => 28,
         Edit::Replace(_) => 29,
+        Edit::SetMerit(_) => 30,
     }
 }
 
@@ -210,7 +218,7 @@ fn kind(edit: &Edit) -> usize {
 fn every_kind_of_edit_is_undone_and_redone_exactly() {
     let mut session = session(double_gauss());
     let edits = every_edit(session.lens());
-    assert_eq!(edits.iter().map(kind).collect::<Vec<_>>(), (0..30).collect::<Vec<_>>());
+    assert_eq!(edits.iter().map(kind).collect::<Vec<_>>(), (0..31).collect::<Vec<_>>());
     let mut lenses = vec![Arc::clone(session.lens())];
     for edit in edits {
         let events = session.apply(edit.clone().into());
@@ -893,4 +901,51 @@ fn a_thousand_random_commands_leave_a_sound_design() {
     }
     println!("{accepted} commands changed the design, {refused} were refused");
     assert!(accepted > 100 && refused > 100);
+}
+
+#[test]
+fn the_merit_function_is_saved_with_the_lens_and_undone() {
+    let folder = std::env::temp_dir().join(format!("aplanat-merit-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    let mut session = session(double_gauss());
+    let proposed = session.view().goal.unwrap();
+    assert_eq!(*proposed, Goal::default_for(&double_gauss()).unwrap());
+    session.apply(Edit::SetMerit(Some(spot_goal())).into());
+    assert_eq!(session.view().goal.as_deref(), Some(&spot_goal()));
+    for file in ["a.json", "b.json"] {
+        session.apply(Command::Save(Some(folder.join(file))));
+        assert_eq!(session.view().goal.as_deref(), Some(&spot_goal()), "under another name");
+    }
+    session.apply(Command::Undo);
+    assert_eq!(session.view().goal, Some(proposed));
+    session.apply(Command::Redo);
+    session.apply(Edit::Scale(2.0).into());
+    assert_eq!(session.view().goal.unwrap().terms[0].weight, 2.5, "both in square millimetres");
+    session.apply(Command::Open(folder.join("b.json")));
+    assert_eq!(session.view().goal.as_deref(), Some(&spot_goal()));
+    std::fs::remove_dir_all(&folder).unwrap();
+}
+
+#[test]
+fn an_accepted_result_has_the_merit_function_that_it_was_optimized_for() {
+    let mut session = session(double_gauss());
+    session.apply(Command::Optimize { method: DescentMethod::Adam, goal: spot_goal() });
+    wait(&mut session, "a step", |view, _| step_of(view) > 0);
+    session.apply(Command::AcceptResult);
+    assert_eq!(session.lens().merit, Some(spot_goal()));
+}
+
+#[test]
+fn targets_follow_a_scaled_lens() {
+    let mut lens = double_gauss();
+    let terms = [Term::FocalLength(50.0), Term::ThroughputLoss(80.0), Term::Light(1.0)];
+    let terms = terms.map(|term| WeightedTerm { term, weight: 1.0 }).to_vec();
+    lens.merit = Some(Goal { terms, ..spot_goal() });
+    let scaled = aplanat::lens::apply_edit(&lens, &Edit::Scale(2.0)).unwrap();
+    let terms = scaled.merit.unwrap().terms;
+    let expected = [(Term::FocalLength(100.0), 1.0), (Term::ThroughputLoss(320.0), 4.0)];
+    for (term, (target, weight)) in terms.iter().zip(expected) {
+        assert_eq!((term.term, term.weight), (target, weight));
+    }
+    assert_eq!(terms[2].weight, 4.0);
 }

@@ -3,7 +3,7 @@
 use super::medium::is_air;
 use super::{VERSION, required_number, serialize_numbers};
 use crate::lens::{
-    Aperture, Fields, Lens, Medium, Object, Pickup, Row, Variable, Wavelength, ZoomPosition,
+    Aperture, Fields, Goal, Lens, Medium, Object, Pickup, Row, Variable, Wavelength, ZoomPosition,
 };
 use serde::de::value::MapAccessDeserializer;
 use serde::de::{Error as _, MapAccess, Unexpected, Visitor};
@@ -40,6 +40,13 @@ struct LensJson {
     variables: Vec<Variable>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pickups: Vec<Pickup>,
+    #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "required_goal")]
+    merit: Option<Goal>,
+}
+
+/// A merit function that is not null: a file without one has no key.
+fn required_goal<'de, D: Deserializer<'de>>(from: D) -> Result<Option<Goal>, D::Error> {
+    Goal::deserialize(from).map(Some)
 }
 
 impl Serialize for Lens {
@@ -60,6 +67,7 @@ impl Serialize for Lens {
             zoom: self.zoom.clone(),
             variables: self.variables.clone(),
             pickups: self.pickups.clone(),
+            merit: self.merit.clone(),
         }
         .serialize(to)
     }
@@ -86,6 +94,7 @@ impl<'de> Deserialize<'de> for Lens {
             variables: keys.variables,
             pickups: keys.pickups,
             image_solve: keys.focus,
+            merit: keys.merit,
         })
     }
 }

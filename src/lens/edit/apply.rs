@@ -60,6 +60,7 @@ impl Lens {
             Edit::InsertZoom { at, position } => self.insert_zoom(*at, position)?,
             Edit::RemoveZoom(at) => self.remove_zoom(*at)?,
             Edit::SetZoom { at, position } => self.zoom_mut(*at)?.clone_from(position),
+            Edit::SetMerit(goal) => self.merit.clone_from(goal),
             Edit::Replace(lens) => self.clone_from(lens),
         }
         Ok(())

@@ -13,7 +13,7 @@ pub use apply::apply_edit;
 pub use error::EditError;
 
 use super::{
-    Aperture, Fields, Lens, Medium, Object, Parameter, Pickup, Quantity, Row, SurfaceNumber,
+    Aperture, Fields, Goal, Lens, Medium, Object, Parameter, Pickup, Quantity, Row, SurfaceNumber,
     Variable, Wavelength, ZoomPosition,
 };
 use serde::{Deserialize, Serialize};
@@ -136,6 +136,8 @@ pub enum Edit {
         /// The new position.
         position: ZoomPosition,
     },
+    /// Sets the merit function; `None` for the one that the program proposes.
+    SetMerit(Option<Goal>),
     /// Replaces the whole lens.
     Replace(Box<Lens>),
 }
@@ -213,6 +215,7 @@ impl Edit {
             Self::InsertZoom { at, .. } => format!("insert zoom position {at}"),
             Self::RemoveZoom(at) => format!("remove zoom position {at}"),
             Self::SetZoom { at, .. } => format!("zoom position {at}"),
+            Self::SetMerit(_) => "merit function".to_owned(),
             Self::Replace(_) => "replace the lens".to_owned(),
         }
     }

@@ -49,6 +49,7 @@ pub(super) fn scale(lens: &mut Lens, factor: f64) -> Result<(), EditError> {
         position.fields.iter_mut().for_each(|fields| scale_fields(fields, factor));
     }
     scale_bounds_and_pickups(lens, factor);
+    lens.merit.iter_mut().for_each(|goal| goal.scale(factor));
     Ok(())
 }
 

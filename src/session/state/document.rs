@@ -1,6 +1,6 @@
 //! The document of a session: edits, undo, and its files.
 
-use super::{Session, SessionEvent};
+use super::{Session, SessionEvent, propose_goal};
 use crate::files;
 use crate::lens::{Edit, Lens, apply_edit};
 use crate::pupil::limited_by_stop;
@@ -15,6 +15,11 @@ impl Session {
             Ok(lens) if lens == *self.lens => {}
             Ok(lens) => {
                 self.history.push(Arc::clone(&self.lens), edit.title(), edit.cell());
+                let keeps_targets = lens.zoom.len() == self.lens.zoom.len()
+                    && !matches!(edit, Edit::Scale(_) | Edit::Replace(_));
+                if !keeps_targets {
+                    self.proposed_goal = propose_goal(&lens);
+                }
                 self.set_design(Arc::new(lens));
             }
             Err(why) => self.post(Severity::Warning, why.to_string()),
@@ -72,6 +77,7 @@ impl Session {
         self.history = UndoStack::default();
         self.saved = Arc::clone(&lens);
         self.path = path;
+        self.proposed_goal = propose_goal(&lens);
         self.settings.zoom = 0;
         self.settings.pupil_wavelength = None;
         self.selected = None;

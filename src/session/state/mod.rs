@@ -19,6 +19,7 @@ use super::undo::UndoStack;
 use super::view::{Message, SessionView, Severity};
 use crate::experiments::{self, Effort, ExperimentReport};
 use crate::lens::Lens;
+use crate::merit::Goal;
 use crate::optimize;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -53,6 +54,8 @@ pub struct Session {
     path: Option<PathBuf>,
     /// The lens as it is in its file.
     saved: Arc<Lens>,
+    /// The merit function of a design that has none of its own; `None` if none can be proposed.
+    proposed_goal: Option<Arc<Goal>>,
     settings: AnalysisSettings,
     /// The surface that every panel highlights.
     selected: Option<usize>,
@@ -117,6 +120,7 @@ impl Session {
     ) -> io::Result<Self> {
         lens.check().map_err(io::Error::other)?;
         let lens = Arc::new(lens);
+        let proposed_goal = propose_goal(&lens);
         let optimize = move |request, _: &_| OptimizationEngine::start(&factory, request);
         let session = Self {
             saved: Arc::clone(&lens),
@@ -124,6 +128,7 @@ impl Session {
             version: 1,
             history: UndoStack::default(),
             path: None,
+            proposed_goal,
             settings: AnalysisSettings::default(),
             selected: None,
             messages: Arc::default(),
@@ -223,6 +228,7 @@ impl Session {
             undo: self.history.undo_title().map(str::to_owned),
             redo: self.history.redo_title().map(str::to_owned),
             path: self.path.clone(),
+            goal: self.goal(),
             dirty: self.is_dirty(),
             settings: self.settings.clone(),
             selected: self.selected.filter(|surface| *surface < self.lens.surfaces.len()),
@@ -232,6 +238,12 @@ impl Session {
     /// The design.
     pub fn lens(&self) -> &Arc<Lens> {
         &self.lens
+    }
+
+    /// The merit function of the design: its own, or else the proposed one.
+    fn goal(&self) -> Option<Arc<Goal>> {
+        let own = self.lens.merit.as_ref().map(|goal| Arc::new(goal.clone()));
+        own.or_else(|| self.proposed_goal.clone())
     }
 
     /// The newest analyses, maybe of an earlier version.
@@ -369,4 +381,9 @@ impl Session {
             self.invalidate();
         }
     }
+}
+
+/// The merit function that is proposed for a lens without one.
+fn propose_goal(lens: &Lens) -> Option<Arc<Goal>> {
+    Goal::default_for(lens).ok().map(Arc::new)
 }

@@ -182,6 +182,7 @@ fn merge_result(run: &OptimizationSnapshot, design: &Arc<Lens>) -> Result<Lens, 
         return Err("the surfaces of the design have changed since the optimization started".into());
     }
     let mut lens = Lens::clone(design);
+    lens.merit.get_or_insert_with(|| run.request.goal.clone());
     for variable in &run.request.lens.variables {
         if let Some(value) = best.get(variable.parameter) {
             lens.set(variable.parameter, value);

@@ -50,6 +50,8 @@ pub struct StructureSearchView {
 pub(super) struct StructureSearchState {
     run: BackgroundRun<StructureSearchEngine>,
     exporting: Vec<u64>,
+    /// The lens that was chosen last, with its generation.
+    chosen: Option<(u64, Arc<Lens>)>,
     previewed_chain: Option<usize>,
     /// The folder of searches without a chosen file.
     folder: Option<PathBuf>,
@@ -62,6 +64,7 @@ impl StructureSearchState {
         Ok(Self {
             run: BackgroundRun::spawn(wake, StructureSearchEngine::start)?,
             exporting: Vec::new(),
+            chosen: None,
             previewed_chain: None,
             folder: None,
             save_path: None,
@@ -111,9 +114,13 @@ impl StructureSearchState {
             }
             StructureSearchCommand::Clear => {
                 self.run.clear();
+                self.chosen = None;
                 self.previewed_chain = None;
             }
             StructureSearchCommand::DismissUnfinished => self.dismiss_unfinished()?,
+            StructureSearchCommand::Choose { number, lens } => {
+                self.chosen = Some((number, Arc::new(*lens)));
+            }
             // The session itself changes the design.
             StructureSearchCommand::Accept(_) => {}
         }
@@ -122,6 +129,7 @@ impl StructureSearchState {
 
     fn start(&mut self, input: StructureSearchInput) {
         self.unfinished = None;
+        self.chosen = None;
         self.run.start(input);
     }
 
@@ -132,8 +140,11 @@ impl StructureSearchState {
         fs::rename(&file, dismissed).map_err(|why| format!("{}: {why}", file.display()))
     }
 
-    /// The lens of a generation.
+    /// The lens of a generation: the one that was chosen, or else the one that is stored.
     pub(super) fn lens_by_number(&self, number: u64) -> Result<Arc<Lens>, String> {
+        if let Some((_, lens)) = self.chosen.as_ref().filter(|(chosen, _)| *chosen == number) {
+            return Ok(Arc::clone(lens));
+        }
         let search = self.run.snapshot();
         let search = search.ok_or_else(|| "there is no search over structure".to_owned())?;
         let lens = search.lens_by_number(number).cloned();
@@ -241,9 +252,18 @@ pub enum StructureSearchCommand {
     Preview(Option<usize>),
     /// Saves the search to this file from now on, or the next search if none is active.
     SaveTo(PathBuf),
-    /// Makes the lens of a generation the design, as one undo step.
+    /// Chooses a lens to accept or export. While its generation still descends, its number alone
+    /// does not tell which of its lenses is meant.
+    Choose {
+        /// The generation.
+        number: u64,
+        /// The lens.
+        lens: Box<Lens>,
+    },
+    /// Makes the lens of a generation the design, as one undo step: the chosen one if its number is
+    /// the same.
     Accept(u64),
-    /// Finalizes and writes the lens of a generation.
+    /// Finalizes and writes the lens of a generation: the chosen one if its number is the same.
     Export {
         /// The generation.
         number: u64,

@@ -38,6 +38,7 @@ pub(super) fn build(file: &ZemaxFile, report: &mut ConversionReport) -> Result<L
         variables: Vec::new(),
         pickups: Vec::new(),
         image_solve: None,
+        merit: None,
     };
     report_image(file, report);
     zoom::add_positions(file, &mut lens, &zoom_names, report)?;

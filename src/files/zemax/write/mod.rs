@@ -172,6 +172,10 @@ impl ZemaxWriter {
             let note = "written as obscurations, or as inner radii of the circular apertures";
             self.record(ConversionOutcome::Used, format!("{obstructing} obstructions"), note);
         }
+        if lens.merit.is_some() {
+            let note = "the terms have no counterpart there";
+            self.record(ConversionOutcome::Dropped, "merit function", note);
+        }
         for variable in &lens.variables {
             let what = format!("variable: {}", variable.parameter);
             let bounded = variable.min.is_some() || variable.max.is_some();

@@ -2,10 +2,10 @@
 //! edge.
 
 use egui::{Align, ComboBox, Grid, Id, Layout as Arrange, RichText, Ui, vec2};
-use std::path::PathBuf;
+use std::sync::Arc;
 
 use super::terms::{self, can_ask_for_more_light, hint, targets, title, unit, value_text};
-use crate::lens::{Aperture, Lens, ParameterKind, Quantity};
+use crate::lens::{Aperture, Edit, Lens, ParameterKind, Quantity};
 use crate::math::expression::evaluate;
 use crate::merit::{Goal, PupilEdge, Term, WeightedTerm};
 use crate::session::{Command, OptimizationSnapshot, SessionView};
@@ -20,8 +20,10 @@ pub(super) struct MeritEditor {
     terms: Vec<MeritRow>,
     edge: PupilEdge,
     zoom_ratios: Vec<f64>,
-    /// The lens for which they were proposed.
-    lens: Option<(String, Option<PathBuf>, usize)>,
+    /// The merit function of the design in the last frame; `None` before the first one.
+    seen: Option<Option<Arc<Goal>>>,
+    /// The merit function that was made of the terms last, until the design has it.
+    written: Option<Goal>,
 }
 
 /// A term, and whether it counts.
@@ -47,24 +49,31 @@ const EDGES: [(PupilEdge, &str, &str); 2] = [
 ];
 
 impl MeritEditor {
-    /// Sets the default goal of a lens, once for each lens.
+    /// Reads the merit function of the design where it is not the one that is shown: another lens
+    /// was opened, or a change was undone. Terms that do not count stay until then.
     pub(super) fn sync(&mut self, view: &SessionView) {
-        let lens = Some((view.lens.name.clone(), view.path.clone(), view.lens.zoom.len()));
-        if self.lens == lens {
+        if self.seen.as_ref() == Some(&view.goal) {
             return;
         }
-        let goal = Goal::default_for(&view.lens).unwrap_or_else(|_| Goal {
-            terms: vec![WeightedTerm { term: Term::Spot, weight: 1.0 }],
-            pupil: PupilEdge::default(),
-            zoom_ratios: Vec::new(),
-        });
+        let is_first = self.seen.replace(view.goal.clone()).is_none();
+        let written = self.written.take();
+        if !is_first && written.as_ref() == view.goal.as_deref() {
+            return;
+        }
+        let goal = goal_of(view);
         let row = |weighted: WeightedTerm| MeritRow { active: true, weighted };
-        *self = Self {
-            terms: goal.terms.into_iter().map(row).collect(),
-            edge: self.edge,
-            zoom_ratios: goal.zoom_ratios,
-            lens,
-        };
+        self.terms = goal.terms.into_iter().map(row).collect();
+        self.edge = goal.pupil;
+        self.zoom_ratios = goal.zoom_ratios;
+    }
+
+    /// Makes the terms the merit function of the design if they differ from what they were.
+    pub(super) fn write_changes(&mut self, before: &Goal, actions: &mut Actions) {
+        let goal = self.goal();
+        if goal != *before {
+            self.written = Some(goal.clone());
+            actions.push(Edit::SetMerit(Some(goal)));
+        }
     }
 
     /// The goal of the optimization.
@@ -183,6 +192,16 @@ impl MeritEditor {
             }
         });
     }
+}
+
+/// The merit function of the design.
+fn goal_of(view: &SessionView) -> Goal {
+    let own = view.goal.as_ref().map(|goal| Goal::clone(goal));
+    own.or_else(|| Goal::of_lens(&view.lens).ok()).unwrap_or_else(|| Goal {
+        terms: vec![WeightedTerm { term: Term::Spot, weight: 1.0 }],
+        pupil: PupilEdge::default(),
+        zoom_ratios: Vec::new(),
+    })
 }
 
 /// True if the stop alone limits the beam, at every zoom position.

@@ -44,6 +44,7 @@ impl Panel for OptimizerPanel {
 
     fn ui(&mut self, ui: &mut Ui, view: &SessionView, actions: &mut Actions) {
         self.merit.sync(view);
+        let goal = self.merit.goal();
         self.controls(ui, view, actions);
         if let Some(search) = view.optimization.snapshot.as_deref() {
             progress(ui, view, search);
@@ -58,6 +59,7 @@ impl Panel for OptimizerPanel {
         ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
             self.merit.ui(ui, view, &mut self.buffers, actions);
         });
+        self.merit.write_changes(&goal, actions);
     }
 
     fn is_typing(&self, context: &Context) -> bool {

@@ -8,7 +8,7 @@ use egui::{
 };
 use glam::DVec2;
 
-use super::{ShownSearch, text};
+use super::{SelectedLens, ShownSearch, text};
 use crate::lens::{Lens, added_glass};
 use crate::search::SteerCommand;
 use crate::session::{Command, FoundLens, SessionView, StructureSearchCommand};
@@ -29,9 +29,9 @@ const WORDS: f32 = 30.0;
 pub(super) fn cards(
     ui: &mut Ui,
     search: ShownSearch<'_>,
-    chosen: Option<u64>,
+    chosen: Option<&SelectedLens>,
     thumbnails: &mut Thumbnails,
-) -> Option<u64> {
+) -> Option<Arc<FoundLens>> {
     let ShownSearch { view, run } = search;
     let same =
         |found: &Arc<FoundLens>| (found.number, found.merit) == (run.best.number, run.best.merit);
@@ -48,13 +48,16 @@ pub(super) fn cards(
     for row in shown.chunks(columns as usize) {
         ui.horizontal(|ui| {
             for found in row {
-                let number = found.number;
                 let look = CardStyle {
-                    selected: Some(number) == chosen,
-                    pinned: run.pinned == Some(number),
+                    selected: chosen.is_some_and(|chosen| chosen.is(found)),
+                    mark: match found.number {
+                        _ if best.is_some_and(|best| Arc::ptr_eq(best, found)) => CardMark::Best,
+                        number if run.pinned == Some(number) => CardMark::Pinned,
+                        _ => CardMark::None,
+                    },
                 };
                 if card(ui, view, found, size, look, thumbnails).clicked() {
-                    clicked = Some(number);
+                    clicked = Some(Arc::clone(found));
                 }
             }
         });
@@ -66,7 +69,27 @@ pub(super) fn cards(
 #[derive(Clone, Copy)]
 struct CardStyle {
     selected: bool,
-    pinned: bool,
+    mark: CardMark,
+}
+
+/// The word on a card.
+#[derive(Clone, Copy)]
+enum CardMark {
+    None,
+    /// New descents start from the lens.
+    Pinned,
+    /// The best lens of a generation that still descends: the card beside it may have its number.
+    Best,
+}
+
+impl CardMark {
+    const fn text(self) -> &'static str {
+        match self {
+            Self::None => "",
+            Self::Pinned => "pinned",
+            Self::Best => "best so far",
+        }
+    }
 }
 
 fn card(
@@ -79,8 +102,10 @@ fn card(
 ) -> Response {
     let (rect, response) = ui.allocate_exact_size(size, Sense::click());
     let text = text::lens_text(found);
-    let pinned = if look.pinned { ", pinned" } else { "" };
-    let label = format!("Lens {}{pinned}: {}", found.number, text.replace('\n', ", "));
+    let mark = look.mark.text();
+    let separator = if mark.is_empty() { "" } else { ", " };
+    let words = text.replace('\n', ", ");
+    let label = format!("Lens {}{separator}{mark}: {words}", found.number);
     response.widget_info(|| WidgetInfo::labeled(Role::Button, true, &label));
     let visuals = ui.visuals();
     let stroke = if look.selected {
@@ -95,7 +120,10 @@ fn card(
     paint(ui, &found.lens, &view.lens, drawing.shrink(4.0), thumbnails);
     let colors = [ui.visuals().text_color(), ui.visuals().weak_text_color()];
     caption(ui, rect, &text, colors);
-    let corner = if look.pinned { "pinned".to_owned() } else { found.number.to_string() };
+    let corner = match look.mark {
+        CardMark::Pinned => mark.to_owned(),
+        _ => format!("{}{separator}{mark}", found.number),
+    };
     let font = FontId::proportional(10.0);
     let color = ui.visuals().weak_text_color();
     ui.painter().text(rect.min + vec2(5.0, 3.0), Align2::LEFT_TOP, corner, font, color);

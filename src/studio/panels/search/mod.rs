@@ -12,10 +12,15 @@ mod plot;
 mod setup;
 mod text;
 
+use std::sync::Arc;
+
 use egui::{Button, Frame, Margin, Panel as Side, RichText, ScrollArea, Ui};
 
 use super::Panel;
-use crate::session::{Command, SessionView, StructureSearchSnapshot, StructureSearchView};
+use crate::lens::Lens;
+use crate::session::{
+    Command, FoundLens, SessionView, StructureSearchCommand, StructureSearchSnapshot,
+};
 use crate::studio::actions::Actions;
 use crate::studio::text::capitalize;
 use lenses::Thumbnails;
@@ -60,10 +65,29 @@ pub struct SearchPanel {
     page: SearchPage,
     setup: SearchSetup,
     thumbnails: Thumbnails,
-    /// The generation that was clicked, and the search that it belongs to.
-    selected: Option<(u64, u64)>,
+    /// The lens that was clicked.
+    selected: Option<SelectedLens>,
     /// The search that was shown last: a new one turns the page.
     shown_run: Option<u64>,
+}
+
+/// A lens of the search that was clicked. It is held as it was then: the best lens of a generation
+/// that still descends is another one a moment later, under the same number.
+#[derive(Debug, Clone)]
+struct SelectedLens {
+    /// The number of the search.
+    run: u64,
+    /// The generation.
+    number: u64,
+    lens: Arc<Lens>,
+}
+
+impl SelectedLens {
+    /// True if a card shows this lens.
+    fn is(&self, found: &FoundLens) -> bool {
+        self.number == found.number
+            && (Arc::ptr_eq(&self.lens, &found.lens) || self.lens == found.lens)
+    }
 }
 
 /// A search that the panel shows, and the session that it belongs to.
@@ -115,7 +139,7 @@ impl SearchPanel {
             self.page = if number.is_some() { SearchPage::Lenses } else { SearchPage::Setup };
             self.shown_run = number;
         }
-        if self.selected.is_some_and(|(run, _)| Some(run) != number) {
+        if self.selected.as_ref().is_some_and(|selected| Some(selected.run) != number) {
             self.selected = None;
         }
     }
@@ -148,9 +172,12 @@ impl SearchPanel {
     fn lenses_page(&mut self, ui: &mut Ui, search: ShownSearch<'_>, actions: &mut Actions) {
         controls::live_controls(ui, search, actions);
         let chosen = self.selected_number();
-        let clicked = plot::plots(ui, search, chosen);
-        let clicked = clicked.or_else(|| lenses::cards(ui, search, chosen, &mut self.thumbnails));
-        self.select(search.view, clicked, actions);
+        let marked = plot::plots(ui, search, chosen);
+        let card = lenses::cards(ui, search, self.selected.as_ref(), &mut self.thumbnails);
+        match card {
+            Some(found) => self.select(search.view, found.number, &found.lens, actions),
+            None => self.select_number(search.view, marked, actions),
+        }
     }
 
     /// The line of the lens that was clicked, or of the best one.
@@ -159,23 +186,30 @@ impl SearchPanel {
         let clicked = family::tree(ui, search.run, number);
         let clicked =
             clicked.or_else(|| family::ancestors(ui, search, number, &mut self.thumbnails));
-        self.select(search.view, clicked, actions);
+        self.select_number(search.view, clicked, actions);
     }
 
     /// The generation that was clicked.
     fn selected_number(&self) -> Option<u64> {
-        self.selected.map(|(_, number)| number)
+        self.selected.as_ref().map(|selected| selected.number)
     }
 
-    /// Shows a generation in place of the design.
-    fn select(&mut self, view: &SessionView, number: Option<u64>, actions: &mut Actions) {
-        let Some(number) = number else { return };
-        let StructureSearchView { run, .. } = &view.structure_search;
-        let (Some(id), Some(search)) = (run.id, &run.snapshot) else { return };
-        self.selected = Some((id.number, number));
+    /// Shows the lens of a generation in place of the design.
+    fn select_number(&mut self, view: &SessionView, number: Option<u64>, actions: &mut Actions) {
+        let (Some(number), Some(search)) = (number, &view.structure_search.run.snapshot) else {
+            return;
+        };
         if let Some(lens) = search.lens_by_number(number) {
-            actions.push(Command::Preview(Some(Box::new((**lens).clone()))));
+            self.select(view, number, lens, actions);
         }
+    }
+
+    /// Shows a lens in place of the design; it is the one that is accepted or exported.
+    fn select(&mut self, view: &SessionView, number: u64, lens: &Arc<Lens>, actions: &mut Actions) {
+        let Some(id) = view.structure_search.run.id else { return };
+        self.selected = Some(SelectedLens { run: id.number, number, lens: Arc::clone(lens) });
+        actions.push(StructureSearchCommand::Choose { number, lens: Box::new((**lens).clone()) });
+        actions.push(Command::Preview(Some(Box::new((**lens).clone()))));
     }
 
     /// The bar of the selected lens: below the page, or above it if there is little room.
@@ -190,15 +224,13 @@ impl SearchPanel {
     }
 
     fn selection(&mut self, ui: &mut Ui, search: ShownSearch<'_>, actions: &mut Actions) {
-        let number = self.selected_number();
-        let lens = number.and_then(|number| search.run.lens_by_number(number));
-        let (Some(number), Some(_)) = (number, lens) else {
+        let Some(selected) = self.selected.clone() else {
             ui.weak("Click a lens or a mark to compare it with the design.");
             return;
         };
-        if lenses::lens_buttons(ui, search, number, actions) {
+        if lenses::lens_buttons(ui, search, selected.number, actions) {
             self.selected = None;
         }
-        text::comparison(ui, search, number);
+        text::comparison(ui, search, &selected);
     }
 }

@@ -2,7 +2,7 @@
 
 use egui::{Label, Ui};
 
-use super::ShownSearch;
+use super::{SelectedLens, ShownSearch};
 use crate::optimize::pareto::ParetoPoint;
 use crate::search::element::piece_count;
 use crate::search::{DescentEnd, LineageNode, OfferOutcome, RunEnd};
@@ -107,12 +107,12 @@ pub(super) fn lens_text(found: &FoundLens) -> String {
 }
 
 /// A lens beside the design: sharpness, light, elements.
-pub(super) fn comparison(ui: &mut Ui, search: ShownSearch<'_>, number: u64) {
+pub(super) fn comparison(ui: &mut Ui, search: ShownSearch<'_>, selected: &SelectedLens) {
     let ShownSearch { view, run } = search;
-    let Some(lens) = run.lens_by_number(number) else { return };
+    let SelectedLens { number, lens, .. } = selected;
     let mut parts = Vec::new();
     let found = run.reservoir.iter().chain([&run.best, &run.start]);
-    let found = found.filter(|found| found.number == number).find_map(|found| found.score.as_ref());
+    let found = found.filter(|found| selected.is(found)).find_map(|found| found.score.as_ref());
     let pair =
         found.and_then(scored_design).zip(view.design_score.as_deref().and_then(scored_design));
     match pair {

@@ -1,0 +1,236 @@
+//! The goal of a design: what its merit function sums. A lens carries it, so that it is saved,
+//! undone and handed on with the lens; the merit function itself is evaluated above this floor.
+
+use super::LensError;
+use super::check::check_number;
+use serde::{Deserialize, Serialize};
+
+/// The goal of an optimization: the terms of its merit function.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Goal {
+    /// The terms that are summed.
+    pub terms: Vec<WeightedTerm>,
+    /// Tells whether derivatives include the motion of the pupil edge.
+    #[serde(default)]
+    pub pupil: PupilEdge,
+    /// The focal length at each zoom position relative to the first; empty for a lens without zoom
+    /// positions.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub zoom_ratios: Vec<f64>,
+}
+
+/// Treatment of the edge of the pupil in derivatives.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum PupilEdge {
+    /// The edge is tracked as the lens changes: values are those of the transmitted rays, and their
+    /// derivatives are unbiased.
+    #[default]
+    Moving,
+    /// The set of transmitted rays is frozen between searches for the pupil, as in most programs.
+    /// Faster, but it ignores changes of the transmitted light and is biased wherever something
+    /// clips.
+    #[serde(rename = "kept")]
+    Frozen,
+}
+
+/// A term and its weight.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct WeightedTerm {
+    /// The term.
+    pub term: Term,
+    /// Its factor in the sum.
+    pub weight: f64,
+}
+
+/// A term (operand) of the merit function. Every term is the mean over the zoom positions; all
+/// except those of light are sums of squares.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum Term {
+    /// The mean square radius of the spots about their centroids, over fields, wavelengths and
+    /// zoom positions by weight, in mm².
+    Spot,
+    /// The integral of the square distance from the centroid over the pupil, in mm⁴: (3.24), the
+    /// mean over fields and wavelengths by weight.
+    SpotIntegral,
+    /// The negative area of the pupil in the first vertex plane, in mm²: (3.25), the weighted mean
+    /// over fields and wavelengths.
+    Throughput,
+    /// One minus the ratio of the mean pupil area to this area in mm²: (4.3).
+    ThroughputLoss(f64),
+    /// The mean squared shortfall of the area of each pupil from this fraction of its area in the
+    /// starting lens.
+    Light(f64),
+    /// The squared shortfall of a field's relative illumination from a minimum: the ratio of its
+    /// pupil area to that on the axis, times cos⁴ of the field angle, as for a lens without
+    /// distortion.
+    RelativeIllumination {
+        /// The field, counted from 0.
+        field: usize,
+        /// The minimum relative illumination.
+        min: f64,
+    },
+    /// The squared deviation of the f-number on the axis from this: the focal length over the
+    /// diameter of a disc with the area of the pupil.
+    FNumber(f64),
+    /// The squared deviation of the focal length from this length in mm, in mm².
+    FocalLength(f64),
+    /// The mean square of the distance of the chief rays' image points from the paraxial image
+    /// (`f tan θ` for an object at infinity), in mm².
+    Distortion,
+    /// Squared violations of limits to the centre thickness of glass, in mm².
+    GlassCenter {
+        /// The minimum thickness, in mm.
+        min: f64,
+        /// The maximum thickness, in mm.
+        max: f64,
+    },
+    /// Squared shortfall of the edge thickness of glass from this minimum in mm, in mm².
+    GlassEdge(f64),
+    /// Squared violations of limits to the centre thickness of air gaps, in mm².
+    AirCenter {
+        /// Not thinner than this.
+        min: f64,
+        /// Not thicker than this.
+        max: f64,
+    },
+    /// Squared shortfall of the edge thickness of air gaps from this minimum in mm, in mm².
+    AirEdge(f64),
+    /// Squared excess of the total track, first vertex to image, over this maximum in mm, in mm².
+    TotalTrack(f64),
+    /// Squared shortfall of the back focus, last vertex to image, from this minimum in mm, in mm².
+    BackFocus(f64),
+    /// Squared excess of `|curvature| × semi-diameter` of each surface over this maximum; 1 is a
+    /// hemisphere.
+    Steepness(f64),
+    /// Squared violations of limits to the semi-diameters, in mm².
+    SemiDiameter {
+        /// The minimum semi-diameter, in mm.
+        min: f64,
+        /// The maximum semi-diameter, in mm.
+        max: f64,
+    },
+}
+
+impl Term {
+    /// The name of the term in files and reports.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Spot => "spot",
+            Self::FocalLength(_) => "focal_length",
+            Self::Distortion => "distortion",
+            Self::GlassCenter { .. } => "glass_center",
+            Self::GlassEdge(_) => "glass_edge",
+            Self::AirCenter { .. } => "air_center",
+            Self::AirEdge(_) => "air_edge",
+            Self::TotalTrack(_) => "total_track",
+            Self::BackFocus(_) => "back_focus",
+            Self::SpotIntegral => "spot_integral",
+            Self::Throughput => "throughput",
+            Self::ThroughputLoss(_) => "throughput_loss",
+            Self::Light(_) => "light",
+            Self::RelativeIllumination { .. } => "relative_illumination",
+            Self::FNumber(_) => "f_number",
+            Self::Steepness(_) => "steepness",
+            Self::SemiDiameter { .. } => "semi_diameter",
+        }
+    }
+
+    /// The targets and limits of the term.
+    pub(crate) fn numbers(self) -> Vec<f64> {
+        match self {
+            Self::Spot | Self::SpotIntegral | Self::Throughput | Self::Distortion => Vec::new(),
+            Self::GlassCenter { min, max }
+            | Self::AirCenter { min, max }
+            | Self::SemiDiameter { min, max } => vec![min, max],
+            Self::RelativeIllumination { min, .. } => vec![min],
+            Self::ThroughputLoss(v)
+            | Self::Light(v)
+            | Self::FNumber(v)
+            | Self::Steepness(v)
+            | Self::FocalLength(v)
+            | Self::GlassEdge(v)
+            | Self::AirEdge(v)
+            | Self::TotalTrack(v)
+            | Self::BackFocus(v) => vec![v],
+        }
+    }
+}
+
+impl Term {
+    /// Multiplies its lengths by a factor.
+    fn scale(&mut self, factor: f64) {
+        match self {
+            Self::FocalLength(length)
+            | Self::GlassEdge(length)
+            | Self::AirEdge(length)
+            | Self::TotalTrack(length)
+            | Self::BackFocus(length) => *length *= factor,
+            Self::GlassCenter { min, max }
+            | Self::AirCenter { min, max }
+            | Self::SemiDiameter { min, max } => {
+                *min *= factor;
+                *max *= factor;
+            }
+            Self::ThroughputLoss(area) => *area *= factor * factor,
+            Self::Spot
+            | Self::SpotIntegral
+            | Self::Throughput
+            | Self::Light(_)
+            | Self::RelativeIllumination { .. }
+            | Self::FNumber(_)
+            | Self::Distortion
+            | Self::Steepness(_) => {}
+        }
+    }
+
+    /// The power of mm in the unit of its value.
+    fn power(self) -> i32 {
+        match self {
+            Self::SpotIntegral => 4,
+            Self::ThroughputLoss(_)
+            | Self::Light(_)
+            | Self::RelativeIllumination { .. }
+            | Self::FNumber(_)
+            | Self::Steepness(_) => 0,
+            _ => 2,
+        }
+    }
+}
+
+impl Goal {
+    /// Follows a lens whose lengths are multiplied by a factor: the targets keep their proportion to
+    /// the lens, and the weights keep the balance of the terms.
+    pub(super) fn scale(&mut self, factor: f64) {
+        for WeightedTerm { term, weight } in &mut self.terms {
+            term.scale(factor);
+            *weight *= factor.powi(2 - term.power());
+        }
+    }
+
+    /// Checks the weights and targets, whatever the lens.
+    pub(super) fn check_numbers(&self) -> Result<(), LensError> {
+        for WeightedTerm { term, weight } in &self.terms {
+            let name = term.name();
+            let what = format!("the weight of the term `{name}` of the merit function");
+            check_number(what, *weight, *weight >= 0.0, "zero or more")?;
+            for target in term.numbers() {
+                let what = format!("a target of the term `{name}` of the merit function");
+                check_number(what, target, true, "a finite number")?;
+            }
+            if let [min, max] = term.numbers()[..]
+                && min > max
+            {
+                let text = format!(
+                    "the term `{name}` of the merit function has the minimum {min} and the \
+                     maximum {max}; expected no more than the maximum"
+                );
+                return Err(LensError::Inconsistent(text));
+            }
+        }
+        Ok(())
+    }
+}
