@@ -119,7 +119,13 @@ fn check_lowest_index(i: usize, surface: &Surface<f64>) -> Result<(), LensError>
     Err(SystemError::Grin { surface: i.into(), why }.into())
 }
 
-fn index(medium: &Medium, place: MediumPlace, um: f64, before: f64) -> Result<f64, LensError> {
+/// The index of a medium at a wavelength in micrometres; that of the gap in front for a mirror.
+pub(super) fn index(
+    medium: &Medium,
+    place: MediumPlace,
+    um: f64,
+    before: f64,
+) -> Result<f64, LensError> {
     match medium {
         Medium::Air => Ok(1.0),
         Medium::Mirror => Ok(before),

@@ -20,6 +20,15 @@ pub enum Command {
     /// Limits the beam by the present aperture of the stop instead of an ideal entrance pupil, as one
     /// undo step.
     LimitByStop,
+    /// Scales the design to a focal length in mm at the zoom position that is shown, as one undo step.
+    ScaleToFocalLength(f64),
+    /// Inserts the lens of a file as an element, as one undo step.
+    InsertLens {
+        /// The file, of any known format.
+        path: PathBuf,
+        /// The index of its first surface; the number of surfaces appends it.
+        at: usize,
+    },
     /// Ends an edit of a table cell: the next edit of the same cell is an undo step of its own.
     CommitEdit,
     /// Reverts the last undo step.

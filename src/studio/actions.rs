@@ -1,6 +1,10 @@
 //! The user's requests in one frame, as panels and menus collect them.
 
+use egui::Theme;
+
+use super::dialogs::DialogKind;
 use super::file_dialog::FileRequest;
+use super::panels::PanelKind;
 use crate::files::BundledLens;
 use crate::lens::Edit;
 use crate::session::{Command, GrinCommand, StructureSearchCommand};
@@ -14,6 +18,24 @@ pub enum UiAction {
     OpenBundled(&'static BundledLens),
     /// Asks for a path, and runs the command that needs it.
     AskPath(FileRequest),
+    /// Opens a dialog.
+    ShowDialog(DialogKind),
+    /// Shows a panel in front of the others.
+    ShowPanel(PanelKind),
+    /// Shows a panel in front of the others, or hides it if it is there.
+    TogglePanel(PanelKind),
+    /// Arranges all panels as usual.
+    ArrangePanels,
+    /// Sets the theme.
+    SetTheme(Theme),
+    /// Closes the window.
+    Quit,
+}
+
+impl From<DialogKind> for UiAction {
+    fn from(dialog: DialogKind) -> Self {
+        Self::ShowDialog(dialog)
+    }
 }
 
 impl From<Command> for UiAction {

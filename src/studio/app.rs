@@ -9,11 +9,16 @@ use egui::{
 };
 
 use super::actions::{Actions, UiAction};
+use super::dialogs::Dialogs;
 use super::dock::Dock;
 use super::draw::RenderBackend;
+use super::dropped;
+use super::element_dialog::place_for_element;
 use super::experiment_window::ExperimentWindow;
 use super::file_dialog::{FileDialog, FileRequest};
 use super::menu;
+use super::menu_items::{MenuContext, PanelState};
+use super::panels::PanelKind;
 use super::text::capitalize;
 use super::unsaved::{PendingAction, PendingState};
 use super::window::Persistence;
@@ -27,6 +32,11 @@ use crate::session::{
 /// The key under which the arrangement of the panels is stored.
 const DOCK: &str = "dock";
 
+/// The key under which the files that were opened last are stored.
+const RECENT: &str = "recent files";
+/// The number of those files.
+const MAX_RECENT: usize = 12;
+
 /// The content of the window.
 #[derive(Debug)]
 pub struct Studio {
@@ -34,6 +44,9 @@ pub struct Studio {
     dock: Dock,
     pub(super) file_dialog: FileDialog,
     experiment_window: ExperimentWindow,
+    dialogs: Dialogs,
+    /// The files that were opened or saved last, the newest first.
+    recent: Vec<PathBuf>,
     persistence: Persistence,
     /// The action that waits until the user has decided about unsaved changes.
     pub(super) pending: Option<PendingState>,
@@ -58,6 +71,8 @@ impl Studio {
             dock: Dock::new(backend, tree),
             file_dialog: FileDialog::default(),
             experiment_window: ExperimentWindow::default(),
+            dialogs: Dialogs::default(),
+            recent: storage.and_then(|s| eframe::get_value(s, RECENT)).unwrap_or_default(),
             persistence,
             pending: None,
             message: None,
@@ -95,11 +110,14 @@ impl Studio {
         let view = self.session.view();
         self.update_title(ui.ctx(), &view);
         let mut actions = Actions::default();
-        menu::shortcuts(ui, &view, self.dock.is_typing(ui.ctx()), &mut actions);
-        bar_frame(ui, Side::top("menu"), |ui| menu::bar(ui, &view, &mut self.dock, &mut actions));
+        let menus = menu_context(&self.dock, &self.recent, &view, ui.ctx());
+        menu::shortcuts(ui, &menus, self.dock.is_typing(ui.ctx()), &mut actions);
+        bar_frame(ui, Side::top("menu"), |ui| menu::bar(ui, &menus, &mut actions));
+        self.dialogs.ui(ui.ctx(), &menus, &mut actions);
         bar_frame(ui, Side::bottom("status"), |ui| Self::status_bar(ui, &view, &mut actions));
         CentralPanel::no_frame().show(ui, |ui| self.dock.ui(ui, &view, &mut actions));
         let context = ui.ctx().clone();
+        self.receive_dropped_files(&context, &mut actions);
         self.experiment_window.ui(&context, view.experiment.as_deref(), &mut actions);
         self.dialogs(&context, &view);
         for action in actions {
@@ -112,6 +130,27 @@ impl Studio {
             UiAction::Run(command) => self.run_or_ask(context, PendingAction::Run(command), None),
             UiAction::AskPath(request) => self.ask_path(context, view, request),
             UiAction::OpenBundled(bundled) => self.open_bundled(context, bundled),
+            UiAction::ShowDialog(kind) => {
+                let menus = menu_context(&self.dock, &self.recent, view, context);
+                self.dialogs.open(kind, &menus);
+                context.request_repaint();
+            }
+            UiAction::ShowPanel(kind) => self.dock.show(kind),
+            UiAction::TogglePanel(kind) => self.dock.toggle(kind),
+            UiAction::ArrangePanels => self.dock.reset(),
+            UiAction::SetTheme(theme) => context.set_theme(theme),
+            UiAction::Quit => context.send_viewport_cmd(ViewportCommand::Close),
+        }
+    }
+
+    /// Opens the files that were dropped on the window, or says by name why one cannot be opened.
+    fn receive_dropped_files(&mut self, context: &Context, actions: &mut Actions) {
+        let files = context.input(|input| input.raw.dropped_files.clone());
+        for path in files.iter().map(|file| file.path().to_owned()) {
+            match dropped::open_actions(&path) {
+                Ok(asked) => actions.extend(asked),
+                Err(why) => self.message = Some(why),
+            }
         }
     }
 
@@ -147,6 +186,11 @@ impl Studio {
         let search = Command::StructureSearch;
         let command = match request {
             FileRequest::Open => Command::Open(path),
+            FileRequest::InsertLens => {
+                let view = self.session.view();
+                let at = place_for_element(&view.lens, view.selected);
+                Command::InsertLens { path, at }
+            }
             FileRequest::ExperimentFolder => Command::SaveExperiment(path),
             FileRequest::Save => Command::Save(Some(path)),
             FileRequest::ExportFront => Command::ExportPareto(path),
@@ -165,12 +209,22 @@ impl Studio {
     /// Keeps a message that does not fit into the status bar for the dialog.
     fn on_events(&mut self, events: Vec<SessionEvent>) {
         for event in events {
+            if let SessionEvent::Opened(path) = &event {
+                self.remember(path);
+            }
             if let SessionEvent::Message(message) = event
                 && (message.text.lines().count() > 1 || message.severity == Severity::Error)
             {
                 self.message = Some(message.text);
             }
         }
+    }
+
+    fn remember(&mut self, path: &Path) {
+        let path = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
+        self.recent.retain(|other| *other != path);
+        self.recent.insert(0, path);
+        self.recent.truncate(MAX_RECENT);
     }
 
     /// Shows a long message or an error until it is closed.
@@ -230,12 +284,28 @@ impl App for Studio {
     fn save(&mut self, storage: &mut dyn Storage) {
         if self.persistence == Persistence::Enabled {
             eframe::set_value(storage, DOCK, self.dock.tree());
+            eframe::set_value(storage, RECENT, &self.recent);
         }
     }
 
     fn persist_egui_memory(&self) -> bool {
         self.persistence == Persistence::Enabled
     }
+}
+
+/// What the items of the menus depend on.
+fn menu_context<'a>(
+    dock: &Dock,
+    recent: &'a [PathBuf],
+    view: &'a SessionView,
+    context: &Context,
+) -> MenuContext<'a> {
+    let panels = PanelKind::ALL.map(|kind| PanelState {
+        kind,
+        title: dock.title(kind),
+        is_open: dock.is_open(kind),
+    });
+    MenuContext { view, panels: panels.into(), recent, theme: context.theme() }
 }
 
 /// The path with which a file dialog starts.

@@ -55,9 +55,17 @@ impl Dock {
         tile.is_some_and(|tile| self.tree.active_tiles().contains(&tile))
     }
 
-    /// Shows or hides a panel.
+    /// Shows a panel in front of the others.
+    pub fn show(&mut self, kind: PanelKind) {
+        self.set_visible(kind, true);
+    }
+
+    /// Shows a panel in front of the others, or hides it if it is there already.
     pub fn toggle(&mut self, kind: PanelKind) {
-        let open = !self.is_open(kind);
+        self.set_visible(kind, !self.is_visible(kind));
+    }
+
+    fn set_visible(&mut self, kind: PanelKind, open: bool) {
         if let Some(tile) = self.tree.tiles.find_pane(&kind) {
             self.tree.set_visible(tile, open);
             self.tree.make_active(|id, _| id == tile);

@@ -12,6 +12,8 @@ use egui::Key;
 pub enum FileRequest {
     /// To read a lens from it, of any known form.
     Open,
+    /// To insert the surfaces of a lens file behind the selected element.
+    InsertLens,
     /// To write the lens in our own form.
     Save,
     /// To write the lens as Zemax reads it.
@@ -38,6 +40,7 @@ impl FileRequest {
     const fn title(self) -> &'static str {
         match self {
             Self::Open => "Open a lens",
+            Self::InsertLens => "Add a lens from a file",
             Self::Save => "Save the lens",
             Self::ExportZemax => "Export the lens for Zemax",
             Self::ExportJson => "Export a copy of the lens",
@@ -53,7 +56,7 @@ impl FileRequest {
 
     const fn extensions(self) -> &'static [&'static str] {
         match self {
-            Self::Open => &["json", "zmx", "ZMX"],
+            Self::Open | Self::InsertLens => &["json", "zmx", "ZMX"],
             Self::Save | Self::ExportJson | Self::OpenSearch | Self::SaveSearch => &["json"],
             Self::ExportSearchLens(_) => &["json", "zmx"],
             Self::ExportZemax => &["zmx"],
@@ -75,7 +78,7 @@ impl FileRequest {
 
     /// True if the file is written.
     fn is_save(self) -> bool {
-        !matches!(self, Self::Open | Self::OpenSearch | Self::OpenField)
+        !matches!(self, Self::Open | Self::InsertLens | Self::OpenSearch | Self::OpenField)
     }
 
     /// The path with the extension that it needs, if it has none.
@@ -194,9 +197,10 @@ fn open_native(
     let context = context.clone();
     thread::Builder::new().name("file dialog".into()).spawn(move || {
         let path = match purpose {
-            FileRequest::Open | FileRequest::OpenSearch | FileRequest::OpenField => {
-                dialog.pick_file()
-            }
+            FileRequest::Open
+            | FileRequest::InsertLens
+            | FileRequest::OpenSearch
+            | FileRequest::OpenField => dialog.pick_file(),
             FileRequest::ExportFront | FileRequest::ExperimentFolder => dialog.pick_folder(),
             _ => dialog.save_file(),
         };

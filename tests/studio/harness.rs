@@ -50,7 +50,7 @@ impl<P: Panel> PanelState<P> {
             match action {
                 UiAction::Run(command) => self.run(command),
                 UiAction::AskPath(request) => self.requests.push(request),
-                UiAction::OpenBundled(bundled) => panic!("no panel opens {bundled:?}"),
+                other => panic!("no panel asks for {other:?}"),
             }
         }
     }

@@ -125,17 +125,21 @@ fn unsaved_changes_are_not_discarded_without_confirmation() {
     let mut harness = window();
     type_radius(&mut harness, "15");
     let lens = harness.state().session().lens().clone();
-    harness.key_press_modifiers(Modifiers::COMMAND, Key::N);
-    harness.run_steps(3);
+    let create = |harness: &mut Harness<'_, Studio>| {
+        harness.key_press_modifiers(Modifiers::COMMAND, Key::N);
+        harness.run_steps(3);
+        harness.get_by_label("Create").click();
+        harness.run_steps(3);
+    };
+    create(&mut harness);
     assert_eq!(*harness.state().session().lens(), lens, "the lens is still there");
     harness.get_by_label("Cancel").click();
     harness.run_steps(3);
     assert!(harness.query_by_label("Save the changes first?").is_none());
-    harness.key_press_modifiers(Modifiers::COMMAND, Key::N);
-    harness.run_steps(3);
+    create(&mut harness);
     harness.get_by_label("Don't save").click();
     harness.run_steps(3);
-    assert_eq!(harness.state().session().lens().name, "New lens");
+    assert_eq!(harness.state().session().lens().name, "Achromat 50 mm f/4");
 }
 
 #[test]
@@ -240,7 +244,9 @@ fn an_experiment_runs_from_the_menu_and_shows_its_claims_and_pictures() {
     let mut harness = window();
     let by_time = |a: &&Experiment, b: &&Experiment| a.seconds.total_cmp(&b.seconds);
     let study = experiments::ALL.iter().min_by(by_time).unwrap();
-    harness.get_by_label("Experiments").click();
+    harness.get_by_label("Help").click();
+    harness.run_steps(3);
+    harness.get_by_label("Studies of the thesis").click();
     harness.run_steps(3);
     for study in experiments::ALL {
         harness.get_by_label_contains(study.title);

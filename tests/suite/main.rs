@@ -11,6 +11,7 @@ mod cli_failures;
 mod cli_files;
 mod closed_forms;
 mod effects;
+mod elements;
 mod experiments;
 mod files;
 mod grin;

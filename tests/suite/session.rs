@@ -4,8 +4,8 @@ use aplanat::effects::{Effect, EffectOverride};
 use aplanat::experiments::{self, Effort, Experiment};
 use aplanat::files;
 use aplanat::lens::{
-    Aperture, Edit, FieldKind, FieldPoint, Fields, Lens, Medium, Object, Parameter, Pickup,
-    Quantity, Row, Variable, ZoomPosition, ZoomThickness,
+    Aperture, Edit, ElementEdit, FieldKind, FieldPoint, Fields, Lens, Medium, Object, Parameter,
+    Pickup, Quantity, Row, Variable, ZoomPosition, ZoomThickness,
 };
 use aplanat::merit::{Goal, MeritError, PupilEdge, Term, TermValue, WeightedTerm};
 use aplanat::optimize::{DescentMethod, OptimizationProgress, Optimizer};
@@ -174,6 +174,7 @@ fn every_edit(lens: &Lens) -> Vec<Edit> {
         Edit::SetVariables(vec![Variable { parameter: CURVATURE, min: None, max: None }]),
         Edit::Replace(Box::new(aplanat::lens::blank())),
         Edit::SetMerit(Some(spot_goal())),
+        Edit::Element(ElementEdit::Bend { surface: 0, by: 0.01 }),
     ]
 }
 
@@ -211,6 +212,7 @@ fn kind(edit: &Edit) -> usize {
         Edit::SetVariables(_) => 28,
         Edit::Replace(_) => 29,
         Edit::SetMerit(_) => 30,
+        Edit::Element(_) => 31,
     }
 }
 
@@ -218,7 +220,7 @@ fn kind(edit: &Edit) -> usize {
 fn every_kind_of_edit_is_undone_and_redone_exactly() {
     let mut session = session(double_gauss());
     let edits = every_edit(session.lens());
-    assert_eq!(edits.iter().map(kind).collect::<Vec<_>>(), (0..31).collect::<Vec<_>>());
+    assert_eq!(edits.iter().map(kind).collect::<Vec<_>>(), (0..32).collect::<Vec<_>>());
     let mut lenses = vec![Arc::clone(session.lens())];
     for edit in edits {
         let events = session.apply(edit.clone().into());

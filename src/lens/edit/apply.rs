@@ -43,6 +43,7 @@ impl Lens {
             Edit::InsertRow { at, row } => rows::insert(self, *at, row)?,
             Edit::RemoveRow(surface) => rows::remove(self, *surface)?,
             Edit::ReverseRows { first, last } => rows::reverse(self, *first, *last)?,
+            Edit::Element(edit) => edit.apply(self)?,
             Edit::Scale(factor) => scale::scale(self, *factor)?,
             Edit::SetName(text) => self.name.clone_from(text),
             Edit::SetSource(text) => self.source.clone_from(text),
@@ -80,7 +81,7 @@ impl Lens {
     }
 
     /// Refuses a parameter that a pickup or a solve decides.
-    fn check_writable(&mut self, parameter: Parameter) -> Result<(), EditError> {
+    pub(super) fn check_writable(&mut self, parameter: Parameter) -> Result<(), EditError> {
         self.row_mut(parameter.surface)?;
         if let Some(pickup) = self.pickups.iter().find(|p| p.parameter == parameter) {
             return Err(EditError::PickedUp(parameter, pickup.source));

@@ -1,6 +1,7 @@
 //! The reasons for which an edit is refused.
 
 use crate::lens::{LensError, Parameter, SurfaceNumber};
+use crate::math::format_short;
 
 /// The reason for which an edit is refused; the lens stays as it was.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -58,4 +59,32 @@ pub enum EditError {
     /// The scale is no positive number.
     #[error("the scale is {0}; expected a number above 0")]
     InvalidScale(f64),
+    /// The new element has no surfaces.
+    #[error("the new element has no surfaces")]
+    NoElement,
+    /// The gap in which an element would be inserted is not air.
+    #[error("the gap after surface {0} is not air; expected air, into which an element goes")]
+    NotInAir(SurfaceNumber),
+    /// The surface belongs to no element.
+    #[error("surface {0} belongs to no element; expected a surface of glass")]
+    NotAnElement(SurfaceNumber),
+    /// No element follows the one of the surface across a gap of air.
+    #[error("no element follows that of surface {0}; expected one behind it to cement it to")]
+    NothingToCement(SurfaceNumber),
+    /// The surface is an outer one of a cemented group.
+    #[error(
+        "surface {0} is the outside of a cemented group; expected one of its cemented surfaces"
+    )]
+    NothingToSplit(SurfaceNumber),
+    /// There is too little air to move an element.
+    #[error("there are only {} mm of air after surface {surface}; expected {} mm",
+        format_short(*room), format_short(*needed))]
+    NoRoom {
+        /// The surface in front of the gap.
+        surface: SurfaceNumber,
+        /// The air there, in mm.
+        room: f64,
+        /// The air that the move needs, in mm.
+        needed: f64,
+    },
 }

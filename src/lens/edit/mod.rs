@@ -5,11 +5,13 @@
 //! table cell that tests an entry and the session that changes the design both call it.
 
 mod apply;
+mod element;
 mod error;
 mod rows;
 mod scale;
 
 pub use apply::apply_edit;
+pub use element::ElementEdit;
 pub use error::EditError;
 
 use super::{
@@ -91,6 +93,8 @@ pub enum Edit {
         /// The last surface of the group.
         last: usize,
     },
+    /// Changes a whole element.
+    Element(ElementEdit),
     /// Multiplies every length by a factor.
     Scale(f64),
     /// Sets the name of the lens.
@@ -198,6 +202,7 @@ impl Edit {
             Self::ReverseRows { first, last } => {
                 format!("reverse surfaces {} to {}", number(first), number(last))
             }
+            Self::Element(edit) => edit.title(),
             Self::Scale(factor) => format!("scale by {factor}"),
             Self::SetName(_) => "name".to_owned(),
             Self::SetSource(_) => "source".to_owned(),
@@ -212,9 +217,9 @@ impl Edit {
             Self::SetVariables(_) => "variables".to_owned(),
             Self::SetPickup(pickup) => format!("pickup of the {}", pickup.parameter),
             Self::RemovePickup(parameter) => format!("remove the pickup of the {parameter}"),
-            Self::InsertZoom { at, .. } => format!("insert zoom position {at}"),
-            Self::RemoveZoom(at) => format!("remove zoom position {at}"),
-            Self::SetZoom { at, .. } => format!("zoom position {at}"),
+            Self::InsertZoom { at, .. } => format!("insert zoom position {}", at + 1),
+            Self::RemoveZoom(at) => format!("remove zoom position {}", at + 1),
+            Self::SetZoom { at, .. } => format!("zoom position {}", at + 1),
             Self::SetMerit(_) => "merit function".to_owned(),
             Self::Replace(_) => "replace the lens".to_owned(),
         }

@@ -2,7 +2,8 @@
 
 use super::{Session, SessionEvent, propose_goal};
 use crate::files;
-use crate::lens::{Edit, Lens, apply_edit};
+use crate::lens::{Aperture, Edit, ElementEdit, Lens, apply_edit};
+use crate::paraxial::{Beam, first_order};
 use crate::pupil::limited_by_stop;
 use crate::session::undo::UndoStack;
 use crate::session::view::Severity;
@@ -33,6 +34,23 @@ impl Session {
             apply_edit(&self.lens, &replace).map_err(|why| why.to_string())
         });
         self.accept(limited, "limit the beam by the stop");
+    }
+
+    pub(super) fn scale_to_focal_length(&mut self, focal_length: f64) {
+        let factor = scale_factor(&self.lens, self.settings.zoom, focal_length);
+        let scaled = factor.and_then(|factor| {
+            apply_edit(&self.lens, &Edit::Scale(factor)).map_err(|why| why.to_string())
+        });
+        self.accept(scaled, &format!("scale to the focal length {focal_length} mm"));
+    }
+
+    pub(super) fn insert_lens(&mut self, path: &Path, at: usize) {
+        let inserted = files::open(path).map_err(|why| why.to_string()).and_then(|opened| {
+            let insert = ElementEdit::Insert { at, rows: opened.lens.surfaces };
+            let edit = Edit::Element(insert);
+            apply_edit(&self.lens, &edit).map_err(|why| why.to_string())
+        });
+        self.accept(inserted, &format!("insert {}", path.display()));
     }
 
     /// Makes a lens the design, as one undo step, or posts the reason why there is none.
@@ -131,4 +149,19 @@ impl Session {
         self.post(Severity::Note, parts.into_iter().flatten().collect::<Vec<_>>().join("\n"));
         self.events.push(SessionEvent::Saved(path.to_owned()));
     }
+}
+
+/// The factor by which a lens is scaled to a focal length at a zoom position.
+fn scale_factor(lens: &Lens, zoom: usize, focal_length: f64) -> Result<f64, String> {
+    if !(focal_length > 0.0 && focal_length.is_finite()) {
+        return Err(format!("the focal length is {focal_length}; expected more than 0, in mm"));
+    }
+    let um = lens.wavelengths[lens.primary()].um;
+    let system = lens.resolve(zoom, um).map_err(|why| why.to_string())?;
+    // The focal length does not depend on the beam; a stop of some size has a meaning for any lens.
+    let aperture = Aperture::StopSemiDiameter(1.0);
+    let beam = Beam { aperture, ..Beam::for_lens(lens, zoom) };
+    let first = first_order(&system, &beam).map_err(|why| why.to_string())?;
+    let present = first.efl.ok_or("the lens has no focal length to scale: it focuses nothing")?;
+    Ok(focal_length / present.abs())
 }

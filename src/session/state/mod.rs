@@ -154,6 +154,8 @@ impl Session {
         match command {
             Command::Edit(edit) => self.edit(&edit),
             Command::LimitByStop => self.limit_by_stop(),
+            Command::ScaleToFocalLength(focal_length) => self.scale_to_focal_length(focal_length),
+            Command::InsertLens { path, at } => self.insert_lens(&path, at),
             Command::CommitEdit => self.history.commit(),
             Command::Undo => self.undo(),
             Command::Redo => self.redo(),

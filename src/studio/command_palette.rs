@@ -1,0 +1,117 @@
+//! The command palette: every command, panel, lens, file and setting, found by words.
+
+use egui::{
+    Align, Button, Context, Id, Key, Layout, Modal, Modifiers, ScrollArea, TextEdit, Ui, vec2,
+};
+
+use super::actions::Actions;
+use super::menu_items::{MenuContext, MenuItem};
+
+/// The number of items that are listed at most.
+const MAX_ITEMS: usize = 60;
+
+/// The text and the selection.
+#[derive(Debug, Default)]
+pub(super) struct CommandPalette {
+    text: String,
+    selected: usize,
+}
+
+impl CommandPalette {
+    /// Shows the palette; true once it is closed.
+    pub(super) fn ui(
+        &mut self,
+        context: &Context,
+        menus: &MenuContext<'_>,
+        actions: &mut Actions,
+    ) -> bool {
+        let mut chosen = None;
+        let modal = Modal::new(Id::unique("command palette")).show(context, |ui| {
+            ui.set_width(560.0);
+            chosen = self.contents(ui, menus);
+        });
+        let done = chosen.is_some();
+        actions.extend(chosen.and_then(|item| item.action));
+        done || modal.should_close()
+    }
+
+    fn contents(&mut self, ui: &mut Ui, menus: &MenuContext<'_>) -> Option<MenuItem> {
+        let (down, up, enter) = ui.input_mut(|input| {
+            let mut pressed = |key| input.consume_key(Modifiers::NONE, key);
+            (pressed(Key::ArrowDown), pressed(Key::ArrowUp), pressed(Key::Enter))
+        });
+        let line = TextEdit::singleline(&mut self.text)
+            .hint_text("A command, panel, lens, file, setting…")
+            .desired_width(f32::INFINITY);
+        let field = ui.add(line).accessible_name("Find a command");
+        field.request_focus();
+        if field.changed() {
+            self.selected = 0;
+        }
+        let items = found(menus.all(), &self.text);
+        let last = items.len().saturating_sub(1);
+        self.selected = (self.selected + usize::from(down)).min(last);
+        self.selected = self.selected.saturating_sub(usize::from(up));
+        ui.add_space(4.0);
+        if items.is_empty() {
+            ui.weak("Nothing has these words.");
+            return None;
+        }
+        let pressed = self.list(ui, &items, down || up);
+        let chosen = if enter { Some(self.selected) } else { pressed };
+        items.into_iter().nth(chosen?)
+    }
+
+    /// Shows the items; the index of one that was pressed.
+    fn list(&self, ui: &mut Ui, items: &[MenuItem], moved: bool) -> Option<usize> {
+        let mut pressed = None;
+        ScrollArea::vertical().max_height(380.0).auto_shrink([false, true]).show(ui, |ui| {
+            ui.spacing_mut().item_spacing.y = 1.0;
+            for (i, item) in items.iter().enumerate() {
+                let row = show_item(ui, item, i == self.selected);
+                if moved && i == self.selected {
+                    row.scroll_to_me(None);
+                }
+                if row.clicked() {
+                    pressed = Some(i);
+                }
+            }
+        });
+        pressed
+    }
+}
+
+fn show_item(ui: &mut Ui, item: &MenuItem, selected: bool) -> egui::Response {
+    let shortcut = item.shortcut.map(|key| ui.ctx().format_shortcut(&key)).unwrap_or_default();
+    let button = Button::new(format!("{}: {}", item.menu, item.title))
+        .selected(selected)
+        .frame_when_inactive(false)
+        .truncate()
+        .shortcut_text(shortcut);
+    let size = vec2(ui.available_width(), 22.0);
+    let layout = Layout::left_to_right(Align::Center).with_main_justify(true);
+    let row = ui.allocate_ui_with_layout(size, layout, |ui| ui.add(button)).inner;
+    if item.hint.is_empty() { row } else { row.on_hover_text(item.hint) }
+}
+
+/// The items that can be asked for and have all words of a text, those that begin with it first.
+pub(super) fn found(items: Vec<MenuItem>, text: &str) -> Vec<MenuItem> {
+    let text = text.to_lowercase();
+    let words: Vec<&str> = text.split_whitespace().collect();
+    let name =
+        |item: &MenuItem| format!("{} {} {}", item.title, item.menu, item.hint).to_lowercase();
+    let fits = |item: &MenuItem| {
+        let name = name(item);
+        item.is_enabled() && words.iter().all(|word| name.contains(word))
+    };
+    let mut items: Vec<MenuItem> = items.into_iter().filter(fits).collect();
+    let rank = |item: &MenuItem| {
+        let title = item.title.to_lowercase();
+        let begins = title.starts_with(text.trim());
+        let has = words.iter().all(|word| title.contains(word));
+        (!begins, !has)
+    };
+    items.sort_by_key(rank);
+    items.truncate(MAX_ITEMS);
+    items
+}

@@ -1,0 +1,68 @@
+//! The dialogs of the window, at most one of each kind at a time.
+
+use egui::Context;
+
+use super::actions::Actions;
+use super::command_palette::CommandPalette;
+use super::element_dialog::{ElementDialog, ElementTask};
+use super::manual::ManualWindow;
+use super::menu_items::MenuContext;
+use super::new_lens::NewLensDialog;
+use super::shortcut_list;
+
+/// A dialog.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum DialogKind {
+    /// The first numbers of a new lens.
+    NewLens,
+    /// A change of an element or of the whole lens.
+    Element(ElementTask),
+    /// The search over all commands.
+    CommandPalette,
+    /// The manual.
+    Manual,
+    /// The list of keyboard shortcuts.
+    Shortcuts,
+}
+
+/// The dialogs that are open.
+#[derive(Debug, Default)]
+pub(super) struct Dialogs {
+    new_lens: Option<NewLensDialog>,
+    element: Option<ElementDialog>,
+    palette: Option<CommandPalette>,
+    manual: ManualWindow,
+    shows_shortcuts: bool,
+}
+
+impl Dialogs {
+    /// Opens a dialog.
+    pub(super) fn open(&mut self, kind: DialogKind, menus: &MenuContext<'_>) {
+        match kind {
+            DialogKind::NewLens => self.new_lens = Some(NewLensDialog::default()),
+            DialogKind::Element(task) => {
+                self.element = Some(ElementDialog::new(task, menus.view));
+            }
+            DialogKind::CommandPalette => self.palette = Some(CommandPalette::default()),
+            DialogKind::Manual => self.manual.open(),
+            DialogKind::Shortcuts => self.shows_shortcuts = true,
+        }
+    }
+
+    /// Shows all dialogs that are open.
+    pub(super) fn ui(&mut self, context: &Context, menus: &MenuContext<'_>, actions: &mut Actions) {
+        if self.new_lens.as_mut().is_some_and(|dialog| dialog.ui(context, actions)) {
+            self.new_lens = None;
+        }
+        if self.element.as_mut().is_some_and(|dialog| dialog.ui(context, menus.view, actions)) {
+            self.element = None;
+        }
+        if self.palette.as_mut().is_some_and(|palette| palette.ui(context, menus, actions)) {
+            self.palette = None;
+        }
+        self.manual.ui(context);
+        if self.shows_shortcuts {
+            self.shows_shortcuts = shortcut_list::ui(context, menus);
+        }
+    }
+}

@@ -1,0 +1,84 @@
+//! Files that are dropped on the window: what each of them is, and what opens it.
+
+use std::path::Path;
+
+use super::actions::UiAction;
+use super::panels::PanelKind;
+use crate::files::{self, MAX_LENS_BYTES};
+use crate::session::{Command, GrinCommand, StructureSearchCommand};
+
+/// A kind of file, by its extension and, for JSON, by its keys.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum FileKind {
+    Lens,
+    Search,
+    GrinField,
+    Glasses,
+    Picture,
+}
+
+/// What opens a file.
+///
+/// # Errors
+/// A file that cannot be opened in the window, with its name and what can be.
+pub(super) fn open_actions(path: &Path) -> Result<Vec<UiAction>, String> {
+    let path = path.to_owned();
+    let panel = |kind| UiAction::ShowPanel(kind);
+    match file_kind(&path)? {
+        FileKind::Lens => Ok(vec![Command::Open(path).into()]),
+        FileKind::Search => {
+            let resume = StructureSearchCommand::ResumeFrom(path);
+            Ok(vec![resume.into(), panel(PanelKind::Search)])
+        }
+        FileKind::GrinField => {
+            Ok(vec![GrinCommand::OpenFile(path).into(), panel(PanelKind::Slice)])
+        }
+        FileKind::Glasses => Err(refusal(
+            &path,
+            "is a catalogue of glasses; only those of the program are used. A glass that is missing \
+             can be typed into the table as nd and vd, such as `1.62 36.4`",
+        )),
+        FileKind::Picture => Err(refusal(
+            &path,
+            "is a picture; a picture is the goal of a gradient-index task, whose file names it: drop \
+             that file",
+        )),
+    }
+}
+
+fn refusal(path: &Path, why: &str) -> String {
+    let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
+    format!("`{name}` {why}.")
+}
+
+fn file_kind(path: &Path) -> Result<FileKind, String> {
+    let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
+    match extension.as_str() {
+        "zmx" => Ok(FileKind::Lens),
+        "npz" => Ok(FileKind::GrinField),
+        "agf" => Ok(FileKind::Glasses),
+        "png" | "jpg" | "jpeg" => Ok(FileKind::Picture),
+        "json" => json_kind(path),
+        _ => Err(refusal(
+            path,
+            "is none of the files that the window opens: a lens (.json, .zmx), a search (.json), a \
+             gradient-index task (.json) or volume (.npz)",
+        )),
+    }
+}
+
+/// The kind of a JSON file by the key that carries its version.
+fn json_kind(path: &Path) -> Result<FileKind, String> {
+    let bytes = files::read_file(path, MAX_LENS_BYTES).map_err(|why| why.to_string())?;
+    let text = String::from_utf8_lossy(&bytes);
+    let has = |key: &str| text.contains(&format!("\"{key}\""));
+    if has("aplanat_grin") {
+        Ok(FileKind::GrinField)
+    } else if has("aplanat_search") {
+        Ok(FileKind::Search)
+    } else if has("aplanat") {
+        Ok(FileKind::Lens)
+    } else {
+        Err(refusal(path, "is JSON without the key `aplanat`, which a lens of this program has"))
+    }
+}

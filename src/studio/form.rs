@@ -1,0 +1,40 @@
+//! Fields of the dialogs: numbers that are dragged or typed, and choices from a few.
+
+use egui::{ComboBox, DragValue, Response, Ui};
+
+use super::number;
+use crate::math::expression::evaluate;
+
+/// The digits of a number in a dialog.
+const DIGITS: i32 = 6;
+
+/// Shows a number that is dragged or typed, with arithmetic as in the table: `*2`, `1/3`.
+pub(super) fn number_field(ui: &mut Ui, name: &str, value: &mut f64, unit: &str) -> Response {
+    let old = *value;
+    let unit_of_text = unit.trim().to_owned();
+    let drag = DragValue::new(value)
+        .speed((0.005 * old.abs()).max(0.001))
+        .suffix(unit)
+        .custom_formatter(|value, _| number::format_digits(value, DIGITS))
+        .custom_parser(move |text| {
+            evaluate(text.trim().trim_end_matches(unit_of_text.as_str()), old).ok()
+        });
+    ui.add(drag).accessible_name(name)
+}
+
+/// Shows a choice from a few.
+pub(super) fn choice<T: PartialEq + Copy>(
+    ui: &mut Ui,
+    name: &str,
+    chosen: &mut T,
+    all: &[(T, &str)],
+) {
+    let title = all.iter().find(|(value, _)| value == chosen).map_or("", |(_, title)| *title);
+    let combo = ComboBox::from_id_salt(name).selected_text(title).width(190.0);
+    let shown = combo.show_ui(ui, |ui| {
+        for (value, title) in all {
+            ui.selectable_value(chosen, *value, *title);
+        }
+    });
+    shown.response.accessible_name(name);
+}
