@@ -44,7 +44,10 @@ pub enum ParaxialError {
     )]
     PupilAtInfinity,
     /// The lens is afocal, so that there is no f-number.
-    #[error("the aperture is an f-number, but the lens focuses nothing")]
+    #[error(
+        "the aperture is an f-number, but the lens focuses nothing; expected an entrance pupil \
+         diameter, or an element with a focal length"
+    )]
     Afocal,
     /// The object lies in the plane of the entrance pupil.
     #[error("the object lies in the plane of the entrance pupil, so that there is no beam")]

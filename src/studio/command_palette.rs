@@ -1,10 +1,12 @@
 //! The command palette: every command, panel, lens, file and setting, found by words.
 
 use egui::{
-    Align, Button, Context, Id, Key, Layout, Modal, Modifiers, ScrollArea, TextEdit, Ui, vec2,
+    Align, Align2, Button, Context, Id, Key, Layout, Modal, Modifiers, ScrollArea, TextEdit, Ui,
+    vec2,
 };
 
 use super::actions::Actions;
+use super::form::dialog_frame;
 use super::menu_items::{MenuContext, MenuItem};
 
 /// The number of items that are listed at most.
@@ -26,7 +28,9 @@ impl CommandPalette {
         actions: &mut Actions,
     ) -> bool {
         let mut chosen = None;
-        let modal = Modal::new(Id::unique("command palette")).show(context, |ui| {
+        let id = Id::unique("command palette");
+        let area = Modal::default_area(id).anchor(Align2::CENTER_TOP, vec2(0.0, 70.0));
+        let modal = Modal::new(id).area(area).frame(dialog_frame(context)).show(context, |ui| {
             ui.set_width(560.0);
             chosen = self.contents(ui, menus);
         });
@@ -59,7 +63,7 @@ impl CommandPalette {
         }
         let pressed = self.list(ui, &items, down || up);
         let chosen = if enter { Some(self.selected) } else { pressed };
-        items.into_iter().nth(chosen?)
+        items.into_iter().nth(chosen?).filter(MenuItem::is_enabled)
     }
 
     /// Shows the items; the index of one that was pressed.
@@ -85,16 +89,19 @@ fn show_item(ui: &mut Ui, item: &MenuItem, selected: bool) -> egui::Response {
     let shortcut = item.shortcut.map(|key| ui.ctx().format_shortcut(&key)).unwrap_or_default();
     let button = Button::new(format!("{}: {}", item.menu, item.title))
         .selected(selected)
-        .frame_when_inactive(false)
+        .frame_when_inactive(selected)
         .truncate()
         .shortcut_text(shortcut);
     let size = vec2(ui.available_width(), 22.0);
     let layout = Layout::left_to_right(Align::Center).with_main_justify(true);
-    let row = ui.allocate_ui_with_layout(size, layout, |ui| ui.add(button)).inner;
+    let row =
+        ui.allocate_ui_with_layout(size, layout, |ui| ui.add_enabled(item.is_enabled(), button));
+    let row = row.inner.on_disabled_hover_text("Not possible now: select a surface of an element.");
     if item.hint.is_empty() { row } else { row.on_hover_text(item.hint) }
 }
 
-/// The items that can be asked for and have all words of a text, those that begin with it first.
+/// The items that have all words of a text: those that can be asked for first, and among them those
+/// that begin with it.
 pub(super) fn found(items: Vec<MenuItem>, text: &str) -> Vec<MenuItem> {
     let text = text.to_lowercase();
     let words: Vec<&str> = text.split_whitespace().collect();
@@ -102,14 +109,14 @@ pub(super) fn found(items: Vec<MenuItem>, text: &str) -> Vec<MenuItem> {
         |item: &MenuItem| format!("{} {} {}", item.title, item.menu, item.hint).to_lowercase();
     let fits = |item: &MenuItem| {
         let name = name(item);
-        item.is_enabled() && words.iter().all(|word| name.contains(word))
+        words.iter().all(|word| name.contains(word))
     };
     let mut items: Vec<MenuItem> = items.into_iter().filter(fits).collect();
     let rank = |item: &MenuItem| {
         let title = item.title.to_lowercase();
         let begins = title.starts_with(text.trim());
         let has = words.iter().all(|word| title.contains(word));
-        (!begins, !has)
+        (!item.is_enabled(), !begins, !has)
     };
     items.sort_by_key(rank);
     items.truncate(MAX_ITEMS);

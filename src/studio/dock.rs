@@ -102,12 +102,17 @@ impl Dock {
 fn default_arrangement() -> Tree<PanelKind> {
     let mut tiles = Tiles::default();
     let mut pane = |kind: PanelKind| tiles.insert_pane(kind);
-    let [layout, slice, spot, pupil, table, optimizer, pareto, search, first, effects] = [
+    let [layout, slice, spot, pupil, table, system, zoom] = [
         PanelKind::Layout,
         PanelKind::Slice,
         PanelKind::Spot,
         PanelKind::Pupil,
         PanelKind::Prescription,
+        PanelKind::System,
+        PanelKind::Zoom,
+    ]
+    .map(&mut pane);
+    let [optimizer, pareto, search, first, effects] = [
         PanelKind::Optimizer,
         PanelKind::Pareto,
         PanelKind::Search,
@@ -119,6 +124,7 @@ fn default_arrangement() -> Tree<PanelKind> {
     let light = tiles.insert_tab_tile(vec![spot, pupil]);
     let better = tiles.insert_tab_tile(vec![optimizer, pareto, search]);
     let drawings = tiles.insert_tab_tile(vec![layout, slice]);
+    let table = tiles.insert_tab_tile(vec![table, system, zoom]);
     let table = row(&mut tiles, &[(table, 0.71), (facts, 0.29)]);
     let left = column(&mut tiles, &[(drawings, 0.52), (table, 0.48)]);
     let right = column(&mut tiles, &[(light, 0.44), (better, 0.56)]);

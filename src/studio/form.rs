@@ -1,12 +1,17 @@
 //! Fields of the dialogs: numbers that are dragged or typed, and choices from a few.
 
-use egui::{ComboBox, DragValue, Response, Ui};
+use egui::{ComboBox, Context, DragValue, Frame, Margin, Response, Ui};
 
 use super::number;
 use crate::math::expression::evaluate;
 
 /// The digits of a number in a dialog.
 const DIGITS: i32 = 6;
+
+/// The frame of a dialog.
+pub(super) fn dialog_frame(context: &Context) -> Frame {
+    Frame::popup(&context.global_style()).inner_margin(Margin::same(14))
+}
 
 /// Shows a number that is dragged or typed, with arithmetic as in the table: `*2`, `1/3`.
 pub(super) fn number_field(ui: &mut Ui, name: &str, value: &mut f64, unit: &str) -> Response {

@@ -1,6 +1,6 @@
 //! The manual: short pages of Markdown in a window of its own, with a search over their words.
 
-use egui::{Context, Id, ScrollArea, TextEdit, Ui, Window, vec2};
+use egui::{Align2, Context, Id, ScrollArea, TextEdit, Ui, Window, vec2};
 use egui_commonmark::{CommonMarkCache, CommonMarkViewer};
 
 /// The pages in their order; the title of each is its first line.
@@ -41,6 +41,8 @@ impl ManualWindow {
             .id(Id::unique("manual"))
             .open(&mut open)
             .collapsible(false)
+            .pivot(Align2::CENTER_CENTER)
+            .default_pos(context.content_rect().center())
             .default_size(vec2(760.0, 500.0));
         window.show(context, |ui| {
             ui.horizontal_top(|ui| {

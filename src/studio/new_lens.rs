@@ -3,7 +3,7 @@
 use egui::{Button, Context, DragValue, Grid, Id, Modal, RichText, Ui};
 
 use super::actions::Actions;
-use super::form::{choice, number_field};
+use super::form::{choice, dialog_frame, number_field};
 use super::number;
 use super::text::capitalize;
 use crate::lens::{
@@ -57,7 +57,8 @@ impl NewLensDialog {
     /// Shows the dialog; true once it is closed.
     pub(super) fn ui(&mut self, context: &Context, actions: &mut Actions) -> bool {
         let mut done = false;
-        let modal = Modal::new(Id::unique("new lens")).show(context, |ui| {
+        let modal = Modal::new(Id::unique("new lens")).frame(dialog_frame(context));
+        let modal = modal.show(context, |ui| {
             ui.set_width(430.0);
             ui.heading("New lens");
             ui.add_space(6.0);

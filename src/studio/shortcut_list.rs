@@ -1,6 +1,6 @@
 //! The list of keyboard shortcuts.
 
-use egui::{Context, Grid, Id, ScrollArea, Window, vec2};
+use egui::{Align2, Context, Grid, Id, ScrollArea, Window, vec2};
 
 use super::menu_items::MenuContext;
 
@@ -23,6 +23,8 @@ pub(super) fn ui(context: &Context, menus: &MenuContext<'_>) -> bool {
         .id(Id::unique("shortcuts"))
         .open(&mut open)
         .collapsible(false)
+        .pivot(Align2::CENTER_CENTER)
+        .default_pos(context.content_rect().center())
         .default_size(vec2(460.0, 520.0));
     window.show(context, |ui| {
         ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {

@@ -3,6 +3,7 @@
 #![expect(clippy::unwrap_used, reason = "a test that cannot prepare its case should fail")]
 #![expect(clippy::print_stdout, reason = "`--nocapture` shows how near the two drawings are")]
 
+mod begin;
 mod drawing;
 mod file_dialog;
 mod grin;

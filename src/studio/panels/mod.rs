@@ -1,6 +1,7 @@
 //! The panels of the window.
 
 mod cell_layout;
+mod edit_form;
 mod effects;
 mod first_order;
 pub(super) mod grin;
@@ -11,7 +12,9 @@ mod prescription;
 mod pupil;
 mod search;
 mod spot;
+mod system;
 mod widgets;
+mod zoom;
 
 pub use effects::EffectsPanel;
 pub use first_order::FirstOrderPanel;
@@ -24,6 +27,8 @@ pub(super) use prescription::first_radius_field;
 pub use pupil::PupilPanel;
 pub use search::SearchPanel;
 pub use spot::SpotPanel;
+pub use system::SystemPanel;
+pub use zoom::ZoomPanel;
 
 use std::sync::Arc;
 
@@ -76,11 +81,15 @@ pub enum PanelKind {
     FirstOrder,
     /// The physical effects that are computed, and why.
     Effects,
+    /// Aperture, fields, wavelengths, object and image.
+    System,
+    /// What differs between zoom positions.
+    Zoom,
 }
 
 impl PanelKind {
     /// Every panel. A new one is a file in this folder, an entry here and a place in the window.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 12] = [
         Self::Layout,
         Self::Slice,
         Self::Prescription,
@@ -91,6 +100,8 @@ impl PanelKind {
         Self::Search,
         Self::FirstOrder,
         Self::Effects,
+        Self::System,
+        Self::Zoom,
     ];
 
     /// A new panel of this kind.
@@ -106,6 +117,8 @@ impl PanelKind {
             Self::Search => Box::new(SearchPanel::default()),
             Self::FirstOrder => Box::new(FirstOrderPanel),
             Self::Effects => Box::new(EffectsPanel),
+            Self::System => Box::new(SystemPanel::default()),
+            Self::Zoom => Box::new(ZoomPanel::default()),
         }
     }
 }

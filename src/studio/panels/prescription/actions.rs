@@ -51,7 +51,7 @@ impl RowAction {
             Self::InsertAfter => Some(insert_edit(lens, row + 1)),
             Self::Remove => Some(Edit::RemoveRow(row)),
             Self::Flip => {
-                let (first, last) = element_around(lens, row)?;
+                let (first, last) = lens.element_around(row)?;
                 Some(Edit::ReverseRows { first, last })
             }
             Self::Stop => (!lens.surfaces.get(row)?.stop).then_some(Edit::SetStop(row)),
@@ -69,17 +69,6 @@ fn insert_edit(lens: &Lens, at: usize) -> Edit {
     Edit::InsertRow { at, row: Row { medium, semi_diameter, ..Row::default() } }
 }
 
-/// The first and the last surface of the glass to which a surface belongs, cemented ones together.
-fn element_around(lens: &Lens, row: usize) -> Option<(usize, usize)> {
-    let filled = |gap: usize| {
-        lens.surfaces.get(gap).is_some_and(|r| !matches!(r.medium, Medium::Air | Medium::Mirror))
-    };
-    let first = (0..row).rev().take_while(|gap| filled(*gap)).last().unwrap_or(row);
-    let last = (row..lens.surfaces.len()).take_while(|gap| filled(*gap)).last();
-    let last = last.map_or(row, |gap| gap + 1);
-    (first < last && last < lens.surfaces.len()).then_some((first, last))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -95,15 +84,15 @@ mod tests {
         let lens = double_gauss();
         let glass = |row: &Row| !matches!(row.medium, Medium::Air);
         let first = lens.surfaces.iter().position(glass).unwrap();
-        let (start, end) = element_around(&lens, first).unwrap();
-        assert!((start..=end).all(|row| element_around(&lens, row) == Some((start, end))));
+        let (start, end) = lens.element_around(first).unwrap();
+        assert!((start..=end).all(|row| lens.element_around(row) == Some((start, end))));
     }
 
     #[test]
     fn a_surface_in_air_has_nothing_to_flip() {
         let lens = double_gauss();
         let stop = lens.stop().unwrap();
-        let alone = element_around(&lens, stop).is_none();
+        let alone = lens.element_around(stop).is_none();
         assert_eq!(RowAction::Flip.edit(&lens, stop).is_none(), alone);
     }
 

@@ -14,6 +14,8 @@ use crate::lens::{Edit, Lens, Medium, Object, Parameter, Quantity, apply_edit};
 use crate::math::expression::evaluate;
 use crate::session::{Command, SessionView};
 use crate::studio::actions::Actions;
+use crate::studio::menu::show_items;
+use crate::studio::menu_items::element_items;
 use crate::studio::number;
 use crate::studio::palette::{Palette, color32};
 use crate::studio::panels::design_results;
@@ -241,6 +243,10 @@ impl PrescriptionTable<'_> {
                 ui.close();
             }
         }
+        ui.menu_button("Element", |ui| {
+            let items = element_items(&self.view.lens, Some(surface));
+            show_items(ui, 260.0, items, self.actions);
+        });
         ui.separator();
         let hyper = self.view.lens.surfaces[surface].hyperhemisphere;
         if ui.selectable_label(hyper, "Hyper-hemisphere").clicked() {

@@ -1,0 +1,229 @@
+//! The rows of the table: names, focal lengths, and what varies: thicknesses, aperture, fields.
+
+use egui::{Button, RichText, Ui};
+
+use crate::lens::{
+    Aperture, Edit, FieldPoint, Fields, Lens, Parameter, Quantity, ZoomPosition, ZoomThickness,
+};
+use crate::paraxial::{Beam, first_order};
+use crate::session::Command;
+use crate::studio::actions::Actions;
+use crate::studio::number;
+use crate::studio::panels::edit_form::EditForm;
+use crate::studio::panels::system::{aperture_kind, aperture_value, aperture_with_value};
+use crate::studio::panels::zoom_name;
+
+/// The width of a number, in points.
+const WIDTH: f32 = 82.0;
+
+/// Shows the rows, a column for each position.
+pub(super) fn ui(ui: &mut Ui, form: &mut EditForm<'_>) {
+    header(ui, form);
+    names(ui, form);
+    let lens = form.view.lens.clone();
+    for surface in varied_gaps(&lens) {
+        gap(ui, form, surface);
+    }
+    if lens.zoom.iter().any(|position| position.aperture.is_some()) {
+        aperture(ui, form);
+    }
+    if lens.zoom.iter().any(|position| position.fields.is_some()) {
+        fields(ui, form);
+    }
+    first_order_rows(ui, &lens);
+}
+
+/// The surfaces behind which the gap varies.
+fn varied_gaps(lens: &Lens) -> Vec<usize> {
+    let has = |surface: &usize| {
+        lens.zoom.iter().any(|zoom| zoom.thicknesses.iter().any(|gap| gap.surface == *surface))
+    };
+    (0..lens.surfaces.len()).filter(has).collect()
+}
+
+fn header(ui: &mut Ui, form: &mut EditForm<'_>) {
+    ui.weak("Position");
+    for zoom in 0..form.view.lens.zoom.len() {
+        let shown = form.view.settings.zoom == zoom;
+        let name = RichText::new((zoom + 1).to_string()).strong();
+        let label = ui.selectable_label(shown, name);
+        let label = label.accessible_name(format!("Show position {}", zoom + 1));
+        if label.on_hover_text("Show this position in all panels").clicked() {
+            form.actions.push(Command::ShowZoom(zoom));
+        }
+    }
+    ui.end_row();
+}
+
+fn names(ui: &mut Ui, form: &mut EditForm<'_>) {
+    ui.label("Name");
+    let lens = form.view.lens.clone();
+    for (at, position) in lens.zoom.iter().enumerate() {
+        let name = format!("Name of position {}", at + 1);
+        let renamed =
+            |text: &str| ZoomPosition { name: text.trim().to_owned(), ..position.clone() };
+        form.text(ui, &name, (&position.name, WIDTH), |text| {
+            Ok(Edit::SetZoom { at, position: renamed(text) })
+        })
+        .on_hover_text(zoom_name(&lens, at));
+    }
+    ui.end_row();
+}
+
+fn gap(ui: &mut Ui, form: &mut EditForm<'_>, surface: usize) {
+    let lens = form.view.lens.clone();
+    ui.label(format!("Thickness after surface {}", surface + 1));
+    for zoom in 0..lens.zoom.len() {
+        let name = format!("Thickness after surface {} at position {}", surface + 1, zoom + 1);
+        let value = lens.thickness_at(surface, zoom).unwrap_or(0.0);
+        let parameter = Parameter::new(surface, Quantity::ZoomThickness(zoom));
+        form.number(ui, &name, (value, WIDTH), |value| Edit::Set { parameter, value });
+    }
+    same_button(ui, form, &format!("the thickness after surface {}", surface + 1), |lens| {
+        lens.surfaces[surface].thickness = lens.thickness_at(surface, 0).unwrap_or(0.0);
+        for position in &mut lens.zoom {
+            position.thicknesses.retain(|gap| gap.surface != surface);
+        }
+    });
+    ui.end_row();
+}
+
+fn aperture(ui: &mut Ui, form: &mut EditForm<'_>) {
+    let lens = form.view.lens.clone();
+    ui.label(aperture_kind(lens.aperture).0);
+    for (at, position) in lens.zoom.iter().enumerate() {
+        let name = format!("Aperture of position {}", at + 1);
+        let own = lens.aperture_at(at);
+        let changed = |aperture: Aperture| Edit::SetZoom {
+            at,
+            position: ZoomPosition { aperture: Some(aperture), ..position.clone() },
+        };
+        form.number(ui, &name, (aperture_value(own), WIDTH), |value| {
+            changed(aperture_with_value(own, value))
+        })
+        .on_hover_text(aperture_kind(own).0);
+    }
+    same_button(ui, form, "the aperture", |lens| {
+        lens.zoom.iter_mut().for_each(|position| position.aperture = None);
+    });
+    ui.end_row();
+}
+
+fn fields(ui: &mut Ui, form: &mut EditForm<'_>) {
+    let lens = form.view.lens.clone();
+    ui.label("Largest field");
+    for (at, position) in lens.zoom.iter().enumerate() {
+        let name = format!("Largest field of position {}", at + 1);
+        let fields = lens.fields_at(at);
+        let largest = largest(fields);
+        form.number(ui, &name, (largest, WIDTH), |value| {
+            let fields = Some(scaled(fields, value, largest));
+            Edit::SetZoom { at, position: ZoomPosition { fields, ..position.clone() } }
+        })
+        .on_hover_text("All fields of the position are scaled with it");
+    }
+    same_button(ui, form, "the fields", |lens| {
+        lens.zoom.iter_mut().for_each(|position| position.fields = None);
+    });
+    ui.end_row();
+}
+
+fn largest(fields: &Fields) -> f64 {
+    fields.values.iter().fold(0.0, |largest: f64, field| largest.max(field.x.hypot(field.y)))
+}
+
+/// The fields with another largest one; those that all lie on the axis become equal-area steps.
+fn scaled(fields: &Fields, value: f64, largest: f64) -> Fields {
+    if largest == 0.0 {
+        return Fields::equal_area(fields.kind, value, fields.values.len());
+    }
+    let by = value / largest;
+    let scale = |field: &FieldPoint| FieldPoint { x: by * field.x, y: by * field.y, ..*field };
+    Fields { kind: fields.kind, values: fields.values.iter().map(scale).collect() }
+}
+
+/// Shows a button that makes something the same at all positions, as at the first one.
+fn same_button(ui: &mut Ui, form: &mut EditForm<'_>, what: &str, change: impl Fn(&mut Lens)) {
+    let button = ui.add(Button::new("✕").small());
+    let name = format!("Do not vary {what}");
+    if button.accessible_name(&name).on_hover_text(&name).clicked() {
+        let mut lens = Lens::clone(&form.view.lens);
+        change(&mut lens);
+        let zooms = |parameter: Parameter| match parameter.quantity {
+            Quantity::ZoomThickness(_) if lens.get(parameter).is_none() => None,
+            _ => Some(parameter),
+        };
+        let mut kept = lens.clone();
+        kept.map_parameters(zooms);
+        form.actions.push(Edit::Replace(Box::new(kept)));
+    }
+}
+
+/// The focal length and the f-number of each position, which cannot be typed.
+fn first_order_rows(ui: &mut Ui, lens: &Lens) {
+    let um = lens.wavelengths[lens.primary()].um;
+    let data = |zoom: usize| {
+        let system = lens.resolve(zoom, um).ok()?;
+        first_order(&system, &Beam::for_lens(lens, zoom)).ok()
+    };
+    let data: Vec<_> = (0..lens.zoom.len()).map(data).collect();
+    let text = |value: Option<f64>| {
+        value.map_or_else(|| "none".to_owned(), |value| number::format_digits(value, 6))
+    };
+    for name in ["Focal length, mm", "f-number"] {
+        ui.weak(name);
+        for first in &data {
+            let first = first.as_ref();
+            let value = if name == "f-number" {
+                first.and_then(|first| first.working_f_number)
+            } else {
+                first.and_then(|first| first.efl)
+            };
+            ui.weak(text(value));
+        }
+        ui.end_row();
+    }
+}
+
+/// Shows the menu of everything that can vary between the positions and does not yet.
+pub(super) fn vary_menu(ui: &mut Ui, lens: &Lens, actions: &mut Actions) {
+    let menu = ui.menu_button("Vary", |ui| {
+        ui.set_min_width(230.0);
+        let varied = varied_gaps(lens);
+        for (surface, row) in lens.surfaces.iter().enumerate() {
+            let text = format!("Thickness after surface {}", surface + 1);
+            let text =
+                if row.comment.is_empty() { text } else { format!("{text} ({})", row.comment) };
+            vary_item(ui, &text, varied.contains(&surface), lens, actions, |_, position| {
+                let thickness = row.thickness;
+                position.thicknesses.push(ZoomThickness { surface, thickness });
+            });
+        }
+        ui.separator();
+        let has = lens.zoom.iter().any(|position| position.aperture.is_some());
+        vary_item(ui, "Aperture", has, lens, actions, |lens, position| {
+            position.aperture = Some(lens.aperture);
+        });
+        let has = lens.zoom.iter().any(|position| position.fields.is_some());
+        vary_item(ui, "Fields", has, lens, actions, |lens, position| {
+            position.fields = Some(lens.fields.clone());
+        });
+    });
+    menu.response.on_hover_text("Choose what is different from position to position");
+}
+
+fn vary_item(
+    ui: &mut Ui,
+    text: &str,
+    varied: bool,
+    lens: &Lens,
+    actions: &mut Actions,
+    vary: impl Fn(&Lens, &mut ZoomPosition),
+) {
+    if ui.add_enabled(!varied, Button::new(text)).clicked() {
+        let mut changed = lens.clone();
+        changed.zoom.iter_mut().for_each(|position| vary(lens, position));
+        actions.push(Edit::Replace(Box::new(changed)));
+        ui.close();
+    }
+}

@@ -1,0 +1,349 @@
+//! A lens begun from nothing: the dialogs, the system, zoom positions, the command palette.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use aplanat::lens::{
+    Aperture, Edit, ElementEdit, ElementForm, FieldKind, Fields, Lens, Object, StartingForm,
+    StartingLens, WavelengthPreset, apply_edit,
+};
+use aplanat::session::{Command, Session, SessionView};
+use aplanat::studio::Studio;
+use aplanat::studio::draw::RenderBackend;
+use aplanat::studio::panels::{Panel, PrescriptionPanel, SystemPanel, ZoomPanel};
+use aplanat::studio::theme;
+use aplanat::studio::window::Persistence;
+use egui::{Key, Modifiers};
+use egui_kittest::Harness;
+use egui_kittest::kittest::Queryable;
+
+use crate::harness::{PanelState, double_gauss, panel_harness, view_of};
+
+fn starting(form: StartingForm) -> Lens {
+    let starting = StartingLens {
+        form,
+        focal_length: 50.0,
+        aperture: Aperture::FNumber(4.0),
+        fields: Fields::equal_area(FieldKind::Angle, 10.0, 3),
+        wavelengths: WavelengthPreset::ALL[0].wavelengths(),
+        object: Object::Infinity,
+    };
+    starting.lens().unwrap()
+}
+
+fn achromat() -> Lens {
+    starting(StartingForm::Element(ElementForm::CementedDoublet))
+}
+
+/// The window on a lens, without waiting for its numbers.
+fn window(lens: Lens) -> Harness<'static, Studio> {
+    let session = Session::new(lens, || {}).unwrap();
+    let studio = Studio::new(session, RenderBackend::Software, Persistence::Disabled, None);
+    let builder = Harness::builder().with_size([1280.0, 800.0]).with_context_setup(theme::apply);
+    let mut harness = builder.build_ui_state(|ui, studio: &mut Studio| studio.ui(ui), studio);
+    harness.run_steps(2);
+    harness
+}
+
+fn press(harness: &mut Harness<'_, Studio>, label: &str) {
+    harness.get_by_label(label).click();
+    harness.run_steps(3);
+}
+
+fn keys(harness: &mut Harness<'_, Studio>, modifiers: Modifiers, key: Key) {
+    harness.key_press_modifiers(modifiers, key);
+    harness.run_steps(3);
+}
+
+fn lens(harness: &Harness<'_, Studio>) -> Arc<Lens> {
+    Arc::clone(harness.state().session().lens())
+}
+
+#[test]
+fn a_new_lens_comes_from_the_dialog() {
+    let mut harness = window(double_gauss());
+    keys(&mut harness, Modifiers::COMMAND, Key::N);
+    press(&mut harness, "Nothing");
+    press(&mut harness, "Create");
+    let lens = lens(&harness);
+    assert_eq!((lens.surfaces.len(), lens.fields.values.len()), (1, 3));
+    assert_eq!(lens.aperture, Aperture::EntrancePupilDiameter(12.5));
+    assert!(harness.query_by_label("Create").is_none(), "the dialog is closed");
+    assert!(harness.state().session().view().messages.is_empty());
+}
+
+#[test]
+fn an_impossible_new_lens_cannot_be_created() {
+    let mut harness = window(double_gauss());
+    keys(&mut harness, Modifiers::COMMAND, Key::N);
+    press(&mut harness, "at");
+    harness.get_by_label("Object distance of the new lens").focus();
+    harness.run_steps(2);
+    harness.get_by_label("Object distance of the new lens").type_text("30");
+    harness.run_steps(2);
+    keys(&mut harness, Modifiers::NONE, Key::Enter);
+    harness.get_by_label_contains("Object distance is");
+    press(&mut harness, "Create");
+    assert_eq!(*lens(&harness), double_gauss());
+}
+
+#[test]
+fn an_element_is_added_with_a_preview_and_as_one_step() {
+    let mut harness = window(starting(StartingForm::Empty));
+    keys(&mut harness, Modifiers::COMMAND | Modifiers::SHIFT, Key::A);
+    assert!(harness.state().session().view().preview_lens.is_some(), "shown before it is added");
+    press(&mut harness, "Apply");
+    assert_eq!(lens(&harness).surfaces.len(), 3);
+    assert!(harness.state().session().view().preview_lens.is_none());
+    press(&mut harness, "Undo");
+    assert_eq!(lens(&harness).surfaces.len(), 1);
+    keys(&mut harness, Modifiers::COMMAND | Modifiers::SHIFT, Key::A);
+    press(&mut harness, "Cancel");
+    assert!(harness.state().session().view().preview_lens.is_none());
+    assert_eq!(lens(&harness).surfaces.len(), 1);
+}
+
+#[test]
+fn the_element_menu_applies_to_the_selected_element() {
+    let mut harness = window(achromat());
+    harness.state_mut().session_mut().apply(Command::Select(Some(2)));
+    harness.run_steps(2);
+    press(&mut harness, "Element");
+    press(&mut harness, "Split the element");
+    let apart = apply_edit(&achromat(), &Edit::Element(ElementEdit::Split(2))).unwrap();
+    assert_eq!(*lens(&harness), apart);
+    keys(&mut harness, Modifiers::COMMAND, Key::J);
+    assert_eq!(lens(&harness).surfaces.len(), 4, "cemented again by its key");
+}
+
+#[test]
+fn the_palette_finds_commands_panels_and_lenses_by_words() {
+    let mut harness = window(achromat());
+    for (words, found) in [
+        ("zemax", "File: Export for Zemax…"),
+        ("pareto view", "View: Pareto front"),
+        ("triplet", "Lens: Triplet 100 mm f/2.7"),
+        ("light theme", "Setting: Light theme"),
+        ("focal scale", "Element: Scale to a focal length…"),
+    ] {
+        keys(&mut harness, Modifiers::COMMAND, Key::K);
+        harness.get_by_label("Find a command").type_text(words);
+        harness.run_steps(3);
+        harness.get_by_label_contains(found);
+        keys(&mut harness, Modifiers::NONE, Key::Escape);
+        assert!(harness.query_by_label("Find a command").is_none());
+    }
+    keys(&mut harness, Modifiers::COMMAND, Key::K);
+    harness.get_by_label("Find a command").type_text("triplet");
+    harness.run_steps(2);
+    keys(&mut harness, Modifiers::NONE, Key::Enter);
+    assert_eq!(lens(&harness).surfaces.len(), 7, "Enter opens it");
+}
+
+#[test]
+fn help_has_a_manual_and_the_shortcuts() {
+    let mut harness = window(achromat());
+    keys(&mut harness, Modifiers::NONE, Key::F1);
+    harness.get_by_label("Search the manual").type_text("cemented");
+    harness.run_steps(3);
+    press(&mut harness, "Whole elements");
+    harness.get_by_label_contains("Bend");
+    press(&mut harness, "Help");
+    press(&mut harness, "Keyboard shortcuts");
+    harness.get_by_label("Ctrl+K");
+}
+
+fn panel<P: Panel + 'static>(panel: P, lens: Lens) -> Harness<'static, PanelState<P>> {
+    let mut harness = panel_harness(panel, view_of(lens));
+    harness.run_steps(3);
+    harness
+}
+
+fn type_into<P: Panel>(harness: &mut Harness<'_, PanelState<P>>, field: &str, text: &str) {
+    harness.get_by_label(field).focus();
+    harness.run_steps(2);
+    harness.get_by_label(field).type_text(text);
+    harness.run_steps(2);
+    harness.key_press(Key::Enter);
+    harness.run_steps(2);
+}
+
+fn click<P: Panel>(harness: &mut Harness<'_, PanelState<P>>, label: &str) {
+    harness.get_by_label(label).click();
+    harness.run_steps(3);
+}
+
+/// The lens after all edits that a panel asked for.
+fn edited<P>(harness: &Harness<'_, PanelState<P>>) -> Lens {
+    let state = harness.state();
+    let mut lens = Lens::clone(&state.view.lens);
+    for command in &state.commands {
+        if let Command::Edit(edit) = command {
+            lens = apply_edit(&lens, edit).unwrap();
+        }
+    }
+    lens
+}
+
+#[test]
+fn the_system_panel_edits_aperture_fields_and_wavelengths() {
+    let mut harness = panel(SystemPanel::default(), achromat());
+    type_into(&mut harness, "Aperture value", "*2");
+    type_into(&mut harness, "Field 3 y", "12");
+    assert_eq!(edited(&harness).aperture, Aperture::FNumber(8.0));
+    assert_eq!(edited(&harness).fields.values[2].y, 12.0);
+
+    let mut harness = panel(SystemPanel::default(), achromat());
+    click(&mut harness, "Delete field 2");
+    assert_eq!(edited(&harness).fields.values.len(), 2);
+
+    let mut harness = panel(SystemPanel::default(), achromat());
+    click(&mut harness, "Primary wavelength 3");
+    assert_eq!(edited(&harness).primary(), 2);
+
+    let mut harness = panel(SystemPanel::default(), achromat());
+    click(&mut harness, "Delete wavelength 2");
+    assert_eq!(edited(&harness).wavelengths.len(), 2);
+    assert_eq!(edited(&harness).wavelengths.iter().filter(|w| w.primary).count(), 1);
+}
+
+#[test]
+fn another_kind_of_aperture_keeps_the_beam() {
+    let mut harness = panel(SystemPanel::default(), achromat());
+    click(&mut harness, "Aperture kind");
+    click(&mut harness, "Entrance pupil diameter");
+    let Aperture::EntrancePupilDiameter(diameter) = edited(&harness).aperture else {
+        panic!("{:?}", edited(&harness).aperture)
+    };
+    assert!((diameter - 12.5).abs() < 1e-9, "{diameter}");
+}
+
+#[test]
+fn another_kind_of_field_keeps_the_directions() {
+    let mut harness = panel(SystemPanel::default(), achromat());
+    click(&mut harness, "Field kind");
+    click(&mut harness, "Paraxial image height");
+    let fields = edited(&harness).fields;
+    assert_eq!(fields.kind, FieldKind::ImageHeight);
+    assert!((fields.values[2].y - 50.0 * 10_f64.to_radians().tan()).abs() < 1e-9);
+}
+
+#[test]
+fn the_object_comes_near_and_goes_far_again() {
+    let mut harness = panel(SystemPanel::default(), achromat());
+    click(&mut harness, "At");
+    assert_eq!(edited(&harness).object, Object::Finite(500.0));
+    let near = edited(&harness);
+    let mut harness = panel(SystemPanel::default(), near);
+    click(&mut harness, "At infinity");
+    assert_eq!(edited(&harness).object, Object::Infinity);
+}
+
+#[test]
+fn a_refused_number_stays_in_its_field_with_the_reason() {
+    let mut harness = panel(SystemPanel::default(), achromat());
+    type_into(&mut harness, "Aperture value", "0");
+    assert!(harness.state().commands.is_empty());
+    assert_eq!(harness.get_by_label("Aperture value").value().as_deref(), Some("0"));
+    harness.get_by_label_contains("F-number is 0; expected");
+}
+
+fn zoom_lens() -> Lens {
+    let mut lens = achromat();
+    lens.zoom = vec![Default::default(), Default::default()];
+    lens
+}
+
+#[test]
+fn zoom_positions_are_added_varied_and_edited() {
+    let mut harness = panel(ZoomPanel::default(), achromat());
+    click(&mut harness, "Add position");
+    assert_eq!(edited(&harness).zoom.len(), 1);
+
+    let mut harness = panel(ZoomPanel::default(), zoom_lens());
+    click(&mut harness, "Vary");
+    click(&mut harness, "Aperture");
+    let varied = edited(&harness);
+    assert!(varied.zoom.iter().all(|position| position.aperture == Some(varied.aperture)));
+
+    let mut harness = panel(ZoomPanel::default(), varied);
+    type_into(&mut harness, "Aperture of position 2", "8");
+    type_into(&mut harness, "Name of position 1", "Wide");
+    let lens = edited(&harness);
+    assert_eq!(lens.aperture_at(1), Aperture::FNumber(8.0));
+    assert_eq!(lens.zoom[0].name, "Wide");
+    click(&mut harness, "Do not vary the aperture");
+    assert!(edited(&harness).zoom.iter().all(|position| position.aperture.is_none()));
+}
+
+#[test]
+fn playing_goes_through_the_positions() {
+    let mut harness = panel(ZoomPanel::default(), zoom_lens());
+    click(&mut harness, "Play");
+    harness.run_steps(40);
+    let shown = |command: &Command| matches!(command, Command::ShowZoom(1));
+    assert!(harness.state().commands.iter().any(shown), "{:?}", harness.state().commands);
+    click(&mut harness, "Stop");
+}
+
+#[test]
+fn a_table_row_has_the_menu_of_its_element() {
+    let mut harness = panel(PrescriptionPanel::default(), achromat());
+    harness.get_by_label("Row of surface 2").click_secondary();
+    harness.run_steps(3);
+    click(&mut harness, "Element");
+    click(&mut harness, "Remove the element");
+    assert_eq!(edited(&harness).surfaces.len(), 1);
+}
+
+#[test]
+fn an_empty_lens_shows_no_error_in_any_panel() {
+    let view: SessionView = view_of(starting(StartingForm::Empty));
+    let results = view.results.as_ref().unwrap();
+    assert!(results.analyses.is_ok(), "{:?}", results.analyses.as_ref().err());
+}
+
+/// A file that is dropped on the window.
+#[derive(Debug)]
+struct Dropped(PathBuf);
+
+impl egui::DroppedFile for Dropped {
+    fn path(&self) -> &std::path::Path {
+        &self.0
+    }
+
+    fn bytes(&self) -> Result<Vec<u8>, String> {
+        std::fs::read(&self.0).map_err(|why| why.to_string())
+    }
+}
+
+fn drop_file(harness: &mut Harness<'_, Studio>, path: PathBuf) {
+    harness.input_mut().dropped_files.push(Arc::new(Dropped(path)));
+    harness.run_steps(3);
+}
+
+#[test]
+fn a_dropped_lens_is_opened_and_remembered_and_another_file_refused_by_name() {
+    let folder = std::env::temp_dir().join(format!("aplanat-drop-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    let path = folder.join("achromat.json");
+    aplanat::files::save(&achromat(), &path).unwrap();
+    let mut harness = window(double_gauss());
+    drop_file(&mut harness, path.clone());
+    assert_eq!(*lens(&harness), achromat());
+    press(&mut harness, "File");
+    press(&mut harness, "Recent files");
+    harness.get_by_label(&path.display().to_string());
+    keys(&mut harness, Modifiers::NONE, Key::Escape);
+
+    let other = folder.join("picture.png");
+    std::fs::write(&other, b"no picture").unwrap();
+    drop_file(&mut harness, other);
+    harness.get_by_label_contains("`picture.png` is a picture");
+    press(&mut harness, "OK");
+    let text = folder.join("letter.txt");
+    std::fs::write(&text, b"dear").unwrap();
+    drop_file(&mut harness, text);
+    harness.get_by_label_contains("`letter.txt` is none of the files");
+    std::fs::remove_dir_all(folder).unwrap();
+}
