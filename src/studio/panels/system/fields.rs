@@ -130,7 +130,7 @@ fn table(ui: &mut Ui, form: &mut EditForm<'_>) {
 
 /// Shows a small button that deletes a row; true if it was pressed.
 pub(super) fn delete_button(ui: &mut Ui, name: &str, enabled: bool) -> bool {
-    let button = ui.add_enabled(enabled, Button::new("✕").small()).accessible_name(name);
+    let button = ui.add_enabled(enabled, Button::new("×").small()).accessible_name(name);
     button.on_hover_text(name).on_disabled_hover_text("The last one stays.").clicked()
 }
 

@@ -144,7 +144,7 @@ fn scaled(fields: &Fields, value: f64, largest: f64) -> Fields {
 
 /// Shows a button that makes something the same at all positions, as at the first one.
 fn same_button(ui: &mut Ui, form: &mut EditForm<'_>, what: &str, change: impl Fn(&mut Lens)) {
-    let button = ui.add(Button::new("✕").small());
+    let button = ui.add(Button::new("×").small());
     let name = format!("Do not vary {what}");
     if button.accessible_name(&name).on_hover_text(&name).clicked() {
         let mut lens = Lens::clone(&form.view.lens);
