@@ -5,6 +5,7 @@
 //! computed in parallel; the results are in the order of the lens, whatever the number of threads.
 //! A field without light gives an [`AnalysisError`] with the reason, never a NaN.
 
+mod clear_semi_diameters;
 mod distortion;
 mod fan;
 mod illumination;
@@ -18,6 +19,7 @@ mod spot;
 mod spot_points;
 mod wavefront;
 
+pub use clear_semi_diameters::clear_semi_diameters;
 pub use distortion::{Distortion, FieldCurvature, distortion, field_curvature};
 pub use fan::{Fan, FanPoint, fan};
 pub use illumination::{Illumination, energy_irradiance, illumination, irradiance};

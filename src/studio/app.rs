@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use eframe::{App, Storage};
 use egui::{
-    Align, CentralPanel, Context, Frame, Id, Label, Layout, Margin, Modal, Panel as Side, Response,
-    RichText, ScrollArea, Ui, ViewportCommand,
+    Align, CentralPanel, Context, Frame, Id, Label, Layout, Margin, Modal, Panel as Side, RawInput,
+    Response, RichText, ScrollArea, Ui, ViewportCommand,
 };
 
 use super::actions::{Actions, UiAction};
@@ -16,6 +16,7 @@ use super::dropped;
 use super::element_dialog::place_for_element;
 use super::experiment_window::ExperimentWindow;
 use super::file_dialog::{FileDialog, FileRequest};
+use super::input_order::InputQueue;
 use super::menu;
 use super::menu_items::{MenuContext, PanelState};
 use super::panels::PanelKind;
@@ -52,6 +53,7 @@ pub struct Studio {
     pub(super) pending: Option<PendingState>,
     /// A message that does not fit into the status bar.
     message: Option<String>,
+    input: InputQueue,
     title: String,
     /// True if the window closes without asking about unsaved changes.
     pub(super) closing: bool,
@@ -76,6 +78,7 @@ impl Studio {
             persistence,
             pending: None,
             message: None,
+            input: InputQueue::default(),
             title: String::new(),
             closing: false,
         }
@@ -277,6 +280,12 @@ impl Studio {
 }
 
 impl App for Studio {
+    fn raw_input_hook(&mut self, context: &Context, input: &mut RawInput) {
+        if self.input.limit(input) {
+            context.request_repaint();
+        }
+    }
+
     fn ui(&mut self, ui: &mut Ui, _frame: &mut eframe::Frame) {
         Self::ui(self, ui);
     }

@@ -16,6 +16,7 @@ mod experiment_window;
 pub mod file_dialog;
 mod form;
 mod manual;
+pub mod input_order;
 mod menu;
 mod menu_items;
 mod new_lens;

@@ -116,6 +116,13 @@ impl EditBuffers {
         self.buffers.iter().any(|draft| Some(draft.input) == cursor)
     }
 
+    /// Replaces the text that is being typed into a field.
+    pub fn replace(&mut self, field: Id, text: String) {
+        if let Some(draft) = self.buffers.iter_mut().find(|draft| draft.input == field) {
+            draft.text = text;
+        }
+    }
+
     fn store(&mut self, field: Id, shown: &str, text: &str) {
         let at = self.buffers.iter().position(|draft| draft.input == field);
         let at = at.unwrap_or_else(|| {

@@ -9,6 +9,7 @@ mod file_dialog;
 mod grin;
 mod harness;
 mod panels;
+mod prescription;
 mod search;
 mod shaders;
 mod unsaved;

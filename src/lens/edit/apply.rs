@@ -63,6 +63,8 @@ impl Lens {
             Edit::SetZoom { at, position } => self.zoom_mut(*at)?.clone_from(position),
             Edit::SetMerit(goal) => self.merit.clone_from(goal),
             Edit::Replace(lens) => self.clone_from(lens),
+            Edit::Sequence { edits, .. } => edits.iter().try_for_each(|edit| self.apply(edit))?,
+            Edit::SetObstruction { surface, value } => self.row_mut(*surface)?.obstruction = *value,
         }
         Ok(())
     }

@@ -144,6 +144,20 @@ pub enum Edit {
     SetMerit(Option<Goal>),
     /// Replaces the whole lens.
     Replace(Box<Lens>),
+    /// Several edits one after the other; only the lens after the last one must be valid.
+    Sequence {
+        /// The title in a menu.
+        title: String,
+        /// The edits, in order.
+        edits: Vec<Edit>,
+    },
+    /// Sets the radius of the central obstruction of a surface; without one it blocks no ray.
+    SetObstruction {
+        /// The surface.
+        surface: usize,
+        /// The radius, in mm.
+        value: Option<f64>,
+    },
 }
 
 /// The cell of a table to which an edit writes; consecutive edits of one cell are one undo step.
@@ -222,6 +236,10 @@ impl Edit {
             Self::SetZoom { at, .. } => format!("zoom position {}", at + 1),
             Self::SetMerit(_) => "merit function".to_owned(),
             Self::Replace(_) => "replace the lens".to_owned(),
+            Self::Sequence { title, .. } => title.clone(),
+            Self::SetObstruction { surface, .. } => {
+                format!("obstruction of surface {}", number(surface))
+            }
         }
     }
 }

@@ -49,6 +49,9 @@ pub struct Analyses {
     pub plan: Timed<EffectPlan>,
     /// The rays of the layout.
     pub layout: Timed<RayLayout>,
+    /// The clear semi-diameters: the largest distance from the axis at which light of any field,
+    /// wavelength and zoom position meets each surface, the image plane last, in mm.
+    pub semi_diameters: Timed<Vec<f64>>,
     /// The points of the spot diagrams, in the order of fields and then wavelengths.
     pub spot_points: Timed<Vec<SpotPoints>>,
     /// The spot of each field.
@@ -180,7 +183,7 @@ fn analyze_unless(
     match ray_model.value {
         Ok(value) => {
             let ray_model = Timed { value: Arc::new(value), ms: ray_model.ms };
-            Analyses::of(ray_model, plan, settings, interrupted).map(Ok)
+            Analyses::of(lens, ray_model, plan, settings, interrupted).map(Ok)
         }
         Err(error) => Some(Err(error.to_string())),
     }
@@ -197,6 +200,7 @@ const FAN_POINTS: usize = 65;
 impl Analyses {
     /// Computes all analyses, those that are looked at first in front. `None` if interrupted.
     fn of(
+        lens: &Lens,
         ray_model: Timed<Arc<RayModel>>,
         plan: Timed<EffectPlan>,
         settings: &AnalysisSettings,
@@ -206,6 +210,8 @@ impl Analyses {
         let b = Arc::clone(&ray_model.value);
         let accuracy = Accuracy { tolerance: settings.tolerance, ..Accuracy::default() };
         let layout = time(|| analysis::ray_layout(&b, settings.rays));
+        unless_interrupted()?;
+        let semi_diameters = time(|| all_semi_diameters(lens, &b, settings.zoom));
         unless_interrupted()?;
         let scatter = time(|| analysis::spot_points(&b));
         unless_interrupted()?;
@@ -229,6 +235,7 @@ impl Analyses {
             ray_model,
             plan,
             layout,
+            semi_diameters,
             spot_points: scatter,
             spots,
             pupils,
@@ -236,6 +243,15 @@ impl Analyses {
             illumination,
         })
     }
+}
+
+/// The clear semi-diameters over all zoom positions; one at which nothing can be traced counts for
+/// nothing.
+fn all_semi_diameters(lens: &Lens, shown: &RayModel, zoom: usize) -> Vec<f64> {
+    let others = (0..lens.zoom_positions()).filter(|position| *position != zoom);
+    let others: Vec<RayModel> =
+        others.filter_map(|position| RayModel::from_lens(lens, position).ok()).collect();
+    analysis::clear_semi_diameters(others.iter().chain([shown]))
 }
 
 /// The spot of a field, with the time of its estimates.

@@ -196,7 +196,8 @@ impl LayoutDrawing {
         let (model, layout) = (&numbers.ray_model.value, &numbers.layout.value);
         let palette = source.palette;
         let system = model.channels[model.primary].system.clone();
-        let section = SectionDrawing::new(&system, &layout.ray_heights);
+        let reached = &numbers.semi_diameters.value;
+        let section = SectionDrawing::new(&system, reached);
         let mut scene = Scene::on(palette.background);
         if let Some(Ok(design)) = source.reference.as_ref().map(|reference| &reference.analyses) {
             draw_reference(&mut scene, design, &palette);
@@ -211,7 +212,7 @@ impl LayoutDrawing {
         Some(Self {
             scene: Arc::new(scene),
             full_view: full_view(&section, layout)?,
-            reached: layout.ray_heights.clone(),
+            reached: reached.clone(),
             fates: layout.fates,
             fields_without_rays: layout.errors.clone(),
             added_glass: added.len(),
@@ -266,8 +267,7 @@ impl LayoutDrawing {
 fn draw_reference(scene: &mut Scene, design: &Analyses, palette: &Palette) {
     let model = &design.ray_model.value;
     let system = &model.channels[model.primary].system;
-    SectionDrawing::new(system, &design.layout.value.ray_heights)
-        .draw_reference(scene, palette.faint);
+    SectionDrawing::new(system, &design.semi_diameters.value).draw_reference(scene, palette.faint);
 }
 
 /// The lowest and the highest place of the image plane that rays reach, with some room.

@@ -59,14 +59,13 @@ impl RowAction {
     }
 }
 
-/// A plane surface that divides the gap in front of row `at` and leaves the light as it is.
-fn insert_edit(lens: &Lens, at: usize) -> Edit {
+/// A plane surface that divides the gap in front of row `at` and leaves the light as it is: its
+/// semi-diameter is automatic and clips nothing.
+pub(super) fn insert_edit(lens: &Lens, at: usize) -> Edit {
     let before = at.checked_sub(1).and_then(|i| lens.surfaces.get(i));
     let medium = before.map_or(&lens.object_medium, |row| &row.medium);
     let medium = if *medium == Medium::Mirror { Medium::Air } else { medium.clone() };
-    let near = lens.surfaces.get(at).or(before);
-    let semi_diameter = near.and_then(|row| row.semi_diameter);
-    Edit::InsertRow { at, row: Row { medium, semi_diameter, ..Row::default() } }
+    Edit::InsertRow { at, row: Row { medium, ..Row::default() } }
 }
 
 #[cfg(test)]
@@ -102,5 +101,6 @@ mod tests {
         let Edit::InsertRow { at: 1, row } = insert_edit(&lens, 1) else { unreachable!() };
         assert_eq!(row.medium, lens.surfaces[0].medium);
         assert_eq!((row.curvature, row.thickness), (0.0, 0.0));
+        assert_eq!(row.semi_diameter, None, "it clips nothing");
     }
 }

@@ -1,10 +1,11 @@
 //! A medium as text: a catalogue name, `nd vd`, an index, `mirror`, or nothing for air.
 
-use crate::lens::{GradientIndex, Medium, ProfileLaw, glass};
+use crate::lens::glass::{self, Glass};
+use crate::lens::{GradientIndex, Medium, ProfileLaw};
 use crate::studio::number;
 
 /// The number of glasses that are suggested while the user types.
-const PROPOSALS: usize = 8;
+const PROPOSALS: usize = 12;
 
 /// The text of a cell.
 pub(super) fn format_medium(medium: &Medium) -> String {
@@ -81,25 +82,31 @@ pub(super) fn parse_medium(text: &str) -> Medium {
     match numbers.as_slice() {
         [Some(index)] => Medium::Index(*index),
         [Some(nd), Some(vd)] => Medium::Model { nd: *nd, vd: *vd },
-        _ => Medium::Glass(
-            glass::find(text).map_or_else(|| text.to_owned(), glass::Glass::full_name),
-        ),
+        _ => Medium::Glass(glass::find(text).map_or_else(|| text.to_owned(), Glass::full_name)),
     }
 }
 
-/// Glasses whose names begin with the text, then those that contain it.
-pub(super) fn suggestions(text: &str) -> Vec<String> {
+/// Glasses whose names begin with the text, then those that contain it, each in the order of their
+/// names.
+pub(super) fn suggestions(text: &str) -> Vec<&'static Glass> {
     let wanted = text.trim().to_uppercase();
     if wanted.is_empty() || wanted.starts_with(['.', '1']) {
         return Vec::new();
     }
-    let all = || glass::catalogue().iter().map(|glass| (glass, glass.full_name().to_uppercase()));
-    let begins = |(g, full): &(&glass::Glass, String)| {
-        g.name.to_uppercase().starts_with(&wanted) || full.starts_with(&wanted)
+    let rank = |glass: &Glass| {
+        let (name, full) = (glass.name.to_uppercase(), glass.full_name().to_uppercase());
+        let begins = name.starts_with(&wanted) || full.starts_with(&wanted);
+        (begins || full.contains(&wanted)).then_some((!begins, name, full))
     };
-    let first = all().filter(&begins);
-    let then = all().filter(|glass| !begins(glass) && glass.1.contains(&wanted));
-    first.chain(then).take(PROPOSALS).map(|(glass, _)| glass.full_name()).collect()
+    let mut found: Vec<_> =
+        glass::catalogue().iter().filter_map(|glass| Some((rank(glass)?, glass))).collect();
+    found.sort_by(|a, b| a.0.cmp(&b.0));
+    found.into_iter().take(PROPOSALS).map(|(_, glass)| glass).collect()
+}
+
+/// A glass in a list: name, nd, vd and catalogue in columns.
+pub(super) fn proposal_line(glass: &Glass) -> String {
+    format!("{:<12} {:.5} {:>6.2}  {}", glass.name, glass.nd, glass.vd, glass.manufacturer)
 }
 
 /// The index and Abbe number of a glass, for a tooltip.
@@ -159,7 +166,11 @@ mod tests {
     fn a_glass_is_found_without_its_maker_and_proposed_while_typing() {
         assert_eq!(parse_medium("n-bk7"), Medium::Glass("SCHOTT N-BK7".into()));
         assert_eq!(parse_medium("n-bk99"), Medium::Glass("n-bk99".into()));
-        assert!(suggestions("n-bk").contains(&"SCHOTT N-BK7".to_owned()));
+        let names = |text| suggestions(text).iter().map(|g| g.full_name()).collect::<Vec<_>>();
+        assert!(names("n-bk").contains(&"SCHOTT N-BK7".to_owned()));
+        let found = suggestions("n-la");
+        assert!(found.iter().is_sorted_by_key(|glass| &glass.name) && found.len() > 4);
+        assert!(proposal_line(found[0]).contains(&format!("{:.5}", found[0].nd)));
         assert!(suggestions("").is_empty() && suggestions("1.5").is_empty());
     }
 }

@@ -7,23 +7,43 @@
 
 mod actions;
 mod badge;
+mod badge_menu;
+mod candidate;
+mod cells;
+mod clipboard;
+mod columns;
+mod cursor;
+mod fields;
 mod glass;
+mod radius_bounds;
+mod shapes;
 mod table;
 mod variables;
 
+use std::sync::Arc;
+
 use egui::{Button, Context, Frame, Id, Key, Margin, Panel as SidePanel, RichText, Ui};
 
-use super::Panel;
+use super::{Panel, design_results};
+use crate::lens::glass::Glass;
+use crate::lens::{Edit, Lens, apply_edit};
 use crate::session::SessionView;
 use crate::studio::actions::Actions;
+use crate::studio::text::capitalize;
 use crate::studio::text_input::{EditBuffers, error_color};
 use actions::RowAction;
+use cells::CellPlace;
+use columns::TableColumn;
+use cursor::{CellCursor, CellGrid, RangeCommand};
 use table::PrescriptionTable;
 
 /// The panel.
 #[derive(Debug, Default)]
 pub struct PrescriptionPanel {
     buffers: EditBuffers,
+    cursor: CellCursor,
+    /// The reason why the last paste was refused.
+    refused: Option<String>,
 }
 
 impl Panel for PrescriptionPanel {
@@ -33,9 +53,24 @@ impl Panel for PrescriptionPanel {
 
     fn ui(&mut self, ui: &mut Ui, view: &SessionView, actions: &mut Actions) {
         keys(ui, view, actions);
-        toolbar(ui, view, actions);
+        self.toolbar(ui, view, actions);
+        clipping_note(ui, &view.lens);
+        let columns = columns::shown(ui, &view.lens);
+        self.cursor_keys(ui, view, &columns, actions);
         self.error_line(ui);
-        PrescriptionTable { view, buffers: &mut self.buffers, actions }.show(ui);
+        let before = self.cursor.active();
+        let table = PrescriptionTable {
+            view,
+            lens: Arc::clone(&view.lens),
+            analyses: design_results(view),
+            candidate: None,
+            columns: &columns,
+            buffers: &mut self.buffers,
+            cursor: &mut self.cursor,
+            actions,
+        };
+        table.show(ui);
+        self.cursor.end(ui, before);
     }
 
     fn is_typing(&self, context: &Context) -> bool {
@@ -51,12 +86,140 @@ pub(in crate::studio) fn first_radius_field() -> Id {
 impl PrescriptionPanel {
     /// The last text that was refused, where it can be read in full.
     fn error_line(&self, ui: &mut Ui) {
-        let Some(why) = self.buffers.last_error() else { return };
+        let Some(why) = self.buffers.last_error().or(self.refused.as_deref()) else { return };
         let frame = Frame::new().inner_margin(Margin::symmetric(4, 2));
         SidePanel::bottom("complaint").frame(frame).show_separator_line(false).show(ui, |ui| {
             ui.label(RichText::new(why).color(error_color(ui)));
         });
     }
+
+    /// Moves the cursor by keys, and carries out what they ask for.
+    fn cursor_keys(
+        &mut self,
+        ui: &Ui,
+        view: &SessionView,
+        columns: &[TableColumn],
+        actions: &mut Actions,
+    ) {
+        let grid = CellGrid { columns, lens: &view.lens };
+        let proposals = self.proposals();
+        self.take_proposal(ui, &proposals);
+        let commands = self.cursor.begin(ui, grid, &self.buffers, proposals.len());
+        if ui.input(|input| input.events.iter().any(is_typed)) {
+            self.refused = None;
+        }
+        for command in commands {
+            let Some(range) = self.cursor.range(grid) else { continue };
+            self.refused = None;
+            let edit = range_edit(ui, grid, view, &range, command);
+            let edit = edit.and_then(|edit| checked(&view.lens, edit));
+            match edit {
+                Ok(edit) => actions.extend(edit),
+                Err(why) => self.refused = Some(capitalize(&why)),
+            }
+        }
+    }
+
+    /// The glasses that are proposed below the cell with the cursor.
+    fn proposals(&self) -> Vec<&'static Glass> {
+        let active = self.cursor.active().filter(|place| place.column == TableColumn::Glass);
+        let typed = active.and_then(|place| self.buffers.text(place.id()));
+        typed.map(glass::suggestions).unwrap_or_default()
+    }
+
+    /// Enter and Tab take the proposal that was chosen by the arrows.
+    fn take_proposal(&mut self, ui: &Ui, proposals: &[&'static Glass]) {
+        let Some(glass) = self.cursor.proposal.and_then(|i| proposals.get(i)) else { return };
+        let ends = ui.input(|i| i.key_pressed(Key::Enter) || i.key_pressed(Key::Tab));
+        if let Some(place) = self.cursor.active().filter(|_| ends) {
+            self.buffers.replace(place.id(), glass.full_name());
+            self.cursor.proposal = None;
+        }
+    }
+
+    fn toolbar(&self, ui: &mut Ui, view: &SessionView, actions: &mut Actions) {
+        let lens = &view.lens;
+        let in_cell = self.cursor.active().and_then(CellPlace::surface);
+        let row = view.selected.or(in_cell).filter(|row| *row < lens.surfaces.len());
+        ui.horizontal_wrapped(|ui| {
+            for action in actions::ALL {
+                let edit = row.and_then(|row| action.edit(lens, row));
+                let button = ui.add_enabled(edit.is_some(), Button::new(action.title()).small());
+                let button = button.on_hover_text(action.hint());
+                let button = button.on_disabled_hover_text("Select a row by its number first.");
+                if let Some(edit) = edit.filter(|_| button.clicked()) {
+                    actions.push(edit);
+                }
+            }
+            variables::menu(ui, lens, actions);
+            columns::menu(ui, lens);
+        });
+    }
+}
+
+fn is_typed(event: &egui::Event) -> bool {
+    matches!(event, egui::Event::Text(_) | egui::Event::Key { pressed: true, .. })
+}
+
+/// The edit that a key asks for in a range of cells; `None` if it only copies.
+fn range_edit(
+    ui: &Ui,
+    grid: CellGrid<'_>,
+    view: &SessionView,
+    range: &(Vec<usize>, Vec<TableColumn>),
+    command: RangeCommand,
+) -> Result<Option<Edit>, String> {
+    let (lens, zoom) = (grid.lens, view.settings.zoom);
+    let surfaces = || range.0.iter().filter_map(|row| row.checked_sub(1));
+    match command {
+        RangeCommand::InsertRow => Ok(surfaces().next().map(|at| actions::insert_edit(lens, at))),
+        RangeCommand::RemoveRows => Ok(remove_edit(surfaces().rev().collect())),
+        RangeCommand::Clear => clipboard::clear_edit(grid, zoom, range).map(Some),
+        RangeCommand::Copy | RangeCommand::Cut => {
+            ui.ctx().copy_text(clipboard::copied_text(lens, zoom, range));
+            let cut = command == RangeCommand::Cut;
+            cut.then(|| clipboard::clear_edit(grid, zoom, range)).transpose()
+        }
+        RangeCommand::Paste(text) => clipboard::paste_edit(grid, zoom, range, &text).map(Some),
+    }
+}
+
+/// Removes surfaces, the last one first.
+fn remove_edit(surfaces: Vec<usize>) -> Option<Edit> {
+    match surfaces[..] {
+        [] => None,
+        [surface] => Some(Edit::RemoveRow(surface)),
+        _ => {
+            let title = format!("remove {} surfaces", surfaces.len());
+            let edits = surfaces.into_iter().map(Edit::RemoveRow).collect();
+            Some(Edit::Sequence { title, edits })
+        }
+    }
+}
+
+/// The edit if the lens stays valid, else the reason why not.
+fn checked(lens: &Lens, edit: Option<Edit>) -> Result<Option<Edit>, String> {
+    match edit {
+        Some(edit) => apply_edit(lens, &edit).map(|_| Some(edit)).map_err(|why| why.to_string()),
+        None => Ok(None),
+    }
+}
+
+/// Says once what clips, in a lens with fixed and automatic semi-diameters.
+fn clipping_note(ui: &mut Ui, lens: &Lens) {
+    let id = Id::unique("fixed semi-diameters clip");
+    let fixed = lens.surfaces.iter().any(|row| row.semi_diameter.is_some());
+    let mixed = fixed && lens.surfaces.iter().any(|row| row.semi_diameter.is_none());
+    let read: bool = ui.data_mut(|data| data.get_persisted(id)).unwrap_or_default();
+    if !mixed || read {
+        return;
+    }
+    ui.horizontal_wrapped(|ui| {
+        ui.weak("Only fixed semi-diameters (badge U) clip rays; the grey ones follow the light.");
+        if ui.small_button("Understood").clicked() {
+            ui.data_mut(|data| data.insert_persisted(id, true));
+        }
+    });
 }
 
 /// Insert and Delete work on the selected row while no text is being edited.
@@ -70,20 +233,4 @@ fn keys(ui: &Ui, view: &SessionView, actions: &mut Actions) {
             actions.extend(action.edit(&view.lens, row));
         }
     }
-}
-
-fn toolbar(ui: &mut Ui, view: &SessionView, actions: &mut Actions) {
-    let lens = &view.lens;
-    ui.horizontal(|ui| {
-        for action in actions::ALL {
-            let edit = view.selected.and_then(|row| action.edit(lens, row));
-            let button = ui.add_enabled(edit.is_some(), Button::new(action.title()).small());
-            let button = button.on_hover_text(action.hint());
-            let button = button.on_disabled_hover_text("Select a row by its number first.");
-            if let Some(edit) = edit.filter(|_| button.clicked()) {
-                actions.push(edit);
-            }
-        }
-        variables::menu(ui, lens, actions);
-    });
 }

@@ -1,0 +1,106 @@
+//! Clear semi-diameters: how far from the axis the light of all fields, wavelengths and zoom
+//! positions meets each surface. They are the size of a surface whose semi-diameter nobody fixed.
+
+use crate::pupil::{Launch, RayModel};
+use crate::trace::RayPolyline;
+use std::f64::consts::PI;
+
+/// The azimuths at which the edge of a pupil is traced, over half of it.
+const AZIMUTHS: u32 = 6;
+/// The halvings of the distance between a ray that is lost and one that is not.
+const HALVINGS: usize = 12;
+
+/// The largest distance from the axis at which the light meets each surface, the image plane last,
+/// in mm. `models` are those of all zoom positions. Rays that some fixed semi-diameter clips do not
+/// count.
+pub fn clear_semi_diameters<'a>(models: impl IntoIterator<Item = &'a RayModel>) -> Vec<f64> {
+    let mut heights = Vec::new();
+    for model in models {
+        let surfaces = model.channels[model.primary].tracer.surfaces();
+        heights.resize(surfaces.max(heights.len()), 0.0);
+        for field in &model.fields {
+            for wavelength in 0..model.channels.len() {
+                if let Ok(launch) = model.launch(*field, wavelength) {
+                    raise_to_edge(&mut heights, &launch);
+                }
+            }
+        }
+    }
+    heights
+}
+
+/// Raises heights to those of the edge of a pupil.
+fn raise_to_edge(heights: &mut [f64], launch: &Launch<'_>) {
+    let halves: &[f64] = if launch.is_symmetric() { &[1.0] } else { &[1.0, -1.0] };
+    for side in halves {
+        for i in 0..=AZIMUTHS {
+            let angle = PI * (f64::from(i) / f64::from(AZIMUTHS) - 0.5);
+            let outward = [side * angle.cos(), angle.sin()];
+            let Some(edge) = outermost(launch, outward) else { continue };
+            for (height, own) in heights.iter_mut().zip(&edge.heights) {
+                *height = height.max(*own);
+            }
+        }
+    }
+}
+
+/// The outermost ray in a direction of the pupil that reaches the image; `None` if not even the ray
+/// through the centre of the pupil does.
+fn outermost(launch: &Launch<'_>, outward: [f64; 2]) -> Option<RayPolyline> {
+    let at = |share: f64| {
+        let ray = launch.ray_through_stop(outward.map(|c| share * c))?;
+        Some(launch.channel().tracer.polyline(ray)).filter(|path| path.fate.is_imaged())
+    };
+    if let Some(path) = at(1.0) {
+        return Some(path);
+    }
+    let (mut inside, mut outside) = (0.0, 1.0);
+    let mut found = at(inside);
+    found.as_ref()?;
+    for _ in 0..HALVINGS {
+        let middle = 0.5 * (inside + outside);
+        match at(middle) {
+            None => outside = middle,
+            path => (inside, found) = (middle, path),
+        }
+    }
+    found
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lens::{Aperture, FieldPoint, Lens, blank};
+
+    fn heights(lens: &Lens) -> Vec<f64> {
+        clear_semi_diameters([&RayModel::from_lens(lens, 0).unwrap()])
+    }
+
+    /// A plate of 5 mm in a beam of 10 mm, without fixed semi-diameters.
+    fn plate() -> Lens {
+        let mut lens = blank();
+        lens.surfaces.iter_mut().for_each(|row| row.semi_diameter = None);
+        lens.aperture = Aperture::EntrancePupilDiameter(10.0);
+        lens
+    }
+
+    #[test]
+    fn surfaces_are_as_large_as_the_beam_and_grow_with_the_field() {
+        let mut lens = plate();
+        assert!(heights(&lens).iter().all(|height| (height - 5.0).abs() < 1e-9));
+        lens.fields.values = vec![FieldPoint { x: 0.0, y: 10.0, weight: 1.0 }];
+        let found = heights(&lens);
+        let index = lens.resolve(0, lens.wavelengths[0].um).unwrap().surfaces[0].index;
+        let inside = (10f64.to_radians().sin() / index).asin().tan();
+        assert!((found[0] - 5.0).abs() < 1e-9);
+        assert!((found[1] - (5.0 + 5.0 * inside)).abs() < 1e-9, "{found:?}");
+    }
+
+    #[test]
+    fn only_light_that_gets_through_counts() {
+        let mut lens = plate();
+        lens.surfaces[1].semi_diameter = Some(3.0);
+        let found = heights(&lens);
+        assert!((found[0] - 3.0).abs() < 2e-3 && found[0] <= 3.0, "{found:?}");
+    }
+}
