@@ -175,6 +175,11 @@ fn every_edit(lens: &Lens) -> Vec<Edit> {
         Edit::Replace(Box::new(aplanat::lens::blank())),
         Edit::SetMerit(Some(spot_goal())),
         Edit::Element(ElementEdit::Bend { surface: 0, by: 0.01 }),
+        Edit::Sequence {
+            title: "two remarks".into(),
+            edits: [0, 1].map(|surface| Edit::SetComment { surface, text: "remark".into() }).into(),
+        },
+        Edit::SetObstruction { surface: 0, value: Some(1.5) },
     ]
 }
 
@@ -213,6 +218,8 @@ fn kind(edit: &Edit) -> usize {
         Edit::Replace(_) => 29,
         Edit::SetMerit(_) => 30,
         Edit::Element(_) => 31,
+        Edit::Sequence { .. } => 32,
+        Edit::SetObstruction { .. } => 33,
     }
 }
 
@@ -220,7 +227,7 @@ fn kind(edit: &Edit) -> usize {
 fn every_kind_of_edit_is_undone_and_redone_exactly() {
     let mut session = session(double_gauss());
     let edits = every_edit(session.lens());
-    assert_eq!(edits.iter().map(kind).collect::<Vec<_>>(), (0..32).collect::<Vec<_>>());
+    assert_eq!(edits.iter().map(kind).collect::<Vec<_>>(), (0..34).collect::<Vec<_>>());
     let mut lenses = vec![Arc::clone(session.lens())];
     for edit in edits {
         let events = session.apply(edit.clone().into());
