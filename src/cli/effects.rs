@@ -343,7 +343,10 @@ pub(super) fn decision_text(decision: &EffectDecision) -> String {
         EffectOverride::Off => "switched off: ",
     };
     let saving = if *computed { "without it" } else { "saves" };
-    let numbers = format!("{} of {} {unit}", ShortNumber(*error), ShortNumber(*limit));
+    let numbers = match *limit {
+        0.0 => format!("{} {unit}, none is allowed", ShortNumber(*error)),
+        limit => format!("{} of {} {unit}", ShortNumber(*error), ShortNumber(limit)),
+    };
     let time = cost.map_or_else(String::new, |cost| {
         format!("; {saving} {:.0} %, {:.2} ms", 100.0 * cost.saved_share, cost.saved_ms)
     });

@@ -4,6 +4,7 @@ use super::error::CliError;
 use super::failures::Failures;
 use super::output::{Output, ShortNumber, TextTable, print_note};
 use super::output_paths::{OutputPaths, stale_note};
+use super::progress::stop_flag;
 use crate::experiments::{
     self, Claim, Effort, Experiment as Study, ExperimentError, ExperimentProgress,
     ExperimentReport, PhaseTiming,
@@ -14,8 +15,10 @@ use serde::Serialize;
 use std::fmt::{self, Display};
 use std::ops::ControlFlow;
 use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
 
-/// A figure or table of the thesis: its data, its pictures, and its claims checked
+/// A figure or table of the thesis: its data, its pictures, and its claims checked; Ctrl-C ends the
+/// study and keeps those before it
 #[derive(Debug, clap::Args)]
 #[command(after_long_help = include_str!("help/experiment.txt"))]
 pub(super) struct ExperimentArgs {
@@ -37,8 +40,12 @@ impl ExperimentArgs {
         let studies = selected_studies(id)?;
         OutputPaths::default().folder("--out", self.out.as_deref(), |_| false)?;
         let (mut runs, mut failed) = (Vec::new(), Failures::default());
+        let stop = stop_flag();
         for study in studies {
-            runs.push(StudyRun { study, report: self.run_study(study, &mut failed) });
+            if stop.load(Ordering::Relaxed) {
+                break;
+            }
+            runs.push(StudyRun { study, report: self.run_study(study, &stop, &mut failed) });
         }
         if let [StudyRun { report: Ok(report), .. }] = &runs[..] {
             failed.note(output.print(report));
@@ -53,13 +60,18 @@ impl ExperimentArgs {
     fn run_study(
         &self,
         study: &'static Study,
+        stop: &AtomicBool,
         failed: &mut Failures,
     ) -> Result<ExperimentReport, CliError> {
         let mut parts = PhaseTimer::new();
         let mut bar = progress_display();
         let mut watch = |progress: ExperimentProgress<'_>| {
             parts.enter(progress.doing);
-            bar(progress)
+            bar(progress);
+            if stop.load(Ordering::Relaxed) {
+                return ControlFlow::Break(());
+            }
+            ControlFlow::Continue(())
         };
         let (outcome, ms) = time_ms(|| (study.run)(Effort::Full, &mut watch));
         let outcome = outcome.map_err(|ended| failure(study, &ended))?;
@@ -111,13 +123,13 @@ impl Display for StudyRuns<'_> {
         let mut table = TextTable::new(&["figure", "title", "claims that hold", "s"]);
         for run in self.0 {
             let [hold, all] = run.claim_counts();
-            let seconds = run.report.as_ref().map_or(f64::NAN, |report| 1e-3 * report.ms);
+            let seconds = run.report.as_ref().map(|report| format!("{:.1}", 1e-3 * report.ms));
             let claims = format!("{hold} of {all}");
             table.row([
                 run.study.id.into(),
                 run.study.title.into(),
                 claims,
-                format!("{seconds:.1}"),
+                seconds.unwrap_or("-".to_owned()),
             ]);
         }
         write!(f, "{table}")
@@ -147,7 +159,7 @@ fn failure(study: &Study, ended: &ExperimentError) -> CliError {
 }
 
 /// A bar with the progress of an experiment and the name of its phase.
-fn progress_display() -> impl FnMut(ExperimentProgress<'_>) -> ControlFlow<()> {
+fn progress_display() -> impl FnMut(ExperimentProgress<'_>) {
     let bar = ProgressBar::new(STEPS as u64);
     let style = ProgressStyle::with_template("{wide_bar} {percent} %  {msg}");
     bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
@@ -158,7 +170,6 @@ fn progress_display() -> impl FnMut(ExperimentProgress<'_>) -> ControlFlow<()> {
             bar.set_message(doing.clone());
         }
         bar.set_position((STEPS * progress.done) as u64);
-        ControlFlow::Continue(())
     }
 }
 

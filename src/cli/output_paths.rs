@@ -100,6 +100,7 @@ fn check_writable(path: &Path, extensions: &[&str]) -> Result<(), CliError> {
         let text = format!("{file}: found {found}; expected a file in a folder that exists");
         return Err(CliError::Input(text));
     }
+    files::check_unlocked(path)?;
     files::check_writable(path).map_err(|error| CliError::Input(error.to_string()))
 }
 

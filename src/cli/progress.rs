@@ -1,8 +1,10 @@
 //! Progress and interruption of a long run: a bar on standard error, and the signals that end it.
 
+use super::output::print_note;
 use indicatif::{ProgressBar, ProgressStyle};
 #[cfg(unix)]
 use signal_hook::consts::{SIGHUP, SIGTERM};
+use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -54,13 +56,27 @@ pub(super) fn styled_bar(steps: usize, template: &str) -> ProgressBar {
     bar.with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()))
 }
 
-/// Runs work that reports how many of its parts are done, with a bar that counts them.
-pub(super) fn with_bar<T>(parts: &str, work: impl FnOnce(&mut dyn FnMut(usize, usize)) -> T) -> T {
+/// Runs work that reports how many of its parts are done, with a bar that counts them. A request to
+/// end breaks it off after a part, which is said; the second value is then true.
+pub(super) fn with_bar<T>(
+    parts: &str,
+    work: impl FnOnce(&mut dyn FnMut(usize, usize) -> ControlFlow<()>) -> T,
+) -> (T, bool) {
+    let stop = stop_flag();
     let bar = styled_bar(0, &format!("{{wide_bar}} {{pos}}/{{len}} {parts}"));
+    let mut stopped = false;
     let result = work(&mut |done, all| {
         bar.set_length(all as u64);
         bar.set_position(done as u64);
+        stopped = done < all && stop.load(Ordering::Relaxed);
+        if stopped { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     });
     bar.finish_and_clear();
-    result
+    if stopped {
+        print_note(STOPPED_NOTE);
+    }
+    (result, stopped)
 }
+
+/// The note on a benchmark that was asked to end.
+pub(super) const STOPPED_NOTE: &str = "note: stopped; only what was measured before is printed";

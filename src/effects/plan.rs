@@ -197,9 +197,9 @@ fn dispersion(
             format!("all {count} wavelengths take the same path")
         }
         count => format!(
-            "the {count} wavelengths land {:.3} um apart; {:.3} um may be neglected",
-            1e3 * measured.dispersion,
-            1e3 * allowed
+            "the {count} wavelengths land {} apart; {}",
+            micrometres(measured.dispersion),
+            allowed_text(allowed)
         ),
     };
     EffectDecision { reason, ..decision }
@@ -248,8 +248,35 @@ fn shift_text(moved: f64, allowed: f64) -> String {
     if !moved.is_finite() {
         return "rays would be lost".to_owned();
     }
-    let [moved, allowed] = [moved, allowed].map(|mm| 1e3 * mm);
-    format!("rays would land {moved:.3} um away; {allowed:.3} um may be neglected")
+    format!("rays would land {} away; {}", micrometres(moved), allowed_text(allowed))
+}
+
+/// A length in mm as text in um with three digits.
+fn micrometres(mm: f64) -> String {
+    let um = 1e3 * mm;
+    let size = um.abs();
+    if size == 0.0 || !(1e-3..1e5).contains(&size) {
+        return if size == 0.0 { "0 um".to_owned() } else { format!("{um:.2e} um") };
+    }
+    let decimals = (2 - size.log10().floor() as i32).max(0) as usize;
+    format!("{um:.decimals$} um")
+}
+
+/// A share as text in percent.
+fn percent(share: f64) -> String {
+    match 100.0 * share {
+        0.0 => "0 %".to_owned(),
+        small if small < 0.01 => format!("{small:.1e} %"),
+        percent => format!("{percent:.2} %"),
+    }
+}
+
+/// The shift that may be neglected, in mm, as text.
+fn allowed_text(allowed: f64) -> String {
+    if allowed == 0.0 {
+        return "nothing may be neglected".to_owned();
+    }
+    format!("{} may be neglected", micrometres(allowed))
 }
 
 /// Keeps the semi-diameters that a ray may reach, those that bound the iteration at an asphere, and
@@ -370,11 +397,11 @@ fn aiming(measured: &EffectMeasurements, allowed: f64, choice: EffectOverride) -
     let decision = lens_decision(Effect::Aiming, choice, shift.max(as_shift(light)), allowed, "mm");
     let reason = if shift.is_finite() {
         format!(
-            "aimed at the paraxial entrance pupil, chief rays or spots would change by {:.3} um, \
-             light by up to {:.2} %; {:.3} um may be neglected",
-            1e3 * shift,
-            100.0 * light,
-            1e3 * allowed
+            "aimed at the paraxial entrance pupil, chief rays or spots would change by {}, light by \
+             up to {}; {}",
+            micrometres(shift),
+            percent(light),
+            allowed_text(allowed)
         )
     } else {
         "rays aimed at the paraxial entrance pupil do not reach the stop".to_owned()

@@ -3,7 +3,7 @@
 
 use super::FileError;
 use std::fs::{self, File, Metadata};
-use std::io::Read;
+use std::io::{self, ErrorKind, Read};
 use std::path::Path;
 
 /// The maximum size of a lens file, and of any other text that describes a design, in bytes.
@@ -23,7 +23,28 @@ pub fn read_file(path: &Path, max: u64) -> Result<Vec<u8>, FileError> {
         let expected = "a file".to_owned();
         return Err(FileError::Unsuitable { file, found: found.to_owned(), expected });
     }
-    read_bounded(File::open(path).map_err(unreadable)?, &file, max)
+    let opened = open_unblocked(path, &data).map_err(unreadable)?;
+    read_bounded(opened, &file, max).map_err(|error| match error {
+        FileError::Unreadable { file, source } if source.kind() == ErrorKind::WouldBlock => {
+            let found = "a file that waits for what is not written yet".to_owned();
+            FileError::Unsuitable { file, found, expected: "a file with an end".to_owned() }
+        }
+        error => error,
+    })
+}
+
+/// Opens a file so that reading does not wait: some files of the system itself, such as
+/// `/proc/kmsg`, do. The pipes that a shell opens for a command do wait for it.
+#[cfg(unix)]
+fn open_unblocked(path: &Path, data: &Metadata) -> io::Result<File> {
+    use std::os::unix::fs::OpenOptionsExt as _;
+    let flags = if data.is_file() { libc::O_NONBLOCK } else { 0 };
+    fs::OpenOptions::new().read(true).custom_flags(flags).open(path)
+}
+
+#[cfg(not(unix))]
+fn open_unblocked(path: &Path, _data: &Metadata) -> io::Result<File> {
+    File::open(path)
 }
 
 /// Reads at most `max` bytes to the end; `file` is the name of the source in messages.

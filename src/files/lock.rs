@@ -31,9 +31,10 @@ impl FileLock {
     /// # Errors
     /// [`FileError::InUse`] if it is locked, with its holder; [`FileError::Unwritable`] if nothing
     /// can be written in its folder; [`FileError::Unsuitable`] if another file has the name of the
-    /// lock.
+    /// lock, or if the file has several names, of which a lock would keep one only.
     pub fn acquire(path: &Path) -> Result<Self, FileError> {
         let name = path.display().to_string();
+        check_single_name(path)?;
         let unwritable = |source| FileError::Unwritable { file: name.clone(), source };
         let beside = lock_path(path).map_err(unwritable)?;
         for _ in 0..MAX_ATTEMPTS {
@@ -66,6 +67,44 @@ impl Drop for FileLock {
             drop(fs::remove_file(&self.path));
         }
     }
+}
+
+/// Refuses a file that another program holds with a [`FileLock`].
+///
+/// # Errors
+/// [`FileError::InUse`].
+pub fn check_unlocked(path: &Path) -> Result<(), FileError> {
+    let Ok(mut lock) = lock_path(path).and_then(File::open) else { return Ok(()) };
+    // A shared lock does not disturb a program that begins at this moment for longer than this.
+    match lock.try_lock_shared() {
+        Err(TryLockError::WouldBlock) => {
+            let (file, holder) = (path.display().to_string(), read_holder(&mut lock));
+            Err(FileError::InUse { file, holder })
+        }
+        Ok(()) | Err(TryLockError::Error(_)) => Ok(()),
+    }
+}
+
+/// Refuses a file with several hard links: to replace it under one name would part it from the
+/// others.
+#[cfg(unix)]
+fn check_single_name(path: &Path) -> Result<(), FileError> {
+    use std::os::unix::fs::MetadataExt as _;
+    let names =
+        fs::metadata(path).ok().filter(fs::Metadata::is_file).map_or(1, |data| data.nlink());
+    if names < 2 {
+        return Ok(());
+    }
+    Err(FileError::Unsuitable {
+        file: path.display().to_string(),
+        found: format!("a file with {names} names (hard links), which saving would part"),
+        expected: "a file with one name; symbolic links to it are kept".to_owned(),
+    })
+}
+
+#[cfg(not(unix))]
+fn check_single_name(_path: &Path) -> Result<(), FileError> {
+    Ok(())
 }
 
 /// The file beside a file that is locked in its place.

@@ -37,7 +37,7 @@ pub use library::{
     LensScaleError, LibraryLens, LibraryQuery, LibraryQueryError, ShortRange, StatedAperture,
     StatedField, library_lenses, scale_to_focal_length,
 };
-pub use lock::FileLock;
+pub use lock::{FileLock, check_unlocked};
 pub use report::{ConversionOutcome, ConversionReport, ConversionRow};
 pub use round_trip::RoundTripCheck;
 pub use self_check::SelfCheck;

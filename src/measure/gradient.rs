@@ -25,6 +25,7 @@ use crate::trace::{
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use serde::Serialize;
 use std::hint::black_box;
+use std::ops::ControlFlow;
 
 /// A class of parameters of a lens.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -210,7 +211,8 @@ const TURNS: usize = 9;
 const TURN: f64 = 2e-3; // seconds
 
 /// Measures a lens at a zoom position, on the axis and at a field, by default the most vignetted
-/// one of the lens. `report` receives the numbers of finished and of all curves.
+/// one of the lens. `report` receives the numbers of finished and of all curves; the fields that are
+/// complete are returned once it breaks.
 ///
 /// # Errors
 /// A lens, field or pupil without light.
@@ -218,7 +220,7 @@ pub fn measure_gradients(
     lens: &Lens,
     zoom: usize,
     field: Option<f64>,
-    mut report: impl FnMut(usize, usize),
+    mut report: impl FnMut(usize, usize) -> ControlFlow<()>,
 ) -> Result<GradientBenchmark, GradientBenchmarkError> {
     let pool = ThreadPoolBuilder::new().num_threads(1).build()?;
     let limited = RayModel::from_lens(lens, zoom)?.limited_by_stop()?;
@@ -237,20 +239,24 @@ pub fn measure_gradients(
             for method in METHODS {
                 rows.extend(scene.curve(integral, exact.gradient(integral), method));
                 done += 1;
-                report(done, all);
+                if report(done, all).is_break() {
+                    return Ok(GradientBenchmark { costs: Vec::new(), fields });
+                }
             }
         }
         fields.push(scene.curves(&exact, axis, rows)?);
     }
-    let costs = PLANES.into_iter().map(|planes| {
+    let mut costs = Vec::new();
+    for planes in PLANES {
         let model = with_primary_system(&model, |system| with_planes(system, planes))?;
         let scene = GradientScene::new(&model, &pool, field)?;
-        let cost = pool.install(|| scene.cost());
+        costs.push(pool.install(|| scene.cost())?);
         done += 1;
-        report(done.min(all), all);
-        cost
-    });
-    Ok(GradientBenchmark { costs: costs.collect::<Result<_, GradientBenchmarkError>>()?, fields })
+        if report(done.min(all), all).is_break() {
+            break;
+        }
+    }
+    Ok(GradientBenchmark { costs, fields })
 }
 
 /// Every estimator in every precision that it supports.

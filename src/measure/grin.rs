@@ -18,6 +18,7 @@ use crate::math::{Real, Vec3};
 use rayon::ThreadPoolBuilder;
 use serde::Serialize;
 use std::hint::black_box;
+use std::ops::ControlFlow;
 
 /// A point of a curve.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -157,13 +158,13 @@ const OFTEN_ENOUGH: usize = 7;
 const TRAPPED: f64 = 8.0;
 
 /// Measures a task with a known exact field, with the light of its first view. `report` receives
-/// the numbers of finished and of all parts.
+/// the numbers of finished and of all parts; those so far are returned once it breaks.
 ///
 /// # Errors
 /// A task without an exact field, or without light.
 pub fn measure_grin(
     task: &GrinTask,
-    mut report: impl FnMut(usize, usize),
+    mut report: impl FnMut(usize, usize) -> ControlFlow<()>,
 ) -> Result<GrinBenchmark, GrinBenchmarkError> {
     let pool = ThreadPoolBuilder::new().num_threads(1).build()?;
     let scene = pool.install(|| GrinBenchmarkScene::new(task))?;
@@ -171,7 +172,7 @@ pub fn measure_grin(
     let mut done = 0;
     let mut report_part = || {
         done += 1;
-        report(done, all);
+        report(done, all).is_break()
     };
     let mut measured = GrinBenchmark {
         rays: scene.rays.len(),
@@ -180,20 +181,29 @@ pub fn measure_grin(
         costs: vec![],
         memory: vec![],
     };
-    report_part();
+    let mut stopped = report_part();
     for made in
         [BenchmarkField::Exact, BenchmarkField::Tricubic(NODES), BenchmarkField::Trilinear(NODES)]
     {
+        if stopped {
+            break;
+        }
         measured.fields.push(pool.install(|| scene.curves(made))?);
-        report_part();
+        stopped = report_part();
     }
     for (made, precision) in COSTS {
+        if stopped {
+            break;
+        }
         measured.costs.push(pool.install(|| scene.cost(made, precision))?);
-        report_part();
+        stopped = report_part();
     }
     for (nodes, per_voxel) in MEMORY {
+        if stopped {
+            break;
+        }
         measured.memory.push(pool.install(|| scene.memory(nodes, per_voxel))?);
-        report_part();
+        stopped = report_part();
     }
     Ok(measured)
 }

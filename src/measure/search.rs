@@ -11,6 +11,7 @@ use crate::search::lens_landscape::{LensLandscape, SearchPlan, SearchSetupError}
 use crate::search::{SearchMethod, SearchSettings};
 use serde::Serialize;
 use std::ops::ControlFlow;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// The fractions of the time after which the merit is recorded.
 const MARKS: [f64; 4] = [0.125, 0.25, 0.5, 1.0];
@@ -67,7 +68,8 @@ pub struct SearchBenchmark {
     pub tolerances: Vec<SearchRow>,
 }
 
-/// Runs a search from a lens with every sampler and at every tolerance, all for the same time.
+/// Runs a search from a lens with every sampler and at every tolerance, all for the same time. Once
+/// `stop` is true, the runs so far are returned.
 ///
 /// # Errors
 /// A lens that a search cannot start from.
@@ -75,25 +77,33 @@ pub fn compare_searches(
     lens: &Lens,
     plan: &SearchPlan,
     race: SearchBudget,
+    stop: &AtomicBool,
 ) -> Result<SearchBenchmark, SearchSetupError> {
     let landscape = plan.landscape(lens)?;
     let row = |method, tolerance, gradients| {
         let mut plan = plan.clone();
         (plan.local.tolerance, plan.local.coarse) = (tolerance, tolerance);
         plan.settings = SearchSettings { method, gradients, moves: None, ..plan.settings };
-        run_seeds(lens, &plan, race)
+        run_seeds(lens, &plan, race, stop)
     };
     let usual = plan.local.tolerance;
     let restore = row(SearchMethod::Restore, usual, None)?;
     // Brute force divides the number of gradients that another sampler computed in the same time.
     let share = restore.gradients / race.seeds.max(1);
-    let methods = vec![
-        restore,
-        row(SearchMethod::Metropolis, usual, None)?,
-        row(SearchMethod::BruteForce, usual, Some(share.max(1)))?,
-    ];
-    let tolerances = TOLERANCES.map(|tolerance| row(SearchMethod::Restore, tolerance, None));
-    let tolerances = tolerances.into_iter().collect::<Result<_, _>>()?;
+    let mut methods = vec![restore];
+    for (method, gradients) in
+        [(SearchMethod::Metropolis, None), (SearchMethod::BruteForce, Some(share.max(1)))]
+    {
+        if !stop.load(Ordering::Relaxed) {
+            methods.push(row(method, usual, gradients)?);
+        }
+    }
+    let mut tolerances = Vec::new();
+    for tolerance in TOLERANCES {
+        if !stop.load(Ordering::Relaxed) {
+            tolerances.push(row(SearchMethod::Restore, tolerance, None)?);
+        }
+    }
     let start = merit_of(&landscape, landscape.start()).unwrap_or(f64::INFINITY);
     Ok(SearchBenchmark { race, start, methods, tolerances })
 }
@@ -107,13 +117,14 @@ fn run_seeds(
     lens: &Lens,
     plan: &SearchPlan,
     race: SearchBudget,
+    stop: &AtomicBool,
 ) -> Result<SearchRow, SearchSetupError> {
     let mut gradients = 0;
     let mut found: Vec<Vec<f64>> = vec![Vec::new(); MARKS.len()];
-    for seed in 1..=race.seeds {
+    for seed in (1..=race.seeds).take_while(|_| !stop.load(Ordering::Relaxed)) {
         let mut plan = plan.clone();
         plan.settings.seed = seed;
-        gradients += run_seed(lens, &plan, race.seconds, &mut found)?;
+        gradients += run_seed(lens, &plan, race.seconds, stop, &mut found)?;
     }
     let mark = |(part, merits): (f64, &mut Vec<f64>)| {
         merits.sort_by(f64::total_cmp);
@@ -125,7 +136,8 @@ fn run_seeds(
             worst: at(merits.len().saturating_sub(1)),
         }
     };
-    let marks = MARKS.into_iter().zip(&mut found).map(mark).collect();
+    let reached = MARKS.into_iter().zip(&mut found).filter(|(_, merits)| !merits.is_empty());
+    let marks = reached.map(mark).collect();
     let (method, tolerance) = (plan.settings.method, plan.local.tolerance);
     Ok(SearchRow { method, tolerance, gradients, marks })
 }
@@ -136,6 +148,7 @@ fn run_seed(
     lens: &Lens,
     plan: &SearchPlan,
     seconds: f64,
+    stop: &AtomicBool,
     found: &mut [Vec<f64>],
 ) -> Result<u64, SearchSetupError> {
     let (landscape, mut run) = plan.begin(lens)?;
@@ -147,7 +160,11 @@ fn run_seed(
         for _ in 0..passed.count() {
             best.push(run.best().point.clone());
         }
-        if best.len() < MARKS.len() { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
+        if best.len() < MARKS.len() && !stop.load(Ordering::Relaxed) {
+            ControlFlow::Continue(())
+        } else {
+            ControlFlow::Break(())
+        }
     });
     // A run that has ended stays as it is until the last mark.
     if end.is_continue() {

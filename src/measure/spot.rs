@@ -13,6 +13,7 @@ use crate::pupil::{
 };
 use crate::trace::{ImagePoints, Rays, TraceSink, Tracer};
 use serde::Serialize;
+use std::ops::ControlFlow;
 
 /// The sampling of a pupil.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -135,7 +136,7 @@ const MARGIN: f64 = 1.3;
 const OFTEN_ENOUGH: usize = 25;
 
 /// Measures all curves of a field at the primary wavelength, at a zoom position. `report` receives
-/// the numbers of finished and of all curves.
+/// the numbers of finished and of all curves; the curves so far are returned once it breaks.
 ///
 /// # Errors
 /// A lens or field without rays.
@@ -143,7 +144,7 @@ pub fn measure_spot_curves(
     lens: &Lens,
     zoom: usize,
     field: FieldPoint,
-    mut report: impl FnMut(usize, usize),
+    mut report: impl FnMut(usize, usize) -> ControlFlow<()>,
 ) -> Result<SpotCurves, SpotCurvesError> {
     let mut curves =
         SpotCurves { rms_clear: 0.0, rms_clipped: None, transmitted: 1.0, rows: Vec::new() };
@@ -168,7 +169,9 @@ pub fn measure_spot_curves(
             for method in PupilSampling::ALL {
                 curves.rows.extend(scene.curve(pupil, method, precision, rms));
                 done += 1;
-                report(done, all);
+                if report(done, all).is_break() {
+                    return Ok(curves);
+                }
             }
         }
     }

@@ -128,6 +128,28 @@ fn a_lens_that_cannot_be_saved_is_printed() {
     has_keys(&done_json(&["info", &lens], ""), &["efl"]);
 }
 
+/// A field that cannot be saved is printed.
+#[cfg(unix)]
+#[test]
+fn a_field_that_cannot_be_saved_is_printed() {
+    let folder = Folder::new("lost-field");
+    fs::create_dir(folder.path("sub")).unwrap();
+    let out = folder.path("sub/field.npz");
+    let running =
+        Running::start(&["grin", "luneburg-radial", "--nodes", "5", "--out", &out, "--json"]);
+    std::thread::sleep(Duration::from_millis(300));
+    fs::remove_dir_all(folder.path("sub")).unwrap();
+    running.signal("-INT");
+    let output = running.output();
+    let said = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    assert!(said.contains("field.npz: cannot be written"), "{said}");
+    let field = &serde_json::from_slice::<Value>(&output.stdout).unwrap()["field"];
+    assert_eq!(field["counts"], json!([5, 5, 5]));
+    let index = field["index"].as_array().unwrap();
+    assert!(index.len() == 125 && index.iter().all(|n| n.as_f64().unwrap() >= 1.0), "{field}");
+}
+
 /// Makes a file that cannot be replaced.
 #[cfg(unix)]
 fn protect(path: &str) {
@@ -202,12 +224,43 @@ fn a_checkpoint_has_one_writer() {
         let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
         refused(2, &arguments, "", &[path, &holder]);
     }
+    let out = ["optimize", LENS, "--vary", "curvatures", "--steps", "1", "--out", &checkpoint];
+    refused(2, &out, "", &[&checkpoint, &holder]);
     running.signal("-KILL");
     running.output();
     let again = start_search(&checkpoint, &[]);
     again.signal("-INT");
     assert_eq!(again.output().status.code(), Some(0));
     assert_eq!(folder.names(), ["link.json", "run.json"], "the lock is gone with its holder");
+}
+
+/// To save a checkpoint under one of two names would part them.
+#[cfg(unix)]
+#[test]
+fn a_checkpoint_has_one_name() {
+    let folder = Folder::new("names");
+    let (checkpoint, second) = (folder.path("run.json"), folder.path("second.json"));
+    let first = ["search", LENS, "--iterations", "4", "--checkpoint", &checkpoint];
+    done_json(&first, "");
+    fs::hard_link(&checkpoint, &second).unwrap();
+    for path in [&checkpoint, &second] {
+        let arguments = ["search", LENS, "--iterations", "8", "--checkpoint", path];
+        refused(2, &arguments, "", &[path, "2 names", "one name"]);
+    }
+    fs::remove_file(&second).unwrap();
+    done_json(&["search", LENS, "--iterations", "8", "--checkpoint", &checkpoint], "");
+}
+
+/// Some files of the system have no end and wait for more.
+#[cfg(target_os = "linux")]
+#[test]
+fn no_file_is_waited_for() {
+    let mut running = Running::start(&["info", "/proc/kmsg"]);
+    let waits = |_: &u32| running.0.as_mut().unwrap().try_wait().unwrap().is_none();
+    (0..200).take_while(waits).for_each(|_| std::thread::sleep(Duration::from_millis(50)));
+    assert!(running.0.as_mut().unwrap().try_wait().unwrap().is_some(), "it waits");
+    let output = running.output();
+    assert_eq!(output.status.code(), Some(2), "{}", text(&output.stderr));
 }
 
 /// A command ends as it does for Ctrl-C: with its result, saved.
@@ -252,6 +305,22 @@ fn every_request_to_end_saves_what_was_found() {
         assert_eq!(ends_with_its_result(&grin, signal)["stopped"], true);
         fs::remove_file(&field).unwrap();
     }
+}
+
+/// A benchmark prints what it measured until then; a study has no result, those before it have.
+#[cfg(unix)]
+#[test]
+fn benchmarks_and_studies_end_when_they_are_asked_to() {
+    let search = ["measure", "search", LENS, "--seconds", "1000"];
+    let report = ends_with_its_result(&search, "-TERM");
+    assert_eq!(report["methods"].as_array().unwrap().len(), 1, "{report}");
+    let running = Running::start(&["experiment", "5.4"]);
+    std::thread::sleep(Duration::from_secs(2));
+    running.signal("-HUP");
+    let output = running.output();
+    let said = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    assert!(said.contains("experiment 5.4: stopped"), "{said}");
 }
 
 /// A run under `nohup` outlives its terminal.

@@ -10,12 +10,12 @@ use super::output::{Output, print_note};
 use super::output_paths::{OutputPaths, stale_note};
 use super::progress::{progress_bar, stop_flag};
 
-use crate::files;
+use crate::files::{self, Volume};
 use crate::grin_design::{self, GrinField, GrinOptimizer, GrinTask};
 use crate::measure::{Stopwatch, peak_megabytes, processor_ms};
 use crate::plot::Canvas;
 use crate::report::{plot_grin_field, plot_grin_image};
-use report::{GrinCostSummary, GrinReport};
+use report::{GrinCostSummary, GrinReport, UnsavedField};
 use serde::Serialize;
 use std::fmt::{self, Display};
 use std::path::{Path, PathBuf};
@@ -82,12 +82,13 @@ impl GrinArgs {
         let processor_ms = processor_ms().zip(before).map(|(now, before)| now - before);
         // The field is saved before anything else is computed from it.
         let mut failures = Failures::default();
-        let volume = failures.note(self.write_volume(&task, runner.best())).unwrap_or_default();
+        let (volume, unsaved) = self.write_or_keep(&task, runner.best(), &mut failures);
         let images = failures.note(self.write_images(&task, runner.best())).unwrap_or_default();
         let mut report =
             GrinReport::new(&runner, &GrinCostSummary { ms, processor_ms, memory, stopped })
                 .map_err(|error| CliError::Failed(format!("{}: {error}", source_name(name))))?;
         let nodes = runner.best().nodes();
+        report.field = unsaved.map(UnsavedField::from);
         let lines = lines.map(|lines| lines.solve(source_name(name), &task, nodes));
         report.lines = lines.and_then(|lines| failures.note(lines));
         if let Some(folder) = &self.png {
@@ -111,11 +112,20 @@ impl GrinArgs {
         paths.folder("--png", self.png.as_deref(), is_image_name)
     }
 
-    /// Writes the volume; returns the paths.
-    fn write_volume(&self, task: &GrinTask, best: &GrinField) -> Result<Vec<PathBuf>, CliError> {
-        let Some(path) = &self.out else { return Ok(Vec::new()) };
-        let volume = task.volume(best, self.nodes).map_err(|error| failed(&error))?;
-        Ok(files::write_volume(path, &volume)?)
+    /// Writes the volume; returns the paths, and the volume if it could not be saved.
+    fn write_or_keep(
+        &self,
+        task: &GrinTask,
+        best: &GrinField,
+        failures: &mut Failures,
+    ) -> (Vec<PathBuf>, Option<Volume>) {
+        let Some(path) = &self.out else { return (Vec::new(), None) };
+        let volume = task.volume(best, self.nodes).map_err(|error| failed(&error));
+        let Some(volume) = failures.note(volume) else { return (Vec::new(), None) };
+        match failures.note(files::write_volume(path, &volume)) {
+            Some(paths) => (paths, None),
+            None => (Vec::new(), Some(volume)),
+        }
     }
 
     /// Writes the images; returns the paths.

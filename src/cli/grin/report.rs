@@ -2,6 +2,7 @@
 
 use super::straight_rays::StraightRayResult;
 use crate::cli::output::{ShortNumber, TextTable};
+use crate::files::{self, Volume};
 use crate::grin_design::{
     self, FieldDifference, FieldScore, GrinOptimizer, LimitCheck, ViewResult,
 };
@@ -41,9 +42,29 @@ pub(super) struct GrinReport {
     processor_ms: Option<f64>,
     memory: Option<MemoryUse>,
     pub(super) files: Vec<PathBuf>,
+    /// The best field, if it could not be saved.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) field: Option<UnsavedField>,
     /// Images of an earlier run in the same folder.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub(super) stale: Vec<PathBuf>,
+}
+
+/// A field that could not be saved: its values at the nodes of a grid, in mm, x fastest.
+#[derive(Serialize)]
+pub(super) struct UnsavedField {
+    counts: [usize; 3],
+    low: [f64; 3],
+    spacing: [f64; 3],
+    index: Vec<f64>,
+}
+
+impl From<Volume> for UnsavedField {
+    fn from(volume: Volume) -> Self {
+        let grid = &volume.grid;
+        let [low, spacing] = [grid.low(), grid.spacing()].map(|v| [v.x, v.y, v.z]);
+        Self { counts: grid.counts(), low, spacing, index: volume.values }
+    }
 }
 
 /// The result of a view.
@@ -127,6 +148,7 @@ impl GrinReport {
             processor_ms: cost.processor_ms,
             memory: cost.memory,
             files: Vec::new(),
+            field: None,
             stale: Vec::new(),
         })
     }
@@ -172,7 +194,10 @@ impl Display for GrinReport {
             ]);
         }
         write!(f, "{table}")?;
-        self.files.iter().try_for_each(|file| writeln!(f, "written: {}", file.display()))
+        self.files.iter().try_for_each(|file| writeln!(f, "written: {}", file.display()))?;
+        let Some(field) = &self.field else { return Ok(()) };
+        let json = files::json::pretty(field);
+        writeln!(f, "the field could not be saved; these are its values, x fastest:\n\n{json}")
     }
 }
 

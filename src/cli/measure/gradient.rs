@@ -40,7 +40,7 @@ impl MeasureGradientArgs {
         self.plot.check([("the lens", self.lens.path())])?;
         opened.ray_model(self.zoom)?;
         self.field.map(|y| opened.field_at(y, self.zoom)).transpose()?;
-        let measured = with_bar("curves", |report| {
+        let (measured, _) = with_bar("curves", |report| {
             measure_gradients(&opened.lens, self.zoom, self.field, report)
         });
         let measured = measured.map_err(|e| CliError::Input(format!("{}: {e}", opened.file)))?;

@@ -34,7 +34,7 @@ impl MeasureGrinArgs {
         let task = load_task(&self.task)?;
         let inputs = task_inputs(&self.task, &task);
         self.plot.check(inputs.iter().map(|(name, path)| (*name, &**path)))?;
-        let measured = with_bar("curves", |report| measure_grin(&task, report));
+        let (measured, _) = with_bar("curves", |report| measure_grin(&task, report));
         let measured = measured.map_err(|e| CliError::Input(format!("{}: {e}", self.task)))?;
         let mut failures = Failures::default();
         failures.note(self.plot.write(|| draw_curves(&measured, &task.name)));

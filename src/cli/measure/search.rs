@@ -2,12 +2,14 @@
 
 use crate::cli::error::CliError;
 use crate::cli::input::LensFile;
-use crate::cli::output::{Output, ShortNumber, TextTable};
+use crate::cli::output::{Output, ShortNumber, TextTable, print_note};
+use crate::cli::progress::{STOPPED_NOTE, stop_flag};
 use crate::cli::search::SearchPlanArgs;
 use crate::measure::{Machine, SearchBenchmark, SearchBudget, SearchRow, compare_searches};
 use crate::search::SearchMethod;
 use serde::Serialize;
 use std::fmt::{self, Display};
+use std::sync::atomic::Ordering;
 
 /// Best merit against seconds: RESTORE, Metropolis-Hastings and brute force with several seeds; and the
 /// effect of the tolerance of the spots
@@ -42,8 +44,12 @@ impl MeasureSearchArgs {
         let opened = self.lens.open()?;
         let plan = self.plan_args.plan(&opened.lens)?;
         let lens = self.plan_args.start_lens(&opened.lens)?;
-        let found = compare_searches(&lens, &plan, SearchBudget { seconds, seeds })
+        let stop = stop_flag();
+        let found = compare_searches(&lens, &plan, SearchBudget { seconds, seeds }, &stop)
             .map_err(|cause| CliError::Input(format!("{}: {cause}", opened.file)))?;
+        if stop.load(Ordering::Relaxed) {
+            print_note(STOPPED_NOTE);
+        }
         output.print(&MeasureSearchReport { machine: Machine::detect(), found })
     }
 }

@@ -42,12 +42,12 @@ impl MeasureSpotArgs {
         let model = opened.ray_model(self.zoom)?;
         let field =
             opened.field_at(self.field.unwrap_or(DEFAULT_ZONE * model.beam.edge), self.zoom)?;
-        let curves = with_bar("curves", |report| {
+        let (curves, stopped) = with_bar("curves", |report| {
             measure_spot_curves(&opened.lens, self.zoom, field, report)
         });
         let curves = curves
             .map_err(|e| CliError::Input(format!("{}, field {}: {e}", opened.file, field.y)))?;
-        if curves.rms_clipped.is_none() {
+        if curves.rms_clipped.is_none() && !stopped {
             return Err(CliError::no_light(&opened.file));
         }
         let title = format!("{}, field {}", opened.lens.name, ShortNumber(field.y));
