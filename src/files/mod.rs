@@ -35,7 +35,7 @@ pub use grayscale::{GrayscaleImage, read_grayscale};
 pub use identity::FileIdentity;
 pub use library::{
     LensScaleError, LibraryLens, LibraryQuery, LibraryQueryError, ShortRange, StatedAperture,
-    StatedField, library_lenses, scale_to_focal_length,
+    StatedField, focal_length_factor, library_lenses, scale_to_focal_length,
 };
 pub use lock::{FileLock, check_unlocked};
 pub use report::{ConversionOutcome, ConversionReport, ConversionRow};

@@ -5,7 +5,7 @@ use egui::Theme;
 use super::dialogs::DialogKind;
 use super::file_dialog::FileRequest;
 use super::panels::PanelKind;
-use crate::files::BundledLens;
+use crate::files::{BundledLens, LibraryLens};
 use crate::lens::Edit;
 use crate::session::{Command, GrinCommand, StructureSearchCommand};
 
@@ -16,6 +16,8 @@ pub enum UiAction {
     Run(Command),
     /// Opens a lens that comes with the program.
     OpenBundled(&'static BundledLens),
+    /// Opens a lens of the library, scaled to a focal length in mm if one is given.
+    OpenLibrary(&'static LibraryLens, Option<f64>),
     /// Asks for a path, and runs the command that needs it.
     AskPath(FileRequest),
     /// Opens a dialog.

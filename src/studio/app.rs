@@ -24,7 +24,7 @@ use super::text::capitalize;
 use super::unsaved::{PendingAction, PendingState};
 use super::window::Persistence;
 use crate::files;
-use crate::files::BundledLens;
+use crate::files::{BundledLens, LibraryLens};
 use crate::session::{
     Command, DocumentSource, GrinCommand, Message, Session, SessionEvent, SessionView, Severity,
     StructureSearchCommand,
@@ -133,6 +133,7 @@ impl Studio {
             UiAction::Run(command) => self.run_or_ask(context, PendingAction::Run(command), None),
             UiAction::AskPath(request) => self.ask_path(context, view, request),
             UiAction::OpenBundled(bundled) => self.open_bundled(context, bundled),
+            UiAction::OpenLibrary(lens, scale) => self.open_library_lens(context, lens, scale),
             UiAction::ShowDialog(kind) => {
                 let menus = menu_context(&self.dock, &self.recent, view, context);
                 self.dialogs.open(kind, &menus);
@@ -164,6 +165,21 @@ impl Studio {
                 self.run_or_ask(context, PendingAction::Run(command), None);
             }
             Err(why) => self.message = Some(why.to_string()),
+        }
+    }
+
+    fn open_library_lens(&mut self, context: &Context, lens: &LibraryLens, scale: Option<f64>) {
+        let opened = lens.open().map_err(|why| why.to_string());
+        let opened = opened.and_then(|lens| match scale {
+            Some(mm) => files::scale_to_focal_length(&lens, mm).map_err(|why| why.to_string()),
+            None => Ok(lens),
+        });
+        match opened {
+            Ok(lens) => {
+                let command = Command::New(Box::new(lens));
+                self.run_or_ask(context, PendingAction::Run(command), None);
+            }
+            Err(why) => self.message = Some(why),
         }
     }
 

@@ -5,6 +5,7 @@ use egui::Context;
 use super::actions::Actions;
 use super::command_palette::CommandPalette;
 use super::element_dialog::{ElementDialog, ElementTask};
+use super::library_window::LibraryWindow;
 use super::manual::ManualWindow;
 use super::menu_items::MenuContext;
 use super::new_lens::NewLensDialog;
@@ -17,6 +18,8 @@ pub enum DialogKind {
     NewLens,
     /// A change of an element or of the whole lens.
     Element(ElementTask),
+    /// The browser of the lens library.
+    Library,
     /// The search over all commands.
     CommandPalette,
     /// The manual.
@@ -31,6 +34,7 @@ pub(super) struct Dialogs {
     new_lens: Option<NewLensDialog>,
     element: Option<ElementDialog>,
     palette: Option<CommandPalette>,
+    library: Option<LibraryWindow>,
     manual: ManualWindow,
     shows_shortcuts: bool,
 }
@@ -44,6 +48,7 @@ impl Dialogs {
                 self.element = Some(ElementDialog::new(task, menus.view));
             }
             DialogKind::CommandPalette => self.palette = Some(CommandPalette::default()),
+            DialogKind::Library => self.library = Some(LibraryWindow::default()),
             DialogKind::Manual => self.manual.open(),
             DialogKind::Shortcuts => self.shows_shortcuts = true,
         }
@@ -59,6 +64,9 @@ impl Dialogs {
         }
         if self.palette.as_mut().is_some_and(|palette| palette.ui(context, menus, actions)) {
             self.palette = None;
+        }
+        if self.library.as_mut().is_some_and(|library| library.ui(context, actions)) {
+            self.library = None;
         }
         self.manual.ui(context);
         if self.shows_shortcuts {

@@ -15,7 +15,7 @@ const REDO_TOO: KeyboardShortcut = KeyboardShortcut::new(Modifiers::COMMAND, Key
 /// Collects what shortcuts ask for. Undo and redo are left to a text field that is being edited.
 pub(super) fn shortcuts(ui: &Ui, menus: &MenuContext<'_>, typing: bool, actions: &mut Actions) {
     let pressed = |key: &KeyboardShortcut| ui.input_mut(|input| input.consume_shortcut(key));
-    let mut items = menus.all();
+    let mut items = menus.commands();
     // A shortcut with Shift also contains the one without: the longer ones are asked first.
     items.sort_by_key(|item| !item.shortcut.is_some_and(|key| key.modifiers.shift));
     let selected = |item: &MenuItem| !(typing && item.yields_to_text);
@@ -70,7 +70,7 @@ fn show_item(ui: &mut Ui, item: MenuItem, actions: &mut Actions) {
 fn file_menu(ui: &mut Ui, menus: &MenuContext<'_>, actions: &mut Actions) {
     ui.set_min_width(210.0);
     let mut items = menus.file().into_iter();
-    for item in items.by_ref().take(2) {
+    for item in items.by_ref().take(3) {
         show_item(ui, item, actions);
     }
     ui.add_enabled_ui(!menus.recent.is_empty(), |ui| {

@@ -95,11 +95,15 @@ pub(super) struct MenuContext<'a> {
 }
 
 impl MenuContext<'_> {
-    /// Every item, the longer shortcuts first among those with the same key.
+    /// Every item of the menus that is no list of files, lenses or studies.
+    pub(super) fn commands(&self) -> Vec<MenuItem> {
+        [self.file(), self.edit(), self.element(), self.view(), help()].concat()
+    }
+
+    /// Every item.
     pub(super) fn all(&self) -> Vec<MenuItem> {
-        let fixed = [self.file(), self.edit(), self.element(), self.view(), help()];
-        let lists = [self.recent(), bundled_lenses(), self.settings(), studies()];
-        fixed.into_iter().chain(lists).flatten().collect()
+        let lists = [self.recent(), bundled_lenses(), library_lenses(), self.settings(), studies()];
+        self.commands().into_iter().chain(lists.into_iter().flatten()).collect()
     }
 
     pub(super) fn file(&self) -> Vec<MenuItem> {
@@ -115,6 +119,9 @@ impl MenuContext<'_> {
                 .control(Key::N)
                 .hint("Begin a lens: focal length, aperture, fields, wavelengths, object"),
             MenuItem::new(MENU, "Open or import…", FileRequest::Open).control(Key::O),
+            MenuItem::new(MENU, "Lens library…", DialogKind::Library)
+                .control(Key::L)
+                .hint("Browse published lenses by type, focal length, aperture and words"),
             MenuItem::new(MENU, "Save", save).control(Key::S).separated(),
             MenuItem::new(MENU, "Save as…", FileRequest::Save).control_shift(Key::S),
             MenuItem::new(MENU, "Export for Zemax…", FileRequest::ExportZemax).control(Key::E),
@@ -273,6 +280,15 @@ pub(super) fn help() -> Vec<MenuItem> {
 pub(super) fn bundled_lenses() -> Vec<MenuItem> {
     let lenses = files::bundled_lenses().iter();
     lenses.map(|lens| MenuItem::new("Lens", lens.title, UiAction::OpenBundled(lens))).collect()
+}
+
+/// The lenses of the library that are not in the menu of bundled ones.
+fn library_lenses() -> Vec<MenuItem> {
+    let bundled = files::bundled_lenses();
+    let more = files::library_lenses().iter();
+    let more = more.filter(|lens| bundled.iter().all(|known| known.name != lens.name));
+    more.map(|lens| MenuItem::new("Lens", lens.title.as_str(), UiAction::OpenLibrary(lens, None)))
+        .collect()
 }
 
 /// The studies of the thesis.

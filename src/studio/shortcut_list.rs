@@ -30,7 +30,7 @@ pub(super) fn ui(context: &Context, menus: &MenuContext<'_>) -> bool {
         ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
             let grid = Grid::new("shortcuts").num_columns(3).striped(true).spacing([18.0, 4.0]);
             grid.show(ui, |ui| {
-                for item in menus.all() {
+                for item in menus.commands() {
                     let Some(key) = item.shortcut else { continue };
                     ui.weak(item.menu);
                     ui.strong(ui.ctx().format_shortcut(&key));

@@ -354,3 +354,33 @@ fn a_dropped_lens_is_opened_and_remembered_and_another_file_refused_by_name() {
     harness.get_by_label_contains("`letter.txt` is none of the files");
     std::fs::remove_dir_all(folder).unwrap();
 }
+
+#[test]
+fn the_library_is_found_by_type_and_range_and_opens_a_scaled_lens() {
+    let mut harness = window(achromat());
+    keys(&mut harness, Modifiers::COMMAND, Key::L);
+    let all = aplanat::files::library_lenses();
+    harness.get_by_label(&format!("{0} of {0} lenses", all.len()));
+    harness.get_by_label("Search the library").type_text("tessar");
+    harness.run_steps(3);
+    harness.get_by_label("Elements").type_text("..4");
+    harness.run_steps(3);
+    let query = aplanat::files::LibraryQuery::new(["tessar", "elements=..4"]).unwrap();
+    let found = query.find();
+    harness.get_by_label(&format!("{} of {} lenses", found.len(), all.len()));
+    press(&mut harness, &found[0].title);
+    press(&mut harness, "scaled to the focal length");
+    press(&mut harness, "Open");
+    let opened = lens(&harness);
+    assert!(opened.notes.contains("to a focal length of 50 mm"), "{}", opened.notes);
+    assert!(harness.query_by_label("Search the library").is_none(), "the browser is closed");
+}
+
+#[test]
+fn a_range_that_cannot_be_meant_is_said() {
+    let mut harness = window(achromat());
+    keys(&mut harness, Modifiers::COMMAND, Key::L);
+    harness.get_by_label("Focal length").type_text("long");
+    harness.run_steps(3);
+    harness.get_by_label_contains("found the range `long`; expected");
+}

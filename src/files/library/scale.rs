@@ -1,6 +1,6 @@
 //! A lens at another focal length: every length times a factor.
 
-use crate::lens::{Edit, EditError, Lens, LensError, apply_edit};
+use crate::lens::{Aperture, Edit, EditError, Lens, LensError, apply_edit};
 use crate::math::format_short;
 use crate::paraxial::{Beam, ParaxialError, first_order};
 
@@ -31,17 +31,28 @@ pub enum LensScaleError {
 /// # Errors
 /// A focal length that is no positive number, and a lens without one.
 pub fn scale_to_focal_length(lens: &Lens, mm: f64) -> Result<Lens, LensScaleError> {
-    if !(mm > 0.0 && mm.is_finite()) {
-        return Err(LensScaleError::FocalLength(mm));
-    }
-    let system = lens.resolve(0, lens.wavelengths[lens.primary()].um)?;
-    let efl = first_order(&system, &Beam::for_lens(lens, 0))?.efl.ok_or(LensScaleError::Afocal)?;
-    let factor = mm / efl.abs();
+    let factor = focal_length_factor(lens, 0, mm)?;
     let mut scaled = apply_edit(lens, &Edit::Scale(factor))?;
     let note = format!("Scaled by {} to a focal length of {} mm.", short(factor), short(mm));
     let notes = [scaled.notes.as_str(), &note].into_iter().filter(|text| !text.is_empty());
     scaled.notes = notes.collect::<Vec<_>>().join("\n");
     Ok(scaled)
+}
+
+/// The factor of every length that gives a lens this focal length, in mm, at its primary wavelength
+/// and a zoom position.
+///
+/// # Errors
+/// As [`scale_to_focal_length`].
+pub fn focal_length_factor(lens: &Lens, zoom: usize, mm: f64) -> Result<f64, LensScaleError> {
+    if !(mm > 0.0 && mm.is_finite()) {
+        return Err(LensScaleError::FocalLength(mm));
+    }
+    let system = lens.resolve(zoom, lens.wavelengths[lens.primary()].um)?;
+    // The focal length does not depend on the beam: a stop of some size has a meaning for any lens.
+    let beam = Beam { aperture: Aperture::StopSemiDiameter(1.0), ..Beam::for_lens(lens, zoom) };
+    let efl = first_order(&system, &beam)?.efl.ok_or(LensScaleError::Afocal)?;
+    Ok(mm / efl.abs())
 }
 
 /// A number in notes, with six digits.

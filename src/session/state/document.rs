@@ -2,8 +2,7 @@
 
 use super::{Session, SessionEvent, propose_goal};
 use crate::files;
-use crate::lens::{Aperture, Edit, ElementEdit, Lens, apply_edit};
-use crate::paraxial::{Beam, first_order};
+use crate::lens::{Edit, ElementEdit, Lens, apply_edit};
 use crate::pupil::limited_by_stop;
 use crate::session::undo::UndoStack;
 use crate::session::view::Severity;
@@ -37,7 +36,8 @@ impl Session {
     }
 
     pub(super) fn scale_to_focal_length(&mut self, focal_length: f64) {
-        let factor = scale_factor(&self.lens, self.settings.zoom, focal_length);
+        let factor = files::focal_length_factor(&self.lens, self.settings.zoom, focal_length);
+        let factor = factor.map_err(|why| why.to_string());
         let scaled = factor.and_then(|factor| {
             apply_edit(&self.lens, &Edit::Scale(factor)).map_err(|why| why.to_string())
         });
@@ -149,19 +149,4 @@ impl Session {
         self.post(Severity::Note, parts.into_iter().flatten().collect::<Vec<_>>().join("\n"));
         self.events.push(SessionEvent::Saved(path.to_owned()));
     }
-}
-
-/// The factor by which a lens is scaled to a focal length at a zoom position.
-fn scale_factor(lens: &Lens, zoom: usize, focal_length: f64) -> Result<f64, String> {
-    if !(focal_length > 0.0 && focal_length.is_finite()) {
-        return Err(format!("the focal length is {focal_length}; expected more than 0, in mm"));
-    }
-    let um = lens.wavelengths[lens.primary()].um;
-    let system = lens.resolve(zoom, um).map_err(|why| why.to_string())?;
-    // The focal length does not depend on the beam; a stop of some size has a meaning for any lens.
-    let aperture = Aperture::StopSemiDiameter(1.0);
-    let beam = Beam { aperture, ..Beam::for_lens(lens, zoom) };
-    let first = first_order(&system, &beam).map_err(|why| why.to_string())?;
-    let present = first.efl.ok_or("the lens has no focal length to scale: it focuses nothing")?;
-    Ok(focal_length / present.abs())
 }

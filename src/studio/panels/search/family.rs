@@ -8,11 +8,11 @@ use egui::{
     vec2,
 };
 
-use super::lenses::Thumbnails;
 use super::{ShownSearch, lenses, moves, text};
 use crate::lens::Lens;
 use crate::search::{LineageNode, OfferOutcome};
 use crate::session::StructureSearchSnapshot;
+use crate::studio::thumbnails::Thumbnails;
 
 /// The number of last generations that the tree shows, besides the line of the selected one.
 const MAX_NODES: usize = 80;

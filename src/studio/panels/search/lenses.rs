@@ -3,22 +3,18 @@
 use std::sync::Arc;
 
 use egui::{
-    Align2, Button, Color32, ColorImage, CursorIcon, FontId, Pos2, Rect, Response, Role, Sense,
-    Stroke, StrokeKind, TextureHandle, TextureOptions, Ui, Vec2, WidgetInfo, pos2, vec2,
+    Align2, Button, Color32, CursorIcon, FontId, Pos2, Rect, Response, Role, Sense, Stroke,
+    StrokeKind, Ui, Vec2, WidgetInfo, pos2, vec2,
 };
-use glam::DVec2;
 
 use super::{SelectedLens, ShownSearch, text};
-use crate::lens::{Lens, added_glass};
+use crate::lens::Lens;
 use crate::search::SteerCommand;
 use crate::session::{Command, FoundLens, SessionView, StructureSearchCommand};
 use crate::studio::actions::Actions;
-use crate::studio::cached::ByAddress;
-use crate::studio::draw::{BoundingBox, Camera, Scene, software};
 use crate::studio::file_dialog::FileRequest;
-use crate::studio::palette::Palette;
 use crate::studio::panels::widgets::{ActionButton, action_buttons};
-use crate::studio::section::SectionDrawing;
+use crate::studio::thumbnails::Thumbnails;
 
 /// The smallest card.
 const CARD: Vec2 = vec2(148.0, 112.0);
@@ -197,81 +193,4 @@ pub(super) fn lens_buttons(
         actions.push(Command::Preview(None));
     }
     back
-}
-
-/// The number of drawings that are cached.
-const CAPACITY: usize = 64;
-/// The margin around a lens, in pixels.
-const MARGIN: f64 = 4.0;
-
-/// The cached drawings.
-#[derive(Default)]
-pub(super) struct Thumbnails {
-    /// The most recently used one is the last.
-    cached: Vec<Thumbnail>,
-}
-
-impl std::fmt::Debug for Thumbnails {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.debug_struct("Thumbnails").field("drawn", &self.cached.len()).finish()
-    }
-}
-
-struct Thumbnail {
-    key: ThumbnailKey,
-    texture: Option<TextureHandle>,
-}
-
-/// The key of a drawing.
-#[derive(PartialEq)]
-struct ThumbnailKey {
-    lens: ByAddress<Lens>,
-    design: ByAddress<Lens>,
-    palette: Palette,
-    size: [u32; 2],
-}
-
-impl Thumbnails {
-    /// The drawing of a lens, with glass tinted that the design does not have; `None` if it cannot
-    /// be traced.
-    pub(super) fn texture(
-        &mut self,
-        ui: &Ui,
-        lens: &Arc<Lens>,
-        design: &Arc<Lens>,
-        size: Vec2,
-    ) -> Option<TextureHandle> {
-        let per_point = ui.ctx().pixels_per_point();
-        let palette = Palette::for_visuals(ui.visuals());
-        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]
-        let size = [size.x, size.y].map(|length| (length * per_point).round() as u32);
-        let key = ThumbnailKey { lens: lens.into(), design: design.into(), palette, size };
-        let known = self.cached.iter().position(|drawn| drawn.key == key);
-        let drawn = known.map(|place| self.cached.remove(place));
-        let drawn = drawn.unwrap_or_else(|| Thumbnail { texture: draw(ui, &key), key });
-        let texture = drawn.texture.clone();
-        self.cached.push(drawn);
-        if self.cached.len() > CAPACITY {
-            self.cached.remove(0);
-        }
-        texture
-    }
-}
-
-fn draw(ui: &Ui, key: &ThumbnailKey) -> Option<TextureHandle> {
-    let ThumbnailKey { lens, design, palette, size } = key;
-    let system = lens.resolve(0, lens.wavelengths[lens.primary()].um).ok()?;
-    let section = SectionDrawing::new(&system, &[]);
-    let mut scene = Scene::on([0, 0, 0, 0]);
-    section.draw_glass(&mut scene, palette, &added_glass(lens, design));
-    section.draw_outlines(&mut scene, palette);
-    let BoundingBox { min, max } = section.bounds()?;
-    // The axis extends a little beyond both ends.
-    let ends = 0.05 * DVec2::new(max.x - min.x, 0.0);
-    let whole = BoundingBox { min: min - ends, max: max + ends };
-    let camera = Camera::fit(whole, DVec2::new(size[0].into(), size[1].into()), MARGIN);
-    let picture = software::draw(&scene, camera, *size);
-    let size = size.map(|n| n as usize);
-    let image = ColorImage::from_rgba_premultiplied(size, &picture.rgba);
-    Some(ui.ctx().load_texture("thumbnail", image, TextureOptions::LINEAR))
 }

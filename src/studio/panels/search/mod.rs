@@ -23,7 +23,7 @@ use crate::session::{
 };
 use crate::studio::actions::Actions;
 use crate::studio::text::capitalize;
-use lenses::Thumbnails;
+use crate::studio::thumbnails::Thumbnails;
 use setup::SearchSetup;
 
 /// The introduction that is shown before the first search.

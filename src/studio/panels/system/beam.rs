@@ -57,7 +57,7 @@ fn aperture(ui: &mut Ui, form: &mut EditForm<'_>) {
     let aperture = lens.aperture;
     let (title, unit) = kind_of(aperture);
     ui.horizontal(|ui| {
-        let combo = ComboBox::from_id_salt("aperture kind").selected_text(title).width(180.0);
+        let combo = ComboBox::from_id_salt("aperture kind").selected_text(title).width(150.0);
         let shown = combo.show_ui(ui, |ui| {
             for (kind, title, _) in KINDS {
                 let possible =
@@ -74,7 +74,7 @@ fn aperture(ui: &mut Ui, form: &mut EditForm<'_>) {
             }
         });
         shown.response.accessible_name("Aperture kind");
-        form.number(ui, "Aperture value", (value(aperture), 90.0), |value| {
+        form.number(ui, "Aperture value", (value(aperture), 66.0), |value| {
             Edit::SetAperture(with_value(aperture, value))
         });
         ui.weak(unit);
@@ -124,10 +124,10 @@ fn object(ui: &mut Ui, form: &mut EditForm<'_>) {
             form.actions.push(Edit::SetObject(Object::Finite(distance)));
         }
         if let Object::Finite(distance) = lens.object {
-            form.number(ui, "Distance of the object", (distance, 90.0), |distance| {
+            form.number(ui, "Distance of the object", (distance, 66.0), |distance| {
                 Edit::SetObject(Object::Finite(distance))
             });
-            ui.weak("mm in front of surface 1");
+            ui.weak("mm").on_hover_text("In front of surface 1");
         }
     });
 }
@@ -154,13 +154,13 @@ fn image(ui: &mut Ui, form: &mut EditForm<'_>) {
     let lens = &form.view.lens;
     ui.horizontal(|ui| {
         let mut follows = lens.image_solve.is_some();
-        let check = ui.checkbox(&mut follows, "Follows the paraxial image");
+        let check = ui.checkbox(&mut follows, "At the paraxial image");
         if check.on_hover_text("The last thickness is solved instead of written").changed() {
             form.actions.push(Edit::SetImageSolve(follows.then_some(0.0)));
         }
         if let Some(offset) = lens.image_solve {
             ui.label("plus");
-            form.number(ui, "Defocus of the image plane", (offset, 70.0), |offset| {
+            form.number(ui, "Defocus of the image plane", (offset, 56.0), |offset| {
                 Edit::SetImageSolve(Some(offset))
             });
             ui.weak("mm");

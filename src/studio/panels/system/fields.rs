@@ -43,7 +43,7 @@ fn kind(ui: &mut Ui, form: &mut EditForm<'_>) {
     let lens = &form.view.lens;
     let chosen = lens.fields.kind;
     let title = KINDS.iter().find(|(kind, ..)| *kind == chosen).map_or("", |(_, title, _)| title);
-    let combo = ComboBox::from_id_salt("field kind").selected_text(title).width(180.0);
+    let combo = ComboBox::from_id_salt("field kind").selected_text(title).width(150.0);
     let shown = combo.show_ui(ui, |ui| {
         for (kind, title, _) in KINDS {
             let possible = kind != FieldKind::ObjectHeight || lens.object != Object::Infinity;
@@ -98,7 +98,7 @@ fn converted(view: &SessionView, kind: FieldKind) -> Fields {
 fn table(ui: &mut Ui, form: &mut EditForm<'_>) {
     let fields = form.view.lens.fields.clone();
     let unit = KINDS.iter().find(|(kind, ..)| *kind == fields.kind).map_or("", |(.., unit)| unit);
-    Grid::new("fields").num_columns(5).spacing([8.0, 3.0]).show(ui, |ui| {
+    Grid::new("fields").num_columns(5).min_col_width(8.0).spacing([6.0, 3.0]).show(ui, |ui| {
         for heading in ["", &format!("x, {unit}"), &format!("y, {unit}"), "Weight", ""] {
             ui.weak(heading);
         }
@@ -112,7 +112,7 @@ fn table(ui: &mut Ui, form: &mut EditForm<'_>) {
             ui.weak((i + 1).to_string());
             for (what, value, set) in numbers {
                 let name = format!("Field {} {what}", i + 1);
-                form.number(ui, &name, (value, 70.0), |value| {
+                form.number(ui, &name, (value, 58.0), |value| {
                     let mut changed = fields.clone();
                     set(&mut changed.values[i], value);
                     Edit::SetFields(changed)

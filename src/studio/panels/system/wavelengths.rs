@@ -39,7 +39,7 @@ fn table(ui: &mut Ui, form: &mut EditForm<'_>) {
     let lens = &form.view.lens;
     let (waves, primary) = (lens.wavelengths.clone(), lens.primary());
     let palette = Palette::for_visuals(ui.visuals());
-    Grid::new("wavelengths").num_columns(5).spacing([8.0, 3.0]).show(ui, |ui| {
+    Grid::new("wavelengths").num_columns(5).min_col_width(8.0).spacing([6.0, 3.0]).show(ui, |ui| {
         for heading in ["", "µm", "Weight", "Primary", ""] {
             ui.weak(heading);
         }
@@ -52,7 +52,7 @@ fn table(ui: &mut Ui, form: &mut EditForm<'_>) {
             ];
             for (what, value, set) in numbers {
                 let name = format!("Wavelength {}{what}", i + 1);
-                form.number(ui, &name, (value, 80.0), |value| {
+                form.number(ui, &name, (value, 70.0), |value| {
                     let mut changed = waves.clone();
                     set(&mut changed[i], value);
                     Edit::SetWavelengths(changed)
