@@ -1,6 +1,6 @@
 //! The dialogs of the window, at most one of each kind at a time.
 
-use egui::Context;
+use egui::{Context, Key};
 
 use super::actions::Actions;
 use super::command_palette::CommandPalette;
@@ -56,6 +56,9 @@ impl Dialogs {
 
     /// Shows all dialogs that are open.
     pub(super) fn ui(&mut self, context: &Context, menus: &MenuContext<'_>, actions: &mut Actions) {
+        // Escape in a text field leaves the field; the next one closes the dialogs.
+        let escapes = !context.egui_wants_keyboard_input()
+            && context.input(|input| input.key_pressed(Key::Escape));
         if self.new_lens.as_mut().is_some_and(|dialog| dialog.ui(context, actions)) {
             self.new_lens = None;
         }
@@ -72,5 +75,18 @@ impl Dialogs {
         if self.shows_shortcuts {
             self.shows_shortcuts = shortcut_list::ui(context, menus);
         }
+        if escapes {
+            self.close_windows(actions);
+        }
+    }
+
+    /// Closes the dialogs that leave the rest of the window usable.
+    fn close_windows(&mut self, actions: &mut Actions) {
+        if let Some(element) = self.element.take() {
+            element.end_preview(actions);
+        }
+        self.library = None;
+        self.manual.close();
+        self.shows_shortcuts = false;
     }
 }

@@ -77,10 +77,17 @@ impl ElementDialog {
             done = self.finish(ui, view, actions);
         });
         let ended = done || !open;
-        if ended && self.shown.is_some() {
-            actions.push(Command::Preview(None));
+        if ended {
+            self.end_preview(actions);
         }
         ended
+    }
+
+    /// Shows the design again in place of what the dialog would give.
+    pub(super) fn end_preview(&self, actions: &mut Actions) {
+        if self.shown.is_some() {
+            actions.push(Command::Preview(None));
+        }
     }
 
     fn title(&self) -> String {

@@ -11,6 +11,7 @@ use egui::{
 
 use super::actions::{Actions, UiAction};
 use super::form::number_field;
+use super::text::counted;
 use super::thumbnails::Thumbnails;
 use crate::files::{LibraryLens, LibraryQuery, ShortRange, library_lenses};
 use crate::lens::Lens;
@@ -114,7 +115,7 @@ impl LibraryWindow {
             for ((_, title, example), text) in RANGES.iter().zip(&mut self.ranges) {
                 ui.label(*title);
                 let line = TextEdit::singleline(text).hint_text(*example).desired_width(54.0);
-                let field = ui.add(line).accessible_name(*title);
+                let field = ui.add(line).accessible_name(format!("{title} range"));
                 field.on_hover_text(format!("A range such as {example}, or one number"));
             }
         });
@@ -237,7 +238,7 @@ fn words(ui: &Ui, painter: &Painter, lens: &LibraryLens, rect: Rect) {
     let galley = painter.layout_job(job);
     painter.galley(at, galley, visuals.text_color());
     let lines = [
-        format!("{}, {} elements", lens.design, lens.parts()),
+        format!("{}, {}", lens.design, parts(lens)),
         format!("{} mm  {}  {}", ShortRange(&lens.focal_length), lens.aperture, lens.field),
     ];
     for (i, line) in lines.into_iter().enumerate() {
@@ -245,4 +246,12 @@ fn words(ui: &Ui, painter: &Painter, lens: &LibraryLens, rect: Rect) {
         let color = visuals.weak_text_color();
         painter.text(at, Align2::LEFT_TOP, line, FontId::proportional(11.0), color);
     }
+}
+
+/// The number of elements and mirrors, in words.
+fn parts(lens: &LibraryLens) -> String {
+    let parts = [(lens.elements, "element"), (lens.mirrors, "mirror")];
+    let parts = parts.into_iter().filter(|(count, _)| *count > 0);
+    let words: Vec<String> = parts.map(|(count, noun)| counted(count as u64, noun)).collect();
+    words.join(", ")
 }

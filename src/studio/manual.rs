@@ -34,6 +34,10 @@ impl ManualWindow {
         self.is_open = true;
     }
 
+    pub(super) const fn close(&mut self) {
+        self.is_open = false;
+    }
+
     /// Shows the window if it is open.
     pub(super) fn ui(&mut self, context: &Context) {
         let mut open = self.is_open;

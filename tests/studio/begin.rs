@@ -363,7 +363,7 @@ fn the_library_is_found_by_type_and_range_and_opens_a_scaled_lens() {
     harness.get_by_label(&format!("{0} of {0} lenses", all.len()));
     harness.get_by_label("Search the library").type_text("tessar");
     harness.run_steps(3);
-    harness.get_by_label("Elements").type_text("..4");
+    harness.get_by_label("Elements range").type_text("..4");
     harness.run_steps(3);
     let query = aplanat::files::LibraryQuery::new(["tessar", "elements=..4"]).unwrap();
     let found = query.find();
@@ -380,7 +380,19 @@ fn the_library_is_found_by_type_and_range_and_opens_a_scaled_lens() {
 fn a_range_that_cannot_be_meant_is_said() {
     let mut harness = window(achromat());
     keys(&mut harness, Modifiers::COMMAND, Key::L);
-    harness.get_by_label("Focal length").type_text("long");
+    harness.get_by_label("Focal length range").type_text("long");
     harness.run_steps(3);
     harness.get_by_label_contains("found the range `long`; expected");
+}
+
+#[test]
+fn escape_closes_the_dialogs_that_leave_the_window_usable() {
+    let mut harness = window(starting(StartingForm::Empty));
+    keys(&mut harness, Modifiers::COMMAND | Modifiers::SHIFT, Key::A);
+    keys(&mut harness, Modifiers::COMMAND, Key::L);
+    assert!(harness.query_by_label("Search the library").is_some());
+    keys(&mut harness, Modifiers::NONE, Key::Escape);
+    assert!(harness.query_by_label("Search the library").is_none());
+    assert!(harness.query_by_label("Apply").is_none());
+    assert!(harness.state().session().view().preview_lens.is_none(), "the design is shown again");
 }
