@@ -50,6 +50,14 @@ fn press(harness: &mut Harness<'_, Studio>, label: &str) {
     harness.run_steps(3);
 }
 
+/// Types into a field of a dialog.
+fn enter_text(harness: &mut Harness<'_, Studio>, field: &str, text: &str) {
+    harness.get_by_label(field).focus();
+    harness.run_steps(2);
+    harness.get_by_label(field).type_text(text);
+    harness.run_steps(3);
+}
+
 /// Presses an item of a menu, whose label also has its shortcut.
 fn press_item(harness: &mut Harness<'_, Studio>, text: &str) {
     harness.get_by_label_contains(text).click();
@@ -150,8 +158,7 @@ fn the_palette_finds_commands_panels_and_lenses_by_words() {
 fn help_has_a_manual_and_the_shortcuts() {
     let mut harness = window(achromat());
     keys(&mut harness, Modifiers::NONE, Key::F1);
-    harness.get_by_label("Search the manual").type_text("cemented");
-    harness.run_steps(3);
+    enter_text(&mut harness, "Search the manual", "cemented");
     press(&mut harness, "Whole elements");
     harness.get_by_label_contains("Bend");
     press(&mut harness, "Help");
@@ -361,10 +368,8 @@ fn the_library_is_found_by_type_and_range_and_opens_a_scaled_lens() {
     keys(&mut harness, Modifiers::COMMAND, Key::L);
     let all = aplanat::files::library_lenses();
     harness.get_by_label(&format!("{0} of {0} lenses", all.len()));
-    harness.get_by_label("Search the library").type_text("tessar");
-    harness.run_steps(3);
-    harness.get_by_label("Elements range").type_text("..4");
-    harness.run_steps(3);
+    enter_text(&mut harness, "Search the library", "tessar");
+    enter_text(&mut harness, "Elements range", "..4");
     let query = aplanat::files::LibraryQuery::new(["tessar", "elements=..4"]).unwrap();
     let found = query.find();
     harness.get_by_label(&format!("{} of {} lenses", found.len(), all.len()));
@@ -380,8 +385,7 @@ fn the_library_is_found_by_type_and_range_and_opens_a_scaled_lens() {
 fn a_range_that_cannot_be_meant_is_said() {
     let mut harness = window(achromat());
     keys(&mut harness, Modifiers::COMMAND, Key::L);
-    harness.get_by_label("Focal length range").type_text("long");
-    harness.run_steps(3);
+    enter_text(&mut harness, "Focal length range", "long");
     harness.get_by_label_contains("found the range `long`; expected");
 }
 
