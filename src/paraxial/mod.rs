@@ -9,10 +9,17 @@
 //! number of mirrors, so that one formula holds for lenses and mirrors. Everything is written over
 //! [`Real`](crate::math::Real), so that a dual yields the derivative of a focal length.
 
+mod drag;
 mod first_order;
+mod parametric;
 mod ray;
 mod seidel;
 
+pub use drag::{
+    DragError, DragLimit, DragOutcome, DragSettings, DragStop, FirstOrderLock, FreeNumbers, Handle,
+    HandleDrag, HandlePlaces, HandleUnit, LockError, MovedNumber, elements, short_name,
+};
 pub use first_order::{Beam, FirstOrder, ParaxialError, ParaxialPupil, first_order};
+pub use parametric::{ParametricLens, ParametricRay, free_parameters};
 pub use ray::{ParaxialRay, paraxial_ray, signed_indices};
 pub use seidel::{Seidel, SeidelSums, seidel};

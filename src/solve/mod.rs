@@ -8,6 +8,7 @@ mod bounds;
 mod cgls;
 mod lbfgs;
 mod levenberg_marquardt;
+mod projection;
 mod trust_region;
 
 pub use adam::{Adam, AdamMoments};
@@ -17,6 +18,10 @@ pub use lbfgs::{Lbfgs, LbfgsStep};
 pub use levenberg_marquardt::{
     Damping, LevenbergMarquardt, LevenbergMarquardtStep, NielsenDamping, ResidualRows, damped_step,
     predicted_decrease,
+};
+pub use projection::{
+    ConstrainedPoint, ConstraintError, ConstraintFunction, CoordinateBounds, nearest_point,
+    nearest_point_from, point_along_normals,
 };
 pub use trust_region::{LeastSquaresPoint, TrustRegion, TrustRegionStep};
 

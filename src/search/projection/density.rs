@@ -8,6 +8,7 @@
 
 use super::model::MarginalRayModel;
 use crate::math::Dual;
+use crate::solve::ConstraintFunction as _;
 use nalgebra::{DMatrix, DVector};
 
 /// The logarithm of the determinant of the map to the nearest lens, which is `at` with the

@@ -14,17 +14,20 @@
 
 mod density;
 mod model;
-mod solve;
 #[cfg(test)]
 mod tests;
 
 use super::SearchRules;
 use super::element::glass_gaps;
-use crate::lens::{Lens, LensError, Parameter, ParameterKind, Quantity, add_variables};
+use crate::lens::{Lens, LensError, Parameter, Quantity};
+use crate::paraxial::free_parameters;
+use crate::solve::{
+    ConstrainedPoint, ConstraintError, ConstraintFunction as _, CoordinateBounds, nearest_point,
+    point_along_normals,
+};
 pub(super) use model::scale;
 use model::{MarginalRayModel, ProjectionCoordinate};
 use serde::{Deserialize, Serialize};
-use solve::{CoordinateBounds, ProjectionSolution};
 use std::fmt::{self, Display};
 
 /// The outcome of a projection.
@@ -69,6 +72,16 @@ pub enum ProjectionError {
     /// The lens cannot be resolved.
     #[error(transparent)]
     Lens(#[from] LensError),
+}
+
+impl From<ConstraintError> for ProjectionError {
+    fn from(error: ConstraintError) -> Self {
+        match error {
+            ConstraintError::Singular => Self::Singular,
+            ConstraintError::Bounds { held, count } => Self::Bounds(held.len(), count),
+            ConstraintError::Steps(steps) => Self::Steps(steps),
+        }
+    }
 }
 
 /// The map to a lens with the same focus.
@@ -158,14 +171,15 @@ impl ProjectionPair {
     }
 
     /// The nearest lens; not exact if another map was requested.
-    fn nearest(&self, map: ProjectionMap) -> Result<ProjectionSolution, ProjectionError> {
-        let found = solve::nearest(&self.new, &self.zero(), &self.target, &self.bounds())?;
-        Ok(ProjectionSolution { exact: found.exact && map == ProjectionMap::Nearest, ..found })
+    fn nearest(&self, map: ProjectionMap) -> Result<ConstrainedPoint, ProjectionError> {
+        let found = nearest_point(&self.new, &self.zero(), &self.target, &self.bounds())?;
+        Ok(ConstrainedPoint { exact: found.exact && map == ProjectionMap::Nearest, ..found })
     }
 
-    fn along_normals(&self) -> Result<ProjectionSolution, ProjectionError> {
+    fn along_normals(&self) -> Result<ConstrainedPoint, ProjectionError> {
         let normals = self.old.jacobian(&self.zero());
-        solve::along_normals(&self.new, &normals, &self.zero(), &self.target, &self.bounds())
+        let bounds = self.bounds();
+        Ok(point_along_normals(&self.new, &normals, &self.zero(), &self.target, &bounds)?)
     }
 
     /// The bounds; a parameter outside the rules may not move farther out.
@@ -175,20 +189,20 @@ impl ProjectionPair {
 
     /// True if the reverse leads back: from the end of the forward map, with the other map and the
     /// lenses exchanged.
-    fn is_reversible(&self, map: ProjectionMap, there: &ProjectionSolution) -> bool {
+    fn is_reversible(&self, map: ProjectionMap, there: &ConstrainedPoint) -> bool {
         let bounds = self.limits.widen_to_include(&there.at);
         let target = self.new.values(&there.at);
         let back = match map {
-            ProjectionMap::AlongNormals => solve::nearest(&self.old, &there.at, &target, &bounds),
+            ProjectionMap::AlongNormals => nearest_point(&self.old, &there.at, &target, &bounds),
             ProjectionMap::Nearest => {
                 let normals = self.new.jacobian(&there.at);
-                solve::along_normals(&self.old, &normals, &there.at, &target, &bounds)
+                point_along_normals(&self.old, &normals, &there.at, &target, &bounds)
             }
         };
         back.is_ok_and(|back| back.exact && back.at.iter().all(|z| z.abs() < 1e-6))
     }
 
-    fn log_determinant(&self, map: ProjectionMap, there: &ProjectionSolution) -> Option<f64> {
+    fn log_determinant(&self, map: ProjectionMap, there: &ConstrainedPoint) -> Option<f64> {
         if !self.is_reversible(map, there) {
             return None;
         }
@@ -205,7 +219,7 @@ impl ProjectionPair {
         }
     }
 
-    fn lens(&self, mutated: &Lens, solution: &ProjectionSolution) -> Lens {
+    fn lens(&self, mutated: &Lens, solution: &ConstrainedPoint) -> Lens {
         let mut lens = mutated.clone();
         for (coordinate, z) in self.coordinates.iter().zip(&solution.at) {
             if *z != 0.0 {
@@ -217,7 +231,7 @@ impl ProjectionPair {
         if lens.pickups.is_empty() { lens } else { lens.with_pickups().unwrap_or(lens) }
     }
 
-    fn report(&self, solution: &ProjectionSolution) -> Projection {
+    fn report(&self, solution: &ConstrainedPoint) -> Projection {
         let (mut curvature, mut distance) = (0.0f64, 0.0f64);
         for (coordinate, z) in self.coordinates.iter().zip(&solution.at) {
             let of_kind = match coordinate.new.quantity {
@@ -235,14 +249,6 @@ fn clamp_to_variable(lens: &Lens, parameter: Parameter, value: f64) -> f64 {
     let Some(variable) = lens.variable(parameter) else { return value };
     let value = variable.min.map_or(value, |min| value.max(min));
     variable.max.map_or(value, |max| value.min(max))
-}
-
-/// All curvatures and distances of a lens that are not picked up from another parameter.
-fn free_parameters(lens: &Lens) -> Vec<Parameter> {
-    let mut freed = lens.clone();
-    freed.variables.clear();
-    add_variables(&mut freed, &[ParameterKind::Curvatures, ParameterKind::Thicknesses]);
-    freed.variables.iter().map(|variable| variable.parameter).collect()
 }
 
 /// The parameters that both lenses share and the rules permit to move.

@@ -8,6 +8,7 @@ use crate::lens::{
 };
 use crate::math::Dual;
 use crate::paraxial::{paraxial_ray, signed_indices};
+use crate::solve::ConstraintFunction as _;
 
 fn bundled(name: &str) -> Lens {
     let found = crate::files::bundled_lenses().iter().find(|bundled| bundled.name == name).unwrap();

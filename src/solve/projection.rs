@@ -1,8 +1,35 @@
-//! Newton's method for the few constraints: to the nearest lens, or along given directions.
+//! Projection onto a few constraints by Newton's method: to the nearest point that satisfies them, or
+//! along given directions.
 
-use super::ProjectionError;
-use super::model::MarginalRayModel;
 use nalgebra::{DMatrix, DVector};
+
+/// Quantities that a projection holds, as functions of some coordinates.
+pub trait ConstraintFunction {
+    /// The constrained quantities.
+    fn values(&self, at: &[f64]) -> Vec<f64>;
+
+    /// Their derivatives by the coordinates, a row for each quantity.
+    fn jacobian(&self, at: &[f64]) -> DMatrix<f64>;
+}
+
+/// The reasons that constraints cannot be satisfied.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum ConstraintError {
+    /// The coordinates cannot change the constrained quantities independently.
+    #[error("the coordinates cannot satisfy all constraints independently")]
+    Singular,
+    /// Coordinates would have to leave their bounds.
+    #[error("coordinates would have to leave their bounds ({} of {count} have reached them)", .held.len())]
+    Bounds {
+        /// The indices of the coordinates that have reached their bounds.
+        held: Vec<usize>,
+        /// The number of coordinates.
+        count: usize,
+    },
+    /// No convergence within this number of steps.
+    #[error("no convergence within {0} steps")]
+    Steps(usize),
+}
 
 /// The maximum number of steps.
 const MAX_STEPS: usize = 15;
@@ -14,17 +41,19 @@ const TOLERANCE: f64 = 1e-12;
 /// costs about a microsecond.
 const MAX_POLISHING_STEPS: usize = 60;
 
-/// The bounds of the coordinates.
+/// The smallest and largest value of each coordinate.
 #[derive(Debug, Clone)]
-pub(super) struct CoordinateBounds(Vec<[f64; 2]>);
+pub struct CoordinateBounds(Vec<[f64; 2]>);
 
 impl CoordinateBounds {
-    pub(super) fn new(ranges: Vec<[f64; 2]>) -> Self {
+    /// Bounds from the range of each coordinate.
+    pub fn new(ranges: Vec<[f64; 2]>) -> Self {
         Self(ranges)
     }
 
     /// The bounds widened to include coordinates that are already outside.
-    pub(super) fn widen_to_include(&self, at: &[f64]) -> Self {
+    #[must_use]
+    pub fn widen_to_include(&self, at: &[f64]) -> Self {
         let widened = |([low, high], z): (&[f64; 2], &f64)| [low.min(*z), high.max(*z)];
         Self(self.0.iter().zip(at).map(widened).collect())
     }
@@ -48,25 +77,27 @@ impl CoordinateBounds {
 
 /// Coordinates at which the constraints are satisfied.
 #[derive(Debug, Clone)]
-pub(super) struct ProjectionSolution {
-    pub(super) at: Vec<f64>,
+pub struct ConstrainedPoint {
+    /// The coordinates.
+    pub at: Vec<f64>,
     /// The Lagrange multipliers, the coefficients of the normals.
-    pub(super) multipliers: DVector<f64>,
-    pub(super) steps: usize,
+    pub multipliers: DVector<f64>,
+    /// The number of Newton steps.
+    pub steps: usize,
     /// The largest residual.
-    pub(super) error: f64,
+    pub error: f64,
     /// True if it is the exact value of the map, not limited by a bound.
-    pub(super) exact: bool,
+    pub exact: bool,
 }
 
-struct ProjectionProblem<'a> {
-    model: &'a MarginalRayModel,
+struct ProjectionProblem<'a, F> {
+    function: &'a F,
     target: &'a [f64],
 }
 
-impl ProjectionProblem<'_> {
+impl<F: ConstraintFunction> ProjectionProblem<'_, F> {
     fn residual(&self, at: &DVector<f64>) -> DVector<f64> {
-        let values = self.model.values(at.as_slice());
+        let values = self.function.values(at.as_slice());
         DVector::from_iterator(values.len(), self.target.iter().zip(&values).map(|(t, v)| t - v))
     }
 
@@ -97,14 +128,31 @@ fn multipliers(jacobian: &DMatrix<f64>, missing: &DVector<f64>) -> Option<DVecto
 /// ← z + Jᵀ (J Jᵀ)⁻¹ c`, halved while the residual grows, with coordinates that reach a bound fixed
 /// there; then, if none did, `z ← z₀ + Jᵀ (J Jᵀ)⁻¹ (c + J (z − z₀))` until the displacement is
 /// along the normals, which is the solution of (4.22).
-pub(super) fn nearest(
-    model: &MarginalRayModel,
+///
+/// # Errors
+/// Constraints that cannot be satisfied.
+pub fn nearest_point<F: ConstraintFunction>(
+    function: &F,
     start: &[f64],
     target: &[f64],
     bounds: &CoordinateBounds,
-) -> Result<ProjectionSolution, ProjectionError> {
-    let problem = ProjectionProblem { model, target };
-    let mut reached = find_feasible(&problem, DVector::from_column_slice(start), bounds)?;
+) -> Result<ConstrainedPoint, ConstraintError> {
+    nearest_point_from(function, start, start, target, bounds)
+}
+
+/// The same from coordinates `guess` that are closer to the solution than `start` is.
+///
+/// # Errors
+/// As [`nearest_point`].
+pub fn nearest_point_from<F: ConstraintFunction>(
+    function: &F,
+    start: &[f64],
+    guess: &[f64],
+    target: &[f64],
+    bounds: &CoordinateBounds,
+) -> Result<ConstrainedPoint, ConstraintError> {
+    let problem = ProjectionProblem { function, target };
+    let mut reached = find_feasible(&problem, DVector::from_column_slice(guess), bounds)?;
     let start = DVector::from_column_slice(start);
     if !reached.exact {
         return Ok(reached);
@@ -120,11 +168,11 @@ pub(super) fn nearest(
     Ok(reached)
 }
 
-fn find_feasible(
-    problem: &ProjectionProblem<'_>,
+fn find_feasible<F: ConstraintFunction>(
+    problem: &ProjectionProblem<'_, F>,
     mut at: DVector<f64>,
     bounds: &CoordinateBounds,
-) -> Result<ProjectionSolution, ProjectionError> {
+) -> Result<ConstrainedPoint, ConstraintError> {
     let count = at.len();
     let mut stopped = vec![false; count];
     let mut missing = problem.residual(&at);
@@ -134,30 +182,33 @@ fn find_feasible(
             let exact = !stopped.iter().any(|s| *s);
             let at = at.as_slice().to_vec();
             let multipliers = DVector::zeros(missing.len());
-            return Ok(ProjectionSolution { at, multipliers, steps, error, exact });
+            return Ok(ConstrainedPoint { at, multipliers, steps, error, exact });
         }
-        let mut jacobian = problem.model.jacobian(at.as_slice());
+        let mut jacobian = problem.function.jacobian(at.as_slice());
         for i in (0..count).filter(|i| stopped[*i]) {
             jacobian.column_mut(i).fill(0.0);
         }
-        let held = stopped.iter().filter(|s| **s).count();
-        let cause =
-            if held > 0 { ProjectionError::Bounds(held, count) } else { ProjectionError::Singular };
-        let Some(multipliers) = multipliers(&jacobian, &missing) else { return Err(cause) };
-        let step = jacobian.transpose() * multipliers;
-        let Some((next, left)) = shorten_step(problem, &at, &step, error, bounds) else {
-            return Err(cause);
+        let cause = || {
+            let held: Vec<usize> = (0..count).filter(|i| stopped[*i]).collect();
+            if held.is_empty() {
+                ConstraintError::Singular
+            } else {
+                ConstraintError::Bounds { held, count }
+            }
         };
+        let multipliers = multipliers(&jacobian, &missing).ok_or_else(cause)?;
+        let step = jacobian.transpose() * multipliers;
+        let (next, left) = shorten_step(problem, &at, &step, error, bounds).ok_or_else(cause)?;
         left.into_iter().for_each(|i| stopped[i] = true);
         at = next;
         missing = problem.residual(&at);
     }
-    Err(ProjectionError::Steps(MAX_STEPS))
+    Err(ConstraintError::Steps(MAX_STEPS))
 }
 
 /// The longest of the step and its halves that reduces the residual, or that reaches a bound first.
-fn shorten_step(
-    problem: &ProjectionProblem<'_>,
+fn shorten_step<F: ConstraintFunction>(
+    problem: &ProjectionProblem<'_, F>,
     at: &DVector<f64>,
     step: &DVector<f64>,
     error: f64,
@@ -176,14 +227,14 @@ fn shorten_step(
     None
 }
 
-fn polish(
-    problem: &ProjectionProblem<'_>,
+fn polish<F: ConstraintFunction>(
+    problem: &ProjectionProblem<'_, F>,
     start: &DVector<f64>,
-    reached: &ProjectionSolution,
+    reached: &ConstrainedPoint,
 ) -> Option<(DVector<f64>, DVector<f64>)> {
     let mut at = DVector::from_column_slice(&reached.at);
     for _ in 0..MAX_POLISHING_STEPS {
-        let jacobian = problem.model.jacobian(at.as_slice());
+        let jacobian = problem.function.jacobian(at.as_slice());
         let wanted = problem.residual(&at) + &jacobian * (&at - start);
         let multipliers = multipliers(&jacobian, &wanted)?;
         let next = start + jacobian.transpose() * &multipliers;
@@ -199,14 +250,17 @@ fn polish(
 
 /// The coordinates `start + Nᵀ λ` at which the constraints are satisfied, with the rows of `N` as
 /// directions.
-pub(super) fn along_normals(
-    model: &MarginalRayModel,
+///
+/// # Errors
+/// Constraints that cannot be satisfied.
+pub fn point_along_normals<F: ConstraintFunction>(
+    function: &F,
     normals: &DMatrix<f64>,
     start: &[f64],
     target: &[f64],
     bounds: &CoordinateBounds,
-) -> Result<ProjectionSolution, ProjectionError> {
-    let problem = ProjectionProblem { model, target };
+) -> Result<ConstrainedPoint, ConstraintError> {
+    let problem = ProjectionProblem { function, target };
     let start = DVector::from_column_slice(start);
     let place = |multipliers: &DVector<f64>| &start + normals.transpose() * multipliers;
     let mut multipliers = DVector::zeros(normals.nrows());
@@ -216,17 +270,17 @@ pub(super) fn along_normals(
         let error = largest(&missing);
         if error <= problem.tolerance() {
             if !bounds.contain(&at) {
-                return Err(ProjectionError::Bounds(0, at.len()));
+                return Err(ConstraintError::Bounds { held: Vec::new(), count: at.len() });
             }
             let at = at.as_slice().to_vec();
-            return Ok(ProjectionSolution { at, multipliers, steps, error, exact: true });
+            return Ok(ConstrainedPoint { at, multipliers, steps, error, exact: true });
         }
-        let square = model.jacobian(at.as_slice()) * normals.transpose();
-        let step = square.lu().solve(&missing).ok_or(ProjectionError::Singular)?;
+        let square = function.jacobian(at.as_slice()) * normals.transpose();
+        let step = square.lu().solve(&missing).ok_or(ConstraintError::Singular)?;
         let halves = (0..10).map(|halvings| &multipliers + &step * 0.5f64.powi(halvings));
         let better = |tried: &DVector<f64>| largest(&problem.residual(&place(tried))) < error;
-        multipliers = halves.into_iter().find(better).ok_or(ProjectionError::Singular)?;
+        multipliers = halves.into_iter().find(better).ok_or(ConstraintError::Singular)?;
         at = place(&multipliers);
     }
-    Err(ProjectionError::Steps(MAX_STEPS))
+    Err(ConstraintError::Steps(MAX_STEPS))
 }

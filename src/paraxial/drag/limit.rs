@@ -1,0 +1,80 @@
+//! How far the numbers of a lens can be moved by a drag, and what ends that.
+
+use crate::lens::{Lens, Parameter, Quantity, SurfaceNumber};
+
+/// The largest part of the radius at which a surface ends that its rim may reach.
+const MAX_STEEPNESS: f64 = 0.999;
+
+/// What ends the range of a number.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum DragLimit {
+    /// A gap would change its sign.
+    #[error("the gap after surface {0} is used up")]
+    Gap(SurfaceNumber),
+    /// A surface would end inside its rim.
+    #[error("surface {0} would not reach its rim")]
+    Rim(SurfaceNumber),
+    /// A variable is at its bound.
+    #[error("the {0} is at the bound of its variable")]
+    Bound(Parameter),
+    /// The number is positive.
+    #[error("it cannot be smaller")]
+    Positive,
+    /// A field angle has reached its largest value.
+    #[error("the field angle cannot be larger")]
+    FieldAngle,
+    /// A numerical aperture has reached its largest value.
+    #[error("the aperture cannot be larger")]
+    Aperture,
+    /// There are no more surfaces.
+    #[error("the lens ends there")]
+    LensEnd,
+}
+
+/// The range of a parameter in a drag, with what ends it below and above: gaps keep their sign,
+/// surfaces reach their rims, variables stay between their bounds.
+pub(super) fn parameter_range(lens: &Lens, parameter: Parameter) -> [(f64, DragLimit); 2] {
+    let [mut low, mut high] = natural_range(lens, parameter);
+    if let Some(variable) = lens.variable(parameter) {
+        let bound = DragLimit::Bound(parameter);
+        if let Some(min) = variable.min.filter(|min| *min > low.0) {
+            low = (min, bound);
+        }
+        if let Some(max) = variable.max.filter(|max| *max < high.0) {
+            high = (max, bound);
+        }
+    }
+    [low, high]
+}
+
+fn natural_range(lens: &Lens, parameter: Parameter) -> [(f64, DragLimit); 2] {
+    let surface = SurfaceNumber::new(parameter.surface);
+    let row = &lens.surfaces[parameter.surface];
+    match parameter.quantity {
+        Quantity::Curvature => {
+            let most = steepest(lens, parameter.surface);
+            [-most, most].map(|end| (end, DragLimit::Rim(surface)))
+        }
+        Quantity::SemiDiameter => {
+            let edge = MAX_STEEPNESS * row.shape().edge();
+            [(0.0, DragLimit::Positive), (edge, DragLimit::Rim(surface))]
+        }
+        Quantity::Thickness | Quantity::ZoomThickness(_) => {
+            let limit = DragLimit::Gap(surface);
+            if lens.light_direction(parameter.surface) < 0.0 {
+                [(f64::NEG_INFINITY, limit), (0.0, limit)]
+            } else {
+                [(0.0, limit), (f64::INFINITY, limit)]
+            }
+        }
+        _ => [(f64::NEG_INFINITY, DragLimit::Positive), (f64::INFINITY, DragLimit::Positive)],
+    }
+}
+
+/// The largest curvature with which a surface reaches its rim, in 1/mm.
+fn steepest(lens: &Lens, surface: usize) -> f64 {
+    let row = &lens.surfaces[surface];
+    let rim = row.semi_diameter.unwrap_or(0.0);
+    let square = (1.0 + row.conic) * rim * rim;
+    if square > 0.0 && !row.hyperhemisphere { MAX_STEEPNESS / square.sqrt() } else { f64::INFINITY }
+}
