@@ -7,6 +7,7 @@ use crate::experiments::Effort;
 use crate::lens::{Edit, Lens};
 use crate::merit::Goal;
 use crate::optimize::{DescentMethod, pareto};
+use crate::paraxial::{DragSettings, Handle};
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
@@ -31,6 +32,22 @@ pub enum Command {
     },
     /// Ends an edit of a table cell: the next edit of the same cell is an undo step of its own.
     CommitEdit,
+    /// Moves a handle of the design to a value, or as near to it as what is locked allows. All moves
+    /// of one handle until the drag ends are one undo step.
+    DragHandle {
+        /// The handle.
+        handle: Handle,
+        /// Its new value.
+        value: f64,
+        /// The semi-diameter in mm with which a surface without one is drawn.
+        rim: Option<f64>,
+    },
+    /// Ends the drag of a handle. Every command that changes or stores the design does so too.
+    EndDrag,
+    /// Ends the drag of a handle and restores the design before it.
+    CancelDrag,
+    /// Sets what is held while handles are dragged, and by which numbers.
+    SetDragSettings(DragSettings),
     /// Reverts the last undo step.
     Undo,
     /// Restores the undo step that was reverted last.
@@ -116,6 +133,24 @@ pub enum Command {
     Select(Option<usize>),
     /// Removes all messages.
     ClearMessages,
+}
+
+impl Command {
+    /// True if a drag of a handle goes on with the command.
+    pub(super) const fn continues_drag(&self) -> bool {
+        matches!(
+            self,
+            Self::DragHandle { .. }
+                | Self::EndDrag
+                | Self::CancelDrag
+                | Self::CommitEdit
+                | Self::Grin(_)
+                | Self::Select(_)
+                | Self::ShowPupils(_)
+                | Self::ShowRays(_)
+                | Self::ClearMessages
+        )
+    }
 }
 
 impl From<StructureSearchCommand> for Command {

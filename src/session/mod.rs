@@ -14,6 +14,7 @@
 mod analysis;
 mod clock;
 mod command;
+mod drag;
 mod experiment;
 mod grin_design;
 mod optimization;
@@ -29,6 +30,7 @@ mod view;
 pub use analysis::{Analyses, AnalysisResults, AnalysisSettings, FieldPupils, analyze};
 pub use clock::Timed;
 pub use command::Command;
+pub use drag::{DragProgress, DragView, HandleSlopes, MeritSlopes};
 pub use experiment::{ExperimentRun, ExperimentStatus};
 pub use grin_design::{
     Contour, DocumentSource, GrinAnalysis, GrinCommand, GrinDocument, GrinRun, GrinView,

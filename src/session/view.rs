@@ -1,6 +1,7 @@
 //! The state of a session that panels read.
 
 use super::analysis::{AnalysisResults, AnalysisSettings};
+use super::drag::DragView;
 use super::experiment::ExperimentRun;
 use super::grin_design::GrinView;
 use super::optimization::OptimizationSnapshot;
@@ -41,6 +42,8 @@ pub struct SessionView {
     pub preview_results: Option<Arc<AnalysisResults>>,
     /// The experiment, until it is dismissed.
     pub experiment: Option<Arc<ExperimentRun>>,
+    /// The handles of the design: what is held while they are dragged, and the drag that goes on.
+    pub drag: DragView,
     /// The messages so far, the newest last.
     pub messages: Arc<Vec<Message>>,
     /// The title of the edit that undo reverts; `None` if there is none.
@@ -74,6 +77,7 @@ impl Default for SessionView {
             preview_lens: None,
             preview_results: None,
             experiment: None,
+            drag: DragView::default(),
             messages: Arc::default(),
             undo: None,
             redo: None,

@@ -37,6 +37,7 @@ mod search;
 mod search_cli;
 mod semi_diameters;
 mod session;
+mod session_drag;
 mod session_grin;
 mod session_pareto;
 mod session_search;

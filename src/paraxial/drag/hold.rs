@@ -8,7 +8,7 @@ use super::{
 use crate::lens::{Lens, Medium, Parameter, Quantity};
 use crate::paraxial::free_parameters;
 use crate::solve::{ConstraintError, ConstraintFunction, CoordinateBounds, nearest_point_from};
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 
 /// A number that may change, measured from its value before in its own steps.
 #[derive(Debug, Clone, Copy)]
@@ -155,6 +155,56 @@ impl HeldLens {
         let change = -(jacobian.transpose() * multipliers);
         let numbers = self.free.iter().zip(change.iter());
         let slopes: Vec<_> = numbers.map(|(n, z)| (n.parameter, n.step * z)).collect();
+        slopes.iter().all(|(_, slope)| slope.is_finite()).then_some(slopes)
+    }
+}
+
+/// The derivatives of the locked quantities by all numbers of a lens.
+pub(super) struct TangentSpace {
+    /// Numbers with their steps, a column each; a number that is not free has the step 0.
+    columns: Vec<(Parameter, f64)>,
+    jacobian: DMatrix<f64>,
+}
+
+impl TangentSpace {
+    /// `None` if nothing is locked, or what is locked does not exist.
+    pub(super) fn new(lens: &Lens, settings: &DragSettings) -> Option<Self> {
+        if settings.locks.is_empty() {
+            return None;
+        }
+        let scale = length_scale(lens).ok()?;
+        let free = free_numbers(lens, &[], settings.free, scale);
+        let step = |parameter: &Parameter| {
+            free.iter().find(|number| number.parameter == *parameter).map_or(0.0, |n| n.step)
+        };
+        let columns: Vec<_> = free_parameters(lens)
+            .into_iter()
+            .map(|parameter| (parameter, step(&parameter)))
+            .collect();
+        let coordinates: Vec<_> =
+            columns.iter().map(|(parameter, _)| vec![(*parameter, 1.0)]).collect();
+        let constraints = LockConstraints::new(lens, &settings.locks, &coordinates).ok()?;
+        Some(Self { jacobian: constraints.jacobian(&vec![0.0; columns.len()]), columns })
+    }
+
+    /// The derivatives of the free numbers by the value of a handle; see [`HeldLens::tangent`].
+    pub(super) fn held(&self, motion: &[(Parameter, f64)]) -> Option<Vec<(Parameter, f64)>> {
+        let by_handle = |parameter: &Parameter| {
+            motion.iter().find(|(moved, _)| moved == parameter).map(|(_, by)| *by)
+        };
+        let shift = self.columns.iter().map(|(parameter, _)| by_handle(parameter).unwrap_or(0.0));
+        let missing = &self.jacobian * DVector::from_iterator(self.columns.len(), shift);
+        if missing.iter().all(|value| *value == 0.0) {
+            return Some(Vec::new());
+        }
+        let mut free = self.jacobian.clone();
+        for (mut column, (parameter, step)) in free.column_iter_mut().zip(&self.columns) {
+            column *= if by_handle(parameter).is_some() { 0.0 } else { *step };
+        }
+        let multipliers = (&free * free.transpose()).cholesky()?.solve(&missing);
+        let change = -(free.transpose() * multipliers);
+        let numbers = self.columns.iter().zip(change.iter()).filter(|(_, z)| **z != 0.0);
+        let slopes: Vec<_> = numbers.map(|((p, step), z)| (*p, step * z)).collect();
         slopes.iter().all(|(_, slope)| slope.is_finite()).then_some(slopes)
     }
 }

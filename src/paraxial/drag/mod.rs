@@ -20,7 +20,7 @@ pub use place::HandlePlaces;
 
 use crate::lens::{Edit, EditError, Lens, Parameter, Quantity, SurfaceNumber, apply_edit};
 use crate::solve::ConstraintError;
-use hold::HeldLens;
+use hold::{HeldLens, TangentSpace};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 use std::sync::Arc;
@@ -271,6 +271,26 @@ impl HandleDrag {
         }
         Some(motion.into_iter().chain(self.held.tangent()?).collect())
     }
+}
+
+/// The derivatives of the numbers of a lens by the value of each of its handles that moves a
+/// parameter, of those too that hold what is locked; handles for which that cannot be held are left
+/// out.
+pub fn tangents(
+    lens: &Lens,
+    zoom: usize,
+    settings: &DragSettings,
+) -> Vec<(Handle, Vec<(Parameter, f64)>)> {
+    let space = TangentSpace::new(lens, settings);
+    let of_handle = |handle: Handle| {
+        let motion = handle.motion(lens, zoom);
+        if motion.is_empty() {
+            return None;
+        }
+        let held = space.as_ref().map_or_else(|| Some(Vec::new()), |space| space.held(&motion))?;
+        Some((handle, motion.into_iter().chain(held).collect()))
+    };
+    Handle::all(lens, zoom).into_iter().filter_map(of_handle).collect()
 }
 
 /// A short name of a number, as in `c3` or `t4`, counted from 1.

@@ -77,7 +77,7 @@ impl Session {
     }
 
     /// Makes another lens the design.
-    fn set_design(&mut self, lens: Arc<Lens>) {
+    pub(super) fn set_design(&mut self, lens: Arc<Lens>) {
         self.settings.zoom = self.settings.zoom.min(lens.zoom_positions() - 1);
         self.lens = lens;
         self.preview_lens = None;

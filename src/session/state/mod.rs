@@ -1,6 +1,7 @@
 //! The session itself: what it holds, how it carries out commands, and what panels see of it.
 
 mod document;
+mod drag;
 mod runs;
 
 use super::analysis::{
@@ -8,6 +9,7 @@ use super::analysis::{
     spawn_analysis,
 };
 use super::command::Command;
+use super::drag::DragState;
 use super::experiment::{ExperimentStatus, ExperimentWorker};
 use super::grin_design::GrinState;
 use super::optimization::{OptimizationEngine, OptimizationRequest, OptimizerFactory};
@@ -67,6 +69,7 @@ pub struct Session {
     grin: GrinState,
     experiment: ExperimentWorker,
     design_score: DesignScore,
+    drag: DragState,
     /// The lens that a panel shows in place of the design.
     preview_lens: Option<Arc<Lens>>,
     /// Analyzes that lens, or the one that a run shows.
@@ -139,6 +142,7 @@ impl Session {
             grin: GrinState::spawn(wake.clone())?,
             experiment: ExperimentWorker::spawn(wake.clone())?,
             design_score: DesignScore::spawn(wake.clone())?,
+            drag: DragState::spawn(wake.clone())?,
             preview_lens: None,
             preview_analysis: spawn_analysis(EffectTiming::Skipped, wake)?,
             preview_request: None,
@@ -151,12 +155,19 @@ impl Session {
 
     /// Carries out a command and returns the events so far.
     pub fn apply(&mut self, command: Command) -> Vec<SessionEvent> {
+        if !command.continues_drag() {
+            self.end_drag();
+        }
         match command {
             Command::Edit(edit) => self.edit(&edit),
             Command::LimitByStop => self.limit_by_stop(),
             Command::ScaleToFocalLength(focal_length) => self.scale_to_focal_length(focal_length),
             Command::InsertLens { path, at } => self.insert_lens(&path, at),
             Command::CommitEdit => self.history.commit(),
+            Command::DragHandle { handle, value, rim } => self.drag_handle(handle, value, rim),
+            Command::EndDrag => self.end_drag(),
+            Command::CancelDrag => self.cancel_drag(),
+            Command::SetDragSettings(settings) => self.set_drag_settings(settings),
             Command::Undo => self.undo(),
             Command::Redo => self.redo(),
             Command::New(lens) => self.replace_design(*lens, None),
@@ -208,6 +219,7 @@ impl Session {
         let is_compared = self.pareto.run.view().id.is_some() || self.structure_search.is_shown();
         self.design_score.sync(&self.lens, is_compared);
         self.grin.sync();
+        self.sync_drag();
         self.sync_preview();
         std::mem::take(&mut self.events)
     }
@@ -226,6 +238,7 @@ impl Session {
             preview_lens: self.preview_lens.clone(),
             preview_results: self.preview_results(),
             experiment: self.experiment.run(),
+            drag: self.drag.view(),
             messages: Arc::clone(&self.messages),
             undo: self.history.undo_title().map(str::to_owned),
             redo: self.history.redo_title().map(str::to_owned),

@@ -1,0 +1,273 @@
+//! Dragging a handle of the design: every move changes the design, all moves of one drag are one
+//! undo step, and the merit tells at each handle which way would help.
+
+use super::clock::now;
+use super::run::{LatestRequestWorker, catch_panic};
+use crate::lens::{Lens, Parameter, ParameterKind, add_variables};
+use crate::math::format_short;
+use crate::merit::{DerivativeLevel, Goal, Merit};
+use crate::paraxial::{
+    DragOutcome, DragSettings, Handle, HandleDrag, MovedNumber, short_name, tangents,
+};
+use std::collections::HashMap;
+use std::io;
+use std::sync::Arc;
+
+/// The number of moved numbers that a message names.
+const NAMED_NUMBERS: usize = 4;
+
+/// A drag that has not ended.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DragProgress {
+    /// The handle.
+    pub handle: Handle,
+    /// The lens before the drag.
+    pub before: Arc<Lens>,
+    /// The value of the handle before the drag.
+    pub start: f64,
+    /// The value that the handle has reached.
+    pub value: f64,
+    /// The numbers that have changed to hold what is locked, those that changed most first.
+    pub moved: Vec<MovedNumber>,
+    /// The reason why the handle has not reached the value that was asked for.
+    pub stop: Option<String>,
+}
+
+/// What a panel with handles shows.
+#[derive(Debug, Clone, Default)]
+pub struct DragView {
+    /// What is held, and by which numbers.
+    pub settings: DragSettings,
+    /// The drag that has not ended.
+    pub progress: Option<Arc<DragProgress>>,
+    /// The reason why the last handle could not be dragged at all.
+    pub error: Option<String>,
+    /// The derivatives of the merit by the handles, maybe of an earlier version of the design.
+    pub slopes: Option<Arc<HandleSlopes>>,
+}
+
+/// The merit of a lens, and its derivatives by the values of the handles.
+#[derive(Debug, Clone)]
+pub struct HandleSlopes {
+    /// The version of the design.
+    pub version: u64,
+    /// The merit and the derivatives, or the reason why there are none.
+    pub result: Result<MeritSlopes, String>,
+    /// The time of the computation, in milliseconds.
+    pub ms: f64,
+}
+
+/// A merit with its derivatives.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct MeritSlopes {
+    /// The merit of the lens.
+    pub merit: f64,
+    /// The merit of the lens before the drag.
+    pub before: f64,
+    /// The derivatives of the merit by the values of the handles that move a parameter.
+    pub slopes: Vec<(Handle, f64)>,
+}
+
+impl MeritSlopes {
+    /// The derivative of the merit by the value of a handle.
+    pub fn slope(&self, handle: Handle) -> Option<f64> {
+        self.slopes.iter().find(|(other, _)| *other == handle).map(|(_, slope)| *slope)
+    }
+}
+
+/// The state of drags in a session.
+#[derive(Debug)]
+pub(super) struct DragState {
+    pub(super) settings: DragSettings,
+    active: Option<(HandleDrag, Arc<DragProgress>)>,
+    error: Option<String>,
+    worker: LatestRequestWorker<SlopesRequest, HandleSlopes>,
+    /// The version whose slopes were requested last.
+    requested: u64,
+}
+
+impl DragState {
+    pub(super) fn spawn(wake: impl Fn() + Send + 'static) -> io::Result<Self> {
+        let mut reference = None;
+        let worker = LatestRequestWorker::spawn("handles", wake, move |request, output| {
+            output.publish(evaluate(&request, &mut reference));
+        })?;
+        Ok(Self {
+            settings: DragSettings::default(),
+            active: None,
+            error: None,
+            worker,
+            requested: 0,
+        })
+    }
+
+    /// The handle that is being dragged.
+    pub(super) fn handle(&self) -> Option<Handle> {
+        self.active.as_ref().map(|(drag, _)| drag.handle())
+    }
+
+    /// Moves a handle, beginning a drag of it if there is none. Returns the lens, or the reason why
+    /// the handle cannot be dragged if that is new.
+    pub(super) fn drag(
+        &mut self,
+        design: &Arc<Lens>,
+        zoom: usize,
+        handle: Handle,
+        (value, rim): (f64, Option<f64>),
+    ) -> Result<Lens, Option<String>> {
+        if self.handle() != Some(handle) {
+            let drag = HandleDrag::new(design, handle, zoom, &self.settings, rim);
+            let drag = drag.map_err(|why| self.refuse(why.to_string()))?;
+            let before = Arc::clone(design);
+            let start = drag.start();
+            let (moved, stop) = (Vec::new(), None);
+            let progress = DragProgress { handle, before, start, value: start, moved, stop };
+            self.active = Some((drag, Arc::new(progress)));
+        }
+        self.error = None;
+        let Some((drag, progress)) = &mut self.active else { return Err(None) };
+        let DragOutcome { lens, value, moved, stop } = drag.to(value);
+        let stop = stop.map(|stop| stop.to_string());
+        *progress = Arc::new(DragProgress { value, moved, stop, ..DragProgress::clone(progress) });
+        Ok(lens)
+    }
+
+    /// The reason, unless it was given before.
+    fn refuse(&mut self, why: String) -> Option<String> {
+        let is_new = self.error.as_ref() != Some(&why);
+        self.error = Some(why.clone());
+        is_new.then_some(why)
+    }
+
+    /// Ends the drag.
+    pub(super) fn take(&mut self) -> Option<Arc<DragProgress>> {
+        self.error = None;
+        self.active.take().map(|(_, progress)| progress)
+    }
+
+    pub(super) fn view(&self) -> DragView {
+        DragView {
+            settings: self.settings.clone(),
+            progress: self.active.as_ref().map(|(_, progress)| Arc::clone(progress)),
+            error: self.error.clone(),
+            slopes: self.worker.latest(),
+        }
+    }
+
+    /// Lets the slopes be requested anew, because what is held has changed.
+    pub(super) const fn forget_slopes(&mut self) {
+        self.requested = 0;
+    }
+
+    /// Requests the slopes of a version of the design, once.
+    pub(super) fn sync(&mut self, version: u64, lens: &Arc<Lens>, zoom: usize, tolerance: f64) {
+        if self.requested == version {
+            return;
+        }
+        self.requested = version;
+        let before = self.active.as_ref().map_or(lens, |(drag, _)| drag.before());
+        self.worker.request(SlopesRequest {
+            version,
+            lens: Arc::clone(lens),
+            before: Arc::clone(before),
+            zoom,
+            settings: self.settings.clone(),
+            tolerance,
+        });
+    }
+}
+
+impl DragProgress {
+    /// The title of the drag in a menu.
+    pub(super) fn title(&self) -> String {
+        format!("drag the {}", self.handle)
+    }
+
+    /// What has moved to hold what is locked; `None` if nothing has.
+    pub fn moved_text(&self) -> Option<String> {
+        if self.moved.is_empty() {
+            return None;
+        }
+        let change = |moved: &MovedNumber| {
+            let name = short_name(moved.parameter);
+            format!("{name} {} to {}", format_short(moved.before), format_short(moved.after))
+        };
+        let named: Vec<String> = self.moved.iter().take(NAMED_NUMBERS).map(change).collect();
+        let more = self.moved.len().saturating_sub(NAMED_NUMBERS);
+        let rest = if more > 0 { format!(" and {more} more") } else { String::new() };
+        Some(format!("{}{rest}", named.join(", ")))
+    }
+}
+
+/// A request for the slopes of a lens.
+#[derive(Debug)]
+struct SlopesRequest {
+    version: u64,
+    lens: Arc<Lens>,
+    /// The lens before the drag, with which the merit is compared.
+    before: Arc<Lens>,
+    zoom: usize,
+    settings: DragSettings,
+    tolerance: f64,
+}
+
+/// The merit function of the lens before a drag.
+#[derive(Debug)]
+struct MeritReference {
+    lens: Arc<Lens>,
+    goal: Goal,
+    light: Vec<Vec<f64>>,
+    merit: f64,
+}
+
+fn evaluate(request: &SlopesRequest, reference: &mut Option<MeritReference>) -> HandleSlopes {
+    let start = now();
+    let result = catch_panic(|| slopes(request, reference));
+    HandleSlopes { version: request.version, result, ms: start.elapsed().as_secs_f64() * 1e3 }
+}
+
+fn slopes(
+    request: &SlopesRequest,
+    reference: &mut Option<MeritReference>,
+) -> Result<MeritSlopes, String> {
+    let known = reference.take().filter(|known| Arc::ptr_eq(&known.lens, &request.before));
+    let known = match known {
+        Some(known) => known,
+        None => MeritReference::new(&request.before, request.tolerance)?,
+    };
+    let known = reference.insert(known);
+    let lens = with_all_variables(&request.lens);
+    let merit = Merit::new(&lens, &known.goal, request.tolerance).map_err(|why| why.to_string())?;
+    let merit = merit.with_initial_light(&known.light);
+    let sum = merit.evaluate(&merit.values(&lens), DerivativeLevel::Gradient);
+    let sum = sum.map_err(|why| why.to_string())?;
+    let by_number = merit.variables().iter().map(|variable| variable.parameter);
+    let by_number: HashMap<Parameter, f64> = by_number.zip(sum.gradient.iter().copied()).collect();
+    let along = |tangent: Vec<(Parameter, f64)>| -> f64 {
+        tangent.iter().map(|(p, by)| by * by_number.get(p).copied().unwrap_or(0.0)).sum()
+    };
+    let tangents = tangents(&request.lens, request.zoom, &request.settings);
+    let slopes = tangents.into_iter().map(|(handle, tangent)| (handle, along(tangent)));
+    let slopes = slopes.filter(|(_, slope)| slope.is_finite()).collect();
+    Ok(MeritSlopes { merit: sum.value, before: known.merit, slopes })
+}
+
+impl MeritReference {
+    fn new(lens: &Arc<Lens>, tolerance: f64) -> Result<Self, String> {
+        let goal = Goal::of_lens(lens).map_err(|why| why.to_string())?;
+        let merit = Merit::new(lens, &goal, tolerance).map_err(|why| why.to_string())?;
+        let value = merit.value(&merit.values(lens)).map_err(|why| why.to_string())?;
+        let light = merit.initial_light().to_vec();
+        Ok(Self { lens: Arc::clone(lens), goal, light, merit: value })
+    }
+}
+
+/// The lens with all numbers that handles move as variables.
+fn with_all_variables(lens: &Lens) -> Lens {
+    let mut freed = lens.clone();
+    freed.variables.clear();
+    let kinds =
+        [ParameterKind::Curvatures, ParameterKind::Thicknesses, ParameterKind::SemiDiameters];
+    add_variables(&mut freed, &kinds);
+    freed
+}

@@ -1,0 +1,147 @@
+//! Drags of handles in a session: one undo step each, taken back by a command, with the slopes of
+//! the merit.
+
+use aplanat::files::{bundled_lenses, json};
+use aplanat::lens::{Edit, Lens};
+use aplanat::merit::{Goal, Merit};
+use aplanat::paraxial::{DragSettings, FirstOrderLock, Handle};
+use aplanat::session::{Command, MeritSlopes, Session};
+use std::thread;
+use std::time::Duration;
+
+fn bundled(name: &str) -> Lens {
+    let found = bundled_lenses().iter().find(|bundled| bundled.name == name).unwrap();
+    json::read(found.text, name).unwrap()
+}
+
+fn session() -> Session {
+    Session::new(bundled("cooke_triplet_100_f27"), || {}).unwrap()
+}
+
+fn drag(handle: Handle, value: f64) -> Command {
+    Command::DragHandle { handle, value, rim: None }
+}
+
+fn lock(session: &mut Session, locks: &[FirstOrderLock]) {
+    let settings = DragSettings { locks: locks.to_vec(), ..DragSettings::default() };
+    session.apply(Command::SetDragSettings(settings));
+}
+
+fn last_message(session: &Session) -> String {
+    session.view().messages.last().map(|message| message.text.clone()).unwrap_or_default()
+}
+
+#[test]
+fn a_drag_is_one_undo_step() {
+    let mut session = session();
+    let before = session.lens().clone();
+    lock(&mut session, &[FirstOrderLock::FocalLength]);
+    let start = before.surfaces[1].curvature;
+    for i in 1..=20 {
+        session.apply(drag(Handle::Curvature(1), start + 1e-5 * f64::from(i)));
+    }
+    let view = session.view();
+    let progress = view.drag.progress.unwrap();
+    assert_eq!((progress.value, progress.start), (start + 2e-4, start));
+    assert_eq!((view.undo, progress.stop.clone()), (None, None));
+    assert!(!progress.moved.is_empty() && *progress.before == *before);
+    session.apply(Command::EndDrag);
+    assert!(session.view().drag.progress.is_none());
+    assert_eq!(session.view().undo.as_deref(), Some("drag the curvature of surface 2"));
+    assert!(last_message(&session).starts_with("the focal length was held by "));
+    let after = session.lens().clone();
+    session.apply(Command::Undo);
+    assert_eq!(*session.lens(), before);
+    assert_eq!(session.view().undo, None, "one step");
+    session.apply(Command::Redo);
+    assert_eq!(*session.lens(), after);
+}
+
+#[test]
+fn a_drag_is_taken_back_without_a_trace() {
+    let mut session = session();
+    let before = session.lens().clone();
+    session.apply(drag(Handle::Vertex(2), 1.0));
+    assert_ne!(*session.lens(), before);
+    session.apply(Command::CancelDrag);
+    let view = session.view();
+    assert_eq!((view.lens, view.undo, view.redo, view.dirty), (before, None, None, false));
+}
+
+#[test]
+fn another_handle_or_edit_ends_a_drag() {
+    let mut session = session();
+    let start = session.lens().surfaces[0].curvature;
+    session.apply(drag(Handle::Curvature(0), 1.01 * start));
+    session.apply(drag(Handle::ImagePlane, 80.0));
+    session.apply(Command::Edit(Edit::set_radius(2, -40.0)));
+    for title in
+        ["curvature of surface 3", "drag the image plane", "drag the curvature of surface 1"]
+    {
+        assert_eq!(session.view().undo.as_deref(), Some(title));
+        session.apply(Command::Undo);
+    }
+    assert_eq!(session.view().undo, None);
+    session.apply(drag(Handle::ImagePlane, session.lens().surfaces[6].thickness));
+    session.apply(Command::EndDrag);
+    assert_eq!(session.view().undo, None, "a handle that came back is no step");
+}
+
+#[test]
+fn a_handle_that_cannot_be_dragged_says_why_once() {
+    let mut session = session();
+    lock(&mut session, &[FirstOrderLock::Magnification]);
+    for _ in 0..3 {
+        session.apply(drag(Handle::Curvature(0), 0.01));
+    }
+    let view = session.view();
+    let why = "the magnification cannot be held: the object is at infinity, so that there is no \
+               magnification";
+    assert_eq!(view.drag.error.as_deref(), Some(why));
+    assert_eq!((view.messages.len(), view.dirty), (1, false));
+}
+
+fn slopes(session: &mut Session) -> MeritSlopes {
+    for _ in 0..6000 {
+        session.poll();
+        let view = session.view();
+        let slopes = view.drag.slopes.filter(|slopes| slopes.version == view.version);
+        if let Some(slopes) = slopes {
+            return slopes.result.clone().unwrap();
+        }
+        thread::sleep(Duration::from_millis(10));
+    }
+    panic!("no slopes");
+}
+
+#[test]
+fn slopes_are_the_derivatives_of_the_merit() {
+    let lens = bundled("double_gauss_nikkor_s_50");
+    let mut session = Session::new(lens.clone(), || {}).unwrap();
+    let found = slopes(&mut session);
+    let goal = Goal::default_for(&lens).unwrap();
+    let start = Merit::new(&lens, &goal, 1e-5).unwrap();
+    let merit = |lens: &Lens| {
+        let merit = Merit::new(lens, &goal, 1e-5).unwrap();
+        let merit = merit.with_initial_light(start.initial_light());
+        merit.value(&merit.values(lens)).unwrap()
+    };
+    for (handle, h) in
+        [(Handle::Curvature(2), 2e-6), (Handle::Vertex(4), 1e-4), (Handle::Rim(0), 1e-3)]
+    {
+        let value = handle.value(&lens, 0).unwrap();
+        let at = |value: f64| {
+            let mut moved = lens.clone();
+            for (parameter, by) in handle.motion(&lens, 0) {
+                let old = lens.get(parameter).unwrap();
+                moved.set(parameter, old + by * (value - handle.value(&lens, 0).unwrap()));
+            }
+            merit(&moved)
+        };
+        let difference = (at(value + h) - at(value - h)) / (2.0 * h);
+        let slope = found.slope(handle).unwrap();
+        let off = (slope - difference).abs() / difference.abs().max(1e-6);
+        assert!(off < 0.05, "{handle}: {slope:e} {difference:e}");
+    }
+    assert!((found.merit / found.before - 1.0).abs() < 1e-9);
+}
