@@ -1,34 +1,42 @@
 //! How far the numbers of a lens can be moved by a drag, and what ends that.
 
 use crate::lens::{Lens, Parameter, Quantity, SurfaceNumber};
+use std::fmt;
 
 /// The largest part of the radius at which a surface ends that its rim may reach.
 const MAX_STEEPNESS: f64 = 0.999;
 
 /// What ends the range of a number.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum DragLimit {
     /// A gap would change its sign.
-    #[error("the gap after surface {0} is used up")]
     Gap(SurfaceNumber),
     /// A surface would end inside its rim.
-    #[error("surface {0} would not reach its rim")]
     Rim(SurfaceNumber),
     /// A variable is at its bound.
-    #[error("the {0} is at the bound of its variable")]
     Bound(Parameter),
     /// The number is positive.
-    #[error("it cannot be smaller")]
     Positive,
     /// A field angle has reached its largest value.
-    #[error("the field angle cannot be larger")]
     FieldAngle,
     /// A numerical aperture has reached its largest value.
-    #[error("the aperture cannot be larger")]
     Aperture,
     /// There are no more surfaces.
-    #[error("the lens ends there")]
     LensEnd,
+}
+
+impl fmt::Display for DragLimit {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Gap(surface) => write!(f, "the gap after surface {surface} is used up"),
+            Self::Rim(surface) => write!(f, "surface {surface} would not reach its rim"),
+            Self::Bound(parameter) => write!(f, "the {parameter} is at the bound of its variable"),
+            Self::Positive => f.write_str("it cannot be smaller"),
+            Self::FieldAngle => f.write_str("the field angle cannot be larger"),
+            Self::Aperture => f.write_str("the aperture cannot be larger"),
+            Self::LensEnd => f.write_str("the lens ends there"),
+        }
+    }
 }
 
 /// The range of a parameter in a drag, with what ends it below and above: gaps keep their sign,
