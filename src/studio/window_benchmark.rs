@@ -12,12 +12,16 @@ use super::app::Studio;
 use super::draw::RenderBackend;
 use super::window::{self, AppResult, Persistence, StudioError};
 use super::{first_lens, panels};
-use crate::lens::{Edit, Parameter, Quantity};
+use crate::files;
+use crate::lens::{Edit, Lens, Parameter, Quantity};
 use crate::measure::{age_ms, processor_ms, time_ms};
+use crate::paraxial::{DragSettings, FirstOrderLock, Handle};
 use crate::session::{Command, Session};
 
 /// The number of timed edits.
 const EDITS: usize = 21;
+/// The number of timed moves of a handle.
+const MOVES: usize = 200;
 /// The number of repainted frames that share the measured processor time.
 const FRAMES: usize = 20;
 /// The time for which the window is left idle.
@@ -41,6 +45,17 @@ pub struct WindowMetrics {
     pub edit_ms: f64,
     /// The slowest of them.
     pub slowest_edit_ms: f64,
+    /// From a move of a handle to the numbers of all panels with the merit and its derivatives by the
+    /// handles, frames apart: the median of 200 moves with the focal length held.
+    pub drag_ms: f64,
+    /// The slowest of them.
+    pub slowest_drag_ms: f64,
+    /// The lens with the most surfaces of those that come with the program.
+    pub largest_lens: String,
+    /// The median of the same moves on that lens.
+    pub largest_drag_ms: f64,
+    /// The slowest of them.
+    pub slowest_largest_drag_ms: f64,
     /// Processor time of a frame in which no drawing changed, all threads together.
     pub frame_processor_ms: Option<f64>,
     /// The time for which the window was left idle with the cursor in a text field.
@@ -138,6 +153,7 @@ impl WindowBenchmark {
                     figures.size = [size.x as u32, size.y as u32];
                 });
                 self.time_edits();
+                self.time_drags();
                 BenchmarkPhase::Settling(5)
             }
             BenchmarkPhase::Settling(0) => BenchmarkPhase::Repainting(FRAMES, processor_ms()),
@@ -193,6 +209,36 @@ impl WindowBenchmark {
         ms
     }
 
+    /// Drags a handle of the first lens, and one of the largest.
+    fn time_drags(&mut self) {
+        let [median, slowest] = self.time_moves(first_lens());
+        self.record(|figures| (figures.drag_ms, figures.slowest_drag_ms) = (median, slowest));
+        let surfaces = |lens: &Lens| lens.surfaces.len();
+        let Some(largest) = bundled_lenses().max_by_key(surfaces) else { return };
+        let name = largest.name.clone();
+        let [median, slowest] = self.time_moves(largest);
+        self.record(|figures| {
+            figures.largest_lens = name;
+            (figures.largest_drag_ms, figures.slowest_largest_drag_ms) = (median, slowest);
+        });
+        self.studio.session_mut().apply(Command::New(Box::new(first_lens())));
+    }
+
+    /// The median and the worst time of the moves of a handle of a lens, in milliseconds.
+    fn time_moves(&mut self, lens: Lens) -> [f64; 2] {
+        let session = self.studio.session_mut();
+        session.apply(Command::New(Box::new(lens)));
+        let locks = vec![FirstOrderLock::FocalLength];
+        let settings = DragSettings { locks, ..DragSettings::default() };
+        session.apply(Command::SetDragSettings(settings));
+        let start = session.lens().surfaces[0].curvature;
+        let mut times: Vec<f64> = (0..MOVES).map(|i| time_move(session, start, i)).collect();
+        session.apply(Command::CancelDrag);
+        session.apply(Command::SetDragSettings(DragSettings::default()));
+        times.sort_by(f64::total_cmp);
+        [times[MOVES / 2], times[MOVES - 1]]
+    }
+
     /// Leaves the window idle, measures its processor time meanwhile, and closes it.
     fn measure_idle(&self, context: &Context) {
         let (figures, window) = (Arc::clone(&self.metrics), context.clone());
@@ -212,6 +258,32 @@ impl WindowBenchmark {
             context.send_viewport_cmd(ViewportCommand::Close);
         }
     }
+}
+
+/// The lenses that come with the program.
+fn bundled_lenses() -> impl Iterator<Item = Lens> {
+    let open = |bundled: &files::BundledLens| {
+        files::parse(bundled.text.as_bytes(), bundled.name).ok().map(|opened| opened.lens)
+    };
+    files::bundled_lenses().iter().filter_map(open)
+}
+
+/// The time of a move of the first curvature to all numbers, in milliseconds.
+fn time_move(session: &mut Session, start: f64, i: usize) -> f64 {
+    let value = start * (1.0 + 1e-4 * i as f64);
+    let ((), ms) = time_ms(|| {
+        session.apply(Command::DragHandle { handle: Handle::Curvature(0), value, rim: None });
+        for _ in 0..MAX_POLLS {
+            session.poll();
+            let view = session.view();
+            let slopes = view.drag.slopes.as_ref().map(|slopes| slopes.version);
+            if view.is_current() && slopes == Some(view.version) {
+                break;
+            }
+            thread::sleep(Duration::from_micros(100));
+        }
+    });
+    ms
 }
 
 fn processor_ms_since(before: Option<f64>) -> Option<f64> {

@@ -7,6 +7,7 @@ mod begin;
 mod drawing;
 mod file_dialog;
 mod grin;
+mod handles;
 mod harness;
 mod panels;
 mod prescription;

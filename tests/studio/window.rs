@@ -18,7 +18,7 @@ use crate::harness::double_gauss;
 const DEADLINE: Duration = Duration::from_mins(1);
 const PAUSE: Duration = Duration::from_millis(5);
 
-fn window() -> Harness<'static, Studio> {
+pub(super) fn window() -> Harness<'static, Studio> {
     let session = Session::new(double_gauss(), || {}).unwrap();
     let studio = Studio::new(session, RenderBackend::Software, Persistence::Disabled, None);
     let builder = Harness::builder().with_size([1280.0, 800.0]).with_context_setup(theme::apply);
@@ -41,7 +41,7 @@ fn wait(harness: &mut Harness<'_, Studio>, what: &str, so: impl Fn(&Harness<'_, 
 }
 
 /// Waits until all numbers belong to the lens as it is.
-fn settle(harness: &mut Harness<'_, Studio>) {
+pub(super) fn settle(harness: &mut Harness<'_, Studio>) {
     wait(harness, "fresh numbers", |harness| harness.state().session().view().is_current());
     harness.run_steps(3);
 }

@@ -31,10 +31,15 @@ struct MeasureWindowReport {
 }
 
 /// The keys of the results, and their descriptions.
-const NAMES: [(&str, &str); 7] = [
+const NAMES: [(&str, &str); 12] = [
     ("first_frame_ms", "process start to first frame, ms"),
     ("edit_ms", "an edit to the results of all panels, ms"),
     ("slowest_edit_ms", "the slowest edit, ms"),
+    ("drag_ms", "a move of a handle to all numbers and the merit, ms"),
+    ("slowest_drag_ms", "the slowest of 200 moves, ms"),
+    ("largest_lens", "the largest bundled lens"),
+    ("largest_drag_ms", "a move of a handle of it, ms"),
+    ("slowest_largest_drag_ms", "the slowest of 200 moves of it, ms"),
     ("frame_processor_ms", "processor time of a frame without changes, ms"),
     ("idle_seconds", "time without input, s"),
     ("idle_processor_ms", "processor time in that time, ms"),

@@ -23,12 +23,26 @@ pub struct SceneView {
     canvas: SceneCanvas,
     /// The camera that the user has chosen; `None` while the whole scene is shown.
     user_camera: Option<Camera>,
+    /// The camera of the last frame.
+    last_camera: Option<Camera>,
+    /// The camera that stays while something in the scene is moved.
+    held_camera: Option<Camera>,
 }
 
 impl SceneView {
     /// A stage; no two of one window share a name.
     pub const fn new(name: &'static str) -> Self {
-        Self { canvas: SceneCanvas::new(name), user_camera: None }
+        Self {
+            canvas: SceneCanvas::new(name),
+            user_camera: None,
+            last_camera: None,
+            held_camera: None,
+        }
+    }
+
+    /// Holds the camera where it is, or lets it follow the scene again.
+    pub fn hold(&mut self, holds: bool) {
+        self.held_camera = if holds { self.held_camera.or(self.last_camera) } else { None };
     }
 
     /// Shows the whole scene again.
@@ -63,7 +77,11 @@ impl SceneView {
         let per_point = f64::from(ui.ctx().pixels_per_point());
         let size = per_point * DVec2::new(rect.width().into(), rect.height().into());
         let fitted = Camera::fit(whole, size, MARGIN * per_point);
-        let camera = self.navigate(ui, &response, fitted, size, per_point);
+        let camera = match self.held_camera {
+            Some(camera) => camera,
+            None => self.navigate(ui, &response, fitted, size, per_point),
+        };
+        self.last_camera = Some(camera);
         let shown = SceneResponse { response, camera, per_point };
         below(ui, &shown);
         self.canvas.show(ui, rect, backend, scene, camera);
@@ -120,6 +138,11 @@ impl SceneResponse {
         let at = self.response.hover_pos()?;
         let px = self.per_point * to_dvec(at - self.response.rect.min);
         Some((self.camera.to_mm(px, self.size()), self.per_point / self.camera.scale))
+    }
+
+    /// The length of a point of the screen in the plane, in mm.
+    pub fn mm_per_point(&self) -> f64 {
+        self.per_point / self.camera.scale
     }
 
     /// The place on the screen of a point of the plane.

@@ -3,9 +3,11 @@
 //! While a search runs, its current lens is shown over the outlines of the design; glass that the
 //! design does not have is tinted.
 
+mod handles;
+
 use std::sync::Arc;
 
-use egui::{Align, ComboBox, DragValue, Layout as Arrange, RichText, Stroke, Ui};
+use egui::{Align, ComboBox, Context, DragValue, Layout as Arrange, RichText, Stroke, Ui};
 use glam::DVec2;
 
 use super::widgets::swatch;
@@ -13,6 +15,7 @@ use super::{Panel, displayed_results, field_name, show_missing_results, zoom_nam
 use crate::analysis::{LayoutRay, RayLayout};
 use crate::lens::{System, added_glass};
 use crate::math::Vec3;
+use crate::paraxial::Handle;
 use crate::session::{Analyses, AnalysisResults, Command, SessionView};
 use crate::studio::actions::Actions;
 use crate::studio::cached::{ByAddress, Cached};
@@ -21,6 +24,7 @@ use crate::studio::number;
 use crate::studio::palette::{Palette, color32};
 use crate::studio::section::SectionDrawing;
 use crate::trace::Fates;
+use handles::{HandleFrame, HandleLayer, handle_places, locks_row};
 
 /// The distance in points within which the pointer picks a surface.
 const NEAR: f64 = 6.0;
@@ -31,12 +35,15 @@ pub struct LayoutPanel {
     backend: RenderBackend,
     scene_view: SceneView,
     drawing: Cached<LayoutKey, Option<LayoutDrawing>>,
+    handles: HandleLayer,
 }
 
 /// The scene of a lens, with what its legend and its tooltips need.
 #[derive(Debug)]
 struct LayoutDrawing {
     scene: Arc<Scene>,
+    /// The handles with their places, in mm.
+    handles: Vec<(Handle, DVec2)>,
     full_view: BoundingBox,
     system: System<f64>,
     reached: Vec<f64>,
@@ -59,8 +66,13 @@ struct LayoutKey {
 
 impl LayoutPanel {
     /// An empty panel.
-    pub const fn new(backend: RenderBackend) -> Self {
-        Self { backend, scene_view: SceneView::new("layout"), drawing: Cached::new() }
+    pub fn new(backend: RenderBackend) -> Self {
+        Self {
+            backend,
+            scene_view: SceneView::new("layout"),
+            drawing: Cached::new(),
+            handles: HandleLayer::default(),
+        }
     }
 }
 
@@ -69,9 +81,15 @@ impl Panel for LayoutPanel {
         "Layout"
     }
 
+    fn is_typing(&self, _context: &Context) -> bool {
+        self.handles.is_typing()
+    }
+
     fn ui(&mut self, ui: &mut Ui, view: &SessionView, actions: &mut Actions) {
         self.refresh(ui, view);
         self.header(ui, view, actions);
+        locks_row(ui, view, actions);
+        self.scene_view.hold(self.handles.before().is_some());
         let Some(Some(drawing)) = self.drawing.last() else {
             return show_missing_results(ui, view);
         };
@@ -79,6 +97,8 @@ impl Panel for LayoutPanel {
         let (scene, full_view) = (&drawing.scene, drawing.full_view);
         let shown = self.scene_view.show(ui, self.backend, scene, full_view, &label);
         let near = drawing.highlight_surface(ui, view, &shown);
+        let frame = HandleFrame { view, shown: &shown, drawing, near };
+        self.handles.ui(ui, &frame, actions);
         if shown.response.clicked() && near != view.selected {
             actions.push(Command::Select(near));
         }
@@ -87,7 +107,7 @@ impl Panel for LayoutPanel {
 
 impl LayoutPanel {
     fn refresh(&mut self, ui: &Ui, view: &SessionView) {
-        let Some(source) = LayoutKey::of(ui, view) else {
+        let Some(source) = LayoutKey::of(ui, view, self.handles.before()) else {
             return self.drawing.clear();
         };
         self.drawing.get(source, LayoutDrawing::new);
@@ -179,9 +199,11 @@ fn zoom_position(ui: &mut Ui, view: &SessionView, actions: &mut Actions) {
 }
 
 impl LayoutKey {
-    fn of(ui: &Ui, view: &SessionView) -> Option<Self> {
+    /// What is drawn: the lens of a search over the design, the design over that before a drag.
+    fn of(ui: &Ui, view: &SessionView, before: Option<&Arc<AnalysisResults>>) -> Option<Self> {
         let shown = displayed_results(view)?.0;
-        let reference = view.results.as_ref().filter(|design| !Arc::ptr_eq(design, shown));
+        let reference = before.or(view.results.as_ref());
+        let reference = reference.filter(|design| !Arc::ptr_eq(design, shown));
         Some(Self {
             results: shown.into(),
             reference: reference.map(Into::into),
@@ -211,6 +233,7 @@ impl LayoutDrawing {
         draw_image(&mut scene, &section, layout, &palette);
         Some(Self {
             scene: Arc::new(scene),
+            handles: handle_places(&source.results),
             full_view: full_view(&section, layout)?,
             reached: reached.clone(),
             fates: layout.fates,

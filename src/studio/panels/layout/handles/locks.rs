@@ -1,0 +1,83 @@
+//! The row above the drawing: what is held while handles are dragged, and the merit.
+
+use egui::{Align, Layout, Ui};
+
+use super::paint::merit_text;
+use crate::lens::Object;
+use crate::paraxial::{DragSettings, FirstOrderLock, FreeNumbers};
+use crate::session::{Command, SessionView};
+use crate::studio::actions::Actions;
+
+/// Shows what can be held, and changes it.
+pub(in crate::studio::panels::layout) fn locks_row(
+    ui: &mut Ui,
+    view: &SessionView,
+    actions: &mut Actions,
+) {
+    ui.horizontal(|ui| {
+        ui.weak("Hold").on_hover_text(
+            "Held while a handle of the drawing is dragged, by the least change of the other numbers",
+        );
+        let before = &view.drag.settings;
+        let mut settings = before.clone();
+        for lock in FirstOrderLock::ALL {
+            if lock != FirstOrderLock::Magnification || view.lens.object != Object::Infinity {
+                lock_chip(ui, lock, &mut settings);
+            }
+        }
+        free_numbers(ui, &mut settings);
+        if settings != *before {
+            actions.push(Command::SetDragSettings(settings));
+        }
+        ui.with_layout(Layout::right_to_left(Align::Center), |ui| merit(ui, view));
+    });
+}
+
+fn lock_chip(ui: &mut Ui, lock: FirstOrderLock, settings: &mut DragSettings) {
+    let is_on = settings.locks.contains(&lock);
+    let chip = ui.selectable_label(is_on, lock.to_string());
+    let chip = chip.accessible_name(&format!("Hold the {lock}"));
+    if chip.on_hover_text(hint(lock)).clicked() {
+        if is_on {
+            settings.locks.retain(|other| *other != lock);
+        } else {
+            settings.locks.push(lock);
+            settings.locks.sort();
+        }
+    }
+}
+
+const fn hint(lock: FirstOrderLock) -> &'static str {
+    match lock {
+        FirstOrderLock::FocalLength => "The focal length stays, at every zoom position",
+        FirstOrderLock::BackFocus => {
+            "The paraxial image stays at its distance from the last vertex"
+        }
+        FirstOrderLock::Focus => "The image plane stays at its distance from the paraxial image",
+        FirstOrderLock::Track => "The length from the first vertex to the image plane stays",
+        FirstOrderLock::Magnification => "The paraxial magnification stays",
+    }
+}
+
+fn free_numbers(ui: &mut Ui, settings: &mut DragSettings) {
+    if settings.locks.is_empty() {
+        return;
+    }
+    let mut only = settings.free == FreeNumbers::Variables;
+    let hint = "Only variables may change to hold it; otherwise every curvature and gap may";
+    if ui.checkbox(&mut only, "by variables").on_hover_text(hint).changed() {
+        settings.free = if only { FreeNumbers::Variables } else { FreeNumbers::All };
+    }
+}
+
+/// The merit of the design, from which the arrows at the handles come.
+fn merit(ui: &mut Ui, view: &SessionView) {
+    let Some(slopes) = &view.drag.slopes else { return };
+    match &slopes.result {
+        Ok(found) => ui.weak(merit_text(found)).on_hover_text(
+            "The default merit function: spots, focal length, light and thicknesses. \
+             The arrows at the handles show where it falls.",
+        ),
+        Err(why) => ui.weak("no merit").on_hover_text(why),
+    };
+}
