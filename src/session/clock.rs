@@ -1,6 +1,6 @@
 //! The only place of the session that reads the clock.
 
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
 /// The present time.
 #[expect(clippy::disallowed_methods, reason = "a session paces its window and times its numbers")]
@@ -45,4 +45,9 @@ impl Throttle {
         }
         due
     }
+}
+
+/// The present time, in seconds since 1970 (UTC); 0 if the clock of the system is before that.
+pub(super) fn unix_seconds() -> u64 {
+    SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |time| time.as_secs())
 }

@@ -52,6 +52,22 @@ pub enum Command {
     Undo,
     /// Restores the undo step that was reverted last.
     Redo,
+    /// Makes a version of the history the design.
+    GoTo(u64),
+    /// Names a version of the history; an empty name is none.
+    NameVersion {
+        /// The version.
+        id: u64,
+        /// The name.
+        name: String,
+    },
+    /// Makes the lens of a step of an optimization the design, as one undo step.
+    Rewind {
+        /// The version that the optimization led to; `None` for the optimization that is shown.
+        version: Option<u64>,
+        /// The step.
+        step: usize,
+    },
     /// Starts with another lens that has no file yet.
     New(Box<Lens>),
     /// Reads a lens from a file of any known format.

@@ -1,4 +1,4 @@
-//! One open design: the document, its undo history, and everything that is computed from it in the
+//! One open design: the document, its versions, and everything that is computed from it in the
 //! background.
 //!
 //! A [`Session`] carries out [`Command`]s and shows its state as a [`SessionView`]. It knows no
@@ -17,6 +17,9 @@ mod command;
 mod drag;
 mod experiment;
 mod grin_design;
+mod history;
+mod journal;
+mod live_merit;
 mod optimization;
 mod pareto;
 mod run;
@@ -24,7 +27,6 @@ mod score;
 mod slot;
 mod state;
 mod structure_search;
-mod undo;
 mod view;
 
 pub use analysis::{Analyses, AnalysisResults, AnalysisSettings, FieldPupils, analyze};
@@ -36,7 +38,12 @@ pub use grin_design::{
     Contour, DocumentSource, GrinAnalysis, GrinCommand, GrinDocument, GrinRun, GrinView,
     IndexProfile, LossSample, MAX_NODES, Slice, SliceQuantity, SliceSettings,
 };
-pub use optimization::{MeritSample, OptimizationRequest, OptimizationSnapshot, OptimizerFactory};
+pub use history::HistoryNode;
+pub use live_merit::{MeritReport, MeritValues};
+pub use optimization::{
+    CurvePoint, MeritSample, OptimizationCurve, OptimizationRequest, OptimizationSnapshot,
+    OptimizerFactory,
+};
 pub use pareto::{ParetoPass, ParetoRun, ParetoView};
 pub use run::{RunId, RunKind, RunStatus, RunView};
 pub use score::ScoredLens;

@@ -1,15 +1,18 @@
 //! Local optimization in the background, on a copy of the design.
 
 use super::run::{Engine, RunKind, RunStatus, RunView, thin_history};
-use crate::lens::Lens;
+use crate::lens::{Lens, Parameter};
 use crate::merit::{Goal, TermValue};
 use crate::optimize::{DescentMethod, OptimizationProgress, Optimizer};
+use serde::{Deserialize, Serialize};
 use std::convert::Infallible;
 use std::sync::Arc;
 use std::time::Duration;
 
 /// The maximum number of points of the merit history.
 const MAX_HISTORY: usize = 2000;
+/// The maximum number of lenses along the way.
+const MAX_CURVE: usize = 300;
 
 /// A specification of an optimization.
 #[derive(Debug, Clone, PartialEq)]
@@ -45,6 +48,47 @@ pub struct OptimizationSnapshot {
     pub best_terms: Vec<TermValue>,
     /// The merit against the step, with at most a few thousand points over the whole run.
     pub history: Vec<MeritSample>,
+    /// The lenses along the way.
+    pub curve: Arc<OptimizationCurve>,
+}
+
+/// The course of an optimization: lenses along it, to which a designer can go back.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct OptimizationCurve {
+    /// The variables.
+    pub parameters: Vec<Parameter>,
+    /// Steps in order, at most a few hundred over the whole run.
+    pub points: Vec<CurvePoint>,
+}
+
+/// A step of an optimization.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CurvePoint {
+    /// The number of steps so far.
+    pub step: usize,
+    /// The merit.
+    pub merit: f64,
+    /// The values of the variables.
+    pub values: Vec<f64>,
+}
+
+impl OptimizationCurve {
+    /// The step that is nearest to a number of steps.
+    pub fn nearest(&self, step: usize) -> Option<&CurvePoint> {
+        self.points.iter().min_by_key(|point| point.step.abs_diff(step))
+    }
+
+    /// A lens with the values of a step.
+    pub fn lens_at(&self, point: &CurvePoint, lens: &Lens) -> Lens {
+        let mut lens = lens.clone();
+        for (parameter, value) in self.parameters.iter().zip(&point.values) {
+            lens.set(*parameter, *value);
+        }
+        // A lens that was checked has pickups that can be followed.
+        lens.with_pickups().unwrap_or(lens)
+    }
 }
 
 /// A point of the merit history.
@@ -71,6 +115,7 @@ pub(super) struct OptimizationEngine {
     optimizer: Box<dyn Optimizer>,
     state: OptimizationSnapshot,
     stride: usize,
+    curve_stride: usize,
 }
 
 impl OptimizationEngine {
@@ -89,8 +134,28 @@ impl OptimizationEngine {
             initial_terms,
             best_terms: Vec::new(),
             history: vec![MeritSample { step: 0, current: merit, best: merit }],
+            curve: Arc::default(),
         };
-        Ok(Self { optimizer, state, stride: 1 })
+        let mut engine = Self { optimizer, state, stride: 1, curve_stride: 1 };
+        engine.record_curve(0, merit);
+        Ok(engine)
+    }
+
+    /// Adds the present lens to the curve.
+    fn record_curve(&mut self, step: usize, merit: f64) {
+        if !merit.is_finite() || !step.is_multiple_of(self.curve_stride) {
+            return;
+        }
+        let lens = self.optimizer.current();
+        let curve = Arc::make_mut(&mut self.state.curve);
+        if curve.points.is_empty() {
+            let variables = &self.state.request.lens.variables;
+            curve.parameters = variables.iter().map(|variable| variable.parameter).collect();
+        }
+        let values = curve.parameters.iter().map(|p| lens.get(*p).unwrap_or(0.0)).collect();
+        curve.points.push(CurvePoint { step, merit, values });
+        let step = |point: &CurvePoint| point.step;
+        thin_history(&mut curve.points, &mut self.curve_stride, MAX_CURVE, step);
     }
 
     /// A lens with the merit function that it was optimized for.
@@ -116,6 +181,7 @@ impl Engine for OptimizationEngine {
             let OptimizationProgress { step, merit: current, best, .. } = progress;
             self.state.history.push(MeritSample { step, current, best });
         }
+        self.record_curve(progress.step, progress.merit);
         let step = |sample: &MeritSample| sample.step;
         thin_history(&mut self.state.history, &mut self.stride, MAX_HISTORY, step);
         self.state.progress = Some(progress);

@@ -4,6 +4,8 @@ use super::analysis::{AnalysisResults, AnalysisSettings};
 use super::drag::DragView;
 use super::experiment::ExperimentRun;
 use super::grin_design::GrinView;
+use super::history::HistoryNode;
+use super::live_merit::MeritReport;
 use super::optimization::OptimizationSnapshot;
 use super::pareto::ParetoView;
 use super::run::RunView;
@@ -50,11 +52,17 @@ pub struct SessionView {
     pub undo: Option<String>,
     /// The title of the edit that redo restores; `None` if there is none.
     pub redo: Option<String>,
+    /// The versions of the design by number.
+    pub history: Arc<Vec<Arc<HistoryNode>>>,
+    /// The number of the present version.
+    pub version_id: u64,
     /// The file of the design; `None` if it was never saved.
     pub path: Option<PathBuf>,
     /// The merit function of the design: its own, or else the one that was proposed when the design
     /// was opened; `None` if none can be proposed for it.
     pub goal: Option<Arc<Goal>>,
+    /// The merit of the design, maybe of an earlier version.
+    pub merit: Option<Arc<MeritReport>>,
     /// True if the design differs from its file.
     pub dirty: bool,
     /// The settings of the analyses.
@@ -81,8 +89,11 @@ impl Default for SessionView {
             messages: Arc::default(),
             undo: None,
             redo: None,
+            history: Arc::default(),
+            version_id: 0,
             path: None,
             goal: None,
+            merit: None,
             dirty: false,
             settings: AnalysisSettings::default(),
             selected: None,

@@ -112,17 +112,18 @@ fn default_arrangement() -> Tree<PanelKind> {
         PanelKind::Zoom,
     ]
     .map(&mut pane);
-    let [optimizer, pareto, search, first, effects] = [
+    let [optimizer, pareto, search, history, first, effects] = [
         PanelKind::Optimizer,
         PanelKind::Pareto,
         PanelKind::Search,
+        PanelKind::History,
         PanelKind::FirstOrder,
         PanelKind::Effects,
     ]
     .map(&mut pane);
     let facts = tiles.insert_tab_tile(vec![first, effects]);
     let light = tiles.insert_tab_tile(vec![spot, pupil]);
-    let better = tiles.insert_tab_tile(vec![optimizer, pareto, search]);
+    let better = tiles.insert_tab_tile(vec![optimizer, pareto, search, history]);
     let drawings = tiles.insert_tab_tile(vec![layout, slice]);
     let table = tiles.insert_tab_tile(vec![table, system, zoom]);
     let table = row(&mut tiles, &[(table, 0.71), (facts, 0.29)]);

@@ -59,6 +59,11 @@ pub fn run(path: Option<&Path>) -> Result<(), StudioError> {
         let mut session = Session::new(first_lens(), move || wake.request_repaint())?;
         if let Some(folder) = eframe::storage_dir("aplanat") {
             session.set_save_folder(folder.join("searches"));
+            let wake = context.egui_ctx.clone();
+            session.set_journal_folder(folder.join("journals"), move || wake.request_repaint())?;
+        }
+        if path.is_none() {
+            session.recover();
         }
         let mut studio = Studio::new(session, backend, Persistence::Enabled, context.storage);
         if let Some(path) = path {

@@ -9,6 +9,7 @@ mod file_dialog;
 mod grin;
 mod handles;
 mod harness;
+mod history;
 mod panels;
 mod prescription;
 mod search;

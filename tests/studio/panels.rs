@@ -200,6 +200,7 @@ fn searching(standing: RunStatus) -> SessionView {
         initial_terms: Vec::new(),
         best_terms: Vec::new(),
         history: Vec::new(),
+        curve: Arc::default(),
     };
     let optimization = run_view(RunKind::Optimization, 1, standing, search);
     SessionView { optimization, ..view }

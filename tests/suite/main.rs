@@ -39,6 +39,8 @@ mod semi_diameters;
 mod session;
 mod session_drag;
 mod session_grin;
+mod session_history;
+mod session_journal;
 mod session_pareto;
 mod session_search;
 mod trace;

@@ -1,9 +1,11 @@
 //! The identity and the status of a background run.
 
+use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
 /// The kinds of background runs of a session; there is one run of each at a time.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum RunKind {
     /// A local optimization of the variables.
     Optimization,

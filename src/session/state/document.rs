@@ -4,7 +4,8 @@ use super::{Session, SessionEvent, propose_goal};
 use crate::files;
 use crate::lens::{Edit, ElementEdit, Lens, apply_edit};
 use crate::pupil::limited_by_stop;
-use crate::session::undo::UndoStack;
+use crate::session::history::{DesignHistory, VersionOrigin};
+use crate::session::journal::JournalEntry;
 use crate::session::view::Severity;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -14,13 +15,14 @@ impl Session {
         match apply_edit(&self.lens, edit) {
             Ok(lens) if lens == *self.lens => {}
             Ok(lens) => {
-                self.history.push(Arc::clone(&self.lens), edit.title(), edit.cell());
                 let keeps_targets = lens.zoom.len() == self.lens.zoom.len()
                     && !matches!(edit, Edit::Scale(_) | Edit::Replace(_));
                 if !keeps_targets {
                     self.proposed_goal = propose_goal(&lens);
                 }
-                self.set_design(Arc::new(lens));
+                let origin =
+                    VersionOrigin { cell: edit.cell(), ..VersionOrigin::new(edit.title()) };
+                self.add_version(Arc::new(lens), origin);
             }
             Err(why) => self.post(Severity::Warning, why.to_string()),
         }
@@ -32,7 +34,7 @@ impl Session {
             let replace = Edit::Replace(Box::new(lens));
             apply_edit(&self.lens, &replace).map_err(|why| why.to_string())
         });
-        self.accept(limited, "limit the beam by the stop");
+        self.accept(limited, VersionOrigin::new("limit the beam by the stop"));
     }
 
     pub(super) fn scale_to_focal_length(&mut self, focal_length: f64) {
@@ -41,7 +43,8 @@ impl Session {
         let scaled = factor.and_then(|factor| {
             apply_edit(&self.lens, &Edit::Scale(factor)).map_err(|why| why.to_string())
         });
-        self.accept(scaled, &format!("scale to the focal length {focal_length} mm"));
+        let title = format!("scale to the focal length {focal_length} mm");
+        self.accept(scaled, VersionOrigin::new(title));
     }
 
     pub(super) fn insert_lens(&mut self, path: &Path, at: usize) {
@@ -50,29 +53,55 @@ impl Session {
             let edit = Edit::Element(insert);
             apply_edit(&self.lens, &edit).map_err(|why| why.to_string())
         });
-        self.accept(inserted, &format!("insert {}", path.display()));
+        self.accept(inserted, VersionOrigin::new(format!("insert {}", path.display())));
     }
 
     /// Makes a lens the design, as one undo step, or posts the reason why there is none.
-    pub(super) fn accept(&mut self, lens: Result<Lens, String>, title: &str) {
+    pub(super) fn accept(&mut self, lens: Result<Lens, String>, origin: VersionOrigin) {
         match lens {
-            Ok(lens) => {
-                self.history.push(Arc::clone(&self.lens), title.to_owned(), None);
-                self.set_design(Arc::new(lens));
-            }
+            Ok(lens) => self.add_version(Arc::new(lens), origin),
             Err(why) => self.post(Severity::Warning, why),
         }
     }
 
+    fn add_version(&mut self, lens: Arc<Lens>, origin: VersionOrigin) {
+        let node = self.history.push(Arc::clone(&lens), origin);
+        self.record(JournalEntry::Node(node));
+        self.record_present();
+        self.set_design(lens);
+    }
+
     pub(super) fn undo(&mut self) {
-        if let Some(lens) = self.history.undo(&self.lens) {
-            self.set_design(lens);
-        }
+        let lens = self.history.undo();
+        self.visit(lens);
     }
 
     pub(super) fn redo(&mut self) {
-        if let Some(lens) = self.history.redo(&self.lens) {
-            self.set_design(lens);
+        let lens = self.history.redo();
+        self.visit(lens);
+    }
+
+    pub(super) fn go_to(&mut self, id: u64) {
+        let lens = self.history.go_to(id);
+        if lens.is_none() {
+            self.post(Severity::Warning, format!("there is no version {id} of the design"));
+        }
+        self.visit(lens);
+    }
+
+    /// Shows a version that the history went to.
+    fn visit(&mut self, lens: Option<Arc<Lens>>) {
+        let Some(lens) = lens else { return };
+        self.history.commit();
+        self.record_present();
+        self.set_design(lens);
+    }
+
+    pub(super) fn name_version(&mut self, id: u64, name: &str) {
+        let name = name.trim().to_owned();
+        let given = Some(name.clone()).filter(|name| !name.is_empty());
+        if self.history.change(id, |node| node.name = given) {
+            self.record(JournalEntry::Name { node: id, name });
         }
     }
 
@@ -92,9 +121,10 @@ impl Session {
         self.optimization.clear();
         self.pareto.clear();
         let lens = Arc::new(lens);
-        self.history = UndoStack::default();
+        self.history = DesignHistory::new(Arc::clone(&lens));
         self.saved = Arc::clone(&lens);
         self.path = path;
+        self.begin_journal();
         self.proposed_goal = propose_goal(&lens);
         self.settings.zoom = 0;
         self.settings.pupil_wavelength = None;
@@ -108,6 +138,7 @@ impl Session {
                 // A foreign file is not overwritten under its own name without asking.
                 let own = (opened.format == files::LensFormat::Native).then(|| path.to_owned());
                 self.replace_design(opened.lens, own);
+                self.resume_journal();
                 if let Some(report) = opened.report {
                     self.post(Severity::Note, format!("imported {}\n{report}", path.display()));
                 }
@@ -126,6 +157,8 @@ impl Session {
             Ok(saved) if saved.format == files::LensFormat::Native => {
                 self.saved = Arc::clone(&self.lens);
                 self.path = Some(path.clone());
+                let node = self.history.present();
+                self.record(JournalEntry::Saved { node, path: path.clone() });
                 self.events.push(SessionEvent::Saved(path));
             }
             // A foreign file may hold less than the lens, which stays unsaved.

@@ -2,6 +2,7 @@
 
 use super::Session;
 use crate::paraxial::{DragSettings, Handle};
+use crate::session::history::VersionOrigin;
 use crate::session::view::Severity;
 use std::sync::Arc;
 
@@ -27,7 +28,7 @@ impl Session {
         if *dragged == *self.lens {
             return;
         }
-        self.accept(Ok((*dragged).clone()), &drag.title());
+        self.accept(Ok((*dragged).clone()), VersionOrigin::new(drag.title()));
         if let Some(moved) = drag.moved_text() {
             let locks: Vec<String> =
                 self.drag.settings.locks.iter().map(ToString::to_string).collect();

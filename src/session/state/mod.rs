@@ -2,6 +2,7 @@
 
 mod document;
 mod drag;
+mod journaling;
 mod runs;
 
 use super::analysis::{
@@ -12,17 +13,20 @@ use super::command::Command;
 use super::drag::DragState;
 use super::experiment::{ExperimentStatus, ExperimentWorker};
 use super::grin_design::GrinState;
+use super::history::DesignHistory;
+use super::journal::JournalEntry;
+use super::live_merit::LiveMerit;
 use super::optimization::{OptimizationEngine, OptimizationRequest, OptimizerFactory};
 use super::pareto::ParetoState;
 use super::run::{BackgroundRun, RunId, RunKind, RunStatus};
 use super::score::DesignScore;
 use super::structure_search::StructureSearchState;
-use super::undo::UndoStack;
 use super::view::{Message, SessionView, Severity};
 use crate::experiments::{self, Effort, ExperimentReport};
 use crate::lens::Lens;
 use crate::merit::Goal;
 use crate::optimize;
+use journaling::Journaling;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -52,7 +56,8 @@ const MAX_RAYS: usize = 2000;
 pub struct Session {
     lens: Arc<Lens>,
     version: u64,
-    history: UndoStack,
+    history: DesignHistory,
+    journaling: Journaling,
     path: Option<PathBuf>,
     /// The lens as it is in its file.
     saved: Arc<Lens>,
@@ -70,6 +75,7 @@ pub struct Session {
     experiment: ExperimentWorker,
     design_score: DesignScore,
     drag: DragState,
+    live_merit: LiveMerit,
     /// The lens that a panel shows in place of the design.
     preview_lens: Option<Arc<Lens>>,
     /// Analyzes that lens, or the one that a run shows.
@@ -127,9 +133,10 @@ impl Session {
         let optimize = move |request, _: &_| OptimizationEngine::start(&factory, request);
         let session = Self {
             saved: Arc::clone(&lens),
+            history: DesignHistory::new(Arc::clone(&lens)),
+            journaling: Journaling::default(),
             lens,
             version: 1,
-            history: UndoStack::default(),
             path: None,
             proposed_goal,
             settings: AnalysisSettings::default(),
@@ -143,6 +150,7 @@ impl Session {
             experiment: ExperimentWorker::spawn(wake.clone())?,
             design_score: DesignScore::spawn(wake.clone())?,
             drag: DragState::spawn(wake.clone())?,
+            live_merit: LiveMerit::spawn(wake.clone())?,
             preview_lens: None,
             preview_analysis: spawn_analysis(EffectTiming::Skipped, wake)?,
             preview_request: None,
@@ -170,6 +178,9 @@ impl Session {
             Command::SetDragSettings(settings) => self.set_drag_settings(settings),
             Command::Undo => self.undo(),
             Command::Redo => self.redo(),
+            Command::GoTo(id) => self.go_to(id),
+            Command::NameVersion { id, name } => self.name_version(id, &name),
+            Command::Rewind { version, step } => self.rewind(version, step),
             Command::New(lens) => self.replace_design(*lens, None),
             Command::Open(path) => self.open(&path),
             Command::Save(path) => self.save(path),
@@ -180,14 +191,14 @@ impl Session {
             Command::Step => self.optimization.step(),
             Command::Stop => self.optimization.stop(),
             Command::AcceptResult => self.accept_result(),
-            Command::DiscardResult => self.optimization.clear(),
+            Command::DiscardResult => self.discard_result(),
             Command::StartPareto { settings, compare } => {
                 self.pareto.start(&self.lens, settings, compare);
             }
             Command::PausePareto => self.pareto.run.pause(),
             Command::ResumePareto => self.pareto.run.resume(),
             Command::StopPareto => self.pareto.run.stop(),
-            Command::ClearPareto => self.pareto.clear(),
+            Command::ClearPareto => self.clear_pareto(),
             Command::ExportPareto(folder) => self.export_pareto(folder),
             Command::StructureSearch(command) => self.structure_search_command(command),
             Command::Grin(command) => self.grin_command(command),
@@ -216,6 +227,8 @@ impl Session {
     /// The events since the last call, those of background threads included.
     pub fn poll(&mut self) -> Vec<SessionEvent> {
         self.receive_run_events();
+        self.journal_runs();
+        self.sync_merit();
         let is_compared = self.pareto.run.view().id.is_some() || self.structure_search.is_shown();
         self.design_score.sync(&self.lens, is_compared);
         self.grin.sync();
@@ -240,10 +253,13 @@ impl Session {
             experiment: self.experiment.run(),
             drag: self.drag.view(),
             messages: Arc::clone(&self.messages),
+            history: Arc::clone(self.history.nodes()),
+            version_id: self.history.present(),
             undo: self.history.undo_title().map(str::to_owned),
             redo: self.history.redo_title().map(str::to_owned),
             path: self.path.clone(),
             goal: self.goal(),
+            merit: self.live_merit.latest(),
             dirty: self.is_dirty(),
             settings: self.settings.clone(),
             selected: self.selected.filter(|surface| *surface < self.lens.surfaces.len()),
@@ -329,6 +345,25 @@ impl Session {
             lens: Arc::clone(&self.lens),
             settings: self.settings.clone(),
         });
+        if let Some(goal) = self.goal() {
+            self.live_merit.request(Arc::clone(&self.lens), goal, self.settings.tolerance);
+        }
+    }
+
+    /// Notes the merit of the present version in the history once it is known.
+    fn sync_merit(&mut self) {
+        let Some(report) = self.live_merit.latest() else { return };
+        let Ok(values) = &report.values else { return };
+        let present = self.history.present();
+        // While a handle is dragged, the lens that is shown is no version yet.
+        let is_present =
+            self.history.node(present).is_some_and(|node| Arc::ptr_eq(&report.lens, &node.lens));
+        if is_present && values.total.is_finite() {
+            let merit = values.total;
+            if self.history.change(present, |node| node.merit = Some(merit)) {
+                self.record(JournalEntry::Merit { node: present, merit });
+            }
+        }
     }
 
     /// Posts a message to the user.

@@ -5,6 +5,7 @@ use crate::lens::{Edit, Lens, apply_edit};
 use crate::merit::Goal;
 use crate::optimize::DescentMethod;
 use crate::session::grin_design::{GrinCommand, GrinExport};
+use crate::session::history::VersionOrigin;
 use crate::session::optimization::{OptimizationRequest, OptimizationSnapshot};
 use crate::session::pareto::ParetoExport;
 use crate::session::run::{RunEvent, RunKind, RunStatus};
@@ -72,9 +73,45 @@ impl Session {
         };
         let merged = merge_result(&run, &self.lens);
         if merged.is_ok() {
-            self.optimization.clear();
+            self.discard_result();
         }
-        self.accept(merged, "accept the optimized lens");
+        let curve = Some(Arc::clone(&run.curve)).filter(|curve| curve.points.len() > 1);
+        let origin = VersionOrigin { curve, ..VersionOrigin::new("accept the optimized lens") };
+        self.accept(merged, origin);
+    }
+
+    pub(super) fn discard_result(&mut self) {
+        self.optimization.clear();
+        self.end_journaled_run(RunKind::Optimization);
+    }
+
+    pub(super) fn clear_pareto(&mut self) {
+        self.pareto.clear();
+        self.end_journaled_run(RunKind::Pareto);
+    }
+
+    /// Makes the lens of a step of an optimization the design: after the version from which the
+    /// optimization started if it was accepted.
+    pub(super) fn rewind(&mut self, version: Option<u64>, step: usize) {
+        let found = match version {
+            Some(id) => self.history.node(id).and_then(|node| {
+                Some((Arc::clone(node.curve.as_ref()?), Arc::clone(&node.lens), node.parent))
+            }),
+            None => self
+                .optimization
+                .snapshot()
+                .map(|run| (Arc::clone(&run.curve), Arc::clone(&run.request.lens), None)),
+        };
+        let point = found.as_ref().and_then(|(curve, ..)| curve.nearest(step));
+        let (Some((curve, lens, parent)), Some(point)) = (&found, point) else {
+            return self.post(Severity::Warning, "there is no optimization to go back in");
+        };
+        let lens = curve.lens_at(point, lens);
+        let checked = lens.check().map(|()| lens).map_err(|why| why.to_string());
+        if let Some(parent) = parent {
+            self.history.go_to(*parent);
+        }
+        self.accept(checked, VersionOrigin::new(format!("optimization, step {}", point.step)));
     }
 
     /// Makes the lens that is shown in place of the design the design. It keeps the variables of the
@@ -86,7 +123,7 @@ impl Session {
         let own = Lens { variables: self.lens.variables.clone(), ..Lens::clone(&shown) };
         let lens = if own.check().is_ok() { own } else { Lens::clone(&shown) };
         let checked = lens.check().map(|()| lens).map_err(|why| why.to_string());
-        self.accept(checked, "accept a lens of the Pareto front");
+        self.accept(checked, VersionOrigin::new("accept a lens of the Pareto front"));
     }
 
     pub(super) fn export_pareto(&mut self, folder: PathBuf) {
@@ -136,7 +173,10 @@ impl Session {
         if found.is_ok() {
             self.structure_search.end_preview();
         }
-        self.accept(found, &format!("accept lens {number} of the search"));
+        let search = self.structure_search.view().run.snapshot;
+        let seed = search.map(|search| search.request.plan.settings.seed);
+        let title = format!("accept lens {number} of the search");
+        self.accept(found, VersionOrigin { seed, ..VersionOrigin::new(title) });
     }
 
     fn post_search_report(&mut self, report: StructureSearchReport) {

@@ -14,7 +14,11 @@ use std::thread;
 use std::time::Duration;
 
 /// The shortest time between two checkpoints.
-const SAVE_INTERVAL: Duration = Duration::from_secs(5);
+const SAVE_INTERVAL: Duration = Duration::from_secs(1);
+/// The shortest time between two examinations of the best lens.
+const EXAMINE_INTERVAL: Duration = Duration::from_secs(5);
+/// The largest part of the time that checkpoints take.
+const SAVE_SHARE: f64 = 0.05;
 
 /// A search to start or to resume.
 #[derive(Debug)]
@@ -55,6 +59,7 @@ pub(super) struct StructureSearchEngine {
     state: StructureSearchSnapshot,
     sidecar: CheckpointSidecar,
     saves: Throttle,
+    examinations: Throttle,
     /// The exclusive use of the checkpoint, from the first time that it is saved or loaded.
     lock: Option<FileLock>,
     /// True after an error, when the search is not to be saved any more.
@@ -86,7 +91,18 @@ impl StructureSearchEngine {
         sidecar.history.begin(&search.run);
         let mut saves = Throttle::new(SAVE_INTERVAL);
         saves.ready();
-        Ok(Self { search, state, sidecar, saves, lock, is_broken: false, sender: sender.clone() })
+        let mut examinations = Throttle::new(EXAMINE_INTERVAL);
+        examinations.ready();
+        Ok(Self {
+            search,
+            state,
+            sidecar,
+            saves,
+            examinations,
+            lock,
+            is_broken: false,
+            sender: sender.clone(),
+        })
     }
 
     /// The reason to end the search, if there is one.
@@ -183,7 +199,12 @@ impl Engine for StructureSearchEngine {
         self.sidecar.history.record(&self.search.run, &events);
         self.state.end_reason = self.end_reason();
         if self.saves.ready() {
-            self.save();
+            let Timed { ms, .. } = time(|| self.save());
+            let pause = Duration::from_secs_f64(1e-3 * ms / SAVE_SHARE);
+            self.saves = Throttle::new(SAVE_INTERVAL.max(pause));
+            self.saves.ready();
+        }
+        if self.examinations.ready() {
             self.evaluate_best();
         }
         Ok(self.state.end_reason.is_some())
@@ -195,7 +216,8 @@ impl Engine for StructureSearchEngine {
             return Ok(());
         }
         self.evaluate_best();
-        if status != RunStatus::Running {
+        // A search that is killed in its first second is there, too.
+        if status != RunStatus::Running || self.state.checkpoint.moves.is_none() {
             self.save();
         }
         Ok(())

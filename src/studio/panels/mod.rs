@@ -5,6 +5,7 @@ mod edit_form;
 mod effects;
 mod first_order;
 pub(super) mod grin;
+mod history;
 mod layout;
 mod optimizer;
 mod pareto;
@@ -19,6 +20,7 @@ mod zoom;
 pub use effects::EffectsPanel;
 pub use first_order::FirstOrderPanel;
 pub use grin::GrinPanel;
+pub use history::HistoryPanel;
 pub use layout::LayoutPanel;
 pub use optimizer::OptimizerPanel;
 pub use pareto::ParetoPanel;
@@ -77,6 +79,8 @@ pub enum PanelKind {
     Pareto,
     /// The search over structure.
     Search,
+    /// The versions of the design.
+    History,
     /// Focal lengths, pupils, third-order sums.
     FirstOrder,
     /// The physical effects that are computed, and why.
@@ -89,7 +93,7 @@ pub enum PanelKind {
 
 impl PanelKind {
     /// Every panel. A new one is a file in this folder, an entry here and a place in the window.
-    pub const ALL: [Self; 12] = [
+    pub const ALL: [Self; 13] = [
         Self::Layout,
         Self::Slice,
         Self::Prescription,
@@ -98,6 +102,7 @@ impl PanelKind {
         Self::Optimizer,
         Self::Pareto,
         Self::Search,
+        Self::History,
         Self::FirstOrder,
         Self::Effects,
         Self::System,
@@ -115,6 +120,7 @@ impl PanelKind {
             Self::Optimizer => Box::new(OptimizerPanel::default()),
             Self::Pareto => Box::new(ParetoPanel::default()),
             Self::Search => Box::new(SearchPanel::default()),
+            Self::History => Box::new(HistoryPanel::default()),
             Self::FirstOrder => Box::new(FirstOrderPanel),
             Self::Effects => Box::new(EffectsPanel),
             Self::System => Box::new(SystemPanel::default()),

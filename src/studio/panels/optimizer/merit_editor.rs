@@ -4,14 +4,16 @@
 use egui::{Align, ComboBox, Grid, Id, Layout as Arrange, RichText, Ui, vec2};
 use std::sync::Arc;
 
+use super::limits;
 use super::terms::{self, can_ask_for_more_light, hint, targets, title, unit, value_text};
 use crate::lens::{Aperture, Edit, Lens, ParameterKind, Quantity};
 use crate::math::expression::evaluate;
-use crate::merit::{Goal, PupilEdge, Term, WeightedTerm};
+use crate::merit::{Goal, PupilEdge, Term, TermValue, WeightedTerm};
 use crate::session::{Command, OptimizationSnapshot, SessionView};
 use crate::studio::actions::Actions;
 use crate::studio::number;
 use crate::studio::panels::{add_variables_edit, field_name};
+use crate::studio::text::capitalize;
 use crate::studio::text_input::{EditBuffers, InputPlacement, TextInput};
 
 /// The terms of the panel.
@@ -110,21 +112,28 @@ impl MeritEditor {
         actions: &mut Actions,
     ) {
         self.warnings(ui, &view.lens, actions);
+        total(ui, view);
         let search = view.optimization.snapshot.as_deref();
         let mut unwanted = None;
-        Grid::new("terms").num_columns(6).spacing([8.0, 2.0]).striped(true).show(ui, |ui| {
+        let repeats = self.repeats();
+        Grid::new("terms").num_columns(7).spacing([8.0, 2.0]).striped(true).show(ui, |ui| {
             for (text, what) in [("Term", ""), ("Weight", ""), ("Target", "")] {
                 heading(ui, text, what);
             }
+            heading(ui, "Value", "Its value for the design, with its estimated error");
+            heading(ui, "Share", "Its part of the merit, by magnitude");
             if search.is_some() {
-                heading(ui, "Before", "Its value for the design");
-                heading(ui, "Now", "Its value for the best lens so far");
+                heading(ui, "Best", "Its value for the best lens of the optimization so far");
             }
             ui.end_row();
+            let mut place = 0;
             for (i, row) in self.terms.iter_mut().enumerate() {
-                if row.ui(ui, view, buffers) {
+                let live = row.active.then(|| LiveTerm::of(view, place, row.weighted)).flatten();
+                let number = repeats[i];
+                if row.ui(ui, view, buffers, TermPlace { number, place, live }) {
                     unwanted = Some(i);
                 }
+                place += usize::from(row.active);
                 ui.end_row();
             }
         });
@@ -132,6 +141,14 @@ impl MeritEditor {
             self.terms.remove(i);
         }
         self.add_menu(ui, view);
+        limits::list(ui, view, actions);
+    }
+
+    /// The number of terms of the same kind before each term.
+    fn repeats(&self) -> Vec<usize> {
+        let names: Vec<_> = self.terms.iter().map(|row| row.weighted.term.name()).collect();
+        let before = |i: usize| names[..i].iter().filter(|name| **name == names[i]).count();
+        (0..names.len()).map(before).collect()
     }
 
     /// Warnings about what prevents the lens from gaining light, each with a button that fixes it.
@@ -176,11 +193,13 @@ impl MeritEditor {
         }
     }
 
-    /// A menu of the terms that are not there yet.
+    /// A menu of the terms that are not there yet, and of those that may be there several times.
     fn add_menu(&mut self, ui: &mut Ui, view: &SessionView) {
         ui.menu_button("Add a term", |ui| {
-            let there =
-                |term: Term| self.terms.iter().any(|row| row.weighted.term.name() == term.name());
+            let there = |term: Term| {
+                !matches!(term, Term::RelativeIllumination { .. })
+                    && self.terms.iter().any(|row| row.weighted.term.name() == term.name())
+            };
             let every = terms::default_terms(view).into_iter();
             let missing: Vec<WeightedTerm> = every.filter(|new| !there(new.term)).collect();
             for weighted in missing {
@@ -202,6 +221,64 @@ fn goal_of(view: &SessionView) -> Goal {
         pupil: PupilEdge::default(),
         zoom_ratios: Vec::new(),
     })
+}
+
+/// A row of the table: its number among those of its kind, its place in the merit function, and its
+/// present value.
+#[derive(Clone, Copy)]
+struct TermPlace {
+    number: usize,
+    place: usize,
+    live: Option<LiveTerm>,
+}
+
+/// The value of a term for the design.
+#[derive(Clone, Copy)]
+struct LiveTerm {
+    value: f64,
+    error: f64,
+    share: Option<f64>,
+    is_current: bool,
+}
+
+impl LiveTerm {
+    /// The value of the term at a place of the merit function, if it has been computed for it.
+    fn of(view: &SessionView, place: usize, weighted: WeightedTerm) -> Option<Self> {
+        let report = view.merit.as_ref()?;
+        let values = report.values.as_ref().ok()?;
+        let TermValue { value, error, .. } = *values.terms.get(place)?;
+        (report.goal.terms.get(place)?.term == weighted.term).then_some(())?;
+        let is_current = Arc::ptr_eq(&report.lens, &view.lens);
+        Some(Self { value, error, share: values.share(place), is_current })
+    }
+
+    fn cells(self, ui: &mut Ui, term: Term) {
+        let color = if self.is_current {
+            ui.visuals().text_color()
+        } else {
+            ui.visuals().weak_text_color()
+        };
+        let text = value_text(term, self.value);
+        let error = match self.error {
+            0.0 => "exact to rounding".to_owned(),
+            error => format!("{} ± {error:.1e}", number::format_digits(self.value, 5)),
+        };
+        ui.colored_label(color, text).on_hover_text(error);
+        let share = self.share.map_or_else(String::new, |share| format!("{:.1} %", 100.0 * share));
+        ui.colored_label(color, share);
+    }
+}
+
+/// The merit of the design, or why it has none.
+fn total(ui: &mut Ui, view: &SessionView) {
+    let Some(report) = &view.merit else { return };
+    match &report.values {
+        Ok(values) => {
+            let text = format!("Merit {}", number::format_digits(values.total, 5));
+            ui.strong(text).on_hover_text("The weighted sum of all terms for the design");
+        }
+        Err(why) => drop(ui.colored_label(ui.visuals().error_fg_color, capitalize(why))),
+    }
 }
 
 /// True if the stop alone limits the beam, at every zoom position.
@@ -229,30 +306,44 @@ fn heading(ui: &mut Ui, text: &str, what: &str) {
 
 impl MeritRow {
     /// Shows the row; true if it is to be removed.
-    fn ui(&mut self, ui: &mut Ui, view: &SessionView, buffers: &mut EditBuffers) -> bool {
+    fn ui(
+        &mut self,
+        ui: &mut Ui,
+        view: &SessionView,
+        buffers: &mut EditBuffers,
+        at: TermPlace,
+    ) -> bool {
         let term = self.weighted.term;
-        ui.checkbox(&mut self.active, title(term)).on_hover_text(hint(term));
-        let name = format!("Weight of {}", title(term));
+        let title = match at.number {
+            0 => title(term).to_owned(),
+            before => format!("{} {}", title(term), before + 1),
+        };
+        ui.checkbox(&mut self.active, &title).on_hover_text(hint(term));
+        let name = format!("Weight of {title}");
         number_field(ui, buffers, &name, &mut self.weighted.weight, 58.0);
         ui.horizontal(|ui| {
             ui.spacing_mut().item_spacing.x = 2.0;
             let targets = targets(&mut self.weighted.term);
             let width = if targets.len() > 1 { 54.0 } else { 70.0 };
             for (what, value) in targets {
-                let name = format!("{what} of {}", title(term));
+                let name = format!("{what} of {title}");
                 number_field(ui, buffers, &name, value, width);
             }
             ui.weak(unit(term));
-            self.field_choice(ui, view);
+            self.field_choice(ui, view, &title);
         });
+        match at.live {
+            Some(live) => live.cells(ui, term),
+            None => [(); 2].iter().for_each(|()| drop(ui.label(""))),
+        }
         if let Some(search) = view.optimization.snapshot.as_deref() {
-            self.value_cells(ui, search);
+            self.best_cell(ui, search, at.place);
         }
         ui.small_button("×").on_hover_text("Remove the term").clicked()
     }
 
     /// The choice of the field where the term is about one.
-    fn field_choice(&mut self, ui: &mut Ui, view: &SessionView) {
+    fn field_choice(&mut self, ui: &mut Ui, view: &SessionView, title: &str) {
         let Term::RelativeIllumination { field, .. } = &mut self.weighted.term else { return };
         let fields = view.lens.fields_at(view.settings.zoom);
         let name = |i: usize| {
@@ -260,26 +351,22 @@ impl MeritRow {
             point.map_or_else(|| "no field".to_owned(), |point| field_name(fields.kind, *point))
         };
         ui.weak("at");
-        let combo = ComboBox::from_id_salt("field of illumination").width(60.0);
+        let combo = ComboBox::from_id_salt(("field", title)).width(60.0);
         let combo = combo.selected_text(name(*field)).show_ui(ui, |ui| {
             for i in 0..fields.values.len() {
                 ui.selectable_value(field, i, name(i));
             }
         });
-        combo.response.accessible_name("Field of Relative illumination");
+        combo.response.accessible_name(format!("Field of {title}"));
     }
 
-    /// The values of the term before the optimization and at its best lens.
-    fn value_cells(&self, ui: &mut Ui, search: &OptimizationSnapshot) {
-        let asked = search.request.goal.terms.iter();
-        let term = asked.map(|w| w.term).find(|t| t.name() == self.weighted.term.name());
-        for values in [&search.initial_terms, &search.best_terms] {
-            let value = term.and_then(|term| {
-                let value = values.iter().find(|value| value.term == term.name())?;
-                Some(value_text(term, value.value))
-            });
-            ui.label(value.unwrap_or_default());
-        }
+    /// The value of the term for the best lens of the optimization, if that has the term.
+    fn best_cell(&self, ui: &mut Ui, search: &OptimizationSnapshot, place: usize) {
+        let term = self.weighted.term;
+        let is_asked = |asked: &&WeightedTerm| self.active && asked.term == term;
+        let asked = search.request.goal.terms.get(place).filter(is_asked);
+        let value = asked.and_then(|_| search.best_terms.get(place));
+        ui.label(value.map(|value| value_text(term, value.value)).unwrap_or_default());
     }
 }
 

@@ -3,14 +3,15 @@
 //!
 //! The search works on its own copy. The design changes only when its result is taken.
 
+mod limits;
 mod merit_editor;
 mod terms;
 
 use egui::{
-    ComboBox, Context, Frame, Margin, Panel as Side, RichText, Role, ScrollArea, Ui, WidgetInfo,
-    vec2,
+    ComboBox, Context, Frame, Margin, Panel as Side, Response, RichText, Role, ScrollArea, Ui,
+    WidgetInfo, vec2,
 };
-use egui_plot::{Line, PlotPoints};
+use egui_plot::{Line, PlotPoints, PlotTransform};
 
 use super::{Panel, decade_name, mean_pupil_area};
 use crate::optimize::DescentMethod;
@@ -51,7 +52,11 @@ impl Panel for OptimizerPanel {
             let frame = Frame::new().inner_margin(Margin { right: 10, ..Margin::ZERO });
             let plot = Side::bottom("merit history").frame(frame).show_separator_line(false);
             let height = (0.45 * ui.available_height()).min(HISTORY);
-            plot.exact_size(height).show(ui, |ui| history_plot(ui, search));
+            plot.exact_size(height).show(ui, |ui| {
+                if let Some(step) = history_plot(ui, search) {
+                    actions.push(Command::Rewind { version: None, step });
+                }
+            });
         }
         if view.lens.variables.is_empty() {
             ui.colored_label(ui.visuals().warn_fg_color, NO_VARIABLES);
@@ -177,14 +182,15 @@ pub(super) fn changes_text(view: &SessionView) -> Vec<String> {
 }
 
 /// The mean RMS radius of the fields with light, in mm.
-fn mean_spot(numbers: &Analyses) -> Option<f64> {
+pub(super) fn mean_spot(numbers: &Analyses) -> Option<f64> {
     let lit = numbers.spots.value.iter().filter_map(|spot| spot.as_ref().ok());
     let radii: Vec<f64> = lit.map(|spot| spot.rms.value).collect();
     (!radii.is_empty()).then(|| radii.iter().sum::<f64>() / radii.len() as f64)
 }
 
-/// Plots the merit of the current and of the best lens, decades up and steps across.
-fn history_plot(ui: &mut Ui, search: &OptimizationSnapshot) {
+/// Plots the merit of the current and of the best lens, decades up and steps across; the step that
+/// was clicked, if one was.
+fn history_plot(ui: &mut Ui, search: &OptimizationSnapshot) -> Option<usize> {
     let decade = |value: f64| if value > 0.0 { value.log10() } else { f64::NAN };
     let curve = |merit: fn(&MeritSample) -> f64| -> PlotPoints<'static> {
         let points = search.history.iter().map(|point| [point.step as f64, decade(merit(point))]);
@@ -205,4 +211,18 @@ fn history_plot(ui: &mut Ui, search: &OptimizationSnapshot) {
     });
     let text = "Merit against steps";
     shown.response.widget_info(|| WidgetInfo::labeled(Role::Image, true, text));
+    let hint = "Click a place to make the lens of that step the design";
+    clicked_step(&shown.response.clone().on_hover_text(hint), &shown.transform)
+}
+
+/// The step of a merit curve that was clicked.
+pub(super) fn clicked_step(response: &Response, transform: &PlotTransform) -> Option<usize> {
+    let place = response.clicked().then(|| response.interact_pointer_pos()).flatten()?;
+    let step = transform.value_from_position(place).x.round().max(0.0);
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "a step, 0 or more"
+    )]
+    Some(step as usize)
 }

@@ -1,0 +1,118 @@
+//! Two versions beside each other: the numbers that a designer asks first, and every parameter that
+//! differs.
+
+use egui::{Grid, Ui};
+
+use crate::lens::{Lens, Parameter, Quantity, SurfaceNumber};
+use crate::session::{Analyses, HistoryNode, SessionView};
+use crate::studio::number;
+use crate::studio::panels::mean_pupil_area;
+use crate::studio::panels::optimizer::mean_spot;
+
+/// A quantity of two versions.
+struct ComparedNumber {
+    name: String,
+    present: f64,
+    selected: f64,
+}
+
+/// Shows the table.
+pub(super) fn table(ui: &mut Ui, view: &SessionView, selected: &HistoryNode) {
+    let numbers = numbers(view, selected);
+    let words = differing_words(&view.lens, &selected.lens);
+    Grid::new("comparison").num_columns(4).spacing([10.0, 1.0]).striped(true).show(ui, |ui| {
+        for heading in ["", "present", "this one", "difference"] {
+            ui.weak(heading);
+        }
+        ui.end_row();
+        for ComparedNumber { name, present, selected } in &numbers {
+            ui.label(name);
+            let change = 100.0 * (selected / present - 1.0);
+            let digits = number::digits_between(*present, selected - present, 5);
+            ui.label(number::format_digits(*present, digits));
+            ui.label(number::format_digits(*selected, digits));
+            if change.is_finite() {
+                ui.label(format!("{change:+.2} %"));
+            } else {
+                ui.label(number::format_digits(selected - present, 3));
+            }
+            ui.end_row();
+        }
+        for (name, present, selected) in words {
+            for text in [name, present, selected] {
+                ui.label(text);
+            }
+            ui.end_row();
+        }
+    });
+}
+
+fn numbers(view: &SessionView, selected: &HistoryNode) -> Vec<ComparedNumber> {
+    let mut found = Vec::new();
+    let mut add = |name: &str, pair: Option<(f64, f64)>| {
+        if let Some((present, selected)) = pair {
+            found.push(ComparedNumber { name: name.to_owned(), present, selected });
+        }
+    };
+    let present = view.history.iter().find(|node| node.id == view.version_id);
+    add("merit", present.and_then(|node| node.merit).zip(selected.merit));
+    let own = view.results.as_ref().filter(|_| view.is_current());
+    let own = own.and_then(|results| results.analyses.as_ref().ok());
+    let other = view.preview_results.as_ref().filter(|results| results.lens == selected.lens);
+    let other = other.and_then(|results| results.analyses.as_ref().ok());
+    if let Some((own, other)) = own.zip(other) {
+        let of = |value: fn(&Analyses) -> Option<f64>| value(own).zip(value(other));
+        add("mean RMS spot, µm", of(|numbers| mean_spot(numbers).map(|spot| 1e3 * spot)));
+        add("focal length, mm", of(|numbers| numbers.first_order().efl));
+        add("light, mm²", of(|numbers| Some(mean_pupil_area(numbers))));
+    }
+    add("total track, mm", Some((view.lens.total_track(), selected.lens.total_track())));
+    found.extend(differing_parameters(&view.lens, &selected.lens));
+    found
+}
+
+/// Radii and thicknesses that differ, of lenses with as many surfaces.
+fn differing_parameters(present: &Lens, selected: &Lens) -> Vec<ComparedNumber> {
+    if present.surfaces.len() != selected.surfaces.len() {
+        return Vec::new();
+    }
+    let mut found = Vec::new();
+    for surface in 0..present.surfaces.len() {
+        for quantity in [
+            Quantity::Curvature,
+            Quantity::Thickness,
+            Quantity::Conic,
+            Quantity::SemiDiameter,
+            Quantity::Index,
+        ] {
+            let parameter = Parameter::new(surface, quantity);
+            let values = present.get(parameter).zip(selected.get(parameter));
+            let Some((old, new)) = values.filter(|(old, new)| old != new) else { continue };
+            let is_radius = quantity == Quantity::Curvature;
+            let shown = |value: f64| if is_radius { number::radius(value) } else { value };
+            let name = parameter.to_string();
+            let name = if is_radius { name.replacen("curvature", "radius", 1) } else { name };
+            found.push(ComparedNumber { name, present: shown(old), selected: shown(new) });
+        }
+    }
+    found
+}
+
+/// Glasses and counts that differ.
+fn differing_words(present: &Lens, selected: &Lens) -> Vec<(String, String, String)> {
+    let [own, other] = [present, selected].map(|lens| lens.surfaces.len());
+    if own != other {
+        return vec![("surfaces".to_owned(), own.to_string(), other.to_string())];
+    }
+    let pairs = present.surfaces.iter().zip(&selected.surfaces).enumerate();
+    let differing = pairs.filter(|(_, (old, new))| old.medium != new.medium);
+    let row = |(i, (old, new)): (usize, (&crate::lens::Row, &crate::lens::Row))| {
+        let name = format!("glass after surface {}", SurfaceNumber::new(i));
+        (name, medium_text(&old.medium), medium_text(&new.medium))
+    };
+    differing.map(row).collect()
+}
+
+fn medium_text(medium: &crate::lens::Medium) -> String {
+    serde_json::to_string(medium).unwrap_or_default().trim_matches('"').to_owned()
+}

@@ -1,0 +1,141 @@
+//! The versions of the design as a tree, the newest first: a version is shown beside the present
+//! one, named, made the design, or followed by another branch.
+
+mod comparison;
+mod tree;
+
+use std::sync::Arc;
+
+use egui::{
+    Align, Context, Frame, Id, Layout as Arrange, Margin, Panel as Side, ScrollArea, Slider, Ui,
+    vec2,
+};
+
+use super::Panel;
+use super::widgets::{ActionButton, action_buttons};
+use crate::session::{Command, HistoryNode, SessionView};
+use crate::studio::actions::Actions;
+use crate::studio::text_input::{EditBuffers, InputPlacement, TextInput};
+
+/// The height of the part about the selected version.
+const DETAILS_HEIGHT: f32 = 190.0;
+
+/// The panel.
+#[derive(Debug, Default)]
+pub struct HistoryPanel {
+    /// The version that was clicked.
+    selected: Option<u64>,
+    /// The step of the selected version's optimization to go back to.
+    step: usize,
+    buffers: EditBuffers,
+}
+
+impl Panel for HistoryPanel {
+    fn title(&self) -> &'static str {
+        "History"
+    }
+
+    fn ui(&mut self, ui: &mut Ui, view: &SessionView, actions: &mut Actions) {
+        let selected = self.selected.and_then(|id| node(view, id));
+        let height = DETAILS_HEIGHT.min(0.6 * ui.available_height());
+        let frame = Frame::new().inner_margin(Margin { top: 4, ..Margin::ZERO });
+        let side = Side::bottom("selected version").frame(frame).show_separator_line(true);
+        side.exact_size(height).show(ui, |ui| {
+            ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| match selected {
+                Some(selected) => self.details(ui, view, selected, actions),
+                None => drop(ui.weak("Click a version to compare it with the present one.")),
+            });
+        });
+        let scroll = ScrollArea::vertical().id_salt("versions").auto_shrink([false, false]);
+        let clicked = scroll.show(ui, |ui| tree::tree(ui, view, self.selected)).inner;
+        if let Some(id) = clicked {
+            self.select(view, id, actions);
+        }
+    }
+
+    fn is_typing(&self, context: &Context) -> bool {
+        self.buffers.is_typing(context)
+    }
+}
+
+impl HistoryPanel {
+    /// Shows a version in place of the design, unless it is the present one.
+    fn select(&mut self, view: &SessionView, id: u64, actions: &mut Actions) {
+        let Some(node) = node(view, id) else { return };
+        self.selected = Some(id);
+        let last = node.curve.as_ref().and_then(|curve| curve.points.last());
+        self.step = last.map_or(0, |point| point.step);
+        let other = (id != view.version_id).then(|| Box::new((*node.lens).clone()));
+        actions.push(Command::Preview(other));
+    }
+
+    /// The buttons of the selected version, its name, and how it differs from the present one.
+    fn details(
+        &mut self,
+        ui: &mut Ui,
+        view: &SessionView,
+        selected: &Arc<HistoryNode>,
+        actions: &mut Actions,
+    ) {
+        let is_other = selected.id != view.version_id;
+        ui.horizontal(|ui| {
+            let buttons = [
+                ActionButton::new("Go to", is_other, Command::GoTo(selected.id))
+                    .hint("Make this version the design; what is changed then is a new branch"),
+                ActionButton::new("Back", is_other, Command::Preview(None))
+                    .hint("Show the present version again in all panels"),
+            ];
+            action_buttons(ui, buttons, actions);
+            self.name_field(ui, selected, actions);
+        });
+        self.curve(ui, selected, actions);
+        if is_other {
+            comparison::table(ui, view, selected);
+        } else {
+            ui.weak("This is the present version.");
+        }
+    }
+
+    fn name_field(&mut self, ui: &mut Ui, selected: &HistoryNode, actions: &mut Actions) {
+        let id = Id::unique(("name of version", selected.id));
+        let field = TextInput {
+            name: "Name of the version",
+            value: selected.name.as_deref().unwrap_or_default(),
+            hint: "name",
+            align: Align::Min,
+            placement: InputPlacement::Form,
+        };
+        let size = vec2(140.0, ui.spacing().interact_size.y);
+        let layout = Arrange::left_to_right(Align::Center);
+        let entry = ui.allocate_ui_with_layout(size, layout, |ui| self.buffers.show(ui, id, field));
+        if let Some(name) = entry.inner.submitted {
+            self.buffers.accept(id);
+            actions.push(Command::NameVersion { id: selected.id, name });
+        }
+    }
+
+    /// The course of the optimization that led to the version: any step of it can be taken.
+    fn curve(&mut self, ui: &mut Ui, selected: &HistoryNode, actions: &mut Actions) {
+        let Some(curve) = &selected.curve else { return };
+        let last = curve.points.last().map_or(0, |point| point.step);
+        let version = Some(selected.id);
+        ui.horizontal(|ui| {
+            ui.weak("Optimization, step");
+            ui.add(Slider::new(&mut self.step, 0..=last)).accessible_name("Step");
+            let text = "Rewind";
+            if ui.button(text).on_hover_text("Make the lens of this step the design").clicked() {
+                actions.push(Command::Rewind { version, step: self.step });
+            }
+        });
+        if let Some(step) = tree::curve_plot(ui, curve) {
+            self.step = step;
+            actions.push(Command::Rewind { version, step });
+        }
+    }
+}
+
+/// A version.
+fn node(view: &SessionView, id: u64) -> Option<&Arc<HistoryNode>> {
+    let place = view.history.binary_search_by_key(&id, |node| node.id).ok()?;
+    view.history.get(place)
+}

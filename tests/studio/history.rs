@@ -1,0 +1,158 @@
+//! The versions of the design and its live merit, driven by accessibility labels.
+
+use std::sync::Arc;
+
+use aplanat::lens::{Edit, Lens, Parameter, Quantity};
+use aplanat::merit::{ConstraintMargin, Goal, TermValue};
+use aplanat::session::{
+    Command, CurvePoint, HistoryNode, MeritReport, MeritValues, OptimizationCurve, SessionView,
+};
+use aplanat::studio::panels::{HistoryPanel, OptimizerPanel};
+use egui::Key;
+use egui_kittest::Harness;
+use egui_kittest::kittest::Queryable;
+
+use crate::harness::{PanelState, double_gauss, panel_harness, view};
+
+fn version(id: u64, parent: Option<u64>, title: &str, merit: f64, lens: &Arc<Lens>) -> HistoryNode {
+    HistoryNode {
+        id,
+        parent,
+        title: title.to_owned(),
+        name: None,
+        merit: Some(merit),
+        time: 86_400 + 3_723,
+        seed: None,
+        lens: Arc::clone(lens),
+        curve: None,
+    }
+}
+
+/// A design with two branches, of which the second is an optimization.
+fn branched() -> SessionView {
+    let mut view = view();
+    let mut other = double_gauss();
+    other.surfaces[2].thickness += 0.5;
+    let other = Arc::new(other);
+    let point =
+        |step: usize| CurvePoint { step, merit: 0.02 / (step + 1) as f64, values: vec![0.02] };
+    let curve = OptimizationCurve {
+        parameters: vec![Parameter::new(0, Quantity::Curvature)],
+        points: (0..5).map(point).collect(),
+    };
+    let nodes = [
+        version(0, None, "opened", 0.02, &view.lens),
+        version(1, Some(0), "thickness of surface 3", 0.03, &other),
+        HistoryNode {
+            curve: Some(Arc::new(curve)),
+            seed: Some(7),
+            ..version(2, Some(0), "accept the optimized lens", 0.01, &view.lens)
+        },
+    ];
+    view.history = Arc::new(nodes.into_iter().map(Arc::new).collect());
+    view.version_id = 2;
+    view
+}
+
+fn history() -> Harness<'static, PanelState<HistoryPanel>> {
+    let mut harness = panel_harness(HistoryPanel::default(), branched());
+    harness.run();
+    harness
+}
+
+#[test]
+fn versions_are_compared_named_and_gone_to() {
+    let mut harness = history();
+    harness
+        .get_by_label("Present version: Accept the optimized lens: merit 0.01 (-50.0 %), seed 7");
+    harness.get_by_label("Thickness of surface 3: merit 0.03 (+50.0 %)").click();
+    harness.run();
+    let commands = &harness.state().commands;
+    assert!(
+        matches!(&commands[..], [Command::Preview(Some(lens))] if lens.name == double_gauss().name)
+    );
+    for text in ["merit", "+200.00 %", "thickness of surface 3", "total track, mm"] {
+        assert!(harness.query_all_by_label(text).count() > 0, "{text}");
+    }
+    harness.get_by_label("Name of the version").focus();
+    harness.run();
+    harness.get_by_label("Name of the version").type_text("thick");
+    harness.run();
+    harness.key_press(Key::Enter);
+    harness.run();
+    harness.get_by_label("Go to").click();
+    harness.run();
+    let named = Command::NameVersion { id: 1, name: "thick".into() };
+    assert_eq!(harness.state().commands[1..], [named, Command::GoTo(1)]);
+}
+
+#[test]
+fn the_course_of_an_optimization_can_be_rewound() {
+    let mut harness = history();
+    harness.get_by_label_contains("Present version").click();
+    harness.run();
+    assert_eq!(harness.state().commands, [Command::Preview(None)], "it is shown already");
+    harness.get_by_label("Merit against steps of this version");
+    harness.get_by_label("Rewind").click();
+    harness.run();
+    let rewind = Command::Rewind { version: Some(2), step: 4 };
+    assert_eq!(harness.state().commands.last(), Some(&rewind));
+}
+
+#[test]
+fn the_merit_of_the_design_and_its_limits_are_shown_without_asking() {
+    let mut view = view();
+    let goal = Goal::default_for(&view.lens).unwrap();
+    let names = goal.terms.iter().map(|weighted| (weighted.term.name(), weighted.weight));
+    let value = |(term, weight)| TermValue {
+        term,
+        weight,
+        value: if term == "spot" { 4e-4 } else { 0.0 },
+        error: 1e-9,
+        rays: 4200,
+    };
+    let limit = |surface, value| ConstraintMargin {
+        term: "glass_edge",
+        surface: Some(surface),
+        zoom: 0,
+        um: None,
+        value,
+        min: Some(0.5),
+        max: None,
+    };
+    let values = MeritValues {
+        total: 4e-4,
+        terms: names.map(value).collect(),
+        limits: vec![limit(0, 2.0), limit(2, 0.5), limit(4, 0.2)],
+    };
+    let (lens, goal) = (Arc::clone(&view.lens), Arc::new(goal));
+    view.goal = Some(Arc::clone(&goal));
+    view.merit = Some(Arc::new(MeritReport { lens, goal, values: Ok(values), ms: 1.0 }));
+    let mut harness = panel_harness(OptimizerPanel::default(), view);
+    harness.run();
+    for text in ["Merit 0.0004", "20 µm", "100.0 %", "3 limits: 1 broken, 1 binding"] {
+        assert!(harness.query_all_by_label(text).count() > 0, "{text}");
+    }
+    harness.get_by_label("Glass edge at surface 5: 0.2 of at least 0.5").click();
+    harness.run();
+    let commands = &harness.state().commands;
+    assert_eq!(*commands, [Command::ShowZoom(0), Command::Select(Some(4))]);
+}
+
+#[test]
+fn a_term_may_be_there_several_times() {
+    let mut harness = panel_harness(OptimizerPanel::default(), view());
+    harness.run();
+    for _ in 0..2 {
+        harness.get_by_label("Add a term").click();
+        harness.run();
+        harness.get_all_by_label("Relative illumination").last().unwrap().click();
+        harness.run();
+    }
+    assert!(harness.query_by_label("Weight of Relative illumination 2").is_some());
+    let Some(Command::Edit(Edit::SetMerit(Some(goal)))) = harness.state().commands.last() else {
+        panic!("{:?}", harness.state().commands);
+    };
+    let count = |name: &str| goal.terms.iter().filter(|w| w.term.name() == name).count();
+    assert_eq!((count("relative_illumination"), count("spot")), (2, 1));
+}

@@ -1,0 +1,324 @@
+//! The journal of a design: whatever ends the program, what was done is there again.
+
+use super::session_pareto::wait;
+use aplanat::files;
+use aplanat::lens::{Edit, Lens, Parameter, Quantity, Variable, blank};
+use aplanat::merit::{Goal, PupilEdge, Term, WeightedTerm};
+use aplanat::optimize::DescentMethod;
+use aplanat::session::{Command, Session};
+use std::fs;
+use std::io::{BufRead as _, BufReader, Write as _};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Stdio};
+use std::time::{Duration, Instant};
+
+/// A folder that is removed at the end.
+struct Folder(PathBuf);
+
+impl Folder {
+    fn new(name: &str) -> Self {
+        let path = std::env::temp_dir().join(format!("aplanat-{name}-{}", std::process::id()));
+        fs::create_dir_all(&path).unwrap();
+        Self(fs::canonicalize(path).unwrap())
+    }
+
+    fn journals(&self) -> PathBuf {
+        self.0.join("journals")
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        drop(fs::remove_dir_all(&self.0));
+    }
+}
+
+fn journaled(lens: Lens, journals: &Path) -> Session {
+    let mut session = Session::new(lens, || {}).unwrap();
+    session.set_journal_folder(journals, || {}).unwrap();
+    session
+}
+
+fn rename(session: &mut Session, name: &str) {
+    session.apply(Edit::SetName(name.to_owned()).into());
+    session.apply(Command::CommitEdit);
+}
+
+/// The journals as a killed program would leave them at this moment.
+fn killed(session: &Session, journals: &Path, copy: &Path) {
+    session.sync_journal();
+    fs::create_dir_all(copy).unwrap();
+    for file in fs::read_dir(journals).unwrap().flatten() {
+        if file.file_name().to_string_lossy().ends_with(".journal") {
+            fs::copy(file.path(), copy.join(file.file_name())).unwrap();
+        }
+    }
+}
+
+/// A session that finds these journals, and the message about what it has recovered.
+fn reopened(journals: &Path) -> (Session, Option<String>) {
+    let mut session = journaled(blank(), journals);
+    let text = session.recover().then(|| {
+        let messages = session.view().messages;
+        messages.last().unwrap().text.clone()
+    });
+    (session, text)
+}
+
+#[test]
+fn a_killed_design_reopens_where_it_was() {
+    let folder = Folder::new("journal-killed");
+    let mut session = journaled(blank(), &folder.journals());
+    assert!(!folder.journals().exists(), "nothing has happened yet");
+    for name in ["a", "b", "c"] {
+        rename(&mut session, name);
+    }
+    session.apply(Command::Undo);
+    let goal = Goal {
+        terms: vec![WeightedTerm { term: Term::Spot, weight: 2.0 }],
+        pupil: PupilEdge::Frozen,
+        zoom_ratios: Vec::new(),
+    };
+    session.apply(Edit::SetMerit(Some(goal.clone())).into());
+    session.apply(Command::NameVersion { id: 3, name: "left behind".into() });
+    let copy = folder.0.join("copy");
+    killed(&session, &folder.journals(), &copy);
+    let (again, text) = reopened(&copy);
+    let text = text.unwrap();
+    assert!(text.starts_with("recovered b with 3 unsaved changes"), "{text}");
+    assert_eq!(text.lines().count(), 1);
+    assert_eq!(again.lens(), session.lens());
+    assert_eq!(again.view().goal.as_deref(), Some(&goal));
+    assert!(again.is_dirty());
+    let [ours, theirs] = [&session, &again].map(|session| session.view());
+    assert_eq!((theirs.history.len(), theirs.version_id), (5, ours.version_id));
+    assert_eq!(theirs.history[3].name.as_deref(), Some("left behind"));
+    assert_eq!((theirs.undo, theirs.history[3].parent), (ours.undo, Some(2)));
+    // What happens now is in the same journal.
+    let mut again = again;
+    rename(&mut again, "d");
+    let second = folder.0.join("second");
+    killed(&again, &copy, &second);
+    assert_eq!(reopened(&second).0.lens().name, "d");
+}
+
+#[test]
+fn a_closed_or_saved_design_leaves_nothing_to_recover() {
+    let folder = Folder::new("journal-closed");
+    let mut session = journaled(blank(), &folder.journals());
+    rename(&mut session, "given up");
+    drop(session);
+    assert_eq!(fs::read_dir(folder.journals()).unwrap().count(), 0, "it has no file");
+
+    let mut session = journaled(blank(), &folder.journals());
+    rename(&mut session, "kept");
+    let file = folder.0.join("kept.json");
+    session.apply(Command::Save(Some(file.clone())));
+    let copy = folder.0.join("copy");
+    killed(&session, &folder.journals(), &copy);
+    assert_eq!(reopened(&copy).1, None, "it is saved");
+    rename(&mut session, "changed");
+    let changed = folder.0.join("changed");
+    killed(&session, &folder.journals(), &changed);
+    let (again, _) = reopened(&changed);
+    assert_eq!((again.lens().name.as_str(), again.view().path), ("changed", Some(file.clone())));
+    drop(session);
+    assert_eq!(reopened(&folder.journals()).1, None, "it was closed");
+
+    let mut session = journaled(blank(), &folder.journals());
+    session.apply(Command::Open(file));
+    let view = session.view();
+    assert_eq!((view.history.len(), view.lens.name.as_str()), (3, "kept"), "its history is back");
+    assert!(!view.dirty && view.undo.is_some());
+}
+
+#[test]
+fn a_damaged_end_is_cut_wherever_it_begins() {
+    let folder = Folder::new("journal-damaged");
+    let mut session = journaled(blank(), &folder.journals());
+    let names = ["a", "b", "c", "d"];
+    for name in names {
+        rename(&mut session, name);
+    }
+    session.sync_journal();
+    let file = fs::read_dir(folder.journals()).unwrap().flatten().map(|file| file.path());
+    let file = file.filter(|path| path.extension().is_some_and(|end| end == "journal")).next();
+    let whole = fs::read(file.unwrap()).unwrap();
+    let copy = folder.0.join("copy");
+    let mut found = Vec::new();
+    for cut in (0..whole.len()).step_by(whole.len() / 40).chain([whole.len()]) {
+        fs::create_dir_all(&copy).unwrap();
+        let mut damaged = whole[..cut].to_vec();
+        damaged.extend([b"garbage".as_slice(), &whole[whole.len().min(cut + 9)..]].concat());
+        fs::write(copy.join("unsaved.journal"), damaged).unwrap();
+        let (again, text) = reopened(&copy);
+        if text.is_some() {
+            found.push(again.lens().name.clone());
+        }
+        drop(again);
+        fs::remove_dir_all(&copy).unwrap();
+    }
+    assert!(found.is_sorted() && found.len() > 10, "{found:?}");
+    assert_eq!(found.last().unwrap(), "d", "{found:?}");
+}
+
+#[test]
+fn an_interrupted_optimization_leaves_its_best_lens_in_the_history() {
+    let folder = Folder::new("journal-run");
+    let parameter = Parameter::new(0, Quantity::Curvature);
+    let mut lens = blank();
+    lens.surfaces[0].curvature = 0.02;
+    lens.variables = vec![Variable { parameter, min: None, max: None }];
+    let mut session = journaled(lens, &folder.journals());
+    let terms = vec![WeightedTerm { term: Term::FocalLength(150.0), weight: 1.0 }];
+    let goal = Goal { terms, pupil: PupilEdge::Frozen, zoom_ratios: Vec::new() };
+    session.apply(Command::Optimize { method: DescentMethod::Adam, goal: goal.clone() });
+    wait(&mut session, "a journal", |_, _| folder.journals().join("unsaved.journal").exists());
+    let copy = folder.0.join("copy");
+    killed(&session, &folder.journals(), &copy);
+    let (again, text) = reopened(&copy);
+    assert!(text.unwrap().contains("1 lens of an interrupted run"));
+    let view = again.view();
+    let kept = view.history.last().unwrap();
+    assert!(kept.title.starts_with("optimization, interrupted at step "), "{}", kept.title);
+    assert_eq!((kept.parent, kept.lens.merit.as_ref()), (Some(0), Some(&goal)));
+    assert_eq!(view.version_id, 0, "the design itself has not changed");
+    session.apply(Command::Stop);
+    session.apply(Command::DiscardResult);
+    let second = folder.0.join("second");
+    killed(&session, &folder.journals(), &second);
+    assert_eq!(reopened(&second).1, None, "a dismissed result is not recovered");
+}
+
+#[test]
+fn two_windows_have_two_journals() {
+    let folder = Folder::new("journal-two");
+    let mut first = journaled(blank(), &folder.journals());
+    let mut second = journaled(blank(), &folder.journals());
+    rename(&mut first, "first");
+    first.sync_journal();
+    rename(&mut second, "second");
+    second.sync_journal();
+    assert_eq!(reopened(&folder.journals()).1, None, "both are open");
+    let copy = folder.0.join("copy");
+    killed(&first, &folder.journals(), &copy);
+    let (one, _) = reopened(&copy);
+    let (other, _) = reopened(&copy);
+    let mut names = [one.lens().name.clone(), other.lens().name.clone()];
+    names.sort();
+    assert_eq!(names, ["first", "second"]);
+}
+
+/// The variable of the environment that makes [`edits_until_killed`] work.
+const WORK: &str = "APLANAT_JOURNAL_TEST";
+
+/// The program that is killed: edits and saves a lens for ever, and tells the number of each edit.
+#[test]
+#[ignore = "the program that other tests kill"]
+fn edits_until_killed() {
+    let Some(folder) = std::env::var_os(WORK).map(PathBuf::from) else { return };
+    let mut session = journaled(blank(), &folder.join("journals"));
+    if !session.recover() && folder.join("lens.json").exists() {
+        session.apply(Command::Open(folder.join("lens.json")));
+    }
+    let first = session.lens().name.parse::<u64>().unwrap_or(0);
+    let mut out = std::io::stdout().lock();
+    for number in first + 1.. {
+        rename(&mut session, &number.to_string());
+        if number % 7 == 0 {
+            session.apply(Command::Save(Some(folder.join("lens.json"))));
+        }
+        writeln!(out, "edit {number}").unwrap();
+        if number % 20 == 0 {
+            session.sync_journal();
+            writeln!(out, "on the disk {number}").unwrap();
+        }
+        out.flush().unwrap();
+        std::thread::sleep(Duration::from_millis(2));
+    }
+}
+
+fn start_editing(folder: &Path) -> Child {
+    std::process::Command::new(std::env::current_exe().unwrap())
+        .args(["--exact", "session_journal::edits_until_killed", "--ignored", "--nocapture"])
+        .env(WORK, folder)
+        .stdout(Stdio::piped())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap()
+}
+
+/// Kills the program after its edits have gone on for a while. Returns the last edit that has to be
+/// there: it was made two seconds before, or the program waited until it was on the disk.
+fn kill_after(folder: &Path, time: Duration) -> u64 {
+    let mut child = start_editing(folder);
+    let mut lines = BufReader::new(child.stdout.take().unwrap()).lines();
+    let (mut edits, mut on_disk): (Vec<(Instant, u64)>, u64) = (Vec::new(), 0);
+    while edits.first().is_none_or(|(begun, _)| begun.elapsed() < time) {
+        let line = lines.next().expect("it edits until it is killed").unwrap();
+        if let Some((_, number)) = line.split_once("edit ") {
+            edits.push((Instant::now(), number.parse().unwrap()));
+        } else if let Some(number) = line.strip_prefix("on the disk ") {
+            on_disk = number.parse().unwrap();
+        }
+    }
+    child.kill().unwrap();
+    child.wait().unwrap();
+    let old = edits.iter().filter(|(made, _)| made.elapsed() > Duration::from_secs(2));
+    old.map(|(_, number)| *number).fold(on_disk, u64::max)
+}
+
+/// The number of the last edit that is there after a kill; 0 if the lens was not edited.
+fn found_edit(folder: &Path) -> u64 {
+    let file = folder.join("lens.json");
+    let saved = file.exists().then(|| files::open(&file).expect("no file is broken").lens);
+    let (session, text) = reopened(&folder.join("journals"));
+    let name = match text {
+        Some(_) => session.lens().name.clone(),
+        None => saved.map_or_else(String::new, |lens| lens.name),
+    };
+    name.parse().unwrap_or(0)
+}
+
+/// Kills a program at these times of its edits, each time in a folder of its own; nothing older than
+/// two seconds may be lost.
+fn kills(times: impl Iterator<Item = Duration>) {
+    for (i, time) in times.enumerate() {
+        let folder = Folder::new(&format!("journal-kill-{i}"));
+        let safe = kill_after(&folder.0, time);
+        let found = found_edit(&folder.0);
+        assert!(found >= safe, "edit {found} was found and {safe} has to be there, {time:?}");
+    }
+}
+
+#[test]
+fn a_program_that_is_killed_while_it_edits_loses_nothing() {
+    kills([5, 90, 250].map(Duration::from_millis).into_iter());
+}
+
+#[test]
+#[ignore = "fifty kills take two minutes"]
+fn fifty_kills_lose_nothing() {
+    kills((0..50).map(|i| Duration::from_micros(700 + 7919 * i * i % 3_000_000)));
+}
+
+#[test]
+#[ignore = "a measurement"]
+fn an_edit_costs_the_window_little_more_with_a_journal() {
+    let lens = files::bundled_lenses().iter().max_by_key(|lens| lens.text.len()).unwrap();
+    let lens = files::json::read(lens.text, lens.name).unwrap();
+    let folder = Folder::new("journal-time");
+    let mut sessions =
+        [Session::new(lens.clone(), || {}).unwrap(), journaled(lens, &folder.journals())];
+    for (session, name) in sessions.iter_mut().zip(["without", "with"]) {
+        let mut times: Vec<f64> = (0..200)
+            .map(|i| {
+                let start = Instant::now();
+                rename(session, &i.to_string());
+                1e3 * start.elapsed().as_secs_f64()
+            })
+            .collect();
+        times.sort_by(f64::total_cmp);
+        println!("{name} a journal: median {:.3} ms, worst {:.3} ms", times[100], times[199]);
+    }
+}
