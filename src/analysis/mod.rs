@@ -6,6 +6,7 @@
 //! A field without light gives an [`AnalysisError`] with the reason, never a NaN.
 
 mod clear_semi_diameters;
+mod diffraction;
 mod distortion;
 mod fan;
 mod illumination;
@@ -18,13 +19,21 @@ mod semi_diameters;
 mod spot;
 mod spot_points;
 mod wavefront;
+mod zernike;
 
 pub use clear_semi_diameters::clear_semi_diameters;
+pub use diffraction::{
+    DiffractionGate, PointSpread, PupilCurve, PupilFunction, PupilSamples, Strehl,
+    diffraction_gate, diffraction_mtf, encircled_energy, point_spread,
+    polychromatic_diffraction_mtf, strehl, through_focus_mtf,
+};
 pub use distortion::{Distortion, FieldCurvature, distortion, field_curvature};
 pub use fan::{Fan, FanPoint, fan};
 pub use illumination::{Illumination, energy_irradiance, illumination, irradiance};
 pub use image_quality::{ImageQuality, field_qualities, field_quality, image_quality};
-pub use mtf::{MtfCurve, MtfPoint, TransferValue, geometric_mtf, polychromatic_geometric_mtf};
+pub use mtf::{
+    MtfCurve, MtfPoint, TransferValue, geometric_mtf, perfect_contrast, polychromatic_geometric_mtf,
+};
 pub use pupil::{FieldPupil, PupilExtent, PupilShape, RayLoss, pupil};
 pub use ray_layout::{LayoutRay, RayLayout, ray_layout};
 pub use reference_sphere::ReferenceForm;
@@ -34,6 +43,7 @@ pub use semi_diameters::{
 pub use spot::{MonochromaticSpot, Spot, airy_radius, rounding_error, spot, spots};
 pub use spot_points::{SpotPoints, spot_points};
 pub use wavefront::{PathError, Wavefront, path_differences, wavefront};
+pub use zernike::{ZernikeIndex, ZernikeMethod, ZernikeOrder, ZernikeSum, zernike};
 
 use crate::lens::FieldPoint;
 use crate::pupil::{LaunchError, RayModel, Region, RegionKind};
@@ -78,6 +88,15 @@ pub enum AnalysisError {
     /// The chief ray does not reach the image.
     #[error("no chief ray: the ray through the middle of the pupil does not reach the image")]
     NoChief,
+    /// Two rays of the pupil have the same direction cosines on the reference sphere.
+    #[error(
+        "the pupil folds: two rays have the same direction from the reference sphere, and \
+         diffraction cannot be told from one exit pupil"
+    )]
+    FoldedPupil,
+    /// The edge of the pupil is not known, or it cannot be divided into parts about one point each.
+    #[error("the pupil is irregular: diffraction needs an edge that is known and star-shaped")]
+    IrregularPupil,
 }
 
 /// The pupil of a field at a wavelength, if rays get through.

@@ -10,7 +10,7 @@ use crate::lens::FieldPoint;
 use crate::pupil::{Accuracy, ConvergedList, Nodes, RayModel, Region, converge_list};
 use crate::trace::ImagePoints;
 use serde::Serialize;
-use std::f64::consts::TAU;
+use std::f64::consts::{FRAC_2_PI, TAU};
 
 /// The optical transfer function at one spatial frequency.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -134,6 +134,12 @@ fn transfer(
     };
     let values = frequencies.iter().flat_map(|nu| [mean(*nu, 1), mean(*nu, 0)]).flatten();
     (area > 0.0).then(|| values.collect())
+}
+
+/// The contrast of a perfect lens with a round pupil at a fraction of the frequency where it ends.
+pub fn perfect_contrast(fraction: f64) -> f64 {
+    let f = fraction.abs();
+    if f >= 1.0 { 0.0 } else { (f.acos() - f * (1.0 - f * f).sqrt()) * FRAC_2_PI }
 }
 
 /// The geometric contrast of a field over all wavelengths: the sum of the complex values by weight.

@@ -160,6 +160,11 @@ impl ReferenceSphere {
         Some(SphereRay { waves, cosines: [to_center.x, to_center.y] })
     }
 
+    /// The wavelength in the image space, in mm.
+    pub(super) fn medium_wavelength(&self) -> f64 {
+        self.wavelength / self.index
+    }
+
     /// The rounding error of a path, in wavelengths.
     pub(super) fn rounding(&self) -> f64 {
         let radius = match self.form {

@@ -15,6 +15,28 @@ pub fn gauss_legendre(count: usize, from: f64, to: f64) -> Vec<(f64, f64)> {
     (0..count).map(node).collect()
 }
 
+/// The `count` Chebyshev points from 0 to 1, ends included: `(1 − cos(π j/(count − 1)))/2`.
+pub fn chebyshev_points(count: usize) -> impl Iterator<Item = f64> {
+    let step = PI / (count.max(2) - 1) as f64;
+    (0..count).map(move |j| (0.5 * step * j as f64).sin().powi(2))
+}
+
+/// The polynomial through values at the [`chebyshev_points`], at a point from 0 to 1, by the second barycentric formula (Berrut and Trefethen, SIAM Review 46, 2004).
+pub fn chebyshev_value(values: &[f64], t: f64) -> f64 {
+    let last = values.len() - 1;
+    let (mut above, mut below) = (0.0, 0.0);
+    for ((j, value), node) in values.iter().enumerate().zip(chebyshev_points(values.len())) {
+        if t == node {
+            return *value;
+        }
+        let end = if j == 0 || j == last { 0.5 } else { 1.0 };
+        let weight = if j % 2 == 0 { end } else { -end } / (t - node);
+        above += weight * value;
+        below += weight;
+    }
+    above / below
+}
+
 /// The zero of the Legendre polynomial with index `i`, from the largest down, and its weight.
 fn legendre_zero(count: usize, i: usize) -> (f64, f64) {
     let n = count as f64;

@@ -36,8 +36,8 @@ pub use patterns::{PupilPattern, pattern_points};
 pub use ray_model::{Aiming, Channel, Dual2, Neglected, PupilMeasure, RayModel, RayModelError};
 pub use real_beam::filled_stop_radius;
 pub use region::{
-    Accuracy, Annulus, Boundary, BoundaryArc, ConvergedList, ConvergedValues, DarkPupil, EdgePoint,
-    Nodes, OutlineSide, PolarFrame, PupilLimit, PupilMoments, PupilOutline, Region, RegionKind,
-    TracedNodes, TracedPupil, converge, converge_list,
+    Accuracy, Annulus, Boundary, BoundaryArc, ConvergedList, ConvergedValues, DarkPupil, EdgeArc,
+    EdgeCurves, EdgePoint, Nodes, OutlineSide, PolarFrame, PupilLimit, PupilMoments, PupilOutline,
+    Region, RegionKind, TracedNodes, TracedPupil, converge, converge_list,
 };
 pub use stop_limited::limited_by_stop;

@@ -130,6 +130,8 @@ pub enum Command {
     SetEffect(Effect, EffectOverride),
     /// Sets whether the pupils of the fields are computed.
     ShowPupils(bool),
+    /// Sets whether the contrast of the fields is computed.
+    ShowContrasts(bool),
     /// Sets the index of the wavelength of the pupils; `None` for the primary one.
     ShowPupilWavelength(Option<usize>),
     /// Starts an experiment in place of the one that runs.

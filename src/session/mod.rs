@@ -29,7 +29,10 @@ mod state;
 mod structure_search;
 mod view;
 
-pub use analysis::{Analyses, AnalysisResults, AnalysisSettings, FieldPupils, analyze};
+pub use analysis::{
+    Analyses, AnalysisResults, AnalysisSettings, FieldContrast, FieldContrasts, FieldPupils,
+    analyze,
+};
 pub use clock::Timed;
 pub use command::Command;
 pub use drag::{DragProgress, DragView, HandleSlopes, MeritSlopes};

@@ -91,6 +91,10 @@ impl Dock {
         if pupils != view.settings.pupils {
             actions.push(Command::ShowPupils(pupils));
         }
+        let contrasts = self.is_visible(PanelKind::Contrast);
+        if contrasts != view.settings.contrasts {
+            actions.push(Command::ShowContrasts(contrasts));
+        }
         let watched = self.is_visible(PanelKind::Slice);
         if watched != view.grin.is_active {
             actions.push(Command::Grin(GrinCommand::SetActive(watched)));
@@ -102,11 +106,12 @@ impl Dock {
 fn default_arrangement() -> Tree<PanelKind> {
     let mut tiles = Tiles::default();
     let mut pane = |kind: PanelKind| tiles.insert_pane(kind);
-    let [layout, slice, spot, pupil, table, system, zoom] = [
+    let [layout, slice, spot, pupil, contrast, table, system, zoom] = [
         PanelKind::Layout,
         PanelKind::Slice,
         PanelKind::Spot,
         PanelKind::Pupil,
+        PanelKind::Contrast,
         PanelKind::Prescription,
         PanelKind::System,
         PanelKind::Zoom,
@@ -122,7 +127,7 @@ fn default_arrangement() -> Tree<PanelKind> {
     ]
     .map(&mut pane);
     let facts = tiles.insert_tab_tile(vec![first, effects]);
-    let light = tiles.insert_tab_tile(vec![spot, pupil]);
+    let light = tiles.insert_tab_tile(vec![spot, pupil, contrast]);
     let better = tiles.insert_tab_tile(vec![optimizer, pareto, search, history]);
     let drawings = tiles.insert_tab_tile(vec![layout, slice]);
     let table = tiles.insert_tab_tile(vec![table, system, zoom]);

@@ -776,3 +776,35 @@ fn wrong_grin_tasks_are_refused_with_their_place() {
         refused(2, &["grin", "-"], &task.to_string(), &words);
     }
 }
+
+#[test]
+fn contrast_and_wavefront_have_errors_rays_and_times() {
+    let folder = std::env::temp_dir().join(format!("aplanat_contrast_{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    let csv = folder.join("mtf.csv");
+    let lens = "lenses/achromat_ac254_100.json";
+    let run = |arguments: &[&str]| {
+        let program = env!("CARGO_BIN_EXE_aplanat");
+        let out = Command::new(program).args(arguments).output().unwrap();
+        assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+        serde_json::from_slice::<Value>(&out.stdout).unwrap()
+    };
+    let path = csv.to_str().unwrap();
+    let mtf = ["--json", "analyze", lens, "mtf", "--field", "0", "--frequencies", "0,50"];
+    let found = run(&[&mtf[..], &["--csv", path]].concat());
+    let point = &found["fields"][0]["diffraction"]["points"][1]["tangential"];
+    let contrast = point["modulus"]["value"].as_f64().unwrap();
+    assert!((contrast - 0.728).abs() < 2e-3, "{point}");
+    assert_eq!(found["fields"][0]["diffraction"]["points"][0]["sagittal"]["re"], 1.0);
+    assert!(found["fields"][0]["gate"]["on"].as_bool().unwrap());
+    let text = std::fs::read_to_string(&csv).unwrap();
+    assert!(text.contains("diffraction.points.1.tangential.modulus.value,0.72"), "{text}");
+    let wave = run(&["--json", "analyze", lens, "wavefront", "--field", "0"]);
+    let rms = wave["fields"][0]["rms"]["value"].as_f64().unwrap();
+    assert!((rms - 0.1008).abs() < 2e-3, "{rms}");
+    let psf = ["--json", "analyze", lens, "psf", "--field", "0", "--at", "0.0025,0"];
+    let spread = run(&psf);
+    let strehl = spread["fields"][0]["strehl"]["value"].as_f64().unwrap();
+    assert!((strehl - 0.68).abs() < 0.01, "{spread}");
+    std::fs::remove_dir_all(folder).unwrap();
+}

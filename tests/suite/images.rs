@@ -10,14 +10,14 @@ use aplanat::paraxial::Beam;
 use aplanat::pupil::{Accuracy, Aiming, RayModel};
 use serde_json::Value;
 
-const ACCURACY: Accuracy = Accuracy { tolerance: 1e-11, max_rays: 400_000 };
+pub(crate) const ACCURACY: Accuracy = Accuracy { tolerance: 1e-11, max_rays: 400_000 };
 
 /// A lens of `images.json`.
-struct ImageLens {
+pub(crate) struct ImageLens {
     data: Value,
 }
 
-fn image_lenses() -> Vec<ImageLens> {
+pub(crate) fn image_lenses() -> Vec<ImageLens> {
     let file = read("images.json");
     file["lenses"].as_array().unwrap().iter().map(|data| ImageLens { data: data.clone() }).collect()
 }
@@ -27,11 +27,11 @@ fn on_y(y: f64) -> FieldPoint {
 }
 
 impl ImageLens {
-    fn id(&self) -> &str {
+    pub(crate) fn id(&self) -> &str {
         self.data["id"].as_str().unwrap()
     }
 
-    fn primary(&self) -> usize {
+    pub(crate) fn primary(&self) -> usize {
         count(&self.data["primary"])
     }
 
@@ -70,7 +70,7 @@ impl ImageLens {
     }
 
     /// Every field with its model.
-    fn fields(&self) -> Vec<(Value, RayModel, FieldPoint)> {
+    pub(crate) fn fields(&self) -> Vec<(Value, RayModel, FieldPoint)> {
         let fields = self.data["fields"].as_array().unwrap();
         let field = |data: &Value| {
             let model = self.model(data["pupil"] == "clip");
@@ -81,7 +81,7 @@ impl ImageLens {
 }
 
 /// The error allowed of an integral.
-fn allowed(err: &Value) -> f64 {
+pub(crate) fn allowed(err: &Value) -> f64 {
     (10.0 * number(err)).max(1e-9)
 }
 

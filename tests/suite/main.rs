@@ -10,6 +10,7 @@ mod cli_effects;
 mod cli_failures;
 mod cli_files;
 mod closed_forms;
+mod diffraction;
 mod drag;
 mod effects;
 mod elements;

@@ -1,10 +1,14 @@
 //! `analyze`: the results that a designer reads, each number with its error, rays and milliseconds.
 
 mod chief;
+mod contrast;
+mod csv;
 mod fan;
 mod focus;
 mod illumination;
+mod point_spread;
 mod spot;
+mod wavefront;
 
 use super::effects::{AllowedSetting, EffectArgs, EffectReport, EffectRule};
 use super::error::CliError;
@@ -20,6 +24,7 @@ use clap::ValueEnum;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fmt::{self, Display};
+use std::path::PathBuf;
 
 /// Spot, fans, distortion, ...: each number with its estimated error, rays and milliseconds
 #[derive(Debug, clap::Args)]
@@ -43,8 +48,27 @@ pub(super) struct AnalyzeArgs {
     #[arg(long, value_name = "N", default_value_t = 0)]
     zoom: usize,
 
+    /// Spatial frequencies of `mtf` and `through-focus-mtf`, in line pairs per mm
+    #[arg(long, value_name = "NU", value_delimiter = ',', default_value = "10,20,30,40,50")]
+    frequencies: Vec<f64>,
+
+    /// A point of `psf`, as `x,y` in mm from the image point of the chief ray; may be repeated
+    #[arg(long = "at", value_name = "X,Y", value_parser = parse_point, allow_hyphen_values = true)]
+    points: Vec<[f64; 2]>,
+
+    /// Writes all numbers as CSV into this file too
+    #[arg(long, value_name = "FILE")]
+    csv: Option<PathBuf>,
+
     #[command(flatten)]
     effects: EffectArgs,
+}
+
+/// The two coordinates of a point.
+fn parse_point(text: &str) -> Result<[f64; 2], String> {
+    let number = |part: &str| part.trim().parse::<f64>().ok().filter(|v| v.is_finite());
+    let pair = text.split_once(',').and_then(|(x, y)| Some([number(x)?, number(y)?]));
+    pair.ok_or_else(|| "expected two numbers in mm, as in `0.002,-0.001`".to_owned())
 }
 
 /// The analyses.
@@ -63,6 +87,20 @@ enum AnalysisKind {
     Illumination,
     /// RMS radius at displaced image planes
     ThroughFocus,
+    /// RMS and map of the wavefront
+    Wavefront,
+    /// Path differences along both sections of the pupil
+    OpdFan,
+    /// Zernike coefficients of the wavefront, in Noll's and the fringe order
+    Zernike,
+    /// Diffraction image of a point and Strehl ratios
+    Psf,
+    /// Share of the light within circles, by diffraction
+    EncircledEnergy,
+    /// Contrast by diffraction and by rays, at one and at all wavelengths
+    Mtf,
+    /// Contrast by diffraction at displaced image planes
+    ThroughFocusMtf,
 }
 
 /// The rule for results at one wavelength.
@@ -82,9 +120,9 @@ impl AnalysisKind {
     /// The effects that the analysis does not leave to the plan.
     fn effect_rules(self) -> &'static [EffectRule] {
         match self {
-            Self::Spot | Self::Fan | Self::ThroughFocus => &[],
+            Self::Spot | Self::Fan | Self::ThroughFocus | Self::Mtf => &[],
             Self::Distortion => &[ONE_WAVELENGTH, OBJECT_IN_PLACE],
-            Self::FieldCurvature | Self::Illumination => &[ONE_WAVELENGTH],
+            _ => &[ONE_WAVELENGTH],
         }
     }
 
@@ -93,15 +131,17 @@ impl AnalysisKind {
         match self {
             Self::Spot | Self::ThroughFocus => TracePurpose::Spot(tolerance),
             Self::Fan | Self::Distortion => TracePurpose::Trace,
-            Self::FieldCurvature | Self::Illumination => TracePurpose::Exact,
+            _ => TracePurpose::Exact,
         }
     }
 
     /// The report of the effects: a shift of rays bounds the errors of some analyses only.
     fn effect_report(self, plan: EffectPlan) -> EffectReport {
         match self {
-            Self::FieldCurvature | Self::Illumination => EffectReport::uncounted(plan.decisions),
-            _ => EffectReport::counted(plan),
+            Self::Spot | Self::ThroughFocus | Self::Fan | Self::Distortion => {
+                EffectReport::counted(plan)
+            }
+            _ => EffectReport::uncounted(plan.decisions),
         }
     }
 }
@@ -110,14 +150,52 @@ impl AnalyzeArgs {
     pub(super) fn run(&self, output: &Output) -> Result<(), CliError> {
         let run = AnalysisRun::new(self)?;
         match self.what {
-            AnalysisKind::Spot => output.print(&run.report(spot::spots(&run))?),
-            AnalysisKind::Fan => output.print(&run.report(fan::fans(&run))?),
-            AnalysisKind::Distortion => output.print(&run.report(chief::distortions(&run))?),
-            AnalysisKind::FieldCurvature => output.print(&run.report(chief::curvatures(&run))?),
+            AnalysisKind::Spot => self.finish(&run, spot::spots(&run), output),
+            AnalysisKind::Fan => self.finish(&run, fan::fans(&run), output),
+            AnalysisKind::Distortion => self.finish(&run, chief::distortions(&run), output),
+            AnalysisKind::FieldCurvature => self.finish(&run, chief::curvatures(&run), output),
             AnalysisKind::Illumination => {
-                output.print(&run.report(illumination::illuminations(&run))?)
+                self.finish(&run, illumination::illuminations(&run), output)
             }
-            AnalysisKind::ThroughFocus => output.print(&run.report(focus::through_focus(&run)?)?),
+            AnalysisKind::ThroughFocus => self.finish(&run, focus::through_focus(&run)?, output),
+            AnalysisKind::Wavefront => self.finish(&run, wavefront::wavefronts(&run), output),
+            AnalysisKind::OpdFan => self.finish(&run, wavefront::path_fans(&run), output),
+            AnalysisKind::Zernike => self.finish(&run, wavefront::zernikes(&run), output),
+            AnalysisKind::Psf => self.finish(&run, point_spread::point_spreads(&run), output),
+            AnalysisKind::EncircledEnergy => {
+                self.finish(&run, point_spread::encircled(&run), output)
+            }
+            AnalysisKind::Mtf => self.finish(&run, contrast::contrasts(&run), output),
+            AnalysisKind::ThroughFocusMtf => {
+                self.finish(&run, contrast::through_focus(&run), output)
+            }
+        }
+    }
+
+    /// Prints the report of all fields, and writes it as CSV if that is asked for.
+    fn finish<T: TextLines + Serialize>(
+        &self,
+        run: &AnalysisRun,
+        fields: Vec<AtField<T>>,
+        output: &Output,
+    ) -> Result<(), CliError> {
+        let report = run.report(fields)?;
+        if let Some(path) = &self.csv {
+            let value = serde_json::to_value(&report)
+                .map_err(|why| CliError::Failed(format!("{}: {why}", path.display())))?;
+            std::fs::write(path, csv::csv(&value))
+                .map_err(|why| CliError::Failed(format!("{}: {why}", path.display())))?;
+        }
+        output.print(&report)
+    }
+
+    /// Refuses frequencies that are no positive numbers.
+    fn check_frequencies(&self) -> Result<(), CliError> {
+        match self.frequencies.iter().find(|nu| !(nu.is_finite() && **nu >= 0.0)) {
+            Some(wrong) => Err(CliError::Input(format!(
+                "--frequencies: found {wrong}; expected line pairs per mm, zero or more"
+            ))),
+            None => Ok(()),
         }
     }
 }
@@ -132,6 +210,10 @@ struct AnalysisRun {
     fields: Vec<SelectedField>,
     zoom: usize,
     accuracy: Accuracy,
+    /// The spatial frequencies, in line pairs per mm; at least one.
+    frequencies: Vec<f64>,
+    /// The points of a diffraction image, in mm from the image point of the chief ray.
+    points: Vec<[f64; 2]>,
 }
 
 /// A selected field.
@@ -145,6 +227,7 @@ struct SelectedField {
 
 impl AnalysisRun {
     fn new(analyze: &AnalyzeArgs) -> Result<Self, CliError> {
+        analyze.check_frequencies()?;
         let choices = analyze.effects.choices(analyze.what.effect_rules())?;
         let opened = analyze.lens.open()?;
         let AnalyzeArgs { what, zoom, .. } = *analyze;
@@ -164,7 +247,8 @@ impl AnalysisRun {
         // Of two equal fields one is enough.
         fields.truncate(chosen.map_or(fields.len(), |_| 1));
         let accuracy = Accuracy { tolerance: analyze.error.0, ..Accuracy::default() };
-        Ok(Self { what, opened, plan, model, fields, zoom, accuracy })
+        let (frequencies, points) = (analyze.frequencies.clone(), analyze.points.clone());
+        Ok(Self { what, opened, plan, model, fields, zoom, accuracy, frequencies, points })
     }
 
     fn primary_um(&self) -> f64 {

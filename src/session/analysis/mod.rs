@@ -3,8 +3,10 @@
 //! A newer request replaces one that has not begun, and interrupts one that has between two analyses.
 //! Results carry the version of the design that they belong to and the time of each analysis.
 
+mod contrast;
 mod pupils;
 
+pub use contrast::{FieldContrast, FieldContrasts};
 pub use pupils::FieldPupils;
 
 use super::clock::{Timed, now, time};
@@ -60,6 +62,8 @@ pub struct Analyses {
     pub airy: Option<f64>,
     /// The pupils of the fields; `None` while no panel shows them.
     pub pupils: Option<Timed<FieldPupils>>,
+    /// The contrast of the fields; `None` while no panel shows it.
+    pub contrasts: Option<Timed<FieldContrasts>>,
     /// The ray fans of each field.
     pub fans: Timed<Vec<Result<Vec<Fan>, AnalysisError>>>,
     /// The distortion at each field.
@@ -219,6 +223,10 @@ impl Analyses {
         unless_interrupted()?;
         let pupils = settings.pupils.then(|| time(|| field_pupils(&b, settings, accuracy)));
         unless_interrupted()?;
+        let contrasts = settings
+            .contrasts
+            .then(|| time(|| contrast::field_contrasts(&b, &spots.value, settings.tolerance)));
+        unless_interrupted()?;
         let fans = time(|| for_each_field(&b, |field| analysis::fan(&b, field, FAN_POINTS)));
         unless_interrupted()?;
         let illumination = time(|| analysis::illumination(&b, b.primary, accuracy));
@@ -239,6 +247,7 @@ impl Analyses {
             spot_points: scatter,
             spots,
             pupils,
+            contrasts,
             fans,
             illumination,
         })
@@ -281,6 +290,9 @@ pub struct AnalysisSettings {
     pub overrides: EffectOverrides,
     /// True if the pupils are computed, because a panel shows them.
     pub pupils: bool,
+    /// True if the contrast is computed, because a panel shows it.
+    #[serde(default)]
+    pub contrasts: bool,
     /// The index of the wavelength of the pupils; `None` for the primary one.
     pub pupil_wavelength: Option<usize>,
 }
@@ -293,6 +305,7 @@ impl Default for AnalysisSettings {
             rays: 15,
             overrides: EffectOverrides::default(),
             pupils: false,
+            contrasts: false,
             pupil_wavelength: None,
         }
     }

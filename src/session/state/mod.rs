@@ -211,6 +211,7 @@ impl Session {
                 self.change_settings(|s| s.overrides.set(effect, choice));
             }
             Command::ShowPupils(shown) => self.change_settings(|s| s.pupils = shown),
+            Command::ShowContrasts(shown) => self.change_settings(|s| s.contrasts = shown),
             Command::ShowPupilWavelength(wavelength) => {
                 self.change_settings(|s| s.pupil_wavelength = wavelength);
             }

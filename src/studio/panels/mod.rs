@@ -1,6 +1,7 @@
 //! The panels of the window.
 
 mod cell_layout;
+mod contrast;
 mod edit_form;
 mod effects;
 mod first_order;
@@ -17,6 +18,7 @@ mod system;
 mod widgets;
 mod zoom;
 
+pub use contrast::ContrastPanel;
 pub use effects::EffectsPanel;
 pub use first_order::FirstOrderPanel;
 pub use grin::GrinPanel;
@@ -73,6 +75,8 @@ pub enum PanelKind {
     Spot,
     /// The pupil of every field, with what limits it.
     Pupil,
+    /// The contrast of every field against spatial frequency.
+    Contrast,
     /// The search for a better lens.
     Optimizer,
     /// The Pareto front of sharpness against light.
@@ -93,12 +97,13 @@ pub enum PanelKind {
 
 impl PanelKind {
     /// Every panel. A new one is a file in this folder, an entry here and a place in the window.
-    pub const ALL: [Self; 13] = [
+    pub const ALL: [Self; 14] = [
         Self::Layout,
         Self::Slice,
         Self::Prescription,
         Self::Spot,
         Self::Pupil,
+        Self::Contrast,
         Self::Optimizer,
         Self::Pareto,
         Self::Search,
@@ -117,6 +122,7 @@ impl PanelKind {
             Self::Prescription => Box::new(PrescriptionPanel::default()),
             Self::Spot => Box::new(SpotPanel::new(backend)),
             Self::Pupil => Box::new(PupilPanel::default()),
+            Self::Contrast => Box::new(ContrastPanel),
             Self::Optimizer => Box::new(OptimizerPanel::default()),
             Self::Pareto => Box::new(ParetoPanel::default()),
             Self::Search => Box::new(SearchPanel::default()),

@@ -1,0 +1,191 @@
+//! The diffraction MTF of a field, and whether diffraction matters.
+
+use super::pupil_function::PupilFunction;
+use crate::analysis::mtf::{curve, geometric_mtf, origin, sum_wavelengths};
+use crate::analysis::reference_sphere::{ReferenceForm, ReferenceSphere};
+use crate::analysis::{AnalysisError, Estimate, MtfCurve, MtfPoint, TransferValue, lit_region};
+use crate::lens::FieldPoint;
+use crate::pupil::{Accuracy, ConvergedList, RayModel, Region};
+use crate::trace::TraceSink as _;
+use serde::Serialize;
+use std::f64::consts::TAU;
+
+/// The contrast by diffraction of a field at one wavelength and some frequencies in line pairs per mm;
+/// errors are absolute. Where the aberrations are so large that the place of the pupil's edge on the
+/// sphere matters, the change on doubling its radius is part of the error.
+///
+/// # Errors
+/// The field is dark, or its pupil folds or has pieces whose edge is not known.
+pub fn diffraction_mtf(
+    model: &RayModel,
+    field: FieldPoint,
+    wavelength: usize,
+    frequencies: &[f64],
+    accuracy: Accuracy,
+) -> Result<MtfCurve, AnalysisError> {
+    let region = lit_region(model, field, wavelength)?;
+    let sphere = ReferenceSphere::for_region(&region)?;
+    let function = PupilFunction::of_region(&region, &sphere, accuracy.tolerance)?;
+    let origin = origin(model, field, &region)?;
+    let mut values = function.values(frequencies, 0.0, accuracy.tolerance)?;
+    let reached = values.iter().flatten().all(|v| v.modulus.error <= accuracy.tolerance);
+    if is_uncertain(&sphere, &region) {
+        let tolerance = accuracy.tolerance.max(COARSE);
+        let wide = PupilFunction::of_region(&region, &sphere.doubled(), tolerance)?;
+        let other = wide.values(frequencies, 0.0, tolerance)?;
+        for (value, other) in values.iter_mut().flatten().zip(other.iter().flatten()) {
+            value.modulus.error += (value.re - other.re).hypot(value.im - other.im);
+        }
+    }
+    let offset = [sphere.center.x - origin[0], sphere.center.y - origin[1]];
+    let list = ConvergedList {
+        values: flatten(frequencies, &values, offset),
+        errors: values.iter().flatten().flat_map(|v| [v.modulus.error, 0.0]).collect(),
+        rays: function.rays(),
+        converged: reached,
+    };
+    Ok(curve(frequencies, origin, &list))
+}
+
+/// The tolerance of contrast on a second sphere.
+const COARSE: f64 = 1e-4;
+/// The uncertainty of paths between two spheres, in wavelengths, below which it does not matter.
+const CERTAIN: f64 = 1e-3;
+
+/// True if paths between two spheres are uncertain by more than a part of a wavelength: by the square
+/// of a ray's error over twice the radius.
+fn is_uncertain(sphere: &ReferenceSphere, region: &Region<'_>) -> bool {
+    let (ReferenceForm::ExitPupil(radius) | ReferenceForm::Replaced(radius)) = sphere.form else {
+        return false;
+    };
+    let (_, landed) = region.launch.trace_points(&region.nodes(2).points);
+    let arrived = (0..landed.x.len()).filter(|i| landed.fate(*i).is_imaged());
+    let square = |i: usize| {
+        (landed.x[i] - sphere.center.x).powi(2) + (landed.y[i] - sphere.center.y).powi(2)
+    };
+    let farthest = arrived.map(square).fold(0.0, f64::max);
+    farthest > 2.0 * radius.abs() * CERTAIN * sphere.wavelength
+}
+
+/// The complex values with their phases counted from the common origin.
+fn flatten(frequencies: &[f64], values: &[[TransferValue; 2]], offset: [f64; 2]) -> Vec<f64> {
+    let turned = |value: &TransferValue, frequency: f64, off: f64| {
+        let (sin, cos) = (-TAU * frequency * off).sin_cos();
+        [value.re * cos - value.im * sin, value.re * sin + value.im * cos]
+    };
+    let both = |(frequency, [t, s]): (&f64, &[TransferValue; 2])| {
+        [turned(t, *frequency, offset[1]), turned(s, *frequency, offset[0])]
+    };
+    frequencies.iter().zip(values).flat_map(both).flatten().collect()
+}
+
+impl PupilFunction {
+    /// The tangential and sagittal values at some frequencies.
+    fn values(
+        &self,
+        frequencies: &[f64],
+        defocus: f64,
+        tolerance: f64,
+    ) -> Result<Vec<[TransferValue; 2]>, AnalysisError> {
+        let at = |nu: &f64| {
+            let tangential = self.transfer([0.0, *nu], defocus, tolerance)?;
+            Ok([tangential, self.transfer([*nu, 0.0], defocus, tolerance)?])
+        };
+        frequencies.iter().map(at).collect()
+    }
+}
+
+/// The contrast by diffraction of a field over all wavelengths: the sum of the complex values by
+/// weight.
+///
+/// # Errors
+/// Every wavelength is dark or refused.
+pub fn polychromatic_diffraction_mtf(
+    model: &RayModel,
+    field: FieldPoint,
+    frequencies: &[f64],
+    accuracy: Accuracy,
+) -> Result<MtfCurve, AnalysisError> {
+    sum_wavelengths(model, |wavelength| {
+        diffraction_mtf(model, field, wavelength, frequencies, accuracy)
+    })
+}
+
+/// The contrast by diffraction of a field at one wavelength and frequency against displacements of the
+/// image plane along the light in mm, from the rays of one pupil; the frequency of a point is the
+/// displacement.
+///
+/// # Errors
+/// As of [`diffraction_mtf`].
+pub fn through_focus_mtf(
+    model: &RayModel,
+    field: FieldPoint,
+    wavelength: usize,
+    frequency: f64,
+    displacements: &[f64],
+    accuracy: Accuracy,
+) -> Result<Vec<MtfPoint>, AnalysisError> {
+    let region = lit_region(model, field, wavelength)?;
+    let sphere = ReferenceSphere::for_region(&region)?;
+    let function = PupilFunction::of_region(&region, &sphere, accuracy.tolerance)?;
+    let at = |defocus: &f64| {
+        let values = function.values(&[frequency], *defocus, accuracy.tolerance)?;
+        let [tangential, sagittal] = values[0];
+        Ok(MtfPoint { frequency: *defocus, tangential, sagittal })
+    };
+    displacements.iter().map(at).collect()
+}
+
+/// The decision whether contrast needs diffraction.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct DiffractionGate {
+    /// True if diffraction has to be computed.
+    pub on: bool,
+    /// The largest change of contrast that diffraction can make: 1.27 ν λ F at the highest frequency,
+    /// at most 1.
+    pub bound: f64,
+    /// The largest change that it makes at the frequencies compared; `None` if the bound decided.
+    pub change: Option<Estimate>,
+    /// The change that is allowed.
+    pub tolerance: f64,
+}
+
+/// The change of contrast by diffraction over νλF, at most, for five families of aberrations.
+const LARGEST_CHANGE: f64 = 1.27;
+/// The parts of the highest frequency at which both contrasts are compared.
+const COMPARED: [f64; 3] = [0.25, 0.5, 1.0];
+
+/// Decides whether the contrast of a field at a wavelength up to a frequency in line pairs per mm needs
+/// diffraction: by a bound, or else by computing both at three frequencies.
+///
+/// # Errors
+/// The field is dark, or the bound does not decide and its pupil cannot be integrated over.
+pub fn diffraction_gate(
+    model: &RayModel,
+    field: FieldPoint,
+    wavelength: usize,
+    highest: f64,
+    tolerance: f64,
+) -> Result<DiffractionGate, AnalysisError> {
+    let f_number = model.first_order.working_f_number.map_or(f64::INFINITY, f64::abs);
+    let bound = LARGEST_CHANGE * highest * model.channels[wavelength].um * 1e-3 * f_number;
+    let bound = bound.min(1.0);
+    if bound <= tolerance {
+        return Ok(DiffractionGate { on: false, bound, change: None, tolerance });
+    }
+    let frequencies = COMPARED.map(|part| part * highest);
+    let accuracy = Accuracy { tolerance: 0.1 * tolerance, ..Accuracy::default() };
+    let wave = diffraction_mtf(model, field, wavelength, &frequencies, accuracy)?;
+    let rays = geometric_mtf(model, field, wavelength, &frequencies, accuracy)?;
+    let differences = wave.points.iter().zip(&rays.points).flat_map(|(d, g)| {
+        let difference = |d: &TransferValue, g: &TransferValue| {
+            let error = d.modulus.error + g.modulus.error;
+            ((d.modulus.value - g.modulus.value).abs(), error)
+        };
+        [difference(&d.tangential, &g.tangential), difference(&d.sagittal, &g.sagittal)]
+    });
+    let (largest, error) =
+        differences.fold((0.0, 0.0), |a: (f64, f64), b| if b.0 > a.0 { b } else { a });
+    let change = Estimate::new(largest, error, wave.rays + rays.rays);
+    Ok(DiffractionGate { on: largest > tolerance, bound, change: Some(change), tolerance })
+}

@@ -1,0 +1,36 @@
+//! Diffraction at a pupil of any shape, by sums that converge spectrally.
+//!
+//! Light on the [reference sphere](super::ReferenceForm) is counted in the direction cosines
+//! `(α, β) = (C − Q)/R` of its points as seen from the centre: a spatial frequency ν in the image is
+//! exactly a shift `λν` of the pupil there, with obliquity and pupil distortion included. The
+//! amplitude keeps the energy of the arriving beam, `A² dα dβ = dp`. With W the path difference:
+//!
+//! ```text
+//! U(x, y) = ∫ A exp(2πi (−W + α x + β y)/λ) dα dβ
+//! OTF(ν)  = ∫ A₊ A₋ exp(−2πi (W₊ − W₋)/λ) dα dβ / ∫ A² dα dβ,   ± at (α, β) ± λν/2
+//! ```
+//!
+//! U is a sum over the quadrature nodes of the pupil itself. For the OTF, W and A are polynomials
+//! fitted to rays, and the overlap of the two shifted pupils is integrated between its own edges.
+//! Light is a scalar here, which is not enough beyond a numerical aperture of about 0.6.
+
+mod contrast;
+mod encircled;
+mod outline;
+mod overlap;
+mod point_spread;
+mod polynomial;
+mod pupil_function;
+mod pupil_samples;
+mod strehl;
+
+pub use contrast::{
+    DiffractionGate, diffraction_gate, diffraction_mtf, polychromatic_diffraction_mtf,
+    through_focus_mtf,
+};
+pub use encircled::encircled_energy;
+pub use outline::PupilCurve;
+pub use point_spread::{PointSpread, point_spread};
+pub use pupil_function::PupilFunction;
+pub use pupil_samples::PupilSamples;
+pub use strehl::{Strehl, strehl};

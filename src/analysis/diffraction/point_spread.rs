@@ -1,0 +1,64 @@
+//! The intensity at points of the image of a point.
+
+use super::pupil_samples::{FEW, PupilSamples};
+use crate::analysis::reference_sphere::{ReferenceForm, ReferenceSphere};
+use crate::analysis::{AnalysisError, Estimate, lit_region};
+use crate::lens::FieldPoint;
+use crate::pupil::{Accuracy, Nodes, RayModel, converge_list};
+
+/// The diffraction image of a point at one wavelength.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PointSpread {
+    /// The intensity at each point asked for, over the peak of the same pupil without aberrations.
+    pub intensities: Vec<Estimate>,
+    /// The Strehl ratio at the centre of the reference sphere, the image point of the chief ray.
+    pub strehl: Estimate,
+    /// The centre of the reference sphere, x and y in mm.
+    pub center: [f64; 2],
+    /// True if the tolerance was reached.
+    pub reached: bool,
+    /// The sphere on which light is counted.
+    pub reference: ReferenceForm,
+}
+
+/// The diffraction image of a field at a wavelength at some points, x and y in mm from the image point
+/// of the chief ray; errors are absolute, relative to a perfect peak.
+///
+/// # Errors
+/// The field is dark or its pupil folds.
+pub fn point_spread(
+    model: &RayModel,
+    field: FieldPoint,
+    wavelength: usize,
+    points: &[[f64; 2]],
+    accuracy: Accuracy,
+) -> Result<PointSpread, AnalysisError> {
+    let region = lit_region(model, field, wavelength)?;
+    let sphere = ReferenceSphere::for_region(&region)?;
+    // A pupil that folds does so for few rays already.
+    PupilSamples::of_nodes(&region, &sphere, &region.nodes(FEW))?;
+    let mut refused = None;
+    let numbers = |nodes: &Nodes| match PupilSamples::of_nodes(&region, &sphere, nodes) {
+        Ok(light) => {
+            let all = std::iter::once([0.0; 2]).chain(points.iter().copied());
+            Some(all.map(|point| light.intensity(point)).collect())
+        }
+        Err(why) => {
+            refused = Some(why);
+            None
+        }
+    };
+    let found = converge_list(&region, accuracy, numbers, |list| vec![1.0; list.len()]);
+    if let Some(why) = refused.filter(|why| *why != AnalysisError::NoLight) {
+        return Err(why);
+    }
+    let found = found.ok_or(AnalysisError::NoLight)?;
+    let estimate = |k: usize| Estimate::new(found.values[k], found.errors[k], found.rays);
+    Ok(PointSpread {
+        intensities: (1..found.values.len()).map(estimate).collect(),
+        strehl: estimate(0),
+        center: [sphere.center.x, sphere.center.y],
+        reached: found.converged,
+        reference: sphere.form,
+    })
+}

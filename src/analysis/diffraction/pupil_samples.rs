@@ -1,0 +1,118 @@
+//! The light of a pupil on the reference sphere, at the nodes of a quadrature.
+
+use crate::analysis::AnalysisError;
+use crate::analysis::reference_sphere::ReferenceSphere;
+use crate::math::Dual;
+use crate::pupil::{Nodes, Region};
+use crate::trace::TraceSink as _;
+use std::f64::consts::TAU;
+
+/// The light of a pupil at some of its points.
+#[derive(Debug, Clone, Default)]
+pub struct PupilSamples {
+    /// The direction cosines across the axis from the sphere to its centre.
+    pub cosines: Vec<[f64; 2]>,
+    /// The path difference at each point, in wavelengths.
+    pub waves: Vec<f64>,
+    /// The integrals of the amplitude over the cosines around each point.
+    pub amplitudes: Vec<f64>,
+    /// The energy of each point: the area of its beam.
+    pub energies: Vec<f64>,
+    /// True if every point stands for its mirror image `(−α, β)` as well; amplitudes and energies
+    /// count both.
+    pub mirrored: bool,
+    /// The wavelength in the image space, in mm.
+    pub wavelength: f64,
+}
+
+/// The order of quadrature of few rays.
+pub(super) const FEW: usize = 2;
+
+/// A complex number as its real and imaginary part.
+pub(super) type Complex = [f64; 2];
+
+impl PupilSamples {
+    /// The light of a pupil at some nodes.
+    ///
+    /// # Errors
+    /// The cosines are no coordinates of the pupil, since it folds there; or no ray arrives.
+    pub(in crate::analysis) fn of_nodes(
+        region: &Region<'_>,
+        sphere: &ReferenceSphere,
+        nodes: &Nodes,
+    ) -> Result<Self, AnalysisError> {
+        let launch = &region.launch;
+        let mut samples = Self {
+            mirrored: nodes.mirrored,
+            wavelength: sphere.medium_wavelength(),
+            ..Self::default()
+        };
+        let (launched, landed) = launch.trace_points(&nodes.points);
+        let (mut least, mut most) = (f64::INFINITY, f64::NEG_INFINITY);
+        for (ray, node) in launched.into_iter().enumerate() {
+            let p = nodes.points[node];
+            if !landed.fate(ray).is_imaged() {
+                continue;
+            }
+            let (Some(start), Some(end)) = (launch.ray(p), launch.unclipped_landing(p)) else {
+                continue;
+            };
+            let path = Dual::constant(launch.optical_path_to(start)) + end.opl;
+            let Some(found) = sphere.project(end.ray, path) else { continue };
+            let [a, b] = found.cosines;
+            let share = launch.beam_share(p);
+            // The area of cosines by that of the beam.
+            let area = (a.slope[0] * b.slope[1] - a.slope[1] * b.slope[0]) / share;
+            (least, most) = (least.min(area), most.max(area));
+            let energy = nodes.weights[node] * share;
+            samples.cosines.push([a.value, b.value]);
+            samples.waves.push(found.waves.value);
+            samples.amplitudes.push(energy * area.abs().sqrt());
+            samples.energies.push(energy);
+        }
+        if samples.cosines.is_empty() {
+            return Err(AnalysisError::NoLight);
+        }
+        if least < 0.0 && most > 0.0 {
+            return Err(AnalysisError::FoldedPupil);
+        }
+        Ok(samples)
+    }
+
+    /// The integral of the squared amplitude over the cosines.
+    pub fn energy(&self) -> f64 {
+        self.energies.iter().sum()
+    }
+
+    /// The integral of the amplitude over the cosines: the field at the centre without aberrations.
+    pub fn peak(&self) -> f64 {
+        self.amplitudes.iter().sum()
+    }
+
+    /// The field at a point of the image, x and y in mm from the centre of the sphere.
+    pub(super) fn field(&self, [x, y]: [f64; 2]) -> Complex {
+        let (kx, ky) = (x / self.wavelength, y / self.wavelength);
+        let (mut re, mut im) = (0.0, 0.0);
+        for ((cosines, waves), amplitude) in
+            self.cosines.iter().zip(&self.waves).zip(&self.amplitudes)
+        {
+            let across = kx * cosines[0];
+            let (phase, factor) = if self.mirrored {
+                (ky * cosines[1] - waves, (TAU * across).cos())
+            } else {
+                (ky * cosines[1] - waves + across, 1.0)
+            };
+            let (sin, cos) = (TAU * phase).sin_cos();
+            re += amplitude * factor * cos;
+            im += amplitude * factor * sin;
+        }
+        [re, im]
+    }
+
+    /// The intensity at a point of the image over that of the same pupil without aberrations at its
+    /// peak; x and y in mm from the centre of the sphere.
+    pub fn intensity(&self, point: [f64; 2]) -> f64 {
+        let [re, im] = self.field(point);
+        (re * re + im * im) / self.peak().powi(2)
+    }
+}

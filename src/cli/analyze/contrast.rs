@@ -1,0 +1,166 @@
+//! The modulation transfer function: against frequency, and through focus.
+
+use super::{AnalysisRun, AtField, SelectedField, TextLines};
+use crate::analysis::{AnalysisError, diffraction_mtf};
+use crate::analysis::{
+    DiffractionGate, MtfCurve, MtfPoint, diffraction_gate, geometric_mtf,
+    polychromatic_diffraction_mtf, polychromatic_geometric_mtf, through_focus_mtf,
+};
+use crate::cli::output::ShortNumber;
+use crate::measure::time_ms;
+use serde::Serialize;
+
+/// The contrast of a field.
+#[derive(Serialize)]
+pub(super) struct MtfJson {
+    gate: GateJson,
+    diffraction: CurveJson,
+    geometric: CurveJson,
+    polychromatic_diffraction: CurveJson,
+    polychromatic_geometric: CurveJson,
+}
+
+/// The decision about diffraction, or the reason why there is none.
+#[derive(Serialize)]
+#[serde(untagged)]
+enum GateJson {
+    Decided(DiffractionGate),
+    Refused { refused: String },
+}
+
+/// A curve with its time, or the reason why there is none.
+#[derive(Serialize)]
+#[serde(untagged)]
+enum CurveJson {
+    Curve {
+        milliseconds: f64,
+        #[serde(flatten)]
+        curve: MtfCurve,
+    },
+    Refused {
+        refused: String,
+    },
+}
+
+impl CurveJson {
+    fn of(work: impl FnOnce() -> Result<MtfCurve, AnalysisError>) -> Self {
+        match time_ms(work) {
+            (Ok(curve), milliseconds) => Self::Curve { milliseconds, curve },
+            (Err(why), _) => Self::Refused { refused: why.to_string() },
+        }
+    }
+}
+
+pub(super) fn contrasts(run: &AnalysisRun) -> Vec<AtField<MtfJson>> {
+    let (model, accuracy, nu) = (&run.model, run.accuracy, &run.frequencies[..]);
+    let highest = nu.iter().copied().fold(0.0, f64::max);
+    let at = |chosen: &SelectedField| {
+        let (field, w) = (chosen.traced, model.primary);
+        // A field without light has neither.
+        let keys = geometric_mtf(model, field, w, &nu[..1], accuracy).map(|_| MtfJson {
+            gate: match diffraction_gate(model, field, w, highest, accuracy.tolerance) {
+                Ok(gate) => GateJson::Decided(gate),
+                Err(why) => GateJson::Refused { refused: why.to_string() },
+            },
+            diffraction: CurveJson::of(|| diffraction_mtf(model, field, w, nu, accuracy)),
+            geometric: CurveJson::of(|| geometric_mtf(model, field, w, nu, accuracy)),
+            polychromatic_diffraction: CurveJson::of(|| {
+                polychromatic_diffraction_mtf(model, field, nu, accuracy)
+            }),
+            polychromatic_geometric: CurveJson::of(|| {
+                polychromatic_geometric_mtf(model, field, nu, accuracy)
+            }),
+        });
+        AtField::new(chosen, keys)
+    };
+    run.fields.iter().map(at).collect()
+}
+
+impl TextLines for MtfJson {
+    const TITLE: &'static str = "contrast of gratings, tangential (lines across y) and sagittal, in \
+         line pairs per mm, with its error";
+
+    fn lines(&self) -> Vec<String> {
+        let mut lines = vec![match &self.gate {
+            GateJson::Decided(gate) => gate_text(gate),
+            GateJson::Refused { refused } => refused.clone(),
+        }];
+        for (name, curve) in [
+            ("diffraction, primary wavelength", &self.diffraction),
+            ("rays, primary wavelength", &self.geometric),
+            ("diffraction, all wavelengths", &self.polychromatic_diffraction),
+            ("rays, all wavelengths", &self.polychromatic_geometric),
+        ] {
+            match curve {
+                CurveJson::Refused { refused } => lines.push(format!("{name}: {refused}")),
+                CurveJson::Curve { milliseconds, curve } => {
+                    let reached = if curve.reached { "" } else { ", tolerance not reached" };
+                    let rays = curve.rays;
+                    lines.push(format!("{name}: {rays} rays, {milliseconds:.3} ms{reached}"));
+                    lines.extend(curve.points.iter().map(point_text));
+                }
+            }
+        }
+        lines
+    }
+}
+
+fn gate_text(gate: &DiffractionGate) -> String {
+    let DiffractionGate { on, bound, change, tolerance } = gate;
+    let state = if *on { "on" } else { "off" };
+    let reason = change.map_or_else(
+        || format!("at most {bound:.2e} by 1.27 nu lambda F"),
+        |change| {
+            format!("it changes contrast by up to {:.2e} ± {:.0e}", change.value, change.error)
+        },
+    );
+    format!("diffraction {state}: {reason}; allowed {tolerance:.0e}")
+}
+
+fn point_text(point: &MtfPoint) -> String {
+    let [t, s] = [point.tangential, point.sagittal].map(|value| {
+        let modulus = value.modulus;
+        format!("{:.6} ± {:.0e}", modulus.value, modulus.error)
+    });
+    format!("  {:>10}  {t:>20}  {s:>20}", ShortNumber(point.frequency))
+}
+
+/// The contrast of a field through focus.
+#[derive(Serialize)]
+pub(super) struct FocusContrastJson {
+    frequency: f64,
+    milliseconds: f64,
+    /// The points; their frequency is the displacement of the image plane, in mm.
+    positions: Vec<MtfPoint>,
+}
+
+/// The positions on each side of the image plane.
+const POSITIONS: i32 = 8;
+
+pub(super) fn through_focus(run: &AnalysisRun) -> Vec<AtField<FocusContrastJson>> {
+    let frequency = run.frequencies[0];
+    let f_number = run.model.first_order.working_f_number.unwrap_or(1.0).abs();
+    // The contrast of a perfect lens falls to zero at about F/nu.
+    let step = f_number / frequency / f64::from(POSITIONS);
+    let shifts: Vec<f64> = (-POSITIONS..=POSITIONS).map(|i| f64::from(i) * step).collect();
+    let at = |field: &SelectedField| {
+        let (found, milliseconds) = time_ms(|| {
+            let (model, primary) = (&run.model, run.model.primary);
+            through_focus_mtf(model, field.traced, primary, frequency, &shifts, run.accuracy)
+        });
+        let keys = found.map(|positions| FocusContrastJson { frequency, milliseconds, positions });
+        AtField::new(field, keys)
+    };
+    run.fields.iter().map(at).collect()
+}
+
+impl TextLines for FocusContrastJson {
+    const TITLE: &'static str = "contrast by diffraction at the primary wavelength against the shift \
+         of the image plane in mm, tangential and sagittal";
+
+    fn lines(&self) -> Vec<String> {
+        let frequency = ShortNumber(self.frequency);
+        let head = format!("at {frequency} line pairs per mm, {:.3} ms", self.milliseconds);
+        std::iter::once(head).chain(self.positions.iter().map(point_text)).collect()
+    }
+}

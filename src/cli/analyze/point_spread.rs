@@ -1,0 +1,143 @@
+//! The diffraction image of a point: intensities, Strehl ratios and encircled energy.
+
+use super::{AnalysisRun, AtField, SelectedField, TextLines, estimate_text};
+use crate::analysis::{
+    Estimate, PointSpread, ReferenceForm, Strehl, encircled_energy, point_spread, strehl,
+};
+use crate::cli::output::ShortNumber;
+use crate::measure::time_ms;
+use serde::Serialize;
+
+/// The diffraction image of a field.
+#[derive(Serialize)]
+pub(super) struct PointSpreadJson {
+    strehl: Estimate,
+    best_strehl: Estimate,
+    best_at: [f64; 3],
+    center: [f64; 2],
+    reference: ReferenceForm,
+    reached: bool,
+    points: Vec<IntensityJson>,
+}
+
+/// The intensity at a point, in mm from the image point of the chief ray.
+#[derive(Serialize)]
+struct IntensityJson {
+    x: f64,
+    y: f64,
+    intensity: Estimate,
+}
+
+/// The points of a profile on each side of its centre.
+const PROFILE: i32 = 10;
+
+/// The size of the diffraction image, λF in mm.
+fn unit(run: &AnalysisRun) -> f64 {
+    run.primary_um() * 1e-3 * run.model.first_order.working_f_number.unwrap_or(1.0).abs()
+}
+
+pub(super) fn point_spreads(run: &AnalysisRun) -> Vec<AtField<PointSpreadJson>> {
+    let step = 0.5 * unit(run);
+    let along = |axis: usize| {
+        let point = move |i: i32| {
+            let v = f64::from(i) * step;
+            if axis == 0 { [v, 0.0] } else { [0.0, v] }
+        };
+        (-PROFILE..=PROFILE).map(point)
+    };
+    let points: Vec<[f64; 2]> =
+        if run.points.is_empty() { along(0).chain(along(1)).collect() } else { run.points.clone() };
+    let at = |field: &SelectedField| {
+        let (model, w) = (&run.model, run.model.primary);
+        let (found, ms) = time_ms(|| {
+            let spread = point_spread(model, field.traced, w, &points, run.accuracy)?;
+            Ok((spread, strehl(model, field.traced, w, run.accuracy)?))
+        });
+        let keys = found.map(|(spread, strehl)| keys(spread, strehl, &points, ms));
+        AtField::new(field, keys)
+    };
+    run.fields.iter().map(at).collect()
+}
+
+fn keys(spread: PointSpread, strehl: Strehl, points: &[[f64; 2]], ms: f64) -> PointSpreadJson {
+    let timed = |e| Estimate { milliseconds: Some(ms), ..e };
+    let point =
+        |([x, y], e): (&[f64; 2], &Estimate)| IntensityJson { x: *x, y: *y, intensity: timed(*e) };
+    PointSpreadJson {
+        strehl: timed(spread.strehl),
+        best_strehl: timed(strehl.best),
+        best_at: strehl.best_at,
+        center: spread.center,
+        reference: spread.reference,
+        reached: spread.reached && strehl.reached,
+        points: points.iter().zip(&spread.intensities).map(point).collect(),
+    }
+}
+
+impl TextLines for PointSpreadJson {
+    const TITLE: &'static str = "diffraction image of a point at the primary wavelength, relative to \
+         the peak without aberrations; x and y in mm from the image point of the chief ray";
+
+    fn lines(&self) -> Vec<String> {
+        let [x, y, z] = self.best_at.map(ShortNumber);
+        let mut lines = vec![
+            estimate_text("Strehl at the chief ray", &self.strehl),
+            estimate_text("best Strehl", &self.best_strehl),
+            format!("found at x {x}, y {y}, along the axis {z} mm"),
+        ];
+        lines.extend(self.points.iter().map(|point| {
+            let IntensityJson { x, y, intensity } = point;
+            let [x, y] = [x, y].map(|v| ShortNumber(*v));
+            format!("{x:>12}  {y:>12}  {:.6} ± {:.0e}", intensity.value, intensity.error)
+        }));
+        if !self.reached {
+            lines.push("the tolerance was not reached".to_owned());
+        }
+        lines
+    }
+}
+
+/// The encircled energy of a field.
+#[derive(Serialize)]
+pub(super) struct EncircledJson {
+    circles: Vec<CircleJson>,
+}
+
+#[derive(Serialize)]
+struct CircleJson {
+    radius: f64,
+    energy: Estimate,
+}
+
+/// The radii of the circles, in λF.
+const RADII: [f64; 10] = [0.25, 0.5, 0.75, 1.0, 1.22, 1.5, 2.0, 3.0, 4.0, 6.0];
+
+pub(super) fn encircled(run: &AnalysisRun) -> Vec<AtField<EncircledJson>> {
+    let radii = RADII.map(|r| r * unit(run));
+    let at = |field: &SelectedField| {
+        let (found, ms) = time_ms(|| {
+            let (model, w) = (&run.model, run.model.primary);
+            encircled_energy(model, field.traced, w, [0.0; 2], &radii, run.accuracy)
+        });
+        let circle = |(radius, energy): (&f64, Estimate)| CircleJson {
+            radius: *radius,
+            energy: Estimate { milliseconds: Some(ms), ..energy },
+        };
+        let keys = found
+            .map(|list| EncircledJson { circles: radii.iter().zip(list).map(circle).collect() });
+        AtField::new(field, keys)
+    };
+    run.fields.iter().map(at).collect()
+}
+
+impl TextLines for EncircledJson {
+    const TITLE: &'static str = "encircled energy by diffraction at the primary wavelength: share of \
+         the light within circles about the image point of the chief ray, radii in mm";
+
+    fn lines(&self) -> Vec<String> {
+        let line = |circle: &CircleJson| {
+            estimate_text(&ShortNumber(circle.radius).to_string(), &circle.energy)
+        };
+        self.circles.iter().map(line).collect()
+    }
+}

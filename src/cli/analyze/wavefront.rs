@@ -1,0 +1,197 @@
+//! The wavefront: RMS, map, fans of path differences and Zernike sums.
+
+use super::{AnalysisRun, AtField, SelectedField, TextLines, estimate_text};
+use crate::analysis::{
+    AnalysisError, Estimate, ReferenceForm, ZernikeMethod, ZernikeOrder, path_differences,
+    wavefront, zernike,
+};
+use crate::cli::output::{ShortNumber, or_dash};
+use crate::measure::time_ms;
+use serde::Serialize;
+
+/// The wavefront of a field.
+#[derive(Serialize)]
+pub(super) struct WavefrontJson {
+    rms: Estimate,
+    mean: Estimate,
+    reached: bool,
+    reference: ReferenceForm,
+    missed: f64,
+    map: Vec<PathJson>,
+}
+
+/// The path difference at a pupil point.
+#[derive(Serialize)]
+struct PathJson {
+    px: f64,
+    py: f64,
+    waves: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    why: Option<String>,
+}
+
+/// The steps of the map from −1 to 1.
+const MAP_STEPS: i32 = 10;
+
+pub(super) fn wavefronts(run: &AnalysisRun) -> Vec<AtField<WavefrontJson>> {
+    let at = |field: &SelectedField| {
+        let primary = run.model.primary;
+        let (found, ms) = time_ms(|| wavefront(&run.model, field.traced, primary, run.accuracy));
+        let side = |i: i32| f64::from(2 * i - MAP_STEPS) / f64::from(MAP_STEPS);
+        let points = (0..=MAP_STEPS).flat_map(|j| (0..=MAP_STEPS).map(move |i| [side(i), side(j)]));
+        let points: Vec<[f64; 2]> = points.filter(|p| p[0].hypot(p[1]) <= 1.0 + 1e-12).collect();
+        let keys = found.and_then(|found| {
+            let timed = |e| Estimate { milliseconds: Some(ms), ..e };
+            Ok(WavefrontJson {
+                rms: timed(found.rms),
+                mean: timed(found.mean),
+                reached: found.converged,
+                reference: found.reference,
+                missed: found.missed,
+                map: paths(run, field, &points)?,
+            })
+        });
+        AtField::new(field, keys)
+    };
+    run.fields.iter().map(at).collect()
+}
+
+/// The path differences at some pupil points.
+fn paths(
+    run: &AnalysisRun,
+    field: &SelectedField,
+    points: &[[f64; 2]],
+) -> Result<Vec<PathJson>, AnalysisError> {
+    let found = path_differences(&run.model, field.traced, run.model.primary, points)?;
+    let keys = |(p, found): (&[f64; 2], Result<f64, crate::analysis::PathError>)| PathJson {
+        px: p[0],
+        py: p[1],
+        waves: found.ok(),
+        why: found.err().map(|why| why.to_string()),
+    };
+    Ok(points.iter().zip(found).map(keys).collect())
+}
+
+impl TextLines for WavefrontJson {
+    const TITLE: &'static str =
+        "wavefront at the primary wavelength, in wavelengths; --json lists the map";
+
+    fn lines(&self) -> Vec<String> {
+        let mut lines = vec![estimate_text("rms", &self.rms), estimate_text("mean", &self.mean)];
+        if let ReferenceForm::Replaced(radius) = self.reference {
+            let radius = ShortNumber(radius);
+            lines.push(format!("exit pupil at the image: sphere of {radius} mm instead"));
+        }
+        if self.missed > 0.0 {
+            lines.push(format!("{:.2e} of the light misses the sphere", self.missed));
+        }
+        if !self.reached {
+            lines.push("the tolerance was not reached".to_owned());
+        }
+        lines
+    }
+}
+
+/// The fans of path differences of a field.
+#[derive(Serialize)]
+pub(super) struct PathFanJson {
+    error: f64,
+    rays: usize,
+    milliseconds: f64,
+    tangential: Vec<PathJson>,
+    sagittal: Vec<PathJson>,
+}
+
+/// The rays of a fan.
+const FAN_POINTS: i32 = 20;
+
+pub(super) fn path_fans(run: &AnalysisRun) -> Vec<AtField<PathFanJson>> {
+    let at = |field: &SelectedField| {
+        let side = |i: i32| f64::from(2 * i - FAN_POINTS) / f64::from(FAN_POINTS);
+        let section = |axis: usize| {
+            let point = |i: i32| if axis == 0 { [side(i), 0.0] } else { [0.0, side(i)] };
+            paths(run, field, &(0..=FAN_POINTS).map(point).collect::<Vec<_>>())
+        };
+        let (found, milliseconds) = time_ms(|| Ok((section(1)?, section(0)?)));
+        let keys = found.map(|(tangential, sagittal)| PathFanJson {
+            error: run.rounding() / (run.primary_um() * 1e-3),
+            rays: tangential.len() + sagittal.len(),
+            milliseconds,
+            tangential,
+            sagittal,
+        });
+        AtField::new(field, keys)
+    };
+    run.fields.iter().map(at).collect()
+}
+
+impl TextLines for PathFanJson {
+    const TITLE: &'static str =
+        "fans of path differences at the primary wavelength, in wavelengths";
+
+    fn lines(&self) -> Vec<String> {
+        let Self { error, rays, milliseconds, .. } = self;
+        let mut lines = vec![format!("{rays} rays, {milliseconds:.3} ms, error {error:.0e} waves")];
+        lines.push("   pupil      tangential        sagittal".to_owned());
+        for (t, s) in self.tangential.iter().zip(&self.sagittal) {
+            let [along, across] = [t.waves, s.waves].map(or_dash);
+            lines.push(format!("{:>8}  {along:>14}  {across:>14}", ShortNumber(t.py)));
+        }
+        lines
+    }
+}
+
+/// The Zernike sums of a field.
+#[derive(Serialize)]
+pub(super) struct ZernikeJson {
+    method: ZernikeMethod,
+    noll: Vec<Estimate>,
+    fringe: Vec<Estimate>,
+    rest: Estimate,
+    reached: bool,
+}
+
+/// The number of polynomials.
+const TERMS: usize = 37;
+
+pub(super) fn zernikes(run: &AnalysisRun) -> Vec<AtField<ZernikeJson>> {
+    let at = |field: &SelectedField| {
+        let sum = |order| {
+            zernike(&run.model, field.traced, run.model.primary, (order, TERMS), run.accuracy)
+        };
+        let (found, ms) = time_ms(|| Ok((sum(ZernikeOrder::Noll)?, sum(ZernikeOrder::Fringe)?)));
+        let timed = |e: Estimate| Estimate { milliseconds: Some(ms), ..e };
+        let keys = found.map(|(noll, fringe)| ZernikeJson {
+            method: noll.method,
+            rest: timed(noll.rest),
+            reached: noll.reached && fringe.reached,
+            noll: noll.coefficients.into_iter().map(timed).collect(),
+            fringe: fringe.coefficients.into_iter().map(timed).collect(),
+        });
+        AtField::new(field, keys)
+    };
+    run.fields.iter().map(at).collect()
+}
+
+impl TextLines for ZernikeJson {
+    const TITLE: &'static str = "Zernike coefficients of the wavefront at the primary wavelength over \
+         the unit disc of the pupil, in wavelengths: Noll's order (RMS 1) and the fringe order (1 at \
+         the rim)";
+
+    fn lines(&self) -> Vec<String> {
+        let method = match self.method {
+            ZernikeMethod::Projection => "projections over the clear disc".to_owned(),
+            ZernikeMethod::LeastSquares(condition) => format!(
+                "least squares over a clipped pupil, condition {}: not the projections of a clear one",
+                ShortNumber(condition)
+            ),
+        };
+        let mut lines = vec![method, estimate_text("rms of the rest", &self.rest)];
+        for (i, (noll, fringe)) in self.noll.iter().zip(&self.fringe).enumerate() {
+            let [noll, fringe] =
+                [noll, fringe].map(|e| format!("{:.6} ± {:.0e}", e.value, e.error));
+            lines.push(format!("{:>4}  {noll:>20}  {fringe:>20}", i + 1));
+        }
+        lines
+    }
+}

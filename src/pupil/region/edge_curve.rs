@@ -1,0 +1,112 @@
+//! The edge of a pupil as a closed curve of points that interpolate it to rounding.
+
+use super::boundary::Boundary;
+use super::edge_search::{EdgeSearch, GUESS_SPREAD, LimitFilter};
+use super::kind::{Region, RegionKind};
+use crate::math::quadrature::chebyshev_points;
+use crate::pupil::launch::Launch;
+use std::f64::consts::TAU;
+
+/// A smooth part of the edge of a pupil.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EdgeArc {
+    /// Its pupil points at the Chebyshev points of its azimuth, ends included.
+    pub points: Vec<[f64; 2]>,
+    /// True if another limit takes over where it begins.
+    pub begins_at_corner: bool,
+}
+
+/// The closed curves around a pupil: the edge of the light and, of an annulus, that of its shadow.
+#[derive(Debug, Clone, PartialEq)]
+pub struct EdgeCurves {
+    /// The arcs around the light, in order of azimuth from +y towards +x.
+    pub outer: Vec<EdgeArc>,
+    /// The arcs around the shadow inside, in the same order; empty if there is none.
+    pub inner: Vec<EdgeArc>,
+    /// The number of rays traced.
+    pub rays: usize,
+}
+
+impl Region<'_> {
+    /// The curves around the pupil, of `count` points an arc; `None` if its edge is not known.
+    pub fn edge_curves(&self, count: usize) -> Option<EdgeCurves> {
+        let launch = &self.launch;
+        match &self.kind {
+            RegionKind::Clear => {
+                Some(EdgeCurves { outer: circle(count), inner: Vec::new(), rays: 0 })
+            }
+            RegionKind::StarShaped(boundary) => {
+                let (outer, rays) = arcs(launch, boundary, LimitFilter::All, count)?;
+                Some(EdgeCurves { outer, inner: Vec::new(), rays })
+            }
+            RegionKind::Irregular { annulus: Some(ring), .. } => {
+                let rims = LimitFilter::WithoutObstructions;
+                let (outer, rays) = arcs(launch, &ring.outer, rims, count)?;
+                let (inner, more) = arcs(launch, &ring.inner, LimitFilter::Obstructions, count)?;
+                Some(EdgeCurves { outer, inner, rays: rays + more })
+            }
+            RegionKind::Dark | RegionKind::Unbounded | RegionKind::Irregular { .. } => None,
+        }
+    }
+}
+
+/// The unit circle in two halves.
+fn circle(count: usize) -> Vec<EdgeArc> {
+    let half = |from: f64| EdgeArc {
+        points: chebyshev_points(count)
+            .map(|t| (from + 0.5 * TAU * t).sin_cos())
+            .map(|(sin, cos)| [sin, cos])
+            .collect(),
+        begins_at_corner: false,
+    };
+    vec![half(0.0), half(0.5 * TAU)]
+}
+
+/// The widest azimuth of an arc that is not divided.
+const WIDEST: f64 = 0.3 * TAU;
+
+fn arcs(
+    launch: &Launch<'_>,
+    boundary: &Boundary,
+    filter: LimitFilter,
+    count: usize,
+) -> Option<(Vec<EdgeArc>, usize)> {
+    let mut search = EdgeSearch::new(launch, boundary.frame).with_limits(filter);
+    let mut found = Vec::new();
+    let several = boundary.arcs.len() > 1;
+    for (i, arc) in boundary.arcs.iter().enumerate() {
+        // The first arc of half an edge begins on the plane of symmetry.
+        let corner = several && !(launch.is_symmetric() && i == 0);
+        let parts = ((arc.to - arc.from) / WIDEST).ceil().max(1.0);
+        let step = (arc.to - arc.from) / parts;
+        for part in 0..parts as usize {
+            let from = arc.from + step * part as f64;
+            let mut points = Vec::with_capacity(count);
+            for t in chebyshev_points(count) {
+                let azimuth = from + t * step;
+                let guess = boundary.radius_guess(azimuth);
+                let edge = search
+                    .edge_at_limit(arc.limit, azimuth, guess)
+                    .or_else(|| search.edge(azimuth, guess, GUESS_SPREAD))?;
+                points.push(boundary.frame.point(azimuth, edge.radius));
+            }
+            found.push(EdgeArc { points, begins_at_corner: corner && part == 0 });
+        }
+    }
+    if launch.is_symmetric() {
+        mirror(&mut found);
+    }
+    Some((found, search.rays))
+}
+
+/// Adds the mirror image of half an edge, whose arcs run backwards.
+fn mirror(arcs: &mut Vec<EdgeArc>) {
+    let count = arcs.len();
+    for i in (0..count).rev() {
+        let points = arcs[i].points.iter().rev().map(|p| [-p[0], p[1]]).collect();
+        // It begins where the arc that it mirrors ends.
+        let begins_at_corner = arcs.get(i + 1).filter(|_| i + 1 < count);
+        let begins_at_corner = begins_at_corner.is_some_and(|next| next.begins_at_corner);
+        arcs.push(EdgeArc { points, begins_at_corner });
+    }
+}
