@@ -71,7 +71,7 @@ fn versions_are_compared_named_and_gone_to() {
     assert!(
         matches!(&commands[..], [Command::Preview(Some(lens))] if lens.name == double_gauss().name)
     );
-    for text in ["merit", "+200.00 %", "thickness of surface 3", "total track, mm"] {
+    for text in ["merit", "+200.00 %", "thickness after surface 3", "total track, mm"] {
         assert!(harness.query_all_by_label(text).count() > 0, "{text}");
     }
     harness.get_by_label("Name of the version").focus();
