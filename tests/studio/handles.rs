@@ -157,7 +157,7 @@ fn arrow_keys_step_a_selected_handle_as_one_undo_step() {
 #[test]
 fn control_snaps_to_round_numbers_and_alt_bends_an_element() {
     let mut harness = window();
-    let to = pull(&mut harness, Handle::Curvature(0), Vec2::new(9.0, 0.0), Modifiers::COMMAND);
+    let to = pull(&mut harness, Handle::Curvature(0), Vec2::new(-9.0, 0.0), Modifiers::COMMAND);
     button(&mut harness, to, false, Modifiers::COMMAND);
     hold_keys(&mut harness, PLAIN);
     let radius = 1.0 / curvature(&harness, 0);
@@ -166,7 +166,7 @@ fn control_snaps_to_round_numbers_and_alt_bends_an_element() {
 
     let before = harness.state().session().lens().clone();
     let element = Handle::Element { front: 0, back: 1 };
-    let to = pull(&mut harness, element, Vec2::new(9.0, 0.0), Modifiers::ALT);
+    let to = pull(&mut harness, element, Vec2::new(-9.0, 0.0), Modifiers::ALT);
     button(&mut harness, to, false, Modifiers::ALT);
     let change = |i: usize| curvature(&harness, i) - before.surfaces[i].curvature;
     assert!(change(0) != 0.0 && (change(1) / change(0) - 1.0).abs() < 1e-9);
