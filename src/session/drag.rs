@@ -190,13 +190,23 @@ impl DragProgress {
         }
         let change = |moved: &MovedNumber| {
             let name = short_name(moved.parameter);
-            format!("{name} {} to {}", format_short(moved.before), format_short(moved.after))
+            let [before, after] = [moved.before, moved.after].map(rounded).map(format_short);
+            format!("{name} {before} to {after}")
         };
         let named: Vec<String> = self.moved.iter().take(NAMED_NUMBERS).map(change).collect();
         let more = self.moved.len().saturating_sub(NAMED_NUMBERS);
         let rest = if more > 0 { format!(" and {more} more") } else { String::new() };
         Some(format!("{}{rest}", named.join(", ")))
     }
+}
+
+/// A number with five significant digits.
+fn rounded(value: f64) -> f64 {
+    if value == 0.0 || !value.is_finite() {
+        return value;
+    }
+    // The digits after the first one; parsing them gives the nearest number.
+    format!("{value:.4e}").parse().unwrap_or(value)
 }
 
 /// A request for the slopes of a lens.

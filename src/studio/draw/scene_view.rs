@@ -105,7 +105,7 @@ impl SceneView {
         if response.dragged() {
             camera = camera.dragged(per_point * to_dvec(response.drag_delta()));
         }
-        if let Some(pointer) = response.hover_pos() {
+        if let Some(pointer) = pointer_over(response) {
             let factor = zoom_factor(ui);
             if factor != 1.0 {
                 let px = per_point * to_dvec(pointer - response.rect.min);
@@ -135,7 +135,7 @@ impl SceneResponse {
 
     /// The point of the plane under the pointer, and how long a point of the screen is there.
     pub fn pointer(&self) -> Option<(DVec2, f64)> {
-        let at = self.response.hover_pos()?;
+        let at = pointer_over(&self.response)?;
         let px = self.per_point * to_dvec(at - self.response.rect.min);
         Some((self.camera.to_mm(px, self.size()), self.per_point / self.camera.scale))
     }
@@ -152,6 +152,12 @@ impl SceneResponse {
         let offset = egui::vec2(px.x as f32, px.y as f32);
         self.response.rect.min + offset
     }
+}
+
+/// The pointer over a scene, also where something lies on the scene.
+fn pointer_over(response: &Response) -> Option<egui::Pos2> {
+    let pointer = response.ctx.input(|input| input.pointer.hover_pos());
+    pointer.filter(|_| response.contains_pointer())
 }
 
 fn to_dvec(v: egui::Vec2) -> DVec2 {

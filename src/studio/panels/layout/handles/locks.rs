@@ -2,7 +2,7 @@
 
 use egui::{Align, Layout, Ui};
 
-use super::paint::merit_text;
+use super::paint::{is_merit_current, merit_text};
 use crate::lens::Object;
 use crate::paraxial::{DragSettings, FirstOrderLock, FreeNumbers};
 use crate::session::{Command, SessionView};
@@ -74,8 +74,9 @@ fn free_numbers(ui: &mut Ui, settings: &mut DragSettings) {
 fn merit(ui: &mut Ui, view: &SessionView) {
     let Some(slopes) = &view.drag.slopes else { return };
     match &slopes.result {
+        Ok(_) if !is_merit_current(view) => ui.weak("merit …"),
         Ok(found) => ui.weak(merit_text(found)).on_hover_text(
-            "The default merit function: spots, focal length, light and thicknesses. \
+            "The merit function of the lens, or the one that the program proposes. \
              The arrows at the handles show where it falls.",
         ),
         Err(why) => ui.weak("no merit").on_hover_text(why),

@@ -25,7 +25,7 @@ use crate::studio::number;
 /// The side of the square in which the pointer picks a handle, in points.
 const HIT_SIZE: f32 = 18.0;
 /// The distance in points within which a handle appears at the pointer.
-const APPEARING_DISTANCE: f32 = 34.0;
+const APPEARING_DISTANCE: f32 = 16.0;
 /// The part of a motion that counts while Shift is held.
 const FINE: f64 = 0.1;
 /// The motion of an arrow key, in points.

@@ -10,16 +10,18 @@ use super::{
     with_places,
 };
 use crate::paraxial::Handle;
-use crate::session::{DragProgress, MeritSlopes};
+use crate::session::{DragProgress, MeritSlopes, SessionView};
 use crate::studio::number;
 
 /// The radius of a handle, in points.
 const RADIUS: f32 = 4.5;
 /// The change of the merit with one point of motion, relative to the merit, at which its arrow has
 /// no length, and the length for every factor of ten above it.
-const ARROW: (f64, f32) = (1e-5, 9.0); // share, points
+const ARROW: (f64, f32) = (1e-4, 7.0); // share, points
+/// The largest change of the merit, relative to it, that a hint tells.
+const MAX_CHANGE: f64 = 0.1;
 /// The greatest length of an arrow, in points.
-const MAX_ARROW: f32 = 38.0;
+const MAX_ARROW: f32 = 26.0;
 
 impl HandleLayer {
     /// True if a handle is dragged, has the focus, or the pointer or the selection is at it.
@@ -71,7 +73,11 @@ impl HandleLayer {
             }
         }
         let slopes = current_slopes(frame);
-        if let Some(arrow) = slopes.and_then(|slopes| merit_arrow(frame, slopes, handle)) {
+        // Of the surfaces that the pointer only passes the arrows would cover each other.
+        let has_arrow = is_active || belongs_to_selection(frame, handle);
+        let arrow = slopes.filter(|_| has_arrow);
+        let arrow = arrow.and_then(|slopes| merit_arrow(frame, slopes, handle));
+        if let Some(arrow) = arrow {
             painter.arrow(
                 center + arrow.normalized() * 7.0,
                 arrow,
@@ -80,7 +86,7 @@ impl HandleLayer {
         }
         if self.grabbed.is_some() || self.typed.is_some() && response.has_focus() {
             self.paint_progress(ui, frame, handle, center);
-        } else if response.hovered() || response.has_focus() {
+        } else if response.hovered() || response.has_focus() && frame.shown.pointer().is_none() {
             let lines = vec![(hint(frame, slopes, handle), visuals.text_color())];
             paint_lines(ui, frame, center, &lines);
         }
@@ -106,7 +112,7 @@ impl HandleLayer {
             lines.extend(progress.stop.iter().map(|stop| (format!("stops: {stop}"), bad)));
         }
         lines.extend(frame.view.drag.error.iter().map(|why| (why.clone(), bad)));
-        if let Some(slopes) = current_slopes(frame) {
+        if let Some(slopes) = current_slopes(frame).filter(|_| is_merit_current(frame.view)) {
             lines.push((merit_text(slopes), plain));
         }
         paint_lines(ui, frame, center, &lines);
@@ -124,6 +130,11 @@ pub(super) fn merit_text(slopes: &MeritSlopes) -> String {
         return format!("merit {now}");
     }
     format!("merit {now}, was {}", number::format_digits(slopes.before, 4))
+}
+
+/// True if the merit belongs to the present version of the design.
+pub(super) fn is_merit_current(view: &SessionView) -> bool {
+    view.drag.slopes.as_ref().is_some_and(|slopes| slopes.version == view.version)
 }
 
 /// Lines of text in a box beside a place, inside the drawing.
@@ -155,6 +166,11 @@ fn paint_lines(ui: &Ui, frame: &HandleFrame<'_>, at: Pos2, lines: &[(String, Col
         painter.galley(place, galley, Color32::PLACEHOLDER);
         place.y += height;
     }
+}
+
+/// True for a handle of the selected surface or of the whole lens.
+fn belongs_to_selection(frame: &HandleFrame<'_>, handle: Handle) -> bool {
+    surface_of(handle).is_none_or(|surface| Some(surface) == frame.view.selected)
 }
 
 /// The slopes of the merit, if there are any for a lens like the present one.
@@ -199,7 +215,10 @@ fn hint(frame: &HandleFrame<'_>, slopes: Option<&MeritSlopes>, handle: Handle) -
     let value = value_text(&frame.view.lens, frame.view.settings.zoom, handle);
     let mut text = format!("{}, {value}", handle_name(handle).trim_start_matches("Handle: "));
     if let Some(share) = slopes.and_then(|slopes| change_per_point(frame, slopes, handle)) {
-        let mm = frame.shown.mm_per_point();
+        // A tenth of the way, and so on, until the derivative describes what happens on it.
+        let tenths = (share.abs() / MAX_CHANGE).log10().ceil().max(0.0);
+        let part = 0.1f64.powf(tenths);
+        let (mm, share) = (part * frame.shown.mm_per_point(), part * share);
         let (rising, falling) = if moves_up(handle) { ("up", "down") } else { ("right", "left") };
         let towards = if share > 0.0 { falling } else { rising };
         let change = number::format_digits(100.0 * share.abs(), 2);
