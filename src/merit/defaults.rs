@@ -4,7 +4,7 @@
 use super::constraints::MinimumThickness;
 use super::goal::focal_lengths;
 use super::{Goal, MeritError, PupilEdge, Term, WeightedTerm};
-use crate::lens::Lens;
+use crate::lens::{Lens, Medium, Row};
 use std::f64::consts::PI;
 
 /// The steepness of a surface, `|curvature| × semi-diameter`, up to which it counts as easy to
@@ -85,7 +85,10 @@ impl Goal {
         terms.extend(first.map(focal_length));
         terms.extend(
             [
-                Term::GlassCenter { min: now.glass_center.clamp(0.0, glass), max: 0.5 * size },
+                Term::GlassCenter {
+                    min: now.glass_center.clamp(0.0, glass),
+                    max: thickest(lens, size),
+                },
                 Term::GlassEdge(now.glass_edge.clamp(0.0, 0.8 * glass)),
                 Term::AirCenter { min: now.air_center.clamp(0.0, air), max: 3.0 * track },
                 Term::AirEdge(now.air_edge.clamp(0.0, 0.5 * air)),
@@ -165,7 +168,7 @@ pub fn default_terms(lens: &Lens, zoom: usize, figures: &LensFigures) -> Vec<Wei
         weighted(Term::Throughput, spot / light),
         unit(Term::FocalLength(efl)),
         unit(Term::Distortion),
-        unit(Term::GlassCenter { min: 0.01 * size, max: 0.5 * size }),
+        unit(Term::GlassCenter { min: 0.01 * size, max: thickest(lens, size) }),
         unit(Term::GlassEdge(0.01 * size)),
         unit(Term::AirCenter { min: 0.002 * size, max: 3.0 * track }),
         unit(Term::AirEdge(0.001 * size)),
@@ -202,6 +205,14 @@ fn zoom_ratios(lens: &Lens, focal_lengths: &[Option<f64>]) -> Vec<f64> {
         }
         _ => Vec::new(),
     }
+}
+
+/// Half of a size, or the thickest glass if there is thicker one, in mm: a rod is longer than its
+/// focal length.
+fn thickest(lens: &Lens, size: f64) -> f64 {
+    let glass = |row: &&Row| !matches!(row.medium, Medium::Air | Medium::Mirror);
+    let rows = lens.surfaces.iter().filter(glass);
+    rows.map(|row| row.thickness.abs()).fold(0.5 * size, f64::max)
 }
 
 /// The largest `|curvature| × semi-diameter` of the surfaces; 0 for those without semi-diameter.

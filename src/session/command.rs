@@ -120,6 +120,14 @@ pub enum Command {
     Preview(Option<Box<Lens>>),
     /// Makes the lens that is shown in place of the design the design, as one undo step.
     AcceptPreview,
+    /// Makes the lens that is shown in place of the design the design, wherever it comes from.
+    AcceptCandidate,
+    /// Keeps that lens beside the design, which does not change.
+    KeepCandidate,
+    /// Dismisses that lens: an optimization ends, a search or a front goes on.
+    DiscardCandidate,
+    /// Sets whether that lens is shown or the design.
+    ShowCandidate(bool),
     /// Sets the relative error allowed of the numbers, 0.001 for 0.1 %.
     SetTolerance(f64),
     /// Sets the index of the zoom position to show.

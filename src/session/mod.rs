@@ -56,4 +56,4 @@ pub use structure_search::{
     CheckpointStatus, DescentMark, EndReason, FoundLens, HistorySample, SearchHistory,
     StructureSearchCommand, StructureSearchRequest, StructureSearchSnapshot, StructureSearchView,
 };
-pub use view::{Message, SessionView, Severity};
+pub use view::{CandidateSource, CandidateView, KeptLens, Message, SessionView, Severity};

@@ -25,6 +25,8 @@ pub struct SessionView {
     pub lens: Arc<Lens>,
     /// The number of changes of the design and of the settings.
     pub version: u64,
+    /// The number of lenses that were opened or begun: a new one is another document.
+    pub document: u64,
     /// The newest analyses, maybe of an earlier version.
     pub results: Option<Arc<AnalysisResults>>,
     /// The local optimization.
@@ -40,6 +42,10 @@ pub struct SessionView {
     pub design_score: Option<Arc<ScoredLens>>,
     /// The lens that a panel shows in place of the design.
     pub preview_lens: Option<Arc<Lens>>,
+    /// The lens that is offered in place of the design; `None` if there is none.
+    pub candidate: Option<CandidateView>,
+    /// The candidates that were kept beside the design.
+    pub kept: Arc<Vec<KeptLens>>,
     /// The analyses of that lens, or of the one that a run shows, maybe of an earlier step.
     pub preview_results: Option<Arc<AnalysisResults>>,
     /// The experiment, until it is dismissed.
@@ -48,6 +54,8 @@ pub struct SessionView {
     pub drag: DragView,
     /// The messages so far, the newest last.
     pub messages: Arc<Vec<Message>>,
+    /// True if nothing was done since the last message.
+    pub message_is_recent: bool,
     /// The title of the edit that undo reverts; `None` if there is none.
     pub undo: Option<String>,
     /// The title of the edit that redo restores; `None` if there is none.
@@ -83,10 +91,14 @@ impl Default for SessionView {
             grin: GrinView::default(),
             design_score: None,
             preview_lens: None,
+            candidate: None,
+            kept: Arc::default(),
             preview_results: None,
             experiment: None,
             drag: DragView::default(),
             messages: Arc::default(),
+            message_is_recent: false,
+            document: 0,
             undo: None,
             redo: None,
             history: Arc::default(),
@@ -106,6 +118,37 @@ impl SessionView {
     pub fn is_current(&self) -> bool {
         self.results.as_ref().is_some_and(|results| results.version == self.version)
     }
+}
+
+/// A lens that is offered in place of the design.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct CandidateView {
+    /// The source.
+    pub source: CandidateSource,
+    /// The name, as in `lens 17 of the search`.
+    pub title: String,
+    /// True if all panels show it; false while they show the design.
+    pub shown: bool,
+}
+
+/// The source of a candidate.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum CandidateSource {
+    /// The local optimization.
+    Optimization,
+    /// A lens that was chosen: of the Pareto front, of the search, or a kept one.
+    Chosen,
+    /// The search, as it goes on.
+    Search,
+}
+
+/// A candidate that was kept beside the design.
+#[derive(Debug, Clone)]
+pub struct KeptLens {
+    /// The name.
+    pub title: String,
+    /// The lens.
+    pub lens: Arc<Lens>,
 }
 
 /// The severity of a message.

@@ -9,6 +9,7 @@ use egui::{
 };
 
 use super::actions::{Actions, UiAction};
+use super::candidate_bar::candidate_bar;
 use super::dialogs::Dialogs;
 use super::dock::Dock;
 use super::draw::RenderBackend;
@@ -116,6 +117,7 @@ impl Studio {
         let menus = menu_context(&self.dock, &self.recent, &view, ui.ctx());
         menu::shortcuts(ui, &menus, self.dock.is_typing(ui.ctx()), &mut actions);
         bar_frame(ui, Side::top("menu"), |ui| menu::bar(ui, &menus, &mut actions));
+        candidate_bar(ui, &view, &mut actions);
         self.dialogs.ui(ui.ctx(), &menus, &mut actions);
         bar_frame(ui, Side::bottom("status"), |ui| Self::status_bar(ui, &view, &mut actions));
         CentralPanel::no_frame().show(ui, |ui| self.dock.ui(ui, &view, &mut actions));
@@ -282,7 +284,7 @@ impl Studio {
     /// The line at the bottom: the last message, and the time of the analysis.
     fn status_bar(ui: &mut Ui, view: &SessionView, actions: &mut Actions) {
         ui.horizontal(|ui| {
-            messages(ui, &view.messages, actions);
+            messages(ui, view, actions);
             ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
                 ui.weak(timing_text(view))
                     .on_hover_text("Time to compute all numbers of all panels after the last edit");
@@ -366,8 +368,9 @@ fn bar_frame(ui: &mut Ui, side: Side, show: impl FnOnce(&mut Ui)) {
     side.frame(frame).show_separator_line(false).show(ui, show);
 }
 
-/// The last message, and a menu of all messages.
-fn messages(ui: &mut Ui, messages: &[Message], actions: &mut Actions) {
+/// The last message until something else is done, and a menu of all messages.
+fn messages(ui: &mut Ui, view: &SessionView, actions: &mut Actions) {
+    let messages = &view.messages;
     let Some(last) = messages.last() else {
         ui.weak("Ready");
         return;
@@ -382,7 +385,10 @@ fn messages(ui: &mut Ui, messages: &[Message], actions: &mut Actions) {
             ui.close();
         }
     });
-    message_label(ui, last);
+    // An old message would contradict what was done since.
+    if view.message_is_recent {
+        message_label(ui, last);
+    }
 }
 
 fn message_label(ui: &mut Ui, message: &Message) -> Response {

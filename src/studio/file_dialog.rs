@@ -97,6 +97,8 @@ impl FileRequest {
 pub struct FileDialog {
     native: Option<(FileRequest, Receiver<Option<PathBuf>>)>,
     prompt: Option<(FileRequest, String)>,
+    /// The path whose file may be replaced once the user says so again.
+    existing: Option<PathBuf>,
 }
 
 impl FileDialog {
@@ -150,6 +152,8 @@ impl FileDialog {
     fn prompt_answer(&mut self, context: &egui::Context) -> Option<(FileRequest, PathBuf)> {
         let (purpose, text) = self.prompt.as_mut()?;
         let purpose = *purpose;
+        let path = purpose.with_extension(PathBuf::from(text.trim()));
+        let replaces = self.existing.as_ref() == Some(&path);
         let mut done = false;
         let modal = egui::Modal::new(egui::Id::unique("path")).show(context, |ui| {
             ui.heading(purpose.title());
@@ -159,20 +163,28 @@ impl FileDialog {
             if !field.lost_focus() {
                 field.request_focus();
             }
+            if replaces {
+                let words = format!("{} exists already.", path.display());
+                ui.colored_label(ui.visuals().warn_fg_color, words);
+            }
             ui.horizontal(|ui| {
-                done = ui.button("OK").clicked() || ui.input(|i| i.key_pressed(Key::Enter));
+                let words = if replaces { "Replace the file" } else { "OK" };
+                done = ui.button(words).clicked() || ui.input(|i| i.key_pressed(Key::Enter));
                 if ui.button("Cancel").clicked() {
                     ui.close();
                 }
             });
         });
-        let path = PathBuf::from(text.trim());
-        if done && !path.as_os_str().is_empty() {
-            self.prompt = None;
-            return Some((purpose, purpose.with_extension(path)));
+        if done && purpose.is_save() && path.is_file() && !replaces {
+            self.existing = Some(path);
+            return None;
+        }
+        if done && !text.trim().is_empty() {
+            (self.prompt, self.existing) = (None, None);
+            return Some((purpose, path));
         }
         if modal.should_close() {
-            self.prompt = None;
+            (self.prompt, self.existing) = (None, None);
         }
         None
     }

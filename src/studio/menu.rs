@@ -7,6 +7,7 @@ use egui::{
 use super::actions::Actions;
 use super::experiment_window;
 use super::menu_items::{self, MenuContext, MenuItem};
+use super::panels::widgets::hint_beside;
 use crate::session::{Command, SessionView};
 
 /// Redo has a second shortcut, which other programs use.
@@ -60,7 +61,7 @@ fn show_item(ui: &mut Ui, item: MenuItem, actions: &mut Actions) {
         button = button.shortcut_text(ui.ctx().format_shortcut(key));
     }
     let response = ui.add_enabled(item.is_enabled(), button);
-    let response = if item.hint.is_empty() { response } else { response.on_hover_text(item.hint) };
+    let response = if item.hint.is_empty() { response } else { hint_beside(response, &item.hint) };
     if response.clicked() {
         actions.extend(item.action);
         ui.close();

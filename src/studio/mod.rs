@@ -5,6 +5,7 @@
 mod actions;
 mod app;
 mod cached;
+mod candidate_bar;
 pub mod colormap;
 mod command_palette;
 mod dialogs;

@@ -22,15 +22,51 @@ pub fn format_digits(value: f64, digits: i32) -> String {
     let exponent = value.abs().log10().floor() as i32;
     if !(-5..=9).contains(&exponent) {
         let decimals = usize::try_from(digits - 1).unwrap_or(0);
-        return format!("{value:.decimals$e}");
+        return without_zeros(&format!("{value:.decimals$e}"));
     }
     let decimals = usize::try_from(digits - 1 - exponent).unwrap_or(0);
-    let text = format!("{value:.decimals$}");
-    if text.contains('.') {
-        text.trim_end_matches('0').trim_end_matches('.').to_owned()
-    } else {
-        text
+    without_zeros(&format!("{value:.decimals$}"))
+}
+
+/// A number without the zeros at the end of its decimals, before an exponent too.
+fn without_zeros(text: &str) -> String {
+    let (decimals, exponent) = text.find('e').map_or((text, ""), |at| text.split_at(at));
+    if !decimals.contains('.') {
+        return text.to_owned();
     }
+    format!("{}{exponent}", decimals.trim_end_matches('0').trim_end_matches('.'))
+}
+
+/// A number with as many digits, at most seven, as fit into some characters.
+pub fn format_within(value: f64, characters: usize) -> String {
+    let texts = (1..=DIGITS).rev().map(|digits| format_digits(value, digits));
+    let shortest = format_digits(value, 1);
+    texts.into_iter().find(|text| text.chars().count() <= characters).unwrap_or(shortest)
+}
+
+/// The error relative to a number below which it is nothing but rounding.
+const ROUNDING: f64 = 1e-12;
+
+/// True if an error is larger than the rounding of its number.
+pub fn is_error(value: f64, error: f64) -> bool {
+    error.is_finite() && error.abs() > ROUNDING * value.abs()
+}
+
+/// A number with its error, both in the same notation and to the same decimal; the number alone with
+/// five digits if the error is only rounding.
+pub fn with_error(value: f64, error: f64) -> String {
+    if !is_error(value, error) {
+        return format_digits(value, 5);
+    }
+    #[expect(clippy::cast_possible_truncation, reason = "an exponent between -324 and 309")]
+    let [size, last] = [value.abs().max(error), error].map(|v| v.log10().floor() as i32);
+    if (-5..=9).contains(&size) && last >= -9 {
+        let decimals = usize::try_from(-last).unwrap_or(0);
+        return format!("{value:.decimals$} ± {error:.decimals$}");
+    }
+    let scale = 10_f64.powi(size);
+    let decimals = usize::try_from(size - last).unwrap_or(0).min(15);
+    format!("({:.decimals$} ± {:.decimals$})e{size}", value / scale, error / scale)
 }
 
 /// The digits that are needed to distinguish numbers of this size that differ by this step; at
@@ -63,12 +99,29 @@ mod tests {
             (100.0, "100"),
             (1234567.89, "1234568"),
             (0.00123456789, "0.001234568"),
-            (1e-9, "1.000000e-9"),
+            (1e-9, "1e-9"),
+            (1e300, "1e300"),
+            (-1.25e-12, "-1.25e-12"),
             (f64::INFINITY, "Infinity"),
         ];
         for (value, text) in cases {
             assert_eq!(format_number(value), text);
         }
+    }
+
+    #[test]
+    fn a_number_is_shortened_until_it_fits() {
+        assert_eq!(format_within(-1.234567e-12, 8), "-1.2e-12");
+        assert_eq!(format_within(-37.123456789, 20), "-37.12346");
+        assert_eq!(format_within(-37.123456789, 6), "-37.12");
+    }
+
+    #[test]
+    fn a_number_and_its_error_have_one_notation_and_rounding_is_no_error() {
+        assert_eq!(with_error(0.041, 3e-5), "0.04100 ± 0.00003");
+        assert_eq!(with_error(94.61, 0.4), "94.6 ± 0.4");
+        assert_eq!(with_error(100.0, 2e-13), "100");
+        assert_eq!(with_error(2.5e-8, 3e-10), "(2.50 ± 0.03)e-8");
     }
 
     #[test]

@@ -43,3 +43,19 @@ fn a_confirmation_can_be_cancelled() {
     assert_eq!(harness.state().1, None);
     assert!(harness.query_by_label("OK").is_none());
 }
+
+#[test]
+fn a_typed_path_of_an_existing_file_asks_before_it_is_replaced() {
+    let path = std::env::temp_dir().join(format!("aplanat-existing-{}.json", std::process::id()));
+    std::fs::write(&path, "{}").unwrap();
+    let mut harness = harness(FileRequest::Save, path.to_str().unwrap());
+    harness.run();
+    harness.get_by_label("OK").click();
+    harness.run();
+    assert_eq!(harness.state().1, None);
+    harness.get_by_label_contains("exists already");
+    harness.get_by_label("Replace the file").click();
+    harness.run();
+    assert_eq!(harness.state().1, Some((FileRequest::Save, path.clone())));
+    std::fs::remove_file(path).unwrap();
+}

@@ -1,7 +1,7 @@
 //! The table of the prescription as a spreadsheet: cursor, ranges, clipboard, semi-diameters.
 
 use aplanat::lens::{Edit, Lens, Parameter, Quantity, Variable, blank};
-use aplanat::session::Command;
+use aplanat::session::{CandidateSource, CandidateView, Command, SessionView};
 use aplanat::studio::panels::PrescriptionPanel;
 use egui::accesskit::Role;
 use egui::{Event, Key, Modifiers};
@@ -303,4 +303,44 @@ fn aspheres_obstructions_and_gradients_are_added_in_the_menu_of_a_row() {
         let titles: Vec<String> = edits(&harness).iter().map(Edit::title).collect();
         assert_eq!(titles, [number]);
     }
+}
+
+#[test]
+fn a_wide_number_is_shortened_and_not_cut() {
+    let mut lens = double_gauss();
+    lens.surfaces[0].curvature = 1e-300;
+    lens.surfaces[0].conic = -1.234567e-12;
+    let harness = table(lens);
+    let value = |cell: &str| harness.get_by_label(cell).value();
+    assert_eq!(value("Radius of surface 1").as_deref(), Some("1e300"));
+    let conic = value("Conic of surface 1").unwrap();
+    assert!(conic.len() <= 8 && conic.ends_with("e-12"), "{conic}");
+}
+
+/// All panels show the same lens, and the table says what differs from the design.
+#[test]
+fn the_table_shows_the_candidate_with_what_it_changes() {
+    let design = view_of(double_gauss());
+    let mut lens = double_gauss();
+    lens.surfaces[1].thickness = 7.5;
+    let candidate =
+        CandidateView { source: CandidateSource::Chosen, title: "a lens".into(), shown: true };
+    let view = SessionView {
+        candidate: Some(candidate),
+        preview_results: view_of(lens).results,
+        ..design
+    };
+    let mut harness = panel_harness(PrescriptionPanel::default(), view);
+    harness.run();
+    let cell = "Thickness of surface 2 of the candidate: 7.5";
+    let unchanged = "Thickness of surface 1 of the candidate: ";
+    harness.get_by_label_contains(unchanged);
+    harness.get_by_label(cell).hover();
+    harness.run();
+    let old = double_gauss().surfaces[1].thickness;
+    harness.get_by_label(&format!("In the design: {old}"));
+    assert!(harness.query_by_label("Thickness of surface 2").is_none(), "nothing can be edited");
+    harness.state_mut().view.candidate.as_mut().unwrap().shown = false;
+    harness.run();
+    harness.get_by_label("Thickness of surface 2");
 }

@@ -4,6 +4,7 @@
 
 mod analysis;
 mod aperture;
+mod candidate;
 mod cli;
 mod cli_arguments;
 mod cli_effects;

@@ -280,3 +280,22 @@ fn the_gauss_newton_matrix_is_that_of_the_residuals() {
     let normal = merit.evaluate(&values, DerivativeLevel::Normal).unwrap().normal[(0, 0)];
     assert!((second / (2.0 * normal) - 1.0).abs() < 1e-6, "{second} and {normal}");
 }
+
+/// A rod is longer than its focal length: the default goal must not ask for another lens.
+#[test]
+fn the_default_goal_allows_the_glass_of_its_own_lens() {
+    for bundled in files::bundled_lenses() {
+        let lens = files::parse(bundled.text.as_bytes(), bundled.name).unwrap().lens;
+        let goal = Goal::default_for(&lens).unwrap();
+        let glass = |row: &&Row| !matches!(row.medium, Medium::Air | Medium::Mirror);
+        let rows = lens.surfaces.iter().filter(glass);
+        let thickest = rows.map(|row| row.thickness.abs()).fold(0.0, f64::max);
+        let limits = goal.terms.iter().filter_map(|weighted| match weighted.term {
+            Term::GlassCenter { max, .. } => Some(max),
+            _ => None,
+        });
+        for max in limits {
+            assert!(max >= thickest, "{}: {max} and {thickest}", bundled.name);
+        }
+    }
+}

@@ -129,6 +129,7 @@ impl Session {
         self.settings.zoom = 0;
         self.settings.pupil_wavelength = None;
         self.selected = None;
+        self.document += 1;
         self.set_design(lens);
     }
 
@@ -159,6 +160,7 @@ impl Session {
                 self.path = Some(path.clone());
                 let node = self.history.present();
                 self.record(JournalEntry::Saved { node, path: path.clone() });
+                self.message_is_recent = false;
                 self.events.push(SessionEvent::Saved(path));
             }
             // A foreign file may hold less than the lens, which stays unsaved.

@@ -1,5 +1,6 @@
 //! The session itself: what it holds, how it carries out commands, and what panels see of it.
 
+mod candidate;
 mod document;
 mod drag;
 mod journaling;
@@ -21,7 +22,7 @@ use super::pareto::ParetoState;
 use super::run::{BackgroundRun, RunId, RunKind, RunStatus};
 use super::score::DesignScore;
 use super::structure_search::StructureSearchState;
-use super::view::{Message, SessionView, Severity};
+use super::view::{KeptLens, Message, SessionView, Severity};
 use crate::experiments::{self, Effort, ExperimentReport};
 use crate::lens::Lens;
 use crate::merit::Goal;
@@ -67,6 +68,10 @@ pub struct Session {
     /// The surface that every panel highlights.
     selected: Option<usize>,
     messages: Arc<Vec<Message>>,
+    /// True if nothing was done since the last message.
+    message_is_recent: bool,
+    /// The number of lenses that were opened or begun.
+    document: u64,
     analysis: AnalysisWorker,
     optimization: BackgroundRun<OptimizationEngine>,
     pareto: ParetoState,
@@ -78,6 +83,12 @@ pub struct Session {
     live_merit: LiveMerit,
     /// The lens that a panel shows in place of the design.
     preview_lens: Option<Arc<Lens>>,
+    /// The origin of that lens.
+    preview_title: String,
+    /// True if a candidate is shown; false while the design is shown in spite of one.
+    shows_candidate: bool,
+    /// The candidates that were kept beside the design.
+    kept: Arc<Vec<KeptLens>>,
     /// Analyzes that lens, or the one that a run shows.
     preview_analysis: AnalysisWorker,
     /// The lens whose analysis was requested last.
@@ -142,6 +153,8 @@ impl Session {
             settings: AnalysisSettings::default(),
             selected: None,
             messages: Arc::default(),
+            message_is_recent: false,
+            document: 0,
             analysis: spawn_analysis(EffectTiming::Measured, wake.clone())?,
             optimization: BackgroundRun::spawn(wake.clone(), optimize)?,
             pareto: ParetoState::spawn(wake.clone())?,
@@ -152,6 +165,9 @@ impl Session {
             drag: DragState::spawn(wake.clone())?,
             live_merit: LiveMerit::spawn(wake.clone())?,
             preview_lens: None,
+            preview_title: String::new(),
+            shows_candidate: true,
+            kept: Arc::default(),
             preview_analysis: spawn_analysis(EffectTiming::Skipped, wake)?,
             preview_request: None,
             preview_version: 0,
@@ -202,8 +218,12 @@ impl Session {
             Command::ExportPareto(folder) => self.export_pareto(folder),
             Command::StructureSearch(command) => self.structure_search_command(command),
             Command::Grin(command) => self.grin_command(command),
-            Command::Preview(lens) => self.preview_lens = lens.map(|lens| Arc::new(*lens)),
+            Command::Preview(lens) => self.preview(lens),
             Command::AcceptPreview => self.accept_preview(),
+            Command::AcceptCandidate => self.accept_candidate(),
+            Command::KeepCandidate => self.keep_candidate(),
+            Command::DiscardCandidate => self.discard_candidate(),
+            Command::ShowCandidate(shown) => self.shows_candidate = shown,
             Command::SetTolerance(tolerance) => self.set_tolerance(tolerance),
             Command::ShowZoom(zoom) => self.show_zoom(zoom),
             Command::ShowRays(rays) => self.change_settings(|s| s.rays = rays.min(MAX_RAYS)),
@@ -250,12 +270,16 @@ impl Session {
             grin: self.grin.view(),
             design_score: self.design_score.latest(),
             preview_lens: self.preview_lens.clone(),
+            candidate: self.candidate(),
+            kept: Arc::clone(&self.kept),
             preview_results: self.preview_results(),
             experiment: self.experiment.run(),
             drag: self.drag.view(),
             messages: Arc::clone(&self.messages),
             history: Arc::clone(self.history.nodes()),
             version_id: self.history.present(),
+            message_is_recent: self.message_is_recent,
+            document: self.document,
             undo: self.history.undo_title().map(str::to_owned),
             redo: self.history.redo_title().map(str::to_owned),
             path: self.path.clone(),
@@ -288,18 +312,6 @@ impl Session {
         !Arc::ptr_eq(&self.lens, &self.saved) && self.lens != self.saved
     }
 
-    /// The lens that is shown in place of the design, with its source.
-    fn previewed(&self) -> Option<(PreviewSource, Arc<Lens>)> {
-        if let Some(lens) = &self.preview_lens {
-            return Some((PreviewSource::Panel, Arc::clone(lens)));
-        }
-        if let Some((id, lens)) = self.structure_search.previewed() {
-            return Some((PreviewSource::Run(id), lens));
-        }
-        let run = self.optimization.view();
-        Some((PreviewSource::Run(run.id?), Arc::clone(run.displayed_lens()?)))
-    }
-
     /// Requests the analysis of the lens that is shown in place of the design, if it is another one.
     fn sync_preview(&mut self) {
         // A chain of a search has no lens for a moment now and then: its last analysis stays valid.
@@ -323,6 +335,9 @@ impl Session {
 
     /// The analyses of the lens that is shown in place of the design, maybe of one step before.
     fn preview_results(&self) -> Option<Arc<AnalysisResults>> {
+        if !self.shows_candidate {
+            return None;
+        }
         let chain = self.structure_search.previewed_run().filter(|_| self.preview_lens.is_none());
         let source = match chain {
             Some(id) => PreviewSource::Run(id),
@@ -336,6 +351,7 @@ impl Session {
     /// Makes all analyses so far outdated.
     fn invalidate(&mut self) {
         self.version += 1;
+        self.message_is_recent = false;
         self.request_analysis();
         self.events.push(SessionEvent::Changed(self.version));
     }
@@ -375,6 +391,7 @@ impl Session {
             messages.remove(0);
         }
         messages.push(message.clone());
+        self.message_is_recent = true;
         self.events.push(SessionEvent::Message(message));
     }
 

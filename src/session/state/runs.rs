@@ -61,7 +61,7 @@ impl Session {
     }
 
     pub(super) fn optimize(&mut self, method: DescentMethod, goal: Goal) {
-        self.preview_lens = None;
+        (self.preview_lens, self.shows_candidate) = (None, true);
         let (lens, tolerance) = (Arc::clone(&self.lens), self.settings.tolerance);
         self.optimization.start(OptimizationRequest { method, lens, goal, tolerance });
     }
@@ -120,10 +120,8 @@ impl Session {
         let Some(shown) = self.preview_lens.take() else {
             return self.post(Severity::Warning, "there is no preview to accept");
         };
-        let own = Lens { variables: self.lens.variables.clone(), ..Lens::clone(&shown) };
-        let lens = if own.check().is_ok() { own } else { Lens::clone(&shown) };
-        let checked = lens.check().map(|()| lens).map_err(|why| why.to_string());
-        self.accept(checked, VersionOrigin::new("accept a lens of the Pareto front"));
+        let title = format!("accept {}", self.preview_title);
+        self.accept(self.with_own_variables(&shown), VersionOrigin::new(title));
     }
 
     pub(super) fn export_pareto(&mut self, folder: PathBuf) {

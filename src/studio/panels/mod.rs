@@ -15,7 +15,7 @@ mod pupil;
 mod search;
 mod spot;
 mod system;
-mod widgets;
+pub(super) mod widgets;
 mod zoom;
 
 pub use contrast::ContrastPanel;
@@ -160,6 +160,13 @@ fn pupil_share(spot: Option<&Spot>) -> f64 {
     colors.map(|color| color.area.value).fold(0.0, f64::max) / std::f64::consts::PI
 }
 
+/// The mean RMS radius of the fields with light, in mm.
+pub(super) fn mean_spot(numbers: &Analyses) -> Option<f64> {
+    let lit = numbers.spots.value.iter().filter_map(|spot| spot.as_ref().ok());
+    let radii: Vec<f64> = lit.map(|spot| spot.rms.value).collect();
+    (!radii.is_empty()).then(|| radii.iter().sum::<f64>() / radii.len() as f64)
+}
+
 /// The light of a lens: the mean area of its pupils in mm², over fields and wavelengths by weight.
 fn mean_pupil_area(numbers: &Analyses) -> f64 {
     let fields = numbers.spots.value.iter().zip(&numbers.ray_model.value.fields);
@@ -174,16 +181,13 @@ fn add_variables_edit(lens: &Lens, kinds: &[ParameterKind]) -> Edit {
     Edit::SetVariables(freed.variables)
 }
 
-/// The relative error of a number, as a suffix.
+/// The relative error of a number in percent, as a suffix; nothing if it is only rounding.
 fn relative_error(estimate: Estimate) -> String {
-    let share = (estimate.error / estimate.value).abs();
-    if !share.is_finite() {
-        String::new()
-    } else if share >= 5e-5 {
-        format!(" ± {} %", number::format_digits(100.0 * share, 2))
-    } else {
-        format!(" ± {share:.0e}")
+    if !number::is_error(estimate.value, estimate.error) || estimate.value == 0.0 {
+        return String::new();
     }
+    let percent = 100.0 * (estimate.error / estimate.value).abs();
+    format!(" ± {} %", number::format_digits(percent, 2))
 }
 
 /// Shows why there are no results.

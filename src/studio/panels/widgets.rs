@@ -1,6 +1,6 @@
 //! Widgets that several panels share.
 
-use egui::{Button, Color32, RichText, Sense, Ui, vec2};
+use egui::{Button, Color32, ProgressBar, RectAlign, Response, RichText, Sense, Tooltip, Ui, vec2};
 use egui_plot::Plot;
 
 use crate::studio::actions::{Actions, UiAction};
@@ -49,6 +49,23 @@ pub(super) fn main_button(
     let button = Button::new(RichText::new(text).strong()).fill(fill);
     let button = ui.add_enabled(enabled, button).on_hover_text(hint);
     button.on_disabled_hover_text(reason).clicked()
+}
+
+/// A progress bar with a text that is legible on its filled and on its empty part.
+pub(in crate::studio) fn progress_bar(ui: &Ui, share: f32, text: impl Into<String>) -> ProgressBar {
+    let text = RichText::new(text).color(ui.visuals().strong_text_color());
+    ProgressBar::new(share).text(text)
+}
+
+/// Explains an item of a menu beside it, where the explanation covers no other item.
+pub(in crate::studio) fn hint_beside(item: Response, text: &str) -> Response {
+    let mut hint = Tooltip::for_enabled(&item);
+    hint.popup = hint.popup.align(RectAlign::RIGHT_START);
+    hint.show(|ui| {
+        ui.set_max_width(ui.spacing().tooltip_width);
+        ui.label(text)
+    });
+    item
 }
 
 /// A plot that can be neither moved nor zoomed.

@@ -1,8 +1,7 @@
 //! The controls of a field: open, save and close, its optimization, and the slice.
 
 use egui::{
-    Align, Button, ComboBox, DragValue, Label, Layout as Arrange, ProgressBar, RichText,
-    ScrollArea, Slider, Ui,
+    Align, Button, ComboBox, DragValue, Label, Layout as Arrange, RichText, ScrollArea, Slider, Ui,
 };
 
 use super::picture::SlicePicture;
@@ -13,7 +12,7 @@ use crate::session::{
 };
 use crate::studio::actions::Actions;
 use crate::studio::file_dialog::FileRequest;
-use crate::studio::panels::widgets::{ActionButton, action_buttons, main_button};
+use crate::studio::panels::widgets::{ActionButton, action_buttons, main_button, progress_bar};
 
 /// Nodes along a side of a written volume, where the field is a spline, unless it is changed.
 pub(in crate::studio) const DEFAULT_NODES: usize = 65;
@@ -158,7 +157,8 @@ pub(super) fn progress(ui: &mut Ui, view: &SessionView, run: &GrinRun) {
             } else {
                 progress.step as f32 / progress.max_steps.max(1) as f32
             };
-            ui.add(ProgressBar::new(share).desired_height(16.0).corner_radius(2).text(text));
+            let bar = progress_bar(ui, share, text).desired_height(16.0);
+            ui.add(bar.corner_radius(2));
         }
         None => {
             ui.add(Label::new(RichText::new(text).weak()).truncate());

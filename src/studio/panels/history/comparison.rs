@@ -7,7 +7,7 @@ use crate::lens::{Lens, Parameter, Quantity, SurfaceNumber};
 use crate::session::{Analyses, HistoryNode, SessionView};
 use crate::studio::number;
 use crate::studio::panels::mean_pupil_area;
-use crate::studio::panels::optimizer::mean_spot;
+use crate::studio::panels::mean_spot;
 
 /// A quantity of two versions.
 struct ComparedNumber {

@@ -34,6 +34,8 @@ const NEAR: f64 = 6.0;
 pub struct LayoutPanel {
     backend: RenderBackend,
     scene_view: SceneView,
+    /// The document that was drawn last: another one is shown whole.
+    document: u64,
     drawing: Cached<LayoutKey, Option<LayoutDrawing>>,
     handles: HandleLayer,
 }
@@ -70,6 +72,7 @@ impl LayoutPanel {
         Self {
             backend,
             scene_view: SceneView::new("layout"),
+            document: 0,
             drawing: Cached::new(),
             handles: HandleLayer::default(),
         }
@@ -86,6 +89,10 @@ impl Panel for LayoutPanel {
     }
 
     fn ui(&mut self, ui: &mut Ui, view: &SessionView, actions: &mut Actions) {
+        if self.document != view.document {
+            self.document = view.document;
+            self.scene_view.fit();
+        }
         self.refresh(ui, view);
         self.header(ui, view, actions);
         locks_row(ui, view, actions);

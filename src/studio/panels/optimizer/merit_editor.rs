@@ -12,6 +12,7 @@ use crate::merit::{Goal, PupilEdge, Term, TermValue, WeightedTerm};
 use crate::session::{Command, OptimizationSnapshot, SessionView};
 use crate::studio::actions::Actions;
 use crate::studio::number;
+use crate::studio::panels::widgets::hint_beside;
 use crate::studio::panels::{add_variables_edit, field_name};
 use crate::studio::text::capitalize;
 use crate::studio::text_input::{EditBuffers, InputPlacement, TextInput};
@@ -204,7 +205,7 @@ impl MeritEditor {
             let missing: Vec<WeightedTerm> = every.filter(|new| !there(new.term)).collect();
             for weighted in missing {
                 let button = ui.button(title(weighted.term));
-                if button.on_hover_text(hint(weighted.term)).clicked() {
+                if hint_beside(button, hint(weighted.term)).clicked() {
                     self.terms.push(MeritRow { active: true, weighted });
                     ui.close();
                 }

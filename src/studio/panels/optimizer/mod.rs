@@ -13,11 +13,9 @@ use egui::{
 };
 use egui_plot::{Line, PlotPoints, PlotTransform};
 
-use super::{Panel, decade_name, mean_pupil_area};
+use super::{Panel, decade_name, mean_pupil_area, mean_spot};
 use crate::optimize::DescentMethod;
-use crate::session::{
-    Analyses, Command, MeritSample, OptimizationSnapshot, RunStatus, SessionView,
-};
+use crate::session::{Command, MeritSample, OptimizationSnapshot, RunStatus, SessionView};
 use crate::studio::actions::Actions;
 use crate::studio::number;
 use crate::studio::panels::widgets::{ActionButton, action_buttons, fixed_plot, main_button};
@@ -179,13 +177,6 @@ pub(super) fn changes_text(view: &SessionView) -> Vec<String> {
         texts.push(format!("light {} to {} mm² ({sign}{change} %)", short(old), short(new)));
     }
     texts
-}
-
-/// The mean RMS radius of the fields with light, in mm.
-pub(super) fn mean_spot(numbers: &Analyses) -> Option<f64> {
-    let lit = numbers.spots.value.iter().filter_map(|spot| spot.as_ref().ok());
-    let radii: Vec<f64> = lit.map(|spot| spot.rms.value).collect();
-    (!radii.is_empty()).then(|| radii.iter().sum::<f64>() / radii.len() as f64)
 }
 
 /// Plots the merit of the current and of the best lens, decades up and steps across; the step that

@@ -7,14 +7,14 @@ mod plot;
 mod setup;
 mod text;
 
-use egui::{Button, Frame, Margin, Panel as Side, ProgressBar, Ui};
+use egui::{Button, Frame, Margin, Panel as Side, Ui};
 
 use super::Panel;
 use crate::optimize::pareto::ParetoPoint;
 use crate::session::{Command, ParetoRun, RunStatus, SessionView};
 use crate::studio::actions::Actions;
 use crate::studio::file_dialog::FileRequest;
-use crate::studio::panels::widgets::{ActionButton, action_buttons, main_button};
+use crate::studio::panels::widgets::{ActionButton, action_buttons, main_button, progress_bar};
 use crate::studio::panels::{NO_LIGHT, is_dark};
 use crate::studio::text::capitalize;
 use setup::ParetoSetup;
@@ -124,9 +124,8 @@ impl ParetoPanel {
 
     fn show(&mut self, ui: &mut Ui, view: &SessionView, run: &ParetoRun, actions: &mut Actions) {
         let share = run.fraction_done() as f32;
-        let bar = ProgressBar::new(share)
-            .desired_height(16.0)
-            .text(text::progress_text(run, view.pareto.run.status));
+        let words = text::progress_text(run, view.pareto.run.status);
+        let bar = progress_bar(ui, share, words).desired_height(16.0);
         ui.add(bar.corner_radius(2));
         text::hypervolume_label(ui, run);
         let frame = Frame::new().inner_margin(Margin { top: 4, ..Margin::ZERO });

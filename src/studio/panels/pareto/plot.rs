@@ -18,6 +18,11 @@ const NEAR: f32 = 14.0;
 /// The margin around the shown range, as a share of it.
 const MARGIN: f64 = 0.06;
 
+/// The share of the plot that a legend takes, across and up.
+const LEGEND: [f64; 2] = [0.5, 0.4];
+/// The points of a front that a mark counts for.
+const MARK: usize = 100;
+
 /// A lens that was clicked.
 pub(super) struct ClickedDesign {
     pub(super) design: ParetoPoint,
@@ -46,7 +51,7 @@ pub(super) fn plot(
     let light = AxisHints::new_x().label("light, mm²").label_spacing(24.0..=44.0);
     let plot = Plot::new("front")
         .height(ui.available_height())
-        .legend(Legend::default().position(Corner::LeftTop).background_alpha(0.6))
+        .legend(Legend::default().position(free_corner(view, run, &bounds)).background_alpha(0.6))
         .custom_x_axes(vec![light])
         .y_axis_label("RMS spot, µm")
         .y_axis_min_width(36.0)
@@ -127,6 +132,35 @@ fn bounds(view: &SessionView, run: &ParetoRun) -> [RangeInclusive<f64>; 2] {
         let margin = (MARGIN * (high - low)).max(0.02 * high.abs()).max(f64::MIN_POSITIVE);
         low - margin..=high + margin
     })
+}
+
+/// The corner of the plot with the fewest points below a legend.
+fn free_corner(view: &SessionView, run: &ParetoRun, bounds: &[RangeInclusive<f64>; 2]) -> Corner {
+    let mut points = plot_points(&run.main.front);
+    // The start and the design are single marks: they count more than one lens of many.
+    for mark in [Some(plot_point(&run.start)), design_point(view)].into_iter().flatten() {
+        points.extend([mark; MARK]);
+    }
+    let share = |axis: usize, value: f64| {
+        let (low, high) = (*bounds[axis].start(), *bounds[axis].end());
+        (value - low) / (high - low)
+    };
+    let covered = |right: bool, top: bool| {
+        let side = |far: bool, share: f64| if far { 1.0 - share } else { share };
+        let below = |point: &&[f64; 2]| {
+            side(right, share(0, point[0])) < LEGEND[0] && side(top, share(1, point[1])) < LEGEND[1]
+        };
+        points.iter().filter(below).count()
+    };
+    [
+        (covered(false, true), Corner::LeftTop),
+        (covered(true, true), Corner::RightTop),
+        (covered(true, false), Corner::RightBottom),
+        (covered(false, false), Corner::LeftBottom),
+    ]
+    .into_iter()
+    .min_by_key(|corner| corner.0)
+    .map_or(Corner::LeftTop, |corner| corner.1)
 }
 
 /// The spot and the light of the design.

@@ -90,8 +90,8 @@ pub(super) fn selection_label(ui: &mut Ui, run: &ParetoRun, chosen: Option<&Pare
 
 /// Spot and light of a lens, one value a line.
 pub(super) fn design_text(design: &ParetoPoint, start: &ParetoPoint) -> String {
-    let spot = with_error(1e3 * design.spot, 1e3 * design.spot_error);
-    let light = with_error(design.light, design.light_error);
+    let spot = number::with_error(1e3 * design.spot, 1e3 * design.spot_error);
+    let light = number::with_error(design.light, design.light_error);
     let percent = number::format_digits(100.0 * design.light / start.light, 4);
     let blur = match design.weight {
         None => "start of the sweep".to_owned(),
@@ -102,9 +102,4 @@ pub(super) fn design_text(design: &ParetoPoint, start: &ParetoPoint) -> String {
         "RMS {spot} µm\nlight {light} mm², {percent} % of the start\n{blur}\n{} rays",
         design.rays
     )
-}
-
-/// A number with its error, both to the digits that the error leaves.
-fn with_error(value: f64, error: f64) -> String {
-    format!("{} ± {}", number::format_digits(value, 5), number::format_digits(error, 1))
 }

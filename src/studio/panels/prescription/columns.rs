@@ -8,6 +8,7 @@ use egui_extras::Column as Width;
 use serde::{Deserialize, Serialize};
 
 use crate::lens::{ASPHERE_TERMS, Lens, Medium, PROFILE_TERMS, Parameter, Quantity};
+use crate::studio::panels::widgets::hint_beside;
 
 /// A column of the table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
@@ -89,7 +90,7 @@ impl TableColumn {
             Self::Thickness => Width::initial(90.0).at_least(70.0),
             Self::Glass => Width::initial(118.0).at_least(70.0),
             Self::SemiDiameter => Width::initial(106.0).at_least(70.0),
-            Self::Conic => Width::initial(64.0).at_least(50.0),
+            Self::Conic => Width::initial(76.0).at_least(50.0),
             Self::Obstruction => Width::initial(86.0).at_least(60.0),
             Self::Asphere(_) | Self::Grin(_) => Width::initial(112.0).at_least(60.0),
             Self::Comment => Width::remainder().at_least(60.0).clip(true),
@@ -189,7 +190,8 @@ pub(super) fn menu(ui: &mut Ui, lens: &Lens) {
     let (button, _) = MenuButton::new("Columns").config(stay).ui(ui, |ui| {
         for column in needed(lens) {
             let mut on = !hidden.contains(&column);
-            if ui.checkbox(&mut on, column.title()).on_hover_text(column.hint()).changed() {
+            let item = ui.checkbox(&mut on, column.title());
+            if hint_beside(item, column.hint()).changed() {
                 if on {
                     hidden.remove(&column)
                 } else {

@@ -8,7 +8,7 @@ use super::badge::{self, ParameterStatus};
 use super::cells::{CellPlace, OBJECT};
 use super::columns::TableColumn;
 use super::glass;
-use super::table::PrescriptionTable;
+use super::table::{PrescriptionTable, room_in};
 use crate::lens::{Edit, Parameter, apply_edit};
 use crate::session::Command;
 use crate::studio::number;
@@ -60,7 +60,8 @@ impl PrescriptionTable<'_> {
     /// Shows the text of a cell: what is typed becomes an edit, if the lens stays valid.
     fn text_field(&mut self, ui: &mut Ui, place: CellPlace) -> Response {
         let zoom = self.view.settings.zoom;
-        let (name, shown) = (place.name(&self.lens, zoom), self.shown_text(place));
+        let (name, shown) =
+            (place.name(&self.lens, zoom), self.shown_text(place, room_in(ui, place)));
         let hint = self.shown_clear(place).map(number::format_number).unwrap_or_default();
         let align = if place.column.is_text() { Align::Min } else { Align::Max };
         let field = TextInput { hint: &hint, ..TextInput::in_table(&name, &shown, align) };

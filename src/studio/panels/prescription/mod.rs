@@ -24,14 +24,15 @@ use std::sync::Arc;
 
 use egui::{Button, Context, Frame, Id, Key, Margin, Panel as SidePanel, RichText, Ui};
 
-use super::{Panel, design_results};
+use super::Panel;
 use crate::lens::glass::Glass;
 use crate::lens::{Edit, Lens, apply_edit};
-use crate::session::SessionView;
+use crate::session::{AnalysisResults, SessionView};
 use crate::studio::actions::Actions;
 use crate::studio::text::capitalize;
 use crate::studio::text_input::{EditBuffers, error_color};
 use actions::RowAction;
+use candidate::Candidate;
 use cells::CellPlace;
 use columns::TableColumn;
 use cursor::{CellCursor, CellGrid, RangeCommand};
@@ -52,25 +53,32 @@ impl Panel for PrescriptionPanel {
     }
 
     fn ui(&mut self, ui: &mut Ui, view: &SessionView, actions: &mut Actions) {
-        keys(ui, view, actions);
-        self.toolbar(ui, view, actions);
-        clipping_note(ui, &view.lens);
-        let columns = columns::shown(ui, &view.lens);
-        self.cursor_keys(ui, view, &columns, actions);
-        self.error_line(ui);
+        let candidate = candidate_results(view);
+        let lens = candidate.map_or(&view.lens, |results| &results.lens);
+        let columns = columns::shown(ui, lens);
         let before = self.cursor.active();
+        ui.add_enabled_ui(candidate.is_none(), |ui| self.toolbar(ui, view, actions));
+        if candidate.is_none() {
+            keys(ui, view, actions);
+            clipping_note(ui, lens);
+            self.cursor_keys(ui, view, &columns, actions);
+            self.error_line(ui);
+        }
         let table = PrescriptionTable {
             view,
-            lens: Arc::clone(&view.lens),
-            analyses: design_results(view),
-            candidate: None,
+            lens: Arc::clone(lens),
+            analyses: candidate.or(view.results.as_ref()).and_then(|r| r.analyses.as_ref().ok()),
+            candidate: candidate
+                .map(|results| Candidate { lens: &results.lens, design: &view.lens }),
             columns: &columns,
             buffers: &mut self.buffers,
             cursor: &mut self.cursor,
             actions,
         };
         table.show(ui);
-        self.cursor.end(ui, before);
+        if candidate.is_none() {
+            self.cursor.end(ui, before);
+        }
     }
 
     fn is_typing(&self, context: &Context) -> bool {
@@ -159,6 +167,12 @@ impl PrescriptionPanel {
 
 fn is_typed(event: &egui::Event) -> bool {
     matches!(event, egui::Event::Text(_) | egui::Event::Key { pressed: true, .. })
+}
+
+/// The results of the candidate that all panels show; `None` while they show the design.
+fn candidate_results(view: &SessionView) -> Option<&Arc<AnalysisResults>> {
+    view.candidate.as_ref().filter(|candidate| candidate.shown)?;
+    view.preview_results.as_ref()
 }
 
 /// The edit that a key asks for in a range of cells; `None` if it only copies.

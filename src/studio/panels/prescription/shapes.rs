@@ -4,6 +4,7 @@ use egui::{Button, Ui};
 
 use crate::lens::{ASPHERE_TERMS, Edit, GradientIndex, Lens, Medium, ProfileLaw};
 use crate::studio::actions::Actions;
+use crate::studio::panels::widgets::hint_beside;
 
 /// The radius of a new obstruction, relative to the semi-diameter.
 const OBSTRUCTED: f64 = 0.25;
@@ -18,7 +19,8 @@ pub(super) fn menu(
 ) {
     ui.separator();
     for (title, hint, edit) in choices(lens, surface, clear) {
-        if ui.add_enabled(edit.is_some(), Button::new(title)).on_hover_text(hint).clicked() {
+        let item = ui.add_enabled(edit.is_some(), Button::new(title));
+        if hint_beside(item, hint).clicked() {
             actions.extend(edit);
             ui.close();
         }

@@ -19,12 +19,17 @@ use crate::studio::menu::show_items;
 use crate::studio::menu_items::element_items;
 use crate::studio::number;
 use crate::studio::palette::{Palette, color32};
+use crate::studio::panels::widgets::hint_beside;
 use crate::studio::text_input::EditBuffers;
 
 /// The height of a row, in points.
 const ROW: f32 = 21.0;
 /// The room at the right of a cell without a badge, and at the left of text, in points.
 pub(super) const MARGIN: f32 = 5.0;
+/// The width of a digit, in points.
+const CHARACTER: f32 = 7.2;
+/// The characters of a number that a narrow column cuts rather than leaves out.
+const MIN_ROOM: usize = 5;
 
 /// The table for one frame.
 pub(super) struct PrescriptionTable<'a> {
@@ -99,7 +104,7 @@ impl PrescriptionTable<'_> {
         if place.row > self.lens.surfaces.len() {
             self.image_cell(ui, place.column);
         } else if let Some(candidate) = &self.candidate {
-            let text = self.shown_text(place);
+            let text = self.shown_text(place, room_in(ui, place));
             candidate.cell(ui, place, &text, self.view.settings.zoom);
         } else if place.is_editable(&self.lens) {
             if self.cursor.is_in_range(self.grid(), place) {
@@ -146,7 +151,8 @@ impl PrescriptionTable<'_> {
         for action in actions::ALL {
             let edit = action.edit(&self.lens, surface);
             let button = Button::new(action.title());
-            if ui.add_enabled(edit.is_some(), button).on_hover_text(action.hint()).clicked() {
+            let item = ui.add_enabled(edit.is_some(), button);
+            if hint_beside(item, action.hint()).clicked() {
                 self.actions.extend(edit);
                 ui.close();
             }
@@ -170,13 +176,15 @@ impl PrescriptionTable<'_> {
         );
     }
 
-    /// The text of a cell as it is shown: a solved gap as it was traced.
-    pub(super) fn shown_text(&self, place: CellPlace) -> String {
-        let text = place.text(&self.lens, self.view.settings.zoom, number::format_number);
+    /// The text of a cell as it is shown, with numbers that fit into some characters: a solved gap as
+    /// it was traced.
+    pub(super) fn shown_text(&self, place: CellPlace, room: usize) -> String {
+        let show = |value| number::format_within(value, room);
+        let text = place.text(&self.lens, self.view.settings.zoom, show);
         let last = place.surface().is_some_and(|s| s + 1 == self.lens.surfaces.len());
         if place.column == TableColumn::Thickness && last && self.lens.image_solve.is_some() {
             let gap = place.surface().and_then(|surface| self.traced_gap(surface));
-            return gap.map_or(text, number::format_number);
+            return gap.map_or(text, show);
         }
         text
     }
@@ -197,6 +205,15 @@ impl PrescriptionTable<'_> {
 /// The field of the first radius.
 pub(super) fn first_radius_field() -> Id {
     CellPlace::new(1, TableColumn::Radius).id()
+}
+
+/// The characters of a number that fit into a cell.
+pub(super) fn room_in(ui: &Ui, place: CellPlace) -> usize {
+    let badge = if place.column.has_badge() { badge::WIDTH } else { 0.0 };
+    let width = ui.max_rect().width() - badge - 2.0 * MARGIN;
+    #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "saturates")]
+    let characters = (width / CHARACTER) as usize;
+    characters.max(MIN_ROOM)
 }
 
 fn header(mut row: TableRow<'_, '_>, columns: &[TableColumn]) {

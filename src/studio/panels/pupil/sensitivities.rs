@@ -250,7 +250,8 @@ impl<'a> SensitivityTable<'a> {
                     if change.value == 0.0 && change.error == 0.0 {
                         return "none".to_owned();
                     }
-                    format!("{} ± {:.0e} {unit}", signed(change.value), change.error)
+                    let sign = if change.value > 0.0 { "+" } else { "" };
+                    format!("{sign}{} {unit}", number::with_error(change.value, change.error))
                 };
                 let (light, blur) =
                     (of(SensitivityKind::Light, "%"), of(SensitivityKind::Blur, "µm"));

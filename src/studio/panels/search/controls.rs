@@ -1,6 +1,6 @@
 //! Start, pause, stop, progress and live controls of a search.
 
-use egui::{Button, Checkbox, DragValue, Label, ProgressBar, RichText, Ui};
+use egui::{Button, Checkbox, DragValue, Label, RichText, Ui};
 
 use super::setup::SearchSetup;
 use super::{ShownSearch, text};
@@ -12,7 +12,7 @@ use crate::session::{
 use crate::studio::actions::Actions;
 use crate::studio::file_dialog::FileRequest;
 use crate::studio::number;
-use crate::studio::panels::widgets::{ActionButton, action_buttons, main_button};
+use crate::studio::panels::widgets::{ActionButton, action_buttons, main_button, progress_bar};
 use crate::studio::panels::{NO_LIGHT, is_dark};
 
 /// Start, pause, stop, open, save and clear.
@@ -114,7 +114,7 @@ pub(super) fn progress(ui: &mut Ui, search: ShownSearch<'_>) {
     let text = text::status_text(run, view.structure_search.run.status);
     match run.fraction_done() {
         Some(done) => {
-            let bar = ProgressBar::new(done as f32).desired_height(16.0).text(text);
+            let bar = progress_bar(ui, done as f32, text).desired_height(16.0);
             ui.add(bar.corner_radius(2));
         }
         None => {
