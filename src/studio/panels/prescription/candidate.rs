@@ -1,6 +1,6 @@
 //! A candidate in the table: the lens of a run in place of the design, with what it changes.
 
-use egui::{Align, Label, Layout, RichText, Sense, Ui};
+use egui::{Align, Label, Layout, RichText, Role, Sense, Ui, WidgetInfo};
 
 use super::badge;
 use super::cells::CellPlace;
@@ -37,7 +37,10 @@ impl Candidate<'_> {
         ui.with_layout(layout, |ui| {
             ui.add_space(MARGIN + if place.column.has_badge() { badge::WIDTH } else { 0.0 });
             let label = ui.add(Label::new(shown).truncate().sense(Sense::hover()));
-            let label = label.accessible_name(format!("{name} of the candidate: {text}"));
+            // The mark of a changed cell is a colour: its name says it too.
+            let change = old.as_ref().map(|old| format!(". {old}")).unwrap_or_default();
+            let name = format!("{name} of the candidate: {text}{change}");
+            label.widget_info(|| WidgetInfo::labeled(Role::Label, true, &name));
             if let Some(old) = old {
                 label.on_hover_text(old);
             }
