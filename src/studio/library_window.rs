@@ -144,17 +144,28 @@ impl LibraryWindow {
         let scroll = ScrollArea::vertical().max_height(height).min_scrolled_height(height);
         scroll.auto_shrink([false, false]).show_rows(ui, CARD.y, rows, |ui, shown| {
             for row in shown {
-                ui.horizontal(|ui| {
-                    for lens in found.iter().skip(row * columns).take(columns) {
-                        let card = self.card(ui, lens, &mut left);
-                        if card.clicked() {
-                            self.selected = Some(lens);
-                        }
-                        opened |= card.double_clicked();
-                    }
-                });
+                let lenses = found.iter().skip(row * columns).take(columns);
+                ui.horizontal(|ui| opened |= self.row(ui, lenses.copied(), &mut left));
             }
         });
+        opened
+    }
+
+    /// Shows a row of cards; true if one was double-clicked.
+    fn row(
+        &mut self,
+        ui: &mut Ui,
+        lenses: impl Iterator<Item = &'static LibraryLens>,
+        left: &mut usize,
+    ) -> bool {
+        let mut opened = false;
+        for lens in lenses {
+            let card = self.card(ui, lens, left);
+            if card.clicked() {
+                self.selected = Some(lens);
+            }
+            opened |= card.double_clicked();
+        }
         opened
     }
 

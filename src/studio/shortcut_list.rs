@@ -1,6 +1,6 @@
 //! The list of keyboard shortcuts.
 
-use egui::{Align2, Context, Grid, Id, ScrollArea, Window, vec2};
+use egui::{Align2, Context, Grid, Id, ScrollArea, Ui, Window, vec2};
 
 use super::menu_items::MenuContext;
 
@@ -27,24 +27,29 @@ pub(super) fn ui(context: &Context, menus: &MenuContext<'_>) -> bool {
         .default_pos(context.content_rect().center())
         .default_size(vec2(460.0, 520.0));
     window.show(context, |ui| {
-        ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
-            let grid = Grid::new("shortcuts").num_columns(3).striped(true).spacing([18.0, 4.0]);
-            grid.show(ui, |ui| {
-                for item in menus.commands() {
-                    let Some(key) = item.shortcut else { continue };
-                    ui.weak(item.menu);
-                    ui.strong(ui.ctx().format_shortcut(&key));
-                    ui.label(item.title);
-                    ui.end_row();
-                }
-                for (place, key, meaning) in OTHERS {
-                    ui.weak(place);
-                    ui.strong(key);
-                    ui.label(meaning);
-                    ui.end_row();
-                }
-            });
-        });
+        let scroll = ScrollArea::vertical().auto_shrink([false, false]);
+        scroll.show(ui, |ui| list(ui, menus));
     });
     open
+}
+
+fn list(ui: &mut Ui, menus: &MenuContext<'_>) {
+    let grid = Grid::new("shortcuts").num_columns(3).striped(true).spacing([18.0, 4.0]);
+    grid.show(ui, |ui| {
+        for item in menus.commands() {
+            if let Some(key) = item.shortcut {
+                row(ui, item.menu, &ui.ctx().format_shortcut(&key), &item.title);
+            }
+        }
+        for (place, key, meaning) in OTHERS {
+            row(ui, place, key, meaning);
+        }
+    });
+}
+
+fn row(ui: &mut Ui, place: &str, key: &str, meaning: &str) {
+    ui.weak(place);
+    ui.strong(key);
+    ui.label(meaning);
+    ui.end_row();
 }

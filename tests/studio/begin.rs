@@ -10,7 +10,7 @@ use aplanat::lens::{
 use aplanat::session::{Command, Session, SessionView};
 use aplanat::studio::Studio;
 use aplanat::studio::draw::RenderBackend;
-use aplanat::studio::panels::{Panel, PrescriptionPanel, SystemPanel, ZoomPanel};
+use aplanat::studio::panels::{FirstOrderPanel, Panel, PrescriptionPanel, SystemPanel, ZoomPanel};
 use aplanat::studio::theme;
 use aplanat::studio::window::Persistence;
 use egui::{Key, Modifiers};
@@ -315,6 +315,9 @@ fn an_empty_lens_shows_no_error_in_any_panel() {
     let view: SessionView = view_of(starting(StartingForm::Empty));
     let results = view.results.as_ref().unwrap();
     assert!(results.analyses.is_ok(), "{:?}", results.analyses.as_ref().err());
+    let mut harness = panel_harness(FirstOrderPanel, view);
+    harness.run_steps(3);
+    harness.get_by_label_contains("There is no glass yet. Add an element");
 }
 
 /// A file that is dropped on the window.

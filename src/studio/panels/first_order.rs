@@ -5,7 +5,7 @@ use egui::{
 };
 
 use super::{Panel, displayed_results, show_missing_results};
-use crate::lens::Lens;
+use crate::lens::{Lens, Medium};
 use crate::paraxial::{FirstOrder, ParaxialPupil, Seidel, SeidelSums};
 use crate::session::SessionView;
 use crate::studio::actions::Actions;
@@ -25,6 +25,9 @@ impl Panel for FirstOrderPanel {
             return show_missing_results(ui, view);
         };
         ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
+            if numbers.first_order().efl.is_none() {
+                ui.weak(without_focus(&results.lens));
+            }
             data(ui, &results.lens, numbers.first_order());
             ui.add_space(6.0);
             ScrollArea::horizontal().show(ui, |ui| match &numbers.seidel.value {
@@ -35,6 +38,15 @@ impl Panel for FirstOrderPanel {
                 None => drop(ui.weak("No third-order sums: the lens has no paraxial chief ray")),
             });
         });
+    }
+}
+
+/// Why a lens has no focal length, and what gives it one.
+fn without_focus(lens: &Lens) -> &'static str {
+    if lens.surfaces.iter().all(|row| row.medium == Medium::Air) {
+        "There is no glass yet. Add an element from the menu Element, or a glass in the table."
+    } else {
+        "Parallel light stays parallel: the lens has no focal length."
     }
 }
 

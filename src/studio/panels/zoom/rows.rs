@@ -1,9 +1,10 @@
 //! The rows of the table: names, focal lengths, and what varies: thicknesses, aperture, fields.
 
-use egui::{Button, RichText, Ui};
+use egui::{Align, Button, Layout, RichText, Ui};
 
 use crate::lens::{
-    Aperture, Edit, FieldPoint, Fields, Lens, Parameter, Quantity, ZoomPosition, ZoomThickness,
+    Aperture, Edit, FieldKind, FieldPoint, Fields, Lens, Parameter, Quantity, ZoomPosition,
+    ZoomThickness,
 };
 use crate::paraxial::{Beam, first_order};
 use crate::session::Command;
@@ -72,7 +73,7 @@ fn names(ui: &mut Ui, form: &mut EditForm<'_>) {
 
 fn gap(ui: &mut Ui, form: &mut EditForm<'_>, surface: usize) {
     let lens = form.view.lens.clone();
-    ui.label(format!("Thickness after surface {}", surface + 1));
+    ui.label(format!("Thickness after surface {}, mm", surface + 1));
     for zoom in 0..lens.zoom.len() {
         let name = format!("Thickness after surface {} at position {}", surface + 1, zoom + 1);
         let value = lens.thickness_at(surface, zoom).unwrap_or(0.0);
@@ -111,7 +112,8 @@ fn aperture(ui: &mut Ui, form: &mut EditForm<'_>) {
 
 fn fields(ui: &mut Ui, form: &mut EditForm<'_>) {
     let lens = form.view.lens.clone();
-    ui.label("Largest field");
+    let unit = if lens.fields.kind == FieldKind::Angle { "°" } else { "mm" };
+    ui.label(format!("Largest field, {unit}"));
     for (at, position) in lens.zoom.iter().enumerate() {
         let name = format!("Largest field of position {}", at + 1);
         let fields = lens.fields_at(at);
@@ -170,16 +172,17 @@ fn first_order_rows(ui: &mut Ui, lens: &Lens) {
     let text = |value: Option<f64>| {
         value.map_or_else(|| "none".to_owned(), |value| number::format_digits(value, 6))
     };
-    for name in ["Focal length, mm", "f-number"] {
+    for name in ["Focal length, mm", "Working f-number"] {
         ui.weak(name);
         for first in &data {
             let first = first.as_ref();
-            let value = if name == "f-number" {
+            let value = if name == "Working f-number" {
                 first.and_then(|first| first.working_f_number)
             } else {
                 first.and_then(|first| first.efl)
             };
-            ui.weak(text(value));
+            let layout = Layout::right_to_left(Align::Center);
+            ui.with_layout(layout, |ui| ui.weak(text(value)));
         }
         ui.end_row();
     }
