@@ -20,6 +20,7 @@ mod help;
 mod info;
 mod input;
 mod library;
+mod limit_prices;
 mod measure;
 mod names;
 mod optimize;

@@ -4,6 +4,7 @@ use super::effects::{DesignEffects, EffectArgs, EffectReport};
 use super::error::CliError;
 use super::failures::Failures;
 use super::input::{self, LensFile, LoadedLens, Tolerance};
+use super::limit_prices;
 use super::names::value_name;
 use super::output::{Output, ShortNumber, or_dash, write_saved};
 use super::output_paths::OutputPaths;
@@ -13,7 +14,9 @@ use crate::files::{self, FileError, json};
 use crate::lens::{Lens, ParameterKind, add_variables};
 use crate::measure::time_ms;
 use crate::merit::{Goal, Merit, MeritError, TermValue};
-use crate::optimize::{DescentMethod, OptimizationEnd, OptimizationProgress, Optimizer, start};
+use crate::optimize::{
+    DescentMethod, LimitPrice, OptimizationEnd, OptimizationProgress, Optimizer, start,
+};
 use crate::paraxial::{Beam, first_order};
 use serde::Serialize;
 use std::fmt::{self, Display};
@@ -98,8 +101,11 @@ impl OptimizeArgs {
         failures.note(self.write_history(&search));
         let after = optimizer.terms().map_err(refuse)?;
         let light = [at_start.light(), merit(optimizer.best())?.light()];
-        let found = OptimizeOutcome { search: &search, ms, light, before, after, saved, effects };
+        let limits = optimizer.binding_limits().to_vec();
+        let found =
+            OptimizeOutcome { search: &search, ms, light, before, after, limits, saved, effects };
         failures.note(output.print(&OptimizeReport::new(self, &lens, &best, found)));
+        failures.note(check_conflict(optimizer.as_ref()).map_err(refuse));
         failures.into_result()
     }
 
@@ -176,6 +182,14 @@ fn merit_error(opened: &LoadedLens, source: MeritError) -> CliError {
     }
 }
 
+/// Returns an error if the limits contradict each other.
+fn check_conflict(optimizer: &dyn Optimizer) -> Result<(), MeritError> {
+    match optimizer.conflict() {
+        [] => Ok(()),
+        limits => Err(MeritError::ConflictingLimits { limits: limits.to_vec() }),
+    }
+}
+
 /// The steps of a run and the reason of its end.
 struct OptimizeRun {
     steps: Vec<OptimizationProgress>,
@@ -207,6 +221,7 @@ struct OptimizeOutcome<'a> {
     light: [f64; 2],
     before: Vec<TermValue>,
     after: Vec<TermValue>,
+    limits: Vec<LimitPrice>,
     /// True if the best lens was saved.
     saved: bool,
     effects: EffectReport,
@@ -231,6 +246,8 @@ struct OptimizeReport {
     refused_steps: usize,
     last_refusal: Option<String>,
     terms: Vec<TermComparison>,
+    /// The limits that hold the best lens, with their prices.
+    limits: Vec<LimitPrice>,
     variables: Vec<VariableComparison>,
     #[serde(flatten)]
     effects: EffectReport,
@@ -276,7 +293,7 @@ struct VariableComparison {
 
 impl OptimizeReport {
     fn new(args: &OptimizeArgs, lens: &Lens, best: &Lens, found: OptimizeOutcome<'_>) -> Self {
-        let OptimizeOutcome { search, ms, light, before, after, saved, effects } = found;
+        let OptimizeOutcome { search, ms, light, before, after, limits, saved, effects } = found;
         let merit = |terms: &[TermValue]| terms.iter().map(|t| t.weight * t.value).sum();
         let refusals = || search.steps.iter().filter_map(|step| step.refused.as_ref());
         let variable = |v: &crate::lens::Variable| VariableComparison {
@@ -298,6 +315,7 @@ impl OptimizeReport {
             refused_steps: refusals().count(),
             last_refusal: refusals().next_back().cloned(),
             terms: TermComparison::compare(&before, &after),
+            limits,
             variables: lens.variables.iter().map(variable).collect(),
             effects,
             out: saved.then(|| args.out.display().to_string()),
@@ -343,6 +361,7 @@ impl Display for OptimizeReport {
         writeln!(f)?;
         let table = TermComparison::table(&self.terms);
         writeln!(f, "{table}")?;
+        limit_prices::write(&self.limits, f)?;
         writeln!(f, "{}", self.effects)?;
         write_saved(f, self.out.as_deref(), self.lens.as_ref())
     }

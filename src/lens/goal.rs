@@ -18,6 +18,28 @@ pub struct Goal {
     /// positions.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub zoom_ratios: Vec<f64>,
+    /// Tells how the trust-region optimizer treats the terms that limit the lens.
+    #[serde(default, skip_serializing_if = "LimitTreatment::is_default")]
+    pub limits: LimitTreatment,
+}
+
+/// Treatment of the terms that limit a lens by the trust-region optimizer: all but spots,
+/// distortion and throughput. The methods without constraints, Adam and damped least squares,
+/// always take them as penalties.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum LimitTreatment {
+    /// They are kept exactly, whatever their weight.
+    Constraints,
+    /// Their squared violations are added to the merit, so that they may be broken a little.
+    #[default]
+    Penalties,
+}
+
+impl LimitTreatment {
+    fn is_default(&self) -> bool {
+        *self == Self::default()
+    }
 }
 
 /// Treatment of the edge of the pupil in derivatives.

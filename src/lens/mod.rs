@@ -32,7 +32,7 @@ pub use check::LensError;
 pub use diff::added_glass;
 pub use edit::{Edit, EditError, EditedCell, ElementEdit, apply_edit};
 pub use element::{ElementForm, NewElement};
-pub use goal::{Goal, PupilEdge, Term, WeightedTerm};
+pub use goal::{Goal, LimitTreatment, PupilEdge, Term, WeightedTerm};
 pub use grin::{GradientIndex, ParaxialGrin};
 pub use parameter::{Parameter, Quantity};
 pub use resolve::paraxial_image_distance;

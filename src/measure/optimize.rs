@@ -4,7 +4,7 @@ use super::double_gauss::double_gauss;
 use super::timing::{RateStatistics, time_ms};
 use super::trace::BenchmarkError;
 use crate::lens::{Lens, Parameter, Quantity, Variable};
-use crate::merit::{Goal, PupilEdge, Term, WeightedTerm};
+use crate::merit::{Goal, LimitTreatment, PupilEdge, Term, WeightedTerm};
 use crate::optimize::{DescentMethod, start};
 use rayon::ThreadPoolBuilder;
 use serde::Serialize;
@@ -92,7 +92,12 @@ fn time(
         WeightedTerm { term: Term::Spot, weight: 1.0 },
         WeightedTerm { term: Term::FocalLength(99.5), weight: 1e-2 },
     ];
-    let goal = Goal { terms, pupil: PupilEdge::Frozen, zoom_ratios: Vec::new() };
+    let goal = Goal {
+        terms,
+        pupil: PupilEdge::Frozen,
+        zoom_ratios: Vec::new(),
+        limits: LimitTreatment::default(),
+    };
     let mut search = start(method, lens, &goal, TOLERANCE)?;
     let before = search.terms()?;
     let mut times = Vec::with_capacity(steps);

@@ -21,16 +21,30 @@ pub(super) fn add_constraints(context: &EvaluationContext<'_>, term: Term, sum: 
 }
 
 /// A quantity of a lens with its bounds.
-struct Constraint {
+pub(super) struct Constraint {
     quantity: ConstrainedQuantity,
     min: Option<f64>,
     max: Option<f64>,
 }
 
+impl Constraint {
+    /// Its value, in mm or as a ratio; infinite if the lens does not limit it.
+    pub(super) fn value<R: Real>(&self, system: &System<R>) -> R {
+        self.quantity.length(system)
+    }
+
+    /// Its margin, with a value.
+    pub(super) fn margin(&self, term: Term, zoom: usize, value: f64) -> ConstraintMargin {
+        let Self { quantity, min, max } = self;
+        let (term, surface) = (term.name(), quantity.surface());
+        ConstraintMargin { term, surface, zoom, um: None, value, min: *min, max: *max }
+    }
+}
+
 /// The constraints of a term, with glass limited at both of its rims instead of at the larger one:
 /// the larger one may change from one rim to the other, and the maximum has a kink there that
 /// misleads a search.
-fn smooth_constraints(
+pub(super) fn smooth_constraints(
     zoom: &Configuration,
     systems: &ResolvedSystems,
     term: Term,
@@ -89,7 +103,7 @@ pub struct ConstraintMargin {
     pub surface: Option<usize>,
     /// The zoom position, counted from 0.
     pub zoom: usize,
-    /// The wavelength in micrometres if light is limited.
+    /// The wavelength in micrometres if the light at one of them is limited.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub um: Option<f64>,
     /// Its value: in mm, or a ratio for a steepness or for light.
@@ -100,6 +114,9 @@ pub struct ConstraintMargin {
     pub max: Option<f64>,
 }
 
+/// The limits of single fields.
+const LIGHT_LIMITS: [&str; 2] = ["light", "relative_illumination"];
+
 impl ConstraintMargin {
     /// The constrained surface, or the field with the wavelength, as it is displayed; `None` for the
     /// whole lens.
@@ -107,8 +124,23 @@ impl ConstraintMargin {
         let index = self.surface?;
         Some(match self.um {
             Some(um) => format!("field {index} at {um} um"),
+            None if LIGHT_LIMITS.contains(&self.term) => format!("field {index}"),
             None => format!("surface {}", SurfaceNumber::new(index)),
         })
+    }
+
+    /// The limited quantity with its place and its bounds, in words.
+    pub fn name(&self) -> String {
+        let place = self.place().map_or(String::new(), |place| format!(" of {place}"));
+        let zoom =
+            if self.zoom > 0 { format!(" at zoom position {}", self.zoom) } else { String::new() };
+        let bounds = match (self.min, self.max) {
+            (Some(min), Some(max)) if min == max => format!("= {min}"),
+            (Some(min), Some(max)) => format!("from {min} to {max}"),
+            (Some(min), None) => format!(">= {min}"),
+            (None, max) => format!("<= {}", max.unwrap_or(f64::INFINITY)),
+        };
+        format!("{}{place}{zoom} {bounds}", self.term)
     }
 
     /// The distance to the nearest bound, negative if the constraint is violated.
@@ -134,14 +166,8 @@ pub fn constraint_margins(
             lens.variables.iter().map(|v| lens.get(v.parameter).unwrap_or(0.0)).collect();
         let systems = zoom.at(&values)?;
         for term in &terms {
-            let margin = |Constraint { quantity, min, max }: Constraint| ConstraintMargin {
-                term: term.name(),
-                surface: quantity.surface(),
-                zoom: number,
-                um: None,
-                value: quantity.length(&systems.manufactured),
-                min,
-                max,
+            let margin = |constraint: Constraint| {
+                constraint.margin(*term, number, constraint.value(&systems.manufactured))
             };
             // An unlimited quantity, such as the edge of a gap without rims, is infinite.
             let all = constraints(&zoom, &systems, *term).into_iter().map(margin);

@@ -3,7 +3,7 @@
 
 use super::constraints::MinimumThickness;
 use super::goal::focal_lengths;
-use super::{Goal, MeritError, PupilEdge, Term, WeightedTerm};
+use super::{Goal, LimitTreatment, MeritError, PupilEdge, Term, WeightedTerm};
 use crate::lens::{Lens, Medium, Row};
 use std::f64::consts::PI;
 
@@ -98,7 +98,12 @@ impl Goal {
         );
         terms.push(in_spots(Term::Light(1.0), size));
         let zoom_ratios = zoom_ratios(lens, &focal_lengths);
-        Ok(Self { terms, pupil: PupilEdge::default(), zoom_ratios })
+        Ok(Self {
+            terms,
+            pupil: PupilEdge::default(),
+            zoom_ratios,
+            limits: LimitTreatment::default(),
+        })
     }
 
     /// Sharp spots at a focal length in mm, by default that of the lens, at every field at least
@@ -137,7 +142,7 @@ impl Goal {
         terms.push(WeightedTerm { term: Term::Steepness(limits.steepness), weight });
         terms.extend(limits.semi_diameter.map(|max| unit(Term::SemiDiameter { min: 0.0, max })));
         let zoom_ratios = zoom_ratios(lens, &focal_lengths);
-        Ok(Self { terms, pupil: PupilEdge::Moving, zoom_ratios })
+        Ok(Self { terms, pupil: PupilEdge::Moving, zoom_ratios, limits: LimitTreatment::Penalties })
     }
 }
 

@@ -1,7 +1,7 @@
 //! Goals that apply to a lens: its focal length, its light, its fields.
 
 use super::MeritError;
-use crate::lens::{Goal, Lens, Object, Term, WeightedTerm};
+use crate::lens::{Goal, Lens, LimitTreatment, Object, PupilEdge, Term, WeightedTerm};
 use crate::paraxial::{Beam, first_order};
 
 impl Term {
@@ -14,6 +14,18 @@ impl Term {
                 | Self::Light(_)
                 | Self::RelativeIllumination { .. }
                 | Self::FNumber(_)
+        )
+    }
+
+    /// True if the term limits the lens and says nothing about one that keeps the limit.
+    pub fn is_limit(self) -> bool {
+        !matches!(
+            self,
+            Self::Spot
+                | Self::SpotIntegral
+                | Self::Throughput
+                | Self::ThroughputLoss(_)
+                | Self::Distortion
         )
     }
 
@@ -73,6 +85,13 @@ impl Goal {
             term.check_light(lens)?;
         }
         Ok(())
+    }
+
+    /// True if a term is kept as a constraint. With frozen pupils the light has no derivative, and a
+    /// limit of it can only be a penalty.
+    pub(super) fn is_constraint(&self, term: Term) -> bool {
+        let derivable = self.pupil == PupilEdge::Moving || !term.concerns_light();
+        self.limits == LimitTreatment::Constraints && term.is_limit() && derivable
     }
 
     /// The target focal length at a zoom position in mm, from that of the first one.

@@ -12,9 +12,9 @@ use nalgebra::DVector;
 use std::f64::consts::PI;
 
 /// A number with its derivatives by the variables.
-struct WithGradient {
-    value: f64,
-    slope: DVector<f64>,
+pub(super) struct WithGradient {
+    pub(super) value: f64,
+    pub(super) slope: DVector<f64>,
 }
 
 /// Adds one of the terms of light.
@@ -61,27 +61,61 @@ fn light_loss(area: &WithGradient, factor: f64, start: f64, sum: &mut SumOfSquar
 }
 
 fn illumination(context: &EvaluationContext<'_>, field: usize, min: f64, sum: &mut SumOfSquares) {
-    let Some(axis) = context.sampling.axis() else { return };
-    let (here, center) =
-        (field_area(context, field, sum.level), field_area(context, axis, sum.level));
-    let cosine = context.sampling.cosine(field).unwrap_or(1.0);
-    let factor = cosine.powi(4) / center.value;
-    let share = factor * here.value;
-    if share < min {
-        let slope = here.slope * factor - center.slope * (share / center.value);
-        sum.add_residual(1.0, min - share, &-slope);
+    let found = relative_illumination(context, field, sum.level);
+    if let Some(share) = found.filter(|share| share.value < min) {
+        sum.add_residual(1.0, min - share.value, &-share.slope);
     }
 }
 
+/// The relative illumination of a field; `None` without a field on the axis.
+pub(super) fn relative_illumination(
+    context: &EvaluationContext<'_>,
+    field: usize,
+    level: DerivativeLevel,
+) -> Option<WithGradient> {
+    let axis = context.sampling.axis()?;
+    let (here, center) = (field_area(context, field, level), field_area(context, axis, level));
+    let cosine = context.sampling.cosine(field).unwrap_or(1.0);
+    let factor = cosine.powi(4) / center.value;
+    let value = factor * here.value;
+    let slope = here.slope * factor - center.slope * (value / center.value);
+    Some(WithGradient { value, slope })
+}
+
 fn f_number(context: &EvaluationContext<'_>, target: f64, sum: &mut SumOfSquares) {
-    let Some(axis) = context.sampling.axis() else { return };
-    let area = field_area(context, axis, sum.level);
+    if let Some(number) = axial_f_number(context, sum.level) {
+        sum.add_residual(1.0, number.value - target, &number.slope);
+    }
+}
+
+/// The f-number on the axis; `None` without a field there.
+pub(super) fn axial_f_number(
+    context: &EvaluationContext<'_>,
+    level: DerivativeLevel,
+) -> Option<WithGradient> {
+    let area = field_area(context, context.sampling.axis()?, level);
     let focal = focal_length_of(&context.systems.clipped[context.zoom.primary]);
     let diameter = 2.0 * (area.value / PI).sqrt();
-    let number = focal.abs() / diameter;
-    let by_focal = slopes(context, sum.level, focal_length_of) * (focal.signum() / diameter);
-    let slope = by_focal - area.slope * (0.5 * number / area.value);
-    sum.add_residual(1.0, number - target, &slope);
+    let value = focal.abs() / diameter;
+    let by_focal = slopes(context, level, focal_length_of) * (focal.signum() / diameter);
+    let slope = by_focal - area.slope * (0.5 * value / area.value);
+    Some(WithGradient { value, slope })
+}
+
+/// The area of the pupil of a field relative to that of the starting lens, both the weighted means
+/// over wavelengths.
+pub(super) fn light_share(
+    context: &EvaluationContext<'_>,
+    field: usize,
+    level: DerivativeLevel,
+) -> WithGradient {
+    let mine = context.sampling.pupils.iter().zip(context.initial_areas);
+    let mine = || mine.clone().filter(|(pupil, _)| pupil.field == field);
+    let weight: f64 = mine().map(|(pupil, _)| pupil.weight).sum();
+    let initial: f64 = mine().map(|(pupil, area)| pupil.weight * area).sum();
+    let now = field_area(context, field, level);
+    let factor = weight / initial;
+    WithGradient { value: now.value * factor, slope: now.slope * factor }
 }
 
 /// The weighted mean area of the pupils, in mm².

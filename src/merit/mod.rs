@@ -18,13 +18,15 @@ mod defaults;
 mod first_order;
 mod goal;
 mod light;
+mod limits;
 mod sampling;
 mod spot;
 mod sum;
 
-pub use crate::lens::{Goal, PupilEdge, Term, WeightedTerm};
+pub use crate::lens::{Goal, LimitTreatment, PupilEdge, Term, WeightedTerm};
 pub use constraints::{ConstraintMargin, constraint_margins};
 pub use defaults::{GoalLimits, LensFigures, MAX_STEEPNESS, default_terms};
+pub use limits::{Limit, LimitedSum};
 pub use sampling::SpotSampling;
 
 use crate::lens::{Lens, LensError, SurfaceNumber, Variable};
@@ -99,6 +101,12 @@ pub enum MeritError {
         term: &'static str,
         /// The reason.
         why: &'static str,
+    },
+    /// No lens near the first one keeps all limits.
+    #[error("no lens near this one keeps all of these limits: {}", .limits.join("; "))]
+    ConflictingLimits {
+        /// The limits that contradict each other; without any of them the others can be kept.
+        limits: Vec<String>,
     },
     /// The lens has no variables.
     #[error(
@@ -285,50 +293,64 @@ impl Merit {
         level: DerivativeLevel,
     ) -> Result<Vec<SumOfSquares>, MeritError> {
         let mut sums = vec![SumOfSquares::zero(values.len(), level); self.goal.terms.len()];
-        let positions = self.zooms.iter().zip(&self.samplings).zip(&self.initial_areas);
-        for ((zoom, sampling), start) in positions {
-            let systems = zoom.at(values)?;
-            if self.needs_pupil_edges() {
-                let model = zoom.ray_model(&systems, &self.lens, sampling.aiming)?;
-                let light = sampling.trace_pupils(&model, true);
-                sampling.check_light(&light)?;
-                if model.has_grin() && light.iter().any(TracedPupil::is_irregular) {
-                    let why = "the pupil is disconnected or not star-shaped, and in a \
-                               gradient-index lens the motion of its edge is unknown then; \
-                               expected a goal with frozen pupils";
-                    return Err(MeritError::DoesNotApply { term: "pupil", why });
-                }
-                let sampling = &sampling.with_pupils(&model, &light);
-                let light = &light[..];
-                let context = EvaluationContext {
-                    zoom,
-                    sampling,
-                    systems: &systems,
-                    values,
-                    initial_areas: start,
-                    traced_pupils: light,
-                };
-                self.add_terms(&context, &mut sums)?;
-            } else {
-                let light = &[];
-                let context = EvaluationContext {
-                    zoom,
-                    sampling,
-                    systems: &systems,
-                    values,
-                    initial_areas: start,
-                    traced_pupils: light,
-                };
-                self.add_terms(&context, &mut sums)?;
-            }
-        }
+        self.visit_positions(values, |context| self.add_terms(context, |_| true, &mut sums))?;
+        self.average(&mut sums)?;
+        Ok(sums)
+    }
+
+    /// Makes means over the zoom positions of sums over them.
+    fn average(&self, sums: &mut [SumOfSquares]) -> Result<(), MeritError> {
         for (sum, weighted) in sums.iter_mut().zip(&self.goal.terms) {
             sum.scale(1.0 / self.zooms.len() as f64);
             if !sum.is_finite() {
                 return Err(MeritError::NotFinite { term: weighted.term.name() });
             }
         }
-        Ok(sums)
+        Ok(())
+    }
+
+    /// Calls `visit` with the lens at every zoom position and its pupils, as far as a term needs
+    /// them.
+    fn visit_positions(
+        &self,
+        values: &[f64],
+        mut visit: impl FnMut(&EvaluationContext<'_>) -> Result<(), MeritError>,
+    ) -> Result<(), MeritError> {
+        let positions = self.zooms.iter().zip(&self.samplings).zip(&self.initial_areas);
+        for ((zoom, sampling), initial_areas) in positions {
+            let systems = &zoom.at(values)?;
+            if !self.needs_pupil_edges() {
+                let traced_pupils = &[];
+                visit(&EvaluationContext {
+                    zoom,
+                    sampling,
+                    systems,
+                    values,
+                    initial_areas,
+                    traced_pupils,
+                })?;
+                continue;
+            }
+            let model = zoom.ray_model(systems, &self.lens, sampling.aiming)?;
+            let traced_pupils = &sampling.trace_pupils(&model, true)[..];
+            sampling.check_light(traced_pupils)?;
+            if model.has_grin() && traced_pupils.iter().any(TracedPupil::is_irregular) {
+                let why = "the pupil is disconnected or not star-shaped, and in a gradient-index \
+                           lens the motion of its edge is unknown then; expected a goal with \
+                           frozen pupils";
+                return Err(MeritError::DoesNotApply { term: "pupil", why });
+            }
+            let sampling = &sampling.with_pupils(&model, traced_pupils);
+            visit(&EvaluationContext {
+                zoom,
+                sampling,
+                systems,
+                values,
+                initial_areas,
+                traced_pupils,
+            })?;
+        }
+        Ok(())
     }
 
     /// True if some term depends on the edges of the pupils.
@@ -338,12 +360,15 @@ impl Merit {
         self.goal.pupil == PupilEdge::Moving && self.goal.terms.iter().any(|w| needs(w.term))
     }
 
+    /// Adds the chosen terms at a zoom position.
     fn add_terms(
         &self,
         context: &EvaluationContext<'_>,
+        chosen: impl Fn(Term) -> bool,
         sums: &mut [SumOfSquares],
     ) -> Result<(), MeritError> {
-        for (sum, weighted) in sums.iter_mut().zip(&self.goal.terms) {
+        let terms = sums.iter_mut().zip(&self.goal.terms);
+        for (sum, weighted) in terms.filter(|(_, weighted)| chosen(weighted.term)) {
             match weighted.term {
                 Term::Spot => spot::add_spot(context, spot::Normalization::PupilArea, sum)?,
                 Term::SpotIntegral => {

@@ -5,6 +5,7 @@
 
 mod adam;
 mod least_squares;
+mod limited;
 pub mod pareto;
 mod segment;
 mod state;
@@ -13,7 +14,7 @@ mod trust_region;
 pub use segment::{DescentState, SegmentResult, SegmentSettings, run_segment};
 
 use crate::lens::Lens;
-use crate::merit::{Goal, Merit, MeritError, TermValue};
+use crate::merit::{ConstraintMargin, Goal, Merit, MeritError, TermValue};
 use serde::{Deserialize, Serialize};
 use std::fmt::Debug;
 
@@ -30,6 +31,29 @@ pub trait Optimizer: Send + Debug {
     fn current(&self) -> &Lens;
     /// Every term of the merit function for the best lens so far.
     fn terms(&self) -> Result<Vec<TermValue>, MeritError>;
+    /// The limits that hold the best lens verified last; empty for a method or a goal without
+    /// constraints.
+    fn binding_limits(&self) -> &[LimitPrice] {
+        &[]
+    }
+    /// The smallest set of limits that contradict each other, if the optimizer has ended because of
+    /// them.
+    fn conflict(&self) -> &[String] {
+        &[]
+    }
+}
+
+/// A limit that holds a lens, with its price.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct LimitPrice {
+    /// The limited number.
+    #[serde(flatten)]
+    pub limit: ConstraintMargin,
+    /// The bound at which it is, in mm or as a ratio.
+    pub bound: f64,
+    /// What the merit would gain, in mm² per mm or per unit of the ratio, by a looser bound. For a
+    /// number with a prescribed value: by a larger one, negative if it would lose.
+    pub price: f64,
 }
 
 /// The progress of an optimizer after a step.
@@ -37,6 +61,8 @@ pub trait Optimizer: Send + Debug {
 pub struct OptimizationProgress {
     /// The number of steps so far.
     pub step: usize,
+    /// The number of evaluations of the merit with its derivatives so far.
+    pub evaluations: usize,
     /// The merit of the current lens.
     pub merit: f64,
     /// The merit of the best lens so far.
@@ -62,6 +88,8 @@ pub enum OptimizationEnd {
     Tolerance,
     /// Several steps have gained nothing.
     NoGain,
+    /// No lens near this one keeps all limits.
+    Conflict,
 }
 
 impl OptimizationEnd {
@@ -71,6 +99,7 @@ impl OptimizationEnd {
             Self::Gradient => "the gradient has vanished",
             Self::Tolerance => "nothing can be gained at the tolerance of the spots",
             Self::NoGain => "several steps have gained nothing",
+            Self::Conflict => "the limits contradict each other",
         }
     }
 }
@@ -119,6 +148,9 @@ pub fn start(
         }
         DescentMethod::DampedLeastSquares => {
             Box::new(least_squares::LeastSquaresOptimizer::new(merit, lens)?)
+        }
+        DescentMethod::TrustRegion if merit.has_limits() => {
+            Box::new(limited::LimitedOptimizer::new(merit, lens, tolerance)?)
         }
         DescentMethod::TrustRegion => {
             Box::new(trust_region::TrustRegionOptimizer::new(merit, lens, tolerance)?)

@@ -15,7 +15,9 @@
 use super::{DescentMethod, Optimizer, start, start_annealed};
 use crate::analysis::{AnalysisError, image_quality};
 use crate::lens::{Lens, LensError, ParameterKind, Quantity, add_variables};
-use crate::merit::{Goal, MAX_STEEPNESS, Merit, MeritError, PupilEdge, Term, WeightedTerm};
+use crate::merit::{
+    Goal, LimitTreatment, MAX_STEEPNESS, Merit, MeritError, PupilEdge, Term, WeightedTerm,
+};
 use crate::pupil::{RayModelError, limited_by_stop};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -432,7 +434,12 @@ pub fn weighted_sum_goal(lens: &Lens, light: f64, pupil: PupilEdge) -> Result<Go
     // No field may go dark: an empty spot would be the sharpest of all.
     let light_term = terms[0].weight * light * goal_size(lens).powi(2);
     terms.push(WeightedTerm { term: Term::Light(MIN_LIGHT), weight: light_term });
-    Ok(Goal { terms, pupil, zoom_ratios: default_goal.zoom_ratios })
+    Ok(Goal {
+        terms,
+        pupil,
+        zoom_ratios: default_goal.zoom_ratios,
+        limits: LimitTreatment::Penalties,
+    })
 }
 
 /// The spot radius in mm at which a violated minimum of light outweighs sharpness.

@@ -5,6 +5,7 @@ use super::{OptimizationEnd, OptimizationProgress};
 use crate::lens::{ASPHERE_TERMS, Lens, Medium, Quantity, RADIAL_TERMS, Variable};
 use crate::merit::{DerivativeLevel, Merit, MeritError, SumOfSquares, TermValue};
 use crate::solve::AdamMoments;
+use nalgebra::DVector;
 
 /// The number of times a step is halved before it is rejected.
 const MAX_HALVINGS: usize = 12;
@@ -114,6 +115,12 @@ impl OptimizerState {
         }
     }
 
+    /// The scaled change that leads from the current values to others.
+    pub(super) fn scaled_change(&self, values: &[f64]) -> DVector<f64> {
+        let changes = values.iter().zip(&self.values).zip(&self.scales);
+        DVector::from_iterator(values.len(), changes.map(|((to, from), scale)| (to - from) / scale))
+    }
+
     /// The variables after a fraction of a step, clamped to their bounds.
     pub(super) fn proposal(&self, step: &[f64], fraction: f64) -> Vec<f64> {
         let moved = |i: usize| {
@@ -129,6 +136,12 @@ impl OptimizerState {
         values: &[f64],
         detail: DerivativeLevel,
     ) -> Result<SumOfSquares, MeritError> {
+        self.check_finite(values)?;
+        self.merit.evaluate(values, detail)
+    }
+
+    /// Returns an error if a value of a variable is not finite.
+    pub(super) fn check_finite(&self, values: &[f64]) -> Result<(), MeritError> {
         if let Some(i) = values.iter().position(|v| !v.is_finite()) {
             let parameter = self.merit.variables()[i].parameter;
             let found = values[i];
@@ -136,7 +149,7 @@ impl OptimizerState {
             let expected = "a finite number";
             return Err(crate::lens::LensError::InvalidNumber { what, found, expected }.into());
         }
-        self.merit.evaluate(values, detail)
+        Ok(())
     }
 
     pub(super) fn accept_step(&mut self, values: Vec<f64>, value: f64) {
@@ -219,6 +232,7 @@ impl OptimizerState {
         self.steps += 1;
         OptimizationProgress {
             step: self.steps,
+            evaluations: self.evaluations,
             merit: self.value,
             best: self.best_value,
             accepted,
@@ -268,7 +282,7 @@ impl OptimizerState {
     }
 
     /// The merit function with the rays of a lens, and its value there.
-    fn with_own_rays(&self, lens: &Lens) -> Option<(Merit, SumOfSquares)> {
+    pub(super) fn with_own_rays(&self, lens: &Lens) -> Option<(Merit, SumOfSquares)> {
         let mut merit = self.merit.clone();
         merit.resample(lens).ok()?;
         let sum = merit.evaluate(&merit.values(lens), DerivativeLevel::Normal).ok()?;
@@ -313,7 +327,7 @@ impl OptimizerState {
     }
 }
 
-fn clamp(variable: &Variable, value: f64) -> f64 {
+pub(super) fn clamp(variable: &Variable, value: f64) -> f64 {
     let low = variable.min.map_or(value, |min| value.max(min));
     variable.max.map_or(low, |max| low.min(max))
 }

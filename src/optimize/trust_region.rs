@@ -142,7 +142,7 @@ impl TrustRegionOptimizer {
 }
 
 /// The merit with its derivatives by scaled variables.
-fn scaled_point(state: &OptimizerState, sum: &SumOfSquares) -> LeastSquaresPoint {
+pub(super) fn scaled_point(state: &OptimizerState, sum: &SumOfSquares) -> LeastSquaresPoint {
     let scales = DVector::from_column_slice(&state.scales);
     let half_gradient = sum.gradient.component_mul(&scales) * 0.5;
     let mut normal = sum.normal.clone();

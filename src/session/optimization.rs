@@ -3,7 +3,7 @@
 use super::run::{Engine, RunKind, RunStatus, RunView, thin_history};
 use crate::lens::{Lens, Parameter};
 use crate::merit::{Goal, TermValue};
-use crate::optimize::{DescentMethod, OptimizationProgress, Optimizer};
+use crate::optimize::{DescentMethod, LimitPrice, OptimizationProgress, Optimizer};
 use serde::{Deserialize, Serialize};
 use std::convert::Infallible;
 use std::sync::Arc;
@@ -46,6 +46,8 @@ pub struct OptimizationSnapshot {
     pub initial_terms: Vec<TermValue>,
     /// The terms of the merit for the best lens so far.
     pub best_terms: Vec<TermValue>,
+    /// The limits that hold the best lens verified last, with their prices.
+    pub limits: Vec<LimitPrice>,
     /// The merit against the step, with at most a few thousand points over the whole run.
     pub history: Vec<MeritSample>,
     /// The lenses along the way.
@@ -133,6 +135,7 @@ impl OptimizationEngine {
             request: Arc::new(request),
             initial_terms,
             best_terms: Vec::new(),
+            limits: Vec::new(),
             history: vec![MeritSample { step: 0, current: merit, best: merit }],
             curve: Arc::default(),
         };
@@ -205,6 +208,7 @@ impl Engine for OptimizationEngine {
             best: Arc::new(self.with_goal(self.optimizer.best())),
             current: Arc::new(self.with_goal(self.optimizer.current())),
             best_terms: self.optimizer.terms().unwrap_or_default(),
+            limits: self.optimizer.binding_limits().to_vec(),
             ..self.state.clone()
         }
     }

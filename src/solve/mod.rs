@@ -6,14 +6,19 @@
 mod adam;
 mod bounds;
 mod cgls;
+mod constrained;
 mod lbfgs;
 mod levenberg_marquardt;
 mod projection;
+mod quadratic_program;
 mod trust_region;
 
 pub use adam::{Adam, AdamMoments};
 pub use bounds::ParameterBounds;
 pub use cgls::cgls;
+pub use constrained::{
+    LimitValues, LimitedPoint, LimitedStep, LimitedTrustRegion, SLACK, smallest_conflict,
+};
 pub use lbfgs::{Lbfgs, LbfgsStep};
 pub use levenberg_marquardt::{
     Damping, LevenbergMarquardt, LevenbergMarquardtStep, NielsenDamping, ResidualRows, damped_step,

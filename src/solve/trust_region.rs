@@ -23,7 +23,7 @@ pub struct LeastSquaresPoint {
 
 /// The matrix that a step takes for half the Hessian.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum HessianModel {
+pub(super) enum HessianModel {
     /// `JᵀJ`.
     GaussNewton,
     /// `JᵀJ + S`.
@@ -43,12 +43,12 @@ pub struct TrustRegionStep {
 #[derive(Debug, Clone, PartialEq)]
 pub struct TrustRegion {
     /// The largest length of a step in scaled parameters; `None` before the first one.
-    radius: Option<f64>,
+    pub(super) radius: Option<f64>,
     /// The scale of every parameter: the root of the largest diagonal entry of `JᵀJ` so far.
-    scales: DVector<f64>,
+    pub(super) scales: DVector<f64>,
     /// `S`.
     secant: DMatrix<f64>,
-    model: HessianModel,
+    pub(super) model: HessianModel,
 }
 
 /// The decrease relative to the predicted one from which a trial is accepted.
@@ -150,7 +150,7 @@ impl TrustRegion {
         }
     }
 
-    fn hessian(&self, point: &LeastSquaresPoint, model: HessianModel) -> DMatrix<f64> {
+    pub(super) fn hessian(&self, point: &LeastSquaresPoint, model: HessianModel) -> DMatrix<f64> {
         match model {
             HessianModel::GaussNewton => point.normal.clone(),
             HessianModel::Augmented => &point.normal + &self.secant,
@@ -161,14 +161,19 @@ impl TrustRegion {
         change.component_mul(&self.scales).norm()
     }
 
-    fn update_scales(&mut self, normal: &DMatrix<f64>) {
+    pub(super) fn update_scales(&mut self, normal: &DMatrix<f64>) {
         let effects = normal.diagonal().map(|d| d.max(0.0).sqrt());
         let least = SMALLEST_SCALE * effects.max().max(f64::MIN_POSITIVE.sqrt());
         self.scales.zip_apply(&effects, |scale, effect| *scale = scale.max(effect).max(least));
     }
 
     /// Changes the model if the other one would have predicted the trial better.
-    fn choose_model(&mut self, step: &TrustRegionStep, from: &LeastSquaresPoint, real: f64) {
+    pub(super) fn choose_model(
+        &mut self,
+        step: &TrustRegionStep,
+        from: &LeastSquaresPoint,
+        real: f64,
+    ) {
         let other = match self.model {
             HessianModel::GaussNewton => HessianModel::Augmented,
             HessianModel::Augmented => HessianModel::GaussNewton,
@@ -182,7 +187,7 @@ impl TrustRegion {
 
     /// Corrects `S` so that `(normal + S) change` is the change of half the gradient. `S` is scaled
     /// down first where it exceeds what was found.
-    fn update_secant(
+    pub(super) fn update_secant(
         &mut self,
         change: &DVector<f64>,
         gradient_change: &DVector<f64>,
@@ -213,7 +218,14 @@ impl TrustRegion {
         ratio: f64,
         value: f64,
     ) {
-        let length = self.length(&step.change);
+        let slope = 2.0 * from.half_gradient.dot(&step.change);
+        self.resize(&step.change, ratio, slope, value - from.value);
+    }
+
+    /// Resizes the region after a trial with this ratio of the decrease to the predicted one, slope
+    /// at its start and rise of the function.
+    pub(super) fn resize(&mut self, change: &DVector<f64>, ratio: f64, slope: f64, rise: f64) {
+        let length = self.length(change);
         let radius = self.radius.unwrap_or(length);
         let radius = if ratio >= GOOD {
             radius.max(GROWTH * length)
@@ -223,8 +235,7 @@ impl TrustRegion {
             SHRINKAGE[1] * length
         } else {
             // The minimum of the parabola through the value and slope here and the value there.
-            let slope = 2.0 * from.half_gradient.dot(&step.change);
-            let factor = -0.5 * slope / (value - from.value - slope);
+            let factor = -0.5 * slope / (rise - slope);
             let [least, most] = SHRINKAGE;
             if factor.is_finite() { factor.clamp(least, most) * length } else { least * length }
         };
@@ -294,7 +305,11 @@ impl TrustRegion {
 }
 
 /// `-(2 gᵀd + dᵀHd)`.
-fn decrease(hessian: &DMatrix<f64>, half_gradient: &DVector<f64>, change: &DVector<f64>) -> f64 {
+pub(super) fn decrease(
+    hessian: &DMatrix<f64>,
+    half_gradient: &DVector<f64>,
+    change: &DVector<f64>,
+) -> f64 {
     -(2.0 * half_gradient.dot(change) + change.dot(&(hessian * change)))
 }
 

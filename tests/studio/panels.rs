@@ -185,6 +185,7 @@ fn searching(standing: RunStatus) -> SessionView {
     let refused = Some("ray 4 is lost: clipped at surface 3".to_owned());
     let progress = OptimizationProgress {
         step: 7,
+        evaluations: 7,
         merit: 0.5,
         best: 0.25,
         accepted: 1.0,
@@ -199,6 +200,7 @@ fn searching(standing: RunStatus) -> SessionView {
         current: Arc::clone(&view.lens),
         initial_terms: Vec::new(),
         best_terms: Vec::new(),
+        limits: Vec::new(),
         history: Vec::new(),
         curve: Arc::default(),
     };

@@ -26,6 +26,7 @@ mod hard_cases;
 mod images;
 mod lens_library;
 mod library;
+mod limits;
 mod merit;
 mod optimize;
 mod paraxial;

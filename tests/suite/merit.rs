@@ -5,7 +5,7 @@ use aplanat::lens::{
     Aperture, FieldKind, FieldPoint, Lens, Medium, Object, Parameter, Pickup, Quantity, Row,
     Variable,
 };
-use aplanat::merit::{DerivativeLevel, Goal, Merit, PupilEdge, Term, WeightedTerm};
+use aplanat::merit::{DerivativeLevel, Goal, LimitTreatment, Merit, PupilEdge, Term, WeightedTerm};
 
 pub(crate) fn bundled(name: &str) -> Lens {
     files::open(format!("lenses/{name}.json")).unwrap().lens
@@ -60,8 +60,12 @@ fn terms() -> Vec<Term> {
 }
 
 pub(crate) fn check(lens: &Lens, term: Term, pupil: PupilEdge, steps: impl Fn(Quantity) -> f64) {
-    let goal =
-        Goal { terms: vec![WeightedTerm { term, weight: 1.0 }], zoom_ratios: Vec::new(), pupil };
+    let goal = Goal {
+        terms: vec![WeightedTerm { term, weight: 1.0 }],
+        zoom_ratios: Vec::new(),
+        limits: LimitTreatment::default(),
+        pupil,
+    };
     // The motion of the edge is exact in the limit of many rays only.
     let tolerance = if pupil == PupilEdge::Moving { 1e-11 } else { 1e-4 };
     let merit = Merit::new(lens, &goal, tolerance).unwrap();
@@ -186,6 +190,7 @@ fn pupils_without_light_have_a_derivative_towards_light() {
     let goal = Goal {
         terms: vec![WeightedTerm { term: Term::Throughput, weight: 1.0 }],
         zoom_ratios: Vec::new(),
+        limits: LimitTreatment::default(),
         pupil: PupilEdge::Moving,
     };
     let merit = Merit::new(&lens, &goal, 1e-3).unwrap();
@@ -225,6 +230,7 @@ fn a_pupil_in_pieces_has_the_derivative_of_the_warp_field() {
     let goal = |pupil| Goal {
         terms: vec![WeightedTerm { term: Term::Throughput, weight: 1.0 }],
         zoom_ratios: Vec::new(),
+        limits: LimitTreatment::default(),
         pupil,
     };
     let gradient = |pupil| {
@@ -270,6 +276,7 @@ fn the_gauss_newton_matrix_is_that_of_the_residuals() {
     let goal = Goal {
         terms: vec![WeightedTerm { term: Term::Spot, weight: 1.0 }],
         zoom_ratios: vec![],
+        limits: LimitTreatment::default(),
         pupil: PupilEdge::default(),
     };
     let merit = Merit::new(&lens, &goal, 1e-4).unwrap();

@@ -2,7 +2,7 @@
 
 use super::merit::{bundled, vary};
 use aplanat::lens::{Aperture, Lens, Parameter, ParameterKind, Pickup, Quantity, add_variables};
-use aplanat::merit::{Goal, Merit, MeritError, PupilEdge, Term, WeightedTerm};
+use aplanat::merit::{Goal, LimitTreatment, Merit, MeritError, PupilEdge, Term, WeightedTerm};
 use aplanat::optimize::{DescentMethod, start};
 
 /// Sharpness alone, with pupils that are kept, or all that a designer would ask for, light among it.
@@ -148,6 +148,7 @@ fn a_step_that_loses_a_ray_is_shortened_and_reported() {
     let goal = Goal {
         terms: vec![WeightedTerm { term: Term::BackFocus(400.0), weight: 1.0 }, spot()],
         zoom_ratios: Vec::new(),
+        limits: LimitTreatment::default(),
         pupil: PupilEdge::Frozen,
     };
     lens.variables.retain(|v| v.parameter.quantity == Quantity::Curvature);
@@ -173,6 +174,7 @@ fn a_goal_that_is_not_finite_or_does_not_apply_is_refused() {
         let goal = Goal {
             terms: vec![WeightedTerm { term, weight: 1.0 }],
             zoom_ratios: Vec::new(),
+            limits: LimitTreatment::default(),
             pupil: PupilEdge::default(),
         };
         let refused = start(DescentMethod::Adam, &lens, &goal, 1e-3).unwrap_err();
@@ -183,6 +185,7 @@ fn a_goal_that_is_not_finite_or_does_not_apply_is_refused() {
     let goal = Goal {
         terms: vec![WeightedTerm { term: Term::FocalLength(50.0), weight: 1.0 }],
         zoom_ratios: Vec::new(),
+        limits: LimitTreatment::default(),
         pupil: PupilEdge::default(),
     };
     assert!(start(DescentMethod::Adam, &afocal, &goal, 1e-3).is_err());
@@ -193,7 +196,12 @@ fn a_goal_that_is_not_finite_or_does_not_apply_is_refused() {
 fn a_lens_without_light_has_no_merit() {
     let mut lens = bundled("double_gauss_rudolph_50");
     lens.surfaces[0].semi_diameter = Some(0.0);
-    let goal = Goal { terms: vec![spot()], zoom_ratios: Vec::new(), pupil: PupilEdge::default() };
+    let goal = Goal {
+        terms: vec![spot()],
+        zoom_ratios: Vec::new(),
+        limits: LimitTreatment::default(),
+        pupil: PupilEdge::default(),
+    };
     let refused = start(DescentMethod::DampedLeastSquares, &lens, &goal, 1e-3).unwrap_err();
     assert!(matches!(refused, MeritError::NoLight { .. }), "{refused}");
 }
@@ -228,7 +236,12 @@ fn pickups_follow_the_optimization() {
     lens.variables.retain(|v| v.parameter != back);
     let source = Parameter::new(0, front);
     lens.pickups.push(Pickup { parameter: back, source, scale: -1.0, offset: 0.0 });
-    let goal = Goal { terms: vec![spot()], zoom_ratios: Vec::new(), pupil: PupilEdge::default() };
+    let goal = Goal {
+        terms: vec![spot()],
+        zoom_ratios: Vec::new(),
+        limits: LimitTreatment::default(),
+        pupil: PupilEdge::default(),
+    };
     let mut optimizer = start(DescentMethod::DampedLeastSquares, &lens, &goal, 1e-3).unwrap();
     for _ in 0..5 {
         optimizer.step();

@@ -7,7 +7,7 @@ use aplanat::lens::{
     Aperture, Edit, ElementEdit, FieldKind, FieldPoint, Fields, Lens, Medium, Object, Parameter,
     Pickup, Quantity, Row, Variable, ZoomPosition, ZoomThickness,
 };
-use aplanat::merit::{Goal, MeritError, PupilEdge, Term, TermValue, WeightedTerm};
+use aplanat::merit::{Goal, LimitTreatment, MeritError, PupilEdge, Term, TermValue, WeightedTerm};
 use aplanat::optimize::{DescentMethod, OptimizationProgress, Optimizer};
 use aplanat::pupil::RayModel;
 use aplanat::session::{
@@ -48,6 +48,7 @@ impl Optimizer for Toy {
         let finished = self.step == self.last;
         OptimizationProgress {
             step: self.step,
+            evaluations: self.step,
             merit,
             best: merit,
             accepted: 1.0,
@@ -92,13 +93,23 @@ fn session(lens: Lens) -> Session {
 
 const OPTIMIZE: Command = Command::Optimize {
     method: DescentMethod::Adam,
-    goal: Goal { terms: Vec::new(), zoom_ratios: Vec::new(), pupil: PupilEdge::Moving },
+    goal: Goal {
+        terms: Vec::new(),
+        zoom_ratios: Vec::new(),
+        limits: LimitTreatment::Constraints,
+        pupil: PupilEdge::Moving,
+    },
 };
 
 /// A merit function of the spots alone.
 fn spot_goal() -> Goal {
     let terms = vec![WeightedTerm { term: Term::Spot, weight: 2.5 }];
-    Goal { terms, zoom_ratios: Vec::new(), pupil: PupilEdge::Frozen }
+    Goal {
+        terms,
+        zoom_ratios: Vec::new(),
+        pupil: PupilEdge::Frozen,
+        limits: LimitTreatment::Constraints,
+    }
 }
 
 /// Waits until something has happened in the background.

@@ -2,7 +2,7 @@
 
 use super::session_pareto::wait;
 use aplanat::lens::{Edit, Parameter, Quantity, Variable, blank};
-use aplanat::merit::{Goal, PupilEdge, Term, WeightedTerm};
+use aplanat::merit::{Goal, LimitTreatment, PupilEdge, Term, WeightedTerm};
 use aplanat::optimize::DescentMethod;
 use aplanat::session::{Command, HistoryNode, Session};
 use std::sync::Arc;
@@ -73,7 +73,12 @@ fn an_accepted_optimization_keeps_its_course_and_can_be_rewound() {
     session.apply(Edit::AddVariable(variable).into());
     let start = session.view().version_id;
     let terms = vec![WeightedTerm { term: Term::FocalLength(150.0), weight: 1.0 }];
-    let goal = Goal { terms, pupil: PupilEdge::Frozen, zoom_ratios: Vec::new() };
+    let goal = Goal {
+        terms,
+        pupil: PupilEdge::Frozen,
+        zoom_ratios: Vec::new(),
+        limits: LimitTreatment::default(),
+    };
     session.apply(Command::Optimize { method: DescentMethod::DampedLeastSquares, goal });
     wait(&mut session, "the end", |view, _| !view.optimization.is_active());
     session.apply(Command::AcceptResult);

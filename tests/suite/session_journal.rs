@@ -3,7 +3,7 @@
 use super::session_pareto::wait;
 use aplanat::files;
 use aplanat::lens::{Edit, Lens, Parameter, Quantity, Variable, blank};
-use aplanat::merit::{Goal, PupilEdge, Term, WeightedTerm};
+use aplanat::merit::{Goal, LimitTreatment, PupilEdge, Term, WeightedTerm};
 use aplanat::optimize::DescentMethod;
 use aplanat::session::{Command, Session};
 use std::fs;
@@ -78,6 +78,7 @@ fn a_killed_design_reopens_where_it_was() {
         terms: vec![WeightedTerm { term: Term::Spot, weight: 2.0 }],
         pupil: PupilEdge::Frozen,
         zoom_ratios: Vec::new(),
+        limits: LimitTreatment::default(),
     };
     session.apply(Edit::SetMerit(Some(goal.clone())).into());
     session.apply(Command::NameVersion { id: 3, name: "left behind".into() });
@@ -171,7 +172,12 @@ fn an_interrupted_optimization_leaves_its_best_lens_in_the_history() {
     lens.variables = vec![Variable { parameter, min: None, max: None }];
     let mut session = journaled(lens, &folder.journals());
     let terms = vec![WeightedTerm { term: Term::FocalLength(150.0), weight: 1.0 }];
-    let goal = Goal { terms, pupil: PupilEdge::Frozen, zoom_ratios: Vec::new() };
+    let goal = Goal {
+        terms,
+        pupil: PupilEdge::Frozen,
+        zoom_ratios: Vec::new(),
+        limits: LimitTreatment::default(),
+    };
     session.apply(Command::Optimize { method: DescentMethod::Adam, goal: goal.clone() });
     wait(&mut session, "a journal", |_, _| folder.journals().join("unsaved.journal").exists());
     let copy = folder.0.join("copy");

@@ -3,11 +3,16 @@
 use super::{FOCAL, assert_near, field, lens, row, thin_rows};
 use aplanat::lens::{Aperture, FieldPoint, Lens, Medium, Parameter, Quantity, Row, Variable};
 use aplanat::lens::{Wavelength, glass};
-use aplanat::merit::{Goal, Merit, PupilEdge, Term, WeightedTerm};
+use aplanat::merit::{Goal, LimitTreatment, Merit, PupilEdge, Term, WeightedTerm};
 
 fn value(lens: &Lens, term: Term) -> f64 {
     let terms = vec![WeightedTerm { term, weight: 1.0 }];
-    let goal = Goal { terms, zoom_ratios: Vec::new(), pupil: PupilEdge::Moving };
+    let goal = Goal {
+        terms,
+        zoom_ratios: Vec::new(),
+        limits: LimitTreatment::default(),
+        pupil: PupilEdge::Moving,
+    };
     let mut lens = lens.clone();
     let parameter = Parameter::new(lens.surfaces.len() - 1, Quantity::Thickness);
     lens.variables = vec![Variable { parameter, min: None, max: None }];

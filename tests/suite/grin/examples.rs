@@ -4,7 +4,7 @@
 use super::lens::{lens_of, ray, system};
 use crate::merit::bundled;
 use aplanat::lens::{Lens, Medium, Parameter, Quantity, RADIAL_TERMS};
-use aplanat::merit::{Goal, PupilEdge, Term, WeightedTerm};
+use aplanat::merit::{Goal, LimitTreatment, PupilEdge, Term, WeightedTerm};
 use aplanat::optimize::{DescentMethod, start};
 use aplanat::paraxial::{Beam, first_order, paraxial_ray};
 use aplanat::search::lens_landscape::LensSummary;
@@ -21,7 +21,12 @@ fn sharpest(mut lens: Lens, free: &[Parameter]) -> Lens {
     lens.fields.values.truncate(1);
     free.iter().for_each(|p| crate::merit::vary(&mut lens, p.surface, p.quantity));
     let terms = vec![WeightedTerm { term: Term::Spot, weight: 1.0 }];
-    let goal = Goal { terms, zoom_ratios: Vec::new(), pupil: PupilEdge::Frozen };
+    let goal = Goal {
+        terms,
+        zoom_ratios: Vec::new(),
+        limits: LimitTreatment::default(),
+        pupil: PupilEdge::Frozen,
+    };
     let mut search = start(DescentMethod::DampedLeastSquares, &lens, &goal, 1e-6).unwrap();
     for _ in 0..60 {
         if search.step().finished {

@@ -9,7 +9,7 @@ use aplanat::lens::{
     Quantity, Shape, System, Variable, ZoomPosition, ZoomThickness, add_variables,
 };
 use aplanat::math::{Real, Vec3};
-use aplanat::merit::{Goal, Merit, PupilEdge, Term, WeightedTerm};
+use aplanat::merit::{Goal, LimitTreatment, Merit, PupilEdge, Term, WeightedTerm};
 use aplanat::optimize::{DescentMethod, start};
 use aplanat::paraxial::{Beam, first_order};
 use aplanat::pupil::{
@@ -339,6 +339,7 @@ fn grin_lens_a_search_finds_the_term_in_r4_that_sharpens_a_rod() {
     let goal = Goal {
         terms: vec![WeightedTerm { term: Term::Spot, weight: 1.0 }],
         zoom_ratios: Vec::new(),
+        limits: LimitTreatment::default(),
         pupil: PupilEdge::Frozen,
     };
     let before = Merit::new(&lens, &goal, 1e-6).unwrap().terms(&[0.0]).unwrap()[0].value.sqrt();

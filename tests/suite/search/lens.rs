@@ -7,7 +7,7 @@ use aplanat::lens::{
     FieldKind, FieldPoint, Fields, Lens, Medium, Parameter, Quantity, Variable, Wavelength,
 };
 use aplanat::math::quadrature::gauss_legendre;
-use aplanat::merit::{Goal, PupilEdge, Term, WeightedTerm};
+use aplanat::merit::{Goal, LimitTreatment, PupilEdge, Term, WeightedTerm};
 use aplanat::optimize::{DescentMethod, DescentState};
 use aplanat::search::lens_landscape::{
     DescentSettings, LensLandscape, LensSummary, SearchPlan, finalize, run, with_open_apertures,
@@ -204,7 +204,12 @@ fn a_start_without_light_is_refused_or_recovered() {
     let mut lens = wide_open();
     let stop = lens.stop().unwrap();
     let sharp = vec![WeightedTerm { term: Term::Spot, weight: 1.0 }];
-    let only = Goal { terms: sharp, pupil: PupilEdge::Moving, zoom_ratios: Vec::new() };
+    let only = Goal {
+        terms: sharp,
+        pupil: PupilEdge::Moving,
+        zoom_ratios: Vec::new(),
+        limits: LimitTreatment::default(),
+    };
     lens.surfaces[stop + 1].semi_diameter = Some(0.0);
     let dark = SearchPlan { goal: Some(only), ..plan(40) };
     let refusal = run(&lens, &dark, |_, _| ControlFlow::Continue(())).unwrap_err();
@@ -219,7 +224,12 @@ fn a_start_without_light_is_refused_or_recovered() {
 fn an_overflowing_merit_is_refused() {
     let lens = wide_open();
     let terms = vec![WeightedTerm { term: Term::FocalLength(-1e200), weight: 1e200 }];
-    let absurd = Goal { terms, pupil: PupilEdge::Moving, zoom_ratios: Vec::new() };
+    let absurd = Goal {
+        terms,
+        pupil: PupilEdge::Moving,
+        zoom_ratios: Vec::new(),
+        limits: LimitTreatment::default(),
+    };
     let plan = SearchPlan { goal: Some(absurd), ..plan(40) };
     let refusal = run(&lens, &plan, |_, _| ControlFlow::Continue(())).unwrap_err();
     assert!(refusal.to_string().contains("finite") || refusal.to_string().contains("loss"));

@@ -8,7 +8,7 @@ use super::limits;
 use super::terms::{self, can_ask_for_more_light, hint, targets, title, unit, value_text};
 use crate::lens::{Aperture, Edit, Lens, ParameterKind, Quantity};
 use crate::math::expression::evaluate;
-use crate::merit::{Goal, PupilEdge, Term, TermValue, WeightedTerm};
+use crate::merit::{Goal, LimitTreatment, PupilEdge, Term, TermValue, WeightedTerm};
 use crate::session::{Command, OptimizationSnapshot, SessionView};
 use crate::studio::actions::Actions;
 use crate::studio::number;
@@ -23,6 +23,7 @@ pub(super) struct MeritEditor {
     terms: Vec<MeritRow>,
     edge: PupilEdge,
     zoom_ratios: Vec<f64>,
+    limits: LimitTreatment,
     /// The merit function of the design in the last frame; `None` before the first one.
     seen: Option<Option<Arc<Goal>>>,
     /// The merit function that was made of the terms last, until the design has it.
@@ -68,6 +69,7 @@ impl MeritEditor {
         self.terms = goal.terms.into_iter().map(row).collect();
         self.edge = goal.pupil;
         self.zoom_ratios = goal.zoom_ratios;
+        self.limits = goal.limits;
     }
 
     /// Makes the terms the merit function of the design if they differ from what they were.
@@ -85,6 +87,7 @@ impl MeritEditor {
             terms: self.active_terms().collect(),
             pupil: self.edge,
             zoom_ratios: self.zoom_ratios.clone(),
+            limits: self.limits,
         }
     }
 
@@ -221,6 +224,7 @@ fn goal_of(view: &SessionView) -> Goal {
         terms: vec![WeightedTerm { term: Term::Spot, weight: 1.0 }],
         pupil: PupilEdge::default(),
         zoom_ratios: Vec::new(),
+        limits: LimitTreatment::default(),
     })
 }
 

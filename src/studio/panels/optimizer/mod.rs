@@ -5,6 +5,7 @@
 
 mod limits;
 mod merit_editor;
+mod prices;
 mod terms;
 
 use egui::{
@@ -61,6 +62,9 @@ impl Panel for OptimizerPanel {
         }
         ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
             self.merit.ui(ui, view, &mut self.buffers, actions);
+            if let Some(search) = view.optimization.snapshot.as_deref() {
+                prices::table(ui, &search.limits);
+            }
         });
         self.merit.write_changes(&goal, actions);
     }

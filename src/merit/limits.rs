@@ -1,0 +1,227 @@
+//! The limits of a lens as constraints: their values, their bounds and their derivatives.
+//!
+//! Lengths, shapes and the focal length follow from the numbers of the lens alone, and an optimizer
+//! can keep them without tracing a ray; the limits of light come from the pupils. The limits that
+//! need no rays come first.
+
+use super::constraints::{Constraint, ConstraintMargin, smooth_constraints};
+use super::first_order::focal_length_of;
+use super::light::{WithGradient, axial_f_number, light_share, relative_illumination};
+use super::sum::{DerivativeLevel, SumOfSquares};
+use super::{Dual1, EvaluationContext, Merit, MeritError, Term};
+use crate::lens::System;
+use nalgebra::DVector;
+
+/// A limited number of a lens, with its derivatives.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Limit {
+    /// The number with its bounds; an equality has two equal ones.
+    pub margin: ConstraintMargin,
+    /// Its derivatives by the variables; zeros unless they are asked for.
+    pub slope: DVector<f64>,
+    /// The weight of its squared violation in the goal.
+    pub weight: f64,
+}
+
+/// The merit without the terms that are constraints, and these.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LimitedSum {
+    /// The sum of the other terms.
+    pub objective: SumOfSquares,
+    /// The limits.
+    pub limits: Vec<Limit>,
+}
+
+/// A number of a resolved lens that is limited and needs no rays.
+enum Mechanical {
+    FocalLength,
+    Constraint(Constraint),
+}
+
+impl Mechanical {
+    fn value(&self, context: &EvaluationContext<'_>) -> f64 {
+        match self {
+            Self::FocalLength => focal_length_of(&context.systems.clipped[context.zoom.primary]),
+            Self::Constraint(constraint) => constraint.value(&context.systems.manufactured),
+        }
+    }
+
+    fn along(&self, system: &System<Dual1>) -> f64 {
+        match self {
+            Self::FocalLength => focal_length_of(system).slope[0],
+            Self::Constraint(constraint) => constraint.value(system).slope[0],
+        }
+    }
+}
+
+impl Merit {
+    /// True if the goal has terms that are constraints.
+    pub fn has_limits(&self) -> bool {
+        self.goal.terms.iter().any(|w| self.goal.is_constraint(w.term))
+    }
+
+    /// The merit without the terms that are constraints, and these with their derivatives.
+    ///
+    /// # Errors
+    /// As [`Merit::evaluate`].
+    pub fn evaluate_with_limits(
+        &self,
+        values: &[f64],
+        level: DerivativeLevel,
+    ) -> Result<LimitedSum, MeritError> {
+        let mut sums = vec![SumOfSquares::zero(values.len(), level); self.goal.terms.len()];
+        let (mut limits, mut of_light) = (Vec::new(), Vec::new());
+        self.visit_positions(values, |context| {
+            self.add_terms(context, |term| !self.goal.is_constraint(term), &mut sums)?;
+            self.add_mechanical_limits(context, level, &mut limits);
+            self.add_light_limits(context, level, &mut of_light);
+            Ok(())
+        })?;
+        self.average(&mut sums)?;
+        let mut objective = SumOfSquares::zero(values.len(), level);
+        for (sum, weighted) in sums.iter().zip(&self.goal.terms) {
+            objective.add(sum, weighted.weight);
+        }
+        limits.append(&mut of_light);
+        match limits.iter().find(|limit| !limit.is_finite()) {
+            Some(limit) => Err(MeritError::NotFinite { term: limit.margin.term }),
+            None => Ok(LimitedSum { objective, limits }),
+        }
+    }
+
+    /// The limits that need no rays, which come first among all.
+    ///
+    /// # Errors
+    /// A lens without first-order data.
+    pub fn mechanical_limits(
+        &self,
+        values: &[f64],
+        level: DerivativeLevel,
+    ) -> Result<Vec<Limit>, MeritError> {
+        let mut limits = Vec::new();
+        let positions = self.zooms.iter().zip(&self.samplings).zip(&self.initial_areas);
+        for ((zoom, sampling), initial_areas) in positions {
+            let systems = &zoom.at(values)?;
+            let traced_pupils = &[];
+            let context =
+                EvaluationContext { zoom, sampling, systems, values, initial_areas, traced_pupils };
+            self.add_mechanical_limits(&context, level, &mut limits);
+        }
+        match limits.iter().find(|limit| !limit.is_finite()) {
+            Some(limit) => Err(MeritError::NotFinite { term: limit.margin.term }),
+            None => Ok(limits),
+        }
+    }
+
+    fn add_mechanical_limits(
+        &self,
+        context: &EvaluationContext<'_>,
+        level: DerivativeLevel,
+        limits: &mut Vec<Limit>,
+    ) {
+        let count = context.values.len();
+        let mut numbers = Vec::new();
+        for weighted in self.goal.terms.iter().filter(|w| self.goal.is_constraint(w.term)) {
+            for (number, margin) in self.mechanical_numbers(context, weighted.term) {
+                let slope = DVector::zeros(count);
+                numbers.push((number, Limit { margin, slope, weight: weighted.weight }));
+            }
+        }
+        if level > DerivativeLevel::Value {
+            for variable in 0..count {
+                let system = context.zoom.system_along(context.systems, variable);
+                numbers.iter_mut().for_each(|(number, limit)| {
+                    limit.slope[variable] = number.along(&system);
+                });
+            }
+        }
+        limits.extend(numbers.into_iter().map(|(_, limit)| limit));
+    }
+
+    /// The limited numbers of a term that need no rays; those that nothing limits are left out, such
+    /// as the edge of a gap without rims.
+    fn mechanical_numbers(
+        &self,
+        context: &EvaluationContext<'_>,
+        term: Term,
+    ) -> Vec<(Mechanical, ConstraintMargin)> {
+        let number = context.zoom.zoom;
+        if let Term::FocalLength(target) = term {
+            let target = Some(self.goal.target(number, target));
+            let value = Mechanical::FocalLength.value(context);
+            let (term, surface, um) = (term.name(), None, None);
+            let margin = ConstraintMargin {
+                term,
+                surface,
+                zoom: number,
+                um,
+                value,
+                min: target,
+                max: target,
+            };
+            return vec![(Mechanical::FocalLength, margin)];
+        }
+        let measured = |constraint: Constraint| {
+            let value = constraint.value(&context.systems.manufactured);
+            let margin = constraint.margin(term, number, value);
+            (Mechanical::Constraint(constraint), margin)
+        };
+        let all = smooth_constraints(context.zoom, context.systems, term);
+        all.into_iter().map(measured).filter(|(_, margin)| margin.value != f64::INFINITY).collect()
+    }
+
+    fn add_light_limits(
+        &self,
+        context: &EvaluationContext<'_>,
+        level: DerivativeLevel,
+        limits: &mut Vec<Limit>,
+    ) {
+        for weighted in self.goal.terms.iter().filter(|w| self.goal.is_constraint(w.term)) {
+            let (term, zoom, weight) = (weighted.term.name(), context.zoom.zoom, weighted.weight);
+            let mut add = |field: Option<usize>, found: WithGradient, min, max| {
+                let WithGradient { value, slope } = found;
+                let margin =
+                    ConstraintMargin { term, surface: field, zoom, um: None, value, min, max };
+                limits.push(Limit { margin, slope, weight });
+            };
+            match weighted.term {
+                Term::Light(share) => {
+                    let lit = |field: &usize| {
+                        context.sampling.pupils.iter().any(|pupil| pupil.field == *field)
+                    };
+                    for field in (0..context.sampling.fields.len()).filter(lit) {
+                        add(Some(field), light_share(context, field, level), Some(share), None);
+                    }
+                }
+                Term::RelativeIllumination { field, min } => {
+                    if let Some(found) = relative_illumination(context, field, level) {
+                        add(Some(field), found, Some(min), None);
+                    }
+                }
+                Term::FNumber(target) => {
+                    if let Some(found) = axial_f_number(context, level) {
+                        add(None, found, Some(target), Some(target));
+                    }
+                }
+                _ => {}
+            }
+        }
+    }
+}
+
+impl Limit {
+    /// The bounds; infinite where there is none.
+    pub fn bounds(&self) -> [f64; 2] {
+        let ConstraintMargin { min, max, .. } = self.margin;
+        [min.unwrap_or(f64::NEG_INFINITY), max.unwrap_or(f64::INFINITY)]
+    }
+
+    /// The amount by which the limit is broken, 0 if it is kept.
+    pub fn violation(&self) -> f64 {
+        (-self.margin.slack()).max(0.0)
+    }
+
+    fn is_finite(&self) -> bool {
+        self.margin.value.is_finite() && self.slope.iter().all(|v| v.is_finite())
+    }
+}

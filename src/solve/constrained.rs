@@ -1,0 +1,509 @@
+//! Sums of squares under limits: sequential quadratic programming in the trust region of
+//! [`TrustRegion`].
+//!
+//! Every step minimizes the model of the sum of squares where the linearized limits hold; if they
+//! cannot all hold within the region, they are broken at a price (elastic mode, Fletcher's `Sl₁QP`;
+//! Nocedal and Wright, *Numerical Optimization*, 18.5). The secant matrix approximates the second
+//! derivatives of the Lagrangian that `JᵀJ` leaves out. A step is accepted if it lowers the sum plus
+//! the violations at their prices.
+
+use super::quadratic_program::{QuadraticProgram, QuadraticSolution};
+use super::trust_region::{
+    HessianModel, LeastSquaresPoint, TrustRegion, TrustRegionStep, decrease,
+};
+use nalgebra::{DMatrix, DVector, SymmetricEigen};
+
+/// Limited functions of the parameters at one point.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LimitValues {
+    /// The values.
+    pub values: DVector<f64>,
+    /// Their derivatives, one row each.
+    pub slopes: DMatrix<f64>,
+    /// The lower and upper bound of each; equal for an equality.
+    pub bounds: Vec<[f64; 2]>,
+    /// The square of each violation times this is comparable with the sum of squares.
+    pub weights: Vec<f64>,
+}
+
+/// A sum of squares with its limits at one point.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LimitedPoint {
+    /// The sum of squares.
+    pub objective: LeastSquaresPoint,
+    /// The limits.
+    pub limits: LimitValues,
+}
+
+/// A proposed step.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LimitedStep {
+    /// The change of every parameter.
+    pub change: DVector<f64>,
+    /// The limited functions behind the step, by their derivatives.
+    pub values: DVector<f64>,
+    /// The multiplier of every limit: what the sum of squares would gain by a bound looser by one
+    /// unit, negative for a lower bound.
+    pub multipliers: DVector<f64>,
+    /// The price of a violation of each limit, if they cannot all hold within the trust region.
+    pub elastic: Option<Vec<f64>>,
+}
+
+/// The state of the method between two trials.
+#[derive(Debug, Clone, PartialEq)]
+pub struct LimitedTrustRegion {
+    region: TrustRegion,
+    /// The price of a violation of each limit in the sum that has to fall.
+    prices: Vec<f64>,
+    /// The natural length of a step at the last point.
+    natural: f64,
+}
+
+/// The violation, in the unit of each limit, up to which a step from a point that keeps them may
+/// break them.
+pub const SLACK: f64 = 1e-3;
+/// The share of a limit's weight that counts for the scales of the parameters.
+const SCALE_SHARE: f64 = 1e-2;
+/// The price of a violation relative to the multiplier, and the part of it that remains.
+const PRICE_FACTOR: f64 = 2.0;
+const PRICE_MEMORY: f64 = 0.5;
+/// The price of a violation in elastic mode relative to the slope of the sum of squares.
+const ELASTIC_PRICE: f64 = 100.0;
+/// The curvature that every scaled parameter has at least; those with an effect have about 2.
+const SHORTNESS: f64 = 1e-9;
+/// The change of a limit by a step of natural length below which its derivatives are rounding.
+const SMALLEST_EFFECT: f64 = 1e-9;
+/// The decrease relative to the predicted one from which a trial is accepted.
+const ACCEPTED: f64 = 1e-4;
+
+impl LimitValues {
+    /// The amount by which each value is above its upper bound, negative below the lower one, 0
+    /// between them.
+    pub fn excesses(&self, values: &DVector<f64>) -> DVector<f64> {
+        let excess = |(value, [low, high]): (&f64, &[f64; 2])| {
+            (value - high).max(0.0) + (value - low).min(0.0)
+        };
+        DVector::from_iterator(values.len(), values.iter().zip(&self.bounds).map(excess))
+    }
+
+    /// The largest violation.
+    pub fn violation(&self) -> f64 {
+        self.excesses(&self.values).amax()
+    }
+
+    /// The values behind a change of the parameters, by their derivatives.
+    pub fn linearized(&self, change: &DVector<f64>) -> DVector<f64> {
+        &self.values + &self.slopes * change
+    }
+
+    /// The ranges by which the values may still change.
+    fn room(&self, values: &DVector<f64>) -> Vec<[f64; 2]> {
+        let range = |(value, [low, high]): (&f64, &[f64; 2])| [low - value, high - value];
+        values.iter().zip(&self.bounds).map(range).collect()
+    }
+}
+
+impl LimitedTrustRegion {
+    /// The method before its first step for this many parameters and limits.
+    pub fn new(parameters: usize, limits: usize) -> Self {
+        Self { region: TrustRegion::new(parameters), prices: vec![0.0; limits], natural: 0.0 }
+    }
+
+    /// True if the region is so small that no step would change anything.
+    pub fn is_exhausted(&self, point: &LimitedPoint) -> bool {
+        self.region.radius.is_some_and(|radius| radius <= 1e-10 * natural_radius(point))
+    }
+
+    /// The step from a point; every parameter may change by the range in `room`. `None` if none can
+    /// be computed.
+    pub fn propose(&mut self, point: &LimitedPoint, room: &[[f64; 2]]) -> Option<LimitedStep> {
+        self.update_scales(point);
+        let radius = *self.region.radius.get_or_insert(natural_radius(point));
+        let step = self.step(point, room, radius, self.region.model)?;
+        self.update_prices(point, &step);
+        Some(step)
+    }
+
+    /// The step of the Gauss-Newton model from a point if nothing but the limits and the ranges
+    /// confined it, and the decrease of the sum of squares that it promises.
+    pub fn unconfined(
+        &mut self,
+        point: &LimitedPoint,
+        room: &[[f64; 2]],
+    ) -> Option<(LimitedStep, f64)> {
+        self.update_scales(point);
+        let radius = UNCONFINED * natural_radius(point);
+        let LeastSquaresPoint { half_gradient, normal, .. } = &point.objective;
+        let step = self.step(point, room, radius, HessianModel::GaussNewton)?;
+        let promised = decrease(normal, half_gradient, &step.change);
+        Some((step, promised))
+    }
+
+    /// The smallest change, in the scales of the parameters, after which the limits hold by their
+    /// derivatives as far as they can; `aims` are the bounds to hold.
+    pub fn correction(
+        &self,
+        limits: &LimitValues,
+        aims: &[[f64; 2]],
+        room: &[[f64; 2]],
+    ) -> Option<DVector<f64>> {
+        let scales = &self.region.scales;
+        let rows = self.effective_rows(limits);
+        let aimed = LimitValues { bounds: aims.to_vec(), ..limits.clone() };
+        let excesses = aimed.excesses(&limits.values);
+        let distance = |(excess, row): (&f64, usize)| {
+            let length = rows.row(row).norm();
+            if length > 0.0 { (excess / length).powi(2) } else { 0.0 }
+        };
+        let distance = excesses.iter().zip(0..).map(distance).sum::<f64>().sqrt();
+        if !(distance > 0.0 && distance.is_finite()) {
+            return None;
+        }
+        let count = scales.len();
+        let prices: Vec<f64> = (0..aims.len())
+            .map(|row| 1e3 * distance / rows.row(row).norm().max(f64::MIN_POSITIVE))
+            .collect();
+        let program = |elastic| {
+            QuadraticProgram {
+                hessian: &DMatrix::identity(count, count),
+                gradient: &DVector::zeros(count),
+                rows: &rows,
+                bounds: &aimed.room(&limits.values),
+                room: &scaled_room(room, scales),
+                radius: 10.0 * distance,
+                elastic,
+            }
+            .solve()
+        };
+        let found = program(None).or_else(|| program(Some(&prices)))?;
+        Some(found.x.component_div(scales))
+    }
+
+    /// Takes note of a trial that could not be evaluated.
+    pub fn note_failure(&mut self, step: &LimitedStep) {
+        self.region.note_failure(&plain_step(step));
+    }
+
+    /// Takes note of a trial; true if it is accepted.
+    pub fn note_trial(
+        &mut self,
+        step: &LimitedStep,
+        from: &LimitedPoint,
+        to: &LimitedPoint,
+    ) -> bool {
+        let prices = self.prices.clone();
+        let penalty = |limits: &LimitValues, values: &DVector<f64>| -> f64 {
+            let excesses = limits.excesses(values);
+            excesses.iter().zip(&prices).map(|(excess, price)| price * excess.abs()).sum()
+        };
+        let before = from.objective.value + penalty(&from.limits, &from.limits.values);
+        let after = to.objective.value + penalty(&to.limits, &to.limits.values);
+        let hessian = self.region.hessian(&from.objective, self.region.model);
+        let gain = decrease(&hessian, &from.objective.half_gradient, &step.change);
+        let predicted =
+            gain + penalty(&from.limits, &from.limits.values) - penalty(&from.limits, &step.values);
+        let allowed = from.limits.violation().max(SLACK);
+        let ratio = (before - after) / predicted;
+        let accepted = predicted > 0.0
+            && ratio > ACCEPTED
+            && after < before
+            && to.limits.violation() <= allowed;
+        self.learn(step, from, to, accepted);
+        let ratio = if predicted > 0.0 && to.limits.violation() <= allowed { ratio } else { -1.0 };
+        let slope = 2.0 * from.objective.half_gradient.dot(&step.change)
+            - (penalty(&from.limits, &from.limits.values) - penalty(&from.limits, &step.values));
+        self.region.resize(&step.change, ratio, slope, after - before);
+        accepted
+    }
+
+    /// Takes the next step as the first one, in the same scales.
+    pub fn forget_radius(&mut self) {
+        self.region.radius = None;
+    }
+
+    /// Takes note that the function has changed a little; `shorter` if its steps were too long.
+    pub fn note_other_function(&mut self, shorter: bool) {
+        self.region.note_other_function(shorter);
+    }
+
+    /// The norm of half the gradient of the Lagrangian in scaled parameters, without those that
+    /// their range holds.
+    pub fn projected_gradient(
+        &mut self,
+        point: &LimitedPoint,
+        multipliers: &DVector<f64>,
+        room: &[[f64; 2]],
+    ) -> f64 {
+        self.region.projected_gradient(&lagrangian(point, multipliers), room)
+    }
+
+    /// The derivatives of the limits by scaled parameters; zeros for limits that no step changes.
+    fn effective_rows(&self, limits: &LimitValues) -> DMatrix<f64> {
+        let (slopes, scales) = (&limits.slopes, &self.region.scales);
+        let mut rows =
+            DMatrix::from_fn(slopes.nrows(), slopes.ncols(), |i, j| slopes[(i, j)] / scales[j]);
+        for mut row in rows.row_iter_mut() {
+            if row.norm() * self.natural <= SMALLEST_EFFECT {
+                row.fill(0.0);
+            }
+        }
+        rows
+    }
+
+    /// The prices at which the violations of a trial count: at least the slope of their squares by
+    /// weight.
+    fn update_prices(&mut self, point: &LimitedPoint, step: &LimitedStep) {
+        if let Some(prices) = &step.elastic {
+            self.prices.clone_from(prices);
+            return;
+        }
+        let excesses = point.limits.excesses(&point.limits.values);
+        let by_square = excesses.iter().zip(&point.limits.weights).map(|(e, w)| 2.0 * w * e.abs());
+        let by_multiplier = step.multipliers.iter().map(|m| PRICE_FACTOR * m.abs());
+        for ((price, square), multiplier) in
+            self.prices.iter_mut().zip(by_square).zip(by_multiplier)
+        {
+            *price = multiplier.max(PRICE_MEMORY * *price).max(square);
+        }
+    }
+
+    /// Corrects the secant matrix and chooses the better model by the Lagrangian.
+    fn learn(
+        &mut self,
+        step: &LimitedStep,
+        from: &LimitedPoint,
+        to: &LimitedPoint,
+        accepted: bool,
+    ) {
+        let [from, to] = [from, to].map(|point| lagrangian(point, &step.multipliers));
+        let hessian = self.region.hessian(&from, self.region.model);
+        let predicted = decrease(&hessian, &from.half_gradient, &step.change);
+        let plain = TrustRegionStep { change: step.change.clone(), predicted };
+        self.region.choose_model(&plain, &from, from.value - to.value);
+        if accepted {
+            let gradient_change = &to.half_gradient - &from.half_gradient;
+            self.region.update_secant(&step.change, &gradient_change, &to.normal);
+        }
+    }
+
+    /// Scales by the effects on the sum of squares and, to a small part, on the limits.
+    fn update_scales(&mut self, point: &LimitedPoint) {
+        let mut normal = point.objective.normal.clone();
+        for (row, weight) in point.limits.weights.iter().enumerate() {
+            for i in 0..normal.nrows() {
+                let slope = point.limits.slopes[(row, i)];
+                normal[(i, i)] += SCALE_SHARE * weight * slope * slope;
+            }
+        }
+        self.region.update_scales(&normal);
+        self.natural = natural_radius(point);
+    }
+
+    /// The minimum of the model under the limits within a radius.
+    fn step(
+        &self,
+        point: &LimitedPoint,
+        room: &[[f64; 2]],
+        radius: f64,
+        model: HessianModel,
+    ) -> Option<LimitedStep> {
+        let scales = self.region.scales.clone();
+        let rows = self.effective_rows(&point.limits);
+        let gradient = 2.0 * point.objective.half_gradient.component_div(&scales);
+        let hessian = self.convex_hessian(point, model);
+        let bounds = point.limits.room(&point.limits.values);
+        let room = &scaled_room(room, &scales);
+        let program = |elastic| {
+            QuadraticProgram {
+                hessian: &hessian,
+                gradient: &gradient,
+                rows: &rows,
+                bounds: &bounds,
+                room,
+                radius,
+                elastic,
+            }
+            .solve()
+        };
+        let steep = ELASTIC_PRICE * gradient.norm().max(radius * hessian.amax());
+        let prices = self.elastic_prices(&point.limits, &rows, steep);
+        let hard = program(None);
+        let elastic = if hard.is_none() { Some(prices) } else { None };
+        let found = hard.or_else(|| program(elastic.as_deref()))?;
+        let QuadraticSolution { x, multipliers } = found;
+        let change = x.component_div(&scales);
+        let values = point.limits.linearized(&change);
+        Some(LimitedStep { change, values, multipliers, elastic })
+    }
+
+    /// The prices of violations in elastic mode: above the slope of the sum of squares, and those of
+    /// their squares by weight.
+    fn elastic_prices(&self, limits: &LimitValues, rows: &DMatrix<f64>, steep: f64) -> Vec<f64> {
+        let excesses = limits.excesses(&limits.values);
+        let weighted = excesses.iter().zip(&limits.weights);
+        let price = |(row, (excess, weight)): (usize, (&f64, &f64))| {
+            let length = rows.row(row).norm();
+            let by_slope = if length > 0.0 { steep / length } else { 0.0 };
+            by_slope.max(2.0 * weight * excess.abs().max(SLACK))
+        };
+        (0..).zip(weighted).map(price).collect()
+    }
+
+    /// The Hessian of the model in scaled parameters without its negative curvatures.
+    fn convex_hessian(&self, point: &LimitedPoint, model: HessianModel) -> DMatrix<f64> {
+        let scales = &self.region.scales;
+        let mut hessian = self.region.hessian(&point.objective, model);
+        for i in 0..scales.len() {
+            for j in 0..scales.len() {
+                hessian[(i, j)] *= 2.0 / (scales[i] * scales[j]);
+            }
+        }
+        // Where nothing else decides, the shortest step is taken.
+        let shift = 1e-12 * hessian.amax() + SHORTNESS;
+        let shifted = &hessian + DMatrix::identity(scales.len(), scales.len()) * shift;
+        if shifted.clone().cholesky().is_some() {
+            return shifted;
+        }
+        let SymmetricEigen { eigenvectors, eigenvalues } = SymmetricEigen::new(hessian);
+        let curvatures = eigenvalues.map(|value| value.max(0.0) + shift);
+        &eigenvectors * DMatrix::from_diagonal(&curvatures) * eigenvectors.transpose()
+    }
+}
+
+/// The radius of an unconfined step relative to the natural one.
+const UNCONFINED: f64 = 100.0;
+
+/// The length of a step that changes the residuals by their own size.
+fn natural_radius(point: &LimitedPoint) -> f64 {
+    let limits = &point.limits;
+    let excesses = limits.excesses(&limits.values);
+    let broken: f64 = excesses.iter().zip(&limits.weights).map(|(e, w)| w * e * e).sum();
+    (point.objective.value.max(0.0) + broken).sqrt().max(f64::MIN_POSITIVE.sqrt())
+}
+
+/// The sum of squares plus the limited functions times their multipliers.
+fn lagrangian(point: &LimitedPoint, multipliers: &DVector<f64>) -> LeastSquaresPoint {
+    let LimitedPoint { objective, limits } = point;
+    LeastSquaresPoint {
+        value: objective.value + multipliers.dot(&limits.values),
+        half_gradient: &objective.half_gradient + limits.slopes.tr_mul(multipliers) * 0.5,
+        normal: objective.normal.clone(),
+    }
+}
+
+fn plain_step(step: &LimitedStep) -> TrustRegionStep {
+    TrustRegionStep { change: step.change.clone(), predicted: 0.0 }
+}
+
+fn scaled_room(room: &[[f64; 2]], scales: &DVector<f64>) -> Vec<[f64; 2]> {
+    room.iter().zip(scales.iter()).map(|([low, high], s)| [low * s, high * s]).collect()
+}
+
+/// The smallest set of limits that contradict each other, from a set that does: each is left out in
+/// turn, for good if the others still contradict each other (Chinneck and Dravnieks, ORSA J.
+/// Computing 3 (1991) 157).
+pub fn smallest_conflict(
+    conflicting: &[usize],
+    mut is_conflict: impl FnMut(&[usize]) -> bool,
+) -> Vec<usize> {
+    let mut remaining = conflicting.to_vec();
+    for candidate in conflicting {
+        let others: Vec<usize> = remaining.iter().copied().filter(|i| i != candidate).collect();
+        if is_conflict(&others) {
+            remaining = others;
+        }
+    }
+    remaining
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Minimizes residuals under limits, both given with their derivatives.
+    fn minimize(
+        start: &[f64],
+        bounds: &[[f64; 2]],
+        functions: impl Fn(&DVector<f64>) -> [(DVector<f64>, DMatrix<f64>); 2],
+    ) -> (DVector<f64>, LimitedPoint, DVector<f64>) {
+        let evaluate = |x: &DVector<f64>| {
+            let [(residuals, jacobian), (values, slopes)] = functions(x);
+            let objective = LeastSquaresPoint {
+                value: residuals.norm_squared(),
+                half_gradient: jacobian.tr_mul(&residuals),
+                normal: jacobian.tr_mul(&jacobian),
+            };
+            let weights = vec![1.0; bounds.len()];
+            LimitedPoint {
+                objective,
+                limits: LimitValues { values, slopes, bounds: bounds.to_vec(), weights },
+            }
+        };
+        let mut x = DVector::from_column_slice(start);
+        let mut point = evaluate(&x);
+        let mut method = LimitedTrustRegion::new(x.len(), bounds.len());
+        let room = vec![[-10.0, 10.0]; x.len()];
+        let mut multipliers = DVector::zeros(bounds.len());
+        for _ in 0..60 {
+            let Some(step) = method.propose(&point, &room) else { break };
+            if method.is_exhausted(&point) {
+                break;
+            }
+            let to = evaluate(&(&x + &step.change));
+            multipliers.clone_from(&step.multipliers);
+            if method.note_trial(&step, &point, &to) {
+                x += &step.change;
+                point = to;
+            }
+        }
+        (x, point, multipliers)
+    }
+
+    /// The point of a circle that is nearest to another point, from outside and inside.
+    #[test]
+    fn it_finds_the_nearest_point_of_a_curve_and_its_price() {
+        for start in [[3.0, 1.0], [0.1, -0.2], [-2.0, 0.5]] {
+            let (x, point, multipliers) = minimize(&start, &[[1.0, 1.0]], |x| {
+                let residuals = DVector::from_vec(vec![x[0] - 2.0, x[1] - 2.0]);
+                let circle = DVector::from_vec(vec![x.norm_squared()]);
+                let slope = DMatrix::from_row_slice(1, 2, &[2.0 * x[0], 2.0 * x[1]]);
+                [(residuals, DMatrix::identity(2, 2)), (circle, slope)]
+            });
+            let half = 0.5_f64.sqrt();
+            assert!((x[0] - half).abs() < 1e-8 && (x[1] - half).abs() < 1e-8, "{x}");
+            assert!(point.limits.violation() < 1e-9, "{}", point.limits.violation());
+            // d/dr² (2√2 - r)² at r = 1.
+            let price = 2.0 * 2.0_f64.sqrt() - 1.0;
+            assert!((multipliers[0] - price).abs() < 1e-6, "{multipliers}");
+        }
+    }
+
+    #[test]
+    fn a_limit_that_does_not_bind_costs_nothing() {
+        let (x, _, multipliers) = minimize(&[-1.2, 1.0], &[[f64::NEG_INFINITY, 5.0]], |x| {
+            let residuals = DVector::from_vec(vec![10.0 * (x[1] - x[0] * x[0]), 1.0 - x[0]]);
+            let jacobian = DMatrix::from_row_slice(2, 2, &[-20.0 * x[0], 10.0, -1.0, 0.0]);
+            let limit = DVector::from_vec(vec![x[0] + x[1]]);
+            [(residuals, jacobian), (limit, DMatrix::from_row_slice(1, 2, &[1.0, 1.0]))]
+        });
+        assert!((x[0] - 1.0).abs() < 1e-6, "{x}");
+        assert!(multipliers[0].abs() < 1e-9, "{multipliers}");
+    }
+
+    #[test]
+    fn contradictions_are_broken_as_little_as_possible() {
+        let bounds = [[1.0, f64::INFINITY], [f64::NEG_INFINITY, 0.0]];
+        let (x, point, _) = minimize(&[5.0], &bounds, |x| {
+            let value = DVector::from_vec(vec![x[0], x[0]]);
+            let slope = DMatrix::from_row_slice(2, 1, &[1.0, 1.0]);
+            [(x.clone(), DMatrix::identity(1, 1)), (value, slope)]
+        });
+        assert!((point.limits.violation() - 1.0).abs() < 1e-6 || (0.0..=1.0).contains(&x[0]));
+    }
+
+    #[test]
+    fn the_smallest_conflict_leaves_out_bystanders() {
+        let conflict = |set: &[usize]| set.contains(&1) && set.contains(&3);
+        assert_eq!(smallest_conflict(&[0, 1, 2, 3, 4], conflict), [1, 3]);
+    }
+}

@@ -1,0 +1,212 @@
+//! Convex quadratic programs within a ball: `min ½ xᵀPx + qᵀx` with `l ≤ Ax ≤ u`, a range for every
+//! parameter and `|x| ≤ radius`, by the interior-point method of Goulart and Chen
+//! (<https://arxiv.org/abs/2405.12762>).
+//!
+//! Rows may be elastic: they can be broken at a price per unit, so that there always is a solution.
+
+use clarabel::algebra::CscMatrix;
+use clarabel::solver::SupportedConeT::{NonnegativeConeT, SecondOrderConeT, ZeroConeT};
+use clarabel::solver::{DefaultSettings, DefaultSolver, IPSolver, SolverStatus};
+use nalgebra::{DMatrix, DVector};
+
+/// A quadratic program.
+pub(super) struct QuadraticProgram<'a> {
+    /// `P`, positive semidefinite.
+    pub(super) hessian: &'a DMatrix<f64>,
+    /// `q`.
+    pub(super) gradient: &'a DVector<f64>,
+    /// `A`.
+    pub(super) rows: &'a DMatrix<f64>,
+    /// `[l, u]` of every row.
+    pub(super) bounds: &'a [[f64; 2]],
+    /// The range of every parameter, which contains 0.
+    pub(super) room: &'a [[f64; 2]],
+    /// The radius of the ball; finite.
+    pub(super) radius: f64,
+    /// The price of breaking each row by one unit; `None` if none may be broken.
+    pub(super) elastic: Option<&'a [f64]>,
+}
+
+/// The solution of a quadratic program.
+pub(super) struct QuadraticSolution {
+    pub(super) x: DVector<f64>,
+    /// The multiplier of every row: positive where the upper bound holds it, negative where the
+    /// lower one does.
+    pub(super) multipliers: DVector<f64>,
+}
+
+/// The accuracy of the interior-point method, relative to the radius.
+const ACCURACY: f64 = 1e-10;
+
+/// One side of a row: `sign · row · x ≤ distance`.
+struct RowSide {
+    row: usize,
+    sign: f64,
+    distance: f64,
+    is_equality: bool,
+}
+
+/// The matrix of the constraints by triplets.
+#[derive(Default)]
+struct Triplets {
+    rows: Vec<usize>,
+    columns: Vec<usize>,
+    values: Vec<f64>,
+    right: Vec<f64>,
+}
+
+impl Triplets {
+    fn push(&mut self, column: usize, value: f64) {
+        self.rows.push(self.right.len());
+        self.columns.push(column);
+        self.values.push(value);
+    }
+
+    fn end_row(&mut self, right: f64) {
+        self.right.push(right);
+    }
+}
+
+impl QuadraticProgram<'_> {
+    /// The solution; `None` if the constraints contradict each other or the method fails.
+    pub(super) fn solve(&self) -> Option<QuadraticSolution> {
+        let sides = self.reachable_sides();
+        let equalities = sides.iter().filter(|side| side.is_equality).count();
+        let (matrix, slacks) = self.constraint_matrix(&sides);
+        let count = self.gradient.len();
+        let balls = count + 1;
+        let unlimited = matrix.right.len() - balls - equalities;
+        let cones = [ZeroConeT(equalities), NonnegativeConeT(unlimited), SecondOrderConeT(balls)];
+        let scale = slacks.iter().fold(self.objective_scale(), |most: f64, price| most.max(*price));
+        let hessian = self.scaled_hessian(count + slacks.len(), scale);
+        let mut gradient: Vec<f64> =
+            self.gradient.iter().map(|slope| slope * self.radius / scale).collect();
+        gradient.extend(slacks.iter().map(|price| price / scale));
+        let Triplets { rows, columns, values, right } = matrix;
+        let size = (right.len(), gradient.len());
+        let matrix = CscMatrix::new_from_triplets(size.0, size.1, rows, columns, values);
+        let solver = DefaultSolver::new(&hessian, &gradient, &matrix, &right, &cones, settings());
+        let mut solver = solver.ok()?;
+        solver.solve();
+        let usable = !matches!(
+            solver.solution.status,
+            SolverStatus::PrimalInfeasible
+                | SolverStatus::AlmostPrimalInfeasible
+                | SolverStatus::DualInfeasible
+                | SolverStatus::AlmostDualInfeasible
+                | SolverStatus::NumericalError
+                | SolverStatus::Unsolved
+        );
+        let x = DVector::from_column_slice(solver.solution.x.get(..count)?) * self.radius;
+        (usable && x.iter().all(|v| v.is_finite())).then(|| QuadraticSolution {
+            x,
+            multipliers: self.multipliers(&sides, &solver.solution.z, scale),
+        })
+    }
+
+    /// The sides of the rows that a step within the ball can reach, equalities first.
+    fn reachable_sides(&self) -> Vec<RowSide> {
+        let mut sides = Vec::new();
+        for (row, [low, high]) in self.bounds.iter().enumerate() {
+            let reach = self.rows.row(row).norm() * self.radius;
+            if !(reach > 0.0) {
+                continue;
+            }
+            if low == high {
+                sides.push(RowSide { row, sign: 1.0, distance: *high, is_equality: true });
+                continue;
+            }
+            for (sign, distance) in [(1.0, *high), (-1.0, -low)] {
+                if distance < reach {
+                    sides.push(RowSide { row, sign, distance, is_equality: false });
+                }
+            }
+        }
+        sides.sort_by_key(|side| !side.is_equality);
+        sides
+    }
+
+    /// The constraints in units of the radius, with rows of length 1, and the price of every slack.
+    fn constraint_matrix(&self, sides: &[RowSide]) -> (Triplets, Vec<f64>) {
+        let count = self.gradient.len();
+        let mut matrix = Triplets::default();
+        let mut slacks = Vec::new();
+        for side in sides {
+            let length = self.rows.row(side.row).norm();
+            for (column, slope) in self.rows.row(side.row).iter().enumerate() {
+                matrix.push(column, side.sign * slope / length);
+            }
+            if let Some(prices) = self.elastic {
+                let signs: &[f64] = if side.is_equality { &[-1.0, 1.0] } else { &[-1.0] };
+                for sign in signs {
+                    matrix.push(count + slacks.len(), *sign);
+                    slacks.push(prices[side.row] * length * self.radius);
+                }
+            }
+            matrix.end_row(side.distance / (length * self.radius));
+        }
+        for slack in 0..slacks.len() {
+            matrix.push(count + slack, -1.0);
+            matrix.end_row(0.0);
+        }
+        self.add_room(&mut matrix);
+        matrix.end_row(1.0);
+        for column in 0..count {
+            matrix.push(column, -1.0);
+            matrix.end_row(0.0);
+        }
+        (matrix, slacks)
+    }
+
+    fn add_room(&self, matrix: &mut Triplets) {
+        for (column, [low, high]) in self.room.iter().enumerate() {
+            for (sign, distance) in [(1.0, *high), (-1.0, -low)] {
+                if distance < self.radius {
+                    matrix.push(column, sign);
+                    matrix.end_row(distance.max(0.0) / self.radius);
+                }
+            }
+        }
+    }
+
+    /// The upper triangle of `P` in units of the radius, with zeros for the slacks.
+    fn scaled_hessian(&self, size: usize, scale: f64) -> CscMatrix<f64> {
+        let (mut rows, mut columns, mut values) = (Vec::new(), Vec::new(), Vec::new());
+        for column in 0..self.gradient.len() {
+            for row in 0..=column {
+                rows.push(row);
+                columns.push(column);
+                values.push(self.hessian[(row, column)] * self.radius * self.radius / scale);
+            }
+        }
+        CscMatrix::new_from_triplets(size, size, rows, columns, values)
+    }
+
+    /// The size of the objective within the ball.
+    fn objective_scale(&self) -> f64 {
+        let linear = self.radius * self.gradient.norm();
+        let scale = if linear > 0.0 { linear } else { self.radius.powi(2) * self.hessian.amax() };
+        if scale > 0.0 { scale } else { f64::MIN_POSITIVE.sqrt() }
+    }
+
+    fn multipliers(&self, sides: &[RowSide], duals: &[f64], scale: f64) -> DVector<f64> {
+        let mut multipliers = DVector::zeros(self.bounds.len());
+        for (side, dual) in sides.iter().zip(duals) {
+            let length = self.rows.row(side.row).norm();
+            multipliers[side.row] += side.sign * dual * scale / (length * self.radius);
+        }
+        multipliers
+    }
+}
+
+fn settings() -> DefaultSettings<f64> {
+    DefaultSettings {
+        verbose: false,
+        max_threads: 1,
+        max_iter: 60,
+        tol_gap_abs: ACCURACY,
+        tol_gap_rel: ACCURACY,
+        tol_feas: ACCURACY,
+        ..DefaultSettings::default()
+    }
+}

@@ -1,0 +1,206 @@
+//! Limits that the optimizer keeps.
+
+use super::merit::{bundled, vary};
+use aplanat::lens::{Lens, ParameterKind, Quantity, add_variables};
+use aplanat::merit::{
+    DerivativeLevel, Goal, LimitTreatment, Merit, MeritError, PupilEdge, Term, WeightedTerm,
+};
+use aplanat::optimize::{DescentMethod, Optimizer, start};
+
+/// The largest violation at the end.
+const KEPT: f64 = 1e-9;
+
+fn goal(terms: &[Term]) -> Goal {
+    let terms = terms.iter().map(|term| WeightedTerm { term: *term, weight: 1.0 }).collect();
+    Goal {
+        terms,
+        pupil: PupilEdge::Moving,
+        zoom_ratios: Vec::new(),
+        limits: LimitTreatment::Constraints,
+    }
+}
+
+/// The default goal with its limits as constraints.
+fn default_goal(lens: &Lens) -> Goal {
+    Goal { limits: LimitTreatment::Constraints, ..Goal::default_for(lens).unwrap() }
+}
+
+fn free(name: &str) -> Lens {
+    let mut lens = bundled(name);
+    if lens.variables.is_empty() {
+        add_variables(&mut lens, &[ParameterKind::Curvatures, ParameterKind::Thicknesses]);
+    }
+    lens
+}
+
+fn run(lens: &Lens, goal: &Goal, steps: usize) -> Box<dyn Optimizer> {
+    let mut optimizer = start(DescentMethod::TrustRegion, lens, goal, 1e-4).unwrap();
+    let taken = (0..steps).take_while(|_| optimizer.step().end.is_none()).count();
+    println!("{taken} steps");
+    optimizer.verify_best();
+    optimizer
+}
+
+/// The largest violation of the limits of a lens, judged by its own rays, and its merit.
+fn judge(best: &Lens, start: &Lens, goal: &Goal) -> (f64, f64) {
+    let light = Merit::new(start, goal, 1e-4).unwrap().initial_light().to_vec();
+    let merit = Merit::new(best, goal, 1e-4).unwrap().with_initial_light(&light);
+    let found = merit.evaluate_with_limits(&merit.values(best), DerivativeLevel::Value).unwrap();
+    for limit in found.limits.iter().filter(|limit| limit.violation() > KEPT) {
+        println!("broken: {} is {}", limit.margin.name(), limit.margin.value);
+    }
+    (found.limits.iter().map(|l| l.violation()).fold(0.0, f64::max), found.objective.value)
+}
+
+#[test]
+fn lenses_end_within_their_limits() {
+    for name in ["tessar_50_f28", "achromat_ac254_100", "double_gauss_nikkor_s_50"] {
+        let lens = free(name);
+        let goal = default_goal(&lens);
+        let (_, before) = judge(&lens, &lens, &goal);
+        let (violation, merit) = judge(run(&lens, &goal, 30).best(), &lens, &goal);
+        assert!(violation <= KEPT && merit < before, "{name}: {violation:e} {before:e} {merit:e}");
+    }
+}
+
+#[test]
+fn a_start_outside_every_limit_is_led_in() {
+    let lens = free("tessar_50_f28");
+    let goal = goal(&[
+        Term::Spot,
+        Term::FocalLength(46.0),
+        Term::GlassCenter { min: 3.2, max: 20.0 },
+        Term::GlassEdge(1.5),
+        Term::AirCenter { min: 1.5, max: 12.0 },
+        Term::TotalTrack(54.0),
+        Term::BackFocus(35.0),
+    ]);
+    let merit = Merit::new(&lens, &goal, 1e-4).unwrap();
+    let at_start =
+        merit.evaluate_with_limits(&merit.values(&lens), DerivativeLevel::Value).unwrap();
+    let broken = at_start.limits.iter().filter(|limit| limit.violation() > 0.0).count();
+    assert!(broken >= 4, "{broken}");
+    let (violation, merit) = judge(run(&lens, &goal, 60).best(), &lens, &goal);
+    assert!(violation <= KEPT && merit.is_finite(), "{violation:e}");
+}
+
+#[test]
+fn limits_that_contradict_each_other_are_named() {
+    let lens = free("tessar_50_f28");
+    let goal = goal(&[
+        Term::Spot,
+        Term::GlassCenter { min: 0.5, max: 20.0 },
+        Term::TotalTrack(30.0),
+        Term::Steepness(0.9),
+        Term::BackFocus(38.0),
+        Term::AirCenter { min: 0.1, max: 40.0 },
+    ]);
+    let refused = start(DescentMethod::TrustRegion, &lens, &goal, 1e-3).unwrap_err();
+    let MeritError::ConflictingLimits { limits } = refused else { panic!("{refused}") };
+    let names: Vec<&str> =
+        limits.iter().map(|name| name.split_whitespace().next().unwrap()).collect();
+    println!("{limits:?}");
+    assert!(names.contains(&"total_track") && names.contains(&"back_focus"), "{names:?}");
+    // Every inner gap could be as thin as nothing and even negative, were it not for its own limit.
+    let gaps = |name: &&&str| **name == "glass_center" || **name == "air_center";
+    assert_eq!(names.len(), 2 + names.iter().filter(gaps).count(), "{names:?}");
+    assert!(!names.contains(&"steepness"));
+}
+
+/// A price is what the merit gains when its bound is loosened.
+#[test]
+fn a_price_is_the_change_of_the_best_merit_by_the_bound() {
+    let mut lens = bundled("achromat_ac254_100");
+    lens.variables.clear();
+    add_variables(&mut lens, &[ParameterKind::Curvatures]);
+    vary(&mut lens, 2, Quantity::Thickness);
+    let at = |focal: f64| {
+        let goal = goal(&[Term::Spot, Term::FocalLength(focal)]);
+        let optimizer = run(&lens, &goal, 80);
+        let price = optimizer.binding_limits()[0].price;
+        (judge(optimizer.best(), &lens, &goal).1, price)
+    };
+    let ([longer, shorter], price) = ([at(100.01).0, at(99.99).0], at(100.0).1);
+    let measured = (shorter - longer) / 0.02;
+    println!("{price:e} {measured:e}");
+    assert!((price - measured).abs() < 0.02 * measured.abs(), "{price:e} {measured:e}");
+}
+
+#[test]
+fn variables_at_their_bounds_stay_there() {
+    let mut lens = free("tessar_50_f28");
+    for i in 0..lens.variables.len() {
+        let value = lens.get(lens.variables[i].parameter).unwrap();
+        (lens.variables[i].min, lens.variables[i].max) = (Some(value), Some(value));
+    }
+    let goal = default_goal(&lens);
+    let optimizer = run(&lens, &goal, 20);
+    let kept: Vec<_> = lens.variables.iter().map(|v| optimizer.best().get(v.parameter)).collect();
+    let asked: Vec<_> = lens.variables.iter().map(|v| lens.get(v.parameter)).collect();
+    assert_eq!(kept, asked);
+    // Then nothing can bring the focal length closer.
+    let goal = self::goal(&[Term::Spot, Term::FocalLength(51.0)]);
+    let refused = start(DescentMethod::TrustRegion, &lens, &goal, 1e-3).unwrap_err();
+    assert!(matches!(refused, MeritError::ConflictingLimits { limits } if limits.len() == 1));
+}
+
+#[test]
+fn a_dark_field_is_lit() {
+    let mut lens = bundled("double_gauss_rudolph_50");
+    lens.variables.clear();
+    lens.surfaces[10].semi_diameter = Some(0.5);
+    vary(&mut lens, 10, Quantity::SemiDiameter);
+    vary(&mut lens, 0, Quantity::Curvature);
+    let goal = goal(&[Term::Spot, Term::Light(0.3)]);
+    let optimizer = run(&lens, &goal, 60);
+    let (violation, _) = judge(optimizer.best(), &lens, &goal);
+    println!("{violation:e} {:?}", optimizer.conflict());
+    assert!(violation <= KEPT || !optimizer.conflict().is_empty(), "{violation:e}");
+}
+
+/// A paraboloid with a distant point on its axis has no aberration, and only the limit is left.
+#[test]
+fn a_perfect_mirror_keeps_its_limit() {
+    let mut lens = bundled("telescope_rc_f8");
+    lens.variables.clear();
+    add_variables(&mut lens, &[ParameterKind::Curvatures, ParameterKind::Thicknesses]);
+    lens.fields.values.truncate(1);
+    let focal = goal(&[Term::FocalLength(8000.0)]);
+    let mut optimizer = start(DescentMethod::TrustRegion, &lens, &focal, 1e-4).unwrap();
+    let progress = (0..40).map(|_| optimizer.step()).last().unwrap();
+    assert!(progress.merit == 0.0, "{progress:?}");
+    optimizer.verify_best();
+    assert!(judge(optimizer.best(), &lens, &focal).0 <= KEPT);
+}
+
+/// Two variables with the same effect leave the Hessian singular.
+#[test]
+fn equal_surfaces_do_no_harm() {
+    let mut lens = free("achromat_ac254_100");
+    let rear = lens.surfaces.len() - 1;
+    let mut plate = lens.surfaces[rear].clone();
+    plate.curvature = 0.0;
+    plate.thickness = 1.0;
+    lens.surfaces.insert(rear, plate.clone());
+    lens.surfaces.insert(rear, plate);
+    lens.variables.clear();
+    add_variables(&mut lens, &[ParameterKind::Curvatures, ParameterKind::Thicknesses]);
+    let goal = default_goal(&lens);
+    let (_, before) = judge(&lens, &lens, &goal);
+    let (violation, merit) = judge(run(&lens, &goal, 25).best(), &lens, &goal);
+    assert!(violation <= KEPT && merit <= before, "{violation:e} {before:e} {merit:e}");
+}
+
+#[test]
+fn penalties_are_kept_when_a_goal_asks_for_them() {
+    let lens = free("achromat_ac254_100");
+    let penalties =
+        Goal { limits: LimitTreatment::Penalties, ..goal(&[Term::Spot, Term::FocalLength(90.0)]) };
+    let optimizer = run(&lens, &penalties, 30);
+    assert!(optimizer.binding_limits().is_empty());
+    let hard = Goal { limits: LimitTreatment::Constraints, ..penalties };
+    let text = serde_json::to_string(&hard).unwrap();
+    assert!(text.contains(r#""limits":"constraints""#), "{text}");
+    assert!(judge(optimizer.best(), &lens, &hard).0 > KEPT, "a penalty gives way");
+    assert!(run(&lens, &hard, 30).conflict().is_empty());
+}
