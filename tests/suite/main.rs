@@ -15,6 +15,7 @@ mod diffraction;
 mod drag;
 mod effects;
 mod elements;
+mod every_lens;
 mod experiments;
 mod files;
 mod grin;
