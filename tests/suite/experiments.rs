@@ -112,7 +112,7 @@ fn a_fast_lens_resolves_moving_targets_better() {
 fn unbiased_gradients_reduce_vignetting_in_the_corner() {
     let outcome = outcome("3.9");
     let [biased, unbiased] =
-        ["biased_cone", "unbiased_cone"].map(|name| column(&outcome.tables[0], name));
+        ["biased_irradiance", "unbiased_irradiance"].map(|name| column(&outcome.tables[0], name));
     assert!(unbiased[unbiased.len() - 1] > biased[biased.len() - 1]);
 }
 

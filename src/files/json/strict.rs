@@ -290,8 +290,7 @@ impl<'de, A: VariantAccess<'de>> VariantAccess<'de> for Strict<'_, A> {
         len: usize,
         visitor: V,
     ) -> Result<V::Value, Self::Error> {
-        let visitor = StrictVisitor::new(visitor, self.slot, None);
-        self.inner.tuple_variant(len, visitor).map_err(ValueError::Parser)
+        self.newtype_variant_seed(TupleSeed(len, visitor))
     }
 
     fn struct_variant<V: Visitor<'de>>(
@@ -299,7 +298,28 @@ impl<'de, A: VariantAccess<'de>> VariantAccess<'de> for Strict<'_, A> {
         fields: &'static [&'static str],
         visitor: V,
     ) -> Result<V::Value, Self::Error> {
-        let visitor = StrictVisitor::of_object(visitor, self.slot);
-        self.inner.struct_variant(fields, visitor).map_err(ValueError::Parser)
+        self.newtype_variant_seed(ObjectSeed(fields, visitor))
+    }
+}
+
+/// The content of a named variant: a list of so many values.
+struct TupleSeed<V>(usize, V);
+
+impl<'de, V: Visitor<'de>> DeserializeSeed<'de> for TupleSeed<V> {
+    type Value = V::Value;
+
+    fn deserialize<D: Deserializer<'de>>(self, from: D) -> Result<V::Value, D::Error> {
+        from.deserialize_tuple(self.0, self.1)
+    }
+}
+
+/// The content of a named variant: an object with these keys.
+struct ObjectSeed<V>(&'static [&'static str], V);
+
+impl<'de, V: Visitor<'de>> DeserializeSeed<'de> for ObjectSeed<V> {
+    type Value = V::Value;
+
+    fn deserialize<D: Deserializer<'de>>(self, from: D) -> Result<V::Value, D::Error> {
+        from.deserialize_struct("", self.0, self.1)
     }
 }
