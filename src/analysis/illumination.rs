@@ -152,7 +152,7 @@ impl SeenFromImage {
     fn new(model: &RayModel, wavelength: usize, point: [f64; 2]) -> Result<Self, AnalysisError> {
         let owned;
         let limited = if model.ends_at_disc() {
-            owned = model.limited_by_stop().map_err(|_| AnalysisError::NoLight)?;
+            owned = model.limited_by_stop().map_err(|_error| AnalysisError::NoLight)?;
             &owned
         } else {
             model
@@ -273,13 +273,13 @@ impl FieldElement<'_> {
     fn acceptance(&self, region: &Region<'_>) -> Result<Estimate, AnalysisError> {
         let launch = &region.launch;
         let factor = launch.axis_cosine();
-        let unit = |p: [f64; 2]| match factor {
-            Some(cosine) => Some(launch.area() * cosine.abs() * launch.beam_share(p)),
-            None => {
-                let direction = launch.dual_ray(p)?.direction;
-                let [l, m] = [direction.x.slope, direction.y.slope];
-                Some((l[0] * m[1] - l[1] * m[0]).abs())
+        let unit = |p: [f64; 2]| {
+            if let Some(cosine) = factor {
+                return Some(launch.area() * cosine.abs() * launch.beam_share(p));
             }
+            let direction = launch.dual_ray(p)?.direction;
+            let [l, m] = [direction.x.slope, direction.y.slope];
+            Some((l[0] * m[1] - l[1] * m[0]).abs())
         };
         let sum = |nodes: &Nodes| {
             let (launched, landed) = launch.trace_points(&nodes.points);

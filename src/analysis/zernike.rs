@@ -94,14 +94,14 @@ fn noll(number: usize) -> ZernikeIndex {
     let place = number - before - 1;
     // Frequencies of a degree: 0, 2, 2, 4, 4, … or 1, 1, 3, 3, …
     let size = if degree % 2 == 0 { place.div_ceil(2) * 2 } else { place / 2 * 2 + 1 } as i32;
-    let frequency = if number % 2 == 0 { size } else { -size };
+    let frequency = if number.is_multiple_of(2) { size } else { -size };
     ZernikeIndex { degree: degree as u32, frequency }
 }
 
 /// The number of a polynomial in the fringe order, from 1.
 fn fringe_number(index: ZernikeIndex) -> u32 {
     let size = index.frequency.unsigned_abs();
-    (1 + (index.degree + size) / 2).pow(2) - 2 * size + u32::from(index.frequency < 0)
+    (1 + index.degree.midpoint(size)).pow(2) - 2 * size + u32::from(index.frequency < 0)
 }
 
 /// All polynomials up to a sum of degree and frequency that holds the first `count` fringe ones.
@@ -140,7 +140,7 @@ fn radial_value(degree: u32, frequency: u32, r: f64) -> f64 {
         for i in 1..=degree - k {
             term *= f64::from(i);
         }
-        for below in [k, (degree + frequency) / 2 - k, half - k] {
+        for below in [k, degree.midpoint(frequency) - k, half - k] {
             for i in 1..=below {
                 term /= f64::from(i);
             }

@@ -256,7 +256,7 @@ pub fn measure_gradients(
             break;
         }
     }
-    Ok(GradientBenchmark { costs, fields })
+    Ok(GradientBenchmark { fields, costs })
 }
 
 /// Every estimator in every precision that it supports.

@@ -326,7 +326,7 @@ impl LimitedTrustRegion {
             .solve()
         };
         let steep = ELASTIC_PRICE * gradient.norm().max(radius * hessian.amax());
-        let prices = self.elastic_prices(&point.limits, &rows, steep);
+        let prices = elastic_prices(&point.limits, &rows, steep);
         let hard = program(None);
         let elastic = if hard.is_none() { Some(prices) } else { None };
         let found = hard.or_else(|| program(elastic.as_deref()))?;
@@ -334,19 +334,6 @@ impl LimitedTrustRegion {
         let change = x.component_div(&scales);
         let values = point.limits.linearized(&change);
         Some(LimitedStep { change, values, multipliers, elastic })
-    }
-
-    /// The prices of violations in elastic mode: above the slope of the sum of squares, and those of
-    /// their squares by weight.
-    fn elastic_prices(&self, limits: &LimitValues, rows: &DMatrix<f64>, steep: f64) -> Vec<f64> {
-        let excesses = limits.excesses(&limits.values);
-        let weighted = excesses.iter().zip(&limits.weights);
-        let price = |(row, (excess, weight)): (usize, (&f64, &f64))| {
-            let length = rows.row(row).norm();
-            let by_slope = if length > 0.0 { steep / length } else { 0.0 };
-            by_slope.max(2.0 * weight * excess.abs().max(SLACK))
-        };
-        (0..).zip(weighted).map(price).collect()
     }
 
     /// The Hessian of the model in scaled parameters without its negative curvatures.
@@ -414,6 +401,19 @@ pub fn smallest_conflict(
         }
     }
     remaining
+}
+
+/// The prices of violations in elastic mode: above the slope of the sum of squares, and those of
+/// their squares by weight.
+fn elastic_prices(limits: &LimitValues, rows: &DMatrix<f64>, steep: f64) -> Vec<f64> {
+    let excesses = limits.excesses(&limits.values);
+    let weighted = excesses.iter().zip(&limits.weights);
+    let price = |(row, (excess, weight)): (usize, (&f64, &f64))| {
+        let length = rows.row(row).norm();
+        let by_slope = if length > 0.0 { steep / length } else { 0.0 };
+        by_slope.max(2.0 * weight * excess.abs().max(SLACK))
+    };
+    (0..).zip(weighted).map(price).collect()
 }
 
 #[cfg(test)]

@@ -171,7 +171,7 @@ impl ElementDialog {
         });
         match &tried {
             Err(why) => {
-                drop(ui.label(RichText::new(capitalize(why)).color(ui.visuals().warn_fg_color)))
+                ui.label(RichText::new(capitalize(why)).color(ui.visuals().warn_fg_color));
             }
             Ok(Some((edit, lens))) if self.shown.as_ref() != Some(edit) => {
                 actions.push(Command::Preview(Some(Box::new(lens.clone()))));

@@ -61,7 +61,7 @@ fn show_item(ui: &mut Ui, item: MenuItem, actions: &mut Actions) {
         button = button.shortcut_text(ui.ctx().format_shortcut(key));
     }
     let response = ui.add_enabled(item.is_enabled(), button);
-    let response = if item.hint.is_empty() { response } else { hint_beside(response, &item.hint) };
+    let response = if item.hint.is_empty() { response } else { hint_beside(response, item.hint) };
     if response.clicked() {
         actions.extend(item.action);
         ui.close();

@@ -263,7 +263,7 @@ fn a_refused_number_stays_in_its_field_with_the_reason() {
 
 fn zoom_lens() -> Lens {
     let mut lens = achromat();
-    lens.zoom = vec![Default::default(), Default::default()];
+    lens.zoom = vec![ZoomPosition::default(), ZoomPosition::default()];
     lens
 }
 

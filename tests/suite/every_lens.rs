@@ -111,9 +111,8 @@ fn determinant(mut m: [[f64; 4]; 4]) -> f64 {
         product *= m[k][k];
         for i in k + 1..4 {
             let factor = m[i][k] / m[k][k];
-            for j in k..4 {
-                m[i][j] -= factor * m[k][j];
-            }
+            let row = m[k];
+            m[i].iter_mut().zip(row).skip(k).for_each(|(entry, above)| *entry -= factor * above);
         }
     }
     product

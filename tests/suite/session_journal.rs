@@ -91,7 +91,7 @@ fn a_killed_design_reopens_where_it_was() {
     assert_eq!(again.lens(), session.lens());
     assert_eq!(again.view().goal.as_deref(), Some(&goal));
     assert!(again.is_dirty());
-    let [ours, theirs] = [&session, &again].map(|session| session.view());
+    let [ours, theirs] = [&session, &again].map(Session::view);
     assert_eq!((theirs.history.len(), theirs.version_id), (5, ours.version_id));
     assert_eq!(theirs.history[3].name.as_deref(), Some("left behind"));
     assert_eq!((theirs.undo, theirs.history[3].parent), (ours.undo, Some(2)));
@@ -142,8 +142,8 @@ fn a_damaged_end_is_cut_wherever_it_begins() {
         rename(&mut session, name);
     }
     session.sync_journal();
-    let file = fs::read_dir(folder.journals()).unwrap().flatten().map(|file| file.path());
-    let file = file.filter(|path| path.extension().is_some_and(|end| end == "journal")).next();
+    let mut files = fs::read_dir(folder.journals()).unwrap().flatten().map(|file| file.path());
+    let file = files.find(|path| path.extension().is_some_and(|end| end == "journal"));
     let whole = fs::read(file.unwrap()).unwrap();
     let copy = folder.0.join("copy");
     let mut found = Vec::new();
@@ -256,6 +256,7 @@ fn start_editing(folder: &Path) -> Child {
 
 /// Kills the program after its edits have gone on for a while. Returns the last edit that has to be
 /// there: it was made two seconds before, or the program waited until it was on the disk.
+#[expect(clippy::disallowed_methods, reason = "the test measures time")]
 fn kill_after(folder: &Path, time: Duration) -> u64 {
     let mut child = start_editing(folder);
     let mut lines = BufReader::new(child.stdout.take().unwrap()).lines();
@@ -308,6 +309,7 @@ fn fifty_kills_lose_nothing() {
     kills((0..50).map(|i| Duration::from_micros(700 + 7919 * i * i % 3_000_000)));
 }
 
+#[expect(clippy::disallowed_methods, reason = "the test measures time")]
 #[test]
 #[ignore = "a measurement"]
 fn an_edit_costs_the_window_little_more_with_a_journal() {

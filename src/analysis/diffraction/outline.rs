@@ -112,12 +112,13 @@ fn arc(nodes: &[[f64; 2]], corner: bool) -> Vec<Segment> {
         (point, slopes.each_ref().map(|slope| chebyshev_value(slope, t) / steps as f64))
     };
     let points: Vec<_> = (0..=steps).map(at).collect();
-    let segment = |(i, pair): (usize, &[([f64; 2], [f64; 2])])| Segment {
+    let pairs = points.windows(2).enumerate();
+    let segments = pairs.map(|(i, pair)| Segment {
         ends: [pair[0].0, pair[1].0],
         slopes: [pair[0].1, pair[1].1],
         begins_at_corner: corner && i == 0,
-    };
-    points.windows(2).enumerate().map(segment).collect()
+    });
+    segments.collect()
 }
 
 /// The derivatives at the Chebyshev points from 0 to 1 of the polynomial through values there
@@ -127,7 +128,7 @@ fn derivative(values: &[f64]) -> Vec<f64> {
     let last = values.len() - 1;
     let end = |i: usize| {
         let size = if i == 0 || i == last { 2.0 } else { 1.0 };
-        if i % 2 == 0 { size } else { -size }
+        if i.is_multiple_of(2) { size } else { -size }
     };
     let at = |i: usize| {
         let others = (0..=last).filter(|j| *j != i);

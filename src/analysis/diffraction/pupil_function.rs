@@ -151,7 +151,9 @@ impl PupilFunction {
         let mut samples = PupilSamples { wavelength: self.wavelength, ..PupilSamples::default() };
         for (piece, sign) in &self.pieces {
             let common = Overlap::new([piece, piece], [0.0; 2]);
-            let Some(common) = common.map_err(|_| AnalysisError::IrregularPupil)? else { continue };
+            let Some(common) = common.map_err(|_error| AnalysisError::IrregularPupil)? else {
+                continue;
+            };
             for node in common.nodes(order.min(OVERLAP_ORDERS - 1)) {
                 let [waves, amplitude] = self.polynomial.at(node.at);
                 samples.cosines.push(node.at);
@@ -200,7 +202,7 @@ impl PupilFunction {
                 // The point plus the shift lies in the first, the point minus it in the second.
                 let back = shift.map(|v| -v);
                 let common = Overlap::new([first, second], back);
-                if let Some(common) = common.map_err(|_| AnalysisError::IrregularPupil)? {
+                if let Some(common) = common.map_err(|_error| AnalysisError::IrregularPupil)? {
                     overlaps.push((common, sign * other));
                 }
             }

@@ -26,11 +26,11 @@ fn add(text: &mut String, place: &str, key: &str, value: &Value) {
             .for_each(|(i, value)| add(text, place, &format!("{key}.{i}"), value)),
         Value::String(words) => {
             let words = words.replace('"', "\"\"");
-            text.push_str(&format!("{place},{key},\"{words}\"\r\n"));
+            text.extend([place, ",", key, ",\"", &words, "\"\r\n"]);
         }
-        Value::Null => text.push_str(&format!("{place},{key},\r\n")),
+        Value::Null => text.extend([place, ",", key, ",\r\n"]),
         Value::Bool(_) | Value::Number(_) => {
-            text.push_str(&format!("{place},{key},{value}\r\n"));
+            text.extend([place, ",", key, ",", &value.to_string(), "\r\n"]);
         }
     }
 }

@@ -53,13 +53,13 @@ pub(super) fn point_spreads(run: &AnalysisRun) -> Vec<AtField<PointSpreadJson>> 
             let spread = point_spread(model, field.traced, w, &points, run.accuracy)?;
             Ok((spread, strehl(model, field.traced, w, run.accuracy)?))
         });
-        let keys = found.map(|(spread, strehl)| keys(spread, strehl, &points, ms));
+        let keys = found.map(|(spread, strehl)| keys(&spread, strehl, &points, ms));
         AtField::new(field, keys)
     };
     run.fields.iter().map(at).collect()
 }
 
-fn keys(spread: PointSpread, strehl: Strehl, points: &[[f64; 2]], ms: f64) -> PointSpreadJson {
+fn keys(spread: &PointSpread, strehl: Strehl, points: &[[f64; 2]], ms: f64) -> PointSpreadJson {
     let timed = |e| Estimate { milliseconds: Some(ms), ..e };
     let point =
         |([x, y], e): (&[f64; 2], &Estimate)| IntensityJson { x: *x, y: *y, intensity: timed(*e) };

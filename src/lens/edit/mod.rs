@@ -149,7 +149,7 @@ pub enum Edit {
         /// The title in a menu.
         title: String,
         /// The edits, in order.
-        edits: Vec<Edit>,
+        edits: Vec<Self>,
     },
     /// Sets the radius of the central obstruction of a surface; without one it blocks no ray.
     SetObstruction {

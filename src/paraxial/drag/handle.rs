@@ -225,11 +225,11 @@ impl Handle {
                 let old = self.value(lens, zoom).ok_or_else(missing)?;
                 scale_fields(fields_mut(&mut changed, zoom), old, value);
             }
-            Self::BeamWidth => set_aperture(&mut changed, zoom, value)?,
+            Self::BeamWidth => set_aperture(&mut changed, zoom, value),
             Self::StopSize => {
                 let old = self.value(lens, zoom).ok_or_else(missing)?;
                 let wider = scaled_aperture(lens.aperture_at(zoom), value / old);
-                set_aperture(&mut changed, zoom, wider)?;
+                set_aperture(&mut changed, zoom, wider);
             }
             Self::ImagePlane if lens.image_solve.is_some() => changed.image_solve = Some(value),
             Self::StopPosition if self.span(lens).is_none() => {
@@ -413,14 +413,14 @@ pub(super) fn scaled_aperture(aperture: Aperture, factor: f64) -> f64 {
 
 /// Sets the number of the aperture. The rim of the stop, which would clip a wider beam, scales with
 /// the beam.
-fn set_aperture(lens: &mut Lens, zoom: usize, number: f64) -> Result<(), DragError> {
+fn set_aperture(lens: &mut Lens, zoom: usize, number: f64) {
     let before = at_zoom(lens, zoom);
     let aperture = with_number(lens.aperture_at(zoom), number);
     match lens.zoom.get_mut(zoom).and_then(|position| position.aperture.as_mut()) {
         Some(own) => *own = aperture,
         None => lens.aperture = aperture,
     }
-    let Some(stop) = lens.stop() else { return Ok(()) };
+    let Some(stop) = lens.stop() else { return };
     if let Aperture::StopSemiDiameter(radius) = aperture {
         let of_position = |at: &Option<Aperture>| match at {
             Some(Aperture::StopSemiDiameter(radius)) => *radius,
@@ -433,7 +433,6 @@ fn set_aperture(lens: &mut Lens, zoom: usize, number: f64) -> Result<(), DragErr
         let factor = old.zip(new).map_or(1.0, |(old, new)| new / old);
         lens.surfaces[stop].semi_diameter = Some(rim * factor);
     }
-    Ok(())
 }
 
 fn fields_mut(lens: &mut Lens, zoom: usize) -> &mut Fields {

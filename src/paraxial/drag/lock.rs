@@ -197,22 +197,6 @@ impl LockConstraints {
         self.constraints.len()
     }
 
-    /// The gaps as a constraint sees them: the last one may end elsewhere than at the image.
-    fn gaps(&self, constraint: Constraint, gaps: &[f64]) -> Vec<f64> {
-        let mut gaps = gaps.to_vec();
-        if let Some(last) = gaps.last_mut() {
-            match constraint {
-                Constraint::HeightBehindVertex(distance) => *last = distance,
-                Constraint::HeightBeforeImage(distance) => *last -= distance,
-                Constraint::Track { solved: Some(_) } => *last = 0.0,
-                Constraint::Power
-                | Constraint::ObjectSlope
-                | Constraint::Track { solved: None } => {}
-            }
-        }
-        gaps
-    }
-
     fn trace(
         &self,
         zoom: usize,
@@ -237,7 +221,7 @@ impl LockConstraints {
         (zoom, constraint): (usize, Constraint),
         at: &(Vec<f64>, Vec<Vec<f64>>),
     ) -> f64 {
-        let gaps = self.gaps(constraint, &at.1[zoom]);
+        let gaps = gaps_until(constraint, &at.1[zoom]);
         let ray = || self.trace(zoom, constraint, &at.0, &gaps);
         match constraint {
             Constraint::Power | Constraint::ObjectSlope => ray().image_slope() * self.scale,
@@ -260,7 +244,7 @@ impl LockConstraints {
         (zoom, constraint): (usize, Constraint),
         (curvatures, gaps): &(Vec<f64>, Vec<Vec<f64>>),
     ) -> (Vec<f64>, Vec<f64>) {
-        let gaps = self.gaps(constraint, &gaps[zoom]);
+        let gaps = gaps_until(constraint, &gaps[zoom]);
         let along = || self.directions.iter().map(|direction| direction / self.scale);
         if let Constraint::Track { solved: None } = constraint {
             return (vec![0.0; gaps.len()], along().collect());
@@ -305,4 +289,18 @@ impl ConstraintFunction for LockConstraints {
         }
         jacobian
     }
+}
+
+/// The gaps as a constraint sees them: the last one may end elsewhere than at the image.
+fn gaps_until(constraint: Constraint, gaps: &[f64]) -> Vec<f64> {
+    let mut gaps = gaps.to_vec();
+    if let Some(last) = gaps.last_mut() {
+        match constraint {
+            Constraint::HeightBehindVertex(distance) => *last = distance,
+            Constraint::HeightBeforeImage(distance) => *last -= distance,
+            Constraint::Track { solved: Some(_) } => *last = 0.0,
+            Constraint::Power | Constraint::ObjectSlope | Constraint::Track { solved: None } => {}
+        }
+    }
+    gaps
 }

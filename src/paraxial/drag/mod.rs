@@ -248,7 +248,7 @@ impl HandleDrag {
         let mut lens = self
             .handle
             .with_value(&self.before, self.zoom, value)
-            .map_err(|_| DragStop::NotANumber)?;
+            .map_err(|_error| DragStop::NotANumber)?;
         self.held.write(&mut lens, &at);
         let lens = apply_edit(&self.before, &Edit::Replace(Box::new(lens)));
         lens.map(|lens| (lens, at)).map_err(DragStop::Lens)

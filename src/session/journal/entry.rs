@@ -65,7 +65,7 @@ impl JournalEntry {
     pub(super) fn line(&self) -> Option<Vec<u8>> {
         let json = serde_json::to_string(self).ok()?;
         let checksum = crc32fast::hash(json.as_bytes());
-        Some(format!("{checksum:0width$x} {json}\n", width = DIGITS).into_bytes())
+        Some(format!("{checksum:0DIGITS$x} {json}\n").into_bytes())
     }
 
     /// The entry of a line without its end; `None` for a damaged one.

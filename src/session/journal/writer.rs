@@ -138,7 +138,7 @@ impl JournalWriter {
             let request = if unsynced {
                 inbox.recv_timeout(SYNC_INTERVAL)
             } else {
-                inbox.recv().map_err(|_| RecvTimeoutError::Disconnected)
+                inbox.recv().map_err(|_closed| RecvTimeoutError::Disconnected)
             };
             match request {
                 Ok(request) => self.handle(request),

@@ -60,7 +60,7 @@ fn plot(ui: &mut Ui, contrasts: &FieldContrasts, height: f32) {
     let shown = plot.include_y(0.0).include_y(1.0).show(ui, |plot| {
         if let Some(limit) = &contrasts.limit {
             let points = contrasts.frequencies.iter().zip(limit).map(|(nu, value)| [*nu, *value]);
-            let line = Line::new("diffraction limit", PlotPoints::from_iter(points));
+            let line = Line::new("diffraction limit", points.collect::<PlotPoints<'_>>());
             plot.line(line.color(color32(palette.strong)).style(LineStyle::dotted_loose()));
         }
         for (i, field) in contrasts.fields.iter().enumerate() {

@@ -235,6 +235,7 @@ impl StatusMenu<'_> {
 }
 
 /// A bound; nothing typed is none.
+#[expect(clippy::option_option, reason = "none typed is a bound that is absent, not a wrong one")]
 fn parse_bound(text: &str) -> Option<Option<f64>> {
     if text.trim().is_empty() { Some(None) } else { parse_value(text).map(Some) }
 }

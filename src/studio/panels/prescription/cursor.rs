@@ -220,15 +220,12 @@ impl CellCursor {
         let under = |at| self.rects.iter().find(|(_, rect)| rect.contains(at)).map(|cell| cell.0);
         let Some(place) = pointer.interact_pos().and_then(under) else { return };
         if pointer.primary_pressed() {
-            match before.filter(|_| shift) {
-                Some(before) => {
-                    self.move_to(before);
-                    (self.active, self.head) = (Some(before), Some(place));
-                }
-                None => {
-                    self.edits_in_place = before == Some(place) && self.active == before;
-                    self.head = None;
-                }
+            if let Some(before) = before.filter(|_| shift) {
+                self.move_to(before);
+                (self.active, self.head) = (Some(before), Some(place));
+            } else {
+                self.edits_in_place = before == Some(place) && self.active == before;
+                self.head = None;
             }
         } else if pointer.primary_down() && !shift {
             let start = pointer.press_origin().and_then(under);

@@ -76,15 +76,14 @@ impl PrescriptionTable<'_> {
             Some(text) => self.try_edit(place, &text),
             None => true,
         };
-        self.leave(ui, place, entry.response.lost_focus(), fits);
+        if entry.response.lost_focus() {
+            self.leave(ui, place, fits);
+        }
         entry.response
     }
 
     /// Moves the cursor after Enter, and back into a cell whose text was refused.
-    fn leave(&mut self, ui: &Ui, place: CellPlace, left: bool, fits: bool) {
-        if !left {
-            return;
-        }
+    fn leave(&mut self, ui: &Ui, place: CellPlace, fits: bool) {
         let (up, escape) = ui.input(|i| (i.modifiers.shift, i.key_pressed(Key::Escape)));
         if ui.input_mut(|input| input.consume_key(Modifiers::NONE, Key::Enter)) {
             let row = if up { place.row.saturating_sub(1) } else { place.row + 1 };

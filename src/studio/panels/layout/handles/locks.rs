@@ -36,7 +36,7 @@ pub(in crate::studio::panels::layout) fn locks_row(
 fn lock_chip(ui: &mut Ui, lock: FirstOrderLock, settings: &mut DragSettings) {
     let is_on = settings.locks.contains(&lock);
     let chip = ui.selectable_label(is_on, lock.to_string());
-    let chip = chip.accessible_name(&format!("Hold the {lock}"));
+    let chip = chip.accessible_name(format!("Hold the {lock}"));
     if chip.on_hover_text(hint(lock)).clicked() {
         if is_on {
             settings.locks.retain(|other| *other != lock);

@@ -223,7 +223,7 @@ fn hint(frame: &HandleFrame<'_>, slopes: Option<&MeritSlopes>, handle: Handle) -
         let towards = if share > 0.0 { falling } else { rising };
         let change = number::format_digits(100.0 * share.abs(), 2);
         let way = number::format_digits(mm, 2);
-        text += &format!("\nmerit falls by {change} % with {way} mm to the {towards}");
+        text = format!("{text}\nmerit falls by {change} % with {way} mm to the {towards}");
     }
     text
 }
