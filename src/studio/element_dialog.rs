@@ -8,7 +8,7 @@ use super::form::{choice, number_field};
 use super::number;
 use super::text::capitalize;
 use crate::lens::{Edit, ElementEdit, ElementForm, Lens, Medium, NewElement, apply_edit};
-use crate::session::{Command, SessionView};
+use crate::session::{Analyses, Command, SessionView};
 
 /// A change of an element or of the whole lens. Surfaces are indices from 0.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -40,7 +40,7 @@ pub(super) struct ElementDialog {
 impl ElementDialog {
     pub(super) fn new(task: ElementTask, view: &SessionView) -> Self {
         let first = view.results.as_ref().and_then(|results| results.analyses.as_ref().ok());
-        let first = first.map(|analyses| analyses.first_order());
+        let first = first.map(Analyses::first_order);
         let focal_length = first.and_then(|first| first.efl).map_or(50.0, f64::abs);
         let pupil = first.and_then(|first| first.entrance_pupil.diameter);
         Self {

@@ -4,7 +4,7 @@ use egui::{Button, ComboBox, DragValue, Grid, Ui};
 
 use super::beam::own_positions;
 use crate::lens::{Edit, FieldKind, FieldPoint, Fields, Object};
-use crate::session::SessionView;
+use crate::session::{Analyses, SessionView};
 use crate::studio::panels::design_results;
 use crate::studio::panels::edit_form::{EditForm, heading};
 
@@ -14,6 +14,9 @@ const KINDS: [(FieldKind, &str, &str); 3] = [
     (FieldKind::ObjectHeight, "Object height", "mm"),
     (FieldKind::ImageHeight, "Paraxial image height", "mm"),
 ];
+/// The name of a number of a field, its value, and what sets it.
+type FieldColumn = (&'static str, f64, fn(&mut FieldPoint, f64));
+
 /// The number of field points that can be made at once.
 const MAX_STEPS: usize = 20;
 
@@ -60,7 +63,7 @@ fn kind(ui: &mut Ui, form: &mut EditForm<'_>) {
 /// The fields as another quantity, by first-order optics where the lens has it.
 fn converted(view: &SessionView, kind: FieldKind) -> Fields {
     let lens = &view.lens;
-    let first = design_results(view).map(|results| results.first_order());
+    let first = design_results(view).map(Analyses::first_order);
     let efl = first.and_then(|first| first.efl);
     let magnification = first.and_then(|first| first.magnification);
     let distance = match lens.object {
@@ -104,7 +107,7 @@ fn table(ui: &mut Ui, form: &mut EditForm<'_>) {
         }
         ui.end_row();
         for (i, field) in fields.values.iter().enumerate() {
-            let numbers: [(&str, f64, fn(&mut FieldPoint, f64)); 3] = [
+            let numbers: [FieldColumn; 3] = [
                 ("x", field.x, |field, value| field.x = value),
                 ("y", field.y, |field, value| field.y = value),
                 ("weight", field.weight, |field, value| field.weight = value),

@@ -67,11 +67,14 @@ impl Panel for SystemPanel {
     }
 }
 
+/// The name of a text of the lens, the text, and the edit that sets it.
+type LensText<'a> = (&'static str, &'a str, fn(String) -> Edit);
+
 /// The name of the lens, its source and the notes on it.
 fn texts(ui: &mut Ui, form: &mut EditForm<'_>) {
     heading(ui, "Lens");
     let lens = &form.view.lens;
-    let texts: [(&str, &str, fn(String) -> Edit); 3] = [
+    let texts: [LensText<'_>; 3] = [
         ("Name", &lens.name, Edit::SetName),
         ("Source", &lens.source, Edit::SetSource),
         ("Notes", &lens.notes, Edit::SetNotes),

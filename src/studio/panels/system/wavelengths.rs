@@ -8,6 +8,9 @@ use crate::studio::palette::{Palette, color32};
 use crate::studio::panels::edit_form::{EditForm, heading};
 use crate::studio::panels::widgets::swatch;
 
+/// The name of a number of a wavelength, its value, and what sets it.
+type WavelengthColumn = (&'static str, f64, fn(&mut Wavelength, f64));
+
 /// Shows the group of wavelengths.
 pub(super) fn ui(ui: &mut Ui, form: &mut EditForm<'_>) {
     heading(ui, "Wavelengths");
@@ -46,7 +49,7 @@ fn table(ui: &mut Ui, form: &mut EditForm<'_>) {
         ui.end_row();
         for (i, wave) in waves.iter().enumerate() {
             swatch(ui, color32(palette.wavelength(wave.um)));
-            let numbers: [(&str, f64, fn(&mut Wavelength, f64)); 2] = [
+            let numbers: [WavelengthColumn; 2] = [
                 ("", wave.um, |wave, value| wave.um = value),
                 (" weight", wave.weight, |wave, value| wave.weight = value),
             ];
