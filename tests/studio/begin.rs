@@ -5,7 +5,7 @@ use std::sync::Arc;
 
 use aplanat::lens::{
     Aperture, Edit, ElementEdit, ElementForm, FieldKind, Fields, Lens, Object, StartingForm,
-    StartingLens, WavelengthPreset, apply_edit,
+    StartingLens, WavelengthPreset, ZoomPosition, apply_edit,
 };
 use aplanat::session::{Command, Session, SessionView};
 use aplanat::studio::Studio;

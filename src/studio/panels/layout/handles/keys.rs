@@ -30,8 +30,7 @@ impl HandleLayer {
         ui: &Ui,
         frame: &HandleFrame<'_>,
         results: &Arc<AnalysisResults>,
-        handle: Handle,
-        response: &Response,
+        (handle, response): (Handle, &Response),
         actions: &mut Actions,
     ) {
         if !response.has_focus() {

@@ -92,8 +92,8 @@ impl HandleLayer {
         self.forget_finished(frame.view);
         for (handle, place) in self.handles(ui, frame) {
             let response = self.interact(ui, frame, handle, place);
-            self.move_by_pointer(ui, frame, results, handle, &response, actions);
-            self.move_by_keys(ui, frame, results, handle, &response, actions);
+            self.move_by_pointer(ui, frame, results, (handle, &response), actions);
+            self.move_by_keys(ui, frame, results, (handle, &response), actions);
             if self.is_visible(ui, frame, handle, &response) {
                 self.paint(ui, frame, handle, &response);
             }
@@ -165,8 +165,7 @@ impl HandleLayer {
         ui: &Ui,
         frame: &HandleFrame<'_>,
         results: &Arc<AnalysisResults>,
-        handle: Handle,
-        response: &Response,
+        (handle, response): (Handle, &Response),
         actions: &mut Actions,
     ) {
         if response.clicked() {
