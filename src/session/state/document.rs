@@ -1,6 +1,7 @@
 //! The document of a session: edits, undo, and its files.
 
-use super::{Session, SessionEvent, propose_goal};
+use super::live_goal::propose_goal;
+use super::{Session, SessionEvent};
 use crate::files;
 use crate::lens::{Edit, ElementEdit, Lens, apply_edit};
 use crate::pupil::limited_by_stop;

@@ -4,6 +4,7 @@ mod candidate;
 mod document;
 mod drag;
 mod journaling;
+mod live_goal;
 mod runs;
 
 use super::analysis::{
@@ -15,7 +16,6 @@ use super::drag::DragState;
 use super::experiment::{ExperimentStatus, ExperimentWorker};
 use super::grin_design::GrinState;
 use super::history::DesignHistory;
-use super::journal::JournalEntry;
 use super::live_merit::LiveMerit;
 use super::optimization::{OptimizationEngine, OptimizationRequest, OptimizerFactory};
 use super::pareto::ParetoState;
@@ -28,6 +28,7 @@ use crate::lens::Lens;
 use crate::merit::Goal;
 use crate::optimize;
 use journaling::Journaling;
+use live_goal::propose_goal;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -296,12 +297,6 @@ impl Session {
         &self.lens
     }
 
-    /// The merit function of the design: its own, or else the proposed one.
-    fn goal(&self) -> Option<Arc<Goal>> {
-        let own = self.lens.merit.as_ref().map(|goal| Arc::new(goal.clone()));
-        own.or_else(|| self.proposed_goal.clone())
-    }
-
     /// The newest analyses, maybe of an earlier version.
     pub fn results(&self) -> Option<Arc<AnalysisResults>> {
         self.analysis.latest()
@@ -364,22 +359,6 @@ impl Session {
         });
         if let Some(goal) = self.goal() {
             self.live_merit.request(Arc::clone(&self.lens), goal, self.settings.tolerance);
-        }
-    }
-
-    /// Notes the merit of the present version in the history once it is known.
-    fn sync_merit(&mut self) {
-        let Some(report) = self.live_merit.latest() else { return };
-        let Ok(values) = &report.values else { return };
-        let present = self.history.present();
-        // While a handle is dragged, the lens that is shown is no version yet.
-        let is_present =
-            self.history.node(present).is_some_and(|node| Arc::ptr_eq(&report.lens, &node.lens));
-        if is_present && values.total.is_finite() {
-            let merit = values.total;
-            if self.history.change(present, |node| node.merit = Some(merit)) {
-                self.record(JournalEntry::Merit { node: present, merit });
-            }
         }
     }
 
@@ -449,9 +428,4 @@ impl Session {
             self.invalidate();
         }
     }
-}
-
-/// The merit function that is proposed for a lens without one.
-fn propose_goal(lens: &Lens) -> Option<Arc<Goal>> {
-    Goal::default_for(lens).ok().map(Arc::new)
 }

@@ -5,16 +5,16 @@ use egui::{Align, ComboBox, Grid, Id, Layout as Arrange, RichText, Ui, vec2};
 use std::sync::Arc;
 
 use super::limits;
+use super::live_term::{LiveTerm, show_total};
 use super::terms::{self, can_ask_for_more_light, hint, targets, title, unit, value_text};
 use crate::lens::{Aperture, Edit, Lens, ParameterKind, Quantity};
 use crate::math::expression::evaluate;
-use crate::merit::{Goal, LimitTreatment, PupilEdge, Term, TermValue, WeightedTerm};
+use crate::merit::{Goal, LimitTreatment, PupilEdge, Term, WeightedTerm};
 use crate::session::{Command, OptimizationSnapshot, SessionView};
 use crate::studio::actions::Actions;
 use crate::studio::number;
 use crate::studio::panels::widgets::hint_beside;
 use crate::studio::panels::{add_variables_edit, field_name};
-use crate::studio::text::capitalize;
 use crate::studio::text_input::{EditBuffers, InputPlacement, TextInput};
 
 /// The terms of the panel.
@@ -116,16 +116,16 @@ impl MeritEditor {
         actions: &mut Actions,
     ) {
         self.warnings(ui, &view.lens, actions);
-        total(ui, view);
+        show_total(ui, view);
         let search = view.optimization.snapshot.as_deref();
         let mut unwanted = None;
         let repeats = self.repeats();
-        Grid::new("terms").num_columns(7).spacing([8.0, 2.0]).striped(true).show(ui, |ui| {
+        Grid::new("terms").num_columns(6).spacing([6.0, 2.0]).striped(true).show(ui, |ui| {
             for (text, what) in [("Term", ""), ("Weight", ""), ("Target", "")] {
                 heading(ui, text, what);
             }
-            heading(ui, "Value", "Its value for the design, with its estimated error");
-            heading(ui, "Share", "Its part of the merit, by magnitude");
+            let what = "Its value for the design, and its part of the merit by magnitude";
+            heading(ui, "Value, share", what);
             if search.is_some() {
                 heading(ui, "Best", "Its value for the best lens of the optimization so far");
             }
@@ -237,55 +237,6 @@ struct TermPlace {
     live: Option<LiveTerm>,
 }
 
-/// The value of a term for the design.
-#[derive(Clone, Copy)]
-struct LiveTerm {
-    value: f64,
-    error: f64,
-    share: Option<f64>,
-    is_current: bool,
-}
-
-impl LiveTerm {
-    /// The value of the term at a place of the merit function, if it has been computed for it.
-    fn of(view: &SessionView, place: usize, weighted: WeightedTerm) -> Option<Self> {
-        let report = view.merit.as_ref()?;
-        let values = report.values.as_ref().ok()?;
-        let TermValue { value, error, .. } = *values.terms.get(place)?;
-        (report.goal.terms.get(place)?.term == weighted.term).then_some(())?;
-        let is_current = Arc::ptr_eq(&report.lens, &view.lens);
-        Some(Self { value, error, share: values.share(place), is_current })
-    }
-
-    fn cells(self, ui: &mut Ui, term: Term) {
-        let color = if self.is_current {
-            ui.visuals().text_color()
-        } else {
-            ui.visuals().weak_text_color()
-        };
-        let text = value_text(term, self.value);
-        let error = match self.error {
-            0.0 => "exact to rounding".to_owned(),
-            error => format!("{} ± {error:.1e}", number::format_digits(self.value, 5)),
-        };
-        ui.colored_label(color, text).on_hover_text(error);
-        let share = self.share.map_or_else(String::new, |share| format!("{:.1} %", 100.0 * share));
-        ui.colored_label(color, share);
-    }
-}
-
-/// The merit of the design, or why it has none.
-fn total(ui: &mut Ui, view: &SessionView) {
-    let Some(report) = &view.merit else { return };
-    match &report.values {
-        Ok(values) => {
-            let text = format!("Merit {}", number::format_digits(values.total, 5));
-            ui.strong(text).on_hover_text("The weighted sum of all terms for the design");
-        }
-        Err(why) => drop(ui.colored_label(ui.visuals().error_fg_color, capitalize(why))),
-    }
-}
-
 /// True if the stop alone limits the beam, at every zoom position.
 fn is_limited_by_stop(lens: &Lens) -> bool {
     let by_stop = |zoom| matches!(lens.aperture_at(zoom), Aperture::StopSemiDiameter(_));
@@ -325,11 +276,11 @@ impl MeritRow {
         };
         ui.checkbox(&mut self.active, &title).on_hover_text(hint(term));
         let name = format!("Weight of {title}");
-        number_field(ui, buffers, &name, &mut self.weighted.weight, 58.0);
+        number_field(ui, buffers, &name, &mut self.weighted.weight, 50.0);
         ui.horizontal(|ui| {
             ui.spacing_mut().item_spacing.x = 2.0;
             let targets = targets(&mut self.weighted.term);
-            let width = if targets.len() > 1 { 54.0 } else { 70.0 };
+            let width = if targets.len() > 1 { 48.0 } else { 60.0 };
             for (what, value) in targets {
                 let name = format!("{what} of {title}");
                 number_field(ui, buffers, &name, value, width);
@@ -338,8 +289,8 @@ impl MeritRow {
             self.field_choice(ui, view, &title);
         });
         match at.live {
-            Some(live) => live.cells(ui, term),
-            None => [(); 2].iter().for_each(|()| drop(ui.label(""))),
+            Some(live) => live.cell(ui, term),
+            None => drop(ui.label("")),
         }
         if let Some(search) = view.optimization.snapshot.as_deref() {
             self.best_cell(ui, search, at.place);

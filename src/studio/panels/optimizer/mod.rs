@@ -4,6 +4,7 @@
 //! The search works on its own copy. The design changes only when its result is taken.
 
 mod limits;
+mod live_term;
 mod merit_editor;
 mod prices;
 mod terms;

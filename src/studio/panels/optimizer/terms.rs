@@ -5,6 +5,9 @@ use crate::session::{Analyses, SessionView};
 use crate::studio::number;
 use crate::studio::panels::{design_results, mean_pupil_area};
 
+/// A deviation below which a term counts as satisfied: it is of the size of rounding errors.
+const ROUNDING: f64 = 1e-12;
+
 /// The title of a term.
 pub(super) const fn title(term: Term) -> &'static str {
     match term {
@@ -120,7 +123,7 @@ pub(super) fn value_text(term: Term, value: f64) -> String {
         Term::SpotIntegral => format!("{} mm⁴", short(value)),
         Term::Throughput => format!("{} mm²", number::format_digits(-value, 4)),
         Term::ThroughputLoss(_) => format!("{} %", short(100.0 * value)),
-        _ if root == 0.0 => "satisfied".to_owned(),
+        _ if root < ROUNDING => "satisfied".to_owned(),
         Term::Light(_) | Term::RelativeIllumination { .. } => {
             format!("{} % short", short(100.0 * root))
         }

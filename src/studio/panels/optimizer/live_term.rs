@@ -1,0 +1,69 @@
+//! The merit of the design as it is now: the value of every term, its error and its share.
+
+use std::sync::Arc;
+
+use egui::Ui;
+
+use super::terms::value_text;
+use crate::merit::{Term, TermValue, WeightedTerm};
+use crate::session::SessionView;
+use crate::studio::number;
+use crate::studio::text::capitalize;
+
+/// The smallest share that is shown.
+const SMALLEST_SHARE: f64 = 5e-4;
+
+/// The value of a term for the design.
+#[derive(Clone, Copy)]
+pub(super) struct LiveTerm {
+    value: f64,
+    error: f64,
+    share: Option<f64>,
+    is_current: bool,
+}
+
+impl LiveTerm {
+    /// The value of the term at a place of the merit function, if it has been computed for it.
+    pub(super) fn of(view: &SessionView, place: usize, weighted: WeightedTerm) -> Option<Self> {
+        let report = view.merit.as_ref()?;
+        let values = report.values.as_ref().ok()?;
+        let TermValue { value, error, .. } = *values.terms.get(place)?;
+        (report.goal.terms.get(place)?.term == weighted.term).then_some(())?;
+        let is_current = Arc::ptr_eq(&report.lens, &view.lens);
+        Some(Self { value, error, share: values.share(place), is_current })
+    }
+
+    /// Shows the value, and the share if there is one.
+    pub(super) fn cell(self, ui: &mut Ui, term: Term) {
+        let color = if self.is_current {
+            ui.visuals().text_color()
+        } else {
+            ui.visuals().weak_text_color()
+        };
+        let text = value_text(term, self.value);
+        let error = match self.error {
+            0.0 => "exact to rounding".to_owned(),
+            error => format!("{} ± {error:.1e}", number::format_digits(self.value, 5)),
+        };
+        let share = self.share.filter(|share| *share >= SMALLEST_SHARE);
+        ui.horizontal(|ui| {
+            ui.spacing_mut().item_spacing.x = 4.0;
+            ui.colored_label(color, text).on_hover_text(error);
+            if let Some(share) = share {
+                ui.weak(format!("{:.1} %", 100.0 * share));
+            }
+        });
+    }
+}
+
+/// The merit of the design, or why it has none.
+pub(super) fn show_total(ui: &mut Ui, view: &SessionView) {
+    let Some(report) = &view.merit else { return };
+    match &report.values {
+        Ok(values) => {
+            let text = format!("Merit {}", number::format_digits(values.total, 5));
+            ui.strong(text).on_hover_text("The weighted sum of all terms for the design");
+        }
+        Err(why) => drop(ui.colored_label(ui.visuals().error_fg_color, capitalize(why))),
+    }
+}
