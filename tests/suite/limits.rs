@@ -3,7 +3,7 @@
 use super::merit::{bundled, vary};
 use aplanat::lens::{Lens, ParameterKind, Quantity, add_variables};
 use aplanat::merit::{
-    DerivativeLevel, Goal, LimitTreatment, Merit, MeritError, PupilEdge, Term, WeightedTerm,
+    DerivativeLevel, Goal, Limit, LimitTreatment, Merit, MeritError, PupilEdge, Term, WeightedTerm,
 };
 use aplanat::optimize::{DescentMethod, Optimizer, start};
 
@@ -49,7 +49,7 @@ fn judge(best: &Lens, start: &Lens, goal: &Goal) -> (f64, f64) {
     for limit in found.limits.iter().filter(|limit| limit.violation() > KEPT) {
         println!("broken: {} is {}", limit.margin.name(), limit.margin.value);
     }
-    (found.limits.iter().map(|l| l.violation()).fold(0.0, f64::max), found.objective.value)
+    (found.limits.iter().map(Limit::violation).fold(0.0, f64::max), found.objective.value)
 }
 
 #[test]

@@ -25,6 +25,7 @@ pub(super) struct MeritEditor {
     zoom_ratios: Vec<f64>,
     limits: LimitTreatment,
     /// The merit function of the design in the last frame; `None` before the first one.
+    #[expect(clippy::option_option, reason = "nothing seen yet is not a design without a goal")]
     seen: Option<Option<Arc<Goal>>>,
     /// The merit function that was made of the terms last, until the design has it.
     written: Option<Goal>,
