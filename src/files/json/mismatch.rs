@@ -10,7 +10,7 @@ pub(super) struct Mismatch {
     pub(super) found: String,
     /// The accepted value.
     pub(super) expected: String,
-    /// True if the value has another type than the accepted one.
+    /// True if the value has another type than the accepted one, or is outside its range.
     other_type: bool,
 }
 
@@ -63,11 +63,15 @@ impl<E: Error> Error for ValueError<E> {
     }
 
     fn invalid_value(found: Unexpected<'_>, expected: &dyn Expected) -> Self {
-        Self::Mismatch(Mismatch::new(describe(found), expected.to_string()))
+        // A number that does not fit into the program's type for it.
+        let other_type =
+            matches!(found, Unexpected::Signed(_) | Unexpected::Unsigned(_) | Unexpected::Float(_));
+        let mismatch = Mismatch::new(describe(found), expected.to_string());
+        Self::Mismatch(Mismatch { other_type, ..mismatch })
     }
 
     fn invalid_length(found: usize, expected: &dyn Expected) -> Self {
-        Self::Mismatch(Mismatch::new(format!("{found} of them"), expected.to_string()))
+        Self::Mismatch(Mismatch::new(format!("a list of length {found}"), expected.to_string()))
     }
 
     fn unknown_variant(found: &str, expected: &'static [&'static str]) -> Self {
