@@ -30,9 +30,9 @@ pub struct Goal {
 #[serde(rename_all = "snake_case")]
 pub enum LimitTreatment {
     /// They are kept exactly, whatever their weight.
-    #[default]
     Constraints,
     /// Their squared violations are added to the merit, so that they may be broken a little.
+    #[default]
     Penalties,
 }
 

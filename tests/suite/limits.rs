@@ -20,6 +20,11 @@ fn goal(terms: &[Term]) -> Goal {
     }
 }
 
+/// The default goal with its limits as constraints.
+fn default_goal(lens: &Lens) -> Goal {
+    Goal { limits: LimitTreatment::Constraints, ..Goal::default_for(lens).unwrap() }
+}
+
 fn free(name: &str) -> Lens {
     let mut lens = bundled(name);
     if lens.variables.is_empty() {
@@ -51,7 +56,7 @@ fn judge(best: &Lens, start: &Lens, goal: &Goal) -> (f64, f64) {
 fn lenses_end_within_their_limits() {
     for name in ["tessar_50_f28", "achromat_ac254_100", "double_gauss_nikkor_s_50"] {
         let lens = free(name);
-        let goal = Goal::default_for(&lens).unwrap();
+        let goal = default_goal(&lens);
         let (_, before) = judge(&lens, &lens, &goal);
         let (violation, merit) = judge(run(&lens, &goal, 30).best(), &lens, &goal);
         assert!(violation <= KEPT && merit < before, "{name}: {violation:e} {before:e} {merit:e}");
@@ -128,7 +133,7 @@ fn variables_at_their_bounds_stay_there() {
         let value = lens.get(lens.variables[i].parameter).unwrap();
         (lens.variables[i].min, lens.variables[i].max) = (Some(value), Some(value));
     }
-    let goal = Goal::default_for(&lens).unwrap();
+    let goal = default_goal(&lens);
     let optimizer = run(&lens, &goal, 20);
     let kept: Vec<_> = lens.variables.iter().map(|v| optimizer.best().get(v.parameter)).collect();
     let asked: Vec<_> = lens.variables.iter().map(|v| lens.get(v.parameter)).collect();
@@ -180,7 +185,7 @@ fn equal_surfaces_do_no_harm() {
     lens.surfaces.insert(rear, plate);
     lens.variables.clear();
     add_variables(&mut lens, &[ParameterKind::Curvatures, ParameterKind::Thicknesses]);
-    let goal = Goal::default_for(&lens).unwrap();
+    let goal = default_goal(&lens);
     let (_, before) = judge(&lens, &lens, &goal);
     let (violation, merit) = judge(run(&lens, &goal, 25).best(), &lens, &goal);
     assert!(violation <= KEPT && merit <= before, "{violation:e} {before:e} {merit:e}");
@@ -191,11 +196,11 @@ fn penalties_are_kept_when_a_goal_asks_for_them() {
     let lens = free("achromat_ac254_100");
     let penalties =
         Goal { limits: LimitTreatment::Penalties, ..goal(&[Term::Spot, Term::FocalLength(90.0)]) };
-    let text = serde_json::to_string(&penalties).unwrap();
-    assert!(text.contains(r#""limits":"penalties""#), "{text}");
     let optimizer = run(&lens, &penalties, 30);
     assert!(optimizer.binding_limits().is_empty());
     let hard = Goal { limits: LimitTreatment::Constraints, ..penalties };
+    let text = serde_json::to_string(&hard).unwrap();
+    assert!(text.contains(r#""limits":"constraints""#), "{text}");
     assert!(judge(optimizer.best(), &lens, &hard).0 > KEPT, "a penalty gives way");
     assert!(run(&lens, &hard, 30).conflict().is_empty());
 }
