@@ -80,7 +80,7 @@ fn a_search_survives_the_loss_of_its_checkpoint() {
     let (checkpoint, out) = (lost.path("sub/run.json"), kept.path("best.json"));
     fs::create_dir(lost.path("sub")).unwrap();
     let running = start_search(&checkpoint, &["--out", &out]);
-    fs::remove_dir_all(lost.path("sub")).unwrap();
+    fs::rename(lost.path("sub"), lost.path("moved")).unwrap();
     std::thread::sleep(Duration::from_secs(1));
     running.signal("-INT");
     let output = running.output();
@@ -101,7 +101,7 @@ fn a_checkpoint_is_tried_again() {
     let checkpoint = folder.path("sub/run.json");
     fs::create_dir(folder.path("sub")).unwrap();
     let running = start_search(&checkpoint, &[]);
-    fs::remove_dir_all(folder.path("sub")).unwrap();
+    fs::rename(folder.path("sub"), folder.path("moved")).unwrap();
     std::thread::sleep(Duration::from_millis(500));
     fs::create_dir(folder.path("sub")).unwrap();
     wait_for(&checkpoint);
@@ -118,7 +118,7 @@ fn a_lens_that_cannot_be_saved_is_printed() {
     fs::create_dir(lost.path("sub")).unwrap();
     let out = lost.path("sub/best.json");
     let running = start_search(&kept.path("run.json"), &["--out", &out]);
-    fs::remove_dir_all(lost.path("sub")).unwrap();
+    fs::rename(lost.path("sub"), lost.path("moved")).unwrap();
     running.signal("-INT");
     let output = running.output();
     assert_eq!(output.status.code(), Some(1), "{}", text(&output.stderr));
@@ -138,7 +138,7 @@ fn a_field_that_cannot_be_saved_is_printed() {
     let running =
         Running::start(&["grin", "luneburg-radial", "--nodes", "5", "--out", &out, "--json"]);
     std::thread::sleep(Duration::from_millis(300));
-    fs::remove_dir_all(folder.path("sub")).unwrap();
+    fs::rename(folder.path("sub"), folder.path("moved")).unwrap();
     running.signal("-INT");
     let output = running.output();
     let said = text(&output.stderr);
