@@ -327,9 +327,9 @@ fn the_family_page_shows_the_lineage_of_a_lens() {
         harness.get_all_by_label_contains("17 moves, 340 gradients in chain 1: ended by its clock");
     assert_eq!(fates.count(), 2);
     press(&mut harness, "Show lens 0");
-    let choice =
-        StructureSearchCommand::Choose { number: 0, lens: Box::new(Lens::clone(&other(0))) };
-    assert_eq!(harness.state().commands, [Command::StructureSearch(choice)]);
+    let lens = Box::new(Lens::clone(&other(0)));
+    let choose = StructureSearchCommand::Choose { number: 0, lens: lens.clone() };
+    assert_eq!(harness.state().commands, [choose.into(), Command::Preview(Some(lens))]);
 }
 
 #[test]

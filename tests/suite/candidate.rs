@@ -104,3 +104,16 @@ fn another_lens_is_another_document() {
     session.apply(Command::New(Box::new(blank())));
     assert_ne!(session.view().document, first);
 }
+
+/// The variables of the design would name other surfaces of a lens that has one more.
+#[test]
+fn a_candidate_with_another_surface_keeps_its_own_variables() {
+    let mut session = session();
+    let mut lens = double_gauss();
+    lens.surfaces.insert(0, aplanat::lens::Row { thickness: 1.0, ..Default::default() });
+    lens.variables.truncate(1);
+    let own = lens.variables.clone();
+    session.apply(Command::Preview(Some(Box::new(lens))));
+    session.apply(Command::AcceptCandidate);
+    assert_eq!(session.lens().variables, own);
+}

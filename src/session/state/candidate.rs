@@ -1,5 +1,6 @@
 //! The candidate: a lens of a run or a panel that the window shows in place of the design.
 
+use super::runs::without_fixed_variables;
 use super::{PreviewSource, Session};
 use crate::lens::Lens;
 use crate::session::history::VersionOrigin;
@@ -87,10 +88,13 @@ impl Session {
         self.shows_candidate = true;
     }
 
-    /// A candidate with the variables of the design if it accepts them: a run may have more.
+    /// A candidate with the variables of the design if it has the same surfaces: a run may have more
+    /// of them, and a lens of a search others.
     pub(super) fn with_own_variables(&self, lens: &Lens) -> Result<Lens, String> {
+        let same_rows = lens.surfaces.len() == self.lens.surfaces.len();
         let own = Lens { variables: self.lens.variables.clone(), ..lens.clone() };
-        let lens = if own.check().is_ok() { own } else { lens.clone() };
+        let fits = same_rows && own.check().is_ok();
+        let lens = if fits { own } else { without_fixed_variables(lens) };
         lens.check().map(|()| lens).map_err(|why| why.to_string())
     }
 

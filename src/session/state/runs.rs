@@ -231,7 +231,7 @@ fn merge_result(run: &OptimizationSnapshot, design: &Arc<Lens>) -> Result<Lens, 
 }
 
 /// A lens of a structure search without the variables that the search has fixed by equal bounds.
-fn without_fixed_variables(lens: &Lens) -> Lens {
+pub(super) fn without_fixed_variables(lens: &Lens) -> Lens {
     let mut own = lens.clone();
     own.variables.retain(|v| v.min.is_none() || v.min != v.max);
     own
