@@ -58,7 +58,12 @@ impl PupilCurve {
         self.segments.iter().map(|segment| segment.ends[0])
     }
 
-    /// The area inside, positive if azimuth from +y towards +x grows along the curve.
+    /// The area inside.
+    pub(super) fn area(&self) -> f64 {
+        0.5 * self.signed_area().abs()
+    }
+
+    /// Twice the area inside, positive if azimuth from +y towards +x grows along the curve.
     fn signed_area(&self) -> f64 {
         self.segments.iter().map(|Segment { ends: [a, b], .. }| a[1] * b[0] - a[0] * b[1]).sum()
     }

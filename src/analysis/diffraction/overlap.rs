@@ -74,8 +74,9 @@ impl Overlap {
             let points = pupils[k].points().step_by(every);
             points.map(|p| [p[0] + moved[k][0], p[1] + moved[k][1]]).collect()
         };
+        let least = TOUCHING * pupils[0].area().min(pupils[1].area());
         // A sliver may slip between coarse polygons.
-        let common = |most| frame(&common_part(polygon(0, most), &polygon(1, most)));
+        let common = |most| frame(&common_part(polygon(0, most), &polygon(1, most)), least);
         let Some((center, axes)) = common(COARSE).or_else(|| common(usize::MAX)) else {
             return Ok(None);
         };
@@ -296,13 +297,12 @@ fn common_part(mut subject: Vec<[f64; 2]>, clip: &[[f64; 2]]) -> Vec<[f64; 2]> {
     subject
 }
 
-/// An area below this part of the square of its distance from the axis is a point that two pupils
-/// touch in.
+/// A common part below this part of the smaller pupil is a point that the two touch in.
 const TOUCHING: f64 = 1e-20;
 
-/// The centroid of a polygon and the axes of the ellipse with its second moments; `None` if it is
-/// empty.
-fn frame(polygon: &[[f64; 2]]) -> Option<([f64; 2], [[f64; 2]; 2])> {
+/// The centroid of a polygon and the axes of the ellipse with its second moments; `None` if its area
+/// is not above `least`.
+fn frame(polygon: &[[f64; 2]], least: f64) -> Option<([f64; 2], [[f64; 2]; 2])> {
     let origin = *polygon.first()?;
     let (mut area, mut first, mut second) = (0.0, [0.0; 2], [0.0; 3]);
     for (i, p) in polygon.iter().enumerate() {
@@ -321,7 +321,7 @@ fn frame(polygon: &[[f64; 2]]) -> Option<([f64; 2], [[f64; 2]; 2])> {
     let xx = second[0] / area - mean[0] * mean[0];
     let xy = second[1] / area - mean[0] * mean[1];
     let yy = second[2] / area - mean[1] * mean[1];
-    if !(area > TOUCHING * (origin[0].hypot(origin[1])).powi(2) && xx > 0.0 && yy > 0.0) {
+    if !(area > least && xx > 0.0 && yy > 0.0) {
         return None;
     }
     let y = yy.sqrt();
