@@ -1,11 +1,11 @@
 //! Encircled energy: the share of the light within a circle.
 
-use super::pupil_samples::{FEW, PupilSamples};
+use super::pupil_samples::PupilSamples;
 use crate::analysis::reference_sphere::ReferenceSphere;
 use crate::analysis::{AnalysisError, Estimate, lit_region};
 use crate::lens::FieldPoint;
 use crate::math::quadrature::gauss_legendre;
-use crate::pupil::{Accuracy, Nodes, RayModel, converge_list};
+use crate::pupil::{Accuracy, RayModel};
 use std::f64::consts::TAU;
 
 /// The share of the light of a field at a wavelength within circles of these radii in mm, ascending,
@@ -23,21 +23,8 @@ pub fn encircled_energy(
 ) -> Result<Vec<Estimate>, AnalysisError> {
     let region = lit_region(model, field, wavelength)?;
     let sphere = ReferenceSphere::for_region(&region)?;
-    // A pupil that folds does so for few rays already.
-    PupilSamples::of_nodes(&region, &sphere, &region.nodes(FEW))?;
-    let mut refused = None;
-    let numbers = |nodes: &Nodes| match PupilSamples::of_nodes(&region, &sphere, nodes) {
-        Ok(light) => Some(light.encircled(center, radii)),
-        Err(why) => {
-            refused = Some(why);
-            None
-        }
-    };
-    let found = converge_list(&region, accuracy, numbers, |list| vec![1.0; list.len()]);
-    if let Some(why) = refused.filter(|why| *why != AnalysisError::NoLight) {
-        return Err(why);
-    }
-    let found = found.ok_or(AnalysisError::NoLight)?;
+    let found =
+        PupilSamples::converge(&region, &sphere, accuracy, |light| light.encircled(center, radii))?;
     let estimate = |k: usize| Estimate::new(found.values[k], found.errors[k], found.rays);
     Ok((0..radii.len()).map(estimate).collect())
 }

@@ -1,10 +1,10 @@
 //! The intensity at points of the image of a point.
 
-use super::pupil_samples::{FEW, PupilSamples};
+use super::pupil_samples::PupilSamples;
 use crate::analysis::reference_sphere::{ReferenceForm, ReferenceSphere};
 use crate::analysis::{AnalysisError, Estimate, lit_region};
 use crate::lens::FieldPoint;
-use crate::pupil::{Accuracy, Nodes, RayModel, converge_list};
+use crate::pupil::{Accuracy, RayModel};
 
 /// The diffraction image of a point at one wavelength.
 #[derive(Debug, Clone, PartialEq)]
@@ -35,24 +35,10 @@ pub fn point_spread(
 ) -> Result<PointSpread, AnalysisError> {
     let region = lit_region(model, field, wavelength)?;
     let sphere = ReferenceSphere::for_region(&region)?;
-    // A pupil that folds does so for few rays already.
-    PupilSamples::of_nodes(&region, &sphere, &region.nodes(FEW))?;
-    let mut refused = None;
-    let numbers = |nodes: &Nodes| match PupilSamples::of_nodes(&region, &sphere, nodes) {
-        Ok(light) => {
-            let all = std::iter::once([0.0; 2]).chain(points.iter().copied());
-            Some(all.map(|point| light.intensity(point)).collect())
-        }
-        Err(why) => {
-            refused = Some(why);
-            None
-        }
-    };
-    let found = converge_list(&region, accuracy, numbers, |list| vec![1.0; list.len()]);
-    if let Some(why) = refused.filter(|why| *why != AnalysisError::NoLight) {
-        return Err(why);
-    }
-    let found = found.ok_or(AnalysisError::NoLight)?;
+    let found = PupilSamples::converge(&region, &sphere, accuracy, |light| {
+        let all = std::iter::once([0.0; 2]).chain(points.iter().copied());
+        all.map(|point| light.intensity(point)).collect()
+    })?;
     let estimate = |k: usize| Estimate::new(found.values[k], found.errors[k], found.rays);
     Ok(PointSpread {
         intensities: (1..found.values.len()).map(estimate).collect(),

@@ -3,7 +3,7 @@
 use crate::analysis::AnalysisError;
 use crate::analysis::reference_sphere::ReferenceSphere;
 use crate::math::Dual;
-use crate::pupil::{Nodes, Region};
+use crate::pupil::{Accuracy, ConvergedList, Nodes, Region, converge_list};
 use crate::trace::TraceSink as _;
 use std::f64::consts::TAU;
 
@@ -26,12 +26,40 @@ pub struct PupilSamples {
 }
 
 /// The order of quadrature of few rays.
-pub(super) const FEW: usize = 2;
+const FEW: usize = 2;
 
 /// A complex number as its real and imaginary part.
 pub(super) type Complex = [f64; 2];
 
 impl PupilSamples {
+    /// Numbers of the light of a pupil, of so many nodes that the tolerance is kept; errors are
+    /// absolute.
+    ///
+    /// # Errors
+    /// The pupil is dark or folds.
+    pub(super) fn converge(
+        region: &Region<'_>,
+        sphere: &ReferenceSphere,
+        accuracy: Accuracy,
+        mut numbers: impl FnMut(&Self) -> Vec<f64>,
+    ) -> Result<ConvergedList, AnalysisError> {
+        // A pupil that folds does so for few rays already.
+        Self::of_nodes(region, sphere, &region.nodes(FEW))?;
+        let mut refused = None;
+        let at_nodes = |nodes: &Nodes| match Self::of_nodes(region, sphere, nodes) {
+            Ok(light) => Some(numbers(&light)),
+            Err(why) => {
+                refused = Some(why);
+                None
+            }
+        };
+        let found = converge_list(region, accuracy, at_nodes, |list| vec![1.0; list.len()]);
+        match refused.filter(|why| *why != AnalysisError::NoLight) {
+            Some(why) => Err(why),
+            None => found.ok_or(AnalysisError::NoLight),
+        }
+    }
+
     /// The light of a pupil at some nodes.
     ///
     /// # Errors

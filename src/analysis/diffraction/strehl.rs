@@ -1,11 +1,11 @@
 //! The Strehl ratio: at the image point of the chief ray, and at the brightest point in space.
 
 use super::pupil_function::third_cosine;
-use super::pupil_samples::{FEW, PupilSamples};
+use super::pupil_samples::PupilSamples;
 use crate::analysis::reference_sphere::ReferenceSphere;
 use crate::analysis::{AnalysisError, Estimate, lit_region};
 use crate::lens::FieldPoint;
-use crate::pupil::{Accuracy, Nodes, RayModel, converge_list};
+use crate::pupil::{Accuracy, RayModel};
 use nalgebra::{Matrix3, Matrix4, Vector3, Vector4};
 use std::f64::consts::TAU;
 
@@ -36,25 +36,11 @@ pub fn strehl(
 ) -> Result<Strehl, AnalysisError> {
     let region = lit_region(model, field, wavelength)?;
     let sphere = ReferenceSphere::for_region(&region)?;
-    // A pupil that folds does so for few rays already.
-    PupilSamples::of_nodes(&region, &sphere, &region.nodes(FEW))?;
-    let mut refused = None;
     let mut best_at = [0.0; 3];
-    let numbers = |nodes: &Nodes| match PupilSamples::of_nodes(&region, &sphere, nodes) {
-        Ok(light) => {
-            best_at = brightest(&light);
-            Some(vec![light.intensity([0.0; 2]), light.intensity_at(best_at)])
-        }
-        Err(why) => {
-            refused = Some(why);
-            None
-        }
-    };
-    let found = converge_list(&region, accuracy, numbers, |_| vec![1.0; 2]);
-    if let Some(why) = refused.filter(|why| *why != AnalysisError::NoLight) {
-        return Err(why);
-    }
-    let found = found.ok_or(AnalysisError::NoLight)?;
+    let found = PupilSamples::converge(&region, &sphere, accuracy, |light| {
+        best_at = brightest(light);
+        vec![light.intensity([0.0; 2]), light.intensity_at(best_at)]
+    })?;
     let estimate = |k: usize| Estimate::new(found.values[k], found.errors[k], found.rays);
     Ok(Strehl { at_chief: estimate(0), best: estimate(1), best_at, reached: found.converged })
 }
