@@ -3,9 +3,10 @@
 //!
 //! A [`HandleDrag`] starts from a lens and gives the lens for every value of its handle. It depends
 //! on the value alone, not on the way to it: a handle that comes back gives the lens that it started
-//! from. The least change is that of the projection of a search ([`nearest_point_from`]): curvatures
-//! count in steps of `0.3/f`, distances in steps of `0.01 f`. Where no nearby lens has the locked
-//! quantities, or the handle has reached the end of its range, it stops and says why.
+//! from. The least change is that of the projection of a search
+//! ([`crate::solve::nearest_point_from`]): curvatures count in steps of `0.3/f`, distances in steps
+//! of `0.01 f`. Where no nearby lens has the locked quantities, or the handle has reached the end of
+//! its range, it stops and says why.
 
 mod handle;
 mod hold;
