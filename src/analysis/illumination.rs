@@ -82,12 +82,30 @@ fn field_light(
     accuracy: Accuracy,
 ) -> Result<FieldLight, AnalysisError> {
     let region = lit_region(model, field, wavelength)?;
-    let found = converge(&region, accuracy, |nodes| cone_area(&region, nodes), |cone| *cone);
-    let found = found.ok_or(AnalysisError::NoLight)?;
-    let cone = Estimate::new(found.values[0], found.errors[0], found.rays);
+    let cone = region_cone(&region, accuracy)?;
     let point = centroid(&region, accuracy)?;
     let irradiance = irradiance(model, wavelength, point, accuracy)?;
     Ok(FieldLight { irradiance, point, cone })
+}
+
+/// The area of the cone of a field's rays at the image in direction cosines, π sin² of the half
+/// angle for a full cone, at a wavelength.
+///
+/// # Errors
+/// No ray of the field gets through at the wavelength.
+pub fn image_cone(
+    model: &RayModel,
+    field: FieldPoint,
+    wavelength: usize,
+    accuracy: Accuracy,
+) -> Result<Estimate, AnalysisError> {
+    region_cone(&lit_region(model, field, wavelength)?, accuracy)
+}
+
+fn region_cone(region: &Region<'_>, accuracy: Accuracy) -> Result<Estimate, AnalysisError> {
+    let found = converge(region, accuracy, |nodes| cone_area(region, nodes), |cone| *cone);
+    let found = found.ok_or(AnalysisError::NoLight)?;
+    Ok(Estimate::new(found.values[0], found.errors[0], found.rays))
 }
 
 fn cone_area(region: &Region<'_>, nodes: &Nodes) -> Option<[f64; 1]> {

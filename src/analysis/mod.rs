@@ -29,7 +29,7 @@ pub use diffraction::{
 };
 pub use distortion::{Distortion, FieldCurvature, distortion, field_curvature};
 pub use fan::{Fan, FanPoint, fan};
-pub use illumination::{Illumination, energy_irradiance, illumination, irradiance};
+pub use illumination::{Illumination, energy_irradiance, illumination, image_cone, irradiance};
 pub use image_quality::{ImageQuality, field_qualities, field_quality, image_quality};
 pub use mtf::{
     MtfCurve, MtfPoint, TransferValue, geometric_mtf, perfect_contrast, polychromatic_geometric_mtf,

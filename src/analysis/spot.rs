@@ -60,9 +60,7 @@ pub struct Spot {
 impl Spot {
     /// The RMS radius with the image plane moved by `defocus` mm along the light.
     pub fn rms_at(&self, defocus: f64) -> f64 {
-        let place = |channel: &MonochromaticSpot, i: usize| {
-            channel.centroid[i].value + defocus * channel.slopes.mean[i]
-        };
+        let place = |channel: &MonochromaticSpot, i: usize| channel.centroid_at(defocus)[i];
         let channels = || self.shares.iter();
         let center: [f64; 2] = [0, 1].map(|i| channels().map(|(c, s)| s * place(c, i)).sum());
         let square = |channel: &MonochromaticSpot| {
@@ -251,6 +249,11 @@ impl MonochromaticSpot {
         let ArrivalSlopes { variance: square, covariance, .. } = self.slopes;
         let mean = self.rms.value.powi(2) + defocus * (2.0 * covariance + defocus * square);
         mean.max(0.0).sqrt()
+    }
+
+    /// The centroid with the image plane moved by `defocus` mm along the light, x and y in mm.
+    pub fn centroid_at(&self, defocus: f64) -> [f64; 2] {
+        [0, 1].map(|i| self.centroid[i].value + defocus * self.slopes.mean[i])
     }
 
     /// The shift of the image plane that gives the smallest RMS radius, in mm along the light; `None`

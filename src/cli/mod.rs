@@ -10,6 +10,7 @@
 
 mod analyze;
 mod convert;
+mod design;
 mod effects;
 mod error;
 mod experiment;
@@ -74,6 +75,7 @@ enum CliCommand {
     Optimize(optimize::OptimizeArgs),
     Pareto(pareto::ParetoArgs),
     Search(Box<search::SearchArgs>),
+    Design(design::DesignArgs),
     Grin(grin::GrinArgs),
     Convert(convert::ConvertArgs),
     Library(library::LibraryArgs),
@@ -92,6 +94,7 @@ impl CliCommand {
             Self::Optimize(optimize) => optimize.run(output),
             Self::Pareto(pareto) => pareto.run(output),
             Self::Search(search) => search.run(output),
+            Self::Design(design) => design.run(output),
             Self::Grin(grin) => grin.run(output),
             Self::Convert(convert) => convert.run(output),
             Self::Library(library) => library.run(output),

@@ -98,7 +98,7 @@ fn constraints(zoom: &Configuration, systems: &ResolvedSystems, term: Term) -> V
 pub struct ConstraintMargin {
     /// The name of the term.
     pub term: &'static str,
-    /// The surface, or the one in front of the gap, counted from 0; the field if light is limited;
+    /// The surface, or the one in front of the gap, counted from 0; the field if it limits fields;
     /// `None` for the whole lens.
     pub surface: Option<usize>,
     /// The zoom position, counted from 0.
@@ -115,7 +115,7 @@ pub struct ConstraintMargin {
 }
 
 /// The limits of single fields.
-const LIGHT_LIMITS: [&str; 2] = ["light", "relative_illumination"];
+const FIELD_LIMITS: [&str; 4] = ["light", "relative_illumination", "clear_area", "distortion"];
 
 impl ConstraintMargin {
     /// The constrained surface, or the field with the wavelength, as it is displayed; `None` for the
@@ -124,7 +124,7 @@ impl ConstraintMargin {
         let index = self.surface?;
         Some(match self.um {
             Some(um) => format!("field {index} at {um} um"),
-            None if LIGHT_LIMITS.contains(&self.term) => format!("field {index}"),
+            None if FIELD_LIMITS.contains(&self.term) => format!("field {index}"),
             None => format!("surface {}", SurfaceNumber::new(index)),
         })
     }

@@ -8,6 +8,7 @@
 
 mod bookkeeping;
 mod checkpoint;
+pub mod design;
 pub mod element;
 mod error;
 mod landscape;

@@ -1,0 +1,67 @@
+//! What `design` prints: the complete specification, and lenses beside it.
+
+use crate::cli::output::{ShortNumber, TextTable};
+use crate::search::design::{FilledValue, LensJudgement, LensRequirements};
+use serde::Serialize;
+use std::fmt::{self, Display};
+
+/// A complete specification, with the judgement of a lens.
+#[derive(Serialize)]
+pub(super) struct JudgementReport {
+    pub(super) requirements: LensRequirements,
+    /// The values that the specification does not state.
+    pub(super) filled: Vec<FilledValue>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) judgement: Option<LensJudgement>,
+}
+
+impl Display for JudgementReport {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write_filled(f, &self.requirements, &self.filled)?;
+        self.judgement.as_ref().map_or(Ok(()), |judgement| write_judgement(f, judgement))
+    }
+}
+
+/// Writes what is asked for in one line, and what was filled.
+pub(super) fn write_filled(
+    f: &mut fmt::Formatter<'_>,
+    asked: &LensRequirements,
+    filled: &[FilledValue],
+) -> fmt::Result {
+    let LensRequirements { focal_length, f_number, elements, .. } = asked;
+    let (f_number, half) = (ShortNumber(*f_number), ShortNumber(asked.half_field()));
+    writeln!(f, "{focal_length} mm, f/{f_number}, {half} deg, at most {elements} elements")?;
+    for FilledValue { key, value, reason } in filled {
+        writeln!(f, "not stated: {key}, taken as {value} ({reason})")?;
+    }
+    Ok(())
+}
+
+/// Writes a judgement: fields, limits that are broken or nearest to it.
+pub(super) fn write_judgement(f: &mut fmt::Formatter<'_>, found: &LensJudgement) -> fmt::Result {
+    let LensJudgement { focal_length, elements, aspheric_surfaces, refocus, .. } = found;
+    writeln!(
+        f,
+        "\nRMS spot radius {:.3} um over the fields; {} mm, {elements} elements, \
+         {aspheric_surfaces} aspheric surfaces; image plane moved by {} mm",
+        1e3 * found.rms,
+        ShortNumber(*focal_length),
+        ShortNumber(*refocus)
+    )?;
+    let mut table =
+        TextTable::new(&["field deg", "rms um", "clear area mm^2", "illumination", "distortion"]);
+    for field in &found.fields {
+        table.row([
+            ShortNumber(field.degrees).to_string(),
+            format!("{:.3}", 1e3 * field.rms),
+            format!("{:.2}", field.clear_area),
+            format!("{:.4}", field.relative_illumination),
+            format!("{:.5}", field.distortion),
+        ]);
+    }
+    write!(f, "{table}")?;
+    match found.failures()[..] {
+        [] => writeln!(f, "all {} limits are kept", found.limits.len()),
+        ref failures => failures.iter().try_for_each(|text| writeln!(f, "broken: {text}")),
+    }
+}

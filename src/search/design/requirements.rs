@@ -1,0 +1,331 @@
+//! A complete specification: what was written and, for everything else, the usual.
+
+use super::refusal::check;
+use super::{GlassList, LensSpecification, SpecificationError};
+use crate::lens::glass::{self, line};
+use serde::Serialize;
+use std::f64::consts::PI;
+
+/// Everything that is asked of a lens. Lists by field have as many entries as there are fields.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct LensRequirements {
+    /// The focal length, in mm; a lens may deviate from it by [`FOCAL_LENGTH_TOLERANCE`].
+    pub focal_length: f64,
+    /// The f-number.
+    pub f_number: f64,
+    /// The fields in degrees from the axis, ascending from 0.
+    pub fields: Vec<f64>,
+    /// The wavelengths in micrometres with their weights.
+    pub wavelengths: Vec<(f64, f64)>,
+    /// The smallest back focus, in mm.
+    pub back_focus: f64,
+    /// The largest track from the first vertex to the image, in mm.
+    pub track: f64,
+    /// The largest number of pieces of glass.
+    pub elements: usize,
+    /// The largest number of aspheric surfaces, conics included.
+    pub aspheric_surfaces: usize,
+    /// The permitted glasses.
+    pub glasses: GlassChoice,
+    /// The largest absolute distortion, as a fraction.
+    pub distortion: f64,
+    /// The smallest relative illumination of every field.
+    pub relative_illumination: Vec<f64>,
+    /// The smallest clear area of every field, in mm².
+    pub clear_area: Vec<f64>,
+    /// The largest semi-diameter, in mm.
+    pub semi_diameter: f64,
+    /// The smallest thickness of glass on the axis, in mm.
+    pub glass_center: f64,
+    /// The smallest thickness of glass at its rim, in mm.
+    pub glass_edge: f64,
+    /// The smallest air space on the axis, in mm.
+    pub air_center: f64,
+}
+
+/// The permitted glasses.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct GlassChoice {
+    /// The glasses of the catalogue by manufacturer and name; empty for all of them.
+    pub names: Vec<String>,
+    /// The ranges of the index and of the Abbe number of model plastics, if they are permitted.
+    pub plastics: Option<[[f64; 2]; 2]>,
+}
+
+/// A value that the specification does not state.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct FilledValue {
+    /// The key.
+    pub key: &'static str,
+    /// The value that is taken, as text.
+    pub value: String,
+    /// The reason for it.
+    pub reason: &'static str,
+}
+
+/// The relative deviation of the focal length that a lens may have.
+pub const FOCAL_LENGTH_TOLERANCE: f64 = 0.01;
+/// The share of the area of an unvignetted beam that has to be clear on the axis.
+const CLEAR_ON_AXIS: f64 = 0.98;
+
+impl LensRequirements {
+    /// Fills what a specification does not state, and refuses what no lens can do.
+    ///
+    /// # Errors
+    /// A value that is none, and requirements that no lens satisfies.
+    pub fn complete(
+        spec: &LensSpecification,
+    ) -> Result<(Self, Vec<FilledValue>), SpecificationError> {
+        check::check_numbers(spec)?;
+        let mut fill = Filling::default();
+        let f_number = fill.f_number(spec)?;
+        let fields = fill.fields(spec)?;
+        let complete = fill.rest(spec, f_number, fields)?;
+        check::check_feasible(spec, &complete)?;
+        Ok((complete, fill.filled))
+    }
+
+    /// The largest field, in degrees.
+    pub fn half_field(&self) -> f64 {
+        self.fields.last().copied().unwrap_or(0.0)
+    }
+
+    /// The radius of the beam on the axis that has the required area, in mm.
+    pub fn beam_radius(&self) -> f64 {
+        (self.clear_area.first().copied().unwrap_or(0.0) / PI).sqrt()
+    }
+}
+
+impl GlassChoice {
+    /// True if a glass of the catalogue, given by its full name, is permitted.
+    pub fn allows(&self, full_name: &str) -> bool {
+        self.names.is_empty() || self.names.iter().any(|name| name == full_name)
+    }
+
+    /// True if a model plastic is permitted.
+    pub fn allows_model(&self, nd: f64, vd: f64) -> bool {
+        let inside = |[low, high]: [f64; 2], v: f64| v >= low - 1e-9 && v <= high + 1e-9;
+        self.plastics.is_some_and(|[index, abbe]| inside(index, nd) && inside(abbe, vd))
+    }
+
+    fn of(list: &GlassList) -> Result<Self, SpecificationError> {
+        match list {
+            GlassList::Words(words) => Self::of_words(words),
+            GlassList::Names(names) => {
+                let full = names.iter().map(|name| full_name(name));
+                Ok(Self { names: full.collect::<Result<_, _>>()?, plastics: None })
+            }
+        }
+    }
+
+    fn of_words(words: &str) -> Result<Self, SpecificationError> {
+        let plastics = || {
+            let ranges = words.strip_prefix(ANY_GLASS)?.strip_prefix(" or model plastics nd ")?;
+            let (index, abbe) = ranges.split_once(", vd ")?;
+            let range = |text: &str| {
+                let (low, high) = text.split_once('-')?;
+                Some([low.parse().ok()?, high.parse().ok()?])
+            };
+            Some([range(index)?, range(abbe)?])
+        };
+        match plastics() {
+            None if words != ANY_GLASS => Err(SpecificationError::invalid(
+                "glasses",
+                format!("`{words}`"),
+                "`any glass of the catalogue`, perhaps followed by ` or model plastics nd \
+                 1.53-1.67, vd 20-56`, or a list of names",
+            )),
+            plastics => Ok(Self { names: Vec::new(), plastics }),
+        }
+    }
+}
+
+const ANY_GLASS: &str = "any glass of the catalogue";
+
+fn full_name(name: &str) -> Result<String, SpecificationError> {
+    glass::find(name).map(glass::Glass::full_name).ok_or_else(|| {
+        let expected = "manufacturer and name of a glass of the catalogue, like SCHOTT N-BK7";
+        SpecificationError::invalid("glasses", format!("`{name}`"), expected)
+    })
+}
+
+/// The values that are filled so far.
+#[derive(Debug, Default)]
+struct Filling {
+    filled: Vec<FilledValue>,
+}
+
+impl Filling {
+    /// The value of a key, or the usual one with a note.
+    fn or<T: Clone + std::fmt::Debug>(
+        &mut self,
+        key: &'static str,
+        stated: Option<&T>,
+        usual: T,
+        reason: &'static str,
+    ) -> T {
+        let Some(value) = stated else {
+            self.filled.push(FilledValue { key, value: format!("{usual:?}"), reason });
+            return usual;
+        };
+        value.clone()
+    }
+
+    fn f_number(&mut self, spec: &LensSpecification) -> Result<f64, SpecificationError> {
+        let of_light = || {
+            let area = spec.min_clear_area_mm2.as_ref()?.first()?;
+            Some(spec.focal_length_mm / (2.0 * (area / PI).sqrt()))
+        };
+        let of_aperture = spec.numerical_aperture.map(|na| 0.5 / na);
+        if let (Some(_), Some(_)) = (spec.f_number, of_aperture) {
+            return Err(SpecificationError::Contradiction(
+                "both `f_number` and `numerical_aperture`; expected one of them".to_owned(),
+            ));
+        }
+        let usual = of_aperture.or_else(of_light);
+        match (spec.f_number, usual) {
+            (Some(stated), _) => Ok(stated),
+            (None, Some(usual)) => {
+                Ok(self.or("f_number", None, usual, "from the aperture or the light on the axis"))
+            }
+            (None, None) => Err(SpecificationError::Missing("f_number")),
+        }
+    }
+
+    fn fields(&mut self, spec: &LensSpecification) -> Result<Vec<f64>, SpecificationError> {
+        let of_image =
+            || spec.image_height_mm.map(|h| (h / spec.focal_length_mm).atan().to_degrees());
+        let of_list = || spec.fields_deg.as_ref().and_then(|list| list.last().copied());
+        let half = match (spec.half_field_deg, of_list().or_else(of_image)) {
+            (Some(stated), _) => stated,
+            (None, Some(usual)) => {
+                self.or("half_field_deg", None, usual, "from the last field or the image height")
+            }
+            (None, None) => return Err(SpecificationError::Missing("half_field_deg")),
+        };
+        let usual = if half > 0.0 { vec![0.0, 0.7 * half, half] } else { vec![0.0] };
+        Ok(self.or("fields_deg", spec.fields_deg.as_ref(), usual, "0, 0.7 and 1 of the field"))
+    }
+
+    fn rest(
+        &mut self,
+        spec: &LensSpecification,
+        f_number: f64,
+        fields: Vec<f64>,
+    ) -> Result<LensRequirements, SpecificationError> {
+        let f = spec.focal_length_mm;
+        let half = fields.last().copied().unwrap_or(0.0);
+        if spec.object.is_none() {
+            self.or("object", None, "infinity".to_owned(), "a distant object");
+        }
+        let ums = vec![line::F, line::D, line::C];
+        let ums = self.or("wavelengths_um", spec.wavelengths_um.as_ref(), ums, "visible light");
+        let ones = vec![1.0; ums.len()];
+        let weights = spec.wavelength_weights.as_ref();
+        let weights = self.or("wavelength_weights", weights, ones, "equal weights");
+        let any = GlassList::Words(ANY_GLASS.to_owned());
+        let glasses = spec.glasses.clone().unwrap_or_else(|| {
+            self.or("glasses", None, ANY_GLASS.to_owned(), "no restriction");
+            any
+        });
+        let (light, areas) = (usual_light(&fields), usual_areas(f, f_number, &fields));
+        let thin = (0.02 * f).clamp(0.25, 1.0);
+        let (size, reason) = (usual_semi_diameter(f, f_number, half), "room for the beams");
+        let usual_light = "vignetting of a good camera lens";
+        Ok(LensRequirements {
+            focal_length: f,
+            f_number,
+            back_focus: self.or("min_back_focus_mm", spec.min_back_focus_mm.as_ref(), 0.0, "none"),
+            track: self.or(
+                "max_track_mm",
+                spec.max_track_mm.as_ref(),
+                2.5 * f,
+                "2.5 focal lengths",
+            ),
+            elements: self.or(
+                "max_elements",
+                spec.max_elements.as_ref(),
+                usual_elements(f_number, half),
+                "the usual form for this aperture and field",
+            ),
+            aspheric_surfaces: self.or(
+                "max_aspheric_surfaces",
+                spec.max_aspheric_surfaces.as_ref(),
+                0,
+                "spheres and planes are cheap",
+            ),
+            glasses: GlassChoice::of(&glasses)?,
+            distortion: self.or(
+                "max_abs_distortion",
+                spec.max_abs_distortion.as_ref(),
+                if half > 30.0 { 0.04 } else { 0.02 },
+                "hardly visible",
+            ),
+            relative_illumination: self.or(
+                "min_relative_illumination",
+                spec.min_relative_illumination.as_ref(),
+                light,
+                usual_light,
+            ),
+            clear_area: self.or(
+                "min_clear_area_mm2",
+                spec.min_clear_area_mm2.as_ref(),
+                areas,
+                usual_light,
+            ),
+            semi_diameter: self.or(
+                "max_semi_diameter_mm",
+                spec.max_semi_diameter_mm.as_ref(),
+                size,
+                reason,
+            ),
+            glass_center: self.or(
+                "min_glass_center_mm",
+                spec.min_glass_center_mm.as_ref(),
+                thin,
+                "what can be polished",
+            ),
+            glass_edge: self.or("min_edge_mm", spec.min_edge_mm.as_ref(), 0.8 * thin, "no chips"),
+            air_center: self.or("min_air_mm", spec.min_air_mm.as_ref(), 0.05, "no contact"),
+            wavelengths: ums.into_iter().zip(weights).collect(),
+            fields,
+        })
+    }
+}
+
+/// The number of elements of the usual form (Smith, *Modern Lens Design*).
+fn usual_elements(f_number: f64, half_field: f64) -> usize {
+    let forms = [
+        (3.5, 3.0, 2),
+        (3.5, 22.0, 3),
+        (2.7, 25.0, 4),
+        (1.6, 10.0, 4),
+        (1.8, 24.0, 6),
+        (1.3, 24.0, 7),
+        (3.4, 35.0, 6),
+    ];
+    let fits = forms.iter().filter(|(n, field, _)| f_number >= *n && half_field <= *field);
+    fits.map(|(_, _, elements)| *elements).min().unwrap_or(8)
+}
+
+/// The field relative to the last one, squared.
+fn squared_part(fields: &[f64], field: f64) -> f64 {
+    let last = fields.last().copied().unwrap_or(0.0);
+    if last > 0.0 { (field / last).powi(2) } else { 0.0 }
+}
+
+fn usual_light(fields: &[f64]) -> Vec<f64> {
+    let light =
+        |field: &f64| field.to_radians().cos().powi(4) * (1.0 - 0.5 * squared_part(fields, *field));
+    fields.iter().map(light).collect()
+}
+
+fn usual_areas(f: f64, f_number: f64, fields: &[f64]) -> Vec<f64> {
+    let full = CLEAR_ON_AXIS * PI / 4.0 * (f / f_number).powi(2);
+    let area = |field: &f64| full * (1.0 - 0.45 * squared_part(fields, *field));
+    fields.iter().map(area).collect()
+}
+
+fn usual_semi_diameter(f: f64, f_number: f64, half_field: f64) -> f64 {
+    0.55 * f / f_number + 0.6 * f * half_field.min(60.0).to_radians().tan()
+}

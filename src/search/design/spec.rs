@@ -1,0 +1,83 @@
+//! The specification of a lens as a customer writes it: everything but focal length, aperture and
+//! field may be missing.
+
+use serde::{Deserialize, Serialize};
+
+/// The specification of a lens for an object at infinity. Missing keys are filled by
+/// [`LensRequirements::complete`](super::LensRequirements::complete).
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LensSpecification {
+    /// The object; only `infinity` is supported.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub object: Option<String>,
+    /// The focal length, in mm.
+    pub focal_length_mm: f64,
+    /// The f-number: the focal length over the diameter of the beam on the axis.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub f_number: Option<f64>,
+    /// The numerical aperture on the side of the image, in place of the f-number.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub numerical_aperture: Option<f64>,
+    /// The largest field, in degrees from the axis.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub half_field_deg: Option<f64>,
+    /// The fields at which the lens is judged, in degrees from the axis, ascending from 0.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub fields_deg: Option<Vec<f64>>,
+    /// The image height of the last field, in mm.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub image_height_mm: Option<f64>,
+    /// The wavelengths, in micrometres.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub wavelengths_um: Option<Vec<f64>>,
+    /// Their weights.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub wavelength_weights: Option<Vec<f64>>,
+    /// The smallest distance from the last vertex to the image, in mm.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub min_back_focus_mm: Option<f64>,
+    /// The largest distance from the first vertex to the image, in mm.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub max_track_mm: Option<f64>,
+    /// The largest number of pieces of glass.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub max_elements: Option<usize>,
+    /// The largest number of surfaces that are neither spheres nor planes.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub max_aspheric_surfaces: Option<usize>,
+    /// The permitted glasses.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub glasses: Option<GlassList>,
+    /// The largest distortion of the chief ray against `f tan θ`, as a fraction.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub max_abs_distortion: Option<f64>,
+    /// The smallest relative illumination of every field.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub min_relative_illumination: Option<Vec<f64>>,
+    /// The smallest area of every field's beam in the plane of the first vertex, in mm².
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub min_clear_area_mm2: Option<Vec<f64>>,
+    /// The largest semi-diameter of a surface, in mm.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub max_semi_diameter_mm: Option<f64>,
+    /// The smallest thickness of glass on the axis, in mm.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub min_glass_center_mm: Option<f64>,
+    /// The smallest thickness of glass at the smaller rim of its two surfaces, in mm.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub min_edge_mm: Option<f64>,
+    /// The smallest air space on the axis, in mm; surfaces may touch at their rims.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub min_air_mm: Option<f64>,
+}
+
+/// The permitted glasses: in words, or by name.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(untagged)]
+pub enum GlassList {
+    /// `any glass of the catalogue`, perhaps with `or model plastics nd 1.53-1.67, vd 20-56`.
+    Words(String),
+    /// Glasses of the catalogue by manufacturer and name.
+    Names(Vec<String>),
+}

@@ -1,0 +1,212 @@
+//! A lens from a specification: what is filled, what is refused, how a lens is judged.
+
+use super::cli::{Scratch, done, done_json, refused};
+use aplanat::lens::{Aperture, Lens, Medium, Row, blank, glass};
+use aplanat::search::design::{
+    LensRequirements, LensSpecification, SpecificationError, judge_lens,
+};
+use serde::Deserialize;
+use serde_json::Value;
+
+/// `tests/reference/spec_sheets.json`.
+#[derive(Deserialize)]
+struct SpecSheets {
+    sheets: Vec<SpecSheet>,
+}
+
+#[derive(Deserialize)]
+struct SpecSheet {
+    id: String,
+    spec: LensSpecification,
+    reference: Value,
+    surfaces: Vec<SheetSurface>,
+}
+
+#[derive(Deserialize)]
+struct SheetSurface {
+    radius: Option<f64>,
+    conic: f64,
+    asphere: Vec<f64>,
+    thickness: f64,
+    semi_diameter: f64,
+    n: [f64; 3],
+}
+
+fn sheets() -> Vec<SpecSheet> {
+    let text = std::fs::read_to_string("tests/reference/spec_sheets.json").unwrap();
+    serde_json::from_str::<SpecSheets>(&text).unwrap().sheets
+}
+
+/// The glass of a surface: the next one of the list by name, or by its indices.
+fn medium(surface: &SheetSurface, glasses: &mut dyn Iterator<Item = &Value>) -> Medium {
+    let [blue, yellow, red] = surface.n;
+    if yellow == 1.0 {
+        return Medium::Air;
+    }
+    match glasses.next().and_then(Value::as_str) {
+        Some(name) => Medium::Glass(glass::find(name).unwrap().full_name()),
+        None => Medium::Model { nd: yellow, vd: (yellow - 1.0) / (blue - red) },
+    }
+}
+
+/// The reference lens of a sheet.
+fn reference(sheet: &SpecSheet) -> Lens {
+    let stop = sheet.reference["stop_surface"].as_u64().unwrap() as usize;
+    let mut glasses = sheet.reference["glasses"].as_array().unwrap().iter();
+    let row = |(i, surface): (usize, &SheetSurface)| Row {
+        curvature: surface.radius.map_or(0.0, |radius| 1.0 / radius),
+        conic: surface.conic,
+        asphere: surface.asphere.clone(),
+        thickness: surface.thickness,
+        medium: medium(surface, &mut glasses),
+        semi_diameter: Some(surface.semi_diameter),
+        stop: i == stop,
+        ..Row::default()
+    };
+    let surfaces: Vec<Row> = sheet.surfaces.iter().enumerate().map(row).collect();
+    let aperture = Aperture::StopSemiDiameter(surfaces[stop].semi_diameter.unwrap());
+    Lens { surfaces, aperture, ..blank() }
+}
+
+fn spec(text: &str) -> LensSpecification {
+    serde_json::from_str(text).unwrap()
+}
+
+fn refusal(text: &str) -> String {
+    LensRequirements::complete(&spec(text)).unwrap_err().to_string()
+}
+
+/// The figures of the sheets come from another tracer, which samples the pupil by pixels: radii and
+/// areas are good to half a per cent, a per cent at steep rims.
+#[test]
+fn the_references_of_the_sheets_have_their_figures() {
+    for sheet in sheets() {
+        let (asked, filled) = LensRequirements::complete(&sheet.spec).unwrap();
+        assert!(filled.is_empty(), "{}: {filled:?}", sheet.id);
+        let found = judge_lens(&reference(&sheet), &asked, 1e-3).unwrap();
+        let near = |what: &str, value: f64, stated: &Value, within: f64| {
+            let stated = stated.as_f64().unwrap();
+            let off = (value - stated).abs() / stated.abs().max(1e-2);
+            assert!(off < within, "{}: {what} {value}, stated {stated}", sheet.id);
+        };
+        near("rms", 1e3 * found.rms, &sheet.reference["rms_um_over_fields"], 0.01);
+        near("focal length", found.focal_length, &sheet.reference["focal_length_mm"], 1e-4);
+        for (field, stated) in
+            found.fields.iter().zip(sheet.reference["fields"].as_array().unwrap())
+        {
+            near("field", 1e3 * field.rms, &stated["rms_um"], 0.012);
+            near("area", field.clear_area, &stated["clear_area_mm2"], 0.01);
+            near("light", field.relative_illumination, &stated["relative_illumination"], 0.012);
+            near("distortion", field.distortion, &stated["distortion"], 0.012);
+        }
+        // The bounds are rounded, and one published lens has rims that would meet in air.
+        for margin in found.limits.iter().filter(|margin| !margin.is_kept) {
+            let limit = &margin.limit;
+            let explained = limit.term == "air_edge" || limit.slack() > -1e-4;
+            assert!(explained, "{}: {limit:?}", sheet.id);
+        }
+        let about_glass = |text: &String| text.contains("not one of the permitted glasses");
+        assert!(found.faults.iter().all(about_glass), "{}: {:?}", sheet.id, found.faults);
+    }
+}
+
+#[test]
+fn focal_length_aperture_and_field_suffice() {
+    let text = r#"{"focal_length_mm": 50, "f_number": 2.8, "half_field_deg": 20}"#;
+    let (asked, filled) = LensRequirements::complete(&spec(text)).unwrap();
+    assert_eq!(asked.fields, [0.0, 14.0, 20.0]);
+    assert_eq!((asked.track, asked.elements, asked.aspheric_surfaces), (125.0, 4, 0));
+    let keys: Vec<&str> = filled.iter().map(|value| value.key).collect();
+    for key in ["fields_deg", "wavelengths_um", "max_track_mm", "max_elements", "glasses"] {
+        assert!(keys.contains(&key), "{keys:?}");
+    }
+    let by_height = r#"{"focal_length_mm": 50, "numerical_aperture": 0.25, "image_height_mm": 20}"#;
+    let (asked, _) = LensRequirements::complete(&spec(by_height)).unwrap();
+    assert!((asked.half_field() - 0.4_f64.atan().to_degrees()).abs() < 1e-12);
+    assert!((asked.f_number - 2.0).abs() < 1e-12);
+}
+
+#[test]
+fn without_aperture_or_field_nothing_is_specified() {
+    let text = r#"{"focal_length_mm": 50, "half_field_deg": 20}"#;
+    assert_eq!(
+        LensRequirements::complete(&spec(text)).unwrap_err(),
+        SpecificationError::Missing("f_number")
+    );
+    let text = r#"{"focal_length_mm": 50, "f_number": 2.8}"#;
+    assert_eq!(
+        LensRequirements::complete(&spec(text)).unwrap_err(),
+        SpecificationError::Missing("half_field_deg")
+    );
+}
+
+#[test]
+fn what_no_lens_can_do_is_refused_by_name() {
+    let with = |rest: &str| format!("{{\"focal_length_mm\": 50, {rest}}}");
+    for (rest, words) in [
+        (r#""f_number": 0.4, "half_field_deg": 5"#, "f/0.4; an image in air"),
+        (
+            r#""f_number": 4, "half_field_deg": 85, "max_abs_distortion": 0.0"#,
+            "170 degrees with a distortion of at most 0",
+        ),
+        (
+            r#""f_number": 1.2, "half_field_deg": 5, "max_elements": 1"#,
+            "1 spherical element at f/1.2",
+        ),
+        (
+            r#""f_number": 4, "half_field_deg": 5, "min_back_focus_mm": 60, "max_track_mm": 60"#,
+            "a back focus of 60 mm within a track of 60 mm",
+        ),
+        (
+            r#""f_number": 4, "half_field_deg": 20, "image_height_mm": 25"#,
+            "an image height of 25 mm at 20 degrees",
+        ),
+        (
+            r#""f_number": 2, "half_field_deg": 5, "max_semi_diameter_mm": 8"#,
+            "through a semi-diameter of 8 mm",
+        ),
+        (r#""f_number": 4, "half_field_deg": 5, "max_elements": 0"#, "without an element"),
+    ] {
+        let text = refusal(&with(rest));
+        assert!(text.starts_with("no lens can do that: ") && text.contains(words), "{text}");
+    }
+}
+
+#[test]
+fn values_that_cannot_be_meant_are_refused_by_key() {
+    let with = |rest: &str| {
+        format!("{{\"focal_length_mm\": 50, \"f_number\": 4, \"half_field_deg\": 5, {rest}}}")
+    };
+    for (rest, words) in [
+        (r#""fields_deg": [0, 3, 2]"#, "fields_deg: found [0.0, 3.0, 2.0]; expected angles"),
+        (r#""fields_deg": [0, 4]"#, "the last field is 4 degrees, and `half_field_deg` is 5"),
+        (r#""min_clear_area_mm2": [100]"#, "min_clear_area_mm2: found 1 numbers for 3 fields"),
+        (r#""glasses": ["N-BK99"]"#, "glasses: found `N-BK99`; expected manufacturer"),
+        (r#""glasses": "cheap ones""#, "glasses: found `cheap ones`"),
+        (r#""max_track_mm": -1"#, "max_track_mm: found -1; expected a number above 0"),
+        (r#""object": "near""#, "object: found `near`; expected `infinity`"),
+        (r#""numerical_aperture": 0.1"#, "both `f_number` and `numerical_aperture`"),
+    ] {
+        let text = refusal(&with(rest));
+        assert!(text.contains(words), "{text}");
+    }
+}
+
+#[test]
+fn the_command_line_names_the_place_and_judges_a_lens() {
+    let file = Scratch::new("spec.json");
+    let write = |text: &str| std::fs::write(file.path(), text).unwrap();
+    write(r#"{"focal_length_mm": 50, "f_numbr": 4}"#);
+    refused(2, &["design", file.path()], "", &["line 1, column", "`f_numbr`", "`f_number`"]);
+    write(r#"{"focal_length_mm": 50, "f_number": 0.4, "half_field_deg": 5}"#);
+    refused(2, &["design", file.path()], "", &["no lens can do that", "f/0.4"]);
+    write(r#"{"focal_length_mm": 100, "f_number": 6, "half_field_deg": 1}"#);
+    let lens = "lenses/achromat_ac254_100.json";
+    let arguments = ["design", file.path(), "--judge", lens];
+    let told = done(&arguments, "");
+    assert!(told.contains("not stated: max_elements, taken as 2"), "{told}");
+    assert!(told.contains("all 22 limits are kept"), "{told}");
+    let report = done_json(&arguments, "");
+    assert_eq!(report["requirements"]["elements"], 2);
+    assert_eq!(report["judgement"]["faults"].as_array().unwrap().len(), 0);
+}
