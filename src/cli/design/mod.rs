@@ -1,38 +1,181 @@
 //! `design`: a lens from a specification, or the judgement of a lens against one.
 
+mod checkpoint;
 mod report;
 
 use super::error::CliError;
+use super::failures::Failures;
 use super::input::{display_name, read_json};
-use super::output::Output;
-use crate::files;
+use super::output::{Output, ShortNumber, print_note};
+use super::output_paths::OutputPaths;
+use super::progress::{stop_flag, styled_bar};
+use crate::files::{self, FileLock};
+use crate::measure::Stopwatch;
 use crate::search::design::{
-    JUDGEMENT_TOLERANCE, LensJudgement, LensRequirements, LensSpecification, judge_lens,
+    DesignRun, DesignSettings, DesignedLens, JUDGEMENT_TOLERANCE, LensJudgement, LensRequirements,
+    LensSpecification, judge_lens,
 };
-use report::JudgementReport;
+use report::{DesignReport, JudgementReport};
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Fills a specification of a lens and judges a lens against it
+/// Designs a lens from a specification, or judges a lens against one; Ctrl-C ends the design and
+/// saves the best lens so far
 #[derive(Debug, clap::Args)]
 #[command(after_long_help = include_str!("../help/design.txt"))]
 pub(super) struct DesignArgs {
     /// The specification, as JSON; `-` reads it from standard input
     spec: PathBuf,
 
+    /// The file for the best lens: .json or .zmx; absent: nothing is designed
+    #[arg(long, value_name = "FILE")]
+    out: Option<PathBuf>,
+
     /// Judges this lens: .json or .zmx
-    #[arg(long, value_name = "LENS")]
+    #[arg(long, value_name = "LENS", conflicts_with = "out")]
     judge: Option<PathBuf>,
+
+    /// Maximum duration in minutes
+    #[arg(long, value_name = "MINUTES")]
+    minutes: Option<f64>,
+
+    /// Maximum number of gradients, after which the round is ended; 200000 if --minutes is absent too
+    #[arg(long, value_name = "N")]
+    gradients: Option<u64>,
+
+    /// The seed of all random numbers
+    #[arg(long, default_value_t = 1, value_name = "N")]
+    seed: u64,
+
+    /// Lenses of the library that are no starts, and neither are their copies
+    #[arg(long, value_name = "NAME")]
+    without: Vec<String>,
+
+    /// A file in which the run is saved after every round; resumes the run if it exists
+    #[arg(long, value_name = "FILE", requires = "out")]
+    checkpoint: Option<PathBuf>,
 }
+
+/// Maximum number of gradients if neither it nor a duration is given.
+const DEFAULT_GRADIENTS: u64 = 200_000;
 
 impl DesignArgs {
     pub(super) fn run(&self, output: &Output) -> Result<(), CliError> {
+        self.check()?;
         let spec: LensSpecification = read_json(&self.spec)?;
         let file = display_name(&self.spec);
         let refuse = |error| CliError::Input(format!("{file}: {error}"));
         let (requirements, filled) = LensRequirements::complete(&spec).map_err(refuse)?;
-        let judgement = self.judge.as_ref().map(|path| judge(path, &requirements)).transpose()?;
-        output.print(&JudgementReport { requirements, filled, judgement })
+        let Some(out) = &self.out else {
+            let judged = self.judge.as_ref().map(|path| judge(path, &requirements));
+            let judgement = judged.transpose()?;
+            return output.print(&JudgementReport { requirements, filled, judgement });
+        };
+        let stop = stop_flag();
+        let _lock = self.checkpoint.as_deref().map(FileLock::acquire).transpose()?;
+        let without = self.without.clone();
+        let settings = DesignSettings { without, ..DesignSettings::with_seed(self.seed) };
+        let mut run = self.start_or_resume(&requirements, &settings)?;
+        let mut failures = Failures::default();
+        self.run_rounds(&mut run, &stop, &mut failures);
+        let lenses = run.finish();
+        let saved = self.save(&lenses, out, &mut failures)?;
+        let gradients = run.gradients();
+        let report = DesignReport { requirements, filled, gradients, lenses, out: saved };
+        failures.note(output.print(&report));
+        failures.into_result()
     }
+
+    fn check(&self) -> Result<(), CliError> {
+        if let Some(minutes) = self.minutes.filter(|m| !(*m >= 0.0 && m.is_finite())) {
+            let text = format!("--minutes: found {minutes}; expected 0 or more");
+            return Err(CliError::Input(text));
+        }
+        let known = |name: &&String| files::library_lenses().iter().all(|lens| lens.name != **name);
+        if let Some(name) = self.without.iter().find(known) {
+            let text = format!(
+                "--without: found `{name}`; expected a lens of the library, as `aplanat library` \
+                 lists them"
+            );
+            return Err(CliError::Input(text));
+        }
+        let read = [("the specification", self.spec.as_path())];
+        let judged = self.judge.as_deref().map(|path| ("--judge", path));
+        let mut paths = OutputPaths::reading(read.into_iter().chain(judged));
+        paths.file("--out", self.out.as_deref(), &["json", "zmx"])?;
+        paths.file("--checkpoint", self.checkpoint.as_deref(), &["json"])
+    }
+
+    fn start_or_resume(
+        &self,
+        asked: &LensRequirements,
+        settings: &DesignSettings,
+    ) -> Result<DesignRun, CliError> {
+        match self.checkpoint.as_deref().filter(|path| path.exists()) {
+            Some(path) => checkpoint::resume(path, asked, settings),
+            None => Ok(DesignRun::new(asked, settings)),
+        }
+    }
+
+    /// Rounds until the budget is used, or until Ctrl-C.
+    fn run_rounds(&self, run: &mut DesignRun, stop: &AtomicBool, failures: &mut Failures) {
+        let watch = Stopwatch::start();
+        let bar = styled_bar(100, "{wide_bar} {pos} % {msg}");
+        while !stop.load(Ordering::Relaxed) {
+            let used = self.share_used(run, watch);
+            bar.set_position((100.0 * used) as u64);
+            let best = ShortNumber(1e3 * run.best());
+            bar.set_message(format!("{:?}, {best} um", run.stage()));
+            if used >= 1.0 || !run.advance(used) {
+                break;
+            }
+            if let Some(path) = &self.checkpoint {
+                failures.note(checkpoint::save(path, run));
+            }
+        }
+        bar.finish_and_clear();
+    }
+
+    /// The share of the budget that is used, at most about 1.
+    fn share_used(&self, run: &DesignRun, watch: Stopwatch) -> f64 {
+        let by_time = self.minutes.map(|minutes| watch.seconds() / (60.0 * minutes));
+        let most = match (self.gradients, self.minutes) {
+            (None, Some(_)) => None,
+            (most, _) => Some(most.unwrap_or(DEFAULT_GRADIENTS)),
+        };
+        let by_gradients = most.map(|most| run.gradients() as f64 / most.max(1) as f64);
+        [by_time, by_gradients].into_iter().flatten().fold(0.0, f64::max)
+    }
+
+    /// Saves the lenses: the best one under its name, the others beside it. Returns their files.
+    fn save(
+        &self,
+        lenses: &[DesignedLens],
+        out: &Path,
+        failures: &mut Failures,
+    ) -> Result<Vec<String>, CliError> {
+        let Some((best, others)) = lenses.split_first() else {
+            return Err(CliError::Failed("no start led to a lens".to_owned()));
+        };
+        failures.note(files::save(&best.lens, out));
+        let mut saved = vec![out.display().to_string()];
+        for lens in others {
+            let path = beside(out, report::merit_name(lens.merit));
+            failures.note(files::save(&lens.lens, &path));
+            saved.push(path.display().to_string());
+        }
+        if !best.judgement.is_valid() {
+            print_note("note: the best lens breaks limits");
+        }
+        Ok(saved)
+    }
+}
+
+/// The path of another lens beside that of the best one.
+fn beside(out: &Path, name: &str) -> PathBuf {
+    let stem = out.file_stem().unwrap_or_default().to_string_lossy();
+    let extension = out.extension().unwrap_or_default().to_string_lossy();
+    out.with_file_name(format!("{stem}_{name}.{extension}"))
 }
 
 fn judge(path: &Path, asked: &LensRequirements) -> Result<LensJudgement, CliError> {

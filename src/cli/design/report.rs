@@ -1,7 +1,9 @@
 //! What `design` prints: the complete specification, and lenses beside it.
 
 use crate::cli::output::{ShortNumber, TextTable};
-use crate::search::design::{FilledValue, LensJudgement, LensRequirements};
+use crate::search::design::{
+    DesignMerit, DesignedLens, FilledValue, LensJudgement, LensRequirements,
+};
 use serde::Serialize;
 use std::fmt::{self, Display};
 
@@ -63,5 +65,37 @@ pub(super) fn write_judgement(f: &mut fmt::Formatter<'_>, found: &LensJudgement)
     match found.failures()[..] {
         [] => writeln!(f, "all {} limits are kept", found.limits.len()),
         ref failures => failures.iter().try_for_each(|text| writeln!(f, "broken: {text}")),
+    }
+}
+
+/// The result of a design.
+#[derive(Serialize)]
+pub(super) struct DesignReport {
+    pub(super) requirements: LensRequirements,
+    pub(super) filled: Vec<FilledValue>,
+    pub(super) gradients: u64,
+    pub(super) lenses: Vec<DesignedLens>,
+    /// The file of each lens.
+    pub(super) out: Vec<String>,
+}
+
+impl Display for DesignReport {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write_filled(f, &self.requirements, &self.filled)?;
+        writeln!(f, "{} gradients", self.gradients)?;
+        for (lens, out) in self.lenses.iter().zip(&self.out) {
+            writeln!(f, "\n{}: {out} (from {})", merit_name(lens.merit), lens.origin)?;
+            write_judgement(f, &lens.judgement)?;
+        }
+        Ok(())
+    }
+}
+
+/// What a lens is best at, as in file names.
+pub(super) fn merit_name(merit: DesignMerit) -> &'static str {
+    match merit {
+        DesignMerit::Best => "best",
+        DesignMerit::Simplest => "simplest",
+        DesignMerit::Brightest => "brightest",
     }
 }

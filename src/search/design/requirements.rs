@@ -3,11 +3,12 @@
 use super::refusal::check;
 use super::{GlassList, LensSpecification, SpecificationError};
 use crate::lens::glass::{self, line};
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 
 /// Everything that is asked of a lens. Lists by field have as many entries as there are fields.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct LensRequirements {
     /// The focal length, in mm; a lens may deviate from it by [`FOCAL_LENGTH_TOLERANCE`].
     pub focal_length: f64,
@@ -44,7 +45,8 @@ pub struct LensRequirements {
 }
 
 /// The permitted glasses.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct GlassChoice {
     /// The glasses of the catalogue by manufacturer and name; empty for all of them.
     pub names: Vec<String>,

@@ -1,0 +1,168 @@
+//! The beams of a draft: for every field an ellipse with the area that is asked for.
+
+use crate::lens::Lens;
+use crate::math::Vec3;
+use crate::pupil::RayModel;
+use crate::search::design::LensRequirements;
+use crate::trace::{Ray, Rays, TraceSink as _};
+
+/// The beams that a draft is judged with.
+#[derive(Debug, Clone)]
+pub(in crate::search::design) struct BeamPlan {
+    /// The share of the aperture and of the field that are asked for, at most 1.
+    pub(in crate::search::design) difficulty: [f64; 2],
+    /// The weight of the squared violations of limits.
+    pub(in crate::search::design) limit_weight: f64,
+    /// The factors by which limits are tightened: lengths and shares.
+    pub(in crate::search::design) margin: f64,
+    /// The rays of the pupils of a lens with rims, in place of ellipses.
+    pub(in crate::search::design) traced: Option<Vec<FieldBeam>>,
+}
+
+/// The rays of a field, the same for every wavelength.
+#[derive(Debug, Clone)]
+pub(in crate::search::design) struct FieldBeam {
+    /// The angle with the axis, in radians.
+    pub(in crate::search::design) angle: f64,
+    /// The weight of the field.
+    pub(in crate::search::design) weight: f64,
+    /// The points relative to its centre in the plane of the first vertex, in mm, each with its part
+    /// of the light. They stand for their mirror images too.
+    pub(in crate::search::design) points: Vec<([f64; 2], f64)>,
+    /// The half-axes of the beam across and along the field, in mm.
+    pub(in crate::search::design) axes: [f64; 2],
+    /// The point of the chief ray, in mm.
+    pub(in crate::search::design) chief: [f64; 2],
+    /// The centre in that plane without the shift by the pupil's distance, in mm.
+    pub(in crate::search::design) center: f64,
+}
+
+/// Gauss nodes and weights on the unit interval.
+const FINE: ([f64; 4], [f64; 4]) = (
+    [0.069_431_844, 0.330_009_478, 0.669_990_522, 0.930_568_156],
+    [0.173_927_423, 0.326_072_577, 0.326_072_577, 0.173_927_423],
+);
+const COARSE: ([f64; 3], [f64; 3]) =
+    ([0.112_701_665, 0.5, 0.887_298_335], [0.277_777_778, 0.444_444_444, 0.277_777_778]);
+/// The number of azimuths in half a turn.
+const AZIMUTHS: usize = 4;
+/// The f-number below which the beams have four rings.
+const FAST: f64 = 2.0;
+/// The order of quadrature of beams that get through rims.
+const TRACED_ORDER: usize = 1;
+/// The fields between those that are asked for, relative to the last one, and their weight.
+const BETWEEN: [f64; 2] = [0.4, 0.86];
+const WEIGHT_BETWEEN: f64 = 0.1;
+
+impl BeamPlan {
+    /// The full beams with these weights of the limits.
+    pub(in crate::search::design) fn full(limit_weight: f64) -> Self {
+        Self { difficulty: [1.0, 1.0], limit_weight, margin: 0.0, traced: None }
+    }
+
+    /// The beams of all fields.
+    pub(super) fn beams(&self, asked: &LensRequirements) -> Vec<FieldBeam> {
+        if let Some(traced) = &self.traced {
+            return traced.clone();
+        }
+        let radius = self.difficulty[0] * asked.beam_radius();
+        let mut fields: Vec<(f64, f64, f64)> = Vec::new();
+        let axis = asked.clear_area.first().copied().unwrap_or(1.0);
+        for (field, area) in asked.fields.iter().zip(&asked.clear_area) {
+            fields.push((*field, 1.0, area / axis));
+        }
+        let between = BETWEEN.map(|part| part * asked.half_field());
+        for field in between.into_iter().filter(|_| asked.half_field() > 0.0) {
+            fields.push((field, WEIGHT_BETWEEN, share_at(asked, field)));
+        }
+        let beam = |&(field, weight, share): &(f64, f64, f64)| {
+            let angle = (self.difficulty[1] * field).to_radians();
+            let [x, y] = [radius * share.max(1.0).sqrt(), radius * share.min(share.sqrt())];
+            let points = ellipse(field == 0.0, [x, y], asked.f_number < FAST);
+            FieldBeam { angle, weight, points, axes: [x, y], chief: [0.0; 2], center: 0.0 }
+        };
+        fields.iter().map(beam).collect()
+    }
+}
+
+/// The area of the beam of a field over that on the axis, by interpolation.
+fn share_at(asked: &LensRequirements, field: f64) -> f64 {
+    let axis = asked.clear_area.first().copied().unwrap_or(1.0);
+    let after = asked.fields.iter().position(|f| *f >= field).unwrap_or(0).max(1);
+    let (low, high) = (asked.fields[after - 1], asked.fields[after]);
+    let part = (field - low) / (high - low);
+    ((1.0 - part) * asked.clear_area[after - 1] + part * asked.clear_area[after]) / axis
+}
+
+/// The nodes of an ellipse with these semi-axes; on the axis those of one radius suffice.
+fn ellipse(on_axis: bool, [a, b]: [f64; 2], fine: bool) -> Vec<([f64; 2], f64)> {
+    let rings: Vec<(f64, f64)> = if fine || on_axis {
+        FINE.0.into_iter().zip(FINE.1).collect()
+    } else {
+        COARSE.0.into_iter().zip(COARSE.1).collect()
+    };
+    let azimuths = if on_axis { 1 } else { AZIMUTHS };
+    let mut points = Vec::new();
+    for (square, weight) in rings {
+        for j in 0..azimuths {
+            let turn = if on_axis {
+                0.0
+            } else {
+                std::f64::consts::PI * (j as f64 + 0.5) / azimuths as f64
+            };
+            let radius = square.sqrt();
+            let point = [a * radius * turn.sin(), b * radius * turn.cos()];
+            points.push((point, weight / azimuths as f64));
+        }
+    }
+    points
+}
+
+impl FieldBeam {
+    /// The ray through a point of the beam, for an entrance pupil at this distance behind the first
+    /// vertex; it starts well in front of the lens.
+    pub(super) fn ray(&self, [x, y]: [f64; 2], pupil: f64, back: f64) -> Ray<f64> {
+        let slope = self.angle.tan();
+        let y = y + self.center - (pupil + back) * slope;
+        let direction = Vec3::new(0.0, self.angle.sin(), self.angle.cos());
+        Ray { point: Vec3::new(x, y, -back), direction }
+    }
+
+    /// The rays of all points.
+    pub(super) fn push_rays(&self, pupil: f64, back: f64, rays: &mut Rays<f64>) {
+        self.points.iter().for_each(|(point, _)| rays.push(self.ray(*point, pupil, back)));
+    }
+
+    /// A beam of given points.
+    fn of_points(angle: f64, weight: f64, points: Vec<([f64; 2], f64)>, chief: [f64; 2]) -> Self {
+        let reach = |i: usize| points.iter().map(|(p, _)| p[i].abs()).fold(0.0, f64::max);
+        // The outermost nodes lie inside the edge.
+        let axes = [1.04 * reach(0), 1.04 * reach(1)];
+        Self { angle, weight, points, axes, chief, center: 0.0 }
+    }
+}
+
+/// The beams that get through the rims of a lens at its primary wavelength; `None` if a field is
+/// dark.
+pub(in crate::search::design) fn traced_beams(lens: &Lens) -> Option<Vec<FieldBeam>> {
+    let model = RayModel::from_lens(lens, 0).ok()?;
+    let beam = |field: &crate::lens::FieldPoint| {
+        let region = crate::analysis::lit_region(&model, *field, model.primary).ok()?;
+        let traced = region.trace_pupil(TRACED_ORDER);
+        let angle = field.y.to_radians();
+        let total: f64 = traced.landed.arrivals().map(|(_, w)| w).sum();
+        let all_imaged = (0..traced.rays.len()).all(|i| traced.landed.sink.fate(i).is_imaged());
+        let crossing = |ray: &Ray<f64>| {
+            let slope = ray.direction.y / ray.direction.z;
+            let cross = ray.direction.x / ray.direction.z;
+            let at = |p: f64, s: f64| p - ray.point.z * s;
+            [at(ray.point.x, cross).abs(), at(ray.point.y, slope)]
+        };
+        let point = |(i, w): (usize, f64)| (crossing(&traced.rays.get(i)), w / total);
+        let chief = crossing(&region.launch.ray([0.0; 2])?);
+        let points: Vec<_> = traced.landed.arrivals().map(point).collect();
+        (total > 0.0 && all_imaged)
+            .then(|| FieldBeam::of_points(angle, field.weight, points, chief))
+    };
+    model.fields.iter().map(beam).collect()
+}

@@ -1,0 +1,509 @@
+//! The merit of a draft: the mean square of its spots and the squared violations of its limits.
+
+use super::beams::FieldBeam;
+use super::parameter::model;
+use super::{BeamPlan, DraftParameter, Freedom, LensDraft};
+use crate::lens::{Lens, Medium, System, glass::model_index};
+use crate::search::design::LensRequirements;
+use crate::solve::LeastSquaresPoint;
+use crate::trace::{ImagePoints, Rays, SurfaceParameter, TraceSink as _, Tracer};
+use nalgebra::{DMatrix, DVector};
+
+/// The merit of a draft by its parameters.
+#[derive(Debug)]
+pub(in crate::search::design) struct DraftMerit<'a> {
+    pub(super) draft: LensDraft,
+    pub(super) asked: &'a LensRequirements,
+    pub(super) plan: &'a BeamPlan,
+    pub(super) freedom: Freedom,
+    pub(super) parameters: Vec<DraftParameter>,
+    /// The height of the beams at every surface, in mm.
+    pub(super) rims: Vec<f64>,
+    beams: Vec<FieldBeam>,
+    /// The distance in front of the first vertex at which rays start, in mm.
+    back: f64,
+    /// The lens at every wavelength with its weight; the weights add up to 1.
+    systems: Vec<(f64, f64, System<f64>)>,
+    primary: usize,
+    /// The numbers of the systems by which rays are differentiated.
+    selected: Vec<(Option<usize>, SurfaceParameter)>,
+}
+
+/// A sum of squared residuals with its derivatives.
+#[derive(Debug)]
+pub(super) struct ResidualSum {
+    point: LeastSquaresPoint,
+}
+
+/// The rays of a wavelength with the derivatives of their image points by the parameters.
+struct ChannelSpots {
+    weight: f64,
+    x: Vec<f64>,
+    y: Vec<f64>,
+    /// For each ray the derivatives of x, then those of y.
+    slopes: Vec<f64>,
+}
+
+impl ResidualSum {
+    fn new(count: usize) -> Self {
+        let half_gradient = DVector::zeros(count);
+        let normal = DMatrix::zeros(count, count);
+        Self { point: LeastSquaresPoint { value: 0.0, half_gradient, normal } }
+    }
+
+    /// Adds a squared residual with its derivatives.
+    pub(super) fn add(&mut self, weight: f64, residual: f64, slopes: &[f64]) {
+        let slopes = DVector::from_column_slice(slopes);
+        self.point.value += weight * residual * residual;
+        self.point.half_gradient.axpy(weight * residual, &slopes, 1.0);
+        self.point.normal.ger(weight, &slopes, &slopes, 1.0);
+    }
+}
+
+impl<'a> DraftMerit<'a> {
+    /// The merit of a draft; `None` if its beams do not get through.
+    pub(in crate::search::design) fn new(
+        draft: &LensDraft,
+        asked: &'a LensRequirements,
+        plan: &'a BeamPlan,
+        freedom: Freedom,
+    ) -> Option<Self> {
+        let mut draft = draft.clone();
+        let freedom = Freedom { pupil: freedom.pupil && plan.traced.is_none(), ..freedom };
+        let parameters = DraftParameter::all(&draft, freedom);
+        clamp(&mut draft, asked, &parameters);
+        let beams = plan.beams(asked);
+        let back = beams.iter().map(|beam| beam.axes[1]).fold(0.0, f64::max);
+        let rows = draft.lens.surfaces.len();
+        let mut selected = Vec::new();
+        for parameter in &parameters {
+            if let DraftParameter::Surface(row, parameter) = parameter {
+                selected.push((Some(*row), *parameter));
+            }
+        }
+        let (systems, primary) = systems(&draft, asked, &parameters)?;
+        let mut merit = Self {
+            draft,
+            asked,
+            plan,
+            freedom,
+            parameters,
+            rims: vec![0.0; rows],
+            beams,
+            back,
+            systems,
+            primary,
+            selected,
+        };
+        merit.aim()?;
+        merit.rims = merit.beam_heights()?;
+        Some(merit)
+    }
+
+    /// The values of the parameters in the draft.
+    pub(in crate::search::design) fn start(&self) -> Vec<f64> {
+        self.parameters.iter().map(|parameter| parameter.get(&self.draft)).collect()
+    }
+
+    /// The draft with these values.
+    pub(super) fn draft_at(&self, values: &[f64]) -> LensDraft {
+        let mut draft = self.draft.clone();
+        for (parameter, value) in self.parameters.iter().zip(values) {
+            parameter.set(&mut draft, *value);
+        }
+        draft
+    }
+
+    /// The range by which each value may change.
+    pub(super) fn room(&self, values: &[f64]) -> Vec<[f64; 2]> {
+        let room = |(parameter, value): (&DraftParameter, &f64)| {
+            let [low, high] = parameter.range(&self.draft, self.asked);
+            [(low - value).min(0.0), (high - value).max(0.0)]
+        };
+        self.parameters.iter().zip(values).map(room).collect()
+    }
+
+    pub(super) fn index_of(&self, parameter: DraftParameter) -> Option<usize> {
+        self.parameters.iter().position(|other| *other == parameter)
+    }
+
+    /// The merit with its derivatives; `None` if a ray is lost.
+    pub(in crate::search::design) fn evaluate(
+        &mut self,
+        values: &[f64],
+    ) -> Option<LeastSquaresPoint> {
+        self.draft = self.draft_at(values);
+        self.update_systems();
+        let mut sum = ResidualSum::new(values.len());
+        self.add_spots(&mut sum)?;
+        self.add_limits(&mut sum)?;
+        sum.point.value.is_finite().then_some(sum.point)
+    }
+
+    fn update_systems(&mut self) {
+        for (um, _, system) in &mut self.systems {
+            for parameter in &self.parameters {
+                match parameter {
+                    DraftParameter::Surface(row, SurfaceParameter::Index)
+                    | DraftParameter::Abbe(row) => {
+                        let (nd, vd) = model(&self.draft.lens, *row);
+                        system.surfaces[*row].index = model_index(nd, vd, *um);
+                    }
+                    DraftParameter::Surface(row, number) => {
+                        *number.value_mut(system, *row) = parameter.get(&self.draft);
+                    }
+                    DraftParameter::Pupil => {}
+                }
+            }
+        }
+    }
+
+    /// The rays of all fields, the chief rays of all fields last.
+    fn rays(&self, pupil: f64) -> Rays<f64> {
+        let mut rays = Rays::default();
+        self.beams.iter().for_each(|beam| beam.push_rays(pupil, self.back, &mut rays));
+        self.beams.iter().for_each(|beam| rays.push(beam.ray(beam.chief, pupil, self.back)));
+        rays
+    }
+
+    fn add_spots(&self, sum: &mut ResidualSum) -> Option<()> {
+        let rays = self.rays(self.pupil());
+        let shift = 1e-5 * self.asked.focal_length;
+        let moved = self.freedom.pupil.then(|| self.rays(self.pupil() + shift));
+        let channels: Option<Vec<ChannelSpots>> = (0..self.systems.len())
+            .map(|c| self.channel(c, &rays, moved.as_ref(), shift))
+            .collect();
+        let channels = channels?;
+        let total: f64 = self.beams.iter().map(|beam| beam.weight).sum();
+        let mut from = 0;
+        for beam in &self.beams {
+            add_field(&channels, beam, from, beam.weight / total, sum);
+            from += beam.points.len();
+        }
+        for (i, beam) in self.beams.iter().enumerate() {
+            self.add_distortion(&channels[self.primary], beam, from + i, sum);
+        }
+        Some(())
+    }
+
+    fn pupil(&self) -> f64 {
+        if self.plan.traced.is_some() { 0.0 } else { self.draft.pupil }
+    }
+
+    /// The image points of a wavelength with their derivatives.
+    fn channel(
+        &self,
+        number: usize,
+        rays: &Rays<f64>,
+        moved: Option<&Rays<f64>>,
+        shift: f64,
+    ) -> Option<ChannelSpots> {
+        let (um, weight, system) = &self.systems[number];
+        let tracer = Tracer::new(system).ok()?.without_rims();
+        let (landings, matrix) = tracer.jacobian(rays, &self.selected);
+        if !(0..rays.len()).all(|i| landings.fate(i).is_imaged()) {
+            return None;
+        }
+        let by_pupil = match moved {
+            None => None,
+            Some(moved) => {
+                let mut there = ImagePoints::<f64>::default();
+                tracer.trace_batch(moved, &mut there);
+                (0..rays.len()).all(|i| there.fate(i).is_imaged()).then_some(())?;
+                Some(there)
+            }
+        };
+        let width = self.selected.len();
+        let count = self.parameters.len();
+        let by_glass: Vec<Option<[f64; 2]>> =
+            self.selected.iter().map(|selected| self.index_slopes(*selected, *um)).collect();
+        let mut slopes = vec![0.0; 2 * count * rays.len()];
+        for ray in 0..rays.len() {
+            for axis in 0..2 {
+                let row = &matrix[(2 * ray + axis) * width..(2 * ray + axis + 1) * width];
+                let to = &mut slopes[(2 * ray + axis) * count..(2 * ray + axis + 1) * count];
+                let mut column = 0;
+                for (value, by_glass) in row.iter().zip(&by_glass) {
+                    to[column] = value * by_glass.map_or(1.0, |[by_index, _]| by_index);
+                    column += 1;
+                    if let Some([_, by_abbe]) = by_glass {
+                        to[column] = value * by_abbe;
+                        column += 1;
+                    }
+                }
+                if let Some(there) = &by_pupil {
+                    let change = [there.x[ray] - landings.x[ray], there.y[ray] - landings.y[ray]];
+                    to[column] = change[axis] / shift;
+                }
+            }
+        }
+        Some(ChannelSpots { weight: *weight, x: landings.x, y: landings.y, slopes })
+    }
+
+    /// The derivatives of the index at a wavelength by index and Abbe number at the d line.
+    fn index_slopes(
+        &self,
+        (row, parameter): (Option<usize>, SurfaceParameter),
+        um: f64,
+    ) -> Option<[f64; 2]> {
+        let row = row.filter(|_| parameter == SurfaceParameter::Index)?;
+        let (nd, vd) = model(&self.draft.lens, row);
+        let n = |nd: f64, vd: f64| model_index(nd, vd, um);
+        let step = 1e-4;
+        let by_abbe = (n(nd, vd + step) - n(nd, vd - step)) / (2.0 * step);
+        // The dispersion is proportional to nd - 1.
+        Some([(n(nd, vd) - 1.0) / (nd - 1.0), by_abbe])
+    }
+
+    /// Adds the squared excess of the distortion of a chief ray over its limit, in mm of the image.
+    fn add_distortion(
+        &self,
+        channel: &ChannelSpots,
+        beam: &FieldBeam,
+        ray: usize,
+        sum: &mut ResidualSum,
+    ) {
+        let slope = beam.angle.tan();
+        let (focal, by_focal) = self.focal_length();
+        let most = (self.asked.distortion * (1.0 - 5.0 * self.plan.margin)) * slope.abs();
+        let off = channel.y[ray] - focal * slope;
+        let over = off.abs() - most * focal.abs();
+        if over <= 0.0 || slope == 0.0 {
+            return;
+        }
+        let count = self.parameters.len();
+        let mut row = channel.slopes[(2 * ray + 1) * count..(2 * ray + 2) * count].to_vec();
+        let of_focal = slope + most * off.signum() * focal.signum();
+        for (parameter, by) in by_focal {
+            if let Some(i) = self.index_of(parameter) {
+                row[i] -= of_focal * by;
+            }
+        }
+        sum.add(self.plan.limit_weight, over * off.signum(), &row);
+    }
+
+    /// The focal length in mm with its derivatives, from a paraxial ray traced forwards and its
+    /// adjoint traced backwards.
+    pub(super) fn focal_length(&self) -> (f64, Vec<(DraftParameter, f64)>) {
+        let (_, _, system) = &self.systems[self.primary];
+        let surfaces = &system.surfaces[..system.surfaces.len() - 1];
+        let (mut y, mut w) = (1.0, 0.0);
+        let mut states = Vec::new();
+        let mut before = 1.0;
+        for surface in surfaces {
+            let power = (surface.index - before) * surface.shape.curvature();
+            let height = y;
+            w -= power * y;
+            y += surface.thickness / surface.index * w;
+            states.push((height, w, before, power));
+            before = surface.index;
+        }
+        let focal = -1.0 / w;
+        let scale = focal * focal;
+        let (mut of_y, mut of_w) = (0.0, 1.0);
+        let mut slopes = Vec::new();
+        let mut by_index_behind = vec![0.0; surfaces.len()];
+        for (i, surface) in surfaces.iter().enumerate().rev() {
+            let (height, w, before, power) = states[i];
+            let (n, t, c) = (surface.index, surface.thickness, surface.shape.curvature());
+            if i + 1 < surfaces.len() {
+                slopes.push((SurfaceParameter::Thickness, i, scale * of_y * w / n));
+                by_index_behind[i] -= of_y * w * t / (n * n);
+                of_w += t / n * of_y;
+            }
+            let by_power = -of_w * height;
+            slopes.push((SurfaceParameter::Curvature, i, scale * by_power * (n - before)));
+            by_index_behind[i] += by_power * c;
+            if i > 0 {
+                by_index_behind[i - 1] -= by_power * c;
+            }
+            of_y -= power * of_w;
+        }
+        let by_index = by_index_behind
+            .iter()
+            .enumerate()
+            .map(|(i, by)| (SurfaceParameter::Index, i, scale * by));
+        let all = slopes.into_iter().chain(by_index);
+        (focal, all.map(|(p, i, by)| (DraftParameter::Surface(i, p), by)).collect())
+    }
+
+    /// Shifts the beams so that their chief rays cross the axis where that of a narrow field does.
+    fn aim(&mut self) -> Option<()> {
+        if self.plan.traced.is_some() {
+            return Some(());
+        }
+        let (_, _, system) = &self.systems[self.primary];
+        let stop = super::super::rims::StopPlace::find(system, self.draft.pupil);
+        let (system, surface) = stop.inserted(system);
+        let tracer = Tracer::new(&system).ok()?.without_rims();
+        let back = self.back;
+        let pupil = self.draft.pupil;
+        for beam in self.beams.iter_mut().filter(|beam| beam.angle != 0.0) {
+            let limit = 0.5 * beam.axes[1];
+            let mut height = |center: f64| {
+                beam.center = center;
+                let ray = tracer.trace_to(beam.ray([0.0; 2], pupil, back), surface);
+                ray.fate.is_imaged().then_some(ray.ray.point.y)
+            };
+            let mut center = 0.0;
+            for _ in 0..4 {
+                let step = 1e-3 * limit.max(1e-6);
+                let Some((here, there)) = height(center).zip(height(center + step)) else { break };
+                let slope = (there - here) / step;
+                if !(slope.abs() > 1e-3) {
+                    break;
+                }
+                center = (center - here / slope).clamp(-4.0 * limit, 4.0 * limit);
+            }
+            beam.center = if center.is_finite() { center } else { 0.0 };
+        }
+        Some(())
+    }
+
+    /// The heights of the beams at the surfaces, in mm; `None` if a ray is lost.
+    fn beam_heights(&self) -> Option<Vec<f64>> {
+        let (_, _, system) = &self.systems[self.primary];
+        let heights = self.heights_in(system, self.rims.len())?;
+        Some(heights.into_iter().map(|[_, all]| all).collect())
+    }
+
+    /// Points at the edge of a beam, or all points of one that is traced.
+    fn edge_points(&self, beam: &FieldBeam) -> Vec<[f64; 2]> {
+        let [x, y] = beam.axes;
+        match self.plan.traced {
+            Some(_) => beam.points.iter().map(|(point, _)| *point).collect(),
+            None => vec![[0.0, y], [0.0, -y], [x, 0.0]],
+        }
+    }
+
+    /// The heights of the axial beam and of all beams at the first surfaces of a system, in mm.
+    fn heights_in(&self, system: &System<f64>, count: usize) -> Option<Vec<[f64; 2]>> {
+        let tracer = Tracer::new(system).ok()?.without_rims();
+        let mut heights = vec![[0.0_f64; 2]; count];
+        for beam in &self.beams {
+            for point in self.edge_points(beam) {
+                let ray = beam.ray(point, self.pupil(), self.back);
+                let traced = tracer.visit(ray, |i, at| {
+                    if let Some([axial, all]) = heights.get_mut(i) {
+                        let height = at.x.hypot(at.y);
+                        *all = all.max(height);
+                        if beam.angle == 0.0 {
+                            *axial = axial.max(height);
+                        }
+                    }
+                });
+                traced.fate.is_imaged().then_some(())?;
+            }
+        }
+        Some(heights)
+    }
+}
+
+/// The heights of the axial beam and of all beams of a draft at the rows of its lens with a
+/// diaphragm, in mm, where all beams are wider than asked for by the factor `surplus`.
+pub(in crate::search::design) fn beam_heights(
+    draft: &LensDraft,
+    asked: &LensRequirements,
+    lens: &Lens,
+    surplus: f64,
+) -> Option<Vec<[f64; 2]>> {
+    let plan = BeamPlan { difficulty: [surplus, 1.0], ..BeamPlan::full(1.0) };
+    let freedom = Freedom { glasses: false, aspheric_surfaces: 0, pupil: true };
+    let merit = DraftMerit::new(draft, asked, &plan, freedom)?;
+    let mut system = lens.resolve(0, lens.wavelengths[lens.primary()].um).ok()?;
+    for surface in &mut system.surfaces {
+        surface.semi_diameter = f64::INFINITY;
+    }
+    merit.heights_in(&system, lens.surfaces.len())
+}
+
+/// Adds the spot of a field about its centroid over all wavelengths.
+fn add_field(
+    channels: &[ChannelSpots],
+    beam: &FieldBeam,
+    from: usize,
+    share: f64,
+    sum: &mut ResidualSum,
+) {
+    let count = sum.point.half_gradient.len();
+    let on_axis = beam.angle == 0.0;
+    let (mut mean, mut mean_slope) = (0.0, vec![0.0; count]);
+    if !on_axis {
+        for channel in channels {
+            for (i, (_, weight)) in beam.points.iter().enumerate() {
+                let (ray, weight) = (from + i, weight * channel.weight);
+                mean += weight * channel.y[ray];
+                let slopes = &channel.slopes[(2 * ray + 1) * count..(2 * ray + 2) * count];
+                mean_slope.iter_mut().zip(slopes).for_each(|(to, by)| *to += weight * by);
+            }
+        }
+    }
+    let rays = channels.len() * beam.points.len();
+    let mut rows = DMatrix::zeros(count, 2 * rays);
+    let mut residuals = DVector::zeros(2 * rays);
+    let mut column = 0;
+    for channel in channels {
+        for (i, (_, weight)) in beam.points.iter().enumerate() {
+            let ray = from + i;
+            let root = (share * weight * channel.weight).sqrt();
+            for axis in 0..2 {
+                let from = (2 * ray + axis) * count;
+                let slopes = &channel.slopes[from..from + count];
+                let value = if axis == 0 { channel.x[ray] } else { channel.y[ray] - mean };
+                residuals[column] = root * value;
+                let mut to = rows.column_mut(column);
+                for (k, slope) in slopes.iter().enumerate() {
+                    let centre = if axis == 0 { 0.0 } else { mean_slope[k] };
+                    to[k] = root * (slope - centre);
+                }
+                column += 1;
+            }
+        }
+    }
+    sum.point.value += residuals.norm_squared();
+    sum.point.half_gradient.gemv(1.0, &rows, &residuals, 1.0);
+    sum.point.normal.gemm(1.0, &rows, &rows.transpose(), 1.0);
+}
+
+/// The systems of a draft at the wavelengths that are asked for, with shapes that have all
+/// parameters, and the index of the primary one.
+fn systems(
+    draft: &LensDraft,
+    asked: &LensRequirements,
+    parameters: &[DraftParameter],
+) -> Option<(Vec<(f64, f64, System<f64>)>, usize)> {
+    let total: f64 = asked.wavelengths.iter().map(|(_, weight)| weight).sum();
+    let mut systems = Vec::new();
+    for (um, weight) in &asked.wavelengths {
+        let mut system = draft.lens.resolve(0, *um).ok()?;
+        for parameter in parameters {
+            if let DraftParameter::Surface(row, number) = parameter {
+                number.promote_shape(&mut system, *row);
+            }
+        }
+        for surface in &mut system.surfaces {
+            surface.semi_diameter = f64::INFINITY;
+        }
+        systems.push((*um, weight / total, system));
+    }
+    let lens = crate::search::design::judge::asked_wavelengths(asked);
+    let primary = lens.iter().position(|w| w.primary).unwrap_or(0);
+    Some((systems, primary))
+}
+
+/// Moves the parameters of a draft into their ranges.
+fn clamp(draft: &mut LensDraft, asked: &LensRequirements, parameters: &[DraftParameter]) {
+    for parameter in parameters {
+        let [low, high] = parameter.range(draft, asked);
+        let value = parameter.get(draft);
+        let inside = value.max(low).min(high);
+        if inside != value {
+            parameter.set(draft, inside);
+        }
+    }
+    for row in &mut draft.lens.surfaces {
+        if let Medium::Model { nd, .. } = &mut row.medium {
+            *nd = nd.max(1.3);
+        }
+    }
+}

@@ -1,0 +1,101 @@
+//! A lens under design: refracting surfaces and a pupil, without diaphragm and rims.
+//!
+//! Its beams are ellipses with the areas that are asked for, in a pupil that moves freely along the
+//! axis; a diaphragm and rims that give such beams are found at the end. So the merit needs no search
+//! for the edge of a pupil, and light cannot be traded for sharpness.
+
+mod beams;
+mod limits;
+mod merit;
+mod parameter;
+
+pub(super) use beams::{BeamPlan, traced_beams};
+pub(super) use merit::{DraftMerit, beam_heights};
+pub(super) use parameter::{DraftParameter, Freedom};
+
+use super::LensRequirements;
+use crate::lens::{Lens, Medium};
+use crate::solve::TrustRegion;
+use serde::{Deserialize, Serialize};
+
+/// A lens under design.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct LensDraft {
+    /// The refracting surfaces, the first one marked as the stop, without rims.
+    pub(super) lens: Lens,
+    /// The distance of the entrance pupil behind the first vertex, in mm.
+    pub(super) pupil: f64,
+}
+
+impl LensDraft {
+    /// True if every medium is air or a glass with an index and an Abbe number.
+    pub(super) fn is_plain(lens: &Lens) -> bool {
+        let plain = |medium: &Medium| {
+            matches!(medium, Medium::Air | Medium::Glass(_) | Medium::Model { .. })
+        };
+        lens.object_medium == Medium::Air && lens.surfaces.iter().all(|row| plain(&row.medium))
+    }
+}
+
+/// The result of a descent.
+#[derive(Debug, Clone)]
+pub(super) struct DraftDescent {
+    /// The lens.
+    pub(super) draft: LensDraft,
+    /// Its merit, in mm².
+    pub(super) value: f64,
+    /// The number of evaluations with derivatives.
+    pub(super) gradients: usize,
+}
+
+/// The number of trials between two measurements of the heights of the beams at the surfaces.
+const ROUND: usize = 12;
+
+/// Descends from a draft by this many trials; `None` if its beams do not get through.
+pub(super) fn descend(
+    draft: &LensDraft,
+    asked: &LensRequirements,
+    plan: &BeamPlan,
+    freedom: Freedom,
+    trials: usize,
+) -> Option<DraftDescent> {
+    let mut now = DraftDescent { draft: draft.clone(), value: f64::INFINITY, gradients: 0 };
+    while now.gradients < trials {
+        let mut merit = DraftMerit::new(&now.draft, asked, plan, freedom)?;
+        let steps = ROUND.min(trials - now.gradients);
+        let (values, value, used) = take_trials(&mut merit, steps)?;
+        now = DraftDescent {
+            draft: merit.draft_at(&values),
+            value,
+            gradients: now.gradients + used.max(1),
+        };
+    }
+    Some(now)
+}
+
+/// Trials of one round: the values at their end, the merit, and the number of evaluations.
+fn take_trials(merit: &mut DraftMerit<'_>, trials: usize) -> Option<(Vec<f64>, f64, usize)> {
+    let mut values = merit.start();
+    let mut point = merit.evaluate(&values)?;
+    let mut region = TrustRegion::new(values.len());
+    let mut used = 1;
+    while used < trials.max(2) {
+        let room = merit.room(&values);
+        let Some(step) = region.propose(&point, &room) else { break };
+        let next: Vec<f64> = values.iter().zip(step.change.iter()).map(|(v, d)| v + d).collect();
+        used += 1;
+        match merit.evaluate(&next) {
+            None => region.note_failure(&step),
+            Some(to) => {
+                if region.note_trial(&step, &point, &to) {
+                    (values, point) = (next, to);
+                }
+            }
+        }
+        if region.is_exhausted(&point) {
+            break;
+        }
+    }
+    Some((values, point.value, used))
+}

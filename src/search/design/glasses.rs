@@ -1,0 +1,97 @@
+//! Glasses of the catalogue in place of model glasses, and their exchange.
+
+use super::LensRequirements;
+use super::draft::LensDraft;
+use crate::lens::{Lens, Medium, glass};
+use crate::search::Random;
+use rand::RngExt as _;
+
+/// The differences of index and Abbe number that count as one unit of distance.
+const UNIT: [f64; 2] = [0.01, 1.2];
+/// The number of glasses that are tried in place of one.
+const TRIED: usize = 10;
+/// The largest distance in index and Abbe number of two glasses that are the same.
+const TWIN: [f64; 2] = [2e-4, 0.1];
+
+/// True if every glass is permitted.
+pub(super) fn in_catalogue(lens: &Lens, asked: &LensRequirements) -> bool {
+    lens.surfaces.iter().all(|row| match &row.medium {
+        Medium::Model { nd, vd } => asked.glasses.allows_model(*nd, *vd),
+        _ => true,
+    })
+}
+
+/// The permitted glasses with data at every wavelength, without twins.
+fn permitted(asked: &LensRequirements) -> Vec<&'static glass::Glass> {
+    let mut found: Vec<&'static glass::Glass> = Vec::new();
+    for glass in glass::catalogue() {
+        let known = asked.wavelengths.iter().all(|(um, _)| glass.index(*um).is_some());
+        let twin = |other: &&glass::Glass| {
+            (other.nd - glass.nd).abs() < TWIN[0] && (other.vd - glass.vd).abs() < TWIN[1]
+        };
+        if known && asked.glasses.allows(&glass.full_name()) && !found.iter().any(twin) {
+            found.push(glass);
+        }
+    }
+    found
+}
+
+/// The permitted glasses, the nearest to an index and an Abbe number first.
+fn by_distance(nd: f64, vd: f64, asked: &LensRequirements) -> Vec<&'static glass::Glass> {
+    let mut all = permitted(asked);
+    let distance =
+        |glass: &glass::Glass| ((glass.nd - nd) / UNIT[0]).hypot((glass.vd - vd) / UNIT[1]);
+    all.sort_by(|a, b| distance(a).total_cmp(&distance(b)));
+    all
+}
+
+/// The draft with the nearest permitted glasses in place of those that are not permitted.
+pub(super) fn snapped(draft: &LensDraft, asked: &LensRequirements) -> LensDraft {
+    let mut draft = draft.clone();
+    for row in &mut draft.lens.surfaces {
+        if let Medium::Model { nd, vd } = row.medium
+            && !asked.glasses.allows_model(nd, vd)
+            && let Some(nearest) = by_distance(nd, vd, asked).first()
+        {
+            row.medium = Medium::Glass(nearest.full_name());
+        }
+    }
+    draft
+}
+
+/// Drafts with another glass in place of that of an element drawn at random: the nearest ones, and
+/// as many drawn from farther away.
+pub(super) fn exchanged(
+    draft: &LensDraft,
+    asked: &LensRequirements,
+    random: &mut Random,
+) -> Vec<LensDraft> {
+    let rows: Vec<(usize, &'static glass::Glass)> = draft
+        .lens
+        .surfaces
+        .iter()
+        .enumerate()
+        .filter_map(|(i, row)| match &row.medium {
+            Medium::Glass(name) => Some((i, glass::find(name)?)),
+            _ => None,
+        })
+        .collect();
+    if rows.is_empty() {
+        return Vec::new();
+    }
+    let (row, now) = rows[random.random_range(0..rows.len())];
+    let near = by_distance(now.nd, now.vd, asked);
+    let others: Vec<&glass::Glass> =
+        near.into_iter().filter(|glass| glass.full_name() != now.full_name()).collect();
+    let mut chosen: Vec<&glass::Glass> = others.iter().take(TRIED / 2).copied().collect();
+    let far = others.len().min(60);
+    if far > TRIED {
+        chosen.extend((0..TRIED / 2).map(|_| others[random.random_range(TRIED / 2..far)]));
+    }
+    let with = |glass: &glass::Glass| {
+        let mut draft = draft.clone();
+        draft.lens.surfaces[row].medium = Medium::Glass(glass.full_name());
+        draft
+    };
+    chosen.into_iter().map(with).collect()
+}

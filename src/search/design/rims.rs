@@ -1,0 +1,150 @@
+//! From a draft to a lens that can be built: a diaphragm, and rims that give the beams of the
+//! requirements and no more.
+
+use super::LensRequirements;
+use super::draft::LensDraft;
+use super::judge::{asked_fields, asked_wavelengths};
+use crate::analysis::lit_region;
+use crate::lens::{Aperture, Lens, Row, Surface, System};
+use crate::pupil::RayModel;
+
+/// The place of a diaphragm.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct StopPlace {
+    /// The surface in front of it.
+    surface: usize,
+    /// Its distance behind the vertex of that surface, in mm.
+    distance: f64,
+}
+
+/// The share by which the beams are larger than asked for.
+const SURPLUS: f64 = 1.001;
+/// The factors by which the beams are widened until every field has its light.
+const WIDER: [f64; 4] = [1.0008, 1.004, 1.01, 1.025];
+/// The number of halvings of the share by which rims shrink.
+const HALVINGS: usize = 9;
+/// The largest `|curvature| × semi-diameter`.
+const STEEPEST: f64 = 0.97;
+/// The order of quadrature of the areas of pupils.
+const AREA_ORDER: usize = 3;
+
+impl StopPlace {
+    /// The image of an entrance pupil, at this distance behind the first vertex, inside a lens: the
+    /// gap in which a paraxial chief ray crosses the axis, or else the surface where it is nearest to
+    /// it.
+    pub(super) fn find(system: &System<f64>, pupil: f64) -> Self {
+        let (mut y, mut nu, mut before) = (-pupil, 1.0, 1.0);
+        let mut nearest = (f64::INFINITY, Self { surface: 0, distance: 0.0 });
+        for (i, surface) in system.surfaces[..system.surfaces.len() - 1].iter().enumerate() {
+            if y.abs() < nearest.0 {
+                nearest = (y.abs(), Self { surface: i, distance: 0.0 });
+            }
+            nu -= y * (surface.index - before) * surface.shape.curvature();
+            before = surface.index;
+            let next = y + surface.thickness * nu / surface.index;
+            let last = i + 2 == system.surfaces.len();
+            if surface.index == 1.0 && !last && y * next < 0.0 {
+                return Self { surface: i, distance: surface.thickness * y / (y - next) };
+            }
+            y = next;
+        }
+        nearest.1
+    }
+
+    /// The system with a plane at this place, and the index of that plane.
+    pub(super) fn inserted(self, system: &System<f64>) -> (System<f64>, usize) {
+        let mut system = system.clone();
+        if self.distance == 0.0 {
+            return (system, self.surface);
+        }
+        let front = &mut system.surfaces[self.surface];
+        let plane = Surface::plane(front.thickness - self.distance, front.index);
+        front.thickness = self.distance;
+        system.surfaces.insert(self.surface + 1, plane);
+        (system, self.surface + 1)
+    }
+
+    /// The lens with a diaphragm at this place.
+    fn in_lens(self, lens: &Lens) -> Lens {
+        let mut lens = lens.clone();
+        lens.surfaces.iter_mut().for_each(|row| row.stop = false);
+        if self.distance == 0.0 {
+            lens.surfaces[self.surface].stop = true;
+            return lens;
+        }
+        let front = &mut lens.surfaces[self.surface];
+        let thickness = front.thickness - self.distance;
+        front.thickness = self.distance;
+        let row = Row { thickness, stop: true, comment: "diaphragm".to_owned(), ..Row::default() };
+        lens.surfaces.insert(self.surface + 1, row);
+        lens
+    }
+}
+
+/// The lens of a draft with a diaphragm and rims; `None` if its beams do not get through.
+pub(super) fn with_rims(draft: &LensDraft, asked: &LensRequirements) -> Option<Lens> {
+    let mut lens = draft.lens.clone();
+    lens.wavelengths = asked_wavelengths(asked);
+    lens.fields = asked_fields(&asked.fields);
+    let um = lens.wavelengths[lens.primary()].um;
+    let place = StopPlace::find(&lens.resolve(0, um).ok()?, draft.pupil);
+    let lens = place.in_lens(&lens);
+    let stop = lens.stop()?;
+    let mut last = None;
+    for surplus in WIDER {
+        let heights = super::draft::beam_heights(draft, asked, &lens, surplus)?;
+        let (fitted, enough) = fit(lens.clone(), asked, &heights, stop);
+        if enough {
+            return Some(fitted);
+        }
+        last = Some(fitted);
+    }
+    last
+}
+
+/// Shrinks the rims from those that let every beam through to those that leave the areas that are
+/// asked for; false if they do not. `heights` are those of the axial beam and of all beams at every row.
+fn fit(
+    mut lens: Lens,
+    asked: &LensRequirements,
+    heights: &[[f64; 2]],
+    stop: usize,
+) -> (Lens, bool) {
+    let mut best = lens.clone();
+    let [mut low, mut high] = [0.0, 1.0];
+    // The rim of the diaphragm gives the light on the axis, whatever the others are.
+    let stop_rim = |lens: &mut Lens, radius: f64| {
+        lens.surfaces[stop].semi_diameter = Some(radius);
+        lens.aperture = Aperture::StopSemiDiameter(radius);
+    };
+    for step in 0..HALVINGS {
+        let share = if step == 0 { 0.0 } else { 0.5 * (low + high) };
+        for (row, [axial, all]) in lens.surfaces.iter_mut().zip(heights) {
+            let open = (axial + (all.max(*axial) - axial) * (1.0 - share)).max(1.0005 * axial);
+            let steepest = STEEPEST / row.curvature.abs().max(1e-12);
+            row.semi_diameter = Some(open.min(asked.semi_diameter).min(steepest));
+        }
+        stop_rim(&mut lens, heights[stop][0]);
+        let enough = has_light(&lens, asked);
+        if enough {
+            best.clone_from(&lens);
+            low = share;
+        } else {
+            high = share;
+        }
+        if step == 0 && !enough {
+            return (lens, false);
+        }
+    }
+    (best, true)
+}
+
+/// True if every field has the clear area that is asked for.
+fn has_light(lens: &Lens, asked: &LensRequirements) -> bool {
+    let Ok(model) = RayModel::from_lens(lens, 0) else { return false };
+    let enough = |(field, least): (&crate::lens::FieldPoint, &f64)| {
+        lit_region(&model, *field, model.primary)
+            .is_ok_and(|region| region.trace_pupil(AREA_ORDER).moments.area >= SURPLUS * least)
+    };
+    model.fields.iter().zip(&asked.clear_area).all(enough)
+}

@@ -1,0 +1,392 @@
+//! A design in rounds: starts, successive halving, mutations, catalogue glasses.
+//!
+//! Every round depends only on the state before it and on the seed, so that a run can be saved
+//! between two rounds and resumed, and has the same result on any number of threads.
+
+use super::LensRequirements;
+use super::draft::{BeamPlan, Freedom, LensDraft, descend};
+use super::finish::{DesignedLens, finished_lenses};
+use super::glasses::{exchanged, in_catalogue, snapped};
+use super::starts::{NamedDraft, achromats, draft_of, library_starts, random_starts};
+use crate::lens::{Aperture, Parameter, Quantity, Variable};
+use crate::search::element::piece_count;
+use crate::search::{MutationKind, Random, SearchRules, propose};
+use rand::{RngExt as _, SeedableRng as _};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+
+/// What a design depends on besides its requirements.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct DesignSettings {
+    /// The seed of all random numbers.
+    pub seed: u64,
+    /// The lenses of the library that are no starts; neither are their copies.
+    pub without: Vec<String>,
+    /// The largest number of lenses of the library and of random lenses at the start.
+    pub starts: [usize; 2],
+}
+
+impl DesignSettings {
+    /// The usual settings with this seed.
+    pub fn with_seed(seed: u64) -> Self {
+        Self { seed, without: Vec::new(), starts: STARTS }
+    }
+}
+
+/// The stage of a design.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum DesignStage {
+    /// Starts are led to the full aperture and field.
+    Starts,
+    /// The better half of them goes on.
+    Halving,
+    /// Structures are changed.
+    Mutations,
+    /// Glasses are those of the catalogue and are exchanged.
+    Glasses,
+}
+
+/// A lens of a run.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(super) struct Candidate {
+    /// Where it comes from.
+    pub(super) origin: String,
+    pub(super) draft: LensDraft,
+    /// Its merit, in mm².
+    pub(super) value: f64,
+}
+
+/// A design that is run round by round.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct DesignRun {
+    asked: LensRequirements,
+    settings: DesignSettings,
+    stage: DesignStage,
+    rounds: u64,
+    gradients: u64,
+    pool: Vec<Candidate>,
+}
+
+/// The usual number of lenses of the library and of random lenses at the start.
+const STARTS: [usize; 2] = [32, 12];
+/// The number of random lenses of which the best one is a start.
+const TRIES: usize = 60;
+/// The levels of aperture and field by which a start is led, and the trials at each.
+const LEVELS: [[f64; 2]; 4] = [[0.35, 0.4], [0.6, 0.65], [0.8, 0.85], [1.0, 1.0]];
+const LEVEL_TRIALS: usize = 24;
+/// The trials of a candidate in a round of halving.
+const HALVING_TRIALS: usize = 72;
+/// The number of candidates that stay.
+const POOL: usize = 8;
+/// The number of mutants of a round, and of those that go on.
+const MUTANTS: usize = 12;
+const CHOSEN: usize = 4;
+const MUTANT_TRIALS: usize = 36;
+const CHOSEN_TRIALS: usize = 120;
+/// The shares of the budget at which mutations end and at which the glasses are settled.
+const MUTATIONS_END: f64 = 0.5;
+const GLASSES_END: f64 = 0.9;
+/// The weights of limits at the start and later.
+const SOFT: f64 = 0.05;
+const FIRM: f64 = 10.0;
+/// The relative difference of merits below which two candidates are the same.
+const SAME: f64 = 2e-3;
+
+impl DesignRun {
+    /// A design before its first round.
+    pub fn new(asked: &LensRequirements, settings: &DesignSettings) -> Self {
+        Self {
+            asked: asked.clone(),
+            settings: settings.clone(),
+            stage: DesignStage::Starts,
+            rounds: 0,
+            gradients: 0,
+            pool: Vec::new(),
+        }
+    }
+
+    /// The requirements.
+    pub fn requirements(&self) -> &LensRequirements {
+        &self.asked
+    }
+
+    /// The settings.
+    pub fn settings(&self) -> &DesignSettings {
+        &self.settings
+    }
+
+    /// The stage of the next round.
+    pub fn stage(&self) -> DesignStage {
+        self.stage
+    }
+
+    /// The number of evaluations with derivatives so far.
+    pub fn gradients(&self) -> u64 {
+        self.gradients
+    }
+
+    /// The number of lenses that are kept.
+    pub fn pool_size(&self) -> usize {
+        self.pool.len()
+    }
+
+    /// The root of the best merit in mm, spots and squared violations together; infinite before
+    /// there is a lens.
+    pub fn best(&self) -> f64 {
+        self.pool.first().map_or(f64::INFINITY, |candidate| candidate.value.sqrt())
+    }
+
+    /// Runs a round; `used` is the share of the budget that is used so far. Returns false if the
+    /// budget allows no further one.
+    pub fn advance(&mut self, used: f64) -> bool {
+        match self.stage {
+            DesignStage::Starts => self.run_starts(),
+            DesignStage::Halving => self.halve(),
+            DesignStage::Mutations if used < MUTATIONS_END => self.mutate(),
+            DesignStage::Mutations => self.choose_glasses(),
+            DesignStage::Glasses if used < GLASSES_END => self.exchange(),
+            DesignStage::Glasses => return false,
+        }
+        self.rounds += 1;
+        !self.pool.is_empty()
+    }
+
+    /// Makes lenses that can be built of the best candidates: the best one first.
+    pub fn finish(&self) -> Vec<DesignedLens> {
+        let snapped: Vec<Candidate> = match self.stage {
+            DesignStage::Glasses => self.pool.clone(),
+            _ => self.catalogued(),
+        };
+        finished_lenses(&snapped, &self.asked)
+    }
+
+    /// The generator of a round: the same whatever was drawn before.
+    fn random(&self, salt: u64) -> Random {
+        let seed = self.settings.seed.wrapping_mul(0x9e37_79b9_7f4a_7c15);
+        Random::seed_from_u64(seed ^ (self.rounds << 20) ^ salt)
+    }
+
+    fn freedom(&self) -> Freedom {
+        let aspheric_surfaces = self.asked.aspheric_surfaces;
+        Freedom { glasses: true, aspheric_surfaces, pupil: true }
+    }
+
+    fn run_starts(&mut self) {
+        let mut starts = library_starts(&self.asked, &self.settings.without);
+        let [library, random] = self.settings.starts;
+        starts.truncate(library);
+        if self.asked.elements <= 4 {
+            starts.extend(achromats(&self.asked).into_iter().filter(|_| self.asked.elements > 1));
+        }
+        starts.extend(random_starts(&self.asked, random, TRIES, &mut self.random(0)));
+        let led: Vec<(Option<Candidate>, usize)> =
+            starts.par_iter().map(|start| self.lead(start)).collect();
+        self.take(led);
+        self.stage = DesignStage::Halving;
+    }
+
+    /// Leads a start to the full aperture and field.
+    fn lead(&self, start: &NamedDraft) -> (Option<Candidate>, usize) {
+        let (mut draft, mut used, mut value) = (start.draft.clone(), 0, f64::INFINITY);
+        let aspheric_surfaces = self.asked.aspheric_surfaces;
+        for (i, difficulty) in LEVELS.into_iter().enumerate() {
+            let plan = BeamPlan { difficulty, ..BeamPlan::full(SOFT) };
+            let freedom = Freedom { glasses: i > 1, aspheric_surfaces, pupil: true };
+            let Some(found) = descend(&draft, &self.asked, &plan, freedom, LEVEL_TRIALS) else {
+                return (None, used + 1);
+            };
+            (draft, value) = (found.draft, found.value);
+            used += found.gradients;
+        }
+        (Some(Candidate { origin: start.name.clone(), draft, value }), used)
+    }
+
+    /// Takes candidates into the pool, the best first.
+    fn take(&mut self, found: Vec<(Option<Candidate>, usize)>) {
+        for (candidate, used) in found {
+            self.gradients += used as u64;
+            self.pool.extend(candidate.filter(|c| c.value.is_finite()));
+        }
+        self.sort();
+    }
+
+    fn sort(&mut self) {
+        self.pool.sort_by(|a, b| a.value.total_cmp(&b.value));
+        self.pool.dedup_by(|a, b| {
+            (a.value - b.value).abs() < SAME * b.value
+                && a.draft.lens.surfaces.len() == b.draft.lens.surfaces.len()
+        });
+    }
+
+    /// Descends from every candidate with firm limits; those that fail are dropped.
+    fn improve(
+        &self,
+        all: &[Candidate],
+        trials: usize,
+        glasses: bool,
+    ) -> Vec<(Option<Candidate>, usize)> {
+        let plan = BeamPlan::full(FIRM);
+        let freedom = Freedom { glasses, ..self.freedom() };
+        let better = |candidate: &Candidate| {
+            let found = descend(&candidate.draft, &self.asked, &plan, freedom, trials);
+            let used = found.as_ref().map_or(1, |found| found.gradients);
+            let candidate = found.map(|found| Candidate {
+                origin: candidate.origin.clone(),
+                draft: found.draft,
+                value: found.value,
+            });
+            (candidate, used)
+        };
+        all.par_iter().map(better).collect()
+    }
+
+    fn halve(&mut self) {
+        let keep = (self.pool.len() / 2).max(POOL);
+        self.pool.truncate(keep);
+        let found = self.improve(&self.pool, HALVING_TRIALS, true);
+        self.pool.clear();
+        self.take(found);
+        if self.pool.len() <= POOL {
+            self.stage = DesignStage::Mutations;
+        }
+    }
+
+    /// Mutates parents drawn by rank, and lets the best mutants go on.
+    fn mutate(&mut self) {
+        let mut mutants = Vec::new();
+        for i in 0..MUTANTS {
+            let mut random = self.random(1 + i as u64);
+            mutants.extend(self.mutant(&mut random));
+        }
+        let first = self.improve(&mutants, MUTANT_TRIALS, true);
+        let mut alive: Vec<Candidate> = Vec::new();
+        for (candidate, used) in first {
+            self.gradients += used as u64;
+            alive.extend(candidate);
+        }
+        alive.sort_by(|a, b| a.value.total_cmp(&b.value));
+        alive.truncate(CHOSEN);
+        alive.extend(self.pool.iter().take(2).cloned());
+        let found = self.improve(&alive, CHOSEN_TRIALS, true);
+        let olds = self.pool.len().min(2);
+        self.pool.drain(..olds);
+        self.take(found);
+        self.pool.truncate(POOL);
+    }
+
+    /// A mutant of a parent drawn with weights 1/rank; `None` if none of several mutations applies.
+    fn mutant(&self, random: &mut Random) -> Option<Candidate> {
+        let total: f64 = (1..=self.pool.len()).map(|rank| 1.0 / rank as f64).sum();
+        let mut left = random.random::<f64>() * total;
+        let drawn = self.pool.iter().enumerate().find(|(i, _)| {
+            left -= 1.0 / (i + 1) as f64;
+            left < 0.0
+        });
+        let parent = drawn.map(|(_, parent)| parent).or(self.pool.first())?;
+        let rules = self.rules();
+        let mut lens = super::rims::with_rims(&parent.draft, &self.asked)?;
+        lens.aperture = Aperture::EntrancePupilDiameter(2.0 * self.asked.beam_radius());
+        lens.variables = variables(&lens);
+        for _ in 0..4 {
+            let Ok(mutant) = propose(&lens, &rules, random) else { continue };
+            let Some(draft) = draft_of(&mutant.lens, &self.asked) else { continue };
+            let origin = format!("{}, {}", parent.origin, mutant.kind.name());
+            return Some(Candidate { origin, draft, value: f64::INFINITY });
+        }
+        None
+    }
+
+    fn rules(&self) -> SearchRules {
+        let asked = &self.asked;
+        SearchRules {
+            elements: [1, asked.elements],
+            glasses: asked.glasses.names.clone(),
+            glass_center: [asked.glass_center, 0.5 * asked.track],
+            glass_edge: asked.glass_edge,
+            air_center: [asked.air_center, asked.track],
+            air_edge: 0.0,
+            semi_diameter: Some(asked.semi_diameter),
+            track: Some(1.2 * asked.track),
+            back_focus: Some(0.8 * asked.back_focus),
+            weights: vec![(MutationKind::MoveStop, 0.0), (MutationKind::Flip, 0.3)],
+            ..SearchRules::default()
+        }
+    }
+
+    /// The pool with glasses of the catalogue.
+    fn catalogued(&self) -> Vec<Candidate> {
+        let snap = |candidate: &Candidate| {
+            let draft = snapped(&candidate.draft, &self.asked);
+            Candidate { draft, ..candidate.clone() }
+        };
+        let snapped: Vec<Candidate> = self.pool.iter().take(POOL).map(snap).collect();
+        let found = self.improve(&snapped, CHOSEN_TRIALS, false);
+        let mut all: Vec<Candidate> = found.into_iter().filter_map(|(c, _)| c).collect();
+        all.sort_by(|a, b| a.value.total_cmp(&b.value));
+        all
+    }
+
+    fn choose_glasses(&mut self) {
+        self.pool = self.catalogued();
+        self.gradients += (self.pool.len() * CHOSEN_TRIALS) as u64;
+        self.stage = DesignStage::Glasses;
+    }
+
+    /// Exchanges a glass of one of the best candidates.
+    fn exchange(&mut self) {
+        let mut random = self.random(0);
+        let of = (self.rounds as usize) % self.pool.len().clamp(1, 3);
+        let Some(parent) = self.pool.get(of).cloned() else { return };
+        let trials = exchanged(&parent.draft, &self.asked, &mut random);
+        let mutants: Vec<Candidate> =
+            trials.into_iter().map(|draft| Candidate { draft, ..parent.clone() }).collect();
+        let tried = self.improve(&mutants, MUTANT_TRIALS, false);
+        let mut alive: Vec<Candidate> = Vec::new();
+        for (candidate, used) in tried {
+            self.gradients += used as u64;
+            alive.extend(candidate);
+        }
+        alive.sort_by(|a, b| a.value.total_cmp(&b.value));
+        alive.truncate(2);
+        let promising = |c: &Candidate| c.value < 1.5 * parent.value;
+        alive.retain(promising);
+        alive.push(parent);
+        let found = self.improve(&alive, HALVING_TRIALS, false);
+        let best = found.into_iter().filter_map(|(candidate, used)| {
+            self.gradients += used as u64;
+            candidate
+        });
+        let best = best.min_by(|a, b| a.value.total_cmp(&b.value));
+        if let Some(best) = best {
+            self.pool[of] = best;
+        }
+        self.pool.sort_by(|a, b| a.value.total_cmp(&b.value));
+    }
+}
+
+/// All curvatures and gaps as variables.
+fn variables(lens: &crate::lens::Lens) -> Vec<Variable> {
+    let shape = [Quantity::Curvature, Quantity::Thickness];
+    let all = (0..lens.surfaces.len()).flat_map(|row| shape.map(|q| Parameter::new(row, q)));
+    let is_shape = |p: &Parameter| {
+        p.quantity == Quantity::Thickness || lens.surfaces[p.surface].comment != "diaphragm"
+    };
+    let all = all.filter(is_shape);
+    all.map(|parameter| Variable { parameter, min: None, max: None }).collect()
+}
+
+impl Candidate {
+    /// The number of elements, an aspheric surface counted as half of one.
+    pub(super) fn price(&self) -> f64 {
+        let rows = self.draft.lens.surfaces.iter();
+        let aspheric = rows.filter(|row| super::judge::is_aspheric(row)).count();
+        piece_count(&self.draft.lens) as f64 + 0.5 * aspheric as f64
+    }
+
+    /// True if every glass is permitted.
+    pub(super) fn is_buildable(&self, asked: &LensRequirements) -> bool {
+        in_catalogue(&self.draft.lens, asked)
+    }
+}

@@ -1,0 +1,268 @@
+//! Where a design starts: lenses of the library at the focal length that is asked for, two thin
+//! groups, and random lenses.
+
+use super::LensRequirements;
+use super::draft::{BeamPlan, DraftMerit, Freedom, LensDraft};
+use super::judge::{asked_fields, asked_wavelengths, is_aspheric};
+use crate::files::{LibraryLens, library_lenses, scale_to_focal_length};
+use crate::lens::{Lens, Medium, Object, Row, blank, glass};
+use crate::paraxial::{Beam, first_order};
+use crate::search::Random;
+use crate::search::element::piece_count;
+use rand::RngExt as _;
+
+/// A start with the name of where it comes from.
+#[derive(Debug, Clone)]
+pub(super) struct NamedDraft {
+    pub(super) name: String,
+    pub(super) draft: LensDraft,
+}
+
+/// The relative difference of all curvatures and gaps below which two lenses are the same.
+const SAME: f64 = 0.05;
+
+/// The lenses of the library that may be starts, the most promising ones first. `without` names
+/// lenses that may not; neither may their copies.
+pub(super) fn library_starts(asked: &LensRequirements, without: &[String]) -> Vec<NamedDraft> {
+    let excluded: Vec<LensDraft> = library_lenses()
+        .iter()
+        .filter(|lens| without.contains(&lens.name))
+        .filter_map(|lens| draft_of(&lens.open().ok()?, asked))
+        .collect();
+    let mut found: Vec<(f64, NamedDraft)> = Vec::new();
+    for entry in library_lenses().iter().filter(|lens| !without.contains(&lens.name)) {
+        let Some(distance) = distance(entry, asked) else { continue };
+        let draft = entry.open().ok().and_then(|lens| draft_of(&lens, asked));
+        let Some(draft) = draft else { continue };
+        if !excluded.iter().any(|other| is_copy(&draft, other)) {
+            found.push((distance, NamedDraft { name: entry.name.clone(), draft }));
+        }
+    }
+    found.sort_by(|a, b| a.0.total_cmp(&b.0));
+    found.into_iter().map(|(_, start)| start).collect()
+}
+
+/// How far a lens is from what is asked for; `None` for one of another kind.
+fn distance(entry: &LibraryLens, asked: &LensRequirements) -> Option<f64> {
+    let one = |values: &[f64]| (values.len() == 1).then(|| values[0]);
+    let f_number = one(entry.aperture.f_number()?)?;
+    let field = one(entry.field.half_angle()?)?;
+    one(&entry.focal_length)?;
+    let too_many = entry.elements > asked.elements;
+    if too_many || entry.mirrors > 0 || entry.elements == 0 {
+        return None;
+    }
+    let missing = (asked.elements - entry.elements) as f64;
+    let far = |a: f64, b: f64| (a / b).ln().abs();
+    Some(
+        far(f_number, asked.f_number)
+            + 2.0 * far(field, asked.half_field().max(0.5))
+            + 0.5 * missing,
+    )
+}
+
+/// The draft of a lens at the focal length that is asked for; `None` if it is not one of plain
+/// glass at one focal length, or breaks the number of elements.
+pub(super) fn draft_of(lens: &Lens, asked: &LensRequirements) -> Option<LensDraft> {
+    if !lens.zoom.is_empty() || !LensDraft::is_plain(lens) || piece_count(lens) > asked.elements {
+        return None;
+    }
+    let mut lens = scale_to_focal_length(lens, asked.focal_length).ok()?;
+    let solved = lens.resolve(0, lens.wavelengths[lens.primary()].um).ok()?;
+    let first = first_order(&solved, &Beam::for_lens(&lens, 0)).ok()?;
+    if first.efl? < 0.0 {
+        return None;
+    }
+    let mut pupil = first.entrance_pupil.position?;
+    for (row, surface) in lens.surfaces.iter_mut().zip(&solved.surfaces) {
+        row.thickness = surface.thickness;
+    }
+    pupil -= without_planes(&mut lens);
+    lens.surfaces.iter_mut().for_each(make_plain);
+    if lens.surfaces.iter().filter(|row| is_aspheric(row)).count() > asked.aspheric_surfaces {
+        for row in &mut lens.surfaces {
+            (row.conic, row.asphere) = (0.0, Vec::new());
+        }
+    }
+    Some(LensDraft { lens: cleared(lens, asked), pupil })
+}
+
+/// Removes planes in air, and returns the length in front of the first refracting surface.
+fn without_planes(lens: &mut Lens) -> f64 {
+    let mut rows: Vec<Row> = Vec::new();
+    let mut front = 0.0;
+    for row in lens.surfaces.drain(..) {
+        let air = rows.last().is_none_or(|before: &Row| before.medium == Medium::Air);
+        if air && row.medium == Medium::Air {
+            match rows.last_mut() {
+                Some(before) => before.thickness += row.thickness,
+                None => front += row.thickness,
+            }
+        } else {
+            rows.push(row);
+        }
+    }
+    lens.surfaces = rows;
+    front
+}
+
+/// Makes a row one of a draft: without rim, with a model glass.
+fn make_plain(row: &mut Row) {
+    (row.semi_diameter, row.obstruction, row.stop) = (None, None, false);
+    if let Medium::Glass(name) = &row.medium
+        && let Some(glass) = glass::find(name)
+    {
+        row.medium = Medium::Model { nd: glass.nd, vd: glass.vd };
+    }
+}
+
+/// The lens without what a draft does not need.
+fn cleared(lens: Lens, asked: &LensRequirements) -> Lens {
+    let mut lens = Lens {
+        object: Object::Infinity,
+        fields: asked_fields(&asked.fields),
+        wavelengths: asked_wavelengths(asked),
+        variables: Vec::new(),
+        pickups: Vec::new(),
+        image_solve: None,
+        merit: None,
+        ..lens
+    };
+    if let Some(first) = lens.surfaces.first_mut() {
+        first.stop = true;
+    }
+    lens
+}
+
+/// True if two drafts have the same surfaces but for small changes.
+fn is_copy(a: &LensDraft, b: &LensDraft) -> bool {
+    let [a, b] = [&a.lens.surfaces, &b.lens.surfaces];
+    if a.len() != b.len() {
+        return false;
+    }
+    let most = |of: fn(&Row) -> f64| b.iter().map(|row| of(row).abs()).fold(0.0, f64::max);
+    let near =
+        |of: fn(&Row) -> f64| a.iter().zip(b).all(|(a, b)| (of(a) - of(b)).abs() < SAME * most(of));
+    near(|row| row.curvature) && near(|row| row.thickness)
+}
+
+/// The glasses of constructed starts: crowns and flints.
+const CROWNS: [(f64, f64); 4] = [(1.5168, 64.17), (1.6204, 60.3), (1.6968, 55.5), (1.788, 47.4)];
+const FLINTS: [(f64, f64); 4] = [(1.6727, 32.2), (1.7282, 28.3), (1.7847, 26.1), (1.62, 36.4)];
+
+/// Random lenses of a number of elements, each the best of several by its merit at a small aperture
+/// and field.
+pub(super) fn random_starts(
+    asked: &LensRequirements,
+    count: usize,
+    tries: usize,
+    random: &mut Random,
+) -> Vec<NamedDraft> {
+    let mut found = Vec::new();
+    for i in 0..count {
+        let tried = (0..tries).filter_map(|_| {
+            let draft = random_lens(asked, random)?;
+            Some((screened(&draft, asked)?, draft))
+        });
+        let best = tried.min_by(|a, b| a.0.total_cmp(&b.0));
+        let name = format!("random {}", i + 1);
+        found.extend(best.map(|(_, draft)| NamedDraft { name, draft }));
+    }
+    found
+}
+
+/// The merit of a draft at a small aperture and field; `None` if its beams do not get through.
+fn screened(draft: &LensDraft, asked: &LensRequirements) -> Option<f64> {
+    let plan = BeamPlan { difficulty: [0.3, 0.4], ..BeamPlan::full(0.1) };
+    let freedom = Freedom { glasses: false, aspheric_surfaces: 0, pupil: false };
+    let mut merit = DraftMerit::new(draft, asked, &plan, freedom)?;
+    Some(merit.evaluate(&merit.start())?.value)
+}
+
+/// A random lens whose last curvature gives it the focal length; half of the elements are cemented
+/// to the one before.
+fn random_lens(asked: &LensRequirements, random: &mut Random) -> Option<LensDraft> {
+    let f = asked.focal_length;
+    let elements = asked.elements.min(8);
+    let pieces = if elements > 2 { elements - random.random_range(0..2) } else { elements };
+    let thick = (0.05 * f).max(1.5 * asked.glass_center);
+    let free = asked.track - asked.back_focus;
+    let mut rows: Vec<Row> = Vec::new();
+    for i in 0..pieces {
+        let crown = random.random::<f64>() < if i % 2 == 0 { 0.75 } else { 0.3 };
+        let list = if crown { CROWNS } else { FLINTS };
+        let (nd, vd) = list[random.random_range(0..list.len())];
+        let power = if crown { 1.0 } else { -1.0 } * (0.5 + 2.0 * random.random::<f64>()) / f;
+        let bend = 3.0 * (random.random::<f64>() - 0.5) / f;
+        let curvature = power / (nd - 1.0);
+        let cemented = i > 0 && random.random::<f64>() < 0.4;
+        let glass = Medium::Model { nd, vd };
+        if cemented && let Some(last) = rows.last_mut() {
+            (last.medium, last.thickness) = (glass, thick);
+            let front = last.curvature;
+            rows.push(Row { curvature: front - curvature, thickness: 0.03 * f, ..Row::default() });
+        } else {
+            let front = bend + 0.5 * curvature;
+            rows.push(Row { curvature: front, thickness: thick, medium: glass, ..Row::default() });
+            let gap = (0.02 + 0.2 * random.random::<f64>().powi(2)) * free.max(0.1 * f);
+            rows.push(Row { curvature: front - curvature, thickness: gap, ..Row::default() });
+        }
+    }
+    focused(rows, asked, random)
+}
+
+/// The lens of these rows with the focal length and the image plane that are asked for.
+fn focused(rows: Vec<Row>, asked: &LensRequirements, random: &mut Random) -> Option<LensDraft> {
+    let lens = cleared(Lens { surfaces: rows, ..blank() }, asked);
+    let system = lens.resolve(0, lens.wavelengths[lens.primary()].um).ok()?;
+    let (mut y, mut nu, mut before) = (1.0, 0.0, 1.0);
+    let last = lens.surfaces.len() - 1;
+    for surface in &system.surfaces[..last] {
+        nu -= y * (surface.index - before) * surface.shape.curvature();
+        before = surface.index;
+        y += surface.thickness * nu / before;
+    }
+    // nu' = nu - y (1 - n) c = -1/f
+    let curvature = (nu + 1.0 / asked.focal_length) / (y * (1.0 - before));
+    let back = y * asked.focal_length;
+    let good = curvature.abs() < 5.0 / asked.focal_length && back > 0.3 * asked.back_focus;
+    if !good || back > asked.track {
+        return None;
+    }
+    let mut lens = lens;
+    (lens.surfaces[last].curvature, lens.surfaces[last].thickness) = (curvature, back);
+    let length: f64 = lens.surfaces[..last].iter().map(|row| row.thickness).sum();
+    let pupil = length * random.random::<f64>();
+    Some(LensDraft { lens, pupil })
+}
+
+/// Cemented achromats by the thin-lens formulas, with either glass in front, in several bendings.
+pub(super) fn achromats(asked: &LensRequirements) -> Vec<NamedDraft> {
+    let f = asked.focal_length;
+    let mut found = Vec::new();
+    for (crown_first, bend) in [(true, 0.0), (true, 1.5), (false, 0.0), (false, 1.5)] {
+        let ((n1, v1), (n2, v2)) = (CROWNS[0], FLINTS[0]);
+        let [positive, negative] =
+            [v1 / (v1 - v2) / f / (n1 - 1.0), -v2 / (v1 - v2) / f / (n2 - 1.0)];
+        let ((a, first), (b, second)) = if crown_first {
+            ((positive, (n1, v1)), (negative, (n2, v2)))
+        } else {
+            ((negative, (n2, v2)), (positive, (n1, v1)))
+        };
+        let front = 0.5 * a + bend / f;
+        let thick = 0.04 * f;
+        let row = |curvature: f64, (nd, vd): (f64, f64)| Row {
+            curvature,
+            thickness: thick,
+            medium: Medium::Model { nd, vd },
+            ..Row::default()
+        };
+        let last = Row { curvature: front - a - b, thickness: f, ..Row::default() };
+        let rows = vec![row(front, first), row(front - a, second), last];
+        let lens = cleared(Lens { surfaces: rows, ..blank() }, asked);
+        let name =
+            if crown_first { "achromat, crown in front" } else { "achromat, flint in front" };
+        found.push(NamedDraft { name: name.to_owned(), draft: LensDraft { lens, pupil: 0.0 } });
+    }
+    found
+}
