@@ -218,23 +218,13 @@ impl<'a> DraftMerit<'a> {
         let by_glass: Vec<Option<[f64; 2]>> =
             self.selected.iter().map(|selected| self.index_slopes(*selected, *um)).collect();
         let mut slopes = vec![0.0; 2 * count * rays.len()];
-        for ray in 0..rays.len() {
-            for axis in 0..2 {
-                let row = &matrix[(2 * ray + axis) * width..(2 * ray + axis + 1) * width];
-                let to = &mut slopes[(2 * ray + axis) * count..(2 * ray + axis + 1) * count];
-                let mut column = 0;
-                for (value, by_glass) in row.iter().zip(&by_glass) {
-                    to[column] = value * by_glass.map_or(1.0, |[by_index, _]| by_index);
-                    column += 1;
-                    if let Some([_, by_abbe]) = by_glass {
-                        to[column] = value * by_abbe;
-                        column += 1;
-                    }
-                }
-                if let Some(there) = &by_pupil {
-                    let change = [there.x[ray] - landings.x[ray], there.y[ray] - landings.y[ray]];
-                    to[column] = change[axis] / shift;
-                }
+        let rows = matrix.chunks_exact(width).zip(slopes.chunks_exact_mut(count));
+        rows.for_each(|(row, to)| spread_row(row, &by_glass, to));
+        if let Some(there) = &by_pupil {
+            for ray in 0..rays.len() {
+                let change = [there.x[ray] - landings.x[ray], there.y[ray] - landings.y[ray]];
+                slopes[(2 * ray + 1) * count - 1] = change[0] / shift;
+                slopes[(2 * ray + 2) * count - 1] = change[1] / shift;
             }
         }
         Some(ChannelSpots { weight: *weight, x: landings.x, y: landings.y, slopes })
@@ -383,15 +373,12 @@ impl<'a> DraftMerit<'a> {
         for beam in &self.beams {
             for point in self.edge_points(beam) {
                 let ray = beam.ray(point, self.pupil(), self.back);
-                let traced = tracer.visit(ray, |i, at| {
-                    if let Some([axial, all]) = heights.get_mut(i) {
-                        let height = at.x.hypot(at.y);
-                        *all = all.max(height);
-                        if beam.angle == 0.0 {
-                            *axial = axial.max(height);
-                        }
-                    }
-                });
+                let mut note = |i: usize, height: f64| {
+                    let Some([axial, all]) = heights.get_mut(i) else { return };
+                    *all = all.max(height);
+                    *axial = if beam.angle == 0.0 { axial.max(height) } else { *axial };
+                };
+                let traced = tracer.visit(ray, |i, at| note(i, at.x.hypot(at.y)));
                 traced.fate.is_imaged().then_some(())?;
             }
         }
@@ -415,6 +402,19 @@ pub(in crate::search::design) fn beam_heights(
         surface.semi_diameter = f64::INFINITY;
     }
     merit.heights_in(&system, lens.surfaces.len())
+}
+
+/// The derivatives by the parameters from those by the numbers of a system: a glass has two
+/// parameters, index and Abbe number, in place of the index.
+fn spread_row(row: &[f64], by_glass: &[Option<[f64; 2]>], to: &mut [f64]) {
+    let mut column = 0;
+    for (value, by_glass) in row.iter().zip(by_glass) {
+        let factors = by_glass.as_ref().map_or(&[1.0][..], |both| &both[..]);
+        for factor in factors {
+            to[column] = value * factor;
+            column += 1;
+        }
+    }
 }
 
 /// Adds the spot of a field about its centroid over all wavelengths.
@@ -441,24 +441,20 @@ fn add_field(
     let rays = channels.len() * beam.points.len();
     let mut rows = DMatrix::zeros(count, 2 * rays);
     let mut residuals = DVector::zeros(2 * rays);
-    let mut column = 0;
-    for channel in channels {
-        for (i, (_, weight)) in beam.points.iter().enumerate() {
-            let ray = from + i;
-            let root = (share * weight * channel.weight).sqrt();
-            for axis in 0..2 {
-                let from = (2 * ray + axis) * count;
-                let slopes = &channel.slopes[from..from + count];
-                let value = if axis == 0 { channel.x[ray] } else { channel.y[ray] - mean };
-                residuals[column] = root * value;
-                let mut to = rows.column_mut(column);
-                for (k, slope) in slopes.iter().enumerate() {
-                    let centre = if axis == 0 { 0.0 } else { mean_slope[k] };
-                    to[k] = root * (slope - centre);
-                }
-                column += 1;
-            }
-        }
+    let all = channels.iter().flat_map(|channel| {
+        beam.points.iter().enumerate().map(move |(i, (_, weight))| (channel, from + i, weight))
+    });
+    for (number, (channel, ray, weight)) in all.enumerate() {
+        let root = (share * weight * channel.weight).sqrt();
+        let slopes = &channel.slopes[2 * ray * count..(2 * ray + 2) * count];
+        let (of_x, of_y) = slopes.split_at(count);
+        residuals[2 * number] = root * channel.x[ray];
+        residuals[2 * number + 1] = root * (channel.y[ray] - mean);
+        let mut to = rows.column_mut(2 * number);
+        to.iter_mut().zip(of_x).for_each(|(to, slope)| *to = root * slope);
+        let mut to = rows.column_mut(2 * number + 1);
+        let centred = of_y.iter().zip(&mean_slope).map(|(slope, mean)| root * (slope - mean));
+        to.iter_mut().zip(centred).for_each(|(to, slope)| *to = slope);
     }
     sum.point.value += residuals.norm_squared();
     sum.point.half_gradient.gemv(1.0, &rows, &residuals, 1.0);
