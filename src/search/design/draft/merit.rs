@@ -5,6 +5,8 @@ use super::parameter::model;
 use super::{BeamPlan, DraftParameter, Freedom, LensDraft};
 use crate::lens::{Lens, Medium, System, glass::model_index};
 use crate::search::design::LensRequirements;
+use crate::search::design::judge::asked_wavelengths;
+use crate::search::design::rims::StopPlace;
 use crate::solve::LeastSquaresPoint;
 use crate::trace::{ImagePoints, Rays, SurfaceParameter, TraceSink as _, Tracer};
 use nalgebra::{DMatrix, DVector};
@@ -323,7 +325,7 @@ impl<'a> DraftMerit<'a> {
             return Some(());
         }
         let (_, _, system) = &self.systems[self.primary];
-        let stop = super::super::rims::StopPlace::find(system, self.draft.pupil);
+        let stop = StopPlace::find(system, self.draft.pupil);
         let (system, surface) = stop.inserted(system);
         let tracer = Tracer::new(&system).ok()?.without_rims();
         let back = self.back;
@@ -482,7 +484,7 @@ fn systems(
         }
         systems.push((*um, weight / total, system));
     }
-    let lens = crate::search::design::judge::asked_wavelengths(asked);
+    let lens = asked_wavelengths(asked);
     let primary = lens.iter().position(|w| w.primary).unwrap_or(0);
     Some((systems, primary))
 }
