@@ -107,6 +107,8 @@ impl<R: Real> System<R> {
             grin: i
                 .checked_sub(1)
                 .and_then(|i| surfaces[i].grin.map(|grin| grin.reversed(surfaces[i].thickness))),
+            pose: surfaces[i].pose.map(|pose| if turn < R::ZERO { pose.reflected() } else { pose }),
+            astigmatism: surfaces[i].astigmatism.map(|astigmatism| turn * astigmatism),
             ..surfaces[i]
         });
         let plane = Surface { index: self.index_before, thickness: R::ZERO, ..*image };

@@ -104,6 +104,8 @@ impl Row {
             obstruction: self.obstruction.unwrap_or(0.0),
             mirror: self.medium == Medium::Mirror,
             hyperhemisphere: self.hyperhemisphere,
+            pose: None,
+            astigmatism: None,
         }
     }
 }

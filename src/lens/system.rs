@@ -1,6 +1,8 @@
 //! A lens resolved to plain numbers, at one wavelength and one zoom position.
 
-use super::{ASPHERE_TERMS, MediumPlace, ProfileCoefficients, RotationalProfile, SurfaceNumber};
+use super::{
+    ASPHERE_TERMS, MediumPlace, Pose, ProfileCoefficients, RotationalProfile, SurfaceNumber,
+};
 use crate::math::{Real, format_short};
 
 /// The form of a surface: `z = c r² / (1 + √(1 − (1+k) c² r²)) + Σ aⱼ r^(2j+4)`.
@@ -142,6 +144,11 @@ pub struct Surface<R> {
     pub mirror: bool,
     /// True if the far half of the sphere or ellipsoid belongs to the surface too.
     pub hyperhemisphere: bool,
+    /// The position of the surface if it is decentred or tilted; `None` for a centred one.
+    pub pose: Option<Pose<R>>,
+    /// The coefficient of y², in 1/mm, that is added to the sag in the surface's own frame: the part of
+    /// an irregularity that is not rotationally symmetric. `None` for a surface of revolution.
+    pub astigmatism: Option<R>,
 }
 
 /// A lens in plain numbers. Rays end at the last surface, as a rule the image plane.
@@ -219,6 +226,18 @@ pub enum SystemError {
         /// The reason, as the rest of a sentence.
         why: String,
     },
+    /// A method that supports centred surfaces only meets another one.
+    #[error(
+        "surface {surface} is decentred, tilted or irregular, which {what} does not support{hint}"
+    )]
+    Posed {
+        /// The surface.
+        surface: SurfaceNumber,
+        /// The method, as the subject of a sentence.
+        what: &'static str,
+        /// What is expected instead, or nothing.
+        hint: &'static str,
+    },
     /// The start or the direction of a ray is not valid.
     #[error(
         "ray {ray}: {found}; expected a start of finite numbers up to 1e100 mm and a direction of \
@@ -274,6 +293,10 @@ impl<R: Real> System<R> {
                 "touches a hyperhemisphere, which is not supported; expected surfaces that end at \
                  their equator",
             ),
+            (front, Some(back)) if front.is_mounted() || back.is_mounted() => refuse(
+                "touches a decentred, tilted or irregular surface, which is not supported; expected \
+                 centred surfaces",
+            ),
             _ => Ok(()),
         }
     }
@@ -281,6 +304,11 @@ impl<R: Real> System<R> {
     /// The index profile of the gap behind a surface; `None` for a homogeneous medium.
     pub fn grin_profile(&self, surface: usize) -> Option<RotationalProfile<R>> {
         self.surfaces.get(surface)?.grin_profile()
+    }
+
+    /// True if any surface is decentred, tilted or irregular.
+    pub fn has_poses(&self) -> bool {
+        self.surfaces.iter().any(Surface::is_mounted)
     }
 
     /// True if any gap is filled with a GRIN medium.
@@ -316,10 +344,18 @@ impl<R: Real> Surface<R> {
             mirror: false,
             hyperhemisphere: false,
             grin: None,
+            pose: None,
+            astigmatism: None,
         }
     }
 
+    /// True if the surface is decentred, tilted or irregular.
+    pub fn is_mounted(&self) -> bool {
+        self.pose.is_some() || self.astigmatism.is_some()
+    }
+
     fn check(&self, i: usize) -> Result<(), SystemError> {
+        self.check_pose(i)?;
         let (curvature, conic, terms) = self.shape.numbers();
         check_finite("curvature", i, curvature.value())?;
         check_finite("conic constant", i, conic.value())?;
@@ -339,6 +375,17 @@ impl<R: Real> Surface<R> {
         } else {
             Err(SystemError::Obstruction { surface: i.into(), found: obstruction, semi_diameter })
         }
+    }
+
+    fn check_pose(&self, i: usize) -> Result<(), SystemError> {
+        if let Some(astigmatism) = self.astigmatism {
+            check_finite("astigmatism", i, astigmatism.value())?;
+        }
+        let Some(Pose { shift, turn }) = self.pose else { return Ok(()) };
+        for v in [shift, turn[0], turn[1], turn[2]] {
+            [v.x, v.y, v.z].iter().try_for_each(|c| check_finite("pose", i, c.value()))?;
+        }
+        Ok(())
     }
 
     /// The index profile of the gap behind the surface; `None` for a homogeneous medium.
@@ -373,6 +420,8 @@ impl<R: Real> Surface<R> {
             obstruction: f(self.obstruction),
             mirror: self.mirror,
             hyperhemisphere: self.hyperhemisphere,
+            pose: self.pose.map(|pose| pose.map(&f)),
+            astigmatism: self.astigmatism.map(&f),
         }
     }
 }

@@ -288,7 +288,7 @@ impl<R: Real> Tracer<R> {
     #[inline(always)]
     pub(super) fn mask(&self, block: &mut RayBlock<R>, count: usize) {
         let is_asphere = |i: &Interface<R>| i.form == SurfaceForm::Asphere;
-        if !self.grin_gaps.is_empty() || self.interfaces.iter().any(is_asphere) {
+        if !self.is_plain() || self.interfaces.iter().any(is_asphere) {
             block.code[count..].fill(R::ONE);
         }
     }
@@ -306,8 +306,8 @@ impl<R: Real> Tracer<R> {
             block.load(rays, from, count, self.index_before);
             self.mask(&mut block, count);
             for (i, interface) in self.interfaces.iter().enumerate() {
-                if self.touches_grin(i) {
-                    block.cross_grin_into::<S>(self, i);
+                if self.is_general(i) {
+                    block.cross_general_into::<S>(self, i);
                 } else {
                     block.cross::<S>(interface, i as u32);
                 }
@@ -414,9 +414,9 @@ impl<R: Real> RayBlock<R> {
     }
 
     #[inline(never)]
-    fn cross_grin_into<S: TraceSink<R>>(&mut self, tracer: &Tracer<R>, number: usize) {
+    fn cross_general_into<S: TraceSink<R>>(&mut self, tracer: &Tracer<R>, number: usize) {
         let mut opl = self.opl;
-        self.cross_grin(tracer, number, |j, arrived| {
+        self.cross_general(tracer, number, |j, arrived| {
             if S::WITH_PATH {
                 opl[j] += arrived.path;
             }
@@ -424,24 +424,24 @@ impl<R: Real> RayBlock<R> {
         self.opl = opl;
     }
 
-    /// Crosses a surface that a GRIN medium touches, ray by ray.
+    /// Crosses a surface that a GRIN medium touches or that is not centred, ray by ray.
     #[inline(never)]
-    pub(super) fn cross_grin(
+    pub(super) fn cross_general(
         &mut self,
         tracer: &Tracer<R>,
         number: usize,
         mut keep: impl FnMut(usize, &PropagatedRay<'_, R>),
     ) {
-        let site = tracer.site(number);
         for j in 0..BLOCK {
             if self.code[j] > R::ZERO {
                 continue;
             }
             let (p, k) = self.state(j);
-            let arrived = site.propagate(p, k);
+            let arrived = tracer.propagate::<true>(number, p, k);
             keep(j, &arrived);
             let crossing = arrived.refract();
-            self.set(j, crossing.point, crossing.k);
+            let (p, k) = tracer.state_out(number, (crossing.point, crossing.k));
+            self.set(j, p, k);
             if let Some(cause) = arrived.loss_cause(&crossing) {
                 self.code[j] = R::from_f64(f64::from(fate::encode(number as u32, cause)));
             }

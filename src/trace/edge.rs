@@ -11,6 +11,7 @@
 use super::grin_gap::GrinGap;
 use super::interface::{Interface, Intersection, SurfaceForm};
 use super::margin::RayLimit;
+use super::mount::Mount;
 use super::propagation::{PropagatedRay, SurfaceSite};
 use super::single::{Ray, optical_direction};
 use super::{AdjointSeed, Rays, SystemGradient, Tracer};
@@ -36,7 +37,7 @@ impl<R: Real> Tracer<R> {
     /// The margin of a ray at one limit, regardless of the rims in front; `None` for a ray that does
     /// not get there.
     pub fn margin(&self, ray: Ray<R>, surface: usize, limit: RayLimit) -> Option<R> {
-        if self.grin_gaps.is_empty() {
+        if self.is_plain() {
             let (p, k) = self.state_before::<false>(ray, surface)?;
             Some(self.propagate::<false>(surface, p, k).margin(limit))
         } else {
@@ -49,14 +50,14 @@ impl<R: Real> Tracer<R> {
     /// there is set to zero, because the root of its rounding error would cost half of the digits;
     /// rims clip nothing. `None` for a ray that does not arrive.
     pub fn land_at_edge(&self, ray: Ray<R>, surface: usize, limit: RayLimit) -> Option<Vec3<R>> {
-        if self.grin_gaps.is_empty() {
+        if self.is_plain() {
             self.edge_landing::<false>(ray, surface, limit)
         } else {
             self.edge_landing::<true>(ray, surface, limit)
         }
     }
 
-    fn edge_landing<const GRIN: bool>(
+    fn edge_landing<const GENERAL: bool>(
         &self,
         ray: Ray<R>,
         surface: usize,
@@ -66,13 +67,14 @@ impl<R: Real> Tracer<R> {
         let mut point = ray.point;
         for i in 0..self.interfaces.len() {
             let limit = (i == surface).then_some(limit);
-            (point, k) = self.propagate::<GRIN>(i, point, k).cross_at_edge(limit)?;
+            let behind = self.propagate::<GENERAL>(i, point, k).cross_at_edge(limit)?;
+            (point, k) = self.state_out(i, behind);
         }
         point.is_finite().then_some(point)
     }
 
     /// Point and optical direction of a ray in front of a surface, in the frame of the surface before.
-    fn state_before<const GRIN: bool>(
+    fn state_before<const GENERAL: bool>(
         &self,
         ray: Ray<R>,
         surface: usize,
@@ -80,7 +82,8 @@ impl<R: Real> Tracer<R> {
         let mut k = optical_direction(ray.direction, self.index_before);
         let mut point = ray.point;
         for i in 0..surface {
-            (point, k) = self.propagate::<GRIN>(i, point, k).cross_at_edge(None)?;
+            let behind = self.propagate::<GENERAL>(i, point, k).cross_at_edge(None)?;
+            (point, k) = self.state_out(i, behind);
         }
         Some((point, k))
     }
@@ -177,7 +180,9 @@ impl Tracer<f64> {
         weight: f64,
         total: &mut SystemGradient<f64>,
     ) -> AdjointSeed<f64> {
-        let by = self.site(surface).margin_slopes::<N>(limit, p, k).map(|slope| slope * weight);
+        let mount = self.mount(surface);
+        let by = self.site(surface).margin_slopes::<N>(mount, limit, p, k);
+        let by = by.map(|slope| slope * weight);
         let own = &self.interfaces[surface];
         let by_k = Vec3::new(by[3], by[4], by[5]);
         let curved = self.grin_gap_before(surface).is_some();
@@ -217,7 +222,8 @@ impl Tracer<f64> {
         let interfaces = self.interfaces[..surface].to_vec();
         let grin_gaps = self.grin_gaps.iter().take(surface).cloned().collect();
         let (index_before, step_plans) = (self.index_before, Vec::new());
-        Self { interfaces, index_before, grin_gaps, step_plans }.without_rims()
+        let mounts = self.mounts.iter().take(surface).copied().collect();
+        Self { interfaces, index_before, grin_gaps, step_plans, mounts }.without_rims()
     }
 }
 
@@ -225,6 +231,7 @@ impl SurfaceSite<'_, f64> {
     /// The derivatives of a margin by its inputs, for a ray in the frame of the surface before.
     fn margin_slopes<const N: usize>(
         &self,
+        mount: Option<&Mount<f64>>,
         limit: RayLimit,
         p: Vec3<f64>,
         k: Vec3<f64>,
@@ -236,6 +243,10 @@ impl SurfaceSite<'_, f64> {
         let indices = indices.map(|(n, i)| input(n, i));
         let surface = own.with_inputs(&indices);
         let (x, y) = (input(p.x, 0), input(p.y, 1));
+        if let Some(mount) = mount {
+            let (mount, p) = (mount.map(Dual::constant), Vec3::new(x, y, input(p.z, 2)));
+            return mount.propagate(&surface, p, k).margin(limit).slope;
+        }
         if N < GRIN_INPUTS {
             let start = Vec3::new(x, y, input(p.z - own.gap, 2));
             return PropagatedRay::straight(&surface, start, k).margin(limit).slope;

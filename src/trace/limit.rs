@@ -172,6 +172,14 @@ impl<R: Real> WarpTracer<R> {
                 "has no warp field; expected the method `boundary` or `difference`".to_owned();
             return Err(SystemError::Grin { surface: surface.into(), why });
         }
+        if let Some(surface) = system.surfaces.iter().position(crate::lens::Surface::is_mounted) {
+            let hint = "; expected the method `boundary` or `difference`";
+            return Err(SystemError::Posed {
+                surface: surface.into(),
+                what: "the warp field",
+                hint,
+            });
+        }
         let forward = Tracer::new(&system.cast::<Jet<R>>())?;
         let kinds = [
             LimitFunction::Rim,

@@ -40,14 +40,14 @@ impl<R: Real> Tracer<R> {
     /// surface that a GRIN medium touches is treated as an asphere, and the side of the medium as a
     /// rim.
     pub fn margins(&self, ray: Ray<R>, visit: impl FnMut(usize, RayLimit, R)) {
-        if self.grin_gaps.is_empty() {
+        if self.is_plain() {
             self.margins_loop::<false>(ray, visit);
         } else {
             self.margins_loop::<true>(ray, visit);
         }
     }
 
-    fn margins_loop<const GRIN: bool>(
+    fn margins_loop<const GENERAL: bool>(
         &self,
         ray: Ray<R>,
         mut visit: impl FnMut(usize, RayLimit, R),
@@ -55,10 +55,10 @@ impl<R: Real> Tracer<R> {
         let mut k = optical_direction(ray.direction, self.index_before);
         let mut point = ray.point;
         for i in 0..self.interfaces.len() {
-            let arrived = self.propagate::<GRIN>(i, point, k);
+            let arrived = self.propagate::<GENERAL>(i, point, k);
             arrived.margins(i, &mut visit);
             let Some(behind) = arrived.cross_at_edge(None) else { return };
-            (point, k) = behind;
+            (point, k) = self.state_out(i, behind);
         }
     }
 }

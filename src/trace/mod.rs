@@ -23,6 +23,7 @@ mod grin_gap;
 mod interface;
 mod limit;
 mod margin;
+mod mount;
 mod propagation;
 mod single;
 mod surface_parameter;
@@ -41,6 +42,7 @@ use crate::lens::{System, SystemError};
 use crate::math::Real;
 use grin_gap::GrinGap;
 use interface::Interface;
+use mount::Mount;
 
 /// A system prepared for tracing: checked, with every constant of a surface computed once.
 #[derive(Debug, Clone)]
@@ -50,6 +52,8 @@ pub struct Tracer<R> {
     /// The GRIN media of the gaps; empty for a lens without any.
     grin_gaps: Vec<Option<GrinGap<R>>>,
     step_plans: Vec<GrinStepPlan>,
+    /// The poses and irregularities of the surfaces; empty for a centred lens.
+    mounts: Vec<Option<Mount<R>>>,
 }
 
 impl<R: Real> Tracer<R> {
@@ -62,8 +66,13 @@ impl<R: Real> Tracer<R> {
         system.check()?;
         let interfaces = interface::interfaces(system);
         let index_before = system.index_before;
-        let mut tracer =
-            Self { interfaces, index_before, grin_gaps: Vec::new(), step_plans: Vec::new() };
+        let mut tracer = Self {
+            interfaces,
+            index_before,
+            grin_gaps: Vec::new(),
+            step_plans: Vec::new(),
+            mounts: mount::mounts(system),
+        };
         if system.has_grin() {
             tracer.fill_grin_gaps(system)?;
         }

@@ -55,6 +55,12 @@ impl<'a, R: Real> PropagatedRay<'a, R> {
         Self { surface, indices, met, k, path, start, lost: None, side: None }
     }
 
+    /// A ray to a point of a surface between homogeneous media for which no closed form exists.
+    pub(super) fn met_at(surface: &'a Interface<R>, met: Intersection<R>, k: Vec3<R>) -> Self {
+        let (path, indices) = (met.s * surface.n2, surface.indices());
+        Self { surface, indices, met, k, path, start: None, lost: None, side: None }
+    }
+
     /// Refracts or reflects the ray; clips it at the rim and at the obstruction.
     #[inline(always)]
     pub(super) fn refract(&self) -> Refraction<R> {
@@ -208,6 +214,12 @@ impl<R: Real> Tracer<R> {
         !self.grin_gaps.is_empty() && self.site(surface).touches_grin()
     }
 
+    /// True if a GRIN medium touches a surface, or if it is not centred.
+    #[inline(always)]
+    pub(super) fn is_general(&self, surface: usize) -> bool {
+        self.touches_grin(surface) || self.mount(surface).is_some()
+    }
+
     /// A surface with the media on both sides.
     pub(super) fn site(&self, surface: usize) -> SurfaceSite<'_, R> {
         SurfaceSite {
@@ -218,19 +230,25 @@ impl<R: Real> Tracer<R> {
         }
     }
 
-    /// Propagates a ray from the frame of the surface before to a surface. `GRIN` must be true for a
-    /// lens with GRIN media; loops are compiled apart for others, since both in one cost registers.
+    /// Propagates a ray from the frame of the surface before to a surface, in whose own frame the
+    /// result is. `GENERAL` must be true for a lens with GRIN media or poses; loops are compiled apart
+    /// for others, since both in one cost registers.
     #[inline(always)]
-    pub(super) fn propagate<const GRIN: bool>(
+    pub(super) fn propagate<const GENERAL: bool>(
         &self,
         i: usize,
         p: Vec3<R>,
         k: Vec3<R>,
     ) -> PropagatedRay<'_, R> {
-        if GRIN && self.touches_grin(i) {
-            return self.site(i).propagate(p, k);
-        }
         let surface = &self.interfaces[i];
+        if GENERAL {
+            if self.touches_grin(i) {
+                return self.site(i).propagate(p, k);
+            }
+            if let Some(mount) = self.mount(i) {
+                return mount.propagate(surface, p, k);
+            }
+        }
         PropagatedRay::straight(surface, Vec3::new(p.x, p.y, p.z - surface.gap), k)
     }
 }

@@ -53,7 +53,8 @@ impl Ray<f64> {
 pub struct TracedRay<R> {
     /// The fate of the ray.
     pub fate: Fate,
-    /// Point and direction in the frame of the surface at which the ray ends: behind the last surface
+    /// Point and direction in the frame of the surface at which the ray ends, of its vertex in the centred
+    /// lens if it is decentred or tilted: behind the last surface
     /// for a ray that arrives, at the point where it is clipped or totally reflected, or in front of
     /// the surface that it misses.
     pub ray: Ray<R>,
@@ -82,7 +83,7 @@ impl<R: Real> Tracer<R> {
     }
 
     /// Traces one ray and calls `visit` with the index of each surface and the point of intersection
-    /// in its frame.
+    /// in its own frame, which is decentred and tilted with it.
     pub fn visit(&self, ray: Ray<R>, visit: impl FnMut(usize, Vec3<R>)) -> TracedRay<R> {
         self.trace_surfaces(ray, self.interfaces.len(), visit)
     }
@@ -92,22 +93,22 @@ impl<R: Real> Tracer<R> {
         self.trace_surfaces(ray, (surface + 1).min(self.interfaces.len()), |_, _| {})
     }
 
-    /// Compiled apart for lenses with and without GRIN media, whose steps would take registers from
-    /// the loop over homogeneous media.
+    /// Compiled apart for lenses with and without GRIN media or poses, whose steps would take registers
+    /// from the loop over centred surfaces and homogeneous media.
     fn trace_surfaces(
         &self,
         ray: Ray<R>,
         surfaces: usize,
         visit: impl FnMut(usize, Vec3<R>),
     ) -> TracedRay<R> {
-        if self.grin_gaps.is_empty() {
+        if self.is_plain() {
             self.trace_loop::<false>(ray, surfaces, visit)
         } else {
             self.trace_loop::<true>(ray, surfaces, visit)
         }
     }
 
-    fn trace_loop<const GRIN: bool>(
+    fn trace_loop<const GENERAL: bool>(
         &self,
         ray: Ray<R>,
         surfaces: usize,
@@ -119,12 +120,21 @@ impl<R: Real> Tracer<R> {
         let mut traced = TracedRay { fate: Fate::Imaged, ray, opl, first_backward_surface };
         for i in 0..surfaces {
             let p = traced.ray.point;
-            let arrived = self.propagate::<GRIN>(i, p, k);
-            let Some(behind) = traced.cross(i, p, &arrived, &mut visit) else {
-                (k, index) = (arrived.k, arrived.indices.before);
-                break;
+            let arrived = self.propagate::<GENERAL>(i, p, k);
+            let behind = traced.cross(i, p, &arrived, &mut visit);
+            (k, index) = match behind {
+                Some(behind) => (behind, arrived.indices.behind),
+                None => (arrived.k, arrived.indices.before),
             };
-            (k, index) = (behind, arrived.indices.behind);
+            if GENERAL {
+                k = self.direction_out(i, k);
+                if !arrived.met.missed {
+                    traced.ray.point = self.point_out(i, traced.ray.point);
+                }
+            }
+            if behind.is_none() {
+                break;
+            }
         }
         traced.ray.direction = k * (R::ONE / index);
         traced
@@ -187,6 +197,7 @@ impl Tracer<f64> {
                 points.extend(inside.map(|p| Vec3::new(p.x, p.y, p.z + vertices[i - 1])));
             }
             heights.push(p.x.hypot(p.y));
+            let p = self.point_out(i, p);
             points.push(Vec3::new(p.x, p.y, p.z + vertices[i]));
         });
         if let Fate::Missed(surface) = landing.fate {

@@ -417,6 +417,8 @@ mod tests {
                 obstruction,
                 mirror,
                 hyperhemisphere: hyper,
+                pose: None,
+                astigmatism: None,
             }
         };
         let terms = [1e-5, -3e-8, 0.0, 1e-12, 0.0, 0.0, 0.0];

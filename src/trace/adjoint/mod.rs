@@ -17,6 +17,7 @@
 
 mod block;
 mod grin;
+mod mounted;
 mod refraction;
 
 use super::batch::{BLOCK, CHUNK, Landings, RayBlock, Rays};
@@ -324,8 +325,8 @@ impl<R: Real> Tracer<R> {
         block.load(rays.slice(from, from + count), 0, count, self.index_before);
         self.mask(&mut block, count);
         for (i, (interface, distance)) in self.interfaces.iter().zip(distances).enumerate() {
-            if self.touches_grin(i) {
-                block.cross_grin(self, i, |j, arrived| distance[j] = arrived.met.s);
+            if self.is_general(i) {
+                block.cross_general(self, i, |j, arrived| distance[j] = arrived.met.s);
             } else {
                 block.cross_recording(interface, i as u32, distance);
             }
@@ -349,6 +350,10 @@ impl<R: Real> Tracer<R> {
             adjoint.s = *distance;
             if self.touches_grin(i) {
                 self.backward_grin(&mut adjoint, i, sink);
+                continue;
+            }
+            if let Some(mount) = self.mount(i) {
+                self.backward_mounted(&mut adjoint, i, mount, sink);
                 continue;
             }
             let limits = seeds.limit_adjoint(i);

@@ -1,0 +1,124 @@
+//! Surfaces that are decentred, tilted, or not quite rotationally symmetric.
+//!
+//! Between surfaces a ray is in the frame of the vertex that the surface has in the centred lens. At a
+//! surface with a [`Pose`] it enters the surface's own frame, is intersected and refracted there, and
+//! leaves it again. An irregular surface has the sag `z(r²) + q y²` in its own frame; the crossing with
+//! the surface of revolution is corrected by Newton's iteration.
+
+use super::Tracer;
+use super::interface::{Interface, Intersection};
+use super::propagation::PropagatedRay;
+use crate::lens::{Pose, Surface, System};
+use crate::math::{Real, Vec3};
+
+/// The number of steps of Newton's iteration after which the crossing with an irregular surface is
+/// exact to rounding: each squares the error, which begins with some wavelengths.
+const NEWTON_STEPS: usize = 4;
+
+/// The position and the irregularity of a surface.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Mount<R> {
+    pub(super) pose: Pose<R>,
+    /// The coefficient of y² in the sag, in 1/mm; `None` for a surface of revolution.
+    pub(super) astigmatism: Option<R>,
+}
+
+/// The mounts of all surfaces; empty for a centred system.
+pub(super) fn mounts<R: Real>(system: &System<R>) -> Vec<Option<Mount<R>>> {
+    if !system.has_poses() {
+        return Vec::new();
+    }
+    let mount = |surface: &Surface<R>| {
+        let pose = surface.pose.unwrap_or_else(Pose::centred);
+        surface.is_mounted().then_some(Mount { pose, astigmatism: surface.astigmatism })
+    };
+    system.surfaces.iter().map(mount).collect()
+}
+
+impl<R: Real> Mount<R> {
+    /// Propagates a straight ray from the frame of the surface before; the result is in the surface's
+    /// own frame.
+    #[inline(never)]
+    pub(super) fn propagate<'a>(
+        &self,
+        surface: &'a Interface<R>,
+        p: Vec3<R>,
+        k: Vec3<R>,
+    ) -> PropagatedRay<'a, R> {
+        let start = self.pose.point_in(Vec3::new(p.x, p.y, p.z - surface.gap));
+        let k = self.pose.direction_in(k);
+        match self.astigmatism {
+            None => PropagatedRay::straight(surface, start, k),
+            Some(q) => PropagatedRay::met_at(surface, surface.intersect_irregular(start, k, q), k),
+        }
+    }
+
+    /// The same mount with every number mapped by `f`.
+    pub(super) fn map<S: Real>(&self, f: impl Fn(R) -> S) -> Mount<S> {
+        Mount { pose: self.pose.map(&f), astigmatism: self.astigmatism.map(&f) }
+    }
+}
+
+impl<R: Real> Interface<R> {
+    /// The intersection with the sag `z(r²) + q y²`, near that with the surface of revolution.
+    fn intersect_irregular(&self, p: Vec3<R>, k: Vec3<R>, q: R) -> Intersection<R> {
+        let plain = self.value().intersect(p.value(), k.value());
+        let (start, before) = self.closest_approach(p, k);
+        let mut s = plain.s - before.value();
+        for _ in 0..NEWTON_STEPS {
+            let at = (start.value() + k.value() * s, k.value());
+            let (f, slope) = self.value().height_above_irregular(at.0, at.1, q.value());
+            s -= f / slope;
+        }
+        let mut s = R::from_f64(if plain.missed { f64::NAN } else { s });
+        for _ in 0..R::ORDER {
+            let (f, slope) = self.height_above_irregular(start + k * s, k, q);
+            s -= f / slope;
+        }
+        let met = self.intersection_at(start + k * s, k, before + s);
+        let twice = q * met.point.y;
+        let normal = Vec3::new(met.normal.x, met.normal.y - (twice + twice), met.normal.z);
+        let a = k.dot(normal);
+        let missed = !(self.sense * a > R::ZERO);
+        Intersection { normal, a, m: normal.dot(normal), missed, ..met }
+    }
+
+    /// `z(r²) + q y² − z` at a point, and its derivative along `k`.
+    fn height_above_irregular(&self, point: Vec3<R>, k: Vec3<R>, q: R) -> (R, R) {
+        let (height, slope) = self.height_above(point, k);
+        let lean = q * point.y;
+        (height + lean * point.y, slope + (lean + lean) * k.y)
+    }
+}
+
+impl<R: Real> Tracer<R> {
+    /// True if no GRIN medium, pose or irregularity asks for the general loops.
+    #[inline(always)]
+    pub(super) fn is_plain(&self) -> bool {
+        self.grin_gaps.is_empty() && self.mounts.is_empty()
+    }
+
+    /// The mount of a surface; `None` for a centred one.
+    #[inline(always)]
+    pub(super) fn mount(&self, surface: usize) -> Option<&Mount<R>> {
+        self.mounts.get(surface)?.as_ref()
+    }
+
+    /// A point in the own frame of a surface, in the frame of its centred vertex.
+    #[inline(always)]
+    pub(super) fn point_out(&self, surface: usize, p: Vec3<R>) -> Vec3<R> {
+        self.mount(surface).map_or(p, |mount| mount.pose.point_out(p))
+    }
+
+    /// A direction in the own frame of a surface, in the frame of its centred vertex.
+    #[inline(always)]
+    pub(super) fn direction_out(&self, surface: usize, k: Vec3<R>) -> Vec3<R> {
+        self.mount(surface).map_or(k, |mount| mount.pose.direction_out(k))
+    }
+
+    /// Point and direction in the own frame of a surface, in the frame of its centred vertex.
+    #[inline(always)]
+    pub(super) fn state_out(&self, i: usize, (p, k): (Vec3<R>, Vec3<R>)) -> (Vec3<R>, Vec3<R>) {
+        (self.point_out(i, p), self.direction_out(i, k))
+    }
+}
