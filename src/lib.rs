@@ -46,6 +46,9 @@ pub mod pupil;
 // What a designer reads, each number with its error estimate.
 pub mod analysis;
 
+// Errors of making: what they do to a lens, and how good the lens is that is made.
+pub mod tolerance;
+
 // The merit function: weighted terms with gradients, constraints, default goals.
 pub mod merit;
 

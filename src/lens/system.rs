@@ -95,6 +95,24 @@ impl<R: Real> Shape<R> {
         Self::Asphere { curvature, conic, terms }
     }
 
+    /// The same surface with these added to its curvature, to its conic constant and to its coefficient
+    /// of r⁴; a form without one of these numbers ignores it, but a plane becomes a sphere.
+    #[must_use]
+    pub fn with_added(self, by_curvature: R, by_conic: R, by_fourth: R) -> Self {
+        match self {
+            Self::Plane => Self::Sphere { curvature: by_curvature },
+            Self::Sphere { curvature } => Self::Sphere { curvature: curvature + by_curvature },
+            Self::Conic { curvature, conic } => {
+                Self::Conic { curvature: curvature + by_curvature, conic: conic + by_conic }
+            }
+            Self::Asphere { curvature, conic, mut terms } => {
+                terms[0] += by_fourth;
+                let (curvature, conic) = (curvature + by_curvature, conic + by_conic);
+                Self::Asphere { curvature, conic, terms }
+            }
+        }
+    }
+
     /// The curvature at the vertex, in 1/mm.
     pub fn curvature(&self) -> R {
         self.numbers().0

@@ -48,4 +48,5 @@ mod session_history;
 mod session_journal;
 mod session_pareto;
 mod session_search;
+mod tolerance;
 mod trace;

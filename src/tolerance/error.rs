@@ -1,0 +1,50 @@
+//! What makes a tolerance analysis impossible.
+
+use crate::lens::{LensError, Perturbation, SurfaceNumber, SystemError};
+use crate::trace::Fate;
+
+/// A fault that makes a tolerance analysis impossible.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum ToleranceError {
+    /// The lens cannot be resolved.
+    #[error(transparent)]
+    Lens(#[from] LensError),
+    /// The perturbed lens cannot be traced.
+    #[error(transparent)]
+    System(#[from] SystemError),
+    /// An error of making names surfaces that the lens does not have, or not in order.
+    #[error(
+        "the error `{}` names surfaces {} to {}; expected surfaces from 1 to {surfaces}",
+        .what.kind.name(), SurfaceNumber::new(.what.first), SurfaceNumber::new(.what.last)
+    )]
+    NoSuchSurface {
+        /// The error of making.
+        what: Perturbation,
+        /// The number of surfaces without the image plane.
+        surfaces: usize,
+    },
+    /// An error of making does not exist on its surface.
+    #[error("the error `{}` of surface {} {why}", .what.kind.name(), SurfaceNumber::new(.what.first))]
+    NotPossible {
+        /// The error of making.
+        what: Perturbation,
+        /// The reason, as the rest of a sentence.
+        why: &'static str,
+    },
+    /// A ray of the beam does not arrive.
+    #[error(
+        "ray {} of field {} is lost at surface {}: {}",
+        .ray + 1, .field + 1, SurfaceNumber::new(.fate.surface().unwrap_or(0)), .fate.name()
+    )]
+    RayLost {
+        /// The field, counted from 0.
+        field: usize,
+        /// The ray, counted from 0.
+        ray: usize,
+        /// Its end.
+        fate: Fate,
+    },
+    /// Something else about the lens or the request.
+    #[error("{0}")]
+    Other(String),
+}

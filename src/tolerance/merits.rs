@@ -1,0 +1,145 @@
+//! How good a lens is, over any number type: spots, refocused spots, wavefronts.
+
+use super::spot::ImageRay;
+use super::wavefront::{PathRay, path_differences};
+use super::{Beam, FieldBeam, SpotMoments, ToleranceError, WavefrontVariance, best_focus};
+use crate::lens::System;
+use crate::math::{Real, Vec3};
+use crate::trace::{Ray, TracedRay, Tracer};
+
+/// What is computed besides spots.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MeritOptions {
+    /// The index of the primary wavelength.
+    pub primary: usize,
+    /// The position of the exit pupil on the axis from the first vertex and the primary wavelength,
+    /// both in mm: for wavefronts; `None` for spots alone.
+    pub wavefront: Option<(f64, f64)>,
+}
+
+/// How good a lens is.
+#[derive(Debug, Clone)]
+pub struct Merits<R> {
+    /// The spot of each field.
+    pub spots: Vec<SpotMoments<R>>,
+    /// The wavefront of each field at the primary wavelength, if it was asked for.
+    pub wavefronts: Vec<WavefrontVariance<R>>,
+    /// The weighted mean of the spots of all fields.
+    pub mean: SpotMoments<R>,
+    /// The displacement of the image plane in mm at which the mean square of all fields is least.
+    pub focus: R,
+}
+
+impl<R: Real> Merits<R> {
+    /// The mean square spot radius in mm², at the image plane.
+    pub fn mean_square(&self) -> R {
+        self.mean.a
+    }
+
+    /// The mean square spot radius in mm² at the best common focus.
+    pub fn mean_square_focused(&self) -> R {
+        self.mean.at(self.focus)
+    }
+}
+
+/// A lens behind a surface, and the rays as they arrive there.
+pub(super) struct Rear<'a, R> {
+    pub(super) systems: &'a [System<R>],
+    /// The position of the image plane from the first vertex of the whole lens, in mm.
+    pub(super) image: R,
+}
+
+/// Judges a lens by the rays of a beam.
+///
+/// # Errors
+/// A lens that cannot be traced, or the first ray that does not arrive.
+pub fn merits<R: Real>(
+    systems: &[System<R>],
+    beam: &Beam,
+    options: MeritOptions,
+) -> Result<Merits<R>, ToleranceError> {
+    let image = systems[options.primary].vertex_positions().last().copied().unwrap_or_default();
+    merits_of(&Rear { systems, image }, beam, options)
+}
+
+/// As [`merits`], for the rear of a lens and rays that start in the frame of its first vertex.
+pub(super) fn merits_of<R: Real>(
+    rear: &Rear<'_, R>,
+    beam: &Beam,
+    options: MeritOptions,
+) -> Result<Merits<R>, ToleranceError> {
+    let tracers: Result<Vec<_>, _> = rear.systems.iter().map(Tracer::new).collect();
+    let tracers = tracers?;
+    let (mut spots, mut wavefronts) = (Vec::new(), Vec::new());
+    for (number, field) in beam.fields.iter().enumerate() {
+        let landings = trace_field(&tracers, field, number)?;
+        spots.push(spot(field, &landings));
+        if let Some((pupil, um)) = options.wavefront {
+            let pupil = R::from_f64(pupil) - rear.image;
+            let index = rear.systems[options.primary].surfaces.last().map_or(R::ONE, |s| s.index);
+            let chief = land(&tracers[options.primary], field.chief.0, number, 0)?;
+            let chief = path_ray(&chief, field.chief.1);
+            let colour = field.colours.iter().position(|c| c.wavelength == options.primary);
+            let Some(colour) = colour else { continue };
+            let rays = &field.colours[colour];
+            let paths = landings[colour].iter().zip(&rays.paths);
+            let paths: Vec<_> = paths.map(|(landing, path)| path_ray(landing, *path)).collect();
+            let waves = path_differences(&paths, &chief, pupil, index);
+            let waves: Vec<R> = waves.into_iter().map(|w| w * R::from_f64(1.0 / um)).collect();
+            let total: f64 = rays.weights.iter().sum();
+            let weights: Vec<f64> = rays.weights.iter().map(|w| w / total).collect();
+            wavefronts.push(WavefrontVariance::new(&waves, &weights, &rays.pupil));
+        }
+    }
+    let weighted = spots.iter().zip(&beam.fields).map(|(s, field)| s.weighted(field.weight));
+    let mean = SpotMoments::sum(weighted);
+    Ok(Merits { spots, wavefronts, mean, focus: best_focus(&mean) })
+}
+
+/// The landings of the rays of a field, colour by colour.
+fn trace_field<R: Real>(
+    tracers: &[Tracer<R>],
+    field: &FieldBeam,
+    number: usize,
+) -> Result<Vec<Vec<TracedRay<R>>>, ToleranceError> {
+    let colour = |colour: &super::ColourRays| {
+        let tracer = &tracers[colour.wavelength];
+        let rays = colour.rays.iter().enumerate();
+        rays.map(|(i, ray)| land(tracer, *ray, number, i)).collect()
+    };
+    field.colours.iter().map(colour).collect()
+}
+
+/// The landing of a ray.
+fn land<R: Real>(
+    tracer: &Tracer<R>,
+    ray: Ray<f64>,
+    field: usize,
+    number: usize,
+) -> Result<TracedRay<R>, ToleranceError> {
+    let traced = tracer.trace(ray.cast());
+    if traced.fate.is_imaged() {
+        Ok(traced)
+    } else {
+        Err(ToleranceError::RayLost { field, ray: number, fate: traced.fate })
+    }
+}
+
+fn path_ray<R: Real>(landing: &TracedRay<R>, start: f64) -> PathRay<R> {
+    let path = landing.opl + R::from_f64(start);
+    PathRay { point: landing.ray.point, direction: landing.ray.direction, path }
+}
+
+/// The spot of a field from its landings.
+fn spot<R: Real>(field: &FieldBeam, landings: &[Vec<TracedRay<R>>]) -> SpotMoments<R> {
+    let colours = field.colours.iter().zip(landings);
+    let weighted = colours.flat_map(|(c, l)| l.iter().zip(&c.weights));
+    let rays: Vec<_> = weighted.map(|(landing, w)| (image_ray(&landing.ray), *w)).collect();
+    SpotMoments::new(&rays)
+}
+
+/// The crossing of a ray with the image plane, on which it need not end: a sensor may be tilted.
+pub(super) fn image_ray<R: Real>(ray: &Ray<R>) -> ImageRay<R> {
+    let Vec3 { x, y, .. } = ray.point;
+    [x, y, ray.direction.x / ray.direction.z, ray.direction.y / ray.direction.z]
+}

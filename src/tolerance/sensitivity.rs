@@ -1,0 +1,157 @@
+//! First and second derivatives of the merits by every error of making.
+//!
+//! One bundle of rays is traced in plain numbers to each surface once; for each error it goes on from
+//! the first surface that the error changes, over numbers that carry the first and second derivative
+//! by the error. Nothing is differenced.
+
+use super::merits::{Rear, merits, merits_of};
+use super::{
+    Beam, ColourRays, FieldBeam, MeritOptions, Merits, NominalLens, ToleranceError, perturb,
+};
+use crate::lens::{Perturbation, System};
+use crate::math::{Dual, Vec3};
+use crate::trace::{Ray, Tracer};
+use rayon::prelude::*;
+
+/// A number with its first and second derivative by one variable.
+pub type Jet2 = Dual<Dual<f64, 1>, 1>;
+
+/// A value and its first and second derivative by an error.
+#[derive(Debug, Clone, Copy, PartialEq, Default, serde::Serialize)]
+pub struct Derivatives {
+    /// The value.
+    pub value: f64,
+    /// The first derivative, per unit of the error.
+    pub first: f64,
+    /// The second derivative, per square of the unit of the error.
+    pub second: f64,
+}
+
+impl From<Jet2> for Derivatives {
+    fn from(jet: Jet2) -> Self {
+        let first = jet.slope[0];
+        Self { value: jet.value.value, first: first.value, second: first.slope[0] }
+    }
+}
+
+/// What an error of making does to the merits of a lens.
+#[derive(Debug, Clone)]
+pub struct Sensitivity {
+    /// The error.
+    pub error: Perturbation,
+    /// The merits as functions of it.
+    pub merits: Merits<Jet2>,
+}
+
+impl Sensitivity {
+    /// The mean square spot in mm², at the image plane.
+    pub fn mean_square(&self) -> Derivatives {
+        self.merits.mean_square().into()
+    }
+
+    /// The mean square spot in mm², at the best common focus.
+    pub fn mean_square_focused(&self) -> Derivatives {
+        self.merits.mean_square_focused().into()
+    }
+
+    /// The displacement of the best common focus, in mm.
+    pub fn focus(&self) -> Derivatives {
+        self.merits.focus.into()
+    }
+}
+
+/// The derivatives by each error, all others being zero.
+///
+/// # Errors
+/// An error that is not possible, a lens that cannot be traced, or a ray that does not arrive.
+pub fn sensitivities(
+    lens: &NominalLens,
+    beam: &Beam,
+    options: MeritOptions,
+    errors: &[Perturbation],
+) -> Result<Vec<Sensitivity>, ToleranceError> {
+    let stages = Stages::new(lens, beam, options)?;
+    let all = errors.par_iter().map(|error| stages.sensitivity(lens, options, *error));
+    all.collect()
+}
+
+/// The beam as it arrives at each surface of the lens as designed.
+struct Stages {
+    /// The rays in the frame of each surface's vertex, in front of it.
+    beams: Vec<Beam>,
+}
+
+impl Stages {
+    fn new(lens: &NominalLens, beam: &Beam, options: MeritOptions) -> Result<Self, ToleranceError> {
+        // Every ray has to arrive.
+        merits(&lens.systems, beam, options)?;
+        let tracers: Result<Vec<_>, _> = lens.systems.iter().map(Tracer::new).collect();
+        let tracers = tracers?;
+        let mut beams = vec![beam.clone()];
+        // The rear of a lens that begins to run backwards would be another lens.
+        let system = &lens.systems[lens.primary];
+        let mirror = system.surfaces.iter().position(|s| s.mirror || s.grin.is_some());
+        for surface in 1..mirror.unwrap_or(system.surfaces.len()) {
+            let gaps = lens.systems.iter().map(|s| s.surfaces[surface - 1].thickness).collect();
+            beams.push(
+                Propagation { tracers: &tracers, gaps, to: surface - 1 }.beam(beam, lens.primary),
+            );
+        }
+        Ok(Self { beams })
+    }
+
+    fn sensitivity(
+        &self,
+        lens: &NominalLens,
+        options: MeritOptions,
+        error: Perturbation,
+    ) -> Result<Sensitivity, ToleranceError> {
+        let variable = Jet2::variable(Dual::variable(0.0, 0), 0);
+        let whole = perturb(lens, &[(error, variable)])?;
+        let image = whole[lens.primary].vertex_positions().last().copied().unwrap_or_default();
+        let from = error.first.min(self.beams.len() - 1);
+        let rear = |system: &System<Jet2>| System {
+            index_before: system.index_before(from),
+            surfaces: system.surfaces[from..].to_vec(),
+            stop: None,
+        };
+        let systems: Vec<_> = whole.iter().map(rear).collect();
+        let merits = merits_of(&Rear { systems: &systems, image }, &self.beams[from], options)?;
+        Ok(Sensitivity { error, merits })
+    }
+}
+
+/// Propagation of a beam through the first surfaces, to the frame of the next vertex.
+struct Propagation<'a> {
+    tracers: &'a [Tracer<f64>],
+    /// The gap in front of that vertex at each wavelength, in mm.
+    gaps: Vec<f64>,
+    to: usize,
+}
+
+impl Propagation<'_> {
+    fn beam(&self, beam: &Beam, primary: usize) -> Beam {
+        let field = |field: &FieldBeam| FieldBeam {
+            weight: field.weight,
+            colours: field.colours.iter().map(|colour| self.colour(colour)).collect(),
+            chief: self.ray(primary, field.chief.0, field.chief.1),
+        };
+        Beam { fields: beam.fields.iter().map(field).collect() }
+    }
+
+    fn colour(&self, colour: &ColourRays) -> ColourRays {
+        let mut arrived = ColourRays::new(colour.wavelength);
+        for (i, ray) in colour.rays.iter().enumerate() {
+            let (ray, path) = self.ray(colour.wavelength, *ray, colour.paths[i]);
+            arrived.push(ray, colour.weights[i], colour.pupil[i], path);
+        }
+        arrived
+    }
+
+    fn ray(&self, wavelength: usize, ray: Ray<f64>, path: f64) -> (Ray<f64>, f64) {
+        let traced = self.tracers[wavelength].trace_to(ray, self.to);
+        let Vec3 { x, y, z } = traced.ray.point;
+        let point = Vec3::new(x, y, z - self.gaps[wavelength]);
+        (Ray { point, ..traced.ray }, path + traced.opl)
+    }
+}
