@@ -176,7 +176,7 @@ mod tests {
     fn a_surface_that_is_carried_turns_about_the_pivot() {
         let motion = RigidMotion { pivot: 50.0, pose: Pose::new([0.0; 2], [0.02, 0.03]) };
         let pose = Pose::centred().carried(&motion, 10.0);
-        let center = pose.point_out(Vec3::new(0.0, 0.0, 40.0));
+        let center: Vec3<f64> = pose.point_out(Vec3::new(0.0, 0.0, 40.0));
         assert!((center.z - 40.0).abs() < 1e-13 && center.x.hypot(center.y) < 1e-13);
         assert!(pose.shift.y > 0.0 && pose.shift.x < 0.0);
     }
