@@ -33,6 +33,7 @@ mod search;
 mod terms;
 #[cfg(test)]
 mod tests;
+mod tolerance;
 mod trace;
 mod window;
 
@@ -74,6 +75,7 @@ enum CliCommand {
     Gradient(gradient::GradientArgs),
     Optimize(optimize::OptimizeArgs),
     Pareto(pareto::ParetoArgs),
+    Tolerance(tolerance::ToleranceArgs),
     Search(Box<search::SearchArgs>),
     Design(design::DesignArgs),
     Grin(grin::GrinArgs),
@@ -93,6 +95,7 @@ impl CliCommand {
             Self::Gradient(gradient) => gradient.run(output),
             Self::Optimize(optimize) => optimize.run(output),
             Self::Pareto(pareto) => pareto.run(output),
+            Self::Tolerance(tolerance) => tolerance.run(output),
             Self::Search(search) => search.run(output),
             Self::Design(design) => design.run(output),
             Self::Grin(grin) => grin.run(output),

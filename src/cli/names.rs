@@ -4,6 +4,7 @@ use crate::lens::ParameterKind;
 use crate::measure::Integral;
 use crate::optimize::DescentMethod;
 use crate::search::SearchMethod;
+use crate::tolerance::ToleranceGrade;
 use clap::ValueEnum;
 use clap::builder::PossibleValue;
 
@@ -28,6 +29,21 @@ impl ValueEnum for DescentMethod {
             }
             Self::DampedLeastSquares => value("dls", "Damped least squares"),
             Self::Adam => value("adam", "Adam: first order, with moments"),
+        })
+    }
+}
+
+impl ValueEnum for ToleranceGrade {
+    fn value_variants<'a>() -> &'a [Self] {
+        &[Self::Commercial, Self::Precision, Self::ShopLimit, Self::MouldedPlastic]
+    }
+
+    fn to_possible_value(&self) -> Option<PossibleValue> {
+        Some(match self {
+            Self::Commercial => value("commercial", "What every shop delivers"),
+            Self::Precision => value("precision", "What a good shop delivers"),
+            Self::ShopLimit => value("shop-limit", "The limit of a good shop"),
+            Self::MouldedPlastic => value("moulded", "Moulded plastic elements of a phone camera"),
         })
     }
 }

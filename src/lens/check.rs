@@ -112,6 +112,8 @@ impl Lens {
         self.check_zoom()?;
         self.check_variables()?;
         self.check_pickups()?;
+        let sheet = self.tolerances.as_ref();
+        sheet.map_or(Ok(()), |sheet| sheet.check(self.surfaces.len()))?;
         self.merit.as_ref().map_or(Ok(()), Goal::check_numbers)
     }
 
@@ -296,6 +298,14 @@ impl Row {
         }
         if let Some(sd) = self.semi_diameter {
             check_number(named(Quantity::SemiDiameter), sd, sd >= 0.0, "zero or more, in mm")?;
+        }
+        for (what, values, limit) in
+            [("decenter", self.decenter, f64::INFINITY), ("tilt", self.tilt, 90.0)]
+        {
+            for found in values {
+                let what = format_args!("{what} of surface {surface}");
+                check_number(what, found, found.abs() < limit, "mm, or less than 90 degrees")?;
+            }
         }
         let Some(inner) = self.obstruction else { return Ok(()) };
         let transmits = self.semi_diameter.is_none_or(|sd| inner == 0.0 || inner < sd);

@@ -25,6 +25,7 @@ mod spectrum;
 mod starting;
 mod surface_number;
 mod system;
+mod tolerance;
 mod variables;
 
 pub use crate::grin::field::{
@@ -45,6 +46,7 @@ pub use spectrum::WavelengthPreset;
 pub use starting::{StartingForm, StartingLens};
 pub use surface_number::{MediumPlace, SurfaceNumber};
 pub use system::{Shape, Surface, System, SystemError};
+pub use tolerance::{ErrorDistribution, Tolerance, ToleranceSheet};
 pub use variables::{ParameterKind, add_variable, add_variables, at_zoom};
 
 use serde::{Deserialize, Serialize};
@@ -84,6 +86,8 @@ pub struct Lens {
     pub image_solve: Option<f64>,
     /// The merit function; `None` for the one that the program proposes.
     pub merit: Option<Goal>,
+    /// The tolerances; `None` for a lens that has none yet.
+    pub tolerances: Option<ToleranceSheet>,
 }
 
 /// The position of the object.
@@ -185,6 +189,10 @@ pub struct Row {
     /// True for a hyperhemisphere: the far half of the sphere or ellipsoid belongs to the surface
     /// too.
     pub hyperhemisphere: bool,
+    /// The displacement of the vertex across the axis along x and y, in mm; surfaces behind stay.
+    pub decenter: [f64; 2],
+    /// The tilt about x, then about y, at the decentred vertex, in degrees; see [`Pose`].
+    pub tilt: [f64; 2],
     /// A remark on the surface.
     pub comment: String,
 }
@@ -346,5 +354,6 @@ pub fn blank() -> Lens {
         pickups: Vec::new(),
         image_solve: None,
         merit: None,
+        tolerances: None,
     }
 }

@@ -86,6 +86,24 @@ impl PerturbationKind {
         self >= Self::ElementDecenterX
     }
 
+    /// True for the errors of the gap behind the surface.
+    pub fn is_of_gap(self) -> bool {
+        matches!(self, Self::Thickness | Self::ThicknessAdjusted | Self::Index | Self::Abbe)
+    }
+
+    /// True for a tilt, whose value is an angle.
+    pub fn is_angle(self) -> bool {
+        matches!(
+            self,
+            Self::SurfaceTiltX
+                | Self::SurfaceTiltY
+                | Self::ElementTiltX
+                | Self::ElementTiltY
+                | Self::ElementRollX
+                | Self::ElementRollY
+        )
+    }
+
     /// True for the errors that break the symmetry about the axis.
     pub fn breaks_symmetry(self) -> bool {
         self == Self::Irregularity || self >= Self::SurfaceDecenterX

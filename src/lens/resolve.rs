@@ -1,7 +1,9 @@
 //! Resolves a lens to plain numbers: applies pickups, looks up glasses, solves the image distance.
 
 use super::system::{Surface, System};
-use super::{Lens, LensError, Medium, MediumPlace, Object, Parameter, Pickup, Row, SystemError};
+use super::{
+    Lens, LensError, Medium, MediumPlace, Object, Parameter, Pickup, Pose, Row, SystemError,
+};
 use super::{glass, grin};
 use crate::math::Real;
 
@@ -94,6 +96,12 @@ impl Lens {
 }
 
 impl Row {
+    /// The position of the surface; `None` for a centred one.
+    pub fn pose(&self) -> Option<Pose<f64>> {
+        let centred = self.decenter == [0.0; 2] && self.tilt == [0.0; 2];
+        (!centred).then(|| Pose::new(self.decenter, self.tilt.map(f64::to_radians)))
+    }
+
     fn surface(&self, thickness: f64, index: f64) -> Surface<f64> {
         Surface {
             shape: self.shape(),
@@ -104,7 +112,7 @@ impl Row {
             obstruction: self.obstruction.unwrap_or(0.0),
             mirror: self.medium == Medium::Mirror,
             hyperhemisphere: self.hyperhemisphere,
-            pose: None,
+            pose: self.pose(),
             astigmatism: None,
         }
     }

@@ -20,6 +20,9 @@ impl Lens {
     /// removed; those mapped to `None` are removed.
     pub fn renumber_rows(&mut self, map: impl Fn(usize) -> Option<usize>) {
         self.map_parameters(|p| map(p.surface).map(|surface| Parameter { surface, ..p }));
+        if let Some(sheet) = &mut self.tolerances {
+            sheet.renumber(|_, i| map(i));
+        }
         for position in &mut self.zoom {
             let gap = |gap: &ZoomThickness| {
                 map(gap.surface).map(|surface| ZoomThickness { surface, ..*gap })
@@ -41,6 +44,11 @@ impl Lens {
         self.map_parameters(|parameter| Some(reversal.parameter(parameter)));
         self.variables.iter_mut().for_each(|variable| reversal.swap_bounds(variable));
         self.pickups.iter_mut().for_each(|pickup| reversal.adjust_pickup(pickup));
+        if let Some(sheet) = &mut self.tolerances {
+            sheet.renumber(|kind, i| {
+                Some(if kind.is_of_gap() { reversal.gap(i) } else { reversal.surface(i) })
+            });
+        }
         for gap in self.zoom.iter_mut().flat_map(|position| &mut position.thicknesses) {
             gap.surface = reversal.gap(gap.surface);
         }

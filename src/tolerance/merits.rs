@@ -59,21 +59,26 @@ pub fn merits<R: Real>(
     options: MeritOptions,
 ) -> Result<Merits<R>, ToleranceError> {
     let image = systems[options.primary].vertex_positions().last().copied().unwrap_or_default();
-    merits_of(&Rear { systems, image }, beam, options)
+    Ok(merits_of(&Rear { systems, image }, beam, options)?.0)
 }
+
+/// The rays of each field at the image plane, with their weights.
+pub(super) type ImageRays<R> = Vec<Vec<(ImageRay<R>, f64)>>;
 
 /// As [`merits`], for the rear of a lens and rays that start in the frame of its first vertex.
 pub(super) fn merits_of<R: Real>(
     rear: &Rear<'_, R>,
     beam: &Beam,
     options: MeritOptions,
-) -> Result<Merits<R>, ToleranceError> {
+) -> Result<(Merits<R>, ImageRays<R>), ToleranceError> {
     let tracers: Result<Vec<_>, _> = rear.systems.iter().map(Tracer::new).collect();
     let tracers = tracers?;
-    let (mut spots, mut wavefronts) = (Vec::new(), Vec::new());
+    let (mut spots, mut wavefronts, mut rays_of_all) = (Vec::new(), Vec::new(), Vec::new());
     for (number, field) in beam.fields.iter().enumerate() {
         let landings = trace_field(&tracers, field, number)?;
-        spots.push(spot(field, &landings));
+        let image_rays = image_rays(field, &landings);
+        spots.push(SpotMoments::new(&image_rays));
+        rays_of_all.push(image_rays);
         if let Some((pupil, um)) = options.wavefront {
             let pupil = R::from_f64(pupil) - rear.image;
             let index = rear.systems[options.primary].surfaces.last().map_or(R::ONE, |s| s.index);
@@ -93,7 +98,7 @@ pub(super) fn merits_of<R: Real>(
     }
     let weighted = spots.iter().zip(&beam.fields).map(|(s, field)| s.weighted(field.weight));
     let mean = SpotMoments::sum(weighted);
-    Ok(Merits { spots, wavefronts, mean, focus: best_focus(&mean) })
+    Ok((Merits { spots, wavefronts, mean, focus: best_focus(&mean) }, rays_of_all))
 }
 
 /// The landings of the rays of a field, colour by colour.
@@ -130,12 +135,14 @@ fn path_ray<R: Real>(landing: &TracedRay<R>, start: f64) -> PathRay<R> {
     PathRay { point: landing.ray.point, direction: landing.ray.direction, path }
 }
 
-/// The spot of a field from its landings.
-fn spot<R: Real>(field: &FieldBeam, landings: &[Vec<TracedRay<R>>]) -> SpotMoments<R> {
+/// The rays of a field at the image plane, with their weights.
+fn image_rays<R: Real>(
+    field: &FieldBeam,
+    landings: &[Vec<TracedRay<R>>],
+) -> Vec<(ImageRay<R>, f64)> {
     let colours = field.colours.iter().zip(landings);
     let weighted = colours.flat_map(|(c, l)| l.iter().zip(&c.weights));
-    let rays: Vec<_> = weighted.map(|(landing, w)| (image_ray(&landing.ray), *w)).collect();
-    SpotMoments::new(&rays)
+    weighted.map(|(landing, w)| (image_ray(&landing.ray), *w)).collect()
 }
 
 /// The crossing of a ray with the image plane, on which it need not end: a sensor may be tilted.

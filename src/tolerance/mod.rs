@@ -13,20 +13,43 @@
 //! wavefront variance by second-order jets: rays are traced once over numbers that carry the
 //! derivatives by an error, from the first surface that it changes on.
 //!
-//! Rays are held: an error changes the lens and not the rays in object space, and rims clip nothing.
+//! Between two errors the mean product of what they do to the rays completes the [`QuadraticForm`],
+//! whose distribution needs no further rays. [`real_lenses`] traces lenses with random errors; both
+//! on the same draws tell how far the form is to be trusted, and their difference corrects it
+//! ([`analyze`]).
+//!
+//! Rays are held: an error changes the lens and not the rays in object space, and rims clip nothing;
+//! what rims would clip is measured and shown.
 
+mod analysis;
+mod as_built;
 mod beam;
+mod draw;
 mod error;
+mod form;
+mod grade;
+mod inverse;
 mod merits;
+mod monte_carlo;
+mod nominal;
 mod perturb;
 mod sensitivity;
 mod spot;
 mod wavefront;
 
+pub use analysis::{
+    AsBuiltSpot, Quantile, ToleranceAnalysis, ToleranceRequest, YieldEstimate, analyze,
+};
+pub use as_built::{AsBuiltGradient, FixedAndRefocused, as_built_gradient};
 pub use beam::{Beam, ColourRays, FieldBeam};
 pub use error::ToleranceError;
+pub use form::{FocusStop, FocusTreatment, QuadraticForm};
+pub use grade::{ToleranceGrade, graded_sheet};
+pub use inverse::loosest_tolerances;
 pub use merits::{MeritOptions, Merits, merits};
+pub use monte_carlo::{RealLens, real_lenses, wilson_interval};
+pub use nominal::ToleranceScene;
 pub use perturb::{NominalLens, perturb};
-pub use sensitivity::{Derivatives, Jet2, Sensitivity, sensitivities};
+pub use sensitivity::{Derivatives, Jet2, RaySensitivity, Sensitivity, sensitivities};
 pub use spot::{SpotMoments, best_focus};
 pub use wavefront::WavefrontVariance;

@@ -18,6 +18,9 @@ pub struct NominalLens {
     pub primary: usize,
     /// The semi-diameter of each surface in mm: the unit of an irregularity.
     pub semi_diameters: Vec<f64>,
+    /// The radii in mm of the clear aperture and of the obstruction of each surface, which clip in a
+    /// lens with its rims; empty if nothing does.
+    pub rims: Vec<(f64, f64)>,
 }
 
 /// The lens at each wavelength with errors of making; numbers without an error are as designed.

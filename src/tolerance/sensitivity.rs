@@ -5,6 +5,7 @@
 //! by the error. Nothing is differenced.
 
 use super::merits::{Rear, merits, merits_of};
+use super::spot::ImageRay;
 use super::{
     Beam, ColourRays, FieldBeam, MeritOptions, Merits, NominalLens, ToleranceError, perturb,
 };
@@ -41,6 +42,41 @@ pub struct Sensitivity {
     pub error: Perturbation,
     /// The merits as functions of it.
     pub merits: Merits<Jet2>,
+    /// What it does to each ray, all fields and wavelengths one after the other.
+    pub rays: Vec<RaySensitivity>,
+}
+
+/// What an error does to a ray at the image plane, relative to the centroid of its field.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RaySensitivity {
+    /// The derivative of x and y by the error, in mm per unit of the error.
+    pub displacement: [f64; 2],
+    /// The slopes `L/N` and `M/N` without errors.
+    pub slope: [f64; 2],
+    /// The derivative of the slopes by the error.
+    pub bend: [f64; 2],
+}
+
+/// The rays of a field relative to their centroid.
+fn centred(rays: &[(ImageRay<Jet2>, f64)]) -> Vec<RaySensitivity> {
+    let of = |ray: &ImageRay<Jet2>| {
+        let first = |i: usize| ray[i].slope[0].value;
+        [first(0), first(1), ray[2].value.value, ray[3].value.value, first(2), first(3)]
+    };
+    let mut center = [0.0; 6];
+    for (ray, weight) in rays {
+        center.iter_mut().zip(of(ray)).for_each(|(sum, number)| *sum += weight * number);
+    }
+    let relative = |(ray, _): &(ImageRay<Jet2>, f64)| {
+        let [x, y, u, v, du, dv] = of(ray);
+        let [cx, cy, cu, cv, cdu, cdv] = center;
+        RaySensitivity {
+            displacement: [x - cx, y - cy],
+            slope: [u - cu, v - cv],
+            bend: [du - cdu, dv - cdv],
+        }
+    };
+    rays.iter().map(relative).collect()
 }
 
 impl Sensitivity {
@@ -116,8 +152,10 @@ impl Stages {
             stop: None,
         };
         let systems: Vec<_> = whole.iter().map(rear).collect();
-        let merits = merits_of(&Rear { systems: &systems, image }, &self.beams[from], options)?;
-        Ok(Sensitivity { error, merits })
+        let rear = Rear { systems: &systems, image };
+        let (merits, rays) = merits_of(&rear, &self.beams[from], options)?;
+        let rays = rays.iter().flat_map(|rays| centred(rays)).collect();
+        Ok(Sensitivity { error, merits, rays })
     }
 }
 

@@ -3,7 +3,8 @@
 use super::medium::is_air;
 use super::{VERSION, required_number, serialize_numbers};
 use crate::lens::{
-    Aperture, Fields, Goal, Lens, Medium, Object, Pickup, Row, Variable, Wavelength, ZoomPosition,
+    Aperture, Fields, Goal, Lens, Medium, Object, Pickup, Row, ToleranceSheet, Variable,
+    Wavelength, ZoomPosition,
 };
 use serde::de::value::MapAccessDeserializer;
 use serde::de::{Error as _, MapAccess, Unexpected, Visitor};
@@ -42,6 +43,13 @@ struct LensJson {
     pickups: Vec<Pickup>,
     #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "required_goal")]
     merit: Option<Goal>,
+    #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "required_sheet")]
+    tolerances: Option<ToleranceSheet>,
+}
+
+/// Tolerances that are not null: a file without them has no key.
+fn required_sheet<'de, D: Deserializer<'de>>(from: D) -> Result<Option<ToleranceSheet>, D::Error> {
+    ToleranceSheet::deserialize(from).map(Some)
 }
 
 /// A merit function that is not null: a file without one has no key.
@@ -68,6 +76,7 @@ impl Serialize for Lens {
             variables: self.variables.clone(),
             pickups: self.pickups.clone(),
             merit: self.merit.clone(),
+            tolerances: self.tolerances.clone(),
         }
         .serialize(to)
     }
@@ -95,6 +104,7 @@ impl<'de> Deserialize<'de> for Lens {
             pickups: keys.pickups,
             image_solve: keys.focus,
             merit: keys.merit,
+            tolerances: keys.tolerances,
         })
     }
 }

@@ -145,6 +145,8 @@ mod tests {
         lens.surfaces[0].hyperhemisphere = true;
         lens.surfaces[0].obstruction = Some(0.1 + 0.7);
         lens.surfaces[1].obstruction = Some(0.0);
+        lens.surfaces[1].decenter = [0.1 + 0.2, -0.0];
+        lens.surfaces[2].tilt = [0.0, -0.7];
         lens.surfaces[2].asphere = vec![0.1 + 0.2, -1.2345678901234567e-19];
         lens.image_solve = Some(0.0);
         let gap = ZoomThickness { surface: 0, thickness: 1e23 };

@@ -43,6 +43,10 @@ struct RowJson {
     stop: bool,
     #[serde(default, skip_serializing_if = "is_false")]
     hyper: bool,
+    #[serde(default, skip_serializing_if = "is_plain_zeros")]
+    decenter: [f64; 2],
+    #[serde(default, skip_serializing_if = "is_plain_zeros")]
+    tilt: [f64; 2],
     #[serde(default, skip_serializing_if = "String::is_empty")]
     comment: String,
 }
@@ -51,6 +55,11 @@ struct RowJson {
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "the signature that serde calls")]
 fn is_plain_zero(value: &f64) -> bool {
     value.to_bits() == 0
+}
+
+/// True if both numbers are +0.
+fn is_plain_zeros(values: &[f64; 2]) -> bool {
+    values.iter().all(is_plain_zero)
 }
 
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "the signature that serde calls")]
@@ -86,6 +95,8 @@ impl Serialize for Row {
             obstruction: self.obstruction,
             stop: self.stop,
             hyper: self.hyperhemisphere,
+            decenter: self.decenter,
+            tilt: self.tilt,
             comment: self.comment.clone(),
         }
         .serialize(to)
@@ -119,6 +130,8 @@ impl<'de> Visitor<'de> for RowVisitor {
             obstruction: keys.obstruction,
             stop: keys.stop,
             hyperhemisphere: keys.hyper,
+            decenter: keys.decenter,
+            tilt: keys.tilt,
             comment: keys.comment,
         })
     }

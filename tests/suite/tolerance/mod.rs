@@ -1,5 +1,7 @@
-//! Errors of making, against the exact answers of `tolerances.json`.
+//! Errors of making, against the exact answers of `tolerances.json`, and their hard cases.
 
+mod as_built;
 mod derivatives;
+mod hard_cases;
 mod rays;
 mod reference;

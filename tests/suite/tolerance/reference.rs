@@ -1,7 +1,10 @@
 //! The lenses, rays and perturbations of `tolerances.json`.
 
 use crate::reference::{count, number, numbers, read};
-use aplanat::lens::{ASPHERE_TERMS, Perturbation, PerturbationKind, Shape, Surface, System};
+use aplanat::lens::{
+    ASPHERE_TERMS, ErrorDistribution, Perturbation, PerturbationKind, Shape, Surface, System,
+    Tolerance,
+};
 use aplanat::math::Vec3;
 use aplanat::tolerance::{Beam, ColourRays, FieldBeam, MeritOptions, NominalLens};
 use aplanat::trace::Ray;
@@ -80,6 +83,7 @@ impl ToleranceCase {
             wavelengths: self.wavelengths(),
             primary: self.primary(),
             semi_diameters: self.surfaces().iter().map(|s| number(&s["semi_diameter"])).collect(),
+            rims: Vec::new(),
         }
     }
 
@@ -136,6 +140,17 @@ impl ToleranceCase {
         }
         colour
     }
+}
+
+/// The tolerances of `as_built`, all with this distribution.
+pub(super) fn tolerances(lens: &ToleranceCase, distribution: ErrorDistribution) -> Vec<Tolerance> {
+    let all = lens.data["as_built"]["tolerances"].as_array().unwrap().iter();
+    let tolerance = |data: &Value| Tolerance {
+        error: perturbation(data),
+        half_range: number(&data["half_range"]),
+        distribution,
+    };
+    all.map(tolerance).collect()
 }
 
 /// Checks that two numbers agree within an absolute tolerance; NaN does not.

@@ -39,6 +39,7 @@ pub(super) fn build(file: &ZemaxFile, report: &mut ConversionReport) -> Result<L
         pickups: Vec::new(),
         image_solve: None,
         merit: None,
+        tolerances: None,
     };
     report_image(file, report);
     zoom::add_positions(file, &mut lens, &zoom_names, report)?;

@@ -39,6 +39,8 @@ pub(super) fn row(
         obstruction: surface.obstruction.map(|(radius, _)| radius * unit),
         stop: number == stop,
         hyperhemisphere: false,
+        decenter: [0.0; 2],
+        tilt: [0.0; 2],
         comment: surface.comment.clone(),
     })
 }

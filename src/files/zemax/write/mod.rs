@@ -9,7 +9,7 @@ mod table;
 
 use crate::files::report::{ConversionOutcome, ConversionReport};
 use crate::files::zemax::INFINITE_GAP;
-use crate::lens::{Lens, LensError, Parameter, Quantity, ZoomThickness};
+use crate::lens::{Lens, LensError, Parameter, Quantity, SystemError, ZoomThickness};
 
 /// The text of the file, and the report of everything that is not exact.
 ///
@@ -18,6 +18,7 @@ use crate::lens::{Lens, LensError, Parameter, Quantity, ZoomThickness};
 pub fn write(lens: &Lens) -> Result<(String, ConversionReport), LensError> {
     lens.check()?;
     check_thicknesses(lens)?;
+    check_poses(lens)?;
     let mut export = ZemaxWriter {
         lens: lens.with_pickups()?,
         text: String::new(),
@@ -30,6 +31,19 @@ pub fn write(lens: &Lens) -> Result<(String, ConversionReport), LensError> {
     export.table();
     export.report_losses();
     Ok((export.text, export.report))
+}
+
+/// Refuses decentred and tilted surfaces, which need coordinate breaks.
+fn check_poses(lens: &Lens) -> Result<(), LensError> {
+    match lens.surfaces.iter().position(|row| row.pose().is_some()) {
+        Some(surface) => Err(SystemError::Posed {
+            surface: surface.into(),
+            what: "the export as .zmx",
+            hint: "; expected the native format (.json)",
+        }
+        .into()),
+        None => Ok(()),
+    }
 }
 
 /// Refuses gaps that the other program takes for infinite ones.

@@ -1,0 +1,353 @@
+//! `tolerance`: what errors of making do to a lens.
+
+use super::error::CliError;
+use super::input::{LensFile, LoadedLens, Tolerance as RelativeError};
+use super::output::{Output, ShortNumber, TextTable};
+use super::output_paths::OutputPaths;
+use crate::files;
+use crate::lens::{PerturbationKind, SurfaceNumber, Tolerance, ToleranceSheet};
+use crate::tolerance::{
+    AsBuiltSpot, Derivatives, ToleranceAnalysis, ToleranceError, ToleranceGrade, ToleranceRequest,
+    ToleranceScene, analyze, graded_sheet, loosest_tolerances,
+};
+use serde::Serialize;
+use std::fmt::{self, Display};
+use std::path::PathBuf;
+
+/// Shows what errors of making do to a lens: sensitivities, expected spot, quantiles, yield
+#[derive(Debug, clap::Args)]
+#[command(after_long_help = include_str!("help/tolerance.txt"))]
+pub(super) struct ToleranceArgs {
+    #[command(flatten)]
+    lens: LensFile,
+
+    /// A class of tolerances in place of those of the lens file; precision where it has none
+    #[arg(long, value_enum, value_name = "GRADE")]
+    grade: Option<ToleranceGrade>,
+
+    /// Lenses with random errors whose rays are traced
+    #[arg(long, default_value_t = 500, value_name = "N")]
+    samples: usize,
+
+    /// The seed of the random errors
+    #[arg(long, default_value_t = 1, value_name = "N")]
+    seed: u64,
+
+    /// Tolerance of the radius of each spot by its sampling: `0.1%` or `1e-3`
+    #[arg(long, default_value = "0.1%", value_name = "TOLERANCE")]
+    error: RelativeError,
+
+    /// The zoom position, counted from 0
+    #[arg(long, default_value_t = 0, value_name = "N")]
+    zoom: usize,
+
+    /// The largest rms spot radius of a good lens in mm: adds the share of good lenses
+    #[arg(long, value_name = "MM")]
+    rms: Option<f64>,
+
+    /// Adds the loosest tolerances with which the expected refocused rms is this, in mm
+    #[arg(long, value_name = "MM")]
+    loosest: Option<f64>,
+
+    /// A file for the table of sensitivities, as CSV
+    #[arg(long, value_name = "FILE")]
+    csv: Option<PathBuf>,
+}
+
+impl ToleranceArgs {
+    pub(super) fn run(&self, output: &Output) -> Result<(), CliError> {
+        OutputPaths::reading([("the lens", self.lens.path())]).file(
+            "--csv",
+            self.csv.as_deref(),
+            &["csv"],
+        )?;
+        self.check_lengths()?;
+        let opened = self.lens.open()?;
+        opened.check_zoom(self.zoom)?;
+        let refuse = |source| tolerance_error(&opened, source);
+        let scene = ToleranceScene::new(&opened.lens, self.zoom, self.error.0).map_err(refuse)?;
+        let sheet = self.sheet(&opened, &scene);
+        let request = ToleranceRequest { seed: self.seed, samples: self.samples, limit: self.rms };
+        let analysis = analyze(&scene, &sheet, request).map_err(refuse)?;
+        let loosest = self.loosest.map(|rms| {
+            loosest_tolerances(&analysis.forms[1], &sheet.errors, rms * rms).map_err(refuse)
+        });
+        let loosest = loosest.transpose()?;
+        let report = ToleranceReport::new(self, &scene, &sheet, analysis, loosest);
+        if let Some(path) = &self.csv {
+            files::write_atomic(path, report.csv().as_bytes())?;
+        }
+        output.print(&report)
+    }
+
+    fn check_lengths(&self) -> Result<(), CliError> {
+        for (name, value) in [("--rms", self.rms), ("--loosest", self.loosest)] {
+            if let Some(found) = value.filter(|v| !(*v > 0.0 && v.is_finite())) {
+                let text = format!("{name}: found {found}; expected more than 0, in mm");
+                return Err(CliError::Input(text));
+            }
+        }
+        Ok(())
+    }
+
+    /// The tolerances of the lens file, or those of the class.
+    fn sheet(&self, opened: &LoadedLens, scene: &ToleranceScene) -> ToleranceSheet {
+        match (&opened.lens.tolerances, self.grade) {
+            (Some(sheet), None) => sheet.clone(),
+            (_, grade) => graded_sheet(&opened.lens, &scene.lens, grade.unwrap_or_default()),
+        }
+    }
+}
+
+fn tolerance_error(opened: &LoadedLens, source: ToleranceError) -> CliError {
+    CliError::Input(format!("{}: {source}", opened.file))
+}
+
+/// The result.
+#[derive(Serialize)]
+struct ToleranceReport {
+    errors: usize,
+    rays: usize,
+    sampling_error: f64,
+    samples: usize,
+    seed: u64,
+    lost: usize,
+    clipping: Option<[f64; 3]>,
+    spots: [AsBuiltSpot; 2],
+    sensitivities: Vec<SensitivityRow>,
+    loosest: Option<Vec<Tolerance>>,
+    warnings: Vec<String>,
+}
+
+/// What one error does.
+#[derive(Serialize)]
+struct SensitivityRow {
+    kind: PerturbationKind,
+    first: usize,
+    last: usize,
+    half_range: f64,
+    /// The standard deviation.
+    sigma: f64,
+    fixed: ShareOfGrowth,
+    refocused: ShareOfGrowth,
+}
+
+/// The derivatives of the mean square spot by an error, and its share of the growth of the
+/// expectation.
+#[derive(Serialize)]
+struct ShareOfGrowth {
+    #[serde(flatten)]
+    by: Derivatives,
+    share: f64,
+}
+
+impl ToleranceReport {
+    fn new(
+        arguments: &ToleranceArgs,
+        scene: &ToleranceScene,
+        sheet: &ToleranceSheet,
+        analysis: ToleranceAnalysis,
+        loosest: Option<Vec<Tolerance>>,
+    ) -> Self {
+        let warnings = warnings(arguments, &analysis);
+        Self {
+            errors: sheet.errors.len(),
+            rays: scene.beam.rays(),
+            sampling_error: scene.sampling_error,
+            samples: arguments.samples,
+            seed: arguments.seed,
+            lost: analysis.lost,
+            clipping: analysis.clipping,
+            sensitivities: rows(sheet, &analysis),
+            spots: analysis.spots,
+            loosest,
+            warnings,
+        }
+    }
+
+    fn csv(&self) -> String {
+        let mut text = "kind,first,last,half_range,sigma,fixed_first,fixed_second,fixed_share,\
+                        refocused_first,refocused_second,refocused_share\r\n"
+            .to_owned();
+        for row in &self.sensitivities {
+            let numbers = [&row.fixed, &row.refocused]
+                .map(|part| format!("{},{},{}", part.by.first, part.by.second, part.share));
+            let place = format!("{},{},{}", row.kind.name(), row.first, row.last);
+            let range = format!("{},{}", row.half_range, row.sigma);
+            text.push_str(&[place, range, numbers.join(",")].join(","));
+            text.push_str("\r\n");
+        }
+        text
+    }
+}
+
+/// The sensitivities, sorted by their share after refocusing.
+fn rows(sheet: &ToleranceSheet, analysis: &ToleranceAnalysis) -> Vec<SensitivityRow> {
+    let grown = |i: usize| {
+        let form = &analysis.forms[i];
+        (form.expectation(&sheet.errors) - form.nominal).abs().max(f64::MIN_POSITIVE)
+    };
+    let total = [grown(0), grown(1)];
+    let share = |by: Derivatives, sigma: f64, total: f64| ShareOfGrowth {
+        by,
+        share: 0.5 * sigma * sigma * by.second / total,
+    };
+    let both = sheet.errors.iter().zip(&analysis.sensitivities);
+    let mut rows: Vec<SensitivityRow> = both
+        .map(|(tolerance, found)| {
+            let sigma = tolerance.deviation();
+            SensitivityRow {
+                kind: tolerance.error.kind,
+                first: tolerance.error.first,
+                last: tolerance.error.last,
+                half_range: tolerance.half_range,
+                sigma,
+                fixed: share(found.mean_square(), sigma, total[0]),
+                refocused: share(found.mean_square_focused(), sigma, total[1]),
+            }
+        })
+        .collect();
+    rows.sort_by(|a, b| b.refocused.share.total_cmp(&a.refocused.share));
+    rows
+}
+
+fn warnings(arguments: &ToleranceArgs, analysis: &ToleranceAnalysis) -> Vec<String> {
+    let mut warnings = Vec::new();
+    for spot in analysis.spots.iter().filter(|spot| !spot.form_agrees) {
+        let [apart, error] = spot.difference.map(|v| 100.0 * v / spot.form_mean_rms);
+        warnings.push(format!(
+            "{}: the quadratic form differs from real lenses by {apart:.2} % +- {error:.2} %; the \
+             corrected numbers count",
+            focus_name(spot)
+        ));
+    }
+    if analysis.lost > 0 {
+        warnings.push(format!(
+            "{} of {} lenses lose rays and count as bad; the means leave them out",
+            analysis.lost, arguments.samples
+        ));
+    }
+    warnings
+}
+
+fn focus_name(spot: &AsBuiltSpot) -> String {
+    let name = serde_json::to_value(spot.focus).unwrap_or_default();
+    name.as_str().unwrap_or_default().to_owned()
+}
+
+/// The number of sensitivities in the text.
+const SHOWN: usize = 20;
+
+impl Display for ToleranceReport {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(
+            f,
+            "{} errors of making, {} rays, {} real lenses; spots as rms in mm\n",
+            self.errors, self.rays, self.samples
+        )?;
+        writeln!(f, "{}", self.spot_table())?;
+        writeln!(f, "{}", self.sensitivity_table())?;
+        if let Some([fixed, refocused, light]) = self.clipping.map(|c| c.map(|v| 100.0 * v)) {
+            writeln!(
+                f,
+                "the pupil is held; rims would change the mean square by {fixed:.2} % (refocused \
+                 {refocused:.2} %) and take {light:.2} % of the light"
+            )?;
+        }
+        if let Some(loosest) = &self.loosest {
+            writeln!(f, "\n{}", loosest_table(loosest))?;
+        }
+        self.warnings.iter().try_for_each(|warning| writeln!(f, "warning: {warning}"))
+    }
+}
+
+impl ToleranceReport {
+    fn spot_table(&self) -> TextTable {
+        let mut table = TextTable::new(&["", "fixed focus", "refocused"]);
+        let both = |of: &dyn Fn(&AsBuiltSpot) -> String| [of(&self.spots[0]), of(&self.spots[1])];
+        let mut row = |name: String, of: &dyn Fn(&AsBuiltSpot) -> String| {
+            let [fixed, refocused] = both(of);
+            table.row([name, fixed, refocused]);
+        };
+        let short = |value: f64| ShortNumber(value).to_string();
+        row("as designed".into(), &|s| short(s.nominal_rms));
+        row("root of the expected mean square".into(), &|s| short(s.form_root_mean_square));
+        row("mean, quadratic form".into(), &|s| short(s.form_mean_rms));
+        row("mean, corrected by real lenses".into(), &|s| with_error(s.mean_rms));
+        row("real lenses minus form".into(), &|s| with_error(s.difference));
+        for (i, quantile) in self.spots[0].quantiles.iter().enumerate() {
+            let name = format!("{:.0} % of the lenses, at most", 100.0 * quantile.share);
+            row(name, &|s| short(s.quantiles[i].corrected));
+        }
+        if self.spots[0].good.is_some() {
+            let percent = |share: f64| format!("{:.1} %", 100.0 * share);
+            row("good lenses".into(), &|s| s.good.map_or(String::new(), |g| percent(g.corrected)));
+            row("of the real ones, 95 % interval".into(), &|s| {
+                let ends = s.good.map_or([0.0; 2], |g| g.interval);
+                format!("{} to {}", percent(ends[0]), percent(ends[1]))
+            });
+        }
+        table
+    }
+
+    fn sensitivity_table(&self) -> TextTable {
+        let head = ["error", "surfaces", "half range", "share fixed", "share refocused"];
+        let mut table = TextTable::new(&head);
+        for row in self.sensitivities.iter().take(SHOWN) {
+            table.row([
+                row.kind.name().to_owned(),
+                surfaces(row.first, row.last),
+                half_range(row.kind, row.half_range),
+                format!("{:.1} %", 100.0 * row.fixed.share),
+                format!("{:.1} %", 100.0 * row.refocused.share),
+            ]);
+        }
+        let more = self.sensitivities.len().saturating_sub(SHOWN);
+        if more > 0 {
+            let rest = |of: fn(&SensitivityRow) -> f64| {
+                100.0 * self.sensitivities[SHOWN..].iter().map(of).sum::<f64>()
+            };
+            let shares = [rest(|row| row.fixed.share), rest(|row| row.refocused.share)];
+            let [fixed, refocused] = shares.map(|share| format!("{share:.1} %"));
+            table.row([format!("{more} more"), String::new(), String::new(), fixed, refocused]);
+        }
+        table
+    }
+}
+
+fn with_error([value, error]: [f64; 2]) -> String {
+    format!("{} +- {error:.1e}", ShortNumber(value))
+}
+
+fn surfaces(first: usize, last: usize) -> String {
+    let number = SurfaceNumber::new;
+    if first == last {
+        number(first).to_string()
+    } else {
+        format!("{}-{}", number(first), number(last))
+    }
+}
+
+/// A half range with its unit; angles in minutes of arc.
+fn half_range(kind: PerturbationKind, value: f64) -> String {
+    let unit = match kind {
+        _ if kind.is_angle() => return format!("{}'", ShortNumber(60.0 * value.to_degrees())),
+        PerturbationKind::Abbe => return format!("{} %", ShortNumber(100.0 * value)),
+        PerturbationKind::Curvature => " /mm",
+        PerturbationKind::Conic | PerturbationKind::Asphere | PerturbationKind::Index => "",
+        _ => " mm",
+    };
+    format!("{}{unit}", ShortNumber(value))
+}
+
+fn loosest_table(tolerances: &[Tolerance]) -> TextTable {
+    let mut table = TextTable::new(&["loosest tolerances", "surfaces", "half range"]);
+    for Tolerance { error, half_range: range, .. } in tolerances {
+        table.row([
+            error.kind.name().to_owned(),
+            surfaces(error.first, error.last),
+            half_range(error.kind, *range),
+        ]);
+    }
+    table
+}

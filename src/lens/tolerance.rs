@@ -1,0 +1,132 @@
+//! The tolerances of a lens: how large each error of making may be, and how it is distributed.
+
+use super::check::check_number;
+use super::{LensError, Perturbation, PerturbationKind};
+use serde::{Deserialize, Serialize};
+
+/// The distribution of an error between plus and minus its half range.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ErrorDistribution {
+    /// Normal with half of the half range as its standard deviation, cut at the half range.
+    #[default]
+    NormalCut,
+    /// Normal with half of the half range as its standard deviation, not cut.
+    Normal,
+    /// The same density everywhere.
+    Uniform,
+    /// A density that grows with the square of the error: parts at the ends of their tolerance.
+    Parabolic,
+    /// Always at one of the two ends.
+    Ends,
+}
+
+impl ErrorDistribution {
+    /// The standard deviation for a half range of 1.
+    pub fn deviation(self) -> f64 {
+        match self {
+            // A standard normal variable cut at ±2 has the variance 1 − 4 φ(2)/(2 Φ(2) − 1).
+            Self::NormalCut => 0.5 * 0.879_625_661_034_239_8,
+            Self::Normal => 0.5,
+            Self::Uniform => 1.0 / 3.0_f64.sqrt(),
+            Self::Parabolic => 0.6_f64.sqrt(),
+            Self::Ends => 1.0,
+        }
+    }
+}
+
+/// The tolerance of one error of making.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(from = "ToleranceJson", into = "ToleranceJson")]
+pub struct Tolerance {
+    /// The error.
+    pub error: Perturbation,
+    /// Half of the permitted range, in the unit of the error (angles in radians).
+    pub half_range: f64,
+    /// The distribution.
+    pub distribution: ErrorDistribution,
+}
+
+impl Tolerance {
+    /// The standard deviation of the error, in its unit.
+    pub fn deviation(&self) -> f64 {
+        self.half_range * self.distribution.deviation()
+    }
+}
+
+/// The tolerances of a lens, and what is adjusted after it is assembled.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ToleranceSheet {
+    /// The tolerances.
+    pub errors: Vec<Tolerance>,
+    /// The largest displacement of the image plane by which focus is adjusted, in mm; `None` for an
+    /// unlimited one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub focus_travel: Option<f64>,
+}
+
+/// The keys of a tolerance in a file: angles in degrees.
+#[derive(Clone, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct ToleranceJson {
+    kind: PerturbationKind,
+    first: usize,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    last: Option<usize>,
+    half_range: f64,
+    #[serde(default)]
+    distribution: ErrorDistribution,
+}
+
+impl From<ToleranceJson> for Tolerance {
+    fn from(keys: ToleranceJson) -> Self {
+        let ToleranceJson { kind, first, last, half_range, distribution } = keys;
+        let error = Perturbation { kind, first, last: last.unwrap_or(first) };
+        let half_range = if kind.is_angle() { half_range.to_radians() } else { half_range };
+        Self { error, half_range, distribution }
+    }
+}
+
+impl From<Tolerance> for ToleranceJson {
+    fn from(tolerance: Tolerance) -> Self {
+        let Tolerance { error: Perturbation { kind, first, last }, half_range, distribution } =
+            tolerance;
+        let half_range = if kind.is_angle() { half_range.to_degrees() } else { half_range };
+        Self { kind, first, last: (last != first).then_some(last), half_range, distribution }
+    }
+}
+
+impl ToleranceSheet {
+    /// Checks the numbers and that the surfaces exist; `surfaces` is their number.
+    pub(super) fn check(&self, surfaces: usize) -> Result<(), LensError> {
+        for Tolerance { error, half_range, .. } in &self.errors {
+            let what = format_args!("half range of the error `{}`", error.kind.name());
+            check_number(what, *half_range, *half_range >= 0.0, "zero or more")?;
+            if error.first > error.last || error.last >= surfaces {
+                let (first, last) = (error.first + 1, error.last + 1);
+                return Err(LensError::Inconsistent(format!(
+                    "the error `{}` names surfaces {first} to {last}; expected 1 to {surfaces}",
+                    error.kind.name()
+                )));
+            }
+        }
+        let travel = self.focus_travel.unwrap_or(0.0);
+        check_number("travel of the focus", travel, travel >= 0.0, "zero or more, in mm")
+    }
+
+    /// Maps the surfaces of all tolerances; those of which one is mapped to `None` are removed.
+    pub(super) fn renumber(&mut self, map: impl Fn(PerturbationKind, usize) -> Option<usize>) {
+        self.errors = self
+            .errors
+            .iter()
+            .filter_map(|tolerance| {
+                let Perturbation { kind, first, last } = tolerance.error;
+                let ends = (map(kind, first)?, map(kind, last)?);
+                let (first, last) = (ends.0.min(ends.1), ends.0.max(ends.1));
+                let error = Perturbation { first, last, ..tolerance.error };
+                Some(Tolerance { error, ..*tolerance })
+            })
+            .collect();
+    }
+}

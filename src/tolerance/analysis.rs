@@ -1,0 +1,217 @@
+//! The whole analysis: sensitivities, the quadratic form, real lenses, and how well both agree.
+
+use super::draw::draw_errors;
+use super::{
+    FocusTreatment, QuadraticForm, RealLens, Sensitivity, ToleranceError, ToleranceScene,
+    real_lenses, sensitivities, wilson_interval,
+};
+use crate::lens::{Perturbation, ToleranceSheet};
+use rayon::prelude::*;
+use serde::Serialize;
+
+/// What is computed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ToleranceRequest {
+    /// The seed of random errors.
+    pub seed: u64,
+    /// The number of real lenses.
+    pub samples: usize,
+    /// The largest rms spot radius of a good lens in mm, for the yield; `None` for no yield.
+    pub limit: Option<f64>,
+}
+
+/// The result.
+#[derive(Debug, Clone)]
+pub struct ToleranceAnalysis {
+    /// What each error does, in the order of the tolerances.
+    pub sensitivities: Vec<Sensitivity>,
+    /// The quadratic forms at the fixed image plane and refocused.
+    pub forms: [QuadraticForm; 2],
+    /// The spots at the fixed image plane and refocused.
+    pub spots: [AsBuiltSpot; 2],
+    /// The number of real lenses of which a ray does not arrive; they count as bad.
+    pub lost: usize,
+    /// The mean relative change of the mean square spot, at the fixed image plane and refocused, and
+    /// the mean share of light lost where rims clip, which the spots leave out; `None` without rays.
+    pub clipping: Option<[f64; 3]>,
+}
+
+/// The spot of lenses that are made, as an rms radius over all fields.
+#[derive(Debug, Clone, Serialize)]
+pub struct AsBuiltSpot {
+    /// The treatment of the focus.
+    pub focus: FocusTreatment,
+    /// The rms of the lens as designed, in mm.
+    pub nominal_rms: f64,
+    /// The root of the expected mean square by the form, in mm.
+    pub form_root_mean_square: f64,
+    /// The mean of the rms by the form, in mm.
+    pub form_mean_rms: f64,
+    /// The mean of the rms in mm with its standard error: the form, corrected by the real lenses.
+    pub mean_rms: [f64; 2],
+    /// The mean of the rms of the real lenses minus that of the form on the same errors, in mm, with
+    /// its standard error.
+    pub difference: [f64; 2],
+    /// True if that difference is within twice its error, or below half a per cent.
+    pub form_agrees: bool,
+    /// The rms that these shares of all lenses do not exceed.
+    pub quantiles: Vec<Quantile>,
+    /// The share of good lenses, if a limit was given.
+    pub good: Option<YieldEstimate>,
+}
+
+/// The rms that a share of all lenses does not exceed.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Quantile {
+    /// The share of the lenses.
+    pub share: f64,
+    /// By the form, in mm.
+    pub form: f64,
+    /// The same corrected by the real lenses, in mm.
+    pub corrected: f64,
+}
+
+/// The share of good lenses.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct YieldEstimate {
+    /// By the form.
+    pub form: f64,
+    /// Of the real lenses.
+    pub real: f64,
+    /// The interval of the real lenses with 95 % confidence.
+    pub interval: [f64; 2],
+    /// The form, corrected by the real lenses on the same errors.
+    pub corrected: f64,
+}
+
+/// The shares of the quantiles.
+const SHARES: [f64; 4] = [0.5, 0.8, 0.9, 0.98];
+/// The number of lenses by the form.
+const FORM_SAMPLES: u64 = 20_000;
+/// The number of real lenses that are traced with rims too.
+const WITH_RIMS: usize = 50;
+/// A difference between form and real lenses below this share is no matter.
+const NEGLIGIBLE: f64 = 0.005;
+
+/// Analyses the tolerances of a lens.
+///
+/// # Errors
+/// An error of making that is not possible, or a lens as designed whose rays do not arrive.
+pub fn analyze(
+    scene: &ToleranceScene,
+    sheet: &ToleranceSheet,
+    request: ToleranceRequest,
+) -> Result<ToleranceAnalysis, ToleranceError> {
+    let errors: Vec<Perturbation> = sheet.errors.iter().map(|t| t.error).collect();
+    let found = sensitivities(&scene.lens, &scene.beam, scene.options, &errors)?;
+    if found.is_empty() {
+        return Err(ToleranceError::Other("no tolerances; expected at least one".to_owned()));
+    }
+    let treatments = [FocusTreatment::Fixed, FocusTreatment::Refocused];
+    let forms =
+        treatments.map(|focus| QuadraticForm::new(scene, &found, focus, sheet.focus_travel));
+    let real = real_lenses(scene, sheet, request.seed, request.samples, WITH_RIMS)?;
+    let spot = |i: usize| as_built(treatments[i], &forms[i], sheet, &real, request);
+    let spots = [spot(0), spot(1)];
+    let lost = real.iter().filter(|lens| lens.mean_square.is_none()).count();
+    let clipping = clipping(&real);
+    Ok(ToleranceAnalysis { sensitivities: found, forms, spots, lost, clipping })
+}
+
+/// The mean changes where rims clip.
+fn clipping(real: &[RealLens]) -> Option<[f64; 3]> {
+    let both = real.iter().filter_map(|lens| lens.mean_square.zip(lens.clipped));
+    let changes: Vec<[f64; 3]> = both
+        .map(|(open, (rims, lost))| [rims[0] / open[0] - 1.0, rims[1] / open[1] - 1.0, lost])
+        .collect();
+    let mean = |i: usize| changes.iter().map(|c| c[i]).sum::<f64>() / changes.len() as f64;
+    (!changes.is_empty()).then(|| [0, 1, 2].map(mean))
+}
+
+fn as_built(
+    focus: FocusTreatment,
+    form: &QuadraticForm,
+    sheet: &ToleranceSheet,
+    real: &[RealLens],
+    request: ToleranceRequest,
+) -> AsBuiltSpot {
+    let mut many = form_sample(form, sheet, request.seed);
+    many.sort_by(f64::total_cmp);
+    let form_mean_rms = mean(&many);
+    let which = usize::from(focus == FocusTreatment::Refocused);
+    // Real lenses and the form on the same errors.
+    let pairs: Vec<[f64; 2]> = real
+        .iter()
+        .filter_map(|lens| Some([lens.mean_square?[which].sqrt(), form.at(&lens.errors).sqrt()]))
+        .collect();
+    let differences: Vec<f64> = pairs.iter().map(|[real, form]| real - form).collect();
+    let difference = mean_with_error(&differences);
+    let agrees = difference[0].abs() <= (2.0 * difference[1]).max(NEGLIGIBLE * form_mean_rms);
+    let spread = mean_with_error(&many)[1];
+    let corrected = form_mean_rms + difference[0];
+    AsBuiltSpot {
+        focus,
+        nominal_rms: form.nominal.sqrt(),
+        form_root_mean_square: form.expectation(&sheet.errors).max(0.0).sqrt(),
+        form_mean_rms,
+        mean_rms: [corrected, difference[1].hypot(spread)],
+        difference,
+        form_agrees: agrees,
+        quantiles: SHARES.map(|share| quantile(share, &many, &pairs)).to_vec(),
+        good: request.limit.map(|limit| good_share(limit, &many, &pairs, real.len())),
+    }
+}
+
+/// The rms of many lenses by the form, in mm.
+fn form_sample(form: &QuadraticForm, sheet: &ToleranceSheet, seed: u64) -> Vec<f64> {
+    let reduced = form.reduced(&sheet.errors);
+    // Other errors than those of the real lenses.
+    let other = seed ^ 0x5DEE_CE66_D1CE_CAFE;
+    let rms = |i: u64| reduced.at(&draw_errors(&sheet.errors, other, i)).sqrt();
+    (0..FORM_SAMPLES).into_par_iter().map(rms).collect()
+}
+
+fn quantile(share: f64, many: &[f64], pairs: &[[f64; 2]]) -> Quantile {
+    let form = at_share(many, share);
+    let of = |i: usize| {
+        let mut column: Vec<f64> = pairs.iter().map(|pair| pair[i]).collect();
+        column.sort_by(f64::total_cmp);
+        at_share(&column, share)
+    };
+    let change = if pairs.is_empty() { 0.0 } else { of(0) - of(1) };
+    Quantile { share, form, corrected: form + change }
+}
+
+/// The value that a share of sorted values does not exceed, between two of them linearly.
+fn at_share(sorted: &[f64], share: f64) -> f64 {
+    let position = share * (sorted.len().max(1) - 1) as f64;
+    let low = position.floor() as usize;
+    let at = |i: usize| sorted.get(i).copied().unwrap_or(f64::NAN);
+    let high = (low + 1).min(sorted.len().max(1) - 1);
+    at(low) + (position - low as f64) * (at(high) - at(low))
+}
+
+fn good_share(limit: f64, many: &[f64], pairs: &[[f64; 2]], count: usize) -> YieldEstimate {
+    let below = |values: &mut dyn Iterator<Item = f64>| values.filter(|rms| *rms <= limit).count();
+    let form = below(&mut many.iter().copied()) as f64 / many.len().max(1) as f64;
+    let good = below(&mut pairs.iter().map(|pair| pair[0]));
+    let by_form = below(&mut pairs.iter().map(|pair| pair[1]));
+    let (real, same) =
+        (good as f64 / count.max(1) as f64, by_form as f64 / pairs.len().max(1) as f64);
+    let corrected = if pairs.is_empty() { form } else { (form + real - same).clamp(0.0, 1.0) };
+    YieldEstimate { form, real, interval: wilson_interval(good, count), corrected }
+}
+
+fn mean(values: &[f64]) -> f64 {
+    values.iter().sum::<f64>() / values.len().max(1) as f64
+}
+
+/// The mean of values and its standard error.
+fn mean_with_error(values: &[f64]) -> [f64; 2] {
+    let (count, middle) = (values.len() as f64, mean(values));
+    if values.len() < 2 {
+        return [middle, 0.0];
+    }
+    let squares: f64 = values.iter().map(|value| (value - middle).powi(2)).sum();
+    [middle, (squares / (count * (count - 1.0))).sqrt()]
+}

@@ -1,0 +1,140 @@
+//! Classes of care in making, as tolerances to begin with.
+//!
+//! The numbers are those of the charts of optical shops: commercial and precision quality, the limit
+//! of a good shop (Optimax, "Manufacturing Tolerance Chart"), and moulded plastic elements of phone
+//! cameras. Fringes are half wavelengths at 632.8 nm.
+
+use super::NominalLens;
+use crate::lens::{
+    ErrorDistribution, Lens, Perturbation, PerturbationKind, Tolerance, ToleranceSheet,
+};
+
+/// The wavelength of the test plates, in mm.
+const TEST_WAVELENGTH: f64 = 0.000_632_8;
+
+/// A class of care in making.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum ToleranceGrade {
+    /// What every shop delivers.
+    Commercial,
+    /// What a good shop delivers without a surcharge.
+    #[default]
+    Precision,
+    /// The limit of a good shop.
+    ShopLimit,
+    /// Moulded plastic elements of a few millimetres.
+    MouldedPlastic,
+}
+
+/// The half ranges of a class.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct GradeNumbers {
+    /// Power, in fringes over the semi-diameter.
+    fringes: f64,
+    /// Irregularity, in fringes.
+    irregularity: f64,
+    /// Thicknesses of glass and air, in mm.
+    thickness: f64,
+    /// Index.
+    index: f64,
+    /// Relative error of the Abbe number.
+    abbe: f64,
+    /// Tilt of a surface, in minutes of arc.
+    surface_tilt: f64,
+    /// Decentre of an element, in mm.
+    decenter: f64,
+    /// Tilt of an element, in minutes of arc.
+    tilt: f64,
+}
+
+impl ToleranceGrade {
+    fn numbers(self) -> GradeNumbers {
+        let of = |[fringes, irregularity, thickness, index, abbe, surface_tilt, decenter, tilt]: [f64; 8]| {
+            GradeNumbers { fringes, irregularity, thickness, index, abbe, surface_tilt, decenter, tilt }
+        };
+        match self {
+            Self::Commercial => of([5.0, 1.0, 0.1, 1e-3, 0.008, 3.0, 0.1, 3.0]),
+            Self::Precision => of([3.0, 0.5, 0.05, 5e-4, 0.005, 1.0, 0.02, 1.0]),
+            Self::ShopLimit => of([1.0, 0.05, 0.02, 2e-4, 0.002, 0.25, 0.01, 0.25]),
+            Self::MouldedPlastic => of([2.0, 1.0, 0.005, 5e-4, 0.005, 1.0, 0.003, 2.0]),
+        }
+    }
+}
+
+/// The tolerances of a class for every surface, gap and element of a lens.
+pub fn graded_sheet(lens: &Lens, nominal: &NominalLens, grade: ToleranceGrade) -> ToleranceSheet {
+    let mut sheet = GradedSheet { nominal, numbers: grade.numbers(), errors: Vec::new() };
+    for surface in 0..lens.surfaces.len() {
+        sheet.add_surface(surface);
+    }
+    let mut first = 0;
+    while first < lens.surfaces.len() {
+        match lens.element_around(first) {
+            Some((from, to)) if from == first => {
+                sheet.add_element(from, to);
+                first = to + 1;
+            }
+            _ => first += 1,
+        }
+    }
+    ToleranceSheet { errors: sheet.errors, focus_travel: None }
+}
+
+/// Tolerances that are being collected.
+struct GradedSheet<'a> {
+    nominal: &'a NominalLens,
+    numbers: GradeNumbers,
+    errors: Vec<Tolerance>,
+}
+
+impl GradedSheet<'_> {
+    fn add(&mut self, kind: PerturbationKind, (first, last): (usize, usize), half_range: f64) {
+        let error = Perturbation { kind, first, last };
+        let distribution = ErrorDistribution::default();
+        self.errors.push(Tolerance { error, half_range, distribution });
+    }
+
+    /// The tolerances of a surface and of the gap behind it.
+    fn add_surface(&mut self, i: usize) {
+        let system = &self.nominal.systems[self.nominal.primary];
+        let (numbers, own) = (self.numbers, &system.surfaces[i]);
+        let before = system.index_before(i);
+        let touches_grin = own.grin.is_some() || i > 0 && system.surfaces[i - 1].grin.is_some();
+        let refracts = own.mirror || own.index != before;
+        let radius = self.nominal.semi_diameters[i];
+        let (alone, glass) = ((i, i), own.index != 1.0 && !own.mirror);
+        let last = i + 2 >= system.surfaces.len();
+        if refracts && radius > 0.0 {
+            let curvature = numbers.fringes * TEST_WAVELENGTH / (radius * radius);
+            self.add(PerturbationKind::Curvature, alone, curvature);
+            if !touches_grin {
+                let depth = numbers.irregularity * 0.5 * TEST_WAVELENGTH;
+                self.add(PerturbationKind::Irregularity, alone, depth);
+                let angle = (numbers.surface_tilt / 60.0).to_radians();
+                self.add(PerturbationKind::SurfaceTiltX, alone, angle);
+                self.add(PerturbationKind::SurfaceTiltY, alone, angle);
+            }
+        }
+        if !last {
+            self.add(PerturbationKind::Thickness, alone, numbers.thickness);
+        }
+        if glass {
+            self.add(PerturbationKind::Index, alone, numbers.index);
+            self.add(PerturbationKind::Abbe, alone, numbers.abbe);
+        }
+    }
+
+    fn add_element(&mut self, first: usize, last: usize) {
+        let system = &self.nominal.systems[self.nominal.primary];
+        let mut gaps = first.saturating_sub(1)..=last;
+        if gaps.any(|gap| system.surfaces[gap].grin.is_some()) {
+            return;
+        }
+        let (numbers, body) = (self.numbers, (first, last));
+        let angle = (numbers.tilt / 60.0).to_radians();
+        self.add(PerturbationKind::ElementDecenterX, body, numbers.decenter);
+        self.add(PerturbationKind::ElementDecenterY, body, numbers.decenter);
+        self.add(PerturbationKind::ElementTiltX, body, angle);
+        self.add(PerturbationKind::ElementTiltY, body, angle);
+    }
+}

@@ -1,0 +1,130 @@
+//! Real lenses: random errors of making, and rays traced through each lens.
+
+use super::draw::draw_errors;
+use super::{
+    Beam, Merits, SpotMoments, ToleranceError, ToleranceScene, best_focus, merits, perturb,
+};
+use crate::lens::{Perturbation, System, ToleranceSheet};
+use crate::trace::Tracer;
+use rayon::prelude::*;
+
+/// A lens with random errors.
+#[derive(Debug, Clone)]
+pub struct RealLens {
+    /// The errors, in their units.
+    pub errors: Vec<f64>,
+    /// The mean square spot radius in mm² at the image plane and at the best focus within its travel;
+    /// `None` if a ray does not arrive.
+    pub mean_square: Option<[f64; 2]>,
+    /// The same with the rims that clip, of the rays that they leave, and the share of the light that
+    /// they take; `None` if it was not asked for or no light is left.
+    pub clipped: Option<([f64; 2], f64)>,
+}
+
+/// Traces lenses with random errors, in parallel; lens `i` depends on the seed and on `i` alone. The
+/// first `with_rims` lenses are traced once more with rims that clip.
+///
+/// # Errors
+/// An error of making that is not possible.
+pub fn real_lenses(
+    scene: &ToleranceScene,
+    sheet: &ToleranceSheet,
+    seed: u64,
+    count: usize,
+    with_rims: usize,
+) -> Result<Vec<RealLens>, ToleranceError> {
+    let lens = |i: usize| real_lens(scene, sheet, seed, (i, i < with_rims));
+    (0..count).into_par_iter().map(lens).collect()
+}
+
+fn real_lens(
+    scene: &ToleranceScene,
+    sheet: &ToleranceSheet,
+    seed: u64,
+    (number, with_rims): (usize, bool),
+) -> Result<RealLens, ToleranceError> {
+    let errors = draw_errors(&sheet.errors, seed, number as u64);
+    let set: Vec<(Perturbation, f64)> =
+        sheet.errors.iter().zip(&errors).map(|(t, value)| (t.error, *value)).collect();
+    let systems = perturb(&scene.lens, &set)?;
+    let focused = |mean: &SpotMoments<f64>| {
+        let travel = sheet.focus_travel.unwrap_or(f64::INFINITY);
+        [mean.a, mean.at(best_focus(mean).clamp(-travel, travel))]
+    };
+    let judged = merits(&systems, &scene.beam, scene.options);
+    let finite = |m: &Merits<f64>| m.mean.a.is_finite() && m.focus.is_finite();
+    let mean_square = judged.ok().filter(finite).map(|merits| focused(&merits.mean));
+    let clipped = if with_rims { clipped_spot(scene, systems) } else { None };
+    let clipped = clipped.map(|(mean, lost)| (focused(&mean), lost));
+    Ok(RealLens { errors, mean_square, clipped })
+}
+
+/// The mean spot of the rays that the rims of a lens leave, and the share of the light that they take;
+/// `None` if a field is dark.
+fn clipped_spot(
+    scene: &ToleranceScene,
+    mut systems: Vec<System<f64>>,
+) -> Option<(SpotMoments<f64>, f64)> {
+    for system in &mut systems {
+        for (surface, (rim, obstruction)) in system.surfaces.iter_mut().zip(&scene.lens.rims) {
+            (surface.semi_diameter, surface.obstruction) = (*rim, *obstruction);
+        }
+    }
+    let tracers: Result<Vec<_>, _> = systems.iter().map(Tracer::new).collect();
+    let (beam, lost) = transmitted(&scene.beam, &tracers.ok()?)?;
+    let judged = merits(&systems, &beam, scene.options).ok()?;
+    Some((judged.mean, lost))
+}
+
+/// The rays of a beam that arrive, and the share of the light of those that do not; `None` if a field
+/// is dark.
+fn transmitted(beam: &Beam, tracers: &[Tracer<f64>]) -> Option<(Beam, f64)> {
+    let (mut left, mut lost) = (beam.clone(), 0.0);
+    for field in &mut left.fields {
+        for colour in &mut field.colours {
+            let tracer = &tracers[colour.wavelength];
+            let mut arrived = super::ColourRays::new(colour.wavelength);
+            for (i, ray) in colour.rays.iter().enumerate() {
+                if tracer.trace(*ray).fate.is_imaged() {
+                    arrived.push(*ray, colour.weights[i], colour.pupil[i], colour.paths[i]);
+                }
+            }
+            *colour = arrived;
+        }
+        let total: f64 = field.colours.iter().flat_map(|colour| &colour.weights).sum();
+        if !(total > 0.0) {
+            return None;
+        }
+        lost += field.weight * (1.0 - total);
+        let weights = field.colours.iter_mut().flat_map(|colour| &mut colour.weights);
+        weights.for_each(|weight| *weight /= total);
+    }
+    Some((left, lost.max(0.0)))
+}
+
+/// The interval in which the share of good lenses lies with 95 % confidence, from `good` of `count`
+/// lenses (Wilson, Journal of the American Statistical Association 22, 1927).
+pub fn wilson_interval(good: usize, count: usize) -> [f64; 2] {
+    const Z: f64 = 1.959_963_984_540_054;
+    if count == 0 {
+        return [0.0, 1.0];
+    }
+    let (k, n, z2) = (good as f64, count as f64, Z * Z);
+    let center = (k + 0.5 * z2) / (n + z2);
+    let half = Z * (k * (n - k) / n + 0.25 * z2).sqrt() / (n + z2);
+    [(center - half).max(0.0), (center + half).min(1.0)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_interval_without_failures_does_not_reach_certainty() {
+        let [low, high] = wilson_interval(100, 100);
+        assert!(high > 1.0 - 1e-12 && (low - 0.963).abs() < 1e-3, "{low} {high}");
+        let [low, high] = wilson_interval(450, 500);
+        assert!((low - 0.8706).abs() < 1e-4 && (high - 0.9234).abs() < 1e-4, "{low} {high}");
+        assert_eq!(wilson_interval(0, 0), [0.0, 1.0]);
+    }
+}

@@ -1,0 +1,191 @@
+//! A lens of the prescription with its beam, ready for errors of making.
+//!
+//! The pupils are found for the lens as designed, with its rims; their rays are then held. A lens that
+//! is symmetric about its axis is judged on both sides of it: its errors are not symmetric.
+
+use super::{Beam, ColourRays, FieldBeam, MeritOptions, NominalLens, ToleranceError};
+use crate::lens::{Lens, System};
+use crate::math::Vec3;
+use crate::pupil::{Accuracy, Launch, Nodes, RayModel, Region, converge};
+use crate::trace::{ImagePoints, Ray, Tracer};
+
+/// A lens as designed, the rays by which it is judged, and their accuracy.
+#[derive(Debug, Clone)]
+pub struct ToleranceScene {
+    /// The lens.
+    pub lens: NominalLens,
+    /// The rays.
+    pub beam: Beam,
+    /// What is computed besides spots.
+    pub options: MeritOptions,
+    /// The largest relative error of the radius of a spot by the quadrature over its pupil.
+    pub sampling_error: f64,
+}
+
+impl ToleranceScene {
+    /// A lens at a zoom position, with pupils sampled so that the radius of each spot is accurate to a
+    /// relative tolerance.
+    ///
+    /// # Errors
+    /// A lens through which no light can be traced.
+    pub fn new(lens: &Lens, zoom: usize, tolerance: f64) -> Result<Self, ToleranceError> {
+        let model = RayModel::from_lens(lens, zoom).map_err(|e| other(&e))?;
+        let mut sampler = Sampler { model: &model, tolerance, worst: 0.0 };
+        let mut fields = Vec::new();
+        for (number, field) in model.fields.iter().enumerate() {
+            if field.weight > 0.0 {
+                fields.push(sampler.field(number)?);
+            }
+        }
+        let worst = sampler.worst;
+        if has_one_side(&model) {
+            fields = fields.into_iter().flat_map(|field| both_sides(&field)).collect();
+        }
+        let total: f64 = fields.iter().map(|field| field.weight).sum();
+        fields.iter_mut().for_each(|field| field.weight /= total);
+        let beam = Beam { fields };
+        let lens = NominalLens::new(lens, &model, &beam)?;
+        let options = MeritOptions { primary: model.primary, wavefront: None };
+        Ok(Self { lens, beam, options, sampling_error: worst })
+    }
+}
+
+fn other(error: &dyn std::fmt::Display) -> ToleranceError {
+    ToleranceError::Other(error.to_string())
+}
+
+/// True if all fields lie on one side of the axis of a centred lens.
+fn has_one_side(model: &RayModel) -> bool {
+    let centred = !model.channels[model.primary].system.has_poses();
+    let fields = || model.fields.iter().filter(|field| field.weight > 0.0);
+    let upper = fields().all(|field| field.x == 0.0 && field.y >= 0.0);
+    let lower = fields().all(|field| field.x == 0.0 && field.y <= 0.0);
+    centred && (upper || lower)
+}
+
+/// A field off the axis and the one opposite to it, with half of the weight each.
+fn both_sides(field: &FieldBeam) -> Vec<FieldBeam> {
+    let Ray { point, direction } = field.chief.0;
+    if point.x == 0.0 && point.y == 0.0 && direction.x == 0.0 && direction.y == 0.0 {
+        return vec![field.clone()];
+    }
+    let half = FieldBeam { weight: 0.5 * field.weight, ..field.clone() };
+    let mut opposite = half.clone();
+    opposite.chief.0 = half_turn(opposite.chief.0);
+    for colour in &mut opposite.colours {
+        colour.rays.iter_mut().for_each(|ray| *ray = half_turn(*ray));
+        colour.pupil.iter_mut().for_each(|[x, y]| (*x, *y) = (-*x, -*y));
+    }
+    vec![half, opposite]
+}
+
+/// A ray that is turned by 180° about the axis.
+fn half_turn(ray: Ray<f64>) -> Ray<f64> {
+    let turn = |v: Vec3<f64>| Vec3::new(-v.x, -v.y, v.z);
+    Ray { point: turn(ray.point), direction: turn(ray.direction) }
+}
+
+/// A ray that is reflected at the plane x = 0.
+fn mirror_image(ray: Ray<f64>) -> Ray<f64> {
+    let flip = |v: Vec3<f64>| Vec3::new(-v.x, v.y, v.z);
+    Ray { point: flip(ray.point), direction: flip(ray.direction) }
+}
+
+/// Finds the rays of fields.
+struct Sampler<'a> {
+    model: &'a RayModel,
+    tolerance: f64,
+    worst: f64,
+}
+
+impl Sampler<'_> {
+    fn field(&mut self, number: usize) -> Result<FieldBeam, ToleranceError> {
+        let field = self.model.fields[number];
+        let (mut colours, mut shares, mut chief) = (Vec::new(), 0.0, None);
+        for (wavelength, channel) in self.model.channels.iter().enumerate() {
+            let launch = self.model.launch(field, wavelength).map_err(|e| other(&e))?;
+            if wavelength == self.model.primary {
+                chief = launch.ray([0.0, 0.0]).map(|ray| (ray, launch.optical_path_to(ray)));
+            }
+            if channel.weight > 0.0
+                && let Some(rays) = self.colour(launch, channel.weight)
+            {
+                shares += channel.weight;
+                colours.push(rays);
+            }
+        }
+        let dark =
+            || ToleranceError::Other(format!("no light of field {} gets through", number + 1));
+        let chief = chief.filter(|_| shares > 0.0).ok_or_else(dark)?;
+        for colour in &mut colours {
+            colour.weights.iter_mut().for_each(|w| *w /= shares);
+        }
+        Ok(FieldBeam { weight: field.weight, colours, chief })
+    }
+
+    /// The rays of a pupil, with this weight in sum; `None` if no light gets through.
+    fn colour(&mut self, launch: Launch<'_>, share: f64) -> Option<ColourRays> {
+        let region = Region::new(launch);
+        let accuracy = Accuracy { tolerance: self.tolerance, ..Accuracy::default() };
+        let mut orders = 0_usize;
+        let radius = |nodes: &Nodes| {
+            orders += 1;
+            let moments = region.moments(nodes);
+            (moments.area > 0.0).then(|| [moments.rms_radius()])
+        };
+        let found = converge(&region, accuracy, radius, |values| *values)?;
+        self.worst = self.worst.max(found.errors[0] / found.values[0].max(f64::MIN_POSITIVE));
+        let nodes = region.nodes(orders.saturating_sub(1));
+        let traced = region.trace::<ImagePoints<f64>>(&nodes);
+        let total: f64 = traced.arrivals().map(|(_, w)| w).sum();
+        let mut colour = ColourRays::new(region.launch.wavelength);
+        let launched = nodes.points.iter().filter_map(|p| Some((*p, region.launch.ray(*p)?)));
+        let launched: Vec<_> = launched.collect();
+        for (i, weight) in traced.arrivals() {
+            let (pupil, ray) = launched[i];
+            let (weight, path) = (share * weight / total, region.launch.optical_path_to(ray));
+            if nodes.mirrored {
+                colour.push(ray, 0.5 * weight, pupil, path);
+                colour.push(mirror_image(ray), 0.5 * weight, [-pupil[0], pupil[1]], path);
+            } else {
+                colour.push(ray, weight, pupil, path);
+            }
+        }
+        (total > 0.0).then_some(colour)
+    }
+}
+
+impl NominalLens {
+    /// A lens at its wavelengths, with the semi-diameters of the prescription or else those that the
+    /// rays need.
+    fn new(lens: &Lens, model: &RayModel, beam: &Beam) -> Result<Self, ToleranceError> {
+        let whole: Vec<System<f64>> = model.channels.iter().map(|c| c.system.clone()).collect();
+        let mut systems = whole.clone();
+        for surface in systems.iter_mut().flat_map(|system| &mut system.surfaces) {
+            surface.remove_apertures();
+        }
+        let mut heights = vec![0.0_f64; systems[0].surfaces.len()];
+        let tracers: Result<Vec<_>, _> = systems.iter().map(Tracer::new).collect();
+        let tracers = tracers?;
+        for colour in beam.fields.iter().flat_map(|field| &field.colours) {
+            for ray in &colour.rays {
+                tracers[colour.wavelength].visit(*ray, |i, p| {
+                    heights[i] = heights[i].max(p.x.hypot(p.y));
+                });
+            }
+        }
+        let written = lens.surfaces.iter().zip(heights);
+        let semi_diameters = written.map(|(row, height)| row.semi_diameter.unwrap_or(height));
+        Ok(Self {
+            systems,
+            wavelengths: model.channels.iter().map(|c| c.um).collect(),
+            primary: model.primary,
+            semi_diameters: semi_diameters.collect(),
+            rims: whole[model.primary]
+                .surfaces
+                .iter()
+                .map(|surface| (surface.semi_diameter, surface.obstruction))
+                .collect(),
+        })
+    }
+}

@@ -1,0 +1,142 @@
+//! Lenses that are made: expectations, quantiles, yields and gradients.
+
+use super::reference::{ToleranceCase, assert_close, kind, lenses, tolerances};
+use crate::reference::{number, numbers};
+use aplanat::lens::{ErrorDistribution, Perturbation, ToleranceSheet};
+use aplanat::tolerance::{
+    ToleranceRequest, ToleranceScene, analyze, as_built_gradient, loosest_tolerances,
+};
+
+/// The lens with the rays of the Monte Carlo of the file, or fewer.
+fn scene(lens: &ToleranceCase, rule: (usize, usize)) -> ToleranceScene {
+    ToleranceScene {
+        lens: lens.nominal(),
+        beam: lens.beam(rule.0, rule.1),
+        options: aplanat::tolerance::MeritOptions { wavefront: None, ..lens.options() },
+        sampling_error: 0.0,
+    }
+}
+
+fn sheet(lens: &ToleranceCase, distribution: ErrorDistribution) -> ToleranceSheet {
+    ToleranceSheet { errors: tolerances(lens, distribution), focus_travel: None }
+}
+
+/// The triplet with normal errors: expectation, mean, quantiles and yields by the form and by real
+/// lenses, against 32,000 lenses of the file.
+#[test]
+fn the_spot_of_triplets_that_are_made_is_that_of_the_reference() {
+    let lens = &lenses()[0];
+    let scene = scene(lens, (3, 6));
+    let sheet = sheet(lens, ErrorDistribution::Normal);
+    let request = ToleranceRequest { seed: 3, samples: 60, limit: Some(0.02) };
+    let found = analyze(&scene, &sheet, request).unwrap();
+    let data = &lens.data["as_built"];
+    for (i, (name, key)) in
+        [("fixed_focus", "mean_square"), ("focused", "mean_square_focused")].iter().enumerate()
+    {
+        let exact = number(&data["second_order_normal"][key]).sqrt();
+        let spot = &found.spots[i];
+        assert_close(spot.form_root_mean_square, exact, 5e-3 * exact, name);
+        let real = &data["normal"][name];
+        let expected = numbers(&real["rms"]);
+        assert_close(spot.mean_rms[0], expected[0], 0.015 * expected[0], name);
+        for quantile in &spot.quantiles {
+            let percent = quantile.share.to_string();
+            let value = &real["rms_quantiles"][&percent];
+            let value = numbers(value)[0];
+            assert_close(quantile.form, value, 0.05 * value, &format!("{name} {percent}"));
+        }
+        let good = spot.good.unwrap();
+        assert!(good.interval[0] <= good.real && good.real <= good.interval[1]);
+    }
+    assert_eq!(found.lost, 0);
+}
+
+/// The same seed gives the same lenses, another one others.
+#[test]
+fn the_same_seed_gives_the_same_result() {
+    let lens = &lenses()[0];
+    let (scene, mut sheet) = (scene(lens, (2, 4)), sheet(lens, ErrorDistribution::Uniform));
+    sheet.errors.truncate(12);
+    let run = |seed: u64| {
+        let request = ToleranceRequest { seed, samples: 12, limit: None };
+        analyze(&scene, &sheet, request).unwrap().spots[1].mean_rms[0]
+    };
+    let alone = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+    assert_eq!(run(5).to_bits(), alone.install(|| run(5)).to_bits());
+    assert_ne!(run(5).to_bits(), run(6).to_bits());
+}
+
+/// The loosest tolerances for an expected spot reach it, and cost the same each.
+#[test]
+fn the_loosest_tolerances_reach_the_spot_that_was_asked_for() {
+    let lens = &lenses()[0];
+    let scene = scene(lens, (3, 6));
+    let sheet = sheet(lens, ErrorDistribution::NormalCut);
+    let request = ToleranceRequest { seed: 3, samples: 0, limit: None };
+    let form = &analyze(&scene, &sheet, request).unwrap().forms[1];
+    let target = 0.02_f64.powi(2);
+    let loosest = loosest_tolerances(form, &sheet.errors, target).unwrap();
+    assert_close(form.expectation(&loosest), target, 1e-12 * target, "expectation");
+    let refused = loosest_tolerances(form, &sheet.errors, 0.25 * form.nominal);
+    assert!(refused.unwrap_err().to_string().contains("expected more than"));
+}
+
+/// The gradient of the expectation, by fewer errors, against the difference of two designs.
+#[test]
+fn the_gradient_of_the_as_built_spot_is_that_of_differences() {
+    let lens = &lenses()[0];
+    let (nominal, beam) = (lens.nominal(), lens.beam(2, 4));
+    let all = tolerances(lens, ErrorDistribution::Normal);
+    let some: Vec<_> = all.into_iter().step_by(9).collect();
+    let design = [
+        Perturbation::of_surface(aplanat::lens::PerturbationKind::Curvature, 2),
+        Perturbation::of_surface(aplanat::lens::PerturbationKind::Thickness, 2),
+    ];
+    let found = as_built_gradient(&nominal, &beam, lens.options(), &some, &design).unwrap();
+    for (i, step) in [1e-7, 1e-4].into_iter().enumerate() {
+        let at = |value: f64| {
+            let mut changed = nominal.clone();
+            changed.systems = aplanat::tolerance::perturb(&nominal, &[(design[i], value)]).unwrap();
+            as_built_gradient(&changed, &beam, lens.options(), &some, &design[..1])
+                .unwrap()
+                .expected
+        };
+        let (above, below) = (at(step), at(-step));
+        for focus in 0..2 {
+            let expected = (above[focus] - below[focus]) / (2.0 * step);
+            let by = found.gradient[i][focus];
+            assert_close(by, expected, 1e-5 * expected.abs().max(1e-6), "gradient");
+        }
+    }
+}
+
+/// The whole gradient of the file to 1e-8 of its largest part; takes minutes without optimization.
+#[test]
+#[ignore = "takes minutes"]
+fn the_gradient_of_the_as_built_spot_is_exact() {
+    let lens = &lenses()[0];
+    let data = &lens.data["as_built_gradient"];
+    let (names, expected): (Vec<_>, Vec<_>) = data["d"].as_object().unwrap().iter().unzip();
+    let design: Vec<Perturbation> = names
+        .iter()
+        .map(|name| {
+            let (what, surface) = name.split_once(' ').unwrap();
+            Perturbation::of_surface(kind(&what.into()), surface.parse().unwrap())
+        })
+        .collect();
+    let all = tolerances(lens, ErrorDistribution::Normal);
+    let beam = lens.beam(8, 18);
+    let found = as_built_gradient(&lens.nominal(), &beam, lens.options(), &all, &design).unwrap();
+    let value = numbers(&data["value"]);
+    for focus in 0..2 {
+        let excess = found.expected[focus] - found.nominal[focus];
+        assert_close(excess, value[focus], 1e-9 * value[focus], "excess");
+        let column: Vec<f64> =
+            expected.iter().map(|d| numbers(d)[focus] + numbers(d)[focus + 2]).collect();
+        let largest = column.iter().fold(0.0, |m: f64, v| m.max(v.abs()));
+        for (i, by) in found.gradient.iter().enumerate() {
+            assert_close(by[focus], column[i], 1e-8 * largest, names[i]);
+        }
+    }
+}

@@ -1,0 +1,150 @@
+//! Errors of making that end rays, do nothing, or ask too much of a quadratic form.
+
+use super::reference::{lenses, tolerances};
+use crate::cli::{done, done_json, refused};
+use aplanat::lens::{ErrorDistribution, Perturbation, PerturbationKind, ToleranceSheet};
+use aplanat::tolerance::{
+    MeritOptions, ToleranceError, ToleranceRequest, ToleranceScene, analyze, merits, perturb,
+};
+
+fn scene(number: usize, rule: (usize, usize)) -> ToleranceScene {
+    let lens = &lenses()[number];
+    ToleranceScene {
+        lens: lens.nominal(),
+        beam: lens.beam(rule.0, rule.1),
+        options: MeritOptions { wavefront: None, ..lens.options() },
+        sampling_error: 0.0,
+    }
+}
+
+/// A tilt far beyond the critical angle, and an element that is pushed out of the beam.
+#[test]
+fn an_error_that_ends_rays_is_reported_with_their_fate() {
+    let scene = scene(0, (2, 6));
+    for (kind, value) in
+        [(PerturbationKind::SurfaceTiltX, 1.2), (PerturbationKind::ElementDecenterY, 60.0)]
+    {
+        let error = match kind {
+            PerturbationKind::SurfaceTiltX => Perturbation::of_surface(kind, 1),
+            _ => Perturbation { kind, first: 2, last: 3 },
+        };
+        let systems = perturb(&scene.lens, &[(error, value)]).unwrap();
+        let judged = merits(&systems, &scene.beam, scene.options);
+        assert!(matches!(judged, Err(ToleranceError::RayLost { .. })), "{kind:?}");
+    }
+}
+
+/// Lenses that lose rays are counted as bad and leave finite numbers.
+#[test]
+fn lenses_that_lose_rays_count_as_bad() {
+    let scene = scene(0, (2, 4));
+    let mut errors = tolerances(&lenses()[0], ErrorDistribution::Ends);
+    errors.retain(|t| t.error.kind == PerturbationKind::ElementDecenterY);
+    errors.iter_mut().for_each(|t| t.half_range = 25.0);
+    let sheet = ToleranceSheet { errors, focus_travel: None };
+    let request = ToleranceRequest { seed: 1, samples: 8, limit: Some(1.0) };
+    let found = analyze(&scene, &sheet, request).unwrap();
+    assert!(found.lost > 0);
+    assert!(found.spots.iter().all(|spot| spot.mean_rms[0].is_finite()));
+}
+
+/// A gap that becomes negative moves surfaces through each other: rays follow the order of the list.
+#[test]
+fn an_element_that_overlaps_its_neighbour_is_traced_in_order() {
+    let scene = scene(0, (2, 4));
+    let error = Perturbation::of_surface(PerturbationKind::Thickness, 1);
+    let systems = perturb(&scene.lens, &[(error, -12.0_f64)]).unwrap();
+    let judged = merits(&systems, &scene.beam, scene.options).unwrap();
+    assert!(f64::is_finite(judged.mean_square()));
+}
+
+/// Tolerances of zero change nothing; surfaces that do not exist and rolls of planes are refused.
+#[test]
+fn no_tolerance_and_impossible_errors() {
+    let scene = scene(0, (2, 4));
+    let mut errors = tolerances(&lenses()[0], ErrorDistribution::NormalCut);
+    errors.truncate(4);
+    errors.iter_mut().for_each(|t| t.half_range = 0.0);
+    let sheet = ToleranceSheet { errors, focus_travel: Some(0.0) };
+    let request = ToleranceRequest { seed: 1, samples: 4, limit: None };
+    let found = analyze(&scene, &sheet, request).unwrap();
+    for spot in &found.spots {
+        assert!((spot.mean_rms[0] / spot.nominal_rms - 1.0).abs() < 1e-5, "{spot:?}");
+    }
+    let refuse = |kind: PerturbationKind, first: usize, words: &str| {
+        let error = Perturbation { kind, first, last: first };
+        let message = perturb(&scene.lens, &[(error, 0.1)]).unwrap_err().to_string();
+        assert!(message.contains(words), "{message}");
+    };
+    refuse(PerturbationKind::Thickness, 7, "expected surfaces from 1 to 7");
+    refuse(PerturbationKind::ElementRollX, 4, "a plane does not have");
+    refuse(PerturbationKind::ThicknessAdjusted, 6, "has no gap behind the next surface");
+}
+
+/// A focus whose travel ends at once is no focus; one that ends somewhere lies between.
+#[test]
+fn a_compensator_at_its_stop_leaves_the_rest() {
+    let scene = scene(0, (2, 6));
+    let mut errors = tolerances(&lenses()[0], ErrorDistribution::NormalCut);
+    errors.retain(|t| t.error.kind == PerturbationKind::Thickness);
+    let run = |travel: Option<f64>| {
+        let sheet = ToleranceSheet { errors: errors.clone(), focus_travel: travel };
+        let request = ToleranceRequest { seed: 1, samples: 30, limit: None };
+        analyze(&scene, &sheet, request).unwrap().spots
+    };
+    let [free, some, none] = [run(None), run(Some(0.1)), run(Some(0.0))].map(|s| s[1].mean_rms[0]);
+    let fixed = run(None)[0].mean_rms[0];
+    assert!(free < some && some < none, "{free} {some} {none}");
+    assert!((none / fixed - 1.0).abs() < 0.02, "{none} {fixed}");
+}
+
+/// A phone lens whose elements are decentred tenfold: the form says by itself that it fails.
+#[test]
+fn a_form_that_fails_says_so() {
+    let scene = scene(2, (3, 6));
+    let mut errors = tolerances(&lenses()[2], ErrorDistribution::Normal);
+    errors.retain(|t| t.error.kind == PerturbationKind::ElementDecenterY);
+    errors.iter_mut().for_each(|t| t.half_range *= 10.0);
+    let sheet = ToleranceSheet { errors, focus_travel: None };
+    let request = ToleranceRequest { seed: 2, samples: 40, limit: None };
+    let found = analyze(&scene, &sheet, request).unwrap();
+    assert!(!found.spots[1].form_agrees, "{:?}", found.spots[1].difference);
+}
+
+/// A singlet with tolerances in its file.
+const SINGLET: &str = r#"{ "aplanat": 1, "name": "Singlet", "object": "infinity",
+  "aperture": {"entrance_pupil_diameter": 10.0},
+  "fields": {"kind": "angle", "values": [{"y": 0.0}, {"y": 2.0}]},
+  "wavelengths": [{"um": 0.5875618}],
+  "surfaces": [
+    {"radius": 100, "thickness": 5.0, "glass": {"index": 1.5}, "semi_diameter": 6.0, "stop": true},
+    {"radius": -100, "thickness": 98.0, "semi_diameter": 6.0}],
+  "tolerances": {"errors": [
+    {"kind": "thickness", "first": 0, "half_range": 0.1},
+    {"kind": "surface_tilt_x", "first": 1, "half_range": 0.05, "distribution": "uniform"},
+    {"kind": "element_decenter_x", "first": 0, "last": 1, "half_range": 0.05}]} }"#;
+
+/// The command: text, JSON, and what it refuses.
+#[test]
+fn the_command_shows_sensitivities_and_spots() {
+    let folder = std::env::temp_dir().join(format!("aplanat_tolerance_{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    let path = folder.join("singlet.json");
+    std::fs::write(&path, SINGLET).unwrap();
+    let lens = path.to_str().unwrap();
+    let few = ["tolerance", lens, "--samples", "4", "--error", "10%"];
+    let text = done(&few, "");
+    for word in ["3 errors", "as designed", "element decenter x", "1-2", "3'", "the pupil is held"]
+    {
+        assert!(text.contains(word), "{word}: {text}");
+    }
+    let json = done_json(&[&few[..], &["--rms", "0.05", "--loosest", "0.5"]].concat(), "");
+    assert_eq!(json["spots"].as_array().unwrap().len(), 2);
+    assert!(json["spots"][1]["good"]["interval"][1].as_f64().unwrap() <= 1.0);
+    assert_eq!(json["loosest"].as_array().unwrap().len(), 3);
+    refused(2, &["tolerance", lens, "--rms=-1"], "", &["--rms"]);
+    refused(2, &["tolerance", lens, "--grade", "good"], "", &["commercial"]);
+    std::fs::write(&path, SINGLET.replace("\"last\": 1", "\"last\": 7")).unwrap();
+    refused(2, &few, "", &["surfaces 1 to 8; expected 1 to 2"]);
+    std::fs::remove_dir_all(&folder).unwrap();
+}
