@@ -58,7 +58,8 @@ pub mod effects;
 // Local optimization of a lens, one step at a time; the Pareto front of sharpness against light.
 pub mod optimize;
 
-// Search over structure: a chain that descends, mutates, regenerates; reservoir, family tree.
+// Search over structure: a chain that descends, mutates, regenerates; reservoir, family tree; a lens
+// from a specification.
 pub mod search;
 
 // Charts and images as PNG; knows nothing of what it draws.

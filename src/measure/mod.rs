@@ -4,6 +4,7 @@
 //! that a busy machine slows all of them alike and ratios remain meaningful. A rate is the median
 //! of many short repetitions, reported with the slowest and the fastest.
 
+mod design;
 mod double_gauss;
 mod effects;
 mod gradient;
@@ -17,6 +18,7 @@ mod spot;
 mod timing;
 mod trace;
 
+pub use design::{SheetReference, SheetScore, SpecificationSheet, measure_design};
 pub use double_gauss::double_gauss;
 pub use effects::EffectTask;
 pub use gradient::{

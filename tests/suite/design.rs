@@ -244,3 +244,12 @@ fn a_design_excludes_only_lenses_that_exist() {
     let arguments = ["design", file.path(), "--out", out.path(), "--without", "no_such_lens"];
     refused(2, &arguments, "", &["--without: found `no_such_lens`"]);
 }
+
+#[test]
+fn sheets_are_measured_by_name() {
+    let sheets = "tests/reference/spec_sheets.json";
+    let arguments = ["measure", "design", sheets, "--only", "no_such_sheet"];
+    refused(2, &arguments, "", &["--only: found `no_such_sheet`"]);
+    let arguments = ["measure", "design", sheets, "--seconds", "0"];
+    refused(2, &arguments, "", &["--seconds: found 0; expected more than 0"]);
+}

@@ -79,7 +79,7 @@ impl DesignArgs {
         let mut failures = Failures::default();
         self.run_rounds(&mut run, &stop, &mut failures);
         let lenses = run.finish();
-        let saved = self.save(&lenses, out, &mut failures)?;
+        let saved = save_lenses(&lenses, out, &mut failures)?;
         let gradients = run.gradients();
         let report = DesignReport { requirements, filled, gradients, lenses, out: saved };
         failures.note(output.print(&report));
@@ -146,29 +146,28 @@ impl DesignArgs {
         let by_gradients = most.map(|most| run.gradients() as f64 / most.max(1) as f64);
         [by_time, by_gradients].into_iter().flatten().fold(0.0, f64::max)
     }
+}
 
-    /// Saves the lenses: the best one under its name, the others beside it. Returns their files.
-    fn save(
-        &self,
-        lenses: &[DesignedLens],
-        out: &Path,
-        failures: &mut Failures,
-    ) -> Result<Vec<String>, CliError> {
-        let Some((best, others)) = lenses.split_first() else {
-            return Err(CliError::Failed("no start led to a lens".to_owned()));
-        };
-        failures.note(files::save(&best.lens, out));
-        let mut saved = vec![out.display().to_string()];
-        for lens in others {
-            let path = beside(out, report::merit_name(lens.merit));
-            failures.note(files::save(&lens.lens, &path));
-            saved.push(path.display().to_string());
-        }
-        if !best.judgement.is_valid() {
-            print_note("note: the best lens breaks limits");
-        }
-        Ok(saved)
+/// Saves the lenses: the best one under its name, the others beside it. Returns their files.
+fn save_lenses(
+    lenses: &[DesignedLens],
+    out: &Path,
+    failures: &mut Failures,
+) -> Result<Vec<String>, CliError> {
+    let Some((best, others)) = lenses.split_first() else {
+        return Err(CliError::Failed("no start led to a lens".to_owned()));
+    };
+    failures.note(files::save(&best.lens, out));
+    let mut saved = vec![out.display().to_string()];
+    for lens in others {
+        let path = beside(out, report::merit_name(lens.merit));
+        failures.note(files::save(&lens.lens, &path));
+        saved.push(path.display().to_string());
     }
+    if !best.judgement.is_valid() {
+        print_note("note: the best lens breaks limits");
+    }
+    Ok(saved)
 }
 
 /// The path of another lens beside that of the best one.

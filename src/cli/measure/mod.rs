@@ -1,5 +1,6 @@
 //! `measure`: benchmarks of accuracy against time, throughput and memory.
 
+mod design;
 mod gradient;
 mod grin;
 mod optimize;
@@ -29,6 +30,7 @@ enum BenchmarkCommand {
     Grin(grin::MeasureGrinArgs),
     Optimize(optimize::MeasureOptimizeArgs),
     Search(Box<search::MeasureSearchArgs>),
+    Design(design::MeasureDesignArgs),
     Window(window::MeasureWindowArgs),
 }
 
@@ -41,6 +43,7 @@ impl MeasureArgs {
             BenchmarkCommand::Grin(grin) => grin.run(output),
             BenchmarkCommand::Optimize(optimize) => optimize.run(output),
             BenchmarkCommand::Search(search) => search.run(output),
+            BenchmarkCommand::Design(design) => design.run(output),
             BenchmarkCommand::Window(window) => window.run(output),
         }
     }

@@ -78,7 +78,7 @@ impl BeamPlan {
         let beam = |&(field, weight, share): &(f64, f64, f64)| {
             let angle = (self.difficulty[1] * field).to_radians();
             let [x, y] = [radius * share.max(1.0).sqrt(), radius * share.min(share.sqrt())];
-            let points = ellipse(field == 0.0, [x, y], asked.f_number < FAST);
+            let points = ellipse(field, [x, y], asked.f_number);
             FieldBeam { angle, weight, points, axes: [x, y], chief: [0.0; 2], center: 0.0 }
         };
         fields.iter().map(beam).collect()
@@ -95,8 +95,9 @@ fn share_at(asked: &LensRequirements, field: f64) -> f64 {
 }
 
 /// The nodes of an ellipse with these semi-axes; on the axis those of one radius suffice.
-fn ellipse(on_axis: bool, [a, b]: [f64; 2], fine: bool) -> Vec<([f64; 2], f64)> {
-    let rings: Vec<(f64, f64)> = if fine || on_axis {
+fn ellipse(field: f64, [a, b]: [f64; 2], f_number: f64) -> Vec<([f64; 2], f64)> {
+    let on_axis = field == 0.0;
+    let rings: Vec<(f64, f64)> = if f_number < FAST || on_axis {
         FINE.0.into_iter().zip(FINE.1).collect()
     } else {
         COARSE.0.into_iter().zip(COARSE.1).collect()

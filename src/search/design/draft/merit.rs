@@ -24,11 +24,20 @@ pub(in crate::search::design) struct DraftMerit<'a> {
     beams: Vec<FieldBeam>,
     /// The distance in front of the first vertex at which rays start, in mm.
     back: f64,
-    /// The lens at every wavelength with its weight; the weights add up to 1.
-    systems: Vec<(f64, f64, System<f64>)>,
+    systems: Vec<DraftSystem>,
     primary: usize,
     /// The numbers of the systems by which rays are differentiated.
     selected: Vec<(Option<usize>, SurfaceParameter)>,
+}
+
+/// A draft at a wavelength.
+#[derive(Debug)]
+struct DraftSystem {
+    /// The wavelength in micrometres.
+    um: f64,
+    /// Its weight; all weights add up to 1.
+    weight: f64,
+    system: System<f64>,
 }
 
 /// A sum of squared residuals with its derivatives.
@@ -143,7 +152,7 @@ impl<'a> DraftMerit<'a> {
     }
 
     fn update_systems(&mut self) {
-        for (um, _, system) in &mut self.systems {
+        for DraftSystem { um, system, .. } in &mut self.systems {
             for parameter in &self.parameters {
                 match parameter {
                     DraftParameter::Surface(row, SurfaceParameter::Index)
@@ -200,7 +209,7 @@ impl<'a> DraftMerit<'a> {
         moved: Option<&Rays<f64>>,
         shift: f64,
     ) -> Option<ChannelSpots> {
-        let (um, weight, system) = &self.systems[number];
+        let DraftSystem { um, weight, system } = &self.systems[number];
         let tracer = Tracer::new(system).ok()?.without_rims();
         let (landings, matrix) = tracer.jacobian(rays, &self.selected);
         if !(0..rays.len()).all(|i| landings.fate(i).is_imaged()) {
@@ -277,7 +286,7 @@ impl<'a> DraftMerit<'a> {
     /// The focal length in mm with its derivatives, from a paraxial ray traced forwards and its
     /// adjoint traced backwards.
     pub(super) fn focal_length(&self) -> (f64, Vec<(DraftParameter, f64)>) {
-        let (_, _, system) = &self.systems[self.primary];
+        let system = &self.systems[self.primary].system;
         let surfaces = &system.surfaces[..system.surfaces.len() - 1];
         let (mut y, mut w) = (1.0, 0.0);
         let mut states = Vec::new();
@@ -324,7 +333,7 @@ impl<'a> DraftMerit<'a> {
         if self.plan.traced.is_some() {
             return Some(());
         }
-        let (_, _, system) = &self.systems[self.primary];
+        let system = &self.systems[self.primary].system;
         let stop = StopPlace::find(system, self.draft.pupil);
         let (system, surface) = stop.inserted(system);
         let tracer = Tracer::new(&system).ok()?.without_rims();
@@ -354,7 +363,7 @@ impl<'a> DraftMerit<'a> {
 
     /// The heights of the beams at the surfaces, in mm; `None` if a ray is lost.
     fn beam_heights(&self) -> Option<Vec<f64>> {
-        let (_, _, system) = &self.systems[self.primary];
+        let system = &self.systems[self.primary].system;
         let heights = self.heights_in(system, self.rims.len())?;
         Some(heights.into_iter().map(|[_, all]| all).collect())
     }
@@ -373,14 +382,12 @@ impl<'a> DraftMerit<'a> {
         let tracer = Tracer::new(system).ok()?.without_rims();
         let mut heights = vec![[0.0_f64; 2]; count];
         for beam in &self.beams {
+            let on_axis = beam.angle == 0.0;
             for point in self.edge_points(beam) {
                 let ray = beam.ray(point, self.pupil(), self.back);
-                let mut note = |i: usize, height: f64| {
-                    let Some([axial, all]) = heights.get_mut(i) else { return };
-                    *all = all.max(height);
-                    *axial = if beam.angle == 0.0 { axial.max(height) } else { *axial };
-                };
-                let traced = tracer.visit(ray, |i, at| note(i, at.x.hypot(at.y)));
+                let traced = tracer.visit(ray, |i, at| {
+                    raise(&mut heights, i, at.x.hypot(at.y), on_axis);
+                });
                 traced.fate.is_imaged().then_some(())?;
             }
         }
@@ -404,6 +411,14 @@ pub(in crate::search::design) fn beam_heights(
         surface.semi_diameter = f64::INFINITY;
     }
     merit.heights_in(&system, lens.surfaces.len())
+}
+
+/// Raises the heights of the axial beam and of all beams at a surface to that of a ray.
+fn raise(heights: &mut [[f64; 2]], surface: usize, height: f64, on_axis: bool) {
+    if let Some([axial, all]) = heights.get_mut(surface) {
+        *all = all.max(height);
+        *axial = if on_axis { axial.max(height) } else { *axial };
+    }
 }
 
 /// The derivatives by the parameters from those by the numbers of a system: a glass has two
@@ -469,7 +484,7 @@ fn systems(
     draft: &LensDraft,
     asked: &LensRequirements,
     parameters: &[DraftParameter],
-) -> Option<(Vec<(f64, f64, System<f64>)>, usize)> {
+) -> Option<(Vec<DraftSystem>, usize)> {
     let total: f64 = asked.wavelengths.iter().map(|(_, weight)| weight).sum();
     let mut systems = Vec::new();
     for (um, weight) in &asked.wavelengths {
@@ -482,7 +497,7 @@ fn systems(
         for surface in &mut system.surfaces {
             surface.semi_diameter = f64::INFINITY;
         }
-        systems.push((*um, weight / total, system));
+        systems.push(DraftSystem { um: *um, weight: weight / total, system });
     }
     let lens = asked_wavelengths(asked);
     let primary = lens.iter().position(|w| w.primary).unwrap_or(0);
