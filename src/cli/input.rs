@@ -2,6 +2,7 @@
 
 use super::error::CliError;
 use super::output::print_note;
+use super::progress::with_bar;
 use crate::files::{self, ConversionOutcome, json};
 use crate::lens::{FieldKind, FieldPoint, Lens, System};
 use crate::pupil::RayModel;
@@ -15,6 +16,40 @@ pub(super) struct LensFile {
     /// The lens: .json or .zmx
     #[arg(value_name = "LENS")]
     path: PathBuf,
+}
+
+/// The lens arguments of a benchmark that takes several.
+#[derive(Debug, clap::Args)]
+pub(super) struct LensFiles {
+    /// The lenses: .json or .zmx
+    #[arg(value_name = "LENS", required = true)]
+    paths: Vec<PathBuf>,
+}
+
+impl LensFiles {
+    /// Measures every lens, and makes a row of its file and what was found; a bar counts them, and
+    /// a request to end leaves out those that have not begun. The second argument of `measure` is
+    /// the name of the file without its ending.
+    pub(super) fn map<T, R>(
+        &self,
+        measure: impl Fn(&Lens, &str) -> T,
+        row: impl Fn(String, T) -> R,
+    ) -> Result<Vec<R>, CliError> {
+        let open = |path: &PathBuf| LensFile { path: path.clone() }.open();
+        let opened: Vec<LoadedLens> = self.paths.iter().map(open).collect::<Result<_, _>>()?;
+        let (rows, _) = with_bar("lenses", |report| {
+            let mut rows = Vec::new();
+            for (opened, path) in opened.iter().zip(&self.paths) {
+                if report(rows.len(), self.paths.len()).is_break() {
+                    break;
+                }
+                let name = path.file_stem().unwrap_or_default().to_string_lossy();
+                rows.push(row(opened.file.clone(), measure(&opened.lens, &name)));
+            }
+            rows
+        });
+        Ok(rows)
+    }
 }
 
 /// A lens with the name of its file.

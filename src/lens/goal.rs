@@ -18,8 +18,9 @@ pub struct Goal {
     /// positions.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub zoom_ratios: Vec<f64>,
-    /// Tells how the trust-region optimizer treats the terms that limit the lens.
-    #[serde(default, skip_serializing_if = "LimitTreatment::is_default")]
+    /// Tells how the trust-region optimizer treats the terms that limit the lens. A goal that was
+    /// written before there was a choice says nothing, and means penalties.
+    #[serde(default = "LimitTreatment::unsaid", skip_serializing_if = "LimitTreatment::is_unsaid")]
     pub limits: LimitTreatment,
 }
 
@@ -30,16 +31,21 @@ pub struct Goal {
 #[serde(rename_all = "snake_case")]
 pub enum LimitTreatment {
     /// They are kept exactly, whatever their weight.
+    #[default]
     Constraints,
     /// Their squared violations are added to the merit, so that they may be broken a little.
-    #[default]
     Penalties,
 }
 
 impl LimitTreatment {
+    /// The treatment by a goal in whose file there is none.
+    fn unsaid() -> Self {
+        Self::Penalties
+    }
+
     #[expect(clippy::trivially_copy_pass_by_ref, reason = "the signature that serde calls")]
-    fn is_default(&self) -> bool {
-        *self == Self::default()
+    fn is_unsaid(&self) -> bool {
+        *self == Self::unsaid()
     }
 }
 

@@ -4,12 +4,14 @@
 //! that a busy machine slows all of them alike and ratios remain meaningful. A rate is the median
 //! of many short repetitions, reported with the slowest and the fastest.
 
+mod arrival;
 mod design;
 mod double_gauss;
 mod effects;
 mod gradient;
 mod grin;
 mod grin_starts;
+mod limits;
 mod machine;
 mod optimize;
 mod rounding;
@@ -18,6 +20,7 @@ mod spot;
 mod timing;
 mod trace;
 
+pub use arrival::{ArrivalComparison, ArrivalRow, measure_arrival};
 pub use design::{SheetReference, SheetScore, SpecificationSheet, measure_design};
 pub use double_gauss::double_gauss;
 pub use effects::EffectTask;
@@ -29,6 +32,7 @@ pub use grin::{
     GrinBenchmark, GrinBenchmarkError, GrinCost, GrinCurves, GrinMemory, GrinRow, measure_grin,
 };
 pub use grin_starts::GrinStarts;
+pub use limits::{LimitComparison, LimitedDescent, compare_limit_treatments};
 pub use machine::{Machine, MemoryUse, age_ms, peak_megabytes, processor_ms};
 pub use optimize::{StepCosts, StepRow, measure_step_costs};
 pub use rounding::{Rounding, measure_rounding};

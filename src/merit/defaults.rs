@@ -142,7 +142,8 @@ impl Goal {
         terms.push(WeightedTerm { term: Term::Steepness(limits.steepness), weight });
         terms.extend(limits.semi_diameter.map(|max| unit(Term::SemiDiameter { min: 0.0, max })));
         let zoom_ratios = zoom_ratios(lens, &focal_lengths);
-        Ok(Self { terms, pupil: PupilEdge::Moving, zoom_ratios, limits: LimitTreatment::default() })
+        let limits = LimitTreatment::Penalties;
+        Ok(Self { terms, pupil: PupilEdge::Moving, zoom_ratios, limits })
     }
 }
 

@@ -38,13 +38,8 @@ fn light_shortfall(context: &EvaluationContext<'_>, share: f64, sum: &mut SumOfS
     {
         let least = share * before;
         if pupil.area < least {
-            let slope = weighted_area(
-                context,
-                sum.level,
-                |other| other == i,
-                -1.0 / (least * pupil.weight),
-            );
-            sum.add_residual(pupil.weight, 1.0 - pupil.area / least, &slope.slope);
+            let slope = pupil_area(context, sum.level, i, -1.0 / least).slope;
+            sum.add_residual(pupil.weight, 1.0 - pupil.area / least, &slope);
         }
     }
 }
@@ -102,20 +97,24 @@ pub(super) fn axial_f_number(
     Some(WithGradient { value, slope })
 }
 
-/// The area of the pupil of a field relative to that of the starting lens, both the weighted means
-/// over wavelengths.
-pub(super) fn light_share(
-    context: &EvaluationContext<'_>,
-    field: usize,
+/// Every pupil with its area relative to that in the starting lens.
+pub(super) fn light_shares<'a>(
+    context: &'a EvaluationContext<'_>,
     level: DerivativeLevel,
+) -> impl Iterator<Item = (&'a SampledPupil, WithGradient)> {
+    let pupils = context.sampling.pupils.iter().zip(context.initial_areas).enumerate();
+    pupils.map(move |(i, (pupil, before))| (pupil, pupil_area(context, level, i, 1.0 / before)))
+}
+
+/// The area of a pupil in mm² times a factor.
+fn pupil_area(
+    context: &EvaluationContext<'_>,
+    level: DerivativeLevel,
+    pupil: usize,
+    factor: f64,
 ) -> WithGradient {
-    let mine = context.sampling.pupils.iter().zip(context.initial_areas);
-    let mine = || mine.clone().filter(|(pupil, _)| pupil.field == field);
-    let weight: f64 = mine().map(|(pupil, _)| pupil.weight).sum();
-    let initial: f64 = mine().map(|(pupil, area)| pupil.weight * area).sum();
-    let now = field_area(context, field, level);
-    let factor = weight / initial;
-    WithGradient { value: now.value * factor, slope: now.slope * factor }
+    let weight = context.sampling.pupils[pupil].weight;
+    weighted_area(context, level, |i| i == pupil, factor / weight)
 }
 
 /// The weighted mean area of the pupils, in mm².

@@ -6,7 +6,7 @@
 
 use super::constraints::{Constraint, ConstraintMargin, smooth_constraints};
 use super::first_order::focal_length_of;
-use super::light::{WithGradient, axial_f_number, light_share, relative_illumination};
+use super::light::{WithGradient, axial_f_number, light_shares, relative_illumination};
 use super::sum::{DerivativeLevel, SumOfSquares};
 use super::{Dual1, EvaluationContext, Merit, MeritError, Term};
 use crate::lens::System;
@@ -178,29 +178,28 @@ impl Merit {
     ) {
         for weighted in self.goal.terms.iter().filter(|w| self.goal.is_constraint(w.term)) {
             let (term, zoom, weight) = (weighted.term.name(), context.zoom.zoom, weighted.weight);
-            let mut add = |field: Option<usize>, found: WithGradient, min, max| {
-                let WithGradient { value, slope } = found;
-                let margin =
-                    ConstraintMargin { term, surface: field, zoom, um: None, value, min, max };
-                limits.push(Limit { margin, slope, weight });
-            };
+            let mut add =
+                |surface, um, found: WithGradient, [min, max]: [Option<f64>; 2], weight| {
+                    let WithGradient { value, slope } = found;
+                    let margin = ConstraintMargin { term, surface, zoom, um, value, min, max };
+                    limits.push(Limit { margin, slope, weight });
+                };
             match weighted.term {
                 Term::Light(share) => {
-                    let lit = |field: &usize| {
-                        context.sampling.pupils.iter().any(|pupil| pupil.field == *field)
-                    };
-                    for field in (0..context.sampling.fields.len()).filter(lit) {
-                        add(Some(field), light_share(context, field, level), Some(share), None);
+                    for (pupil, now) in light_shares(context, level) {
+                        let um = context.sampling.channels[pupil.wavelength].um;
+                        let weight = weight * pupil.weight / (share * share);
+                        add(Some(pupil.field), Some(um), now, [Some(share), None], weight);
                     }
                 }
                 Term::RelativeIllumination { field, min } => {
                     if let Some(found) = relative_illumination(context, field, level) {
-                        add(Some(field), found, Some(min), None);
+                        add(Some(field), None, found, [Some(min), None], weight);
                     }
                 }
                 Term::FNumber(target) => {
                     if let Some(found) = axial_f_number(context, level) {
-                        add(None, found, Some(target), Some(target));
+                        add(None, None, found, [Some(target); 2], weight);
                     }
                 }
                 _ => {}

@@ -7,47 +7,13 @@
 //! derivatives of the Lagrangian that `JᵀJ` leaves out. A step is accepted if it lowers the sum plus
 //! the violations at their prices.
 
+use super::kink::KinkBranches;
+use super::limit_values::{LimitValues, LimitedPoint, LimitedStep, SLACK};
 use super::quadratic_program::{QuadraticProgram, QuadraticSolution};
 use super::trust_region::{
     HessianModel, LeastSquaresPoint, TrustRegion, TrustRegionStep, decrease,
 };
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
-
-/// Limited functions of the parameters at one point.
-#[derive(Debug, Clone, PartialEq)]
-pub struct LimitValues {
-    /// The values.
-    pub values: DVector<f64>,
-    /// Their derivatives, one row each.
-    pub slopes: DMatrix<f64>,
-    /// The lower and upper bound of each; equal for an equality.
-    pub bounds: Vec<[f64; 2]>,
-    /// The square of each violation times this is comparable with the sum of squares.
-    pub weights: Vec<f64>,
-}
-
-/// A sum of squares with its limits at one point.
-#[derive(Debug, Clone, PartialEq)]
-pub struct LimitedPoint {
-    /// The sum of squares.
-    pub objective: LeastSquaresPoint,
-    /// The limits.
-    pub limits: LimitValues,
-}
-
-/// A proposed step.
-#[derive(Debug, Clone, PartialEq)]
-pub struct LimitedStep {
-    /// The change of every parameter.
-    pub change: DVector<f64>,
-    /// The limited functions behind the step, by their derivatives.
-    pub values: DVector<f64>,
-    /// The multiplier of every limit: what the sum of squares would gain by a bound looser by one
-    /// unit, negative for a lower bound.
-    pub multipliers: DVector<f64>,
-    /// The price of a violation of each limit, if they cannot all hold within the trust region.
-    pub elastic: Option<Vec<f64>>,
-}
 
 /// The state of the method between two trials.
 #[derive(Debug, Clone, PartialEq)]
@@ -57,11 +23,12 @@ pub struct LimitedTrustRegion {
     prices: Vec<f64>,
     /// The natural length of a step at the last point.
     natural: f64,
+    /// The branches of kinked limits beside those of the last point.
+    branches: KinkBranches,
+    /// True if the last trial has met a kink.
+    met_kink: bool,
 }
 
-/// The violation, in the unit of each limit, up to which a step from a point that keeps them may
-/// break them.
-pub const SLACK: f64 = 1e-3;
 /// The share of a limit's weight that counts for the scales of the parameters.
 const SCALE_SHARE: f64 = 1e-2;
 /// The price of a violation relative to the multiplier, and the part of it that remains.
@@ -73,52 +40,33 @@ const ELASTIC_PRICE: f64 = 100.0;
 const SHORTNESS: f64 = 1e-9;
 /// The change of a limit by a step of natural length below which its derivatives are rounding.
 const SMALLEST_EFFECT: f64 = 1e-9;
+/// The violation, in the unit of each limit, that may be an error of its evaluation.
+const NOISE: f64 = 1e-7;
 /// The decrease relative to the predicted one from which a trial is accepted.
 const ACCEPTED: f64 = 1e-4;
-
-impl LimitValues {
-    /// The amount by which each value is above its upper bound, negative below the lower one, 0
-    /// between them.
-    pub fn excesses(&self, values: &DVector<f64>) -> DVector<f64> {
-        let excess = |(value, [low, high]): (&f64, &[f64; 2])| {
-            (value - high).max(0.0) + (value - low).min(0.0)
-        };
-        DVector::from_iterator(values.len(), values.iter().zip(&self.bounds).map(excess))
-    }
-
-    /// The largest violation.
-    pub fn violation(&self) -> f64 {
-        self.excesses(&self.values).amax()
-    }
-
-    /// The values behind a change of the parameters, by their derivatives.
-    pub fn linearized(&self, change: &DVector<f64>) -> DVector<f64> {
-        &self.values + &self.slopes * change
-    }
-
-    /// The ranges by which the values may still change.
-    fn room(&self, values: &DVector<f64>) -> Vec<[f64; 2]> {
-        let range = |(value, [low, high]): (&f64, &[f64; 2])| [low - value, high - value];
-        values.iter().zip(&self.bounds).map(range).collect()
-    }
-}
 
 impl LimitedTrustRegion {
     /// The method before its first step for this many parameters and limits.
     pub fn new(parameters: usize, limits: usize) -> Self {
-        Self { region: TrustRegion::new(parameters), prices: vec![0.0; limits], natural: 0.0 }
+        Self {
+            region: TrustRegion::new(parameters),
+            prices: vec![0.0; limits],
+            natural: 0.0,
+            branches: KinkBranches::default(),
+            met_kink: false,
+        }
     }
 
     /// True if the region is so small that no step would change anything.
     pub fn is_exhausted(&self, point: &LimitedPoint) -> bool {
-        self.region.radius.is_some_and(|radius| radius <= 1e-10 * natural_radius(point))
+        self.region.radius.is_some_and(|radius| radius <= 1e-10 * point.natural_radius())
     }
 
     /// The step from a point; every parameter may change by the range in `room`. `None` if none can
     /// be computed.
     pub fn propose(&mut self, point: &LimitedPoint, room: &[[f64; 2]]) -> Option<LimitedStep> {
         self.update_scales(point);
-        let radius = *self.region.radius.get_or_insert(natural_radius(point));
+        let radius = *self.region.radius.get_or_insert(point.natural_radius());
         let step = self.step(point, room, radius, self.region.model)?;
         self.update_prices(point, &step);
         Some(step)
@@ -132,7 +80,7 @@ impl LimitedTrustRegion {
         room: &[[f64; 2]],
     ) -> Option<(LimitedStep, f64)> {
         self.update_scales(point);
-        let radius = UNCONFINED * natural_radius(point);
+        let radius = UNCONFINED * point.natural_radius();
         let LeastSquaresPoint { half_gradient, normal, .. } = &point.objective;
         let step = self.step(point, room, radius, HessianModel::GaussNewton)?;
         let promised = decrease(normal, half_gradient, &step.change);
@@ -191,29 +139,49 @@ impl LimitedTrustRegion {
         from: &LimitedPoint,
         to: &LimitedPoint,
     ) -> bool {
-        let prices = self.prices.clone();
-        let penalty = |limits: &LimitValues, values: &DVector<f64>| -> f64 {
-            let excesses = limits.excesses(values);
-            excesses.iter().zip(&prices).map(|(excess, price)| price * excess.abs()).sum()
-        };
-        let before = from.objective.value + penalty(&from.limits, &from.limits.values);
-        let after = to.objective.value + penalty(&to.limits, &to.limits.values);
         let hessian = self.region.hessian(&from.objective, self.region.model);
-        let gain = decrease(&hessian, &from.objective.half_gradient, &step.change);
-        let predicted =
-            gain + penalty(&from.limits, &from.limits.values) - penalty(&from.limits, &step.values);
-        let allowed = from.limits.violation().max(SLACK);
-        let ratio = (before - after) / predicted;
-        let accepted = predicted > 0.0
-            && ratio > ACCEPTED
-            && after < before
-            && to.limits.violation() <= allowed;
-        self.learn(step, from, to, accepted);
-        let ratio = if predicted > 0.0 && to.limits.violation() <= allowed { ratio } else { -1.0 };
-        let slope = 2.0 * from.objective.half_gradient.dot(&step.change)
-            - (penalty(&from.limits, &from.limits.values) - penalty(&from.limits, &step.values));
-        self.region.resize(&step.change, ratio, slope, after - before);
+        // The curvature of the limits is in the Hessian: the correction of the step is not counted.
+        let gain = decrease(&hessian, &from.objective.half_gradient, &step.proposed);
+        let relief = self.penalty(&from.limits, &from.limits.values)
+            - self.penalty(&from.limits, &step.values);
+        let predicted = gain + relief;
+        let rise = to.objective.value - from.objective.value
+            + self.penalty(&to.limits, &to.limits.values)
+            - self.penalty(&from.limits, &from.limits.values);
+        let noise = NOISE * self.prices.iter().sum::<f64>();
+        let is_near = to.limits.violation() <= from.limits.violation().max(SLACK);
+        let ratio =
+            if predicted > 0.0 && is_near { (noise - rise) / (noise + predicted) } else { -1.0 };
+        let accepted = ratio > ACCEPTED;
+        let scales = self.region.scales.clone();
+        if accepted {
+            self.branches.advance(&step.change, &to.limits, &step.branch_multipliers);
+        }
+        self.met_kink = self.branches.meet(step, [&from.limits, &to.limits], accepted, &scales);
+        if !self.met_kink {
+            self.learn(step, from, to, accepted);
+        }
+        let slope = 2.0 * from.objective.half_gradient.dot(&step.change) - relief;
+        self.region.resize(&step.change, ratio, slope, rise);
         accepted
+    }
+
+    /// The violations at their prices.
+    fn penalty(&self, limits: &LimitValues, values: &DVector<f64>) -> f64 {
+        let excesses = limits.excesses(values);
+        excesses.iter().zip(&self.prices).map(|(excess, price)| price * excess.abs()).sum()
+    }
+
+    /// True if the last trial has met a kink of a limit, which no correction can follow.
+    pub fn met_kink(&self) -> bool {
+        self.met_kink
+    }
+
+    /// Starts again from a point with a small region, in the same scales.
+    pub fn restart(&mut self, point: &LimitedPoint) {
+        self.region.radius = Some(RESTART * point.natural_radius());
+        self.region.model = HessianModel::GaussNewton;
+        self.branches.forget();
     }
 
     /// Takes the next step as the first one, in the same scales.
@@ -223,6 +191,7 @@ impl LimitedTrustRegion {
 
     /// Takes note that the function has changed a little; `shorter` if its steps were too long.
     pub fn note_other_function(&mut self, shorter: bool) {
+        self.branches.forget();
         self.region.note_other_function(shorter);
     }
 
@@ -231,10 +200,12 @@ impl LimitedTrustRegion {
     pub fn projected_gradient(
         &mut self,
         point: &LimitedPoint,
-        multipliers: &DVector<f64>,
+        step: &LimitedStep,
         room: &[[f64; 2]],
     ) -> f64 {
-        self.region.projected_gradient(&lagrangian(point, multipliers), room)
+        let half_gradient = step.half_lagrangian.clone();
+        let lagrangian = LeastSquaresPoint { half_gradient, ..point.objective.clone() };
+        self.region.projected_gradient(&lagrangian, room)
     }
 
     /// The derivatives of the limits by scaled parameters; zeros for limits that no step changes.
@@ -275,7 +246,7 @@ impl LimitedTrustRegion {
         to: &LimitedPoint,
         accepted: bool,
     ) {
-        let [from, to] = [from, to].map(|point| lagrangian(point, &step.multipliers));
+        let [from, to] = [from, to].map(|point| point.lagrangian(&step.own_multipliers));
         let hessian = self.region.hessian(&from, self.region.model);
         let predicted = decrease(&hessian, &from.half_gradient, &step.change);
         let plain = TrustRegionStep { change: step.change.clone(), predicted };
@@ -296,7 +267,7 @@ impl LimitedTrustRegion {
             }
         }
         self.region.update_scales(&normal);
-        self.natural = natural_radius(point);
+        self.natural = point.natural_radius();
     }
 
     /// The minimum of the model under the limits within a radius.
@@ -308,10 +279,11 @@ impl LimitedTrustRegion {
         model: HessianModel,
     ) -> Option<LimitedStep> {
         let scales = self.region.scales.clone();
-        let rows = self.effective_rows(&point.limits);
+        let limits = self.branches.with_branches(&point.limits);
+        let rows = self.effective_rows(&limits);
         let gradient = 2.0 * point.objective.half_gradient.component_div(&scales);
         let hessian = self.convex_hessian(point, model);
-        let bounds = point.limits.room(&point.limits.values);
+        let bounds = limits.room(&limits.values);
         let room = &scaled_room(room, &scales);
         let program = |elastic| {
             QuadraticProgram {
@@ -326,14 +298,25 @@ impl LimitedTrustRegion {
             .solve()
         };
         let steep = ELASTIC_PRICE * gradient.norm().max(radius * hessian.amax());
-        let prices = elastic_prices(&point.limits, &rows, steep);
+        let prices = elastic_prices(&limits, &rows, steep);
         let hard = program(None);
         let elastic = if hard.is_none() { Some(prices) } else { None };
         let found = hard.or_else(|| program(elastic.as_deref()))?;
         let QuadraticSolution { x, multipliers } = found;
         let change = x.component_div(&scales);
-        let values = point.limits.linearized(&change);
-        Some(LimitedStep { change, values, multipliers, elastic })
+        let count = point.limits.values.len();
+        let half_lagrangian =
+            &point.objective.half_gradient + limits.slopes.tr_mul(&multipliers) * 0.5;
+        Some(LimitedStep {
+            values: point.limits.linearized(&change),
+            proposed: change.clone(),
+            change,
+            own_multipliers: multipliers.rows(0, count).into_owned(),
+            branch_multipliers: multipliers.iter().skip(count).copied().collect(),
+            multipliers: self.branches.total(&multipliers),
+            half_lagrangian,
+            elastic: elastic.map(|prices| prices[..count].to_vec()),
+        })
     }
 
     /// The Hessian of the model in scaled parameters without its negative curvatures.
@@ -357,26 +340,10 @@ impl LimitedTrustRegion {
     }
 }
 
+/// The radius of the first step after a restart, relative to the natural one.
+const RESTART: f64 = 1e-2;
 /// The radius of an unconfined step relative to the natural one.
 const UNCONFINED: f64 = 100.0;
-
-/// The length of a step that changes the residuals by their own size.
-fn natural_radius(point: &LimitedPoint) -> f64 {
-    let limits = &point.limits;
-    let excesses = limits.excesses(&limits.values);
-    let broken: f64 = excesses.iter().zip(&limits.weights).map(|(e, w)| w * e * e).sum();
-    (point.objective.value.max(0.0) + broken).sqrt().max(f64::MIN_POSITIVE.sqrt())
-}
-
-/// The sum of squares plus the limited functions times their multipliers.
-fn lagrangian(point: &LimitedPoint, multipliers: &DVector<f64>) -> LeastSquaresPoint {
-    let LimitedPoint { objective, limits } = point;
-    LeastSquaresPoint {
-        value: objective.value + multipliers.dot(&limits.values),
-        half_gradient: &objective.half_gradient + limits.slopes.tr_mul(multipliers) * 0.5,
-        normal: objective.normal.clone(),
-    }
-}
 
 fn plain_step(step: &LimitedStep) -> TrustRegionStep {
     TrustRegionStep { change: step.change.clone(), predicted: 0.0 }
@@ -384,23 +351,6 @@ fn plain_step(step: &LimitedStep) -> TrustRegionStep {
 
 fn scaled_room(room: &[[f64; 2]], scales: &DVector<f64>) -> Vec<[f64; 2]> {
     room.iter().zip(scales.iter()).map(|([low, high], s)| [low * s, high * s]).collect()
-}
-
-/// The smallest set of limits that contradict each other, from a set that does: each is left out in
-/// turn, for good if the others still contradict each other (Chinneck and Dravnieks, ORSA J.
-/// Computing 3 (1991) 157).
-pub fn smallest_conflict(
-    conflicting: &[usize],
-    mut is_conflict: impl FnMut(&[usize]) -> bool,
-) -> Vec<usize> {
-    let mut remaining = conflicting.to_vec();
-    for candidate in conflicting {
-        let others: Vec<usize> = remaining.iter().copied().filter(|i| i != candidate).collect();
-        if is_conflict(&others) {
-            remaining = others;
-        }
-    }
-    remaining
 }
 
 /// The prices of violations in elastic mode: above the slope of the sum of squares, and those of
@@ -498,6 +448,24 @@ mod tests {
         assert!(multipliers[0].abs() < 1e-9, "{multipliers}");
     }
 
+    /// The limited function is the larger of two, whose kink the minimum lies on; the derivatives
+    /// tell of one of them at a time.
+    #[test]
+    fn it_finds_a_minimum_on_a_kink_of_a_limit() {
+        for start in [[-1.0, 0.7], [0.2, -0.4]] {
+            let (x, point, multipliers) = minimize(&start, &[[f64::NEG_INFINITY, 1.0]], |x| {
+                let residuals = DVector::from_vec(vec![x[0] - 2.0, 0.1 * (x[1] - 0.3)]);
+                let jacobian = DMatrix::from_row_slice(2, 2, &[1.0, 0.0, 0.0, 0.1]);
+                let limit = DVector::from_vec(vec![x[0] + x[1].abs() + 0.1 * x[1] * x[1]]);
+                let slope = [1.0, x[1].signum() + 0.2 * x[1]];
+                [(residuals, jacobian), (limit, DMatrix::from_row_slice(1, 2, &slope))]
+            });
+            assert!((x[0] - 1.0).abs() < 1e-6 && x[1].abs() < 1e-6, "{start:?}: {x}");
+            assert!(point.limits.violation() < 1e-6, "{}", point.limits.violation());
+            assert!((multipliers[0] - 2.0).abs() < 1e-3, "{multipliers}");
+        }
+    }
+
     #[test]
     fn contradictions_are_broken_as_little_as_possible() {
         let bounds = [[1.0, f64::INFINITY], [f64::NEG_INFINITY, 0.0]];
@@ -507,11 +475,5 @@ mod tests {
             [(x.clone(), DMatrix::identity(1, 1)), (value, slope)]
         });
         assert!((point.limits.violation() - 1.0).abs() < 1e-6 || (0.0..=1.0).contains(&x[0]));
-    }
-
-    #[test]
-    fn the_smallest_conflict_leaves_out_bystanders() {
-        let conflict = |set: &[usize]| set.contains(&1) && set.contains(&3);
-        assert_eq!(smallest_conflict(&[0, 1, 2, 3, 4], conflict), [1, 3]);
     }
 }

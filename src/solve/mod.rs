@@ -6,9 +6,12 @@
 mod adam;
 mod bounds;
 mod cgls;
+mod conflict;
 mod constrained;
+mod kink;
 mod lbfgs;
 mod levenberg_marquardt;
+mod limit_values;
 mod projection;
 mod quadratic_program;
 mod trust_region;
@@ -16,14 +19,14 @@ mod trust_region;
 pub use adam::{Adam, AdamMoments};
 pub use bounds::ParameterBounds;
 pub use cgls::cgls;
-pub use constrained::{
-    LimitValues, LimitedPoint, LimitedStep, LimitedTrustRegion, SLACK, smallest_conflict,
-};
+pub use conflict::smallest_conflict;
+pub use constrained::LimitedTrustRegion;
 pub use lbfgs::{Lbfgs, LbfgsStep};
 pub use levenberg_marquardt::{
     Damping, LevenbergMarquardt, LevenbergMarquardtStep, NielsenDamping, ResidualRows, damped_step,
     predicted_decrease,
 };
+pub use limit_values::{LimitValues, LimitedPoint, LimitedStep, SLACK};
 pub use projection::{
     ConstrainedPoint, ConstraintError, ConstraintFunction, CoordinateBounds, nearest_point,
     nearest_point_from, point_along_normals,

@@ -20,9 +20,8 @@ fn goal(terms: &[Term]) -> Goal {
     }
 }
 
-/// The default goal with its limits as constraints.
 fn default_goal(lens: &Lens) -> Goal {
-    Goal { limits: LimitTreatment::Constraints, ..Goal::default_for(lens).unwrap() }
+    Goal::default_for(lens).unwrap()
 }
 
 fn free(name: &str) -> Lens {
@@ -189,6 +188,41 @@ fn equal_surfaces_do_no_harm() {
     let (_, before) = judge(&lens, &lens, &goal);
     let (violation, merit) = judge(run(&lens, &goal, 25).best(), &lens, &goal);
     assert!(violation <= KEPT && merit <= before, "{violation:e} {before:e} {merit:e}");
+}
+
+/// A new goal has constraints, and its file says so; one without the key was written before there
+/// was a choice, and means what it meant.
+#[test]
+fn new_goals_have_constraints_and_old_files_have_penalties() {
+    let goal = default_goal(&free("tessar_50_f28"));
+    assert_eq!(goal.limits, LimitTreatment::Constraints);
+    let mut file = serde_json::to_value(&goal).unwrap();
+    assert_eq!(file["limits"], "constraints");
+    assert_eq!(serde_json::from_value::<Goal>(file.clone()).unwrap(), goal);
+    file.as_object_mut().unwrap().remove("limits");
+    let old: Goal = serde_json::from_value(file.clone()).unwrap();
+    assert_eq!(old.limits, LimitTreatment::Penalties);
+    assert_eq!(serde_json::to_value(&old).unwrap(), file);
+}
+
+/// A constraint of light is kept exactly where the penalty of the same term vanishes.
+#[test]
+fn light_is_limited_alike_as_constraint_and_as_penalty() {
+    let start = free("wide_nikkor_28_f35");
+    let goal = goal(&[Term::Light(1.0)]);
+    let merit = Merit::new(&start, &goal, 1e-3).unwrap();
+    let mut narrow = start.clone();
+    for row in &mut narrow.surfaces {
+        row.semi_diameter = row.semi_diameter.map(|rim| 0.97 * rim);
+    }
+    let merit = Merit::new(&narrow, &goal, 1e-3).unwrap().with_initial_light(merit.initial_light());
+    let values = merit.values(&narrow);
+    let limits = merit.evaluate_with_limits(&values, DerivativeLevel::Value).unwrap().limits;
+    let pupils = merit.spot_samplings().len();
+    assert_eq!(limits.len(), pupils);
+    let by_limits: f64 = limits.iter().map(|limit| limit.weight * limit.violation().powi(2)).sum();
+    let penalty = merit.value(&values).unwrap();
+    assert!(penalty > 0.0 && (by_limits / penalty - 1.0).abs() < 1e-9, "{by_limits:e} {penalty:e}");
 }
 
 #[test]

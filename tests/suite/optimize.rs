@@ -67,7 +67,7 @@ fn the_trust_region_method_arrives_at_the_minimum() {
         if lens.variables.is_empty() {
             add_variables(&mut lens, &[ParameterKind::Curvatures, ParameterKind::Thicknesses]);
         }
-        let goal = Goal::default_for(&lens).unwrap();
+        let goal = Goal { limits: LimitTreatment::Penalties, ..Goal::default_for(&lens).unwrap() };
         let mut optimizer = start(DescentMethod::TrustRegion, &lens, &goal, 1e-4).unwrap();
         let steps = (0..1000).take_while(|_| !optimizer.step().finished).count();
         let found: f64 = optimizer.terms().unwrap().iter().map(|t| t.weight * t.value).sum();

@@ -1,8 +1,10 @@
 //! `measure`: benchmarks of accuracy against time, throughput and memory.
 
+mod arrival;
 mod design;
 mod gradient;
 mod grin;
+mod limits;
 mod optimize;
 mod plot;
 mod search;
@@ -29,6 +31,7 @@ enum BenchmarkCommand {
     Gradient(gradient::MeasureGradientArgs),
     Grin(grin::MeasureGrinArgs),
     Optimize(optimize::MeasureOptimizeArgs),
+    Limits(limits::MeasureLimitsArgs),
     Search(Box<search::MeasureSearchArgs>),
     Design(design::MeasureDesignArgs),
     Window(window::MeasureWindowArgs),
@@ -42,6 +45,7 @@ impl MeasureArgs {
             BenchmarkCommand::Gradient(gradient) => gradient.run(output),
             BenchmarkCommand::Grin(grin) => grin.run(output),
             BenchmarkCommand::Optimize(optimize) => optimize.run(output),
+            BenchmarkCommand::Limits(limits) => limits.run(output),
             BenchmarkCommand::Search(search) => search.run(output),
             BenchmarkCommand::Design(design) => design.run(output),
             BenchmarkCommand::Window(window) => window.run(output),

@@ -1,22 +1,35 @@
-//! `measure optimize`: the time of a step of local optimization.
+//! `measure optimize`: the time of a step of local optimization, and the work until it arrives.
 
+use super::arrival;
 use crate::cli::error::CliError;
+use crate::cli::input::LensFiles;
 use crate::cli::output::{Output, ShortNumber, TextTable};
 use crate::measure::{Machine, StepCosts, measure_step_costs};
 use serde::Serialize;
 use std::fmt::{self, Display};
 
-/// Milliseconds per iteration on one core: double Gauss, 4 fields, all curvatures and thicknesses
+/// Milliseconds per iteration on one core: double Gauss, 4 fields, all curvatures and thicknesses.
+/// With lenses: evaluations and milliseconds until within 1 % of the best merit known
 #[derive(Debug, clap::Args)]
 #[command(after_long_help = include_str!("../help/measure_optimize.txt"))]
 pub(super) struct MeasureOptimizeArgs {
-    /// The number of steps of each run
+    #[command(flatten)]
+    lenses: Option<LensFiles>,
+
+    /// The number of steps of each run without lenses
     #[arg(long, value_name = "N", default_value_t = 200)]
     steps: usize,
+
+    /// The maximum number of evaluations of each method with lenses
+    #[arg(long, value_name = "N", default_value_t = 1500)]
+    evaluations: usize,
 }
 
 impl MeasureOptimizeArgs {
     pub(super) fn run(&self, output: &Output) -> Result<(), CliError> {
+        if let Some(lenses) = &self.lenses {
+            return output.print(&arrival::measure(lenses, self.evaluations)?);
+        }
         let costs = measure_step_costs(self.steps).map_err(|e| CliError::Failed(e.to_string()))?;
         output.print(&MeasureOptimizeReport {
             machine: Machine::detect(),

@@ -1,0 +1,133 @@
+//! Limits restored with the rays of the lens itself.
+
+use super::{KEPT, LimitedOptimizer, RESTORED, scaled_point};
+use crate::merit::{DerivativeLevel, Limit};
+use crate::optimize::LimitPrice;
+use crate::solve::LimitValues;
+
+/// The distance from the bounds for which a correction aims.
+const AIM: f64 = 1e-10;
+/// The largest such distance, for limits whose rays are found a little differently each time.
+const LARGEST_AIM: f64 = 1e-5;
+/// The number of corrections of a lens that is to keep its limits.
+const CORRECTIONS: usize = 8;
+/// The number of times that the rays are found anew while the limits are restored.
+const SETTLEMENTS: usize = 6;
+
+impl LimitedOptimizer {
+    /// Finds the rays of the current lens anew, restores its limits with them, and makes it the best
+    /// lens if it is. Returns true if the merit is another one by more than the tolerance.
+    pub(super) fn settle(&mut self) -> bool {
+        let before = self.state.value;
+        self.unchecked = 0;
+        for round in 0..SETTLEMENTS {
+            if !self.find_rays() || self.point.limits.violation() <= KEPT {
+                break;
+            }
+            // What is still broken after a correction is the difference that new rays make.
+            let difference = 2.0 * self.point.limits.violation();
+            self.restore(if round == 0 { AIM } else { difference.clamp(AIM, LARGEST_AIM) });
+        }
+        self.adopt_verified();
+        (self.state.value - before).abs() > 2.0 * self.tolerance * before.abs()
+    }
+
+    /// Finds the rays of the current lens anew; false if that fails.
+    fn find_rays(&mut self) -> bool {
+        let mut merit = self.state.merit.clone();
+        let found = merit
+            .resample(&self.state.current)
+            .and_then(|()| merit.evaluate_with_limits(&self.state.values, DerivativeLevel::Normal));
+        match found {
+            Ok(found) if found.limits.len() == self.limits.len() => {
+                self.state.merit = merit;
+                self.state.value = found.objective.value;
+                self.point = scaled_point(&self.state, &found.objective, &found.limits);
+                self.limits = found.limits;
+                true
+            }
+            Ok(_) => false,
+            Err(cause) => {
+                self.state.refused = Some(cause.to_string());
+                false
+            }
+        }
+    }
+
+    /// Corrects the current lens until it keeps its limits with the present rays, by a margin.
+    fn restore(&mut self, margin: f64) {
+        for _ in 0..CORRECTIONS {
+            let aims: Vec<[f64; 2]> = self
+                .point
+                .limits
+                .bounds
+                .iter()
+                .map(
+                    |[low, high]| {
+                        if low == high { [*low, *high] } else { [low + margin, high - margin] }
+                    },
+                )
+                .collect();
+            let limits = &self.point.limits;
+            let aimed = |limits: &LimitValues| {
+                LimitValues { bounds: aims.clone(), ..limits.clone() }.violation()
+            };
+            if aimed(limits) <= RESTORED.max(0.1 * margin) {
+                break;
+            }
+            let Some(values) = self.corrected(&self.state.values, limits, &aims) else { break };
+            let merit = &self.state.merit;
+            let Ok(found) = merit.evaluate_with_limits(&values, DerivativeLevel::Normal) else {
+                break;
+            };
+            self.state.evaluations += 1;
+            let point = scaled_point(&self.state, &found.objective, &found.limits);
+            if !(aimed(&point.limits) < aimed(limits)) {
+                break;
+            }
+            self.state.values = values;
+            self.state.value = point.objective.value;
+            self.state.current = self.state.merit.lens(&self.state.values);
+            (self.point, self.limits) = (point, found.limits);
+        }
+    }
+
+    /// Makes the current lens, whose rays are its own, the best one, or returns to the one verified
+    /// before if that is better.
+    fn adopt_verified(&mut self) {
+        let rank = self.rank();
+        match self.verified.take() {
+            Some((lens, before)) if before < rank => {
+                self.state.current.clone_from(&lens);
+                self.state.values = self.state.merit.values(&lens);
+                self.find_rays();
+                self.method.note_other_function(true);
+                self.state.failed_verifications += 1;
+                self.verified = Some((lens, before));
+            }
+            _ => {
+                self.state.failed_verifications = 0;
+                self.verified = Some((self.state.current.clone(), rank));
+            }
+        }
+        self.best_violation = self.rank().0;
+        self.state.best_value = self.state.value;
+        self.state.best.clone_from(&self.state.current);
+        self.note_prices();
+    }
+
+    /// The violation and the merit of the current lens: the smaller the better, in this order.
+    fn rank(&self) -> (f64, f64) {
+        let violation = self.point.limits.violation();
+        (if violation <= KEPT { 0.0 } else { violation }, self.state.value)
+    }
+
+    /// Notes the binding limits of the current lens with their multipliers.
+    pub(super) fn note_prices(&mut self) {
+        let room = self.state.room();
+        let Some((step, _)) = self.method.unconfined(&self.point, &room) else { return };
+        let price = |(limit, multiplier): (&Limit, &f64)| LimitPrice::new(limit, *multiplier);
+        let all = self.limits.iter().zip(step.multipliers.iter());
+        self.prices = all.filter_map(price).collect();
+    }
+}

@@ -1,0 +1,136 @@
+//! Kinks of limited functions.
+//!
+//! A limited function may be the least or the largest of several smooth ones, as the light through
+//! two rims of the same size is the light through the narrower one. Its derivatives tell of one
+//! branch alone, and a step that follows that branch runs into the other. So the branches that were
+//! met on the way are remembered by their value and slope, and every step keeps their limits too
+//! (cutting planes; Kelley, SIAM J. 8 (1960) 703).
+
+use super::limit_values::{LimitValues, LimitedStep};
+use nalgebra::{DMatrix, DVector};
+
+/// The branches of kinked limits beside those of the current point.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(super) struct KinkBranches {
+    branches: Vec<Branch>,
+}
+
+/// A branch of a limited function.
+#[derive(Debug, Clone, PartialEq)]
+struct Branch {
+    limit: usize,
+    /// Its value at the current point, by its derivatives.
+    value: f64,
+    slope: DVector<f64>,
+    /// The accepted steps since it was met or has held a step.
+    age: usize,
+}
+
+/// The violation beyond the one promised that tells of a kink, in the unit of the limit.
+const SURPRISE: f64 = 1e-7;
+/// The difference of two slopes, relative to one of them, above which they are of two branches.
+const DISTINCT: f64 = 0.05;
+/// The difference above which no smooth curvature explains it.
+const KINKED: f64 = 0.3;
+/// The accepted steps after which a branch is forgotten unless it has held one.
+const MAX_AGE: usize = 10;
+
+impl KinkBranches {
+    /// The limits at a point, and after them those of the branches.
+    pub(super) fn with_branches(&self, limits: &LimitValues) -> LimitValues {
+        let (own, count) = (limits.values.len(), limits.values.len() + self.branches.len());
+        let all = |i: usize| i.checked_sub(own).map(|k| &self.branches[k]);
+        let limit = |i: usize| all(i).map_or(i, |branch| branch.limit);
+        LimitValues {
+            values: DVector::from_fn(count, |i, _| {
+                all(i).map_or_else(|| limits.values[i], |b| b.value)
+            }),
+            slopes: DMatrix::from_fn(count, limits.slopes.ncols(), |i, j| {
+                all(i).map_or_else(|| limits.slopes[(i, j)], |branch| branch.slope[j])
+            }),
+            bounds: (0..count).map(|i| limits.bounds[limit(i)]).collect(),
+            weights: (0..count).map(|i| limits.weights[limit(i)]).collect(),
+        }
+    }
+
+    /// The multipliers of limits and of the branches after them, added up for every limit.
+    pub(super) fn total(&self, multipliers: &DVector<f64>) -> DVector<f64> {
+        let own = multipliers.len() - self.branches.len();
+        let mut total = multipliers.rows(0, own).into_owned();
+        for (branch, multiplier) in self.branches.iter().zip(multipliers.iter().skip(own)) {
+            total[branch.limit] += multiplier;
+        }
+        total
+    }
+
+    pub(super) fn forget(&mut self) {
+        self.branches.clear();
+    }
+
+    /// Follows an accepted step; branches with a multiplier stay young.
+    pub(super) fn advance(&mut self, change: &DVector<f64>, to: &LimitValues, multipliers: &[f64]) {
+        let held = |k: usize| multipliers.get(k).is_some_and(|m| m.abs() > 1e-12);
+        for (k, branch) in self.branches.iter_mut().enumerate() {
+            branch.value += branch.slope.dot(change);
+            branch.age = if held(k) { 0 } else { branch.age + 1 };
+            branch.value =
+                not_beyond(to.bounds[branch.limit], branch.value, to.values[branch.limit]);
+        }
+        self.branches.retain(|branch| branch.age <= MAX_AGE);
+    }
+
+    /// Remembers the branches that a trial has met although its point's derivatives did not tell of
+    /// them: those by whose derivatives the proposed step breaks a limit more than was promised. Of
+    /// an accepted trial the branch of the point it came from is remembered. True if there was a
+    /// kink.
+    pub(super) fn meet(
+        &mut self,
+        step: &LimitedStep,
+        [from, to]: [&LimitValues; 2],
+        accepted: bool,
+        scales: &DVector<f64>,
+    ) -> bool {
+        let proposed = &to.values + &to.slopes * (&step.proposed - &step.change);
+        let [real, promised] = [&proposed, &step.values].map(|values| from.excesses(values));
+        let mut met = false;
+        for i in 0..promised.len() {
+            let [low, high] = from.bounds[i];
+            if low == high || real[i].abs() <= promised[i].abs() + SURPRISE {
+                continue;
+            }
+            let [here, there] = [from, to].map(|limits| limits.slopes.row(i).transpose());
+            let difference = difference(&here, &there, scales);
+            if !(difference > DISTINCT) {
+                continue;
+            }
+            met |= difference > KINKED;
+            let (value, now, slope) = if accepted {
+                (from.values[i] + here.dot(&step.change), to.values[i], here)
+            } else {
+                (to.values[i] - there.dot(&step.change), from.values[i], there)
+            };
+            self.remember(i, not_beyond([low, high], value, now), slope, scales);
+        }
+        met
+    }
+
+    fn remember(&mut self, limit: usize, value: f64, slope: DVector<f64>, scales: &DVector<f64>) {
+        self.branches.retain(|branch| {
+            branch.limit != limit || difference(&slope, &branch.slope, scales) > DISTINCT
+        });
+        self.branches.push(Branch { limit, value, slope, age: 0 });
+    }
+}
+
+/// The value of a branch, or that of the limited function where the branch would already break the
+/// limit more than that does.
+fn not_beyond([low, high]: [f64; 2], value: f64, now: f64) -> f64 {
+    let above = if low.is_finite() { value.max(now.min(low)) } else { value };
+    if high.is_finite() { above.min(now.max(high)) } else { above }
+}
+
+/// The length of the difference of two slopes relative to that of the first.
+fn difference(a: &DVector<f64>, b: &DVector<f64>, scales: &DVector<f64>) -> f64 {
+    let [a, b] = [a, b].map(|slope| slope.component_div(scales));
+    (&b - &a).norm() / a.norm()
+}
