@@ -1,8 +1,9 @@
 //! What `design` prints: the complete specification, and lenses beside it.
 
 use crate::cli::output::{ShortNumber, TextTable};
+use crate::lens::SurfaceNumber;
 use crate::search::design::{
-    DesignMerit, DesignedLens, FilledValue, LensJudgement, LensRequirements,
+    DesignMerit, DesignedLens, FilledValue, LensJudgement, LensRequirements, LimitCost,
 };
 use serde::Serialize;
 use std::fmt::{self, Display};
@@ -86,9 +87,20 @@ impl Display for DesignReport {
         for (lens, out) in self.lenses.iter().zip(&self.out) {
             writeln!(f, "\n{}: {out} (from {})", merit_name(lens.merit), lens.origin)?;
             write_judgement(f, &lens.judgement)?;
+            write_costs(f, &lens.costs)?;
         }
         Ok(())
     }
+}
+
+/// Writes what the limits cost.
+fn write_costs(f: &mut fmt::Formatter<'_>, costs: &[LimitCost]) -> fmt::Result {
+    for LimitCost { term, surface, um_per_mm } in costs {
+        let place =
+            surface.map_or(String::new(), |row| format!(" of surface {}", SurfaceNumber::new(row)));
+        writeln!(f, "{term}{place} costs {} um per mm", ShortNumber(*um_per_mm))?;
+    }
+    Ok(())
 }
 
 /// What a lens is best at, as in file names.

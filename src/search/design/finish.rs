@@ -1,7 +1,7 @@
 //! The end of a design: rims, beams that get through them, every limit kept, judgement.
 
 use super::LensRequirements;
-use super::draft::{BeamPlan, Freedom, LensDraft, descend, traced_beams};
+use super::draft::{BeamPlan, Freedom, LensDraft, LimitCost, descend, limit_costs, traced_beams};
 use super::judge::{JUDGEMENT_TOLERANCE, LensJudgement, judge_lens};
 use super::rims::with_rims;
 use super::run::Candidate;
@@ -30,6 +30,8 @@ pub struct DesignedLens {
     pub origin: String,
     /// Its judgement.
     pub judgement: LensJudgement,
+    /// What the limits cost that hold it.
+    pub costs: Vec<LimitCost>,
     /// The lens.
     pub lens: Lens,
 }
@@ -84,33 +86,51 @@ fn rank(judgement: &LensJudgement) -> f64 {
 /// A lens that can be built; `None` if no light gets through.
 fn finish(candidate: &Candidate, asked: &LensRequirements) -> Option<DesignedLens> {
     let mut draft = settled(&candidate.draft, asked);
-    let mut best: Option<(LensJudgement, Lens)> = None;
+    let mut best: Option<(LensJudgement, Lens, Vec<LimitCost>)> = None;
+    let mut costs = limit_costs(&draft, asked, &settling(), freedom(asked));
     for margin in MARGINS {
         let Some(lens) = with_rims(&draft, asked) else { break };
         if let Ok(judgement) = judge_lens(&lens, asked, JUDGEMENT_TOLERANCE)
-            && best.as_ref().is_none_or(|(before, _)| rank(&judgement) < rank(before))
+            && best.as_ref().is_none_or(|(before, ..)| rank(&judgement) < rank(before))
         {
-            best = Some((judgement, refocused(&lens, asked)));
+            let costs = in_lens(&costs, &lens);
+            best = Some((judgement, refocused(&lens, asked), costs));
         }
         let Some(beams) = traced_beams(&lens) else { break };
         let plan = BeamPlan { traced: Some(beams), margin, ..BeamPlan::full(WEIGHT) };
         let freedom = freedom(asked);
         let Some(found) = descend(&draft, asked, &plan, freedom, TRIALS) else { break };
         draft = found.draft;
+        costs = limit_costs(&draft, asked, &plan, freedom);
     }
-    let (judgement, lens) = best?;
+    let (judgement, lens, costs) = best?;
     let origin = candidate.origin.clone();
-    Some(DesignedLens { merit: DesignMerit::Best, origin, judgement, lens })
+    Some(DesignedLens { merit: DesignMerit::Best, origin, judgement, costs, lens })
 }
 
 fn freedom(asked: &LensRequirements) -> Freedom {
     Freedom { glasses: false, aspheric_surfaces: asked.aspheric_surfaces, pupil: true }
 }
 
+/// The costs with the surfaces of a lens, which has a diaphragm that its draft has not.
+fn in_lens(costs: &[LimitCost], lens: &Lens) -> Vec<LimitCost> {
+    let diaphragm = lens.surfaces.iter().position(|row| row.stop && row.comment == "diaphragm");
+    let behind = |row: usize| diaphragm.is_some_and(|stop| row >= stop);
+    let moved = |cost: &LimitCost| {
+        let surface = cost.surface.map(|row| if behind(row) { row + 1 } else { row });
+        LimitCost { surface, ..cost.clone() }
+    };
+    costs.iter().map(moved).collect()
+}
+
+/// The beams and the heavy limits of the first descent of a finish.
+fn settling() -> BeamPlan {
+    BeamPlan { margin: 1e-4, ..BeamPlan::full(WEIGHT) }
+}
+
 /// The draft after a descent with heavy limits.
 fn settled(draft: &LensDraft, asked: &LensRequirements) -> LensDraft {
-    let plan = BeamPlan { margin: 1e-4, ..BeamPlan::full(WEIGHT) };
-    descend(draft, asked, &plan, freedom(asked), 2 * TRIALS)
+    descend(draft, asked, &settling(), freedom(asked), 2 * TRIALS)
         .map_or_else(|| draft.clone(), |found| found.draft)
 }
 

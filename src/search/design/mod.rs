@@ -17,6 +17,7 @@ mod run;
 mod spec;
 mod starts;
 
+pub use draft::LimitCost;
 pub use finish::{DesignMerit, DesignedLens};
 pub use judge::{
     FieldJudgement, JUDGEMENT_TOLERANCE, JudgementError, LensJudgement, RequirementMargin,

@@ -51,8 +51,15 @@ impl DraftMerit<'_> {
         Some(())
     }
 
-    fn limit(&self, violation: f64, slopes: &[(DraftParameter, f64)], sum: &mut ResidualSum) {
+    fn limit(
+        &self,
+        (term, surface): (&'static str, Option<usize>),
+        violation: f64,
+        slopes: &[(DraftParameter, f64)],
+        sum: &mut ResidualSum,
+    ) {
         if violation != 0.0 {
+            sum.broken.push((term, surface, violation));
             let mut row = vec![0.0; self.parameters.len()];
             for (parameter, slope) in slopes {
                 if let Some(i) = self.index_of(*parameter) {
@@ -72,7 +79,7 @@ impl DraftMerit<'_> {
         let room = FOCAL_PART * FOCAL_LENGTH_TOLERANCE * target;
         let off = focal - target;
         let violation = if off.abs() > room { off - room * off.signum() } else { 0.0 };
-        self.limit(violation, &slopes, sum);
+        self.limit(("focal_length", None), violation, &slopes, sum);
         Some(())
     }
 
@@ -82,10 +89,11 @@ impl DraftMerit<'_> {
         let margin = self.plan.margin * self.asked.focal_length;
         let track: f64 = rows.iter().map(|row| row.thickness).sum();
         let slopes: Vec<_> = (0..rows.len()).map(|i| (gap(i), 1.0)).collect();
-        self.limit((track - self.asked.track + margin).max(0.0), &slopes, sum);
+        let long = (track - self.asked.track + margin).max(0.0);
+        self.limit(("total_track", None), long, &slopes, sum);
         let last = rows.len() - 1;
         let short = rows[last].thickness - self.asked.back_focus - margin;
-        self.limit(short.min(0.0), &[(gap(last), 1.0)], sum);
+        self.limit(("back_focus", None), short.min(0.0), &[(gap(last), 1.0)], sum);
     }
 
     fn add_edge(&self, i: usize, sum: &mut ResidualSum) {
@@ -104,7 +112,8 @@ impl DraftMerit<'_> {
             let by = by.into_iter();
             slopes.extend(by.map(|(p, slope)| (DraftParameter::Surface(row, p), sign * slope)));
         }
-        self.limit(short, &slopes, sum);
+        let term = if rows[i].medium == Medium::Air { "air_edge" } else { "glass_edge" };
+        self.limit((term, Some(i)), short, &slopes, sum);
     }
 
     fn add_steepness(&self, i: usize, sum: &mut ResidualSum) {
@@ -113,7 +122,7 @@ impl DraftMerit<'_> {
         let over = (curvature * self.rims[i]).abs() - STEEPNESS[0];
         let by = DraftParameter::Surface(i, SurfaceParameter::Curvature);
         let slope = curvature.signum() * self.rims[i] * length;
-        self.limit(length * over.max(0.0), &[(by, slope)], sum);
+        self.limit(("steepness", Some(i)), length * over.max(0.0), &[(by, slope)], sum);
     }
 
     /// Keeps a glass inside the map.
@@ -127,9 +136,19 @@ impl DraftMerit<'_> {
         let [by_index, by_abbe] =
             [DraftParameter::Surface(i, SurfaceParameter::Index), DraftParameter::Abbe(i)];
         let over = (nd - high).max(0.0);
-        self.limit(length * over, &[(by_index, length), (by_abbe, -length * high_slope)], sum);
+        self.limit(
+            ("glass", Some(i)),
+            length * over,
+            &[(by_index, length), (by_abbe, -length * high_slope)],
+            sum,
+        );
         let under = (nd - low).min(0.0);
-        self.limit(length * under, &[(by_index, length), (by_abbe, -length * low_slope)], sum);
+        self.limit(
+            ("glass", Some(i)),
+            length * under,
+            &[(by_index, length), (by_abbe, -length * low_slope)],
+            sum,
+        );
     }
 }
 

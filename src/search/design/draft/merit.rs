@@ -2,7 +2,7 @@
 
 use super::beams::FieldBeam;
 use super::parameter::model;
-use super::{BeamPlan, DraftParameter, Freedom, LensDraft};
+use super::{BeamPlan, DraftParameter, Freedom, LensDraft, LimitCost};
 use crate::lens::{Lens, Medium, System, glass::model_index};
 use crate::search::design::LensRequirements;
 use crate::search::design::judge::asked_wavelengths;
@@ -44,6 +44,8 @@ struct DraftSystem {
 #[derive(Debug)]
 pub(super) struct ResidualSum {
     point: LeastSquaresPoint,
+    /// The limits that are broken, each with its surface and its violation in mm.
+    pub(super) broken: Vec<(&'static str, Option<usize>, f64)>,
 }
 
 /// The rays of a wavelength with the derivatives of their image points by the parameters.
@@ -59,7 +61,8 @@ impl ResidualSum {
     fn new(count: usize) -> Self {
         let half_gradient = DVector::zeros(count);
         let normal = DMatrix::zeros(count, count);
-        Self { point: LeastSquaresPoint { value: 0.0, half_gradient, normal } }
+        let point = LeastSquaresPoint { value: 0.0, half_gradient, normal };
+        Self { point, broken: Vec::new() }
     }
 
     /// Adds a squared residual with its derivatives.
@@ -143,12 +146,42 @@ impl<'a> DraftMerit<'a> {
         &mut self,
         values: &[f64],
     ) -> Option<LeastSquaresPoint> {
+        self.sum(values).map(|sum| sum.point)
+    }
+
+    fn sum(&mut self, values: &[f64]) -> Option<ResidualSum> {
         self.draft = self.draft_at(values);
         self.update_systems();
         let mut sum = ResidualSum::new(values.len());
         self.add_spots(&mut sum)?;
         self.add_limits(&mut sum)?;
-        sum.point.value.is_finite().then_some(sum.point)
+        sum.point.value.is_finite().then_some(sum)
+    }
+
+    /// What the limits of the draft cost at a minimum of the merit: by their multipliers.
+    pub(super) fn limit_costs(&mut self) -> Option<Vec<LimitCost>> {
+        let values = self.start();
+        let sum = self.sum(&values)?;
+        let weight = self.plan.limit_weight;
+        let squares: f64 = sum.broken.iter().map(|(_, _, v)| weight * v * v).sum();
+        let rms = (sum.point.value - squares).max(0.0).sqrt().max(1e-9);
+        let of_penalty = |&(term, surface, violation): &(&'static str, Option<usize>, f64)| {
+            LimitCost { term, surface, um_per_mm: 1e3 * weight * violation.abs() / rms }
+        };
+        let mut costs: Vec<LimitCost> = sum.broken.iter().map(of_penalty).collect();
+        for (i, parameter) in self.parameters.iter().enumerate() {
+            let DraftParameter::Surface(row, SurfaceParameter::Thickness) = *parameter else {
+                continue;
+            };
+            let [least, _] = parameter.range(&self.draft, self.asked);
+            let slope = sum.point.half_gradient[i];
+            if values[i] <= least && slope > 0.0 {
+                let air = self.draft.lens.surfaces[row].medium == Medium::Air;
+                let term = if air { "air_center" } else { "glass_center" };
+                costs.push(LimitCost { term, surface: Some(row), um_per_mm: 1e3 * slope / rms });
+            }
+        }
+        Some(costs)
     }
 
     fn update_systems(&mut self) {
@@ -280,6 +313,7 @@ impl<'a> DraftMerit<'a> {
                 row[i] -= of_focal * by;
             }
         }
+        sum.broken.push(("distortion", None, over));
         sum.add(self.plan.limit_weight, over * off.signum(), &row);
     }
 

@@ -38,6 +38,32 @@ impl LensDraft {
     }
 }
 
+/// What a limit costs.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct LimitCost {
+    /// The limit.
+    pub term: &'static str,
+    /// The surface, or the one in front of the gap, counted from 0; `None` for the whole lens.
+    pub surface: Option<usize>,
+    /// What the RMS spot radius over the fields would gain, in µm, by a bound looser by 1 mm; for a
+    /// distortion in mm of the image.
+    pub um_per_mm: f64,
+}
+
+/// The costs of all limits that hold a draft, those that cost most first; empty if its beams do not
+/// get through.
+pub(super) fn limit_costs(
+    draft: &LensDraft,
+    asked: &LensRequirements,
+    plan: &BeamPlan,
+    freedom: Freedom,
+) -> Vec<LimitCost> {
+    let merit = DraftMerit::new(draft, asked, plan, freedom);
+    let mut costs = merit.and_then(|mut merit| merit.limit_costs()).unwrap_or_default();
+    costs.sort_by(|a, b| b.um_per_mm.total_cmp(&a.um_per_mm));
+    costs
+}
+
 /// The result of a descent.
 #[derive(Debug, Clone)]
 pub(super) struct DraftDescent {
