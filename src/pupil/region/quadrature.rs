@@ -34,7 +34,7 @@ impl Default for Accuracy {
 pub struct ConvergedValues<const K: usize> {
     /// The numbers at the highest order used.
     pub values: [f64; K],
-    /// The change of each by the last raising of the order.
+    /// The change of each by the last raising of the order, and at least a part of the one before.
     pub errors: [f64; K],
     /// The number of rays traced.
     pub rays: usize,
@@ -79,6 +79,11 @@ impl Region<'_> {
             }
             RegionKind::Irregular { .. } => IRREGULAR_ORDERS,
         }
+    }
+
+    /// True if the pupil has no known boundary and is sampled by a sequence of points.
+    fn is_sampled(&self) -> bool {
+        matches!(self.kind, RegionKind::Irregular { annulus: None, .. })
     }
 
     /// The nodes of an order, counted from 0; none if there is no light.
@@ -234,7 +239,7 @@ fn sampling_error(change: f64, error_before: f64) -> f64 {
 pub struct ConvergedList {
     /// The numbers at the highest order used.
     pub values: Vec<f64>,
-    /// The change of each by the last raising of the order.
+    /// The change of each by the last raising of the order, and at least a part of the one before.
     pub errors: Vec<f64>,
     /// The number of rays traced.
     pub rays: usize,
@@ -242,9 +247,19 @@ pub struct ConvergedList {
     pub converged: bool,
 }
 
-/// Raises the order until each of some numbers changes by less than the tolerance times its scale;
-/// `None` if no light gets through. `numbers` computes them from nodes, `scales` gives the scale of
-/// each.
+/// The part of the error before the last raising of the order that is left at least. Two orders may
+/// agree by chance; from one to the next the error falls to between a quarter and a thirtieth.
+const LEAST_FALL: f64 = 0.1;
+
+/// The error of an order of Gauss rules from the last change.
+fn order_error(change: f64, error_before: f64) -> f64 {
+    let least = if error_before.is_finite() { LEAST_FALL * error_before } else { 0.0 };
+    change.max(least)
+}
+
+/// Raises the order until each of some numbers changes by less than the tolerance times its scale,
+/// and did not change by much more the time before; `None` if no light gets through. `numbers`
+/// computes them from nodes, `scales` gives the scale of each.
 pub fn converge<const K: usize>(
     region: &Region<'_>,
     accuracy: Accuracy,
@@ -281,7 +296,9 @@ pub fn converge_list(
             |last| last.changes(region, &values),
         );
         let allowed = scales(&values).into_iter().map(|scale| accuracy.tolerance * scale.abs());
-        let converged = errors.iter().zip(allowed).all(|(error, allowed)| *error <= allowed);
+        let small = errors.iter().zip(allowed).all(|(error, allowed)| *error <= allowed);
+        // A first change alone does not tell an agreement by chance.
+        let converged = small && (has_error || region.is_sampled());
         let now = ConvergedList { values, errors, rays, converged };
         if converged {
             return Some(now);
@@ -294,11 +311,8 @@ pub fn converge_list(
 impl ConvergedList {
     /// The errors of the numbers at the next order, from their changes.
     fn changes(&self, region: &Region<'_>, values: &[f64]) -> Vec<f64> {
-        let sampled = matches!(region.kind, RegionKind::Irregular { annulus: None, .. });
+        let error = if region.is_sampled() { sampling_error } else { order_error };
         let change = |k: usize| (values[k] - self.values[k]).abs();
-        let error = |k: usize| {
-            if sampled { sampling_error(change(k), self.errors[k]) } else { change(k) }
-        };
-        (0..values.len()).map(error).collect()
+        (0..values.len()).map(|k| error(change(k), self.errors[k])).collect()
     }
 }
