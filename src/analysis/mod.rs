@@ -9,6 +9,7 @@ mod clear_semi_diameters;
 mod diffraction;
 mod distortion;
 mod fan;
+mod geometric_radius;
 mod illumination;
 mod image_quality;
 mod mtf;

@@ -1,11 +1,11 @@
 //! The spot: the image points of the rays of a field.
 
+use super::geometric_radius::geometric_radius;
 use super::{AnalysisError, Estimate, lit_region};
 use crate::lens::FieldPoint;
-use crate::pupil::{Accuracy, Nodes, PupilMoments, RayModel, Region, RegionKind, converge};
-use crate::trace::{Landings, TraceSink};
+use crate::pupil::{Accuracy, Nodes, PupilMoments, RayModel, Region, converge};
+use crate::trace::Landings;
 use rayon::prelude::*;
-use std::f64::consts::{PI, TAU};
 
 /// The spot of a field at one wavelength.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -104,17 +104,30 @@ pub fn spot(
     let channels = trace_channels(model, field, accuracy);
     let pooled = combine_channels(model, &channels)?;
     let lit = || channels.iter().filter_map(|channel| channel.as_ref().ok());
-    let center = pooled.centroid.map(|e| e.value);
     Ok(Spot {
         field,
         rms: pooled.rms,
         centroid: pooled.centroid,
-        radius: geometric_radius(lit(), center, pooled.rms.error, model.neglected.ray_shift),
+        radius: radius(&pooled, lit().map(|channel| &channel.0), model, accuracy),
         light: pooled.light,
         is_fully_lit: pooled.is_fully_lit,
         shares: lit().map(|(_, spot)| *spot).zip(pooled.shares).collect(),
         channels: channels.iter().map(|c| c.as_ref().map(|c| c.1).map_err(|e| *e)).collect(),
     })
+}
+
+/// The largest distance from the common centroid; its error is that of the search, of the centroid,
+/// and the shift of a ray by what is left out.
+fn radius<'a>(
+    pooled: &PolychromaticSpot,
+    regions: impl Iterator<Item = &'a Region<'a>>,
+    model: &RayModel,
+    accuracy: Accuracy,
+) -> Estimate {
+    let [x, y] = pooled.centroid;
+    let found = geometric_radius(regions, [x.value, y.value], accuracy.tolerance);
+    let error = found.error + x.error.hypot(y.error) + model.neglected.ray_shift;
+    Estimate::new(found.value, error, pooled.rms.rays + found.rays)
 }
 
 /// The pupil and the spot at one wavelength.
@@ -280,73 +293,4 @@ fn spot_moments(region: &Region<'_>, nodes: &Nodes) -> Option<[f64; 8]> {
     };
     let covariance = traced.arrivals().map(|(i, w)| w * product(i)).sum::<f64>() / area;
     (area > 0.0).then(|| [points.rms_radius(), x, y, area, slopes.spread / area, covariance, u, v])
-}
-
-/// The rays around the edge from which the largest distance is found.
-const EDGE_RAYS: usize = 128;
-
-/// The largest distance of a ray from a point, over rays at the edge and those of a quadrature
-/// inside it. The error is by how much the distance may rise between two edge rays, and the shift of
-/// a ray by what is left out.
-fn geometric_radius<'a>(
-    lit: impl Iterator<Item = &'a LitChannel<'a>>,
-    center: [f64; 2],
-    rms_error: f64,
-    ray_shift: f64,
-) -> Estimate {
-    let (mut radius, mut most, mut rays) = (0.0f64, 0.0f64, 0);
-    for (region, spot) in lit {
-        let inside = region.nodes(2.min(region.orders() - 1));
-        let edge = edge_points(region);
-        rays += spot.rms.rays + inside.points.len() + edge.len();
-        let far = ray_distances(region, &inside.points, center).into_iter().fold(0.0, f64::max);
-        let edge = ray_distances(region, &edge, center);
-        let peak = edge.iter().copied().fold(far, f64::max);
-        radius = radius.max(peak);
-        most = most.max(peak + rise_between(&edge, region.launch.is_symmetric()));
-    }
-    Estimate::new(radius, (most - radius).max(rms_error) + ray_shift, rays)
-}
-
-/// By how much the largest of some distances around an edge may be exceeded between two of them: a
-/// quarter of the fall to the lower of its second neighbours, which is more than a parabola or a
-/// corner between them rises. Half an edge goes on as its mirror image.
-fn rise_between(edge: &[f64], half: bool) -> f64 {
-    let count = edge.len();
-    if count < 5 {
-        return 0.0;
-    }
-    let peak = (0..count).max_by(|a, b| edge[*a].total_cmp(&edge[*b])).unwrap_or(0);
-    // The last point of a whole edge is the first one again.
-    let neighbours = if half {
-        [peak.abs_diff(2), (count - 1) - (count - 1).abs_diff(peak + 2)]
-    } else {
-        [(peak + count - 3) % (count - 1), (peak + 2) % (count - 1)]
-    };
-    0.25 * (edge[peak] - edge[neighbours[0]].min(edge[neighbours[1]]))
-}
-
-/// Points just inside the edge of a pupil.
-fn edge_points(region: &Region<'_>) -> Vec<[f64; 2]> {
-    let turn = if region.launch.is_symmetric() { PI } else { TAU };
-    let at = |i: usize| turn * i as f64 / EDGE_RAYS as f64;
-    let inside = 1.0 - 1e-9;
-    match &region.kind {
-        RegionKind::Clear => (0..=EDGE_RAYS)
-            .map(|i| at(i).sin_cos())
-            .map(|(s, c)| [inside * s, inside * c])
-            .collect(),
-        RegionKind::StarShaped(boundary) => boundary.points(&region.launch, EDGE_RAYS, inside),
-        RegionKind::Irregular { annulus: Some(ring), .. } => {
-            ring.outer.points(&region.launch, EDGE_RAYS, inside)
-        }
-        RegionKind::Dark | RegionKind::Unbounded | RegionKind::Irregular { .. } => Vec::new(),
-    }
-}
-
-/// The distances of the image points of some rays from a point, of those that arrive.
-fn ray_distances(region: &Region<'_>, points: &[[f64; 2]], [x, y]: [f64; 2]) -> Vec<f64> {
-    let (launched, landed) = region.launch.trace_points(points);
-    let arrived = (0..launched.len()).filter(|i| landed.fate(*i).is_imaged());
-    arrived.map(|i| (landed.x[i] - x).hypot(landed.y[i] - y)).collect()
 }

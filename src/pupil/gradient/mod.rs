@@ -10,6 +10,8 @@
 //! ```
 //!
 //! (Teh, *Computational Lens Design*, eq. 3.16, with the factor 1/|∇g| that is missing there.)
+//! The rays of the field stay the same while the lens changes: the direction of a field that is given
+//! by the height of its image does not follow the focal length.
 //! Leaving out the second integral is the usual, biased derivative. All estimators differentiate
 //! by every number of a system at once, semi-diameters included.
 

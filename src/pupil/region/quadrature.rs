@@ -248,8 +248,9 @@ pub struct ConvergedList {
 }
 
 /// The part of the error before the last raising of the order that is left at least. Two orders may
-/// agree by chance; from one to the next the error falls to between a quarter and a thirtieth.
-const LEAST_FALL: f64 = 0.1;
+/// agree by chance; where the light of a field grazes a surface, or its spot is much aberrated, an
+/// order leaves a sixth of the error of the one before.
+const LEAST_FALL: f64 = 1.0 / 6.0;
 
 /// The error of an order of Gauss rules from the last change.
 fn order_error(change: f64, error_before: f64) -> f64 {

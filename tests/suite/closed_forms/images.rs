@@ -58,18 +58,15 @@ fn the_radius_of_a_spot_does_not_depend_on_the_azimuth_of_its_field() {
         let (sin, cos) = degrees.to_radians().sin_cos();
         spot(&model, field(sin, cos), ACCURACY).unwrap().radius
     };
-    // The farthest ray lies in the plane of symmetry, where an edge ray is traced.
+    // The farthest ray lies in the plane of symmetry, where an edge ray is traced first.
     let exact = at(0.0);
-    let mut inexact = 0;
     for step in 1..60 {
         let got = at(f64::from(step) * 1.37);
         let error = (got.value - exact.value).abs();
         let stated = got.error + exact.error + 1e-9 * exact.value;
         assert!(error <= stated, "step {step}: {got:?} instead of {exact:?}");
-        assert!(got.error < 3e-3 * got.value, "{got:?}");
-        inexact += usize::from(error > 1e-6 * exact.value);
+        assert!(error <= 1e-6 * exact.value, "step {step}: {got:?} instead of {exact:?}");
     }
-    assert!(inexact > 20, "{inexact}");
 }
 
 #[test]
@@ -108,15 +105,19 @@ fn the_error_of_the_illumination_covers_its_error() {
     let (mut compared, mut inexact) = (0, 0);
     for lens in lenses() {
         let model = lens.clipped_model();
-        let at = |tolerance| {
-            illumination(&model, lens.primary(), Accuracy { tolerance, ..ACCURACY })
+        let at = |accuracy| {
+            illumination(&model, lens.primary(), accuracy)
                 .into_iter()
                 .filter_map(|light| light.relative.filter(|share| share.value > 0.0))
         };
-        for tolerance in [0.3, 1e-1, 1e-2, 1e-4] {
-            for (rough, exact) in at(tolerance).zip(at(ACCURACY.tolerance)).skip(1) {
+        let exact: Vec<_> = at(ACCURACY).collect();
+        let rough = [0.3, 1e-1, 1e-2, 1e-4].map(|tolerance| Accuracy { tolerance, ..ACCURACY });
+        // Rays that run out leave the result of a low order.
+        let short = Accuracy { max_rays: 1, ..ACCURACY };
+        for accuracy in rough.into_iter().chain([short]) {
+            for (rough, exact) in at(accuracy).zip(&exact).skip(1) {
                 let error = (rough.value - exact.value).abs();
-                let stated = rough.error + exact.error;
+                let stated = rough.error + exact.error.max(ACCURACY.tolerance * exact.value);
                 assert!(error <= stated, "{}: {error:e}, stated {stated:e}", lens.id());
                 compared += 1;
                 inexact += usize::from(error > 1e-9);
@@ -124,7 +125,7 @@ fn the_error_of_the_illumination_covers_its_error() {
         }
     }
     println!("{compared} illuminations, {inexact} of them with an error above 1e-9");
-    assert!(compared >= 60 && inexact >= 10, "{compared}, {inexact}");
+    assert!(compared >= 75 && inexact >= 12, "{compared}, {inexact}");
 }
 
 #[test]

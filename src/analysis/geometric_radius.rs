@@ -1,0 +1,216 @@
+//! The largest distance of any ray of a spot from a point: a maximum over the pupil and its edge.
+//!
+//! In the azimuth and the share of the radius up to the edge, a pupil is a rectangle on which the
+//! distance is smooth but for the corners of the edge. A lattice that contains the azimuths of these
+//! shows the peaks, and the highest of them are refined.
+
+use super::Estimate;
+use crate::pupil::Region;
+use crate::trace::TraceSink;
+use std::f64::consts::{PI, TAU};
+
+/// The azimuths of the lattice in half a turn.
+const AZIMUTHS: usize = 24;
+/// The shares of the radius of the lattice, closer towards the edge: equal steps of area.
+const SHARES: usize = 8;
+/// The first step of the refinement: in lattice steps of the azimuth, and in shares of the radius.
+const FIRST_STEP: [f64; 2] = [0.5, 0.06];
+/// The factor between the steps of the refinement.
+const SHRINK: f64 = 0.25;
+/// The largest number of moves and of shorter steps of the refinement.
+const MAX_STEPS: usize = 40;
+/// The part of the fall from a peak to the lowest of its neighbours that it may rise between them: a
+/// parabola rises by a quarter, a corner by a half.
+const RISE: f64 = 0.5;
+/// The part of the allowed error to which a peak is refined.
+const REFINED: f64 = 0.25;
+/// The largest number of peaks that are refined.
+const MAX_PEAKS: usize = 8;
+
+/// The largest distance of a ray of some pupils from a point, to a relative tolerance. The error is
+/// what the distance may rise between the rays traced last.
+pub(super) fn geometric_radius<'a>(
+    regions: impl Iterator<Item = &'a Region<'a>>,
+    center: [f64; 2],
+    tolerance: f64,
+) -> Estimate {
+    let mut searches: Vec<PeakSearch<'_>> =
+        regions.map(|region| PeakSearch { region, center, rays: 0 }).collect();
+    let mut peaks: Vec<(usize, Peak)> = Vec::new();
+    for (i, search) in searches.iter_mut().enumerate() {
+        peaks.extend(search.peaks().into_iter().map(|peak| (i, peak)));
+    }
+    peaks.sort_by(|a, b| b.1.bound().total_cmp(&a.1.bound()));
+    let (mut radius, mut most) = (0.0f64, 0.0f64);
+    for (count, (i, peak)) in peaks.into_iter().enumerate() {
+        if peak.bound() <= radius {
+            break;
+        }
+        let peak =
+            if count < MAX_PEAKS { searches[i].refine(peak, REFINED * tolerance) } else { peak };
+        radius = radius.max(peak.distance);
+        most = most.max(peak.bound());
+    }
+    let rays = searches.iter().map(|search| search.rays).sum();
+    Estimate::new(radius, (most - radius).max(0.0), rays)
+}
+
+/// A local maximum of the distance.
+#[derive(Debug, Clone, Copy)]
+struct Peak {
+    /// The azimuth and the share of the radius.
+    place: [f64; 2],
+    /// The distance there.
+    distance: f64,
+    /// How much more it may be nearby.
+    rise: f64,
+}
+
+impl Peak {
+    fn bound(&self) -> f64 {
+        self.distance + self.rise
+    }
+}
+
+/// The search for the peaks of one pupil.
+struct PeakSearch<'a> {
+    region: &'a Region<'a>,
+    center: [f64; 2],
+    rays: usize,
+}
+
+impl PeakSearch<'_> {
+    /// The peaks of the lattice; of a pupil whose edge is not known, the farthest of many rays.
+    fn peaks(&mut self) -> Vec<Peak> {
+        let half = self.region.launch.is_symmetric();
+        let azimuths = self.region.azimuths(if half { AZIMUTHS } else { 2 * AZIMUTHS });
+        let shares: [f64; SHARES] =
+            std::array::from_fn(|j| ((j + 1) as f64 / SHARES as f64).sqrt());
+        let mut lattice = Vec::with_capacity(azimuths.len());
+        for azimuth in &azimuths {
+            let Some(radius) = self.region.lit_radius(*azimuth) else {
+                return self.farthest_sample().into_iter().collect();
+            };
+            self.rays += radius.rays;
+            lattice.push(self.distances(&shares.map(|share| radius.point(share))));
+        }
+        let mut peaks = Vec::new();
+        for (i, row) in lattice.iter().enumerate() {
+            for (j, distance) in row.iter().copied().enumerate() {
+                let around = neighbours(&lattice, i, j, half);
+                if distance >= around.iter().copied().fold(0.0, f64::max) {
+                    let place = [azimuths[i], shares[j]];
+                    peaks.push(Peak { place, distance, rise: rise(distance, around) });
+                }
+            }
+        }
+        peaks
+    }
+
+    /// The distances of the rays of some pupil points; −∞ for those that do not arrive.
+    fn distances(&mut self, points: &[[f64; 2]]) -> Vec<f64> {
+        self.rays += points.len();
+        let [x, y] = self.center;
+        let (launched, landed) = self.region.launch.trace_points(points);
+        let mut distances = vec![f64::NEG_INFINITY; points.len()];
+        for (ray, i) in launched.into_iter().enumerate() {
+            if landed.fate(ray).is_imaged() {
+                distances[i] = (landed.x[ray] - x).hypot(landed.y[ray] - y);
+            }
+        }
+        distances
+    }
+
+    /// The farthest ray of a sample of an irregular pupil, and how much farther it is than that of a
+    /// quarter as many rays.
+    fn farthest_sample(&mut self) -> Option<Peak> {
+        let orders = 0..3.min(self.region.orders());
+        let farthest = orders.map(|order| {
+            let points = self.region.nodes(order).points;
+            self.distances(&points).into_iter().fold(0.0, f64::max)
+        });
+        let found: Vec<f64> = farthest.collect();
+        let distance = found.iter().copied().reduce(f64::max)?;
+        let fewer = found.iter().rev().skip(1).copied().fold(0.0, f64::max);
+        Some(Peak { place: [0.0; 2], distance, rise: distance - fewer })
+    }
+
+    /// A peak that may rise by no more than a relative tolerance.
+    fn refine(&mut self, mut peak: Peak, tolerance: f64) -> Peak {
+        let mut step = [FIRST_STEP[0] * PI / AZIMUTHS as f64, FIRST_STEP[1]];
+        for _ in 0..MAX_STEPS {
+            if peak.rise <= tolerance * peak.distance {
+                break;
+            }
+            let around = self.around(peak.place, step);
+            let best = around.iter().copied().fold(peak, Peak::higher);
+            if best.distance > peak.distance {
+                peak = Peak { rise: peak.rise, ..best };
+                continue;
+            }
+            peak.rise = rise(peak.distance, around.iter().map(|other| other.distance));
+            if let Some(top) = self.at(vertex(&peak, &around, step)) {
+                peak = Peak { rise: peak.rise, ..peak.higher(top) };
+            }
+            step = step.map(|size| SHRINK * size);
+        }
+        peak
+    }
+
+    /// The eight places at a step from one.
+    fn around(&mut self, [azimuth, share]: [f64; 2], [turn, along]: [f64; 2]) -> Vec<Peak> {
+        let steps = [-1.0, 0.0, 1.0].into_iter().flat_map(|i| [-1.0, 0.0, 1.0].map(|j| [i, j]));
+        let others = steps.filter(|step| *step != [0.0; 2]);
+        others.filter_map(|[i, j]| self.at([azimuth + i * turn, share + j * along])).collect()
+    }
+
+    /// The distance at a place, or at the nearest one of the pupil.
+    fn at(&mut self, [azimuth, share]: [f64; 2]) -> Option<Peak> {
+        let azimuth = azimuth.rem_euclid(TAU);
+        let mirrored = self.region.launch.is_symmetric() && azimuth > PI;
+        let azimuth = if mirrored { TAU - azimuth } else { azimuth };
+        let place = [azimuth, share.clamp(0.0, 1.0)];
+        let radius = self.region.lit_radius(azimuth)?;
+        self.rays += radius.rays;
+        let distance = self.distances(&[radius.point(place[1])])[0];
+        distance.is_finite().then_some(Peak { place, distance, rise: 0.0 })
+    }
+}
+
+impl Peak {
+    fn higher(self, other: Self) -> Self {
+        if other.distance > self.distance { other } else { self }
+    }
+}
+
+/// By how much a peak may rise between its neighbours.
+fn rise(distance: f64, around: impl IntoIterator<Item = f64>) -> f64 {
+    let low = around.into_iter().filter(|other| other.is_finite()).fold(distance, f64::min);
+    RISE * (distance - low)
+}
+
+/// The distances around one of the lattice; half a turn goes on as its mirror image, and a whole one
+/// begins again.
+fn neighbours(lattice: &[Vec<f64>], i: usize, j: usize, half: bool) -> Vec<f64> {
+    let last = lattice.len() - 1;
+    // The last azimuth of a whole turn is the first one again; a single one has no neighbours.
+    let (second, last_but_one) = (1.min(last), last.saturating_sub(1));
+    let (before, after) = if half { (second, last_but_one) } else { (last_but_one, second) };
+    let before = if i == 0 { before } else { i - 1 };
+    let after = if i == last { after } else { i + 1 };
+    let columns = j.saturating_sub(1)..(j + 2).min(lattice[i].len());
+    let places = [before, i, after].into_iter().flat_map(|i| columns.clone().map(move |k| (i, k)));
+    places.filter(|place| *place != (i, j)).map(|(i, k)| lattice[i][k]).collect()
+}
+
+/// The vertex of the parabolas along both coordinates through a peak and its neighbours.
+fn vertex(peak: &Peak, around: &[Peak], step: [f64; 2]) -> [f64; 2] {
+    // The order of `PeakSearch::around`, if none of the eight is missing.
+    let &[_, left, _, low, high, _, right, _] = around else { return peak.place };
+    let shift = |before: Peak, after: Peak| {
+        let bend = before.distance - 2.0 * peak.distance + after.distance;
+        if bend < 0.0 { 0.5 * (before.distance - after.distance) / bend } else { 0.0 }
+    };
+    let shifts = [shift(left, right), shift(low, high)];
+    [0, 1].map(|k| peak.place[k] + shifts[k].clamp(-1.0, 1.0) * step[k])
+}
