@@ -3,7 +3,7 @@
 //! This file is the map. The modules below are the floors of the house, from the ground up, and
 //! **a module uses only modules declared above it**; `tests/architecture.rs` keeps that true.
 //!
-//! What is deliberately absent:
+//! Deliberately absent:
 //! - *tracing looks nothing up*: a [`lens::Lens`] is what a person wrote, a [`lens::System`] holds
 //!   only numbers;
 //! - *no ray is dropped silently*: every ray ends with a [`trace::Fate`];

@@ -131,14 +131,14 @@ fn radius<'a>(
 }
 
 /// The pupil and the spot at one wavelength.
-pub(super) type LitChannel<'a> = (Region<'a>, MonochromaticSpot);
+pub(super) type TransmittedChannel<'a> = (Region<'a>, MonochromaticSpot);
 
 /// The pupil and the spot of a field at every wavelength, or why there is none.
 pub(super) fn trace_channels(
     model: &RayModel,
     field: FieldPoint,
     accuracy: Accuracy,
-) -> Vec<Result<LitChannel<'_>, AnalysisError>> {
+) -> Vec<Result<TransmittedChannel<'_>, AnalysisError>> {
     let trace = |wavelength| {
         let region = lit_region(model, field, wavelength)?;
         let spot = monochromatic_spot(&region, accuracy).ok_or(AnalysisError::NoLight)?;
@@ -161,7 +161,7 @@ pub(super) struct PolychromaticSpot {
 /// are proportional to the weight of the wavelength times the area of its pupil.
 pub(super) fn combine_channels(
     model: &RayModel,
-    channels: &[Result<LitChannel<'_>, AnalysisError>],
+    channels: &[Result<TransmittedChannel<'_>, AnalysisError>],
 ) -> Result<PolychromaticSpot, AnalysisError> {
     let weighted = || model.channels.iter().map(|channel| channel.weight).zip(channels);
     let lit: Vec<(f64, &MonochromaticSpot)> =

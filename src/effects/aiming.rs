@@ -1,8 +1,8 @@
 //! The difference that a beam aimed at the paraxial entrance pupil makes.
 //!
 //! A beam through the disc of the paraxial entrance pupil ends near the rim of the stop, not at it.
-//! How far the rays at the rim of the disc miss that of the stop bounds the part of the pupil that
-//! the two beams do not share, and with it the changes of light and of the spot. A beam that the rim
+//! The distance by which the rays at the rim of the disc miss that of the stop bounds the part of the
+//! pupil that the two beams do not share, and with it the changes of light and of the spot. A beam that the rim
 //! of the stop limits is the same either way; only the chief ray, from which image heights are
 //! measured, goes elsewhere.
 

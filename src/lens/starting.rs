@@ -6,7 +6,7 @@ use super::{
 };
 use crate::math::format_short;
 
-/// What stands in a new lens.
+/// The content of a new lens.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum StartingForm {
     /// A stop and an image plane one focal length behind it, without any glass.
@@ -18,7 +18,7 @@ pub enum StartingForm {
 /// The system that a new lens is for.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StartingLens {
-    /// What it begins with.
+    /// Its content.
     pub form: StartingForm,
     /// The focal length, in mm.
     pub focal_length: f64,

@@ -19,6 +19,6 @@ pub use dual::Dual;
 pub(crate) use format::format_short;
 pub use jet::Jet;
 pub use lanes::SimdWidth;
-pub(crate) use lanes::run_vectorized;
+pub(crate) use lanes::{dot, run_vectorized};
 pub use real::Real;
 pub use vec3::Vec3;

@@ -4,7 +4,7 @@
 //! Every number that changes is an affine function of one variable: a curvature is the variable
 //! itself, a pickup a multiple of it, and the index of a model glass is proportional to nd.
 
-use super::{Dual1, MeritError};
+use super::{MeritError, SLOPES, VariableDual};
 use crate::lens::glass::model_index;
 use crate::lens::{
     Aperture, FieldKind, Lens, Medium, Object, Quantity, Shape, Surface, System,
@@ -13,7 +13,7 @@ use crate::lens::{
 use crate::paraxial::Beam;
 use crate::pupil::{Aiming, RayModel, filled_stop_radius};
 use crate::trace::{SurfaceParameter, SystemGradient};
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 
 /// A number of a system that follows a variable: `offset + factor × variable`.
 #[derive(Debug, Clone, Copy)]
@@ -132,11 +132,9 @@ impl Configuration {
         if primary.surfaces[self.stop].semi_diameter <= radius {
             return Ok(None);
         }
-        let slope = |variable| {
-            let along = self.system_along_without_focus(primary, variable);
-            filled_stop_radius(&along, beam).map_or(0.0, |radius| radius.slope[0])
-        };
-        let slopes = DVector::from_iterator(self.variables, (0..self.variables).map(slope));
+        let slopes = self.slopes(primary, |along| {
+            filled_stop_radius(along, beam).unwrap_or_else(|_| VariableDual::constant(radius))
+        });
         for system in systems {
             system.surfaces[self.stop].semi_diameter = radius;
         }
@@ -163,11 +161,7 @@ impl Configuration {
     fn solve_focus(&self, systems: &mut [System<f64>], offset: f64) -> DVector<f64> {
         let primary = &systems[self.primary];
         let gap = paraxial_image_distance(primary, self.object) + offset;
-        let slope = |variable| {
-            let along = self.system_along_without_focus(primary, variable);
-            paraxial_image_distance(&along, self.object).slope[0]
-        };
-        let slopes = DVector::from_iterator(self.variables, (0..self.variables).map(slope));
+        let slopes = self.slopes(primary, |along| paraxial_image_distance(along, self.object));
         for system in systems {
             let last = system.surfaces.len() - 2;
             system.surfaces[last].thickness = gap;
@@ -175,24 +169,46 @@ impl Configuration {
         slopes
     }
 
-    fn system_along_without_focus(&self, primary: &System<f64>, variable: usize) -> System<Dual1> {
-        let mut system: System<Dual1> = primary.cast();
-        for binding in
-            self.bindings[self.primary].iter().filter(|binding| binding.variable == variable)
-        {
-            binding.target.value_mut(&mut system, binding.surface).slope[0] = binding.factor;
+    /// The derivatives by the variables of a number of a system that does not depend on the focus.
+    fn slopes(
+        &self,
+        primary: &System<f64>,
+        number: impl Fn(&System<VariableDual>) -> VariableDual,
+    ) -> DVector<f64> {
+        let blocks = (0..self.variables).step_by(SLOPES);
+        let slopes =
+            blocks.flat_map(|first| number(&self.along_without_focus(primary, first)).slope);
+        DVector::from_iterator(self.variables, slopes.take(self.variables))
+    }
+
+    /// A system with its derivatives along a block of variables, given by the first.
+    fn along_without_focus(&self, primary: &System<f64>, first: usize) -> System<VariableDual> {
+        let mut system: System<VariableDual> = primary.cast();
+        for binding in &self.bindings[self.primary] {
+            let direction = binding.variable.checked_sub(first).filter(|along| *along < SLOPES);
+            if let Some(direction) = direction {
+                let number = binding.target.value_mut(&mut system, binding.surface);
+                number.slope[direction] = binding.factor;
+            }
         }
         system
     }
 
-    /// The system at the primary wavelength with its derivative along one variable.
-    pub(super) fn system_along(&self, systems: &ResolvedSystems, variable: usize) -> System<Dual1> {
-        let mut system = self.system_along_without_focus(&systems.manufactured, variable);
-        if let Some(focus) = &systems.focus_slopes {
-            let last = system.surfaces.len() - 2;
-            system.surfaces[last].thickness.slope[0] = focus[variable];
-        }
-        system
+    /// The systems at the primary wavelength with their derivatives along each block of variables in
+    /// turn, with the first variable of the block.
+    pub(super) fn systems_along<'a>(
+        &'a self,
+        systems: &'a ResolvedSystems,
+    ) -> impl Iterator<Item = (usize, System<VariableDual>)> + 'a {
+        (0..self.variables).step_by(SLOPES).map(|first| {
+            let mut system = self.along_without_focus(&systems.manufactured, first);
+            if let Some(focus) = &systems.focus_slopes {
+                let last = system.surfaces.len() - 2;
+                let slopes = &mut system.surfaces[last].thickness.slope;
+                slopes.iter_mut().zip(focus.iter().skip(first)).for_each(|(to, by)| *to = *by);
+            }
+            (first, system)
+        })
     }
 
     /// The derivatives by the variables from those by the numbers of a system.
@@ -250,27 +266,29 @@ impl Configuration {
         varying
     }
 
-    /// The derivatives by the variables from those by the varying parameters.
-    pub(super) fn row_by_variables(
+    /// The derivatives of the varying parameters by the variables: a row for each parameter.
+    pub(super) fn parameter_slopes(
         &self,
         systems: &ResolvedSystems,
         wavelength: usize,
         varying: &[(Option<usize>, SurfaceParameter)],
-        row: &[f64],
-        by_variable: &mut [f64],
-    ) {
-        by_variable.fill(0.0);
-        let by = |surface: usize, parameter: SurfaceParameter| {
-            varying.iter().position(|m| *m == (Some(surface), parameter)).map_or(0.0, |i| row[i])
+    ) -> DMatrix<f64> {
+        let mut slopes = DMatrix::zeros(varying.len(), self.variables);
+        let row = |surface: usize, parameter: SurfaceParameter| {
+            varying.iter().position(|varies| *varies == (Some(surface), parameter))
         };
         for binding in &self.bindings[wavelength] {
-            by_variable[binding.variable] += binding.factor * by(binding.surface, binding.target);
+            if let Some(row) = row(binding.surface, binding.target) {
+                slopes[(row, binding.variable)] += binding.factor;
+            }
         }
-        if let Some(focus) = &systems.focus_slopes {
-            let last = self.systems[wavelength].surfaces.len() - 2;
-            let by_gap = by(last, SurfaceParameter::Thickness);
-            by_variable.iter_mut().zip(focus.iter()).for_each(|(to, f)| *to += by_gap * f);
+        let last = self.systems[wavelength].surfaces.len() - 2;
+        if let (Some(focus), Some(row)) =
+            (&systems.focus_slopes, row(last, SurfaceParameter::Thickness))
+        {
+            slopes.row_mut(row).iter_mut().zip(focus.iter()).for_each(|(to, by)| *to += by);
         }
+        slopes
     }
 }
 

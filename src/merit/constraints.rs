@@ -5,7 +5,7 @@
 use super::binding::{Configuration, ResolvedSystems};
 use super::first_order::slopes;
 use super::sum::SumOfSquares;
-use super::{Dual1, EvaluationContext, MeritError, Term};
+use super::{EvaluationContext, MeritError, Term, VariableDual};
 use crate::lens::{Lens, SurfaceNumber, System};
 use crate::math::Real;
 use serde::Serialize;
@@ -348,8 +348,8 @@ impl BoundedLength<'_> {
     }
 
     fn residual(&self, r: f64, sum: &mut SumOfSquares) {
-        let slope =
-            slopes(self.context, sum.level, |system: &System<Dual1>| self.quantity.length(system));
+        let length = |system: &System<VariableDual>| self.quantity.length(system);
+        let slope = slopes(self.context, sum.level, length);
         sum.add_residual(1.0, r, &slope);
     }
 }

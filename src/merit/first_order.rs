@@ -1,7 +1,7 @@
 //! Terms of first-order optics, differentiated by dual numbers.
 
-use super::EvaluationContext;
 use super::sum::{DerivativeLevel, SumOfSquares};
+use super::{EvaluationContext, VariableDual};
 use crate::lens::System;
 use crate::math::Real;
 use crate::paraxial::{paraxial_ray, signed_indices};
@@ -17,14 +17,15 @@ pub(super) fn focal_length(context: &EvaluationContext<'_>, target: f64, sum: &m
 pub(super) fn slopes(
     context: &EvaluationContext<'_>,
     level: DerivativeLevel,
-    number: impl Fn(&System<super::Dual1>) -> super::Dual1,
+    number: impl Fn(&System<VariableDual>) -> VariableDual,
 ) -> DVector<f64> {
     let count = context.values.len();
     if level == DerivativeLevel::Value {
         return DVector::zeros(count);
     }
-    let slope = |variable| number(&context.zoom.system_along(context.systems, variable)).slope[0];
-    DVector::from_iterator(count, (0..count).map(slope))
+    let systems = context.zoom.systems_along(context.systems);
+    let slopes = systems.flat_map(|(_, system)| number(&system).slope);
+    DVector::from_iterator(count, slopes.take(count))
 }
 
 /// The focal length `−n₁ y₁ / (n' u')` of the ray that arrives parallel to the axis; infinite for

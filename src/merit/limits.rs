@@ -8,7 +8,7 @@ use super::constraints::{Constraint, ConstraintMargin, smooth_constraints};
 use super::first_order::focal_length_of;
 use super::light::{WithGradient, axial_f_number, light_shares, relative_illumination};
 use super::sum::{DerivativeLevel, SumOfSquares};
-use super::{Dual1, EvaluationContext, Merit, MeritError, Term};
+use super::{EvaluationContext, Merit, MeritError, Term, VariableDual};
 use crate::lens::System;
 use nalgebra::DVector;
 
@@ -46,10 +46,10 @@ impl Mechanical {
         }
     }
 
-    fn along(&self, system: &System<Dual1>) -> f64 {
+    fn of(&self, system: &System<VariableDual>) -> VariableDual {
         match self {
-            Self::FocalLength => focal_length_of(system).slope[0],
-            Self::Constraint(constraint) => constraint.value(system).slope[0],
+            Self::FocalLength => focal_length_of(system),
+            Self::Constraint(constraint) => constraint.value(system),
         }
     }
 }
@@ -128,11 +128,11 @@ impl Merit {
             }
         }
         if level > DerivativeLevel::Value {
-            for variable in 0..count {
-                let system = context.zoom.system_along(context.systems, variable);
-                numbers.iter_mut().for_each(|(number, limit)| {
-                    limit.slope[variable] = number.along(&system);
-                });
+            for (first, system) in context.zoom.systems_along(context.systems) {
+                for (number, limit) in &mut numbers {
+                    let slopes = number.of(&system).slope;
+                    limit.slope.iter_mut().skip(first).zip(slopes).for_each(|(to, by)| *to = by);
+                }
             }
         }
         limits.extend(numbers.into_iter().map(|(_, limit)| limit));

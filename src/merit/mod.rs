@@ -39,8 +39,11 @@ use sampling::RaySampling;
 use serde::Serialize;
 pub use sum::{DerivativeLevel, SumOfSquares};
 
-/// A number with its derivative along one variable.
-type Dual1 = Dual<f64, 1>;
+/// The number of variables along which derivatives are computed together.
+const SLOPES: usize = 8;
+
+/// A number with its derivatives along some variables.
+type VariableDual = Dual<f64, SLOPES>;
 
 /// The error of a merit function that cannot be set up or evaluated.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

@@ -70,6 +70,8 @@ pub(super) struct RaySampling {
 pub(super) struct ChannelRays {
     pub(super) um: f64,
     pub(super) rays: Rays<f64>,
+    /// The image points of the rays through the lens in which their pupils were found, in mm.
+    pub(super) points: Vec<[f64; 2]>,
     /// The weight of each ray in the spot of its field, including the weights of fields and
     /// wavelengths.
     pub(super) weights: Vec<f64>,
@@ -82,7 +84,7 @@ pub(super) struct ChannelRays {
 impl ChannelRays {
     fn new(um: f64) -> Self {
         let (weights, ends, mirrored) = (Vec::new(), Vec::new(), Vec::new());
-        Self { um, rays: Rays::default(), weights, ends, mirrored }
+        Self { um, rays: Rays::default(), points: Vec::new(), weights, ends, mirrored }
     }
 
     /// Adds the rays of a pupil, which together have the weight `share`.
@@ -90,6 +92,7 @@ impl ChannelRays {
         let weight: f64 = traced.landed.arrivals().map(|(_, w)| w).sum();
         for (i, w) in traced.landed.arrivals() {
             self.rays.push(traced.rays.get(i));
+            self.points.push([traced.landed.sink.x[i], traced.landed.sink.y[i]]);
             self.weights.push(share * w / weight);
         }
     }

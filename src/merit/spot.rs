@@ -4,15 +4,16 @@ use super::first_order::{image_scale, slopes};
 use super::sum::{DerivativeLevel, SumOfSquares};
 use super::{EvaluationContext, MeritError};
 use crate::lens::{FieldKind, Object};
-use crate::math::Vec3;
+use crate::math::{SimdWidth, Vec3, dot, run_vectorized};
 use crate::pupil::{PupilMoments, QuadraticIntegrand};
 use crate::trace::{AdjointSeed, Fate, ImagePoints, TraceSink, Tracer};
 use nalgebra::{DMatrix, DVector};
+use std::ops::Range;
 
 /// The traced rays of one wavelength.
 struct SpotRays {
     tracer: Tracer<f64>,
-    points: ImagePoints<f64>,
+    points: Vec<[f64; 2]>,
     /// The weight of each ray in the sum.
     weights: Vec<f64>,
 }
@@ -22,6 +23,13 @@ struct Centroid {
     x: f64,
     y: f64,
     share: f64,
+}
+
+impl Centroid {
+    /// The position of an image point relative to the centroid, in mm.
+    fn offset(&self, [x, y]: [f64; 2]) -> [f64; 2] {
+        [x - self.x, y - self.y]
+    }
 }
 
 /// The normalization of a spot.
@@ -48,7 +56,7 @@ pub(super) fn add_spot(
     for (channel, traced) in context.sampling.channels.iter().zip(&traced) {
         for (field, centroid) in centroids.iter().enumerate() {
             for i in channel.range(field) {
-                let (x, y) = (traced.points.x[i] - centroid.x, traced.points.y[i] - centroid.y);
+                let [x, y] = centroid.offset(traced.points[i]);
                 sum.value += traced.weights[i] * (x * x + y * y);
             }
         }
@@ -95,14 +103,19 @@ fn trace(
     let channel = &context.sampling.channels[wavelength];
     let system = &context.systems.unclipped[wavelength];
     let tracer = Tracer::new(system).map_err(crate::lens::LensError::from)?;
-    let mut points = ImagePoints::default();
-    tracer.trace_batch(&channel.rays, &mut points);
-    let lost = (0..channel.rays.len()).find(|i| !points.fate(*i).is_imaged());
+    let weights = weights(context, wavelength, normalization);
+    if !context.traced_pupils.is_empty() {
+        return Ok(SpotRays { tracer, points: channel.points.clone(), weights });
+    }
+    let mut landed = ImagePoints::default();
+    tracer.trace_batch(&channel.rays, &mut landed);
+    let lost = (0..channel.rays.len()).find(|i| !landed.fate(*i).is_imaged());
     match lost {
         None => {
-            Ok(SpotRays { tracer, points, weights: weights(context, wavelength, normalization) })
+            let points = landed.x.into_iter().zip(landed.y).map(|(x, y)| [x, y]).collect();
+            Ok(SpotRays { tracer, points, weights })
         }
-        Some(i) => Err(lost_ray_error(context, wavelength, i, points.fate(i))),
+        Some(i) => Err(lost_ray_error(context, wavelength, i, landed.fate(i))),
     }
 }
 
@@ -139,8 +152,8 @@ fn centroid(context: &EvaluationContext<'_>, traced: &[SpotRays], field: usize) 
         for i in channel.range(field) {
             let w = traced.weights[i];
             share += w;
-            x += if channel.mirrored[field] { 0.0 } else { w * traced.points.x[i] };
-            y += w * traced.points.y[i];
+            x += if channel.mirrored[field] { 0.0 } else { w * traced.points[i][0] };
+            y += w * traced.points[i][1];
         }
     }
     let inverse = if share > 0.0 { 1.0 / share } else { 0.0 };
@@ -160,7 +173,7 @@ fn add_gradient(
         for (field, centroid) in centroids.iter().enumerate() {
             for i in channel.range(field) {
                 let w = 2.0 * traced.weights[i];
-                let (x, y) = (traced.points.x[i] - centroid.x, traced.points.y[i] - centroid.y);
+                let [x, y] = centroid.offset(traced.points[i]);
                 seeds[i] = Vec3::new(w * x, w * y, 0.0);
             }
         }
@@ -184,38 +197,112 @@ fn add_normal_matrix(
     for (wavelength, traced) in traced.iter().enumerate() {
         let channel = &context.sampling.channels[wavelength];
         let moving = context.zoom.moving_parameters(wavelength);
-        let (_, rows) = traced.tracer.jacobian(&channel.rays, &moving);
-        let mut weighted = DMatrix::zeros(count, 2 * channel.rays.len());
-        let mut slope = vec![0.0; count];
-        for (field, centroid) in centroids.iter().enumerate() {
-            let axes = channel.range(field).flat_map(|i| [(i, 0), (i, 1)]);
-            for (i, axis) in axes {
-                let w = traced.weights[i];
-                let position =
-                    [traced.points.x[i] - centroid.x, traced.points.y[i] - centroid.y][axis];
-                let from = (2 * i + axis) * moving.len();
-                let row = &rows[from..from + moving.len()];
-                context.zoom.row_by_variables(
-                    context.systems,
-                    wavelength,
-                    &moving,
-                    row,
-                    &mut slope,
-                );
-                let column = DVector::from_column_slice(&slope);
-                sum.gradient.axpy(2.0 * w * position, &column, 1.0);
+        let by_variable = context.zoom.parameter_slopes(context.systems, wavelength, &moving);
+        let rows = traced.tracer.landing_slopes(&channel.rays, &moving);
+        let slopes = WeightedSlopes::new(&rows, moving.len(), &traced.weights);
+        let offsets = centroids.iter().enumerate().flat_map(|(field, centroid)| {
+            channel.range(field).map(|i| centroid.offset(traced.points[i]))
+        });
+        let gradient = slopes.times_offsets(&offsets.collect::<Vec<_>>());
+        sum.gradient.gemv_tr(2.0, &by_variable, &gradient, 1.0);
+        for (field, means) in means.iter_mut().enumerate() {
+            for (axis, mean) in means.iter_mut().enumerate() {
                 if axis == 1 || !channel.mirrored[field] {
-                    means[field][axis].axpy(w, &column, 1.0);
+                    let by_number = slopes.sum(axis, channel.range(field));
+                    mean.gemv_tr(1.0, &by_variable, &by_number, 1.0);
                 }
-                weighted.set_column(2 * i + axis, &(column * w.sqrt()));
             }
         }
-        sum.normal.gemm(1.0, &weighted, &weighted.transpose(), 1.0);
+        let normal = slopes.normal_matrix() * &by_variable;
+        sum.normal.gemm(1.0, &by_variable.transpose(), &normal, 1.0);
     }
     for (mean, centroid) in means.iter().zip(centroids).filter(|(_, c)| c.share > 0.0) {
         for slope in mean {
             sum.normal.ger(-1.0 / centroid.share, slope, slope, 1.0);
         }
+    }
+}
+
+/// The derivatives of image points by numbers of a system, each times the root of the weight of its
+/// ray: for each number those of x of all rays, then those of y.
+struct WeightedSlopes {
+    numbers: usize,
+    /// The roots of the weights.
+    roots: Vec<f64>,
+    slopes: Vec<f64>,
+}
+
+impl WeightedSlopes {
+    /// From the derivatives of x by all numbers, then of y, for each ray in turn.
+    fn new(rows: &[f64], numbers: usize, weights: &[f64]) -> Self {
+        let roots: Vec<f64> = weights.iter().map(|weight| weight.sqrt()).collect();
+        let rays = roots.len();
+        let mut slopes = vec![0.0; rows.len()];
+        for (i, root) in roots.iter().enumerate() {
+            for axis in 0..2 {
+                let row = &rows[(2 * i + axis) * numbers..][..numbers];
+                for (number, slope) in row.iter().enumerate() {
+                    slopes[(2 * number + axis) * rays + i] = root * slope;
+                }
+            }
+        }
+        Self { numbers, roots, slopes }
+    }
+
+    /// Those of x and y by one number.
+    fn of(&self, number: usize) -> &[f64] {
+        let length = 2 * self.roots.len();
+        &self.slopes[number * length..][..length]
+    }
+
+    /// `Σ w offset ∂`, by each number.
+    fn times_offsets(&self, offsets: &[[f64; 2]]) -> DVector<f64> {
+        let along = |axis: usize| {
+            let pairs = self.roots.iter().zip(offsets);
+            pairs.map(move |(root, offset)| root * offset[axis])
+        };
+        let weighted: Vec<f64> = along(0).chain(along(1)).collect();
+        self.dots(
+            #[inline(always)]
+            |number| dot(self.of(number), &weighted),
+        )
+    }
+
+    /// `Σ w ∂` of one axis over some rays, by each number.
+    fn sum(&self, axis: usize, rays: Range<usize>) -> DVector<f64> {
+        let roots = &self.roots[rays.clone()];
+        let from = axis * self.roots.len() + rays.start;
+        self.dots(
+            #[inline(always)]
+            |number| dot(&self.of(number)[from..from + roots.len()], roots),
+        )
+    }
+
+    /// `Σ w ∂ ∂ᵀ` over both axes.
+    fn normal_matrix(&self) -> DMatrix<f64> {
+        let mut normal = DMatrix::zeros(self.numbers, self.numbers);
+        for column in 0..self.numbers {
+            let of_column = self.of(column);
+            let products = self.dots(
+                #[inline(always)]
+                |row| if row < column { 0.0 } else { dot(self.of(row), of_column) },
+            );
+            for row in column..self.numbers {
+                normal[(row, column)] = products[row];
+                normal[(column, row)] = products[row];
+            }
+        }
+        normal
+    }
+
+    /// A number for each of the numbers of the system, computed with vector instructions.
+    #[inline(always)]
+    fn dots(&self, of: impl Fn(usize) -> f64) -> DVector<f64> {
+        run_vectorized(
+            SimdWidth::detect(),
+            #[inline(always)]
+            || DVector::from_iterator(self.numbers, (0..self.numbers).map(&of)),
+        )
     }
 }
 
@@ -234,7 +321,7 @@ pub(super) fn add_distortion(
     let chief = &context.sampling.chief_rays;
     let (hits, rows) = tracer.jacobian(chief, &moving);
     let total: f64 = context.sampling.fields.iter().map(|f| f.weight).sum();
-    let mut slope = vec![0.0; sum.gradient.len()];
+    let by_variable = context.zoom.parameter_slopes(context.systems, primary, &moving).transpose();
     for (field, height) in heights.iter().enumerate() {
         if context.sampling.is_dark(field) {
             continue;
@@ -246,8 +333,8 @@ pub(super) fn add_distortion(
         for (axis, position) in [hits.x[field], hits.y[field]].into_iter().enumerate() {
             let from = (2 * field + axis) * moving.len();
             let row = &rows[from..from + moving.len()];
-            context.zoom.row_by_variables(context.systems, primary, &moving, row, &mut slope);
-            let column = DVector::from_column_slice(&slope) - &scale_slope * height[axis];
+            let slope = &by_variable * DVector::from_column_slice(row);
+            let column = slope - &scale_slope * height[axis];
             sum.add_residual(weight, position - scale * height[axis], &column);
         }
     }

@@ -51,8 +51,8 @@ pub struct LimitPrice {
     pub limit: ConstraintMargin,
     /// The bound at which it is, in mm or as a ratio.
     pub bound: f64,
-    /// What the merit would gain, in mm² per mm or per unit of the ratio, by a looser bound. For a
-    /// number with a prescribed value: by a larger one, negative if it would lose.
+    /// The gain in merit, in mm² per mm or per unit of the ratio, by a looser bound. For a number
+    /// with a prescribed value: by a larger one, negative for a loss.
     pub price: f64,
 }
 

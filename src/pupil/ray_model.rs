@@ -90,7 +90,7 @@ pub struct RayModel {
     pub first_order: FirstOrder<f64>,
     /// The map from pupil coordinates to rays.
     pub aiming: Aiming,
-    /// What is left out: part of the errors of results.
+    /// The effects that are left out: part of the errors of results.
     pub neglected: Neglected,
     /// The measure of integrals over a pupil.
     pub measure: PupilMeasure,

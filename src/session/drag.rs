@@ -33,10 +33,10 @@ pub struct DragProgress {
     pub stop: Option<String>,
 }
 
-/// What a panel with handles shows.
+/// The state that a panel with handles shows.
 #[derive(Debug, Clone, Default)]
 pub struct DragView {
-    /// What is held, and by which numbers.
+    /// The locked quantities, and the numbers that hold them.
     pub settings: DragSettings,
     /// The drag that has not ended.
     pub progress: Option<Arc<DragProgress>>,
@@ -183,7 +183,7 @@ impl DragProgress {
         format!("drag the {}", self.handle)
     }
 
-    /// What has moved to hold what is locked; `None` if nothing has.
+    /// The numbers that have moved to hold the locked quantities; `None` if none has.
     pub fn moved_text(&self) -> Option<String> {
         if self.moved.is_empty() {
             return None;

@@ -40,7 +40,7 @@ pub struct HistoryNode {
     pub curve: Option<Arc<OptimizationCurve>>,
 }
 
-/// What led to a version.
+/// The origin of a version.
 #[derive(Debug, Clone, Default)]
 pub(super) struct VersionOrigin {
     /// The title of the edit or of the result.

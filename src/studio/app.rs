@@ -320,7 +320,7 @@ impl App for Studio {
     }
 }
 
-/// What the items of the menus depend on.
+/// The state on which the items of the menus depend.
 fn menu_context<'a>(
     dock: &Dock,
     recent: &'a [PathBuf],

@@ -17,7 +17,7 @@ enum FileKind {
     Picture,
 }
 
-/// What opens a file.
+/// The actions that open a file.
 ///
 /// # Errors
 /// A file that cannot be opened in the window, with its name and what can be.

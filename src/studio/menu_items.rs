@@ -1,4 +1,4 @@
-//! What can be asked for from the menu bar: menus, keyboard shortcuts, the list of shortcuts and the
+//! The requests of the menu bar: menus, keyboard shortcuts, the list of shortcuts and the
 //! command palette show the same items.
 
 use std::path::PathBuf;
@@ -85,7 +85,7 @@ pub(super) struct PanelState {
     pub(super) is_open: bool,
 }
 
-/// What the items depend on.
+/// The state on which the items depend.
 #[derive(Debug)]
 pub(super) struct MenuContext<'a> {
     pub(super) view: &'a SessionView,
@@ -230,7 +230,7 @@ impl MenuContext<'_> {
     }
 }
 
-/// What can be done with the element of a surface; disabled without one.
+/// The commands for the element of a surface; disabled without one.
 pub(super) fn element_items(lens: &Lens, surface: Option<usize>) -> Vec<MenuItem> {
     const MENU: &str = "Element";
     let around = surface.and_then(|surface| Some((surface, lens.element_around(surface)?)));

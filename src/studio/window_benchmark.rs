@@ -67,7 +67,7 @@ pub struct WindowMetrics {
 /// Opens a window, measures it, and closes it again.
 ///
 /// # Errors
-/// Where no window can open: see [`StudioError`].
+/// No window can open: see [`StudioError`].
 pub fn measure_window() -> Result<WindowMetrics, StudioError> {
     let figures = Arc::new(Mutex::new(WindowMetrics::default()));
     let shared = Arc::clone(&figures);

@@ -20,6 +20,8 @@ use rayon::prelude::*;
 
 /// The number of rays in a block.
 pub(super) const BLOCK: usize = 64;
+/// The number of rays in a block of those that fill no whole one.
+pub(super) const SMALL_BLOCK: usize = 16;
 /// The number of rays of one parallel task.
 pub(super) const CHUNK: usize = 64 * BLOCK;
 
@@ -286,7 +288,7 @@ impl<R: Real> Tracer<R> {
     /// Marks the rays that only fill up a block as lost, in a lens where every ray costs time of its
     /// own.
     #[inline(always)]
-    pub(super) fn mask(&self, block: &mut RayBlock<R>, count: usize) {
+    pub(super) fn mask<const N: usize>(&self, block: &mut RayBlock<R, N>, count: usize) {
         let is_asphere = |i: &Interface<R>| i.form == SurfaceForm::Asphere;
         if !self.is_plain() || self.interfaces.iter().any(is_asphere) {
             block.code[count..].fill(R::ONE);
@@ -299,45 +301,60 @@ impl<R: Real> Tracer<R> {
         rays: RaySlice<'_, R>,
         part: &mut TraceSinkPart<'_, R>,
     ) {
-        let mut block = RayBlock::new();
-        let mut from = 0;
-        while from < rays.x.len() {
-            let count = BLOCK.min(rays.x.len() - from);
-            block.load(rays, from, count, self.index_before);
-            self.mask(&mut block, count);
-            for (i, interface) in self.interfaces.iter().enumerate() {
-                if self.is_general(i) {
-                    block.cross_general_into::<S>(self, i);
-                } else {
-                    block.cross::<S>(interface, i as u32);
-                }
-            }
-            let index = self.interfaces.last().map_or(self.index_before, |i| i.index_behind);
-            block.store::<S>(part, from, count, index);
-            from += count;
+        let whole = rays.x.len() / BLOCK * BLOCK;
+        let mut block: RayBlock<R> = RayBlock::new();
+        for from in (0..whole).step_by(BLOCK) {
+            self.trace_block::<S, BLOCK>(&mut block, rays, from, BLOCK, part);
         }
+        let mut block: RayBlock<R, SMALL_BLOCK> = RayBlock::new();
+        for from in (whole..rays.x.len()).step_by(SMALL_BLOCK) {
+            let count = SMALL_BLOCK.min(rays.x.len() - from);
+            self.trace_block::<S, SMALL_BLOCK>(&mut block, rays, from, count, part);
+        }
+    }
+
+    #[inline(always)]
+    fn trace_block<S: TraceSink<R>, const N: usize>(
+        &self,
+        block: &mut RayBlock<R, N>,
+        rays: RaySlice<'_, R>,
+        from: usize,
+        count: usize,
+        part: &mut TraceSinkPart<'_, R>,
+    ) {
+        block.load(rays, from, count, self.index_before);
+        self.mask(block, count);
+        for (i, interface) in self.interfaces.iter().enumerate() {
+            if self.is_general(i) {
+                block.cross_general_into::<S>(self, i);
+            } else {
+                block.cross::<S>(interface, i as u32);
+            }
+        }
+        let index = self.interfaces.last().map_or(self.index_before, |i| i.index_behind);
+        block.store::<S>(part, from, count, index);
     }
 }
 
 /// A block of rays on their way, as columns.
 #[derive(Clone)]
-pub(super) struct RayBlock<R> {
-    pub(super) x: [R; BLOCK],
-    pub(super) y: [R; BLOCK],
-    pub(super) z: [R; BLOCK],
-    pub(super) kx: [R; BLOCK],
-    pub(super) ky: [R; BLOCK],
-    pub(super) kz: [R; BLOCK],
-    opl: [R; BLOCK],
+pub(super) struct RayBlock<R, const N: usize = BLOCK> {
+    pub(super) x: [R; N],
+    pub(super) y: [R; N],
+    pub(super) z: [R; N],
+    pub(super) kx: [R; N],
+    pub(super) ky: [R; N],
+    pub(super) kz: [R; N],
+    opl: [R; N],
     /// 0 for a ray on its way, else the code of its loss; a number of the same width as the others, so
     /// that the vector instructions need no conversion.
-    pub(super) code: [R; BLOCK],
+    pub(super) code: [R; N],
 }
 
-impl<R: Real> RayBlock<R> {
+impl<R: Real, const N: usize> RayBlock<R, N> {
     #[inline(always)]
     pub(super) fn new() -> Self {
-        let zero = [R::ZERO; BLOCK];
+        let zero = [R::ZERO; N];
         Self { x: zero, y: zero, z: zero, kx: zero, ky: zero, kz: zero, opl: zero, code: zero }
     }
 
@@ -355,7 +372,7 @@ impl<R: Real> RayBlock<R> {
             to[..count].copy_from_slice(&column[from..from + count]);
             to[count..].fill(column[from]);
         }
-        for j in 0..BLOCK {
+        for j in 0..N {
             let k = optical_direction(Vec3::new(self.kx[j], self.ky[j], self.kz[j]), index);
             (self.kx[j], self.ky[j], self.kz[j]) = (k.x, k.y, k.z);
             self.opl[j] = R::ZERO;
@@ -366,7 +383,7 @@ impl<R: Real> RayBlock<R> {
     /// Loads the rays that `ray` makes.
     #[inline(always)]
     pub(super) fn fill(&mut self, index: R, ray: impl Fn(usize) -> Ray<R>) {
-        for j in 0..BLOCK {
+        for j in 0..N {
             let ray = ray(j);
             self.set(j, ray.point, optical_direction(ray.direction, index));
             self.code[j] = R::ZERO;
@@ -375,8 +392,8 @@ impl<R: Real> RayBlock<R> {
 
     /// The same rays over another number type.
     #[inline(always)]
-    pub(super) fn map<S: Real>(&self, f: impl Fn(R) -> S) -> RayBlock<S> {
-        let column = |from: &[R; BLOCK]| std::array::from_fn(|j| f(from[j]));
+    pub(super) fn map<S: Real>(&self, f: impl Fn(R) -> S) -> RayBlock<S, N> {
+        let column = |from: &[R; N]| std::array::from_fn(|j| f(from[j]));
         RayBlock {
             x: column(&self.x),
             y: column(&self.y),
@@ -432,7 +449,7 @@ impl<R: Real> RayBlock<R> {
         number: usize,
         mut keep: impl FnMut(usize, &PropagatedRay<'_, R>),
     ) {
-        for j in 0..BLOCK {
+        for j in 0..N {
             if self.code[j] > R::ZERO {
                 continue;
             }
@@ -454,7 +471,7 @@ impl<R: Real> RayBlock<R> {
         &mut self,
         interface: &Interface<R>,
         number: u32,
-        distance: &mut [R; BLOCK],
+        distance: &mut [R; N],
     ) {
         self.cross_with(interface, number, |j, met| distance[j] = met.s);
     }
@@ -483,7 +500,7 @@ impl<R: Real> RayBlock<R> {
     fn clip_obstruction(&mut self, interface: &Interface<R>, number: u32) {
         let lost = |cause: u32| R::from_f64(f64::from(fate::encode(number, cause)));
         let (clipped, reflected) = (lost(CLIPPED), lost(TOTAL_REFLECTION));
-        for j in 0..BLOCK {
+        for j in 0..N {
             let (p, _) = self.state(j);
             let code = self.code[j];
             let arrived = !(code > R::ZERO) | (code == reflected);
@@ -547,9 +564,9 @@ impl<R: Real> RayBlock<R> {
     /// The distance along `k` of every ray to an asphere, from its start or its point of closest
     /// approach; NaN for a miss.
     #[inline(always)]
-    fn asphere_distances(&self, interface: &Interface<R>) -> [R; BLOCK] {
-        let mut before = [R::ZERO; BLOCK];
-        let mut rays = asphere::RayStarts::<R, BLOCK>::new();
+    fn asphere_distances(&self, interface: &Interface<R>) -> [R; N] {
+        let mut before = [R::ZERO; N];
+        let mut rays = asphere::RayStarts::<R, N>::new();
         for (j, before) in before.iter_mut().enumerate() {
             let (p, k) = self.state(j);
             let (start, distance) =
@@ -558,7 +575,7 @@ impl<R: Real> RayBlock<R> {
             rays.set(j, start, k);
         }
         let asphere::NewtonResult { mut s, trusted } = asphere::newton_crossings(interface, &rays);
-        for j in 0..BLOCK {
+        for j in 0..N {
             if !(trusted[j] > R::ZERO) && !(self.code[j] > R::ZERO) {
                 let (p, k) = rays.get(j);
                 let (p, k, start) = (p.value(), k.value(), -before[j].value());
@@ -581,7 +598,7 @@ impl<R: Real> RayBlock<R> {
         let lost = |cause: u32| R::from_f64(f64::from(fate::encode(number, cause)));
         let (missed, clipped) = (lost(MISSED), lost(CLIPPED));
         let reflected = lost(TOTAL_REFLECTION);
-        for j in 0..BLOCK {
+        for j in 0..N {
             let (p, k) = self.state(j);
             let p = Vec3::new(p.x, p.y, p.z - interface.gap);
             let met = meet(&interface, j, p, k);

@@ -46,6 +46,34 @@ impl<R: Real> Tracer<R> {
         }
     }
 
+    /// The margin of a ray at one limit as by [`Tracer::margin`], with the rims and obstructions of
+    /// another tracer of the same lens; `None` also if a surface is not centred or a medium has a
+    /// gradient.
+    pub fn margin_with_rims(
+        &self,
+        rims: &Tracer<f64>,
+        ray: Ray<R>,
+        surface: usize,
+        limit: RayLimit,
+    ) -> Option<R> {
+        if !self.is_plain() {
+            return None;
+        }
+        let (p, k) = self.state_before::<false>(ray, surface)?;
+        let arrived = self.propagate::<false>(surface, p, k);
+        let Interface { rim2, obstruction2, .. } = rims.interfaces[surface];
+        let clipping = Interface {
+            rim2: R::from_f64(rim2),
+            obstruction2: R::from_f64(obstruction2),
+            ..*arrived.surface
+        };
+        match limit {
+            RayLimit::Rim => Some(clipping.rim_margin(arrived.met.point)),
+            RayLimit::Obstruction => Some(clipping.obstruction_margin(arrived.met.point)),
+            _ => Some(arrived.margin(limit)),
+        }
+    }
+
     /// The landing of a ray on the edge, whose margin at a limit is zero. The cosine that vanishes
     /// there is set to zero, because the root of its rounding error would cost half of the digits;
     /// rims clip nothing. `None` for a ray that does not arrive.
@@ -151,6 +179,9 @@ impl Tracer<f64> {
         rays: &Rays<f64>,
         weights: &[f64],
     ) -> SystemGradient<f64> {
+        if let Some(total) = self.plain_margin_gradient(surface, limit, rays, weights) {
+            return total;
+        }
         let mut total = SystemGradient::zero(self.interfaces.len());
         let mut seeds = vec![AdjointSeed::default(); rays.len()];
         for (i, (seed, weight)) in seeds.iter_mut().zip(weights).enumerate() {
@@ -218,7 +249,7 @@ impl Tracer<f64> {
     }
 
     /// The surfaces in front of one, without anything that clips.
-    fn surfaces_before(&self, surface: usize) -> Self {
+    pub(super) fn surfaces_before(&self, surface: usize) -> Self {
         let interfaces = self.interfaces[..surface].to_vec();
         let grin_gaps = self.grin_gaps.iter().take(surface).cloned().collect();
         let (index_before, step_plans) = (self.index_before, Vec::new());

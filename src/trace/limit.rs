@@ -261,7 +261,7 @@ impl<R: Real> WarpTracer<R> {
         count: usize,
         ray: impl Fn(usize) -> Ray<Jet<R>>,
     ) -> RayBlock<Jet<R>> {
-        let mut block = RayBlock::new();
+        let mut block: RayBlock<_> = RayBlock::new();
         block.fill(self.forward.index_before, ray);
         // Rays that only fill up the block count as lost.
         block.code[count..].fill(Jet::ONE);

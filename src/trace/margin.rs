@@ -170,12 +170,12 @@ impl<R: Real> PropagatedRay<'_, R> {
 
 impl<R: Real> Interface<R> {
     #[inline(always)]
-    fn rim_margin(&self, p: Vec3<R>) -> R {
+    pub(super) fn rim_margin(&self, p: Vec3<R>) -> R {
         self.rim2 - (p.x * p.x + p.y * p.y)
     }
 
     #[inline(always)]
-    fn obstruction_margin(&self, p: Vec3<R>) -> R {
+    pub(super) fn obstruction_margin(&self, p: Vec3<R>) -> R {
         p.x * p.x + p.y * p.y - self.obstruction2
     }
 

@@ -23,6 +23,7 @@ mod grin_gap;
 mod interface;
 mod limit;
 mod margin;
+mod margin_batch;
 mod mount;
 mod propagation;
 mod single;

@@ -618,7 +618,7 @@ fn front_lenses_are_browsed_and_accepted() {
     harness.get_by_label("Brighter").click();
     harness.run();
     harness.get_by_label_contains("% of the start");
-    harness.get_by_label("Take this lens").click();
+    harness.get_by_label("Accept this lens").click();
     harness.run();
     assert_eq!(harness.state().commands[1..], [preview(1), Command::AcceptPreview]);
 }

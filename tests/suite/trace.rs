@@ -5,8 +5,8 @@ use super::reference::{self, Reference, number, numbers};
 use aplanat::lens::{Shape, Surface, System};
 use aplanat::math::{Dual, Real, Vec3};
 use aplanat::trace::{
-    AdjointSeed, Fate, ImagePoints, Landings, Ray, RayLimit, Rays, SimdWidth, SystemGradient,
-    TraceSink, Tracer,
+    AdjointSeed, Fate, ImagePoints, Landings, Ray, RayLimit, Rays, SimdWidth, SurfaceParameter,
+    SystemGradient, TraceSink, Tracer,
 };
 use serde_json::Value;
 
@@ -172,6 +172,79 @@ fn obstructed(radius: f64) -> System<f64> {
         system.surfaces[i].obstruction = radius * (1.0 + 0.1 * i as f64);
     }
     system
+}
+
+/// The search for the edge of a pupil asks for many margins at once.
+#[test]
+fn margins_of_many_rays_are_those_of_single_rays() {
+    let mut system = bundled("phone_us7558005_1").resolve(0, 0.5876).unwrap();
+    for surface in system.surfaces.iter_mut().step_by(3) {
+        surface.obstruction = 0.1;
+    }
+    let tracer = Tracer::new(&system).unwrap();
+    let height = system.surfaces[0].semi_diameter;
+    let ray = |i: usize| {
+        let (x, y) = (0.05 * (i % 5) as f64, 0.08 * (i / 5) as f64 - 1.0);
+        let direction = Vec3::new(0.0, 0.1, 0.99_f64.sqrt());
+        Ray { point: Vec3::new(x * height, y * height, 0.0), direction }
+    };
+    let rays: Rays<f64> = (0..101).map(ray).collect();
+    let mut compared = 0;
+    for surface in 0..system.surfaces.len() {
+        for limit in [RayLimit::Rim, RayLimit::Obstruction, RayLimit::Miss] {
+            let margins = tracer.margins_at(&rays, surface, limit);
+            let landings = tracer.landings_at_edge(&rays, surface, limit);
+            for (i, (margin, landing)) in margins.iter().zip(landings).enumerate() {
+                let single = tracer.margin(rays.get(i), surface, limit);
+                assert_eq!(margin.to_bits(), single.unwrap_or(f64::NAN).to_bits(), "{surface} {i}");
+                compared += usize::from(margin.is_finite());
+                match tracer.land_at_edge(rays.get(i), surface, limit) {
+                    Some(point) => assert_eq!(landing, [point.x, point.y], "{surface} {limit:?}"),
+                    None => assert!(landing[0].is_nan(), "{surface} {limit:?}"),
+                }
+            }
+        }
+    }
+    assert!(compared > 1000, "{compared}");
+}
+
+/// The derivative of a margin at a rim or an obstruction by every number of the lens.
+#[test]
+fn the_margin_at_a_rim_has_the_derivative_of_its_value() {
+    let mut system = bundled("double_gauss_rudolph_50").resolve(0, 0.5876).unwrap();
+    system.surfaces[7].obstruction = 0.5;
+    for surface in 0..system.surfaces.len() {
+        SurfaceParameter::Curvature.promote_shape(&mut system, surface);
+    }
+    let rays = some_rays(21);
+    let weights: Vec<f64> = (0..rays.len()).map(|i| 0.3 + 0.1 * i as f64).collect();
+    for (surface, limit) in [(0, RayLimit::Rim), (5, RayLimit::Rim), (7, RayLimit::Obstruction)] {
+        let sum = |system: &System<f64>| {
+            let margins = Tracer::new(system).unwrap().margins_at(&rays, surface, limit);
+            margins.iter().zip(&weights).map(|(margin, weight)| margin * weight).sum::<f64>()
+        };
+        let tracer = Tracer::new(&system).unwrap();
+        let exact = tracer.margin_gradient(surface, limit, &rays, &weights);
+        for i in 0..system.surfaces.len() {
+            let by = exact.surfaces[i];
+            let numbers = [
+                (SurfaceParameter::Curvature, by.curvature, 1e-6),
+                (SurfaceParameter::Thickness, by.thickness, 1e-5),
+                (SurfaceParameter::Index, by.index, 1e-6),
+                (SurfaceParameter::SemiDiameter, by.semi_diameter, 1e-5),
+            ];
+            for (parameter, by, step) in numbers {
+                let moved = |step: f64| {
+                    let mut moved = system.clone();
+                    *parameter.value_mut(&mut moved, i) += step;
+                    sum(&moved)
+                };
+                let difference = (moved(step) - moved(-step)) / (2.0 * step);
+                let near = (by - difference).abs() <= 1e-5 * difference.abs().max(1.0);
+                assert!(near, "{surface} {limit:?}: {by} and {difference} by {parameter:?} of {i}");
+            }
+        }
+    }
 }
 
 #[test]

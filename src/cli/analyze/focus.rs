@@ -86,7 +86,7 @@ fn shift_image(lens: &mut Lens, zoom: usize, defocus: f64) {
 /// about its own size.
 fn focus_step(run: &AnalysisRun) -> f64 {
     let rms = |field: &AtField<spot::SpotJson>| match &field.outcome {
-        FieldOutcome::Lit(lit) => Some(lit.rms()),
+        FieldOutcome::Transmitted(lit) => Some(lit.rms()),
         FieldOutcome::Dark { .. } => None,
     };
     let smallest = spot::spots(run).iter().filter_map(rms).fold(f64::INFINITY, f64::min);

@@ -349,14 +349,14 @@ struct AtField<T> {
 #[derive(Serialize)]
 #[serde(untagged)]
 enum FieldOutcome<T> {
-    Lit(T),
+    Transmitted(T),
     Dark { dark: String },
 }
 
 impl<T> AtField<T> {
     fn new(field: &SelectedField, result: Result<T, AnalysisError>) -> Self {
         let outcome = match result {
-            Ok(lit) => FieldOutcome::Lit(lit),
+            Ok(lit) => FieldOutcome::Transmitted(lit),
             Err(dark) => FieldOutcome::Dark { dark: dark.to_string() },
         };
         Self { x: field.given.x, y: field.given.y, outcome }
@@ -384,7 +384,7 @@ impl<T: TextLines> Display for AnalysisReport<T> {
             let across = if *x == 0.0 { String::new() } else { format!("x {}, ", ShortNumber(*x)) };
             writeln!(f, "\nfield {across}y {} {unit}", ShortNumber(*y))?;
             match outcome {
-                FieldOutcome::Lit(lit) => {
+                FieldOutcome::Transmitted(lit) => {
                     lit.lines().iter().try_for_each(|line| writeln!(f, "  {line}"))?;
                 }
                 FieldOutcome::Dark { dark } => writeln!(f, "  {dark}")?,

@@ -20,7 +20,7 @@ pub(super) struct SpotJson {
 #[derive(Serialize)]
 #[serde(untagged)]
 enum ColorSpotJson {
-    Lit {
+    Transmitted {
         wavelength_um: f64,
         rms: Estimate,
         centroid_x: Estimate,
@@ -76,7 +76,7 @@ impl SpotJson {
 impl ColorSpotJson {
     fn new(wavelength_um: f64, spot: &Result<MonochromaticSpot, AnalysisError>) -> Self {
         match spot {
-            Ok(spot) => Self::Lit {
+            Ok(spot) => Self::Transmitted {
                 wavelength_um,
                 rms: spot.rms,
                 centroid_x: spot.centroid[0],
@@ -90,7 +90,7 @@ impl ColorSpotJson {
 
     fn line(&self) -> String {
         match self {
-            Self::Lit { wavelength_um, rms, .. } => {
+            Self::Transmitted { wavelength_um, rms, .. } => {
                 estimate_text(&format!("rms at {wavelength_um} um"), rms)
             }
             Self::Dark { wavelength_um, dark } => format!("{wavelength_um} um: {dark}"),

@@ -80,7 +80,7 @@ fn draw_curves(curves: &SpotCurves, title: &str) -> Result<Vec<u8>, ImageError> 
         let name = match pupil {
             PupilClipping::Clear => "clear pupil".to_owned(),
             PupilClipping::Clipped => {
-                format!("clipped pupil, {:.0} % lit", 100.0 * curves.transmitted)
+                format!("clipped pupil, {:.0} % transmitted", 100.0 * curves.transmitted)
             }
         };
         let curve = |(method, color), (precision, stroke)| {
@@ -122,8 +122,9 @@ impl Display for MeasureSpotReport {
             let (title, rms) = match pupil {
                 PupilClipping::Clear => ("clear pupil".to_owned(), Some(curves.rms_clear)),
                 PupilClipping::Clipped => {
-                    let lit = 100.0 * curves.transmitted;
-                    (format!("clipped pupil, {lit:.1} % of the disc lit"), curves.rms_clipped)
+                    let percent = 100.0 * curves.transmitted;
+                    let title = format!("clipped pupil, {percent:.1} % of the disc transmitted");
+                    (title, curves.rms_clipped)
                 }
             };
             match rms {

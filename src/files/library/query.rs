@@ -1,5 +1,5 @@
-//! What lenses of the library are asked for: words that their descriptions contain, and ranges that
-//! their numbers lie in.
+//! Queries of the library: words that the descriptions of lenses contain, and ranges that their
+//! numbers lie in.
 
 use super::{LibraryLens, library_lenses};
 use std::ops::RangeInclusive;

@@ -2,8 +2,8 @@
 //!
 //! The value of a spline is a weighted mean of its coefficients with nonnegative weights (de Boor,
 //! *A Practical Guide to Splines*, chapter IX): coefficients within a range keep the value in it.
-//! Those outside the domain need a wider range, for a field with a large gradient at its boundary.
-//! Where that violates the range within a cell that intersects the domain, the excess of the
+//! Those outside the domain need a wider range, for a field with a large gradient at its boundary. If
+//! that violates the range within a cell that intersects the domain, the excess of the
 //! coefficients of that cell beyond the range is reduced: by as much as the control points of the
 //! cell require. The values in a cell are means of its control points, so that no violation is
 //! missed.

@@ -1,4 +1,4 @@
-//! How far the numbers of a lens can be moved by a drag, and what ends that.
+//! The range over which a drag can move the numbers of a lens, and the cause of its ends.
 
 use crate::lens::{Lens, Parameter, Quantity, SurfaceNumber};
 use std::fmt;
@@ -6,7 +6,7 @@ use std::fmt;
 /// The largest part of the radius at which a surface ends that its rim may reach.
 const MAX_STEEPNESS: f64 = 0.999;
 
-/// What ends the range of a number.
+/// The cause that ends the range of a number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum DragLimit {
     /// A gap would change its sign.

@@ -37,7 +37,7 @@ pub enum FreeNumbers {
     Variables,
 }
 
-/// What is held in drags, and by which numbers.
+/// The quantities that drags hold, and the numbers that hold them.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct DragSettings {
     /// The quantities that stay.
@@ -65,7 +65,7 @@ pub enum DragError {
 pub enum DragStop {
     /// The end of the range of a number.
     Limit(DragLimit),
-    /// What is locked cannot be held.
+    /// The locked quantities cannot be held.
     Locks {
         /// The locked quantities.
         locks: Vec<FirstOrderLock>,

@@ -1,5 +1,5 @@
-//! Where the handles of a lens are in its section, and which value of a handle a motion in the
-//! section means.
+//! The places of the handles of a lens in its section, and the value of a handle that a motion in
+//! the section means.
 
 use super::Handle;
 use super::handle::scaled_aperture;

@@ -13,8 +13,8 @@
 
 use super::{Integrand, QuadraticIntegrand, WarpSampling};
 use crate::math::Vec3;
-use crate::pupil::region::{PolarFrame, PupilLimit, RadialLine, RegionKind, TracedPupil};
-use crate::trace::{AdjointSeed, Ray, RayLimit, Rays, SystemGradient};
+use crate::pupil::region::{RegionKind, TracedPupil};
+use crate::trace::{AdjointSeed, SystemGradient};
 
 impl TracedPupil<'_> {
     /// The integral, in mm² of the first vertex plane times the unit of the integrand.
@@ -49,25 +49,14 @@ impl TracedPupil<'_> {
     pub fn edge_motion(&self, cost: &impl Integrand) -> Option<SystemGradient<f64>> {
         let tracer = &self.region.launch.channel().tracer;
         let mut total = SystemGradient::zero(tracer.surfaces());
-        let frame = match &self.region.kind {
-            RegionKind::Clear => return Some(total),
-            RegionKind::StarShaped(boundary) => boundary.frame,
-            RegionKind::Irregular { annulus: Some(annulus), .. } => annulus.outer.frame,
-            RegionKind::Irregular { annulus: None, .. }
-            | RegionKind::Dark
-            | RegionKind::Unbounded => return None,
-        };
-        if self.radial_lines.is_empty() {
-            return None;
+        if self.region.kind == RegionKind::Clear {
+            return Some(total);
         }
-        for limit in self.limits() {
-            let PupilLimit::Surface(surface, ray_limit) = limit else { continue };
-            let on_limit = self.radial_lines.iter().filter(|line| line.edge.limit == limit);
-            let moved =
-                on_limit.filter_map(|s| self.edge_ray(cost, &frame, s, (surface, ray_limit)));
-            let (rays, weights): (Vec<_>, Vec<f64>) = moved.unzip();
-            let rays: Rays<f64> = rays.into_iter().collect();
-            total.add(&tracer.margin_gradient(surface, ray_limit, &rays, &weights), 1.0);
+        for edge in self.edges()? {
+            let weight = |(by, landing): (&f64, &[f64; 2])| by * cost.value(*landing);
+            let weights: Vec<f64> = edge.by_margin.iter().zip(&edge.landings).map(weight).collect();
+            let moved = tracer.margin_gradient(edge.surface, edge.limit, &edge.rays, &weights);
+            total.add(&moved, 1.0);
         }
         Some(total)
     }
@@ -90,26 +79,5 @@ impl TracedPupil<'_> {
         let mut whole = self.region.warp_derivative(cost, WarpSampling::default())?.gradient;
         whole.add(&self.biased_derivative(cost), -1.0);
         Some(whole)
-    }
-
-    /// The ray at the end of a radial line, and the derivative of the integral by its margin.
-    fn edge_ray(
-        &self,
-        cost: &impl Integrand,
-        frame: &PolarFrame,
-        line: &RadialLine,
-        (surface, ray_limit): (usize, RayLimit),
-    ) -> Option<(Ray<f64>, f64)> {
-        let launch = &self.region.launch;
-        let p = frame.point(line.azimuth, line.edge.radius);
-        let ray = launch.ray(p)?;
-        let channel = launch.channel();
-        let landed = channel.tracer.land_at_edge(ray, surface, ray_limit)?;
-        let slope = channel.unclipped.margin(launch.dual_ray(p)?, surface, ray_limit)?.slope;
-        let direction = frame.direction(line.azimuth);
-        let outwards = slope[0] * direction[0] + slope[1] * direction[1];
-        let measure = launch.area() * line.share * line.edge.radius;
-        let weight = -measure * cost.value([landed.x, landed.y]) / outwards;
-        weight.is_finite().then_some((ray, weight))
     }
 }

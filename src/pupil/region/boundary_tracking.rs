@@ -6,8 +6,9 @@ use super::kind::{Region, RegionKind};
 use crate::pupil::launch::Launch;
 use std::f64::consts::PI;
 
-/// The accuracy of a corner, where both margins vanish, relative to the size of the pupil.
-const CORNER_TOLERANCE: f64 = 1e-12;
+/// The last Newton step to a corner, where both margins vanish, relative to the size of the pupil: the
+/// error behind it is of the order of its square.
+const LAST_STEP: f64 = 3e-8;
 /// The largest number of Newton steps to a corner.
 const STEPS: usize = 12;
 /// The longest Newton step, relative to the size of the pupil: a longer one leaves the
@@ -51,7 +52,7 @@ impl<'a> Region<'a> {
             [0, 1].map(|k| cover.center[k] + u * cover.axes[0][k] + v * cover.axes[1][k])
         };
         let points: Vec<_> = (0..CELLS * CELLS).map(place).collect();
-        if launch.lit_mask(&points).into_iter().any(|lit| lit) {
+        if launch.transmission_mask(&points).into_iter().any(|lit| lit) {
             return Self::new(launch);
         }
         Self { launch, kind: RegionKind::Dark, rays: points.len() }
@@ -75,7 +76,7 @@ impl Boundary {
             found.arcs[next].from = corner - turn;
         }
         // Without light at the centre there is no star-shaped pupil.
-        let lit = launch.is_lit(self.frame.center);
+        let lit = launch.transmits(self.frame.center);
         (lit && found.arcs.iter().all(|arc| arc.to - arc.from > SHORTEST_ARC)).then_some(found)
     }
 
@@ -92,7 +93,7 @@ impl Boundary {
         let mut p = self.frame.point(before, self.radius_guess(before));
         let size = self.radius_guess(before) * self.frame.area().sqrt();
         for _ in 0..STEPS {
-            *rays += 4;
+            *rays += 2;
             let (f, [fx, fy]) = margin_with_slope(launch, p, a.limit)?;
             let (g, [gx, gy]) = margin_with_slope(launch, p, b.limit)?;
             let determinant = fx * gy - fy * gx;
@@ -102,7 +103,7 @@ impl Boundary {
                 return None;
             }
             p = [p[0] - step[0], p[1] - step[1]];
-            if length <= CORNER_TOLERANCE * size {
+            if length <= LAST_STEP * size {
                 let (azimuth, _) = self.frame.polar(p);
                 // The azimuth nearest to the former one, up to full turns.
                 let turns = ((before - azimuth) / (2.0 * PI)).round();
@@ -123,10 +124,13 @@ fn margin_with_slope(
         PupilLimit::Disc => Some((1.0 - p[0] * p[0] - p[1] * p[1], [-2.0 * p[0], -2.0 * p[1]])),
         PupilLimit::Unaimed => None,
         PupilLimit::Surface(surface, ray_limit) => {
-            let channel = launch.channel();
-            let value = channel.tracer.margin(launch.ray(p)?, surface, ray_limit)?;
-            let slope = channel.unclipped.margin(launch.dual_ray(p)?, surface, ray_limit)?.slope;
-            Some((value, slope))
+            let (channel, ray) = (launch.channel(), launch.dual_ray(p)?);
+            let (open, tracer) = (&channel.unclipped, &channel.tracer);
+            if let Some(margin) = open.margin_with_rims(tracer, ray, surface, ray_limit) {
+                return Some((margin.value, margin.slope));
+            }
+            let value = tracer.margin(launch.ray(p)?, surface, ray_limit)?;
+            Some((value, open.margin(ray, surface, ray_limit)?.slope))
         }
     }
 }

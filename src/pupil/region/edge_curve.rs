@@ -1,7 +1,7 @@
 //! The edge of a pupil as a closed curve of points that interpolate it to rounding.
 
-use super::boundary::Boundary;
-use super::edge_search::{EdgeSearch, GUESS_SPREAD, LimitFilter};
+use super::boundary::{Boundary, EdgePoint};
+use super::edge_search::{EdgeSearch, LimitFilter};
 use super::kind::{Region, RegionKind};
 use crate::math::quadrature::chebyshev_points;
 use crate::pupil::launch::Launch;
@@ -81,15 +81,14 @@ fn arcs(
         let step = (arc.to - arc.from) / parts;
         for part in 0..parts as usize {
             let from = arc.from + step * part as f64;
-            let mut points = Vec::with_capacity(count);
-            for t in chebyshev_points(count) {
-                let azimuth = from + t * step;
-                let guess = boundary.radius_guess(azimuth);
-                let edge = search
-                    .edge_at_limit(arc.limit, azimuth, guess)
-                    .or_else(|| search.edge(azimuth, guess, GUESS_SPREAD))?;
-                points.push(boundary.frame.point(azimuth, edge.radius));
-            }
+            let guess = |t: f64| (from + t * step, boundary.radius_guess(from + t * step));
+            let guesses: Vec<_> = chebyshev_points(count).map(guess).collect();
+            let edges = search.edges_along_arc(arc.limit, &guesses);
+            let point = |((azimuth, _), edge): (&(f64, f64), Option<EdgePoint>)| {
+                Some(boundary.frame.point(*azimuth, edge?.radius))
+            };
+            let points: Option<Vec<_>> = guesses.iter().zip(edges).map(point).collect();
+            let points = points?;
             found.push(EdgeArc { points, begins_at_corner: corner && part == 0 });
         }
     }

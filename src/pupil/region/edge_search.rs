@@ -4,6 +4,7 @@
 //! rounding by a bracketed secant; where the margin that ends it changes, the edge has a corner.
 
 use super::boundary::{Boundary, BoundaryArc, EdgePoint, PolarFrame, PupilLimit};
+use super::limit_secant::{LimitSecant, SECANT_STEPS, SecantStep};
 use crate::pupil::launch::Launch;
 use crate::trace::RayLimit;
 use std::f64::consts::PI;
@@ -29,7 +30,7 @@ const JUMP: f64 = 1e-5;
 /// The relative error of the radius interpolated between two samples of the edge.
 pub(super) const GUESS_SPREAD: f64 = 0.003;
 /// The distance inside the edge, relative to the radius, at which margins are evaluated.
-const INSIDE: f64 = 1e-9;
+pub(super) const INSIDE: f64 = 1e-9;
 /// A margin this small relative to its neighbours is one that ends the pupil.
 const ENDING: f64 = 1e-6;
 /// A cosine that vanishes at this part of the radius or beyond vanishes at the edge but for
@@ -114,7 +115,7 @@ impl Launch<'_> {
     }
 
     /// True if the ray at `p` gets through the surfaces.
-    pub(super) fn is_lit(&self, p: [f64; 2]) -> bool {
+    pub(super) fn transmits(&self, p: [f64; 2]) -> bool {
         self.probe(p, PupilLimit::Disc).failed.is_none()
     }
 }
@@ -256,20 +257,6 @@ impl<'a> EdgeSearch<'a> {
         EdgePoint { radius: low, limit }
     }
 
-    /// The edge at an azimuth if a given limit makes it: the zero of its margin alone, provided
-    /// that a ray just inside passes all limits.
-    pub(super) fn edge_at_limit(
-        &mut self,
-        limit: PupilLimit,
-        azimuth: f64,
-        guess: f64,
-    ) -> Option<EdgePoint> {
-        let radius = self.limit_zero(limit, azimuth, guess).filter(|r| *r > 0.0)?;
-        self.rays += 1;
-        let inside = self.frame.point(azimuth, radius * (1.0 - INSIDE));
-        self.launch.is_lit(inside).then_some(EdgePoint { radius, limit })
-    }
-
     /// The margin of a ray at one limit; NaN if it does not get there.
     fn margin(&mut self, azimuth: f64, r: f64, limit: PupilLimit) -> f64 {
         self.rays += 1;
@@ -280,22 +267,23 @@ impl<'a> EdgeSearch<'a> {
     }
 
     /// The radius at which one limit alone would end the pupil, by the secant method from a guess.
-    fn limit_zero(&mut self, limit: PupilLimit, azimuth: f64, guess: f64) -> Option<f64> {
+    pub(super) fn limit_zero(
+        &mut self,
+        limit: PupilLimit,
+        azimuth: f64,
+        guess: f64,
+    ) -> Option<f64> {
         if limit == PupilLimit::Disc {
             return Some(self.disc(azimuth));
         }
-        let (mut r, mut step) = (guess, 1e-4 * guess);
-        let mut before = self.margin(azimuth, r - step, limit);
-        for _ in 0..20 {
-            let margin = self.margin(azimuth, r, limit);
-            let next = -margin * step / (margin - before);
-            if margin == 0.0 || next.abs() <= 1e-13 * guess {
-                return Some(r + if margin == 0.0 { 0.0 } else { next });
+        let mut search = LimitSecant::new(guess);
+        search.before = self.margin(azimuth, search.first(), limit);
+        for _ in 0..SECANT_STEPS {
+            match search.advance(self.margin(azimuth, search.r, limit)) {
+                SecantStep::Further => {}
+                SecantStep::Found(radius) => return Some(radius),
+                SecantStep::Lost => return None,
             }
-            if !(next.abs() < guess) {
-                return None;
-            }
-            (before, step, r) = (margin, next, r + next);
         }
         None
     }

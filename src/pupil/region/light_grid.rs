@@ -29,7 +29,7 @@ const FIRST_REACH: f64 = 1.6;
 
 impl Launch<'_> {
     /// For each pupil point, true if its ray gets through the surfaces.
-    pub(super) fn lit_mask(&self, points: &[[f64; 2]]) -> Vec<bool> {
+    pub(super) fn transmission_mask(&self, points: &[[f64; 2]]) -> Vec<bool> {
         let mut lit = vec![false; points.len()];
         let (traced, landed) = self.trace_points(points);
         traced.iter().enumerate().for_each(|(ray, i)| lit[*i] = landed.fate(ray).is_imaged());
@@ -124,7 +124,7 @@ impl LightGrid {
             .collect();
         let points: Vec<_> = chosen.iter().map(|i| grid.point(*i)).collect();
         grid.rays = points.len();
-        for (i, lit) in chosen.iter().zip(launch.lit_mask(&points)) {
+        for (i, lit) in chosen.iter().zip(launch.transmission_mask(&points)) {
             grid.lit[*i] = lit;
             if mirrored {
                 let (row, column) = (i / cells, i % cells);
@@ -201,7 +201,7 @@ impl LightGrid {
         let points = || self.lit_cells().map(|i| self.point(i));
         let middle = self.centroid();
         let mut center = if launch.is_symmetric() { [0.0, middle[1]] } else { middle };
-        if !launch.is_lit(center) {
+        if !launch.transmits(center) {
             let distance = |p: &[f64; 2]| (p[0] - center[0]).hypot(p[1] - center[1]);
             let nearest = points().min_by(|a, b| distance(a).total_cmp(&distance(b)));
             center = nearest.unwrap_or(center);

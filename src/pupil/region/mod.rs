@@ -12,6 +12,8 @@ mod edge_curve;
 mod edge_search;
 mod kind;
 mod light_grid;
+mod limit_edge;
+mod limit_secant;
 mod lit_radius;
 mod moments;
 mod nodes;
@@ -28,7 +30,6 @@ pub use kind::{Region, RegionKind};
 pub use lit_radius::LitRadius;
 pub use moments::PupilMoments;
 pub use nodes::Nodes;
-pub(super) use nodes::RadialLine;
 pub use outline::{OutlineSide, PupilOutline};
 pub use quadrature::{
     Accuracy, ConvergedList, ConvergedValues, TracedNodes, converge, converge_list,

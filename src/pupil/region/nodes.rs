@@ -21,14 +21,14 @@ pub struct Nodes {
 
 /// A radius of a pupil with a boundary, from the centre of its frame to its edge.
 #[derive(Debug, Clone, Copy)]
-pub(in crate::pupil) struct RadialLine {
-    pub(in crate::pupil) azimuth: f64,
-    pub(in crate::pupil) edge: EdgePoint,
+pub(super) struct RadialLine {
+    pub(super) azimuth: f64,
+    pub(super) edge: EdgePoint,
     /// Its share of the full turn, times the area of the frame.
-    pub(in crate::pupil) share: f64,
+    pub(super) share: f64,
     /// The distance from the centre at which a cosine vanishes beyond the edge, in lengths of the
     /// radius; infinite if none does nearby.
-    pub(in crate::pupil) grazing_distance: f64,
+    pub(super) grazing_distance: f64,
 }
 
 /// A cosine that vanishes beyond this, in lengths of the radius, does not matter.

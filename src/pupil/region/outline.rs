@@ -131,7 +131,7 @@ impl Region<'_> {
     }
 
     fn area_and_centroid(&self, nodes: &Nodes) -> Option<[f64; 3]> {
-        let lit = self.launch.lit_mask(&nodes.points);
+        let lit = self.launch.transmission_mask(&nodes.points);
         let (mut area, mut sum) = (0.0, [0.0; 2]);
         for ((p, weight), _) in nodes.points.iter().zip(&nodes.weights).zip(lit).filter(|n| n.1) {
             let Some((at, unit)) = self.launch.crossing_with_area(*p) else { continue };

@@ -6,7 +6,7 @@
 //! own mirror image is integrated over one half.
 
 use super::boundary::{Boundary, PolarFrame};
-use super::edge_search::{EdgeSearch, GUESS_SPREAD};
+use super::edge_search::EdgeSearch;
 use super::kind::{Region, RegionKind};
 use super::nodes::{Grading, Nodes, RadialLine, clear_nodes, irregular_nodes, line_nodes};
 use crate::pupil::gauss_rules::legendre;
@@ -133,17 +133,19 @@ impl Region<'_> {
         for (i, arc) in boundary.arcs.iter().enumerate() {
             let length = arc.to - arc.from;
             let grading = Grading::of(&boundary.arcs, i, !self.launch.is_symmetric());
-            for (t, share) in legendre(azimuths) {
-                let (t, stretch) = grading.map(*t);
-                let azimuth = arc.from + t * length;
-                let guess = boundary.radius_guess(azimuth);
-                let expected = search.edge_at_limit(arc.limit, azimuth, guess);
-                if let Some(edge) = expected.or_else(|| search.edge(azimuth, guess, GUESS_SPREAD)) {
-                    let grazing_distance =
-                        search.grazing_distance(&boundary.grazing_limits, azimuth, edge);
-                    let share = factor * share * stretch * length;
-                    lines.push(RadialLine { azimuth, edge, share, grazing_distance });
-                }
+            let guess = |(t, _): &(f64, f64)| {
+                let azimuth = arc.from + grading.map(*t).0 * length;
+                (azimuth, boundary.radius_guess(azimuth))
+            };
+            let guesses: Vec<_> = legendre(azimuths).iter().map(guess).collect();
+            let edges = search.edges_along_arc(arc.limit, &guesses);
+            let nodes = legendre(azimuths).iter().zip(guesses);
+            for (((t, share), (azimuth, _)), edge) in nodes.zip(edges) {
+                let Some(edge) = edge else { continue };
+                let grazing_distance =
+                    search.grazing_distance(&boundary.grazing_limits, azimuth, edge);
+                let share = factor * share * grading.map(*t).1 * length;
+                lines.push(RadialLine { azimuth, edge, share, grazing_distance });
             }
         }
         (lines, search.rays)

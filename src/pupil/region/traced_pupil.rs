@@ -4,10 +4,12 @@
 use super::boundary::PupilLimit;
 use super::dark_pupil::DarkPupil;
 use super::kind::{Region, RegionKind};
+use super::limit_edge::LimitEdge;
 use super::moments::PupilMoments;
 use super::nodes::{Nodes, RadialLine};
 use super::quadrature::TracedNodes;
 use crate::trace::{ImagePoints, Rays, TraceSink};
+use std::sync::OnceLock;
 
 /// The traced rays of a pupil.
 #[derive(Debug, Clone)]
@@ -15,7 +17,10 @@ pub struct TracedPupil<'a> {
     /// The pupil.
     pub(in crate::pupil) region: Region<'a>,
     /// The radii that the rays lie on, if the boundary of the pupil is known; else empty.
-    pub(in crate::pupil) radial_lines: Vec<RadialLine>,
+    pub(super) radial_lines: Vec<RadialLine>,
+    /// The rays on its edge, by the limits that make it, once they have been asked for; `None` if the
+    /// edge is unknown.
+    pub(super) edges: OnceLock<Option<Vec<LimitEdge>>>,
     /// The traced rays.
     pub rays: Rays<f64>,
     /// Their image points, each with its weight in pupil coordinates.
@@ -43,6 +48,7 @@ impl<'a> Region<'a> {
         TracedPupil {
             region: self.clone(),
             radial_lines: Vec::new(),
+            edges: OnceLock::new(),
             moments: PupilMoments::of_image_points(&landed, self.launch.area()),
             landed,
             dark: None,
@@ -59,7 +65,7 @@ impl TracedPupil<'_> {
     }
 
     /// The limits at the ends of the radial lines, each once.
-    pub(in crate::pupil) fn limits(&self) -> Vec<PupilLimit> {
+    pub(super) fn limits(&self) -> Vec<PupilLimit> {
         let mut found: Vec<PupilLimit> = Vec::new();
         for line in &self.radial_lines {
             if !found.contains(&line.edge.limit) {

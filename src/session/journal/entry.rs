@@ -12,7 +12,7 @@ pub(super) const VERSION: u32 = 1;
 /// The number of digits of a checksum.
 const DIGITS: usize = 8;
 
-/// What has happened to a design.
+/// An event in the life of a design.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub(in crate::session) enum JournalEntry {

@@ -14,7 +14,7 @@ pub(in crate::session) struct JournalState {
     pub(in crate::session) history: DesignHistory,
     /// The version that is in its file.
     pub(in crate::session) saved: Option<u64>,
-    /// What running computations have found.
+    /// The results of running computations.
     pub(in crate::session) runs: Vec<RunRecord>,
     /// True if the design was closed in order.
     closed: bool,

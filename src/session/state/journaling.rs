@@ -1,4 +1,4 @@
-//! What a session writes into its journal, and how a design is recovered from one.
+//! The entries that a session writes into its journal, and the recovery of a design from one.
 
 use super::Session;
 use crate::lens::Lens;

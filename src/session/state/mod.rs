@@ -23,6 +23,7 @@ use super::run::{BackgroundRun, RunId, RunKind, RunStatus};
 use super::score::DesignScore;
 use super::structure_search::StructureSearchState;
 use super::view::{KeptLens, Message, SessionView, Severity};
+use crate::effects::{Effect, EffectOverride};
 use crate::experiments::{self, Effort, ExperimentReport};
 use crate::lens::Lens;
 use crate::merit::Goal;
@@ -183,6 +184,11 @@ impl Session {
         if !command.continues_drag() {
             self.end_drag();
         }
+        self.carry_out(command);
+        self.poll()
+    }
+
+    fn carry_out(&mut self, command: Command) {
         match command {
             Command::Edit(edit) => self.edit(&edit),
             Command::LimitByStop => self.limit_by_stop(),
@@ -228,9 +234,7 @@ impl Session {
             Command::SetTolerance(tolerance) => self.set_tolerance(tolerance),
             Command::ShowZoom(zoom) => self.show_zoom(zoom),
             Command::ShowRays(rays) => self.change_settings(|s| s.rays = rays.min(MAX_RAYS)),
-            Command::SetEffect(effect, choice) => {
-                self.change_settings(|s| s.overrides.set(effect, choice));
-            }
+            Command::SetEffect(effect, choice) => self.set_effect(effect, choice),
             Command::ShowPupils(shown) => self.change_settings(|s| s.pupils = shown),
             Command::ShowContrasts(shown) => self.change_settings(|s| s.contrasts = shown),
             Command::ShowPupilWavelength(wavelength) => {
@@ -243,7 +247,10 @@ impl Session {
             Command::Select(surface) => self.selected = surface,
             Command::ClearMessages => self.messages = Arc::default(),
         }
-        self.poll()
+    }
+
+    fn set_effect(&mut self, effect: Effect, choice: EffectOverride) {
+        self.change_settings(|settings| settings.overrides.set(effect, choice));
     }
 
     /// The events since the last call, those of background threads included.

@@ -41,7 +41,7 @@ impl Panel for FirstOrderPanel {
     }
 }
 
-/// Why a lens has no focal length, and what gives it one.
+/// The reason why a lens has no focal length, and the remedy.
 fn without_focus(lens: &Lens) -> &'static str {
     if lens.surfaces.iter().all(|row| row.medium == Medium::Air) {
         "There is no glass yet. Add an element from the menu Element, or a glass in the table."

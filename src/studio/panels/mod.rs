@@ -91,7 +91,7 @@ pub enum PanelKind {
     Effects,
     /// Aperture, fields, wavelengths, object and image.
     System,
-    /// What differs between zoom positions.
+    /// The differences between zoom positions.
     Zoom,
 }
 

@@ -195,10 +195,29 @@ fn lane_sum<R: Real>(lanes: &[R; BLOCK]) -> R {
     ((a + b) + (c + d)) + ((e + f) + (g + h))
 }
 
+/// The columns of the selected parameters, for object space and then for each surface.
+#[derive(Debug)]
+struct ColumnPlaces(Vec<Vec<(SurfaceParameter, usize)>>);
+
+impl ColumnPlaces {
+    fn new(selected: &[(Option<usize>, SurfaceParameter)], surfaces: usize) -> Self {
+        let mut places = vec![Vec::new(); surfaces + 1];
+        for (column, (surface, parameter)) in selected.iter().enumerate() {
+            places[surface.map_or(0, |surface| surface + 1)].push((*parameter, column));
+        }
+        Self(places)
+    }
+
+    fn find(&self, surface: Option<usize>, parameter: SurfaceParameter) -> Option<usize> {
+        let here = &self.0[surface.map_or(0, |surface| surface + 1)];
+        here.iter().find(|(selected, _)| *selected == parameter).map(|(_, column)| *column)
+    }
+}
+
 /// The derivatives of each ray by the selected parameters of the system.
 #[derive(Debug)]
 struct JacobianColumns<'a, R> {
-    selected: &'a [(Option<usize>, SurfaceParameter)],
+    places: &'a ColumnPlaces,
     /// A column for each selected parameter.
     columns: &'a mut [[R; BLOCK]],
 }
@@ -211,8 +230,8 @@ impl<R: Real> GradientSink<R> for JacobianColumns<'_, R> {
         parameter: SurfaceParameter,
         lanes: &[R; BLOCK],
     ) {
-        let found = self.selected.iter().position(|w| *w == (surface, parameter));
-        if let Some(column) = found.map(|i| &mut self.columns[i]) {
+        if let Some(place) = self.places.find(surface, parameter) {
+            let column = &mut self.columns[place];
             column.iter_mut().zip(lanes).for_each(|(to, from)| *to += *from);
         }
     }
@@ -281,6 +300,17 @@ impl<R: Real> Tracer<R> {
     ) -> (Landings<R>, Vec<R>) {
         let mut landings = Landings::default();
         self.trace_batch(rays, &mut landings);
+        (landings, self.landing_slopes(rays, selected))
+    }
+
+    /// The derivatives of x and y of the landings by the selected parameters of the system, as by
+    /// [`Tracer::jacobian`].
+    pub fn landing_slopes(
+        &self,
+        rays: &Rays<R>,
+        selected: &[(Option<usize>, SurfaceParameter)],
+    ) -> Vec<R> {
+        let places = ColumnPlaces::new(selected, self.surfaces());
         let row = 2 * selected.len();
         let mut matrix = vec![R::ZERO; row * rays.len()];
         let mut distances = vec![[R::ZERO; BLOCK]; self.surfaces()];
@@ -298,9 +328,9 @@ impl<R: Real> Tracer<R> {
                     let block = self.forward(rays, from, count, &mut distances);
                     columns.fill([R::ZERO; BLOCK]);
                     let (of_x, of_y) = columns.split_at_mut(selected.len());
-                    let mut rows = JacobianColumns { selected, columns: of_x };
+                    let mut rows = JacobianColumns { places: &places, columns: of_x };
                     self.backward(block.clone(), &distances, count, &|_| x, &mut rows);
-                    let mut rows = JacobianColumns { selected, columns: of_y };
+                    let mut rows = JacobianColumns { places: &places, columns: of_y };
                     self.backward(block, &distances, count, &|_| y, &mut rows);
                     for j in 0..count {
                         let to = &mut matrix[(from + j) * row..(from + j + 1) * row];
@@ -309,7 +339,7 @@ impl<R: Real> Tracer<R> {
                 }
             },
         );
-        (landings, matrix)
+        matrix
     }
 
     /// Traces a block and stores the distance to each surface.
@@ -321,7 +351,7 @@ impl<R: Real> Tracer<R> {
         count: usize,
         distances: &mut [[R; BLOCK]],
     ) -> RayBlock<R> {
-        let mut block = RayBlock::new();
+        let mut block: RayBlock<R> = RayBlock::new();
         block.load(rays.slice(from, from + count), 0, count, self.index_before);
         self.mask(&mut block, count);
         for (i, (interface, distance)) in self.interfaces.iter().zip(distances).enumerate() {

@@ -206,7 +206,7 @@ fn zoom_position(ui: &mut Ui, view: &SessionView, actions: &mut Actions) {
 }
 
 impl LayoutKey {
-    /// What is drawn: the lens of a search over the design, the design over that before a drag.
+    /// The lenses to draw: that of a search over the design, the design over that before a drag.
     fn of(ui: &Ui, view: &SessionView, before: Option<&Arc<AnalysisResults>>) -> Option<Self> {
         let shown = displayed_results(view)?.0;
         let reference = before.or(view.results.as_ref());

@@ -14,7 +14,7 @@ use crate::studio::text::counted;
 /// The distance from a bound, relative to the bound, below which it is binding.
 const BINDING: f64 = 1e-4;
 
-/// How a quantity stands to its bounds.
+/// The position of a quantity relative to its bounds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum LimitState {
     Broken,

@@ -169,7 +169,7 @@ impl ParetoPanel {
                 }
             }
             let shown = view.preview_lens.is_some() && self.selected.is_some();
-            let take = ui.add_enabled(shown, Button::new("Take this lens"));
+            let take = ui.add_enabled(shown, Button::new("Accept this lens"));
             if take.on_hover_text("Make it the design, as one undo step").clicked() {
                 actions.push(Command::AcceptPreview);
             }

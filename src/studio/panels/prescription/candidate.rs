@@ -47,7 +47,7 @@ impl Candidate<'_> {
         });
     }
 
-    /// What the design has in place of a changed cell; `None` for an unchanged one.
+    /// The text of the design in place of a changed cell; `None` for an unchanged one.
     fn old_text(self, place: CellPlace, zoom: usize) -> Option<String> {
         let rows = self.design.surfaces.len();
         if place.row > rows {

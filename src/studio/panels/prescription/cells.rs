@@ -1,4 +1,4 @@
-//! What a cell holds as text, and the edit of a text that is typed or pasted into it.
+//! The text of a cell, and the edit for a text that is typed or pasted into it.
 
 use egui::Id;
 

@@ -17,7 +17,7 @@ const MAX_WAIT: u8 = 6;
 /// The rows that a page key moves by.
 const PAGE: isize = 10;
 
-/// What a key asks for in the range of cells.
+/// The action of a key on the range of cells.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum RangeCommand {
     InsertRow,

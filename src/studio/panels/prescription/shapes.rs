@@ -1,4 +1,4 @@
-//! What a surface may have beyond a sphere and a glass: asphere terms, an obstruction, a gradient.
+//! Features of a surface beyond a sphere and a glass: asphere terms, an obstruction, a gradient.
 
 use egui::{Button, Ui};
 

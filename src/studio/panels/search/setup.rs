@@ -182,7 +182,7 @@ impl SearchSetup {
             },
         );
         ui.end_row();
-        ui.weak("Rims");
+        ui.weak("Semi-diameters");
         let hint = "Remove the stop and open every semi-diameter as far as the neighbouring \
             surfaces and this value allow: the search then decides what limits the beam";
         optional(
@@ -192,7 +192,7 @@ impl SearchSetup {
             &mut disabled.open,
             hint,
             |ui, value| {
-                length(ui, "Largest rim at the start", value, 0.1..=10_000.0);
+                length(ui, "Largest semi-diameter at the start", value, 0.1..=10_000.0);
             },
         );
         ui.end_row();

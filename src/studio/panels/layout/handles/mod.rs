@@ -53,7 +53,7 @@ struct GrabbedHandle {
     by: GrabbedBy,
 }
 
-/// What moves a handle.
+/// The device that moves a handle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum GrabbedBy {
     Pointer,
@@ -148,7 +148,7 @@ impl HandleLayer {
         }
     }
 
-    /// What moves a handle; `None` for one that is not grabbed.
+    /// The device that moves a handle; `None` for one that is not grabbed.
     fn holds(&self, handle: Handle) -> Option<GrabbedBy> {
         let grabbed = self.grabbed.as_ref()?;
         (handle_id(grabbed.handle) == handle_id(handle)).then_some(grabbed.by)
