@@ -62,7 +62,7 @@ struct Peak {
     place: [f64; 2],
     /// The distance there.
     distance: f64,
-    /// How much more it may be nearby.
+    /// The possible increase nearby.
     rise: f64,
 }
 

@@ -119,7 +119,7 @@ struct ToleranceReport {
     warnings: Vec<String>,
 }
 
-/// What one error does.
+/// The effect of one error.
 #[derive(Serialize)]
 struct SensitivityRow {
     kind: PerturbationKind,

@@ -253,7 +253,7 @@ pub enum SystemError {
         surface: SurfaceNumber,
         /// The method, as the subject of a sentence.
         what: &'static str,
-        /// What is expected instead, or nothing.
+        /// The expected value, if there is one.
         hint: &'static str,
     },
     /// The start or the direction of a ray is not valid.

@@ -40,9 +40,9 @@ pub struct SheetScore {
     pub score: Option<f64>,
     /// The radius over that of the known lens itself.
     pub against_reference: Option<f64>,
-    /// What the lens breaks.
+    /// The limits that the lens breaks.
     pub failures: Vec<String>,
-    /// Where the lens comes from.
+    /// The origin of the lens.
     pub origin: String,
     /// The number of gradients.
     pub gradients: u64,

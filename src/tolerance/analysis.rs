@@ -9,7 +9,7 @@ use crate::lens::{Perturbation, ToleranceSheet};
 use rayon::prelude::*;
 use serde::Serialize;
 
-/// What is computed.
+/// The scope of an analysis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ToleranceRequest {
     /// The seed of random errors.
@@ -23,7 +23,7 @@ pub struct ToleranceRequest {
 /// The result.
 #[derive(Debug, Clone)]
 pub struct ToleranceAnalysis {
-    /// What each error does, in the order of the tolerances.
+    /// The effect of each error, in the order of the tolerances.
     pub sensitivities: Vec<Sensitivity>,
     /// The quadratic forms at the fixed image plane and refocused.
     pub forms: [QuadraticForm; 2],

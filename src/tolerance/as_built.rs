@@ -74,7 +74,7 @@ struct DesignSlope {
     second: f64,
 }
 
-/// What one error adds to the expectation, and the derivatives by some design numbers.
+/// The contribution of one error to the expectation, and the derivatives by some design numbers.
 type ExcessTerm = (FixedAndRefocused, [[DesignSlope; 2]; LANES]);
 
 fn term(

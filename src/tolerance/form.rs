@@ -162,7 +162,7 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
-/// What each error does to the rays: for each, the displacements of all rays from the centroids of
+/// The effect of each error on the rays: for each, the displacements of all rays from the centroids of
 /// their fields, multiplied by the roots of their weights.
 fn ray_rows(
     scene: &ToleranceScene,

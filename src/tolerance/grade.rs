@@ -15,9 +15,9 @@ const TEST_WAVELENGTH: f64 = 0.000_632_8;
 /// A class of care in making.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum ToleranceGrade {
-    /// What every shop delivers.
+    /// The accuracy of every shop.
     Commercial,
-    /// What a good shop delivers without a surcharge.
+    /// The accuracy of a good shop without a surcharge.
     #[default]
     Precision,
     /// The limit of a good shop.

@@ -7,7 +7,7 @@ use crate::lens::System;
 use crate::math::{Real, Vec3};
 use crate::trace::{Ray, TracedRay, Tracer};
 
-/// What is computed besides spots.
+/// The quantities computed besides spots.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MeritOptions {
     /// The index of the primary wavelength.
@@ -17,7 +17,7 @@ pub struct MeritOptions {
     pub wavefront: Option<(f64, f64)>,
 }
 
-/// How good a lens is.
+/// The merits of a lens.
 #[derive(Debug, Clone)]
 pub struct Merits<R> {
     /// The spot of each field.

@@ -16,7 +16,7 @@ pub struct ToleranceScene {
     pub lens: NominalLens,
     /// The rays.
     pub beam: Beam,
-    /// What is computed besides spots.
+    /// The quantities computed besides spots.
     pub options: MeritOptions,
     /// The largest relative error of the radius of a spot by the quadrature over its pupil.
     pub sampling_error: f64,

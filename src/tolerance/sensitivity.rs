@@ -35,18 +35,18 @@ impl From<Jet2> for Derivatives {
     }
 }
 
-/// What an error of making does to the merits of a lens.
+/// The effect of an error of making on the merits of a lens.
 #[derive(Debug, Clone)]
 pub struct Sensitivity {
     /// The error.
     pub error: Perturbation,
     /// The merits as functions of it.
     pub merits: Merits<Jet2>,
-    /// What it does to each ray, all fields and wavelengths one after the other.
+    /// Its effect on each ray, all fields and wavelengths one after the other.
     pub rays: Vec<RaySensitivity>,
 }
 
-/// What an error does to a ray at the image plane, relative to the centroid of its field.
+/// The effect of an error on a ray at the image plane, relative to the centroid of its field.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RaySensitivity {
     /// The derivative of x and y by the error, in mm per unit of the error.

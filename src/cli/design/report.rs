@@ -103,7 +103,7 @@ fn write_costs(f: &mut fmt::Formatter<'_>, costs: &[LimitCost]) -> fmt::Result {
     Ok(())
 }
 
-/// What a lens is best at, as in file names.
+/// The quality in which a lens is best, as in file names.
 pub(super) fn merit_name(merit: DesignMerit) -> &'static str {
     match merit {
         DesignMerit::Best => "best",

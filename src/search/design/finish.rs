@@ -9,7 +9,7 @@ use crate::lens::Lens;
 use rayon::prelude::*;
 use serde::Serialize;
 
-/// What a designed lens is best at.
+/// The quality in which a designed lens is best.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum DesignMerit {
@@ -24,13 +24,13 @@ pub enum DesignMerit {
 /// A designed lens.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct DesignedLens {
-    /// What it is best at.
+    /// The quality in which it is best.
     pub merit: DesignMerit,
     /// The start and the mutations that led to it.
     pub origin: String,
     /// Its judgement.
     pub judgement: LensJudgement,
-    /// What the limits cost that hold it.
+    /// The costs of its binding limits.
     pub costs: Vec<LimitCost>,
     /// The lens.
     pub lens: Lens,

@@ -88,7 +88,7 @@ pub struct LensJudgement {
     pub aspheric_surfaces: usize,
     /// Everything that is limited.
     pub limits: Vec<RequirementMargin>,
-    /// What else is wrong, in words: glasses that are not permitted, a hole between the fields.
+    /// Other faults, in words: glasses that are not permitted, a hole between the fields.
     pub faults: Vec<String>,
 }
 

@@ -220,16 +220,8 @@ impl Filling {
         if spec.object.is_none() {
             self.or("object", None, "infinity".to_owned(), "a distant object");
         }
-        let ums = vec![line::F, line::D, line::C];
-        let ums = self.or("wavelengths_um", spec.wavelengths_um.as_ref(), ums, "visible light");
-        let ones = vec![1.0; ums.len()];
-        let weights = spec.wavelength_weights.as_ref();
-        let weights = self.or("wavelength_weights", weights, ones, "equal weights");
-        let any = GlassList::Words(ANY_GLASS.to_owned());
-        let glasses = spec.glasses.clone().unwrap_or_else(|| {
-            self.or("glasses", None, ANY_GLASS.to_owned(), "no restriction");
-            any
-        });
+        let wavelengths = self.wavelengths(spec);
+        let glasses = self.glasses(spec);
         let (light, areas) = (usual_light(&fields), usual_areas(f, f_number, &fields));
         let thin = (0.02 * f).clamp(0.25, 1.0);
         let (size, reason) = (usual_semi_diameter(f, f_number, half), "room for the beams");
@@ -289,8 +281,26 @@ impl Filling {
             ),
             glass_edge: self.or("min_edge_mm", spec.min_edge_mm.as_ref(), 0.8 * thin, "no chips"),
             air_center: self.or("min_air_mm", spec.min_air_mm.as_ref(), 0.05, "no contact"),
-            wavelengths: ums.into_iter().zip(weights).collect(),
+            wavelengths,
             fields,
+        })
+    }
+
+    /// The wavelengths in um with their weights.
+    fn wavelengths(&mut self, spec: &LensSpecification) -> Vec<(f64, f64)> {
+        let usual = vec![line::F, line::D, line::C];
+        let ums = self.or("wavelengths_um", spec.wavelengths_um.as_ref(), usual, "visible light");
+        let ones = vec![1.0; ums.len()];
+        let weights = spec.wavelength_weights.as_ref();
+        let weights = self.or("wavelength_weights", weights, ones, "equal weights");
+        ums.into_iter().zip(weights).collect()
+    }
+
+    /// The permitted glasses.
+    fn glasses(&mut self, spec: &LensSpecification) -> GlassList {
+        spec.glasses.clone().unwrap_or_else(|| {
+            self.or("glasses", None, ANY_GLASS.to_owned(), "no restriction");
+            GlassList::Words(ANY_GLASS.to_owned())
         })
     }
 }

@@ -15,7 +15,7 @@ use rand::{RngExt as _, SeedableRng as _};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-/// What a design depends on besides its requirements.
+/// The settings of a design besides its requirements.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct DesignSettings {
@@ -51,7 +51,7 @@ pub enum DesignStage {
 /// A lens of a run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct Candidate {
-    /// Where it comes from.
+    /// Its origin.
     pub(super) origin: String,
     pub(super) draft: LensDraft,
     /// Its merit, in mm².

@@ -42,7 +42,7 @@ pub(super) fn library_starts(asked: &LensRequirements, without: &[String]) -> Ve
     found.into_iter().map(|(_, start)| start).collect()
 }
 
-/// How far a lens is from what is asked for; `None` for one of another kind.
+/// The distance of a lens from the requirements; `None` for one of another kind.
 fn distance(entry: &LibraryLens, asked: &LensRequirements) -> Option<f64> {
     let one = |values: &[f64]| (values.len() == 1).then(|| values[0]);
     let f_number = one(entry.aperture.f_number()?)?;

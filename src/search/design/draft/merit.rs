@@ -158,7 +158,7 @@ impl<'a> DraftMerit<'a> {
         sum.point.value.is_finite().then_some(sum)
     }
 
-    /// What the limits of the draft cost at a minimum of the merit: by their multipliers.
+    /// The costs of the limits of the draft at a minimum of the merit: by their multipliers.
     pub(super) fn limit_costs(&mut self) -> Option<Vec<LimitCost>> {
         let values = self.start();
         let sum = self.sum(&values)?;

@@ -38,14 +38,14 @@ impl LensDraft {
     }
 }
 
-/// What a limit costs.
+/// The cost of a limit.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct LimitCost {
     /// The limit.
     pub term: &'static str,
     /// The surface, or the one in front of the gap, counted from 0; `None` for the whole lens.
     pub surface: Option<usize>,
-    /// What the RMS spot radius over the fields would gain, in µm, by a bound looser by 1 mm; for a
+    /// The decrease of the RMS spot radius over the fields, in µm, by a bound looser by 1 mm; for a
     /// distortion in mm of the image.
     pub um_per_mm: f64,
 }

@@ -5,7 +5,7 @@ use crate::lens::{ASPHERE_TERMS, Lens, Medium};
 use crate::search::design::LensRequirements;
 use crate::trace::SurfaceParameter;
 
-/// What a descent may change besides curvatures, gaps and the pupil.
+/// The variables of a descent besides curvatures, gaps and the pupil.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(in crate::search::design) struct Freedom {
     /// True to vary the index and the Abbe number of glasses.
