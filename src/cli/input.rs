@@ -27,6 +27,11 @@ pub(super) struct LensFiles {
 }
 
 impl LensFiles {
+    /// The lenses of some files.
+    pub(super) const fn new(paths: Vec<PathBuf>) -> Self {
+        Self { paths }
+    }
+
     /// Measures every lens, and makes a row of its file and what was found; a bar counts them, and
     /// a request to end leaves out those that have not begun. The second argument of `measure` is
     /// the name of the file without its ending.

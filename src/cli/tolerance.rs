@@ -64,7 +64,7 @@ impl ToleranceArgs {
         self.check_lengths()?;
         let opened = self.lens.open()?;
         opened.check_zoom(self.zoom)?;
-        let refuse = |source| tolerance_error(&opened, source);
+        let refuse = |source: ToleranceError| tolerance_error(&opened, &source);
         let scene = ToleranceScene::new(&opened.lens, self.zoom, self.error.0).map_err(refuse)?;
         let sheet = self.sheet(&opened, &scene);
         let request = ToleranceRequest { seed: self.seed, samples: self.samples, limit: self.rms };
@@ -99,7 +99,7 @@ impl ToleranceArgs {
     }
 }
 
-fn tolerance_error(opened: &LoadedLens, source: ToleranceError) -> CliError {
+fn tolerance_error(opened: &LoadedLens, source: &ToleranceError) -> CliError {
     CliError::Input(format!("{}: {source}", opened.file))
 }
 

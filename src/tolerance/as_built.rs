@@ -54,17 +54,23 @@ pub fn as_built_gradient(
         let terms = terms?;
         let mut sums = [[0.0; 2]; LANES];
         for (i, (excess, slopes)) in terms.iter().enumerate() {
-            for focus in 0..2 {
-                expected[focus] += if number == 0 { excess[focus] } else { 0.0 };
-                for (sum, slope) in sums.iter_mut().zip(slopes) {
-                    sum[focus] +=
-                        slope[focus].second + if i == 0 { slope[focus].value } else { 0.0 };
-                }
+            if number == 0 {
+                (0..2).for_each(|focus| expected[focus] += excess[focus]);
+            }
+            for (sum, slope) in sums.iter_mut().zip(slopes) {
+                add_slope(sum, slope, i == 0);
             }
         }
         gradient.extend_from_slice(&sums[..some.len()]);
     }
     Ok(AsBuiltGradient { nominal, expected, gradient })
+}
+
+/// Adds the derivative of the excess by one error, and with the first one that of the nominal value.
+fn add_slope(sum: &mut [f64; 2], slope: &[DesignSlope; 2], is_first: bool) {
+    for (sum, slope) in sum.iter_mut().zip(slope) {
+        *sum += slope.second + if is_first { slope.value } else { 0.0 };
+    }
 }
 
 /// The derivative of the nominal value by a design number, and that of the excess by one error.

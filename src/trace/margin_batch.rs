@@ -81,13 +81,19 @@ impl<R: Real> Tracer<R> {
                     let count = SMALL_BLOCK.min(rays.len() - from);
                     block.load(rays.slice(from, from + count), 0, count, self.index_before);
                     self.mask(&mut block, count);
-                    for (i, interface) in self.interfaces[..surfaces].iter().enumerate() {
-                        block.cross_with(&interface.open(), i as u32, |_, _| {});
-                    }
+                    self.cross_open(&mut block, surfaces);
                     visit(&mut block, count);
                 }
             },
         );
+    }
+
+    /// Takes a block across the first surfaces, without their rims and obstructions.
+    #[inline(always)]
+    fn cross_open(&self, block: &mut RayBlock<R, SMALL_BLOCK>, surfaces: usize) {
+        for (i, interface) in self.interfaces[..surfaces].iter().enumerate() {
+            block.cross_with(&interface.open(), i as u32, |_, _| {});
+        }
     }
 }
 

@@ -7,14 +7,16 @@ use crate::cli::output::{Output, ShortNumber, TextTable};
 use crate::measure::{Machine, StepCosts, measure_step_costs};
 use serde::Serialize;
 use std::fmt::{self, Display};
+use std::path::PathBuf;
 
 /// Milliseconds per iteration on one core: double Gauss, 4 fields, all curvatures and thicknesses.
 /// With lenses: evaluations and milliseconds until within 1 % of the best merit known
 #[derive(Debug, clap::Args)]
 #[command(after_long_help = include_str!("../help/measure_optimize.txt"))]
 pub(super) struct MeasureOptimizeArgs {
-    #[command(flatten)]
-    lenses: Option<LensFiles>,
+    /// The lenses: .json or .zmx
+    #[arg(value_name = "LENS")]
+    lenses: Vec<PathBuf>,
 
     /// The number of steps of each run without lenses
     #[arg(long, value_name = "N", default_value_t = 200)]
@@ -27,8 +29,9 @@ pub(super) struct MeasureOptimizeArgs {
 
 impl MeasureOptimizeArgs {
     pub(super) fn run(&self, output: &Output) -> Result<(), CliError> {
-        if let Some(lenses) = &self.lenses {
-            return output.print(&arrival::measure(lenses, self.evaluations)?);
+        if !self.lenses.is_empty() {
+            let lenses = LensFiles::new(self.lenses.clone());
+            return output.print(&arrival::measure(&lenses, self.evaluations)?);
         }
         let costs = measure_step_costs(self.steps).map_err(|e| CliError::Failed(e.to_string()))?;
         output.print(&MeasureOptimizeReport {
