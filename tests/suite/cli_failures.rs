@@ -135,8 +135,17 @@ fn a_field_that_cannot_be_saved_is_printed() {
     let folder = Folder::new("lost-field");
     fs::create_dir(folder.path("sub")).unwrap();
     let out = folder.path("sub/field.npz");
-    let running =
-        Running::start(&["grin", "luneburg-radial", "--nodes", "5", "--out", &out, "--json"]);
+    let running = Running::start(&[
+        "grin",
+        "luneburg",
+        "--nodes",
+        "5",
+        "--iterations",
+        "1000000",
+        "--out",
+        &out,
+        "--json",
+    ]);
     std::thread::sleep(Duration::from_millis(300));
     fs::rename(folder.path("sub"), folder.path("moved")).unwrap();
     running.signal("-INT");
