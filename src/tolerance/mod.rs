@@ -1,7 +1,7 @@
 //! Errors of making: what they do to a lens, and how good the lens is that is made.
 //!
 //! A [`Perturbation`](crate::lens::Perturbation) with a value changes a resolved lens
-//! ([`perturb`]). The mean square spot `S` is a smooth function of all errors `p`, so that two
+//! ([`perturb()`]). The mean square spot `S` is a smooth function of all errors `p`, so that two
 //! derivatives of it are nearly everything: with errors that are independent and have the mean 0 and
 //! the variances `σ²`,
 //!
