@@ -36,15 +36,15 @@ fn the_spot_of_triplets_that_are_made_is_that_of_the_reference() {
     {
         let exact = number(&data["second_order_normal"][key]).sqrt();
         let spot = &found.spots[i];
-        assert_close(spot.form_root_mean_square, exact, 5e-3 * exact, name);
+        assert_close(spot.form_root_mean_square, exact, 2e-3 * exact, name);
         let real = &data["normal"][name];
         let expected = numbers(&real["rms"]);
-        assert_close(spot.mean_rms[0], expected[0], 0.015 * expected[0], name);
+        assert_close(spot.mean_rms[0], expected[0], 0.01 * expected[0], name);
         for quantile in &spot.quantiles {
             let percent = quantile.share.to_string();
             let value = &real["rms_quantiles"][&percent];
             let value = numbers(value)[0];
-            assert_close(quantile.form, value, 0.05 * value, &format!("{name} {percent}"));
+            assert_close(quantile.form, value, 0.03 * value, &format!("{name} {percent}"));
         }
         let good = spot.good.unwrap();
         assert!(good.interval[0] <= good.real && good.real <= good.interval[1]);
