@@ -163,7 +163,7 @@ fn functions_are_short() {
             }
         }
     }
-    assert!(longest.0 <= 90, "{} has {} lines", longest.1, longest.0);
+    assert!(longest.0 <= 60, "{} has {} lines", longest.1, longest.0);
 }
 
 /// Every function of a formatted text with the number of its lines: from `fn` to the brace at the
@@ -265,11 +265,6 @@ fn documentation_names_the_thing() {
             before = line;
         }
     }
-    // "Where light enters" can be the best title of a section; a habit of it is not.
-    assert!(
-        bare.len() * 50 < all,
-        "{} of {all} begin as bare clauses:\n{}",
-        bare.len(),
-        bare.join("\n")
-    );
+    assert!(all > 5_000, "only {all} were found");
+    assert!(bare.is_empty(), "these begin as bare clauses:\n{}", bare.join("\n"));
 }

@@ -88,7 +88,7 @@ impl PeakSearch<'_> {
             std::array::from_fn(|j| ((j + 1) as f64 / SHARES as f64).sqrt());
         let mut lattice = Vec::with_capacity(azimuths.len());
         for azimuth in &azimuths {
-            let Some(radius) = self.region.lit_radius(*azimuth) else {
+            let Some(radius) = self.region.pupil_radius(*azimuth) else {
                 return self.farthest_sample().into_iter().collect();
             };
             self.rays += radius.rays;
@@ -170,7 +170,7 @@ impl PeakSearch<'_> {
         let mirrored = self.region.launch.is_symmetric() && azimuth > PI;
         let azimuth = if mirrored { TAU - azimuth } else { azimuth };
         let place = [azimuth, share.clamp(0.0, 1.0)];
-        let radius = self.region.lit_radius(azimuth)?;
+        let radius = self.region.pupil_radius(azimuth)?;
         self.rays += radius.rays;
         let distance = self.distances(&[radius.point(place[1])])[0];
         distance.is_finite().then_some(Peak { place, distance, rise: 0.0 })

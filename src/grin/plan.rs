@@ -77,24 +77,14 @@ pub fn plan_tracing<F: IndexField<f64> + ?Sized>(
         screen: None,
     };
     // Where the force jumps, the error does not decrease further once a voxel has several steps.
-    let finest = if field.resolution().continuous_force {
-        path / MAX_STEPS
+    let (finest, order) = if field.resolution().continuous_force {
+        (path / MAX_STEPS, integrator.order())
     } else {
-        longest / MAX_STEPS_PER_VOXEL
+        (longest / MAX_STEPS_PER_VOXEL, 1)
     };
-    let order = if field.resolution().continuous_force { integrator.order() } else { 1 };
-    let (mut step, mut error) = (longest, f64::INFINITY);
-    let (mut least, mut stalled) = (f64::INFINITY, 0);
-    for _ in 0..TRIES {
-        error = exit_change(field, &setup(step), &setup(0.5 * step), &sample)?;
-        stalled = if error < (0.5 * least).max(CHAOTIC_ERROR * path) { 0 } else { stalled + 1 };
-        least = least.min(error);
-        if error <= tolerance || step <= finest || stalled == MAX_STALLED {
-            break;
-        }
-        step *= (0.8 * tolerance / error).powf(1.0 / f64::from(order)).clamp(0.2, 0.7);
-        step = step.max(finest);
-    }
+    let steps = StepSearch { longest, finest, order, tolerance, chaotic: CHAOTIC_ERROR * path };
+    let (step, error) =
+        steps.find(|step| exit_change(field, &setup(step), &setup(0.5 * step), &sample))?;
     let reached = error <= tolerance;
     let verdict = if reached { "within" } else { "not within" };
     reasons.push(format!(
@@ -102,6 +92,41 @@ pub fn plan_tracing<F: IndexField<f64> + ?Sized>(
         sample.len(),
     ));
     Ok(TracingPlan { setup: setup(step), error, is_within_tolerance: reached, reasons })
+}
+
+/// The search for a step size whose error is within a tolerance.
+struct StepSearch {
+    /// The step size to begin with.
+    longest: f64,
+    /// The step size below which the search gives up.
+    finest: f64,
+    /// The power of the step size with which the error decreases.
+    order: u32,
+    tolerance: f64,
+    /// Only errors above this count as stalled.
+    chaotic: f64,
+}
+
+impl StepSearch {
+    /// The last step size tried, and its error.
+    fn find(
+        &self,
+        error_of: impl Fn(f64) -> Result<f64, GrinSetupError>,
+    ) -> Result<(f64, f64), GrinSetupError> {
+        let (mut step, mut error) = (self.longest, f64::INFINITY);
+        let (mut least, mut stalled) = (f64::INFINITY, 0);
+        for _ in 0..TRIES {
+            error = error_of(step)?;
+            stalled = if error < (0.5 * least).max(self.chaotic) { 0 } else { stalled + 1 };
+            least = least.min(error);
+            if error <= self.tolerance || step <= self.finest || stalled == MAX_STALLED {
+                break;
+            }
+            let factor = (0.8 * self.tolerance / error).powf(1.0 / f64::from(self.order));
+            step = (step * factor.clamp(0.2, 0.7)).max(self.finest);
+        }
+        Ok((step, error))
+    }
 }
 
 /// The integrator and the last step that suit the continuity of the force.

@@ -37,7 +37,7 @@ pub use ray_model::{Aiming, Channel, Dual2, Neglected, PupilMeasure, RayModel, R
 pub use real_beam::filled_stop_radius;
 pub use region::{
     Accuracy, Annulus, Boundary, BoundaryArc, ConvergedList, ConvergedValues, DarkPupil, EdgeArc,
-    EdgeCurves, EdgePoint, LitRadius, Nodes, OutlineSide, PolarFrame, PupilLimit, PupilMoments,
-    PupilOutline, Region, RegionKind, TracedNodes, TracedPupil, converge, converge_list,
+    EdgeCurves, EdgePoint, Nodes, OutlineSide, PolarFrame, PupilLimit, PupilMoments, PupilOutline,
+    PupilRadius, Region, RegionKind, TracedNodes, TracedPupil, converge, converge_list,
 };
 pub use stop_limited::limited_by_stop;

@@ -14,10 +14,10 @@ mod kind;
 mod light_grid;
 mod limit_edge;
 mod limit_secant;
-mod lit_radius;
 mod moments;
 mod nodes;
 mod outline;
+mod pupil_radius;
 mod quadrature;
 mod search;
 mod traced_pupil;
@@ -27,10 +27,10 @@ pub use boundary::{Boundary, BoundaryArc, EdgePoint, PolarFrame, PupilLimit};
 pub use dark_pupil::DarkPupil;
 pub use edge_curve::{EdgeArc, EdgeCurves};
 pub use kind::{Region, RegionKind};
-pub use lit_radius::LitRadius;
 pub use moments::PupilMoments;
 pub use nodes::Nodes;
 pub use outline::{OutlineSide, PupilOutline};
+pub use pupil_radius::PupilRadius;
 pub use quadrature::{
     Accuracy, ConvergedList, ConvergedValues, TracedNodes, converge, converge_list,
 };

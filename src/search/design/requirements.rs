@@ -209,6 +209,7 @@ impl Filling {
         Ok(self.or("fields_deg", spec.fields_deg.as_ref(), usual, "0, 0.7 and 1 of the field"))
     }
 
+    /// The remaining requirements, with the usual values for those that are not stated.
     fn rest(
         &mut self,
         spec: &LensSpecification,
@@ -216,74 +217,87 @@ impl Filling {
         fields: Vec<f64>,
     ) -> Result<LensRequirements, SpecificationError> {
         let f = spec.focal_length_mm;
-        let half = fields.last().copied().unwrap_or(0.0);
         if spec.object.is_none() {
             self.or("object", None, "infinity".to_owned(), "a distant object");
         }
         let wavelengths = self.wavelengths(spec);
-        let glasses = self.glasses(spec);
-        let (light, areas) = (usual_light(&fields), usual_areas(f, f_number, &fields));
-        let thin = (0.02 * f).clamp(0.25, 1.0);
-        let (size, reason) = (usual_semi_diameter(f, f_number, half), "room for the beams");
-        let usual_light = "vignetting of a good camera lens";
+        let glasses = GlassChoice::of(&self.glasses(spec))?;
+        let half = fields.last().copied().unwrap_or(0.0);
+        let (elements, aspheric_surfaces) = self.element_counts(spec, f_number, half);
+        let (relative_illumination, clear_area) = self.light(spec, f_number, &fields);
+        let [glass_center, glass_edge, air_center] = self.thinnest_gaps(spec);
+        let track = spec.max_track_mm.as_ref();
+        let distortion = if half > 30.0 { 0.04 } else { 0.02 };
+        let semi_diameter = usual_semi_diameter(f, f_number, half);
         Ok(LensRequirements {
             focal_length: f,
             f_number,
             back_focus: self.or("min_back_focus_mm", spec.min_back_focus_mm.as_ref(), 0.0, "none"),
-            track: self.or(
-                "max_track_mm",
-                spec.max_track_mm.as_ref(),
-                2.5 * f,
-                "2.5 focal lengths",
-            ),
-            elements: self.or(
-                "max_elements",
-                spec.max_elements.as_ref(),
-                usual_elements(f_number, half),
-                "the usual form for this aperture and field",
-            ),
-            aspheric_surfaces: self.or(
-                "max_aspheric_surfaces",
-                spec.max_aspheric_surfaces.as_ref(),
-                0,
-                "spheres and planes are cheap",
-            ),
-            glasses: GlassChoice::of(&glasses)?,
+            track: self.or("max_track_mm", track, 2.5 * f, "2.5 focal lengths"),
+            elements,
+            aspheric_surfaces,
+            glasses,
             distortion: self.or(
                 "max_abs_distortion",
                 spec.max_abs_distortion.as_ref(),
-                if half > 30.0 { 0.04 } else { 0.02 },
+                distortion,
                 "hardly visible",
             ),
-            relative_illumination: self.or(
-                "min_relative_illumination",
-                spec.min_relative_illumination.as_ref(),
-                light,
-                usual_light,
-            ),
-            clear_area: self.or(
-                "min_clear_area_mm2",
-                spec.min_clear_area_mm2.as_ref(),
-                areas,
-                usual_light,
-            ),
+            relative_illumination,
+            clear_area,
             semi_diameter: self.or(
                 "max_semi_diameter_mm",
                 spec.max_semi_diameter_mm.as_ref(),
-                size,
-                reason,
+                semi_diameter,
+                "room for the beams",
             ),
-            glass_center: self.or(
-                "min_glass_center_mm",
-                spec.min_glass_center_mm.as_ref(),
-                thin,
-                "what can be polished",
-            ),
-            glass_edge: self.or("min_edge_mm", spec.min_edge_mm.as_ref(), 0.8 * thin, "no chips"),
-            air_center: self.or("min_air_mm", spec.min_air_mm.as_ref(), 0.05, "no contact"),
+            glass_center,
+            glass_edge,
+            air_center,
             wavelengths,
             fields,
         })
+    }
+
+    /// The largest numbers of elements and of aspheric surfaces.
+    fn element_counts(
+        &mut self,
+        spec: &LensSpecification,
+        f_number: f64,
+        half: f64,
+    ) -> (usize, usize) {
+        let usual = usual_elements(f_number, half);
+        let reason = "the usual form for this aperture and field";
+        let elements = self.or("max_elements", spec.max_elements.as_ref(), usual, reason);
+        let aspheres = spec.max_aspheric_surfaces.as_ref();
+        let reason = "spheres and planes are cheap";
+        (elements, self.or("max_aspheric_surfaces", aspheres, 0, reason))
+    }
+
+    /// The least relative illumination and the least clear areas in mm², by field.
+    fn light(
+        &mut self,
+        spec: &LensSpecification,
+        f_number: f64,
+        fields: &[f64],
+    ) -> (Vec<f64>, Vec<f64>) {
+        let reason = "vignetting of a good camera lens";
+        let stated = spec.min_relative_illumination.as_ref();
+        let relative = self.or("min_relative_illumination", stated, usual_light(fields), reason);
+        let usual = usual_areas(spec.focal_length_mm, f_number, fields);
+        let stated = spec.min_clear_area_mm2.as_ref();
+        (relative, self.or("min_clear_area_mm2", stated, usual, reason))
+    }
+
+    /// The least thickness of glass at its center, of glass at its edge and of air, in mm.
+    fn thinnest_gaps(&mut self, spec: &LensSpecification) -> [f64; 3] {
+        let thin = (0.02 * spec.focal_length_mm).clamp(0.25, 1.0);
+        let (center, edge) = (spec.min_glass_center_mm.as_ref(), spec.min_edge_mm.as_ref());
+        [
+            self.or("min_glass_center_mm", center, thin, "what can be polished"),
+            self.or("min_edge_mm", edge, 0.8 * thin, "no chips"),
+            self.or("min_air_mm", spec.min_air_mm.as_ref(), 0.05, "no contact"),
+        ]
     }
 
     /// The wavelengths in um with their weights.

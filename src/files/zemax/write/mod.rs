@@ -9,7 +9,9 @@ mod table;
 
 use crate::files::report::{ConversionOutcome, ConversionReport};
 use crate::files::zemax::INFINITE_GAP;
-use crate::lens::{Lens, LensError, Parameter, Quantity, SystemError, ZoomThickness};
+use crate::lens::{
+    Lens, LensError, Parameter, Pickup, Quantity, SystemError, Variable, ZoomThickness,
+};
 
 /// The text of the file, and the report of everything that is not exact.
 ///
@@ -191,38 +193,35 @@ impl ZemaxWriter {
             self.record(ConversionOutcome::Dropped, "merit function", note);
         }
         for variable in &lens.variables {
-            let what = format!("variable: {}", variable.parameter);
-            let bounded = variable.min.is_some() || variable.max.is_some();
-            let both = variable.min.is_some() && variable.max.is_some();
-            match variable.parameter.quantity {
-                Quantity::SemiDiameter => {
-                    self.record(
-                        ConversionOutcome::Dropped,
-                        what,
-                        "semi-diameters cannot be variables there",
-                    );
-                }
-                Quantity::Thickness if both => {}
-                _ if bounded => self.record(
-                    ConversionOutcome::Dropped,
-                    what,
-                    "its bounds; it remains a variable",
-                ),
-                _ => {}
-            }
+            self.report_variable(variable);
         }
         for pickup in &lens.pickups {
-            let like = pickup.parameter.quantity == pickup.source.quantity;
-            let is_supported =
-                matches!(pickup.parameter.quantity, Quantity::Curvature | Quantity::Thickness);
-            if !(like && is_supported) {
-                let what = format!("pickup: {} from the {}", pickup.parameter, pickup.source);
-                self.record(
-                    ConversionOutcome::Approximated,
-                    what,
-                    "the present value, without the pickup",
-                );
-            }
+            self.report_pickup(pickup);
+        }
+    }
+
+    /// Records what a variable loses.
+    fn report_variable(&mut self, variable: &Variable) {
+        let is_bounded = variable.min.is_some() || variable.max.is_some();
+        let has_both_bounds = variable.min.is_some() && variable.max.is_some();
+        let note = match variable.parameter.quantity {
+            Quantity::SemiDiameter => "semi-diameters cannot be variables there",
+            Quantity::Thickness if has_both_bounds => return,
+            _ if is_bounded => "its bounds; it remains a variable",
+            _ => return,
+        };
+        self.record(ConversionOutcome::Dropped, format!("variable: {}", variable.parameter), note);
+    }
+
+    /// Records a pickup that the format does not know.
+    fn report_pickup(&mut self, pickup: &Pickup) {
+        let like = pickup.parameter.quantity == pickup.source.quantity;
+        let is_supported =
+            matches!(pickup.parameter.quantity, Quantity::Curvature | Quantity::Thickness);
+        if !(like && is_supported) {
+            let what = format!("pickup: {} from the {}", pickup.parameter, pickup.source);
+            let note = "the present value, without the pickup";
+            self.record(ConversionOutcome::Approximated, what, note);
         }
     }
 }

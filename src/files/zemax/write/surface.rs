@@ -64,17 +64,7 @@ impl ZemaxWriter {
         if aspheric {
             self.terms(i, &row.asphere);
         }
-        let mut varying = Vec::new();
-        for (number, value) in graded.iter().flatten() {
-            self.surface_line(format!("PARM {number} {}", super::number(*value)));
-            let quantity = gradient::variable_quantity(gradient::KIND, *number);
-            if quantity.is_some_and(|quantity| self.is_variable(i, quantity)) {
-                varying.push(*number);
-            }
-        }
-        for number in varying {
-            self.surface_line(format!("VPAR {number}"));
-        }
+        self.index_gradient(i, graded.iter().flatten());
         self.thickness(i, row.thickness);
         let variable = self.is_variable(i, Quantity::Index);
         if graded.is_none() {
@@ -82,13 +72,34 @@ impl ZemaxWriter {
         }
         self.semi_diameter(&row);
         if row.hyperhemisphere {
-            let note = "the other program decides by itself if the far half of the surface counts";
-            self.record(
-                ConversionOutcome::Dropped,
-                format!("hyperhemisphere of surface {}", SurfaceNumber::new(i)),
-                note,
-            );
+            self.report_hyperhemisphere(i);
         }
+    }
+
+    /// The coefficients of a gradient-index medium, then those that vary.
+    fn index_gradient<'a>(
+        &mut self,
+        i: usize,
+        coefficients: impl Iterator<Item = &'a (usize, f64)> + Clone,
+    ) {
+        for (parameter, value) in coefficients.clone() {
+            self.surface_line(format!("PARM {parameter} {}", number(*value)));
+        }
+        for (parameter, _) in coefficients {
+            let quantity = gradient::variable_quantity(gradient::KIND, *parameter);
+            if quantity.is_some_and(|quantity| self.is_variable(i, quantity)) {
+                self.surface_line(format!("VPAR {parameter}"));
+            }
+        }
+    }
+
+    fn report_hyperhemisphere(&mut self, i: usize) {
+        let note = "the other program decides by itself if the far half of the surface counts";
+        self.record(
+            ConversionOutcome::Dropped,
+            format!("hyperhemisphere of surface {}", SurfaceNumber::new(i)),
+            note,
+        );
     }
 
     /// The parameters of a surface whose gap is a gradient-index medium that the format has.

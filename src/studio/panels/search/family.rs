@@ -4,8 +4,8 @@
 use std::sync::Arc;
 
 use egui::{
-    Color32, CursorIcon, Label, Pos2, Rect, RichText, Role, Sense, Stroke, Ui, WidgetInfo, pos2,
-    vec2,
+    Color32, CursorIcon, Label, Painter, Pos2, Rect, RichText, Role, Sense, Stroke, Ui, WidgetInfo,
+    pos2, vec2,
 };
 
 use super::{ShownSearch, lenses, moves, text};
@@ -26,14 +26,7 @@ type Generation = Arc<LineageNode<Arc<Lens>>>;
 /// Shows the tree; the generation that was clicked, if one was.
 pub(super) fn tree(ui: &mut Ui, run: &StructureSearchSnapshot, number: u64) -> Option<u64> {
     let line: Vec<u64> = run.ancestry(number).map(|node| node.number).collect();
-    let first = run.lineage.len().saturating_sub(MAX_NODES);
-    let shown: Vec<&Generation> = run
-        .lineage
-        .iter()
-        .enumerate()
-        .filter(|(i, node)| *i >= first || line.contains(&node.number))
-        .map(|(_, node)| node)
-        .collect();
+    let shown = shown_generations(run, &line);
     let size = vec2(ui.available_width(), HEIGHT);
     let (rect, response) = ui.allocate_exact_size(size, Sense::click());
     let label = format!("Family tree of {} generations", shown.len());
@@ -41,33 +34,12 @@ pub(super) fn tree(ui: &mut Ui, run: &StructureSearchSnapshot, number: u64) -> O
     let places = node_positions(&shown, rect.shrink2(vec2(8.0, 8.0)));
     let painter = ui.painter_at(rect);
     painter.rect_filled(rect, 2.0, ui.visuals().extreme_bg_color);
-    let place_of = |wanted: u64| {
-        let place = shown.iter().position(|node| node.number == wanted)?;
-        Some(places[place])
-    };
-    for (node, at) in shown.iter().zip(&places) {
-        let on_line = line.contains(&node.number);
-        if let Some(from) = node.parent.and_then(place_of) {
-            let color = if on_line { ui.visuals().hyperlink_color } else { faint(ui) };
-            let stroke = Stroke::new(if on_line { 1.8 } else { 0.7 }, color);
-            painter.line_segment([from, *at], stroke);
-        }
+    draw_descent(&painter, ui, &shown, &places, &line);
+    if let Some(i) = shown.iter().position(|node| node.number == number) {
+        painter.circle_stroke(places[i], 6.5, Stroke::new(1.5, ui.visuals().strong_text_color()));
     }
-    for (node, at) in shown.iter().zip(&places) {
-        let accepted = node.offer.is_some_and(OfferOutcome::is_accepted);
-        let radius = if accepted { 4.2 } else { 2.4 };
-        painter.circle_filled(*at, radius, moves::color(ui.visuals(), node.kind));
-    }
-    if let Some(at) = place_of(number) {
-        painter.circle_stroke(at, 6.5, Stroke::new(1.5, ui.visuals().strong_text_color()));
-    }
-    let pointer = response.hover_pos()?;
-    let near = shown
-        .iter()
-        .zip(&places)
-        .min_by(|(_, a), (_, b)| a.distance(pointer).total_cmp(&b.distance(pointer)));
-    let (node, at) = near.filter(|(_, at)| at.distance(pointer) < NEAR)?;
-    painter.circle_stroke(*at, 6.5, ui.visuals().selection.stroke);
+    let (node, at) = nearest_generation(&shown, &places, response.hover_pos()?)?;
+    painter.circle_stroke(at, 6.5, ui.visuals().selection.stroke);
     let text = format!(
         "Lens {}\n{}\n{}",
         node.number,
@@ -77,6 +49,47 @@ pub(super) fn tree(ui: &mut Ui, run: &StructureSearchSnapshot, number: u64) -> O
     let response =
         response.on_hover_cursor(CursorIcon::PointingHand).on_hover_text_at_pointer(text);
     response.clicked().then_some(node.number)
+}
+
+/// The latest generations, and all those on a line of descent.
+fn shown_generations<'a>(run: &'a StructureSearchSnapshot, line: &[u64]) -> Vec<&'a Generation> {
+    let first = run.lineage.len().saturating_sub(MAX_NODES);
+    let is_shown = |(i, node): &(usize, &Generation)| *i >= first || line.contains(&node.number);
+    run.lineage.iter().enumerate().filter(is_shown).map(|(_, node)| node).collect()
+}
+
+/// Draws every generation at its place, with a line from its parent.
+fn draw_descent(painter: &Painter, ui: &Ui, shown: &[&Generation], places: &[Pos2], line: &[u64]) {
+    let place_of = |wanted: u64| {
+        let place = shown.iter().position(|node| node.number == wanted)?;
+        Some(places[place])
+    };
+    for (node, at) in shown.iter().zip(places) {
+        let on_line = line.contains(&node.number);
+        if let Some(from) = node.parent.and_then(place_of) {
+            let color = if on_line { ui.visuals().hyperlink_color } else { faint(ui) };
+            let stroke = Stroke::new(if on_line { 1.8 } else { 0.7 }, color);
+            painter.line_segment([from, *at], stroke);
+        }
+    }
+    for (node, at) in shown.iter().zip(places) {
+        let accepted = node.offer.is_some_and(OfferOutcome::is_accepted);
+        let radius = if accepted { 4.2 } else { 2.4 };
+        painter.circle_filled(*at, radius, moves::color(ui.visuals(), node.kind));
+    }
+}
+
+/// The generation whose place is nearest to a pointer that is near one.
+fn nearest_generation<'a>(
+    shown: &[&'a Generation],
+    places: &[Pos2],
+    pointer: Pos2,
+) -> Option<(&'a Generation, Pos2)> {
+    let distance = |at: &Pos2| at.distance(pointer);
+    let near =
+        places.iter().enumerate().min_by(|(_, a), (_, b)| distance(a).total_cmp(&distance(b)));
+    let (i, at) = near.filter(|(_, at)| distance(at) < NEAR)?;
+    Some((shown[i], *at))
 }
 
 fn faint(ui: &Ui) -> Color32 {

@@ -9,16 +9,16 @@ use std::f64::consts::{PI, TAU};
 /// A ray is this close to the edge, relative to the radius, that rounding cannot put it outside.
 const INSIDE: f64 = 1e-9;
 
-/// The lit part of a radius of a pupil.
+/// The part of a radius of a pupil through which light gets.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct LitRadius {
+pub struct PupilRadius {
     /// Its ends in pupil coordinates, the inner one first, both just inside the light.
     ends: [[f64; 2]; 2],
     /// The number of rays traced to find them.
     pub rays: usize,
 }
 
-impl LitRadius {
+impl PupilRadius {
     /// The pupil point at a share of the way to the edge, from 0 to 1.
     pub fn point(&self, share: f64) -> [f64; 2] {
         let [from, to] = self.ends;
@@ -27,9 +27,9 @@ impl LitRadius {
 }
 
 impl Region<'_> {
-    /// The lit part of the radius at an azimuth in radians, counted from +y towards +x of the frame
+    /// The part with light of the radius at an azimuth in radians, counted from +y towards +x of the frame
     /// of the pupil; `None` if the edge is not known there.
-    pub fn lit_radius(&self, azimuth: f64) -> Option<LitRadius> {
+    pub fn pupil_radius(&self, azimuth: f64) -> Option<PupilRadius> {
         let edge = |boundary: &Boundary, filter, factor: f64| {
             let mut search = EdgeSearch::new(&self.launch, boundary.frame).with_limits(filter);
             let found = search.edge(azimuth, boundary.radius_guess(azimuth), GUESS_SPREAD)?;
@@ -39,16 +39,16 @@ impl Region<'_> {
             RegionKind::Clear => {
                 let (sin, cos) = azimuth.sin_cos();
                 let ends = [[0.0; 2], [sin, cos].map(|v| (1.0 - INSIDE) * v)];
-                Some(LitRadius { ends, rays: 0 })
+                Some(PupilRadius { ends, rays: 0 })
             }
             RegionKind::StarShaped(boundary) => {
                 let (end, rays) = edge(boundary, LimitFilter::All, 1.0 - INSIDE)?;
-                Some(LitRadius { ends: [boundary.frame.center, end], rays })
+                Some(PupilRadius { ends: [boundary.frame.center, end], rays })
             }
             RegionKind::Irregular { annulus: Some(ring), .. } => {
                 let outer = edge(&ring.outer, LimitFilter::WithoutObstructions, 1.0 - INSIDE)?;
                 let inner = edge(&ring.inner, LimitFilter::Obstructions, 1.0 + INSIDE)?;
-                Some(LitRadius { ends: [inner.0, outer.0], rays: inner.1 + outer.1 })
+                Some(PupilRadius { ends: [inner.0, outer.0], rays: inner.1 + outer.1 })
             }
             RegionKind::Dark | RegionKind::Unbounded | RegionKind::Irregular { .. } => None,
         }
