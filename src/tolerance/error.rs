@@ -1,4 +1,4 @@
-//! What makes a tolerance analysis impossible.
+//! The errors that make a tolerance analysis impossible.
 
 use crate::lens::{LensError, Perturbation, SurfaceNumber, SystemError};
 use crate::trace::Fate;

@@ -1,4 +1,4 @@
-//! How good a lens is, over any number type: spots, refocused spots, wavefronts.
+//! The image quality of a lens over any number type: spots, refocused spots, wavefronts.
 
 use super::spot::ImageRay;
 use super::wavefront::{PathRay, path_differences};

@@ -1,4 +1,4 @@
-//! What `design` prints: the complete specification, and lenses beside it.
+//! The report of `design`: the complete specification, and lenses beside it.
 
 use crate::cli::output::{ShortNumber, TextTable};
 use crate::lens::SurfaceNumber;

@@ -1,5 +1,5 @@
-//! Where a design starts: lenses of the library at the focal length that is asked for, two thin
-//! groups, and random lenses.
+//! The starting points of a design: lenses of the library at the focal length that is asked for,
+//! two thin groups, and random lenses.
 
 use super::LensRequirements;
 use super::draft::{BeamPlan, DraftMerit, Freedom, LensDraft};

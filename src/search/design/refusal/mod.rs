@@ -1,4 +1,4 @@
-//! What no lens can do is refused before any search, by name.
+//! Requirements that no lens can meet, refused by name before any search.
 
 pub(super) mod check;
 
