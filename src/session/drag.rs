@@ -159,17 +159,26 @@ impl DragState {
         self.requested = 0;
     }
 
-    /// Requests the slopes of a version of the design, once.
-    pub(super) fn sync(&mut self, version: u64, lens: &Arc<Lens>, zoom: usize, tolerance: f64) {
-        if self.requested == version {
-            return;
-        }
+    /// True if the slopes of a version of the design have not been requested yet.
+    pub(super) const fn lacks_slopes(&self, version: u64) -> bool {
+        self.requested != version
+    }
+
+    /// Requests the slopes of a version of the design.
+    pub(super) fn request_slopes(
+        &mut self,
+        version: u64,
+        lens: &Arc<Lens>,
+        goal: Option<Arc<Goal>>,
+        (zoom, tolerance): (usize, f64),
+    ) {
         self.requested = version;
         let before = self.active.as_ref().map_or(lens, |(drag, _)| drag.before());
         self.worker.request(SlopesRequest {
             version,
             lens: Arc::clone(lens),
             before: Arc::clone(before),
+            goal,
             zoom,
             settings: self.settings.clone(),
             tolerance,
@@ -216,6 +225,8 @@ struct SlopesRequest {
     lens: Arc<Lens>,
     /// The lens before the drag, with which the merit is compared.
     before: Arc<Lens>,
+    /// The merit function of the design; `None` if it has none.
+    goal: Option<Arc<Goal>>,
     zoom: usize,
     settings: DragSettings,
     tolerance: f64,
@@ -225,7 +236,8 @@ struct SlopesRequest {
 #[derive(Debug)]
 struct MeritReference {
     lens: Arc<Lens>,
-    goal: Goal,
+    goal: Arc<Goal>,
+    tolerance: f64,
     light: Vec<Vec<f64>>,
     merit: f64,
 }
@@ -240,10 +252,11 @@ fn slopes(
     request: &SlopesRequest,
     reference: &mut Option<MeritReference>,
 ) -> Result<MeritSlopes, String> {
-    let known = reference.take().filter(|known| Arc::ptr_eq(&known.lens, &request.before));
+    let goal = request.goal.as_ref().ok_or("the lens has no merit function")?;
+    let known = reference.take().filter(|known| known.serves(request, goal));
     let known = match known {
         Some(known) => known,
-        None => MeritReference::new(&request.before, request.tolerance)?,
+        None => MeritReference::new(&request.before, goal, request.tolerance)?,
     };
     let known = reference.insert(known);
     let lens = with_all_variables(&request.lens);
@@ -263,12 +276,18 @@ fn slopes(
 }
 
 impl MeritReference {
-    fn new(lens: &Arc<Lens>, tolerance: f64) -> Result<Self, String> {
-        let goal = Goal::of_lens(lens).map_err(|why| why.to_string())?;
-        let merit = Merit::new(lens, &goal, tolerance).map_err(|why| why.to_string())?;
+    fn new(lens: &Arc<Lens>, goal: &Arc<Goal>, tolerance: f64) -> Result<Self, String> {
+        let merit = Merit::new(lens, goal, tolerance).map_err(|why| why.to_string())?;
         let value = merit.value(&merit.values(lens)).map_err(|why| why.to_string())?;
         let light = merit.initial_light().to_vec();
-        Ok(Self { lens: Arc::clone(lens), goal, light, merit: value })
+        Ok(Self { lens: Arc::clone(lens), goal: Arc::clone(goal), tolerance, light, merit: value })
+    }
+
+    /// True if a request asks for the same merit function of the same lens.
+    fn serves(&self, request: &SlopesRequest, goal: &Goal) -> bool {
+        Arc::ptr_eq(&self.lens, &request.before)
+            && *self.goal == *goal
+            && self.tolerance == request.tolerance
     }
 }
 

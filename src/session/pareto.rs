@@ -228,6 +228,14 @@ impl ParetoState {
         Ok(Self { run: BackgroundRun::spawn(wake, ParetoEngine::start)?, earlier: Vec::new() })
     }
 
+    /// True if a lens is on a front of the latest run or of an earlier one.
+    pub(super) fn has_found(&self, lens: &Lens) -> bool {
+        let latest = self.run.view();
+        let runs = self.earlier.iter().chain([&latest]).filter_map(|run| run.snapshot.as_deref());
+        let passes = runs.flat_map(|run| std::iter::once(&run.main).chain(&run.biased));
+        passes.flat_map(|pass| pass.front.points()).any(|point| point.lens == *lens)
+    }
+
     /// Starts a sweep; the one before it is retained to compare with.
     pub(super) fn start(&mut self, lens: &Arc<Lens>, settings: ParetoSettings, compare: bool) {
         let last = self.run.view();

@@ -74,6 +74,23 @@ fn a_kept_candidate_can_be_shown_again() {
 }
 
 #[test]
+fn a_kept_candidate_is_a_branch_of_the_history() {
+    let mut session = session();
+    preview(&mut session);
+    assert_eq!(session.view().candidate.unwrap().title, "a changed lens");
+    session.apply(Command::KeepCandidate);
+    session.apply(Command::DiscardCandidate);
+    let view = session.view();
+    assert_eq!((view.version_id, view.history.len(), view.undo), (0, 2, None));
+    let branch = view.history.last().unwrap();
+    assert_eq!((branch.parent, &*branch.title), (Some(0), "kept lens 1: a changed lens"));
+    session.apply(Command::GoTo(branch.id));
+    assert_eq!(**session.lens(), other());
+    session.apply(Command::Undo);
+    assert_eq!(**session.lens(), double_gauss());
+}
+
+#[test]
 fn the_design_can_be_shown_in_spite_of_a_candidate() {
     let mut session = session();
     preview(&mut session);

@@ -145,3 +145,19 @@ fn slopes_are_the_derivatives_of_the_merit() {
     }
     assert!((found.merit / found.before - 1.0).abs() < 1e-9);
 }
+
+#[test]
+fn the_merit_at_the_handles_is_that_of_the_design() {
+    let mut session = session();
+    // Another focal length than that which the proposed merit function asks for.
+    session.apply(Command::Edit(Edit::set_radius(0, 60.0)));
+    let at_handles = slopes(&mut session).merit;
+    let goal = session.view().goal.unwrap();
+    let merit = Merit::new(session.lens(), &goal, 1e-5).unwrap();
+    let own = merit.value(&merit.values(session.lens())).unwrap();
+    assert!((at_handles / own - 1.0).abs() < 1e-2, "{at_handles} {own}");
+    let proposed_now = Goal::of_lens(session.lens()).unwrap();
+    let merit = Merit::new(session.lens(), &proposed_now, 1e-5).unwrap();
+    let other = merit.value(&merit.values(session.lens())).unwrap();
+    assert!((own / other - 1.0).abs() > 0.05, "the two are told apart: {own} {other}");
+}

@@ -164,6 +164,22 @@ fn a_damaged_end_is_cut_wherever_it_begins() {
 }
 
 #[test]
+fn the_proposed_merit_function_is_the_same_after_a_recovery() {
+    let folder = Folder::new("journal-goal");
+    let bundled = files::bundled_lenses().iter().find(|lens| lens.name == "singlet_la1131");
+    let lens = files::json::read(bundled.unwrap().text, "singlet").unwrap();
+    let mut session = journaled(lens, &folder.journals());
+    let power = session.lens().surfaces[0].curvature + session.lens().surfaces[1].curvature.abs();
+    session.apply(Edit::set_radius(0, 1.0 / (1.3 * power)).into());
+    let copy = folder.0.join("copy");
+    killed(&session, &folder.journals(), &copy);
+    let (again, _) = reopened(&copy);
+    assert_eq!(again.lens(), session.lens());
+    assert_eq!(again.view().goal, session.view().goal);
+    assert_ne!(again.view().goal, Goal::default_for(again.lens()).ok().map(Into::into));
+}
+
+#[test]
 fn an_interrupted_optimization_leaves_its_best_lens_in_the_history() {
     let folder = Folder::new("journal-run");
     let parameter = Parameter::new(0, Quantity::Curvature);

@@ -4,6 +4,7 @@ use super::runs::without_fixed_variables;
 use super::{PreviewSource, Session};
 use crate::lens::Lens;
 use crate::session::history::VersionOrigin;
+use crate::session::journal::JournalEntry;
 use crate::session::view::{CandidateSource, CandidateView, KeptLens, Severity};
 use std::sync::Arc;
 
@@ -40,6 +41,10 @@ impl Session {
         if let Some(kept) = self.kept.iter().find(|kept| *kept.lens == *lens) {
             return kept.title.clone();
         }
+        if let Some(version) = self.history.nodes().iter().find(|node| *node.lens == *lens) {
+            let name = version.name.as_deref().unwrap_or(&version.title);
+            return format!("the version \"{name}\"");
+        }
         let search = self.structure_search.view().run.snapshot;
         let found = search.as_ref().and_then(|search| {
             let retained = search.reservoir.iter().chain([&search.best, &search.start]);
@@ -52,7 +57,8 @@ impl Session {
         });
         match found {
             Some(number) => format!("lens {number} of the search"),
-            None => "a lens of the Pareto front".to_owned(),
+            None if self.pareto.has_found(lens) => "a lens of the Pareto front".to_owned(),
+            None => "a changed lens".to_owned(),
         }
     }
 
@@ -109,7 +115,7 @@ impl Session {
         self.shows_candidate = true;
     }
 
-    /// Keeps the candidate beside the design, which stays as it is.
+    /// Keeps the candidate beside the design, which stays as it is, and as a branch of the history.
     pub(super) fn keep_candidate(&mut self) {
         let Some((_, lens)) = self.offered() else {
             return self.post(Severity::Warning, "there is no candidate to keep");
@@ -123,7 +129,15 @@ impl Session {
         if kept.len() >= MAX_KEPT {
             kept.remove(0);
         }
-        kept.push(KeptLens { title: title.clone(), lens });
+        kept.push(KeptLens { title: title.clone(), lens: Arc::clone(&lens) });
+        self.branch(&lens, title.clone());
         self.post(Severity::Note, format!("{title}; the design is unchanged"));
+    }
+
+    /// Adds a lens to the history as a version after the present one, which stays present.
+    fn branch(&mut self, lens: &Arc<Lens>, title: String) {
+        let own = self.with_own_variables(lens).map_or_else(|_| Arc::clone(lens), Arc::new);
+        let node = self.history.branch(self.history.present(), own, VersionOrigin::new(title));
+        self.record(JournalEntry::Node(node));
     }
 }

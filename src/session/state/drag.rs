@@ -56,9 +56,10 @@ impl Session {
     /// Requests the slopes of the merit once the analyses of the design are there.
     pub(super) fn sync_drag(&mut self) {
         let analyzed = self.analysis.latest().is_some_and(|latest| latest.version == self.version);
-        if analyzed {
-            let (zoom, tolerance) = (self.settings.zoom, self.settings.tolerance);
-            self.drag.sync(self.version, &self.lens, zoom, tolerance);
+        if analyzed && self.drag.lacks_slopes(self.version) {
+            let settings = (self.settings.zoom, self.settings.tolerance);
+            let goal = self.goal();
+            self.drag.request_slopes(self.version, &self.lens, goal, settings);
         }
     }
 }

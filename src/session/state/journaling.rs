@@ -1,6 +1,7 @@
 //! The entries that a session writes into its journal, and the recovery of a design from one.
 
 use super::Session;
+use super::live_goal::propose_goal;
 use crate::lens::Lens;
 use crate::session::clock::Throttle;
 use crate::session::history::VersionOrigin;
@@ -135,6 +136,10 @@ impl Session {
         let text = recovery_text(&state, &present.lens);
         self.replace_design(Lens::clone(&present.lens), state.path.clone());
         self.history = state.history;
+        // The targets of the merit function that was proposed for the lens as it was opened.
+        if let Some(first) = self.history.nodes().first() {
+            self.proposed_goal = propose_goal(&first.lens);
+        }
         // A lens that was never saved differs from every file.
         self.saved =
             saved.map_or_else(|| Arc::new(crate::lens::blank()), |node| Arc::clone(&node.lens));
