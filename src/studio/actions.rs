@@ -2,6 +2,7 @@
 
 use egui::Theme;
 
+use super::arrangement::Arrangement;
 use super::dialogs::DialogKind;
 use super::file_dialog::FileRequest;
 use super::panels::PanelKind;
@@ -26,8 +27,10 @@ pub enum UiAction {
     ShowPanel(PanelKind),
     /// Shows a panel in front of the others, or hides it if it is there.
     TogglePanel(PanelKind),
-    /// Arranges all panels as usual.
-    ArrangePanels,
+    /// Gives one panel all the room of the others, or shows them again.
+    MaximizePanel(Option<PanelKind>),
+    /// Arranges all panels.
+    ArrangePanels(Arrangement),
     /// Sets the theme.
     SetTheme(Theme),
     /// Closes the window.

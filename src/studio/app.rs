@@ -143,7 +143,8 @@ impl Studio {
             }
             UiAction::ShowPanel(kind) => self.dock.show(kind),
             UiAction::TogglePanel(kind) => self.dock.toggle(kind),
-            UiAction::ArrangePanels => self.dock.reset(),
+            UiAction::MaximizePanel(kind) => self.dock.maximize(kind),
+            UiAction::ArrangePanels(arrangement) => self.dock.arrange(arrangement),
             UiAction::SetTheme(theme) => context.set_theme(theme),
             UiAction::Quit => context.send_viewport_cmd(ViewportCommand::Close),
         }
@@ -332,7 +333,9 @@ fn menu_context<'a>(
         title: dock.title(kind),
         is_open: dock.is_open(kind),
     });
-    MenuContext { view, panels: panels.into(), recent, theme: context.theme() }
+    let front = dock.front();
+    let maximized = dock.maximized().is_some();
+    MenuContext { view, panels: panels.into(), front, maximized, recent, theme: context.theme() }
 }
 
 /// The path with which a file dialog starts.

@@ -1,13 +1,16 @@
 //! The arrangement of the panels: tabs that can be dragged side by side, on top of each other, or
 //! closed and opened again from the menu.
 
-use egui::{Color32, Context, Frame, Id, Margin, Stroke, Style, Ui, Visuals, WidgetText};
+use egui::{
+    Color32, Context, Frame, Margin, Rect, Response, Role, Sense, Stroke, StrokeKind, Style, Ui,
+    Vec2, Visuals, WidgetInfo, WidgetText, vec2,
+};
 use egui_tiles::{
-    Behavior, Container, Linear, LinearDir, SimplificationOptions, TabState, Tile, TileId, Tiles,
-    Tree, UiResponse,
+    Behavior, SimplificationOptions, TabState, Tabs, Tile, TileId, Tiles, Tree, UiResponse,
 };
 
-use super::actions::Actions;
+use super::actions::{Actions, UiAction};
+use super::arrangement::Arrangement;
 use super::draw::RenderBackend;
 use super::panels::{Panel, PanelKind};
 use crate::session::{Command, GrinCommand, SessionView};
@@ -16,6 +19,10 @@ use crate::session::{Command, GrinCommand, SessionView};
 pub struct Dock {
     tree: Tree<PanelKind>,
     panels: Vec<(PanelKind, Box<dyn Panel>)>,
+    /// The panel that was brought to the front last.
+    front: PanelKind,
+    /// The panel that alone is shown.
+    maximized: Option<PanelKind>,
 }
 
 impl std::fmt::Debug for Dock {
@@ -30,8 +37,9 @@ impl Dock {
         let whole = |tree: &Tree<PanelKind>| {
             PanelKind::ALL.iter().all(|kind| tree.tiles.find_pane(kind).is_some())
         };
-        let tree = left.filter(whole).unwrap_or_else(default_arrangement);
-        Self { tree, panels: PanelKind::ALL.map(|kind| (kind, kind.panel(backend))).into() }
+        let tree = left.filter(whole).unwrap_or_else(|| Arrangement::Default.tree());
+        let panels = PanelKind::ALL.map(|kind| (kind, kind.panel(backend))).into();
+        Self { tree, panels, front: PanelKind::Layout, maximized: None }
     }
 
     /// The arrangement of the panels.
@@ -39,9 +47,26 @@ impl Dock {
         &self.tree
     }
 
-    /// Arranges all panels as usual.
-    pub fn reset(&mut self) {
-        self.tree = default_arrangement();
+    /// Arranges all panels.
+    pub fn arrange(&mut self, arrangement: Arrangement) {
+        self.maximized = None;
+        self.tree = arrangement.tree();
+    }
+
+    /// The panel that was brought to the front last.
+    pub const fn front(&self) -> PanelKind {
+        self.front
+    }
+
+    /// The panel that alone is shown.
+    pub const fn maximized(&self) -> Option<PanelKind> {
+        self.maximized
+    }
+
+    /// Shows one panel alone, or all panels.
+    pub fn maximize(&mut self, kind: Option<PanelKind>) {
+        self.maximized = kind;
+        self.front = kind.unwrap_or(self.front);
     }
 
     /// True if a panel is open, maybe behind another one.
@@ -51,6 +76,9 @@ impl Dock {
 
     /// True if a panel is open and not behind another one.
     fn is_visible(&self, kind: PanelKind) -> bool {
+        if let Some(shown) = self.maximized {
+            return shown == kind;
+        }
         let tile = self.tree.tiles.find_pane(&kind);
         tile.is_some_and(|tile| self.tree.active_tiles().contains(&tile))
     }
@@ -66,6 +94,8 @@ impl Dock {
     }
 
     fn set_visible(&mut self, kind: PanelKind, open: bool) {
+        self.maximized = None;
+        self.front = kind;
         if let Some(tile) = self.tree.tiles.find_pane(&kind) {
             self.tree.set_visible(tile, open);
             self.tree.make_active(|id, _| id == tile);
@@ -85,8 +115,13 @@ impl Dock {
 
     /// Shows all panels.
     pub fn ui(&mut self, ui: &mut Ui, view: &SessionView, actions: &mut Actions) {
-        let Self { tree, panels } = self;
-        tree.ui(&mut DockFrame { panels, view, actions }, ui);
+        match self.maximized {
+            Some(kind) => self.maximized_ui(ui, kind, view, actions),
+            None => {
+                let panels = &mut self.panels;
+                self.tree.ui(&mut DockFrame { panels, view, actions }, ui);
+            }
+        }
         let pupils = self.is_visible(PanelKind::Pupil);
         if pupils != view.settings.pupils {
             actions.push(Command::ShowPupils(pupils));
@@ -100,62 +135,48 @@ impl Dock {
             actions.push(Command::Grin(GrinCommand::SetActive(watched)));
         }
     }
-}
 
-/// The drawings with the numbers of the lens below it; beside them how good it is and the search.
-fn default_arrangement() -> Tree<PanelKind> {
-    let mut tiles = Tiles::default();
-    let mut pane = |kind: PanelKind| tiles.insert_pane(kind);
-    let [layout, slice, spot, pupil, contrast, table, system, zoom] = [
-        PanelKind::Layout,
-        PanelKind::Slice,
-        PanelKind::Spot,
-        PanelKind::Pupil,
-        PanelKind::Contrast,
-        PanelKind::Prescription,
-        PanelKind::System,
-        PanelKind::Zoom,
-    ]
-    .map(&mut pane);
-    let [optimizer, pareto, search, history, first, effects] = [
-        PanelKind::Optimizer,
-        PanelKind::Pareto,
-        PanelKind::Search,
-        PanelKind::History,
-        PanelKind::FirstOrder,
-        PanelKind::Effects,
-    ]
-    .map(&mut pane);
-    let facts = tiles.insert_tab_tile(vec![first, effects]);
-    let light = tiles.insert_tab_tile(vec![spot, pupil, contrast]);
-    let better = tiles.insert_tab_tile(vec![optimizer, pareto, search, history]);
-    let drawings = tiles.insert_tab_tile(vec![layout, slice]);
-    let table = tiles.insert_tab_tile(vec![table, system, zoom]);
-    let table = row(&mut tiles, &[(table, 0.71), (facts, 0.29)]);
-    let left = column(&mut tiles, &[(drawings, 0.52), (table, 0.48)]);
-    let right = column(&mut tiles, &[(light, 0.44), (better, 0.56)]);
-    let root = row(&mut tiles, &[(left, 0.665), (right, 0.335)]);
-    Tree::new(Id::unique("dock"), root, tiles)
-}
-
-fn row(tiles: &mut Tiles<PanelKind>, parts: &[(TileId, f32)]) -> TileId {
-    linear_tile(tiles, LinearDir::Horizontal, parts)
-}
-
-fn column(tiles: &mut Tiles<PanelKind>, parts: &[(TileId, f32)]) -> TileId {
-    linear_tile(tiles, LinearDir::Vertical, parts)
-}
-
-fn linear_tile(
-    tiles: &mut Tiles<PanelKind>,
-    direction: LinearDir,
-    parts: &[(TileId, f32)],
-) -> TileId {
-    let mut linear = Linear::new(direction, parts.iter().map(|(tile, _)| *tile).collect());
-    for (tile, share) in parts {
-        linear.shares.set_share(*tile, *share);
+    /// Shows one panel alone, below a bar with its title.
+    fn maximized_ui(
+        &mut self,
+        ui: &mut Ui,
+        kind: PanelKind,
+        view: &SessionView,
+        actions: &mut Actions,
+    ) {
+        let title = self.title(kind);
+        let frame = Frame::new().fill(ui.visuals().panel_fill).inner_margin(Margin::same(5));
+        frame.show(ui, |ui| {
+            ui.horizontal(|ui| {
+                ui.strong(title);
+                let hint = "Show this panel among the others again (F11)";
+                if ui.button("Show all panels").on_hover_text(hint).clicked() {
+                    actions.push(UiAction::MaximizePanel(None));
+                }
+            });
+            ui.set_min_size(ui.available_size());
+            if let Some((_, panel)) = self.panels.iter_mut().find(|(other, _)| *other == kind) {
+                panel.ui(ui, view, actions);
+            }
+        });
     }
-    tiles.insert_new(Tile::Container(Container::Linear(linear)))
+}
+
+/// A small button with the sign of a maximized window.
+fn maximize_button(ui: &mut Ui, name: &str) -> Response {
+    let (rect, response) = ui.allocate_exact_size(Vec2::splat(20.0), Sense::click());
+    response.widget_info(|| WidgetInfo::labeled(Role::Button, true, name));
+    let color = if response.hovered() || response.has_focus() {
+        ui.visuals().strong_text_color()
+    } else {
+        ui.visuals().weak_text_color()
+    };
+    let sign = Rect::from_center_size(rect.center(), vec2(11.0, 9.0));
+    let painter = ui.painter();
+    painter.rect_stroke(sign, 1.0, Stroke::new(1.0, color), StrokeKind::Inside);
+    let title = sign.with_max_y(sign.top() + 2.5);
+    painter.rect_filled(title, 1.0, color);
+    response.on_hover_text(format!("{name}: give it all the room"))
 }
 
 /// The panels in one frame.
@@ -181,6 +202,23 @@ impl Behavior<PanelKind> for DockFrame<'_> {
     fn tab_title_for_pane(&mut self, kind: &PanelKind) -> WidgetText {
         let panel = self.panels.iter().find(|(other, _)| other == kind);
         panel.map_or("", |(_, panel)| panel.title()).into()
+    }
+
+    /// A button that gives the panel in front all the room.
+    fn top_bar_right_ui(
+        &mut self,
+        tiles: &Tiles<PanelKind>,
+        ui: &mut Ui,
+        _tile: TileId,
+        tabs: &Tabs,
+        _scroll_offset: &mut f32,
+    ) {
+        let Some(Tile::Pane(kind)) = tabs.active.and_then(|tile| tiles.get(tile)) else { return };
+        let title = self.panels.iter().find(|(other, _)| other == kind);
+        let title = format!("Maximize {}", title.map_or("", |(_, panel)| panel.title()));
+        if maximize_button(ui, &title).clicked() {
+            self.actions.push(UiAction::MaximizePanel(Some(*kind)));
+        }
     }
 
     fn is_tab_closable(&self, _tiles: &Tiles<PanelKind>, _tile: TileId) -> bool {

@@ -4,9 +4,9 @@ use std::collections::HashMap;
 use std::sync::Arc;
 
 use egui::{
-    Align2, Button, Color32, ComboBox, Context, CursorIcon, FontId, Id, Painter, Pos2, Rect,
-    Response, RichText, Role, ScrollArea, Sense, Stroke, StrokeKind, TextEdit, Ui, Vec2,
-    WidgetInfo, Window, pos2, vec2,
+    Align2, Button, ComboBox, Context, CursorIcon, FontId, Id, Painter, Rect, Response, RichText,
+    Role, ScrollArea, Sense, Stroke, StrokeKind, TextEdit, Ui, Vec2, WidgetInfo, Window, pos2,
+    vec2,
 };
 
 use super::actions::{Actions, UiAction};
@@ -198,10 +198,7 @@ impl LibraryWindow {
             self.lenses.insert(&entry.name, entry.open().ok().map(Arc::new));
         }
         let Some(Some(lens)) = self.lenses.get(entry.name.as_str()) else { return };
-        let all = Rect::from_min_max(Pos2::ZERO, pos2(1.0, 1.0));
-        if let Some(texture) = self.thumbnails.texture(ui, lens, lens, rect.size()) {
-            ui.painter().image(texture.id(), rect, all, Color32::WHITE);
-        }
+        self.thumbnails.paint(ui, lens, lens, rect);
     }
 
     /// Shows what is selected and the buttons; true if a lens was opened.

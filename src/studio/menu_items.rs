@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use egui::{Key, KeyboardShortcut, Modifiers, Theme};
 
 use super::actions::UiAction;
+use super::arrangement::Arrangement;
 use super::dialogs::DialogKind;
 use super::element_dialog::ElementTask;
 use super::file_dialog::FileRequest;
@@ -90,6 +91,10 @@ pub(super) struct PanelState {
 pub(super) struct MenuContext<'a> {
     pub(super) view: &'a SessionView,
     pub(super) panels: Vec<PanelState>,
+    /// The panel that was brought to the front last.
+    pub(super) front: PanelKind,
+    /// True if that panel alone is shown.
+    pub(super) maximized: bool,
     pub(super) recent: &'a [PathBuf],
     pub(super) theme: Theme,
 }
@@ -195,8 +200,32 @@ impl MenuContext<'_> {
             KEYS.get(i).map_or(item.clone(), |key| item.control(*key))
         });
         let mut items: Vec<MenuItem> = panels.collect();
-        items.push(MenuItem::new(MENU, "Default arrangement", UiAction::ArrangePanels).separated());
+        items.extend(self.arrangements());
         items
+    }
+
+    /// One panel alone, and the arrangements of all panels.
+    fn arrangements(&self) -> [MenuItem; 3] {
+        const MENU: &str = "View";
+        let front = self.panels.iter().find(|panel| panel.kind == self.front);
+        let (title, kind) = if self.maximized {
+            ("Show all panels".to_owned(), None)
+        } else {
+            let title = front.map_or("panel", |panel| panel.title);
+            (format!("Maximize: {title}"), Some(self.front))
+        };
+        let arrange = |title: &str, arrangement| {
+            MenuItem::new(MENU, title, UiAction::ArrangePanels(arrangement))
+        };
+        [
+            MenuItem::new(MENU, title, UiAction::MaximizePanel(kind))
+                .key(Modifiers::NONE, Key::F11)
+                .separated()
+                .hint("The panel that was opened last has all the room, until all are shown again"),
+            arrange("Arrangement for a search", Arrangement::Search)
+                .hint("The layout large, and beside it the lenses that the search has found"),
+            arrange("Default arrangement", Arrangement::Default),
+        ]
     }
 
     /// The files that were opened or saved last, the newest first.

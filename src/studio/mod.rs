@@ -4,6 +4,7 @@
 
 mod actions;
 mod app;
+pub mod arrangement;
 mod cached;
 mod candidate_bar;
 pub mod colormap;

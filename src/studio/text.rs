@@ -9,6 +9,11 @@ pub fn capitalize(text: &str) -> String {
     first + letters.as_str()
 }
 
+/// A text of the library, whose lengths are in `um`, with the sign for micrometres.
+pub fn micrometres(text: &str) -> String {
+    text.replace(" um", " µm")
+}
+
 /// A count with its noun, in the plural unless it is 1.
 pub fn counted(count: u64, noun: &str) -> String {
     format!("{count} {noun}{}", if count == 1 { "" } else { "s" })
@@ -36,6 +41,7 @@ mod tests {
     #[test]
     fn texts_begin_with_a_capital_and_counts_have_plurals() {
         assert_eq!(capitalize("édition"), "Édition");
+        assert_eq!(micrometres("3 um apart"), "3 µm apart");
         assert_eq!([counted(1, "ray"), counted(0, "ray")], ["1 ray", "0 rays"]);
     }
 }

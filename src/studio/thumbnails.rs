@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use egui::{ColorImage, TextureHandle, TextureOptions, Ui, Vec2};
+use egui::{Color32, ColorImage, Pos2, Rect, TextureHandle, TextureOptions, Ui, Vec2, pos2};
 use glam::DVec2;
 
 use super::cached::ByAddress;
@@ -44,9 +44,17 @@ struct ThumbnailKey {
 }
 
 impl Thumbnails {
+    /// Draws a lens into a part of the window, with glass tinted that the design does not have.
+    pub(super) fn paint(&mut self, ui: &Ui, lens: &Arc<Lens>, design: &Arc<Lens>, rect: Rect) {
+        let all = Rect::from_min_max(Pos2::ZERO, pos2(1.0, 1.0));
+        if let Some(texture) = self.texture(ui, lens, design, rect.size()) {
+            ui.painter().image(texture.id(), rect, all, Color32::WHITE);
+        }
+    }
+
     /// The drawing of a lens, with glass tinted that the design does not have; `None` if it cannot
     /// be traced.
-    pub(super) fn texture(
+    fn texture(
         &mut self,
         ui: &Ui,
         lens: &Arc<Lens>,

@@ -8,7 +8,7 @@ use crate::effects::{EffectCost, EffectDecision, EffectOverride, EffectPlan};
 use crate::session::{Command, SessionView};
 use crate::studio::actions::Actions;
 use crate::studio::number;
-use crate::studio::text::capitalize;
+use crate::studio::text::{capitalize, micrometres};
 
 /// The panel.
 #[derive(Debug)]
@@ -42,7 +42,7 @@ fn table(ui: &mut Ui, plan: &EffectPlan, view: &SessionView, actions: &mut Actio
                 let chosen = view.settings.overrides.get(decision.effect);
                 override_menu(ui, decision, chosen, actions);
             });
-            let reason = capitalize(&decision.reason);
+            let reason = micrometres(&capitalize(&decision.reason));
             ui.label(RichText::new(reason).small());
             ui.label(RichText::new(reason_text(decision)).small().weak()).on_hover_text(
                 "The error if the effect is left out, the limit above which it is needed, and the \
@@ -97,7 +97,8 @@ const fn override_name(choice: EffectOverride) -> &'static str {
 fn reason_text(decision: &EffectDecision) -> String {
     let digits = |value: f64| number::format_digits(value, 3);
     let EffectDecision { error, limit, unit, cost, .. } = decision;
-    let rests = format!("{} {unit}, limit {} {unit}", digits(*error), digits(*limit));
+    let (scale, unit) = if *unit == "mm" { (1e3, "µm") } else { (1.0, *unit) };
+    let rests = format!("{} {unit}, limit {} {unit}", digits(scale * error), digits(scale * limit));
     let Some(EffectCost { saved_share, saved_ms }) = *cost else { return rests };
     if saved_share == 0.0 {
         return rests;

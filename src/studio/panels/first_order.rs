@@ -1,12 +1,10 @@
-//! The first-order data of a lens: focal lengths, pupils, and the third-order sums.
+//! The first-order data of a lens: focal lengths and pupils.
 
-use egui::{
-    Align, Color32, Frame, Grid, Label, Layout as Arrange, Margin, RichText, ScrollArea, Ui,
-};
+use egui::{Align, Color32, Frame, Label, Layout as Arrange, Margin, RichText, ScrollArea, Ui};
 
 use super::{Panel, displayed_results, show_missing_results};
 use crate::lens::{Lens, Medium};
-use crate::paraxial::{FirstOrder, ParaxialPupil, Seidel, SeidelSums};
+use crate::paraxial::{FirstOrder, ParaxialPupil};
 use crate::session::SessionView;
 use crate::studio::actions::Actions;
 use crate::studio::number;
@@ -29,14 +27,6 @@ impl Panel for FirstOrderPanel {
                 ui.weak(without_focus(&results.lens));
             }
             data(ui, &results.lens, numbers.first_order());
-            ui.add_space(6.0);
-            ScrollArea::horizontal().show(ui, |ui| match &numbers.seidel.value {
-                Some(seidel) => sums(ui, &results.lens, seidel),
-                None if numbers.ray_model.value.has_grin() => drop(ui.weak(
-                    "No third-order sums: those of a gradient-index medium are not implemented",
-                )),
-                None => drop(ui.weak("No third-order sums: the lens has no paraxial chief ray")),
-            });
         });
     }
 }
@@ -129,84 +119,6 @@ fn mm(value: Option<f64>) -> String {
         || "none".to_owned(),
         |value| format!("{} mm", number::format_digits(value, 6)),
     )
-}
-
-/// The columns of the sums with their explanations.
-const SUMS: [(&str, &str); 7] = [
-    ("S1", "Spherical aberration"),
-    ("S2", "Coma"),
-    ("S3", "Astigmatism"),
-    ("S4", "Petzval curvature"),
-    ("S5", "Distortion"),
-    ("C1", "Axial colour between the outer wavelengths"),
-    ("C2", "Lateral colour between the outer wavelengths"),
-];
-
-const fn row_of(sums: &SeidelSums<f64>) -> [f64; 7] {
-    [sums.s1, sums.s2, sums.s3, sums.s4, sums.s5, sums.c1, sums.c2]
-}
-
-fn sums(ui: &mut Ui, lens: &Lens, seidel: &Seidel<f64>) {
-    ui.label(RichText::new("Seidel sums, µm").strong()).on_hover_text(
-        "Third-order wave aberrations at the edge of pupil and field, surface by surface \
-         (Welford's S1 to S5, C1, C2); the tint shows where they come from",
-    );
-    Grid::new("seidel").num_columns(8).spacing([4.0, 2.0]).show(ui, |ui| {
-        ui.weak("Surf");
-        for (name, meaning) in SUMS {
-            right(ui, |ui| drop(ui.weak(name).on_hover_text(meaning)));
-        }
-        ui.end_row();
-        for (i, sums) in seidel.surfaces.iter().enumerate() {
-            let stop = lens.surfaces.get(i).is_some_and(|row| row.stop);
-            ui.label(if stop { format!("{} STO", i + 1) } else { (i + 1).to_string() });
-            numbers(ui, sums, &largest(seidel));
-        }
-        ui.strong("Sum");
-        numbers(ui, &seidel.total, &[f64::INFINITY; 7]);
-    });
-}
-
-/// The largest contribution to each sum.
-fn largest(seidel: &Seidel<f64>) -> [f64; 7] {
-    let mut most = [0.0_f64; 7];
-    for sums in &seidel.surfaces {
-        for (most, value) in most.iter_mut().zip(row_of(sums)) {
-            *most = most.max(value.abs());
-        }
-    }
-    most
-}
-
-fn numbers(ui: &mut Ui, sums: &SeidelSums<f64>, largest: &[f64; 7]) {
-    for (value, largest) in row_of(sums).into_iter().zip(largest) {
-        let share = if *largest > 0.0 { value / largest } else { 0.0 };
-        right(ui, |ui| {
-            let text = RichText::new(fixed(1e3 * value)).small();
-            let tint = tint(ui, share);
-            ui.label(text.background_color(tint));
-        });
-    }
-    ui.end_row();
-}
-
-/// A number with at most five characters besides its sign, so that columns stay narrow.
-fn fixed(value: f64) -> String {
-    let size = value.abs();
-    if size >= 1e5 || (size < 1e-3 && size > 0.0) {
-        format!("{value:.1e}")
-    } else if size >= 100.0 {
-        format!("{value:.1}")
-    } else {
-        format!("{value:.3}")
-    }
-}
-
-/// The tint of a contribution: red for positive, blue for negative.
-fn tint(ui: &Ui, share: f64) -> Color32 {
-    let color =
-        if share > 0.0 { ui.visuals().error_fg_color } else { ui.visuals().hyperlink_color };
-    color.gamma_multiply((0.4 * share.abs()) as f32)
 }
 
 fn right(ui: &mut Ui, show: impl FnOnce(&mut Ui)) {

@@ -13,6 +13,7 @@ mod pareto;
 mod prescription;
 mod pupil;
 mod search;
+mod seidel;
 mod spot;
 mod system;
 pub(super) mod widgets;
@@ -30,6 +31,7 @@ pub use prescription::PrescriptionPanel;
 pub(super) use prescription::first_radius_field;
 pub use pupil::PupilPanel;
 pub use search::SearchPanel;
+pub use seidel::SeidelPanel;
 pub use spot::SpotPanel;
 pub use system::SystemPanel;
 pub use zoom::ZoomPanel;
@@ -85,8 +87,10 @@ pub enum PanelKind {
     Search,
     /// The versions of the design.
     History,
-    /// Focal lengths, pupils, third-order sums.
+    /// Focal lengths and pupils.
     FirstOrder,
+    /// The third-order sums of every surface.
+    Seidel,
     /// The physical effects that are computed, and why.
     Effects,
     /// Aperture, fields, wavelengths, object and image.
@@ -97,7 +101,7 @@ pub enum PanelKind {
 
 impl PanelKind {
     /// Every panel. A new one is a file in this folder, an entry here and a place in the window.
-    pub const ALL: [Self; 14] = [
+    pub const ALL: [Self; 15] = [
         Self::Layout,
         Self::Slice,
         Self::Prescription,
@@ -109,6 +113,7 @@ impl PanelKind {
         Self::Search,
         Self::History,
         Self::FirstOrder,
+        Self::Seidel,
         Self::Effects,
         Self::System,
         Self::Zoom,
@@ -128,6 +133,7 @@ impl PanelKind {
             Self::Search => Box::new(SearchPanel::default()),
             Self::History => Box::new(HistoryPanel::default()),
             Self::FirstOrder => Box::new(FirstOrderPanel),
+            Self::Seidel => Box::new(SeidelPanel),
             Self::Effects => Box::new(EffectsPanel),
             Self::System => Box::new(SystemPanel::default()),
             Self::Zoom => Box::new(ZoomPanel::default()),
@@ -181,12 +187,18 @@ fn add_variables_edit(lens: &Lens, kinds: &[ParameterKind]) -> Edit {
     Edit::SetVariables(freed.variables)
 }
 
+/// The smallest relative error that is shown as a number, in percent.
+const SMALLEST_PERCENT: f64 = 0.001;
+
 /// The relative error of a number in percent, as a suffix; nothing if it is only rounding.
 fn relative_error(estimate: Estimate) -> String {
     if !number::is_error(estimate.value, estimate.error) || estimate.value == 0.0 {
         return String::new();
     }
     let percent = 100.0 * (estimate.error / estimate.value).abs();
+    if percent < SMALLEST_PERCENT {
+        return format!(" ± <{SMALLEST_PERCENT} %");
+    }
     format!(" ± {} %", number::format_digits(percent, 2))
 }
 

@@ -16,6 +16,7 @@ use super::widgets::{ActionButton, action_buttons};
 use crate::session::{Command, HistoryNode, SessionView};
 use crate::studio::actions::Actions;
 use crate::studio::text_input::{EditBuffers, InputPlacement, TextInput};
+use crate::studio::thumbnails::Thumbnails;
 
 /// The height of the part about the selected version.
 const DETAILS_HEIGHT: f32 = 190.0;
@@ -27,6 +28,7 @@ pub struct HistoryPanel {
     selected: Option<u64>,
     /// The step of the selected version's optimization to go back to.
     step: usize,
+    thumbnails: Thumbnails,
     buffers: EditBuffers,
 }
 
@@ -47,7 +49,8 @@ impl Panel for HistoryPanel {
             });
         });
         let scroll = ScrollArea::vertical().id_salt("versions").auto_shrink([false, false]);
-        let clicked = scroll.show(ui, |ui| tree::tree(ui, view, self.selected)).inner;
+        let clicked =
+            scroll.show(ui, |ui| tree::tree(ui, view, self.selected, &mut self.thumbnails)).inner;
         if let Some(id) = clicked {
             self.select(view, id, actions);
         }

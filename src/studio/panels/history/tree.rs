@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use egui::{Button, Pos2, RichText, Role, Sense, Stroke, Ui, WidgetInfo, pos2, vec2};
+use egui::{Button, Pos2, RichText, Role, Sense, Stroke, Ui, Vec2, WidgetInfo, pos2, vec2};
 use egui_plot::{Line, PlotPoints};
 
 use super::node;
@@ -12,14 +12,22 @@ use crate::studio::panels::decade_name;
 use crate::studio::panels::optimizer::clicked_step;
 use crate::studio::panels::widgets::fixed_plot;
 use crate::studio::text::capitalize;
+use crate::studio::thumbnails::Thumbnails;
 
 /// The width of a branch and the height of a version.
 const CELL: [f32; 2] = [12.0, 20.0];
+/// The size of the drawing of a version.
+const THUMBNAIL: Vec2 = vec2(44.0, 18.0);
 /// The height of the curve of an optimization.
 const CURVE_HEIGHT: f32 = 64.0;
 
 /// Shows the tree, the newest version first; the one that was clicked, if one was.
-pub(super) fn tree(ui: &mut Ui, view: &SessionView, selected: Option<u64>) -> Option<u64> {
+pub(super) fn tree(
+    ui: &mut Ui,
+    view: &SessionView,
+    selected: Option<u64>,
+    thumbnails: &mut Thumbnails,
+) -> Option<u64> {
     let columns = columns(view);
     let count = columns.values().max().map_or(1, |last| last + 1);
     let mut marks: BTreeMap<u64, Pos2> = BTreeMap::new();
@@ -32,6 +40,10 @@ pub(super) fn tree(ui: &mut Ui, view: &SessionView, selected: Option<u64>) -> Op
             let column = columns.get(&version.id).copied().unwrap_or(0);
             let place = pos2(rect.left() + CELL[0] * (column as f32 + 0.5), rect.center().y);
             marks.insert(version.id, place);
+            let (drawing, _) = ui.allocate_exact_size(THUMBNAIL, Sense::hover());
+            if ui.is_rect_visible(drawing) {
+                thumbnails.paint(ui, &version.lens, &version.lens, drawing);
+            }
             let text = line_text(view, version);
             let is_present = version.id == view.version_id;
             let mut words = RichText::new(&text);

@@ -4,6 +4,7 @@
 //! design does not have is tinted.
 
 mod handles;
+mod lost_light;
 
 use std::sync::Arc;
 
@@ -25,6 +26,7 @@ use crate::studio::palette::{Palette, color32};
 use crate::studio::section::SectionDrawing;
 use crate::trace::Fates;
 use handles::{HandleFrame, HandleLayer, handle_places, locks_row};
+use lost_light::{ClippingRim, clipping_rims, lost_rays_menu};
 
 /// The distance in points within which the pointer picks a surface.
 const NEAR: f64 = 6.0;
@@ -50,6 +52,8 @@ struct LayoutDrawing {
     system: System<f64>,
     reached: Vec<f64>,
     fates: Fates,
+    /// The rims that clip rays.
+    clipping: Vec<ClippingRim>,
     /// Fields without rays, and why.
     fields_without_rays: Vec<(usize, String)>,
     /// The number of glass elements that the design does not have.
@@ -126,7 +130,7 @@ impl LayoutPanel {
 
     fn header(&mut self, ui: &mut Ui, view: &SessionView, actions: &mut Actions) {
         ui.horizontal(|ui| {
-            self.legend(ui, view);
+            self.legend(ui, view, actions);
             ui.with_layout(Arrange::right_to_left(Align::Center), |ui| {
                 if ui.button("Fit").on_hover_text("Show the whole lens (double click)").clicked() {
                     self.scene_view.fit();
@@ -138,7 +142,7 @@ impl LayoutPanel {
     }
 
     /// The colours of the fields, and the number of lost rays.
-    fn legend(&self, ui: &mut Ui, view: &SessionView) {
+    fn legend(&self, ui: &mut Ui, view: &SessionView, actions: &mut Actions) {
         let palette = Palette::for_visuals(ui.visuals());
         let fields = view.lens.fields_at(view.settings.zoom);
         for (i, field) in fields.values.iter().enumerate() {
@@ -151,8 +155,13 @@ impl LayoutPanel {
         if let Some(text) = losses_text(drawing.fates) {
             let color = color32(palette.lost_ray);
             swatch(ui, color);
-            ui.label(RichText::new(text).color(color))
-                .on_hover_text("Lost rays are drawn to their end, which is marked by a dot");
+            let text = RichText::new(text).color(color);
+            if drawing.clipping.is_empty() || view.preview_results.is_some() {
+                let hint = "Lost rays are drawn to their end, which is marked by a dot";
+                ui.label(text).on_hover_text(hint);
+            } else {
+                lost_rays_menu(ui, text, &drawing.clipping, &view.lens, actions);
+            }
         }
         if drawing.added_glass > 0 {
             swatch(ui, color32(palette.added_glass).to_opaque());
@@ -244,6 +253,7 @@ impl LayoutDrawing {
             full_view: full_view(&section, layout)?,
             reached: reached.clone(),
             fates: layout.fates,
+            clipping: clipping_rims(&source.results.lens, layout),
             fields_without_rays: layout.errors.clone(),
             added_glass: added.len(),
             system,

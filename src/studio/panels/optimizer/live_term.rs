@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use egui::Ui;
+use egui::{Response, Ui};
 
 use super::terms::value_text;
 use crate::merit::{Term, TermValue, WeightedTerm};
@@ -33,8 +33,8 @@ impl LiveTerm {
         Some(Self { value, error, share: values.share(place), is_current })
     }
 
-    /// Shows the value, and the share if there is one.
-    pub(super) fn cell(self, ui: &mut Ui, term: Term) {
+    /// Shows the value.
+    pub(super) fn value(self, ui: &mut Ui, term: Term) -> Response {
         let color = if self.is_current {
             ui.visuals().text_color()
         } else {
@@ -45,10 +45,15 @@ impl LiveTerm {
             0.0 => "exact to rounding".to_owned(),
             error => format!("{} ± {error:.1e}", number::format_digits(self.value, 5)),
         };
+        ui.colored_label(color, text).on_hover_text(error)
+    }
+
+    /// Shows the value, and the share if there is one.
+    pub(super) fn cell(self, ui: &mut Ui, term: Term) {
         let share = self.share.filter(|share| *share >= SMALLEST_SHARE);
         ui.horizontal(|ui| {
             ui.spacing_mut().item_spacing.x = 4.0;
-            ui.colored_label(color, text).on_hover_text(error);
+            self.value(ui, term);
             if let Some(share) = share {
                 ui.weak(format!("{:.1} %", 100.0 * share));
             }

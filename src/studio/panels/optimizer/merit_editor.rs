@@ -109,6 +109,14 @@ impl MeritEditor {
         ui.label(RichText::new(chosen.map_or("", |(.., what)| what)).small().weak());
     }
 
+    /// The chosen treatment in words.
+    pub(super) const fn edge_text(&self) -> &'static str {
+        match self.edge {
+            PupilEdge::Moving => "moving pupil edge",
+            PupilEdge::Frozen => "fixed rays",
+        }
+    }
+
     pub(super) fn ui(
         &mut self,
         ui: &mut Ui,
@@ -125,10 +133,12 @@ impl MeritEditor {
             for (text, what) in [("Term", ""), ("Weight", ""), ("Target", "")] {
                 heading(ui, text, what);
             }
-            let what = "Its value for the design, and its part of the merit by magnitude";
-            heading(ui, "Value, share", what);
             if search.is_some() {
+                heading(ui, "Value", "Its value for the design");
                 heading(ui, "Best", "Its value for the best lens of the optimization so far");
+            } else {
+                let what = "Its value for the design, and its part of the merit by magnitude";
+                heading(ui, "Value, share", what);
             }
             ui.end_row();
             let mut place = 0;
@@ -289,14 +299,18 @@ impl MeritRow {
             ui.weak(unit(term));
             self.field_choice(ui, view, &title);
         });
+        let search = view.optimization.snapshot.as_deref();
         match at.live {
+            // The value for the best lens takes the place of the share.
+            Some(live) if search.is_some() => drop(live.value(ui, term)),
             Some(live) => live.cell(ui, term),
             None => drop(ui.label("")),
         }
-        if let Some(search) = view.optimization.snapshot.as_deref() {
+        if let Some(search) = search {
             self.best_cell(ui, search, at.place);
         }
-        ui.small_button("×").on_hover_text("Remove the term").clicked()
+        let fixed = view.optimization.is_active();
+        !fixed && ui.small_button("×").on_hover_text("Remove the term").clicked()
     }
 
     /// The choice of the field where the term is about one.

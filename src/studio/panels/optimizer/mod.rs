@@ -1,7 +1,7 @@
-//! The optimizer: its goal, its controls, its progress, and the choice to take or discard the
-//! result.
+//! The optimizer: its goal, its controls, its progress, and the choice to accept or discard
+//! the result.
 //!
-//! The search works on its own copy. The design changes only when its result is taken.
+//! The search works on its own copy. The design changes only when its result is accepted.
 
 mod limits;
 mod live_term;
@@ -95,15 +95,20 @@ impl OptimizerPanel {
                     .hint("Take one step of the paused optimization"),
                 ActionButton::new("Stop", active, Command::Stop)
                     .hint("Stop the optimization and retain its result for inspection"),
-                ActionButton::new("Take", has_result, Command::AcceptResult)
+                ActionButton::new("Accept", has_result, Command::AcceptResult)
                     .hint("Make the best lens the design, as one undo step"),
                 ActionButton::new("Discard", has_result, Command::DiscardResult)
                     .hint("Stop the optimization and discard its result"),
             ];
             action_buttons(ui, buttons, actions);
         });
-        self.method(ui, active);
-        ui.add_enabled_ui(!active, |ui| self.merit.edge_choice(ui));
+        if active {
+            // What cannot be changed now leaves its room to the terms.
+            ui.weak(format!("{}, {}", self.method.name(), self.merit.edge_text()));
+        } else {
+            self.method(ui);
+            self.merit.edge_choice(ui);
+        }
     }
 
     fn start_button(&self, ui: &mut Ui, view: &SessionView, active: bool, actions: &mut Actions) {
@@ -116,10 +121,10 @@ impl OptimizerPanel {
         }
     }
 
-    fn method(&mut self, ui: &mut Ui, active: bool) {
+    fn method(&mut self, ui: &mut Ui) {
         ui.horizontal(|ui| {
             ui.weak("Method");
-            ui.add_enabled_ui(!active, |ui| method_menu(ui, &mut self.method));
+            method_menu(ui, &mut self.method);
         });
     }
 }
@@ -143,7 +148,8 @@ fn progress(ui: &mut Ui, view: &SessionView, search: &OptimizationSnapshot) {
         ui.label(format!("after step {step}"));
         if let (Some(first), Some(last)) = (search.history.first(), search.progress.as_ref()) {
             ui.separator();
-            ui.label(format!("merit {:.3e} to {:.3e}", first.current, last.best));
+            let [first, best] = [first.current, last.best].map(|v| number::format_digits(v, 4));
+            ui.label(format!("merit {first} to {best}"));
         }
     });
     if let Some(end) = search.progress.as_ref().and_then(|progress| progress.end) {

@@ -24,7 +24,7 @@ const INTRODUCTION: &str = "How sharp can this lens be for how much light? The s
     two against \
     each other over many weights, each descended from the lens before it, and plots every lens \
     that no other lens beats in both.\n\
-    Click a point to show its lens, double-click to take it. The design does not change meanwhile.";
+    Click a point to show its lens, double-click to accept it. The design does not change meanwhile.";
 
 /// The height of the bar of the selected lens: buttons and two lines.
 const SELECTION_HEIGHT: f32 = 62.0;
@@ -169,17 +169,12 @@ impl ParetoPanel {
                 }
             }
             let shown = view.preview_lens.is_some() && self.selected.is_some();
-            let take = ui.add_enabled(shown, Button::new("Accept this lens"));
-            if take.on_hover_text("Make it the design, as one undo step").clicked() {
+            let accept = ui.add_enabled(shown, Button::new("Accept this lens"));
+            if accept.on_hover_text("Make it the design, as one undo step").clicked() {
                 actions.push(Command::AcceptPreview);
             }
-            let back = ui.add_enabled(shown, Button::new("Back to the design"));
-            if back
-                .on_hover_text(
-                    "Show the design again in all panels; the prescription always shows it",
-                )
-                .clicked()
-            {
+            let back = ui.add_enabled(shown, Button::new("Show the design"));
+            if back.on_hover_text("Show the design again in all panels").clicked() {
                 actions.push(Command::Preview(None));
             }
         });

@@ -1,7 +1,8 @@
 //! Start, pause, stop, progress and live controls of a search.
 
-use egui::{Button, Checkbox, DragValue, Label, RichText, Ui};
+use egui::{Button, Checkbox, ComboBox, DragValue, Label, RichText, Ui};
 
+use super::lenses::CardOrder;
 use super::setup::SearchSetup;
 use super::{ShownSearch, text};
 use crate::search::lens_landscape::describe_violation;
@@ -9,7 +10,8 @@ use crate::search::{SteerCommand, Temperature};
 use crate::session::{
     Command, RunStatus, SessionView, StructureSearchCommand, StructureSearchSnapshot,
 };
-use crate::studio::actions::Actions;
+use crate::studio::actions::{Actions, UiAction};
+use crate::studio::arrangement::Arrangement;
 use crate::studio::file_dialog::FileRequest;
 use crate::studio::number;
 use crate::studio::panels::widgets::{ActionButton, action_buttons, main_button, progress_bar};
@@ -133,12 +135,37 @@ pub(super) fn progress(ui: &mut Ui, search: ShownSearch<'_>) {
     violations(ui, run);
 }
 
-/// The live controls: the temperature, and the chain that is previewed.
-pub(super) fn live_controls(ui: &mut Ui, search: ShownSearch<'_>, actions: &mut Actions) {
+/// The live controls: the temperature, the chain that is previewed, and the order of the cards.
+pub(super) fn live_controls(
+    ui: &mut Ui,
+    search: ShownSearch<'_>,
+    order: &mut CardOrder,
+    actions: &mut Actions,
+) {
     ui.horizontal_wrapped(|ui| {
         temperature(ui, search, actions);
         preview_choice(ui, search, actions);
+        let hint = "Give the search the window: the lens of a chain large, the retained lenses \
+                    beside it";
+        if ui.button("Watch").on_hover_text(hint).clicked() {
+            actions.push(UiAction::ArrangePanels(Arrangement::Search));
+            let chain = search.view.structure_search.previewed_chain.unwrap_or(0);
+            actions.push(Command::Preview(None));
+            actions.push(StructureSearchCommand::Preview(Some(chain)));
+        }
+        order_choice(ui, order);
     });
+}
+
+/// The number by which the cards are sorted.
+fn order_choice(ui: &mut Ui, order: &mut CardOrder) {
+    let combo = ComboBox::from_id_salt("order of the lenses").width(92.0);
+    let combo = combo.selected_text(order.text()).show_ui(ui, |ui| {
+        for choice in CardOrder::ALL {
+            ui.selectable_value(order, choice, choice.text());
+        }
+    });
+    combo.response.accessible_name("Order of the lenses");
 }
 
 fn temperature(ui: &mut Ui, search: ShownSearch<'_>, actions: &mut Actions) {

@@ -8,7 +8,7 @@ use egui::{
     pos2, vec2,
 };
 
-use super::{ShownSearch, lenses, moves, text};
+use super::{ShownSearch, moves, text};
 use crate::lens::Lens;
 use crate::search::{LineageNode, OfferOutcome};
 use crate::session::StructureSearchSnapshot;
@@ -133,7 +133,7 @@ pub(super) fn ancestors(
             let label = format!("Show lens {}", node.number);
             response.widget_info(|| WidgetInfo::labeled(Role::Button, true, &label));
             ui.painter().rect_filled(rect, 2.0, ui.visuals().extreme_bg_color);
-            lenses::paint(ui, &node.point, &view.lens, rect.shrink(2.0), thumbnails);
+            thumbnails.paint(ui, &node.point, &view.lens, rect.shrink(2.0));
             if response.on_hover_cursor(CursorIcon::PointingHand).clicked() {
                 clicked = Some(node.number);
             }

@@ -3,12 +3,11 @@
 use std::sync::Arc;
 
 use egui::{
-    Align2, Button, Color32, CursorIcon, FontId, Pos2, Rect, Response, Role, Sense, Stroke,
-    StrokeKind, Ui, Vec2, WidgetInfo, pos2, vec2,
+    Align2, Button, Color32, CursorIcon, FontId, Rect, Response, Role, Sense, Stroke, StrokeKind,
+    Ui, Vec2, WidgetInfo, pos2, vec2,
 };
 
 use super::{SelectedLens, ShownSearch, text};
-use crate::lens::Lens;
 use crate::search::SteerCommand;
 use crate::session::{Command, FoundLens, SessionView, StructureSearchCommand};
 use crate::studio::actions::Actions;
@@ -21,11 +20,58 @@ const CARD: Vec2 = vec2(148.0, 112.0);
 /// The part of a card for its words.
 const WORDS: f32 = 30.0;
 
-/// Shows the retained lenses, the best first; the clicked one, if any.
+/// The number by which the retained lenses are sorted.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(super) enum CardOrder {
+    /// The smallest merit first.
+    #[default]
+    Merit,
+    /// The smallest spot first.
+    Spot,
+    /// The brightest first.
+    Light,
+    /// The fewest elements first.
+    Elements,
+    /// The shortest first.
+    Length,
+}
+
+impl CardOrder {
+    /// Every order.
+    pub(super) const ALL: [Self; 5] =
+        [Self::Merit, Self::Spot, Self::Light, Self::Elements, Self::Length];
+
+    /// The order in words.
+    pub(super) const fn text(self) -> &'static str {
+        match self {
+            Self::Merit => "By merit",
+            Self::Spot => "By spot",
+            Self::Light => "By light",
+            Self::Elements => "By elements",
+            Self::Length => "By length",
+        }
+    }
+
+    /// The number of a lens, less for one that comes first; infinite for one that has none yet.
+    fn key(self, found: &FoundLens) -> f64 {
+        let score = found.score.as_ref().and_then(|scored| scored.score.as_ref().ok());
+        let key = match self {
+            Self::Merit => Some(found.merit),
+            Self::Spot => score.map(|point| point.spot),
+            Self::Light => score.map(|point| -point.light),
+            Self::Elements => Some(found.elements as f64),
+            Self::Length => Some(found.lens.total_track()),
+        };
+        key.unwrap_or(f64::INFINITY)
+    }
+}
+
+/// Shows the retained lenses in an order; the clicked one, if any.
 pub(super) fn cards(
     ui: &mut Ui,
     search: ShownSearch<'_>,
     chosen: Option<&SelectedLens>,
+    order: CardOrder,
     thumbnails: &mut Thumbnails,
 ) -> Option<Arc<FoundLens>> {
     let ShownSearch { view, run } = search;
@@ -33,7 +79,8 @@ pub(super) fn cards(
         |found: &Arc<FoundLens>| (found.number, found.merit) == (run.best.number, run.best.merit);
     let is_retained = run.reservoir.iter().any(same);
     let best = (!is_retained).then_some(&run.best);
-    let shown: Vec<&Arc<FoundLens>> = best.into_iter().chain(&run.reservoir).collect();
+    let mut shown: Vec<&Arc<FoundLens>> = best.into_iter().chain(&run.reservoir).collect();
+    shown.sort_by(|a, b| order.key(a).total_cmp(&order.key(b)));
     let width = ui.available_width();
     let gap = 4.0;
     let columns = ((width + gap) / (CARD.x + gap)).floor().max(1.0);
@@ -113,7 +160,7 @@ fn card(
     };
     ui.painter().rect(rect, 3.0, visuals.extreme_bg_color, stroke, StrokeKind::Inside);
     let drawing = Rect::from_min_max(rect.min, pos2(rect.right(), rect.bottom() - WORDS));
-    paint(ui, &found.lens, &view.lens, drawing.shrink(4.0), thumbnails);
+    thumbnails.paint(ui, &found.lens, &view.lens, drawing.shrink(4.0));
     let colors = [ui.visuals().text_color(), ui.visuals().weak_text_color()];
     caption(ui, rect, &text, colors);
     let corner = match look.mark {
@@ -135,20 +182,6 @@ fn caption(ui: &Ui, rect: Rect, text: &str, colors: [Color32; 2]) {
     }
 }
 
-/// Draws a lens into a part of the window.
-pub(super) fn paint(
-    ui: &Ui,
-    lens: &Arc<Lens>,
-    design: &Arc<Lens>,
-    rect: Rect,
-    thumbnails: &mut Thumbnails,
-) {
-    let all = Rect::from_min_max(Pos2::ZERO, pos2(1.0, 1.0));
-    if let Some(texture) = thumbnails.texture(ui, lens, design, rect.size()) {
-        ui.painter().image(texture.id(), rect, all, Color32::WHITE);
-    }
-}
-
 /// Buttons to accept, pin or export a lens; true if the design is to be shown again.
 pub(super) fn lens_buttons(
     ui: &mut Ui,
@@ -158,7 +191,7 @@ pub(super) fn lens_buttons(
 ) -> bool {
     let ShownSearch { view, run } = search;
     let exporting = view.structure_search.exporting.contains(&number);
-    let take = format!("Make lens {number} the design, as one undo step");
+    let accept = format!("Make lens {number} the design, as one undo step");
     let pin = if run.pinned == Some(number) {
         let command = StructureSearchCommand::Control(SteerCommand::Unpin);
         let hint = "Start new descents from any retained lens again";
@@ -169,7 +202,7 @@ pub(super) fn lens_buttons(
         ActionButton::new("Pin", view.structure_search.run.is_active(), command).hint(hint)
     };
     let buttons = [
-        ActionButton::new("Take", true, StructureSearchCommand::Accept(number)).hint(&take),
+        ActionButton::new("Accept", true, StructureSearchCommand::Accept(number)).hint(&accept),
         pin,
         ActionButton::new(
             if exporting { "Finalizing…" } else { "Export…" },
@@ -186,7 +219,7 @@ pub(super) fn lens_buttons(
         ui.spacing_mut().item_spacing.x = 4.0;
         action_buttons(ui, buttons, actions);
         let shown = view.preview_lens.is_some();
-        let button = ui.add_enabled(shown, Button::new("Back to the design"));
+        let button = ui.add_enabled(shown, Button::new("Show the design"));
         back = button.on_hover_text("Show the design again in all panels").clicked();
     });
     if back {

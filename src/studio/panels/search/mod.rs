@@ -1,7 +1,7 @@
 //! The search over structure, live: elements appear, split, fuse and vanish while the merit falls.
 //!
 //! Every lens that the search retains can be compared with the design, traced back through its
-//! ancestors, pinned, taken or exported. The search works on its own copy.
+//! ancestors, pinned, accepted or exported. The search works on its own copy.
 
 mod controls;
 mod family;
@@ -24,6 +24,7 @@ use crate::session::{
 use crate::studio::actions::Actions;
 use crate::studio::text::capitalize;
 use crate::studio::thumbnails::Thumbnails;
+use lenses::CardOrder;
 use setup::SearchSetup;
 
 /// The introduction that is shown before the first search.
@@ -31,7 +32,7 @@ const INTRODUCTION: &str = "Which lens of another structure is better? Chains de
     design, add, \
     remove, glue, split, bend, flip and exchange elements, and retain the best lens of \
     every pattern of glass and air.\n\
-    The design does not change until one of their lenses is taken.";
+    The design does not change until one of their lenses is accepted.";
 
 /// The height of the bar of the selected lens: buttons and two lines.
 const SELECTION_HEIGHT: f32 = 62.0;
@@ -65,6 +66,8 @@ pub struct SearchPanel {
     page: SearchPage,
     setup: SearchSetup,
     thumbnails: Thumbnails,
+    /// The order of the retained lenses.
+    order: CardOrder,
     /// The lens that was clicked.
     selected: Option<SelectedLens>,
     /// The search that was shown last: a new one turns the page.
@@ -170,10 +173,11 @@ impl SearchPanel {
 
     /// The merit history and the retained lenses.
     fn lenses_page(&mut self, ui: &mut Ui, search: ShownSearch<'_>, actions: &mut Actions) {
-        controls::live_controls(ui, search, actions);
+        controls::live_controls(ui, search, &mut self.order, actions);
         let chosen = self.selected_number();
         let marked = plot::plots(ui, search, chosen);
-        let card = lenses::cards(ui, search, self.selected.as_ref(), &mut self.thumbnails);
+        let chosen = self.selected.as_ref();
+        let card = lenses::cards(ui, search, chosen, self.order, &mut self.thumbnails);
         match card {
             Some(found) => self.select(search.view, found.number, &found.lens, actions),
             None => self.select_number(search.view, marked, actions),

@@ -13,6 +13,8 @@ use crate::studio::panels::widgets::fixed_plot;
 const NEAR: f32 = 10.0;
 /// The height of the plot of elements.
 const STRIP: f32 = 44.0;
+/// The height of a page that has room for the plot of elements and for the legend.
+const ROOMY: f32 = 250.0;
 /// The room for the numbers at the left.
 const AXIS: f32 = 40.0;
 
@@ -21,9 +23,13 @@ pub(super) fn plots(ui: &mut Ui, search: ShownSearch<'_>, chosen: Option<u64>) -
     let ShownSearch { view, run } = search;
     let chain = view.structure_search.previewed_chain.unwrap_or(0);
     let height = (0.3 * ui.available_height()).clamp(80.0, 260.0);
+    // With little room, the retained lenses come first.
+    let is_roomy = ui.available_height() > ROOMY;
     let clicked = merit_plot(ui, run, chain, chosen, height);
-    elements_plot(ui, run, chain);
-    legend(ui, run);
+    if is_roomy {
+        elements_plot(ui, run, chain);
+        legend(ui, run);
+    }
     clicked
 }
 
@@ -62,9 +68,8 @@ fn merit_plot(
         plot.line(Line::new("previewed chain", chain_curve(run, chain)).color(weak).width(1.2));
         start_line(plot, run, visuals.warn_fg_color);
         let best = run.history.moments.iter();
-        let best: PlotPoints<'_> =
-            best.filter_map(|m| Some([m.round as f64, decade(m.best)?])).collect();
-        plot.line(Line::new("best", best).color(visuals.hyperlink_color).width(2.0));
+        let best = best.filter_map(|m| Some([m.round as f64, decade(m.best)?])).collect();
+        plot.line(Line::new("best", distinct(best)).color(visuals.hyperlink_color).width(2.0));
         mutation_marks(plot, run, &visuals);
         if let Some(mark) = run.history.marks.iter().find(|mark| Some(mark.number) == chosen) {
             let ring =
@@ -94,7 +99,7 @@ fn chain_curve(run: &StructureSearchSnapshot, chain: usize) -> PlotPoints<'stati
         let (merit, _) = moment.chains.get(chain).copied().flatten()?;
         Some([moment.round as f64, decade(merit)?])
     };
-    run.history.moments.iter().filter_map(merit).collect()
+    distinct(run.history.moments.iter().filter_map(merit).collect()).into()
 }
 
 fn mark_point(mark: &DescentMark) -> Option<[f64; 2]> {
@@ -198,7 +203,13 @@ fn step_curve(steps: &[[f64; 2]]) -> Vec<[f64; 2]> {
         }
         stairs.push(*step);
     }
-    stairs
+    distinct(stairs)
+}
+
+/// A curve without repeated points, of which three in a row have no direction to draw a line in.
+fn distinct(mut curve: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
+    curve.dedup();
+    curve
 }
 
 /// The marks of the kinds that have occurred.
@@ -213,4 +224,15 @@ fn legend(ui: &mut Ui, run: &StructureSearchSnapshot) {
             }
         }
     });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_step_curve_has_no_repeated_points() {
+        let steps = [[0.0, 6.0], [3.0, 7.0], [3.0, 7.0], [3.0, 7.0], [4.0, 7.0]];
+        assert_eq!(step_curve(&steps), [[0.0, 6.0], [3.0, 6.0], [3.0, 7.0], [4.0, 7.0]]);
+    }
 }

@@ -1,0 +1,128 @@
+//! The third-order sums of a lens, surface by surface.
+
+use egui::{Align, Color32, Grid, Layout as Arrange, RichText, ScrollArea, Ui, Vec2, vec2};
+
+use super::{Panel, displayed_results, show_missing_results};
+use crate::lens::Lens;
+use crate::paraxial::{Seidel, SeidelSums};
+use crate::session::SessionView;
+use crate::studio::actions::Actions;
+
+/// The panel.
+#[derive(Debug)]
+pub struct SeidelPanel;
+
+impl Panel for SeidelPanel {
+    fn title(&self) -> &'static str {
+        "Seidel sums"
+    }
+
+    fn ui(&mut self, ui: &mut Ui, view: &SessionView, _actions: &mut Actions) {
+        let Some((results, numbers)) = displayed_results(view) else {
+            return show_missing_results(ui, view);
+        };
+        ScrollArea::both().auto_shrink([false, false]).show(ui, |ui| match &numbers.seidel.value {
+            Some(seidel) => sums(ui, &results.lens, seidel),
+            None if numbers.ray_model.value.has_grin() => {
+                drop(ui.weak(
+                    "No third-order sums: those of a gradient-index medium are not implemented",
+                ))
+            }
+            None => drop(ui.weak("No third-order sums: the lens has no paraxial chief ray")),
+        });
+    }
+}
+
+/// The height of a row.
+const ROW: f32 = 14.0;
+/// The room between two columns.
+const GAP: f32 = 6.0;
+/// The width of the column of surfaces.
+const SURFACE: f32 = 48.0;
+
+/// The columns of the sums with their explanations.
+const SUMS: [(&str, &str); 7] = [
+    ("S1", "Spherical aberration"),
+    ("S2", "Coma"),
+    ("S3", "Astigmatism"),
+    ("S4", "Petzval curvature"),
+    ("S5", "Distortion"),
+    ("C1", "Axial colour between the outer wavelengths"),
+    ("C2", "Lateral colour between the outer wavelengths"),
+];
+
+const fn row_of(sums: &SeidelSums<f64>) -> [f64; 7] {
+    [sums.s1, sums.s2, sums.s3, sums.s4, sums.s5, sums.c1, sums.c2]
+}
+
+fn sums(ui: &mut Ui, lens: &Lens, seidel: &Seidel<f64>) {
+    ui.label(RichText::new("Seidel sums, µm").strong()).on_hover_text(
+        "Third-order wave aberrations at the edge of pupil and field, surface by surface \
+         (Welford's S1 to S5, C1, C2); the tint shows where they come from",
+    );
+    ui.spacing_mut().interact_size.y = ROW;
+    let width = ((ui.available_width() - SURFACE) / SUMS.len() as f32 - GAP).clamp(34.0, 80.0);
+    let cell = vec2(width, ROW);
+    Grid::new("seidel").num_columns(8).spacing([GAP, 2.0]).striped(true).show(ui, |ui| {
+        ui.weak("Surf");
+        for (name, meaning) in SUMS {
+            right(ui, cell, |ui| drop(ui.weak(name).on_hover_text(meaning)));
+        }
+        ui.end_row();
+        for (i, sums) in seidel.surfaces.iter().enumerate() {
+            let stop = lens.surfaces.get(i).is_some_and(|row| row.stop);
+            ui.label(if stop { format!("{} STO", i + 1) } else { (i + 1).to_string() });
+            numbers(ui, cell, sums, &largest(seidel));
+        }
+        ui.strong("Sum");
+        numbers(ui, cell, &seidel.total, &[f64::INFINITY; 7]);
+    });
+}
+
+/// The largest contribution to each sum.
+fn largest(seidel: &Seidel<f64>) -> [f64; 7] {
+    let mut most = [0.0_f64; 7];
+    for sums in &seidel.surfaces {
+        for (most, value) in most.iter_mut().zip(row_of(sums)) {
+            *most = most.max(value.abs());
+        }
+    }
+    most
+}
+
+fn numbers(ui: &mut Ui, cell: Vec2, sums: &SeidelSums<f64>, largest: &[f64; 7]) {
+    for (value, largest) in row_of(sums).into_iter().zip(largest) {
+        let share = if *largest > 0.0 { value / largest } else { 0.0 };
+        right(ui, cell, |ui| {
+            let text = RichText::new(fixed(1e3 * value)).small();
+            let tint = tint(ui, share);
+            ui.label(text.background_color(tint));
+        });
+    }
+    ui.end_row();
+}
+
+/// A number with at most five characters besides its sign, so that the columns have the same width.
+fn fixed(value: f64) -> String {
+    let size = value.abs();
+    if size >= 1e5 || (size < 1e-3 && size > 0.0) {
+        format!("{value:.1e}")
+    } else if size >= 100.0 {
+        format!("{value:.1}")
+    } else {
+        // Adding zero takes the sign from a zero.
+        format!("{:.3}", value + 0.0)
+    }
+}
+
+/// The tint of a contribution: red for positive, blue for negative.
+fn tint(ui: &Ui, share: f64) -> Color32 {
+    let color =
+        if share > 0.0 { ui.visuals().error_fg_color } else { ui.visuals().hyperlink_color };
+    color.gamma_multiply((0.4 * share.abs()) as f32)
+}
+
+/// Shows something at the right end of a cell.
+fn right(ui: &mut Ui, cell: Vec2, show: impl FnOnce(&mut Ui)) {
+    ui.allocate_ui_with_layout(cell, Arrange::right_to_left(Align::Center), show);
+}
