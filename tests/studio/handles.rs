@@ -1,6 +1,7 @@
 //! The handles of the layout in the whole window: by the pointer, by keys, by a typed value.
 
 use aplanat::paraxial::Handle;
+use aplanat::session::Command;
 use aplanat::studio::Studio;
 use egui::{Event, Key, Modifiers, PointerButton, Pos2, Vec2};
 use egui_kittest::Harness;
@@ -187,4 +188,26 @@ fn a_drag_on_the_drawing_itself_moves_the_view() {
     harness.run_steps(2);
     assert!((center(&harness, Handle::Vertex(3)) - before - by).length() < 1.0);
     assert_eq!(*harness.state().session().lens().as_ref(), double_gauss());
+}
+
+#[test]
+fn another_lens_is_shown_whole() {
+    let mut harness = window();
+    let places = |harness: &Harness<'_, Studio>| {
+        [Handle::Vertex(3), Handle::ImagePlane].map(|handle| center(harness, handle))
+    };
+    let whole = places(&harness);
+    let layout = harness.get_by_label_contains("Section of ").rect();
+    let from = layout.left_top() + Vec2::new(12.0, 12.0);
+    move_to(&mut harness, from);
+    button(&mut harness, from, true, PLAIN);
+    move_to(&mut harness, from + Vec2::new(30.0, 20.0));
+    button(&mut harness, from + Vec2::new(30.0, 20.0), false, PLAIN);
+    harness.run_steps(2);
+    assert!((places(&harness)[0] - whole[0]).length() > 20.0);
+    harness.state_mut().session_mut().apply(Command::New(Box::new(double_gauss())));
+    settle(&mut harness);
+    for (now, whole) in places(&harness).into_iter().zip(whole) {
+        assert!((now - whole).length() < 1.0, "{now:?} {whole:?}");
+    }
 }

@@ -10,6 +10,7 @@ mod grin;
 mod handles;
 mod harness;
 mod history;
+mod legibility;
 mod panels;
 mod prescription;
 mod search;

@@ -14,7 +14,7 @@ use aplanat::studio::draw::RenderBackend;
 use aplanat::studio::file_dialog::FileRequest;
 use aplanat::studio::panels::{
     EffectsPanel, FirstOrderPanel, LayoutPanel, OptimizerPanel, Panel, ParetoPanel,
-    PrescriptionPanel, PupilPanel, SpotPanel,
+    PrescriptionPanel, PupilPanel, SeidelPanel, SpotPanel,
 };
 use egui::{Key, Modifiers};
 use egui_kittest::Harness;
@@ -323,7 +323,7 @@ fn an_optimization_can_be_paused_stepped_stopped_and_accepted() {
         (RunStatus::Running, "Stop", Command::Stop),
         (RunStatus::Paused, "Resume", Command::Resume),
         (RunStatus::Paused, "Step", Command::Step),
-        (RunStatus::Stopped, "Take", Command::AcceptResult),
+        (RunStatus::Stopped, "Accept", Command::AcceptResult),
         (RunStatus::Finished, "Discard", Command::DiscardResult),
     ];
     for (standing, button, command) in cases {
@@ -499,11 +499,46 @@ fn the_layout_counts_lost_rays_by_fate() {
 }
 
 #[test]
+fn lost_rays_offer_the_rims_that_clip_them() {
+    let mut harness = panel_harness(LayoutPanel::new(RenderBackend::Software), view());
+    harness.run();
+    harness.get_by_label_contains("clipped of 45 rays").click();
+    harness.run();
+    harness.get_by_label_contains("Widen the rim of surface 1 from 6.3 to ").click();
+    harness.run();
+    let [Command::Preview(Some(wider))] = harness.state().commands.as_slice() else {
+        panic!("{:?}", harness.state().commands);
+    };
+    assert!(wider.surfaces[0].semi_diameter > Some(6.3));
+    assert_eq!(wider.surfaces[1..], double_gauss().surfaces[1..]);
+}
+
+#[test]
 fn first_order_data_are_labelled() {
     let mut harness = panel_harness(FirstOrderPanel, view());
     harness.run();
-    for text in ["Focal length", "49.389 mm", "Petzval radius", "Seidel sums, µm"] {
+    for text in ["Focal length", "49.389 mm", "Petzval radius"] {
         harness.get_by_label(text);
+    }
+}
+
+#[test]
+fn seidel_sums_are_shown_for_every_surface_within_the_narrowest_panel() {
+    // The room of the panel in a window of 1280 x 800.
+    let mut harness = Harness::builder()
+        .with_size([420.0, 310.0])
+        .with_context_setup(aplanat::studio::theme::apply)
+        .build_ui_state(
+            |ui, view: &mut SessionView| {
+                let mut actions = aplanat::studio::Actions::default();
+                SeidelPanel.ui(ui, view, &mut actions);
+            },
+            view(),
+        );
+    harness.run();
+    for column in ["Seidel sums, µm", "6 STO", "S1", "S2", "S3", "S4", "S5", "C1", "C2", "Sum"] {
+        let place = harness.get_by_label(column).rect();
+        assert!(place.right() <= 420.0 && place.bottom() <= 310.0, "{column}: {place:?}");
     }
 }
 
@@ -531,7 +566,7 @@ fn a_lens_that_cannot_be_traced_says_why_in_every_panel() {
 }
 
 /// A front of the double Gauss that stands somehow, and one before it.
-fn fronts(standing: RunStatus) -> SessionView {
+pub(super) fn fronts(standing: RunStatus) -> SessionView {
     let view = view();
     let design = |i: usize| pareto::ParetoPoint {
         lens: Lens { name: format!("lens {i}"), ..double_gauss() },

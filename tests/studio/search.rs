@@ -19,7 +19,7 @@ use aplanat::session::{
 use aplanat::studio::file_dialog::FileRequest;
 use aplanat::studio::panels::SearchPanel;
 use egui_kittest::Harness;
-use egui_kittest::kittest::Queryable;
+use egui_kittest::kittest::{NodeT as _, Queryable};
 
 use crate::harness::{PanelState, double_gauss, panel_harness, view, view_of};
 
@@ -280,13 +280,13 @@ fn a_retained_lens_is_compared_pinned_accepted_and_exported() {
     let preview = Command::Preview(Some(lens));
     assert_eq!(harness.state().commands, [choose.clone().into(), preview]);
     harness.get_by_label_contains("Lens 1: RMS 50 to 10 µm (-80 %), light 90 to 90 mm² (0 %)");
-    for button in ["Pin", "Take", "Export…"] {
+    for button in ["Pin", "Accept", "Export…"] {
         press(&mut harness, button);
     }
     let pin = StructureSearchCommand::Control(SteerCommand::Pin(1));
     assert_eq!(asked(&harness), [choose.clone(), pin, StructureSearchCommand::Accept(1)]);
     assert_eq!(harness.state().requests, [FileRequest::ExportSearchLens(1)]);
-    press(&mut harness, "Back to the design");
+    press(&mut harness, "Show the design");
     assert_eq!(harness.state().commands.last(), Some(&Command::Preview(None)));
 
     let mut pinned = searching(RunStatus::Running);
@@ -299,6 +299,27 @@ fn a_retained_lens_is_compared_pinned_accepted_and_exported() {
     harness.run();
     press(&mut harness, "Unpin");
     assert_eq!(asked(&harness), [choose, StructureSearchCommand::Control(SteerCommand::Unpin)]);
+}
+
+#[test]
+fn retained_lenses_are_sorted_by_a_number() {
+    let mut view = searching(RunStatus::Stopped);
+    let run = Arc::make_mut(view.structure_search.run.snapshot.as_mut().unwrap());
+    let bright = Arc::make_mut(&mut run.reservoir[1]);
+    bright.score.as_mut().unwrap().score.as_mut().unwrap().light = 120.0;
+    let mut harness = panel(view);
+    let first = |harness: &Harness<'_, PanelState<SearchPanel>>| {
+        let cards = harness.get_all_by_label_contains(" elements, ");
+        let place = |rect: egui::Rect| (rect.top(), rect.left());
+        let order = |a: &egui::Rect, b: &egui::Rect| place(*a).partial_cmp(&place(*b)).unwrap();
+        let cards = cards.map(|card| (card.rect(), card.accesskit_node().label().unwrap()));
+        cards.min_by(|a, b| order(&a.0, &b.0)).unwrap().1
+    };
+    let by_merit = first(&harness);
+    harness.get_by_label("Order of the lenses").click();
+    harness.run();
+    press(&mut harness, "By light");
+    assert_ne!(first(&harness), by_merit);
 }
 
 #[test]
@@ -387,7 +408,7 @@ fn a_card_that_was_clicked_stays_the_lens_that_was_clicked() {
     run.best = descending(0.005);
     harness.state_mut().view.structure_search.run.snapshot = Some(Arc::new(run));
     harness.run();
-    press(&mut harness, "Take");
+    press(&mut harness, "Accept");
     let chosen = asked(&harness);
     let [StructureSearchCommand::Choose { number: 0, lens }, StructureSearchCommand::Accept(0)] =
         chosen.as_slice()

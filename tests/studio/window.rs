@@ -159,7 +159,7 @@ fn an_optimization_changes_the_preview_and_is_accepted_as_one_step() {
         harness.query_by_label("Stopped").is_some() || harness.query_by_label("Finished").is_some()
     });
     assert_eq!(*harness.state().session().lens().as_ref(), double_gauss(), "not taken yet");
-    harness.get_by_label("Take").click();
+    harness.get_by_label("Accept").click();
     harness.run_steps(3);
     settle(&mut harness);
     assert_ne!(radii(&spots(&harness)), radii(&before));
@@ -193,7 +193,7 @@ fn a_structure_search_shows_lenses_and_one_is_accepted_as_one_step() {
     let card = harness.get_all_by_label_contains(" elements, ").next().unwrap();
     card.click_accesskit();
     harness.run_steps(3);
-    harness.get_by_label("Take").click();
+    harness.get_by_label("Accept").click();
     harness.run_steps(3);
     settle(&mut harness);
     assert!(harness.state().session().is_dirty());
@@ -305,4 +305,26 @@ fn a_field_is_analysed_only_while_its_panel_is_shown() {
         !forming(&harness).is_active && forming(&harness).run.snapshot.is_some(),
         "it stays open"
     );
+}
+
+#[test]
+fn a_panel_can_have_the_window_and_a_search_can_be_watched() {
+    let mut harness = window();
+    let width =
+        |harness: &Harness<'_, Studio>| harness.get_by_label_contains("Section of ").rect().width();
+    let among_others = width(&harness);
+    harness.get_by_label("Maximize Layout").click();
+    harness.run_steps(3);
+    assert!(width(&harness) > 1.3 * among_others);
+    assert!(harness.query_by_label("Radius of surface 1").is_none());
+    harness.key_press(Key::F11);
+    harness.run_steps(3);
+    harness.get_by_label("Radius of surface 1");
+    assert!((width(&harness) - among_others).abs() < 1.0);
+    harness.get_by_label("View").click();
+    harness.run_steps(3);
+    harness.get_by_label("Arrangement for a search").click();
+    harness.run_steps(3);
+    harness.get_by_label("Paraxial projection");
+    harness.get_by_label("Radius of surface 1");
 }

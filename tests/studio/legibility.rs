@@ -1,0 +1,163 @@
+//! What the window paints: texts stand out from what lies below them, and nothing covers what a
+//! person needs to see.
+
+use aplanat::session::{Command, RunStatus, SessionView};
+use aplanat::studio::panels::ParetoPanel;
+use egui::epaint::{ClippedShape, TextShape};
+use egui::{Color32, Pos2, Rect, Rgba, Shape, Theme};
+use egui_kittest::Harness;
+use egui_kittest::kittest::Queryable;
+use std::sync::Arc;
+
+use crate::harness::{PanelState, panel_harness};
+use crate::panels::fronts;
+use crate::window::window;
+
+/// The least contrast of small text (WCAG 2.1, success criterion 1.4.3).
+const READABLE: f32 = 4.5;
+/// The least contrast of any text, notes beside the numbers included.
+const DISCERNIBLE: f32 = 3.0;
+
+/// The shapes of a frame, in the order in which they are painted.
+fn shapes(painted: &[ClippedShape]) -> Vec<&Shape> {
+    fn add<'a>(shape: &'a Shape, all: &mut Vec<&'a Shape>) {
+        match shape {
+            Shape::Vec(parts) => parts.iter().for_each(|part| add(part, all)),
+            shape => all.push(shape),
+        }
+    }
+    let mut all = Vec::new();
+    painted.iter().for_each(|clipped| add(&clipped.shape, &mut all));
+    all
+}
+
+/// The relative luminance of an opaque colour.
+fn luminance(color: Color32) -> f32 {
+    let color = Rgba::from(color);
+    0.2126 * color.r() + 0.7152 * color.g() + 0.0722 * color.b()
+}
+
+/// The contrast of two opaque colours, 1 to 21.
+fn contrast(a: Color32, b: Color32) -> f32 {
+    let [a, b] = [luminance(a), luminance(b)];
+    (a.max(b) + 0.05) / (a.min(b) + 0.05)
+}
+
+fn text_color(text: &TextShape) -> Color32 {
+    let own = text.galley.job.sections.first().map(|section| section.format.color);
+    let own = own.filter(|color| *color != Color32::PLACEHOLDER);
+    text.override_text_color.or(own).unwrap_or(text.fallback_color)
+}
+
+/// The colour of the last opaque rectangle below a place, of those that are painted first.
+fn ground(below: &[&Shape], place: Pos2) -> Option<Color32> {
+    below.iter().rev().find_map(|shape| match shape {
+        Shape::Rect(rect) if rect.fill.is_opaque() && rect.rect.contains(place) => Some(rect.fill),
+        _ => None,
+    })
+}
+
+/// The texts of a frame with their contrast to what lies below them.
+fn contrasts(painted: &[ClippedShape]) -> Vec<(String, f32)> {
+    let all = shapes(painted);
+    let texts = all.iter().enumerate().filter_map(|(i, shape)| match shape {
+        Shape::Text(text) if text_color(text).is_opaque() => Some((i, text)),
+        _ => None,
+    });
+    let of_text = |(i, text): (usize, &TextShape)| {
+        let ground = ground(&all[..i], text.visual_bounding_rect().center())?;
+        Some((text.galley.text().to_owned(), contrast(text_color(text), ground)))
+    };
+    texts.filter_map(of_text).collect()
+}
+
+fn front(view: SessionView, theme: Theme) -> Harness<'static, PanelState<ParetoPanel>> {
+    let mut harness = panel_harness(ParetoPanel::default(), view);
+    harness.ctx.set_theme(theme);
+    harness.run();
+    harness
+}
+
+#[test]
+fn the_text_of_a_progress_bar_is_readable_in_both_themes() {
+    for theme in [Theme::Dark, Theme::Light] {
+        let harness = front(fronts(RunStatus::Running), theme);
+        let contrasts = contrasts(&harness.output().shapes);
+        let of_bar = contrasts.iter().find(|(text, _)| text.starts_with("Running"));
+        let (text, contrast) = of_bar.expect("a progress bar with its text");
+        assert!(*contrast >= READABLE, "{theme:?}: {text}: {contrast}");
+    }
+}
+
+#[test]
+fn every_text_of_the_window_stands_out_in_both_themes() {
+    let mut harness = window();
+    for theme in [Theme::Dark, Theme::Light] {
+        harness.ctx.set_theme(theme);
+        harness.run_steps(3);
+        let contrasts = contrasts(&harness.output().shapes);
+        assert!(contrasts.len() > 100);
+        for (text, contrast) in contrasts {
+            assert!(contrast >= DISCERNIBLE, "{theme:?}: {text}: {contrast}");
+        }
+    }
+}
+
+/// The places of the crosses of a plot: the middles of short lines of a colour.
+fn crosses(painted: &[ClippedShape], color: Color32) -> Vec<Pos2> {
+    let cross = |shape: &&Shape| match shape {
+        Shape::LineSegment { points: [a, b], stroke } => {
+            let is_stroke = (4.0..20.0).contains(&a.distance(*b)) && stroke.color == color;
+            is_stroke.then(|| a.lerp(*b, 0.5))
+        }
+        _ => None,
+    };
+    shapes(painted).iter().filter_map(cross).collect()
+}
+
+#[test]
+fn the_legend_of_the_front_does_not_cover_the_start() {
+    for (spot, light) in [(0.002, 10.0), (0.002, 110.0), (0.09, 10.0), (0.09, 110.0)] {
+        let mut view = fronts(RunStatus::Finished);
+        let run = Arc::make_mut(view.pareto.run.snapshot.as_mut().unwrap());
+        let start = Arc::make_mut(&mut run.start);
+        (start.spot, start.light) = (spot, light);
+        let harness = front(view, Theme::Dark);
+        let legend = ["start", "run 2: 0.5000", "fixed rays: 0.5000"];
+        let legend = legend.map(|entry| harness.get_by_label(entry).rect());
+        let legend = legend.into_iter().fold(Rect::NOTHING, Rect::union);
+        let color = harness.ctx.global_style().visuals.strong_text_color();
+        let starts = crosses(&harness.output().shapes, color);
+        assert!(!starts.is_empty(), "the start is drawn");
+        for start in starts {
+            assert!(!legend.contains(start), "{spot} mm, {light} mm²: {start:?} in {legend:?}");
+        }
+    }
+}
+
+#[test]
+fn the_explanation_of_a_menu_item_covers_no_item() {
+    let mut harness = window();
+    harness.ctx.all_styles_mut(|style| {
+        style.interaction.tooltip_delay = 0.0;
+        style.interaction.show_tooltips_only_when_still = false;
+    });
+    harness.state_mut().session_mut().apply(Command::Select(Some(2)));
+    harness.get_by_label("Element").click();
+    // No explanation follows a click for a moment.
+    harness.run_steps(30);
+    let hints = [
+        ("Add an element…", "A singlet or a cemented doublet of some focal length"),
+        ("Reverse the element", "The last surface comes first"),
+        ("Remove the element", "Air takes its place"),
+    ];
+    let items = hints.map(|(item, _)| harness.get_by_label(item).rect());
+    for (item, hint) in hints {
+        harness.get_by_label(item).hover();
+        harness.run_steps(6);
+        let hint = harness.get_by_label(hint).rect();
+        for covered in items {
+            assert!(!hint.intersects(covered), "{item}: {hint:?} over {covered:?}");
+        }
+    }
+}
