@@ -1,4 +1,4 @@
-//! What the window paints: texts stand out from what lies below them, and nothing covers what a
+//! Legibility of the window: texts stand out from the ground below them, and nothing covers the parts that a
 //! person needs to see.
 
 use aplanat::session::{Command, RunStatus, SessionView};

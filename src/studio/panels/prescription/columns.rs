@@ -89,7 +89,7 @@ impl TableColumn {
             Self::Radius => Width::initial(94.0).at_least(70.0),
             Self::Thickness => Width::initial(90.0).at_least(70.0),
             Self::Glass => Width::initial(118.0).at_least(70.0),
-            Self::SemiDiameter => Width::initial(106.0).at_least(70.0),
+            Self::SemiDiameter => Width::initial(114.0).at_least(70.0),
             Self::Conic => Width::initial(76.0).at_least(50.0),
             Self::Obstruction => Width::initial(86.0).at_least(60.0),
             Self::Asphere(_) | Self::Grin(_) => Width::initial(112.0).at_least(60.0),

@@ -214,16 +214,23 @@ fn merit_arrow(frame: &HandleFrame<'_>, slopes: &MeritSlopes, handle: Handle) ->
 fn hint(frame: &HandleFrame<'_>, slopes: Option<&MeritSlopes>, handle: Handle) -> String {
     let value = value_text(&frame.view.lens, frame.view.settings.zoom, handle);
     let mut text = format!("{}, {value}", handle_name(handle).trim_start_matches("Handle: "));
-    if let Some(share) = slopes.and_then(|slopes| change_per_point(frame, slopes, handle)) {
+    let share = slopes.and_then(|slopes| change_per_point(frame, slopes, handle));
+    if share == Some(0.0) {
+        text.push_str("\nthe merit does not depend on it");
+    } else if let Some(share) = share {
         // A tenth of the way, and so on, until the derivative describes what happens on it.
         let tenths = (share.abs() / MAX_CHANGE).log10().ceil().max(0.0);
         let part = 0.1f64.powf(tenths);
         let (mm, share) = (part * frame.shown.mm_per_point(), part * share);
-        let (rising, falling) = if moves_up(handle) { ("up", "down") } else { ("right", "left") };
+        let [rising, falling] = if moves_up(handle) {
+            ["upwards", "downwards"]
+        } else {
+            ["to the right", "to the left"]
+        };
         let towards = if share > 0.0 { falling } else { rising };
         let change = number::format_digits(100.0 * share.abs(), 2);
         let way = number::format_digits(mm, 2);
-        text = format!("{text}\nmerit falls by {change} % with {way} mm to the {towards}");
+        text = format!("{text}\nmerit falls by {change} % with {way} mm {towards}");
     }
     text
 }
