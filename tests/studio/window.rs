@@ -159,7 +159,7 @@ fn an_optimization_changes_the_preview_and_is_accepted_as_one_step() {
         harness.query_by_label("Stopped").is_some() || harness.query_by_label("Finished").is_some()
     });
     assert_eq!(*harness.state().session().lens().as_ref(), double_gauss(), "not taken yet");
-    harness.get_by_label("Accept").click();
+    harness.get_all_by_label("Accept").last().unwrap().click();
     harness.run_steps(3);
     settle(&mut harness);
     assert_ne!(radii(&spots(&harness)), radii(&before));
@@ -193,7 +193,7 @@ fn a_structure_search_shows_lenses_and_one_is_accepted_as_one_step() {
     let card = harness.get_all_by_label_contains(" elements, ").next().unwrap();
     card.click_accesskit();
     harness.run_steps(3);
-    harness.get_by_label("Accept").click();
+    harness.get_all_by_label("Accept").last().unwrap().click();
     harness.run_steps(3);
     settle(&mut harness);
     assert!(harness.state().session().is_dirty());
