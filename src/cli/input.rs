@@ -2,13 +2,14 @@
 
 use super::error::CliError;
 use super::output::print_note;
-use super::progress::with_bar;
+use super::progress::{stop_flag, with_bar};
 use crate::files::{self, ConversionOutcome, json};
 use crate::lens::{FieldKind, FieldPoint, Lens, System};
 use crate::pupil::RayModel;
 use serde::de::DeserializeOwned;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
+use std::sync::atomic::AtomicBool;
 
 /// The lens argument of a subcommand.
 #[derive(Debug, clap::Args)]
@@ -34,22 +35,25 @@ impl LensFiles {
 
     /// Measures every lens, and makes a row of its file and what was found; a bar counts them, and
     /// a request to end leaves out those that have not begun. The second argument of `measure` is
-    /// the name of the file without its ending.
+    /// the name of the file without its ending, the third is true once it is asked to end; a lens
+    /// of which nothing is found then has no row.
     pub(super) fn map<T, R>(
         &self,
-        measure: impl Fn(&Lens, &str) -> T,
+        measure: impl Fn(&Lens, &str, &AtomicBool) -> Option<T>,
         row: impl Fn(String, T) -> R,
     ) -> Result<Vec<R>, CliError> {
         let open = |path: &PathBuf| LensFile { path: path.clone() }.open();
         let opened: Vec<LoadedLens> = self.paths.iter().map(open).collect::<Result<_, _>>()?;
-        let (rows, _) = with_bar("lenses", |report| {
+        let stop = stop_flag();
+        let (rows, _) = with_bar(&stop, "lenses", |report| {
             let mut rows = Vec::new();
-            for (opened, path) in opened.iter().zip(&self.paths) {
-                if report(rows.len(), self.paths.len()).is_break() {
+            for (done, (opened, path)) in opened.iter().zip(&self.paths).enumerate() {
+                let name = path.file_stem().unwrap_or_default().to_string_lossy();
+                let found = measure(&opened.lens, &name, &stop);
+                rows.extend(found.map(|found| row(opened.file.clone(), found)));
+                if report(done, self.paths.len()).is_break() {
                     break;
                 }
-                let name = path.file_stem().unwrap_or_default().to_string_lossy();
-                rows.push(row(opened.file.clone(), measure(&opened.lens, &name)));
             }
             rows
         });

@@ -59,10 +59,10 @@ pub(super) fn styled_bar(steps: usize, template: &str) -> ProgressBar {
 /// Runs work that reports how many of its parts are done, with a bar that counts them. A request to
 /// end breaks it off after a part, which is said; the second value is then true.
 pub(super) fn with_bar<T>(
+    stop: &AtomicBool,
     parts: &str,
     work: impl FnOnce(&mut dyn FnMut(usize, usize) -> ControlFlow<()>) -> T,
 ) -> (T, bool) {
-    let stop = stop_flag();
     let bar = styled_bar(0, &format!("{{wide_bar}} {{pos}}/{{len}} {parts}"));
     let mut stopped = false;
     let result = work(&mut |done, all| {
@@ -78,5 +78,11 @@ pub(super) fn with_bar<T>(
     (result, stopped)
 }
 
-/// The note on a benchmark that was asked to end.
-pub(super) const STOPPED_NOTE: &str = "note: stopped; only what was measured before is printed";
+/// Prints a note if a benchmark was asked to end.
+pub(super) fn note_if_stopped(stop: &AtomicBool) {
+    if stop.load(Ordering::Relaxed) {
+        print_note(STOPPED_NOTE);
+    }
+}
+
+const STOPPED_NOTE: &str = "note: stopped; only what was measured before is printed";

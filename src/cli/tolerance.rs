@@ -1,14 +1,16 @@
 //! `tolerance`: what errors of making do to a lens.
 
 use super::error::CliError;
+use super::failures::Failures;
 use super::input::{LensFile, LoadedLens, Tolerance as RelativeError};
 use super::output::{Output, ShortNumber, TextTable};
 use super::output_paths::OutputPaths;
+use super::progress::{note_if_stopped, stop_flag};
 use crate::files;
 use crate::lens::{PerturbationKind, SurfaceNumber, Tolerance, ToleranceSheet};
 use crate::tolerance::{
     AsBuiltSpot, Derivatives, ToleranceAnalysis, ToleranceError, ToleranceGrade, ToleranceRequest,
-    ToleranceScene, analyze, graded_sheet, loosest_tolerances,
+    ToleranceScene, analyze_until, graded_sheet, loosest_tolerances,
 };
 use serde::Serialize;
 use std::fmt::{self, Display};
@@ -68,16 +70,20 @@ impl ToleranceArgs {
         let scene = ToleranceScene::new(&opened.lens, self.zoom, self.error.0).map_err(refuse)?;
         let sheet = self.sheet(&opened, &scene);
         let request = ToleranceRequest { seed: self.seed, samples: self.samples, limit: self.rms };
-        let analysis = analyze(&scene, &sheet, request).map_err(refuse)?;
+        let stop = stop_flag();
+        let analysis = analyze_until(&scene, &sheet, request, &stop).map_err(refuse)?;
+        note_if_stopped(&stop);
         let loosest = self.loosest.map(|rms| {
             loosest_tolerances(&analysis.forms[1], &sheet.errors, rms * rms).map_err(refuse)
         });
         let loosest = loosest.transpose()?;
         let report = ToleranceReport::new(self, &scene, &sheet, analysis, loosest);
+        let mut failures = Failures::default();
         if let Some(path) = &self.csv {
-            files::write_atomic(path, report.csv().as_bytes())?;
+            failures.note(files::write_atomic(path, report.csv().as_bytes()));
         }
-        output.print(&report)
+        failures.note(output.print(&report));
+        failures.into_result()
     }
 
     fn check_lengths(&self) -> Result<(), CliError> {
@@ -149,12 +155,12 @@ impl ToleranceReport {
         analysis: ToleranceAnalysis,
         loosest: Option<Vec<Tolerance>>,
     ) -> Self {
-        let warnings = warnings(arguments, &analysis);
+        let warnings = warnings(&analysis);
         Self {
             errors: sheet.errors.len(),
             rays: scene.beam.rays(),
             sampling_error: scene.sampling_error,
-            samples: arguments.samples,
+            samples: analysis.samples,
             seed: arguments.seed,
             lost: analysis.lost,
             clipping: analysis.clipping,
@@ -211,7 +217,7 @@ fn rows(sheet: &ToleranceSheet, analysis: &ToleranceAnalysis) -> Vec<Sensitivity
     rows
 }
 
-fn warnings(arguments: &ToleranceArgs, analysis: &ToleranceAnalysis) -> Vec<String> {
+fn warnings(analysis: &ToleranceAnalysis) -> Vec<String> {
     let mut warnings = Vec::new();
     for spot in analysis.spots.iter().filter(|spot| !spot.form_agrees) {
         let [apart, error] = spot.difference.map(|v| 100.0 * v / spot.form_mean_rms);
@@ -224,7 +230,7 @@ fn warnings(arguments: &ToleranceArgs, analysis: &ToleranceAnalysis) -> Vec<Stri
     if analysis.lost > 0 {
         warnings.push(format!(
             "{} of {} lenses lose rays and count as bad; the means leave them out",
-            analysis.lost, arguments.samples
+            analysis.lost, analysis.samples
         ));
     }
     warnings

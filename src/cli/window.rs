@@ -4,6 +4,8 @@ use super::error::CliError;
 use crate::files;
 use serde_json::Value;
 use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
 /// Opens the studio on a lens, or on the first bundled one.
 pub(super) fn open(lens: Option<&Path>) -> Result<(), CliError> {
@@ -14,9 +16,9 @@ pub(super) fn open(lens: Option<&Path>) -> Result<(), CliError> {
     show(lens)
 }
 
-/// Times of the studio, measured in a real window.
-pub(super) fn benchmark() -> Result<Value, CliError> {
-    measured()
+/// Times of the studio, measured in a real window until `stop` is true.
+pub(super) fn benchmark(stop: &Arc<AtomicBool>) -> Result<Value, CliError> {
+    measured(stop)
 }
 
 #[cfg(feature = "studio")]
@@ -26,24 +28,29 @@ fn show(lens: Option<&Path>) -> Result<(), CliError> {
 }
 
 #[cfg(feature = "studio")]
-fn measured() -> Result<Value, CliError> {
+fn measured(stop: &Arc<AtomicBool>) -> Result<Value, CliError> {
     let figures =
-        crate::studio::measure_window().map_err(|why| CliError::Failed(why.to_string()))?;
+        crate::studio::measure_window(stop).map_err(|why| CliError::Failed(why.to_string()))?;
     serde_json::to_value(figures).map_err(|why| CliError::Failed(why.to_string()))
 }
 
 #[cfg(not(feature = "studio"))]
 fn show(_lens: Option<&Path>) -> Result<(), CliError> {
-    measured().map(drop)
+    Err(without_window())
 }
 
 #[cfg(not(feature = "studio"))]
-fn measured() -> Result<Value, CliError> {
+fn measured(_stop: &Arc<AtomicBool>) -> Result<Value, CliError> {
+    Err(without_window())
+}
+
+#[cfg(not(feature = "studio"))]
+fn without_window() -> CliError {
     let without = "this program was built without its window (cargo feature `studio`)\n\
         with it: `cargo run --release`\n\
         the same work without a window: `aplanat info LENS`, `aplanat analyze LENS spot`, \
         `aplanat optimize LENS --out FILE`, `aplanat convert IN OUT`; `aplanat --help` lists all";
-    Err(CliError::Failed(without.to_owned()))
+    CliError::Failed(without.to_owned())
 }
 
 /// Refuses a word that is neither a file nor looks like one: a mistyped subcommand.

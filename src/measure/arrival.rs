@@ -7,8 +7,9 @@ use super::limits::with_variables;
 use super::timing::Stopwatch;
 use crate::lens::Lens;
 use crate::merit::{Goal, LimitTreatment, MeritError, TermValue};
-use crate::optimize::{DescentMethod, OptimizationEnd, start};
+use crate::optimize::{DescentMethod, OptimizationEnd, Optimizer, start};
 use serde::Serialize;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// The merit relative to the best one known at which a descent has arrived.
 const ARRIVED: f64 = 1.01;
@@ -69,7 +70,8 @@ struct Course {
 
 /// Optimizes a lens by every method, with up to this many evaluations each. A lens without a goal
 /// gets the default one, a lens without variables all curvatures and thicknesses. `name` is the name
-/// of the file of a bundled lens, without its ending.
+/// of the file of a bundled lens, without its ending. Once `stop` is true, the descents that have
+/// ended are returned; `None` without any.
 ///
 /// # Errors
 /// A lens without a merit.
@@ -78,22 +80,28 @@ pub fn measure_arrival(
     name: &str,
     evaluations: usize,
     tolerance: f64,
-) -> Result<ArrivalComparison, MeritError> {
+    stop: &AtomicBool,
+) -> Result<Option<ArrivalComparison>, MeritError> {
     let lens = with_variables(lens);
     let goal = Goal { limits: LimitTreatment::Penalties, ..Goal::of_lens(&lens)? };
     let known = BEST_KNOWN.iter().find(|(known, _)| *known == name).map(|(_, merit)| *merit);
-    let descend = |method| descend(method, &lens, &goal, evaluations, tolerance);
-    let courses: Vec<Course> =
-        DescentMethod::ALL.into_iter().map(descend).collect::<Result<_, _>>()?;
+    let mut courses: Vec<Course> = Vec::new();
+    for method in DescentMethod::ALL {
+        let optimizer = start(method, &lens, &goal, tolerance)?;
+        courses.extend(descend(method, optimizer, evaluations, stop)?);
+    }
+    if courses.is_empty() {
+        return Ok(None);
+    }
     let found = courses.iter().map(|course| course.row.merit).fold(f64::INFINITY, f64::min);
     let best_known = known.map_or(found, |known| known.min(found));
     let before = start(DescentMethod::TrustRegion, &lens, &goal, tolerance)?.terms()?;
-    Ok(ArrivalComparison {
+    Ok(Some(ArrivalComparison {
         variables: lens.variables.len(),
         merit_before: total(&before),
         best_known,
         rows: courses.into_iter().map(|course| course.arrival(best_known)).collect(),
-    })
+    }))
 }
 
 impl Course {
@@ -110,17 +118,19 @@ impl Course {
     }
 }
 
+/// A whole descent; `None` once `stop` is true.
 fn descend(
     method: DescentMethod,
-    lens: &Lens,
-    goal: &Goal,
+    mut optimizer: Box<dyn Optimizer>,
     evaluations: usize,
-    tolerance: f64,
-) -> Result<Course, MeritError> {
+    stop: &AtomicBool,
+) -> Result<Option<Course>, MeritError> {
     let watch = Stopwatch::start();
-    let mut optimizer = start(method, lens, goal, tolerance)?;
     let (mut steps, mut end): (Vec<(usize, f64, f64)>, _) = (Vec::new(), None);
     while end.is_none() && steps.last().is_none_or(|step| step.0 < evaluations) {
+        if stop.load(Ordering::Relaxed) {
+            return Ok(None);
+        }
         let progress = optimizer.step();
         steps.push((progress.evaluations, 1e3 * watch.seconds(), progress.best));
         end = progress.end;
@@ -135,7 +145,7 @@ fn descend(
         ms_in_all: 1e3 * watch.seconds(),
         end,
     };
-    Ok(Course { row, steps })
+    Ok(Some(Course { row, steps }))
 }
 
 fn total(terms: &[TermValue]) -> f64 {

@@ -6,6 +6,7 @@ use crate::search::design::{
     LensSpecification, SpecificationError, judge_lens,
 };
 use serde::{Deserialize, Serialize};
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// A specification with the known lens that it was taken from.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
@@ -51,7 +52,7 @@ pub struct SheetScore {
 }
 
 /// Designs a lens from a sheet for some seconds, without the known lens and its copies among the
-/// starts, and judges it anew. The finish comes on top of the time.
+/// starts, and judges it anew. The finish comes on top of the time. `None` once `stop` is true.
 ///
 /// # Errors
 /// A specification that no lens satisfies.
@@ -59,20 +60,24 @@ pub fn measure_design(
     sheet: &SpecificationSheet,
     seconds: f64,
     seed: u64,
-) -> Result<SheetScore, SpecificationError> {
+    stop: &AtomicBool,
+) -> Result<Option<SheetScore>, SpecificationError> {
     let (asked, _) = LensRequirements::complete(&sheet.spec)?;
     let known = sheet.reference.source.rsplit('/').next().unwrap_or_default();
     let without = vec![known.trim_end_matches(".json").to_owned()];
     let settings = DesignSettings { without, ..DesignSettings::with_seed(seed) };
     let watch = Stopwatch::start();
     let mut run = DesignRun::new(&asked, &settings);
-    while watch.seconds() < seconds && run.advance(watch.seconds() / seconds) {}
+    while watch.seconds() < seconds && run.advance(watch.seconds() / seconds, stop) {}
+    if stop.load(Ordering::Relaxed) {
+        return Ok(None);
+    }
     let designed = run.finish().into_iter().next();
     let judged = designed
         .as_ref()
         .and_then(|found| judge_lens(&found.lens, &asked, JUDGEMENT_TOLERANCE).ok());
     let rms_um = judged.as_ref().map(|judgement| 1e3 * judgement.rms);
-    Ok(SheetScore {
+    Ok(Some(SheetScore {
         id: sheet.id.clone(),
         score: rms_um.map(|rms| rms / sheet.bar_rms_um),
         against_reference: rms_um.map(|rms| rms / sheet.reference.rms_um_over_fields),
@@ -81,5 +86,5 @@ pub fn measure_design(
         origin: designed.map_or_else(String::new, |found| found.origin),
         gradients: run.gradients(),
         seconds: watch.seconds(),
-    })
+    }))
 }

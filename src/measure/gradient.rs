@@ -26,6 +26,7 @@ use rayon::{ThreadPool, ThreadPoolBuilder};
 use serde::Serialize;
 use std::hint::black_box;
 use std::ops::ControlFlow;
+use std::sync::atomic::AtomicBool;
 
 /// A class of parameters of a lens.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -558,7 +559,7 @@ impl<'a> GradientScene<'a> {
             .iter_mut()
             .map(|turn| TimedCase { work: 1.0, repetition: Box::new(turn) })
             .collect();
-        let rates = time_interleaved(&mut cases, TURNS, TURN);
+        let (rates, _) = time_interleaved(&mut cases, TURNS, TURN, &AtomicBool::new(false));
         drop(cases);
         drop(turns);
         // The fastest repetitions: slower ones were disturbed by other processes.

@@ -6,6 +6,7 @@ use crate::lens::{Lens, ParameterKind, add_variables};
 use crate::merit::{DerivativeLevel, Goal, Limit, LimitTreatment, Merit, MeritError};
 use crate::optimize::{DescentMethod, OptimizationEnd, start};
 use serde::Serialize;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// The ends of two descents of a lens, one with its limits as constraints, one with penalties.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -47,7 +48,7 @@ pub struct LimitedDescent {
 
 /// Optimizes a lens by the trust-region method with its limits as constraints and as penalties, up
 /// to this many steps each. A lens without a goal gets the default one, a lens without variables
-/// all curvatures and thicknesses.
+/// all curvatures and thicknesses. `None` once `stop` is true.
 ///
 /// # Errors
 /// A lens without a merit, or with limits that contradict each other.
@@ -55,19 +56,22 @@ pub fn compare_limit_treatments(
     lens: &Lens,
     steps: usize,
     tolerance: f64,
-) -> Result<LimitComparison, MeritError> {
+    stop: &AtomicBool,
+) -> Result<Option<LimitComparison>, MeritError> {
     let lens = with_variables(lens);
     let goal = Goal { limits: LimitTreatment::Constraints, ..Goal::of_lens(&lens)? };
     let judge = LimitJudge::new(&lens, &goal, tolerance)?;
     let start = judge.judge(&lens)?;
-    let descend = |limits| judge.descend(&Goal { limits, ..goal.clone() }, steps);
-    Ok(LimitComparison {
+    let descend = |limits| judge.descend(&Goal { limits, ..goal.clone() }, steps, stop);
+    let Some(constraints) = descend(LimitTreatment::Constraints)? else { return Ok(None) };
+    let penalties = descend(LimitTreatment::Penalties)?;
+    Ok(penalties.map(|penalties| LimitComparison {
         variables: lens.variables.len(),
         merit_before: start.merit,
         violation_before: start.violation,
-        constraints: descend(LimitTreatment::Constraints)?,
-        penalties: descend(LimitTreatment::Penalties)?,
-    })
+        constraints,
+        penalties,
+    }))
 }
 
 /// The lens, with all curvatures and thicknesses as variables if it has none.
@@ -114,13 +118,22 @@ impl<'a> LimitJudge<'a> {
         })
     }
 
-    fn descend(&self, goal: &Goal, steps: usize) -> Result<LimitedDescent, MeritError> {
+    /// A whole descent; `None` once `stop` is true.
+    fn descend(
+        &self,
+        goal: &Goal,
+        steps: usize,
+        stop: &AtomicBool,
+    ) -> Result<Option<LimitedDescent>, MeritError> {
         let watch = Stopwatch::start();
         let mut optimizer = start(DescentMethod::TrustRegion, self.start, goal, self.tolerance)?;
         let mut last = None;
         while last.as_ref().is_none_or(|p: &crate::optimize::OptimizationProgress| {
             p.end.is_none() && p.step < steps
         }) {
+            if stop.load(Ordering::Relaxed) {
+                return Ok(None);
+            }
             last = Some(optimizer.step());
         }
         optimizer.verify_best();
@@ -129,6 +142,6 @@ impl<'a> LimitJudge<'a> {
             last.map_or((0, 0, None), |p| (p.evaluations, p.step, p.end));
         let binding = optimizer.binding_limits().len();
         let found = self.judge(optimizer.best())?;
-        Ok(LimitedDescent { binding, steps: taken, evaluations, ms, end, ..found })
+        Ok(Some(LimitedDescent { binding, steps: taken, evaluations, ms, end, ..found }))
     }
 }

@@ -8,6 +8,7 @@ use crate::merit::{Goal, LimitTreatment, PupilEdge, Term, WeightedTerm};
 use crate::optimize::{DescentMethod, start};
 use rayon::ThreadPoolBuilder;
 use serde::Serialize;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// The relative accuracy of the spot radii.
 const TOLERANCE: f64 = 1e-6;
@@ -48,8 +49,9 @@ pub struct StepRow {
     pub spot_after: f64,
 }
 
-/// Times `steps` steps of every local optimizer on one core.
-pub fn measure_step_costs(steps: usize) -> Result<StepCosts, BenchmarkError> {
+/// Times `steps` steps of every local optimizer on one core; once `stop` is true, those whose steps
+/// are all timed are returned.
+pub fn measure_step_costs(steps: usize, stop: &AtomicBool) -> Result<StepCosts, BenchmarkError> {
     let clipped = with_all_variables(double_gauss());
     let mut clear = clipped.clone();
     clear.surfaces.iter_mut().for_each(|row| row.semi_diameter = None);
@@ -62,12 +64,15 @@ pub fn measure_step_costs(steps: usize) -> Result<StepCosts, BenchmarkError> {
         ("dls_clipped", DescentMethod::DampedLeastSquares, &clipped),
     ];
     let pool = ThreadPoolBuilder::new().num_threads(1).build()?;
-    let row = |(name, method, lens)| pool.install(|| time(name, method, lens, steps));
+    let mut rows = Vec::new();
+    for (name, method, lens) in searches {
+        rows.extend(pool.install(|| time(name, method, lens, steps, stop))?);
+    }
     Ok(StepCosts {
         variables: clear.variables.len(),
         fields: clear.fields.values.len(),
         tolerance: TOLERANCE,
-        rows: searches.into_iter().map(row).collect::<Result<_, _>>()?,
+        rows,
     })
 }
 
@@ -82,12 +87,14 @@ fn with_all_variables(mut lens: Lens) -> Lens {
     lens
 }
 
+/// The cost of the steps of a method; `None` once `stop` is true.
 fn time(
     name: &'static str,
     method: DescentMethod,
     lens: &Lens,
     steps: usize,
-) -> Result<StepRow, BenchmarkError> {
+    stop: &AtomicBool,
+) -> Result<Option<StepRow>, BenchmarkError> {
     let terms = vec![
         WeightedTerm { term: Term::Spot, weight: 1.0 },
         WeightedTerm { term: Term::FocalLength(99.5), weight: 1e-2 },
@@ -102,6 +109,9 @@ fn time(
     let before = search.terms()?;
     let mut times = Vec::with_capacity(steps);
     for _ in 0..steps {
+        if stop.load(Ordering::Relaxed) {
+            return Ok(None);
+        }
         let (progress, ms) = time_ms(|| search.step());
         if progress.finished {
             break;
@@ -111,7 +121,7 @@ fn time(
     let after = search.terms()?;
     let mean = times.iter().sum::<f64>() / times.len().max(1) as f64;
     let RateStatistics { median, min, max } = RateStatistics::of(times);
-    Ok(StepRow {
+    Ok(Some(StepRow {
         name,
         ms_per_iteration: median,
         mean,
@@ -121,5 +131,5 @@ fn time(
         error: before[0].error / before[0].value,
         spot_before: before[0].value,
         spot_after: after[0].value,
-    })
+    }))
 }

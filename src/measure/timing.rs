@@ -3,6 +3,7 @@
 use serde::Serialize;
 use std::hint::black_box;
 use std::ops::RangeInclusive;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
 /// The rate of a piece of work over many repetitions: the median, the slowest and the fastest.
@@ -36,24 +37,28 @@ pub(super) struct TimedCase<'a> {
     pub(super) repetition: Box<dyn FnMut() + 'a>,
 }
 
-/// Times all cases in turn, `turns` times each for at least `seconds`; returns their rates in units
-/// of work per second.
+/// Times all cases in turn, up to `turns` times each for at least `seconds`, and at least once;
+/// returns their rates in units of work per second, and the number of turns. Once `stop` is true,
+/// no further turn begins.
 pub(super) fn time_interleaved(
     cases: &mut [TimedCase<'_>],
     turns: usize,
     seconds: f64,
-) -> Vec<RateStatistics> {
+    stop: &AtomicBool,
+) -> (Vec<RateStatistics>, usize) {
     let repeats: Vec<u32> =
         cases.iter_mut().map(|c| repetition_count(&mut c.repetition, seconds)).collect();
     let mut rates = vec![Vec::with_capacity(turns); cases.len()];
-    for _ in 0..turns {
+    let mut done = 0;
+    while done == 0 || (done < turns && !stop.load(Ordering::Relaxed)) {
+        done += 1;
         for ((case, repeats), rates) in cases.iter_mut().zip(&repeats).zip(&mut rates) {
             let watch = Stopwatch::start();
             (0..*repeats).for_each(|_| (case.repetition)());
             rates.push(f64::from(*repeats) * case.work / watch.seconds());
         }
     }
-    rates.into_iter().map(RateStatistics::of).collect()
+    (rates.into_iter().map(RateStatistics::of).collect(), done)
 }
 
 /// The number of repetitions that take `seconds`; the first one warms up.

@@ -11,6 +11,7 @@ use crate::trace::{AdjointSeed, ImagePoints, Ray, Rays, SimdWidth, Tracer};
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use serde::Serialize;
 use std::hint::black_box;
+use std::sync::atomic::AtomicBool;
 
 /// Rays of a repetition on one thread.
 const RAYS: usize = 2 * 4096;
@@ -32,6 +33,8 @@ const GRADIENT: &str = "gradient";
 pub struct Throughput {
     /// The number of surfaces of the lens, including the image plane.
     pub surfaces: usize,
+    /// The number of repetitions of each way of tracing.
+    pub turns: usize,
     /// One row per way of tracing.
     pub rows: Vec<TraceRow>,
     /// Rounding in `f64` against twice the precision.
@@ -122,8 +125,9 @@ fn with_asphere(i: usize, shape: Shape<f64>) -> Shape<f64> {
     Shape::Asphere { curvature: shape.curvature(), conic: 0.0, terms }
 }
 
-/// Times every way of tracing in turn, `turns` repetitions each.
-pub fn measure_throughput(turns: usize) -> Result<Throughput, BenchmarkError> {
+/// Times every way of tracing in turn, `turns` repetitions each, or as many as there are, but at
+/// least one, when `stop` becomes true.
+pub fn measure_throughput(turns: usize, stop: &AtomicBool) -> Result<Throughput, BenchmarkError> {
     let system = double_gauss().resolve(0, line::D)?;
     let tracers = TracerVariants::new(&system)?;
     let pool = ThreadPoolBuilder::new().num_threads(2).build()?;
@@ -131,7 +135,7 @@ pub fn measure_throughput(turns: usize) -> Result<Throughput, BenchmarkError> {
     let memory_gradient = peak_megabytes(|| differentiate_many(&tracers.plain));
     let (names, mut contestants): (Vec<_>, Vec<_>) =
         timed_cases(&tracers, &pool).into_iter().unzip();
-    let rates = time_interleaved(&mut contestants, turns, TURN);
+    let (rates, turns) = time_interleaved(&mut contestants, turns, TURN, stop);
     let rows: Vec<TraceRow> =
         names.into_iter().zip(rates).map(|(name, rate)| TraceRow::new(name, rate)).collect();
     let rate = |name| {
@@ -140,6 +144,7 @@ pub fn measure_throughput(turns: usize) -> Result<Throughput, BenchmarkError> {
     };
     Ok(Throughput {
         surfaces: tracers.plain.surfaces(),
+        turns,
         gradient_over_forward: rate(FORWARD) / rate(GRADIENT),
         rows,
         rounding_f64: measure_rounding::<f64>(&system, ROUNDED_RAYS)?,

@@ -1,5 +1,6 @@
 //! The cost of the window: a real one is opened, edited, repainted, left idle and closed.
 
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
 use std::time::Duration;
@@ -31,7 +32,8 @@ const SETTLING_TIME: Duration = Duration::from_millis(700);
 /// The longest time for the analysis after an edit.
 const MAX_POLLS: u32 = 20_000; // looks, a tenth of a millisecond apart
 
-/// The measured cost of a window. A value that the system does not provide is absent.
+/// The measured cost of a window. A value that the system does not provide, or that was not
+/// measured before the end was asked for, is absent.
 #[derive(Debug, Clone, Default, PartialEq, Serialize)]
 pub struct WindowMetrics {
     /// The name of the renderer.
@@ -42,37 +44,38 @@ pub struct WindowMetrics {
     /// screen.
     pub first_frame_ms: Option<f64>,
     /// From an edit to the numbers of all panels, frames apart: the median of 21 edits.
-    pub edit_ms: f64,
+    pub edit_ms: Option<f64>,
     /// The slowest of them.
-    pub slowest_edit_ms: f64,
+    pub slowest_edit_ms: Option<f64>,
     /// From a move of a handle to the numbers of all panels with the merit and its derivatives by the
     /// handles, frames apart: the median of 200 moves with the focal length held.
-    pub drag_ms: f64,
+    pub drag_ms: Option<f64>,
     /// The slowest of them.
-    pub slowest_drag_ms: f64,
+    pub slowest_drag_ms: Option<f64>,
     /// The lens with the most surfaces of those that come with the program.
-    pub largest_lens: String,
+    pub largest_lens: Option<String>,
     /// The median of the same moves on that lens.
-    pub largest_drag_ms: f64,
+    pub largest_drag_ms: Option<f64>,
     /// The slowest of them.
-    pub slowest_largest_drag_ms: f64,
+    pub slowest_largest_drag_ms: Option<f64>,
     /// Processor time of a frame in which no drawing changed, all threads together.
     pub frame_processor_ms: Option<f64>,
     /// The time for which the window was left idle with the cursor in a text field.
-    pub idle_seconds: f64,
+    pub idle_seconds: Option<f64>,
     /// Processor time in that time, all threads together.
     pub idle_processor_ms: Option<f64>,
 }
 
-/// Opens a window, measures it, and closes it again.
+/// Opens a window, measures it, and closes it again; earlier once `stop` is true, with what was
+/// measured until then.
 ///
 /// # Errors
 /// No window can open: see [`StudioError`].
-pub fn measure_window() -> Result<WindowMetrics, StudioError> {
+pub fn measure_window(stop: &Arc<AtomicBool>) -> Result<WindowMetrics, StudioError> {
     let figures = Arc::new(Mutex::new(WindowMetrics::default()));
-    let shared = Arc::clone(&figures);
+    let (shared, stop) = (Arc::clone(&figures), Arc::clone(stop));
     window::open_window(Persistence::Disabled, move |context, backend| {
-        start_benchmark(context, backend, &shared)
+        start_benchmark(context, backend, &shared, Arc::clone(&stop))
     })?;
     let found = figures.lock().unwrap_or_else(PoisonError::into_inner).clone();
     Ok(found)
@@ -82,6 +85,7 @@ fn start_benchmark(
     context: &CreationContext<'_>,
     backend: RenderBackend,
     figures: &Arc<Mutex<WindowMetrics>>,
+    stop: Arc<AtomicBool>,
 ) -> AppResult {
     let wake = context.egui_ctx.clone();
     let session = Session::new(first_lens(), move || wake.request_repaint())?;
@@ -96,13 +100,15 @@ fn start_benchmark(
     );
     let figures = Arc::clone(figures);
     figures.lock().unwrap_or_else(PoisonError::into_inner).renderer = renderer;
-    Ok(Box::new(WindowBenchmark { studio, metrics: figures, phase: BenchmarkPhase::Opening }))
+    let phase = BenchmarkPhase::Opening;
+    Ok(Box::new(WindowBenchmark { studio, metrics: figures, stop, phase }))
 }
 
 /// A studio that measures itself.
 struct WindowBenchmark {
     studio: Studio,
     metrics: Arc<Mutex<WindowMetrics>>,
+    stop: Arc<AtomicBool>,
     phase: BenchmarkPhase,
 }
 
@@ -138,6 +144,10 @@ impl App for WindowBenchmark {
 impl WindowBenchmark {
     /// Does the work of this frame and returns the next phase.
     fn advance(&mut self, context: &Context) -> BenchmarkPhase {
+        if self.is_stopped() {
+            context.send_viewport_cmd(ViewportCommand::Close);
+            return BenchmarkPhase::Idle;
+        }
         if !matches!(self.phase, BenchmarkPhase::Idle) {
             context.request_repaint();
         }
@@ -176,17 +186,23 @@ impl WindowBenchmark {
         }
     }
 
+    fn is_stopped(&self) -> bool {
+        self.stop.load(Ordering::Relaxed)
+    }
+
     fn record(&self, note: impl FnOnce(&mut WindowMetrics)) {
         note(&mut self.metrics.lock().unwrap_or_else(PoisonError::into_inner));
     }
 
     /// Types radii and waits each time for the numbers of all panels.
     fn time_edits(&mut self) {
-        let mut times: Vec<f64> = (0..EDITS).map(|i| self.time_edit(i)).collect();
-        times.sort_by(f64::total_cmp);
+        let mut times = Vec::new();
+        while times.len() < EDITS && !self.is_stopped() {
+            times.push(self.time_edit(times.len()));
+        }
+        let Some([median, slowest]) = median_and_slowest(times) else { return };
         self.record(|figures| {
-            figures.edit_ms = times[EDITS / 2];
-            figures.slowest_edit_ms = times[EDITS - 1];
+            (figures.edit_ms, figures.slowest_edit_ms) = (Some(median), Some(slowest));
         });
     }
 
@@ -211,46 +227,52 @@ impl WindowBenchmark {
 
     /// Drags a handle of the first lens, and one of the largest.
     fn time_drags(&mut self) {
-        let [median, slowest] = self.time_moves(first_lens());
-        self.record(|figures| (figures.drag_ms, figures.slowest_drag_ms) = (median, slowest));
+        let Some([median, slowest]) = self.time_moves(first_lens()) else { return };
+        self.record(|figures| {
+            (figures.drag_ms, figures.slowest_drag_ms) = (Some(median), Some(slowest));
+        });
         let surfaces = |lens: &Lens| lens.surfaces.len();
         let Some(largest) = bundled_lenses().max_by_key(surfaces) else { return };
         let name = largest.name.clone();
-        let [median, slowest] = self.time_moves(largest);
+        let Some([median, slowest]) = self.time_moves(largest) else { return };
         self.record(|figures| {
-            figures.largest_lens = name;
-            (figures.largest_drag_ms, figures.slowest_largest_drag_ms) = (median, slowest);
+            figures.largest_lens = Some(name);
+            figures.largest_drag_ms = Some(median);
+            figures.slowest_largest_drag_ms = Some(slowest);
         });
         self.studio.session_mut().apply(Command::New(Box::new(first_lens())));
     }
 
-    /// The median and the worst time of the moves of a handle of a lens, in milliseconds.
-    fn time_moves(&mut self, lens: Lens) -> [f64; 2] {
+    /// The median and the worst time of the moves of a handle of a lens, in milliseconds; `None`
+    /// without any.
+    fn time_moves(&mut self, lens: Lens) -> Option<[f64; 2]> {
+        let stop = Arc::clone(&self.stop);
         let session = self.studio.session_mut();
         session.apply(Command::New(Box::new(lens)));
         let locks = vec![FirstOrderLock::FocalLength];
         let settings = DragSettings { locks, ..DragSettings::default() };
         session.apply(Command::SetDragSettings(settings));
         let start = session.lens().surfaces[0].curvature;
-        let mut times: Vec<f64> = (0..MOVES).map(|i| time_move(session, start, i)).collect();
+        let going_on = (0..MOVES).take_while(|_| !stop.load(Ordering::Relaxed));
+        let times = going_on.map(|i| time_move(session, start, i)).collect();
         session.apply(Command::CancelDrag);
         session.apply(Command::SetDragSettings(DragSettings::default()));
-        times.sort_by(f64::total_cmp);
-        [times[MOVES / 2], times[MOVES - 1]]
+        median_and_slowest(times)
     }
 
     /// Leaves the window idle, measures its processor time meanwhile, and closes it.
     fn measure_idle(&self, context: &Context) {
         let (figures, window) = (Arc::clone(&self.metrics), context.clone());
+        let stop = Arc::clone(&self.stop);
         let look = move || {
             thread::sleep(SETTLING_TIME);
             let before = processor_ms();
-            thread::sleep(IDLE_TIME);
-            let spent = processor_ms_since(before);
-            let mut figures = figures.lock().unwrap_or_else(PoisonError::into_inner);
-            figures.idle_seconds = IDLE_TIME.as_secs_f64();
-            figures.idle_processor_ms = spent;
-            drop(figures);
+            if sleep_unless(&stop, IDLE_TIME) {
+                let spent = processor_ms_since(before);
+                let mut figures = figures.lock().unwrap_or_else(PoisonError::into_inner);
+                figures.idle_seconds = Some(IDLE_TIME.as_secs_f64());
+                figures.idle_processor_ms = spent;
+            }
             window.send_viewport_cmd(ViewportCommand::Close);
         };
         if let Err(error) = thread::Builder::new().name("idle".into()).spawn(look) {
@@ -289,3 +311,22 @@ fn time_move(session: &mut Session, start: f64, i: usize) -> f64 {
 fn processor_ms_since(before: Option<f64>) -> Option<f64> {
     Some(processor_ms()? - before?)
 }
+
+/// The median and the largest of some times; `None` without any.
+fn median_and_slowest(mut times: Vec<f64>) -> Option<[f64; 2]> {
+    times.sort_by(f64::total_cmp);
+    Some([*times.get(times.len() / 2)?, *times.last()?])
+}
+
+/// Sleeps for a time, a quarter of a second at once; false if `stop` became true.
+fn sleep_unless(stop: &AtomicBool, time: Duration) -> bool {
+    let parts = time.as_millis() / PART.as_millis();
+    (0..parts).all(|_| {
+        thread::sleep(PART);
+        !stop.load(Ordering::Relaxed)
+    })
+}
+
+/// The longest sleep of the thread that watches the idle window: short enough to end soon, long
+/// enough to cost no processor time.
+const PART: Duration = Duration::from_millis(250);

@@ -8,6 +8,7 @@ use super::{
 use crate::lens::{Perturbation, ToleranceSheet};
 use rayon::prelude::*;
 use serde::Serialize;
+use std::sync::atomic::AtomicBool;
 
 /// The scope of an analysis.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -29,7 +30,9 @@ pub struct ToleranceAnalysis {
     pub forms: [QuadraticForm; 2],
     /// The spots at the fixed image plane and refocused.
     pub spots: [AsBuiltSpot; 2],
-    /// The number of real lenses of which a ray does not arrive; they count as bad.
+    /// The number of real lenses.
+    pub samples: usize,
+    /// The number of those of which a ray does not arrive; they count as bad.
     pub lost: usize,
     /// The mean relative change of the mean square spot, at the fixed image plane and refocused, and
     /// the mean share of light lost where rims clip, which the spots leave out; `None` without rays.
@@ -102,6 +105,19 @@ pub fn analyze(
     sheet: &ToleranceSheet,
     request: ToleranceRequest,
 ) -> Result<ToleranceAnalysis, ToleranceError> {
+    analyze_until(scene, sheet, request, &AtomicBool::new(false))
+}
+
+/// The same with fewer real lenses once `stop` is true.
+///
+/// # Errors
+/// As those of [`analyze`].
+pub fn analyze_until(
+    scene: &ToleranceScene,
+    sheet: &ToleranceSheet,
+    request: ToleranceRequest,
+    stop: &AtomicBool,
+) -> Result<ToleranceAnalysis, ToleranceError> {
     let errors: Vec<Perturbation> = sheet.errors.iter().map(|t| t.error).collect();
     let found = sensitivities(&scene.lens, &scene.beam, scene.options, &errors)?;
     if found.is_empty() {
@@ -110,12 +126,13 @@ pub fn analyze(
     let treatments = [FocusTreatment::Fixed, FocusTreatment::Refocused];
     let forms =
         treatments.map(|focus| QuadraticForm::new(scene, &found, focus, sheet.focus_travel));
-    let real = real_lenses(scene, sheet, request.seed, request.samples, WITH_RIMS)?;
+    let real = real_lenses(scene, sheet, request.seed, request.samples, WITH_RIMS, stop)?;
     let spot = |i: usize| as_built(treatments[i], &forms[i], sheet, &real, request);
     let spots = [spot(0), spot(1)];
     let lost = real.iter().filter(|lens| lens.mean_square.is_none()).count();
     let clipping = clipping(&real);
-    Ok(ToleranceAnalysis { sensitivities: found, forms, spots, lost, clipping })
+    let samples = real.len();
+    Ok(ToleranceAnalysis { sensitivities: found, forms, spots, samples, lost, clipping })
 }
 
 /// The mean changes where rims clip.

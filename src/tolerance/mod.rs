@@ -39,6 +39,7 @@ mod wavefront;
 
 pub use analysis::{
     AsBuiltSpot, Quantile, ToleranceAnalysis, ToleranceRequest, YieldEstimate, analyze,
+    analyze_until,
 };
 pub use as_built::{AsBuiltGradient, FixedAndRefocused, as_built_gradient};
 pub use beam::{Beam, ColourRays, FieldBeam};

@@ -7,6 +7,7 @@ use super::{
 use crate::lens::{Perturbation, System, ToleranceSheet};
 use crate::trace::Tracer;
 use rayon::prelude::*;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// A lens with random errors.
 #[derive(Debug, Clone)]
@@ -22,7 +23,8 @@ pub struct RealLens {
 }
 
 /// Traces lenses with random errors, in parallel; lens `i` depends on the seed and on `i` alone. The
-/// first `with_rims` lenses are traced once more with rims that clip.
+/// first `with_rims` lenses are traced once more with rims that clip. Once `stop` is true, the first
+/// lenses are returned that are traced.
 ///
 /// # Errors
 /// An error of making that is not possible.
@@ -32,10 +34,20 @@ pub fn real_lenses(
     seed: u64,
     count: usize,
     with_rims: usize,
+    stop: &AtomicBool,
 ) -> Result<Vec<RealLens>, ToleranceError> {
     let lens = |i: usize| real_lens(scene, sheet, seed, (i, i < with_rims));
-    (0..count).into_par_iter().map(lens).collect()
+    let mut lenses = Vec::new();
+    while lenses.len() < count && !stop.load(Ordering::Relaxed) {
+        let part = lenses.len()..count.min(lenses.len() + PART);
+        let part: Result<Vec<_>, _> = part.into_par_iter().map(lens).collect();
+        lenses.extend(part?);
+    }
+    Ok(lenses)
 }
+
+/// The number of lenses between two looks at the request to stop.
+const PART: usize = 128;
 
 fn real_lens(
     scene: &ToleranceScene,

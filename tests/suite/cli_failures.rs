@@ -10,6 +10,8 @@ use std::process::{Child, Command, Output, Stdio};
 use std::time::Duration;
 
 const LENS: &str = "lenses/cooke_triplet_100_f27.json";
+const SINGLET: &str = "lenses/singlet_la1131.json";
+const ZOOM: &str = "lenses/zoom_nikkor_28_80.json";
 
 /// A command that runs while the test goes on.
 struct Running(Option<Child>);
@@ -176,14 +178,19 @@ fn failed_json(arguments: &[&str], words: &[&str]) -> Value {
     serde_json::from_slice(&output.stdout).unwrap()
 }
 
-/// The lenses of a front that cannot be saved are printed; those of a reservoir that could be saved
-/// are the result of this run, not of an earlier one.
+/// The lenses of a front that cannot be saved are printed; lenses of a reservoir and images that
+/// could be saved are the result of this run, not of an earlier one.
 #[cfg(unix)]
 #[test]
 fn a_folder_that_cannot_be_filled_loses_no_lens() {
     let folder = Folder::new("half-full");
     let all = folder.path("");
     protect(&folder.path("front_001.json"));
+    let grin = ["grin", "luneburg", "--iterations", "2", "--png", &all];
+    protect(&folder.path("section.png"));
+    let report = failed_json(&grin, &["section.png"]);
+    assert_eq!(report["files"], json!([folder.path("profile.png")]));
+    assert_eq!(report["stale"], json!([folder.path("section.png")]));
     let front = ["pareto", LENS, "--points", "2", "--steps", "2", "--no-biased", "--error", "1%"];
     let report = failed_json(&[&front[..], &["--out", &all]].concat(), &["front_001.json"]);
     let lenses = report["lenses"].as_array().unwrap();
@@ -200,6 +207,36 @@ fn a_folder_that_cannot_be_filled_loses_no_lens() {
     let report = failed_json(&search, &[lost]);
     assert_eq!(report["files"][0], kept);
     assert!(!report["stale"].to_string().contains(kept), "{report}");
+}
+
+/// A command whose files take no bytes, as on a full disk.
+#[cfg(target_os = "linux")]
+fn on_a_full_disk(arguments: &[&str]) -> Value {
+    // Without the signal, a write beyond the limit on the size of files fails.
+    let limited = "trap '' 25; ulimit -f 0; exec \"$@\"";
+    let mut command = Command::new("sh");
+    command.args(["-c", limited, "sh", env!("CARGO_BIN_EXE_aplanat")]).args(arguments);
+    let output = Running::of(command.arg("--json")).output();
+    let said = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    assert!(said.contains("cannot be written"), "{said}");
+    serde_json::from_slice(&output.stdout).unwrap()
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_full_disk_loses_no_result() {
+    let folder = Folder::new("full-disk");
+    let (table, out) = (folder.path("table.csv"), folder.path("out.json"));
+    let spots = on_a_full_disk(&["analyze", SINGLET, "spot", "--error", "1%", "--csv", &table]);
+    assert!(spots["fields"][0]["rms"]["value"].as_f64().unwrap() > 0.0, "{spots}");
+    let made = on_a_full_disk(&["tolerance", SINGLET, "--samples", "4", "--csv", &table]);
+    assert_eq!(made["samples"], 4);
+    let best = ["optimize", SINGLET, "--vary", "curvatures", "--steps", "1", "--out", &out];
+    assert!(on_a_full_disk(&best)["lens"].is_object());
+    let field = on_a_full_disk(&["grin", "luneburg", "--iterations", "1", "--out", &out]);
+    assert!(field["field"]["index"].is_array());
+    assert_eq!(folder.names(), [""; 0], "nothing is left behind");
 }
 
 /// A terminal or a disk that takes no results does not keep them from the file.
@@ -330,6 +367,74 @@ fn benchmarks_and_studies_end_when_they_are_asked_to() {
     let said = text(&output.stderr);
     assert_eq!(output.status.code(), Some(1), "{said}");
     assert!(said.contains("experiment 5.4: stopped"), "{said}");
+}
+
+/// Benchmarks that would take hours print what they measured until they were asked to end.
+#[cfg(unix)]
+#[test]
+fn every_benchmark_ends_when_it_is_asked_to() {
+    let many = "100000000";
+    let commands: [(&[&str], &str); 6] = [
+        (&["tolerance", SINGLET, "--samples", many], "spots"),
+        (&["measure", "trace", "--turns", many], "rows"),
+        (&["measure", "optimize", "--steps", many], "rows"),
+        (&["measure", "optimize", ZOOM, "--evaluations", many], "rows"),
+        (&["measure", "limits", ZOOM, "--steps", many], "rows"),
+        (&["measure", "search", LENS, "--seconds", many], "methods"),
+    ];
+    // A busy machine may need longer until the work begins.
+    for wait in [600, 6000, 30000] {
+        let start = |(command, _): &(&[&str], _)| Running::start(&[*command, &["--json"]].concat());
+        let running: Vec<Running> = commands.iter().map(start).collect();
+        std::thread::sleep(Duration::from_millis(wait));
+        running.iter().for_each(|running| running.signal("-TERM"));
+        let ended: Vec<Output> = running.into_iter().map(Running::output).collect();
+        if ended.iter().any(|output| output.status.code().is_none()) {
+            continue;
+        }
+        for (output, (command, rows)) in ended.iter().zip(commands) {
+            let said = text(&output.stderr);
+            assert_eq!(output.status.code(), Some(0), "{command:?}: {said}");
+            assert!(said.contains("stopped; only what was measured"), "{command:?}: {said}");
+            let report: Value = serde_json::from_slice(&output.stdout).unwrap();
+            assert!(report[rows].is_array(), "{command:?}: {report}");
+        }
+        let trace: Value = serde_json::from_slice(&ended[1].stdout).unwrap();
+        assert!(trace["rows"][0]["min"].as_f64().unwrap() > 0.0, "{trace}");
+        return;
+    }
+    panic!("the work never began");
+}
+
+/// A benchmark of nothing has no result.
+#[test]
+fn no_repetition_is_wrong_input() {
+    for command in [["measure", "trace", "--turns", "0"], ["measure", "optimize", "--steps", "0"]] {
+        refused(2, &command, "", &[command[2], "found 0; expected 1 or more"]);
+    }
+}
+
+/// A design that is asked to end does so within a round, with a lens if it has one.
+#[cfg(unix)]
+#[test]
+fn a_design_ends_within_a_round() {
+    let folder = Folder::new("design-end");
+    let spec = r#"{"focal_length_mm": 50, "f_number": 4, "half_field_deg": 10, "max_elements": 3}"#;
+    let (spec, out) = (folder.file("spec.json", spec), folder.path("lens.json"));
+    let checkpoint = folder.path("run.json");
+    let design = ["design", &spec, "--out", &out, "--minutes", "1000", "--checkpoint", &checkpoint];
+    let running = Running::start(&design);
+    std::thread::sleep(Duration::from_millis(600));
+    running.signal("-TERM");
+    let output = running.output();
+    let said = text(&output.stderr);
+    match output.status.code() {
+        Some(0) => assert!(Path::new(&out).exists(), "{said}"),
+        Some(1) => assert!(said.contains("stopped: no start led to a lens"), "{said}"),
+        // Before the work began.
+        code => assert_eq!(code, None, "{said}"),
+    }
+    assert!(!Path::new(&checkpoint).exists(), "a round that was ended depends on time");
 }
 
 /// A run under `nohup` outlives its terminal.

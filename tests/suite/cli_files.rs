@@ -106,6 +106,11 @@ fn no_command_writes_over_what_it_reads() {
     grin(&folder.path("values.json"), &["the numbers of --out", "a file of the task"]);
     #[cfg(unix)]
     {
+        let table = folder.path("table.csv");
+        fs::hard_link(&lens, &table).unwrap();
+        for command in [&["analyze", &lens, "spot"][..], &["tolerance", &lens]] {
+            refused(2, &[command, &["--csv", &table]].concat(), "", &["--csv", "is the lens"]);
+        }
         let plot = folder.path("plot.png");
         std::os::unix::fs::symlink("start.json", &plot).unwrap();
         refused(2, &["measure", "spot", &lens, "--plot", &plot], "", &["--plot", "is the lens"]);

@@ -7,6 +7,7 @@ use aplanat::search::design::{
 };
 use serde::Deserialize;
 use serde_json::Value;
+use std::sync::atomic::AtomicBool;
 
 /// `tests/reference/spec_sheets.json`.
 #[derive(Deserialize)]
@@ -219,11 +220,11 @@ fn two_rounds(threads: usize, saved: bool) -> DesignRun {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
     pool.install(|| {
         let mut run = DesignRun::new(&asked, &settings);
-        assert!(run.advance(0.0));
+        assert!(run.advance(0.0, &AtomicBool::new(false)));
         if saved {
             run = serde_json::from_str(&serde_json::to_string(&run).unwrap()).unwrap();
         }
-        assert!(run.advance(0.0));
+        assert!(run.advance(0.0, &AtomicBool::new(false)));
         run
     })
 }

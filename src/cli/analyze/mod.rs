@@ -12,10 +12,13 @@ mod wavefront;
 
 use super::effects::{AllowedSetting, EffectArgs, EffectReport, EffectRule};
 use super::error::CliError;
+use super::failures::Failures;
 use super::input::{LensFile, LoadedLens, Tolerance};
 use super::output::{Output, ShortNumber};
+use super::output_paths::OutputPaths;
 use crate::analysis::{AnalysisError, Estimate};
 use crate::effects::{self, Effect, EffectPlan, TracePurpose};
+use crate::files;
 use crate::lens::{FieldKind, FieldPoint, SurfaceNumber};
 use crate::measure::time_ms;
 use crate::pupil::{Accuracy, RayModel};
@@ -148,6 +151,8 @@ impl AnalysisKind {
 
 impl AnalyzeArgs {
     pub(super) fn run(&self, output: &Output) -> Result<(), CliError> {
+        let mut paths = OutputPaths::reading([("the lens", self.lens.path())]);
+        paths.file("--csv", self.csv.as_deref(), &["csv"])?;
         let run = AnalysisRun::new(self)?;
         match self.what {
             AnalysisKind::Spot => self.finish(&run, spot::spots(&run), output),
@@ -172,7 +177,8 @@ impl AnalyzeArgs {
         }
     }
 
-    /// Prints the report of all fields, and writes it as CSV if that is asked for.
+    /// Prints the report of all fields, and writes it as CSV if that is asked for; it is printed too
+    /// if it cannot be written.
     fn finish<T: TextLines + Serialize>(
         &self,
         run: &AnalysisRun,
@@ -180,13 +186,14 @@ impl AnalyzeArgs {
         output: &Output,
     ) -> Result<(), CliError> {
         let report = run.report(fields)?;
+        let mut failures = Failures::default();
         if let Some(path) = &self.csv {
             let value = serde_json::to_value(&report)
                 .map_err(|why| CliError::Failed(format!("{}: {why}", path.display())))?;
-            std::fs::write(path, csv::csv(&value))
-                .map_err(|why| CliError::Failed(format!("{}: {why}", path.display())))?;
+            failures.note(files::write_atomic(path, csv::csv(&value).as_bytes()));
         }
-        output.print(&report)
+        failures.note(output.print(&report));
+        failures.into_result()
     }
 
     /// Refuses frequencies that are no positive numbers.

@@ -9,12 +9,13 @@ use super::input::{display_name, read_json};
 use super::output::{Output, ShortNumber, print_note};
 use super::output_paths::OutputPaths;
 use super::progress::{stop_flag, styled_bar};
-use crate::files::{self, FileLock};
+use crate::files::{self, FileError, FileLock};
 use crate::measure::Stopwatch;
 use crate::search::design::{
     DesignRun, DesignSettings, DesignedLens, JUDGEMENT_TOLERANCE, LensJudgement, LensRequirements,
     LensSpecification, judge_lens,
 };
+use indicatif::ProgressBar;
 use report::{DesignReport, JudgementReport};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -78,8 +79,13 @@ impl DesignArgs {
         let mut run = self.start_or_resume(&requirements, &settings)?;
         let mut failures = Failures::default();
         self.run_rounds(&mut run, &stop, &mut failures);
-        let lenses = run.finish();
-        let saved = save_lenses(&lenses, out, &mut failures)?;
+        let stopped = stop.load(Ordering::Relaxed);
+        let lenses = if stopped { run.finish_best() } else { run.finish() };
+        if lenses.is_empty() {
+            let why = if stopped { "stopped: " } else { "" };
+            return Err(CliError::Failed(format!("{why}no start led to a lens")));
+        }
+        let saved = save_lenses(&lenses, out, &mut failures);
         let gradients = run.gradients();
         let report = DesignReport { requirements, filled, gradients, lenses, out: saved };
         failures.note(output.print(&report));
@@ -117,23 +123,35 @@ impl DesignArgs {
         }
     }
 
-    /// Rounds until the budget is used, or until Ctrl-C.
+    /// Rounds until the budget is used, or until Ctrl-C. A checkpoint that cannot be saved is said
+    /// once and tried again; the failure of the last one is noted.
     fn run_rounds(&self, run: &mut DesignRun, stop: &AtomicBool, failures: &mut Failures) {
         let watch = Stopwatch::start();
         let bar = styled_bar(100, "{wide_bar} {pos} % {msg}");
+        let mut failed = None;
         while !stop.load(Ordering::Relaxed) {
             let used = self.share_used(run, watch);
             bar.set_position((100.0 * used) as u64);
             let best = ShortNumber(1e3 * run.best());
             bar.set_message(format!("{:?}, {best} um", run.stage()));
-            if used >= 1.0 || !run.advance(used) {
+            let goes_on = used < 1.0 && run.advance(used, stop);
+            // A round that was ended is not saved: it depends on time.
+            if !goes_on || stop.load(Ordering::Relaxed) {
                 break;
             }
-            if let Some(path) = &self.checkpoint {
-                failures.note(checkpoint::save(path, run));
-            }
+            failed = self.save(run, &bar, failed.is_some());
         }
         bar.finish_and_clear();
+        failures.note(failed.map_or(Ok(()), Err));
+    }
+
+    /// Saves the checkpoint, if there is a file for it; its failure, said if it is the first one.
+    fn save(&self, run: &DesignRun, bar: &ProgressBar, is_failing: bool) -> Option<FileError> {
+        let error = checkpoint::save(self.checkpoint.as_deref()?, run).err()?;
+        if !is_failing {
+            bar.suspend(|| print_note(format!("note: the design goes on: {error}")));
+        }
+        Some(error)
     }
 
     /// The share of the budget that is used, at most about 1.
@@ -148,26 +166,22 @@ impl DesignArgs {
     }
 }
 
-/// Saves the lenses: the best one under its name, the others beside it. Returns their files.
+/// Saves the lenses: the best one under its name, the others beside it. Returns their files, `None`
+/// for one that could not be saved.
 fn save_lenses(
     lenses: &[DesignedLens],
     out: &Path,
     failures: &mut Failures,
-) -> Result<Vec<String>, CliError> {
-    let Some((best, others)) = lenses.split_first() else {
-        return Err(CliError::Failed("no start led to a lens".to_owned()));
+) -> Vec<Option<String>> {
+    let mut save = |(i, lens): (usize, &DesignedLens)| {
+        let path = if i == 0 { out.into() } else { beside(out, report::merit_name(lens.merit)) };
+        failures.note(files::save(&lens.lens, &path)).map(|_| path.display().to_string())
     };
-    failures.note(files::save(&best.lens, out));
-    let mut saved = vec![out.display().to_string()];
-    for lens in others {
-        let path = beside(out, report::merit_name(lens.merit));
-        failures.note(files::save(&lens.lens, &path));
-        saved.push(path.display().to_string());
-    }
-    if !best.judgement.is_valid() {
+    let saved = lenses.iter().enumerate().map(&mut save).collect();
+    if lenses.first().is_some_and(|best| !best.judgement.is_valid()) {
         print_note("note: the best lens breaks limits");
     }
-    Ok(saved)
+    saved
 }
 
 /// The path of another lens beside that of the best one.

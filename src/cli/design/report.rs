@@ -1,6 +1,6 @@
 //! The report of `design`: the complete specification, and lenses beside it.
 
-use crate::cli::output::{ShortNumber, TextTable};
+use crate::cli::output::{ShortNumber, TextTable, write_saved};
 use crate::lens::SurfaceNumber;
 use crate::search::design::{
     DesignMerit, DesignedLens, FilledValue, LensJudgement, LensRequirements, LimitCost,
@@ -76,8 +76,8 @@ pub(super) struct DesignReport {
     pub(super) filled: Vec<FilledValue>,
     pub(super) gradients: u64,
     pub(super) lenses: Vec<DesignedLens>,
-    /// The file of each lens.
-    pub(super) out: Vec<String>,
+    /// The file of each lens; `None` for one that could not be saved.
+    pub(super) out: Vec<Option<String>>,
 }
 
 impl Display for DesignReport {
@@ -85,9 +85,11 @@ impl Display for DesignReport {
         write_filled(f, &self.requirements, &self.filled)?;
         writeln!(f, "{} gradients", self.gradients)?;
         for (lens, out) in self.lenses.iter().zip(&self.out) {
-            writeln!(f, "\n{}: {out} (from {})", merit_name(lens.merit), lens.origin)?;
+            let file = out.as_deref().unwrap_or("not saved");
+            writeln!(f, "\n{}: {file} (from {})", merit_name(lens.merit), lens.origin)?;
             write_judgement(f, &lens.judgement)?;
             write_costs(f, &lens.costs)?;
+            write_saved(f, None, out.is_none().then_some(&lens.lens))?;
         }
         Ok(())
     }

@@ -19,7 +19,7 @@ use report::{GrinCostSummary, GrinReport, UnsavedField};
 use serde::Serialize;
 use std::fmt::{self, Display};
 use std::path::{Path, PathBuf};
-use std::sync::atomic::Ordering;
+use std::sync::atomic::{AtomicBool, Ordering};
 use straight_rays::StraightRaySolver;
 
 /// Designs a field of refractive index for the light of a task; Ctrl-C ends the search and writes the
@@ -75,7 +75,8 @@ impl GrinArgs {
         let mut runner = GrinOptimizer::new(&task).map_err(refuse)?;
         let (clock, before) = (Stopwatch::start(), processor_ms());
         let mut worked = Ok(true);
-        let memory = peak_megabytes(|| worked = self.search(&mut runner, clock));
+        let stop = stop_flag();
+        let memory = peak_megabytes(|| worked = self.search(&mut runner, clock, &stop));
         let stopped =
             !worked.map_err(|error| CliError::Failed(format!("{}: {error}", source_name(name))))?;
         let ms = 1e3 * clock.seconds();
@@ -83,14 +84,15 @@ impl GrinArgs {
         // The field is saved before anything else is computed from it.
         let mut failures = Failures::default();
         let (volume, unsaved) = self.write_or_keep(&task, runner.best(), &mut failures);
-        let images = failures.note(self.write_images(&task, runner.best())).unwrap_or_default();
+        let mut images = Vec::new();
+        failures.note(self.write_images(&task, runner.best(), &mut images));
         let mut report =
             GrinReport::new(&runner, &GrinCostSummary { ms, processor_ms, memory, stopped })
                 .map_err(|error| CliError::Failed(format!("{}: {error}", source_name(name))))?;
         let nodes = runner.best().nodes();
         report.field = unsaved.map(UnsavedField::from);
-        let lines = lines.map(|lines| lines.solve(source_name(name), &task, nodes));
-        report.lines = lines.and_then(|lines| failures.note(lines));
+        let lines = lines.map(|lines| lines.solve(source_name(name), &task, nodes, &stop));
+        report.lines = lines.and_then(|lines| failures.note(lines)).flatten();
         if let Some(folder) = &self.png {
             report.stale = files::stale_files(folder, &images, is_image_name);
             stale_note(&report.stale).iter().for_each(|note| print_note(format!("note: {note}")));
@@ -128,10 +130,14 @@ impl GrinArgs {
         }
     }
 
-    /// Writes the images; returns the paths.
-    fn write_images(&self, task: &GrinTask, best: &GrinField) -> Result<Vec<PathBuf>, CliError> {
-        let Some(folder) = &self.png else { return Ok(Vec::new()) };
-        let mut written = Vec::new();
+    /// Writes the images until one fails; adds the paths to `written`.
+    fn write_images(
+        &self,
+        task: &GrinTask,
+        best: &GrinField,
+        written: &mut Vec<PathBuf>,
+    ) -> Result<(), CliError> {
+        let Some(folder) = &self.png else { return Ok(()) };
         let mut write = |name: String, canvas: &Canvas| -> Result<(), CliError> {
             let path = folder.join(name);
             files::write_atomic(&path, &canvas.png().map_err(|error| failed(&error))?)?;
@@ -147,7 +153,7 @@ impl GrinArgs {
             let canvas = plot_grin_image(&view.name, image, seen.result.psnr.unwrap_or(0.0));
             write(format!("view-{}.png", i + 1), &canvas)?;
         }
-        Ok(written)
+        Ok(())
     }
 
     fn check(&self) -> Result<(), CliError> {
@@ -169,8 +175,8 @@ impl GrinArgs {
         &self,
         runner: &mut GrinOptimizer,
         clock: Stopwatch,
+        stop: &AtomicBool,
     ) -> Result<bool, grin_design::GrinTaskError> {
-        let stop = stop_flag();
         let bar = progress_bar(0);
         let most = self.iterations.unwrap_or(usize::MAX);
         let late = |minutes: f64| clock.seconds() >= 60.0 * minutes;

@@ -6,6 +6,7 @@ use crate::measure::Stopwatch;
 use serde::Serialize;
 use std::fmt::{self, Display};
 use std::ops::ControlFlow;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Steps of the conjugate gradient method.
 const CGLS_STEPS: usize = 60;
@@ -36,13 +37,19 @@ impl StraightRaySolver {
         Ok(Self { chords, ms: 1e3 * clock.seconds() })
     }
 
+    /// Reconstructs the field; `None` once `stop` is true.
     pub(super) fn solve(
         self,
         name: &str,
         task: &GrinTask,
         nodes: usize,
-    ) -> Result<StraightRayResult, CliError> {
+        stop: &AtomicBool,
+    ) -> Result<Option<StraightRayResult>, CliError> {
         let clock = Stopwatch::start();
+        let is_stopped = || stop.load(Ordering::Relaxed);
+        if is_stopped() {
+            return Ok(None);
+        }
         let (mut best, mut step, mut steps) = (None, 0, 0);
         let visit = |medium: &GrinField| {
             steps += 1;
@@ -52,17 +59,14 @@ impl StraightRaySolver {
             if error.zip(best).is_none_or(|(error, best)| error < best) {
                 (best, step) = (error, steps);
             }
-            ControlFlow::Continue(())
+            if is_stopped() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
         };
         self.chords
             .reconstruct(nodes, CGLS_STEPS, visit)
             .map_err(|error| straight_ray_error(name, &error))?;
-        Ok(StraightRayResult {
-            of_contrast: best,
-            step,
-            steps,
-            ms: self.ms + 1e3 * clock.seconds(),
-        })
+        let ms = self.ms + 1e3 * clock.seconds();
+        let result = StraightRayResult { of_contrast: best, step, steps, ms };
+        Ok((!is_stopped()).then_some(result))
     }
 }
 

@@ -13,7 +13,9 @@ const TOLERANCE: f64 = 1e-4;
 
 /// Optimizes every lens by every method, with up to this many evaluations each.
 pub(super) fn measure(lenses: &LensFiles, evaluations: usize) -> Result<ArrivalReport, CliError> {
-    let compare = |lens: &_, name: &str| measure_arrival(lens, name, evaluations, TOLERANCE);
+    let compare = |lens: &_, name: &str, stop: &_| {
+        measure_arrival(lens, name, evaluations, TOLERANCE, stop).transpose()
+    };
     let rows = lenses.map(compare, |file, found| match found {
         Ok(found) => ArrivalLens { file, found: Some(found), refused: None },
         Err(cause) => ArrivalLens { file, found: None, refused: Some(cause.to_string()) },

@@ -3,12 +3,11 @@
 use crate::cli::error::CliError;
 use crate::cli::input::{display_name, read_json};
 use crate::cli::output::{Output, TextTable, print_note};
-use crate::cli::progress::{STOPPED_NOTE, stop_flag};
+use crate::cli::progress::{note_if_stopped, stop_flag};
 use crate::measure::{Machine, SheetScore, SpecificationSheet, measure_design};
 use serde::{Deserialize, Serialize};
 use std::fmt::{self, Display};
 use std::path::PathBuf;
-use std::sync::atomic::Ordering;
 
 /// Designs lenses from specification sheets, without the known lens of each among the starts, and
 /// compares the spots
@@ -54,15 +53,13 @@ impl MeasureDesignArgs {
         let stop = stop_flag();
         let mut scores = Vec::new();
         for sheet in file.sheets.iter().filter(chosen) {
-            if stop.load(Ordering::Relaxed) {
-                print_note(STOPPED_NOTE);
-                break;
-            }
-            let score = measure_design(sheet, self.seconds, self.seed)
+            let score = measure_design(sheet, self.seconds, self.seed, &stop)
                 .map_err(|error| CliError::Input(format!("{}: {error}", sheet.id)))?;
+            let Some(score) = score else { break };
             print_note(line(&score).join("  "));
             scores.push(score);
         }
+        note_if_stopped(&stop);
         output.print(&MeasureDesignReport { machine: Machine::detect(), scores })
     }
 }

@@ -5,7 +5,7 @@ use crate::cli::error::CliError;
 use crate::cli::failures::Failures;
 use crate::cli::input::LensFile;
 use crate::cli::output::{Output, ShortNumber, TextTable};
-use crate::cli::progress::with_bar;
+use crate::cli::progress::{stop_flag, with_bar};
 use crate::measure::{
     GradientBenchmark, GradientCost, GradientCurves, GradientRow, Integral, Machine, Precision,
     measure_gradients,
@@ -40,7 +40,7 @@ impl MeasureGradientArgs {
         self.plot.check([("the lens", self.lens.path())])?;
         opened.ray_model(self.zoom)?;
         self.field.map(|y| opened.field_at(y, self.zoom)).transpose()?;
-        let (measured, _) = with_bar("curves", |report| {
+        let (measured, _) = with_bar(&stop_flag(), "curves", |report| {
             measure_gradients(&opened.lens, self.zoom, self.field, report)
         });
         let measured = measured.map_err(|e| CliError::Input(format!("{}: {e}", opened.file)))?;

@@ -5,7 +5,7 @@ use crate::cli::error::CliError;
 use crate::cli::failures::Failures;
 use crate::cli::grin::{load_task, task_inputs};
 use crate::cli::output::{Output, TextTable};
-use crate::cli::progress::with_bar;
+use crate::cli::progress::{stop_flag, with_bar};
 use crate::grin::Integrator;
 use crate::measure::{
     GrinBenchmark, GrinCost, GrinCurves, GrinMemory, GrinRow, GrinStarts, Machine, MemoryUse,
@@ -34,7 +34,7 @@ impl MeasureGrinArgs {
         let task = load_task(&self.task)?;
         let inputs = task_inputs(&self.task, &task);
         self.plot.check(inputs.iter().map(|(name, path)| (*name, &**path)))?;
-        let (measured, _) = with_bar("curves", |report| measure_grin(&task, report));
+        let (measured, _) = with_bar(&stop_flag(), "curves", |report| measure_grin(&task, report));
         let measured = measured.map_err(|e| CliError::Input(format!("{}: {e}", self.task)))?;
         let mut failures = Failures::default();
         failures.note(self.plot.write(|| draw_curves(&measured, &task.name)));

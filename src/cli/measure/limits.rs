@@ -29,7 +29,9 @@ const KEPT: f64 = 1e-9;
 
 impl MeasureLimitsArgs {
     pub(super) fn run(&self, output: &Output) -> Result<(), CliError> {
-        let compare = |lens: &_, _: &str| compare_limit_treatments(lens, self.steps, self.error.0);
+        let compare = |lens: &_, _: &str, stop: &_| {
+            compare_limit_treatments(lens, self.steps, self.error.0, stop).transpose()
+        };
         let rows: Vec<LimitRow> = self.lenses.map(compare, |file, found| match found {
             Ok(found) => LimitRow { file, found: Some(found), refused: None },
             Err(cause) => LimitRow { file, found: None, refused: Some(cause.to_string()) },

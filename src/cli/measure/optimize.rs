@@ -4,6 +4,7 @@ use super::arrival;
 use crate::cli::error::CliError;
 use crate::cli::input::LensFiles;
 use crate::cli::output::{Output, ShortNumber, TextTable};
+use crate::cli::progress::{note_if_stopped, stop_flag};
 use crate::measure::{Machine, StepCosts, measure_step_costs};
 use serde::Serialize;
 use std::fmt::{self, Display};
@@ -29,11 +30,17 @@ pub(super) struct MeasureOptimizeArgs {
 
 impl MeasureOptimizeArgs {
     pub(super) fn run(&self, output: &Output) -> Result<(), CliError> {
+        if self.steps == 0 {
+            return Err(CliError::Input("--steps: found 0; expected 1 or more".into()));
+        }
         if !self.lenses.is_empty() {
             let lenses = LensFiles::new(self.lenses.clone());
             return output.print(&arrival::measure(&lenses, self.evaluations)?);
         }
-        let costs = measure_step_costs(self.steps).map_err(|e| CliError::Failed(e.to_string()))?;
+        let stop = stop_flag();
+        let costs =
+            measure_step_costs(self.steps, &stop).map_err(|e| CliError::Failed(e.to_string()))?;
+        note_if_stopped(&stop);
         output.print(&MeasureOptimizeReport {
             machine: Machine::detect(),
             steps: self.steps,

@@ -2,14 +2,13 @@
 
 use crate::cli::error::CliError;
 use crate::cli::input::LensFile;
-use crate::cli::output::{Output, ShortNumber, TextTable, print_note};
-use crate::cli::progress::{STOPPED_NOTE, stop_flag};
+use crate::cli::output::{Output, ShortNumber, TextTable};
+use crate::cli::progress::{note_if_stopped, stop_flag};
 use crate::cli::search::SearchPlanArgs;
 use crate::measure::{Machine, SearchBenchmark, SearchBudget, SearchRow, compare_searches};
 use crate::search::SearchMethod;
 use serde::Serialize;
 use std::fmt::{self, Display};
-use std::sync::atomic::Ordering;
 
 /// Best merit against seconds: RESTORE, Metropolis-Hastings and brute force with several seeds; and the
 /// effect of the tolerance of the spots
@@ -47,9 +46,7 @@ impl MeasureSearchArgs {
         let stop = stop_flag();
         let found = compare_searches(&lens, &plan, SearchBudget { seconds, seeds }, &stop)
             .map_err(|cause| CliError::Input(format!("{}: {cause}", opened.file)))?;
-        if stop.load(Ordering::Relaxed) {
-            print_note(STOPPED_NOTE);
-        }
+        note_if_stopped(&stop);
         output.print(&MeasureSearchReport { machine: Machine::detect(), found })
     }
 }

@@ -5,7 +5,7 @@ use crate::cli::error::CliError;
 use crate::cli::failures::Failures;
 use crate::cli::input::LensFile;
 use crate::cli::output::{Output, ShortNumber, TextTable};
-use crate::cli::progress::with_bar;
+use crate::cli::progress::{stop_flag, with_bar};
 use crate::measure::{
     Machine, Precision, PupilClipping, PupilSampling, SpotCurves, SpotRow, measure_spot_curves,
 };
@@ -42,7 +42,7 @@ impl MeasureSpotArgs {
         let model = opened.ray_model(self.zoom)?;
         let field =
             opened.field_at(self.field.unwrap_or(DEFAULT_ZONE * model.beam.edge), self.zoom)?;
-        let (curves, stopped) = with_bar("curves", |report| {
+        let (curves, stopped) = with_bar(&stop_flag(), "curves", |report| {
             measure_spot_curves(&opened.lens, self.zoom, field, report)
         });
         let curves = curves

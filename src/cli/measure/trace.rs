@@ -2,6 +2,7 @@
 
 use crate::cli::error::CliError;
 use crate::cli::output::{Output, ShortNumber, TextTable};
+use crate::cli::progress::{note_if_stopped, stop_flag};
 use crate::measure::{Machine, MemoryUse, Rounding, Throughput, measure_throughput};
 use serde::Serialize;
 use std::fmt::{self, Display};
@@ -17,28 +18,29 @@ pub(super) struct MeasureTraceArgs {
 
 impl MeasureTraceArgs {
     pub(super) fn run(&self, output: &Output) -> Result<(), CliError> {
+        if self.turns == 0 {
+            return Err(CliError::Input("--turns: found 0; expected 1 or more".into()));
+        }
+        let stop = stop_flag();
         let measured =
-            measure_throughput(self.turns).map_err(|e| CliError::Failed(e.to_string()))?;
-        output.print(&MeasureTraceReport {
-            machine: Machine::detect(),
-            turns: self.turns,
-            measured,
-        })
+            measure_throughput(self.turns, &stop).map_err(|e| CliError::Failed(e.to_string()))?;
+        note_if_stopped(&stop);
+        output.print(&MeasureTraceReport { machine: Machine::detect(), measured })
     }
 }
 
 #[derive(Serialize)]
 struct MeasureTraceReport {
     machine: Machine,
-    turns: usize,
     #[serde(flatten)]
     measured: Throughput,
 }
 
 impl Display for MeasureTraceReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { machine, turns, measured } = self;
+        let Self { machine, measured } = self;
         writeln!(f, "{machine}")?;
+        let turns = measured.turns;
         writeln!(f, "million ray-surfaces a second, fates included, over {turns} repetitions:\n")?;
         let mut table = TextTable::new(&["", "median", "slowest", "fastest"]);
         for row in &measured.rows {

@@ -2,6 +2,7 @@
 
 use crate::cli::error::CliError;
 use crate::cli::output::{Output, ShortNumber, TextTable};
+use crate::cli::progress::{note_if_stopped, stop_flag};
 use crate::cli::window;
 use crate::measure::Machine;
 use serde::Serialize;
@@ -16,10 +17,10 @@ pub(super) struct MeasureWindowArgs {}
 impl MeasureWindowArgs {
     pub(super) fn run(&self, output: &Output) -> Result<(), CliError> {
         let Self {} = self;
-        output.print(&MeasureWindowReport {
-            machine: Machine::detect(),
-            figures: window::benchmark()?,
-        })
+        let stop = stop_flag();
+        let figures = window::benchmark(&stop)?;
+        note_if_stopped(&stop);
+        output.print(&MeasureWindowReport { machine: Machine::detect(), figures })
     }
 }
 

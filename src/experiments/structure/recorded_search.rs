@@ -8,8 +8,10 @@ use crate::search::{MutationKind, SearchRunOn};
 use rayon::prelude::*;
 use std::ops::ControlFlow;
 
-/// The number of gradients between two reports of progress.
-const SLICE: u64 = 100;
+/// The number of gradients of all searches together between two reports of progress, and the largest
+/// one of each: a report is the only occasion to stop them.
+const SLICE: u64 = 400;
+const SLICE_OF_EACH: u64 = 100;
 
 /// A search with the record of its rounds.
 #[derive(Debug)]
@@ -85,9 +87,10 @@ impl RecordedSearch {
         if self.run.end_reason().is_some() { 1.0 } else { share.min(1.0) }
     }
 
-    fn advance(&mut self) {
+    /// Goes on until about so many gradients more are made.
+    fn advance(&mut self, gradients: u64) {
         let Self { landscape, run, marks } = self;
-        let until = run.statistics().gradients + SLICE;
+        let until = run.statistics().gradients + gradients;
         let flow = run.advance(landscape, |run, _| {
             marks.push(RoundRecord::new(run));
             if run.statistics().gradients < until {
@@ -125,6 +128,7 @@ pub(super) fn run_to_end(
     part: ProgressSpan<'_>,
     progress: &mut ProgressFn<'_>,
 ) -> ExperimentResult<()> {
+    let slice = (SLICE / searches.len().max(1) as u64).clamp(1, SLICE_OF_EACH);
     loop {
         let done: f64 =
             searches.iter().map(RecordedSearch::done).sum::<f64>() / searches.len() as f64;
@@ -132,6 +136,6 @@ pub(super) fn run_to_end(
         if searches.iter().all(|search| search.run.end_reason().is_some()) {
             return Ok(());
         }
-        searches.par_iter_mut().for_each(RecordedSearch::advance);
+        searches.par_iter_mut().for_each(|search| search.advance(slice));
     }
 }

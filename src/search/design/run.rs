@@ -14,6 +14,7 @@ use crate::search::{MutationKind, Random, SearchRules, propose};
 use rand::{RngExt as _, SeedableRng as _};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// The settings of a design besides its requirements.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -139,14 +140,15 @@ impl DesignRun {
     }
 
     /// Runs a round; `used` is the share of the budget that is used so far. Returns false if the
-    /// budget allows no further one.
-    pub fn advance(&mut self, used: f64) -> bool {
+    /// budget allows no further one. Once `stop` is true, candidates stay as they are: a round that
+    /// is ended so depends on time, and no further one may follow.
+    pub fn advance(&mut self, used: f64, stop: &AtomicBool) -> bool {
         match self.stage {
-            DesignStage::Starts => self.run_starts(),
-            DesignStage::Halving => self.halve(),
-            DesignStage::Mutations if used < MUTATIONS_END => self.mutate(),
-            DesignStage::Mutations => self.choose_glasses(),
-            DesignStage::Glasses if used < GLASSES_END => self.exchange(),
+            DesignStage::Starts => self.run_starts(stop),
+            DesignStage::Halving => self.halve(stop),
+            DesignStage::Mutations if used < MUTATIONS_END => self.mutate(stop),
+            DesignStage::Mutations => self.choose_glasses(stop),
+            DesignStage::Glasses if used < GLASSES_END => self.exchange(stop),
             DesignStage::Glasses => return false,
         }
         self.rounds += 1;
@@ -157,9 +159,17 @@ impl DesignRun {
     pub fn finish(&self) -> Vec<DesignedLens> {
         let snapped: Vec<Candidate> = match self.stage {
             DesignStage::Glasses => self.pool.clone(),
-            _ => self.catalogued(),
+            _ => self.catalogued(&AtomicBool::new(false)),
         };
         finished_lenses(&snapped, &self.asked)
+    }
+
+    /// The same of the best candidate alone, in less time.
+    pub fn finish_best(&self) -> Vec<DesignedLens> {
+        let mut first = self.clone();
+        first.pool.truncate(1);
+        let lenses = first.finish();
+        if lenses.is_empty() { self.finish() } else { lenses }
     }
 
     /// The generator of a round: the same whatever was drawn before.
@@ -173,25 +183,28 @@ impl DesignRun {
         Freedom { glasses: true, aspheric_surfaces, pupil: true }
     }
 
-    fn run_starts(&mut self) {
+    fn run_starts(&mut self, stop: &AtomicBool) {
         let mut starts = library_starts(&self.asked, &self.settings.without);
         let [library, random] = self.settings.starts;
         starts.truncate(library);
         if self.asked.elements <= 4 {
             starts.extend(achromats(&self.asked).into_iter().filter(|_| self.asked.elements > 1));
         }
-        starts.extend(random_starts(&self.asked, random, TRIES, &mut self.random(0)));
+        starts.extend(random_starts(&self.asked, random, TRIES, &mut self.random(0), stop));
         let led: Vec<(Option<Candidate>, usize)> =
-            starts.par_iter().map(|start| self.lead(start)).collect();
+            starts.par_iter().map(|start| self.lead(start, stop)).collect();
         self.take(led);
         self.stage = DesignStage::Halving;
     }
 
-    /// Leads a start to the full aperture and field.
-    fn lead(&self, start: &NamedDraft) -> (Option<Candidate>, usize) {
+    /// Leads a start to the full aperture and field, unless `stop` becomes true.
+    fn lead(&self, start: &NamedDraft, stop: &AtomicBool) -> (Option<Candidate>, usize) {
         let (mut draft, mut used, mut value) = (start.draft.clone(), 0, f64::INFINITY);
         let aspheric_surfaces = self.asked.aspheric_surfaces;
         for (i, difficulty) in LEVELS.into_iter().enumerate() {
+            if stop.load(Ordering::Relaxed) {
+                return (None, used);
+            }
             let plan = BeamPlan { difficulty, ..BeamPlan::full(SOFT) };
             let freedom = Freedom { glasses: i > 1, aspheric_surfaces, pupil: true };
             let Some(found) = descend(&draft, &self.asked, &plan, freedom, LEVEL_TRIALS) else {
@@ -220,16 +233,21 @@ impl DesignRun {
         });
     }
 
-    /// Descends from every candidate with firm limits; those that fail are dropped.
+    /// Descends from every candidate with firm limits; those that fail are dropped. Once `stop` is
+    /// true, they stay as they are.
     fn improve(
         &self,
         all: &[Candidate],
         trials: usize,
         glasses: bool,
+        stop: &AtomicBool,
     ) -> Vec<(Option<Candidate>, usize)> {
         let plan = BeamPlan::full(FIRM);
         let freedom = Freedom { glasses, ..self.freedom() };
         let better = |candidate: &Candidate| {
+            if stop.load(Ordering::Relaxed) {
+                return (Some(candidate.clone()), 0);
+            }
             let found = descend(&candidate.draft, &self.asked, &plan, freedom, trials);
             let used = found.as_ref().map_or(1, |found| found.gradients);
             let candidate = found.map(|found| Candidate {
@@ -242,10 +260,10 @@ impl DesignRun {
         all.par_iter().map(better).collect()
     }
 
-    fn halve(&mut self) {
+    fn halve(&mut self, stop: &AtomicBool) {
         let keep = (self.pool.len() / 2).max(POOL);
         self.pool.truncate(keep);
-        let found = self.improve(&self.pool, HALVING_TRIALS, true);
+        let found = self.improve(&self.pool, HALVING_TRIALS, true, stop);
         self.pool.clear();
         self.take(found);
         if self.pool.len() <= POOL {
@@ -254,13 +272,13 @@ impl DesignRun {
     }
 
     /// Mutates parents drawn by rank, and lets the best mutants go on.
-    fn mutate(&mut self) {
+    fn mutate(&mut self, stop: &AtomicBool) {
         let mut mutants = Vec::new();
         for i in 0..MUTANTS {
             let mut random = self.random(1 + i as u64);
             mutants.extend(self.mutant(&mut random));
         }
-        let first = self.improve(&mutants, MUTANT_TRIALS, true);
+        let first = self.improve(&mutants, MUTANT_TRIALS, true, stop);
         let mut alive: Vec<Candidate> = Vec::new();
         for (candidate, used) in first {
             self.gradients += used as u64;
@@ -269,7 +287,7 @@ impl DesignRun {
         alive.sort_by(|a, b| a.value.total_cmp(&b.value));
         alive.truncate(CHOSEN);
         alive.extend(self.pool.iter().take(2).cloned());
-        let found = self.improve(&alive, CHOSEN_TRIALS, true);
+        let found = self.improve(&alive, CHOSEN_TRIALS, true, stop);
         let olds = self.pool.len().min(2);
         self.pool.drain(..olds);
         self.take(found);
@@ -316,33 +334,42 @@ impl DesignRun {
     }
 
     /// The pool with glasses of the catalogue.
-    fn catalogued(&self) -> Vec<Candidate> {
+    fn catalogued(&self, stop: &AtomicBool) -> Vec<Candidate> {
         let snap = |candidate: &Candidate| {
             let draft = snapped(&candidate.draft, &self.asked);
             Candidate { draft, ..candidate.clone() }
         };
         let snapped: Vec<Candidate> = self.pool.iter().take(POOL).map(snap).collect();
-        let found = self.improve(&snapped, CHOSEN_TRIALS, false);
+        let found = self.improve(&snapped, CHOSEN_TRIALS, false, stop);
         let mut all: Vec<Candidate> = found.into_iter().filter_map(|(c, _)| c).collect();
         all.sort_by(|a, b| a.value.total_cmp(&b.value));
         all
     }
 
-    fn choose_glasses(&mut self) {
-        self.pool = self.catalogued();
+    fn choose_glasses(&mut self, stop: &AtomicBool) {
+        let catalogued = self.catalogued(stop);
+        // The values of candidates that stayed as they were are those with the glasses before.
+        if stop.load(Ordering::Relaxed) {
+            return;
+        }
+        self.pool = catalogued;
         self.gradients += (self.pool.len() * CHOSEN_TRIALS) as u64;
         self.stage = DesignStage::Glasses;
     }
 
     /// Exchanges a glass of one of the best candidates.
-    fn exchange(&mut self) {
+    fn exchange(&mut self, stop: &AtomicBool) {
         let mut random = self.random(0);
         let of = (self.rounds as usize) % self.pool.len().clamp(1, 3);
         let Some(parent) = self.pool.get(of).cloned() else { return };
         let trials = exchanged(&parent.draft, &self.asked, &mut random);
         let mutants: Vec<Candidate> =
             trials.into_iter().map(|draft| Candidate { draft, ..parent.clone() }).collect();
-        let tried = self.improve(&mutants, MUTANT_TRIALS, false);
+        let tried = self.improve(&mutants, MUTANT_TRIALS, false, stop);
+        // The values of mutants that stayed as they were are those of their parent.
+        if stop.load(Ordering::Relaxed) {
+            return;
+        }
         let mut alive: Vec<Candidate> = Vec::new();
         for (candidate, used) in tried {
             self.gradients += used as u64;
@@ -353,7 +380,7 @@ impl DesignRun {
         let promising = |c: &Candidate| c.value < 1.5 * parent.value;
         alive.retain(promising);
         alive.push(parent);
-        let found = self.improve(&alive, HALVING_TRIALS, false);
+        let found = self.improve(&alive, HALVING_TRIALS, false, stop);
         let best = found.into_iter().filter_map(|(candidate, used)| {
             self.gradients += used as u64;
             candidate

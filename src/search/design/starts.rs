@@ -10,6 +10,7 @@ use crate::paraxial::{Beam, first_order};
 use crate::search::Random;
 use crate::search::element::piece_count;
 use rand::RngExt as _;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// A start with the name of where it comes from.
 #[derive(Debug, Clone)]
@@ -151,15 +152,16 @@ const CROWNS: [(f64, f64); 4] = [(1.5168, 64.17), (1.6204, 60.3), (1.6968, 55.5)
 const FLINTS: [(f64, f64); 4] = [(1.6727, 32.2), (1.7282, 28.3), (1.7847, 26.1), (1.62, 36.4)];
 
 /// Random lenses of a number of elements, each the best of several by its merit at a small aperture
-/// and field.
+/// and field; fewer once `stop` is true.
 pub(super) fn random_starts(
     asked: &LensRequirements,
     count: usize,
     tries: usize,
     random: &mut Random,
+    stop: &AtomicBool,
 ) -> Vec<NamedDraft> {
     let mut found = Vec::new();
-    for i in 0..count {
+    for i in (0..count).take_while(|_| !stop.load(Ordering::Relaxed)) {
         let tried = (0..tries).filter_map(|_| {
             let draft = random_lens(asked, random)?;
             Some((screened(&draft, asked)?, draft))
