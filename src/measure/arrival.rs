@@ -7,7 +7,7 @@ use super::limits::with_variables;
 use super::timing::Stopwatch;
 use crate::lens::Lens;
 use crate::merit::{Goal, LimitTreatment, MeritError, TermValue};
-use crate::optimize::{DescentMethod, OptimizationEnd, Optimizer, start};
+use crate::optimize::{DescentMethod, OptimizationEnd, start};
 use serde::Serialize;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -87,8 +87,7 @@ pub fn measure_arrival(
     let known = BEST_KNOWN.iter().find(|(known, _)| *known == name).map(|(_, merit)| *merit);
     let mut courses: Vec<Course> = Vec::new();
     for method in DescentMethod::ALL {
-        let optimizer = start(method, &lens, &goal, tolerance)?;
-        courses.extend(descend(method, optimizer, evaluations, stop)?);
+        courses.extend(descend(method, &lens, &goal, evaluations, tolerance, stop)?);
     }
     if courses.is_empty() {
         return Ok(None);
@@ -121,11 +120,14 @@ impl Course {
 /// A whole descent; `None` once `stop` is true.
 fn descend(
     method: DescentMethod,
-    mut optimizer: Box<dyn Optimizer>,
+    lens: &Lens,
+    goal: &Goal,
     evaluations: usize,
+    tolerance: f64,
     stop: &AtomicBool,
 ) -> Result<Option<Course>, MeritError> {
     let watch = Stopwatch::start();
+    let mut optimizer = start(method, lens, goal, tolerance)?;
     let (mut steps, mut end): (Vec<(usize, f64, f64)>, _) = (Vec::new(), None);
     while end.is_none() && steps.last().is_none_or(|step| step.0 < evaluations) {
         if stop.load(Ordering::Relaxed) {
