@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use eframe::{App, Storage};
 use egui::{
     Align, CentralPanel, Context, Frame, Id, Label, Layout, Margin, Modal, Panel as Side, RawInput,
-    Response, RichText, ScrollArea, Ui, ViewportCommand,
+    Response, RichText, ScrollArea, Ui, ViewportCommand, vec2,
 };
 
 use super::actions::{Actions, UiAction};
@@ -284,16 +284,17 @@ impl Studio {
 
     /// The line at the bottom: the last message, and the time of the analysis.
     fn status_bar(ui: &mut Ui, view: &SessionView, actions: &mut Actions) {
-        ui.horizontal(|ui| {
-            messages(ui, view, actions);
-            ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-                ui.weak(timing_text(view))
-                    .on_hover_text("Time to compute all numbers of all panels after the last edit");
-                if view.dirty {
-                    ui.separator();
-                    ui.weak("unsaved changes");
-                }
-            });
+        let size = vec2(ui.available_width(), ui.spacing().interact_size.y);
+        // A long message ends where the texts at the right begin.
+        ui.allocate_ui_with_layout(size, Layout::right_to_left(Align::Center), |ui| {
+            ui.weak(timing_text(view))
+                .on_hover_text("Time to compute all numbers of all panels after the last edit");
+            if view.dirty {
+                ui.separator();
+                ui.weak("unsaved changes");
+            }
+            let left = Layout::left_to_right(Align::Center);
+            ui.with_layout(left, |ui| messages(ui, view, actions));
         });
     }
 }
