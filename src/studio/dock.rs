@@ -115,12 +115,11 @@ impl Dock {
 
     /// Shows all panels.
     pub fn ui(&mut self, ui: &mut Ui, view: &SessionView, actions: &mut Actions) {
-        match self.maximized {
-            Some(kind) => self.maximized_ui(ui, kind, view, actions),
-            None => {
-                let panels = &mut self.panels;
-                self.tree.ui(&mut DockFrame { panels, view, actions }, ui);
-            }
+        if let Some(kind) = self.maximized {
+            self.maximized_ui(ui, kind, view, actions);
+        } else {
+            let panels = &mut self.panels;
+            self.tree.ui(&mut DockFrame { panels, view, actions }, ui);
         }
         let pupils = self.is_visible(PanelKind::Pupil);
         if pupils != view.settings.pupils {

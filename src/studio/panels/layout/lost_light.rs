@@ -44,11 +44,11 @@ pub(super) fn clipping_rims(lens: &Lens, layout: &RayLayout) -> Vec<ClippingRim>
     rims.into_values().collect()
 }
 
-const HINT: &str = "Show the lens with this change as a candidate: the bar above the panels accepts or \
-    discards it. Another rim may limit the beam then";
+const HINT: &str = "Show the lens with this change as a candidate: the bar above the panels accepts \
+    or discards it. Another rim may limit the beam then";
 
-/// Shows the number of lost rays with a menu of the rims that clip them; a rim that is chosen is shown
-/// wide enough as a candidate.
+/// Shows the number of lost rays with a menu of the rims that clip them; a rim that is chosen is
+/// shown wide enough as a candidate.
 pub(super) fn lost_rays_menu(
     ui: &mut Ui,
     text: RichText,
@@ -71,7 +71,8 @@ pub(super) fn lost_rays_menu(
         }
     });
     menu.response.on_hover_text(
-        "Lost rays are drawn to their end, which is marked by a dot. Click for the rims that clip them",
+        "Lost rays are drawn to their end, which is marked by a dot. Click for the rims that clip \
+         them",
     );
 }
 
