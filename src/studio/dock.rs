@@ -118,8 +118,8 @@ impl Dock {
         if let Some(kind) = self.maximized {
             self.maximized_ui(ui, kind, view, actions);
         } else {
-            let panels = &mut self.panels;
-            self.tree.ui(&mut DockFrame { panels, view, actions }, ui);
+            let Self { tree, panels, front, .. } = self;
+            tree.ui(&mut DockFrame { panels, front, view, actions }, ui);
         }
         let pupils = self.is_visible(PanelKind::Pupil);
         if pupils != view.settings.pupils {
@@ -181,6 +181,8 @@ fn maximize_button(ui: &mut Ui, name: &str) -> Response {
 /// The panels in one frame.
 struct DockFrame<'a> {
     panels: &'a mut Vec<(PanelKind, Box<dyn Panel>)>,
+    /// The panel that was brought to the front last.
+    front: &'a mut PanelKind,
     view: &'a SessionView,
     actions: &'a mut Actions,
 }
@@ -201,6 +203,18 @@ impl Behavior<PanelKind> for DockFrame<'_> {
     fn tab_title_for_pane(&mut self, kind: &PanelKind) -> WidgetText {
         let panel = self.panels.iter().find(|(other, _)| other == kind);
         panel.map_or("", |(_, panel)| panel.title()).into()
+    }
+
+    fn on_tab_button(
+        &mut self,
+        tiles: &mut Tiles<PanelKind>,
+        tile: TileId,
+        button_response: Response,
+    ) -> Response {
+        if let (true, Some(Tile::Pane(kind))) = (button_response.clicked(), tiles.get(tile)) {
+            *self.front = *kind;
+        }
+        button_response
     }
 
     /// A button that gives the panel in front all the room.

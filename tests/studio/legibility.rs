@@ -136,33 +136,6 @@ fn the_legend_of_the_front_does_not_cover_the_start() {
 }
 
 #[test]
-fn the_explanation_of_a_menu_item_covers_no_item() {
-    let mut harness = window();
-    harness.ctx.all_styles_mut(|style| {
-        style.interaction.tooltip_delay = 0.0;
-        style.interaction.show_tooltips_only_when_still = false;
-    });
-    harness.state_mut().session_mut().apply(Command::Select(Some(2)));
-    harness.get_by_label("Element").click();
-    // No explanation follows a click for a moment.
-    harness.run_steps(30);
-    let hints = [
-        ("Add an element…", "A singlet or a cemented doublet of some focal length"),
-        ("Reverse the element", "The last surface comes first"),
-        ("Remove the element", "Air takes its place"),
-    ];
-    let items = hints.map(|(item, _)| harness.get_by_label(item).rect());
-    for (item, hint) in hints {
-        harness.get_by_label(item).hover();
-        harness.run_steps(6);
-        let hint = harness.get_by_label(hint).rect();
-        for covered in items {
-            assert!(!hint.intersects(covered), "{item}: {hint:?} over {covered:?}");
-        }
-    }
-}
-
-#[test]
 fn a_long_message_ends_before_the_texts_at_the_right() {
     let mut harness = window();
     let path = format!("/nowhere/{}.json", "long/".repeat(60));

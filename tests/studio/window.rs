@@ -321,6 +321,13 @@ fn a_panel_can_have_the_window_and_a_search_can_be_watched() {
     harness.run_steps(3);
     harness.get_by_label("Radius of surface 1");
     assert!((width(&harness) - among_others).abs() < 1.0);
+    harness.get_by_label("Pupil").click();
+    harness.run_steps(3);
+    harness.key_press(Key::F11);
+    harness.run_steps(3);
+    settle(&mut harness);
+    harness.get_by_label("Show all panels");
+    harness.get_by_label_contains("Pupil of field 1");
     harness.get_by_label("View").click();
     harness.run_steps(3);
     harness.get_by_label("Arrangement for a search").click();
