@@ -146,3 +146,30 @@ fn a_long_message_ends_before_the_texts_at_the_right() {
     assert!(message.right() <= timing.left(), "{message:?} {timing:?}");
     assert!(message.left() < 200.0 && timing.right() > 1200.0);
 }
+
+#[test]
+fn the_explanation_of_a_menu_item_covers_no_item() {
+    let mut harness = window();
+    harness.ctx.all_styles_mut(|style| {
+        style.interaction.tooltip_delay = 0.0;
+        style.interaction.show_tooltips_only_when_still = false;
+    });
+    harness.state_mut().session_mut().apply(Command::Select(Some(2)));
+    harness.get_by_label("Element").click();
+    // No explanation follows a click for a moment.
+    harness.run_steps(30);
+    let hints = [
+        ("Add an element…", "A singlet or a cemented doublet of some focal length"),
+        ("Reverse the element", "The last surface comes first"),
+        ("Remove the element", "Air takes its place"),
+    ];
+    let items = hints.map(|(item, _)| harness.get_by_label_contains(item).rect());
+    for (item, hint) in hints {
+        harness.get_by_label_contains(item).hover();
+        harness.run_steps(6);
+        let hint = harness.get_by_label(hint).rect();
+        for covered in items {
+            assert!(!hint.intersects(covered), "{item}: {hint:?} over {covered:?}");
+        }
+    }
+}
