@@ -26,7 +26,7 @@ impl Panel for SeidelPanel {
             None if numbers.ray_model.value.has_grin() => {
                 drop(ui.weak(
                     "No third-order sums: those of a gradient-index medium are not implemented",
-                ))
+                ));
             }
             None => drop(ui.weak("No third-order sums: the lens has no paraxial chief ray")),
         });
