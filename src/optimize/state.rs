@@ -123,11 +123,15 @@ impl OptimizerState {
 
     /// The variables after a fraction of a step, clamped to their bounds.
     pub(super) fn proposal(&self, step: &[f64], fraction: f64) -> Vec<f64> {
-        let moved = |i: usize| {
-            let value = self.values[i] + fraction * step[i] * self.scales[i];
-            clamp(&self.merit.variables()[i], value)
-        };
-        (0..self.values.len()).map(moved).collect()
+        let step: Vec<f64> = step.iter().map(|change| fraction * change).collect();
+        self.moved(&self.values, &step)
+    }
+
+    /// Values of the variables after a scaled change, clamped to their bounds.
+    pub(super) fn moved(&self, values: &[f64], change: &[f64]) -> Vec<f64> {
+        let moved =
+            |i: usize| clamp(&self.merit.variables()[i], values[i] + change[i] * self.scales[i]);
+        (0..values.len()).map(moved).collect()
     }
 
     /// The merit at some values; an error if the lens that they define is invalid.
@@ -244,13 +248,18 @@ impl OptimizerState {
 
     /// The range by which each scaled variable may change.
     pub(super) fn room(&self) -> Vec<[f64; 2]> {
+        self.room_from(&self.values)
+    }
+
+    /// The range by which each scaled variable may change from these values.
+    pub(super) fn room_from(&self, values: &[f64]) -> Vec<[f64; 2]> {
         let range = |i: usize| {
-            let (variable, value) = (&self.merit.variables()[i], self.values[i]);
+            let (variable, value) = (&self.merit.variables()[i], values[i]);
             let low = variable.min.map_or(f64::NEG_INFINITY, |min| (min - value).min(0.0));
             let high = variable.max.map_or(f64::INFINITY, |max| (max - value).max(0.0));
             [low / self.scales[i], high / self.scales[i]]
         };
-        (0..self.values.len()).map(range).collect()
+        (0..values.len()).map(range).collect()
     }
 
     /// Evaluates the current lens with newly found rays. As long as the merit agrees with that of

@@ -2,12 +2,12 @@
 //! [`TrustRegion`].
 //!
 //! Every step minimizes the model of the sum of squares where the linearized limits hold; if they
-//! cannot all hold within the region, they are broken at a price (elastic mode, Fletcher's `Sl₁QP`;
-//! Nocedal and Wright, *Numerical Optimization*, 18.5). The secant matrix approximates the second
-//! derivatives of the Lagrangian that `JᵀJ` leaves out. A step is accepted if it lowers the sum plus
-//! the violations at their prices.
+//! cannot all hold within the region, where they are broken as little as they can be within a part
+//! of it (Byrd and Omojokun; Nocedal and Wright, *Numerical Optimization*, 18.5). The secant matrix
+//! approximates the second derivatives of the Lagrangian that `JᵀJ` leaves out. A step is accepted
+//! if it lowers the sum plus the violations at their prices.
 
-use super::kink::KinkBranches;
+use super::kink::{KinkBranches, KinkTrial};
 use super::limit_values::{LimitValues, LimitedPoint, LimitedStep, SLACK};
 use super::quadratic_program::{QuadraticProgram, QuadraticSolution};
 use super::trust_region::{
@@ -18,13 +18,13 @@ use nalgebra::{DMatrix, DVector, SymmetricEigen};
 /// The state of the method between two trials.
 #[derive(Debug, Clone, PartialEq)]
 pub struct LimitedTrustRegion {
-    region: TrustRegion,
+    pub(super) region: TrustRegion,
     /// The price of a violation of each limit in the sum that has to fall.
     prices: Vec<f64>,
     /// The natural length of a step at the last point.
-    natural: f64,
+    pub(super) natural: f64,
     /// The branches of kinked limits beside those of the last point.
-    branches: KinkBranches,
+    pub(super) branches: KinkBranches,
     /// True if the last trial has met a kink.
     met_kink: bool,
 }
@@ -34,14 +34,14 @@ const SCALE_SHARE: f64 = 1e-2;
 /// The price of a violation relative to the multiplier, and the part of it that remains.
 const PRICE_FACTOR: f64 = 2.0;
 const PRICE_MEMORY: f64 = 0.5;
-/// The price of a violation in elastic mode relative to the slope of the sum of squares.
-const ELASTIC_PRICE: f64 = 100.0;
 /// The curvature that every scaled parameter has at least; those with an effect have about 2.
 const SHORTNESS: f64 = 1e-9;
 /// The change of a limit by a step of natural length below which its derivatives are rounding.
 const SMALLEST_EFFECT: f64 = 1e-9;
 /// The violation, in the unit of each limit, that may be an error of its evaluation.
 const NOISE: f64 = 1e-7;
+/// The factor of the region after a trial that could not be evaluated.
+const FAILED: f64 = 0.5;
 /// The decrease relative to the predicted one from which a trial is accepted.
 const ACCEPTED: f64 = 1e-4;
 
@@ -87,49 +87,21 @@ impl LimitedTrustRegion {
         Some((step, promised))
     }
 
-    /// The smallest change, in the scales of the parameters, after which the limits hold by their
-    /// derivatives as far as they can; `aims` are the bounds to hold.
-    pub fn correction(
-        &self,
-        limits: &LimitValues,
-        aims: &[[f64; 2]],
-        room: &[[f64; 2]],
-    ) -> Option<DVector<f64>> {
-        let scales = &self.region.scales;
-        let rows = self.effective_rows(limits);
-        let aimed = LimitValues { bounds: aims.to_vec(), ..limits.clone() };
-        let excesses = aimed.excesses(&limits.values);
-        let distance = |(excess, row): (&f64, usize)| {
-            let length = rows.row(row).norm();
-            if length > 0.0 { (excess / length).powi(2) } else { 0.0 }
-        };
-        let distance = excesses.iter().zip(0..).map(distance).sum::<f64>().sqrt();
-        if !(distance > 0.0 && distance.is_finite()) {
-            return None;
-        }
-        let count = scales.len();
-        let prices: Vec<f64> = (0..aims.len())
-            .map(|row| 1e3 * distance / rows.row(row).norm().max(f64::MIN_POSITIVE))
-            .collect();
-        let program = |elastic| {
-            QuadraticProgram {
-                hessian: &DMatrix::identity(count, count),
-                gradient: &DVector::zeros(count),
-                rows: &rows,
-                bounds: &aimed.room(&limits.values),
-                room: &scaled_room(room, scales),
-                radius: 10.0 * distance,
-                elastic,
-            }
-            .solve()
-        };
-        let found = program(None).or_else(|| program(Some(&prices)))?;
-        Some(found.x.component_div(scales))
-    }
-
     /// Takes note of a trial that could not be evaluated.
     pub fn note_failure(&mut self, step: &LimitedStep) {
-        self.region.note_failure(&plain_step(step));
+        let length = self.region.length(&step.proposed);
+        let radius = self.region.radius.map_or(length, |radius| radius.min(length));
+        self.region.radius = Some(FAILED * radius);
+    }
+
+    /// Takes note that no step could be computed within the region.
+    pub fn note_no_step(&mut self) {
+        self.region.radius = self.region.radius.map(|radius| FAILED * radius);
+    }
+
+    /// True if a change of the parameters is no longer than a step.
+    pub fn is_shorter(&self, change: &DVector<f64>, step: &LimitedStep) -> bool {
+        self.region.length(change) <= self.region.length(&step.proposed)
     }
 
     /// Takes note of a trial; true if it is accepted.
@@ -149,7 +121,9 @@ impl LimitedTrustRegion {
             + self.penalty(&to.limits, &to.limits.values)
             - self.penalty(&from.limits, &from.limits.values);
         let noise = NOISE * self.prices.iter().sum::<f64>();
-        let is_near = to.limits.violation() <= from.limits.violation().max(SLACK);
+        // Where the limits cannot all hold one may yield to others, at its price.
+        let is_near =
+            step.is_relaxed || to.limits.violation() <= from.limits.violation().max(SLACK);
         let ratio =
             if predicted > 0.0 && is_near { (noise - rise) / (noise + predicted) } else { -1.0 };
         let accepted = ratio > ACCEPTED;
@@ -157,7 +131,9 @@ impl LimitedTrustRegion {
         if accepted {
             self.branches.advance(&step.change, &to.limits, &step.branch_multipliers);
         }
-        self.met_kink = self.branches.meet(step, [&from.limits, &to.limits], accepted, &scales);
+        let LimitedStep { proposed, change, values: promised, .. } = step;
+        let trial = KinkTrial { proposed, change, promised };
+        self.met_kink = self.branches.meet(trial, [&from.limits, &to.limits], accepted, &scales);
         if !self.met_kink {
             self.learn(step, from, to, accepted);
         }
@@ -191,7 +167,9 @@ impl LimitedTrustRegion {
 
     /// Takes note that the function has changed a little; `shorter` if its steps were too long.
     pub fn note_other_function(&mut self, shorter: bool) {
-        self.branches.forget();
+        if shorter {
+            self.branches.forget();
+        }
         self.region.note_other_function(shorter);
     }
 
@@ -209,7 +187,7 @@ impl LimitedTrustRegion {
     }
 
     /// The derivatives of the limits by scaled parameters; zeros for limits that no step changes.
-    fn effective_rows(&self, limits: &LimitValues) -> DMatrix<f64> {
+    pub(super) fn effective_rows(&self, limits: &LimitValues) -> DMatrix<f64> {
         let (slopes, scales) = (&limits.slopes, &self.region.scales);
         let mut rows =
             DMatrix::from_fn(slopes.nrows(), slopes.ncols(), |i, j| slopes[(i, j)] / scales[j]);
@@ -224,10 +202,6 @@ impl LimitedTrustRegion {
     /// The prices at which the violations of a trial count: at least the slope of their squares by
     /// weight.
     fn update_prices(&mut self, point: &LimitedPoint, step: &LimitedStep) {
-        if let Some(prices) = &step.elastic {
-            self.prices.clone_from(prices);
-            return;
-        }
         let excesses = point.limits.excesses(&point.limits.values);
         let by_square = excesses.iter().zip(&point.limits.weights).map(|(e, w)| 2.0 * w * e.abs());
         let by_multiplier = step.multipliers.iter().map(|m| PRICE_FACTOR * m.abs());
@@ -235,6 +209,20 @@ impl LimitedTrustRegion {
             self.prices.iter_mut().zip(by_square).zip(by_multiplier)
         {
             *price = multiplier.max(PRICE_MEMORY * *price).max(square);
+        }
+        self.raise_prices(point, step);
+    }
+
+    /// Raises the prices until what a step gains in violations outweighs what it loses in the sum of
+    /// squares (Byrd, Nocedal, Waltz, Optim. Methods Softw. 23 (2008) 197).
+    fn raise_prices(&mut self, point: &LimitedPoint, step: &LimitedStep) {
+        let hessian = self.region.hessian(&point.objective, self.region.model);
+        let gain = decrease(&hessian, &point.objective.half_gradient, &step.proposed);
+        let relief = self.penalty(&point.limits, &point.limits.values)
+            - self.penalty(&point.limits, &step.values);
+        if relief > 0.0 && PRICE_FACTOR * -gain > relief {
+            let factor = PRICE_FACTOR * -gain / relief;
+            self.prices.iter_mut().for_each(|price| *price *= factor);
         }
     }
 
@@ -285,23 +273,18 @@ impl LimitedTrustRegion {
         let hessian = self.convex_hessian(point, model);
         let bounds = limits.room(&limits.values);
         let room = &scaled_room(room, &scales);
-        let program = |elastic| {
-            QuadraticProgram {
-                hessian: &hessian,
-                gradient: &gradient,
-                rows: &rows,
-                bounds: &bounds,
-                room,
-                radius,
-                elastic,
-            }
-            .solve()
+        let program = QuadraticProgram {
+            hessian: &hessian,
+            gradient: &gradient,
+            rows: &rows,
+            bounds: &bounds,
+            room,
+            radius,
+            elastic: None,
         };
-        let steep = ELASTIC_PRICE * gradient.norm().max(radius * hessian.amax());
-        let prices = elastic_prices(&limits, &rows, steep);
-        let hard = program(None);
-        let elastic = if hard.is_none() { Some(prices) } else { None };
-        let found = hard.or_else(|| program(elastic.as_deref()))?;
+        let hard = program.solve();
+        let is_relaxed = hard.is_none();
+        let found = hard.or_else(|| program.solve_relaxed())?;
         let QuadraticSolution { x, multipliers } = found;
         let change = x.component_div(&scales);
         let count = point.limits.values.len();
@@ -315,12 +298,12 @@ impl LimitedTrustRegion {
             branch_multipliers: multipliers.iter().skip(count).copied().collect(),
             multipliers: self.branches.total(&multipliers),
             half_lagrangian,
-            elastic: elastic.map(|prices| prices[..count].to_vec()),
+            is_relaxed,
         })
     }
 
     /// The Hessian of the model in scaled parameters without its negative curvatures.
-    fn convex_hessian(&self, point: &LimitedPoint, model: HessianModel) -> DMatrix<f64> {
+    pub(super) fn convex_hessian(&self, point: &LimitedPoint, model: HessianModel) -> DMatrix<f64> {
         let scales = &self.region.scales;
         let mut hessian = self.region.hessian(&point.objective, model);
         for i in 0..scales.len() {
@@ -345,25 +328,8 @@ const RESTART: f64 = 1e-2;
 /// The radius of an unconfined step relative to the natural one.
 const UNCONFINED: f64 = 100.0;
 
-fn plain_step(step: &LimitedStep) -> TrustRegionStep {
-    TrustRegionStep { change: step.change.clone(), predicted: 0.0 }
-}
-
-fn scaled_room(room: &[[f64; 2]], scales: &DVector<f64>) -> Vec<[f64; 2]> {
+pub(super) fn scaled_room(room: &[[f64; 2]], scales: &DVector<f64>) -> Vec<[f64; 2]> {
     room.iter().zip(scales.iter()).map(|([low, high], s)| [low * s, high * s]).collect()
-}
-
-/// The prices of violations in elastic mode: above the slope of the sum of squares, and those of
-/// their squares by weight.
-fn elastic_prices(limits: &LimitValues, rows: &DMatrix<f64>, steep: f64) -> Vec<f64> {
-    let excesses = limits.excesses(&limits.values);
-    let weighted = excesses.iter().zip(&limits.weights);
-    let price = |(row, (excess, weight)): (usize, (&f64, &f64))| {
-        let length = rows.row(row).norm();
-        let by_slope = if length > 0.0 { steep / length } else { 0.0 };
-        by_slope.max(2.0 * weight * excess.abs().max(SLACK))
-    };
-    (0..).zip(weighted).map(price).collect()
 }
 
 #[cfg(test)]
@@ -405,7 +371,8 @@ mod tests {
             for _ in 0..4 {
                 let promised = bounds.iter().zip(step.values.iter());
                 let aims: Vec<_> = promised.map(|([l, h], v)| [l.min(*v), h.max(*v)]).collect();
-                let Some(change) = method.correction(&to.limits, &aims, &room) else { break };
+                let aimed = to.limits.with_bounds(&aims);
+                let Some(change) = method.correction(&aimed, &room) else { break };
                 trial += change;
                 to = evaluate(&trial);
             }

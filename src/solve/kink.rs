@@ -6,13 +6,24 @@
 //! met on the way are remembered by their value and slope, and every step keeps their limits too
 //! (cutting planes; Kelley, SIAM J. 8 (1960) 703).
 
-use super::limit_values::{LimitValues, LimitedStep};
+use super::limit_values::LimitValues;
 use nalgebra::{DMatrix, DVector};
 
 /// The branches of kinked limits beside those of the current point.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(super) struct KinkBranches {
     branches: Vec<Branch>,
+}
+
+/// A trial step of a search for kinks.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct KinkTrial<'a> {
+    /// The change of the parameters by the derivatives of the limits.
+    pub(super) proposed: &'a DVector<f64>,
+    /// The change that was tried.
+    pub(super) change: &'a DVector<f64>,
+    /// The limited functions behind the proposed change by their derivatives.
+    pub(super) promised: &'a DVector<f64>,
 }
 
 /// A branch of a limited function.
@@ -71,12 +82,19 @@ impl KinkBranches {
     pub(super) fn advance(&mut self, change: &DVector<f64>, to: &LimitValues, multipliers: &[f64]) {
         let held = |k: usize| multipliers.get(k).is_some_and(|m| m.abs() > 1e-12);
         for (k, branch) in self.branches.iter_mut().enumerate() {
-            branch.value += branch.slope.dot(change);
             branch.age = if held(k) { 0 } else { branch.age + 1 };
+        }
+        self.branches.retain(|branch| branch.age <= MAX_AGE);
+        self.follow(change, to);
+    }
+
+    /// Follows a change of the parameters.
+    pub(super) fn follow(&mut self, change: &DVector<f64>, to: &LimitValues) {
+        for branch in &mut self.branches {
+            branch.value += branch.slope.dot(change);
             branch.value =
                 not_beyond(to.bounds[branch.limit], branch.value, to.values[branch.limit]);
         }
-        self.branches.retain(|branch| branch.age <= MAX_AGE);
     }
 
     /// Remembers the branches that a trial has met although its point's derivatives did not tell of
@@ -85,13 +103,14 @@ impl KinkBranches {
     /// kink.
     pub(super) fn meet(
         &mut self,
-        step: &LimitedStep,
+        trial: KinkTrial<'_>,
         [from, to]: [&LimitValues; 2],
         accepted: bool,
         scales: &DVector<f64>,
     ) -> bool {
-        let proposed = &to.values + &to.slopes * (&step.proposed - &step.change);
-        let [real, promised] = [&proposed, &step.values].map(|values| from.excesses(values));
+        let KinkTrial { proposed, change, promised } = trial;
+        let reached = &to.values + &to.slopes * (proposed - change);
+        let [real, promised] = [&reached, promised].map(|values| from.excesses(values));
         let mut met = false;
         for i in 0..promised.len() {
             let [low, high] = from.bounds[i];
@@ -105,9 +124,9 @@ impl KinkBranches {
             }
             met |= difference > KINKED;
             let (value, now, slope) = if accepted {
-                (from.values[i] + here.dot(&step.change), to.values[i], here)
+                (from.values[i] + here.dot(change), to.values[i], here)
             } else {
-                (to.values[i] - there.dot(&step.change), from.values[i], there)
+                (to.values[i] - there.dot(change), from.values[i], there)
             };
             self.remember(i, not_beyond([low, high], value, now), slope, scales);
         }

@@ -48,8 +48,8 @@ pub struct LimitedStep {
     pub(super) branch_multipliers: Vec<f64>,
     /// Half the gradient of the Lagrangian before the step.
     pub(super) half_lagrangian: DVector<f64>,
-    /// The price of a violation of each limit, if they cannot all hold within the trust region.
-    pub elastic: Option<Vec<f64>>,
+    /// True if the limits cannot all hold within the trust region by their derivatives.
+    pub is_relaxed: bool,
 }
 
 impl LimitValues {
@@ -60,6 +60,12 @@ impl LimitValues {
             (value - high).max(0.0) + (value - low).min(0.0)
         };
         DVector::from_iterator(values.len(), values.iter().zip(&self.bounds).map(excess))
+    }
+
+    /// The same values under other bounds.
+    #[must_use]
+    pub fn with_bounds(&self, bounds: &[[f64; 2]]) -> Self {
+        Self { bounds: bounds.to_vec(), ..self.clone() }
     }
 
     /// The largest violation.

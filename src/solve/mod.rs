@@ -14,6 +14,7 @@ mod levenberg_marquardt;
 mod limit_values;
 mod projection;
 mod quadratic_program;
+mod restoration;
 mod trust_region;
 
 pub use adam::{Adam, AdamMoments};

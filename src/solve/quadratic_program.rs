@@ -10,6 +10,7 @@ use clarabel::solver::{DefaultSettings, DefaultSolver, IPSolver, SolverStatus};
 use nalgebra::{DMatrix, DVector};
 
 /// A quadratic program.
+#[derive(Clone, Copy)]
 pub(super) struct QuadraticProgram<'a> {
     /// `P`, positive semidefinite.
     pub(super) hessian: &'a DMatrix<f64>,
@@ -37,6 +38,16 @@ pub(super) struct QuadraticSolution {
 
 /// The accuracy of the interior-point method, relative to the radius.
 const ACCURACY: f64 = 1e-10;
+
+/// The residual of the constraints up to which an iterate that has not converged is used.
+const USABLE: f64 = 1e-6;
+
+/// The part of the ball in which the bounds are approached; the rest is left to the objective.
+const RESTORING_PART: f64 = 0.7;
+/// The weight of the length of a step against the violation of the rows.
+const BREVITY: f64 = 1e-4;
+/// The room that a relaxed row gets, relative to its reach within the ball.
+const MARGIN: f64 = 1e-8;
 
 /// One side of a row: `sign · row · x ≤ distance`.
 struct RowSide {
@@ -88,20 +99,60 @@ impl QuadraticProgram<'_> {
         let solver = DefaultSolver::new(&hessian, &gradient, &matrix, &right, &cones, settings());
         let mut solver = solver.ok()?;
         solver.solve();
-        let usable = !matches!(
-            solver.solution.status,
-            SolverStatus::PrimalInfeasible
-                | SolverStatus::AlmostPrimalInfeasible
-                | SolverStatus::DualInfeasible
-                | SolverStatus::AlmostDualInfeasible
-                | SolverStatus::NumericalError
-                | SolverStatus::Unsolved
-        );
-        let x = DVector::from_column_slice(solver.solution.x.get(..count)?) * self.radius;
-        (usable && x.iter().all(|v| v.is_finite())).then(|| QuadraticSolution {
-            x,
-            multipliers: self.multipliers(&sides, &solver.solution.z, scale),
+        let solution = &solver.solution;
+        let found = DVector::from_column_slice(solution.x.get(..count)?);
+        // Without convergence the last iterate may still be good enough for a step.
+        let usable = match solution.status {
+            SolverStatus::Solved | SolverStatus::AlmostSolved => true,
+            SolverStatus::MaxIterations | SolverStatus::InsufficientProgress => {
+                solution.r_prim <= USABLE
+            }
+            _ => false,
+        };
+        let length = found.norm();
+        (usable && length <= 1.0 + USABLE).then(|| QuadraticSolution {
+            x: found * (self.radius / length.max(1.0)),
+            multipliers: self.multipliers(&sides, &solution.z, scale),
         })
+    }
+
+    /// The solution under bounds as close to those given as they can be kept within a part of the
+    /// ball.
+    pub(super) fn solve_relaxed(&self) -> Option<QuadraticSolution> {
+        let nearest = self.least_violation()?;
+        let reached = self.rows * &nearest;
+        let relaxed = |(row, [low, high]): (usize, &[f64; 2])| {
+            let margin = MARGIN * self.radius * self.rows.row(row).norm();
+            let value = reached[row];
+            if low == high {
+                return [value; 2];
+            }
+            let low = if value < *low { value - margin } else { *low };
+            let high = if value > *high { value + margin } else { *high };
+            [low, high]
+        };
+        let bounds: Vec<[f64; 2]> = (0..).zip(self.bounds).map(relaxed).collect();
+        let found = QuadraticProgram { bounds: &bounds, ..*self }.solve();
+        let multipliers = DVector::zeros(bounds.len());
+        Some(found.unwrap_or(QuadraticSolution { x: nearest, multipliers }))
+    }
+
+    /// The shortest step within a part of the ball that breaks the rows least, by the sum of the
+    /// distances to their bounds.
+    fn least_violation(&self) -> Option<DVector<f64>> {
+        let count = self.gradient.len();
+        let radius = RESTORING_PART * self.radius;
+        let lengths = (0..self.bounds.len()).map(|row| self.rows.row(row).norm());
+        let prices: Vec<f64> =
+            lengths.map(|length| if length > 0.0 { 1.0 / length } else { 0.0 }).collect();
+        let found = QuadraticProgram {
+            hessian: &(DMatrix::identity(count, count) * (BREVITY / radius)),
+            gradient: &DVector::zeros(count),
+            radius,
+            elastic: Some(&prices),
+            ..*self
+        };
+        found.solve().map(|found| found.x)
     }
 
     /// The sides of the rows that a step within the ball can reach, equalities first.

@@ -157,7 +157,7 @@ impl TrustRegion {
         }
     }
 
-    fn length(&self, change: &DVector<f64>) -> f64 {
+    pub(super) fn length(&self, change: &DVector<f64>) -> f64 {
         change.component_mul(&self.scales).norm()
     }
 

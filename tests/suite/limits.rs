@@ -5,7 +5,7 @@ use aplanat::lens::{Lens, ParameterKind, Quantity, add_variables};
 use aplanat::merit::{
     DerivativeLevel, Goal, Limit, LimitTreatment, Merit, MeritError, PupilEdge, Term, WeightedTerm,
 };
-use aplanat::optimize::{DescentMethod, Optimizer, start};
+use aplanat::optimize::{DescentMethod, OptimizationEnd, Optimizer, start};
 
 /// The largest violation at the end.
 const KEPT: f64 = 1e-9;
@@ -237,4 +237,30 @@ fn penalties_are_kept_when_a_goal_asks_for_them() {
     assert!(text.contains(r#""limits":"constraints""#), "{text}");
     assert!(judge(optimizer.best(), &lens, &hard).0 > KEPT, "a penalty gives way");
     assert!(run(&lens, &hard, 30).conflict().is_empty());
+}
+
+/// At the best lens the light of a field is clipped by a crescent that the rays of the lens on the
+/// other side of the clipping do not see.
+#[test]
+fn light_is_kept_where_clipping_begins() {
+    let mut lens = bundled("telescope_rc_f8");
+    lens.variables.clear();
+    add_variables(&mut lens, &[ParameterKind::Curvatures, ParameterKind::Thicknesses]);
+    let goal = default_goal(&lens);
+    let mut optimizer = start(DescentMethod::TrustRegion, &lens, &goal, 1e-3).unwrap();
+    let end = (0..60).find_map(|_| optimizer.step().end);
+    let (violation, merit) = judge(optimizer.best(), &lens, &goal);
+    assert!(end.is_some_and(|end| end != OptimizationEnd::Conflict), "{end:?}");
+    assert!(violation <= KEPT && merit < 1.41e-3, "{violation:e} {merit:e}");
+}
+
+/// The focal length at two zoom positions and the light of an f-number beam, which the focal length
+/// fixes at one wavelength and nearly at the others.
+#[test]
+fn limits_that_depend_on_each_other_are_approached() {
+    let lens = free("macro_micro_nikkor_105_f28");
+    let goal = default_goal(&lens);
+    let mut optimizer = start(DescentMethod::TrustRegion, &lens, &goal, 1e-2).unwrap();
+    let progress = (0..12).map(|_| optimizer.step()).last().unwrap();
+    assert!(progress.end.is_none() && progress.merit < 1.0, "{progress:?}");
 }

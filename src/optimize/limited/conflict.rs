@@ -15,7 +15,7 @@ impl LimitedOptimizer {
         let is_conflict = |set: &[usize]| {
             let chosen: Vec<Limit> = set.iter().map(|i| self.limits[*i].clone()).collect();
             let limits = limit_values(&self.state, &chosen);
-            let remaining = self.method.correction(&limits, &limits.bounds, &room).map_or_else(
+            let remaining = self.method.correction(&limits, &room).map_or_else(
                 || limits.violation(),
                 |change| limits.excesses(&limits.linearized(&change)).amax(),
             );
@@ -64,7 +64,7 @@ impl LimitedOptimizer {
                 return false;
             }
             least = least.min(violation);
-            match self.corrected(&values, &limits, &limits.bounds) {
+            match self.corrected(&values, &limits) {
                 Some(next) => values = next,
                 None => return false,
             }

@@ -101,12 +101,14 @@ impl LimitedOptimizer {
     /// is worth trying.
     fn try_step(&mut self) -> Result<f64, OptimizationEnd> {
         let room = self.state.room();
-        let step = self.method.propose(&self.point, &room).ok_or(OptimizationEnd::Tolerance)?;
+        let Some(step) = self.method.propose(&self.point, &room) else {
+            return self.without_step();
+        };
         let gradient = self.method.projected_gradient(&self.point, &step, &room);
         let first = *self.first_gradient.get_or_insert(gradient);
         let is_kept = self.point.limits.violation() <= SLACK;
         self.stuck =
-            if step.elastic.is_some() && !self.gains_limits(&step) { self.stuck + 1 } else { 0 };
+            if step.is_relaxed && !self.gains_limits(&step, &room) { self.stuck + 1 } else { 0 };
         if self.stuck >= PATIENCE {
             return Err(OptimizationEnd::Conflict);
         }
@@ -121,21 +123,33 @@ impl LimitedOptimizer {
             return Ok(0.0);
         }
         if self.idle >= PATIENCE || self.method.is_exhausted(&self.point) {
-            let kept = is_kept || step.elastic.is_none();
+            let kept = is_kept || !step.is_relaxed;
             return Err(if kept { OptimizationEnd::Tolerance } else { OptimizationEnd::Conflict });
         }
         Ok(if self.take(step) { 1.0 } else { 0.0 })
+    }
+
+    /// A smaller region where no step could be computed, as long as one remains.
+    fn without_step(&mut self) -> Result<f64, OptimizationEnd> {
+        self.method.note_no_step();
+        if self.method.is_exhausted(&self.point) {
+            Err(OptimizationEnd::Tolerance)
+        } else {
+            Ok(0.0)
+        }
     }
 
     fn small_gain(&self) -> f64 {
         SMALL_GAIN * self.tolerance * self.point.objective.value
     }
 
-    /// True if a step brings the limits closer by a thousandth.
-    fn gains_limits(&self, step: &LimitedStep) -> bool {
+    /// True if a step brings the limits closer by a thousandth, or a longer one would.
+    fn gains_limits(&self, step: &LimitedStep, room: &[[f64; 2]]) -> bool {
         let limits = &self.point.limits;
         let sum = |values: &DVector<f64>| limits.excesses(values).abs().sum();
-        sum(&step.values) < 0.999 * sum(&limits.values)
+        let gains = |values: &DVector<f64>| sum(values) < 0.999 * sum(&limits.values);
+        let farther = || self.method.correction(limits, room);
+        gains(&step.values) || farther().is_some_and(|change| gains(&limits.linearized(&change)))
     }
 
     /// The decrease of the merit that the derivatives promise: of the step itself and, if that is
@@ -164,7 +178,10 @@ impl LimitedOptimizer {
     }
 
     fn second_trial(&mut self, step: &LimitedStep, from: &[f64], found: &LimitValues) -> bool {
-        let Some(values) = self.corrected(from, found, &found.bounds) else { return false };
+        let corrected = self.corrected(from, found);
+        let Some(values) = corrected.filter(|to| self.is_near(from, to, step)) else {
+            return false;
+        };
         let mut step = step.clone();
         step.change = self.state.scaled_change(&values);
         let Some((to, limits)) = self.evaluate(&values, &step) else { return false };
@@ -234,46 +251,36 @@ impl LimitedOptimizer {
             .zip(step.values.iter())
             .map(|([low, high], promised)| [low.min(*promised), high.max(*promised)])
             .collect();
-        let mut values = proposed;
+        let mut values = proposed.clone();
         for _ in 0..TRIAL_CORRECTIONS {
             let merit = &self.state.merit;
             let Ok(found) = merit.mechanical_limits(&values, DerivativeLevel::Gradient) else {
                 break;
             };
             let found = limit_values(&self.state, &found);
-            let aims = &aims[..found.bounds.len()];
-            let excess = LimitValues { bounds: aims.to_vec(), ..found.clone() }.violation();
-            if excess <= RESTORED {
+            let aimed = found.with_bounds(&aims[..found.bounds.len()]);
+            if aimed.violation() <= RESTORED {
                 break;
             }
-            match self.corrected(&values, &found, aims) {
-                Some(next) => values = next,
-                None => break,
+            match self.corrected(&values, &aimed) {
+                // Beyond the length of the step the derivatives tell nothing.
+                Some(next) if self.is_near(&proposed, &next, step) => values = next,
+                _ => break,
             }
         }
         values
     }
 
-    /// Values corrected so that their limits keep within the aims by their derivatives.
-    fn corrected(
-        &self,
-        values: &[f64],
-        found: &LimitValues,
-        aims: &[[f64; 2]],
-    ) -> Option<Vec<f64>> {
-        let variables = self.state.merit.variables();
-        let range = |i: usize| {
-            let (variable, value, scale) = (&variables[i], values[i], self.state.scales[i]);
-            let low = variable.min.map_or(f64::NEG_INFINITY, |min| (min - value).min(0.0));
-            let high = variable.max.map_or(f64::INFINITY, |max| (max - value).max(0.0));
-            [low / scale, high / scale]
-        };
-        let room: Vec<[f64; 2]> = (0..values.len()).map(range).collect();
-        let change = self.method.correction(found, aims, &room)?;
-        let moved = |i: usize| {
-            super::state::clamp(&variables[i], values[i] + change[i] * self.state.scales[i])
-        };
-        Some((0..values.len()).map(moved).collect())
+    /// True if one set of values is no further from another one than a step is long.
+    fn is_near(&self, from: &[f64], to: &[f64], step: &LimitedStep) -> bool {
+        let change = self.state.scaled_change(to) - self.state.scaled_change(from);
+        self.method.is_shorter(&change, step)
+    }
+
+    /// Values corrected so that their limits hold by their derivatives.
+    fn corrected(&self, values: &[f64], found: &LimitValues) -> Option<Vec<f64>> {
+        let change = self.method.correction(found, &self.state.room_from(values))?;
+        Some(self.state.moved(values, change.as_slice()))
     }
 
     /// Ends the descent, unless the rays turn out to be others by now.
@@ -326,7 +333,8 @@ impl Optimizer for LimitedOptimizer {
         if let Err(end) = tried {
             self.conclude(end);
         } else if self.unchecked >= self.interval {
-            self.interval = if self.settle() { (self.interval / 2).max(1) } else { CHECK_INTERVAL };
+            self.interval =
+                if self.check_rays() { (self.interval / 2).max(1) } else { CHECK_INTERVAL };
         }
         self.state.progress(tried.unwrap_or(0.0), self.end)
     }

@@ -3,7 +3,7 @@
 use super::{KEPT, LimitedOptimizer, RESTORED, scaled_point};
 use crate::merit::{DerivativeLevel, Limit};
 use crate::optimize::LimitPrice;
-use crate::solve::LimitValues;
+use crate::solve::{LimitValues, SLACK};
 
 /// The distance from the bounds for which a correction aims.
 const AIM: f64 = 1e-10;
@@ -18,15 +18,28 @@ impl LimitedOptimizer {
     /// Finds the rays of the current lens anew, restores its limits with them, and makes it the best
     /// lens if it is. Returns true if the merit is another one by more than the tolerance.
     pub(super) fn settle(&mut self) -> bool {
+        self.settle_within(f64::INFINITY)
+    }
+
+    /// [`Self::settle`] on the way: limits that are broken by more than the slack are left to the
+    /// steps.
+    pub(super) fn check_rays(&mut self) -> bool {
+        self.settle_within(SLACK)
+    }
+
+    /// Finds the rays anew and restores limits that are broken by at most this.
+    fn settle_within(&mut self, restorable: f64) -> bool {
         let before = self.state.value;
         self.unchecked = 0;
-        for round in 0..SETTLEMENTS {
-            if !self.find_rays() || self.point.limits.violation() <= KEPT {
+        let mut margin = AIM;
+        for _ in 0..SETTLEMENTS {
+            let violation = if self.find_rays() { self.point.limits.violation() } else { 0.0 };
+            if violation <= KEPT || violation > restorable {
                 break;
             }
+            self.restore(margin);
             // What is still broken after a correction is the difference that new rays make.
-            let difference = 2.0 * self.point.limits.violation();
-            self.restore(if round == 0 { AIM } else { difference.clamp(AIM, LARGEST_AIM) });
+            margin = (2.0 * violation).clamp(AIM, LARGEST_AIM);
         }
         self.adopt_verified();
         (self.state.value - before).abs() > 2.0 * self.tolerance * before.abs()
@@ -57,39 +70,35 @@ impl LimitedOptimizer {
     /// Corrects the current lens until it keeps its limits with the present rays, by a margin.
     fn restore(&mut self, margin: f64) {
         for _ in 0..CORRECTIONS {
-            let aims: Vec<[f64; 2]> = self
-                .point
-                .limits
-                .bounds
-                .iter()
-                .map(
-                    |[low, high]| {
-                        if low == high { [*low, *high] } else { [low + margin, high - margin] }
-                    },
-                )
-                .collect();
-            let limits = &self.point.limits;
-            let aimed = |limits: &LimitValues| {
-                LimitValues { bounds: aims.clone(), ..limits.clone() }.violation()
-            };
-            if aimed(limits) <= RESTORED.max(0.1 * margin) {
+            let limits = self.method.with_margin(&self.point.limits, margin);
+            if limits.violation() <= RESTORED.max(0.1 * margin) || !self.correct(&limits) {
                 break;
             }
-            let Some(values) = self.corrected(&self.state.values, limits, &aims) else { break };
-            let merit = &self.state.merit;
-            let Ok(found) = merit.evaluate_with_limits(&values, DerivativeLevel::Normal) else {
-                break;
-            };
-            self.state.evaluations += 1;
-            let point = scaled_point(&self.state, &found.objective, &found.limits);
-            if !(aimed(&point.limits) < aimed(limits)) {
-                break;
-            }
+        }
+    }
+
+    /// Corrects the current lens once; false if no other correction may follow.
+    fn correct(&mut self, limits: &LimitValues) -> bool {
+        let Some(change) = self.method.restoration(&self.point, limits, &self.state.room()) else {
+            return false;
+        };
+        let values = self.state.moved(&self.state.values, change.as_slice());
+        let Ok(found) = self.state.merit.evaluate_with_limits(&values, DerivativeLevel::Normal)
+        else {
+            return false;
+        };
+        self.state.evaluations += 1;
+        let point = scaled_point(&self.state, &found.objective, &found.limits);
+        let change = self.state.scaled_change(&values);
+        let to = &point.limits.with_bounds(&limits.bounds);
+        let [accepted, met_kink] = self.method.note_restoration(&change, [limits, to]);
+        if accepted {
             self.state.values = values;
             self.state.value = point.objective.value;
             self.state.current = self.state.merit.lens(&self.state.values);
             (self.point, self.limits) = (point, found.limits);
         }
+        accepted || met_kink
     }
 
     /// Makes the current lens, whose rays are its own, the best one, or returns to the one verified
@@ -97,7 +106,8 @@ impl LimitedOptimizer {
     fn adopt_verified(&mut self) {
         let rank = self.rank();
         match self.verified.take() {
-            Some((lens, before)) if before < rank => {
+            // Limits that are broken may have to be broken more on the way to where they are kept.
+            Some((lens, before)) if before < rank && before.0 == 0.0 => {
                 self.state.current.clone_from(&lens);
                 self.state.values = self.state.merit.values(&lens);
                 self.find_rays();
