@@ -1,8 +1,12 @@
-//! What a higher order changes is in the stated errors.
+//! What a higher order changes, and what a plan leaves out, is in the stated errors.
 
-use super::{ACCURACY, check_every_lens, edge, near};
-use aplanat::analysis::rounding_error;
-use aplanat::pupil::{Accuracy, ConvergedValues, Nodes, Region, converge};
+use super::{ACCURACY, ROUGH, alike, check_every_lens, edge, ensure, near, text};
+use aplanat::analysis::{rounding_error, spot};
+use aplanat::effects::{
+    self, Effect, EffectOverride, EffectOverrides, EffectPlan, TracePurpose, build_ray_model_at,
+};
+use aplanat::lens::Lens;
+use aplanat::pupil::{Accuracy, ConvergedValues, Nodes, RayModel, Region, converge};
 
 /// What a higher order changes is in the stated error of a lower one.
 #[test]
@@ -31,4 +35,49 @@ fn moments_of(region: &Region<'_>, accuracy: Accuracy) -> Result<ConvergedValues
     };
     let scales = |[radius, _, area]: &[f64; 3]| [*radius, *radius, *area];
     converge(region, accuracy, numbers, scales).ok_or_else(|| "no light".to_owned())
+}
+
+/// What a plan leaves out is in the stated errors, that of the light in the tolerance asked for;
+/// whether the lens does not call for it or somebody has switched the search of the chief ray off.
+#[test]
+fn stated_errors_hold_what_a_plan_leaves_out() {
+    let planned = check_every_lens(|lens, model| {
+        let measured = effects::measure_effects(lens, 0).map_err(text)?;
+        let plan = |aiming| {
+            let overrides = EffectOverrides::default().with(Effect::Aiming, aiming);
+            effects::plan(&measured, TracePurpose::Spot(ROUGH.tolerance), &overrides)
+        };
+        let [auto, not_aimed] = [EffectOverride::Auto, EffectOverride::Off].map(plan);
+        let fields = changes_are_stated(lens, model, &auto);
+        let fields = fields.map_err(|why| format!("planned, {why}"))?;
+        ensure(fields == 2, || format!("planned: {fields} fields have light"))?;
+        // Where no ray through the paraxial pupil reaches the stop, the error is infinite.
+        if not_aimed.neglected().shift.is_finite() {
+            let not_aimed = changes_are_stated(lens, model, &not_aimed);
+            not_aimed.map_err(|why| format!("not aimed, {why}"))?;
+        }
+        Ok([!auto.computes(Effect::Aiming), !auto.unclipped.is_empty()])
+    });
+    for k in [0, 1] {
+        assert!(planned.iter().any(|left_out| left_out[k]), "nothing is left out");
+    }
+}
+
+/// Compares the spots of a lens and its light, on the axis and at the edge of the field, with what a
+/// plan leaves out and without; the number of fields that have light without.
+fn changes_are_stated(lens: &Lens, model: &RayModel, plan: &EffectPlan) -> Result<usize, String> {
+    let planned = build_ray_model_at(lens, 0, &model.fields, plan).map_err(text)?;
+    let last = model.fields.iter().position(|field| *field == edge(model)).unwrap();
+    let mut fields = 0;
+    for k in [0, last] {
+        let exact = spot(model, model.fields[k], ROUGH).map_err(text)?;
+        // A field that is dark has no number, and says so.
+        let Ok(found) = spot(&planned, planned.fields[k], ROUGH) else { continue };
+        let at = |what: &str| format!("{what} at {}", model.fields[k].y);
+        alike(&at("radius"), exact.rms, found.rms)?;
+        let error = exact.light.error + found.light.error + ROUGH.tolerance * exact.light.value;
+        near(&at("light"), exact.light.value, found.light.value, error)?;
+        fields += 1;
+    }
+    Ok(fields)
 }
