@@ -23,13 +23,17 @@ impl Panel for SeidelPanel {
         };
         ScrollArea::both().auto_shrink([false, false]).show(ui, |ui| match &numbers.seidel.value {
             Some(seidel) => sums(ui, &results.lens, seidel),
-            None if numbers.ray_model.value.has_grin() => {
-                drop(ui.weak(
-                    "No third-order sums: those of a gradient-index medium are not implemented",
-                ));
-            }
-            None => drop(ui.weak("No third-order sums: the lens has no paraxial chief ray")),
+            None => drop(ui.weak(missing_sums(numbers.ray_model.value.has_grin()))),
         });
+    }
+}
+
+/// The reason why a lens has no sums.
+const fn missing_sums(has_grin: bool) -> &'static str {
+    if has_grin {
+        "No third-order sums: those of a gradient-index medium are not implemented"
+    } else {
+        "No third-order sums: the lens has no paraxial chief ray"
     }
 }
 
