@@ -248,3 +248,29 @@ pub(super) fn rounding_error<R: Real>(at: Vec3<R>, displacement: Vec3<R>) -> R {
     let size = at.dot(at).sqrt() + displacement.dot(displacement).sqrt();
     R::from_f64(1e3 * R::EPSILON) * size
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// `2x² + 3y² − z² + x − 4y + 5z − 7` and its zeros along a ray, by substitution.
+    #[test]
+    fn a_ray_crosses_a_general_quadric_at_the_roots_of_its_equation() {
+        let face = Face {
+            square: Vec3::new(2.0, 3.0, -1.0),
+            linear: Vec3::new(1.0, -4.0, 5.0),
+            constant: -7.0,
+        };
+        let value = |p: Vec3<f64>| {
+            2.0 * p.x * p.x + 3.0 * p.y * p.y - p.z * p.z + p.x - 4.0 * p.y + 5.0 * p.z - 7.0
+        };
+        let (x, v) = (Vec3::new(0.3, -0.2, 0.1), Vec3::new(0.7, 0.5, 0.4));
+        assert!((face.level(x) - value(x)).abs() < 1e-14);
+        let roots = face.crossings(x, v).unwrap();
+        for t in roots {
+            let p = Vec3::new(x.x + t * v.x, x.y + t * v.y, x.z + t * v.z);
+            assert!(value(p).abs() < 1e-12, "{t}: {}", value(p));
+        }
+        assert!((roots[0] - roots[1]).abs() > 0.1, "{roots:?}");
+    }
+}

@@ -233,6 +233,16 @@ mod tests {
     }
 
     #[test]
+    fn an_axis_is_widened_on_both_sides_alike() {
+        let axis = Axis::linear("mm", [2.0, 12.0]);
+        let (low, high) = (axis.low, axis.high);
+        let wide = axis.widened(high - low + 6.0);
+        assert_eq!((wide.low, wide.high), (low - 3.0, high + 3.0));
+        let same = wide.clone().widened(1.0);
+        assert_eq!((same.low, same.high), (wide.low, wide.high));
+    }
+
+    #[test]
     fn an_axis_of_one_value_or_none_has_a_length() {
         for axis in [Axis::linear("", [3.0]), Axis::linear("", []), Axis::linear("", [f64::NAN])] {
             assert!(axis.high > axis.low, "{axis:?}");

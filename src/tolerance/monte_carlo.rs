@@ -130,6 +130,37 @@ pub fn wilson_interval(good: usize, count: usize) -> [f64; 2] {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::lens::{Shape, Surface};
+    use crate::math::Vec3;
+    use crate::tolerance::{ColourRays, FieldBeam};
+    use crate::trace::Ray;
+
+    /// A hole of radius 1 in front of the image plane, and a field with this weight whose rays are at
+    /// these heights.
+    fn clipped(weight: f64, heights: &[f64]) -> Option<(Beam, f64)> {
+        let mut hole = Surface::plane(1.0, 1.0);
+        hole.semi_diameter = 1.0;
+        let image = Surface { shape: Shape::Plane, ..Surface::plane(0.0, 1.0) };
+        let system = System { index_before: 1.0, surfaces: vec![hole, image], stop: None };
+        let along =
+            |y: f64| Ray { point: Vec3::new(0.0, y, 0.0), direction: Vec3::new(0.0, 0.0, 1.0) };
+        let mut colour = ColourRays::new(0);
+        for y in heights {
+            colour.push(along(*y), 1.0 / heights.len() as f64, [0.0, *y], 0.0);
+        }
+        let field = FieldBeam { weight, colours: vec![colour], chief: (along(0.0), 0.0) };
+        transmitted(&Beam { fields: vec![field] }, &[Tracer::new(&system).unwrap()])
+    }
+
+    #[test]
+    fn clipped_rays_lose_their_light_and_the_others_share_the_weight() {
+        let (beam, lost) = clipped(0.8, &[0.0, 0.5, -0.5, 2.0]).unwrap();
+        let colour = &beam.fields[0].colours[0];
+        assert_eq!(colour.rays.len(), 3);
+        assert!(colour.weights.iter().all(|w| (w - 1.0 / 3.0).abs() < 1e-15));
+        assert!((lost - 0.2).abs() < 1e-15, "{lost}");
+        assert!(clipped(0.8, &[3.0, 2.0]).is_none());
+    }
 
     #[test]
     fn an_interval_without_failures_does_not_reach_certainty() {

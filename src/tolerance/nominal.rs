@@ -189,3 +189,24 @@ impl NominalLens {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn two_opposite_fields_share_the_weight_of_one() {
+        let ray = |x: f64, y: f64| Ray {
+            point: Vec3::new(x, y, 0.0),
+            direction: Vec3::new(0.0, 0.6, 0.8),
+        };
+        let mut colour = ColourRays::new(0);
+        colour.push(ray(1.0, 2.0), 1.0, [0.1, 0.2], 0.0);
+        let field = FieldBeam { weight: 0.3, colours: vec![colour], chief: (ray(0.0, 0.0), 0.0) };
+        let [same, opposite] = both_sides(&field).try_into().unwrap();
+        assert_eq!([same.weight, opposite.weight], [0.15, 0.15]);
+        let turned = opposite.colours[0].rays[0];
+        assert_eq!([turned.point.x, turned.point.y, turned.direction.y], [-1.0, -2.0, -0.6]);
+        assert_eq!(opposite.colours[0].pupil[0], [-0.1, -0.2]);
+    }
+}

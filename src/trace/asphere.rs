@@ -196,3 +196,32 @@ pub(super) fn newton_crossings<R: Real, const W: usize>(
 
 /// The number of steps of Newton's iteration before a crossing is isolated instead.
 const NEWTON_STEPS: usize = 10;
+
+#[cfg(test)]
+mod bounds {
+    use super::*;
+    use crate::lens::{Shape, Surface, System};
+    use crate::trace::Tracer;
+
+    #[test]
+    fn the_sag_of_an_asphere_stays_within_its_bounds() {
+        let shape = Shape::Asphere {
+            curvature: 0.05,
+            conic: -0.4,
+            terms: std::array::from_fn(|j| [-2e-5, 3e-7, -1e-9].get(j).copied().unwrap_or(0.0)),
+        };
+        let surface = Surface { shape, ..Surface::plane(1.0, 1.5) };
+        let surfaces = vec![surface, Surface::plane(0.0, 1.5)];
+        let tracer = Tracer::new(&System { index_before: 1.0, surfaces, stop: None }).unwrap();
+        let interface = tracer.interfaces[0];
+        for range in [(0.0, 0.1), (2.0, 2.05), (4.0, 4.02)] {
+            let (low, high, _) = interface.sag_bounds(range);
+            let sag = |r: f64| interface.sag(r * r).0;
+            for r in [range.0, 0.5 * (range.0 + range.1), range.1] {
+                assert!(low <= sag(r) && sag(r) <= high, "{low} {} {high}", sag(r));
+            }
+            let own = (sag(range.1) - sag(range.0)).abs();
+            assert!(high - low < 10.0 * own + 1e-3, "{low} {high}, but it changes by {own}");
+        }
+    }
+}

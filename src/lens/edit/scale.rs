@@ -27,6 +27,7 @@ pub(super) fn scale(lens: &mut Lens, factor: f64) -> Result<(), EditError> {
         row.thickness *= factor;
         row.semi_diameter = row.semi_diameter.map(|sd| sd * factor);
         row.obstruction = row.obstruction.map(|inner| inner * factor);
+        row.decenter = row.decenter.map(|length| length * factor);
         for (term, a) in row.asphere.iter_mut().enumerate() {
             *a *= factor.powi(-(2 * term as i32 + 3));
         }
@@ -84,5 +85,27 @@ fn scale_bounds_and_pickups(lens: &mut Lens, factor: f64) {
         let by = factor.powi(powers(pickup.parameter));
         pickup.offset *= by;
         pickup.scale *= by / factor.powi(powers(pickup.source));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lens::{FieldPoint, blank};
+
+    #[test]
+    fn heights_of_fields_and_decentres_are_lengths_and_angles_are_not() {
+        for (kind, factor) in [(FieldKind::Angle, 1.0), (FieldKind::ImageHeight, 4.0)] {
+            let mut lens = blank();
+            let values = vec![FieldPoint { x: -1.5, y: 3.0, weight: 0.5 }];
+            lens.fields = Fields { kind, values };
+            lens.surfaces =
+                vec![Row { decenter: [0.25, -0.5], tilt: [1.0, 2.0], ..Row::default() }];
+            scale(&mut lens, 4.0).unwrap();
+            let field = lens.fields.values[0];
+            assert_eq!([field.x, field.y, field.weight], [-1.5 * factor, 3.0 * factor, 0.5]);
+            assert_eq!(lens.surfaces[0].decenter, [1.0, -2.0]);
+            assert_eq!(lens.surfaces[0].tilt, [1.0, 2.0]);
+        }
     }
 }

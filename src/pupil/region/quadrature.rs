@@ -319,3 +319,15 @@ impl ConvergedList {
         (0..values.len()).map(|k| error(change(k), self.errors[k])).collect()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_error_of_clipped_points_falls_to_a_quarter_at_most() {
+        assert_eq!(sampling_error(1e-6, f64::INFINITY), 2e-6);
+        assert_eq!(sampling_error(1e-6, 4e-4), 1e-4);
+        assert_eq!(sampling_error(3e-4, 4e-4), 6e-4);
+    }
+}

@@ -148,3 +148,44 @@ fn has_light(lens: &Lens, asked: &LensRequirements) -> bool {
     };
     model.fields.iter().zip(&asked.clear_area).all(enough)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Three planes, which leave a chief ray straight.
+    fn planes() -> System<f64> {
+        let gap = |thickness| Surface::plane(thickness, 1.0);
+        let surfaces = vec![gap(4.0), gap(6.0), gap(10.0), gap(0.0)];
+        System { index_before: 1.0, surfaces, stop: None }
+    }
+
+    #[test]
+    fn a_stop_is_in_the_gap_where_the_chief_ray_crosses_the_axis() {
+        let place = StopPlace::find(&planes(), 5.5);
+        assert_eq!(place.surface, 1);
+        assert!((place.distance - 1.5).abs() < 1e-12, "{}", place.distance);
+        let (system, stop) = place.inserted(&planes());
+        assert_eq!(stop, 2);
+        let gaps: Vec<f64> = system.surfaces.iter().map(|s| s.thickness).collect();
+        assert_eq!(gaps, [4.0, 1.5, 4.5, 10.0, 0.0]);
+    }
+
+    /// The entrance pupil of a stop behind a lens is where paraxial optics has it.
+    #[test]
+    fn the_pupil_of_a_stop_behind_a_lens_leads_back_to_it() {
+        let mut system = planes();
+        system.surfaces[0] = Surface {
+            shape: crate::lens::Shape::Sphere { curvature: 0.02 },
+            ..Surface::plane(3.0, 1.5)
+        };
+        system.surfaces[1] = Surface::plane(8.0, 1.0);
+        // From a stop 2 mm behind the second surface, backwards: l = −2 · 1.5 − 3 in glass, then
+        // 1/l' = 1.5/(−l) reversed through the first surface of power 0.01.
+        let inside = 3.0 + 2.0 * 1.5;
+        let pupil = 1.0 / (1.5 / inside - 0.01);
+        let place = StopPlace::find(&system, pupil);
+        assert_eq!(place.surface, 1);
+        assert!((place.distance - 2.0).abs() < 1e-12, "{}", place.distance);
+    }
+}

@@ -268,3 +268,71 @@ pub(super) fn achromats(asked: &LensRequirements) -> Vec<NamedDraft> {
     }
     found
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::search::design::LensSpecification;
+    use rand::SeedableRng as _;
+
+    fn requirements() -> LensRequirements {
+        let spec: LensSpecification = serde_json::from_str(
+            r#"{"focal_length_mm": 80.0, "f_number": 4.0, "half_field_deg": 10.0}"#,
+        )
+        .unwrap();
+        LensRequirements::complete(&spec).unwrap().0
+    }
+
+    fn focal_length(draft: &LensDraft, um: f64) -> f64 {
+        let system = draft.lens.resolve(0, um).unwrap();
+        let (mut y, mut nu, mut before) = (1.0, 0.0, 1.0);
+        for surface in &system.surfaces[..system.surfaces.len() - 1] {
+            nu -= y * (surface.index - before) * surface.shape.curvature();
+            before = surface.index;
+            y += surface.thickness * nu / before;
+        }
+        -1.0 / nu
+    }
+
+    #[test]
+    fn random_lenses_have_the_focal_length_and_fit_into_the_track() {
+        let (asked, mut random) = (requirements(), Random::seed_from_u64(4));
+        let drafts: Vec<_> = (0..200).filter_map(|_| random_lens(&asked, &mut random)).collect();
+        assert!(drafts.len() > 20, "{}", drafts.len());
+        for draft in &drafts {
+            let um = draft.lens.wavelengths[draft.lens.primary()].um;
+            assert!((focal_length(draft, um) / 80.0 - 1.0).abs() < 1e-9);
+            let rows = &draft.lens.surfaces;
+            let back = rows.last().unwrap().thickness;
+            assert!(back <= asked.track && back > 0.3 * asked.back_focus, "{back}");
+            assert!(rows.iter().all(|row| row.thickness > 0.0), "{rows:?}");
+        }
+        let elements = |draft: &LensDraft| piece_count(&draft.lens);
+        assert!(drafts.iter().all(|draft| (1..=asked.elements).contains(&elements(draft))));
+    }
+
+    #[test]
+    fn achromats_have_their_power_and_no_colour_as_thin_lenses() {
+        for start in achromats(&requirements()) {
+            let mut draft = start.draft;
+            draft.lens.surfaces[..2].iter_mut().for_each(|row| row.thickness = 0.0);
+            let [blue, yellow, red] =
+                [0.4861327, 0.5875618, 0.6562725].map(|um| focal_length(&draft, um));
+            assert!((yellow / 80.0 - 1.0).abs() < 1e-9, "{}: {yellow}", start.name);
+            assert!((blue / red - 1.0).abs() < 1e-4, "{}: {blue} {red}", start.name);
+        }
+    }
+
+    #[test]
+    fn the_nearest_lenses_of_the_library_come_first() {
+        let asked = requirements();
+        let named = |name: &str| library_lenses().iter().find(|entry| entry.name == name).unwrap();
+        let tessar = distance(named("tessar_50_f28"), &asked).unwrap();
+        let expected = (2.8_f64 / 4.0).ln().abs();
+        assert!(tessar > expected && tessar < expected + 4.0, "{tessar}");
+        assert!(distance(named("zoom_nikkor_43_86_f35"), &asked).is_none_or(|d| d.is_finite()));
+        let starts = library_starts(&asked, &[]);
+        let far = |start: &NamedDraft| distance(named(&start.name), &asked).unwrap();
+        assert!(starts.windows(2).all(|pair| far(&pair[0]) <= far(&pair[1])));
+    }
+}

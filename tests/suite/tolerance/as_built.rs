@@ -111,9 +111,8 @@ fn the_gradient_of_the_as_built_spot_is_that_of_differences() {
     }
 }
 
-/// The whole gradient of the file to 1e-8 of its largest part; takes minutes without optimization.
+/// The whole gradient of the file to 1e-8 of its largest part.
 #[test]
-#[ignore = "takes minutes"]
 fn the_gradient_of_the_as_built_spot_is_exact() {
     let lens = &lenses()[0];
     let data = &lens.data["as_built_gradient"];

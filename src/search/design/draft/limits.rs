@@ -181,3 +181,19 @@ fn sag_slopes(row: &Row, height: f64) -> Vec<(SurfaceParameter, f64)> {
     slopes.extend((0..super::parameter::USED_TERMS).map(term));
     slopes
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_range_of_the_index_is_linear_between_the_points_of_the_map() {
+        let ([low, high], [low_slope, high_slope]) = glass_range(62.5);
+        assert!((low - 1.5).abs() < 1e-12 && (high - 1.615).abs() < 1e-12, "{low} {high}");
+        assert!((low_slope + 0.002).abs() < 1e-12 && (high_slope + 0.012).abs() < 1e-12);
+        for (vd, least, most) in GLASS_MAP {
+            let ([low, high], _) = glass_range(vd);
+            assert!((low - least).abs() < 1e-12 && (high - most).abs() < 1e-12, "{vd}");
+        }
+    }
+}
