@@ -198,8 +198,7 @@ pub(super) fn newton_crossings<R: Real, const W: usize>(
 const NEWTON_STEPS: usize = 10;
 
 #[cfg(test)]
-mod bounds {
-    use super::*;
+mod tests {
     use crate::lens::{Shape, Surface, System};
     use crate::trace::Tracer;
 

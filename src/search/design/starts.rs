@@ -277,7 +277,7 @@ mod tests {
 
     fn requirements() -> LensRequirements {
         let spec: LensSpecification = serde_json::from_str(
-            r#"{"focal_length_mm": 80.0, "f_number": 4.0, "half_field_deg": 10.0}"#,
+            r#"{"focal_length_mm": 80.0, "f_number": 4.0, "half_field_deg": 10.0, "max_elements": 6}"#,
         )
         .unwrap();
         LensRequirements::complete(&spec).unwrap().0
@@ -327,10 +327,13 @@ mod tests {
     fn the_nearest_lenses_of_the_library_come_first() {
         let asked = requirements();
         let named = |name: &str| library_lenses().iter().find(|entry| entry.name == name).unwrap();
-        let tessar = distance(named("tessar_50_f28"), &asked).unwrap();
-        let expected = (2.8_f64 / 4.0).ln().abs();
-        assert!(tessar > expected && tessar < expected + 4.0, "{tessar}");
-        assert!(distance(named("zoom_nikkor_43_86_f35"), &asked).is_none_or(|d| d.is_finite()));
+        let tessar = named("tessar_50_f28");
+        assert_eq!((tessar.elements, tessar.aperture.f_number().unwrap()), (4, &[2.8][..]));
+        let half = tessar.field.half_angle().unwrap()[0];
+        let expected = (4.0_f64 / 2.8).ln() + 2.0 * (half / 10.0).ln().abs() + 0.5 * (6.0 - 4.0);
+        let found = distance(tessar, &asked).unwrap();
+        assert!((found - expected).abs() < 1e-12, "{found}, not {expected}");
+        assert_eq!(distance(named("zoom_tamron_28_75_f28"), &asked), None);
         let starts = library_starts(&asked, &[]);
         let far = |start: &NamedDraft| distance(named(&start.name), &asked).unwrap();
         assert!(starts.windows(2).all(|pair| far(&pair[0]) <= far(&pair[1])));
