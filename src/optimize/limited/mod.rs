@@ -165,7 +165,7 @@ impl LimitedOptimizer {
     /// Evaluates a step, and takes it if that lowers the merit at the prices of the limits.
     fn take(&mut self, mut step: LimitedStep) -> bool {
         let proposed = self.state.proposal(step.change.as_slice(), 1.0);
-        let values = self.restored(&step, proposed);
+        let values = self.restored(&step, &proposed);
         step.change = self.state.scaled_change(&values);
         let Some((to, limits)) = self.evaluate(&values, &step) else { return false };
         if self.method.note_trial(&step, &self.point, &to) {
@@ -242,7 +242,7 @@ impl LimitedOptimizer {
 
     /// The values of a proposal after corrections that keep the limits that need no rays as the
     /// derivatives have promised.
-    fn restored(&self, step: &LimitedStep, proposed: Vec<f64>) -> Vec<f64> {
+    fn restored(&self, step: &LimitedStep, proposed: &[f64]) -> Vec<f64> {
         let aims: Vec<[f64; 2]> = self
             .point
             .limits
@@ -251,7 +251,7 @@ impl LimitedOptimizer {
             .zip(step.values.iter())
             .map(|([low, high], promised)| [low.min(*promised), high.max(*promised)])
             .collect();
-        let mut values = proposed.clone();
+        let mut values = proposed.to_vec();
         for _ in 0..TRIAL_CORRECTIONS {
             let merit = &self.state.merit;
             let Ok(found) = merit.mechanical_limits(&values, DerivativeLevel::Gradient) else {
@@ -264,7 +264,7 @@ impl LimitedOptimizer {
             }
             match self.corrected(&values, &aimed) {
                 // Beyond the length of the step the derivatives tell nothing.
-                Some(next) if self.is_near(&proposed, &next, step) => values = next,
+                Some(next) if self.is_near(proposed, &next, step) => values = next,
                 _ => break,
             }
         }
