@@ -113,7 +113,7 @@ pub(super) fn run_sweep(
     let mut designs = vec![start];
     for (i, beta) in plan.betas.iter().enumerate() {
         let mut goal = goal.clone();
-        goal.terms.push(WeightedTerm { term: Term::Throughput, weight: *beta });
+        goal.terms.push(WeightedTerm::new(Term::Throughput, *beta));
         let begin = &designs[designs.len() - 1].lens;
         let search = start_annealed(begin, &goal, SEARCH_TOLERANCE, plan.steps);
         let mut search = search?;

@@ -3,6 +3,7 @@
 
 use super::LensError;
 use super::check::check_number;
+use super::operand::{OperandKind, TermScope, TermSelection, check_scope};
 use serde::{Deserialize, Serialize};
 
 /// The goal of an optimization: the terms of its merit function.
@@ -72,6 +73,16 @@ pub struct WeightedTerm {
     pub term: Term,
     /// Its factor in the sum.
     pub weight: f64,
+    /// The part of the lens to which it applies.
+    #[serde(default, skip_serializing_if = "TermScope::is_all")]
+    pub scope: TermScope,
+}
+
+impl WeightedTerm {
+    /// A term that applies to the whole lens.
+    pub const fn new(term: Term, weight: f64) -> Self {
+        Self { term, weight, scope: TermScope::ALL }
+    }
 }
 
 /// A term (operand) of the merit function. Every term is the mean over the zoom positions; all
@@ -142,6 +153,17 @@ pub enum Term {
         /// The maximum semi-diameter, in mm.
         max: f64,
     },
+    /// Squared violations of the bounds of a quantity, in the square of its unit.
+    Operand {
+        /// The quantity.
+        kind: OperandKind,
+        /// The lower bound; `None` for none.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        min: Option<f64>,
+        /// The upper bound; `None` for none. A target has two equal bounds.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        max: Option<f64>,
+    },
 }
 
 impl Term {
@@ -165,6 +187,7 @@ impl Term {
             Self::FNumber(_) => "f_number",
             Self::Steepness(_) => "steepness",
             Self::SemiDiameter { .. } => "semi_diameter",
+            Self::Operand { kind, .. } => kind.name(),
         }
     }
 
@@ -176,6 +199,7 @@ impl Term {
             | Self::AirCenter { min, max }
             | Self::SemiDiameter { min, max } => vec![min, max],
             Self::RelativeIllumination { min, .. } => vec![min],
+            Self::Operand { min, max, .. } => min.into_iter().chain(max).collect(),
             Self::ThroughputLoss(v)
             | Self::Light(v)
             | Self::FNumber(v)
@@ -187,9 +211,46 @@ impl Term {
             | Self::BackFocus(v) => vec![v],
         }
     }
+
+    /// The selections that the scope of the term may have.
+    pub const fn selections(self) -> &'static [TermSelection] {
+        use TermSelection::{Fields, Surfaces, Wavelengths, Zooms};
+        match self {
+            Self::Spot
+            | Self::SpotIntegral
+            | Self::Throughput
+            | Self::ThroughputLoss(_)
+            | Self::Light(_) => &[Fields, Wavelengths, Zooms],
+            Self::Distortion => &[Fields, Zooms],
+            Self::GlassCenter { .. }
+            | Self::GlassEdge(_)
+            | Self::AirCenter { .. }
+            | Self::AirEdge(_)
+            | Self::Steepness(_)
+            | Self::SemiDiameter { .. } => &[Surfaces, Zooms],
+            Self::RelativeIllumination { .. }
+            | Self::FNumber(_)
+            | Self::FocalLength(_)
+            | Self::TotalTrack(_)
+            | Self::BackFocus(_) => &[Zooms],
+            Self::Operand { kind, .. } => kind.selections(),
+        }
+    }
 }
 
 impl Term {
+    /// True if the surfaces of its scope stand for the gaps behind them.
+    pub(super) const fn is_of_gaps(self) -> bool {
+        matches!(
+            self,
+            Self::GlassCenter { .. }
+                | Self::GlassEdge(_)
+                | Self::AirCenter { .. }
+                | Self::AirEdge(_)
+                | Self::Operand { kind: OperandKind::Gap | OperandKind::Track, .. }
+        )
+    }
+
     /// Multiplies its lengths by a factor.
     fn scale(&mut self, factor: f64) {
         match self {
@@ -205,6 +266,9 @@ impl Term {
                 *max *= factor;
             }
             Self::ThroughputLoss(area) => *area *= factor * factor,
+            Self::Operand { kind, min, max } if !kind.is_angle() => {
+                min.iter_mut().chain(max).for_each(|bound| *bound *= factor);
+            }
             Self::Spot
             | Self::SpotIntegral
             | Self::Throughput
@@ -212,6 +276,7 @@ impl Term {
             | Self::RelativeIllumination { .. }
             | Self::FNumber(_)
             | Self::Distortion
+            | Self::Operand { .. }
             | Self::Steepness(_) => {}
         }
     }
@@ -225,6 +290,7 @@ impl Term {
             | Self::RelativeIllumination { .. }
             | Self::FNumber(_)
             | Self::Steepness(_) => 0,
+            Self::Operand { kind, .. } if kind.is_angle() => 0,
             _ => 2,
         }
     }
@@ -234,15 +300,53 @@ impl Goal {
     /// Follows a lens whose lengths are multiplied by a factor: the targets keep their proportion to
     /// the lens, and the weights keep the balance of the terms.
     pub(super) fn scale(&mut self, factor: f64) {
-        for WeightedTerm { term, weight } in &mut self.terms {
+        for WeightedTerm { term, weight, .. } in &mut self.terms {
             term.scale(factor);
             *weight *= factor.powi(2 - term.power());
         }
     }
 
+    /// Follows surfaces or zoom positions that are inserted, removed or reversed: `map` tells the new
+    /// index of each, or `None` for one that is gone. A term about nothing that is left is removed.
+    pub(super) fn renumber(
+        &mut self,
+        selection: TermSelection,
+        map: impl Fn(Term, usize) -> Option<usize>,
+    ) {
+        self.terms.retain_mut(|weighted| {
+            let term = weighted.term;
+            if let (Term::RelativeIllumination { field, .. }, TermSelection::Fields) =
+                (&mut weighted.term, selection)
+            {
+                let Some(moved) = map(term, *field) else { return false };
+                *field = moved;
+            }
+            let Some([first, last]) = weighted.scope.range(selection) else { return true };
+            let moved = (first..=last).filter_map(|i| map(weighted.term, i));
+            let ends = moved.fold(None, |ends: Option<[usize; 2]>, i| {
+                Some(ends.map_or([i, i], |[low, high]| [low.min(i), high.max(i)]))
+            });
+            *weighted.scope.range_mut(selection) = ends;
+            ends.is_some()
+        });
+    }
+
+    /// The goal of a lens that is only its zoom position of this index.
+    pub(super) fn restrict_to_zoom(&mut self, zoom: usize) {
+        let ratio = self.zoom_ratios.get(zoom).copied().unwrap_or(1.0);
+        self.zoom_ratios.clear();
+        self.terms.retain(|weighted| weighted.scope.has(TermSelection::Zooms, zoom));
+        for WeightedTerm { term, scope, .. } in &mut self.terms {
+            scope.zooms = None;
+            if let Term::FocalLength(target) = term {
+                *target *= ratio;
+            }
+        }
+    }
+
     /// Checks the weights and targets, whatever the lens.
     pub(super) fn check_numbers(&self) -> Result<(), LensError> {
-        for WeightedTerm { term, weight } in &self.terms {
+        for WeightedTerm { term, weight, scope } in &self.terms {
             let name = term.name();
             let what = format!("the weight of the term `{name}` of the merit function");
             check_number(what, *weight, *weight >= 0.0, "zero or more")?;
@@ -250,6 +354,7 @@ impl Goal {
                 let what = format!("a target of the term `{name}` of the merit function");
                 check_number(what, target, true, "a finite number")?;
             }
+            check_scope(name, *scope)?;
             if let [min, max] = term.numbers()[..]
                 && min > max
             {

@@ -1,7 +1,7 @@
 //! Renumbering and reversing rows, along with the variables, pickups and zoom positions that name
 //! them.
 
-use super::{Lens, Medium, Parameter, Pickup, Quantity, Variable, ZoomThickness};
+use super::{Lens, Medium, Parameter, Pickup, Quantity, TermSelection, Variable, ZoomThickness};
 
 impl Lens {
     /// Maps the parameters of all variables and pickups; those mapped to `None` are removed.
@@ -16,12 +16,15 @@ impl Lens {
         self.pickups = self.pickups.iter().filter_map(pickup).collect();
     }
 
-    /// Maps the row indices of variables, pickups and zoom positions, for rows that were inserted or
+    /// Maps the row indices of variables, pickups, zoom positions and merit terms, for rows that were inserted or
     /// removed; those mapped to `None` are removed.
     pub fn renumber_rows(&mut self, map: impl Fn(usize) -> Option<usize>) {
         self.map_parameters(|p| map(p.surface).map(|surface| Parameter { surface, ..p }));
         if let Some(sheet) = &mut self.tolerances {
             sheet.renumber(|_, i| map(i));
+        }
+        if let Some(goal) = &mut self.merit {
+            goal.renumber(TermSelection::Surfaces, |_, i| map(i));
         }
         for position in &mut self.zoom {
             let gap = |gap: &ZoomThickness| {
@@ -47,6 +50,11 @@ impl Lens {
         if let Some(sheet) = &mut self.tolerances {
             sheet.renumber(|kind, i| {
                 Some(if kind.is_of_gap() { reversal.gap(i) } else { reversal.surface(i) })
+            });
+        }
+        if let Some(goal) = &mut self.merit {
+            goal.renumber(TermSelection::Surfaces, |term, i| {
+                Some(if term.is_of_gaps() { reversal.gap(i) } else { reversal.surface(i) })
             });
         }
         for gap in self.zoom.iter_mut().flat_map(|position| &mut position.thicknesses) {

@@ -127,6 +127,9 @@ pub fn at_zoom(lens: &Lens, zoom: usize) -> Lens {
             Some(Pickup { parameter, source, ..*pickup })
         })
         .collect();
+    if let Some(goal) = &mut single.merit {
+        goal.restrict_to_zoom(zoom);
+    }
     single.variables.retain(|v| !matches!(v.parameter.quantity, Quantity::ZoomThickness(_)));
     single
 }

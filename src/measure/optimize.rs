@@ -95,10 +95,8 @@ fn time(
     steps: usize,
     stop: &AtomicBool,
 ) -> Result<Option<StepRow>, BenchmarkError> {
-    let terms = vec![
-        WeightedTerm { term: Term::Spot, weight: 1.0 },
-        WeightedTerm { term: Term::FocalLength(99.5), weight: 1e-2 },
-    ];
+    let terms =
+        vec![WeightedTerm::new(Term::Spot, 1.0), WeightedTerm::new(Term::FocalLength(99.5), 1e-2)];
     let goal = Goal {
         terms,
         pupil: PupilEdge::Frozen,

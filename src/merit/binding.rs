@@ -37,9 +37,12 @@ pub(super) struct Configuration {
     /// The systems, one per wavelength.
     systems: Vec<System<f64>>,
     /// The surface that is the stop.
-    stop: usize,
-    /// The beam that fills the stop as far as its aperture says; `None` if the stop is the aperture.
-    filling_beam: Option<Beam>,
+    pub(super) stop: usize,
+    /// The beam of the lens.
+    pub(super) beam: Beam,
+    /// True if the beam fills the stop as far as its aperture says; false if the stop is the
+    /// aperture.
+    fills_stop: bool,
     bindings: Vec<Vec<ParameterBinding>>,
     /// The distance of the image plane from the paraxial focus in mm, if the last gap is solved
     /// for.
@@ -60,6 +63,15 @@ pub(super) struct ResolvedSystems {
     focus_slopes: Option<DVector<f64>>,
     /// The derivatives of the radius of the stop by the variables, if a beam fills it in part.
     stop_slopes: Option<DVector<f64>>,
+}
+
+impl ResolvedSystems {
+    /// The systems, one per wavelength, that of the primary one as its parts are made.
+    pub(super) fn of_wavelengths(&self, primary: usize) -> Vec<System<f64>> {
+        let mut all = self.clipped.clone();
+        all[primary].clone_from(&self.manufactured);
+        all
+    }
 }
 
 impl Configuration {
@@ -94,7 +106,8 @@ impl Configuration {
             field_kind: lens.fields_at(zoom).kind,
             is_glass: (0..lens.surfaces.len()).map(glass).collect(),
             stop,
-            filling_beam: (!matches!(beam.aperture, Aperture::StopSemiDiameter(_))).then_some(beam),
+            beam,
+            fills_stop: !matches!(beam.aperture, Aperture::StopSemiDiameter(_)),
             focus_offset: lens.image_solve,
             variables: lens.variables.len(),
             bindings,
@@ -126,7 +139,10 @@ impl Configuration {
     /// Limits the stop to what the beam fills of it, and returns the derivatives of its radius by
     /// the variables; `None` if its own rim is smaller.
     fn fill_stop(&self, systems: &mut [System<f64>]) -> Result<Option<DVector<f64>>, MeritError> {
-        let Some(beam) = &self.filling_beam else { return Ok(None) };
+        if !self.fills_stop {
+            return Ok(None);
+        }
+        let beam = &self.beam;
         let primary = &systems[self.primary];
         let radius = filled_stop_radius(primary, beam)?;
         if primary.surfaces[self.stop].semi_diameter <= radius {
@@ -183,8 +199,19 @@ impl Configuration {
 
     /// A system with its derivatives along a block of variables, given by the first.
     fn along_without_focus(&self, primary: &System<f64>, first: usize) -> System<VariableDual> {
-        let mut system: System<VariableDual> = primary.cast();
-        for binding in &self.bindings[self.primary] {
+        self.along_at(primary, self.primary, first)
+    }
+
+    /// The system of a wavelength with its derivatives along a block of variables, given by the
+    /// first.
+    fn along_at(
+        &self,
+        system: &System<f64>,
+        wavelength: usize,
+        first: usize,
+    ) -> System<VariableDual> {
+        let mut system: System<VariableDual> = system.cast();
+        for binding in &self.bindings[wavelength] {
             let direction = binding.variable.checked_sub(first).filter(|along| *along < SLOPES);
             if let Some(direction) = direction {
                 let number = binding.target.value_mut(&mut system, binding.surface);
@@ -192,6 +219,37 @@ impl Configuration {
             }
         }
         system
+    }
+
+    /// The systems of all wavelengths with their derivatives along each block of variables in turn,
+    /// with the first variable of the block.
+    pub(super) fn all_systems_along<'a>(
+        &'a self,
+        systems: &'a ResolvedSystems,
+    ) -> impl Iterator<Item = (usize, Vec<System<VariableDual>>)> + 'a {
+        let all = systems.of_wavelengths(self.primary);
+        (0..self.variables).step_by(SLOPES).map(move |first| {
+            let along = |(i, system)| {
+                let mut system = self.along_at(system, i, first);
+                self.move_focus(&mut system, systems, first);
+                system
+            };
+            (first, all.iter().enumerate().map(along).collect())
+        })
+    }
+
+    /// Gives the last gap of a system its derivatives along a block of variables, if it is solved
+    /// for.
+    fn move_focus(
+        &self,
+        system: &mut System<VariableDual>,
+        systems: &ResolvedSystems,
+        first: usize,
+    ) {
+        let Some(focus) = &systems.focus_slopes else { return };
+        let last = system.surfaces.len() - 2;
+        let slopes = &mut system.surfaces[last].thickness.slope;
+        slopes.iter_mut().zip(focus.iter().skip(first)).for_each(|(to, by)| *to = *by);
     }
 
     /// The systems at the primary wavelength with their derivatives along each block of variables in
@@ -202,11 +260,7 @@ impl Configuration {
     ) -> impl Iterator<Item = (usize, System<VariableDual>)> + 'a {
         (0..self.variables).step_by(SLOPES).map(|first| {
             let mut system = self.along_without_focus(&systems.manufactured, first);
-            if let Some(focus) = &systems.focus_slopes {
-                let last = system.surfaces.len() - 2;
-                let slopes = &mut system.surfaces[last].thickness.slope;
-                slopes.iter_mut().zip(focus.iter().skip(first)).for_each(|(to, by)| *to = *by);
-            }
+            self.move_focus(&mut system, systems, first);
             (first, system)
         })
     }

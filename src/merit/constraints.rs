@@ -5,15 +5,19 @@
 use super::binding::{Configuration, ResolvedSystems};
 use super::first_order::slopes;
 use super::sum::SumOfSquares;
-use super::{EvaluationContext, MeritError, Term, VariableDual};
-use crate::lens::{Lens, SurfaceNumber, System};
+use super::{EvaluationContext, MeritError, Term, VariableDual, WeightedTerm};
+use crate::lens::{Lens, SurfaceNumber, System, TermScope, TermSelection};
 use crate::math::Real;
 use serde::Serialize;
 
 /// Adds the squared violations of one of the constraints.
-pub(super) fn add_constraints(context: &EvaluationContext<'_>, term: Term, sum: &mut SumOfSquares) {
-    for Constraint { quantity, min, max } in smooth_constraints(context.zoom, context.systems, term)
-    {
+pub(super) fn add_constraints(
+    context: &EvaluationContext<'_>,
+    weighted: WeightedTerm,
+    sum: &mut SumOfSquares,
+) {
+    let all = smooth_constraints(context.zoom, context.systems, weighted);
+    for Constraint { quantity, min, max } in all {
         let number = BoundedLength { quantity, context };
         min.into_iter().for_each(|min| number.at_least(min, sum));
         max.into_iter().for_each(|max| number.at_most(max, sum));
@@ -37,7 +41,13 @@ impl Constraint {
     pub(super) fn margin(&self, term: Term, zoom: usize, value: f64) -> ConstraintMargin {
         let Self { quantity, min, max } = self;
         let (term, surface) = (term.name(), quantity.surface());
-        ConstraintMargin { term, surface, zoom, um: None, value, min: *min, max: *max }
+        let (min, max) = (*min, *max);
+        ConstraintMargin { term, surface, field: None, zoom, um: None, value, min, max }
+    }
+
+    /// True if it belongs to the scope of its term.
+    fn is_in(&self, scope: TermScope) -> bool {
+        self.quantity.surface().is_none_or(|surface| scope.has(TermSelection::Surfaces, surface))
     }
 }
 
@@ -47,20 +57,41 @@ impl Constraint {
 pub(super) fn smooth_constraints(
     zoom: &Configuration,
     systems: &ResolvedSystems,
-    term: Term,
+    weighted: WeightedTerm,
 ) -> Vec<Constraint> {
-    let Term::GlassEdge(min) = term else { return constraints(zoom, systems, term) };
+    let Term::GlassEdge(min) = weighted.term else {
+        return constraints(zoom, systems, weighted);
+    };
     let at = |gap, rim| Constraint {
         quantity: ConstrainedQuantity::Edge { gap, rim },
         min: Some(min),
         max: None,
     };
     let both = |gap| [at(gap, EdgeRadius::Front), at(gap, EdgeRadius::Rear)];
-    zoom.inner_gaps(true).flat_map(both).collect()
+    let all = zoom.inner_gaps(true).flat_map(both);
+    all.filter(|constraint| constraint.is_in(weighted.scope)).collect()
+}
+
+/// The constraints of a term within its scope.
+fn constraints(
+    zoom: &Configuration,
+    systems: &ResolvedSystems,
+    weighted: WeightedTerm,
+) -> Vec<Constraint> {
+    if !weighted.scope.has(TermSelection::Zooms, zoom.zoom) {
+        return Vec::new();
+    }
+    let mut all = constraints_everywhere(zoom, systems, weighted.term);
+    all.retain(|constraint| constraint.is_in(weighted.scope));
+    all
 }
 
 /// The constraints of a term.
-fn constraints(zoom: &Configuration, systems: &ResolvedSystems, term: Term) -> Vec<Constraint> {
+fn constraints_everywhere(
+    zoom: &Configuration,
+    systems: &ResolvedSystems,
+    term: Term,
+) -> Vec<Constraint> {
     let last = zoom.is_glass.len() - 1;
     let both = |quantity, min, max| Constraint { quantity, min: Some(min), max: Some(max) };
     let least = |quantity, min| Constraint { quantity, min: Some(min), max: None };
@@ -101,6 +132,9 @@ pub struct ConstraintMargin {
     /// The surface, or the one in front of the gap, counted from 0; the field if it limits fields;
     /// `None` for the whole lens.
     pub surface: Option<usize>,
+    /// The field, counted from 0, of a quantity that belongs to a surface and a field.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub field: Option<usize>,
     /// The zoom position, counted from 0.
     pub zoom: usize,
     /// The wavelength in micrometres if the light at one of them is limited.
@@ -121,7 +155,12 @@ impl ConstraintMargin {
     /// The constrained surface, or the field with the wavelength, as it is displayed; `None` for the
     /// whole lens.
     pub fn place(&self) -> Option<String> {
-        let index = self.surface?;
+        let Some(index) = self.surface else {
+            return self.field.map(|field| format!("field {field}"));
+        };
+        if let Some(field) = self.field {
+            return Some(format!("surface {}, field {field}", SurfaceNumber::new(index)));
+        }
         Some(match self.um {
             Some(um) => format!("field {index} at {um} um"),
             None if FIELD_LIMITS.contains(&self.term) => format!("field {index}"),
@@ -156,21 +195,21 @@ impl ConstraintMargin {
 /// A lens that cannot be resolved.
 pub fn constraint_margins(
     lens: &Lens,
-    terms: impl Iterator<Item = Term>,
+    terms: impl Iterator<Item = WeightedTerm>,
 ) -> Result<Vec<ConstraintMargin>, MeritError> {
-    let terms: Vec<Term> = terms.collect();
+    let terms: Vec<WeightedTerm> = terms.collect();
     let mut found = Vec::new();
     for number in 0..lens.zoom_positions() {
         let zoom = Configuration::new(lens, number)?;
         let values: Vec<f64> =
             lens.variables.iter().map(|v| lens.get(v.parameter).unwrap_or(0.0)).collect();
         let systems = zoom.at(&values)?;
-        for term in &terms {
+        for weighted in &terms {
             let margin = |constraint: Constraint| {
-                constraint.margin(*term, number, constraint.value(&systems.manufactured))
+                constraint.margin(weighted.term, number, constraint.value(&systems.manufactured))
             };
             // An unlimited quantity, such as the edge of a gap without rims, is infinite.
-            let all = constraints(&zoom, &systems, *term).into_iter().map(margin);
+            let all = constraints(&zoom, &systems, *weighted).into_iter().map(margin);
             found.extend(all.filter(|margin| margin.value.is_finite()));
         }
     }
@@ -311,14 +350,14 @@ impl ConstrainedQuantity {
 }
 
 /// The sag at a distance from the axis, or close to the edge of the surface if it ends before.
-fn sag_at<R: Real>(surface: &crate::lens::Surface<R>, height: R) -> R {
+pub(super) fn sag_at<R: Real>(surface: &crate::lens::Surface<R>, height: R) -> R {
     // The slope of the sag is infinite at the edge itself.
     let edge = 0.999 * surface.shape.edge();
     let height = if height.value() < edge { height } else { R::from_f64(edge) };
     surface.shape.sag(height * height).map_or(R::ZERO, |(z, _)| z)
 }
 
-fn along_light<R: Real>(system: &System<R>, gap: usize) -> R {
+pub(super) fn along_light<R: Real>(system: &System<R>, gap: usize) -> R {
     system.light_direction(gap) * system.surfaces[gap].thickness
 }
 

@@ -139,7 +139,7 @@ impl Goal {
             .map(unit),
         );
         let weight = (STEEPNESS_IN_SPOT * size).powi(2);
-        terms.push(WeightedTerm { term: Term::Steepness(limits.steepness), weight });
+        terms.push(WeightedTerm::new(Term::Steepness(limits.steepness), weight));
         terms.extend(limits.semi_diameter.map(|max| unit(Term::SemiDiameter { min: 0.0, max })));
         let zoom_ratios = zoom_ratios(lens, &focal_lengths);
         let limits = LimitTreatment::Penalties;
@@ -163,7 +163,7 @@ pub fn default_terms(lens: &Lens, zoom: usize, figures: &LensFigures) -> Vec<Wei
     let field = lens.fields_at(zoom).values.len().saturating_sub(1);
     let [narrowest, widest] = semi_diameter_range(lens, size);
     let given_away = light_weight(size);
-    let weighted = |term, weight| WeightedTerm { term, weight };
+    let weighted = |term, weight| WeightedTerm::new(term, weight);
     vec![
         unit(Term::Spot),
         weighted(Term::SpotIntegral, 1.0 / light),
@@ -186,16 +186,16 @@ pub fn default_terms(lens: &Lens, zoom: usize, figures: &LensFigures) -> Vec<Wei
 }
 
 fn unit(term: Term) -> WeightedTerm {
-    WeightedTerm { term, weight: 1.0 }
+    WeightedTerm::new(term, 1.0)
 }
 
 fn focal_length(target: f64) -> WeightedTerm {
-    WeightedTerm { term: Term::FocalLength(target), weight: FOCAL_LENGTH_WEIGHT }
+    WeightedTerm::new(Term::FocalLength(target), FOCAL_LENGTH_WEIGHT)
 }
 
 /// A term of light for a lens of this focal length.
 fn in_spots(term: Term, size: f64) -> WeightedTerm {
-    WeightedTerm { term, weight: light_weight(size) }
+    WeightedTerm::new(term, light_weight(size))
 }
 
 /// The weight of a loss of all light, in mm², for a lens of this focal length.

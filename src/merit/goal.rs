@@ -1,7 +1,10 @@
 //! Goals that apply to a lens: its focal length, its light, its fields.
 
 use super::MeritError;
-use crate::lens::{Goal, Lens, LimitTreatment, Object, PupilEdge, Term, WeightedTerm};
+use crate::lens::{
+    Goal, Lens, LimitTreatment, Object, OperandKind, PupilEdge, Term, TermScope, TermSelection,
+    WeightedTerm, last_index,
+};
 use crate::paraxial::{Beam, first_order};
 
 impl Term {
@@ -55,6 +58,13 @@ impl Term {
     }
 }
 
+impl Term {
+    /// True if the image plane counts as a surface of its scope.
+    pub const fn may_be_at_image(self) -> bool {
+        matches!(self, Self::Operand { kind: OperandKind::ChiefRayHeight, .. })
+    }
+}
+
 impl Goal {
     /// Returns an error if a term or target does not apply to the lens.
     pub fn check(&self, lens: &Lens) -> Result<(), MeritError> {
@@ -65,7 +75,7 @@ impl Goal {
         if !self.zoom_ratios.is_empty() && self.zoom_ratios.len() != lens.zoom_positions() {
             return refuse("the number of `zoom_ratios` differs from the number of zoom positions");
         }
-        for WeightedTerm { term, weight } in &self.terms {
+        for WeightedTerm { term, weight, scope } in &self.terms {
             let refuse = |why| Err(MeritError::DoesNotApply { term: term.name(), why });
             if !(weight.is_finite() && *weight >= 0.0) {
                 return refuse("its weight is negative or not finite");
@@ -83,6 +93,7 @@ impl Goal {
                 return refuse("the lens is afocal");
             }
             term.check_light(lens)?;
+            check_scope(lens, *term, *scope)?;
         }
         Ok(())
     }
@@ -98,6 +109,31 @@ impl Goal {
     pub(super) fn target(&self, zoom: usize, first: f64) -> f64 {
         first * self.zoom_ratios.get(zoom).copied().unwrap_or(1.0)
     }
+}
+
+/// Returns an error if a scope selects what the term does not have, or what the lens has not.
+fn check_scope(lens: &Lens, term: Term, scope: TermScope) -> Result<(), MeritError> {
+    let refuse = |why| Err(MeritError::DoesNotApply { term: term.name(), why });
+    for selection in TermSelection::ALL {
+        let Some([_, last]) = scope.range(selection) else { continue };
+        if !term.selections().contains(&selection) {
+            return refuse(match selection {
+                TermSelection::Surfaces => "it cannot be restricted to surfaces",
+                TermSelection::Fields => "it cannot be restricted to fields",
+                TermSelection::Wavelengths => "it cannot be restricted to wavelengths",
+                TermSelection::Zooms => "it cannot be restricted to zoom positions",
+            });
+        }
+        if last > last_index(lens, selection, term.may_be_at_image()) {
+            return refuse(match selection {
+                TermSelection::Surfaces => "the lens has no surface of that number",
+                TermSelection::Fields => "the lens has no field of that number",
+                TermSelection::Wavelengths => "the lens has no wavelength of that number",
+                TermSelection::Zooms => "the lens has no zoom position of that number",
+            });
+        }
+    }
+    Ok(())
 }
 
 /// The focal length at every zoom position; `None` for an afocal lens.

@@ -6,7 +6,8 @@
 use super::first_order::{focal_length_of, slopes};
 use super::sampling::SampledPupil;
 use super::sum::{DerivativeLevel, SumOfSquares};
-use super::{EvaluationContext, Term};
+use super::{EvaluationContext, Term, WeightedTerm};
+use crate::lens::TermScope;
 use crate::pupil::QuadraticIntegrand;
 use nalgebra::DVector;
 use std::f64::consts::PI;
@@ -18,13 +19,18 @@ pub(super) struct WithGradient {
 }
 
 /// Adds one of the terms of light.
-pub(super) fn add_light_term(context: &EvaluationContext<'_>, term: Term, sum: &mut SumOfSquares) {
-    match term {
-        Term::Throughput => light_loss(&mean_area(context, sum.level), 1.0, 0.0, sum),
+pub(super) fn add_light_term(
+    context: &EvaluationContext<'_>,
+    weighted: WeightedTerm,
+    sum: &mut SumOfSquares,
+) {
+    let scope = weighted.scope;
+    match weighted.term {
+        Term::Throughput => light_loss(&mean_area(context, scope, sum.level), 1.0, 0.0, sum),
         Term::ThroughputLoss(full) => {
-            light_loss(&mean_area(context, sum.level), 1.0 / full, 1.0, sum);
+            light_loss(&mean_area(context, scope, sum.level), 1.0 / full, 1.0, sum);
         }
-        Term::Light(share) => light_shortfall(context, share, sum),
+        Term::Light(share) => light_shortfall(context, share, scope, sum),
         Term::RelativeIllumination { field, min } => illumination(context, field, min, sum),
         Term::FNumber(target) => f_number(context, target, sum),
         _ => {}
@@ -32,14 +38,20 @@ pub(super) fn add_light_term(context: &EvaluationContext<'_>, term: Term, sum: &
 }
 
 /// Adds the squared shortfalls of the pupil areas from a fraction of their initial areas.
-fn light_shortfall(context: &EvaluationContext<'_>, share: f64, sum: &mut SumOfSquares) {
+fn light_shortfall(
+    context: &EvaluationContext<'_>,
+    share: f64,
+    scope: TermScope,
+    sum: &mut SumOfSquares,
+) {
+    let total = total_weight(context, scope);
     for (i, (pupil, before)) in
         context.sampling.pupils.iter().zip(context.initial_areas).enumerate()
     {
         let least = share * before;
-        if pupil.area < least {
+        if pupil.area < least && pupil.is_in(scope) {
             let slope = pupil_area(context, sum.level, i, -1.0 / least).slope;
-            sum.add_residual(pupil.weight, 1.0 - pupil.area / least, &slope);
+            sum.add_residual(pupil.weight / total, 1.0 - pupil.area / least, &slope);
         }
     }
 }
@@ -100,9 +112,11 @@ pub(super) fn axial_f_number(
 /// Every pupil with its area relative to that in the starting lens.
 pub(super) fn light_shares<'a>(
     context: &'a EvaluationContext<'_>,
+    scope: TermScope,
     level: DerivativeLevel,
 ) -> impl Iterator<Item = (&'a SampledPupil, WithGradient)> {
     let pupils = context.sampling.pupils.iter().zip(context.initial_areas).enumerate();
+    let pupils = pupils.filter(move |(_, (pupil, _))| pupil.is_in(scope));
     pupils.map(move |(i, (pupil, before))| (pupil, pupil_area(context, level, i, 1.0 / before)))
 }
 
@@ -117,9 +131,24 @@ fn pupil_area(
     weighted_area(context, level, |i| i == pupil, factor / weight)
 }
 
-/// The weighted mean area of the pupils, in mm².
-fn mean_area(context: &EvaluationContext<'_>, level: DerivativeLevel) -> WithGradient {
-    weighted_area(context, level, |_| true, 1.0)
+/// The weight of the pupils of a scope; exactly 1 for all of them.
+pub(super) fn total_weight(context: &EvaluationContext<'_>, scope: TermScope) -> f64 {
+    if scope.is_all() {
+        return 1.0;
+    }
+    let pupils = context.sampling.pupils.iter();
+    pupils.filter(|pupil| pupil.is_in(scope)).map(|pupil| pupil.weight).sum()
+}
+
+/// The weighted mean area of the pupils of a scope, in mm².
+fn mean_area(
+    context: &EvaluationContext<'_>,
+    scope: TermScope,
+    level: DerivativeLevel,
+) -> WithGradient {
+    let pupils = &context.sampling.pupils;
+    let total = total_weight(context, scope);
+    weighted_area(context, level, |i| pupils[i].is_in(scope), 1.0 / total)
 }
 
 /// The area of the pupil of a field in mm², the weighted mean over wavelengths.

@@ -6,10 +6,13 @@
 
 use super::constraints::{Constraint, ConstraintMargin, smooth_constraints};
 use super::first_order::focal_length_of;
-use super::light::{WithGradient, axial_f_number, light_shares, relative_illumination};
+use super::light::{
+    WithGradient, axial_f_number, light_shares, relative_illumination, total_weight,
+};
+use super::operands::operand_values;
 use super::sum::{DerivativeLevel, SumOfSquares};
-use super::{EvaluationContext, Merit, MeritError, Term, VariableDual};
-use crate::lens::System;
+use super::{EvaluationContext, Merit, MeritError, Term, VariableDual, WeightedTerm};
+use crate::lens::{System, TermSelection};
 use nalgebra::DVector;
 
 /// A limited number of a lens, with its derivatives.
@@ -75,7 +78,7 @@ impl Merit {
             self.add_terms(context, |term| !self.goal.is_constraint(term), &mut sums)?;
             self.add_mechanical_limits(context, level, &mut limits);
             self.add_light_limits(context, level, &mut of_light);
-            Ok(())
+            self.add_operand_limits(context, level, &mut of_light)
         })?;
         self.average(&mut sums)?;
         let mut objective = SumOfSquares::zero(values.len(), level);
@@ -99,14 +102,10 @@ impl Merit {
         level: DerivativeLevel,
     ) -> Result<Vec<Limit>, MeritError> {
         let mut limits = Vec::new();
-        let positions = self.zooms.iter().zip(&self.samplings).zip(&self.initial_areas);
-        for ((zoom, sampling), initial_areas) in positions {
-            let systems = &zoom.at(values)?;
-            let traced_pupils = &[];
-            let context =
-                EvaluationContext { zoom, sampling, systems, values, initial_areas, traced_pupils };
-            self.add_mechanical_limits(&context, level, &mut limits);
-        }
+        self.visit_without_pupils(values, |context| {
+            self.add_mechanical_limits(context, level, &mut limits);
+            Ok(())
+        })?;
         match limits.iter().find(|limit| !limit.is_finite()) {
             Some(limit) => Err(MeritError::NotFinite { term: limit.margin.term }),
             None => Ok(limits),
@@ -122,7 +121,7 @@ impl Merit {
         let count = context.values.len();
         let mut numbers = Vec::new();
         for weighted in self.goal.terms.iter().filter(|w| self.goal.is_constraint(w.term)) {
-            for (number, margin) in self.mechanical_numbers(context, weighted.term) {
+            for (number, margin) in self.mechanical_numbers(context, *weighted) {
                 let slope = DVector::zeros(count);
                 numbers.push((number, Limit { margin, slope, weight: weighted.weight }));
             }
@@ -143,9 +142,12 @@ impl Merit {
     fn mechanical_numbers(
         &self,
         context: &EvaluationContext<'_>,
-        term: Term,
+        weighted: WeightedTerm,
     ) -> Vec<(Mechanical, ConstraintMargin)> {
-        let number = context.zoom.zoom;
+        let (number, term) = (context.zoom.zoom, weighted.term);
+        if !weighted.scope.has(TermSelection::Zooms, number) {
+            return Vec::new();
+        }
         if let Term::FocalLength(target) = term {
             let target = Some(self.goal.target(number, target));
             let value = Mechanical::FocalLength.value(context);
@@ -153,6 +155,7 @@ impl Merit {
             let margin = ConstraintMargin {
                 term,
                 surface,
+                field: None,
                 zoom: number,
                 um,
                 value,
@@ -166,7 +169,7 @@ impl Merit {
             let margin = constraint.margin(term, number, value);
             (Mechanical::Constraint(constraint), margin)
         };
-        let all = smooth_constraints(context.zoom, context.systems, term);
+        let all = smooth_constraints(context.zoom, context.systems, weighted);
         all.into_iter().map(measured).filter(|(_, margin)| margin.value != f64::INFINITY).collect()
     }
 
@@ -176,19 +179,25 @@ impl Merit {
         level: DerivativeLevel,
         limits: &mut Vec<Limit>,
     ) {
-        for weighted in self.goal.terms.iter().filter(|w| self.goal.is_constraint(w.term)) {
+        let zoom = context.zoom.zoom;
+        let here = |w: &&WeightedTerm| w.scope.has(TermSelection::Zooms, zoom);
+        let asked = self.goal.terms.iter().filter(|w| self.goal.is_constraint(w.term));
+        for weighted in asked.filter(here) {
             let (term, zoom, weight) = (weighted.term.name(), context.zoom.zoom, weighted.weight);
             let mut add =
                 |surface, um, found: WithGradient, [min, max]: [Option<f64>; 2], weight| {
                     let WithGradient { value, slope } = found;
-                    let margin = ConstraintMargin { term, surface, zoom, um, value, min, max };
+                    let (field, value) = (None, value);
+                    let margin =
+                        ConstraintMargin { term, surface, field, zoom, um, value, min, max };
                     limits.push(Limit { margin, slope, weight });
                 };
             match weighted.term {
                 Term::Light(share) => {
-                    for (pupil, now) in light_shares(context, level) {
+                    for (pupil, now) in light_shares(context, weighted.scope, level) {
                         let um = context.sampling.channels[pupil.wavelength].um;
-                        let weight = weight * pupil.weight / (share * share);
+                        let part = pupil.weight / total_weight(context, weighted.scope);
+                        let weight = weight * part / (share * share);
                         add(Some(pupil.field), Some(um), now, [Some(share), None], weight);
                     }
                 }
@@ -205,6 +214,40 @@ impl Merit {
                 _ => {}
             }
         }
+    }
+}
+
+impl Merit {
+    /// Adds the bounded quantities that are constraints.
+    fn add_operand_limits(
+        &self,
+        context: &EvaluationContext<'_>,
+        level: DerivativeLevel,
+        limits: &mut Vec<Limit>,
+    ) -> Result<(), MeritError> {
+        for weighted in self.goal.terms.iter().filter(|w| self.goal.is_constraint(w.term)) {
+            for found in operand_values(context, *weighted, level)? {
+                let weight = weighted.weight;
+                limits.push(Limit { margin: found.margin, slope: found.slope, weight });
+            }
+        }
+        Ok(())
+    }
+
+    /// The quantities that terms of the goal bound, with their bounds.
+    ///
+    /// # Errors
+    /// A chief ray that does not reach the image.
+    pub fn operand_margins(&self, values: &[f64]) -> Result<Vec<ConstraintMargin>, MeritError> {
+        let mut margins = Vec::new();
+        self.visit_without_pupils(values, |context| {
+            for weighted in &self.goal.terms {
+                let found = operand_values(context, *weighted, DerivativeLevel::Value)?;
+                margins.extend(found.into_iter().map(|found| found.margin));
+            }
+            Ok(())
+        })?;
+        Ok(margins)
     }
 }
 

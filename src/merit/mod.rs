@@ -19,11 +19,14 @@ mod first_order;
 mod goal;
 mod light;
 mod limits;
+mod operands;
 mod sampling;
 mod spot;
 mod sum;
 
-pub use crate::lens::{Goal, LimitTreatment, PupilEdge, Term, WeightedTerm};
+pub use crate::lens::{
+    Goal, LimitTreatment, OperandKind, PupilEdge, Term, TermScope, TermSelection, WeightedTerm,
+};
 pub use constraints::{ConstraintMargin, constraint_margins};
 pub use defaults::{GoalLimits, LensFigures, MAX_STEEPNESS, default_terms};
 pub use limits::{Limit, LimitedSum};
@@ -258,22 +261,32 @@ impl Merit {
         values: &[f64],
         level: DerivativeLevel,
     ) -> Result<SumOfSquares, MeritError> {
+        self.evaluate_with_terms(values, level).map(|(total, _)| total)
+    }
+
+    /// The merit as [`Merit::evaluate`] gives it, and the value of each term, without its weight.
+    ///
+    /// # Errors
+    /// As [`Merit::evaluate`].
+    pub fn evaluate_with_terms(
+        &self,
+        values: &[f64],
+        level: DerivativeLevel,
+    ) -> Result<(SumOfSquares, Vec<TermValue>), MeritError> {
         let mut total = SumOfSquares::zero(values.len(), level);
+        let mut terms = Vec::with_capacity(self.goal.terms.len());
         for (sum, weighted) in self.evaluate_terms(values, level)?.iter().zip(&self.goal.terms) {
             total.add(sum, weighted.weight);
+            let (error, rays) = self.error_and_rays(weighted.term, sum.value);
+            let (term, weight) = (weighted.term.name(), weighted.weight);
+            terms.push(TermValue { term, weight, value: sum.value, error, rays });
         }
-        Ok(total)
+        Ok((total, terms))
     }
 
     /// The value of each term, without its weight.
     pub fn terms(&self, values: &[f64]) -> Result<Vec<TermValue>, MeritError> {
-        let report = |(sum, weighted): (SumOfSquares, &WeightedTerm)| {
-            let (error, rays) = self.error_and_rays(weighted.term, sum.value);
-            let (term, weight) = (weighted.term.name(), weighted.weight);
-            TermValue { term, weight, value: sum.value, error, rays }
-        };
-        let sums = self.evaluate_terms(values, DerivativeLevel::Value)?;
-        Ok(sums.into_iter().zip(&self.goal.terms).map(report).collect())
+        self.evaluate_with_terms(values, DerivativeLevel::Value).map(|(_, terms)| terms)
     }
 
     /// The estimated error of a term and the number of its rays.
@@ -284,9 +297,14 @@ impl Merit {
         match term {
             Term::Spot | Term::SpotIntegral => (2.0 * worst * value, rays),
             _ if term.concerns_light() => (worst * value.abs(), rays),
-            Term::Distortion => (0.0, self.samplings.iter().map(RaySampling::chief_count).sum()),
+            Term::Distortion => (0.0, self.chief_ray_count()),
+            Term::Operand { kind, .. } if kind.traces_chief_rays() => (0.0, self.chief_ray_count()),
             _ => (0.0, 0),
         }
+    }
+
+    fn chief_ray_count(&self) -> usize {
+        self.samplings.iter().map(RaySampling::chief_count).sum()
     }
 
     /// The sum of squares of each term, averaged over the zoom positions.
@@ -304,7 +322,9 @@ impl Merit {
     /// Makes means over the zoom positions of sums over them.
     fn average(&self, sums: &mut [SumOfSquares]) -> Result<(), MeritError> {
         for (sum, weighted) in sums.iter_mut().zip(&self.goal.terms) {
-            sum.scale(1.0 / self.zooms.len() as f64);
+            let scope = weighted.scope;
+            let positions = (0..self.zooms.len()).filter(|i| scope.has(TermSelection::Zooms, *i));
+            sum.scale(1.0 / positions.count() as f64);
             if !sum.is_finite() {
                 return Err(MeritError::NotFinite { term: weighted.term.name() });
             }
@@ -356,6 +376,28 @@ impl Merit {
         Ok(())
     }
 
+    /// Calls `visit` with the lens at every zoom position as it is without rays.
+    fn visit_without_pupils(
+        &self,
+        values: &[f64],
+        mut visit: impl FnMut(&EvaluationContext<'_>) -> Result<(), MeritError>,
+    ) -> Result<(), MeritError> {
+        let positions = self.zooms.iter().zip(&self.samplings).zip(&self.initial_areas);
+        for ((zoom, sampling), initial_areas) in positions {
+            let systems = &zoom.at(values)?;
+            let traced_pupils = &[];
+            visit(&EvaluationContext {
+                zoom,
+                sampling,
+                systems,
+                values,
+                initial_areas,
+                traced_pupils,
+            })?;
+        }
+        Ok(())
+    }
+
     /// True if some term depends on the edges of the pupils.
     fn needs_pupil_edges(&self) -> bool {
         let needs =
@@ -371,19 +413,24 @@ impl Merit {
         sums: &mut [SumOfSquares],
     ) -> Result<(), MeritError> {
         let terms = sums.iter_mut().zip(&self.goal.terms);
-        for (sum, weighted) in terms.filter(|(_, weighted)| chosen(weighted.term)) {
+        let zoom = context.zoom.zoom;
+        for (sum, weighted) in terms.filter(|(_, weighted)| {
+            chosen(weighted.term) && weighted.scope.has(TermSelection::Zooms, zoom)
+        }) {
+            let scope = weighted.scope;
             match weighted.term {
-                Term::Spot => spot::add_spot(context, spot::Normalization::PupilArea, sum)?,
+                Term::Spot => spot::add_spot(context, spot::Normalization::PupilArea, scope, sum)?,
                 Term::SpotIntegral => {
-                    spot::add_spot(context, spot::Normalization::Unnormalized, sum)?;
+                    spot::add_spot(context, spot::Normalization::Unnormalized, scope, sum)?;
                 }
-                Term::Distortion => spot::add_distortion(context, sum)?,
+                Term::Distortion => spot::add_distortion(context, scope, sum)?,
                 Term::FocalLength(target) => {
                     let target = self.goal.target(context.zoom.zoom, target);
                     first_order::focal_length(context, target, sum);
                 }
-                term if term.concerns_light() => light::add_light_term(context, term, sum),
-                term => constraints::add_constraints(context, term, sum),
+                Term::Operand { .. } => operands::add_operand(context, *weighted, sum)?,
+                term if term.concerns_light() => light::add_light_term(context, *weighted, sum),
+                _ => constraints::add_constraints(context, *weighted, sum),
             }
         }
         Ok(())

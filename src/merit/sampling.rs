@@ -1,7 +1,7 @@
 //! The rays that spots are computed from: the pupils, sampled once to a tolerance.
 
 use super::MeritError;
-use crate::lens::{FieldPoint, Lens};
+use crate::lens::{FieldPoint, Lens, TermScope, TermSelection};
 use crate::pupil::{
     Accuracy, Aiming, FixedLaunch, Launch, Nodes, PupilMoments, RayModel, Region, RegionKind,
     TracedPupil, converge,
@@ -101,6 +101,14 @@ impl ChannelRays {
     pub(super) fn range(&self, field: usize) -> std::ops::Range<usize> {
         let start = field.checked_sub(1).map_or(0, |before| self.ends[before]);
         start..self.ends[field]
+    }
+}
+
+impl SampledPupil {
+    /// True if its field and its wavelength are in a scope.
+    pub(super) fn is_in(&self, scope: TermScope) -> bool {
+        scope.has(TermSelection::Fields, self.field)
+            && scope.has(TermSelection::Wavelengths, self.wavelength)
     }
 }
 

@@ -3,7 +3,7 @@
 use super::first_order::{image_scale, slopes};
 use super::sum::{DerivativeLevel, SumOfSquares};
 use super::{EvaluationContext, MeritError};
-use crate::lens::{FieldKind, Object};
+use crate::lens::{FieldKind, Object, TermScope, TermSelection};
 use crate::math::{SimdWidth, Vec3, dot, run_vectorized};
 use crate::pupil::{PupilMoments, QuadraticIntegrand};
 use crate::trace::{AdjointSeed, Fate, ImagePoints, TraceSink, Tracer};
@@ -41,15 +41,55 @@ pub(super) enum Normalization {
     Unnormalized,
 }
 
+/// The part of the spots that a term is about.
+#[derive(Debug, Clone, Copy)]
+struct ScopedPart {
+    scope: TermScope,
+    /// The share of its rays in the weight of all.
+    share: f64,
+}
+
+impl ScopedPart {
+    /// The part in a scope; an error if no light gets through there.
+    fn new(context: &EvaluationContext<'_>, scope: TermScope) -> Result<Self, MeritError> {
+        if scope.is_all() {
+            return Ok(Self { scope, share: 1.0 });
+        }
+        let part = Self { scope, share: 1.0 };
+        let (mut share, mut first) = (0.0, None);
+        for (wavelength, channel) in context.sampling.channels.iter().enumerate() {
+            for field in 0..context.sampling.fields.len() {
+                if part.factor(field, wavelength) > 0.0 {
+                    first = first.or(Some((field, channel.um)));
+                    share += channel.weights[channel.range(field)].iter().sum::<f64>();
+                }
+            }
+        }
+        let (field, um) = first.unwrap_or((0, 0.0));
+        let dark = MeritError::NoLight { field, zoom: context.zoom.zoom, um };
+        if share > 0.0 { Ok(Self { scope, share }) } else { Err(dark) }
+    }
+
+    /// The factor of the weight of a field and wavelength, so that the weights of the part add up to
+    /// one; zero outside.
+    fn factor(self, field: usize, wavelength: usize) -> f64 {
+        let inside = self.scope.has(TermSelection::Fields, field)
+            && self.scope.has(TermSelection::Wavelengths, wavelength);
+        if inside { 1.0 / self.share } else { 0.0 }
+    }
+}
+
 /// Adds the spots about their polychromatic centroids.
 pub(super) fn add_spot(
     context: &EvaluationContext<'_>,
     normalization: Normalization,
+    scope: TermScope,
     sum: &mut SumOfSquares,
 ) -> Result<(), MeritError> {
+    let part = ScopedPart::new(context, scope)?;
     let wavelengths = 0..context.sampling.channels.len();
     let traced: Result<Vec<_>, _> =
-        wavelengths.map(|wavelength| trace(context, wavelength, normalization)).collect();
+        wavelengths.map(|wavelength| trace(context, wavelength, normalization, part)).collect();
     let traced = traced?;
     let centroids: Vec<_> =
         (0..context.sampling.fields.len()).map(|field| centroid(context, &traced, field)).collect();
@@ -66,14 +106,14 @@ pub(super) fn add_spot(
         DerivativeLevel::Gradient => add_gradient(context, &traced, &centroids, sum),
         DerivativeLevel::Normal => add_normal_matrix(context, &traced, &centroids, sum),
     }
-    add_edge_motion(context, normalization, &centroids, sum);
+    add_edge_motion(context, (normalization, part), &centroids, sum);
     Ok(())
 }
 
 /// Adds the contribution of the moving pupil edges to the derivatives.
 fn add_edge_motion(
     context: &EvaluationContext<'_>,
-    normalization: Normalization,
+    (normalization, part): (Normalization, ScopedPart),
     centroids: &[Centroid],
     sum: &mut SumOfSquares,
 ) {
@@ -82,7 +122,7 @@ fn add_edge_motion(
         let PupilMoments { area, centroid, spread } = pupil.moments;
         let [dx, dy] = [centroid[0] - x, centroid[1] - y];
         let spread = spread + area * (dx * dx + dy * dy);
-        let share = pupil.share;
+        let share = pupil.share * part.factor(pupil.field, pupil.wavelength);
         let (square, constant) = match normalization {
             Normalization::PupilArea if area > 0.0 => {
                 (share / area, -share * spread / (area * area))
@@ -99,11 +139,12 @@ fn trace(
     context: &EvaluationContext<'_>,
     wavelength: usize,
     normalization: Normalization,
+    part: ScopedPart,
 ) -> Result<SpotRays, MeritError> {
     let channel = &context.sampling.channels[wavelength];
     let system = &context.systems.unclipped[wavelength];
     let tracer = Tracer::new(system).map_err(crate::lens::LensError::from)?;
-    let weights = weights(context, wavelength, normalization);
+    let weights = weights(context, wavelength, normalization, part);
     if !context.traced_pupils.is_empty() {
         return Ok(SpotRays { tracer, points: channel.points.clone(), weights });
     }
@@ -123,9 +164,16 @@ fn weights(
     context: &EvaluationContext<'_>,
     wavelength: usize,
     normalization: Normalization,
+    part: ScopedPart,
 ) -> Vec<f64> {
     let channel = &context.sampling.channels[wavelength];
     let mut weights = channel.weights.clone();
+    if !part.scope.is_all() {
+        for field in 0..context.sampling.fields.len() {
+            let factor = part.factor(field, wavelength);
+            weights[channel.range(field)].iter_mut().for_each(|w| *w *= factor);
+        }
+    }
     if normalization == Normalization::Unnormalized {
         for pupil in context.sampling.pupils.iter().filter(|p| p.wavelength == wavelength) {
             weights[channel.range(pupil.field)].iter_mut().for_each(|w| *w *= pupil.moments.area);
@@ -309,6 +357,7 @@ impl WeightedSlopes {
 /// Adds the mean square distance of the chief rays' image points from the paraxial image, in mm².
 pub(super) fn add_distortion(
     context: &EvaluationContext<'_>,
+    scope: TermScope,
     sum: &mut SumOfSquares,
 ) -> Result<(), MeritError> {
     let primary = context.zoom.primary;
@@ -320,10 +369,12 @@ pub(super) fn add_distortion(
     let moving = context.zoom.moving_parameters(primary);
     let chief = &context.sampling.chief_rays;
     let (hits, rows) = tracer.jacobian(chief, &moving);
-    let total: f64 = context.sampling.fields.iter().map(|f| f.weight).sum();
+    let inside = |field: &usize| scope.has(TermSelection::Fields, *field);
+    let fields = context.sampling.fields.iter().enumerate();
+    let total: f64 = fields.filter(|(field, _)| inside(field)).map(|(_, f)| f.weight).sum();
     let by_variable = context.zoom.parameter_slopes(context.systems, primary, &moving).transpose();
     for (field, height) in heights.iter().enumerate() {
-        if context.sampling.is_dark(field) {
+        if context.sampling.is_dark(field) || !inside(&field) {
             continue;
         }
         if !hits.fate(field).is_imaged() {
@@ -341,7 +392,11 @@ pub(super) fn add_distortion(
     Ok(())
 }
 
-fn lost_chief_error(context: &EvaluationContext<'_>, field: usize, fate: Fate) -> MeritError {
+pub(super) fn lost_chief_error(
+    context: &EvaluationContext<'_>,
+    field: usize,
+    fate: Fate,
+) -> MeritError {
     let um = context.sampling.channels[context.zoom.primary].um;
     MeritError::RayLost { ray: 0, field, zoom: context.zoom.zoom, um, fate }
 }

@@ -393,7 +393,7 @@ impl SweepChain {
         let Some((weight, pupil)) = next else { return };
         let mut goal = Goal { pupil, ..self.goal.clone() };
         if weight > 0.0 {
-            goal.terms.push(WeightedTerm { term: Term::Throughput, weight });
+            goal.terms.push(WeightedTerm::new(Term::Throughput, weight));
         }
         let search = match self.method {
             DescentMethod::Adam => start_annealed(&self.lens, &goal, self.tolerance, left),
@@ -424,16 +424,16 @@ impl SweepChain {
 /// A lens without first-order data.
 pub fn weighted_sum_goal(lens: &Lens, light: f64, pupil: PupilEdge) -> Result<Goal, MeritError> {
     let default_goal = Goal::default_for(lens)?;
-    let mut terms = vec![WeightedTerm { term: Term::SpotIntegral, weight: 1.0 }];
+    let mut terms = vec![WeightedTerm::new(Term::SpotIntegral, 1.0)];
     // The integral of a spot is its mean square radius times the light, so the other terms are
     // scaled by the light too.
     let others =
         default_goal.terms.into_iter().filter(|w| !matches!(w.term, Term::Spot | Term::Light(_)));
     terms.extend(others.map(|w| WeightedTerm { weight: light * w.weight, ..w }));
-    terms.push(WeightedTerm { term: Term::Steepness(MAX_STEEPNESS), weight: light });
+    terms.push(WeightedTerm::new(Term::Steepness(MAX_STEEPNESS), light));
     // No field may go dark: an empty spot would be the sharpest of all.
     let light_term = terms[0].weight * light * goal_size(lens).powi(2);
-    terms.push(WeightedTerm { term: Term::Light(MIN_LIGHT), weight: light_term });
+    terms.push(WeightedTerm::new(Term::Light(MIN_LIGHT), light_term));
     Ok(Goal {
         terms,
         pupil,

@@ -2,6 +2,7 @@
 //! undo step, and the merit tells at each handle which way would help.
 
 use super::clock::now;
+use super::live_merit::{MeritReport, MeritValues};
 use super::run::{LatestRequestWorker, catch_panic};
 use crate::lens::{Lens, Parameter, ParameterKind, add_variables};
 use crate::math::format_short;
@@ -66,6 +67,8 @@ pub struct MeritSlopes {
     pub before: f64,
     /// The derivatives of the merit by the values of the handles that move a parameter.
     pub slopes: Vec<(Handle, f64)>,
+    /// The values of the merit function, compared with the light of the lens before the drag.
+    pub values: MeritValues,
 }
 
 impl MeritSlopes {
@@ -143,6 +146,22 @@ impl DragState {
     pub(super) fn take(&mut self) -> Option<Arc<DragProgress>> {
         self.error = None;
         self.active.take().map(|(_, progress)| progress)
+    }
+
+    /// The merit of a version of the design that is being dragged, once it is known.
+    pub(super) fn merit_report(
+        &self,
+        version: u64,
+        lens: &Arc<Lens>,
+        goal: Option<Arc<Goal>>,
+    ) -> Option<Arc<MeritReport>> {
+        self.handle()?;
+        let slopes = self.worker.latest().filter(|slopes| slopes.version == version)?;
+        let values = match &slopes.result {
+            Ok(found) => Ok(found.values.clone()),
+            Err(why) => Err(why.clone()),
+        };
+        Some(Arc::new(MeritReport { lens: Arc::clone(lens), goal: goal?, values, ms: slopes.ms }))
     }
 
     pub(super) fn view(&self) -> DragView {
@@ -262,8 +281,9 @@ fn slopes(
     let lens = with_all_variables(&request.lens);
     let merit = Merit::new(&lens, &known.goal, request.tolerance).map_err(|why| why.to_string())?;
     let merit = merit.with_initial_light(&known.light);
-    let sum = merit.evaluate(&merit.values(&lens), DerivativeLevel::Gradient);
-    let sum = sum.map_err(|why| why.to_string())?;
+    let found = merit.evaluate_with_terms(&merit.values(&lens), DerivativeLevel::Gradient);
+    let (sum, terms) = found.map_err(|why| why.to_string())?;
+    let values = MeritValues::new(&lens, &merit, terms).map_err(|why| why.to_string())?;
     let by_number = merit.variables().iter().map(|variable| variable.parameter);
     let by_number: HashMap<Parameter, f64> = by_number.zip(sum.gradient.iter().copied()).collect();
     let along = |tangent: Vec<(Parameter, f64)>| -> f64 {
@@ -272,7 +292,7 @@ fn slopes(
     let tangents = tangents(&request.lens, request.zoom, &request.settings);
     let slopes = tangents.into_iter().map(|(handle, tangent)| (handle, along(tangent)));
     let slopes = slopes.filter(|(_, slope)| slope.is_finite()).collect();
-    Ok(MeritSlopes { merit: sum.value, before: known.merit, slopes })
+    Ok(MeritSlopes { merit: sum.value, before: known.merit, slopes, values })
 }
 
 impl MeritReference {

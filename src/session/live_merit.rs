@@ -4,7 +4,7 @@
 use super::clock::{Timed, time};
 use super::run::{LatestRequestWorker, catch_panic};
 use crate::lens::Lens;
-use crate::merit::{ConstraintMargin, Goal, Merit, TermValue, constraint_margins};
+use crate::merit::{ConstraintMargin, Goal, Merit, MeritError, TermValue, constraint_margins};
 use std::io;
 use std::sync::Arc;
 
@@ -22,7 +22,7 @@ pub struct MeritReport {
 }
 
 /// The values of a merit function.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct MeritValues {
     /// The weighted sum of all terms.
     pub total: f64,
@@ -44,8 +44,20 @@ impl MeritValues {
     fn evaluate(lens: &Lens, goal: &Goal, tolerance: f64) -> Result<Self, String> {
         let merit = Merit::new(lens, goal, tolerance).map_err(|why| why.to_string())?;
         let terms = merit.terms(&merit.values(lens)).map_err(|why| why.to_string())?;
-        let asked = goal.terms.iter().map(|weighted| weighted.term);
-        let limits = constraint_margins(lens, asked).map_err(|why| why.to_string())?;
+        Self::new(lens, &merit, terms).map_err(|why| why.to_string())
+    }
+
+    /// The values of terms that were evaluated for a lens, with its limits.
+    pub(super) fn new(
+        lens: &Lens,
+        merit: &Merit,
+        terms: Vec<TermValue>,
+    ) -> Result<Self, MeritError> {
+        let values = merit.values(lens);
+        let goal = merit.goal();
+        let asked = goal.terms.iter().copied();
+        let mut limits = constraint_margins(lens, asked)?;
+        limits.extend(merit.operand_margins(&values)?);
         let total = terms.iter().map(|term| term.weight * term.value).sum();
         Ok(Self { total, terms, limits })
     }

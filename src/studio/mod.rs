@@ -27,6 +27,7 @@ pub mod number;
 pub mod palette;
 pub mod panels;
 pub mod section;
+mod session_benchmark;
 mod shortcut_list;
 pub mod text;
 pub mod text_input;
@@ -61,6 +62,7 @@ pub fn run(path: Option<&Path>) -> Result<(), StudioError> {
         let mut session = Session::new(first_lens(), move || wake.request_repaint())?;
         if let Some(folder) = eframe::storage_dir("aplanat") {
             session.set_save_folder(folder.join("searches"));
+            session.set_field_folder(folder.join("fields"));
             let wake = context.egui_ctx.clone();
             session.set_journal_folder(folder.join("journals"), move || wake.request_repaint())?;
         }

@@ -11,26 +11,20 @@ use serde::Serialize;
 
 use super::app::Studio;
 use super::draw::RenderBackend;
+use super::session_benchmark::{
+    TimeSummary, largest_lens, time_edits, time_journaled_edits, time_moves,
+};
 use super::window::{self, AppResult, Persistence, StudioError};
 use super::{first_lens, panels};
-use crate::files;
-use crate::lens::{Edit, Lens, Parameter, Quantity};
-use crate::measure::{age_ms, processor_ms, time_ms};
-use crate::paraxial::{DragSettings, FirstOrderLock, Handle};
+use crate::measure::{age_ms, processor_ms};
 use crate::session::{Command, Session};
 
-/// The number of timed edits.
-const EDITS: usize = 21;
-/// The number of timed moves of a handle.
-const MOVES: usize = 200;
 /// The number of repainted frames that share the measured processor time.
 const FRAMES: usize = 20;
 /// The time for which the window is left idle.
 const IDLE_TIME: Duration = Duration::from_secs(5);
 /// The time for which it settles before that.
 const SETTLING_TIME: Duration = Duration::from_millis(700);
-/// The longest time for the analysis after an edit.
-const MAX_POLLS: u32 = 20_000; // looks, a tenth of a millisecond apart
 
 /// The measured cost of a window. A value that the system does not provide, or that was not
 /// measured before the end was asked for, is absent.
@@ -58,6 +52,13 @@ pub struct WindowMetrics {
     pub largest_drag_ms: Option<f64>,
     /// The slowest of them.
     pub slowest_largest_drag_ms: Option<f64>,
+    /// The time of an edit of that lens on the window's thread, without its results and without a
+    /// journal: the median of 200 edits.
+    pub unjournaled_edit_ms: Option<f64>,
+    /// The same with a journal.
+    pub journaled_edit_ms: Option<f64>,
+    /// The slowest of them.
+    pub slowest_journaled_edit_ms: Option<f64>,
     /// Processor time of a frame in which no drawing changed, all threads together.
     pub frame_processor_ms: Option<f64>,
     /// The time for which the window was left idle with the cursor in a text field.
@@ -164,6 +165,7 @@ impl WindowBenchmark {
                 });
                 self.time_edits();
                 self.time_drags();
+                self.time_journal();
                 BenchmarkPhase::Settling(5)
             }
             BenchmarkPhase::Settling(0) => BenchmarkPhase::Repainting(FRAMES, processor_ms()),
@@ -196,68 +198,39 @@ impl WindowBenchmark {
 
     /// Types radii and waits each time for the numbers of all panels.
     fn time_edits(&mut self) {
-        let mut times = Vec::new();
-        while times.len() < EDITS && !self.is_stopped() {
-            times.push(self.time_edit(times.len()));
-        }
-        let Some([median, slowest]) = median_and_slowest(times) else { return };
+        let stop = Arc::clone(&self.stop);
+        let Some(times) = time_edits(self.studio.session_mut(), &stop) else { return };
+        let TimeSummary { median, slowest } = times;
         self.record(|figures| {
             (figures.edit_ms, figures.slowest_edit_ms) = (Some(median), Some(slowest));
         });
     }
 
-    fn time_edit(&mut self, i: usize) -> f64 {
-        let session = self.studio.session_mut();
-        let curvature = Parameter::new(0, Quantity::Curvature);
-        let factor = if i.is_multiple_of(2) { 1.001 } else { 1.0 / 1.001 };
-        let value = session.lens().get(curvature).unwrap_or(0.0) / factor;
-        let edit = Edit::Set { parameter: curvature, value };
-        let ((), ms) = time_ms(|| {
-            session.apply(Command::Edit(edit));
-            session.apply(Command::CommitEdit);
-            for _ in 0..MAX_POLLS {
-                if session.view().is_current() {
-                    break;
-                }
-                thread::sleep(Duration::from_micros(100));
-            }
-        });
-        ms
-    }
-
     /// Drags a handle of the first lens, and one of the largest.
     fn time_drags(&mut self) {
-        let Some([median, slowest]) = self.time_moves(first_lens()) else { return };
-        self.record(|figures| {
-            (figures.drag_ms, figures.slowest_drag_ms) = (Some(median), Some(slowest));
-        });
-        let surfaces = |lens: &Lens| lens.surfaces.len();
-        let Some(largest) = bundled_lenses().max_by_key(surfaces) else { return };
-        let name = largest.name.clone();
-        let Some([median, slowest]) = self.time_moves(largest) else { return };
-        self.record(|figures| {
-            figures.largest_lens = Some(name);
-            figures.largest_drag_ms = Some(median);
-            figures.slowest_largest_drag_ms = Some(slowest);
-        });
-        self.studio.session_mut().apply(Command::New(Box::new(first_lens())));
-    }
-
-    /// The median and the worst time of the moves of a handle of a lens, in milliseconds; `None`
-    /// without any.
-    fn time_moves(&mut self, lens: Lens) -> Option<[f64; 2]> {
         let stop = Arc::clone(&self.stop);
         let session = self.studio.session_mut();
-        session.apply(Command::New(Box::new(lens)));
-        let locks = vec![FirstOrderLock::FocalLength];
-        let settings = DragSettings { locks, ..DragSettings::default() };
-        session.apply(Command::SetDragSettings(settings));
-        let start = session.lens().surfaces[0].curvature;
-        let going_on = (0..MOVES).take_while(|_| !stop.load(Ordering::Relaxed));
-        let times = going_on.map(|i| time_move(session, start, i)).collect();
-        session.apply(Command::CancelDrag);
-        session.apply(Command::SetDragSettings(DragSettings::default()));
-        median_and_slowest(times)
+        let Some(first) = time_moves(session, first_lens(), &stop) else { return };
+        let Some(largest) = largest_lens() else { return };
+        let name = largest.name.clone();
+        let second = time_moves(session, largest, &stop);
+        session.apply(Command::New(Box::new(first_lens())));
+        self.record(|figures| {
+            (figures.drag_ms, figures.slowest_drag_ms) = (Some(first.median), Some(first.slowest));
+            figures.largest_lens = Some(name);
+            figures.largest_drag_ms = second.map(|times| times.median);
+            figures.slowest_largest_drag_ms = second.map(|times| times.slowest);
+        });
+    }
+
+    /// Edits the largest lens with a journal and without one.
+    fn time_journal(&self) {
+        let Some([without, with]) = time_journaled_edits(&self.stop) else { return };
+        self.record(|figures| {
+            figures.unjournaled_edit_ms = Some(without.median);
+            figures.journaled_edit_ms = Some(with.median);
+            figures.slowest_journaled_edit_ms = Some(with.slowest);
+        });
     }
 
     /// Leaves the window idle, measures its processor time meanwhile, and closes it.
@@ -282,40 +255,8 @@ impl WindowBenchmark {
     }
 }
 
-/// The lenses that come with the program.
-fn bundled_lenses() -> impl Iterator<Item = Lens> {
-    let open = |bundled: &files::BundledLens| {
-        files::parse(bundled.text.as_bytes(), bundled.name).ok().map(|opened| opened.lens)
-    };
-    files::bundled_lenses().iter().filter_map(open)
-}
-
-/// The time of a move of the first curvature to all numbers, in milliseconds.
-fn time_move(session: &mut Session, start: f64, i: usize) -> f64 {
-    let value = start * (1.0 + 1e-4 * i as f64);
-    let ((), ms) = time_ms(|| {
-        session.apply(Command::DragHandle { handle: Handle::Curvature(0), value, rim: None });
-        for _ in 0..MAX_POLLS {
-            session.poll();
-            let view = session.view();
-            let slopes = view.drag.slopes.as_ref().map(|slopes| slopes.version);
-            if view.is_current() && slopes == Some(view.version) {
-                break;
-            }
-            thread::sleep(Duration::from_micros(100));
-        }
-    });
-    ms
-}
-
 fn processor_ms_since(before: Option<f64>) -> Option<f64> {
     Some(processor_ms()? - before?)
-}
-
-/// The median and the largest of some times; `None` without any.
-fn median_and_slowest(mut times: Vec<f64>) -> Option<[f64; 2]> {
-    times.sort_by(f64::total_cmp);
-    Some([*times.get(times.len() / 2)?, *times.last()?])
 }
 
 /// Sleeps for a time, a quarter of a second at once; false if `stop` became true.

@@ -114,6 +114,7 @@ fn the_merit_of_the_design_and_its_limits_are_shown_without_asking() {
     let limit = |surface, value| ConstraintMargin {
         term: "glass_edge",
         surface: Some(surface),
+        field: None,
         zoom: 0,
         um: None,
         value,

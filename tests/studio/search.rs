@@ -102,6 +102,7 @@ fn thin(value: f64) -> ConstraintMargin {
     ConstraintMargin {
         term: "glass_edge",
         surface: Some(2),
+        field: None,
         zoom: 0,
         um: None,
         value,

@@ -11,7 +11,7 @@ use aplanat::optimize::{DescentMethod, OptimizationEnd, Optimizer, start};
 const KEPT: f64 = 1e-9;
 
 fn goal(terms: &[Term]) -> Goal {
-    let terms = terms.iter().map(|term| WeightedTerm { term: *term, weight: 1.0 }).collect();
+    let terms = terms.iter().map(|term| WeightedTerm::new(*term, 1.0)).collect();
     Goal {
         terms,
         pupil: PupilEdge::Moving,

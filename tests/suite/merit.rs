@@ -60,8 +60,18 @@ fn terms() -> Vec<Term> {
 }
 
 pub(crate) fn check(lens: &Lens, term: Term, pupil: PupilEdge, steps: impl Fn(Quantity) -> f64) {
+    check_term(lens, WeightedTerm::new(term, 1.0), pupil, steps);
+}
+
+pub(crate) fn check_term(
+    lens: &Lens,
+    weighted: WeightedTerm,
+    pupil: PupilEdge,
+    steps: impl Fn(Quantity) -> f64,
+) {
+    let term = weighted.term;
     let goal = Goal {
-        terms: vec![WeightedTerm { term, weight: 1.0 }],
+        terms: vec![weighted],
         zoom_ratios: Vec::new(),
         limits: LimitTreatment::default(),
         pupil,
@@ -97,7 +107,7 @@ pub(crate) fn check(lens: &Lens, term: Term, pupil: PupilEdge, steps: impl Fn(Qu
     println!("{}: gradient against differences, worst {worst:.1e}", term.name());
 }
 
-fn step(quantity: Quantity) -> f64 {
+pub(crate) fn step(quantity: Quantity) -> f64 {
     match quantity {
         Quantity::Curvature => 2e-5,
         Quantity::Asphere(term) => 1e-6 * 0.03_f64.powi(2 * term as i32),
@@ -188,7 +198,7 @@ fn pupils_without_light_have_a_derivative_towards_light() {
         check(&lens, term, PupilEdge::Moving, |quantity| 0.02 * step(quantity));
     }
     let goal = Goal {
-        terms: vec![WeightedTerm { term: Term::Throughput, weight: 1.0 }],
+        terms: vec![WeightedTerm::new(Term::Throughput, 1.0)],
         zoom_ratios: Vec::new(),
         limits: LimitTreatment::default(),
         pupil: PupilEdge::Moving,
@@ -228,7 +238,7 @@ fn a_pupil_in_pieces_has_the_derivative_of_the_warp_field() {
     vary(&mut lens, 0, Quantity::Curvature);
     vary(&mut lens, 2, Quantity::SemiDiameter);
     let goal = |pupil| Goal {
-        terms: vec![WeightedTerm { term: Term::Throughput, weight: 1.0 }],
+        terms: vec![WeightedTerm::new(Term::Throughput, 1.0)],
         zoom_ratios: Vec::new(),
         limits: LimitTreatment::default(),
         pupil,
@@ -274,7 +284,7 @@ fn the_gauss_newton_matrix_is_that_of_the_residuals() {
     lens.variables.clear();
     vary(&mut lens, 2, Quantity::Thickness);
     let goal = Goal {
-        terms: vec![WeightedTerm { term: Term::Spot, weight: 1.0 }],
+        terms: vec![WeightedTerm::new(Term::Spot, 1.0)],
         zoom_ratios: vec![],
         limits: LimitTreatment::default(),
         pupil: PupilEdge::default(),

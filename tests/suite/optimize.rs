@@ -146,7 +146,7 @@ fn bounds_hold_and_lenses_without_variables_are_refused() {
 fn a_step_that_loses_a_ray_is_shortened_and_reported() {
     let mut lens = bundled("double_gauss_rudolph_50");
     let goal = Goal {
-        terms: vec![WeightedTerm { term: Term::BackFocus(400.0), weight: 1.0 }, spot()],
+        terms: vec![WeightedTerm::new(Term::BackFocus(400.0), 1.0), spot()],
         zoom_ratios: Vec::new(),
         limits: LimitTreatment::default(),
         pupil: PupilEdge::Frozen,
@@ -164,7 +164,7 @@ fn a_step_that_loses_a_ray_is_shortened_and_reported() {
 }
 
 fn spot() -> WeightedTerm {
-    WeightedTerm { term: Term::Spot, weight: 1.0 }
+    WeightedTerm::new(Term::Spot, 1.0)
 }
 
 #[test]
@@ -172,7 +172,7 @@ fn a_goal_that_is_not_finite_or_does_not_apply_is_refused() {
     let lens = bundled("double_gauss_rudolph_50");
     for term in [Term::FocalLength(f64::NAN), Term::TotalTrack(f64::INFINITY)] {
         let goal = Goal {
-            terms: vec![WeightedTerm { term, weight: 1.0 }],
+            terms: vec![WeightedTerm::new(term, 1.0)],
             zoom_ratios: Vec::new(),
             limits: LimitTreatment::default(),
             pupil: PupilEdge::default(),
@@ -183,7 +183,7 @@ fn a_goal_that_is_not_finite_or_does_not_apply_is_refused() {
     let mut afocal = lens.clone();
     afocal.surfaces.iter_mut().for_each(|row| row.curvature = 0.0);
     let goal = Goal {
-        terms: vec![WeightedTerm { term: Term::FocalLength(50.0), weight: 1.0 }],
+        terms: vec![WeightedTerm::new(Term::FocalLength(50.0), 1.0)],
         zoom_ratios: Vec::new(),
         limits: LimitTreatment::default(),
         pupil: PupilEdge::default(),

@@ -103,7 +103,7 @@ const OPTIMIZE: Command = Command::Optimize {
 
 /// A merit function of the spots alone.
 fn spot_goal() -> Goal {
-    let terms = vec![WeightedTerm { term: Term::Spot, weight: 2.5 }];
+    let terms = vec![WeightedTerm::new(Term::Spot, 2.5)];
     Goal {
         terms,
         zoom_ratios: Vec::new(),
@@ -959,7 +959,7 @@ fn an_accepted_result_has_the_merit_function_that_it_was_optimized_for() {
 fn targets_follow_a_scaled_lens() {
     let mut lens = double_gauss();
     let terms = [Term::FocalLength(50.0), Term::ThroughputLoss(80.0), Term::Light(1.0)];
-    let terms = terms.map(|term| WeightedTerm { term, weight: 1.0 }).to_vec();
+    let terms = terms.map(|term| WeightedTerm::new(term, 1.0)).to_vec();
     lens.merit = Some(Goal { terms, ..spot_goal() });
     let scaled = aplanat::lens::apply_edit(&lens, &Edit::Scale(2.0)).unwrap();
     let terms = scaled.merit.unwrap().terms;

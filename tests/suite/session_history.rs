@@ -72,7 +72,7 @@ fn an_accepted_optimization_keeps_its_course_and_can_be_rewound() {
     session.apply(Edit::Set { parameter, value: 0.02 }.into());
     session.apply(Edit::AddVariable(variable).into());
     let start = session.view().version_id;
-    let terms = vec![WeightedTerm { term: Term::FocalLength(150.0), weight: 1.0 }];
+    let terms = vec![WeightedTerm::new(Term::FocalLength(150.0), 1.0)];
     let goal = Goal {
         terms,
         pupil: PupilEdge::Frozen,

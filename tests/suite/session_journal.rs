@@ -7,22 +7,19 @@ use aplanat::merit::{Goal, LimitTreatment, PupilEdge, Term, WeightedTerm};
 use aplanat::optimize::DescentMethod;
 use aplanat::session::{Command, Session};
 use std::fs;
-use std::io::{BufRead as _, BufReader, Write as _};
 use std::path::{Path, PathBuf};
-use std::process::{Child, Stdio};
-use std::time::{Duration, Instant};
 
 /// A folder that is removed at the end.
-struct Folder(PathBuf);
+pub(crate) struct Folder(pub(crate) PathBuf);
 
 impl Folder {
-    fn new(name: &str) -> Self {
+    pub(crate) fn new(name: &str) -> Self {
         let path = std::env::temp_dir().join(format!("aplanat-{name}-{}", std::process::id()));
         fs::create_dir_all(&path).unwrap();
         Self(fs::canonicalize(path).unwrap())
     }
 
-    fn journals(&self) -> PathBuf {
+    pub(crate) fn journals(&self) -> PathBuf {
         self.0.join("journals")
     }
 }
@@ -33,13 +30,13 @@ impl Drop for Folder {
     }
 }
 
-fn journaled(lens: Lens, journals: &Path) -> Session {
+pub(crate) fn journaled(lens: Lens, journals: &Path) -> Session {
     let mut session = Session::new(lens, || {}).unwrap();
     session.set_journal_folder(journals, || {}).unwrap();
     session
 }
 
-fn rename(session: &mut Session, name: &str) {
+pub(crate) fn rename(session: &mut Session, name: &str) {
     session.apply(Edit::SetName(name.to_owned()).into());
     session.apply(Command::CommitEdit);
 }
@@ -56,7 +53,7 @@ fn killed(session: &Session, journals: &Path, copy: &Path) {
 }
 
 /// A session that finds these journals, and the message about what it has recovered.
-fn reopened(journals: &Path) -> (Session, Option<String>) {
+pub(crate) fn reopened(journals: &Path) -> (Session, Option<String>) {
     let mut session = journaled(blank(), journals);
     let text = session.recover().then(|| {
         let messages = session.view().messages;
@@ -75,7 +72,7 @@ fn a_killed_design_reopens_where_it_was() {
     }
     session.apply(Command::Undo);
     let goal = Goal {
-        terms: vec![WeightedTerm { term: Term::Spot, weight: 2.0 }],
+        terms: vec![WeightedTerm::new(Term::Spot, 2.0)],
         pupil: PupilEdge::Frozen,
         zoom_ratios: Vec::new(),
         limits: LimitTreatment::default(),
@@ -187,7 +184,7 @@ fn an_interrupted_optimization_leaves_its_best_lens_in_the_history() {
     lens.surfaces[0].curvature = 0.02;
     lens.variables = vec![Variable { parameter, min: None, max: None }];
     let mut session = journaled(lens, &folder.journals());
-    let terms = vec![WeightedTerm { term: Term::FocalLength(150.0), weight: 1.0 }];
+    let terms = vec![WeightedTerm::new(Term::FocalLength(150.0), 1.0)];
     let goal = Goal {
         terms,
         pupil: PupilEdge::Frozen,
@@ -229,120 +226,4 @@ fn two_windows_have_two_journals() {
     let mut names = [one.lens().name.clone(), other.lens().name.clone()];
     names.sort();
     assert_eq!(names, ["first", "second"]);
-}
-
-/// The variable of the environment that makes [`edits_until_killed`] work.
-const WORK: &str = "APLANAT_JOURNAL_TEST";
-
-/// The program that is killed: edits and saves a lens for ever, and tells the number of each edit.
-#[test]
-#[ignore = "the program that other tests kill"]
-fn edits_until_killed() {
-    let Some(folder) = std::env::var_os(WORK).map(PathBuf::from) else { return };
-    let mut session = journaled(blank(), &folder.join("journals"));
-    if !session.recover() && folder.join("lens.json").exists() {
-        session.apply(Command::Open(folder.join("lens.json")));
-    }
-    let first = session.lens().name.parse::<u64>().unwrap_or(0);
-    let mut out = std::io::stdout().lock();
-    for number in first + 1.. {
-        rename(&mut session, &number.to_string());
-        if number % 7 == 0 {
-            session.apply(Command::Save(Some(folder.join("lens.json"))));
-        }
-        writeln!(out, "edit {number}").unwrap();
-        if number % 20 == 0 {
-            session.sync_journal();
-            writeln!(out, "on the disk {number}").unwrap();
-        }
-        out.flush().unwrap();
-        std::thread::sleep(Duration::from_millis(2));
-    }
-}
-
-fn start_editing(folder: &Path) -> Child {
-    std::process::Command::new(std::env::current_exe().unwrap())
-        .args(["--exact", "session_journal::edits_until_killed", "--ignored", "--nocapture"])
-        .env(WORK, folder)
-        .stdout(Stdio::piped())
-        .stderr(Stdio::null())
-        .spawn()
-        .unwrap()
-}
-
-/// Kills the program after its edits have gone on for a while. Returns the last edit that has to be
-/// there: it was made two seconds before, or the program waited until it was on the disk.
-#[expect(clippy::disallowed_methods, reason = "the test measures time")]
-fn kill_after(folder: &Path, time: Duration) -> u64 {
-    let mut child = start_editing(folder);
-    let mut lines = BufReader::new(child.stdout.take().unwrap()).lines();
-    let (mut edits, mut on_disk): (Vec<(Instant, u64)>, u64) = (Vec::new(), 0);
-    while edits.first().is_none_or(|(begun, _)| begun.elapsed() < time) {
-        let line = lines.next().expect("it edits until it is killed").unwrap();
-        if let Some((_, number)) = line.split_once("edit ") {
-            edits.push((Instant::now(), number.parse().unwrap()));
-        } else if let Some(number) = line.strip_prefix("on the disk ") {
-            on_disk = number.parse().unwrap();
-        }
-    }
-    child.kill().unwrap();
-    child.wait().unwrap();
-    let old = edits.iter().filter(|(made, _)| made.elapsed() > Duration::from_secs(2));
-    old.map(|(_, number)| *number).fold(on_disk, u64::max)
-}
-
-/// The number of the last edit that is there after a kill; 0 if the lens was not edited.
-fn found_edit(folder: &Path) -> u64 {
-    let file = folder.join("lens.json");
-    let saved = file.exists().then(|| files::open(&file).expect("no file is broken").lens);
-    let (session, text) = reopened(&folder.join("journals"));
-    let name = match text {
-        Some(_) => session.lens().name.clone(),
-        None => saved.map_or_else(String::new, |lens| lens.name),
-    };
-    name.parse().unwrap_or(0)
-}
-
-/// Kills a program at these times of its edits, each time in a folder of its own; nothing older than
-/// two seconds may be lost.
-fn kills(times: impl Iterator<Item = Duration>) {
-    for (i, time) in times.enumerate() {
-        let folder = Folder::new(&format!("journal-kill-{i}"));
-        let safe = kill_after(&folder.0, time);
-        let found = found_edit(&folder.0);
-        assert!(found >= safe, "edit {found} was found and {safe} has to be there, {time:?}");
-    }
-}
-
-#[test]
-fn a_program_that_is_killed_while_it_edits_loses_nothing() {
-    kills([5, 90, 250].map(Duration::from_millis).into_iter());
-}
-
-#[test]
-#[ignore = "fifty kills take two minutes"]
-fn fifty_kills_lose_nothing() {
-    kills((0..50).map(|i| Duration::from_micros(700 + 7919 * i * i % 3_000_000)));
-}
-
-#[expect(clippy::disallowed_methods, reason = "the test measures time")]
-#[test]
-#[ignore = "a measurement"]
-fn an_edit_costs_the_window_little_more_with_a_journal() {
-    let lens = files::bundled_lenses().iter().max_by_key(|lens| lens.text.len()).unwrap();
-    let lens = files::json::read(lens.text, lens.name).unwrap();
-    let folder = Folder::new("journal-time");
-    let mut sessions =
-        [Session::new(lens.clone(), || {}).unwrap(), journaled(lens, &folder.journals())];
-    for (session, name) in sessions.iter_mut().zip(["without", "with"]) {
-        let mut times: Vec<f64> = (0..200)
-            .map(|i| {
-                let start = Instant::now();
-                rename(session, &i.to_string());
-                1e3 * start.elapsed().as_secs_f64()
-            })
-            .collect();
-        times.sort_by(f64::total_cmp);
-        println!("{name} a journal: median {:.3} ms, worst {:.3} ms", times[100], times[199]);
-    }
 }

@@ -32,7 +32,7 @@ struct MeasureWindowReport {
 }
 
 /// The keys of the results, and their descriptions.
-const NAMES: [(&str, &str); 12] = [
+const NAMES: [(&str, &str); 15] = [
     ("first_frame_ms", "process start to first frame, ms"),
     ("edit_ms", "an edit to the results of all panels, ms"),
     ("slowest_edit_ms", "the slowest edit, ms"),
@@ -41,6 +41,9 @@ const NAMES: [(&str, &str); 12] = [
     ("largest_lens", "the largest bundled lens"),
     ("largest_drag_ms", "a move of a handle of it, ms"),
     ("slowest_largest_drag_ms", "the slowest of 200 moves of it, ms"),
+    ("unjournaled_edit_ms", "an edit of it on the window's thread without a journal, ms"),
+    ("journaled_edit_ms", "an edit of it on the window's thread with a journal, ms"),
+    ("slowest_journaled_edit_ms", "the slowest of 200 such edits, ms"),
     ("frame_processor_ms", "processor time of a frame without changes, ms"),
     ("idle_seconds", "time without input, s"),
     ("idle_processor_ms", "processor time in that time, ms"),

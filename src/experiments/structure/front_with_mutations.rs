@@ -230,7 +230,7 @@ fn extend_front(front: &Front, found: &[ParetoPoint]) -> Front {
 fn plan(start: &ParetoPoint, weight: f64, gradients: u64) -> ExperimentResult<SearchPlan> {
     let goal = weighted_sum_goal(&start.lens, start.light, PupilEdge::Moving);
     let mut goal = goal?;
-    goal.terms.push(WeightedTerm { term: Term::Throughput, weight });
+    goal.terms.push(WeightedTerm::new(Term::Throughput, weight));
     let semi_diameters = start.lens.surfaces.iter().filter_map(|row| row.semi_diameter);
     let widest =
         ParetoSettings::default().semi_diameter_factors[1] * semi_diameters.fold(0.0, f64::max);

@@ -67,7 +67,7 @@ fn plan(start: &Lens, rules: SearchRules, gradients: u64) -> ExperimentResult<Se
 /// The goal with each limit of a thickness, an edge or a steepness relaxed to the value of the lens
 /// if that violates it.
 fn relax_limits(lens: &Lens, goal: &Goal) -> Result<Goal, MeritError> {
-    let found = constraint_margins(lens, goal.terms.iter().map(|w| w.term))?;
+    let found = constraint_margins(lens, goal.terms.iter().copied())?;
     let relaxed_term = |w: &WeightedTerm| WeightedTerm { term: relax_term(w.term, &found), ..*w };
     Ok(Goal { terms: goal.terms.iter().map(relaxed_term).collect(), ..goal.clone() })
 }
@@ -107,7 +107,7 @@ mod tests {
             let relaxed = relax_limits(&lens, &usual).unwrap();
             let terms = |goal: &Goal| goal.terms.iter().map(|w| w.term).collect::<Vec<_>>();
             let slack = |goal: &Goal| {
-                let found = constraint_margins(&lens, terms(goal).into_iter()).unwrap();
+                let found = constraint_margins(&lens, goal.terms.iter().copied()).unwrap();
                 found.iter().map(ConstraintMargin::slack).fold(f64::INFINITY, f64::min)
             };
             assert!(slack(&relaxed) >= 0.0, "{}: {}", subject.name, slack(&relaxed));

@@ -2,8 +2,8 @@
 
 use super::{Edit, EditError, rows, scale};
 use crate::lens::{
-    Aperture, Lens, LensError, Medium, Parameter, Pickup, Quantity, Row, Variable, ZoomPosition,
-    ZoomThickness,
+    Aperture, FieldPoint, Fields, Lens, LensError, Medium, Parameter, Pickup, Quantity, Row,
+    TermSelection, Variable, Wavelength, ZoomPosition, ZoomThickness,
 };
 
 /// The lens after an edit. The values of parameters that follow others are up to date in it.
@@ -50,8 +50,8 @@ impl Lens {
             Edit::SetNotes(text) => self.notes.clone_from(text),
             Edit::SetObject(object) => self.object = *object,
             Edit::SetAperture(aperture) => self.set_aperture(*aperture),
-            Edit::SetFields(fields) => self.fields.clone_from(fields),
-            Edit::SetWavelengths(wavelengths) => self.wavelengths.clone_from(wavelengths),
+            Edit::SetFields(fields) => self.set_fields(fields),
+            Edit::SetWavelengths(wavelengths) => self.set_wavelengths(wavelengths),
             Edit::SetImageSolve(offset) => self.set_image_solve(*offset)?,
             Edit::AddVariable(variable) => self.add_variable(*variable)?,
             Edit::RemoveVariable(parameter) => self.variables.retain(|v| v.parameter != *parameter),
@@ -203,6 +203,31 @@ impl Lens {
         Ok(())
     }
 
+    /// Sets the field points. Terms of the merit function about one that moves in the list follow it.
+    fn set_fields(&mut self, fields: &Fields) {
+        let before = std::mem::replace(&mut self.fields, fields.clone()).values;
+        let place = |i: usize| {
+            let same =
+                |new: &&FieldPoint| before.get(i).is_some_and(|f| (f.x, f.y) == (new.x, new.y));
+            fields.values.iter().position(|new| same(&new))
+        };
+        if let Some(goal) = self.merit.as_mut().filter(|_| before.len() != fields.values.len()) {
+            goal.renumber(TermSelection::Fields, |_, i| place(i));
+        }
+    }
+
+    /// Sets the wavelengths. Terms of the merit function about one that moves in the list follow it.
+    fn set_wavelengths(&mut self, wavelengths: &[Wavelength]) {
+        let before = std::mem::replace(&mut self.wavelengths, wavelengths.to_vec());
+        let place = |i: usize| {
+            let um = before.get(i)?.um;
+            wavelengths.iter().position(|new| new.um == um)
+        };
+        if let Some(goal) = self.merit.as_mut().filter(|_| before.len() != wavelengths.len()) {
+            goal.renumber(TermSelection::Wavelengths, |_, i| place(i));
+        }
+    }
+
     fn insert_zoom(&mut self, at: usize, position: &ZoomPosition) -> Result<(), EditError> {
         let count = self.zoom.len();
         if at > count {
@@ -230,6 +255,9 @@ impl Lens {
                 .map(|zoom| Parameter { quantity: Quantity::ZoomThickness(zoom), ..parameter }),
             _ => Some(parameter),
         });
+        if let Some(goal) = &mut self.merit {
+            goal.renumber(TermSelection::Zooms, |_, zoom| map(zoom));
+        }
     }
 
     /// Refuses a lens that cannot be resolved at some zoom position and wavelength.

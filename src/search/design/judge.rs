@@ -341,7 +341,8 @@ impl LensGap {
 fn limits(lens: &Lens, asked: &LensRequirements, found: &LensJudgement) -> Vec<RequirementMargin> {
     let mut all = Vec::new();
     let mut add = |term, surface, value: f64, min: Option<f64>, max: Option<f64>| {
-        let limit = ConstraintMargin { term, surface, zoom: 0, um: None, value, min, max };
+        let (field, um) = (None, None);
+        let limit = ConstraintMargin { term, surface, field, zoom: 0, um, value, min, max };
         let size = min.or(max).map_or(1.0, |bound| bound.abs().max(1.0));
         let is_kept = limit.slack() >= -ROUNDING * size;
         all.push(RequirementMargin { limit, is_kept });

@@ -143,7 +143,11 @@ impl LensLandscape {
     /// The margins of all constraints of the goal and of the number of elements.
     pub(super) fn limits(&self, lens: &Lens) -> Result<Vec<ConstraintMargin>, LandscapeError> {
         let mut limits = vec![self.element_count_margin(lens)];
-        limits.extend(constraint_margins(lens, self.goal.terms.iter().map(|w| w.term))?);
+        limits.extend(constraint_margins(lens, self.goal.terms.iter().copied())?);
+        if self.goal.terms.iter().any(|w| matches!(w.term, Term::Operand { .. })) {
+            let merit = self.merit(lens, FIRST_TOLERANCE)?;
+            limits.extend(merit.operand_margins(&merit.values(lens))?);
+        }
         Ok(limits)
     }
 
@@ -162,6 +166,7 @@ impl LensLandscape {
         let margin = |(spot, before): (&crate::merit::SpotSampling, &f64)| ConstraintMargin {
             term: "light",
             surface: Some(spot.field),
+            field: None,
             zoom: spot.zoom,
             um: Some(spot.um),
             value: spot.area,
@@ -188,9 +193,14 @@ impl LensLandscape {
                 Term::BackFocus(min) => Term::BackFocus(min + mm),
                 Term::Steepness(max) => Term::Steepness(max * (1.0 - part)),
                 Term::Light(share) => Term::Light(share * (1.0 + part)),
+                Term::Operand { kind, min, max } if min != max => {
+                    let step = if kind.is_angle() { part } else { mm };
+                    let (min, max) = (min.map(|min| min + step), max.map(|max| max - step));
+                    Term::Operand { kind, min, max }
+                }
                 other => return WeightedTerm { term: other, ..*w },
             };
-            WeightedTerm { term, weight: w.weight * harder }
+            WeightedTerm { term, weight: w.weight * harder, ..*w }
         };
         let mut tight = self.clone();
         tight.goal.terms = self.goal.terms.iter().map(tighter).collect();

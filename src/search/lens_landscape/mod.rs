@@ -99,6 +99,7 @@ impl LensLandscape {
         let rules = rules.normalize()?;
         rules.check_fixed_ends(lens.surfaces.len())?;
         violations::check_glasses(lens, &rules)?;
+        violations::check_scopes(goal)?;
         let mut start = limited_by_stop(lens)?;
         variables::freeze_others(&mut start);
         start.check()?;

@@ -3,7 +3,7 @@
 use super::{LandscapeError, LensLandscape};
 use crate::lens::{Lens, Medium, Object, glass};
 use crate::math::format_short;
-use crate::merit::{ConstraintMargin, MeritError, Term, TermValue};
+use crate::merit::{ConstraintMargin, Goal, MeritError, Term, TermValue, WeightedTerm};
 use crate::search::{SearchRules, element};
 use std::f64::consts::PI;
 
@@ -15,7 +15,8 @@ impl LensLandscape {
     pub(super) fn element_count_margin(&self, lens: &Lens) -> ConstraintMargin {
         let [min, max] = self.rules.elements.map(|count| Some(count as f64));
         let value = element::piece_count(lens) as f64;
-        ConstraintMargin { term: "elements", surface: None, zoom: 0, um: None, value, min, max }
+        let (term, surface, field) = ("elements", None, None);
+        ConstraintMargin { term, surface, field, zoom: 0, um: None, value, min, max }
     }
 
     /// All constraints that a lens violates, including the number of its elements and the light of
@@ -105,6 +106,21 @@ impl LensLandscape {
     fn find_in_goal(&self, number: impl Fn(Term) -> Option<f64>) -> Option<f64> {
         self.goal.terms.iter().find_map(|weighted| number(weighted.term))
     }
+}
+
+/// Refuses terms about some surfaces, whose numbers change with the structure, and terms about the
+/// light of a part of the fields, which a finished lens is not tested for.
+pub(super) fn check_scopes(goal: &Goal) -> Result<(), LandscapeError> {
+    let about_light = |w: &&WeightedTerm| w.term.concerns_light() && !w.scope.is_all();
+    let refused = goal.terms.iter().find(|w| w.scope.surfaces.is_some() || about_light(w));
+    refused.map_or(Ok(()), |weighted| {
+        Err(LandscapeError::Setting {
+            what: "the scope of a term of the merit function",
+            found: format!("a part of the lens for `{}`", weighted.term.name()),
+            expected: "the whole lens in a search over structures, whose surfaces have no fixed \
+                       numbers",
+        })
+    })
 }
 
 /// The message for a violated constraint.

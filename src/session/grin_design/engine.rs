@@ -1,6 +1,7 @@
 //! The engine of the design of a gradient-index field. Its steps are those of a design without a
 //! window: showing, pausing and writing the field change nothing.
 
+use super::backup::{FieldBackup, NODES};
 use super::document::{DocumentSource, GrinDocument};
 use crate::files;
 use crate::grin::Integrator;
@@ -87,15 +88,26 @@ pub(super) struct GrinEngine {
     stride: usize,
     /// True once the design has ended.
     shows_best: bool,
+    backup: Option<FieldBackup>,
+    /// True after a backup that failed, which is reported once.
+    has_failed: bool,
     sender: EventSender<GrinExport>,
+}
+
+/// A document to open.
+#[derive(Debug, Clone)]
+pub(super) struct GrinInput {
+    pub(super) source: DocumentSource,
+    /// The folder in which the best field is kept while the design goes on; `None` for none.
+    pub(super) backups: Option<PathBuf>,
 }
 
 impl GrinEngine {
     pub(super) fn open(
-        source: &DocumentSource,
+        input: &GrinInput,
         sender: &EventSender<GrinExport>,
     ) -> Result<Self, String> {
-        let (document, optimizer) = GrinDocument::open(source)?;
+        let (document, optimizer) = GrinDocument::open(&input.source)?;
         let state = GrinRun {
             field: Arc::new(document.start.clone()),
             document: Arc::new(document),
@@ -106,7 +118,15 @@ impl GrinEngine {
             saved: false,
             tracing: optimizer.as_ref().map(GrinOptimizer::tracing),
         };
-        Ok(Self { optimizer, state, stride: 1, shows_best: false, sender: sender.clone() })
+        Ok(Self {
+            optimizer,
+            state,
+            stride: 1,
+            shows_best: false,
+            backup: input.backups.as_deref().map(FieldBackup::new),
+            has_failed: false,
+            sender: sender.clone(),
+        })
     }
 
     /// Prepares for the first step.
@@ -133,6 +153,19 @@ impl GrinEngine {
             history.push(LossSample { step, current: loss, best, level });
         }
         thin_history(history, &mut self.stride, MAX_HISTORY, |sample| sample.step);
+    }
+
+    /// Keeps the best field, so that it outlives a program that is killed.
+    fn back_up(&mut self) {
+        let (Some(backup), Some(optimizer)) = (&mut self.backup, &self.optimizer) else { return };
+        let Some(task) = &self.state.document.task else { return };
+        let volume = || task.volume(optimizer.best(), NODES).map_err(|why| why.to_string());
+        let kept = backup.update(volume);
+        if let Some(why) = kept.err().filter(|_| !self.has_failed) {
+            self.has_failed = true;
+            let text = format!("the field would be lost in a crash: {why}");
+            self.sender.report(GrinExport::Failed(text));
+        }
     }
 
     /// Writes the best field and describes what was written.
@@ -167,7 +200,7 @@ impl Engine for GrinEngine {
     const INTERVAL: Duration = Duration::from_millis(100);
     const KEEPS_PREVIOUS: bool = true;
 
-    type Input = DocumentSource;
+    type Input = GrinInput;
     type Request = GrinRequest;
     type Report = GrinExport;
     type Snapshot = GrinRun;
@@ -186,6 +219,7 @@ impl Engine for GrinEngine {
         self.record(&progress);
         self.state.progress = Some(progress);
         self.state.saved = false;
+        self.back_up();
         Ok(finished)
     }
 
@@ -209,12 +243,21 @@ impl Engine for GrinEngine {
             GrinRequest::Write(path, nodes) => {
                 let written = self.write(&path, nodes);
                 self.state.saved |= written.is_ok();
+                if let Some(backup) = self.backup.as_mut().filter(|_| written.is_ok()) {
+                    backup.remove();
+                }
                 self.sender.report(match written {
                     Ok(text) => GrinExport::Written(path, text),
                     Err(why) => GrinExport::Failed(why),
                 });
                 Ok(None)
             }
+        }
+    }
+
+    fn close(&mut self) {
+        if let Some(backup) = &mut self.backup {
+            backup.remove();
         }
     }
 

@@ -4,6 +4,7 @@
 //! Three threads share the work: one takes the steps of the design, one computes slices, one traces
 //! all light of the task. Nothing is open at first, and nothing is computed while no panel shows it.
 
+mod backup;
 mod contour;
 mod document;
 mod engine;
@@ -18,7 +19,7 @@ pub use slice::{IndexProfile, Slice, SliceQuantity, SliceSettings};
 use super::clock::{Throttle, Timed, time};
 use super::run::{BackgroundRun, LatestRequestWorker, RunEvent, RunStatus, RunView};
 use crate::grin_design::{GrinField, ViewReport};
-use engine::{GrinEngine, GrinRequest};
+use engine::{GrinEngine, GrinInput, GrinRequest};
 use serde::{Deserialize, Serialize};
 use slice::{SliceRequest, compute_slice};
 use std::io;
@@ -74,11 +75,13 @@ pub(super) struct GrinState {
     requested_slice: Option<SliceRequest>,
     requested_field: Option<Arc<GrinField>>,
     throttle: Throttle,
+    /// The folder in which fields are kept while they are designed.
+    backups: Option<PathBuf>,
 }
 
 impl GrinState {
     pub(super) fn spawn(wake: impl Fn() + Send + Clone + 'static) -> io::Result<Self> {
-        let open = |source, sender: &_| GrinEngine::open(&source, sender);
+        let open = |input, sender: &_| GrinEngine::open(&input, sender);
         let slice = |request| Ok(compute_slice(request));
         let analyze = |(document, field)| analyze(&document, field);
         Ok(Self {
@@ -92,14 +95,30 @@ impl GrinState {
             requested_slice: None,
             requested_field: None,
             throttle: Throttle::new(INTERVAL),
+            backups: None,
         })
+    }
+
+    /// Keeps fields in a folder while they are designed from now on, and opens the one that a killed
+    /// program has left there. Returns its file.
+    pub(super) fn set_backup_folder(&mut self, folder: PathBuf) -> Option<PathBuf> {
+        let left = backup::take_interrupted(&folder);
+        self.backups = Some(folder);
+        if let Some(file) = &left {
+            self.open(DocumentSource::File(file.clone()));
+        }
+        left
+    }
+
+    fn open(&mut self, source: DocumentSource) {
+        self.run.start(GrinInput { source, backups: self.backups.clone() });
     }
 
     /// Carries out a command, or returns the reason why that is impossible.
     pub(super) fn handle(&mut self, command: GrinCommand) -> Result<(), String> {
         match command {
-            GrinCommand::OpenFile(path) => self.run.start(DocumentSource::File(path)),
-            GrinCommand::OpenBuiltin(name) => self.run.start(DocumentSource::Builtin(name)),
+            GrinCommand::OpenFile(path) => self.open(DocumentSource::File(path)),
+            GrinCommand::OpenBuiltin(name) => self.open(DocumentSource::Builtin(name)),
             GrinCommand::Start => self.start()?,
             GrinCommand::Pause => self.run.pause(),
             GrinCommand::Resume => self.run.resume(),

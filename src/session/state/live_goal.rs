@@ -3,6 +3,7 @@
 use super::Session;
 use crate::lens::Lens;
 use crate::merit::Goal;
+use crate::session::MeritReport;
 use crate::session::journal::JournalEntry;
 use std::sync::Arc;
 
@@ -11,6 +12,12 @@ impl Session {
     pub(super) fn goal(&self) -> Option<Arc<Goal>> {
         let own = self.lens.merit.as_ref().map(|goal| Arc::new(goal.clone()));
         own.or_else(|| self.proposed_goal.clone())
+    }
+
+    /// The newest merit, of the lens that is dragged if one is.
+    pub(super) fn merit_report(&self) -> Option<Arc<MeritReport>> {
+        let dragged = self.drag.merit_report(self.version, &self.lens, self.goal());
+        dragged.or_else(|| self.live_merit.latest())
     }
 
     /// Notes the merit of the present version in the history once it is known.

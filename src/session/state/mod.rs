@@ -292,7 +292,7 @@ impl Session {
             redo: self.history.redo_title().map(str::to_owned),
             path: self.path.clone(),
             goal: self.goal(),
-            merit: self.live_merit.latest(),
+            merit: self.merit_report(),
             dirty: self.is_dirty(),
             settings: self.settings.clone(),
             selected: self.selected.filter(|surface| *surface < self.lens.surfaces.len()),
@@ -364,7 +364,8 @@ impl Session {
             lens: Arc::clone(&self.lens),
             settings: self.settings.clone(),
         });
-        if let Some(goal) = self.goal() {
+        // While a handle is dragged, its slopes come with the merit.
+        if let Some(goal) = self.goal().filter(|_| self.drag.handle().is_none()) {
             self.live_merit.request(Arc::clone(&self.lens), goal, self.settings.tolerance);
         }
     }

@@ -21,6 +21,16 @@ impl Session {
         self.structure_search.set_save_folder(folder.into());
     }
 
+    /// Keeps gradient-index fields in a folder while they are designed from now on, and opens the one
+    /// that a program has left there when it was killed.
+    pub fn set_field_folder(&mut self, folder: impl Into<PathBuf>) {
+        if let Some(file) = self.grin.set_backup_folder(folder.into()) {
+            let file = file.display();
+            let text = format!("recovered the field of an interrupted design: {file}");
+            self.post(Severity::Note, text);
+        }
+    }
+
     /// Takes the events of all runs.
     pub(super) fn receive_run_events(&mut self) {
         for event in self.optimization.drain_events() {

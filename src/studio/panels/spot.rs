@@ -131,7 +131,7 @@ fn tolerance(ui: &mut Ui, view: &SessionView, actions: &mut Actions) {
 }
 
 /// Half of the width of every spot drawing, in mm.
-fn half_width(numbers: &Analyses) -> f64 {
+pub(super) fn half_width(numbers: &Analyses) -> f64 {
     let lit = numbers.spots.value.iter().filter_map(|spot| spot.as_ref().ok());
     let widest = lit.map(|spot| spot.radius.value).fold(0.0, f64::max);
     let airy = numbers.airy.unwrap_or(0.0);
@@ -263,8 +263,7 @@ fn radii(ui: &mut Ui, spot: &Spot) {
     let line = |ui: &mut Ui, text: String| -> Response { ui.label(RichText::new(text).small()) };
     line(ui, format!("RMS {}", in_um(spot.rms))).on_hover_text(
         "Root mean square distance from the centroid of all colours, by quadrature over the \
-         pupil; the dots are other rays, by quadrature \
-            over the pupil; the dots are other rays",
+         pupil; the dots are other rays",
     );
     line(ui, format!("GEO {}", in_um(spot.radius)))
         .on_hover_text("Largest distance from the centroid of all colours");

@@ -2,7 +2,7 @@
 
 use super::{assert_near, lens, row, sphere_sag};
 use aplanat::lens::{Aperture, Lens, Medium, Row};
-use aplanat::merit::{Goal, Term, constraint_margins};
+use aplanat::merit::{Goal, Term, WeightedTerm, constraint_margins};
 
 /// A stop, a concave mirror 100 mm behind it and a convex one 80 mm in front of that; the image lies
 /// 120 mm behind the second one.
@@ -18,7 +18,7 @@ fn two_mirrors() -> Lens {
 }
 
 fn lengths(lens: &Lens, term: Term) -> Vec<f64> {
-    let margins = constraint_margins(lens, [term].into_iter()).unwrap();
+    let margins = constraint_margins(lens, [WeightedTerm::new(term, 1.0)].into_iter()).unwrap();
     margins.into_iter().map(|margin| margin.value).collect()
 }
 

@@ -6,7 +6,7 @@ use aplanat::lens::{Wavelength, glass};
 use aplanat::merit::{Goal, LimitTreatment, Merit, PupilEdge, Term, WeightedTerm};
 
 fn value(lens: &Lens, term: Term) -> f64 {
-    let terms = vec![WeightedTerm { term, weight: 1.0 }];
+    let terms = vec![WeightedTerm::new(term, 1.0)];
     let goal = Goal {
         terms,
         zoom_ratios: Vec::new(),

@@ -20,7 +20,7 @@ fn sharpest(mut lens: Lens, free: &[Parameter]) -> Lens {
     lens.variables.clear();
     lens.fields.values.truncate(1);
     free.iter().for_each(|p| crate::merit::vary(&mut lens, p.surface, p.quantity));
-    let terms = vec![WeightedTerm { term: Term::Spot, weight: 1.0 }];
+    let terms = vec![WeightedTerm::new(Term::Spot, 1.0)];
     let goal = Goal {
         terms,
         zoom_ratios: Vec::new(),

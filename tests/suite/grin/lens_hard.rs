@@ -337,7 +337,7 @@ fn grin_lens_a_search_finds_the_term_in_r4_that_sharpens_a_rod() {
     lens.variables =
         vec![Variable { parameter: Parameter::new(0, Quantity::Grin(1)), min: None, max: None }];
     let goal = Goal {
-        terms: vec![WeightedTerm { term: Term::Spot, weight: 1.0 }],
+        terms: vec![WeightedTerm::new(Term::Spot, 1.0)],
         zoom_ratios: Vec::new(),
         limits: LimitTreatment::default(),
         pupil: PupilEdge::Frozen,

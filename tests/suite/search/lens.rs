@@ -203,7 +203,7 @@ fn parameters_that_are_not_variable_stay_fixed() {
 fn a_start_without_light_is_refused_or_recovered() {
     let mut lens = wide_open();
     let stop = lens.stop().unwrap();
-    let sharp = vec![WeightedTerm { term: Term::Spot, weight: 1.0 }];
+    let sharp = vec![WeightedTerm::new(Term::Spot, 1.0)];
     let only = Goal {
         terms: sharp,
         pupil: PupilEdge::Moving,
@@ -223,7 +223,7 @@ fn a_start_without_light_is_refused_or_recovered() {
 #[test]
 fn an_overflowing_merit_is_refused() {
     let lens = wide_open();
-    let terms = vec![WeightedTerm { term: Term::FocalLength(-1e200), weight: 1e200 }];
+    let terms = vec![WeightedTerm::new(Term::FocalLength(-1e200), 1e200)];
     let absurd = Goal {
         terms,
         pupil: PupilEdge::Moving,

@@ -3,8 +3,9 @@
 
 use egui::{Grid, Ui};
 
+use super::spots;
 use crate::lens::{Lens, Parameter, Quantity, SurfaceNumber};
-use crate::session::{Analyses, HistoryNode, SessionView};
+use crate::session::{Analyses, AnalysisResults, HistoryNode, SessionView};
 use crate::studio::number;
 use crate::studio::panels::mean_pupil_area;
 use crate::studio::panels::mean_spot;
@@ -45,7 +46,23 @@ pub(super) fn table(ui: &mut Ui, view: &SessionView, selected: &HistoryNode) {
             ui.end_row();
         }
     });
+    if let Some((present, selected)) = both(view, selected) {
+        spots::beside_each_other(ui, present, selected);
+    }
 }
+
+/// The present version and the selected one with their numbers, once both are known.
+fn both<'a>(view: &'a SessionView, selected: &HistoryNode) -> Option<(Shown<'a>, Shown<'a>)> {
+    let with_numbers = |results: &'a AnalysisResults| {
+        results.analyses.as_ref().ok().map(|numbers| (results, numbers))
+    };
+    let own = view.results.as_deref().filter(|_| view.is_current())?;
+    let other = view.preview_results.as_deref().filter(|other| other.lens == selected.lens)?;
+    with_numbers(own).zip(with_numbers(other))
+}
+
+/// A lens with its numbers.
+type Shown<'a> = (&'a AnalysisResults, &'a Analyses);
 
 fn numbers(view: &SessionView, selected: &HistoryNode) -> Vec<ComparedNumber> {
     let mut found = Vec::new();
@@ -56,11 +73,7 @@ fn numbers(view: &SessionView, selected: &HistoryNode) -> Vec<ComparedNumber> {
     };
     let present = view.history.iter().find(|node| node.id == view.version_id);
     add("merit", present.and_then(|node| node.merit).zip(selected.merit));
-    let own = view.results.as_ref().filter(|_| view.is_current());
-    let own = own.and_then(|results| results.analyses.as_ref().ok());
-    let other = view.preview_results.as_ref().filter(|results| results.lens == selected.lens);
-    let other = other.and_then(|results| results.analyses.as_ref().ok());
-    if let Some((own, other)) = own.zip(other) {
+    if let Some(((_, own), (_, other))) = both(view, selected) {
         let of = |value: fn(&Analyses) -> Option<f64>| value(own).zip(value(other));
         add("mean RMS spot, µm", of(|numbers| mean_spot(numbers).map(|spot| 1e3 * spot)));
         add("focal length, mm", of(|numbers| numbers.first_order().efl));

@@ -2,6 +2,7 @@
 //! one, named, made the design, or followed by another branch.
 
 mod comparison;
+mod spots;
 mod tree;
 
 use std::sync::Arc;

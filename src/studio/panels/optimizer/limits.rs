@@ -82,13 +82,15 @@ pub(super) fn list(ui: &mut Ui, view: &SessionView, actions: &mut Actions) {
 /// A limit in words: what, where, its value, its bounds.
 fn limit_text(name: &str, limit: &ConstraintMargin) -> String {
     let short = |value: f64| number::format_digits(value, 4);
-    let place = limit.surface.map(|at| format!(" at surface {}", SurfaceNumber::new(at)));
+    let surface = limit.surface.map(|at| format!(" at surface {}", SurfaceNumber::new(at)));
+    let field = limit.field.map(|at| format!(", field {}", at + 1));
+    let place = [surface, field].into_iter().flatten().collect::<String>();
     let bounds = match (limit.min, limit.max) {
         (Some(min), Some(max)) => format!("{} to {}", short(min), short(max)),
         (Some(min), None) => format!("at least {}", short(min)),
         (None, Some(max)) => format!("at most {}", short(max)),
-        (None, None) => String::new(),
+        (None, None) => "no bound".to_owned(),
     };
     let zoom = if limit.zoom > 0 { format!(", zoom {}", limit.zoom + 1) } else { String::new() };
-    format!("{name}{}{zoom}: {} of {bounds}", place.unwrap_or_default(), short(limit.value))
+    format!("{name}{}{zoom}: {} of {bounds}", place, short(limit.value))
 }

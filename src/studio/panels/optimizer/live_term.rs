@@ -28,7 +28,8 @@ impl LiveTerm {
         let report = view.merit.as_ref()?;
         let values = report.values.as_ref().ok()?;
         let TermValue { value, error, .. } = *values.terms.get(place)?;
-        (report.goal.terms.get(place)?.term == weighted.term).then_some(())?;
+        let known = report.goal.terms.get(place)?;
+        ((known.term, known.scope) == (weighted.term, weighted.scope)).then_some(())?;
         let is_current = Arc::ptr_eq(&report.lens, &view.lens);
         Some(Self { value, error, share: values.share(place), is_current })
     }

@@ -1,11 +1,12 @@
 //! The editor of the merit function: terms with weights and targets, and the treatment of the pupil
 //! edge.
 
-use egui::{Align, ComboBox, Grid, Id, Layout as Arrange, RichText, Ui, vec2};
+use egui::{Align, ComboBox, Grid, Id, Layout as Arrange, RichText, ScrollArea, Ui, vec2};
 use std::sync::Arc;
 
 use super::limits;
 use super::live_term::{LiveTerm, show_total};
+use super::scope;
 use super::terms::{self, can_ask_for_more_light, hint, targets, title, unit, value_text};
 use crate::lens::{Aperture, Edit, Lens, ParameterKind, Quantity};
 use crate::math::expression::evaluate;
@@ -208,22 +209,18 @@ impl MeritEditor {
         }
     }
 
-    /// A menu of the terms that are not there yet, and of those that may be there several times.
+    /// A menu of all terms; each may be there several times, for different parts of the lens.
     fn add_menu(&mut self, ui: &mut Ui, view: &SessionView) {
         ui.menu_button("Add a term", |ui| {
-            let there = |term: Term| {
-                !matches!(term, Term::RelativeIllumination { .. })
-                    && self.terms.iter().any(|row| row.weighted.term.name() == term.name())
-            };
-            let every = terms::default_terms(view).into_iter();
-            let missing: Vec<WeightedTerm> = every.filter(|new| !there(new.term)).collect();
-            for weighted in missing {
-                let button = ui.button(title(weighted.term));
-                if hint_beside(button, hint(weighted.term)).clicked() {
-                    self.terms.push(MeritRow { active: true, weighted });
-                    ui.close();
+            ScrollArea::vertical().max_height(420.0).show(ui, |ui| {
+                for weighted in terms::default_terms(view) {
+                    let button = ui.button(title(weighted.term));
+                    if hint_beside(button, hint(weighted.term)).clicked() {
+                        self.terms.push(MeritRow { active: true, weighted });
+                        ui.close();
+                    }
                 }
-            }
+            });
         });
     }
 }
@@ -232,7 +229,7 @@ impl MeritEditor {
 fn goal_of(view: &SessionView) -> Goal {
     let own = view.goal.as_ref().map(|goal| Goal::clone(goal));
     own.or_else(|| Goal::of_lens(&view.lens).ok()).unwrap_or_else(|| Goal {
-        terms: vec![WeightedTerm { term: Term::Spot, weight: 1.0 }],
+        terms: vec![WeightedTerm::new(Term::Spot, 1.0)],
         pupil: PupilEdge::default(),
         zoom_ratios: Vec::new(),
         limits: LimitTreatment::default(),
@@ -296,8 +293,10 @@ impl MeritRow {
                 let name = format!("{what} of {title}");
                 number_field(ui, buffers, &name, value, width);
             }
+            scope::bounds(ui, buffers, &title, &mut self.weighted.term);
             ui.weak(unit(term));
             self.field_choice(ui, view, &title);
+            scope::button(ui, buffers, &view.lens, &title, &mut self.weighted);
         });
         let search = view.optimization.snapshot.as_deref();
         match at.live {
@@ -334,7 +333,9 @@ impl MeritRow {
     /// The value of the term for the best lens of the optimization, if that has the term.
     fn best_cell(&self, ui: &mut Ui, search: &OptimizationSnapshot, place: usize) {
         let term = self.weighted.term;
-        let is_asked = |asked: &&WeightedTerm| self.active && asked.term == term;
+        let scope = self.weighted.scope;
+        let is_asked =
+            |asked: &&WeightedTerm| self.active && (asked.term, asked.scope) == (term, scope);
         let asked = search.request.goal.terms.get(place).filter(is_asked);
         let value = asked.and_then(|_| search.best_terms.get(place));
         ui.label(value.map(|value| value_text(term, value.value)).unwrap_or_default());

@@ -7,6 +7,7 @@ mod limits;
 mod live_term;
 mod merit_editor;
 mod prices;
+mod scope;
 mod terms;
 
 use egui::{

@@ -1,6 +1,7 @@
 //! The title, the unit, the explanation and the default of every term.
 
-use crate::merit::{self, LensFigures, Term, WeightedTerm};
+use super::scope;
+use crate::merit::{self, LensFigures, OperandKind, Term, WeightedTerm};
 use crate::session::{Analyses, SessionView};
 use crate::studio::number;
 use crate::studio::panels::{design_results, mean_pupil_area};
@@ -28,6 +29,7 @@ pub(super) const fn title(term: Term) -> &'static str {
         Term::BackFocus(_) => "Back focus",
         Term::Steepness(_) => "Steepness",
         Term::SemiDiameter { .. } => "Semi-diameter",
+        Term::Operand { kind, .. } => scope::title(kind),
     }
 }
 
@@ -71,6 +73,7 @@ pub(super) const fn hint(term: Term) -> &'static str {
             "Curvature times semi-diameter larger than this at some surface; 1 is a hemisphere"
         }
         Term::SemiDiameter { .. } => "Semi-diameters smaller or larger than this",
+        Term::Operand { kind, .. } => scope::hint(kind),
     }
 }
 
@@ -86,6 +89,7 @@ pub(super) const fn unit(term: Term) -> &'static str {
         | Term::Distortion
         | Term::FNumber(_)
         | Term::Steepness(_) => "",
+        Term::Operand { kind, .. } if kind.is_angle() => "°",
         Term::FocalLength(_)
         | Term::GlassCenter { .. }
         | Term::GlassEdge(_)
@@ -93,6 +97,7 @@ pub(super) const fn unit(term: Term) -> &'static str {
         | Term::AirEdge(_)
         | Term::TotalTrack(_)
         | Term::BackFocus(_)
+        | Term::Operand { .. }
         | Term::SemiDiameter { .. } => "mm",
     }
 }
@@ -100,7 +105,11 @@ pub(super) const fn unit(term: Term) -> &'static str {
 /// The targets of a term with their names.
 pub(super) fn targets(term: &mut Term) -> Vec<(&'static str, &mut f64)> {
     match term {
-        Term::Spot | Term::SpotIntegral | Term::Throughput | Term::Distortion => Vec::new(),
+        Term::Spot
+        | Term::SpotIntegral
+        | Term::Throughput
+        | Term::Distortion
+        | Term::Operand { .. } => Vec::new(),
         Term::GlassCenter { min, max }
         | Term::AirCenter { min, max }
         | Term::SemiDiameter { min, max } => vec![("Minimum", min), ("Maximum", max)],
@@ -129,6 +138,7 @@ pub(super) fn value_text(term: Term, value: f64) -> String {
         }
         Term::FNumber(_) => format!("off by {}", short(root)),
         Term::Steepness(_) => format!("{} over", short(root)),
+        Term::Operand { kind, .. } if kind.is_angle() => format!("{}° off", short(root)),
         _ if root < 0.1 => format!("{} µm", short(1e3 * root)),
         _ => format!("{} mm", short(root)),
     }
@@ -153,7 +163,8 @@ pub(super) fn default_terms(view: &SessionView) -> Vec<WeightedTerm> {
         mean_square_spot: results.and_then(mean_square),
     };
     let terms = merit::default_terms(&view.lens, view.settings.zoom, &figures);
-    terms.into_iter().map(rounded).collect()
+    let operand = |kind| WeightedTerm::new(Term::Operand { kind, min: None, max: None }, 1.0);
+    terms.into_iter().map(rounded).chain(OperandKind::ALL.map(operand)).collect()
 }
 
 /// The area of the pupil on the axis in mm², the mean over wavelengths.

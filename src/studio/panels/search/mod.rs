@@ -9,6 +9,7 @@ mod lenses;
 mod limits;
 mod moves;
 mod plot;
+mod replay;
 mod setup;
 mod text;
 
@@ -25,6 +26,7 @@ use crate::studio::actions::Actions;
 use crate::studio::text::capitalize;
 use crate::studio::thumbnails::Thumbnails;
 use lenses::CardOrder;
+use replay::Replay;
 use setup::SearchSetup;
 
 /// The introduction that is shown before the first search.
@@ -70,6 +72,8 @@ pub struct SearchPanel {
     order: CardOrder,
     /// The lens that was clicked.
     selected: Option<SelectedLens>,
+    /// The mutations of a line that are shown one after the other.
+    replay: Replay,
     /// The search that was shown last: a new one turns the page.
     shown_run: Option<u64>,
 }
@@ -142,6 +146,9 @@ impl SearchPanel {
             self.page = if number.is_some() { SearchPage::Lenses } else { SearchPage::Setup };
             self.shown_run = number;
         }
+        if self.page != SearchPage::Family {
+            self.replay.stop();
+        }
         if self.selected.as_ref().is_some_and(|selected| Some(selected.run) != number) {
             self.selected = None;
         }
@@ -186,11 +193,17 @@ impl SearchPanel {
 
     /// The line of the lens that was clicked, or of the best one.
     fn family_page(&mut self, ui: &mut Ui, search: ShownSearch<'_>, actions: &mut Actions) {
-        let number = self.selected_number().unwrap_or(search.run.best.number);
-        let clicked = family::tree(ui, search.run, number);
+        let selected = self.selected_number().unwrap_or(search.run.best.number);
+        // The line stays the same while its ancestors are shown.
+        let number = self.replay.youngest().unwrap_or(selected);
+        let replayed = self.replay.ui(ui, search.run, number);
+        let clicked = family::tree(ui, search.run, selected);
         let clicked =
             clicked.or_else(|| family::ancestors(ui, search, number, &mut self.thumbnails));
-        self.select_number(search.view, clicked, actions);
+        if clicked.is_some() {
+            self.replay.stop();
+        }
+        self.select_number(search.view, clicked.or(replayed), actions);
     }
 
     /// The generation that was clicked.

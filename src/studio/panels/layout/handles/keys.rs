@@ -81,6 +81,12 @@ impl HandleLayer {
         if grabbed.by == GrabbedBy::Released {
             return;
         }
+        let (lens, zoom) = (&frame.view.lens, frame.view.settings.zoom);
+        if handle.unit(lens, zoom) == HandleUnit::Surface {
+            // A step of some points would seldom reach the next surface.
+            let value = handle.value(lens, zoom).map(|at| at + (step.x + step.y).signum());
+            return push_drag(grabbed, value, actions);
+        }
         let modifiers = ui.input(|input| input.modifiers);
         let share = if modifiers.shift { FINE } else { 1.0 };
         // Either pair of arrows moves a handle along its only direction.
