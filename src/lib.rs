@@ -68,6 +68,9 @@ pub mod plot;
 // Results as files and drawings: the front of sharpness against light, GRIN fields and images.
 pub mod report;
 
+// Pictures through a lens: scenes, pixels by rays backwards, the sensor.
+pub mod picture;
+
 // Benchmarks: accuracy against time, throughput, memory.
 pub mod measure;
 

@@ -10,11 +10,10 @@
 //! cosines (Rimmer, "Relative illumination calculations", Proc. SPIE 655, 1986): the irradiance only
 //! where the image is sharp, since rays of other fields arrive at the same point too.
 
+use super::seen_from_image::SeenFromImage;
 use super::{AnalysisError, Estimate, lit_region};
-use crate::lens::{FieldKind, FieldPoint, Object, Shape, Surface, System};
-use crate::math::Vec3;
-use crate::paraxial::Beam;
-use crate::pupil::{Accuracy, Aiming, Dual2, Nodes, RayModel, Region, converge};
+use crate::lens::{FieldKind, FieldPoint};
+use crate::pupil::{Accuracy, Nodes, RayModel, Region, converge};
 use crate::trace::TraceSink as _;
 use rayon::prelude::*;
 
@@ -151,101 +150,6 @@ pub fn irradiance(
         seen.index_ratio * found.errors[0],
         found.rays,
     ))
-}
-
-/// The distance of the sphere around the reversed lens that takes up all its light, in lengths of the
-/// lens.
-const AROUND: f64 = 1e3;
-
-/// The lens as seen from a point of its image: reversed, with that point as object.
-struct SeenFromImage {
-    model: RayModel,
-    /// Two unit vectors tangential to the image surface at the point.
-    tangents: [Vec3<f64>; 2],
-    /// `n'²/n²`.
-    index_ratio: f64,
-}
-
-impl SeenFromImage {
-    fn new(model: &RayModel, wavelength: usize, point: [f64; 2]) -> Result<Self, AnalysisError> {
-        let owned;
-        let limited = if model.ends_at_disc() {
-            owned = model.limited_by_stop().map_err(|_error| AnalysisError::NoLight)?;
-            &owned
-        } else {
-            model
-        };
-        let channel = &limited.channels[wavelength];
-        let [x, y] = point;
-        let (image, lens) = channel.system.surfaces.split_last().ok_or(AnalysisError::NoLight)?;
-        let (sag, slope) = image.shape.sag(x * x + y * y).ok_or(AnalysisError::NoLight)?;
-        let last = lens.last().ok_or(AnalysisError::NoLight)?;
-        // After an odd number of mirrors the reversed lens keeps the direction of z.
-        let turn = -channel.system.light_direction(lens.len() - 1);
-        let distance = -turn * (last.thickness + sag);
-        let beam = Beam {
-            object: Object::Finite(distance),
-            aperture: limited.beam.aperture,
-            field: FieldKind::ObjectHeight,
-            edge: x.hypot(y),
-        };
-        let system = surrounded(&channel.system);
-        let systems = || vec![(channel.um, 1.0, system.clone())];
-        let field = FieldPoint { x, y, weight: 1.0 };
-        let aimed = |aiming| {
-            let model = RayModel::from_systems(systems(), 0, beam, aiming).ok()?;
-            let model = RayModel { fields: vec![field], ..model };
-            model.launch(field, 0).is_ok().then_some(model)
-        };
-        let model = aimed(Aiming::Chief).or_else(|| aimed(Aiming::Paraxial));
-        let slopes = [x, y].map(|v| 2.0 * v * slope * turn);
-        let (n, behind) = (channel.system.index_before, last.index);
-        Ok(Self {
-            model: model.ok_or(AnalysisError::NoLight)?,
-            tangents: tangents(slopes),
-            index_ratio: (behind / n).powi(2),
-        })
-    }
-
-    /// The area in cosines against the tangent plane; `None` if no ray gets through.
-    fn solid_angle(&self, region: &Region<'_>, nodes: &Nodes) -> Option<[f64; 1]> {
-        let launch = &region.launch;
-        let (launched, landed) = launch.trace_points(&nodes.points);
-        let (mut sum, mut lit) = (0.0, false);
-        for (ray, node) in launched.iter().enumerate() {
-            if !landed.fate(ray).is_imaged() {
-                continue;
-            }
-            let Some(ray) = launch.dual_ray(nodes.points[*node]) else { continue };
-            let along = |t: Vec3<f64>| ray.direction.dot(Vec3::<Dual2>::from_f64(t)).slope;
-            let [u, v] = self.tangents.map(along);
-            sum += nodes.weights[*node] * (u[0] * v[1] - u[1] * v[0]).abs();
-            lit = true;
-        }
-        lit.then_some([sum])
-    }
-}
-
-/// The reversed lens with a sphere around its front in place of the object: any light that leaves the
-/// lens comes from the scene.
-fn surrounded(system: &System<f64>) -> System<f64> {
-    let rims = system.surfaces.iter().map(|surface| surface.semi_diameter);
-    let widest = rims.filter(|rim| rim.is_finite()).fold(1.0, f64::max);
-    let radius = AROUND * (system.total_track() + widest);
-    let mut reversed = system.reversed(radius);
-    if let Some(last) = reversed.surfaces.last_mut() {
-        let shape = Shape::Sphere { curvature: -1.0 / radius };
-        *last = Surface { shape, hyperhemisphere: true, ..Surface::plane(0.0, last.index) };
-    }
-    reversed
-}
-
-/// Two unit vectors at right angles in the tangent plane of a surface with these slopes.
-fn tangents([p, q]: [f64; 2]) -> [Vec3<f64>; 2] {
-    let unit = |v: Vec3<f64>| v * (1.0 / v.dot(v).sqrt());
-    let first = unit(Vec3::new(1.0, 0.0, p));
-    let rest = Vec3::new(0.0, 1.0, q);
-    [first, unit(rest - first * rest.dot(first))]
 }
 
 /// The step of the field in the energy of a field element, relative to the field, and in radians or

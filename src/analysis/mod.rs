@@ -16,6 +16,7 @@ mod mtf;
 mod pupil;
 mod ray_layout;
 mod reference_sphere;
+mod seen_from_image;
 mod semi_diameters;
 mod spot;
 mod spot_points;
@@ -38,6 +39,7 @@ pub use mtf::{
 pub use pupil::{FieldPupil, PupilExtent, PupilShape, RayLoss, pupil};
 pub use ray_layout::{LayoutRay, RayLayout, ray_layout};
 pub use reference_sphere::ReferenceForm;
+pub use seen_from_image::{BackwardLens, lit_outline};
 pub use semi_diameters::{
     RimSensitivities, RimSensitivity, mean_rim_sensitivities, rim_sensitivities,
 };

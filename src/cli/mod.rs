@@ -28,6 +28,7 @@ mod optimize;
 mod output;
 mod output_paths;
 mod pareto;
+mod picture;
 mod progress;
 mod search;
 mod terms;
@@ -72,6 +73,7 @@ enum CliCommand {
     Info(info::InfoArgs),
     Trace(trace::TraceArgs),
     Analyze(analyze::AnalyzeArgs),
+    Picture(picture::PictureArgs),
     Gradient(gradient::GradientArgs),
     Optimize(optimize::OptimizeArgs),
     Pareto(pareto::ParetoArgs),
@@ -92,6 +94,7 @@ impl CliCommand {
             Self::Info(info) => info.run(output),
             Self::Trace(trace) => trace.run(output),
             Self::Analyze(analyze) => analyze.run(output),
+            Self::Picture(picture) => picture.run(output),
             Self::Gradient(gradient) => gradient.run(output),
             Self::Optimize(optimize) => optimize.run(output),
             Self::Pareto(pareto) => pareto.run(output),

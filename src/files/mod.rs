@@ -11,8 +11,8 @@ mod checkpoint;
 mod convert;
 mod error;
 mod folder;
-mod grayscale;
 mod identity;
+mod image_file;
 pub mod json;
 mod library;
 mod lock;
@@ -31,8 +31,8 @@ pub use checkpoint::{CheckpointError, CheckpointFormat};
 pub use convert::{Conversion, convert};
 pub use error::FileError;
 pub use folder::{own_files, stale_files};
-pub use grayscale::{GrayscaleImage, read_grayscale};
 pub use identity::FileIdentity;
+pub use image_file::{ColorImage, GrayscaleImage, read_color, read_grayscale};
 pub use library::{
     LensScaleError, LibraryLens, LibraryQuery, LibraryQueryError, ShortRange, StatedAperture,
     StatedField, focal_length_factor, library_lenses, scale_to_focal_length,

@@ -69,6 +69,12 @@ impl<R: Real> Rays<R> {
         self.n.push(ray.direction.z);
     }
 
+    /// Removes all rays and keeps the capacity.
+    pub fn clear(&mut self) {
+        let Self { x, y, z, l, m, n } = self;
+        [x, y, z, l, m, n].into_iter().for_each(Vec::clear);
+    }
+
     /// The ray with index `i`.
     ///
     /// # Panics
@@ -130,6 +136,19 @@ pub struct Landings<R> {
     /// The optical paths from the starts, in mm.
     pub opl: Vec<R>,
     codes: Vec<u32>,
+}
+
+impl<R: Real> Landings<R> {
+    /// The point and the direction of a ray behind the last surface, in its frame.
+    ///
+    /// # Panics
+    /// If there is no such ray.
+    pub fn ray(&self, i: usize) -> Ray<R> {
+        Ray {
+            point: Vec3::new(self.x[i], self.y[i], self.z[i]),
+            direction: Vec3::new(self.l[i], self.m[i], self.n[i]),
+        }
+    }
 }
 
 /// The landings of rays across the axis alone, for spots; zeros for a lost ray.

@@ -116,6 +116,16 @@ impl Fates {
         }
     }
 
+    /// Counts the rays of another set too.
+    pub fn add(&mut self, other: Self) {
+        self.imaged += other.imaged;
+        self.missed += other.missed;
+        self.clipped += other.clipped;
+        self.total_reflection += other.total_reflection;
+        self.turned += other.turned;
+        self.trapped += other.trapped;
+    }
+
     /// The number of all rays.
     pub fn total(self) -> usize {
         let lost = self.missed + self.clipped + self.total_reflection;

@@ -36,7 +36,7 @@ impl ImageLens {
     }
 
     /// The lens over the unit disc if no rim clips, else limited by its rims alone.
-    fn model(&self, clipped: bool) -> RayModel {
+    pub(crate) fn model(&self, clipped: bool) -> RayModel {
         let waves = numbers(&self.data["wavelengths_um"]);
         let weights = numbers(&self.data["weights"]);
         let systems: Vec<_> =

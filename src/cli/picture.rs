@@ -1,0 +1,440 @@
+//! `picture`: what a camera with a lens sees of a scene.
+
+use super::error::CliError;
+use super::failures::Failures;
+use super::input::{LensFile, LoadedLens, Tolerance};
+use super::output::{Output, ShortNumber, print_note};
+use super::output_paths::OutputPaths;
+use super::progress::{progress_bar, stop_flag};
+use crate::analysis::Estimate;
+use crate::files::{read_color, write_atomic};
+use crate::lens::{Lens, Object};
+use crate::measure::time_ms;
+use crate::picture::{
+    BitDepth, BuiltInScene, ColorBand, Coloring, ExactRenderer, ExactSettings, Exposure,
+    ImageFrame, MID_GREY, OmittedEffect, Picture, PictureError, QuickRenderer, Raster, Scene,
+    SensorModel, SensorPreset, encode_png, field_diagonal, focused, omitted_effects, photon_count,
+    picture_model, quick_error,
+};
+use crate::pupil::RayModel;
+use crate::trace::Fates;
+use serde::Serialize;
+use std::fmt::{self, Display};
+use std::ops::ControlFlow;
+use std::path::PathBuf;
+use std::sync::atomic::Ordering;
+
+/// What a camera with the lens sees of a scene, by rays backwards, with the error of the picture
+#[derive(Debug, clap::Args)]
+#[command(after_long_help = include_str!("help/picture.txt"))]
+pub(super) struct PictureArgs {
+    #[command(flatten)]
+    lens: LensFile,
+
+    /// The scene: white, target, star, edge, checkerboard, still-life, or a PNG or JPEG file
+    #[arg(long, value_name = "SCENE")]
+    scene: String,
+
+    /// Writes the picture into this file, PNG
+    #[arg(long, value_name = "FILE")]
+    out: PathBuf,
+
+    /// Follows rays from every pixel, even if the quick way would do
+    #[arg(long)]
+    exact: bool,
+
+    /// The quick way, by the map from image to scene, even if its error is larger than asked for
+    #[arg(long, conflicts_with = "exact")]
+    quick: bool,
+
+    /// The error: root mean square over the pixels, as a share of mid grey, or of the pixel where that
+    /// is brighter
+    #[arg(long, default_value = "1%", value_name = "TOLERANCE")]
+    error: Tolerance,
+
+    /// The number of columns and rows
+    #[arg(long, default_value = "480x320", value_name = "WxH", value_parser = parse_pixels)]
+    pixels: [usize; 2],
+
+    /// The diagonal of the sensor in mm; absent: that of the image of the lens's fields
+    #[arg(long, value_name = "MM", allow_negative_numbers = true)]
+    diagonal: Option<f64>,
+
+    /// The distance of the scene in front of the first surface in mm; absent: that of the focus
+    #[arg(long, value_name = "MM", allow_negative_numbers = true)]
+    distance: Option<f64>,
+
+    /// Focuses at this distance in front of the first surface in mm, by moving the image plane
+    #[arg(long, value_name = "MM", allow_negative_numbers = true)]
+    focus: Option<f64>,
+
+    /// Grey, at the wavelengths of the lens with their weights
+    #[arg(long)]
+    gray: bool,
+
+    /// Bits of a colour of a pixel in the file: 8 or 16
+    #[arg(long, default_value = "8", value_name = "BITS", value_parser = ["8", "16"])]
+    bits: String,
+
+    /// The largest number of rays of a colour of a pixel
+    #[arg(long, default_value_t = 4096, value_name = "N")]
+    max_samples: usize,
+
+    /// The seed of the rays
+    #[arg(long, default_value_t = 0, value_name = "SEED")]
+    seed: u32,
+
+    /// Shows the numbers of a sensor with its noise: canon-7d, phone or industrial
+    #[arg(long, value_name = "NAME")]
+    sensor: Option<String>,
+
+    /// The exposure time in seconds; absent: until white fills 80 % of the range of the sensor
+    #[arg(long, value_name = "S", requires = "sensor")]
+    seconds: Option<f64>,
+
+    /// The luminance of white in the scene in cd/m2; absent: 100, and 1 for still-life
+    #[arg(long, value_name = "CD")]
+    luminance: Option<f64>,
+
+    /// The zoom position, counted from 0
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    zoom: usize,
+}
+
+/// The numbers of columns and rows.
+fn parse_pixels(text: &str) -> Result<[usize; 2], String> {
+    let count = |part: &str| part.trim().parse::<usize>().ok().filter(|n| (1..=16_384).contains(n));
+    let pair = text.split_once('x').and_then(|(w, h)| Some([count(w)?, count(h)?]));
+    pair.ok_or_else(|| "expected columns and rows from 1 to 16384, as in `480x320`".to_owned())
+}
+
+/// The distance in mm at which a scene with depth is placed and focused if none is given.
+const NEAR: f64 = 1000.0;
+
+/// The tiles on which the quick way is compared with the exact one, and the samples of their pixels.
+const CHECKED_TILES: usize = 24;
+const CHECKED_SAMPLES: usize = 128;
+
+/// The number of steps of the progress bar.
+const STEPS: usize = 1000;
+
+impl PictureArgs {
+    pub(super) fn run(&self, output: &Output) -> Result<(), CliError> {
+        let mut paths = OutputPaths::reading([("the lens", self.lens.path())]);
+        paths.file("--out", Some(&self.out), &["png"])?;
+        let sensor = self.sensor_preset()?;
+        let opened = self.lens.open()?;
+        opened.check_zoom(self.zoom)?;
+        let (picture, ms) = time_ms(|| self.render(&opened));
+        let (RenderedPicture { picture, error, way }, shot) = picture?;
+        let exposed = sensor.map(|preset| self.expose(preset, &picture));
+        let mut report = self.report(&picture, (way, error), &shot, ms);
+        let shown = exposed.map_or(picture, |(image, exposed)| {
+            report.sensor = Some(exposed);
+            image
+        });
+        let mut failures = Failures::default();
+        failures.note(self.save(&shown, &report));
+        failures.note(output.print(&report));
+        failures.into_result()
+    }
+
+    fn built_in(&self) -> Option<BuiltInScene> {
+        BuiltInScene::ALL.iter().find(|(_, name)| *name == self.scene).map(|(scene, _)| *scene)
+    }
+
+    /// The lens as it is focused, and the distance of the focus; `None` at infinity.
+    fn focused_lens(&self, opened: &LoadedLens) -> Result<(Lens, Option<f64>), PictureError> {
+        let needs_depth = self.built_in().is_some_and(BuiltInScene::has_depth);
+        let near = match opened.lens.object {
+            Object::Infinity => needs_depth.then_some(NEAR),
+            Object::Finite(_) => None,
+        };
+        match (self.focus.or(near), opened.lens.object) {
+            (Some(distance), _) => {
+                let lens = focused(&opened.lens, self.zoom, distance)?;
+                Ok((lens, Some(distance)))
+            }
+            (None, Object::Finite(distance)) => Ok((opened.lens.clone(), Some(distance))),
+            (None, Object::Infinity) => Ok((opened.lens.clone(), None)),
+        }
+    }
+
+    fn render(&self, opened: &LoadedLens) -> Result<(RenderedPicture, CameraShot), CliError> {
+        let refuse = |error: PictureError| CliError::Input(format!("{}: {error}", opened.file));
+        let shot = self.shot(opened).map_err(refuse)?;
+        let scene = self.scene(&shot)?.map_err(refuse)?;
+        let CameraShot { model, bands, frame, .. } = &shot;
+        let renderer = ExactRenderer::new(model, bands, &scene, *frame).map_err(refuse)?;
+        let quick = if self.exact { None } else { Some(quick_picture(&shot, &renderer)) };
+        let quick = quick.transpose().map_err(refuse)?;
+        let is_kept = |quick: &RenderedPicture| self.quick || quick.error.value <= self.error.0;
+        let picture = quick.filter(is_kept).unwrap_or_else(|| self.exact_picture(&renderer));
+        Ok((picture, shot))
+    }
+
+    fn exact_picture(&self, renderer: &ExactRenderer<'_>) -> RenderedPicture {
+        let settings = ExactSettings {
+            tolerance: self.error.0,
+            max_samples: self.max_samples,
+            seed: self.seed,
+            seconds: 0.0,
+        };
+        let (stop, bar) = (stop_flag(), progress_bar(STEPS));
+        let watch = |done: f64| {
+            bar.set_position((STEPS as f64 * done) as u64);
+            if stop.load(Ordering::Relaxed) {
+                ControlFlow::Break(())
+            } else {
+                ControlFlow::Continue(())
+            }
+        };
+        let picture = renderer.render(&settings, &watch);
+        bar.finish_and_clear();
+        if !picture.complete {
+            print_note("note: stopped; what was not sampled is black");
+        }
+        let error = Estimate::new(picture.rms_error(), 0.0, 0);
+        RenderedPicture { picture, error, way: "exact" }
+    }
+
+    fn shot(&self, opened: &LoadedLens) -> Result<CameraShot, PictureError> {
+        let coloring = if self.gray { Coloring::Gray } else { Coloring::Rgb(3) };
+        let (lens, focus) = self.focused_lens(opened)?;
+        let unfocused = RayModel::from_lens(&opened.lens, self.zoom)?;
+        let diagonal = self.diagonal.map_or_else(|| field_diagonal(&unfocused), Ok)?;
+        let (model, bands) = picture_model(&lens, self.zoom, coloring)?;
+        let frame = ImageFrame::new(&model, self.pixels, diagonal)?;
+        Ok(CameraShot { model, bands, frame, focus, distance: self.distance.or(focus) })
+    }
+
+    /// The scene; the outer error is that of its file.
+    fn scene(&self, shot: &CameraShot) -> Result<Result<Scene, PictureError>, CliError> {
+        let CameraShot { model, frame, distance, .. } = shot;
+        if let Some(scene) = self.built_in() {
+            return Ok(scene.build(model, frame, *distance));
+        }
+        let path = PathBuf::from(&self.scene);
+        if !path.exists() {
+            let names = BuiltInScene::ALL.map(|(_, name)| name).join(", ");
+            let text = format!(
+                "--scene: no scene or file `{}`; expected {names}, or a PNG or JPEG file",
+                self.scene
+            );
+            return Err(CliError::Input(text));
+        }
+        let raster = Raster::new(read_color(&path)?);
+        Ok(Scene::of_raster(raster, model, frame, *distance))
+    }
+
+    /// The sensor, and a check of the numbers that belong to it.
+    fn sensor_preset(&self) -> Result<Option<&'static SensorPreset>, CliError> {
+        let is_positive = |v: &f64| *v > 0.0 && v.is_finite();
+        if let Some(wrong) = self.luminance.filter(|v| !is_positive(v)) {
+            let text = format!("--luminance: found {wrong}; expected a positive number of cd/m2");
+            return Err(CliError::Input(text));
+        }
+        if let Some(wrong) = self.seconds.filter(|v| !(*v >= 0.0 && v.is_finite())) {
+            return Err(CliError::Input(format!("--seconds: found {wrong}; expected 0 or more")));
+        }
+        let Some(name) = &self.sensor else { return Ok(None) };
+        let Some(preset) = SensorPreset::find(name) else {
+            let names = SensorPreset::ALL.map(|preset| preset.name).join(", ");
+            let text = format!("--sensor: no sensor `{name}`; expected one of {names}");
+            return Err(CliError::Input(text));
+        };
+        Ok(Some(preset))
+    }
+
+    /// The picture as a sensor sees it.
+    fn expose(&self, preset: &'static SensorPreset, picture: &Picture) -> (Picture, SensorReport) {
+        let of_scene = if self.built_in() == Some(BuiltInScene::StillLife) { 1.0 } else { 100.0 };
+        let luminance = self.luminance.unwrap_or(of_scene);
+        let sensor = &preset.model;
+        let seconds = self.seconds.unwrap_or_else(|| sensor.normal_exposure(picture, luminance));
+        let exposure = Exposure { luminance, seconds, seed: u64::from(self.seed) };
+        let image = sensor.expose(picture, &exposure);
+        let photons = |level: f64| {
+            photon_count(level * luminance * picture.white, picture.frame.pitch, seconds)
+        };
+        let dark = sensor.dark_current * seconds;
+        let report = SensorReport {
+            name: preset.name,
+            source: preset.source,
+            model: *sensor,
+            luminance,
+            seconds,
+            white_photons: photons(1.0),
+            signal_to_noise: [1.0, MID_GREY, 0.01]
+                .map(|v| sensor.signal_to_noise(photons(v), dark)),
+            saturated: image.saturated,
+        };
+        (image.develop(picture), report)
+    }
+
+    fn report(
+        &self,
+        picture: &Picture,
+        (way, error): (&'static str, Estimate),
+        shot: &CameraShot,
+        milliseconds: f64,
+    ) -> PictureReport {
+        let pixels = (picture.frame.pixels[0] * picture.frame.pixels[1]) as f64;
+        PictureReport {
+            scene: self.scene.clone(),
+            pixels: picture.frame.pixels,
+            size: picture.frame.size(),
+            focus: shot.focus,
+            distance: shot.distance,
+            way,
+            error: error.value,
+            error_of_error: error.error,
+            tolerance: self.error.0,
+            reached: picture.reached && error.value <= self.error.0,
+            complete: picture.complete,
+            white: picture.white,
+            mean: picture.mean(),
+            rays: picture.rays,
+            rays_per_pixel: picture.rays as f64 / pixels,
+            fates: picture.fates,
+            left_out: omitted_effects(&shot.model, &picture.frame, self.error.0),
+            sensor: None,
+            quick_milliseconds: error.milliseconds,
+            milliseconds,
+            out: self.out.display().to_string(),
+        }
+    }
+
+    fn save(&self, picture: &Picture, report: &PictureReport) -> Result<(), CliError> {
+        let depth = if self.bits == "16" { BitDepth::Sixteen } else { BitDepth::Eight };
+        let data = serde_json::to_string(report).unwrap_or_default();
+        let texts = [("Software", "Aplanat".to_owned()), ("Aplanat picture", data)];
+        let bytes = encode_png(picture, depth, &texts)
+            .map_err(|error| CliError::Failed(format!("{}: {error}", self.out.display())))?;
+        Ok(write_atomic(&self.out, &bytes)?)
+    }
+}
+
+/// A picture by the quick way, with its error against the exact way on some of its tiles.
+fn quick_picture(
+    shot: &CameraShot,
+    exact: &ExactRenderer<'_>,
+) -> Result<RenderedPicture, PictureError> {
+    let quick = QuickRenderer::new(&shot.model, &shot.bands, exact)?;
+    let (mut picture, ms) = time_ms(|| quick.render());
+    let error = quick_error(exact, &picture, CHECKED_TILES, CHECKED_SAMPLES);
+    picture.rays = error.rays;
+    let error = Estimate { milliseconds: Some(ms), ..error };
+    Ok(RenderedPicture { picture, error, way: "quick" })
+}
+
+/// A picture with its error.
+struct RenderedPicture {
+    picture: Picture,
+    /// As a share of mid grey, or of the pixel where that is brighter; with the milliseconds of the
+    /// picture without its preparation and its error where it is made the quick way.
+    error: Estimate,
+    way: &'static str,
+}
+
+/// A lens focused for a picture, with its sensor.
+struct CameraShot {
+    model: RayModel,
+    bands: Vec<ColorBand>,
+    frame: ImageFrame,
+    /// The distance of the focus in mm; `None` at infinity.
+    focus: Option<f64>,
+    /// The distance of the scene in mm; `None` at infinity.
+    distance: Option<f64>,
+}
+
+/// The printed result.
+#[derive(Serialize)]
+struct PictureReport {
+    scene: String,
+    pixels: [usize; 2],
+    size: [f64; 2],
+    focus: Option<f64>,
+    distance: Option<f64>,
+    way: &'static str,
+    error: f64,
+    error_of_error: f64,
+    tolerance: f64,
+    reached: bool,
+    complete: bool,
+    white: f64,
+    mean: f64,
+    rays: usize,
+    rays_per_pixel: f64,
+    fates: Fates,
+    left_out: Vec<OmittedEffect>,
+    sensor: Option<SensorReport>,
+    quick_milliseconds: Option<f64>,
+    milliseconds: f64,
+    out: String,
+}
+
+/// The exposure of a sensor.
+#[derive(Serialize)]
+struct SensorReport {
+    name: &'static str,
+    source: &'static str,
+    #[serde(flatten)]
+    model: SensorModel,
+    luminance: f64,
+    seconds: f64,
+    white_photons: f64,
+    /// At white, at mid grey and at a hundredth of white.
+    signal_to_noise: [f64; 3],
+    saturated: f64,
+}
+
+impl Display for SensorReport {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [white, grey, dark] = self.signal_to_noise;
+        let seconds = ShortNumber(self.seconds);
+        writeln!(f, "sensor {}: {seconds} s at {} cd/m2", self.name, self.luminance)?;
+        writeln!(f, "  {} photons at white", ShortNumber(self.white_photons))?;
+        writeln!(
+            f,
+            "  signal to noise {white:.1} at white, {grey:.1} at mid grey, {dark:.1} at 1 %"
+        )?;
+        writeln!(f, "  {:.2} % saturated; {}", 100.0 * self.saturated, self.source)
+    }
+}
+
+impl Display for PictureReport {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let place = |distance: Option<f64>| {
+            distance.map_or("infinity".to_owned(), |mm| format!("{} mm", ShortNumber(mm)))
+        };
+        let ([width, height], [columns, rows]) = (self.size, self.pixels);
+        writeln!(f, "{} at {}, focus at {}", self.scene, place(self.distance), place(self.focus))?;
+        writeln!(f, "{columns} x {rows} pixels on {width:.3} x {height:.3} mm")?;
+        let reached = if self.reached { "" } else { ", not reached" };
+        let percent = 100.0 * self.tolerance;
+        let of_quick = self.quick_milliseconds.map(|ms| {
+            let error = 100.0 * self.error_of_error;
+            format!(" ± {error:.3} %, against the exact way on some tiles; made in {ms:.0} ms")
+        });
+        let of_quick = of_quick.unwrap_or_else(|| " by sampling".to_owned());
+        writeln!(
+            f,
+            "error {:.3} % of mid grey (rms){of_quick}; asked for {percent} %{reached}",
+            100.0 * self.error
+        )?;
+        writeln!(f, "a white card on the axis gives {} of its radiance", ShortNumber(self.white))?;
+        let lost = 100.0 * (1.0 - self.fates.imaged as f64 / self.rays.max(1) as f64);
+        writeln!(
+            f,
+            "{} rays ({:.0} a pixel, {lost:.1} % lost at rims), {:.0} ms",
+            self.rays, self.rays_per_pixel, self.milliseconds
+        )?;
+        for OmittedEffect { effect, change, reason } in &self.left_out {
+            let change = change.map(|c| format!("{:.2} %, ", 100.0 * c)).unwrap_or_default();
+            writeln!(f, "left out: {effect} ({change}{reason})")?;
+        }
+        self.sensor.iter().try_for_each(|sensor| write!(f, "{sensor}"))?;
+        writeln!(f, "saved as {}", self.out)
+    }
+}

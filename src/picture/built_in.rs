@@ -1,0 +1,134 @@
+//! Scenes made by code: test targets that fill the frame, and a still life lit by a candle.
+
+use super::frame::filling_size;
+use super::pattern::Pattern;
+use super::scene::{Radiance, Scene, SceneLayer};
+use super::{ImageFrame, PictureError, Raster};
+use crate::pupil::RayModel;
+use std::sync::Arc;
+
+/// A scene that needs no file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum BuiltInScene {
+    /// A white card in every direction.
+    White,
+    /// Groups of bars (after USAF 1951).
+    Target,
+    /// A Siemens star.
+    Star,
+    /// A slanted edge of the contrast 4:1 (ISO 12233).
+    Edge,
+    /// Black and white squares.
+    Checkerboard,
+    /// A candle before a wall, with two balls at other distances.
+    StillLife,
+}
+
+impl BuiltInScene {
+    /// Every scene with its name.
+    pub const ALL: [(Self, &'static str); 6] = [
+        (Self::White, "white"),
+        (Self::Target, "target"),
+        (Self::Star, "star"),
+        (Self::Edge, "edge"),
+        (Self::Checkerboard, "checkerboard"),
+        (Self::StillLife, "still-life"),
+    ];
+
+    /// True for a scene with depth, which needs a distance.
+    pub fn has_depth(self) -> bool {
+        self == Self::StillLife
+    }
+
+    /// The scene at a distance in mm, or at infinity, of the size that fills a frame.
+    ///
+    /// # Errors
+    /// A lens without focal length, or a distance that is not in front of it.
+    pub fn build(
+        self,
+        model: &RayModel,
+        frame: &ImageFrame,
+        distance: Option<f64>,
+    ) -> Result<Scene, PictureError> {
+        let half_size = filling_size(model, frame, distance)?;
+        let pattern = match self {
+            Self::White => return Ok(Scene::uniform(1.0)),
+            Self::Target => Pattern::Bars,
+            Self::Star => Pattern::Star(36.0),
+            Self::Edge => Pattern::SlantedEdge,
+            Self::Checkerboard => Pattern::Checkerboard(10.0),
+            Self::StillLife => return still_life(half_size, distance),
+        };
+        let layer =
+            SceneLayer { distance, center: [0.0; 2], half_size, velocity: [0.0; 2], pattern };
+        Scene::new(vec![layer], [0.0; 3], 1.0)
+    }
+}
+
+impl Scene {
+    /// A picture at a distance in mm, or at infinity: as large as fits into a frame, before black.
+    ///
+    /// # Errors
+    /// A lens without focal length, or a distance that is not in front of it.
+    pub fn of_raster(
+        raster: Raster,
+        model: &RayModel,
+        frame: &ImageFrame,
+        distance: Option<f64>,
+    ) -> Result<Self, PictureError> {
+        let [width, height] = filling_size(model, frame, distance)?;
+        let aspect = raster.aspect();
+        let half_height = height.min(width / aspect);
+        let layer = SceneLayer {
+            distance,
+            center: [0.0; 2],
+            half_size: [aspect * half_height, half_height],
+            velocity: [0.0; 2],
+            pattern: Pattern::Raster(Arc::new(raster)),
+        };
+        Self::new(vec![layer], [0.0; 3], 1.0)
+    }
+}
+
+/// The colour of a candle's light with the luminance 1.
+const CANDLE: Radiance = [1.65, 0.87, 0.28];
+/// The luminance of the flame, of the wall behind it and of white in the picture, in cd/m².
+const FLAME: f64 = 1e4;
+const WALL: f64 = 0.3;
+const WHITE: f64 = 1.0;
+
+/// A candle at a distance, an orange in front of it and an apple behind it, each left and right, and a
+/// wall at one and a half of the distance that the candle lights. Sizes are shares of the frame.
+fn still_life([width, height]: [f64; 2], distance: Option<f64>) -> Result<Scene, PictureError> {
+    let lit = |level: f64, [red, green, blue]: Radiance| {
+        [level * red * CANDLE[0], level * green * CANDLE[1], level * blue * CANDLE[2]]
+    };
+    let scale = |depth: f64| if distance.is_some() { depth } else { 1.0 };
+    let layer =
+        |depth: f64, [x, y]: [f64; 2], [across, along]: [f64; 2], pattern: Pattern| SceneLayer {
+            distance: distance.map(|distance| depth * distance),
+            center: [scale(depth) * x * width, scale(depth) * y * height],
+            half_size: [scale(depth) * across * height, scale(depth) * along * height],
+            velocity: [0.0; 2],
+            pattern,
+        };
+    let orange = Pattern::Ball { radiance: lit(1.2, [1.0, 0.5, 0.1]), lit_from: [1.2, 0.8] };
+    let apple = Pattern::Ball { radiance: lit(0.8, [0.3, 0.8, 0.2]), lit_from: [-1.2, 0.6] };
+    let wax = Pattern::Uniform { radiance: lit(3.0, [1.0, 1.0, 0.9]), cover: 1.0 };
+    let table = Pattern::Uniform { radiance: lit(0.15, [0.6, 0.4, 0.25]), cover: 1.0 };
+    let wall = Pattern::LitWall {
+        radiance: lit(WALL, [0.9, 0.85, 0.8]),
+        light: [0.0, 0.2 * height],
+        distance: 0.9 * height,
+    };
+    let endless = |layer: SceneLayer| SceneLayer { half_size: [1e9; 2], ..layer };
+    let layers = vec![
+        layer(0.9, [-0.5, -0.55], [0.3, 0.3], orange),
+        layer(1.0, [0.0, 0.22], [0.045, 0.14], Pattern::Flame(lit(FLAME, [1.0; 3]))),
+        layer(1.0, [0.0, -0.4], [0.07, 0.47], wax),
+        layer(1.2, [0.55, -0.5], [0.35, 0.33], apple),
+        layer(1.35, [0.0, -1.4], [9.0, 0.65], table),
+        endless(layer(1.5, [0.0, 0.0], [1.0, 1.0], wall)),
+    ];
+    Scene::new(layers, [0.0; 3], WHITE)
+}

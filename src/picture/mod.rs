@@ -1,0 +1,41 @@
+//! Pictures through a lens: what a camera with this lens sees of a scene.
+//!
+//! A [`Scene`] is painted planes at depths. An [`ExactRenderer`] follows rays backwards from every pixel
+//! through the lens into it, with the rims clipping: distortion, lateral colour, blur that varies over the
+//! field, vignetting and depth of field need no model of their own. The error by sampling is stated; what
+//! is left out (diffraction, losses at surfaces, ghosts) is named in the metadata of the file. A
+//! [`SensorModel`] makes noisy numbers of the light.
+
+mod beamlets;
+mod built_in;
+mod color_band;
+mod error;
+mod exact;
+mod focus;
+mod frame;
+mod lit_directions;
+mod mip_texture;
+mod omitted;
+mod pattern;
+mod picture_data;
+mod png_file;
+mod quick;
+mod raster;
+mod scene;
+mod sensor;
+
+pub use built_in::BuiltInScene;
+pub use color_band::{ColorBand, Coloring, picture_model};
+pub use error::PictureError;
+pub use exact::{ExactRenderer, ExactSettings, MID_GREY, PictureProgress, REPLICATES};
+pub use focus::focused;
+pub use frame::{ImageFrame, field_diagonal, filling_size};
+pub use lit_directions::{DrawnDirection, LitDirections};
+pub use omitted::{OmittedEffect, omitted_effects};
+pub use pattern::{Paint, PaintedPoint, Pattern};
+pub use picture_data::Picture;
+pub use png_file::{BitDepth, encode_png};
+pub use quick::{QuickRenderer, quick_error};
+pub use raster::Raster;
+pub use scene::{Radiance, Scene, SceneLayer};
+pub use sensor::{Exposure, SensorImage, SensorModel, SensorPreset, photon_count};

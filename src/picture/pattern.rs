@@ -1,0 +1,207 @@
+//! What is painted on the planes of a scene: test patterns as functions, and pictures from files.
+
+use super::raster::Raster;
+use super::scene::Radiance;
+use std::f64::consts::TAU;
+use std::sync::Arc;
+
+/// A point of a painted rectangle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PaintedPoint {
+    /// The distance from its middle to the right and upwards, in the unit of the plane.
+    pub place: [f64; 2],
+    /// Half of the width and height of the rectangle, in the same unit.
+    pub half_size: [f64; 2],
+}
+
+/// The paint at a point.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Paint {
+    /// The radiance.
+    pub radiance: Radiance,
+    /// The share of what is behind that it covers, 0 to 1.
+    pub cover: f64,
+}
+
+/// A painting.
+#[derive(Debug, Clone)]
+pub enum Pattern {
+    /// The same everywhere.
+    Uniform {
+        /// The radiance.
+        radiance: Radiance,
+        /// The share of what is behind that it covers.
+        cover: f64,
+    },
+    /// `1 + c cos(2π (f·x) + φ)`.
+    Wave {
+        /// The contrast c.
+        contrast: f64,
+        /// The periods f per unit of the plane, to the right and upwards.
+        frequency: [f64; 2],
+        /// The phase φ in the middle, in radians.
+        phase: f64,
+    },
+    /// Black and white squares, this many along the height.
+    Checkerboard(f64),
+    /// A straight edge at 5 degrees from the vertical between a dark left and a light right side, with
+    /// the contrast 4:1 of ISO 12233.
+    SlantedEdge,
+    /// A star of this many black and as many white sectors (Siemens).
+    Star(f64),
+    /// Groups of three horizontal and three vertical black bars on white; each group is
+    /// the sixth root of two finer than the one before (USAF 1951).
+    Bars,
+    /// A disc that shines evenly, with the brightness of a lit ball if it is shaded.
+    Ball {
+        /// The radiance in its middle.
+        radiance: Radiance,
+        /// The direction of the light on it as seen from its middle, to the right and upwards.
+        lit_from: [f64; 2],
+    },
+    /// A candle's flame: a drop that is brightest above its middle.
+    Flame(Radiance),
+    /// A wall that a light in front of it shines on.
+    LitWall {
+        /// The radiance of the wall nearest to the light.
+        radiance: Radiance,
+        /// The place of the light over the wall, in the unit of the plane.
+        light: [f64; 2],
+        /// Its distance from the wall, in the same unit.
+        distance: f64,
+    },
+    /// A picture.
+    Raster(Arc<Raster>),
+}
+
+fn grey(level: f64) -> Paint {
+    Paint { radiance: [level; 3], cover: 1.0 }
+}
+
+const CLEAR: Paint = Paint { radiance: [0.0; 3], cover: 0.0 };
+const EDGE_SLOPE: f64 = 0.087_488_663_525_924; // tan 5°
+const EDGE_LEVELS: [f64; 2] = [0.2, 0.8];
+
+impl Pattern {
+    /// The paint at a point.
+    pub fn paint(&self, point: PaintedPoint) -> Paint {
+        let PaintedPoint { place: [x, y], half_size: [half_width, half_height] } = point;
+        let (u, v) = (x / half_width, y / half_height);
+        match self {
+            Self::Uniform { radiance, cover } => Paint { radiance: *radiance, cover: *cover },
+            Self::Wave { contrast, frequency: [f, g], phase } => {
+                grey(1.0 + contrast * (TAU * (f * x + g * y) + phase).cos())
+            }
+            Self::Checkerboard(count) => {
+                let side = 2.0 * half_height / count;
+                let square = (x / side).floor() + (y / side).floor();
+                grey(square.rem_euclid(2.0))
+            }
+            Self::SlantedEdge => grey(EDGE_LEVELS[usize::from(x > EDGE_SLOPE * y)]),
+            Self::Star(sectors) => {
+                let inside = x.hypot(y) <= half_width.min(half_height);
+                let sector = (y.atan2(x) / TAU * sectors).rem_euclid(1.0);
+                grey(f64::from(u8::from(!inside || sector < 0.5)))
+            }
+            Self::Bars => grey(bars([x / half_height, v])),
+            Self::Ball { radiance, lit_from } => ball([u, v], *radiance, *lit_from),
+            Self::Flame(radiance) => flame([u, v], *radiance),
+            Self::LitWall { radiance, light, distance } => {
+                let square = (x - light[0]).powi(2) + (y - light[1]).powi(2);
+                // The inverse square of the distance times the cosine on the wall.
+                let share = (1.0 + square / (distance * distance)).powf(-1.5);
+                Paint { radiance: radiance.map(|v| v * share), cover: 1.0 }
+            }
+            Self::Raster(raster) => raster.paint([0.5 * (u + 1.0), 0.5 * (1.0 - v)]),
+        }
+    }
+}
+
+/// The height of the largest group of bars, over half of the height of the target.
+const LARGEST_GROUP: f64 = 0.5;
+/// The number of groups in a row; each row is half as large as the one above it.
+const GROUPS: i32 = 6;
+const ROWS: i32 = 6;
+
+/// The level of the target at a place in halves of its height: rows of groups from the top, each group
+/// five bar widths high and eleven wide: three horizontal bars, a gap, three vertical bars.
+fn bars([x, y]: [f64; 2]) -> f64 {
+    let (mut top, mut height) = (0.9, LARGEST_GROUP);
+    for _ in 0..ROWS {
+        let mut left = -1.35;
+        for group in 0..GROUPS {
+            let bar = height / 5.0 * (-f64::from(group) / 6.0).exp2();
+            let place = [(x - left) / bar, (top - y) / bar];
+            if is_bar(place) {
+                return 0.0;
+            }
+            left += 13.0 * bar;
+        }
+        top -= 1.2 * height;
+        height *= 0.5;
+    }
+    1.0
+}
+
+/// True on a bar of a group, in bar widths from its upper left corner.
+fn is_bar([right, down]: [f64; 2]) -> bool {
+    let is_even = |at: f64| (at.floor() as i32) % 2 == 0;
+    let inside = |at: f64, from: f64| at >= from && at < from + 5.0;
+    inside(down, 0.0)
+        && (inside(right, 0.0) && is_even(down) || inside(right, 6.0) && is_even(right))
+}
+
+/// A ball of Lambert's cosine, lit from a side in front of it.
+fn ball([u, v]: [f64; 2], radiance: Radiance, [lx, ly]: [f64; 2]) -> Paint {
+    let square = u * u + v * v;
+    if square > 1.0 {
+        return CLEAR;
+    }
+    let front = (1.0 - square).sqrt();
+    let lit = ((front + lx * u + ly * v) / (1.0 + lx * lx + ly * ly).sqrt()).max(0.0);
+    Paint { radiance: radiance.map(|level| level * lit), cover: 1.0 }
+}
+
+/// A drop with its tip upwards, clear at its foot.
+fn flame([u, v]: [f64; 2], radiance: Radiance) -> Paint {
+    let up = 0.5 * (v + 1.0);
+    let width = (up.sqrt() * (1.0 - up) * 2.2).min(1.0);
+    if u.abs() > width {
+        return CLEAR;
+    }
+    let bright = (0.25 + 0.75 * (4.0 * up * (1.0 - up))).min(1.0);
+    Paint { radiance: radiance.map(|level| level * bright), cover: 1.0 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn level(pattern: &Pattern, place: [f64; 2]) -> f64 {
+        pattern.paint(PaintedPoint { place, half_size: [1.5, 1.0] }).radiance[0]
+    }
+
+    #[test]
+    fn patterns_have_their_levels_where_they_belong() {
+        let board = Pattern::Checkerboard(4.0);
+        assert_eq!([level(&board, [0.1, 0.1]), level(&board, [0.6, 0.1])], [0.0, 1.0]);
+        assert_eq!(level(&board, [-0.1, 0.1]), 1.0);
+        let edge = Pattern::SlantedEdge;
+        assert_eq!([level(&edge, [0.08, 0.9]), level(&edge, [0.08, 0.93])], [0.8, 0.2]);
+        let star = Pattern::Star(4.0);
+        assert_eq!([level(&star, [0.5, 0.01]), level(&star, [0.5, -0.01])], [1.0, 0.0]);
+        let wave = Pattern::Wave { contrast: 0.5, frequency: [2.0, 0.0], phase: 0.0 };
+        assert!((level(&wave, [0.25, 0.7]) - 0.5).abs() < 1e-15);
+    }
+
+    #[test]
+    fn half_of_a_group_of_bars_is_black_and_groups_do_not_touch() {
+        // The first group: three horizontal bars from its upper left corner.
+        let bar = LARGEST_GROUP / 5.0;
+        let at = |right: f64, down: f64| bars([-1.35 + right * bar, 0.9 - down * bar]);
+        let column: Vec<f64> = (0..6).map(|i| at(2.5, f64::from(i) + 0.5)).collect();
+        assert_eq!(column, [0.0, 1.0, 0.0, 1.0, 0.0, 1.0]);
+        let row: Vec<f64> = (5..12).map(|i| at(f64::from(i) + 0.5, 2.5)).collect();
+        assert_eq!(row, [1.0, 0.0, 1.0, 0.0, 1.0, 0.0, 1.0]);
+    }
+}

@@ -1,0 +1,103 @@
+//! A picture as a PNG file of 8 or 16 bits, with its data as text inside.
+
+use super::Picture;
+use png::{BitDepth as PngDepth, ColorType, Encoder, EncodingError};
+
+/// The bits of a colour of a pixel.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum BitDepth {
+    /// 256 levels.
+    Eight,
+    /// 65536 levels.
+    Sixteen,
+}
+
+impl BitDepth {
+    /// Appends the level of a value from 0 to 1, big end first.
+    fn push(self, value: f64, bytes: &mut Vec<u8>) {
+        let value = value.clamp(0.0, 1.0);
+        match self {
+            Self::Eight => bytes.push((255.0 * value).round() as u8),
+            Self::Sixteen => bytes.extend(((65535.0 * value).round() as u16).to_be_bytes()),
+        }
+    }
+}
+
+/// The file of a picture in sRGB, whose white is the picture's, with texts by their keywords.
+///
+/// # Errors
+/// A text that PNG does not hold.
+pub fn encode_png(
+    picture: &Picture,
+    depth: BitDepth,
+    texts: &[(&str, String)],
+) -> Result<Vec<u8>, EncodingError> {
+    let mut pixels = Vec::new();
+    for value in picture.values.iter().flatten() {
+        depth.push(srgb_value(value / picture.white), &mut pixels);
+    }
+    let mut bytes = Vec::new();
+    let [width, height] = picture.frame.pixels.map(|count| count as u32);
+    let mut encoder = Encoder::new(&mut bytes, width, height);
+    encoder.set_color(ColorType::Rgb);
+    encoder.set_depth(match depth {
+        BitDepth::Eight => PngDepth::Eight,
+        BitDepth::Sixteen => PngDepth::Sixteen,
+    });
+    for (keyword, text) in texts {
+        encoder.add_itxt_chunk((*keyword).to_owned(), text.clone())?;
+    }
+    let mut writer = encoder.write_header()?;
+    writer.write_image_data(&pixels)?;
+    writer.finish()?;
+    Ok(bytes)
+}
+
+/// The sRGB value of linear light, both 0 to 1 (IEC 61966-2-1).
+fn srgb_value(light: f64) -> f64 {
+    let light = light.clamp(0.0, 1.0);
+    if light <= 0.0031308 { 12.92 * light } else { 1.055 * light.powf(1.0 / 2.4) - 0.055 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::picture::ImageFrame;
+    use crate::trace::Fates;
+
+    fn picture() -> Picture {
+        let frame = ImageFrame { pixels: [2, 1], pitch: 1.0, center: [0.0; 2], inverted: true };
+        Picture {
+            frame,
+            values: vec![[0.0, 0.5, 9.0], [0.1, 0.25, 0.5]],
+            errors: vec![[0.0; 3]; 2],
+            white: 0.5,
+            rays: 0,
+            fates: Fates::default(),
+            reached: true,
+            complete: true,
+            overshoot: 0.0,
+        }
+    }
+
+    #[test]
+    fn files_hold_both_depths_and_their_texts() {
+        let text = [("Left out", "diffraction, 1 %".to_owned())];
+        for (depth, white) in [(BitDepth::Eight, 255), (BitDepth::Sixteen, 65535)] {
+            let bytes = encode_png(&picture(), depth, &text).unwrap();
+            let image = image::load_from_memory(&bytes).unwrap();
+            let level = image.clone().into_rgb16().get_pixel(0, 0).0;
+            assert_eq!(level, [0, 65535, 65535]);
+            let half = image.into_rgb16().get_pixel(1, 0).0[1];
+            // Half of the light is 0.735 of the scale.
+            assert!((f64::from(half) / 65535.0 - 0.735_357).abs() < 1.0 / f64::from(white));
+            let decoder = png::Decoder::new(std::io::Cursor::new(&bytes));
+            let reader = decoder.read_info().unwrap();
+            let stored = &reader.info().utf8_text[0];
+            assert_eq!(
+                (stored.keyword.as_str(), stored.get_text().unwrap()),
+                ("Left out", text[0].1.clone())
+            );
+        }
+    }
+}
