@@ -265,3 +265,26 @@ impl WaveSamples {
         self.mean(left).sqrt()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A sum that leaves a known part.
+    #[test]
+    fn the_rest_is_what_the_polynomials_leave() {
+        let count = 400;
+        let angle = |i: usize| std::f64::consts::TAU * (i as f64 + 0.5) / count as f64;
+        let points: Vec<[f64; 2]> = (0..count).map(|i| [angle(i).cos(), angle(i).sin()]).collect();
+        let waves: Vec<f64> = (0..count).map(|i| 0.7 + 0.2 * (9.0 * angle(i)).cos()).collect();
+        let samples = WaveSamples { points, waves, weights: vec![1.0; count] };
+        let piston = noll(1);
+        let rest = samples.rest(&[piston], &[0.7]);
+        assert!((rest - 0.2 / 2f64.sqrt()).abs() < 1e-12, "{rest}");
+        assert!((samples.rest(&[piston], &[0.0]).powi(2) - 0.49 - 0.02).abs() < 1e-12);
+        let (fitted, condition) = samples.fit(&[piston]).unwrap();
+        assert!((fitted[0] - 0.7).abs() < 1e-12 && (condition - 1.0).abs() < 1e-12);
+        let two = WaveSamples { points: vec![[0.0; 2]], waves: vec![1.0], weights: vec![1.0] };
+        assert!(two.fit(&[piston, piston]).is_none());
+    }
+}

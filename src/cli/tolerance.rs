@@ -16,6 +16,8 @@ use serde::Serialize;
 use std::fmt::{self, Display};
 use std::path::PathBuf;
 
+type SampleCount = clap::builder::RangedU64ValueParser<usize>;
+
 /// Shows what errors of making do to a lens: sensitivities, expected spot, quantiles, yield
 #[derive(Debug, clap::Args)]
 #[command(after_long_help = include_str!("help/tolerance.txt"))]
@@ -27,8 +29,9 @@ pub(super) struct ToleranceArgs {
     #[arg(long, value_enum, value_name = "GRADE")]
     grade: Option<ToleranceGrade>,
 
-    /// Lenses with random errors whose rays are traced
-    #[arg(long, default_value_t = 500, value_name = "N")]
+    /// Lenses with random errors whose rays are traced; two at least, or nothing tells the error of
+    /// the quadratic form
+    #[arg(long, default_value_t = 500, value_name = "N", value_parser = SampleCount::new().range(2..))]
     samples: usize,
 
     /// The seed of the random errors

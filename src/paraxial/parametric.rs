@@ -277,3 +277,21 @@ fn has_own(lens: &Lens, zoom: usize, row: usize) -> bool {
     let position = lens.zoom.get(zoom);
     position.is_some_and(|p| p.thicknesses.iter().any(|gap| gap.surface == row))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    use crate::files::{bundled_lenses, json};
+    use crate::lens::Medium;
+
+    #[test]
+    fn the_indices_of_object_and_image_space_are_those_of_their_media() {
+        let found = bundled_lenses().iter().find(|lens| lens.name == "tessar_50_f28").unwrap();
+        let mut lens = json::read(found.text, found.name).unwrap();
+        lens.object_medium = Medium::Index(1.33);
+        lens.surfaces.last_mut().unwrap().medium = Medium::Index(1.5);
+        let parametric = ParametricLens::new(&lens, &[]).unwrap();
+        assert_eq!([parametric.object_index(0), parametric.image_index(0)], [1.33, 1.5]);
+    }
+}

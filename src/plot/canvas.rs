@@ -191,3 +191,32 @@ pub fn draw_image_row(title: &str, pixels: usize, images: &[(String, Vec<Color>)
     }
     canvas
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_raster_fills_its_cells_row_by_row() {
+        let mut canvas = Canvas::new([12, 14]);
+        let colors: [Color; 6] = [[1; 3], [2; 3], [3; 3], [4; 3], [5; 3], [6; 3]];
+        canvas.raster([2.0, 3.0], 3, 3, &colors);
+        for (i, pixel) in canvas.pixels().chunks(3).enumerate() {
+            let (x, y) = (i % 12, i / 12);
+            let inside = (2..11).contains(&x) && (3..9).contains(&y);
+            let cell = if inside { ((x - 2) / 3 + 3 * ((y - 3) / 3)) as u8 + 1 } else { 0xff };
+            assert_eq!(pixel, [cell; 3], "{x} {y}");
+        }
+    }
+
+    #[test]
+    fn images_stand_beside_each_other_under_their_names() {
+        let colors = |level: u8| vec![[level; 3]; 4];
+        let images = [("a".to_owned(), colors(10)), ("b".to_owned(), colors(20))];
+        let canvas = draw_image_row("title", 2, &images);
+        let count =
+            |level: u8| canvas.pixels().chunks(3).filter(|pixel| **pixel == [level; 3]).count();
+        let side = (IMAGE_SIDE / 2).max(1) * 2;
+        assert_eq!([count(10), count(20)], [side * side; 2]);
+    }
+}

@@ -259,4 +259,15 @@ mod tests {
         assert!(((b[0] - a[0]) - (a[1] - b[1])).abs() < 1e-9);
         assert_eq!(chart.to_pixel([0.5, 0.5]), [200.0, 50.0]);
     }
+
+    #[test]
+    fn a_chart_contains_what_both_axes_contain() {
+        let (x, y) = (Axis::linear("x", [0.0, 1.0]), Axis::linear("y", [0.0, 10.0]));
+        let chart = Chart::new([10.0, 20.0], [110.0, 220.0], x, y);
+        let inside = [[0.0, 0.0], [1.0, 10.0], [0.5, 3.0]];
+        let outside = [[-0.1, 5.0], [1.1, 5.0], [0.5, -1.0], [0.5, 11.0]];
+        assert!(inside.into_iter().all(|point| chart.contains(point)));
+        assert!(!outside.into_iter().any(|point| chart.contains(point)));
+        assert_eq!(chart.to_pixel([0.0, 10.0]), [10.0, 20.0]);
+    }
 }

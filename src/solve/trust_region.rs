@@ -448,4 +448,23 @@ mod tests {
         let (_, value, trials) = minimize(&[0.5, 0.5], |_| vec![WIDE; 2], twins, 20);
         assert_eq!((value, trials), (0.0, 0));
     }
+
+    #[test]
+    fn a_trial_that_fails_shortens_the_next_step() {
+        let (residuals, jacobian) = rosenbrock(&DVector::from_vec(vec![-1.2, 1.0]));
+        let point = LeastSquaresPoint {
+            value: residuals.norm_squared(),
+            half_gradient: jacobian.tr_mul(&residuals),
+            normal: jacobian.tr_mul(&jacobian),
+        };
+        let mut region = TrustRegion::new(2);
+        let mut last = f64::INFINITY;
+        for _ in 0..5 {
+            let step = region.propose(&point, &[WIDE; 2]).unwrap();
+            let length = region.length(&step.change);
+            assert!(length <= (SHRINKAGE[1] + 1e-9) * last, "{length} after {last}");
+            region.note_failure(&step);
+            last = length;
+        }
+    }
 }

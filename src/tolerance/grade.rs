@@ -138,3 +138,53 @@ impl GradedSheet<'_> {
         self.add(PerturbationKind::ElementTiltY, body, angle);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tolerance::ToleranceScene;
+
+    use crate::files::{bundled_lenses, json};
+
+    fn sheet(name: &str) -> ToleranceSheet {
+        let found = bundled_lenses().iter().find(|bundled| bundled.name == name).unwrap();
+        let lens = json::read(found.text, name).unwrap();
+        let scene = ToleranceScene::new(&lens, 0, 1e-2).unwrap();
+        graded_sheet(&lens, &scene.lens, ToleranceGrade::Precision)
+    }
+
+    fn places(sheet: &ToleranceSheet, kind: PerturbationKind) -> Vec<(usize, usize)> {
+        let errors = sheet.errors.iter().map(|tolerance| tolerance.error);
+        errors.filter(|e| e.kind == kind).map(|e| (e.first, e.last)).collect()
+    }
+
+    /// A triplet has six surfaces, five gaps in front of the image and three elements.
+    #[test]
+    fn every_surface_gap_and_element_has_its_tolerances_once() {
+        let sheet = sheet("cooke_triplet_100_f27");
+        let elements = places(&sheet, PerturbationKind::ElementTiltX);
+        let glasses = places(&sheet, PerturbationKind::Index);
+        assert_eq!(elements.len(), 3);
+        assert_eq!(glasses.len(), 3);
+        for ((first, last), (glass, _)) in elements.iter().zip(&glasses) {
+            assert_eq!((first, last), (glass, &(glass + 1)));
+        }
+        assert!(elements.windows(2).all(|pair| pair[0].1 < pair[1].0));
+        for kind in [PerturbationKind::ElementDecenterX, PerturbationKind::ElementDecenterY] {
+            assert_eq!(places(&sheet, kind), elements);
+        }
+        let refracting: Vec<(usize, usize)> =
+            elements.iter().flat_map(|(a, b)| [(*a, *a), (*b, *b)]).collect();
+        for kind in [PerturbationKind::Curvature, PerturbationKind::SurfaceTiltX] {
+            assert_eq!(places(&sheet, kind), refracting);
+        }
+    }
+
+    #[test]
+    fn a_gradient_has_no_tolerance_of_its_surfaces_shape_but_of_their_power() {
+        let sheet = sheet("grin_rod_melles_griot");
+        assert!(!places(&sheet, PerturbationKind::Curvature).is_empty());
+        assert_eq!(places(&sheet, PerturbationKind::Irregularity), []);
+        assert_eq!(places(&sheet, PerturbationKind::ElementTiltX), []);
+    }
+}

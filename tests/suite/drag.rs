@@ -4,7 +4,7 @@ use aplanat::files::{bundled_lenses, json};
 use aplanat::lens::{Lens, LensSection, Object, Parameter, Quantity, Variable};
 use aplanat::paraxial::{
     Beam, DragError, DragOutcome, DragSettings, DragStop, FirstOrder, FirstOrderLock, FreeNumbers,
-    Handle, HandleDrag, HandlePlaces, LockError, first_order,
+    Handle, HandleDrag, HandlePlaces, LockError, first_order, short_name,
 };
 use std::sync::Arc;
 
@@ -301,4 +301,42 @@ fn handles_follow_the_pointer() {
             assert!(off < 0.02 * delta[0], "{name}: {handle} is {off:e} beside the pointer");
         }
     }
+}
+
+/// Where the pointer leads a handle, in closed form.
+#[test]
+fn values_follow_the_pointer() {
+    let lens = bundled("double_gauss_rudolph_50");
+    let (system, data) =
+        (lens.resolve(0, lens.wavelengths[lens.primary()].um).unwrap(), first(&lens, 0));
+    let section = LensSection::new(&system, &[]);
+    let places = HandlePlaces { lens: &lens, zoom: 0, section: &section, first_order: &data };
+    let value = |handle: Handle, start: f64, delta: [f64; 2]| {
+        places.value_after(handle, start, delta).unwrap()
+    };
+    assert_eq!(value(Handle::Rim(2), 9.0, [0.3, 0.5]), 9.5);
+    assert_eq!(value(Handle::ImagePlane, 2.0, [-0.3, 0.5]), 1.7);
+    let near = |found: f64, expected: f64| {
+        assert!((found / expected - 1.0).abs() < 1e-12, "{found} {expected}");
+    };
+    let stop = data.stop_semi_diameter;
+    near(value(Handle::StopSize, stop, [0.0, -1.0]), stop - 1.0);
+    let [_, y] = places.place(Handle::FieldHeight).unwrap();
+    let edge = 20.0_f64;
+    near(value(Handle::FieldHeight, edge, [0.0, 0.0]), edge);
+    let wider = value(Handle::FieldHeight, edge, [0.0, 0.25 * y]);
+    near(wider.to_radians().tan(), 1.25 * edge.to_radians().tan());
+    let [_, y] = places.place(Handle::BeamWidth).unwrap();
+    let factor =
+        value(Handle::BeamWidth, 1.0, [0.0, 0.5 * y]) / value(Handle::BeamWidth, 1.0, [0.0; 2]);
+    let fast = matches!(lens.aperture, aplanat::lens::Aperture::FNumber(_));
+    near(factor, if fast { 1.0 / 1.5 } else { 1.5 });
+}
+
+#[test]
+fn numbers_that_move_have_short_names() {
+    let name = |surface, quantity| short_name(Parameter::new(surface, quantity));
+    assert_eq!(name(2, Quantity::Curvature), "c3");
+    assert_eq!(name(0, Quantity::Thickness), "t1");
+    assert_eq!(name(4, Quantity::ZoomThickness(1)), "t5 (zoom 2)");
 }

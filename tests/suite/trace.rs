@@ -2,7 +2,7 @@
 
 use super::merit::bundled;
 use super::reference::{self, Reference, number, numbers};
-use aplanat::lens::{Shape, Surface, System};
+use aplanat::lens::{Pose, Shape, Surface, System};
 use aplanat::math::{Dual, Real, Vec3};
 use aplanat::trace::{
     AdjointSeed, Fate, ImagePoints, Landings, Ray, RayLimit, Rays, SimdWidth, SurfaceParameter,
@@ -581,4 +581,71 @@ fn the_second_sheet_of_a_hyperboloid_is_no_surface() {
         assert_eq!(fate(0.0, whole, 12.0), far);
         assert_eq!(fate(-0.5, whole, 20.0), far);
     }
+}
+
+/// Derivatives through decentred, tilted and irregular surfaces, against differences.
+#[test]
+fn mounted_surfaces_have_the_derivatives_of_their_landings() {
+    let mut system = system();
+    for surface in &mut system.surfaces {
+        // A plane has no curvature that could change.
+        if surface.shape == Shape::Plane {
+            surface.shape = Shape::Sphere { curvature: 0.0 };
+        }
+    }
+    for i in [1, 4, 7] {
+        let i64 = i as f64;
+        system.surfaces[i].pose = Some(Pose::new([0.1 * i64, -0.2], [0.01, -0.005 * i64]));
+    }
+    system.surfaces[4].astigmatism = Some(2e-4);
+    system.surfaces[7].astigmatism = Some(-1e-4);
+    let rays = some_rays(19);
+    let seed = AdjointSeed {
+        point: Vec3::new(0.7, -0.4, 0.0),
+        direction: Vec3::new(0.3, 5.0, 0.0),
+        opl: 0.2,
+    };
+    let sum = |system: &System<f64>| {
+        let mut hits = Landings::default();
+        Tracer::new(system).unwrap().trace_batch(&rays, &mut hits);
+        (0..rays.len())
+            .filter(|i| hits.fate(*i).is_imaged())
+            .map(|i| {
+                0.7 * hits.x[i] - 0.4 * hits.y[i]
+                    + 0.3 * hits.l[i]
+                    + 5.0 * hits.m[i]
+                    + 0.2 * hits.opl[i]
+            })
+            .sum::<f64>()
+    };
+    let gradient = Tracer::new(&system).unwrap().gradient(&rays, |_| seed);
+    let mut compared = 0;
+    for i in 0..system.surfaces.len() - 1 {
+        let difference = |step: f64, set: fn(&mut System<f64>, usize, f64)| {
+            let value = |by: f64| {
+                let mut other = system.clone();
+                set(&mut other, i, by);
+                sum(&other)
+            };
+            (8.0 * (value(step) - value(-step)) - (value(2.0 * step) - value(-2.0 * step)))
+                / (12.0 * step)
+        };
+        let found = &gradient.surfaces[i];
+        let pairs = [
+            (found.thickness, difference(1e-3, |s, i, by| s.surfaces[i].thickness += by)),
+            (found.index, difference(1e-5, |s, i, by| s.surfaces[i].index += by)),
+            (
+                found.curvature,
+                difference(1e-6, |s, i, by| {
+                    *SurfaceParameter::Curvature.value_mut(s, i) += by;
+                }),
+            ),
+        ];
+        for (k, (found, difference)) in pairs.into_iter().enumerate() {
+            let size = found.abs().max(difference.abs()).max(1.0);
+            assert!((found - difference).abs() < 1e-7 * size, "{i} {k}: {found} {difference}");
+            compared += 1;
+        }
+    }
+    assert_eq!(compared, 3 * (system.surfaces.len() - 1));
 }

@@ -28,7 +28,6 @@ pub fn diffraction_mtf(
     let function = PupilFunction::of_region(&region, &sphere, accuracy.tolerance)?;
     let origin = origin(model, field, &region)?;
     let mut values = function.values(frequencies, 0.0, accuracy.tolerance)?;
-    let reached = values.iter().flatten().all(|v| v.modulus.error <= accuracy.tolerance);
     if is_uncertain(&sphere, &region) {
         let tolerance = accuracy.tolerance.max(COARSE);
         let wide = PupilFunction::of_region(&region, &sphere.doubled(), tolerance)?;
@@ -37,6 +36,8 @@ pub fn diffraction_mtf(
             value.modulus.error += (value.re - other.re).hypot(value.im - other.im);
         }
     }
+    // What the choice of the sphere leaves uncertain counts too.
+    let reached = values.iter().flatten().all(|v| v.modulus.error <= accuracy.tolerance);
     let offset = [sphere.center.x - origin[0], sphere.center.y - origin[1]];
     let list = ConvergedList {
         values: flatten(frequencies, &values, offset),

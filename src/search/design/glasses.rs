@@ -95,3 +95,75 @@ pub(super) fn exchanged(
     };
     chosen.into_iter().map(with).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    use crate::lens::{Row, blank};
+    use crate::search::design::LensSpecification;
+    use rand::SeedableRng as _;
+
+    fn requirements(glasses: &str) -> LensRequirements {
+        let spec = format!(
+            r#"{{"focal_length_mm": 50.0, "f_number": 4.0, "half_field_deg": 5.0{glasses}}}"#
+        );
+        let spec: LensSpecification = serde_json::from_str(&spec).unwrap();
+        LensRequirements::complete(&spec).unwrap().0
+    }
+
+    fn draft(medium: Medium) -> LensDraft {
+        let glass = Row { medium, thickness: 3.0, curvature: 0.02, ..Row::default() };
+        let surfaces = vec![glass, Row { thickness: 40.0, ..Row::default() }];
+        LensDraft { lens: Lens { surfaces, ..blank() }, pupil: 0.0 }
+    }
+
+    #[test]
+    fn permitted_glasses_have_no_twins() {
+        let all = permitted(&requirements(""));
+        assert!(all.len() > 100, "{}", all.len());
+        for (i, a) in all.iter().enumerate() {
+            let twin =
+                |b: &&&glass::Glass| (a.nd - b.nd).abs() < TWIN[0] && (a.vd - b.vd).abs() < TWIN[1];
+            assert!(!all[i + 1..].iter().any(|b| twin(&b)), "{}", a.full_name());
+        }
+        let two = requirements(r#", "glasses": ["SCHOTT N-BK7", "SCHOTT N-SF5"]"#);
+        let mut names: Vec<String> =
+            permitted(&two).iter().map(|glass| glass.full_name()).collect();
+        names.sort();
+        assert_eq!(names, ["SCHOTT N-BK7", "SCHOTT N-SF5"]);
+        assert_eq!(by_distance(1.67, 32.0, &two)[0].full_name(), "SCHOTT N-SF5");
+        assert_eq!(by_distance(1.52, 64.0, &two)[0].full_name(), "SCHOTT N-BK7");
+    }
+
+    #[test]
+    fn a_model_glass_is_replaced_by_the_nearest_of_the_catalogue() {
+        let asked = requirements("");
+        let model = draft(Medium::Model { nd: 1.5169, vd: 64.1 });
+        assert!(!in_catalogue(&model.lens, &asked));
+        let snapped = snapped(&model, &asked);
+        assert!(in_catalogue(&snapped.lens, &asked));
+        let Medium::Glass(name) = &snapped.lens.surfaces[0].medium else { panic!("{snapped:?}") };
+        let found = glass::find(name).unwrap();
+        assert!((found.nd - 1.5168).abs() < 1e-3 && (found.vd - 64.17).abs() < 0.5, "{name}");
+    }
+
+    #[test]
+    fn an_exchange_tries_other_glasses_the_nearest_first() {
+        let asked = requirements("");
+        let start = draft(Medium::Glass("SCHOTT N-BK7".to_owned()));
+        let others = exchanged(&start, &asked, &mut Random::seed_from_u64(1));
+        assert_eq!(others.len(), TRIED);
+        let distance = |other: &LensDraft| {
+            let Medium::Glass(name) = &other.lens.surfaces[0].medium else { panic!("{other:?}") };
+            assert_ne!(name, "SCHOTT N-BK7");
+            let glass = glass::find(name).unwrap();
+            ((glass.nd - 1.5168) / UNIT[0]).hypot((glass.vd - 64.17) / UNIT[1])
+        };
+        let near: Vec<f64> = others[..TRIED / 2].iter().map(distance).collect();
+        assert!(near.is_sorted(), "{near:?}");
+        assert!(others[TRIED / 2..].iter().all(|other| distance(other) >= near[TRIED / 2 - 1]));
+        let model = draft(Medium::Model { nd: 1.5, vd: 60.0 });
+        assert!(exchanged(&model, &asked, &mut Random::seed_from_u64(1)).is_empty());
+    }
+}

@@ -339,4 +339,22 @@ mod tests {
         let far = |start: &NamedDraft| distance(named(&start.name), &asked).unwrap();
         assert!(starts.windows(2).all(|pair| far(&pair[0]) <= far(&pair[1])));
     }
+
+    #[test]
+    fn a_copy_has_nearly_the_same_surfaces() {
+        let original = achromats(&requirements()).swap_remove(0).draft;
+        let changed = |change: fn(&mut Row)| {
+            let mut other = original.clone();
+            change(&mut other.lens.surfaces[1]);
+            other
+        };
+        assert!(is_copy(&original, &original));
+        assert!(is_copy(&changed(|row| row.curvature *= 1.01), &original));
+        assert!(is_copy(&changed(|row| row.thickness *= 1.01), &original));
+        assert!(!is_copy(&changed(|row| row.curvature *= 1.5), &original));
+        assert!(!is_copy(&changed(|row| row.thickness += 20.0), &original));
+        let mut longer = original.clone();
+        longer.lens.surfaces.push(Row::default());
+        assert!(!is_copy(&longer, &original));
+    }
 }

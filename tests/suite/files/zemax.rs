@@ -3,7 +3,8 @@
 use super::foreign;
 use aplanat::files::{self, ConversionOutcome, ConversionReport, FileError, OpenedLens};
 use aplanat::lens::{
-    Aperture, FieldKind, Lens, Medium, Object, Parameter, Pickup, Quantity, Variable,
+    Aperture, FieldKind, GradientIndex, Lens, Medium, Object, Parameter, Pickup, ProfileLaw,
+    Quantity, Variable,
 };
 
 fn achromat() -> String {
@@ -399,4 +400,84 @@ fn heights_of_fields_have_the_unit_of_lengths_and_angles_have_none() {
             assert_eq!(heights, [0.0, 1.5 * factor, 2.5 * factor], "{unit}, kind {kind}");
         }
     }
+}
+
+#[test]
+fn coefficients_of_a_gradient_have_the_unit_of_their_power() {
+    let values = [3.0, 5.0, 7.0, 0.1, 0.2, 0.3];
+    let mut lines = String::from("  TYPE GRINSUR3\r\n  PARM 2 1.6");
+    for (i, value) in values.iter().enumerate() {
+        lines += &format!("\r\n  PARM {} {value}", i + 3);
+    }
+    let text = achromat().replacen("  TYPE STANDARD", "  TYPE REPLACED", 2);
+    let text = text.replacen("  TYPE REPLACED", "  TYPE STANDARD", 1);
+    let text = text.replacen("  TYPE REPLACED", &lines, 1).replace("UNIT MM", "UNIT IN");
+    let lens = lens(&text);
+    let Medium::Grin(gradient) = &lens.surfaces[0].medium else { panic!("{lens:?}") };
+    assert_eq!(gradient.base, Medium::Index(1.6));
+    let powers = [2, 4, 6, 1, 2, 3];
+    let found = gradient.radial.iter().chain(&gradient.axial);
+    for ((found, value), power) in found.zip(values).zip(powers) {
+        let expected = value / 25.4_f64.powi(power);
+        assert!((found / expected - 1.0).abs() < 1e-14, "{found} {expected}");
+    }
+    assert_eq!((gradient.radial.len(), gradient.axial.len()), (3, 3));
+}
+
+#[test]
+fn odd_powers_of_the_height_are_refused_by_their_line() {
+    let with = |parameter: usize| {
+        let lines = format!("  TYPE ODDASPHE\r\n  PARM {parameter} 1e-5");
+        let text = achromat().replacen("  TYPE STANDARD", "  TYPE REPLACED", 2);
+        let text = text.replacen("  TYPE REPLACED", "  TYPE STANDARD", 1);
+        open(text.replacen("  TYPE REPLACED", &lines, 1).as_bytes())
+    };
+    for power in [1, 3, 5, 7] {
+        let text = with(power).unwrap_err().to_string();
+        assert!(text.contains(&format!("a term in r^{power}")), "{text}");
+    }
+    assert_eq!(with(4).unwrap().lens.surfaces[0].asphere, [1e-5]);
+    assert_eq!(with(8).unwrap().lens.surfaces[0].asphere, [0.0, 0.0, 1e-5]);
+}
+
+#[test]
+fn indices_adjusted_to_another_environment_are_reported() {
+    let read = |line: &str| {
+        let text = achromat().replacen("UNIT MM", &format!("{line}\r\nUNIT MM"), 1);
+        let report = open(text.as_bytes()).unwrap().report.unwrap();
+        outcome(&report, "ENVD").0
+    };
+    assert_eq!(read("ENVD 50 1 1"), ConversionOutcome::Approximated);
+    assert_eq!(read("ENVD 20 0.5 1"), ConversionOutcome::Approximated);
+    assert_eq!(read("ENVD 50 1 0"), ConversionOutcome::Preserved);
+    assert_eq!(read("ENVD 20 1 1"), ConversionOutcome::Preserved);
+}
+
+/// The other program has no aspheric surface in front of this kind of medium.
+#[test]
+fn an_asphere_in_front_of_a_gradient_is_never_lost_in_silence() {
+    let mut lens = lens(&achromat());
+    let gradient = GradientIndex {
+        base: Medium::Index(1.6),
+        law: ProfileLaw::Index,
+        radial: vec![-1e-3],
+        axial: Vec::new(),
+    };
+    lens.surfaces[0].medium = Medium::Grin(Box::new(gradient));
+    let folder = super::folder("asphere-and-gradient");
+    let target = folder.join("a.zmx");
+    files::save(&lens, &target).unwrap();
+    assert_eq!(files::open(&target).unwrap().lens.surfaces[0].medium, lens.surfaces[0].medium);
+    lens.surfaces[0].asphere = vec![1e-6];
+    match files::save(&lens, &target) {
+        Err(error) => assert!(error.to_string().contains("not saved"), "{error}"),
+        Ok(report) => {
+            let again = files::open(&target).unwrap().lens;
+            assert_eq!(again.surfaces[0].asphere, [1e-6]);
+            let rows = report.report.unwrap().rows;
+            let lost = rows.iter().filter(|row| row.outcome != ConversionOutcome::Used);
+            assert!(lost.into_iter().any(|row| row.text.contains("surface 1")), "{rows:?}");
+        }
+    }
+    std::fs::remove_dir_all(folder).unwrap();
 }

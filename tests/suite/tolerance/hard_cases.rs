@@ -143,6 +143,7 @@ fn the_command_shows_sensitivities_and_spots() {
     assert!(json["spots"][1]["good"]["interval"][1].as_f64().unwrap() <= 1.0);
     assert_eq!(json["loosest"].as_array().unwrap().len(), 3);
     refused(2, &["tolerance", lens, "--rms=-1"], "", &["--rms"]);
+    refused(2, &["tolerance", lens, "--samples", "1"], "", &["--samples", "2.."]);
     refused(2, &["tolerance", lens, "--grade", "good"], "", &["commercial"]);
     std::fs::write(&path, SINGLET.replace("\"last\": 1", "\"last\": 7")).unwrap();
     refused(2, &few, "", &["surfaces 1 to 8; expected 1 to 2"]);

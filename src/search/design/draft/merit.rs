@@ -554,3 +554,87 @@ fn clamp(draft: &mut LensDraft, asked: &LensRequirements, parameters: &[DraftPar
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    use crate::search::design::LensSpecification;
+    use crate::search::design::starts::achromats;
+
+    fn requirements(spec: &str) -> LensRequirements {
+        let spec: LensSpecification = serde_json::from_str(spec).unwrap();
+        LensRequirements::complete(&spec).unwrap().0
+    }
+
+    /// The terms that a merit counts as broken.
+    fn broken(merit: &mut DraftMerit<'_>, values: &[f64]) -> Vec<&'static str> {
+        let mut terms: Vec<_> = merit.sum(values).unwrap().broken.iter().map(|b| b.0).collect();
+        terms.sort_unstable();
+        terms.dedup();
+        terms
+    }
+
+    /// Every derivative against a central difference, with every limit broken that needs no rays.
+    #[test]
+    fn the_merit_of_a_draft_has_the_derivative_of_its_value() {
+        let asked = requirements(
+            r#"{"focal_length_mm": 60.0, "f_number": 5.0, "half_field_deg": 4.0,
+                "max_elements": 2, "min_back_focus_mm": 70.0, "max_track_mm": 75.0}"#,
+        );
+        let mut draft = achromats(&asked).swap_remove(1).draft;
+        // Outside the map of glasses on both sides, too thin at its rim, and off the focal length.
+        draft.lens.surfaces[0].medium = Medium::Model { nd: 1.75, vd: 62.0 };
+        draft.lens.surfaces[1].medium = Medium::Model { nd: 1.52, vd: 32.0 };
+        draft.lens.surfaces[0].curvature *= 1.2;
+        draft.lens.surfaces[0].thickness = 0.5;
+        draft.lens.surfaces[1].thickness = 25.0;
+        draft.lens.surfaces[2].conic = -0.5;
+        let freedom = Freedom { glasses: true, aspheric_surfaces: 1, pupil: true };
+        let plan = BeamPlan { margin: 0.05, ..BeamPlan::full(0.3) };
+        let mut merit = DraftMerit::new(&draft, &asked, &plan, freedom).unwrap();
+        let values = merit.start();
+        let terms = broken(&mut merit, &values);
+        for term in ["back_focus", "focal_length", "glass", "glass_edge", "total_track"] {
+            assert!(terms.contains(&term), "{term} is not broken: {terms:?}");
+        }
+        let point = merit.evaluate(&values).unwrap();
+        for (i, parameter) in merit.parameters.clone().into_iter().enumerate() {
+            let step = match parameter {
+                DraftParameter::Surface(_, SurfaceParameter::Curvature) => 1e-7,
+                DraftParameter::Surface(_, SurfaceParameter::AsphereTerm(term)) => {
+                    1e-7 * 1e-2_f64.powi(term as i32)
+                }
+                DraftParameter::Surface(_, SurfaceParameter::Index) => 1e-6,
+                _ => 1e-4,
+            };
+            let mut value = |by: f64| {
+                let mut values = values.clone();
+                values[i] += by;
+                merit.evaluate(&values).unwrap().value
+            };
+            let difference = (value(step) - value(-step)) / (2.0 * step);
+            let found = 2.0 * point.half_gradient[i];
+            let size = found.abs().max(difference.abs()).max(1e-9);
+            assert!(
+                (found - difference).abs() < 1e-5 * size,
+                "{parameter:?}: {found:e}, by a difference {difference:e}"
+            );
+        }
+    }
+
+    #[test]
+    fn the_focal_length_of_a_draft_is_that_of_first_order_optics() {
+        let asked =
+            requirements(r#"{"focal_length_mm": 80.0, "f_number": 8.0, "half_field_deg": 2.0}"#);
+        for start in achromats(&asked) {
+            let plan = BeamPlan::full(1.0);
+            let freedom = Freedom { glasses: false, aspheric_surfaces: 0, pupil: false };
+            let merit = DraftMerit::new(&start.draft, &asked, &plan, freedom).unwrap();
+            let beam = crate::paraxial::Beam::for_lens(&start.draft.lens, 0);
+            let system = &merit.systems[merit.primary].system;
+            let exact = crate::paraxial::first_order(system, &beam).unwrap().efl.unwrap();
+            assert!((merit.focal_length().0 / exact - 1.0).abs() < 1e-10, "{exact}");
+        }
+    }
+}
