@@ -281,16 +281,15 @@ fn has_own(lens: &Lens, zoom: usize, row: usize) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    use crate::files::{bundled_lenses, json};
-    use crate::lens::Medium;
+    use crate::lens::{Medium, Row, blank};
 
     #[test]
     fn the_indices_of_object_and_image_space_are_those_of_their_media() {
-        let found = bundled_lenses().iter().find(|lens| lens.name == "tessar_50_f28").unwrap();
-        let mut lens = json::read(found.text, found.name).unwrap();
+        let row = |medium| Row { thickness: 5.0, curvature: 0.01, medium, ..Row::default() };
+        let surfaces = vec![row(Medium::Index(1.7)), row(Medium::Index(1.5))];
+        let mut lens = Lens { surfaces, ..blank() };
         lens.object_medium = Medium::Index(1.33);
-        lens.surfaces.last_mut().unwrap().medium = Medium::Index(1.5);
+        lens.surfaces[0].stop = true;
         let parametric = ParametricLens::new(&lens, &[]).unwrap();
         assert_eq!([parametric.object_index(0), parametric.image_index(0)], [1.33, 1.5]);
     }
