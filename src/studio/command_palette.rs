@@ -96,8 +96,17 @@ fn show_item(ui: &mut Ui, item: &MenuItem, selected: bool) -> egui::Response {
     let layout = Layout::left_to_right(Align::Center).with_main_justify(true);
     let row =
         ui.allocate_ui_with_layout(size, layout, |ui| ui.add_enabled(item.is_enabled(), button));
-    let row = row.inner.on_disabled_hover_text("Not possible now: select a surface of an element.");
+    let row = row.inner.on_disabled_hover_text(disabled_hint(item));
     if item.hint.is_empty() { row } else { row.on_hover_text(item.hint) }
+}
+
+/// The reason why an item makes no sense now.
+fn disabled_hint(item: &MenuItem) -> &'static str {
+    match item.menu {
+        "Element" => "Not possible now: select a surface of an element.",
+        "Edit" => "Nothing to undo or redo.",
+        _ => "Not possible now: it needs a run, a result or variables that are not there.",
+    }
 }
 
 /// The items that have all words of a text: those that can be asked for first, and among them those

@@ -11,6 +11,7 @@ use super::dialogs::DialogKind;
 use super::element_dialog::ElementTask;
 use super::file_dialog::FileRequest;
 use super::panels::PanelKind;
+use super::run_items;
 use crate::experiments::{self, Effort};
 use crate::files;
 use crate::lens::{Edit, ElementEdit, Lens};
@@ -35,11 +36,19 @@ pub(super) struct MenuItem {
 }
 
 impl MenuItem {
-    fn new(menu: &'static str, title: impl Into<String>, action: impl Into<UiAction>) -> Self {
+    pub(super) fn new(
+        menu: &'static str,
+        title: impl Into<String>,
+        action: impl Into<UiAction>,
+    ) -> Self {
         Self::maybe(menu, title, Some(action.into()))
     }
 
-    fn maybe(menu: &'static str, title: impl Into<String>, action: Option<UiAction>) -> Self {
+    pub(super) fn maybe(
+        menu: &'static str,
+        title: impl Into<String>,
+        action: Option<UiAction>,
+    ) -> Self {
         Self {
             menu,
             title: title.into(),
@@ -107,7 +116,15 @@ impl MenuContext<'_> {
 
     /// Every item.
     pub(super) fn all(&self) -> Vec<MenuItem> {
-        let lists = [self.recent(), bundled_lenses(), library_lenses(), self.settings(), studies()];
+        let lists = [
+            run_items::commands(self.view),
+            self.recent(),
+            bundled_lenses(),
+            library_lenses(),
+            self.settings(),
+            run_items::settings(self.view),
+            studies(),
+        ];
         self.commands().into_iter().chain(lists.into_iter().flatten()).collect()
     }
 

@@ -26,6 +26,7 @@ mod new_lens;
 pub mod number;
 pub mod palette;
 pub mod panels;
+mod run_items;
 pub mod section;
 mod session_benchmark;
 mod shortcut_list;

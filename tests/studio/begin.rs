@@ -139,6 +139,14 @@ fn the_palette_finds_commands_panels_and_lenses_by_words() {
         ("triplet", "Lens: Triplet 100 mm f/2.7"),
         ("light theme", "Setting: Light theme"),
         ("focal scale", "Element: Scale to a focal length…"),
+        ("vary curvatures", "Variables: Vary all curvatures"),
+        ("stop optimization", "Optimizer: Stop the optimization"),
+        ("start front", "Front: Start a Pareto front with default settings"),
+        ("start search", "Search: Start a search with default settings"),
+        ("discard candidate", "Candidate: Discard the candidate"),
+        ("task luneburg-radial", "Gradient index: Open the task luneburg-radial"),
+        ("hold focal", "Setting: Hold the focal length in drags"),
+        ("effect never aim", "Setting: Effect"),
     ] {
         keys(&mut harness, Modifiers::COMMAND, Key::K);
         harness.get_by_label("Find a command").type_text(words);

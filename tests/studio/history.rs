@@ -3,9 +3,10 @@
 use std::sync::Arc;
 
 use aplanat::lens::{Edit, Lens, Parameter, Quantity};
-use aplanat::merit::{ConstraintMargin, Goal, TermValue};
+use aplanat::merit::{ConstraintMargin, Goal, OperandKind, Term, TermScope, TermValue};
 use aplanat::session::{
-    Command, CurvePoint, HistoryNode, MeritReport, MeritValues, OptimizationCurve, SessionView,
+    AnalysisResults, Command, CurvePoint, HistoryNode, MeritReport, MeritValues, OptimizationCurve,
+    SessionView,
 };
 use aplanat::studio::panels::{HistoryPanel, OptimizerPanel};
 use egui::Key;
@@ -156,4 +157,53 @@ fn a_term_may_be_there_several_times() {
     };
     let count = |name: &str| goal.terms.iter().filter(|w| w.term.name() == name).count();
     assert_eq!((count("relative_illumination"), count("spot")), (2, 1));
+}
+
+#[test]
+fn the_spots_of_two_versions_stand_beside_each_other() {
+    let mut view = branched();
+    let results = view.results.clone().unwrap();
+    let lens = Arc::clone(&view.history[1].lens);
+    view.preview_results = Some(Arc::new(AnalysisResults { lens, ..(*results).clone() }));
+    let mut harness = panel_harness(HistoryPanel::default(), view);
+    harness.run();
+    harness.get_by_label_contains("Thickness of surface 3").click();
+    harness.run();
+    for which in ["present", "selected"] {
+        harness.get_by_label_contains(&format!("Spot of field 1 of the {which} version: RMS"));
+    }
+}
+
+#[test]
+fn a_term_is_bounded_and_restricted_to_a_part_of_the_lens() {
+    let mut harness = panel_harness(OptimizerPanel::default(), view());
+    harness.run();
+    let type_into = |harness: &mut Harness<'_, _>, field: &str, text: &str| {
+        harness.get_by_label(field).focus();
+        harness.run();
+        harness.get_by_label(field).type_text(text);
+        harness.run();
+        harness.key_press(Key::Enter);
+        harness.run();
+    };
+    harness.get_by_label("Add a term").click();
+    harness.run();
+    harness.get_by_label("Chief-ray angle").scroll_to_me();
+    harness.run();
+    harness.get_all_by_label("Chief-ray angle").last().unwrap().click();
+    harness.run();
+    type_into(&mut harness, "Maximum of Chief-ray angle", "12");
+    harness.get_by_label("Scope of Chief-ray angle").click();
+    harness.run();
+    type_into(&mut harness, "Surfaces of Chief-ray angle", "3-4");
+    let Some(Command::Edit(Edit::SetMerit(Some(goal)))) = harness.state().commands.last() else {
+        panic!("{:?}", harness.state().commands);
+    };
+    let term = goal.terms.last().unwrap();
+    let kind = OperandKind::ChiefRayAngle;
+    assert_eq!(term.term, Term::Operand { kind, min: None, max: Some(12.0) });
+    assert_eq!(term.scope, TermScope { surfaces: Some([2, 3]), ..TermScope::ALL });
+    let count = harness.state().commands.len();
+    type_into(&mut harness, "Surfaces of Chief-ray angle", "99");
+    assert_eq!(harness.state().commands.len(), count, "the lens has no such surface");
 }

@@ -418,3 +418,23 @@ fn a_card_that_was_clicked_stays_the_lens_that_was_clicked() {
     };
     assert_eq!(**lens, *clicked, "neither the start nor the lens of a moment later");
 }
+
+#[test]
+fn the_line_of_a_lens_is_replayed_from_the_oldest_on() {
+    let mut harness = panel(searching(RunStatus::Stopped));
+    press(&mut harness, "Family");
+    press(&mut harness, "Replay");
+    let shown = |harness: &Harness<'_, PanelState<SearchPanel>>| {
+        let numbers = harness.state().commands.iter().filter_map(|command| match command {
+            Command::StructureSearch(StructureSearchCommand::Choose { number, .. }) => {
+                Some(*number)
+            }
+            _ => None,
+        });
+        numbers.collect::<Vec<_>>()
+    };
+    assert_eq!(shown(&harness).first(), Some(&0));
+    harness.run_steps(200);
+    assert_eq!(shown(&harness), [0, 1]);
+    assert!(harness.query_by_label("Replay").is_some(), "it has ended");
+}

@@ -181,7 +181,7 @@ fn mean_pupil_area(numbers: &Analyses) -> f64 {
 }
 
 /// The edit that lets the optimizer change some kinds of numbers too.
-fn add_variables_edit(lens: &Lens, kinds: &[ParameterKind]) -> Edit {
+pub(super) fn add_variables_edit(lens: &Lens, kinds: &[ParameterKind]) -> Edit {
     let mut freed = lens.clone();
     add_variables(&mut freed, kinds);
     Edit::SetVariables(freed.variables)

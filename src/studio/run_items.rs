@@ -1,0 +1,186 @@
+//! Requests to the runs and to what panels show, for the command palette: what a panel offers by
+//! buttons is found by words, too.
+
+use super::menu_items::MenuItem;
+use crate::effects::{Effect, EffectOverride};
+use crate::grin_design;
+use crate::lens::{Lens, Object, ParameterKind};
+use crate::optimize::DescentMethod;
+use crate::paraxial::FirstOrderLock;
+use crate::session::{
+    Command, GrinCommand, RunStatus, RunView, SessionView, StructureSearchCommand,
+};
+use crate::studio::panels::add_variables_edit;
+
+/// A request with its title; `None` while it makes no sense.
+type Request = (&'static str, Option<Command>);
+
+/// The commands of the optimization, the front, the search, the field and the candidate.
+pub(super) fn commands(view: &SessionView) -> Vec<MenuItem> {
+    let groups = [
+        ("Optimizer", optimizer(view)),
+        ("Front", front(view)),
+        ("Search", search(view)),
+        ("Gradient index", field(view)),
+        ("Candidate", candidate(view)),
+        ("Variables", variables(&view.lens)),
+    ];
+    let items = |(menu, requests): (&'static str, Vec<Request>)| {
+        requests
+            .into_iter()
+            .map(move |(title, command)| MenuItem::maybe(menu, title, command.map(Into::into)))
+    };
+    let tasks = grin_design::BUILTIN_TASKS.iter().map(|task| {
+        let open = GrinCommand::OpenBuiltin(task.name.to_owned());
+        MenuItem::new("Gradient index", format!("Open the task {}", task.name), open)
+    });
+    groups.into_iter().flat_map(items).chain(tasks).collect()
+}
+
+/// A command for a run that waits, or takes steps.
+fn for_run<S>(run: &RunView<S>, command: Command) -> Option<Command> {
+    run.is_active().then_some(command)
+}
+
+fn optimizer(view: &SessionView) -> Vec<Request> {
+    let run = &view.optimization;
+    let is_paused = run.status == RunStatus::Paused;
+    let ready = !run.is_active() && !view.lens.variables.is_empty();
+    let goal = view.goal.as_ref().filter(|_| ready);
+    let method = DescentMethod::default();
+    let start = goal.map(|goal| Command::Optimize { method, goal: (**goal).clone() });
+    let has_result = run.snapshot.is_some();
+    vec![
+        ("Optimize", start),
+        ("Pause the optimization", for_run(run, Command::Pause).filter(|_| !is_paused)),
+        ("Resume the optimization", is_paused.then_some(Command::Resume)),
+        ("Take one step of the optimization", is_paused.then_some(Command::Step)),
+        ("Stop the optimization", for_run(run, Command::Stop)),
+        ("Accept the optimized lens", has_result.then_some(Command::AcceptResult)),
+        ("Discard the optimized lens", has_result.then_some(Command::DiscardResult)),
+    ]
+}
+
+fn front(view: &SessionView) -> Vec<Request> {
+    let run = &view.pareto.run;
+    let is_paused = run.status == RunStatus::Paused;
+    let idle = !run.is_active();
+    let start = Command::StartPareto { settings: Default::default(), compare: false };
+    vec![
+        ("Start a Pareto front with default settings", idle.then_some(start)),
+        ("Pause the front", for_run(run, Command::PausePareto).filter(|_| !is_paused)),
+        ("Resume the front", is_paused.then_some(Command::ResumePareto)),
+        ("Stop the front", for_run(run, Command::StopPareto)),
+        ("Dismiss the front", run.snapshot.as_ref().map(|_| Command::ClearPareto)),
+    ]
+}
+
+fn search(view: &SessionView) -> Vec<Request> {
+    let run = &view.structure_search.run;
+    let is_paused = run.status == RunStatus::Paused;
+    let wish = |command| Command::StructureSearch(command);
+    let start = wish(StructureSearchCommand::Start(Box::default()));
+    let unfinished = view.structure_search.unfinished.clone();
+    let active = |command| for_run(run, wish(command));
+    vec![
+        ("Start a search with default settings", (!run.is_active()).then_some(start)),
+        (
+            "Resume the unfinished search",
+            unfinished.map(|path| wish(StructureSearchCommand::ResumeFrom(path))),
+        ),
+        ("Pause the search", active(StructureSearchCommand::Pause).filter(|_| !is_paused)),
+        ("Resume the search", is_paused.then(|| wish(StructureSearchCommand::Resume))),
+        ("Stop the search", active(StructureSearchCommand::Stop)),
+        (
+            "Accept the best lens of the search",
+            run.snapshot.as_ref().map(|run| wish(StructureSearchCommand::Accept(run.best.number))),
+        ),
+        ("Dismiss the search", run.snapshot.as_ref().map(|_| wish(StructureSearchCommand::Clear))),
+    ]
+}
+
+fn field(view: &SessionView) -> Vec<Request> {
+    let run = &view.grin.run;
+    let is_paused = run.status == RunStatus::Paused;
+    let is_ready = run.snapshot.as_ref().is_some_and(|run| run.is_ready());
+    let wish = Command::Grin;
+    vec![
+        ("Design the field", is_ready.then(|| wish(GrinCommand::Start))),
+        (
+            "Pause the design of the field",
+            for_run(run, wish(GrinCommand::Pause)).filter(|_| !is_paused),
+        ),
+        (
+            "Resume the design of the field",
+            (is_paused && !is_ready).then(|| wish(GrinCommand::Resume)),
+        ),
+        ("Stop the design of the field", for_run(run, wish(GrinCommand::Stop))),
+        ("Close the field", run.snapshot.as_ref().map(|_| wish(GrinCommand::Close))),
+    ]
+}
+
+fn candidate(view: &SessionView) -> Vec<Request> {
+    let shown = view.candidate.as_ref().map(|candidate| candidate.shown);
+    vec![
+        ("Accept the candidate", shown.map(|_| Command::AcceptCandidate)),
+        ("Keep the candidate and the design", shown.map(|_| Command::KeepCandidate)),
+        ("Discard the candidate", shown.map(|_| Command::DiscardCandidate)),
+        (
+            "Switch between the candidate and the design",
+            shown.map(|shown| Command::ShowCandidate(!shown)),
+        ),
+    ]
+}
+
+fn variables(lens: &Lens) -> Vec<Request> {
+    [
+        ("Vary all curvatures", ParameterKind::Curvatures),
+        ("Vary all thicknesses", ParameterKind::Thicknesses),
+        ("Vary all semi-diameters", ParameterKind::SemiDiameters),
+    ]
+    .map(|(title, kind)| (title, Some(Command::from(add_variables_edit(lens, &[kind])))))
+    .into_iter()
+    .chain([("Limit the beam by the stop", Some(Command::LimitByStop))])
+    .collect()
+}
+
+/// Settings of what panels show and compute: zoom position, what drags hold, effects.
+pub(super) fn settings(view: &SessionView) -> Vec<MenuItem> {
+    const MENU: &str = "Setting";
+    let setting = |title: String, command: Command, on: bool| MenuItem {
+        checked: Some(on),
+        ..MenuItem::new(MENU, title, command)
+    };
+    let zooms = view.lens.zoom_positions();
+    let zoom = (0..zooms).filter(|_| zooms > 1).map(|zoom| {
+        let title = format!("Show zoom position {}", zoom + 1);
+        setting(title, Command::ShowZoom(zoom), view.settings.zoom == zoom)
+    });
+    let is_offered = |lock: &FirstOrderLock| {
+        *lock != FirstOrderLock::Magnification || view.lens.object != Object::Infinity
+    };
+    let locks = FirstOrderLock::ALL.into_iter().filter(is_offered).map(|lock| {
+        let mut settings = view.drag.settings.clone();
+        let on = settings.locks.contains(&lock);
+        if on {
+            settings.locks.retain(|other| *other != lock);
+        } else {
+            settings.locks.push(lock);
+            settings.locks.sort();
+        }
+        setting(format!("Hold the {lock} in drags"), Command::SetDragSettings(settings), on)
+    });
+    let effects = Effect::ALL.into_iter().flat_map(|effect| {
+        [EffectOverride::Auto, EffectOverride::On, EffectOverride::Off].map(|choice| {
+            let name = match choice {
+                EffectOverride::Auto => "as the lens asks",
+                EffectOverride::On => "always",
+                EffectOverride::Off => "never",
+            };
+            let on = view.settings.overrides.get(effect) == choice;
+            let title = format!("Effect {}: {name}", effect.name());
+            setting(title, Command::SetEffect(effect, choice), on)
+        })
+    });
+    zoom.chain(locks).chain(effects).collect()
+}
