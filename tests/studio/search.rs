@@ -46,7 +46,9 @@ fn asked(harness: &Harness<'_, PanelState<SearchPanel>>) -> Vec<StructureSearchC
 
 fn started(harness: &Harness<'_, PanelState<SearchPanel>>) -> StructureSearchRequest {
     match asked(harness).as_slice() {
-        [StructureSearchCommand::Start(quest)] => StructureSearchRequest::clone(quest),
+        [StructureSearchCommand::Preview(Some(0)), StructureSearchCommand::Start(quest)] => {
+            StructureSearchRequest::clone(quest)
+        }
         other => panic!("{other:?}"),
     }
 }

@@ -114,13 +114,25 @@ fn plain(value: Option<f64>) -> String {
     value.map_or_else(|| "none".to_owned(), |value| number::format_digits(value, 6))
 }
 
+/// A length with its unit: micrometres below a hundredth of a millimetre.
 fn mm(value: Option<f64>) -> String {
-    value.map_or_else(
-        || "none".to_owned(),
-        |value| format!("{} mm", number::format_digits(value, 6)),
-    )
+    let Some(value) = value else { return "none".to_owned() };
+    let is_small = value != 0.0 && value.abs() < 0.01;
+    let (value, unit) = if is_small { (1e3 * value, "µm") } else { (value, "mm") };
+    format!("{} {unit}", number::format_digits(value, 6))
 }
 
 fn right(ui: &mut Ui, show: impl FnOnce(&mut Ui)) {
     ui.with_layout(Arrange::right_to_left(Align::Center), show);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn small_lengths_are_short() {
+        let texts = [6.500_74e-5, 0.5, 0.0, -0.009].map(|value| mm(Some(value)));
+        assert_eq!(texts, ["0.0650074 µm", "0.5 mm", "0 mm", "-9 µm"]);
+    }
 }

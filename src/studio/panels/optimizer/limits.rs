@@ -89,8 +89,9 @@ fn limit_text(name: &str, limit: &ConstraintMargin) -> String {
         (Some(min), Some(max)) => format!("{} to {}", short(min), short(max)),
         (Some(min), None) => format!("at least {}", short(min)),
         (None, Some(max)) => format!("at most {}", short(max)),
-        (None, None) => "no bound".to_owned(),
+        (None, None) => String::new(),
     };
+    let of = if bounds.is_empty() { ", no bound" } else { " of " };
     let zoom = if limit.zoom > 0 { format!(", zoom {}", limit.zoom + 1) } else { String::new() };
-    format!("{name}{}{zoom}: {} of {bounds}", place, short(limit.value))
+    format!("{name}{}{zoom}: {}{of}{bounds}", place, short(limit.value))
 }

@@ -1,7 +1,7 @@
 //! The editor of the merit function: terms with weights and targets, and the treatment of the pupil
 //! edge.
 
-use egui::{Align, ComboBox, Grid, Id, Layout as Arrange, RichText, ScrollArea, Ui, vec2};
+use egui::{Align, ComboBox, Grid, Id, Layout as Arrange, RichText, Ui, vec2};
 use std::sync::Arc;
 
 use super::limits;
@@ -212,16 +212,29 @@ impl MeritEditor {
     /// A menu of all terms; each may be there several times, for different parts of the lens.
     fn add_menu(&mut self, ui: &mut Ui, view: &SessionView) {
         ui.menu_button("Add a term", |ui| {
-            ScrollArea::vertical().max_height(420.0).show(ui, |ui| {
-                for weighted in terms::default_terms(view) {
-                    let button = ui.button(title(weighted.term));
-                    if hint_beside(button, hint(weighted.term)).clicked() {
-                        self.terms.push(MeritRow { active: true, weighted });
-                        ui.close();
+            for weighted in terms::default_terms(view) {
+                self.add_item(ui, weighted);
+            }
+            for (title, kinds) in scope::GROUPS {
+                ui.menu_button(*title, |ui| {
+                    for kind in *kinds {
+                        let term = Term::Operand { kind: *kind, min: None, max: None };
+                        self.add_item(ui, WeightedTerm::new(term, 1.0));
                     }
-                }
-            });
+                });
+            }
         });
+    }
+}
+
+impl MeritEditor {
+    /// An item of the menu that adds a term.
+    fn add_item(&mut self, ui: &mut Ui, weighted: WeightedTerm) {
+        let button = ui.button(title(weighted.term));
+        if hint_beside(button, hint(weighted.term)).clicked() {
+            self.terms.push(MeritRow { active: true, weighted });
+            ui.close();
+        }
     }
 }
 

@@ -9,6 +9,31 @@ use crate::merit::{OperandKind, Term, TermScope, TermSelection, WeightedTerm};
 use crate::studio::number;
 use crate::studio::text_input::{EditBuffers, InputPlacement, TextInput};
 
+/// The operands in the groups of a menu.
+pub(super) const GROUPS: &[(&str, &[OperandKind])] = &[
+    ("Gaps and sags", &[OperandKind::Gap, OperandKind::Track, OperandKind::Sag]),
+    (
+        "Chief rays",
+        &[
+            OperandKind::ChiefRayHeight,
+            OperandKind::ChiefRayAngle,
+            OperandKind::IncidenceAngle,
+            OperandKind::Telecentricity,
+        ],
+    ),
+    (
+        "Seidel sums",
+        &[
+            OperandKind::SphericalAberration,
+            OperandKind::Coma,
+            OperandKind::Astigmatism,
+            OperandKind::PetzvalCurvature,
+            OperandKind::ThirdOrderDistortion,
+        ],
+    ),
+    ("Colour", &[OperandKind::AxialColor, OperandKind::LateralColor]),
+];
+
 /// The title of an operand.
 pub(super) const fn title(kind: OperandKind) -> &'static str {
     match kind {
@@ -190,6 +215,12 @@ fn capitalized(selection: TermSelection) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn every_operand_is_in_one_group() {
+        let grouped = GROUPS.iter().flat_map(|(_, kinds)| kinds.iter().copied());
+        assert_eq!(grouped.collect::<Vec<_>>(), OperandKind::ALL);
+    }
 
     #[test]
     fn ranges_are_read_as_they_are_shown() {

@@ -1,7 +1,7 @@
 //! The title, the unit, the explanation and the default of every term.
 
 use super::scope;
-use crate::merit::{self, LensFigures, OperandKind, Term, WeightedTerm};
+use crate::merit::{self, LensFigures, Term, WeightedTerm};
 use crate::session::{Analyses, SessionView};
 use crate::studio::number;
 use crate::studio::panels::{design_results, mean_pupil_area};
@@ -163,8 +163,7 @@ pub(super) fn default_terms(view: &SessionView) -> Vec<WeightedTerm> {
         mean_square_spot: results.and_then(mean_square),
     };
     let terms = merit::default_terms(&view.lens, view.settings.zoom, &figures);
-    let operand = |kind| WeightedTerm::new(Term::Operand { kind, min: None, max: None }, 1.0);
-    terms.into_iter().map(rounded).chain(OperandKind::ALL.map(operand)).collect()
+    terms.into_iter().map(rounded).collect()
 }
 
 /// The area of the pupil on the axis in mm², the mean over wavelengths.

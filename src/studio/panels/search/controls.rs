@@ -62,6 +62,9 @@ fn start_button(
     let hint = "Search over structure in the background, on a copy of the design";
     let reason = if dark { NO_LIGHT } else { "A search is already running" };
     if main_button(ui, "Search", ready, hint, reason) {
+        // What the search does is what a person wants to see first.
+        actions.push(Command::Preview(None));
+        actions.push(StructureSearchCommand::Preview(Some(0)));
         actions.push(StructureSearchCommand::Start(Box::new(setup.request(view))));
     }
     if dark {
