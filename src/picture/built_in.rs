@@ -5,16 +5,19 @@ use super::pattern::Pattern;
 use super::scene::{Radiance, Scene, SceneLayer};
 use super::{ImageFrame, PictureError, Raster};
 use crate::pupil::RayModel;
+use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
 /// A scene that needs no file.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum BuiltInScene {
     /// A white card in every direction.
     White,
     /// Groups of bars (after USAF 1951).
     Target,
     /// A Siemens star.
+    #[default]
     Star,
     /// A slanted edge of the contrast 4:1 (ISO 12233).
     Edge,
@@ -34,6 +37,12 @@ impl BuiltInScene {
         (Self::Checkerboard, "checkerboard"),
         (Self::StillLife, "still-life"),
     ];
+
+    /// The name of the scene.
+    pub fn name(self) -> &'static str {
+        let entry = Self::ALL.iter().find(|(scene, _)| *scene == self);
+        entry.map_or("", |(_, name)| name)
+    }
 
     /// True for a scene with depth, which needs a distance.
     pub fn has_depth(self) -> bool {

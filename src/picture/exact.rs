@@ -15,7 +15,7 @@ use super::lit_directions::LitDirections;
 use super::scene::{Radiance, Scene};
 use super::{ColorBand, ImageFrame, Picture, PictureError};
 use crate::analysis::{BackwardLens, irradiance};
-use crate::lens::SurfaceNumber;
+use crate::lens::{Surface, SurfaceNumber};
 use crate::pupil::{Accuracy, RayModel};
 use crate::trace::{Fates, Landings, Rays, TraceSink as _};
 use rayon::prelude::*;
@@ -152,7 +152,7 @@ impl<'a> ExactRenderer<'a> {
         frame: ImageFrame,
     ) -> Result<Self, PictureError> {
         let system = &model.channels[model.primary].system;
-        if let Some(surface) = system.surfaces.iter().position(|surface| surface.is_mounted()) {
+        if let Some(surface) = system.surfaces.iter().position(Surface::is_mounted) {
             return Err(PictureError::NotCentred(SurfaceNumber::new(surface)));
         }
         let backward = bands.iter().map(|band| BackwardBand::new(model, band));
@@ -280,7 +280,7 @@ impl<'a> ExactRenderer<'a> {
         }
     }
 
-    /// The seed of a replicate of a pixel (the finalizer of MurmurHash3).
+    /// The seed of a replicate of a pixel (the finalizer of `MurmurHash3`).
     fn seed(&self, [column, row]: [usize; 2], replicate: usize, seed: u32) -> u32 {
         let place = (row * self.frame.pixels[0] + column) * REPLICATES + replicate;
         let mut hash = (place as u32) ^ seed.wrapping_mul(0x9E37_79B9);

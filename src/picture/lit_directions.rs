@@ -176,7 +176,7 @@ impl RingPolygon {
             let radius = if radius > 0.0 { radius } else { widest };
             [sin, cos].map(|v| v * radius * WIDER / (PI / CORNERS as f64).cos())
         };
-        let corners = radii.into_iter().enumerate().map(corner).collect();
+        let corners: Vec<[f64; 2]> = radii.into_iter().enumerate().map(corner).collect();
         Some(Self { centers, areas: areas(&corners), corners })
     }
 
@@ -232,7 +232,7 @@ fn enclose(radii: &mut [f64; CORNERS], outline: &[[f64; 2]], center: [f64; 2]) {
 }
 
 /// The areas of the triangles between the centre and the sides, summed up.
-fn areas(corners: &Vec<[f64; 2]>) -> Vec<f64> {
+fn areas(corners: &[[f64; 2]]) -> Vec<f64> {
     let next = corners.iter().skip(1).chain(corners.first());
     let triangle = |(a, b): (&[f64; 2], &[f64; 2])| 0.5 * (a[0] * b[1] - a[1] * b[0]).abs();
     let sum = |sum: &mut f64, area: f64| {

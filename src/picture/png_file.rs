@@ -32,10 +32,7 @@ pub fn encode_png(
     depth: BitDepth,
     texts: &[(&str, String)],
 ) -> Result<Vec<u8>, EncodingError> {
-    let mut pixels = Vec::new();
-    for value in picture.values.iter().flatten() {
-        depth.push(srgb_value(value / picture.white), &mut pixels);
-    }
+    let pixels = picture.srgb_bytes(depth);
     let mut bytes = Vec::new();
     let [width, height] = picture.frame.pixels.map(|count| count as u32);
     let mut encoder = Encoder::new(&mut bytes, width, height);
@@ -51,6 +48,18 @@ pub fn encode_png(
     writer.write_image_data(&pixels)?;
     writer.finish()?;
     Ok(bytes)
+}
+
+impl Picture {
+    /// The pixels in sRGB whose white is the picture's, row by row from the upper left corner: red, green
+    /// and blue, those of 16 bits with the big end first.
+    pub fn srgb_bytes(&self, depth: BitDepth) -> Vec<u8> {
+        let mut bytes = Vec::new();
+        for value in self.values.iter().flatten() {
+            depth.push(srgb_value(value / self.white), &mut bytes);
+        }
+        bytes
+    }
 }
 
 /// The sRGB value of linear light, both 0 to 1 (IEC 61966-2-1).

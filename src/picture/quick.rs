@@ -244,9 +244,8 @@ fn tile_error(
     let (mut sum, mut count) = (0.0, 0.0);
     for (i, [column, row]) in tile.pixels().enumerate() {
         let shown = picture.values[row * picture.frame.pixels[0] + column];
-        for c in 0..3 {
-            let (a, b) = (a.values[i][c], b.values[i][c]);
-            sum += (a - shown[c]) * (b - shown[c]) / (0.5 * (a + b)).max(grey).powi(2);
+        for ((shown, a), b) in shown.into_iter().zip(a.values[i]).zip(b.values[i]) {
+            sum += (a - shown) * (b - shown) / (0.5 * (a + b)).max(grey).powi(2);
             count += 1.0;
         }
     }

@@ -8,6 +8,7 @@ use crate::lens::{Edit, Lens};
 use crate::merit::Goal;
 use crate::optimize::{DescentMethod, pareto};
 use crate::paraxial::{DragSettings, Handle};
+use crate::picture::BuiltInScene;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
@@ -140,6 +141,12 @@ pub enum Command {
     ShowPupils(bool),
     /// Sets whether the contrast of the fields is computed.
     ShowContrasts(bool),
+    /// Sets whether the picture of a scene is computed.
+    ShowPicture(bool),
+    /// Sets the scene of the picture.
+    ShowScene(BuiltInScene),
+    /// Saves the picture of the scene as PNG.
+    SavePicture(PathBuf),
     /// Sets the index of the wavelength of the pupils; `None` for the primary one.
     ShowPupilWavelength(Option<usize>),
     /// Starts an experiment in place of the one that runs.

@@ -31,7 +31,7 @@ mod view;
 
 pub use analysis::{
     Analyses, AnalysisResults, AnalysisSettings, FieldContrast, FieldContrasts, FieldPupils,
-    analyze,
+    ScenePicture, analyze,
 };
 pub use clock::Timed;
 pub use command::Command;

@@ -223,6 +223,7 @@ impl Studio {
             }
             FileRequest::OpenField => Command::Grin(GrinCommand::OpenFile(path)),
             FileRequest::SaveField(nodes) => Command::Grin(GrinCommand::Save { path, nodes }),
+            FileRequest::SavePicture => Command::SavePicture(path),
             FileRequest::ExportZemax | FileRequest::ExportJson => Command::Export(path),
         };
         self.run_or_ask(context, PendingAction::Run(command), None);
@@ -347,6 +348,10 @@ fn likely_path(view: &SessionView, request: FileRequest) -> Option<PathBuf> {
         FileRequest::ExportFront => {
             let beside = view.path.as_ref().map(|path| path.with_file_name("front"));
             Some(beside.unwrap_or_else(|| PathBuf::from("front")))
+        }
+        FileRequest::SavePicture => {
+            let beside = view.path.as_ref().map(|path| path.with_extension("png"));
+            Some(beside.unwrap_or_else(|| PathBuf::from("picture.png")))
         }
         FileRequest::OpenSearch => checkpoint().or_else(|| search.unfinished.clone()),
         FileRequest::SaveSearch => checkpoint().or_else(|| search.save_path.clone()),

@@ -30,7 +30,8 @@ fn default_arrangement() -> Tree<PanelKind> {
     use PanelKind as Kind;
     let mut tiles = Tiles::default();
     let facts = tabs(&mut tiles, &[Kind::FirstOrder, Kind::Effects]);
-    let light = tabs(&mut tiles, &[Kind::Spot, Kind::Pupil, Kind::Contrast, Kind::Seidel]);
+    let light =
+        tabs(&mut tiles, &[Kind::Spot, Kind::Pupil, Kind::Contrast, Kind::Picture, Kind::Seidel]);
     let better = tabs(&mut tiles, &[Kind::Optimizer, Kind::Pareto, Kind::Search, Kind::History]);
     let drawings = tabs(&mut tiles, &[Kind::Layout, Kind::Slice]);
     let table = tabs(&mut tiles, &[Kind::Prescription, Kind::System, Kind::Zoom]);
@@ -45,7 +46,8 @@ fn search_arrangement() -> Tree<PanelKind> {
     use PanelKind as Kind;
     let mut tiles = Tiles::default();
     let drawings = tabs(&mut tiles, &[Kind::Layout, Kind::Slice]);
-    let light = tabs(&mut tiles, &[Kind::Spot, Kind::Pupil, Kind::Contrast, Kind::Seidel]);
+    let light =
+        tabs(&mut tiles, &[Kind::Spot, Kind::Pupil, Kind::Contrast, Kind::Picture, Kind::Seidel]);
     let numbers = [Kind::Prescription, Kind::System, Kind::Zoom, Kind::FirstOrder, Kind::Effects];
     let numbers = tabs(&mut tiles, &numbers);
     let better = tabs(&mut tiles, &[Kind::Search, Kind::Optimizer, Kind::Pareto, Kind::History]);

@@ -129,6 +129,10 @@ impl Dock {
         if contrasts != view.settings.contrasts {
             actions.push(Command::ShowContrasts(contrasts));
         }
+        let picture = self.is_visible(PanelKind::Picture);
+        if picture != view.settings.picture {
+            actions.push(Command::ShowPicture(picture));
+        }
         let watched = self.is_visible(PanelKind::Slice);
         if watched != view.grin.is_active {
             actions.push(Command::Grin(GrinCommand::SetActive(watched)));

@@ -34,6 +34,8 @@ pub enum FileRequest {
     OpenField,
     /// To write the gradient-index field, with this number of nodes along a side.
     SaveField(usize),
+    /// To write the picture of a scene.
+    SavePicture,
 }
 
 impl FileRequest {
@@ -51,6 +53,7 @@ impl FileRequest {
             Self::ExportSearchLens(_) => "Export the lens of the search",
             Self::OpenField => "Open a GRIN task or a volume",
             Self::SaveField(_) => "Save the volume",
+            Self::SavePicture => "Save the picture",
         }
     }
 
@@ -62,13 +65,18 @@ impl FileRequest {
             Self::ExportZemax => &["zmx"],
             Self::OpenField => &["json", "npz"],
             Self::SaveField(_) => &["npz", "json"],
+            Self::SavePicture => &["png"],
             Self::ExportFront | Self::ExperimentFolder => &[],
         }
     }
 
     /// The name of the filter for the extensions.
     const fn filter_name(self) -> &'static str {
-        if matches!(self, Self::OpenField | Self::SaveField(_)) { "GRIN fields" } else { "Lenses" }
+        match self {
+            Self::OpenField | Self::SaveField(_) => "GRIN fields",
+            Self::SavePicture => "Pictures",
+            _ => "Lenses",
+        }
     }
 
     /// True if the user types the name of a new file.

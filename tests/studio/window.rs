@@ -240,6 +240,31 @@ fn pupils_are_computed_while_they_are_shown_and_follow_an_edit() {
 }
 
 #[test]
+fn a_scene_is_seen_through_the_lens_while_its_panel_is_shown() {
+    let mut harness = window();
+    let picture = |harness: &Harness<'_, Studio>| {
+        let results = harness.state().session().results().unwrap();
+        results.analyses.as_ref().unwrap().picture.clone()
+    };
+    assert!(picture(&harness).is_none(), "what is not shown is not computed");
+    harness.get_by_label("Picture").click();
+    harness.run_steps(3);
+    settle(&mut harness);
+    harness.get_by_label("Picture of star through the lens");
+    let shown = picture(&harness).unwrap();
+    let found = shown.value.as_ref().unwrap();
+    assert!(found.picture.values.iter().flatten().any(|value| *value > 0.5 * found.picture.white));
+    assert!(found.picture.values.iter().flatten().all(|value| value.is_finite()));
+    let path = std::env::temp_dir().join(format!("aplanat-{}-panel.png", std::process::id()));
+    let save = Command::SavePicture(path.clone());
+    harness.state_mut().session_mut().apply(save);
+    harness.run_steps(3);
+    let image = image::open(&path).unwrap();
+    assert!(image.width() >= 96 && image.height() >= 64);
+    std::fs::remove_file(&path).unwrap();
+}
+
+#[test]
 fn an_experiment_runs_from_the_menu_and_shows_its_claims_and_pictures() {
     let mut harness = window();
     let by_time = |a: &&Experiment, b: &&Experiment| a.seconds.total_cmp(&b.seconds);

@@ -5,9 +5,11 @@
 
 mod contrast;
 mod pupils;
+mod scene_picture;
 
 pub use contrast::{FieldContrast, FieldContrasts};
 pub use pupils::FieldPupils;
+pub use scene_picture::ScenePicture;
 
 use super::clock::{Timed, now, time};
 use super::run::{LatestRequestWorker, WorkerOutput, catch_panic};
@@ -18,6 +20,7 @@ use crate::effects::{self, EffectOverrides, EffectPlan, TracePurpose};
 use crate::lens::{FieldPoint, Lens};
 use crate::measure::EffectTask;
 use crate::paraxial::{FirstOrder, Seidel};
+use crate::picture::BuiltInScene;
 use crate::pupil::{Accuracy, RayModel, RayModelError};
 use pupils::{field_pupils, for_each_field};
 use serde::{Deserialize, Serialize};
@@ -64,6 +67,8 @@ pub struct Analyses {
     pub pupils: Option<Timed<FieldPupils>>,
     /// The contrast of the fields; `None` while no panel shows it.
     pub contrasts: Option<Timed<FieldContrasts>>,
+    /// A scene through the lens, or the reason why there is none; `None` while no panel shows it.
+    pub picture: Option<Arc<Timed<Result<ScenePicture, String>>>>,
     /// The ray fans of each field.
     pub fans: Timed<Vec<Result<Vec<Fan>, AnalysisError>>>,
     /// The distortion at each field.
@@ -119,7 +124,8 @@ pub(super) fn spawn_analysis(
     let mut published = None;
     AnalysisWorker::spawn("analysis", wake, move |request, output| {
         let results = answer(request, output, &mut published);
-        if let (Some(results), EffectTiming::Measured) = (results, timing) {
+        let refined = results.map(|results| refine(results, output));
+        if let (Some(results), EffectTiming::Measured) = (refined, timing) {
             measure(results, output);
         }
     })
@@ -143,6 +149,21 @@ fn answer(
     *published = Some(now());
     output.publish(results.clone());
     Some(results)
+}
+
+/// Publishes the results once more with a fine picture if a panel shows one and no request interrupts
+/// that.
+fn refine(mut results: AnalysisResults, output: &AnalysisOutput) -> AnalysisResults {
+    let AnalysisSettings { zoom, scene, picture, .. } = results.settings;
+    if !picture || results.analyses.is_err() || !output.idle_for(IDLE_TIME) {
+        return results;
+    }
+    let fine = time(|| catch_panic(|| scene_picture::fine_picture(&results.lens, zoom, scene)));
+    if let Ok(analyses) = &mut results.analyses {
+        analyses.picture = Some(Arc::new(fine));
+        output.publish(results.clone());
+    }
+    results
 }
 
 /// Publishes the results once more with the cost of each effect, if no request interrupts that.
@@ -227,6 +248,11 @@ impl Analyses {
             .contrasts
             .then(|| time(|| contrast::field_contrasts(&b, &spots.value, settings.tolerance)));
         unless_interrupted()?;
+        let picture = settings.picture.then(|| {
+            let AnalysisSettings { zoom, scene, .. } = *settings;
+            Arc::new(time(|| scene_picture::coarse_picture(lens, zoom, scene)))
+        });
+        unless_interrupted()?;
         let fans = time(|| for_each_field(&b, |field| analysis::fan(&b, field, FAN_POINTS)));
         unless_interrupted()?;
         let illumination = time(|| analysis::illumination(&b, b.primary, accuracy));
@@ -248,6 +274,7 @@ impl Analyses {
             spots,
             pupils,
             contrasts,
+            picture,
             fans,
             illumination,
         })
@@ -293,6 +320,12 @@ pub struct AnalysisSettings {
     /// True if the contrast is computed, because a panel shows it.
     #[serde(default)]
     pub contrasts: bool,
+    /// True if the picture of a scene is computed, because a panel shows it.
+    #[serde(default)]
+    pub picture: bool,
+    /// The scene of the picture.
+    #[serde(default)]
+    pub scene: BuiltInScene,
     /// The index of the wavelength of the pupils; `None` for the primary one.
     pub pupil_wavelength: Option<usize>,
 }
@@ -306,6 +339,8 @@ impl Default for AnalysisSettings {
             overrides: EffectOverrides::default(),
             pupils: false,
             contrasts: false,
+            picture: false,
+            scene: BuiltInScene::default(),
             pupil_wavelength: None,
         }
     }

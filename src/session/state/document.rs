@@ -4,7 +4,9 @@ use super::live_goal::propose_goal;
 use super::{Session, SessionEvent};
 use crate::files;
 use crate::lens::{Edit, ElementEdit, Lens, apply_edit};
+use crate::picture::{BitDepth, encode_png};
 use crate::pupil::limited_by_stop;
+use crate::session::ScenePicture;
 use crate::session::history::{DesignHistory, VersionOrigin};
 use crate::session::journal::JournalEntry;
 use crate::session::view::Severity;
@@ -175,6 +177,32 @@ impl Session {
             Ok(saved) => self.post_export(path, saved),
             Err(why) => self.post(Severity::Error, why.to_string()),
         }
+    }
+
+    /// Saves the newest picture of the scene.
+    pub(super) fn save_picture(&mut self, path: &Path) {
+        match self.write_picture(path) {
+            Ok(()) => self.post(Severity::Note, format!("saved as {}", path.display())),
+            Err(why) => self.post(Severity::Error, why),
+        }
+    }
+
+    fn write_picture(&self, path: &Path) -> Result<(), String> {
+        let results = self.results();
+        let analyses = results.as_ref().and_then(|results| results.analyses.as_ref().ok());
+        let shown = analyses.and_then(|analyses| analyses.picture.clone());
+        let shown = shown.ok_or("there is no picture yet; open the panel Picture")?;
+        let ScenePicture { picture, scene, error, .. } =
+            shown.value.as_ref().map_err(Clone::clone)?;
+        let error = error.map_or("not measured".to_owned(), |error| format!("{:.4}", error.value));
+        let texts = [
+            ("Software", "Aplanat".to_owned()),
+            ("Scene", scene.name().to_owned()),
+            ("Error", format!("{error} of mid grey (rms)")),
+            ("Left out", "diffraction, losses, ghosts".to_owned()),
+        ];
+        let bytes = encode_png(picture, BitDepth::Eight, &texts).map_err(|why| why.to_string())?;
+        files::write_atomic(path, &bytes).map_err(|why| why.to_string())
     }
 
     /// Posts what a foreign file contains and what it could not represent.

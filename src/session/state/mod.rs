@@ -237,6 +237,9 @@ impl Session {
             Command::SetEffect(effect, choice) => self.set_effect(effect, choice),
             Command::ShowPupils(shown) => self.change_settings(|s| s.pupils = shown),
             Command::ShowContrasts(shown) => self.change_settings(|s| s.contrasts = shown),
+            Command::ShowPicture(shown) => self.change_settings(|s| s.picture = shown),
+            Command::ShowScene(scene) => self.change_settings(|s| s.scene = scene),
+            Command::SavePicture(path) => self.save_picture(&path),
             Command::ShowPupilWavelength(wavelength) => {
                 self.change_settings(|s| s.pupil_wavelength = wavelength);
             }

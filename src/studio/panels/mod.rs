@@ -10,6 +10,7 @@ mod history;
 mod layout;
 mod optimizer;
 mod pareto;
+mod picture;
 mod prescription;
 mod pupil;
 mod search;
@@ -27,6 +28,7 @@ pub use history::HistoryPanel;
 pub use layout::LayoutPanel;
 pub use optimizer::OptimizerPanel;
 pub use pareto::ParetoPanel;
+pub use picture::PicturePanel;
 pub use prescription::PrescriptionPanel;
 pub(super) use prescription::first_radius_field;
 pub use pupil::PupilPanel;
@@ -79,6 +81,8 @@ pub enum PanelKind {
     Pupil,
     /// The contrast of every field against spatial frequency.
     Contrast,
+    /// A scene seen through the lens.
+    Picture,
     /// The search for a better lens.
     Optimizer,
     /// The Pareto front of sharpness against light.
@@ -101,13 +105,14 @@ pub enum PanelKind {
 
 impl PanelKind {
     /// Every panel. A new one is a file in this folder, an entry here and a place in the window.
-    pub const ALL: [Self; 15] = [
+    pub const ALL: [Self; 16] = [
         Self::Layout,
         Self::Slice,
         Self::Prescription,
         Self::Spot,
         Self::Pupil,
         Self::Contrast,
+        Self::Picture,
         Self::Optimizer,
         Self::Pareto,
         Self::Search,
@@ -128,6 +133,7 @@ impl PanelKind {
             Self::Spot => Box::new(SpotPanel::new(backend)),
             Self::Pupil => Box::new(PupilPanel::default()),
             Self::Contrast => Box::new(ContrastPanel),
+            Self::Picture => Box::new(PicturePanel::default()),
             Self::Optimizer => Box::new(OptimizerPanel::default()),
             Self::Pareto => Box::new(ParetoPanel::default()),
             Self::Search => Box::new(SearchPanel::default()),

@@ -1,0 +1,78 @@
+//! A small picture of a scene through the lens, for the window.
+//!
+//! It is made the quick way: coarse with every edit, and finer, with its error, once the lens is still.
+
+use crate::analysis::Estimate;
+use crate::lens::{Lens, Object};
+use crate::measure::time_ms;
+use crate::picture::{
+    BuiltInScene, Coloring, ExactRenderer, ImageFrame, Picture, PictureError, QuickRenderer,
+    field_diagonal, focused, picture_model, quick_error,
+};
+use crate::pupil::RayModel;
+
+/// A picture of a scene through the lens.
+#[derive(Debug, Clone)]
+pub struct ScenePicture {
+    /// The scene.
+    pub scene: BuiltInScene,
+    /// The picture.
+    pub picture: Picture,
+    /// The root mean square error against rays from every pixel, as a share of mid grey, with the
+    /// milliseconds of the picture; `None` of a coarse picture, whose error is not measured.
+    pub error: Option<Estimate>,
+    /// The distance in mm to which the lens is focused; `None` at infinity.
+    pub focus: Option<f64>,
+}
+
+/// The pixels of a picture while the lens changes, and of one of a lens that is still.
+const COARSE: [usize; 2] = [96, 64];
+const FINE: [usize; 2] = [360, 240];
+/// The distance in mm at which a scene with depth is placed before a lens that is focused at infinity.
+const NEAR: f64 = 1000.0;
+/// The tiles on which a fine picture is compared with rays, and the samples of their pixels.
+const TILES: usize = 8;
+const SAMPLES: usize = 64;
+
+/// A coarse picture of a lens.
+pub(super) fn coarse_picture(
+    lens: &Lens,
+    zoom: usize,
+    scene: BuiltInScene,
+) -> Result<ScenePicture, String> {
+    scene_picture(lens, zoom, scene, COARSE, None).map_err(|error| error.to_string())
+}
+
+/// A fine picture of a lens, with its error.
+pub(super) fn fine_picture(
+    lens: &Lens,
+    zoom: usize,
+    scene: BuiltInScene,
+) -> Result<ScenePicture, String> {
+    scene_picture(lens, zoom, scene, FINE, Some(TILES)).map_err(|error| error.to_string())
+}
+
+fn scene_picture(
+    lens: &Lens,
+    zoom: usize,
+    scene: BuiltInScene,
+    pixels: [usize; 2],
+    tiles: Option<usize>,
+) -> Result<ScenePicture, PictureError> {
+    let diagonal = field_diagonal(&RayModel::from_lens(lens, zoom)?)?;
+    let (focus, moved) = match lens.object {
+        Object::Finite(distance) => (Some(distance), None),
+        Object::Infinity if scene.has_depth() => (Some(NEAR), Some(focused(lens, zoom, NEAR)?)),
+        Object::Infinity => (None, None),
+    };
+    let (model, bands) = picture_model(moved.as_ref().unwrap_or(lens), zoom, Coloring::Rgb(1))?;
+    let frame = ImageFrame::new(&model, pixels, diagonal)?;
+    let painted = scene.build(&model, &frame, focus)?;
+    let exact = ExactRenderer::new(&model, &bands, &painted, frame)?;
+    let (picture, ms) =
+        time_ms(|| QuickRenderer::new(&model, &bands, &exact).map(|quick| quick.render()));
+    let picture = picture?;
+    let measured = tiles.map(|tiles| quick_error(&exact, &picture, tiles, SAMPLES));
+    let error = measured.map(|error| Estimate { milliseconds: Some(ms), ..error });
+    Ok(ScenePicture { scene, picture, error, focus })
+}
