@@ -31,8 +31,8 @@ const FINE: [usize; 2] = [360, 240];
 /// The distance in mm at which a scene with depth is placed before a lens that is focused at infinity.
 const NEAR: f64 = 1000.0;
 /// The tiles on which a fine picture is compared with rays, and the samples of their pixels.
-const TILES: usize = 8;
-const SAMPLES: usize = 64;
+const TILES: usize = 4;
+const SAMPLES: usize = 32;
 
 /// A coarse picture of a lens.
 pub(super) fn coarse_picture(
