@@ -191,3 +191,26 @@ impl FieldPupil {
         (whole.value > 0.0).then(|| Estimate::new(share, error, area.rays + whole.rays))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_share_of_a_pupil_has_the_errors_of_both_areas() {
+        let area = |value: f64, error: f64| Estimate::new(value, error, 10);
+        let extent = PupilExtent { area: area(3.0, 0.3), centroid: [area(0.0, 0.0); 2] };
+        let pupil = FieldPupil {
+            field: FieldPoint { x: 0.0, y: 0.0, weight: 1.0 },
+            shape: PupilShape::Unbounded,
+            extent: Some(extent),
+            disc: Vec::new(),
+            across_beam: false,
+            rays: 10,
+        };
+        let share = pupil.share_of(area(4.0, 0.1)).unwrap();
+        assert_eq!((share.value, share.rays), (0.75, 20));
+        assert!((share.error - (0.3 + 0.75 * 0.1) / 4.0).abs() < 1e-15);
+        assert!(pupil.share_of(area(0.0, 0.0)).is_none());
+    }
+}

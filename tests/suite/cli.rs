@@ -301,6 +301,24 @@ fn analyze_prints_every_number_with_error_and_cost() {
     assert!((focused - plain).abs() < 1e-12, "{focused} {plain}");
 }
 
+/// What a person reads has a line for every number of the JSON.
+#[test]
+fn analyses_in_words_have_a_line_for_every_number() {
+    let text = |what: &str| done(&["analyze", LENS, what, "--field", "0", "--error", "5%"], "");
+    let lines = |text: &str, word: &str| text.lines().filter(|line| line.contains(word)).count();
+    let focus = text("through-focus");
+    assert_eq!(lines(&focus, " ± "), 11, "{focus}");
+    let spot = text("spot");
+    let rms = &analyzed("spot", &["--field", "0", "--error", "5%"])[0]["rms"];
+    let digits = &rms["value"].to_string()[..6];
+    assert!(spot.lines().any(|line| line.contains("rms") && line.contains(digits)), "{spot}");
+    let contrast = text("through-focus-mtf");
+    assert_eq!(lines(&contrast, "line pairs per mm, "), 1, "{contrast}");
+    assert!(lines(&contrast, "±") >= 11, "{contrast}");
+    let fans = analyzed("opd-fan", &["--field", "0"]);
+    assert_eq!(fans[0]["tangential"].as_array().unwrap().len(), 21);
+}
+
 #[test]
 fn a_spot_meets_its_tolerance() {
     let rms = |error: &str| {

@@ -168,3 +168,19 @@ fn read(path: &Path) -> Result<SavedSearch, StructureSearchError> {
         error => SearchError::from(error).into(),
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_limit_of_time_that_is_used_up_no_longer_counts() {
+        let remaining = |minutes, seconds| {
+            CheckpointSidecar { minutes, seconds, ..CheckpointSidecar::default() }
+                .remaining_minutes()
+        };
+        assert_eq!(remaining(Some(2.0), 119.0), Some(2.0));
+        assert_eq!(remaining(Some(2.0), 121.0), None);
+        assert_eq!(remaining(None, 5.0), None);
+    }
+}
