@@ -24,7 +24,7 @@ use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::sync::atomic::Ordering;
 
-/// What a camera with the lens sees of a scene, by rays backwards, with the error of the picture
+/// A picture of a scene through the lens, by rays traced backwards, with its error
 #[derive(Debug, clap::Args)]
 #[command(after_long_help = include_str!("help/picture.txt"))]
 pub(super) struct PictureArgs {

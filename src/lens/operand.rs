@@ -121,7 +121,7 @@ impl OperandKind {
     }
 }
 
-/// What the scope of a term selects from.
+/// The parts of a lens from which the scope of a term selects.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum TermSelection {
     /// Surfaces, or the gaps behind them.

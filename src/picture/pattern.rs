@@ -1,4 +1,4 @@
-//! What is painted on the planes of a scene: test patterns as functions, and pictures from files.
+//! The paintings on the planes of a scene: test patterns as functions, and pictures from files.
 
 use super::raster::Raster;
 use super::scene::Radiance;

@@ -215,9 +215,7 @@ impl Session {
             Command::Stop => self.optimization.stop(),
             Command::AcceptResult => self.accept_result(),
             Command::DiscardResult => self.discard_result(),
-            Command::StartPareto { settings, compare } => {
-                self.pareto.start(&self.lens, settings, compare);
-            }
+            Command::StartPareto { settings, compare } => self.start_pareto(settings, compare),
             Command::PausePareto => self.pareto.run.pause(),
             Command::ResumePareto => self.pareto.run.resume(),
             Command::StopPareto => self.pareto.run.stop(),
@@ -240,9 +238,7 @@ impl Session {
             Command::ShowPicture(shown) => self.change_settings(|s| s.picture = shown),
             Command::ShowScene(scene) => self.change_settings(|s| s.scene = scene),
             Command::SavePicture(path) => self.save_picture(&path),
-            Command::ShowPupilWavelength(wavelength) => {
-                self.change_settings(|s| s.pupil_wavelength = wavelength);
-            }
+            Command::ShowPupilWavelength(w) => self.change_settings(|s| s.pupil_wavelength = w),
             Command::StartExperiment { id, effort } => self.start_experiment(&id, effort),
             Command::CancelExperiment => self.experiment.cancel(),
             Command::DismissExperiment => self.experiment.dismiss(),

@@ -4,6 +4,7 @@ use super::{Session, SessionEvent};
 use crate::lens::{Edit, Lens, apply_edit};
 use crate::merit::Goal;
 use crate::optimize::DescentMethod;
+use crate::optimize::pareto::ParetoSettings;
 use crate::session::grin_design::{GrinCommand, GrinExport};
 use crate::session::history::VersionOrigin;
 use crate::session::optimization::{OptimizationRequest, OptimizationSnapshot};
@@ -93,6 +94,10 @@ impl Session {
     pub(super) fn discard_result(&mut self) {
         self.optimization.clear();
         self.end_journaled_run(RunKind::Optimization);
+    }
+
+    pub(super) fn start_pareto(&mut self, settings: ParetoSettings, compare: bool) {
+        self.pareto.start(&self.lens, settings, compare);
     }
 
     pub(super) fn clear_pareto(&mut self) {
