@@ -6,9 +6,11 @@
 //! A field without light gives an [`AnalysisError`] with the reason, never a NaN.
 
 mod clear_semi_diameters;
+mod color_error;
 mod diffraction;
 mod distortion;
 mod fan;
+mod footprint;
 mod geometric_radius;
 mod illumination;
 mod image_quality;
@@ -24,6 +26,9 @@ mod wavefront;
 mod zernike;
 
 pub use clear_semi_diameters::clear_semi_diameters;
+pub use color_error::{
+    LateralColor, LongitudinalAberration, ZoneFocus, lateral_color, longitudinal_aberration,
+};
 pub use diffraction::{
     DiffractionGate, PointSpread, PupilCurve, PupilFunction, PupilSamples, Strehl,
     diffraction_gate, diffraction_mtf, encircled_energy, point_spread,
@@ -31,6 +36,7 @@ pub use diffraction::{
 };
 pub use distortion::{Distortion, FieldCurvature, distortion, field_curvature};
 pub use fan::{Fan, FanPoint, fan};
+pub use footprint::{Footprint, footprint};
 pub use illumination::{Illumination, energy_irradiance, illumination, image_cone, irradiance};
 pub use image_quality::{ImageQuality, field_qualities, field_quality, image_quality};
 pub use mtf::{

@@ -11,6 +11,7 @@ mod cli_effects;
 mod cli_failures;
 mod cli_files;
 mod closed_forms;
+mod color_errors;
 mod design;
 mod diffraction;
 mod drag;

@@ -1,6 +1,7 @@
 //! `analyze`: the results that a designer reads, each number with its error, rays and milliseconds.
 
 mod chief;
+mod color;
 mod contrast;
 mod csv;
 mod fan;
@@ -55,6 +56,10 @@ pub(super) struct AnalyzeArgs {
     #[arg(long, value_name = "NU", value_delimiter = ',', default_value = "10,20,30,40,50")]
     frequencies: Vec<f64>,
 
+    /// The surface of `footprint`, counted from 1; absent: the first
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    surface: usize,
+
     /// A point of `psf`, as `x,y` in mm from the image point of the chief ray; may be repeated
     #[arg(long = "at", value_name = "X,Y", value_parser = parse_point, allow_hyphen_values = true)]
     points: Vec<[f64; 2]>,
@@ -84,6 +89,12 @@ enum AnalysisKind {
     Fan,
     /// Chief rays compared with `f tan(theta)` and `f theta`
     Distortion,
+    /// Chief rays of every wavelength against that of the primary one
+    LateralColor,
+    /// Crossings of the rays of the axial point with the axis, zone by zone; axial colour
+    Longitudinal,
+    /// Edge of the beam on a surface
+    Footprint,
     /// Tangential and sagittal focus along chief rays
     FieldCurvature,
     /// Light relative to the first field, with the vignetted pupil
@@ -112,6 +123,12 @@ const ONE_WAVELENGTH: EffectRule = EffectRule {
     allowed: AllowedSetting::AlwaysOff,
     reason: "only the primary wavelength is traced",
 };
+/// The rule for results that compare colours.
+const COLORS: EffectRule = EffectRule {
+    effect: Effect::Dispersion,
+    allowed: AllowedSetting::AlwaysOn,
+    reason: "the wavelengths are compared",
+};
 /// The rule for image heights compared with ideal ones.
 const OBJECT_IN_PLACE: EffectRule = EffectRule {
     effect: Effect::FiniteObject,
@@ -124,6 +141,7 @@ impl AnalysisKind {
     fn effect_rules(self) -> &'static [EffectRule] {
         match self {
             Self::Spot | Self::Fan | Self::ThroughFocus | Self::Mtf => &[],
+            Self::LateralColor | Self::Longitudinal => &[COLORS],
             Self::Distortion => &[ONE_WAVELENGTH, OBJECT_IN_PLACE],
             _ => &[ONE_WAVELENGTH],
         }
@@ -158,6 +176,11 @@ impl AnalyzeArgs {
             AnalysisKind::Spot => self.finish(&run, spot::spots(&run), output),
             AnalysisKind::Fan => self.finish(&run, fan::fans(&run), output),
             AnalysisKind::Distortion => self.finish(&run, chief::distortions(&run), output),
+            AnalysisKind::LateralColor => self.finish(&run, color::lateral_colors(&run), output),
+            AnalysisKind::Longitudinal => self.finish(&run, color::longitudinal(&run), output),
+            AnalysisKind::Footprint => {
+                self.finish(&run, color::footprints(&run, self.surface)?, output)
+            }
             AnalysisKind::FieldCurvature => self.finish(&run, chief::curvatures(&run), output),
             AnalysisKind::Illumination => {
                 self.finish(&run, illumination::illuminations(&run), output)
