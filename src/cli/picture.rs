@@ -425,9 +425,13 @@ impl Display for PictureReport {
         )?;
         writeln!(f, "a white card on the axis gives {} of its radiance", ShortNumber(self.white))?;
         let lost = 100.0 * (1.0 - self.fates.imaged as f64 / self.rays.max(1) as f64);
+        let lost = match self.way {
+            "exact" => format!(", {lost:.1} % lost at rims"),
+            _ => " to measure the error".to_owned(),
+        };
         writeln!(
             f,
-            "{} rays ({:.0} a pixel, {lost:.1} % lost at rims), {:.0} ms",
+            "{} rays ({:.0} a pixel{lost}), {:.0} ms",
             self.rays, self.rays_per_pixel, self.milliseconds
         )?;
         for OmittedEffect { effect, change, reason } in &self.left_out {

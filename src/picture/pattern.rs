@@ -118,29 +118,37 @@ impl Pattern {
 }
 
 /// The height of the largest group of bars, over half of the height of the target.
-const LARGEST_GROUP: f64 = 0.5;
+const LARGEST_GROUP: f64 = 0.22;
+/// The left end of the rows, and the tops of equal blocks of them.
+const LEFT: f64 = -1.35;
+const BLOCKS: [f64; 3] = [0.92, 0.3, -0.32];
 /// The number of groups in a row; each row is half as large as the one above it.
 const GROUPS: i32 = 6;
 const ROWS: i32 = 6;
 
-/// The level of the target at a place in halves of its height: rows of groups from the top, each group
+/// The level of the target at a place in halves of its height: three blocks of rows of groups from the top, each group
 /// five bar widths high and eleven wide: three horizontal bars, a gap, three vertical bars.
 fn bars([x, y]: [f64; 2]) -> f64 {
-    let (mut top, mut height) = (0.9, LARGEST_GROUP);
+    let is_on = |top: f64| y <= top && is_in_block([x, top - y]);
+    if BLOCKS.into_iter().any(is_on) { 0.0 } else { 1.0 }
+}
+
+/// True on a bar of a block of rows, at a place to the right of the middle and down from its top.
+fn is_in_block([x, mut down]: [f64; 2]) -> bool {
+    let mut height = LARGEST_GROUP;
     for _ in 0..ROWS {
-        let mut left = -1.35;
+        let mut left = LEFT;
         for group in 0..GROUPS {
             let bar = height / 5.0 * (-f64::from(group) / 6.0).exp2();
-            let place = [(x - left) / bar, (top - y) / bar];
-            if is_bar(place) {
-                return 0.0;
+            if is_bar([(x - left) / bar, down / bar]) {
+                return true;
             }
             left += 13.0 * bar;
         }
-        top -= 1.2 * height;
+        down -= 1.2 * height;
         height *= 0.5;
     }
-    1.0
+    false
 }
 
 /// True on a bar of a group, in bar widths from its upper left corner.
@@ -198,7 +206,7 @@ mod tests {
     fn half_of_a_group_of_bars_is_black_and_groups_do_not_touch() {
         // The first group: three horizontal bars from its upper left corner.
         let bar = LARGEST_GROUP / 5.0;
-        let at = |right: f64, down: f64| bars([-1.35 + right * bar, 0.9 - down * bar]);
+        let at = |right: f64, down: f64| bars([LEFT + right * bar, BLOCKS[0] - down * bar]);
         let column: Vec<f64> = (0..6).map(|i| at(2.5, f64::from(i) + 0.5)).collect();
         assert_eq!(column, [0.0, 1.0, 0.0, 1.0, 0.0, 1.0]);
         let row: Vec<f64> = (5..12).map(|i| at(f64::from(i) + 0.5, 2.5)).collect();
