@@ -110,12 +110,12 @@ impl OperandKind {
     pub(super) const fn selections(self) -> &'static [TermSelection] {
         use TermSelection::{Fields, Surfaces, Wavelengths, Zooms};
         match self {
-            Self::Gap | Self::Track | Self::Sag => &[Surfaces, Zooms],
             Self::ChiefRayHeight | Self::ChiefRayAngle | Self::IncidenceAngle => {
                 &[Surfaces, Fields, Wavelengths, Zooms]
             }
             Self::Telecentricity | Self::LateralColor => &[Fields, Wavelengths, Zooms],
             Self::AxialColor => &[Wavelengths, Zooms],
+            // Distances, sags and third-order sums.
             _ => &[Surfaces, Zooms],
         }
     }
@@ -177,7 +177,6 @@ impl TermScope {
     pub const ALL: Self = Self { surfaces: None, fields: None, wavelengths: None, zooms: None };
 
     /// True if it selects everything.
-    #[expect(clippy::trivially_copy_pass_by_ref, reason = "the signature that serde calls")]
     pub fn is_all(&self) -> bool {
         *self == Self::ALL
     }

@@ -231,25 +231,11 @@ impl Configuration {
         (0..self.variables).step_by(SLOPES).map(move |first| {
             let along = |(i, system)| {
                 let mut system = self.along_at(system, i, first);
-                self.move_focus(&mut system, systems, first);
+                move_focus(&mut system, systems, first);
                 system
             };
             (first, all.iter().enumerate().map(along).collect())
         })
-    }
-
-    /// Gives the last gap of a system its derivatives along a block of variables, if it is solved
-    /// for.
-    fn move_focus(
-        &self,
-        system: &mut System<VariableDual>,
-        systems: &ResolvedSystems,
-        first: usize,
-    ) {
-        let Some(focus) = &systems.focus_slopes else { return };
-        let last = system.surfaces.len() - 2;
-        let slopes = &mut system.surfaces[last].thickness.slope;
-        slopes.iter_mut().zip(focus.iter().skip(first)).for_each(|(to, by)| *to = *by);
     }
 
     /// The systems at the primary wavelength with their derivatives along each block of variables in
@@ -260,7 +246,7 @@ impl Configuration {
     ) -> impl Iterator<Item = (usize, System<VariableDual>)> + 'a {
         (0..self.variables).step_by(SLOPES).map(|first| {
             let mut system = self.along_without_focus(&systems.manufactured, first);
-            self.move_focus(&mut system, systems, first);
+            move_focus(&mut system, systems, first);
             (first, system)
         })
     }
@@ -344,6 +330,15 @@ impl Configuration {
         }
         slopes
     }
+}
+
+/// Gives the last gap of a system its derivatives along a block of variables, if it is solved
+/// for.
+fn move_focus(system: &mut System<VariableDual>, systems: &ResolvedSystems, first: usize) {
+    let Some(focus) = &systems.focus_slopes else { return };
+    let last = system.surfaces.len() - 2;
+    let slopes = &mut system.surfaces[last].thickness.slope;
+    slopes.iter_mut().zip(focus.iter().skip(first)).for_each(|(to, by)| *to = *by);
 }
 
 /// Removes the limits of a surface: while the lens changes, rays may pass a rim or an obstruction

@@ -6,10 +6,11 @@ use super::live_merit::{MeritReport, MeritValues};
 use super::run::{LatestRequestWorker, catch_panic};
 use crate::lens::{Lens, Parameter, ParameterKind, add_variables};
 use crate::math::format_short;
-use crate::merit::{DerivativeLevel, Goal, Merit};
+use crate::merit::{DerivativeLevel, Goal, Merit, MeritError, SumOfSquares, TermValue};
 use crate::paraxial::{
     DragOutcome, DragSettings, Handle, HandleDrag, MovedNumber, short_name, tangents,
 };
+use std::borrow::Cow;
 use std::collections::HashMap;
 use std::io;
 use std::sync::Arc;
@@ -251,14 +252,14 @@ struct SlopesRequest {
     tolerance: f64,
 }
 
-/// The merit function of the lens before a drag.
+/// The merit function of the lens before a drag, by all numbers that handles move.
 #[derive(Debug)]
 struct MeritReference {
     lens: Arc<Lens>,
     goal: Arc<Goal>,
     tolerance: f64,
-    light: Vec<Vec<f64>>,
-    merit: f64,
+    merit: Merit,
+    value: f64,
 }
 
 fn evaluate(request: &SlopesRequest, reference: &mut Option<MeritReference>) -> HandleSlopes {
@@ -279,10 +280,7 @@ fn slopes(
     };
     let known = reference.insert(known);
     let lens = with_all_variables(&request.lens);
-    let merit = Merit::new(&lens, &known.goal, request.tolerance).map_err(|why| why.to_string())?;
-    let merit = merit.with_initial_light(&known.light);
-    let found = merit.evaluate_with_terms(&merit.values(&lens), DerivativeLevel::Gradient);
-    let (sum, terms) = found.map_err(|why| why.to_string())?;
+    let (merit, sum, terms) = known.evaluate(&lens).map_err(|why| why.to_string())?;
     let values = MeritValues::new(&lens, &merit, terms).map_err(|why| why.to_string())?;
     let by_number = merit.variables().iter().map(|variable| variable.parameter);
     let by_number: HashMap<Parameter, f64> = by_number.zip(sum.gradient.iter().copied()).collect();
@@ -292,15 +290,35 @@ fn slopes(
     let tangents = tangents(&request.lens, request.zoom, &request.settings);
     let slopes = tangents.into_iter().map(|(handle, tangent)| (handle, along(tangent)));
     let slopes = slopes.filter(|(_, slope)| slope.is_finite()).collect();
-    Ok(MeritSlopes { merit: sum.value, before: known.merit, slopes, values })
+    Ok(MeritSlopes { merit: sum.value, before: known.value, slopes, values })
 }
 
 impl MeritReference {
     fn new(lens: &Arc<Lens>, goal: &Arc<Goal>, tolerance: f64) -> Result<Self, String> {
-        let merit = Merit::new(lens, goal, tolerance).map_err(|why| why.to_string())?;
-        let value = merit.value(&merit.values(lens)).map_err(|why| why.to_string())?;
-        let light = merit.initial_light().to_vec();
-        Ok(Self { lens: Arc::clone(lens), goal: Arc::clone(goal), tolerance, light, merit: value })
+        let free = with_all_variables(lens);
+        let merit = Merit::new(&free, goal, tolerance).map_err(|why| why.to_string())?;
+        let value = merit.value(&merit.values(&free)).map_err(|why| why.to_string())?;
+        Ok(Self { lens: Arc::clone(lens), goal: Arc::clone(goal), tolerance, merit, value })
+    }
+
+    /// The merit of a lens with its derivatives and its terms, by the pupils of the lens before,
+    /// which follow the lens; where they cannot, by new ones.
+    fn evaluate(
+        &self,
+        lens: &Lens,
+    ) -> Result<(Cow<'_, Merit>, SumOfSquares, Vec<TermValue>), MeritError> {
+        let values = self.merit.values(lens);
+        if self.merit.lens(&values) == *lens {
+            let found = self.merit.evaluate_with_terms(&values, DerivativeLevel::Gradient);
+            if let Ok((sum, terms)) = found {
+                return Ok((Cow::Borrowed(&self.merit), sum, terms));
+            }
+        }
+        let merit = Merit::new(lens, &self.goal, self.tolerance)?;
+        let merit = merit.with_initial_light(self.merit.initial_light());
+        let (sum, terms) =
+            merit.evaluate_with_terms(&merit.values(lens), DerivativeLevel::Gradient)?;
+        Ok((Cow::Owned(merit), sum, terms))
     }
 
     /// True if a request asks for the same merit function of the same lens.

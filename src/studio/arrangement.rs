@@ -14,6 +14,8 @@ pub enum Arrangement {
     /// The layout large with the numbers of the lens below; beside them the search, as high as the
     /// window.
     Search,
+    /// Most panels beside each other, for a large window.
+    Large,
 }
 
 impl Arrangement {
@@ -22,6 +24,7 @@ impl Arrangement {
         match self {
             Self::Default => default_arrangement(),
             Self::Search => search_arrangement(),
+            Self::Large => large_arrangement(),
         }
     }
 }
@@ -57,6 +60,27 @@ fn search_arrangement() -> Tree<PanelKind> {
     Tree::new(Id::unique("dock"), root, tiles)
 }
 
+fn large_arrangement() -> Tree<PanelKind> {
+    use PanelKind as Kind;
+    let mut tiles = Tiles::default();
+    let drawings = tabs(&mut tiles, &[Kind::Layout, Kind::Slice]);
+    let table = tabs(&mut tiles, &[Kind::Prescription]);
+    let system = tabs(&mut tiles, &[Kind::System, Kind::Zoom]);
+    let table = row(&mut tiles, &[(table, 0.66), (system, 0.34)]);
+    let left = column(&mut tiles, &[(drawings, 0.54), (table, 0.46)]);
+    let spots = tabs(&mut tiles, &[Kind::Spot, Kind::Pupil]);
+    let contrast = tabs(&mut tiles, &[Kind::Contrast]);
+    let facts = tabs(&mut tiles, &[Kind::FirstOrder, Kind::Effects]);
+    let sums = tabs(&mut tiles, &[Kind::Seidel]);
+    let numbers = row(&mut tiles, &[(facts, 0.42), (sums, 0.58)]);
+    let middle = column(&mut tiles, &[(spots, 0.3), (contrast, 0.3), (numbers, 0.4)]);
+    let better = tabs(&mut tiles, &[Kind::Optimizer, Kind::Search, Kind::Pareto]);
+    let history = tabs(&mut tiles, &[Kind::History]);
+    let right = column(&mut tiles, &[(better, 0.58), (history, 0.42)]);
+    let root = row(&mut tiles, &[(left, 0.46), (middle, 0.3), (right, 0.24)]);
+    Tree::new(Id::unique("dock"), root, tiles)
+}
+
 /// Panels behind each other, the first one in front.
 fn tabs(tiles: &mut Tiles<PanelKind>, kinds: &[PanelKind]) -> TileId {
     let panes = kinds.iter().map(|kind| tiles.insert_pane(*kind)).collect();
@@ -81,4 +105,28 @@ fn linear_tile(
         linear.shares.set_share(*tile, *share);
     }
     tiles.insert_new(Tile::Container(Container::Linear(linear)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::HashSet;
+
+    #[test]
+    fn every_arrangement_has_every_panel_once() {
+        let kinds = |arrangement: Arrangement| {
+            let tree = arrangement.tree();
+            let panes = tree.tiles.tiles().filter_map(|tile| match tile {
+                Tile::Pane(kind) => Some(format!("{kind:?}")),
+                Tile::Container(_) => None,
+            });
+            panes.collect::<Vec<_>>()
+        };
+        let all: HashSet<_> = kinds(Arrangement::Default).into_iter().collect();
+        for arrangement in [Arrangement::Default, Arrangement::Search, Arrangement::Large] {
+            let found = kinds(arrangement);
+            assert_eq!(found.len(), all.len(), "{arrangement:?}");
+            assert_eq!(found.into_iter().collect::<HashSet<_>>(), all, "{arrangement:?}");
+        }
+    }
 }

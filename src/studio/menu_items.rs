@@ -222,7 +222,7 @@ impl MenuContext<'_> {
     }
 
     /// One panel alone, and the arrangements of all panels.
-    fn arrangements(&self) -> [MenuItem; 3] {
+    fn arrangements(&self) -> [MenuItem; 4] {
         const MENU: &str = "View";
         let front = self.panels.iter().find(|panel| panel.kind == self.front);
         let (title, kind) = if self.maximized {
@@ -241,6 +241,8 @@ impl MenuContext<'_> {
                 .hint("The panel that was opened last has all the room, until all are shown again"),
             arrange("Arrangement for a search", Arrangement::Search)
                 .hint("The layout large, and beside it the lenses that the search has found"),
+            arrange("Arrangement for a large window", Arrangement::Large)
+                .hint("Most panels beside each other: from about 2000 points of width on"),
             arrange("Default arrangement", Arrangement::Default),
         ]
     }

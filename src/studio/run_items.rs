@@ -6,6 +6,7 @@ use crate::effects::{Effect, EffectOverride};
 use crate::grin_design;
 use crate::lens::{Lens, Object, ParameterKind};
 use crate::optimize::DescentMethod;
+use crate::optimize::pareto::ParetoSettings;
 use crate::paraxial::FirstOrderLock;
 use crate::session::{
     Command, GrinCommand, RunStatus, RunView, SessionView, StructureSearchCommand,
@@ -65,7 +66,7 @@ fn front(view: &SessionView) -> Vec<Request> {
     let run = &view.pareto.run;
     let is_paused = run.status == RunStatus::Paused;
     let idle = !run.is_active();
-    let start = Command::StartPareto { settings: Default::default(), compare: false };
+    let start = Command::StartPareto { settings: ParetoSettings::default(), compare: false };
     vec![
         ("Start a Pareto front with default settings", idle.then_some(start)),
         ("Pause the front", for_run(run, Command::PausePareto).filter(|_| !is_paused)),

@@ -3,7 +3,7 @@
 
 use aplanat::files::{bundled_lenses, json};
 use aplanat::lens::{Edit, Lens};
-use aplanat::merit::{Goal, Merit};
+use aplanat::merit::{Goal, Merit, TermValue};
 use aplanat::paraxial::{DragSettings, FirstOrderLock, Handle};
 use aplanat::session::{Command, MeritSlopes, Session};
 use std::thread;
@@ -160,4 +160,22 @@ fn the_merit_at_the_handles_is_that_of_the_design() {
     let merit = Merit::new(session.lens(), &proposed_now, 1e-5).unwrap();
     let other = merit.value(&merit.values(session.lens())).unwrap();
     assert!((own / other - 1.0).abs() > 0.05, "the two are told apart: {own} {other}");
+}
+
+/// The pupils of the lens before follow the dragged one: its merit is that of pupils of its own.
+#[test]
+fn the_merit_of_a_dragged_lens_comes_with_its_slopes() {
+    let mut session = session();
+    slopes(&mut session);
+    let start = session.lens().surfaces[0].curvature;
+    session.apply(drag(Handle::Curvature(0), 1.01 * start));
+    let found = slopes(&mut session);
+    let report = session.view().merit.unwrap();
+    assert!(std::sync::Arc::ptr_eq(&report.lens, session.lens()));
+    assert_eq!(report.values.as_ref().unwrap().total, found.values.total);
+    let merit = Merit::new(session.lens(), &report.goal, 1e-3).unwrap();
+    let spot = |terms: &[TermValue]| terms.iter().find(|term| term.term == "spot").unwrap().value;
+    let fresh = spot(&merit.terms(&merit.values(session.lens())).unwrap());
+    let followed = spot(&found.values.terms);
+    assert!((followed / fresh - 1.0).abs() < 5e-3, "{followed} and {fresh}");
 }

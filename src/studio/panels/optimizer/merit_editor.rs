@@ -10,7 +10,7 @@ use super::scope;
 use super::terms::{self, can_ask_for_more_light, hint, targets, title, unit, value_text};
 use crate::lens::{Aperture, Edit, Lens, ParameterKind, Quantity};
 use crate::math::expression::evaluate;
-use crate::merit::{Goal, LimitTreatment, PupilEdge, Term, WeightedTerm};
+use crate::merit::{Goal, LimitTreatment, OperandKind, PupilEdge, Term, WeightedTerm};
 use crate::session::{Command, OptimizationSnapshot, SessionView};
 use crate::studio::actions::Actions;
 use crate::studio::number;
@@ -216,18 +216,21 @@ impl MeritEditor {
                 self.add_item(ui, weighted);
             }
             for (title, kinds) in scope::GROUPS {
-                ui.menu_button(*title, |ui| {
-                    for kind in *kinds {
-                        let term = Term::Operand { kind: *kind, min: None, max: None };
-                        self.add_item(ui, WeightedTerm::new(term, 1.0));
-                    }
-                });
+                ui.menu_button(*title, |ui| self.add_operands(ui, kinds));
             }
         });
     }
 }
 
 impl MeritEditor {
+    /// Items of the menu that add operands, which have no bounds at first.
+    fn add_operands(&mut self, ui: &mut Ui, kinds: &[OperandKind]) {
+        for kind in kinds {
+            let term = Term::Operand { kind: *kind, min: None, max: None };
+            self.add_item(ui, WeightedTerm::new(term, 1.0));
+        }
+    }
+
     /// An item of the menu that adds a term.
     fn add_item(&mut self, ui: &mut Ui, weighted: WeightedTerm) {
         let button = ui.button(title(weighted.term));
