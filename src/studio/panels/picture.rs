@@ -14,6 +14,7 @@ use crate::studio::file_dialog::FileRequest;
 type ShownPicture = Timed<Result<ScenePicture, String>>;
 
 /// The panel.
+#[derive(Default)]
 pub struct PicturePanel {
     texture: Cached<ByAddress<ShownPicture>, TextureHandle>,
 }
@@ -21,12 +22,6 @@ pub struct PicturePanel {
 impl std::fmt::Debug for PicturePanel {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("PicturePanel").finish_non_exhaustive()
-    }
-}
-
-impl Default for PicturePanel {
-    fn default() -> Self {
-        Self { texture: Cached::new() }
     }
 }
 
