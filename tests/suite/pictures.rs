@@ -168,7 +168,7 @@ fn a_picture_that_is_ended_early_says_so() {
     let renderer = ExactRenderer::new(&model, &bands, &scene, frame).unwrap();
     let picture = renderer.render(&samples(16), &|_| ControlFlow::Break(()));
     assert!(!picture.complete && !picture.reached);
-    assert!(picture.values.iter().any(|value| *value == [0.0; 3]));
+    assert!(picture.values.contains(&[0.0; 3]));
 }
 
 #[test]

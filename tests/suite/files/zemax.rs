@@ -405,10 +405,9 @@ fn heights_of_fields_have_the_unit_of_lengths_and_angles_have_none() {
 #[test]
 fn coefficients_of_a_gradient_have_the_unit_of_their_power() {
     let values = [3.0, 5.0, 7.0, 0.1, 0.2, 0.3];
-    let mut lines = String::from("  TYPE GRINSUR3\r\n  PARM 2 1.6");
-    for (i, value) in values.iter().enumerate() {
-        lines += &format!("\r\n  PARM {} {value}", i + 3);
-    }
+    let parameter = |(i, value): (usize, &f64)| format!("\r\n  PARM {} {value}", i + 3);
+    let parameters: Vec<String> = values.iter().enumerate().map(parameter).collect();
+    let lines = format!("  TYPE GRINSUR3\r\n  PARM 2 1.6{}", parameters.concat());
     let text = achromat().replacen("  TYPE STANDARD", "  TYPE REPLACED", 2);
     let text = text.replacen("  TYPE REPLACED", "  TYPE STANDARD", 1);
     let text = text.replacen("  TYPE REPLACED", &lines, 1).replace("UNIT MM", "UNIT IN");
