@@ -69,7 +69,7 @@ fn large_arrangement() -> Tree<PanelKind> {
     let table = row(&mut tiles, &[(table, 0.66), (system, 0.34)]);
     let left = column(&mut tiles, &[(drawings, 0.54), (table, 0.46)]);
     let spots = tabs(&mut tiles, &[Kind::Spot, Kind::Pupil]);
-    let contrast = tabs(&mut tiles, &[Kind::Contrast]);
+    let contrast = tabs(&mut tiles, &[Kind::Contrast, Kind::Picture]);
     let facts = tabs(&mut tiles, &[Kind::FirstOrder, Kind::Effects]);
     let sums = tabs(&mut tiles, &[Kind::Seidel]);
     let numbers = row(&mut tiles, &[(facts, 0.42), (sums, 0.58)]);
