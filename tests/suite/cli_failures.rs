@@ -17,8 +17,16 @@ const ZOOM: &str = "lenses/zoom_nikkor_28_80.json";
 struct Running(Option<Child>);
 
 impl Running {
+    /// Starts the program with the end of the terminal as a request to end, which `nohup` around the
+    /// tests would have it ignore.
     fn start(arguments: &[&str]) -> Self {
-        Self::of(Command::new(env!("CARGO_BIN_EXE_aplanat")).args(arguments))
+        let program = env!("CARGO_BIN_EXE_aplanat");
+        if cfg!(target_os = "linux") {
+            let start = ["--default-signal=HUP", program];
+            Self::of(Command::new("env").args(start).args(arguments))
+        } else {
+            Self::of(Command::new(program).args(arguments))
+        }
     }
 
     fn of(command: &mut Command) -> Self {
