@@ -11,11 +11,11 @@ use std::path::PathBuf;
 #[derive(Debug, clap::Args)]
 #[command(after_long_help = include_str!("help/convert.txt"))]
 pub(super) struct ConvertArgs {
-    /// The lens to read: .json or .zmx
+    /// The lens to read: .json, .zmx, .seq or .roa
     #[arg(value_name = "IN")]
     from: PathBuf,
 
-    /// The file to write, in the format of its extension: .json or .zmx
+    /// The file to write, in the format of its extension: .json, .zmx or .seq
     #[arg(value_name = "OUT")]
     to: PathBuf,
 }
@@ -23,7 +23,7 @@ pub(super) struct ConvertArgs {
 impl ConvertArgs {
     pub(super) fn run(&self, output: &Output) -> Result<(), CliError> {
         let mut paths = OutputPaths::reading([("the lens", self.from.as_path())]);
-        paths.file("OUT", Some(&self.to), &["json", "zmx"])?;
+        paths.file("OUT", Some(&self.to), &["json", "zmx", "seq"])?;
         let opened = files::open(&self.from)?;
         let file = self.from.display().to_string();
         LoadedLens { lens: opened.lens.clone(), file }.check_traceable()?;

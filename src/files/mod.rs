@@ -8,15 +8,18 @@ mod atomic;
 mod bounded;
 mod bundled;
 mod checkpoint;
+pub mod codev;
 mod convert;
 mod error;
 mod folder;
 mod identity;
 mod image_file;
+mod image_side;
 pub mod json;
 mod library;
 mod lock;
 mod probe_rays;
+mod ray_optics;
 mod report;
 mod round_trip;
 mod self_check;
@@ -58,6 +61,10 @@ pub enum LensFormat {
     Native,
     /// Zemax, `.zmx`.
     Zemax,
+    /// CODE V, `.seq`.
+    CodeV,
+    /// The program ray-optics, `.roa`; only read.
+    RayOptics,
 }
 
 /// A lens read from a file.
@@ -87,7 +94,8 @@ pub struct SaveReport {
     pub proof: Option<RoundTripCheck>,
 }
 
-const READABLE: &str = "a lens: JSON with the key `aplanat`, or Zemax .zmx";
+const READABLE: &str =
+    "a lens: JSON with the key `aplanat`, Zemax .zmx, CODE V .seq or ray-optics .roa";
 
 /// Reads a lens from a file of any known format.
 ///
@@ -116,31 +124,49 @@ pub fn parse(bytes: &[u8], name: &str) -> Result<OpenedLens, FileError> {
             let lens = json::read(&decode_unicode(bytes, name)?, name)?;
             Ok(OpenedLens { lens, format: LensFormat::Native, report: None, checks: Vec::new() })
         }
-        LensFormat::Zemax => {
-            let (lens, report) = zemax::read(&text, name)?;
-            let checks = self_check::self_checks(&lens).unwrap_or_default();
-            Ok(OpenedLens { lens, format: LensFormat::Zemax, report: Some(report), checks })
+        LensFormat::Zemax => Ok(foreign(zemax::read(&text, name)?, LensFormat::Zemax)),
+        LensFormat::RayOptics => {
+            let text = decode_unicode(bytes, name)?;
+            Ok(foreign(ray_optics::read(&text, name)?, LensFormat::RayOptics))
         }
+        LensFormat::CodeV => Ok(foreign(codev::read(&text, name)?, LensFormat::CodeV)),
     }
 }
 
+/// A lens from a foreign file, with numbers to compare.
+fn foreign((mut lens, mut report): (Lens, ConversionReport), format: LensFormat) -> OpenedLens {
+    image_side::face_image(&mut lens, &mut report);
+    let checks = self_check::self_checks(&lens).unwrap_or_default();
+    OpenedLens { lens, format, report: Some(report), checks }
+}
+
 fn format_by_content(text: &str) -> Option<LensFormat> {
+    if ray_optics::is_model(text) {
+        return Some(LensFormat::RayOptics);
+    }
     if text.trim_start().starts_with('{') {
         return Some(LensFormat::Native);
     }
-    let mut keywords = text.lines().filter_map(|line| line.split_whitespace().next());
-    keywords.any(|word| matches!(word, "SURF" | "MODE" | "VERS")).then_some(LensFormat::Zemax)
+    let lines = || text.split(['\n', '\r']);
+    let keywords = || lines().filter_map(|line| line.split_whitespace().next());
+    if keywords().any(|word| matches!(word, "SURF" | "MODE" | "VERS")) {
+        return Some(LensFormat::Zemax);
+    }
+    let object = |word: &str| word.eq_ignore_ascii_case("SO");
+    keywords().any(object).then_some(LensFormat::CodeV)
 }
 
 fn format_by_extension(path: &Path) -> Option<LensFormat> {
     match path.extension()?.to_str()?.to_ascii_lowercase().as_str() {
         "json" => Some(LensFormat::Native),
         "zmx" => Some(LensFormat::Zemax),
+        "seq" => Some(LensFormat::CodeV),
+        "roa" => Some(LensFormat::RayOptics),
         _ => None,
     }
 }
 
-/// Writes a lens to a file, in the format of its extension: `.json` or `.zmx`. A foreign file is read
+/// Writes a lens to a file, in the format of its extension: `.json`, `.zmx` or `.seq`. A foreign file is read
 /// back and traced first. On failure the target is unchanged.
 ///
 /// # Errors
@@ -150,15 +176,17 @@ pub fn save(lens: &Lens, path: impl AsRef<Path>) -> Result<SaveReport, FileError
     let path = path.as_ref();
     let file = path.display().to_string();
     lens.check().map_err(|source| FileError::Lens { file: file.clone(), source })?;
-    let Some(format) = format_by_extension(path) else {
+    let writable = format_by_extension(path).filter(|format| *format != LensFormat::RayOptics);
+    let Some(format) = writable else {
         let extension = path.extension().unwrap_or_default().to_string_lossy();
         let found = format!("the extension `{extension}`");
-        return Err(FileError::NotALens { file, found, expected: "`.json` or `.zmx` to write to" });
+        let expected = "`.json`, `.zmx` or `.seq` to write to";
+        return Err(FileError::NotALens { file, found, expected });
     };
     let (bytes, report, proof) = match format {
         LensFormat::Native => (json::write(lens).into_bytes(), None, None),
-        LensFormat::Zemax => {
-            let (bytes, report, proof) = checked_zemax(lens, &file)?;
+        LensFormat::Zemax | LensFormat::CodeV | LensFormat::RayOptics => {
+            let (bytes, report, proof) = checked_foreign(lens, format, &file)?;
             (bytes, Some(report), Some(proof))
         }
     };
@@ -177,14 +205,20 @@ fn unreadable_export(file: &str, error: &FileError) -> FileError {
     FileError::RoundTripFailed { file: file.to_owned(), what }
 }
 
-/// The bytes of a Zemax file, checked by reading it back and tracing it.
-fn checked_zemax(
+/// The bytes of a foreign file, checked by reading it back and tracing it.
+fn checked_foreign(
     lens: &Lens,
+    format: LensFormat,
     file: &str,
 ) -> Result<(Vec<u8>, ConversionReport, RoundTripCheck), FileError> {
     let unusable = |source| FileError::Lens { file: file.to_owned(), source };
-    let (text, report) = zemax::write(lens).map_err(unusable)?;
-    let bytes = text::encode_utf16(&text);
+    let (bytes, report) = if format == LensFormat::CodeV {
+        let (text, report) = codev::write(lens).map_err(unusable)?;
+        (text.into_bytes(), report)
+    } else {
+        let (text, report) = zemax::write(lens).map_err(unusable)?;
+        (text::encode_utf16(&text), report)
+    };
     let back = parse(&bytes, file).map_err(|error| unreadable_export(file, &error))?;
     let proof = round_trip::check_round_trip(lens, &back.lens, file)?;
     Ok((bytes, report, proof))

@@ -111,3 +111,31 @@ fn sunflower(count: usize) -> impl Iterator<Item = (f64, f64)> {
         (radius * cos, radius * sin)
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lens::{Fields, blank};
+
+    #[test]
+    fn rays_of_an_angle_come_from_the_point_that_the_pupil_sees_under_it() {
+        // The stop is the first surface, so that the entrance pupil is there.
+        let mut lens = blank();
+        lens.surfaces[0].curvature = 0.02;
+        let degrees = [[0.0, 0.0], [0.0, 12.0], [-7.0, 3.0]];
+        let point = |[x, y]: [f64; 2]| FieldPoint { x, y, weight: 1.0 };
+        let values = degrees.map(point).to_vec();
+        lens.fields = Fields { kind: FieldKind::Angle, values: values.clone() };
+        lens.object = Object::Finite(300.0);
+        let launch = ProbeLaunch::new(&lens, 0).unwrap();
+        for field in values {
+            for ray in launch.rays(field) {
+                let Vec3 { x, y, z } = ray.point;
+                assert_eq!(z, -300.0);
+                let seen = [x, y].map(|height| -(height / z.abs()).atan().to_degrees());
+                let off = (seen[0] - field.x).hypot(seen[1] - field.y);
+                assert!(off < 1e-9, "{seen:?} {field:?}");
+            }
+        }
+    }
+}

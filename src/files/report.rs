@@ -9,6 +9,8 @@ use std::fmt;
 pub enum ConversionOutcome {
     /// The other format cannot represent it; it is lost.
     Dropped,
+    /// A surface that cannot be traced; its lines are kept with the row, and rays meet its conic.
+    Locked,
     /// It is represented approximately, as described by the note.
     Approximated,
     /// It affects no ray; it is kept in this report only.
@@ -19,12 +21,14 @@ pub enum ConversionOutcome {
 
 impl ConversionOutcome {
     /// All outcomes, the most important one first.
-    pub const ALL: [Self; 4] = [Self::Dropped, Self::Approximated, Self::Preserved, Self::Used];
+    pub const ALL: [Self; 5] =
+        [Self::Dropped, Self::Locked, Self::Approximated, Self::Preserved, Self::Used];
 
     /// The word in reports.
     pub fn name(self) -> &'static str {
         match self {
             Self::Dropped => "dropped",
+            Self::Locked => "locked",
             Self::Approximated => "approximated",
             Self::Preserved => "preserved",
             Self::Used => "used",
@@ -127,7 +131,7 @@ mod tests {
         report.add(ConversionOutcome::Dropped, "hyper of surface 3", "no such thing there");
         let table = report.to_string();
         let lines: Vec<&str> = table.lines().collect();
-        assert_eq!(lines[0], "1 dropped, 0 approximated, 0 preserved, 1 used");
+        assert_eq!(lines[0], "1 dropped, 0 locked, 0 approximated, 0 preserved, 1 used");
         assert!(lines[1].starts_with("dropped") && lines[1].ends_with("no such thing there"));
         assert!(lines[2].contains("    7  ENPD 16"), "{}", lines[2]);
         report.rows.truncate(1);

@@ -307,6 +307,12 @@ impl Row {
                 check_number(what, found, found.abs() < limit, "mm, or less than 90 degrees")?;
             }
         }
+        for axis in [self.break_before, self.break_after].into_iter().flatten() {
+            let place = format_args!("break of the axis at surface {surface}").to_string();
+            axis.decenter.iter().try_for_each(|v| check_number(&place, *v, true, FINITE))?;
+            let turn = |v: &f64| check_number(&place, *v, v.abs() <= 360.0, "at most 360 degrees");
+            axis.tilt.iter().try_for_each(turn)?;
+        }
         let Some(inner) = self.obstruction else { return Ok(()) };
         let transmits = self.semi_diameter.is_none_or(|sd| inner == 0.0 || inner < sd);
         let expected = "zero or more and less than the semi-diameter, in mm";

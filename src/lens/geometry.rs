@@ -1,7 +1,7 @@
 //! Geometry that many rooms need: lengths along the axis, sags, and the lens traversed backwards.
 
-use super::{Lens, Medium, Row, Shape, Surface, System};
-use crate::math::Real;
+use super::{Lens, Medium, Pose, Row, Shape, Surface, System};
+use crate::math::{Real, Vec3};
 
 impl Lens {
     /// The sum of the absolute thicknesses as written, in mm: the length of the lens from its first
@@ -33,8 +33,25 @@ impl<R: Real> System<R> {
         if mirrors.count() % 2 == 0 { R::ONE } else { -R::ONE }
     }
 
-    /// The position of every vertex on the axis, in mm from the first one; the last is as a rule
-    /// that of the image plane.
+    /// The frame in front of every surface, with its origin at the vertex, in that of the first one:
+    /// its axis is turned and displaced by the breaks of the surfaces before.
+    pub fn frames(&self) -> Vec<Pose<R>> {
+        let mut frame = Pose::centred();
+        let mut frames = Vec::with_capacity(self.surfaces.len());
+        for surface in &self.surfaces {
+            frames.push(frame);
+            let gap =
+                Pose { shift: Vec3::new(R::ZERO, R::ZERO, surface.thickness), ..Pose::centred() };
+            frame = match &surface.axis {
+                None => frame.then(&gap),
+                Some(axis) => frame.then(axis).then(&gap),
+            };
+        }
+        frames
+    }
+
+    /// The position of every vertex along the axis, in mm from the first one; the last is as a rule
+    /// that of the image plane. A broken axis is straightened.
     pub fn vertex_positions(&self) -> Vec<R> {
         let gaps = self.surfaces.iter().map(|surface| surface.thickness);
         let positions = gaps.scan(R::ZERO, |z, gap| {
@@ -99,6 +116,7 @@ impl<R: Real> System<R> {
         // Light that travels towards −z at the end already has the right direction.
         let turn = if mirrors % 2 == 0 { -R::ONE } else { R::ONE };
         let gap = |i: usize| i.checked_sub(1).map_or(distance, |i| -(turn * surfaces[i].thickness));
+        let directed = |pose: Pose<R>| if turn < R::ZERO { pose.reflected() } else { pose };
         let count = surfaces.len();
         let reversed = (0..count).rev().map(|i| Surface {
             shape: surfaces[i].shape.with_sag_sign(turn),
@@ -107,7 +125,8 @@ impl<R: Real> System<R> {
             grin: i
                 .checked_sub(1)
                 .and_then(|i| surfaces[i].grin.map(|grin| grin.reversed(surfaces[i].thickness))),
-            pose: surfaces[i].pose.map(|pose| if turn < R::ZERO { pose.reflected() } else { pose }),
+            pose: reversed_pose(&surfaces[i]).map(directed),
+            axis: surfaces[i].axis.map(|axis| directed(axis.inverse())),
             astigmatism: surfaces[i].astigmatism.map(|astigmatism| turn * astigmatism),
             ..surfaces[i]
         });
@@ -118,6 +137,13 @@ impl<R: Real> System<R> {
             stop: self.stop.map(|stop| count - 1 - stop),
         }
     }
+}
+
+/// The pose of a surface on the axis behind it.
+fn reversed_pose<R: Real>(surface: &Surface<R>) -> Option<Pose<R>> {
+    let Some(axis) = surface.axis else { return surface.pose };
+    let own = surface.pose.unwrap_or_else(Pose::centred);
+    Some(axis.inverse().then(&own))
 }
 
 impl<R: Real> Shape<R> {

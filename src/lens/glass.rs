@@ -1,6 +1,7 @@
 //! Refractive index of glasses as a function of the wavelength, by catalogue name or from nd and vd.
 //!
-//! The catalogue is `assets/glasses.json`, a subset of the refractiveindex.info database (CC0).
+//! The catalogue is `assets/glasses.json`, a subset of the refractiveindex.info database (CC0);
+//! `assets/further_glasses.json` holds more of it, for lenses that name those glasses.
 //! Indices are relative to air at about 20 °C, as in the catalogues of the manufacturers.
 
 use serde::Deserialize;
@@ -85,33 +86,55 @@ struct GlassCatalogue {
 /// Every glass that comes with the program.
 pub fn catalogue() -> &'static [Glass] {
     static CATALOGUE: OnceLock<Vec<Glass>> = OnceLock::new();
-    CATALOGUE.get_or_init(|| {
-        let text = include_str!("../../assets/glasses.json");
-        let parsed: Result<GlassCatalogue, _> = serde_json::from_str(text);
-        parsed.map(|c| c.glasses).unwrap_or_default()
-    })
+    CATALOGUE.get_or_init(|| parse_catalogue(include_str!("../../assets/glasses.json")))
+}
+
+/// Glasses that are found by name alone: a search or a design does not propose them.
+fn further_catalogue() -> &'static [Glass] {
+    static CATALOGUE: OnceLock<Vec<Glass>> = OnceLock::new();
+    CATALOGUE.get_or_init(|| parse_catalogue(include_str!("../../assets/further_glasses.json")))
+}
+
+fn parse_catalogue(text: &str) -> Vec<Glass> {
+    let parsed: Result<GlassCatalogue, _> = serde_json::from_str(text);
+    parsed.map(|c| c.glasses).unwrap_or_default()
+}
+
+/// Every glass that a name can mean: those of [`catalogue`], then the further ones.
+pub fn known() -> impl Iterator<Item = &'static Glass> {
+    catalogue().iter().chain(further_catalogue())
 }
 
 /// The glass with this name, `SCHOTT N-BK7` or, if only one manufacturer has it, `N-BK7`; blanks and
-/// case are ignored.
+/// case are ignored. The further glasses are searched last.
 pub fn find(name: &str) -> Option<&'static Glass> {
-    names().get(&normalize(name)).copied().flatten()
+    let name = normalize(name);
+    let listed = names().get(&name).copied();
+    listed.unwrap_or_else(|| further_names().get(&name).copied().flatten())
 }
 
 /// The glass of every name; `None` for a name that two manufacturers share.
 fn names() -> &'static HashMap<String, Option<&'static Glass>> {
     static NAMES: OnceLock<HashMap<String, Option<&'static Glass>>> = OnceLock::new();
-    NAMES.get_or_init(|| {
-        let mut names: HashMap<_, Option<&'static Glass>> = HashMap::new();
-        for glass in catalogue() {
-            let short = names.entry(normalize(&glass.name));
-            short.and_modify(|only| *only = None).or_insert(Some(glass));
-        }
-        for glass in catalogue().iter().rev() {
-            names.insert(normalize(&glass.full_name()), Some(glass));
-        }
-        names
-    })
+    NAMES.get_or_init(|| index_names(catalogue()))
+}
+
+/// The further glass of every name, likewise.
+fn further_names() -> &'static HashMap<String, Option<&'static Glass>> {
+    static NAMES: OnceLock<HashMap<String, Option<&'static Glass>>> = OnceLock::new();
+    NAMES.get_or_init(|| index_names(further_catalogue()))
+}
+
+fn index_names(glasses: &'static [Glass]) -> HashMap<String, Option<&'static Glass>> {
+    let mut names: HashMap<_, Option<&'static Glass>> = HashMap::new();
+    for glass in glasses {
+        let short = names.entry(normalize(&glass.name));
+        short.and_modify(|only| *only = None).or_insert(Some(glass));
+    }
+    for glass in glasses.iter().rev() {
+        names.insert(normalize(&glass.full_name()), Some(glass));
+    }
+    names
 }
 
 /// The name in upper case without blanks.
@@ -130,6 +153,13 @@ pub fn similar_names(name: &str) -> Vec<String> {
         wanted.ends_with(&short) || short.contains(&wanted)
     };
     catalogue().iter().filter(near).take(3).map(Glass::full_name).collect()
+}
+
+/// The catalogue glass nearest to an index and an Abbe number at the d line, with weights that count
+/// 0.001 in the index as much as 0.5 in the Abbe number.
+pub fn nearest(nd: f64, vd: f64) -> Option<&'static Glass> {
+    let distance = |glass: &&Glass| ((glass.nd - nd) / 1e-3).hypot((glass.vd - vd) / 0.5);
+    catalogue().iter().min_by(|a, b| distance(a).total_cmp(&distance(b)))
 }
 
 /// The index of a model glass at a wavelength in micrometres, from index and Abbe number at the d
@@ -159,12 +189,29 @@ mod tests {
     #[test]
     fn the_catalogue_agrees_with_its_own_nd_and_vd() {
         assert!(catalogue().len() > 300);
-        for glass in catalogue() {
+        for glass in known() {
             let n = |um| glass.index(um).unwrap();
             let vd = (n(line::D) - 1.0) / (n(line::F) - n(line::C));
             assert!((n(line::D) - glass.nd).abs() < 2e-6, "{}", glass.full_name());
             assert!((vd - glass.vd).abs() < 2e-3 * vd, "{}", glass.full_name());
         }
+    }
+
+    #[test]
+    fn further_glasses_are_found_by_name_and_not_proposed() {
+        assert!(further_catalogue().len() > 1000);
+        assert_eq!(find("J-LAK02").unwrap().full_name(), "HIKARI J-LAK02");
+        assert!(catalogue().iter().all(|glass| glass.name != "J-LAK02"));
+        // The data sheet of 1993 says 1.5230 at the d line.
+        assert!((find("B270").unwrap().nd - 1.5230).abs() < 4e-5);
+        // A name of the catalogue keeps its meaning.
+        assert_eq!(find("N-BK7").unwrap().full_name(), "SCHOTT N-BK7");
+    }
+
+    #[test]
+    fn the_nearest_glass_of_a_glass_is_itself() {
+        let bk7 = find("SCHOTT N-BK7").unwrap();
+        assert_eq!(nearest(bk7.nd, bk7.vd).unwrap().nd, bk7.nd);
     }
 
     #[test]

@@ -7,6 +7,7 @@
 //! and medium of a row belong to the gap behind its surface; the last thickness leads to the image
 //! plane, which has no row. The curvature is stored, the radius is displayed.
 
+mod axis_break;
 mod check;
 mod diff;
 mod edit;
@@ -32,6 +33,7 @@ mod variables;
 pub use crate::grin::field::{
     AXIAL_TERMS, PROFILE_TERMS, ProfileCoefficients, ProfileLaw, RADIAL_TERMS, RotationalProfile,
 };
+pub use axis_break::AxisBreak;
 pub use check::LensError;
 pub use diff::added_glass;
 pub use edit::{Edit, EditError, EditedCell, ElementEdit, apply_edit};
@@ -195,8 +197,27 @@ pub struct Row {
     pub decenter: [f64; 2],
     /// The tilt about x, then about y, at the decentred vertex, in degrees; see [`Pose`].
     pub tilt: [f64; 2],
+    /// The break of the axis at the vertex in front of the surface, before its own decentre and tilt;
+    /// the surface and everything behind it stand on the new axis.
+    pub break_before: Option<AxisBreak>,
+    /// The break of the axis behind the surface: the thickness is measured along the new axis.
+    pub break_after: Option<AxisBreak>,
+    /// The lines of a foreign file on a surface that cannot be traced; `None` for a surface that can.
+    pub locked: Option<LockedSurface>,
     /// A remark on the surface.
     pub comment: String,
+}
+
+/// The description of a surface that this program cannot trace, as the file has it. Rays meet the
+/// conic of the row in its place.
+#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LockedSurface {
+    /// The surface type, as the file names it.
+    pub kind: String,
+    /// The lines of the file that describe it.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub lines: Vec<String>,
 }
 
 /// The medium that fills a gap, or the mirror at its beginning.

@@ -1,4 +1,4 @@
-//! Errors of making: what is not as the prescription says, each one number.
+//! Manufacturing errors: what is not as the prescription says, each one number.
 
 use serde::{Deserialize, Serialize};
 

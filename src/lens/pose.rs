@@ -1,4 +1,4 @@
-//! Surfaces that are decentred and tilted.
+//! Surfaces that are decentred and tilted; for a break of the axis itself see [`super::AxisBreak`].
 //!
 //! A [`Pose`] places a surface relative to the frame of its vertex in the centred lens: the point
 //! `q` of the surface's own frame lies at `shift + turn q` there. A tilt by the angle `a` about x and
@@ -78,16 +78,30 @@ impl<R: Real> Pose<R> {
         self.direction_in(p - self.shift)
     }
 
+    /// The pose in this frame of something that has the pose `inner` in the frame that this pose places.
+    #[must_use]
+    pub fn then(&self, inner: &Self) -> Self {
+        let columns = [0, 1, 2].map(|i| self.direction_out(inner.column(i)));
+        let row =
+            |of: fn(&Vec3<R>) -> R| Vec3::new(of(&columns[0]), of(&columns[1]), of(&columns[2]));
+        let turn = [row(|c| c.x), row(|c| c.y), row(|c| c.z)];
+        Self { shift: self.point_out(inner.shift), turn }
+    }
+
+    /// The pose of the outer frame in the frame that this pose places.
+    #[must_use]
+    pub fn inverse(&self) -> Self {
+        let turn = [0, 1, 2].map(|i| self.column(i));
+        Self { shift: -self.direction_in(self.shift), turn }
+    }
+
     /// The pose of a surface with this pose that is carried along by a rigid motion; `vertex` is the
     /// position of its centred vertex on the axis, in mm from the first one.
     #[must_use]
     pub fn carried(&self, motion: &RigidMotion<R>, vertex: R) -> Self {
         let lever = Vec3::new(R::ZERO, R::ZERO, motion.pivot - vertex);
         let shift = lever + motion.pose.point_out(self.shift - lever);
-        let columns = [0, 1, 2].map(|i| motion.pose.direction_out(self.column(i)));
-        let row =
-            |of: fn(&Vec3<R>) -> R| Vec3::new(of(&columns[0]), of(&columns[1]), of(&columns[2]));
-        Self { shift, turn: [row(|c| c.x), row(|c| c.y), row(|c| c.z)] }
+        Self { shift, ..motion.pose.then(self) }
     }
 
     /// A column of the rotation matrix.

@@ -96,10 +96,25 @@ impl Lens {
 }
 
 impl Row {
-    /// The position of the surface; `None` for a centred one.
+    /// The position of the surface on the axis in front of it; `None` for a centred one.
     pub fn pose(&self) -> Option<Pose<f64>> {
         let centred = self.decenter == [0.0; 2] && self.tilt == [0.0; 2];
-        (!centred).then(|| Pose::new(self.decenter, self.tilt.map(f64::to_radians)))
+        let own = (!centred).then(|| Pose::new(self.decenter, self.tilt.map(f64::to_radians)));
+        match (self.break_before, own) {
+            (None, own) => own,
+            (Some(axis), None) => Some(axis.pose()),
+            (Some(axis), Some(own)) => Some(axis.pose().then(&own)),
+        }
+    }
+
+    /// The frame of the axis behind the surface in that of the axis in front of it; `None` where the
+    /// axis is not broken.
+    pub fn axis(&self) -> Option<Pose<f64>> {
+        match [self.break_before, self.break_after] {
+            [None, None] => None,
+            [Some(only), None] | [None, Some(only)] => Some(only.pose()),
+            [Some(before), Some(after)] => Some(before.pose().then(&after.pose())),
+        }
     }
 
     fn surface(&self, thickness: f64, index: f64) -> Surface<f64> {
@@ -113,6 +128,7 @@ impl Row {
             mirror: self.medium == Medium::Mirror,
             hyperhemisphere: self.hyperhemisphere,
             pose: self.pose(),
+            axis: self.axis(),
             astigmatism: None,
         }
     }

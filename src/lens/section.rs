@@ -1,16 +1,20 @@
 //! The section of a lens in the y-z plane, as points that anything can draw.
 //!
 //! An element extends to the larger of its two semi-diameters; the smaller surface continues flat,
-//! as lenses are ground. A surface without a semi-diameter extends to its outermost rays, or else as
+//! as lenses are ground. Decentred and tilted surfaces are drawn by their points with x = 0 in their own
+//! frame, projected along x. A surface without a semi-diameter extends to its outermost rays, or else as
 //! far as the largest surface.
 
-use super::System;
+use super::{Pose, System};
+use crate::math::Vec3;
 
 /// The section of a system. Points are `[z, y]` in mm from the first vertex.
 #[derive(Clone, Debug)]
 pub struct LensSection<'a> {
     system: &'a System<f64>,
     vertices: Vec<f64>,
+    /// The frame of every surface in that of the first vertex.
+    places: Vec<Pose<f64>>,
     heights: Vec<f64>,
 }
 
@@ -19,7 +23,14 @@ impl<'a> LensSection<'a> {
     /// in mm; it may be empty.
     pub fn new(system: &'a System<f64>, ray_heights: &[f64]) -> Self {
         let heights = heights(system, ray_heights);
-        Self { system, vertices: system.vertex_positions(), heights }
+        let frames = system.frames();
+        let vertices = frames.iter().map(|frame| frame.shift.z).collect();
+        let own = |(frame, pose): (Pose<f64>, Option<Pose<f64>>)| {
+            pose.map_or(frame, |pose| frame.then(&pose))
+        };
+        let poses = system.surfaces.iter().map(|surface| surface.pose);
+        let places = frames.into_iter().zip(poses).map(own).collect();
+        Self { system, vertices, places, heights }
     }
 
     /// The system.
@@ -27,7 +38,7 @@ impl<'a> LensSection<'a> {
         self.system
     }
 
-    /// The position of every vertex on the axis, the image plane last.
+    /// The z of every vertex on the axis, the image plane last.
     pub fn vertices(&self) -> &[f64] {
         &self.vertices
     }
@@ -74,13 +85,33 @@ impl<'a> LensSection<'a> {
     pub fn point(&self, surface: usize, height: f64) -> [f64; 2] {
         let ground = height.abs().min(self.heights[surface]);
         let sag = self.system.surfaces[surface].shape.clamped_sag(ground);
-        [self.vertices[surface] + sag, height]
+        projected(self.places[surface].point_out(Vec3::new(0.0, height, sag)))
+    }
+
+    /// The point of the vertex plane of a surface at a height.
+    pub fn plane_point(&self, surface: usize, height: f64) -> [f64; 2] {
+        projected(self.places[surface].point_out(Vec3::new(0.0, height, 0.0)))
+    }
+
+    /// The height of a point above the vertex of a surface, in the frame of the surface.
+    pub fn height_above(&self, surface: usize, point: Vec3<f64>) -> f64 {
+        self.places[surface].point_in(point).y
+    }
+
+    /// The axis from the first vertex to the last, broken where the lens breaks it.
+    pub fn axis(&self) -> Vec<[f64; 2]> {
+        self.system.frames().into_iter().map(|frame| projected(frame.shift)).collect()
     }
 
     /// The surface that passes nearest to a point, no farther than `within` mm along the axis.
     pub fn surface_near(&self, [z, y]: [f64; 2], within: f64) -> Option<usize> {
-        let distance = |i: &usize| (self.point(*i, y)[0] - z).abs();
-        let reaches = |i: &usize| y.abs() <= self.heights[*i] + within;
+        let own = |i: &usize| self.places[*i].point_in(Vec3::new(0.0, y, z));
+        let sag = |i: usize, y: f64| {
+            let ground = y.abs().min(self.heights[i]);
+            self.system.surfaces[i].shape.clamped_sag(ground)
+        };
+        let distance = |i: &usize| (sag(*i, own(i).y) - own(i).z).abs();
+        let reaches = |i: &usize| own(i).y.abs() <= self.heights[*i] + within;
         (0..self.heights.len())
             .filter(reaches)
             .min_by(|a, b| distance(a).total_cmp(&distance(b)))
@@ -91,6 +122,10 @@ impl<'a> LensSection<'a> {
         let share = |i: u32| 2.0 * f64::from(i) / f64::from(pieces) - 1.0;
         (0..=pieces).map(|i| self.point(surface, height * share(i))).collect()
     }
+}
+
+fn projected(point: Vec3<f64>) -> [f64; 2] {
+    [point.z, point.y]
 }
 
 fn heights(system: &System<f64>, ray_heights: &[f64]) -> Vec<f64> {
@@ -131,6 +166,22 @@ mod tests {
         let rim = back.last().copied().unwrap_or_default();
         assert_eq!(rim[1], 10.0);
         assert!((rim[0] - (5.0 - 0.02 * 64.0 / (1.0 + (1.0_f64 - 0.0256).sqrt()))).abs() < 1e-12);
+    }
+
+    #[test]
+    fn behind_a_fold_mirror_the_axis_goes_up() {
+        let mut system = singlet();
+        let turned = |degrees: f64| Pose::new([0.0; 2], [degrees.to_radians(), 0.0]);
+        (system.surfaces[1].mirror, system.surfaces[1].thickness) = (true, -95.0);
+        (system.surfaces[1].pose, system.surfaces[1].axis) =
+            (Some(turned(45.0)), Some(turned(90.0)));
+        let section = LensSection::new(&system, &[]);
+        let [z, y] = section.point(2, 0.0);
+        // The new axis is −y, and light travels against it.
+        assert!((z - 5.0).abs() < 1e-12 && (y - 95.0).abs() < 1e-12, "{z} {y}");
+        let [z, y] = section.point(2, 3.0);
+        assert!((z - 8.0).abs() < 1e-12 && (y - 95.0).abs() < 1e-12, "{z} {y}");
+        assert_eq!(section.surface_near([6.0, 95.2], 0.5), Some(2));
     }
 
     #[test]

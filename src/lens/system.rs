@@ -37,6 +37,20 @@ pub enum Shape<R> {
 }
 
 impl<R: Real> Shape<R> {
+    /// The same form with each number in another type.
+    fn map<S: Real>(self, f: impl Fn(R) -> S) -> Shape<S> {
+        match self {
+            Self::Plane => Shape::Plane,
+            Self::Sphere { curvature } => Shape::Sphere { curvature: f(curvature) },
+            Self::Conic { curvature, conic } => {
+                Shape::Conic { curvature: f(curvature), conic: f(conic) }
+            }
+            Self::Asphere { curvature, conic, terms } => {
+                Shape::Asphere { curvature: f(curvature), conic: f(conic), terms: terms.map(f) }
+            }
+        }
+    }
+
     /// The simplest form with these numbers.
     pub fn simplest(curvature: R, conic: R, terms: [R; ASPHERE_TERMS]) -> Self {
         if terms.iter().any(|a| a.value() != 0.0) {
@@ -164,6 +178,9 @@ pub struct Surface<R> {
     pub hyperhemisphere: bool,
     /// The position of the surface if it is decentred or tilted; `None` for a centred one.
     pub pose: Option<Pose<R>>,
+    /// The frame of the axis behind the surface in that of the axis in front of it, both with their
+    /// origin at the vertex; `None` where the axis is not broken.
+    pub axis: Option<Pose<R>>,
     /// The coefficient of y², in 1/mm, that is added to the sag in the surface's own frame: the part of
     /// an irregularity that is not rotationally symmetric. `None` for a surface of revolution.
     pub astigmatism: Option<R>,
@@ -246,7 +263,8 @@ pub enum SystemError {
     },
     /// A method that supports centred surfaces only meets another one.
     #[error(
-        "surface {surface} is decentred, tilted or irregular, which {what} does not support{hint}"
+        "surface {surface} is decentred, tilted or irregular, or the axis is broken there, which {what} \
+         does not support{hint}"
     )]
     Posed {
         /// The surface.
@@ -329,6 +347,17 @@ impl<R: Real> System<R> {
         self.surfaces.iter().any(Surface::is_mounted)
     }
 
+    /// True if the axis is broken at any surface.
+    pub fn has_broken_axis(&self) -> bool {
+        self.surfaces.iter().any(|surface| surface.axis.is_some())
+    }
+
+    /// True if the whole lens mirrors itself at the y-z plane: no surface is decentred along x or
+    /// tilted about y.
+    pub fn mirrors_in_x(&self) -> bool {
+        self.surfaces.iter().all(Surface::mirrors_in_x)
+    }
+
     /// True if any gap is filled with a GRIN medium.
     pub fn has_grin(&self) -> bool {
         self.surfaces.iter().any(|surface| surface.grin.is_some())
@@ -363,13 +392,22 @@ impl<R: Real> Surface<R> {
             hyperhemisphere: false,
             grin: None,
             pose: None,
+            axis: None,
             astigmatism: None,
         }
     }
 
-    /// True if the surface is decentred, tilted or irregular.
+    /// True if the surface is decentred, tilted or irregular, or the axis is broken there.
     pub fn is_mounted(&self) -> bool {
-        self.pose.is_some() || self.astigmatism.is_some()
+        self.pose.is_some() || self.axis.is_some() || self.astigmatism.is_some()
+    }
+
+    /// True if the surface and the axis behind it mirror themselves at the y-z plane.
+    fn mirrors_in_x(&self) -> bool {
+        let upright = |pose: &Pose<R>| {
+            pose.shift.x == R::ZERO && pose.turn[0].y == R::ZERO && pose.turn[0].z == R::ZERO
+        };
+        self.pose.as_ref().is_none_or(upright) && self.axis.as_ref().is_none_or(upright)
     }
 
     fn check(&self, i: usize) -> Result<(), SystemError> {
@@ -399,9 +437,10 @@ impl<R: Real> Surface<R> {
         if let Some(astigmatism) = self.astigmatism {
             check_finite("astigmatism", i, astigmatism.value())?;
         }
-        let Some(Pose { shift, turn }) = self.pose else { return Ok(()) };
-        for v in [shift, turn[0], turn[1], turn[2]] {
-            [v.x, v.y, v.z].iter().try_for_each(|c| check_finite("pose", i, c.value()))?;
+        for Pose { shift, turn } in [self.pose, self.axis].into_iter().flatten() {
+            for v in [shift, turn[0], turn[1], turn[2]] {
+                [v.x, v.y, v.z].iter().try_for_each(|c| check_finite("pose", i, c.value()))?;
+            }
         }
         Ok(())
     }
@@ -419,18 +458,8 @@ impl<R: Real> Surface<R> {
 
     /// The same surface with every number mapped by `f`.
     pub fn map<S: Real>(&self, f: impl Fn(R) -> S) -> Surface<S> {
-        let shape = match self.shape {
-            Shape::Plane => Shape::Plane,
-            Shape::Sphere { curvature } => Shape::Sphere { curvature: f(curvature) },
-            Shape::Conic { curvature, conic } => {
-                Shape::Conic { curvature: f(curvature), conic: f(conic) }
-            }
-            Shape::Asphere { curvature, conic, terms } => {
-                Shape::Asphere { curvature: f(curvature), conic: f(conic), terms: terms.map(&f) }
-            }
-        };
         Surface {
-            shape,
+            shape: self.shape.map(&f),
             thickness: f(self.thickness),
             index: f(self.index),
             grin: self.grin.map(|grin| grin.map(&f)),
@@ -439,6 +468,7 @@ impl<R: Real> Surface<R> {
             mirror: self.mirror,
             hyperhemisphere: self.hyperhemisphere,
             pose: self.pose.map(|pose| pose.map(&f)),
+            axis: self.axis.map(|axis| axis.map(&f)),
             astigmatism: self.astigmatism.map(&f),
         }
     }

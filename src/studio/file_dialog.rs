@@ -59,7 +59,7 @@ impl FileRequest {
 
     const fn extensions(self) -> &'static [&'static str] {
         match self {
-            Self::Open | Self::InsertLens => &["json", "zmx", "ZMX"],
+            Self::Open | Self::InsertLens => &["json", "zmx", "ZMX", "seq", "SEQ", "roa"],
             Self::Save | Self::ExportJson | Self::OpenSearch | Self::SaveSearch => &["json"],
             Self::ExportSearchLens(_) => &["json", "zmx"],
             Self::ExportZemax => &["zmx"],

@@ -372,4 +372,92 @@ mod tests {
         assert!(matches!(decide(MAX_INTERVALS), Ok(Some(_))));
         assert!((0..5).all(|budget| decide(budget).is_err()));
     }
+
+    /// The sag of a conic with terms in r⁴, r⁶ and so on.
+    fn sag(curvature: f64, conic: f64, terms: &[f64], r2: f64) -> f64 {
+        let root = (1.0 - (1.0 + conic) * curvature * curvature * r2).sqrt();
+        let powers = terms.iter().enumerate().map(|(j, a)| a * r2.powi(j as i32 + 2));
+        curvature * r2 / (1.0 + root) + powers.sum::<f64>()
+    }
+
+    /// The place where a function falls below zero between two others.
+    fn bisect([mut low, mut high]: [f64; 2], above: &impl Fn(f64) -> f64) -> f64 {
+        for _ in 0..60 {
+            let middle = 0.5 * (low + high);
+            [low, high] = if above(middle) > 0.0 { [middle, high] } else { [low, middle] };
+        }
+        low
+    }
+
+    #[test]
+    fn the_first_crossing_is_that_of_a_fine_scan() {
+        let cases: [(f64, f64, &[f64]); 4] = [
+            (0.123_512, -0.3, &[0.076_650_2, -0.050_375_5, 0.008_034]),
+            (0.15, -0.5, &[-0.03, 0.004, -1e-4]),
+            (0.0, 0.0, &[0.1, -0.03, 0.002]),
+            (-0.05, 0.0, &[-0.1, 0.025, -0.0015]),
+        ];
+        let mut compared = 0;
+        for (curvature, conic, terms) in cases {
+            let surface = surface(curvature, conic, terms);
+            for i in 0..80 {
+                let at = |step: f64| 2.0 * (f64::from(i) * step).fract() - 1.0;
+                let point = [2.5 * at(0.856_674_8), 2.5 * at(0.733_891_8)];
+                let ray = ray(surface, point, [0.6 * at(0.628_706_7), 0.6 * at(0.538_597_4)]);
+                let r2 = |s: f64| (ray.p.x + s * ray.k.x).powi(2) + (ray.p.y + s * ray.k.y).powi(2);
+                let above = |s: f64| sag(curvature, conic, terms, r2(s)) - ray.p.z - s * ray.k.z;
+                let within = |s: f64| r2(s) < 9.0;
+                if !within(0.0) || above(0.0) < 0.0 {
+                    continue;
+                }
+                let mut scan = (0..4000).map(|n| 1e-3 * f64::from(n));
+                let end = scan.find(|s| !within(*s) || above(*s) < 0.0);
+                let Some(end) = end.filter(|s| within(*s)) else { continue };
+                let low = bisect([end - 1e-3, end], &above);
+                let mut search = CrossingSearch { ray: &ray, budget: MAX_INTERVALS };
+                let found = search.nearest_crossing().ok().flatten().unwrap();
+                assert!((found - low).abs() < 1e-12, "{curvature} {i}: {found} {low}");
+                compared += 1;
+            }
+        }
+        assert!(compared > 150, "{compared}");
+    }
+
+    #[test]
+    fn the_bound_of_the_slope_is_none_below_it_and_not_far_above() {
+        let surface = surface(0.15, -0.5, &[-0.03, 0.004]);
+        for (from, to) in [(0.0, 0.5), (0.5, 1.5), (2.0, 2.2), (1.0, 3.0)] {
+            for intervals in [1, 4, 64] {
+                let (c, conic, terms) = (surface.curvature, surface.conic, &surface.terms);
+                let bound = slope_bound_between(c, conic, terms, (from, to), intervals);
+                let sag = |r: f64| sag(0.15, -0.5, &[-0.03, 0.004], r * r);
+                let slope = |r: f64| ((sag(r + 1e-6) - sag(r - 1e-6)) / 2e-6).abs();
+                let places = (0..=100).map(|i| from + (to - from) * f64::from(i) / 100.0);
+                let steepest = places.map(slope).fold(0.0, f64::max);
+                assert!(steepest <= bound + 1e-8, "{from} {to} {intervals}: {steepest} {bound}");
+                let near = bound <= 1.2 * steepest + 0.02;
+                assert!(intervals < 64 || near, "{from} {to}: {steepest} {bound}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_distances_of_a_part_of_a_ray_are_those_of_its_points() {
+        let surface = surface(0.1, 0.0, &[0.01]);
+        for (point, direction) in [([1.0, -0.5], [0.3, 0.4]), ([-2.0, 0.1], [0.5, 0.0])] {
+            let ray = ray(surface, point, direction);
+            for (from, to) in [(-6.0, 6.0), (0.0, 1.0), (-3.0, -1.0), (2.0, 5.0)] {
+                let at = |i: i32| from + (to - from) * f64::from(i) / 20_000.0;
+                let off = (0..=20_000).map(|i| {
+                    let (s, p, k) = (at(i), ray.p, ray.k);
+                    (p.x + s * k.x).hypot(p.y + s * k.y)
+                });
+                let exact = off.fold([f64::INFINITY, 0.0f64], |[a, b], r| [a.min(r), b.max(r)]);
+                let (low, high) = ray.distances(from, to, 100.0);
+                assert!((low - exact[0]).abs() < 1e-3, "{from} {to}: {low} {exact:?}");
+                assert!((high - exact[1]).abs() < 1e-9, "{from} {to}: {high} {exact:?}");
+                assert_eq!(ray.distances(from, to, 0.5 * high).1, 0.5 * high);
+            }
+        }
+    }
 }

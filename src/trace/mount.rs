@@ -2,7 +2,8 @@
 //!
 //! Between surfaces a ray is in the frame of the vertex that the surface has in the centred lens. At a
 //! surface with a [`Pose`] it enters the surface's own frame, is intersected and refracted there, and
-//! leaves it again. An irregular surface has the sag `z(r²) + q y²` in its own frame; the crossing with
+//! leaves it again. Where the axis is broken, it leaves into the frame of the new axis: everything
+//! behind stands on it, and the gaps are measured along it. An irregular surface has the sag `z(r²) + q y²` in its own frame; the crossing with
 //! the surface of revolution is corrected by Newton's iteration.
 
 use super::Tracer;
@@ -19,6 +20,10 @@ const NEWTON_STEPS: usize = 4;
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Mount<R> {
     pub(super) pose: Pose<R>,
+    /// The axis behind the surface in the frame in front of it; `None` where it is not broken.
+    pub(super) axis: Option<Pose<R>>,
+    /// The surface's own frame in the frame behind it.
+    pub(super) behind: Pose<R>,
     /// The coefficient of y² in the sag, in 1/mm; `None` for a surface of revolution.
     pub(super) astigmatism: Option<R>,
 }
@@ -30,7 +35,9 @@ pub(super) fn mounts<R: Real>(system: &System<R>) -> Vec<Option<Mount<R>>> {
     }
     let mount = |surface: &Surface<R>| {
         let pose = surface.pose.unwrap_or_else(Pose::centred);
-        surface.is_mounted().then_some(Mount { pose, astigmatism: surface.astigmatism })
+        let behind = surface.axis.map_or(pose, |axis| axis.inverse().then(&pose));
+        let (axis, astigmatism) = (surface.axis, surface.astigmatism);
+        surface.is_mounted().then_some(Mount { pose, axis, behind, astigmatism })
     };
     system.surfaces.iter().map(mount).collect()
 }
@@ -55,7 +62,13 @@ impl<R: Real> Mount<R> {
 
     /// The same mount with every number mapped by `f`.
     pub(super) fn map<S: Real>(&self, f: impl Fn(R) -> S) -> Mount<S> {
-        Mount { pose: self.pose.map(&f), astigmatism: self.astigmatism.map(&f) }
+        let turned = |pose: Pose<R>| pose.map(&f);
+        Mount {
+            pose: turned(self.pose),
+            axis: self.axis.map(turned),
+            behind: turned(self.behind),
+            astigmatism: self.astigmatism.map(&f),
+        }
     }
 }
 
@@ -104,21 +117,42 @@ impl<R: Real> Tracer<R> {
         self.mounts.get(surface)?.as_ref()
     }
 
-    /// A point in the own frame of a surface, in the frame of its centred vertex.
+    /// A point in the own frame of a surface, in the frame behind it.
     #[inline(always)]
     pub(super) fn point_out(&self, surface: usize, p: Vec3<R>) -> Vec3<R> {
-        self.mount(surface).map_or(p, |mount| mount.pose.point_out(p))
+        self.mount(surface).map_or(p, |mount| mount.behind.point_out(p))
     }
 
-    /// A direction in the own frame of a surface, in the frame of its centred vertex.
+    /// A direction in the own frame of a surface, in the frame behind it.
     #[inline(always)]
     pub(super) fn direction_out(&self, surface: usize, k: Vec3<R>) -> Vec3<R> {
-        self.mount(surface).map_or(k, |mount| mount.pose.direction_out(k))
+        self.mount(surface).map_or(k, |mount| mount.behind.direction_out(k))
     }
 
-    /// Point and direction in the own frame of a surface, in the frame of its centred vertex.
+    /// Point and direction in the own frame of a surface, in the frame behind it.
     #[inline(always)]
     pub(super) fn state_out(&self, i: usize, (p, k): (Vec3<R>, Vec3<R>)) -> (Vec3<R>, Vec3<R>) {
         (self.point_out(i, p), self.direction_out(i, k))
+    }
+
+    /// A direction in the own frame of a surface that is missed, in the frame in front of it.
+    #[inline(always)]
+    pub(super) fn direction_before(&self, surface: usize, k: Vec3<R>) -> Vec3<R> {
+        self.mount(surface).map_or(k, |mount| mount.pose.direction_out(k))
+    }
+
+    /// The frame in front of every surface in that of the first one.
+    pub(super) fn frames(&self) -> Vec<Pose<R>> {
+        let mut frame = Pose::centred();
+        let mut frames = Vec::with_capacity(self.interfaces.len());
+        for (i, interface) in self.interfaces.iter().enumerate() {
+            let gap = Vec3::new(R::ZERO, R::ZERO, interface.gap);
+            frame.shift = frame.point_out(gap);
+            frames.push(frame);
+            if let Some(axis) = self.mount(i).and_then(|mount| mount.axis.as_ref()) {
+                frame = frame.then(axis);
+            }
+        }
+        frames
     }
 }

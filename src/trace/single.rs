@@ -54,8 +54,8 @@ pub struct TracedRay<R> {
     /// The fate of the ray.
     pub fate: Fate,
     /// Point and direction in the frame of the surface at which the ray ends, of its vertex in the centred
-    /// lens if it is decentred or tilted: behind the last surface
-    /// for a ray that arrives, at the point where it is clipped or totally reflected, or in front of
+    /// lens if it is decentred or tilted, and of the axis behind it if it is broken there: behind the last
+    /// surface for a ray that arrives, at the point where it is clipped or totally reflected, or in front of
     /// the surface that it misses.
     pub ray: Ray<R>,
     /// The optical path from the start to that point, in mm.
@@ -127,8 +127,10 @@ impl<R: Real> Tracer<R> {
                 None => (arrived.k, arrived.indices.before),
             };
             if GENERAL {
-                k = self.direction_out(i, k);
-                if !arrived.met.missed {
+                if arrived.met.missed {
+                    k = self.direction_before(i, k);
+                } else {
+                    k = self.direction_out(i, k);
                     traced.ray.point = self.point_out(i, traced.ray.point);
                 }
             }
@@ -183,29 +185,23 @@ impl Tracer<f64> {
     /// of that surface, if it travels towards it.
     pub fn polyline(&self, ray: Ray<f64>) -> RayPolyline {
         let mut points = vec![ray.point];
-        let mut vertices = Vec::with_capacity(self.interfaces.len());
-        let mut z = 0.0;
-        for interface in &self.interfaces {
-            z += interface.gap;
-            vertices.push(z);
-        }
+        let frames = self.frames();
         let mut heights = Vec::with_capacity(self.interfaces.len());
         let landing = self.visit(ray, |i, p| {
             if let Some(gap) = self.grin_gap_before(i) {
                 let before = self.trace_to(ray, i - 1).ray;
                 let inside = gap.sample_points(&self.interfaces[i], before);
-                points.extend(inside.map(|p| Vec3::new(p.x, p.y, p.z + vertices[i - 1])));
+                points.extend(inside.map(|p| frames[i - 1].point_out(p)));
             }
             heights.push(p.x.hypot(p.y));
-            let p = self.point_out(i, p);
-            points.push(Vec3::new(p.x, p.y, p.z + vertices[i]));
+            let p = self.mount(i).map_or(p, |mount| mount.pose.point_out(p));
+            points.push(frames[i].point_out(p));
         });
         if let Fate::Missed(surface) = landing.fate {
             let (p, d) = (landing.ray.point, landing.ray.direction);
             let s = -p.z / d.z;
             if s.is_finite() && s > 0.0 {
-                let end = p + d * s;
-                points.push(Vec3::new(end.x, end.y, vertices[surface as usize]));
+                points.push(frames[surface as usize].point_out(p + d * s));
             }
         }
         RayPolyline { points, heights, fate: landing.fate }

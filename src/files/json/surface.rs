@@ -2,7 +2,7 @@
 
 use super::medium::is_air;
 use super::required_number;
-use crate::lens::{Medium, Row};
+use crate::lens::{AxisBreak, LockedSurface, Medium, Row};
 use serde::de::value::MapAccessDeserializer;
 use serde::de::{Error, MapAccess, Unexpected, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
@@ -47,6 +47,12 @@ struct RowJson {
     decenter: [f64; 2],
     #[serde(default, skip_serializing_if = "is_plain_zeros")]
     tilt: [f64; 2],
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    break_before: Option<AxisBreak>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    break_after: Option<AxisBreak>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    locked: Option<LockedSurface>,
     #[serde(default, skip_serializing_if = "String::is_empty")]
     comment: String,
 }
@@ -97,6 +103,9 @@ impl Serialize for Row {
             hyper: self.hyperhemisphere,
             decenter: self.decenter,
             tilt: self.tilt,
+            break_before: self.break_before,
+            break_after: self.break_after,
+            locked: self.locked.clone(),
             comment: self.comment.clone(),
         }
         .serialize(to)
@@ -132,6 +141,9 @@ impl<'de> Visitor<'de> for RowVisitor {
             hyperhemisphere: keys.hyper,
             decenter: keys.decenter,
             tilt: keys.tilt,
+            break_before: keys.break_before,
+            break_after: keys.break_after,
+            locked: keys.locked,
             comment: keys.comment,
         })
     }

@@ -131,3 +131,21 @@ pub(super) fn write(shape: &[usize], values: &[f64]) -> Vec<u8> {
     values.iter().for_each(|value| bytes.extend(value.to_le_bytes()));
     bytes
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_numbers_of_an_array_begin_at_a_multiple_of_64_bytes() {
+        // Headers of every length, modulo 64.
+        for dimensions in 1..=64 {
+            let bytes = write(&vec![1; dimensions], &[0.25]);
+            let begin = bytes.len() - 8;
+            assert_eq!(begin % 64, 0, "{dimensions} dimensions");
+            assert_eq!(bytes[begin - 1], b'\n');
+            let length = usize::from(u16::from_le_bytes([bytes[8], bytes[9]]));
+            assert_eq!(begin, 10 + length);
+        }
+    }
+}

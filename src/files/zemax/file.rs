@@ -82,6 +82,12 @@ pub(super) struct ZemaxSurface {
     pub(super) curvature: Option<(f64, usize)>,
     pub(super) curvature_solve: CurvatureSolve,
     pub(super) conic: f64,
+    /// Decentre, tilts and order of a break in front of the surface that belongs to it.
+    pub(super) own_break: Option<[f64; 6]>,
+    /// The displacement of the aperture, and its line.
+    pub(super) aperture_offset: Option<(f64, f64, usize)>,
+    /// The lines of the surface as they are.
+    pub(super) lines: Vec<String>,
     /// Parameter and extra-data numbers with their index and line.
     pub(super) parameters: Vec<(usize, f64, usize)>,
     pub(super) extra: Vec<(usize, f64, usize)>,
@@ -130,7 +136,7 @@ pub(super) struct SemiDiameterLine {
 }
 
 /// The medium behind a surface.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub(super) struct GlassLine {
     pub(super) name: String,
     /// 0 catalogue, 1 model, 2 pickup, 3 substitute, 4 offset.

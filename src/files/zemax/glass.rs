@@ -10,8 +10,26 @@ use crate::files::report::ConversionOutcome;
 use crate::lens::Medium;
 use crate::lens::glass::{self, Glass};
 
-/// A medium, the outcome of its import, and the note on it.
-pub(super) type ImportedMedium = (Medium, ConversionOutcome, String);
+/// A medium, and the outcome of its import.
+#[derive(Debug, Clone, PartialEq)]
+pub(in crate::files) struct ImportedMedium {
+    pub(in crate::files) medium: Medium,
+    pub(in crate::files) outcome: ConversionOutcome,
+    /// The substitute or the deviation; the full name of a catalogue glass.
+    pub(in crate::files) note: String,
+    /// The name of a glass that is not known.
+    pub(in crate::files) missing: Option<String>,
+}
+
+impl ImportedMedium {
+    fn used(medium: Medium, note: String) -> Self {
+        Self { medium, outcome: ConversionOutcome::Used, note, missing: None }
+    }
+
+    fn approximated(medium: Medium, note: String) -> Self {
+        Self { medium, outcome: ConversionOutcome::Approximated, note, missing: None }
+    }
+}
 
 /// The medium behind surface `number`.
 pub(super) fn medium(
@@ -24,9 +42,9 @@ pub(super) fn medium(
     for _ in 0..=surfaces.len() {
         let line = surfaces.get(at).and_then(|surface| surface.glass.as_ref());
         match line {
-            None => return Ok((Medium::Air, ConversionOutcome::Used, String::new())),
+            None => return Ok(ImportedMedium::used(Medium::Air, String::new())),
             Some(line) if line.code == 2 => at = line.source.unwrap_or(usize::MAX),
-            Some(line) => return resolve_glass(line, catalogues),
+            Some(line) => return Ok(resolve_glass(line, catalogues)),
         }
     }
     let line = surfaces[number].glass.as_ref().map_or(0, |glass| glass.line);
@@ -34,49 +52,103 @@ pub(super) fn medium(
     Err(malformed_glass(line, found, "a pickup that ends at a glass"))
 }
 
+/// The medium of a glass that a file names without an index, of the first of the makers that has it. Other
+/// characters than letters and digits do not count.
+pub(in crate::files) fn named_medium(name: &str, makers: &[String]) -> ImportedMedium {
+    let line = GlassLine { name: name.to_owned(), ..GlassLine::default() };
+    let found = resolve_glass(&line, makers);
+    let same = match &found.medium {
+        Medium::Glass(full) => glass::find(full).filter(|g| letters(&g.name) == letters(name)),
+        _ => None,
+    };
+    match same {
+        Some(glass) => ImportedMedium::used(found.medium, glass.full_name()),
+        None => found,
+    }
+}
+
+/// The letters and digits of a name, in upper case.
+fn letters(name: &str) -> String {
+    name.chars().filter(char::is_ascii_alphanumeric).flat_map(char::to_uppercase).collect()
+}
+
 fn malformed_glass(line: usize, found: String, expected: &str) -> ParseError {
     ParseError { place: format!("line {line}"), found, expected: expected.to_owned() }
 }
 
-fn resolve_glass(line: &GlassLine, catalogues: &[String]) -> Result<ImportedMedium, ParseError> {
+fn resolve_glass(line: &GlassLine, catalogues: &[String]) -> ImportedMedium {
     let name = line.name.to_ascii_uppercase();
     match (name.as_str(), line.code) {
-        ("MIRROR", _) => return Ok((Medium::Mirror, ConversionOutcome::Used, String::new())),
-        ("AIR" | "", _) => return Ok((Medium::Air, ConversionOutcome::Used, String::new())),
-        (_, 1) => return Ok(model_medium(line)),
-        _ if name.starts_with("___BLANK") => return Ok(model_medium(line)),
+        ("MIRROR", _) => return ImportedMedium::used(Medium::Mirror, String::new()),
+        ("AIR" | "", _) => return ImportedMedium::used(Medium::Air, String::new()),
+        (_, 1) => return model_medium(line),
+        _ if name.starts_with("___BLANK") => return model_medium(line),
         _ => {}
     }
-    let exact = find_in_catalogues(&name, catalogues);
+    let exact = find_in_catalogues(&name, catalogues, line);
     let found = exact.map(|glass| (glass, true)).or_else(|| find_similar(line, catalogues));
     match found {
-        Some((glass, exact)) => Ok(catalogue_medium(line, glass, exact)),
+        Some((glass, exact)) => catalogue_medium(line, glass, exact),
         None => unlisted_medium(line),
     }
 }
 
-/// The glass of this name, in the first of the catalogues that has it, or else in any.
-fn find_in_catalogues(name: &str, catalogues: &[String]) -> Option<&'static Glass> {
-    let listed = catalogues.iter().find_map(|catalogue| {
-        // `OHARA_2021-04` is a version of the catalogue `OHARA`.
-        let maker = catalogue.split(['_', '-']).next().unwrap_or_default();
-        glass::find(&format!("{maker} {name}"))
-    });
-    listed.or_else(|| glass::find(name))
+/// The glass of this name, in the first of the catalogues that has it with the index of the line, or that has
+/// it at all, or else in any.
+fn find_in_catalogues(
+    name: &str,
+    catalogues: &[String],
+    line: &GlassLine,
+) -> Option<&'static Glass> {
+    let listed = || {
+        catalogues.iter().filter_map(|catalogue| {
+            // `OHARA_2021-04` is a version of the catalogue `OHARA`.
+            let maker = catalogue.split(['_', '-']).next().unwrap_or_default();
+            glass::find(&format!("{maker} {name}"))
+        })
+    };
+    // Several of them may have a glass of this name: index and Abbe number on the line
+    // decide.
+    let agrees = |glass: &&Glass| !is_placeholder(line) && (glass.nd - line.nd).abs() < 5e-5;
+    let off = |glass: &&Glass| (glass.vd - line.vd).abs();
+    let nearest = listed().filter(agrees).min_by(|a, b| off(a).total_cmp(&off(b)));
+    nearest.or_else(|| listed().next()).or_else(|| glass::find(name))
 }
 
 /// Prefixes of glasses that replaced older ones.
 const PREFIXES: [&str; 5] = ["N-", "S-", "H-", "E-", "J-"];
 
+/// Other names of materials.
+const OTHER_NAMES: [(&str, &str); 8] = [
+    ("C79-80", "FUSED_SILICA SILICA"),
+    ("F_SILICA", "FUSED_SILICA SILICA"),
+    ("FUSED_SILICA", "FUSED_SILICA SILICA"),
+    ("ACRYLIC", "PLASTIC PMMA"),
+    ("POLYCARB", "PLASTIC POLYCARBONATE"),
+    ("PC", "PLASTIC POLYCARBONATE"),
+    ("POLYSTYR", "PLASTIC POLYSTYRENE"),
+    ("STYRENE", "PLASTIC POLYSTYRENE"),
+];
+
 /// A glass of a similar name, provided that the index on the line, if any, agrees.
 fn find_similar(line: &GlassLine, catalogues: &[String]) -> Option<(&'static Glass, bool)> {
     let name = line.name.to_ascii_uppercase();
-    let with = |prefix: &&str| find_in_catalogues(&format!("{prefix}{name}"), catalogues);
-    let letters = |name: &str| -> String {
-        name.chars().filter(char::is_ascii_alphanumeric).flat_map(char::to_uppercase).collect()
+    let with = |prefix: &&str| find_in_catalogues(&format!("{prefix}{name}"), catalogues, line);
+    let alike = |g: &&Glass| letters(&g.name) == letters(&name);
+    let listed = |g: &&Glass| catalogues.contains(&g.manufacturer);
+    let spelled = || {
+        let own = glass::known().filter(alike).find(listed);
+        own.or_else(|| glass::known().find(alike))
     };
-    let spelled = || glass::catalogue().iter().find(|g| letters(&g.name) == letters(&name));
-    let found = PREFIXES.iter().find_map(with).or_else(spelled)?;
+    let renamed = || OTHER_NAMES.iter().find(|(other, _)| *other == name);
+    // `L-TIM28_MOLD` is `L-TIM28` after moulding.
+    let treated = || find_in_catalogues(name.split_once('_')?.0, catalogues, line);
+    let found = PREFIXES
+        .iter()
+        .find_map(with)
+        .or_else(spelled)
+        .or_else(|| renamed().and_then(|(_, glass)| glass::find(glass)))
+        .or_else(treated)?;
     let agrees = is_placeholder(line) || (found.nd - line.nd).abs() < 1e-3;
     agrees.then_some((found, false))
 }
@@ -93,10 +165,10 @@ fn model_medium(line: &GlassLine) -> ImportedMedium {
         Medium::Model { nd: line.nd, vd: line.vd }
     };
     if line.partial == 0.0 {
-        (medium, ConversionOutcome::Used, String::new())
+        ImportedMedium::used(medium, String::new())
     } else {
         let note = "the deviation of the partial dispersion is taken as 0";
-        (medium, ConversionOutcome::Approximated, note.to_owned())
+        ImportedMedium::approximated(medium, note.to_owned())
     }
 }
 
@@ -106,43 +178,58 @@ fn catalogue_medium(line: &GlassLine, glass: &Glass, exact: bool) -> ImportedMed
     if line.code == 4 && line.offsets != (0.0, 0.0) {
         let (nd, vd) = (glass.nd + line.offsets.0, glass.vd + line.offsets.1);
         let note = format!("{full} with its offsets as the model glass nd {nd}, vd {vd}");
-        return (Medium::Model { nd, vd }, ConversionOutcome::Approximated, note);
+        return ImportedMedium::approximated(Medium::Model { nd, vd }, note);
     }
     let medium = Medium::Glass(full.clone());
     if !exact {
         let note = format!("{full} in place of {}", line.name);
-        return (medium, ConversionOutcome::Approximated, note);
+        return ImportedMedium::approximated(medium, note);
     }
     let far = !is_placeholder(line) && (glass.nd - line.nd).abs() > 5e-4;
     if far {
         let note = format!("{full} has nd {}, the file says {}", glass.nd, line.nd);
-        return (medium, ConversionOutcome::Approximated, note);
+        return ImportedMedium::approximated(medium, note);
     }
-    (medium, ConversionOutcome::Used, full)
+    ImportedMedium::used(medium, full)
 }
 
-/// A glass that no catalogue has, by the index on its line or by the six-digit code of its name.
-fn unlisted_medium(line: &GlassLine) -> Result<ImportedMedium, ParseError> {
-    let numbers =
-        if is_placeholder(line) { six_digit_code(&line.name) } else { Some((line.nd, line.vd)) };
-    let Some((nd, vd)) = numbers else {
-        let similar = glass::similar_names(&line.name);
-        let hint = if similar.is_empty() {
-            String::new()
-        } else {
-            format!("; similar names: {}", similar.join(", "))
-        };
-        let found = format!("the unknown glass `{}` without an index on its line", line.name);
-        let expected = format!("a catalogue glass, or one with nd and vd{hint}");
-        return Err(malformed_glass(line.line, found, &expected));
+/// The index and the Abbe number of a glass of which the file says nothing: those of N-BK7, the most
+/// common one.
+const UNKNOWN: (f64, f64) = (1.5168, 64.17);
+
+/// A glass that no catalogue has, by the index on its line, by the six-digit code of its name, or by
+/// those of the most common glass.
+fn unlisted_medium(line: &GlassLine) -> ImportedMedium {
+    let stated = (!is_placeholder(line)).then_some((line.nd, line.vd));
+    let code = six_digit_code(&line.name);
+    let name = &line.name;
+    let Some((nd, vd)) = stated.or(code) else {
+        let (nd, vd) = UNKNOWN;
+        let note = format!(
+            "no catalogue has {name} and the line has no index: nd {nd}, vd {vd} in its place{}",
+            similar(name)
+        );
+        let (medium, outcome) = (Medium::Model { nd, vd }, ConversionOutcome::Dropped);
+        return ImportedMedium { medium, outcome, note, missing: Some(name.clone()) };
     };
+    // Fictitious glasses are what their code says.
+    let missing = (stated.is_some() && code.is_none()).then(|| name.clone());
     let medium = if vd == 0.0 { Medium::Index(nd) } else { Medium::Model { nd, vd } };
-    let note = format!("no catalogue has {}: the model glass nd {nd}, vd {vd}", line.name);
-    Ok((medium, ConversionOutcome::Approximated, note))
+    let nearest = glass::nearest(nd, vd).map(Glass::full_name).unwrap_or_default();
+    let note = format!(
+        "no catalogue has {name}: the model glass nd {nd}, vd {vd}; the nearest glass is {nearest}"
+    );
+    ImportedMedium { missing, ..ImportedMedium::approximated(medium, note) }
+}
+
+/// Similar names, as the end of a sentence.
+fn similar(name: &str) -> String {
+    let names = glass::similar_names(name);
+    if names.is_empty() { String::new() } else { format!("; similar names: {}", names.join(", ")) }
 }
 
 /// True for materials without a maker: crystals, fused silica, plastics.
-pub(super) fn is_general(glass: &Glass) -> bool {
+pub(in crate::files) fn is_general(glass: &Glass) -> bool {
     matches!(glass.manufacturer.as_str(), "CRYSTAL" | "PLASTIC" | "FUSED_SILICA")
 }
 
@@ -187,52 +274,60 @@ mod tests {
 
     #[test]
     fn names_are_found_in_the_catalogues() {
-        let (medium, outcome, _) = found(line("N-BK7", 0, 1.5, 40.0)).unwrap();
-        assert_eq!((medium, outcome), (glass("SCHOTT N-BK7"), ConversionOutcome::Used));
-        let (medium, outcome, note) = found(line("BK7", 0, 1.5168, 64.17)).unwrap();
-        assert_eq!((medium, outcome), (glass("SCHOTT N-BK7"), ConversionOutcome::Approximated));
-        assert_eq!(note, "SCHOTT N-BK7 in place of BK7");
-        let (medium, ..) = found(line("n-bk7", 3, 0.0, 0.0)).unwrap();
-        assert_eq!(medium, glass("SCHOTT N-BK7"));
+        let bk7 = found(line("N-BK7", 0, 1.5, 40.0)).unwrap();
+        assert_eq!((bk7.medium, bk7.outcome), (glass("SCHOTT N-BK7"), ConversionOutcome::Used));
+        let bk7 = found(line("BK7", 0, 1.5168, 64.17)).unwrap();
+        let expected = (glass("SCHOTT N-BK7"), ConversionOutcome::Approximated);
+        assert_eq!((bk7.medium, bk7.outcome), expected);
+        assert_eq!(bk7.note, "SCHOTT N-BK7 in place of BK7");
+        assert_eq!(found(line("n-bk7", 3, 0.0, 0.0)).unwrap().medium, glass("SCHOTT N-BK7"));
         // An old name whose index differs from that of the new glass is a model glass.
-        let (medium, ..) = found(line("BK7", 0, 1.6, 60.0)).unwrap();
-        assert_eq!(medium, Medium::Model { nd: 1.6, vd: 60.0 });
+        let other = found(line("BK7", 0, 1.6, 60.0)).unwrap();
+        assert_eq!(other.medium, Medium::Model { nd: 1.6, vd: 60.0 });
+        for (name, expected) in [
+            ("J-LAK02", "HIKARI J-LAK02"),
+            ("B270", "SCHOTT B270"),
+            ("C79-80", "FUSED_SILICA SILICA"),
+            ("L-TIM28_MOLD", "OHARA L-TIM28"),
+        ] {
+            let found = found(line(name, 0, 0.0, 0.0)).unwrap();
+            assert_eq!((found.medium, found.missing), (glass(expected), None));
+        }
     }
 
     #[test]
     fn models_mirrors_and_codes_are_what_they_say() {
         assert_eq!(
-            found(line("___BLANK", 1, 1.6, 36.0)).unwrap().0,
+            found(line("___BLANK", 1, 1.6, 36.0)).unwrap().medium,
             Medium::Model { nd: 1.6, vd: 36.0 }
         );
-        assert_eq!(found(line("___BLANK", 1, 1.33, 0.0)).unwrap().0, Medium::Index(1.33));
-        assert_eq!(found(line("MIRROR", 0, 1.5, 40.0)).unwrap().0, Medium::Mirror);
+        assert_eq!(found(line("___BLANK", 1, 1.33, 0.0)).unwrap().medium, Medium::Index(1.33));
+        assert_eq!(found(line("MIRROR", 0, 1.5, 40.0)).unwrap().medium, Medium::Mirror);
         for name in ["517642", "517.642"] {
             assert_eq!(
-                found(line(name, 0, 0.0, 0.0)).unwrap().0,
+                found(line(name, 0, 0.0, 0.0)).unwrap().medium,
                 Medium::Model { nd: 1.517, vd: 64.2 }
             );
         }
         let mut shifted = line("N-BK7", 4, 0.0, 0.0);
         shifted.offsets = (0.001, 0.2);
-        let (medium, outcome, _) = found(shifted).unwrap();
+        let shifted = found(shifted).unwrap();
         let bk7 = glass::find("N-BK7").unwrap();
-        assert_eq!(medium, Medium::Model { nd: bk7.nd + 0.001, vd: bk7.vd + 0.2 });
-        assert_eq!(outcome, ConversionOutcome::Approximated);
+        assert_eq!(shifted.medium, Medium::Model { nd: bk7.nd + 0.001, vd: bk7.vd + 0.2 });
+        assert_eq!(shifted.outcome, ConversionOutcome::Approximated);
     }
 
     #[test]
-    fn an_unknown_glass_needs_an_index() {
-        let (medium, outcome, note) = found(line("XYZ-9", 0, 1.7, 30.0)).unwrap();
-        assert_eq!(
-            (medium, outcome),
-            (Medium::Model { nd: 1.7, vd: 30.0 }, ConversionOutcome::Approximated)
-        );
-        assert!(note.contains("no catalogue has XYZ-9"));
+    fn an_unknown_glass_has_the_index_of_its_line_or_a_stated_substitute() {
+        let known = found(line("XYZ-9", 0, 1.7, 30.0)).unwrap();
+        assert_eq!(known.medium, Medium::Model { nd: 1.7, vd: 30.0 });
+        assert_eq!(known.outcome, ConversionOutcome::Approximated);
+        assert!(known.note.contains("no catalogue has XYZ-9"), "{}", known.note);
         for (nd, vd) in [(1.5, 40.0), (0.0, 0.0)] {
-            let error = found(line("XYZ-9", 0, nd, vd)).unwrap_err();
-            assert_eq!(error.place, "line 9");
-            assert!(error.found.contains("`XYZ-9`"));
+            let unknown = found(line("XYZ-9", 0, nd, vd)).unwrap();
+            assert_eq!(unknown.medium, Medium::Model { nd: 1.5168, vd: 64.17 });
+            assert_eq!(unknown.outcome, ConversionOutcome::Dropped);
+            assert_eq!(unknown.missing.as_deref(), Some("XYZ-9"));
         }
     }
 
@@ -245,7 +340,7 @@ mod tests {
         let end =
             ZemaxSurface { glass: Some(line("N-BK7", 0, 0.0, 0.0)), ..ZemaxSurface::default() };
         let surfaces = [pickup(1), pickup(2), end];
-        assert_eq!(medium(&surfaces, 0, &[]).unwrap().0, glass("SCHOTT N-BK7"));
+        assert_eq!(medium(&surfaces, 0, &[]).unwrap().medium, glass("SCHOTT N-BK7"));
         let circle = [pickup(1), pickup(0)];
         assert!(medium(&circle, 0, &[]).unwrap_err().found.contains("form a circle"));
     }

@@ -4,15 +4,17 @@
 //! The report lists every line of a file as used, approximated, preserved or dropped.
 
 mod build;
-mod coordinate_breaks;
+mod even_fit;
 mod file;
 mod glass;
 mod gradient;
 mod line;
 mod parse;
+mod row_plan;
 mod shape;
 mod write;
 
+pub(super) use glass::{ImportedMedium, is_general, named_medium};
 pub use write::write;
 
 use super::error::{FileError, ParseError};

@@ -56,6 +56,7 @@ impl Lens {
             Edit::AddVariable(variable) => self.add_variable(*variable)?,
             Edit::RemoveVariable(parameter) => self.variables.retain(|v| v.parameter != *parameter),
             Edit::SetVariables(variables) => self.variables.clone_from(variables),
+            Edit::SetTolerances(sheet) => self.tolerances.clone_from(sheet),
             Edit::SetPickup(pickup) => self.set_pickup(*pickup),
             Edit::RemovePickup(follower) => self.pickups.retain(|p| p.parameter != *follower),
             Edit::InsertZoom { at, position } => self.insert_zoom(*at, position)?,

@@ -161,11 +161,7 @@ fn remove(lens: &mut Lens, surface: usize) -> Result<(), EditError> {
     }
     let inner: f64 = lens.surfaces[first..last].iter().map(|row| row.thickness).sum();
     let joined = |lens: &Lens, front: usize, zoom: Option<usize>| {
-        let gap = |row: usize| {
-            let own = zoom.and_then(|zoom| lens.thickness_at(row, zoom));
-            own.unwrap_or(lens.surfaces[row].thickness)
-        };
-        gap(front) + inner + gap(last)
+        gap_at(lens, front, zoom) + inner + gap_at(lens, last, zoom)
     };
     if let Some(front) = first.checked_sub(1) {
         let written = joined(lens, front, None);
@@ -178,6 +174,12 @@ fn remove(lens: &mut Lens, surface: usize) -> Result<(), EditError> {
         lens.surfaces[front].thickness = written;
     }
     (first..=last).rev().try_for_each(|row| rows::remove(lens, row))
+}
+
+/// The thickness behind a surface, at a zoom position if one is given.
+fn gap_at(lens: &Lens, row: usize, zoom: Option<usize>) -> f64 {
+    let own = zoom.and_then(|zoom| lens.thickness_at(row, zoom));
+    own.unwrap_or(lens.surfaces[row].thickness)
 }
 
 /// Moves the element of a surface along the axis by some millimetres, towards the image if positive.

@@ -16,7 +16,7 @@ pub use error::EditError;
 
 use super::{
     Aperture, Fields, Goal, Lens, Medium, Object, Parameter, Pickup, Quantity, Row, SurfaceNumber,
-    Variable, Wavelength, ZoomPosition,
+    ToleranceSheet, Variable, Wavelength, ZoomPosition,
 };
 use serde::{Deserialize, Serialize};
 
@@ -120,6 +120,8 @@ pub enum Edit {
     RemoveVariable(Parameter),
     /// Replaces all variables.
     SetVariables(Vec<Variable>),
+    /// Replaces the tolerances; `None` removes them.
+    SetTolerances(Option<ToleranceSheet>),
     /// Makes a parameter follow another one.
     SetPickup(Pickup),
     /// Removes the pickup of a parameter, which keeps its value.
@@ -229,6 +231,7 @@ impl Edit {
             Self::AddVariable(variable) => format!("add the variable {}", variable.parameter),
             Self::RemoveVariable(parameter) => format!("remove the variable {parameter}"),
             Self::SetVariables(_) => "variables".to_owned(),
+            Self::SetTolerances(_) => "tolerances".to_owned(),
             Self::SetPickup(pickup) => format!("pickup of the {}", pickup.parameter),
             Self::RemovePickup(parameter) => format!("remove the pickup of the {parameter}"),
             Self::InsertZoom { at, .. } => format!("insert zoom position {}", at + 1),

@@ -28,6 +28,9 @@ pub(super) fn scale(lens: &mut Lens, factor: f64) -> Result<(), EditError> {
         row.semi_diameter = row.semi_diameter.map(|sd| sd * factor);
         row.obstruction = row.obstruction.map(|inner| inner * factor);
         row.decenter = row.decenter.map(|length| length * factor);
+        for axis in [&mut row.break_before, &mut row.break_after].into_iter().flatten() {
+            axis.decenter = axis.decenter.map(|length| length * factor);
+        }
         for (term, a) in row.asphere.iter_mut().enumerate() {
             *a *= factor.powi(-(2 * term as i32 + 3));
         }
@@ -91,7 +94,7 @@ fn scale_bounds_and_pickups(lens: &mut Lens, factor: f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lens::{FieldPoint, blank};
+    use crate::lens::{AxisBreak, FieldPoint, blank};
 
     #[test]
     fn heights_of_fields_and_decentres_are_lengths_and_angles_are_not() {
@@ -99,13 +102,16 @@ mod tests {
             let mut lens = blank();
             let values = vec![FieldPoint { x: -1.5, y: 3.0, weight: 0.5 }];
             lens.fields = Fields { kind, values };
-            lens.surfaces =
-                vec![Row { decenter: [0.25, -0.5], tilt: [1.0, 2.0], ..Row::default() }];
+            let axis = AxisBreak { decenter: [0.5, 0.0, -1.0], tilt: [45.0, 0.0, 0.0] };
+            let (decenter, tilt, break_after) = ([0.25, -0.5], [1.0, 2.0], Some(axis));
+            lens.surfaces = vec![Row { decenter, tilt, break_after, ..Row::default() }];
             scale(&mut lens, 4.0).unwrap();
             let field = lens.fields.values[0];
             assert_eq!([field.x, field.y, field.weight], [-1.5 * factor, 3.0 * factor, 0.5]);
             assert_eq!(lens.surfaces[0].decenter, [1.0, -2.0]);
             assert_eq!(lens.surfaces[0].tilt, [1.0, 2.0]);
+            let scaled = AxisBreak { decenter: [2.0, 0.0, -4.0], ..axis };
+            assert_eq!(lens.surfaces[0].break_after, Some(scaled));
         }
     }
 }

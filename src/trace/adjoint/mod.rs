@@ -303,36 +303,50 @@ impl<R: Real> Tracer<R> {
         (landings, self.landing_slopes(rays, selected))
     }
 
-    /// The derivatives of x and y of the landings by the selected parameters of the system, as by
-    /// [`Tracer::jacobian`].
+    /// The derivatives of x and y of the landings alone, as [`Tracer::jacobian`] gives them.
     pub fn landing_slopes(
         &self,
         rays: &Rays<R>,
         selected: &[(Option<usize>, SurfaceParameter)],
     ) -> Vec<R> {
-        let places = ColumnPlaces::new(selected, self.surfaces());
-        let row = 2 * selected.len();
-        let mut matrix = vec![R::ZERO; row * rays.len()];
-        let mut distances = vec![[R::ZERO; BLOCK]; self.surfaces()];
-        let mut columns = vec![[R::ZERO; BLOCK]; row];
         let x =
             AdjointSeed { point: Vec3::new(R::ONE, R::ZERO, R::ZERO), ..AdjointSeed::default() };
         let y =
             AdjointSeed { point: Vec3::new(R::ZERO, R::ONE, R::ZERO), ..AdjointSeed::default() };
+        let seed = |number: usize, _ray: usize| if number == 0 { x } else { y };
+        self.slopes_of_rays(rays, selected, 2, seed)
+    }
+
+    /// The derivatives of `count` numbers of each ray by the selected parameters: for each ray those
+    /// of its first number, then those of the next; zeros for a lost ray. `seed` gives the derivatives
+    /// of a number by the landing of a ray.
+    pub fn slopes_of_rays(
+        &self,
+        rays: &Rays<R>,
+        selected: &[(Option<usize>, SurfaceParameter)],
+        count: usize,
+        seed: impl Fn(usize, usize) -> AdjointSeed<R>,
+    ) -> Vec<R> {
+        let places = ColumnPlaces::new(selected, self.surfaces());
+        let row = count * selected.len();
+        let mut matrix = vec![R::ZERO; row * rays.len()];
+        let mut distances = vec![[R::ZERO; BLOCK]; self.surfaces()];
+        let mut columns = vec![[R::ZERO; BLOCK]; row];
         run_vectorized(
             SimdWidth::detect(),
             #[inline(always)]
             || {
                 for from in (0..rays.len()).step_by(BLOCK) {
-                    let count = BLOCK.min(rays.len() - from);
-                    let block = self.forward(rays, from, count, &mut distances);
+                    let lanes = BLOCK.min(rays.len() - from);
+                    let block = self.forward(rays, from, lanes, &mut distances);
                     columns.fill([R::ZERO; BLOCK]);
-                    let (of_x, of_y) = columns.split_at_mut(selected.len());
-                    let mut rows = JacobianColumns { places: &places, columns: of_x };
-                    self.backward(block.clone(), &distances, count, &|_| x, &mut rows);
-                    let mut rows = JacobianColumns { places: &places, columns: of_y };
-                    self.backward(block, &distances, count, &|_| y, &mut rows);
-                    for j in 0..count {
+                    for number in 0..count {
+                        let columns = &mut columns[number * selected.len()..][..selected.len()];
+                        let mut rows = JacobianColumns { places: &places, columns };
+                        let seed = |j: usize| seed(number, from + j);
+                        self.backward(block.clone(), &distances, lanes, &seed, &mut rows);
+                    }
+                    for j in 0..lanes {
                         let to = &mut matrix[(from + j) * row..(from + j + 1) * row];
                         to.iter_mut().zip(&columns).for_each(|(to, column)| *to = column[j]);
                     }

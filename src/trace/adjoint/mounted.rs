@@ -28,7 +28,7 @@ impl<R: Real> Tracer<R> {
         let interface = &self.interfaces[i];
         // The gap in front belongs to the frame of the centred vertex.
         let own = Interface { gap: R::ZERO, ..*interface };
-        adjoint.enter(&mount.pose);
+        adjoint.enter(&mount.behind);
         match mount.astigmatism {
             None => adjoint.retrace_surface(&own, None),
             Some(q) => adjoint.retrace_irregular(&own, q),
@@ -39,7 +39,7 @@ impl<R: Real> Tracer<R> {
 }
 
 impl<R: Real> AdjointBlock<R> {
-    /// Turns the block into the own frame of a surface.
+    /// Turns the block from the frame behind a surface into its own.
     fn enter(&mut self, pose: &Pose<R>) {
         for j in 0..BLOCK {
             let (p, k) = self.block.state(j);

@@ -92,7 +92,10 @@ fn a_failed_write_leaves_the_existing_file() {
     let error = files::save(&lens, folder.join("no/such/folder/a.json")).unwrap_err();
     assert!(error.to_string().contains("cannot be written"), "{error}");
     let error = files::save(&lens, folder.join("a.doc")).unwrap_err().to_string();
-    assert!(error.contains("found the extension `doc`; expected `.json` or `.zmx`"), "{error}");
+    assert!(
+        error.contains("found the extension `doc`; expected `.json`, `.zmx` or `.seq`"),
+        "{error}"
+    );
 
     let occupied = folder.join("folder.json");
     fs::create_dir(&occupied).unwrap();

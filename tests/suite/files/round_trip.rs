@@ -1,6 +1,6 @@
 //! A lens that is written and read again is identical, to the last bit.
 
-use super::{FOREIGN, folder, foreign};
+use super::{FOREIGN, ROUNDED, folder, foreign};
 use aplanat::files::{self, ConversionOutcome, json};
 use aplanat::lens::{
     Aperture, FieldKind, FieldPoint, Fields, Lens, Medium, Object, Parameter, Pickup, Quantity, Row,
@@ -58,6 +58,24 @@ fn every_foreign_file_round_trips() {
         assert_eq!(json::write(&back), json::write(&lens), "{name}");
         let through = files::parse(json::write(&lens).as_bytes(), "a.json").unwrap().lens;
         assert_eq!(through, lens, "{name}");
+    }
+    fs::remove_dir_all(folder).unwrap();
+}
+
+#[test]
+fn rounded_files_trace_alike_in_every_format() {
+    let folder = folder("rounded");
+    for name in ROUNDED {
+        let lens = files::parse(&foreign(name), name).unwrap().lens;
+        let through = files::parse(json::write(&lens).as_bytes(), "a.json").unwrap().lens;
+        assert_eq!(through, lens, "{name}");
+        for target in ["a.zmx", "a.seq"] {
+            let proof = match files::save(&lens, folder.join(target)) {
+                Ok(saved) => saved.proof.unwrap(),
+                Err(error) => panic!("{name} as {target}: {error}"),
+            };
+            assert!(proof.imaged > 0 && proof.worst_mm < 1e-10, "{name}: {proof:?}");
+        }
     }
     fs::remove_dir_all(folder).unwrap();
 }

@@ -55,6 +55,9 @@ fn grin_invalid_volumes_name_the_place() {
     let text = refusal("lens.json", br#"{"aplanat_volume": 1, "size": 3}"#);
     assert!(text.contains("line 1") && text.contains("the unknown key `size`"), "{text}");
     assert!(refusal("lens.zmx", b"VERS 1").contains("the header of a volume"));
+    assert!(refusal("lens.zmx", b"VERS 1").contains("the text `VERS 1`"));
+    let text = refusal("lens.zmx", b"VE\x00\x01");
+    assert!(text.contains("the bytes [56, 45, 00, 01]"), "{text}");
     let header = |counts: &str, spacing: &str| {
         format!(
             r#"{{"aplanat_volume": 1, "counts": {counts}, "low": [0, 0, 0], "spacing": {spacing},

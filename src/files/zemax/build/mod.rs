@@ -9,7 +9,8 @@ mod solve;
 mod zoom;
 
 use super::file::ZemaxFile;
-use super::{coordinate_breaks, glass, gradient};
+use super::row_plan::{RowPlan, is_break};
+use super::{glass, gradient};
 use crate::files::error::ParseError;
 use crate::files::report::{ConversionOutcome, ConversionReport};
 use crate::lens::{Lens, Medium, Object, Row};
@@ -17,11 +18,12 @@ use crate::lens::{Lens, Medium, Object, Row};
 /// Builds the lens; the report receives everything that cannot be represented.
 pub(super) fn build(file: &ZemaxFile, report: &mut ConversionReport) -> Result<Lens, ParseError> {
     check_complete(file)?;
-    coordinate_breaks::check_breaks(&file.surfaces)?;
-    let stop = stop(file)?;
+    let plan = RowPlan::new(&file.surfaces);
+    report_breaks(file, report);
+    let stop = stop(file, &plan, report)?;
     let object = object(file)?;
     let object_medium = object_medium(file, report)?;
-    let surfaces = rows(file, stop, report)?;
+    let surfaces = rows(file, &plan, stop, report)?;
     let aperture = beam::aperture(file, stop, &object_medium)?;
     let (name, source, notes, zoom_names) = split_notes(file);
     let mut lens = Lens {
@@ -42,8 +44,8 @@ pub(super) fn build(file: &ZemaxFile, report: &mut ConversionReport) -> Result<L
         tolerances: None,
     };
     report_image(file, report);
-    zoom::add_positions(file, &mut lens, &zoom_names, report)?;
-    solve::add_solves(file, &mut lens, report);
+    zoom::add_positions(file, &plan, &mut lens, &zoom_names, report)?;
+    solve::add_solves(file, &plan, &mut lens, report);
     beam::infinite_f_number(file, &mut lens, report);
     Ok(lens)
 }
@@ -68,8 +70,9 @@ fn check_complete(file: &ZemaxFile) -> Result<(), ParseError> {
         let found = format!("a thickness of {thickness} behind the last surface");
         return wrong(line, found, "an image with thickness 0; is the file truncated?");
     }
-    if surfaces.len() < 3 {
-        let found = format!("{} surfaces", surfaces.len());
+    let solid = surfaces.iter().filter(|surface| !is_break(surface)).count();
+    if solid < 3 || [surfaces.first(), surfaces.last()].into_iter().flatten().any(is_break) {
+        let found = format!("{solid} surfaces");
         let line = surfaces.last().map_or(1, |surface| surface.line);
         return wrong(line, found, "an object, at least one surface, and an image");
     }
@@ -77,7 +80,11 @@ fn check_complete(file: &ZemaxFile) -> Result<(), ParseError> {
 }
 
 /// The surface of the file that is the stop.
-fn stop(file: &ZemaxFile) -> Result<usize, ParseError> {
+fn stop(
+    file: &ZemaxFile,
+    plan: &RowPlan,
+    report: &mut ConversionReport,
+) -> Result<usize, ParseError> {
     let surfaces = &file.surfaces;
     let numbered = surfaces.iter().enumerate();
     let mut stops = numbered.filter_map(|(number, surface)| Some((number, surface.stop?)));
@@ -98,7 +105,14 @@ fn stop(file: &ZemaxFile) -> Result<usize, ParseError> {
     if stop == 0 || stop + 1 == surfaces.len() {
         return wrong(format!("line {line}"), format!("STOP on surface {stop}"));
     }
-    Ok(stop)
+    if plan.row(stop).is_some() {
+        return Ok(stop);
+    }
+    let next = plan.rows.iter().map(|row| row.surface).find(|surface| *surface > stop);
+    let surface = next.or(plan.rows.last().map(|row| row.surface)).unwrap_or(stop);
+    let note = format!("on a coordinate break; surface {surface} is the stop in its place");
+    report.amend(line, ConversionOutcome::Approximated, note);
+    Ok(surface)
 }
 
 /// Object distances from this on are infinite.
@@ -118,39 +132,50 @@ fn object(file: &ZemaxFile) -> Result<Object, ParseError> {
 }
 
 fn object_medium(file: &ZemaxFile, report: &mut ConversionReport) -> Result<Medium, ParseError> {
-    let (medium, outcome, note) = glass::medium(&file.surfaces, 0, &file.catalogues)?;
-    if let Some(glass) = &file.surfaces[0].glass {
-        if medium == Medium::Mirror {
-            report.amend(glass.line, ConversionOutcome::Dropped, "the object cannot be a mirror");
+    let glass = glass::medium(&file.surfaces, 0, &file.catalogues)?;
+    if let Some(line) = &file.surfaces[0].glass {
+        if glass.medium == Medium::Mirror {
+            report.amend(line.line, ConversionOutcome::Dropped, "the object cannot be a mirror");
             return Ok(Medium::Air);
         }
-        report.amend(glass.line, outcome, note);
+        report.amend(line.line, glass.outcome, glass.note);
     }
-    Ok(medium)
+    Ok(glass.medium)
 }
 
 fn rows(
     file: &ZemaxFile,
+    plan: &RowPlan,
     stop: usize,
     report: &mut ConversionReport,
 ) -> Result<Vec<Row>, ParseError> {
-    // The medium of the current gap; a coordinate break has the same on both sides.
-    let mut gap = Medium::Air;
-    let mut rows = Vec::with_capacity(file.surfaces.len() - 2);
-    for number in 1..file.surfaces.len() - 1 {
-        let (medium, outcome, note) = glass::medium(&file.surfaces, number, &file.catalogues)?;
-        if let Some(glass) = &file.surfaces[number].glass {
-            report.amend(glass.line, outcome, note);
+    let mut rows = Vec::with_capacity(plan.rows.len());
+    for planned in &plan.rows {
+        let number = planned.surface;
+        let glass = glass::medium(&file.surfaces, number, &file.catalogues)?;
+        if let Some(line) = &file.surfaces[number].glass {
+            report.amend(line.line, glass.outcome, glass.note.clone());
         }
-        let medium =
-            if coordinate_breaks::is_break(&file.surfaces[number]) { gap.clone() } else { medium };
-        let medium = gradient::medium(&file.surfaces[number], file.unit).unwrap_or(medium);
-        if medium != Medium::Mirror {
-            gap = medium.clone();
+        let medium = gradient::medium(&file.surfaces[number], file.unit).unwrap_or(glass.medium);
+        let mut row = row::row(file, planned, stop, medium, report)?;
+        if let (Some(name), true) = (glass.missing, row.comment.is_empty()) {
+            row.comment = format!("glass {name} is not known");
         }
-        rows.push(row::row(file, number, stop, medium, report)?);
+        rows.push(row);
     }
     Ok(rows)
+}
+
+/// Reports the coordinate breaks, which become breaks of the axis.
+fn report_breaks(file: &ZemaxFile, report: &mut ConversionReport) {
+    for surface in file.surfaces.iter().filter(|surface| is_break(surface)) {
+        report.amend(surface.kind.1, ConversionOutcome::Used, "a break of the axis");
+        let clip = surface.clip.map(|(_, line)| line);
+        let lines = [surface.glass.as_ref().map(|glass| glass.line), clip];
+        for line in lines.into_iter().flatten() {
+            report.amend(line, ConversionOutcome::Preserved, "on a coordinate break");
+        }
+    }
 }
 
 /// Reports the properties of object and image that are lost, since both are planes here.

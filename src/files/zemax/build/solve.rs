@@ -3,22 +3,30 @@
 use crate::files::report::{ConversionOutcome, ConversionReport};
 use crate::files::zemax::file::{CurvatureSolve, PickupLine, ZemaxFile, ZemaxSurface};
 use crate::files::zemax::gradient;
+use crate::files::zemax::row_plan::RowPlan;
 use crate::lens::{Lens, Parameter, Pickup, Quantity, Variable};
 
 /// Adds variables, pickups and the focus solve to the lens.
-pub(super) fn add_solves(file: &ZemaxFile, lens: &mut Lens, report: &mut ConversionReport) {
-    for row in 0..lens.surfaces.len() {
-        let surface = &file.surfaces[row + 1];
-        add_focus_solve(surface, row, lens, report);
+pub(super) fn add_solves(
+    file: &ZemaxFile,
+    plan: &RowPlan,
+    lens: &mut Lens,
+    report: &mut ConversionReport,
+) {
+    for (row, planned) in plan.rows.iter().enumerate() {
+        let surface = &file.surfaces[planned.surface];
+        add_focus_solve(&file.surfaces[planned.gap], row, lens, report);
         match surface.curvature_solve {
             CurvatureSolve::Fixed => {}
             CurvatureSolve::Variable => add_variable(lens, row, Quantity::Curvature),
             CurvatureSolve::Pickup(line) => {
                 let offset = line.offset / file.unit;
-                add_pickup(lens, row, Quantity::Curvature, PickupLine { offset, ..line }, report);
+                let parameter = Parameter::new(row, Quantity::Curvature);
+                let source = plan.row(line.surface);
+                add_pickup(lens, parameter, source, PickupLine { offset, ..line }, report);
             }
         }
-        thickness(file, row, lens, report);
+        thickness(file, plan, row, lens, report);
         if surface.variable_conic.is_some() {
             add_variable(lens, row, Quantity::Conic);
         }
@@ -60,8 +68,14 @@ fn add_variable(lens: &mut Lens, surface: usize, quantity: Quantity) {
     }
 }
 
-fn thickness(file: &ZemaxFile, row: usize, lens: &mut Lens, report: &mut ConversionReport) {
-    let surface = &file.surfaces[row + 1];
+fn thickness(
+    file: &ZemaxFile,
+    plan: &RowPlan,
+    row: usize,
+    lens: &mut Lens,
+    report: &mut ConversionReport,
+) {
+    let surface = &file.surfaces[plan.rows[row].gap];
     let solved = lens.image_solve.is_some() && row + 1 == lens.surfaces.len();
     if solved {
         let pickup = surface.thickness_pickup.map(|pickup| pickup.line);
@@ -73,7 +87,8 @@ fn thickness(file: &ZemaxFile, row: usize, lens: &mut Lens, report: &mut Convers
     }
     if let Some(line) = surface.thickness_pickup {
         let offset = line.offset * file.unit;
-        add_pickup(lens, row, Quantity::Thickness, PickupLine { offset, ..line }, report);
+        let parameter = Parameter::new(row, Quantity::Thickness);
+        add_pickup(lens, parameter, plan.gap(line.surface), PickupLine { offset, ..line }, report);
         return;
     }
     let Some((low, high, line)) = surface.variable_thickness else { return };
@@ -105,13 +120,12 @@ fn terms(surface: &ZemaxSurface, row: usize, lens: &mut Lens, report: &mut Conve
 /// Adds a pickup if it yields the present value; else the present value is used.
 fn add_pickup(
     lens: &mut Lens,
-    row: usize,
-    quantity: Quantity,
+    parameter: Parameter,
+    source: Option<usize>,
     line: PickupLine,
     report: &mut ConversionReport,
 ) {
-    let parameter = Parameter::new(row, quantity);
-    let source = line.surface.checked_sub(1).map(|surface| Parameter::new(surface, quantity));
+    let source = source.map(|surface| Parameter { surface, ..parameter });
     let found = source.and_then(|source| lens.get(source).map(|value| (source, value)));
     let present = lens.get(parameter).unwrap_or(0.0);
     match found {

@@ -3,6 +3,7 @@
 use crate::files::error::ParseError;
 use crate::files::report::{ConversionOutcome, ConversionReport};
 use crate::files::zemax::file::{ConfigurationOperand, ZemaxFile};
+use crate::files::zemax::row_plan::RowPlan;
 use crate::lens::{
     Aperture, FieldKind, Lens, Object, Parameter, Quantity, Variable, ZoomPosition, ZoomThickness,
 };
@@ -11,6 +12,7 @@ use std::collections::BTreeMap;
 /// Adds zoom positions to the lens, if the file has more than one configuration.
 pub(super) fn add_positions(
     file: &ZemaxFile,
+    plan: &RowPlan,
     lens: &mut Lens,
     names: &[String],
     report: &mut ConversionReport,
@@ -24,7 +26,7 @@ pub(super) fn add_positions(
         .map(|i| ZoomPosition { name: name(i), ..ZoomPosition::default() })
         .collect();
     for operand in &file.operands {
-        if let Err(why) = apply(file.unit, lens, operand) {
+        if let Err(why) = apply(file.unit, plan, lens, operand) {
             report.amend(operand.line, ConversionOutcome::Dropped, why);
         }
     }
@@ -51,13 +53,18 @@ fn check_complete(file: &ZemaxFile) -> Result<(), ParseError> {
 }
 
 /// Writes one value into its zoom position; the error is the note of the report.
-fn apply(unit: f64, lens: &mut Lens, operand: &ConfigurationOperand) -> Result<(), &'static str> {
+fn apply(
+    unit: f64,
+    plan: &RowPlan,
+    lens: &mut Lens,
+    operand: &ConfigurationOperand,
+) -> Result<(), &'static str> {
     let zoom = operand.configuration - 1;
     match operand.name.as_str() {
-        "THIC" => thickness(unit, lens, operand),
+        "THIC" => thickness(unit, plan, lens, operand),
         "APER" => aperture(unit, lens, operand),
         "SDIA" => {
-            let stop = lens.stop().map(|stop| stop + 1) == Some(operand.target);
+            let stop = lens.stop().is_some() && lens.stop() == plan.row(operand.target);
             if !(stop && matches!(lens.aperture, Aperture::StopSemiDiameter(_))) {
                 return Err("only the size of the stop can change with the zoom position");
             }
@@ -70,13 +77,15 @@ fn apply(unit: f64, lens: &mut Lens, operand: &ConfigurationOperand) -> Result<(
 
 fn thickness(
     unit: f64,
+    plan: &RowPlan,
     lens: &mut Lens,
     operand: &ConfigurationOperand,
 ) -> Result<(), &'static str> {
-    let surface = match operand.target.checked_sub(1) {
-        None => return Err("the object distance cannot change with the zoom position"),
-        Some(surface) if surface < lens.surfaces.len() => surface,
-        Some(_) => return Err("there is no such gap"),
+    if operand.target == 0 {
+        return Err("the object distance cannot change with the zoom position");
+    }
+    let Some(surface) = plan.gap(operand.target) else {
+        return Err("there is no such gap, or it is part of a break of the axis");
     };
     if operand.value.abs() >= 1e10 {
         return Err("an infinite gap");

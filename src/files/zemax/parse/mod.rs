@@ -80,7 +80,10 @@ impl ZemaxReader {
             return Ok(verdict);
         }
         match self.file.surfaces.last_mut() {
-            Some(surface) if self.in_surface => surface::read(surface, line),
+            Some(surface) if self.in_surface => {
+                surface.lines.push(line.source_text());
+                surface::read(surface, line)
+            }
             None if surface::KEYWORDS.contains(&line.keyword) => {
                 Err(line
                     .malformed(format!("`{}` before the first SURF", line.source_text()), "SURF 0"))

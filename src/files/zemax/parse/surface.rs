@@ -53,27 +53,42 @@ pub(super) fn read(
             surface.marginal_height = Some((height, zone, line.number));
         }
         "PZUP" => return thickness_pickup(surface, line),
-        _ => return read_other(line),
+        "OBDC" => {
+            let (x, y) = (line.number(0)?, line.number(1)?);
+            surface.aperture_offset = (x != 0.0 || y != 0.0).then_some((x, y, line.number));
+        }
+        "SCBD" => return own_break(surface, line),
+        _ => return Ok(read_other(line)),
     }
     Ok(used())
 }
 
-/// Reads the other lines of a surface: those that affect rays are dropped, approximated or refused.
-fn read_other(line: &ZemaxLine<'_>) -> Result<LineOutcome, ParseError> {
-    let zeros = |from| (from..line.fields.len()).all(|field| line.number(field) == Ok(0.0));
-    Ok(match line.keyword {
-        "SQAP" | "ELAP" | "OBDC" | "UDAD" | "UDOB" | "SQOB" | "ELOB" | "SPID" => {
+/// The outcome of the other lines of a surface: those that affect rays are dropped or approximated.
+fn read_other(line: &ZemaxLine<'_>) -> LineOutcome {
+    match line.keyword {
+        "SQAP" | "ELAP" | "UDAD" | "UDOB" | "SQOB" | "ELOB" | "SPID" => {
             dropped("only circular, centred apertures and obstructions are supported")
         }
         "PPAR" | "CHZH" | "TOLE" | "TCOM" | "EDGE" | "PMVA" | "PUPZ" | "CENT" => {
             approximated("the present value of the solve is used")
         }
-        "SCBD" if !zeros(1) => {
-            let found = format!("a tilted or decentred surface (`{}`)", line.source_text());
-            return Err(line.malformed(found, "surfaces that are centred on the axis"));
-        }
         _ => preserved(),
-    })
+    }
+}
+
+/// `SCBD side order 0 dx dy tilts`: the break that belongs to a surface, on the side 1 in front of it.
+fn own_break(surface: &mut ZemaxSurface, line: &ZemaxLine<'_>) -> Result<LineOutcome, ParseError> {
+    let number = |field| line.number_or(field, 0.0);
+    let moves = [number(3)?, number(4)?, number(5)?, number(6)?, number(7)?];
+    if moves == [0.0; 5] {
+        return Ok(preserved());
+    }
+    if number(0)? != 1.0 {
+        return Ok(dropped("a tilt or decentre behind the surface"));
+    }
+    let [dx, dy, x, y, z] = moves;
+    surface.own_break = Some([dx, dy, x, y, z, number(1)?]);
+    Ok(used())
 }
 
 /// The names of the solve codes, from 2 on.

@@ -4,14 +4,16 @@
 //! written as a fixed one with a circular aperture, since a semi-diameter alone does not clip there.
 
 mod header;
+mod place;
 mod surface;
 mod table;
 
 use crate::files::report::{ConversionOutcome, ConversionReport};
 use crate::files::zemax::INFINITE_GAP;
 use crate::lens::{
-    Lens, LensError, Parameter, Pickup, Quantity, SystemError, Variable, ZoomThickness,
+    Lens, LensError, Parameter, Pickup, Quantity, SurfaceNumber, Variable, ZoomThickness,
 };
+use place::{FileNumbers, RowBreaks, file_numbers, row_breaks};
 
 /// The text of the file, and the report of everything that is not exact.
 ///
@@ -20,9 +22,11 @@ use crate::lens::{
 pub fn write(lens: &Lens) -> Result<(String, ConversionReport), LensError> {
     lens.check()?;
     check_thicknesses(lens)?;
-    check_poses(lens)?;
+    let breaks = row_breaks(lens);
     let mut export = ZemaxWriter {
         lens: lens.with_pickups()?,
+        numbers: file_numbers(&breaks),
+        breaks,
         text: String::new(),
         report: ConversionReport::default(),
     };
@@ -33,19 +37,6 @@ pub fn write(lens: &Lens) -> Result<(String, ConversionReport), LensError> {
     export.table();
     export.report_losses();
     Ok((export.text, export.report))
-}
-
-/// Refuses decentred and tilted surfaces, which need coordinate breaks.
-fn check_poses(lens: &Lens) -> Result<(), LensError> {
-    match lens.surfaces.iter().position(|row| row.pose().is_some()) {
-        Some(surface) => Err(SystemError::Posed {
-            surface: surface.into(),
-            what: "the export as .zmx",
-            hint: "; expected the native format (.json)",
-        }
-        .into()),
-        None => Ok(()),
-    }
 }
 
 /// Refuses gaps that the other program takes for infinite ones.
@@ -70,6 +61,9 @@ fn check_thicknesses(lens: &Lens) -> Result<(), LensError> {
 struct ZemaxWriter {
     /// The lens, with pickups and focus resolved.
     lens: Lens,
+    /// The coordinate breaks around every surface, and the numbers of the surfaces among them.
+    breaks: Vec<RowBreaks>,
+    numbers: Vec<FileNumbers>,
     text: String,
     report: ConversionReport,
 }
@@ -187,6 +181,13 @@ impl ZemaxWriter {
         if obstructing > 0 {
             let note = "written as obscurations, or as inner radii of the circular apertures";
             self.record(ConversionOutcome::Used, format!("{obstructing} obstructions"), note);
+        }
+        for (i, row) in lens.surfaces.iter().enumerate() {
+            if let Some(locked) = &row.locked {
+                let what = format!("surface {}: {}", SurfaceNumber::new(i), locked.kind);
+                let note = "written back with the lines of its file; rays meet its conic here";
+                self.record(ConversionOutcome::Locked, what, note);
+            }
         }
         if lens.merit.is_some() {
             let note = "the terms have no counterpart there";

@@ -6,7 +6,8 @@ use crate::files::zemax::glass as zemax_glass;
 use crate::files::zemax::gradient;
 use crate::lens::glass;
 use crate::lens::{
-    Aperture, Medium, MediumPlace, Object, Parameter, Pickup, Quantity, Row, SurfaceNumber,
+    Aperture, LockedSurface, Medium, MediumPlace, Object, Parameter, Pickup, Quantity, Row,
+    SurfaceNumber,
 };
 
 impl ZemaxWriter {
@@ -15,7 +16,8 @@ impl ZemaxWriter {
         for i in 0..self.lens.surfaces.len() {
             self.row(i);
         }
-        self.line(format!("SURF {}", self.lens.surfaces.len() + 1));
+        let image = self.numbers.last().map_or(1, |numbers| numbers.gap + 1);
+        self.line(format!("SURF {image}"));
         self.plane("0.0");
     }
 
@@ -40,16 +42,18 @@ impl ZemaxWriter {
 
     fn row(&mut self, i: usize) {
         let row = self.lens.surfaces[i].clone();
-        self.line(format!("SURF {}", i + 1));
+        self.breaks_before(i);
+        self.line(format!("SURF {}", self.numbers[i].surface));
         if row.stop {
             self.surface_line("STOP");
         }
         let aspheric = row.asphere.iter().any(|a| *a != 0.0);
         let graded = self.gradient(i, aspheric);
-        self.surface_line(match (aspheric, graded.is_some()) {
-            (true, _) => "TYPE EVENASPH".to_owned(),
-            (false, true) => format!("TYPE {}", gradient::KIND),
-            (false, false) => "TYPE STANDARD".to_owned(),
+        self.surface_line(match (&row.locked, aspheric, graded.is_some()) {
+            (Some(locked), ..) => format!("TYPE {}", locked.kind),
+            (None, true, _) => "TYPE EVENASPH".to_owned(),
+            (None, false, true) => format!("TYPE {}", gradient::KIND),
+            (None, false, false) => "TYPE STANDARD".to_owned(),
         });
         if !row.comment.is_empty() {
             self.surface_line(format!("COMM {}", one_line(&row.comment)));
@@ -61,11 +65,17 @@ impl ZemaxWriter {
         if self.is_variable(i, Quantity::Conic) {
             self.surface_line("VCON");
         }
-        if aspheric {
+        if let Some(locked) = &row.locked {
+            self.locked_lines(i, locked);
+        } else if aspheric {
             self.terms(i, &row.asphere);
         }
         self.index_gradient(i, graded.iter().flatten());
-        self.thickness(i, row.thickness);
+        if self.breaks[i].behind.is_empty() {
+            self.thickness(i, row.thickness);
+        } else {
+            self.surface_line("DISZ 0.0");
+        }
         let variable = self.is_variable(i, Quantity::Index);
         if graded.is_none() {
             self.glass(&row.medium, MediumPlace::behind(i), variable);
@@ -73,6 +83,23 @@ impl ZemaxWriter {
         self.semi_diameter(&row);
         if row.hyperhemisphere {
             self.report_hyperhemisphere(i);
+        }
+        self.breaks_behind(i);
+    }
+
+    /// The parameters of a surface that cannot be traced, as its file has them.
+    fn locked_lines(&mut self, i: usize, locked: &LockedSurface) {
+        if locked.lines.iter().any(|line| line.starts_with("UNIT ")) {
+            let what = format!("surface {}: {}", SurfaceNumber::new(i), locked.kind);
+            let note = "its parameters are in another unit than millimetres and are not written";
+            self.record(ConversionOutcome::Dropped, what, note);
+            return;
+        }
+        let parameters = |line: &&String| {
+            ["PARM ", "XDAT ", "VPAR "].iter().any(|keyword| line.starts_with(keyword))
+        };
+        for line in locked.lines.iter().filter(parameters) {
+            self.surface_line(line);
         }
     }
 
@@ -124,7 +151,8 @@ impl ZemaxWriter {
     fn curvature(&mut self, i: usize, curvature: f64) {
         let solve = match self.pickup(i, Quantity::Curvature) {
             Some(pickup) => {
-                let (surface, scale) = (pickup.source.surface + 1, number(pickup.scale));
+                let surface = self.numbers[pickup.source.surface].surface;
+                let scale = number(pickup.scale);
                 format!("4 {surface} {scale} {}", number(pickup.offset))
             }
             None if self.is_variable(i, Quantity::Curvature) => "1 0 0 0".to_owned(),
@@ -146,13 +174,13 @@ impl ZemaxWriter {
         }
     }
 
-    fn thickness(&mut self, i: usize, thickness: f64) {
+    pub(super) fn thickness(&mut self, i: usize, thickness: f64) {
         self.surface_line(format!("DISZ {}", number(thickness)));
         let parameter = Parameter::new(i, Quantity::Thickness);
         if self.has_focus_solve() && i + 1 == self.lens.surfaces.len() {
             self.surface_line("MAZH 0 0");
         } else if let Some(pickup) = self.pickup(i, Quantity::Thickness) {
-            let surface = pickup.source.surface + 1;
+            let surface = self.numbers[pickup.source.surface].gap;
             let line = format!("PZUP {surface} {} 0", numbers([pickup.scale, pickup.offset]));
             self.surface_line(line);
         } else if let Some(variable) = self.lens.variable(parameter).copied() {

@@ -43,7 +43,7 @@ impl ZemaxWriter {
                 (gap, self.lens.variable(parameter).is_some())
             };
             let values: Vec<(f64, bool)> = (0..positions.len()).map(value).collect();
-            self.operand("THIC", surface + 1, &values);
+            self.operand("THIC", self.numbers[surface].gap, &values);
         }
     }
 
@@ -61,7 +61,10 @@ impl ZemaxWriter {
         }
         let values: Vec<(f64, bool)> = all.into_iter().map(|a| (size(a), false)).collect();
         match (base, self.lens.stop()) {
-            (Aperture::StopSemiDiameter(_), Some(stop)) => self.operand("SDIA", stop + 1, &values),
+            (Aperture::StopSemiDiameter(_), Some(stop)) => {
+                let surface = self.numbers[stop].surface;
+                self.operand("SDIA", surface, &values);
+            }
             _ => self.operand("APER", 0, &values),
         }
     }

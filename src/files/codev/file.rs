@@ -1,0 +1,117 @@
+//! The content of a sequence file before it is interpreted. Lengths are in the unit of the file.
+
+use crate::lens::FieldKind;
+use std::collections::BTreeMap;
+
+/// The content of a file.
+#[derive(Debug, Default)]
+pub(super) struct CodeVFile {
+    /// Millimetres per unit.
+    pub(super) unit: Option<f64>,
+    /// True if surfaces are given by radii, false if by curvatures.
+    pub(super) radii: Option<bool>,
+    pub(super) title: String,
+    pub(super) notes: Vec<String>,
+    pub(super) aperture: Option<ApertureCommand>,
+    pub(super) waves_nm: Vec<f64>,
+    pub(super) wave_weights: Vec<f64>,
+    /// From 1.
+    pub(super) reference: Option<usize>,
+    pub(super) field_kind: Option<FieldKind>,
+    pub(super) fields_x: Vec<f64>,
+    pub(super) fields_y: Vec<f64>,
+    pub(super) field_weights: Vec<f64>,
+    /// The object first, the image last.
+    pub(super) surfaces: Vec<CodeVSurface>,
+    /// True from `SI` on.
+    pub(super) is_complete: bool,
+    /// True if a command of the whole lens follows the surfaces, which are all there then.
+    pub(super) is_followed: bool,
+    /// The surface of the stop, from 0 for the object.
+    pub(super) stop: Option<usize>,
+    /// True if the image distance is the paraxial one, with the row of the report.
+    pub(super) focus: Option<usize>,
+    /// The wavelengths in nanometres of a private catalogue.
+    pub(super) private_nm: Vec<f64>,
+    /// The indices of the private glasses at these wavelengths, by name in upper case.
+    pub(super) private: BTreeMap<String, Vec<f64>>,
+    pub(super) in_private: bool,
+    pub(super) positions: usize,
+    pub(super) zoomed: Vec<ZoomCommand>,
+    pub(super) pickups: Vec<PickupCommand>,
+}
+
+/// The definition of the beam width.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum ApertureCommand {
+    Diameter(f64),
+    FNumber(f64),
+    ImageNa(f64),
+    ObjectNa(f64),
+}
+
+/// One surface.
+#[derive(Debug, Clone, Default)]
+pub(super) struct CodeVSurface {
+    /// The radius or the curvature; 0 is a plane in both.
+    pub(super) bend: f64,
+    pub(super) thickness: f64,
+    pub(super) glass: Option<String>,
+    /// The row of the report with the glass.
+    pub(super) row: usize,
+    pub(super) conic: f64,
+    /// Coefficients of r⁴ to r²⁰.
+    pub(super) terms: [f64; 9],
+    pub(super) clip: Option<f64>,
+    pub(super) obstruction: Option<f64>,
+    /// True if the aperture is displaced.
+    pub(super) is_offset: bool,
+    pub(super) label: String,
+    pub(super) decenter: [f64; 3],
+    /// ADE, BDE and CDE in degrees.
+    pub(super) tilt: [f64; 3],
+    pub(super) placement: Placement,
+    pub(super) is_curvature_free: bool,
+    pub(super) is_thickness_free: bool,
+    /// The command that makes the surface impossible to trace.
+    pub(super) locked: Option<String>,
+    pub(super) lines: Vec<String>,
+}
+
+/// The frames that the decentre and the tilt of a surface move.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub(in crate::files) enum Placement {
+    /// The surface and everything behind it.
+    #[default]
+    Basic,
+    /// The surface alone (`DAR`).
+    Return,
+    /// The surface, and the tilt once more what is behind it (`BEN`).
+    Bend,
+    /// Everything behind the surface, in reverse (`REV`).
+    Reverse,
+}
+
+/// A command of the zoom table: one value for each position.
+#[derive(Debug)]
+pub(super) struct ZoomCommand {
+    pub(super) name: String,
+    /// Surface or field, from 1.
+    pub(super) target: usize,
+    pub(super) values: Vec<f64>,
+    /// The row of the report.
+    pub(super) row: usize,
+}
+
+/// A pickup of the same number of another surface.
+#[derive(Debug)]
+pub(super) struct PickupCommand {
+    /// True for a thickness, false for a radius.
+    pub(super) is_thickness: bool,
+    pub(super) surface: usize,
+    pub(super) source: usize,
+    pub(super) scale: f64,
+    pub(super) offset: f64,
+    /// The row of the report.
+    pub(super) row: usize,
+}

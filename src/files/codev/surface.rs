@@ -1,0 +1,127 @@
+//! The commands of a surface: its form, aperture, place and label.
+
+use super::command::{Command, parse_number};
+use super::file::{CodeVSurface, Placement};
+use super::parse::{CommandOutcome, dropped, preserved, used};
+use crate::files::error::ParseError;
+use crate::files::report::ConversionOutcome;
+
+/// The glass of `S bend thickness glass`; older files give an index and an Abbe number.
+pub(super) fn glass_word(words: &[String]) -> Option<String> {
+    let (name, behind) = (words.get(2)?, words.get(3));
+    let both = behind.and_then(|vd| Some((parse_number(name)?, parse_number(vd)?)));
+    Some(both.map_or_else(|| name.clone(), |(nd, vd)| format!("{nd}:{vd}")))
+}
+
+/// Reads one command of a surface.
+pub(super) fn read(
+    surface: &mut CodeVSurface,
+    command: &Command,
+) -> Result<CommandOutcome, ParseError> {
+    match command.name.as_str() {
+        "RDY" | "CUY" => return bend(surface, command),
+        "THI" => {
+            if let Some(thickness) = command.words.first().and_then(|word| parse_number(word)) {
+                surface.thickness = thickness;
+            } else {
+                return Ok(frozen());
+            }
+        }
+        "GLA" => surface.glass = command.words.first().cloned(),
+        "RMD" | "REFL" => surface.glass = Some("REFL".to_owned()),
+        "K" => surface.conic = command.last_number()?,
+        "A" | "B" | "C" | "D" | "E" | "F" | "G" | "H" | "J" => term(surface, command)?,
+        "SLB" => surface.label = command.words.first().cloned().unwrap_or_default(),
+        "CIR" => return circle(surface, command),
+        "REX" | "REY" | "ELX" | "ELY" | "ARO" => {
+            return Ok(dropped("only circular, centred apertures are supported"));
+        }
+        "ADX" | "ADY" => {
+            surface.is_offset |= command.last_number()? != 0.0;
+            return Ok(dropped("a decentred aperture: only centred ones clip here"));
+        }
+        "CCY" => surface.is_curvature_free = command.last_number()? == 0.0,
+        "THC" => surface.is_thickness_free = command.last_number()? == 0.0,
+        "SPH" | "CON" | "ASP" => {}
+        _ => return place(surface, command),
+    }
+    Ok(used())
+}
+
+fn frozen() -> CommandOutcome {
+    (ConversionOutcome::Approximated, "the present value of the solve is used".to_owned())
+}
+
+/// `RDY` and `CUY` set the number that `S` sets; the mode of the file decides its meaning.
+fn bend(surface: &mut CodeVSurface, command: &Command) -> Result<CommandOutcome, ParseError> {
+    let Some(value) = command.words.first().and_then(|word| parse_number(word)) else {
+        return Ok(frozen());
+    };
+    if surface.bend != 0.0 && (value - surface.bend).abs() > 1e-12 * value.abs() {
+        return Err(command.malformed(format!("`{}`", command.text), "the number that S gives"));
+    }
+    surface.bend = value;
+    Ok(used())
+}
+
+fn term(surface: &mut CodeVSurface, command: &Command) -> Result<(), ParseError> {
+    const LETTERS: &str = "ABCDEFGHJ";
+    if let Some(term) = LETTERS.find(command.name.as_str()) {
+        surface.terms[term] = command.last_number()?;
+    }
+    Ok(())
+}
+
+/// `CIR [CLR|EDG|OBS|HOL] [label] radius`.
+fn circle(surface: &mut CodeVSurface, command: &Command) -> Result<CommandOutcome, ParseError> {
+    let radius = command.last_number()?;
+    if radius < 0.0 {
+        return Err(command.malformed(format!("`{}`", command.text), "a radius of zero or more"));
+    }
+    if command.has_word("EDG") {
+        return Ok(preserved());
+    }
+    let inner = command.has_word("OBS") || command.has_word("HOL");
+    let target = if inner { &mut surface.obstruction } else { &mut surface.clip };
+    *target = Some(radius);
+    Ok(used())
+}
+
+/// Decentres, tilts, and the rest.
+fn place(surface: &mut CodeVSurface, command: &Command) -> Result<CommandOutcome, ParseError> {
+    let numbers = ["XDE", "YDE", "ZDE", "ADE", "BDE", "CDE"];
+    if let Some(i) = numbers.iter().position(|name| *name == command.name) {
+        let all = if i < 3 { &mut surface.decenter } else { &mut surface.tilt };
+        all[i % 3] = command.last_number()?;
+        return Ok(used());
+    }
+    surface.placement = match command.name.as_str() {
+        "DAR" => Placement::Return,
+        "BEN" => Placement::Bend,
+        "REV" => Placement::Reverse,
+        "RET" | "GLB" | "XOD" | "YOD" | "ZOD" => {
+            return Ok(dropped("this place of the surface is not supported"));
+        }
+        _ => return Ok(other(surface, command)),
+    };
+    Ok(used())
+}
+
+/// The surface types that cannot be traced, and the commands that affect no ray.
+fn other(surface: &mut CodeVSurface, command: &Command) -> CommandOutcome {
+    const TYPES: [&str; 14] = [
+        "DIF", "CYL", "YTO", "XTO", "AAS", "SPS", "XYP", "ZRN", "GRT", "HOE", "DOE", "MOD", "SPL",
+        "UDS",
+    ];
+    let nonzero = || command.last_number().is_ok_and(|value| value != 0.0);
+    let fresnel = command.name == "CUF" && nonzero();
+    if !(TYPES.contains(&command.name.as_str()) || fresnel) {
+        return preserved();
+    }
+    surface.locked.get_or_insert_with(|| command.text.clone());
+    let note = format!(
+        "{} cannot be traced: the row is locked and rays meet its asphere alone",
+        command.text
+    );
+    (ConversionOutcome::Locked, note)
+}

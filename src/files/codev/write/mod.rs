@@ -1,0 +1,222 @@
+//! Writing of a lens as the text of a `.seq` file.
+//!
+//! Radii and wavelengths in nanometres, with the fewest digits that read back to the same bits; a
+//! semi-diameter is a `CIR`, which clips there too.
+
+mod surface;
+
+use crate::files::report::{ConversionOutcome, ConversionReport};
+use crate::lens::{
+    Aperture, FieldKind, Lens, LensError, Object, Parameter, Pickup, Quantity, SystemError,
+};
+
+/// The text of the file, and the report of everything that is not exact.
+///
+/// # Errors
+/// An invalid lens, or a place of a surface that the format cannot hold.
+pub fn write(lens: &Lens) -> Result<(String, ConversionReport), LensError> {
+    lens.check()?;
+    let unplaced = lens.surfaces.iter().position(|row| surface::place(row).is_none());
+    if let Some(surface) = unplaced {
+        let (what, hint) = ("the export as .seq", "; expected .zmx or the native format (.json)");
+        return Err(SystemError::Posed { surface: surface.into(), what, hint }.into());
+    }
+    let (lens, report) = (lens.with_pickups()?, ConversionReport::default());
+    let mut writer = CodeVWriter { lens, text: String::new(), report };
+    writer.solve_focus();
+    writer.header();
+    writer.surfaces();
+    writer.zoom();
+    writer.pickups();
+    writer.line("GO");
+    writer.report_losses();
+    Ok((writer.text, writer.report))
+}
+
+/// A file that is being written.
+struct CodeVWriter {
+    /// The lens, with pickups and focus resolved.
+    lens: Lens,
+    text: String,
+    report: ConversionReport,
+}
+
+/// A number in the fewest digits that read back to the same bits.
+fn number(value: f64) -> String {
+    if value == 0.0 || (1e-5..1e15).contains(&value.abs()) {
+        format!("{value:?}")
+    } else {
+        format!("{value:E}")
+    }
+}
+
+/// Numbers with blanks between them.
+fn numbers(values: impl IntoIterator<Item = f64>) -> String {
+    values.into_iter().map(number).collect::<Vec<_>>().join(" ")
+}
+
+/// A text in quotes, on one line.
+fn quoted(text: &str) -> String {
+    let plain: String = text.chars().map(|c| if c.is_control() { ' ' } else { c }).collect();
+    format!("'{}'", plain.replace('\'', "\"").trim())
+}
+
+impl CodeVWriter {
+    /// Writes one line. Long ones are continued, since the program reads lines of limited length.
+    fn line(&mut self, text: impl AsRef<str>) {
+        const LONGEST: usize = 78;
+        let mut length = 0;
+        for word in text.as_ref().split_inclusive(' ') {
+            if length > 0 && length + word.len() > LONGEST && !text.as_ref().contains('\'') {
+                self.text.push_str("&\r\n ");
+                length = 1;
+            }
+            self.text.push_str(word);
+            length += word.len();
+        }
+        self.text.push_str("\r\n");
+    }
+
+    fn record(&mut self, outcome: ConversionOutcome, what: impl AsRef<str>, note: &str) {
+        self.report.add(outcome, what.as_ref(), note);
+    }
+
+    /// Writes the solved last gap into the lens.
+    fn solve_focus(&mut self) {
+        if self.lens.image_solve.is_none() {
+            return;
+        }
+        let (last, primary) = (self.lens.surfaces.len() - 1, self.lens.primary());
+        let system = self.lens.resolve(0, self.lens.wavelengths[primary].um);
+        if let Ok(system) = system {
+            self.lens.surfaces[last].thickness = system.surfaces[last].thickness;
+        }
+    }
+
+    fn header(&mut self) {
+        self.line("RDM;LEN");
+        self.line(format!("TITLE {}", quoted(&self.lens.name)));
+        self.aperture(self.lens.aperture);
+        self.line("DIM M");
+        let waves = self.lens.wavelengths.clone();
+        self.line(format!("WL {}", numbers(waves.iter().map(|wave| wave.um * 1e3))));
+        self.line(format!("REF {}", self.lens.primary() + 1));
+        self.line(format!("WTW {}", numbers(waves.iter().map(|wave| wave.weight))));
+        let fields = self.lens.fields.clone();
+        let suffix = field_suffix(fields.kind);
+        self.line(format!("X{suffix} {}", numbers(fields.values.iter().map(|field| field.x))));
+        self.line(format!("Y{suffix} {}", numbers(fields.values.iter().map(|field| field.y))));
+        self.line(format!("WTF {}", numbers(fields.values.iter().map(|field| field.weight))));
+        self.private_glasses();
+    }
+
+    fn aperture(&mut self, aperture: Aperture) {
+        match aperture {
+            Aperture::EntrancePupilDiameter(v) => self.line(format!("EPD {}", number(v))),
+            Aperture::FNumber(v) => self.line(format!("FNO {}", number(v))),
+            Aperture::ObjectNa(v) => self.line(format!("NAO {}", number(v))),
+            // The stop's own CIR is the aperture.
+            Aperture::StopSemiDiameter(_) => {}
+        }
+    }
+
+    fn surfaces(&mut self) {
+        let distance = match self.lens.object {
+            Object::Infinity => "0.1E14".to_owned(),
+            Object::Finite(distance) => number(distance),
+        };
+        let medium = self.lens.object_medium.clone();
+        let glass = self.glass(&medium, crate::lens::MediumPlace::Object);
+        self.line(format!("SO 0.0 {distance}{glass}"));
+        for i in 0..self.lens.surfaces.len() {
+            self.surface(i);
+        }
+        let defocus = self.lens.image_solve.unwrap_or(0.0);
+        if self.lens.image_solve.is_some() {
+            self.line("  PIM");
+        }
+        self.line(format!("SI 0.0 {}", number(defocus)));
+    }
+
+    /// Thicknesses and apertures of the zoom positions; the rest is reported.
+    fn zoom(&mut self) {
+        let positions = self.lens.zoom.len();
+        if positions < 2 {
+            return;
+        }
+        self.line(format!("ZOO {positions}"));
+        for surface in 0..self.lens.surfaces.len() {
+            let zoom = &self.lens.zoom;
+            let own = zoom.iter().flat_map(|position| &position.thicknesses);
+            if own.into_iter().any(|gap| gap.surface == surface) {
+                let gap = |zoom| self.lens.thickness_at(surface, zoom).unwrap_or(0.0);
+                let values = numbers((0..positions).map(gap));
+                self.line(format!("ZOO THI S{} {values}", surface + 1));
+            }
+        }
+        if self.lens.zoom.iter().any(|position| position.aperture.is_some()) {
+            let note = "the aperture of the lens is used at every position";
+            self.record(ConversionOutcome::Dropped, "apertures of the zoom positions", note);
+        }
+        if self.lens.zoom.iter().any(|position| position.fields.is_some()) {
+            let note = "the fields of the lens are used at every position";
+            self.record(ConversionOutcome::Dropped, "fields of the zoom positions", note);
+        }
+    }
+
+    fn pickups(&mut self) {
+        for pickup in self.lens.pickups.clone() {
+            let Pickup { parameter, source, scale, offset } = pickup;
+            let name = match (parameter.quantity, source.quantity) {
+                (Quantity::Thickness, Quantity::Thickness) => "THI",
+                (Quantity::Curvature, Quantity::Curvature) if offset == 0.0 => "RDY",
+                _ => {
+                    let what = format!("pickup: {parameter} from the {source}");
+                    let note = "the present value, without the pickup";
+                    self.record(ConversionOutcome::Approximated, what, note);
+                    continue;
+                }
+            };
+            let scale = if name == "THI" { scale } else { scale.recip() };
+            let [to, from] = [parameter.surface, source.surface].map(|surface| surface + 1);
+            let factors = numbers([scale, offset]);
+            self.line(format!("PIK {name} S{to} Z1 {name} S{from} Z1 {factors}"));
+        }
+    }
+
+    fn is_variable(&self, surface: usize, quantity: Quantity) -> bool {
+        self.lens.variable(Parameter::new(surface, quantity)).is_some()
+    }
+
+    fn report_losses(&mut self) {
+        if self.lens.merit.is_some() {
+            self.record(
+                ConversionOutcome::Dropped,
+                "merit function",
+                "it has no counterpart there",
+            );
+        }
+        if self.lens.tolerances.is_some() {
+            self.record(ConversionOutcome::Dropped, "tolerances", "they are not written");
+        }
+        for variable in self.lens.variables.clone() {
+            let known =
+                matches!(variable.parameter.quantity, Quantity::Curvature | Quantity::Thickness);
+            let bounded = variable.min.is_some() || variable.max.is_some();
+            if !known || bounded {
+                let note =
+                    if known { "its bounds; it remains a variable" } else { "a constant there" };
+                let what = format!("variable: {}", variable.parameter);
+                self.record(ConversionOutcome::Dropped, what, note);
+            }
+        }
+    }
+}
+
+fn field_suffix(kind: FieldKind) -> &'static str {
+    match kind {
+        FieldKind::Angle => "AN",
+        FieldKind::ObjectHeight => "OB",
+        FieldKind::ImageHeight => "IM",
+    }
+}

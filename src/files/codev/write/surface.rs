@@ -1,0 +1,184 @@
+//! One surface: form, glass, aperture and place.
+
+use super::{CodeVWriter, number, quoted};
+use crate::files::report::ConversionOutcome;
+use crate::files::zemax::is_general;
+use crate::lens::glass::{self, Glass};
+use crate::lens::{Aperture, AxisBreak, Medium, MediumPlace, Quantity, Row, SurfaceNumber};
+
+/// Decentre and tilt of a surface, and the word that says what they move.
+type Place = Option<(AxisBreak, &'static str)>;
+
+/// The place of a surface, which has none if it is centred; `None` for one that the format cannot hold
+/// without a surface of its own.
+pub(super) fn place(row: &Row) -> Option<Place> {
+    let [x, y] = row.decenter;
+    let own = row.decenter != [0.0; 2] || row.tilt != [0.0; 2];
+    match (row.break_before, row.break_after) {
+        (None, None) if !own => Some(None),
+        (None, None) => {
+            let tilt = [row.tilt[0], row.tilt[1], 0.0];
+            Some(Some((AxisBreak { decenter: [x, y, 0.0], tilt }, "DAR")))
+        }
+        (Some(before), None) if !own => Some(Some((before, ""))),
+        (Some(before), Some(after)) if !own => {
+            let turn = AxisBreak { decenter: [0.0; 3], ..before };
+            let same = turn.pose().inverse().then(&after.pose()).is_nearly_centred();
+            same.then_some(Some((before, "BEN")))
+        }
+        (None, Some(after)) if !own => {
+            let reverse = AxisBreak::from_pose(&after.pose().inverse());
+            Some(Some((reverse, "REV")))
+        }
+        _ => None,
+    }
+}
+
+impl CodeVWriter {
+    pub(super) fn surface(&mut self, i: usize) {
+        let row = self.lens.surfaces[i].clone();
+        let radius = if row.curvature == 0.0 { 0.0 } else { row.curvature.recip() };
+        let last = i + 1 == self.lens.surfaces.len();
+        let defocus = if last { self.lens.image_solve.unwrap_or(0.0) } else { 0.0 };
+        let glass = self.glass(&row.medium, MediumPlace::behind(i));
+        self.line(format!("S {} {}{glass}", number(radius), number(row.thickness - defocus)));
+        if row.stop {
+            self.line("  STO");
+        }
+        if !row.comment.is_empty() {
+            self.line(format!("  SLB {}", quoted(&row.comment)));
+        }
+        self.aperture_of(&row);
+        self.form(&row);
+        let [bend, gap] = [Quantity::Curvature, Quantity::Thickness]
+            .map(|quantity| if self.is_variable(i, quantity) { 0 } else { 100 });
+        self.line(format!("  CCY {bend}; THC {gap}"));
+        self.place(&row);
+        self.report_row(i, &row);
+    }
+
+    fn aperture_of(&mut self, row: &Row) {
+        let stop = match self.lens.aperture {
+            Aperture::StopSemiDiameter(radius) if row.stop => Some(radius),
+            _ => None,
+        };
+        if let Some(radius) = stop.or(row.semi_diameter) {
+            self.line(format!("  CIR {}", number(radius)));
+        }
+        if let Some(inner) = row.obstruction.filter(|inner| *inner > 0.0) {
+            self.line(format!("  CIR OBS {}", number(inner)));
+        }
+    }
+
+    fn form(&mut self, row: &Row) {
+        let aspheric = row.asphere.iter().any(|a| *a != 0.0);
+        if aspheric || row.conic != 0.0 {
+            self.line(if aspheric { "  ASP" } else { "  CON" });
+            self.line(format!("  K {}", number(row.conic)));
+        }
+        for (letter, a) in "ABCDEFG".chars().zip(&row.asphere).filter(|_| aspheric) {
+            self.line(format!("  {letter} {}", number(*a)));
+        }
+    }
+
+    fn place(&mut self, row: &Row) {
+        let Some(Some((moved, word))) = place(row) else { return };
+        let [x, y, z] = moved.decenter;
+        let [a, b, c] = moved.tilt;
+        let all = [("XDE", x), ("YDE", y), ("ZDE", z), ("ADE", -a), ("BDE", -b), ("CDE", c)];
+        for (name, value) in all.into_iter().filter(|(_, value)| *value != 0.0) {
+            self.line(format!("  {name} {}", number(value)));
+        }
+        if !word.is_empty() {
+            self.line(format!("  {word}"));
+        }
+    }
+
+    fn report_row(&mut self, i: usize, row: &Row) {
+        let surface = SurfaceNumber::new(i);
+        if row.hyperhemisphere {
+            let what = format!("hyperhemisphere of surface {surface}");
+            self.record(ConversionOutcome::Dropped, what, "the other program decides by itself");
+        }
+        if let Some(locked) = &row.locked {
+            let what = format!("surface {surface}: {}", locked.kind);
+            self.record(ConversionOutcome::Locked, what, "written as its conic or asphere alone");
+        }
+    }
+
+    /// The glass behind a surface, with a blank in front; nothing for air.
+    pub(super) fn glass(&mut self, medium: &Medium, place: MediumPlace) -> String {
+        match medium {
+            Medium::Air => String::new(),
+            Medium::Mirror => " REFL".to_owned(),
+            Medium::Glass(name) => match glass::find(name) {
+                Some(glass) => format!(" {}", catalogue_name(glass)),
+                None => String::new(),
+            },
+            Medium::Model { nd, vd } => {
+                let note = "each program has its own dispersion formula for nd and vd";
+                self.record(ConversionOutcome::Approximated, format!("model glass {place}"), note);
+                fictitious(*nd, *vd).unwrap_or_else(|| format!(" {nd}:{vd}"))
+            }
+            Medium::Index(_) => self.private_name(medium),
+            Medium::Grin(gradient) => {
+                let note = "a gradient-index medium cannot be written: its base is";
+                self.record(ConversionOutcome::Dropped, format!("GRIN medium {place}"), note);
+                self.glass(&gradient.base, place)
+            }
+        }
+    }
+
+    /// The indices without dispersion, each once.
+    fn private_indices(&self) -> Vec<f64> {
+        let media = self.lens.surfaces.iter().map(|row| &row.medium);
+        let mut indices: Vec<f64> = Vec::new();
+        for medium in std::iter::once(&self.lens.object_medium).chain(media) {
+            let Medium::Index(index) = medium else { continue };
+            if !indices.contains(index) {
+                indices.push(*index);
+            }
+        }
+        indices
+    }
+
+    fn private_name(&self, medium: &Medium) -> String {
+        let place = |index: &f64| *medium == Medium::Index(*index);
+        let number = self.private_indices().iter().position(place).unwrap_or(0);
+        format!(" 'INDEX{}'", number + 1)
+    }
+
+    /// The private catalogue of the indices without dispersion.
+    pub(super) fn private_glasses(&mut self) {
+        let indices = self.private_indices();
+        if indices.is_empty() {
+            return;
+        }
+        self.line("PRV");
+        self.line("PWL 2000.0 587.5618 300.0");
+        for (i, index) in indices.into_iter().enumerate() {
+            let index = number(index);
+            self.line(format!("'INDEX{}' {index} {index} {index}", i + 1));
+        }
+        self.line("END");
+    }
+}
+
+/// A catalogue name as CODE V has it: letters and digits, then the maker if there is one.
+fn catalogue_name(glass: &Glass) -> String {
+    if is_general(glass) {
+        return glass.name.clone();
+    }
+    let letters: String = glass.name.chars().filter(char::is_ascii_alphanumeric).collect();
+    format!("{}_{}", letters.to_ascii_uppercase(), glass.manufacturer)
+}
+
+/// The name of a fictitious glass, `517000.642000`; `None` for numbers that it cannot hold.
+fn fictitious(nd: f64, vd: f64) -> Option<String> {
+    if !(1.0..2.0).contains(&nd) || !(10.0..100.0).contains(&vd) {
+        return None;
+    }
+    let [index, abbe] = [nd, vd].map(|value| format!("{value:?}"));
+    let (index, abbe) = (index.strip_prefix("1.")?, abbe.replace('.', ""));
+    Some(format!(" {index:0<6}.{abbe:0<6}"))
+}
