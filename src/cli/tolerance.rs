@@ -1,4 +1,4 @@
-//! `tolerance`: what errors of making do to a lens.
+//! `tolerance`: what manufacturing errors do to a lens.
 
 use super::error::CliError;
 use super::failures::Failures;
@@ -16,9 +16,11 @@ use serde::Serialize;
 use std::fmt::{self, Display};
 use std::path::PathBuf;
 
-type SampleCount = clap::builder::RangedU64ValueParser<usize>;
+fn parse_sample_count(text: &str) -> Result<usize, &'static str> {
+    text.parse().ok().filter(|count| *count >= 2).ok_or("expected a whole number, 2 or more")
+}
 
-/// Shows what errors of making do to a lens: sensitivities, expected spot, quantiles, yield
+/// Shows what manufacturing errors do to a lens: sensitivities, expected spot, quantiles, yield
 #[derive(Debug, clap::Args)]
 #[command(after_long_help = include_str!("help/tolerance.txt"))]
 pub(super) struct ToleranceArgs {
@@ -30,8 +32,8 @@ pub(super) struct ToleranceArgs {
     grade: Option<ToleranceGrade>,
 
     /// Lenses with random errors whose rays are traced; two at least, or nothing tells the error of
-    /// the quadratic form
-    #[arg(long, default_value_t = 500, value_name = "N", value_parser = SampleCount::new().range(2..))]
+    /// the quadratic model
+    #[arg(long, default_value_t = 500, value_name = "N", value_parser = parse_sample_count)]
     samples: usize,
 
     /// The seed of the random errors
@@ -46,7 +48,7 @@ pub(super) struct ToleranceArgs {
     #[arg(long, default_value_t = 0, value_name = "N")]
     zoom: usize,
 
-    /// The largest rms spot radius of a good lens in mm: adds the share of good lenses
+    /// The largest rms spot radius of a good lens in mm: adds the yield, the share of good lenses
     #[arg(long, value_name = "MM")]
     rms: Option<f64>,
 
@@ -192,18 +194,10 @@ impl ToleranceReport {
 
 /// The sensitivities, sorted by their share after refocusing.
 fn rows(sheet: &ToleranceSheet, analysis: &ToleranceAnalysis) -> Vec<SensitivityRow> {
-    let grown = |i: usize| {
-        let form = &analysis.forms[i];
-        (form.expectation(&sheet.errors) - form.nominal).abs().max(f64::MIN_POSITIVE)
-    };
-    let total = [grown(0), grown(1)];
-    let share = |by: Derivatives, sigma: f64, total: f64| ShareOfGrowth {
-        by,
-        share: 0.5 * sigma * sigma * by.second / total,
-    };
-    let both = sheet.errors.iter().zip(&analysis.sensitivities);
+    let shares = analysis.growth_shares(&sheet.errors);
+    let both = sheet.errors.iter().zip(&analysis.sensitivities).zip(shares);
     let mut rows: Vec<SensitivityRow> = both
-        .map(|(tolerance, found)| {
+        .map(|((tolerance, found), [fixed, refocused])| {
             let sigma = tolerance.deviation();
             SensitivityRow {
                 kind: tolerance.error.kind,
@@ -211,8 +205,8 @@ fn rows(sheet: &ToleranceSheet, analysis: &ToleranceAnalysis) -> Vec<Sensitivity
                 last: tolerance.error.last,
                 half_range: tolerance.half_range,
                 sigma,
-                fixed: share(found.mean_square(), sigma, total[0]),
-                refocused: share(found.mean_square_focused(), sigma, total[1]),
+                fixed: ShareOfGrowth { by: found.mean_square(), share: fixed },
+                refocused: ShareOfGrowth { by: found.mean_square_focused(), share: refocused },
             }
         })
         .collect();
@@ -225,7 +219,7 @@ fn warnings(analysis: &ToleranceAnalysis) -> Vec<String> {
     for spot in analysis.spots.iter().filter(|spot| !spot.form_agrees) {
         let [apart, error] = spot.difference.map(|v| 100.0 * v / spot.form_mean_rms);
         warnings.push(format!(
-            "{}: the quadratic form differs from real lenses by {apart:.2} % +- {error:.2} %; the \
+            "{}: the quadratic model differs from Monte Carlo by {apart:.2} % ± {error:.2} %; the \
              corrected numbers count",
             focus_name(spot)
         ));
@@ -251,7 +245,7 @@ impl Display for ToleranceReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(
             f,
-            "{} errors of making, {} rays, {} real lenses; spots as rms in mm\n",
+            "{} manufacturing errors, {} rays, {} lenses by Monte Carlo; spots as rms in mm\n",
             self.errors, self.rays, self.samples
         )?;
         writeln!(f, "{}", self.spot_table())?;
@@ -281,17 +275,16 @@ impl ToleranceReport {
         let short = |value: f64| ShortNumber(value).to_string();
         row("as designed".into(), &|s| short(s.nominal_rms));
         row("root of the expected mean square".into(), &|s| short(s.form_root_mean_square));
-        row("mean, quadratic form".into(), &|s| short(s.form_mean_rms));
-        row("mean, corrected by real lenses".into(), &|s| with_error(s.mean_rms));
-        row("real lenses minus form".into(), &|s| with_error(s.difference));
+        row("mean, quadratic model".into(), &|s| short(s.form_mean_rms));
+        row("mean, corrected by Monte Carlo".into(), &|s| with_error(s.mean_rms));
+        row("Monte Carlo minus quadratic model".into(), &|s| with_error(s.difference));
         for (i, quantile) in self.spots[0].quantiles.iter().enumerate() {
             let name = format!("{:.0} % of the lenses, at most", 100.0 * quantile.share);
             row(name, &|s| short(s.quantiles[i].corrected));
         }
         if self.spots[0].good.is_some() {
-            let percent = |share: f64| format!("{:.1} %", 100.0 * share);
-            row("good lenses".into(), &|s| s.good.map_or(String::new(), |g| percent(g.corrected)));
-            row("of the real ones, 95 % interval".into(), &|s| {
+            row("yield".into(), &|s| s.good.map_or(String::new(), |g| percent(g.corrected)));
+            row("yield by Monte Carlo, 95 % interval".into(), &|s| {
                 let ends = s.good.map_or([0.0; 2], |g| g.interval);
                 format!("{} to {}", percent(ends[0]), percent(ends[1]))
             });
@@ -307,25 +300,31 @@ impl ToleranceReport {
                 row.kind.name().to_owned(),
                 surfaces(row.first, row.last),
                 half_range(row.kind, row.half_range),
-                format!("{:.1} %", 100.0 * row.fixed.share),
-                format!("{:.1} %", 100.0 * row.refocused.share),
+                percent(row.fixed.share),
+                percent(row.refocused.share),
             ]);
         }
         let more = self.sensitivities.len().saturating_sub(SHOWN);
         if more > 0 {
             let rest = |of: fn(&SensitivityRow) -> f64| {
-                100.0 * self.sensitivities[SHOWN..].iter().map(of).sum::<f64>()
+                self.sensitivities[SHOWN..].iter().map(of).sum::<f64>()
             };
             let shares = [rest(|row| row.fixed.share), rest(|row| row.refocused.share)];
-            let [fixed, refocused] = shares.map(|share| format!("{share:.1} %"));
+            let [fixed, refocused] = shares.map(percent);
             table.row([format!("{more} more"), String::new(), String::new(), fixed, refocused]);
         }
         table
     }
 }
 
+/// A share in percent, without the sign of a number that rounds to 0.
+fn percent(share: f64) -> String {
+    let rounded = (1e3 * share).round() / 10.0 + 0.0;
+    format!("{rounded:.1} %")
+}
+
 fn with_error([value, error]: [f64; 2]) -> String {
-    format!("{} +- {error:.1e}", ShortNumber(value))
+    format!("{} ± {error:.1e}", ShortNumber(value))
 }
 
 fn surfaces(first: usize, last: usize) -> String {

@@ -9,11 +9,13 @@ use crate::merit::Goal;
 use crate::optimize::{DescentMethod, pareto};
 use crate::paraxial::{DragSettings, Handle};
 use crate::picture::BuiltInScene;
+use crate::tolerance::ToleranceGrade;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 
 /// A command of the user. An [`Edit`] changes the design and can be undone; the other commands open
 /// and save, control background runs, or set what is shown.
+#[expect(clippy::large_enum_variant, reason = "made once for each action of a person")]
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Command {
@@ -147,6 +149,12 @@ pub enum Command {
     ShowScene(BuiltInScene),
     /// Saves the picture of the scene as PNG.
     SavePicture(PathBuf),
+    /// Sets whether the lens as it is made is computed.
+    ShowTolerances(bool),
+    /// Sets the class of care in making of a lens without tolerances of its own.
+    SetToleranceGrade(ToleranceGrade),
+    /// Sets the largest rms spot radius of a good lens in mm; `None` for no yield.
+    SetGoodRms(Option<f64>),
     /// Sets the index of the wavelength of the pupils; `None` for the primary one.
     ShowPupilWavelength(Option<usize>),
     /// Starts an experiment in place of the one that runs.

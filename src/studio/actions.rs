@@ -11,6 +11,7 @@ use crate::lens::Edit;
 use crate::session::{Command, GrinCommand, StructureSearchCommand};
 
 /// A request of the user to the window.
+#[expect(clippy::large_enum_variant, reason = "made once for each action of a person")]
 #[derive(Debug, Clone, PartialEq)]
 pub enum UiAction {
     /// Runs a command of the session.

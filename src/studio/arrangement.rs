@@ -37,7 +37,7 @@ fn default_arrangement() -> Tree<PanelKind> {
         tabs(&mut tiles, &[Kind::Spot, Kind::Pupil, Kind::Contrast, Kind::Picture, Kind::Seidel]);
     let better = tabs(&mut tiles, &[Kind::Optimizer, Kind::Pareto, Kind::Search, Kind::History]);
     let drawings = tabs(&mut tiles, &[Kind::Layout, Kind::Slice]);
-    let table = tabs(&mut tiles, &[Kind::Prescription, Kind::System, Kind::Zoom]);
+    let table = tabs(&mut tiles, &[Kind::Prescription, Kind::System, Kind::Zoom, Kind::Tolerances]);
     let table = row(&mut tiles, &[(table, 0.71), (facts, 0.29)]);
     let left = column(&mut tiles, &[(drawings, 0.52), (table, 0.48)]);
     let right = column(&mut tiles, &[(light, 0.44), (better, 0.56)]);
@@ -51,7 +51,14 @@ fn search_arrangement() -> Tree<PanelKind> {
     let drawings = tabs(&mut tiles, &[Kind::Layout, Kind::Slice]);
     let light =
         tabs(&mut tiles, &[Kind::Spot, Kind::Pupil, Kind::Contrast, Kind::Picture, Kind::Seidel]);
-    let numbers = [Kind::Prescription, Kind::System, Kind::Zoom, Kind::FirstOrder, Kind::Effects];
+    let numbers = [
+        Kind::Prescription,
+        Kind::System,
+        Kind::Zoom,
+        Kind::Tolerances,
+        Kind::FirstOrder,
+        Kind::Effects,
+    ];
     let numbers = tabs(&mut tiles, &numbers);
     let better = tabs(&mut tiles, &[Kind::Search, Kind::Optimizer, Kind::Pareto, Kind::History]);
     let below = row(&mut tiles, &[(numbers, 0.5), (light, 0.5)]);
@@ -65,7 +72,7 @@ fn large_arrangement() -> Tree<PanelKind> {
     let mut tiles = Tiles::default();
     let drawings = tabs(&mut tiles, &[Kind::Layout, Kind::Slice]);
     let table = tabs(&mut tiles, &[Kind::Prescription]);
-    let system = tabs(&mut tiles, &[Kind::System, Kind::Zoom]);
+    let system = tabs(&mut tiles, &[Kind::System, Kind::Zoom, Kind::Tolerances]);
     let table = row(&mut tiles, &[(table, 0.66), (system, 0.34)]);
     let left = column(&mut tiles, &[(drawings, 0.54), (table, 0.46)]);
     let spots = tabs(&mut tiles, &[Kind::Spot, Kind::Pupil]);

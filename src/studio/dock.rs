@@ -133,6 +133,10 @@ impl Dock {
         if picture != view.settings.picture {
             actions.push(Command::ShowPicture(picture));
         }
+        let tolerances = self.is_visible(PanelKind::Tolerances);
+        if tolerances != view.settings.tolerances {
+            actions.push(Command::ShowTolerances(tolerances));
+        }
         let watched = self.is_visible(PanelKind::Slice);
         if watched != view.grin.is_active {
             actions.push(Command::Grin(GrinCommand::SetActive(watched)));

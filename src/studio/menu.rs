@@ -119,8 +119,9 @@ fn undo_buttons(ui: &mut Ui, view: &SessionView, actions: &mut Actions) {
 
 fn theme_button(ui: &mut Ui) {
     let dark = ui.visuals().dark_mode;
-    let (sign, other) = if dark { ("Light", Theme::Light) } else { ("Dark", Theme::Dark) };
-    let button = ui.button(sign).accessible_name("Switch between dark and light");
+    let (name, other) =
+        if dark { ("Light theme", Theme::Light) } else { ("Dark theme", Theme::Dark) };
+    let button = ui.button(name).accessible_name("Switch between dark and light");
     if button.on_hover_text("Switch between dark and light").clicked() {
         ui.ctx().set_theme(other);
     }

@@ -5,7 +5,7 @@ use super::{
     FocusTreatment, QuadraticForm, RealLens, Sensitivity, ToleranceError, ToleranceScene,
     real_lenses, sensitivities, wilson_interval,
 };
-use crate::lens::{Perturbation, ToleranceSheet};
+use crate::lens::{Perturbation, Tolerance, ToleranceSheet};
 use rayon::prelude::*;
 use serde::Serialize;
 use std::sync::atomic::AtomicBool;
@@ -59,6 +59,10 @@ pub struct AsBuiltSpot {
     pub form_agrees: bool,
     /// The rms that these shares of all lenses do not exceed.
     pub quantiles: Vec<Quantile>,
+    /// The distribution of the rms: shares of all lenses in even steps, with the rms that they do not
+    /// exceed.
+    #[serde(skip)]
+    pub distribution: Vec<Quantile>,
     /// The share of good lenses, if a limit was given.
     pub good: Option<YieldEstimate>,
 }
@@ -89,6 +93,8 @@ pub struct YieldEstimate {
 
 /// The shares of the quantiles.
 const SHARES: [f64; 4] = [0.5, 0.8, 0.9, 0.98];
+/// The steps of the distribution.
+const STEPS: usize = 50;
 /// The number of lenses by the form.
 const FORM_SAMPLES: u64 = 20_000;
 /// The number of real lenses that are traced with rims too.
@@ -135,6 +141,23 @@ pub fn analyze_until(
     Ok(ToleranceAnalysis { sensitivities: found, forms, spots, samples, lost, clipping })
 }
 
+impl ToleranceAnalysis {
+    /// The share of each error in the growth of the expected mean square spot, at the fixed image plane
+    /// and refocused.
+    pub fn growth_shares(&self, tolerances: &[Tolerance]) -> Vec<[f64; 2]> {
+        let total = [0, 1].map(|i| {
+            let form: &QuadraticForm = &self.forms[i];
+            (form.expectation(tolerances) - form.nominal).abs().max(f64::MIN_POSITIVE)
+        });
+        let share = |(tolerance, found): (&Tolerance, &Sensitivity)| {
+            let half = 0.5 * tolerance.deviation().powi(2);
+            let by = [found.mean_square(), found.mean_square_focused()];
+            [half * by[0].second / total[0], half * by[1].second / total[1]]
+        };
+        tolerances.iter().zip(&self.sensitivities).map(share).collect()
+    }
+}
+
 /// The mean changes where rims clip.
 fn clipping(real: &[RealLens]) -> Option<[f64; 3]> {
     let both = real.iter().filter_map(|lens| lens.mean_square.zip(lens.clipped));
@@ -175,6 +198,9 @@ fn as_built(
         difference,
         form_agrees: agrees,
         quantiles: SHARES.map(|share| quantile(share, &many, &pairs)).to_vec(),
+        distribution: (0..=STEPS)
+            .map(|i| quantile(i as f64 / STEPS as f64, &many, &pairs))
+            .collect(),
         good: request.limit.map(|limit| good_share(limit, &many, &pairs, real.len())),
     }
 }

@@ -9,11 +9,14 @@ use crate::lens::{
     ErrorDistribution, Lens, Perturbation, PerturbationKind, Tolerance, ToleranceSheet,
 };
 
+use serde::{Deserialize, Serialize};
+
 /// The wavelength of the test plates, in mm.
 const TEST_WAVELENGTH: f64 = 0.000_632_8;
 
 /// A class of care in making.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum ToleranceGrade {
     /// The accuracy of every shop.
     Commercial,
@@ -48,6 +51,14 @@ struct GradeNumbers {
 }
 
 impl ToleranceGrade {
+    /// Every class with its name, from the loosest to the tightest, moulded plastic last.
+    pub const ALL: [(Self, &'static str); 4] = [
+        (Self::Commercial, "Commercial"),
+        (Self::Precision, "Precision"),
+        (Self::ShopLimit, "Shop limit"),
+        (Self::MouldedPlastic, "Moulded plastic"),
+    ];
+
     fn numbers(self) -> GradeNumbers {
         let of = |[fringes, irregularity, thickness, index, abbe, surface_tilt, decenter, tilt]: [f64; 8]| {
             GradeNumbers { fringes, irregularity, thickness, index, abbe, surface_tilt, decenter, tilt }

@@ -209,4 +209,28 @@ mod tests {
         assert_eq!([turned.point.x, turned.point.y, turned.direction.y], [-1.0, -2.0, -0.6]);
         assert_eq!(opposite.colours[0].pupil[0], [-0.1, -0.2]);
     }
+
+    /// Half a pupil stands for its mirror image, at the mirrored place of the pupil.
+    #[test]
+    fn the_rays_of_a_field_on_an_axis_fill_both_halves_of_the_pupil() {
+        let found = crate::files::bundled_lenses().iter().find(|b| b.name == "tessar_50_f28");
+        let found = found.unwrap();
+        let lens = crate::files::json::read(found.text, found.name).unwrap();
+        let model = RayModel::from_lens(&lens, 0).unwrap();
+        let mut sampler = Sampler { model: &model, tolerance: 1e-2, worst: 0.0 };
+        let field = sampler.field(1).unwrap();
+        for colour in &field.colours {
+            let mean = |of: &dyn Fn(usize) -> f64| -> f64 {
+                (0..colour.rays.len()).map(|i| colour.weights[i] * of(i)).sum()
+            };
+            assert!(mean(&|i| colour.pupil[i][0]).abs() < 1e-12);
+            assert!(mean(&|i| colour.rays[i].point.x).abs() < 1e-10);
+            assert!(mean(&|i| colour.pupil[i][0].abs()) > 0.05);
+            // The same side of the pupil is the same side of the beam.
+            assert!(
+                (0..colour.rays.len())
+                    .all(|i| { colour.pupil[i][0] * colour.rays[i].point.x >= 0.0 })
+            );
+        }
+    }
 }

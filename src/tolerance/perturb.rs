@@ -63,6 +63,9 @@ fn check(lens: &NominalLens, what: Perturbation) -> Result<(), ToleranceError> {
         PerturbationKind::ThicknessAdjusted if first + 1 >= surfaces => {
             refuse("has no gap behind the next surface that could take it up")
         }
+        _ if kind.moves_a_body() && system.surfaces[first..=last].iter().any(breaks_axis) => {
+            refuse("holds a break of the axis, which is not supported")
+        }
         PerturbationKind::ElementRollX | PerturbationKind::ElementRollY
             if own.shape.curvature() == 0.0 =>
         {
@@ -76,6 +79,10 @@ fn check(lens: &NominalLens, what: Perturbation) -> Result<(), ToleranceError> {
         }
         _ => Ok(()),
     }
+}
+
+fn breaks_axis(surface: &Surface<f64>) -> bool {
+    surface.axis.is_some()
 }
 
 /// Adds an error to the numbers of its surface; poses and dispersion are no such numbers.

@@ -111,6 +111,7 @@ fn the_merit_of_the_design_and_its_limits_are_shown_without_asking() {
         value: if term == "spot" { 4e-4 } else { 0.0 },
         error: 1e-9,
         rays: 4200,
+        reached: true,
     };
     let limit = |surface, value| ConstraintMargin {
         term: "glass_edge",
@@ -132,7 +133,7 @@ fn the_merit_of_the_design_and_its_limits_are_shown_without_asking() {
     view.merit = Some(Arc::new(MeritReport { lens, goal, values: Ok(values), ms: 1.0 }));
     let mut harness = panel_harness(OptimizerPanel::default(), view);
     harness.run();
-    for text in ["Merit 0.0004", "20 µm", "100.0 %", "3 limits: 1 broken, 1 binding"] {
+    for text in ["Merit 0.0004", "20 µm", "100 %", "3 limits: 1 broken, 1 binding"] {
         assert!(harness.query_all_by_label(text).count() > 0, "{text}");
     }
     harness.get_by_label("Glass edge at surface 5: 0.2 of at least 0.5").click();

@@ -15,5 +15,6 @@ mod panels;
 mod prescription;
 mod search;
 mod shaders;
+mod tolerances;
 mod unsaved;
 mod window;

@@ -347,8 +347,8 @@ fn the_family_page_shows_the_lineage_of_a_lens() {
     harness.get_by_label_contains(
         "merit 0.05 before, 0.08 after the mutation, 0.02 after the descent",
     );
-    let fates =
-        harness.get_all_by_label_contains("17 moves, 340 gradients in chain 1: ended by its clock");
+    let fates = harness
+        .get_all_by_label_contains("17 moves, 340 gradients in chain 1: ended at random (restart)");
     assert_eq!(fates.count(), 2);
     press(&mut harness, "Show lens 0");
     let lens = Box::new(Lens::clone(&other(0)));

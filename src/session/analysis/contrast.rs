@@ -12,7 +12,7 @@ use crate::session::clock::{Timed, time};
 /// The contrast of all fields over all wavelengths.
 #[derive(Debug, Clone)]
 pub struct FieldContrasts {
-    /// The spatial frequencies of the curves, in line pairs per mm.
+    /// The spatial frequencies of the curves, in cycles/mm.
     pub frequencies: Vec<f64>,
     /// The contrast of a perfect lens of the same working f-number at each frequency; `None` for an
     /// afocal lens.
@@ -74,7 +74,7 @@ fn field_contrast(
     }
 }
 
-/// The frequency in line pairs per mm at which the contrast of a perfect lens ends.
+/// The frequency in cycles/mm at which the contrast of a perfect lens ends.
 fn cutoff(model: &RayModel) -> Option<f64> {
     let f_number = model.first_order.working_f_number?.abs();
     Some(1e3 / (model.channels[model.primary].um * f_number)).filter(|nu| nu.is_finite())

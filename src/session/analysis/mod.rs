@@ -3,10 +3,12 @@
 //! A newer request replaces one that has not begun, and interrupts one that has between two analyses.
 //! Results carry the version of the design that they belong to and the time of each analysis.
 
+mod as_built;
 mod contrast;
 mod pupils;
 mod scene_picture;
 
+pub use as_built::{AsBuiltLens, predict_as_built};
 pub use contrast::{FieldContrast, FieldContrasts};
 pub use pupils::FieldPupils;
 pub use scene_picture::ScenePicture;
@@ -22,6 +24,7 @@ use crate::measure::EffectTask;
 use crate::paraxial::{FirstOrder, Seidel};
 use crate::picture::BuiltInScene;
 use crate::pupil::{Accuracy, RayModel, RayModelError};
+use crate::tolerance::ToleranceGrade;
 use pupils::{field_pupils, for_each_field};
 use serde::{Deserialize, Serialize};
 use std::io;
@@ -69,6 +72,9 @@ pub struct Analyses {
     pub contrasts: Option<Timed<FieldContrasts>>,
     /// A scene through the lens, or the reason why there is none; `None` while no panel shows it.
     pub picture: Option<Arc<Timed<Result<ScenePicture, String>>>>,
+    /// The lens as it is made, or the reason why nothing is known of it; `None` while no panel shows it,
+    /// and at first: it takes longer than all else.
+    pub as_built: Option<Arc<Timed<Result<AsBuiltLens, String>>>>,
     /// The ray fans of each field.
     pub fans: Timed<Vec<Result<Vec<Fan>, AnalysisError>>>,
     /// The distortion at each field.
@@ -124,7 +130,7 @@ pub(super) fn spawn_analysis(
     let mut published = None;
     AnalysisWorker::spawn("analysis", wake, move |request, output| {
         let results = answer(request, output, &mut published);
-        let refined = results.map(|results| refine(results, output));
+        let refined = results.map(|results| refine(publish_prediction(results, output), output));
         if let (Some(results), EffectTiming::Measured) = (refined, timing) {
             measure(results, output);
         }
@@ -151,18 +157,38 @@ fn answer(
     Some(results)
 }
 
-/// Publishes the results once more with a fine picture if a panel shows one and no request interrupts
-/// that.
-fn refine(mut results: AnalysisResults, output: &AnalysisOutput) -> AnalysisResults {
-    let AnalysisSettings { zoom, scene, picture, .. } = results.settings;
-    if !picture || results.analyses.is_err() || !output.idle_for(IDLE_TIME) {
-        return results;
-    }
-    let fine = time(|| catch_panic(|| scene_picture::fine_picture(&results.lens, zoom, scene)));
-    if let Ok(analyses) = &mut results.analyses {
-        analyses.picture = Some(Arc::new(fine));
+/// Publishes the results once more with the lens as it is made if a panel shows it and no request
+/// waits.
+fn publish_prediction(mut results: AnalysisResults, output: &AnalysisOutput) -> AnalysisResults {
+    let Ok(analyses) = &mut results.analyses else { return results };
+    if results.settings.tolerances && !output.is_interrupted() {
+        let predicted = time(|| catch_panic(|| predict_as_built(&results.lens, &results.settings)));
+        analyses.as_built = Some(Arc::new(predicted));
         output.publish(results.clone());
     }
+    results
+}
+
+/// Publishes the results once more with a fine picture, and with real lenses as they are made, if panels
+/// show these and no request interrupts that.
+fn refine(mut results: AnalysisResults, output: &AnalysisOutput) -> AnalysisResults {
+    let settings = results.settings.clone();
+    let asked = settings.picture || settings.tolerances;
+    let Ok(analyses) = &mut results.analyses else { return results };
+    if !asked || !output.idle_for(IDLE_TIME) {
+        return results;
+    }
+    let AnalysisSettings { zoom, scene, .. } = settings;
+    if settings.tolerances {
+        let confirmed =
+            time(|| catch_panic(|| as_built::confirm_as_built(&results.lens, &settings)));
+        analyses.as_built = Some(Arc::new(confirmed));
+    }
+    if settings.picture && !output.is_interrupted() {
+        let fine = time(|| catch_panic(|| scene_picture::fine_picture(&results.lens, zoom, scene)));
+        analyses.picture = Some(Arc::new(fine));
+    }
+    output.publish(results.clone());
     results
 }
 
@@ -275,6 +301,7 @@ impl Analyses {
             pupils,
             contrasts,
             picture,
+            as_built: None,
             fans,
             illumination,
         })
@@ -306,6 +333,10 @@ fn spot_with_time(
 
 /// The settings of the analyses.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[expect(
+    clippy::struct_excessive_bools,
+    reason = "each panel that is shown has a switch of its own"
+)]
 pub struct AnalysisSettings {
     /// The relative error allowed of the numbers.
     pub tolerance: f64,
@@ -326,6 +357,15 @@ pub struct AnalysisSettings {
     /// The scene of the picture.
     #[serde(default)]
     pub scene: BuiltInScene,
+    /// True if the lens as it is made is computed, because a panel shows it.
+    #[serde(default)]
+    pub tolerances: bool,
+    /// The class of care in making of a lens without tolerances of its own.
+    #[serde(default)]
+    pub grade: ToleranceGrade,
+    /// The largest rms spot radius of a good lens in mm; `None` for no yield.
+    #[serde(default)]
+    pub good_rms: Option<f64>,
     /// The index of the wavelength of the pupils; `None` for the primary one.
     pub pupil_wavelength: Option<usize>,
 }
@@ -341,6 +381,9 @@ impl Default for AnalysisSettings {
             contrasts: false,
             picture: false,
             scene: BuiltInScene::default(),
+            tolerances: false,
+            grade: ToleranceGrade::default(),
+            good_rms: None,
             pupil_wavelength: None,
         }
     }

@@ -231,20 +231,31 @@ impl Session {
             Command::ShowCandidate(shown) => self.shows_candidate = shown,
             Command::SetTolerance(tolerance) => self.set_tolerance(tolerance),
             Command::ShowZoom(zoom) => self.show_zoom(zoom),
-            Command::ShowRays(rays) => self.change_settings(|s| s.rays = rays.min(MAX_RAYS)),
             Command::SetEffect(effect, choice) => self.set_effect(effect, choice),
-            Command::ShowPupils(shown) => self.change_settings(|s| s.pupils = shown),
-            Command::ShowContrasts(shown) => self.change_settings(|s| s.contrasts = shown),
-            Command::ShowPicture(shown) => self.change_settings(|s| s.picture = shown),
-            Command::ShowScene(scene) => self.change_settings(|s| s.scene = scene),
             Command::SavePicture(path) => self.save_picture(&path),
-            Command::ShowPupilWavelength(w) => self.change_settings(|s| s.pupil_wavelength = w),
             Command::StartExperiment { id, effort } => self.start_experiment(&id, effort),
             Command::CancelExperiment => self.experiment.cancel(),
             Command::DismissExperiment => self.experiment.dismiss(),
             Command::SaveExperiment(folder) => self.save_experiment(&folder),
             Command::Select(surface) => self.selected = surface,
             Command::ClearMessages => self.messages = Arc::default(),
+            shown => self.show(&shown),
+        }
+    }
+
+    /// Carries out a command about what the panels show of the design; others do nothing here.
+    fn show(&mut self, command: &Command) {
+        match *command {
+            Command::ShowRays(rays) => self.change_settings(|s| s.rays = rays.min(MAX_RAYS)),
+            Command::ShowPupils(shown) => self.change_settings(|s| s.pupils = shown),
+            Command::ShowContrasts(shown) => self.change_settings(|s| s.contrasts = shown),
+            Command::ShowPicture(shown) => self.change_settings(|s| s.picture = shown),
+            Command::ShowScene(scene) => self.change_settings(|s| s.scene = scene),
+            Command::ShowTolerances(shown) => self.change_settings(|s| s.tolerances = shown),
+            Command::SetToleranceGrade(grade) => self.change_settings(|s| s.grade = grade),
+            Command::SetGoodRms(rms) => self.change_settings(|s| s.good_rms = rms),
+            Command::ShowPupilWavelength(w) => self.change_settings(|s| s.pupil_wavelength = w),
+            _ => {}
         }
     }
 

@@ -17,6 +17,7 @@ mod search;
 mod seidel;
 mod spot;
 mod system;
+mod tolerances;
 pub(super) mod widgets;
 mod zoom;
 
@@ -36,6 +37,7 @@ pub use search::SearchPanel;
 pub use seidel::SeidelPanel;
 pub use spot::SpotPanel;
 pub use system::SystemPanel;
+pub use tolerances::TolerancesPanel;
 pub use zoom::ZoomPanel;
 
 use std::sync::Arc;
@@ -83,6 +85,8 @@ pub enum PanelKind {
     Contrast,
     /// A scene seen through the lens.
     Picture,
+    /// Manufacturing errors and what they do to the lens.
+    Tolerances,
     /// The search for a better lens.
     Optimizer,
     /// The Pareto front of sharpness against light.
@@ -105,7 +109,7 @@ pub enum PanelKind {
 
 impl PanelKind {
     /// Every panel. A new one is a file in this folder, an entry here and a place in the window.
-    pub const ALL: [Self; 16] = [
+    pub const ALL: [Self; 17] = [
         Self::Layout,
         Self::Slice,
         Self::Prescription,
@@ -113,6 +117,7 @@ impl PanelKind {
         Self::Pupil,
         Self::Contrast,
         Self::Picture,
+        Self::Tolerances,
         Self::Optimizer,
         Self::Pareto,
         Self::Search,
@@ -134,6 +139,7 @@ impl PanelKind {
             Self::Pupil => Box::new(PupilPanel::default()),
             Self::Contrast => Box::new(ContrastPanel),
             Self::Picture => Box::new(PicturePanel::default()),
+            Self::Tolerances => Box::new(TolerancesPanel::default()),
             Self::Optimizer => Box::new(OptimizerPanel::default()),
             Self::Pareto => Box::new(ParetoPanel::default()),
             Self::Search => Box::new(SearchPanel::default()),

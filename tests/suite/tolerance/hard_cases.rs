@@ -143,6 +143,8 @@ fn the_command_shows_sensitivities_and_spots() {
     assert!(json["spots"][1]["good"]["interval"][1].as_f64().unwrap() <= 1.0);
     assert_eq!(json["loosest"].as_array().unwrap().len(), 3);
     refused(2, &["tolerance", lens, "--rms=-1"], "", &["--rms"]);
+    refused(2, &["tolerance", lens, "--rms=0"], "", &["--rms"]);
+    refused(2, &["tolerance", lens, "--loosest=0"], "", &["--loosest"]);
     refused(2, &["tolerance", lens, "--samples", "1"], "", &["--samples", "2.."]);
     refused(2, &["tolerance", lens, "--grade", "good"], "", &["commercial"]);
     std::fs::write(&path, SINGLET.replace("\"last\": 1", "\"last\": 7")).unwrap();

@@ -1,0 +1,72 @@
+//! The lens as it is made, for the window.
+//!
+//! Sensitivities and the quadratic form follow every edit; once the lens is still, real lenses with
+//! random errors correct them.
+
+use super::AnalysisSettings;
+use crate::lens::{Lens, ToleranceSheet};
+use crate::tolerance::{
+    ToleranceAnalysis, ToleranceError, ToleranceRequest, ToleranceScene, analyze, graded_sheet,
+};
+
+/// The tolerances of a lens and what they do to it.
+#[derive(Debug, Clone)]
+pub struct AsBuiltLens {
+    /// The tolerances.
+    pub sheet: ToleranceSheet,
+    /// True if they are those of the lens file; false if a grade proposes them.
+    pub from_lens: bool,
+    /// The share of each error in the growth of the expected mean square spot, at the fixed image plane
+    /// and refocused.
+    pub shares: Vec<[f64; 2]>,
+    /// The analysis.
+    pub analysis: ToleranceAnalysis,
+    /// The number of rays of the lens as designed.
+    pub rays: usize,
+    /// The largest relative error of the radius of a spot by the sampling of its pupil.
+    pub sampling_error: f64,
+}
+
+/// The relative error of spots while the lens changes.
+const COARSE: f64 = 1e-2;
+/// The number of real lenses of one that is still.
+const REAL_LENSES: usize = 500;
+/// The seed of their errors.
+const SEED: u64 = 1;
+
+/// The lens as it is made, by its derivatives alone.
+///
+/// # Errors
+/// A lens that no light gets through, or a tolerance that is not possible, in words.
+pub fn predict_as_built(lens: &Lens, settings: &AnalysisSettings) -> Result<AsBuiltLens, String> {
+    as_built(lens, settings, COARSE.max(settings.tolerance), 0).map_err(|why| why.to_string())
+}
+
+/// The lens as it is made, corrected by real lenses.
+pub(super) fn confirm_as_built(
+    lens: &Lens,
+    settings: &AnalysisSettings,
+) -> Result<AsBuiltLens, String> {
+    as_built(lens, settings, settings.tolerance, REAL_LENSES).map_err(|why| why.to_string())
+}
+
+fn as_built(
+    lens: &Lens,
+    settings: &AnalysisSettings,
+    tolerance: f64,
+    samples: usize,
+) -> Result<AsBuiltLens, ToleranceError> {
+    let scene = ToleranceScene::new(lens, settings.zoom, tolerance)?;
+    let graded = || graded_sheet(lens, &scene.lens, settings.grade);
+    let sheet = lens.tolerances.clone().unwrap_or_else(graded);
+    let request = ToleranceRequest { seed: SEED, samples, limit: settings.good_rms };
+    let analysis = analyze(&scene, &sheet, request)?;
+    Ok(AsBuiltLens {
+        shares: analysis.growth_shares(&sheet.errors),
+        sheet,
+        from_lens: lens.tolerances.is_some(),
+        analysis,
+        rays: scene.beam.rays(),
+        sampling_error: scene.sampling_error,
+    })
+}
