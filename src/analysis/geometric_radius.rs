@@ -94,17 +94,12 @@ impl PeakSearch<'_> {
             self.rays += radius.rays;
             lattice.push(self.distances(&shares.map(|share| radius.point(share))));
         }
-        let mut peaks = Vec::new();
-        for (i, row) in lattice.iter().enumerate() {
-            for (j, distance) in row.iter().copied().enumerate() {
-                let around = neighbours(&lattice, i, j, half);
-                if distance >= around.iter().copied().fold(0.0, f64::max) {
-                    let place = [azimuths[i], shares[j]];
-                    peaks.push(Peak { place, distance, rise: rise(distance, around) });
-                }
-            }
-        }
-        peaks
+        let peak = |(i, j, rise): (usize, usize, f64)| Peak {
+            place: [azimuths[i], shares[j]],
+            distance: lattice[i][j],
+            rise,
+        };
+        local_peaks(&lattice, half).map(peak).collect()
     }
 
     /// The distances of the rays of some pupil points; −∞ for those that do not arrive.
@@ -183,6 +178,17 @@ impl Peak {
     }
 }
 
+/// The places of a lattice that no neighbour exceeds, each with the amount by which its peak may rise.
+fn local_peaks(lattice: &[Vec<f64>], half: bool) -> impl Iterator<Item = (usize, usize, f64)> {
+    let places =
+        lattice.iter().enumerate().flat_map(|(i, row)| (0..row.len()).map(move |j| (i, j)));
+    places.filter_map(move |(i, j)| {
+        let (distance, around) = (lattice[i][j], neighbours(lattice, i, j, half));
+        let highest = around.iter().copied().fold(0.0, f64::max);
+        (distance >= highest).then(|| (i, j, rise(distance, around)))
+    })
+}
+
 /// By how much a peak may rise between its neighbours.
 fn rise(distance: f64, around: impl IntoIterator<Item = f64>) -> f64 {
     let low = around.into_iter().filter(|other| other.is_finite()).fold(distance, f64::min);
@@ -213,4 +219,27 @@ fn vertex(peak: &Peak, around: &[Peak], step: [f64; 2]) -> [f64; 2] {
     };
     let shifts = [shift(left, right), shift(low, high)];
     [0, 1].map(|k| peak.place[k] + shifts[k].clamp(-1.0, 1.0) * step[k])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_vertex_of_a_paraboloid_is_found_from_its_neighbours() {
+        let top = [0.03, -0.004];
+        let step = [0.1, 0.01];
+        let at = |x: f64, y: f64| {
+            let distance = 5.0 - 3.0 * (x - top[0]).powi(2) - 40.0 * (y - top[1]).powi(2);
+            Peak { place: [x, y], distance, rise: 0.0 }
+        };
+        let shares = [-1.0, 0.0, 1.0];
+        let steps = shares.into_iter().flat_map(|i| shares.map(|j| [i, j]));
+        let around: Vec<Peak> = steps
+            .filter(|step| *step != [0.0; 2])
+            .map(|[i, j]| at(i * step[0], j * step[1]))
+            .collect();
+        let found = vertex(&at(0.0, 0.0), &around, step);
+        assert!((found[0] - top[0]).hypot(found[1] - top[1]) < 1e-12, "{found:?}");
+    }
 }

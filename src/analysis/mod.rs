@@ -10,6 +10,7 @@ mod color_error;
 mod diffraction;
 mod distortion;
 mod fan;
+mod fitted_wavefront;
 mod footprint;
 mod geometric_radius;
 mod illumination;
@@ -36,11 +37,15 @@ pub use diffraction::{
 };
 pub use distortion::{Distortion, FieldCurvature, distortion, field_curvature};
 pub use fan::{Fan, FanPoint, fan};
+pub use fitted_wavefront::{
+    FittedWavefront, ImageRay, WavefrontReference, image_rays, rms_without_tilt,
+};
 pub use footprint::{Footprint, footprint};
 pub use illumination::{Illumination, energy_irradiance, illumination, image_cone, irradiance};
 pub use image_quality::{ImageQuality, field_qualities, field_quality, image_quality};
 pub use mtf::{
-    MtfCurve, MtfPoint, TransferValue, geometric_mtf, perfect_contrast, polychromatic_geometric_mtf,
+    MtfCurve, MtfPoint, TransferValue, geometric_mtf, perfect_contrast,
+    polychromatic_geometric_mtf, transfer,
 };
 pub use pupil::{FieldPupil, PupilExtent, PupilShape, RayLoss, pupil};
 pub use ray_layout::{LayoutRay, RayLayout, ray_layout};

@@ -26,7 +26,7 @@ pub struct TransferValue {
 /// The contrast at one spatial frequency.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct MtfPoint {
-    /// The spatial frequency, in line pairs per mm.
+    /// The spatial frequency, in cycles/mm.
     pub frequency: f64,
     /// For lines perpendicular to y: from the spread of light along y.
     pub tangential: TransferValue,
@@ -56,7 +56,7 @@ impl TransferValue {
     }
 }
 
-/// The geometric contrast of a field at one wavelength and some frequencies in line pairs per mm;
+/// The geometric contrast of a field at one wavelength and some frequencies in cycles/mm;
 /// errors are absolute.
 ///
 /// # Errors
@@ -119,7 +119,10 @@ pub(super) fn origin(
     })
 }
 
-fn transfer(
+/// The mean of `exp(−2πiν x)` over the light of some nodes, with distances from an origin: for each
+/// frequency in cycles/mm the real and imaginary part of the tangential value, then of the sagittal
+/// one. `None` if no ray arrives.
+pub fn transfer(
     region: &Region<'_>,
     nodes: &Nodes,
     [x0, y0]: [f64; 2],

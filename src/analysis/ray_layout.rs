@@ -82,9 +82,10 @@ impl RayLayout {
 
 /// The z at which rays begin: in front of all surfaces, also of mirrors before the first vertex.
 fn drawing_start(model: &RayModel) -> f64 {
-    let positions = model.channels[model.primary].system.vertex_positions();
-    let first = positions.iter().copied().fold(0.0, f64::min);
-    let last = positions.iter().copied().fold(0.0, f64::max);
+    let frames = model.channels[model.primary].system.frames();
+    let positions = || frames.iter().map(|frame| frame.shift.z);
+    let first = positions().fold(0.0, f64::min);
+    let last = positions().fold(0.0, f64::max);
     first - LEAD * (last - first)
 }
 

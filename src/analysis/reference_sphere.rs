@@ -30,6 +30,52 @@ pub enum ReferenceForm {
     Plane,
 }
 
+impl ReferenceForm {
+    /// The form of the sphere of a pupil.
+    ///
+    /// # Errors
+    /// No ray of the pupil arrives.
+    pub fn of_region(region: &Region<'_>) -> Result<Self, AnalysisError> {
+        Ok(ReferenceSphere::for_region(region)?.form)
+    }
+
+    /// The length from a point of a ray near the image, at `off` from the centre of the sphere, to
+    /// the sphere, beyond that of the ray through the centre, in mm; `None` if the ray misses the
+    /// sphere, and for a plane, which has no centre.
+    pub fn length_beyond<R: Real>(self, off: Vec3<R>, direction: Vec3<R>) -> Option<R> {
+        self.meet(off, direction).map(|(beyond, _)| beyond)
+    }
+
+    /// [`ReferenceForm::length_beyond`], and the cosine of the angle between the ray and the normal
+    /// of the sphere where they meet.
+    #[inline(always)]
+    fn meet<R: Real>(self, off: Vec3<R>, direction: Vec3<R>) -> Option<(R, R)> {
+        let along = off.dot(direction);
+        match self {
+            Self::ExitPupil(signed) | Self::Replaced(signed) => {
+                let (radius, sense) = (R::from_f64(signed.abs()), R::from_f64(signed.signum()));
+                let square = off.dot(off) - along * along;
+                let rest = radius * radius - square;
+                if !(rest >= R::ZERO) {
+                    return None;
+                }
+                let root = rest.sqrt();
+                Some((sense * square / (radius + root) - along, root / radius))
+            }
+            Self::Infinite => Some((-along, R::ONE)),
+            Self::Plane => None,
+        }
+    }
+
+    /// One over the signed radius, in 1/mm; 0 for an infinite one.
+    fn curvature(self) -> f64 {
+        match self {
+            Self::ExitPupil(radius) | Self::Replaced(radius) => radius.recip(),
+            Self::Infinite | Self::Plane => 0.0,
+        }
+    }
+}
+
 /// The reference sphere of a field, with the chief ray that ends at its centre.
 #[derive(Debug, Clone)]
 pub(super) struct ReferenceSphere {
@@ -135,25 +181,13 @@ impl ReferenceSphere {
     pub(super) fn project<R: Real>(&self, ray: Ray<R>, path: R) -> Option<SphereRay<R>> {
         let off = ray.point - Vec3::from_f64(self.center);
         let d = ray.direction;
-        let a = off.dot(d);
-        let (beyond, to_center) = match self.form {
-            ReferenceForm::ExitPupil(signed) | ReferenceForm::Replaced(signed) => {
-                let (radius, sense) = (R::from_f64(signed.abs()), R::from_f64(signed.signum()));
-                let square = off.dot(off) - a * a;
-                let rest = radius * radius - square;
-                if !(rest >= R::ZERO) {
-                    return None;
-                }
-                let root = rest.sqrt();
-                let scale = R::ONE / radius;
-                let cosines = d * (root * scale) + (d * a - off) * (sense * scale);
-                (sense * square / (radius + root) - a, cosines)
-            }
-            ReferenceForm::Infinite => (-a, d),
-            ReferenceForm::Plane => {
-                let chief = Vec3::from_f64(self.direction);
-                (-(off.dot(chief) / d.dot(chief)), d)
-            }
+        let (beyond, to_center) = if self.form == ReferenceForm::Plane {
+            let chief = Vec3::from_f64(self.direction);
+            (-(off.dot(chief) / d.dot(chief)), d)
+        } else {
+            let (beyond, cosine) = self.form.meet(off, d)?;
+            let across = (d * off.dot(d) - off) * R::from_f64(self.form.curvature());
+            (beyond, d * cosine + across)
         };
         let difference = R::from_f64(self.path) - path - R::from_f64(self.index) * beyond;
         let waves = difference * R::from_f64(1.0 / self.wavelength);

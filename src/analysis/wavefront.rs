@@ -5,7 +5,7 @@
 //! positive differences.
 
 use super::reference_sphere::{ReferenceForm, ReferenceSphere};
-use super::{AnalysisError, Estimate, lit_region};
+use super::{AnalysisError, Estimate, lit_region, rms_without_tilt};
 use crate::lens::FieldPoint;
 use crate::math::Vec3;
 use crate::pupil::{Accuracy, Nodes, RayModel, Region, converge};
@@ -17,6 +17,9 @@ pub struct Wavefront {
     /// The standard deviation of the path difference over the lit pupil, in wavelengths: piston is
     /// removed, tilt is not.
     pub rms: Estimate,
+    /// The same with tilt removed too: about the image point that makes it least, defocus as it is.
+    /// `None` for an afocal lens, and if rays miss the reference sphere.
+    pub rms_without_tilt: Option<Estimate>,
     /// The mean path difference from the chief ray, in wavelengths.
     pub mean: Estimate,
     /// True if the tolerance was reached.
@@ -55,16 +58,23 @@ pub fn wavefront(
     let region = lit_region(model, field, wavelength)?;
     let sphere = ReferenceSphere::for_region(&region)?;
     let rounding = sphere.rounding();
-    let scales = |[rms, _, _]: &[f64; 3]| {
+    let scales = |[rms, _, _, _]: &[f64; 4]| {
         let scale = rms.max(rounding / accuracy.tolerance);
-        [scale, scale, 1.0]
+        [scale, scale, 1.0, scale]
     };
-    let found = converge(&region, accuracy, |nodes| moments(&sphere, &region, nodes), scales);
+    let numbers = |nodes: &Nodes| {
+        let [rms, mean, missed] = moments(&sphere, &region, nodes)?;
+        let without_tilt = rms_without_tilt(&region, nodes, sphere.form);
+        Some([rms, mean, missed, without_tilt.unwrap_or(0.0)])
+    };
+    let found = converge(&region, accuracy, numbers, scales);
     let found = found.ok_or(AnalysisError::NoLight)?;
     let estimate =
         |k: usize| Estimate::new(found.values[k], found.errors[k].max(rounding), found.rays);
+    let has_best_point = sphere.form != ReferenceForm::Plane && found.values[2] == 0.0;
     Ok(Wavefront {
         rms: estimate(0),
+        rms_without_tilt: has_best_point.then(|| estimate(3)),
         mean: estimate(1),
         converged: found.converged,
         reference: sphere.form,

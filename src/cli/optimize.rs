@@ -6,12 +6,12 @@ use super::failures::Failures;
 use super::input::{self, LensFile, LoadedLens, Tolerance};
 use super::limit_prices;
 use super::names::value_name;
-use super::output::{Output, ShortNumber, or_dash, write_saved};
+use super::output::{Output, ShortNumber, TextTable, or_dash, write_saved};
 use super::output_paths::OutputPaths;
 use super::progress::{progress_bar, stop_flag};
 use super::terms::TermComparison;
 use crate::files::{self, FileError, json};
-use crate::lens::{Lens, ParameterKind, add_variables};
+use crate::lens::{Lens, ParameterKind, Quantity, Variable, add_variables};
 use crate::measure::time_ms;
 use crate::merit::{Goal, Merit, MeritError, TermValue};
 use crate::optimize::{
@@ -51,8 +51,9 @@ pub(super) struct OptimizeArgs {
     #[arg(long, value_enum, value_delimiter = ',', value_name = "KINDS")]
     vary: Vec<ParameterKind>,
 
-    /// The merit function, as JSON; absent: that of the lens file, or else sharp spots at the
-    /// present focal length
+    /// The merit function, as JSON, in place of the default one with all its terms, limits of
+    /// thicknesses included; absent: that of the lens file, or else sharp spots at the present focal
+    /// length within limits
     #[arg(long, value_name = "FILE")]
     goal: Option<PathBuf>,
 
@@ -81,7 +82,7 @@ impl OptimizeArgs {
         let opened = self.lens.open()?;
         let mut lens = design.working_lens(&opened.lens);
         add_variables(&mut lens, &self.vary);
-        let refuse = |source| merit_error(&opened, source);
+        let refuse = |source| self.merit_error(&opened, source);
         let goal = self.goal(&lens).map_err(|e| e.or_else(refuse))?;
         let started = start(self.method, &lens, &goal, self.error.0);
         let mut optimizer = started.map_err(refuse)?;
@@ -130,6 +131,21 @@ impl OptimizeArgs {
         }
     }
 
+    /// The error of a merit function: a wrong term is one of the file of the goal, if there is one.
+    fn merit_error(&self, opened: &LoadedLens, source: MeritError) -> CliError {
+        let file = match (&self.goal, &source) {
+            (Some(goal), MeritError::DoesNotApply { .. }) => input::display_name(goal),
+            _ => opened.file.clone(),
+        };
+        match source {
+            MeritError::NoVariables => CliError::Input(format!(
+                "{file}: found no variables; expected some in the file (`\"variables\"`), or kinds \
+                 of parameters to vary: `--vary curvatures,thicknesses`"
+            )),
+            source => CliError::Merit { file, source },
+        }
+    }
+
     /// Steps until convergence, the maximum number of steps or Ctrl-C.
     fn search(&self, optimizer: &mut dyn Optimizer, stop: &AtomicBool) -> OptimizeRun {
         let most = self.steps.unwrap_or(default_steps(self.method));
@@ -168,17 +184,6 @@ impl GoalError {
             Self::Failure(failure) => failure,
             Self::Merit(source) => refuse(source),
         }
-    }
-}
-
-fn merit_error(opened: &LoadedLens, source: MeritError) -> CliError {
-    let file = opened.file.clone();
-    match source {
-        MeritError::NoVariables => CliError::Input(format!(
-            "{file}: found no variables; expected some in the file (`\"variables\"`), or kinds of \
-             parameters to vary: `--vary curvatures,thicknesses`"
-        )),
-        source => CliError::Merit { file, source },
     }
 }
 
@@ -249,6 +254,9 @@ struct OptimizeReport {
     /// The limits that hold the best lens, with their prices.
     limits: Vec<LimitPrice>,
     variables: Vec<VariableComparison>,
+    /// True if thicknesses vary that no term limits.
+    #[serde(skip)]
+    free_thicknesses: bool,
     #[serde(flatten)]
     effects: EffectReport,
     out: Option<String>,
@@ -291,12 +299,33 @@ struct VariableComparison {
     after: Option<f64>,
 }
 
+/// The terms that limit thicknesses.
+const THICKNESS_TERMS: [&str; 8] = [
+    "glass_center",
+    "glass_edge",
+    "air_center",
+    "air_edge",
+    "total_track",
+    "back_focus",
+    "gap",
+    "track",
+];
+
+/// True if a lens varies thicknesses that none of these terms limits.
+fn has_free_thicknesses(lens: &Lens, terms: &[TermValue]) -> bool {
+    let is_thickness = |variable: &Variable| {
+        matches!(variable.parameter.quantity, Quantity::Thickness | Quantity::ZoomThickness(_))
+    };
+    let is_limited = terms.iter().any(|term| THICKNESS_TERMS.contains(&term.term));
+    lens.variables.iter().any(is_thickness) && !is_limited
+}
+
 impl OptimizeReport {
     fn new(args: &OptimizeArgs, lens: &Lens, best: &Lens, found: OptimizeOutcome<'_>) -> Self {
         let OptimizeOutcome { search, ms, light, before, after, limits, saved, effects } = found;
         let merit = |terms: &[TermValue]| terms.iter().map(|t| t.weight * t.value).sum();
         let refusals = || search.steps.iter().filter_map(|step| step.refused.as_ref());
-        let variable = |v: &crate::lens::Variable| VariableComparison {
+        let variable = |v: &Variable| VariableComparison {
             parameter: v.parameter.to_string(),
             before: lens.get(v.parameter),
             after: best.get(v.parameter),
@@ -314,12 +343,32 @@ impl OptimizeReport {
             focal_lengths: FocalLengths::compare(lens, best),
             refused_steps: refusals().count(),
             last_refusal: refusals().next_back().cloned(),
+            free_thicknesses: has_free_thicknesses(lens, &after),
             terms: TermComparison::compare(&before, &after),
             limits,
             variables: lens.variables.iter().map(variable).collect(),
             effects,
             out: saved.then(|| args.out.display().to_string()),
             lens: (!saved).then(|| best.clone()),
+        }
+    }
+}
+
+/// The number of variables in the text.
+const SHOWN_VARIABLES: usize = 30;
+
+impl OptimizeReport {
+    fn write_variables(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mut table = TextTable::new(&["variable", "before", "after"]);
+        for VariableComparison { parameter, before, after } in
+            self.variables.iter().take(SHOWN_VARIABLES)
+        {
+            table.row([parameter.clone(), or_dash(*before), or_dash(*after)]);
+        }
+        write!(f, "{table}")?;
+        match self.variables.len().saturating_sub(SHOWN_VARIABLES) {
+            0 => writeln!(f),
+            more => writeln!(f, "{more} more in --json\n"),
         }
     }
 }
@@ -358,10 +407,17 @@ impl Display for OptimizeReport {
                 "  no term depends on the light: part of the sharpness was gained by clipping"
             )?;
         }
+        if self.free_thicknesses {
+            writeln!(f, "  no term limits thicknesses, but thicknesses vary")?;
+        }
         writeln!(f)?;
         let table = TermComparison::table(&self.terms);
         writeln!(f, "{table}")?;
-        limit_prices::write(&self.limits, f)?;
+        if let Some(note) = TermComparison::note(&self.terms) {
+            writeln!(f, "{note}")?;
+        }
+        limit_prices::write(&self.limits, *merit_after, f)?;
+        self.write_variables(f)?;
         writeln!(f, "{}", self.effects)?;
         write_saved(f, self.out.as_deref(), self.lens.as_ref())
     }

@@ -18,11 +18,13 @@ struct TermEstimate {
     value: f64,
     error: f64,
     rays: usize,
+    reached: bool,
 }
 
 impl TermEstimate {
     fn new(term: &TermValue) -> Self {
-        Self { value: term.value, error: term.error, rays: term.rays }
+        let TermValue { value, error, rays, reached, .. } = *term;
+        Self { value, error, rays, reached }
     }
 }
 
@@ -36,6 +38,19 @@ impl TermComparison {
             after: TermEstimate::new(after),
         };
         before.iter().zip(after).map(term).collect()
+    }
+
+    /// A note on the terms that the rays do not sample to the tolerance; `None` without such terms.
+    pub(super) fn note(terms: &[Self]) -> Option<String> {
+        let coarse = terms.iter().filter(|term| !(term.before.reached && term.after.reached));
+        let names: Vec<&str> = coarse.map(|term| term.term).collect();
+        let text = || {
+            format!(
+                "note: the tolerance is not reached, the errors are as shown: {}",
+                names.join(", ")
+            )
+        };
+        (!names.is_empty()).then(text)
     }
 
     /// A table with a row for each term.

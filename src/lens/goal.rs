@@ -25,8 +25,8 @@ pub struct Goal {
     pub limits: LimitTreatment,
 }
 
-/// Treatment of the terms that limit a lens by the trust-region optimizer: all but spots,
-/// distortion and throughput. The methods without constraints, Adam and damped least squares,
+/// Treatment of the terms that limit a lens by the trust-region optimizer: all but spots, wavefronts,
+/// contrasts, distortion and throughput. The methods without constraints, Adam and damped least squares,
 /// always take them as penalties.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -96,6 +96,17 @@ pub enum Term {
     /// The integral of the square distance from the centroid over the pupil, in mm⁴: (3.24), the
     /// mean over fields and wavelengths by weight.
     SpotIntegral,
+    /// The mean square wavefront, in squared waves of each wavelength: path differences from a sphere
+    /// about the image point that makes them least, over fields and wavelengths by weight.
+    Wavefront,
+    /// The mean squared shortfall of the geometric modulation transfer, tangential and sagittal, from
+    /// a minimum, over fields by weight.
+    GeometricMtf {
+        /// The spatial frequency at the image, in cycles/mm.
+        frequency: f64,
+        /// The minimum modulation, at most 1.
+        min: f64,
+    },
     /// The negative area of the pupil in the first vertex plane, in mm²: (3.25), the weighted mean
     /// over fields and wavelengths.
     Throughput,
@@ -180,6 +191,8 @@ impl Term {
             Self::TotalTrack(_) => "total_track",
             Self::BackFocus(_) => "back_focus",
             Self::SpotIntegral => "spot_integral",
+            Self::Wavefront => "wavefront",
+            Self::GeometricMtf { .. } => "geometric_mtf",
             Self::Throughput => "throughput",
             Self::ThroughputLoss(_) => "throughput_loss",
             Self::Light(_) => "light",
@@ -194,7 +207,12 @@ impl Term {
     /// The targets and limits of the term.
     pub(crate) fn numbers(self) -> Vec<f64> {
         match self {
-            Self::Spot | Self::SpotIntegral | Self::Throughput | Self::Distortion => Vec::new(),
+            Self::Spot
+            | Self::SpotIntegral
+            | Self::Wavefront
+            | Self::Throughput
+            | Self::Distortion => Vec::new(),
+            Self::GeometricMtf { frequency, min } => vec![frequency, min],
             Self::GlassCenter { min, max }
             | Self::AirCenter { min, max }
             | Self::SemiDiameter { min, max } => vec![min, max],
@@ -218,6 +236,8 @@ impl Term {
         match self {
             Self::Spot
             | Self::SpotIntegral
+            | Self::Wavefront
+            | Self::GeometricMtf { .. }
             | Self::Throughput
             | Self::ThroughputLoss(_)
             | Self::Light(_) => &[Fields, Wavelengths, Zooms],
@@ -266,11 +286,13 @@ impl Term {
                 *max *= factor;
             }
             Self::ThroughputLoss(area) => *area *= factor * factor,
+            Self::GeometricMtf { frequency, .. } => *frequency /= factor,
             Self::Operand { kind, min, max } if !kind.is_angle() => {
                 min.iter_mut().chain(max).for_each(|bound| *bound *= factor);
             }
             Self::Spot
             | Self::SpotIntegral
+            | Self::Wavefront
             | Self::Throughput
             | Self::Light(_)
             | Self::RelativeIllumination { .. }
@@ -286,6 +308,7 @@ impl Term {
         match self {
             Self::SpotIntegral => 4,
             Self::ThroughputLoss(_)
+            | Self::GeometricMtf { .. }
             | Self::Light(_)
             | Self::RelativeIllumination { .. }
             | Self::FNumber(_)

@@ -24,6 +24,15 @@ const STEEPNESS_IN_SPOT: f64 = 0.1;
 /// The relative illumination asked of the last field.
 const CORNER_ILLUMINATION: f64 = 0.5;
 
+/// The radius of the blur of an RMS wavefront of one wave, over wavelength and f-number.
+const WAVE_BLUR: f64 = 8.0;
+/// A wavelength of visible light, in mm.
+const PRIMARY: f64 = 5.5e-4;
+/// The spatial frequency of a proposed contrast, in cycles/mm, and its minimum: those of a picture on
+/// film.
+const MTF_FREQUENCY: f64 = 30.0;
+const MTF_MIN: f64 = 0.5;
+
 /// The limits that a lens has to satisfy, with the weight 1 for squared violations in mm².
 #[derive(Debug, Clone, PartialEq)]
 pub struct GoalLimits {
@@ -167,6 +176,8 @@ pub fn default_terms(lens: &Lens, zoom: usize, figures: &LensFigures) -> Vec<Wei
     vec![
         unit(Term::Spot),
         weighted(Term::SpotIntegral, 1.0 / light),
+        weighted(Term::Wavefront, (WAVE_BLUR * f_number * PRIMARY).powi(2)),
+        weighted(Term::GeometricMtf { frequency: MTF_FREQUENCY, min: MTF_MIN }, spot),
         weighted(Term::Light(1.0), given_away),
         weighted(Term::FNumber(f_number), given_away / f_number.powi(2)),
         weighted(Term::RelativeIllumination { field, min: CORNER_ILLUMINATION }, given_away),

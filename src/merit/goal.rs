@@ -20,16 +20,41 @@ impl Term {
         )
     }
 
+    /// True if the term is computed from all rays of the pupils.
+    pub(super) const fn is_of_rays(self) -> bool {
+        matches!(
+            self,
+            Self::Spot | Self::SpotIntegral | Self::Wavefront | Self::GeometricMtf { .. }
+        )
+    }
+
     /// True if the term limits the lens and says nothing about one that keeps the limit.
     pub fn is_limit(self) -> bool {
         !matches!(
             self,
             Self::Spot
                 | Self::SpotIntegral
+                | Self::Wavefront
+                | Self::GeometricMtf { .. }
                 | Self::Throughput
                 | Self::ThroughputLoss(_)
                 | Self::Distortion
         )
+    }
+
+    /// Returns an error if its numbers contradict each other.
+    fn check_bounds(self) -> Result<(), MeritError> {
+        let refuse = |why| Err(MeritError::DoesNotApply { term: self.name(), why });
+        match (self, &self.numbers()[..]) {
+            (Self::GeometricMtf { frequency, min }, _) => {
+                if frequency > 0.0 && min > 0.0 && min <= 1.0 {
+                    return Ok(());
+                }
+                refuse("its frequency is not positive, or its minimum is not between 0 and 1")
+            }
+            (_, [min, max]) if min > max => refuse("its minimum is larger than its maximum"),
+            _ => Ok(()),
+        }
     }
 
     /// Returns an error if the term asks for light that is undefined for the lens.
@@ -83,12 +108,8 @@ impl Goal {
             if !term.numbers().iter().all(|v| v.is_finite()) {
                 return refuse("its target is not finite");
             }
-            if let [min, max] = term.numbers()[..]
-                && min > max
-            {
-                return refuse("its minimum is larger than its maximum");
-            }
-            let focal = matches!(term, Term::FocalLength(_) | Term::FNumber(_));
+            term.check_bounds()?;
+            let focal = matches!(term, Term::FocalLength(_) | Term::FNumber(_) | Term::Wavefront);
             if focal && focal_lengths(lens)?.contains(&None) {
                 return refuse("the lens is afocal");
             }

@@ -81,10 +81,7 @@ impl Merit {
             self.add_operand_limits(context, level, &mut of_light)
         })?;
         self.average(&mut sums)?;
-        let mut objective = SumOfSquares::zero(values.len(), level);
-        for (sum, weighted) in sums.iter().zip(&self.goal.terms) {
-            objective.add(sum, weighted.weight);
-        }
+        let objective = self.weighted_sum(&sums, values.len(), level);
         limits.append(&mut of_light);
         match limits.iter().find(|limit| !limit.is_finite()) {
             Some(limit) => Err(MeritError::NotFinite { term: limit.margin.term }),

@@ -14,6 +14,7 @@
 
 mod binding;
 mod constraints;
+mod contrast;
 mod defaults;
 mod first_order;
 mod goal;
@@ -21,8 +22,10 @@ mod light;
 mod limits;
 mod operands;
 mod sampling;
+mod scoped_part;
 mod spot;
 mod sum;
+mod wavefront;
 
 pub use crate::lens::{
     Goal, LimitTreatment, OperandKind, PupilEdge, Term, TermScope, TermSelection, WeightedTerm,
@@ -34,11 +37,11 @@ pub use sampling::SpotSampling;
 
 use crate::lens::{Lens, LensError, SurfaceNumber, Variable};
 use crate::math::Dual;
-use crate::pupil::{LaunchError, QuadraticIntegrand, RayModelError, TracedPupil};
-use crate::trace::Fate;
+use crate::pupil::{LaunchError, QuadraticIntegrand, RayModel, RayModelError, TracedPupil};
+use crate::trace::{Fate, SystemGradient};
 use binding::Configuration;
 use nalgebra::DVector;
-use sampling::RaySampling;
+use sampling::{RaySampling, SampledPupil, SamplingDemand, TRANSFER_SCALE};
 use serde::Serialize;
 pub use sum::{DerivativeLevel, SumOfSquares};
 
@@ -135,6 +138,8 @@ pub struct TermValue {
     pub error: f64,
     /// The number of rays that it is computed from.
     pub rays: usize,
+    /// True if the rays of its pupils sample it to the tolerance that was asked for.
+    pub reached: bool,
 }
 
 /// The merit function of a lens: its goal, its variables, and the rays that sample it.
@@ -180,8 +185,10 @@ impl Merit {
         // A lens without light can be asked for light.
         let about_light = self.goal.terms.iter().any(|w| w.term.concerns_light());
         let dark = about_light && self.goal.pupil == PupilEdge::Moving;
-        let found: Result<Vec<_>, _> =
-            positions.map(|zoom| RaySampling::new(lens, zoom, self.tolerance, dark)).collect();
+        let demand = SamplingDemand::of_goal(&self.goal);
+        let found: Result<Vec<_>, _> = positions
+            .map(|zoom| RaySampling::new(lens, zoom, self.tolerance, dark, demand.clone()))
+            .collect();
         self.samplings = found?;
         Ok(())
     }
@@ -273,15 +280,29 @@ impl Merit {
         values: &[f64],
         level: DerivativeLevel,
     ) -> Result<(SumOfSquares, Vec<TermValue>), MeritError> {
-        let mut total = SumOfSquares::zero(values.len(), level);
-        let mut terms = Vec::with_capacity(self.goal.terms.len());
-        for (sum, weighted) in self.evaluate_terms(values, level)?.iter().zip(&self.goal.terms) {
-            total.add(sum, weighted.weight);
+        let sums = self.evaluate_terms(values, level)?;
+        let term_value = |(sum, weighted): (&SumOfSquares, &WeightedTerm)| {
             let (error, rays) = self.error_and_rays(weighted.term, sum.value);
             let (term, weight) = (weighted.term.name(), weighted.weight);
-            terms.push(TermValue { term, weight, value: sum.value, error, rays });
+            let reached = self.is_sampled(weighted.term);
+            TermValue { term, weight, value: sum.value, error, rays, reached }
+        };
+        let terms = sums.iter().zip(&self.goal.terms).map(term_value).collect();
+        Ok((self.weighted_sum(&sums, values.len(), level), terms))
+    }
+
+    /// The sum of the terms, each times its weight.
+    fn weighted_sum(
+        &self,
+        sums: &[SumOfSquares],
+        variables: usize,
+        level: DerivativeLevel,
+    ) -> SumOfSquares {
+        let mut total = SumOfSquares::zero(variables, level);
+        for (sum, weighted) in sums.iter().zip(&self.goal.terms) {
+            total.add(sum, weighted.weight);
         }
-        Ok((total, terms))
+        total
     }
 
     /// The value of each term, without its weight.
@@ -295,11 +316,30 @@ impl Merit {
         let worst = sampled.iter().fold(0.0, |e: f64, s| e.max(s.error));
         let rays = sampled.iter().map(|s| s.rays).sum();
         match term {
-            Term::Spot | Term::SpotIntegral => (2.0 * worst * value, rays),
+            Term::Spot | Term::SpotIntegral | Term::Wavefront => (2.0 * worst * value, rays),
+            Term::GeometricMtf { .. } => {
+                let worst = self.transfer_error();
+                (worst * (2.0 * value.max(0.0).sqrt() + worst), rays)
+            }
             _ if term.concerns_light() => (worst * value.abs(), rays),
             Term::Distortion => (0.0, self.chief_ray_count()),
             Term::Operand { kind, .. } if kind.traces_chief_rays() => (0.0, self.chief_ray_count()),
             _ => (0.0, 0),
+        }
+    }
+
+    /// The largest estimated error of a transfer.
+    fn transfer_error(&self) -> f64 {
+        self.samplings.iter().map(|sampling| sampling.transfer_error).fold(0.0, f64::max)
+    }
+
+    /// True if the rays of the pupils sample a term to the tolerance.
+    fn is_sampled(&self, term: Term) -> bool {
+        let worst = self.spot_samplings().iter().fold(0.0, |e: f64, s| e.max(s.error));
+        match term {
+            Term::GeometricMtf { .. } => self.transfer_error() <= TRANSFER_SCALE * self.tolerance,
+            _ if term.is_of_rays() || term.concerns_light() => worst <= self.tolerance,
+            _ => true,
         }
     }
 
@@ -339,41 +379,18 @@ impl Merit {
         values: &[f64],
         mut visit: impl FnMut(&EvaluationContext<'_>) -> Result<(), MeritError>,
     ) -> Result<(), MeritError> {
-        let positions = self.zooms.iter().zip(&self.samplings).zip(&self.initial_areas);
-        for ((zoom, sampling), initial_areas) in positions {
-            let systems = &zoom.at(values)?;
-            if !self.needs_pupil_edges() {
-                let traced_pupils = &[];
-                visit(&EvaluationContext {
-                    zoom,
-                    sampling,
-                    systems,
-                    values,
-                    initial_areas,
-                    traced_pupils,
-                })?;
-                continue;
-            }
-            let model = zoom.ray_model(systems, &self.lens, sampling.aiming)?;
+        if !self.needs_pupil_edges() {
+            return self.visit_without_pupils(values, visit);
+        }
+        self.visit_without_pupils(values, |context| {
+            let EvaluationContext { zoom, sampling, .. } = *context;
+            let model = zoom.ray_model(context.systems, &self.lens, sampling.aiming)?;
             let traced_pupils = &sampling.trace_pupils(&model, true)[..];
             sampling.check_light(traced_pupils)?;
-            if model.has_grin() && traced_pupils.iter().any(TracedPupil::is_irregular) {
-                let why = "the pupil is disconnected or not star-shaped, and in a gradient-index \
-                           lens the motion of its edge is unknown then; expected a goal with \
-                           frozen pupils";
-                return Err(MeritError::DoesNotApply { term: "pupil", why });
-            }
+            check_edge_motion(&model, traced_pupils)?;
             let sampling = &sampling.with_pupils(&model, traced_pupils);
-            visit(&EvaluationContext {
-                zoom,
-                sampling,
-                systems,
-                values,
-                initial_areas,
-                traced_pupils,
-            })?;
-        }
-        Ok(())
+            visit(&EvaluationContext { sampling, traced_pupils, ..*context })
+        })
     }
 
     /// Calls `visit` with the lens at every zoom position as it is without rays.
@@ -385,14 +402,13 @@ impl Merit {
         let positions = self.zooms.iter().zip(&self.samplings).zip(&self.initial_areas);
         for ((zoom, sampling), initial_areas) in positions {
             let systems = &zoom.at(values)?;
-            let traced_pupils = &[];
             visit(&EvaluationContext {
                 zoom,
                 sampling,
                 systems,
                 values,
                 initial_areas,
-                traced_pupils,
+                traced_pupils: &[],
             })?;
         }
         Ok(())
@@ -400,8 +416,7 @@ impl Merit {
 
     /// True if some term depends on the edges of the pupils.
     fn needs_pupil_edges(&self) -> bool {
-        let needs =
-            |term: Term| matches!(term, Term::Spot | Term::SpotIntegral) || term.concerns_light();
+        let needs = |term: Term| term.is_of_rays() || term.concerns_light();
         self.goal.pupil == PupilEdge::Moving && self.goal.terms.iter().any(|w| needs(w.term))
     }
 
@@ -423,6 +438,10 @@ impl Merit {
                 Term::SpotIntegral => {
                     spot::add_spot(context, spot::Normalization::Unnormalized, scope, sum)?;
                 }
+                Term::Wavefront => wavefront::add_wavefront(context, scope, sum)?,
+                Term::GeometricMtf { frequency, min } => {
+                    contrast::add_contrast_shortfall(context, [frequency, min], scope, sum)?;
+                }
                 Term::Distortion => spot::add_distortion(context, scope, sum)?,
                 Term::FocalLength(target) => {
                     let target = self.goal.target(context.zoom.zoom, target);
@@ -435,6 +454,16 @@ impl Merit {
         }
         Ok(())
     }
+}
+
+/// Refuses pupils whose edges' motion is unknown: irregular ones of a gradient-index lens.
+fn check_edge_motion(model: &RayModel, pupils: &[TracedPupil<'_>]) -> Result<(), MeritError> {
+    if model.has_grin() && pupils.iter().any(TracedPupil::is_irregular) {
+        let why = "the pupil is disconnected or not star-shaped, and in a gradient-index lens the \
+                   motion of its edge is unknown then; expected a goal with frozen pupils";
+        return Err(MeritError::DoesNotApply { term: "pupil", why });
+    }
+    Ok(())
 }
 
 /// A lens at one zoom position and some values of the variables.
@@ -459,13 +488,25 @@ impl EvaluationContext<'_> {
         {
             let asked = cost.square != 0.0 || cost.constant != 0.0;
             if asked {
-                total += self.zoom.by_variables(
-                    self.systems,
-                    pupil.wavelength,
-                    &traced.robust_edge_motion(&cost),
-                );
+                let by_number = traced.robust_edge_motion(&cost);
+                total += self.zoom.by_variables(self.systems, pupil.wavelength, &by_number);
             }
         }
         total
+    }
+
+    /// The sum of the derivatives by the variables that `of` gives for traced pupils; zeros if pupils
+    /// are frozen.
+    fn sum_over_pupils(
+        &self,
+        of: impl Fn(&SampledPupil, &TracedPupil<'_>) -> Result<Option<SystemGradient<f64>>, MeritError>,
+    ) -> Result<DVector<f64>, MeritError> {
+        let mut total = DVector::zeros(self.values.len());
+        for (traced, pupil) in self.traced_pupils.iter().zip(&self.sampling.pupils) {
+            if let Some(by_number) = of(pupil, traced)? {
+                total += self.zoom.by_variables(self.systems, pupil.wavelength, &by_number);
+            }
+        }
+        Ok(total)
     }
 }

@@ -1,10 +1,11 @@
 //! The rays that spots are computed from: the pupils, sampled once to a tolerance.
 
-use super::MeritError;
+use super::{Goal, MeritError, Term};
+use crate::analysis::{ReferenceForm, rms_without_tilt, transfer};
 use crate::lens::{FieldPoint, Lens, TermScope, TermSelection};
 use crate::pupil::{
     Accuracy, Aiming, FixedLaunch, Launch, Nodes, PupilMoments, RayModel, Region, RegionKind,
-    TracedPupil, converge,
+    TracedPupil, converge_list,
 };
 use crate::trace::{Ray, Rays};
 use serde::Serialize;
@@ -30,6 +31,62 @@ pub struct SpotSampling {
     pub area: f64,
 }
 
+/// The error of a transfer that counts as much as the whole radius of a spot: its integrand
+/// oscillates, and a hundredth of contrast is more than a designer can tell.
+pub(super) const TRANSFER_SCALE: f64 = 5.0;
+
+/// The demands of terms on the rays, besides spots.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(super) struct SamplingDemand {
+    /// True if a term asks for wavefronts, and so for optical paths.
+    pub(super) wavefront: bool,
+    /// The spatial frequencies of terms about contrast, in cycles/mm.
+    pub(super) frequencies: Vec<f64>,
+}
+
+impl SamplingDemand {
+    pub(super) fn of_goal(goal: &Goal) -> Self {
+        let mut demand = Self::default();
+        for weighted in &goal.terms {
+            match weighted.term {
+                Term::Wavefront => demand.wavefront = true,
+                Term::GeometricMtf { frequency, .. } => demand.frequencies.push(frequency),
+                _ => {}
+            }
+        }
+        demand
+    }
+
+    /// The numbers that must converge: the radius of the spot, the RMS wavefront if it is asked for, and the
+    /// transfer at each frequency. `None` if no ray arrives.
+    fn numbers(
+        &self,
+        region: &Region<'_>,
+        nodes: &Nodes,
+        reference: Option<ReferenceForm>,
+    ) -> Option<Vec<f64>> {
+        let moments = region.moments(nodes);
+        if !(moments.area > 0.0) {
+            return None;
+        }
+        let mut numbers = vec![moments.rms_radius()];
+        if let Some(form) = reference {
+            numbers.push(rms_without_tilt(region, nodes, form).unwrap_or(0.0));
+        }
+        if !self.frequencies.is_empty() {
+            numbers.extend(transfer(region, nodes, moments.centroid, &self.frequencies)?);
+        }
+        Some(numbers)
+    }
+
+    /// The scales of [`SamplingDemand::numbers`]: lengths and waves are relative, a transfer is not.
+    fn scales(&self, numbers: &[f64]) -> Vec<f64> {
+        let relative = 1 + usize::from(self.wavefront);
+        let scale = |(i, value): (usize, &f64)| if i < relative { *value } else { TRANSFER_SCALE };
+        numbers.iter().enumerate().map(scale).collect()
+    }
+}
+
 /// The pupil of one field and wavelength, as last found.
 #[derive(Debug, Clone)]
 pub(super) struct SampledPupil {
@@ -45,6 +102,8 @@ pub(super) struct SampledPupil {
     kind: RegionKind,
     /// The order of quadrature that reaches the tolerance.
     order: usize,
+    /// The form of its reference sphere; `None` if no term asks for the wavefront.
+    pub(super) reference: Option<ReferenceForm>,
     pub(super) moments: PupilMoments,
     /// [`TracedPupil::signed_area`], in mm².
     pub(super) area: f64,
@@ -63,6 +122,9 @@ pub(super) struct RaySampling {
     pub(super) pupils: Vec<SampledPupil>,
     pub(super) aiming: Aiming,
     spot_samplings: Vec<SpotSampling>,
+    demand: SamplingDemand,
+    /// The largest estimated error of a transfer; 0 if none is asked for.
+    pub(super) transfer_error: f64,
 }
 
 /// The rays at one wavelength.
@@ -75,6 +137,9 @@ pub(super) struct ChannelRays {
     /// The weight of each ray in the spot of its field, including the weights of fields and
     /// wavelengths.
     pub(super) weights: Vec<f64>,
+    /// The optical path from the object to the start of each ray, in mm; empty if no term asks for
+    /// it.
+    pub(super) paths: Vec<f64>,
     /// The index behind the last ray of each field.
     pub(super) ends: Vec<usize>,
     /// True for each field whose rays also represent their mirror images.
@@ -83,15 +148,25 @@ pub(super) struct ChannelRays {
 
 impl ChannelRays {
     fn new(um: f64) -> Self {
-        let (weights, ends, mirrored) = (Vec::new(), Vec::new(), Vec::new());
-        Self { um, rays: Rays::default(), points: Vec::new(), weights, ends, mirrored }
+        Self {
+            um,
+            rays: Rays::default(),
+            points: Vec::new(),
+            weights: Vec::new(),
+            paths: Vec::new(),
+            ends: Vec::new(),
+            mirrored: Vec::new(),
+        }
     }
 
     /// Adds the rays of a pupil, which together have the weight `share`.
-    fn add_pupil(&mut self, traced: &TracedPupil<'_>, share: f64) {
+    fn add_pupil(&mut self, traced: &TracedPupil<'_>, share: f64, with_paths: bool) {
         let weight: f64 = traced.landed.arrivals().map(|(_, w)| w).sum();
         for (i, w) in traced.landed.arrivals() {
             self.rays.push(traced.rays.get(i));
+            if with_paths {
+                self.paths.push(traced.path_to(traced.rays.get(i)));
+            }
             self.points.push([traced.landed.sink.x[i], traced.landed.sink.y[i]]);
             self.weights.push(share * w / weight);
         }
@@ -120,6 +195,7 @@ impl RaySampling {
         zoom: usize,
         tolerance: f64,
         dark_too: bool,
+        demand: SamplingDemand,
     ) -> Result<Self, MeritError> {
         let model = RayModel::from_lens(lens, zoom)?;
         let mut sampling = Self {
@@ -129,6 +205,8 @@ impl RaySampling {
             pupils: Vec::new(),
             aiming: model.aiming,
             spot_samplings: Vec::new(),
+            demand,
+            transfer_error: 0.0,
         };
         let total: f64 = sampling.fields.iter().map(|f| f.weight).sum();
         let channels: f64 = model.channels.iter().map(|c| c.weight).sum();
@@ -173,15 +251,27 @@ impl RaySampling {
         let (fixed_launch, cosine) = (launch.to_fixed(), launch.axis_cosine());
         let ideal_area = PI * launch.area();
         let region = Region::new(launch);
+        let asked = self.demand.wavefront;
+        let reference = asked.then(|| ReferenceForm::of_region(&region).ok()).flatten();
         let accuracy = Accuracy { tolerance, ..Accuracy::default() };
         let mut orders = 0_usize;
-        let radius = |nodes: &Nodes| {
+        let numbers = |nodes: &Nodes| {
             orders += 1;
-            let moments = region.moments(nodes);
-            (moments.area > 0.0).then(|| [moments.rms_radius()])
+            self.demand.numbers(&region, nodes, reference)
         };
-        let found = converge(&region, accuracy, radius, |values| *values);
-        let error = found.map_or(0.0, |f| f.errors[0] / f.values[0].max(f64::MIN_POSITIVE));
+        let found = converge_list(&region, accuracy, numbers, |list| self.demand.scales(list));
+        let relative = if reference.is_some() { 2 } else { 1 };
+        let [mut error, mut transfer_error] = [0.0f64; 2];
+        for (i, (value, change)) in
+            found.iter().flat_map(|f| f.values.iter().zip(&f.errors)).enumerate()
+        {
+            if i < relative {
+                error = error.max(change / value.max(f64::MIN_POSITIVE));
+            } else {
+                transfer_error = transfer_error.max(*change);
+            }
+        }
+        self.transfer_error = self.transfer_error.max(transfer_error);
         let (kind, moments) = (region.kind, PupilMoments::default());
         let order = orders.saturating_sub(1);
         self.pupils.push(SampledPupil {
@@ -193,6 +283,7 @@ impl RaySampling {
             fixed_launch,
             kind,
             order,
+            reference,
             moments,
             area: 0.0,
             ideal_area,
@@ -225,7 +316,11 @@ impl RaySampling {
             } else {
                 Region { launch, kind: pupil.kind.clone(), rays: 0 }
             };
-            region.trace_pupil(pupil.order)
+            if self.demand.frequencies.is_empty() {
+                region.trace_pupil(pupil.order)
+            } else {
+                region.trace_whole_pupil(pupil.order)
+            }
         };
         self.pupils.iter().map(traced).collect()
     }
@@ -261,7 +356,9 @@ impl RaySampling {
                     (pupil.wavelength, pupil.field) == (wavelength, field)
                 };
                 let mine = self.pupils.iter().zip(traced).filter(is_same);
-                mine.for_each(|(pupil, traced)| channel.add_pupil(traced, pupil.share));
+                mine.for_each(|(pupil, traced)| {
+                    channel.add_pupil(traced, pupil.share, self.demand.wavefront);
+                });
                 channel.ends.push(channel.weights.len());
             }
         }

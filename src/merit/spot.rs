@@ -1,6 +1,7 @@
 //! Terms of real rays: spots and distortion.
 
 use super::first_order::{image_scale, slopes};
+use super::scoped_part::ScopedPart;
 use super::sum::{DerivativeLevel, SumOfSquares};
 use super::{EvaluationContext, MeritError};
 use crate::lens::{FieldKind, Object, TermScope, TermSelection};
@@ -39,44 +40,6 @@ pub(super) enum Normalization {
     PupilArea,
     /// None: the integral over the pupil (3.24).
     Unnormalized,
-}
-
-/// The part of the spots that a term is about.
-#[derive(Debug, Clone, Copy)]
-struct ScopedPart {
-    scope: TermScope,
-    /// The share of its rays in the weight of all.
-    share: f64,
-}
-
-impl ScopedPart {
-    /// The part in a scope; an error if no light gets through there.
-    fn new(context: &EvaluationContext<'_>, scope: TermScope) -> Result<Self, MeritError> {
-        if scope.is_all() {
-            return Ok(Self { scope, share: 1.0 });
-        }
-        let part = Self { scope, share: 1.0 };
-        let (mut share, mut first) = (0.0, None);
-        for (wavelength, channel) in context.sampling.channels.iter().enumerate() {
-            for field in 0..context.sampling.fields.len() {
-                if part.factor(field, wavelength) > 0.0 {
-                    first = first.or(Some((field, channel.um)));
-                    share += channel.weights[channel.range(field)].iter().sum::<f64>();
-                }
-            }
-        }
-        let (field, um) = first.unwrap_or((0, 0.0));
-        let dark = MeritError::NoLight { field, zoom: context.zoom.zoom, um };
-        if share > 0.0 { Ok(Self { scope, share }) } else { Err(dark) }
-    }
-
-    /// The factor of the weight of a field and wavelength, so that the weights of the part add up to
-    /// one; zero outside.
-    fn factor(self, field: usize, wavelength: usize) -> f64 {
-        let inside = self.scope.has(TermSelection::Fields, field)
-            && self.scope.has(TermSelection::Wavelengths, wavelength);
-        if inside { 1.0 / self.share } else { 0.0 }
-    }
 }
 
 /// Adds the spots about their polychromatic centroids.
@@ -182,7 +145,7 @@ fn weights(
     weights
 }
 
-fn lost_ray_error(
+pub(super) fn lost_ray_error(
     context: &EvaluationContext<'_>,
     wavelength: usize,
     i: usize,

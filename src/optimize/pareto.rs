@@ -475,3 +475,22 @@ fn with_sweep_variables(lens: &Lens, [narrow, wide]: [f64; 2]) -> Lens {
     }
     lens
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_blurs_of_a_sweep_are_a_geometric_sequence_between_their_ends() {
+        let settings =
+            ParetoSettings { points: 6, blur: [2e-5, 7e-3], ..ParetoSettings::default() };
+        let blurs: Vec<f64> = settings.weights(80.0).into_iter().map(f64::sqrt).collect();
+        assert_eq!(blurs.len(), 6);
+        assert!((blurs[0] / (80.0 * 2e-5) - 1.0).abs() < 1e-12, "{blurs:?}");
+        assert!((blurs[5] / (80.0 * 7e-3) - 1.0).abs() < 1e-12, "{blurs:?}");
+        let ratio = (7e-3f64 / 2e-5).powf(0.2);
+        assert!(blurs.windows(2).all(|pair| (pair[1] / pair[0] / ratio - 1.0).abs() < 1e-12));
+        let one = ParetoSettings { points: 1, ..settings };
+        assert_eq!(one.weights(80.0), [(80.0f64 * 2e-5).powi(2)]);
+    }
+}

@@ -131,3 +131,26 @@ fn adam(
     }
     state
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_rate_falls_after_segments_without_improvement_and_rises_after_others() {
+        let mut state = DescentState::default();
+        let mut paces = vec![1.0];
+        for _ in 0..40 {
+            state.shrink_step();
+            paces.extend(state.pace);
+        }
+        assert!(paces[..6].is_sorted_by(|a, b| a > b), "{paces:?}");
+        assert_eq!(paces.last(), Some(&MIN_RATE));
+        state.grow_step();
+        assert!(state.pace > Some(MIN_RATE));
+        (0..100).for_each(|_| state.grow_step());
+        assert_eq!(state.pace, Some(MAX_RATE));
+        state.restart_slower();
+        assert_eq!(state.pace, Some(0.5 * MAX_RATE));
+    }
+}

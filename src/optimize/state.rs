@@ -369,3 +369,26 @@ fn scale(lens: &Lens, variable: &Variable) -> f64 {
         },
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lens::{Parameter, blank};
+
+    #[test]
+    fn curvature_and_aspheres_have_scales_of_the_same_sag_at_the_rim() {
+        let mut lens = blank();
+        lens.surfaces[0].semi_diameter = Some(14.0);
+        let scale = |quantity: Quantity| {
+            let parameter = Parameter::new(0, quantity);
+            scale(&lens, &Variable { parameter, min: None, max: None })
+        };
+        // c r²/2 and a r^(4 + 2 k).
+        let sag = scale(Quantity::Curvature) * 14.0 * 14.0 / 2.0;
+        assert!(sag > 0.0);
+        for term in 0..ASPHERE_TERMS {
+            let same = scale(Quantity::Asphere(term)) * 14f64.powi(4 + 2 * term as i32);
+            assert!((same / sag - 1.0).abs() < 1e-12, "{term}: {same} {sag}");
+        }
+    }
+}

@@ -1,4 +1,4 @@
-//! Bounds of the parameters of an optimisation, and of their steps.
+//! Bounds of the parameters of an optimization, and of their steps.
 
 /// The range of each parameter, and the largest change in a step.
 ///

@@ -153,3 +153,49 @@ fn difference(a: &DVector<f64>, b: &DVector<f64>, scales: &DVector<f64>) -> f64 
     let [a, b] = [a, b].map(|slope| slope.component_div(scales));
     (&b - &a).norm() / a.norm()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn slopes_differ_relative_to_the_first_one() {
+        let of = |values: [f64; 2]| DVector::from_row_slice(&values);
+        let scales = of([1.0, 1.0]);
+        for size in [0.1, 1.0, 7.0] {
+            let (a, b) = (of([size, 0.0]), of([0.0, size]));
+            assert!((difference(&a, &b, &scales) - 2f64.sqrt()).abs() < 1e-12, "{size}");
+            assert_eq!(difference(&a, &a, &scales), 0.0);
+            // In other units of the parameters both have other lengths.
+            let found = difference(&a, &b, &of([2.0, 0.5]));
+            assert!((found - 17f64.sqrt()).abs() < 1e-12, "{found}");
+        }
+    }
+
+    #[test]
+    fn a_branch_follows_its_slope_and_is_forgotten_when_it_is_asked_to_or_old() {
+        let limits = LimitValues {
+            values: DVector::from_element(1, 9.0),
+            slopes: DMatrix::from_element(1, 2, 0.0),
+            bounds: vec![[f64::NEG_INFINITY, 10.0]],
+            weights: vec![1.0],
+        };
+        let branch =
+            |age| Branch { limit: 0, value: 2.0, slope: DVector::from_vec(vec![1.0, -3.0]), age };
+        let mut branches = KinkBranches { branches: vec![branch(0)] };
+        let change = DVector::from_vec(vec![0.5, 0.1]);
+        branches.follow(&change, &limits);
+        assert!((branches.branches[0].value - 2.2).abs() < 1e-12);
+        branches.advance(&(-change), &limits, &[1.0]);
+        assert!((branches.branches[0].value - 2.0).abs() < 1e-12);
+        assert_eq!(branches.with_branches(&limits).values.as_slice(), [9.0, 2.0]);
+        let still = DVector::zeros(2);
+        (0..MAX_AGE).for_each(|_| branches.advance(&still, &limits, &[0.0]));
+        assert_eq!(branches.branches.len(), 1);
+        branches.advance(&still, &limits, &[0.0]);
+        assert!(branches.branches.is_empty(), "it has held no step");
+        branches.branches.push(branch(0));
+        branches.forget();
+        assert_eq!(branches.with_branches(&limits).values.as_slice(), [9.0]);
+    }
+}

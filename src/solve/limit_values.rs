@@ -104,3 +104,28 @@ impl LimitedPoint {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn excesses_are_positive_above_and_negative_below_their_bounds() {
+        let values = DVector::from_vec(vec![3.0, -3.0, 0.5, 2.0, -7.0]);
+        let limits = LimitValues {
+            slopes: DMatrix::zeros(5, 1),
+            bounds: vec![
+                [-1.0, 1.0],
+                [-1.0, 1.0],
+                [-1.0, 1.0],
+                [2.0, 2.0],
+                [f64::NEG_INFINITY, 0.0],
+            ],
+            weights: vec![1.0; 5],
+            values: values.clone(),
+        };
+        assert_eq!(limits.excesses(&values).as_slice(), [2.0, -2.0, 0.0, 0.0, 0.0]);
+        assert_eq!(limits.violation(), 2.0);
+        assert_eq!(limits.excesses(&values.add_scalar(4.0)).as_slice(), [6.0, 0.0, 3.5, 4.0, 0.0]);
+    }
+}

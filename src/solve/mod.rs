@@ -1,4 +1,4 @@
-//! Optimisers as pure numerics, each once: for lenses and fields alike.
+//! Optimizers as pure numerics, each once: for lenses and fields alike.
 //!
 //! None of them knows what its numbers mean. Each takes one step at a time, so that the caller owns
 //! the loop, and none reads a clock or draws random numbers.

@@ -261,3 +261,42 @@ fn settings() -> DefaultSettings<f64> {
         ..DefaultSettings::default()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bounds_that_a_step_can_reach_hold_whatever_the_radius() {
+        // The nearest point to (100, 0) with x + y at most `bound`, in a ball: on the boundary of
+        // the ball or on the line.
+        let (hessian, rows) = (DMatrix::identity(2, 2), DMatrix::from_row_slice(1, 2, &[1.0, 1.0]));
+        let room = [[f64::NEG_INFINITY, f64::INFINITY]; 2];
+        for (radius, target) in [(20.0, 100.0), (0.05, 1.0)] {
+            let gradient = DVector::from_vec(vec![-target, 0.0]);
+            for part in [0.1, 0.5, 0.9, 1.3, 2.0] {
+                let bound = part * radius;
+                let program = QuadraticProgram {
+                    hessian: &hessian,
+                    gradient: &gradient,
+                    rows: &rows,
+                    bounds: &[[f64::NEG_INFINITY, bound]],
+                    room: &room,
+                    radius,
+                    elastic: None,
+                };
+                let x = program.solve().unwrap().x;
+                // Without the row: (radius, 0), whose sum is the radius.
+                if part > 1.0 {
+                    assert!((x[0] - radius).abs() < 1e-4 * radius, "{radius} {part}: {x}");
+                    continue;
+                }
+                // On the line and on the circle.
+                let along = (radius * radius - 0.5 * bound * bound).sqrt() / 2f64.sqrt();
+                let exact = [0.5 * bound + along, 0.5 * bound - along];
+                let off = (x[0] - exact[0]).hypot(x[1] - exact[1]);
+                assert!(off < 1e-3 * radius, "{radius} {part}: {x} {exact:?}");
+            }
+        }
+    }
+}

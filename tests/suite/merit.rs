@@ -1,11 +1,13 @@
 //! Derivatives of every term by every kind of variable, against central differences.
 
+use aplanat::analysis::wavefront;
 use aplanat::files;
 use aplanat::lens::{
     Aperture, FieldKind, FieldPoint, Lens, Medium, Object, Parameter, Pickup, Quantity, Row,
     Variable,
 };
 use aplanat::merit::{DerivativeLevel, Goal, LimitTreatment, Merit, PupilEdge, Term, WeightedTerm};
+use aplanat::pupil::{Accuracy, RayModel};
 
 pub(crate) fn bundled(name: &str) -> Lens {
     files::open(format!("lenses/{name}.json")).unwrap().lens
@@ -48,6 +50,8 @@ fn everything() -> Lens {
 fn terms() -> Vec<Term> {
     vec![
         Term::Spot,
+        Term::Wavefront,
+        Term::GeometricMtf { frequency: 5.0, min: 1.0 },
         Term::FocalLength(60.0),
         Term::Distortion,
         Term::GlassCenter { min: 1.5, max: 2.0 },
@@ -119,10 +123,17 @@ pub(crate) fn step(quantity: Quantity) -> f64 {
     }
 }
 
+/// A factor of the steps by which a term may be told from a polynomial: contrast oscillates.
+fn smoothness(term: Term) -> f64 {
+    if matches!(term, Term::GeometricMtf { .. }) { 0.1 } else { 1.0 }
+}
+
 #[test]
 fn every_term_has_the_derivative_of_its_value() {
     let lens = everything();
-    terms().into_iter().for_each(|term| check(&lens, term, PupilEdge::Frozen, step));
+    for term in terms() {
+        check(&lens, term, PupilEdge::Frozen, |quantity| smoothness(term) * step(quantity));
+    }
 }
 
 #[test]
@@ -141,6 +152,7 @@ fn every_term_includes_the_motion_of_the_pupil() {
         }
         let moving = [
             Term::Spot,
+            Term::Wavefront,
             Term::GlassEdge(3.0),
             Term::SpotIntegral,
             Term::Throughput,
@@ -152,9 +164,27 @@ fn every_term_includes_the_motion_of_the_pupil() {
             Term::SemiDiameter { min: 5.0, max: 6.0 },
         ];
         for term in moving {
-            check(&lens, term, PupilEdge::Moving, |quantity| 0.02 * step(quantity));
+            let share = if term == Term::Wavefront { 0.1 } else { 0.02 };
+            check(&lens, term, PupilEdge::Moving, |quantity| share * step(quantity));
         }
     }
+}
+
+/// Contrast oscillates over the pupil, and takes many more rays than the other terms.
+#[test]
+fn contrast_includes_the_motion_of_the_pupil() {
+    let mut lens = bundled("double_gauss_rudolph_50");
+    lens.wavelengths = vec![lens.wavelengths[lens.primary()]];
+    lens.fields.values.remove(1);
+    lens.variables.clear();
+    vary(&mut lens, 0, Quantity::Curvature);
+    for surface in [0, 5] {
+        let rim = Parameter::new(surface, Quantity::SemiDiameter);
+        lens.set(rim, lens.get(rim).unwrap() * (1.0 + 1e-3 * surface as f64));
+        vary(&mut lens, surface, Quantity::SemiDiameter);
+    }
+    let term = Term::GeometricMtf { frequency: 2.0, min: 1.0 };
+    check(&lens, term, PupilEdge::Moving, |quantity| 0.02 * step(quantity));
 }
 
 /// An aperture that is a pupil, a cone or a focal ratio fills a stop that changes with the lens.
@@ -172,8 +202,10 @@ fn derivatives_include_the_stop_that_a_beam_fills() {
             vary(&mut lens, surface, Quantity::Curvature);
             vary(&mut lens, surface, Quantity::Thickness);
         }
-        for term in [Term::Spot, Term::Throughput, Term::Light(1.01)] {
-            check(&lens, term, PupilEdge::Moving, |quantity| 0.02 * step(quantity));
+        for term in [Term::Spot, Term::Wavefront, Term::Throughput, Term::Light(1.01)] {
+            // Rounding of paths of 1e5 waves asks for larger steps.
+            let share = if term == Term::Wavefront { 0.1 } else { 0.02 };
+            check(&lens, term, PupilEdge::Moving, |quantity| share * step(quantity));
         }
     }
 }
@@ -271,8 +303,11 @@ fn a_zoom_lens_has_derivatives_by_its_moving_gaps() {
         }
     }
     vary(&mut lens, 3, Quantity::Curvature);
-    for term in [Term::Spot, Term::FocalLength(29.0), Term::TotalTrack(10.0)] {
-        check(&lens, term, PupilEdge::Frozen, step);
+    let contrast = Term::GeometricMtf { frequency: 2.0, min: 1.0 };
+    let terms =
+        [Term::Spot, Term::Wavefront, contrast, Term::FocalLength(29.0), Term::TotalTrack(10.0)];
+    for term in terms {
+        check(&lens, term, PupilEdge::Frozen, |quantity| smoothness(term) * step(quantity));
     }
 }
 
@@ -283,19 +318,137 @@ fn the_gauss_newton_matrix_is_that_of_the_residuals() {
     let mut lens = bundled("achromat_ac254_100");
     lens.variables.clear();
     vary(&mut lens, 2, Quantity::Thickness);
-    let goal = Goal {
-        terms: vec![WeightedTerm::new(Term::Spot, 1.0)],
-        zoom_ratios: vec![],
+    for term in [Term::Spot, Term::Wavefront] {
+        let merit = Merit::new(&lens, &goal_of(term), 1e-4).unwrap();
+        let values = merit.values(&lens);
+        let slope = |t: f64| {
+            let sum = merit.evaluate(&[values[0] + t], DerivativeLevel::Gradient);
+            sum.unwrap().gradient[0]
+        };
+        let second = (slope(0.01) - slope(-0.01)) / 0.02;
+        let normal = merit.evaluate(&values, DerivativeLevel::Normal).unwrap().normal[(0, 0)];
+        let limit = if term == Term::Spot { 1e-6 } else { 1e-3 };
+        assert!((second / (2.0 * normal) - 1.0).abs() < limit, "{second} and {normal}");
+    }
+}
+
+/// A goal of one term with pupils that move.
+fn goal_of(term: Term) -> Goal {
+    Goal {
+        terms: vec![WeightedTerm::new(term, 1.0)],
+        zoom_ratios: Vec::new(),
         limits: LimitTreatment::default(),
         pupil: PupilEdge::default(),
+    }
+}
+
+/// A spherical mirror of radius 200 mm with a beam of semi-diameter 10 mm.
+fn spherical_mirror() -> Lens {
+    let mut lens = bundled("double_gauss_rudolph_50");
+    lens.surfaces = vec![Row {
+        curvature: -1.0 / 200.0,
+        thickness: -100.0,
+        medium: Medium::Mirror,
+        stop: true,
+        ..Row::default()
+    }];
+    lens.aperture = Aperture::EntrancePupilDiameter(20.0);
+    lens.fields.values = vec![FieldPoint { x: 0.0, y: 0.0, weight: 1.0 }];
+    lens.wavelengths.truncate(1);
+    lens.wavelengths[0].primary = true;
+    lens.variables.clear();
+    vary(&mut lens, 0, Quantity::Thickness);
+    lens
+}
+
+/// The wavefront of a spherical mirror is `r⁴/4R³` to the lowest order, and `2/(3√5)` of it, root
+/// mean square, about its mean.
+#[test]
+fn the_wavefront_of_a_spherical_mirror_is_spherical_aberration() {
+    let lens = spherical_mirror();
+    let merit = Merit::new(&lens, &goal_of(Term::Wavefront), 1e-6).unwrap();
+    let value = merit.value(&merit.values(&lens)).unwrap();
+    let edge = 1e4 / (4.0 * 8e6) / (lens.wavelengths[0].um * 1e-3);
+    let exact = 2.0 / (3.0 * 5.0_f64.sqrt()) * edge;
+    assert!((value.sqrt() / exact - 1.0).abs() < 5e-3, "{} and {exact}", value.sqrt());
+}
+
+/// Off the axis the best image point removes the tilt, so that the wavefront is at most that about
+/// the chief ray, and on the axis both are the same.
+#[test]
+fn the_wavefront_term_is_that_of_the_analysis_without_tilt() {
+    let lens = bundled("heliar_100_f45");
+    let model = RayModel::from_lens(&lens, 0).unwrap();
+    for (number, field) in model.fields.iter().enumerate() {
+        let mut one = lens.clone();
+        one.fields.values = vec![*field];
+        one.wavelengths = vec![lens.wavelengths[lens.primary()]];
+        vary(&mut one, 0, Quantity::Curvature);
+        let merit = Merit::new(&one, &goal_of(Term::Wavefront), 1e-6).unwrap();
+        let free = merit.value(&merit.values(&one)).unwrap().sqrt();
+        let accuracy = Accuracy { tolerance: 1e-6, ..Accuracy::default() };
+        let about_chief = wavefront(&model, *field, model.primary, accuracy).unwrap().rms.value;
+        let printed = wavefront(&model, *field, model.primary, accuracy).unwrap();
+        let without_tilt = printed.rms_without_tilt.unwrap().value;
+        assert!((free / without_tilt - 1.0).abs() < 1e-5, "{free} and {without_tilt}");
+        if number == 0 {
+            assert!((free / about_chief - 1.0).abs() < 1e-5, "{free} and {about_chief}");
+        } else {
+            assert!(free < about_chief && free > 0.1 * about_chief, "{free} and {about_chief}");
+        }
+    }
+}
+
+/// Defocus alone: the transfer of a uniform disc of radius `a` is `2 J₁(k a)/(k a)`, here at the
+/// frequency where `k a = 1`.
+#[test]
+fn the_contrast_of_a_defocused_disc_is_that_of_bessel() {
+    let mut lens = spherical_mirror();
+    lens.surfaces[0].conic = -1.0;
+    lens.surfaces[0].thickness = -99.0;
+    // The rays of a paraboloid cross the plane 1 mm before its focus at r/f (1 + r²/4f²...).
+    let radius = 10.0 / (100.0 - 100.0 / 400.0);
+    let frequency = 1.0 / (std::f64::consts::TAU * radius);
+    let merit = Merit::new(&lens, &goal_of(Term::GeometricMtf { frequency, min: 1.0 }), 1e-8);
+    let merit = merit.unwrap();
+    let value = merit.value(&merit.values(&lens)).unwrap();
+    let bessel = 2.0 * 0.440_050_585_744_933_5;
+    assert!((1.0 - value.sqrt() - bessel).abs() < 1e-3, "{} and {bessel}", 1.0 - value.sqrt());
+}
+
+/// A contrast that oscillates faster than the rays follow says so.
+#[test]
+fn a_contrast_says_if_its_rays_are_too_few() {
+    let mut lens = bundled("cooke_triplet_100_f27");
+    vary(&mut lens, 0, Quantity::Curvature);
+    let reached = |frequency, tolerance| {
+        let goal = goal_of(Term::GeometricMtf { frequency, min: 1.0 });
+        let merit = Merit::new(&lens, &goal, tolerance).unwrap();
+        merit.terms(&merit.values(&lens)).unwrap()[0].reached
     };
-    let merit = Merit::new(&lens, &goal, 1e-4).unwrap();
-    let values = merit.values(&lens);
-    let at =
-        |t: f64| merit.evaluate(&[values[0] + t], DerivativeLevel::Gradient).unwrap().gradient[0];
-    let second = (at(0.01) - at(-0.01)) / 0.02;
-    let normal = merit.evaluate(&values, DerivativeLevel::Normal).unwrap().normal[(0, 0)];
-    assert!((second / (2.0 * normal) - 1.0).abs() < 1e-6, "{second} and {normal}");
+    assert!(reached(1.0, 1e-3));
+    assert!(!reached(300.0, 1e-8));
+}
+
+#[test]
+fn a_contrast_needs_a_frequency_and_a_reachable_minimum() {
+    let lens = bundled("heliar_100_f45");
+    for (frequency, min) in [(0.0, 0.5), (-3.0, 0.5), (10.0, 0.0), (10.0, 1.5), (f64::NAN, 0.5)] {
+        let goal = goal_of(Term::GeometricMtf { frequency, min });
+        let text = Merit::new(&lens, &goal, 1e-3).unwrap_err().to_string();
+        assert!(text.contains("geometric_mtf"), "{text}");
+    }
+}
+
+/// A contrast that is already above its minimum asks for nothing.
+#[test]
+fn a_contrast_above_its_minimum_has_no_merit() {
+    let mut lens = bundled("heliar_100_f45");
+    vary(&mut lens, 0, Quantity::Curvature);
+    let goal = goal_of(Term::GeometricMtf { frequency: 0.01, min: 0.5 });
+    let merit = Merit::new(&lens, &goal, 1e-3).unwrap();
+    let sum = merit.evaluate(&merit.values(&lens), DerivativeLevel::Normal).unwrap();
+    assert!(sum.value == 0.0 && sum.gradient.amax() == 0.0);
 }
 
 /// A rod is longer than its focal length: the default goal must not ask for another lens.

@@ -10,7 +10,7 @@ use crate::trace::TraceSink as _;
 use serde::Serialize;
 use std::f64::consts::TAU;
 
-/// The contrast by diffraction of a field at one wavelength and some frequencies in line pairs per mm;
+/// The contrast by diffraction of a field at one wavelength and some frequencies in cycles/mm;
 /// errors are absolute. Where the aberrations are so large that the place of the pupil's edge on the
 /// sphere matters, the change on doubling its radius is part of the error.
 ///
@@ -156,7 +156,7 @@ const LARGEST_CHANGE: f64 = 1.27;
 /// The parts of the highest frequency at which both contrasts are compared.
 const COMPARED: [f64; 3] = [0.25, 0.5, 1.0];
 
-/// Decides whether the contrast of a field at a wavelength up to a frequency in line pairs per mm needs
+/// Decides whether the contrast of a field at a wavelength up to a frequency in cycles/mm needs
 /// diffraction: by a bound, or else by computing both at three frequencies.
 ///
 /// # Errors

@@ -134,3 +134,31 @@ impl WavePolynomial {
         sum
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_polynomials_leave_is_the_weighted_rms_of_the_rest() {
+        let at = |i: usize| [0.1 * (0.37 * i as f64).sin(), 0.1 * (0.61 * i as f64).cos()];
+        let sample = |i: usize, scale: f64| {
+            let cosines = at(i);
+            let values = [(40.0 * cosines[0]).sin() + cosines[1].abs(), 1.0 + cosines[0].powi(3)];
+            FitSample { cosines, values, weight: scale * (1.0 + (i % 3) as f64) }
+        };
+        for scale in [1.0, 1e-3, 250.0] {
+            let samples: Vec<FitSample> = (0..120).map(|i| sample(i, scale)).collect();
+            let basis = PolynomialBasis::new((0..120).map(at), 15, false);
+            let (found, left) = basis.fit(&samples).unwrap();
+            let total: f64 = samples.iter().map(|sample| sample.weight).sum();
+            for k in [0, 1] {
+                let square =
+                    |s: &FitSample| s.weight * (s.values[k] - found.at(s.cosines)[k]).powi(2);
+                let exact = (samples.iter().map(square).sum::<f64>() / total).sqrt();
+                assert!((left[k] - exact).abs() < 1e-9, "{scale}: {left:?} {exact}");
+                assert!(k == 1 || exact > 1e-4, "nothing is left: {exact}");
+            }
+        }
+    }
+}

@@ -165,7 +165,7 @@ impl PupilFunction {
         Ok(samples)
     }
 
-    /// The optical transfer function at a spatial frequency, x and y in line pairs per mm, to an
+    /// The optical transfer function at a spatial frequency, x and y in cycles/mm, to an
     /// absolute tolerance, with its origin at the centre of the reference sphere. The image plane may
     /// be moved by `defocus` mm along the light.
     ///

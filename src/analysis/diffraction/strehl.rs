@@ -80,23 +80,26 @@ fn climb(light: &PupilSamples, start: [f64; 3]) -> [f64; 3] {
     for _ in 0..STEPS {
         let (gradient, curvature) = light.slopes_at(here.into());
         let Some(step) = uphill(gradient, curvature) else { break };
-        let mut factor = 1.0;
-        let mut moved = false;
-        for _ in 0..HALVINGS {
-            let there = here + factor * step;
-            let found = light.intensity_at(there.into());
-            if found > value {
-                moved = found > value * (1.0 + 1e-14);
-                (here, value) = (there, found);
-                break;
-            }
-            factor *= 0.5;
-        }
-        if !moved {
+        let Some((there, found)) = brighter_point(light, here, value, step) else { break };
+        let has_risen = found > value * (1.0 + 1e-14);
+        (here, value) = (there, found);
+        if !has_risen {
             break;
         }
     }
     here.into()
+}
+
+/// The first point along a step, halved again and again, at which the intensity is above `value`.
+fn brighter_point(
+    light: &PupilSamples,
+    here: Vector3<f64>,
+    value: f64,
+    step: Vector3<f64>,
+) -> Option<(Vector3<f64>, f64)> {
+    let halved = std::iter::successors(Some(1.0), |factor| Some(0.5 * factor)).take(HALVINGS);
+    let points = halved.map(|factor: f64| here + factor * step);
+    points.map(|there| (there, light.intensity_at(there.into()))).find(|(_, found)| *found > value)
 }
 
 /// The Newton step, with every curvature taken as a negative one.

@@ -56,10 +56,18 @@ impl LiveTerm {
             ui.spacing_mut().item_spacing.x = 4.0;
             self.value(ui, term);
             if let Some(share) = share {
-                ui.weak(format!("{:.1} %", 100.0 * share));
+                ui.weak(share_text(share));
             }
         });
     }
+}
+
+/// A share in percent, with a decimal only where it is small: the column is narrow.
+fn share_text(share: f64) -> String {
+    if share < 0.0995 {
+        return format!("{:.1} %", 100.0 * share);
+    }
+    format!("{:.0} %", 100.0 * share)
 }
 
 /// The merit of the design, or why it has none.

@@ -1,23 +1,23 @@
-//! The limits that hold the optimized lens, with their prices.
+//! The active limits of the optimized lens, with their prices.
 
 use crate::optimize::LimitPrice;
 use crate::studio::number;
 use egui::{Grid, Ui};
 
-/// Shows the limits that hold the best lens; nothing if there are none.
+/// Shows the active limits of the best lens; nothing if there are none.
 pub(super) fn table(ui: &mut Ui, limits: &[LimitPrice]) {
     if limits.is_empty() {
         return;
     }
     ui.add_space(6.0);
-    ui.strong("Limits that hold the lens");
+    ui.strong("Active limits");
     Grid::new("binding limits").num_columns(4).spacing([8.0, 2.0]).striped(true).show(ui, |ui| {
         ui.weak("Limit");
         ui.weak("Value");
         ui.weak("Bound");
         ui.weak("Price").on_hover_text(
-            "What the merit would gain, in mm², by a bound looser by 1 mm or by 1 of a ratio; for \
-             a prescribed value, by a larger one",
+            "Decrease of the merit, in mm², per mm or per unit of the ratio by which the bound is \
+             relaxed; for a prescribed value, by which it is increased",
         );
         ui.end_row();
         limits.iter().for_each(|limit| row(ui, limit));

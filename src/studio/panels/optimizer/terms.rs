@@ -14,6 +14,8 @@ pub(super) const fn title(term: Term) -> &'static str {
     match term {
         Term::Spot => "Spot",
         Term::SpotIntegral => "Spot × light",
+        Term::Wavefront => "RMS wavefront",
+        Term::GeometricMtf { .. } => "Geometric MTF",
         Term::Throughput => "Throughput",
         Term::ThroughputLoss(_) => "Throughput loss",
         Term::Light(_) => "Light",
@@ -40,6 +42,13 @@ pub(super) const fn hint(term: Term) -> &'static str {
         Term::SpotIntegral => {
             "Square distance from the centroid, integrated over all light that gets through \
              instead of averaged: it falls when light is lost, so combine it with a term for light"
+        }
+        Term::Wavefront => {
+            "Mean square path difference from the sphere about the best image point, in waves: \
+             sharpness of a lens near the diffraction limit"
+        }
+        Term::GeometricMtf { .. } => {
+            "Contrast of rays at a spatial frequency below this minimum, tangential and sagittal"
         }
         Term::Throughput => {
             "As much light as possible: minus the mean area of the pupils. It has no target; its \
@@ -85,6 +94,8 @@ pub(super) const fn unit(term: Term) -> &'static str {
         Term::RelativeIllumination { .. } => "× axis",
         Term::Spot
         | Term::SpotIntegral
+        | Term::Wavefront
+        | Term::GeometricMtf { .. }
         | Term::Throughput
         | Term::Distortion
         | Term::FNumber(_)
@@ -107,9 +118,13 @@ pub(super) fn targets(term: &mut Term) -> Vec<(&'static str, &mut f64)> {
     match term {
         Term::Spot
         | Term::SpotIntegral
+        | Term::Wavefront
         | Term::Throughput
         | Term::Distortion
         | Term::Operand { .. } => Vec::new(),
+        Term::GeometricMtf { frequency, min } => {
+            vec![("Cycles/mm", frequency), ("Minimum", min)]
+        }
         Term::GlassCenter { min, max }
         | Term::AirCenter { min, max }
         | Term::SemiDiameter { min, max } => vec![("Minimum", min), ("Maximum", max)],
@@ -132,11 +147,13 @@ pub(super) fn value_text(term: Term, value: f64) -> String {
         Term::SpotIntegral => format!("{} mm⁴", short(value)),
         Term::Throughput => format!("{} mm²", number::format_digits(-value, 4)),
         Term::ThroughputLoss(_) => format!("{} %", short(100.0 * value)),
+        Term::Wavefront => format!("{} waves", short(root)),
         _ if root < ROUNDING => "satisfied".to_owned(),
         Term::Light(_) | Term::RelativeIllumination { .. } => {
             format!("{} % short", short(100.0 * root))
         }
         Term::FNumber(_) => format!("off by {}", short(root)),
+        Term::GeometricMtf { .. } => format!("{} short", short(root)),
         Term::Steepness(_) => format!("{} over", short(root)),
         Term::Operand { kind, .. } if kind.is_angle() => format!("{}° off", short(root)),
         _ if root < 0.1 => format!("{} µm", short(1e3 * root)),

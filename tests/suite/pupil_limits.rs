@@ -1,0 +1,131 @@
+//! Pupils whose limits move a little, and pupils without light, in closed form.
+
+use aplanat::analysis::spot;
+use aplanat::lens::{Aperture, FieldKind, FieldPoint, Lens, Object, Surface, System, blank};
+use aplanat::paraxial::Beam;
+use aplanat::pupil::{Accuracy, Aiming, RayModel, Region, RegionKind, limited_by_stop};
+use std::f64::consts::PI;
+
+/// The radius of the entrance pupil, and the distance from it to the plane with a rim, in mm.
+const RADIUS: f64 = 5.0;
+const DISTANCE: f64 = 50.0;
+
+/// A beam through the pupil that is displaced by `shift` at a plane 50 mm behind.
+fn displaced(shift: f64, behind: &Surface<f64>) -> RayModel {
+    let front = Surface::plane(DISTANCE, 1.0);
+    let surfaces = vec![front, *behind, Surface::plane(0.0, 1.0)];
+    let system = System { index_before: 1.0, surfaces, stop: Some(0) };
+    let edge = (shift / DISTANCE).atan().to_degrees();
+    let beam = Beam {
+        object: Object::Infinity,
+        aperture: Aperture::EntrancePupilDiameter(2.0 * RADIUS),
+        field: FieldKind::Angle,
+        edge,
+    };
+    let fields = vec![FieldPoint { x: 0.0, y: edge, weight: 1.0 }];
+    let model = RayModel::from_systems(vec![(0.55, 1.0, system)], 0, beam, Aiming::Paraxial);
+    RayModel { fields, ..model.unwrap() }
+}
+
+fn with_rim(shift: f64, semi_diameter: f64) -> RayModel {
+    displaced(shift, &Surface { semi_diameter, ..Surface::plane(DISTANCE, 1.0) })
+}
+
+fn region(model: &RayModel) -> Region<'_> {
+    Region::new(model.launch(model.fields[0], 0).unwrap())
+}
+
+/// The area that two discs have in common, for radii and the distance of their centres.
+fn overlap(r: f64, s: f64, d: f64) -> f64 {
+    let a = ((d * d + r * r - s * s) / (2.0 * d * r)).acos();
+    let b = ((d * d + s * s - r * r) / (2.0 * d * s)).acos();
+    r * r * (a - 0.5 * (2.0 * a).sin()) + s * s * (b - 0.5 * (2.0 * b).sin())
+}
+
+#[test]
+fn corners_between_the_pupil_and_a_rim_are_followed_with_few_rays() {
+    let before = with_rim(4.0, 5.0);
+    let before = region(&before).kind;
+    assert!(matches!(before, RegionKind::StarShaped(_)), "{before:?}");
+    for (shift, rim) in [(4.0, 5.0), (4.05, 5.0), (3.9, 4.95), (4.0, 5.1)] {
+        let model = with_rim(shift, rim);
+        let tracked = Region::track(&before, model.launch(model.fields[0], 0).unwrap());
+        let area = tracked.trace_pupil(8).moments.area;
+        let exact = overlap(RADIUS, rim, shift);
+        assert!((area / exact - 1.0).abs() < 1e-9, "{shift} {rim}: {area} {exact}");
+        let searched = region(&model).rays;
+        assert!(4 * tracked.rays < searched, "{shift} {rim}: {} {searched}", tracked.rays);
+    }
+}
+
+/// The mean over the pupil of a function of the place, by the midpoints of 200 x 200 cells.
+fn mean(of: impl Fn(f64, f64) -> f64) -> f64 {
+    let at = |i: usize| RADIUS * ((i as f64 + 0.5) / 100.0 - 1.0);
+    let cells = (0..40_000).map(|i| (at(i % 200), at(i / 200)));
+    let inside: Vec<f64> =
+        cells.filter(|(x, y)| x.hypot(*y) < RADIUS).map(|(x, y)| of(x, y)).collect();
+    inside.iter().sum::<f64>() / inside.len() as f64
+}
+
+#[test]
+fn a_dark_pupil_is_as_deep_as_its_rays_are_far_from_light() {
+    let blocked = |obstruction: f64| Surface { obstruction, ..Surface::plane(DISTANCE, 1.0) };
+    for (model, exact) in [
+        (displaced(0.0, &blocked(7.5)), mean(|x, y| 7.5 - x.hypot(y))),
+        (displaced(1.0, &blocked(9.0)), mean(|x, y| 9.0 - x.hypot(y + 1.0))),
+        (with_rim(12.0, 6.0), mean(|x, y| x.hypot(y + 12.0) - 6.0)),
+        (with_rim(8.0, 2.0), mean(|x, y| x.hypot(y + 8.0) - 2.0)),
+    ] {
+        let pupil = region(&model).trace_pupil(0);
+        assert!(!pupil.has_light());
+        let depth = pupil.dark.as_ref().unwrap().depth() * RADIUS;
+        // The mean over a grid of 9 x 9 rays against that over the disc.
+        assert!((depth / exact - 1.0).abs() < 0.1, "{depth} {exact}");
+        let area = -pupil.signed_area();
+        assert!((area / (PI * RADIUS * depth) - 1.0).abs() < 0.02, "{area} {depth}");
+    }
+}
+
+/// The image plane shows the pupil itself: what two discs of 5 mm have in common.
+#[test]
+fn the_farthest_ray_of_a_clipped_spot_is_at_a_corner_of_its_pupil() {
+    // Whole; and with a shadow across the middle that leaves two pieces, of which samples are traced
+    // that hardly reach into the corners.
+    for (shift, shadow, allowed) in [(4.0, 0.0, 1e-4), (8.0, 1.5, 0.03)] {
+        let mut model = displaced(0.5 * shift, &Surface::plane(DISTANCE, 1.0));
+        let mut system = model.channels[0].system.clone();
+        system.surfaces[1].obstruction = shadow;
+        let rim = Surface { semi_diameter: 5.0, ..Surface::plane(DISTANCE, 1.0) };
+        system.surfaces.insert(2, rim);
+        let edge = model.beam;
+        let fields = model.fields.clone();
+        model =
+            RayModel::from_systems(vec![(0.55, 1.0, system)], 0, edge, Aiming::Paraxial).unwrap();
+        model.fields = fields;
+        let accuracy = Accuracy { tolerance: 1e-4, max_rays: 200_000 };
+        let radius = spot(&model, model.fields[0], accuracy).unwrap().radius;
+        let exact = (RADIUS * RADIUS - 0.25 * shift * shift).sqrt();
+        assert!((radius.value / exact - 1.0).abs() <= allowed, "{radius:?} {exact}");
+        assert!(radius.error <= allowed * exact, "{shift}: {radius:?}");
+    }
+}
+
+/// The size of the stop that a beam is given by counts, not the rim of its row.
+#[test]
+fn a_beam_given_by_its_stop_keeps_its_light_when_it_is_limited_by_it() {
+    let mut lens = blank();
+    lens.surfaces[0].curvature = 0.02;
+    let light = |lens: &Lens| {
+        let model = RayModel::from_lens(lens, 0).unwrap();
+        spot(&model, lens.fields.values[0], Accuracy::default()).unwrap().light.value
+    };
+    for (size, rim) in [(4.0, 6.0), (6.0, 4.0)] {
+        lens.aperture = Aperture::StopSemiDiameter(size);
+        lens.surfaces[0].semi_diameter = Some(rim);
+        let limited = limited_by_stop(&lens).unwrap();
+        assert_eq!(limited.aperture, lens.aperture);
+        let (before, after) = (light(&lens), light(&limited));
+        assert!((before / (PI * size * size) - 1.0).abs() < 1e-3, "{size} {rim}: {before}");
+        assert!((after / before - 1.0).abs() < 1e-6, "{size} {rim}: {before} {after}");
+    }
+}
