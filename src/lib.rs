@@ -3,7 +3,7 @@
 //! This file is the map. The modules below are the floors of the house, from the ground up, and
 //! **a module uses only modules declared above it**; `tests/architecture.rs` keeps that true.
 //!
-//! Deliberately absent:
+//! Rules:
 //! - *tracing looks nothing up*: a [`lens::Lens`] is what a person wrote, a [`lens::System`] holds
 //!   only numbers;
 //! - *no ray is dropped silently*: every ray ends with a [`trace::Fate`];
@@ -18,7 +18,7 @@
 // Numbers without optics: the number types, vectors, roots, quadrature, samplers.
 pub mod math;
 
-// Optimisers as pure numerics: Adam, L-BFGS, Levenberg-Marquardt, conjugate gradients.
+// Optimizers as pure numerics: Adam, L-BFGS, Levenberg-Marquardt, conjugate gradients.
 pub mod solve;
 
 // Light in one gradient-index field: fields, ray integrators, their discrete adjoint; knows no lens.
@@ -33,20 +33,20 @@ pub mod paraxial;
 // Real rays through a system: every ray ends with a fate; derivatives forwards and backwards.
 pub mod trace;
 
-// Reading and writing lenses: the native JSON, Zemax; an export proves itself.
+// Reading and writing lenses: the native JSON, Zemax, CODE V; an export proves itself.
 pub mod files;
 
-// Design tasks in one gradient-index field: the light and its goals, and the optimisation of the field.
+// Design tasks in one gradient-index field: the light and its goals, and the optimization of the field.
 pub mod grin_design;
 
 // The set of rays that get through: where they start, their boundary, quadrature over them, and
-// derivatives of integrals over it that know that it moves.
+// derivatives of integrals over it that include the motion of the pupil edge.
 pub mod pupil;
 
 // What a designer reads, each number with its error estimate.
 pub mod analysis;
 
-// Errors of making: what they do to a lens, and how good the lens is that is made.
+// Manufacturing errors: what they do to a lens, and how good the lens is that is made.
 pub mod tolerance;
 
 // The merit function: weighted terms with gradients, constraints, default goals.

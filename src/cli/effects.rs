@@ -72,6 +72,8 @@ pub(super) enum AllowedSetting {
     AlwaysOff,
     /// The command computes the effect unless it is switched off.
     OnUnlessOff,
+    /// The effect does not concern the command, which can neither compute it nor omit it.
+    NotApplicable,
 }
 
 /// The rule of a command for an effect that it does not leave to the plan.
@@ -96,6 +98,7 @@ impl EffectRule {
             (self.allowed, setting),
             (AllowedSetting::AlwaysOn, EffectOverride::Off)
                 | (AllowedSetting::AlwaysOff, EffectOverride::On)
+                | (AllowedSetting::NotApplicable, EffectOverride::On | EffectOverride::Off)
         )
     }
 
@@ -113,9 +116,8 @@ impl EffectRule {
     /// The setting that is planned for the user's one.
     fn setting(&self, chosen: EffectOverride) -> EffectOverride {
         match (self.allowed, chosen) {
-            (AllowedSetting::AlwaysOff, _) | (AllowedSetting::OnUnlessOff, EffectOverride::Off) => {
-                EffectOverride::Off
-            }
+            (AllowedSetting::AlwaysOff | AllowedSetting::NotApplicable, _)
+            | (AllowedSetting::OnUnlessOff, EffectOverride::Off) => EffectOverride::Off,
             _ => EffectOverride::On,
         }
     }
@@ -123,7 +125,7 @@ impl EffectRule {
     /// Enters the rule into the decision that was planned.
     fn explain(&self, decision: &mut EffectDecision) {
         match self.allowed {
-            AllowedSetting::AlwaysOff => {
+            AllowedSetting::AlwaysOff | AllowedSetting::NotApplicable => {
                 (decision.needed, decision.residual) = (false, 0.0);
                 self.reason.clone_into(&mut decision.reason);
             }
@@ -178,9 +180,10 @@ impl EffectChoices {
 
     /// True if an effect is switched off that the command computes otherwise.
     pub(super) fn leave_out_any(&self) -> bool {
-        let never = |rule: &EffectRule| rule.allowed == AllowedSetting::AlwaysOff;
+        let never = [AllowedSetting::AlwaysOff, AllowedSetting::NotApplicable];
         Effect::ALL.into_iter().any(|effect| {
-            let is_never = self.rules.iter().any(|rule| rule.effect == effect && never(rule));
+            let mut rules = self.rules.iter().filter(|rule| rule.effect == effect);
+            let is_never = rules.any(|rule| never.contains(&rule.allowed));
             self.chosen.get(effect) == EffectOverride::Off && !is_never
         })
     }
@@ -325,8 +328,14 @@ impl EffectReport {
 
 impl Display for EffectReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(f, "effects")?;
-        self.effects.iter().try_for_each(|decision| writeln!(f, "{}", decision_text(decision)))?;
+        let computed = self.effects.iter().filter(|decision| decision.computed);
+        let names: Vec<&str> = computed.map(|decision| option_name(decision.effect)).collect();
+        let computed = if names.is_empty() { "none".to_owned() } else { names.join(", ") };
+        let omitted = self.effects.len() - names.len();
+        writeln!(
+            f,
+            "effects: {computed} computed; {omitted} omitted (`aplanat info` and --json say why)"
+        )?;
         let warning = self.warning();
         if warning.is_empty() { Ok(()) } else { writeln!(f, "  {warning}") }
     }

@@ -3,7 +3,7 @@
 use super::effects::{AllowedSetting, EffectArgs, EffectReport, EffectRule};
 use super::error::CliError;
 use super::input::{LensFile, LoadedLens, Tolerance};
-use super::output::{Output, ShortNumber, TextTable};
+use super::output::{Output, ShortNumber, TextTable, counted};
 use crate::effects::{self, Effect, EffectOverride, EffectPlan, TracePurpose};
 use crate::lens::{
     Fields, Lens, Medium, MediumPlace, PROFILE_TERMS, ProfileLaw, RADIAL_TERMS, SurfaceNumber,
@@ -340,7 +340,8 @@ impl GradientReport {
 impl Display for GradientReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { value, error, rays, ms, d, d_error, method, reason, unit, .. } = self;
-        writeln!(f, "{} {unit} ± {error:.1e}   {rays} rays, {ms:.3} ms", ShortNumber(*value))?;
+        let rays = counted(*rays, "ray");
+        writeln!(f, "{} {unit} ± {error:.1e}   {rays}, {ms:.3} ms", ShortNumber(*value))?;
         writeln!(f, "{method}: {reason}")?;
         if !self.reached {
             let why = match *method {

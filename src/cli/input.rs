@@ -14,7 +14,7 @@ use std::sync::atomic::AtomicBool;
 /// The lens argument of a subcommand.
 #[derive(Debug, clap::Args)]
 pub(super) struct LensFile {
-    /// The lens: .json or .zmx
+    /// The lens: .json, .zmx, .seq or .roa
     #[arg(value_name = "LENS")]
     path: PathBuf,
 }
@@ -22,7 +22,7 @@ pub(super) struct LensFile {
 /// The lens arguments of a benchmark that takes several.
 #[derive(Debug, clap::Args)]
 pub(super) struct LensFiles {
-    /// The lenses: .json or .zmx
+    /// The lenses: .json, .zmx, .seq or .roa
     #[arg(value_name = "LENS", required = true)]
     paths: Vec<PathBuf>,
 }
@@ -78,10 +78,15 @@ impl LensFile {
         let file = self.path.display().to_string();
         let opened = files::open(&self.path)?;
         let report = opened.report.unwrap_or_default();
-        let [dropped, changed] = [ConversionOutcome::Dropped, ConversionOutcome::Approximated]
-            .map(|outcome| report.count(outcome));
-        if dropped + changed > 0 {
-            let text = format!("{dropped} lines dropped, {changed} approximated");
+        let [dropped, locked, changed] = [
+            ConversionOutcome::Dropped,
+            ConversionOutcome::Locked,
+            ConversionOutcome::Approximated,
+        ]
+        .map(|outcome| report.count(outcome));
+        if dropped + locked + changed > 0 {
+            let locked = if locked > 0 { format!("{locked} locked, ") } else { String::new() };
+            let text = format!("{dropped} lines dropped, {locked}{changed} approximated");
             print_note(format!("note: {file}: {text}; `aplanat convert` lists them"));
         }
         Ok(LoadedLens { lens: opened.lens, file })

@@ -38,9 +38,10 @@ mod tolerance;
 mod trace;
 mod window;
 
-use clap::{Parser, Subcommand};
+use clap::{Arg, Command, CommandFactory, FromArgMatches, Parser, Subcommand};
 use error::CliError;
 use output::{Output, print_note};
+use std::any::TypeId;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
@@ -49,7 +50,7 @@ use std::process::ExitCode;
 #[derive(Debug, Parser)]
 #[command(version, after_help = AFTER_HELP, disable_help_subcommand = true)]
 struct CliArgs {
-    /// The lens that the studio opens: .json or .zmx
+    /// The lens that the studio opens: .json, .zmx, .seq or .roa
     lens: Option<PathBuf>,
 
     /// Prints the result as JSON
@@ -114,7 +115,7 @@ impl CliCommand {
 /// Runs the command that the arguments of the process name, or opens the studio.
 pub fn run() -> ExitCode {
     env_logger::init();
-    match CliArgs::try_parse() {
+    match CliArgs::read() {
         Ok(arguments) => exit_code(arguments.run()),
         Err(usage) => {
             // A reader of the help that closes the pipe early is no failure.
@@ -125,6 +126,11 @@ pub fn run() -> ExitCode {
 }
 
 impl CliArgs {
+    /// The arguments of the process.
+    fn read() -> Result<Self, clap::Error> {
+        Self::from_arg_matches(&with_numbers(Self::command()).try_get_matches()?)
+    }
+
     fn run(&self) -> Result<(), CliError> {
         let output = Output::new(self.json);
         match &self.command {
@@ -135,6 +141,25 @@ impl CliArgs {
             None => window::open(self.lens.as_deref()),
         }
     }
+}
+
+/// A command whose options, and those of its subcommands, take negative numbers as values, so that a
+/// wrong number is refused by the range that it violates, and refuse other texts in plain words.
+fn with_numbers(command: Command) -> Command {
+    command.mut_args(with_number).mut_subcommands(with_numbers)
+}
+
+fn with_number(option: Arg) -> Arg {
+    if option.get_long().is_none() || !option.get_action().takes_values() {
+        return option;
+    }
+    let is_length = option.get_value_parser().type_id() == TypeId::of::<f64>();
+    let option = option.allow_negative_numbers(true);
+    if is_length { option.value_parser(parse_number) } else { option }
+}
+
+fn parse_number(text: &str) -> Result<f64, &'static str> {
+    text.parse().map_err(|_not_a_number| "expected a number")
 }
 
 fn exit_code(result: Result<(), CliError>) -> ExitCode {

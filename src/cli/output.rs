@@ -69,6 +69,19 @@ impl Display for ShortNumber {
     }
 }
 
+/// A number of things, the noun in the singular for one.
+pub(super) fn counted(count: usize, noun: &str) -> String {
+    if count == 1 { format!("1 {noun}") } else { format!("{count} {noun}s") }
+}
+
+/// A number from rays, or 0 if it is below its error and that is rounding.
+pub(super) fn without_rounding(value: f64, error: f64) -> f64 {
+    if value.abs() <= error && error < ROUNDING { 0.0 } else { value }
+}
+
+/// The largest error, in mm or wavelengths, that is taken for rounding.
+const ROUNDING: f64 = 1e-9;
+
 /// A number, or a dash if it does not exist.
 pub(super) fn or_dash(value: Option<f64>) -> String {
     value.map_or("-".to_owned(), |value| ShortNumber(value).to_string())

@@ -72,8 +72,9 @@ impl OutputPaths {
 fn check_folder(folder: &Path) -> Result<(), CliError> {
     let existing = folder.ancestors().find(|part| part.exists());
     if let Some(part) = existing.filter(|part| !part.is_dir()) {
-        let (folder, part) = (folder.display(), part.display());
-        return Err(CliError::Input(format!("{folder}: {part} is a file; expected a folder")));
+        let inside = if part == folder { String::new() } else { format!("{}: ", folder.display()) };
+        let text = format!("{inside}{} is a file; expected a folder", part.display());
+        return Err(CliError::Input(text));
     }
     let parent = folder.parent().filter(|parent| !parent.as_os_str().is_empty());
     if let Some(parent) = parent.filter(|parent| !parent.exists()) {

@@ -423,7 +423,11 @@ impl Display for PictureReport {
             "error {:.3} % of mid grey (rms){of_quick}; asked for {percent} %{reached}",
             100.0 * self.error
         )?;
-        writeln!(f, "a white card on the axis gives {} of its radiance", ShortNumber(self.white))?;
+        writeln!(
+            f,
+            "on-axis image irradiance of a white card: {} of its radiance",
+            ShortNumber(self.white)
+        )?;
         let lost = 100.0 * (1.0 - self.fates.imaged as f64 / self.rays.max(1) as f64);
         let lost = match self.way {
             "exact" => format!(", {lost:.1} % lost at rims"),

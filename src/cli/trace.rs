@@ -32,7 +32,7 @@ pub(super) struct TraceArgs {
 const GIVEN_RAYS: [EffectRule; 6] = [
     EffectRule {
         effect: Effect::Dispersion,
-        allowed: AllowedSetting::AlwaysOff,
+        allowed: AllowedSetting::NotApplicable,
         reason: "the rays have one wavelength",
     },
     EffectRule {
@@ -47,12 +47,12 @@ const GIVEN_RAYS: [EffectRule; 6] = [
     },
     EffectRule {
         effect: Effect::Aiming,
-        allowed: AllowedSetting::AlwaysOff,
+        allowed: AllowedSetting::NotApplicable,
         reason: "the rays are given, and none is aimed",
     },
     EffectRule {
         effect: Effect::FiniteObject,
-        allowed: AllowedSetting::AlwaysOff,
+        allowed: AllowedSetting::NotApplicable,
         reason: "the rays begin where they are given",
     },
     EffectRule {
@@ -69,6 +69,7 @@ impl TraceArgs {
         let request: RayRequest = input::read_long_json(&self.rays, MAX_DATA_BYTES)?;
         let wavelength_um = request.wavelength_um.unwrap_or_else(|| opened.primary_um());
         let zoom = request.zoom.unwrap_or(0);
+        self.check_zoom(zoom, &opened)?;
         let mut system = opened.system(zoom, Some(wavelength_um))?;
         let effects = simplify_as_asked(&mut system, &opened, zoom, &choices)?;
         let refuse = |source| CliError::Rays { file: input::display_name(&self.rays), source };
@@ -81,6 +82,18 @@ impl TraceArgs {
         let landings = landings.inspect(|landing| fates.count(landing.fate));
         let rays = landings.map(|landing| TracedRayJson::new(&landing, last)).collect();
         output.print(&TraceReport { wavelength_um, zoom, fates, rays, effects })
+    }
+
+    /// Refuses a zoom position of the file of the rays that the lens does not have.
+    fn check_zoom(&self, zoom: usize, opened: &LoadedLens) -> Result<(), CliError> {
+        let last = opened.lens.zoom_positions() - 1;
+        if zoom <= last {
+            return Ok(());
+        }
+        let (rays, lens) = (input::display_name(&self.rays), &opened.file);
+        let text =
+            format!("{rays}: `zoom`: no zoom position {zoom} in {lens}; expected 0 to {last}");
+        Err(CliError::Input(text))
     }
 }
 
@@ -205,10 +218,7 @@ impl Display for TraceReport {
         )?;
         match &self.effects {
             Some(effects) => write!(f, "\n{effects}"),
-            None => writeln!(
-                f,
-                "every effect of the lens is computed: given rays need not be those of the beam"
-            ),
+            None => writeln!(f, "effects: all of the lens that concern given rays are computed"),
         }
     }
 }

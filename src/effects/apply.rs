@@ -1,5 +1,6 @@
 //! A lens resolved according to a plan: effects that are left out are absent from its numbers.
 
+use super::dispersion::light_change;
 use super::effect::Effect;
 use super::plan::EffectPlan;
 use super::simplify::{collimate_fields, reduce_to_conic};
@@ -30,6 +31,35 @@ pub fn build_ray_model_at(
     fields: &[FieldPoint],
     plan: &EffectPlan,
 ) -> Result<RayModel, RayModelError> {
+    let (systems, primary) = resolve_planned(lens, zoom, plan)?;
+    let beam = Beam::for_lens(lens, zoom);
+    let mut built = aim_planned(systems, primary, beam, plan)?;
+    built.fields = fields.to_vec();
+    if lens.object != Object::Infinity
+        && !plan.computes(Effect::FiniteObject)
+        && let Some((beam, fields)) = collimate_fields(&built, &beam)
+    {
+        let systems = built.channels.into_iter().map(|c| (c.um, c.weight, c.system)).collect();
+        built = aim_planned(systems, primary, beam, plan)?;
+        built.fields = fields;
+    }
+    built.neglected = plan.neglected();
+    let residual = plan.decision(Effect::Dispersion).map_or(0.0, |decision| decision.residual);
+    if residual > 0.0 {
+        built.neglected.light += light_change(lens, zoom, fields)?;
+    }
+    Ok(built)
+}
+
+/// A wavelength in µm, its weight, and the lens resolved there.
+type ResolvedWavelength = (f64, f64, System<f64>);
+
+/// The lens at the wavelengths that a plan computes, and the position of the primary one among them.
+fn resolve_planned(
+    lens: &Lens,
+    zoom: usize,
+    plan: &EffectPlan,
+) -> Result<(Vec<ResolvedWavelength>, usize), LensError> {
     let primary = lens.primary();
     let one = !plan.computes(Effect::Dispersion);
     let wavelengths = if one { &lens.wavelengths[primary..=primary] } else { &lens.wavelengths };
@@ -40,26 +70,22 @@ pub fn build_ray_model_at(
         Ok((w.um, if one { 1.0 } else { w.weight }, system))
     };
     let systems: Result<Vec<_>, LensError> = wavelengths.iter().map(resolve).collect();
-    let primary = if one { 0 } else { primary };
-    let aimed = plan.computes(Effect::Aiming);
-    let model = |systems, beam| -> Result<RayModel, RayModelError> {
-        let aiming = if aimed { Aiming::Chief } else { Aiming::Paraxial };
-        let model = RayModel::from_systems(systems, primary, beam, aiming)?;
-        Ok(if aimed { model.limited_by_stop()? } else { model })
-    };
-    let beam = Beam::for_lens(lens, zoom);
-    let mut built = model(systems?, beam)?;
-    built.fields = fields.to_vec();
-    if lens.object != Object::Infinity
-        && !plan.computes(Effect::FiniteObject)
-        && let Some((beam, fields)) = collimate_fields(&built, &beam)
-    {
-        let systems = built.channels.into_iter().map(|c| (c.um, c.weight, c.system)).collect();
-        built = model(systems, beam)?;
-        built.fields = fields;
+    Ok((systems?, if one { 0 } else { primary }))
+}
+
+/// The ray model of resolved systems, with rays aimed as a plan says.
+fn aim_planned(
+    systems: Vec<ResolvedWavelength>,
+    primary: usize,
+    beam: Beam,
+    plan: &EffectPlan,
+) -> Result<RayModel, RayModelError> {
+    if plan.computes(Effect::Aiming) {
+        let model = RayModel::from_systems(systems, primary, beam, Aiming::Chief)?;
+        Ok(model.limited_by_stop()?)
+    } else {
+        RayModel::from_systems(systems, primary, beam, Aiming::Paraxial)
     }
-    built.neglected = plan.neglected();
-    Ok(built)
 }
 
 /// Removes from a resolved lens what a plan leaves out: aspheric terms, semi-diameters and

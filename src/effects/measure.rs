@@ -9,7 +9,7 @@ use super::simplify::{collimate_fields, reduce_to_conic};
 use crate::lens::{FieldPoint, Lens, Object, Shape, System};
 use crate::math::Vec3;
 use crate::paraxial::Beam;
-use crate::pupil::{Aiming, Launch, PupilPattern, RayModel, RayModelError, Region, pattern_points};
+use crate::pupil::{Aiming, Launch, PupilPattern, RayModel, RayModelError, pattern_points};
 use crate::trace::{Fate, Fates, GrinStepPlan, Ray, Tracer};
 use rayon::prelude::*;
 use std::f64::consts::TAU;
@@ -28,9 +28,6 @@ pub struct EffectMeasurements {
     /// The distance between the rays of each wavelength and those of the primary one in the image
     /// plane, root mean square, for the field where it is largest, in mm.
     pub dispersion: f64,
-    /// The largest relative change of the light of a field if all of it had the primary wavelength;
-    /// infinite if that cannot be told.
-    pub dispersion_light: f64,
     /// The aspheres, each with the shift of rays without its aspheric terms, in mm.
     pub aspheres: Vec<(usize, f64)>,
     /// The clearance at every given semi-diameter and obstruction.
@@ -72,9 +69,6 @@ const RINGS: usize = 3;
 /// a side, and half a side in radii of the pupil. They are those that the search for the pupil begins
 /// with, so that it finds no light that they miss.
 const STRAY: [(usize, f64); 2] = [(25, 1.6), (25, 3.2)];
-/// The order of quadrature of the areas of pupils, whose errors are nearly the same at all
-/// wavelengths.
-const AREA_ORDER: usize = 2;
 /// The points on the rim of the pupil.
 const ON_RIM: usize = 24;
 
@@ -108,7 +102,6 @@ pub fn measure_effects_at(
         length: system.total_track(),
         smallest_spot: smallest_spot(&model, &bundles),
         dispersion: dispersion(&model, &bundles),
-        dispersion_light: dispersion_light(&model),
         aspheres: aspheres(&model, &bundles)?,
         rims: rims(&model)?,
         fates: bundles.iter().fold(Fates::default(), |sum, bundle| add_fates(sum, bundle.fates)),
@@ -257,29 +250,6 @@ fn dispersion(model: &RayModel, bundles: &[SampledBundle]) -> f64 {
         bundles.iter().filter(of_field).map(square).sum::<f64>().sqrt()
     };
     model.fields.iter().map(worst).fold(0.0, f64::max)
-}
-
-/// The change of the clear area of the pupil, weighted over the wavelengths, of the worst field.
-fn dispersion_light(model: &RayModel) -> f64 {
-    if model.channels.len() == 1 {
-        return 0.0;
-    }
-    let weights: f64 = model.channels.iter().map(|channel| channel.weight).sum();
-    let area = |field: FieldPoint, wavelength: usize| {
-        let Ok(launch) = model.launch(field, wavelength) else { return 0.0 };
-        let scale = launch.area();
-        let region = Region::new(launch);
-        scale * region.moments(&region.nodes(AREA_ORDER)).area
-    };
-    let change = |field: &FieldPoint| {
-        let areas: Vec<f64> = (0..model.channels.len()).map(|w| area(*field, w)).collect();
-        let weighted = model.channels.iter().zip(&areas).map(|(channel, a)| channel.weight * a);
-        let mean = weighted.sum::<f64>() / weights;
-        let change = (areas[model.primary] / mean - 1.0).abs();
-        // A field that is dark at all wavelengths has no light to change.
-        if mean == 0.0 { 0.0 } else { change }
-    };
-    model.fields.par_iter().map(change).reduce(|| 0.0, f64::max)
 }
 
 /// The largest RMS shift of a bundle at the primary wavelength in another system.

@@ -10,6 +10,7 @@
 
 mod aiming;
 mod apply;
+mod dispersion;
 mod effect;
 mod measure;
 mod plan;

@@ -103,9 +103,6 @@ pub struct EffectPlan {
     /// The largest relative change of light by rays aimed at the paraxial entrance pupil; 0 if they
     /// are aimed at the stop.
     pub aiming_light: f64,
-    /// The largest relative change of light by all of it having the primary wavelength; 0 if every
-    /// wavelength is traced.
-    pub dispersion_light: f64,
 }
 
 impl EffectPlan {
@@ -119,12 +116,13 @@ impl EffectPlan {
         self.decision(effect).is_none_or(|decision| decision.computed)
     }
 
-    /// The changes by all that is left out together.
+    /// The changes by all that is left out together; that of light without the part of dispersion,
+    /// which is measured with the ray model.
     pub fn neglected(&self) -> Neglected {
         let shifts = self.decisions.iter().filter(|decision| decision.unit == "mm");
         let shift: f64 = shifts.map(|decision| decision.residual).sum();
         let ray_shift = shift * (sample_points().len() as f64).sqrt();
-        Neglected { shift, ray_shift, light: self.aiming_light + self.dispersion_light }
+        Neglected { shift, ray_shift, light: self.aiming_light }
     }
 
     /// The effects that the user left out although the lens calls for them and that no shift of rays
@@ -156,19 +154,10 @@ pub fn plan(
         object(measured, allowed, overrides.get(Effect::FiniteObject)),
         grin,
     ];
-    let mut plan = EffectPlan {
-        decisions,
-        as_conic,
-        unclipped,
-        homogeneous,
-        aiming_light: 0.0,
-        dispersion_light: 0.0,
-    };
-    let light = |plan: &EffectPlan, effect, change| {
-        if plan.computes(effect) { 0.0 } else { change }
-    };
-    plan.aiming_light = light(&plan, Effect::Aiming, measured.paraxial_aiming.light);
-    plan.dispersion_light = light(&plan, Effect::Dispersion, measured.dispersion_light);
+    let mut plan = EffectPlan { decisions, as_conic, unclipped, homogeneous, aiming_light: 0.0 };
+    if !plan.computes(Effect::Aiming) {
+        plan.aiming_light = measured.paraxial_aiming.light;
+    }
     plan
 }
 

@@ -1,4 +1,4 @@
-//! Figure 3.3: the stop of a lens that is optimised for sharpness alone closes to a pinhole if the
+//! Figure 3.3: the stop of a lens that is optimized for sharpness alone closes to a pinhole if the
 //! gradient includes the motion of the pupil edge.
 //!
 //! Two singlets around a stop, `C = |p − o|²` with `o` the middle of the sensor, and the stop's
@@ -23,7 +23,7 @@ use crate::pupil::{QuadraticIntegrand, RayModel, Region};
 
 pub(super) const EXPERIMENT: Experiment = Experiment {
     id: "3.3",
-    title: "An aperture stop optimised for sharpness alone",
+    title: "An aperture stop optimized for sharpness alone",
     claim: "The unbiased gradient closes the stop to a pinhole; the biased one leaves it unchanged",
     omits: "nothing of the figure",
     seconds: 1.0,

@@ -1,6 +1,6 @@
 //! Figure 5.9: a fibre that refocuses parallel light periodically, compared with the parabolic one.
 //!
-//! The field is optimised for its first focus alone. For meridional rays the exact answer is the
+//! The field is optimized for its first focus alone. For meridional rays the exact answer is the
 //! hyperbolic secant, which refocuses at one, three and five times that distance; the parabolic
 //! profile has no focus, so it is compared at those planes where its own blur is smallest.
 
@@ -21,7 +21,7 @@ use std::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_2, SQRT_2};
 pub(super) const EXPERIMENT: Experiment = Experiment {
     id: "5.9",
     title: "A focusing fibre compared with the parabolic one",
-    claim: "The optimised profile focuses better than the parabolic one, over more periods",
+    claim: "The optimized profile focuses better than the parabolic one, over more periods",
     omits: "nothing of the figure",
     seconds: 1.0,
     run,
@@ -61,7 +61,7 @@ fn run(_: Effort, progress: &mut ProgressFn<'_>) -> ExperimentResult {
             spot.into(),
         ]);
         let says =
-            format!("focus {}: blur of the parabolic fibre, relative to the optimised one", i + 1);
+            format!("focus {}: blur of the parabolic fibre, relative to the optimized one", i + 1);
         outcome.claims.push(Claim::at_least(says, spot / view.spot, BETTER));
     }
     let difference = task.difference(best)?;
@@ -142,7 +142,7 @@ fn draw_focus_errors(
         let setup = plan?.setup;
         let tracer = GrinTracer::new(best.index_field(), setup)?;
         let found = tracer.trace_batch(rays).iter().map(|exit| radius(exit.x)).collect();
-        curves.push((format!("optimised, focus {}", i + 1), points(found), color));
+        curves.push((format!("optimized, focus {}", i + 1), points(found), color));
     }
     let mut canvas = Canvas::new([1500, 860]);
     let all = || curves.iter().flat_map(|curve| &curve.1);

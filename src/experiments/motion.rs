@@ -32,12 +32,12 @@ pub(super) const EXPERIMENT: Experiment = Experiment {
 const LENS: &str = "double_gauss_rudolph_50";
 /// The order of quadrature.
 const ORDER: usize = 6;
-/// The range of frequencies plotted, in line pairs per mm.
+/// The range of frequencies plotted, in cycles/mm.
 const FREQUENCIES: [f64; 2] = [0.5, 40.0];
 const STEPS: usize = 80;
 /// The motion of the image during the exposure of the dark lens, in mm.
 const WAY: f64 = 0.2;
-/// The frequency at which both are compared, in line pairs per mm.
+/// The frequency at which both are compared, in cycles/mm.
 const COMPARED: f64 = 4.0;
 /// The minimum ratio of the exposure times.
 const TIMES: f64 = 2.0;
@@ -88,7 +88,7 @@ impl Exposure {
         })
     }
 
-    /// The contrast at a frequency in line pairs per mm of a target whose image moves by `distance`,
+    /// The contrast at a frequency in cycles/mm of a target whose image moves by `distance`,
     /// in mm.
     fn contrast(&self, frequency: f64, distance: f64) -> f64 {
         let (mut sum, mut light) = (0.0, 0.0);
@@ -154,7 +154,7 @@ impl ExposurePair {
             .with_error(error),
             Claim::at_most("spot of the darkest lens relative to the brightest", sharper, 1.0),
             Claim::at_most(
-                format!("at rest: contrast bright over dark, {COMPARED} line pairs/mm"),
+                format!("at rest: contrast bright over dark, {COMPARED} cycles/mm"),
                 bright / dark,
                 1.0,
             ),
@@ -191,7 +191,7 @@ impl ExposurePair {
 
     fn draw(&self) -> Canvas {
         let mut canvas = Canvas::new([1200, 800]);
-        let x = Axis::linear("line pairs/mm", FREQUENCIES.into_iter().chain([0.0]));
+        let x = Axis::linear("cycles/mm", FREQUENCIES.into_iter().chain([0.0]));
         let y = Axis::linear("contrast", [0.0, 1.0]);
         let chart = Chart::new([120.0, 190.0], [1140.0, 690.0], x, y);
         chart.draw(&mut canvas, &format!("the image moves {WAY} mm in the longer exposure"));

@@ -1,4 +1,4 @@
-//! Figure 3.6: sharpness against light. A lens is optimised with increasing weight on its light by
+//! Figure 3.6: sharpness against light. A lens is optimized with increasing weight on its light by
 //! unbiased derivatives, which include the motion of the pupils, and by biased ones. For the latter
 //! the light has no derivative: all weights are equivalent, and an aperture has to be chosen
 //! beforehand.

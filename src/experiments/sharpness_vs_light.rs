@@ -1,4 +1,4 @@
-//! Shared parts of figures 3.6 to 3.10: lenses optimised for sharpness and light together (3.26),
+//! Shared parts of figures 3.6 to 3.10: lenses optimized for sharpness and light together (3.26),
 //! and the sharpness and light of their fields.
 
 use super::{DataTable, ExperimentError, ExperimentResult, ProgressFn, TableCell, report_progress};

@@ -1,4 +1,4 @@
-//! Figure 3.9: the brightness of the corner of a white target, with a lens optimised by unbiased
+//! Figure 3.9: the brightness of the corner of a white target, with a lens optimized by unbiased
 //! gradients, which include the light off the axis, and with one by biased gradients, which do not.
 //!
 //! Both searches begin with the same lens and a fixed stop, so that the difference is not just a

@@ -22,8 +22,8 @@ use crate::pupil::RayModel;
 
 pub(super) const EXPERIMENT: Experiment = Experiment {
     id: "3.10",
-    title: "Two zoom lenses optimised at three positions",
-    claim: "Sharper and brighter over the whole range, also between the optimised positions",
+    title: "Two zoom lenses optimized at three positions",
+    claim: "Sharper and brighter over the whole range, also between the optimized positions",
     omits: "the simulated images of the test target; figures are at one wavelength",
     seconds: 100.0,
     run,
@@ -33,7 +33,7 @@ pub(super) const EXPERIMENT: Experiment = Experiment {
 const POSITIONS: [f64; 7] = [0.0, 0.35, 0.65, 1.0, 1.35, 1.65, 2.0];
 
 /// True for the positions of the search.
-fn is_optimised(position: usize) -> bool {
+fn is_optimized(position: usize) -> bool {
     POSITIONS[position].fract() == 0.0
 }
 
@@ -53,7 +53,7 @@ fn run(effort: Effort, progress: &mut ProgressFn<'_>) -> ExperimentResult {
         let designs = run_sweep(&zoom, &plan, part, progress)?;
         let before = ZoomRange::of(&designs[0].lens, &mut outcome.rays)?;
         let (lens, after) = best_design(&designs[1..], &before, &mut outcome.rays)?;
-        outcome.lenses.push((format!("{name}-optimised"), lens));
+        outcome.lenses.push((format!("{name}-optimized"), lens));
         outcome.claims.extend(claims(name, &before, &after));
         outcome.tables.push(table(name, &before, &after));
         outcome.pictures.push(NamedPlot { name, canvas: draw(name, &before, &after) });
@@ -88,7 +88,7 @@ impl ZoomRange {
     /// The smallest improvement over another one at the positions of the search: above 1 if it is
     /// better at all of them.
     fn gain(&self, other: &Self) -> f64 {
-        let least = (0..POSITIONS.len()).filter(|i| is_optimised(*i)).map(|i| {
+        let least = (0..POSITIONS.len()).filter(|i| is_optimized(*i)).map(|i| {
             let [blur, light] = self.ratios(other, i);
             (1.0 / blur).min(1.0 + LIGHT_FACTOR * (light - 1.0))
         });
@@ -157,7 +157,7 @@ fn lens_between(lens: &Lens, place: f64) -> ExperimentResult<Lens> {
 
 /// Claims about the positions that neither the search nor the choice of the design has seen.
 fn claims(name: &str, before: &ZoomRange, after: &ZoomRange) -> Vec<Claim> {
-    let unseen = || (0..POSITIONS.len()).filter(|i| !is_optimised(*i));
+    let unseen = || (0..POSITIONS.len()).filter(|i| !is_optimized(*i));
     let ratios = |k: usize| unseen().map(move |i| after.ratios(before, i)[k]);
     vec![
         Claim::at_most(
@@ -199,7 +199,7 @@ fn table(name: &'static str, before: &ZoomRange, after: &ZoomRange) -> DataTable
 fn draw(name: &str, before: &ZoomRange, after: &ZoomRange) -> Canvas {
     let mut canvas = Canvas::new([1500, 760]);
     let ranges: [(&str, &ZoomRange, Color); 2] =
-        [("start", before, PALETTE[1]), ("optimised", after, PALETTE[0])];
+        [("start", before, PALETTE[1]), ("optimized", after, PALETTE[0])];
     let focal = ranges.iter().flat_map(|(_, range, _)| range.focal_lengths.iter().copied());
     let x = Axis::linear("focal length, mm", focal);
     let values = |k: usize| {
@@ -245,5 +245,25 @@ mod tests {
             assert!((parabola(values, i as f64) - value).abs() < 1e-12);
         }
         assert!((parabola([0.0, 1.0, 4.0], 1.5) - 2.25).abs() < 1e-12);
+    }
+
+    #[test]
+    fn only_what_is_sharper_and_not_darker_at_all_positions_of_the_search_is_a_gain() {
+        let range = |blur: f64, light: f64| ZoomRange {
+            points: POSITIONS.map(|_| [blur, light]).to_vec(),
+            focal_lengths: Vec::new(),
+        };
+        let before = range(0.02, 50.0);
+        assert_eq!(before.gain(&before), 1.0);
+        assert!(range(0.01, 60.0).gain(&before) > 1.5);
+        assert!(range(0.01, 45.0).gain(&before) < 1.0, "sharper and darker");
+        assert!(range(0.03, 60.0).gain(&before) < 1.0, "brighter and less sharp");
+        let mut worse = range(0.01, 60.0);
+        worse.points[3] = [0.03, 60.0];
+        assert!(worse.gain(&before) < 1.0);
+        // Between the positions of the search it may be worse.
+        worse.points[3] = [0.01, 60.0];
+        worse.points[1] = [0.03, 60.0];
+        assert!(worse.gain(&before) > 1.5);
     }
 }

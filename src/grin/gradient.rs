@@ -54,7 +54,7 @@ impl<R: Real, F: IndexField<R> + ?Sized> GrinTracer<'_, R, F> {
     ///
     /// `loss` receives the number of the ray and its exit, and returns the loss and its derivative
     /// with respect to the exit. It is called for every ray, also for one that did not arrive,
-    /// whose derivative is ignored: a constant loss for those keeps an optimiser from driving rays
+    /// whose derivative is ignored: a constant loss for those keeps an optimizer from driving rays
     /// away. If retracing shows that a ray is chaotic, `loss` is called again with
     /// [`GrinFate::Chaotic`].
     pub fn loss_and_gradient(

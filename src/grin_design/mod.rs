@@ -1,4 +1,4 @@
-//! Design tasks in one gradient-index field: the task file, the loss, the optimisation of the
+//! Design tasks in one gradient-index field: the task file, the loss, the optimization of the
 //! field, and reports on a field.
 //!
 //! A [`GrinTask`] is the content of a JSON file: the representation of the field and its

@@ -80,4 +80,42 @@ mod tests {
         assert!((data.efl.unwrap() - 98.96).abs() < 0.01, "{:?}", data.efl);
         assert!((data.entrance_pupil.position.unwrap() - ENTRANCE_PUPIL).abs() < 1e-9);
     }
+
+    #[test]
+    fn the_bundle_fills_the_entrance_pupil_evenly() {
+        let count = 4000;
+        let rays = bundle(count);
+        let at_pupil = |i: usize| {
+            let Ray { point, direction } = rays.get(i);
+            let t = ENTRANCE_PUPIL / direction.z;
+            [point.x + t * direction.x, point.y + t * direction.y]
+        };
+        let mean = |of: &dyn Fn([f64; 2]) -> f64| {
+            (0..count).map(|i| of(at_pupil(i))).sum::<f64>() / count as f64
+        };
+        let radius = 0.5 * ENTRANCE_PUPIL_DIAMETER;
+        // A disc has means of x² and y² of a quarter of its squared radius.
+        assert!(mean(&|p| p[0]).abs() < 0.01 * radius && mean(&|p| p[1]).abs() < 0.01 * radius);
+        let square = 0.25 * radius * radius;
+        for axis in [0, 1] {
+            let found = mean(&|p| p[axis] * p[axis]);
+            assert!((found / square - 1.0).abs() < 0.01, "{axis}: {found} {square}");
+        }
+        assert!(mean(&|p| p[0] * p[1]).abs() < 0.01 * square);
+        // No two rays are closer than half of the mean distance.
+        let apart = |i: usize, j: usize| {
+            let (a, b) = (at_pupil(i), at_pupil(j));
+            (a[0] - b[0]).hypot(a[1] - b[1])
+        };
+        let least = (0..200).flat_map(|i| (i + 1..400).map(move |j| (i, j)));
+        let least = least.map(|(i, j)| apart(i, j)).fold(f64::INFINITY, f64::min);
+        assert!(least > 0.5 * radius * (std::f64::consts::PI / count as f64).sqrt(), "{least}");
+    }
+
+    #[test]
+    fn every_surface_of_the_lens_has_its_rim() {
+        let lens = double_gauss();
+        assert!(lens.surfaces.iter().all(|row| row.semi_diameter.is_some()));
+        assert_eq!(lens.surfaces[STOP].semi_diameter, Some(15.0));
+    }
 }

@@ -504,3 +504,18 @@ fn fastest<T>(often: usize, mut work: impl FnMut() -> T) -> (T, f64) {
     }
     (result, best)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn exits_are_as_far_apart_as_pythagoras_says_and_lost_ones_do_not_count() {
+        let at = |x: f64, y: f64, z: f64| Some(Vec3::new(x, y, z));
+        let found = [at(1.0, 2.0, 3.0), None, at(0.0, 0.0, 0.0), at(5.0, 5.0, 5.0)];
+        let exact = [at(1.0, 5.0, 7.0), at(9.0, 9.0, 9.0), None, at(5.0, 5.0, 4.0)];
+        // 5 and 1 apart.
+        assert!((distance(&found, &exact) - 13f64.sqrt()).abs() < 1e-12);
+        assert_eq!(distance(&found[2..], &found[2..]), 0.0);
+    }
+}

@@ -4,7 +4,7 @@
 use super::timing::Stopwatch;
 use crate::lens::{Lens, ParameterKind, add_variables};
 use crate::merit::{DerivativeLevel, Goal, Limit, LimitTreatment, Merit, MeritError};
-use crate::optimize::{DescentMethod, OptimizationEnd, start};
+use crate::optimize::{DescentMethod, OptimizationEnd, OptimizationProgress, start};
 use serde::Serialize;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -127,10 +127,9 @@ impl<'a> LimitJudge<'a> {
     ) -> Result<Option<LimitedDescent>, MeritError> {
         let watch = Stopwatch::start();
         let mut optimizer = start(DescentMethod::TrustRegion, self.start, goal, self.tolerance)?;
+        let goes_on = |p: &OptimizationProgress| p.end.is_none() && p.step < steps;
         let mut last = None;
-        while last.as_ref().is_none_or(|p: &crate::optimize::OptimizationProgress| {
-            p.end.is_none() && p.step < steps
-        }) {
+        while last.as_ref().is_none_or(goes_on) {
             if stop.load(Ordering::Relaxed) {
                 return Ok(None);
             }

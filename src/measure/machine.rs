@@ -120,4 +120,19 @@ mod tests {
         assert!(age_ms().is_some_and(|later| later >= age));
         assert!(processor_ms().is_some_and(|later| later >= work));
     }
+
+    #[test]
+    fn a_machine_is_described_with_its_cores_and_its_build() {
+        let slow = Machine {
+            processor: "Abacus 9".to_owned(),
+            cores: 12,
+            lane_bits: 256,
+            optimised: false,
+        };
+        let text = slow.to_string();
+        for word in ["Abacus 9", "12 cores", "256 bits", "NOT OPTIMISED"] {
+            assert!(text.contains(word), "{text}");
+        }
+        assert!(!Machine { optimised: true, ..slow }.to_string().contains("OPTIMISED"));
+    }
 }

@@ -125,6 +125,13 @@ pub struct FirstOrder<R> {
     pub chief: Option<ParaxialRay<R>>,
 }
 
+impl FirstOrder<f64> {
+    /// The radius of the Petzval surface in mm, minus one over the Petzval sum; `None` for a flat one.
+    pub fn petzval_radius(&self) -> Option<f64> {
+        (self.petzval_sum != 0.0).then(|| -1.0 / self.petzval_sum)
+    }
+}
+
 /// The matrix of a lens from its first vertex to every surface, as two rays.
 struct TransferRays<R> {
     /// The ray with `(y, nu) = (1, 0)`.

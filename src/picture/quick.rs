@@ -205,14 +205,9 @@ pub fn quick_error(
     samples: usize,
 ) -> Estimate {
     let tiles = exact.tiles();
-    // Steps of the golden ratio reach tiles in all parts of the picture.
-    let chosen = (0..count.min(tiles.len())).map(|i| {
-        let part = (0.5 + 0.618_033_988_749_895 * i as f64).fract();
-        &tiles[(part * tiles.len() as f64) as usize]
-    });
-    let chosen: Vec<&PictureTile> = chosen.collect();
+    let chosen = spread_out(tiles.len(), count).into_par_iter();
     let errors: Vec<(f64, usize)> =
-        chosen.par_iter().map(|tile| tile_error(exact, picture, tile, samples)).collect();
+        chosen.map(|i| tile_error(exact, picture, &tiles[i], samples)).collect();
     let n = errors.len().max(1) as f64;
     let mean = errors.iter().map(|(square, _)| square).sum::<f64>() / n;
     let spread = errors.iter().map(|(square, _)| (square - mean).powi(2)).sum::<f64>();
@@ -221,6 +216,12 @@ pub fn quick_error(
     // The error of a root: never above the root of the error.
     let error = (0.5 * of_mean / value.max(f64::MIN_POSITIVE)).min(of_mean.sqrt());
     Estimate::new(value, error, errors.iter().map(|(_, rays)| rays).sum())
+}
+
+/// At most `count` places among `all`, in steps of the golden ratio, which reach all parts.
+fn spread_out(all: usize, count: usize) -> Vec<usize> {
+    let part = |i: usize| (0.5 + 0.618_033_988_749_895 * i as f64).fract();
+    (0..count.min(all)).map(|i| (part(i) * all as f64) as usize).collect()
 }
 
 /// The mean squared error of a tile, and the rays traced for it.

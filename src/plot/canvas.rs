@@ -141,6 +141,11 @@ impl Canvas {
         }
     }
 
+    /// The number of letters of a text that is not wider than this, in pixels.
+    pub fn letters(width: usize) -> usize {
+        width / (DOT * ADVANCE) as usize
+    }
+
     fn draw_glyph(&mut self, [x, y]: [i32; 2], letter: char, color: Color) {
         for (column, bits) in glyph(letter).into_iter().enumerate() {
             for row in (0..8).filter(|row| bits >> row & 1 == 1) {
@@ -218,5 +223,32 @@ mod tests {
             |level: u8| canvas.pixels().chunks(3).filter(|pixel| **pixel == [level; 3]).count();
         let side = (IMAGE_SIDE / 2).max(1) * 2;
         assert_eq!([count(10), count(20)], [side * side; 2]);
+        // A margin before, between and behind.
+        let width = 2 * side + 3 * IMAGE_MARGIN as usize;
+        assert_eq!(canvas.size()[0] as usize, width);
+    }
+
+    #[test]
+    fn a_dashed_curve_is_interrupted_at_equal_lengths_around_corners() {
+        // 200 pixels to the right and 200 down, in steps of one pixel of length.
+        let drawn = |stroke: Stroke| -> Vec<bool> {
+            let mut canvas = Canvas::new([240, 240]);
+            let points = [[10.0, 10.0], [210.0, 10.0], [210.0, 210.0]];
+            canvas.curve(&points, [0; 3], stroke);
+            let dark = |x: usize, y: usize| canvas.pixels()[3 * (240 * y + x)] == 0;
+            (0..200).map(|i| dark(10 + i, 10)).chain((0..200).map(|i| dark(210, 10 + i))).collect()
+        };
+        assert!(drawn(Stroke::Solid).iter().all(|dark| *dark));
+        let dashed = drawn(Stroke::Dashed);
+        let starts: Vec<usize> =
+            (1..dashed.len()).filter(|i| dashed[*i] && !dashed[i - 1]).collect();
+        assert!(starts.len() as f64 > 0.9 * 400.0 / DASH_PERIOD - 2.0, "{starts:?}");
+        for pair in starts.windows(2) {
+            // To the corner, whose square hides a pixel or two.
+            let period = (pair[1] - pair[0]) as f64;
+            assert!((period - DASH_PERIOD).abs() <= 2.0, "{starts:?}");
+        }
+        let dark = dashed.iter().filter(|dark| **dark).count() as f64 / 400.0;
+        assert!(dark > 0.3 && dark < 0.9, "{dark}");
     }
 }

@@ -270,4 +270,20 @@ mod tests {
         assert!(!outside.into_iter().any(|point| chart.contains(point)));
         assert_eq!(chart.to_pixel([0.0, 10.0]), [10.0, 20.0]);
     }
+
+    #[test]
+    fn equal_scales_show_a_circle_as_a_circle() {
+        for (x, y) in
+            [([0.0, 10.0], [0.0, 2.0]), ([0.0, 1.0], [0.0, 90.0]), ([-3.0, 3.0], [-1.0, 1.0])]
+        {
+            let axes = (Axis::linear("x", x), Axis::linear("y", y));
+            let chart =
+                Chart::new([100.0, 50.0], [500.0, 250.0], axes.0, axes.1).with_equal_scales();
+            let [a, b] = [[0.0, 0.0], [0.3, 0.7]].map(|point| chart.to_pixel(point));
+            let scales = [(b[0] - a[0]) / 0.3, (a[1] - b[1]) / 0.7];
+            assert!((scales[0] / scales[1] - 1.0).abs() < 1e-12, "{scales:?}");
+            // What was asked for is still inside.
+            assert!(chart.contains([x[0], y[0]]) && chart.contains([x[1], y[1]]), "{x:?} {y:?}");
+        }
+    }
 }

@@ -44,3 +44,25 @@ const GLYPHS: [[u8; 5]; 91] = [
     [0x3c, 0x40, 0x30, 0x40, 0x3c], [0x44, 0x28, 0x10, 0x28, 0x44], [0x4c, 0x90, 0x90, 0x90, 0x7c],
     [0x44, 0x64, 0x54, 0x4c, 0x44],
 ];
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn letters_differ_and_those_with_a_symmetry_have_it() {
+        let all: Vec<[u8; 5]> = (' '..='z').map(glyph).collect();
+        for (i, letter) in all.iter().enumerate() {
+            assert!(!all[i + 1..].contains(letter), "{i}");
+        }
+        assert_eq!(glyph(' '), [0; 5]);
+        for letter in "AHIMOTUVWXYov|".chars().filter(|letter| *letter <= 'z') {
+            let columns = glyph(letter);
+            let mut mirrored = columns;
+            mirrored.reverse();
+            assert_eq!(columns, mirrored, "{letter}");
+        }
+        // A box without a letter.
+        assert!(!all.contains(&glyph('\u{3b1}')) && glyph('\u{3b1}') == glyph('\u{1f}'));
+    }
+}

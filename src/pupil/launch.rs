@@ -129,7 +129,7 @@ impl<'a> Launch<'a> {
 
     /// True for a field on the axis: all azimuths of its pupil are alike.
     pub(super) fn is_axial(&self) -> bool {
-        self.field.x == 0.0 && self.field.y == 0.0
+        self.field.x == 0.0 && self.field.y == 0.0 && !self.channel().system.has_poses()
     }
 
     /// The lens at this wavelength.
@@ -139,7 +139,7 @@ impl<'a> Launch<'a> {
 
     /// True if the rays at `(−px, py)` mirror those at `(px, py)`.
     pub fn is_symmetric(&self) -> bool {
-        self.field.x == 0.0
+        self.field.x == 0.0 && self.channel().system.mirrors_in_x()
     }
 
     /// The area of one unit of pupil coordinates, in mm² of the first vertex plane: the measure of

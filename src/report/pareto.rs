@@ -7,7 +7,7 @@
 use crate::files::{self, FileError};
 use crate::lens::{Lens, Wavelength};
 use crate::optimize::pareto::{Front, ParetoPoint};
-use crate::plot::{Axis, BLACK, Canvas, Chart, Color, GREY, GRID, Legend, PALETTE, Stroke};
+use crate::plot::{Axis, BLACK, Canvas, Chart, Color, GRID, Legend, PALETTE, Stroke, TextAlign};
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -32,7 +32,14 @@ pub struct ParetoReport<'a> {
 const HEAD: &str = "spot_mm,spot_error_mm,light_mm2,light_error_mm2,weight_mm2,rays,file\n";
 /// The width and height of the plot in pixels, and its margins: left, top, right, bottom.
 const SIZE: [u32; 2] = [1000, 720];
-const MARGINS: [f64; 4] = [110.0, 110.0, 40.0, 90.0];
+const MARGINS: [f64; 4] = [110.0, 200.0, 40.0, 90.0];
+/// The place of the legend: above the chart, where it hides nothing.
+const LEGEND: [f64; 2] = [MARGINS[0] + 18.0, 36.0];
+/// The place of the name of the lens, in the middle.
+const NAME: [f64; 2] = [500.0, 10.0];
+
+/// The colour of the biased front.
+const BIASED: Color = PALETTE[3];
 
 impl ParetoReport<'_> {
     /// Writes the report into a folder, which is created if it does not exist. Returns the files,
@@ -101,20 +108,23 @@ impl ParetoReport<'_> {
         all
     }
 
-    /// Spot against light: the front over all lenses evaluated, and the biased front in grey.
+    /// Spot against light: the front over all lenses evaluated, and the biased front in orange.
     pub fn plot(&self) -> Canvas {
         let mut canvas = Canvas::new(SIZE);
         let (front, start) = (places(self.front.points()), place(self.start));
         let biased = places(self.biased.map_or(&[], Front::points));
         let chart = chart(&[&front, &biased, &[start]]);
-        chart.draw(&mut canvas, &format!("Sharpness against light: {}", self.name));
+        let room = SIZE[0] as usize - 20;
+        let name = shortened(self.name, Canvas::letters(room));
+        canvas.text(NAME, &name, BLACK, TextAlign::Middle);
+        chart.draw(&mut canvas, "Sharpness against light");
         for [spot, light] in self.tried {
             let at = [*light, 1e3 * spot];
             if chart.contains(at) {
                 canvas.square(chart.to_pixel(at), 1, GRID);
             }
         }
-        for (points, color) in [(&biased, GREY), (&front, PALETTE[1])] {
+        for (points, color) in [(&biased, BIASED), (&front, PALETTE[1])] {
             let points = chart.to_pixels(points);
             canvas.marked_curve(&points, color, Stroke::Solid);
         }
@@ -130,12 +140,20 @@ impl ParetoReport<'_> {
             ("start".to_owned(), BLACK),
             (format!("front, {}", volume(self.front)), PALETTE[1]),
         ];
-        lines.extend(self.biased.map(|front| (format!("fixed pupils, {}", volume(front)), GREY)));
-        let mut legend = Legend::new([MARGINS[0] + 18.0, MARGINS[1] + 12.0]);
+        lines.extend(self.biased.map(|front| (format!("fixed pupils, {}", volume(front)), BIASED)));
+        let mut legend = Legend::new(LEGEND);
         for (text, color) in &lines {
             legend.marker(canvas, text, *color);
         }
     }
+}
+
+/// A text of at most this number of letters, the last three of a longer one dots.
+fn shortened(text: &str, letters: usize) -> String {
+    if text.chars().count() <= letters {
+        return text.to_owned();
+    }
+    text.chars().take(letters.saturating_sub(3)).chain("...".chars()).collect()
 }
 
 /// The chart, with axes that contain the fronts and the start but not all lenses evaluated.

@@ -30,8 +30,8 @@ mod structure_search;
 mod view;
 
 pub use analysis::{
-    Analyses, AnalysisResults, AnalysisSettings, FieldContrast, FieldContrasts, FieldPupils,
-    ScenePicture, analyze,
+    Analyses, AnalysisResults, AnalysisSettings, AsBuiltLens, FieldContrast, FieldContrasts,
+    FieldPupils, ScenePicture, analyze, predict_as_built,
 };
 pub use clock::Timed;
 pub use command::Command;

@@ -5,6 +5,7 @@ use glam::DVec2;
 use super::draw::{BoundingBox, Rgba, Scene};
 use super::palette::{Palette, to_byte};
 use crate::lens::{LensSection, System};
+use crate::math::Vec3;
 
 /// The straight pieces of a drawn surface: the sag of a hemisphere of 200 px is then off by a
 /// fiftieth of a pixel.
@@ -26,9 +27,9 @@ impl<'a> SectionDrawing<'a> {
     /// The bounding box of the whole lens: all surfaces and the image plane.
     pub fn bounds(&self) -> Option<BoundingBox> {
         let heights = self.section.heights().iter().enumerate();
-        let heights = heights.map(|(i, h)| if i == self.section.image() { 0.0 } else { *h });
-        let corners = self.section.vertices().iter().zip(heights);
-        BoundingBox::around(corners.flat_map(|(&z, h)| [DVec2::new(z, h), DVec2::new(z, -h)]))
+        let heights = heights.map(|(i, h)| (i, if i == self.section.image() { 0.0 } else { *h }));
+        let corner = |(i, h): (usize, f64)| [h, -h].map(|h| self.section.plane_point(i, h).into());
+        BoundingBox::around(heights.flat_map(corner))
     }
 
     /// Draws glass, to lie below the rays; that behind the surfaces of `added_glass` is tinted.
@@ -58,9 +59,14 @@ impl<'a> SectionDrawing<'a> {
         self.draw_stop(scene, palette);
     }
 
-    /// The z of the image plane, in mm.
-    pub fn image_position(&self) -> f64 {
-        self.section.image_position()
+    /// The point of the image plane at a height above its axis.
+    pub fn image_point(&self, height: f64) -> DVec2 {
+        self.section.plane_point(self.section.image(), height).into()
+    }
+
+    /// The height of a point above the axis of the image plane, in mm.
+    pub fn image_height(&self, point: Vec3<f64>) -> f64 {
+        self.section.height_above(self.section.image(), point)
     }
 
     /// The largest height of the lens above the axis, in mm.
@@ -92,6 +98,9 @@ impl<'a> SectionDrawing<'a> {
     }
 
     fn draw_axis(&self, scene: &mut Scene, palette: &Palette) {
+        if self.section.system().has_broken_axis() {
+            return scene.polyline(&points(self.section.axis()), 1.0, palette.faint);
+        }
         let vertices = || self.section.vertices().iter().copied();
         let (first, last) = (
             vertices().fold(f64::INFINITY, f64::min),
@@ -108,10 +117,11 @@ impl<'a> SectionDrawing<'a> {
             return;
         };
         let highest = heights.iter().copied().fold(0.0, f64::max);
-        let [z, height] = self.section.point(stop, heights[stop]);
+        let along = DVec2::from(self.section.plane_point(stop, 1.0))
+            - DVec2::from(self.section.plane_point(stop, 0.0));
         for side in [-1.0, 1.0] {
-            let rim = DVec2::new(z, side * height);
-            scene.line(rim, rim + DVec2::new(0.0, side * 0.25 * highest), 3.0, palette.strong);
+            let rim = DVec2::from(self.section.point(stop, side * heights[stop]));
+            scene.line(rim, rim + along * (side * 0.25 * highest), 3.0, palette.strong);
         }
     }
 }

@@ -14,6 +14,7 @@ pub(super) enum UnsavedDocument {
 }
 
 /// An action that may discard unsaved changes.
+#[expect(clippy::large_enum_variant, reason = "made once for each action of a person")]
 #[derive(Debug)]
 pub(super) enum PendingAction {
     Run(Command),

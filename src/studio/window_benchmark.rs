@@ -55,6 +55,8 @@ pub struct WindowMetrics {
     /// The time of an edit of that lens on the window's thread, without its results and without a
     /// journal: the median of 200 edits.
     pub unjournaled_edit_ms: Option<f64>,
+    /// The slowest of them: what other threads take from the window's.
+    pub slowest_unjournaled_edit_ms: Option<f64>,
     /// The same with a journal.
     pub journaled_edit_ms: Option<f64>,
     /// The slowest of them.
@@ -228,6 +230,7 @@ impl WindowBenchmark {
         let Some([without, with]) = time_journaled_edits(&self.stop) else { return };
         self.record(|figures| {
             figures.unjournaled_edit_ms = Some(without.median);
+            figures.slowest_unjournaled_edit_ms = Some(without.slowest);
             figures.journaled_edit_ms = Some(with.median);
             figures.slowest_journaled_edit_ms = Some(with.slowest);
         });

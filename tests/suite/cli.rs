@@ -10,7 +10,7 @@ const LENS: &str = "lenses/double_gauss_rudolph_50.json";
 const ZOOM: &str = "lenses/zoom_nikkor_28_80.json";
 
 /// Runs the program without a display.
-fn aplanat(arguments: &[&str], input: &str) -> Output {
+pub(super) fn aplanat(arguments: &[&str], input: &str) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_aplanat"));
     command.args(arguments).env_remove("DISPLAY");
     command.env_remove("WAYLAND_DISPLAY").env_remove("WAYLAND_SOCKET");
@@ -252,7 +252,7 @@ fn trace_refuses_what_cannot_be_traced() {
     let file = |input: &str, words: &[&str]| {
         refused(2, &["trace", LENS, "--rays", "-"], input, &[&[LENS], words].concat());
     };
-    file("{\"rays\": [], \"zoom\": 7}", &["zoom position 7"]);
+    refuse("{\"rays\": [], \"zoom\": 7}", &["zoom position 7"]);
     file("{\"rays\": [], \"wavelength_um\": 90}", &["90 um"]);
 }
 
@@ -269,6 +269,29 @@ fn estimate(value: &Value) -> f64 {
     has_keys(value, &["value", "error", "rays"]);
     assert!(value["milliseconds"].as_f64().unwrap() > 0.0, "{value}");
     value["value"].as_f64().unwrap()
+}
+
+#[test]
+fn the_airy_radius_is_that_of_the_working_f_number() {
+    let first = done_json(&["info", LENS], "");
+    let f_number = find(&first, "working_f_number").unwrap();
+    let report = done_json(&["analyze", LENS, "spot", "--field", "0"], "");
+    let um = report["wavelength_um"].as_f64().unwrap();
+    let radius = report["airy_radius"].as_f64().unwrap();
+    // In mm: 1.22 λ N.
+    assert!((radius / (1.22e-3 * um * f_number) - 1.0).abs() < 1e-3, "{radius} {f_number}");
+}
+
+/// The first number of this name anywhere in a document.
+fn find(value: &Value, name: &str) -> Option<f64> {
+    match value {
+        Value::Object(map) => {
+            let own = map.get(name).and_then(Value::as_f64);
+            own.or_else(|| map.values().find_map(|inner| find(inner, name)))
+        }
+        Value::Array(list) => list.iter().find_map(|inner| find(inner, name)),
+        _ => None,
+    }
 }
 
 #[test]
@@ -313,7 +336,7 @@ fn analyses_in_words_have_a_line_for_every_number() {
     let digits = &rms["value"].to_string()[..6];
     assert!(spot.lines().any(|line| line.contains("rms") && line.contains(digits)), "{spot}");
     let contrast = text("through-focus-mtf");
-    assert_eq!(lines(&contrast, "line pairs per mm, "), 1, "{contrast}");
+    assert_eq!(lines(&contrast, "cycles/mm, "), 1, "{contrast}");
     assert!(lines(&contrast, "±") >= 11, "{contrast}");
     let fans = analyzed("opd-fan", &["--field", "0"]);
     assert_eq!(fans[0]["tangential"].as_array().unwrap().len(), 21);

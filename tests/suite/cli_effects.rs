@@ -298,6 +298,9 @@ fn a_switch_that_cannot_be_followed_is_refused_by_name() {
     refuse(&["gradient", GAUSS], "aiming=off", &["real stop"]);
     refuse(&["trace", GAUSS, "--rays", "-"], "aiming=on", &["none is aimed"]);
     refuse(&["trace", GAUSS, "--rays", "-"], "dispersion=on", &["one wavelength"]);
+    for effect in ["dispersion", "aiming", "finite-object"] {
+        refuse(&["trace", GAUSS, "--rays", "-"], &format!("{effect}=off"), &["off here: the rays"]);
+    }
     refuse(&["analyze", GAUSS, "distortion"], "dispersion=on", &["only the primary wavelength"]);
     refuse(&["analyze", GAUSS, "distortion"], "finite_object=off", &["where it is"]);
     refuse(&["analyze", GAUSS, "spot"], "total-reflection=off", &["part of refraction"]);

@@ -3,9 +3,10 @@
 use crate::images::{ACCURACY, ImageLens, allowed, image_lenses};
 use crate::reference::{Worst, number, numbers, read};
 use aplanat::analysis::{
-    AnalysisError, PupilCurve, PupilFunction, ZernikeIndex, ZernikeMethod, ZernikeOrder,
-    diffraction_gate, diffraction_mtf, encircled_energy, point_spread,
-    polychromatic_diffraction_mtf, strehl, through_focus_mtf, zernike,
+    AnalysisError, PupilCurve, PupilFunction, PupilSamples, TransferValue, ZernikeIndex,
+    ZernikeMethod, ZernikeOrder, diffraction_gate, diffraction_mtf, encircled_energy,
+    perfect_contrast, point_spread, polychromatic_diffraction_mtf, strehl, through_focus_mtf,
+    zernike,
 };
 use aplanat::pupil::Accuracy;
 use serde_json::Value;
@@ -350,4 +351,87 @@ fn focus_and_the_best_strehl_need_no_new_rays() {
     let rings = encircled_energy(&model, field, w, [0.0; 2], &[0.002, 0.05], Accuracy::default());
     let rings = rings.unwrap();
     assert!(rings[0].value < rings[1].value && rings[1].value < 1.0 && rings[1].value > 0.9);
+}
+
+/// The Bessel function of order one, by the midpoints of its integral, which is spectrally exact.
+fn bessel_one(x: f64) -> f64 {
+    let count = 400;
+    let at = |i: i32| PI * (f64::from(i) + 0.5) / f64::from(count);
+    (0..count).map(|i| (at(i) - x * at(i).sin()).cos()).sum::<f64>() / f64::from(count)
+}
+
+#[test]
+fn the_energy_of_two_beams_within_a_circle_follows_their_fringes() {
+    // |U|² = 2 + 2 cos(K·x), K = 2 pi (2 a) / lambda, whose integral over a circle of radius R about c
+    // is 2 pi R² (1 + cos(K·c) 2 J1(K R) / (K R)).
+    let (wavelength, a, energy) = (0.5e-3, 0.1, 3.0);
+    let beams = PupilSamples {
+        cosines: vec![[a, 0.0], [-a, 0.0]],
+        waves: vec![0.0; 2],
+        amplitudes: vec![1.0; 2],
+        energies: vec![energy; 2],
+        mirrored: false,
+        wavelength,
+    };
+    let fringe = 2.0 * PI * 2.0 * a / wavelength;
+    for center in [[0.0, 0.0], [0.4e-3, 7e-3]] {
+        let radii = [2e-4, 0.01, 0.03];
+        let found = beams.encircled(center, &radii);
+        for (radius, share) in radii.into_iter().zip(found) {
+            let q = fringe * radius;
+            let contrast = (fringe * center[0]).cos() * 2.0 * bessel_one(q) / q;
+            let light = 2.0 * PI * radius * radius * (1.0 + contrast);
+            let exact = light / (wavelength * wavelength * 2.0 * energy);
+            assert!((share / exact - 1.0).abs() < 1e-9, "{center:?} {radius}: {share} {exact}");
+        }
+    }
+}
+
+#[test]
+fn the_contrast_of_a_perfect_lens_is_the_overlap_of_two_discs() {
+    // Of unit discs whose centres are 2 f apart, by strips across the line between them.
+    for f in [0.0f64, 0.05, 0.3, 0.5, 0.9, 0.99] {
+        let count = 4000;
+        // x = cos t takes the square root's end away.
+        let end = f.acos();
+        let strip = |i: i32| (end * (f64::from(i) + 0.5) / f64::from(count)).sin().powi(2);
+        let half: f64 = (0..count).map(strip).sum::<f64>() * end / f64::from(count);
+        let found = perfect_contrast(f);
+        assert!((found - 4.0 * half / PI).abs() < 1e-6, "{f}: {found} {half}");
+        assert_eq!(perfect_contrast(-f), found);
+    }
+    assert_eq!([1.0, 1.5].map(perfect_contrast), [0.0; 2]);
+}
+
+#[test]
+fn a_contrast_states_what_the_polynomials_leave_and_no_more() {
+    // An even polynomial of low degree is its own fit.
+    let (smooth, unit) = disc(|[x, y]| 0.2 * (x * x + y * y));
+    let exact = smooth.transfer([0.3 / unit, 0.0], 0.0, 1e-9).unwrap();
+    assert!(exact.modulus.error < 1e-6, "{exact:?}");
+    // A ridge is not: twice the ridge leaves twice as much.
+    let error = |height: f64| {
+        let (ridge, unit) = disc(|[x, _]| height * x.abs());
+        ridge.transfer([0.3 / unit, 0.0], 0.0, 1e-6).unwrap().modulus.error
+    };
+    let (one, two) = (error(0.02), error(0.04));
+    assert!(one > 1e-5 && one < 0.1, "{one}");
+    assert!((two / one - 2.0).abs() < 0.1, "{one} {two}");
+}
+
+#[test]
+fn a_contrast_is_reached_when_its_errors_are_within_the_tolerance() {
+    let (lens, mut unreached) = (&image_lenses()[0], 0);
+    for (_, model, field) in lens.fields().into_iter().take(1) {
+        for tolerance in [1e-2, 1e-14] {
+            let accuracy = Accuracy { tolerance, ..ACCURACY };
+            let curve = diffraction_mtf(&model, field, lens.primary(), &[10.0], accuracy).unwrap();
+            let point = curve.points[0];
+            let within = |value: &TransferValue| value.modulus.error <= tolerance;
+            let all = within(&point.tangential) && within(&point.sagittal);
+            assert_eq!(curve.reached, all, "{} {tolerance}: {point:?}", field.y);
+            unreached += usize::from(!curve.reached);
+        }
+    }
+    assert!(unreached > 0);
 }

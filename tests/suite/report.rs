@@ -55,3 +55,30 @@ fn an_output_folder_that_is_a_file_is_named() {
     assert!(why.starts_with("Cargo.toml: cannot be written"), "{why}");
     assert_eq!(front.relative_hypervolume(start), 0.0);
 }
+
+/// The name of a lens may be long: neither side of the plot is cut, and a biased front is seen.
+#[test]
+fn a_plot_contains_its_title_and_all_fronts() {
+    let mut start = ParetoPoint::evaluate(&bundled("double_gauss_rudolph_50"), None, 1e-2).unwrap();
+    (start.spot, start.light) = (0.02, 100.0);
+    let name =
+        "a name as long as those of lenses from patents, with year, number and example".repeat(3);
+    let (front, wavelengths) = (Front::default(), start.lens.wavelengths.clone());
+    let (start, tried, biased) = (&start, &[][..], Some(&front));
+    let report = ParetoReport {
+        name: &name,
+        wavelengths: &wavelengths,
+        start,
+        front: &front,
+        tried,
+        biased,
+    };
+    let canvas = report.plot();
+    let width = canvas.size()[0] as usize;
+    for row in canvas.pixels().chunks(3 * width) {
+        let ends = row[..12].iter().chain(&row[3 * width - 12..]);
+        assert!(ends.into_iter().all(|value| *value == 0xff));
+    }
+    let orange = [0xff, 0x7f, 0x0e];
+    assert!(canvas.pixels().chunks(3).any(|pixel| pixel == orange), "the sample of the legend");
+}

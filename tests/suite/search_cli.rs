@@ -80,7 +80,7 @@ fn search_says_what_is_wrong_with_its_arguments() {
     wrong(&["--minutes", "0"], &["--minutes", "more than 0"]);
     wrong(&["--iterations", "0"], &["--iterations", "1 or more"]);
     wrong(&["--elements", "8..4"], &["smaller one first"]);
-    wrong(&["--forbid", "paint"], &["add-singlet", "move-stop"]);
+    wrong(&["--forbid", "paint"], &["add_singlet", "move_stop"]);
     wrong(&["--max-diameter=-3"], &["--max-diameter", "more than 0"]);
     wrong(&["--max-diameter", "-3"], &["--max-diameter", "found -3", "more than 0"]);
     wrong(&["--max-track", "-1e308"], &["--max-track", "found -1.0000e308"]);

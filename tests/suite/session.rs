@@ -5,7 +5,7 @@ use aplanat::experiments::{self, Effort, Experiment};
 use aplanat::files;
 use aplanat::lens::{
     Aperture, Edit, ElementEdit, FieldKind, FieldPoint, Fields, Lens, Medium, Object, Parameter,
-    Pickup, Quantity, Row, Variable, ZoomPosition, ZoomThickness,
+    Pickup, Quantity, Row, ToleranceSheet, Variable, ZoomPosition, ZoomThickness,
 };
 use aplanat::merit::{Goal, LimitTreatment, MeritError, PupilEdge, Term, TermValue, WeightedTerm};
 use aplanat::optimize::{DescentMethod, OptimizationProgress, Optimizer};
@@ -191,6 +191,7 @@ fn every_edit(lens: &Lens) -> Vec<Edit> {
             edits: [0, 1].map(|surface| Edit::SetComment { surface, text: "remark".into() }).into(),
         },
         Edit::SetObstruction { surface: 0, value: Some(1.5) },
+        Edit::SetTolerances(Some(ToleranceSheet { errors: Vec::new(), focus_travel: Some(0.2) })),
     ]
 }
 
@@ -231,6 +232,7 @@ fn kind(edit: &Edit) -> usize {
         Edit::Element(_) => 31,
         Edit::Sequence { .. } => 32,
         Edit::SetObstruction { .. } => 33,
+        Edit::SetTolerances(_) => 34,
     }
 }
 
@@ -238,7 +240,7 @@ fn kind(edit: &Edit) -> usize {
 fn every_kind_of_edit_is_undone_and_redone_exactly() {
     let mut session = session(double_gauss());
     let edits = every_edit(session.lens());
-    assert_eq!(edits.iter().map(kind).collect::<Vec<_>>(), (0..34).collect::<Vec<_>>());
+    assert_eq!(edits.iter().map(kind).collect::<Vec<_>>(), (0..35).collect::<Vec<_>>());
     let mut lenses = vec![Arc::clone(session.lens())];
     for edit in edits {
         let events = session.apply(edit.clone().into());
@@ -653,6 +655,27 @@ fn sensitivities_are_computed_with_the_pupils() {
         (0..all.surfaces.len()).filter(|i| all.surfaces[*i].is_significant()).collect();
     assert_eq!(felt, [0, 5, 10], "front, stop and rear");
     assert!(felt.iter().all(|i| all.surfaces[*i].area.value > 0.0), "glass lets light through");
+}
+
+#[test]
+fn pupils_are_compared_with_the_one_on_the_axis() {
+    let settings = AnalysisSettings { pupils: true, ..AnalysisSettings::default() };
+    let pupils = |lens: &Lens| analyze(lens, &settings).unwrap().pupils.unwrap().value;
+    let mut lens = lens("tessar_50_f28");
+    let fields = &lens.fields.values;
+    let axis = fields.iter().position(|field| field.x == 0.0 && field.y == 0.0).unwrap();
+    let found = pupils(&lens);
+    let areas: Vec<f64> =
+        found.fields.iter().map(|field| field.value.extent.unwrap().area.value).collect();
+    let before = found.axis.unwrap().value;
+    assert_eq!(before, areas[axis]);
+    assert!(areas.iter().any(|area| *area < 0.9 * before), "{areas:?}");
+    // A lens without a field on the axis has a pupil there as well.
+    let last = lens.fields.values.len() - 1;
+    lens.fields.values = vec![lens.fields.values[last]];
+    let without = pupils(&lens).axis.unwrap();
+    let off = (without.value - before).abs();
+    assert!(off <= without.error.max(1e-6 * before), "{without:?} {before}");
 }
 
 #[test]

@@ -317,6 +317,23 @@ fn a_volume_is_shown_and_written_in_the_other_format() {
 }
 
 #[test]
+fn a_slice_begins_at_the_origin_or_in_the_middle() {
+    let folder = folder("middle");
+    let path = folder.join("volume.npz");
+    let low = Vec3::new(1.0, -0.5, -3.0);
+    // From 1 to 2, from -0.5 to 1 and from -3 to -1.
+    let grid = RegularGrid::new([3, 4, 5], low, Vec3::new(0.5, 0.5, 0.5)).unwrap();
+    write_volume(&path, &Volume { grid, values: vec![1.5; grid.node_count()] }).unwrap();
+    let mut session = session();
+    form(&mut session, GrinCommand::SetActive(true));
+    open(&mut session, &path);
+    let document = Arc::clone(&run(&session).document);
+    let middle = |axis| document.middle(axis);
+    assert_eq!([SpatialAxis::X, SpatialAxis::Y, SpatialAxis::Z].map(middle), [1.5, 0.0, -2.0]);
+    std::fs::remove_dir_all(folder).unwrap();
+}
+
+#[test]
 fn invalid_grin_files_are_refused_and_the_open_document_stays() {
     let folder = folder("refused");
     let mut session = session();

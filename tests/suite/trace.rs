@@ -247,6 +247,51 @@ fn the_margin_at_a_rim_has_the_derivative_of_its_value() {
     }
 }
 
+/// The same by the coefficients of aspheres, at their own rims and at those behind.
+#[test]
+fn the_margin_at_the_rim_of_an_asphere_has_the_derivative_of_its_value() {
+    let mut system = bundled("double_gauss_rudolph_50").resolve(0, 0.5876).unwrap();
+    for surface in [0, 3] {
+        SurfaceParameter::AsphereTerm(0).promote_shape(&mut system, surface);
+        *SurfaceParameter::Conic.value_mut(&mut system, surface) = -0.4;
+        for (term, value) in [2e-6, -3e-8, 1e-10].into_iter().enumerate() {
+            *SurfaceParameter::AsphereTerm(term).value_mut(&mut system, surface) = value;
+        }
+    }
+    let rays = some_rays(15);
+    let weights: Vec<f64> = (0..rays.len()).map(|i| 0.3 + 0.1 * i as f64).collect();
+    for surface in [0, 3, 6] {
+        let sum = |system: &System<f64>| {
+            let tracer = Tracer::new(system).unwrap();
+            let margins = tracer.margins_at(&rays, surface, RayLimit::Rim);
+            margins.iter().zip(&weights).map(|(margin, weight)| margin * weight).sum::<f64>()
+        };
+        let tracer = Tracer::new(&system).unwrap();
+        let exact = tracer.margin_gradient(surface, RayLimit::Rim, &rays, &weights);
+        for i in [0, 3].into_iter().filter(|i| *i <= surface) {
+            let by = exact.surfaces[i];
+            let terms = (0..4).map(|term| {
+                (
+                    SurfaceParameter::AsphereTerm(term),
+                    by.terms[term],
+                    1e-8 * 0.04_f64.powi(term as i32),
+                )
+            });
+            for (parameter, by, step) in terms.chain([(SurfaceParameter::Conic, by.conic, 1e-4)]) {
+                let moved = |step: f64| {
+                    let mut moved = system.clone();
+                    *parameter.value_mut(&mut moved, i) += step;
+                    sum(&moved)
+                };
+                let difference = (moved(step) - moved(-step)) / (2.0 * step);
+                let near = (by - difference).abs() <= 1e-5 * difference.abs().max(1e-3);
+                assert!(near, "{surface}: {by} and {difference} by {parameter:?} of {i}");
+                assert!(difference != 0.0, "{surface}: {parameter:?} of {i} does nothing");
+            }
+        }
+    }
+}
+
 #[test]
 fn an_obstruction_clips_inside_and_its_edge_passes() {
     let plane =
@@ -454,6 +499,27 @@ fn a_plane_between_equal_media_changes_nothing() {
     }
 }
 
+/// An asphere without a rim that bends away from a ray, and comes back to it far out.
+#[test]
+fn a_ray_meets_an_unlimited_asphere_far_from_where_it_began() {
+    let (curvature, term) = (0.02, -125.0 / 150f64.powi(4));
+    let mut terms = [0.0; 7];
+    terms[0] = term;
+    let shape = Shape::Asphere { curvature, conic: -1.0, terms };
+    let surface = Surface { shape, ..Surface::plane(300.0, 1.0) };
+    let surfaces = vec![surface, Surface::plane(0.0, 1.0)];
+    let tracer = Tracer::new(&System { index_before: 1.0, surfaces, stop: None }).unwrap();
+    // At 45 degrees from a height of 50 mm at the vertex plane: z = r - 50, and c r²/2 + a r⁴ = z at
+    // 150 mm and at no smaller height.
+    let gap = |r: f64| 0.5 * curvature * r * r + term * r.powi(4) - (r - 50.0);
+    assert!((500..1500).all(|i| gap(0.1 * f64::from(i)) > 0.0) && gap(150.0).abs() < 1e-9);
+    let direction = Vec3::new(0.0, 0.5f64.sqrt(), 0.5f64.sqrt());
+    let met = tracer.trace_to(Ray { point: Vec3::new(0.0, 49.0, -1.0), direction }, 0);
+    assert!(met.fate.is_imaged(), "{met:?}");
+    let Vec3 { y, z, .. } = met.ray.point;
+    assert!((y - 150.0).abs() < 1e-9 && (z - 100.0).abs() < 1e-9, "{y} {z}");
+}
+
 #[test]
 fn a_curvature_that_vanishes_joins_the_plane() {
     let trace = |curvature: f64| {
@@ -597,6 +663,8 @@ fn mounted_surfaces_have_the_derivatives_of_their_landings() {
         let i64 = i as f64;
         system.surfaces[i].pose = Some(Pose::new([0.1 * i64, -0.2], [0.01, -0.005 * i64]));
     }
+    system.surfaces[2].axis = Some(Pose::new([0.05, 0.1], [0.02, -0.01]));
+    system.surfaces[4].axis = Some(Pose::new([-0.1, 0.0], [-0.01, 0.02]));
     system.surfaces[4].astigmatism = Some(2e-4);
     system.surfaces[7].astigmatism = Some(-1e-4);
     let rays = some_rays(19);

@@ -7,7 +7,7 @@ use crate::analysis::{
     longitudinal_aberration,
 };
 use crate::cli::error::CliError;
-use crate::cli::output::{ShortNumber, or_dash};
+use crate::cli::output::{ShortNumber, counted, or_dash, without_rounding};
 use crate::lens::FieldPoint;
 use crate::measure::time_ms;
 use serde::Serialize;
@@ -56,7 +56,8 @@ impl TextLines for LateralColorJson {
 
     fn lines(&self) -> Vec<String> {
         let Self { error, rays, milliseconds, colors } = self;
-        let mut lines = vec![format!("{rays} rays, {milliseconds:.3} ms, error {error:.0e} mm")];
+        let mut lines =
+            vec![format!("{}, {milliseconds:.3} ms, error {error:.0e} mm", counted(*rays, "ray"))];
         lines.extend(colors.iter().map(|ColorShiftJson { wavelength_um, dx, dy }| {
             format!(
                 "{wavelength_um:>9} um  dx {:>12}  dy {:>12}",
@@ -121,7 +122,7 @@ impl TextLines for LongitudinalJson {
         "longitudinal aberration: crossings of rays with the axis, in mm behind the image plane";
 
     fn lines(&self) -> Vec<String> {
-        let mut lines = vec![format!("{} rays, {:.3} ms", self.rays, self.milliseconds)];
+        let mut lines = vec![format!("{}, {:.3} ms", counted(self.rays, "ray"), self.milliseconds)];
         for color in &self.colors {
             let axial = or_dash(color.axial_color);
             lines.push(format!("{} um, axial colour {axial} mm", color.wavelength_um));
@@ -188,10 +189,13 @@ impl TextLines for FootprintJson {
         let number = self.surface + 1;
         let mut lines = vec![
             format!("surface {number}: reach {} ± {error:.0e}, rim {rim}", ShortNumber(*reach)),
-            format!("{rays} rays, {milliseconds:.3} ms"),
+            format!("{}, {milliseconds:.3} ms", counted(*rays, "ray")),
+            format!("{:>12}  {:>12}", "x, mm", "y, mm"),
         ];
-        let corner =
-            |[x, y]: &[f64; 2]| format!("{:>12}  {:>12}", ShortNumber(*x), ShortNumber(*y));
+        let corner = |point: &[f64; 2]| {
+            let [x, y] = point.map(|v| ShortNumber(without_rounding(v, *error)));
+            format!("{x:>12}  {y:>12}")
+        };
         lines.extend(self.outline.iter().step_by(6).map(corner));
         lines
     }

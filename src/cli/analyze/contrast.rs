@@ -6,7 +6,7 @@ use crate::analysis::{
     DiffractionGate, MtfCurve, MtfPoint, diffraction_gate, geometric_mtf,
     polychromatic_diffraction_mtf, polychromatic_geometric_mtf, through_focus_mtf,
 };
-use crate::cli::output::ShortNumber;
+use crate::cli::output::{ShortNumber, counted};
 use crate::measure::time_ms;
 use serde::Serialize;
 
@@ -77,8 +77,8 @@ pub(super) fn contrasts(run: &AnalysisRun) -> Vec<AtField<MtfJson>> {
 }
 
 impl TextLines for MtfJson {
-    const TITLE: &'static str = "contrast of gratings, tangential (lines across y) and sagittal, in \
-         line pairs per mm, with its error";
+    const TITLE: &'static str =
+        "MTF: tangential (lines across y) and sagittal, frequencies in cycles/mm";
 
     fn lines(&self) -> Vec<String> {
         let mut lines = vec![match &self.gate {
@@ -95,8 +95,9 @@ impl TextLines for MtfJson {
                 CurveJson::Refused { refused } => lines.push(format!("{name}: {refused}")),
                 CurveJson::Curve { milliseconds, curve } => {
                     let reached = if curve.reached { "" } else { ", tolerance not reached" };
-                    let rays = curve.rays;
-                    lines.push(format!("{name}: {rays} rays, {milliseconds:.3} ms{reached}"));
+                    let rays = counted(curve.rays, "ray");
+                    lines.push(format!("{name}: {rays}, {milliseconds:.3} ms{reached}"));
+                    lines.push(column_heads("cycles/mm"));
                     lines.extend(curve.points.iter().map(point_text));
                 }
             }
@@ -115,6 +116,11 @@ fn gate_text(gate: &DiffractionGate) -> String {
         },
     );
     format!("diffraction {state}: {reason}; allowed {tolerance:.0e}")
+}
+
+/// The heads of the columns of a curve.
+fn column_heads(first: &str) -> String {
+    format!("  {first:>10}  {:>20}  {:>20}", "tangential", "sagittal")
 }
 
 fn point_text(point: &MtfPoint) -> String {
@@ -155,12 +161,13 @@ pub(super) fn through_focus(run: &AnalysisRun) -> Vec<AtField<FocusContrastJson>
 }
 
 impl TextLines for FocusContrastJson {
-    const TITLE: &'static str = "contrast by diffraction at the primary wavelength against the shift \
-         of the image plane in mm, tangential and sagittal";
+    const TITLE: &'static str = "MTF by diffraction at the primary wavelength against the shift of the \
+         image plane, tangential and sagittal";
 
     fn lines(&self) -> Vec<String> {
         let frequency = ShortNumber(self.frequency);
-        let head = format!("at {frequency} line pairs per mm, {:.3} ms", self.milliseconds);
-        std::iter::once(head).chain(self.positions.iter().map(point_text)).collect()
+        let head = format!("at {frequency} cycles/mm, {:.3} ms", self.milliseconds);
+        let heads = [head, column_heads("shift, mm")];
+        heads.into_iter().chain(self.positions.iter().map(point_text)).collect()
     }
 }

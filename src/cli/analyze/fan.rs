@@ -2,7 +2,7 @@
 
 use super::{AnalysisRun, AtField, SelectedField, TextLines};
 use crate::analysis::{AnalysisError, Fan, FanPoint, fan};
-use crate::cli::output::{ShortNumber, or_dash};
+use crate::cli::output::{ShortNumber, counted, or_dash};
 use crate::measure::time_ms;
 use serde::Serialize;
 
@@ -83,7 +83,8 @@ impl TextLines for FanJson {
 
     fn lines(&self) -> Vec<String> {
         let Self { error, rays, milliseconds, colors } = self;
-        let mut lines = vec![format!("{rays} rays, {milliseconds:.3} ms, error {error:.0e} mm")];
+        let mut lines =
+            vec![format!("{}, {milliseconds:.3} ms, error {error:.0e} mm", counted(*rays, "ray"))];
         for color in colors {
             lines.push(format!("{} um", color.wavelength_um));
             lines.push("   pupil   tangential dy  sagittal dx  sagittal dy".to_owned());

@@ -1,5 +1,6 @@
 //! `analyze`: the results that a designer reads, each number with its error, rays and milliseconds.
 
+mod aberration_names;
 mod chief;
 mod color;
 mod contrast;
@@ -15,7 +16,7 @@ use super::effects::{AllowedSetting, EffectArgs, EffectReport, EffectRule};
 use super::error::CliError;
 use super::failures::Failures;
 use super::input::{LensFile, LoadedLens, Tolerance};
-use super::output::{Output, ShortNumber};
+use super::output::{Output, ShortNumber, counted, without_rounding};
 use super::output_paths::OutputPaths;
 use crate::analysis::{AnalysisError, Estimate};
 use crate::effects::{self, Effect, EffectPlan, TracePurpose};
@@ -52,7 +53,7 @@ pub(super) struct AnalyzeArgs {
     #[arg(long, value_name = "N", default_value_t = 0)]
     zoom: usize,
 
-    /// Spatial frequencies of `mtf` and `through-focus-mtf`, in line pairs per mm
+    /// Spatial frequencies of `mtf` and `through-focus-mtf`, in cycles/mm
     #[arg(long, value_name = "NU", value_delimiter = ',', default_value = "10,20,30,40,50")]
     frequencies: Vec<f64>,
 
@@ -223,7 +224,7 @@ impl AnalyzeArgs {
     fn check_frequencies(&self) -> Result<(), CliError> {
         match self.frequencies.iter().find(|nu| !(nu.is_finite() && **nu >= 0.0)) {
             Some(wrong) => Err(CliError::Input(format!(
-                "--frequencies: found {wrong}; expected line pairs per mm, zero or more"
+                "--frequencies: found {wrong}; expected cycles/mm, zero or more"
             ))),
             None => Ok(()),
         }
@@ -240,7 +241,7 @@ struct AnalysisRun {
     fields: Vec<SelectedField>,
     zoom: usize,
     accuracy: Accuracy,
-    /// The spatial frequencies, in line pairs per mm; at least one.
+    /// The spatial frequencies, in cycles/mm; at least one.
     frequencies: Vec<f64>,
     /// The points of a diffraction image, in mm from the image point of the chief ray.
     points: Vec<[f64; 2]>,
@@ -428,7 +429,8 @@ impl<T: TextLines> Display for AnalysisReport<T> {
 fn estimate_text(name: &str, estimate: &Estimate) -> String {
     let Estimate { value, error, rays, milliseconds } = *estimate;
     let ms = milliseconds.map(|ms| format!(", {ms:.3} ms")).unwrap_or_default();
-    format!("{name:<22} {:>13} ± {error:.1e}   {rays} rays{ms}", ShortNumber(value))
+    let (value, rays) = (ShortNumber(without_rounding(value, error)), counted(rays, "ray"));
+    format!("{name:<22} {value:>13} ± {error:.1e}   {rays}{ms}")
 }
 
 /// Computes a result and passes it with its milliseconds to `note`.

@@ -4,7 +4,7 @@ use super::{AnalysisRun, AtField, SelectedField, TextLines, estimate_text};
 use crate::analysis::{
     Estimate, PointSpread, ReferenceForm, Strehl, encircled_energy, point_spread, strehl,
 };
-use crate::cli::output::ShortNumber;
+use crate::cli::output::{ShortNumber, without_rounding};
 use crate::measure::time_ms;
 use serde::Serialize;
 
@@ -18,6 +18,9 @@ pub(super) struct PointSpreadJson {
     reference: ReferenceForm,
     reached: bool,
     points: Vec<IntensityJson>,
+    /// The rounding error of a length, in mm.
+    #[serde(skip)]
+    rounding: f64,
 }
 
 /// The intensity at a point, in mm from the image point of the chief ray.
@@ -53,7 +56,10 @@ pub(super) fn point_spreads(run: &AnalysisRun) -> Vec<AtField<PointSpreadJson>> 
             let spread = point_spread(model, field.traced, w, &points, run.accuracy)?;
             Ok((spread, strehl(model, field.traced, w, run.accuracy)?))
         });
-        let keys = found.map(|(spread, strehl)| keys(&spread, strehl, &points, ms));
+        let keys = found.map(|(spread, strehl)| PointSpreadJson {
+            rounding: run.rounding(),
+            ..keys(&spread, strehl, &points, ms)
+        });
         AtField::new(field, keys)
     };
     run.fields.iter().map(at).collect()
@@ -71,6 +77,7 @@ fn keys(spread: &PointSpread, strehl: Strehl, points: &[[f64; 2]], ms: f64) -> P
         reference: spread.reference,
         reached: spread.reached && strehl.reached,
         points: points.iter().zip(&spread.intensities).map(point).collect(),
+        rounding: 0.0,
     }
 }
 
@@ -79,12 +86,13 @@ impl TextLines for PointSpreadJson {
          the peak without aberrations; x and y in mm from the image point of the chief ray";
 
     fn lines(&self) -> Vec<String> {
-        let [x, y, z] = self.best_at.map(ShortNumber);
+        let [x, y, z] = self.best_at.map(|v| ShortNumber(without_rounding(v, self.rounding)));
         let mut lines = vec![
             estimate_text("Strehl at the chief ray", &self.strehl),
             estimate_text("best Strehl", &self.best_strehl),
             format!("found at x {x}, y {y}, along the axis {z} mm"),
         ];
+        lines.push(format!("{:>12}  {:>12}  intensity", "x, mm", "y, mm"));
         lines.extend(self.points.iter().map(|point| {
             let IntensityJson { x, y, intensity } = point;
             let [x, y] = [x, y].map(|v| ShortNumber(*v));
@@ -138,6 +146,7 @@ impl TextLines for EncircledJson {
         let line = |circle: &CircleJson| {
             estimate_text(&ShortNumber(circle.radius).to_string(), &circle.energy)
         };
-        self.circles.iter().map(line).collect()
+        let head = format!("{:<22} {:>13}", "radius, mm", "share");
+        std::iter::once(head).chain(self.circles.iter().map(line)).collect()
     }
 }

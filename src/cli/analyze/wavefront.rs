@@ -1,11 +1,12 @@
 //! The wavefront: RMS, map, fans of path differences and Zernike sums.
 
+use super::aberration_names::aberration_name;
 use super::{AnalysisRun, AtField, SelectedField, TextLines, estimate_text};
 use crate::analysis::{
     AnalysisError, Estimate, ReferenceForm, ZernikeMethod, ZernikeOrder, path_differences,
     wavefront, zernike,
 };
-use crate::cli::output::{ShortNumber, or_dash};
+use crate::cli::output::{ShortNumber, counted, or_dash};
 use crate::measure::time_ms;
 use serde::Serialize;
 
@@ -13,6 +14,7 @@ use serde::Serialize;
 #[derive(Serialize)]
 pub(super) struct WavefrontJson {
     rms: Estimate,
+    rms_without_tilt: Option<Estimate>,
     mean: Estimate,
     reached: bool,
     reference: ReferenceForm,
@@ -44,6 +46,7 @@ pub(super) fn wavefronts(run: &AnalysisRun) -> Vec<AtField<WavefrontJson>> {
             let timed = |e| Estimate { milliseconds: Some(ms), ..e };
             Ok(WavefrontJson {
                 rms: timed(found.rms),
+                rms_without_tilt: found.rms_without_tilt.map(timed),
                 mean: timed(found.mean),
                 reached: found.converged,
                 reference: found.reference,
@@ -77,7 +80,10 @@ impl TextLines for WavefrontJson {
         "wavefront at the primary wavelength, in wavelengths; --json lists the map";
 
     fn lines(&self) -> Vec<String> {
-        let mut lines = vec![estimate_text("rms", &self.rms), estimate_text("mean", &self.mean)];
+        let mut lines = vec![estimate_text("rms", &self.rms)];
+        let without_tilt = self.rms_without_tilt.iter();
+        lines.extend(without_tilt.map(|rms| estimate_text("rms without tilt", rms)));
+        lines.push(estimate_text("mean", &self.mean));
         if let ReferenceForm::Replaced(radius) = self.reference {
             let radius = ShortNumber(radius);
             lines.push(format!("exit pupil at the image: sphere of {radius} mm instead"));
@@ -131,7 +137,10 @@ impl TextLines for PathFanJson {
 
     fn lines(&self) -> Vec<String> {
         let Self { error, rays, milliseconds, .. } = self;
-        let mut lines = vec![format!("{rays} rays, {milliseconds:.3} ms, error {error:.0e} waves")];
+        let mut lines = vec![format!(
+            "{}, {milliseconds:.3} ms, error {error:.0e} waves",
+            counted(*rays, "ray")
+        )];
         lines.push("   pupil      tangential        sagittal".to_owned());
         for (t, s) in self.tangential.iter().zip(&self.sagittal) {
             let [along, across] = [t.waves, s.waves].map(or_dash);
@@ -181,17 +190,40 @@ impl TextLines for ZernikeJson {
     fn lines(&self) -> Vec<String> {
         let method = match self.method {
             ZernikeMethod::Projection => "projections over the clear disc".to_owned(),
-            ZernikeMethod::LeastSquares(condition) => format!(
-                "least squares over a clipped pupil, condition {}: not the projections of a clear one",
-                ShortNumber(condition)
-            ),
+            ZernikeMethod::LeastSquares(condition) => fit_text(condition),
         };
         let mut lines = vec![method, estimate_text("rms of the rest", &self.rest)];
+        lines.push(format!("{:>4}  {:>20}  {:<22}  {:>20}", "", "Noll", "", "fringe"));
+        let names = [ZernikeOrder::Noll, ZernikeOrder::Fringe].map(|order| order.indices(TERMS));
         for (i, (noll, fringe)) in self.noll.iter().zip(&self.fringe).enumerate() {
-            let [noll, fringe] =
-                [noll, fringe].map(|e| format!("{:.6} ± {:.0e}", e.value, e.error));
-            lines.push(format!("{:>4}  {noll:>20}  {fringe:>20}", i + 1));
+            let [noll, fringe] = [noll, fringe].map(coefficient_text);
+            let [first, second] = [names[0][i], names[1][i]].map(aberration_name);
+            lines.push(format!("{:>4}  {noll:>20}  {first:<22}  {fringe:>20}  {second}", i + 1));
         }
         lines
     }
+}
+
+/// The largest condition number of a fit over a full disc.
+const FULL_DISC: f64 = 1.01;
+
+/// The description of a fit.
+fn fit_text(condition: f64) -> String {
+    if condition < FULL_DISC {
+        return format!("least-squares fit (condition number {})", ShortNumber(condition));
+    }
+    format!(
+        "least-squares fit over a clipped pupil (condition number {}): its coefficients differ from \
+         projections over the clear disc",
+        ShortNumber(condition)
+    )
+}
+
+/// A coefficient with its error; 0 where no digit is left.
+fn coefficient_text(estimate: &Estimate) -> String {
+    let Estimate { value, error, .. } = *estimate;
+    if value.abs() < 5e-7 {
+        return format!("0 ± {error:.0e}");
+    }
+    format!("{value:.6} ± {error:.0e}")
 }

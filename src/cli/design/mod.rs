@@ -32,7 +32,7 @@ pub(super) struct DesignArgs {
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
 
-    /// Judges this lens: .json or .zmx
+    /// Judges this lens: .json, .zmx, .seq or .roa
     #[arg(long, value_name = "LENS", conflicts_with = "out")]
     judge: Option<PathBuf>,
 
@@ -70,7 +70,9 @@ impl DesignArgs {
         let Some(out) = &self.out else {
             let judged = self.judge.as_ref().map(|path| judge(path, &requirements));
             let judgement = judged.transpose()?;
-            return output.print(&JudgementReport { requirements, filled, judgement });
+            let broken = judgement.as_ref().map_or(0, |found| found.failures().len());
+            output.print(&JudgementReport { requirements, filled, judgement })?;
+            return check_judgement(broken);
         };
         let stop = stop_flag();
         let _lock = self.checkpoint.as_deref().map(FileLock::acquire).transpose()?;
@@ -189,6 +191,15 @@ fn beside(out: &Path, name: &str) -> PathBuf {
     let stem = out.file_stem().unwrap_or_default().to_string_lossy();
     let extension = out.extension().unwrap_or_default().to_string_lossy();
     out.with_file_name(format!("{stem}_{name}.{extension}"))
+}
+
+/// Fails if the judged lens breaks limits.
+fn check_judgement(broken: usize) -> Result<(), CliError> {
+    match broken {
+        0 => Ok(()),
+        1 => Err(CliError::Failed("the lens breaks 1 limit".to_owned())),
+        _ => Err(CliError::Failed(format!("the lens breaks {broken} limits"))),
+    }
 }
 
 fn judge(path: &Path, asked: &LensRequirements) -> Result<LensJudgement, CliError> {

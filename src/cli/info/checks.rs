@@ -2,7 +2,7 @@
 //! beyond the surface, an aperture beyond the stop, fields without rays.
 
 use crate::cli::output::ShortNumber;
-use crate::lens::{FieldPoint, Medium, SurfaceNumber, System};
+use crate::lens::{FieldPoint, Lens, Medium, SurfaceNumber, System};
 use crate::pupil::RayModel;
 use crate::trace::Fates;
 use serde::Serialize;
@@ -51,6 +51,24 @@ pub(super) fn checks(
     if fates.imaged == 0 && lost > 0 {
         let found = format!("no light: none of {lost} rays reaches the image");
         checks.push(LensCheck { surface: None, found });
+    }
+    checks
+}
+
+/// Checks for parts that first-order data or rays leave out: tilts, breaks of the axis, and surfaces that
+/// cannot be traced.
+pub(super) fn unusual_parts(lens: &Lens) -> Vec<LensCheck> {
+    let rows = || lens.surfaces.iter().enumerate();
+    let locked = rows().filter_map(|(i, row)| {
+        let kind = &row.locked.as_ref()?.kind;
+        let found = format!("{kind} cannot be traced: rays meet its conic or asphere alone");
+        Some(LensCheck { surface: Some(i), found })
+    });
+    let mut checks: Vec<LensCheck> = locked.collect();
+    if rows().any(|(_, row)| row.pose().is_some() || row.axis().is_some()) {
+        let found = "surfaces are decentred or tilted, or the axis is broken: first-order data and \
+                     Seidel sums are those of the straightened axis";
+        checks.push(LensCheck { surface: None, found: found.to_owned() });
     }
     checks
 }

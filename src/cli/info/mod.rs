@@ -108,7 +108,8 @@ impl ZoomReport {
         let media: Vec<_> = lens.surfaces.iter().map(|row| row.medium.clone()).collect();
         let (facts, effects) = effects::decisions(opened, zoom, choices)?;
         let model = opened.ray_model(zoom)?;
-        let checks = checks(&system, &media, &model, data.stop_semi_diameter, facts.fates);
+        let mut checks = checks(&system, &media, &model, data.stop_semi_diameter, facts.fates);
+        checks.extend(checks::unusual_parts(lens));
         Ok(Self {
             zoom,
             zoom_name: lens.zoom.get(zoom).map(|z| z.name.clone()).unwrap_or_default(),
@@ -174,10 +175,10 @@ fn radii_text(radii: &[Option<f64>], none: &str) -> String {
 /// A row of the table of first-order data.
 type FirstOrderRow = (&'static str, fn(&ZoomReport) -> String);
 
-const FIRST_ORDER: [FirstOrderRow; 18] = [
+const FIRST_ORDER: [FirstOrderRow; 19] = [
     ("focal length", |p| or_dash(p.first_order.efl)),
-    ("back focal point, from the last vertex", |p| or_dash(p.first_order.bfl)),
-    ("front focal point, from the first vertex", |p| or_dash(p.first_order.ffl)),
+    ("back focal length, from the last vertex", |p| or_dash(p.first_order.bfl)),
+    ("front focal length, from the first vertex", |p| or_dash(p.first_order.ffl)),
     ("front principal plane, from the first vertex", |p| {
         or_dash(p.first_order.front_principal_plane)
     }),
@@ -191,10 +192,11 @@ const FIRST_ORDER: [FirstOrderRow; 18] = [
     ("stop semi-diameter", |p| ShortNumber(p.first_order.stop_semi_diameter).to_string()),
     ("first vertex to image plane", |p| ShortNumber(p.total_track).to_string()),
     ("paraxial image, from the last vertex", |p| or_dash(p.first_order.paraxial_image)),
-    ("image plane behind the paraxial image", |p| or_dash(p.first_order.image_defocus)),
+    ("defocus: image plane from the paraxial image", |p| or_dash(p.first_order.image_defocus)),
     ("magnification", |p| or_dash(p.first_order.magnification)),
     ("Lagrange invariant", |p| or_dash(p.first_order.lagrange)),
     ("Petzval sum, 1/mm", |p| ShortNumber(p.first_order.petzval_sum).to_string()),
+    ("Petzval radius", |p| or_dash(p.first_order.petzval_radius())),
 ];
 
 impl InfoReport {

@@ -32,7 +32,7 @@ struct MeasureWindowReport {
 }
 
 /// The keys of the results, and their descriptions.
-const NAMES: [(&str, &str); 15] = [
+const NAMES: [(&str, &str); 16] = [
     ("first_frame_ms", "process start to first frame, ms"),
     ("edit_ms", "an edit to the results of all panels, ms"),
     ("slowest_edit_ms", "the slowest edit, ms"),
@@ -42,6 +42,7 @@ const NAMES: [(&str, &str); 15] = [
     ("largest_drag_ms", "a move of a handle of it, ms"),
     ("slowest_largest_drag_ms", "the slowest of 200 moves of it, ms"),
     ("unjournaled_edit_ms", "an edit of it on the window's thread without a journal, ms"),
+    ("slowest_unjournaled_edit_ms", "the slowest of 200 such edits, ms"),
     ("journaled_edit_ms", "an edit of it on the window's thread with a journal, ms"),
     ("slowest_journaled_edit_ms", "the slowest of 200 such edits, ms"),
     ("frame_processor_ms", "processor time of a frame without changes, ms"),

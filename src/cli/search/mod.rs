@@ -10,13 +10,14 @@ pub(super) use plan_args::SearchPlanArgs;
 use super::effects::{DesignEffects, EffectArgs};
 use super::error::CliError;
 use super::failures::Failures;
-use super::input::LensFile;
+use super::input::{self, LensFile};
 use super::output::{Output, ShortNumber, print_note};
 use super::output_paths::{OutputPaths, stale_note};
 use super::progress::{progress_bar, stop_flag};
 use crate::files::{self, CheckpointError, FileLock};
 use crate::lens::Lens;
 use crate::measure::Stopwatch;
+use crate::merit::MeritError;
 use crate::search::lens_landscape::{LandscapeError, LensLandscape, SearchPlan, finalize};
 use crate::search::{FoundPoint, RunEnd, SearchError, SearchMethod, SearchRun, SearchRunOn};
 use report::SearchReport;
@@ -114,7 +115,7 @@ impl SearchArgs {
         let effects = design.report(&start, &opened.file)?;
         let Lens { wavelengths, .. } = start;
         let original = Lens { wavelengths, ..opened.lens.clone() };
-        let refused = |cause: LandscapeError| landscape_error(&opened.file, cause);
+        let refused = |cause: LandscapeError| self.landscape_error(&opened.file, cause);
         let landscape = plan.landscape(&lens).map_err(refused)?;
         let start_breaks = landscape.violations(landscape.start()).map_err(refused)?;
         let (mut run, resumed) = self.start_or_resume(&landscape, &plan, &opened.file)?;
@@ -157,6 +158,20 @@ impl SearchArgs {
         failures.note(output.print(&report));
         failures.note(report.check_finished());
         failures.into_result()
+    }
+
+    /// The error of a landscape: a wrong term is one of the file of the goal, if there is one.
+    fn landscape_error(&self, file: &str, cause: LandscapeError) -> CliError {
+        let goal = self.plan_args.files().find(|(option, _)| *option == "--goal");
+        match (cause, goal) {
+            (cause @ (LandscapeError::Setting { .. } | LandscapeError::Rule(_)), _) => {
+                CliError::Input(cause.to_string())
+            }
+            (cause @ LandscapeError::Merit(MeritError::DoesNotApply { .. }), Some((_, goal))) => {
+                CliError::Input(format!("{}: {cause}", input::display_name(goal)))
+            }
+            (cause, _) => CliError::Input(format!("{file}: {cause}")),
+        }
     }
 
     fn check(&self) -> Result<(), CliError> {
@@ -349,15 +364,6 @@ fn nothing_to_do(run: &SearchRunOn<LensLandscape>) -> Option<String> {
 }
 
 /// The error of a lens for which the search is not possible.
-fn landscape_error(file: &str, cause: LandscapeError) -> CliError {
-    match cause {
-        LandscapeError::Setting { .. } | LandscapeError::Rule(_) => {
-            CliError::Input(cause.to_string())
-        }
-        cause => CliError::Input(format!("{file}: {cause}")),
-    }
-}
-
 /// The error of settings or of a checkpoint.
 fn search_error(cause: SearchError) -> CliError {
     match cause {

@@ -56,7 +56,8 @@ pub(in crate::cli) struct SearchPlanArgs {
     #[arg(long)]
     no_projection: bool,
 
-    /// Kinds of mutations to exclude
+    /// Kinds of mutations to exclude: `add_singlet`, `remove_singlet`, `glue`, `split`, `drop_layer`,
+    /// `bend`, `flip`, `exchange_glass`, `move_stop`, `global_draw`
     #[arg(long, value_name = "KINDS", value_delimiter = ',')]
     forbid: Vec<MutationArg>,
 
@@ -148,9 +149,9 @@ impl FromStr for MutationArg {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let name = |kind: MutationKind| kind.name().replace(' ', "-");
+        let name = |kind: MutationKind| kind.name().replace(' ', "_");
         let all = MutationKind::MUTATIONS.into_iter().chain([MutationKind::Global]);
-        let found = all.clone().find(|kind| name(*kind) == text.replace('_', "-"));
+        let found = all.clone().find(|kind| name(*kind) == text.replace('-', "_"));
         let known: Vec<String> = all.map(name).collect();
         found.map(Self).ok_or_else(|| format!("expected one of {}", known.join(", ")))
     }

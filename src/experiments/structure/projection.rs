@@ -317,3 +317,21 @@ fn key(canvas: &mut Canvas) {
     }
     legend.curve(canvas, "merit of the start", GREY, Stroke::Dashed);
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::experiments::structure::STUDY_LENSES;
+    use crate::experiments::structure::recorded_search::with_rounds;
+
+    #[test]
+    fn the_error_of_a_difference_has_the_variances_of_both_sides() {
+        let share = |better: u64| with_rounds(&[(10, 10, better, 1.0)]);
+        let sides = [vec![share(5), share(7)], vec![share(2), share(4)]];
+        let comparison = ProjectionComparison { subject: STUDY_LENSES[0], sides };
+        let found = comparison.difference(10);
+        assert!((found.mean - 0.3).abs() < 1e-12, "{}", found.mean);
+        // Each mean of two has a standard error of 0.1; twice that of the difference.
+        assert!((found.error - 2.0 * 0.02f64.sqrt()).abs() < 1e-12, "{}", found.error);
+    }
+}

@@ -139,3 +139,36 @@ pub(super) fn run_to_end(
         searches.par_iter_mut().for_each(|search| search.advance(slice));
     }
 }
+
+/// A search with these rounds: gradients, moves, moves to better lenses, and the best loss.
+#[cfg(test)]
+pub(super) fn with_rounds(rounds: &[(u64, u64, u64, f64)]) -> RecordedSearch {
+    let record = |&(gradients, moves, better, best): &(u64, u64, u64, f64)| RoundRecord {
+        gradients,
+        moves,
+        better,
+        best,
+        loss: None,
+        generation: 0,
+        kind: None,
+    };
+    let lens = crate::files::bundled_lenses().iter().find(|b| b.name == "singlet_la1131").unwrap();
+    let lens = crate::files::json::read(lens.text, lens.name).unwrap();
+    let mut search = RecordedSearch::new(&lens, &SearchPlan::default()).unwrap();
+    search.marks = rounds.iter().map(record).collect();
+    search
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_record_is_read_up_to_a_number_of_gradients() {
+        let search = with_rounds(&[(10, 4, 1, 0.9), (20, 8, 2, 0.5), (30, 10, 5, 0.5)]);
+        assert!(search.share_after(9).is_nan(), "before the first move");
+        assert_eq!([10, 19, 20, 99].map(|g| search.share_after(g)), [0.25, 0.25, 0.25, 0.5]);
+        assert_eq!([10, 29, 99].map(|g| search.best_after(g)), [0.9, 0.5, 0.5]);
+        assert_eq!(search.best_after(5), search.start());
+    }
+}

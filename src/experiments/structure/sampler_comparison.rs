@@ -269,3 +269,18 @@ impl Effort {
         self.select((STUDY_LENSES.len(), 5, 12_000), (1, 2, 200))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::experiments::structure::recorded_search::with_rounds;
+
+    #[test]
+    fn the_spread_over_seeds_is_the_best_the_middle_and_the_worst() {
+        let best = |loss: f64| with_rounds(&[(10, 1, 1, 2.0 * loss), (20, 2, 1, loss)]);
+        let searches = [0.3, 0.1, 0.2].map(best);
+        assert_eq!(spread(&searches, 15), [0.2, 0.4, 0.6]);
+        assert_eq!(spread(&searches, 20), [0.1, 0.2, 0.3]);
+        assert_eq!(spread(&searches[..1], 20), [0.3; 3]);
+    }
+}

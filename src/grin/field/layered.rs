@@ -67,7 +67,7 @@ pub struct ProfileSamples<R> {
 
 /// The index as a function of one coordinate.
 pub trait ProfileFunction<R: Real>: Debug + Send + Sync {
-    /// The parameters that an optimiser may change.
+    /// The parameters that an optimizer may change.
     fn parameters(&self) -> &[R];
     /// Mutable access to the parameters.
     fn parameters_mut(&mut self) -> &mut [R];

@@ -85,7 +85,7 @@ pub struct FieldResolution {
 /// outside. Blocks of rays are evaluated at once; the block methods must return the same bits as
 /// the single ones, and do unless they are overridden.
 pub trait IndexField<R: Real>: Debug + Send + Sync {
-    /// The parameters that an optimiser may change, in the order of the gradient.
+    /// The parameters that an optimizer may change, in the order of the gradient.
     fn parameters(&self) -> &[R];
 
     /// Mutable access to the parameters.

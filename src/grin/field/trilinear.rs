@@ -23,7 +23,7 @@ pub enum HessianDiagonal {
     /// comparison.
     Exact,
     /// Second differences of the nodes, interpolated: the second derivatives of the sampled
-    /// function. For optimisation.
+    /// function. For optimization.
     #[default]
     Smoothed,
 }

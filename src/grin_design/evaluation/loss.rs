@@ -251,7 +251,7 @@ pub(in crate::grin_design) fn evaluate_rows(
 
 #[cfg(test)]
 mod tests {
-    use super::evaluate;
+    use super::{evaluate, evaluate_rows};
     use crate::grin_design::evaluation::penalties::FieldPenalties;
     use crate::grin_design::evaluation::targets::measure_targets;
     use crate::grin_design::evaluation::views::{plan_views, view_rays};
@@ -306,5 +306,39 @@ mod tests {
             let off = (adjoint - difference).abs() / difference.abs();
             assert!(off < 1e-5, "{name}: {adjoint} {difference}");
         }
+    }
+
+    /// Least squares see the same loss, and the same gradient.
+    #[test]
+    fn the_squares_of_the_rows_add_up_to_the_loss() {
+        let mut compared = 0;
+        for name in ["luneburg-radial", "fibre", "plume"] {
+            let Some(mut task) = smooth(name) else { panic!("{name} is no task") };
+            for view in &mut task.views {
+                if let LightSource::Parallel { rays, .. } = &mut view.source {
+                    *rays = 2;
+                }
+            }
+            let wave = |p: Vec3<f64>| 1.1 + 0.02 * (2.0 * p.x + p.y).sin() * (p.z - 0.4).cos();
+            let field = GrinField::from_function(task.field, 4, wave).unwrap();
+            let setups = plan_views(&task, field.index_field(), RaySet::Scoring).unwrap();
+            let targets = measure_targets(&task).unwrap();
+            let views = view_rays(&task, &targets, &setups, RaySet::Scoring).unwrap();
+            if views.iter().any(|view| view.screen.is_some()) {
+                continue;
+            }
+            let penalties = FieldPenalties::new(&task);
+            let rows = evaluate_rows(field.index_field(), &views, &penalties).unwrap();
+            let whole = evaluate(field.index_field(), &views, &penalties).unwrap();
+            let sum: f64 = rows.iter().map(|(residual, _)| residual * residual).sum();
+            assert!((sum / whole.loss - 1.0).abs() < 1e-9, "{name}: {sum} {}", whole.loss);
+            let largest = whole.gradient.iter().fold(0.0, |most: f64, g| most.max(g.abs()));
+            for (i, exact) in whole.gradient.iter().enumerate() {
+                let slope: f64 = rows.iter().map(|(residual, row)| 2.0 * residual * row[i]).sum();
+                assert!((slope - exact).abs() < 1e-4 * largest, "{name} {i}: {slope} {exact}");
+            }
+            compared += 1;
+        }
+        assert!(compared >= 3, "{compared}");
     }
 }

@@ -121,3 +121,43 @@ impl FieldPenalties {
         sum
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::grin_design::GrinField;
+
+    #[test]
+    fn penalties_are_mean_squares_of_what_is_beyond_the_limits() {
+        // n = 1.6 + 0.03 x, whose gradient is 0.03.
+        let kind = FieldRepresentation::Tricubic { half: 2.0 };
+        let field = GrinField::from_function(kind, 9, |p| 1.6 + 0.03 * p.x).unwrap();
+        let places: Vec<Vec3<f64>> =
+            (0..5).map(|i| Vec3::new(0.2 * f64::from(i) - 0.4, 0.1, -0.3)).collect();
+        let condition = BoundaryCondition { index: 1.5, fixed: false, weight: 7.0 };
+        let none = FieldPenalties { edge: None, slope: None, range: None };
+        let value = |penalties: &FieldPenalties| penalties.value(field.index_field());
+        let mean = |off: &dyn Fn(f64) -> f64| {
+            places.iter().map(|p| off(1.6 + 0.03 * p.x).powi(2)).sum::<f64>() / 5.0
+        };
+        let edge = FieldPenalties { edge: Some((condition, places.clone())), ..none.clone() };
+        let exact = 7.0 * mean(&|index| index - 1.5);
+        assert!((value(&edge) / exact - 1.0).abs() < 1e-9, "{} {exact}", value(&edge));
+        // The size of the domain is in mm, so that the sum is in mm², as the misses of rays.
+        let size = 3.0;
+        let stiff = (STIFFNESS * size).powi(2);
+        for (limits, off) in [
+            ([1.0, 1.55], (|index| index - 1.55) as fn(f64) -> f64),
+            ([1.65, 2.0], |index| 1.65 - index),
+            ([1.5, 1.7], |_| 0.0),
+        ] {
+            let range =
+                FieldPenalties { range: Some((limits, size, places.clone())), ..none.clone() };
+            let exact = stiff * mean(&off);
+            assert!((value(&range) - exact).abs() <= 1e-9 * exact, "{limits:?}: {exact}");
+        }
+        let slope = FieldPenalties { slope: Some((0.02, size, places.clone())), ..none };
+        let exact = (STIFFNESS * size * 0.01).powi(2);
+        assert!((value(&slope) / exact - 1.0).abs() < 1e-6, "{} {exact}", value(&slope));
+    }
+}

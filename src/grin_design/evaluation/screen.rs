@@ -187,4 +187,16 @@ mod tests {
             assert!(light(2) > light(3), "rows from the bottom");
         }
     }
+
+    #[test]
+    fn a_difference_of_a_tenth_of_the_peak_is_20_decibels() {
+        let light = Vec3::new(0.0, 0.0, 1.0);
+        let mut screen = Screen::new(None, light, 1.0, (&TargetImage::Face, 8)).unwrap();
+        for peak in [0.5, 1.0, 4.0] {
+            screen.wanted = (0..64).map(|i| peak * f64::from(i) / 63.0).collect();
+            let image: Vec<f64> = screen.wanted.iter().map(|w| w + 0.1 * peak).collect();
+            let decibels = screen.psnr(screen.difference(&image));
+            assert!((decibels - 20.0).abs() < 1e-12, "{peak}: {decibels}");
+        }
+    }
 }

@@ -365,3 +365,27 @@ fn integrate_gradient(
     };
     cgls(grid.node_count(), &right, steps, forward, back, |_| ControlFlow::Continue(()))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_follow_from_their_gradient() {
+        // (1 - x²) (1 - y²) (1 - z²), which vanishes at the faces of the cube.
+        let f = |x: f64| 1.0 - x * x;
+        let grid = RegularGrid::cube(9, 1.0).unwrap();
+        let volume = |of: &dyn Fn(Vec3<f64>) -> f64| Trilinear::from_function(grid, of).unwrap();
+        let parts = [
+            volume(&|p| -2.0 * p.x * f(p.y) * f(p.z)),
+            volume(&|p| -2.0 * p.y * f(p.z) * f(p.x)),
+            volume(&|p| -2.0 * p.z * f(p.x) * f(p.y)),
+        ];
+        let found = integrate_gradient(&volume(&|_| 0.0), &parts, 60);
+        for (n, found) in found.into_iter().enumerate() {
+            let p = grid.node(n);
+            let exact = f(p.x) * f(p.y) * f(p.z);
+            assert!((found - exact).abs() < 0.05, "{p:?}: {found} {exact}");
+        }
+    }
+}

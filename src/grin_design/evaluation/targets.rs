@@ -2,7 +2,7 @@
 //! rings.
 //!
 //! The reference field is traced with the settings for its own kind, and to a tighter tolerance
-//! than the field under optimisation, so that the optimisation does not reproduce its own tracing
+//! than the field under optimization, so that the optimization does not reproduce its own tracing
 //! errors. A ray without information, because it is trapped, chaotic or grazing there, is excluded
 //! and counted with its reason.
 

@@ -1,4 +1,4 @@
-//! The field under optimisation: its initial values, the ranges of its parameters, its refinement,
+//! The field under optimization: its initial values, the ranges of its parameters, its refinement,
 //! and its values on a grid.
 
 use crate::files::Volume;
@@ -16,7 +16,7 @@ use crate::math::Vec3;
 /// The smallest number of coefficients of a spline.
 const MIN_COEFFICIENTS: usize = 4;
 
-/// A field under optimisation.
+/// A field under optimization.
 #[derive(Debug, Clone, PartialEq)]
 pub enum GrinField {
     /// Node values on a cube.
@@ -250,5 +250,22 @@ mod tests {
         let values = field.volume(space, 9).unwrap().values;
         let least = values.iter().copied().fold(f64::INFINITY, f64::min);
         assert!((least - edge).abs() < 1e-12 && edge < 1.25, "{least} {edge}");
+    }
+
+    #[test]
+    fn the_resolution_of_a_radial_spline_is_the_distance_of_its_last_knots() {
+        // Cubic pieces between knots that are evenly spaced in the square of the radius.
+        for (coefficients, radius) in [(9, 2.0), (20, 0.5)] {
+            let pieces = f64::from(coefficients - 3);
+            let last = radius * (1.0 - (1.0 - 1.0 / pieces).sqrt());
+            for kind in
+                [FieldRepresentation::Sphere { radius }, FieldRepresentation::Cylinder { radius }]
+            {
+                let nodes = coefficients as usize;
+                let field = GrinField::from_function(kind, nodes, |_| 1.5).unwrap();
+                let voxel = field.index_field().resolution().voxel.unwrap();
+                assert!((voxel / last - 1.0).abs() < 1e-9, "{kind:?}: {voxel} {last}");
+            }
+        }
     }
 }

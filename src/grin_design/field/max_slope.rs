@@ -85,3 +85,38 @@ fn max_voxel_slope(field: &Trilinear<f64>, space: Domain) -> LocatedValue {
     let voxels = (0..(nx - 1) * (ny - 1) * (nz - 1)).into_par_iter();
     voxels.map(of_voxel).reduce(|| (0.0, grid.low()), higher)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::grin::field::RegularGrid;
+    use crate::grin_design::task::FieldRepresentation;
+
+    #[test]
+    fn one_node_that_stands_out_is_found_wherever_it_is() {
+        let low = Vec3::new(-1.0, -1.0, -1.0);
+        let grid = RegularGrid::new([5, 5, 6], low, Vec3::new(0.5, 0.5, 0.4)).unwrap();
+        let steepest = (2.0f64.powi(2) + 2.0f64.powi(2) + 2.5f64.powi(2)).sqrt();
+        for node in (0..grid.node_count()).filter(|n| n % 7 == 0 || n % 5 == 4) {
+            let mut values = vec![1.5; grid.node_count()];
+            values[node] = 2.5;
+            let field = Trilinear::new(grid, values).unwrap();
+            let (slope, at) = max_voxel_slope(&field, Domain::Cube { half: 1.0 });
+            assert!((slope - steepest).abs() < 1e-9, "node {node}: {slope} {steepest}");
+            assert_eq!(at, grid.node(node));
+        }
+    }
+
+    #[test]
+    fn the_gradient_of_a_parabola_is_largest_at_its_end() {
+        // n = 1.5 + 0.1 r², whose gradient is 0.2 r, largest at the rim of the cylinder: coefficients
+        // that are linear make a spline that is.
+        let kind = FieldRepresentation::Cylinder { radius: 1.0 };
+        let mut field = GrinField::from_function(kind, 9, |_| 1.5).unwrap();
+        for (i, value) in field.parameters_mut().iter_mut().enumerate() {
+            *value += 0.1 * (i as f64 - 1.0) / 6.0;
+        }
+        let steepest = field.max_slope(Domain::Rod { radius: 0.8, from: -2.0, to: 2.0 });
+        assert!((steepest - 0.16).abs() < 1e-3, "{steepest}");
+    }
+}

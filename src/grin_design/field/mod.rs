@@ -1,4 +1,4 @@
-//! Fields of a task: the one under optimisation, with its limits, and the reference fields.
+//! Fields of a task: the one under optimization, with its limits, and the reference fields.
 
 mod grin_field;
 pub(super) mod index_bounds;

@@ -26,7 +26,7 @@ pub struct FieldDifference {
     pub without_offset: f64,
     /// That mean.
     pub offset: f64,
-    /// `‖η - η*‖ / ‖η* - η₀‖` with the initial field `η₀`: 1 for an optimisation that found
+    /// `‖η - η*‖ / ‖η* - η₀‖` with the initial field `η₀`: 1 for an optimization that found
     /// nothing, infinite where the reference is the initial field up to rounding.
     #[serde(rename = "of_contrast")]
     pub relative_to_contrast: f64,

@@ -1,5 +1,5 @@
 //! The image of every view, traced with the scoring rays, beside its target. Needs no gradient and
-//! no optimisation.
+//! no optimization.
 
 use crate::grin::{GrinRay, GrinSetup, GrinTracer, IndexField, Integrator, RayExit};
 use crate::grin_design::GrinTaskError;

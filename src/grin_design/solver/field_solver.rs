@@ -1,4 +1,4 @@
-//! The optimisation methods of a task behind one interface.
+//! The optimization methods of a task behind one interface.
 
 use crate::grin_design::GrinTaskError;
 use crate::grin_design::evaluation::loss::{LossEvaluation, evaluate, evaluate_rows};
@@ -12,7 +12,7 @@ use crate::solve::{Adam, Lbfgs, LevenbergMarquardt, ParameterBounds, ResidualRow
 /// Adam's rate falls to this fraction over the second half of a level.
 const ANNEALED: f64 = 0.1;
 
-/// An optimisation method with its state.
+/// An optimization method with its state.
 #[derive(Debug, Clone)]
 pub(super) enum FieldSolver {
     /// Adam, with its rate at the beginning of the level.

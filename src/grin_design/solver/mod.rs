@@ -1,4 +1,4 @@
-//! The optimisation of a field, one step at a time.
+//! The optimization of a field, one step at a time.
 
 mod field_solver;
 mod optimizer;

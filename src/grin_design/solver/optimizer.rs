@@ -1,4 +1,4 @@
-//! The optimisation of a field, one step at a time: the caller owns the loop.
+//! The optimization of a field, one step at a time: the caller owns the loop.
 
 use super::field_solver::{FieldSolver, LossFunction, SolverStep};
 use crate::grin::field::HessianDiagonal;
@@ -19,7 +19,7 @@ const REPLAN_INTERVAL: usize = 16;
 /// Steps between two evaluations of the field with the scoring rays.
 const SCORE_INTERVAL: usize = 20;
 
-/// The progress of an optimisation after a step.
+/// The progress of an optimization after a step.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GrinProgress {
     /// Steps so far.
@@ -37,7 +37,7 @@ pub struct GrinProgress {
     /// The outcomes of the rays of this step that contribute to the loss; empty for least squares,
     /// which count rays only when the field is scored.
     pub counts: RayCounts,
-    /// True if the optimisation has finished.
+    /// True if the optimization has finished.
     pub finished: bool,
 }
 
@@ -50,7 +50,7 @@ pub struct FieldScore {
     pub views: Vec<ViewResult>,
 }
 
-/// The optimisation of the field of a task. Its result does not depend on the number of threads.
+/// The optimization of the field of a task. Its result does not depend on the number of threads.
 #[derive(Debug)]
 pub struct GrinOptimizer {
     task: GrinTask,
@@ -74,7 +74,7 @@ pub struct GrinOptimizer {
 }
 
 impl GrinOptimizer {
-    /// Starts the optimisation of a task whose files have been read: see
+    /// Starts the optimization of a task whose files have been read: see
     /// [`GrinTask::read_files`].
     ///
     /// # Errors
@@ -107,7 +107,7 @@ impl GrinOptimizer {
         Ok(runner)
     }
 
-    /// The same optimisation with the Hessian of a trilinear field inside its voxels, which ignores
+    /// The same optimization with the Hessian of a trilinear field inside its voxels, which ignores
     /// the jumps of its gradient: for comparison. See [`HessianDiagonal`].
     #[must_use]
     pub fn with_exact_hessian(mut self) -> Self {
@@ -172,7 +172,7 @@ impl GrinOptimizer {
         Ok(self.progress(loss, counts))
     }
 
-    /// Scores the current field, so that the best one is known; to be called when an optimisation
+    /// Scores the current field, so that the best one is known; to be called when an optimization
     /// is stopped before its end.
     ///
     /// # Errors

@@ -72,3 +72,29 @@ pub(in crate::grin_design) fn length(v: Vec3<f64>) -> f64 {
 pub(in crate::grin_design) fn radians(degrees: f64) -> f64 {
     degrees * PI / 180.0
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn points_spread_over_the_unit_sphere() {
+        let mean = |points: &[Vec3<f64>], of: fn(Vec3<f64>) -> f64| {
+            points.iter().map(|p| of(*p)).sum::<f64>() / points.len() as f64
+        };
+        let members = (0..2000).map(sphere_sequence).collect();
+        for points in [sphere_points(2000), members] {
+            assert!(points.iter().all(|p| (length(*p) - 1.0).abs() < 1e-12));
+            // The means of x² and of z⁴ over a sphere are 1/3 and 1/5.
+            for (of, exact) in [
+                ((|p| p.x) as fn(Vec3<f64>) -> f64, 0.0),
+                (|p| p.z, 0.0),
+                (|p| p.x * p.x, 1.0 / 3.0),
+                (|p| p.y * p.y, 1.0 / 3.0),
+                (|p| p.z.powi(4), 0.2),
+            ] {
+                assert!((mean(&points, of) - exact).abs() < 5e-3, "{}", mean(&points, of));
+            }
+        }
+    }
+}

@@ -57,11 +57,11 @@ pub struct GrinTask {
     /// The condition at the boundary of the domain; none if absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub edge: Option<BoundaryCondition>,
-    /// The optimisation method.
+    /// The optimization method.
     pub method: GrinMethod,
     /// Resolutions from coarse to fine.
     pub levels: Vec<RefinementLevel>,
-    /// The known solution, for comparison; the optimisation does not use it.
+    /// The known solution, for comparison; the optimization does not use it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub exact: Option<ReferenceField>,
 }
@@ -295,13 +295,13 @@ pub struct ManufacturingLimits {
     #[serde(default = "two")]
     pub high: f64,
     /// The largest gradient of the index, in 1/mm; unlimited if absent. A penalty guides the
-    /// optimisation, and the resulting field satisfies the limit everywhere: a field whose gradient
+    /// optimization, and the resulting field satisfies the limit everywhere: a field whose gradient
     /// is too large is scaled towards the index of the boundary. The range of the index is likewise
     /// enforced by a penalty where coefficients alone do not guarantee it, and satisfied by the
     /// resulting field.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub slope: Option<f64>,
-    /// The largest change of the index in one step of the optimisation.
+    /// The largest change of the index in one step of the optimization.
     #[serde(default = "small")]
     pub change: f64,
 }
@@ -338,7 +338,7 @@ pub struct BoundaryCondition {
     pub weight: f64,
 }
 
-/// The optimisation method.
+/// The optimization method.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum GrinMethod {

@@ -32,9 +32,13 @@ pub struct HandlePlaces<'a> {
 }
 
 impl HandlePlaces<'_> {
-    /// The place of a handle; `None` for one that is not in the section.
+    /// The place of a handle; `None` for one that is not in the section, and where the axis is broken,
+    /// since handles move along a straight one.
     pub fn place(&self, handle: Handle) -> Option<[f64; 2]> {
         let section = self.section;
+        if section.system().has_broken_axis() {
+            return None;
+        }
         let (vertices, heights) = (section.vertices(), section.heights());
         let image = section.image();
         let place = match handle {

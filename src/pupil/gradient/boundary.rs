@@ -13,8 +13,8 @@
 
 use super::{Integrand, QuadraticIntegrand, WarpSampling};
 use crate::math::Vec3;
-use crate::pupil::region::{RegionKind, TracedPupil};
-use crate::trace::{AdjointSeed, SystemGradient};
+use crate::pupil::region::{LimitEdge, RegionKind, TracedPupil};
+use crate::trace::{AdjointSeed, Rays, SystemGradient};
 
 impl TracedPupil<'_> {
     /// The integral, in mm² of the first vertex plane times the unit of the integrand.
@@ -47,14 +47,38 @@ impl TracedPupil<'_> {
     /// The contribution of the motion of the edge: zero for the disc of the pupil, which does not
     /// move; `None` if the edge is unknown.
     pub fn edge_motion(&self, cost: &impl Integrand) -> Option<SystemGradient<f64>> {
+        self.edge_motion_of_points(|p| cost.value(p))
+    }
+
+    /// The same for a contribution that is given by the image point alone.
+    pub fn edge_motion_of_points(
+        &self,
+        cost: impl Fn([f64; 2]) -> f64,
+    ) -> Option<SystemGradient<f64>> {
+        self.sum_over_edges(|edge| edge.landings.iter().map(|p| cost(*p)).collect())
+    }
+
+    /// The same for a contribution that depends on the whole ray: `costs` gives those of some rays, in
+    /// the unit of the integral over mm² of the first vertex plane.
+    pub fn edge_motion_of_rays(
+        &self,
+        costs: impl Fn(&Rays<f64>) -> Vec<f64>,
+    ) -> Option<SystemGradient<f64>> {
+        self.sum_over_edges(|edge| costs(&edge.rays))
+    }
+
+    fn sum_over_edges(
+        &self,
+        costs: impl Fn(&LimitEdge) -> Vec<f64>,
+    ) -> Option<SystemGradient<f64>> {
         let tracer = &self.region.launch.channel().tracer;
         let mut total = SystemGradient::zero(tracer.surfaces());
         if self.region.kind == RegionKind::Clear {
             return Some(total);
         }
         for edge in self.edges()? {
-            let weight = |(by, landing): (&f64, &[f64; 2])| by * cost.value(*landing);
-            let weights: Vec<f64> = edge.by_margin.iter().zip(&edge.landings).map(weight).collect();
+            let weights: Vec<f64> =
+                edge.by_margin.iter().zip(costs(edge)).map(|(by, cost)| by * cost).collect();
             let moved = tracer.margin_gradient(edge.surface, edge.limit, &edge.rays, &weights);
             total.add(&moved, 1.0);
         }

@@ -418,6 +418,7 @@ mod tests {
                 mirror,
                 hyperhemisphere: hyper,
                 pose: None,
+                axis: None,
                 astigmatism: None,
             }
         };

@@ -27,6 +27,7 @@ pub use boundary::{Boundary, BoundaryArc, EdgePoint, PolarFrame, PupilLimit};
 pub use dark_pupil::DarkPupil;
 pub use edge_curve::{EdgeArc, EdgeCurves};
 pub use kind::{Region, RegionKind};
+pub(super) use limit_edge::LimitEdge;
 pub use moments::PupilMoments;
 pub use nodes::Nodes;
 pub use outline::{OutlineSide, PupilOutline};

@@ -8,7 +8,7 @@ use super::limit_edge::LimitEdge;
 use super::moments::PupilMoments;
 use super::nodes::{Nodes, RadialLine};
 use super::quadrature::TracedNodes;
-use crate::trace::{ImagePoints, Rays, TraceSink};
+use crate::trace::{ImagePoints, Ray, Rays, TraceSink};
 use std::sync::OnceLock;
 
 /// The traced rays of a pupil.
@@ -38,7 +38,16 @@ impl<'a> Region<'a> {
     /// lie on one radius: enough for integrands that depend on the distance from the axis alone, and
     /// for those that averaging over azimuth makes such, as squares of distances from a point.
     pub fn trace_pupil(&self, order: usize) -> TracedPupil<'a> {
-        let (nodes, radial_lines) = self.nodes_and_lines(order, true);
+        self.trace_lines(order, true)
+    }
+
+    /// The same with rays at all azimuths, for any integrand.
+    pub fn trace_whole_pupil(&self, order: usize) -> TracedPupil<'a> {
+        self.trace_lines(order, false)
+    }
+
+    fn trace_lines(&self, order: usize, alike: bool) -> TracedPupil<'a> {
+        let (nodes, radial_lines) = self.nodes_and_lines(order, alike);
         TracedPupil { radial_lines, dark: self.dark_pupil(), ..self.trace_nodes(&nodes) }
     }
 
@@ -80,6 +89,11 @@ impl TracedPupil<'_> {
     /// the way back.
     pub fn signed_area(&self) -> f64 {
         self.dark.as_ref().map_or(self.moments.area, DarkPupil::area)
+    }
+
+    /// The optical path from the object point or plane wave to the start of a ray of this pupil, in mm.
+    pub fn path_to(&self, ray: Ray<f64>) -> f64 {
+        self.region.launch.optical_path_to(ray)
     }
 
     /// True if some ray arrives.

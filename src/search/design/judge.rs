@@ -101,11 +101,35 @@ impl LensJudgement {
     /// Everything that is wrong, in words.
     pub fn failures(&self) -> Vec<String> {
         let broken = self.limits.iter().filter(|margin| !margin.is_kept);
-        let text =
-            |m: &RequirementMargin| format!("{}: found {:.6}", m.limit.name(), m.limit.value);
-        broken.map(text).chain(self.faults.iter().cloned()).collect()
+        broken.map(|margin| failure(&margin.limit)).chain(self.faults.iter().cloned()).collect()
     }
 }
+
+/// A broken limit, in words.
+fn failure(limit: &ConstraintMargin) -> String {
+    let name = limit.term.replace('_', " ");
+    let place = limit.place().map_or(String::new(), |place| format!(" of {place}"));
+    let number = |value: f64| {
+        let text = format!("{value:.6}");
+        text.trim_end_matches('0').trim_end_matches('.').to_owned()
+    };
+    let value = number(limit.value);
+    let found = if COUNTED.contains(&limit.term) {
+        format!("{value} {name}{place}")
+    } else {
+        format!("{name}{place} {value}")
+    };
+    match (limit.min, limit.max) {
+        (Some(min), _) if limit.value < min => {
+            format!("{found}; at least {} required", number(min))
+        }
+        (_, Some(max)) => format!("{found}; at most {} allowed", number(max)),
+        _ => found,
+    }
+}
+
+/// The limits of numbers of things.
+const COUNTED: [&str; 2] = ["elements", "aspheric_surfaces"];
 
 /// Judges a lens: its own fields, wavelengths and zoom positions are replaced by what is asked for.
 ///

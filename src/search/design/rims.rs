@@ -152,6 +152,8 @@ fn has_light(lens: &Lens, asked: &LensRequirements) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::search::design::LensSpecification;
+    use crate::search::design::starts::library_starts;
 
     /// Three planes, which leave a chief ray straight.
     fn planes() -> System<f64> {
@@ -187,5 +189,38 @@ mod tests {
         let place = StopPlace::find(&system, pupil);
         assert_eq!(place.surface, 1);
         assert!((place.distance - 2.0).abs() < 1e-12, "{}", place.distance);
+    }
+
+    #[test]
+    fn rims_leave_the_areas_that_are_asked_for_and_little_more() {
+        let spec: LensSpecification = serde_json::from_str(
+            r#"{"focal_length_mm": 60.0, "f_number": 5.0, "half_field_deg": 15.0, "max_elements": 4}"#,
+        )
+        .unwrap();
+        let mut asked = LensRequirements::complete(&spec).unwrap().0;
+        let axis = asked.clear_area[0];
+        asked.clear_area.iter_mut().skip(1).for_each(|area| *area = 0.6 * axis);
+        let mut tight = false;
+        for start in library_starts(&asked, &[]).iter().take(8) {
+            let Some(lens) = with_rims(&start.draft, &asked) else { continue };
+            if !has_light(&lens, &asked) {
+                continue;
+            }
+            let model = RayModel::from_lens(&lens, 0).unwrap();
+            let area = |field: &crate::lens::FieldPoint| {
+                let region = lit_region(&model, *field, model.primary).unwrap();
+                region.trace_pupil(4).moments.area / axis
+            };
+            let areas: Vec<f64> = model.fields.iter().map(area).collect();
+            assert!((1.0..1.1).contains(&areas[0]), "{}: {areas:?}", start.name);
+            let least = areas[1..].iter().copied().fold(f64::INFINITY, f64::min);
+            assert!(least >= 0.6, "{}: {areas:?}", start.name);
+            // Not below the beam on the axis, which is more than enough in a slow and thin lens.
+            tight = least < 0.66;
+            if tight {
+                break;
+            }
+        }
+        assert!(tight, "no rim gives no more light than was asked for");
     }
 }

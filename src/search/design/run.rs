@@ -417,3 +417,43 @@ impl Candidate {
         in_catalogue(&self.draft.lens, asked)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::search::design::LensSpecification;
+
+    fn with_pool(stage: DesignStage) -> DesignRun {
+        let spec: LensSpecification = serde_json::from_str(
+            r#"{"focal_length_mm": 60.0, "f_number": 6.0, "half_field_deg": 2.0, "max_elements": 3}"#,
+        )
+        .unwrap();
+        let asked = LensRequirements::complete(&spec).unwrap().0;
+        let candidate = |start: NamedDraft| Candidate {
+            origin: start.name,
+            draft: start.draft,
+            value: f64::INFINITY,
+        };
+        let mut run = DesignRun::new(&asked, &DesignSettings::with_seed(3));
+        run.pool = achromats(&asked).into_iter().take(1).map(candidate).collect();
+        run.stage = stage;
+        run
+    }
+
+    #[test]
+    fn mutants_compete_until_half_of_the_budget_is_used_and_glasses_follow() {
+        let stop = AtomicBool::new(false);
+        let mut run = with_pool(DesignStage::Mutations);
+        let (rules, asked) = (run.rules(), run.requirements());
+        assert!(rules.track >= Some(asked.track) && rules.back_focus <= Some(asked.back_focus));
+        assert!(run.advance(0.2, &stop) && run.stage() == DesignStage::Mutations);
+        let names = MutationKind::MUTATIONS.map(MutationKind::name);
+        let is_mutant = |c: &Candidate| names.iter().any(|name| c.origin.ends_with(name));
+        assert!(run.pool.iter().any(is_mutant), "{:?}", run.pool);
+        assert!(run.pool.is_sorted_by_key(|c| c.value) && run.best().is_finite());
+        assert!(run.pool.iter().all(|c| piece_count(&c.draft.lens) <= 3));
+        assert!(run.advance(0.5, &stop) && run.stage() == DesignStage::Glasses);
+        assert!(run.pool.iter().all(|c| in_catalogue(&c.draft.lens, &run.asked)));
+        assert!(!run.advance(0.95, &stop));
+    }
+}

@@ -312,3 +312,34 @@ fn cross_check(lens: &Lens, figures: &LensSummary) -> Result<Vec<CrossCheck>, La
     }
     Ok(all)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_second_sampling_confirms_what_is_true_and_nothing_else() {
+        let found =
+            crate::files::bundled_lenses().iter().find(|b| b.name == "tessar_50_f28").unwrap();
+        let mut lens = crate::files::json::read(found.text, found.name).unwrap();
+        // A field in no plane of the coordinates, so that its spot is beside both.
+        let field = &mut lens.fields.values[1];
+        (field.x, field.y) = (0.6 * field.y, 0.8 * field.y);
+        lens.fields.values = vec![*field];
+        let figures = LensSummary::new(&lens, 1e-4).unwrap();
+        let agrees = |change: &dyn Fn(&mut LensSummary)| {
+            let mut figures = figures.clone();
+            change(&mut figures);
+            cross_check(&lens, &figures).unwrap()[0].agrees
+        };
+        assert!(agrees(&|_| {}));
+        assert!(!agrees(&|figures| figures.fields[0].light.value *= 1.05));
+        assert!(!agrees(&|figures| figures.fields[0].light.value *= 0.95));
+        for factor in [0.95, 1.05] {
+            let spot = |figures: &mut LensSummary| {
+                figures.fields[0].spot.iter_mut().for_each(|spot| spot.value *= factor);
+            };
+            assert!(!agrees(&spot), "{factor}");
+        }
+    }
+}

@@ -52,3 +52,22 @@ pub(super) fn with_values(landscape: &LensLandscape, lens: &Lens, values: &[f64]
     }
     there.with_pickups().ok()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lens::ASPHERE_TERMS;
+
+    #[test]
+    fn curvature_and_aspheres_have_units_of_the_same_sag() {
+        let size = 70.0;
+        let unit = |quantity: Quantity| langevin_unit(Parameter::new(0, quantity), size);
+        // At a fifth of the size.
+        let height: f64 = 0.2 * size;
+        let sag = 0.5 * unit(Quantity::Curvature) * height * height;
+        for term in 0..ASPHERE_TERMS {
+            let same = unit(Quantity::Asphere(term)) * height.powi(4 + 2 * term as i32);
+            assert!((same / sag - 1.0).abs() < 1e-12, "{term}: {same} {sag}");
+        }
+    }
+}

@@ -209,7 +209,8 @@ impl LensLandscape {
         let optical_merit = || {
             let merit = self.merit(&self.start, self.local.tolerance).ok()?;
             let terms = merit.terms(&merit.values(&self.with_variables(&self.start))).ok()?;
-            let optical = |name: &str| ["spot", "spot_integral", "light"].contains(&name);
+            let names = ["spot", "spot_integral", "wavefront", "geometric_mtf", "light"];
+            let optical = |name: &str| names.contains(&name);
             let sum: f64 =
                 terms.iter().filter(|t| optical(t.term)).map(|t| t.weight * t.value).sum();
             (sum > 0.0).then_some(sum)

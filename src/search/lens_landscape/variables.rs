@@ -128,3 +128,27 @@ pub(super) fn clamp_to_bounds(lens: &Lens) -> Lens {
     }
     inside
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lens::blank;
+
+    #[test]
+    fn gaps_of_glass_and_air_have_the_limits_of_the_rules_unless_there_is_a_mirror() {
+        let mut lens = blank();
+        let rules = SearchRules {
+            glass_center: [1.0, 9.0],
+            air_center: [0.1, 30.0],
+            back_focus: Some(12.0),
+            ..SearchRules::default()
+        };
+        let last = lens.surfaces.len() - 1;
+        assert_eq!(gap_bounds(&lens, &rules, 0), [Some(1.0), Some(9.0)]);
+        assert_eq!(gap_bounds(&lens, &rules, last), [Some(12.0), None]);
+        lens.surfaces[0].medium = Medium::Air;
+        assert_eq!(gap_bounds(&lens, &rules, 0), [Some(0.1), Some(30.0)]);
+        lens.surfaces[last].medium = Medium::Mirror;
+        assert_eq!(gap_bounds(&lens, &rules, 0), [None, None]);
+    }
+}

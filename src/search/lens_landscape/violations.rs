@@ -10,6 +10,10 @@ use std::f64::consts::PI;
 /// The relative shortfall of light within the sampling error, which does not count as a violation.
 const LIGHT_TOLERANCE: f64 = 1e-3;
 
+/// The largest violation of a limit that does not count, in its unit: penalties keep limits up to a
+/// remainder that no measurement shows.
+const LIMIT_TOLERANCE: f64 = 1e-6;
+
 impl LensLandscape {
     /// The number of elements with its permitted range.
     pub(super) fn element_count_margin(&self, lens: &Lens) -> ConstraintMargin {
@@ -28,7 +32,7 @@ impl LensLandscape {
         let dark =
             |light: &ConstraintMargin| -light.slack() > LIGHT_TOLERANCE * light.min.unwrap_or(0.0);
         let mut violated = self.limits(lens)?;
-        violated.retain(|limit| limit.slack() < 0.0);
+        violated.retain(|limit| limit.slack() < -LIMIT_TOLERANCE);
         violated.extend(self.light_margins(lens)?.into_iter().filter(dark));
         Ok(violated)
     }

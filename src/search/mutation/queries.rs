@@ -47,3 +47,23 @@ pub(super) fn medium_after(lens: &Lens, row: usize) -> Medium {
     let media = lens.surfaces[..=row].iter().rev().map(|row| &row.medium);
     media.chain([&lens.object_medium]).find(|m| **m != Medium::Mirror).cloned().unwrap_or_default()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_surface_with_any_figure_is_not_plain() {
+        let sphere = || Row { curvature: 0.02, ..Row::default() };
+        assert!(is_plain(&sphere()) && is_plain(&Row { asphere: vec![0.0; 3], ..sphere() }));
+        for figured in [
+            Row { conic: -1.0, ..sphere() },
+            Row { asphere: vec![0.0, 1e-9], ..sphere() },
+            Row { conic: 0.2, asphere: vec![1e-7], ..sphere() },
+            Row { hyperhemisphere: true, ..sphere() },
+            Row { obstruction: Some(1.0), ..sphere() },
+        ] {
+            assert!(!is_plain(&figured), "{figured:?}");
+        }
+    }
+}

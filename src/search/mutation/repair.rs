@@ -207,3 +207,60 @@ fn primary_ray_model(lens: &Lens, zoom: usize) -> Result<RayModel, Refusal> {
     let model = RayModel::from_systems(vec![(um, 1.0, system)], 0, beam, Aiming::Chief)?;
     Ok(model.limited_by_stop().map_err(RayModelError::from)?)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lens::blank;
+
+    /// Two surfaces of the same radius, 8 mm apart, with a gap that grows outwards.
+    fn growing_gap(rims: [f64; 2]) -> Lens {
+        let mut lens = blank();
+        lens.surfaces.truncate(2);
+        lens.surfaces[0].curvature = -0.02;
+        lens.surfaces[1].curvature = 0.02;
+        lens.surfaces[0].thickness = 8.0;
+        for (row, rim) in lens.surfaces.iter_mut().zip(rims) {
+            row.semi_diameter = Some(rim);
+        }
+        lens
+    }
+
+    #[test]
+    fn a_gap_is_clear_up_to_the_smaller_rim() {
+        // The other way round each sag takes R − √(R² − h²) away.
+        let open = growing_gap([30.0, 30.0]);
+        assert_eq!(clear_height(&open, 0, 2.0), None);
+        let mut closing = open;
+        closing.surfaces[0].curvature = 0.02;
+        closing.surfaces[1].curvature = -0.02;
+        let sag: f64 = 0.5 * (8.0 - 2.0);
+        let exact = (2.0 * 50.0 * sag - sag * sag).sqrt();
+        let found = clear_height(&closing, 0, 2.0).unwrap();
+        assert!((found - exact).abs() < 1e-6, "{found} {exact}");
+        // Neither surface reaches that height if one of them does not.
+        for rims in [[30.0, 15.0], [15.0, 30.0]] {
+            let mut small = closing.clone();
+            for (row, rim) in small.surfaces.iter_mut().zip(rims) {
+                row.semi_diameter = Some(rim);
+            }
+            assert_eq!(clear_height(&small, 0, 2.0), None, "{rims:?}");
+        }
+    }
+
+    #[test]
+    fn a_surface_is_no_wider_than_its_steepness_the_rules_and_twice_the_others_allow() {
+        let mut lens = growing_gap([10.0, 12.0]);
+        let rules = SearchRules { semi_diameter: None, steepness: 0.8, ..SearchRules::default() };
+        let largest = |lens: &Lens, rules: &SearchRules| largest_semi_diameter(lens, 0, rules);
+        // Twice the widest of 12 mm; the sine of the slope at 40 mm would be 0.8.
+        assert_eq!(largest(&lens, &rules), 24.0);
+        let narrow = SearchRules { semi_diameter: Some(20.0), ..rules.clone() };
+        assert_eq!(largest(&lens, &narrow), 20.0);
+        lens.surfaces[0].curvature = -0.05;
+        assert!((largest(&lens, &rules) - 16.0).abs() < 1e-12);
+        lens.surfaces.iter_mut().for_each(|row| row.semi_diameter = None);
+        lens.surfaces[0].curvature = 0.0;
+        assert_eq!(largest(&lens, &rules), f64::INFINITY);
+    }
+}

@@ -1,8 +1,8 @@
 //! That the model of the projection is what first-order optics says of a lens with gradients, its
 //! derivatives those of its values.
 
-use super::free_parameters;
 use super::model::{MarginalRayModel, ProjectionCoordinate, scale};
+use super::{SearchRules, curvature_range, free_parameters};
 use crate::lens::{
     GradientIndex, Lens, Medium, Object, ProfileLaw, Quantity, ZoomPosition, ZoomThickness,
 };
@@ -165,4 +165,18 @@ fn the_derivatives_of_what_is_kept_agree_with_differences() {
         }
         assert!(worst < 2e-8, "{}: {worst:e}", lens.name);
     }
+}
+
+#[test]
+fn a_surface_may_be_curved_until_its_rim_is_too_steep() {
+    let mut lens = bundled("cooke_triplet_100_f27");
+    let rules = SearchRules { steepness: 0.6, ..SearchRules::default() };
+    for rim in [3.0, 12.0] {
+        lens.surfaces[1].semi_diameter = Some(rim);
+        let (low, high) = curvature_range(&lens, 1, &rules);
+        // The sine of the slope at the rim of a sphere is its curvature times the height.
+        assert!((high * rim - 0.6).abs() < 1e-12 && low == -high, "{low} {high}");
+    }
+    lens.surfaces[1].semi_diameter = None;
+    assert_eq!(curvature_range(&lens, 1, &rules), (f64::NEG_INFINITY, f64::INFINITY));
 }

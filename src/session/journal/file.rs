@@ -188,3 +188,45 @@ fn file_name(document: Option<&Path>, number: usize) -> String {
     let checksum = crc32fast::hash(whole.as_os_str().as_encoded_bytes());
     format!("{stem}-{checksum:08x}{extra}.{EXTENSION}")
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lens::{Lens, blank};
+    use crate::session::history::{DesignHistory, VersionOrigin};
+    use std::sync::Arc;
+
+    #[test]
+    fn a_journal_that_is_too_long_forgets_its_oldest_versions() {
+        let folder =
+            std::env::temp_dir().join(format!("aplanat-long-journal-{}", std::process::id()));
+        drop(fs::remove_dir_all(&folder));
+        // Versions of 0.7 MB, of which half of the room holds some eleven.
+        let lens = Arc::new(Lens { notes: "n".repeat(700_000), ..blank() });
+        let mut history = DesignHistory::new(Arc::clone(&lens));
+        for i in 0..12 {
+            history.push(Arc::clone(&lens), VersionOrigin::new(format!("edit {i}")));
+        }
+        let present = history.present();
+        let before = history.clone();
+        history.push(lens, VersionOrigin::new("last"));
+        let last = JournalEntry::Node(Arc::clone(history.node(present + 1).unwrap()));
+        let mut file = JournalFile::create(&folder, JournalState::begin(None, before)).unwrap();
+        // As if there had been many entries that are of no account any more.
+        file.bytes = MAX_BYTES;
+        let forgotten = file.append(&last).unwrap();
+        file.sync().unwrap();
+        let length = fs::metadata(&file.path).unwrap().len();
+        assert!(length <= MAX_BYTES / 2 && length == file.bytes, "{length} {}", file.bytes);
+        let kept = 14 - forgotten;
+        assert!(forgotten > 0 && kept > 3, "{forgotten}");
+        assert_eq!(file.append(&JournalEntry::Closed).unwrap(), 0);
+        let path = file.path.clone();
+        drop(file);
+        let again = JournalFile::open(&path).unwrap();
+        assert_eq!(again.state.history.nodes().len(), kept);
+        assert!(again.state.history.node(present).is_some());
+        drop(again);
+        fs::remove_dir_all(&folder).unwrap();
+    }
+}

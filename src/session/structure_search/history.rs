@@ -111,3 +111,39 @@ fn mark_of(run: &SearchRunOn<LensLandscape>, number: u64, round: u64) -> Option<
     let LineageNode { chain, kind, start_loss: merit, .. } = *node;
     Some(DescentMark { round, number, chain, kind, merit, entered: false })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn marks_of_descents_without_a_retained_lens_are_thinned() {
+        let mark = |number: u64| DescentMark {
+            round: number,
+            number,
+            chain: 0,
+            kind: None,
+            merit: 1.0,
+            // One in five, among them odd ones.
+            entered: number.is_multiple_of(5),
+        };
+        let mut history = SearchHistory::default();
+        let most = MAX_MARKS as u64;
+        history.marks = (0..most).map(mark).collect();
+        history.thin_marks();
+        assert_eq!(history.marks.len(), MAX_MARKS, "as many as are allowed");
+        let numbers = |history: &SearchHistory| -> Vec<u64> {
+            history.marks.iter().map(|mark| mark.number).collect()
+        };
+        let kept = |step: u64| -> Vec<u64> {
+            (0..=most).filter(|n| n.is_multiple_of(5) || n.is_multiple_of(step)).collect()
+        };
+        history.marks = (0..=most).map(mark).collect();
+        history.thin_marks();
+        assert_eq!(numbers(&history), kept(2));
+        // Every second one of the rest goes when there are too many again.
+        history.marks = (0..=most).map(mark).collect();
+        history.thin_marks();
+        assert_eq!(numbers(&history), kept(4));
+    }
+}

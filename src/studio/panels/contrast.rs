@@ -49,7 +49,7 @@ impl Panel for ContrastPanel {
 
 fn legend(ui: &mut Ui) {
     let text = "tangential solid, sagittal dashed, diffraction limit dotted; all wavelengths, \
-                line pairs per mm";
+                cycles/mm";
     ui.label(RichText::new(text).small().weak());
 }
 
@@ -86,7 +86,7 @@ fn curve_points(
 
 fn describe(response: &Response, contrasts: &FieldContrasts) {
     let highest = contrasts.frequencies.last().copied().unwrap_or(0.0);
-    let label = format!("Contrast against frequency up to {highest} line pairs per mm");
+    let label = format!("Contrast against frequency up to {highest} cycles/mm");
     response.widget_info(|| WidgetInfo::labeled(egui::Role::Image, true, &label));
 }
 

@@ -60,7 +60,6 @@ fn data(ui: &mut Ui, lens: &Lens, first: &FirstOrder<f64>) {
 
 fn lines(lens: &Lens, first: &FirstOrder<f64>) -> Vec<DataLine> {
     let track: f64 = lens.surfaces.iter().map(|row| row.thickness).sum();
-    let petzval = (first.petzval_sum != 0.0).then(|| -1.0 / first.petzval_sum);
     vec![
         DataLine("Focal length", mm(first.efl), "Equivalent focal length, one over the power"),
         DataLine(
@@ -80,22 +79,22 @@ fn lines(lens: &Lens, first: &FirstOrder<f64>) -> Vec<DataLine> {
             "One over twice the numerical aperture in the image space",
         ),
         pupil_place("Entrance pupil at", first.entrance_pupil, "From the first vertex"),
-        pupil_size("Entrance pupil size", first.entrance_pupil),
+        pupil_diameter("Entrance pupil diameter", first.entrance_pupil),
         pupil_place("Exit pupil at", first.exit_pupil, "From the last vertex"),
-        pupil_size("Exit pupil size", first.exit_pupil),
+        pupil_diameter("Exit pupil diameter", first.exit_pupil),
         DataLine(
             "Stop semi-diameter",
             mm(Some(first.stop_semi_diameter)),
             "Height of the marginal ray at the stop",
         ),
-        DataLine(
-            "Image behind focus",
-            mm(first.image_defocus),
-            "Image plane from the paraxial image",
-        ),
+        DataLine("Defocus", mm(first.image_defocus), "Image plane from the paraxial image"),
         DataLine("Magnification", plain(first.magnification), "None for an object at infinity"),
         DataLine("Lagrange invariant", mm(first.lagrange), "n (ū y − u ȳ), the same everywhere"),
-        DataLine("Petzval radius", mm(petzval), "Radius of the image surface without astigmatism"),
+        DataLine(
+            "Petzval radius",
+            mm(first.petzval_radius()),
+            "Radius of the image surface without astigmatism",
+        ),
         DataLine("Total track", mm(Some(track)), "From the first vertex to the image, as written"),
     ]
 }
@@ -105,9 +104,9 @@ fn pupil_place(name: &'static str, pupil: ParaxialPupil<f64>, from: &'static str
     DataLine(name, place, from)
 }
 
-fn pupil_size(name: &'static str, pupil: ParaxialPupil<f64>) -> DataLine {
+fn pupil_diameter(name: &'static str, pupil: ParaxialPupil<f64>) -> DataLine {
     let size = pupil.diameter.map_or_else(|| "telecentric".to_owned(), |d| mm(Some(d)));
-    DataLine(name, size, "Its diameter")
+    DataLine(name, size, "Paraxial")
 }
 
 fn plain(value: Option<f64>) -> String {

@@ -266,7 +266,7 @@ fn radii(ui: &mut Ui, spot: &Spot) {
          pupil; the dots are other rays",
     );
     line(ui, format!("GEO {}", in_um(spot.radius)))
-        .on_hover_text("Largest distance from the centroid of all colours");
+        .on_hover_text("Geometric radius: the largest distance from the centroid of all colours");
     let time = spot.rms.milliseconds.map(|ms| format!(", {ms:.2} ms")).unwrap_or_default();
     let rays = RichText::new(format!("{} rays{time}", spot.radius.rays)).small();
     ui.label(rays.weak()).on_hover_text("Rays traced for these numbers, and the time");

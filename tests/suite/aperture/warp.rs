@@ -178,6 +178,19 @@ fn aperture_gradients_of_a_fixed_disc_have_no_edge_motion() {
 }
 
 #[test]
+fn the_rays_of_the_warp_field_are_counted() {
+    let case = &cases()[1];
+    let model = case.model();
+    let region = Region::new(case.launch(&model));
+    let rays = |count: usize| {
+        let sampling = WarpSampling { count, seed: 3 };
+        region.warp_derivative(&case.throughput().0, sampling).unwrap().rays
+    };
+    // As many as were asked for, after those that searched for the edge.
+    assert_eq!([rays(64), rays(256)], [64, 256].map(|count| region.rays + count));
+}
+
+#[test]
 fn aperture_gradients_of_rays_aimed_at_the_stop_move_with_its_rim() {
     for case in [&cases()[1], &cases()[4]] {
         let plain = case.model();

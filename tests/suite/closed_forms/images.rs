@@ -2,6 +2,7 @@
 
 use super::{FOCAL, assert_near, beam, field, paraboloid, system, thin_lens};
 use crate::aperture::image;
+use crate::merit::bundled;
 use crate::reference::lenses;
 use aplanat::analysis::{airy_radius, illumination, path_differences, spot};
 use aplanat::lens::{FieldPoint, Shape, Surface, System};
@@ -135,4 +136,42 @@ fn light_of_a_field_has_no_weight() {
     let heavy = FieldPoint { weight: 7.0, ..field(0.0, 0.5) };
     let [light, heavy] = [field(0.0, 0.5), heavy].map(|f| spot(&model, f, ACCURACY).unwrap());
     assert_eq!((light.rms, light.light), (heavy.rms, heavy.light));
+}
+
+/// Denser media everywhere bend rays as before and make every path longer.
+#[test]
+fn paths_grow_with_the_indices_of_all_media() {
+    let lens = bundled("double_gauss_rudolph_50");
+    let plain = lens.resolve(0, UM).unwrap();
+    let points = [[0.0, 0.9], [0.4, -0.6], [-0.7, 0.1]];
+    let paths = |index: f64| {
+        let mut system = plain.clone();
+        system.index_before *= index;
+        system.surfaces.iter_mut().for_each(|surface| surface.index *= index);
+        let model = model(vec![(UM, 1.0, system)], 12.0, 8.0);
+        path_differences(&model, field(3.0, 8.0), 0, &points).unwrap()
+    };
+    for (thin, dense) in paths(1.0).into_iter().zip(paths(1.33)) {
+        let (thin, dense) = (thin.unwrap(), dense.unwrap());
+        assert!(thin.abs() > 0.05, "{thin}");
+        assert!((dense / thin - 1.33).abs() < 1e-7, "{dense} {thin}");
+    }
+}
+
+#[test]
+fn the_farthest_ray_of_a_spot_is_known_to_the_tolerance() {
+    let lens = bundled("double_gauss_rudolph_50");
+    let model = RayModel::from_lens(&lens, 0).unwrap();
+    for point in &model.fields[..2] {
+        let radius = |tolerance: f64| {
+            spot(&model, *point, Accuracy { tolerance, ..ACCURACY }).unwrap().radius
+        };
+        let exact = radius(1e-6);
+        for tolerance in [1e-2, 1e-4] {
+            let found = radius(tolerance);
+            assert!(found.error <= 3.0 * tolerance * found.value, "{} {found:?}", point.y);
+            let off = (found.value - exact.value).abs();
+            assert!(off <= found.error + exact.error, "{} {found:?} {exact:?}", point.y);
+        }
+    }
 }

@@ -2,6 +2,7 @@
 //! focuses into glass, two mirrors, the cos⁴ law.
 
 mod constraints;
+mod drawings;
 mod effects;
 mod first_order;
 mod images;

@@ -3,7 +3,7 @@
 use super::{FOCAL, assert_near, field, lens, row, thin_rows};
 use aplanat::lens::{Aperture, FieldPoint, Lens, Medium, Parameter, Quantity, Row, Variable};
 use aplanat::lens::{Wavelength, glass};
-use aplanat::merit::{Goal, LimitTreatment, Merit, PupilEdge, Term, WeightedTerm};
+use aplanat::merit::{DerivativeLevel, Goal, LimitTreatment, Merit, PupilEdge, Term, WeightedTerm};
 
 fn value(lens: &Lens, term: Term) -> f64 {
     let terms = vec![WeightedTerm::new(term, 1.0)];
@@ -93,4 +93,28 @@ fn a_spot_term_weighs_its_wavelengths() {
         assert_near(value(&lens, Term::Spot), exact, 1e-4);
     }
     assert!(blur(blue) / blur(red) < 0.9 || blur(red) / blur(blue) < 0.9);
+}
+
+/// A stop in front of everything gives all fields their light: what is relative does not change with
+/// its size.
+#[test]
+fn the_size_of_the_stop_does_not_change_what_fields_have_relative_to_the_axis() {
+    let mut lens = behind_a_stop(&[0.0, 20.0]);
+    let parameter = Parameter::new(0, Quantity::SemiDiameter);
+    lens.variables = vec![Variable { parameter, min: None, max: None }];
+    let slope = |term: Term| {
+        let goal = Goal {
+            terms: vec![WeightedTerm::new(term, 1.0)],
+            zoom_ratios: Vec::new(),
+            limits: LimitTreatment::default(),
+            pupil: PupilEdge::Moving,
+        };
+        let merit = Merit::new(&lens, &goal, 1e-6).unwrap();
+        merit.evaluate(&merit.values(&lens), DerivativeLevel::Gradient).unwrap().gradient[0]
+    };
+    let relative = slope(Term::RelativeIllumination { field: 1, min: 1.5 });
+    assert!(relative.abs() < 1e-6, "{relative}");
+    // The f-number does: by -N/r.
+    let number = FOCAL / 10.0;
+    assert_near(slope(Term::FNumber(7.0)), 2.0 * (number - 7.0) * -number / 5.0, 1e-6);
 }

@@ -9,7 +9,8 @@ use aplanat::lens::{
 use aplanat::math::{Dual, Real, Vec3};
 use aplanat::paraxial::{Beam, first_order};
 use aplanat::trace::{
-    AdjointSeed, Fate, Landings, Ray, Rays, SurfaceParameter, SystemGradient, TraceSink, Tracer,
+    AdjointSeed, Fate, Landings, Ray, RayLimit, Rays, SurfaceParameter, SystemGradient, TraceSink,
+    Tracer,
 };
 use std::f64::consts::{FRAC_PI_2, PI};
 
@@ -421,4 +422,43 @@ fn grin_lens_parameters_are_named_and_set() {
     assert!(!lens.set(Parameter::new(3, Quantity::Grin(0)), 1.0));
     assert_eq!(lens.get(Parameter::new(0, Quantity::Grin(10))), None);
     assert_eq!(Fate::Turned(2).surface(), Some(2));
+}
+
+/// A rod of 1 mm with an end of half a millimetre of radius.
+#[test]
+fn grin_lens_a_small_one_is_the_same_all_around() {
+    let lens = lens_of(
+        r#"{"thickness": 1.0, "glass": {"gradient": {"base": {"index": 1.6}, "of": "index",
+        "radial": [-0.1]}}, "semi_diameter": 0.45, "stop": true},
+        {"curvature": -2.0, "thickness": 0.5, "semi_diameter": 0.45}"#,
+        r#"{"entrance_pupil_diameter": 0.6}"#,
+    );
+    let tracer = Tracer::new(&system(&lens)).unwrap();
+    for height in [0.1, 0.25, 0.3] {
+        let landing = |turn: f64| {
+            let (sin, cos) = turn.sin_cos();
+            let found = tracer.trace(ray(height * cos, height * sin, 0.0, 0.0));
+            assert!(found.fate.is_imaged(), "{height} {turn}: {:?}", found.fate);
+            // Back to the plane of the axis and the ray.
+            let Vec3 { x, y, .. } = found.ray.point;
+            [x * cos + y * sin, y * cos - x * sin]
+        };
+        let first = landing(0.0);
+        for turn in [0.7, FRAC_PI_2, 2.5, PI, 4.0, 1.5 * PI] {
+            let [along, across] = landing(turn);
+            assert!((along - first[0]).abs() < 1e-9 && across.abs() < 1e-9, "{height} {turn}");
+        }
+    }
+}
+
+#[test]
+fn grin_lens_a_ray_that_misses_the_end_of_its_gradient_has_a_negative_margin() {
+    let mut system = system(&rod("index", 1.6, &[-0.01], 5.0));
+    // A ball of half a millimetre at the end of a rod of 1.5 mm.
+    system.surfaces[1].shape = aplanat::lens::Shape::Sphere { curvature: 2.0 };
+    system.surfaces[1].semi_diameter = f64::INFINITY;
+    let tracer = Tracer::new(&system).unwrap();
+    let margin = |height: f64| tracer.margin(ray(0.0, height, 0.0, 0.0), 1, RayLimit::Miss);
+    assert!(margin(0.1).unwrap() > 0.0);
+    assert_eq!(margin(0.9), Some(-1.0));
 }

@@ -5,7 +5,8 @@ use super::{generous, seeded};
 use crate::merit::bundled;
 use aplanat::files;
 use aplanat::lens::{
-    FieldPoint, Lens, Medium, Parameter, ParameterKind, Pickup, Quantity, System, add_variables,
+    FieldPoint, Lens, Medium, Object, Parameter, ParameterKind, Pickup, Quantity, System,
+    add_variables,
 };
 use aplanat::pupil::{RayModel, Region};
 use aplanat::search::element::{elements, piece_count, topology};
@@ -372,5 +373,70 @@ fn a_new_element_clips_no_light() {
             println!("{name}: {}: {sound} of {} keep their light", kind.name(), shares.len());
             assert!(kind == MutationKind::Glue || 2 * sound > shares.len());
         }
+    }
+}
+
+/// The object and the rest of the lens stay where they are: a new front element takes its length from
+/// the distance of the object.
+#[test]
+fn a_new_front_element_stands_between_the_object_and_the_lens() {
+    let far = bundled("heliar_100_f45");
+    let rules = SearchRules {
+        projection: false,
+        weights: vec![(MutationKind::AddSinglet, 3.0), (MutationKind::Split, 0.5)],
+        ..generous()
+    };
+    for object in [Object::Finite(400.0), Object::Finite(-250.0), Object::Infinity] {
+        let lens = Lens { object, ..far.clone() };
+        let (mut in_front, mut between) = (0, 0);
+        for seed in 0..60 {
+            let added = mutate(MutationKind::AddSinglet, &lens, &rules, &mut seeded(seed));
+            let Ok(mutant) = added else { continue };
+            let rows = &mutant.lens.surfaces;
+            if mutant.new_glass != [0] || rows[2].curvature != lens.surfaces[0].curvature {
+                between += 1;
+                assert!(mutant.log_ratio.is_some(), "{}", mutant.change);
+                continue;
+            }
+            in_front += 1;
+            match (object, mutant.lens.object) {
+                (Object::Finite(before), Object::Finite(after)) => {
+                    let length = rows[0].thickness + rows[1].thickness;
+                    assert!((before - length - after).abs() < 1e-9, "{before} {length} {after}");
+                    // To take it away again would move the object.
+                    assert_eq!(mutant.log_ratio, None);
+                }
+                (Object::Infinity, Object::Infinity) => assert!(mutant.log_ratio.is_some()),
+                (before, after) => panic!("{before:?} {after:?}"),
+            }
+        }
+        assert!(in_front >= 3 && between >= 3, "{object:?}: {in_front} {between}");
+    }
+}
+
+#[test]
+fn kinds_are_proposed_in_proportion_to_their_weights() {
+    let lens = bundled("double_gauss_nikkor_s_50");
+    let weight = |kind: MutationKind| match kind {
+        MutationKind::Flip => 3.0,
+        MutationKind::RemoveSinglet => 6.0,
+        MutationKind::AddSinglet => 1.0,
+        _ => 0.0,
+    };
+    let weights = MutationKind::MUTATIONS.map(|kind| (kind, weight(kind))).to_vec();
+    // With both ends fixed every mutation is refused at once, by its kind.
+    let rules = SearchRules { weights, fixed_ends: [13, 0], ..generous() };
+    let mut random = seeded(5);
+    let kinds: Vec<MutationKind> =
+        (0..300).map(|_| propose(&lens, &rules, &mut random).unwrap_err().kind).collect();
+    // Four standard errors of a share of 300.
+    for (kind, share) in [
+        (MutationKind::Flip, 0.3f64),
+        (MutationKind::RemoveSinglet, 0.6),
+        (MutationKind::AddSinglet, 0.1),
+    ] {
+        let allowed = 4.0 * (share * (1.0 - share) / 300.0).sqrt();
+        let found = kinds.iter().filter(|found| **found == kind).count() as f64 / 300.0;
+        assert!((found - share).abs() < allowed, "{}: {found}", kind.name());
     }
 }

@@ -167,3 +167,48 @@ pub(in crate::search::design) fn traced_beams(lens: &Lens) -> Option<Vec<FieldBe
     };
     model.fields.iter().map(beam).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::search::design::LensSpecification;
+    use std::f64::consts::PI;
+
+    #[test]
+    fn the_beam_of_a_field_is_an_ellipse_with_the_area_that_is_asked_for() {
+        let spec: LensSpecification = serde_json::from_str(
+            r#"{"focal_length_mm": 80.0, "f_number": 4.0, "half_field_deg": 12.0}"#,
+        )
+        .unwrap();
+        let mut asked = LensRequirements::complete(&spec).unwrap().0;
+        let axis = PI * 10.0 * 10.0;
+        // One field with less and one with more light than the axis.
+        asked.fields = vec![0.0, 8.0, 12.0];
+        asked.clear_area = vec![axis, 0.5 * axis, 1.3 * axis];
+        assert!((asked.beam_radius() - 10.0).abs() < 1e-12);
+        for difficulty in [1.0, 0.4] {
+            let plan = BeamPlan { difficulty: [difficulty, 1.0], ..BeamPlan::full(1.0) };
+            let beams = plan.beams(&asked);
+            for (beam, area) in beams.iter().zip(&asked.clear_area) {
+                let [x, y] = beam.axes;
+                let exact = difficulty * difficulty * area;
+                assert!((PI * x * y / exact - 1.0).abs() < 1e-9, "{x} {y} {exact}");
+                // The mean squares over an ellipse are a quarter of those of its axes.
+                let mean = |of: &dyn Fn([f64; 2]) -> f64| -> f64 {
+                    beam.points.iter().map(|(point, weight)| weight * of(*point)).sum()
+                };
+                let square = mean(&|[a, b]| a * a + b * b);
+                assert!((square / (0.25 * (x * x + y * y)) - 1.0).abs() < 1e-6, "{square}");
+                assert!((mean(&|_| 1.0) - 1.0).abs() < 1e-6);
+            }
+        }
+    }
+
+    #[test]
+    fn the_axes_of_a_beam_of_points_hold_them_with_little_room() {
+        let points = vec![([3.0, -1.0], 0.5), ([-1.0, 7.0], 0.5)];
+        let beam = FieldBeam::of_points(0.0, 1.0, points, [0.0; 2]);
+        let [x, y] = beam.axes;
+        assert!((3.0..3.3).contains(&x) && (7.0..7.7).contains(&y), "{x} {y}");
+    }
+}

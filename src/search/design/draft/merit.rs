@@ -560,7 +560,7 @@ mod tests {
     use super::*;
 
     use crate::search::design::LensSpecification;
-    use crate::search::design::starts::achromats;
+    use crate::search::design::starts::{achromats, library_starts};
 
     fn requirements(spec: &str) -> LensRequirements {
         let spec: LensSpecification = serde_json::from_str(spec).unwrap();
@@ -635,6 +635,68 @@ mod tests {
             let system = &merit.systems[merit.primary].system;
             let exact = crate::paraxial::first_order(system, &beam).unwrap().efl.unwrap();
             assert!((merit.focal_length().0 / exact - 1.0).abs() < 1e-10, "{exact}");
+        }
+    }
+
+    /// Chief rays cross the axis where that of a narrow field does, although the lens in front of
+    /// the stop has an aberration of its pupil.
+    #[test]
+    fn beams_are_aimed_at_the_middle_of_the_stop() {
+        let asked = requirements(
+            r#"{"focal_length_mm": 60.0, "f_number": 4.0, "half_field_deg": 22.0, "max_elements": 6}"#,
+        );
+        let plan = BeamPlan::full(1.0);
+        let freedom = Freedom { glasses: false, aspheric_surfaces: 0, pupil: false };
+        let mut moved: f64 = 0.0;
+        for start in library_starts(&asked, &[]).iter().take(4) {
+            let draft = &start.draft;
+            let Some(merit) = DraftMerit::new(draft, &asked, &plan, freedom) else { continue };
+            let system = &merit.systems[merit.primary].system;
+            let (system, stop) = StopPlace::find(system, draft.pupil).inserted(system);
+            let tracer = Tracer::new(&system).unwrap().without_rims();
+            for beam in merit.beams.iter().filter(|beam| beam.angle != 0.0) {
+                let chief = tracer.trace_to(beam.ray([0.0; 2], draft.pupil, merit.back), stop);
+                let height = chief.ray.point.y;
+                assert!(height.abs() < 1e-3 * beam.axes[1], "{}: {height}", start.name);
+                moved = moved.max(beam.center.abs());
+            }
+        }
+        assert!(moved > 0.01, "nothing to aim: {moved}");
+    }
+
+    #[test]
+    fn a_focal_length_is_broken_by_what_is_beyond_its_range() {
+        let asked =
+            requirements(r#"{"focal_length_mm": 80.0, "f_number": 8.0, "half_field_deg": 2.0}"#);
+        let plan = BeamPlan::full(1.0);
+        let freedom = Freedom { glasses: false, aspheric_surfaces: 0, pupil: false };
+        let start = achromats(&asked).swap_remove(0).draft;
+        for sign in [-1.0, 1.0] {
+            let (mut before, mut found) = (80.0, None);
+            for i in 0..400 {
+                let mut draft = start.clone();
+                for row in &mut draft.lens.surfaces {
+                    row.curvature /= 1.0 + sign * 1e-4 * f64::from(i);
+                }
+                let mut merit = DraftMerit::new(&draft, &asked, &plan, freedom).unwrap();
+                let values = merit.start();
+                let focal = merit.focal_length().0;
+                let sum = merit.sum(&values).unwrap();
+                let broken = sum.broken.iter().find(|broken| broken.0 == "focal_length");
+                found = broken.map(|broken| broken.2);
+                if let Some(violation) = found {
+                    // The first that is out of range is out by less than the last change.
+                    let change: f64 = focal - before;
+                    assert!(violation * sign > 0.0, "{focal}: {violation}");
+                    assert!(
+                        violation.abs() <= 1.01 * change.abs(),
+                        "{focal}: {violation} {change}"
+                    );
+                    break;
+                }
+                before = focal;
+            }
+            assert!(found.is_some());
         }
     }
 }

@@ -125,3 +125,42 @@ fn take_trials(merit: &mut DraftMerit<'_>, trials: usize) -> Option<(Vec<f64>, f
     }
     Some((values, point.value, used))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::search::design::LensSpecification;
+    use crate::search::design::starts::achromats;
+
+    #[test]
+    fn a_descent_improves_a_draft_with_the_trials_that_it_has() {
+        let spec: LensSpecification = serde_json::from_str(
+            r#"{"focal_length_mm": 60.0, "f_number": 5.0, "half_field_deg": 3.0, "max_elements": 2}"#,
+        )
+        .unwrap();
+        let asked = LensRequirements::complete(&spec).unwrap().0;
+        let mut draft = achromats(&asked).swap_remove(0).draft;
+        draft.lens.surfaces[1].curvature *= 0.9;
+        let plan = BeamPlan::full(1.0);
+        let freedom = Freedom { glasses: true, aspheric_surfaces: 0, pupil: true };
+        let mut merit = DraftMerit::new(&draft, &asked, &plan, freedom).unwrap();
+        let start = merit.start();
+        let before = merit.evaluate(&start).unwrap().value;
+        let descent = |trials| descend(&draft, &asked, &plan, freedom, trials).unwrap();
+        let (few, many) = (descent(6), descent(40));
+        assert!(few.value < 0.5 * before && few.gradients <= 8, "{before} {few:?}");
+        assert!(many.value < few.value && many.gradients > 20, "{} {}", many.value, few.value);
+    }
+
+    #[test]
+    fn the_entrance_pupil_may_be_anywhere_in_the_lens() {
+        let spec: LensSpecification = serde_json::from_str(
+            r#"{"focal_length_mm": 60.0, "f_number": 5.0, "half_field_deg": 3.0}"#,
+        )
+        .unwrap();
+        let asked = LensRequirements::complete(&spec).unwrap().0;
+        let draft = achromats(&asked).swap_remove(0).draft;
+        let [low, high] = DraftParameter::Pupil.range(&draft, &asked);
+        assert!(low <= -0.5 * asked.track && high >= asked.track, "{low} {high}");
+    }
+}

@@ -311,9 +311,10 @@ fn draw_reference(scene: &mut Scene, design: &Analyses, palette: &Palette) {
 }
 
 /// The lowest and the highest place of the image plane that rays reach, with some room.
-fn image_extent(layout: &RayLayout) -> Option<(f64, f64)> {
+fn image_extent(section: &SectionDrawing<'_>, layout: &RayLayout) -> Option<(f64, f64)> {
     let arrived = layout.rays.iter().filter(|ray| ray.path.fate.is_imaged());
-    let ends = arrived.filter_map(|ray| Some(DVec2::splat(ray.path.points.last()?.y)));
+    let height = |point: &Vec3<f64>| DVec2::splat(section.image_height(*point));
+    let ends = arrived.filter_map(|ray| ray.path.points.last().map(height));
     let BoundingBox { min, max } = BoundingBox::around(ends)?;
     let margin = 0.06 * (max.y - min.y);
     Some((min.y - margin, max.y + margin))
@@ -325,18 +326,17 @@ fn draw_image(
     layout: &RayLayout,
     palette: &Palette,
 ) {
-    let z = section.image_position();
-    let (low, high) = image_extent(layout).unwrap_or_default();
+    let (low, high) = image_extent(section, layout).unwrap_or_default();
     let reach = low.abs().max(high.abs()).max(section.max_height());
     let (low, high) = (low.min(-0.4 * reach), high.max(0.4 * reach));
-    scene.line(DVec2::new(z, low), DVec2::new(z, high), 1.5, palette.strong);
+    scene.line(section.image_point(low), section.image_point(high), 1.5, palette.strong);
 }
 
 /// The extent that *Fit* shows: the lens, the image and the starts of the rays.
 fn full_view(section: &SectionDrawing<'_>, layout: &RayLayout) -> Option<BoundingBox> {
     let lens = section.bounds()?;
-    let z = section.image_position();
-    let ends = image_extent(layout).map(|(low, high)| [DVec2::new(z, low), DVec2::new(z, high)]);
+    let ends = image_extent(section, layout);
+    let ends = ends.map(|(low, high)| [section.image_point(low), section.image_point(high)]);
     let high = 1.4 * section.max_height();
     let starts = layout.rays.iter().filter_map(|ray| ray.path.points.first());
     let starts = starts.map(|start| DVec2::new(start.z, start.y.clamp(-high, high)));

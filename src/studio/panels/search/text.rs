@@ -160,7 +160,7 @@ pub(super) fn outcome_text<P>(node: &LineageNode<P>) -> String {
     );
     let end = match node.end {
         None => "not finished",
-        Some(DescentEnd::Regeneration) => "ended by its clock",
+        Some(DescentEnd::Regeneration) => "ended at random (restart)",
         Some(DescentEnd::MaxMoves) => "ended at the maximum length",
         Some(DescentEnd::InfiniteLoss) => "ended without light",
         Some(DescentEnd::Mutation) => "ended by an accepted mutation",
