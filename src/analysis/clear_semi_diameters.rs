@@ -1,8 +1,10 @@
 //! Clear semi-diameters: how far from the axis the light of all fields, wavelengths and zoom
 //! positions meets each surface. They are the size of a surface whose semi-diameter nobody fixed.
 
+use crate::lens::FieldPoint;
 use crate::pupil::{Launch, RayModel};
-use crate::trace::RayPolyline;
+use crate::trace::Ray;
+use rayon::prelude::*;
 use std::f64::consts::PI;
 
 /// The azimuths at which the edge of a pupil is traced, over half of it.
@@ -14,19 +16,26 @@ const HALVINGS: usize = 12;
 /// in mm. `models` are those of all zoom positions. Rays that some fixed semi-diameter clips do not
 /// count. The edge of the light is found to 1e-9 of its radius.
 pub fn clear_semi_diameters<'a>(models: impl IntoIterator<Item = &'a RayModel>) -> Vec<f64> {
-    let mut heights = Vec::new();
-    for model in models {
-        let surfaces = model.channels[model.primary].tracer.surfaces();
-        heights.resize(surfaces.max(heights.len()), 0.0);
-        for field in &model.fields {
-            for wavelength in 0..model.channels.len() {
-                if let Ok(launch) = model.launch(*field, wavelength) {
-                    raise_to_edge(&mut heights, &launch);
-                }
-            }
+    let beams = models.into_iter().flat_map(|model| {
+        let fields = model.fields.iter();
+        fields.flat_map(move |field| (0..model.channels.len()).map(move |w| (model, *field, w)))
+    });
+    let beams: Vec<(&RayModel, FieldPoint, usize)> = beams.collect();
+    let of_beam = |(model, field, wavelength): &(&RayModel, FieldPoint, usize)| {
+        let mut heights = vec![0.0; model.channels[model.primary].tracer.surfaces()];
+        if let Ok(launch) = model.launch(*field, *wavelength) {
+            raise_to_edge(&mut heights, &launch);
         }
-    }
-    heights
+        heights
+    };
+    beams.par_iter().map(of_beam).reduce(Vec::new, higher)
+}
+
+/// The larger of the heights at each surface.
+fn higher(mut a: Vec<f64>, b: Vec<f64>) -> Vec<f64> {
+    a.resize(a.len().max(b.len()), 0.0);
+    a.iter_mut().zip(b).for_each(|(height, own)| *height = height.max(own));
+    a
 }
 
 /// Raises heights to those of the edge of a pupil.
@@ -37,22 +46,22 @@ fn raise_to_edge(heights: &mut [f64], launch: &Launch<'_>) {
             let angle = PI * (f64::from(i) / f64::from(AZIMUTHS) - 0.5);
             let outward = [side * angle.cos(), angle.sin()];
             let Some(edge) = outermost(launch, outward) else { continue };
-            for (height, own) in heights.iter_mut().zip(&edge.heights) {
-                *height = height.max(*own);
-            }
+            launch.channel().tracer.visit(edge, |surface, p| {
+                heights[surface] = heights[surface].max(p.x.hypot(p.y));
+            });
         }
     }
 }
 
 /// The outermost ray in a direction of the pupil that reaches the image; `None` if not even the ray
 /// through the centre of the pupil does.
-fn outermost(launch: &Launch<'_>, outward: [f64; 2]) -> Option<RayPolyline> {
+fn outermost(launch: &Launch<'_>, outward: [f64; 2]) -> Option<Ray<f64>> {
     let at = |share: f64| {
         let ray = launch.ray_through_stop(outward.map(|c| share * c))?;
-        Some(launch.channel().tracer.polyline(ray)).filter(|path| path.fate.is_imaged())
+        launch.channel().tracer.trace(ray).fate.is_imaged().then_some(ray)
     };
-    if let Some(path) = at(1.0) {
-        return Some(path);
+    if let Some(ray) = at(1.0) {
+        return Some(ray);
     }
     let (mut inside, mut outside) = (0.0, 1.0);
     let mut found = at(inside);
@@ -61,7 +70,7 @@ fn outermost(launch: &Launch<'_>, outward: [f64; 2]) -> Option<RayPolyline> {
         let middle = 0.5 * (inside + outside);
         match at(middle) {
             None => outside = middle,
-            path => (inside, found) = (middle, path),
+            ray => (inside, found) = (middle, ray),
         }
     }
     found
@@ -70,7 +79,7 @@ fn outermost(launch: &Launch<'_>, outward: [f64; 2]) -> Option<RayPolyline> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lens::{Aperture, FieldPoint, Lens, blank};
+    use crate::lens::{Aperture, Lens, blank};
 
     /// Rays at the rim are launched by 1e-9 of its radius inside it, so that rounding does not decide
     /// whether they pass.

@@ -5,6 +5,7 @@
 
 use crate::pupil::{Launch, PupilPattern, RayModel, pattern_points};
 use crate::trace::{Fates, ImagePoints, Rays, TraceSink};
+use rayon::prelude::*;
 
 /// The image points of one field at one wavelength.
 #[derive(Debug, Clone, Default)]
@@ -25,15 +26,15 @@ const RINGS: usize = 6;
 /// The image points of every field and wavelength; a field without light has none.
 pub fn spot_points(model: &RayModel) -> Vec<SpotPoints> {
     let points = pattern_points(PupilPattern::Hexapolar(RINGS));
-    let mut all = Vec::new();
-    for (field, point) in model.fields.iter().enumerate() {
-        for wavelength in 0..model.channels.len() {
-            let dots =
-                model.launch(*point, wavelength).ok().map(|launch| points_of(&launch, &points));
-            all.push(SpotPoints { field, wavelength, ..dots.unwrap_or_default() });
-        }
-    }
-    all
+    let beams: Vec<(usize, usize)> = (0..model.fields.len())
+        .flat_map(|field| (0..model.channels.len()).map(move |wavelength| (field, wavelength)))
+        .collect();
+    let of_beam = |(field, wavelength): (usize, usize)| {
+        let launch = model.launch(model.fields[field], wavelength).ok();
+        let dots = launch.map(|launch| points_of(&launch, &points));
+        SpotPoints { field, wavelength, ..dots.unwrap_or_default() }
+    };
+    beams.into_par_iter().map(of_beam).collect()
 }
 
 fn points_of(launch: &Launch<'_>, points: &[[f64; 2]]) -> SpotPoints {

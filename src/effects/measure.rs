@@ -10,7 +10,7 @@ use crate::lens::{FieldPoint, Lens, Object, Shape, System};
 use crate::math::Vec3;
 use crate::paraxial::Beam;
 use crate::pupil::{Aiming, Launch, PupilPattern, RayModel, RayModelError, pattern_points};
-use crate::trace::{Fate, Fates, GrinStepPlan, Ray, Tracer};
+use crate::trace::{Fate, Fates, GrinStepPlan, ImagePoints, Ray, Rays, TraceSink as _, Tracer};
 use rayon::prelude::*;
 use std::f64::consts::TAU;
 
@@ -368,12 +368,11 @@ fn raise_heights(
     points: &[[f64; 2]],
     tracer: &Tracer<f64>,
 ) {
-    for ray in points.iter().filter_map(|p| launch.ray(*p)) {
-        let mut heights = vec![0.0; reached.len()];
-        let landing = tracer.visit(ray, |i, p| heights[i] = p.x.hypot(p.y));
-        if landing.fate.is_imaged() {
-            reached.iter_mut().zip(heights).for_each(|(r, h)| *r = h.max(*r));
-        }
+    let rays: Rays<f64> = points.iter().filter_map(|p| launch.ray(*p)).collect();
+    let mut landed = ImagePoints::default();
+    tracer.trace_batch(&rays, &mut landed);
+    for i in (0..rays.len()).filter(|i| landed.fate(*i).is_imaged()) {
+        tracer.visit(rays.get(i), |i, p| reached[i] = reached[i].max(p.x.hypot(p.y)));
     }
 }
 

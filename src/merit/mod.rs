@@ -41,6 +41,7 @@ use crate::pupil::{LaunchError, QuadraticIntegrand, RayModel, RayModelError, Tra
 use crate::trace::{Fate, SystemGradient};
 use binding::Configuration;
 use nalgebra::DVector;
+use rayon::prelude::*;
 use sampling::{RaySampling, SampledPupil, SamplingDemand, TRANSFER_SCALE};
 use serde::Serialize;
 pub use sum::{DerivativeLevel, SumOfSquares};
@@ -482,31 +483,32 @@ impl EvaluationContext<'_> {
     /// The derivatives by the variables that the motion of the pupils' edges contributes to
     /// integrals with these integrands, one for each pupil; zeros if pupils are frozen.
     fn edge_motion(&self, costs: impl Iterator<Item = QuadraticIntegrand>) -> DVector<f64> {
-        let mut total = DVector::zeros(self.values.len());
-        for ((traced, pupil), cost) in
-            self.traced_pupils.iter().zip(&self.sampling.pupils).zip(costs)
-        {
-            let asked = cost.square != 0.0 || cost.constant != 0.0;
-            if asked {
-                let by_number = traced.robust_edge_motion(&cost);
-                total += self.zoom.by_variables(self.systems, pupil.wavelength, &by_number);
-            }
-        }
-        total
+        let costs: Vec<QuadraticIntegrand> = costs.collect();
+        let pupils = self.traced_pupils.par_iter().zip(&self.sampling.pupils).zip(&costs);
+        let asked = pupils.filter(|(_, cost)| cost.square != 0.0 || cost.constant != 0.0);
+        let motions: Vec<DVector<f64>> = asked
+            .map(|((traced, pupil), cost)| {
+                let by_number = traced.robust_edge_motion(cost);
+                self.zoom.by_variables(self.systems, pupil.wavelength, &by_number)
+            })
+            .collect();
+        motions.into_iter().fold(DVector::zeros(self.values.len()), |total, motion| total + motion)
     }
 
     /// The sum of the derivatives by the variables that `of` gives for traced pupils; zeros if pupils
     /// are frozen.
     fn sum_over_pupils(
         &self,
-        of: impl Fn(&SampledPupil, &TracedPupil<'_>) -> Result<Option<SystemGradient<f64>>, MeritError>,
+        of: impl Fn(&SampledPupil, &TracedPupil<'_>) -> Result<Option<SystemGradient<f64>>, MeritError>
+        + Sync,
     ) -> Result<DVector<f64>, MeritError> {
-        let mut total = DVector::zeros(self.values.len());
-        for (traced, pupil) in self.traced_pupils.iter().zip(&self.sampling.pupils) {
-            if let Some(by_number) = of(pupil, traced)? {
-                total += self.zoom.by_variables(self.systems, pupil.wavelength, &by_number);
-            }
-        }
-        Ok(total)
+        let pupils = self.traced_pupils.par_iter().zip(&self.sampling.pupils);
+        let motions = pupils.map(|(traced, pupil)| {
+            let by_number = of(pupil, traced)?;
+            Ok(by_number.map(|by| self.zoom.by_variables(self.systems, pupil.wavelength, &by)))
+        });
+        let motions: Result<Vec<_>, MeritError> = motions.collect();
+        let zero = DVector::zeros(self.values.len());
+        Ok(motions?.into_iter().flatten().fold(zero, |total, motion| total + motion))
     }
 }

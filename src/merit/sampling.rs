@@ -8,6 +8,7 @@ use crate::pupil::{
     TracedPupil, converge_list,
 };
 use crate::trace::{Ray, Rays};
+use rayon::prelude::*;
 use serde::Serialize;
 use std::f64::consts::PI;
 
@@ -322,7 +323,7 @@ impl RaySampling {
                 region.trace_whole_pupil(pupil.order)
             }
         };
-        self.pupils.iter().map(traced).collect()
+        self.pupils.par_iter().map(traced).collect()
     }
 
     /// Returns an error if a pupil has gone dark since it was found: its spot would be empty, and

@@ -9,6 +9,7 @@ use crate::math::{SimdWidth, Vec3, dot, run_vectorized};
 use crate::pupil::{PupilMoments, QuadraticIntegrand};
 use crate::trace::{AdjointSeed, Fate, ImagePoints, TraceSink, Tracer};
 use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
 use std::ops::Range;
 
 /// The traced rays of one wavelength.
@@ -178,7 +179,7 @@ fn add_gradient(
     centroids: &[Centroid],
     sum: &mut SumOfSquares,
 ) {
-    for (wavelength, traced) in traced.iter().enumerate() {
+    let of_wavelength = |(wavelength, traced): (usize, &SpotRays)| {
         let channel = &context.sampling.channels[wavelength];
         let mut seeds = vec![Vec3::default(); channel.rays.len()];
         for (field, centroid) in centroids.iter().enumerate() {
@@ -190,8 +191,10 @@ fn add_gradient(
         }
         let seed = |i: usize| AdjointSeed { point: seeds[i], ..AdjointSeed::default() };
         let by_number = traced.tracer.gradient(&channel.rays, seed);
-        sum.gradient += context.zoom.by_variables(context.systems, wavelength, &by_number);
-    }
+        context.zoom.by_variables(context.systems, wavelength, &by_number)
+    };
+    let gradients: Vec<DVector<f64>> = traced.par_iter().enumerate().map(of_wavelength).collect();
+    gradients.into_iter().for_each(|gradient| sum.gradient += gradient);
 }
 
 /// Adds the gradient and the Gauss-Newton matrix: `Σ w (∂x − ∂x̄)(∂x − ∂x̄)ᵀ = Σ w ∂x ∂xᵀ − W ∂x̄
@@ -205,12 +208,18 @@ fn add_normal_matrix(
     let count = sum.gradient.len();
     // The mean slopes of x and y of every field.
     let mut means = vec![[DVector::zeros(count), DVector::zeros(count)]; centroids.len()];
-    for (wavelength, traced) in traced.iter().enumerate() {
-        let channel = &context.sampling.channels[wavelength];
+    let of_wavelength = |(wavelength, traced): (usize, &SpotRays)| {
         let moving = context.zoom.moving_parameters(wavelength);
         let by_variable = context.zoom.parameter_slopes(context.systems, wavelength, &moving);
-        let rows = traced.tracer.landing_slopes(&channel.rays, &moving);
+        let rays = &context.sampling.channels[wavelength].rays;
+        let rows = traced.tracer.landing_slopes(rays, &moving);
         let slopes = WeightedSlopes::new(&rows, moving.len(), &traced.weights);
+        let normal = slopes.normal_matrix() * &by_variable;
+        (slopes, by_variable, normal)
+    };
+    let parts: Vec<_> = traced.par_iter().enumerate().map(of_wavelength).collect();
+    let channels = context.sampling.channels.iter().zip(traced);
+    for ((channel, traced), (slopes, by_variable, normal)) in channels.zip(parts) {
         let offsets = centroids.iter().enumerate().flat_map(|(field, centroid)| {
             channel.range(field).map(|i| centroid.offset(traced.points[i]))
         });
@@ -224,7 +233,6 @@ fn add_normal_matrix(
                 }
             }
         }
-        let normal = slopes.normal_matrix() * &by_variable;
         sum.normal.gemm(1.0, &by_variable.transpose(), &normal, 1.0);
     }
     for (mean, centroid) in means.iter().zip(centroids).filter(|(_, c)| c.share > 0.0) {

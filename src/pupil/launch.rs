@@ -6,7 +6,7 @@
 //! telecentric beam `q` is the slope. A [`PupilMap`] leads from pupil coordinates to that plane.
 
 use super::field_source::{FieldSource, GRAZING, PupilMap, field_source, paraxial_map};
-use super::ray_aiming::{AimedRay, aim_at};
+use super::ray_aiming::{AimedRay, aim_at, aim_from_chief_ray};
 use super::ray_model::{Aiming, Channel, Dual2, PupilMeasure, RayModel};
 use crate::lens::{FieldKind, FieldPoint};
 use crate::math::Real;
@@ -181,8 +181,8 @@ impl<'a> Launch<'a> {
         if self.aiming == Aiming::Chief && !self.model.ends_at_disc() {
             // Rounding must not decide whether a ray at the rim passes.
             let inside = p.map(|v| v * (1.0 - INSIDE_RIM));
-            if let Some(found) = self.aim(inside) {
-                return Some(self.source.ray(found.q));
+            if let Some(q) = self.aim_coordinates(inside) {
+                return Some(self.source.ray(q));
             }
         }
         self.ray(p)
@@ -302,8 +302,14 @@ impl<'a> Launch<'a> {
     fn ray_coordinates(&self, p: [f64; 2]) -> Option<[f64; 2]> {
         match self.aiming {
             Aiming::Paraxial | Aiming::Chief => Some(self.map.map(p)),
-            Aiming::Stop => self.aim(p).map(|found| found.q),
+            Aiming::Stop => self.aim_coordinates(p),
         }
+    }
+
+    /// The ray coordinates of the ray through a point of the stop, in stop radii.
+    fn aim_coordinates(&self, p: [f64; 2]) -> Option<[f64; 2]> {
+        aim_from_chief_ray(self.model, self.wavelength, &self.source, &self.map, p)
+            .or_else(|| Some(self.aim(p)?.q))
     }
 
     fn aim(&self, p: [f64; 2]) -> Option<AimedRay> {

@@ -1,5 +1,7 @@
-//! Ray aiming: the ray of a field that crosses the stop, or another surface, at a given point, by
-//! Newton's method on the two ray coordinates with derivatives from dual numbers.
+//! Ray aiming: the ray of a field that crosses the stop, or another surface, at a given point.
+//!
+//! Newton's method on the two ray coordinates with derivatives from dual numbers, or, where the
+//! derivatives at the chief ray are known, Broyden's method from these, which traces plain numbers.
 
 use super::field_source::{FieldSource, PupilMap, solve_2x2};
 use super::ray_model::{Dual2, RayModel};
@@ -34,6 +36,60 @@ const HALVINGS: usize = 12;
 const ROUNDING: f64 = 1e-10;
 /// The rounding error of a point on a ray, relative to the distance of the object point.
 const PATH_ROUNDING: f64 = 16.0 * f64::EPSILON;
+
+/// The largest number of secant steps.
+const SECANT_STEPS: usize = 10;
+/// An offset that is smaller than this part of the stop is rounding for certain.
+const EXACT: f64 = 4.0 * f64::EPSILON;
+
+/// The ray coordinates of a source whose ray crosses the stop at `target`, in stop radii, by Broyden's
+/// method from the affine map at the chief ray (Broyden, Mathematics of Computation 19, 1965); `None`
+/// if that does not converge.
+pub(super) fn aim_from_chief_ray(
+    model: &RayModel,
+    wavelength: usize,
+    source: &FieldSource,
+    map: &PupilMap,
+    target: [f64; 2],
+) -> Option<[f64; 2]> {
+    let radius = model.stop_radius();
+    let [[a, b], [c, d]] = map.columns.map(|column| column.map(|v| v / radius));
+    let (surface, goal) = (model.stop(), target.map(|v| v * radius));
+    let search = AimSolver { model, wavelength, source, surface, target: goal };
+    let (mut q, mut slopes) = (map.map(target), [[a, c], [b, d]]);
+    let mut offset = search.offset(q)?;
+    for _ in 0..SECANT_STEPS {
+        let step = [0, 1].map(|i| -dot2(slopes[i], offset));
+        let next = [q[0] + step[0], q[1] + step[1]];
+        let there = search.offset(next)?;
+        let (before, size) = (offset[0].hypot(offset[1]), there[0].hypot(there[1]));
+        if size <= EXACT * search.scale() || (size >= 0.5 * before && size <= search.tolerance()) {
+            return Some(next);
+        }
+        if size >= before {
+            return None;
+        }
+        update_inverse(&mut slopes, step, [there[0] - offset[0], there[1] - offset[1]])?;
+        (q, offset) = (next, there);
+    }
+    None
+}
+
+/// Broyden's update of the inverse of a matrix of derivatives after a step that has changed the values
+/// by `change`; `None` if it has none.
+fn update_inverse(inverse: &mut [[f64; 2]; 2], step: [f64; 2], change: [f64; 2]) -> Option<()> {
+    let predicted = inverse.map(|row| dot2(row, change));
+    let along = [0, 1].map(|j| step[0] * inverse[0][j] + step[1] * inverse[1][j]);
+    let scale = dot2(step, predicted);
+    for (row, (step, predicted)) in inverse.iter_mut().zip(step.into_iter().zip(predicted)) {
+        row.iter_mut().zip(along).for_each(|(v, along)| *v += (step - predicted) * along / scale);
+    }
+    (scale != 0.0 && inverse.iter().flatten().all(|v| v.is_finite())).then_some(())
+}
+
+fn dot2(a: [f64; 2], b: [f64; 2]) -> f64 {
+    a[0] * b[0] + a[1] * b[1]
+}
 
 /// The ray of a source that crosses `surface` at `target`, in mm, searched from the ray coordinates
 /// `guess`.
@@ -94,6 +150,16 @@ impl AimSolver<'_> {
     /// far object point.
     fn tolerance(&self) -> f64 {
         ROUNDING * self.scale() + PATH_ROUNDING * self.source.distance()
+    }
+
+    /// The distance between the intersection of a ray with the surface and the target; `None` for a
+    /// ray that does not get there.
+    fn offset(&self, q: [f64; 2]) -> Option<[f64; 2]> {
+        let channel = &self.model.channels[self.wavelength];
+        let landing = channel.open.trace_to(self.source.ray(q), self.surface);
+        let Vec3 { x, y, .. } = landing.ray.point;
+        let offset = [x - self.target[0], y - self.target[1]];
+        (landing.fate.is_imaged() && offset.iter().all(|v| v.is_finite())).then_some(offset)
     }
 
     fn evaluate(&self, q: [f64; 2]) -> Option<AimOffset> {

@@ -73,6 +73,8 @@ pub struct Channel {
     /// The same without semi-diameters and obstructions, with derivatives by the two pupil
     /// coordinates.
     pub(super) unclipped: Tracer<Dual2>,
+    /// The same in plain numbers.
+    pub(super) open: Tracer<f64>,
 }
 
 /// A lens with its beam at one zoom position, ready for tracing at every wavelength.
@@ -131,8 +133,9 @@ impl RayModel {
             let stop = system.stop.unwrap_or(0);
             rim.into_iter().for_each(|radius| system.surfaces[stop].semi_diameter = radius);
             let tracer = Tracer::new(&system)?;
-            let open = Tracer::new(&system.cast::<Dual2>())?.without_rims();
-            Ok(Channel { um, weight, system, tracer, unclipped: open })
+            let unclipped = Tracer::new(&system.cast::<Dual2>())?.without_rims();
+            let open = tracer.clone().without_rims();
+            Ok(Channel { um, weight, system, tracer, unclipped, open })
         };
         let channels: Result<Vec<_>, SystemError> = systems.into_iter().map(channel).collect();
         Ok(Self {
@@ -170,6 +173,7 @@ impl RayModel {
         }
         let channel = &mut model.channels[wavelength];
         channel.tracer = Tracer::new(&system)?;
+        channel.open = channel.tracer.clone().without_rims();
         channel.unclipped = Tracer::new(&system.cast::<Dual2>())?.without_rims();
         channel.system = system;
         Ok(model)

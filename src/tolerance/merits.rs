@@ -71,8 +71,7 @@ pub(super) fn merits_of<R: Real>(
     beam: &Beam,
     options: MeritOptions,
 ) -> Result<(Merits<R>, ImageRays<R>), ToleranceError> {
-    let tracers: Result<Vec<_>, _> = rear.systems.iter().map(Tracer::new).collect();
-    let tracers = tracers?;
+    let tracers = open_tracers(rear.systems)?;
     let (mut spots, mut wavefronts, mut rays_of_all) = (Vec::new(), Vec::new(), Vec::new());
     for (number, field) in beam.fields.iter().enumerate() {
         let landings = trace_field(&tracers, field, number)?;
@@ -99,6 +98,14 @@ pub(super) fn merits_of<R: Real>(
     let weighted = spots.iter().zip(&beam.fields).map(|(s, field)| s.weighted(field.weight));
     let mean = SpotMoments::sum(weighted);
     Ok((Merits { spots, wavefronts, mean, focus: best_focus(&mean) }, rays_of_all))
+}
+
+/// Tracers of systems whose rims clip nothing: the semi-diameters only tell where the crossing with an
+/// asphere is sought first.
+pub(super) fn open_tracers<R: Real>(
+    systems: &[System<R>],
+) -> Result<Vec<Tracer<R>>, ToleranceError> {
+    systems.iter().map(|system| Ok(Tracer::new(system)?.without_rims())).collect()
 }
 
 /// The landings of the rays of a field, colour by colour.

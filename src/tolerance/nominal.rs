@@ -3,11 +3,12 @@
 //! The pupils are found for the lens as designed, with its rims; their rays are then held. A lens that
 //! is symmetric about its axis is judged on both sides of it: its errors are not symmetric.
 
+use super::merits::open_tracers;
 use super::{Beam, ColourRays, FieldBeam, MeritOptions, NominalLens, ToleranceError};
 use crate::lens::{Lens, System};
 use crate::math::Vec3;
 use crate::pupil::{Accuracy, Launch, Nodes, RayModel, Region, converge};
-use crate::trace::{ImagePoints, Ray, Tracer};
+use crate::trace::{ImagePoints, Ray};
 
 /// A lens as designed, the rays by which it is judged, and their accuracy.
 #[derive(Debug, Clone)]
@@ -155,23 +156,39 @@ impl Sampler<'_> {
     }
 }
 
+/// The radius within which the crossing with a surface is sought, in heights of the outermost ray: an
+/// error of making moves rays by much less.
+const SEARCH_MARGIN: f64 = 1.1;
+
+/// The largest distance in mm from the axis at which a ray of a beam meets each surface, whatever its
+/// rim.
+fn ray_heights(systems: &[System<f64>], beam: &Beam) -> Result<Vec<f64>, ToleranceError> {
+    let mut heights = vec![0.0_f64; systems[0].surfaces.len()];
+    let tracers = open_tracers(systems)?;
+    for colour in beam.fields.iter().flat_map(|field| &field.colours) {
+        for ray in &colour.rays {
+            tracers[colour.wavelength].visit(*ray, |i, p| {
+                heights[i] = heights[i].max(p.x.hypot(p.y));
+            });
+        }
+    }
+    Ok(heights)
+}
+
 impl NominalLens {
     /// A lens at its wavelengths, with the semi-diameters of the prescription or else those that the
     /// rays need.
     fn new(lens: &Lens, model: &RayModel, beam: &Beam) -> Result<Self, ToleranceError> {
         let whole: Vec<System<f64>> = model.channels.iter().map(|c| c.system.clone()).collect();
+        let heights = ray_heights(&whole, beam)?;
         let mut systems = whole.clone();
-        for surface in systems.iter_mut().flat_map(|system| &mut system.surfaces) {
-            surface.remove_apertures();
-        }
-        let mut heights = vec![0.0_f64; systems[0].surfaces.len()];
-        let tracers: Result<Vec<_>, _> = systems.iter().map(Tracer::new).collect();
-        let tracers = tracers?;
-        for colour in beam.fields.iter().flat_map(|field| &field.colours) {
-            for ray in &colour.rays {
-                tracers[colour.wavelength].visit(*ray, |i, p| {
-                    heights[i] = heights[i].max(p.x.hypot(p.y));
-                });
+        for system in &mut systems {
+            let has_grin = system.has_grin();
+            for (surface, height) in system.surfaces.iter_mut().zip(&heights) {
+                surface.remove_apertures();
+                if !has_grin && *height > 0.0 {
+                    surface.semi_diameter = SEARCH_MARGIN * height;
+                }
             }
         }
         let written = lens.surfaces.iter().zip(heights);

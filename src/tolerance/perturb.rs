@@ -10,7 +10,8 @@ use crate::math::Real;
 /// A lens as designed, resolved at its wavelengths.
 #[derive(Debug, Clone)]
 pub struct NominalLens {
-    /// The lens at each wavelength, without anything that clips.
+    /// The lens at each wavelength. Its semi-diameters clip nothing: they tell where the crossing with
+    /// an asphere is sought first.
     pub systems: Vec<System<f64>>,
     /// The wavelengths, in micrometres.
     pub wavelengths: Vec<f64>,

@@ -4,7 +4,7 @@
 //! the first surface that the error changes, over numbers that carry the first and second derivative
 //! by the error. Nothing is differenced.
 
-use super::merits::{Rear, merits, merits_of};
+use super::merits::{Rear, merits, merits_of, open_tracers};
 use super::spot::ImageRay;
 use super::{
     Beam, ColourRays, FieldBeam, MeritOptions, Merits, NominalLens, ToleranceError, perturb,
@@ -121,8 +121,7 @@ impl Stages {
     fn new(lens: &NominalLens, beam: &Beam, options: MeritOptions) -> Result<Self, ToleranceError> {
         // Every ray has to arrive.
         merits(&lens.systems, beam, options)?;
-        let tracers: Result<Vec<_>, _> = lens.systems.iter().map(Tracer::new).collect();
-        let tracers = tracers?;
+        let tracers = open_tracers(&lens.systems)?;
         let mut beams = vec![beam.clone()];
         // The rear of a lens that begins to run backwards would be another lens.
         let system = &lens.systems[lens.primary];

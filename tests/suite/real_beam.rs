@@ -4,6 +4,7 @@ use aplanat::analysis::{Estimate, distortion, field_curvature, spot};
 use aplanat::files;
 use aplanat::lens::{Aperture, Lens};
 use aplanat::pupil::{Accuracy, Aiming, RayModel, Region};
+use aplanat::trace::Tracer;
 use std::f64::consts::PI;
 
 fn library() -> impl Iterator<Item = (&'static str, Lens)> {
@@ -91,6 +92,45 @@ fn chief_rays_stay_where_they_are_when_the_stop_closes() {
             }
         }
     }
+}
+
+/// The last surface of a traced lens that is cut off behind its stop is the stop: a ray that is asked
+/// for by a point of it lands there, whatever lies in front.
+#[test]
+fn rays_cross_the_stop_where_they_are_asked_to() {
+    let mut aimed = 0;
+    for (name, lens) in library() {
+        for zoom in 0..lens.zoom_positions() {
+            let model = RayModel::from_lens(&lens, zoom).unwrap();
+            if model.ends_at_disc() {
+                continue;
+            }
+            let (stop, radius) = (model.stop(), model.stop_radius());
+            for (wavelength, channel) in model.channels.iter().enumerate() {
+                let mut front = channel.system.clone();
+                front.surfaces.truncate(stop + 1);
+                front.surfaces.iter_mut().for_each(|surface| surface.remove_apertures());
+                let tracer = Tracer::new(&front).unwrap();
+                for field in &model.fields {
+                    let launch = model.launch(*field, wavelength).unwrap();
+                    for p in [[0.0, 0.0], [0.0, 0.9], [0.5, -0.8], [-0.7, 0.2]] {
+                        let end = tracer.trace(launch.ray_through_stop(p).unwrap());
+                        // A ray that cannot cross the stop there keeps its coordinates.
+                        if !end.fate.is_imaged() {
+                            continue;
+                        }
+                        let off =
+                            [end.ray.point.x / radius - p[0], end.ray.point.y / radius - p[1]];
+                        let off = off[0].hypot(off[1]);
+                        assert!(off < 2e-9, "{name}, {field:?}, {p:?}: {off:e} of the stop");
+                        aimed += 1;
+                    }
+                }
+            }
+        }
+    }
+    println!("{aimed} rays");
+    assert!(aimed > 500, "{aimed}");
 }
 
 #[test]
