@@ -5,7 +5,7 @@
 //! shows the peaks, and the highest of them are refined.
 
 use super::Estimate;
-use crate::pupil::Region;
+use crate::pupil::{Region, additive_sequence};
 use crate::trace::TraceSink;
 use std::f64::consts::{PI, TAU};
 
@@ -26,6 +26,20 @@ const RISE: f64 = 0.5;
 const REFINED: f64 = 0.25;
 /// The largest number of peaks that are refined.
 const MAX_PEAKS: usize = 8;
+/// The order of the sample of a pupil without a known edge.
+const SAMPLE_ORDER: usize = 2;
+/// Of a sample, the distances of so many farthest rays show how much farther light may reach: the
+/// share of the pupil beyond a distance falls to nothing like a power of what is left, the square at
+/// a corner, and the farthest of n random rays then leaves more than the difference to the 20th in
+/// four of a thousand cases.
+const FARTHEST: usize = 20;
+/// The rays of a sample of the place where the farthest rays start, and the largest number of these.
+const CLOSER_RAYS: usize = 2048;
+/// The size of that place, in the box around those starts.
+const MARGIN: f64 = 1.5;
+/// Another sample follows if the last one reduced what is left to this part.
+const CLOSER: f64 = 0.7;
+const MAX_SAMPLES: usize = 12;
 
 /// The largest distance of a ray of some pupils from a point, to a relative tolerance. The error is
 /// what the distance may rise between the rays traced last.
@@ -38,7 +52,7 @@ pub(super) fn geometric_radius<'a>(
         regions.map(|region| PeakSearch { region, center, rays: 0 }).collect();
     let mut peaks: Vec<(usize, Peak)> = Vec::new();
     for (i, search) in searches.iter_mut().enumerate() {
-        peaks.extend(search.peaks().into_iter().map(|peak| (i, peak)));
+        peaks.extend(search.peaks(REFINED * tolerance).into_iter().map(|peak| (i, peak)));
     }
     peaks.sort_by(|a, b| b.1.bound().total_cmp(&a.1.bound()));
     let (mut radius, mut most) = (0.0f64, 0.0f64);
@@ -72,6 +86,31 @@ impl Peak {
     }
 }
 
+/// The farthest rays of a sample of a pupil.
+struct FarthestRays {
+    /// The farthest one, and by how much others may exceed it.
+    peak: Peak,
+    /// The places where they start.
+    starts: Vec<[f64; 2]>,
+}
+
+impl FarthestRays {
+    /// Points all over a box somewhat larger than that of their starts.
+    fn points_around(&self) -> Vec<[f64; 2]> {
+        let ranges = [0, 1].map(|k| {
+            let along = || self.starts.iter().map(|start| start[k]);
+            let (low, high) =
+                (along().fold(f64::INFINITY, f64::min), along().fold(f64::NEG_INFINITY, f64::max));
+            (0.5 * (low + high), 0.5 * MARGIN * (high - low))
+        });
+        let place = |i| {
+            let u = additive_sequence([0.5; 2], i);
+            [0, 1].map(|k| ranges[k].0 + ranges[k].1 * (2.0 * u[k] - 1.0))
+        };
+        (0..CLOSER_RAYS).map(place).collect()
+    }
+}
+
 /// The search for the peaks of one pupil.
 struct PeakSearch<'a> {
     region: &'a Region<'a>,
@@ -81,7 +120,7 @@ struct PeakSearch<'a> {
 
 impl PeakSearch<'_> {
     /// The peaks of the lattice; of a pupil whose edge is not known, the farthest of many rays.
-    fn peaks(&mut self) -> Vec<Peak> {
+    fn peaks(&mut self, tolerance: f64) -> Vec<Peak> {
         let half = self.region.launch.is_symmetric();
         let azimuths = self.region.azimuths(if half { AZIMUTHS } else { 2 * AZIMUTHS });
         let shares: [f64; SHARES] =
@@ -89,7 +128,7 @@ impl PeakSearch<'_> {
         let mut lattice = Vec::with_capacity(azimuths.len());
         for azimuth in &azimuths {
             let Some(radius) = self.region.pupil_radius(*azimuth) else {
-                return self.farthest_sample().into_iter().collect();
+                return self.farthest_sample(tolerance).into_iter().collect();
             };
             self.rays += radius.rays;
             lattice.push(self.distances(&shares.map(|share| radius.point(share))));
@@ -116,18 +155,40 @@ impl PeakSearch<'_> {
         distances
     }
 
-    /// The farthest ray of a sample of an irregular pupil, and how much farther it is than that of a
-    /// quarter as many rays.
-    fn farthest_sample(&mut self) -> Option<Peak> {
-        let orders = 0..3.min(self.region.orders());
-        let farthest = orders.map(|order| {
-            let points = self.region.nodes(order).points;
-            self.distances(&points).into_iter().fold(0.0, f64::max)
-        });
-        let found: Vec<f64> = farthest.collect();
-        let distance = found.iter().copied().reduce(f64::max)?;
-        let fewer = found.iter().rev().skip(1).copied().fold(0.0, f64::max);
-        Some(Peak { place: [0.0; 2], distance, rise: distance - fewer })
+    /// The farthest ray of a pupil whose edge is not known: of rays all over it, then of rays where the
+    /// farthest of them start, as long as these draw together and differ by more than is allowed.
+    fn farthest_sample(&mut self, tolerance: f64) -> Option<Peak> {
+        let order = SAMPLE_ORDER.min(self.region.orders().checked_sub(1)?);
+        let mut rays = self.farthest_of(self.region.nodes(order).points)?;
+        let mut highest = rays.peak;
+        for _ in 0..MAX_SAMPLES {
+            if rays.peak.rise <= tolerance * highest.distance {
+                break;
+            }
+            let Some(closer) = self.farthest_of(rays.points_around()) else { break };
+            highest = highest.higher(closer.peak);
+            if closer.peak.rise > CLOSER * rays.peak.rise {
+                break;
+            }
+            rays = closer;
+        }
+        Some(Peak { rise: (rays.peak.bound() - highest.distance).max(0.0), ..highest })
+    }
+
+    /// The farthest rays of a sample, and by how much others may exceed them.
+    fn farthest_of(&mut self, points: Vec<[f64; 2]>) -> Option<FarthestRays> {
+        let distances = self.distances(&points);
+        let mut rays: Vec<_> =
+            distances.into_iter().zip(points).filter(|ray| ray.0.is_finite()).collect();
+        rays.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let &(distance, place) = rays.first()?;
+        // Fewer rays say nothing about how far others reach.
+        let rise = rays.get(FARTHEST - 1).map_or(distance, |last| distance - last.0);
+        rays.truncate(FARTHEST);
+        let mirrored = self.region.launch.is_symmetric();
+        let unfolded = |[x, y]: [f64; 2]| if mirrored { [x.abs(), y] } else { [x, y] };
+        let starts = rays.into_iter().map(|ray| unfolded(ray.1)).collect();
+        Some(FarthestRays { peak: Peak { place, distance, rise }, starts })
     }
 
     /// A peak that may rise by no more than a relative tolerance.
@@ -138,6 +199,10 @@ impl PeakSearch<'_> {
                 break;
             }
             let around = self.around(peak.place, step);
+            if around.is_empty() {
+                // The edge of the pupil is not known: what samples left stays.
+                break;
+            }
             let best = around.iter().copied().fold(peak, Peak::higher);
             if best.distance > peak.distance {
                 peak = Peak { rise: peak.rise, ..best };

@@ -32,6 +32,7 @@ pub use gradient::{
     WarpSampling, choose_estimator, differentiate,
 };
 pub use launch::{FixedLaunch, Launch, LaunchError};
+pub(crate) use patterns::additive_sequence;
 pub use patterns::{PupilPattern, pattern_points};
 pub use ray_model::{Aiming, Channel, Dual2, Neglected, PupilMeasure, RayModel, RayModelError};
 pub use real_beam::filled_stop_radius;

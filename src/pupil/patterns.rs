@@ -83,7 +83,7 @@ fn disc_point(u: f64, v: f64) -> [f64; 2] {
 
 /// Point `i` of Roberts's additive sequence over the unit square, begun at `start`: any number of
 /// points fills the square evenly.
-pub(super) fn additive_sequence(start: [f64; 2], i: usize) -> [f64; 2] {
+pub(crate) fn additive_sequence(start: [f64; 2], i: usize) -> [f64; 2] {
     const STEP: [f64; 2] = [0.754_877_666_246_692_7, 0.569_840_290_998_053_2];
     [0, 1].map(|k| (start[k] + STEP[k] * i as f64).fract())
 }

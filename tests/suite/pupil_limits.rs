@@ -106,6 +106,7 @@ fn the_farthest_ray_of_a_clipped_spot_is_at_a_corner_of_its_pupil() {
         let radius = spot(&model, model.fields[0], accuracy).unwrap().radius;
         let exact = (RADIUS * RADIUS - 0.25 * shift * shift).sqrt();
         assert!((radius.value / exact - 1.0).abs() <= allowed, "{radius:?} {exact}");
+        assert!((radius.value - exact).abs() <= radius.error + 1e-9, "{radius:?} {exact}");
         assert!(radius.error <= allowed * exact, "{shift}: {radius:?}");
     }
 }
