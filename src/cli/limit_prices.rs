@@ -53,3 +53,15 @@ fn is_same_quantity(a: &LimitPrice, b: &LimitPrice) -> bool {
 fn is_near(a: f64, b: f64) -> bool {
     (a - b).abs() <= 1e-9 * a.abs().max(b.abs())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_the_same_quantity_up_to_rounding() {
+        assert!(is_near(3.0, 3.0) && is_near(-2.0, -2.0 * (1.0 + 1e-12)));
+        assert!(!is_near(3.0, 3.001) && !is_near(2.0, -2.0) && !is_near(0.0, 1.0));
+        assert!(is_near(0.0, 0.0));
+    }
+}

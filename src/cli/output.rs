@@ -151,4 +151,13 @@ mod tests {
         table.row(["a longer one".into(), "-1".into()]);
         assert_eq!(table.to_string(), "row            x\na longer one  -1\n");
     }
+
+    #[test]
+    fn a_number_below_its_rounding_error_is_0() {
+        assert_eq!(without_rounding(-2e-12, 3e-12), 0.0);
+        assert_eq!(without_rounding(-2e-12, 1e-12), -2e-12);
+        // An error that is more than rounding says nothing about the number.
+        assert_eq!(without_rounding(1e-3, 2e-3), 1e-3);
+        assert_eq!(without_rounding(1.5, 1e-12), 1.5);
+    }
 }

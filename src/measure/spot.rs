@@ -408,4 +408,20 @@ mod tests {
             assert!(error(fixed, 3) > 1e-6, "{fixed:?}");
         }
     }
+
+    #[test]
+    fn the_spot_of_weighted_points_is_their_standard_deviation() {
+        let mut points = ImagePoints::<f64>::default();
+        points.resize(3);
+        points.x.copy_from_slice(&[1.0, 3.0, 3.0]);
+        points.y.copy_from_slice(&[-1.0, 5.0, 5.0]);
+        // Weights 2, 1, 1: half the light at either place, whose distance is the root of 40.
+        let weighted = [(0, 2.0), (1, 1.0), (2, 1.0)];
+        let found = rms(weighted.into_iter(), &points, false).unwrap();
+        assert!((found - 10f64.sqrt()).abs() < 1e-12, "{found}");
+        // Each point and its mirror image at -x: variance of y, and the mean of x² about 0.
+        let found = rms(weighted.into_iter(), &points, true).unwrap();
+        assert!((found - (9.0 + 0.5 * (1.0 + 9.0f64)).sqrt()).abs() < 1e-12, "{found}");
+        assert_eq!(rms(std::iter::empty(), &points, true), None);
+    }
 }

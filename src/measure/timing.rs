@@ -113,3 +113,24 @@ pub(super) fn time_median<T>(
     times.sort_by(f64::total_cmp);
     (result, times[times.len() / 2])
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn work_is_repeated_as_often_as_counts_say() {
+        let repetitions = |counts, ms| {
+            let mut count = 0;
+            time_median(counts, || {
+                count += 1;
+                std::thread::sleep(std::time::Duration::from_millis(ms));
+            });
+            count
+        };
+        // Long work as seldom as allowed, short work as often.
+        assert_eq!(repetitions(1..=9, 6), 1);
+        assert_eq!(repetitions(3..=9, 6), 3);
+        assert!((2..=3).contains(&repetitions(2..=3, 0)));
+    }
+}

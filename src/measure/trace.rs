@@ -255,3 +255,15 @@ fn differentiate_many(tracer: &Tracer<f64>) {
     let rays = bundle(MANY_RAYS);
     black_box(tracer.gradient(&rays, seed));
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn two_surfaces_become_aspheres() {
+        let sphere = Shape::Sphere { curvature: 0.01 };
+        let surfaces = (0..12).map(|i| with_asphere(i, sphere));
+        assert_eq!(surfaces.filter(|shape| matches!(shape, Shape::Asphere { .. })).count(), 2);
+    }
+}

@@ -141,3 +141,31 @@ fn still_life([width, height]: [f64; 2], distance: Option<f64>) -> Result<Scene,
     ];
     Scene::new(layers, [0.0; 3], WHITE)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_fruit_is_lit_by_the_candle_between() {
+        for distance in [None, Some(2000.0)] {
+            let scene = still_life([300.0, 200.0], distance).unwrap();
+            let center_of = |is: fn(&Pattern) -> bool| {
+                scene.layers().iter().filter(move |layer| is(&layer.pattern)).map(|l| l.center)
+            };
+            let candle = center_of(|p| matches!(p, Pattern::Flame(_))).next().unwrap();
+            assert_eq!(candle[0], 0.0);
+            let mut sides = Vec::new();
+            for layer in scene.layers() {
+                if let Pattern::Ball { lit_from: [across, along], .. } = layer.pattern {
+                    let [x, y] = [0, 1].map(|k| candle[k] - layer.center[k]);
+                    assert!(across * x > 0.0 && along * y > 0.0, "{:?}", layer.center);
+                    assert!(x.abs() < 0.5 * 300.0 * 1.5 && x != 0.0, "within the frame");
+                    sides.push(x.signum());
+                }
+            }
+            assert_eq!(sides.iter().sum::<f64>(), 0.0, "one on either side");
+            assert_eq!(sides.len(), 2);
+        }
+    }
+}

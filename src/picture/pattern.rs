@@ -212,4 +212,50 @@ mod tests {
         let row: Vec<f64> = (5..12).map(|i| at(f64::from(i) + 0.5, 2.5)).collect();
         assert_eq!(row, [1.0, 0.0, 1.0, 0.0, 1.0, 0.0, 1.0]);
     }
+
+    #[test]
+    fn a_wall_darkens_by_the_inverse_square_and_the_cosine_and_a_ball_towards_its_side() {
+        let wall = Pattern::LitWall { radiance: [2.0; 3], light: [0.3, -0.2], distance: 0.5 };
+        assert_eq!(level(&wall, [0.3, -0.2]), 2.0);
+        // As far beside the foot as the light is away: half by the square, 1/sqrt 2 by the cosine.
+        assert!((level(&wall, [0.3, 0.3]) - 2.0 * 0.5f64.powf(1.5)).abs() < 1e-15);
+        // A ball is brightest where its surface faces the light, at (lx, ly, 1) over its length.
+        let ball = Pattern::Ball { radiance: [1.0; 3], lit_from: [2.0, -2.0] };
+        let at = |u: f64, v: f64| level(&ball, [1.5 * u, v]);
+        assert!((at(2.0 / 3.0, -2.0 / 3.0) - 1.0).abs() < 1e-12);
+        assert_eq!(at(-0.6, 0.7), 0.0);
+        assert!((at(0.0, 0.0) - 1.0 / 3.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_star_is_white_around_its_circle_and_its_first_sector() {
+        let star = Pattern::Star(4.0);
+        for place in [[1.2, 0.1], [1.2, -0.1], [0.8, -0.8], [-0.8, 0.8]] {
+            assert_eq!(level(&star, place), 1.0, "{place:?}");
+        }
+        // Eight sectors of 45 degrees in turn, the first of them from the right upwards.
+        let around = (0..8).map(|i| (TAU * (f64::from(i) + 0.5) / 8.0).sin_cos());
+        let levels: Vec<f64> =
+            around.map(|(sin, cos)| level(&star, [0.5 * cos, 0.5 * sin])).collect();
+        assert_eq!(levels, [1.0, 0.0, 1.0, 0.0, 1.0, 0.0, 1.0, 0.0]);
+    }
+
+    #[test]
+    fn the_left_end_of_the_rows_crosses_three_bars_of_six_rows_of_three_blocks() {
+        let column = (0..400_000).map(|i| bars([LEFT + 1e-4, 1.0 - 5e-6 * f64::from(i)]));
+        let levels: Vec<f64> = column.collect();
+        let entered = levels.windows(2).filter(|pair| pair[0] > pair[1]).count();
+        assert_eq!(entered, 3 * 6 * 3);
+    }
+
+    #[test]
+    fn a_picture_is_painted_with_its_first_pixel_above_on_the_left() {
+        let light = [0.1, 0.2, 0.3, 0.4].map(|level| [level, level, level, 1.0]).to_vec();
+        let image = crate::files::ColorImage { width: 2, height: 2, light };
+        let raster = Pattern::Raster(Arc::new(Raster::new(image)));
+        let corners = [[-1.4, 0.9], [1.4, 0.9], [-1.4, -0.9], [1.4, -0.9]];
+        for (corner, exact) in corners.into_iter().zip([0.1, 0.2, 0.3, 0.4]) {
+            assert!((level(&raster, corner) - exact).abs() < 1e-7, "{corner:?}");
+        }
+    }
 }

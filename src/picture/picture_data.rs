@@ -49,3 +49,27 @@ impl Picture {
         pixel.iter().sum::<f64>() / 3.0
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_mean_is_over_pixels_and_colours() {
+        let frame = ImageFrame { pixels: [2, 1], pitch: 1e-3, center: [0.0; 2], inverted: true };
+        let picture = Picture {
+            frame,
+            values: vec![[1.0, 2.0, 3.0], [4.0, 5.0, 12.0]],
+            errors: vec![[0.0; 3]; 2],
+            white: 1.0,
+            rays: 0,
+            fates: Fates::default(),
+            reached: true,
+            complete: true,
+            overshoot: 0.0,
+        };
+        assert_eq!(picture.mean(), 27.0 / 6.0);
+        assert_eq!([picture.gray([0, 0]), picture.gray([1, 0])], [2.0, 7.0]);
+        assert_eq!(picture.rms_error(), 0.0);
+    }
+}

@@ -286,4 +286,45 @@ mod tests {
             assert!(chart.contains([x[0], y[0]]) && chart.contains([x[1], y[1]]), "{x:?} {y:?}");
         }
     }
+
+    /// True if a part of an image is not white everywhere.
+    fn is_inked(canvas: &Canvas, [left, right]: [u32; 2], [top, bottom]: [u32; 2]) -> bool {
+        let place = |x: u32, y: u32| 3 * (y * canvas.size()[0] + x) as usize;
+        let colors = (top..bottom).flat_map(|y| (left..right).map(move |x| place(x, y)));
+        colors.into_iter().any(|at| canvas.pixels()[at..at + 3] != [0xff; 3])
+    }
+
+    #[test]
+    fn a_chart_has_a_frame_and_a_label_beside_every_tick() {
+        let (x, y) = (Axis::linear("", [0.0, 1.0]), Axis::linear("", [0.0, 10.0]));
+        let chart = Chart::new([100.0, 80.0], [300.0, 240.0], x, y);
+        let mut canvas = Canvas::new([400, 300]);
+        chart.draw(&mut canvas, "");
+        let black = |x: usize, y: usize| {
+            let at = 3 * (y * 400 + x);
+            canvas.pixels()[at..at + 3] == BLACK
+        };
+        assert!((100..=300).all(|x| black(x, 80) && black(x, 240)));
+        assert!((80..=240).all(|y| black(100, y) && black(300, y)));
+        // Values from 0 to 10 in steps of 2 over 160 pixels, the labels left of the frame.
+        for tick in 0..=5 {
+            let y = 240 - 32 * tick;
+            assert!(is_inked(&canvas, [40, 100], [y - 8, y + 8]), "{tick}");
+        }
+        assert!(!is_inked(&canvas, [0, 40], [0, 300]));
+        assert_eq!(chart.to_pixels(&[[0.0, 0.0], [1.0, 10.0]]), [[100.0, 240.0], [300.0, 80.0]]);
+    }
+
+    #[test]
+    fn the_name_of_an_entry_stands_behind_its_sample_and_the_next_one_below() {
+        let mut canvas = Canvas::new([200, 100]);
+        let mut legend = Legend::new([20.0, 20.0]);
+        legend.curve(&mut canvas, "H", BLACK, Stroke::Solid);
+        // The sample, a gap, the name.
+        assert!((20..70).all(|x| is_inked(&canvas, [x, x + 1], [20, 40])));
+        assert!(!is_inked(&canvas, [72, 80], [0, 100]) && is_inked(&canvas, [80, 120], [20, 40]));
+        assert!(!is_inked(&canvas, [0, 200], [44, 100]));
+        legend.marker(&mut canvas, "H", BLACK);
+        assert!(is_inked(&canvas, [30, 60], [44, 100]));
+    }
 }

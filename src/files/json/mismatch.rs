@@ -130,4 +130,9 @@ mod tests {
         assert_eq!(one_of(&["a", "b"]), "`a` or `b`");
         assert_eq!(one_of(&["a", "b", "c"]), "one of `a`, `b`, `c`");
     }
+
+    #[test]
+    fn no_accepted_name_is_said_so() {
+        assert_eq!(one_of(&[]), "none");
+    }
 }

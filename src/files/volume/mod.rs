@@ -131,3 +131,28 @@ fn checked_volume(
 fn decode<const N: usize>(bytes: &[u8], number: impl Fn([u8; N]) -> f64) -> Vec<f64> {
     bytes.as_chunks::<N>().0.iter().map(|bytes| number(*bytes)).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_value_that_is_no_number_is_named_by_its_node() {
+        let at = |n: usize| {
+            let mut values = vec![1.5; 24];
+            values[n] = f64::NAN;
+            checked_volume([2, 3, 4], [0.0; 3], [1.0; 3], values, "values").unwrap_err().found
+        };
+        // x runs fastest, z slowest.
+        for (n, node) in [(1, "[1, 0, 0]"), (2, "[0, 1, 0]"), (6, "[0, 0, 1]"), (23, "[1, 2, 3]")] {
+            assert!(at(n).ends_with(node), "{n}: {}", at(n));
+        }
+    }
+
+    #[test]
+    fn a_file_that_is_no_volume_is_described_as_text_or_bytes() {
+        assert_eq!(describe_start(b"hello\n  you"), "the text `hello you`");
+        assert_eq!(describe_start(b"a\x01b"), "the bytes [61, 01, 62]");
+        assert_eq!(describe_start(b""), "an empty file");
+    }
+}

@@ -121,3 +121,17 @@ fn message(panic: &(dyn Any + Send)) -> String {
     let text = text.or_else(|| panic.downcast_ref::<String>().cloned());
     format!("the computation failed: {}", text.unwrap_or_else(|| "unknown reason".to_owned()))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_panic_becomes_a_message_with_its_words() {
+        let refused = catch_panic::<()>(|| panic!("no light at {}", 3)).unwrap_err();
+        assert!(refused.ends_with("no light at 3"), "{refused}");
+        let refused = catch_panic::<()>(|| panic!("dark")).unwrap_err();
+        assert!(refused.ends_with("dark"), "{refused}");
+        assert_eq!(catch_panic(|| Ok(2)), Ok(2));
+    }
+}
