@@ -62,10 +62,11 @@ pub mod optimize;
 // from a specification.
 pub mod search;
 
-// Charts and images as PNG; knows nothing of what it draws.
+// Charts and images as PNG, drawings and documents on paper; knows nothing of what it draws.
 pub mod plot;
 
-// Results as files and drawings: the front of sharpness against light, GRIN fields and images.
+// Results as files and drawings: the front of sharpness against light, GRIN fields and images; the
+// prescription report of a lens, its drawings and its solids.
 pub mod report;
 
 // Pictures through a lens: scenes, pixels by rays backwards, the sensor.

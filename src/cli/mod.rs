@@ -11,6 +11,7 @@
 mod analyze;
 mod convert;
 mod design;
+mod drawing;
 mod effects;
 mod error;
 mod experiment;
@@ -30,6 +31,7 @@ mod output_paths;
 mod pareto;
 mod picture;
 mod progress;
+mod report;
 mod search;
 mod terms;
 #[cfg(test)]
@@ -83,6 +85,8 @@ enum CliCommand {
     Design(design::DesignArgs),
     Grin(grin::GrinArgs),
     Convert(convert::ConvertArgs),
+    Report(report::ReportArgs),
+    Drawing(drawing::DrawingArgs),
     Library(library::LibraryArgs),
     Experiment(experiment::ExperimentArgs),
     Measure(measure::MeasureArgs),
@@ -104,6 +108,8 @@ impl CliCommand {
             Self::Design(design) => design.run(output),
             Self::Grin(grin) => grin.run(output),
             Self::Convert(convert) => convert.run(output),
+            Self::Report(report) => report.run(output),
+            Self::Drawing(drawing) => drawing.run(output),
             Self::Library(library) => library.run(output),
             Self::Experiment(experiment) => experiment.run(output),
             Self::Measure(measure) => measure.run(output),

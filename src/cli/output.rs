@@ -3,6 +3,7 @@
 use super::error::CliError;
 use crate::files::json;
 use crate::lens::Lens;
+pub(super) use crate::math::ShortNumber;
 use serde::Serialize;
 use std::fmt::{self, Display};
 use std::io::{Write as _, stderr, stdout};
@@ -42,31 +43,6 @@ pub(super) fn write_saved(
 pub(super) fn print_note(text: impl Display) {
     // A note that cannot be printed is not a failure.
     drop(writeln!(stderr(), "{text}"));
-}
-
-/// A number with seven significant digits and without trailing zeros.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct ShortNumber(pub(super) f64);
-
-impl Display for ShortNumber {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let value = self.0;
-        let size = value.abs();
-        if size == 0.0 || !value.is_finite() {
-            return f.pad(&value.to_string());
-        }
-        if !(1e-4..1e9).contains(&size) {
-            return f.pad(&format!("{value:.4e}"));
-        }
-        let decimals = (6 - size.log10().floor() as i32).max(0) as usize;
-        let text = format!("{value:.decimals$}");
-        let shorter = if text.contains('.') {
-            text.trim_end_matches('0').trim_end_matches('.')
-        } else {
-            &text
-        };
-        f.pad(shorter)
-    }
 }
 
 /// A number of things, the noun in the singular for one.
@@ -133,17 +109,6 @@ impl Display for TextTable {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn numbers_have_seven_digits_and_no_idle_zeros() {
-        let shown = |value: f64| ShortNumber(value).to_string();
-        assert_eq!(shown(50.0), "50");
-        assert_eq!(shown(-99.499_874_37), "-99.49987");
-        assert_eq!(shown(0.036_437_850_765), "0.03643785");
-        assert_eq!(shown(1e-9), "1.0000e-9");
-        assert_eq!(shown(0.0), "0");
-        assert_eq!(shown(123_456_789.1), "123456789");
-    }
 
     #[test]
     fn columns_line_up() {

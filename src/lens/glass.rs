@@ -50,6 +50,9 @@ pub struct Glass {
     pub coefficients: Vec<f64>,
     /// The shortest and the longest wavelength of the formula, in micrometres.
     pub range_um: [f64; 2],
+    /// The density in g/cm³; `None` if the catalogue does not have it.
+    #[serde(rename = "density_g_cm3", default)]
+    pub density: Option<f64>,
 }
 
 impl Glass {

@@ -43,6 +43,11 @@ impl<'a> LensSection<'a> {
         &self.vertices
     }
 
+    /// The place of a surface in the frame of the first vertex.
+    pub fn place(&self, surface: usize) -> Pose<f64> {
+        self.places[surface]
+    }
+
     /// The height to which every surface extends, in mm.
     pub fn heights(&self) -> &[f64] {
         &self.heights

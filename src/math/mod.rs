@@ -16,7 +16,7 @@ mod vec3;
 
 pub use double::DoubleDouble;
 pub use dual::Dual;
-pub(crate) use format::format_short;
+pub(crate) use format::{ShortNumber, format_short};
 pub use jet::Jet;
 pub use lanes::SimdWidth;
 pub(crate) use lanes::{dot, run_vectorized};

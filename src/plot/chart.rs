@@ -43,14 +43,19 @@ impl Axis {
         Self { name: name.to_owned(), low, high, step: 1.0, logarithmic: true }
     }
 
+    /// The name of the axis.
+    pub(super) fn name(&self) -> &str {
+        &self.name
+    }
+
     /// The position of a value along the axis, 0 at its start and 1 at its end.
-    fn fraction(&self, value: f64) -> f64 {
+    pub(super) fn fraction(&self, value: f64) -> f64 {
         let place = if self.logarithmic { value.log10().max(self.low) } else { value };
         (place - self.low) / (self.high - self.low)
     }
 
     /// The positions of the ticks along the axis, with their labels.
-    fn ticks(&self) -> impl Iterator<Item = (f64, String)> + '_ {
+    pub(super) fn ticks(&self) -> impl Iterator<Item = (f64, String)> + '_ {
         let [first, last] = [
             (self.low / self.step - END_TOLERANCE).ceil(),
             (self.high / self.step + END_TOLERANCE).floor(),

@@ -9,6 +9,7 @@ use crate::merit::Goal;
 use crate::optimize::{DescentMethod, pareto};
 use crate::paraxial::{DragSettings, Handle};
 use crate::picture::BuiltInScene;
+use crate::report::PaperKind;
 use crate::tolerance::ToleranceGrade;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
@@ -79,6 +80,13 @@ pub enum Command {
     Save(Option<PathBuf>),
     /// Writes a copy in the format of the extension.
     Export(PathBuf),
+    /// Writes a report, the layout or the solids of the lens, in the format of the extension.
+    ExportPaper {
+        /// The kind of the file.
+        kind: PaperKind,
+        /// The file.
+        path: PathBuf,
+    },
     /// Starts a local optimization of a copy of the design.
     Optimize {
         /// The descent method.

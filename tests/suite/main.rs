@@ -13,6 +13,7 @@ mod cli_files;
 mod cli_wording;
 mod closed_forms;
 mod color_errors;
+mod deliverables;
 mod design;
 mod diffraction;
 mod drag;

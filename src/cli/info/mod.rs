@@ -10,6 +10,7 @@ use super::output::{Output, ShortNumber, TextTable, or_dash};
 use crate::effects::EffectDecision;
 use crate::lens::{Lens, SurfaceNumber};
 use crate::paraxial::{Beam, FirstOrder, Seidel, SeidelSums, first_order, seidel};
+use crate::report::first_order_numbers;
 use checks::{LensCheck, checks};
 use serde::Serialize;
 use std::fmt::{self, Display};
@@ -172,33 +173,6 @@ fn radii_text(radii: &[Option<f64>], none: &str) -> String {
     radii.iter().map(shown).collect::<Vec<_>>().join("  ")
 }
 
-/// A row of the table of first-order data.
-type FirstOrderRow = (&'static str, fn(&ZoomReport) -> String);
-
-const FIRST_ORDER: [FirstOrderRow; 19] = [
-    ("focal length", |p| or_dash(p.first_order.efl)),
-    ("back focal length, from the last vertex", |p| or_dash(p.first_order.bfl)),
-    ("front focal length, from the first vertex", |p| or_dash(p.first_order.ffl)),
-    ("front principal plane, from the first vertex", |p| {
-        or_dash(p.first_order.front_principal_plane)
-    }),
-    ("rear principal plane, from the last vertex", |p| or_dash(p.first_order.rear_principal_plane)),
-    ("f-number", |p| or_dash(p.first_order.f_number)),
-    ("working f-number", |p| or_dash(p.first_order.working_f_number)),
-    ("entrance pupil, from the first vertex", |p| or_dash(p.first_order.entrance_pupil.position)),
-    ("entrance pupil diameter", |p| or_dash(p.first_order.entrance_pupil.diameter)),
-    ("exit pupil, from the last vertex", |p| or_dash(p.first_order.exit_pupil.position)),
-    ("exit pupil diameter", |p| or_dash(p.first_order.exit_pupil.diameter)),
-    ("stop semi-diameter", |p| ShortNumber(p.first_order.stop_semi_diameter).to_string()),
-    ("first vertex to image plane", |p| ShortNumber(p.total_track).to_string()),
-    ("paraxial image, from the last vertex", |p| or_dash(p.first_order.paraxial_image)),
-    ("defocus: image plane from the paraxial image", |p| or_dash(p.first_order.image_defocus)),
-    ("magnification", |p| or_dash(p.first_order.magnification)),
-    ("Lagrange invariant", |p| or_dash(p.first_order.lagrange)),
-    ("Petzval sum, 1/mm", |p| ShortNumber(p.first_order.petzval_sum).to_string()),
-    ("Petzval radius", |p| or_dash(p.first_order.petzval_radius())),
-];
-
 impl InfoReport {
     fn first_order(&self) -> TextTable {
         let head = |p: &ZoomReport| format!("zoom {} {}", p.zoom, p.zoom_name);
@@ -206,8 +180,12 @@ impl InfoReport {
         if !self.positions.is_empty() {
             table.row(std::iter::once(String::new()).chain(self.positions().map(head)));
         }
-        for (name, value) in FIRST_ORDER {
-            table.row(std::iter::once(name.to_owned()).chain(self.positions().map(value)));
+        let columns: Vec<_> =
+            self.positions().map(|p| first_order_numbers(&p.first_order, p.total_track)).collect();
+        let names = columns.first().into_iter().flatten().map(|(name, _)| *name);
+        for (i, name) in names.enumerate() {
+            let values = columns.iter().map(|column| or_dash(column[i].1));
+            table.row(std::iter::once(name.to_owned()).chain(values));
         }
         table
     }

@@ -6,6 +6,9 @@ use crate::files;
 use crate::lens::{Edit, ElementEdit, Lens, apply_edit};
 use crate::picture::{BitDepth, encode_png};
 use crate::pupil::limited_by_stop;
+use crate::report::{
+    PaperKind, ReportSettings, drawing_bytes, has_extension, report_bytes, solids_file,
+};
 use crate::session::ScenePicture;
 use crate::session::history::{DesignHistory, VersionOrigin};
 use crate::session::journal::JournalEntry;
@@ -177,6 +180,34 @@ impl Session {
             Ok(saved) => self.post_export(path, saved),
             Err(why) => self.post(Severity::Error, why.to_string()),
         }
+    }
+
+    /// Writes a report, the layout or the solids of the lens.
+    pub(super) fn export_paper(&mut self, kind: PaperKind, path: &Path) {
+        match self.write_paper(kind, path) {
+            Ok(()) => self.post(Severity::Note, format!("saved as {}", path.display())),
+            Err(why) => self.post(Severity::Error, format!("{}: {why}", path.display())),
+        }
+    }
+
+    fn write_paper(&self, kind: PaperKind, path: &Path) -> Result<(), String> {
+        let allowed = kind.extensions();
+        if !allowed.iter().any(|extension| has_extension(path, extension)) {
+            return Err(format!("expected a name that ends with .{}", allowed.join(" or .")));
+        }
+        let zoom = self.settings.zoom;
+        let settings = ReportSettings { tolerance: self.settings.tolerance };
+        let bytes = match kind {
+            PaperKind::Report => report_bytes(&self.lens, settings, path).map(|(bytes, _)| bytes),
+            PaperKind::Layout => {
+                drawing_bytes(&self.lens, zoom, None, path).map(|(bytes, _)| bytes)
+            }
+            PaperKind::Solids => {
+                solids_file(&self.lens, zoom, None).map(|file| file.text.into_bytes())
+            }
+        };
+        let bytes = bytes.map_err(|why| why.to_string())?;
+        files::write_atomic(path, &bytes).map_err(|why| why.to_string())
     }
 
     /// Saves the newest picture of the scene.

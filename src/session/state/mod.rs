@@ -208,6 +208,7 @@ impl Session {
             Command::Open(path) => self.open(&path),
             Command::Save(path) => self.save(path),
             Command::Export(path) => self.export(&path),
+            Command::ExportPaper { kind, path } => self.export_paper(kind, &path),
             Command::Optimize { method, goal } => self.optimize(method, goal),
             Command::Pause => self.optimization.pause(),
             Command::Resume => self.optimization.resume(),
