@@ -6,7 +6,7 @@
 //!
 //! Neither truck nor another crate writes what mechanics expect, a named product for every element with
 //! analytic surfaces: their solids have spline surfaces without names. The text of the file, a list of
-//! numbered entities, is written here; a test reads it back with `ruststep`.
+//! numbered entities, is written here.
 
 mod entities;
 mod profile;
