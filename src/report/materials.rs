@@ -71,6 +71,11 @@ fn weight_text(bodies: &[LensBody]) -> String {
         bodies.iter().filter(|body| body.solid().is_ok()).filter_map(LensBody::mass).collect();
     let sum: f64 = known.iter().sum();
     let missing = bodies.len() - known.len();
+    if known.is_empty() {
+        return "The weight is not known: no element has both a density in the glass catalogue and a \
+                volume."
+            .to_owned();
+    }
     let elements = if missing == 1 { "element" } else { "elements" };
     let left_out = if missing == 0 {
         String::new()

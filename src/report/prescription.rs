@@ -55,6 +55,10 @@ pub fn prescription_report(
     positions.iter().for_each(|position| position.add_spots(&mut document));
     positions.iter().for_each(|position| position.add_contrast(&mut document));
     positions.iter().for_each(|position| position.add_effects(&mut document));
+    document.text(
+        "Always off: coatings, polarization, stray light, surface scatter, and changes by temperature \
+         and pressure: indices are those of the glass catalogues at about 20 \u{b0}C in air.",
+    );
     if let Some(first) = positions.first() {
         document.heading("Bill of material");
         let (table, weight) = bill_of_material(&first.scene.bodies());
@@ -242,10 +246,6 @@ impl<'a> ReportPosition<'a> {
             ]);
         }
         document.table(table);
-        document.text(
-            "Always off: coatings, polarization, stray light, surface scatter, and changes by temperature \
-             and pressure: indices are those of the glass catalogues at about 20 \u{b0}C in air.",
-        );
     }
 }
 

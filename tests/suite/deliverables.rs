@@ -492,6 +492,7 @@ fn weights_are_those_of_the_catalogue() {
     done(&["report", lens.path(), "--out", out.path()], "");
     let html = std::fs::read_to_string(&out.0).unwrap();
     assert!(
-        html.contains("<td>unknown</td><td>unknown</td>") && html.contains("without 1 element")
+        html.contains("<td>unknown</td><td>unknown</td>")
+            && html.contains("The weight is not known")
     );
 }

@@ -217,7 +217,7 @@ mod tests {
         let count = |word: &str| all.iter().filter(|(text, _)| *text == word).count();
         assert_eq!(count("surface"), pages.len());
         assert!((0..200).all(|i| count(&format!("{}.5", i * 7)) == 1));
-        let outside = |[x, y]: [f64; 2]| x < LEFT || x > LEFT + WIDTH || y > SHEET[1] - 9.0;
+        let outside = |[x, y]: [f64; 2]| !(LEFT..=LEFT + WIDTH).contains(&x) || y > SHEET[1] - 9.0;
         assert!(!all.iter().any(|(_, at)| outside(*at)));
     }
 

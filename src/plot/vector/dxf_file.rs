@@ -24,7 +24,7 @@ pub enum DxfError {
     Writer(String),
 }
 
-/// What is drawn as a DXF file (AutoCAD 2004, in mm), the sheet left out.
+/// The drawn thing as a DXF file (the version of 2004, in mm), the sheet left out.
 ///
 /// # Errors
 /// A drawing without a scale.
@@ -86,12 +86,12 @@ fn styled(specific: EntityType, pen: &Pen) -> Option<Entity> {
     if pen.color != [0; 3] {
         entity.common.color_24_bit = (r << 16) | (g << 8) | b;
     }
-    entity.common.line_type_name = match pen.pattern {
+    let pattern = match pen.pattern {
         LinePattern::Full => "CONTINUOUS",
         LinePattern::Dashes => "DASHED",
         LinePattern::DashDot => "CENTER",
-    }
-    .to_owned();
+    };
+    pattern.clone_into(&mut entity.common.line_type_name);
     Some(entity)
 }
 

@@ -149,7 +149,7 @@ pub enum Mark {
     },
     /// Part of a circle.
     Arc {
-        /// Where it is.
+        /// Its place.
         arc: SheetArc,
         /// Its pen.
         pen: Pen,

@@ -33,7 +33,7 @@ impl ElementTolerances<'_> {
     pub(super) fn thickness(&self) -> String {
         let kinds = [PerturbationKind::Thickness, PerturbationKind::ThicknessAdjusted];
         let half = kinds.into_iter().filter_map(|kind| self.of(kind, self.gap())).reduce(f64::min);
-        with_tolerance(ShortNumber(self.body.thickness).to_string(), half)
+        with_tolerance(&ShortNumber(self.body.thickness).to_string(), half)
     }
 
     /// Power and irregularity in fringes.
@@ -72,8 +72,8 @@ fn short(value: f64) -> String {
     }
 }
 
-fn with_tolerance(text: String, half: Option<f64>) -> String {
-    half.map_or(text.clone(), |half| format!("{text} \u{b1} {}", short(half)))
+fn with_tolerance(text: &str, half: Option<f64>) -> String {
+    half.map_or_else(|| text.to_owned(), |half| format!("{text} \u{b1} {}", short(half)))
 }
 
 /// The lines of a surface.
@@ -122,10 +122,10 @@ pub(super) fn material_column(of: &ElementTolerances<'_>) -> Vec<String> {
     let mut lines = vec![material_name(medium)];
     if let Some((nd, vd)) = index_and_abbe(medium) {
         let index = of.of(PerturbationKind::Index, gap);
-        lines.push(with_tolerance(format!("nd {nd:.6}"), index));
+        lines.push(with_tolerance(&format!("nd {nd:.6}"), index));
         if let Some(vd) = vd {
             let abbe = of.of(PerturbationKind::Abbe, gap).map(|share| share * vd);
-            lines.push(with_tolerance(format!("vd {vd:.2}"), abbe));
+            lines.push(with_tolerance(&format!("vd {vd:.2}"), abbe));
         }
     }
     if matches!(medium, crate::lens::Medium::Grin(_)) {
