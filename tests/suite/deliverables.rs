@@ -228,7 +228,7 @@ fn an_element_drawing_has_its_radii_signs_material_and_tolerances() {
 /// A parameter of an entity.
 #[derive(Debug, Clone, PartialEq)]
 enum Parameter {
-    List(Vec<Parameter>),
+    List(Vec<Self>),
     Ref(u64),
     Real(f64),
     /// A word between dots, a string or a sign.
