@@ -38,7 +38,11 @@ impl<'a> LayoutScene<'a> {
     /// A lens or an aperture through which no ray can be traced.
     pub fn new(lens: &'a Lens, zoom: usize) -> Result<Self, RayModelError> {
         let model = RayModel::from_lens(lens, zoom)?;
-        let system = model.channels[model.primary].system.clone();
+        let mut system = model.channels[model.primary].system.clone();
+        // The stop of rays is as small as the aperture makes it; the glass around it is not.
+        for (surface, row) in system.surfaces.iter_mut().zip(&lens.surfaces) {
+            surface.semi_diameter = row.semi_diameter.unwrap_or(surface.semi_diameter);
+        }
         Ok(Self { lens, zoom, system, rays: ray_layout(&model, RAYS) })
     }
 
