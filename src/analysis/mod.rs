@@ -6,6 +6,7 @@
 //! A field without light gives an [`AnalysisError`] with the reason, never a NaN.
 
 mod clear_semi_diameters;
+mod coating;
 mod color_error;
 mod diffraction;
 mod distortion;
@@ -13,6 +14,7 @@ mod fan;
 mod fitted_wavefront;
 mod footprint;
 mod geometric_radius;
+mod ghosts;
 mod illumination;
 mod image_quality;
 mod mtf;
@@ -27,6 +29,7 @@ mod wavefront;
 mod zernike;
 
 pub use clear_semi_diameters::clear_semi_diameters;
+pub use coating::{Coating, ThinFilm, film_reflectance};
 pub use color_error::{
     LateralColor, LongitudinalAberration, ZoneFocus, lateral_color, longitudinal_aberration,
 };
@@ -41,6 +44,10 @@ pub use fitted_wavefront::{
     FittedWavefront, ImageRay, WavefrontReference, image_rays, rms_without_tilt,
 };
 pub use footprint::{Footprint, footprint};
+pub use ghosts::{
+    Ghost, GhostError, GhostPatch, GhostPath, GhostRanking, GhostRay, ParaxialGhost, ghosts,
+    rank_ghosts,
+};
 pub use illumination::{Illumination, energy_irradiance, illumination, image_cone, irradiance};
 pub use image_quality::{ImageQuality, field_qualities, field_quality, image_quality};
 pub use mtf::{

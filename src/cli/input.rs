@@ -69,6 +69,11 @@ pub(super) struct LoadedLens {
 }
 
 impl LensFile {
+    /// The lens of a file.
+    pub(super) fn of(path: &Path) -> Self {
+        Self { path: path.to_owned() }
+    }
+
     pub(super) fn path(&self) -> &Path {
         &self.path
     }

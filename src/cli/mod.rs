@@ -9,6 +9,7 @@
 //! `aplanat help`.
 
 mod analyze;
+mod calc;
 mod convert;
 mod design;
 mod drawing;
@@ -77,6 +78,7 @@ enum CliCommand {
     Trace(trace::TraceArgs),
     Analyze(analyze::AnalyzeArgs),
     Picture(picture::PictureArgs),
+    Calc(calc::CalcArgs),
     Gradient(gradient::GradientArgs),
     Optimize(optimize::OptimizeArgs),
     Pareto(pareto::ParetoArgs),
@@ -100,6 +102,7 @@ impl CliCommand {
             Self::Trace(trace) => trace.run(output),
             Self::Analyze(analyze) => analyze.run(output),
             Self::Picture(picture) => picture.run(output),
+            Self::Calc(calc) => calc.run(output),
             Self::Gradient(gradient) => gradient.run(output),
             Self::Optimize(optimize) => optimize.run(output),
             Self::Pareto(pareto) => pareto.run(output),

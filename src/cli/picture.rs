@@ -102,7 +102,7 @@ pub(super) struct PictureArgs {
 }
 
 /// The numbers of columns and rows.
-fn parse_pixels(text: &str) -> Result<[usize; 2], String> {
+pub(super) fn parse_pixels(text: &str) -> Result<[usize; 2], String> {
     let count = |part: &str| part.trim().parse::<usize>().ok().filter(|n| (1..=16_384).contains(n));
     let pair = text.split_once('x').and_then(|(w, h)| Some([count(w)?, count(h)?]));
     pair.ok_or_else(|| "expected columns and rows from 1 to 16384, as in `480x320`".to_owned())

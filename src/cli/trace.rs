@@ -1,14 +1,16 @@
 //! `trace`: rays given as JSON.
 
+use super::analyze::parse_coating;
 use super::effects::{AllowedSetting, EffectArgs, EffectChoices, EffectReport, EffectRule};
 use super::error::CliError;
 use super::input::{self, LensFile, LoadedLens};
 use super::output::{Output, ShortNumber, TextTable};
+use crate::analysis::{Coating, GhostPath, GhostRay};
 use crate::effects::{self, Effect, TracePurpose};
 use crate::files::MAX_DATA_BYTES;
 use crate::lens::{SurfaceNumber, System};
 use crate::math::Vec3;
-use crate::trace::{Fates, Ray, TracedRay, Tracer};
+use crate::trace::{Fate, Fates, Ray, TracedRay, Tracer};
 use serde::{Deserialize, Serialize};
 use std::fmt::{self, Display};
 use std::path::PathBuf;
@@ -24,8 +26,28 @@ pub(super) struct TraceArgs {
     #[arg(long, value_name = "FILE")]
     rays: PathBuf,
 
+    /// Follows the ghost that surface J reflects first and surface I, in front of it, then; counted from 1
+    #[arg(long, value_name = "J,I", value_parser = parse_pair)]
+    ghost: Option<[usize; 2]>,
+
+    /// The coating between air and glass of the surfaces of --ghost: none, single-layer, v, or a share as
+    /// `0.3%`
+    #[arg(long, value_name = "COATING", default_value = "none", value_parser = parse_coating)]
+    coating: Coating,
+
+    /// Rims clip no ray
+    #[arg(long, requires = "ghost")]
+    unclipped: bool,
+
     #[command(flatten)]
     effects: EffectArgs,
+}
+
+/// The two surfaces of a ghost, counted from 1.
+fn parse_pair(text: &str) -> Result<[usize; 2], String> {
+    let number = |part: &str| part.trim().parse::<usize>().ok().filter(|surface| *surface > 0);
+    let pair = text.split_once(',').and_then(|(j, i)| Some([number(j)?, number(i)?]));
+    pair.ok_or_else(|| "expected two surfaces counted from 1, as in `10,2`".to_owned())
 }
 
 /// The rules for given rays, which need not be those of the beam that a plan is measured on.
@@ -77,11 +99,41 @@ impl TraceArgs {
         let rays: Vec<Ray<f64>> = request.rays.into_iter().map(Ray::from).collect();
         rays.iter().enumerate().try_for_each(|(i, ray)| ray.check(i)).map_err(refuse)?;
         let last = tracer.surfaces() - 1;
-        let landings = rays.iter().map(|ray| tracer.trace(*ray));
+        let ghost = self.ghost_path(&system, &opened)?;
+        let follow = |ray: &Ray<f64>| match &ghost {
+            None => TracedRayJson::new(&tracer.trace(*ray), last),
+            Some(path) => self.along_ghost(path, *ray, 1e-3 * wavelength_um),
+        };
         let mut fates = Fates::default();
-        let landings = landings.inspect(|landing| fates.count(landing.fate));
-        let rays = landings.map(|landing| TracedRayJson::new(&landing, last)).collect();
+        let landings = rays.iter().map(follow).inspect(|ray| fates.count(ray.end));
+        let rays = landings.collect();
         output.print(&TraceReport { wavelength_um, zoom, fates, rays, effects })
+    }
+
+    /// The path of the ghost that rays are to follow.
+    fn ghost_path(
+        &self,
+        system: &System<f64>,
+        opened: &LoadedLens,
+    ) -> Result<Option<GhostPath>, CliError> {
+        let Some(pair) = self.ghost else { return Ok(None) };
+        let refuse = |why| CliError::Input(format!("--ghost: {}: {why}", opened.file));
+        let path = GhostPath::new(system, pair.map(|surface| surface - 1)).map_err(refuse)?;
+        Ok(Some(if self.unclipped { path.without_rims() } else { path }))
+    }
+
+    /// The end of a ray along the path of a ghost, with its light.
+    fn along_ghost(&self, path: &GhostPath, ray: Ray<f64>, wavelength: f64) -> TracedRayJson {
+        let GhostRay { traced, intensity } = path.trace(ray, wavelength, self.coating);
+        let last = path.steps.len() - 1;
+        let step = traced.fate.surface().unwrap_or(last);
+        TracedRayJson {
+            surface: path.steps[step],
+            step: Some(step),
+            intensity: traced.fate.is_imaged().then_some(intensity),
+            backwards: None,
+            ..TracedRayJson::new(&traced, last)
+        }
     }
 
     /// Refuses a zoom position of the file of the rays that the lens does not have.
@@ -171,6 +223,14 @@ struct TracedRayJson {
     opl: f64,
     #[serde(skip_serializing_if = "Option::is_none")]
     backwards: Option<usize>,
+    /// The step of the path of a ghost.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    step: Option<usize>,
+    /// The light that arrives along that path, s and p polarised.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    intensity: Option<[f64; 2]>,
+    #[serde(skip)]
+    end: Fate,
 }
 
 impl TracedRayJson {
@@ -187,6 +247,9 @@ impl TracedRayJson {
             n: d.z,
             opl: landing.opl,
             backwards: landing.first_backward_surface,
+            step: None,
+            intensity: None,
+            end: landing.fate,
         }
     }
 }

@@ -13,7 +13,9 @@ mod grin;
 mod grin_starts;
 mod limits;
 mod machine;
+mod mtf;
 mod optimize;
+mod picture;
 mod rounding;
 mod search;
 mod spot;
@@ -34,7 +36,9 @@ pub use grin::{
 pub use grin_starts::GrinStarts;
 pub use limits::{LimitComparison, LimitedDescent, compare_limit_treatments};
 pub use machine::{Machine, MemoryUse, age_ms, peak_megabytes, processor_ms};
+pub use mtf::{TransferCurves, TransferMethod, TransferRow, measure_transfer};
 pub use optimize::{StepCosts, StepRow, measure_step_costs};
+pub use picture::{PictureCurves, PictureRow, PictureWay, measure_picture};
 pub use rounding::{Rounding, measure_rounding};
 pub use search::{MeritQuantiles, SearchBenchmark, SearchBudget, SearchRow, compare_searches};
 pub use spot::{

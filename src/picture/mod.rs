@@ -23,6 +23,7 @@ mod quick;
 mod raster;
 mod scene;
 mod sensor;
+mod sensor_law;
 
 pub use built_in::BuiltInScene;
 pub use color_band::{ColorBand, Coloring, picture_model};
@@ -39,3 +40,4 @@ pub use quick::{QuickRenderer, quick_error};
 pub use raster::Raster;
 pub use scene::{Radiance, Scene, SceneLayer};
 pub use sensor::{Exposure, SensorImage, SensorModel, SensorPreset, photon_count};
+pub use sensor_law::{black_body_photons, photons_of_wavelength};

@@ -1,5 +1,6 @@
 //! Encircled energy: the share of the light within a circle.
 
+use super::pupil_function::PupilFunction;
 use super::pupil_samples::PupilSamples;
 use crate::analysis::reference_sphere::ReferenceSphere;
 use crate::analysis::{AnalysisError, Estimate, lit_region};
@@ -27,6 +28,54 @@ pub fn encircled_energy(
         PupilSamples::converge(&region, &sphere, accuracy, |light| light.encircled(center, radii))?;
     let estimate = |k: usize| Estimate::new(found.values[k], found.errors[k], found.rays);
     Ok((0..radii.len()).map(estimate).collect())
+}
+
+/// The nodes of a smooth part of the contrast, and of a period of the Bessel function.
+const PART_NODES: usize = 40;
+const PERIOD_NODES: f64 = 6.0;
+
+impl PupilFunction {
+    /// The share of the energy within a circle of a radius in mm about the centre, for a round pupil whose
+    /// aberrations are round too: `2π r ∫ OTF(ν) J₁(2π ν r) dν` up to its cutoff in cycles/mm. The
+    /// contrast has corners at `1 − ε`, `1 ± ε` halved and `ε` of it for a round shadow of the share ε.
+    ///
+    /// # Errors
+    /// The pupil is irregular.
+    pub fn round_encircled(
+        &self,
+        radius: f64,
+        cutoff: f64,
+        shadow: f64,
+        fine: bool,
+    ) -> Result<f64, AnalysisError> {
+        let mut ends = [0.0, 0.5 * (1.0 - shadow), shadow, 0.5 * (1.0 + shadow), 1.0];
+        ends.sort_by(f64::total_cmp);
+        let mut sum = 0.0;
+        for pair in ends.windows(2).filter(|pair| pair[1] > pair[0]) {
+            let width = (pair[1] - pair[0]) * cutoff;
+            let count = PART_NODES + (PERIOD_NODES * radius * width) as usize;
+            let count = if fine { count + count / 2 } else { count };
+            for (t, weight) in gauss_legendre(count, 0.0, 1.0) {
+                // Slow at both ends, where the contrast has the power 3/2.
+                let nu = cutoff * pair[0] + width * t * t * t * (10.0 - t * (15.0 - 6.0 * t));
+                let slope = width * 30.0 * t * t * (1.0 - t) * (1.0 - t);
+                let contrast = self.transfer([0.0, nu], 0.0, 1e-12)?.re;
+                sum += weight * slope * contrast * bessel_j1(TAU * nu * radius);
+            }
+        }
+        Ok(TAU * radius * sum)
+    }
+}
+
+/// The Bessel function J₁ by its integral over a period, whose sum converges with more nodes than its
+/// argument.
+fn bessel_j1(x: f64) -> f64 {
+    let count = 40 + (1.2 * x.abs()) as usize;
+    let node = |i: usize| {
+        let sin = (TAU * (i as f64 + 0.5) / count as f64).sin();
+        sin * (x * sin).sin()
+    };
+    (0..count).map(node).sum::<f64>() / count as f64
 }
 
 /// The nodes of a radius and of a turn for each fringe of the pattern that they cross, and at least.

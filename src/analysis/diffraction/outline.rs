@@ -47,6 +47,28 @@ impl PupilCurve {
         Self::from_arcs(&[half(0.0), half(1.0)])
     }
 
+    /// The edge of the common part of two discs, each given by its centre and its radius; `None` if they
+    /// are apart or one contains the other.
+    pub fn common_part_of_discs(discs: [[f64; 3]; 2]) -> Option<Self> {
+        let arc = |own: [f64; 3], other: [f64; 3]| {
+            let [x, y] = [other[0] - own[0], other[1] - own[1]];
+            let distance = x.hypot(y);
+            let half = (distance * distance + own[2] * own[2] - other[2] * other[2])
+                / (2.0 * distance * own[2]);
+            if !(half.abs() < 1.0) {
+                return None;
+            }
+            let (middle, half) = (x.atan2(y), half.acos());
+            let point = |t: f64| {
+                let (sin, cos) = (middle + half * (2.0 * t - 1.0)).sin_cos();
+                [own[0] + own[2] * sin, own[1] + own[2] * cos]
+            };
+            Some((chebyshev_points(40).map(point).collect(), true))
+        };
+        let [a, b] = discs;
+        Some(Self::from_arcs(&[arc(a, b)?, arc(b, a)?]))
+    }
+
     /// A polygon with these corners.
     pub fn polygon(corners: &[[f64; 2]]) -> Self {
         let side = |i: usize| (vec![corners[i], corners[(i + 1) % corners.len()]], true);

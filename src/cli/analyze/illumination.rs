@@ -1,7 +1,8 @@
 //! The illumination of the fields.
 
 use super::{AnalysisRun, AtField, SelectedField, TextLines, estimate_text};
-use crate::analysis::{Estimate, Illumination, energy_irradiance, illumination};
+use crate::analysis::{Estimate, Illumination, energy_irradiance, illumination, irradiance};
+use crate::cli::output::ShortNumber;
 use crate::lens::FieldPoint;
 use crate::measure::time_ms;
 use crate::pupil::RayModel;
@@ -19,6 +20,29 @@ pub(super) struct IlluminationJson {
     relative_cone: Option<Estimate>,
     #[serde(skip_serializing_if = "Option::is_none")]
     dark: Option<String>,
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    points: Vec<PointLight>,
+}
+
+/// The irradiance at a point of the image, in mm; `None` where no light arrives.
+#[derive(Clone, Serialize)]
+struct PointLight {
+    x: f64,
+    y: f64,
+    irradiance: Option<Estimate>,
+}
+
+/// The irradiance at the points that were asked for.
+fn point_lights(run: &AnalysisRun) -> Vec<PointLight> {
+    // The plan of the fields' beams says nothing about rims that other points see.
+    let model = RayModel::from_lens(&run.opened.lens, run.zoom);
+    let model = model.as_ref().unwrap_or(&run.model);
+    let at = |point: &[f64; 2]| {
+        let (found, ms) = time_ms(|| irradiance(model, model.primary, *point, run.accuracy));
+        let timed = |e| Estimate { milliseconds: Some(ms), ..e };
+        PointLight { x: point[0], y: point[1], irradiance: found.ok().map(timed) }
+    };
+    run.points.iter().map(at).collect()
 }
 
 pub(super) fn illuminations(run: &AnalysisRun) -> Vec<AtField<IlluminationJson>> {
@@ -55,6 +79,7 @@ fn keys(
         cone: timed(light.cone, milliseconds),
         relative_cone: light.relative_cone.map(|e| timed(e, milliseconds)),
         dark: light.error.map(|dark| dark.to_string()),
+        points: point_lights(run),
     };
     AtField::new(field, Ok(keys))
 }
@@ -70,6 +95,12 @@ impl TextLines for IlluminationJson {
         lines.extend(self.energy.iter().map(|e| estimate_text("by energy", e)));
         lines.push(estimate_text("cone", &self.cone));
         lines.extend(self.relative_cone.iter().map(|e| estimate_text("relative cone", e)));
+        lines.extend(self.points.iter().map(|PointLight { x, y, irradiance }| {
+            let place = format!("at {}, {} mm", ShortNumber(*x), ShortNumber(*y));
+            irradiance
+                .as_ref()
+                .map_or_else(|| format!("{place}: no light"), |light| estimate_text(&place, light))
+        }));
         lines.extend(self.dark.clone());
         lines
     }

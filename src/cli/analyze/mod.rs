@@ -7,6 +7,7 @@ mod contrast;
 mod csv;
 mod fan;
 mod focus;
+mod ghosts;
 mod illumination;
 mod point_spread;
 mod spot;
@@ -18,7 +19,7 @@ use super::failures::Failures;
 use super::input::{LensFile, LoadedLens, Tolerance};
 use super::output::{Output, ShortNumber, counted, without_rounding};
 use super::output_paths::OutputPaths;
-use crate::analysis::{AnalysisError, Estimate};
+use crate::analysis::{AnalysisError, Coating, Estimate};
 use crate::effects::{self, Effect, EffectPlan, TracePurpose};
 use crate::files;
 use crate::lens::{FieldKind, FieldPoint, SurfaceNumber};
@@ -61,9 +62,18 @@ pub(super) struct AnalyzeArgs {
     #[arg(long, value_name = "N", default_value_t = 1)]
     surface: usize,
 
-    /// A point of `psf`, as `x,y` in mm from the image point of the chief ray; may be repeated
+    /// A point of `psf`, as `x,y` in mm from the image point of the chief ray, or of the image for
+    /// `illumination`, from the axis; may be repeated
     #[arg(long = "at", value_name = "X,Y", value_parser = parse_point, allow_hyphen_values = true)]
     points: Vec<[f64; 2]>,
+
+    /// The coating of `ghosts` between air and glass: none, single-layer, v, or a reflected share as `0.3%`
+    #[arg(long, value_name = "COATING", default_value = "none", value_parser = parse_coating)]
+    coating: Coating,
+
+    /// The number of pairs of `ghosts` that real rays follow, the brightest by first-order optics
+    #[arg(long, value_name = "N", default_value_t = 45)]
+    ghosts: usize,
 
     /// Writes all numbers as CSV into this file too
     #[arg(long, value_name = "FILE")]
@@ -74,10 +84,16 @@ pub(super) struct AnalyzeArgs {
 }
 
 /// The two coordinates of a point.
-fn parse_point(text: &str) -> Result<[f64; 2], String> {
+pub(super) fn parse_point(text: &str) -> Result<[f64; 2], String> {
     let number = |part: &str| part.trim().parse::<f64>().ok().filter(|v| v.is_finite());
     let pair = text.split_once(',').and_then(|(x, y)| Some([number(x)?, number(y)?]));
     pair.ok_or_else(|| "expected two numbers in mm, as in `0.002,-0.001`".to_owned())
+}
+
+/// A coating.
+pub(super) fn parse_coating(text: &str) -> Result<Coating, String> {
+    let expected = "expected none, single-layer, v, or a reflected share as in `0.3%`";
+    Coating::parse(text).ok_or_else(|| expected.to_owned())
 }
 
 /// The analyses.
@@ -116,6 +132,8 @@ enum AnalysisKind {
     Mtf,
     /// Contrast by diffraction at displaced image planes
     ThroughFocusMtf,
+    /// Light that two surfaces reflect: size, irradiance, focus and the surfaces
+    Ghosts,
 }
 
 /// The rule for results at one wavelength.
@@ -130,6 +148,20 @@ const COLORS: EffectRule = EffectRule {
     allowed: AllowedSetting::AlwaysOn,
     reason: "the wavelengths are compared",
 };
+/// The rules for light that leaves the beam, which the plan of a beam says nothing about.
+const GHOST_RULES: [EffectRule; 3] = [
+    ONE_WAVELENGTH,
+    EffectRule {
+        effect: Effect::Clipping,
+        allowed: AllowedSetting::AlwaysOn,
+        reason: "reflected light leaves the beam",
+    },
+    EffectRule {
+        effect: Effect::Asphere,
+        allowed: AllowedSetting::AlwaysOn,
+        reason: "reflected light leaves the beam",
+    },
+];
 /// The rule for image heights compared with ideal ones.
 const OBJECT_IN_PLACE: EffectRule = EffectRule {
     effect: Effect::FiniteObject,
@@ -144,6 +176,7 @@ impl AnalysisKind {
             Self::Spot | Self::Fan | Self::ThroughFocus | Self::Mtf => &[],
             Self::LateralColor | Self::Longitudinal => &[COLORS],
             Self::Distortion => &[ONE_WAVELENGTH, OBJECT_IN_PLACE],
+            Self::Ghosts => &GHOST_RULES,
             _ => &[ONE_WAVELENGTH],
         }
     }
@@ -197,6 +230,10 @@ impl AnalyzeArgs {
             AnalysisKind::Mtf => self.finish(&run, contrast::contrasts(&run), output),
             AnalysisKind::ThroughFocusMtf => {
                 self.finish(&run, contrast::through_focus(&run), output)
+            }
+            AnalysisKind::Ghosts => {
+                let lists = ghosts::ghost_lists(&run, self.coating, self.ghosts)?;
+                self.finish(&run, lists, output)
             }
         }
     }

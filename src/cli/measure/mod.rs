@@ -5,7 +5,9 @@ mod design;
 mod gradient;
 mod grin;
 mod limits;
+mod mtf;
 mod optimize;
+mod picture;
 mod plot;
 mod search;
 mod spot;
@@ -28,7 +30,9 @@ pub(super) struct MeasureArgs {
 enum BenchmarkCommand {
     Trace(trace::MeasureTraceArgs),
     Spot(spot::MeasureSpotArgs),
+    Mtf(mtf::MeasureMtfArgs),
     Gradient(gradient::MeasureGradientArgs),
+    Picture(picture::MeasurePictureArgs),
     Grin(grin::MeasureGrinArgs),
     Optimize(optimize::MeasureOptimizeArgs),
     Limits(limits::MeasureLimitsArgs),
@@ -42,7 +46,9 @@ impl MeasureArgs {
         match &self.what {
             BenchmarkCommand::Trace(trace) => trace.run(output),
             BenchmarkCommand::Spot(spot) => spot.run(output),
+            BenchmarkCommand::Mtf(mtf) => mtf.run(output),
             BenchmarkCommand::Gradient(gradient) => gradient.run(output),
+            BenchmarkCommand::Picture(picture) => picture.run(output),
             BenchmarkCommand::Grin(grin) => grin.run(output),
             BenchmarkCommand::Optimize(optimize) => optimize.run(output),
             BenchmarkCommand::Limits(limits) => limits.run(output),

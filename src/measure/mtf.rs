@@ -1,0 +1,184 @@
+//! Error against time of the modulation transfer function, by rays and by diffraction.
+//!
+//! The work is that of a designer's chart: every field and colour, tangential and sagittal, at all
+//! frequencies, on one thread. The reference is the tightest tolerance; errors are the largest absolute
+//! differences of the complex sums over wavelengths from it.
+
+use super::timing::time_median;
+use crate::analysis::{
+    AnalysisError, MtfCurve, TransferValue, polychromatic_diffraction_mtf,
+    polychromatic_geometric_mtf,
+};
+use crate::lens::FieldPoint;
+use crate::pupil::{Accuracy, RayModel};
+use rayon::ThreadPool;
+use serde::Serialize;
+use std::ops::ControlFlow;
+
+/// The way of computing contrast.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum TransferMethod {
+    /// By rays alone.
+    Geometric,
+    /// By diffraction.
+    Diffraction,
+}
+
+impl TransferMethod {
+    /// Both ways.
+    pub const ALL: [Self; 2] = [Self::Geometric, Self::Diffraction];
+
+    /// The name of the method in tables.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Geometric => "rays",
+            Self::Diffraction => "diffraction",
+        }
+    }
+}
+
+/// A chart of contrast at one tolerance.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct TransferRow {
+    /// The method.
+    pub method: TransferMethod,
+    /// The tolerance asked for.
+    pub tolerance: f64,
+    /// The largest error estimate.
+    pub stated: f64,
+    /// The largest difference from the reference.
+    pub error: f64,
+    /// True if every curve says that it reached the tolerance.
+    pub reached: bool,
+    /// The rays of all curves.
+    pub rays: usize,
+    /// The time of the whole chart on one thread, in milliseconds.
+    pub ms: f64,
+}
+
+/// Error against time of both methods for a lens.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct TransferCurves {
+    /// The fields, in the unit of the lens.
+    pub fields: Vec<f64>,
+    /// The number of wavelengths.
+    pub colors: usize,
+    /// The lowest and the highest frequency, in cycles/mm.
+    pub frequencies: [f64; 2],
+    /// The number of frequencies.
+    pub count: usize,
+    /// The charts.
+    pub rows: Vec<TransferRow>,
+    /// The reason why there are no charts by diffraction.
+    pub refused: Option<String>,
+}
+
+/// The tolerances of the charts, and that of the reference.
+const TOLERANCES: [f64; 4] = [1e-2, 1e-3, 1e-4, 1e-5];
+const REFERENCE: f64 = 3e-7;
+/// The parts of the farthest field.
+const ZONES: [f64; 3] = [0.0, 0.7, 1.0];
+
+/// Measures the charts of a lens at so many frequencies up to one in cycles/mm, on the thread of a pool;
+/// `report` is told how many of all parts are
+/// done, and may break.
+///
+/// # Errors
+/// No field has light.
+pub fn measure_transfer(
+    model: &RayModel,
+    (highest, count): (f64, usize),
+    pool: &ThreadPool,
+    mut report: impl FnMut(usize, usize) -> ControlFlow<()>,
+) -> Result<TransferCurves, AnalysisError> {
+    let edge = model.beam.edge;
+    let chart = TransferChart {
+        model,
+        pool,
+        fields: ZONES.map(|zone| FieldPoint { x: 0.0, y: zone * edge, weight: 1.0 }).to_vec(),
+        frequencies: (1..=count).map(|i| highest * i as f64 / count as f64).collect(),
+    };
+    let mut curves = TransferCurves {
+        fields: chart.fields.iter().map(|field| field.y).collect(),
+        colors: model.channels.len(),
+        frequencies: [highest / count as f64, highest],
+        count,
+        rows: Vec::new(),
+        refused: None,
+    };
+    let all = TransferMethod::ALL.len() * (TOLERANCES.len() + 1);
+    let mut done = 0;
+    for method in TransferMethod::ALL {
+        let exact = match chart.compute(method, REFERENCE) {
+            Ok(exact) => exact,
+            Err(why) if method == TransferMethod::Geometric => return Err(why),
+            Err(why) => {
+                curves.refused = Some(why.to_string());
+                break;
+            }
+        };
+        for tolerance in TOLERANCES {
+            done += 1;
+            if report(done, all).is_break() {
+                return Ok(curves);
+            }
+            curves.rows.push(chart.row(method, tolerance, &exact)?);
+        }
+    }
+    Ok(curves)
+}
+
+/// The chart of a lens: its fields and frequencies.
+struct TransferChart<'a> {
+    model: &'a RayModel,
+    /// One thread.
+    pool: &'a ThreadPool,
+    fields: Vec<FieldPoint>,
+    frequencies: Vec<f64>,
+}
+
+impl TransferChart<'_> {
+    fn compute(
+        &self,
+        method: TransferMethod,
+        tolerance: f64,
+    ) -> Result<Vec<MtfCurve>, AnalysisError> {
+        let accuracy = Accuracy { tolerance, ..Accuracy::default() };
+        let curve = |field: &FieldPoint| match method {
+            TransferMethod::Geometric => {
+                polychromatic_geometric_mtf(self.model, *field, &self.frequencies, accuracy)
+            }
+            TransferMethod::Diffraction => {
+                polychromatic_diffraction_mtf(self.model, *field, &self.frequencies, accuracy)
+            }
+        };
+        self.pool.install(|| self.fields.iter().map(curve).collect())
+    }
+
+    fn row(
+        &self,
+        method: TransferMethod,
+        tolerance: f64,
+        exact: &[MtfCurve],
+    ) -> Result<TransferRow, AnalysisError> {
+        let (found, ms) = time_median(1..=9, || self.compute(method, tolerance));
+        let found = found?;
+        let pairs = values(&found).zip(values(exact));
+        let off = |(a, b): (TransferValue, TransferValue)| (a.re - b.re).hypot(a.im - b.im);
+        Ok(TransferRow {
+            method,
+            tolerance,
+            stated: values(&found).map(|value| value.modulus.error).fold(0.0, f64::max),
+            error: pairs.map(off).fold(0.0, f64::max),
+            reached: found.iter().all(|curve| curve.reached),
+            rays: found.iter().map(|curve| curve.rays).sum(),
+            ms,
+        })
+    }
+}
+
+fn values(curves: &[MtfCurve]) -> impl Iterator<Item = TransferValue> + '_ {
+    let points = curves.iter().flat_map(|curve| &curve.points);
+    points.flat_map(|point| [point.tangential, point.sagittal])
+}

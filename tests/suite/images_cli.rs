@@ -1,0 +1,365 @@
+//! The cases of `images.json` that commands answer: pupils, coatings, light, sensors and ghosts.
+
+use crate::cli::{Scratch, done, done_json, refused};
+use crate::reference::{count, number, numbers, read};
+use serde_json::{Value, json};
+
+/// The absolute tolerance of integrals.
+const INTEGRAL: f64 = 1e-9;
+
+fn list(value: &Value) -> &Vec<Value> {
+    value.as_array().unwrap()
+}
+
+/// Compares a number with an exact one.
+fn close(found: &Value, exact: &Value, tolerance: f64, place: &str) {
+    let (found, exact) = (number(found), number(exact));
+    assert!((found - exact).abs() <= tolerance, "{place}: {found} and {exact}");
+}
+
+/// A pupil by options, with points, radii and frequencies.
+fn pupil(options: &[&str], asked: &[String]) -> Value {
+    let asked: Vec<&str> = asked.iter().map(String::as_str).collect();
+    done_json(&[&["calc", "pupil"], options, &asked].concat(), "")
+}
+
+#[test]
+fn aberrations_by_name_are_those_of_the_books() {
+    let unit = 0.5e-3 * 2.0;
+    for exact in list(&read("images.json")["aberrated_disc"]) {
+        let terms = |key: &str, option: &str| -> Vec<String> {
+            let all = exact[key].as_object().unwrap().iter();
+            all.map(|(name, waves)| format!("--{option}={name}={waves}")).collect()
+        };
+        let mut asked = [terms("seidel_waves", "seidel"), terms("noll_waves", "noll")].concat();
+        for point in list(&exact["psf"]) {
+            let [x, y] = ["x_over_lambdaN", "y_over_lambdaN"].map(|key| number(&point[key]) * unit);
+            asked.push(format!("--at={x:.17},{y:.17}"));
+        }
+        for otf in list(&exact["otf"]) {
+            let [x, y] = ["fx_over_cutoff", "fy_over_cutoff"].map(|key| number(&otf[key]) / unit);
+            asked.push(format!("--frequency={x:.17},{y:.17}"));
+        }
+        let found = pupil(&["--um=0.5", "--f-number=2"], &asked);
+        close(&found["strehl"], &exact["strehl_at_origin"], INTEGRAL, "Strehl");
+        for (i, point) in list(&exact["psf"]).iter().enumerate() {
+            close(&found["points"][i]["intensity"], &point["value"], INTEGRAL, &point.to_string());
+        }
+        for (i, otf) in list(&exact["otf"]).iter().enumerate() {
+            close(&found["transfer"][i]["re"], &otf["re"], INTEGRAL, &otf.to_string());
+            close(&found["transfer"][i]["im"], &otf["im"], INTEGRAL, &otf.to_string());
+        }
+    }
+}
+
+#[test]
+fn pupils_in_pieces_by_options() {
+    for exact in list(&read("images.json")["other_pupils"]) {
+        let mut asked = vec![format!("--um={}", exact["wavelength_um"])];
+        match exact["kind"].as_str().unwrap() {
+            "discs" => asked.extend(list(&exact["discs"]).iter().map(|disc| {
+                let d = numbers(disc);
+                format!("--disc={},{},{}", d[0], d[1], d[2])
+            })),
+            "polygon" => asked.push(format!(
+                "--polygon={},{},{}",
+                exact["sides"], exact["circumradius"], exact["first_vertex_deg"]
+            )),
+            _ => {
+                let centers = list(&exact["centres"]).iter().map(numbers);
+                let disc =
+                    |c: Vec<f64>| format!("--disc={},{},{}", c[0], c[1], exact["disc_radius"]);
+                asked.extend(centers.map(disc));
+                asked.push("--common".to_owned());
+            }
+        }
+        asked.extend(list(&exact["psf"]).iter().map(|p| format!("--at={},{}", p["x"], p["y"])));
+        let frequency = |otf: &Value| format!("--frequency={},{}", otf["nx"], otf["ny"]);
+        asked.extend(list(&exact["otf"]).iter().map(frequency));
+        let found = pupil(&[], &asked);
+        for (i, point) in list(&exact["psf"]).iter().enumerate() {
+            close(&found["points"][i]["intensity"], &point["value"], INTEGRAL, &point.to_string());
+        }
+        for (i, otf) in list(&exact["otf"]).iter().enumerate() {
+            close(&found["transfer"][i]["re"], &otf["value"], INTEGRAL, &otf.to_string());
+        }
+    }
+}
+
+#[test]
+fn coatings_reflect_what_the_books_say() {
+    let mut compared = 0;
+    for exact in list(&read("images.json")["fresnel"]) {
+        let mut asked: Vec<String> = ["from", "to", "um", "angle"]
+            .into_iter()
+            .zip(["n0", "ns", "wavelength_um", "angle_deg"])
+            .map(|(option, key)| format!("--{option}={}", exact[key]))
+            .collect();
+        let films = list(&exact["layers_from_the_incident_side"]).iter();
+        asked.extend(films.map(|film| format!("--film={}:{}", film["n"], film["nm"])));
+        let asked: Vec<&str> = asked.iter().map(String::as_str).collect();
+        let found = done_json(&[&["calc", "coating"], &asked[..]].concat(), "");
+        for (key, name) in [("R_s", "s"), ("R_p", "p"), ("R", "mean")] {
+            let size = number(&exact[key]);
+            // Digits below 1e-16 of the incident light are rounding.
+            close(&found[name], &exact[key], 1e-12 * size + 1e-16, &exact.to_string());
+            compared += 1;
+        }
+    }
+    assert_eq!(compared, 156);
+}
+
+#[test]
+fn light_and_noise_by_formula() {
+    let file = read("images.json");
+    let relative = |found: &Value, exact: &Value, place: &Value| {
+        close(found, exact, 1e-12 * number(exact).abs(), &place.to_string());
+    };
+    let calc = |name: &str, options: &[(&str, &Value)]| {
+        let options: Vec<String> = options.iter().map(|(k, v)| format!("--{k}={v}")).collect();
+        let options: Vec<&str> = options.iter().map(String::as_str).collect();
+        done_json(&[&["calc", name], &options[..]].concat(), "")
+    };
+    for e in list(&file["photons"]) {
+        let options = [
+            ("lux", &e["illuminance_lux"]),
+            ("pixel", &e["pixel_um"]),
+            ("seconds", &e["seconds"]),
+            ("um", &e["wavelength_um"]),
+        ];
+        relative(&calc("photons", &options)["photons"], &e["photons"], e);
+    }
+    for e in list(&file["black_body_photon_radiance"]) {
+        let options = [("kelvin", &e["kelvin"]), ("from", &e["from_nm"]), ("to", &e["to_nm"])];
+        let found = calc("black-body", &options);
+        relative(&found["photons_per_s_m2_sr"], &e["photons_per_s_m2_sr"], e);
+    }
+    for e in list(&file["motion"]) {
+        let found = calc("smear", &[("way", &e["smear_mm"]), ("frequency", &e["frequency"])]);
+        relative(&found["factor"], &e["factor"], e);
+    }
+    for e in list(&file["thin_lens_blur"]) {
+        let options = [
+            ("focal-length", &e["focal_length"]),
+            ("f-number", &e["f_number"]),
+            ("focus", &e["focus_mm"]),
+            ("object", &e["object_mm"]),
+        ];
+        let found = calc("blur", &options);
+        relative(&found["image_distance"], &e["image_distance"], e);
+        relative(&found["blur_diameter"], &e["blur_diameter_mm"], e);
+    }
+}
+
+#[test]
+fn the_law_of_a_sensor_has_its_exact_moments() {
+    for sensor in list(&read("images.json")["noise"]) {
+        let options = [
+            ("quantum-efficiency", "quantum_efficiency"),
+            ("gain", "gain_dn_per_e"),
+            ("read-noise", "read_noise_e"),
+            ("dark", "dark_e"),
+            ("black-level", "black_level_dn"),
+            ("bits", "bits"),
+            ("full-well", "full_well_e"),
+        ];
+        let options = options.map(|(option, key)| format!("--{option}={}", sensor[key]));
+        for level in list(&sensor["levels"]) {
+            let photons = format!("--photons={}", level["photons"]);
+            let mut asked = vec!["calc", "noise", &photons];
+            asked.extend(options.iter().map(String::as_str));
+            let found = done_json(&asked, "");
+            let place = level.to_string();
+            // The file has ten to twelve digits of the sums.
+            let size = number(&level["mean"]);
+            close(&found["mean"], &level["mean"], 2e-11 * size, &place);
+            close(
+                &found["variance"],
+                &level["variance"],
+                2e-9 * number(&level["variance"]),
+                &place,
+            );
+            for key in ["ideal_mean", "ideal_variance", "ideal_snr"] {
+                close(&found[key], &level[key], 1e-12 * (1.0 + number(&level[key])), &place);
+            }
+        }
+    }
+}
+
+/// The lens of the ghosts, with its indices at one wavelength, as a file.
+fn ghost_lens(file: &Value) -> Scratch {
+    let ghosts = &file["ghosts"];
+    let lens = list(&file["lenses"]).iter().find(|lens| lens["id"] == ghosts["lens"]).unwrap();
+    let stop = count(&lens["stop_surface"]);
+    let row = |(i, row): (usize, &Value)| {
+        let index = number(&ghosts["indices"][i]);
+        let mut surface = json!({
+            "curvature": row["radius"].as_f64().map_or(0.0, f64::recip),
+            "thickness": row["thickness"],
+            "semi_diameter": row["semi_diameter"],
+        });
+        if index != 1.0 {
+            surface["glass"] = json!({ "index": index });
+        }
+        if i == stop {
+            surface["stop"] = json!(true);
+        }
+        surface
+    };
+    let text = json!({
+        "aplanat": 1,
+        "name": "ghosts",
+        "object": "infinity",
+        "aperture": {"entrance_pupil_diameter": ghosts["epd"]},
+        "fields": {"kind": "angle", "values": [{"y": 0.0}, {"y": 10.0}]},
+        "wavelengths": [{"um": ghosts["wavelength_um"]}],
+        "surfaces": list(&lens["surfaces"]).iter().enumerate().map(row).collect::<Vec<_>>(),
+    });
+    Scratch::with("ghosts.json", &text.to_string())
+}
+
+#[test]
+fn ghosts_by_first_order_optics() {
+    let file = read("images.json");
+    let lens = ghost_lens(&file);
+    let path = lens.0.to_str().unwrap();
+    let found = done_json(&["analyze", path, "ghosts", "--field", "0"], "");
+    let field = &found["fields"][0];
+    let exact = &file["ghosts"];
+    assert_eq!(field["pairs"], exact["pairs"]);
+    close(&field["transmission"], &exact["transmission_direct"], 1e-12, "transmission");
+    close(&field["ghost_flux"], &exact["ghost_flux_share"], 1e-12, "flux");
+    for exact in list(&exact["ghosts"]) {
+        let is_same = |ghost: &&Value| {
+            ["first_reflection", "second_reflection"].iter().all(|key| ghost[key] == exact[key])
+        };
+        let found = list(&field["ghosts"]).iter().find(is_same).unwrap();
+        let [[a, b], [c, d]] = [0, 1].map(|i| [0, 1].map(|k| &found["matrix"][i][k]));
+        let pairs = [
+            (a, "A"),
+            (b, "B"),
+            (c, "C"),
+            (d, "D"),
+            (&found["focal_length"], "ghost_focal_length"),
+            (&found["focus"], "ghost_image_from_image_plane"),
+            (&found["paraxial_radius"], "sensor_radius_full_beam"),
+            (&found["clip_factor"], "clip_factor"),
+            (&found["height_per_tangent"], "height_per_tan"),
+            (&found["reflected"], "reflectance_product"),
+            (&found["transmitted"], "transmitted"),
+            (&found["paraxial_irradiance"], "irradiance_over_entrance"),
+        ];
+        for (found, key) in pairs {
+            let size = number(&exact[key]).abs();
+            close(found, &exact[key], 1e-10 * size + 1e-13, &format!("{key} of {exact}"));
+        }
+        assert_eq!(found["clipped_at"], exact["clipped_at"], "{exact}");
+        // Light that first-order optics lets arrive does so by real rays too, near the axis.
+        assert!(found["fates"]["imaged"].as_u64().unwrap() > 0, "{found}");
+    }
+}
+
+#[test]
+fn rays_of_ghosts_with_their_light() {
+    let file = read("images.json");
+    let lens = ghost_lens(&file);
+    let path = lens.0.to_str().unwrap();
+    let mut compared = 0;
+    for exact in list(&file["ghosts"]["real_meridional_rays"]) {
+        let (sin, cos) = number(&exact["field_deg"]).to_radians().sin_cos();
+        let ray = json!({"x": 0.0, "y": exact["y0"], "z": 0.0, "L": 0.0, "M": sin, "N": cos});
+        let rays = json!({ "rays": [ray] }).to_string();
+        let surface = |key: &str| count(&exact[key]) + 1;
+        let ghost =
+            format!("--ghost={},{}", surface("first_reflection"), surface("second_reflection"));
+        let follow = |more: &[&str]| {
+            let arguments = ["trace", path, "--rays", "-", &ghost];
+            done_json(&[&arguments[..], more].concat(), &rays)["rays"][0].clone()
+        };
+        let (clipped, free) = (follow(&[]), follow(&["--unclipped"]));
+        let status = exact["status"].as_str().unwrap();
+        let fate = match status {
+            "ok" => "imaged",
+            "tir" => "total_reflection",
+            "miss" => "missed",
+            other => other,
+        };
+        if fate == "imaged" || fate == "clipped" {
+            assert_eq!(clipped["fate"], fate, "{exact}");
+            for (key, name) in [("y", "y"), ("M", "M"), ("N", "N")] {
+                close(&free[name], &exact[key], 1e-10, &format!("{key} of {exact}"));
+            }
+            for (i, key) in ["intensity_s", "intensity_p"].into_iter().enumerate() {
+                let size = number(&exact[key]);
+                close(
+                    &free["intensity"][i],
+                    &exact[key],
+                    1e-9 * size,
+                    &format!("{key} of {exact}"),
+                );
+            }
+        } else {
+            assert_eq!(free["fate"], fate, "{exact}");
+            assert_eq!(free["step"], exact["step"], "{exact}");
+            assert_eq!(free["surface"], exact["surface"], "{exact}");
+        }
+        if fate == "clipped" {
+            assert_eq!(clipped["step"], exact["clipped_step"], "{exact}");
+            assert_eq!(clipped["surface"], exact["clipped_surface"], "{exact}");
+        }
+        compared += 1;
+    }
+    assert_eq!(compared, 40);
+}
+
+/// With little reflection ghosts fall as its square.
+#[test]
+fn coatings_weaken_ghosts_by_the_square_of_their_reflection() {
+    let flux = |coating: &str| {
+        let lens = "lenses/double_gauss_rudolph_50.json";
+        let found =
+            done_json(&["analyze", lens, "ghosts", "--field", "0", "--coating", coating], "");
+        number(&found["fields"][0]["ghost_flux"])
+    };
+    let [one, half] = ["0.02%", "0.01%"].map(flux);
+    // Cemented surfaces keep theirs.
+    assert!(half < 0.6 * one, "{one:e} {half:e}");
+    let [bare, single, v] = ["none", "single-layer", "v"].map(flux);
+    assert!(v < single && single < 0.2 * bare, "{bare:e} {single:e} {v:e}");
+}
+
+#[test]
+fn wrong_questions_about_light_are_refused() {
+    let lens = "lenses/double_gauss_rudolph_50.json";
+    for (arguments, words) in [
+        (vec!["calc", "coating", "--to", "0"], ["--to", "positive"]),
+        (vec!["calc", "coating", "--to", "1.5", "--angle", "90"], ["--angle", "90"]),
+        (vec!["calc", "coating", "--to", "1.5", "--film", "1.38"], ["--film", "1.38:99.64"]),
+        (vec!["calc", "coating", "--to", "1.5", "--coating", "gold"], ["gold", "single-layer"]),
+        (vec!["calc", "pupil", "--f-number", "0.2"], ["--f-number", "0.5"]),
+        (vec!["calc", "pupil", "--seidel", "W999=1"], ["W999", "W040"]),
+        (vec!["calc", "pupil", "--noll", "99=1"], ["99", "45"]),
+        (vec!["calc", "pupil", "--disc", "0,0,-1"], ["--disc", "positive"]),
+        (vec!["calc", "pupil", "--disc", "0,0,0.1", "--common"], ["--common", "two"]),
+        (vec!["calc", "pupil", "--polygon", "2,0.1,0"], ["--polygon", "3 to 100"]),
+        (vec!["calc", "pupil", "--disc", "0,0,0.1", "--noll", "4=1"], ["--noll", "round"]),
+        (vec!["calc", "pupil", "--radius", "0"], ["--radius", "more than 0"]),
+        (vec!["calc", "black-body", "--kelvin", "300", "--from", "5", "--to", "4"], ["--to", "4"]),
+        (vec!["calc", "noise", "--photons", "-1"], ["--photons", "-1"]),
+        (vec!["calc", "noise", "--photons", "1", "--bits", "40"], ["bits", "40"]),
+        (
+            vec!["calc", "blur", "--focal-length=50", "--f-number=2", "--focus=40", "--object=90"],
+            ["--focus", "40"],
+        ),
+        (vec!["trace", lens, "--rays", "-", "--ghost", "1,2"], ["--ghost", "surface 1"]),
+        (vec!["trace", lens, "--rays", "-", "--ghost", "0,2"], ["--ghost", "counted from 1"]),
+        (vec!["analyze", lens, "ghosts", "--coating", "120%"], ["--coating", "0.3%"]),
+        (vec!["analyze", "lenses/telescope_rc_f8.json", "ghosts"], ["mirror", "surface 1"]),
+        (vec!["analyze", "lenses/wood_lens_60.json", "ghosts"], ["gradient", "surface"]),
+    ] {
+        let ray = r#"{"rays": [{"x": 0, "y": 0, "z": 0, "L": 0, "M": 0, "N": 1}]}"#;
+        refused(2, &arguments, ray, &words);
+    }
+    let text = done(&["analyze", lens, "ghosts", "--ghosts", "3", "--field", "0"], "");
+    assert!(text.contains("first order") && text.contains("45 ghosts"), "{text}");
+}

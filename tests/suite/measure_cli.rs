@@ -1,0 +1,46 @@
+//! `aplanat measure mtf` and `measure picture`: their numbers, and what is refused.
+
+use super::cli::{done_json, refused};
+use serde_json::Value;
+
+const LENS: &str = "lenses/achromat_ac254_100.json";
+
+fn rows(report: &Value) -> Vec<Value> {
+    report["lenses"][0]["rows"].as_array().unwrap().clone()
+}
+
+#[test]
+fn pictures_are_measured_the_quick_way_and_the_exact_one() {
+    let small = ["--pixels", "24x16", "--exact-pixels", "12x8", "--scene", "edge"];
+    let report = done_json(&[&["measure", "picture", LENS], &small[..]].concat(), "");
+    let rows = rows(&report);
+    let ways: Vec<&str> = rows.iter().map(|row| row["way"].as_str().unwrap()).collect();
+    assert_eq!(ways, ["first", "quick", "exact", "exact", "exact", "exact"]);
+    let exact = &rows[2..];
+    for row in exact {
+        let [error, tolerance] = ["error", "tolerance"].map(|key| row[key].as_f64().unwrap());
+        assert!(error <= tolerance, "{row}");
+        let [ms, whole] = ["ms", "whole_ms"].map(|key| row[key].as_f64().unwrap());
+        assert!(whole >= 4.0 * ms, "{row}");
+    }
+    assert!(exact.windows(2).all(|pair| pair[0]["error"].as_f64() >= pair[1]["error"].as_f64()));
+}
+
+#[test]
+fn wrong_measurements_are_refused() {
+    for (arguments, words) in [
+        (vec!["mtf"], ["LENS", "required"]),
+        (vec!["mtf", "no-lens.json"], ["no-lens.json", "No such file"]),
+        (vec!["mtf", LENS, "--highest", "0"], ["--highest", "positive"]),
+        (vec!["mtf", LENS, "--highest", "NaN"], ["--highest", "positive"]),
+        (vec!["mtf", LENS, "--count", "0"], ["--count", "1 to"]),
+        (vec!["mtf", LENS, "--zoom", "3"], ["zoom", "3"]),
+        (vec!["mtf", LENS, "--plot", "chart.gif"], ["chart.gif", "png"]),
+        (vec!["picture", LENS, "--scene", "moon"], ["moon", "star"]),
+        (vec!["picture", LENS, "--scene", "still-life"], ["still-life", "star"]),
+        (vec!["picture", LENS, "--pixels", "0x3"], ["0x3", "columns"]),
+        (vec!["picture", LENS, "--exact-pixels", "9"], ["9", "columns"]),
+    ] {
+        refused(2, &[&["measure"], &arguments[..]].concat(), "", &words);
+    }
+}
