@@ -169,7 +169,7 @@ fn a_layout_is_to_scale_and_the_dxf_has_the_lens_in_its_own_size() {
     assert!((arc.center.x - z - 1.0 / curvature).abs() < 1e-4, "{:?}", arc.center);
     assert!(arc.center.y.abs() < 1e-6 && layer == "OUTLINE", "{:?} {layer}", arc.center);
     let svg = drawn(GAUSS, "svg", &[]);
-    assert!(svg.contains("width=\"297mm\"") && svg.contains("Scale 1:1"), "{}", &svg[..200]);
+    assert!(svg.contains("width=\"297mm\"") && svg.contains("Scale 2:1"), "{}", &svg[..200]);
 }
 
 #[test]
@@ -261,6 +261,10 @@ fn parameter(text: &str) -> (Parameter, &str) {
         let doubled = string.replace("''", "__");
         let end = doubled.find('\'').unwrap();
         return (Parameter::Word(string[..end].to_owned()), &string[end + 1..]);
+    }
+    // A number with a type, as `LENGTH_MEASURE(1.E-6)`.
+    if let Some((_, inner)) = text.split_once('(').filter(|(kind, _)| !kind.contains([',', ')'])) {
+        return list(inner);
     }
     let (word, rest) = text.split_at(text.find([',', ')']).unwrap());
     let parameter = if let Some(number) = word.strip_prefix('#') {
