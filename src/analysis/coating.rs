@@ -192,11 +192,14 @@ mod tests {
 
     #[test]
     fn nothing_is_reflected_where_nothing_changes_and_a_film_without_thickness_is_none() {
-        assert_eq!(Coating::Bare.reflectance([1.6, 1.6], 550e-6, 0.3), [0.0; 2]);
-        assert_eq!(film_reflectance(&[], [1.6, 1.6], 550e-6, 0.3), [0.0; 2]);
+        // The square of an amplitude that is rounding.
+        let is_none = |found: [f64; 2]| found.iter().all(|share| (0.0..1e-30).contains(share));
+        assert!(is_none(Coating::Bare.reflectance([1.6, 1.6], 550e-6, 0.3)));
+        assert!(is_none(film_reflectance(&[], [1.6, 1.6], 550e-6, 0.3)));
         let none = [ThinFilm { index: OUTER, thickness: 0.0 }];
         let bare = film_reflectance(&[], [1.0, GLASS], 550e-6, 0.7);
-        assert_eq!(film_reflectance(&none, [1.0, GLASS], 550e-6, 0.7), bare);
+        let found = film_reflectance(&none, [1.0, GLASS], 550e-6, 0.7);
+        assert!(found.iter().zip(bare).all(|(a, b)| (a - b).abs() < 1e-15), "{found:?} {bare:?}");
     }
 
     #[test]
