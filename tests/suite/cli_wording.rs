@@ -102,7 +102,7 @@ fn negative_numbers_are_refused_by_their_range() {
 #[test]
 fn mutations_are_listed_and_may_be_spelled_either_way() {
     let help = done(&["search", "--help"], "");
-    assert!(help.contains("add_singlet, remove_singlet") && help.contains("global_draw"));
+    assert!(help.contains("`add_singlet`, `remove_singlet`") && help.contains("global_draw"));
     for name in ["add-singlet", "add_singlet"] {
         done(&["search", SINGLET, "--iterations", "1", "--forbid", name], "");
     }
