@@ -1,6 +1,6 @@
 //! The dialog that begins a lens: focal length, aperture, fields, wavelengths and object.
 
-use egui::{Button, Context, DragValue, Grid, Id, Key, Modal, Response, RichText, Ui};
+use egui::{Button, Context, DragValue, Grid, Id, Modal, RichText, Ui};
 
 use super::actions::Actions;
 use super::form::{choice, dialog_frame, number_field};
@@ -34,10 +34,6 @@ pub(super) struct NewLensDialog {
     wavelengths: usize,
     at_infinity: bool,
     distance: f64,
-    /// True before the first frame, which gives the first field the keyboard.
-    opening: bool,
-    /// True once Enter was pressed in a field with a number.
-    confirmed: bool,
 }
 
 impl Default for NewLensDialog {
@@ -53,8 +49,6 @@ impl Default for NewLensDialog {
             wavelengths: 0,
             at_infinity: true,
             distance: 200.0,
-            opening: true,
-            confirmed: false,
         }
     }
 }
@@ -78,11 +72,7 @@ impl NewLensDialog {
 
     fn rows(&mut self, ui: &mut Ui) {
         ui.label("Focal length");
-        let first = number_field(ui, "Focal length", &mut self.focal_length, " mm");
-        if std::mem::take(&mut self.opening) {
-            first.request_focus();
-        }
-        self.note_enter(ui, &first);
+        number_field(ui, "Focal length", &mut self.focal_length, " mm");
         ui.end_row();
         ui.label("Object");
         ui.horizontal(|ui| self.object(ui));
@@ -111,10 +101,8 @@ impl NewLensDialog {
         ui.radio_value(&mut self.at_infinity, true, "at infinity");
         ui.radio_value(&mut self.at_infinity, false, "at");
         ui.add_enabled_ui(!self.at_infinity, |ui| {
-            let field =
-                number_field(ui, "Object distance of the new lens", &mut self.distance, " mm")
-                    .on_hover_text("In front of the lens");
-            self.note_enter(ui, &field);
+            number_field(ui, "Object distance of the new lens", &mut self.distance, " mm")
+                .on_hover_text("In front of the lens");
         });
         if before && !self.at_infinity {
             self.distance = self.distance.max(4.0 * self.focal_length);
@@ -142,13 +130,7 @@ impl NewLensDialog {
             self.aperture_value = self.equivalent_aperture(before);
         }
         let unit = if self.aperture == ApertureChoice::EntrancePupil { " mm" } else { "" };
-        let field = number_field(ui, "Aperture value", &mut self.aperture_value, unit);
-        self.note_enter(ui, &field);
-    }
-
-    /// Notes that a number was entered with the Enter key, which creates the lens.
-    fn note_enter(&mut self, ui: &Ui, field: &Response) {
-        self.confirmed |= field.lost_focus() && ui.input(|input| input.key_pressed(Key::Enter));
+        number_field(ui, "Aperture value", &mut self.aperture_value, unit);
     }
 
     /// The value of the chosen quantity for about the same beam as that of another one.
@@ -179,8 +161,7 @@ impl NewLensDialog {
         choice(ui, "Fields of the new lens", &mut self.field, &kinds);
         ui.label("up to");
         let unit = if self.field == FieldKind::Angle { "°" } else { " mm" };
-        let field = number_field(ui, "Largest field", &mut self.field_max, unit);
-        self.note_enter(ui, &field);
+        number_field(ui, "Largest field", &mut self.field_max, unit);
     }
 
     fn field_count(&mut self, ui: &mut Ui) {
@@ -231,7 +212,7 @@ impl NewLensDialog {
     }
 
     /// Shows the buttons, and above them why the lens cannot be made; true if it was.
-    fn buttons(&mut self, ui: &mut Ui, actions: &mut Actions) -> bool {
+    fn buttons(&self, ui: &mut Ui, actions: &mut Actions) -> bool {
         let lens = self.lens();
         if let Err(why) = &lens {
             ui.label(RichText::new(why).color(ui.visuals().warn_fg_color));
@@ -240,8 +221,7 @@ impl NewLensDialog {
         ui.horizontal(|ui| {
             let fill = ui.visuals().selection.bg_fill;
             let create = Button::new(RichText::new("Create").strong()).fill(fill);
-            let asked = ui.add_enabled(lens.is_ok(), create).clicked() || self.confirmed;
-            if let (true, Ok(lens)) = (asked, &lens) {
+            if let (true, Ok(lens)) = (ui.add_enabled(lens.is_ok(), create).clicked(), &lens) {
                 actions.push(Command::New(Box::new(lens.clone())));
                 done = true;
             }
@@ -249,7 +229,6 @@ impl NewLensDialog {
                 ui.close();
             }
         });
-        self.confirmed = false;
         done
     }
 }

@@ -7,7 +7,7 @@ use aplanat::lens::{
     Aperture, Edit, ElementEdit, ElementForm, FieldKind, Fields, Lens, Object, StartingForm,
     StartingLens, WavelengthPreset, ZoomPosition, apply_edit,
 };
-use aplanat::session::{AnalysisSettings, Command, Session, SessionView, analyze};
+use aplanat::session::{Command, Session, SessionView};
 use aplanat::studio::Studio;
 use aplanat::studio::draw::RenderBackend;
 use aplanat::studio::panels::{FirstOrderPanel, Panel, PrescriptionPanel, SystemPanel, ZoomPanel};
@@ -84,19 +84,6 @@ fn a_new_lens_comes_from_the_dialog() {
     assert_eq!(lens.aperture, Aperture::EntrancePupilDiameter(12.5));
     assert!(harness.query_by_label("Create").is_none(), "the dialog is closed");
     assert!(harness.state().session().view().messages.is_empty());
-}
-
-#[test]
-fn a_lens_is_begun_by_the_keyboard_alone() {
-    let mut harness = window(double_gauss());
-    keys(&mut harness, Modifiers::COMMAND, Key::N);
-    harness.event(egui::Event::Text("35".to_owned()));
-    harness.run_steps(3);
-    keys(&mut harness, Modifiers::NONE, Key::Enter);
-    assert!(harness.query_by_label("Create").is_none(), "the dialog is closed");
-    let found = analyze(&lens(&harness), &AnalysisSettings::default()).unwrap();
-    let focal_length = found.first_order().efl.unwrap();
-    assert!((focal_length - 35.0).abs() < 0.5, "{focal_length} mm");
 }
 
 #[test]
