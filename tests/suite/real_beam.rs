@@ -110,6 +110,8 @@ fn rays_cross_the_stop_where_they_are_asked_to() {
                 let mut front = channel.system.clone();
                 front.surfaces.truncate(stop + 1);
                 front.surfaces.iter_mut().for_each(aplanat::lens::Surface::remove_apertures);
+                // Nothing follows that a gradient behind the stop could end at.
+                front.surfaces[stop].grin = None;
                 let tracer = Tracer::new(&front).unwrap();
                 let points = [[0.0, 0.0], [0.0, 0.9], [0.5, -0.8], [-0.7, 0.2]];
                 for (field, p) in model.fields.iter().flat_map(|f| points.map(|p| (f, p))) {

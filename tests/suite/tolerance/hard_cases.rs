@@ -134,7 +134,7 @@ fn the_command_shows_sensitivities_and_spots() {
     let lens = path.to_str().unwrap();
     let few = ["tolerance", lens, "--samples", "4", "--error", "10%"];
     let text = done(&few, "");
-    for word in ["3 errors", "as designed", "element decenter x", "1-2", "3'", "the pupil is held"]
+    for word in ["3 manufacturing errors", "as designed", "element decenter x", "1-2", "3'", "the pupil is held"]
     {
         assert!(text.contains(word), "{word}: {text}");
     }
