@@ -134,8 +134,14 @@ fn the_command_shows_sensitivities_and_spots() {
     let lens = path.to_str().unwrap();
     let few = ["tolerance", lens, "--samples", "4", "--error", "10%"];
     let text = done(&few, "");
-    for word in ["3 manufacturing errors", "as designed", "element decenter x", "1-2", "3'", "the pupil is held"]
-    {
+    for word in [
+        "3 manufacturing errors",
+        "as designed",
+        "element decenter x",
+        "1-2",
+        "3'",
+        "the pupil is held",
+    ] {
         assert!(text.contains(word), "{word}: {text}");
     }
     let json = done_json(&[&few[..], &["--rms", "0.05", "--loosest", "0.5"]].concat(), "");
