@@ -151,7 +151,7 @@ fn the_command_shows_sensitivities_and_spots() {
     refused(2, &["tolerance", lens, "--rms=-1"], "", &["--rms"]);
     refused(2, &["tolerance", lens, "--rms=0"], "", &["--rms"]);
     refused(2, &["tolerance", lens, "--loosest=0"], "", &["--loosest"]);
-    refused(2, &["tolerance", lens, "--samples", "1"], "", &["--samples", "2.."]);
+    refused(2, &["tolerance", lens, "--samples", "1"], "", &["--samples", "2 or more"]);
     refused(2, &["tolerance", lens, "--grade", "good"], "", &["commercial"]);
     std::fs::write(&path, SINGLET.replace("\"last\": 1", "\"last\": 7")).unwrap();
     refused(2, &few, "", &["surfaces 1 to 8; expected 1 to 2"]);
