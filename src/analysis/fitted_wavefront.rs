@@ -132,9 +132,13 @@ impl FittedWavefront {
         let waves: Option<Vec<_>> = rays.iter().map(|at| reference.wave(at, center)).collect();
         let mut waves = waves?;
         let total: f64 = weights.iter().sum();
-        let sum: f64 = waves.iter().zip(weights).map(|(wave, w)| w * wave.value).sum();
-        let piston = sum / total;
-        waves.iter_mut().for_each(|wave| wave.value -= piston);
+        let remove_mean = |waves: &mut [WaveDual]| {
+            let sum: f64 = waves.iter().zip(weights).map(|(wave, w)| w * wave.value).sum();
+            waves.iter_mut().for_each(|wave| wave.value -= sum / total);
+            sum / total
+        };
+        // Once more for the rounding of a sum of whole paths: derivatives hold the piston.
+        let piston = remove_mean(&mut waves) + remove_mean(&mut waves);
         let squares = waves.iter().zip(weights).map(|(wave, w)| w * wave.value * wave.value);
         let mean_square = squares.sum::<f64>() / total;
         Some(Self { reference, center, piston, waves, mean_square })

@@ -31,7 +31,10 @@ pub fn build_ray_model_at(
     fields: &[FieldPoint],
     plan: &EffectPlan,
 ) -> Result<RayModel, RayModelError> {
-    let (systems, primary) = resolve_planned(lens, zoom, plan)?;
+    // Without dispersion the other wavelengths are needed only for what that changes of the light.
+    let unseen = plan.decision(Effect::Dispersion).map_or(0.0, |decision| decision.residual);
+    let colors = plan.computes(Effect::Dispersion) || unseen > 0.0;
+    let (systems, primary) = resolve_planned(lens, zoom, plan, colors)?;
     let beam = Beam::for_lens(lens, zoom);
     let mut built = aim_planned(systems, primary, beam, plan)?;
     built.fields = fields.to_vec();
@@ -44,9 +47,9 @@ pub fn build_ray_model_at(
         built.fields = fields;
     }
     built.neglected = plan.neglected();
-    let residual = plan.decision(Effect::Dispersion).map_or(0.0, |decision| decision.residual);
-    if residual > 0.0 {
-        built.neglected.light += light_change(lens, zoom, fields)?;
+    if !plan.computes(Effect::Dispersion) {
+        built.neglected.light += light_change(&built);
+        built.keep_primary_wavelength();
     }
     Ok(built)
 }
@@ -54,23 +57,22 @@ pub fn build_ray_model_at(
 /// A wavelength in µm, its weight, and the lens resolved there.
 type ResolvedWavelength = (f64, f64, System<f64>);
 
-/// The lens at the wavelengths that a plan computes, and the position of the primary one among them.
+/// The lens at all wavelengths (`colors`) or at the primary one, and the position of that among them.
 fn resolve_planned(
     lens: &Lens,
     zoom: usize,
     plan: &EffectPlan,
+    colors: bool,
 ) -> Result<(Vec<ResolvedWavelength>, usize), LensError> {
     let primary = lens.primary();
-    let one = !plan.computes(Effect::Dispersion);
-    let wavelengths = if one { &lens.wavelengths[primary..=primary] } else { &lens.wavelengths };
+    let wavelengths = if colors { &lens.wavelengths } else { &lens.wavelengths[primary..=primary] };
     let resolve = |w: &Wavelength| {
         let mut system = lens.resolve(zoom, w.um)?;
         simplify(&mut system, plan);
-        // A single wavelength has all the weight, whatever its share of the light.
-        Ok((w.um, if one { 1.0 } else { w.weight }, system))
+        Ok((w.um, w.weight, system))
     };
     let systems: Result<Vec<_>, LensError> = wavelengths.iter().map(resolve).collect();
-    Ok((systems?, if one { 0 } else { primary }))
+    Ok((systems?, if colors { primary } else { 0 }))
 }
 
 /// The ray model of resolved systems, with rays aimed as a plan says.

@@ -3,23 +3,21 @@
 //! It takes the pupil of every field and wavelength, so it is measured only for a model that leaves
 //! dispersion out.
 
-use crate::lens::{FieldPoint, Lens};
-use crate::pupil::{RayModel, RayModelError, Region};
+use crate::lens::FieldPoint;
+use crate::pupil::{RayModel, Region};
 use rayon::prelude::*;
 
 /// The order of quadrature of the areas of pupils, whose errors are nearly the same at all
 /// wavelengths.
 const AREA_ORDER: usize = 2;
 
-/// The largest relative change of the light of a field if all of it had the primary wavelength.
-pub(super) fn light_change(
-    lens: &Lens,
-    zoom: usize,
-    fields: &[FieldPoint],
-) -> Result<f64, RayModelError> {
-    let model = RayModel::from_lens(lens, zoom)?;
-    let changes = fields.par_iter().map(|field| field_change(&model, *field));
-    Ok(changes.reduce(|| 0.0, f64::max))
+/// The largest relative change of the light of a field if all of it had the primary wavelength; 0
+/// with a single wavelength.
+pub(super) fn light_change(model: &RayModel) -> f64 {
+    if model.channels.len() == 1 {
+        return 0.0;
+    }
+    model.fields.par_iter().map(|field| field_change(model, *field)).reduce(|| 0.0, f64::max)
 }
 
 /// The change at one field. A field that is dark at the primary wavelength has no light to change.

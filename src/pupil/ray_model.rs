@@ -150,6 +150,14 @@ impl RayModel {
         })
     }
 
+    /// Leaves out all wavelengths but the primary one, which then has all the weight.
+    pub(crate) fn keep_primary_wavelength(&mut self) {
+        self.channels.swap(0, self.primary);
+        self.channels.truncate(1);
+        self.channels[0].weight = 1.0;
+        self.primary = 0;
+    }
+
     /// The Seidel sums; the chromatic ones between the shortest and the longest wavelength if there
     /// are two. `None` if there is no chief ray or a gap is filled with a gradient-index medium.
     pub fn seidel(&self) -> Option<Seidel<f64>> {

@@ -100,10 +100,8 @@ pub(crate) fn check_term(
         let relative = error / (difference.abs() + scale);
         worst = worst.max(relative);
         let name = variable.parameter.to_string();
-        // Of the wavefront, whose motion of the edge converges slowest, to 2.2e-6 on two lenses.
-        let bound = if term == Term::Wavefront { 5e-6 } else { 2e-6 };
         assert!(
-            relative < bound,
+            relative < 2e-6,
             "{} by {name}: {} and {difference}",
             term.name(),
             sum.gradient[i]

@@ -742,9 +742,7 @@ fn effect_costs_are_measured_when_idle() {
         println!("{}: {:.2} ms", decision.effect.name(), decision.cost.unwrap().saved_ms);
     }
     let saved_ms = |effect| plan.decision(effect).unwrap().cost.unwrap().saved_ms;
-    // What dispersion changes of the light is found where it is left out, and can cost more than that
-    // saves.
-    assert!(saved_ms(Effect::Dispersion) != 0.0 && saved_ms(Effect::Clipping) != 0.0);
+    assert!(saved_ms(Effect::Dispersion) > 0.0 && saved_ms(Effect::Clipping) != 0.0);
     assert_eq!(saved_ms(Effect::Asphere), 0.0, "what is off costs nothing");
     assert!(session.view().is_current());
 }
