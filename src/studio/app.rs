@@ -224,6 +224,7 @@ impl Studio {
             FileRequest::OpenField => Command::Grin(GrinCommand::OpenFile(path)),
             FileRequest::SaveField(nodes) => Command::Grin(GrinCommand::Save { path, nodes }),
             FileRequest::SavePicture => Command::SavePicture(path),
+            FileRequest::ExportPaper(kind) => Command::ExportPaper { kind, path },
             FileRequest::ExportZemax | FileRequest::ExportJson => Command::Export(path),
         };
         self.run_or_ask(context, PendingAction::Run(command), None);
@@ -352,6 +353,11 @@ fn likely_path(view: &SessionView, request: FileRequest) -> Option<PathBuf> {
         FileRequest::SavePicture => {
             let beside = view.path.as_ref().map(|path| path.with_extension("png"));
             Some(beside.unwrap_or_else(|| PathBuf::from("picture.png")))
+        }
+        FileRequest::ExportPaper(kind) => {
+            let name = PathBuf::from("lens");
+            let beside = view.path.clone().unwrap_or(name);
+            Some(beside.with_extension(kind.extensions().first().unwrap_or(&"pdf")))
         }
         FileRequest::OpenSearch => checkpoint().or_else(|| search.unfinished.clone()),
         FileRequest::SaveSearch => checkpoint().or_else(|| search.save_path.clone()),

@@ -7,6 +7,8 @@ use std::thread;
 
 use egui::Key;
 
+use crate::report::PaperKind;
+
 /// The purpose for which a path is asked.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum FileRequest {
@@ -36,6 +38,8 @@ pub enum FileRequest {
     SaveField(usize),
     /// To write the picture of a scene.
     SavePicture,
+    /// To write a report, the layout or the solids of the lens.
+    ExportPaper(PaperKind),
 }
 
 impl FileRequest {
@@ -54,6 +58,9 @@ impl FileRequest {
             Self::OpenField => "Open a GRIN task or a volume",
             Self::SaveField(_) => "Save the volume",
             Self::SavePicture => "Save the picture",
+            Self::ExportPaper(PaperKind::Report) => "Export the prescription report",
+            Self::ExportPaper(PaperKind::Layout) => "Export the drawing of the layout",
+            Self::ExportPaper(PaperKind::Solids) => "Export the elements as solids",
         }
     }
 
@@ -66,6 +73,7 @@ impl FileRequest {
             Self::OpenField => &["json", "npz"],
             Self::SaveField(_) => &["npz", "json"],
             Self::SavePicture => &["png"],
+            Self::ExportPaper(kind) => kind.extensions(),
             Self::ExportFront | Self::ExperimentFolder => &[],
         }
     }
@@ -75,6 +83,9 @@ impl FileRequest {
         match self {
             Self::OpenField | Self::SaveField(_) => "GRIN fields",
             Self::SavePicture => "Pictures",
+            Self::ExportPaper(PaperKind::Report) => "Reports",
+            Self::ExportPaper(PaperKind::Layout) => "Drawings",
+            Self::ExportPaper(PaperKind::Solids) => "Solids",
             _ => "Lenses",
         }
     }
@@ -252,6 +263,9 @@ mod tests {
         assert_eq!(complete(FileRequest::Save, "a/lens"), PathBuf::from("a/lens.json"));
         assert_eq!(complete(FileRequest::Save, "a/lens.v2"), PathBuf::from("a/lens.v2"));
         assert_eq!(complete(FileRequest::ExportZemax, "lens"), PathBuf::from("lens.zmx"));
+        let report = FileRequest::ExportPaper(PaperKind::Report);
+        assert_eq!(complete(report, "lens"), PathBuf::from("lens.pdf"));
+        assert_eq!(complete(report, "lens.html"), PathBuf::from("lens.html"));
         assert_eq!(complete(FileRequest::Open, "lens"), PathBuf::from("lens"));
         assert_eq!(complete(FileRequest::ExportFront, "front"), PathBuf::from("front"));
     }

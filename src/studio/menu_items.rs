@@ -15,6 +15,7 @@ use super::run_items;
 use crate::experiments::{self, Effort};
 use crate::files;
 use crate::lens::{Edit, ElementEdit, Lens};
+use crate::report::PaperKind;
 use crate::session::{Command, SessionView};
 
 /// Something that can be asked for.
@@ -148,6 +149,12 @@ impl MenuContext<'_> {
             MenuItem::new(MENU, "Save as…", FileRequest::Save).control_shift(Key::S),
             MenuItem::new(MENU, "Export for Zemax…", FileRequest::ExportZemax).control(Key::E),
             MenuItem::new(MENU, "Export a copy as JSON…", FileRequest::ExportJson),
+            MenuItem::new(MENU, "Export report…", FileRequest::ExportPaper(PaperKind::Report))
+                .hint("Data, layout, spots, MTF, effects and weights as PDF or HTML"),
+            MenuItem::new(MENU, "Export drawing…", FileRequest::ExportPaper(PaperKind::Layout))
+                .hint("The layout to scale as PDF, SVG or DXF"),
+            MenuItem::new(MENU, "Export STEP…", FileRequest::ExportPaper(PaperKind::Solids))
+                .hint("The elements as solids for mechanical design"),
             MenuItem::maybe(
                 MENU,
                 "Export the Pareto front…",

@@ -15,6 +15,7 @@ pub(super) const fn title(term: Term) -> &'static str {
         Term::Spot => "Spot",
         Term::SpotIntegral => "Spot × light",
         Term::Wavefront => "RMS wavefront",
+        Term::Strehl => "Strehl ratio",
         Term::GeometricMtf { .. } => "Geometric MTF",
         Term::Throughput => "Throughput",
         Term::ThroughputLoss(_) => "Throughput loss",
@@ -46,6 +47,10 @@ pub(super) const fn hint(term: Term) -> &'static str {
         Term::Wavefront => {
             "Mean square path difference from the sphere about the best image point, in waves: \
              sharpness of a lens near the diffraction limit"
+        }
+        Term::Strehl => {
+            "What the Strehl ratio about the brightest image point lacks of 1: for a lens close to the \
+             diffraction limit"
         }
         Term::GeometricMtf { .. } => {
             "Contrast of rays at a spatial frequency below this minimum, tangential and sagittal"
@@ -95,6 +100,7 @@ pub(super) const fn unit(term: Term) -> &'static str {
         Term::Spot
         | Term::SpotIntegral
         | Term::Wavefront
+        | Term::Strehl
         | Term::GeometricMtf { .. }
         | Term::Throughput
         | Term::Distortion
@@ -119,6 +125,7 @@ pub(super) fn targets(term: &mut Term) -> Vec<(&'static str, &mut f64)> {
         Term::Spot
         | Term::SpotIntegral
         | Term::Wavefront
+        | Term::Strehl
         | Term::Throughput
         | Term::Distortion
         | Term::Operand { .. } => Vec::new(),
@@ -148,6 +155,7 @@ pub(super) fn value_text(term: Term, value: f64) -> String {
         Term::Throughput => format!("{} mm²", number::format_digits(-value, 4)),
         Term::ThroughputLoss(_) => format!("{} %", short(100.0 * value)),
         Term::Wavefront => format!("{} waves", short(root)),
+        Term::Strehl => format!("{} of 1", short(1.0 - value)),
         _ if root < ROUNDING => "satisfied".to_owned(),
         Term::Light(_) | Term::RelativeIllumination { .. } => {
             format!("{} % short", short(100.0 * root))
