@@ -8,6 +8,7 @@
 
 mod adjoint_memory;
 mod aperture_stop;
+mod camera;
 mod entrance_pupil;
 mod fibre;
 mod gradient_image;
@@ -36,6 +37,7 @@ use crate::grin_design::{self, GrinOptimizer, GrinTask, GrinTaskError, Reference
 use crate::lens::{Lens, LensError};
 use crate::merit::MeritError;
 use crate::optimize::pareto::ParetoError;
+use crate::picture::PictureError;
 use crate::plot::NamedPlot;
 use crate::pupil::{LaunchError, RayModelError};
 use crate::search::MutationError;
@@ -160,6 +162,7 @@ fail_on!(
     MeritError,
     MutationError,
     ParetoError,
+    PictureError,
     RayModelError,
     ReferenceFieldError,
     SearchSetupError,

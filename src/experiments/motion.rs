@@ -2,20 +2,22 @@
 //! exposed to equal brightness of the image. The bright lens is less sharp, but its shorter
 //! exposure makes the moving target sharper.
 //!
-//! The brightness of an extended scene grows with the area of the pupil over the square of the
-//! focal length. Contrast is that of the spot on the axis, `|∫ exp(2πi ν x) dw| / ∫ dw`, times that
+//! The brightness of an extended scene on the axis is its radiance times the projected solid angle of the
+//! light there, so that exposures are in the inverse ratio of these. Pictures of moving bars by rays from
+//! every pixel check it, and the contrasts. Contrast is that of the spot on the axis, `|∫ exp(2πi ν x) dw| / ∫ dw`, times that
 //! of the motion `s` of the image during the exposure, `|sin(π ν s) / (π ν s)|`.
 
-use super::pareto_front::{ANGLES, plan};
-use super::sharpness_vs_light::{ProgressSpan, focal_length, run_sweep, with_field_angles};
+use super::camera::{CameraFrame, darkest_and_brightest, draw_pictures, take};
 use super::{
     Claim, DataTable, Effort, Experiment, ExperimentError, ExperimentOutcome, ExperimentResult,
-    NamedPlot, ProgressFn, lens,
+    NamedPlot, ProgressFn, report_progress,
 };
-use crate::lens::Lens;
+use crate::analysis::irradiance;
+use crate::lens::{FieldPoint, Lens};
 use crate::optimize::pareto::ParetoPoint;
+use crate::picture::{ExactSettings, Pattern, Picture, Scene, SceneLayer, filling_size};
 use crate::plot::{Axis, Canvas, Chart, Color, Legend, PALETTE, Stroke};
-use crate::pupil::{RayModel, Region};
+use crate::pupil::{Accuracy, RayModel, Region};
 use std::f64::consts::PI;
 
 pub(super) const EXPERIMENT: Experiment = Experiment {
@@ -23,13 +25,11 @@ pub(super) const EXPERIMENT: Experiment = Experiment {
     title: "A moving target at equal brightness",
     claim: "The brightest lens of a front needs a fraction of the time of the darkest one, and shows \
             sharper what moves",
-    omits: "the simulated images of the moving target; contrasts are computed on the axis in \
-            their place",
-    seconds: 5.0,
+    omits: "the colours of the simulated images",
+    seconds: 15.0,
     run,
 };
 
-const LENS: &str = "double_gauss_rudolph_50";
 /// The order of quadrature.
 const ORDER: usize = 6;
 /// The range of frequencies plotted, in cycles/mm.
@@ -39,24 +39,37 @@ const STEPS: usize = 80;
 const WAY: f64 = 0.2;
 /// The frequency at which both are compared, in cycles/mm.
 const COMPARED: f64 = 4.0;
+/// The periods and the columns of a picture of moving bars.
+const PERIODS: f64 = 2.0;
+const COLUMNS: usize = 48;
+/// The sampling error of pictures, and the difference from a prediction that is allowed.
+const SAMPLING: f64 = 0.01;
+const EQUAL: f64 = 0.02;
+/// The diagonal of the pictures of the target, in mm.
+const TARGET: f64 = 4.0;
+const ACCURACY: Accuracy = Accuracy { tolerance: 1e-6, max_rays: 100_000 };
 /// The minimum ratio of the exposure times.
 const TIMES: f64 = 2.0;
 
 fn run(effort: Effort, progress: &mut ProgressFn<'_>) -> ExperimentResult {
-    let start = with_field_angles(lens(LENS)?, &ANGLES);
-    let part = ProgressSpan { from: 0.0, to: 1.0, name: "front of sharpness and light" };
-    let designs = run_sweep(&start, &plan(effort), part, progress)?;
-    let [Some(bright), Some(dark)] = [designs.get(1), designs.last()] else {
-        return Err(ExperimentError::Failed("no design was found".to_owned()));
-    };
+    let designs = darkest_and_brightest(effort, 0.7, progress)?;
     let mut rays = 0;
-    let [dark, bright] = [Exposure::of(dark, &mut rays)?, Exposure::of(bright, &mut rays)?];
+    let [dark, bright] =
+        [MovingShot::of(&designs[0], &mut rays)?, MovingShot::of(&designs[1], &mut rays)?];
     let times = bright.brightness / dark.brightness;
     let pair = ExposurePair { dark, bright, exposure_ratio: times };
+    report_progress(progress, 0.7, "pictures of moving bars")?;
+    let mut claims = pair.claims();
+    claims.extend(pair.picture_claims(&mut rays)?);
+    report_progress(progress, 0.8, "pictures of the moving target")?;
+    let target = pair.draw_target(effort.select(140, 24), &mut rays)?;
     Ok(ExperimentOutcome {
-        claims: pair.claims(),
+        claims,
         tables: vec![pair.lenses(), pair.table()],
-        pictures: vec![NamedPlot { name: "contrast", canvas: pair.draw() }],
+        pictures: vec![
+            NamedPlot { name: "contrast", canvas: pair.draw() },
+            NamedPlot { name: "target", canvas: target },
+        ],
         lenses: vec![
             ("darkest".to_owned(), pair.dark.design.lens.clone()),
             ("brightest".to_owned(), pair.bright.design.lens.clone()),
@@ -66,26 +79,86 @@ fn run(effort: Effort, progress: &mut ProgressFn<'_>) -> ExperimentResult {
 }
 
 /// A lens with its brightness and its spot on the axis.
-struct Exposure {
+struct MovingShot {
     design: ParetoPoint,
-    /// The light per image area, in arbitrary units, and its relative error.
+    /// The height of the image over the tangent of its field angle near the axis, in mm: the focal length
+    /// but for the defocus of the image plane.
+    scale: f64,
+    /// The projected solid angle of the light on the axis, and its relative error.
     brightness: f64,
     error: f64,
     /// The x coordinates in mm and the weights of the rays of the field on the axis.
     spot: Vec<[f64; 2]>,
 }
 
-impl Exposure {
+impl MovingShot {
     fn of(design: &ParetoPoint, rays: &mut usize) -> ExperimentResult<Self> {
-        let focal = focal_length(&design.lens)?;
         let spot = spot(&design.lens, rays)?;
-        *rays += design.rays;
+        let model = RayModel::from_lens(&design.lens, 0)?;
+        let light = irradiance(&model, model.primary, [0.0; 2], ACCURACY);
+        let light = light.map_err(|error| ExperimentError::Failed(error.to_string()))?;
+        *rays += design.rays + light.rays;
         Ok(Self {
-            brightness: design.light / (focal * focal),
-            error: design.light_error / design.light,
+            scale: image_scale(&model)?,
+            brightness: light.value,
+            error: light.error / light.value,
             spot,
             design: design.clone(),
         })
+    }
+
+    /// A picture during an exposure of this many seconds of a layer that the image of moves by [`WAY`] to the
+    /// right in a second.
+    fn picture(
+        &self,
+        frame: &CameraFrame,
+        seconds: f64,
+        pattern: impl Fn(f64) -> Pattern,
+        rays: &mut usize,
+    ) -> ExperimentResult<Picture> {
+        let settings = ExactSettings { tolerance: SAMPLING, seconds, ..ExactSettings::default() };
+        let shot = take(&self.design.lens, frame, &settings, |model, frame| {
+            let half_size = match pattern(self.scale) {
+                Pattern::Bars => filling_size(model, frame, None)?,
+                _ => [f64::INFINITY; 2],
+            };
+            let velocity = [WAY / self.scale, 0.0];
+            let pattern = pattern(self.scale);
+            let layer =
+                SceneLayer { distance: None, center: [0.0; 2], half_size, velocity, pattern };
+            Scene::new(vec![layer], [1.0; 3], 1.0)
+        })?;
+        *rays += shot.picture.rays;
+        Ok(shot.picture)
+    }
+
+    /// The contrast of moving bars in a picture of them, and its standard error; and the mean light.
+    fn pictured(&self, seconds: f64, rays: &mut usize) -> ExperimentResult<[f64; 3]> {
+        let width = PERIODS / COMPARED;
+        let rows = 4;
+        let pitch = width / COLUMNS as f64;
+        let diagonal = Some(pitch * (COLUMNS as f64).hypot(rows as f64));
+        let frame = CameraFrame { pixels: [COLUMNS, rows], diagonal };
+        let wave = |scale: f64| Pattern::Wave {
+            contrast: 1.0,
+            frequency: [COMPARED * scale, 0.0],
+            phase: 0.0,
+        };
+        let picture = self.picture(&frame, seconds, wave, rays)?;
+        let mut sums = [0.0; 4];
+        for (i, (value, error)) in picture.values.iter().zip(&picture.errors).enumerate() {
+            let phase = 2.0 * PI * PERIODS * ((i % COLUMNS) as f64 + 0.5) / COLUMNS as f64;
+            let (sin, cos) = phase.sin_cos();
+            let terms = [value[0], value[0] * cos, value[0] * sin, error[0] * error[0]];
+            sums = [0, 1, 2, 3].map(|k| sums[k] + terms[k]);
+        }
+        let [light, re, im, squares] = sums;
+        // A pixel averages over its width.
+        let half = PI * COMPARED * pitch;
+        let pixel = half.sin() / half;
+        let contrast = 2.0 * re.hypot(im) / light / pixel;
+        let error = (2.0 * squares).sqrt() / light;
+        Ok([contrast, error, light / picture.values.len() as f64])
     }
 
     /// The contrast at a frequency in cycles/mm of a target whose image moves by `distance`,
@@ -121,10 +194,19 @@ fn spot(lens: &Lens, rays: &mut usize) -> ExperimentResult<Vec<[f64; 2]>> {
 /// The number of azimuths to which a radius of the spot on the axis is rotated.
 const AZIMUTHS: usize = 32;
 
+/// The height of the image over the tangent of its field angle near the axis, in mm.
+fn image_scale(model: &RayModel) -> ExperimentResult<f64> {
+    const DEGREES: f64 = 0.05;
+    let field = FieldPoint { x: 0.0, y: DEGREES, weight: 1.0 };
+    let chief = model.chief_point(field, model.primary);
+    let [_, height] = chief.map_err(|error| ExperimentError::Failed(error.to_string()))?;
+    Ok(height / DEGREES.to_radians().tan())
+}
+
 /// Both lenses at equal brightness.
 struct ExposurePair {
-    dark: Exposure,
-    bright: Exposure,
+    dark: MovingShot,
+    bright: MovingShot,
     /// The exposure time of the dark lens relative to that of the bright one.
     exposure_ratio: f64,
 }
@@ -164,6 +246,53 @@ impl ExposurePair {
                 1.1,
             ),
         ]
+    }
+
+    /// The claims that pictures by rays from every pixel check.
+    fn picture_claims(&self, rays: &mut usize) -> ExperimentResult<Vec<Claim>> {
+        let [dark, dark_error, dark_light] = self.dark.pictured(1.0, rays)?;
+        let seconds = self.exposure_ratio.recip();
+        let [bright, bright_error, bright_light] = self.bright.pictured(seconds, rays)?;
+        let [_, _, moving_dark, moving_bright] = self.contrasts(COMPARED);
+        let predicted = moving_bright / moving_dark;
+        let error = (dark_error / dark).hypot(bright_error / bright);
+        // The mean of bars is half of the light; each picture counts its own time.
+        let equal = bright_light * seconds / dark_light;
+        let light_error = (dark_error.hypot(bright_error)) / 2f64.sqrt();
+        Ok(vec![
+            Claim::at_most(
+                "exposures by the inverse ratio of solid angles: brightness of the pictures over each \
+                 other, less 1",
+                (equal - 1.0).abs(),
+                EQUAL,
+            )
+            .with_error(light_error),
+            Claim::at_least("moving bars in the pictures: contrast bright over dark", bright / dark, 1.1)
+                .with_error(error * bright / dark),
+            Claim::at_most(
+                "that ratio over the computed one, less 1",
+                (bright / dark / predicted - 1.0).abs(),
+                EQUAL,
+            )
+            .with_error(error),
+        ])
+    }
+
+    /// The moving target through both lenses.
+    fn draw_target(&self, columns: usize, rays: &mut usize) -> ExperimentResult<Canvas> {
+        let frame = CameraFrame { pixels: [columns; 2], diagonal: Some(TARGET) };
+        let mut levels = |shot: &MovingShot, seconds: f64| {
+            let picture = shot.picture(&frame, seconds, |_| Pattern::Bars, rays)?;
+            let white = picture.white;
+            Ok::<_, ExperimentError>(
+                picture.values.iter().map(|v| v[0] / white).collect::<Vec<_>>(),
+            )
+        };
+        let bright = levels(&self.bright, self.exposure_ratio.recip())?;
+        let dark = levels(&self.dark, 1.0)?;
+        let pictures = [("brightest, short", bright), ("darkest, long", dark)];
+        let title = "a target that moves to the right, at equal brightness";
+        Ok(draw_pictures(title, &pictures, columns, (1.0 / 2.2, 0.0)).0)
     }
 
     fn lenses(&self) -> DataTable {
