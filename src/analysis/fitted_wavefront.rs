@@ -11,6 +11,7 @@ use crate::math::{Dual, Vec3};
 use crate::pupil::{Nodes, Region};
 use crate::trace::{AdjointSeed, Landings, Ray, Rays, TraceSink as _, Tracer};
 use nalgebra::{DMatrix, DVector, Matrix2, Vector2};
+use std::f64::consts::TAU;
 
 /// A path difference in waves with its derivatives by the image point across the axis (2), by the end
 /// of the ray (3) and by its direction there (3).
@@ -71,6 +72,15 @@ impl WavefrontReference {
     }
 }
 
+/// The number of a wavefront that is made small.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum WavefrontCost {
+    /// The mean square, in squared waves.
+    MeanSquare,
+    /// One minus the Strehl ratio `|mean exp(2πi W)|²`.
+    StrehlLoss,
+}
+
 /// The wavefront of a pupil about its best image point.
 #[derive(Debug, Clone)]
 pub struct FittedWavefront {
@@ -82,6 +92,8 @@ pub struct FittedWavefront {
     waves: Vec<WaveDual>,
     /// The mean square, in squared waves.
     pub mean_square: f64,
+    /// The mean of exp(2πi W), its real and imaginary part; known about the brightest image point.
+    phasor: [f64; 2],
 }
 
 /// The corrections of the image point; each leaves the square of the error of the one before.
@@ -89,6 +101,9 @@ const CORRECTIONS: usize = 6;
 /// A correction is the last one if it changes the mean square by less than this share: the tilt that
 /// it leaves is as small as the square of the one that it has removed.
 const SETTLED: f64 = 1e-12;
+/// The steps to the brightest image point, and the shorter ones that are tried in place of each.
+const BRIGHTENINGS: usize = 20;
+const HALVINGS: usize = 6;
 /// A tilt is told from the mean square slope of the waves above this share of the larger one.
 const TILTED: f64 = 1e-12;
 
@@ -141,7 +156,18 @@ impl FittedWavefront {
         let piston = remove_mean(&mut waves) + remove_mean(&mut waves);
         let squares = waves.iter().zip(weights).map(|(wave, w)| w * wave.value * wave.value);
         let mean_square = squares.sum::<f64>() / total;
-        Some(Self { reference, center, piston, waves, mean_square })
+        Some(Self { reference, center, piston, waves, mean_square, phasor: [0.0; 2] })
+    }
+
+    /// The same with its phasor.
+    fn with_phasor(mut self, weights: &[f64]) -> Self {
+        let total: f64 = weights.iter().sum();
+        let phasors = self.waves.iter().zip(weights).map(|(wave, w)| {
+            let (sin, cos) = (TAU * wave.value).sin_cos();
+            [w * cos / total, w * sin / total]
+        });
+        self.phasor = phasors.fold([0.0; 2], |sum, p| [sum[0] + p[0], sum[1] + p[1]]);
+        self
     }
 
     /// The displacement of the image point to where the mean square is least in first order, in mm.
@@ -170,15 +196,115 @@ impl FittedWavefront {
         }
     }
 
-    /// The square of a ray's path difference against the mean; 0 if it misses the sphere.
-    pub fn square(&self, at: &ImageRay) -> f64 {
-        let wave = self.reference.wave(at, self.center);
-        wave.map_or(0.0, |wave| (wave.value - self.piston).powi(2))
+    /// The same wavefront about the image point nearby where the Strehl ratio is largest.
+    #[must_use]
+    pub fn brightest(self, rays: &[ImageRay], weights: &[f64], mirrored: bool) -> Self {
+        let mut best = self.with_phasor(weights);
+        for _ in 0..BRIGHTENINGS {
+            let mut step = best.brighter(weights, mirrored);
+            let mut next = None;
+            for _ in 0..HALVINGS {
+                let center = [best.center[0] + step[0], best.center[1] + step[1]];
+                let tried = Self::about(best.reference, rays, weights, center);
+                let tried = tried.map(|tried| tried.with_phasor(weights));
+                next = tried.filter(|tried| tried.strehl() > best.strehl());
+                if next.is_some() {
+                    break;
+                }
+                step = step.map(|v| 0.25 * v);
+            }
+            let Some(next) = next else { break };
+            best = next;
+        }
+        best
     }
 
-    /// The path difference of a ray, in waves.
-    pub fn wave(&self, ray: usize) -> f64 {
-        self.waves[ray].value
+    /// The displacement of the image point to where the Strehl ratio is largest by its derivatives, in mm;
+    /// uphill if these do not describe a maximum.
+    fn brighter(&self, weights: &[f64], mirrored: bool) -> [f64; 2] {
+        let total: f64 = weights.iter().sum();
+        let [re, im] = self.phasor;
+        let (mut first, mut cross, mut second) = ([[0.0; 2]; 2], [0.0; 2], [0.0; 3]);
+        for (wave, weight) in self.waves.iter().zip(weights) {
+            let (sin, cos) = (TAU * wave.value).sin_cos();
+            let [x, y] = [0, 1].map(|axis| TAU * wave.slope[axis]);
+            let share = weight / total;
+            // exp(2πi W) turned by the phase of the mean: U* exp(2πi W).
+            let (along, across) = (re * cos + im * sin, re * sin - im * cos);
+            for (axis, slope) in [x, y].into_iter().enumerate() {
+                cross[axis] -= share * slope * across;
+                first[axis] =
+                    [first[axis][0] - share * slope * sin, first[axis][1] + share * slope * cos];
+            }
+            for (sum, product) in second.iter_mut().zip([x * x, x * y, y * y]) {
+                *sum -= share * product * along;
+            }
+        }
+        let dot = |a: [f64; 2], b: [f64; 2]| a[0] * b[0] + a[1] * b[1];
+        let gradient = [0, 1].map(|axis| 2.0 * cross[axis]);
+        let xx = 2.0 * (dot(first[0], first[0]) + second[0]);
+        let xy = 2.0 * (dot(first[0], first[1]) + second[1]);
+        let yy = 2.0 * (dot(first[1], first[1]) + second[2]);
+        if mirrored || !(xx < TILTED * yy) {
+            return [0.0, if yy < 0.0 { -gradient[1] / yy } else { 0.0 }];
+        }
+        let determinant = xx * yy - xy * xy;
+        if xx < 0.0 && determinant > 0.0 {
+            let [gx, gy] = gradient;
+            return [(xy * gy - yy * gx) / determinant, (xy * gx - xx * gy) / determinant];
+        }
+        [0.0; 2]
+    }
+
+    /// The Strehl ratio about the brightest image point: the intensity at the image point over that without path differences.
+    pub fn strehl(&self) -> f64 {
+        self.phasor[0].powi(2) + self.phasor[1].powi(2)
+    }
+
+    /// The number that is made small.
+    pub fn cost(&self, cost: WavefrontCost) -> f64 {
+        match cost {
+            WavefrontCost::MeanSquare => self.mean_square,
+            WavefrontCost::StrehlLoss => 1.0 - self.strehl(),
+        }
+    }
+
+    /// The derivative of a cost by the path difference of a ray, over the ray's share of the light.
+    pub fn cost_slope(&self, cost: WavefrontCost, ray: usize) -> f64 {
+        let wave = self.waves[ray].value;
+        match cost {
+            WavefrontCost::MeanSquare => 2.0 * wave,
+            WavefrontCost::StrehlLoss => {
+                let (sin, cos) = (TAU * wave).sin_cos();
+                2.0 * TAU * (self.phasor[0] * sin - self.phasor[1] * cos)
+            }
+        }
+    }
+
+    /// The change of a cost by the share of the light that comes with a ray; 0 if it misses the sphere.
+    pub fn cost_excess(&self, cost: WavefrontCost, at: &ImageRay) -> f64 {
+        match cost {
+            WavefrontCost::MeanSquare => self.square(at) - self.mean_square,
+            WavefrontCost::StrehlLoss => self.reference.wave(at, self.center).map_or(0.0, |wave| {
+                let (sin, cos) = (TAU * (wave.value - self.piston)).sin_cos();
+                2.0 * (self.strehl() - self.phasor[0] * cos - self.phasor[1] * sin)
+            }),
+        }
+    }
+
+    /// The factor between half of the second derivatives of a cost and those of the mean square, near a
+    /// good image.
+    pub fn cost_curvature(&self, cost: WavefrontCost) -> f64 {
+        match cost {
+            WavefrontCost::MeanSquare => 1.0,
+            WavefrontCost::StrehlLoss => TAU * TAU * self.strehl(),
+        }
+    }
+
+    /// The square of a ray's path difference against the mean; 0 if it misses the sphere.
+    fn square(&self, at: &ImageRay) -> f64 {
+        let wave = self.reference.wave(at, self.center);
+        wave.map_or(0.0, |wave| (wave.value - self.piston).powi(2))
     }
 
     /// The derivatives of a path difference by the landing of its ray.
@@ -239,6 +365,23 @@ pub fn image_rays(
 /// The RMS wavefront at some nodes of a pupil, in waves; `None` if no ray arrives or one misses the
 /// sphere.
 pub fn rms_without_tilt(region: &Region<'_>, nodes: &Nodes, form: ReferenceForm) -> Option<f64> {
+    let (fitted, _, _) = fitted_at(region, nodes, form)?;
+    Some(fitted.mean_square.sqrt())
+}
+
+/// The Strehl ratio about the brightest image point at some nodes of a pupil, as of
+/// [`FittedWavefront::strehl`]; `None` if no ray arrives or one misses the sphere.
+pub fn brightest_strehl(region: &Region<'_>, nodes: &Nodes, form: ReferenceForm) -> Option<f64> {
+    let (fitted, rays, weights) = fitted_at(region, nodes, form)?;
+    Some(fitted.brightest(&rays, &weights, nodes.mirrored).strehl())
+}
+
+/// The wavefront at some nodes of a pupil, with its rays and their weights.
+fn fitted_at(
+    region: &Region<'_>,
+    nodes: &Nodes,
+    form: ReferenceForm,
+) -> Option<(FittedWavefront, Vec<ImageRay>, Vec<f64>)> {
     let traced = region.trace_nodes(nodes);
     let channel = region.launch.channel();
     let reference = WavefrontReference::new(&channel.system, channel.um, form);
@@ -246,5 +389,5 @@ pub fn rms_without_tilt(region: &Region<'_>, nodes: &Nodes, form: ReferenceForm)
     let arrived = traced.landed.arrivals().filter_map(|(i, weight)| Some((ends[i]?, weight)));
     let (rays, weights): (Vec<_>, Vec<_>) = arrived.unzip();
     let fitted = FittedWavefront::new(reference, &rays, &weights, nodes.mirrored)?;
-    Some(fitted.mean_square.sqrt())
+    Some((fitted, rays, weights))
 }

@@ -41,7 +41,8 @@ pub use diffraction::{
 pub use distortion::{Distortion, FieldCurvature, distortion, field_curvature};
 pub use fan::{Fan, FanPoint, fan};
 pub use fitted_wavefront::{
-    FittedWavefront, ImageRay, WavefrontReference, image_rays, rms_without_tilt,
+    FittedWavefront, ImageRay, WavefrontCost, WavefrontReference, brightest_strehl, image_rays,
+    rms_without_tilt,
 };
 pub use footprint::{Footprint, footprint};
 pub use ghosts::{

@@ -99,6 +99,9 @@ pub enum Term {
     /// The mean square wavefront, in squared waves of each wavelength: path differences from a sphere
     /// about the image point that makes them least, over fields and wavelengths by weight.
     Wavefront,
+    /// The rest of 1 that the Strehl ratio lacks, about the image point that makes it largest nearby: the intensity
+    /// there over that of the same rays without path differences, over fields and wavelengths by weight.
+    Strehl,
     /// The mean squared shortfall of the geometric modulation transfer, tangential and sagittal, from
     /// a minimum, over fields by weight.
     GeometricMtf {
@@ -192,6 +195,7 @@ impl Term {
             Self::BackFocus(_) => "back_focus",
             Self::SpotIntegral => "spot_integral",
             Self::Wavefront => "wavefront",
+            Self::Strehl => "strehl",
             Self::GeometricMtf { .. } => "geometric_mtf",
             Self::Throughput => "throughput",
             Self::ThroughputLoss(_) => "throughput_loss",
@@ -210,6 +214,7 @@ impl Term {
             Self::Spot
             | Self::SpotIntegral
             | Self::Wavefront
+            | Self::Strehl
             | Self::Throughput
             | Self::Distortion => Vec::new(),
             Self::GeometricMtf { frequency, min } => vec![frequency, min],
@@ -237,6 +242,7 @@ impl Term {
             Self::Spot
             | Self::SpotIntegral
             | Self::Wavefront
+            | Self::Strehl
             | Self::GeometricMtf { .. }
             | Self::Throughput
             | Self::ThroughputLoss(_)
@@ -293,6 +299,7 @@ impl Term {
             Self::Spot
             | Self::SpotIntegral
             | Self::Wavefront
+            | Self::Strehl
             | Self::Throughput
             | Self::Light(_)
             | Self::RelativeIllumination { .. }

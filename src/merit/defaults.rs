@@ -26,6 +26,8 @@ const CORNER_ILLUMINATION: f64 = 0.5;
 
 /// The radius of the blur of an RMS wavefront of one wave, over wavelength and f-number.
 const WAVE_BLUR: f64 = 8.0;
+/// The radius of the blur of an image without any of its Strehl ratio, likewise.
+const STREHL_BLUR: f64 = 1.2;
 /// A wavelength of visible light, in mm.
 const PRIMARY: f64 = 5.5e-4;
 /// The spatial frequency of a proposed contrast, in cycles/mm, and its minimum: those of a picture on
@@ -176,6 +178,7 @@ pub fn default_terms(lens: &Lens, zoom: usize, figures: &LensFigures) -> Vec<Wei
     vec![
         unit(Term::Spot),
         weighted(Term::SpotIntegral, 1.0 / light),
+        weighted(Term::Strehl, (STREHL_BLUR * f_number * PRIMARY).powi(2)),
         weighted(Term::Wavefront, (WAVE_BLUR * f_number * PRIMARY).powi(2)),
         weighted(Term::GeometricMtf { frequency: MTF_FREQUENCY, min: MTF_MIN }, spot),
         weighted(Term::Light(1.0), given_away),

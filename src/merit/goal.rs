@@ -24,7 +24,11 @@ impl Term {
     pub(super) const fn is_of_rays(self) -> bool {
         matches!(
             self,
-            Self::Spot | Self::SpotIntegral | Self::Wavefront | Self::GeometricMtf { .. }
+            Self::Spot
+                | Self::SpotIntegral
+                | Self::Wavefront
+                | Self::Strehl
+                | Self::GeometricMtf { .. }
         )
     }
 
@@ -35,6 +39,7 @@ impl Term {
             Self::Spot
                 | Self::SpotIntegral
                 | Self::Wavefront
+                | Self::Strehl
                 | Self::GeometricMtf { .. }
                 | Self::Throughput
                 | Self::ThroughputLoss(_)
@@ -109,7 +114,10 @@ impl Goal {
                 return refuse("its target is not finite");
             }
             term.check_bounds()?;
-            let focal = matches!(term, Term::FocalLength(_) | Term::FNumber(_) | Term::Wavefront);
+            let focal = matches!(
+                term,
+                Term::FocalLength(_) | Term::FNumber(_) | Term::Wavefront | Term::Strehl
+            );
             if focal && focal_lengths(lens)?.contains(&None) {
                 return refuse("the lens is afocal");
             }

@@ -35,6 +35,7 @@ pub use defaults::{GoalLimits, LensFigures, MAX_STEEPNESS, default_terms};
 pub use limits::{Limit, LimitedSum};
 pub use sampling::SpotSampling;
 
+use crate::analysis::WavefrontCost;
 use crate::lens::{Lens, LensError, SurfaceNumber, Variable};
 use crate::math::Dual;
 use crate::pupil::{LaunchError, QuadraticIntegrand, RayModel, RayModelError, TracedPupil};
@@ -318,6 +319,7 @@ impl Merit {
         let rays = sampled.iter().map(|s| s.rays).sum();
         match term {
             Term::Spot | Term::SpotIntegral | Term::Wavefront => (2.0 * worst * value, rays),
+            Term::Strehl => (self.transfer_error(), rays),
             Term::GeometricMtf { .. } => {
                 let worst = self.transfer_error();
                 (worst * (2.0 * value.max(0.0).sqrt() + worst), rays)
@@ -338,7 +340,9 @@ impl Merit {
     fn is_sampled(&self, term: Term) -> bool {
         let worst = self.spot_samplings().iter().fold(0.0, |e: f64, s| e.max(s.error));
         match term {
-            Term::GeometricMtf { .. } => self.transfer_error() <= TRANSFER_SCALE * self.tolerance,
+            Term::GeometricMtf { .. } | Term::Strehl => {
+                self.transfer_error() <= TRANSFER_SCALE * self.tolerance
+            }
             _ if term.is_of_rays() || term.concerns_light() => worst <= self.tolerance,
             _ => true,
         }
@@ -439,7 +443,12 @@ impl Merit {
                 Term::SpotIntegral => {
                     spot::add_spot(context, spot::Normalization::Unnormalized, scope, sum)?;
                 }
-                Term::Wavefront => wavefront::add_wavefront(context, scope, sum)?,
+                Term::Wavefront => {
+                    wavefront::add_wavefront(context, WavefrontCost::MeanSquare, scope, sum)?;
+                }
+                Term::Strehl => {
+                    wavefront::add_wavefront(context, WavefrontCost::StrehlLoss, scope, sum)?;
+                }
                 Term::GeometricMtf { frequency, min } => {
                     contrast::add_contrast_shortfall(context, [frequency, min], scope, sum)?;
                 }

@@ -1,7 +1,7 @@
 //! The rays that spots are computed from: the pupils, sampled once to a tolerance.
 
 use super::{Goal, MeritError, Term};
-use crate::analysis::{ReferenceForm, rms_without_tilt, transfer};
+use crate::analysis::{ReferenceForm, brightest_strehl, rms_without_tilt, transfer};
 use crate::lens::{FieldPoint, Lens, TermScope, TermSelection};
 use crate::pupil::{
     Accuracy, Aiming, FixedLaunch, Launch, Nodes, PupilMoments, RayModel, Region, RegionKind,
@@ -41,6 +41,8 @@ pub(super) const TRANSFER_SCALE: f64 = 5.0;
 pub(super) struct SamplingDemand {
     /// True if a term asks for wavefronts, and so for optical paths.
     pub(super) wavefront: bool,
+    /// True if a term asks for the Strehl ratio, which needs more rays.
+    pub(super) strehl: bool,
     /// The spatial frequencies of terms about contrast, in cycles/mm.
     pub(super) frequencies: Vec<f64>,
 }
@@ -51,6 +53,7 @@ impl SamplingDemand {
         for weighted in &goal.terms {
             match weighted.term {
                 Term::Wavefront => demand.wavefront = true,
+                Term::Strehl => (demand.wavefront, demand.strehl) = (true, true),
                 Term::GeometricMtf { frequency, .. } => demand.frequencies.push(frequency),
                 _ => {}
             }
@@ -58,8 +61,8 @@ impl SamplingDemand {
         demand
     }
 
-    /// The numbers that must converge: the radius of the spot, the RMS wavefront if it is asked for, and the
-    /// transfer at each frequency. `None` if no ray arrives.
+    /// The numbers that must converge: the radius of the spot, the RMS wavefront and the Strehl ratio if they are
+    /// asked for, and the transfer at each frequency. `None` if no ray arrives.
     fn numbers(
         &self,
         region: &Region<'_>,
@@ -73,6 +76,9 @@ impl SamplingDemand {
         let mut numbers = vec![moments.rms_radius()];
         if let Some(form) = reference {
             numbers.push(rms_without_tilt(region, nodes, form).unwrap_or(0.0));
+            if self.strehl {
+                numbers.push(brightest_strehl(region, nodes, form).unwrap_or(0.0));
+            }
         }
         if !self.frequencies.is_empty() {
             numbers.extend(transfer(region, nodes, moments.centroid, &self.frequencies)?);
@@ -80,7 +86,8 @@ impl SamplingDemand {
         Some(numbers)
     }
 
-    /// The scales of [`SamplingDemand::numbers`]: lengths and waves are relative, a transfer is not.
+    /// The scales of [`SamplingDemand::numbers`]: lengths and waves are relative, a Strehl
+    /// ratio and a transfer are not.
     fn scales(&self, numbers: &[f64]) -> Vec<f64> {
         let relative = 1 + usize::from(self.wavefront);
         let scale = |(i, value): (usize, &f64)| if i < relative { *value } else { TRANSFER_SCALE };

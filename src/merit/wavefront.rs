@@ -1,14 +1,14 @@
-//! The mean square wavefront of the pupils.
+//! The mean square wavefront of the pupils, and what their Strehl ratio lacks of 1.
 //!
-//! Piston and the image point are those that make the mean square least; as it is stationary in them,
-//! they are held fixed in its derivatives. The radius of the reference sphere is that of the lens in
+//! Piston and the image point are those that make either least; as it is stationary in them, they are
+//! held fixed in its derivatives. The radius of the reference sphere is that of the lens in
 //! which the rays were found.
 
 use super::scoped_part::ScopedPart;
 use super::spot::lost_ray_error;
 use super::sum::{DerivativeLevel, SumOfSquares};
 use super::{EvaluationContext, MeritError};
-use crate::analysis::{FittedWavefront, ImageRay, WavefrontReference, image_rays};
+use crate::analysis::{FittedWavefront, ImageRay, WavefrontCost, WavefrontReference, image_rays};
 use crate::lens::TermScope;
 use crate::pupil::TracedPupil;
 use crate::trace::{AdjointSeed, Landings, Rays, SystemGradient, TraceSink as _, Tracer};
@@ -24,11 +24,13 @@ struct PupilPart {
     /// The weights of its rays.
     weights: Vec<f64>,
     fitted: FittedWavefront,
+    cost: WavefrontCost,
 }
 
-/// Adds the mean square wavefronts, in squared waves.
+/// Adds the mean costs of the wavefronts.
 pub(super) fn add_wavefront(
     context: &EvaluationContext<'_>,
+    cost: WavefrontCost,
     scope: TermScope,
     sum: &mut SumOfSquares,
 ) -> Result<(), MeritError> {
@@ -36,9 +38,9 @@ pub(super) fn add_wavefront(
     for wavelength in 0..context.sampling.channels.len() {
         let system = &context.systems.unclipped[wavelength];
         let tracer = Tracer::new(system).map_err(crate::lens::LensError::from)?;
-        let pupils = fit_pupils(context, &tracer, wavelength, part)?;
+        let pupils = fit_pupils(context, &tracer, wavelength, (part, cost))?;
         for pupil in &pupils {
-            sum.value += pupil.weights.iter().sum::<f64>() * pupil.fitted.mean_square;
+            sum.value += pupil.weights.iter().sum::<f64>() * pupil.fitted.cost(cost);
         }
         if sum.level > DerivativeLevel::Value {
             add_gradient(context, &tracer, wavelength, &pupils, sum);
@@ -56,7 +58,7 @@ fn fit_pupils(
     context: &EvaluationContext<'_>,
     tracer: &Tracer<f64>,
     wavelength: usize,
-    part: ScopedPart,
+    (part, cost): (ScopedPart, WavefrontCost),
 ) -> Result<Vec<PupilPart>, MeritError> {
     let channel = &context.sampling.channels[wavelength];
     let system = &context.systems.unclipped[wavelength];
@@ -79,8 +81,12 @@ fn fit_pupils(
         let weights: Vec<f64> = channel.weights[range.clone()].iter().map(|w| factor * w).collect();
         let mirrored = channel.mirrored[pupil.field];
         let fitted = FittedWavefront::new(reference, &own, &weights, mirrored);
-        let fitted = fitted.ok_or(MISSES_SPHERE)?;
-        pupils.push(PupilPart { wavelength, field: pupil.field, range, weights, fitted });
+        let brightest = |fitted: FittedWavefront| match cost {
+            WavefrontCost::MeanSquare => fitted,
+            WavefrontCost::StrehlLoss => fitted.brightest(&own, &weights, mirrored),
+        };
+        let fitted = fitted.map(brightest).ok_or(MISSES_SPHERE)?;
+        pupils.push(PupilPart { wavelength, field: pupil.field, range, weights, fitted, cost });
     }
     Ok(pupils)
 }
@@ -101,7 +107,7 @@ fn add_gradient(
     let mut seeds = vec![AdjointSeed::default(); channel.rays.len()];
     for pupil in pupils {
         for (i, weight) in pupil.weights.iter().enumerate() {
-            let factor = 2.0 * weight * pupil.fitted.wave(i);
+            let factor = weight * pupil.fitted.cost_slope(pupil.cost, i);
             seeds[pupil.range.start + i] = pupil.fitted.seed(i, factor);
         }
     }
@@ -109,8 +115,8 @@ fn add_gradient(
     sum.gradient += context.zoom.by_variables(context.systems, wavelength, &by_number);
 }
 
-/// Adds the motion of the edges: the mean square of a pupil changes by the difference of the square at
-/// its edge from the mean, over its area.
+/// Adds the motion of the edges: the cost of a pupil changes by the excess that light at its edge brings,
+/// over its area.
 fn add_edge_motion(
     context: &EvaluationContext<'_>,
     tracer: &Tracer<f64>,
@@ -136,7 +142,7 @@ fn edge_motion(
     let share = part.weights.iter().sum::<f64>() / area;
     let costs = |rays: &Rays<f64>| {
         let ends = image_rays(tracer, rays, |i| traced.path_to(rays.get(i)));
-        let excess = |at: &ImageRay| part.fitted.square(at) - part.fitted.mean_square;
+        let excess = |at: &ImageRay| part.fitted.cost_excess(part.cost, at);
         ends.iter().map(|at| share * at.as_ref().map_or(0.0, excess)).collect()
     };
     let why = "the pupil is disconnected or not star-shaped, and the motion of its edge is unknown; \
@@ -157,7 +163,8 @@ fn add_normal_matrix(
     let by_variable = context.zoom.parameter_slopes(context.systems, wavelength, &moving);
     for pupil in pupils {
         let rays: Rays<f64> = pupil.range.clone().map(|i| channel.rays.get(i)).collect();
-        let roots: Vec<f64> = pupil.weights.iter().map(|weight| weight.sqrt()).collect();
+        let curvature = pupil.fitted.cost_curvature(pupil.cost);
+        let roots: Vec<f64> = pupil.weights.iter().map(|w| (w * curvature).sqrt()).collect();
         let seed = |_, ray: usize| pupil.fitted.seed(ray.min(roots.len() - 1), 1.0);
         let slopes = tracer.slopes_of_rays(&rays, &moving, 1, seed);
         let mut rows = DMatrix::from_row_slice(roots.len(), moving.len(), &slopes);

@@ -24,6 +24,54 @@ fn pupil(options: &[&str], asked: &[String]) -> Value {
 }
 
 #[test]
+fn the_pupils_of_the_books() {
+    let file = read("images.json");
+    for exact in list(&file["airy"]) {
+        let [um, f_number] = ["wavelength_um", "f_number"].map(|key| number(&exact[key]));
+        let unit = 1e-3 * um * f_number;
+        let mut asked = Vec::new();
+        for point in list(&exact["points"]) {
+            let r = number(&point["r_over_lambdaN"]) * unit;
+            asked.extend([format!("--at={r:.17},0"), format!("--radius={r:.17}")]);
+        }
+        asked.extend(
+            list(&exact["otf"]).iter().map(|otf| format!("--frequency=0,{}", otf["frequency"])),
+        );
+        let options = [format!("--um={um}"), format!("--f-number={f_number}")];
+        let found = pupil(&[&options[0], &options[1]], &asked);
+        for (i, point) in list(&exact["points"]).iter().enumerate() {
+            let place = format!("{point}");
+            close(&found["points"][i]["intensity"], &point["intensity"], 1e-10, &place);
+            close(&found["circles"][i]["energy"], &point["encircled"], INTEGRAL, &place);
+        }
+        for (i, otf) in list(&exact["otf"]).iter().enumerate() {
+            close(&found["transfer"][i]["re"], &otf["value"], INTEGRAL, &otf.to_string());
+        }
+    }
+}
+
+#[test]
+fn rings_have_their_share_of_light_in_circles() {
+    for exact in list(&read("images.json")["annular"]) {
+        let unit = 0.5e-3 * 2.0;
+        let asked: Vec<String> = list(&exact["points"])
+            .iter()
+            .map(|p| format!("--radius={:.17}", number(&p["r_over_lambdaN"]) * unit))
+            .collect();
+        let shadow = format!("--obscuration={}", exact["obscuration"]);
+        let found = pupil(&["--um=0.5", "--f-number=2", &shadow], &asked);
+        for (i, point) in list(&exact["points"]).iter().enumerate() {
+            close(
+                &found["circles"][i]["energy"],
+                &point["encircled"],
+                INTEGRAL,
+                &point.to_string(),
+            );
+        }
+    }
+}
+
+#[test]
 fn aberrations_by_name_are_those_of_the_books() {
     let unit = 0.5e-3 * 2.0;
     for exact in list(&read("images.json")["aberrated_disc"]) {
@@ -326,6 +374,33 @@ fn coatings_weaken_ghosts_by_the_square_of_their_reflection() {
     assert!(half < 0.6 * one, "{one:e} {half:e}");
     let [bare, single, v] = ["none", "single-layer", "v"].map(flux);
     assert!(v < single && single < 0.2 * bare, "{bare:e} {single:e} {v:e}");
+}
+
+#[test]
+fn a_ghost_of_a_real_beam_agrees_with_first_order_optics_near_the_axis() {
+    let mut file = read("images.json");
+    file["ghosts"]["epd"] = json!(0.2);
+    let lenses = file["lenses"].as_array_mut().unwrap();
+    for lens in lenses.iter_mut().filter(|lens| lens["id"] == "double_gauss_rudolph_50") {
+        lens["surfaces"][0]["semi_diameter"] = json!(0.1);
+    }
+    let lens = ghost_lens(&file);
+    let found = done_json(&["analyze", lens.0.to_str().unwrap(), "ghosts", "--field", "0"], "");
+    for ghost in list(&found["fields"][0]["ghosts"]) {
+        let whole = number(&ghost["clip_factor"]) == 1.0 && ghost["fates"]["clipped"] == 0;
+        if !whole || number(&ghost["paraxial_radius"]) < 0.05 {
+            continue;
+        }
+        // A thousand cells of a disc.
+        for (real, paraxial, tolerance) in
+            [("radius", "paraxial_radius", 0.02), ("irradiance", "paraxial_irradiance", 0.04)]
+        {
+            let ratio = number(&ghost[real]) / number(&ghost[paraxial]);
+            assert!((ratio - 1.0).abs() < tolerance, "{real} {ratio}: {ghost}");
+        }
+        let flux = number(&ghost["flux"][0]) / number(&ghost["transmitted"]);
+        assert!((flux - 1.0).abs() < 1e-3, "{flux}: {ghost}");
+    }
 }
 
 #[test]

@@ -29,6 +29,7 @@ mod grin_limits;
 mod grin_views;
 mod grin_wrong;
 mod hard_cases;
+mod image_hard_cases;
 mod images;
 mod images_cli;
 mod lens_library;

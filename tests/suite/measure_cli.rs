@@ -1,12 +1,34 @@
 //! `aplanat measure mtf` and `measure picture`: their numbers, and what is refused.
 
-use super::cli::{done_json, refused};
+use super::cli::{Scratch, done, done_json, refused};
 use serde_json::Value;
 
 const LENS: &str = "lenses/achromat_ac254_100.json";
 
 fn rows(report: &Value) -> Vec<Value> {
     report["lenses"][0]["rows"].as_array().unwrap().clone()
+}
+
+#[test]
+fn contrast_is_measured_both_ways_at_four_tolerances() {
+    let chart = Scratch::new("mtf.png");
+    let plot = chart.0.to_str().unwrap();
+    let report =
+        done_json(&["measure", "mtf", LENS, "--count", "2", "--highest", "8", "--plot", plot], "");
+    assert_eq!(report["lenses"][0]["fields"], serde_json::json!([0.0, 0.7, 1.0]));
+    assert_eq!(report["lenses"][0]["frequencies"], serde_json::json!([4.0, 8.0]));
+    let rows = rows(&report);
+    assert_eq!(rows.len(), 8);
+    for row in &rows {
+        let [error, tolerance] = ["error", "tolerance"].map(|key| row[key].as_f64().unwrap());
+        assert!(row["reached"] == true && error <= tolerance, "{row}");
+        assert!(row["ms"].as_f64().unwrap() > 0.0 && row["rays"].as_u64().unwrap() > 0, "{row}");
+    }
+    let png = std::fs::read(&chart.0).unwrap();
+    assert_eq!(&png[1..4], b"PNG");
+    let text = done(&["measure", "mtf", LENS, LENS, "--count", "1", "--highest", "2"], "");
+    assert!(text.contains("1 frequencies from 2 to 2 cycles/mm"), "{text}");
+    assert_eq!(text.matches("diffraction").count(), 8, "{text}");
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! Derivatives of every term by every kind of variable, against central differences.
 
-use aplanat::analysis::wavefront;
+use aplanat::analysis::{strehl, wavefront};
 use aplanat::files;
 use aplanat::lens::{
     Aperture, FieldKind, FieldPoint, Lens, Medium, Object, Parameter, Pickup, Quantity, Row,
@@ -100,12 +100,7 @@ pub(crate) fn check_term(
         let relative = error / (difference.abs() + scale);
         worst = worst.max(relative);
         let name = variable.parameter.to_string();
-        assert!(
-            relative < 2e-6,
-            "{} by {name}: {} and {difference}",
-            term.name(),
-            sum.gradient[i]
-        );
+        assert!(relative < 2e-6, "{} by {name}: {} and {difference}", term.name(), sum.gradient[i]);
         let same = (sum.gradient[i] - normal.gradient[i]).abs();
         assert!(
             same <= 1e-9 * sum.gradient.amax(),
@@ -473,4 +468,74 @@ fn the_default_goal_allows_the_glass_of_its_own_lens() {
             assert!(max >= thickest, "{}: {max} and {thickest}", bundled.name);
         }
     }
+}
+
+/// An achromat near the diffraction limit: steps of a hundredth of its Strehl ratio would be large.
+fn achromat() -> Lens {
+    let mut lens = bundled("achromat_ac254_100");
+    lens.variables.clear();
+    lens.fields.values = vec![
+        FieldPoint { x: 0.0, y: 0.0, weight: 1.0 },
+        FieldPoint { x: 0.0, y: 0.8, weight: 2.0 },
+    ];
+    for surface in 0..lens.surfaces.len() {
+        for quantity in [Quantity::Curvature, Quantity::Thickness] {
+            vary(&mut lens, surface, quantity);
+        }
+    }
+    lens
+}
+
+#[test]
+fn the_strehl_ratio_has_the_derivative_of_its_value() {
+    let lens = achromat();
+    check(&lens, Term::Strehl, PupilEdge::Frozen, |quantity| 0.002 * step(quantity));
+}
+
+#[test]
+fn the_strehl_ratio_includes_the_motion_of_the_pupil() {
+    let mut lens = achromat();
+    for surface in 0..lens.surfaces.len() {
+        let rim = Parameter::new(surface, Quantity::SemiDiameter);
+        let size = lens.get(rim).unwrap_or(12.0);
+        lens.set(rim, size * (1.0 + 1e-3 * surface as f64));
+        vary(&mut lens, surface, Quantity::SemiDiameter);
+    }
+    check(&lens, Term::Strehl, PupilEdge::Moving, |quantity| 0.002 * step(quantity));
+}
+
+/// A paraboloid is perfect on its axis; w waves of defocus at the rim leave `(sin πw / πw)²`.
+#[test]
+fn the_strehl_ratio_of_a_defocused_mirror_is_that_of_the_books() {
+    let loss = |defocus: f64| {
+        let mut lens = spherical_mirror();
+        lens.surfaces[0].conic = -1.0;
+        lens.surfaces[0].thickness = -100.0 + defocus;
+        let merit = Merit::new(&lens, &goal_of(Term::Strehl), 1e-8).unwrap();
+        (merit.value(&merit.values(&lens)).unwrap(), lens.wavelengths[0].um * 1e-3)
+    };
+    assert!(loss(0.0).0.abs() < 1e-9, "{:?}", loss(0.0));
+    // The sagitta of the wave at the rim: 1 − cos θ with tan(θ/2) = r/2f.
+    let rim = 2.0 * 0.05_f64.powi(2) / (1.0 + 0.05_f64.powi(2));
+    for defocus in [0.02, 0.05, 0.1] {
+        let (found, wavelength) = loss(defocus);
+        let phase = std::f64::consts::PI * defocus * rim / wavelength;
+        let exact = 1.0 - (phase.sin() / phase).powi(2);
+        assert!((found - exact).abs() < 2e-3 * exact, "{defocus}: {found} and {exact}");
+    }
+}
+
+/// Energy in place of amplitude in cosines changes the ratio of this lens by less than a thousandth.
+#[test]
+fn the_strehl_ratio_is_that_of_the_diffraction_image() {
+    let mut lens = bundled("achromat_ac254_100");
+    lens.fields.values.truncate(1);
+    lens.wavelengths = vec![lens.wavelengths[lens.primary()]];
+    vary(&mut lens, 0, Quantity::Curvature);
+    let model = RayModel::from_lens(&lens, 0).unwrap();
+    let accuracy = Accuracy { tolerance: 1e-7, ..Accuracy::default() };
+    let exact = strehl(&model, model.fields[0], 0, accuracy).unwrap().at_chief.value;
+    let merit = Merit::new(&lens, &goal_of(Term::Strehl), 1e-8).unwrap();
+    let found = 1.0 - merit.value(&merit.values(&lens)).unwrap();
+    assert!((found - exact).abs() < 1e-3, "{found} and {exact}");
 }

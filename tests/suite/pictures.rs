@@ -34,7 +34,7 @@ fn point_frame(center: [f64; 2]) -> ImageFrame {
     ImageFrame { pixels: [1, 1], pitch: 1e-9, center, inverted: true }
 }
 
-fn render(
+pub(crate) fn render(
     model: &RayModel,
     bands: &[ColorBand],
     scene: &Scene,
@@ -45,7 +45,7 @@ fn render(
 }
 
 /// Exactly this many samples of each pixel.
-fn samples(count: usize) -> ExactSettings {
+pub(crate) fn samples(count: usize) -> ExactSettings {
     ExactSettings { tolerance: -1.0, max_samples: count, ..ExactSettings::default() }
 }
 
