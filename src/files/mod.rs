@@ -53,6 +53,18 @@ use crate::lens::Lens;
 use serde::Serialize;
 use std::path::Path;
 
+/// Names an imported lens after its file if it has no name, and notes the file if it has no source.
+fn set_origin(lens: &mut Lens, file: &str) {
+    let path = Path::new(file);
+    if lens.name.is_empty() {
+        lens.name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    }
+    if lens.source.is_empty() {
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        lens.source = format!("Imported from {name}");
+    }
+}
+
 /// A file format of lenses.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]

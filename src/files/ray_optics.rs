@@ -12,7 +12,6 @@ use crate::lens::{
     Row, SurfaceNumber, Wavelength,
 };
 use serde_json::Value;
-use std::path::Path;
 
 /// Object distances from this on are infinite.
 const INFINITE_DISTANCE: f64 = 1e10;
@@ -38,12 +37,7 @@ pub(super) fn read(text: &str, file: &str) -> Result<(Lens, ConversionReport), F
     let mut report = ConversionReport::default();
     let model = attributes(&json["optical_model"]);
     let mut lens = lens(model, &mut report).map_err(|wrong| wrong.in_file(file))?;
-    let path = Path::new(file);
-    if lens.name.is_empty() {
-        lens.name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-    }
-    let name = path.file_name().unwrap_or_default().to_string_lossy();
-    lens.source = format!("Imported from {name}");
+    super::set_origin(&mut lens, file);
     lens.check().map_err(|source| FileError::Lens { file: file.to_owned(), source })?;
     Ok((lens, report))
 }

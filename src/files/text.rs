@@ -1,4 +1,5 @@
-//! Decoding of text files: the encoding is guessed from the bytes, and binary files are recognized.
+//! Text files: the encoding is guessed from the bytes, binary files are recognized, and numbers are
+//! written so that they read back to the same bits.
 
 use super::error::{FileError, ParseError};
 use encoding_rs::{Encoding, UTF_8, UTF_16BE, UTF_16LE, WINDOWS_1252};
@@ -18,6 +19,20 @@ const SIGNATURES: &[(&[u8], &str)] = &[
     (b"\x7FELF", "a program"),
     (b"MZ", "a program"),
 ];
+
+/// A number in the fewest digits that read back to the same bits.
+pub(super) fn number(value: f64) -> String {
+    if value == 0.0 || (1e-5..1e15).contains(&value.abs()) {
+        format!("{value:?}")
+    } else {
+        format!("{value:E}")
+    }
+}
+
+/// Numbers with blanks between them.
+pub(super) fn numbers(values: impl IntoIterator<Item = f64>) -> String {
+    values.into_iter().map(number).collect::<Vec<_>>().join(" ")
+}
 
 /// The kind of a file that is not text; `None` for text.
 pub(super) fn binary_kind(bytes: &[u8]) -> Option<String> {

@@ -139,32 +139,16 @@ pub enum Command {
     DiscardCandidate,
     /// Sets whether that lens is shown or the design.
     ShowCandidate(bool),
+    /// Sets what a panel shows of the design.
+    Show(PanelSetting),
     /// Sets the relative error allowed of the numbers, 0.001 for 0.1 %.
     SetTolerance(f64),
     /// Sets the index of the zoom position to show.
     ShowZoom(usize),
-    /// Sets the number of rays of each field in the layout.
-    ShowRays(usize),
     /// Sets whether a physical effect is computed: as planned, always or never.
     SetEffect(Effect, EffectOverride),
-    /// Sets whether the pupils of the fields are computed.
-    ShowPupils(bool),
-    /// Sets whether the contrast of the fields is computed.
-    ShowContrasts(bool),
-    /// Sets whether the picture of a scene is computed.
-    ShowPicture(bool),
-    /// Sets the scene of the picture.
-    ShowScene(BuiltInScene),
     /// Saves the picture of the scene as PNG.
     SavePicture(PathBuf),
-    /// Sets whether the lens as it is made is computed.
-    ShowTolerances(bool),
-    /// Sets the class of care in making of a lens without tolerances of its own.
-    SetToleranceGrade(ToleranceGrade),
-    /// Sets the largest rms spot radius of a good lens in mm; `None` for no yield.
-    SetGoodRms(Option<f64>),
-    /// Sets the index of the wavelength of the pupils; `None` for the primary one.
-    ShowPupilWavelength(Option<usize>),
     /// Starts an experiment in place of the one that runs.
     StartExperiment {
         /// The number of its figure or table.
@@ -184,6 +168,29 @@ pub enum Command {
     ClearMessages,
 }
 
+/// What a panel shows of the design.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum PanelSetting {
+    /// The number of rays of each field in the layout.
+    Rays(usize),
+    /// Whether the pupils of the fields are computed.
+    Pupils(bool),
+    /// Whether the contrast of the fields is computed.
+    Contrasts(bool),
+    /// Whether the picture of a scene is computed.
+    Picture(bool),
+    /// The scene of the picture.
+    Scene(BuiltInScene),
+    /// Whether the lens as it is made is computed.
+    Tolerances(bool),
+    /// The class of care in making of a lens without tolerances of its own.
+    ToleranceGrade(ToleranceGrade),
+    /// The largest rms spot radius of a good lens in mm; `None` for no yield.
+    GoodRms(Option<f64>),
+    /// The index of the wavelength of the pupils; `None` for the primary one.
+    PupilWavelength(Option<usize>),
+}
+
 impl Command {
     /// True if a drag of a handle goes on with the command.
     pub(super) const fn continues_drag(&self) -> bool {
@@ -195,8 +202,7 @@ impl Command {
                 | Self::CommitEdit
                 | Self::Grin(_)
                 | Self::Select(_)
-                | Self::ShowPupils(_)
-                | Self::ShowRays(_)
+                | Self::Show(PanelSetting::Pupils(_) | PanelSetting::Rays(_))
                 | Self::ClearMessages
         )
     }

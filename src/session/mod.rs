@@ -34,7 +34,7 @@ pub use analysis::{
     FieldPupils, ScenePicture, analyze, predict_as_built,
 };
 pub use clock::Timed;
-pub use command::Command;
+pub use command::{Command, PanelSetting};
 pub use drag::{DragProgress, DragView, HandleSlopes, MeritSlopes};
 pub use experiment::{ExperimentRun, ExperimentStatus};
 pub use grin_design::{

@@ -13,7 +13,7 @@ use super::actions::{Actions, UiAction};
 use super::arrangement::Arrangement;
 use super::draw::RenderBackend;
 use super::panels::{Panel, PanelKind};
-use crate::session::{Command, GrinCommand, SessionView};
+use crate::session::{Command, GrinCommand, PanelSetting, SessionView};
 
 /// The arranged panels.
 pub struct Dock {
@@ -123,19 +123,19 @@ impl Dock {
         }
         let pupils = self.is_visible(PanelKind::Pupil);
         if pupils != view.settings.pupils {
-            actions.push(Command::ShowPupils(pupils));
+            actions.push(Command::Show(PanelSetting::Pupils(pupils)));
         }
         let contrasts = self.is_visible(PanelKind::Contrast);
         if contrasts != view.settings.contrasts {
-            actions.push(Command::ShowContrasts(contrasts));
+            actions.push(Command::Show(PanelSetting::Contrasts(contrasts)));
         }
         let picture = self.is_visible(PanelKind::Picture);
         if picture != view.settings.picture {
-            actions.push(Command::ShowPicture(picture));
+            actions.push(Command::Show(PanelSetting::Picture(picture)));
         }
         let tolerances = self.is_visible(PanelKind::Tolerances);
         if tolerances != view.settings.tolerances {
-            actions.push(Command::ShowTolerances(tolerances));
+            actions.push(Command::Show(PanelSetting::Tolerances(tolerances)));
         }
         let watched = self.is_visible(PanelKind::Slice);
         if watched != view.grin.is_active {

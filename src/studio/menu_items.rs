@@ -16,7 +16,7 @@ use crate::experiments::{self, Effort};
 use crate::files;
 use crate::lens::{Edit, ElementEdit, Lens};
 use crate::report::PaperKind;
-use crate::session::{Command, SessionView};
+use crate::session::{Command, PanelSetting, SessionView};
 
 /// Something that can be asked for.
 #[derive(Debug, Clone)]
@@ -278,7 +278,7 @@ impl MenuContext<'_> {
         });
         let rays = [5, 15, 51].map(|rays| {
             let title = format!("{rays} rays of each field in the layout");
-            let item = MenuItem::new(MENU, title, Command::ShowRays(rays));
+            let item = MenuItem::new(MENU, title, Command::Show(PanelSetting::Rays(rays)));
             MenuItem { checked: Some(self.view.settings.rays == rays), ..item }
         });
         themes.into_iter().chain(errors).chain(rays).collect()

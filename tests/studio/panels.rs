@@ -453,7 +453,7 @@ fn the_wavelength_of_pupils_can_be_chosen() {
     harness.run();
     harness.get_by_label("486.1 nm").click();
     harness.run();
-    assert_eq!(harness.state().commands, [Command::ShowPupilWavelength(Some(0))]);
+    assert_eq!(harness.state().commands, [Command::Show(PanelSetting::PupilWavelength(Some(0)))]);
 }
 
 #[test]

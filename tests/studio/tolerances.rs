@@ -4,7 +4,9 @@ use std::sync::Arc;
 
 use aplanat::files;
 use aplanat::lens::{Edit, Lens, ToleranceSheet};
-use aplanat::session::{AnalysisResults, Command, SessionView, Timed, predict_as_built};
+use aplanat::session::{
+    AnalysisResults, Command, PanelSetting, SessionView, Timed, predict_as_built,
+};
 use aplanat::studio::panels::TolerancesPanel;
 use aplanat::tolerance::ToleranceGrade;
 use egui::Key;
@@ -94,12 +96,12 @@ fn the_class_and_the_limit_of_good_lenses_are_settings() {
         .state()
         .commands
         .iter()
-        .any(|command| matches!(command, Command::SetGoodRms(Some(limit)) if *limit > 0.0));
+        .any(|command| matches!(command, Command::Show(PanelSetting::GoodRms(Some(limit))) if *limit > 0.0));
     assert!(asked);
     harness.get_by_label("Care in making").click();
     harness.run();
     harness.get_by_label("Commercial").click();
     harness.run();
-    let wanted = Command::SetToleranceGrade(ToleranceGrade::Commercial);
+    let wanted = Command::Show(PanelSetting::ToleranceGrade(ToleranceGrade::Commercial));
     assert!(harness.state().commands.contains(&wanted));
 }

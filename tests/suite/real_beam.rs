@@ -4,6 +4,7 @@ use aplanat::analysis::{Estimate, distortion, field_curvature, spot};
 use aplanat::files;
 use aplanat::lens::{Aperture, Lens};
 use aplanat::pupil::{Accuracy, Aiming, RayModel, Region};
+use aplanat::trace::Tracer;
 use std::f64::consts::PI;
 
 fn library() -> impl Iterator<Item = (&'static str, Lens)> {
@@ -91,6 +92,48 @@ fn chief_rays_stay_where_they_are_when_the_stop_closes() {
             }
         }
     }
+}
+
+/// The last surface of a traced lens that is cut off behind its stop is the stop: a ray that is asked
+/// for by a point of it lands there, whatever lies in front.
+#[test]
+fn rays_cross_the_stop_where_they_are_asked_to() {
+    let mut aimed = 0;
+    for (name, lens) in library() {
+        for zoom in 0..lens.zoom_positions() {
+            let model = RayModel::from_lens(&lens, zoom).unwrap();
+            if !model.ends_at_disc() {
+                aimed += check_aim(name, &model);
+            }
+        }
+    }
+    println!("{aimed} rays");
+    assert!(aimed > 500, "{aimed}");
+}
+
+/// The number of rays that cross the stop; a ray that cannot do so keeps its coordinates.
+fn check_aim(name: &str, model: &RayModel) -> usize {
+    let (stop, radius) = (model.stop(), model.stop_radius());
+    let mut crossing = 0;
+    for (wavelength, channel) in model.channels.iter().enumerate() {
+        let mut front = channel.system.clone();
+        front.surfaces.truncate(stop + 1);
+        front.surfaces.iter_mut().for_each(aplanat::lens::Surface::remove_apertures);
+        // Nothing follows that a gradient behind the stop could end at.
+        front.surfaces[stop].grin = None;
+        let tracer = Tracer::new(&front).unwrap();
+        let points = [[0.0, 0.0], [0.0, 0.9], [0.5, -0.8], [-0.7, 0.2]];
+        for (field, p) in model.fields.iter().flat_map(|f| points.map(|p| (f, p))) {
+            let launch = model.launch(*field, wavelength).unwrap();
+            let end = tracer.trace(launch.ray_through_stop(p).unwrap());
+            let off = [end.ray.point.x / radius - p[0], end.ray.point.y / radius - p[1]];
+            let off = off[0].hypot(off[1]);
+            let crosses = end.fate.is_imaged();
+            assert!(!crosses || off < 2e-9, "{name}, {field:?}, {p:?}: {off:e} of the stop");
+            crossing += usize::from(crosses);
+        }
+    }
+    crossing
 }
 
 #[test]

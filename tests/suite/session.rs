@@ -912,7 +912,7 @@ impl Random {
             9 => Command::ShowZoom(self.below(5)),
             10 => Command::SetTolerance(self.number()),
             11 => Command::SetEffect(Effect::Clipping, EffectOverride::Off),
-            12 => Command::ShowRays(self.below(40)),
+            12 => Command::Show(PanelSetting::Rays(self.below(40))),
             _ => Command::Edit(self.edit()),
         }
     }

@@ -7,6 +7,7 @@ use crate::analysis::{AnalysisError, Estimate, lit_region};
 use crate::lens::FieldPoint;
 use crate::math::quadrature::gauss_legendre;
 use crate::pupil::{Accuracy, RayModel};
+use rayon::prelude::*;
 use std::f64::consts::TAU;
 
 /// The share of the light of a field at a wavelength within circles of these radii in mm, ascending,
@@ -35,36 +36,54 @@ const PART_NODES: usize = 40;
 const PERIOD_NODES: f64 = 6.0;
 
 impl PupilFunction {
-    /// The share of the energy within a circle of a radius in mm about the centre, for a round pupil whose
+    /// The shares of the energy within circles of radii in mm about the centre, for a round pupil whose
     /// aberrations are round too: `2π r ∫ OTF(ν) J₁(2π ν r) dν` up to its cutoff in cycles/mm. The
     /// contrast has corners at `1 − ε`, `1 ± ε` halved and `ε` of it for a round shadow of the share ε.
+    /// All circles share the frequencies, which the largest one asks for.
     ///
     /// # Errors
     /// The pupil is irregular.
     pub fn round_encircled(
         &self,
-        radius: f64,
+        radii: &[f64],
         cutoff: f64,
         shadow: f64,
         fine: bool,
-    ) -> Result<f64, AnalysisError> {
-        let mut ends = [0.0, 0.5 * (1.0 - shadow), shadow, 0.5 * (1.0 + shadow), 1.0];
-        ends.sort_by(f64::total_cmp);
-        let mut sum = 0.0;
-        for pair in ends.windows(2).filter(|pair| pair[1] > pair[0]) {
-            let width = (pair[1] - pair[0]) * cutoff;
-            let count = PART_NODES + (PERIOD_NODES * radius * width) as usize;
-            let count = if fine { count + count / 2 } else { count };
-            for (t, weight) in gauss_legendre(count, 0.0, 1.0) {
-                // Slow at both ends, where the contrast has the power 3/2.
-                let nu = cutoff * pair[0] + width * t * t * t * (10.0 - t * (15.0 - 6.0 * t));
-                let slope = width * 30.0 * t * t * (1.0 - t) * (1.0 - t);
-                let contrast = self.transfer([0.0, nu], 0.0, 1e-12)?.re;
-                sum += weight * slope * contrast * bessel_j1(TAU * nu * radius);
-            }
+    ) -> Result<Vec<f64>, AnalysisError> {
+        if radii.is_empty() {
+            return Ok(Vec::new());
         }
-        Ok(TAU * radius * sum)
+        let largest = radii.iter().copied().fold(0.0, f64::max);
+        let contrasts: Result<Vec<_>, AnalysisError> = frequencies(largest, cutoff, shadow, fine)
+            .into_par_iter()
+            .map(|(nu, weight)| Ok((nu, weight * self.transfer([0.0, nu], 0.0, 1e-12)?.re)))
+            .collect();
+        let contrasts = contrasts?;
+        let share = |radius: &f64| {
+            let term = |(nu, contrast): &(f64, f64)| contrast * bessel_j1(TAU * nu * radius);
+            TAU * radius * contrasts.iter().map(term).sum::<f64>()
+        };
+        Ok(radii.iter().map(share).collect())
     }
+}
+
+/// Frequencies in cycles/mm up to a cutoff with their weights, for circles up to a radius in mm.
+fn frequencies(radius: f64, cutoff: f64, shadow: f64, fine: bool) -> Vec<(f64, f64)> {
+    let mut ends = [0.0, 0.5 * (1.0 - shadow), shadow, 0.5 * (1.0 + shadow), 1.0];
+    ends.sort_by(f64::total_cmp);
+    let mut nodes = Vec::new();
+    for pair in ends.windows(2).filter(|pair| pair[1] > pair[0]) {
+        let width = (pair[1] - pair[0]) * cutoff;
+        let count = PART_NODES + (PERIOD_NODES * radius * width) as usize;
+        let count = if fine { count + count / 2 } else { count };
+        for (t, weight) in gauss_legendre(count, 0.0, 1.0) {
+            // Slow at both ends, where the contrast has the power 3/2.
+            let nu = cutoff * pair[0] + width * t * t * t * (10.0 - t * (15.0 - 6.0 * t));
+            let slope = width * 30.0 * t * t * (1.0 - t) * (1.0 - t);
+            nodes.push((nu, weight * slope));
+        }
+    }
+    nodes
 }
 
 /// The Bessel function J₁ by its integral over a period, whose sum converges with more nodes than its

@@ -252,8 +252,7 @@ impl PupilArgs {
         };
         let transfer: Result<Vec<_>, AnalysisError> =
             self.frequencies.iter().map(transfer).collect();
-        let circle = |radius: &f64| self.circle(pupil, *radius, is_round);
-        let circles: Result<Vec<_>, AnalysisError> = self.radii.iter().map(circle).collect();
+        let circles = if is_round { self.round_circles(pupil) } else { self.circles(pupil) };
         Ok(PupilReport {
             strehl: many.intensity([0.0; 2]),
             points: self.points.iter().map(point).collect(),
@@ -262,20 +261,26 @@ impl PupilArgs {
         })
     }
 
-    /// The energy within a circle: by its contrast if the pupil is round, else over the image.
-    fn circle(
-        &self,
-        pupil: &PupilFunction,
-        radius: f64,
-        is_round: bool,
-    ) -> Result<PupilCircle, AnalysisError> {
-        if is_round {
-            let cutoff = 1e3 / (self.um * self.f_number);
-            let [before, energy] = [false, true]
-                .map(|fine| pupil.round_encircled(radius, cutoff, self.obscuration, fine));
-            let (before, energy) = (before?, energy?);
-            return Ok(PupilCircle { radius, energy, error: (energy - before).abs() });
-        }
+    /// The energy within circles about the centre of the image of a round pupil, by its contrast.
+    fn round_circles(&self, pupil: &PupilFunction) -> Result<Vec<PupilCircle>, AnalysisError> {
+        let cutoff = 1e3 / (self.um * self.f_number);
+        let [few, many] = [false, true]
+            .map(|fine| pupil.round_encircled(&self.radii, cutoff, self.obscuration, fine));
+        let energies = few?.into_iter().zip(many?).zip(&self.radii);
+        let circle = |((before, energy), radius): ((f64, f64), &f64)| PupilCircle {
+            radius: *radius,
+            energy,
+            error: (energy - before).abs(),
+        };
+        Ok(energies.map(circle).collect())
+    }
+
+    /// The energy within circles about the centre, over the image.
+    fn circles(&self, pupil: &PupilFunction) -> Result<Vec<PupilCircle>, AnalysisError> {
+        self.radii.iter().map(|radius| self.circle(pupil, *radius)).collect()
+    }
+
+    fn circle(&self, pupil: &PupilFunction, radius: f64) -> Result<PupilCircle, AnalysisError> {
         let widest = radius.min(WIDEST * 1e-3 * self.um * self.f_number);
         let share = |light: &PupilSamples| light.encircled([0.0; 2], &[widest])[0];
         let [few, many] = CIRCLE_ORDERS.map(|order| pupil.samples(order));

@@ -20,7 +20,6 @@ pub use write::write;
 use super::error::FileError;
 use super::report::ConversionReport;
 use crate::lens::Lens;
-use std::path::Path;
 
 /// Reads a lens from the text of a file. `file` is its name in messages, and the name of a lens that has
 /// none.
@@ -31,12 +30,7 @@ pub fn read(text: &str, file: &str) -> Result<(Lens, ConversionReport), FileErro
     let text = text.replace("\r\n", "\n").replace('\r', "\n");
     let (parsed, mut report) = parse::parse(&text).map_err(|wrong| wrong.in_file(file))?;
     let mut lens = build::build(&parsed, &mut report).map_err(|wrong| wrong.in_file(file))?;
-    let path = Path::new(file);
-    if lens.name.is_empty() {
-        lens.name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-    }
-    let name = path.file_name().unwrap_or_default().to_string_lossy();
-    lens.source = format!("Imported from {name}");
+    crate::files::set_origin(&mut lens, file);
     lens.check().map_err(|source| FileError::Lens { file: file.to_owned(), source })?;
     build::solve_focus(&parsed, &mut lens, &mut report);
     Ok((lens, report))

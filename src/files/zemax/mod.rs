@@ -20,7 +20,6 @@ pub use write::write;
 use super::error::{FileError, ParseError};
 use super::report::ConversionReport;
 use crate::lens::Lens;
-use std::path::Path;
 
 /// Thicknesses from this on are infinite, which is accepted for the object only.
 const INFINITE_GAP: f64 = 1e18;
@@ -39,14 +38,7 @@ const ZOOM_NAME: &str = "Zoom position: ";
 pub fn read(text: &str, file: &str) -> Result<(Lens, ConversionReport), FileError> {
     let text = text.replace("\r\n", "\n").replace('\r', "\n");
     let (mut lens, report) = parse_lens(&text).map_err(|wrong| wrong.in_file(file))?;
-    let path = Path::new(file);
-    if lens.name.is_empty() {
-        lens.name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-    }
-    if lens.source.is_empty() {
-        let name = path.file_name().unwrap_or_default().to_string_lossy();
-        lens.source = format!("Imported from {name}");
-    }
+    crate::files::set_origin(&mut lens, file);
     lens.check().map_err(|source| FileError::Lens { file: file.to_owned(), source })?;
     apply_focus_solve(&mut lens);
     Ok((lens, report))

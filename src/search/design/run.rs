@@ -74,8 +74,11 @@ pub struct DesignRun {
 const STARTS: [usize; 2] = [32, 12];
 /// The number of random lenses of which the best one is a start.
 const TRIES: usize = 60;
-/// The levels of aperture and field by which a start is led, and the trials at each.
-const LEVELS: [[f64; 2]; 4] = [[0.35, 0.4], [0.6, 0.65], [0.8, 0.85], [1.0, 1.0]];
+/// The share of aperture and field at which a start is tried first.
+const FIRST_LEVEL: f64 = 0.35;
+/// The largest increase of that share at once, and the smallest one that is tried.
+const LEVEL_STEPS: [f64; 2] = [0.25, 0.02];
+/// The trials at each share.
 const LEVEL_TRIALS: usize = 24;
 /// The trials of a candidate in a round of halving.
 const HALVING_TRIALS: usize = 72;
@@ -197,21 +200,30 @@ impl DesignRun {
         self.stage = DesignStage::Halving;
     }
 
-    /// Leads a start to the full aperture and field, unless `stop` becomes true.
+    /// Leads a start to the full aperture and field, unless `stop` becomes true. Where a ray is lost
+    /// the share of aperture and field grows by half as much.
     fn lead(&self, start: &NamedDraft, stop: &AtomicBool) -> (Option<Candidate>, usize) {
         let (mut draft, mut used, mut value) = (start.draft.clone(), 0, f64::INFINITY);
         let aspheric_surfaces = self.asked.aspheric_surfaces;
-        for (i, difficulty) in LEVELS.into_iter().enumerate() {
-            if stop.load(Ordering::Relaxed) {
+        let (mut level, mut step) = (0.0, FIRST_LEVEL);
+        while level < 1.0 {
+            if stop.load(Ordering::Relaxed) || step < LEVEL_STEPS[1] {
                 return (None, used);
             }
-            let plan = BeamPlan { difficulty, ..BeamPlan::full(SOFT) };
-            let freedom = Freedom { glasses: i > 1, aspheric_surfaces, pupil: true };
-            let Some(found) = descend(&draft, &self.asked, &plan, freedom, LEVEL_TRIALS) else {
-                return (None, used + 1);
-            };
-            (draft, value) = (found.draft, found.value);
-            used += found.gradients;
+            let next = f64::min(level + step, 1.0);
+            let plan = BeamPlan { difficulty: [next, next], ..BeamPlan::full(SOFT) };
+            let freedom = Freedom { glasses: level > 0.5, aspheric_surfaces, pupil: true };
+            match descend(&draft, &self.asked, &plan, freedom, LEVEL_TRIALS) {
+                Some(found) => {
+                    (draft, value, level) = (found.draft, found.value, next);
+                    used += found.gradients;
+                    step = f64::min(2.0 * step, LEVEL_STEPS[0]);
+                }
+                None => {
+                    used += 1;
+                    step *= 0.5;
+                }
+            }
         }
         (Some(Candidate { origin: start.name.clone(), draft, value }), used)
     }

@@ -162,8 +162,9 @@ pub(super) fn random_starts(
 ) -> Vec<NamedDraft> {
     let mut found = Vec::new();
     for i in (0..count).take_while(|_| !stop.load(Ordering::Relaxed)) {
+        let draw = if i % 2 == 0 { two_group_lens } else { random_lens };
         let tried = (0..tries).filter_map(|_| {
-            let draft = random_lens(asked, random)?;
+            let draft = draw(asked, random)?;
             Some((screened(&draft, asked)?, draft))
         });
         let best = tried.min_by(|a, b| a.0.total_cmp(&b.0));
@@ -181,36 +182,124 @@ fn screened(draft: &LensDraft, asked: &LensRequirements) -> Option<f64> {
     Some(merit.evaluate(&merit.start())?.value)
 }
 
-/// A random lens whose last curvature gives it the focal length; half of the elements are cemented
-/// to the one before.
+/// An element of a random lens.
+struct ThinElement {
+    crown: bool,
+    /// Its power, in 1/mm.
+    power: f64,
+    /// The air behind it, in mm.
+    gap: f64,
+    /// The chance that it is cemented to the element in front of it.
+    cemented: f64,
+}
+
+/// A random lens whose last curvature gives it the focal length; almost half of the elements are
+/// cemented to the one before.
 fn random_lens(asked: &LensRequirements, random: &mut Random) -> Option<LensDraft> {
     let f = asked.focal_length;
-    let elements = asked.elements.min(8);
-    let pieces = if elements > 2 { elements - random.random_range(0..2) } else { elements };
-    let thick = (0.05 * f).max(1.5 * asked.glass_center);
-    let free = asked.track - asked.back_focus;
-    let mut rows: Vec<Row> = Vec::new();
-    for i in 0..pieces {
+    let free = (asked.track - asked.back_focus).max(0.1 * f);
+    let mut rows = Vec::new();
+    for i in 0..piece_number(asked, random) {
         let crown = random.random::<f64>() < if i % 2 == 0 { 0.75 } else { 0.3 };
-        let list = if crown { CROWNS } else { FLINTS };
-        let (nd, vd) = list[random.random_range(0..list.len())];
         let power = if crown { 1.0 } else { -1.0 } * (0.5 + 2.0 * random.random::<f64>()) / f;
-        let bend = 3.0 * (random.random::<f64>() - 0.5) / f;
-        let curvature = power / (nd - 1.0);
-        let cemented = i > 0 && random.random::<f64>() < 0.4;
-        let glass = Medium::Model { nd, vd };
-        if cemented && let Some(last) = rows.last_mut() {
-            (last.medium, last.thickness) = (glass, thick);
-            let front = last.curvature;
-            rows.push(Row { curvature: front - curvature, thickness: 0.03 * f, ..Row::default() });
+        let gap = (0.02 + 0.2 * random.random::<f64>().powi(2)) * free;
+        push_element(&mut rows, &ThinElement { crown, power, gap, cemented: 0.4 }, asked, random);
+    }
+    focused(rows, asked, random)
+}
+
+/// A random lens of two groups that have the focal length and the back focus as thin lenses: a
+/// negative group in front where the back focus exceeds the focal length, a positive one otherwise.
+///
+/// At a distance `d` the powers of two thin lenses with focal length `f` and back focus `b` are
+/// `(f − b) / (d f)` and `(b + d − f) / (d b)` (Kingslake, *Lens Design Fundamentals*, 3.1).
+fn two_group_lens(asked: &LensRequirements, random: &mut Random) -> Option<LensDraft> {
+    let f = asked.focal_length;
+    let pieces = piece_number(asked, random);
+    if pieces < 2 {
+        return None;
+    }
+    let back = asked.back_focus.max(0.05 * f) * (1.0 + 0.3 * random.random::<f64>());
+    let longest = asked.track - back;
+    let distance = longest * (0.3 + 0.6 * random.random::<f64>());
+    let powers = [(f - back) / (distance * f), (back + distance - f) / (distance * back)];
+    let front = random.random_range(1..pieces);
+    let mut rows: Vec<Row> = Vec::new();
+    let mut first_length = 0.0;
+    for (power, count) in powers.into_iter().zip([front, pieces - front]) {
+        let start = rows.len();
+        for element in group(power, count, asked, random) {
+            push_element(&mut rows, &element, asked, random);
+        }
+        let end = rows.len() - 1;
+        let length: f64 = rows[start..end].iter().map(|row| row.thickness).sum();
+        if start == 0 {
+            first_length = length;
         } else {
-            let front = bend + 0.5 * curvature;
-            rows.push(Row { curvature: front, thickness: thick, medium: glass, ..Row::default() });
-            let gap = (0.02 + 0.2 * random.random::<f64>().powi(2)) * free.max(0.1 * f);
-            rows.push(Row { curvature: front - curvature, thickness: gap, ..Row::default() });
+            let apart = distance - 0.5 * (first_length + length);
+            rows[start - 1].thickness = apart.max(0.02 * f);
         }
     }
     focused(rows, asked, random)
+}
+
+/// The elements of a group of this power: one of the opposite sign and of the opposite kind of glass
+/// among others that share the rest.
+fn group(
+    power: f64,
+    count: usize,
+    asked: &LensRequirements,
+    random: &mut Random,
+) -> Vec<ThinElement> {
+    let f = asked.focal_length;
+    let corrector = (count > 1).then(|| random.random_range(0..count));
+    let opposite = if corrector.is_some() { 0.2 + 1.2 * random.random::<f64>() } else { 0.0 };
+    // A group without power still bends: its elements have those of a weak lens.
+    let size = power.abs().max(0.3 / f).copysign(power);
+    let share = size * (1.0 + opposite) / (count.max(2) - 1) as f64;
+    let element = |i: usize| {
+        let is_corrector = corrector == Some(i);
+        let power = if is_corrector { -opposite * size } else { share };
+        let gap = (0.01 + 0.08 * random.random::<f64>().powi(2)) * f;
+        ThinElement { crown: power > 0.0, power, gap, cemented: if i > 0 { 0.4 } else { 0.0 } }
+    };
+    (0..count).map(element).collect()
+}
+
+/// The number of pieces of a random lens.
+fn piece_number(asked: &LensRequirements, random: &mut Random) -> usize {
+    let elements = asked.elements.min(8);
+    if elements > 2 { elements - random.random_range(0..2) } else { elements }
+}
+
+/// Appends an element of random glass and bending.
+fn push_element(
+    rows: &mut Vec<Row>,
+    element: &ThinElement,
+    asked: &LensRequirements,
+    random: &mut Random,
+) {
+    let f = asked.focal_length;
+    let thick = (0.05 * f).max(1.5 * asked.glass_center);
+    let list = if element.crown { CROWNS } else { FLINTS };
+    let (nd, vd) = list[random.random_range(0..list.len())];
+    let bend = 3.0 * (random.random::<f64>() - 0.5) / f;
+    let curvature = element.power / (nd - 1.0);
+    let cemented = random.random::<f64>() < element.cemented;
+    let glass = Medium::Model { nd, vd };
+    let last = rows.last_mut().filter(|_| cemented);
+    let front = match last {
+        Some(last) => {
+            (last.medium, last.thickness) = (glass, thick);
+            last.curvature
+        }
+        None => {
+            let front = bend + 0.5 * curvature;
+            rows.push(Row { curvature: front, thickness: thick, medium: glass, ..Row::default() });
+            front
+        }
+    };
+    rows.push(Row { curvature: front - curvature, thickness: element.gap, ..Row::default() });
 }
 
 /// The lens of these rows with the focal length and the image plane that are asked for.

@@ -11,7 +11,7 @@ use super::analysis::{
     AnalysisRequest, AnalysisResults, AnalysisSettings, AnalysisWorker, EffectTiming,
     spawn_analysis,
 };
-use super::command::Command;
+use super::command::{Command, PanelSetting};
 use super::drag::DragState;
 use super::experiment::{ExperimentStatus, ExperimentWorker};
 use super::grin_design::GrinState;
@@ -240,24 +240,22 @@ impl Session {
             Command::SaveExperiment(folder) => self.save_experiment(&folder),
             Command::Select(surface) => self.selected = surface,
             Command::ClearMessages => self.messages = Arc::default(),
-            shown => self.show(&shown),
+            Command::Show(setting) => self.show(setting),
         }
     }
 
-    /// Carries out a command about what the panels show of the design; others do nothing here.
-    fn show(&mut self, command: &Command) {
-        match *command {
-            Command::ShowRays(rays) => self.change_settings(|s| s.rays = rays.min(MAX_RAYS)),
-            Command::ShowPupils(shown) => self.change_settings(|s| s.pupils = shown),
-            Command::ShowContrasts(shown) => self.change_settings(|s| s.contrasts = shown),
-            Command::ShowPicture(shown) => self.change_settings(|s| s.picture = shown),
-            Command::ShowScene(scene) => self.change_settings(|s| s.scene = scene),
-            Command::ShowTolerances(shown) => self.change_settings(|s| s.tolerances = shown),
-            Command::SetToleranceGrade(grade) => self.change_settings(|s| s.grade = grade),
-            Command::SetGoodRms(rms) => self.change_settings(|s| s.good_rms = rms),
-            Command::ShowPupilWavelength(w) => self.change_settings(|s| s.pupil_wavelength = w),
-            _ => {}
-        }
+    fn show(&mut self, setting: PanelSetting) {
+        self.change_settings(|settings| match setting {
+            PanelSetting::Rays(rays) => settings.rays = rays.min(MAX_RAYS),
+            PanelSetting::Pupils(shown) => settings.pupils = shown,
+            PanelSetting::Contrasts(shown) => settings.contrasts = shown,
+            PanelSetting::Picture(shown) => settings.picture = shown,
+            PanelSetting::Scene(scene) => settings.scene = scene,
+            PanelSetting::Tolerances(shown) => settings.tolerances = shown,
+            PanelSetting::ToleranceGrade(grade) => settings.grade = grade,
+            PanelSetting::GoodRms(rms) => settings.good_rms = rms,
+            PanelSetting::PupilWavelength(wavelength) => settings.pupil_wavelength = wavelength,
+        });
     }
 
     fn set_effect(&mut self, effect: Effect, choice: EffectOverride) {

@@ -6,7 +6,7 @@ use egui::{ComboBox, RichText, TextureHandle, TextureOptions, Ui, Vec2, WidgetIn
 
 use super::{Panel, displayed_results, show_missing_results};
 use crate::picture::{BitDepth, BuiltInScene};
-use crate::session::{Command, ScenePicture, SessionView, Timed};
+use crate::session::{Command, PanelSetting, ScenePicture, SessionView, Timed};
 use crate::studio::actions::Actions;
 use crate::studio::cached::{ByAddress, Cached};
 use crate::studio::file_dialog::FileRequest;
@@ -81,7 +81,7 @@ fn choose_scene(ui: &mut Ui, view: &SessionView, actions: &mut Actions) {
     ComboBox::from_id_salt("scene").selected_text(chosen.name()).show_ui(ui, |ui| {
         for (scene, name) in BuiltInScene::ALL {
             if ui.selectable_label(chosen == scene, name).clicked() {
-                actions.push(Command::ShowScene(scene));
+                actions.push(Command::Show(PanelSetting::Scene(scene)));
             }
         }
     });

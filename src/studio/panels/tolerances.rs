@@ -9,7 +9,7 @@ use egui_plot::{Line, LineStyle, PlotPoints, VLine};
 use super::widgets::{fixed_plot, hint_beside};
 use super::{Panel, displayed_results, show_missing_results};
 use crate::lens::{Edit, Perturbation, PerturbationKind, SurfaceNumber, Tolerance};
-use crate::session::{AsBuiltLens, Command, SessionView, Timed};
+use crate::session::{AsBuiltLens, Command, PanelSetting, SessionView, Timed};
 use crate::studio::actions::Actions;
 use crate::studio::number;
 use crate::studio::palette::{Palette, color32};
@@ -185,7 +185,7 @@ fn choose_grade(
     let shown = combo.show_ui(ui, |ui| {
         for (grade, name) in ToleranceGrade::ALL {
             if ui.selectable_label(chosen == grade, name).clicked() {
-                actions.push(Command::SetToleranceGrade(grade));
+                actions.push(Command::Show(PanelSetting::ToleranceGrade(grade)));
             }
         }
     });
@@ -204,14 +204,14 @@ fn choose_limit(ui: &mut Ui, view: &SessionView, made: &AsBuiltLens, actions: &m
     let hint = "Adds the share of lenses whose rms spot radius is at most this";
     if ui.checkbox(&mut asks, "Good up to").on_hover_text(hint).changed() {
         let proposed = 1.2 * made.analysis.spots[1].form_mean_rms;
-        actions.push(Command::SetGoodRms(asks.then_some(proposed)));
+        actions.push(Command::Show(PanelSetting::GoodRms(asks.then_some(proposed))));
     }
     if let Some(limit) = view.settings.good_rms {
         let mut um = 1e3 * limit;
         let speed = 0.01 * um;
         let drag = DragValue::new(&mut um).speed(speed).range(1e-6..=1e6).suffix(" µm");
         if ui.add(drag).changed() {
-            actions.push(Command::SetGoodRms(Some(1e-3 * um)));
+            actions.push(Command::Show(PanelSetting::GoodRms(Some(1e-3 * um))));
         }
     }
 }

@@ -6,6 +6,7 @@
 mod surface;
 
 use crate::files::report::{ConversionOutcome, ConversionReport};
+use crate::files::text::{number, numbers};
 use crate::lens::{
     Aperture, FieldKind, Lens, LensError, Object, Parameter, Pickup, Quantity, SystemError,
 };
@@ -39,20 +40,6 @@ struct CodeVWriter {
     lens: Lens,
     text: String,
     report: ConversionReport,
-}
-
-/// A number in the fewest digits that read back to the same bits.
-fn number(value: f64) -> String {
-    if value == 0.0 || (1e-5..1e15).contains(&value.abs()) {
-        format!("{value:?}")
-    } else {
-        format!("{value:E}")
-    }
-}
-
-/// Numbers with blanks between them.
-fn numbers(values: impl IntoIterator<Item = f64>) -> String {
-    values.into_iter().map(number).collect::<Vec<_>>().join(" ")
 }
 
 /// A text in quotes, on one line.

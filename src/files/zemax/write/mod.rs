@@ -9,6 +9,7 @@ mod surface;
 mod table;
 
 use crate::files::report::{ConversionOutcome, ConversionReport};
+use crate::files::text::{number, numbers};
 use crate::files::zemax::INFINITE_GAP;
 use crate::lens::{
     Lens, LensError, Parameter, Pickup, Quantity, SurfaceNumber, Variable, ZoomThickness,
@@ -66,20 +67,6 @@ struct ZemaxWriter {
     numbers: Vec<FileNumbers>,
     text: String,
     report: ConversionReport,
-}
-
-/// A number in the fewest digits that read back to the same bits.
-fn number(value: f64) -> String {
-    if value == 0.0 || (1e-5..1e15).contains(&value.abs()) {
-        format!("{value:?}")
-    } else {
-        format!("{value:E}")
-    }
-}
-
-/// Numbers with blanks between them.
-fn numbers(values: impl IntoIterator<Item = f64>) -> String {
-    values.into_iter().map(number).collect::<Vec<_>>().join(" ")
 }
 
 /// A text on one line.

@@ -87,10 +87,11 @@ pub(super) fn descend(
     trials: usize,
 ) -> Option<DraftDescent> {
     let mut now = DraftDescent { draft: draft.clone(), value: f64::INFINITY, gradients: 0 };
+    let mut region = None;
     while now.gradients < trials {
         let mut merit = DraftMerit::new(&now.draft, asked, plan, freedom)?;
         let steps = ROUND.min(trials - now.gradients);
-        let (values, value, used) = take_trials(&mut merit, steps)?;
+        let (values, value, used) = take_trials(&mut merit, &mut region, steps)?;
         now = DraftDescent {
             draft: merit.draft_at(&values),
             value,
@@ -100,11 +101,16 @@ pub(super) fn descend(
     Some(now)
 }
 
-/// Trials of one round: the values at their end, the merit, and the number of evaluations.
-fn take_trials(merit: &mut DraftMerit<'_>, trials: usize) -> Option<(Vec<f64>, f64, usize)> {
+/// Trials of one round: the values at their end, the merit, and the number of evaluations. The
+/// region goes on from one round to the next unless it has vanished.
+fn take_trials(
+    merit: &mut DraftMerit<'_>,
+    kept: &mut Option<TrustRegion>,
+    trials: usize,
+) -> Option<(Vec<f64>, f64, usize)> {
     let mut values = merit.start();
     let mut point = merit.evaluate(&values)?;
-    let mut region = TrustRegion::new(values.len());
+    let mut region = kept.take().unwrap_or_else(|| TrustRegion::new(values.len()));
     let mut used = 1;
     while used < trials.max(2) {
         let room = merit.room(&values);
@@ -120,9 +126,10 @@ fn take_trials(merit: &mut DraftMerit<'_>, trials: usize) -> Option<(Vec<f64>, f
             }
         }
         if region.is_exhausted(&point) {
-            break;
+            return Some((values, point.value, used));
         }
     }
+    *kept = Some(region);
     Some((values, point.value, used))
 }
 

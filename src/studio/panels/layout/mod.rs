@@ -17,7 +17,7 @@ use crate::analysis::{LayoutRay, RayLayout};
 use crate::lens::{System, added_glass};
 use crate::math::Vec3;
 use crate::paraxial::Handle;
-use crate::session::{Analyses, AnalysisResults, Command, SessionView};
+use crate::session::{Analyses, AnalysisResults, Command, PanelSetting, SessionView};
 use crate::studio::actions::Actions;
 use crate::studio::cached::{ByAddress, Cached};
 use crate::studio::draw::{BoundingBox, RenderBackend, Rgba, Scene, SceneResponse, SceneView};
@@ -191,7 +191,7 @@ fn rays(ui: &mut Ui, view: &SessionView, actions: &mut Actions) {
     let drag = DragValue::new(&mut count).range(1..=501).speed(0.2).suffix(" rays");
     let drag = ui.add(drag).accessible_name("Rays of each field");
     if drag.on_hover_text("Rays of each field in the drawing").changed() {
-        actions.push(Command::ShowRays(count));
+        actions.push(Command::Show(PanelSetting::Rays(count)));
     }
 }
 

@@ -16,7 +16,7 @@ use super::widgets::swatch;
 use super::{Panel, displayed_results, show_missing_results, zoom_name};
 use crate::analysis::{FieldPupil, PupilShape};
 use crate::pupil::{PupilLimit, RayModel};
-use crate::session::{self, Analyses, AnalysisResults, Command, SessionView, Timed};
+use crate::session::{self, Analyses, AnalysisResults, Command, PanelSetting, SessionView, Timed};
 use crate::studio::actions::Actions;
 use crate::studio::palette::{Palette, color32};
 use crate::studio::text::capitalize;
@@ -139,7 +139,7 @@ fn wavelength(ui: &mut Ui, view: &SessionView, shown: usize, actions: &mut Actio
     });
     combo.response.accessible_name("Wavelength of the pupils");
     if chosen != shown {
-        actions.push(Command::ShowPupilWavelength(Some(chosen)));
+        actions.push(Command::Show(PanelSetting::PupilWavelength(Some(chosen))));
     }
 }
 
