@@ -12,7 +12,7 @@ use super::{
     Claim, DataTable, Effort, Experiment, ExperimentError, ExperimentOutcome, ExperimentResult,
     NamedPlot, ProgressFn, report_progress,
 };
-use crate::analysis::irradiance;
+use crate::analysis::{distortion, irradiance};
 use crate::lens::{FieldPoint, Lens};
 use crate::optimize::pareto::ParetoPoint;
 use crate::picture::{ExactSettings, Pattern, Picture, Scene, SceneLayer, filling_size};
@@ -198,9 +198,9 @@ const AZIMUTHS: usize = 32;
 fn image_scale(model: &RayModel) -> ExperimentResult<f64> {
     const DEGREES: f64 = 0.05;
     let field = FieldPoint { x: 0.0, y: DEGREES, weight: 1.0 };
-    let chief = model.chief_point(field, model.primary);
-    let [_, height] = chief.map_err(|error| ExperimentError::Failed(error.to_string()))?;
-    Ok(height / DEGREES.to_radians().tan())
+    let chief = distortion(model, field, model.primary);
+    let chief = chief.map_err(|error| ExperimentError::Failed(error.to_string()))?;
+    Ok(chief.height / DEGREES.to_radians().tan())
 }
 
 /// Both lenses at equal brightness.

@@ -169,7 +169,8 @@ pub enum Command {
 }
 
 /// What a panel shows of the design.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum PanelSetting {
     /// The number of rays of each field in the layout.
     Rays(usize),

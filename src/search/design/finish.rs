@@ -37,11 +37,15 @@ pub struct DesignedLens {
 }
 
 /// The rounds of a finish, the trials of each, and the weight of limits.
-const ROUNDS: usize = 6;
+const ROUNDS: usize = 12;
 const TRIALS: usize = 30;
 const WEIGHT: f64 = 300.0;
-/// The margins of the limits in the rounds, relative to the focal length.
-const MARGINS: [f64; ROUNDS] = [0.0, 1e-4, 2e-4, 5e-4, 1e-3, 2e-3];
+/// The margin of the limits, relative to the focal length.
+const MARGIN: f64 = 1e-4;
+/// The part of its violation by which a broken limit is tightened for the next round, and the least
+/// tightening of a length, relative to the focal length.
+const TIGHTENING: f64 = 1.2;
+const LEAST_TIGHTENING: f64 = 1e-5;
 /// The number of candidates that are finished.
 const FINISHED: usize = 4;
 /// The additional light of the brightest lens.
@@ -83,29 +87,70 @@ fn rank(judgement: &LensJudgement) -> f64 {
     if judgement.is_valid() { judgement.rms } else { 1e3 * (1.0 + judgement.rms) }
 }
 
-/// A lens that can be built; `None` if no light gets through.
+/// A lens that can be built; `None` if no light gets through. In every round the limits that the lens
+/// before broke are tightened by what it broke them by, since a penalty never keeps its limit.
 fn finish(candidate: &Candidate, asked: &LensRequirements) -> Option<DesignedLens> {
     let mut draft = settled(&candidate.draft, asked);
     let mut best: Option<(LensJudgement, Lens, Vec<LimitCost>)> = None;
     let mut costs = limit_costs(&draft, asked, &settling(), freedom(asked));
-    for margin in MARGINS {
-        let Some(lens) = with_rims(&draft, asked) else { break };
-        if let Ok(judgement) = judge_lens(&lens, asked, JUDGEMENT_TOLERANCE)
-            && best.as_ref().is_none_or(|(before, ..)| rank(&judgement) < rank(before))
-        {
-            let costs = in_lens(&costs, &lens);
-            best = Some((judgement, refocused(&lens, asked), costs));
+    let mut wanted = TightRequirements { asked: asked.clone(), edge_margin: 0.0 };
+    for _ in 0..ROUNDS {
+        let Some(lens) = with_rims(&draft, &wanted.asked) else { break };
+        if let Ok(judgement) = judge_lens(&lens, asked, JUDGEMENT_TOLERANCE) {
+            wanted.tighten(asked, &judgement);
+            if best.as_ref().is_none_or(|(before, ..)| rank(&judgement) < rank(before)) {
+                let costs = in_lens(&costs, &lens);
+                best = Some((judgement, refocused(&lens, asked), costs));
+            }
         }
         let Some(beams) = traced_beams(&lens) else { break };
-        let plan = BeamPlan { traced: Some(beams), margin, ..BeamPlan::full(WEIGHT) };
+        let edge_margin = wanted.edge_margin;
+        let plan = BeamPlan { traced: Some(beams), edge_margin, ..settling() };
         let freedom = freedom(asked);
-        let Some(found) = descend(&draft, asked, &plan, freedom, TRIALS) else { break };
+        let Some(found) = descend(&draft, &wanted.asked, &plan, freedom, TRIALS) else { break };
         draft = found.draft;
-        costs = limit_costs(&draft, asked, &plan, freedom);
+        costs = limit_costs(&draft, &wanted.asked, &plan, freedom);
     }
     let (judgement, lens, costs) = best?;
     let origin = candidate.origin.clone();
     Some(DesignedLens { merit: DesignMerit::Best, origin, judgement, costs, lens })
+}
+
+/// Requirements that are tighter than what is asked for where a lens has broken them.
+struct TightRequirements {
+    asked: LensRequirements,
+    /// What is added to the least thicknesses of glass and air at rims, in mm.
+    edge_margin: f64,
+}
+
+impl TightRequirements {
+    /// Tightens every requirement that a lens breaks by a little more than its violation.
+    fn tighten(&mut self, asked: &LensRequirements, judgement: &LensJudgement) {
+        let least = LEAST_TIGHTENING * asked.focal_length;
+        let mut edge: f64 = 0.0;
+        for margin in judgement.limits.iter().filter(|margin| !margin.is_kept) {
+            let limit = &margin.limit;
+            let excess = TIGHTENING * -limit.slack() + least;
+            match limit.term {
+                "total_track" => self.asked.track -= excess,
+                "back_focus" => self.asked.back_focus += excess,
+                "distortion" => {
+                    self.asked.distortion *= 1.0 - excess / asked.distortion.max(excess)
+                }
+                "glass_edge" | "air_edge" => edge = edge.max(excess),
+                _ => {}
+            }
+        }
+        self.edge_margin += edge;
+        for (i, field) in judgement.fields.iter().enumerate() {
+            let area = asked.clear_area[i] / field.clear_area;
+            let light = asked.relative_illumination[i] / field.relative_illumination;
+            let short = area.max(light) - 1.0;
+            if short > 0.0 {
+                self.asked.clear_area[i] *= 1.0 + TIGHTENING * short + LEAST_TIGHTENING;
+            }
+        }
+    }
 }
 
 fn freedom(asked: &LensRequirements) -> Freedom {
@@ -125,7 +170,7 @@ fn in_lens(costs: &[LimitCost], lens: &Lens) -> Vec<LimitCost> {
 
 /// The beams and the heavy limits of the first descent of a finish.
 fn settling() -> BeamPlan {
-    BeamPlan { margin: 1e-4, ..BeamPlan::full(WEIGHT) }
+    BeamPlan { margin: MARGIN, ..BeamPlan::full(WEIGHT) }
 }
 
 /// The draft after a descent with heavy limits.

@@ -15,6 +15,8 @@ pub(in crate::search::design) struct BeamPlan {
     pub(in crate::search::design) limit_weight: f64,
     /// The factors by which limits are tightened: lengths and shares.
     pub(in crate::search::design) margin: f64,
+    /// What is added to the least thicknesses of glass and air at rims, in mm.
+    pub(in crate::search::design) edge_margin: f64,
     /// The rays of the pupils of a lens with rims, in place of ellipses.
     pub(in crate::search::design) traced: Option<Vec<FieldBeam>>,
 }
@@ -57,7 +59,7 @@ const WEIGHT_BETWEEN: f64 = 0.1;
 impl BeamPlan {
     /// The full beams with these weights of the limits.
     pub(in crate::search::design) fn full(limit_weight: f64) -> Self {
-        Self { difficulty: [1.0, 1.0], limit_weight, margin: 0.0, traced: None }
+        Self { difficulty: [1.0, 1.0], limit_weight, margin: 0.0, edge_margin: 0.0, traced: None }
     }
 
     /// The beams of all fields.

@@ -98,7 +98,7 @@ impl DraftMerit<'_> {
 
     fn add_edge(&self, i: usize, sum: &mut ResidualSum) {
         let rows = &self.draft.lens.surfaces;
-        let margin = 0.2 * self.plan.margin * self.asked.focal_length;
+        let margin = 0.2 * self.plan.margin * self.asked.focal_length + self.plan.edge_margin;
         let least = if rows[i].medium == Medium::Air { 0.0 } else { self.asked.glass_edge };
         let rim = self.rims[i].min(self.rims[i + 1]);
         let (front, rear) = (sag(&rows[i], rim), sag(&rows[i + 1], rim));
