@@ -8,7 +8,7 @@ use super::state::OptimizerState;
 use super::trust_region::TrustRegionOptimizer;
 use crate::lens::Lens;
 use crate::merit::{DerivativeLevel, Merit, MeritError};
-use crate::solve::{AdamMoments, NielsenDamping};
+use crate::solve::{AdamMoments, NielsenDamping, TrustRegionMemory};
 use serde::{Deserialize, Serialize};
 
 /// The settings of a segment of a descent.
@@ -32,6 +32,9 @@ pub struct DescentState {
     pace: Option<f64>,
     /// The damping of least squares and its growth factor.
     damping: Option<NielsenDamping>,
+    /// The trust region.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    region: Option<TrustRegionMemory>,
     /// The number of steps so far.
     pub steps: usize,
 }
@@ -55,6 +58,8 @@ const MAX_RATE: f64 = 2.0;
 const RATE_GROWTH: f64 = 1.2;
 /// The factor of the rate after a segment without improvement.
 const RATE_DECAY: f64 = 0.8;
+/// The factor of the trust region after a segment that worsened the merit.
+const REGION_DECAY: f64 = 0.25;
 
 impl DescentState {
     /// Raises the rate after a segment that improved the merit.
@@ -71,6 +76,7 @@ impl DescentState {
     pub fn restart_slower(&mut self) {
         self.pace = Some((0.5 * self.pace.unwrap_or(1.0)).max(MIN_RATE));
         self.moments = AdamMoments::default();
+        self.region.iter_mut().for_each(|region| region.shrink(REGION_DECAY));
     }
 }
 
@@ -94,8 +100,10 @@ pub fn run_segment(
             adam(state, sum.gradient.as_slice(), asked, memory)
         }
         DescentMethod::TrustRegion => {
-            let mut search = TrustRegionOptimizer::resume(state, &sum, 0.0);
+            let search = TrustRegionOptimizer::resume(state, &sum, 0.0);
+            let mut search = search.with_memory(memory.region.as_ref());
             search.take_steps(asked.steps);
+            memory.region = search.memory();
             search.into_state()
         }
         DescentMethod::DampedLeastSquares => {

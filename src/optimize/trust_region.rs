@@ -9,7 +9,7 @@ use super::state::OptimizerState;
 use super::{OptimizationEnd, OptimizationProgress, Optimizer};
 use crate::lens::Lens;
 use crate::merit::{DerivativeLevel, Merit, MeritError, SumOfSquares, TermValue};
-use crate::solve::{LeastSquaresPoint, TrustRegion, TrustRegionStep};
+use crate::solve::{LeastSquaresPoint, TrustRegion, TrustRegionMemory, TrustRegionStep};
 use nalgebra::DVector;
 
 /// The number of accepted steps between two checks of the rays, at most.
@@ -61,6 +61,22 @@ impl TrustRegionOptimizer {
             idle: 0,
             end: None,
         }
+    }
+
+    /// The same descent with the region of an earlier one.
+    pub(super) fn with_memory(mut self, memory: Option<&TrustRegionMemory>) -> Self {
+        if let Some(memory) = memory {
+            self.region = TrustRegion::resume(memory, &self.state.scales);
+        }
+        self
+    }
+
+    /// The region, to go on with; `None` once it has vanished.
+    pub(super) fn memory(&self) -> Option<TrustRegionMemory> {
+        if self.region.is_exhausted(&self.point) {
+            return None;
+        }
+        self.region.memory(&self.state.scales)
     }
 
     /// The state of the descent.

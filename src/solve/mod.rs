@@ -32,7 +32,7 @@ pub use projection::{
     ConstrainedPoint, ConstraintError, ConstraintFunction, CoordinateBounds, nearest_point,
     nearest_point_from, point_along_normals,
 };
-pub use trust_region::{LeastSquaresPoint, TrustRegion, TrustRegionStep};
+pub use trust_region::{LeastSquaresPoint, TrustRegion, TrustRegionMemory, TrustRegionStep};
 
 /// The scalar product.
 fn dot(a: &[f64], b: &[f64]) -> f64 {
