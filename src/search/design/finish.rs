@@ -1,7 +1,9 @@
 //! The end of a design: rims, beams that get through them, every limit kept, judgement.
 
 use super::LensRequirements;
-use super::draft::{BeamPlan, Freedom, LensDraft, LimitCost, descend, limit_costs, traced_beams};
+use super::draft::{
+    BeamPlan, Freedom, LensDraft, LimitCost, USED_TERMS, descend, limit_costs, traced_beams,
+};
 use super::judge::{JUDGEMENT_TOLERANCE, LensJudgement, judge_lens};
 use super::rims::with_rims;
 use super::run::Candidate;
@@ -42,6 +44,9 @@ const TRIALS: usize = 30;
 const WEIGHT: f64 = 300.0;
 /// The margin of the limits, relative to the focal length.
 const MARGIN: f64 = 1e-4;
+/// The rounds without a gain by this share after which a lens that keeps every limit is finished.
+const PATIENCE: usize = 2;
+const SMALL_GAIN: f64 = 5e-3;
 /// The part of its violation by which a broken limit is tightened for the next round, and the least
 /// tightening of a length, relative to the focal length.
 const TIGHTENING: f64 = 1.2;
@@ -94,14 +99,21 @@ fn finish(candidate: &Candidate, asked: &LensRequirements) -> Option<DesignedLen
     let mut best: Option<(LensJudgement, Lens, Vec<LimitCost>)> = None;
     let mut costs = limit_costs(&draft, asked, &settling(), freedom(asked));
     let mut wanted = TightRequirements { asked: asked.clone(), edge_margin: 0.0 };
+    let mut idle = 0;
     for _ in 0..ROUNDS {
         let Some(lens) = with_rims(&draft, &wanted.asked) else { break };
+        idle += 1;
         if let Ok(judgement) = judge_lens(&lens, asked, JUDGEMENT_TOLERANCE) {
             wanted.tighten(asked, &judgement);
-            if best.as_ref().is_none_or(|(before, ..)| rank(&judgement) < rank(before)) {
+            let before = best.as_ref().map_or(f64::INFINITY, |(before, ..)| rank(before));
+            if rank(&judgement) < before {
+                idle = if rank(&judgement) < (1.0 - SMALL_GAIN) * before { 0 } else { idle };
                 let costs = in_lens(&costs, &lens);
                 best = Some((judgement, refocused(&lens, asked), costs));
             }
+        }
+        if idle >= PATIENCE && best.as_ref().is_some_and(|(found, ..)| found.is_valid()) {
+            break;
         }
         let Some(beams) = traced_beams(&lens) else { break };
         let edge_margin = wanted.edge_margin;
@@ -154,7 +166,12 @@ impl TightRequirements {
 }
 
 fn freedom(asked: &LensRequirements) -> Freedom {
-    Freedom { glasses: false, aspheric_surfaces: asked.aspheric_surfaces, pupil: true }
+    Freedom {
+        glasses: false,
+        aspheric_surfaces: asked.aspheric_surfaces,
+        terms: USED_TERMS,
+        pupil: true,
+    }
 }
 
 /// The costs with the surfaces of a lens, which has a diaphragm that its draft has not.

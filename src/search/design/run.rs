@@ -4,7 +4,7 @@
 //! between two rounds and resumed, and has the same result on any number of threads.
 
 use super::LensRequirements;
-use super::draft::{BeamPlan, Freedom, LensDraft, descend};
+use super::draft::{BeamPlan, Freedom, LensDraft, USED_TERMS, descend};
 use super::finish::{DesignedLens, finished_lenses};
 use super::glasses::{exchanged, in_catalogue, snapped};
 use super::starts::{NamedDraft, achromats, draft_of, library_starts, random_starts};
@@ -183,7 +183,7 @@ impl DesignRun {
 
     fn freedom(&self) -> Freedom {
         let aspheric_surfaces = self.asked.aspheric_surfaces;
-        Freedom { glasses: true, aspheric_surfaces, pupil: true }
+        Freedom { glasses: true, aspheric_surfaces, terms: USED_TERMS, pupil: true }
     }
 
     fn run_starts(&mut self, stop: &AtomicBool) {
@@ -212,7 +212,9 @@ impl DesignRun {
             }
             let next = f64::min(level + step, 1.0);
             let plan = BeamPlan { difficulty: [next, next], ..BeamPlan::full(SOFT) };
-            let freedom = Freedom { glasses: level > 0.5, aspheric_surfaces, pupil: true };
+            // High powers that few rays hold bend those of the next level away.
+            let terms = if next < 1.0 { 1 } else { USED_TERMS };
+            let freedom = Freedom { glasses: level > 0.5, aspheric_surfaces, terms, pupil: true };
             match descend(&draft, &self.asked, &plan, freedom, LEVEL_TRIALS) {
                 Some(found) => {
                     (draft, value, level) = (found.draft, found.value, next);

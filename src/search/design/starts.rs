@@ -2,7 +2,7 @@
 //! two thin groups, and random lenses.
 
 use super::LensRequirements;
-use super::draft::{BeamPlan, DraftMerit, Freedom, LensDraft};
+use super::draft::{BeamPlan, DraftMerit, Freedom, LensDraft, USED_TERMS};
 use super::judge::{asked_fields, asked_wavelengths, is_aspheric};
 use crate::files::{LibraryLens, library_lenses, scale_to_focal_length};
 use crate::lens::{Lens, Medium, Object, Row, blank, glass};
@@ -177,7 +177,7 @@ pub(super) fn random_starts(
 /// The merit of a draft at a small aperture and field; `None` if its beams do not get through.
 fn screened(draft: &LensDraft, asked: &LensRequirements) -> Option<f64> {
     let plan = BeamPlan { difficulty: [0.3, 0.4], ..BeamPlan::full(0.1) };
-    let freedom = Freedom { glasses: false, aspheric_surfaces: 0, pupil: false };
+    let freedom = Freedom { glasses: false, aspheric_surfaces: 0, terms: USED_TERMS, pupil: false };
     let mut merit = DraftMerit::new(draft, asked, &plan, freedom)?;
     Some(merit.evaluate(&merit.start())?.value)
 }

@@ -2,7 +2,7 @@
 
 use super::beams::FieldBeam;
 use super::parameter::model;
-use super::{BeamPlan, DraftParameter, Freedom, LensDraft, LimitCost};
+use super::{BeamPlan, DraftParameter, Freedom, LensDraft, LimitCost, USED_TERMS};
 use crate::lens::{Lens, Medium, System, glass::model_index};
 use crate::search::design::LensRequirements;
 use crate::search::design::judge::asked_wavelengths;
@@ -56,6 +56,9 @@ struct ChannelSpots {
     /// For each ray the derivatives of x, then those of y.
     slopes: Vec<f64>,
 }
+
+/// The radius of aspheric surfaces relative to the height of the beams on them.
+const ASPHERE_ROOM: f64 = 1.3;
 
 impl ResidualSum {
     fn new(count: usize) -> Self {
@@ -111,7 +114,23 @@ impl<'a> DraftMerit<'a> {
         };
         merit.aim()?;
         merit.rims = merit.beam_heights()?;
+        merit.limit_aspheres();
         Some(merit)
+    }
+
+    /// Gives aspheric surfaces rims somewhat outside the beams: rays are not to look for crossings where
+    /// the high powers of the surface have long left it.
+    fn limit_aspheres(&mut self) {
+        let is_term = |parameter: &DraftParameter| match parameter {
+            DraftParameter::Surface(row, SurfaceParameter::AsphereTerm(_)) => Some(*row),
+            _ => None,
+        };
+        for row in self.parameters.iter().filter_map(is_term) {
+            let radius = ASPHERE_ROOM * self.rims[row];
+            for DraftSystem { system, .. } in self.systems.iter_mut().filter(|_| radius > 0.0) {
+                system.surfaces[row].semi_diameter = radius;
+            }
+        }
     }
 
     /// The values of the parameters in the draft.
@@ -243,7 +262,7 @@ impl<'a> DraftMerit<'a> {
         shift: f64,
     ) -> Option<ChannelSpots> {
         let DraftSystem { um, weight, system } = &self.systems[number];
-        let tracer = Tracer::new(system).ok()?.without_rims();
+        let tracer = Tracer::new(system).ok()?;
         let (landings, matrix) = tracer.jacobian(rays, &self.selected);
         if !(0..rays.len()).all(|i| landings.fate(i).is_imaged()) {
             return None;
@@ -438,7 +457,7 @@ pub(in crate::search::design) fn beam_heights(
     surplus: f64,
 ) -> Option<Vec<[f64; 2]>> {
     let plan = BeamPlan { difficulty: [surplus, 1.0], ..BeamPlan::full(1.0) };
-    let freedom = Freedom { glasses: false, aspheric_surfaces: 0, pupil: true };
+    let freedom = Freedom { glasses: false, aspheric_surfaces: 0, terms: USED_TERMS, pupil: true };
     let merit = DraftMerit::new(draft, asked, &plan, freedom)?;
     let mut system = lens.resolve(0, lens.wavelengths[lens.primary()].um).ok()?;
     for surface in &mut system.surfaces {
@@ -590,7 +609,8 @@ mod tests {
         draft.lens.surfaces[0].thickness = 0.5;
         draft.lens.surfaces[1].thickness = 25.0;
         draft.lens.surfaces[2].conic = -0.5;
-        let freedom = Freedom { glasses: true, aspheric_surfaces: 1, pupil: true };
+        let freedom =
+            Freedom { glasses: true, aspheric_surfaces: 1, terms: USED_TERMS, pupil: true };
         let plan = BeamPlan { margin: 0.05, ..BeamPlan::full(0.3) };
         let mut merit = DraftMerit::new(&draft, &asked, &plan, freedom).unwrap();
         let values = merit.start();
@@ -629,7 +649,8 @@ mod tests {
             requirements(r#"{"focal_length_mm": 80.0, "f_number": 8.0, "half_field_deg": 2.0}"#);
         for start in achromats(&asked) {
             let plan = BeamPlan::full(1.0);
-            let freedom = Freedom { glasses: false, aspheric_surfaces: 0, pupil: false };
+            let freedom =
+                Freedom { glasses: false, aspheric_surfaces: 0, terms: USED_TERMS, pupil: false };
             let merit = DraftMerit::new(&start.draft, &asked, &plan, freedom).unwrap();
             let beam = crate::paraxial::Beam::for_lens(&start.draft.lens, 0);
             let system = &merit.systems[merit.primary].system;
@@ -646,7 +667,8 @@ mod tests {
             r#"{"focal_length_mm": 60.0, "f_number": 4.0, "half_field_deg": 22.0, "max_elements": 6}"#,
         );
         let plan = BeamPlan::full(1.0);
-        let freedom = Freedom { glasses: false, aspheric_surfaces: 0, pupil: false };
+        let freedom =
+            Freedom { glasses: false, aspheric_surfaces: 0, terms: USED_TERMS, pupil: false };
         let mut moved: f64 = 0.0;
         for start in library_starts(&asked, &[]).iter().take(4) {
             let draft = &start.draft;
@@ -669,7 +691,8 @@ mod tests {
         let asked =
             requirements(r#"{"focal_length_mm": 80.0, "f_number": 8.0, "half_field_deg": 2.0}"#);
         let plan = BeamPlan::full(1.0);
-        let freedom = Freedom { glasses: false, aspheric_surfaces: 0, pupil: false };
+        let freedom =
+            Freedom { glasses: false, aspheric_surfaces: 0, terms: USED_TERMS, pupil: false };
         let start = achromats(&asked).swap_remove(0).draft;
         for sign in [-1.0, 1.0] {
             let (mut before, mut found) = (80.0, None);

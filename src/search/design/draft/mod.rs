@@ -11,7 +11,7 @@ mod parameter;
 
 pub(super) use beams::{BeamPlan, traced_beams};
 pub(super) use merit::{DraftMerit, beam_heights};
-pub(super) use parameter::{DraftParameter, Freedom};
+pub(super) use parameter::{DraftParameter, Freedom, USED_TERMS};
 
 use super::LensRequirements;
 use crate::lens::{Lens, Medium};
@@ -149,7 +149,8 @@ mod tests {
         let mut draft = achromats(&asked).swap_remove(0).draft;
         draft.lens.surfaces[1].curvature *= 0.9;
         let plan = BeamPlan::full(1.0);
-        let freedom = Freedom { glasses: true, aspheric_surfaces: 0, pupil: true };
+        let freedom =
+            Freedom { glasses: true, aspheric_surfaces: 0, terms: USED_TERMS, pupil: true };
         let mut merit = DraftMerit::new(&draft, &asked, &plan, freedom).unwrap();
         let start = merit.start();
         let before = merit.evaluate(&start).unwrap().value;

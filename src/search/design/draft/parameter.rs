@@ -12,6 +12,8 @@ pub(in crate::search::design) struct Freedom {
     pub(in crate::search::design) glasses: bool,
     /// The number of surfaces that may be aspheric.
     pub(in crate::search::design) aspheric_surfaces: usize,
+    /// The number of even powers of an asphere from r⁴ on, at most [`USED_TERMS`].
+    pub(in crate::search::design) terms: usize,
     /// True to move the pupil.
     pub(in crate::search::design) pupil: bool,
 }
@@ -28,7 +30,7 @@ pub(in crate::search::design) enum DraftParameter {
 }
 
 /// The even powers of an asphere that a design uses, r⁴ to r¹⁰.
-pub(super) const USED_TERMS: usize = 4;
+pub(in crate::search::design) const USED_TERMS: usize = 4;
 /// The largest curvature, times the focal length.
 const STEEPEST: f64 = 6.0;
 /// The ranges of the index and of the Abbe number of glasses.
@@ -46,7 +48,7 @@ impl DraftParameter {
             add(SurfaceParameter::Thickness);
             if figured.contains(&i) {
                 add(SurfaceParameter::Conic);
-                (0..USED_TERMS).for_each(|term| add(SurfaceParameter::AsphereTerm(term)));
+                (0..freedom.terms).for_each(|term| add(SurfaceParameter::AsphereTerm(term)));
             }
             if freedom.glasses && matches!(row.medium, Medium::Model { .. }) {
                 all.push(Self::Surface(i, SurfaceParameter::Index));
