@@ -415,9 +415,9 @@ fn minimize_by_factors(
             return Some(found.0 * (radius / length).min(1.0));
         }
         if length > radius {
-            low = shift
+            low = shift;
         } else {
-            high = shift
+            high = shift;
         }
         shift = next_shift(shift, &found, radius);
     }

@@ -7,8 +7,8 @@ use aplanat::lens::{Aperture, Edit, Lens, Medium, Object, Parameter, Quantity, R
 use aplanat::merit::{Goal, PupilEdge, Term};
 use aplanat::optimize::{DescentMethod, OptimizationEnd, OptimizationProgress, pareto};
 use aplanat::session::{
-    Command, OptimizationRequest, OptimizationSnapshot, ParetoPass, ParetoRun, ParetoView, RunId,
-    RunKind, RunStatus, RunView, SessionView,
+    Command, OptimizationRequest, OptimizationSnapshot, PanelSetting, ParetoPass, ParetoRun,
+    ParetoView, RunId, RunKind, RunStatus, RunView, SessionView,
 };
 use aplanat::studio::draw::RenderBackend;
 use aplanat::studio::file_dialog::FileRequest;

@@ -147,7 +147,7 @@ impl TightRequirements {
                 "total_track" => self.asked.track -= excess,
                 "back_focus" => self.asked.back_focus += excess,
                 "distortion" => {
-                    self.asked.distortion *= 1.0 - excess / asked.distortion.max(excess)
+                    self.asked.distortion *= 1.0 - excess / asked.distortion.max(excess);
                 }
                 "glass_edge" | "air_edge" => edge = edge.max(excess),
                 _ => {}

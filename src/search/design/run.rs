@@ -215,16 +215,13 @@ impl DesignRun {
             // High powers that few rays hold bend those of the next level away.
             let terms = if next < 1.0 { 1 } else { USED_TERMS };
             let freedom = Freedom { glasses: level > 0.5, aspheric_surfaces, terms, pupil: true };
-            match descend(&draft, &self.asked, &plan, freedom, LEVEL_TRIALS) {
-                Some(found) => {
-                    (draft, value, level) = (found.draft, found.value, next);
-                    used += found.gradients;
-                    step = f64::min(2.0 * step, LEVEL_STEPS[0]);
-                }
-                None => {
-                    used += 1;
-                    step *= 0.5;
-                }
+            if let Some(found) = descend(&draft, &self.asked, &plan, freedom, LEVEL_TRIALS) {
+                (draft, value, level) = (found.draft, found.value, next);
+                used += found.gradients;
+                step = f64::min(2.0 * step, LEVEL_STEPS[0]);
+            } else {
+                used += 1;
+                step *= 0.5;
             }
         }
         (Some(Candidate { origin: start.name.clone(), draft, value }), used)

@@ -210,9 +210,6 @@ fn random_lens(asked: &LensRequirements, random: &mut Random) -> Option<LensDraf
 
 /// A random lens of two groups that have the focal length and the back focus as thin lenses: a
 /// negative group in front where the back focus exceeds the focal length, a positive one otherwise.
-///
-/// At a distance `d` the powers of two thin lenses with focal length `f` and back focus `b` are
-/// `(f − b) / (d f)` and `(b + d − f) / (d b)` (Kingslake, *Lens Design Fundamentals*, 3.1).
 fn two_group_lens(asked: &LensRequirements, random: &mut Random) -> Option<LensDraft> {
     let f = asked.focal_length;
     let pieces = piece_number(asked, random);
@@ -222,7 +219,7 @@ fn two_group_lens(asked: &LensRequirements, random: &mut Random) -> Option<LensD
     let back = asked.back_focus.max(0.05 * f) * (1.0 + 0.3 * random.random::<f64>());
     let longest = asked.track - back;
     let distance = longest * (0.3 + 0.6 * random.random::<f64>());
-    let powers = [(f - back) / (distance * f), (back + distance - f) / (distance * back)];
+    let powers = group_powers(f, back, distance);
     let front = random.random_range(1..pieces);
     let mut rows: Vec<Row> = Vec::new();
     let mut first_length = 0.0;
@@ -241,6 +238,12 @@ fn two_group_lens(asked: &LensRequirements, random: &mut Random) -> Option<LensD
         }
     }
     focused(rows, asked, random)
+}
+
+/// The powers of two thin lenses at a distance `d` with the focal length `f` and the back focus `b`:
+/// `(f − b) / (d f)` and `(b + d − f) / (d b)` (Kingslake, *Lens Design Fundamentals*, 3.1).
+fn group_powers(f: f64, b: f64, d: f64) -> [f64; 2] {
+    [(f - b) / (d * f), (b + d - f) / (d * b)]
 }
 
 /// The elements of a group of this power: one of the opposite sign and of the opposite kind of glass
@@ -288,16 +291,13 @@ fn push_element(
     let cemented = random.random::<f64>() < element.cemented;
     let glass = Medium::Model { nd, vd };
     let last = rows.last_mut().filter(|_| cemented);
-    let front = match last {
-        Some(last) => {
-            (last.medium, last.thickness) = (glass, thick);
-            last.curvature
-        }
-        None => {
-            let front = bend + 0.5 * curvature;
-            rows.push(Row { curvature: front, thickness: thick, medium: glass, ..Row::default() });
-            front
-        }
+    let front = if let Some(last) = last {
+        (last.medium, last.thickness) = (glass, thick);
+        last.curvature
+    } else {
+        let front = bend + 0.5 * curvature;
+        rows.push(Row { curvature: front, thickness: thick, medium: glass, ..Row::default() });
+        front
     };
     rows.push(Row { curvature: front - curvature, thickness: element.gap, ..Row::default() });
 }
@@ -398,6 +398,31 @@ mod tests {
         }
         let elements = |draft: &LensDraft| piece_count(&draft.lens);
         assert!(drafts.iter().all(|draft| (1..=asked.elements).contains(&elements(draft))));
+    }
+
+    #[test]
+    fn two_groups_have_the_focal_length_and_a_long_back_focus_from_a_negative_front() {
+        let spec: LensSpecification = serde_json::from_str(
+            r#"{"focal_length_mm": 28.0, "f_number": 3.5, "half_field_deg": 33.0,
+                "min_back_focus_mm": 37.5, "max_track_mm": 90.5, "max_elements": 6}"#,
+        )
+        .unwrap();
+        let asked = LensRequirements::complete(&spec).unwrap().0;
+        let mut random = Random::seed_from_u64(5);
+        let drafts: Vec<_> = (0..400).filter_map(|_| two_group_lens(&asked, &mut random)).collect();
+        assert!(drafts.len() > 20, "{}", drafts.len());
+        for draft in &drafts {
+            let um = draft.lens.wavelengths[draft.lens.primary()].um;
+            assert!((focal_length(draft, um) / 28.0 - 1.0).abs() < 1e-9);
+            assert!(draft.lens.surfaces.iter().all(|row| row.thickness > 0.0));
+            assert!((2..=6).contains(&piece_count(&draft.lens)));
+        }
+        let [f, b, d] = [28.0, 38.0, 45.0];
+        let [front, rear] = group_powers(f, b, d);
+        // The height of a ray at the rear lens, over the slope behind it, is the back focus.
+        let (height, slope) = (1.0 - d * front, front + rear * (1.0 - d * front));
+        assert!(front < 0.0 && (slope * f - 1.0).abs() < 1e-12);
+        assert!((height / slope - b).abs() < 1e-9);
     }
 
     #[test]
