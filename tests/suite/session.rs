@@ -11,8 +11,8 @@ use aplanat::merit::{Goal, LimitTreatment, MeritError, PupilEdge, Term, TermValu
 use aplanat::optimize::{DescentMethod, OptimizationProgress, Optimizer};
 use aplanat::pupil::RayModel;
 use aplanat::session::{
-    AnalysisSettings, Command, ExperimentStatus, OptimizerFactory, RunStatus, Session,
-    SessionEvent, SessionView, Severity, analyze,
+    AnalysisSettings, Command, ExperimentStatus, OptimizerFactory, PanelSetting, RunStatus,
+    Session, SessionEvent, SessionView, Severity, analyze,
 };
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
