@@ -168,21 +168,21 @@ pub enum Command {
     ClearMessages,
 }
 
-/// What a panel shows of the design.
+/// A setting of what panels show of the design.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum PanelSetting {
     /// The number of rays of each field in the layout.
     Rays(usize),
-    /// Whether the pupils of the fields are computed.
+    /// True to compute the pupils of the fields.
     Pupils(bool),
-    /// Whether the contrast of the fields is computed.
+    /// True to compute the contrast of the fields.
     Contrasts(bool),
-    /// Whether the picture of a scene is computed.
+    /// True to compute the picture of a scene.
     Picture(bool),
     /// The scene of the picture.
     Scene(BuiltInScene),
-    /// Whether the lens as it is made is computed.
+    /// True to compute the lens as it is made.
     Tolerances(bool),
     /// The class of care in making of a lens without tolerances of its own.
     ToleranceGrade(ToleranceGrade),

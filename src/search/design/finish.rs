@@ -131,7 +131,7 @@ fn finish(candidate: &Candidate, asked: &LensRequirements) -> Option<DesignedLen
 /// Requirements that are tighter than what is asked for where a lens has broken them.
 struct TightRequirements {
     asked: LensRequirements,
-    /// What is added to the least thicknesses of glass and air at rims, in mm.
+    /// The addition to the least thicknesses of glass and air at rims, in mm.
     edge_margin: f64,
 }
 

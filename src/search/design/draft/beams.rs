@@ -15,7 +15,7 @@ pub(in crate::search::design) struct BeamPlan {
     pub(in crate::search::design) limit_weight: f64,
     /// The factors by which limits are tightened: lengths and shares.
     pub(in crate::search::design) margin: f64,
-    /// What is added to the least thicknesses of glass and air at rims, in mm.
+    /// The addition to the least thicknesses of glass and air at rims, in mm.
     pub(in crate::search::design) edge_margin: f64,
     /// The rays of the pupils of a lens with rims, in place of ellipses.
     pub(in crate::search::design) traced: Option<Vec<FieldBeam>>,
