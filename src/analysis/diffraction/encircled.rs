@@ -31,6 +31,8 @@ pub fn encircled_energy(
     Ok((0..radii.len()).map(estimate).collect())
 }
 
+/// The absolute error of a contrast under the integral of encircled energy.
+const CONTRAST_TOLERANCE: f64 = 1e-9;
 /// The nodes of a smooth part of the contrast, and of a period of the Bessel function.
 const PART_NODES: usize = 40;
 const PERIOD_NODES: f64 = 6.0;
@@ -39,7 +41,8 @@ impl PupilFunction {
     /// The shares of the energy within circles of radii in mm about the centre, for a round pupil whose
     /// aberrations are round too: `2π r ∫ OTF(ν) J₁(2π ν r) dν` up to its cutoff in cycles/mm. The
     /// contrast has corners at `1 − ε`, `1 ± ε` halved and `ε` of it for a round shadow of the share ε.
-    /// All circles share the frequencies, which the largest one asks for.
+    /// All circles share the frequencies, which the largest one asks for. With each share comes the error
+    /// that those of the contrasts leave in it.
     ///
     /// # Errors
     /// The pupil is irregular.
@@ -49,19 +52,25 @@ impl PupilFunction {
         cutoff: f64,
         shadow: f64,
         fine: bool,
-    ) -> Result<Vec<f64>, AnalysisError> {
+    ) -> Result<Vec<[f64; 2]>, AnalysisError> {
         if radii.is_empty() {
             return Ok(Vec::new());
         }
         let largest = radii.iter().copied().fold(0.0, f64::max);
-        let contrasts: Result<Vec<_>, AnalysisError> = frequencies(largest, cutoff, shadow, fine)
-            .into_par_iter()
-            .map(|(nu, weight)| Ok((nu, weight * self.transfer([0.0, nu], 0.0, 1e-12)?.re)))
-            .collect();
+        let contrast = |(nu, weight): (f64, f64)| {
+            let found = self.transfer([0.0, nu], 0.0, CONTRAST_TOLERANCE)?;
+            Ok((nu, [found.re, found.modulus.error].map(|value| weight * value)))
+        };
+        let contrasts: Result<Vec<(f64, [f64; 2])>, AnalysisError> =
+            frequencies(largest, cutoff, shadow, fine).into_par_iter().map(contrast).collect();
         let contrasts = contrasts?;
         let share = |radius: &f64| {
-            let term = |(nu, contrast): &(f64, f64)| contrast * bessel_j1(TAU * nu * radius);
-            TAU * radius * contrasts.iter().map(term).sum::<f64>()
+            let terms = contrasts.iter().map(|(nu, [value, error])| {
+                let bessel = bessel_j1(TAU * nu * radius);
+                [value * bessel, error * bessel.abs()]
+            });
+            let sum = terms.fold([0.0; 2], |sum, term| [sum[0] + term[0], sum[1] + term[1]]);
+            sum.map(|part| TAU * radius * part)
         };
         Ok(radii.iter().map(share).collect())
     }

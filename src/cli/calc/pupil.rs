@@ -267,10 +267,8 @@ impl PupilArgs {
         let [few, many] = [false, true]
             .map(|fine| pupil.round_encircled(&self.radii, cutoff, self.obscuration, fine));
         let energies = few?.into_iter().zip(many?).zip(&self.radii);
-        let circle = |((before, energy), radius): ((f64, f64), &f64)| PupilCircle {
-            radius: *radius,
-            energy,
-            error: (energy - before).abs(),
+        let circle = |(([before, _], [energy, left]), radius): (([f64; 2], [f64; 2]), &f64)| {
+            PupilCircle { radius: *radius, energy, error: (energy - before).abs() + left }
         };
         Ok(energies.map(circle).collect())
     }
