@@ -357,7 +357,8 @@ pub(super) fn decision_text(decision: &EffectDecision) -> String {
         limit => format!("{} of {} {unit}", ShortNumber(*error), ShortNumber(limit)),
     };
     let time = cost.map_or_else(String::new, |cost| {
-        format!("; {saving} {:.0} %, {:.2} ms", 100.0 * cost.saved_share, cost.saved_ms)
+        let (share, ms, error) = (100.0 * cost.saved_share, cost.saved_ms, cost.error_ms);
+        format!("; {saving} {share:.0} %, {ms:.2} ± {error:.2} ms")
     });
     format!("  {:<18} {verdict:<8}  {asked}{reason} ({numbers}{time})", effect.name())
 }

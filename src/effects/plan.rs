@@ -77,13 +77,15 @@ pub struct EffectDecision {
 }
 
 /// The time that an effect takes, measured by runs with it and without it.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct EffectCost {
     /// The part of the time with the effect that leaving it out saves; negative if it costs time.
     #[serde(rename = "saves")]
     pub saved_share: f64,
     /// The same in milliseconds.
     pub saved_ms: f64,
+    /// The error of `saved_ms`, by the scatter of the runs, in milliseconds.
+    pub error_ms: f64,
 }
 
 /// The decisions for a lens.

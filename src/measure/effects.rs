@@ -1,6 +1,6 @@
 //! The measured cost of each effect: the time of the spots of a lens with it and without it.
 
-use super::timing::time_ms;
+use super::timing::{Stopwatch, time_ms};
 use crate::analysis;
 use crate::effects::{
     self, Effect, EffectCost, EffectMeasurements, EffectOverride, EffectOverrides, EffectPlan,
@@ -9,8 +9,15 @@ use crate::effects::{
 use crate::lens::Lens;
 use crate::pupil::{Accuracy, RayModelError};
 
-/// The number of measurements, of which the shortest counts.
-const REPETITIONS: usize = 2;
+/// The fewest pairs of measurements, with an effect and without it. Of each kind the shortest counts:
+/// whatever else the machine does only makes a run longer.
+const MIN_PAIRS: usize = 4;
+/// The longest time for the pairs of one effect, in seconds.
+const MAX_SECONDS: f64 = 1.0;
+/// A saving is known once its error is below this part of it.
+const RELATIVE_ERROR: f64 = 0.25;
+/// A saving of this part of the time with the effect is too small to be told from none.
+const NEGLIGIBLE: f64 = 0.02;
 /// The limit of rays for a spot: without an effect, a spot may never reach its tolerance.
 const MAX_RAYS: usize = 10_000;
 
@@ -67,19 +74,22 @@ impl EffectTask<'_> {
         let plans = [EffectOverride::On, EffectOverride::Off]
             .map(|choice| self.plan(facts, &self.overrides.clone().with(effect, choice)));
         if computes_same(&plans) {
-            return Some(EffectCost { saved_share: 0.0, saved_ms: 0.0 });
+            return Some(EffectCost::default());
         }
-        let mut best = [f64::INFINITY; 2];
-        for _ in 0..REPETITIONS {
-            for (best, plan) in best.iter_mut().zip(&plans) {
+        let (watch, mut times) = (Stopwatch::start(), [ShortestTimes::NONE; 2]);
+        for pair in 1.. {
+            for (times, plan) in times.iter_mut().zip(&plans) {
                 if interrupted() {
                     return None;
                 }
-                *best = best.min(time_ms(|| self.compute_spots(plan)).1);
+                times.add(time_ms(|| self.compute_spots(plan)).1);
+            }
+            let is_known = pair >= MIN_PAIRS && is_resolved(&times);
+            if is_known || (pair >= MIN_PAIRS && watch.seconds() > MAX_SECONDS) {
+                break;
             }
         }
-        let saved_ms = best[0] - best[1];
-        Some(EffectCost { saved_share: saved_ms / best[0], saved_ms })
+        Some(saving(&times))
     }
 
     /// The number of spots of the lens resolved by a plan; 0 if it cannot be.
@@ -90,8 +100,64 @@ impl EffectTask<'_> {
     }
 }
 
+/// The shortest of some times and the next one, in milliseconds.
+#[derive(Debug, Clone, Copy)]
+struct ShortestTimes {
+    best: f64,
+    next: f64,
+}
+
+impl ShortestTimes {
+    const NONE: Self = Self { best: f64::INFINITY, next: f64::INFINITY };
+
+    fn add(&mut self, ms: f64) {
+        self.next = self.next.min(ms.max(self.best));
+        self.best = self.best.min(ms);
+    }
+}
+
+/// The saving between the times with an effect and without it. Its error is the distance of the two
+/// shortest times of each.
+fn saving([on, off]: &[ShortestTimes; 2]) -> EffectCost {
+    let saved_ms = on.best - off.best;
+    let error_ms = (on.next - on.best) + (off.next - off.best);
+    EffectCost { saved_share: saved_ms / on.best, saved_ms, error_ms }
+}
+
+/// True if the saving is known well enough, or is negligible.
+fn is_resolved(times: &[ShortestTimes; 2]) -> bool {
+    let EffectCost { saved_ms, error_ms, .. } = saving(times);
+    error_ms < RELATIVE_ERROR * saved_ms.abs() || error_ms < NEGLIGIBLE * times[0].best
+}
+
 /// True if both plans compute the same.
 fn computes_same([on, off]: &[EffectPlan; 2]) -> bool {
     let same = |effect: &Effect| on.computes(*effect) == off.computes(*effect);
     Effect::ALL.iter().all(same) && on.as_conic == off.as_conic && on.unclipped == off.unclipped
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn shortest(times: &[f64]) -> ShortestTimes {
+        let mut shortest = ShortestTimes::NONE;
+        times.iter().for_each(|ms| shortest.add(*ms));
+        shortest
+    }
+
+    #[test]
+    fn a_saving_is_that_of_the_shortest_times() {
+        let times = [shortest(&[9.0, 3.0, 7.0, 3.25]), shortest(&[1.0, 20.0, 1.0, 1.125])];
+        let cost = saving(&times);
+        assert_eq!((cost.saved_ms, cost.error_ms), (2.0, 0.25));
+        assert!(is_resolved(&times));
+    }
+
+    #[test]
+    fn a_saving_that_times_cannot_tell_from_none_is_measured_again() {
+        assert!(!is_resolved(&[shortest(&[3.0, 5.0]), shortest(&[2.0, 4.0])]));
+        assert!(!is_resolved(&[shortest(&[3.0]), shortest(&[2.0])]), "one run has no error");
+        assert!(is_resolved(&[shortest(&[3.0, 3.01]), shortest(&[3.0, 3.01])]), "negligible");
+    }
 }

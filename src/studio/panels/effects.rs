@@ -99,10 +99,11 @@ fn reason_text(decision: &EffectDecision) -> String {
     let EffectDecision { error, limit, unit, cost, .. } = decision;
     let (scale, unit) = if *unit == "mm" { (1e3, "µm") } else { (1.0, *unit) };
     let rests = format!("{} {unit}, limit {} {unit}", digits(scale * error), digits(scale * limit));
-    let Some(EffectCost { saved_share, saved_ms }) = *cost else { return rests };
+    let Some(EffectCost { saved_share, saved_ms, error_ms }) = *cost else { return rests };
     if saved_share == 0.0 {
         return rests;
     }
     let verb = if decision.computed { "would save" } else { "saves" };
-    format!("{rests}; {verb} {:.0} % of the spots ({saved_ms:.2} ms)", 100.0 * saved_share)
+    let percent = 100.0 * saved_share;
+    format!("{rests}; {verb} {percent:.0} % of the spots ({saved_ms:.2} ± {error_ms:.2} ms)")
 }
