@@ -87,3 +87,7 @@ pub mod studio;
 
 // The headless command line.
 pub mod cli;
+
+// The same library for Python.
+#[cfg(feature = "python")]
+pub mod python;

@@ -7,7 +7,7 @@ use clap::CommandFactory;
 use serde::Serialize;
 use std::fmt::{self, Display};
 
-/// Prints the help of a command or of a topic: lens-file, conventions, effects, packages
+/// Prints the help of a command or of a topic: lens-file, conventions, effects, packages, python
 #[derive(Debug, clap::Args)]
 pub(super) struct HelpArgs {
     /// A command, or one of the topics; all commands where it is absent
@@ -16,11 +16,12 @@ pub(super) struct HelpArgs {
 }
 
 /// Texts that belong to no command, by name.
-pub(super) const TOPICS: [(&str, &str); 4] = [
+pub(super) const TOPICS: [(&str, &str); 5] = [
     ("lens-file", include_str!("help/lens-file.txt")),
     ("conventions", include_str!("help/conventions.txt")),
     ("effects", include_str!("help/effects.txt")),
     ("packages", include_str!("help/packages.txt")),
+    ("python", include_str!("help/python.txt")),
 ];
 
 /// A text that is printed as it is.

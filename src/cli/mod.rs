@@ -134,6 +134,33 @@ pub fn run() -> ExitCode {
     }
 }
 
+/// The outcome of a subcommand that a program has run.
+#[derive(Debug)]
+pub struct CommandOutcome {
+    /// The result as JSON; empty if there is none. A command that fails late has one all the same.
+    pub json: String,
+    /// The error, as the command line prints it.
+    pub error: Option<String>,
+    /// The exit status of the command line.
+    pub status: u8,
+}
+
+/// Runs a subcommand with its arguments, as in `["analyze", "lens.json", "spot"]`, and returns its
+/// result instead of printing it. Signals are left to the caller.
+pub fn run_collecting(arguments: &[String]) -> CommandOutcome {
+    progress::leave_signals_to_host();
+    let words = std::iter::once("aplanat").chain(arguments.iter().map(String::as_str));
+    let matches = with_numbers(CliArgs::command()).try_get_matches_from(words);
+    let parsed = matches.and_then(|matches| CliArgs::from_arg_matches(&matches));
+    let output = Output::collecting();
+    let (error, status) = match parsed.map(|arguments| arguments.run_with(&output)) {
+        Ok(Ok(())) => (None, 0),
+        Ok(Err(failure)) => (Some(failure.to_string()), failure.exit_status()),
+        Err(usage) => (Some(usage.to_string()), 2),
+    };
+    CommandOutcome { json: output.into_collected(), error, status }
+}
+
 impl CliArgs {
     /// The arguments of the process.
     fn read() -> Result<Self, clap::Error> {
@@ -141,12 +168,15 @@ impl CliArgs {
     }
 
     fn run(&self) -> Result<(), CliError> {
-        let output = Output::new(self.json);
+        self.run_with(&Output::new(self.json))
+    }
+
+    fn run_with(&self, output: &Output) -> Result<(), CliError> {
         match &self.command {
             Some(_) if self.lens.is_some() => Err(CliError::Input(
                 "a lens in front of a subcommand; expected it behind: `aplanat info LENS`".into(),
             )),
-            Some(command) => command.run(&output),
+            Some(command) => command.run(output),
             None => window::open(self.lens.as_deref()),
         }
     }

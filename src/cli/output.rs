@@ -7,21 +7,40 @@ pub(super) use crate::math::ShortNumber;
 use serde::Serialize;
 use std::fmt::{self, Display};
 use std::io::{Write as _, stderr, stdout};
+use std::sync::{Mutex, PoisonError};
 
 /// The printer of results, as text or as JSON.
 #[derive(Debug)]
 pub(super) struct Output {
     json: bool,
+    /// The results so far, if they are collected instead of printed.
+    collected: Option<Mutex<String>>,
 }
 
 impl Output {
     pub(super) fn new(json: bool) -> Self {
-        Self { json }
+        Self { json, collected: None }
+    }
+
+    /// A printer that collects results as JSON.
+    pub(super) fn collecting() -> Self {
+        Self { json: true, collected: Some(Mutex::default()) }
+    }
+
+    /// The collected results; empty if they were printed.
+    pub(super) fn into_collected(self) -> String {
+        let into_text =
+            |text: Mutex<String>| text.into_inner().unwrap_or_else(PoisonError::into_inner);
+        self.collected.map(into_text).unwrap_or_default()
     }
 
     /// Prints a result.
     pub(super) fn print(&self, result: &(impl Serialize + Display)) -> Result<(), CliError> {
         let text = if self.json { json::pretty(result) } else { result.to_string() };
+        if let Some(collected) = &self.collected {
+            collected.lock().unwrap_or_else(PoisonError::into_inner).push_str(&text);
+            return Ok(());
+        }
         let mut out = stdout().lock();
         out.write_all(text.as_bytes())?;
         Ok(out.flush()?)

@@ -355,6 +355,17 @@ fn unclip(surface: &mut Surface<f64>) {
 /// The radius up to which an asphere is extended, in semi-diameters.
 const ASPHERE_MARGIN: f64 = 1.2;
 
+/// The system of a lens at a wavelength, each surface in a shape that has the numbers that vary.
+pub(super) fn resolve_for_variables(
+    lens: &Lens,
+    zoom: usize,
+    um: f64,
+) -> Result<System<f64>, MeritError> {
+    let mut system = lens.resolve(zoom, um)?;
+    bind_parameters(lens, zoom, um, &mut system);
+    Ok(system)
+}
+
 /// The bindings of the variables at a wavelength; surfaces of `system` are promoted to shapes that
 /// have the numbers bound.
 fn bind_parameters(

@@ -25,6 +25,7 @@ mod sampling;
 mod scoped_part;
 mod spot;
 mod sum;
+mod variable_system;
 mod wavefront;
 
 pub use crate::lens::{
@@ -34,6 +35,7 @@ pub use constraints::{ConstraintMargin, constraint_margins};
 pub use defaults::{GoalLimits, LensFigures, MAX_STEEPNESS, default_terms};
 pub use limits::{Limit, LimitedSum};
 pub use sampling::SpotSampling;
+pub use variable_system::VariableSystem;
 
 use crate::analysis::WavefrontCost;
 use crate::lens::{Lens, LensError, SurfaceNumber, Variable};

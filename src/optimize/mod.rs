@@ -19,7 +19,7 @@ use serde::{Deserialize, Serialize};
 use std::fmt::Debug;
 
 /// A local optimizer that its caller steps, observes and stops.
-pub trait Optimizer: Send + Debug {
+pub trait Optimizer: Send + Sync + Debug {
     /// Takes one step; a step that would make the lens invalid is shortened.
     fn step(&mut self) -> OptimizationProgress;
     /// Evaluates the best lens with newly found rays, as the optimizer itself does from time to

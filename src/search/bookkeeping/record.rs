@@ -1,10 +1,29 @@
 //! Applies the events of a round to lineage, reservoir, statistics and best point.
 
-use super::{DescentEnd, ReservoirEntry};
-use crate::search::sampler::chain::{LocalMove, TurnEvent};
-use crate::search::{Landscape, SearchEvent, SearchPoint, SearchRun};
+use super::{DescentEnd, LineageNode, OfferOutcome, ReservoirEntry};
+use crate::search::sampler::chain::{LocalMove, NewDescent, TurnEvent};
+use crate::search::{Landscape, SearchEvent, SearchPoint, SearchRun, StructureChange};
 
 impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
+    /// Admits a point that another run on the same landscape has found, between two rounds. Its loss
+    /// is computed here, whatever the other run says; a point without a finite one is rejected.
+    pub fn admit<L>(&mut self, landscape: &L, point: P) -> OfferOutcome
+    where
+        L: Landscape<Point = P, Memory = M>,
+    {
+        let loss = landscape.loss(&point);
+        let entry = ReservoirEntry::new(landscape, self.lineage.total(), loss, point.clone());
+        let offer = self.reservoir.offer(entry.clone());
+        if offer.is_accepted() {
+            let record = StructureChange::Received.into();
+            let start = NewDescent { parent: None, kind: None, record, before: None, loss, point };
+            let node = LineageNode { offer: Some(offer), ..self.new_node(0, start) };
+            self.lineage.add(node);
+            self.update_best(&entry);
+        }
+        offer
+    }
+
     /// Applies one event of a chain.
     pub(in crate::search) fn record<L>(
         &mut self,

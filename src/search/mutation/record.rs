@@ -16,6 +16,8 @@ pub enum StructureChange {
     Continuation,
     /// A random lens.
     RandomDraw,
+    /// A lens that another run has found.
+    Received,
     /// Added a singlet.
     AddSinglet {
         /// The glass of the singlet.
@@ -87,6 +89,7 @@ impl Display for StructureChange {
             Self::Start => f.write_str("the start"),
             Self::Continuation => f.write_str("continuation"),
             Self::RandomDraw => f.write_str("drawn at random"),
+            Self::Received => f.write_str("found by another run"),
             Self::AddSinglet { glass, first } => {
                 write!(f, "added a singlet of {glass} as {}", SurfacePair(*first))
             }

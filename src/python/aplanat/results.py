@@ -1,0 +1,68 @@
+"""Results: numbers with their errors, and the rest by name."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A number with its error."""
+
+    value: float
+    """The number, in the unit of the analysis."""
+    error: float | None
+    """Its estimated error, in the same unit."""
+    rays: int | None = None
+    """The rays that it is computed from."""
+    seconds: float | None = None
+    """The time that it took."""
+
+    def __float__(self) -> float:
+        return float(self.value)
+
+    def __str__(self) -> str:
+        return f"{self.value:.6g}" if self.error is None else f"{self.value:.6g} ± {self.error:.1g}"
+
+
+class Result(Mapping[str, Any]):
+    """The result of a command: its entries by name, as attributes or by `[]`."""
+
+    def __init__(self, entries: Mapping[str, Any]) -> None:
+        self._entries = {name: from_json(value) for name, value in entries.items()}
+
+    def __getattr__(self, name: str) -> Any:
+        try:
+            return self.__dict__["_entries"][name]
+        except KeyError:
+            raise AttributeError(f"no entry `{name}`; there are {', '.join(self)}") from None
+
+    def __getitem__(self, name: str) -> Any:
+        return self._entries[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._entries)
+
+    def __len__(self) -> int:
+        return len(self._entries)
+
+    def __dir__(self) -> list[str]:
+        return [*super().__dir__(), *self._entries]
+
+    def __repr__(self) -> str:
+        return f"Result({self._entries!r})"
+
+
+def from_json(value: Any) -> Any:
+    """A value of JSON with estimates and results in place of objects."""
+    if isinstance(value, list):
+        return [from_json(entry) for entry in value]
+    if not isinstance(value, dict):
+        return value
+    if value.keys() <= {"value", "error", "rays", "milliseconds"} and {"value", "error"} <= value.keys():
+        milliseconds = value.get("milliseconds")
+        seconds = None if milliseconds is None else 1e-3 * milliseconds
+        return Estimate(value["value"], value["error"], value.get("rays"), seconds)
+    return Result(value)

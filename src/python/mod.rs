@@ -1,0 +1,44 @@
+//! The library for Python: lenses, rays, merit functions and long runs, behind the feature `python`.
+//!
+//! This is the compiled half, `aplanat._aplanat`: numbers come and go as NumPy arrays, everything
+//! else as the JSON of the file formats and of the command line. The half that is written in Python,
+//! in `aplanat/` beside this file, gives them their names, and reads that JSON. Long work runs
+//! without the interpreter's lock; the caller owns the loop of every run.
+//!
+//! Python counts surfaces from 0, as JSON does.
+#![expect(clippy::needless_pass_by_value, reason = "arguments from Python are owned")]
+
+mod command;
+mod error;
+mod lens;
+mod merit;
+mod names;
+mod rays;
+mod runs;
+
+use pyo3::pymodule;
+
+/// The module that Python imports.
+#[pymodule]
+#[pyo3(name = "_aplanat")]
+mod extension {
+    #[pymodule_export]
+    use super::command::run_command;
+    #[pymodule_export]
+    use super::error::{InputError, WorkError};
+    #[pymodule_export]
+    use super::lens::{PyLens, bundled_names};
+    #[pymodule_export]
+    use super::merit::PyMerit;
+    #[pymodule_export]
+    use super::rays::{ray_gradient, trace_rays};
+    #[pymodule_export]
+    use super::runs::{PyGrinRun, PyOptimizer, PyParetoSweep, PySearch};
+    use pyo3::prelude::*;
+
+    #[pymodule_init]
+    fn add_constants(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        module.add("FATES", super::rays::FATES)?;
+        module.add("__version__", env!("CARGO_PKG_VERSION"))
+    }
+}
