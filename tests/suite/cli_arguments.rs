@@ -86,3 +86,20 @@ fn a_folder_is_created_only_in_one_that_exists() {
     refused(2, &["experiment", "3.3", "--out", deep.to_str().unwrap()], "", &words);
     assert!(!folder.exists());
 }
+
+#[test]
+fn a_program_gets_results_and_errors_instead_of_output() {
+    let run = |words: &[&str]| {
+        let words: Vec<String> = words.iter().map(|word| (*word).to_owned()).collect();
+        aplanat::cli::run_collecting(&words)
+    };
+    let lens = "lenses/singlet_la1131.json";
+    let info = run(&["info", lens]);
+    let found: serde_json::Value = serde_json::from_str(&info.json).unwrap();
+    assert!(info.error.is_none() && info.status == 0 && found["efl"].as_f64().unwrap() > 1.0);
+    let wrong = run(&["analyze", lens, "spot", "--zoom", "4"]);
+    assert_eq!((wrong.json.as_str(), wrong.status), ("", 2));
+    assert!(wrong.error.unwrap().contains("no zoom position 4"));
+    let unknown = run(&["nothing", lens]);
+    assert!(unknown.status == 2 && unknown.error.is_some());
+}

@@ -64,3 +64,4 @@ mod session_search;
 mod tilted;
 mod tolerance;
 mod trace;
+mod variable_system;

@@ -338,9 +338,12 @@ def _arguments() -> argparse.ArgumentParser:
 
 
 def _main() -> int:
-    import ray
-
     options = _arguments().parse_args()
+    try:
+        import ray
+    except ImportError:
+        print("error: Ray is not installed; expected `pip install 'aplanat[ray]'`", file=sys.stderr)
+        return 2
     try:
         lens = Lens.open(options.lens)
         plan = json.loads(Path(options.plan).read_text(encoding="utf-8")) if options.plan else {}

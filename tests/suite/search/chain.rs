@@ -359,3 +359,25 @@ fn the_best_point_of_an_active_descent_can_be_pinned() {
     let pinned = run.pinned().unwrap();
     assert!(pinned.point == best && pinned.loss == loss && loss < run.start().loss);
 }
+
+#[test]
+fn a_run_admits_what_another_one_has_found() {
+    let landscape = Rugged::default();
+    let mut other = begin(&settings(SearchMethod::Restore));
+    to_the_end(&mut other, &landscape);
+    let found = other.best().clone();
+    let mut run = begin(&SearchSettings { seed: 8, ..settings(SearchMethod::Restore) });
+    rounds(&mut run, &landscape, 3);
+    let generations = run.lineage().total();
+    assert!(run.admit(&landscape, found.point.clone()).is_accepted());
+    assert_eq!((run.best().loss, &run.best().point), (found.loss, &found.point));
+    assert_eq!(run.lineage().total(), generations + 1);
+    assert!(!run.admit(&landscape, found.point).is_accepted(), "it is there already");
+    rounds(&mut run, &landscape, 50);
+    assert!(run.best().loss <= found.loss);
+    // Nothing is believed: the loss is that of this landscape.
+    let before = run.clone();
+    let worthless = Rugged::with(Fault::NotANumber);
+    assert!(!run.admit(&worthless, Spot { elements: 6, x: 0.0 }).is_accepted());
+    assert!(run == before, "what is rejected leaves no trace");
+}
