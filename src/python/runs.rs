@@ -18,6 +18,9 @@ use serde_json::json;
 use std::path::PathBuf;
 use std::sync::Arc;
 
+/// The index at the nodes of a grid, the lowest corner of the grid, and its spacing, in mm.
+type GridField<'py> = (Bound<'py, PyArray3<f64>>, [f64; 3], [f64; 3]);
+
 /// Settings from JSON; the default ones without it.
 fn read_settings<T: DeserializeOwned + Default>(text: Option<&str>, what: &str) -> PyResult<T> {
     text.map_or_else(|| Ok(T::default()), |text| json::read_json(text, what).map_err(wrong_input))
@@ -250,11 +253,7 @@ impl PyGrinRun {
     }
 
     /// The best field: the index at the nodes of a grid, its lowest corner and its spacing in mm.
-    fn field<'py>(
-        &self,
-        py: Python<'py>,
-        nodes: usize,
-    ) -> PyResult<(Bound<'py, PyArray3<f64>>, [f64; 3], [f64; 3])> {
+    fn field<'py>(&self, py: Python<'py>, nodes: usize) -> PyResult<GridField<'py>> {
         let task = self.optimizer.task();
         let volume = task.volume(self.optimizer.best(), nodes).map_err(failed_work)?;
         let (counts, low, spacing) =

@@ -95,7 +95,7 @@ fn a_program_gets_results_and_errors_instead_of_output() {
     };
     let lens = "lenses/singlet_la1131.json";
     let info = run(&["info", lens]);
-    let found: serde_json::Value = serde_json::from_str(&info.json).unwrap();
+    let found: Value = serde_json::from_str(&info.json).unwrap();
     assert!(info.error.is_none() && info.status == 0 && found["efl"].as_f64().unwrap() > 1.0);
     let wrong = run(&["analyze", lens, "spot", "--zoom", "4"]);
     assert_eq!((wrong.json.as_str(), wrong.status), ("", 2));
