@@ -17,6 +17,7 @@ mod effects;
 mod error;
 mod experiment;
 mod failures;
+mod glass;
 mod gradient;
 mod grin;
 mod help;
@@ -41,12 +42,14 @@ mod tolerance;
 mod trace;
 mod window;
 
+use crate::files;
 use clap::{Arg, Command, CommandFactory, FromArgMatches, Parser, Subcommand};
 use error::CliError;
 use output::{Output, print_note};
 use std::any::TypeId;
 use std::path::PathBuf;
 use std::process::ExitCode;
+use std::sync::Once;
 
 /// Designs lenses by computation. Without arguments, or with a lens alone, it opens the studio; a
 /// subcommand needs neither window nor display.
@@ -90,6 +93,7 @@ enum CliCommand {
     Report(report::ReportArgs),
     Drawing(drawing::DrawingArgs),
     Library(library::LibraryArgs),
+    Glass(glass::GlassArgs),
     Experiment(experiment::ExperimentArgs),
     Measure(measure::MeasureArgs),
     Help(help::HelpArgs),
@@ -114,6 +118,7 @@ impl CliCommand {
             Self::Report(report) => report.run(output),
             Self::Drawing(drawing) => drawing.run(output),
             Self::Library(library) => library.run(output),
+            Self::Glass(glass) => glass.run(output),
             Self::Experiment(experiment) => experiment.run(output),
             Self::Measure(measure) => measure.run(output),
             Self::Help(help) => help.run(output),
@@ -172,6 +177,7 @@ impl CliArgs {
     }
 
     fn run_with(&self, output: &Output) -> Result<(), CliError> {
+        load_own_glasses();
         match &self.command {
             Some(_) if self.lens.is_some() => Err(CliError::Input(
                 "a lens in front of a subcommand; expected it behind: `aplanat info LENS`".into(),
@@ -180,6 +186,16 @@ impl CliArgs {
             None => window::open(self.lens.as_deref()),
         }
     }
+}
+
+/// Makes the glasses that a person has added known, once. A catalogue that cannot be read is said, and is
+/// no reason to end.
+fn load_own_glasses() {
+    static ONCE: Once = Once::new();
+    ONCE.call_once(|| {
+        let errors = files::load_own_glasses();
+        errors.iter().for_each(|error| print_note(format!("note: {error}")));
+    });
 }
 
 /// A command whose options, and those of its subcommands, take negative numbers as values, so that a

@@ -4,6 +4,7 @@
 //! used, approximated, preserved and dropped. An export is read back and traced before it is saved, and
 //! every file is written beside its target and renamed, so that a failure leaves the target unchanged.
 
+mod agf;
 mod atomic;
 mod bounded;
 mod bundled;
@@ -18,6 +19,7 @@ mod image_side;
 pub mod json;
 mod library;
 mod lock;
+mod own_glass;
 mod probe_rays;
 mod ray_optics;
 mod report;
@@ -27,6 +29,7 @@ mod text;
 mod volume;
 pub mod zemax;
 
+pub use agf::{AgfCatalogue, AgfGlass, parse_agf, read_agf};
 pub use atomic::{check_writable, write_atomic};
 pub use bounded::{MAX_DATA_BYTES, MAX_LENS_BYTES, read_bounded, read_file};
 pub use bundled::{BundledLens, bundled_lenses};
@@ -38,9 +41,12 @@ pub use identity::FileIdentity;
 pub use image_file::{ColorImage, GrayscaleImage, read_color, read_grayscale};
 pub use library::{
     LensScaleError, LibraryLens, LibraryQuery, LibraryQueryError, ShortRange, StatedAperture,
-    StatedField, focal_length_factor, library_lenses, scale_to_focal_length,
+    StatedField, focal_length_factor, library_lenses, parse_range, scale_to_focal_length,
 };
 pub use lock::{FileLock, check_unlocked};
+pub use own_glass::{
+    add_catalogue, glass_folder, load_own_glasses, own_catalogues, remove_catalogue,
+};
 pub use report::{ConversionOutcome, ConversionReport, ConversionRow};
 pub use round_trip::RoundTripCheck;
 pub use self_check::SelfCheck;

@@ -87,6 +87,8 @@ pub enum Command {
         /// The file.
         path: PathBuf,
     },
+    /// Adds a glass catalogue for good, whose glasses lenses can name from now on.
+    AddGlasses(PathBuf),
     /// Starts a local optimization of a copy of the design.
     Optimize {
         /// The descent method.

@@ -214,6 +214,7 @@ impl Studio {
                 Command::InsertLens { path, at }
             }
             FileRequest::ExperimentFolder => Command::SaveExperiment(path),
+            FileRequest::AddGlasses => Command::AddGlasses(path),
             FileRequest::Save => Command::Save(Some(path)),
             FileRequest::ExportFront => Command::ExportPareto(path),
             FileRequest::OpenSearch => search(StructureSearchCommand::ResumeFrom(path)),

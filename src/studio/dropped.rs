@@ -33,11 +33,7 @@ pub(super) fn open_actions(path: &Path) -> Result<Vec<UiAction>, String> {
         FileKind::GrinField => {
             Ok(vec![GrinCommand::OpenFile(path).into(), panel(PanelKind::Slice)])
         }
-        FileKind::Glasses => Err(refusal(
-            &path,
-            "is a catalogue of glasses; only those of the program are used. A glass that is missing \
-             can be typed into the table as nd and vd, such as `1.62 36.4`",
-        )),
+        FileKind::Glasses => Ok(vec![Command::AddGlasses(path).into()]),
         FileKind::Picture => Err(refusal(
             &path,
             "is a picture; a picture is the goal of a gradient-index task, whose file names it: drop \
@@ -62,7 +58,7 @@ fn file_kind(path: &Path) -> Result<FileKind, String> {
         _ => Err(refusal(
             path,
             "is none of the files that the window opens: a lens (.json, .zmx, .seq, .roa), a search (.json), a \
-             gradient-index task (.json) or volume (.npz)",
+             gradient-index task (.json) or volume (.npz), a glass catalogue (.agf)",
         )),
     }
 }

@@ -16,6 +16,8 @@ pub enum FileRequest {
     Open,
     /// To insert the surfaces of a lens file behind the selected element.
     InsertLens,
+    /// To add the glass catalogue of a maker.
+    AddGlasses,
     /// To write the lens in our own form.
     Save,
     /// To write the lens as Zemax reads it.
@@ -47,6 +49,7 @@ impl FileRequest {
         match self {
             Self::Open => "Open a lens",
             Self::InsertLens => "Add a lens from a file",
+            Self::AddGlasses => "Add a glass catalogue",
             Self::Save => "Save the lens",
             Self::ExportZemax => "Export the lens for Zemax",
             Self::ExportJson => "Export a copy of the lens",
@@ -69,6 +72,7 @@ impl FileRequest {
             Self::Open | Self::InsertLens => &["json", "zmx", "ZMX", "seq", "SEQ", "roa"],
             Self::Save | Self::ExportJson | Self::OpenSearch | Self::SaveSearch => &["json"],
             Self::ExportSearchLens(_) => &["json", "zmx"],
+            Self::AddGlasses => &["agf", "AGF"],
             Self::ExportZemax => &["zmx"],
             Self::OpenField => &["json", "npz"],
             Self::SaveField(_) => &["npz", "json"],
@@ -83,6 +87,7 @@ impl FileRequest {
         match self {
             Self::OpenField | Self::SaveField(_) => "GRIN fields",
             Self::SavePicture => "Pictures",
+            Self::AddGlasses => "Glass catalogues",
             Self::ExportPaper(PaperKind::Report) => "Reports",
             Self::ExportPaper(PaperKind::Layout) => "Drawings",
             Self::ExportPaper(PaperKind::Solids) => "Solids",
@@ -97,7 +102,9 @@ impl FileRequest {
 
     /// True if the file is written.
     fn is_save(self) -> bool {
-        !matches!(self, Self::Open | Self::InsertLens | Self::OpenSearch | Self::OpenField)
+        let reads =
+            [Self::Open, Self::InsertLens, Self::AddGlasses, Self::OpenSearch, Self::OpenField];
+        !reads.contains(&self)
     }
 
     /// The path with the extension that it needs, if it has none.

@@ -79,6 +79,12 @@ def test_commands_return_estimates_with_errors(double_gauss):
         mtf.nothing
 
 
+def test_results_are_pickled(double_gauss):
+    spot = aplanat.analyze(double_gauss, "spot")
+    again = pickle.loads(pickle.dumps(spot))
+    assert again == spot and again.fields[0].rms == spot.fields[0].rms
+
+
 def test_commands_fail_as_on_the_command_line(double_gauss):
     with pytest.raises(aplanat.InputError, match="--error"):
         aplanat.analyze(double_gauss, "spot", error=7)

@@ -98,14 +98,32 @@ def test_wrong_settings_are_refused_before_any_work(singlet):
         cluster.Coordinator(singlet, {"nothing": 1}, 100)
 
 
-@needs_ray
-def test_ray_gives_the_same_bits(singlet, undisturbed):
+@pytest.fixture(scope="module")
+def two_workers():
     import ray
 
     ray.init(num_cpus=2, include_dashboard=False, log_to_driver=False)
-    try:
-        for state in cluster.search(singlet, PLAN, gradients=360, groups=3, period=40):
-            pass
-    finally:
-        ray.shutdown()
+    yield
+    ray.shutdown()
+
+
+@needs_ray
+def test_ray_gives_the_same_bits(singlet, undisturbed, two_workers):
+    for state in cluster.search(singlet, PLAN, gradients=360, groups=3, period=40):
+        pass
     assert state.fingerprint == undisturbed.fingerprint
+
+
+@needs_ray
+def test_fronts_commands_and_fields_come_from_machines(double_gauss, two_workers):
+    front = cluster.pareto(double_gauss, points=2, slices=2, steps=5)
+    spots = [numbers.spot for numbers, _ in front]
+    assert len(front) >= 2 and spots == sorted(spots), "brighter is less sharp"
+    again = cluster.pareto(double_gauss, points=2, slices=2, steps=5)
+    assert [lens for _, lens in again] == [lens for _, lens in front]
+    [info] = cluster.commands([("info", "lenses/singlet_la1131.json")])
+    assert info.efl > 0
+    [(values, _, _)] = cluster.grin(["luneburg-radial"], nodes=9)
+    assert values.shape == (9, 9, 9)
+    with pytest.raises(aplanat.InputError, match="slices"):
+        cluster.pareto(double_gauss, points=2, slices=3)

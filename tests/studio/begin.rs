@@ -370,6 +370,11 @@ fn a_dropped_lens_is_opened_and_remembered_and_another_file_refused_by_name() {
     std::fs::write(&text, b"dear").unwrap();
     drop_file(&mut harness, text);
     harness.get_by_label_contains("`letter.txt` is none of the files");
+    press(&mut harness, "OK");
+    let glasses = folder.join("glasses.agf");
+    std::fs::write(&glasses, b"no glass").unwrap();
+    drop_file(&mut harness, glasses);
+    harness.get_by_label_contains("expected a glass catalogue .agf");
     std::fs::remove_dir_all(folder).unwrap();
 }
 

@@ -22,6 +22,7 @@ mod elements;
 mod every_lens;
 mod experiments;
 mod files;
+mod glass;
 mod goals;
 mod grin;
 mod grin_design;

@@ -114,8 +114,8 @@ impl FromStr for Condition {
     }
 }
 
-/// A range whose ends may be left out, or one number.
-fn parse_range(text: &str) -> Option<RangeInclusive<f64>> {
+/// A range such as `28..50` whose ends may be left out, or one number; `None` for anything else.
+pub fn parse_range(text: &str) -> Option<RangeInclusive<f64>> {
     let end = |text: &str, absent: f64| match text {
         "" => Some(absent),
         text => text.parse::<f64>().ok(),

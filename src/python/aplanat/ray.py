@@ -19,14 +19,16 @@ import json
 import os
 import sys
 import tempfile
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from . import _aplanat
+from .commands import run
 from .lens import Lens
-from .runs import Search
+from .results import Result, from_json
+from .runs import GrinTask, Search
 
 VERSION = _aplanat.__version__
 ATTEMPTS = 5
@@ -311,6 +313,85 @@ def _run_periods(periods: list[Period], submit: Callable[[Period], Any], ray: An
                 raise LostPeriodError(f"group {i} failed {ATTEMPTS} times: {error}") from error
             waiting[submit(periods[i])] = i
     return [outcomes[i] for i in range(len(periods))]
+
+
+def each(function: Callable[..., Any], arguments: Iterable[tuple[Any, ...]]) -> list[Any]:
+    """The results of a function for each of some arguments, on the machines of Ray, in their order. Work
+    that a lost machine was doing is done again."""
+    import ray
+
+    if not ray.is_initialized():
+        ray.init(log_to_driver=False, include_dashboard=False)
+    remote = ray.remote(num_cpus=1, max_retries=-1)(_call_alone)
+    return ray.get([remote.remote(function, *words) for words in arguments])
+
+
+def _call_alone(function: Callable[..., Any], *arguments: Any) -> Any:
+    os.environ.setdefault("RAYON_NUM_THREADS", "1")
+    return function(*arguments)
+
+
+def commands(lines: Iterable[Sequence[object]]) -> list[Result]:
+    """The results of commands of the command line, such as `("experiment", "4.6")`, one a machine."""
+    return each(_command, [([str(word) for word in line],) for line in lines])
+
+
+def _command(words: list[str]) -> Result:
+    return run(*words)
+
+
+def pareto(
+    lens: Lens, *, points: int = 20, slices: int = 2, **settings: Any
+) -> list[tuple[Result, Lens]]:
+    """The front of sharpness against light, a slice of the weights a machine, in the order of the light.
+
+    The settings are those of `aplanat.pareto`.
+    """
+    if not 1 <= slices <= points:
+        raise _aplanat.InputError(f"slices: found {slices}; expected 1 to the number of points")
+    low, high = settings.pop("blur", (4e-5, 3.5e-3))
+    edges = [low * (high / low) ** (i / slices) for i in range(slices + 1)]
+    shares = [points // slices + (i < points % slices) for i in range(slices)]
+    text = lens._native.to_json()
+    tasks = [
+        (text, {**settings, "points": share, "blur": edges[i : i + 2]})
+        for i, share in enumerate(shares)
+    ]
+    found = [
+        (from_json(json.loads(numbers)), _lens(lens))
+        for front in each(_front, tasks)
+        for numbers, lens in front
+    ]
+    return [one for one in sorted(found, key=_light) if not any(_beats(two, one) for two in found)]
+
+
+def _front(lens: str, settings: dict[str, Any]) -> list[tuple[str, str]]:
+    sweep = _aplanat.ParetoSweep(_aplanat.Lens.from_json(lens), json.dumps(settings))
+    while not json.loads(sweep.step())["finished"]:
+        pass
+    numbers, lenses = sweep.front()
+    return [(json.dumps(n), lens.to_json()) for n, lens in zip(json.loads(numbers), lenses, strict=True)]
+
+
+def _light(entry: tuple[Result, Lens]) -> float:
+    return entry[0].light
+
+
+def _beats(two: tuple[Result, Lens], one: tuple[Result, Lens]) -> bool:
+    (a, _), (b, _) = two, one
+    return a.spot <= b.spot and a.light >= b.light and (a.spot < b.spot or a.light > b.light)
+
+
+def grin(tasks: Iterable[str | Mapping[str, Any]], nodes: int = 65) -> list[tuple[Any, Any, Any]]:
+    """The fields of tasks of refractive index, a task a machine: what `aplanat.GrinTask.field` gives."""
+    return each(_field, [(task, nodes) for task in tasks])
+
+
+def _field(task: str | Mapping[str, Any], nodes: int) -> tuple[Any, Any, Any]:
+    design = GrinTask(task)
+    for _ in design:
+        pass
+    return design.field(nodes)
 
 
 def _write_whole(path: Path, content: bytes) -> None:

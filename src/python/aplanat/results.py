@@ -34,10 +34,10 @@ class Result(Mapping[str, Any]):
         self._entries = {name: from_json(value) for name, value in entries.items()}
 
     def __getattr__(self, name: str) -> Any:
-        try:
-            return self.__dict__["_entries"][name]
-        except KeyError:
-            raise AttributeError(f"no entry `{name}`; there are {', '.join(self)}") from None
+        entries = self.__dict__.get("_entries", {})
+        if name not in entries:
+            raise AttributeError(f"no entry `{name}`; there are {', '.join(entries)}")
+        return entries[name]
 
     def __getitem__(self, name: str) -> Any:
         return self._entries[name]
@@ -53,6 +53,16 @@ class Result(Mapping[str, Any]):
 
     def __repr__(self) -> str:
         return f"Result({self._entries!r})"
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return (_result_of, (self._entries,))
+
+
+def _result_of(entries: dict[str, Any]) -> Result:
+    """A result of entries that are no JSON any more, for `pickle`."""
+    result = Result({})
+    result._entries = entries
+    return result
 
 
 def from_json(value: Any) -> Any:

@@ -190,6 +190,19 @@ impl Session {
         }
     }
 
+    /// Adds a glass catalogue for good.
+    pub(super) fn add_glasses(&mut self, path: &Path) {
+        match files::add_catalogue(path) {
+            Ok((catalogue, saved)) => {
+                let (count, refused) = (catalogue.glasses.len(), catalogue.refused.len());
+                let saved = saved.display();
+                let text = format!("{count} glasses added, {refused} refused; kept as {saved}");
+                self.post(Severity::Note, text);
+            }
+            Err(why) => self.post(Severity::Error, why.to_string()),
+        }
+    }
+
     fn write_paper(&self, kind: PaperKind, path: &Path) -> Result<(), String> {
         let allowed = kind.extensions();
         if !allowed.iter().any(|extension| has_extension(path, extension)) {

@@ -209,6 +209,7 @@ impl Session {
             Command::Save(path) => self.save(path),
             Command::Export(path) => self.export(&path),
             Command::ExportPaper { kind, path } => self.export_paper(kind, &path),
+            Command::AddGlasses(path) => self.add_glasses(&path),
             Command::Optimize { method, goal } => self.optimize(method, goal),
             Command::Pause => self.optimization.pause(),
             Command::Resume => self.optimization.resume(),

@@ -98,8 +98,8 @@ pub(super) fn suggestions(text: &str) -> Vec<&'static Glass> {
         let begins = name.starts_with(&wanted) || full.starts_with(&wanted);
         (begins || full.contains(&wanted)).then_some((!begins, name, full))
     };
-    let mut found: Vec<_> =
-        glass::catalogue().iter().filter_map(|glass| Some((rank(glass)?, glass))).collect();
+    let proposed = glass::catalogue().iter().chain(glass::added_glasses());
+    let mut found: Vec<_> = proposed.filter_map(|glass| Some((rank(glass)?, glass))).collect();
     found.sort_by(|a, b| a.0.cmp(&b.0));
     found.into_iter().take(PROPOSALS).map(|(_, glass)| glass).collect()
 }

@@ -2,7 +2,14 @@
 //!
 //! The catalogue is `assets/glasses.json`, a subset of the refractiveindex.info database (CC0);
 //! `assets/further_glasses.json` holds more of it, for lenses that name those glasses.
-//! Indices are relative to air at about 20 °C, as in the catalogues of the manufacturers.
+//! Indices are relative to air at about 20 °C, as in the catalogues of the manufacturers. A person may
+//! add catalogues of their own with [`add`].
+
+mod added;
+mod dispersion;
+
+pub use added::{add, added_glasses};
+pub use dispersion::DispersionFormula;
 
 use serde::Deserialize;
 use std::collections::HashMap;
@@ -18,18 +25,6 @@ pub mod line {
     pub const D: f64 = 0.5875618;
     /// The red line of hydrogen.
     pub const C: f64 = 0.6562725;
-}
-
-/// A dispersion formula, with the wavelength λ in micrometres.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum DispersionFormula {
-    /// `n² = 1 + c₀ + Σ Bᵢ λ²/(λ² − Cᵢ)`.
-    SellmeierSq,
-    /// `n² = 1 + c₀ + Σ Bᵢ λ²/(λ² − Cᵢ²)`.
-    SellmeierLin,
-    /// `n² = c₀ + Σ cᵢ λ^pᵢ`.
-    Poly,
 }
 
 /// One glass of the catalogue.
@@ -62,17 +57,7 @@ impl Glass {
         if !(low..=high).contains(&um) {
             return None;
         }
-        let (first, rest) = self.coefficients.split_first()?;
-        let l2 = um * um;
-        let term = |pair: &[f64]| match self.formula {
-            DispersionFormula::SellmeierSq => pair[0] * l2 / (l2 - pair[1]),
-            DispersionFormula::SellmeierLin => pair[0] * l2 / (l2 - pair[1] * pair[1]),
-            DispersionFormula::Poly => pair[0] * um.powf(pair[1]),
-        };
-        let sum: f64 = rest.chunks_exact(2).map(term).sum();
-        let one = if self.formula == DispersionFormula::Poly { 0.0 } else { 1.0 };
-        let n2 = one + first + sum;
-        (n2 > 0.0).then(|| n2.sqrt())
+        self.formula.index(&self.coefficients, um)
     }
 
     /// The manufacturer and the name, as in lens files.
@@ -89,13 +74,13 @@ struct GlassCatalogue {
 /// Every glass that comes with the program.
 pub fn catalogue() -> &'static [Glass] {
     static CATALOGUE: OnceLock<Vec<Glass>> = OnceLock::new();
-    CATALOGUE.get_or_init(|| parse_catalogue(include_str!("../../assets/glasses.json")))
+    CATALOGUE.get_or_init(|| parse_catalogue(include_str!("../../../assets/glasses.json")))
 }
 
 /// Glasses that are found by name alone: a search or a design does not propose them.
 fn further_catalogue() -> &'static [Glass] {
     static CATALOGUE: OnceLock<Vec<Glass>> = OnceLock::new();
-    CATALOGUE.get_or_init(|| parse_catalogue(include_str!("../../assets/further_glasses.json")))
+    CATALOGUE.get_or_init(|| parse_catalogue(include_str!("../../../assets/further_glasses.json")))
 }
 
 fn parse_catalogue(text: &str) -> Vec<Glass> {
@@ -103,38 +88,43 @@ fn parse_catalogue(text: &str) -> Vec<Glass> {
     parsed.map(|c| c.glasses).unwrap_or_default()
 }
 
-/// Every glass that a name can mean: those of [`catalogue`], then the further ones.
+/// Every glass that a name can mean: those of [`catalogue`], then the further ones, then the added
+/// ones.
 pub fn known() -> impl Iterator<Item = &'static Glass> {
-    catalogue().iter().chain(further_catalogue())
+    catalogue().iter().chain(further_catalogue()).chain(added_glasses())
 }
 
 /// The glass with this name, `SCHOTT N-BK7` or, if only one manufacturer has it, `N-BK7`; blanks and
-/// case are ignored. The further glasses are searched last.
+/// case are ignored. The further glasses are searched next, and those that a person has added last, so
+/// that no catalogue changes the meaning of a name.
 pub fn find(name: &str) -> Option<&'static Glass> {
     let name = normalize(name);
     let listed = names().get(&name).copied();
-    listed.unwrap_or_else(|| further_names().get(&name).copied().flatten())
+    let built_in = listed.unwrap_or_else(|| further_names().get(&name).copied().flatten());
+    built_in.or_else(|| added::find(&name))
 }
 
 /// The glass of every name; `None` for a name that two manufacturers share.
 fn names() -> &'static HashMap<String, Option<&'static Glass>> {
     static NAMES: OnceLock<HashMap<String, Option<&'static Glass>>> = OnceLock::new();
-    NAMES.get_or_init(|| index_names(catalogue()))
+    NAMES.get_or_init(|| index_names(catalogue().iter()))
 }
 
 /// The further glass of every name, likewise.
 fn further_names() -> &'static HashMap<String, Option<&'static Glass>> {
     static NAMES: OnceLock<HashMap<String, Option<&'static Glass>>> = OnceLock::new();
-    NAMES.get_or_init(|| index_names(further_catalogue()))
+    NAMES.get_or_init(|| index_names(further_catalogue().iter()))
 }
 
-fn index_names(glasses: &'static [Glass]) -> HashMap<String, Option<&'static Glass>> {
+fn index_names(
+    glasses: impl DoubleEndedIterator<Item = &'static Glass> + Clone,
+) -> HashMap<String, Option<&'static Glass>> {
     let mut names: HashMap<_, Option<&'static Glass>> = HashMap::new();
-    for glass in glasses {
+    for glass in glasses.clone() {
         let short = names.entry(normalize(&glass.name));
         short.and_modify(|only| *only = None).or_insert(Some(glass));
     }
-    for glass in glasses.iter().rev() {
+    for glass in glasses.rev() {
         names.insert(normalize(&glass.full_name()), Some(glass));
     }
     names

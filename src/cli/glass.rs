@@ -1,0 +1,204 @@
+//! `glass`: lists the glasses that lenses can name, and adds catalogues of makers.
+
+use super::error::CliError;
+use super::output::{Output, ShortNumber, TextTable};
+use crate::files::{self, AgfCatalogue, AgfGlass, parse_range};
+use crate::lens::glass::{self, Glass, line};
+use serde::Serialize;
+use std::fmt;
+use std::ops::RangeInclusive;
+use std::path::PathBuf;
+
+/// Lists the glasses that lenses can name, and adds the catalogues of makers, .agf
+#[derive(Debug, clap::Args)]
+#[command(after_long_help = include_str!("help/glass.txt"))]
+pub(super) struct GlassArgs {
+    /// Words of maker and name, and ranges such as nd=1.6..1.7 or vd=50..; absent: every glass
+    #[arg(value_name = "WORD")]
+    words: Vec<String>,
+
+    /// Adds a catalogue for good, in place of one of the same name
+    #[arg(long, value_name = "FILE", conflicts_with = "words")]
+    add: Option<PathBuf>,
+
+    /// Removes the catalogue of this name that was added
+    #[arg(long, value_name = "NAME", conflicts_with_all = ["words", "add"])]
+    remove: Option<String>,
+}
+
+impl GlassArgs {
+    pub(super) fn run(&self, output: &Output) -> Result<(), CliError> {
+        if let Some(path) = &self.add {
+            let (catalogue, saved) = files::add_catalogue(path)?;
+            return output.print(&AddedCatalogue::new(catalogue, saved.display().to_string()));
+        }
+        if let Some(name) = &self.remove {
+            let removed = files::remove_catalogue(name)?.display().to_string();
+            return output.print(&RemovedCatalogue { removed });
+        }
+        let conditions: Vec<GlassCondition> =
+            self.words.iter().map(|word| GlassCondition::new(word)).collect::<Result<_, _>>()?;
+        let is_meant = |glass: &&Glass| conditions.iter().all(|c| c.is_met_by(glass));
+        let found: Vec<GlassRow> = glass::known().filter(is_meant).map(GlassRow::new).collect();
+        if found.is_empty() {
+            let query = self.words.join(" ");
+            let text = format!("found no glass for `{query}`; `aplanat glass` lists all");
+            return Err(CliError::Input(text));
+        }
+        output.print(&GlassList(found))
+    }
+}
+
+/// A condition on a glass.
+enum GlassCondition {
+    /// The maker or the name contains these letters, which are capitals.
+    Word(String),
+    Index(RangeInclusive<f64>),
+    Abbe(RangeInclusive<f64>),
+}
+
+impl GlassCondition {
+    fn new(word: &str) -> Result<Self, CliError> {
+        let Some((name, text)) = word.split_once('=') else {
+            return Ok(Self::Word(word.to_uppercase()));
+        };
+        let range = parse_range(text).ok_or_else(|| {
+            CliError::Input(format!(
+                "found the range `{text}`; expected `1.6..1.7`, `50..` or one number"
+            ))
+        })?;
+        match name {
+            "nd" => Ok(Self::Index(range)),
+            "vd" => Ok(Self::Abbe(range)),
+            _ => Err(CliError::Input(format!("found the number `{name}`; expected nd or vd"))),
+        }
+    }
+
+    fn is_met_by(&self, glass: &Glass) -> bool {
+        match self {
+            Self::Word(word) => glass.full_name().to_uppercase().contains(word),
+            Self::Index(range) => range.contains(&glass.nd),
+            Self::Abbe(range) => range.contains(&glass.vd),
+        }
+    }
+}
+
+/// A glass of the list.
+#[derive(Serialize)]
+struct GlassRow {
+    maker: &'static str,
+    name: &'static str,
+    nd: f64,
+    vd: f64,
+    /// The partial dispersion PgF, if the formula reaches these lines.
+    #[serde(rename = "PgF")]
+    partial_dispersion: Option<f64>,
+    range_um: [f64; 2],
+    #[serde(rename = "density_g_cm3")]
+    density: Option<f64>,
+}
+
+impl GlassRow {
+    fn new(glass: &'static Glass) -> Self {
+        let [g, f, c] = [line::G, line::F, line::C].map(|um| glass.index(um));
+        let partial = || Some((g? - f?) / (f? - c?));
+        Self {
+            maker: &glass.manufacturer,
+            name: &glass.name,
+            nd: glass.nd,
+            vd: glass.vd,
+            partial_dispersion: partial(),
+            range_um: glass.range_um,
+            density: glass.density,
+        }
+    }
+}
+
+/// Glasses, one line each.
+#[derive(Serialize)]
+#[serde(transparent)]
+struct GlassList(Vec<GlassRow>);
+
+impl fmt::Display for GlassList {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mut table =
+            TextTable::new(&["maker", "name", "nd", "vd", "PgF", "um", "g/cm3"]).left(&[1]);
+        let dash = || "-".to_owned();
+        for glass in &self.0 {
+            let [low, high] = glass.range_um.map(ShortNumber);
+            table.row([
+                glass.maker.to_owned(),
+                glass.name.to_owned(),
+                format!("{:.5}", glass.nd),
+                format!("{:.2}", glass.vd),
+                glass.partial_dispersion.map_or_else(dash, |value| format!("{value:.4}")),
+                format!("{low}..{high}"),
+                glass.density.map_or_else(dash, |value| format!("{value:.2}")),
+            ]);
+        }
+        write!(f, "{table}")?;
+        writeln!(f, "{}", counted_glasses(self.0.len()))
+    }
+}
+
+fn counted_glasses(count: usize) -> String {
+    if count == 1 { "1 glass".to_owned() } else { format!("{count} glasses") }
+}
+
+/// The report on a catalogue that was added.
+#[derive(Serialize)]
+struct AddedCatalogue {
+    saved: String,
+    glasses: Vec<AddedGlass>,
+    refused: Vec<RefusedGlass>,
+}
+
+#[derive(Serialize)]
+struct AddedGlass {
+    name: String,
+    nd: f64,
+    vd: f64,
+    #[serde(flatten)]
+    further: AgfGlass,
+}
+
+#[derive(Serialize)]
+struct RefusedGlass {
+    name: String,
+    why: String,
+}
+
+impl AddedCatalogue {
+    fn new(catalogue: AgfCatalogue, saved: String) -> Self {
+        let added = |further: AgfGlass| {
+            let Glass { name, nd, vd, .. } = further.glass.clone();
+            AddedGlass { name, nd, vd, further }
+        };
+        let refused = |(name, why)| RefusedGlass { name, why };
+        Self {
+            saved,
+            glasses: catalogue.glasses.into_iter().map(added).collect(),
+            refused: catalogue.refused.into_iter().map(refused).collect(),
+        }
+    }
+}
+
+impl fmt::Display for AddedCatalogue {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let glasses = counted_glasses(self.glasses.len());
+        writeln!(f, "{glasses}, {} refused; saved as {}", self.refused.len(), self.saved)?;
+        self.refused.iter().try_for_each(|glass| writeln!(f, "  {}: {}", glass.name, glass.why))
+    }
+}
+
+/// The report on a catalogue that was removed.
+#[derive(Serialize)]
+struct RemovedCatalogue {
+    removed: String,
+}
+
+impl fmt::Display for RemovedCatalogue {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "removed {}", self.removed)
+    }
+}

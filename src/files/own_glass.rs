@@ -1,0 +1,108 @@
+//! The glass catalogues that a person has added: files `.agf` in a folder of the settings.
+
+use super::agf::{AgfCatalogue, parse_agf, read_agf};
+use super::atomic::write_atomic;
+use super::bounded::read_file;
+use super::error::FileError;
+use crate::lens::glass;
+use std::env;
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// The variable of the environment that names another folder.
+const FOLDER_VARIABLE: &str = "APLANAT_GLASSES";
+/// The largest catalogue, in bytes.
+pub(super) const MAX_CATALOGUE_BYTES: u64 = 256 << 20;
+
+/// The folder of the catalogues that a person has added: `aplanat/glasses` in the folder of the
+/// settings, or that of the variable `APLANAT_GLASSES`; `None` without a home.
+pub fn glass_folder() -> Option<PathBuf> {
+    let own = env::var_os(FOLDER_VARIABLE).filter(|folder| !folder.is_empty());
+    own.map(PathBuf::from).or_else(|| Some(dirs::config_dir()?.join("aplanat").join("glasses")))
+}
+
+/// The catalogues that a person has added, by name.
+pub fn own_catalogues() -> Vec<PathBuf> {
+    let Some(entries) = glass_folder().and_then(|folder| fs::read_dir(folder).ok()) else {
+        return Vec::new();
+    };
+    let paths = entries.filter_map(|entry| Some(entry.ok()?.path()));
+    let mut paths: Vec<PathBuf> = paths.filter(|path| is_agf(path)).collect();
+    paths.sort();
+    paths
+}
+
+/// Makes the glasses of all catalogues that a person has added known; returns the errors of those that
+/// cannot be read.
+pub fn load_own_glasses() -> Vec<FileError> {
+    let mut errors = Vec::new();
+    for path in own_catalogues() {
+        match read_agf(&path) {
+            Ok(catalogue) => add_glasses(&catalogue),
+            Err(error) => errors.push(error),
+        }
+    }
+    errors
+}
+
+/// Adds a catalogue for good: it is copied into the folder of the settings, in place of one of the same
+/// name, and its glasses are known from now on.
+///
+/// # Errors
+/// A file that is no catalogue, or a folder that cannot be written.
+pub fn add_catalogue(path: &Path) -> Result<(AgfCatalogue, PathBuf), FileError> {
+    let file = path.display().to_string();
+    let bytes = read_file(path, MAX_CATALOGUE_BYTES)?;
+    let name = maker(path);
+    let catalogue = parse_agf(&bytes, &name, &file)?;
+    let target = folder_for_writing(&file)?.join(format!("{name}.agf"));
+    write_atomic(&target, &bytes)?;
+    add_glasses(&catalogue);
+    Ok((catalogue, target))
+}
+
+/// Removes the catalogue of a name from the folder of the settings; returns its path.
+///
+/// # Errors
+/// There is none of this name, or it cannot be removed.
+pub fn remove_catalogue(name: &str) -> Result<PathBuf, FileError> {
+    let known = own_catalogues();
+    let found = known.iter().find(|path| maker(path) == name.to_uppercase());
+    let Some(path) = found else {
+        let names: Vec<String> = known.iter().map(|path| maker(path)).collect();
+        let expected = if names.is_empty() {
+            "one that was added; there is none".to_owned()
+        } else {
+            format!("one of {}", names.join(", "))
+        };
+        let (file, found) = ("the catalogues".to_owned(), format!("`{name}`"));
+        return Err(FileError::Unsuitable { file, found, expected });
+    };
+    let refuse = |source| FileError::Unwritable { file: path.display().to_string(), source };
+    fs::remove_file(path).map_err(refuse)?;
+    Ok(path.clone())
+}
+
+/// The maker of the glasses of a catalogue: the name of its file in capitals.
+pub(super) fn maker(path: &Path) -> String {
+    path.file_stem().unwrap_or_default().to_string_lossy().to_uppercase()
+}
+
+fn add_glasses(catalogue: &AgfCatalogue) {
+    glass::add(catalogue.glasses.iter().map(|entry| entry.glass.clone()).collect());
+}
+
+fn folder_for_writing(file: &str) -> Result<PathBuf, FileError> {
+    let refuse = |file: String, source| FileError::Unwritable { file, source };
+    let folder = glass_folder().ok_or_else(|| {
+        let text = format!("no folder for settings; expected one in {FOLDER_VARIABLE}");
+        refuse(file.to_owned(), io::Error::new(io::ErrorKind::NotFound, text))
+    })?;
+    fs::create_dir_all(&folder).map_err(|why| refuse(folder.display().to_string(), why))?;
+    Ok(folder)
+}
+
+fn is_agf(path: &Path) -> bool {
+    path.extension().is_some_and(|extension| extension.eq_ignore_ascii_case("agf"))
+}

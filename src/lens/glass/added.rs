@@ -1,0 +1,37 @@
+//! Glasses of catalogues that a person has added: they last as long as the program.
+
+use super::{Glass, index_names};
+use std::collections::HashMap;
+use std::sync::{PoisonError, RwLock, RwLockReadGuard};
+
+/// The added glasses and the glass of every name; `None` for a name that two manufacturers share.
+#[derive(Debug)]
+struct AddedGlasses {
+    glasses: Vec<&'static Glass>,
+    names: Option<HashMap<String, Option<&'static Glass>>>,
+}
+
+static ADDED: RwLock<AddedGlasses> = RwLock::new(AddedGlasses { glasses: Vec::new(), names: None });
+
+/// Adds glasses, which every lens finds by name from now on. Of two with the same manufacturer and name
+/// the first one is found.
+pub fn add(glasses: Vec<Glass>) {
+    let glasses: &'static [Glass] = glasses.leak();
+    let mut added = ADDED.write().unwrap_or_else(PoisonError::into_inner);
+    added.glasses.extend(glasses);
+    added.names = Some(index_names(added.glasses.iter().copied()));
+}
+
+/// Every added glass, in the order in which they were added.
+pub fn added_glasses() -> Vec<&'static Glass> {
+    read().glasses.clone()
+}
+
+/// The added glass of a normalized name.
+pub(super) fn find(name: &str) -> Option<&'static Glass> {
+    read().names.as_ref()?.get(name).copied().flatten()
+}
+
+fn read() -> RwLockReadGuard<'static, AddedGlasses> {
+    ADDED.read().unwrap_or_else(PoisonError::into_inner)
+}

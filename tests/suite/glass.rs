@@ -1,0 +1,232 @@
+//! Glass catalogues of makers: every dispersion formula, damaged files, and lenses that name their glasses.
+
+use aplanat::files::{AgfCatalogue, parse_agf};
+use serde_json::Value;
+use std::path::PathBuf;
+use std::process::Command;
+
+/// The catalogue of a text.
+fn parsed(text: &str) -> AgfCatalogue {
+    parse_agf(text.as_bytes(), "MAKER", "maker.agf").unwrap()
+}
+
+fn glass_of(formula: u32, coefficients: &str) -> String {
+    format!(
+        "NM G{formula} {formula} 517642 - - 0 1 -\nED 7.1 8.3 2.51 -0.0009 0\nCD {coefficients}\nLD 0.4 0.8\n"
+    )
+}
+
+#[test]
+fn every_formula_has_the_index_of_its_definition() {
+    let um: f64 = 0.55;
+    let l2 = um * um;
+    let power = |p: i32| um.powi(p);
+    let sellmeier = |terms: &[(f64, f64)]| {
+        (1.0 + terms.iter().map(|(k, l)| k * l2 / (l2 - l)).sum::<f64>()).sqrt()
+    };
+    let l = 1.0 / (l2 - 0.028);
+    let cases: [(u32, &str, f64); 13] = [
+        (
+            1,
+            "2.3 -0.01 0.01 1E-4 1E-5 1E-6",
+            (2.3 - 0.01 * l2
+                + 0.01 * power(-2)
+                + 1e-4 * power(-4)
+                + 1e-5 * power(-6)
+                + 1e-6 * power(-8))
+            .sqrt(),
+        ),
+        (2, "1.0 0.006 0.2 0.02 1.0 100", sellmeier(&[(1.0, 0.006), (0.2, 0.02), (1.0, 100.0)])),
+        (
+            3,
+            "1.5 0.01 0.001 -0.01 0.001 -1E-4",
+            1.5 + 0.01 * l + 0.001 * l * l - 0.01 * l2 + 0.001 * l2 * l2 - 1e-4 * l2 * l2 * l2,
+        ),
+        (4, "0.2 1.0 0.1 0.02 0.2", (1.2 + l2 / (l2 - 0.01) + 0.02 / (l2 - 0.04)).sqrt()),
+        (5, "1.5 0.01 0.001", 1.5 + 0.01 / um + 0.001 / um.powf(3.5)),
+        (
+            6,
+            "1.0 0.006 0.2 0.02 1.0 100 0.1 0.01",
+            sellmeier(&[(1.0, 0.006), (0.2, 0.02), (1.0, 100.0), (0.1, 0.01)]),
+        ),
+        (7, "2.5 0.03 0.02 0.01", (2.5 + 0.03 / (l2 - 0.02) - 0.01 * l2).sqrt()),
+        (8, "1.5 1.0 0.01 0.01", (1.5 + l2 / (l2 - 0.01) - 0.01 * l2).sqrt()),
+        (9, "1.5 1.0 0.01 0.02 100", (1.5 + l2 / (l2 - 0.01) + 0.02 * l2 / (l2 - 100.0)).sqrt()),
+        (
+            10,
+            "2.3 -0.01 0.01 1E-4 1E-5 1E-6 1E-7 1E-8",
+            (2.3 - 0.01 * l2
+                + 0.01 * power(-2)
+                + 1e-4 * power(-4)
+                + 1e-5 * power(-6)
+                + 1e-6 * power(-8)
+                + 1e-7 * power(-10)
+                + 1e-8 * power(-12))
+            .sqrt(),
+        ),
+        (
+            11,
+            "1.0 0.006 0.2 0.02 1.0 100 0.1 0.01 0.05 0.001",
+            sellmeier(&[(1.0, 0.006), (0.2, 0.02), (1.0, 100.0), (0.1, 0.01), (0.05, 0.001)]),
+        ),
+        (
+            12,
+            "2.3 -0.01 0.01 1E-4 1E-5 1E-6 1E-3 1E-4",
+            (2.3 - 0.01 * l2
+                + 0.01 * power(-2)
+                + 1e-4 * power(-4)
+                + 1e-5 * power(-6)
+                + 1e-6 * power(-8)
+                + 1e-3 * power(4)
+                + 1e-4 * power(6))
+            .sqrt(),
+        ),
+        (
+            13,
+            "2.3 -0.01 1E-3 0.01 1E-4 1E-5 1E-6 1E-7 1E-8",
+            (2.3 - 0.01 * l2
+                + 1e-3 * power(4)
+                + 0.01 * power(-2)
+                + 1e-4 * power(-4)
+                + 1e-5 * power(-6)
+                + 1e-6 * power(-8)
+                + 1e-7 * power(-10)
+                + 1e-8 * power(-12))
+            .sqrt(),
+        ),
+    ];
+    let text: String = cases.iter().map(|(formula, c, _)| glass_of(*formula, c)).collect();
+    let catalogue = parsed(&text);
+    assert_eq!((catalogue.glasses.len(), catalogue.refused.len()), (13, 0));
+    for ((formula, _, expected), entry) in cases.iter().zip(&catalogue.glasses) {
+        let found = entry.glass.index(um).unwrap();
+        assert!((found - expected).abs() < 1e-13, "formula {formula}: {found}, {expected}");
+        assert!(entry.glass.index(0.39).is_none() && entry.glass.index(0.81).is_none());
+        assert_eq!((entry.glass.density, entry.status), (Some(2.51), Some("preferred")));
+    }
+}
+
+/// The data sheet of SCHOTT N-BK7: coefficients, and indices at five lines.
+const BK7: &str = "CC a comment\nNM N-BK7 2 517642 1.5168 64.17 0 1 -\nGC comment\n\
+    ED 7.1 8.3 2.51 -0.0009 0\n\
+    CD 1.03961212 0.00600069867 0.231792344 0.0200179144 1.01046945 103.560653\n\
+    TD 1.86E-06 1.31E-08 -1.37E-11 4.34E-07 6.27E-10 0.17 20\nOD 1.0 2.0 0.0 1.0 2.3 2.3\n\
+    LD 0.3 2.5\nIT 0.4 0.997 10\nIT 0.5 0.998 10\n";
+
+#[test]
+fn a_glass_has_everything_that_its_maker_says() {
+    let catalogue = parsed(BK7);
+    let entry = &catalogue.glasses[0];
+    for (um, index) in [(0.4861327, 1.52238), (0.5875618, 1.51680), (0.6562725, 1.51432)] {
+        assert!((entry.glass.index(um).unwrap() - index).abs() < 5e-6);
+    }
+    assert!((entry.glass.vd - 64.17).abs() < 0.005);
+    assert_eq!((entry.expansion, entry.relative_cost), (Some(7.1), Some(1.0)));
+    assert_eq!(entry.thermal[0], 1.86e-6);
+    assert_eq!(entry.resistance, [2.0, 0.0, 1.0, 2.3, 2.3]);
+    assert_eq!(entry.transmission, [[0.4, 0.997, 10.0], [0.5, 0.998, 10.0]]);
+}
+
+#[test]
+fn glasses_that_nobody_can_use_are_refused_by_name() {
+    let text = format!(
+        "{BK7}{}{}{}NM EMPTY 2\n{BK7}NM\n",
+        glass_of(99, "1 2"),
+        glass_of(1, "-5"),
+        "NM NORANGE 5 0 1.5 60 0 0 -\nCD 1.5\n"
+    );
+    let catalogue = parsed(&text);
+    assert_eq!(catalogue.glasses.len(), 1);
+    let reason = |name: &str| {
+        let found = catalogue.refused.iter().find(|(refused, _)| refused == name);
+        found.map_or_else(|| panic!("{name}: {:?}", catalogue.refused), |(_, why)| why.clone())
+    };
+    assert!(reason("G99").contains("formula 99"));
+    assert!(reason("G1").contains("no index"));
+    assert!(reason("NORANGE").contains("LD"));
+    assert!(reason("N-BK7").contains("second"));
+    for bytes in [&b""[..], b"hello", b"\x89PNG\r\n\x1a\n\0\0\0\0", &[0, 1, 2, 3, 4, 5]] {
+        assert!(parse_agf(bytes, "M", "m.agf").is_err());
+    }
+}
+
+#[test]
+fn damaged_catalogues_do_not_panic() {
+    let mut seed = 12345_u64;
+    let mut next = |below: usize| {
+        seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        (seed >> 33) as usize % below
+    };
+    let original = format!("{BK7}{}", glass_of(13, "2 1 1 1")).into_bytes();
+    for _ in 0..20_000 {
+        let mut bytes = original.clone();
+        for _ in 0..=next(4) {
+            let at = next(bytes.len());
+            match next(3) {
+                0 => bytes[at] = next(256) as u8,
+                1 => drop(bytes.remove(at)),
+                _ => bytes.insert(at, b"0-E.\n 9"[next(7)]),
+            }
+        }
+        if let Ok(catalogue) = parse_agf(&bytes, "M", "m.agf") {
+            for entry in catalogue.glasses {
+                let [low, high] = entry.glass.range_um;
+                assert!([low, high].map(|um| entry.glass.index(um)).iter().all(Option::is_some));
+            }
+        }
+    }
+}
+
+#[test]
+fn a_hundred_thousand_glasses_are_read_in_time() {
+    let text: String = (0..100_000).map(|i| BK7.replace("N-BK7", &format!("X{i}"))).collect();
+    assert_eq!(parsed(&text).glasses.len(), 100_000);
+    let utf16: Vec<u8> =
+        std::iter::once(0xFEFF_u16).chain(BK7.encode_utf16()).flat_map(u16::to_le_bytes).collect();
+    assert_eq!(parse_agf(&utf16, "M", "m.agf").unwrap().glasses.len(), 1);
+}
+
+#[test]
+fn a_catalogue_is_added_and_its_glass_found_in_a_lens() {
+    let scratch = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("glass");
+    drop(std::fs::remove_dir_all(&scratch));
+    std::fs::create_dir_all(&scratch).unwrap();
+    let folder = scratch.join("catalogues");
+    let run = |words: &[&str]| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_aplanat"));
+        let output = command.args(words).env("APLANAT_GLASSES", &folder).output().unwrap();
+        let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
+        (output.status.code(), text(output.stdout), text(output.stderr))
+    };
+    let file = scratch.join("mine.agf");
+    std::fs::write(&file, BK7.replace("N-BK7", "SPECIAL-1")).unwrap();
+    let lens = scratch.join("lens.json");
+    let text = std::fs::read_to_string("lenses/singlet_la1131.json").unwrap();
+    std::fs::write(&lens, text.replace("SCHOTT N-BK7", "MINE SPECIAL-1")).unwrap();
+    let (file, lens) = (file.to_str().unwrap(), lens.to_str().unwrap());
+    let (status, _, errors) = run(&["info", lens]);
+    assert!(status == Some(2) && errors.contains("unknown glass `MINE SPECIAL-1`"), "{errors}");
+    let (status, text, errors) = run(&["glass", "--add", file, "--json"]);
+    let added: Value = serde_json::from_str(&text).unwrap();
+    assert!(status == Some(0) && added["glasses"][0]["name"] == "SPECIAL-1", "{errors}");
+    let (status, text, _) = run(&["info", lens, "--json"]);
+    let own: Value = serde_json::from_str(&text).unwrap();
+    let bundled = run(&["info", "lenses/singlet_la1131.json", "--json"]).1;
+    let bundled: Value = serde_json::from_str(&bundled).unwrap();
+    assert_eq!((status, &own["efl"]), (Some(0), &bundled["efl"]));
+    let (_, text, _) = run(&["glass", "mine", "nd=1.5..1.6"]);
+    assert!(text.contains("SPECIAL-1") && text.contains("1 glass"), "{text}");
+    assert!(run(&["glass", "--remove", "mine"]).1.contains("removed"));
+    assert_eq!(run(&["info", lens]).0, Some(2));
+    let (status, _, errors) = run(&["glass", "--remove", "mine"]);
+    assert!(status == Some(2) && errors.contains("there is none"), "{errors}");
+    for (words, expected) in [
+        (vec!["glass", "nothing-like-it"], "found no glass"),
+        (vec!["glass", "nd=high"], "expected `1.6..1.7`"),
+        (vec!["glass", "weight=1"], "expected nd or vd"),
+        (vec!["glass", "--add", lens], "expected a glass catalogue"),
+    ] {
+        let (status, _, errors) = run(&words);
+        assert!(status == Some(2) && errors.contains(expected), "{words:?}: {errors}");
+    }
+}
