@@ -90,7 +90,7 @@ struct GlassRow {
     name: &'static str,
     nd: f64,
     vd: f64,
-    /// The partial dispersion PgF, if the formula reaches these lines.
+    /// The partial dispersion `PgF`, if the formula reaches these lines.
     #[serde(rename = "PgF")]
     partial_dispersion: Option<f64>,
     range_um: [f64; 2],
@@ -150,7 +150,8 @@ fn counted_glasses(count: usize) -> String {
 struct AddedCatalogue {
     saved: String,
     glasses: Vec<AddedGlass>,
-    refused: Vec<RefusedGlass>,
+    refused: Vec<GlassRemark>,
+    contradictory: Vec<GlassRemark>,
 }
 
 #[derive(Serialize)]
@@ -163,7 +164,7 @@ struct AddedGlass {
 }
 
 #[derive(Serialize)]
-struct RefusedGlass {
+struct GlassRemark {
     name: String,
     why: String,
 }
@@ -174,11 +175,14 @@ impl AddedCatalogue {
             let Glass { name, nd, vd, .. } = further.glass.clone();
             AddedGlass { name, nd, vd, further }
         };
-        let refused = |(name, why)| RefusedGlass { name, why };
+        let remarks = |found: Vec<(String, String)>| {
+            found.into_iter().map(|(name, why)| GlassRemark { name, why }).collect()
+        };
         Self {
             saved,
             glasses: catalogue.glasses.into_iter().map(added).collect(),
-            refused: catalogue.refused.into_iter().map(refused).collect(),
+            refused: remarks(catalogue.refused),
+            contradictory: remarks(catalogue.contradictory),
         }
     }
 }
@@ -187,7 +191,8 @@ impl fmt::Display for AddedCatalogue {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let glasses = counted_glasses(self.glasses.len());
         writeln!(f, "{glasses}, {} refused; saved as {}", self.refused.len(), self.saved)?;
-        self.refused.iter().try_for_each(|glass| writeln!(f, "  {}: {}", glass.name, glass.why))
+        let remarks = self.refused.iter().chain(&self.contradictory);
+        remarks.into_iter().try_for_each(|glass| writeln!(f, "  {}: {}", glass.name, glass.why))
     }
 }
 

@@ -49,7 +49,6 @@ use output::{Output, print_note};
 use std::any::TypeId;
 use std::path::PathBuf;
 use std::process::ExitCode;
-use std::sync::Once;
 
 /// Designs lenses by computation. Without arguments, or with a lens alone, it opens the studio; a
 /// subcommand needs neither window nor display.
@@ -177,7 +176,8 @@ impl CliArgs {
     }
 
     fn run_with(&self, output: &Output) -> Result<(), CliError> {
-        load_own_glasses();
+        // A catalogue that cannot be read is said, and is no reason to end.
+        files::load_own_glasses().iter().for_each(|error| print_note(format!("note: {error}")));
         match &self.command {
             Some(_) if self.lens.is_some() => Err(CliError::Input(
                 "a lens in front of a subcommand; expected it behind: `aplanat info LENS`".into(),
@@ -186,16 +186,6 @@ impl CliArgs {
             None => window::open(self.lens.as_deref()),
         }
     }
-}
-
-/// Makes the glasses that a person has added known, once. A catalogue that cannot be read is said, and is
-/// no reason to end.
-fn load_own_glasses() {
-    static ONCE: Once = Once::new();
-    ONCE.call_once(|| {
-        let errors = files::load_own_glasses();
-        errors.iter().for_each(|error| print_note(format!("note: {error}")));
-    });
 }
 
 /// A command whose options, and those of its subcommands, take negative numbers as values, so that a

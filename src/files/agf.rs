@@ -3,14 +3,14 @@
 //! | record | content |
 //! |---|---|
 //! | `NM` | name, number of the formula, code, nd, vd, exclusion, status, melt frequency |
-//! | `ED` | expansion from −30 to 70 °C and from 20 to 300 °C in 1e-6/K, density, ΔPgF, … |
+//! | `ED` | expansion from −30 to 70 °C and from 20 to 300 °C in 1e-6/K, density, `ΔPgF`, … |
 //! | `CD` | coefficients of the formula |
 //! | `TD` | D₀ D₁ D₂ E₀ E₁ λtk of dn/dT, reference temperature |
 //! | `OD` | relative cost, codes for climate, stains, acid, alkali, phosphate |
 //! | `LD` | shortest and longest wavelength, µm |
 //! | `IT` | wavelength in µm, internal transmission, thickness in mm |
 //!
-//! A missing number is `-`. Makers give the index relative to air, as this program does.
+//! A missing number is `-`; a line that begins with a number continues the record before it. Makers give the index relative to air, as this program does.
 
 use super::bounded::read_file;
 use super::error::FileError;
@@ -21,6 +21,9 @@ use serde::Serialize;
 use std::collections::BTreeSet;
 use std::path::Path;
 
+/// The difference of two indices that may be rounding, or that of two melts.
+const SAME_INDEX: f64 = 1e-4;
+
 /// A glass catalogue of a maker.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct AgfCatalogue {
@@ -28,6 +31,8 @@ pub struct AgfCatalogue {
     pub glasses: Vec<AgfGlass>,
     /// The names of glasses that are left out, each with the reason.
     pub refused: Vec<(String, String)>,
+    /// The names of glasses whose formula contradicts the index that the file gives, each with both.
+    pub contradictory: Vec<(String, String)>,
 }
 
 /// A glass with everything that its maker says of it.
@@ -77,7 +82,12 @@ pub fn parse_agf(bytes: &[u8], maker: &str, file: &str) -> Result<AgfCatalogue, 
     let mut names = BTreeSet::new();
     for records in split_glasses(&text) {
         match records.glass(maker) {
-            Ok(glass) if names.insert(glass.glass.name.clone()) => catalogue.glasses.push(glass),
+            Ok(glass) if names.insert(glass.glass.name.clone()) => {
+                let name = || glass.glass.name.clone();
+                let remark = records.contradiction(&glass.glass).map(|text| (name(), text));
+                catalogue.contradictory.extend(remark);
+                catalogue.glasses.push(glass);
+            }
             Ok(glass) => {
                 let why = "a second glass of this name".to_owned();
                 catalogue.refused.push((glass.glass.name, why));
@@ -101,6 +111,9 @@ fn split_glasses(text: &str) -> Vec<GlassRecords<'_>> {
         let words: Vec<&str> = line.split_whitespace().collect();
         match (words.first(), glasses.last_mut()) {
             (Some(&"NM"), _) => glasses.push(GlassRecords(vec![words])),
+            (Some(first), Some(glass)) if first.parse::<f64>().is_ok() => {
+                glass.0.last_mut().into_iter().for_each(|record| record.extend(&words));
+            }
             (Some(_), Some(glass)) => glass.0.push(words),
             _ => {}
         }
@@ -152,6 +165,14 @@ impl<'a> GlassRecords<'a> {
             transmission: self.transmission(),
             glass,
         })
+    }
+
+    /// The index at the d line by the file and by the formula, if they differ.
+    fn contradiction(&self, glass: &Glass) -> Option<String> {
+        let said = self.words("NM").get(3).copied().map(number).filter(|nd| *nd > 0.0)?;
+        let found = glass.index(line::D)?;
+        let text = || format!("nd is {said} by the file, {found:.5} by its formula");
+        ((found - said).abs() > SAME_INDEX).then(text)
     }
 
     fn range(&self) -> Result<[f64; 2], String> {
@@ -236,6 +257,8 @@ fn check_index(glass: &mut Glass) -> Result<(), String> {
     }
     let [f, d, c] = [line::F, line::D, line::C].map(|um| glass.index(um));
     match d.zip(f.zip(c)) {
+        // A constant index has no Abbe number; 0 stands for none, as in model glasses.
+        Some((d, (f, c))) if f == c => (glass.nd, glass.vd) = (d, 0.0),
         Some((d, (f, c))) => (glass.nd, glass.vd) = (d, (d - 1.0) / (f - c)),
         // Infrared materials have no index at the d line; what the file says of it is kept.
         None if !(glass.nd > 0.0 && glass.vd.is_finite()) => {

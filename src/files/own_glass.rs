@@ -9,6 +9,7 @@ use std::env;
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
+use std::sync::Once;
 
 /// The variable of the environment that names another folder.
 const FOLDER_VARIABLE: &str = "APLANAT_GLASSES";
@@ -33,16 +34,19 @@ pub fn own_catalogues() -> Vec<PathBuf> {
     paths
 }
 
-/// Makes the glasses of all catalogues that a person has added known; returns the errors of those that
-/// cannot be read.
+/// Makes the glasses of all catalogues that a person has added known, when it is called first; returns the
+/// errors of those that cannot be read.
 pub fn load_own_glasses() -> Vec<FileError> {
+    static ONCE: Once = Once::new();
     let mut errors = Vec::new();
-    for path in own_catalogues() {
-        match read_agf(&path) {
-            Ok(catalogue) => add_glasses(&catalogue),
-            Err(error) => errors.push(error),
+    ONCE.call_once(|| {
+        for path in own_catalogues() {
+            match read_agf(&path) {
+                Ok(catalogue) => add_glasses(&catalogue),
+                Err(error) => errors.push(error),
+            }
         }
-    }
+    });
     errors
 }
 

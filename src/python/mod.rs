@@ -38,6 +38,8 @@ mod extension {
 
     #[pymodule_init]
     fn add_constants(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        // A catalogue that cannot be read is said by the command `glass`, and is no reason to end.
+        drop(crate::files::load_own_glasses());
         module.add("FATES", super::rays::FATES)?;
         module.add("__version__", env!("CARGO_PKG_VERSION"))
     }

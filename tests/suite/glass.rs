@@ -128,6 +128,38 @@ fn a_glass_has_everything_that_its_maker_says() {
 }
 
 #[test]
+fn a_constant_index_has_no_abbe_number_and_infrared_materials_keep_that_of_the_file() {
+    let constant = parsed("NM FLAT 1 0 1.5 60 0 0 -\nCD 2.25\nLD 0.3 2\n");
+    assert_eq!((constant.glasses[0].glass.nd, constant.glasses[0].glass.vd), (1.5, 0.0));
+    let infrared =
+        parsed("NM GE 1 0 4.0 100.5 0 0 -\nCD 16.0 0 0.5\nLD 2 14\nNM X 1 0 - -\nCD 9\nLD 2 9\n");
+    let numbers = infrared.glasses.iter().map(|entry| (entry.glass.nd, entry.glass.vd));
+    assert_eq!(numbers.collect::<Vec<_>>(), [(4.0, 100.5), (3.0, 0.0)]);
+}
+
+/// The coefficients of HIKARI J-FK5 as some files write them, on three lines.
+const WRAPPED: &str = "NM J-FK5 13 1 1.487490 70.318793 0 0 1\nED 8.9 0 2.45 2.7E-3 0 0\n\
+    CD 2.188268550E+000 -9.190447240E-003 -1.116210710E-004 9.263728150E-003 \n\
+    7.349007330E-005 4.197242420E-006 -1.154122030E-007 0.000000000E+000 \n\
+    0.000000000E+000 0.000000000E+000\nLD 3.65015000E-001 2.05809000E+000\n";
+
+#[test]
+fn records_go_on_in_lines_that_begin_with_a_number() {
+    let catalogue = parsed(WRAPPED);
+    let glass = &catalogue.glasses[0].glass;
+    assert!((glass.nd - 1.48749).abs() < 5e-6 && (glass.vd - 70.3188).abs() < 1e-3);
+    assert!(catalogue.contradictory.is_empty());
+}
+
+#[test]
+fn a_formula_that_contradicts_its_file_is_named() {
+    let catalogue = parsed("NM GLUE 2 0 1.54356 40.95 0 1 -\nCD 1.3237 0 1.47E-02 0\nLD 0.38 1\n");
+    let (name, text) = &catalogue.contradictory[0];
+    assert!(name == "GLUE" && text.contains("1.54356") && text.contains("1.52918"), "{text}");
+    assert_eq!(catalogue.glasses.len(), 1);
+}
+
+#[test]
 fn glasses_that_nobody_can_use_are_refused_by_name() {
     let text = format!(
         "{BK7}{}{}{}NM EMPTY 2\n{BK7}NM\n",

@@ -1,7 +1,7 @@
 //! Glasses of catalogues that a person has added: they last as long as the program.
 
 use super::{Glass, index_names};
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 use std::sync::{PoisonError, RwLock, RwLockReadGuard};
 
 /// The added glasses and the glass of every name; `None` for a name that two manufacturers share.
@@ -13,11 +13,13 @@ struct AddedGlasses {
 
 static ADDED: RwLock<AddedGlasses> = RwLock::new(AddedGlasses { glasses: Vec::new(), names: None });
 
-/// Adds glasses, which every lens finds by name from now on. Of two with the same manufacturer and name
-/// the first one is found.
+/// Adds glasses, which every lens finds by name from now on, in place of those that were added of the
+/// same manufacturers. Of two with the same manufacturer and name the first one is found.
 pub fn add(glasses: Vec<Glass>) {
     let glasses: &'static [Glass] = glasses.leak();
+    let makers: BTreeSet<&str> = glasses.iter().map(|new| new.manufacturer.as_str()).collect();
     let mut added = ADDED.write().unwrap_or_else(PoisonError::into_inner);
+    added.glasses.retain(|old| !makers.contains(old.manufacturer.as_str()));
     added.glasses.extend(glasses);
     added.names = Some(index_names(added.glasses.iter().copied()));
 }

@@ -63,15 +63,14 @@ fn finite(index: f64) -> Option<f64> {
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use super::DispersionFormula as F;
 
     #[test]
     fn every_formula_is_that_of_its_definition() {
         let um: f64 = 0.6;
         let l2 = 0.36_f64;
-        let at = |formula: DispersionFormula, c: &[f64]| formula.index(c, um).unwrap();
+        let at = |formula: F, c: &[f64]| formula.index(c, um).unwrap();
         let close = |found: f64, expected: f64| assert!((found - expected).abs() < 1e-15);
-        use DispersionFormula as F;
         close(at(F::SellmeierSq, &[0.1, 1.0, 0.01]), (1.1 + l2 / 0.35).sqrt());
         close(at(F::SellmeierLin, &[0.1, 1.0, 0.1]), (1.1 + l2 / 0.35).sqrt());
         close(at(F::Poly, &[2.0, 0.5, 2.0, 0.01, -2.0]), (2.0 + 0.18 + 0.01 / l2).sqrt());
@@ -79,8 +78,11 @@ mod tests {
             at(F::SellmeierTwo, &[0.1, 1.0, 0.1, 0.2, 0.2]),
             (1.1 + l2 / 0.35 + 0.2 / 0.32).sqrt(),
         );
-        close(at(F::HandbookOne, &[2.0, 0.1, 0.01, 0.02]), (2.0 + 0.1 / 0.35 - 0.0072).sqrt());
-        close(at(F::HandbookTwo, &[2.0, 0.1, 0.01, 0.02]), (2.0 + 0.036 / 0.35 - 0.0072).sqrt());
+        close(at(F::HandbookOne, &[2.0, 0.1, 0.01, 0.02]), (2.0 + 0.1 / 0.35 - 0.02 * l2).sqrt());
+        close(
+            at(F::HandbookTwo, &[2.0, 0.1, 0.01, 0.02]),
+            (2.0 + 0.1 * l2 / 0.35 - 0.02 * l2).sqrt(),
+        );
         close(at(F::Conrady, &[1.5, 0.01, 0.001]), 1.5 + 0.01 / um + 0.001 / um.powf(3.5));
         let l = 1.0 / (l2 - 0.028);
         let far = 0.01 * l2 + 0.002 * l2 * l2 + 0.0003 * l2 * l2 * l2;
@@ -92,9 +94,9 @@ mod tests {
 
     #[test]
     fn where_a_formula_has_no_value_there_is_no_index() {
-        assert_eq!(DispersionFormula::SellmeierSq.index(&[0.0, 1.0, 0.25], 0.5), None);
-        assert_eq!(DispersionFormula::Poly.index(&[-1.0], 0.5), None);
-        assert_eq!(DispersionFormula::Conrady.index(&[], 0.5), None);
-        assert_eq!(DispersionFormula::Herzberger.index(&[f64::NAN], 0.5), None);
+        assert_eq!(F::SellmeierSq.index(&[0.0, 1.0, 0.25], 0.5), None);
+        assert_eq!(F::Poly.index(&[-1.0], 0.5), None);
+        assert_eq!(F::Conrady.index(&[], 0.5), None);
+        assert_eq!(F::Herzberger.index(&[f64::NAN], 0.5), None);
     }
 }
