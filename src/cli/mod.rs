@@ -128,6 +128,8 @@ impl CliCommand {
 /// Runs the command that the arguments of the process name, or opens the studio.
 pub fn run() -> ExitCode {
     env_logger::init();
+    // A catalogue that cannot be read is said, and is no reason to end.
+    files::load_own_glasses().iter().for_each(|error| print_note(format!("note: {error}")));
     match CliArgs::read() {
         Ok(arguments) => exit_code(arguments.run()),
         Err(usage) => {
@@ -150,7 +152,8 @@ pub struct CommandOutcome {
 }
 
 /// Runs a subcommand with its arguments, as in `["analyze", "lens.json", "spot"]`, and returns its
-/// result instead of printing it. Signals are left to the caller.
+/// result instead of printing it. Signals are left to the caller, and so are the glasses that a person
+/// has added: see [`files::load_own_glasses`].
 pub fn run_collecting(arguments: &[String]) -> CommandOutcome {
     progress::leave_signals_to_host();
     let words = std::iter::once("aplanat").chain(arguments.iter().map(String::as_str));
@@ -176,8 +179,6 @@ impl CliArgs {
     }
 
     fn run_with(&self, output: &Output) -> Result<(), CliError> {
-        // A catalogue that cannot be read is said, and is no reason to end.
-        files::load_own_glasses().iter().for_each(|error| print_note(format!("note: {error}")));
         match &self.command {
             Some(_) if self.lens.is_some() => Err(CliError::Input(
                 "a lens in front of a subcommand; expected it behind: `aplanat info LENS`".into(),

@@ -12,7 +12,7 @@ const ZOOM: &str = "lenses/zoom_nikkor_28_80.json";
 /// Runs the program without a display.
 pub(super) fn aplanat(arguments: &[&str], input: &str) -> Output {
     let mut command = Command::new(env!("CARGO_BIN_EXE_aplanat"));
-    command.args(arguments).env_remove("DISPLAY");
+    command.args(arguments).env_remove("DISPLAY").env("APLANAT_GLASSES", "no folder");
     command.env_remove("WAYLAND_DISPLAY").env_remove("WAYLAND_SOCKET");
     command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
     let mut child = command.spawn().unwrap();

@@ -233,8 +233,8 @@ fn a_catalogue_is_added_and_its_glass_found_in_a_lens() {
     let file = scratch.join("mine.agf");
     std::fs::write(&file, BK7.replace("N-BK7", "SPECIAL-1")).unwrap();
     let lens = scratch.join("lens.json");
-    let text = std::fs::read_to_string("lenses/singlet_la1131.json").unwrap();
-    std::fs::write(&lens, text.replace("SCHOTT N-BK7", "MINE SPECIAL-1")).unwrap();
+    let text_of_lens = std::fs::read_to_string("lenses/singlet_la1131.json").unwrap();
+    std::fs::write(&lens, text_of_lens.replace("SCHOTT N-BK7", "MINE SPECIAL-1")).unwrap();
     let (file, lens) = (file.to_str().unwrap(), lens.to_str().unwrap());
     let (status, _, errors) = run(&["info", lens]);
     assert!(status == Some(2) && errors.contains("unknown glass `MINE SPECIAL-1`"), "{errors}");
@@ -248,7 +248,17 @@ fn a_catalogue_is_added_and_its_glass_found_in_a_lens() {
     assert_eq!((status, &own["efl"]), (Some(0), &bundled["efl"]));
     let (_, text, _) = run(&["glass", "mine", "nd=1.5..1.6"]);
     assert!(text.contains("SPECIAL-1") && text.contains("1 glass"), "{text}");
+    // A catalogue that has a glass of the program changes neither lenses nor exports.
+    let misc = scratch.join("misc.agf");
+    std::fs::write(&misc, BK7.replace("N-BK7", "CAF2")).unwrap();
+    assert_eq!(run(&["glass", "--add", misc.to_str().unwrap()]).0, Some(0));
+    let own = scratch.join("caf2.json");
+    std::fs::write(&own, text_of_lens.replace("SCHOTT N-BK7", "CRYSTAL CAF2")).unwrap();
+    let zmx = scratch.join("caf2.zmx");
+    let (status, _, errors) = run(&["convert", own.to_str().unwrap(), zmx.to_str().unwrap()]);
+    assert_eq!(status, Some(0), "{errors}");
     assert!(run(&["glass", "--remove", "mine"]).1.contains("removed"));
+    assert!(run(&["glass", "--remove", "misc"]).1.contains("removed"));
     assert_eq!(run(&["info", lens]).0, Some(2));
     let (status, _, errors) = run(&["glass", "--remove", "mine"]);
     assert!(status == Some(2) && errors.contains("there is none"), "{errors}");

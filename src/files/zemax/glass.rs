@@ -94,8 +94,20 @@ fn resolve_glass(line: &GlassLine, catalogues: &[String]) -> ImportedMedium {
 }
 
 /// The glass of this name, in the first of the catalogues that has it with the index of the line, or that has
-/// it at all, or else in any.
+/// it at all, or else in any. Those that a person has added come last, so that a file means the same
+/// everywhere as long as the program has its glasses.
 fn find_in_catalogues(
+    name: &str,
+    catalogues: &[String],
+    line: &GlassLine,
+) -> Option<&'static Glass> {
+    let among = |find| find_among(find, name, catalogues, line);
+    among(glass::find_built_in).or_else(|| among(glass::find_added))
+}
+
+/// The glass of this name among those that `find` knows.
+fn find_among(
+    find: fn(&str) -> Option<&'static Glass>,
     name: &str,
     catalogues: &[String],
     line: &GlassLine,
@@ -104,7 +116,7 @@ fn find_in_catalogues(
         catalogues.iter().filter_map(|catalogue| {
             // `OHARA_2021-04` is a version of the catalogue `OHARA`.
             let maker = catalogue.split(['_', '-']).next().unwrap_or_default();
-            glass::find(&format!("{maker} {name}"))
+            find(&format!("{maker} {name}"))
         })
     };
     // Several of them may have a glass of this name: index and Abbe number on the line
@@ -112,7 +124,7 @@ fn find_in_catalogues(
     let agrees = |glass: &&Glass| !is_placeholder(line) && (glass.nd - line.nd).abs() < 5e-5;
     let off = |glass: &&Glass| (glass.vd - line.vd).abs();
     let nearest = listed().filter(agrees).min_by(|a, b| off(a).total_cmp(&off(b)));
-    nearest.or_else(|| listed().next()).or_else(|| glass::find(name))
+    nearest.or_else(|| listed().next()).or_else(|| find(name))
 }
 
 /// Prefixes of glasses that replaced older ones.

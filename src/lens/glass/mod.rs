@@ -98,10 +98,19 @@ pub fn known() -> impl Iterator<Item = &'static Glass> {
 /// case are ignored. The further glasses are searched next, and those that a person has added last, so
 /// that no catalogue changes the meaning of a name.
 pub fn find(name: &str) -> Option<&'static Glass> {
+    find_built_in(name).or_else(|| find_added(name))
+}
+
+/// The glass of the program with this name, as [`find`] understands it.
+pub fn find_built_in(name: &str) -> Option<&'static Glass> {
     let name = normalize(name);
     let listed = names().get(&name).copied();
-    let built_in = listed.unwrap_or_else(|| further_names().get(&name).copied().flatten());
-    built_in.or_else(|| added::find(&name))
+    listed.unwrap_or_else(|| further_names().get(&name).copied().flatten())
+}
+
+/// The glass that a person has added with this name, as [`find`] understands it.
+pub fn find_added(name: &str) -> Option<&'static Glass> {
+    added::find(&normalize(name))
 }
 
 /// The glass of every name; `None` for a name that two manufacturers share.

@@ -75,6 +75,7 @@ fn info(name: &str) -> (serde_json::Value, f64) {
     let start = Instant::now();
     let path = format!("lenses/{name}.json");
     let output = Command::new(env!("CARGO_BIN_EXE_aplanat"))
+        .env("APLANAT_GLASSES", "no folder")
         .args(["info", &path, "--json"])
         .output()
         .unwrap();
