@@ -20,7 +20,27 @@ def _settings(settings: Mapping[str, Any] | None) -> str | None:
     return None if settings is None else json.dumps(settings)
 
 
-class Optimizer(Iterator[Result]):
+class _Run(Iterator[Result]):
+    """A run of the library whose steps return their progress as JSON."""
+
+    _native: Any
+    _is_over = False
+
+    def _step(self) -> str:
+        return self._native.step()
+
+    def _ends_with(self, progress: Result) -> bool:
+        return progress.finished
+
+    def __next__(self) -> Result:
+        if self._is_over:
+            raise StopIteration
+        progress = from_json(json.loads(self._step()))
+        self._is_over = self._ends_with(progress)
+        return progress
+
+
+class Optimizer(_Run):
     """Local optimization.
 
     >>> optimizer = Optimizer(lens, names=["curvature[0]", "curvature[1]"])
@@ -42,14 +62,6 @@ class Optimizer(Iterator[Result]):
         absent, `names` the variables of the lens."""
         names = None if names is None else list(names)
         self._native = _aplanat.Optimizer(lens._native, goal_json(goal), names, method, tolerance)
-        self._finished = False
-
-    def __next__(self) -> Result:
-        if self._finished:
-            raise StopIteration
-        progress = from_json(json.loads(self._native.step()))
-        self._finished = progress.finished
-        return progress
 
     @property
     def best(self) -> Lens:
@@ -63,20 +75,12 @@ class Optimizer(Iterator[Result]):
         return from_json(json.loads(self._native.report()))
 
 
-class pareto(Iterator[Result]):  # noqa: N801, a verb like the command
+class pareto(_Run):  # noqa: N801, a verb like the command
     """The front of sharpness against light. `front` has the lenses so far."""
 
     def __init__(self, lens: Lens, **settings: Any) -> None:
         """The settings are those of `aplanat pareto`: `points=20`, `steps=500`, `method="adam"`."""
         self._native = _aplanat.ParetoSweep(lens._native, _settings(settings or None))
-        self._finished = False
-
-    def __next__(self) -> Result:
-        if self._finished:
-            raise StopIteration
-        progress = from_json(json.loads(self._native.step()))
-        self._finished = progress.finished
-        return progress
 
     @property
     def front(self) -> list[tuple[Result, Lens]]:
@@ -85,7 +89,7 @@ class pareto(Iterator[Result]):  # noqa: N801, a verb like the command
         return list(zip(from_json(json.loads(numbers)), map(Lens, lenses), strict=True))
 
 
-class Search(Iterator[Result]):
+class Search(_Run):
     """A search over the structure of a lens; each step is a round of all its chains."""
 
     def __init__(
@@ -99,14 +103,12 @@ class Search(Iterator[Result]):
         With a checkpoint the search goes on from there."""
         path = None if checkpoint is None else os.fspath(checkpoint)
         self._native = _aplanat.Search(lens._native, _settings(plan), path)
-        self._ended = False
 
-    def __next__(self) -> Result:
-        if self._ended:
-            raise StopIteration
-        progress = from_json(json.loads(self._native.round()))
-        self._ended = progress.ended is not None
-        return progress
+    def _step(self) -> str:
+        return self._native.round()
+
+    def _ends_with(self, progress: Result) -> bool:
+        return progress.ended is not None
 
     @property
     def best(self) -> Lens:
@@ -133,20 +135,12 @@ class Search(Iterator[Result]):
         self._native.save(os.fspath(checkpoint))
 
 
-class GrinTask(Iterator[Result]):
+class GrinTask(_Run):
     """The design of a field of refractive index by the adjoint method."""
 
     def __init__(self, task: str | Mapping[str, Any]) -> None:
         """The name of a built-in task, or the content of a task file."""
         self._native = _aplanat.GrinRun(task if isinstance(task, str) else json.dumps(task))
-        self._finished = False
-
-    def __next__(self) -> Result:
-        if self._finished:
-            raise StopIteration
-        progress = from_json(json.loads(self._native.step()))
-        self._finished = progress.finished
-        return progress
 
     def finish(self) -> None:
         """Scores the field of a run that is ended early."""
