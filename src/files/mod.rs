@@ -19,6 +19,7 @@ mod image_side;
 pub mod json;
 mod library;
 mod lock;
+mod oslo;
 mod own_glass;
 mod probe_rays;
 mod ray_optics;
@@ -83,6 +84,8 @@ pub enum LensFormat {
     CodeV,
     /// The program ray-optics, `.roa`; only read.
     RayOptics,
+    /// The program OSLO, `.len`; only read.
+    Oslo,
 }
 
 /// A lens read from a file.
@@ -112,8 +115,8 @@ pub struct SaveReport {
     pub proof: Option<RoundTripCheck>,
 }
 
-const READABLE: &str =
-    "a lens: JSON with the key `aplanat`, Zemax .zmx, CODE V .seq or ray-optics .roa";
+const READABLE: &str = "a lens: JSON with the key `aplanat`, Zemax .zmx, CODE V .seq, OSLO .len or ray-optics \
+     .roa";
 
 /// Reads a lens from a file of any known format.
 ///
@@ -148,6 +151,7 @@ pub fn parse(bytes: &[u8], name: &str) -> Result<OpenedLens, FileError> {
             Ok(foreign(ray_optics::read(&text, name)?, LensFormat::RayOptics))
         }
         LensFormat::CodeV => Ok(foreign(codev::read(&text, name)?, LensFormat::CodeV)),
+        LensFormat::Oslo => Ok(foreign(oslo::read(&text, name)?, LensFormat::Oslo)),
     }
 }
 
@@ -165,6 +169,9 @@ fn format_by_content(text: &str) -> Option<LensFormat> {
     if text.trim_start().starts_with('{') {
         return Some(LensFormat::Native);
     }
+    if oslo::is_lens(text) {
+        return Some(LensFormat::Oslo);
+    }
     let lines = || text.split(['\n', '\r']);
     let keywords = || lines().filter_map(|line| line.split_whitespace().next());
     if keywords().any(|word| matches!(word, "SURF" | "MODE" | "VERS")) {
@@ -180,6 +187,7 @@ fn format_by_extension(path: &Path) -> Option<LensFormat> {
         "zmx" => Some(LensFormat::Zemax),
         "seq" => Some(LensFormat::CodeV),
         "roa" => Some(LensFormat::RayOptics),
+        "len" => Some(LensFormat::Oslo),
         _ => None,
     }
 }
@@ -194,7 +202,8 @@ pub fn save(lens: &Lens, path: impl AsRef<Path>) -> Result<SaveReport, FileError
     let path = path.as_ref();
     let file = path.display().to_string();
     lens.check().map_err(|source| FileError::Lens { file: file.clone(), source })?;
-    let writable = format_by_extension(path).filter(|format| *format != LensFormat::RayOptics);
+    let writable = format_by_extension(path)
+        .filter(|format| !matches!(format, LensFormat::RayOptics | LensFormat::Oslo));
     let Some(format) = writable else {
         let extension = path.extension().unwrap_or_default().to_string_lossy();
         let found = format!("the extension `{extension}`");
@@ -203,7 +212,7 @@ pub fn save(lens: &Lens, path: impl AsRef<Path>) -> Result<SaveReport, FileError
     };
     let (bytes, report, proof) = match format {
         LensFormat::Native => (json::write(lens).into_bytes(), None, None),
-        LensFormat::Zemax | LensFormat::CodeV | LensFormat::RayOptics => {
+        LensFormat::Zemax | LensFormat::CodeV | LensFormat::RayOptics | LensFormat::Oslo => {
             let (bytes, report, proof) = checked_foreign(lens, format, &file)?;
             (bytes, Some(report), Some(proof))
         }

@@ -69,7 +69,9 @@ impl FileRequest {
 
     const fn extensions(self) -> &'static [&'static str] {
         match self {
-            Self::Open | Self::InsertLens => &["json", "zmx", "ZMX", "seq", "SEQ", "roa"],
+            Self::Open | Self::InsertLens => {
+                &["json", "zmx", "ZMX", "seq", "SEQ", "len", "LEN", "roa"]
+            }
             Self::Save | Self::ExportJson | Self::OpenSearch | Self::SaveSearch => &["json"],
             Self::ExportSearchLens(_) => &["json", "zmx"],
             Self::AddGlasses => &["agf", "AGF"],

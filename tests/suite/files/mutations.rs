@@ -96,7 +96,7 @@ fn no_damaged_file_causes_a_panic() {
     let files: usize = files.unwrap_or(FILES);
     for i in 0..files {
         let bytes = spoiled(&seeds[i % seeds.len()], &mut random);
-        let name = ["a.json", "a.zmx", "a.seq", "a.roa", "a"][random.below(5)];
+        let name = ["a.json", "a.zmx", "a.seq", "a.roa", "a.len", "a"][random.below(6)];
         match files::parse(&bytes, name) {
             Ok(opened) => {
                 lenses += 1;

@@ -1,0 +1,98 @@
+//! The meaning of a lens of OSLO, on a Cooke triplet whose first-order data are known.
+
+use super::foreign;
+use aplanat::files::{self, ConversionOutcome, LensFormat, OpenedLens};
+use aplanat::lens::{Aperture, FieldKind, Medium, Object, Quantity};
+use aplanat::paraxial::{Beam, first_order};
+
+fn text() -> String {
+    String::from_utf8(foreign("triplet.len")).unwrap()
+}
+
+fn read(text: &str) -> OpenedLens {
+    files::parse(text.as_bytes(), "a.len").unwrap()
+}
+
+fn efl(opened: &OpenedLens) -> f64 {
+    let lens = &opened.lens;
+    let system = lens.resolve(0, lens.wavelengths[lens.primary()].um).unwrap();
+    first_order(&system, &Beam::for_lens(lens, 0)).unwrap().efl.unwrap()
+}
+
+#[test]
+fn a_lens_is_read() {
+    let opened = files::parse(text().as_bytes(), "unknown").unwrap();
+    assert_eq!(opened.format, LensFormat::Oslo);
+    let lens = &opened.lens;
+    assert_eq!((lens.name.as_str(), lens.source.as_str()), ("Cooke triplet", "Geary"));
+    assert_eq!((lens.notes.as_str(), lens.object), ("A note", Object::Infinity));
+    assert_eq!(lens.aperture, Aperture::EntrancePupilDiameter(10.0));
+    assert_eq!((lens.surfaces.len(), lens.stop()), (6, Some(2)));
+    let fields: Vec<f64> = lens.fields.values.iter().map(|field| field.y).collect();
+    assert_eq!((lens.fields.kind, fields), (FieldKind::Angle, vec![0.0, 14.0, 20.0]));
+    assert_eq!((lens.wavelengths[1].um, lens.wavelengths[1].weight), (0.48, 0.5));
+    // Only an aperture that is checked clips.
+    let rims: Vec<Option<f64>> = lens.surfaces.iter().map(|row| row.semi_diameter).collect();
+    assert_eq!(rims, [Some(7.57), None, None, None, None, None]);
+    // The reference lens has 49.99978 mm with SK16 and F2; ours are the successors of these glasses.
+    assert!((efl(&opened) - 49.99978).abs() < 0.02, "{}", efl(&opened));
+}
+
+#[test]
+fn units_shapes_and_what_follows_are_read() {
+    let inches = read(&text().replace("UNI 1.0", "UNI 25.4"));
+    assert!((efl(&inches) / efl(&read(&text())) - 25.4).abs() < 1e-9);
+    let odd = text()
+        .replace("RD 22.01359", "CV 0.0454\nCC -0.5\nAD 1e-6\nAF -2e-9")
+        .replace("RD -18.39533", "PK CV 1 -1.0 0.001\nPY 0.0")
+        .replace("RD 79.6836\nTH 2.95208", "PK TH -4 2.0");
+    let lens = read(&odd).lens;
+    let front = &lens.surfaces[0];
+    assert_eq!((front.curvature, front.conic), (0.0454, -0.5));
+    assert_eq!(front.asphere, [1e-6, 0.0, -2e-9]);
+    assert_eq!(lens.image_solve, Some(0.0));
+    let pickups: Vec<_> = lens
+        .pickups
+        .iter()
+        .map(|p| (p.parameter.surface, p.source.surface, p.source.quantity, p.scale, p.offset))
+        .collect();
+    assert_eq!(
+        pickups,
+        [(4, 0, Quantity::Thickness, 2.0, 0.0), (5, 0, Quantity::Curvature, -1.0, 0.001)]
+    );
+    let mirror = read(&text().replace("GLA F2", "RFL").replace("TH 0.99997", "TH -0.99997"));
+    assert_eq!(mirror.lens.surfaces[2].medium, Medium::Mirror);
+}
+
+#[test]
+fn what_has_no_counterpart_is_listed_and_what_is_wrong_is_named() {
+    let opened = read(&text().replace("AP 4.05", "TLA 3.0\nAP 4.05\nGRT 2"));
+    let report = opened.report.unwrap();
+    let dropped: Vec<&str> =
+        report.rows_with(ConversionOutcome::Dropped).map(|row| row.text.as_str()).collect();
+    assert_eq!(dropped, ["TLA 3.0", "GRT 2"]);
+    for (from, to, expected) in [
+        ("EBR 5.0", "EBR wide", "line 3, EBR: found `wide`; expected a number"),
+        ("EBR 5.0", "", "expected EBR or NAO"),
+        ("EBR 5.0", "EBR -5", "expected more than 0"),
+        ("TH 6.00755", "TH 1e300", "found `1e300`"),
+        ("UNI 1.0", "UNI 0", "expected more than 0"),
+        ("AP 6.7", "PK CV 1.5", "expected the number of a surface"),
+    ] {
+        let error = files::parse(text().replacen(from, to, 1).as_bytes(), "a.len").unwrap_err();
+        assert!(error.to_string().contains(expected), "{to}: {error}");
+    }
+    assert!(files::parse(b"LEN NEW \"x\"\nEBR 1\nNXT\nEND", "a.len").is_err());
+}
+
+#[test]
+fn an_object_nearby_has_the_aperture_of_its_beam() {
+    let near = read(&text().replace("TH 1.0e+20", "TH 100.0").replace("ANG 20.0", "OBH 10.0"));
+    let Aperture::ObjectNa(na) = near.lens.aperture else { panic!("{:?}", near.lens.aperture) };
+    assert!((na - 5.0 / 5.0_f64.hypot(100.0)).abs() < 1e-15);
+    assert_eq!(near.lens.object, Object::Finite(100.0));
+    assert_eq!(
+        (near.lens.fields.kind, near.lens.fields.values[2].y),
+        (FieldKind::ObjectHeight, 10.0)
+    );
+}
