@@ -106,12 +106,10 @@ impl<'a> OsloCommand<'a> {
 /// The outcome of a command, with a note.
 type Taken = Result<(ConversionOutcome, String), ParseError>;
 
-fn used() -> Taken {
-    Ok((ConversionOutcome::Used, String::new()))
-}
+const USED: (ConversionOutcome, String) = (ConversionOutcome::Used, String::new());
 
-fn dropped(note: &str) -> Taken {
-    Ok((ConversionOutcome::Dropped, note.to_owned()))
+fn dropped(note: &str) -> (ConversionOutcome, String) {
+    (ConversionOutcome::Dropped, note.to_owned())
 }
 
 /// A surface of a file, in its unit of length.
@@ -124,7 +122,6 @@ struct OsloSurface {
     glass: Option<String>,
     mirror: bool,
     semi_diameter: Option<f64>,
-    checked: bool,
     stop: bool,
     focus: bool,
     comment: String,
@@ -178,7 +175,7 @@ impl OsloModel {
     /// Takes a command of the lens or of the present surface.
     fn take(&mut self, command: &OsloCommand<'_>) -> Taken {
         if self.is_ended {
-            return dropped("behind the end of the lens");
+            return Ok(dropped("behind the end of the lens"));
         }
         match command.name.as_str() {
             "LEN" => self.name = command.quoted(),
@@ -199,11 +196,11 @@ impl OsloModel {
             name if name.starts_with("SNO") => self.notes.push(command.quoted()),
             _ => return self.take_of_surface(command),
         }
-        used()
+        Ok(USED)
     }
 
     fn take_of_surface(&mut self, command: &OsloCommand<'_>) -> Taken {
-        let Some(surface) = self.surfaces.last_mut() else { return dropped("no surface") };
+        let Some(surface) = self.surfaces.last_mut() else { return Ok(dropped("no surface")) };
         match command.name.as_str() {
             "RD" => {
                 let radius = command.number(0)?;
@@ -227,9 +224,9 @@ impl OsloModel {
             "CBK" | "DRW" | "CHK" | "DLRS" | "DLFD" | "DLAP" | "DLAS" | "DLNR" | "AMO" => {
                 return Ok((ConversionOutcome::Preserved, String::new()));
             }
-            _ => return dropped("this program has no counterpart"),
+            _ => return Ok(dropped("this program has no counterpart")),
         }
-        used()
+        Ok(USED)
     }
 
     fn lens(&self, report: &mut ConversionReport) -> Result<Lens, ParseError> {
@@ -329,10 +326,10 @@ impl OsloSurface {
     fn take_aperture(&mut self, command: &OsloCommand<'_>) -> Taken {
         let is_checked = |word: &&str| word.eq_ignore_ascii_case("CHK");
         let place = usize::from(command.words.first().is_some_and(is_checked));
-        self.checked = command.words.iter().any(is_checked);
-        self.semi_diameter = Some(command.number(place)?).filter(|radius| *radius > 0.0);
-        if self.checked {
-            return used();
+        let radius = command.number(place)?;
+        if command.words.iter().any(is_checked) {
+            self.semi_diameter = Some(radius).filter(|radius| *radius > 0.0);
+            return Ok(USED);
         }
         let note =
             "not checked: it clips no rays, and the semi-diameter is left to them".to_owned();
@@ -344,7 +341,7 @@ impl OsloSurface {
         let is_curvature = match kind.as_deref() {
             Some("CV") => true,
             Some("TH") => false,
-            _ => return dropped("only curvatures and thicknesses follow others here"),
+            _ => return Ok(dropped("only curvatures and thicknesses follow others here")),
         };
         let source = command.number(1)?;
         if source.fract() != 0.0 || source.abs() > MAX_SURFACES as f64 {
@@ -355,7 +352,7 @@ impl OsloSurface {
         };
         let (scale, offset) = (optional(2, 1.0)?, optional(3, 0.0)?);
         self.pickups.push(OsloPickup { is_curvature, source: source as i64, scale, offset });
-        used()
+        Ok(USED)
     }
 
     fn row(&self, unit: f64) -> Row {
@@ -366,7 +363,7 @@ impl OsloSurface {
             thickness: self.thickness * unit,
             conic: self.conic,
             asphere: self.asphere[..count].iter().enumerate().map(term).collect(),
-            semi_diameter: self.semi_diameter.filter(|_| self.checked).map(|r| r * unit),
+            semi_diameter: self.semi_diameter.map(|radius| radius * unit),
             comment: self.comment.clone(),
             ..Row::default()
         }
