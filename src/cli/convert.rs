@@ -11,7 +11,7 @@ use std::path::PathBuf;
 #[derive(Debug, clap::Args)]
 #[command(after_long_help = include_str!("help/convert.txt"))]
 pub(super) struct ConvertArgs {
-    /// The lens to read: .json, .zmx, .seq, .len or .roa
+    /// The lens to read: .json, .zmx, .zar, .seq, .len or .roa
     #[arg(value_name = "IN")]
     from: PathBuf,
 

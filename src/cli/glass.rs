@@ -30,7 +30,7 @@ impl GlassArgs {
     pub(super) fn run(&self, output: &Output) -> Result<(), CliError> {
         if let Some(path) = &self.add {
             let (catalogue, saved) = files::add_catalogue(path)?;
-            return output.print(&AddedCatalogue::new(catalogue, saved.display().to_string()));
+            return output.print(&AddedCatalogue::new(catalogue, &saved));
         }
         if let Some(name) = &self.remove {
             let removed = files::remove_catalogue(name)?.display().to_string();
@@ -148,7 +148,7 @@ fn counted_glasses(count: usize) -> String {
 /// The report on a catalogue that was added.
 #[derive(Serialize)]
 struct AddedCatalogue {
-    saved: String,
+    saved: Vec<String>,
     glasses: Vec<AddedGlass>,
     refused: Vec<GlassRemark>,
     contradictory: Vec<GlassRemark>,
@@ -170,7 +170,7 @@ struct GlassRemark {
 }
 
 impl AddedCatalogue {
-    fn new(catalogue: AgfCatalogue, saved: String) -> Self {
+    fn new(catalogue: AgfCatalogue, saved: &[PathBuf]) -> Self {
         let added = |further: AgfGlass| {
             let Glass { name, nd, vd, .. } = further.glass.clone();
             AddedGlass { name, nd, vd, further }
@@ -179,7 +179,7 @@ impl AddedCatalogue {
             found.into_iter().map(|(name, why)| GlassRemark { name, why }).collect()
         };
         Self {
-            saved,
+            saved: saved.iter().map(|path| path.display().to_string()).collect(),
             glasses: catalogue.glasses.into_iter().map(added).collect(),
             refused: remarks(catalogue.refused),
             contradictory: remarks(catalogue.contradictory),
@@ -190,7 +190,12 @@ impl AddedCatalogue {
 impl fmt::Display for AddedCatalogue {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let glasses = counted_glasses(self.glasses.len());
-        writeln!(f, "{glasses}, {} refused; saved as {}", self.refused.len(), self.saved)?;
+        writeln!(
+            f,
+            "{glasses}, {} refused; saved as {}",
+            self.refused.len(),
+            self.saved.join(", ")
+        )?;
         let remarks = self.refused.iter().chain(&self.contradictory);
         remarks.into_iter().try_for_each(|glass| writeln!(f, "  {}: {}", glass.name, glass.why))
     }

@@ -14,7 +14,7 @@ use std::sync::atomic::AtomicBool;
 /// The lens argument of a subcommand.
 #[derive(Debug, clap::Args)]
 pub(super) struct LensFile {
-    /// The lens: .json, .zmx, .seq, .len or .roa
+    /// The lens: .json, .zmx, .zar, .seq, .len or .roa
     #[arg(value_name = "LENS")]
     path: PathBuf,
 }
@@ -22,7 +22,7 @@ pub(super) struct LensFile {
 /// The lens arguments of a benchmark that takes several.
 #[derive(Debug, clap::Args)]
 pub(super) struct LensFiles {
-    /// The lenses: .json, .zmx, .seq, .len or .roa
+    /// The lenses: .json, .zmx, .zar, .seq, .len or .roa
     #[arg(value_name = "LENS", required = true)]
     paths: Vec<PathBuf>,
 }

@@ -55,7 +55,7 @@ use std::process::ExitCode;
 #[derive(Debug, Parser)]
 #[command(version, after_help = AFTER_HELP, disable_help_subcommand = true)]
 struct CliArgs {
-    /// The lens that the studio opens: .json, .zmx, .seq, .len or .roa
+    /// The lens that the studio opens: .json, .zmx, .zar, .seq, .len or .roa
     lens: Option<PathBuf>,
 
     /// Prints the result as JSON

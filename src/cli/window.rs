@@ -60,7 +60,7 @@ fn reject_mistyped_command(path: &Path) -> Result<(), CliError> {
     }
     let word = path.display();
     Err(CliError::Input(format!(
-        "`{word}` is neither a subcommand nor a file; expected a lens file (.json, .zmx, .seq, .len, .roa) \
+        "`{word}` is neither a subcommand nor a file; expected a lens file (.json, .zmx, .zar, .seq, .len, .roa) \
          or a subcommand: `aplanat --help` lists them"
     )))
 }

@@ -35,6 +35,15 @@ pub struct AgfCatalogue {
     pub contradictory: Vec<(String, String)>,
 }
 
+impl AgfCatalogue {
+    /// Adds the glasses and remarks of another catalogue.
+    pub(super) fn append(&mut self, other: Self) {
+        self.glasses.extend(other.glasses);
+        self.refused.extend(other.refused);
+        self.contradictory.extend(other.contradictory);
+    }
+}
+
 /// A glass with everything that its maker says of it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct AgfGlass {

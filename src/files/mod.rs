@@ -28,6 +28,7 @@ mod round_trip;
 mod self_check;
 mod text;
 mod volume;
+mod zar;
 pub mod zemax;
 
 pub use agf::{AgfCatalogue, AgfGlass, parse_agf, read_agf};
@@ -86,6 +87,15 @@ pub enum LensFormat {
     RayOptics,
     /// The program OSLO, `.len`; only read.
     Oslo,
+    /// An archive of Zemax with a lens and its catalogues, `.zar`; only read.
+    Archive,
+}
+
+impl LensFormat {
+    /// True for a format that lenses are written in.
+    fn is_written(self) -> bool {
+        matches!(self, Self::Native | Self::Zemax | Self::CodeV)
+    }
 }
 
 /// A lens read from a file.
@@ -115,8 +125,8 @@ pub struct SaveReport {
     pub proof: Option<RoundTripCheck>,
 }
 
-const READABLE: &str = "a lens: JSON with the key `aplanat`, Zemax .zmx, CODE V .seq, OSLO .len or ray-optics \
-     .roa";
+const READABLE: &str = "a lens: JSON with the key `aplanat`, Zemax .zmx or .zar, CODE V .seq, OSLO .len or \
+     ray-optics .roa";
 
 /// Reads a lens from a file of any known format.
 ///
@@ -134,6 +144,35 @@ pub fn open(path: impl AsRef<Path>) -> Result<OpenedLens, FileError> {
 /// # Errors
 /// Bytes that are not a lens, malformed text, or an invalid lens.
 pub fn parse(bytes: &[u8], name: &str) -> Result<OpenedLens, FileError> {
+    if zar::is_archive(bytes) { parse_archive(bytes, name) } else { parse_text(bytes, name) }
+}
+
+/// The lens of an archive. Its other files are listed in the report.
+fn parse_archive(bytes: &[u8], name: &str) -> Result<OpenedLens, FileError> {
+    let members = zar::members(bytes, name)?;
+    let lens = members.iter().position(|member| member.has_extension("zmx"));
+    let Some(lens) = lens else {
+        let found = "an archive with no lens .zmx".to_owned();
+        return Err(FileError::NotALens { file: name.to_owned(), found, expected: READABLE });
+    };
+    let file = format!("{name}/{}", members[lens].name());
+    let mut opened = parse_text(&members[lens].contents(name)?, &file)?;
+    opened.format = LensFormat::Archive;
+    let report = opened.report.get_or_insert_default();
+    for (i, member) in members.iter().enumerate() {
+        if i != lens {
+            let note = if member.has_extension("agf") {
+                format!("a glass catalogue; `aplanat glass --add {name}` makes its glasses known")
+            } else {
+                "a file of the archive, not read".to_owned()
+            };
+            report.add(ConversionOutcome::Preserved, &member.name(), note);
+        }
+    }
+    Ok(opened)
+}
+
+fn parse_text(bytes: &[u8], name: &str) -> Result<OpenedLens, FileError> {
     let nothing = |found| FileError::NotALens { file: name.to_owned(), found, expected: READABLE };
     if let Some(found) = text::binary_kind(bytes) {
         return Err(nothing(found));
@@ -152,6 +191,7 @@ pub fn parse(bytes: &[u8], name: &str) -> Result<OpenedLens, FileError> {
         }
         LensFormat::CodeV => Ok(foreign(codev::read(&text, name)?, LensFormat::CodeV)),
         LensFormat::Oslo => Ok(foreign(oslo::read(&text, name)?, LensFormat::Oslo)),
+        LensFormat::Archive => Err(nothing("a damaged archive".to_owned())),
     }
 }
 
@@ -188,6 +228,7 @@ fn format_by_extension(path: &Path) -> Option<LensFormat> {
         "seq" => Some(LensFormat::CodeV),
         "roa" => Some(LensFormat::RayOptics),
         "len" => Some(LensFormat::Oslo),
+        "zar" => Some(LensFormat::Archive),
         _ => None,
     }
 }
@@ -202,20 +243,17 @@ pub fn save(lens: &Lens, path: impl AsRef<Path>) -> Result<SaveReport, FileError
     let path = path.as_ref();
     let file = path.display().to_string();
     lens.check().map_err(|source| FileError::Lens { file: file.clone(), source })?;
-    let writable = format_by_extension(path)
-        .filter(|format| !matches!(format, LensFormat::RayOptics | LensFormat::Oslo));
-    let Some(format) = writable else {
+    let Some(format) = format_by_extension(path).filter(|format| format.is_written()) else {
         let extension = path.extension().unwrap_or_default().to_string_lossy();
         let found = format!("the extension `{extension}`");
         let expected = "`.json`, `.zmx` or `.seq` to write to";
         return Err(FileError::NotALens { file, found, expected });
     };
-    let (bytes, report, proof) = match format {
-        LensFormat::Native => (json::write(lens).into_bytes(), None, None),
-        LensFormat::Zemax | LensFormat::CodeV | LensFormat::RayOptics | LensFormat::Oslo => {
-            let (bytes, report, proof) = checked_foreign(lens, format, &file)?;
-            (bytes, Some(report), Some(proof))
-        }
+    let (bytes, report, proof) = if format == LensFormat::Native {
+        (json::write(lens).into_bytes(), None, None)
+    } else {
+        let (bytes, report, proof) = checked_foreign(lens, format, &file)?;
+        (bytes, Some(report), Some(proof))
     };
     write_atomic(path, &bytes)?;
     Ok(SaveReport { format, report, proof })

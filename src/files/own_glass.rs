@@ -4,6 +4,7 @@ use super::agf::{AgfCatalogue, parse_agf, read_agf};
 use super::atomic::write_atomic;
 use super::bounded::read_file;
 use super::error::FileError;
+use super::zar;
 use crate::lens::glass;
 use std::env;
 use std::fs;
@@ -51,19 +52,47 @@ pub fn load_own_glasses() -> Vec<FileError> {
 }
 
 /// Adds a catalogue for good: it is copied into the folder of the settings, in place of one of the same
-/// name, and its glasses are known from now on.
+/// name, and its glasses are known from now on. Of an archive `.zar` all catalogues are added. Returns what
+/// they hold, and where they are kept.
 ///
 /// # Errors
-/// A file that is no catalogue, or a folder that cannot be written.
-pub fn add_catalogue(path: &Path) -> Result<(AgfCatalogue, PathBuf), FileError> {
+/// A file that is no catalogue, an archive without one, or a folder that cannot be written.
+pub fn add_catalogue(path: &Path) -> Result<(AgfCatalogue, Vec<PathBuf>), FileError> {
     let file = path.display().to_string();
     let bytes = read_file(path, MAX_CATALOGUE_BYTES)?;
-    let name = maker(path);
-    let catalogue = parse_agf(&bytes, &name, &file)?;
-    let target = folder_for_writing(&file)?.join(format!("{name}.agf"));
-    write_atomic(&target, &bytes)?;
-    add_glasses(&catalogue);
-    Ok((catalogue, target))
+    let mut found = AgfCatalogue::default();
+    let mut saved = Vec::new();
+    for (name, bytes) in catalogues_in(bytes, path, &file)? {
+        let catalogue = parse_agf(&bytes, &name, &file)?;
+        let target = folder_for_writing(&file)?.join(format!("{name}.agf"));
+        write_atomic(&target, &bytes)?;
+        add_glasses(&catalogue);
+        found.append(catalogue);
+        saved.push(target);
+    }
+    Ok((found, saved))
+}
+
+/// The makers and the bytes of the catalogues of a file: itself, or those of an archive.
+fn catalogues_in(
+    bytes: Vec<u8>,
+    path: &Path,
+    file: &str,
+) -> Result<Vec<(String, Vec<u8>)>, FileError> {
+    if !zar::is_archive(&bytes) {
+        return Ok(vec![(maker(path), bytes)]);
+    }
+    let members = zar::members(&bytes, file)?;
+    let catalogues = members.iter().filter(|member| member.has_extension("agf"));
+    let read =
+        |member: &zar::Member<'_>| Ok((maker(Path::new(&member.name())), member.contents(file)?));
+    let found: Vec<_> = catalogues.map(read).collect::<Result<_, FileError>>()?;
+    if found.is_empty() {
+        let (found, expected) = ("an archive without catalogues", "one with a catalogue .agf");
+        let (file, found, expected) = (file.to_owned(), found.to_owned(), expected.to_owned());
+        return Err(FileError::Unsuitable { file, found, expected });
+    }
+    Ok(found)
 }
 
 /// Removes the catalogue of a name from the folder of the settings; returns its path.

@@ -50,14 +50,14 @@ fn refusal(path: &Path, why: &str) -> String {
 fn file_kind(path: &Path) -> Result<FileKind, String> {
     let extension = path.extension().unwrap_or_default().to_string_lossy().to_lowercase();
     match extension.as_str() {
-        "zmx" | "seq" | "len" | "roa" => Ok(FileKind::Lens),
+        "zmx" | "zar" | "seq" | "len" | "roa" => Ok(FileKind::Lens),
         "npz" => Ok(FileKind::GrinField),
         "agf" => Ok(FileKind::Glasses),
         "png" | "jpg" | "jpeg" => Ok(FileKind::Picture),
         "json" => json_kind(path),
         _ => Err(refusal(
             path,
-            "is none of the files that the window opens: a lens (.json, .zmx, .seq, .len, .roa), a search (.json), a \
+            "is none of the files that the window opens: a lens (.json, .zmx, .zar, .seq, .len, .roa), a search (.json), a \
              gradient-index task (.json) or volume (.npz), a glass catalogue (.agf)",
         )),
     }

@@ -70,11 +70,11 @@ impl FileRequest {
     const fn extensions(self) -> &'static [&'static str] {
         match self {
             Self::Open | Self::InsertLens => {
-                &["json", "zmx", "ZMX", "seq", "SEQ", "len", "LEN", "roa"]
+                &["json", "zmx", "ZMX", "zar", "ZAR", "seq", "SEQ", "len", "LEN", "roa"]
             }
             Self::Save | Self::ExportJson | Self::OpenSearch | Self::SaveSearch => &["json"],
             Self::ExportSearchLens(_) => &["json", "zmx"],
-            Self::AddGlasses => &["agf", "AGF"],
+            Self::AddGlasses => &["agf", "AGF", "zar", "ZAR"],
             Self::ExportZemax => &["zmx"],
             Self::OpenField => &["json", "npz"],
             Self::SaveField(_) => &["npz", "json"],

@@ -32,7 +32,7 @@ pub(super) struct DesignArgs {
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
 
-    /// Judges this lens: .json, .zmx, .seq, .len or .roa
+    /// Judges this lens: .json, .zmx, .zar, .seq, .len or .roa
     #[arg(long, value_name = "LENS", conflicts_with = "out")]
     judge: Option<PathBuf>,
 

@@ -16,7 +16,7 @@ use std::path::PathBuf;
 #[derive(Debug, clap::Args)]
 #[command(after_long_help = include_str!("../help/measure_mtf.txt"))]
 pub(super) struct MeasureMtfArgs {
-    /// The lenses: .json, .zmx, .seq, .len or .roa
+    /// The lenses: .json, .zmx, .zar, .seq, .len or .roa
     #[arg(value_name = "LENS", required = true)]
     lenses: Vec<PathBuf>,
 

@@ -15,7 +15,7 @@ use std::path::PathBuf;
 #[derive(Debug, clap::Args)]
 #[command(after_long_help = include_str!("../help/measure_optimize.txt"))]
 pub(super) struct MeasureOptimizeArgs {
-    /// The lenses: .json, .zmx, .seq, .len or .roa
+    /// The lenses: .json, .zmx, .zar, .seq, .len or .roa
     #[arg(value_name = "LENS")]
     lenses: Vec<PathBuf>,
 

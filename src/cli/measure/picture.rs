@@ -18,7 +18,7 @@ use std::path::PathBuf;
 #[derive(Debug, clap::Args)]
 #[command(after_long_help = include_str!("../help/measure_picture.txt"))]
 pub(super) struct MeasurePictureArgs {
-    /// The lenses: .json, .zmx, .seq, .len or .roa
+    /// The lenses: .json, .zmx, .zar, .seq, .len or .roa
     #[arg(value_name = "LENS", required = true)]
     lenses: Vec<PathBuf>,
 

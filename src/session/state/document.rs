@@ -195,7 +195,8 @@ impl Session {
         match files::add_catalogue(path) {
             Ok((catalogue, saved)) => {
                 let (count, refused) = (catalogue.glasses.len(), catalogue.refused.len());
-                let saved = saved.display();
+                let saved: Vec<String> = saved.iter().map(|p| p.display().to_string()).collect();
+                let saved = saved.join(", ");
                 let text = format!("{count} glasses added, {refused} refused; kept as {saved}");
                 self.post(Severity::Note, text);
             }
