@@ -110,6 +110,21 @@ pub fn parse_agf(bytes: &[u8], maker: &str, file: &str) -> Result<AgfCatalogue, 
     Ok(catalogue)
 }
 
+impl AgfGlass {
+    /// A glass of which nothing else is known.
+    pub(super) fn without_remarks(glass: Glass) -> Self {
+        Self {
+            glass,
+            status: None,
+            expansion: None,
+            thermal: Vec::new(),
+            relative_cost: None,
+            resistance: Vec::new(),
+            transmission: Vec::new(),
+        }
+    }
+}
+
 /// The records of one glass, each as its words.
 struct GlassRecords<'a>(Vec<Vec<&'a str>>);
 
@@ -258,7 +273,7 @@ fn dispersion(formula: f64, c: &[f64]) -> Option<(DispersionFormula, Vec<f64>)> 
 
 /// Refuses a glass whose formula has no index in its range, and takes nd and vd from the formula where
 /// the file has none.
-fn check_index(glass: &mut Glass) -> Result<(), String> {
+pub(super) fn check_index(glass: &mut Glass) -> Result<(), String> {
     let [low, high] = glass.range_um;
     let middle = 0.5 * (low + high);
     if [low, middle, high].iter().any(|um| glass.index(*um).is_none_or(|n| !(n < 10.0))) {

@@ -28,6 +28,7 @@ mod round_trip;
 mod self_check;
 mod text;
 mod volume;
+mod yaml_glass;
 mod zar;
 pub mod zemax;
 

@@ -255,6 +255,7 @@ impl OsloModel {
             fields: self.fields(is_far, report),
             wavelengths: self.wavelengths(),
             image_solve: rows.last().is_some_and(|last| last.focus).then_some(0.0),
+            surfaces: Vec::with_capacity(rows.len()),
             ..crate::lens::blank()
         };
         let stop = rows.iter().position(|surface| surface.stop).unwrap_or_else(|| {

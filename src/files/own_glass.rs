@@ -1,9 +1,11 @@
-//! The glass catalogues that a person has added: files `.agf` in a folder of the settings.
+//! The glass catalogues that a person has added: files `.agf` in a folder of the settings, and folders of
+//! materials `.yml`, one for each maker.
 
 use super::agf::{AgfCatalogue, parse_agf, read_agf};
 use super::atomic::write_atomic;
-use super::bounded::read_file;
+use super::bounded::{MAX_LENS_BYTES, read_file};
 use super::error::FileError;
+use super::yaml_glass::{is_material, material_files, parse_material, read_materials};
 use super::zar;
 use crate::lens::glass;
 use std::env;
@@ -30,7 +32,8 @@ pub fn own_catalogues() -> Vec<PathBuf> {
         return Vec::new();
     };
     let paths = entries.filter_map(|entry| Some(entry.ok()?.path()));
-    let mut paths: Vec<PathBuf> = paths.filter(|path| is_agf(path)).collect();
+    let is_catalogue = |path: &PathBuf| is_agf(path) || !material_files(path).is_empty();
+    let mut paths: Vec<PathBuf> = paths.filter(is_catalogue).collect();
     paths.sort();
     paths
 }
@@ -42,7 +45,7 @@ pub fn load_own_glasses() -> Vec<FileError> {
     let mut errors = Vec::new();
     ONCE.call_once(|| {
         for path in own_catalogues() {
-            match read_agf(&path) {
+            match read_own(&path) {
                 Ok(catalogue) => add_glasses(&catalogue),
                 Err(error) => errors.push(error),
             }
@@ -51,14 +54,49 @@ pub fn load_own_glasses() -> Vec<FileError> {
     errors
 }
 
+fn read_own(path: &Path) -> Result<AgfCatalogue, FileError> {
+    if path.is_dir() { read_materials(path) } else { read_agf(path) }
+}
+
+/// Adds a material for good, beside those of the same maker.
+fn add_material(path: &Path, file: &str) -> Result<(AgfCatalogue, Vec<PathBuf>), FileError> {
+    let refuse = |found: String, expected: &str| {
+        let (file, expected) = (file.to_owned(), expected.to_owned());
+        Err(FileError::Unsuitable { file, found, expected })
+    };
+    let bytes = read_file(path, MAX_LENS_BYTES)?;
+    let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+    let absolute = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
+    let maker = absolute.parent().map(maker).unwrap_or_default();
+    let added = match parse_material(&bytes, &maker, &name) {
+        Ok(glass) => glass,
+        Err(found) => return refuse(found, "a material with a formula"),
+    };
+    let settings = folder_for_writing(file)?;
+    if settings.join(format!("{maker}.agf")).exists() {
+        let found = format!("a material of {maker}, of which a catalogue .agf was added");
+        return refuse(found, "a maker without a catalogue; `aplanat glass --remove` removes one");
+    }
+    let folder = settings.join(&maker);
+    let unwritable = |source| FileError::Unwritable { file: folder.display().to_string(), source };
+    fs::create_dir_all(&folder).map_err(unwritable)?;
+    let target = folder.join(format!("{name}.yml"));
+    write_atomic(&target, &bytes)?;
+    add_glasses(&read_materials(&folder)?);
+    Ok((AgfCatalogue { glasses: vec![added], ..AgfCatalogue::default() }, vec![target]))
+}
+
 /// Adds a catalogue for good: it is copied into the folder of the settings, in place of one of the same
-/// name, and its glasses are known from now on. Of an archive `.zar` all catalogues are added. Returns what
-/// they hold, and where they are kept.
+/// name, and its glasses are known from now on. Of an archive `.zar` all catalogues are added, and a
+/// material `.yml` is added to those of its folder. Returns what they hold, and where they are kept.
 ///
 /// # Errors
 /// A file that is no catalogue, an archive without one, or a folder that cannot be written.
 pub fn add_catalogue(path: &Path) -> Result<(AgfCatalogue, Vec<PathBuf>), FileError> {
     let file = path.display().to_string();
+    if is_material(path) {
+        return add_material(path, &file);
+    }
     let bytes = read_file(path, MAX_CATALOGUE_BYTES)?;
     let mut found = AgfCatalogue::default();
     let mut saved = Vec::new();
@@ -113,7 +151,14 @@ pub fn remove_catalogue(name: &str) -> Result<PathBuf, FileError> {
         return Err(FileError::Unsuitable { file, found, expected });
     };
     let refuse = |source| FileError::Unwritable { file: path.display().to_string(), source };
-    fs::remove_file(path).map_err(refuse)?;
+    if path.is_dir() {
+        for material in material_files(path) {
+            fs::remove_file(material).map_err(refuse)?;
+        }
+        fs::remove_dir(path).map_err(refuse)?;
+    } else {
+        fs::remove_file(path).map_err(refuse)?;
+    }
     Ok(path.clone())
 }
 

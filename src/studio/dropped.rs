@@ -52,13 +52,13 @@ fn file_kind(path: &Path) -> Result<FileKind, String> {
     match extension.as_str() {
         "zmx" | "zar" | "seq" | "len" | "roa" => Ok(FileKind::Lens),
         "npz" => Ok(FileKind::GrinField),
-        "agf" => Ok(FileKind::Glasses),
+        "agf" | "yml" | "yaml" => Ok(FileKind::Glasses),
         "png" | "jpg" | "jpeg" => Ok(FileKind::Picture),
         "json" => json_kind(path),
         _ => Err(refusal(
             path,
             "is none of the files that the window opens: a lens (.json, .zmx, .zar, .seq, .len, .roa), a search (.json), a \
-             gradient-index task (.json) or volume (.npz), a glass catalogue (.agf)",
+             gradient-index task (.json) or volume (.npz), a glass catalogue (.agf, .yml)",
         )),
     }
 }

@@ -272,3 +272,66 @@ fn a_catalogue_is_added_and_its_glass_found_in_a_lens() {
         assert!(status == Some(2) && errors.contains(expected), "{words:?}: {errors}");
     }
 }
+
+/// A member of an archive of Zemax in its first layout, not compressed.
+fn archive_member(name: &str, data: &[u8]) -> Vec<u8> {
+    let mut header = vec![0; 0x14C];
+    header[..2].copy_from_slice(&[0xEA, 0x00]);
+    header[0x0C..0x10].copy_from_slice(&(data.len() as u32).to_le_bytes());
+    header[0x20..0x20 + name.len()].copy_from_slice(name.as_bytes());
+    [header, data.to_vec()].concat()
+}
+
+#[test]
+fn materials_and_the_catalogues_of_an_archive_are_added_and_removed() {
+    let scratch = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("glass_kinds");
+    drop(std::fs::remove_dir_all(&scratch));
+    std::fs::create_dir_all(scratch.join("mymaker")).unwrap();
+    let folder = scratch.join("catalogues");
+    let run = |words: &[&str]| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_aplanat"));
+        let output = command.args(words).env("APLANAT_GLASSES", &folder).output().unwrap();
+        let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
+        (output.status.code(), text(output.stdout), text(output.stderr))
+    };
+    let material = |name: &str, text: &str| {
+        let path = scratch.join("mymaker").join(name);
+        std::fs::write(&path, text).unwrap();
+        path.to_str().unwrap().to_owned()
+    };
+    let text = "DATA:\n  - type: formula 5\n    wavelength_range: 0.35 2.5\n    coefficients: 1.5 0.004 -2\n";
+    let (a, b) = (material("A-1.yml", text), material("B-2.yml", text));
+    let table =
+        material("T.yml", "DATA:\n  - type: tabulated nk\n    data: |\n        0.4 1.5 0\n");
+    for file in [&a, &b] {
+        assert_eq!(run(&["glass", "--add", file]).0, Some(0));
+    }
+    // The second one did not replace the first, in the folder and in the program.
+    let (_, listed, _) = run(&["glass", "mymaker"]);
+    assert!(
+        listed.contains("A-1") && listed.contains("B-2") && listed.contains("2 glasses"),
+        "{listed}"
+    );
+    let (status, _, errors) = run(&["glass", "--add", &table]);
+    assert!(status == Some(2) && errors.contains("expected a material with a formula"), "{errors}");
+    let zmx = std::fs::read("tests/files/achromat.zmx").unwrap();
+    let archive = [
+        archive_member("ACHROMAT.ZMX", &zmx),
+        archive_member("MINE.AGF", BK7.replace("N-BK7", "SPECIAL-1").as_bytes()),
+    ];
+    let zar = scratch.join("achromat.zar");
+    std::fs::write(&zar, archive.concat()).unwrap();
+    let zar = zar.to_str().unwrap();
+    let (status, text, errors) = run(&["glass", "--add", zar, "--json"]);
+    let added: Value = serde_json::from_str(&text).unwrap();
+    assert_eq!((status, &added["glasses"][0]["name"]), (Some(0), &"SPECIAL-1".into()), "{errors}");
+    let focal_length = |file: &str| {
+        let info: Value = serde_json::from_str(&run(&["info", file, "--json"]).1).unwrap();
+        info["efl"].clone()
+    };
+    assert_eq!(focal_length(zar), focal_length("tests/files/achromat.zmx"));
+    for name in ["mymaker", "mine"] {
+        assert!(run(&["glass", "--remove", name]).1.contains("removed"));
+    }
+    assert_eq!(std::fs::read_dir(&folder).unwrap().count(), 0);
+}

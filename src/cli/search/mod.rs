@@ -211,6 +211,10 @@ impl SearchArgs {
         let mut plan = self.plan_args.plan(lens)?;
         plan.settings.method = self.method;
         plan.settings.seed = self.seed;
+        if let (None, Some(path)) = (self.plan_args.descent, &self.checkpoint) {
+            // What is wrong with a checkpoint is said when it is resumed.
+            plan.local.method = SearchPlan::stored_method(path).unwrap_or(plan.local.method);
+        }
         let usual = if self.minutes.is_none() { Some(DEFAULT_ITERATIONS) } else { None };
         plan.settings.gradients = self.iterations.or(usual);
         plan.settings.check().map_err(search_error)?;

@@ -98,9 +98,9 @@ pub(in crate::cli) struct SearchPlanArgs {
     #[arg(long, value_name = "SHARE", allow_negative_numbers = true)]
     gamma: Option<f64>,
 
-    /// The method of the local steps
-    #[arg(long, value_enum, default_value_t = DescentSettings::default().method)]
-    descent: DescentMethod,
+    /// The method of the local steps; absent: that of the checkpoint, or else trust-region
+    #[arg(long, value_enum)]
+    pub(in crate::cli) descent: Option<DescentMethod>,
 
     /// The number of steps of a local move
     #[arg(long, value_name = "N", default_value_t = DescentSettings::default().steps)]
@@ -198,7 +198,7 @@ impl SearchPlanArgs {
         plan.local.tolerance = self.error.0;
         plan.local.coarse = self.error.0;
         plan.local.steps = self.steps;
-        plan.local.method = self.descent;
+        plan.local.method = self.descent.unwrap_or(plan.local.method);
         let settings = &mut plan.settings;
         settings.chains = self.chains.unwrap_or(settings.chains);
         settings.reservoir = self.reservoir.unwrap_or(settings.reservoir);

@@ -22,6 +22,16 @@ pub enum DispersionFormula {
     HandbookOne,
     /// `n² = A + B λ²/(λ² − C) − D λ²`.
     HandbookTwo,
+    /// `n = c₀ + Σ cᵢ λ^pᵢ`.
+    Cauchy,
+    /// `n = 1 + c₀ + Σ Bᵢ/(Cᵢ − 1/λ²)`.
+    Gas,
+    /// `(n² − 1)/(n² + 2) = A + B λ²/(λ² − C) + D λ²`.
+    LorentzLorenz,
+    /// `n² = A + B/(λ² − C) + D (λ − E)/((λ − E)² + F)`.
+    Resonance,
+    /// `n² = c₀ + Σ B λ^p/(λ² − C^q) + Σ cᵢ λ^pᵢ` with two terms in the first sum.
+    ResonancesAndPowers,
 }
 
 /// The constant of Herzberger's formula, in µm².
@@ -52,9 +62,35 @@ impl DispersionFormula {
                 return finite(c(0) + l * (c(1) + l * c(2)) + far);
             }
             Self::Conrady => return finite(c(0) + c(1) / um + c(2) / um.powf(3.5)),
+            Self::Cauchy => return finite(sum(&|c, power| c * um.powf(power))),
+            Self::Gas => return finite(1.0 + sum(&|b, c| b / (c - 1.0 / l2))),
+            Self::LorentzLorenz => {
+                let ratio = c(0) + c(1) * l2 / (l2 - c(2)) + c(3) * l2;
+                (1.0 + 2.0 * ratio) / (1.0 - ratio)
+            }
+            Self::Resonance => {
+                let away = um - c(4);
+                c(0) + c(1) / (l2 - c(2)) + c(3) * away / (away * away + c(5))
+            }
+            Self::ResonancesAndPowers => resonances_and_powers(coefficients, um),
         };
         (square > 0.0).then(|| square.sqrt()).and_then(finite)
     }
+}
+
+/// The square of the index by [`DispersionFormula::ResonancesAndPowers`].
+fn resonances_and_powers(coefficients: &[f64], um: f64) -> f64 {
+    let (first, rest) = coefficients.split_at(coefficients.len().min(1));
+    let (resonances, powers) = rest.split_at(rest.len().min(8));
+    let resonance = |term: &[f64]| match *term {
+        // A term that is absent has no pole either.
+        [0.0, ..] => 0.0,
+        [b, power, c, exponent] => b * um.powf(power) / (um * um - c.powf(exponent)),
+        _ => f64::NAN,
+    };
+    first.iter().sum::<f64>()
+        + resonances.chunks(4).map(resonance).sum::<f64>()
+        + powers.chunks_exact(2).map(|term| term[0] * um.powf(term[1])).sum::<f64>()
 }
 
 fn finite(index: f64) -> Option<f64> {

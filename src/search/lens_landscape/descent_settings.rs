@@ -14,7 +14,7 @@ const MAX_STEPS: usize = 10_000;
 pub struct DescentSettings {
     /// The optimization method.
     pub method: DescentMethod,
-    /// The maximum number of steps of a local move; damped least squares takes fewer if it
+    /// The maximum number of steps of a local move; all methods but Adam take fewer if the move
     /// converges.
     pub steps: usize,
     /// The initial learning rate of Adam, in units in which a step of 1 changes the residuals by as
@@ -36,7 +36,7 @@ pub struct DescentSettings {
 impl Default for DescentSettings {
     fn default() -> Self {
         Self {
-            method: DescentMethod::DampedLeastSquares,
+            method: DescentMethod::TrustRegion,
             steps: 20,
             rate: 0.015,
             tolerance: 1e-2,

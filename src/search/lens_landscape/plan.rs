@@ -1,11 +1,13 @@
 //! A search of a lens, described by one value and run by one call.
 
 use super::{DescentSettings, LandscapeError, LensLandscape};
+use crate::files::CheckpointError;
 use crate::lens::Lens;
 use crate::merit::{DerivativeLevel, Goal};
+use crate::optimize::DescentMethod;
 use crate::search::{
-    MutationKind, SearchError, SearchEvent, SearchRules, SearchRun, SearchRunOn, SearchSettings,
-    Temperature,
+    MutationKind, SEARCH_CHECKPOINT, SearchError, SearchEvent, SearchRules, SearchRun, SearchRunOn,
+    SearchSettings, Temperature,
 };
 use serde::{Deserialize, Serialize};
 use std::ops::ControlFlow;
@@ -96,6 +98,15 @@ impl SearchPlan {
         Ok((landscape, run))
     }
 
+    /// The method of the local moves of a checkpoint.
+    ///
+    /// # Errors
+    /// The file cannot be read, or is no checkpoint of a search over lenses.
+    pub fn stored_method(path: &Path) -> Result<DescentMethod, CheckpointError> {
+        let stored: StoredSearch = SEARCH_CHECKPOINT.read(path)?;
+        Ok(stored.landscape.local.method)
+    }
+
     /// The run of a checkpoint, which keeps its temperature if none is given.
     ///
     /// # Errors
@@ -119,6 +130,17 @@ impl SearchPlan {
         let gamma = if forbidden { 0.0 } else { self.settings.gamma };
         SearchSettings { temperature: Some(temperature), gamma, ..self.settings.clone() }
     }
+}
+
+/// The part of a checkpoint that tells its method.
+#[derive(Deserialize)]
+struct StoredSearch {
+    landscape: StoredLandscape,
+}
+
+#[derive(Deserialize)]
+struct StoredLandscape {
+    local: DescentSettings,
 }
 
 /// Searches from a lens until the run ends or `watch` breaks, which is called after every round.
