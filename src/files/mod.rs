@@ -163,7 +163,7 @@ fn parse_archive(bytes: &[u8], name: &str) -> Result<OpenedLens, FileError> {
     for (i, member) in members.iter().enumerate() {
         if i != lens {
             let note = if member.has_extension("agf") {
-                format!("a glass catalogue; `aplanat glass --add {name}` makes its glasses known")
+                format!("a glass catalogue, not known until `aplanat glass --add \"{name}\"`")
             } else {
                 "a file of the archive, not read".to_owned()
             };

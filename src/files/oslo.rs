@@ -6,14 +6,15 @@
 
 use super::error::{FileError, ParseError};
 use super::report::{ConversionOutcome, ConversionReport, ConversionRow};
-use super::zemax::named_medium;
+use super::zemax::{apply_focus_solve, named_medium};
+use crate::lens::glass::{self, line};
 use crate::lens::{
     ASPHERE_TERMS, Aperture, FieldKind, FieldPoint, Fields, Lens, Medium, Object, Parameter,
     Pickup, Quantity, Row, SurfaceNumber, Wavelength,
 };
 
-/// Object distances from this on are infinite; OSLO writes 1e20.
-const INFINITE_DISTANCE: f64 = 1e10;
+/// Object distances from this on, in the unit of the file, are infinite (OSLO Optics Reference, page 151).
+const INFINITE_DISTANCE: f64 = 1e8;
 /// The largest accepted number.
 const MAX_NUMBER: f64 = 1e100;
 /// The largest accepted number of surfaces.
@@ -52,6 +53,7 @@ pub(super) fn read(text: &str, file: &str) -> Result<(Lens, ConversionReport), F
     let mut lens = model.lens(&mut report).map_err(|wrong| wrong.in_file(file))?;
     super::set_origin(&mut lens, file);
     lens.check().map_err(|source| FileError::Lens { file: file.to_owned(), source })?;
+    apply_focus_solve(&mut lens);
     Ok((lens, report))
 }
 
@@ -66,7 +68,12 @@ struct OsloCommand<'a> {
 impl<'a> OsloCommand<'a> {
     /// The command of a line; `None` for a comment or a blank one.
     fn new(line: usize, text: &'a str) -> Option<Self> {
-        let text = text.split("//").next().unwrap_or_default().trim();
+        let mut quoted = false;
+        let comment = text.char_indices().find(|(i, letter)| {
+            quoted ^= *letter == '"';
+            !quoted && text[*i..].starts_with("//")
+        });
+        let text = text[..comment.map_or(text.len(), |(i, _)| i)].trim();
         let mut words = text.split_whitespace();
         let name = words.next()?.to_ascii_uppercase();
         Some(Self { line, name, words: words.collect(), text })
@@ -79,11 +86,8 @@ impl<'a> OsloCommand<'a> {
 
     /// The text in quotes, or else all words.
     fn quoted(&self) -> String {
-        let inside = self.text.split_once('"').map(|(_, rest)| rest.trim_end_matches('"'));
-        inside.map_or_else(
-            || self.words.join(" "),
-            |text| text.split('"').next().unwrap_or(text).to_owned(),
-        )
+        let inside = self.text.split('"').nth(1);
+        inside.map_or_else(|| self.words.join(" "), str::to_owned)
     }
 
     /// The number of a word.
@@ -91,6 +95,28 @@ impl<'a> OsloCommand<'a> {
         let word = self.words.get(i).copied().unwrap_or_default();
         let value = word.parse().ok().filter(|value: &f64| value.abs() <= MAX_NUMBER);
         value.ok_or_else(|| self.wrong(&format!("`{word}`"), "a number"))
+    }
+
+    /// The glass of the words: a name, indices at these wavelengths in µm, or a model.
+    fn glass(&self, um: &[f64]) -> Result<OsloGlass, ParseError> {
+        let wrong = || self.wrong(&format!("`{}`", self.words.join(" ")), "a glass or indices");
+        let is_model = self.words.first().is_some_and(|word| word.eq_ignore_ascii_case("MOD"));
+        let words = &self.words[usize::from(is_model)..];
+        let is_name = |word: &&str| word.parse::<f64>().is_err();
+        let named = usize::from(words.first().is_some_and(is_name));
+        let index = |word: &&str| word.parse().ok().filter(|n: &f64| *n > 0.0 && *n < MAX_NUMBER);
+        let n: Option<Vec<f64>> = words[named..].iter().map(index).collect();
+        match (n, is_model) {
+            (Some(n), false) if n.is_empty() && named == 1 => {
+                Ok(OsloGlass::Named(words[0].to_owned()))
+            }
+            (Some(n), _) if n.is_empty() => Err(wrong()),
+            (Some(n), true) if n.len() == 2 => Ok(OsloGlass::Model { nd: n[0], vd: n[1] }),
+            (Some(n), _) => Ok(OsloGlass::Indices { um: um.to_vec(), n }),
+            // A name of several words.
+            (None, false) if named == 1 => Ok(OsloGlass::Named(words.join(" "))),
+            (None, _) => Err(wrong()),
+        }
     }
 
     fn numbers(&self) -> Result<Vec<f64>, ParseError> {
@@ -119,7 +145,7 @@ struct OsloSurface {
     thickness: f64,
     conic: f64,
     asphere: [f64; ASPHERE_TERMS],
-    glass: Option<String>,
+    glass: Option<OsloGlass>,
     mirror: bool,
     semi_diameter: Option<f64>,
     stop: bool,
@@ -128,7 +154,24 @@ struct OsloSurface {
     pickups: Vec<OsloPickup>,
 }
 
-/// A number that follows that of another surface.
+/// A glass behind a surface.
+#[derive(Debug, Clone, PartialEq)]
+enum OsloGlass {
+    Named(String),
+    /// Indices at wavelengths in µm.
+    Indices {
+        um: Vec<f64>,
+        n: Vec<f64>,
+    },
+    /// The index and the Abbe number at the d line.
+    Model {
+        nd: f64,
+        vd: f64,
+    },
+}
+
+/// A number that follows that of another surface: with its sign or the other one, and a constant in the
+/// unit of the file.
 #[derive(Debug, Clone)]
 struct OsloPickup {
     is_curvature: bool,
@@ -200,28 +243,37 @@ impl OsloModel {
     }
 
     fn take_of_surface(&mut self, command: &OsloCommand<'_>) -> Taken {
+        let um = self.wavelengths_um().to_vec();
         let Some(surface) = self.surfaces.last_mut() else { return Ok(dropped("no surface")) };
         match command.name.as_str() {
             "RD" => {
                 let radius = command.number(0)?;
-                surface.curvature = if radius == 0.0 { 0.0 } else { 1.0 / radius };
+                surface.set_curvature(if radius == 0.0 { 0.0 } else { 1.0 / radius });
             }
-            "CV" => surface.curvature = command.number(0)?,
-            "TH" => surface.thickness = command.number(0)?,
+            "CV" => surface.set_curvature(command.number(0)?),
+            "TH" => {
+                surface.thickness = command.number(0)?;
+                surface.focus = false;
+                surface.pickups.retain(|pickup| pickup.is_curvature);
+            }
             "CC" => surface.conic = command.number(0)?,
             "AD" | "AE" | "AF" | "AG" | "AH" | "AI" | "AJ" => {
                 let term = command.name.as_bytes()[1] - b'D';
                 surface.asphere[usize::from(term)] = command.number(0)?;
             }
-            "GLA" | "GLASS" => surface.glass = Some(command.words.join(" ")),
-            "AIR" => surface.glass = None,
+            "GLA" | "GLASS" => {
+                surface.glass = Some(command.glass(&um)?);
+                surface.mirror = false;
+            }
+            "AIR" => (surface.glass, surface.mirror) = (None, false),
             "RFL" | "RFH" => surface.mirror = true,
             "AST" => surface.stop = true,
-            "NOT" | "LME" => surface.comment = command.quoted(),
+            "NOT" => surface.comment = command.quoted(),
             "AP" => return surface.take_aperture(command),
             "PK" => return surface.take_pickup(command),
             "PY" if command.number(0)? == 0.0 => surface.focus = true,
-            "CBK" | "DRW" | "CHK" | "DLRS" | "DLFD" | "DLAP" | "DLAS" | "DLNR" | "AMO" => {
+            "GTO" => return Err(command.wrong("a jump to another surface", "surfaces in order")),
+            "CBK" | "DRW" | "CHK" | "LME" | "LMN" | "DLRS" | "DLFD" | "DLAP" | "DLAS" | "DLNR" => {
                 return Ok((ConversionOutcome::Preserved, String::new()));
             }
             _ => return Ok(dropped("this program has no counterpart")),
@@ -243,18 +295,29 @@ impl OsloModel {
             let note = "the image surface is taken as a plane";
             report.add(ConversionOutcome::Approximated, "image", note);
         }
+        if object.mirror {
+            return Err(missing("a mirror as the object", "a surface without a mirror"));
+        }
         let distance = object.thickness * self.unit;
-        let is_far = distance.abs() >= INFINITE_DISTANCE || distance == 0.0;
+        if distance == 0.0 {
+            let note = "the object has no distance: it is taken to be at infinity";
+            report.add(ConversionOutcome::Approximated, "TH of the object", note);
+        }
+        let is_far = object.thickness.abs() >= INFINITE_DISTANCE || distance == 0.0;
+        // The thickness of the image is the distance from the solved focus to the image surface.
+        let shift = image.thickness * self.unit;
+        let is_solved = rows.last().is_some_and(|last| last.focus);
+        let object_medium = medium(object, "the object", report);
         let mut lens = Lens {
             name: self.name.clone(),
             source: self.source.clone(),
             notes: self.notes.join("\n"),
             object: if is_far { Object::Infinity } else { Object::Finite(distance) },
-            object_medium: medium(object, "the object", report),
-            aperture: self.aperture((!is_far).then_some(distance))?,
+            aperture: self.aperture((!is_far).then_some(distance), &object_medium)?,
+            object_medium,
             fields: self.fields(is_far, report),
             wavelengths: self.wavelengths(),
-            image_solve: rows.last().is_some_and(|last| last.focus).then_some(0.0),
+            image_solve: is_solved.then_some(shift),
             surfaces: Vec::with_capacity(rows.len()),
             ..crate::lens::blank()
         };
@@ -267,29 +330,52 @@ impl OsloModel {
             let place = format!("surface {}", SurfaceNumber::new(i));
             let medium = medium(surface, &place, report);
             lens.surfaces.push(Row { stop: i == stop, medium, ..surface.row(self.unit) });
-            for pickup in &surface.pickups {
-                match pickup.resolve(i, rows.len(), self.unit) {
-                    Some(pickup) => lens.pickups.push(pickup),
-                    None => report.add(
-                        ConversionOutcome::Dropped,
-                        &format!("PK of {place}"),
-                        "it follows a surface that is none of this lens",
-                    ),
-                }
+            if surface.focus && i + 1 < rows.len() {
+                let note = "only the last thickness is solved; the written one is kept";
+                report.add(ConversionOutcome::Dropped, &format!("PY of {place}"), note);
             }
         }
+        if !is_solved && let Some(last) = lens.surfaces.last_mut() {
+            last.thickness += shift;
+        }
+        self.add_pickups(rows, &mut lens, report);
         Ok(lens)
     }
 
+    /// Adds the pickups. That of a curvature takes the shape along: conic constant and asphere.
+    fn add_pickups(&self, rows: &[OsloSurface], lens: &mut Lens, report: &mut ConversionReport) {
+        for (i, surface) in rows.iter().enumerate() {
+            for pickup in &surface.pickups {
+                let Some(found) = pickup.resolve(i, rows.len(), self.unit) else {
+                    let place = format!("PK of surface {}", SurfaceNumber::new(i));
+                    let note = "it follows a surface that is none of this lens";
+                    report.add(ConversionOutcome::Dropped, &place, note);
+                    continue;
+                };
+                if pickup.is_curvature {
+                    let source = lens.surfaces[found.source.surface].clone();
+                    lens.surfaces[i].conic = source.conic;
+                    lens.surfaces[i].asphere =
+                        source.asphere.iter().map(|term| found.scale * term).collect();
+                }
+                lens.pickups.push(found);
+            }
+        }
+    }
+
     /// The beam; an object nearby has the numerical aperture of the beam on the first surface.
-    fn aperture(&self, distance: Option<f64>) -> Result<Aperture, ParseError> {
+    fn aperture(&self, distance: Option<f64>, object: &Medium) -> Result<Aperture, ParseError> {
         let aperture = match (self.beam_radius, self.object_na, distance) {
             (_, Some(na), Some(_)) => Aperture::ObjectNa(na),
             (Some(radius), _, Some(distance)) => {
+                let index = index_of(object);
                 let radius = radius * self.unit;
-                Aperture::ObjectNa(radius / radius.hypot(distance))
+                Aperture::ObjectNa(index * radius / radius.hypot(distance))
             }
             (Some(radius), _, None) => Aperture::EntrancePupilDiameter(2.0 * radius * self.unit),
+            (None, Some(_), None) => {
+                return Err(missing("NAO and an object at infinity", "EBR"));
+            }
             _ => return Err(missing("no aperture", "EBR or NAO")),
         };
         let (Aperture::ObjectNa(value) | Aperture::EntrancePupilDiameter(value)) = aperture else {
@@ -314,21 +400,33 @@ impl OsloModel {
         Fields { kind, values: shares.iter().map(point).collect() }
     }
 
+    /// The wavelengths in µm that were set last; never empty.
+    fn wavelengths_um(&self) -> &[f64] {
+        if self.wavelengths.is_empty() { &USUAL_WAVELENGTHS } else { &self.wavelengths }
+    }
+
     fn wavelengths(&self) -> Vec<Wavelength> {
-        let written = Some(&self.wavelengths[..]).filter(|written| !written.is_empty());
-        let all = written.unwrap_or(&USUAL_WAVELENGTHS).iter().enumerate();
+        let all = self.wavelengths_um().iter().enumerate();
         let weight = |i: usize| self.weights.get(i).copied().unwrap_or(1.0);
         all.map(|(i, um)| Wavelength { um: *um, weight: weight(i), primary: i == 0 }).collect()
     }
 }
 
 impl OsloSurface {
+    /// Sets the curvature, which then follows no other.
+    fn set_curvature(&mut self, curvature: f64) {
+        self.curvature = curvature;
+        self.pickups.retain(|pickup| !pickup.is_curvature);
+    }
+
     /// The aperture of a surface, which clips rays only if it is checked.
     fn take_aperture(&mut self, command: &OsloCommand<'_>) -> Taken {
         let is_checked = |word: &&str| word.eq_ignore_ascii_case("CHK");
-        let place = usize::from(command.words.first().is_some_and(is_checked));
+        let first = command.words.first();
+        let is_unchecked = |word: &&str| word.eq_ignore_ascii_case("UNC");
+        let place = usize::from(first.is_some_and(|word| is_checked(word) || is_unchecked(word)));
         let radius = command.number(place)?;
-        if command.words.iter().any(is_checked) {
+        if first.is_some_and(is_checked) {
             self.semi_diameter = Some(radius).filter(|radius| *radius > 0.0);
             return Ok(USED);
         }
@@ -339,19 +437,19 @@ impl OsloSurface {
 
     fn take_pickup(&mut self, command: &OsloCommand<'_>) -> Taken {
         let kind = command.words.first().map(|word| word.to_ascii_uppercase());
-        let is_curvature = match kind.as_deref() {
-            Some("CV") => true,
-            Some("TH") => false,
+        let (is_curvature, scale) = match kind.as_deref() {
+            Some("CV") => (true, 1.0),
+            Some("CVM") => (true, -1.0),
+            Some("TH") => (false, 1.0),
+            Some("THM") => (false, -1.0),
             _ => return Ok(dropped("only curvatures and thicknesses follow others here")),
         };
         let source = command.number(1)?;
         if source.fract() != 0.0 || source.abs() > MAX_SURFACES as f64 {
             return Err(command.wrong(&source.to_string(), "the number of a surface"));
         }
-        let optional = |i: usize, usual: f64| {
-            if command.words.len() > i { command.number(i) } else { Ok(usual) }
-        };
-        let (scale, offset) = (optional(2, 1.0)?, optional(3, 0.0)?);
+        let offset = if command.words.len() > 2 { command.number(2)? } else { 0.0 };
+        self.pickups.retain(|pickup| pickup.is_curvature != is_curvature);
         self.pickups.push(OsloPickup { is_curvature, source: source as i64, scale, offset });
         Ok(USED)
     }
@@ -397,15 +495,51 @@ fn medium(surface: &OsloSurface, place: &str, report: &mut ConversionReport) -> 
     if surface.mirror {
         return Medium::Mirror;
     }
-    let Some(name) = surface.glass.as_deref().filter(|name| !name.eq_ignore_ascii_case("AIR"))
-    else {
-        return Medium::Air;
+    let name = match &surface.glass {
+        None => return Medium::Air,
+        Some(OsloGlass::Named(name)) if name.eq_ignore_ascii_case("AIR") => return Medium::Air,
+        Some(OsloGlass::Named(name)) => name,
+        Some(OsloGlass::Model { nd, vd }) => return Medium::Model { nd: *nd, vd: *vd },
+        Some(OsloGlass::Indices { um, n }) => {
+            let (medium, note) = medium_of_indices(um, n);
+            if !note.is_empty() {
+                report.add(ConversionOutcome::Approximated, &format!("GLA of {place}"), note);
+            }
+            return medium;
+        }
     };
     let imported = named_medium(name, &[]);
     if imported.outcome != ConversionOutcome::Used {
         report.add(imported.outcome, &format!("glass {name} of {place}"), imported.note);
     }
     imported.medium
+}
+
+/// The index of the object medium at the d line.
+fn index_of(medium: &Medium) -> f64 {
+    match medium {
+        Medium::Index(n) | Medium::Model { nd: n, .. } => *n,
+        Medium::Glass(name) => glass::find(name).map_or(1.0, |glass| glass.nd),
+        Medium::Air | Medium::Mirror | Medium::Grin(_) => 1.0,
+    }
+}
+
+/// The medium with given indices, and what is approximated: a model glass if the d, F and C lines are
+/// among the wavelengths.
+fn medium_of_indices(um: &[f64], n: &[f64]) -> (Medium, &'static str) {
+    if n.iter().all(|other| *other == n[0]) {
+        return (Medium::Index(n[0]), "");
+    }
+    let at = |line: f64| {
+        um.iter().zip(n).find(|(um, _)| (**um - line).abs() < 1e-4).map(|(_, index)| *index)
+    };
+    match (at(line::D), at(line::F), at(line::C)) {
+        (Some(nd), Some(f), Some(c)) if f > c => {
+            let vd = (nd - 1.0) / (f - c);
+            (Medium::Model { nd, vd }, "a model glass with these indices at d, F and C")
+        }
+        _ => (Medium::Index(n[0]), "the index at the first wavelength, without dispersion"),
+    }
 }
 
 fn missing(found: &str, expected: &str) -> ParseError {

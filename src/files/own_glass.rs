@@ -5,7 +5,9 @@ use super::agf::{AgfCatalogue, parse_agf, read_agf};
 use super::atomic::write_atomic;
 use super::bounded::{MAX_LENS_BYTES, read_file};
 use super::error::FileError;
-use super::yaml_glass::{is_material, material_files, parse_material, read_materials};
+use super::yaml_glass::{
+    is_material, maker_of_folder, material_files, parse_material, read_materials,
+};
 use super::zar;
 use crate::lens::glass;
 use std::env;
@@ -55,7 +57,7 @@ pub fn load_own_glasses() -> Vec<FileError> {
 }
 
 fn read_own(path: &Path) -> Result<AgfCatalogue, FileError> {
-    if path.is_dir() { read_materials(path) } else { read_agf(path) }
+    if path.is_dir() { Ok(read_materials(path)) } else { read_agf(path) }
 }
 
 /// Adds a material for good, beside those of the same maker.
@@ -66,14 +68,22 @@ fn add_material(path: &Path, file: &str) -> Result<(AgfCatalogue, Vec<PathBuf>),
     };
     let bytes = read_file(path, MAX_LENS_BYTES)?;
     let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-    let absolute = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
-    let maker = absolute.parent().map(maker).unwrap_or_default();
+    let parent = path.parent().filter(|parent| !parent.as_os_str().is_empty());
+    let parent = fs::canonicalize(parent.unwrap_or(Path::new(".")));
+    let maker = maker_of_folder(&parent.map_err(|source| {
+        let file = file.to_owned();
+        FileError::Unreadable { file, source }
+    })?);
+    if maker.is_empty() {
+        let found = "a material in the root folder".to_owned();
+        return refuse(found, "one in a folder with the name of its maker");
+    }
     let added = match parse_material(&bytes, &maker, &name) {
         Ok(glass) => glass,
         Err(found) => return refuse(found, "a material with a formula"),
     };
     let settings = folder_for_writing(file)?;
-    if settings.join(format!("{maker}.agf")).exists() {
+    if own_catalogues().iter().any(|known| is_agf(known) && maker_of(known) == maker) {
         let found = format!("a material of {maker}, of which a catalogue .agf was added");
         return refuse(found, "a maker without a catalogue; `aplanat glass --remove` removes one");
     }
@@ -82,7 +92,7 @@ fn add_material(path: &Path, file: &str) -> Result<(AgfCatalogue, Vec<PathBuf>),
     fs::create_dir_all(&folder).map_err(unwritable)?;
     let target = folder.join(format!("{name}.yml"));
     write_atomic(&target, &bytes)?;
-    add_glasses(&read_materials(&folder)?);
+    add_glasses(&read_materials(&folder));
     Ok((AgfCatalogue { glasses: vec![added], ..AgfCatalogue::default() }, vec![target]))
 }
 
@@ -98,17 +108,38 @@ pub fn add_catalogue(path: &Path) -> Result<(AgfCatalogue, Vec<PathBuf>), FileEr
         return add_material(path, &file);
     }
     let bytes = read_file(path, MAX_CATALOGUE_BYTES)?;
+    let folder = folder_for_writing(&file)?;
+    let catalogues = catalogues_in(bytes, path, &file)?;
+    let parse = |(name, bytes): (String, Vec<u8>)| {
+        check_maker(&name, &folder, &file)?;
+        Ok((parse_agf(&bytes, &name, &file)?, folder.join(format!("{name}.agf")), bytes))
+    };
+    // Nothing is written unless all of it can be used.
+    let parsed: Vec<_> = catalogues.into_iter().map(parse).collect::<Result<_, FileError>>()?;
     let mut found = AgfCatalogue::default();
     let mut saved = Vec::new();
-    for (name, bytes) in catalogues_in(bytes, path, &file)? {
-        let catalogue = parse_agf(&bytes, &name, &file)?;
-        let target = folder_for_writing(&file)?.join(format!("{name}.agf"));
+    for (catalogue, target, bytes) in parsed {
         write_atomic(&target, &bytes)?;
         add_glasses(&catalogue);
         found.append(catalogue);
         saved.push(target);
     }
     Ok((found, saved))
+}
+
+/// Refuses a catalogue whose name is no name of a file, or that of materials that were added.
+fn check_maker(name: &str, folder: &Path, file: &str) -> Result<(), FileError> {
+    let is_wrong = |letter: char| letter.is_control() || matches!(letter, ':' | '/' | '\\');
+    let (found, expected) = if name.is_empty() || name.contains(is_wrong) {
+        (format!("a catalogue named `{}`", name.escape_debug()), "the name of a maker")
+    } else if folder.join(name).is_dir() {
+        let found = format!("a catalogue of {name}, of which materials .yml were added");
+        (found, "a maker without materials; `aplanat glass --remove` removes them")
+    } else {
+        return Ok(());
+    };
+    let (file, expected) = (file.to_owned(), expected.to_owned());
+    Err(FileError::Unsuitable { file, found, expected })
 }
 
 /// The makers and the bytes of the catalogues of a file: itself, or those of an archive.
@@ -118,13 +149,22 @@ fn catalogues_in(
     file: &str,
 ) -> Result<Vec<(String, Vec<u8>)>, FileError> {
     if !zar::is_archive(&bytes) {
-        return Ok(vec![(maker(path), bytes)]);
+        return Ok(vec![(maker_of(path), bytes)]);
     }
     let members = zar::members(&bytes, file)?;
-    let catalogues = members.iter().filter(|member| member.has_extension("agf"));
-    let read =
-        |member: &zar::Member<'_>| Ok((maker(Path::new(&member.name())), member.contents(file)?));
-    let found: Vec<_> = catalogues.map(read).collect::<Result<_, FileError>>()?;
+    let mut found: Vec<(String, Vec<u8>)> = Vec::new();
+    let mut total = 0;
+    for member in members.iter().filter(|member| member.has_extension("agf")) {
+        let bytes = member.contents(file)?;
+        total += bytes.len() as u64;
+        let name = maker_of(Path::new(&member.name()));
+        if total > MAX_CATALOGUE_BYTES || found.iter().any(|(other, _)| *other == name) {
+            let found = format!("too long a catalogue or a second one: {name}");
+            let (file, expected) = (file.to_owned(), "each maker once, 256 MB in all".to_owned());
+            return Err(FileError::Unsuitable { file, found, expected });
+        }
+        found.push((name, bytes));
+    }
     if found.is_empty() {
         let (found, expected) = ("an archive without catalogues", "one with a catalogue .agf");
         let (file, found, expected) = (file.to_owned(), found.to_owned(), expected.to_owned());
@@ -139,9 +179,9 @@ fn catalogues_in(
 /// There is none of this name, or it cannot be removed.
 pub fn remove_catalogue(name: &str) -> Result<PathBuf, FileError> {
     let known = own_catalogues();
-    let found = known.iter().find(|path| maker(path) == name.to_uppercase());
+    let found = known.iter().find(|path| maker_of(path) == name.to_uppercase());
     let Some(path) = found else {
-        let names: Vec<String> = known.iter().map(|path| maker(path)).collect();
+        let names: Vec<String> = known.iter().map(|path| maker_of(path)).collect();
         let expected = if names.is_empty() {
             "one that was added; there is none".to_owned()
         } else {
@@ -151,15 +191,24 @@ pub fn remove_catalogue(name: &str) -> Result<PathBuf, FileError> {
         return Err(FileError::Unsuitable { file, found, expected });
     };
     let refuse = |source| FileError::Unwritable { file: path.display().to_string(), source };
-    if path.is_dir() {
+    if path.is_dir() && !path.is_symlink() {
         for material in material_files(path) {
             fs::remove_file(material).map_err(refuse)?;
         }
-        fs::remove_dir(path).map_err(refuse)?;
+        match fs::remove_dir(path) {
+            // Files that this program did not put there stay.
+            Err(why) if why.kind() == io::ErrorKind::DirectoryNotEmpty => {}
+            removed => removed.map_err(refuse)?,
+        }
     } else {
         fs::remove_file(path).map_err(refuse)?;
     }
     Ok(path.clone())
+}
+
+/// The maker of the glasses of a catalogue or of a folder of materials.
+fn maker_of(path: &Path) -> String {
+    if path.is_dir() { maker_of_folder(path) } else { maker(path) }
 }
 
 /// The maker of the glasses of a catalogue: the name of its file in capitals.

@@ -1,13 +1,12 @@
 //! Materials of refractiveindex.info, `.yml`: one file for each.
 //!
-//! The name of the file is that of the material, and the folder that holds it stands for the maker. The
+//! The name of the file is that of the material, and the folder that holds it stands for the maker; folders
+//! that name a kind of file (`optical`, `nk`) are passed over. Indices are taken as relative to air. The
 //! formulas are those of the database's document *Dispersion formulas*, numbers 1 to 9; tables of indices are
 //! refused by name, since between their rows every index would be a guess.
 
 use super::agf::{AgfCatalogue, AgfGlass, check_index};
 use super::bounded::{MAX_LENS_BYTES, read_file};
-use super::error::FileError;
-use super::own_glass::maker;
 use super::text;
 use crate::lens::glass::{DispersionFormula, Glass};
 use serde::Deserialize;
@@ -25,6 +24,8 @@ struct MaterialFile {
     /// Properties in those before.
     #[serde(rename = "SPECS", default)]
     specs: BTreeMap<String, serde_json::Value>,
+    #[serde(rename = "CONDITIONS", default)]
+    conditions: BTreeMap<String, serde_json::Value>,
 }
 
 #[derive(Deserialize)]
@@ -36,6 +37,17 @@ struct MaterialData {
     wavelength_range: String,
     #[serde(default)]
     coefficients: String,
+}
+
+/// The folders of the database that name a kind of file and no maker.
+const KINDS: [&str; 4] = ["optical", "nk", "infrared", "filter"];
+
+/// The maker that the folder of a material stands for, in capitals; empty for the root folder.
+pub(super) fn maker_of_folder(folder: &Path) -> String {
+    let name = |path: &Path| path.file_name().unwrap_or_default().to_string_lossy().to_uppercase();
+    let is_kind = KINDS.iter().any(|kind| name(folder) == kind.to_uppercase());
+    let named = if is_kind { folder.parent().unwrap_or(folder) } else { folder };
+    name(named)
 }
 
 /// True for a file of a material, by its name.
@@ -53,20 +65,19 @@ pub(super) fn material_files(folder: &Path) -> Vec<PathBuf> {
     paths
 }
 
-/// Reads all materials of a folder, whose name is that of the maker.
-///
-/// # Errors
-/// A file that cannot be read, or is too long.
-pub(super) fn read_materials(folder: &Path) -> Result<AgfCatalogue, FileError> {
+/// Reads all materials of a folder, whose name is that of the maker. Those that cannot be read are refused.
+pub(super) fn read_materials(folder: &Path) -> AgfCatalogue {
     let mut catalogue = AgfCatalogue::default();
     for path in material_files(folder) {
         let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-        match parse_material(&read_file(&path, MAX_LENS_BYTES)?, &maker(folder), &name) {
+        let bytes = read_file(&path, MAX_LENS_BYTES).map_err(|why| why.to_string());
+        let read = bytes.and_then(|b| parse_material(&b, &maker_of_folder(folder), &name));
+        match read {
             Ok(glass) => catalogue.glasses.push(glass),
             Err(why) => catalogue.refused.push((name, why)),
         }
     }
-    Ok(catalogue)
+    catalogue
 }
 
 /// The material of a file.
@@ -79,14 +90,26 @@ pub(super) fn parse_material(bytes: &[u8], maker: &str, name: &str) -> Result<Ag
     }
     let file: MaterialFile = serde_norway::from_str(&text::decode(bytes))
         .map_err(|why| format!("not a material of refractiveindex.info: {}", first_line(&why)))?;
+    let absolute = ["n_is_absolute", "n_absolute"];
+    if absolute.iter().any(|key| file.is_true(key)) {
+        return Err(
+            "its indices are relative to vacuum; expected indices relative to air".to_owned()
+        );
+    }
     let formula = file.data.iter().find_map(|data| Some((data, data.formula()?)));
-    let Some((data, (formula, coefficients))) = formula else {
+    let Some((data, formula)) = formula else {
         let kinds: Vec<&str> = file.data.iter().map(|data| data.kind.as_str()).collect();
         let found = if kinds.is_empty() { "no data".to_owned() } else { kinds.join(", ") };
         return Err(format!("{found}; expected one of the formulas 1 to 9"));
     };
-    let range = numbers(&data.wavelength_range);
+    let range = numbers(&data.wavelength_range).unwrap_or_default();
     let [low, high] = range[..] else { return Err("it has no range of wavelengths".to_owned()) };
+    if !(low > 0.0 && low < high) {
+        return Err(format!("its range of wavelengths is {low} to {high}"));
+    }
+    let coefficients = numbers(&data.coefficients).filter(|c| is_whole(formula, c.len()));
+    let coefficients =
+        coefficients.ok_or_else(|| format!("its coefficients are `{}`", data.coefficients))?;
     let number = |key: &str| file.number(key);
     let mut glass = Glass {
         name: name.to_owned(),
@@ -96,7 +119,7 @@ pub(super) fn parse_material(bytes: &[u8], maker: &str, name: &str) -> Result<Ag
         formula,
         coefficients,
         range_um: [low, high],
-        density: number("density").filter(|density| *density > 0.0),
+        density: file.density(),
     };
     check_index(&mut glass)?;
     Ok(AgfGlass::without_remarks(glass))
@@ -109,14 +132,31 @@ impl MaterialFile {
         let text = || value.as_str()?.split_whitespace().next()?.parse().ok();
         value.as_f64().or_else(text).filter(|value: &f64| value.is_finite())
     }
+
+    /// The density in g/cm³: files have it in this unit, or a list of values in kg/m³.
+    fn density(&self) -> Option<f64> {
+        let value = self.properties.get("density").or_else(|| self.specs.get("density"))?;
+        let in_grams = || {
+            let text = value.as_str().filter(|text| text.contains("g/cm"))?;
+            text.split_whitespace().next()?.parse().ok()
+        };
+        let in_kilograms = || Some(value.as_array()?.first()?.get("value")?.as_f64()? / 1000.0);
+        in_grams().or_else(in_kilograms).filter(|density: &f64| *density > 0.0)
+    }
+
+    fn is_true(&self, key: &str) -> bool {
+        let sections = [&self.properties, &self.specs, &self.conditions];
+        let value = sections.iter().find_map(|section| section.get(key));
+        value.is_some_and(|value| value.as_bool() == Some(true) || value.as_str() == Some("true"))
+    }
 }
 
 impl MaterialData {
-    /// The formula with its coefficients; `None` for a table.
-    fn formula(&self) -> Option<(DispersionFormula, Vec<f64>)> {
+    /// The formula; `None` for a table.
+    fn formula(&self) -> Option<DispersionFormula> {
         use DispersionFormula as F;
         let number: u8 = self.kind.strip_prefix("formula")?.trim().parse().ok()?;
-        let formula = match number {
+        Some(match number {
             1 => F::SellmeierLin,
             2 => F::SellmeierSq,
             3 => F::Poly,
@@ -127,14 +167,21 @@ impl MaterialData {
             8 => F::LorentzLorenz,
             9 => F::Resonance,
             _ => return None,
-        };
-        Some((formula, numbers(&self.coefficients)))
+        })
     }
 }
 
-/// The numbers of a text, up to the first word that is none.
-fn numbers(text: &str) -> Vec<f64> {
-    text.split_whitespace().map_while(|word| word.parse().ok()).collect()
+/// True for a number of coefficients without half a term at the end.
+fn is_whole(formula: DispersionFormula, count: usize) -> bool {
+    use DispersionFormula as F;
+    let pairs = [F::SellmeierLin, F::SellmeierSq, F::Poly, F::Cauchy, F::Gas];
+    count > 0 && (count % 2 == 1 || !pairs.contains(&formula))
+}
+
+/// The numbers of a text; `None` if a word is none.
+fn numbers(text: &str) -> Option<Vec<f64>> {
+    let number = |word: &str| word.parse().ok().filter(|number: &f64| number.is_finite());
+    text.split_whitespace().map(number).collect()
 }
 
 fn first_line(why: &serde_norway::Error) -> String {
@@ -215,8 +262,34 @@ mod tests {
         assert!(refusal("").contains("an empty file"));
         assert!(refusal(&material("formula 12", "1 2 3")).contains("formula 12, tabulated k"));
         assert!(refusal(&material("formula 2", "-3")).contains("no index in its range"));
+        assert!(
+            refusal(&material("formula 2", "0 1.1 0,01")).contains("coefficients are `0 1.1 0,01`")
+        );
+        assert!(refusal(&material("formula 2", "0 1.1")).contains("coefficients are `0 1.1`"));
+        let backwards = material("formula 2", "0 1.1 0.01").replace("0.3 2.5", "2.5 0.3");
+        assert!(refusal(&backwards).contains("range of wavelengths is 2.5 to 0.3"));
+        let vacuum = material("formula 2", "0 1.1 0.01") + "SPECS:\n    n_is_absolute: true\n";
+        assert!(refusal(&vacuum).contains("relative to vacuum"));
         let no_range = material("formula 2", "0 1.1 0.01").replace("0.3 2.5", "often");
         assert!(refusal(&no_range).contains("no range of wavelengths"));
+    }
+
+    #[test]
+    fn densities_of_both_ages_of_the_database_are_in_grams() {
+        let list = material("formula 2", "0 1.1 0.01")
+            .replace("density: 2.51 g/cm<sup>3</sup>", "density:\n      - value: 2510");
+        let glass = parse_material(list.as_bytes(), "M", "G").unwrap().glass;
+        assert!((glass.density.unwrap() - 2.51).abs() < 1e-12);
+        let bare = material("formula 2", "0 1.1 0.01").replace("2.51 g/cm<sup>3</sup>", "2510");
+        assert_eq!(parse_material(bare.as_bytes(), "M", "G").unwrap().glass.density, None);
+    }
+
+    #[test]
+    fn the_folder_of_a_material_stands_for_its_maker() {
+        let maker = |path: &str| maker_of_folder(Path::new(path));
+        assert_eq!(maker("data/specs/schott/optical"), "SCHOTT");
+        assert_eq!(maker("data/main/SiO2/nk"), "SIO2");
+        assert_eq!((maker("lib.v1.2"), maker("/")), ("LIB.V1.2".to_owned(), String::new()));
     }
 
     #[test]

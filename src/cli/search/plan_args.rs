@@ -98,7 +98,7 @@ pub(in crate::cli) struct SearchPlanArgs {
     #[arg(long, value_name = "SHARE", allow_negative_numbers = true)]
     gamma: Option<f64>,
 
-    /// The method of the local steps; absent: that of the checkpoint, or else trust-region
+    /// The method of the local steps; absent: trust-region, or that of the checkpoint if there is one
     #[arg(long, value_enum)]
     pub(in crate::cli) descent: Option<DescentMethod>,
 

@@ -56,7 +56,7 @@ fn parse_lens(text: &str) -> Result<(Lens, ConversionReport), ParseError> {
 }
 
 /// Writes the solved gap into the lens, so that its prescription shows the position of the focus.
-fn apply_focus_solve(lens: &mut Lens) {
+pub(super) fn apply_focus_solve(lens: &mut Lens) {
     if lens.image_solve.is_none() {
         return;
     }

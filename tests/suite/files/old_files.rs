@@ -1,6 +1,6 @@
 //! Files written by the first version of the program open, and are written back with the same keys.
 
-use crate::cli::{Scratch, done_json};
+use crate::cli::{Scratch, aplanat, done_json};
 use aplanat::files::{json, read_volume};
 use aplanat::lens::{Lens, Medium, Quantity};
 use aplanat::merit::Goal;
@@ -77,6 +77,14 @@ fn an_old_checkpoint_is_resumed() {
     };
     // Earlier versions recorded the reasons as text: the count remains, under its own name.
     assert_eq!(refused(&idle, "split"), json!({"other": 1}));
+    // It goes on by the method of its time, which was damped least squares.
+    let other = [&base[..], &["--iterations", "40", "--descent", "trust-region"]].concat();
+    let output = aplanat(&other, "");
+    let errors = String::from_utf8_lossy(&output.stderr).into_owned();
+    assert!(
+        output.status.code() == Some(2) && errors.contains("landscape.local.method"),
+        "{errors}"
+    );
     let more = done_json(&[&base[..], &["--iterations", "40"]].concat(), "");
     assert_eq!((&more["resumed"], &more["gradients"]), (&true.into(), &28.into()));
 }

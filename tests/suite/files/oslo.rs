@@ -44,13 +44,16 @@ fn units_shapes_and_what_follows_are_read() {
     assert!((efl(&inches) / efl(&read(&text())) - 25.4).abs() < 1e-9);
     let odd = text()
         .replace("RD 22.01359", "CV 0.0454\nCC -0.5\nAD 1e-6\nAF -2e-9")
-        .replace("RD -18.39533", "PK CV 1 -1.0 0.001\nPY 0.0")
+        .replace("RD -18.39533", "PK CVM 1 0.001\nPY 0.0")
         .replace("RD 79.6836\nTH 2.95208", "PK TH -4 2.0");
     let lens = read(&odd).lens;
     let front = &lens.surfaces[0];
     assert_eq!((front.curvature, front.conic), (0.0454, -0.5));
     assert_eq!(front.asphere, [1e-6, 0.0, -2e-9]);
     assert_eq!(lens.image_solve, Some(0.0));
+    // A curvature that follows another takes its shape along.
+    assert_eq!(lens.surfaces[5].conic, -0.5);
+    assert_eq!(lens.surfaces[5].asphere, [-1e-6, 0.0, 2e-9]);
     let pickups: Vec<_> = lens
         .pickups
         .iter()
@@ -58,7 +61,7 @@ fn units_shapes_and_what_follows_are_read() {
         .collect();
     assert_eq!(
         pickups,
-        [(4, 0, Quantity::Thickness, 2.0, 0.0), (5, 0, Quantity::Curvature, -1.0, 0.001)]
+        [(4, 0, Quantity::Thickness, 1.0, 2.0), (5, 0, Quantity::Curvature, -1.0, 0.001)]
     );
     let mirror = read(&text().replace("GLA F2", "RFL").replace("TH 0.99997", "TH -0.99997"));
     assert_eq!(mirror.lens.surfaces[2].medium, Medium::Mirror);
@@ -95,4 +98,34 @@ fn an_object_nearby_has_the_aperture_of_its_beam() {
         (near.lens.fields.kind, near.lens.fields.values[2].y),
         (FieldKind::ObjectHeight, 10.0)
     );
+}
+
+#[test]
+fn a_glass_may_have_indices_instead_of_a_name() {
+    let medium = |glass: &str| {
+        let text =
+            text().replacen("WV 0.55 0.48 0.65\n", "", 1).replacen("WW 1.0 0.5 0.5\n", "", 1);
+        read(&text.replacen("GLA F2", glass, 1)).lens.surfaces[2].medium.clone()
+    };
+    assert_eq!(medium("GLA 1.5168"), Medium::Index(1.5168));
+    assert_eq!(medium("GLA MOD 1.62 36.4"), Medium::Model { nd: 1.62, vd: 36.4 });
+    let Medium::Model { nd, vd, .. } = medium("GLA MOD MINE 1.62 1.63 1.61") else { panic!() };
+    assert!(nd == 1.62 && (vd - 0.62 / 0.02).abs() < 1e-9);
+    let wrong = text().replacen("GLA F2", "GLA MOD", 1);
+    let error = files::parse(wrong.as_bytes(), "a.len").unwrap_err().to_string();
+    assert!(error.contains("expected a glass or indices"), "{error}");
+}
+
+#[test]
+fn the_image_may_stand_beside_the_focus() {
+    let shifted = text().replace("// SRF 7\nAIR", "// SRF 7\nAIR\nTH 0.25");
+    let lens = read(&shifted).lens;
+    assert!((lens.surfaces[5].thickness - (42.20778 + 0.25)).abs() < 1e-12);
+    let solved = read(&shifted.replace("TH 42.20778", "PY 0.0")).lens;
+    assert_eq!(solved.image_solve, Some(0.25));
+    // The row shows where the focus is.
+    let focus = read(&text().replace("TH 42.20778", "PY 0.0")).lens.surfaces[5].thickness;
+    assert!((solved.surfaces[5].thickness - focus - 0.25).abs() < 1e-9 && focus > 40.0);
+    let far = read(&text().replace("TH 1.0e+20", "TH 9.9999999996e+09")).lens;
+    assert_eq!(far.object, Object::Infinity);
 }
