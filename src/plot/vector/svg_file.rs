@@ -120,7 +120,7 @@ mod tests {
     #[test]
     fn lines_and_areas_have_their_points_in_order() {
         let mut drawing = VectorDrawing::new([10.0, 10.0]);
-        drawing.line(&[[1.0, 2.0], [3.5, 4.0], [0.0, 9.25]], crate::plot::Pen::THIN);
+        drawing.line(&[[1.0, 2.0], [3.5, 4.0], [0.0, 9.25]], Pen::THIN);
         drawing.area(&[[5.0, 6.0], [7.0, 6.0], [7.0, 8.0]], [0; 3]);
         let svg = svg_text(&drawing);
         for points in ["\"1,2 3.5,4 0,9.25\"", "\"5,6 7,6 7,8\""] {
