@@ -125,6 +125,10 @@ mod tests {
         for (glasses, added) in cases {
             assert_eq!(added_glass(&lens(&glasses), &own), added, "{glasses:?}");
         }
+        // Of two elements of one glass, the one of the other shape is the added one.
+        let single = lens(&[("A", 0.02)]);
+        assert_eq!(added_glass(&lens(&[("A", 0.02), ("A", 0.3)]), &single), [2]);
+        assert_eq!(added_glass(&lens(&[("A", 0.3), ("A", 0.02)]), &single), [0]);
         assert_eq!(added_glass(&lens(&[]), &own), [0; 0]);
         assert_eq!(added_glass(&own, &lens(&[])), [0, 2, 4]);
     }

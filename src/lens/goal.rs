@@ -208,6 +208,17 @@ impl Term {
         }
     }
 
+    /// The least and the largest value of a term that bounds a quantity on both sides.
+    const fn range(self) -> Option<[f64; 2]> {
+        match self {
+            Self::GlassCenter { min, max }
+            | Self::AirCenter { min, max }
+            | Self::SemiDiameter { min, max }
+            | Self::Operand { min: Some(min), max: Some(max), .. } => Some([min, max]),
+            _ => None,
+        }
+    }
+
     /// The targets and limits of the term.
     pub(crate) fn numbers(self) -> Vec<f64> {
         match self {
@@ -385,7 +396,7 @@ impl Goal {
                 check_number(what, target, true, "a finite number")?;
             }
             check_scope(name, *scope)?;
-            if let [min, max] = term.numbers()[..]
+            if let Some([min, max]) = term.range()
                 && min > max
             {
                 let text = format!(

@@ -332,3 +332,23 @@ fn matrix_exponential<R: Real>(m: R, b: R, c: R) -> [[R; 2]; 2] {
 fn matrix_product<R: Real>(a: [[R; 2]; 2], b: [[R; 2]; 2]) -> [[R; 2]; 2] {
     std::array::from_fn(|i| std::array::from_fn(|j| a[i][0] * b[0][j] + a[i][1] * b[1][j]))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The exponentials of a rotation and of a hyperbolic turn, in closed form.
+    #[test]
+    fn the_series_of_a_matrix_is_its_exponential() {
+        let near = |found: [[f64; 2]; 2], exact: [[f64; 2]; 2]| {
+            for (found, exact) in found.iter().flatten().zip(exact.iter().flatten()) {
+                assert!((found - exact).abs() < 1e-13 * (1.0 + exact.abs()), "{found} {exact}");
+            }
+        };
+        for t in [0.1_f64, 1.0, 2.5] {
+            near(matrix_exponential(0.0, t, -t), [[t.cos(), t.sin()], [-t.sin(), t.cos()]]);
+            near(matrix_exponential(0.0, t, t), [[t.cosh(), t.sinh()], [t.sinh(), t.cosh()]]);
+            near(matrix_exponential(t, 0.0, 0.0), [[t.exp(), 0.0], [0.0, (-t).exp()]]);
+        }
+    }
+}

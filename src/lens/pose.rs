@@ -194,4 +194,12 @@ mod tests {
         assert!((center.z - 40.0).abs() < 1e-13 && center.x.hypot(center.y) < 1e-13);
         assert!(pose.shift.y > 0.0 && pose.shift.x < 0.0);
     }
+
+    #[test]
+    fn a_pose_is_finite_if_every_number_is() {
+        assert!(Pose::new([0.3, -0.2], [0.1, 0.2]).is_finite());
+        for (decenter, tilt) in [([f64::INFINITY, 0.0], [0.0; 2]), ([0.0; 2], [0.0, f64::NAN])] {
+            assert!(!Pose::new(decenter, tilt).is_finite(), "{decenter:?} {tilt:?}");
+        }
+    }
 }

@@ -165,4 +165,15 @@ mod tests {
         assert!((y.slope[0].value - 2.5 * 3f64.powf(1.5)).abs() < 1e-13);
         assert!((y.slope[0].slope[0] - 3.75 * 3f64.sqrt()).abs() < 1e-13);
     }
+
+    #[test]
+    fn a_dual_is_finite_if_its_value_and_every_slope_are() {
+        let dual = |value: f64, slope: [f64; 2]| Dual { value, slope };
+        assert!(dual(1.0, [0.0, -2.0]).is_finite());
+        for other in
+            [dual(f64::NAN, [0.0; 2]), dual(1.0, [0.0, f64::INFINITY]), dual(1.0, [f64::NAN, 0.0])]
+        {
+            assert!(!other.is_finite(), "{other:?}");
+        }
+    }
 }

@@ -262,3 +262,22 @@ fn trace_box(
     }
     sideways
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A beamlet at a point of the y axis, turned to another point as far from the axis: what pointed
+    /// away from the axis still does, and lengths and handedness are kept.
+    #[test]
+    fn a_turned_beamlet_points_where_its_image_point_does() {
+        let e = [0.6, -0.8];
+        let beamlet = Beamlet { start: [0.0, 2.0], slope: [0.1, 0.0], ..Beamlet::default() };
+        let turned = beamlet.turned(e);
+        let near = |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).hypot(a[1] - b[1]) < 1e-15;
+        assert!(near(turned.start, [2.0 * e[0], 2.0 * e[1]]), "{:?}", turned.start);
+        // A quarter turn from the y axis to the x axis takes e to this direction.
+        assert!(near(turned.slope, [0.1 * e[1], -0.1 * e[0]]), "{:?}", turned.slope);
+        assert!(near(beamlet.turned([0.0, 1.0]).slope, beamlet.slope));
+    }
+}

@@ -258,4 +258,15 @@ mod tests {
             assert!((level(&raster, corner) - exact).abs() < 1e-7, "{corner:?}");
         }
     }
+
+    /// A row of groups, each smaller by a sixth of an octave, has the three bars of every group.
+    #[test]
+    fn a_row_of_bars_crosses_every_group() {
+        let down = 0.5 * LARGEST_GROUP / 5.0;
+        let row = (0..400_000).map(|i| bars([LEFT - 1e-3 + 1e-5 * f64::from(i), BLOCKS[0] - down]));
+        let levels: Vec<f64> = row.collect();
+        let entered = levels.windows(2).filter(|pair| pair[0] > pair[1]).count();
+        // On the first horizontal bar, then each of three vertical ones.
+        assert_eq!(entered, 4 * GROUPS as usize);
+    }
 }

@@ -276,4 +276,29 @@ mod tests {
         let outside = filled(&Shape::Sphere { curvature: 0.1 }, 10.0, 10.0);
         assert!((outside - PI * 1000.0 / 3.0).abs() < 1e-9, "{outside}");
     }
+
+    /// Two equal spheres that meet: the first place without glass is at most a step beyond the height
+    /// `h` at which twice the sag `c h² / (1 + sqrt(1 − c² h²))` is the thickness.
+    #[test]
+    fn glass_ends_where_two_spheres_meet() {
+        let (c, thickness, rim) = (0.05, 1.0, 12.0);
+        let body = LensBody {
+            number: 1,
+            surfaces: [0, 1],
+            medium: Medium::Index(1.5),
+            shapes: [Shape::Sphere { curvature: c }, Shape::Sphere { curvature: -c }],
+            heights: [rim; 2],
+            thickness,
+            frame: Pose::centred(),
+            fault: None,
+        };
+        let sag: f64 = 0.5 * thickness;
+        let meet = (2.0 * sag / c - sag * sag).sqrt();
+        let Some(BodyError::Thickness { thickness, height, .. }) = body.thin_place() else {
+            panic!("the glass ends at {meet} mm");
+        };
+        let step = rim / f64::from(HEIGHTS);
+        assert!((meet - step..=meet + step).contains(&height), "{height} {meet}");
+        assert!(thickness < THINNEST && thickness > -2.0 * c * rim * step, "{thickness}");
+    }
 }

@@ -121,3 +121,18 @@ fn in_plane(source: &LightSource, back: f64) -> Vec<GrinRay<f64>> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn drawn_rays_are_spread_evenly_from_edge_to_edge() {
+        let rays = in_plane(&LightSource::Fan { height: 2.0, z: -3.0, rays: 5 }, 10.0);
+        let heights: Vec<f64> = rays.iter().map(|ray| ray.x.x).collect();
+        assert_eq!((heights.len(), heights[0], heights[RAYS - 1]), (RAYS, -2.0, 2.0));
+        let step = 4.0 / (RAYS - 1) as f64;
+        assert!(heights.windows(2).all(|pair| (pair[1] - pair[0] - step).abs() < 1e-12));
+        assert!(rays.iter().all(|ray| ray.x.z == -3.0 && ray.v.z == 1.0));
+    }
+}

@@ -111,3 +111,40 @@ pub(super) fn contrast_figure(curves: &[(String, &MtfCurve)]) -> VectorDrawing {
     figure.text([FIGURE - 42.0, y + 4.0], "dashed: sagittal", 2.4, TextAlign::Left);
     figure
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plot::Mark;
+    use crate::trace::Fates;
+
+    /// Points of a spot keep their places about the centroid, at the scale that the figure states.
+    #[test]
+    fn the_points_of_a_spot_are_drawn_in_its_cell_to_scale() {
+        let points = vec![[0.3, 1.05], [0.45, 1.2], [0.3, 1.35], [0.15, 1.2]];
+        let of_color =
+            |points| SpotPoints { field: 0, wavelength: 0, points, fates: Fates::default() };
+        let cell = SpotCell {
+            name: "axis".to_owned(),
+            centroid: Some([0.3, 1.2]),
+            points: vec![of_color(points.clone())],
+        };
+        let (figure, shown) = spot_figure(&[cell], None);
+        let middle_of = |mark: &Mark| match mark {
+            Mark::Area { points, .. } => {
+                let n = points.len() as f64;
+                Some([0, 1].map(|k| points.iter().map(|p| p[k]).sum::<f64>() / n))
+            }
+            _ => None,
+        };
+        let drawn: Vec<[f64; 2]> = figure.marks.iter().filter_map(middle_of).collect();
+        assert_eq!(drawn.len(), points.len());
+        let scale = CELL / shown;
+        let middle = [0.5 * CELL, 4.0 + 0.5 * CELL];
+        for (at, p) in drawn.iter().zip(&points) {
+            let x = middle[0] + scale * (p[0] - 0.3);
+            let y = middle[1] - scale * (p[1] - 1.2);
+            assert!((at[0] - x).hypot(at[1] - y) < 1e-9, "{at:?} for {p:?}");
+        }
+    }
+}

@@ -220,3 +220,48 @@ pub(super) fn draw_curve(sheet: &mut VectorDrawing, points: &[[f64; 2]], pen: Pe
         sheet.line(points, pen);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::files::{bundled_lenses, json};
+    use crate::plot::Mark;
+
+    /// The layout is in the middle of the room that frame and title leave, and no rim is drawn outside
+    /// of what the sheet makes room for.
+    #[test]
+    fn a_layout_lies_in_the_middle_of_its_sheet() {
+        for name in ["double_gauss_rudolph_50", "telescope_rc_f8", "wide_nikkor_28_f35"] {
+            let bundled = bundled_lenses().iter().find(|bundled| bundled.name == name).unwrap();
+            let lens = json::read(bundled.text, name).unwrap();
+            let scene = LayoutScene::new(&lens, 0).unwrap();
+            let (low, high) = scene.bounds();
+            let sheet = scene.sheet();
+            let scale = sheet.scale.unwrap();
+            let [left, bottom] = scale.to_sheet(low);
+            let [right, top] = scale.to_sheet(high);
+            let [width, height] = sheet.size;
+            assert!((left - (width - right)).abs() < 1e-9, "{name}: {left} {right}");
+            // The title is 20 mm high and stands on the frame.
+            assert!((top - (height - 20.0 - bottom)).abs() < 1e-9, "{name}: {top} {bottom}");
+            let inside = |p: &[f64; 2]| {
+                let [z, y] = scale.to_model(*p);
+                (low[0] - 1e-6..=high[0] + 1e-6).contains(&z)
+                    && (low[1] - 1e-6..=high[1] + 1e-6).contains(&y)
+            };
+            let is_rim =
+                |mark: &&Mark| matches!(mark, Mark::Line { pen, .. } if *pen == Pen::OUTLINE);
+            for mark in sheet.marks.iter().filter(is_rim) {
+                let Mark::Line { points, .. } = mark else { continue };
+                assert!(points.iter().all(inside), "{name}: {points:?}");
+                // The cylinder of a lens is as high as the higher one of its two surfaces.
+                let heights: Vec<f64> =
+                    points.iter().map(|p| scale.to_model(*p)[1].abs()).collect();
+                if let [front, start, end, back] = heights[..] {
+                    let highest = front.max(back) - 1e-9;
+                    assert!(start >= highest && end >= highest, "{name}: {heights:?}");
+                }
+            }
+        }
+    }
+}

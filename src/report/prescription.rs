@@ -323,3 +323,44 @@ fn contrast_table(curves: &[(String, MtfCurve)]) -> DocumentTable {
     }
     table
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The curves end where the middle one of the spots has lost most of its contrast, and not far beyond
+    /// what any lens resolves; at a frequency of 1, 2 or 5 with zeros.
+    #[test]
+    fn frequencies_reach_from_zero_to_what_a_lens_resolves() {
+        for name in ["double_gauss_nikkor_s_50", "grin_rod_melles_griot", "singlet_la1131"] {
+            let bundled = crate::files::bundled_lenses().iter().find(|b| b.name == name).unwrap();
+            let lens = crate::files::json::read(bundled.text, name).unwrap();
+            let settings = ReportSettings { tolerance: 0.01 };
+            let position = ReportPosition::new(&lens, 0, settings).unwrap();
+            let found = position.frequencies();
+            let last = found[FREQUENCIES - 1];
+            assert!(found.len() == FREQUENCIES && found[0] == 0.0);
+            let step = last / (FREQUENCIES - 1) as f64;
+            assert!(found.windows(2).all(|pair| (pair[1] - pair[0] - step).abs() < 1e-9 * last));
+            let digits = last / 10f64.powf(last.log10().floor() + 1e-12);
+            assert!([1.0, 2.0, 5.0, 10.0].iter().any(|d| (digits - d).abs() < 1e-6), "{last}");
+            assert!(last <= 2.6 * position.cutoff().unwrap(), "{name}: {last}");
+            let mut radii: Vec<f64> = (0..lens.fields.values.len())
+                .map(|i| {
+                    crate::analysis::spot(
+                        &position.exact,
+                        position.exact.fields[i],
+                        position.accuracy,
+                    )
+                })
+                .filter_map(|found| Some(found.ok()?.rms.value))
+                .collect();
+            radii.sort_by(f64::total_cmp);
+            let middle = radii[radii.len() / 2];
+            // A spot of this radius over half of a period blurs it.
+            let blurred = 0.5 / middle;
+            let wanted = blurred.min(position.cutoff().unwrap());
+            assert!(last > 0.9 * wanted && last < 2.8 * wanted, "{name}: {last} {wanted}");
+        }
+    }
+}

@@ -115,4 +115,28 @@ mod tests {
             assert!(factor * length <= 200.0);
         }
     }
+
+    #[test]
+    fn the_words_of_a_title_are_in_their_field_and_on_lines_of_their_own() {
+        let sheet = DrawingSheet::a4().finish("A lens", "Layout", 2.0);
+        let texts: Vec<[f64; 2]> = sheet
+            .marks
+            .iter()
+            .filter_map(|mark| match mark {
+                crate::plot::Mark::Text { at, .. } => Some(*at),
+                _ => None,
+            })
+            .collect();
+        let [right, bottom] = [297.0 - MARGIN, 210.0 - MARGIN];
+        assert_eq!(texts.len(), 4);
+        for [x, y] in &texts {
+            assert!(*x > right - TITLE_FIELD[0] && *x < right - 20.0, "{x}");
+            assert!(*y > bottom - TITLE_FIELD[1] + 3.0 && *y < bottom - 1.0, "{y}");
+        }
+        let apart =
+            |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).abs() > 30.0 || (a[1] - b[1]).abs() > 4.0;
+        for i in 0..4 {
+            assert!((0..i).all(|j| apart(texts[i], texts[j])), "{texts:?}");
+        }
+    }
 }

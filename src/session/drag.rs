@@ -338,3 +338,22 @@ fn with_all_variables(lens: &Lens) -> Lens {
     add_variables(&mut freed, &kinds);
     freed
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_that_moved_are_told_with_five_digits() {
+        for (value, told) in [
+            (123_456.7, 123_460.0),
+            (-0.012_345_678, -0.012_346),
+            (99.999_96, 100.0),
+            (0.0, 0.0),
+            (2.5, 2.5),
+        ] {
+            assert_eq!(rounded(value), told, "{value}");
+        }
+        assert!(rounded(f64::INFINITY).is_infinite() && rounded(f64::NAN).is_nan());
+    }
+}

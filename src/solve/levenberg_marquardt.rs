@@ -207,3 +207,23 @@ fn normal_equations(rows: &ResidualRows, count: usize) -> (DMatrix<f64>, DVector
     let residuals = DVector::from_iterator(rows.len(), rows.iter().map(|(residual, _)| *residual));
     (jacobian.tr_mul(&jacobian), jacobian.tr_mul(&residuals))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A method that starts again with other residuals takes the steps of a fresh one.
+    #[test]
+    fn residuals_of_before_are_forgotten_after_a_restart() {
+        let bounds = ParameterBounds::uniform(1, [-100.0, 100.0], 100.0);
+        let to = |goal: f64| move |p: &[f64]| Ok::<_, ()>(vec![(p[0] - goal, vec![1.0])]);
+        let mut method = LevenbergMarquardt::default();
+        let mut parameters = [0.0];
+        method.step(&mut parameters, &bounds, to(1.0)).unwrap();
+        assert!((parameters[0] - 1.0).abs() < 2e-3, "{parameters:?}");
+        method.restart();
+        let there = method.step(&mut parameters, &bounds, to(-5.0)).unwrap();
+        assert!((parameters[0] + 5.0).abs() < 1e-2, "{parameters:?}");
+        assert!((there.value - (parameters[0] + 5.0).powi(2)).abs() < 1e-12);
+    }
+}

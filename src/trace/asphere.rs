@@ -223,4 +223,29 @@ mod tests {
             assert!(high - low < 10.0 * own + 1e-3, "{low} {high}, but it changes by {own}");
         }
     }
+
+    /// The second differences of the sag, by `z = c r²/(1 + √(1 − (1 + k) c² r²)) + Σ a r^(4 + 2 j)`, are
+    /// nowhere above their bound.
+    #[test]
+    fn the_bound_of_the_second_derivative_holds() {
+        for (c, conic, terms) in [
+            (0.0, 0.0, vec![3e-5]),
+            (0.05, -0.7, vec![1e-5, -4e-8]),
+            (-0.04, 0.5, vec![0.0, 0.0, 2e-10]),
+            (0.02, 0.0, vec![-2e-5, 0.0, 0.0, 5e-13]),
+        ] {
+            let sag = |r: f64| {
+                let conic = c * r * r / (1.0 + (1.0 - (1.0 + conic) * c * c * r * r).sqrt());
+                terms.iter().enumerate().fold(conic, |z, (j, a)| z + a * r.powi(4 + 2 * j as i32))
+            };
+            let radius = 9.0;
+            let bound = super::second_derivative_bound(c, conic, &terms, radius);
+            let h = 1e-3;
+            for i in 0..=200 {
+                let r = (radius - h) * f64::from(i) / 200.0;
+                let second = (sag(r + h) - 2.0 * sag(r) + sag(r - h)) / (h * h);
+                assert!(second.abs() <= bound * (1.0 + 1e-6) + 1e-8, "{r}: {second} {bound}");
+            }
+        }
+    }
 }

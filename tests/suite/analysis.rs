@@ -2,8 +2,8 @@
 
 use crate::reference::{Reference, Worst, count, lenses, number, numbers};
 use aplanat::analysis::{
-    AnalysisError, PupilShape, distortion, fan, field_curvature, geometric_mtf, illumination,
-    image_quality, path_differences, pupil, spot, spots, wavefront,
+    AnalysisError, Estimate, ImageQuality, PupilShape, distortion, fan, field_curvature,
+    geometric_mtf, illumination, image_quality, path_differences, pupil, spot, spots, wavefront,
 };
 use aplanat::lens::{FieldKind, FieldPoint};
 use aplanat::paraxial::{Beam, first_order, seidel};
@@ -320,4 +320,19 @@ fn the_quality_of_a_lens_is_the_mean_of_its_spots() {
     let dark = image_quality(&lens, 1e-4).unwrap();
     assert_eq!((dark.spot, dark.light.value), (Err(AnalysisError::NoLight), 0.0));
     assert!(!dark.is_fully_lit);
+}
+
+/// Parts that are alike have together what each of them has, by any weights, error and light included.
+#[test]
+fn the_quality_of_equal_parts_is_that_of_each() {
+    let part = ImageQuality {
+        spot: Ok(Estimate::new(0.02, 3e-4, 100)),
+        light: Estimate::new(50.0, 0.4, 100),
+        is_fully_lit: true,
+    };
+    let all = ImageQuality::mean(&[(0.5, part), (3.0, part), (1.25, part)]);
+    let (spot, one) = (all.spot.unwrap(), part.spot.unwrap());
+    assert!((spot.value - one.value).abs() < 1e-15 && (spot.error - one.error).abs() < 1e-15);
+    assert!((all.light.value - 50.0).abs() < 1e-12 && (all.light.error - 0.4).abs() < 1e-12);
+    assert!(all.is_fully_lit && all.spot.unwrap().rays == 300);
 }

@@ -261,7 +261,9 @@ fn analyzed(what: &str, more: &[&str]) -> Vec<Value> {
     let report = done_json(&[&["analyze", LENS, what], more].concat(), "");
     let keys = ["analysis", "zoom", "wavelength_um", "tolerance", "field_kind", "airy_radius"];
     has_keys(&report, &keys);
-    report["fields"].as_array().unwrap().clone()
+    let fields = report["fields"].as_array().unwrap();
+    assert!(!fields.is_empty(), "{what} of no field");
+    fields.clone()
 }
 
 /// A number must come with its error and cost.
@@ -322,6 +324,12 @@ fn analyze_prints_every_number_with_error_and_cost() {
     let focused = estimate(&focus[5]["rms"]);
     let plain = estimate(&analyzed("spot", &["--field", "0"])[0]["rms"]);
     assert!((focused - plain).abs() < 1e-12, "{focused} {plain}");
+    // Rays are straight behind the lens: the square of the radius is a parabola in the place of the
+    // image plane, and it is least between the ends.
+    let squares: Vec<f64> = (0..11).map(|i| estimate(&focus[i]["rms"]).powi(2)).collect();
+    let bends: Vec<f64> = squares.windows(3).map(|s| s[0] - 2.0 * s[1] + s[2]).collect();
+    assert!(bends.iter().all(|bend| *bend > 0.0), "{squares:?}");
+    assert!(bends.iter().all(|bend| (bend / bends[0] - 1.0).abs() < 0.05), "{bends:?}");
 }
 
 /// What a person reads has a line for every number of the JSON.
@@ -674,6 +682,10 @@ fn measure_trace_has_a_rate_for_every_method() {
     }
     let rounding = |name: &str| measured[name]["point_rms_mm"].as_f64().unwrap();
     assert!(rounding("rounding_f64") < 1e-12 && rounding("rounding_f32") < 1e-4);
+    // Single precision rounds, and a mean is between nothing and the largest.
+    let largest = measured["rounding_f32"]["point_max_mm"].as_f64().unwrap();
+    let mean = rounding("rounding_f32");
+    assert!(mean > 0.01 * largest && mean <= largest, "{mean} {largest}");
     assert_eq!(measured["rounding_f64"]["other_fates"], 0);
 }
 
@@ -776,7 +788,12 @@ fn a_grin_task_is_optimized_and_written_as_a_volume() {
     assert!(read.values.iter().all(|index| *index >= 1.0), "also where the fibre ends");
     let task = done(&["grin", "luneburg-radial", "--show"], "");
     let file = Scratch::with("task.json", &task);
+    let before = std::time::SystemTime::now();
     let stopped = done_json(&["grin", file.path(), "--iterations", "2"], "");
+    // A part of the time that the whole command took.
+    let whole = 1e3 * before.elapsed().unwrap().as_secs_f64();
+    let ms = stopped["ms"].as_f64().unwrap();
+    assert!(ms > 0.0 && ms < whole, "{ms} of {whole}");
     assert_eq!(stopped["steps"], 2);
     assert_eq!(stopped["stopped"], true);
     refused(2, &["grin", file.path(), "--out", file.path()], "", &["--out", "the task itself"]);

@@ -135,6 +135,8 @@ fn tables_have_heads_and_no_rounding_noise() {
     assert!(zernike.contains("(condition number 1)") || zernike.contains("projections"));
     assert!(!zernike.contains("-0.000000"), "{zernike}");
     assert!(zernike.contains("defocus") && zernike.contains("spherical"), "{zernike}");
+    // On the axis the brightest point of a centred lens is on it, by symmetry.
+    assert!(analyzed("psf").contains("found at x 0, y 0, along the axis"));
     for (what, heads) in [
         ("psf", ["x, mm", "y, mm", "intensity"]),
         ("mtf", ["cycles/mm", "tangential", "sagittal"]),

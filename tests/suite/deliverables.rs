@@ -168,6 +168,11 @@ fn a_layout_is_to_scale_and_the_dxf_has_the_lens_in_its_own_size() {
     assert!((arc.radius * curvature.abs() - 1.0).abs() < 1e-6, "{} {curvature}", arc.radius);
     assert!((arc.center.x - z - 1.0 / curvature).abs() < 1e-4, "{:?}", arc.center);
     assert!(arc.center.y.abs() < 1e-6 && layer == "OUTLINE", "{:?} {layer}", arc.center);
+    // It is the part of the circle at the vertex of the surface.
+    let turn = (arc.end_angle - arc.start_angle).rem_euclid(360.0);
+    let middle = (arc.start_angle + 0.5 * turn).to_radians();
+    let at = [arc.center.x + arc.radius * middle.cos(), arc.center.y + arc.radius * middle.sin()];
+    assert!(turn < 180.0 && (at[0] - z).abs() < 1e-4 && at[1].abs() < 1e-4, "{turn} {at:?}");
     let svg = drawn(GAUSS, "svg", &[]);
     assert!(svg.contains("width=\"297mm\"") && svg.contains("Scale 2:1"), "{}", &svg[..200]);
 }
@@ -220,6 +225,8 @@ fn an_element_drawing_has_its_radii_signs_material_and_tolerances() {
     }
     let second = drawn(ACHROMAT, "svg", &["--element", "2"]);
     assert!(second.contains(" CC<") && second.contains("4/ -"), "{second}");
+    // A sphere is no asphere of the constant 0.
+    assert!(!svg.contains("asphere") && !second.contains("asphere"));
     // A plane and an asphere.
     assert!(drawn(SINGLET, "svg", &["--element", "1"]).contains("R plane"));
     assert!(drawn(PHONE, "svg", &["--element", "1"]).contains("asphere, k"));

@@ -127,6 +127,27 @@ fn focal_length_aperture_and_field_suffice() {
     assert!((asked.f_number - 2.0).abs() < 1e-12);
 }
 
+/// The beam of the axis fills a circle of the area that is asked for, and its diameter into the focal
+/// length is the f-number.
+#[test]
+fn light_that_is_asked_for_gives_the_f_number() {
+    let area = std::f64::consts::PI * 6.25_f64.powi(2);
+    let text = format!(
+        r#"{{"focal_length_mm": 50, "half_field_deg": 5, "fields_deg": [0, 5],
+            "min_clear_area_mm2": [{area}, {}]}}"#,
+        0.8 * area
+    );
+    let (asked, _) = LensRequirements::complete(&spec(&text)).unwrap();
+    assert!((asked.f_number - 4.0).abs() < 1e-9, "{}", asked.f_number);
+}
+
+#[test]
+fn a_lens_for_its_axis_alone_can_be_asked_for() {
+    let text = r#"{"focal_length_mm": 50, "f_number": 8, "half_field_deg": 0, "fields_deg": [0]}"#;
+    let (asked, _) = LensRequirements::complete(&spec(text)).unwrap();
+    assert_eq!((asked.fields.as_slice(), asked.half_field()), (&[0.0][..], 0.0));
+}
+
 #[test]
 fn without_aperture_or_field_nothing_is_specified() {
     let text = r#"{"focal_length_mm": 50, "half_field_deg": 20}"#;
@@ -167,6 +188,12 @@ fn what_no_lens_can_do_is_refused_by_name() {
             "through a semi-diameter of 8 mm",
         ),
         (r#""f_number": 4, "half_field_deg": 5, "max_elements": 0"#, "without an element"),
+        // A beam of 100 mm across at 50 mm is that of f/0.5.
+        (
+            r#""f_number": 0.6, "half_field_deg": 5, "fields_deg": [0, 5], "max_elements": 6,
+                "min_clear_area_mm2": [8000, 8000], "max_semi_diameter_mm": 80"#,
+            "a beam of 8000 mm^2 at a focal length of 50 mm",
+        ),
     ] {
         let text = refusal(&with(rest));
         assert!(text.starts_with("no lens can do that: ") && text.contains(words), "{text}");

@@ -1,10 +1,10 @@
 //! Handles of a lens: what is locked is held exactly, what cannot be held stops by name.
 
 use aplanat::files::{bundled_lenses, json};
-use aplanat::lens::{Lens, LensSection, Object, Parameter, Quantity, Variable};
+use aplanat::lens::{Aperture, Lens, LensSection, Medium, Object, Parameter, Quantity, Variable};
 use aplanat::paraxial::{
     Beam, DragError, DragOutcome, DragSettings, DragStop, FirstOrder, FirstOrderLock, FreeNumbers,
-    Handle, HandleDrag, HandlePlaces, LockError, first_order, short_name,
+    Handle, HandleDrag, HandlePlaces, HandleUnit, LockError, first_order, short_name,
 };
 use std::sync::Arc;
 
@@ -326,6 +326,10 @@ fn values_follow_the_pointer() {
     near(value(Handle::FieldHeight, edge, [0.0, 0.0]), edge);
     let wider = value(Handle::FieldHeight, edge, [0.0, 0.25 * y]);
     near(wider.to_radians().tan(), 1.25 * edge.to_radians().tan());
+    let mut heights = lens.clone();
+    heights.fields.kind = aplanat::lens::FieldKind::ImageHeight;
+    let of_heights = HandlePlaces { lens: &heights, ..places };
+    near(of_heights.value_after(Handle::FieldHeight, 18.0, [0.0, 0.25 * y]).unwrap(), 1.25 * 18.0);
     let [_, y] = places.place(Handle::BeamWidth).unwrap();
     let factor =
         value(Handle::BeamWidth, 1.0, [0.0, 0.5 * y]) / value(Handle::BeamWidth, 1.0, [0.0; 2]);
@@ -339,4 +343,67 @@ fn numbers_that_move_have_short_names() {
     assert_eq!(name(2, Quantity::Curvature), "c3");
     assert_eq!(name(0, Quantity::Thickness), "t1");
     assert_eq!(name(4, Quantity::ZoomThickness(1)), "t5 (zoom 2)");
+}
+
+/// The stop moves along the lens, and the beam of the axis stays what it was.
+#[test]
+fn a_stop_that_moves_to_another_surface_keeps_the_beam() {
+    let mut lens = bundled("tessar_50_f28");
+    let stop = lens.stop().unwrap();
+    lens.aperture = Aperture::StopSemiDiameter(first(&lens, 0).stop_semi_diameter);
+    let before = first(&lens, 0);
+    for surface in [0, 2] {
+        assert_ne!(surface, stop);
+        let mut other = lens.clone();
+        other.surfaces.iter_mut().enumerate().for_each(|(i, row)| row.stop = i == surface);
+        other.aperture = Aperture::EntrancePupilDiameter(before.entrance_pupil.diameter.unwrap());
+        let height = first(&other, 0).stop_semi_diameter;
+        let handle = Handle::StopPosition;
+        if handle.unit(&other, 0) != HandleUnit::Surface {
+            continue;
+        }
+        // From the surface where it now is to the next one, and the beam is the same again.
+        other.aperture = Aperture::StopSemiDiameter(height);
+        let found = drag(&other, handle, &[]).to((surface + 1) as f64);
+        assert_eq!((found.stop, found.lens.stop()), (None, Some(surface + 1)));
+        let after = first(&found.lens, 0);
+        let near = |a: f64, b: f64| (a / b - 1.0).abs() < 1e-9;
+        assert!(near(after.f_number.unwrap(), before.f_number.unwrap()), "{surface}");
+        let rim = found.lens.surfaces[surface + 1].semi_diameter.unwrap();
+        assert!(rim >= after.stop_semi_diameter - 1e-9, "{rim}");
+    }
+}
+
+/// One handle of the stop moves it and one opens it: they lie on opposite sides of the axis.
+#[test]
+fn the_handles_of_the_stop_are_apart() {
+    let lens = bundled("double_gauss_rudolph_50");
+    let (system, data) =
+        (lens.resolve(0, lens.wavelengths[lens.primary()].um).unwrap(), first(&lens, 0));
+    let section = LensSection::new(&system, &[]);
+    let places = HandlePlaces { lens: &lens, zoom: 0, section: &section, first_order: &data };
+    let [position, size] =
+        [Handle::StopPosition, Handle::StopSize].map(|handle| places.place(handle).unwrap());
+    assert_eq!(size[1], data.stop_semi_diameter);
+    assert!(position[1] < 0.0 && (position[0] - size[0]).abs() < 1e-9, "{position:?} {size:?}");
+}
+
+/// What is drawn of a section: every glass with its index, and the highest rim.
+#[test]
+fn a_section_has_every_element_and_the_height_of_its_highest_rim() {
+    for name in ["double_gauss_rudolph_50", "telescope_rc_f8", "zoom_nikkor_28_80"] {
+        let lens = bundled(name);
+        let um = lens.wavelengths[lens.primary()].um;
+        let system = lens.resolve(0, um).unwrap();
+        let section = LensSection::new(&system, &[]);
+        let is_glass =
+            |row: &aplanat::lens::Row| !matches!(row.medium, Medium::Air | Medium::Mirror);
+        let glasses: Vec<usize> =
+            (0..lens.surfaces.len()).filter(|i| is_glass(&lens.surfaces[*i])).collect();
+        let found: Vec<(usize, f64)> = section.elements().collect();
+        assert_eq!(found.iter().map(|(i, _)| *i).collect::<Vec<_>>(), glasses, "{name}");
+        assert!(found.iter().all(|(i, n)| *n == system.surfaces[*i].index && *n > 1.3));
+        let rims = lens.surfaces.iter().filter_map(|row| row.semi_diameter);
+        assert_eq!(section.max_height(), rims.fold(0.0, f64::max), "{name}");
+    }
 }

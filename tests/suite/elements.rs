@@ -5,7 +5,7 @@ use aplanat::lens::{
     Aperture, Edit, ElementEdit, ElementForm, FieldKind, Fields, Lens, Medium, NewElement, Object,
     Row, StartingForm, StartingLens, WavelengthPreset, ZoomPosition, ZoomThickness, apply_edit,
 };
-use aplanat::paraxial::{Beam, FirstOrder, first_order};
+use aplanat::paraxial::{Beam, FirstOrder, first_order, seidel};
 use aplanat::session::{AnalysisSettings, Command, Session, analyze};
 
 fn starting(form: StartingForm) -> StartingLens {
@@ -210,6 +210,65 @@ fn a_moved_element_moves_alone_and_not_through_its_neighbour() {
     }
     let refused = refusal(&lens, ElementEdit::Move { surface: first, by: 1.1 * room });
     assert!(refused.contains("of air after surface"));
+    // The room and what the motion takes are lengths.
+    assert!(!refused.contains('-'), "{refused}");
+}
+
+/// The image plane of a solve stays at the focus, so nothing has to make room for the last element.
+#[test]
+fn the_last_element_moves_against_a_solved_image() {
+    let mut lens = doublet();
+    lens.image_solve = Some(0.0);
+    let last = lens.surfaces.len() - 1;
+    let before = first(&lens);
+    let moved = edited(&lens, ElementEdit::Move { surface: last, by: 2.0 });
+    assert!(close(moved.surfaces[0].thickness, lens.surfaces[0].thickness + 2.0));
+    assert_eq!(moved.surfaces[last].thickness, lens.surfaces[last].thickness);
+    let after = first(&moved);
+    assert!(close(after.bfl.unwrap(), before.bfl.unwrap()));
+    assert!(after.image_defocus.unwrap().abs() < 1e-9);
+}
+
+#[test]
+fn a_stop_on_either_side_of_the_air_stays_where_elements_are_cemented() {
+    let apart = edited(&doublet(), ElementEdit::Split(2));
+    for at in [2, 3] {
+        let mut lens = apart.clone();
+        lens.surfaces.iter_mut().enumerate().for_each(|(i, row)| row.stop = i == at);
+        let joined = edited(&lens, ElementEdit::Cement(1));
+        assert_eq!(joined.stop(), Some(2), "{at}");
+    }
+}
+
+/// For distant light the stronger side of a singlet of least aberration is in front: `q` has the
+/// sign of `−p` (Welford 1986, section 12.3). Turned round it has more spherical aberration.
+#[test]
+fn a_singlet_for_distant_light_turns_its_stronger_side_to_it() {
+    let lens = singlet();
+    let [front, back] = [1, 2].map(|i| lens.surfaces[i].curvature);
+    assert!(front > 0.0 && front.abs() > back.abs(), "{front} {back}");
+    let aberration = |lens: &Lens| {
+        let system = lens.resolve(0, lens.wavelengths[lens.primary()].um).unwrap();
+        seidel(&system, &first(lens), None).unwrap().total.s1.abs()
+    };
+    let mut turned = lens.clone();
+    (turned.surfaces[1].curvature, turned.surfaces[2].curvature) = (-back, -front);
+    assert!(aberration(&turned) > 2.0 * aberration(&lens));
+}
+
+/// Heights on the image become the angles of `h = f tan θ`, across both axes.
+#[test]
+fn image_heights_of_an_empty_lens_become_angles_in_both_directions() {
+    let mut fields = Fields::equal_area(FieldKind::ImageHeight, 12.0, 2);
+    fields.values[0].x = 7.0;
+    let lens =
+        StartingLens { fields: fields.clone(), ..starting(StartingForm::Empty) }.lens().unwrap();
+    assert_eq!(lens.fields.kind, FieldKind::Angle);
+    for (angle, height) in lens.fields.values.iter().zip(&fields.values) {
+        for (angle, height) in [(angle.x, height.x), (angle.y, height.y)] {
+            assert!(close(35.0 * angle.to_radians().tan(), height), "{angle} {height}");
+        }
+    }
 }
 
 #[test]

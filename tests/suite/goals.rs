@@ -29,6 +29,27 @@ fn the_default_goal_of_a_scaled_lens_is_the_scaled_goal() {
     }
 }
 
+/// Patterns of a lens of twice the size are twice as coarse, and so is the frequency that a goal is
+/// about.
+#[test]
+fn a_goal_of_contrast_keeps_its_cycles_per_lens() {
+    let mut lens = bundled("tessar_50_f28");
+    let term = Term::GeometricMtf { frequency: 30.0, min: 0.5 };
+    lens.merit = Some(Goal {
+        terms: vec![WeightedTerm::new(term, 1.0)],
+        zoom_ratios: Vec::new(),
+        limits: LimitTreatment::default(),
+        pupil: PupilEdge::Frozen,
+    });
+    // A frequency is no minimum, though it is the larger one of the two numbers.
+    lens.check().unwrap();
+    let large = apply_edit(&lens, &Edit::Scale(2.5)).unwrap();
+    let Term::GeometricMtf { frequency, .. } = large.merit.unwrap().terms[0].term else {
+        panic!("another term");
+    };
+    assert!((2.5 * frequency - 30.0).abs() < 1e-12, "{frequency}");
+}
+
 /// In the blue the index of a model glass grows by another amount than at the d line.
 #[test]
 fn a_model_glass_of_another_index_has_the_merit_of_the_lens_with_it() {

@@ -438,3 +438,33 @@ fn wrong_questions_about_light_are_refused() {
     let text = done(&["analyze", lens, "ghosts", "--ghosts", "3", "--field", "0"], "");
     assert!(text.contains("first order") && text.contains("45 ghosts"), "{text}");
 }
+
+/// The table has the share of the rays of a ghost that arrive, of which the JSON has the numbers.
+#[test]
+fn the_table_of_ghosts_has_the_share_that_arrives() {
+    let file = read("images.json");
+    let lens = ghost_lens(&file);
+    let path = lens.0.to_str().unwrap();
+    let arguments = ["analyze", path, "ghosts", "--field", "0"];
+    let found = done_json(&arguments, "");
+    let text = crate::cli::done(&arguments, "");
+    let ghosts = list(&found["fields"][0]["ghosts"]);
+    assert!(!ghosts.is_empty());
+    for ghost in ghosts {
+        let all: f64 = ghost["fates"].as_object().unwrap().values().map(number).sum();
+        let share = 100.0 * number(&ghost["fates"]["imaged"]) / all;
+        let surface = |key: &str| ghost[key].as_u64().unwrap() + 1;
+        let pair = format!("{}, {}", surface("first_reflection"), surface("second_reflection"));
+        let line = text.lines().find(|line| line.trim_start().starts_with(&pair)).unwrap();
+        assert!(line.contains(&format!(" {share:.0} %")), "{share} in {line}");
+    }
+}
+
+/// A circle far around an image has all of its light, within the error that is stated.
+#[test]
+fn a_wide_circle_about_the_image_of_a_pupil_that_is_not_round_has_all_light() {
+    let found = pupil(&["--um=0.5", "--disc=0.1,0,0.1"], &["--radius=5".to_owned()]);
+    let circle = &found["circles"][0];
+    let (energy, error) = (number(&circle["energy"]), number(&circle["error"]));
+    assert!(energy <= 1.0 && energy > 0.9 && energy + error >= 1.0 - 1e-12, "{circle}");
+}

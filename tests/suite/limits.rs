@@ -264,3 +264,19 @@ fn limits_that_depend_on_each_other_are_approached() {
     let progress = (0..12).map(|_| optimizer.step()).last().unwrap();
     assert!(progress.end.is_none() && progress.merit < 1.0, "{progress:?}");
 }
+
+/// Nothing that may change opens the rim through which a field has to get, and the limit is named.
+#[test]
+fn a_limit_that_nothing_can_keep_is_named() {
+    let mut lens = bundled("double_gauss_rudolph_50");
+    lens.variables.clear();
+    lens.surfaces[10].semi_diameter = Some(0.5);
+    vary(&mut lens, 10, Quantity::Curvature);
+    let mut optimizer =
+        start(DescentMethod::TrustRegion, &lens, &goal(&[Term::Spot, Term::Light(0.9)]), 1e-3)
+            .unwrap();
+    let end = (0..100).find_map(|_| optimizer.step().end);
+    assert_eq!(end, Some(OptimizationEnd::Conflict));
+    assert!(!optimizer.conflict().is_empty());
+    assert!(optimizer.conflict().iter().all(|name| name.contains("light")));
+}

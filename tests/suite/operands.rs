@@ -143,6 +143,29 @@ fn third_order_sums_follow_the_rim_of_the_stop() {
     }
 }
 
+/// A lens with its stop opened is the lens with that aperture: spherical aberration by the fourth
+/// power of the beam, coma by the third.
+#[test]
+fn third_order_sums_of_an_opened_stop_are_those_of_the_faster_lens() {
+    let aperture = |lens: &Lens, radius: f64| {
+        let mut lens =
+            apply_edit(lens, &Edit::SetAperture(Aperture::StopSemiDiameter(radius))).unwrap();
+        lens.variables.clear();
+        lens
+    };
+    let lens = aperture(&bundled("tessar_50_f28"), 6.0);
+    let mut opened = lens.clone();
+    let stop = lens.stop().unwrap();
+    vary(&mut opened, stop, Quantity::SemiDiameter);
+    for kind in OperandKind::ALL.into_iter().filter(|kind| kind.is_third_order()) {
+        let terms = vec![scoped(operand(kind), TermScope::ALL)];
+        let merit = Merit::new(&opened, &goal(terms), 1e-3).unwrap();
+        let found = merit.operand_margins(&[6.6]).unwrap()[0].value;
+        let exact = values(&aperture(&lens, 6.6), kind, TermScope::ALL)[0];
+        assert_near(found, exact, 1e-9 * exact.abs());
+    }
+}
+
 #[test]
 fn terms_about_a_part_are_terms_of_a_lens_with_that_part_only() {
     let mut lens = bundled("tessar_50_f28");

@@ -292,3 +292,19 @@ fn the_quick_way_sees_depth() {
     });
     assert!(error < 0.06, "{error}");
 }
+
+/// A picture that is too bright by a tenth everywhere is wrong by as much everywhere, and from several
+/// tiles that is known well.
+#[test]
+fn the_error_of_a_picture_that_is_wrong_alike_everywhere_is_well_known() {
+    let lens = bundled("double_gauss_rudolph_50");
+    let (model, bands) = picture_model(&lens, 0, Coloring::Rgb(1)).unwrap();
+    let frame = ImageFrame::new(&model, [96, 64], 4.0).unwrap();
+    let scene = Scene::uniform(1.0);
+    let exact = ExactRenderer::new(&model, &bands, &scene, frame).unwrap();
+    let mut picture = QuickRenderer::new(&model, &bands, &exact).unwrap().render();
+    picture.values.iter_mut().flatten().for_each(|value| *value *= 1.1);
+    let error = quick_error(&exact, &picture, 6, 64);
+    assert!((error.value - 0.1).abs() < 0.02, "{error:?}");
+    assert!(error.error < 0.15 * error.value, "{error:?}");
+}

@@ -600,3 +600,13 @@ fn a_telecentric_object_space_fills_its_aperture() {
         assert_eq!(Region::new(launch).kind, RegionKind::Clear);
     }
 }
+
+/// The edge of a pupil that is no rim of a lens is the stop where rays are aimed at it.
+#[test]
+fn the_edge_of_the_pupil_itself_is_named_by_what_rays_are_aimed_at() {
+    let lens = crate::merit::bundled("double_gauss_rudolph_50");
+    let model = RayModel::from_lens(&lens, 0).unwrap();
+    let name = |aiming| RayModel { aiming, ..model.clone() }.limit_name(PupilLimit::Disc);
+    assert_eq!(name(Aiming::Stop), "rim of the stop");
+    assert_eq!(name(Aiming::Paraxial), "entrance pupil");
+}

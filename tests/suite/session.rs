@@ -992,3 +992,19 @@ fn targets_follow_a_scaled_lens() {
     }
     assert_eq!(terms[2].weight, 4.0);
 }
+
+#[test]
+fn a_selected_surface_is_shown_while_the_lens_has_it() {
+    let mut session = session(double_gauss());
+    let last = session.lens().surfaces.len() - 1;
+    for (chosen, shown) in [
+        (None, None),
+        (Some(0), Some(0)),
+        (Some(3), Some(3)),
+        (Some(last), Some(last)),
+        (Some(last + 1), None),
+    ] {
+        session.apply(Command::Select(chosen));
+        assert_eq!(session.view().selected, shown, "{chosen:?}");
+    }
+}

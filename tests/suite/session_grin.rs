@@ -374,3 +374,25 @@ fn invalid_grin_files_are_refused_and_the_open_document_stays() {
     );
     std::fs::remove_dir_all(folder).unwrap();
 }
+
+/// A field that a killed program has left in the folder is opened at the next start, once, and told.
+#[test]
+fn the_field_of_an_interrupted_design_is_opened_again() {
+    let folder = folder("grin-interrupted");
+    let mut killed = session();
+    form(&mut killed, GrinCommand::OpenBuiltin("luneburg-radial".into()));
+    wait(&mut killed, "the task", |view, _| view.grin.run.snapshot.is_some());
+    let left = folder.join("field-4000000000.npz");
+    form(&mut killed, GrinCommand::Save { path: left.clone(), nodes: 9 });
+    wait(&mut killed, "the file", |_, events| events.contains(&SessionEvent::Saved(left.clone())));
+    let mut next = session();
+    next.set_field_folder(&folder);
+    let told = next.view().messages.last().unwrap().text.clone();
+    assert!(told.starts_with("recovered the field of an interrupted design"), "{told}");
+    wait(&mut next, "the field", |view, _| view.grin.run.snapshot.is_some());
+    assert!(run(&next).document.name.starts_with("interrupted"));
+    let mut later = session();
+    later.set_field_folder(&folder);
+    assert!(later.view().messages.is_empty(), "it is found once");
+    std::fs::remove_dir_all(folder).unwrap();
+}

@@ -227,3 +227,21 @@ fn two_windows_have_two_journals() {
     names.sort();
     assert_eq!(names, ["first", "second"]);
 }
+
+/// A new design has a journal of its own: what was done to it before it was killed is all there is.
+#[test]
+fn a_killed_design_that_followed_another_reopens_without_it() {
+    let folder = Folder::new("journal-next");
+    let mut session = journaled(blank(), &folder.journals());
+    rename(&mut session, "first");
+    let file = folder.0.join("first.json");
+    session.apply(Command::Save(Some(file)));
+    session.apply(Command::New(Box::new(blank())));
+    rename(&mut session, "second");
+    let copy = folder.0.join("copy");
+    killed(&session, &folder.journals(), &copy);
+    let (again, text) = reopened(&copy);
+    assert!(text.unwrap().starts_with("recovered second with 1 unsaved change"));
+    assert_eq!((again.lens(), again.view().path), (session.lens(), None));
+    assert_eq!(again.view().history.len(), session.view().history.len());
+}

@@ -717,3 +717,42 @@ fn mounted_surfaces_have_the_derivatives_of_their_landings() {
     }
     assert_eq!(compared, 3 * (system.surfaces.len() - 1));
 }
+
+/// Light that has already passed the vertex plane of a surface that it misses is drawn to where it
+/// last met glass; light on its way there is drawn as far as that plane.
+#[test]
+fn the_drawing_of_a_ray_that_misses_ends_where_it_is() {
+    let sphere = |curvature: f64, thickness: f64| Surface {
+        shape: Shape::Sphere { curvature },
+        ..Surface::plane(thickness, 1.0)
+    };
+    let drawn = |gap: f64| {
+        let surfaces = vec![sphere(0.1, gap), sphere(1.0 / 3.0, 5.0)];
+        let system = System { index_before: 1.0, surfaces, stop: None };
+        let direction = Vec3::new(0.0, 0.0, 1.0);
+        let ray = Ray { point: Vec3::new(0.0, 8.0, -1.0), direction };
+        Tracer::new(&system).unwrap().polyline(ray)
+    };
+    // At a height of 8 the first sphere of radius 10 is 4 behind its vertex.
+    for (gap, ends) in [(2.0, vec![-1.0, 4.0]), (6.0, vec![-1.0, 4.0, 6.0])] {
+        let found = drawn(gap);
+        assert_eq!(found.fate, Fate::Missed(1));
+        let z: Vec<f64> = found.points.iter().map(|p| p.z).collect();
+        assert!(z.len() == ends.len(), "{z:?}");
+        assert!(z.iter().zip(ends).all(|(a, b)| (a - b).abs() < 1e-12), "{z:?}");
+    }
+}
+
+#[test]
+fn light_goes_through_no_medium_without_a_positive_index() {
+    let system = |before: f64, behind: f64| System {
+        index_before: before,
+        surfaces: vec![Surface::plane(5.0, behind), Surface::plane(0.0, 1.0)],
+        stop: None,
+    };
+    assert!(Tracer::new(&system(1.0, 1.5)).is_ok());
+    for bad in [0.0, -1.5, f64::NAN, f64::INFINITY] {
+        assert!(Tracer::new(&system(bad, 1.5)).is_err(), "{bad} in front");
+        assert!(Tracer::new(&system(1.0, bad)).is_err(), "{bad} behind");
+    }
+}

@@ -121,3 +121,34 @@ fn lattice(space: Domain, parts: usize) -> Vec<Vec3<f64>> {
     };
     (0..side.pow(3)).map(place).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_lattice_has_every_corner_of_its_domain_and_equal_steps() {
+        let space = Domain::Rod { radius: 2.0, from: -1.0, to: 5.0 };
+        let points = lattice(space, 3);
+        assert_eq!(points.len(), 64);
+        let [low, high] = space.corners();
+        for corner in [low, high, Vec3::new(low.x, high.y, low.z), Vec3::new(high.x, low.y, high.z)]
+        {
+            assert!(points.iter().any(|p| (*p - corner).dot(*p - corner) < 1e-20), "{corner:?}");
+        }
+        let mut depths: Vec<f64> = points.iter().map(|p| p.z).collect();
+        depths.sort_by(f64::total_cmp);
+        depths.dedup_by(|a, b| (*a - *b).abs() < 1e-12);
+        let step = (high.z - low.z) / 3.0;
+        assert!(depths.len() == 4 && (depths[1] - depths[0] - step).abs() < 1e-12, "{depths:?}");
+    }
+
+    /// The ends of a rod, of a ball and of a cube that are farthest apart.
+    #[test]
+    fn a_domain_has_the_diameter_of_its_farthest_points() {
+        let near = |a: f64, b: f64| (a - b).abs() < 1e-12;
+        assert!(near(Domain::Rod { radius: 1.5, from: -1.0, to: 3.0 }.diameter(), 5.0));
+        assert!(near(Domain::Ball { radius: 1.5 }.diameter(), 3.0));
+        assert!(near(Domain::Cube { half: 0.5 }.diameter(), 3.0_f64.sqrt()));
+    }
+}

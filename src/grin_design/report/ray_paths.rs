@@ -250,4 +250,18 @@ mod tests {
         let middle = hermite(&pair, 0.5);
         assert!((middle.x - 0.5).abs() < 1e-12 && middle.y > 0.1, "{middle:?}");
     }
+
+    #[test]
+    fn rays_are_grouped_by_their_beam_or_by_their_source() {
+        let mut sizes: Vec<usize> = group_rays(&beams()).iter().map(Vec::len).collect();
+        sizes.sort_unstable();
+        assert_eq!(sizes, [11, 11], "two beams");
+        let from = |x: f64, to: f64| GrinRay {
+            x: Vec3::new(x, 0.0, -5.0),
+            v: Vec3::new(to, 0.1 * x, 1.0),
+        };
+        let fans: Vec<GrinRay<f64>> =
+            (0..9).map(|i| from(f64::from(i % 3), 0.01 * f64::from(i))).collect();
+        assert_eq!(group_rays(&fans).len(), 3, "three points");
+    }
 }

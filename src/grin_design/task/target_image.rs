@@ -191,4 +191,27 @@ mod tests {
             assert!((0..3).all(|k| k == i || by_depth[k] < by_depth[i] - 0.1), "{by_depth:?}");
         }
     }
+
+    /// A ring is its own mirror image in both directions and across the diagonal, pixel by pixel, and it
+    /// is bright where its circle is.
+    #[test]
+    fn a_ring_by_formula_is_round() {
+        let side = 24;
+        let ring: Vec<f64> = (0..side * side).map(|n| TargetImage::Ring.pixel(n, side)).collect();
+        let at = |column: usize, row: usize| ring[row * side + column];
+        for row in 0..side {
+            for column in 0..side {
+                let here = at(column, row);
+                for other in
+                    [at(row, column), at(side - 1 - column, row), at(column, side - 1 - row)]
+                {
+                    assert!((here - other).abs() < 1e-12, "{column} {row}: {here} {other}");
+                }
+            }
+        }
+        // The circle has a radius of 0.6 of the half side.
+        let crossing = (side as f64 * 0.5 * (1.0 - 0.6)) as usize;
+        assert!(at(crossing, side / 2) > 0.8, "{}", at(crossing, side / 2));
+        assert!(at(side / 2, side / 2) < 0.3 && at(0, 0) < 0.3);
+    }
 }

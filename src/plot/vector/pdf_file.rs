@@ -54,7 +54,7 @@ pub fn pdf_bytes(title: &str, pages: &[VectorDrawing]) -> Result<Vec<u8>, PdfErr
 fn draw(surface: &mut Surface<'_>, mark: &Mark, font: &Font) {
     match mark {
         Mark::Line { points, pen } => draw_line(surface, polyline(points, false).as_ref(), pen),
-        Mark::Arc { arc, pen } => draw_line(surface, arc_path(arc).as_ref(), pen),
+        Mark::Arc { arc, pen } => draw_line(surface, curve(&arc_pieces(arc)).as_ref(), pen),
         Mark::Area { points, color } => {
             surface.set_stroke(None);
             surface.set_fill(Some(fill(*color)));
@@ -117,23 +117,77 @@ fn polyline(points: &[[f64; 2]], closed: bool) -> Option<Path> {
     builder.finish()
 }
 
-/// An arc by cubic pieces of at most 45 degrees, each within 4e-6 of the radius.
-fn arc_path(arc: &SheetArc) -> Option<Path> {
+/// An arc by the points of cubic pieces of at most 45 degrees, each within 4e-6 of the radius.
+fn arc_pieces(arc: &SheetArc) -> Vec<[[f64; 2]; 4]> {
     let [from, to] = arc.angles;
     let pieces = ((to - from) / FRAC_PI_4).ceil().max(1.0);
     let step = (to - from) / pieces;
     let reach = 4.0 / 3.0 * (0.25 * step).tan() * arc.radius;
     let tangent = |angle: f64| [-angle.sin() * reach, angle.cos() * reach];
-    let mut builder = PathBuilder::new();
-    let [x, y] = arc.point(from).map(|v| v as f32);
-    builder.move_to(x, y);
-    for i in 0..pieces as usize {
+    let piece = |i: usize| {
         let angles = [from + i as f64 * step, from + (i + 1) as f64 * step];
         let [a, b] = angles.map(|angle| arc.point(angle));
         let [u, v] = angles.map(tangent);
-        let [x1, y1, x2, y2, x, y] =
-            [a[0] + u[0], a[1] + u[1], b[0] - v[0], b[1] - v[1], b[0], b[1]].map(|v| v as f32);
+        [a, [a[0] + u[0], a[1] + u[1]], [b[0] - v[0], b[1] - v[1]], b]
+    };
+    (0..pieces as usize).map(piece).collect()
+}
+
+fn curve(pieces: &[[[f64; 2]; 4]]) -> Option<Path> {
+    let mut builder = PathBuilder::new();
+    for (i, piece) in pieces.iter().enumerate() {
+        let [[x0, y0], [x1, y1], [x2, y2], [x, y]] = piece.map(|p| p.map(|v| v as f32));
+        if i == 0 {
+            builder.move_to(x0, y0);
+        }
         builder.cubic_to(x1, y1, x2, y2, x, y);
     }
     builder.finish()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn arcs_are_round_and_go_from_end_to_end() {
+        for angles in [[0.2, 0.9], [-1.0, 3.0], [0.0, 6.2]] {
+            let arc = SheetArc { center: [3.0, -2.0], radius: 50.0, angles };
+            let pieces = arc_pieces(&arc);
+            let apart = |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).hypot(a[1] - b[1]);
+            assert!(apart(pieces[0][0], arc.point(angles[0])) < 1e-12);
+            assert!(apart(pieces[pieces.len() - 1][3], arc.point(angles[1])) < 1e-12);
+            assert!(pieces.windows(2).all(|pair| apart(pair[0][3], pair[1][0]) < 1e-12));
+            for piece in &pieces {
+                for t in [0.1, 0.3, 0.5, 0.8] {
+                    // The weights of a cubic curve by Bernstein.
+                    let s: f64 = 1.0 - t;
+                    let weights = [s * s * s, 3.0 * s * s * t, 3.0 * s * t * t, t * t * t];
+                    let at = [0, 1].map(|k| (0..4).map(|i| weights[i] * piece[i][k]).sum::<f64>());
+                    let off = apart(at, arc.center) / arc.radius - 1.0;
+                    assert!(off.abs() < 5e-6, "{angles:?} {t}: {off:e}");
+                }
+            }
+        }
+    }
+
+    /// A sheet of A4 measures 297 mm, which are 841.89 points of 1/72 inch.
+    #[test]
+    fn a_page_has_the_size_of_its_sheet_and_every_point_of_its_lines() {
+        let page = |middle: [f64; 2]| {
+            let mut drawing = VectorDrawing::new([297.0, 210.0]);
+            drawing.line(&[[10.0, 10.0], middle, [50.0, 60.0], [90.0, 20.0]], Pen::THIN);
+            pdf_bytes("a", &[drawing]).unwrap()
+        };
+        let file = page([20.0, 30.0]);
+        let text = String::from_utf8_lossy(&file);
+        let (_, media) = text.split_once("/MediaBox").unwrap();
+        let (_, media) = media.split_once('[').unwrap();
+        let (media, _) = media.split_once(']').unwrap();
+        let sides: Vec<f64> = media.split_whitespace().map(|v| v.parse().unwrap()).collect();
+        let exact = [0.0, 0.0, 297.0 / 25.4 * 72.0, 210.0 / 25.4 * 72.0];
+        assert!(sides.iter().zip(exact).all(|(a, b)| (a - b).abs() < 1e-2), "{sides:?}");
+        assert_eq!(file, page([20.0, 30.0]));
+        assert!(file != page([25.0, 30.0]), "a point of the line is not in the file");
+    }
 }

@@ -116,4 +116,15 @@ mod tests {
         assert!(svg.contains("&lt;/text&gt;&lt;script&gt;&quot;&amp;</text>"), "{svg}");
         assert_eq!([number(-1e-9), number(1.25), number(3.0)], ["0", "1.25", "3"]);
     }
+
+    #[test]
+    fn lines_and_areas_have_their_points_in_order() {
+        let mut drawing = VectorDrawing::new([10.0, 10.0]);
+        drawing.line(&[[1.0, 2.0], [3.5, 4.0], [0.0, 9.25]], Pen::THIN);
+        drawing.area(&[[5.0, 6.0], [7.0, 6.0], [7.0, 8.0]], [0; 3]);
+        let svg = svg_text(&drawing);
+        for points in ["\"1,2 3.5,4 0,9.25\"", "\"5,6 7,6 7,8\""] {
+            assert!(svg.contains(points), "{svg}");
+        }
+    }
 }

@@ -118,3 +118,19 @@ impl PupilDerivative {
         SurfaceParameter::all().map(excess).fold(0.0, f64::max)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Of a disc of radius r whose middle is d away: `∫ |p − c|² = π r² (r²/2 + d²)`.
+    #[test]
+    fn the_integral_about_a_point_beside_the_centroid_follows_from_the_parallel_axes() {
+        let (r, [a, b]) = (1.5_f64, [0.7, -0.4]);
+        let area = std::f64::consts::PI * r * r;
+        let light = PupilMoments { area, centroid: [2.0, 3.0], spread: 0.5 * area * r * r };
+        let cost = QuadraticIntegrand { center: [2.0 - a, 3.0 - b], square: 2.0, constant: -0.25 };
+        let exact = 2.0 * area * (0.5 * r * r + a * a + b * b) - 0.25 * area;
+        assert!((cost.integrate(&light) - exact).abs() < 1e-12, "{exact}");
+    }
+}

@@ -169,3 +169,36 @@ impl ElementSheet<'_> {
         (!joints.is_empty()).then(|| format!("Cemented {}", joints.join(" and ")))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::files::{bundled_lenses, json};
+    use crate::plot::{Mark, text_width};
+
+    /// Words can be read, stay within the frame, and notes stand beside the title, below the table.
+    #[test]
+    fn the_words_of_an_element_are_legible_and_in_their_place() {
+        for name in ["achromat_ac254_100", "phone_us7558005_1"] {
+            let bundled = bundled_lenses().iter().find(|bundled| bundled.name == name).unwrap();
+            let lens = json::read(bundled.text, name).unwrap();
+            let drawing = element_drawing(&lens, 0, 1).unwrap();
+            let [right, bottom] = drawing.size.map(|length| length - MARGIN);
+            let table = bottom - 20.0 - TABLE;
+            for mark in &drawing.marks {
+                let Mark::Text { at: [x, y], text, size, align, of_sheet, .. } = mark else {
+                    continue;
+                };
+                assert!(*size > 1.2, "{name}: {text} of {size} mm");
+                if *of_sheet && *align == TextAlign::Left {
+                    let end = x + text_width(text, *size);
+                    assert!(*x >= MARGIN && end <= right + 1e-9, "{name}: {text} ends at {end}");
+                }
+                assert!(*y > MARGIN && *y < bottom, "{name}: {text} at {y}");
+                if text.starts_with("Indications") || text.starts_with("Mass") {
+                    assert!(*y > table + TABLE, "{name}: {text} at {y}");
+                }
+            }
+        }
+    }
+}

@@ -134,3 +134,30 @@ fn arrow(sheet: &mut VectorDrawing, tip: [f64; 2], [dx, dy]: [f64; 2]) {
     // A CAD program gets no areas.
     sheet.line(&[tip, left, right, tip], Pen::THIN.with_width(0.05));
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plot::Mark;
+
+    /// Lines at equal distances fill an area: their lengths times that distance are the area.
+    #[test]
+    fn hatching_covers_the_area_and_nothing_else() {
+        let outline = [[10.0, 20.0], [52.0, 20.0], [52.0, 45.0], [10.0, 45.0]];
+        let mut drawing = VectorDrawing::new([100.0, 100.0]);
+        hatch(&mut drawing, &outline);
+        let mut covered = 0.0;
+        for mark in &drawing.marks {
+            let Mark::Line { points, .. } = mark else { panic!("{mark:?}") };
+            let (a, b) = (points[0], points[1]);
+            let inside = |p: [f64; 2]| {
+                (10.0 - 1e-9..=52.0 + 1e-9).contains(&p[0])
+                    && (20.0 - 1e-9..=45.0 + 1e-9).contains(&p[1])
+            };
+            assert!(inside(a) && inside(b), "{a:?} {b:?}");
+            assert!((a[0] - b[0] + a[1] - b[1]).abs() < 1e-9, "at 45 degrees: {a:?} {b:?}");
+            covered += (a[0] - b[0]).hypot(a[1] - b[1]) * HATCH;
+        }
+        assert!((covered / (42.0 * 25.0) - 1.0).abs() < 0.02, "{covered}");
+    }
+}

@@ -206,3 +206,58 @@ fn refocused(lens: &Lens, asked: &LensRequirements) -> Lens {
     }
     lens
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::search::design::LensSpecification;
+    use crate::search::design::starts::achromats;
+
+    fn finished() -> (LensRequirements, LensDraft, Lens) {
+        let spec: LensSpecification = serde_json::from_str(
+            r#"{"focal_length_mm": 60.0, "f_number": 6.0, "half_field_deg": 2.0, "max_elements": 3}"#,
+        )
+        .unwrap();
+        let asked = LensRequirements::complete(&spec).unwrap().0;
+        let draft = settled(&achromats(&asked)[0].draft, &asked);
+        let lens = with_rims(&draft, &asked).unwrap();
+        (asked, draft, lens)
+    }
+
+    #[test]
+    fn lenses_that_keep_their_limits_come_first_and_sharper_ones_before_others() {
+        let (asked, _, lens) = finished();
+        let mut kept = judge_lens(&lens, &asked, JUDGEMENT_TOLERANCE).unwrap();
+        kept.faults.clear();
+        kept.limits.clear();
+        let with = |rms: f64, fault: bool| {
+            let mut judgement = LensJudgement { rms, ..kept.clone() };
+            judgement.faults.extend(fault.then(|| "a fault".to_owned()));
+            rank(&judgement)
+        };
+        let order = [(0.01, false), (0.02, false), (0.005, true), (0.5, true)];
+        let ranks = order.map(|(rms, fault)| with(rms, fault));
+        assert!(ranks.windows(2).all(|pair| pair[0] < pair[1]), "{ranks:?}");
+    }
+
+    #[test]
+    fn a_refocused_lens_is_in_focus() {
+        let (asked, _, mut lens) = finished();
+        lens.surfaces.last_mut().unwrap().thickness += 0.3;
+        let off = |lens: &Lens| judge_lens(lens, &asked, JUDGEMENT_TOLERANCE).unwrap().refocus;
+        assert!(off(&lens).abs() > 0.1, "{}", off(&lens));
+        let sharp = refocused(&lens, &asked);
+        assert!(off(&sharp).abs() < 0.01, "{}", off(&sharp));
+    }
+
+    /// A lens that is longer than what is asked for pays for its length.
+    #[test]
+    fn a_limit_that_is_broken_has_a_cost() {
+        let (mut asked, draft, lens) = finished();
+        asked.track = lens.total_track() - 2.0;
+        let costs = limit_costs(&draft, &asked, &settling(), freedom(&asked));
+        let track = costs.iter().find(|cost| cost.term == "total_track").unwrap();
+        assert!(track.um_per_mm > 0.0 && track.surface.is_none(), "{costs:?}");
+        assert!(costs.windows(2).all(|pair| pair[0].um_per_mm >= pair[1].um_per_mm), "{costs:?}");
+    }
+}

@@ -467,4 +467,16 @@ mod tests {
         assert!(run.pool.iter().all(|c| in_catalogue(&c.draft.lens, &run.asked)));
         assert!(!run.advance(0.95, &stop));
     }
+
+    /// A piece costs 1, an aspheric surface half of that.
+    #[test]
+    fn a_candidate_costs_its_pieces_and_its_aspheres() {
+        let run = with_pool(DesignStage::Mutations);
+        let mut candidate = run.pool[0].clone();
+        let pieces = piece_count(&candidate.draft.lens) as f64;
+        assert!(pieces >= 2.0 && candidate.price() == pieces);
+        candidate.draft.lens.surfaces[0].conic = -0.7;
+        candidate.draft.lens.surfaces[1].asphere = vec![1e-6];
+        assert_eq!(candidate.price(), pieces + 1.0);
+    }
 }

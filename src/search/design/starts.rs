@@ -471,4 +471,26 @@ mod tests {
         longer.lens.surfaces.push(Row::default());
         assert!(!is_copy(&longer, &original));
     }
+
+    /// Mirrors, gradients and materials without an Abbe number have no place in a draft.
+    #[test]
+    fn drafts_are_made_of_plain_glasses_alone() {
+        let asked = requirements();
+        let found = crate::files::bundled_lenses().iter().filter_map(|bundled| {
+            let lens = crate::files::json::read(bundled.text, bundled.name).unwrap();
+            Some((
+                bundled.name,
+                draft_of(&lens, &LensRequirements { elements: 20, ..asked.clone() })?,
+            ))
+        });
+        let mut count = 0;
+        for (name, draft) in found {
+            let is_plain = |medium: &Medium| {
+                matches!(medium, Medium::Air | Medium::Glass(_) | Medium::Model { .. })
+            };
+            assert!(draft.lens.surfaces.iter().all(|row| is_plain(&row.medium)), "{name}");
+            count += 1;
+        }
+        assert!(count > 5, "{count}");
+    }
 }

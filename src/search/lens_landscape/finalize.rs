@@ -342,4 +342,27 @@ mod tests {
             assert!(!agrees(&spot), "{factor}");
         }
     }
+
+    /// What keeps a tightened bound keeps the bound as well.
+    #[test]
+    fn tightened_bounds_lie_inside_of_the_bounds() {
+        let found =
+            crate::files::bundled_lenses().iter().find(|b| b.name == "tessar_50_f28").unwrap();
+        let lens = crate::files::json::read(found.text, found.name).unwrap();
+        let mut landscape =
+            crate::search::lens_landscape::SearchPlan::default().landscape(&lens).unwrap();
+        let gap =
+            Term::Operand { kind: crate::merit::OperandKind::Gap, min: Some(1.0), max: Some(9.0) };
+        landscape.goal.terms =
+            vec![WeightedTerm::new(gap, 1.0), WeightedTerm::new(Term::BackFocus(30.0), 1.0)];
+        for round in 0..3 {
+            let tight = landscape.tighten(round).goal.terms;
+            let Term::Operand { min: Some(min), max: Some(max), .. } = tight[0].term else {
+                panic!("{tight:?}");
+            };
+            assert!(min > 1.0 && max < 9.0 && min < max, "{min} {max}");
+            assert!(matches!(tight[1].term, Term::BackFocus(min) if min > 30.0));
+            assert!(tight[0].weight >= 1.0);
+        }
+    }
 }

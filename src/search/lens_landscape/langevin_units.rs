@@ -70,4 +70,35 @@ mod tests {
             assert!((same / sag - 1.0).abs() < 1e-12, "{term}: {same} {sag}");
         }
     }
+
+    /// Values in these units lead back to the lens, and a slope per unit is that of the loss.
+    #[test]
+    fn values_in_units_lead_back_to_the_lens() {
+        let found =
+            crate::files::bundled_lenses().iter().find(|b| b.name == "tessar_50_f28").unwrap();
+        let lens = crate::files::json::read(found.text, found.name).unwrap();
+        let landscape =
+            crate::search::lens_landscape::SearchPlan::default().landscape(&lens).unwrap();
+        let start = std::sync::Arc::clone(landscape.start());
+        let here = loss_gradient(&landscape, &start).unwrap();
+        let back = with_values(&landscape, &start, &here.values).unwrap();
+        for variable in &landscape.with_variables(&start).variables {
+            let [before, after] =
+                [&*start, &back].map(|lens| lens.get(variable.parameter).unwrap());
+            assert!((after - before).abs() <= 1e-12 * before.abs(), "{before} {after}");
+        }
+    }
+
+    /// The scale of losses is that of the spots alone, and penalties only add to it.
+    #[test]
+    fn the_scale_of_losses_is_at_most_the_loss_of_the_start() {
+        let found =
+            crate::files::bundled_lenses().iter().find(|b| b.name == "tessar_50_f28").unwrap();
+        let lens = crate::files::json::read(found.text, found.name).unwrap();
+        let landscape =
+            crate::search::lens_landscape::SearchPlan::default().landscape(&lens).unwrap();
+        let (scale, loss) =
+            (landscape.loss_scale(), crate::search::Landscape::loss(&landscape, landscape.start()));
+        assert!(scale > 0.0 && scale <= loss * (1.0 + 1e-9), "{scale} {loss}");
+    }
 }

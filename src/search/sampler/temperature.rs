@@ -152,3 +152,20 @@ fn log_sum(a: f64, b: f64) -> f64 {
     let (high, low) = if a > b { (a, b) } else { (b, a) };
     if high == f64::NEG_INFINITY { high } else { high + (low - high).exp().ln_1p() }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_logarithm_of_a_sum_is_that_of_the_sum() {
+        for (a, b) in [(0.3_f64, 2.0_f64), (2.0, 0.3), (-1.0, -1.0)] {
+            assert!((log_sum(a, b) - (a.exp() + b.exp()).ln()).abs() < 1e-14, "{a} {b}");
+        }
+        // Beyond the range of the exponential the larger one is all, in either order.
+        for (a, b) in [(800.0, -800.0), (5.0, f64::NEG_INFINITY)] {
+            assert_eq!((log_sum(a, b), log_sum(b, a)), (a, a));
+        }
+        assert_eq!(log_sum(f64::NEG_INFINITY, f64::NEG_INFINITY), f64::NEG_INFINITY);
+    }
+}

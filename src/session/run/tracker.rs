@@ -184,4 +184,13 @@ mod tests {
         assert_eq!(report_status(&mut tracker, third, Stopped), Stopped);
         assert_eq!(tracker.current(), Some(third));
     }
+
+    #[test]
+    fn a_run_that_starts_again_shows_neither_its_end_nor_its_failure() {
+        let mut tracker = RunTracker::default();
+        let number = tracker.start(false);
+        tracker.receive::<()>(ThreadMessage::Failed(number, "no lens".to_owned()));
+        tracker.restart();
+        assert_eq!((tracker.status(), tracker.error()), (Starting, None));
+    }
 }

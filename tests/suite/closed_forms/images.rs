@@ -4,8 +4,12 @@ use super::{FOCAL, assert_near, beam, field, paraboloid, system, thin_lens};
 use crate::aperture::image;
 use crate::merit::bundled;
 use crate::reference::lenses;
-use aplanat::analysis::{airy_radius, illumination, path_differences, spot};
+use aplanat::analysis::{
+    airy_radius, diffraction_gate, energy_irradiance, illumination, path_differences,
+    perfect_contrast, spot,
+};
 use aplanat::lens::{FieldPoint, Shape, Surface, System};
+use aplanat::picture::{ImageFrame, omitted_effects};
 use aplanat::pupil::{Accuracy, Aiming, RayModel};
 
 const ACCURACY: Accuracy = Accuracy { tolerance: 1e-11, max_rays: 400_000 };
@@ -173,5 +177,43 @@ fn the_farthest_ray_of_a_spot_is_known_to_the_tolerance() {
             let off = (found.value - exact.value).abs();
             assert!(off <= found.error + exact.error, "{} {found:?} {exact:?}", point.y);
         }
+    }
+}
+
+/// Rays show a paraboloid as perfect, so what diffraction changes at its focus is one minus the
+/// overlap of two discs; a finer pixel asks for a higher frequency, where that is more.
+#[test]
+fn the_change_by_diffraction_of_a_perfect_lens_is_in_closed_form() {
+    let model = model(vec![(UM, 1.0, paraboloid(0.0))], 10.0, 0.0);
+    let f_number = model.first_order.working_f_number.unwrap().abs();
+    let exact = |frequency: f64| 1.0 - perfect_contrast(frequency * UM * 1e-3 * f_number);
+    let axis = field(0.0, 0.0);
+    for highest in [20.0, 40.0] {
+        let gate = diffraction_gate(&model, axis, 0, highest, 1e-3).unwrap();
+        let change = gate.change.unwrap().value;
+        assert!((change / exact(highest) - 1.0).abs() < 0.01, "{change} {}", exact(highest));
+        let pitch = 0.5 / highest;
+        let frame = ImageFrame { pixels: [8, 8], pitch, center: [0.0; 2], inverted: true };
+        let left_out = omitted_effects(&model, &frame, 1e-3);
+        assert_eq!(left_out[0].effect, "diffraction");
+        let change = left_out[0].change.unwrap();
+        assert!((change / exact(highest) - 1.0).abs() < 0.01, "{change} {}", exact(highest));
+    }
+}
+
+/// A lens of revolution sees a field turned about its axis as it was: nothing depends on the azimuth
+/// of its rays, aimed at the stop or not.
+#[test]
+fn the_light_of_a_turned_field_is_the_same() {
+    let lens = bundled("wide_nikkor_28_f35");
+    let model = RayModel { aiming: Aiming::Stop, ..RayModel::from_lens(&lens, 0).unwrap() };
+    let accuracy = Accuracy { tolerance: 1e-4, ..Accuracy::default() };
+    let at = |x: f64, y: f64| {
+        energy_irradiance(&model, field(x, y), model.primary, accuracy).unwrap().value
+    };
+    let straight = at(0.0, 15.0);
+    for (x, y) in [(9.0, 12.0), (-12.0, 9.0)] {
+        let turned = at(x, y);
+        assert!((turned / straight - 1.0).abs() < 2e-3, "{x} {y}: {turned} {straight}");
     }
 }

@@ -187,3 +187,39 @@ fn malformed_files_are_refused_with_their_line() {
         }
     }
 }
+
+#[test]
+fn what_a_written_file_cannot_hold_is_reported() {
+    let mut lens = changed("  CON; K -0.5", "  DIF DOE; HOR 1.0\n  HCO C1 -0.0018").lens;
+    lens.surfaces[1].conic = 0.0;
+    lens.surfaces[0].hyperhemisphere = true;
+    let path = super::folder("codev-lost").join("lost.seq");
+    let report = files::save(&lens, path).unwrap().report.unwrap();
+    assert_eq!(outcome(&report, "hyperhemisphere of surface 1"), ConversionOutcome::Dropped);
+    assert_eq!(outcome(&report, "surface 2: DIF DOE"), ConversionOutcome::Locked);
+}
+
+/// Light from a point far away has no numerical aperture, and no beam is of size 0.
+#[test]
+fn apertures_of_zoom_positions_are_those_that_a_lens_can_have() {
+    let zoom = "ZOO   2\nZOO NAO 0.1 0.2\nZOO EPD 12.0 0.0\nGO";
+    let opened = open(&text().replace("\nGO", &format!("\n{zoom}")));
+    assert_eq!(opened.lens.zoom_positions(), 2);
+    assert_eq!(opened.lens.aperture_at(1), Aperture::EntrancePupilDiameter(12.0));
+    let report = opened.report.unwrap();
+    assert_eq!(outcome(&report, "ZOO NAO"), ConversionOutcome::Dropped);
+    assert_eq!(outcome(&report, "ZOO EPD"), ConversionOutcome::Dropped);
+}
+
+#[test]
+fn every_zoom_position_is_written_and_read_back() {
+    let zoom = "ZOO   3\nZOO THI S3 30.0 35.0 41.5\nGO";
+    let lens = open(&text().replace("\nGO", &format!("\n{zoom}"))).lens;
+    assert_eq!(lens.zoom_positions(), 3);
+    let path = super::folder("codev-zoom").join("zoom.seq");
+    files::save(&lens, &path).unwrap();
+    let back = files::open(&path).unwrap().lens;
+    for position in 0..3 {
+        assert_eq!(back.thickness_at(2, position), lens.thickness_at(2, position), "{position}");
+    }
+}

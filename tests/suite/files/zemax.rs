@@ -299,6 +299,8 @@ fn malformed_files_are_refused_with_their_line() {
         ("ENPD 16.0", "ENPD", "line 7: found `ENPD` with 0 fields"),
         ("ENPD 16.0", "ENPD -3", "line 7: found Diameter(-3.0)"),
         ("ENPD 16.0", "ENPD 0", "line 7: found Diameter(0.0)"),
+        ("ENPD 16.0", "OBNA 95 1", "line 7: found ObjectConeDegrees(95.0)"),
+        ("ENPD 16.0", "OBNA 0 1", "line 7: found ObjectConeDegrees(0.0)"),
         ("ENPD 16.0", "", "found no aperture before it; expected ENPD, FNUM, OBNA or FLOA"),
         ("SURF 0", "  DISZ 3\r\nSURF 0", "line 23: found `DISZ 3` before the first SURF"),
         ("SURF 2", "SURF 3", "line 39: found `SURF 3`; expected SURF 2"),

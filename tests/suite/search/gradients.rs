@@ -6,7 +6,8 @@ use super::projection::assert_equivalent;
 use super::{generous, seeded};
 use crate::merit::bundled;
 use aplanat::lens::{
-    GradientIndex, Lens, Medium, Parameter, Pickup, ProfileLaw, Quantity, RADIAL_TERMS, Variable,
+    GradientIndex, Lens, Medium, Parameter, Pickup, ProfileLaw, Quantity, RADIAL_TERMS, Row,
+    Variable,
 };
 use aplanat::math::Vec3;
 use aplanat::search::lens_landscape::{
@@ -335,4 +336,39 @@ fn apertures_are_not_opened_where_the_index_is_unknown() {
     let plate = with_open_apertures(&bundled("wood_lens_60"), 40.0);
     assert_eq!(rims(&plate), [7.5, 8.0]);
     assert!(plate.resolve(0, 0.5875618).is_ok());
+}
+
+#[test]
+fn the_bounds_of_the_gaps_beside_a_diaphragm_add_up_when_it_goes() {
+    let mut lens = bundled("double_gauss_rudolph_50");
+    let stop = lens.stop().unwrap();
+    let gap = |row: usize| Parameter::new(row, Quantity::Thickness);
+    let variable =
+        |row: usize, min: Option<f64>, max: Option<f64>| Variable { parameter: gap(row), min, max };
+    for (second, expected) in [(Some(1.5), Some(2.0)), (None, None)] {
+        lens.variables =
+            vec![variable(stop - 1, Some(0.5), Some(8.0)), variable(stop, second, Some(9.0))];
+        let open = with_open_apertures(&lens, 12.0);
+        assert_eq!(open.surfaces.len() + 1, lens.surfaces.len(), "the plane is gone");
+        let sum = lens.surfaces[stop - 1].thickness + lens.surfaces[stop].thickness;
+        assert!((open.surfaces[stop - 1].thickness - sum).abs() < 1e-12);
+        let joined = open.variable(gap(stop - 1)).unwrap();
+        assert_eq!((joined.min, joined.max), (expected, Some(17.0)));
+    }
+}
+
+/// A plane behind the last element has no surface on its far side with which its gap could be joined.
+#[test]
+fn a_diaphragm_behind_the_lens_stays() {
+    let mut lens = bundled("achromat_ac254_100");
+    lens.surfaces.iter_mut().for_each(|row| row.stop = false);
+    let image = lens.surfaces.last_mut().unwrap();
+    let rest = image.thickness - 3.0;
+    image.thickness = 3.0;
+    let row = Row { thickness: rest, stop: true, semi_diameter: Some(9.0), ..Row::default() };
+    lens.surfaces.push(row);
+    lens.check().unwrap();
+    let open = with_open_apertures(&lens, 20.0);
+    assert_eq!((open.surfaces.len(), open.stop()), (lens.surfaces.len(), lens.stop()));
+    assert_lens(&open);
 }
