@@ -44,7 +44,8 @@ fn units_shapes_and_what_follows_are_read() {
     assert!((efl(&inches) / efl(&read(&text())) - 25.4).abs() < 1e-9);
     let odd = text()
         .replace("RD 22.01359", "CV 0.0454\nCC -0.5\nAD 1e-6\nAF -2e-9")
-        .replace("RD -18.39533", "PK CVM 1 0.001\nPY 0.0")
+        .replace("RD -18.39533", "PK CVM 1 0.001")
+        .replace("TH 42.20778", "TH 42.20778\nPY 0.0")
         .replace("RD 79.6836\nTH 2.95208", "PK TH -4 2.0");
     let lens = read(&odd).lens;
     let front = &lens.surfaces[0];
