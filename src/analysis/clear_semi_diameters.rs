@@ -3,7 +3,7 @@
 
 use crate::lens::FieldPoint;
 use crate::pupil::{Launch, RayModel};
-use crate::trace::Ray;
+use crate::trace::{ImagePoints, Ray, Rays, TraceSink as _};
 use rayon::prelude::*;
 use std::f64::consts::PI;
 
@@ -41,39 +41,52 @@ fn higher(mut a: Vec<f64>, b: Vec<f64>) -> Vec<f64> {
 /// Raises heights to those of the edge of a pupil.
 fn raise_to_edge(heights: &mut [f64], launch: &Launch<'_>) {
     let halves: &[f64] = if launch.is_symmetric() { &[1.0] } else { &[1.0, -1.0] };
-    for side in halves {
-        for i in 0..=AZIMUTHS {
-            let angle = PI * (f64::from(i) / f64::from(AZIMUTHS) - 0.5);
-            let outward = [side * angle.cos(), angle.sin()];
-            let Some(edge) = outermost(launch, outward) else { continue };
-            launch.channel().tracer.visit(edge, |surface, p| {
-                heights[surface] = heights[surface].max(p.x.hypot(p.y));
-            });
-        }
+    let angle = |i: u32| PI * (f64::from(i) / f64::from(AZIMUTHS) - 0.5);
+    let direction = |side: f64, i: u32| [side * angle(i).cos(), angle(i).sin()];
+    let outward = halves.iter().flat_map(|side| (0..=AZIMUTHS).map(|i| direction(*side, i)));
+    for edge in outermost(launch, &outward.collect::<Vec<_>>()).into_iter().flatten() {
+        launch.channel().tracer.visit(edge, |surface, p| {
+            heights[surface] = heights[surface].max(p.x.hypot(p.y));
+        });
     }
 }
 
-/// The outermost ray in a direction of the pupil that reaches the image; `None` if not even the ray
+/// The outermost ray in each direction of the pupil that reaches the image; `None` if not even the ray
 /// through the centre of the pupil does.
-fn outermost(launch: &Launch<'_>, outward: [f64; 2]) -> Option<Ray<f64>> {
-    let at = |share: f64| {
-        let ray = launch.ray_through_stop(outward.map(|c| share * c))?;
-        launch.channel().tracer.trace(ray).fate.is_imaged().then_some(ray)
+fn outermost(launch: &Launch<'_>, outward: &[[f64; 2]]) -> Vec<Option<Ray<f64>>> {
+    let mut found = passing(launch, outward);
+    let cut: Vec<usize> = (0..outward.len()).filter(|i| found[*i].is_none()).collect();
+    let Some(center) = passing(launch, &[[0.0; 2]])[0].filter(|_| !cut.is_empty()) else {
+        return found;
     };
-    if let Some(ray) = at(1.0) {
-        return Some(ray);
-    }
-    let (mut inside, mut outside) = (0.0, 1.0);
-    let mut found = at(inside);
-    found.as_ref()?;
+    cut.iter().for_each(|i| found[*i] = Some(center));
+    let mut between = vec![(0.0, 1.0); cut.len()];
     for _ in 0..HALVINGS {
-        let middle = 0.5 * (inside + outside);
-        match at(middle) {
-            None => outside = middle,
-            ray => (inside, found) = (middle, ray),
+        let middle = |(inside, outside): &(f64, f64)| 0.5 * (inside + outside);
+        let shares = between.iter().map(middle);
+        let points: Vec<_> =
+            cut.iter().zip(shares).map(|(i, share)| outward[*i].map(|c| share * c)).collect();
+        for ((ray, i), between) in passing(launch, &points).into_iter().zip(&cut).zip(&mut between)
+        {
+            match ray {
+                None => between.1 = middle(between),
+                ray => (between.0, found[*i]) = (middle(between), ray),
+            }
         }
     }
     found
+}
+
+/// The rays through some points of the stop that reach the image.
+fn passing(launch: &Launch<'_>, points: &[[f64; 2]]) -> Vec<Option<Ray<f64>>> {
+    let mut rays = launch.rays_through_stop(points);
+    let launched: Rays<f64> = rays.iter().flatten().copied().collect();
+    let mut landed = ImagePoints::default();
+    launch.channel().tracer.trace_batch(&launched, &mut landed);
+    for (i, ray) in rays.iter_mut().filter(|ray| ray.is_some()).enumerate() {
+        *ray = ray.filter(|_| landed.fate(i).is_imaged());
+    }
+    rays
 }
 
 #[cfg(test)]

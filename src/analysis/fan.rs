@@ -4,7 +4,7 @@
 use super::AnalysisError;
 use crate::lens::FieldPoint;
 use crate::pupil::RayModel;
-use crate::trace::Fate;
+use crate::trace::{Fate, Ray};
 
 /// A ray of a fan.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -39,8 +39,8 @@ pub fn fan(model: &RayModel, field: FieldPoint, count: usize) -> Result<Vec<Fan>
     let chief = model.chief_point(field, model.primary)?;
     let one = |wavelength: usize| {
         let launch = model.launch(field, wavelength).map_err(AnalysisError::NoRays)?;
-        let point = |pupil: f64, p: [f64; 2]| {
-            let landing = launch.ray_through_stop(p).map(|ray| launch.channel().tracer.trace(ray));
+        let point = |(pupil, ray): (f64, Option<Ray<f64>>)| {
+            let landing = ray.map(|ray| launch.channel().tracer.trace(ray));
             let arrived = landing.filter(|landing| landing.fate.is_imaged());
             let error = |at: crate::math::Vec3<f64>| [at.x - chief[0], at.y - chief[1]];
             FanPoint {
@@ -50,11 +50,12 @@ pub fn fan(model: &RayModel, field: FieldPoint, count: usize) -> Result<Vec<Fan>
             }
         };
         let at = |i: usize| 2.0 * i as f64 / count.saturating_sub(1).max(1) as f64 - 1.0;
-        Ok(Fan {
-            wavelength,
-            tangential: (0..count).map(|i| point(at(i), [0.0, at(i)])).collect(),
-            sagittal: (0..count).map(|i| point(at(i), [at(i), 0.0])).collect(),
-        })
+        let section = |place: fn(f64) -> [f64; 2]| {
+            let points: Vec<_> = (0..count).map(|i| place(at(i))).collect();
+            let rays = launch.rays_through_stop(&points);
+            (0..count).map(at).zip(rays).map(point).collect()
+        };
+        Ok(Fan { wavelength, tangential: section(|y| [0.0, y]), sagittal: section(|x| [x, 0.0]) })
     };
     (0..model.channels.len()).map(one).collect()
 }

@@ -45,8 +45,10 @@ pub fn ray_layout(model: &RayModel, count: usize) -> RayLayout {
     for (field, point) in model.fields.iter().enumerate() {
         match model.launch(*point, model.primary) {
             Ok(launch) => {
-                for pupil in pupil_coordinates(count) {
-                    if let Some(ray) = launch.ray_through_stop([0.0, pupil]) {
+                let heights: Vec<[f64; 2]> = pupil_coordinates(count).map(|y| [0.0, y]).collect();
+                for (pupil, ray) in pupil_coordinates(count).zip(launch.rays_through_stop(&heights))
+                {
+                    if let Some(ray) = ray {
                         let mut path = launch.channel().tracer.polyline(ray);
                         layout.count(&path);
                         extend_backwards(model, &mut path.points, ray.direction);

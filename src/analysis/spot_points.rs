@@ -38,7 +38,7 @@ pub fn spot_points(model: &RayModel) -> Vec<SpotPoints> {
 }
 
 fn points_of(launch: &Launch<'_>, points: &[[f64; 2]]) -> SpotPoints {
-    let rays: Rays<f64> = points.iter().filter_map(|p| launch.ray_through_stop(*p)).collect();
+    let rays: Rays<f64> = launch.rays_through_stop(points).into_iter().flatten().collect();
     let mut landed = ImagePoints::default();
     launch.channel().tracer.trace_batch(&rays, &mut landed);
     let arrived = (0..rays.len()).filter(|i| landed.fate(*i).is_imaged());

@@ -177,7 +177,7 @@ impl SampledBundle {
         let mut bundle = Self {
             field: launch.field,
             wavelength: launch.wavelength,
-            rays: places.iter().map(|p| launch.ray(*p)).collect(),
+            rays: launch.rays(places),
             landed: Vec::with_capacity(places.len()),
             fates: Fates::default(),
             grazing: None,
@@ -368,7 +368,7 @@ fn raise_heights(
     points: &[[f64; 2]],
     tracer: &Tracer<f64>,
 ) {
-    let rays: Rays<f64> = points.iter().filter_map(|p| launch.ray(*p)).collect();
+    let rays: Rays<f64> = launch.rays(points).into_iter().flatten().collect();
     let mut landed = ImagePoints::default();
     tracer.trace_batch(&rays, &mut landed);
     for i in (0..rays.len()).filter(|i| landed.fate(*i).is_imaged()) {

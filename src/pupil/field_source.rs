@@ -6,7 +6,7 @@ use crate::math::{Real, Vec3};
 use crate::trace::Ray;
 
 /// The origin that all rays of a field share.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum FieldSource {
     /// A direction. `across` spans the plane perpendicular to it; `ahead` is the distance in front
     /// of that plane at which a ray starts that cannot start at the first vertex plane, in mm.

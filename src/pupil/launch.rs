@@ -6,7 +6,8 @@
 //! telecentric beam `q` is the slope. A [`PupilMap`] leads from pupil coordinates to that plane.
 
 use super::field_source::{FieldSource, GRAZING, PupilMap, field_source, paraxial_map};
-use super::ray_aiming::{AimedRay, aim_at, aim_from_chief_ray};
+use super::found_pupils::FoundPupils;
+use super::ray_aiming::{AimedRay, aim_all_from_chief_ray, aim_at, aim_from_chief_ray};
 use super::ray_model::{Aiming, Channel, Dual2, PupilMeasure, RayModel};
 use crate::lens::{FieldKind, FieldPoint};
 use crate::math::Real;
@@ -35,7 +36,7 @@ const WIDE: f64 = 45.0;
 
 /// The rays of one field and wavelength, independent of the lens: an integral over a moving pupil
 /// keeps them while the lens changes.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FixedLaunch {
     field: FieldPoint,
     wavelength: usize,
@@ -102,14 +103,22 @@ impl<'a> Launch<'a> {
         let source = field_source(model, field).ok_or(LaunchError::NoObjectPoint)?;
         let map = paraxial_map(model, &source);
         let mut launch = Self { model, field, wavelength, aiming, source, map };
-        match aiming {
-            Aiming::Paraxial => {}
-            Aiming::Chief | Aiming::Stop => {
-                let chief = launch.chief_ray().ok_or(LaunchError::NotAimed)?;
-                launch.map = chief.pupil_map(model.stop_radius()).ok_or(LaunchError::NotAimed)?;
-            }
+        if aiming != Aiming::Paraxial {
+            let search = || launch.map_at_stop().ok_or(LaunchError::NotAimed);
+            let own = launch.found_pupils();
+            launch.map = own.map_or_else(search, |own| own.map(&launch.to_fixed(), search))?;
         }
         Ok(launch)
+    }
+
+    /// The affine map at the chief ray; `None` if that was not found.
+    fn map_at_stop(&self) -> Option<PupilMap> {
+        self.chief_ray()?.pupil_map(self.model.stop_radius())
+    }
+
+    /// The pupils that the model remembers if the field is one of its own.
+    pub(super) fn found_pupils(&self) -> Option<&'a FoundPupils> {
+        self.model.fields.contains(&self.field).then_some(&self.model.found)
     }
 
     /// The same rays, independent of the lens.
@@ -175,6 +184,15 @@ impl<'a> Launch<'a> {
         Some(self.source.ray(self.ray_coordinates(p)?))
     }
 
+    /// The rays at some pupil coordinates, as [`Launch::ray`] finds each.
+    pub fn rays(&self, points: &[[f64; 2]]) -> Vec<Option<Ray<f64>>> {
+        if self.aiming != Aiming::Stop {
+            return points.iter().map(|p| self.ray(*p)).collect();
+        }
+        let found = self.aim_all_coordinates(points);
+        found.into_iter().map(|q| Some(self.source.ray(q?))).collect()
+    }
+
     /// The ray that crosses the real stop at a point of it, in stop radii, if its rim limits the
     /// beam; else, and if no such ray is found, that at these pupil coordinates.
     pub fn ray_through_stop(&self, p: [f64; 2]) -> Option<Ray<f64>> {
@@ -186,6 +204,20 @@ impl<'a> Launch<'a> {
             }
         }
         self.ray(p)
+    }
+
+    /// The rays that cross the real stop at some points of it, as [`Launch::ray_through_stop`] finds
+    /// each.
+    pub fn rays_through_stop(&self, points: &[[f64; 2]]) -> Vec<Option<Ray<f64>>> {
+        if self.aiming != Aiming::Chief || self.model.ends_at_disc() {
+            return self.rays(points);
+        }
+        let inside: Vec<_> = points.iter().map(|p| p.map(|v| v * (1.0 - INSIDE_RIM))).collect();
+        let found = self.aim_all_coordinates(&inside);
+        let ray = |(q, p): (Option<[f64; 2]>, &[f64; 2])| {
+            q.map_or_else(|| self.ray(*p), |q| Some(self.source.ray(q)))
+        };
+        found.into_iter().zip(points).map(ray).collect()
     }
 
     /// The intersection of the ray at these pupil coordinates with the plane in which pupils are
@@ -241,8 +273,8 @@ impl<'a> Launch<'a> {
     pub fn trace_points(&self, points: &[[f64; 2]]) -> (Vec<usize>, ImagePoints<f64>) {
         let mut rays = Rays::with_capacity(points.len());
         let mut launched = Vec::with_capacity(points.len());
-        for (i, p) in points.iter().enumerate() {
-            if let Some(ray) = self.ray(*p) {
+        for (i, ray) in self.rays(points).into_iter().enumerate() {
+            if let Some(ray) = ray {
                 rays.push(ray);
                 launched.push(i);
             }
@@ -310,6 +342,14 @@ impl<'a> Launch<'a> {
     fn aim_coordinates(&self, p: [f64; 2]) -> Option<[f64; 2]> {
         aim_from_chief_ray(self.model, self.wavelength, &self.source, &self.map, p)
             .or_else(|| Some(self.aim(p)?.q))
+    }
+
+    /// The same for several points, most of them searched for together.
+    fn aim_all_coordinates(&self, points: &[[f64; 2]]) -> Vec<Option<[f64; 2]>> {
+        let found =
+            aim_all_from_chief_ray(self.model, self.wavelength, &self.source, &self.map, points);
+        let alone = |p: &[f64; 2]| Some(self.aim(*p)?.q);
+        found.into_iter().zip(points).map(|(q, p)| q.or_else(|| alone(p))).collect()
     }
 
     fn aim(&self, p: [f64; 2]) -> Option<AimedRay> {

@@ -17,6 +17,7 @@
 //! stop if every ray is aimed at it.
 
 mod field_source;
+mod found_pupils;
 mod gauss_rules;
 mod gradient;
 mod launch;
@@ -27,6 +28,7 @@ mod real_beam;
 mod region;
 mod stop_limited;
 
+pub use found_pupils::FoundPupils;
 pub use gradient::{
     DerivativeError, DerivativeEstimator, Integrand, PupilDerivative, QuadraticIntegrand,
     WarpSampling, choose_estimator, differentiate,

@@ -6,6 +6,7 @@
 use super::field_source::{FieldSource, PupilMap, solve_2x2};
 use super::ray_model::{Dual2, RayModel};
 use crate::math::Vec3;
+use crate::trace::{ImagePoints, Rays, TraceSink as _};
 
 /// A ray that crosses a surface at a given point.
 #[derive(Debug, Clone, Copy)]
@@ -52,27 +53,122 @@ pub(super) fn aim_from_chief_ray(
     map: &PupilMap,
     target: [f64; 2],
 ) -> Option<[f64; 2]> {
-    let radius = model.stop_radius();
-    let [[a, b], [c, d]] = map.columns.map(|column| column.map(|v| v / radius));
-    let (surface, goal) = (model.stop(), target.map(|v| v * radius));
-    let search = AimSolver { model, wavelength, source, surface, target: goal };
-    let (mut q, mut slopes) = (map.map(target), [[a, c], [b, d]]);
-    let mut offset = search.offset(q)?;
+    let (surface, goal) = (model.stop(), target.map(|v| v * model.stop_radius()));
+    let solver = AimSolver { model, wavelength, source, surface, target: goal };
+    let start = map.map(target);
+    let mut search = SecantSearch::new(map, model.stop_radius(), start, solver.offset(start)?);
     for _ in 0..SECANT_STEPS {
-        let step = [0, 1].map(|i| -dot2(slopes[i], offset));
-        let next = [q[0] + step[0], q[1] + step[1]];
-        let there = search.offset(next)?;
-        let (before, size) = (offset[0].hypot(offset[1]), there[0].hypot(there[1]));
-        if size <= EXACT * search.scale() || (size >= 0.5 * before && size <= search.tolerance()) {
-            return Some(next);
+        let next = search.next();
+        match search.advance(next, solver.offset(next)?, &solver) {
+            SecantStep::Closer => {}
+            SecantStep::Found => return Some(next),
+            SecantStep::Failed => return None,
         }
-        if size >= before {
-            return None;
-        }
-        update_inverse(&mut slopes, step, [there[0] - offset[0], there[1] - offset[1]])?;
-        (q, offset) = (next, there);
     }
     None
+}
+
+/// The same for many targets together, whose rays are traced in batches; bit for bit what
+/// [`aim_from_chief_ray`] finds for each.
+pub(super) fn aim_all_from_chief_ray(
+    model: &RayModel,
+    wavelength: usize,
+    source: &FieldSource,
+    map: &PupilMap,
+    targets: &[[f64; 2]],
+) -> Vec<Option<[f64; 2]>> {
+    let radius = model.stop_radius();
+    let goal = |i: usize| targets[i].map(|v| v * radius);
+    let solver =
+        |i: usize| AimSolver { model, wavelength, source, surface: model.stop(), target: goal(i) };
+    let starts: Vec<[f64; 2]> = targets.iter().map(|target| map.map(*target)).collect();
+    let crossed = stop_points(model, wavelength, source, &starts);
+    let begin = |(i, (start, point)): (usize, (&[f64; 2], Option<[f64; 2]>))| {
+        let offset = solver(i).offset_of(point?)?;
+        Some((i, SecantSearch::new(map, radius, *start, offset)))
+    };
+    let mut active: Vec<(usize, SecantSearch)> =
+        starts.iter().zip(crossed).enumerate().filter_map(begin).collect();
+    let mut found = vec![None; targets.len()];
+    for _ in 0..SECANT_STEPS {
+        let next: Vec<[f64; 2]> = active.iter().map(|(_, search)| search.next()).collect();
+        let mut crossed = stop_points(model, wavelength, source, &next).into_iter().zip(next);
+        active.retain_mut(|(i, search)| {
+            let Some((Some(point), next)) = crossed.next() else { return false };
+            let solver = solver(*i);
+            let Some(there) = solver.offset_of(point) else { return false };
+            let step = search.advance(next, there, &solver);
+            if step == SecantStep::Found {
+                found[*i] = Some(next);
+            }
+            step == SecantStep::Closer
+        });
+    }
+    found
+}
+
+/// The points at which rays of a source cross the stop, in mm; `None` for a ray that does not get there.
+fn stop_points(
+    model: &RayModel,
+    wavelength: usize,
+    source: &FieldSource,
+    coordinates: &[[f64; 2]],
+) -> Vec<Option<[f64; 2]>> {
+    let rays: Rays<f64> = coordinates.iter().map(|q| source.ray(*q)).collect();
+    let mut crossed = ImagePoints::default();
+    model.channels[wavelength].to_stop.trace_batch(&rays, &mut crossed);
+    let point = |i: usize| crossed.fate(i).is_imaged().then(|| [crossed.x[i], crossed.y[i]]);
+    (0..rays.len()).map(point).collect()
+}
+
+/// Broyden's search for the ray coordinates of one ray.
+struct SecantSearch {
+    q: [f64; 2],
+    /// The inverse of the derivatives of the point at the stop by the ray coordinates.
+    inverse: [[f64; 2]; 2],
+    offset: [f64; 2],
+}
+
+/// The outcome of a step of a search.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum SecantStep {
+    Closer,
+    Found,
+    Failed,
+}
+
+impl SecantSearch {
+    /// The search from the affine map at the chief ray.
+    fn new(map: &PupilMap, radius: f64, q: [f64; 2], offset: [f64; 2]) -> Self {
+        let [[a, b], [c, d]] = map.columns.map(|column| column.map(|v| v / radius));
+        Self { q, inverse: [[a, c], [b, d]], offset }
+    }
+
+    fn step(&self) -> [f64; 2] {
+        self.inverse.map(|row| -dot2(row, self.offset))
+    }
+
+    /// The ray coordinates to try next.
+    fn next(&self) -> [f64; 2] {
+        let step = self.step();
+        [0, 1].map(|i| self.q[i] + step[i])
+    }
+
+    /// Goes on to ray coordinates whose ray misses the target by `there`.
+    fn advance(&mut self, next: [f64; 2], there: [f64; 2], solver: &AimSolver<'_>) -> SecantStep {
+        let before = self.offset[0].hypot(self.offset[1]);
+        let size = there[0].hypot(there[1]);
+        if size <= EXACT * solver.scale() || (size >= 0.5 * before && size <= solver.tolerance()) {
+            return SecantStep::Found;
+        }
+        let step = self.step();
+        let change = [0, 1].map(|i| there[i] - self.offset[i]);
+        if size >= before || update_inverse(&mut self.inverse, step, change).is_none() {
+            return SecantStep::Failed;
+        }
+        (self.q, self.offset) = (next, there);
+        SecantStep::Closer
+    }
 }
 
 /// Broyden's update of the inverse of a matrix of derivatives after a step that has changed the values
@@ -158,8 +254,13 @@ impl AimSolver<'_> {
         let channel = &self.model.channels[self.wavelength];
         let landing = channel.open.trace_to(self.source.ray(q), self.surface);
         let Vec3 { x, y, .. } = landing.ray.point;
-        let offset = [x - self.target[0], y - self.target[1]];
-        (landing.fate.is_imaged() && offset.iter().all(|v| v.is_finite())).then_some(offset)
+        landing.fate.is_imaged().then(|| self.offset_of([x, y]))?
+    }
+
+    /// The distance between a point of the surface and the target; `None` if it is not finite.
+    fn offset_of(&self, point: [f64; 2]) -> Option<[f64; 2]> {
+        let offset = [0, 1].map(|i| point[i] - self.target[i]);
+        offset.iter().all(|v| v.is_finite()).then_some(offset)
     }
 
     fn evaluate(&self, q: [f64; 2]) -> Option<AimOffset> {

@@ -1,5 +1,6 @@
 //! A lens with its beam, ready for tracing.
 
+use super::found_pupils::FoundPupils;
 use crate::lens::{Aperture, FieldPoint, Lens, LensError, System, SystemError};
 use crate::math::Dual;
 use crate::paraxial::{Beam, FirstOrder, ParaxialError, Seidel, first_order, seidel};
@@ -75,6 +76,8 @@ pub struct Channel {
     pub(super) unclipped: Tracer<Dual2>,
     /// The same in plain numbers.
     pub(super) open: Tracer<f64>,
+    /// The same up to and including the stop.
+    pub(super) to_stop: Tracer<f64>,
 }
 
 /// A lens with its beam at one zoom position, ready for tracing at every wavelength.
@@ -96,6 +99,8 @@ pub struct RayModel {
     pub neglected: Neglected,
     /// The measure of integrals over a pupil.
     pub measure: PupilMeasure,
+    /// The pupils found so far for its own fields; a clone begins without any.
+    pub found: FoundPupils,
 }
 
 impl RayModel {
@@ -135,7 +140,8 @@ impl RayModel {
             let tracer = Tracer::new(&system)?;
             let unclipped = Tracer::new(&system.cast::<Dual2>())?.without_rims();
             let open = tracer.clone().without_rims();
-            Ok(Channel { um, weight, system, tracer, unclipped, open })
+            let to_stop = open.up_to(stop);
+            Ok(Channel { um, weight, system, tracer, unclipped, open, to_stop })
         };
         let channels: Result<Vec<_>, SystemError> = systems.into_iter().map(channel).collect();
         Ok(Self {
@@ -147,6 +153,7 @@ impl RayModel {
             aiming,
             neglected: Neglected::default(),
             measure: PupilMeasure::default(),
+            found: FoundPupils::default(),
         })
     }
 
@@ -156,6 +163,7 @@ impl RayModel {
         self.channels.truncate(1);
         self.channels[0].weight = 1.0;
         self.primary = 0;
+        self.found = FoundPupils::default();
     }
 
     /// The Seidel sums; the chromatic ones between the shortest and the longest wavelength if there
@@ -175,13 +183,14 @@ impl RayModel {
         wavelength: usize,
         system: System<f64>,
     ) -> Result<Self, SystemError> {
-        let mut model = self.clone();
+        let (mut model, stop) = (self.clone(), self.stop());
         if let Aperture::StopSemiDiameter(radius) = &mut model.beam.aperture {
-            *radius = system.surfaces[self.stop()].semi_diameter;
+            *radius = system.surfaces[stop].semi_diameter;
         }
         let channel = &mut model.channels[wavelength];
         channel.tracer = Tracer::new(&system)?;
         channel.open = channel.tracer.clone().without_rims();
+        channel.to_stop = channel.open.up_to(stop);
         channel.unclipped = Tracer::new(&system.cast::<Dual2>())?.without_rims();
         channel.system = system;
         Ok(model)

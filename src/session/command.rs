@@ -178,6 +178,10 @@ pub enum PanelSetting {
     Rays(usize),
     /// True to compute the pupils of the fields.
     Pupils(bool),
+    /// True to compute the ray fans.
+    Fans(bool),
+    /// True to compute distortion, field curvature and illumination over the field.
+    FieldCurves(bool),
     /// True to compute the contrast of the fields.
     Contrasts(bool),
     /// True to compute the picture of a scene.

@@ -18,6 +18,11 @@ use std::sync::Arc;
 /// The number of moved numbers that a message names.
 const NAMED_NUMBERS: usize = 4;
 
+/// The relative error allowed of spots in the merit of a lens with handles: its derivatives are arrows,
+/// and while a handle is dragged its terms are told with their errors. The lens at rest has them to the
+/// tolerance of the settings.
+const COARSE: f64 = 1e-2;
+
 /// A drag that has not ended.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DragProgress {
@@ -201,7 +206,7 @@ impl DragState {
             goal,
             zoom,
             settings: self.settings.clone(),
-            tolerance,
+            tolerance: tolerance.max(COARSE),
         });
     }
 }

@@ -29,12 +29,22 @@ impl Arrangement {
     }
 }
 
+/// The panels of the light in the image.
+const LIGHT: [PanelKind; 7] = [
+    PanelKind::Spot,
+    PanelKind::Fans,
+    PanelKind::Contrast,
+    PanelKind::FieldCurves,
+    PanelKind::Pupil,
+    PanelKind::Picture,
+    PanelKind::Seidel,
+];
+
 fn default_arrangement() -> Tree<PanelKind> {
     use PanelKind as Kind;
     let mut tiles = Tiles::default();
     let facts = tabs(&mut tiles, &[Kind::FirstOrder, Kind::Effects]);
-    let light =
-        tabs(&mut tiles, &[Kind::Spot, Kind::Pupil, Kind::Contrast, Kind::Picture, Kind::Seidel]);
+    let light = tabs(&mut tiles, &LIGHT);
     let better = tabs(&mut tiles, &[Kind::Optimizer, Kind::Pareto, Kind::Search, Kind::History]);
     let drawings = tabs(&mut tiles, &[Kind::Layout, Kind::Slice]);
     let table = tabs(&mut tiles, &[Kind::Prescription, Kind::System, Kind::Zoom, Kind::Tolerances]);
@@ -49,8 +59,7 @@ fn search_arrangement() -> Tree<PanelKind> {
     use PanelKind as Kind;
     let mut tiles = Tiles::default();
     let drawings = tabs(&mut tiles, &[Kind::Layout, Kind::Slice]);
-    let light =
-        tabs(&mut tiles, &[Kind::Spot, Kind::Pupil, Kind::Contrast, Kind::Picture, Kind::Seidel]);
+    let light = tabs(&mut tiles, &LIGHT);
     let numbers = [
         Kind::Prescription,
         Kind::System,
@@ -75,8 +84,8 @@ fn large_arrangement() -> Tree<PanelKind> {
     let system = tabs(&mut tiles, &[Kind::System, Kind::Zoom, Kind::Tolerances]);
     let table = row(&mut tiles, &[(table, 0.66), (system, 0.34)]);
     let left = column(&mut tiles, &[(drawings, 0.54), (table, 0.46)]);
-    let spots = tabs(&mut tiles, &[Kind::Spot, Kind::Pupil]);
-    let contrast = tabs(&mut tiles, &[Kind::Contrast, Kind::Picture]);
+    let spots = tabs(&mut tiles, &[Kind::Spot, Kind::Fans, Kind::Pupil]);
+    let contrast = tabs(&mut tiles, &[Kind::Contrast, Kind::FieldCurves, Kind::Picture]);
     let facts = tabs(&mut tiles, &[Kind::FirstOrder, Kind::Effects]);
     let sums = tabs(&mut tiles, &[Kind::Seidel]);
     let numbers = row(&mut tiles, &[(facts, 0.42), (sums, 0.58)]);

@@ -121,25 +121,29 @@ impl Dock {
             let Self { tree, panels, front, .. } = self;
             tree.ui(&mut DockFrame { panels, front, view, actions }, ui);
         }
-        let pupils = self.is_visible(PanelKind::Pupil);
-        if pupils != view.settings.pupils {
-            actions.push(Command::Show(PanelSetting::Pupils(pupils)));
-        }
-        let contrasts = self.is_visible(PanelKind::Contrast);
-        if contrasts != view.settings.contrasts {
-            actions.push(Command::Show(PanelSetting::Contrasts(contrasts)));
-        }
-        let picture = self.is_visible(PanelKind::Picture);
-        if picture != view.settings.picture {
-            actions.push(Command::Show(PanelSetting::Picture(picture)));
-        }
-        let tolerances = self.is_visible(PanelKind::Tolerances);
-        if tolerances != view.settings.tolerances {
-            actions.push(Command::Show(PanelSetting::Tolerances(tolerances)));
-        }
+        self.request_analyses(view, actions);
         let watched = self.is_visible(PanelKind::Slice);
         if watched != view.grin.is_active {
             actions.push(Command::Grin(GrinCommand::SetActive(watched)));
+        }
+    }
+
+    /// Asks for the analyses of those panels alone that are visible.
+    fn request_analyses(&self, view: &SessionView, actions: &mut Actions) {
+        let settings = &view.settings;
+        let asked: [(PanelKind, bool, fn(bool) -> PanelSetting); 6] = [
+            (PanelKind::Pupil, settings.pupils, PanelSetting::Pupils),
+            (PanelKind::Contrast, settings.contrasts, PanelSetting::Contrasts),
+            (PanelKind::Fans, settings.fans, PanelSetting::Fans),
+            (PanelKind::FieldCurves, settings.field_curves, PanelSetting::FieldCurves),
+            (PanelKind::Picture, settings.picture, PanelSetting::Picture),
+            (PanelKind::Tolerances, settings.tolerances, PanelSetting::Tolerances),
+        ];
+        for (panel, computed, setting) in asked {
+            let visible = self.is_visible(panel);
+            if visible != computed {
+                actions.push(Command::Show(setting(visible)));
+            }
         }
     }
 

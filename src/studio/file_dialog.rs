@@ -74,7 +74,7 @@ impl FileRequest {
             }
             Self::Save | Self::ExportJson | Self::OpenSearch | Self::SaveSearch => &["json"],
             Self::ExportSearchLens(_) => &["json", "zmx"],
-            Self::AddGlasses => &["agf", "AGF", "zar", "ZAR", "yml"],
+            Self::AddGlasses => &["agf", "AGF", "zar", "ZAR", "yml", "YML", "yaml", "YAML"],
             Self::ExportZemax => &["zmx"],
             Self::OpenField => &["json", "npz"],
             Self::SaveField(_) => &["npz", "json"],

@@ -146,7 +146,7 @@ impl MenuContext<'_> {
                 .control(Key::L)
                 .hint("Browse published lenses by type, focal length, aperture and words"),
             MenuItem::new(MENU, "Add glass catalogue…", FileRequest::AddGlasses)
-                .hint("The glasses of a maker, .agf; they stay for later sessions"),
+                .hint("The glasses of a maker, .agf, .zar or .yml; they stay for later sessions"),
             MenuItem::new(MENU, "Save", save).control(Key::S).separated(),
             MenuItem::new(MENU, "Save as…", FileRequest::Save).control_shift(Key::S),
             MenuItem::new(MENU, "Export for Zemax…", FileRequest::ExportZemax).control(Key::E),

@@ -75,6 +75,8 @@ pub(super) fn time_moves(
     session.apply(Command::New(Box::new(lens)));
     let locks = vec![FirstOrderLock::FocalLength];
     session.apply(Command::SetDragSettings(DragSettings { locks, ..DragSettings::default() }));
+    // Nobody takes a handle before it is drawn.
+    wait_for_numbers(session);
     let start = session.lens().surfaces[0].curvature;
     let going_on = (0..MOVES).take_while(|_| !stop.load(Ordering::Relaxed));
     let times = TimeSummary::new(going_on.map(|i| time_move(session, start, i)));
@@ -88,17 +90,22 @@ fn time_move(session: &mut Session, start: f64, i: usize) -> f64 {
     let value = start * (1.0 + 1e-4 * i as f64);
     let ((), ms) = time_ms(|| {
         session.apply(Command::DragHandle { handle: Handle::Curvature(0), value, rim: None });
-        for _ in 0..MAX_POLLS {
-            session.poll();
-            let view = session.view();
-            let slopes = view.drag.slopes.as_ref().map(|slopes| slopes.version);
-            if view.is_current() && slopes == Some(view.version) {
-                break;
-            }
-            thread::sleep(Duration::from_micros(100));
-        }
+        wait_for_numbers(session);
     });
     ms
+}
+
+/// Waits for all numbers of the design, the derivatives at its handles included.
+fn wait_for_numbers(session: &mut Session) {
+    for _ in 0..MAX_POLLS {
+        session.poll();
+        let view = session.view();
+        let slopes = view.drag.slopes.as_ref().map(|slopes| slopes.version);
+        if view.is_current() && slopes == Some(view.version) {
+            break;
+        }
+        thread::sleep(Duration::from_micros(100));
+    }
 }
 
 /// Edits of the largest lens without a journal and with one, until the commands return.

@@ -250,11 +250,7 @@ impl Tracer<f64> {
 
     /// The surfaces in front of one, without anything that clips.
     pub(super) fn surfaces_before(&self, surface: usize) -> Self {
-        let interfaces = self.interfaces[..surface].to_vec();
-        let grin_gaps = self.grin_gaps.iter().take(surface).cloned().collect();
-        let (index_before, step_plans) = (self.index_before, Vec::new());
-        let mounts = self.mounts.iter().take(surface).copied().collect();
-        Self { interfaces, index_before, grin_gaps, step_plans, mounts }.without_rims()
+        self.first_surfaces(surface).without_rims()
     }
 }
 

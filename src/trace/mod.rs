@@ -115,6 +115,22 @@ impl<R: Real> Tracer<R> {
         self
     }
 
+    /// The surfaces up to and including one. A ray that gets through ends there.
+    #[must_use]
+    pub fn up_to(&self, surface: usize) -> Self {
+        self.first_surfaces((surface + 1).min(self.interfaces.len()))
+    }
+
+    fn first_surfaces(&self, count: usize) -> Self {
+        Self {
+            interfaces: self.interfaces[..count].to_vec(),
+            index_before: self.index_before,
+            grin_gaps: self.grin_gaps.iter().take(count).cloned().collect(),
+            step_plans: Vec::new(),
+            mounts: self.mounts.iter().take(count).copied().collect(),
+        }
+    }
+
     /// The number of surfaces, including the image plane.
     pub fn surfaces(&self) -> usize {
         self.interfaces.len()

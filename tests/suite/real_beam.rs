@@ -137,6 +137,32 @@ fn check_aim(name: &str, model: &RayModel) -> usize {
 }
 
 #[test]
+fn rays_that_are_aimed_together_are_those_aimed_alone() {
+    let points = aplanat::pupil::pattern_points(aplanat::pupil::PupilPattern::Hexapolar(3));
+    let mut compared = 0;
+    for (name, lens) in library() {
+        for aiming in [Aiming::Chief, Aiming::Stop] {
+            let model = RayModel::with_aiming(&lens, 0, aiming).unwrap();
+            let model =
+                if aiming == Aiming::Chief { model.limited_by_stop().unwrap() } else { model };
+            let channels = 0..model.channels.len();
+            for (field, channel) in
+                model.fields.iter().flat_map(|f| channels.clone().map(move |c| (f, c)))
+            {
+                let Ok(launch) = model.launch(*field, channel) else { continue };
+                let alone = points.iter().map(|p| launch.ray_through_stop(*p));
+                let through = launch.rays_through_stop(&points);
+                assert!(alone.eq(through), "{name}, {field:?}, {aiming:?}");
+                let alone = points.iter().map(|p| launch.ray(*p));
+                assert!(alone.eq(launch.rays(&points)), "{name}, {field:?}, {aiming:?}");
+                compared += points.len();
+            }
+        }
+    }
+    assert!(compared > 10_000, "{compared}");
+}
+
+#[test]
 fn the_beam_on_the_axis_is_as_wide_as_the_aperture_says() {
     let mut checked = 0;
     for (name, mut lens) in library() {

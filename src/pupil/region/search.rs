@@ -13,28 +13,35 @@ use std::f64::consts::{PI, TAU};
 /// The number of rays at the rim that decide whether a pupil is clear.
 const RIM_RAYS: usize = 16;
 impl<'a> Region<'a> {
-    /// Searches for the region of a launch.
+    /// The region of a launch, searched for unless the model remembers it.
     pub fn new(launch: Launch<'a>) -> Self {
-        let disc = launch.model.ends_at_disc();
-        let shadows = launch.obstruction_centers();
-        let mut rays = 0;
-        if launch.model.stop_radius() == 0.0 {
-            return Self { launch, kind: RegionKind::Dark, rays };
-        }
-        if disc && launch.is_clear(&shadows, &mut rays) {
-            return Self { launch, kind: RegionKind::Clear, rays };
-        }
-        let Some(grid) = LightGrid::around_light(&launch, &mut rays) else {
-            return Self { launch, kind: RegionKind::Dark, rays };
-        };
-        let kind = grid.classify(&launch, &shadows);
-        rays += match &kind {
-            RegionKind::StarShaped(boundary) => boundary.rays,
-            RegionKind::Irregular { annulus: Some(annulus), .. } => annulus.rays(),
-            _ => 0,
-        };
+        let search = || search(&launch);
+        let own = launch.found_pupils();
+        let (kind, rays) = own.map_or_else(search, |own| own.region(&launch.to_fixed(), search));
         Self { launch, kind, rays }
     }
+}
+
+/// Searches for the region of a launch.
+fn search(launch: &Launch<'_>) -> (RegionKind, usize) {
+    let mut rays = 0;
+    if launch.model.stop_radius() == 0.0 {
+        return (RegionKind::Dark, rays);
+    }
+    let shadows = launch.obstruction_centers();
+    if launch.model.ends_at_disc() && launch.is_clear(&shadows, &mut rays) {
+        return (RegionKind::Clear, rays);
+    }
+    let Some(grid) = LightGrid::around_light(launch, &mut rays) else {
+        return (RegionKind::Dark, rays);
+    };
+    let kind = grid.classify(launch, &shadows);
+    rays += match &kind {
+        RegionKind::StarShaped(boundary) => boundary.rays,
+        RegionKind::Irregular { annulus: Some(annulus), .. } => annulus.rays(),
+        _ => 0,
+    };
+    (kind, rays)
 }
 
 /// The pupil point at an azimuth of the rim.

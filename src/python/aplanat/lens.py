@@ -55,7 +55,7 @@ class Lens:
 
     @classmethod
     def open(cls, path: str | os.PathLike[str]) -> Lens:
-        """Reads a lens from a file: .json, .zmx, .seq or .roa."""
+        """Reads a lens from a file: .json, .zmx, .zar, .seq, .len or .roa."""
         return cls(_aplanat.Lens.open(os.fspath(path)))
 
     @classmethod

@@ -405,7 +405,7 @@ def _arguments() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="python -m aplanat.ray", description=__doc__.split("\n")[0])
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
     search = commands.add_parser("search", help="optimizes the structure of a lens")
-    search.add_argument("lens", help="the lens: .json, .zmx, .seq or .roa")
+    search.add_argument("lens", help="the lens: .json, .zmx, .zar, .seq, .len or .roa")
     search.add_argument("--out", required=True, help="the file for the best lens: .json or .zmx")
     search.add_argument("--gradients", type=int, default=12_000, help="gradients of all groups")
     search.add_argument("--groups", type=int, default=2, help="groups of chains, at least one a core")

@@ -5,19 +5,19 @@
 
 mod as_built;
 mod contrast;
+mod field_curves;
 mod pupils;
 mod scene_picture;
 
 pub use as_built::{AsBuiltLens, predict_as_built};
 pub use contrast::{FieldContrast, FieldContrasts};
+pub use field_curves::{FieldCurvePoint, FieldCurves};
 pub use pupils::FieldPupils;
 pub use scene_picture::ScenePicture;
 
 use super::clock::{Timed, now, time};
 use super::run::{LatestRequestWorker, WorkerOutput, catch_panic};
-use crate::analysis::{
-    self, AnalysisError, Distortion, Fan, FieldCurvature, Illumination, RayLayout, Spot, SpotPoints,
-};
+use crate::analysis::{self, AnalysisError, Fan, RayLayout, Spot, SpotPoints};
 use crate::effects::{self, EffectOverrides, EffectPlan, TracePurpose};
 use crate::lens::{FieldPoint, Lens};
 use crate::measure::EffectTask;
@@ -75,14 +75,10 @@ pub struct Analyses {
     /// The lens as it is made, or the reason why nothing is known of it; `None` while no panel shows it,
     /// and at first: it takes longer than all else.
     pub as_built: Option<Arc<Timed<Result<AsBuiltLens, String>>>>,
-    /// The ray fans of each field.
-    pub fans: Timed<Vec<Result<Vec<Fan>, AnalysisError>>>,
-    /// The distortion at each field.
-    pub distortion: Timed<Vec<Result<Distortion, AnalysisError>>>,
-    /// The field curvature at each field.
-    pub curvature: Timed<Vec<Result<FieldCurvature, AnalysisError>>>,
-    /// The illumination of each field.
-    pub illumination: Timed<Vec<Illumination>>,
+    /// The ray fans of each field; `None` while no panel shows them.
+    pub fans: Option<Timed<Vec<Result<Vec<Fan>, AnalysisError>>>>,
+    /// Distortion, field curvature and illumination over the field; `None` while no panel shows them.
+    pub field_curves: Option<Timed<FieldCurves>>,
 }
 
 impl Analyses {
@@ -279,19 +275,16 @@ impl Analyses {
             Arc::new(time(|| scene_picture::coarse_picture(lens, zoom, scene)))
         });
         unless_interrupted()?;
-        let fans = time(|| for_each_field(&b, |field| analysis::fan(&b, field, FAN_POINTS)));
+        let fans = settings
+            .fans
+            .then(|| time(|| for_each_field(&b, |field| analysis::fan(&b, field, FAN_POINTS))));
         unless_interrupted()?;
-        let illumination = time(|| analysis::illumination(&b, b.primary, accuracy));
+        let field_curves =
+            settings.field_curves.then(|| time(|| field_curves::field_curves(&b, accuracy)));
         unless_interrupted()?;
         Some(Self {
             seidel: time(|| b.seidel()),
             airy: analysis::airy_radius(&b),
-            distortion: time(|| {
-                for_each_field(&b, |field| analysis::distortion(&b, field, b.primary))
-            }),
-            curvature: time(|| {
-                for_each_field(&b, |field| analysis::field_curvature(&b, field, b.primary))
-            }),
             ray_model,
             plan,
             layout,
@@ -303,7 +296,7 @@ impl Analyses {
             picture,
             as_built: None,
             fans,
-            illumination,
+            field_curves,
         })
     }
 }
@@ -351,6 +344,13 @@ pub struct AnalysisSettings {
     /// True if the contrast is computed, because a panel shows it.
     #[serde(default)]
     pub contrasts: bool,
+    /// True if the ray fans are computed, because a panel shows them.
+    #[serde(default)]
+    pub fans: bool,
+    /// True if distortion, field curvature and illumination are computed over the field, because a panel
+    /// shows them.
+    #[serde(default)]
+    pub field_curves: bool,
     /// True if the picture of a scene is computed, because a panel shows it.
     #[serde(default)]
     pub picture: bool,
@@ -379,6 +379,8 @@ impl Default for AnalysisSettings {
             overrides: EffectOverrides::default(),
             pupils: false,
             contrasts: false,
+            fans: false,
+            field_curves: false,
             picture: false,
             scene: BuiltInScene::default(),
             tolerances: false,

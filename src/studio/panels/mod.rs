@@ -4,6 +4,8 @@ mod cell_layout;
 mod contrast;
 mod edit_form;
 mod effects;
+mod fans;
+mod field_curves;
 mod first_order;
 pub(super) mod grin;
 mod history;
@@ -23,6 +25,8 @@ mod zoom;
 
 pub use contrast::ContrastPanel;
 pub use effects::EffectsPanel;
+pub use fans::FansPanel;
+pub use field_curves::FieldCurvesPanel;
 pub use first_order::FirstOrderPanel;
 pub use grin::GrinPanel;
 pub use history::HistoryPanel;
@@ -83,6 +87,10 @@ pub enum PanelKind {
     Pupil,
     /// The contrast of every field against spatial frequency.
     Contrast,
+    /// The transverse aberration of every field over its pupil.
+    Fans,
+    /// Distortion, field curvature and illumination over the field.
+    FieldCurves,
     /// A scene seen through the lens.
     Picture,
     /// Manufacturing errors and what they do to the lens.
@@ -109,13 +117,15 @@ pub enum PanelKind {
 
 impl PanelKind {
     /// Every panel. A new one is a file in this folder, an entry here and a place in the window.
-    pub const ALL: [Self; 17] = [
+    pub const ALL: [Self; 19] = [
         Self::Layout,
         Self::Slice,
         Self::Prescription,
         Self::Spot,
         Self::Pupil,
         Self::Contrast,
+        Self::Fans,
+        Self::FieldCurves,
         Self::Picture,
         Self::Tolerances,
         Self::Optimizer,
@@ -138,6 +148,8 @@ impl PanelKind {
             Self::Spot => Box::new(SpotPanel::new(backend)),
             Self::Pupil => Box::new(PupilPanel::default()),
             Self::Contrast => Box::new(ContrastPanel),
+            Self::Fans => Box::new(FansPanel),
+            Self::FieldCurves => Box::new(FieldCurvesPanel),
             Self::Picture => Box::new(PicturePanel::default()),
             Self::Tolerances => Box::new(TolerancesPanel::default()),
             Self::Optimizer => Box::new(OptimizerPanel::default()),

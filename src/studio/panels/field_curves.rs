@@ -1,0 +1,159 @@
+//! Distortion, field curvature and relative illumination over the field, as lens data sheets show them.
+
+use egui::{RichText, Ui, WidgetInfo};
+use egui_plot::{Corner, HLine, Legend, Line, LineStyle, PlotPoints};
+
+use super::widgets::fixed_plot;
+use super::{Panel, displayed_results, show_missing_results};
+use crate::lens::FieldKind;
+use crate::session::{FieldCurvePoint, FieldCurves, SessionView};
+use crate::studio::actions::Actions;
+use crate::studio::number;
+use crate::studio::palette::{Palette, Rgba, color32};
+
+/// The height of the title of a plot.
+const TITLE: f32 = 24.0;
+/// The lowest plot.
+const LOWEST: f32 = 80.0;
+
+/// The panel.
+#[derive(Debug, Default)]
+pub struct FieldCurvesPanel;
+
+impl Panel for FieldCurvesPanel {
+    fn title(&self) -> &'static str {
+        "Field curves"
+    }
+
+    fn ui(&mut self, ui: &mut Ui, view: &SessionView, _actions: &mut Actions) {
+        let Some((results, numbers)) = displayed_results(view) else {
+            return show_missing_results(ui, view);
+        };
+        let Some(curves) = &numbers.field_curves else {
+            ui.weak("Computing …");
+            return;
+        };
+        if curves.value.points.is_empty() {
+            ui.weak("All fields are on the axis: there is nothing to show over the field");
+            return;
+        }
+        let kind = results.lens.fields_at(results.settings.zoom).kind;
+        summary(ui, &curves.value, curves.ms);
+        let height = (ui.available_height() / 3.0 - TITLE).max(LOWEST);
+        egui::ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
+            for chart in charts(&curves.value, Palette::for_visuals(ui.visuals())) {
+                chart.show(ui, unit(kind), height);
+            }
+        });
+    }
+}
+
+/// The unit of a field.
+const fn unit(kind: FieldKind) -> &'static str {
+    match kind {
+        FieldKind::Angle => "degrees",
+        FieldKind::ObjectHeight => "mm in the object",
+        FieldKind::ImageHeight => "mm in the image",
+    }
+}
+
+/// The number of rays, the error of the illumination and the time.
+fn summary(ui: &mut Ui, curves: &FieldCurves, ms: f64) {
+    let lights = || curves.points.iter().filter_map(|point| point.illumination.relative);
+    let error = lights().map(|light| light.error).fold(0.0, f64::max);
+    let rays: usize = lights().map(|light| light.rays).sum();
+    let text = format!("illumination ± {error:.0e}, {rays} rays, {ms:.1} ms; primary wavelength");
+    ui.label(RichText::new(text).small().weak());
+}
+
+/// A curve with its name, its colour and how it is drawn.
+struct Curve {
+    name: &'static str,
+    points: Vec<[f64; 2]>,
+    color: Rgba,
+    dashed: bool,
+}
+
+/// A quantity against the field.
+struct Chart {
+    title: &'static str,
+    hint: &'static str,
+    curves: Vec<Curve>,
+    from_zero: bool,
+}
+
+fn charts(curves: &FieldCurves, palette: Palette) -> [Chart; 3] {
+    let [first, second] = [palette.field(0), palette.field(1)];
+    let against = |number: &dyn Fn(&FieldCurvePoint) -> Option<f64>| {
+        let point = |point: &FieldCurvePoint| Some([point.height, number(point)?]);
+        curves.points.iter().filter_map(point).collect::<Vec<_>>()
+    };
+    let curve = |name, color, dashed, points| Curve { name, points, color, dashed };
+    let distortion = |point: &FieldCurvePoint| {
+        let found = point.distortion.as_ref().ok()?;
+        Some(found.distortion.map_or(0.0, |share| 100.0 * share))
+    };
+    let focus = |point: &FieldCurvePoint| point.curvature.as_ref().ok().copied();
+    let tangential = against(&|point| focus(point)?.tangential);
+    let sagittal = against(&|point| focus(point)?.sagittal);
+    let light = |point: &FieldCurvePoint| Some(100.0 * point.illumination.relative?.value);
+    [
+        Chart {
+            title: "Distortion, %",
+            hint: "Real over ideal height of the chief ray, less 1; for a distant object the ideal \
+                   height is f tan θ",
+            curves: vec![curve("distortion", first, false, against(&distortion))],
+            from_zero: false,
+        },
+        Chart {
+            title: "Field curvature, mm from the image plane",
+            hint: "Foci of a narrow beam about the chief ray (Coddington), positive along the light",
+            curves: vec![
+                curve("tangential", first, false, tangential),
+                curve("sagittal", second, true, sagittal),
+            ],
+            from_zero: false,
+        },
+        Chart {
+            title: "Relative illumination, %",
+            hint: "Irradiance in the image of a uniform scene, relative to the axis",
+            curves: vec![curve("illumination", first, false, against(&light))],
+            from_zero: true,
+        },
+    ]
+}
+
+impl Chart {
+    fn show(self, ui: &mut Ui, unit: &'static str, height: f32) {
+        ui.label(RichText::new(self.title).small().strong()).on_hover_text(self.hint);
+        let label = self.describe(unit);
+        let weak = ui.visuals().weak_text_color();
+        let mut plot = fixed_plot(self.title, height).include_x(0.0).include_y(0.0);
+        if self.curves.len() > 1 {
+            plot = plot.legend(Legend::default().position(Corner::LeftBottom));
+        }
+        if self.from_zero {
+            plot = plot.include_y(100.0);
+        }
+        let shown = plot.x_axis_label(format!("field, {unit}")).show(ui, |plot| {
+            plot.hline(HLine::new("", 0.0).color(weak).allow_hover(false));
+            for Curve { name, points, color, dashed } in self.curves {
+                let style = if dashed { LineStyle::dashed_loose() } else { LineStyle::Solid };
+                let points: PlotPoints<'_> = points.into_iter().collect();
+                plot.line(Line::new(name, points).color(color32(color)).style(style).width(1.6));
+            }
+        });
+        shown.response.widget_info(|| WidgetInfo::labeled(egui::Role::Image, true, &label));
+    }
+
+    /// The chart in words, with its values at the edge of the field.
+    fn describe(&self, unit: &str) -> String {
+        let edge = |curve: &Curve| {
+            let [field, value] = *curve.points.last()?;
+            let [field, value] = [field, value].map(|v| number::format_digits(v, 4));
+            Some(format!("{} {value} at {field} {unit}", curve.name))
+        };
+        let edges: Vec<String> = self.curves.iter().filter_map(edge).collect();
+        format!("{}: {}", self.title, edges.join(", "))
+    }
+}
