@@ -48,6 +48,9 @@ pub(super) struct Configuration {
     /// for.
     focus_offset: Option<f64>,
     variables: usize,
+    /// The semi-diameters of the light at surfaces whose rims nobody has fixed, in mm; infinite at the
+    /// others.
+    clear_rims: Vec<f64>,
 }
 
 /// The systems of a zoom position at some values of the variables.
@@ -112,7 +115,20 @@ impl Configuration {
             variables: lens.variables.len(),
             bindings,
             systems,
+            clear_rims: Vec::new(),
         })
+    }
+
+    /// Gives surfaces whose rims nobody has fixed the semi-diameters of the light.
+    pub(super) fn set_clear_rims(&mut self, rims: &[f64]) {
+        self.clear_rims = rims.to_vec();
+    }
+
+    /// The semi-diameters of the light at a surface and the next one, as far as their rims follow it;
+    /// else infinite.
+    pub(super) fn clear_rims(&self, surface: usize) -> [f64; 2] {
+        let rim = |i: usize| self.clear_rims.get(i).copied().unwrap_or(f64::INFINITY);
+        [rim(surface), rim(surface + 1)]
     }
 
     /// The systems at some values of the variables.

@@ -6,8 +6,10 @@ use super::binding::{Configuration, ResolvedSystems};
 use super::first_order::slopes;
 use super::sum::SumOfSquares;
 use super::{EvaluationContext, MeritError, Term, VariableDual, WeightedTerm};
+use crate::analysis::clear_semi_diameters;
 use crate::lens::{Lens, SurfaceNumber, System, TermScope, TermSelection};
 use crate::math::Real;
+use crate::pupil::RayModel;
 use serde::Serialize;
 
 /// Adds the squared violations of one of the constraints.
@@ -63,7 +65,7 @@ pub(super) fn smooth_constraints(
         return constraints(zoom, systems, weighted);
     };
     let at = |gap, rim| Constraint {
-        quantity: ConstrainedQuantity::Edge { gap, rim },
+        quantity: ConstrainedQuantity::Edge { gap, rim, clear: zoom.clear_rims(gap) },
         min: Some(min),
         max: None,
     };
@@ -97,6 +99,11 @@ fn constraints_everywhere(
     let least = |quantity, min| Constraint { quantity, min: Some(min), max: None };
     let most = |quantity, max| Constraint { quantity, min: None, max: Some(max) };
     let gaps = |glass| zoom.inner_gaps(glass);
+    let edge = |gap, rim| ConstrainedQuantity::Edge { gap, rim, clear: zoom.clear_rims(gap) };
+    let steepness = |surface| {
+        let [clear, _] = zoom.clear_rims(surface);
+        ConstrainedQuantity::Steepness { surface, clear }
+    };
     match term {
         Term::GlassCenter { min, max } => {
             gaps(true).map(|gap| both(ConstrainedQuantity::Center(gap), min, max)).collect()
@@ -104,17 +111,15 @@ fn constraints_everywhere(
         Term::AirCenter { min, max } => {
             gaps(false).map(|gap| both(ConstrainedQuantity::Center(gap), min, max)).collect()
         }
-        Term::GlassEdge(min) => gaps(true)
-            .map(|gap| least(ConstrainedQuantity::Edge { gap, rim: EdgeRadius::Larger }, min))
-            .collect(),
-        Term::AirEdge(min) => gaps(false)
-            .map(|gap| least(ConstrainedQuantity::Edge { gap, rim: EdgeRadius::Smaller }, min))
-            .collect(),
+        Term::GlassEdge(min) => {
+            gaps(true).map(|gap| least(edge(gap, EdgeRadius::Larger), min)).collect()
+        }
+        Term::AirEdge(min) => {
+            gaps(false).map(|gap| least(edge(gap, EdgeRadius::Smaller), min)).collect()
+        }
         Term::TotalTrack(max) => vec![most(ConstrainedQuantity::Track, max)],
         Term::BackFocus(min) => vec![least(ConstrainedQuantity::Center(last), min)],
-        Term::Steepness(max) => {
-            (0..=last).map(|i| most(ConstrainedQuantity::Steepness(i), max)).collect()
-        }
+        Term::Steepness(max) => (0..=last).map(|i| most(steepness(i), max)).collect(),
         Term::SemiDiameter { min, max } => zoom
             .clipping_surfaces(systems)
             .into_iter()
@@ -199,8 +204,13 @@ pub fn constraint_margins(
 ) -> Result<Vec<ConstraintMargin>, MeritError> {
     let terms: Vec<WeightedTerm> = terms.collect();
     let mut found = Vec::new();
+    let mut clear = None;
     for number in 0..lens.zoom_positions() {
-        let zoom = Configuration::new(lens, number)?;
+        let mut zoom = Configuration::new(lens, number)?;
+        if terms.iter().any(|weighted| weighted.term.concerns_rims()) {
+            let clear = clear.get_or_insert_with(|| automatic_rims(lens));
+            zoom.set_clear_rims(clear);
+        }
         let values: Vec<f64> =
             lens.variables.iter().map(|v| lens.get(v.parameter).unwrap_or(0.0)).collect();
         let systems = zoom.at(&values)?;
@@ -208,7 +218,7 @@ pub fn constraint_margins(
             let margin = |constraint: Constraint| {
                 constraint.margin(weighted.term, number, constraint.value(&systems.manufactured))
             };
-            // An unlimited quantity, such as the edge of a gap without rims, is infinite.
+            // An unlimited quantity, such as the edge of a gap that no light reaches, is infinite.
             let all = constraints(&zoom, &systems, *weighted).into_iter().map(margin);
             found.extend(all.filter(|margin| margin.value.is_finite()));
         }
@@ -244,15 +254,18 @@ impl MinimumThickness {
         let none = f64::INFINITY;
         let mut found =
             Self { glass_center: none, glass_edge: none, air_center: none, air_edge: none };
+        let clear = automatic_rims(lens);
         for number in 0..lens.zoom_positions() {
-            let zoom = Configuration::new(lens, number)?;
+            let mut zoom = Configuration::new(lens, number)?;
+            zoom.set_clear_rims(&clear);
             let values: Vec<f64> =
                 lens.variables.iter().map(|v| lens.get(v.parameter).unwrap_or(0.0)).collect();
             let system = &zoom.at(&values)?.manufactured;
             for gap in 0..zoom.is_glass.len() - 1 {
                 let center = ConstrainedQuantity::Center(gap).length(system);
                 let rim = if zoom.is_glass[gap] { EdgeRadius::Larger } else { EdgeRadius::Smaller };
-                let edge = ConstrainedQuantity::Edge { gap, rim }.length(system);
+                let clear = zoom.clear_rims(gap);
+                let edge = ConstrainedQuantity::Edge { gap, rim, clear }.length(system);
                 let (to_center, to_edge) = if zoom.is_glass[gap] {
                     (&mut found.glass_center, &mut found.glass_edge)
                 } else {
@@ -270,14 +283,19 @@ impl MinimumThickness {
 #[derive(Clone, Copy)]
 enum ConstrainedQuantity {
     Center(usize),
-    /// The thickness at a rim; infinite if the surfaces have none.
+    /// The thickness at a rim; infinite if the surfaces have none. `clear` are the semi-diameters of
+    /// the light at both surfaces, which stand for rims that nobody has fixed.
     Edge {
         gap: usize,
         rim: EdgeRadius,
+        clear: [f64; 2],
     },
     Track,
     /// `|curvature| × semi-diameter`: 1 for a hemisphere; 0 if the surface has no rim.
-    Steepness(usize),
+    Steepness {
+        surface: usize,
+        clear: f64,
+    },
     Rim(usize),
 }
 
@@ -311,9 +329,10 @@ impl EdgeRadius {
 impl ConstrainedQuantity {
     fn surface(self) -> Option<usize> {
         match self {
-            Self::Center(at) | Self::Edge { gap: at, .. } | Self::Steepness(at) | Self::Rim(at) => {
-                Some(at)
-            }
+            Self::Center(at)
+            | Self::Edge { gap: at, .. }
+            | Self::Steepness { surface: at, .. }
+            | Self::Rim(at) => Some(at),
             Self::Track => None,
         }
     }
@@ -322,9 +341,10 @@ impl ConstrainedQuantity {
     fn length<R: Real>(self, system: &System<R>) -> R {
         match self {
             Self::Center(gap) => along_light(system, gap),
-            Self::Edge { gap, rim } => {
+            Self::Edge { gap, rim, clear } => {
                 let (before, behind) = (&system.surfaces[gap], &system.surfaces[gap + 1]);
-                let Some(height) = rim.height(before.semi_diameter, behind.semi_diameter) else {
+                let rims = [made_rim(before, clear[0]), made_rim(behind, clear[1])];
+                let Some(height) = rim.height(rims[0], rims[1]) else {
                     return R::from_f64(f64::INFINITY);
                 };
                 let sags = sag_at(behind, height) - sag_at(before, height);
@@ -335,11 +355,11 @@ impl ConstrainedQuantity {
                 let gaps = 0..system.surfaces.len() - 1;
                 gaps.fold(R::ZERO, |sum, gap| sum + along_light(system, gap))
             }
-            Self::Steepness(surface) => {
+            Self::Steepness { surface, clear } => {
                 let surface = &system.surfaces[surface];
-                let limited = surface.semi_diameter.value() < f64::INFINITY;
-                if limited {
-                    (surface.shape.curvature() * surface.semi_diameter).abs()
+                let rim = made_rim(surface, clear);
+                if rim.value() < f64::INFINITY {
+                    (surface.shape.curvature() * rim).abs()
                 } else {
                     R::ZERO
                 }
@@ -347,6 +367,31 @@ impl ConstrainedQuantity {
             Self::Rim(surface) => system.surfaces[surface].semi_diameter,
         }
     }
+}
+
+/// The semi-diameter of a surface: as it is fixed, or that of the light.
+fn made_rim<R: Real>(surface: &crate::lens::Surface<R>, clear: f64) -> R {
+    let fixed = surface.semi_diameter;
+    if fixed.value() < f64::INFINITY { fixed } else { R::from_f64(clear) }
+}
+
+/// The clear semi-diameters in mm of the surfaces whose rims nobody has fixed; infinite for the others
+/// and where no light arrives.
+pub(super) fn automatic_rims(lens: &Lens) -> Vec<f64> {
+    let is_automatic = |row: &crate::lens::Row| row.semi_diameter.is_none();
+    let open = vec![f64::INFINITY; lens.surfaces.len()];
+    if !lens.surfaces.iter().any(is_automatic) {
+        return open;
+    }
+    let positions = 0..lens.zoom_positions();
+    let models: Vec<RayModel> =
+        positions.filter_map(|zoom| RayModel::from_lens(lens, zoom).ok()).collect();
+    let clear = clear_semi_diameters(&models);
+    let rows = lens.surfaces.iter().zip(clear.into_iter().chain(open));
+    let rim = |(row, clear): (&crate::lens::Row, f64)| {
+        if is_automatic(row) && clear > 0.0 { clear } else { f64::INFINITY }
+    };
+    rows.map(rim).collect()
 }
 
 /// The sag at a distance from the axis, or close to the edge of the surface if it ends before.

@@ -20,6 +20,11 @@ impl Term {
         )
     }
 
+    /// True if the term depends on the rims of the surfaces, fixed or not.
+    pub(super) const fn concerns_rims(self) -> bool {
+        matches!(self, Self::GlassEdge(_) | Self::AirEdge(_) | Self::Steepness(_))
+    }
+
     /// True if the term is computed from all rays of the pupils.
     pub(super) const fn is_of_rays(self) -> bool {
         matches!(

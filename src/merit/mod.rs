@@ -194,6 +194,10 @@ impl Merit {
             .map(|zoom| RaySampling::new(lens, zoom, self.tolerance, dark, demand.clone()))
             .collect();
         self.samplings = found?;
+        if self.goal.terms.iter().any(|weighted| weighted.term.concerns_rims()) {
+            let rims = constraints::automatic_rims(lens);
+            self.zooms.iter_mut().for_each(|zoom| zoom.set_clear_rims(&rims));
+        }
         Ok(())
     }
 

@@ -37,10 +37,20 @@ pub fn filled_stop_radius<R: Real>(system: &System<R>, beam: &Beam) -> Result<R,
         return Ok(R::from_f64(radius));
     }
     let first = first_order(system, beam)?;
-    let tracer = Tracer::new(system)?.without_rims();
+    let stop = system.stop.unwrap_or(0);
+    let tracer = Tracer::new(&front_part(system, stop))?.without_rims();
     let ray = marginal_ray(&first, beam.object);
-    let height = stop_height(&tracer, system.stop.unwrap_or(0), ray);
+    let height = stop_height(&tracer, stop, ray);
     Ok(height.unwrap_or(first.stop_semi_diameter))
+}
+
+/// The system up to and including a surface. A gradient behind that has nothing to end at.
+fn front_part<R: Real>(system: &System<R>, surface: usize) -> System<R> {
+    let mut surfaces: Vec<_> = system.surfaces.iter().take(surface + 1).cloned().collect();
+    if let Some(last) = surfaces.last_mut() {
+        last.grin = None;
+    }
+    System { surfaces, index_before: system.index_before, stop: system.stop }
 }
 
 /// The real ray from the point on the axis to the rim of the paraxial entrance pupil.

@@ -1,11 +1,11 @@
 //! The command palette: every command, panel, lens, file and setting, found by words.
 
 use egui::{
-    Align, Align2, Button, Context, Id, Key, Layout, Modal, Modifiers, ScrollArea, TextEdit, Ui,
-    vec2,
+    Align, Align2, Button, Context, Event, Id, Key, Layout, Modal, Modifiers, ScrollArea, TextEdit,
+    Ui, vec2,
 };
 
-use super::actions::Actions;
+use super::actions::{Actions, UiAction};
 use super::form::dialog_frame;
 use super::menu_items::{MenuContext, MenuItem};
 
@@ -35,7 +35,7 @@ impl CommandPalette {
             chosen = self.contents(ui, menus);
         });
         let done = chosen.is_some();
-        actions.extend(chosen.and_then(|item| item.action));
+        actions.extend(chosen.and_then(|item| item.action).map(shown_at_least));
         done || modal.should_close()
     }
 
@@ -44,12 +44,15 @@ impl CommandPalette {
             let mut pressed = |key| input.consume_key(Modifiers::NONE, key);
             (pressed(Key::ArrowDown), pressed(Key::ArrowUp), pressed(Key::Enter))
         });
+        let id = Id::unique("words of the command palette");
+        let early = self.take_early_text(ui, id);
         let line = TextEdit::singleline(&mut self.text)
+            .id(id)
             .hint_text("A command, panel, lens, file, setting…")
             .desired_width(f32::INFINITY);
         let field = ui.add(line).accessible_name("Find a command");
         field.request_focus();
-        if field.changed() {
+        if field.changed() || early {
             self.selected = 0;
         }
         let items = found(menus.all(), &self.text);
@@ -64,6 +67,23 @@ impl CommandPalette {
         let pressed = self.list(ui, &items, down || up);
         let chosen = if enter { Some(self.selected) } else { pressed };
         items.into_iter().nth(chosen?).filter(MenuItem::is_enabled)
+    }
+
+    /// Takes what is typed before the field can: in the first frame the palette is only measured. True
+    /// if there was something.
+    fn take_early_text(&mut self, ui: &Ui, field: Id) -> bool {
+        if ui.is_enabled() && ui.memory(|memory| memory.has_focus(field)) {
+            return false;
+        }
+        let before = self.text.len();
+        ui.input(|input| {
+            for event in &input.events {
+                if let Event::Text(text) = event {
+                    self.text.push_str(text);
+                }
+            }
+        });
+        self.text.len() > before
     }
 
     /// Shows the items; the index of one that was pressed.
@@ -82,6 +102,14 @@ impl CommandPalette {
             }
         });
         pressed
+    }
+}
+
+/// The action of an item that was looked for: a panel is shown, and not hidden because it is open.
+fn shown_at_least(action: UiAction) -> UiAction {
+    match action {
+        UiAction::TogglePanel(kind) => UiAction::ShowPanel(kind),
+        other => other,
     }
 }
 
@@ -110,7 +138,7 @@ fn disabled_hint(item: &MenuItem) -> &'static str {
 }
 
 /// The items that have all words of a text: those that can be asked for first, and among them those
-/// that begin with it.
+/// with this very title and those that begin with it.
 pub(super) fn found(items: Vec<MenuItem>, text: &str) -> Vec<MenuItem> {
     let text = text.to_lowercase();
     let words: Vec<&str> = text.split_whitespace().collect();
@@ -123,9 +151,9 @@ pub(super) fn found(items: Vec<MenuItem>, text: &str) -> Vec<MenuItem> {
     let mut items: Vec<MenuItem> = items.into_iter().filter(fits).collect();
     let rank = |item: &MenuItem| {
         let title = item.title.to_lowercase();
-        let begins = title.starts_with(text.trim());
+        let (is, begins) = (title == text.trim(), title.starts_with(text.trim()));
         let has = words.iter().all(|word| title.contains(word));
-        (!item.is_enabled(), !begins, !has)
+        (!item.is_enabled(), !is, !begins, !has)
     };
     items.sort_by_key(rank);
     items.truncate(MAX_ITEMS);

@@ -1,7 +1,7 @@
 //! The dialogs that add, move, bend and scale. What they would give is shown in the drawings before it
 //! is done.
 
-use egui::{Align2, Button, Context, Grid, Id, RichText, Ui, Window, vec2};
+use egui::{Align2, Button, Context, Grid, Id, Response, RichText, Ui, Window, vec2};
 
 use super::actions::Actions;
 use super::form::{choice, number_field};
@@ -33,6 +33,8 @@ pub(super) struct ElementDialog {
     /// The index of the row in front of which an element is added.
     at: usize,
     by: f64,
+    /// True once the first number has had the cursor.
+    entered: bool,
     /// The edit whose result is shown in the drawings.
     shown: Option<Edit>,
 }
@@ -50,6 +52,7 @@ impl ElementDialog {
             semi_diameter: rounded(0.55 * pupil.map_or(0.2 * focal_length, f64::abs)),
             at: place_for_element(&view.lens, view.selected),
             by: 0.0,
+            entered: false,
             shown: None,
         }
     }
@@ -104,19 +107,30 @@ impl ElementDialog {
             ElementTask::Add => self.new_element(ui, &view.lens),
             ElementTask::Move(_) => {
                 ui.label("Towards the image by");
-                number_field(ui, "Distance", &mut self.by, " mm");
+                let first = number_field(ui, "Distance", &mut self.by, " mm");
+                self.enter(&first);
                 ui.end_row();
             }
             ElementTask::Bend(_) => {
                 ui.label("Change of the curvatures");
-                number_field(ui, "Change of the curvatures", &mut self.by, " /mm");
+                let first = number_field(ui, "Change of the curvatures", &mut self.by, " /mm");
+                self.enter(&first);
                 ui.end_row();
             }
             ElementTask::Scale => {
                 ui.label("Focal length");
-                number_field(ui, "Focal length of the lens", &mut self.focal_length, " mm");
+                let name = "Focal length of the lens";
+                let first = number_field(ui, name, &mut self.focal_length, " mm");
+                self.enter(&first);
                 ui.end_row();
             }
+        }
+    }
+
+    /// Gives the cursor to the first number of the dialog that has just been opened.
+    fn enter(&mut self, first: &Response) {
+        if !std::mem::replace(&mut self.entered, true) {
+            first.request_focus();
         }
     }
 
@@ -127,8 +141,10 @@ impl ElementDialog {
         choice(ui, "Element form", &mut self.form, &forms);
         ui.end_row();
         ui.label("Focal length");
-        number_field(ui, "Focal length of the element", &mut self.focal_length, " mm")
-            .on_hover_text("Negative for a diverging element");
+        let name = "Focal length of the element";
+        let first = number_field(ui, name, &mut self.focal_length, " mm");
+        self.enter(&first);
+        first.on_hover_text("Negative for a diverging element");
         ui.end_row();
         ui.label("Thick enough up to the height");
         number_field(ui, "Semi-diameter of the element", &mut self.semi_diameter, " mm");

@@ -38,7 +38,10 @@ pub(super) fn choice<T: PartialEq + Copy>(
     let combo = ComboBox::from_id_salt(name).selected_text(title).width(190.0);
     let shown = combo.show_ui(ui, |ui| {
         for (value, title) in all {
-            ui.selectable_value(chosen, *value, *title);
+            // A pointer closes the list by itself, a key does not.
+            if ui.selectable_value(chosen, *value, *title).clicked() {
+                ui.close();
+            }
         }
     });
     shown.response.accessible_name(name);

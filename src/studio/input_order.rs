@@ -40,7 +40,14 @@ fn acts(event: &Event) -> bool {
         Event::Key { key, pressed: true, modifiers, .. } => {
             let moves = matches!(
                 key,
-                Key::Enter | Key::Tab | Key::Escape | Key::F2 | Key::ArrowUp | Key::ArrowDown
+                Key::Enter
+                    | Key::Tab
+                    | Key::Escape
+                    | Key::F2
+                    | Key::ArrowUp
+                    | Key::ArrowDown
+                    | Key::Insert
+                    | Key::Delete
             );
             moves || modifiers.command
         }

@@ -39,6 +39,8 @@ pub(super) struct LibraryWindow {
     design: String,
     ranges: [String; RANGES.len()],
     selected: Option<&'static LibraryLens>,
+    /// True once the words have had the cursor.
+    entered: bool,
     scales: bool,
     focal_length: f64,
     /// The lenses that have been read; `None` for one that cannot be.
@@ -59,6 +61,7 @@ impl Default for LibraryWindow {
             design: String::new(),
             ranges: Default::default(),
             selected: None,
+            entered: false,
             scales: false,
             focal_length: 50.0,
             lenses: HashMap::new(),
@@ -102,7 +105,10 @@ impl LibraryWindow {
             let line = TextEdit::singleline(&mut self.words)
                 .hint_text("Words: maker, year, type…")
                 .desired_width(190.0);
-            ui.add(line).accessible_name("Search the library");
+            let field = ui.add(line).accessible_name("Search the library");
+            if !std::mem::replace(&mut self.entered, true) {
+                field.request_focus();
+            }
             let chosen = if self.design.is_empty() { "All types" } else { &self.design };
             let combo = ComboBox::from_id_salt("lens type").selected_text(chosen).width(130.0);
             let shown = combo.show_ui(ui, |ui| {
@@ -175,7 +181,10 @@ impl LibraryWindow {
         let response = response.on_hover_cursor(CursorIcon::PointingHand);
         let selected = self.selected.is_some_and(|lens| std::ptr::eq(lens, entry));
         let visuals = ui.visuals();
-        let stroke = if selected {
+        let stroke = if response.has_focus() {
+            response.scroll_to_me(None);
+            Stroke::new(2.0, visuals.strong_text_color())
+        } else if selected {
             Stroke::new(2.0, visuals.selection.stroke.color)
         } else {
             visuals.widgets.noninteractive.bg_stroke

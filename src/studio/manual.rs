@@ -18,6 +18,8 @@ const PAGES: [&str; 7] = [
 #[derive(Default)]
 pub(super) struct ManualWindow {
     is_open: bool,
+    /// True if the search gets the cursor, since the window has just been opened.
+    enters: bool,
     page: usize,
     words: String,
     cache: CommonMarkCache,
@@ -31,7 +33,7 @@ impl std::fmt::Debug for ManualWindow {
 
 impl ManualWindow {
     pub(super) const fn open(&mut self) {
-        self.is_open = true;
+        (self.is_open, self.enters) = (true, true);
     }
 
     pub(super) const fn close(&mut self) {
@@ -67,6 +69,9 @@ impl ManualWindow {
             .hint_text("Search the manual")
             .desired_width(f32::INFINITY);
         let field = ui.add(line).accessible_name("Search the manual");
+        if std::mem::take(&mut self.enters) {
+            field.request_focus();
+        }
         let found: Vec<usize> = pages_with(&self.words).collect();
         if field.changed() && !found.contains(&self.page) {
             self.page = found.first().copied().unwrap_or(self.page);

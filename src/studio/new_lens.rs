@@ -1,6 +1,6 @@
 //! The dialog that begins a lens: focal length, aperture, fields, wavelengths and object.
 
-use egui::{Button, Context, DragValue, Grid, Id, Modal, RichText, Ui};
+use egui::{Button, Context, DragValue, Grid, Id, Key, Modal, RichText, Ui};
 
 use super::actions::Actions;
 use super::form::{choice, dialog_frame, number_field};
@@ -34,6 +34,8 @@ pub(super) struct NewLensDialog {
     wavelengths: usize,
     at_infinity: bool,
     distance: f64,
+    /// True once the first field has had the cursor.
+    entered: bool,
 }
 
 impl Default for NewLensDialog {
@@ -49,6 +51,7 @@ impl Default for NewLensDialog {
             wavelengths: 0,
             at_infinity: true,
             distance: 200.0,
+            entered: false,
         }
     }
 }
@@ -57,6 +60,8 @@ impl NewLensDialog {
     /// Shows the dialog; true once it is closed.
     pub(super) fn ui(&mut self, context: &Context, actions: &mut Actions) -> bool {
         let mut done = false;
+        // Escape leaves a number first, then the dialog.
+        let typing = context.egui_wants_keyboard_input();
         let modal = Modal::new(Id::unique("new lens")).frame(dialog_frame(context));
         let modal = modal.show(context, |ui| {
             ui.set_width(430.0);
@@ -67,12 +72,16 @@ impl NewLensDialog {
             ui.separator();
             done = self.buttons(ui, actions);
         });
-        done || modal.should_close()
+        let escape = context.input(|input| input.key_pressed(Key::Escape));
+        done || (modal.should_close() && !(typing && escape))
     }
 
     fn rows(&mut self, ui: &mut Ui) {
         ui.label("Focal length");
-        number_field(ui, "Focal length", &mut self.focal_length, " mm");
+        let first = number_field(ui, "Focal length", &mut self.focal_length, " mm");
+        if !std::mem::replace(&mut self.entered, true) {
+            first.request_focus();
+        }
         ui.end_row();
         ui.label("Object");
         ui.horizontal(|ui| self.object(ui));
@@ -158,10 +167,33 @@ impl NewLensDialog {
         if !self.at_infinity {
             kinds.push((FieldKind::ObjectHeight, "object height"));
         }
+        let before = self.field;
         choice(ui, "Fields of the new lens", &mut self.field, &kinds);
+        if self.field != before {
+            self.field_max = self.equivalent_field(before);
+        }
         ui.label("up to");
         let unit = if self.field == FieldKind::Angle { "°" } else { " mm" };
         number_field(ui, "Largest field", &mut self.field_max, unit);
+    }
+
+    /// The largest field in the chosen quantity for about the same field of view as in another one.
+    fn equivalent_field(&self, before: FieldKind) -> f64 {
+        let (value, f) = (self.field_max, self.focal_length);
+        let object = if self.at_infinity { f } else { self.distance };
+        // The image of a thin lens lies f d / (d - f) behind it.
+        let image = if self.at_infinity { f } else { f * object / (object - f).abs() };
+        let slope = match before {
+            FieldKind::Angle => value.to_radians().tan(),
+            FieldKind::ImageHeight => value / image,
+            FieldKind::ObjectHeight => value / object,
+        };
+        let value = match self.field {
+            FieldKind::Angle => slope.atan().to_degrees(),
+            FieldKind::ImageHeight => slope * image,
+            FieldKind::ObjectHeight => slope * object,
+        };
+        number::format_digits(value, 4).parse().unwrap_or(value)
     }
 
     fn field_count(&mut self, ui: &mut Ui) {
@@ -230,5 +262,28 @@ impl NewLensDialog {
             }
         });
         done
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_field_of_view_stays_when_its_quantity_is_changed() {
+        let mut dialog =
+            NewLensDialog { field: FieldKind::ImageHeight, ..NewLensDialog::default() };
+        let height = dialog.equivalent_field(FieldKind::Angle);
+        assert!((height - 50.0 * 10f64.to_radians().tan()).abs() < 1e-3, "{height}");
+        (dialog.field_max, dialog.field) = (height, FieldKind::Angle);
+        assert!((dialog.equivalent_field(FieldKind::ImageHeight) - 10.0).abs() < 1e-3);
+        // An object 200 mm in front of a lens of 50 mm is imaged at a third of its size.
+        let near = NewLensDialog {
+            at_infinity: false,
+            field_max: 6.0,
+            field: FieldKind::ImageHeight,
+            ..NewLensDialog::default()
+        };
+        assert!((near.equivalent_field(FieldKind::ObjectHeight) - 2.0).abs() < 1e-9);
     }
 }

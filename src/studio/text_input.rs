@@ -17,6 +17,8 @@ pub struct EditBuffers {
     /// The field that was entered by a click that is still going on: it selects all of its text
     /// once the button is released.
     selecting: Option<Id>,
+    /// The field with the cursor and its text that is selected as a whole, as long as nothing is typed.
+    entered: Option<(Id, String)>,
 }
 
 #[derive(Debug)]
@@ -72,6 +74,7 @@ impl EditBuffers {
     /// Shows a field in all the width that is left.
     pub fn show(&mut self, ui: &mut Ui, id: Id, field: TextInput<'_>) -> InputResponse {
         self.discard_stale(ui, id, field.value);
+        self.follow_value(ui, id, field.value);
         let draft = self.buffers.iter().position(|draft| draft.input == id);
         let mut text = draft.map_or(field.value, |i| self.buffers[i].text.as_str()).to_owned();
         let refused = draft.and_then(|i| self.buffers[i].error.clone());
@@ -160,6 +163,26 @@ impl EditBuffers {
         }
     }
 
+    /// Selects the whole text of the field with the cursor anew once its value changes without being
+    /// typed, by undo for example: what is typed replaces all of the new text too.
+    fn follow_value(&mut self, ui: &Ui, field: Id, shown: &str) {
+        if !ui.memory(|memory| memory.has_focus(field)) {
+            return;
+        }
+        if self.buffers.iter().any(|draft| draft.input == field) {
+            self.entered = None;
+            return;
+        }
+        let known = self.entered.as_ref().filter(|(entered, _)| *entered == field);
+        if known.is_some_and(|(_, text)| text != shown) {
+            // Before the field takes what is typed in this very frame.
+            select_whole(ui.ctx(), field);
+        }
+        if known.is_none_or(|(_, text)| text != shown) {
+            self.entered = Some((field, shown.to_owned()));
+        }
+    }
+
     /// Selects the whole text of a field that is entered, so that typing replaces it.
     fn select_all(&mut self, ui: &Ui, field: &Response) {
         if field.gained_focus() {
@@ -168,14 +191,19 @@ impl EditBuffers {
         if self.selecting != Some(field.id) {
             return;
         }
-        let mut state = TextEditState::load(ui.ctx(), field.id).unwrap_or_default();
-        let all = CCursorRange::two(CCursor::new(0), CCursor::new(usize::MAX >> 1));
-        state.cursor.set_char_range(Some(all));
-        state.store(ui.ctx(), field.id);
+        select_whole(ui.ctx(), field.id);
         if !ui.input(|input| input.pointer.any_down()) {
             self.selecting = None;
         }
     }
+}
+
+/// Selects the whole text of a field.
+fn select_whole(context: &Context, field: Id) {
+    let mut state = TextEditState::load(context, field).unwrap_or_default();
+    let all = CCursorRange::two(CCursor::new(0), CCursor::new(usize::MAX >> 1));
+    state.cursor.set_char_range(Some(all));
+    state.store(context, field);
 }
 
 /// The colour of rejected texts and errors.

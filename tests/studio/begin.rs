@@ -131,6 +131,44 @@ fn the_element_menu_applies_to_the_selected_element() {
 }
 
 #[test]
+fn the_palette_shows_an_open_panel_and_ranks_an_exact_title_first() {
+    let mut harness = window(double_gauss());
+    keys(&mut harness, Modifiers::COMMAND, Key::K);
+    enter_text(&mut harness, "Find a command", "prescription");
+    keys(&mut harness, Modifiers::NONE, Key::Enter);
+    harness.get_by_label("Radius of surface 1");
+    keys(&mut harness, Modifiers::COMMAND, Key::K);
+    enter_text(&mut harness, "Find a command", "optimize");
+    let top = |words| {
+        let found = harness.get_all_by_label_contains(words).map(|node| node.rect().top());
+        found.min_by(f32::total_cmp).unwrap()
+    };
+    assert!(top("Optimizer: Optimize") < top("View: Optimizer"));
+}
+
+/// A slow frame delivers the shortcut and the first letters together.
+#[test]
+fn letters_typed_at_once_after_the_shortcut_reach_the_palette() {
+    let mut harness = window(double_gauss());
+    harness.key_press_modifiers(Modifiers::COMMAND, Key::K);
+    harness.step();
+    harness.input_mut().events.push(egui::Event::Text("undo".into()));
+    harness.run_steps(3);
+    assert_eq!(harness.get_by_label("Find a command").value().as_deref(), Some("undo"));
+}
+
+#[test]
+fn the_cursor_is_in_the_first_number_of_a_dialog() {
+    let mut harness = window(double_gauss());
+    keys(&mut harness, Modifiers::COMMAND, Key::N);
+    assert!(harness.get_by_label("Focal length").is_focused());
+    keys(&mut harness, Modifiers::NONE, Key::Escape);
+    harness.get_by_label("New lens");
+    keys(&mut harness, Modifiers::NONE, Key::Escape);
+    assert!(harness.query_by_label("New lens").is_none());
+}
+
+#[test]
 fn the_palette_finds_commands_panels_and_lenses_by_words() {
     let mut harness = window(achromat());
     for (words, found) in [

@@ -145,6 +145,57 @@ fn a_range_is_copied_pasted_and_cleared() {
 }
 
 #[test]
+fn all_numbers_of_a_range_are_varied_and_fixed_together() {
+    let mut harness = table(double_gauss());
+    enter(&mut harness, "Radius of surface 1");
+    for _ in 0..2 {
+        harness.key_press_modifiers(Modifiers::SHIFT, Key::ArrowDown);
+        harness.run();
+    }
+    harness.key_press_modifiers(Modifiers::COMMAND | Modifiers::SHIFT, Key::V);
+    harness.run();
+    let varied = |edit: &Edit| match edit {
+        Edit::AddVariable(variable) => Some(variable.parameter.surface),
+        _ => None,
+    };
+    match &edits(&harness)[..] {
+        [Edit::Sequence { edits, .. }] => {
+            let surfaces: Option<Vec<usize>> = edits.iter().map(varied).collect();
+            assert_eq!(surfaces, Some(vec![0, 1, 2]));
+        }
+        other => panic!("{other:?}"),
+    }
+}
+
+/// Undo and pasting change the text under the cursor: what is typed next replaces all of it.
+#[test]
+fn a_typed_value_replaces_all_of_a_value_that_has_changed_under_the_cursor() {
+    let mut harness = table(double_gauss());
+    enter(&mut harness, "Radius of surface 2");
+    let mut longer = double_gauss();
+    longer.surfaces[1].curvature = -1.0 / 107.7891;
+    harness.state_mut().view = view_of(longer);
+    harness.input_mut().events.extend([Event::Text("6".into()), Event::Text("0".into())]);
+    harness.step();
+    harness.key_press(Key::Enter);
+    harness.run();
+    assert_eq!(edits(&harness), [Edit::set_radius(1, 60.0)]);
+}
+
+#[test]
+fn a_number_that_is_no_index_is_refused_as_glass() {
+    let mut harness = table(double_gauss());
+    enter(&mut harness, "Glass of surface 1");
+    harness.get_by_label("Glass of surface 1").type_text("60");
+    harness.run();
+    harness.key_press(Key::Enter);
+    harness.run();
+    assert_eq!(edits(&harness), []);
+    let refused = harness.get_by_label("Glass of surface 1");
+    assert_eq!(refused.value().as_deref(), Some("60"));
+}
+
+#[test]
 fn backspace_clears_a_range() {
     let mut harness = table(double_gauss());
     enter(&mut harness, "Radius of surface 1");

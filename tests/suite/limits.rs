@@ -280,3 +280,31 @@ fn a_limit_that_nothing_can_keep_is_named() {
     assert!(!optimizer.conflict().is_empty());
     assert!(optimizer.conflict().iter().all(|name| name.contains("light")));
 }
+
+/// A lens of two radii of 50 mm, 3 mm thick, in a beam of 20 mm: the light fills the first surface to
+/// 10 mm, where two sags of 1.0102 mm leave 0.9796 mm of glass, whether the rim is fixed or not.
+#[test]
+fn an_edge_is_measured_where_the_light_ends_if_no_rim_is_fixed() {
+    let mut lens = aplanat::lens::blank();
+    lens.aperture = aplanat::lens::Aperture::EntrancePupilDiameter(20.0);
+    lens.surfaces[0].thickness = 3.0;
+    for (row, curvature) in lens.surfaces.iter_mut().zip([0.02, -0.02]) {
+        (row.curvature, row.semi_diameter) = (curvature, None);
+    }
+    let edge = 3.0 - 2.0 * (50.0 - f64::sqrt(2500.0 - 100.0));
+    let terms = [Term::GlassEdge(2.0), Term::Steepness(0.1)].map(|t| WeightedTerm::new(t, 1.0));
+    let found = aplanat::merit::constraint_margins(&lens, terms.into_iter()).unwrap();
+    let value = |term: &str| found.iter().find(|margin| margin.term == term).unwrap().value;
+    assert!((value("glass_edge") - edge).abs() < 1e-8, "{}", value("glass_edge"));
+    assert!((value("steepness") - 0.2).abs() < 1e-9);
+    // A penalty counts what is missing at both rims, once each.
+    let mut goal = goal(&[Term::GlassEdge(2.0)]);
+    goal.limits = LimitTreatment::Penalties;
+    let merit = Merit::new(&lens, &goal, 1e-3).unwrap();
+    let cost = merit.value(&merit.values(&lens)).unwrap();
+    assert!(cost >= (2.0 - edge).powi(2) - 1e-6, "{cost}");
+    lens.surfaces.iter_mut().for_each(|row| row.semi_diameter = Some(10.0));
+    let fixed = aplanat::merit::constraint_margins(&lens, terms.into_iter()).unwrap();
+    let fixed = fixed.iter().find(|margin| margin.term == "glass_edge").unwrap().value;
+    assert!((fixed - edge).abs() < 1e-12, "{fixed}");
+}

@@ -1,6 +1,5 @@
 //! The contrast of all fields against spatial frequency.
 
-use super::pupils::for_each_field;
 use crate::analysis::{
     self, AnalysisError, Estimate, MtfCurve, Spot, Wavefront, polychromatic_diffraction_mtf,
     polychromatic_geometric_mtf,
@@ -8,6 +7,7 @@ use crate::analysis::{
 use crate::lens::FieldPoint;
 use crate::pupil::{Accuracy, RayModel};
 use crate::session::clock::{Timed, time};
+use rayon::prelude::*;
 
 /// The contrast of all fields over all wavelengths.
 #[derive(Debug, Clone)]
@@ -39,22 +39,30 @@ const REACH: f64 = 2.0;
 /// The error allowed of a curve that is looked at.
 const LARGEST_ERROR: f64 = 1e-3;
 
-/// The contrast of all fields up to a frequency that the sharpest one still shows.
+/// The contrast of all fields up to a frequency that the sharpest one still shows; `None` if it was
+/// interrupted between two fields.
 pub(super) fn field_contrasts(
     model: &RayModel,
     spots: &[Result<Spot, AnalysisError>],
     tolerance: f64,
-) -> FieldContrasts {
+    interrupted: impl Fn() -> bool,
+) -> Option<FieldContrasts> {
     let highest = highest_frequency(model, spots);
     let step = highest / FREQUENCIES as f64;
     let frequencies: Vec<f64> = (0..=FREQUENCIES).map(|i| step * i as f64).collect();
     let accuracy = Accuracy { tolerance: tolerance.min(LARGEST_ERROR), ..Accuracy::default() };
-    let fields = for_each_field(model, |field| {
-        time(|| field_contrast(model, field, &frequencies, accuracy))
-    });
+    let contrast =
+        |field: &FieldPoint| time(|| field_contrast(model, *field, &frequencies, accuracy));
+    let mut fields = Vec::with_capacity(model.fields.len());
+    for together in model.fields.chunks(rayon::current_num_threads()) {
+        if interrupted() {
+            return None;
+        }
+        fields.par_extend(together.par_iter().map(contrast));
+    }
     let cutoff = cutoff(model);
     let limit = |nu: &f64| cutoff.map(|cutoff| analysis::perfect_contrast(nu / cutoff));
-    FieldContrasts { limit: frequencies.iter().map(limit).collect(), frequencies, fields }
+    Some(FieldContrasts { limit: frequencies.iter().map(limit).collect(), frequencies, fields })
 }
 
 fn field_contrast(

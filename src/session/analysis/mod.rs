@@ -68,7 +68,8 @@ pub struct Analyses {
     pub airy: Option<f64>,
     /// The pupils of the fields; `None` while no panel shows them.
     pub pupils: Option<Timed<FieldPupils>>,
-    /// The contrast of the fields; `None` while no panel shows it.
+    /// The contrast of the fields; `None` while no panel shows it, and at first: it may take longer than
+    /// all else.
     pub contrasts: Option<Timed<FieldContrasts>>,
     /// A scene through the lens, or the reason why there is none; `None` while no panel shows it.
     pub picture: Option<Arc<Timed<Result<ScenePicture, String>>>>,
@@ -126,7 +127,8 @@ pub(super) fn spawn_analysis(
     let mut published = None;
     AnalysisWorker::spawn("analysis", wake, move |request, output| {
         let results = answer(request, output, &mut published);
-        let refined = results.map(|results| refine(publish_prediction(results, output), output));
+        let slower = |results| publish_prediction(publish_contrasts(results, output), output);
+        let refined = results.map(|results| refine(slower(results), output));
         if let (Some(results), EffectTiming::Measured) = (refined, timing) {
             measure(results, output);
         }
@@ -151,6 +153,23 @@ fn answer(
     *published = Some(now());
     output.publish(results.clone());
     Some(results)
+}
+
+/// Publishes the results once more with the contrast of the fields if a panel shows it, unless another
+/// request interrupts that: where the image is blurred it takes longer than all else.
+fn publish_contrasts(mut results: AnalysisResults, output: &AnalysisOutput) -> AnalysisResults {
+    let Ok(analyses) = &mut results.analyses else { return results };
+    let AnalysisSettings { contrasts, tolerance, .. } = results.settings;
+    if contrasts && !output.is_interrupted() {
+        let (model, spots) = (&analyses.ray_model.value, &analyses.spots.value);
+        let interrupted = || output.is_interrupted();
+        let found = time(|| contrast::field_contrasts(model, spots, tolerance, interrupted));
+        if let Some(value) = found.value {
+            analyses.contrasts = Some(Timed { value, ms: found.ms });
+            output.publish(results.clone());
+        }
+    }
+    results
 }
 
 /// Publishes the results once more with the lens as it is made if a panel shows it and no request
@@ -266,10 +285,6 @@ impl Analyses {
         unless_interrupted()?;
         let pupils = settings.pupils.then(|| time(|| field_pupils(&b, settings, accuracy)));
         unless_interrupted()?;
-        let contrasts = settings
-            .contrasts
-            .then(|| time(|| contrast::field_contrasts(&b, &spots.value, settings.tolerance)));
-        unless_interrupted()?;
         let picture = settings.picture.then(|| {
             let AnalysisSettings { zoom, scene, .. } = *settings;
             Arc::new(time(|| scene_picture::coarse_picture(lens, zoom, scene)))
@@ -292,7 +307,7 @@ impl Analyses {
             spot_points: scatter,
             spots,
             pupils,
-            contrasts,
+            contrasts: None,
             picture,
             as_built: None,
             fans,

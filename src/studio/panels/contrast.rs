@@ -1,5 +1,7 @@
 //! The modulation transfer function of every field, with the limit that diffraction sets.
 
+use std::sync::Arc;
+
 use egui::{Response, RichText, Ui, WidgetInfo};
 use egui_plot::{Line, LineStyle, PlotPoints};
 
@@ -7,7 +9,7 @@ use super::widgets::{fixed_plot, swatch};
 use super::{Panel, displayed_results, field_name, show_missing_results};
 use crate::analysis::{AnalysisError, MtfCurve, TransferValue};
 use crate::lens::Fields;
-use crate::session::{FieldContrast, FieldContrasts, SessionView, Timed};
+use crate::session::{AnalysisResults, FieldContrast, FieldContrasts, SessionView, Timed};
 use crate::studio::actions::Actions;
 use crate::studio::number;
 use crate::studio::palette::{Palette, color32};
@@ -16,10 +18,14 @@ use crate::studio::palette::{Palette, color32};
 const LINE: f32 = 23.0;
 /// The lowest plot.
 const LOWEST: f32 = 120.0;
+/// The opacity of what belongs to the lens before.
+const FAINT: f32 = 0.45;
 
-/// The panel.
+/// The panel. It shows the last contrasts, faint, until those of a changed lens are there.
 #[derive(Debug, Default)]
-pub struct ContrastPanel;
+pub struct ContrastPanel {
+    last: Option<Arc<AnalysisResults>>,
+}
 
 impl Panel for ContrastPanel {
     fn title(&self) -> &'static str {
@@ -30,13 +36,22 @@ impl Panel for ContrastPanel {
         let Some((results, numbers)) = displayed_results(view) else {
             return show_missing_results(ui, view);
         };
-        let Some(contrasts) = &numbers.contrasts else {
+        let is_current = numbers.contrasts.is_some();
+        if is_current {
+            self.last = Some(Arc::clone(results));
+        }
+        let shown = self.last.as_ref().and_then(|last| Some((last, last.analyses.as_ref().ok()?)));
+        let shown = shown.and_then(|(last, numbers)| Some((last, numbers.contrasts.as_ref()?)));
+        let Some((results, contrasts)) = shown else {
             ui.weak("Computing …");
             return;
         };
         let lines = 2 + contrasts.value.fields.len();
         let height = (ui.available_height() - LINE * lines as f32).max(LOWEST);
-        legend(ui);
+        legend(ui, is_current);
+        if !is_current {
+            ui.multiply_opacity(FAINT);
+        }
         plot(ui, &contrasts.value, height);
         let fields = results.lens.fields_at(results.settings.zoom);
         egui::ScrollArea::vertical().show(ui, |ui| {
@@ -47,7 +62,11 @@ impl Panel for ContrastPanel {
     }
 }
 
-fn legend(ui: &mut Ui) {
+fn legend(ui: &mut Ui, is_current: bool) {
+    if !is_current {
+        ui.label(RichText::new("of the lens before; computing …").small());
+        return;
+    }
     let text = "tangential solid, sagittal dashed, diffraction limit dotted; all wavelengths, \
                 cycles/mm";
     ui.label(RichText::new(text).small().weak());

@@ -8,8 +8,9 @@ use super::{Panel, displayed_results, show_missing_results};
 use crate::lens::FieldKind;
 use crate::session::{FieldCurvePoint, FieldCurves, SessionView};
 use crate::studio::actions::Actions;
+use crate::studio::draw::Rgba;
 use crate::studio::number;
-use crate::studio::palette::{Palette, Rgba, color32};
+use crate::studio::palette::{Palette, color32};
 
 /// The height of the title of a plot.
 const TITLE: f32 = 24.0;

@@ -147,7 +147,7 @@ impl PanelKind {
             Self::Prescription => Box::new(PrescriptionPanel::default()),
             Self::Spot => Box::new(SpotPanel::new(backend)),
             Self::Pupil => Box::new(PupilPanel::default()),
-            Self::Contrast => Box::new(ContrastPanel),
+            Self::Contrast => Box::new(ContrastPanel::default()),
             Self::Fans => Box::new(FansPanel),
             Self::FieldCurves => Box::new(FieldCurvesPanel),
             Self::Picture => Box::new(PicturePanel::default()),

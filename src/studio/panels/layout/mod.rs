@@ -279,7 +279,10 @@ impl LayoutDrawing {
             ui.painter_at(shown.response.rect).line(curve, stroke);
         }
         let near = near?;
-        shown.response.clone().on_hover_text_at_pointer(self.describe(view, near));
+        // While a handle is dragged its numbers stand where the explanation would.
+        if view.drag.progress.is_none() {
+            shown.response.clone().on_hover_text_at_pointer(self.describe(view, near));
+        }
         (near < view.lens.surfaces.len()).then_some(near)
     }
 

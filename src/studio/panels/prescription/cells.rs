@@ -98,7 +98,7 @@ impl CellPlace {
         let Some(surface) = self.surface() else { return self.object_edit(lens, text) };
         match self.column {
             TableColumn::Glass => {
-                Ok(Edit::SetMedium { surface, medium: glass::parse_medium(text) })
+                Ok(Edit::SetMedium { surface, medium: glass::typed_medium(text)? })
             }
             TableColumn::Comment => Ok(Edit::SetComment { surface, text: text.to_owned() }),
             TableColumn::Obstruction => {

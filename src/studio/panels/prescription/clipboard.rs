@@ -75,7 +75,7 @@ pub(super) fn clear_edit(
     sequence(grid.lens, zoom, "clear cells", Vec::new(), values)
 }
 
-fn cells<'a>(
+pub(super) fn cells<'a>(
     rows: &'a [usize],
     columns: &'a [TableColumn],
 ) -> impl Iterator<Item = CellPlace> + 'a {

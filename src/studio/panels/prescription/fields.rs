@@ -6,6 +6,7 @@ use egui::{
 
 use super::badge::{self, ParameterStatus};
 use super::cells::{CellPlace, OBJECT};
+use super::clipboard::cells;
 use super::columns::TableColumn;
 use super::glass;
 use super::table::{PrescriptionTable, room_in};
@@ -72,6 +73,10 @@ impl PrescriptionTable<'_> {
         let show = |ui: &mut Ui| self.buffers.show(ui, place.id(), field);
         let entry = ui.allocate_ui_with_layout(size, layout, show).inner;
         self.cursor.record(place, rect, entry.response.has_focus());
+        if entry.response.gained_focus() && place.surface() != self.view.selected {
+            // Commands for an element mean that of the cursor.
+            self.actions.push(Command::Select(place.surface()));
+        }
         let fits = match entry.submitted {
             Some(text) => self.try_edit(place, &text),
             None => true,
@@ -125,6 +130,9 @@ impl PrescriptionTable<'_> {
         let keys = Modifiers::COMMAND | Modifiers::SHIFT;
         if field.has_focus() && ui.input_mut(|input| input.consume_key(keys, Key::V)) {
             let status = ParameterStatus::of(&self.lens, parameter);
+            if let Some(edit) = self.range_toggle(matches!(status, ParameterStatus::Variable(_))) {
+                return self.actions.push(edit);
+            }
             if status == ParameterStatus::Automatic {
                 let surface = parameter.surface;
                 let fix = clear.map(|size| Edit::SetSemiDiameter { surface, value: Some(size) });
@@ -132,6 +140,28 @@ impl PrescriptionTable<'_> {
             }
             self.actions.push(badge::toggle_edit(status, parameter));
         }
+    }
+
+    /// The edit that makes all numbers of a range of cells variable, or fixed; `None` if no range is
+    /// chosen.
+    fn range_toggle(&self, fix: bool) -> Option<Edit> {
+        let (rows, columns) = self.cursor.range(self.grid())?;
+        let cells = cells(&rows, &columns).filter(|place| place.row != OBJECT);
+        let zoom = self.view.settings.zoom;
+        let number = |place: CellPlace| place.column.parameter(&self.lens, zoom, place.surface()?);
+        let numbers: Vec<Parameter> = cells.filter_map(number).collect();
+        let edit = |parameter: &Parameter| {
+            let status = ParameterStatus::of(&self.lens, *parameter);
+            let changes = match status {
+                ParameterStatus::Variable(_) => fix,
+                ParameterStatus::Fixed | ParameterStatus::Clipping => !fix,
+                _ => false,
+            };
+            changes.then(|| badge::toggle_edit(status, *parameter))
+        };
+        let edits: Vec<Edit> = numbers.iter().filter_map(edit).collect();
+        let title = format!("{} {} numbers", if fix { "fix" } else { "vary" }, edits.len());
+        (numbers.len() > 1).then_some(Edit::Sequence { title, edits })
     }
 
     /// Proposes glasses below a cell into which a name is typed.

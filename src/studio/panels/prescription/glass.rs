@@ -62,6 +62,24 @@ fn parse_gradient(text: &str) -> Option<Medium> {
     Some(Medium::Grin(Box::new(GradientIndex { base, law, radial: radial?, axial: axial? })))
 }
 
+/// The indices that a number in a cell can mean: no material has another one in light or infrared.
+const INDICES: std::ops::RangeInclusive<f64> = 0.1..=6.0;
+
+/// The medium that a text stands for, or the reason why a number is no index.
+pub(super) fn typed_medium(text: &str) -> Result<Medium, String> {
+    let medium = parse_medium(text);
+    let index = match medium {
+        Medium::Index(index) => index,
+        Medium::Model { nd, .. } => nd,
+        _ => return Ok(medium),
+    };
+    if INDICES.contains(&index) {
+        return Ok(medium);
+    }
+    let why = "no material has this index; type an index such as 1.5, nd and vd, or a glass";
+    Err(format!("{index}: {why}"))
+}
+
 /// Parses the text of a cell. An unknown name is kept, so that the error of the lens names it.
 pub(super) fn parse_medium(text: &str) -> Medium {
     let text = text.trim();
