@@ -411,6 +411,29 @@ fn gradients_agree_with_differences_of_edited_files() {
 }
 
 #[test]
+fn a_gradient_weighs_wavelengths_as_the_lens_does() {
+    let lens: Value = serde_json::from_str(&std::fs::read_to_string(LENS).unwrap()).unwrap();
+    let light = |name: &str, wavelengths: Vec<Value>| {
+        let mut lens = lens.clone();
+        lens["wavelengths"] = wavelengths.into();
+        let file = Scratch::with(name, &lens.to_string());
+        let report = done_json(
+            &["gradient", file.path(), "--field", "20", "--term", "throughput", "--error", "1e-9"],
+            "",
+        );
+        report["value"].as_f64().unwrap()
+    };
+    let one = |um: f64, weight: f64, primary: bool| json!({"um": um, "weight": weight, "primary": primary});
+    let (red, blue) = (0.7065188, 0.4046561);
+    let alone = [red, blue].map(|um| light("one-color.json", vec![one(um, 0.3, true)]));
+    assert!((alone[0] / alone[1] - 1.0).abs() > 1e-3, "the colors differ: {alone:?}");
+    let both = light("two-colors.json", vec![one(red, 0.3, true), one(blue, 0.7, false)]);
+    let mean = 0.3 * alone[0] + 0.7 * alone[1];
+    // The stop alone limits the beams, whatever the primary wavelength is.
+    assert!((both / mean - 1.0).abs() < 1e-6, "{both} {mean}");
+}
+
+#[test]
 fn a_gradient_says_whether_its_tolerance_was_reached() {
     let boundary = ["gradient", LENS, "--field", "20"];
     assert_eq!(done_json(&boundary, "")["reached"], true);
