@@ -60,7 +60,7 @@ fn reference_vignetted() {
                 assert!(light[f].error.is_some() && light[f].cone.value == 0.0, "{}", lens.id());
                 continue;
             }
-            let mut note = |name: &str, got: aplanat::analysis::Estimate, factor: f64| {
+            let mut note = |name: &str, got: Estimate, factor: f64| {
                 if exact[name].is_null() {
                     return;
                 }

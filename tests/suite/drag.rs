@@ -253,7 +253,7 @@ fn beam_field_and_stop_take_the_value_that_was_asked_for() {
     assert!((first(&small, 0).stop_semi_diameter / (0.5 * size.start()) - 1.0).abs() < 1e-12);
     assert_eq!(
         drag(&fast, Handle::BeamWidth, &[]).to(4.0).lens.aperture_at(0),
-        aplanat::lens::Aperture::FNumber(4.0)
+        Aperture::FNumber(4.0)
     );
 }
 
@@ -333,7 +333,7 @@ fn values_follow_the_pointer() {
     let [_, y] = places.place(Handle::BeamWidth).unwrap();
     let factor =
         value(Handle::BeamWidth, 1.0, [0.0, 0.5 * y]) / value(Handle::BeamWidth, 1.0, [0.0; 2]);
-    let fast = matches!(lens.aperture, aplanat::lens::Aperture::FNumber(_));
+    let fast = matches!(lens.aperture, Aperture::FNumber(_));
     near(factor, if fast { 1.0 / 1.5 } else { 1.5 });
 }
 

@@ -447,7 +447,7 @@ fn the_table_of_ghosts_has_the_share_that_arrives() {
     let path = lens.0.to_str().unwrap();
     let arguments = ["analyze", path, "ghosts", "--field", "0"];
     let found = done_json(&arguments, "");
-    let text = crate::cli::done(&arguments, "");
+    let text = done(&arguments, "");
     let ghosts = list(&found["fields"][0]["ghosts"]);
     assert!(!ghosts.is_empty());
     for ghost in ghosts {
