@@ -343,7 +343,7 @@ mod tests {
         }
     }
 
-    /// What keeps a tightened bound keeps the bound as well.
+    /// A lens within a tightened bound is within the bound as well.
     #[test]
     fn tightened_bounds_lie_inside_of_the_bounds() {
         let found =
