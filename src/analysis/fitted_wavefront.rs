@@ -391,3 +391,27 @@ fn fitted_at(
     let fitted = FittedWavefront::new(reference, &rays, &weights, nodes.mirrored)?;
     Some((fitted, rays, weights))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The slope of a sphere is the tangent of the angle whose sine is the height over the radius.
+    #[test]
+    fn a_point_of_a_curved_image_moves_along_it() {
+        let (radius, [x, y]) = (40.0_f64, [6.0, -11.0]);
+        let reference = WavefrontReference {
+            form: ReferenceForm::Infinite,
+            image: Shape::Sphere { curvature: 1.0 / radius },
+            index: 1.0,
+            wavelength: 5e-4,
+        };
+        let point = reference.image_point([x, y]).unwrap();
+        let height = (radius * radius - x * x - y * y).sqrt();
+        assert!((point.z.value - (radius - height)).abs() < 1e-12, "{:?}", point.z);
+        for (axis, off) in [x, y].into_iter().enumerate() {
+            let slope = point.z.slope[axis];
+            assert!((slope - off / height).abs() < 1e-12, "{slope} {}", off / height);
+        }
+    }
+}

@@ -424,3 +424,23 @@ fn object(measured: &EffectMeasurements, allowed: f64, choice: EffectOverride) -
     let computed = decision.computed && measured.finite_object.is_some();
     EffectDecision { computed, reason, ..decision }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lengths_have_three_digits_and_no_long_row_of_zeros() {
+        for (mm, text) in [
+            (0.0, "0 um"),
+            (0.0123, "12.3 um"),
+            (-0.5, "-500 um"),
+            (2.0, "2000 um"),
+            (1.234e-5, "0.0123 um"),
+            (2.5e-8, "2.50e-5 um"),
+            (1234.0, "1.23e6 um"),
+        ] {
+            assert_eq!(micrometres(mm), text);
+        }
+    }
+}

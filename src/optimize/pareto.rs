@@ -479,6 +479,7 @@ fn with_sweep_variables(lens: &Lens, [narrow, wide]: [f64; 2]) -> Lens {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::lens::{Parameter, Variable, blank};
 
     #[test]
     fn the_blurs_of_a_sweep_are_a_geometric_sequence_between_their_ends() {
@@ -492,5 +493,54 @@ mod tests {
         assert!(blurs.windows(2).all(|pair| (pair[1] / pair[0] / ratio - 1.0).abs() < 1e-12));
         let one = ParetoSettings { points: 1, ..settings };
         assert_eq!(one.weights(80.0), [(80.0f64 * 2e-5).powi(2)]);
+    }
+
+    /// Rims may vary by the factors of the sweep, but for the bounds that they have already.
+    #[test]
+    fn the_rims_of_a_sweep_are_bounded_by_factors_of_their_size() {
+        let mut lens = blank();
+        lens.surfaces[1].semi_diameter = Some(8.0);
+        let own = Parameter::new(1, Quantity::SemiDiameter);
+        lens.variables.push(Variable { parameter: own, min: None, max: Some(9.0) });
+        let free = with_sweep_variables(&lens, [0.5, 1.25]);
+        let bounds = |surface: usize| {
+            let rim = Parameter::new(surface, Quantity::SemiDiameter);
+            let found = free.variables.iter().find(|variable| variable.parameter == rim).unwrap();
+            [found.min, found.max]
+        };
+        assert_eq!([bounds(0), bounds(1)], [[Some(5.0), Some(12.5)], [Some(4.0), Some(9.0)]]);
+    }
+
+    /// The first correction of a chain is the descent of its goal with the pupil of the correction.
+    #[test]
+    fn a_chain_begins_with_the_pupil_of_its_correction() {
+        let found = crate::files::bundled_lenses();
+        let found = found.iter().find(|b| b.name == "double_gauss_rudolph_50").unwrap();
+        let lens = crate::files::json::read(found.text, found.name).unwrap();
+        let lens = with_sweep_variables(&limited_by_stop(&lens).unwrap(), [0.5, 1.5]);
+        let goal = weighted_sum_goal(&lens, 100.0, PupilEdge::Moving).unwrap();
+        let method = DescentMethod::TrustRegion;
+        let descent = |pupil: PupilEdge| {
+            let goal = Goal { pupil, ..goal.clone() };
+            let mut search = start(method, &lens, &goal, 1e-2).unwrap();
+            (0..3).for_each(|_| drop(search.step()));
+            search.current().clone()
+        };
+        assert!(descent(PupilEdge::Frozen) != descent(PupilEdge::Moving));
+        let mut chain = SweepChain {
+            lens: lens.clone(),
+            goal: goal.clone(),
+            first_correction: Some((0.0, PupilEdge::Frozen)),
+            weights: Vec::new(),
+            method,
+            steps: 1,
+            tolerance: 1e-2,
+            active: None,
+            refused: None,
+        };
+        chain.start_next();
+        let mut search = chain.active.unwrap().search;
+        (0..3).for_each(|_| drop(search.step()));
+        assert!(*search.current() == descent(PupilEdge::Frozen));
     }
 }

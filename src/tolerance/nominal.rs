@@ -210,6 +210,7 @@ impl NominalLens {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::lens::FieldPoint;
 
     #[test]
     fn two_opposite_fields_share_the_weight_of_one() {
@@ -249,5 +250,19 @@ mod tests {
                     .all(|i| { colour.pupil[i][0] * colour.rays[i].point.x >= 0.0 })
             );
         }
+    }
+
+    /// A field without weight is not traced, so it does not stand for the other side.
+    #[test]
+    fn fields_are_on_one_side_if_those_with_weight_are() {
+        let one_side = |heights: &[(f64, f64)]| {
+            let mut lens = crate::lens::blank();
+            let field = |(y, weight): &(f64, f64)| FieldPoint { x: 0.0, y: *y, weight: *weight };
+            lens.fields.values = heights.iter().map(field).collect();
+            has_one_side(&RayModel::from_lens(&lens, 0).unwrap())
+        };
+        assert!(one_side(&[(0.0, 1.0), (4.0, 1.0)]) && one_side(&[(-4.0, 1.0), (0.0, 0.5)]));
+        assert!(one_side(&[(0.0, 1.0), (4.0, 1.0), (-3.0, 0.0)]));
+        assert!(!one_side(&[(0.0, 1.0), (4.0, 1.0), (-3.0, 0.1)]));
     }
 }

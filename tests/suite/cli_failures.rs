@@ -375,6 +375,7 @@ fn benchmarks_and_studies_end_when_they_are_asked_to() {
     let said = text(&output.stderr);
     assert_eq!(output.status.code(), Some(1), "{said}");
     assert!(said.contains("experiment 5.4: stopped"), "{said}");
+    assert!(output.stdout.is_empty(), "{}", text(&output.stdout));
 }
 
 /// Benchmarks that would take hours print what they measured until they were asked to end.

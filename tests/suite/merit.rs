@@ -210,6 +210,24 @@ fn derivatives_include_the_stop_that_a_beam_fills() {
     }
 }
 
+/// A stop that is filled in part does not clip by its own rim, and the rims beside it clip by theirs.
+#[test]
+fn derivatives_include_the_rims_beside_a_stop_that_a_beam_fills() {
+    let mut lens = Lens { aperture: Aperture::FNumber(4.0), ..bundled("cooke_triplet_100_f27") };
+    let stop = lens.stop().unwrap();
+    lens.variables.clear();
+    lens.surfaces[0].semi_diameter = Some(11.0);
+    for surface in [0, stop] {
+        vary(&mut lens, surface, Quantity::SemiDiameter);
+    }
+    for term in [Term::Spot, Term::Throughput] {
+        check(&lens, term, PupilEdge::Moving, |quantity| 0.02 * step(quantity));
+    }
+    let merit = Merit::new(&lens, &goal_of(Term::Throughput), 1e-6).unwrap();
+    let slopes = merit.evaluate(&merit.values(&lens), DerivativeLevel::Gradient).unwrap().gradient;
+    assert!(merit.has_light() && slopes[0] < 0.0 && slopes[1] == 0.0, "{slopes}");
+}
+
 /// A lens whose fields off the axis end at its last rim.
 fn half_dark() -> Lens {
     let mut lens = bundled("double_gauss_rudolph_50");

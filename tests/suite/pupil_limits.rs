@@ -1,6 +1,6 @@
 //! Pupils whose limits move a little, and pupils without light, in closed form.
 
-use aplanat::analysis::spot;
+use aplanat::analysis::{PupilShape, pupil, spot};
 use aplanat::lens::{Aperture, FieldKind, FieldPoint, Lens, Object, Surface, System, blank};
 use aplanat::paraxial::Beam;
 use aplanat::pupil::{Accuracy, Aiming, RayModel, Region, RegionKind, limited_by_stop};
@@ -56,6 +56,41 @@ fn corners_between_the_pupil_and_a_rim_are_followed_with_few_rays() {
         let searched = region(&model).rays;
         assert!(4 * tracked.rays < searched, "{shift} {rim}: {} {searched}", tracked.rays);
     }
+}
+
+/// A field beside the plane of the drawing has a pupil without a mirrored half: its arcs close.
+#[test]
+fn corners_all_around_a_pupil_are_followed_with_few_rays() {
+    let aside = |shift: f64, rim: f64| {
+        let mut model = with_rim(shift, rim);
+        model.fields[0] = FieldPoint { x: model.fields[0].y, y: 0.0, weight: 1.0 };
+        model
+    };
+    for (shift, rim, sign) in [(4.0, 5.0, 1.0), (1.0, 5.9, 1.0), (1.0, 5.9, -1.0)] {
+        let before = aside(sign * shift, rim);
+        let before = region(&before).kind;
+        let model = aside(sign * (shift + 0.01), rim);
+        let tracked = Region::track(&before, model.launch(model.fields[0], 0).unwrap());
+        let area = tracked.trace_pupil(8).moments.area;
+        let exact = overlap(RADIUS, rim, shift + 0.01);
+        assert!((area / exact - 1.0).abs() < 1e-9, "{shift} {rim}: {area} {exact}");
+        let searched = region(&model).rays;
+        assert!(4 * tracked.rays < searched, "{shift} {rim}: {} {searched}", tracked.rays);
+    }
+}
+
+/// A shadow of 2 mm in a pupil of 5 mm leaves a ring about the axis, and the dots that draw it are
+/// spread evenly: their mean square distance is that of the ring, half the sum of both squares.
+#[test]
+fn the_dots_of_a_ring_fill_it_evenly() {
+    let model = displaced(0.0, &Surface { obstruction: 2.0, ..Surface::plane(DISTANCE, 1.0) });
+    let drawn = pupil(&model, model.fields[0], 0, Accuracy::default());
+    let PupilShape::Irregular { pieces, dots } = drawn.shape else { panic!("{:?}", drawn.shape) };
+    let mean = |of: &dyn Fn(&[f64; 2]) -> f64| dots.iter().map(of).sum::<f64>() / dots.len() as f64;
+    assert!(pieces == 1 && dots.iter().all(|[x, y]| (2.0..=RADIUS).contains(&x.hypot(*y))));
+    let square = mean(&|[x, y]| x * x + y * y);
+    assert!((square / 14.5 - 1.0).abs() < 0.02, "{square}");
+    assert!(mean(&|[x, _]| *x).abs() < 1e-9 && mean(&|[_, y]| *y).abs() < 1e-9);
 }
 
 /// The mean over the pupil of a function of the place, by the midpoints of 200 x 200 cells.

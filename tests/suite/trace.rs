@@ -756,3 +756,32 @@ fn light_goes_through_no_medium_without_a_positive_index() {
         assert!(Tracer::new(&system(1.0, bad)).is_err(), "{bad} behind");
     }
 }
+
+/// Rays to points of a conic that are known beforehand, with the normal there: half of the gradient
+/// of `2z − c (r² + (1 + κ) z²)`.
+#[test]
+fn the_margin_at_a_miss_is_that_along_the_normal_of_the_conic() {
+    let (curvature, index) = (0.04, 1.5);
+    for conic in [0.0, -2.0, -1.0, 0.7] {
+        let shape = Shape::Conic { curvature, conic };
+        let surfaces = vec![Surface { shape, ..Surface::plane(0.0, 1.7) }];
+        let tracer = Tracer::new(&System { index_before: index, surfaces, stop: None }).unwrap();
+        for [x, y, u, v] in [[3.0, -5.0, 0.2, 0.1], [0.0, 9.0, 0.0, -0.3], [7.0, 2.0, 0.3, 0.0]] {
+            let r2: f64 = x * x + y * y;
+            let root = (1.0 - (1.0 + conic) * curvature * curvature * r2).sqrt();
+            let point = Vec3::new(x, y, curvature * r2 / (1.0 + root));
+            let normal = Vec3::new(-curvature * x, -curvature * y, root);
+            let direction = Vec3::new(u, v, (1.0_f64 - u * u - v * v).sqrt());
+            let mut found = None;
+            tracer.margins(
+                Ray { point: point - direction * 20.0, direction },
+                |_, limit, margin| {
+                    found = found.or((limit == RayLimit::Miss).then_some(margin));
+                },
+            );
+            let exact = (index * direction.dot(normal)).powi(2);
+            let found: f64 = found.unwrap();
+            assert!((found / exact - 1.0).abs() < 1e-12, "{conic} {x} {y}: {found} {exact}");
+        }
+    }
+}

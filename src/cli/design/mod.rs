@@ -207,3 +207,39 @@ fn judge(path: &Path, asked: &LensRequirements) -> Result<LensJudgement, CliErro
     let refuse = |error| CliError::Input(format!("{}: {error}", path.display()));
     judge_lens(&opened.lens, asked, JUDGEMENT_TOLERANCE).map_err(refuse)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lens::{Lens, blank};
+    use crate::search::design::DesignMerit;
+
+    #[test]
+    fn the_best_lens_has_the_name_that_is_asked_for_and_others_their_merit() {
+        let spec = r#"{"focal_length_mm": 100, "f_number": 10, "half_field_deg": 1}"#;
+        let spec: LensSpecification = serde_json::from_str(spec).unwrap();
+        let (asked, _) = LensRequirements::complete(&spec).unwrap();
+        let mut lens = blank();
+        (lens.surfaces[0].curvature, lens.surfaces[1].thickness) = (0.02, 95.0);
+        let judgement = judge_lens(&lens, &asked, JUDGEMENT_TOLERANCE).unwrap();
+        let designed = |merit: DesignMerit| DesignedLens {
+            merit,
+            origin: String::new(),
+            judgement: judgement.clone(),
+            costs: Vec::new(),
+            lens: Lens { name: report::merit_name(merit).to_owned(), ..lens.clone() },
+        };
+        let folder = std::env::temp_dir().join(format!("aplanat-designed-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        let lenses = [DesignMerit::Best, DesignMerit::Simplest].map(designed);
+        let mut failures = Failures::default();
+        let saved = save_lenses(&lenses, &folder.join("a.json"), &mut failures);
+        failures.into_result().unwrap();
+        for (saved, name) in saved.iter().zip(["a.json", "a_simplest.json"]) {
+            assert_eq!(saved.as_deref(), Some(folder.join(name).to_str().unwrap()));
+        }
+        let name = |file: &str| files::open(folder.join(file)).unwrap().lens.name;
+        assert_eq!([name("a.json"), name("a_simplest.json")], ["best", "simplest"]);
+        std::fs::remove_dir_all(&folder).unwrap();
+    }
+}

@@ -125,3 +125,32 @@ fn difference(
         },
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::grin::field::{RegularGrid, Trilinear};
+
+    fn linear(value: impl Fn(f64) -> f64) -> Trilinear<f64> {
+        let grid = RegularGrid::cube(3, 1.0).unwrap();
+        Trilinear::from_function(grid, |at| value(at.z)).unwrap()
+    }
+
+    /// An index of 1.55 and 1.45 at two places where it should be 1.4, and was 1 at the start.
+    #[test]
+    fn differences_are_shares_of_the_norms() {
+        let (found, exact) = (linear(|z| 1.5 + 0.1 * z), linear(|_| 1.4));
+        let places = [-0.5, 0.5].map(|z| (Vec3::new(0.0, 0.0, z), 1.0));
+        let of = difference(&found, &exact, &|_| 1.0, &places);
+        let near = |found: f64, exact: f64| {
+            assert!((found - exact).abs() < 1e-12, "{found} {exact}: {of:?}");
+        };
+        let root_mean = |a: f64, b: f64| (0.5 * (a * a + b * b)).sqrt();
+        near(of.relative, root_mean(0.15, 0.05) / 1.4);
+        near(of.relative_to_contrast, root_mean(0.15, 0.05) / 0.4);
+        near(of.offset, 0.5 * (1.55 * 1.55 + 1.45 * 1.45) - 1.96);
+        // The squares of both are 0.15 from their mean, which the offset makes that of the reference.
+        let [low, high] = [1.96_f64 - 0.15, 1.96 + 0.15].map(f64::sqrt);
+        near(of.without_offset, root_mean(low - 1.4, high - 1.4) / 1.4);
+    }
+}

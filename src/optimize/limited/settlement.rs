@@ -141,3 +141,46 @@ impl LimitedOptimizer {
         self.prices = all.filter_map(price).collect();
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lens::{Lens, ParameterKind, add_variables, blank};
+    use crate::merit::{Goal, LimitTreatment, Merit, PupilEdge, Term, WeightedTerm};
+    use crate::optimize::Optimizer as _;
+
+    /// A biconvex lens, and the least back focus that is asked for.
+    fn optimizer(back_focus: f64) -> LimitedOptimizer {
+        let mut lens = blank();
+        (lens.surfaces[0].curvature, lens.surfaces[1].curvature) = (0.02, -0.02);
+        add_variables(&mut lens, &[ParameterKind::Thicknesses]);
+        let goal = Goal {
+            terms: [Term::Spot, Term::BackFocus(back_focus)]
+                .map(|term| WeightedTerm::new(term, 1.0))
+                .to_vec(),
+            pupil: PupilEdge::Moving,
+            zoom_ratios: Vec::new(),
+            limits: LimitTreatment::Constraints,
+        };
+        LimitedOptimizer::new(Merit::new(&lens, &goal, 1e-3).unwrap(), &lens, 1e-3).unwrap()
+    }
+
+    fn back_focus(lens: &Lens) -> f64 {
+        lens.surfaces[1].thickness
+    }
+
+    /// Broken limits count before the merit, and limits that are kept do not count.
+    #[test]
+    fn a_lens_is_ranked_by_its_broken_limits_first() {
+        let kept = optimizer(45.0);
+        assert_eq!(kept.rank(), (0.0, kept.state.value));
+        let mut broken = optimizer(52.5);
+        let missing = 52.5 - back_focus(broken.current());
+        let (violation, merit) = broken.rank();
+        assert!((violation - missing).abs() < 1e-9 && merit > 0.0, "{violation} {missing}");
+        assert!(kept.rank() < broken.rank());
+        (0..5).for_each(|_| drop(broken.step()));
+        broken.verify_best();
+        assert!(back_focus(broken.best()) > 52.5 - 1e-9 && broken.rank().0 == 0.0);
+    }
+}

@@ -211,6 +211,7 @@ fn refocused(lens: &Lens, asked: &LensRequirements) -> Lens {
 mod tests {
     use super::*;
     use crate::search::design::LensSpecification;
+    use crate::search::design::glasses::snapped;
     use crate::search::design::starts::achromats;
 
     fn finished() -> (LensRequirements, LensDraft, Lens) {
@@ -259,5 +260,16 @@ mod tests {
         let track = costs.iter().find(|cost| cost.term == "total_track").unwrap();
         assert!(track.um_per_mm > 0.0 && track.surface.is_none(), "{costs:?}");
         assert!(costs.windows(2).all(|pair| pair[0].um_per_mm >= pair[1].um_per_mm), "{costs:?}");
+    }
+
+    /// A lens without a simpler one beside it is not the simplest as well.
+    #[test]
+    fn a_lens_is_listed_once() {
+        let (asked, draft, _) = finished();
+        let draft = settled(&snapped(&draft, &asked), &asked);
+        let candidate = Candidate { origin: "an achromat".to_owned(), draft, value: 0.0 };
+        let lenses = finished_lenses(&[candidate], &asked);
+        assert!(lenses[0].judgement.is_valid(), "{:?}", lenses[0].judgement.failures());
+        assert!(lenses.iter().all(|lens| lens.merit != DesignMerit::Simplest));
     }
 }

@@ -92,3 +92,21 @@ fn remove_piece(draft: &mut MutationDraft, layer: GroupEnd) {
     draft.remove(outer);
     draft.inherit_variables(&[]);
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lens::{Medium, blank};
+
+    /// Two pieces that are cemented: either may go if one is enough, none if there must be two.
+    #[test]
+    fn a_piece_may_go_while_the_least_number_remains() {
+        let mut lens = blank();
+        let mut second = lens.surfaces[0].clone();
+        (second.stop, second.medium) = (false, Medium::Index(1.62));
+        lens.surfaces.insert(1, second);
+        let rules = |least: usize| SearchRules { elements: [least, 8], ..SearchRules::default() };
+        assert_eq!(sites(&lens, &rules(1)).unwrap().len(), 2);
+        assert!(matches!(sites(&lens, &rules(2)), Err(Refusal::TooFewElements)));
+    }
+}

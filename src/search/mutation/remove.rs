@@ -174,3 +174,21 @@ fn reverse_move(
     let singlet = Some(SingletProposal { singlet, neighbour, scale });
     Some(ReverseMove { kind: MutationKind::AddSinglet, log_density_ratio: log, spacing, singlet })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lens::{Row, blank};
+
+    /// A lens keeps a surface: its only singlet may go if something else stays.
+    #[test]
+    fn the_last_two_surfaces_stay() {
+        let mut lens = blank();
+        lens.surfaces[0].stop = false;
+        let rules = SearchRules { elements: [0, 8], ..SearchRules::default() };
+        assert!(matches!(sites(&lens, &rules), Err(Refusal::NoSinglet)));
+        let stop = Row { thickness: 10.0, stop: true, ..Row::default() };
+        lens.surfaces.insert(0, stop);
+        assert_eq!(sites(&lens, &rules).unwrap().len(), 1);
+    }
+}

@@ -75,3 +75,17 @@ impl LangevinProposal {
 pub(super) fn has_finite_squares(gradient: &[f64]) -> bool {
     gradient.iter().all(|g| (g * g).is_finite())
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The largest number is about 1.8e308, the square of 1.34e154.
+    #[test]
+    fn a_gradient_is_of_use_if_its_squares_are_numbers() {
+        assert!(has_finite_squares(&[0.0, -1e150, 1.3e154]));
+        for wrong in [1.4e154, -1e200, f64::INFINITY, f64::NAN] {
+            assert!(!has_finite_squares(&[1.0, wrong]), "{wrong:e}");
+        }
+    }
+}

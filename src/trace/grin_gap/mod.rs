@@ -262,3 +262,34 @@ fn is_turned_back<R: Real>(entry: Option<&Interface<R>>, state: &RayState<R>) ->
         height < R::ZERO && rate < R::ZERO
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lens::{PROFILE_TERMS, ProfileCoefficients, ProfileLaw};
+
+    /// In `n² = n₀² − a r²` a ray oscillates like a pendulum, `cos √a σ`: its largest distance is
+    /// its amplitude, wherever a step begins and ends.
+    #[test]
+    fn the_widest_place_of_a_ray_is_that_of_a_pendulum() {
+        let (amplitude, rate): (f64, f64) = (0.8, 0.3);
+        let mut terms = [0.0; PROFILE_TERMS];
+        terms[0] = -rate * rate;
+        let coefficients = ProfileCoefficients::new(ProfileLaw::Square, terms);
+        let gap = GrinGap {
+            field: RotationalProfile { base: 1.6, coefficients },
+            ops: INTEGRATOR.ops(),
+            step: 1.0,
+            max_steps: 100,
+            side2: 0.7,
+        };
+        for [from, to] in [[-0.1_f64, 0.3], [-0.25, 0.1], [-0.2, 0.2]] {
+            let x = Vec3::new(amplitude * from.cos(), 0.0, 0.0);
+            let v = Vec3::new(-amplitude * rate * from.sin(), 0.0, 1.0);
+            let before = RayState { x, v, path: 0.0 };
+            let h = (to - from) / rate;
+            let widest = gap.widest_radius2(0.0, before, h, gap.advance(before, h)).sqrt();
+            assert!((widest / amplitude - 1.0).abs() < 1e-6, "{from} {to}: {widest}");
+        }
+    }
+}

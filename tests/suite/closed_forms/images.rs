@@ -201,6 +201,34 @@ fn the_change_by_diffraction_of_a_perfect_lens_is_in_closed_form() {
     }
 }
 
+/// The share of the beam at a point of the stop is the area that a small piece of the stop has where
+/// its rays cross the first vertex plane, against that of an equal piece at the chief ray.
+#[test]
+fn the_share_of_a_beam_is_the_area_between_neighbouring_rays() {
+    let lens = bundled("wide_nikkor_28_f35");
+    let model = RayModel { aiming: Aiming::Stop, ..RayModel::from_lens(&lens, 0).unwrap() };
+    // Both fields are 30 degrees off the axis, one of them beside the y axis.
+    for (x, y) in [(0.0, 30.0), (18.0, 24.0)] {
+        let launch = model.launch(field(x, y), model.primary).unwrap();
+        let at = |p: [f64; 2]| {
+            let ray = launch.ray(p).unwrap();
+            let foot = ray.point - ray.direction * (ray.point.z / ray.direction.z);
+            [foot.x, foot.y]
+        };
+        let area = |[x, y]: [f64; 2]| {
+            let side = |a: [f64; 2], b: [f64; 2]| [a[0] - b[0], a[1] - b[1]];
+            let u = side(at([x + 1e-3, y]), at([x - 1e-3, y]));
+            let v = side(at([x, y + 1e-3]), at([x, y - 1e-3]));
+            u[0] * v[1] - u[1] * v[0]
+        };
+        for p in [[0.0, 0.0], [0.0, 0.7], [0.6, 0.5], [-0.8, -0.3], [0.5, -0.7]] {
+            let exact = area(p) / area([0.0, 0.0]);
+            let found = launch.beam_share(p);
+            assert!((found / exact - 1.0).abs() < 1e-5, "{x} {y} {p:?}: {found} {exact}");
+        }
+    }
+}
+
 /// A lens of revolution sees a field turned about its axis as it was: nothing depends on the azimuth
 /// of its rays, aimed at the stop or not.
 #[test]

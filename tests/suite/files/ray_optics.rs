@@ -3,6 +3,7 @@
 use super::foreign;
 use aplanat::files::{self, ConversionOutcome, LensFormat};
 use aplanat::lens::{Aperture, FieldKind, Medium, Object};
+use serde_json::Value;
 
 fn text() -> String {
     String::from_utf8(foreign("doublet.roa")).unwrap()
@@ -62,4 +63,23 @@ fn odd_powers_are_locked_and_missing_parts_named() {
         let error = files::parse(text.replacen(from, to, 1).as_bytes(), "a.roa").unwrap_err();
         assert!(error.to_string().contains(expected), "{to}: {error}");
     }
+}
+
+/// A lens has 1000 surfaces at most, with those of the object and of the image in a file.
+#[test]
+fn a_model_has_as_many_surfaces_as_a_lens() {
+    let with = |count: usize| {
+        let mut file: Value = serde_json::from_str(&text()).unwrap();
+        let model = &mut file["optical_model"]["attributes"]["seq_model"]["attributes"];
+        for (list, more) in [("ifcs", count - 6), ("gaps", count - 6)] {
+            let list = model[list].as_array_mut().unwrap();
+            // Behind the second surface of the lens, where its glass goes on.
+            let again = list[2].clone();
+            list.splice(2..2, std::iter::repeat_n(again, more));
+        }
+        files::parse(file.to_string().as_bytes(), "a.roa")
+    };
+    assert_eq!(with(1000).unwrap().lens.surfaces.len(), 998);
+    let error = with(1001).unwrap_err().to_string();
+    assert!(error.contains("1001 surfaces") && error.contains("998"), "{error}");
 }
