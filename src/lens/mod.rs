@@ -12,6 +12,7 @@ mod check;
 mod diff;
 mod edit;
 mod element;
+mod freeform;
 mod geometry;
 pub mod glass;
 mod goal;
@@ -38,6 +39,7 @@ pub use check::LensError;
 pub use diff::added_glass;
 pub use edit::{Edit, EditError, EditedCell, ElementEdit, apply_edit};
 pub use element::{ElementForm, NewElement};
+pub use freeform::{BASE_NUMBERS, BaseSag, FREEFORM_NUMBERS, Freeform, FreeformKind};
 pub use goal::{Goal, LimitTreatment, PupilEdge, Term, WeightedTerm};
 pub use grin::{GradientIndex, ParaxialGrin};
 pub use operand::{IndexRange, OperandKind, TermScope, TermSelection, last_index};
@@ -177,6 +179,8 @@ pub struct Row {
     pub conic: f64,
     /// Coefficients of r⁴, r⁶, ... r¹⁶, in mm⁻³, mm⁻⁵, ...
     pub asphere: Vec<f64>,
+    /// The form that the sag has beside; `None` for a conic with these coefficients alone.
+    pub freeform: Option<Freeform<f64>>,
     /// The distance along the axis to the next vertex, or from the last one to the image plane, in
     /// mm.
     pub thickness: f64,

@@ -130,6 +130,7 @@ impl Row {
             pose: self.pose(),
             axis: self.axis(),
             astigmatism: None,
+            freeform: self.freeform.clone().map(Box::new),
         }
     }
 }
@@ -189,7 +190,7 @@ pub fn paraxial_image_distance<R: Real>(system: &System<R>, object: Object) -> R
             sense = -sense;
         }
         let behind = sense * surface.index;
-        nu -= y * (behind - n) * surface.shape.curvature();
+        nu -= y * (behind - n) * surface.curvature();
         n = behind;
         if i == last {
             break;

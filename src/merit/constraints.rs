@@ -338,11 +338,7 @@ impl ConstrainedQuantity {
             Self::Steepness(surface) => {
                 let surface = &system.surfaces[surface];
                 let limited = surface.semi_diameter.value() < f64::INFINITY;
-                if limited {
-                    (surface.shape.curvature() * surface.semi_diameter).abs()
-                } else {
-                    R::ZERO
-                }
+                if limited { (surface.curvature() * surface.semi_diameter).abs() } else { R::ZERO }
             }
             Self::Rim(surface) => system.surfaces[surface].semi_diameter,
         }

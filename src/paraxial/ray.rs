@@ -53,7 +53,7 @@ pub fn paraxial_ray<R: Real>(system: &System<R>, height: R, slope: R) -> Paraxia
     let (mut y, mut nu) = (height, indices[0] * slope);
     for (i, surface) in system.surfaces.iter().enumerate() {
         heights.push(y);
-        nu -= y * (indices[i + 1] - before) * surface.shape.curvature();
+        nu -= y * (indices[i + 1] - before) * surface.curvature();
         let u = nu / indices[i + 1];
         slopes.push(u);
         if let Some(Some(gap)) = gaps.get(i) {

@@ -19,6 +19,7 @@ mod asphere_crossing;
 mod batch;
 mod edge;
 mod fate;
+mod freeform;
 mod grin_gap;
 mod interface;
 mod limit;
@@ -72,8 +73,9 @@ impl<R: Real> Tracer<R> {
             index_before,
             grin_gaps: Vec::new(),
             step_plans: Vec::new(),
-            mounts: mount::mounts(system),
+            mounts: Vec::new(),
         };
+        tracer.mounts = mount::mounts(system, &tracer.interfaces);
         if system.has_grin() {
             tracer.fill_grin_gaps(system)?;
         }

@@ -1,12 +1,14 @@
-//! Surfaces that are decentred, tilted, or not quite rotationally symmetric.
+//! Surfaces that are decentred, tilted, or not rotationally symmetric.
 //!
 //! Between surfaces a ray is in the frame of the vertex that the surface has in the centred lens. At a
 //! surface with a [`Pose`] it enters the surface's own frame, is intersected and refracted there, and
 //! leaves it again. Where the axis is broken, it leaves into the frame of the new axis: everything
-//! behind stands on it, and the gaps are measured along it. An irregular surface has the sag `z(r²) + q y²` in its own frame; the crossing with
-//! the surface of revolution is corrected by Newton's iteration.
+//! behind stands on it, and the gaps are measured along it. An irregular surface has the sag
+//! `z(r²) + q y²` in its own frame; the crossing with the surface of revolution is corrected by
+//! Newton's iteration. A freeform has a search of its own (`freeform`).
 
 use super::Tracer;
+use super::freeform::FreeformFace;
 use super::interface::{Interface, Intersection};
 use super::propagation::PropagatedRay;
 use crate::lens::{Pose, Surface, System};
@@ -17,29 +19,38 @@ use crate::math::{Real, Vec3};
 const NEWTON_STEPS: usize = 4;
 
 /// The position and the irregularity of a surface.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub(super) struct Mount<R> {
     pub(super) pose: Pose<R>,
     /// The axis behind the surface in the frame in front of it; `None` where it is not broken.
     pub(super) axis: Option<Pose<R>>,
     /// The surface's own frame in the frame behind it.
     pub(super) behind: Pose<R>,
-    /// The coefficient of y² in the sag, in 1/mm; `None` for a surface of revolution.
+    /// The coefficient of y² in the sag, in 1/mm; `None` for a surface of revolution and a freeform.
     pub(super) astigmatism: Option<R>,
+    /// The form of the sag; `None` for a conic with even powers.
+    pub(super) face: Option<FreeformFace<R>>,
 }
 
 /// The mounts of all surfaces; empty for a centred system.
-pub(super) fn mounts<R: Real>(system: &System<R>) -> Vec<Option<Mount<R>>> {
+pub(super) fn mounts<R: Real>(
+    system: &System<R>,
+    interfaces: &[Interface<R>],
+) -> Vec<Option<Mount<R>>> {
     if !system.has_poses() {
         return Vec::new();
     }
-    let mount = |surface: &Surface<R>| {
+    let mount = |(surface, interface): (&Surface<R>, &Interface<R>)| {
         let pose = surface.pose.unwrap_or_else(Pose::centred);
         let behind = surface.axis.map_or(pose, |axis| axis.inverse().then(&pose));
-        let (axis, astigmatism) = (surface.axis, surface.astigmatism);
-        surface.is_mounted().then_some(Mount { pose, axis, behind, astigmatism })
+        let (axis, mut astigmatism) = (surface.axis, surface.astigmatism);
+        let face = surface.freeform.as_ref().map(|form| {
+            let irregular = astigmatism.take().unwrap_or(R::ZERO);
+            FreeformFace::new(interface, form, irregular)
+        });
+        surface.is_mounted().then_some(Mount { pose, axis, behind, astigmatism, face })
     };
-    system.surfaces.iter().map(mount).collect()
+    system.surfaces.iter().zip(interfaces).map(mount).collect()
 }
 
 impl<R: Real> Mount<R> {
@@ -54,6 +65,9 @@ impl<R: Real> Mount<R> {
     ) -> PropagatedRay<'a, R> {
         let start = self.pose.point_in(Vec3::new(p.x, p.y, p.z - surface.gap));
         let k = self.pose.direction_in(k);
+        if let Some(face) = &self.face {
+            return PropagatedRay::met_at(surface, face.intersect(surface, start, k), k);
+        }
         match self.astigmatism {
             None => PropagatedRay::straight(surface, start, k),
             Some(q) => PropagatedRay::met_at(surface, surface.intersect_irregular(start, k, q), k),
@@ -68,6 +82,7 @@ impl<R: Real> Mount<R> {
             axis: self.axis.map(turned),
             behind: turned(self.behind),
             astigmatism: self.astigmatism.map(&f),
+            face: self.face.as_ref().map(|face| face.map(&f)),
         }
     }
 }

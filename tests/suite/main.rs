@@ -22,6 +22,7 @@ mod elements;
 mod every_lens;
 mod experiments;
 mod files;
+mod freeform;
 mod glass;
 mod goals;
 mod grin;

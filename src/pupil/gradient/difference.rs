@@ -102,6 +102,8 @@ impl SurfaceScales {
                 let length = row.thickness.abs().max(r);
                 grin_scale(row.grin.as_ref()?, k, r, length)
             }
+            // A change of the sag by a length r times the angle.
+            SurfaceParameter::Freeform(k) => r.powi(row.freeform.as_ref()?.kind.power(k)),
         };
         let step = STEP * scale;
         (step.is_finite() && step > 0.0).then_some(step)

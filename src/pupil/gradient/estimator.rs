@@ -384,6 +384,8 @@ fn natural_size(
                 None => 2 * (k as i32 + 1),
                 Some(j) => j as i32 + 1,
             },
+            // The power of the length depends on the kind of the form; rounding is far below both.
+            SurfaceParameter::Freeform(_) => -1,
         };
         integral * size.powi(power)
     }

@@ -1,4 +1,4 @@
-//! The adjoint of a surface that is decentred, tilted or irregular.
+//! The adjoint of a surface that is decentred, tilted, irregular or a freeform.
 //!
 //! The block enters the surface's own frame, is retraced through the surface there, and leaves the
 //! frame in front of it. The derivatives by the state of a ray turn with the frame, because a rotation
@@ -7,12 +7,13 @@
 use super::GradientSink;
 use super::block::AdjointBlock;
 use super::refraction::{SagDerivatives, SagRefractionAdjoint, SurfaceNormal, unrefract};
-use crate::lens::Pose;
-use crate::math::{Real, Vec3};
-use crate::trace::Tracer;
+use crate::lens::{ASPHERE_TERMS, BASE_NUMBERS, Pose};
+use crate::math::{Dual, Real, Vec3};
 use crate::trace::batch::BLOCK;
+use crate::trace::freeform::FreeformFace;
 use crate::trace::interface::Interface;
 use crate::trace::mount::Mount;
+use crate::trace::{SurfaceParameter, Tracer};
 
 impl<R: Real> Tracer<R> {
     /// Retraces a block through a surface with a mount to the surface before, and hands over the
@@ -29,12 +30,18 @@ impl<R: Real> Tracer<R> {
         // The gap in front belongs to the frame of the centred vertex.
         let own = Interface { gap: R::ZERO, ..*interface };
         adjoint.enter(&mount.behind);
-        match mount.astigmatism {
-            None => adjoint.retrace_surface(&own, None),
-            Some(q) => adjoint.retrace_irregular(&own, q),
+        let mut columns = Vec::new();
+        match (mount.astigmatism, &mount.face) {
+            (_, Some(face)) => columns = adjoint.retrace_freeform(&own, face),
+            (None, None) => adjoint.retrace_surface(&own, None),
+            (Some(q), None) => adjoint.retrace_irregular(&own, q),
         }
         adjoint.leave(&mount.pose, interface.gap);
         adjoint.accumulate(interface, i, sink);
+        for (k, lanes) in columns.iter().enumerate() {
+            let lanes = adjoint.mask_lost(lanes);
+            sink.add_lanes(Some(i), SurfaceParameter::Freeform(k), &lanes);
+        }
     }
 }
 
@@ -69,6 +76,96 @@ impl<R: Real> AdjointBlock<R> {
             self.set_shape_derivatives(j, &at.sag, lambda, at.by_slope);
             self.transfer_back(surface, j, p, &at.back, at.by_point - at.normal * lambda);
         }
+    }
+}
+
+/// The inputs of the base of a sag: x and y, then the numbers below.
+const CURVATURE: usize = 2;
+const CONIC: usize = 3;
+const TERMS: usize = 4;
+const OWN: usize = TERMS + ASPHERE_TERMS;
+const INPUTS: usize = OWN + BASE_NUMBERS;
+
+impl<R: Real> AdjointBlock<R> {
+    /// Retraces the block through a freeform. Returns the derivatives by its numbers.
+    fn retrace_freeform(
+        &mut self,
+        surface: &Interface<R>,
+        face: &FreeformFace<R>,
+    ) -> Vec<[R; BLOCK]> {
+        let mut columns = vec![[R::ZERO; BLOCK]; face.form.numbers.len()];
+        for j in 0..BLOCK {
+            if self.block.code[j] > R::ZERO {
+                continue;
+            }
+            let (p, behind) = self.block.state(j);
+            let sag = FreeformSlopes::new(surface, face, p);
+            let vector = Vec3::new(-sag.gradient[0], -sag.gradient[1], R::ONE);
+            let normal = SurfaceNormal { vector, m: vector.dot(vector), unit: false };
+            let back = unrefract(surface, normal, behind, self.by_k(j));
+            let n = back.by_normal;
+            let [[xx, xy], [yx, yy]] = sag.bends;
+            let bent = Vec3::new(xx * n.x + xy * n.y, yx * n.x + yy * n.y, R::ZERO);
+            let by_point = self.by_point(j) - bent;
+            let lambda = (by_point.dot(back.k) + self.by_opl[j] * surface.n2) / back.a;
+            let weights = [lambda, -n.x, -n.y];
+            self.set_base_derivatives(j, &sag, weights, &mut columns);
+            face.form.visit_series(p.x, p.y, |k, by| columns[k][j] = dot3(weights, by));
+            self.transfer_back(surface, j, p, &back, by_point - vector * lambda);
+        }
+        columns
+    }
+
+    /// Sets the derivatives by the numbers of the base, from those by the sag and its gradient.
+    fn set_base_derivatives(
+        &mut self,
+        j: usize,
+        sag: &FreeformSlopes<R>,
+        weights: [R; 3],
+        columns: &mut [[R; BLOCK]],
+    ) {
+        let by = |input: usize| dot3(weights, sag.base.map(|of| of.slope[input]));
+        (self.by_curvature[j], self.by_conic[j]) = (by(CURVATURE), by(CONIC));
+        for (term, lanes) in self.by_terms.iter_mut().enumerate() {
+            lanes[j] = by(TERMS + term);
+        }
+        for (k, lanes) in columns.iter_mut().take(BASE_NUMBERS).enumerate() {
+            lanes[j] = by(OWN + k);
+        }
+    }
+}
+
+fn dot3<R: Real>(a: [R; 3], b: [R; 3]) -> R {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+/// The gradient of a freeform at a point, its derivatives by the point, and those of the base by all
+/// its numbers.
+struct FreeformSlopes<R> {
+    gradient: [R; 2],
+    bends: [[R; 2]; 2],
+    base: [Dual<R, INPUTS>; 3],
+}
+
+impl<R: Real> FreeformSlopes<R> {
+    fn new(surface: &Interface<R>, face: &FreeformFace<R>, p: Vec3<R>) -> Self {
+        let input = Dual::<R, INPUTS>::variable;
+        let mut base = face.base(surface).map(Dual::constant);
+        base.curvature = input(base.curvature.value, CURVATURE);
+        base.conic = input(base.conic.value, CONIC);
+        base.terms = std::array::from_fn(|i| input(base.terms[i].value, TERMS + i));
+        base.own = std::array::from_fn(|i| input(base.own[i].value, OWN + i));
+        let base = base.sag(input(p.x, 0), input(p.y, 1));
+        let (x, y) = (Dual::<R, 2>::variable(p.x, 0), Dual::<R, 2>::variable(p.y, 1));
+        let [_, by_x, by_y] = face.form.series_sag(x, y, Dual::constant);
+        let twice = face.astigmatism + face.astigmatism;
+        let bend = |base: &Dual<R, INPUTS>, series: Dual<R, 2>| {
+            [base.slope[0] + series.slope[0], base.slope[1] + series.slope[1]]
+        };
+        let (along_x, mut along_y) = (bend(&base[1], by_x), bend(&base[2], by_y));
+        along_y[1] += twice;
+        let gradient = [base[1].value + by_x.value, base[2].value + by_y.value + twice * p.y];
+        Self { gradient, bends: [along_x, along_y], base }
     }
 }
 

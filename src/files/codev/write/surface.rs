@@ -100,6 +100,11 @@ impl CodeVWriter {
             let what = format!("hyperhemisphere of surface {surface}");
             self.record(ConversionOutcome::Dropped, what, "the other program decides by itself");
         }
+        if let Some(form) = &row.freeform {
+            let what = format!("surface {surface}: {}", form.kind.name());
+            let note = "written as its conic with even powers alone";
+            self.record(ConversionOutcome::Dropped, what, note);
+        }
         if let Some(locked) = &row.locked {
             let what = format!("surface {surface}: {}", locked.kind);
             self.record(ConversionOutcome::Locked, what, "written as its conic or asphere alone");

@@ -11,8 +11,9 @@ mod table;
 use crate::files::report::{ConversionOutcome, ConversionReport};
 use crate::files::text::{number, numbers};
 use crate::files::zemax::INFINITE_GAP;
+use crate::files::zemax::freeform::{self, FormLines};
 use crate::lens::{
-    Lens, LensError, Parameter, Pickup, Quantity, SurfaceNumber, Variable, ZoomThickness,
+    Lens, LensError, Parameter, Pickup, Quantity, Row, SurfaceNumber, Variable, ZoomThickness,
 };
 use place::{FileNumbers, RowBreaks, file_numbers, row_breaks};
 
@@ -170,6 +171,7 @@ impl ZemaxWriter {
             self.record(ConversionOutcome::Used, format!("{obstructing} obstructions"), note);
         }
         for (i, row) in lens.surfaces.iter().enumerate() {
+            self.report_freeform(i, row);
             if let Some(locked) = &row.locked {
                 let what = format!("surface {}: {}", SurfaceNumber::new(i), locked.kind);
                 let note = "written back with the lines of its file; rays meet its conic here";
@@ -188,17 +190,46 @@ impl ZemaxWriter {
         }
     }
 
+    /// Records what a freeform loses.
+    fn report_freeform(&mut self, i: usize, row: &Row) {
+        let Some(form) = &row.freeform else { return };
+        let what = format!("surface {}: {}", SurfaceNumber::new(i), form.kind.name());
+        let Some(lines) = freeform::form_lines(row, form) else {
+            let note = "has no counterpart there: the conic with its even powers is written alone";
+            self.record(ConversionOutcome::Dropped, what, note);
+            return;
+        };
+        if lines.kind.ends_with("ZERNSAG") {
+            let note =
+                "the order and the sign of the angle are those that the other program prints";
+            self.record(ConversionOutcome::Used, what, note);
+        }
+    }
+
     /// Records what a variable loses.
     fn report_variable(&mut self, variable: &Variable) {
         let is_bounded = variable.min.is_some() || variable.max.is_some();
         let has_both_bounds = variable.min.is_some() && variable.max.is_some();
         let note = match variable.parameter.quantity {
             Quantity::SemiDiameter => "semi-diameters cannot be variables there",
+            Quantity::Freeform(k) if !self.is_varied_there(variable.parameter.surface, k) => {
+                "this number cannot be a variable in the file"
+            }
             Quantity::Thickness if has_both_bounds => return,
             _ if is_bounded => "its bounds; it remains a variable",
             _ => return,
         };
         self.record(ConversionOutcome::Dropped, format!("variable: {}", variable.parameter), note);
+    }
+
+    fn is_varied_there(&self, surface: usize, number: usize) -> bool {
+        let row = &self.lens.surfaces[surface];
+        let lines = row.freeform.as_ref().and_then(|form| freeform::form_lines(row, form));
+        let varies = |lines: FormLines| {
+            let mut parameters = lines.parameters.iter();
+            parameters.any(|(i, _)| freeform::varied_number(lines.kind, *i) == Some(number))
+        };
+        lines.is_some_and(varies)
     }
 
     /// Records a pickup that the format does not know.
