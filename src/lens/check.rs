@@ -322,6 +322,9 @@ impl Row {
     }
 
     fn check_freeform(&self, surface: SurfaceNumber) -> Result<(), LensError> {
+        if let Some(why) = self.ideal.and_then(|ideal| ideal.fault(self)) {
+            return Err(LensError::Inconsistent(format!("surface {surface}: {why}")));
+        }
         let Some(form) = &self.freeform else { return Ok(()) };
         let far = "a freeform has no far half, but the surface is a hyperhemisphere".to_owned();
         let why = form.fault().or(self.hyperhemisphere.then_some(far));

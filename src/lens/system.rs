@@ -1,8 +1,8 @@
 //! A lens resolved to plain numbers, at one wavelength and one zoom position.
 
 use super::{
-    ASPHERE_TERMS, Freeform, MediumPlace, Pose, ProfileCoefficients, RotationalProfile,
-    SurfaceNumber,
+    ASPHERE_TERMS, Freeform, IdealAction, MediumPlace, Pose, ProfileCoefficients,
+    RotationalProfile, SurfaceNumber,
 };
 use crate::math::{Real, format_short};
 
@@ -187,6 +187,8 @@ pub struct Surface<R> {
     pub astigmatism: Option<R>,
     /// The form that the sag has beside the conic and its even powers; `None` for none.
     pub freeform: Option<Box<Freeform<R>>>,
+    /// The rule by which the surface deflects light beside; `None` for none.
+    pub ideal: Option<IdealAction<R>>,
 }
 
 /// A lens in plain numbers. Rays end at the last surface, as a rule the image plane.
@@ -266,8 +268,8 @@ pub enum SystemError {
     },
     /// A method that supports centred surfaces only meets another one.
     #[error(
-        "surface {surface} is decentred, tilted, irregular or a freeform, or the axis is broken there, \
-         which {what} does not support{hint}"
+        "surface {surface} is decentred, tilted, irregular, a freeform or an ideal element, or the axis \
+         is broken there, which {what} does not support{hint}"
     )]
     Posed {
         /// The surface.
@@ -345,7 +347,7 @@ impl<R: Real> System<R> {
         self.surfaces.get(surface)?.grin_profile()
     }
 
-    /// True if any surface is decentred, tilted, irregular or a freeform.
+    /// True if any surface is decentred, tilted, irregular, a freeform or an ideal element.
     pub fn has_poses(&self) -> bool {
         self.surfaces.iter().any(Surface::is_mounted)
     }
@@ -398,13 +400,16 @@ impl<R: Real> Surface<R> {
             axis: None,
             astigmatism: None,
             freeform: None,
+            ideal: None,
         }
     }
 
-    /// True if the surface is decentred, tilted, irregular or a freeform, or the axis is broken there.
+    /// True if the surface is decentred, tilted, irregular, a freeform or an ideal element, or the axis is
+    /// broken there.
     pub fn is_mounted(&self) -> bool {
         let placed = self.pose.is_some() || self.axis.is_some();
-        placed || self.astigmatism.is_some() || self.freeform.is_some()
+        let shaped = self.astigmatism.is_some() || self.freeform.is_some();
+        placed || shaped || self.ideal.is_some()
     }
 
     /// The curvature of the section with the y-z plane at the vertex, in 1/mm, which first-order optics
@@ -412,6 +417,11 @@ impl<R: Real> Surface<R> {
     pub fn curvature(&self) -> R {
         let Some(form) = &self.freeform else { return self.shape.curvature() };
         form.vertex_curvatures(&self.shape)[1]
+    }
+
+    /// The power in 1/mm that a paraxial lens adds to that of refraction.
+    pub fn added_power(&self) -> R {
+        self.ideal.map_or(R::ZERO, IdealAction::power)
     }
 
     /// True if the surface and the axis behind it mirror themselves at the y-z plane.
@@ -450,6 +460,9 @@ impl<R: Real> Surface<R> {
         if let Some(astigmatism) = self.astigmatism {
             check_finite("astigmatism", i, astigmatism.value())?;
         }
+        if let Some(ideal) = self.ideal {
+            check_finite("power or deflection", i, ideal.number().value())?;
+        }
         if let Some(form) = &self.freeform {
             form.numbers.iter().try_for_each(|a| check_finite("freeform number", i, a.value()))?;
         }
@@ -487,6 +500,7 @@ impl<R: Real> Surface<R> {
             axis: self.axis.map(|axis| axis.map(&f)),
             astigmatism: self.astigmatism.map(&f),
             freeform: self.freeform.as_ref().map(|form| Box::new(form.map(&f))),
+            ideal: self.ideal.map(|ideal| ideal.map(&f)),
         }
     }
 }

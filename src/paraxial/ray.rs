@@ -54,6 +54,9 @@ pub fn paraxial_ray<R: Real>(system: &System<R>, height: R, slope: R) -> Paraxia
     for (i, surface) in system.surfaces.iter().enumerate() {
         heights.push(y);
         nu -= y * (indices[i + 1] - before) * surface.curvature();
+        if surface.ideal.is_some() {
+            nu -= y * surface.added_power();
+        }
         let u = nu / indices[i + 1];
         slopes.push(u);
         if let Some(Some(gap)) = gaps.get(i) {

@@ -69,7 +69,7 @@ pub enum BodyError {
     #[error("surface {0} is of a kind that is not known here ({1})")]
     Locked(SurfaceNumber, String),
     /// A surface that is not one of revolution, or no conic with even powers.
-    #[error("surface {0} is a freeform ({1}), which is not drawn as a solid of revolution")]
+    #[error("surface {0} is a {1}, which is not drawn as a solid of revolution")]
     Freeform(SurfaceNumber, &'static str),
 }
 
@@ -194,6 +194,9 @@ impl LensBody {
             }
             if let Some(form) = &own(side).freeform {
                 return Some(BodyError::Freeform(numbers[side], form.kind.name()));
+            }
+            if let Some(ideal) = own(side).ideal {
+                return Some(BodyError::Freeform(numbers[side], ideal.name()));
             }
             if own(side).hyperhemisphere {
                 return Some(BodyError::Hyperhemisphere(numbers[side]));

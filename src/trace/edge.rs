@@ -149,7 +149,11 @@ impl<R: Real> PropagatedRay<'_, R> {
             return None;
         }
         if limit == Some(RayLimit::TotalReflection) {
-            return Some((met.point, self.k - met.normal * (met.a / met.m)));
+            return Some((met.point, self.grazing()));
+        }
+        if self.ideal().is_some() {
+            let refraction = self.refract();
+            return (!refraction.reflected).then_some((refraction.point, refraction.k));
         }
         let refraction = self.surface.refract(met, self.k, self.indices.dn2);
         (!refraction.reflected).then_some((refraction.point, refraction.k))

@@ -100,10 +100,18 @@ impl FreeformSearch {
         let bounds = base.map(Interval::constant);
         let (steepest, sags) = ([f64::INFINITY; 2], Interval::WHOLE);
         let mut search = Self { surface, form, astigmatism, base, bounds, steepest, sags };
-        if let Some((steepest, sags)) = search.bounds_inside(surface.rim2.sqrt()) {
+        if search.is_plane() {
+            search.steepest = [0.0; 2];
+        } else if let Some((steepest, sags)) = search.bounds_inside(surface.rim2.sqrt()) {
             (search.steepest, search.sags) = (steepest, sags);
         }
         search
+    }
+
+    fn is_plane(&self) -> bool {
+        let of_row = [self.surface.curvature, self.astigmatism].into_iter();
+        let mut all = of_row.chain(self.surface.terms).chain(self.form.numbers.iter().copied());
+        all.all(|number| number == 0.0)
     }
 
     fn sag(&self, x: f64, y: f64) -> [f64; 3] {

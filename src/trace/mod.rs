@@ -17,6 +17,7 @@ mod adjoint;
 mod asphere;
 mod asphere_crossing;
 mod batch;
+mod deflection;
 mod edge;
 mod fate;
 mod freeform;

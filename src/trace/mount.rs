@@ -8,10 +8,11 @@
 //! Newton's iteration. A freeform has a search of its own (`freeform`).
 
 use super::Tracer;
+use super::deflection::Deflection;
 use super::freeform::FreeformFace;
 use super::interface::{Interface, Intersection};
 use super::propagation::PropagatedRay;
-use crate::lens::{Pose, Surface, System};
+use crate::lens::{Freeform, FreeformKind, IdealAction, Pose, Surface, System};
 use crate::math::{Real, Vec3};
 
 /// The number of steps of Newton's iteration after which the crossing with an irregular surface is
@@ -30,6 +31,8 @@ pub(super) struct Mount<R> {
     pub(super) astigmatism: Option<R>,
     /// The form of the sag; `None` for a conic with even powers.
     pub(super) face: Option<FreeformFace<R>>,
+    /// The rule by which it deflects light; a surface with one has a form too.
+    pub(super) ideal: Option<IdealAction<R>>,
 }
 
 /// The mounts of all surfaces; empty for a centred system.
@@ -44,11 +47,14 @@ pub(super) fn mounts<R: Real>(
         let pose = surface.pose.unwrap_or_else(Pose::centred);
         let behind = surface.axis.map_or(pose, |axis| axis.inverse().then(&pose));
         let (axis, mut astigmatism) = (surface.axis, surface.astigmatism);
-        let face = surface.freeform.as_ref().map(|form| {
+        let plain = Freeform { kind: FreeformKind::OddAsphere, numbers: Vec::new() };
+        let form = surface.freeform.as_deref().or(surface.ideal.is_some().then_some(&plain));
+        let face = form.map(|form| {
             let irregular = astigmatism.take().unwrap_or(R::ZERO);
             FreeformFace::new(interface, form, irregular)
         });
-        surface.is_mounted().then_some(Mount { pose, axis, behind, astigmatism, face })
+        let ideal = surface.ideal;
+        surface.is_mounted().then_some(Mount { pose, axis, behind, astigmatism, face, ideal })
     };
     system.surfaces.iter().zip(interfaces).map(mount).collect()
 }
@@ -66,7 +72,10 @@ impl<R: Real> Mount<R> {
         let start = self.pose.point_in(Vec3::new(p.x, p.y, p.z - surface.gap));
         let k = self.pose.direction_in(k);
         if let Some(face) = &self.face {
-            return PropagatedRay::met_at(surface, face.intersect(surface, start, k), k);
+            let met = face.intersect(surface, start, k);
+            let arrived = PropagatedRay::met_at(surface, met, k);
+            let ideal = self.ideal.map(|action| Deflection::new(action, surface));
+            return ideal.map_or(arrived, |ideal| arrived.deflected_by(ideal));
         }
         match self.astigmatism {
             None => PropagatedRay::straight(surface, start, k),
@@ -83,6 +92,7 @@ impl<R: Real> Mount<R> {
             behind: turned(self.behind),
             astigmatism: self.astigmatism.map(&f),
             face: self.face.as_ref().map(|face| face.map(&f)),
+            ideal: self.ideal.map(|ideal| ideal.map(&f)),
         }
     }
 }

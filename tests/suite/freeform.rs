@@ -567,3 +567,37 @@ fn freeforms_survive_a_foreign_file() {
     }
     std::fs::remove_dir_all(&folder).unwrap();
 }
+
+/// Toroids and biconics go through a `.seq` file too; other forms are named as lost.
+#[test]
+fn toroids_and_biconics_survive_a_sequence_file() {
+    let folder = std::env::temp_dir().join(format!("aplanat-sequence-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    let path = folder.join("form.seq");
+    for (kind, numbers, kept) in [
+        (FreeformKind::Biconic, vec![0.05, -0.7], true),
+        (FreeformKind::Toroid, vec![-0.06, 0.0, -2e-5, 1e-8], true),
+        (FreeformKind::Toroid, vec![0.0], true),
+        (FreeformKind::Toroid, vec![0.0, 1e-3], false),
+        (FreeformKind::OddAsphere, vec![0.0, 0.0, 1e-4], false),
+    ] {
+        let mut written = lens();
+        written.surfaces[0].conic = -0.3;
+        written.surfaces[0].freeform = Some(Freeform { kind, numbers });
+        let report = files::save(&written, &path).unwrap().to_string();
+        assert_eq!(report.contains(&format!("surface 1: {}", kind.name())), !kept, "{report}");
+        let again = files::open(&path).unwrap().lens;
+        assert_eq!(again.surfaces[0].freeform.is_some(), kept);
+        if !kept {
+            continue;
+        }
+        let [a, b] = [&written, &again]
+            .map(|lens| Tracer::new(&lens.resolve(0, 0.5875618).unwrap()).unwrap());
+        for i in 0..40 {
+            let (p, q) = (a.trace(some_rays(40).get(i)), b.trace(some_rays(40).get(i)));
+            let apart = p.ray.point - q.ray.point;
+            assert!(p.fate == q.fate && apart.dot(apart).sqrt() < 1e-11, "{apart:?}");
+        }
+    }
+    std::fs::remove_dir_all(&folder).unwrap();
+}

@@ -31,6 +31,7 @@ mod grin_limits;
 mod grin_views;
 mod grin_wrong;
 mod hard_cases;
+mod ideal;
 mod image_hard_cases;
 mod images;
 mod images_cli;

@@ -71,6 +71,14 @@ pub(super) fn unusual_parts(lens: &Lens) -> Vec<LensCheck> {
         checks.push(LensCheck { surface: None, found: found.to_owned() });
     }
     for (i, row) in rows() {
+        if let Some(ideal) = row.ideal {
+            let found = format!(
+                "{}: Seidel sums leave it out; the optical path of a paraxial lens is that of a plane \
+                 wave in front of it",
+                ideal.name()
+            );
+            checks.push(LensCheck { surface: Some(i), found });
+        }
         let Some(form) = &row.freeform else { continue };
         let found = format!(
             "{}: first-order data are those of the y-z section, and Seidel sums leave its powers \

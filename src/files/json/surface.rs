@@ -2,7 +2,7 @@
 
 use super::medium::is_air;
 use super::required_number;
-use crate::lens::{AxisBreak, Freeform, LockedSurface, Medium, Row};
+use crate::lens::{AxisBreak, Freeform, IdealElement, LockedSurface, Medium, Row};
 use serde::de::value::MapAccessDeserializer;
 use serde::de::{Error, MapAccess, Unexpected, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
@@ -26,6 +26,8 @@ struct RowJson {
     asphere: Vec<f64>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     freeform: Option<Freeform<f64>>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    ideal: Option<IdealElement>,
     thickness: f64,
     #[serde(default, skip_serializing_if = "is_air")]
     glass: Medium,
@@ -98,6 +100,7 @@ impl Serialize for Row {
             conic: self.conic,
             asphere: self.asphere.clone(),
             freeform: self.freeform.clone(),
+            ideal: self.ideal,
             thickness: self.thickness,
             glass: self.medium.clone(),
             semi_diameter: self.semi_diameter,
@@ -137,6 +140,7 @@ impl<'de> Visitor<'de> for RowVisitor {
             conic: keys.conic,
             asphere: keys.asphere,
             freeform: keys.freeform,
+            ideal: keys.ideal,
             thickness: keys.thickness,
             medium: keys.glass,
             semi_diameter: keys.semi_diameter,

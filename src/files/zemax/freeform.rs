@@ -7,17 +7,20 @@
 //! | `BICONICX` | 1 radius in x, 0 for flat; 2 conic constant in x | |
 //! | `TOROIDAL` | 1 radius of rotation, 0 for a cylinder; 2 to 8: y² to y¹⁴ | 1 count of Zernike terms |
 //! | `XPOLYNOM` | | 1 count, 2 unit R, then x, y, x², xy, … |
+//! | `PARAXIAL` | 1 focal length; 2 mode of the optical path | |
+//! | `DGRATING` | 1 lines per µm; 2 order | |
 //! | `SZERNSAG`, `FZERNSAG` | 0 continued beyond R; 1 to 8: r² to r¹⁶ | 1 count, 2 radius R, then terms |
 
 use super::file::ZemaxSurface;
 use super::shape::ZemaxShape;
 use crate::files::report::ConversionOutcome;
-use crate::lens::{Freeform, FreeformKind, Row};
+use crate::lens::{Freeform, FreeformKind, IdealElement, Row};
 
 /// The freeform of a surface of a type that is none of revolution; `None` for another type.
 pub(super) fn surface_form(surface: &ZemaxSurface) -> Option<Result<ZemaxShape, String>> {
     let base = ZemaxShape::base(surface);
     let form = match surface.kind.0.as_str() {
+        "PARAXIAL" | "DGRATING" => return Some(ideal(base, surface)),
         "BICONICX" => return biconic(base, surface).map(Ok),
         "TOROIDAL" => toroid(surface),
         "XPOLYNOM" => polynomial(surface),
@@ -25,6 +28,22 @@ pub(super) fn surface_form(surface: &ZemaxSurface) -> Option<Result<ZemaxShape, 
         _ => return None,
     };
     Some(form.map(|form| ZemaxShape { freeform: Some(form), ..base }))
+}
+
+/// A paraxial lens or a grating.
+fn ideal(base: ZemaxShape, surface: &ZemaxSurface) -> Result<ZemaxShape, String> {
+    let (first, second) = (parameter(surface, 1), parameter(surface, 2));
+    if surface.kind.0 == "DGRATING" {
+        let ideal = IdealElement::Grating { lines_per_mm: 1e3 * first, order: second };
+        return Ok(ZemaxShape { ideal: Some(ideal), ..base });
+    }
+    if base.curvature != 0.0 || first == 0.0 {
+        return Err(format!("the focal length {first} and the curvature {}", base.curvature));
+    }
+    let note = "its optical path is that of a plane wave in front of it";
+    let note = Some((surface.kind.1, ConversionOutcome::Used, note.to_owned()));
+    let ideal = Some(IdealElement::Lens { focal_length: first });
+    Ok(ZemaxShape { conic: 0.0, ideal, note, ..base })
 }
 
 fn parameter(surface: &ZemaxSurface, index: usize) -> f64 {
@@ -185,6 +204,32 @@ pub(super) fn form_lines(row: &Row, form: &Freeform<f64>) -> Option<FormLines> {
             lines("FZERNSAG", zernike_parameters(row), normalised(radius))
         }
         _ => None,
+    }
+}
+
+/// The lines of a paraxial lens or a grating; `None` for a grating on a surface that is no conic.
+pub(super) fn ideal_lines(row: &Row, ideal: IdealElement) -> Option<FormLines> {
+    let extra = Vec::new();
+    match ideal {
+        IdealElement::Lens { focal_length } => {
+            let parameters = vec![(1, focal_length), (2, 0.0)];
+            Some(FormLines { kind: "PARAXIAL", parameters, extra })
+        }
+        IdealElement::Grating { lines_per_mm, order } => {
+            let conic = row.freeform.is_none() && row.asphere.iter().all(|a| *a == 0.0);
+            let parameters = vec![(1, 1e-3 * lines_per_mm), (2, order)];
+            conic.then_some(FormLines { kind: "DGRATING", parameters, extra })
+        }
+    }
+}
+
+/// The lines of a row of a type of its own; `None` for a conic with even powers, and for what the format
+/// does not have.
+pub(super) fn row_lines(row: &Row) -> Option<FormLines> {
+    match (row.ideal, &row.freeform) {
+        (Some(ideal), _) => ideal_lines(row, ideal),
+        (None, Some(form)) => form_lines(row, form),
+        (None, None) => None,
     }
 }
 

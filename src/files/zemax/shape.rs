@@ -4,7 +4,7 @@ use super::even_fit;
 use super::file::ZemaxSurface;
 use super::freeform;
 use crate::files::report::ConversionOutcome;
-use crate::lens::{ASPHERE_TERMS, Freeform};
+use crate::lens::{ASPHERE_TERMS, Freeform, IdealElement};
 
 /// The shape of a surface, in the unit of the file.
 #[derive(Debug, Default, PartialEq)]
@@ -15,6 +15,8 @@ pub(super) struct ZemaxShape {
     pub(super) asphere: Vec<f64>,
     /// The form beside, if there is one.
     pub(super) freeform: Option<Freeform<f64>>,
+    /// The rule by which it deflects light, if there is one.
+    pub(super) ideal: Option<IdealElement>,
     /// The note on a reduction, with the line that made it necessary.
     pub(super) note: Option<(usize, ConversionOutcome, String)>,
 }
@@ -223,7 +225,14 @@ fn fitted(
         found.error
     );
     let note = Some((line, ConversionOutcome::Approximated, note));
-    Ok(ZemaxShape { curvature, conic: found.conic, asphere: found.terms, freeform: None, note })
+    Ok(ZemaxShape {
+        curvature,
+        conic: found.conic,
+        asphere: found.terms,
+        freeform: None,
+        ideal: None,
+        note,
+    })
 }
 
 /// The coefficient of `x^k` in `Qₘ(x)`: `(−1)^(m+k) C(m+4, m−k) C(m+4+k, k)`.
@@ -421,7 +430,7 @@ mod tests {
 
     #[test]
     fn what_cannot_be_traced_is_refused() {
-        for kind in ["TILTSURF", "PARAXIAL", "DGRATING", "USERSURF", "NONSEQCO"] {
+        for kind in ["TILTSURF", "USERSURF", "NONSEQCO"] {
             assert_eq!(surface_shape(&surface(kind, 0.0, 0.0)), Err(String::new()));
         }
     }

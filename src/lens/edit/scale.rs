@@ -37,6 +37,7 @@ pub(super) fn scale(lens: &mut Lens, factor: f64) -> Result<(), EditError> {
         for (term, a) in row.asphere.iter_mut().enumerate() {
             *a *= factor.powi(-(2 * term as i32 + 3));
         }
+        row.ideal = row.ideal.map(|ideal| ideal.scaled(factor));
         row.freeform = row.freeform.as_ref().map(|form| form.scaled(factor));
         if let Medium::Grin(gradient) = &mut row.medium {
             for k in gradient.written_terms().collect::<Vec<_>>() {

@@ -6,10 +6,13 @@
 
 use super::GradientSink;
 use super::block::AdjointBlock;
-use super::refraction::{SagDerivatives, SagRefractionAdjoint, SurfaceNormal, unrefract};
+use super::refraction::{
+    RefractionAdjoint, SagDerivatives, SagRefractionAdjoint, SurfaceNormal, unrefract,
+};
 use crate::lens::{ASPHERE_TERMS, BASE_NUMBERS, Pose};
 use crate::math::{Dual, Real, Vec3};
 use crate::trace::batch::BLOCK;
+use crate::trace::deflection::Deflection;
 use crate::trace::freeform::FreeformFace;
 use crate::trace::interface::Interface;
 use crate::trace::mount::Mount;
@@ -32,7 +35,10 @@ impl<R: Real> Tracer<R> {
         adjoint.enter(&mount.behind);
         let mut columns = Vec::new();
         match (mount.astigmatism, &mount.face) {
-            (_, Some(face)) => columns = adjoint.retrace_freeform(&own, face),
+            (_, Some(face)) => {
+                let ideal = mount.ideal.map(|action| Deflection::new(action, &own));
+                columns = adjoint.retrace_freeform(&own, face, ideal.as_ref());
+            }
             (None, None) => adjoint.retrace_surface(&own, None),
             (Some(q), None) => adjoint.retrace_irregular(&own, q),
         }
@@ -92,6 +98,7 @@ impl<R: Real> AdjointBlock<R> {
         &mut self,
         surface: &Interface<R>,
         face: &FreeformFace<R>,
+        ideal: Option<&Deflection<R>>,
     ) -> Vec<[R; BLOCK]> {
         let mut columns = vec![[R::ZERO; BLOCK]; face.form.numbers.len()];
         for j in 0..BLOCK {
@@ -102,16 +109,27 @@ impl<R: Real> AdjointBlock<R> {
             let sag = FreeformSlopes::new(surface, face, p);
             let vector = Vec3::new(-sag.gradient[0], -sag.gradient[1], R::ONE);
             let normal = SurfaceNormal { vector, m: vector.dot(vector), unit: false };
-            let back = unrefract(surface, normal, behind, self.by_k(j));
+            let deflected = ideal.map(|ideal| {
+                DeflectionAdjoint::new(ideal, (p, behind, vector), self.by_k(j), self.by_opl[j])
+            });
+            let back = match &deflected {
+                Some(deflected) => deflected.back,
+                None => unrefract(surface, normal, behind, self.by_k(j)),
+            };
             let n = back.by_normal;
             let [[xx, xy], [yx, yy]] = sag.bends;
             let bent = Vec3::new(xx * n.x + xy * n.y, yx * n.x + yy * n.y, R::ZERO);
-            let by_point = self.by_point(j) - bent;
+            let by_rule = deflected.map_or(Vec3::default(), |deflected| deflected.by_point);
+            let by_point = self.by_point(j) + by_rule - bent;
             let lambda = (by_point.dot(back.k) + self.by_opl[j] * surface.n2) / back.a;
             let weights = [lambda, -n.x, -n.y];
             self.set_base_derivatives(j, &sag, weights, &mut columns);
             face.form.visit_series(p.x, p.y, |k, by| columns[k][j] = dot3(weights, by));
             self.transfer_back(surface, j, p, &back, by_point - vector * lambda);
+            if let Some(deflected) = deflected {
+                self.by_index_before[j] += deflected.by_indices[0];
+                self.by_index_behind[j] += deflected.by_indices[1];
+            }
         }
         columns
     }
@@ -137,6 +155,50 @@ impl<R: Real> AdjointBlock<R> {
 
 fn dot3<R: Real>(a: [R; 3], b: [R; 3]) -> R {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+/// The adjoint of a deflection by a rule.
+#[derive(Clone, Copy)]
+struct DeflectionAdjoint<R> {
+    back: RefractionAdjoint<R>,
+    by_point: Vec3<R>,
+    /// By the indices in front and behind.
+    by_indices: [R; 2],
+}
+
+impl<R: Real> DeflectionAdjoint<R> {
+    /// From the point, the direction behind and the normal, and the derivatives by that direction and
+    /// by the optical path.
+    fn new(
+        ideal: &Deflection<R>,
+        (point, behind, normal): (Vec3<R>, Vec3<R>, Vec3<R>),
+        by_behind: Vec3<R>,
+        by_opl: R,
+    ) -> Self {
+        let k = ideal.undeflect(point, behind, normal);
+        let input = Dual::<R, 11>::variable;
+        let vector = |v: Vec3<R>, first: usize| {
+            Vec3::new(input(v.x, first), input(v.y, first + 1), input(v.z, first + 2))
+        };
+        let varied = Deflection {
+            action: ideal.action.map(Dual::constant),
+            sense: Dual::constant(ideal.sense),
+            mirror: ideal.mirror,
+            before: input(ideal.before, 9),
+            behind: input(ideal.behind, 10),
+        };
+        let (at, along) = (vector(point, 0), vector(k, 3));
+        let there = varied.deflect(at, along, vector(normal, 6));
+        let path = varied.path(at, along);
+        let by = |i: usize| {
+            let slope = Vec3::new(there.x.slope[i], there.y.slope[i], there.z.slope[i]);
+            by_behind.dot(slope) + by_opl * path.slope[i]
+        };
+        let by_vector = |first: usize| Vec3::new(by(first), by(first + 1), by(first + 2));
+        let (a, by_dn2) = (k.dot(normal), R::ZERO);
+        let back = RefractionAdjoint { k, a, by_k: by_vector(3), by_normal: by_vector(6), by_dn2 };
+        Self { back, by_point: by_vector(0), by_indices: [by(9), by(10)] }
+    }
 }
 
 /// The gradient of a freeform at a point, its derivatives by the point, and those of the base by all

@@ -192,7 +192,13 @@ impl ZemaxWriter {
 
     /// Records what a freeform loses.
     fn report_freeform(&mut self, i: usize, row: &Row) {
-        let Some(form) = &row.freeform else { return };
+        if let Some(ideal) = row.ideal.filter(|ideal| freeform::ideal_lines(row, *ideal).is_none())
+        {
+            let what = format!("surface {}: {}", SurfaceNumber::new(i), ideal.name());
+            let note = "on an asphere it has no counterpart there: the surface is written alone";
+            self.record(ConversionOutcome::Dropped, what, note);
+        }
+        let Some(form) = row.freeform.as_ref().filter(|_| row.ideal.is_none()) else { return };
         let what = format!("surface {}: {}", SurfaceNumber::new(i), form.kind.name());
         let Some(lines) = freeform::form_lines(row, form) else {
             let note = "has no counterpart there: the conic with its even powers is written alone";

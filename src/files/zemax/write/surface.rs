@@ -49,7 +49,7 @@ impl ZemaxWriter {
             self.surface_line("STOP");
         }
         let aspheric = row.asphere.iter().any(|a| *a != 0.0);
-        let form = row.freeform.as_ref().and_then(|form| freeform::form_lines(&row, form));
+        let form = freeform::row_lines(&row);
         let graded = self.gradient(i, aspheric || form.is_some());
         self.surface_line(match (&row.locked, &form, aspheric, graded.is_some()) {
             (Some(locked), ..) => format!("TYPE {}", locked.kind),
