@@ -89,7 +89,7 @@ struct FreeformSearch {
 const CELLS: u32 = 8;
 
 /// The number of parts of a ray after which it counts as one that misses.
-const MAX_PARTS: u32 = 5_000;
+const MAX_PARTS: u32 = 2_000;
 
 /// The largest number of steps of Newton's iteration.
 const NEWTON_STEPS: usize = 20;
