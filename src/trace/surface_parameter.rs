@@ -115,9 +115,10 @@ impl<R: Real> SurfaceGradient<R> {
         }
     }
 
-    /// The derivative by one number, mutable.
-    pub fn by_mut(&mut self, parameter: SurfaceParameter) -> &mut R {
-        match parameter {
+    /// Sets the derivative by one number. Zero for a number of a freeform that is missing changes
+    /// nothing.
+    pub fn set(&mut self, parameter: SurfaceParameter, by: R) {
+        let number = match parameter {
             SurfaceParameter::Curvature => &mut self.curvature,
             SurfaceParameter::Conic => &mut self.conic,
             SurfaceParameter::AsphereTerm(term) => &mut self.terms[term],
@@ -125,8 +126,10 @@ impl<R: Real> SurfaceGradient<R> {
             SurfaceParameter::Index => &mut self.index,
             SurfaceParameter::SemiDiameter => &mut self.semi_diameter,
             SurfaceParameter::GrinTerm(k) => &mut self.grin_terms[k],
+            SurfaceParameter::Freeform(k) if k >= self.freeform.len() && by == R::ZERO => return,
             SurfaceParameter::Freeform(k) => self.freeform_mut(k),
-        }
+        };
+        *number = by;
     }
 }
 

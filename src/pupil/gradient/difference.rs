@@ -54,8 +54,8 @@ impl Region<'_> {
                     *slot.value_mut(system, i) += step;
                 };
                 let [by, error] = moved.derivative(step, by_slot);
-                *found.gradient.surfaces[i].by_mut(slot) = by;
-                *found.error.surfaces[i].by_mut(slot) = error;
+                found.gradient.surfaces[i].set(slot, by);
+                found.error.surfaces[i].set(slot, error);
             }
         }
         found.rays = moved.rays;

@@ -341,8 +341,8 @@ impl PupilDerivative {
             let [worst, largest] = [&self.error, &self.gradient].map(|g| g.largest(slot));
             let share = if largest > 0.0 { (worst / largest).min(1.0) } else { 0.0 };
             for (error, by) in self.error.surfaces.iter_mut().zip(&self.gradient.surfaces) {
-                let error = error.by_mut(slot);
-                *error = error.max(share * by.by(slot).abs());
+                let larger = error.by(slot).max(share * by.by(slot).abs());
+                error.set(slot, larger);
             }
         }
     }
@@ -355,7 +355,7 @@ impl PupilDerivative {
                 continue;
             }
             for numbers in [&mut *by, &mut *error] {
-                numbers.surfaces.iter_mut().for_each(|surface| *surface.by_mut(slot) = 0.0);
+                numbers.surfaces.iter_mut().for_each(|surface| surface.set(slot, 0.0));
                 if slot == SurfaceParameter::Index {
                     numbers.index_before = 0.0;
                 }
