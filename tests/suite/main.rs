@@ -23,6 +23,7 @@ mod every_lens;
 mod experiments;
 mod files;
 mod freeform;
+mod freeform_sag;
 mod glass;
 mod goals;
 mod grin;

@@ -271,6 +271,3 @@ impl Freeform<f64> {
         Some(format!("number {number} of the {name} is {found}; expected a finite one"))
     }
 }
-
-#[cfg(test)]
-mod tests;

@@ -1,7 +1,7 @@
 //! Every form against numbers that another program computed with 40 digits from the definitions.
 
-use super::*;
-use crate::math::Interval;
+use aplanat::lens::{Freeform, FreeformKind, Shape};
+use aplanat::math::{Arithmetic, Interval};
 
 /// The point of the numbers below, in mm.
 const AT: [f64; 2] = [1.7, -2.6];
