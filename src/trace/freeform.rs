@@ -230,8 +230,9 @@ impl PartSearch<'_> {
         let (p, k) = (self.p, self.k);
         let across = k.x.hypot(k.y);
         let at_vertex_plane = if k.z == 0.0 { 0.0 } else { (p.z / k.z).abs() * across };
-        let start = p.x.hypot(p.y);
-        4.0 * start.max(start + at_vertex_plane).max(p.z.abs())
+        let lengths = self.face.form.kind.lengths().into_iter().fold(0.0, f64::max);
+        let start = p.x.hypot(p.y) + at_vertex_plane;
+        4.0 * start.max(p.z.abs()).max(self.start.abs() * across).max(lengths)
     }
 
     /// The first crossing behind the start of the ray, or else the last one in front of it, within

@@ -320,7 +320,7 @@ pub(crate) fn assert_landing_derivatives(name: &str, system: &System<f64>) -> us
             let found = gradient.surfaces[i].by(parameter);
             let size = found.abs().max(difference.abs()).max(1e-12 / step).max(1e-3);
             assert!(
-                (found - difference).abs() < 1e-7 * size,
+                (found - difference).abs() < 1e-6 * size,
                 "{name}, surface {i}, {parameter:?}: {found} {difference}"
             );
             compared += 1;
@@ -556,17 +556,18 @@ fn freeforms_survive_a_foreign_file() {
         (row.curvature, row.conic, row.asphere) = (curvature, conic, terms.to_vec());
         row.freeform = Some(form.clone());
         let path = folder.join("form.zmx");
-        let report = files::save(&written, &path).unwrap();
+        let saved = files::save(&written, &path);
         let name = form.kind.name();
-        let again = files::open(&path).unwrap().lens;
-        let found = again.surfaces[0].freeform.as_ref();
-        let dropped = report.to_string().contains(&format!("surface 1: {name}")) && found.is_none();
         let expressible = !matches!(form.kind, FreeformKind::Chebyshev { .. })
             && !(form.kind == FreeformKind::Biconic && terms[0] != 0.0);
-        assert_eq!(dropped, !expressible, "{name}: {report}");
         if !expressible {
+            let error = saved.unwrap_err().to_string();
+            assert!(error.contains("surface 1") && error.contains("as .zmx does not"), "{error}");
             continue;
         }
+        saved.unwrap();
+        let again = files::open(&path).unwrap().lens;
+        assert_eq!(again.surfaces[0].freeform.as_ref().map(|form| form.kind), Some(form.kind));
         let [a, b] = [&written, &again]
             .map(|lens| Tracer::new(&lens.resolve(0, 0.5875618).unwrap()).unwrap());
         for i in 0..40 {
@@ -579,7 +580,7 @@ fn freeforms_survive_a_foreign_file() {
     std::fs::remove_dir_all(&folder).unwrap();
 }
 
-/// Toroids and biconics go through a `.seq` file too; other forms are named as lost.
+/// Toroids and biconics go through a `.seq` file too; other forms are refused by their surface.
 #[test]
 fn toroids_and_biconics_survive_a_sequence_file() {
     let folder = std::env::temp_dir().join(format!("aplanat-sequence-{}", std::process::id()));
@@ -595,13 +596,14 @@ fn toroids_and_biconics_survive_a_sequence_file() {
         let mut written = lens();
         written.surfaces[0].conic = -0.3;
         written.surfaces[0].freeform = Some(Freeform { kind, numbers });
-        let report = files::save(&written, &path).unwrap().to_string();
-        assert_eq!(report.contains(&format!("surface 1: {}", kind.name())), !kept, "{report}");
-        let again = files::open(&path).unwrap().lens;
-        assert_eq!(again.surfaces[0].freeform.is_some(), kept);
+        let saved = files::save(&written, &path);
         if !kept {
+            let error = saved.unwrap_err().to_string();
+            assert!(error.contains("surface 1") && error.contains("as .seq does not"), "{error}");
             continue;
         }
+        saved.unwrap();
+        let again = files::open(&path).unwrap().lens;
         let [a, b] = [&written, &again]
             .map(|lens| Tracer::new(&lens.resolve(0, 0.5875618).unwrap()).unwrap());
         for i in 0..40 {

@@ -119,8 +119,8 @@ fn place(surface: &mut CodeVSurface, command: &Command) -> Result<CommandOutcome
 fn other(surface: &mut CodeVSurface, command: &Command) -> CommandOutcome {
     const TYPES: [&str; 11] =
         ["DIF", "XTO", "SPS", "XYP", "ZRN", "GRT", "HOE", "DOE", "MOD", "SPL", "UDS"];
-    let nonzero = || command.last_number().is_ok_and(|value| value != 0.0);
     const TERMS: [&str; 9] = ["CUF", "AR", "BR", "CR", "DR", "AP", "BP", "CP", "DP"];
+    let nonzero = || command.last_number().is_ok_and(|value| value != 0.0);
     let term = TERMS.contains(&command.name.as_str()) && nonzero();
     if !(TYPES.contains(&command.name.as_str()) || term) {
         return preserved();

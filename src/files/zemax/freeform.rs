@@ -21,7 +21,7 @@ pub(super) fn surface_form(surface: &ZemaxSurface) -> Option<Result<ZemaxShape, 
     let base = ZemaxShape::base(surface);
     let form = match surface.kind.0.as_str() {
         "PARAXIAL" | "DGRATING" => return Some(ideal(base, surface)),
-        "BICONICX" => return biconic(base, surface).map(Ok),
+        "BICONICX" => return Some(Ok(biconic(base, surface))),
         "TOROIDAL" => toroid(surface),
         "XPOLYNOM" => polynomial(surface),
         "SZERNSAG" | "FZERNSAG" => return Some(zernike(base, surface)),
@@ -85,14 +85,14 @@ fn checked(kind: FreeformKind, numbers: Vec<f64>) -> Result<Freeform<f64>, Strin
     form.fault().map_or(Ok(form), Err)
 }
 
-/// `None` for a surface that is round, and so a conic.
-fn biconic(base: ZemaxShape, surface: &ZemaxSurface) -> Option<ZemaxShape> {
+/// A biconic; a surface that is round is a conic.
+fn biconic(base: ZemaxShape, surface: &ZemaxSurface) -> ZemaxShape {
     let curvature = reciprocal(parameter(surface, 1));
     let conic = parameter(surface, 2);
     let round = (curvature - base.curvature).abs() <= 1e-15 * curvature.abs()
         && (conic == base.conic || curvature == 0.0);
     let form = Freeform { kind: FreeformKind::Biconic, numbers: vec![curvature, conic] };
-    Some(ZemaxShape { freeform: (!round).then_some(form), ..base })
+    ZemaxShape { freeform: (!round).then_some(form), ..base }
 }
 
 fn toroid(surface: &ZemaxSurface) -> Result<Freeform<f64>, String> {

@@ -251,7 +251,8 @@ impl Freeform<f64> {
         let (mut inside, mut outside) = (0.0, y);
         for _ in 0..60 {
             let middle = 0.5 * (inside + outside);
-            if sag(middle).is_finite() { inside = middle } else { outside = middle }
+            let end = if sag(middle).is_finite() { &mut inside } else { &mut outside };
+            *end = middle;
         }
         Some(sag(inside)).filter(|z| z.is_finite()).unwrap_or(0.0)
     }

@@ -78,10 +78,8 @@ impl<N: Arithmetic> PowerTable<N> {
             values[n] =
                 if n.is_multiple_of(2) { values[n / 2].square() } else { values[n - 1] * u };
         }
-        let mut slopes = [N::constant(0.0); POWERS];
-        for n in 1..POWERS {
-            slopes[n] = N::constant(n as f64) * values[n - 1] * inverse;
-        }
+        let slope = |n: usize| N::constant(n as f64) * values[n.saturating_sub(1)] * inverse;
+        let slopes = std::array::from_fn(slope);
         Self { values, slopes }
     }
 
@@ -96,10 +94,8 @@ impl<N: Arithmetic> PowerTable<N> {
             values[n] = (u + u) * values[n - 1] - values[n - 2];
             second[n] = (u + u) * second[n - 1] - second[n - 2];
         }
-        let mut slopes = [N::constant(0.0); POWERS];
-        for n in 1..POWERS {
-            slopes[n] = N::constant(n as f64) * second[n - 1] * inverse;
-        }
+        let slope = |n: usize| N::constant(n as f64) * second[n.saturating_sub(1)] * inverse;
+        let slopes = std::array::from_fn(slope);
         Self { values, slopes }
     }
 }

@@ -106,15 +106,6 @@ impl CodeVWriter {
             let what = format!("hyperhemisphere of surface {surface}");
             self.record(ConversionOutcome::Dropped, what, "the other program decides by itself");
         }
-        if let Some(ideal) = row.ideal {
-            let what = format!("surface {surface}: {}", ideal.name());
-            self.record(ConversionOutcome::Dropped, what, "written as the surface alone");
-        }
-        if let Some(form) = row.freeform.as_ref().filter(|_| form_lines(row).is_none()) {
-            let what = format!("surface {surface}: {}", form.kind.name());
-            let note = "written as its conic with even powers alone";
-            self.record(ConversionOutcome::Dropped, what, note);
-        }
         if let Some(locked) = &row.locked {
             let what = format!("surface {surface}: {}", locked.kind);
             self.record(ConversionOutcome::Locked, what, "written as its conic or asphere alone");
@@ -177,6 +168,11 @@ impl CodeVWriter {
         }
         self.line("END");
     }
+}
+
+/// True for a freeform or an ideal element that the format does not have.
+pub(super) fn has_no_form(row: &Row) -> bool {
+    (row.freeform.is_some() || row.ideal.is_some()) && form_lines(row).is_none()
 }
 
 /// The lines of a form that is none of revolution; `None` for another one, and for what the format does not

@@ -13,7 +13,8 @@ use crate::files::text::{number, numbers};
 use crate::files::zemax::INFINITE_GAP;
 use crate::files::zemax::freeform::{self, FormLines};
 use crate::lens::{
-    Lens, LensError, Parameter, Pickup, Quantity, Row, SurfaceNumber, Variable, ZoomThickness,
+    Lens, LensError, Parameter, Pickup, Quantity, Row, SurfaceNumber, SystemError, Variable,
+    ZoomThickness,
 };
 use place::{FileNumbers, RowBreaks, file_numbers, row_breaks};
 
@@ -24,6 +25,12 @@ use place::{FileNumbers, RowBreaks, file_numbers, row_breaks};
 pub fn write(lens: &Lens) -> Result<(String, ConversionReport), LensError> {
     lens.check()?;
     check_thicknesses(lens)?;
+    let special = |row: &Row| row.freeform.is_some() || row.ideal.is_some();
+    let lost = |row: &Row| special(row) && freeform::row_lines(row).is_none();
+    if let Some(surface) = lens.surfaces.iter().position(lost) {
+        let (what, hint) = ("the export as .zmx", "; expected the native format (.json)");
+        return Err(SystemError::Posed { surface: surface.into(), what, hint }.into());
+    }
     let breaks = row_breaks(lens);
     let mut export = ZemaxWriter {
         lens: lens.with_pickups()?,
@@ -190,21 +197,11 @@ impl ZemaxWriter {
         }
     }
 
-    /// Records what a freeform loses.
+    /// Records the convention of a freeform.
     fn report_freeform(&mut self, i: usize, row: &Row) {
-        if let Some(ideal) = row.ideal.filter(|ideal| freeform::ideal_lines(row, *ideal).is_none())
-        {
-            let what = format!("surface {}: {}", SurfaceNumber::new(i), ideal.name());
-            let note = "on an asphere it has no counterpart there: the surface is written alone";
-            self.record(ConversionOutcome::Dropped, what, note);
-        }
         let Some(form) = row.freeform.as_ref().filter(|_| row.ideal.is_none()) else { return };
+        let Some(lines) = freeform::form_lines(row, form) else { return };
         let what = format!("surface {}: {}", SurfaceNumber::new(i), form.kind.name());
-        let Some(lines) = freeform::form_lines(row, form) else {
-            let note = "has no counterpart there: the conic with its even powers is written alone";
-            self.record(ConversionOutcome::Dropped, what, note);
-            return;
-        };
         if lines.kind.ends_with("ZERNSAG") {
             let note =
                 "the order and the sign of the angle are those that the other program prints";
