@@ -111,7 +111,7 @@ impl<'a, R: Real> PropagatedRay<'a, R> {
                 let k = ideal.deflect(self.met.point, self.k, self.met.normal);
                 let reflected = !(self.reflection_margin() >= R::ZERO);
                 let k = if reflected { self.k } else { k };
-                Refraction { clipped, k, reflected, ..refraction }
+                Refraction { k, clipped, reflected, ..refraction }
             }
         }
     }

@@ -24,7 +24,7 @@ pub(super) fn surface_form(surface: &ZemaxSurface) -> Option<Result<ZemaxShape, 
         "BICONICX" => return Some(Ok(biconic(base, surface))),
         "TOROIDAL" => toroid(surface),
         "XPOLYNOM" => polynomial(surface),
-        "SZERNSAG" | "FZERNSAG" => return Some(zernike(base, surface)),
+        "SZERNSAG" | "FZERNSAG" => return Some(zernike(&base, surface)),
         _ => return None,
     };
     Some(form.map(|form| ZemaxShape { freeform: Some(form), ..base }))
@@ -59,10 +59,8 @@ fn extra(surface: &ZemaxSurface, index: usize) -> f64 {
 /// The terms of the extra data, as many as count, without zeros at the end; `unit` is the radius R.
 fn extra_terms(surface: &ZemaxSurface) -> Result<(f64, Vec<f64>), String> {
     let (count, unit) = (extra(surface, 1), extra(surface, 2));
-    let mut terms: Vec<f64> = (3..)
-        .take_while(|i| (*i - 2) as f64 <= count.min(1e3))
-        .map(|i| extra(surface, i))
-        .collect();
+    let mut terms: Vec<f64> =
+        (3..1_003).take_while(|i| (*i - 2) as f64 <= count).map(|i| extra(surface, i)).collect();
     trim(&mut terms);
     if terms.iter().any(|a| !a.is_finite()) || !(unit > 0.0 && unit.is_finite()) {
         return Err(format!("the normalization radius {unit}"));
@@ -112,7 +110,7 @@ fn polynomial(surface: &ZemaxSurface) -> Result<Freeform<f64>, String> {
 }
 
 /// A Zernike sag; its term in r² is split exactly between the focus and the piston.
-fn zernike(base: ZemaxShape, surface: &ZemaxSurface) -> Result<ZemaxShape, String> {
+fn zernike(base: &ZemaxShape, surface: &ZemaxSurface) -> Result<ZemaxShape, String> {
     let (radius, mut terms) = extra_terms(surface)?;
     let decenters = [9, 10].map(|i| parameter(surface, i));
     if decenters != [0.0; 2] {
@@ -137,7 +135,7 @@ fn zernike(base: ZemaxShape, surface: &ZemaxSurface) -> Result<ZemaxShape, Strin
     let note = "the Zernike terms continue beyond their normalization radius here";
     let note = (parameter(surface, 0) == 0.0)
         .then(|| (surface.kind.1, ConversionOutcome::Used, note.to_owned()));
-    Ok(ZemaxShape { asphere, freeform: Some(checked(kind, terms)?), note, ..base })
+    Ok(ZemaxShape { asphere, freeform: Some(checked(kind, terms)?), note, ..*base })
 }
 
 /// A conic with powers of r that are no even ones up to r¹⁶ alone; each term has its power, its

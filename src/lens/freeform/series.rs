@@ -152,7 +152,7 @@ pub(super) fn noll(index: usize) -> ZernikeTerm {
         n += 1;
         rest -= n;
     }
-    let m = n % 2 + 2 * ((rest + (n + 1) % 2) / 2);
+    let m = n % 2 + 2 * usize::midpoint(rest, (n + 1) % 2);
     let factor = if m == 0 { n + 1 } else { 2 * (n + 1) } as f64;
     // The first polynomial has the number 1, and even numbers have cosines.
     ZernikeTerm { n, m, sine: m > 0 && index.is_multiple_of(2), factor: factor.sqrt() }

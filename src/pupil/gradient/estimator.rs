@@ -379,13 +379,14 @@ fn natural_size(
             SurfaceParameter::Curvature => 1,
             SurfaceParameter::Conic | SurfaceParameter::Index => 0,
             SurfaceParameter::AsphereTerm(term) => 2 * term as i32 + 3,
-            SurfaceParameter::Thickness | SurfaceParameter::SemiDiameter => -1,
+            // The power of the length depends on the kind of a form; rounding is far below.
+            SurfaceParameter::Thickness
+            | SurfaceParameter::SemiDiameter
+            | SurfaceParameter::Freeform(_) => -1,
             SurfaceParameter::GrinTerm(k) => match k.checked_sub(RADIAL_TERMS) {
                 None => 2 * (k as i32 + 1),
                 Some(j) => j as i32 + 1,
             },
-            // The power of the length depends on the kind of the form; rounding is far below both.
-            SurfaceParameter::Freeform(_) => -1,
         };
         integral * size.powi(power)
     }
