@@ -476,9 +476,8 @@ fn wild_freeforms_end_in_a_fate() {
                 for semi_diameter in [2.0, f64::INFINITY] {
                     let system = single(&(shape, wild.clone()), semi_diameter);
                     let tracer = Tracer::new(&system).unwrap();
-                    for (fate, count) in fates_of(&tracer, &rays) {
-                        *fates.entry(fate).or_default() += count;
-                    }
+                    let found = fates_of(&tracer, &rays).into_iter();
+                    found.for_each(|(fate, count)| *fates.entry(fate).or_default() += count);
                 }
             }
         }
