@@ -192,7 +192,7 @@ impl BackwardLens {
         let (reversed, radius) = surrounded(system);
         Ok(Self {
             tracer: Tracer::new(&reversed)?,
-            image: *image,
+            image: image.clone(),
             back: last.thickness,
             turn: turn(system),
             radius,

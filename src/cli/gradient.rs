@@ -6,7 +6,7 @@ use super::input::{LensFile, LoadedLens, Tolerance};
 use super::output::{Output, ShortNumber, TextTable, counted};
 use crate::effects::{self, Effect, EffectOverride, EffectPlan, TracePurpose};
 use crate::lens::{
-    Fields, Lens, Medium, MediumPlace, PROFILE_TERMS, ProfileLaw, RADIAL_TERMS, SurfaceNumber,
+    Fields, Lens, Medium, MediumPlace, PROFILE_TERMS, ProfileLaw, RADIAL_TERMS, Row, SurfaceNumber,
     at_zoom,
 };
 use crate::measure::{Integral, time_ms};
@@ -284,6 +284,9 @@ struct DerivativeColumns {
     /// The ten coefficients of a gradient-index medium; only if the lens has one.
     #[serde(skip_serializing_if = "are_none")]
     gradient: Vec<Option<Vec<f64>>>,
+    /// The numbers of a freeform; only if the lens has one.
+    #[serde(skip_serializing_if = "are_none")]
+    freeform: Vec<Option<Vec<f64>>>,
 }
 
 fn are_none(column: &[Option<Vec<f64>>]) -> bool {
@@ -298,6 +301,10 @@ impl DerivativeColumns {
         let gradient = |medium: &Medium, s: &SurfaceGradient<f64>| {
             matches!(medium, Medium::Grin(_)).then(|| s.grin_terms.to_vec())
         };
+        let freeform = |row: &Row, s: &SurfaceGradient<f64>| {
+            let count = row.freeform.as_ref()?.numbers.len();
+            Some((0..count).map(|k| s.by(SurfaceParameter::Freeform(k))).collect())
+        };
         Self {
             curvature: column(|s| s.curvature),
             thickness: column(|s| s.thickness),
@@ -306,6 +313,7 @@ impl DerivativeColumns {
             index: column(|s| s.index),
             asphere: rows().map(|(r, s)| asphere(r.asphere.len(), &s.terms)).collect(),
             gradient: rows().map(|(r, s)| gradient(&r.medium, s)).collect(),
+            freeform: rows().map(|(r, s)| freeform(r, s)).collect(),
         }
     }
 }

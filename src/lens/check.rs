@@ -296,6 +296,7 @@ impl Row {
         for (term, a) in self.asphere.iter().enumerate() {
             check_number(named(Quantity::Asphere(term)), *a, true, FINITE)?;
         }
+        self.check_freeform(surface)?;
         if let Some(sd) = self.semi_diameter {
             check_number(named(Quantity::SemiDiameter), sd, sd >= 0.0, "zero or more, in mm")?;
         }
@@ -318,6 +319,16 @@ impl Row {
         let expected = "zero or more and less than the semi-diameter, in mm";
         let what = format_args!("obstruction of surface {surface}");
         check_number(what, inner, inner >= 0.0 && transmits, expected)
+    }
+
+    fn check_freeform(&self, surface: SurfaceNumber) -> Result<(), LensError> {
+        if let Some(why) = self.ideal.and_then(|ideal| ideal.fault(self)) {
+            return Err(LensError::Inconsistent(format!("surface {surface}: {why}")));
+        }
+        let Some(form) = &self.freeform else { return Ok(()) };
+        let far = "a freeform has no far half, but the surface is a hyperhemisphere".to_owned();
+        let why = form.fault().or(self.hyperhemisphere.then_some(far));
+        why.map_or(Ok(()), |why| Err(LensError::Inconsistent(format!("surface {surface}: {why}"))))
     }
 }
 

@@ -95,8 +95,30 @@ impl Shape<f64> {
     }
 }
 
+impl Surface<f64> {
+    /// The sag in mm of the section with the y-z plane at a height, or that at the edge of the surface
+    /// where it ends before; an irregularity is left out.
+    pub fn clamped_sag(&self, y: f64) -> f64 {
+        match &self.freeform {
+            None => self.shape.clamped_sag(y),
+            Some(form) => form.section_sag(&self.shape, y),
+        }
+    }
+
+    /// The sag in mm of the section with the y-z plane at a height; `None` beyond the edge of the
+    /// surface.
+    pub fn section_sag(&self, y: f64) -> Option<f64> {
+        match &self.freeform {
+            None => Some(self.shape.sag(y * y)?.0),
+            Some(form) => {
+                Some(form.sag(&form.base(&self.shape), 0.0, y)[0]).filter(|z| z.is_finite())
+            }
+        }
+    }
+}
+
 impl Row {
-    /// The form of the surface.
+    /// The form of the surface, without that of a freeform.
     pub fn shape(&self) -> Shape<f64> {
         let mut terms = [0.0; super::ASPHERE_TERMS];
         terms.iter_mut().zip(&self.asphere).for_each(|(to, from)| *to = *from);
@@ -128,9 +150,10 @@ impl<R: Real> System<R> {
             pose: reversed_pose(&surfaces[i]).map(directed),
             axis: surfaces[i].axis.map(|axis| directed(axis.inverse())),
             astigmatism: surfaces[i].astigmatism.map(|astigmatism| turn * astigmatism),
-            ..surfaces[i]
+            freeform: surfaces[i].freeform.as_ref().map(|form| Box::new(form.with_sag_sign(turn))),
+            ..surfaces[i].clone()
         });
-        let plane = Surface { index: self.index_before, thickness: R::ZERO, ..*image };
+        let plane = Surface { index: self.index_before, thickness: R::ZERO, ..image.clone() };
         Self {
             index_before: surfaces.last().map_or(self.index_before, |surface| surface.index),
             surfaces: reversed.chain(std::iter::once(plane)).collect(),

@@ -12,10 +12,12 @@ mod check;
 mod diff;
 mod edit;
 mod element;
+mod freeform;
 mod geometry;
 pub mod glass;
 mod goal;
 mod grin;
+mod ideal;
 mod operand;
 mod parameter;
 mod perturbation;
@@ -38,8 +40,10 @@ pub use check::LensError;
 pub use diff::added_glass;
 pub use edit::{Edit, EditError, EditedCell, ElementEdit, apply_edit};
 pub use element::{ElementForm, NewElement};
+pub use freeform::{BASE_NUMBERS, BaseSag, FREEFORM_NUMBERS, Freeform, FreeformKind};
 pub use goal::{Goal, LimitTreatment, PupilEdge, Term, WeightedTerm};
 pub use grin::{GradientIndex, ParaxialGrin};
+pub use ideal::{IdealAction, IdealElement};
 pub use operand::{IndexRange, OperandKind, TermScope, TermSelection, last_index};
 pub use parameter::{Parameter, Quantity};
 pub use perturbation::{Perturbation, PerturbationKind};
@@ -177,6 +181,10 @@ pub struct Row {
     pub conic: f64,
     /// Coefficients of r⁴, r⁶, ... r¹⁶, in mm⁻³, mm⁻⁵, ...
     pub asphere: Vec<f64>,
+    /// The form that the sag has beside; `None` for a conic with these coefficients alone.
+    pub freeform: Option<Freeform<f64>>,
+    /// The rule by which the surface deflects light beside refraction or reflection; `None` for none.
+    pub ideal: Option<IdealElement>,
     /// The distance along the axis to the next vertex, or from the last one to the image plane, in
     /// mm.
     pub thickness: f64,

@@ -28,6 +28,8 @@ pub enum Quantity {
     Grin(usize),
     /// The semi-diameter, in mm.
     SemiDiameter,
+    /// The number of a freeform with this index, in the order of its kind.
+    Freeform(usize),
 }
 
 /// One number of a lens: a quantity of a row.
@@ -59,6 +61,7 @@ impl fmt::Display for Parameter {
                 Some(j) => write!(f, "GRIN coefficient {} of z after surface {surface}", j + 1),
             },
             Quantity::SemiDiameter => write!(f, "semi-diameter of surface {surface}"),
+            Quantity::Freeform(k) => write!(f, "freeform number {} of surface {surface}", k + 1),
         }
     }
 }
@@ -108,6 +111,7 @@ impl Lens {
                 _ => None,
             },
             Quantity::SemiDiameter => row.semi_diameter,
+            Quantity::Freeform(k) => row.freeform.as_ref()?.numbers.get(k).copied(),
         }
     }
 
@@ -130,6 +134,13 @@ impl Lens {
                 self.set_zoom_thickness(parameter.surface, zoom, value);
             }
             Quantity::Asphere(_) | Quantity::ZoomThickness(_) => return false,
+            Quantity::Freeform(k) => {
+                let form = row.freeform.as_mut();
+                match form.and_then(|form| form.numbers.get_mut(k)) {
+                    Some(number) => *number = value,
+                    None => return false,
+                }
+            }
             Quantity::Index => match row.medium.index_mut() {
                 Some(n) => *n = value,
                 None => return false,

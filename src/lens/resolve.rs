@@ -84,7 +84,7 @@ impl Lens {
         for (i, row) in self.surfaces.iter().enumerate() {
             current = index(&row.medium, MediumPlace::behind(i), um, current)?;
             let thickness = self.thickness_at(i, zoom).unwrap_or(row.thickness);
-            let mut surface = row.surface(thickness, current);
+            let mut surface = row.surface(thickness, current, um);
             // A GRIN medium with a constant index is homogeneous.
             surface.grin = self.grin_coefficients(i).filter(|grin| !grin.is_constant());
             check_lowest_index(i, &surface)?;
@@ -117,7 +117,7 @@ impl Row {
         }
     }
 
-    fn surface(&self, thickness: f64, index: f64) -> Surface<f64> {
+    fn surface(&self, thickness: f64, index: f64, um: f64) -> Surface<f64> {
         Surface {
             shape: self.shape(),
             thickness,
@@ -130,6 +130,8 @@ impl Row {
             pose: self.pose(),
             axis: self.axis(),
             astigmatism: None,
+            freeform: self.freeform.clone().map(Box::new),
+            ideal: self.ideal.map(|ideal| ideal.action(um)),
         }
     }
 }
@@ -189,7 +191,10 @@ pub fn paraxial_image_distance<R: Real>(system: &System<R>, object: Object) -> R
             sense = -sense;
         }
         let behind = sense * surface.index;
-        nu -= y * (behind - n) * surface.shape.curvature();
+        nu -= y * (behind - n) * surface.curvature();
+        if surface.ideal.is_some() {
+            nu -= y * surface.added_power();
+        }
         n = behind;
         if i == last {
             break;

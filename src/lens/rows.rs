@@ -1,7 +1,9 @@
 //! Renumbering and reversing rows, along with the variables, pickups and zoom positions that name
 //! them.
 
-use super::{Lens, Medium, Parameter, Pickup, Quantity, TermSelection, Variable, ZoomThickness};
+use super::{
+    Lens, Medium, Parameter, Pickup, Quantity, Row, TermSelection, Variable, ZoomThickness,
+};
 
 impl Lens {
     /// Maps the parameters of all variables and pickups; those mapped to `None` are removed.
@@ -44,9 +46,10 @@ impl Lens {
     pub fn reverse_rows(&mut self, first: usize, last: usize) {
         let reversal = Reversal { first, last };
         reversal.reverse(self);
+        let rows = self.surfaces.clone();
         self.map_parameters(|parameter| Some(reversal.parameter(parameter)));
-        self.variables.iter_mut().for_each(|variable| reversal.swap_bounds(variable));
-        self.pickups.iter_mut().for_each(|pickup| reversal.adjust_pickup(pickup));
+        self.variables.iter_mut().for_each(|variable| reversal.swap_bounds(variable, &rows));
+        self.pickups.iter_mut().for_each(|pickup| reversal.adjust_pickup(pickup, &rows));
         if let Some(sheet) = &mut self.tolerances {
             sheet.renumber(|kind, i| {
                 Some(if kind.is_of_gap() { reversal.gap(i) } else { reversal.surface(i) })
@@ -80,6 +83,11 @@ impl Reversal {
         for (i, row) in group.iter_mut().enumerate() {
             row.curvature = negate(row.curvature);
             row.asphere.iter_mut().for_each(|a| *a = negate(*a));
+            if let Some(form) = &mut row.freeform {
+                let kind = form.kind;
+                let signed = form.numbers.iter_mut().enumerate().filter(|(k, _)| kind.has_sign(*k));
+                signed.for_each(|(_, a)| *a = negate(*a));
+            }
             let from = if i < inner { inner - 1 - i } else { inner };
             (row.thickness, row.medium) = gaps[from].clone();
         }
@@ -104,29 +112,35 @@ impl Reversal {
             Quantity::Curvature
             | Quantity::Conic
             | Quantity::Asphere(_)
+            | Quantity::Freeform(_)
             | Quantity::SemiDiameter => self.surface(parameter.surface),
         };
         Parameter { surface, ..parameter }
     }
 
-    /// True if a parameter has the opposite sign after the reversal.
-    fn changes_sign(self, parameter: Parameter) -> bool {
-        (self.first..=self.last).contains(&parameter.surface)
-            && matches!(parameter.quantity, Quantity::Curvature | Quantity::Asphere(_))
+    /// True if a parameter of the reversed rows has the opposite sign after the reversal.
+    fn changes_sign(self, parameter: Parameter, rows: &[Row]) -> bool {
+        let form = rows.get(parameter.surface).and_then(|row| row.freeform.as_ref());
+        let signed = match parameter.quantity {
+            Quantity::Curvature | Quantity::Asphere(_) => true,
+            Quantity::Freeform(k) => form.is_some_and(|form| form.kind.has_sign(k)),
+            _ => false,
+        };
+        signed && (self.first..=self.last).contains(&parameter.surface)
     }
 
-    fn swap_bounds(self, variable: &mut Variable) {
-        if self.changes_sign(variable.parameter) {
+    fn swap_bounds(self, variable: &mut Variable, rows: &[Row]) {
+        if self.changes_sign(variable.parameter, rows) {
             (variable.min, variable.max) = (variable.max.map(negate), variable.min.map(negate));
         }
     }
 
-    fn adjust_pickup(self, pickup: &mut Pickup) {
-        if self.changes_sign(pickup.parameter) {
+    fn adjust_pickup(self, pickup: &mut Pickup, rows: &[Row]) {
+        if self.changes_sign(pickup.parameter, rows) {
             pickup.scale = negate(pickup.scale);
             pickup.offset = negate(pickup.offset);
         }
-        if self.changes_sign(pickup.source) {
+        if self.changes_sign(pickup.source, rows) {
             pickup.scale = negate(pickup.scale);
         }
     }

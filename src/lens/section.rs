@@ -89,7 +89,7 @@ impl<'a> LensSection<'a> {
     /// The point of a surface at a height, flat beyond its own semi-diameter.
     pub fn point(&self, surface: usize, height: f64) -> [f64; 2] {
         let ground = height.abs().min(self.heights[surface]);
-        let sag = self.system.surfaces[surface].shape.clamped_sag(ground);
+        let sag = self.system.surfaces[surface].clamped_sag(ground.copysign(height));
         projected(self.places[surface].point_out(Vec3::new(0.0, height, sag)))
     }
 
@@ -113,7 +113,7 @@ impl<'a> LensSection<'a> {
         let own = |i: &usize| self.places[*i].point_in(Vec3::new(0.0, y, z));
         let sag = |i: usize, y: f64| {
             let ground = y.abs().min(self.heights[i]);
-            self.system.surfaces[i].shape.clamped_sag(ground)
+            self.system.surfaces[i].clamped_sag(ground.copysign(y))
         };
         let distance = |i: &usize| (sag(*i, own(i).y) - own(i).z).abs();
         let reaches = |i: &usize| own(i).y.abs() <= self.heights[*i] + within;

@@ -1,7 +1,8 @@
 //! A lens resolved to plain numbers, at one wavelength and one zoom position.
 
 use super::{
-    ASPHERE_TERMS, MediumPlace, Pose, ProfileCoefficients, RotationalProfile, SurfaceNumber,
+    ASPHERE_TERMS, Freeform, IdealAction, MediumPlace, Pose, ProfileCoefficients,
+    RotationalProfile, SurfaceNumber,
 };
 use crate::math::{Real, format_short};
 
@@ -155,7 +156,7 @@ impl<R: Real> Shape<R> {
 }
 
 /// One surface and the gap behind it, in plain numbers.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Surface<R> {
     /// The form of the surface.
     pub shape: Shape<R>,
@@ -184,6 +185,10 @@ pub struct Surface<R> {
     /// The coefficient of y², in 1/mm, that is added to the sag in the surface's own frame: the part of
     /// an irregularity that is not rotationally symmetric. `None` for a surface of revolution.
     pub astigmatism: Option<R>,
+    /// The form that the sag has beside the conic and its even powers; `None` for none.
+    pub freeform: Option<Box<Freeform<R>>>,
+    /// The rule by which the surface deflects light beside; `None` for none.
+    pub ideal: Option<IdealAction<R>>,
 }
 
 /// A lens in plain numbers. Rays end at the last surface, as a rule the image plane.
@@ -263,8 +268,8 @@ pub enum SystemError {
     },
     /// A method that supports centred surfaces only meets another one.
     #[error(
-        "surface {surface} is decentred, tilted or irregular, or the axis is broken there, which {what} \
-         does not support{hint}"
+        "surface {surface} is decentred, tilted, irregular, a freeform or an ideal element, or the axis \
+         is broken there, which {what} does not support{hint}"
     )]
     Posed {
         /// The surface.
@@ -330,8 +335,8 @@ impl<R: Real> System<R> {
                  their equator",
             ),
             (front, Some(back)) if front.is_mounted() || back.is_mounted() => refuse(
-                "touches a decentred, tilted or irregular surface, which is not supported; expected \
-                 centred surfaces",
+                "touches a decentred, tilted, irregular or freeform surface, which is not supported; \
+                 expected centred surfaces of revolution",
             ),
             _ => Ok(()),
         }
@@ -342,7 +347,7 @@ impl<R: Real> System<R> {
         self.surfaces.get(surface)?.grin_profile()
     }
 
-    /// True if any surface is decentred, tilted or irregular.
+    /// True if any surface is decentred, tilted, irregular, a freeform or an ideal element.
     pub fn has_poses(&self) -> bool {
         self.surfaces.iter().any(Surface::is_mounted)
     }
@@ -394,12 +399,29 @@ impl<R: Real> Surface<R> {
             pose: None,
             axis: None,
             astigmatism: None,
+            freeform: None,
+            ideal: None,
         }
     }
 
-    /// True if the surface is decentred, tilted or irregular, or the axis is broken there.
+    /// True if the surface is decentred, tilted, irregular, a freeform or an ideal element, or the axis is
+    /// broken there.
     pub fn is_mounted(&self) -> bool {
-        self.pose.is_some() || self.axis.is_some() || self.astigmatism.is_some()
+        let placed = self.pose.is_some() || self.axis.is_some();
+        let shaped = self.astigmatism.is_some() || self.freeform.is_some();
+        placed || shaped || self.ideal.is_some()
+    }
+
+    /// The curvature of the section with the y-z plane at the vertex, in 1/mm, which first-order optics
+    /// takes; an irregularity is left out.
+    pub fn curvature(&self) -> R {
+        let Some(form) = &self.freeform else { return self.shape.curvature() };
+        form.vertex_curvatures(&self.shape)[1]
+    }
+
+    /// The power in 1/mm that a paraxial lens adds to that of refraction.
+    pub fn added_power(&self) -> R {
+        self.ideal.map_or(R::ZERO, IdealAction::power)
     }
 
     /// True if the surface and the axis behind it mirror themselves at the y-z plane.
@@ -407,7 +429,8 @@ impl<R: Real> Surface<R> {
         let upright = |pose: &Pose<R>| {
             pose.shift.x == R::ZERO && pose.turn[0].y == R::ZERO && pose.turn[0].z == R::ZERO
         };
-        self.pose.as_ref().is_none_or(upright) && self.axis.as_ref().is_none_or(upright)
+        let even = self.freeform.as_ref().is_none_or(|form| form.mirrors_in_x());
+        even && self.pose.as_ref().is_none_or(upright) && self.axis.as_ref().is_none_or(upright)
     }
 
     fn check(&self, i: usize) -> Result<(), SystemError> {
@@ -436,6 +459,12 @@ impl<R: Real> Surface<R> {
     fn check_pose(&self, i: usize) -> Result<(), SystemError> {
         if let Some(astigmatism) = self.astigmatism {
             check_finite("astigmatism", i, astigmatism.value())?;
+        }
+        if let Some(ideal) = self.ideal {
+            check_finite("power or deflection", i, ideal.number().value())?;
+        }
+        if let Some(form) = &self.freeform {
+            form.numbers.iter().try_for_each(|a| check_finite("freeform number", i, a.value()))?;
         }
         for Pose { shift, turn } in [self.pose, self.axis].into_iter().flatten() {
             for v in [shift, turn[0], turn[1], turn[2]] {
@@ -470,6 +499,8 @@ impl<R: Real> Surface<R> {
             pose: self.pose.map(|pose| pose.map(&f)),
             axis: self.axis.map(|axis| axis.map(&f)),
             astigmatism: self.astigmatism.map(&f),
+            freeform: self.freeform.as_ref().map(|form| Box::new(form.map(&f))),
+            ideal: self.ideal.map(|ideal| ideal.map(&f)),
         }
     }
 }

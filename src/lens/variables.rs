@@ -1,6 +1,6 @@
 //! Choosing the variables of a lens, and reducing a zoom lens to one position.
 
-use super::{Lens, Medium, Parameter, Pickup, Quantity, Variable};
+use super::{Lens, Medium, Parameter, Pickup, Quantity, Row, Variable};
 
 /// A kind of parameter that an optimizer may change.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -11,7 +11,7 @@ pub enum ParameterKind {
     Thicknesses,
     /// Every conic constant that is not 0.
     Conics,
-    /// Every asphere coefficient that is written in the prescription.
+    /// Every asphere coefficient and every number of a freeform that is written in the prescription.
     Aspheres,
     /// Every index of a model glass or constant medium.
     Indices,
@@ -63,8 +63,8 @@ fn parameters(lens: &Lens, kind: ParameterKind) -> Vec<Parameter> {
             all(Quantity::Conic).filter(|p| lens.surfaces[p.surface].conic != 0.0).collect()
         }
         ParameterKind::Aspheres => rows
-            .flat_map(|i| (0..lens.surfaces[i].asphere.len()).map(move |term| (i, term)))
-            .map(|(i, term)| Parameter::new(i, Quantity::Asphere(term)))
+            .flat_map(|i| asphere_quantities(&lens.surfaces[i]).map(move |term| (i, term)))
+            .map(|(i, quantity)| Parameter::new(i, quantity))
             .collect(),
         ParameterKind::Indices => all(Quantity::Index).collect(),
         ParameterKind::SemiDiameters => all(Quantity::SemiDiameter).collect(),
@@ -84,6 +84,13 @@ fn refracts(lens: &Lens, surface: usize) -> bool {
     // An axial profile starts anew behind each surface.
     let starts = matches!(behind, Medium::Grin(grin) if grin.is_axial());
     *behind == Medium::Mirror || before != behind || starts
+}
+
+/// The coefficients of the sag beside the conic that are written.
+fn asphere_quantities(row: &Row) -> impl Iterator<Item = Quantity> + use<> {
+    let numbers = row.freeform.as_ref().map_or(0, |form| form.numbers.len());
+    let terms = (0..row.asphere.len()).map(Quantity::Asphere);
+    terms.chain((0..numbers).map(Quantity::Freeform))
 }
 
 /// The GRIN coefficients behind a surface.

@@ -2,12 +2,13 @@
 //!
 //! The physics is written once over the trait [`Real`]: `f64` gives a ray, `f32` a fast preview,
 //! a [`Dual`] a derivative, a dual of duals a second derivative, a [`Jet`] all second derivatives by
-//! two variables.
+//! two variables, an [`Interval`] bounds of all values.
 
 mod double;
 mod dual;
 pub mod expression;
 mod format;
+mod interval;
 mod jet;
 mod lanes;
 pub mod quadrature;
@@ -17,6 +18,7 @@ mod vec3;
 pub use double::DoubleDouble;
 pub use dual::Dual;
 pub(crate) use format::{ShortNumber, format_short};
+pub use interval::{Arithmetic, Interval};
 pub use jet::Jet;
 pub use lanes::SimdWidth;
 pub(crate) use lanes::{dot, run_vectorized};

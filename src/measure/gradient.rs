@@ -311,7 +311,7 @@ fn with_planes(mut system: System<f64>, planes: usize) -> System<f64> {
         let Some(gap) = (at..last).chain(0..at.min(last)).find(open) else { break };
         let before = &mut system.surfaces[gap];
         before.thickness *= 0.5;
-        let plane = Surface { shape: Shape::Plane, semi_diameter: f64::INFINITY, ..*before };
+        let plane = Surface { shape: Shape::Plane, semi_diameter: f64::INFINITY, ..before.clone() };
         system.surfaces.insert(gap + 1, plane);
         system.stop = system.stop.map(|stop| if stop > gap { stop + 1 } else { stop });
         at = gap + 2;

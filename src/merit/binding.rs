@@ -289,7 +289,9 @@ impl Configuration {
                     0.0
                 }
                 SurfaceParameter::SemiDiameter => surface.semi_diameter,
-                SurfaceParameter::GrinTerm(k) => surface.grin_terms[k],
+                target @ (SurfaceParameter::GrinTerm(_) | SurfaceParameter::Freeform(_)) => {
+                    surface.by(target)
+                }
             };
             by_variable[binding.variable] += binding.factor * by_number;
         }
@@ -363,6 +365,7 @@ fn move_focus(system: &mut System<VariableDual>, systems: &ResolvedSystems, firs
 fn unclip(surface: &mut Surface<f64>) {
     surface.obstruction = 0.0;
     surface.semi_diameter = match surface.shape {
+        _ if surface.freeform.is_some() => ASPHERE_MARGIN * surface.semi_diameter,
         Shape::Asphere { .. } => ASPHERE_MARGIN * surface.semi_diameter,
         Shape::Plane | Shape::Sphere { .. } | Shape::Conic { .. } => f64::INFINITY,
     };
@@ -404,6 +407,7 @@ fn bind_parameters(
                 Quantity::ZoomThickness(z) if z == zoom => SurfaceParameter::Thickness,
                 Quantity::Index => SurfaceParameter::Index,
                 Quantity::Grin(k) => SurfaceParameter::GrinTerm(k),
+                Quantity::Freeform(k) => SurfaceParameter::Freeform(k),
                 Quantity::SemiDiameter if !has_own_aperture(lens, zoom, surface) => {
                     SurfaceParameter::SemiDiameter
                 }

@@ -359,7 +359,7 @@ impl ConstrainedQuantity {
                 let surface = &system.surfaces[surface];
                 let rim = made_rim(surface, clear);
                 if rim.value() < f64::INFINITY {
-                    (surface.shape.curvature() * rim).abs()
+                    (surface.curvature() * rim).abs()
                 } else {
                     R::ZERO
                 }

@@ -367,6 +367,11 @@ fn scale(lens: &Lens, variable: &Variable) -> f64 {
             }
             _ => 1.0,
         },
+        // The same sag at the rim as for an asphere.
+        Quantity::Freeform(k) => {
+            let form = lens.surfaces[variable.parameter.surface].freeform.as_ref();
+            form.map_or(1.0, |form| 0.05 * rim.powi(form.kind.power(k)))
+        }
     }
 }
 

@@ -355,7 +355,7 @@ fn petzval_sum<R: Real>(system: &System<R>) -> R {
     let (mut sum, mut n) = (R::ZERO, indices[0]);
     for (i, surface) in system.surfaces.iter().enumerate() {
         let behind = indices[i + 1];
-        sum += (behind - n) * surface.shape.curvature() / (n * behind);
+        sum += (behind - n) * surface.curvature() / (n * behind);
         n = behind;
         if let Some(Some(gap)) = gaps.get(i) {
             sum += gap.petzval;

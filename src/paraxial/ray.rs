@@ -53,7 +53,10 @@ pub fn paraxial_ray<R: Real>(system: &System<R>, height: R, slope: R) -> Paraxia
     let (mut y, mut nu) = (height, indices[0] * slope);
     for (i, surface) in system.surfaces.iter().enumerate() {
         heights.push(y);
-        nu -= y * (indices[i + 1] - before) * surface.shape.curvature();
+        nu -= y * (indices[i + 1] - before) * surface.curvature();
+        if surface.ideal.is_some() {
+            nu -= y * surface.added_power();
+        }
         let u = nu / indices[i + 1];
         slopes.push(u);
         if let Some(Some(gap)) = gaps.get(i) {

@@ -4,7 +4,9 @@
 //! all are counted from 0.
 
 use super::error::wrong_input;
-use crate::lens::{ASPHERE_TERMS, Lens, PROFILE_TERMS, Parameter, Quantity, ZoomPosition};
+use crate::lens::{
+    ASPHERE_TERMS, FREEFORM_NUMBERS, Lens, PROFILE_TERMS, Parameter, Quantity, ZoomPosition,
+};
 use pyo3::PyResult;
 
 /// The name of a parameter.
@@ -19,13 +21,14 @@ pub(super) fn parameter_name(parameter: Parameter) -> String {
         Quantity::Index => format!("index[{i}]"),
         Quantity::Grin(k) => format!("grin[{i},{k}]"),
         Quantity::SemiDiameter => format!("semi_diameter[{i}]"),
+        Quantity::Freeform(k) => format!("freeform[{i},{k}]"),
     }
 }
 
 /// The parameter of a name.
 pub(super) fn parse_parameter(name: &str) -> PyResult<Parameter> {
     let expected = "expected curvature, conic, thickness, index or semi_diameter with a surface in \
-                    brackets, as in `curvature[2]`, or asphere, grin or thickness with two numbers, \
+                    brackets, as in `curvature[2]`, or asphere, freeform, grin or thickness with two numbers, \
                     as in `asphere[0,1]`; counted from 0";
     parameter_of(name).ok_or_else(|| wrong_input(format!("found `{name}`; {expected}")))
 }
@@ -44,6 +47,7 @@ fn parameter_of(name: &str) -> Option<Parameter> {
         ("index", []) => Quantity::Index,
         ("grin", [k]) => Quantity::Grin(*k),
         ("semi_diameter", []) => Quantity::SemiDiameter,
+        ("freeform", [k]) => Quantity::Freeform(*k),
         _ => return None,
     };
     Some(Parameter::new(numbers[0], quantity))
@@ -66,6 +70,7 @@ pub(super) fn parameters_of(lens: &Lens) -> Vec<Parameter> {
             .into_iter()
             .chain((0..terms).map(Quantity::Asphere))
             .chain((0..PROFILE_TERMS).map(Quantity::Grin))
+            .chain((0..FREEFORM_NUMBERS).map(Quantity::Freeform))
             .chain(own.map(|(zoom, _)| Quantity::ZoomThickness(zoom)))
             .map(move |quantity| Parameter::new(i, quantity))
     };

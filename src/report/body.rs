@@ -68,6 +68,9 @@ pub enum BodyError {
     /// A surface whose form is not known.
     #[error("surface {0} is of a kind that is not known here ({1})")]
     Locked(SurfaceNumber, String),
+    /// A surface that is not one of revolution, or no conic with even powers.
+    #[error("surface {0} is a {1}, which is not drawn as a solid of revolution")]
+    Freeform(SurfaceNumber, &'static str),
 }
 
 /// The bodies of a lens in the order of the light; mirrors and stops are none.
@@ -188,6 +191,12 @@ impl LensBody {
         for side in [0, 1] {
             if let Some(locked) = &own(side).locked {
                 return Some(BodyError::Locked(numbers[side], locked.kind.clone()));
+            }
+            if let Some(form) = &own(side).freeform {
+                return Some(BodyError::Freeform(numbers[side], form.kind.name()));
+            }
+            if let Some(ideal) = own(side).ideal {
+                return Some(BodyError::Freeform(numbers[side], ideal.name()));
             }
             if own(side).hyperhemisphere {
                 return Some(BodyError::Hyperhemisphere(numbers[side]));

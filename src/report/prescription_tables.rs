@@ -57,6 +57,12 @@ fn remarks(row: &Row) -> Vec<String> {
     } else if row.conic != 0.0 {
         words.push("conic".to_owned());
     }
+    if let Some(ideal) = row.ideal {
+        words.push(ideal.name().to_owned());
+    }
+    if let Some(form) = &row.freeform {
+        words.push(form.kind.name().to_owned());
+    }
     if let Some(radius) = row.obstruction {
         words.push(format!("obstructed to {}", ShortNumber(radius)));
     }

@@ -30,6 +30,8 @@ const INPUTS: usize = TERMS + ASPHERE_TERMS;
 const GAP: usize = INPUTS;
 const TERMS_BEFORE: usize = GAP + 1;
 const TERMS_BEHIND: usize = TERMS_BEFORE + PROFILE_TERMS;
+/// The number of numbers of a freeform that are inputs at a time.
+const FORM_INPUTS: usize = 8;
 /// The number of inputs where a GRIN medium touches the surface.
 const GRIN_INPUTS: usize = TERMS_BEHIND + PROFILE_TERMS;
 
@@ -147,7 +149,11 @@ impl<R: Real> PropagatedRay<'_, R> {
             return None;
         }
         if limit == Some(RayLimit::TotalReflection) {
-            return Some((met.point, self.k - met.normal * (met.a / met.m)));
+            return Some((met.point, self.grazing()));
+        }
+        if self.ideal().is_some() {
+            let refraction = self.refract();
+            return (!refraction.reflected).then_some((refraction.point, refraction.k));
         }
         let refraction = self.surface.refract(met, self.k, self.indices.dn2);
         (!refraction.reflected).then_some((refraction.point, refraction.k))
@@ -224,6 +230,9 @@ impl Tracer<f64> {
             None => total.index_before += by_index,
         }
         let numbers = &mut total.surfaces[surface];
+        if let Some(mount) = mount {
+            own.add_freeform_slopes(mount, limit, (p, k), weight, &mut numbers.freeform);
+        }
         numbers.index += by[BEHIND];
         numbers.curvature += by[CURVATURE];
         if matches!(own.form, SurfaceForm::Conic | SurfaceForm::Asphere) {
@@ -293,6 +302,30 @@ impl SurfaceSite<'_, f64> {
 }
 
 impl Interface<f64> {
+    /// Adds the derivatives of a margin by the numbers of a freeform, some at a time.
+    fn add_freeform_slopes(
+        &self,
+        mount: &Mount<f64>,
+        limit: RayLimit,
+        (p, k): (Vec3<f64>, Vec3<f64>),
+        weight: f64,
+        total: &mut Vec<f64>,
+    ) {
+        let count = mount.face.as_ref().map_or(0, |face| face.form.numbers.len());
+        total.resize(count.max(total.len()), 0.0);
+        let surface = self.map(Dual::<f64, FORM_INPUTS>::constant);
+        let (p, k) = (Vec3::from_f64(p), Vec3::from_f64(k));
+        for (block, totals) in total[..count].chunks_mut(FORM_INPUTS).enumerate() {
+            let mut varied = mount.map(Dual::constant);
+            let numbers = varied.face.iter_mut().flat_map(|face| &mut face.form.numbers);
+            for (i, number) in numbers.skip(block * FORM_INPUTS).take(FORM_INPUTS).enumerate() {
+                *number = Dual::variable(number.value, i);
+            }
+            let by = varied.propagate(&surface, p, k).margin(limit).slope;
+            totals.iter_mut().zip(by).for_each(|(to, by)| *to += weight * by);
+        }
+    }
+
     /// The same surface between these indices, with its curvature, conic constant and coefficients
     /// as inputs; a plane as the sphere that it may become.
     fn with_inputs<const N: usize>(

@@ -12,7 +12,8 @@ pub enum Fate {
     /// The ray meets the surface outside the semi-diameter or inside the obstruction, or it leaves the
     /// GRIN medium in front through its side.
     Clipped(u32),
-    /// The ray is totally reflected at the surface.
+    /// The ray is totally reflected at the surface, or no light is in the order of a grating, which is
+    /// evanescent.
     TotalReflection(u32),
     /// The GRIN medium in front of the surface turns the ray back.
     Turned(u32),

@@ -88,7 +88,7 @@ impl<R: Real> PropagatedRay<'_, R> {
         if surface.obstruction2.value() > 0.0 {
             visit(i, RayLimit::Obstruction, surface.obstruction_margin(met.point));
         }
-        if !surface.mirror {
+        if self.may_reflect() {
             visit(i, RayLimit::TotalReflection, self.reflection_margin());
         }
     }
@@ -135,11 +135,6 @@ impl<R: Real> PropagatedRay<'_, R> {
             SurfaceForm::Plane => self.surface.sense * self.k.z,
             _ => self.surface.discriminant(start, self.k),
         })
-    }
-
-    #[inline(always)]
-    fn reflection_margin(&self) -> R {
-        self.met.a * self.met.a + self.indices.dn2 * self.met.m
     }
 
     /// The component of the normal along the axis, negative behind the equator.

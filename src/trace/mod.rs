@@ -17,8 +17,10 @@ mod adjoint;
 mod asphere;
 mod asphere_crossing;
 mod batch;
+mod deflection;
 mod edge;
 mod fate;
+mod freeform;
 mod grin_gap;
 mod interface;
 mod limit;
@@ -72,8 +74,9 @@ impl<R: Real> Tracer<R> {
             index_before,
             grin_gaps: Vec::new(),
             step_plans: Vec::new(),
-            mounts: mount::mounts(system),
+            mounts: Vec::new(),
         };
+        tracer.mounts = mount::mounts(system, &tracer.interfaces);
         if system.has_grin() {
             tracer.fill_grin_gaps(system)?;
         }
@@ -127,7 +130,7 @@ impl<R: Real> Tracer<R> {
             index_before: self.index_before,
             grin_gaps: self.grin_gaps.iter().take(count).cloned().collect(),
             step_plans: Vec::new(),
-            mounts: self.mounts.iter().take(count).copied().collect(),
+            mounts: self.mounts.iter().take(count).cloned().collect(),
         }
     }
 

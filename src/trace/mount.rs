@@ -1,15 +1,18 @@
-//! Surfaces that are decentred, tilted, or not quite rotationally symmetric.
+//! Surfaces that are decentred, tilted, or not rotationally symmetric.
 //!
 //! Between surfaces a ray is in the frame of the vertex that the surface has in the centred lens. At a
 //! surface with a [`Pose`] it enters the surface's own frame, is intersected and refracted there, and
 //! leaves it again. Where the axis is broken, it leaves into the frame of the new axis: everything
-//! behind stands on it, and the gaps are measured along it. An irregular surface has the sag `z(r²) + q y²` in its own frame; the crossing with
-//! the surface of revolution is corrected by Newton's iteration.
+//! behind stands on it, and the gaps are measured along it. An irregular surface has the sag
+//! `z(r²) + q y²` in its own frame; the crossing with the surface of revolution is corrected by
+//! Newton's iteration. A freeform has a search of its own (`freeform`).
 
 use super::Tracer;
+use super::deflection::Deflection;
+use super::freeform::FreeformFace;
 use super::interface::{Interface, Intersection};
 use super::propagation::PropagatedRay;
-use crate::lens::{Pose, Surface, System};
+use crate::lens::{Freeform, FreeformKind, IdealAction, Pose, Surface, System};
 use crate::math::{Real, Vec3};
 
 /// The number of steps of Newton's iteration after which the crossing with an irregular surface is
@@ -17,29 +20,43 @@ use crate::math::{Real, Vec3};
 const NEWTON_STEPS: usize = 4;
 
 /// The position and the irregularity of a surface.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub(super) struct Mount<R> {
     pub(super) pose: Pose<R>,
     /// The axis behind the surface in the frame in front of it; `None` where it is not broken.
     pub(super) axis: Option<Pose<R>>,
     /// The surface's own frame in the frame behind it.
     pub(super) behind: Pose<R>,
-    /// The coefficient of y² in the sag, in 1/mm; `None` for a surface of revolution.
+    /// The coefficient of y² in the sag, in 1/mm; `None` for a surface of revolution and a freeform.
     pub(super) astigmatism: Option<R>,
+    /// The form of the sag; `None` for a conic with even powers.
+    pub(super) face: Option<FreeformFace<R>>,
+    /// The rule by which it deflects light; a surface with one has a form too.
+    pub(super) ideal: Option<IdealAction<R>>,
 }
 
 /// The mounts of all surfaces; empty for a centred system.
-pub(super) fn mounts<R: Real>(system: &System<R>) -> Vec<Option<Mount<R>>> {
+pub(super) fn mounts<R: Real>(
+    system: &System<R>,
+    interfaces: &[Interface<R>],
+) -> Vec<Option<Mount<R>>> {
     if !system.has_poses() {
         return Vec::new();
     }
-    let mount = |surface: &Surface<R>| {
+    let mount = |(surface, interface): (&Surface<R>, &Interface<R>)| {
         let pose = surface.pose.unwrap_or_else(Pose::centred);
         let behind = surface.axis.map_or(pose, |axis| axis.inverse().then(&pose));
-        let (axis, astigmatism) = (surface.axis, surface.astigmatism);
-        surface.is_mounted().then_some(Mount { pose, axis, behind, astigmatism })
+        let (axis, mut astigmatism) = (surface.axis, surface.astigmatism);
+        let plain = Freeform { kind: FreeformKind::OddAsphere, numbers: Vec::new() };
+        let form = surface.freeform.as_deref().or(surface.ideal.is_some().then_some(&plain));
+        let face = form.map(|form| {
+            let irregular = astigmatism.take().unwrap_or(R::ZERO);
+            FreeformFace::new(interface, form, irregular)
+        });
+        let ideal = surface.ideal;
+        surface.is_mounted().then_some(Mount { pose, axis, behind, astigmatism, face, ideal })
     };
-    system.surfaces.iter().map(mount).collect()
+    system.surfaces.iter().zip(interfaces).map(mount).collect()
 }
 
 impl<R: Real> Mount<R> {
@@ -54,6 +71,12 @@ impl<R: Real> Mount<R> {
     ) -> PropagatedRay<'a, R> {
         let start = self.pose.point_in(Vec3::new(p.x, p.y, p.z - surface.gap));
         let k = self.pose.direction_in(k);
+        if let Some(face) = &self.face {
+            let met = face.intersect(surface, start, k);
+            let arrived = PropagatedRay::met_at(surface, met, k);
+            let ideal = self.ideal.map(|action| Deflection::new(action, surface));
+            return ideal.map_or(arrived, |ideal| arrived.deflected_by(ideal));
+        }
         match self.astigmatism {
             None => PropagatedRay::straight(surface, start, k),
             Some(q) => PropagatedRay::met_at(surface, surface.intersect_irregular(start, k, q), k),
@@ -68,6 +91,8 @@ impl<R: Real> Mount<R> {
             axis: self.axis.map(turned),
             behind: turned(self.behind),
             astigmatism: self.astigmatism.map(&f),
+            face: self.face.as_ref().map(|face| face.map(&f)),
+            ideal: self.ideal.map(|ideal| ideal.map(&f)),
         }
     }
 }

@@ -6,6 +6,7 @@
 //! for both.
 
 use super::Tracer;
+use super::deflection::Deflection;
 use super::fate::{CLIPPED, MISSED, TOTAL_REFLECTION};
 use super::grin_gap::GrinGap;
 use super::interface::{Interface, Intersection, Refraction, SurfaceForm};
@@ -39,6 +40,8 @@ pub(super) struct PropagatedRay<'a, R> {
     start: Option<Vec3<R>>,
     /// The cause of a loss inside a GRIN medium.
     lost: Option<u32>,
+    /// The rule by which the surface deflects light beside.
+    ideal: Option<Deflection<R>>,
     /// In a GRIN medium, the least difference on the way between the squares of the radius of the
     /// glass and of the distance from the axis, in mm².
     side: Option<R>,
@@ -52,13 +55,49 @@ impl<'a, R: Real> PropagatedRay<'a, R> {
         let met = surface.intersect(start, k);
         let path = met.s * surface.n2;
         let (start, indices) = (Some(start), surface.indices());
-        Self { surface, indices, met, k, path, start, lost: None, side: None }
+        Self { surface, indices, met, k, path, start, lost: None, ideal: None, side: None }
     }
 
     /// A ray to a point of a surface between homogeneous media for which no closed form exists.
     pub(super) fn met_at(surface: &'a Interface<R>, met: Intersection<R>, k: Vec3<R>) -> Self {
         let (path, indices) = (met.s * surface.n2, surface.indices());
-        Self { surface, indices, met, k, path, start: None, lost: None, side: None }
+        Self { surface, indices, met, k, path, start: None, lost: None, ideal: None, side: None }
+    }
+
+    /// The same ray at a surface that deflects light by a rule.
+    pub(super) fn deflected_by(self, ideal: Deflection<R>) -> Self {
+        let path = self.path + ideal.path(self.met.point, self.k);
+        Self { path, ideal: Some(ideal), ..self }
+    }
+
+    /// The square of the component of the direction behind along the normal; negative for a ray that is
+    /// totally reflected, or in an order that no light is in.
+    #[inline(always)]
+    pub(super) fn reflection_margin(&self) -> R {
+        match &self.ideal {
+            None => self.met.a * self.met.a + self.indices.dn2 * self.met.m,
+            Some(ideal) => ideal.margin(self.k, self.met.normal),
+        }
+    }
+
+    /// The direction behind of a ray whose margin is zero, which leaves along the surface.
+    #[inline(always)]
+    pub(super) fn grazing(&self) -> Vec3<R> {
+        let met = &self.met;
+        match &self.ideal {
+            None => self.k - met.normal * (met.a / met.m),
+            Some(ideal) => ideal.grazing(self.k, met),
+        }
+    }
+
+    #[inline(always)]
+    pub(super) fn ideal(&self) -> Option<&Deflection<R>> {
+        self.ideal.as_ref()
+    }
+
+    /// True if the surface may send a ray back that meets it.
+    pub(super) fn may_reflect(&self) -> bool {
+        !self.surface.mirror || self.ideal.is_some()
     }
 
     /// Refracts or reflects the ray; clips it at the rim and at the obstruction.
@@ -66,7 +105,15 @@ impl<'a, R: Real> PropagatedRay<'a, R> {
     pub(super) fn refract(&self) -> Refraction<R> {
         let refraction = self.surface.refract(self.met, self.k, self.indices.dn2);
         let clipped = refraction.clipped | self.surface.obstructs(self.met.point);
-        Refraction { clipped, ..refraction }
+        match &self.ideal {
+            None => Refraction { clipped, ..refraction },
+            Some(ideal) => {
+                let k = ideal.deflect(self.met.point, self.k, self.met.normal);
+                let reflected = !(self.reflection_margin() >= R::ZERO);
+                let k = if reflected { self.k } else { k };
+                Refraction { k, clipped, reflected, ..refraction }
+            }
+        }
     }
 
     /// The first cause of a loss; `None` for a ray that gets through.
@@ -158,7 +205,8 @@ impl<'a, R: Real> SurfaceSite<'a, R> {
                 let side = gap.side2 - exit.widest;
                 let lost = (side < R::ZERO && !met.missed).then_some(CLIPPED);
                 let indices = self.local_indices(point);
-                PropagatedRay { surface, indices, met, k, path, start, lost, side: Some(side) }
+                let (ideal, side) = (None, Some(side));
+                PropagatedRay { surface, indices, met, k, path, start, lost, ideal, side }
             }
             Err((cause, RayState { x, v: k, path })) => {
                 let point = Vec3::new(x.x, x.y, x.z - surface.gap);
@@ -172,6 +220,7 @@ impl<'a, R: Real> SurfaceSite<'a, R> {
                     path,
                     start,
                     lost: Some(cause),
+                    ideal: None,
                     side: None,
                 }
             }

@@ -2,8 +2,8 @@
 
 use super::adjoint::{SurfaceGradient, SystemGradient};
 use crate::lens::{
-    ASPHERE_TERMS, PROFILE_TERMS, ProfileCoefficients, ProfileLaw, RADIAL_TERMS, Shape, Surface,
-    System,
+    ASPHERE_TERMS, FREEFORM_NUMBERS, PROFILE_TERMS, ProfileCoefficients, ProfileLaw, RADIAL_TERMS,
+    Shape, Surface, System,
 };
 use crate::math::Real;
 
@@ -24,6 +24,8 @@ pub enum SurfaceParameter {
     SemiDiameter,
     /// A coefficient of the GRIN medium behind the surface.
     GrinTerm(usize),
+    /// A number of a freeform.
+    Freeform(usize),
 }
 
 impl SurfaceParameter {
@@ -32,7 +34,8 @@ impl SurfaceParameter {
         let plain =
             [Self::Curvature, Self::Conic, Self::Thickness, Self::Index, Self::SemiDiameter];
         let figured = plain.into_iter().chain((0..ASPHERE_TERMS).map(Self::AsphereTerm));
-        figured.chain((0..PROFILE_TERMS).map(Self::GrinTerm))
+        let graded = figured.chain((0..PROFILE_TERMS).map(Self::GrinTerm));
+        graded.chain((0..FREEFORM_NUMBERS).map(Self::Freeform))
     }
 
     /// True if a surface has such a number; a plane has the curvature zero.
@@ -46,6 +49,9 @@ impl SurfaceParameter {
             Self::Curvature | Self::Thickness | Self::Index | Self::SemiDiameter => true,
             Self::Conic => matches!(shape, Shape::Conic { .. } | Shape::Asphere { .. }),
             Self::AsphereTerm(_) => matches!(shape, Shape::Asphere { .. }),
+            Self::Freeform(k) => {
+                surface.freeform.as_ref().is_some_and(|form| k < form.numbers.len())
+            }
         }
     }
 
@@ -84,6 +90,10 @@ impl SurfaceParameter {
                 Some(grin) => &mut grin.terms[k],
                 None => &mut surface.index,
             },
+            (Self::Freeform(k), _) => match &mut surface.freeform {
+                Some(form) if k < form.numbers.len() => &mut form.numbers[k],
+                _ => &mut surface.index,
+            },
             // An index is always there.
             _ => &mut surface.index,
         }
@@ -101,12 +111,14 @@ impl<R: Real> SurfaceGradient<R> {
             SurfaceParameter::Index => self.index,
             SurfaceParameter::SemiDiameter => self.semi_diameter,
             SurfaceParameter::GrinTerm(k) => self.grin_terms[k],
+            SurfaceParameter::Freeform(k) => self.freeform.get(k).copied().unwrap_or_default(),
         }
     }
 
-    /// The derivative by one number, mutable.
-    pub fn by_mut(&mut self, parameter: SurfaceParameter) -> &mut R {
-        match parameter {
+    /// Sets the derivative by one number. Zero for a number of a freeform that is missing changes
+    /// nothing.
+    pub fn set(&mut self, parameter: SurfaceParameter, by: R) {
+        let number = match parameter {
             SurfaceParameter::Curvature => &mut self.curvature,
             SurfaceParameter::Conic => &mut self.conic,
             SurfaceParameter::AsphereTerm(term) => &mut self.terms[term],
@@ -114,7 +126,10 @@ impl<R: Real> SurfaceGradient<R> {
             SurfaceParameter::Index => &mut self.index,
             SurfaceParameter::SemiDiameter => &mut self.semi_diameter,
             SurfaceParameter::GrinTerm(k) => &mut self.grin_terms[k],
-        }
+            SurfaceParameter::Freeform(k) if k >= self.freeform.len() && by == R::ZERO => return,
+            SurfaceParameter::Freeform(k) => self.freeform_mut(k),
+        };
+        *number = by;
     }
 }
 
@@ -122,8 +137,20 @@ impl<R: Real> SystemGradient<R> {
     /// Combines each number of this gradient with that of another one with as many surfaces.
     #[must_use]
     pub fn zip_with(&self, other: &Self, combine: impl Fn(R, R) -> R) -> Self {
-        let pairs = self.numbers().zip(other.numbers());
-        Self::from_numbers(self.surfaces.len(), pairs.map(|(a, b)| combine(a, b)))
+        let fixed = |gradient: &Self| {
+            let mut fixed = gradient.clone();
+            fixed.surfaces.iter_mut().for_each(|surface| surface.freeform.clear());
+            fixed
+        };
+        let (a, b) = (fixed(self), fixed(other));
+        let pairs = a.numbers().zip(b.numbers());
+        let mut all = Self::from_numbers(self.surfaces.len(), pairs.map(|(a, b)| combine(a, b)));
+        for ((to, a), b) in all.surfaces.iter_mut().zip(&self.surfaces).zip(&other.surfaces) {
+            let numbers =
+                (0..a.freeform.len().max(b.freeform.len())).map(SurfaceParameter::Freeform);
+            to.freeform = numbers.map(|number| combine(a.by(number), b.by(number))).collect();
+        }
+        all
     }
 
     /// The derivatives by the numbers of one kind, surface by surface; the index of object space is

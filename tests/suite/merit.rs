@@ -119,7 +119,7 @@ pub(crate) fn step(quantity: Quantity) -> f64 {
         | Quantity::Thickness
         | Quantity::ZoomThickness(_)
         | Quantity::SemiDiameter => 1e-2,
-        Quantity::Index | Quantity::Grin(_) => 1e-4,
+        Quantity::Index | Quantity::Grin(_) | Quantity::Freeform(_) => 1e-4,
     }
 }
 

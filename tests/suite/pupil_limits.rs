@@ -13,7 +13,7 @@ const DISTANCE: f64 = 50.0;
 /// A beam through the pupil that is displaced by `shift` at a plane 50 mm behind.
 fn displaced(shift: f64, behind: &Surface<f64>) -> RayModel {
     let front = Surface::plane(DISTANCE, 1.0);
-    let surfaces = vec![front, *behind, Surface::plane(0.0, 1.0)];
+    let surfaces = vec![front, behind.clone(), Surface::plane(0.0, 1.0)];
     let system = System { index_before: 1.0, surfaces, stop: Some(0) };
     let edge = (shift / DISTANCE).atan().to_degrees();
     let beam = Beam {

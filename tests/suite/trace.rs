@@ -226,7 +226,7 @@ fn the_margin_at_a_rim_has_the_derivative_of_its_value() {
         let tracer = Tracer::new(&system).unwrap();
         let exact = tracer.margin_gradient(surface, limit, &rays, &weights);
         for i in 0..system.surfaces.len() {
-            let by = exact.surfaces[i];
+            let by = &exact.surfaces[i];
             let numbers = [
                 (SurfaceParameter::Curvature, by.curvature, 1e-6),
                 (SurfaceParameter::Thickness, by.thickness, 1e-5),
@@ -269,7 +269,7 @@ fn the_margin_at_the_rim_of_an_asphere_has_the_derivative_of_its_value() {
         let tracer = Tracer::new(&system).unwrap();
         let exact = tracer.margin_gradient(surface, RayLimit::Rim, &rays, &weights);
         for i in [0, 3].into_iter().filter(|i| *i <= surface) {
-            let by = exact.surfaces[i];
+            let by = &exact.surfaces[i];
             let terms = (0..4).map(|term| {
                 (
                     SurfaceParameter::AsphereTerm(term),
@@ -432,7 +432,7 @@ fn scale(surface: &Surface<f64>, factor: f64) -> Surface<f64> {
         thickness: surface.thickness * factor,
         semi_diameter: surface.semi_diameter * factor,
         obstruction: surface.obstruction * factor,
-        ..*surface
+        ..surface.clone()
     }
 }
 
@@ -474,7 +474,7 @@ fn reversed(system: &System<f64>) -> System<f64> {
             shape: Shape::simplest(-c, k, terms.map(|a| -a)),
             thickness,
             index: system.index_before(i),
-            ..system.surfaces[i]
+            ..system.surfaces[i].clone()
         });
     }
     surfaces.push(Surface::plane(0.0, system.index_before));
@@ -485,7 +485,7 @@ fn reversed(system: &System<f64>) -> System<f64> {
 fn a_plane_between_equal_media_changes_nothing() {
     let system = system();
     let mut longer = system.clone();
-    let gap = longer.surfaces[3];
+    let gap = longer.surfaces[3].clone();
     longer.surfaces[3].thickness *= 0.25;
     let thickness = gap.thickness - longer.surfaces[3].thickness;
     let plane = Surface { shape: Shape::Plane, thickness, semi_diameter: f64::INFINITY, ..gap };

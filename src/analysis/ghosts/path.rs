@@ -178,7 +178,7 @@ fn unfolded(lens: &System<f64>, [first, second]: [usize; 2], steps: &[usize]) ->
     }
     let turned = 2 * first - second;
     let surface = |(k, i): (usize, &usize)| {
-        let surface = lens.surfaces[*i];
+        let surface = lens.surfaces[*i].clone();
         let next = steps.get(k + 1).map_or(0.0, |next| z[*next] - z[*i]);
         let backwards = k >= first && k < turned;
         let index = if backwards { lens.index_before(*i) } else { surface.index };

@@ -70,6 +70,23 @@ pub(super) fn unusual_parts(lens: &Lens) -> Vec<LensCheck> {
                      Seidel sums are those of the straightened axis";
         checks.push(LensCheck { surface: None, found: found.to_owned() });
     }
+    for (i, row) in rows() {
+        if let Some(ideal) = row.ideal {
+            let found = format!(
+                "{}: Seidel sums leave it out; the optical path of a paraxial lens is that of a plane \
+                 wave in front of it",
+                ideal.name()
+            );
+            checks.push(LensCheck { surface: Some(i), found });
+        }
+        let Some(form) = &row.freeform else { continue };
+        let found = format!(
+            "{}: first-order data are those of the y-z section, and Seidel sums leave its powers \
+             beyond the curvature out",
+            form.kind.name()
+        );
+        checks.push(LensCheck { surface: Some(i), found });
+    }
     checks
 }
 
@@ -77,7 +94,7 @@ pub(super) fn unusual_parts(lens: &Lens) -> Vec<LensCheck> {
 fn rim(system: &System<f64>, i: usize) -> Option<LensCheck> {
     let surface = &system.surfaces[i];
     let sd = surface.semi_diameter;
-    if !sd.is_finite() || surface.hyperhemisphere || surface.shape.sag(sd * sd).is_some() {
+    if !sd.is_finite() || surface.hyperhemisphere || surface.section_sag(sd).is_some() {
         return None;
     }
     let found = format!("the semi-diameter {sd} mm is beyond the edge of the surface");
@@ -116,7 +133,7 @@ fn gap(system: &System<f64>, i: usize) -> Option<LensCheck> {
     }
     let rims = [before.semi_diameter, behind.semi_diameter];
     let height = rims.into_iter().filter(|sd| sd.is_finite()).reduce(f64::min)?;
-    let sag = |surface: &crate::lens::Surface<f64>| Some(surface.shape.sag(height * height)?.0);
+    let sag = |surface: &crate::lens::Surface<f64>| surface.section_sag(height);
     let edge = before.thickness + sag(behind)? - sag(before)?;
     if edge >= 0.0 {
         return None;

@@ -64,6 +64,12 @@ pub(super) struct CodeVSurface {
     pub(super) terms: [f64; 9],
     pub(super) clip: Option<f64>,
     pub(super) obstruction: Option<f64>,
+    /// The form, if it is none of revolution.
+    pub(super) profile: Option<CodeVProfile>,
+    /// The curvature of the section with the x-z plane.
+    pub(super) across: f64,
+    /// The conic constant of that section.
+    pub(super) conic_across: f64,
     /// True if the aperture is displaced.
     pub(super) is_offset: bool,
     pub(super) label: String,
@@ -76,6 +82,15 @@ pub(super) struct CodeVSurface {
     /// The command that makes the surface impossible to trace.
     pub(super) locked: Option<String>,
     pub(super) lines: Vec<String>,
+}
+
+/// A form that is none of revolution.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum CodeVProfile {
+    /// A cylinder (`CYL`) or a curve in the y-z plane that is turned about a line parallel to y (`YTO`).
+    Toroid,
+    /// A biconic (`AAS`).
+    Biconic,
 }
 
 /// The frames that the decentre and the tilt of a surface move.

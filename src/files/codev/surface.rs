@@ -1,7 +1,7 @@
 //! The commands of a surface: its form, aperture, place and label.
 
 use super::command::{Command, parse_number};
-use super::file::{CodeVSurface, Placement};
+use super::file::{CodeVProfile, CodeVSurface, Placement};
 use super::parse::{CommandOutcome, dropped, preserved, used};
 use crate::files::error::ParseError;
 use crate::files::report::ConversionOutcome;
@@ -29,7 +29,15 @@ pub(super) fn read(
         }
         "GLA" => surface.glass = command.words.first().cloned(),
         "RMD" | "REFL" => surface.glass = Some("REFL".to_owned()),
-        "K" => surface.conic = command.last_number()?,
+        "K" | "KY" => surface.conic = command.last_number()?,
+        "KX" => surface.conic_across = command.last_number()?,
+        "CUX" => surface.across = command.last_number()?,
+        "RDX" => {
+            let radius = command.last_number()?;
+            surface.across = if radius == 0.0 { 0.0 } else { radius.recip() };
+        }
+        "CYL" | "YTO" => surface.profile = Some(CodeVProfile::Toroid),
+        "AAS" => surface.profile = Some(CodeVProfile::Biconic),
         "A" | "B" | "C" | "D" | "E" | "F" | "G" | "H" | "J" => term(surface, command)?,
         "SLB" => surface.label = command.words.first().cloned().unwrap_or_default(),
         "CIR" => return circle(surface, command),
@@ -109,13 +117,12 @@ fn place(surface: &mut CodeVSurface, command: &Command) -> Result<CommandOutcome
 
 /// The surface types that cannot be traced, and the commands that affect no ray.
 fn other(surface: &mut CodeVSurface, command: &Command) -> CommandOutcome {
-    const TYPES: [&str; 14] = [
-        "DIF", "CYL", "YTO", "XTO", "AAS", "SPS", "XYP", "ZRN", "GRT", "HOE", "DOE", "MOD", "SPL",
-        "UDS",
-    ];
+    const TYPES: [&str; 11] =
+        ["DIF", "XTO", "SPS", "XYP", "ZRN", "GRT", "HOE", "DOE", "MOD", "SPL", "UDS"];
+    const TERMS: [&str; 9] = ["CUF", "AR", "BR", "CR", "DR", "AP", "BP", "CP", "DP"];
     let nonzero = || command.last_number().is_ok_and(|value| value != 0.0);
-    let fresnel = command.name == "CUF" && nonzero();
-    if !(TYPES.contains(&command.name.as_str()) || fresnel) {
+    let term = TERMS.contains(&command.name.as_str()) && nonzero();
+    if !(TYPES.contains(&command.name.as_str()) || term) {
         return preserved();
     }
     surface.locked.get_or_insert_with(|| command.text.clone());

@@ -2,7 +2,7 @@
 
 use super::medium::is_air;
 use super::required_number;
-use crate::lens::{AxisBreak, LockedSurface, Medium, Row};
+use crate::lens::{AxisBreak, Freeform, IdealElement, LockedSurface, Medium, Row};
 use serde::de::value::MapAccessDeserializer;
 use serde::de::{Error, MapAccess, Unexpected, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
@@ -24,6 +24,10 @@ struct RowJson {
     conic: f64,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     asphere: Vec<f64>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    freeform: Option<Freeform<f64>>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    ideal: Option<IdealElement>,
     thickness: f64,
     #[serde(default, skip_serializing_if = "is_air")]
     glass: Medium,
@@ -95,6 +99,8 @@ impl Serialize for Row {
             curvature: (!is_plain_zero(&self.curvature)).then_some(self.curvature),
             conic: self.conic,
             asphere: self.asphere.clone(),
+            freeform: self.freeform.clone(),
+            ideal: self.ideal,
             thickness: self.thickness,
             glass: self.medium.clone(),
             semi_diameter: self.semi_diameter,
@@ -133,6 +139,8 @@ impl<'de> Visitor<'de> for RowVisitor {
             curvature: keys.curvature()?,
             conic: keys.conic,
             asphere: keys.asphere,
+            freeform: keys.freeform,
+            ideal: keys.ideal,
             thickness: keys.thickness,
             medium: keys.glass,
             semi_diameter: keys.semi_diameter,

@@ -6,6 +6,7 @@
 mod build;
 mod even_fit;
 mod file;
+mod freeform;
 mod glass;
 mod gradient;
 mod line;

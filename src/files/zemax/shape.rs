@@ -1,9 +1,10 @@
-//! Reduction of the surface types to a conic with a polynomial in r².
+//! Reduction of the surface types to a conic with a polynomial in r², or to a freeform.
 
 use super::even_fit;
 use super::file::ZemaxSurface;
+use super::freeform;
 use crate::files::report::ConversionOutcome;
-use crate::lens::ASPHERE_TERMS;
+use crate::lens::{ASPHERE_TERMS, Freeform, IdealElement};
 
 /// The shape of a surface, in the unit of the file.
 #[derive(Debug, Default, PartialEq)]
@@ -12,6 +13,10 @@ pub(super) struct ZemaxShape {
     pub(super) conic: f64,
     /// Coefficients of r⁴, r⁶, ...
     pub(super) asphere: Vec<f64>,
+    /// The form beside, if there is one.
+    pub(super) freeform: Option<Freeform<f64>>,
+    /// The rule by which it deflects light, if there is one.
+    pub(super) ideal: Option<IdealElement>,
     /// The note on a reduction, with the line that made it necessary.
     pub(super) note: Option<(usize, ConversionOutcome, String)>,
 }
@@ -36,9 +41,8 @@ pub(super) fn surface_shape(surface: &ZemaxSurface) -> Result<ZemaxShape, String
         "ODDASPHE" => polynomial(surface, &parameter_terms(&surface.parameters, |i| i)),
         "XASPHERE" => polynomial(surface, &extended_terms(&surface.extra, |i| 2 * i)),
         "XOSPHERE" => polynomial(surface, &extended_terms(&surface.extra, |i| i)),
-        "BICONICX" => biconic(form, surface),
         "QED_TYPE" => forbes(form, surface),
-        _ => Err(String::new()),
+        _ => freeform::surface_form(surface).unwrap_or_else(|| Err(String::new())),
     }
 }
 
@@ -65,9 +69,23 @@ fn extended_terms(extra: &[PowerTerm], power: fn(usize) -> usize) -> Vec<PowerTe
         .collect()
 }
 
-/// A conic with powers of r: exactly, or else by the even asphere nearest to it inside the semi-diameter, if
-/// that is near enough.
+/// A conic with powers of r. One with odd powers is a freeform. Of even powers that no even asphere has,
+/// the even asphere nearest to them inside the semi-diameter is taken if that is near enough, since every
+/// method knows it, or else a freeform.
 fn polynomial(surface: &ZemaxSurface, terms: &[PowerTerm]) -> Result<ZemaxShape, String> {
+    let as_freeform = || {
+        let form = freeform::odd_asphere(terms)?;
+        Ok(ZemaxShape { freeform: Some(form), ..ZemaxShape::base(surface) })
+    };
+    let is_odd = |(power, value, _): &PowerTerm| !power.is_multiple_of(2) && *value != 0.0;
+    if terms.iter().any(is_odd) {
+        return as_freeform();
+    }
+    even_polynomial(surface, terms).or_else(|why| as_freeform().map_err(|_longer| why))
+}
+
+/// A conic with even powers of r: exactly, or else by the even asphere nearest to it.
+fn even_polynomial(surface: &ZemaxSurface, terms: &[PowerTerm]) -> Result<ZemaxShape, String> {
     let base = ZemaxShape::base(surface);
     add_terms(ZemaxShape::base(surface), terms).or_else(|why| {
         let reach = surface.semi_diameter.map(|given| given.value);
@@ -207,7 +225,14 @@ fn fitted(
         found.error
     );
     let note = Some((line, ConversionOutcome::Approximated, note));
-    Ok(ZemaxShape { curvature, conic: found.conic, asphere: found.terms, note })
+    Ok(ZemaxShape {
+        curvature,
+        conic: found.conic,
+        asphere: found.terms,
+        freeform: None,
+        ideal: None,
+        note,
+    })
 }
 
 /// The coefficient of `x^k` in `Qₘ(x)`: `(−1)^(m+k) C(m+4, m−k) C(m+4+k, k)`.
@@ -220,23 +245,11 @@ fn binomial(n: usize, k: usize) -> f64 {
     (0..k).fold(1.0, |product, i| product * (n - i) as f64 / (i + 1) as f64)
 }
 
-/// A biconic surface that is rotationally symmetric. Parameters: 1 radius in x, 0 for flat; 2 conic
-/// constant in x.
-fn biconic(form: ZemaxShape, surface: &ZemaxSurface) -> Result<ZemaxShape, String> {
-    let value = |index| {
-        let found = surface.parameters.iter().rfind(|(i, ..)| *i == index);
-        found.map_or(0.0, |(_, value, _)| *value)
-    };
-    let curvature = if value(1) == 0.0 { 0.0 } else { 1.0 / value(1) };
-    let round = (curvature - form.curvature).abs() <= 1e-15 * curvature.abs()
-        && (value(2) == form.conic || curvature == 0.0);
-    if round { Ok(form) } else { Err("other curvatures in x than in y".to_owned()) }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::files::zemax::file::SemiDiameterLine;
+    use crate::lens::FreeformKind;
 
     fn surface(kind: &str, curvature: f64, conic: f64) -> ZemaxSurface {
         ZemaxSurface {
@@ -267,8 +280,10 @@ mod tests {
         let folded = surface_shape(&s).unwrap();
         assert_eq!((folded.curvature, folded.conic), (-0.05 + 0.02, -1.0));
         s.conic = 0.0;
-        let error = surface_shape(&s).unwrap_err();
-        assert!(error.starts_with("a term in r^2 (line 7)"), "{error}");
+        // Without a semi-diameter it is a freeform.
+        let unlimited = surface_shape(&s).unwrap();
+        assert_eq!(unlimited.freeform.unwrap().numbers, [0.0, 0.01, 0.0, 1e-5]);
+        assert_eq!((unlimited.curvature, unlimited.conic), (-0.05, 0.0));
         // Inside a semi-diameter another even asphere is as good.
         s.semi_diameter = Some(SemiDiameterLine { value: 8.0, fixed: false, line: 9 });
         let fitted = surface_shape(&s).unwrap();
@@ -283,7 +298,8 @@ mod tests {
         }
         // The cusp of a term in r has no such asphere.
         s.kind.0 = "ODDASPHE".to_owned();
-        assert!(surface_shape(&s).unwrap_err().starts_with("a term in r^1"));
+        let odd = surface_shape(&s).unwrap().freeform.unwrap();
+        assert_eq!((odd.kind, &odd.numbers[..]), (FreeformKind::OddAsphere, &[0.01, 1e-5][..]));
     }
 
     #[test]
@@ -294,12 +310,17 @@ mod tests {
         s.extra.push((12, 1.0, 12)); // r^20, beyond the eight terms in use
         assert_eq!(surface_shape(&s).unwrap().asphere, [0.01, -0.01]);
         s.extra[0].1 = 10.0;
+        let longer = surface_shape(&s).unwrap().freeform.unwrap();
+        assert_eq!((longer.numbers.len(), longer.numbers[19]), (20, 2.0_f64.powi(-20)));
+        s.extra.push((13, 1.0, 13)); // r^22
+        s.extra[0].1 = 11.0;
         assert!(surface_shape(&s).unwrap_err().contains("a term in r^20 (line 12)"));
         let mut s = surface("XOSPHERE", 0.02, 0.0);
         s.extra = vec![(1, 4.0, 7), (2, 10.0, 8), (6, 1.0, 9)];
         assert_eq!(surface_shape(&s).unwrap().asphere, [1e-4]);
         s.extra.push((5, 1.0, 10));
-        assert!(surface_shape(&s).unwrap_err().contains("a term in r^3 (line 10)"));
+        let odd = surface_shape(&s).unwrap().freeform.unwrap();
+        assert!((odd.numbers[2] - 1e-3).abs() < 1e-18 && (odd.numbers[3] - 1e-4).abs() < 1e-19);
     }
 
     /// The first polynomials as Forbes prints them, eq. 2.5.
@@ -359,19 +380,57 @@ mod tests {
     }
 
     #[test]
-    fn a_biconic_is_read_where_it_is_round() {
+    fn biconics_toroids_and_polynomials_are_freeforms_unless_they_are_round() {
         let mut s = surface("BICONICX", 0.0, 0.0);
         s.parameters = vec![(1, 0.0, 7), (2, 0.0, 8)];
         assert_eq!(surface_shape(&s).unwrap(), ZemaxShape::default());
         s.curvature = Some((0.02, 6));
-        assert!(surface_shape(&s).unwrap_err().contains("other curvatures in x"));
+        let cylinder = surface_shape(&s).unwrap();
+        assert_eq!(
+            (cylinder.curvature, cylinder.freeform.unwrap().numbers),
+            (0.02, vec![0.0, 0.0])
+        );
         s.parameters[0].1 = 50.0;
-        assert_eq!(surface_shape(&s).unwrap().curvature, 0.02);
+        assert_eq!(surface_shape(&s).unwrap().freeform, None);
+        let mut s = surface("TOROIDAL", 0.02, -1.0);
+        s.parameters = vec![(1, -25.0, 7), (3, 1e-5, 8)];
+        let toroid = surface_shape(&s).unwrap().freeform.unwrap();
+        assert_eq!((toroid.kind, toroid.numbers), (FreeformKind::Toroid, vec![-0.04, 0.0, 1e-5]));
+        let mut s = surface("XPOLYNOM", 0.02, 0.5);
+        s.extra = vec![(1, 5.0, 7), (2, 4.0, 8), (3, 0.1, 9), (6, -0.2, 10), (8, 9.0, 11)];
+        let form = surface_shape(&s).unwrap().freeform.unwrap();
+        assert_eq!(form.kind, FreeformKind::XyPolynomial { radius: 4.0 });
+        assert_eq!(form.numbers, [0.1, 0.0, 0.0, -0.2]);
+        s.extra[1].1 = 0.0;
+        assert!(surface_shape(&s).unwrap_err().contains("normalization radius 0"));
+    }
+
+    /// The term in r² of a Zernike sag is its focus with a piston, both orders.
+    #[test]
+    fn a_zernike_sag_keeps_its_even_powers() {
+        for kind in ["SZERNSAG", "FZERNSAG"] {
+            let mut s = surface(kind, 0.02, 0.0);
+            s.parameters = vec![(0, 1.0, 5), (1, 3e-3, 6), (2, 1e-5, 7)];
+            s.extra = vec![(1, 5.0, 7), (2, 4.0, 8), (7, 0.01, 9)];
+            let read = surface_shape(&s).unwrap();
+            assert_eq!((read.asphere.as_slice(), &read.note), (&[1e-5][..], &None));
+            let form = read.freeform.unwrap();
+            for (x, y) in [(0.0, 0.0), (1.5, -2.0), (3.0, 4.0)] {
+                let mut fifth = form.clone();
+                fifth.numbers[..4].fill(0.0);
+                let apart = form.series_sag(x, y, |a| a)[0] - fifth.series_sag(x, y, |a| a)[0];
+                assert!((apart - 3e-3 * (x * x + y * y)).abs() < 1e-16, "{kind}: {apart}");
+            }
+            s.parameters[0].1 = 0.0;
+            assert!(surface_shape(&s).unwrap().note.unwrap().2.contains("continue beyond"));
+            s.parameters.push((9, 1.0, 10));
+            assert!(surface_shape(&s).unwrap_err().contains("decentred Zernike"));
+        }
     }
 
     #[test]
     fn what_cannot_be_traced_is_refused() {
-        for kind in ["TILTSURF", "TOROIDAL", "PARAXIAL", "DGRATING", "USERSURF", "NONSEQCO"] {
+        for kind in ["TILTSURF", "USERSURF", "NONSEQCO"] {
             assert_eq!(surface_shape(&surface(kind, 0.0, 0.0)), Err(String::new()));
         }
     }

@@ -1,7 +1,7 @@
 //! Inserting, removing, replacing and reversing rows; parameters that name a row are renumbered.
 
 use super::EditError;
-use crate::lens::{Lens, Medium, PROFILE_TERMS, Parameter, Quantity, Row};
+use crate::lens::{FREEFORM_NUMBERS, Lens, Medium, PROFILE_TERMS, Parameter, Quantity, Row};
 
 /// Inserts a row in front of row `at`. An image solve stays with the last row.
 pub(super) fn insert(lens: &mut Lens, at: usize, row: &Row) -> Result<(), EditError> {
@@ -41,7 +41,8 @@ pub(super) fn remove(lens: &mut Lens, surface: usize) -> Result<(), EditError> {
 pub(super) fn replace(lens: &mut Lens, surface: usize, row: &Row) -> Result<(), EditError> {
     lens.row_mut(surface)?.clone_from(row);
     let gradient = (0..PROFILE_TERMS).map(Quantity::Grin);
-    for quantity in [Quantity::Index, Quantity::SemiDiameter].into_iter().chain(gradient) {
+    let forms = (0..FREEFORM_NUMBERS).map(Quantity::Freeform).chain(gradient);
+    for quantity in [Quantity::Index, Quantity::SemiDiameter].into_iter().chain(forms) {
         let parameter = Parameter::new(surface, quantity);
         if lens.get(parameter).is_none() {
             lens.drop_references(parameter);

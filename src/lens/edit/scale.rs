@@ -14,6 +14,9 @@ fn power(rows: &[Row], parameter: Parameter) -> i32 {
             Medium::Grin(gradient) => gradient.power(k),
             _ => 0,
         },
+        Quantity::Freeform(k) => {
+            rows[parameter.surface].freeform.as_ref().map_or(0, |form| form.kind.power(k))
+        }
     }
 }
 
@@ -34,6 +37,8 @@ pub(super) fn scale(lens: &mut Lens, factor: f64) -> Result<(), EditError> {
         for (term, a) in row.asphere.iter_mut().enumerate() {
             *a *= factor.powi(-(2 * term as i32 + 3));
         }
+        row.ideal = row.ideal.map(|ideal| ideal.scaled(factor));
+        row.freeform = row.freeform.as_ref().map(|form| form.scaled(factor));
         if let Medium::Grin(gradient) = &mut row.medium {
             for k in gradient.written_terms().collect::<Vec<_>>() {
                 let term = gradient.term(k).unwrap_or(0.0);

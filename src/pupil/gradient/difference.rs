@@ -54,8 +54,8 @@ impl Region<'_> {
                     *slot.value_mut(system, i) += step;
                 };
                 let [by, error] = moved.derivative(step, by_slot);
-                *found.gradient.surfaces[i].by_mut(slot) = by;
-                *found.error.surfaces[i].by_mut(slot) = error;
+                found.gradient.surfaces[i].set(slot, by);
+                found.error.surfaces[i].set(slot, error);
             }
         }
         found.rays = moved.rays;
@@ -102,6 +102,8 @@ impl SurfaceScales {
                 let length = row.thickness.abs().max(r);
                 grin_scale(row.grin.as_ref()?, k, r, length)
             }
+            // A change of the sag by a length r times the angle.
+            SurfaceParameter::Freeform(k) => r.powi(row.freeform.as_ref()?.kind.power(k)),
         };
         let step = STEP * scale;
         (step.is_finite() && step > 0.0).then_some(step)

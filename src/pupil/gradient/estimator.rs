@@ -341,8 +341,8 @@ impl PupilDerivative {
             let [worst, largest] = [&self.error, &self.gradient].map(|g| g.largest(slot));
             let share = if largest > 0.0 { (worst / largest).min(1.0) } else { 0.0 };
             for (error, by) in self.error.surfaces.iter_mut().zip(&self.gradient.surfaces) {
-                let error = error.by_mut(slot);
-                *error = error.max(share * by.by(slot).abs());
+                let larger = error.by(slot).max(share * by.by(slot).abs());
+                error.set(slot, larger);
             }
         }
     }
@@ -355,7 +355,7 @@ impl PupilDerivative {
                 continue;
             }
             for numbers in [&mut *by, &mut *error] {
-                numbers.surfaces.iter_mut().for_each(|surface| *surface.by_mut(slot) = 0.0);
+                numbers.surfaces.iter_mut().for_each(|surface| surface.set(slot, 0.0));
                 if slot == SurfaceParameter::Index {
                     numbers.index_before = 0.0;
                 }
@@ -379,7 +379,10 @@ fn natural_size(
             SurfaceParameter::Curvature => 1,
             SurfaceParameter::Conic | SurfaceParameter::Index => 0,
             SurfaceParameter::AsphereTerm(term) => 2 * term as i32 + 3,
-            SurfaceParameter::Thickness | SurfaceParameter::SemiDiameter => -1,
+            // The power of the length depends on the kind of a form; rounding is far below.
+            SurfaceParameter::Thickness
+            | SurfaceParameter::SemiDiameter
+            | SurfaceParameter::Freeform(_) => -1,
             SurfaceParameter::GrinTerm(k) => match k.checked_sub(RADIAL_TERMS) {
                 None => 2 * (k as i32 + 1),
                 Some(j) => j as i32 + 1,

@@ -420,6 +420,8 @@ mod tests {
                 pose: None,
                 axis: None,
                 astigmatism: None,
+                freeform: None,
+                ideal: None,
             }
         };
         let terms = [1e-5, -3e-8, 0.0, 1e-12, 0.0, 0.0, 0.0];

@@ -8,7 +8,7 @@ use crate::search::LossGradient;
 
 /// The unit of a parameter for a lens of a size in mm; units of all parameters deflect rays by
 /// similar amounts.
-fn langevin_unit(parameter: Parameter, size: f64) -> f64 {
+fn langevin_unit(lens: &Lens, parameter: Parameter, size: f64) -> f64 {
     match parameter.quantity {
         Quantity::Curvature => 0.5 / size,
         Quantity::Thickness | Quantity::ZoomThickness(_) | Quantity::SemiDiameter => 0.02 * size,
@@ -19,6 +19,10 @@ fn langevin_unit(parameter: Parameter, size: f64) -> f64 {
             let power = if k < RADIAL_TERMS { 2 * k + 2 } else { k - RADIAL_TERMS + 1 };
             0.02 / (0.2 * size).powi(power as i32)
         }
+        Quantity::Freeform(k) => {
+            let form = lens.surfaces[parameter.surface].freeform.as_ref();
+            0.05 * (0.2 * size).powi(form.map_or(0, |form| form.kind.power(k)))
+        }
     }
 }
 
@@ -26,8 +30,9 @@ pub(super) fn loss_gradient(landscape: &LensLandscape, lens: &Lens) -> Option<Lo
     let merit = landscape.merit(lens, landscape.local.tolerance).ok()?;
     let values = merit.values(&landscape.with_variables(lens));
     let sum = merit.evaluate(&values, DerivativeLevel::Gradient).ok()?;
-    let unit =
-        |i: usize| langevin_unit(merit.variables()[i].parameter, landscape.variable_rules.size);
+    let unit = |i: usize| {
+        langevin_unit(lens, merit.variables()[i].parameter, landscape.variable_rules.size)
+    };
     let units: Vec<f64> = (0..values.len()).map(unit).collect();
     Some(LossGradient {
         loss: sum.value,
@@ -43,7 +48,7 @@ pub(super) fn with_values(landscape: &LensLandscape, lens: &Lens, values: &[f64]
     }
     let mut there = lens.clone();
     for (variable, value) in free.variables.iter().zip(values) {
-        let value = value * langevin_unit(variable.parameter, landscape.variable_rules.size);
+        let value = value * langevin_unit(lens, variable.parameter, landscape.variable_rules.size);
         let inside = variable.min.is_none_or(|min| value >= min)
             && variable.max.is_none_or(|max| value <= max);
         if !inside || !there.set(variable.parameter, value) {
@@ -61,7 +66,9 @@ mod tests {
     #[test]
     fn curvature_and_aspheres_have_units_of_the_same_sag() {
         let size = 70.0;
-        let unit = |quantity: Quantity| langevin_unit(Parameter::new(0, quantity), size);
+        let unit = |quantity: Quantity| {
+            langevin_unit(&crate::lens::blank(), Parameter::new(0, quantity), size)
+        };
         // At a fifth of the size.
         let height: f64 = 0.2 * size;
         let sag = 0.5 * unit(Quantity::Curvature) * height * height;

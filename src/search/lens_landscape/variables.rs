@@ -95,7 +95,9 @@ fn bounds(lens: &Lens, rules: &SearchRules, size: f64, parameter: Parameter) -> 
         }
         Quantity::SemiDiameter => [Some(MIN_SEMI_DIAMETER * size), rules.semi_diameter],
         Quantity::Index => both(MODEL_INDICES),
-        Quantity::Conic | Quantity::Asphere(_) | Quantity::Grin(_) => [None, None],
+        Quantity::Conic | Quantity::Asphere(_) | Quantity::Grin(_) | Quantity::Freeform(_) => {
+            [None, None]
+        }
     }
 }
 

@@ -40,7 +40,7 @@ pub struct AdjointSeed<R> {
 }
 
 /// Derivatives by the numbers of one surface.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct SurfaceGradient<R> {
     /// By the curvature.
     pub curvature: R,
@@ -56,6 +56,23 @@ pub struct SurfaceGradient<R> {
     pub semi_diameter: R,
     /// By the coefficients of the GRIN medium behind the surface; zero without one.
     pub grin_terms: [R; PROFILE_TERMS],
+    /// By the numbers of a freeform; those that are missing are zero.
+    pub freeform: Vec<R>,
+}
+
+impl<R: Real> SurfaceGradient<R> {
+    /// All numbers, in a fixed order.
+    fn numbers(&self) -> impl Iterator<Item = R> {
+        let plain = [self.curvature, self.conic, self.thickness, self.index, self.semi_diameter];
+        let fixed = plain.into_iter().chain(self.terms).chain(self.grin_terms);
+        fixed.chain(self.freeform.iter().copied())
+    }
+
+    /// The derivative by a number of a freeform, mutable.
+    pub(super) fn freeform_mut(&mut self, number: usize) -> &mut R {
+        self.freeform.resize(self.freeform.len().max(number + 1), R::ZERO);
+        &mut self.freeform[number]
+    }
 }
 
 /// Derivatives by every number of a system.
@@ -73,18 +90,14 @@ impl<R: Real> SystemGradient<R> {
         Self { index_before: R::ZERO, surfaces: vec![SurfaceGradient::default(); surfaces] }
     }
 
-    /// All numbers, in a fixed order.
+    /// All numbers, in a fixed order, those of a freeform after the others of its surface.
     pub fn numbers(&self) -> impl Iterator<Item = R> {
-        let of = |s: &SurfaceGradient<R>| {
-            let SurfaceGradient { curvature, conic, terms, thickness, index, .. } = *s;
-            let plain = [curvature, conic, thickness, index, s.semi_diameter];
-            plain.into_iter().chain(terms).chain(s.grin_terms)
-        };
-        std::iter::once(self.index_before).chain(self.surfaces.iter().flat_map(of))
+        let surfaces = self.surfaces.iter().flat_map(SurfaceGradient::numbers);
+        std::iter::once(self.index_before).chain(surfaces)
     }
 
     /// The gradient by these numbers in the order of [`SystemGradient::numbers`], for a system of this
-    /// many surfaces; missing numbers are zero.
+    /// many surfaces without freeforms; missing numbers are zero.
     pub fn from_numbers(surfaces: usize, numbers: impl IntoIterator<Item = R>) -> Self {
         let mut numbers = numbers.into_iter();
         let mut next = || numbers.next().unwrap_or_default();
@@ -93,7 +106,17 @@ impl<R: Real> SystemGradient<R> {
             let [curvature, conic, thickness, index, semi_diameter] = [(); 5].map(|()| next());
             let terms = [(); ASPHERE_TERMS].map(|()| next());
             let grin_terms = [(); PROFILE_TERMS].map(|()| next());
-            SurfaceGradient { curvature, conic, terms, thickness, index, semi_diameter, grin_terms }
+            let freeform = Vec::new();
+            SurfaceGradient {
+                curvature,
+                conic,
+                terms,
+                thickness,
+                index,
+                semi_diameter,
+                grin_terms,
+                freeform,
+            }
         };
         Self { index_before, surfaces: (0..surfaces).map(surface).collect() }
     }
@@ -109,6 +132,9 @@ impl<R: Real> SystemGradient<R> {
             to.semi_diameter += from.semi_diameter * factor;
             to.terms.iter_mut().zip(from.terms).for_each(|(t, f)| *t += f * factor);
             to.grin_terms.iter_mut().zip(from.grin_terms).for_each(|(t, f)| *t += f * factor);
+            for (number, by) in from.freeform.iter().enumerate() {
+                *to.freeform_mut(number) += *by * factor;
+            }
         }
     }
 }
@@ -178,6 +204,7 @@ impl<R: Real> GradientSink<R> for SystemGradient<R> {
             SurfaceParameter::Index => surface.index += sum,
             SurfaceParameter::SemiDiameter => surface.semi_diameter += sum,
             SurfaceParameter::GrinTerm(k) => surface.grin_terms[k] += sum,
+            SurfaceParameter::Freeform(k) => *surface.freeform_mut(k) += sum,
         }
     }
 }

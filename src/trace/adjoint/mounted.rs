@@ -1,4 +1,4 @@
-//! The adjoint of a surface that is decentred, tilted or irregular.
+//! The adjoint of a surface that is decentred, tilted, irregular or a freeform.
 //!
 //! The block enters the surface's own frame, is retraced through the surface there, and leaves the
 //! frame in front of it. The derivatives by the state of a ray turn with the frame, because a rotation
@@ -6,13 +6,17 @@
 
 use super::GradientSink;
 use super::block::AdjointBlock;
-use super::refraction::{SagDerivatives, SagRefractionAdjoint, SurfaceNormal, unrefract};
-use crate::lens::Pose;
-use crate::math::{Real, Vec3};
-use crate::trace::Tracer;
+use super::refraction::{
+    RefractionAdjoint, SagDerivatives, SagRefractionAdjoint, SurfaceNormal, unrefract,
+};
+use crate::lens::{ASPHERE_TERMS, BASE_NUMBERS, Pose};
+use crate::math::{Dual, Real, Vec3};
 use crate::trace::batch::BLOCK;
+use crate::trace::deflection::Deflection;
+use crate::trace::freeform::FreeformFace;
 use crate::trace::interface::Interface;
 use crate::trace::mount::Mount;
+use crate::trace::{SurfaceParameter, Tracer};
 
 impl<R: Real> Tracer<R> {
     /// Retraces a block through a surface with a mount to the surface before, and hands over the
@@ -29,12 +33,21 @@ impl<R: Real> Tracer<R> {
         // The gap in front belongs to the frame of the centred vertex.
         let own = Interface { gap: R::ZERO, ..*interface };
         adjoint.enter(&mount.behind);
-        match mount.astigmatism {
-            None => adjoint.retrace_surface(&own, None),
-            Some(q) => adjoint.retrace_irregular(&own, q),
+        let mut columns = Vec::new();
+        match (mount.astigmatism, &mount.face) {
+            (_, Some(face)) => {
+                let ideal = mount.ideal.map(|action| Deflection::new(action, &own));
+                columns = adjoint.retrace_freeform(&own, face, ideal.as_ref());
+            }
+            (None, None) => adjoint.retrace_surface(&own, None),
+            (Some(q), None) => adjoint.retrace_irregular(&own, q),
         }
         adjoint.leave(&mount.pose, interface.gap);
         adjoint.accumulate(interface, i, sink);
+        for (k, lanes) in columns.iter().enumerate() {
+            let lanes = adjoint.mask_lost(lanes);
+            sink.add_lanes(Some(i), SurfaceParameter::Freeform(k), &lanes);
+        }
     }
 }
 
@@ -69,6 +82,152 @@ impl<R: Real> AdjointBlock<R> {
             self.set_shape_derivatives(j, &at.sag, lambda, at.by_slope);
             self.transfer_back(surface, j, p, &at.back, at.by_point - at.normal * lambda);
         }
+    }
+}
+
+/// The inputs of the base of a sag: x and y, then the numbers below.
+const CURVATURE: usize = 2;
+const CONIC: usize = 3;
+const TERMS: usize = 4;
+const OWN: usize = TERMS + ASPHERE_TERMS;
+const INPUTS: usize = OWN + BASE_NUMBERS;
+
+impl<R: Real> AdjointBlock<R> {
+    /// Retraces the block through a freeform. Returns the derivatives by its numbers.
+    fn retrace_freeform(
+        &mut self,
+        surface: &Interface<R>,
+        face: &FreeformFace<R>,
+        ideal: Option<&Deflection<R>>,
+    ) -> Vec<[R; BLOCK]> {
+        let mut columns = vec![[R::ZERO; BLOCK]; face.form.numbers.len()];
+        for j in 0..BLOCK {
+            if self.block.code[j] > R::ZERO {
+                continue;
+            }
+            let (p, behind) = self.block.state(j);
+            let sag = FreeformSlopes::new(surface, face, p);
+            let vector = Vec3::new(-sag.gradient[0], -sag.gradient[1], R::ONE);
+            let normal = SurfaceNormal { vector, m: vector.dot(vector), unit: false };
+            let deflected = ideal.map(|ideal| {
+                DeflectionAdjoint::new(ideal, (p, behind, vector), self.by_k(j), self.by_opl[j])
+            });
+            let back = match &deflected {
+                Some(deflected) => deflected.back,
+                None => unrefract(surface, normal, behind, self.by_k(j)),
+            };
+            let n = back.by_normal;
+            let [[xx, xy], [yx, yy]] = sag.bends;
+            let bent = Vec3::new(xx * n.x + xy * n.y, yx * n.x + yy * n.y, R::ZERO);
+            let by_rule = deflected.map_or(Vec3::default(), |deflected| deflected.by_point);
+            let by_point = self.by_point(j) + by_rule - bent;
+            let lambda = (by_point.dot(back.k) + self.by_opl[j] * surface.n2) / back.a;
+            let weights = [lambda, -n.x, -n.y];
+            self.set_base_derivatives(j, &sag, weights, &mut columns);
+            face.form.visit_series(p.x, p.y, |k, by| columns[k][j] = dot3(weights, by));
+            self.transfer_back(surface, j, p, &back, by_point - vector * lambda);
+            if let Some(deflected) = deflected {
+                self.by_index_before[j] += deflected.by_indices[0];
+                self.by_index_behind[j] += deflected.by_indices[1];
+            }
+        }
+        columns
+    }
+
+    /// Sets the derivatives by the numbers of the base, from those by the sag and its gradient.
+    fn set_base_derivatives(
+        &mut self,
+        j: usize,
+        sag: &FreeformSlopes<R>,
+        weights: [R; 3],
+        columns: &mut [[R; BLOCK]],
+    ) {
+        let by = |input: usize| dot3(weights, sag.base.map(|of| of.slope[input]));
+        (self.by_curvature[j], self.by_conic[j]) = (by(CURVATURE), by(CONIC));
+        for (term, lanes) in self.by_terms.iter_mut().enumerate() {
+            lanes[j] = by(TERMS + term);
+        }
+        for (k, lanes) in columns.iter_mut().take(BASE_NUMBERS).enumerate() {
+            lanes[j] = by(OWN + k);
+        }
+    }
+}
+
+fn dot3<R: Real>(a: [R; 3], b: [R; 3]) -> R {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+/// The adjoint of a deflection by a rule.
+#[derive(Clone, Copy)]
+struct DeflectionAdjoint<R> {
+    back: RefractionAdjoint<R>,
+    by_point: Vec3<R>,
+    /// By the indices in front and behind.
+    by_indices: [R; 2],
+}
+
+impl<R: Real> DeflectionAdjoint<R> {
+    /// From the point, the direction behind and the normal, and the derivatives by that direction and
+    /// by the optical path.
+    fn new(
+        ideal: &Deflection<R>,
+        (point, behind, normal): (Vec3<R>, Vec3<R>, Vec3<R>),
+        by_behind: Vec3<R>,
+        by_opl: R,
+    ) -> Self {
+        let k = ideal.undeflect(point, behind, normal);
+        let input = Dual::<R, 11>::variable;
+        let vector = |v: Vec3<R>, first: usize| {
+            Vec3::new(input(v.x, first), input(v.y, first + 1), input(v.z, first + 2))
+        };
+        let varied = Deflection {
+            action: ideal.action.map(Dual::constant),
+            sense: Dual::constant(ideal.sense),
+            mirror: ideal.mirror,
+            before: input(ideal.before, 9),
+            behind: input(ideal.behind, 10),
+        };
+        let (at, along) = (vector(point, 0), vector(k, 3));
+        let there = varied.deflect(at, along, vector(normal, 6));
+        let path = varied.path(at, along);
+        let by = |i: usize| {
+            let slope = Vec3::new(there.x.slope[i], there.y.slope[i], there.z.slope[i]);
+            by_behind.dot(slope) + by_opl * path.slope[i]
+        };
+        let by_vector = |first: usize| Vec3::new(by(first), by(first + 1), by(first + 2));
+        let (a, by_dn2) = (k.dot(normal), R::ZERO);
+        let back = RefractionAdjoint { k, a, by_k: by_vector(3), by_normal: by_vector(6), by_dn2 };
+        Self { back, by_point: by_vector(0), by_indices: [by(9), by(10)] }
+    }
+}
+
+/// The gradient of a freeform at a point, its derivatives by the point, and those of the base by all
+/// its numbers.
+struct FreeformSlopes<R> {
+    gradient: [R; 2],
+    bends: [[R; 2]; 2],
+    base: [Dual<R, INPUTS>; 3],
+}
+
+impl<R: Real> FreeformSlopes<R> {
+    fn new(surface: &Interface<R>, face: &FreeformFace<R>, p: Vec3<R>) -> Self {
+        let input = Dual::<R, INPUTS>::variable;
+        let mut base = face.base(surface).map(Dual::constant);
+        base.curvature = input(base.curvature.value, CURVATURE);
+        base.conic = input(base.conic.value, CONIC);
+        base.terms = std::array::from_fn(|i| input(base.terms[i].value, TERMS + i));
+        base.own = std::array::from_fn(|i| input(base.own[i].value, OWN + i));
+        let base = base.sag(input(p.x, 0), input(p.y, 1));
+        let (x, y) = (Dual::<R, 2>::variable(p.x, 0), Dual::<R, 2>::variable(p.y, 1));
+        let [_, by_x, by_y] = face.form.series_sag(x, y, Dual::constant);
+        let twice = face.astigmatism + face.astigmatism;
+        let bend = |base: &Dual<R, INPUTS>, series: Dual<R, 2>| {
+            [base.slope[0] + series.slope[0], base.slope[1] + series.slope[1]]
+        };
+        let (along_x, mut along_y) = (bend(&base[1], by_x), bend(&base[2], by_y));
+        along_y[1] += twice;
+        let gradient = [base[1].value + by_x.value, base[2].value + by_y.value + twice * p.y];
+        Self { gradient, bends: [along_x, along_y], base }
     }
 }
 

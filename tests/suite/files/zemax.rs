@@ -3,8 +3,8 @@
 use super::foreign;
 use aplanat::files::{self, ConversionOutcome, ConversionReport, FileError, OpenedLens};
 use aplanat::lens::{
-    Aperture, FieldKind, GradientIndex, Lens, Medium, Object, Parameter, Pickup, ProfileLaw,
-    Quantity, Variable,
+    Aperture, FieldKind, FreeformKind, GradientIndex, Lens, Medium, Object, Parameter, Pickup,
+    ProfileLaw, Quantity, Variable,
 };
 
 fn achromat() -> String {
@@ -417,7 +417,7 @@ fn coefficients_of_a_gradient_have_the_unit_of_their_power() {
 }
 
 #[test]
-fn odd_powers_of_the_height_are_locked_with_their_line() {
+fn odd_powers_of_the_height_are_read_as_they_are() {
     let with = |parameter: usize| {
         let lines = format!("  TYPE ODDASPHE\r\n  PARM {parameter} 1e-5");
         let text = achromat().replacen("  TYPE STANDARD", "  TYPE REPLACED", 2);
@@ -427,10 +427,10 @@ fn odd_powers_of_the_height_are_locked_with_their_line() {
     for power in [1, 3, 5, 7] {
         let opened = with(power).unwrap();
         let report = opened.report.unwrap();
-        let (outcome, note) = outcome(&report, "TYPE ODDASPHE");
-        assert_eq!(outcome, ConversionOutcome::Locked);
-        assert!(note.contains(&format!("a term in r^{power}")), "{note}");
-        assert_eq!(opened.lens.surfaces[0].locked.as_ref().unwrap().kind, "ODDASPHE");
+        assert_eq!(outcome(&report, "TYPE ODDASPHE").0, ConversionOutcome::Used);
+        let form = opened.lens.surfaces[0].freeform.as_ref().unwrap();
+        assert_eq!((form.kind, form.numbers.len()), (FreeformKind::OddAsphere, power));
+        assert_eq!(form.numbers[power - 1], 1e-5);
     }
     assert_eq!(with(4).unwrap().lens.surfaces[0].asphere, [1e-5]);
     assert_eq!(with(8).unwrap().lens.surfaces[0].asphere, [0.0, 0.0, 1e-5]);

@@ -389,7 +389,7 @@ fn grin_lens_the_plan_keeps_its_tolerance() {
         }
         // A gap in two halves has other steps: what differs is their error.
         let whole = tracer.trace(ray(0.5, 0.8, 0.02, -0.05));
-        let first = system.surfaces[0];
+        let first = system.surfaces[0].clone();
         let half = Surface {
             shape: aplanat::lens::Shape::Plane,
             thickness: 0.5 * first.thickness,

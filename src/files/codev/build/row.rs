@@ -1,10 +1,11 @@
 //! The surfaces between object and image, and their place on the axis.
 
 use super::glass;
-use crate::files::codev::file::{CodeVFile, CodeVSurface, PickupCommand, Placement};
+use crate::files::codev::file::{CodeVFile, CodeVProfile, CodeVSurface, PickupCommand, Placement};
 use crate::files::report::{ConversionOutcome, ConversionReport};
 use crate::lens::{
-    ASPHERE_TERMS, AxisBreak, Lens, LockedSurface, Parameter, Pickup, Pose, Quantity, Row, Variable,
+    ASPHERE_TERMS, AxisBreak, BASE_NUMBERS, Freeform, FreeformKind, Lens, LockedSurface, Parameter,
+    Pickup, Pose, Quantity, Row, Variable,
 };
 use crate::math::Vec3;
 
@@ -59,10 +60,13 @@ fn row(file: &CodeVFile, number: usize, radii: bool, report: &mut ConversionRepo
         Some(name) if surface.label.is_empty() => format!("glass {name} is not known"),
         _ => surface.label.clone(),
     };
+    let form = freeform(surface);
+    let is_toroid = form.as_ref().is_some_and(|form| form.kind == FreeformKind::Toroid);
     Row {
         curvature: bend / unit,
         conic: surface.conic,
-        asphere: asphere(surface, unit, report),
+        asphere: if is_toroid { Vec::new() } else { asphere(surface, unit, report) },
+        freeform: form.map(|form| form.scaled(unit)),
         thickness: surface.thickness * unit,
         medium: imported.medium,
         semi_diameter: clip(surface).map(|radius| radius * unit),
@@ -71,6 +75,24 @@ fn row(file: &CodeVFile, number: usize, radii: bool, report: &mut ConversionRepo
         comment,
         ..Row::default()
     }
+}
+
+/// The form that is none of revolution, in the unit of the file. The coefficients of a toroid are those of
+/// its curve.
+fn freeform(surface: &CodeVSurface) -> Option<Freeform<f64>> {
+    let profile = surface.profile.filter(|_| surface.locked.is_none())?;
+    Some(match profile {
+        CodeVProfile::Biconic => {
+            let numbers = vec![surface.across, surface.conic_across];
+            Freeform { kind: FreeformKind::Biconic, numbers }
+        }
+        CodeVProfile::Toroid => {
+            let used = surface.terms.iter().rposition(|a| *a != 0.0).map_or(0, |last| last + 1);
+            let terms = &surface.terms[..used.min(BASE_NUMBERS - 2)];
+            let numbers = [surface.across, 0.0].into_iter().chain(terms.iter().copied()).collect();
+            Freeform { kind: FreeformKind::Toroid, numbers }
+        }
+    })
 }
 
 /// The coefficients up to r¹⁶.

@@ -18,6 +18,7 @@ use crate::lens::{
 pub fn write(lens: &Lens) -> Result<(String, ConversionReport), LensError> {
     lens.check()?;
     let unplaced = lens.surfaces.iter().position(|row| surface::place(row).is_none());
+    let unplaced = unplaced.or(lens.surfaces.iter().position(surface::has_no_form));
     if let Some(surface) = unplaced {
         let (what, hint) = ("the export as .seq", "; expected .zmx or the native format (.json)");
         return Err(SystemError::Posed { surface: surface.into(), what, hint }.into());

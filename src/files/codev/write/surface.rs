@@ -4,7 +4,9 @@ use super::{CodeVWriter, number, quoted};
 use crate::files::report::ConversionOutcome;
 use crate::files::zemax::is_general;
 use crate::lens::glass::{self, Glass};
-use crate::lens::{Aperture, AxisBreak, Medium, MediumPlace, Quantity, Row, SurfaceNumber};
+use crate::lens::{
+    Aperture, AxisBreak, FreeformKind, Medium, MediumPlace, Quantity, Row, SurfaceNumber,
+};
 
 /// Decentre and tilt of a surface, and the word that says what they move.
 type Place = Option<(AxisBreak, &'static str)>;
@@ -71,6 +73,10 @@ impl CodeVWriter {
     }
 
     fn form(&mut self, row: &Row) {
+        if let Some(lines) = form_lines(row) {
+            lines.into_iter().for_each(|line| self.line(format!("  {line}")));
+            return;
+        }
         let aspheric = row.asphere.iter().any(|a| *a != 0.0);
         if aspheric || row.conic != 0.0 {
             self.line(if aspheric { "  ASP" } else { "  CON" });
@@ -161,6 +167,38 @@ impl CodeVWriter {
             self.line(format!("'INDEX{}' {index} {index} {index}", i + 1));
         }
         self.line("END");
+    }
+}
+
+/// True for a freeform or an ideal element that the format does not have.
+pub(super) fn has_no_form(row: &Row) -> bool {
+    (row.freeform.is_some() || row.ideal.is_some()) && form_lines(row).is_none()
+}
+
+/// The lines of a form that is none of revolution; `None` for another one, and for what the format does not
+/// have.
+fn form_lines(row: &Row) -> Option<Vec<String>> {
+    let form = row.freeform.as_ref().filter(|_| row.ideal.is_none())?;
+    if row.asphere.iter().any(|a| *a != 0.0) {
+        return None;
+    }
+    let conic = number(row.conic);
+    match (form.kind, &form.numbers[..]) {
+        (FreeformKind::Biconic, [bend, across]) => Some(vec![
+            "AAS".to_owned(),
+            format!("CUX {}", number(*bend)),
+            format!("KY {conic}"),
+            format!("KX {}", number(*across)),
+        ]),
+        (FreeformKind::Toroid, [bend, terms @ ..])
+            if terms.first().is_none_or(|square| *square == 0.0) =>
+        {
+            let head = ["YTO".to_owned(), format!("CUX {}", number(*bend)), format!("K {conic}")];
+            let letters = "ABCDEFG".chars().zip(terms.iter().skip(1));
+            let terms = letters.map(|(letter, a)| format!("{letter} {}", number(*a)));
+            Some(head.into_iter().chain(terms).collect())
+        }
+        _ => None,
     }
 }
 

@@ -30,6 +30,8 @@ pub(super) fn row(
         curvature: form.curvature / unit,
         conic: form.conic,
         asphere: scaled.collect(),
+        freeform: form.freeform.map(|form| form.scaled(unit)),
+        ideal: form.ideal.map(|ideal| ideal.scaled(unit)),
         thickness: thickness(file, planned)? * unit,
         medium,
         semi_diameter: semi_diameter(file, number, stop, report).map(|radius| radius * unit),

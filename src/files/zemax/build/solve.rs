@@ -2,6 +2,7 @@
 
 use crate::files::report::{ConversionOutcome, ConversionReport};
 use crate::files::zemax::file::{CurvatureSolve, PickupLine, ZemaxFile, ZemaxSurface};
+use crate::files::zemax::freeform;
 use crate::files::zemax::gradient;
 use crate::files::zemax::row_plan::RowPlan;
 use crate::lens::{Lens, Parameter, Pickup, Quantity, Variable};
@@ -109,6 +110,10 @@ fn terms(surface: &ZemaxSurface, row: usize, lens: &mut Lens, report: &mut Conve
     for &(index, line) in &surface.variable_parameters {
         if surface.kind.0 == "EVENASPH" && (2..=8).contains(&index) {
             add_variable(lens, row, Quantity::Asphere(index - 2));
+        } else if let Some(number) = freeform::varied_number(&surface.kind.0, index)
+            .filter(|number| lens.get(Parameter::new(row, Quantity::Freeform(*number))).is_some())
+        {
+            add_variable(lens, row, Quantity::Freeform(number));
         } else if let Some(quantity) = gradient::variable_quantity(&surface.kind.0, index) {
             add_variable(lens, row, quantity);
         } else {

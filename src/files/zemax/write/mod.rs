@@ -11,8 +11,10 @@ mod table;
 use crate::files::report::{ConversionOutcome, ConversionReport};
 use crate::files::text::{number, numbers};
 use crate::files::zemax::INFINITE_GAP;
+use crate::files::zemax::freeform::{self, FormLines};
 use crate::lens::{
-    Lens, LensError, Parameter, Pickup, Quantity, SurfaceNumber, Variable, ZoomThickness,
+    Lens, LensError, Parameter, Pickup, Quantity, Row, SurfaceNumber, SystemError, Variable,
+    ZoomThickness,
 };
 use place::{FileNumbers, RowBreaks, file_numbers, row_breaks};
 
@@ -23,6 +25,12 @@ use place::{FileNumbers, RowBreaks, file_numbers, row_breaks};
 pub fn write(lens: &Lens) -> Result<(String, ConversionReport), LensError> {
     lens.check()?;
     check_thicknesses(lens)?;
+    let special = |row: &Row| row.freeform.is_some() || row.ideal.is_some();
+    let lost = |row: &Row| special(row) && freeform::row_lines(row).is_none();
+    if let Some(surface) = lens.surfaces.iter().position(lost) {
+        let (what, hint) = ("the export as .zmx", "; expected the native format (.json)");
+        return Err(SystemError::Posed { surface: surface.into(), what, hint }.into());
+    }
     let breaks = row_breaks(lens);
     let mut export = ZemaxWriter {
         lens: lens.with_pickups()?,
@@ -170,6 +178,7 @@ impl ZemaxWriter {
             self.record(ConversionOutcome::Used, format!("{obstructing} obstructions"), note);
         }
         for (i, row) in lens.surfaces.iter().enumerate() {
+            self.report_freeform(i, row);
             if let Some(locked) = &row.locked {
                 let what = format!("surface {}: {}", SurfaceNumber::new(i), locked.kind);
                 let note = "written back with the lines of its file; rays meet its conic here";
@@ -188,17 +197,42 @@ impl ZemaxWriter {
         }
     }
 
+    /// Records the convention of a freeform.
+    fn report_freeform(&mut self, i: usize, row: &Row) {
+        let Some(form) = row.freeform.as_ref().filter(|_| row.ideal.is_none()) else { return };
+        let Some(lines) = freeform::form_lines(row, form) else { return };
+        let what = format!("surface {}: {}", SurfaceNumber::new(i), form.kind.name());
+        if lines.kind.ends_with("ZERNSAG") {
+            let note =
+                "the order and the sign of the angle are those that the other program prints";
+            self.record(ConversionOutcome::Used, what, note);
+        }
+    }
+
     /// Records what a variable loses.
     fn report_variable(&mut self, variable: &Variable) {
         let is_bounded = variable.min.is_some() || variable.max.is_some();
         let has_both_bounds = variable.min.is_some() && variable.max.is_some();
         let note = match variable.parameter.quantity {
             Quantity::SemiDiameter => "semi-diameters cannot be variables there",
+            Quantity::Freeform(k) if !self.is_varied_there(variable.parameter.surface, k) => {
+                "this number cannot be a variable in the file"
+            }
             Quantity::Thickness if has_both_bounds => return,
             _ if is_bounded => "its bounds; it remains a variable",
             _ => return,
         };
         self.record(ConversionOutcome::Dropped, format!("variable: {}", variable.parameter), note);
+    }
+
+    fn is_varied_there(&self, surface: usize, number: usize) -> bool {
+        let row = &self.lens.surfaces[surface];
+        let lines = row.freeform.as_ref().and_then(|form| freeform::form_lines(row, form));
+        let varies = |lines: FormLines| {
+            let mut parameters = lines.parameters.iter();
+            parameters.any(|(i, _)| freeform::varied_number(lines.kind, *i) == Some(number))
+        };
+        lines.is_some_and(varies)
     }
 
     /// Records a pickup that the format does not know.

@@ -2,6 +2,7 @@
 
 use super::{ZemaxWriter, number, numbers, one_line};
 use crate::files::report::ConversionOutcome;
+use crate::files::zemax::freeform::{self, FormLines};
 use crate::files::zemax::glass as zemax_glass;
 use crate::files::zemax::gradient;
 use crate::lens::glass;
@@ -48,12 +49,14 @@ impl ZemaxWriter {
             self.surface_line("STOP");
         }
         let aspheric = row.asphere.iter().any(|a| *a != 0.0);
-        let graded = self.gradient(i, aspheric);
-        self.surface_line(match (&row.locked, aspheric, graded.is_some()) {
+        let form = freeform::row_lines(&row);
+        let graded = self.gradient(i, aspheric || form.is_some());
+        self.surface_line(match (&row.locked, &form, aspheric, graded.is_some()) {
             (Some(locked), ..) => format!("TYPE {}", locked.kind),
-            (None, true, _) => "TYPE EVENASPH".to_owned(),
-            (None, false, true) => format!("TYPE {}", gradient::KIND),
-            (None, false, false) => "TYPE STANDARD".to_owned(),
+            (None, Some(form), ..) => format!("TYPE {}", form.kind),
+            (None, None, true, _) => "TYPE EVENASPH".to_owned(),
+            (None, None, false, true) => format!("TYPE {}", gradient::KIND),
+            (None, None, false, false) => "TYPE STANDARD".to_owned(),
         });
         if !row.comment.is_empty() {
             self.surface_line(format!("COMM {}", one_line(&row.comment)));
@@ -67,6 +70,8 @@ impl ZemaxWriter {
         }
         if let Some(locked) = &row.locked {
             self.locked_lines(i, locked);
+        } else if let Some(form) = &form {
+            self.form_lines(i, form);
         } else if aspheric {
             self.terms(i, &row.asphere);
         }
@@ -100,6 +105,22 @@ impl ZemaxWriter {
         };
         for line in locked.lines.iter().filter(parameters) {
             self.surface_line(line);
+        }
+    }
+
+    /// The parameters and the extra data of a freeform, then the parameters that vary.
+    fn form_lines(&mut self, i: usize, form: &FormLines) {
+        for (parameter, value) in &form.parameters {
+            self.surface_line(format!("PARM {parameter} {}", number(*value)));
+        }
+        for (place, value) in form.extra.iter().enumerate() {
+            self.surface_line(format!("XDAT {} {} 0 0 1 0 0", place + 1, number(*value)));
+        }
+        for (parameter, _) in &form.parameters {
+            let varied = freeform::varied_number(form.kind, *parameter);
+            if varied.is_some_and(|k| self.is_variable(i, Quantity::Freeform(k))) {
+                self.surface_line(format!("VPAR {parameter}"));
+            }
         }
     }
 

@@ -78,7 +78,9 @@ impl DraftParameter {
                 surface.asphere.get(term).copied().unwrap_or(0.0)
             }
             SurfaceParameter::Index => model(&draft.lens, row).0,
-            SurfaceParameter::SemiDiameter | SurfaceParameter::GrinTerm(_) => 0.0,
+            SurfaceParameter::SemiDiameter
+            | SurfaceParameter::GrinTerm(_)
+            | SurfaceParameter::Freeform(_) => 0.0,
         }
     }
 
@@ -107,7 +109,9 @@ impl DraftParameter {
                 surface.asphere[term] = value;
             }
             SurfaceParameter::Index => surface.medium = Medium::Model { nd: value, vd },
-            SurfaceParameter::SemiDiameter | SurfaceParameter::GrinTerm(_) => {}
+            SurfaceParameter::SemiDiameter
+            | SurfaceParameter::GrinTerm(_)
+            | SurfaceParameter::Freeform(_) => {}
         }
     }
 

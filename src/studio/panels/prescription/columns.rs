@@ -139,6 +139,7 @@ pub(super) fn parameter_name(parameter: Parameter) -> String {
         Quantity::Index => "Index",
         Quantity::Grin(term) => TableColumn::Grin(term).title(),
         Quantity::Asphere(term) => TableColumn::Asphere(term).title(),
+        Quantity::Freeform(number) => &format!("Freeform number {}", number + 1),
     };
     format!("{what} of surface {}", parameter.surface + 1)
 }

@@ -1,0 +1,261 @@
+//! The surface types that are freeforms: reading, and writing with the same parameters.
+//!
+//! | type | parameters | extra data |
+//! |---|---|---|
+//! | `ODDASPHE` | 1 to 8: r to r⁸ | |
+//! | `XOSPHERE` | | 1 count, 2 unit R, then (r/R)^k |
+//! | `BICONICX` | 1 radius in x, 0 for flat; 2 conic constant in x | |
+//! | `TOROIDAL` | 1 radius of rotation, 0 for a cylinder; 2 to 8: y² to y¹⁴ | 1 count of Zernike terms |
+//! | `XPOLYNOM` | | 1 count, 2 unit R, then x, y, x², xy, … |
+//! | `PARAXIAL` | 1 focal length; 2 mode of the optical path | |
+//! | `DGRATING` | 1 lines per µm; 2 order | |
+//! | `SZERNSAG`, `FZERNSAG` | 0 continued beyond R; 1 to 8: r² to r¹⁶ | 1 count, 2 radius R, then terms |
+
+use super::file::ZemaxSurface;
+use super::shape::ZemaxShape;
+use crate::files::report::ConversionOutcome;
+use crate::lens::{Freeform, FreeformKind, IdealElement, Row};
+
+/// The freeform of a surface of a type that is none of revolution; `None` for another type.
+pub(super) fn surface_form(surface: &ZemaxSurface) -> Option<Result<ZemaxShape, String>> {
+    let base = ZemaxShape::base(surface);
+    let form = match surface.kind.0.as_str() {
+        "PARAXIAL" | "DGRATING" => return Some(ideal(base, surface)),
+        "BICONICX" => return Some(Ok(biconic(base, surface))),
+        "TOROIDAL" => toroid(surface),
+        "XPOLYNOM" => polynomial(surface),
+        "SZERNSAG" | "FZERNSAG" => return Some(zernike(&base, surface)),
+        _ => return None,
+    };
+    Some(form.map(|form| ZemaxShape { freeform: Some(form), ..base }))
+}
+
+/// A paraxial lens or a grating.
+fn ideal(base: ZemaxShape, surface: &ZemaxSurface) -> Result<ZemaxShape, String> {
+    let (first, second) = (parameter(surface, 1), parameter(surface, 2));
+    if surface.kind.0 == "DGRATING" {
+        let ideal = IdealElement::Grating { lines_per_mm: 1e3 * first, order: second };
+        return Ok(ZemaxShape { ideal: Some(ideal), ..base });
+    }
+    if base.curvature != 0.0 || first == 0.0 {
+        return Err(format!("the focal length {first} and the curvature {}", base.curvature));
+    }
+    let note = "its optical path is that of a plane wave in front of it";
+    let note = Some((surface.kind.1, ConversionOutcome::Used, note.to_owned()));
+    let ideal = Some(IdealElement::Lens { focal_length: first });
+    Ok(ZemaxShape { conic: 0.0, ideal, note, ..base })
+}
+
+fn parameter(surface: &ZemaxSurface, index: usize) -> f64 {
+    let found = surface.parameters.iter().rfind(|(i, ..)| *i == index);
+    found.map_or(0.0, |(_, value, _)| *value)
+}
+
+fn extra(surface: &ZemaxSurface, index: usize) -> f64 {
+    let found = surface.extra.iter().rfind(|(i, ..)| *i == index);
+    found.map_or(0.0, |(_, value, _)| *value)
+}
+
+/// The terms of the extra data, as many as count, without zeros at the end; `unit` is the radius R.
+fn extra_terms(surface: &ZemaxSurface) -> Result<(f64, Vec<f64>), String> {
+    let (count, unit) = (extra(surface, 1), extra(surface, 2));
+    let mut terms: Vec<f64> =
+        (3..1_003).take_while(|i| (*i - 2) as f64 <= count).map(|i| extra(surface, i)).collect();
+    trim(&mut terms);
+    if terms.iter().any(|a| !a.is_finite()) || !(unit > 0.0 && unit.is_finite()) {
+        return Err(format!("the normalization radius {unit}"));
+    }
+    Ok((unit, terms))
+}
+
+fn trim(terms: &mut Vec<f64>) {
+    let used = terms.iter().rposition(|a| *a != 0.0).map_or(0, |last| last + 1);
+    terms.truncate(used);
+}
+
+fn reciprocal(radius: f64) -> f64 {
+    if radius == 0.0 { 0.0 } else { radius.recip() }
+}
+
+/// A form, if the numbers can be traced.
+fn checked(kind: FreeformKind, numbers: Vec<f64>) -> Result<Freeform<f64>, String> {
+    let form = Freeform { kind, numbers };
+    form.fault().map_or(Ok(form), Err)
+}
+
+/// A biconic; a surface that is round is a conic.
+fn biconic(base: ZemaxShape, surface: &ZemaxSurface) -> ZemaxShape {
+    let curvature = reciprocal(parameter(surface, 1));
+    let conic = parameter(surface, 2);
+    let round = (curvature - base.curvature).abs() <= 1e-15 * curvature.abs()
+        && (conic == base.conic || curvature == 0.0);
+    let form = Freeform { kind: FreeformKind::Biconic, numbers: vec![curvature, conic] };
+    ZemaxShape { freeform: (!round).then_some(form), ..base }
+}
+
+fn toroid(surface: &ZemaxSurface) -> Result<Freeform<f64>, String> {
+    let zernike = extra_terms(surface).is_ok_and(|(_, terms)| !terms.is_empty());
+    if zernike {
+        return Err("Zernike terms".to_owned());
+    }
+    let mut terms: Vec<f64> = (2..=8).map(|i| parameter(surface, i)).collect();
+    trim(&mut terms);
+    terms.insert(0, reciprocal(parameter(surface, 1)));
+    checked(FreeformKind::Toroid, terms)
+}
+
+fn polynomial(surface: &ZemaxSurface) -> Result<Freeform<f64>, String> {
+    let (radius, terms) = extra_terms(surface)?;
+    checked(FreeformKind::XyPolynomial { radius }, terms)
+}
+
+/// A Zernike sag; its term in r² is split exactly between the focus and the piston.
+fn zernike(base: &ZemaxShape, surface: &ZemaxSurface) -> Result<ZemaxShape, String> {
+    let (radius, mut terms) = extra_terms(surface)?;
+    let decenters = [9, 10].map(|i| parameter(surface, i));
+    if decenters != [0.0; 2] {
+        return Err("decentred Zernike terms".to_owned());
+    }
+    let is_standard = surface.kind.0 == "SZERNSAG";
+    let square = parameter(surface, 1) * radius * radius;
+    if square != 0.0 {
+        terms.resize(terms.len().max(4), 0.0);
+        let focus = if is_standard { 3.0_f64.sqrt() } else { 1.0 };
+        // ρ² = (Z₄/√3 + 1)/2, without the root in the fringe order.
+        terms[3] += 0.5 * square / focus;
+        terms[0] += 0.5 * square;
+    }
+    let kind = if is_standard {
+        FreeformKind::Zernike { radius }
+    } else {
+        FreeformKind::FringeZernike { radius }
+    };
+    let mut asphere: Vec<f64> = (2..=8).map(|i| parameter(surface, i)).collect();
+    trim(&mut asphere);
+    let note = "the Zernike terms continue beyond their normalization radius here";
+    let note = (parameter(surface, 0) == 0.0)
+        .then(|| (surface.kind.1, ConversionOutcome::Used, note.to_owned()));
+    Ok(ZemaxShape { asphere, freeform: Some(checked(kind, terms)?), note, ..*base })
+}
+
+/// A conic with powers of r that are no even ones up to r¹⁶ alone; each term has its power, its
+/// coefficient and its line.
+pub(super) fn odd_asphere(terms: &[(usize, f64, usize)]) -> Result<Freeform<f64>, String> {
+    let most = FreeformKind::OddAsphere.counts()[1];
+    let mut numbers = Vec::new();
+    for &(power, value, line) in terms.iter().filter(|(_, value, _)| *value != 0.0) {
+        if power == 0 || power > most {
+            return Err(format!("a term in r^{power} (line {line})"));
+        }
+        numbers.resize(numbers.len().max(power), 0.0);
+        numbers[power - 1] += value;
+    }
+    checked(FreeformKind::OddAsphere, numbers)
+}
+
+/// The lines of a freeform: its type, then its parameters and extra data.
+pub(super) struct FormLines {
+    /// The name of the type.
+    pub(super) kind: &'static str,
+    /// The parameters, each with its number.
+    pub(super) parameters: Vec<(usize, f64)>,
+    /// The extra data, from the first on.
+    pub(super) extra: Vec<f64>,
+}
+
+/// The lines for the form of a row; `None` if the format has no such surface.
+pub(super) fn form_lines(row: &Row, form: &Freeform<f64>) -> Option<FormLines> {
+    let plain = row.asphere.iter().all(|a| *a == 0.0);
+    let lines = |kind, parameters, extra| Some(FormLines { kind, parameters, extra });
+    let normalised = |radius: f64| {
+        let head = [form.numbers.len() as f64, radius];
+        head.into_iter().chain(form.numbers.iter().copied()).collect::<Vec<f64>>()
+    };
+    let numbered = |first: usize, numbers: &[f64]| -> Vec<(usize, f64)> {
+        (first..).zip(numbers.iter().copied()).collect()
+    };
+    match form.kind {
+        FreeformKind::OddAsphere => {
+            let powers = merged_powers(row, form);
+            if powers.len() <= 8 {
+                return lines("ODDASPHE", numbered(1, &powers), Vec::new());
+            }
+            let head = [powers.len() as f64, 1.0];
+            lines("XOSPHERE", Vec::new(), head.into_iter().chain(powers).collect())
+        }
+        FreeformKind::Biconic if plain => {
+            let numbers = [reciprocal(form.numbers[0]), form.numbers[1]];
+            lines("BICONICX", numbered(1, &numbers), Vec::new())
+        }
+        FreeformKind::Toroid if plain => {
+            let mut numbers = form.numbers.clone();
+            numbers[0] = reciprocal(numbers[0]);
+            lines("TOROIDAL", numbered(1, &numbers), Vec::new())
+        }
+        FreeformKind::XyPolynomial { radius } if plain => {
+            lines("XPOLYNOM", Vec::new(), normalised(radius))
+        }
+        FreeformKind::Zernike { radius } => {
+            lines("SZERNSAG", zernike_parameters(row), normalised(radius))
+        }
+        FreeformKind::FringeZernike { radius } => {
+            lines("FZERNSAG", zernike_parameters(row), normalised(radius))
+        }
+        _ => None,
+    }
+}
+
+/// The lines of a paraxial lens or a grating; `None` for a grating on a surface that is no conic.
+pub(super) fn ideal_lines(row: &Row, ideal: IdealElement) -> Option<FormLines> {
+    let extra = Vec::new();
+    match ideal {
+        IdealElement::Lens { focal_length } => {
+            let parameters = vec![(1, focal_length), (2, 0.0)];
+            Some(FormLines { kind: "PARAXIAL", parameters, extra })
+        }
+        IdealElement::Grating { lines_per_mm, order } => {
+            let conic = row.freeform.is_none() && row.asphere.iter().all(|a| *a == 0.0);
+            let parameters = vec![(1, 1e-3 * lines_per_mm), (2, order)];
+            conic.then_some(FormLines { kind: "DGRATING", parameters, extra })
+        }
+    }
+}
+
+/// The lines of a row of a type of its own; `None` for a conic with even powers, and for what the format
+/// does not have.
+pub(super) fn row_lines(row: &Row) -> Option<FormLines> {
+    match (row.ideal, &row.freeform) {
+        (Some(ideal), _) => ideal_lines(row, ideal),
+        (None, Some(form)) => form_lines(row, form),
+        (None, None) => None,
+    }
+}
+
+/// The terms continue beyond the radius; the powers begin with r⁴.
+fn zernike_parameters(row: &Row) -> Vec<(usize, f64)> {
+    let powers = row.asphere.iter().enumerate().map(|(term, a)| (term + 2, *a));
+    std::iter::once((0, 1.0)).chain(powers).collect()
+}
+
+/// All powers of r beside the conic, from the first on.
+fn merged_powers(row: &Row, form: &Freeform<f64>) -> Vec<f64> {
+    let mut powers = form.numbers.clone();
+    for (term, a) in row.asphere.iter().enumerate().filter(|(_, a)| **a != 0.0) {
+        powers.resize(powers.len().max(2 * term + 4), 0.0);
+        powers[2 * term + 3] += a;
+    }
+    trim(&mut powers);
+    powers
+}
+
+/// The number of a freeform that a parameter is.
+pub(super) fn varied_number(kind: &str, index: usize) -> Option<usize> {
+    // The first parameter of these is a radius, of which a curvature is no linear function.
+    let (first, last) = match kind {
+        "ODDASPHE" => (1, 8),
+        "BICONICX" => (2, 2),
+        "TOROIDAL" => (2, 8),
+        _ => return None,
+    };
+    (first..=last).contains(&index).then(|| index - 1)
+}

@@ -1,0 +1,274 @@
+//! Forms of the sag that are no conic with even powers of the distance from the axis.
+//!
+//! Every form is one formula, written once over [`Arithmetic`]: it gives the sag and its gradient for
+//! numbers, second derivatives and derivatives by the coefficients for dual numbers, and bounds for
+//! intervals, by which a ray finds its first crossing. The sag is a base, `z = c r²/(1 + √(1 − (1+κ)
+//! c² r²)) + Σ aⱼ r^(2j+4)` or the biconic or toroid in place of the conic, plus a series of terms
+//! that are linear in their coefficients. A further form is a base or a series more, nothing else.
+
+mod base;
+mod series;
+
+pub use base::{BASE_NUMBERS, BaseSag};
+
+use super::{ASPHERE_TERMS, Shape};
+use crate::math::{Arithmetic, Dual, Real};
+use serde::{Deserialize, Serialize};
+
+/// The largest number of coefficients of a form: all terms up to the tenth degree.
+pub const FREEFORM_NUMBERS: usize = 66;
+
+/// The kind of a form, which decides what its numbers mean.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum FreeformKind {
+    /// Adds `Σ aₖ r^k`; the numbers are `a₁, a₂, …`, in mm^(1−k). A term in r is a cone, whose tip is
+    /// met as a plane.
+    OddAsphere,
+    /// A conic with another curvature and conic constant in the x-z plane than in the y-z plane:
+    /// `z = (cx x² + cy y²)/(1 + √(1 − (1+kx) cx² x² − (1+ky) cy² y²))`. The numbers are `cx` in 1/mm and
+    /// `kx`; those of y are the curvature and the conic constant of the row.
+    Biconic,
+    /// The curve `f(y)`, the conic of the row and `Σ αₖ y^(2k)`, turned about an axis parallel to y at
+    /// the distance 1/cx. The numbers are `cx` in 1/mm, 0 for a cylinder, and `α₁, α₂, …`, in
+    /// mm^(1−2k).
+    Toroid,
+    /// Adds `Σ a u^i v^j` with `u = x/R`, `v = y/R`; the numbers, in mm, are those of u, v, u², uv, v²,
+    /// u³, u²v, …
+    XyPolynomial {
+        /// The radius R, in mm.
+        radius: f64,
+    },
+    /// Adds Zernike polynomials over a circle, normalised to the variance 1 and in the order of Noll
+    /// (JOSA 66, 207, 1976), the angle counted from x towards y. The numbers are in mm. Beyond the circle
+    /// the polynomials continue.
+    Zernike {
+        /// The radius of the circle, in mm.
+        radius: f64,
+    },
+    /// As [`FreeformKind::Zernike`], with the value 1 at the rim and in the fringe order, which ends with
+    /// the 37th.
+    FringeZernike {
+        /// The radius of the circle, in mm.
+        radius: f64,
+    },
+    /// Adds `Σ a T_i(x/X) T_j(y/Y)` with the polynomials of Chebyshev; the numbers, in mm, are those of
+    /// (i, j) = (0, 0), (1, 0), (0, 1), (2, 0), (1, 1), … Beyond the rectangle the polynomials continue.
+    Chebyshev {
+        /// The half widths X and Y of the rectangle, in mm.
+        half_widths: [f64; 2],
+    },
+}
+
+impl FreeformKind {
+    /// The name in texts.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::OddAsphere => "odd asphere",
+            Self::Biconic => "biconic",
+            Self::Toroid => "toroid",
+            Self::XyPolynomial { .. } => "XY polynomial",
+            Self::Zernike { .. } => "Zernike sag",
+            Self::FringeZernike { .. } => "fringe Zernike sag",
+            Self::Chebyshev { .. } => "Chebyshev polynomial",
+        }
+    }
+
+    /// True if the numbers belong to the base of the sag, not to a series.
+    const fn has_own_base(self) -> bool {
+        matches!(self, Self::Biconic | Self::Toroid)
+    }
+
+    /// The least and the largest number of numbers.
+    pub const fn counts(self) -> [usize; 2] {
+        match self {
+            Self::Biconic => [2, 2],
+            Self::Toroid => [1, BASE_NUMBERS],
+            Self::OddAsphere => [0, 20],
+            Self::XyPolynomial { .. } => [0, FREEFORM_NUMBERS - 1],
+            Self::FringeZernike { .. } => [0, 37],
+            Self::Zernike { .. } | Self::Chebyshev { .. } => [0, FREEFORM_NUMBERS],
+        }
+    }
+
+    /// The lengths over which the coordinates are normalised, in mm; empty for a form without any.
+    pub fn lengths(self) -> Vec<f64> {
+        match self {
+            Self::OddAsphere | Self::Biconic | Self::Toroid => Vec::new(),
+            Self::XyPolynomial { radius }
+            | Self::Zernike { radius }
+            | Self::FringeZernike { radius } => vec![radius],
+            Self::Chebyshev { half_widths } => half_widths.to_vec(),
+        }
+    }
+
+    /// The same kind with the lengths multiplied by `factor`.
+    #[must_use]
+    pub fn scaled(self, factor: f64) -> Self {
+        match self {
+            Self::OddAsphere | Self::Biconic | Self::Toroid => self,
+            Self::XyPolynomial { radius } => Self::XyPolynomial { radius: radius * factor },
+            Self::Zernike { radius } => Self::Zernike { radius: radius * factor },
+            Self::FringeZernike { radius } => Self::FringeZernike { radius: radius * factor },
+            Self::Chebyshev { half_widths } => {
+                Self::Chebyshev { half_widths: half_widths.map(|half| half * factor) }
+            }
+        }
+    }
+
+    /// The power of mm in the unit of a number.
+    pub fn power(self, number: usize) -> i32 {
+        let k = i32::try_from(number).unwrap_or(i32::MAX);
+        match self {
+            Self::OddAsphere => -k,
+            Self::Biconic => k - 1,
+            Self::Toroid if number == 0 => -1,
+            Self::Toroid => 1 - 2 * k,
+            _ => 1,
+        }
+    }
+
+    /// True if a number changes its sign with that of the sag.
+    pub fn has_sign(self, number: usize) -> bool {
+        !(self == Self::Biconic && number == 1)
+    }
+
+    /// True if a number is a coefficient of a function that is the same at x and at −x.
+    fn is_even_in_x(self, number: usize) -> bool {
+        match self {
+            Self::OddAsphere | Self::Biconic | Self::Toroid => true,
+            Self::XyPolynomial { .. } => series::powers(number + 1)[0].is_multiple_of(2),
+            Self::Chebyshev { .. } => series::powers(number)[0].is_multiple_of(2),
+            Self::Zernike { .. } => series::noll(number).is_even_in_x(),
+            Self::FringeZernike { .. } => series::fringe(number).is_even_in_x(),
+        }
+    }
+}
+
+/// A form of the sag with its numbers.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Freeform<R> {
+    /// The kind.
+    pub kind: FreeformKind,
+    /// The numbers, in the order and the units of the kind.
+    pub numbers: Vec<R>,
+}
+
+impl<R: Real> Freeform<R> {
+    /// The same form with each number mapped by `f`.
+    pub fn map<S: Real>(&self, f: impl Fn(R) -> S) -> Freeform<S> {
+        Freeform { kind: self.kind, numbers: self.numbers.iter().map(|a| f(*a)).collect() }
+    }
+
+    /// The same form with its sag multiplied by `turn`, which is 1 or −1.
+    #[must_use]
+    pub fn with_sag_sign(&self, turn: R) -> Self {
+        let sign = |k: usize, a: R| if self.kind.has_sign(k) { turn * a } else { a };
+        let numbers = self.numbers.iter().enumerate().map(|(k, a)| sign(k, *a)).collect();
+        Self { kind: self.kind, numbers }
+    }
+
+    /// True if the sag is the same at x and at −x.
+    pub fn mirrors_in_x(&self) -> bool {
+        let mut odd = (0..self.numbers.len()).filter(|k| !self.kind.is_even_in_x(*k));
+        odd.all(|k| self.numbers[k].value() == 0.0)
+    }
+
+    /// The base with the numbers of a conic and its even powers.
+    pub fn base(&self, shape: &Shape<R>) -> BaseSag<R> {
+        let (curvature, conic, terms) = shape.numbers();
+        self.base_of(curvature, conic, terms)
+    }
+
+    /// The base with these numbers of the row.
+    pub fn base_of(&self, curvature: R, conic: R, terms: [R; ASPHERE_TERMS]) -> BaseSag<R> {
+        let mut own = [R::ZERO; BASE_NUMBERS];
+        if self.kind.has_own_base() {
+            own.iter_mut().zip(&self.numbers).for_each(|(to, from)| *to = *from);
+        }
+        BaseSag { kind: self.kind, curvature, conic, terms, own }
+    }
+
+    /// The numbers of the series, over another kind of number.
+    fn series_numbers(&self) -> &[R] {
+        if self.kind.has_own_base() { &[] } else { &self.numbers }
+    }
+
+    /// The sag of the series in mm, and its derivatives by x and y. `number` makes a coefficient a
+    /// number of the arithmetic.
+    pub fn series_sag<N: Arithmetic>(&self, x: N, y: N, number: impl Fn(R) -> N) -> [N; 3] {
+        let numbers = self.series_numbers();
+        let mut sum = [N::constant(0.0); 3];
+        series::visit(self.kind, numbers.len(), x, y, |k, term| {
+            let a = number(numbers[k]);
+            sum = std::array::from_fn(|i| sum[i] + a * term[i]);
+        });
+        sum
+    }
+
+    /// Calls `visit` with each number of the series and the function that it multiplies, with its
+    /// derivatives by x and y.
+    pub fn visit_series<N: Arithmetic>(&self, x: N, y: N, visit: impl FnMut(usize, [N; 3])) {
+        series::visit(self.kind, self.series_numbers().len(), x, y, visit);
+    }
+
+    /// The sag in mm on a base, and its derivatives by x and y; NaN where the base does not exist.
+    pub fn sag(&self, base: &BaseSag<R>, x: R, y: R) -> [R; 3] {
+        let (base, series) = (base.sag(x, y), self.series_sag(x, y, |a| a));
+        std::array::from_fn(|i| base[i] + series[i])
+    }
+
+    /// The curvatures of the sections with the x-z and the y-z plane at the vertex, in 1/mm. The tip
+    /// of a cone counts as a plane.
+    pub fn vertex_curvatures(&self, shape: &Shape<R>) -> [R; 2] {
+        let constant = Dual::<R, 2>::constant;
+        let form = self.map(constant);
+        let base = self.base(shape).map(constant);
+        let at = |direction| Dual::variable(R::ZERO, direction);
+        let [_, by_x, by_y] = form.sag(&base, at(0), at(1));
+        [by_x.slope[0], by_y.slope[1]]
+    }
+}
+
+impl Freeform<f64> {
+    /// The same form with every length multiplied by `factor`.
+    #[must_use]
+    pub fn scaled(&self, factor: f64) -> Self {
+        let scale = |(k, a): (usize, &f64)| a * factor.powi(self.kind.power(k));
+        let numbers = self.numbers.iter().enumerate().map(scale).collect();
+        Self { kind: self.kind.scaled(factor), numbers }
+    }
+
+    /// The sag in mm of the section with the y-z plane; beyond the edge of the base that at the
+    /// edge.
+    pub fn section_sag(&self, shape: &Shape<f64>, y: f64) -> f64 {
+        let sag = |y: f64| self.sag(&self.base(shape), 0.0, y)[0];
+        let found = sag(y);
+        if found.is_finite() {
+            return found;
+        }
+        let (mut inside, mut outside) = (0.0, y);
+        for _ in 0..60 {
+            let middle = 0.5 * (inside + outside);
+            let end = if sag(middle).is_finite() { &mut inside } else { &mut outside };
+            *end = middle;
+        }
+        Some(sag(inside)).filter(|z| z.is_finite()).unwrap_or(0.0)
+    }
+
+    /// The fault of the numbers, as the rest of a sentence; `None` if there is none.
+    pub fn fault(&self) -> Option<String> {
+        let ([least, most], found) = (self.kind.counts(), self.numbers.len());
+        let name = self.kind.name();
+        if found < least || found > most {
+            return Some(format!("the {name} has {found} numbers; expected {least} to {most}"));
+        }
+        if let Some(length) = self.kind.lengths().into_iter().find(|l| !(*l > 0.0 && *l < 1e50)) {
+            return Some(format!("the {name} is normalised to {length} mm; expected more than 0"));
+        }
+        let wrong = self.numbers.iter().position(|a| !(a.abs() <= 1e100))?;
+        let (number, found) = (wrong + 1, self.numbers[wrong]);
+        Some(format!("number {number} of the {name} is {found}; expected a finite one"))
+    }
+}
