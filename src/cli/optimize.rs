@@ -11,9 +11,9 @@ use super::output_paths::OutputPaths;
 use super::progress::{progress_bar, stop_flag};
 use super::terms::TermComparison;
 use crate::files::{self, FileError, json};
-use crate::lens::{Lens, ParameterKind, Quantity, Variable, add_variables};
+use crate::lens::{Lens, ParameterKind, Quantity, ToleranceGrade, Variable, add_variables};
 use crate::measure::time_ms;
-use crate::merit::{Goal, Merit, MeritError, TermValue};
+use crate::merit::{Goal, Merit, MeritError, Term, TermValue};
 use crate::optimize::{
     DescentMethod, LimitPrice, OptimizationEnd, OptimizationProgress, Optimizer, start,
 };
@@ -56,6 +56,11 @@ pub(super) struct OptimizeArgs {
     /// length within limits
     #[arg(long, value_name = "FILE")]
     goal: Option<PathBuf>,
+
+    /// Optimizes the spots of lenses that are made with the tolerances of this class, in place of the
+    /// spots as designed
+    #[arg(long, value_enum, value_name = "GRADE")]
+    as_built: Option<ToleranceGrade>,
 
     /// A file for the history of all steps, as JSON
     #[arg(long, value_name = "FILE")]
@@ -125,10 +130,15 @@ impl OptimizeArgs {
     }
 
     fn goal(&self, lens: &Lens) -> Result<Goal, GoalError> {
-        match &self.goal {
-            Some(path) => input::read_json(path).map_err(GoalError::Failure),
-            None => Goal::of_lens(lens).map_err(GoalError::Merit),
+        let goal: Goal = match &self.goal {
+            Some(path) => input::read_json(path).map_err(GoalError::Failure)?,
+            None => Goal::of_lens(lens).map_err(GoalError::Merit)?,
+        };
+        if self.as_built.is_some() && !goal.terms.iter().any(|w| w.term == Term::Spot) {
+            let text = "--as-built: found a merit function without a term `spot`; expected one";
+            return Err(GoalError::Failure(CliError::Input(text.to_owned())));
         }
+        Ok(if self.as_built.is_some() { goal.as_built(self.as_built) } else { goal })
     }
 
     /// The error of a merit function: a wrong term is one of the file of the goal, if there is one.

@@ -7,10 +7,11 @@ use super::output::{Output, ShortNumber, TextTable};
 use super::output_paths::OutputPaths;
 use super::progress::{note_if_stopped, stop_flag};
 use crate::files;
-use crate::lens::{PerturbationKind, SurfaceNumber, Tolerance, ToleranceSheet};
+use crate::lens::{Lens, PerturbationKind, SurfaceNumber, Tolerance, ToleranceSheet};
 use crate::tolerance::{
-    AsBuiltSpot, Derivatives, ToleranceAnalysis, ToleranceError, ToleranceGrade, ToleranceRequest,
-    ToleranceScene, analyze_until, graded_sheet, loosest_tolerances,
+    AsBuiltSpot, Derivatives, PriceClass, QuadraticForm, ToleranceAnalysis, ToleranceError,
+    ToleranceGrade, ToleranceRequest, ToleranceScene, analyze_until, form_yield, graded_sheet,
+    loosest_for_yield, loosest_tolerances, price_classes,
 };
 use serde::Serialize;
 use std::fmt::{self, Display};
@@ -56,6 +57,10 @@ pub(super) struct ToleranceArgs {
     #[arg(long, value_name = "MM")]
     loosest: Option<f64>,
 
+    /// Adds the loosest tolerances with which this share of the lenses is good by --rms, refocused
+    #[arg(long, value_name = "SHARE", requires = "rms", conflicts_with = "loosest")]
+    loosest_yield: Option<RelativeError>,
+
     /// A file for the table of sensitivities, as CSV
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
@@ -78,10 +83,10 @@ impl ToleranceArgs {
         let stop = stop_flag();
         let analysis = analyze_until(&scene, &sheet, request, &stop).map_err(refuse)?;
         note_if_stopped(&stop);
-        let loosest = self.loosest.map(|rms| {
-            loosest_tolerances(&analysis.forms[1], &sheet.errors, rms * rms).map_err(refuse)
-        });
-        let loosest = loosest.transpose()?;
+        let loosest =
+            self.loosest(&analysis.forms[1], &sheet.errors).transpose().map_err(refuse)?;
+        let loosest = loosest
+            .map(|found| Loosest::new(found, &analysis.forms[1], self.rms, (&opened.lens, &scene)));
         let report = ToleranceReport::new(self, &scene, &sheet, analysis, loosest);
         let mut failures = Failures::default();
         if let Some(path) = &self.csv {
@@ -89,6 +94,21 @@ impl ToleranceArgs {
         }
         failures.note(output.print(&report));
         failures.into_result()
+    }
+
+    /// The loosest tolerances that are asked for.
+    fn loosest(
+        &self,
+        form: &QuadraticForm,
+        errors: &[Tolerance],
+    ) -> Option<Result<Vec<Tolerance>, ToleranceError>> {
+        match (self.loosest, self.loosest_yield, self.rms) {
+            (Some(rms), ..) => Some(loosest_tolerances(form, errors, rms * rms)),
+            (None, Some(share), Some(limit)) => {
+                Some(loosest_for_yield(form, errors, limit, share.0))
+            }
+            _ => None,
+        }
     }
 
     fn check_lengths(&self) -> Result<(), CliError> {
@@ -127,7 +147,45 @@ struct ToleranceReport {
     spots: [AsBuiltSpot; 2],
     sensitivities: Vec<SensitivityRow>,
     loosest: Option<Vec<Tolerance>>,
+    prices: Option<LoosestPrices>,
     warnings: Vec<String>,
+}
+
+/// The loosest tolerances.
+struct Loosest {
+    tolerances: Vec<Tolerance>,
+    prices: LoosestPrices,
+}
+
+/// The prices of the loosest tolerances, and the yield with them.
+#[derive(Serialize)]
+struct LoosestPrices {
+    /// The price class of each tolerance; `None` where classes say nothing.
+    classes: Vec<Option<PriceClass>>,
+    /// The share of good lenses with the loosest tolerances, and with each as its class has it; `None`
+    /// without a limit.
+    good: Option<[f64; 2]>,
+}
+
+impl Loosest {
+    fn new(
+        tolerances: Vec<Tolerance>,
+        form: &QuadraticForm,
+        limit: Option<f64>,
+        (lens, scene): (&Lens, &ToleranceScene),
+    ) -> Self {
+        let prices = price_classes(lens, &scene.lens, &tolerances);
+        let by_class = |(tolerance, price): (&Tolerance, &Option<(PriceClass, f64)>)| {
+            let half_range = price.map_or(tolerance.half_range, |(_, half_range)| half_range);
+            Tolerance { half_range, ..*tolerance }
+        };
+        let by_class: Vec<Tolerance> = tolerances.iter().zip(&prices).map(by_class).collect();
+        let good = limit.map(|limit| {
+            [&tolerances, &by_class].map(|tolerances| form_yield(form, tolerances, limit))
+        });
+        let classes = prices.into_iter().map(|price| price.map(|(class, _)| class)).collect();
+        Self { tolerances, prices: LoosestPrices { classes, good } }
+    }
 }
 
 /// The effect of one error.
@@ -158,9 +216,10 @@ impl ToleranceReport {
         scene: &ToleranceScene,
         sheet: &ToleranceSheet,
         analysis: ToleranceAnalysis,
-        loosest: Option<Vec<Tolerance>>,
+        loosest: Option<Loosest>,
     ) -> Self {
         let warnings = warnings(&analysis);
+        let (loosest, prices) = loosest.map(|l| (l.tolerances, l.prices)).unzip();
         Self {
             errors: sheet.errors.len(),
             rays: scene.beam.rays(),
@@ -172,6 +231,7 @@ impl ToleranceReport {
             sensitivities: rows(sheet, &analysis),
             spots: analysis.spots,
             loosest,
+            prices,
             warnings,
         }
     }
@@ -224,6 +284,15 @@ fn warnings(analysis: &ToleranceAnalysis) -> Vec<String> {
             focus_name(spot)
         ));
     }
+    for spot in analysis.spots.iter().filter(|spot| !spot.rims_agree) {
+        let [change, error] =
+            spot.clipping.unwrap_or_default().map(|v| 100.0 * v / spot.form_mean_rms);
+        warnings.push(format!(
+            "{}: rims that clip change the mean rms by {change:.2} % ± {error:.2} %; the errors of the \
+             means count that, the quantiles and the yield leave it out",
+            focus_name(spot)
+        ));
+    }
     if analysis.lost > 0 {
         warnings.push(format!(
             "{} of {} lenses lose rays and count as bad; the means leave them out",
@@ -257,8 +326,12 @@ impl Display for ToleranceReport {
                  {refocused:.2} %) and take {light:.2} % of the light"
             )?;
         }
-        if let Some(loosest) = &self.loosest {
-            writeln!(f, "\n{}", loosest_table(loosest))?;
+        if let Some((loosest, prices)) = self.loosest.as_ref().zip(self.prices.as_ref()) {
+            writeln!(f, "\n{}", loosest_table(loosest, &prices.classes))?;
+            if let Some([good, by_class]) = prices.good {
+                let [good, by_class] = [good, by_class].map(percent);
+                writeln!(f, "yield by the quadratic model: {good}; each at its class: {by_class}")?;
+            }
         }
         self.warnings.iter().try_for_each(|warning| writeln!(f, "warning: {warning}"))
     }
@@ -348,13 +421,14 @@ fn half_range(kind: PerturbationKind, value: f64) -> String {
     format!("{}{unit}", ShortNumber(value))
 }
 
-fn loosest_table(tolerances: &[Tolerance]) -> TextTable {
-    let mut table = TextTable::new(&["loosest tolerances", "surfaces", "half range"]);
-    for Tolerance { error, half_range: range, .. } in tolerances {
+fn loosest_table(tolerances: &[Tolerance], classes: &[Option<PriceClass>]) -> TextTable {
+    let mut table = TextTable::new(&["loosest tolerances", "surfaces", "half range", "class"]);
+    for (Tolerance { error, half_range: range, .. }, class) in tolerances.iter().zip(classes) {
         table.row([
             error.kind.name().to_owned(),
             surfaces(error.first, error.last),
             half_range(error.kind, *range),
+            class.map_or("", PriceClass::name).to_owned(),
         ]);
     }
     table

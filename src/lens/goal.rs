@@ -2,6 +2,7 @@
 //! undone and handed on with the lens; the merit function itself is evaluated above this floor.
 
 use super::LensError;
+use super::ToleranceGrade;
 use super::check::check_number;
 use super::operand::{OperandKind, TermScope, TermSelection, check_scope};
 use serde::{Deserialize, Serialize};
@@ -93,6 +94,14 @@ pub enum Term {
     /// The mean square radius of the spots about their centroids, over fields, wavelengths and
     /// zoom positions by weight, in mm².
     Spot,
+    /// The expected mean square radius of the spots of lenses that are made, in mm²: that of
+    /// [`Term::Spot`], and what errors of making add to it after each lens is refocused, by the
+    /// tolerances of the lens.
+    AsBuilt {
+        /// A class of tolerances in place of those of the lens.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        grade: Option<ToleranceGrade>,
+    },
     /// The integral of the square distance from the centroid over the pupil, in mm⁴: (3.24), the
     /// mean over fields and wavelengths by weight.
     SpotIntegral,
@@ -185,6 +194,7 @@ impl Term {
     pub fn name(self) -> &'static str {
         match self {
             Self::Spot => "spot",
+            Self::AsBuilt { .. } => "as_built",
             Self::FocalLength(_) => "focal_length",
             Self::Distortion => "distortion",
             Self::GlassCenter { .. } => "glass_center",
@@ -223,6 +233,7 @@ impl Term {
     pub(crate) fn numbers(self) -> Vec<f64> {
         match self {
             Self::Spot
+            | Self::AsBuilt { .. }
             | Self::SpotIntegral
             | Self::Wavefront
             | Self::Strehl
@@ -251,6 +262,7 @@ impl Term {
         use TermSelection::{Fields, Surfaces, Wavelengths, Zooms};
         match self {
             Self::Spot
+            | Self::AsBuilt { .. }
             | Self::SpotIntegral
             | Self::Wavefront
             | Self::Strehl
@@ -308,6 +320,7 @@ impl Term {
                 min.iter_mut().chain(max).for_each(|bound| *bound *= factor);
             }
             Self::Spot
+            | Self::AsBuilt { .. }
             | Self::SpotIntegral
             | Self::Wavefront
             | Self::Strehl

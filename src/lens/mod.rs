@@ -54,7 +54,7 @@ pub use spectrum::WavelengthPreset;
 pub use starting::{StartingForm, StartingLens};
 pub use surface_number::{MediumPlace, SurfaceNumber};
 pub use system::{Shape, Surface, System, SystemError};
-pub use tolerance::{ErrorDistribution, Tolerance, ToleranceSheet};
+pub use tolerance::{ErrorDistribution, Tolerance, ToleranceGrade, ToleranceSheet};
 pub use variables::{ParameterKind, add_variable, add_variables, at_zoom};
 
 use serde::{Deserialize, Serialize};

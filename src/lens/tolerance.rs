@@ -54,6 +54,31 @@ impl Tolerance {
     }
 }
 
+/// A class of care in making.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ToleranceGrade {
+    /// The accuracy of every shop.
+    Commercial,
+    /// The accuracy of a good shop without a surcharge.
+    #[default]
+    Precision,
+    /// The limit of a good shop.
+    ShopLimit,
+    /// Moulded plastic elements of a few millimetres.
+    MouldedPlastic,
+}
+
+impl ToleranceGrade {
+    /// Every class with its name, from the loosest to the tightest, moulded plastic last.
+    pub const ALL: [(Self, &'static str); 4] = [
+        (Self::Commercial, "Commercial"),
+        (Self::Precision, "Precision"),
+        (Self::ShopLimit, "Shop limit"),
+        (Self::MouldedPlastic, "Moulded plastic"),
+    ];
+}
+
 /// The tolerances of a lens, and what is adjusted after it is assembled.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]

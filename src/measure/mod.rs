@@ -20,6 +20,7 @@ mod rounding;
 mod search;
 mod spot;
 mod timing;
+mod tolerance;
 mod trace;
 
 pub use arrival::{ArrivalComparison, ArrivalRow, measure_arrival};
@@ -46,4 +47,8 @@ pub use spot::{
     measure_spot_curves,
 };
 pub use timing::{RateStatistics, Stopwatch, time_ms};
+pub use tolerance::{
+    AsBuiltComparison, AsBuiltCost, MadeDesign, ToleranceBenchmark, ToleranceBenchmarkError,
+    compare_as_built, measure_tolerances,
+};
 pub use trace::{BenchmarkError, Throughput, TraceRow, measure_throughput};

@@ -4,7 +4,7 @@
 use super::constraints::MinimumThickness;
 use super::goal::focal_lengths;
 use super::{Goal, LimitTreatment, MeritError, PupilEdge, Term, WeightedTerm};
-use crate::lens::{Lens, Medium, Row};
+use crate::lens::{Lens, Medium, Row, ToleranceGrade};
 use std::f64::consts::PI;
 
 /// The steepness of a surface, `|curvature| × semi-diameter`, up to which it counts as easy to
@@ -177,6 +177,7 @@ pub fn default_terms(lens: &Lens, zoom: usize, figures: &LensFigures) -> Vec<Wei
     let weighted = |term, weight| WeightedTerm::new(term, weight);
     vec![
         unit(Term::Spot),
+        unit(Term::AsBuilt { grade: Some(ToleranceGrade::Precision) }),
         weighted(Term::SpotIntegral, 1.0 / light),
         weighted(Term::Strehl, (STREHL_BLUR * f_number * PRIMARY).powi(2)),
         weighted(Term::Wavefront, (WAVE_BLUR * f_number * PRIMARY).powi(2)),

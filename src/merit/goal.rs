@@ -3,7 +3,7 @@
 use super::MeritError;
 use crate::lens::{
     Goal, Lens, LimitTreatment, Object, OperandKind, PupilEdge, Term, TermScope, TermSelection,
-    WeightedTerm, last_index,
+    ToleranceGrade, WeightedTerm, last_index,
 };
 use crate::paraxial::{Beam, first_order};
 
@@ -30,6 +30,7 @@ impl Term {
         matches!(
             self,
             Self::Spot
+                | Self::AsBuilt { .. }
                 | Self::SpotIntegral
                 | Self::Wavefront
                 | Self::Strehl
@@ -42,6 +43,7 @@ impl Term {
         !matches!(
             self,
             Self::Spot
+                | Self::AsBuilt { .. }
                 | Self::SpotIntegral
                 | Self::Wavefront
                 | Self::Strehl
@@ -126,10 +128,23 @@ impl Goal {
             if focal && focal_lengths(lens)?.contains(&None) {
                 return refuse("the lens is afocal");
             }
+            if *term == (Term::AsBuilt { grade: None }) && lens.tolerances.is_none() {
+                return refuse("the lens has no tolerances; expected some, or a grade of the term");
+            }
             term.check_light(lens)?;
             check_scope(lens, *term, *scope)?;
         }
         Ok(())
+    }
+
+    /// The same goal with the spots of lenses that are made in place of spots as designed; with the
+    /// tolerances of the lens, or those of a class.
+    #[must_use]
+    pub fn as_built(mut self, grade: Option<ToleranceGrade>) -> Self {
+        for weighted in self.terms.iter_mut().filter(|weighted| weighted.term == Term::Spot) {
+            weighted.term = Term::AsBuilt { grade };
+        }
+        self
     }
 
     /// True if a term is kept as a constraint. With frozen pupils the light has no derivative, and a

@@ -12,6 +12,7 @@
 //! Design*, chapter 3): an optimizer can then be asked for light, and does not mistake clipping for
 //! sharpness. A goal with frozen pupils has the usual, biased derivatives.
 
+mod as_built;
 mod binding;
 mod constraints;
 mod contrast;
@@ -42,6 +43,7 @@ use crate::lens::{Lens, LensError, SurfaceNumber, Variable};
 use crate::math::Dual;
 use crate::pupil::{LaunchError, QuadraticIntegrand, RayModel, RayModelError, TracedPupil};
 use crate::trace::{Fate, SystemGradient};
+use as_built::MadeTolerances;
 use binding::Configuration;
 use nalgebra::DVector;
 use rayon::prelude::*;
@@ -156,6 +158,9 @@ pub struct Merit {
     samplings: Vec<RaySampling>,
     /// The initial areas of the pupils in mm², by zoom position.
     initial_areas: Vec<Vec<f64>>,
+    /// The tolerances of terms about lenses that are made, by zoom position and term; `None` for
+    /// other terms.
+    tolerances: Vec<Vec<Option<MadeTolerances>>>,
     tolerance: f64,
 }
 
@@ -175,6 +180,7 @@ impl Merit {
             zooms,
             samplings: Vec::new(),
             initial_areas: Vec::new(),
+            tolerances: Vec::new(),
             tolerance,
         };
         merit.goal.check(lens)?;
@@ -198,6 +204,12 @@ impl Merit {
             let rims = constraints::automatic_rims(lens);
             self.zooms.iter_mut().for_each(|zoom| zoom.set_clear_rims(&rims));
         }
+        let of_zoom = |(zoom, sampling): (usize, &RaySampling)| {
+            let of_term = |w: &WeightedTerm| MadeTolerances::of_term(lens, zoom, sampling, w.term);
+            self.goal.terms.iter().map(of_term).collect()
+        };
+        let tolerances: Result<_, _> = self.samplings.iter().enumerate().map(of_zoom).collect();
+        self.tolerances = tolerances?;
         Ok(())
     }
 
@@ -324,7 +336,9 @@ impl Merit {
         let worst = sampled.iter().fold(0.0, |e: f64, s| e.max(s.error));
         let rays = sampled.iter().map(|s| s.rays).sum();
         match term {
-            Term::Spot | Term::SpotIntegral | Term::Wavefront => (2.0 * worst * value, rays),
+            Term::Spot | Term::AsBuilt { .. } | Term::SpotIntegral | Term::Wavefront => {
+                (2.0 * worst * value, rays)
+            }
             Term::Strehl => (self.transfer_error(), rays),
             Term::GeometricMtf { .. } => {
                 let worst = self.transfer_error();
@@ -438,14 +452,20 @@ impl Merit {
         chosen: impl Fn(Term) -> bool,
         sums: &mut [SumOfSquares],
     ) -> Result<(), MeritError> {
-        let terms = sums.iter_mut().zip(&self.goal.terms);
         let zoom = context.zoom.zoom;
-        for (sum, weighted) in terms.filter(|(_, weighted)| {
+        let terms = sums.iter_mut().zip(&self.goal.terms).zip(&self.tolerances[zoom]);
+        for ((sum, weighted), tolerances) in terms.filter(|((_, weighted), _)| {
             chosen(weighted.term) && weighted.scope.has(TermSelection::Zooms, zoom)
         }) {
             let scope = weighted.scope;
             match weighted.term {
                 Term::Spot => spot::add_spot(context, spot::Normalization::PupilArea, scope, sum)?,
+                Term::AsBuilt { .. } => {
+                    spot::add_spot(context, spot::Normalization::PupilArea, scope, sum)?;
+                    if let Some(tolerances) = tolerances {
+                        as_built::add_growth(context, tolerances, scope, sum)?;
+                    }
+                }
                 Term::SpotIntegral => {
                     spot::add_spot(context, spot::Normalization::Unnormalized, scope, sum)?;
                 }

@@ -45,6 +45,8 @@ pub(super) struct SamplingDemand {
     pub(super) strehl: bool,
     /// The spatial frequencies of terms about contrast, in cycles/mm.
     pub(super) frequencies: Vec<f64>,
+    /// True if a term asks for lenses that are made, which are not symmetric about their axis.
+    pub(super) as_built: bool,
 }
 
 impl SamplingDemand {
@@ -55,6 +57,7 @@ impl SamplingDemand {
                 Term::Wavefront => demand.wavefront = true,
                 Term::Strehl => (demand.wavefront, demand.strehl) = (true, true),
                 Term::GeometricMtf { frequency, .. } => demand.frequencies.push(frequency),
+                Term::AsBuilt { .. } => demand.as_built = true,
                 _ => {}
             }
         }
@@ -324,7 +327,7 @@ impl RaySampling {
             } else {
                 Region { launch, kind: pupil.kind.clone(), rays: 0 }
             };
-            if self.demand.frequencies.is_empty() {
+            if self.demand.frequencies.is_empty() && !self.demand.as_built {
                 region.trace_pupil(pupil.order)
             } else {
                 region.trace_whole_pupil(pupil.order)

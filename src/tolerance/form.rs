@@ -47,10 +47,9 @@ pub struct FocusStop {
 }
 
 impl FocusStop {
-    /// The mean square spot in mm² by which a lens with these errors is worse than at its best focus.
-    fn cost(&self, errors: &[f64]) -> f64 {
-        let excess = (self.nominal + dot(&self.first, errors)).abs() - self.travel;
-        self.slopes * excess.max(0.0).powi(2)
+    /// The mean square spot in mm² by which a lens with this best focus is worse than there.
+    fn cost(&self, focus: f64) -> f64 {
+        self.slopes * (focus.abs() - self.travel).max(0.0).powi(2)
     }
 }
 
@@ -97,7 +96,9 @@ impl QuadraticForm {
             let row: f64 = errors.iter().enumerate().map(|(j, p)| self.second[(i, j)] * p).sum();
             sum += error * (self.first[i] + 0.5 * row);
         }
-        sum.max(0.0) + self.stop.as_ref().map_or(0.0, |stop| stop.cost(errors))
+        let stop = self.stop.as_ref();
+        let cost = |stop: &FocusStop| stop.cost(stop.nominal + dot(&stop.first, errors));
+        sum.max(0.0) + stop.map_or(0.0, cost)
     }
 
     /// The expected mean square spot radius in mm², with a focus whose travel has no end.
@@ -132,8 +133,9 @@ impl QuadraticForm {
             kept.push((eigenvalues[m], direction));
         }
         let carried: f64 = kept.iter().map(|(value, _)| value).sum();
-        let constant = self.nominal + 0.5 * (trace - carried);
-        ReducedForm { constant, first: self.first.clone(), kept, stop: self.stop.clone() }
+        let (nominal, neglected) = (self.nominal, 0.5 * (trace - carried));
+        let (first, stop) = (self.first.clone(), self.stop.clone());
+        ReducedForm { nominal, neglected, first, kept, stop }
     }
 }
 
@@ -142,7 +144,9 @@ const NEGLECTED: f64 = 1e-4;
 
 /// A quadratic form in few combinations of its variables.
 pub(super) struct ReducedForm {
-    constant: f64,
+    nominal: f64,
+    /// The mean of the part that is left out, for the tolerances themselves.
+    neglected: f64,
     first: Vec<f64>,
     /// Eigenvalues, and the combinations of errors that they belong to.
     kept: Vec<(f64, Vec<f64>)>,
@@ -152,10 +156,33 @@ pub(super) struct ReducedForm {
 impl ReducedForm {
     /// The mean square spot radius of a lens with these errors, in mm².
     pub(super) fn at(&self, errors: &[f64]) -> f64 {
-        let kept = self.kept.iter().map(|(value, v)| 0.5 * value * dot(v, errors).powi(2));
-        let sum = self.constant + dot(&self.first, errors) + kept.sum::<f64>();
-        sum.max(0.0) + self.stop.as_ref().map_or(0.0, |stop| stop.cost(errors))
+        self.at_multiple(&self.along(errors), 1.0)
     }
+
+    /// The terms of the form for all multiples of some errors.
+    pub(super) fn along(&self, errors: &[f64]) -> ErrorMultiples {
+        let kept = self.kept.iter().map(|(value, v)| 0.5 * value * dot(v, errors).powi(2));
+        ErrorMultiples {
+            linear: dot(&self.first, errors),
+            square: self.neglected + kept.sum::<f64>(),
+            focus: self.stop.as_ref().map_or(0.0, |stop| dot(&stop.first, errors)),
+        }
+    }
+
+    /// The mean square spot radius of a lens with a multiple of some errors, in mm².
+    pub(super) fn at_multiple(&self, errors: &ErrorMultiples, factor: f64) -> f64 {
+        let ErrorMultiples { linear, square, focus } = errors;
+        let sum = self.nominal + factor * (linear + factor * square);
+        let stop = self.stop.as_ref();
+        sum.max(0.0) + stop.map_or(0.0, |stop| stop.cost(stop.nominal + factor * focus))
+    }
+}
+
+/// The additions of errors to the form: to first order, to second order, and to the best focus.
+pub(super) struct ErrorMultiples {
+    linear: f64,
+    square: f64,
+    focus: f64,
 }
 
 fn dot(a: &[f64], b: &[f64]) -> f64 {

@@ -6,28 +6,14 @@
 
 use super::NominalLens;
 use crate::lens::{
-    ErrorDistribution, Lens, Perturbation, PerturbationKind, Tolerance, ToleranceSheet,
+    ErrorDistribution, Lens, Perturbation, PerturbationKind, Tolerance, ToleranceGrade,
+    ToleranceSheet,
 };
-
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
+use std::collections::BTreeMap;
 
 /// The wavelength of the test plates, in mm.
 const TEST_WAVELENGTH: f64 = 0.000_632_8;
-
-/// A class of care in making.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum ToleranceGrade {
-    /// The accuracy of every shop.
-    Commercial,
-    /// The accuracy of a good shop without a surcharge.
-    #[default]
-    Precision,
-    /// The limit of a good shop.
-    ShopLimit,
-    /// Moulded plastic elements of a few millimetres.
-    MouldedPlastic,
-}
 
 /// The half ranges of a class.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -50,31 +36,33 @@ struct GradeNumbers {
     tilt: f64,
 }
 
-impl ToleranceGrade {
-    /// Every class with its name, from the loosest to the tightest, moulded plastic last.
-    pub const ALL: [(Self, &'static str); 4] = [
-        (Self::Commercial, "Commercial"),
-        (Self::Precision, "Precision"),
-        (Self::ShopLimit, "Shop limit"),
-        (Self::MouldedPlastic, "Moulded plastic"),
-    ];
-
-    fn numbers(self) -> GradeNumbers {
-        let of = |[fringes, irregularity, thickness, index, abbe, surface_tilt, decenter, tilt]: [f64; 8]| {
-            GradeNumbers { fringes, irregularity, thickness, index, abbe, surface_tilt, decenter, tilt }
+/// The half ranges of a class.
+fn grade_numbers(grade: ToleranceGrade) -> GradeNumbers {
+    let of =
+        |[fringes, irregularity, thickness, index, abbe, surface_tilt, decenter, tilt]: [f64;
+             8]| {
+            GradeNumbers {
+                fringes,
+                irregularity,
+                thickness,
+                index,
+                abbe,
+                surface_tilt,
+                decenter,
+                tilt,
+            }
         };
-        match self {
-            Self::Commercial => of([5.0, 1.0, 0.1, 1e-3, 0.008, 3.0, 0.1, 3.0]),
-            Self::Precision => of([3.0, 0.5, 0.05, 5e-4, 0.005, 1.0, 0.02, 1.0]),
-            Self::ShopLimit => of([1.0, 0.05, 0.02, 2e-4, 0.002, 0.25, 0.01, 0.25]),
-            Self::MouldedPlastic => of([2.0, 1.0, 0.005, 5e-4, 0.005, 1.0, 0.003, 2.0]),
-        }
+    match grade {
+        ToleranceGrade::Commercial => of([5.0, 1.0, 0.1, 1e-3, 0.008, 3.0, 0.1, 3.0]),
+        ToleranceGrade::Precision => of([3.0, 0.5, 0.05, 5e-4, 0.005, 1.0, 0.02, 1.0]),
+        ToleranceGrade::ShopLimit => of([1.0, 0.05, 0.02, 2e-4, 0.002, 0.25, 0.01, 0.25]),
+        ToleranceGrade::MouldedPlastic => of([2.0, 1.0, 0.005, 5e-4, 0.005, 1.0, 0.003, 2.0]),
     }
 }
 
 /// The tolerances of a class for every surface, gap and element of a lens.
 pub fn graded_sheet(lens: &Lens, nominal: &NominalLens, grade: ToleranceGrade) -> ToleranceSheet {
-    let mut sheet = GradedSheet { nominal, numbers: grade.numbers(), errors: Vec::new() };
+    let mut sheet = GradedSheet { nominal, numbers: grade_numbers(grade), errors: Vec::new() };
     for surface in 0..lens.surfaces.len() {
         sheet.add_surface(surface);
     }
@@ -89,6 +77,60 @@ pub fn graded_sheet(lens: &Lens, nominal: &NominalLens, grade: ToleranceGrade) -
         }
     }
     ToleranceSheet { errors: sheet.errors, focus_travel: None }
+}
+
+/// The price of a tolerance: the loosest class of care that keeps it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum PriceClass {
+    /// Every shop keeps it.
+    Commercial,
+    /// A good shop keeps it without a surcharge.
+    Precision,
+    /// It is the limit of a good shop.
+    ShopLimit,
+    /// It is tighter than that.
+    Beyond,
+}
+
+impl PriceClass {
+    /// Its name in tables.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Commercial => "commercial",
+            Self::Precision => "precision",
+            Self::ShopLimit => "shop limit",
+            Self::Beyond => "beyond",
+        }
+    }
+}
+
+/// The price of each tolerance, and the half range of its class: its own beyond all classes. `None`
+/// for an error that classes say nothing about.
+pub fn price_classes(
+    lens: &Lens,
+    nominal: &NominalLens,
+    tolerances: &[Tolerance],
+) -> Vec<Option<(PriceClass, f64)>> {
+    let classes = [
+        (ToleranceGrade::Commercial, PriceClass::Commercial),
+        (ToleranceGrade::Precision, PriceClass::Precision),
+        (ToleranceGrade::ShopLimit, PriceClass::ShopLimit),
+    ];
+    let half_ranges = classes.map(|(grade, class)| {
+        let sheet = graded_sheet(lens, nominal, grade);
+        let of: BTreeMap<_, _> = sheet.errors.iter().map(|t| (t.error, t.half_range)).collect();
+        (class, of)
+    });
+    let price = |t: &Tolerance| {
+        half_ranges[0].1.get(&t.error)?;
+        let kept = half_ranges.iter().find_map(|(class, of)| {
+            let range = of.get(&t.error).filter(|range| **range <= t.half_range);
+            range.map(|range| (*class, *range))
+        });
+        Some(kept.unwrap_or((PriceClass::Beyond, t.half_range)))
+    };
+    tolerances.iter().map(price).collect()
 }
 
 /// Tolerances that are being collected.

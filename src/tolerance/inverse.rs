@@ -1,5 +1,6 @@
-//! The loosest tolerances for a spot that is asked for.
+//! The loosest tolerances for a spot, or for a share of good lenses, that is asked for.
 
+use super::draw::draw_errors;
 use super::{QuadraticForm, ToleranceError};
 use crate::lens::Tolerance;
 
@@ -25,17 +26,91 @@ pub fn loosest_tolerances(
             target.max(0.0).sqrt()
         )));
     }
+    let (factors, total) = equal_costs(form, tolerances);
+    let scale = if total > 0.0 { ((target - form.nominal) / total).sqrt() } else { 1.0 };
+    Ok(widened(tolerances, |i| factors[i] * scale))
+}
+
+/// The factors by which tolerances are widened so that each costs about the same, and what all cost
+/// then, in mm².
+fn equal_costs(form: &QuadraticForm, tolerances: &[Tolerance]) -> (Vec<f64>, f64) {
     let cost = |(i, t): (usize, &Tolerance)| 0.5 * form.second[(i, i)] * t.deviation().powi(2);
     let costs: Vec<f64> = tolerances.iter().enumerate().map(cost).collect();
     let paid = costs.iter().filter(|cost| **cost > 0.0).count().max(1);
     let mean = costs.iter().filter(|cost| **cost > 0.0).sum::<f64>() / paid as f64;
-    let factor = |cost: f64| {
-        if cost > 0.0 { (mean / cost).sqrt().clamp(1.0 / MOST, MOST) } else { MOST }
+    let factor = |cost: &f64| {
+        if *cost > 0.0 { (mean / cost).sqrt().clamp(1.0 / MOST, MOST) } else { MOST }
     };
-    let total: f64 = costs.iter().map(|cost| cost * factor(*cost).powi(2)).sum();
-    let scale = if total > 0.0 { ((target - form.nominal) / total).sqrt() } else { 1.0 };
-    let widened = tolerances.iter().zip(&costs);
-    let widened = widened
-        .map(|(t, cost)| Tolerance { half_range: t.half_range * factor(*cost) * scale, ..*t });
-    Ok(widened.collect())
+    let factors: Vec<f64> = costs.iter().map(factor).collect();
+    let total = costs.iter().zip(&factors).map(|(cost, factor)| cost * factor * factor).sum();
+    (factors, total)
+}
+
+fn widened(tolerances: &[Tolerance], factor: impl Fn(usize) -> f64) -> Vec<Tolerance> {
+    let wider =
+        |(i, t): (usize, &Tolerance)| Tolerance { half_range: t.half_range * factor(i), ..*t };
+    tolerances.iter().enumerate().map(wider).collect()
+}
+
+/// The number of lenses by the form from which a yield is told: its error is half a per cent.
+const LENSES: u64 = 8_000;
+/// The halvings of the range in which a factor is sought.
+const HALVINGS: usize = 40;
+/// The factor up to which tolerances are widened or narrowed for a yield.
+const WIDEST: f64 = 1e4;
+
+/// The share of lenses with these tolerances whose rms spot is at most `limit` mm, by the form.
+pub fn form_yield(form: &QuadraticForm, tolerances: &[Tolerance], limit: f64) -> f64 {
+    yield_at_factor(form, tolerances, limit)(1.0)
+}
+
+/// The yield as a function of a factor of all tolerances, by the same random lenses for all factors.
+fn yield_at_factor(
+    form: &QuadraticForm,
+    tolerances: &[Tolerance],
+    limit: f64,
+) -> impl Fn(f64) -> f64 {
+    let reduced = form.reduced(tolerances);
+    let lenses: Vec<_> =
+        (0..LENSES).map(|i| reduced.along(&draw_errors(tolerances, SEED, i))).collect();
+    move |factor| {
+        let is_good = |errors| reduced.at_multiple(errors, factor) <= limit * limit;
+        lenses.iter().filter(|errors| is_good(errors)).count() as f64 / LENSES as f64
+    }
+}
+
+/// The seed of the lenses from which a yield is told.
+const SEED: u64 = 0x7E1D;
+
+/// The loosest tolerances with which this share of lenses has an rms spot of at most `limit` mm, by the
+/// form. Each error costs about the same, as by [`loosest_tolerances`].
+///
+/// # Errors
+/// A limit that the lens without errors does not reach, and a share that is not between 0 and 1.
+pub fn loosest_for_yield(
+    form: &QuadraticForm,
+    tolerances: &[Tolerance],
+    limit: f64,
+    share: f64,
+) -> Result<Vec<Tolerance>, ToleranceError> {
+    if !(share > 0.0 && share < 1.0) {
+        let text = format!("a yield of {share} is asked for; expected more than 0 and less than 1");
+        return Err(ToleranceError::Other(text));
+    }
+    if !(limit * limit > form.nominal) {
+        let rms = form.nominal.max(0.0).sqrt();
+        return Err(ToleranceError::Other(format!(
+            "lenses with an rms of {limit} mm are asked for; expected more than {rms:.6} mm, that of \
+             the lens without errors"
+        )));
+    }
+    let (factors, _) = equal_costs(form, tolerances);
+    let shaped = widened(tolerances, |i| factors[i]);
+    let good = yield_at_factor(form, &shaped, limit);
+    let (mut low, mut high) = (1.0 / WIDEST, WIDEST);
+    for _ in 0..HALVINGS {
+        let middle = (low * high).sqrt();
+        if good(middle) >= share { low = middle } else { high = middle }
+    }
+    Ok(widened(&shaped, |_| low))
 }

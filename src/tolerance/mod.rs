@@ -24,6 +24,7 @@
 mod analysis;
 mod as_built;
 mod beam;
+mod covariance;
 mod draw;
 mod error;
 mod form;
@@ -35,22 +36,26 @@ mod nominal;
 mod perturb;
 mod sensitivity;
 mod spot;
+mod sweep;
 mod wavefront;
 
+pub use crate::lens::ToleranceGrade;
 pub use analysis::{
     AsBuiltSpot, Quantile, ToleranceAnalysis, ToleranceRequest, YieldEstimate, analyze,
-    analyze_until,
+    analyze_until, form_spots,
 };
 pub use as_built::{AsBuiltGradient, FixedAndRefocused, as_built_gradient};
 pub use beam::{Beam, ColourRays, FieldBeam};
+pub use covariance::{LeverArm, MadeKind, MadeNumber, NumberCovariance, TiltingBody};
 pub use error::ToleranceError;
 pub use form::{FocusStop, FocusTreatment, QuadraticForm};
-pub use grade::{ToleranceGrade, graded_sheet};
-pub use inverse::loosest_tolerances;
+pub use grade::{PriceClass, graded_sheet, price_classes};
+pub use inverse::{form_yield, loosest_for_yield, loosest_tolerances};
 pub use merits::{MeritOptions, Merits, merits};
 pub use monte_carlo::{RealLens, real_lenses, wilson_interval};
 pub use nominal::ToleranceScene;
 pub use perturb::{NominalLens, perturb};
 pub use sensitivity::{Derivatives, Jet2, RaySensitivity, Sensitivity, sensitivities};
 pub use spot::{SpotMoments, best_focus};
+pub use sweep::{SweptSensitivity, swept_sensitivities};
 pub use wavefront::WavefrontVariance;

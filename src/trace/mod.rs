@@ -32,7 +32,10 @@ mod single;
 mod surface_parameter;
 
 pub use crate::math::SimdWidth;
-pub use adjoint::{AdjointSeed, SurfaceGradient, SystemGradient};
+pub use adjoint::{
+    AdjointSeed, ErrorDirections, ErrorNumber, ErrorRows, ErrorSlopes, SurfaceGradient,
+    SystemGradient,
+};
 pub use batch::{ImagePoints, Landings, Rays, TraceSink};
 pub use fate::{Fate, Fates};
 pub use grin_gap::GrinStepPlan;

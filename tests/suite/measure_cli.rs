@@ -49,6 +49,22 @@ fn pictures_are_measured_the_quick_way_and_the_exact_one() {
 }
 
 #[test]
+fn tolerances_are_exact_and_their_costs_are_told() {
+    let report = done_json(
+        &["measure", "tolerance", "lenses/tessar_50_f28.json", "--samples", "4", "--steps", "0"],
+        "",
+    );
+    let cost = &report["cost"];
+    assert!(cost["first_error"].as_f64().unwrap() < 1e-9, "{cost}");
+    assert!(cost["second_error"].as_f64().unwrap() < 1e-7, "{cost}");
+    assert!(cost["errors"].as_u64().unwrap() > 50 && cost["samples"] == 4, "{cost}");
+    let counts: Vec<&Value> =
+        cost["gradients"].as_array().unwrap().iter().map(|row| &row["tolerances"]).collect();
+    assert_eq!(counts, [10, 100, 1000]);
+    assert_eq!(report["designs"], Value::Null);
+}
+
+#[test]
 fn wrong_measurements_are_refused() {
     for (arguments, words) in [
         (vec!["mtf"], ["LENS", "required"]),

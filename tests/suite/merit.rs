@@ -4,7 +4,7 @@ use aplanat::analysis::{strehl, wavefront};
 use aplanat::files;
 use aplanat::lens::{
     Aperture, FieldKind, FieldPoint, Lens, Medium, Object, Parameter, Pickup, Quantity, Row,
-    Variable,
+    ToleranceGrade, Variable,
 };
 use aplanat::merit::{DerivativeLevel, Goal, LimitTreatment, Merit, PupilEdge, Term, WeightedTerm};
 use aplanat::pupil::{Accuracy, RayModel};
@@ -50,6 +50,7 @@ fn everything() -> Lens {
 fn terms() -> Vec<Term> {
     vec![
         Term::Spot,
+        Term::AsBuilt { grade: Some(ToleranceGrade::Commercial) },
         Term::Wavefront,
         Term::GeometricMtf { frequency: 5.0, min: 1.0 },
         Term::FocalLength(60.0),
@@ -202,7 +203,8 @@ fn derivatives_include_the_stop_that_a_beam_fills() {
             vary(&mut lens, surface, Quantity::Curvature);
             vary(&mut lens, surface, Quantity::Thickness);
         }
-        for term in [Term::Spot, Term::Wavefront, Term::Throughput, Term::Light(1.01)] {
+        let as_built = Term::AsBuilt { grade: Some(ToleranceGrade::Commercial) };
+        for term in [Term::Spot, as_built, Term::Wavefront, Term::Throughput, Term::Light(1.01)] {
             // Rounding of paths of 1e5 waves asks for larger steps.
             let share = if term == Term::Wavefront { 0.1 } else { 0.02 };
             check(&lens, term, PupilEdge::Moving, |quantity| share * step(quantity));

@@ -11,6 +11,7 @@ mod picture;
 mod plot;
 mod search;
 mod spot;
+mod tolerance;
 mod trace;
 mod window;
 
@@ -38,6 +39,7 @@ enum BenchmarkCommand {
     Limits(limits::MeasureLimitsArgs),
     Search(Box<search::MeasureSearchArgs>),
     Design(design::MeasureDesignArgs),
+    Tolerance(tolerance::MeasureToleranceArgs),
     Window(window::MeasureWindowArgs),
 }
 
@@ -54,6 +56,7 @@ impl MeasureArgs {
             BenchmarkCommand::Limits(limits) => limits.run(output),
             BenchmarkCommand::Search(search) => search.run(output),
             BenchmarkCommand::Design(design) => design.run(output),
+            BenchmarkCommand::Tolerance(tolerance) => tolerance.run(output),
             BenchmarkCommand::Window(window) => window.run(output),
         }
     }

@@ -16,9 +16,13 @@
 //! [`super::interface`]; the cost does not depend on the number of parameters.
 
 mod block;
+mod errors;
 mod grin;
 mod mounted;
 mod refraction;
+mod sag_crossing;
+
+pub use errors::{ErrorDirections, ErrorNumber, ErrorRows, ErrorSlopes};
 
 use super::batch::{BLOCK, CHUNK, Landings, RayBlock, Rays};
 use super::interface::Interface;

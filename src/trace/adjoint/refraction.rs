@@ -185,6 +185,16 @@ impl<R: Real> SagDerivatives<R> {
         }
     }
 
+    /// Those of a conic with this curvature and conic constant plus one, where the root `1 − (1+κ) c z`
+    /// of its sag is known.
+    #[inline(always)]
+    pub(super) fn of_conic([curvature, k1]: [R; 2], root: R, r2: R) -> Self {
+        let half = R::from_f64(0.5);
+        let slope = curvature * half / root;
+        let second = k1 * (slope * slope) * (slope + slope);
+        Self { r2, curvature, root, slope, second }
+    }
+
     /// The derivatives by curvature and conic constant, from those by z and by w.
     #[inline(always)]
     pub(super) fn by_conic(&self, by_z: R, by_w: R) -> (R, R) {

@@ -4,7 +4,8 @@ use super::reference::{ToleranceCase, assert_close, kind, lenses, tolerances};
 use crate::reference::{number, numbers};
 use aplanat::lens::{ErrorDistribution, Perturbation, ToleranceSheet};
 use aplanat::tolerance::{
-    ToleranceRequest, ToleranceScene, analyze, as_built_gradient, loosest_tolerances,
+    ToleranceRequest, ToleranceScene, analyze, as_built_gradient, form_yield, loosest_for_yield,
+    loosest_tolerances,
 };
 
 /// The lens with the rays of the Monte Carlo of the file, or fewer.
@@ -80,6 +81,30 @@ fn the_loosest_tolerances_reach_the_spot_that_was_asked_for() {
     assert_close(form.expectation(&loosest), target, 1e-12 * target, "expectation");
     let refused = loosest_tolerances(form, &sheet.errors, 0.25 * form.nominal);
     assert!(refused.unwrap_err().to_string().contains("expected more than"));
+}
+
+/// The loosest tolerances for a yield give it to other lenses too: rays of real ones, other seeds.
+#[test]
+fn the_loosest_tolerances_give_the_yield_that_was_asked_for() {
+    let lens = &lenses()[0];
+    let scene = scene(lens, (3, 6));
+    let tight = sheet(lens, ErrorDistribution::NormalCut);
+    let request = ToleranceRequest { seed: 3, samples: 2, limit: None };
+    let form = &analyze(&scene, &tight, request).unwrap().forms[1];
+    let limit = 1.15 * form.nominal.sqrt();
+    for share in [0.5, 0.9] {
+        let errors = loosest_for_yield(form, &tight.errors, limit, share).unwrap();
+        assert_close(form_yield(form, &errors, limit), share, 2e-3, "the same lenses");
+        let loose = ToleranceSheet { errors, focus_travel: None };
+        let request = ToleranceRequest { seed: 11, samples: 150, limit: Some(limit) };
+        let good = analyze(&scene, &loose, request).unwrap().spots[1].good.unwrap();
+        assert_close(good.form, share, 0.025, "the form, other lenses");
+        assert!(good.interval[0] < share && share < good.interval[1], "{good:?}");
+    }
+    for (limit, share) in [(0.5 * form.nominal.sqrt(), 0.9), (limit, 1.0)] {
+        let refused = loosest_for_yield(form, &tight.errors, limit, share).unwrap_err();
+        assert!(refused.to_string().contains("expected more than"), "{refused}");
+    }
 }
 
 /// The gradient of the expectation, by fewer errors, against the difference of two designs.

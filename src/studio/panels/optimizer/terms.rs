@@ -13,6 +13,7 @@ const ROUNDING: f64 = 1e-12;
 pub(super) const fn title(term: Term) -> &'static str {
     match term {
         Term::Spot => "Spot",
+        Term::AsBuilt { .. } => "As built",
         Term::SpotIntegral => "Spot × light",
         Term::Wavefront => "RMS wavefront",
         Term::Strehl => "Strehl ratio",
@@ -40,6 +41,10 @@ pub(super) const fn title(term: Term) -> &'static str {
 pub(super) const fn hint(term: Term) -> &'static str {
     match term {
         Term::Spot => "Mean square spot radius over fields and wavelengths, about the centroids",
+        Term::AsBuilt { .. } => {
+            "Expected mean square spot radius of lenses that are made with the tolerances of the lens \
+             or of a class, each refocused: sharp, and easy to build"
+        }
         Term::SpotIntegral => {
             "Square distance from the centroid, integrated over all light that gets through \
              instead of averaged: it falls when light is lost, so combine it with a term for light"
@@ -98,6 +103,7 @@ pub(super) const fn unit(term: Term) -> &'static str {
         Term::Light(_) => "× now",
         Term::RelativeIllumination { .. } => "× axis",
         Term::Spot
+        | Term::AsBuilt { .. }
         | Term::SpotIntegral
         | Term::Wavefront
         | Term::Strehl
@@ -123,6 +129,7 @@ pub(super) const fn unit(term: Term) -> &'static str {
 pub(super) fn targets(term: &mut Term) -> Vec<(&'static str, &mut f64)> {
     match term {
         Term::Spot
+        | Term::AsBuilt { .. }
         | Term::SpotIntegral
         | Term::Wavefront
         | Term::Strehl

@@ -1,0 +1,133 @@
+//! `measure tolerance`: the exactness and the cost of tolerances, and the gain of designs as built.
+
+use crate::cli::error::CliError;
+use crate::cli::input::LensFile;
+use crate::cli::output::{Output, ShortNumber, TextTable};
+use crate::cli::progress::stop_flag;
+use crate::files;
+use crate::lens::{Lens, ToleranceGrade};
+use crate::measure::{
+    AsBuiltComparison, Machine, MadeDesign, ToleranceBenchmark, ToleranceBenchmarkError,
+    compare_as_built, measure_tolerances,
+};
+use serde::Serialize;
+use std::fmt::{self, Display};
+use std::path::PathBuf;
+
+/// Exactness and cost of tolerances, and the spread of lenses by a design that is optimized as built
+#[derive(Debug, clap::Args)]
+#[command(after_long_help = include_str!("../help/measure_tolerance.txt"))]
+pub(super) struct MeasureToleranceArgs {
+    /// The lens: .json, .zmx, .zar, .seq, .len or .roa
+    #[arg(value_name = "LENS")]
+    lens: Option<PathBuf>,
+
+    /// The class of the tolerances
+    #[arg(long, value_enum, value_name = "GRADE", default_value_t = ToleranceGrade::Commercial)]
+    grade: ToleranceGrade,
+
+    /// Lenses with random errors whose rays are traced
+    #[arg(long, default_value_t = 500, value_name = "N")]
+    samples: usize,
+
+    /// The maximum number of steps of each descent; 0 for none
+    #[arg(long, value_name = "N", default_value_t = 1000)]
+    steps: usize,
+}
+
+/// The lens without a file.
+const DOUBLE_GAUSS: &str = "double_gauss_rudolph_50";
+
+impl MeasureToleranceArgs {
+    pub(super) fn run(&self, output: &Output) -> Result<(), CliError> {
+        let (lens, file) = self.lens()?;
+        let fail = |e: ToleranceBenchmarkError| CliError::Failed(format!("{file}: {e}"));
+        let cost = measure_tolerances(&lens, self.grade, self.samples).map_err(fail)?;
+        let stop = stop_flag();
+        let designs = if self.steps > 0 {
+            compare_as_built(&lens, self.grade, (self.steps, self.samples), &stop).map_err(fail)?
+        } else {
+            None
+        };
+        let machine = Machine::detect();
+        output.print(&MeasureToleranceReport { machine, file, cost, designs })
+    }
+
+    /// The lens and its name.
+    fn lens(&self) -> Result<(Lens, String), CliError> {
+        if let Some(path) = &self.lens {
+            let opened = LensFile::of(path).open()?;
+            return Ok((opened.lens, opened.file));
+        }
+        let missing = || CliError::Failed(format!("there is no bundled lens {DOUBLE_GAUSS}"));
+        let found = files::bundled_lenses().iter().find(|lens| lens.name == DOUBLE_GAUSS);
+        let found = found.ok_or_else(missing)?;
+        let lens = files::json::read(found.text, found.name)?;
+        Ok((lens, DOUBLE_GAUSS.to_owned()))
+    }
+}
+
+#[derive(Serialize)]
+struct MeasureToleranceReport {
+    machine: Machine,
+    file: String,
+    cost: ToleranceBenchmark,
+    designs: Option<AsBuiltComparison>,
+}
+
+/// The gain in the 90 % quantile that is asked for, as a share.
+const GAIN: f64 = 0.2;
+
+impl MeasureToleranceReport {
+    fn costs(&self) -> TextTable {
+        let ToleranceBenchmark { errors, rays, samples, .. } = self.cost;
+        let cost = &self.cost;
+        let mut table = TextTable::new(&["", "asked", "reached"]);
+        let ms = |ms: f64| format!("{} ms", ShortNumber(ms));
+        let mut row = |what: String, asked: String, reached: String| {
+            table.row([what, asked, reached]);
+        };
+        let exact = |error: f64| format!("{error:.1e}");
+        row("first derivatives".into(), "1.0e-9".into(), exact(cost.first_error));
+        row("second derivatives".into(), "1.0e-7".into(), exact(cost.second_error));
+        let sweep = format!("sensitivities by {errors} errors, {rays} rays, one core");
+        row(sweep, ms(5.0), ms(cost.sweep_ms));
+        row("the same with second derivatives of rays".into(), String::new(), ms(cost.jets_ms));
+        row("yield by the quadratic form, one core".into(), ms(50.0), ms(cost.form_ms));
+        row(format!("{samples} real lenses, two cores"), ms(1000.0), ms(cost.samples_ms));
+        for gradient in &cost.gradients {
+            let what = format!("as-built gradient, {} tolerances", gradient.tolerances);
+            let ratio = format!("{:.1} x ({})", gradient.ordinary_gradients, ms(gradient.ms));
+            row(what, "8 ordinary ones".into(), ratio);
+        }
+        table
+    }
+}
+
+impl Display for MeasureToleranceReport {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(f, "{}\n{}\n\n{}", self.machine, self.file, self.costs())?;
+        let Some(designs) = &self.designs else { return Ok(()) };
+        let AsBuiltComparison { samples, nominal, as_built, .. } = designs;
+        writeln!(f, "refocused rms spots in mm, {samples} lenses by Monte Carlo:\n")?;
+        let head = ["optimized", "as designed", "mean as built", "90 %", "light mm^2", "steps"];
+        let mut table = TextTable::new(&head);
+        for (name, design) in [("as designed", nominal), ("as built", as_built)] {
+            let MadeDesign { rms, mean, quantile, light, steps } = *design;
+            let number = |value: f64| ShortNumber(value).to_string();
+            let mean = format!("{} ± {:.1e}", ShortNumber(mean[0]), mean[1]);
+            let cells = [number(rms), mean, number(quantile), number(light), steps.to_string()];
+            table.row(std::iter::once(name.to_owned()).chain(cells));
+        }
+        writeln!(f, "{table}")?;
+        let gain = 1.0 - as_built.quantile / nominal.quantile;
+        let cost = as_built.rms / nominal.rms - 1.0;
+        writeln!(
+            f,
+            "asked: the 90 % quantile {:.0} % less; reached: {:.1} % less, and {:.1} % more as designed",
+            100.0 * GAIN,
+            100.0 * gain,
+            100.0 * cost
+        )
+    }
+}

@@ -1,0 +1,298 @@
+//! Tolerances: how exact their derivatives are, what they cost, and what a design gains that is
+//! optimized as it is built.
+
+use super::timing::{TimedCase, time_interleaved, time_median};
+use super::trace::BenchmarkError;
+use crate::lens::{
+    Lens, ParameterKind, Perturbation, PerturbationKind, Tolerance, ToleranceGrade, ToleranceSheet,
+    add_variables,
+};
+use crate::merit::{
+    DerivativeLevel, Goal, LimitTreatment, Merit, MeritError, PupilEdge, Term, WeightedTerm,
+};
+use crate::optimize::{DescentMethod, start};
+use crate::tolerance::{
+    Derivatives, FocusTreatment, NominalLens, QuadraticForm, ToleranceError, ToleranceRequest,
+    ToleranceScene, analyze, form_spots, graded_sheet, perturb, real_lenses, sensitivities,
+    swept_sensitivities,
+};
+use rayon::ThreadPoolBuilder;
+use serde::Serialize;
+use std::hint::black_box;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// The relative accuracy of the spot radii that sensitivities are computed from.
+const ACCURACY: f64 = 1e-4;
+/// The numbers of tolerances for which the gradient of the as-built merit is timed.
+const COUNTS: [usize; 3] = [10, 100, 1000];
+
+/// The turns in which gradients are timed, and the least seconds of each.
+const TURNS: usize = 15;
+const TURN_SECONDS: f64 = 0.02;
+
+/// The cost of tolerances on a lens.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ToleranceBenchmark {
+    /// The number of errors of making.
+    pub errors: usize,
+    /// The number of rays, those of opposite fields included.
+    pub rays: usize,
+    /// The largest relative difference of first derivatives by a sweep back and by jets.
+    pub first_error: f64,
+    /// The largest relative difference of second derivatives by jets and by differences of first
+    /// ones.
+    pub second_error: f64,
+    /// The time of the sensitivities by one sweep, on one core, in milliseconds.
+    pub sweep_ms: f64,
+    /// The time of all derivatives by second-order jets, on one core, in milliseconds.
+    pub jets_ms: f64,
+    /// The time of the distribution and the yield by the quadratic form, on one core, in
+    /// milliseconds.
+    pub form_ms: f64,
+    /// The number of real lenses, and the time of their rays on two cores in milliseconds.
+    pub samples: usize,
+    /// That time.
+    pub samples_ms: f64,
+    /// The cost of gradients.
+    pub gradients: Vec<AsBuiltCost>,
+}
+
+/// The cost of the gradient of the as-built merit.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct AsBuiltCost {
+    /// The number of tolerances.
+    pub tolerances: usize,
+    /// The time on one core, in milliseconds.
+    pub ms: f64,
+    /// The same over the time of the gradient of the spot with the same pupils.
+    pub ordinary_gradients: f64,
+}
+
+/// The cause for which tolerances cannot be measured.
+#[derive(Debug, thiserror::Error)]
+pub enum ToleranceBenchmarkError {
+    /// The tolerances.
+    #[error(transparent)]
+    Tolerance(#[from] ToleranceError),
+    /// The merit function.
+    #[error(transparent)]
+    Merit(#[from] MeritError),
+    /// The threads.
+    #[error(transparent)]
+    Threads(#[from] BenchmarkError),
+}
+
+/// Measures the tolerances of a class on a lens, with this many real lenses.
+///
+/// # Errors
+/// A lens that has no tolerances.
+pub fn measure_tolerances(
+    lens: &Lens,
+    grade: ToleranceGrade,
+    samples: usize,
+) -> Result<ToleranceBenchmark, ToleranceBenchmarkError> {
+    let scene = ToleranceScene::new(lens, 0, ACCURACY)?;
+    let sheet = graded_sheet(lens, &scene.lens, grade);
+    let errors: Vec<Perturbation> = sheet.errors.iter().map(|t| t.error).collect();
+    let jets = || sensitivities(&scene.lens, &scene.beam, scene.options, &errors);
+    let [one, two] = [1, 2].map(|threads| ThreadPoolBuilder::new().num_threads(threads).build());
+    let (one, two) = (one.map_err(BenchmarkError::from)?, two.map_err(BenchmarkError::from)?);
+    let (swept, sweep_ms) =
+        one.install(|| time_median(3..=50, || swept_sensitivities(&scene, &errors)));
+    let (found, jets_ms) = one.install(|| time_median(1..=5, jets));
+    let (swept, found) = (swept?, found?);
+    let form = || {
+        let form = QuadraticForm::new(&scene, &found, FocusTreatment::Refocused, None);
+        form_spots(&form, &sheet, 1).len()
+    };
+    let (_, form_ms) = one.install(|| time_median(3..=9, form));
+    let go_on = AtomicBool::new(false);
+    let real = || real_lenses(&scene, &sheet, 1, samples, 0, &go_on).map(|lenses| lenses.len());
+    let (traced, samples_ms) = two.install(|| time_median(1..=5, real));
+    let pairs = found.iter().zip(&swept);
+    let first_error = pairs.map(|(jet, swept)| first_difference(jet.mean_square(), swept.first));
+    Ok(ToleranceBenchmark {
+        errors: errors.len(),
+        rays: scene.beam.rays(),
+        first_error: first_error.fold(0.0, f64::max),
+        second_error: second_error(&scene, &sheet)?,
+        sweep_ms,
+        jets_ms,
+        form_ms,
+        samples: traced?,
+        samples_ms,
+        gradients: one.install(|| gradient_costs(lens, &sheet))?,
+    })
+}
+
+/// The difference of a first derivative, relative to the larger of itself and `√|value × second|`.
+fn first_difference(exact: Derivatives, first: f64) -> f64 {
+    let scale = exact.first.abs().max((exact.value * exact.second).abs().sqrt());
+    (first - exact.first).abs() / scale.max(f64::MIN_POSITIVE)
+}
+
+/// The largest relative difference between second derivatives by jets and by differences of first
+/// ones, over some errors of every kind.
+fn second_error(scene: &ToleranceScene, sheet: &ToleranceSheet) -> Result<f64, ToleranceError> {
+    let mut worst = 0.0_f64;
+    for kind in PerturbationKind::ALL {
+        let of_kind = |t: &&Tolerance| t.error.kind == kind && t.half_range > 0.0;
+        let Some(tolerance) = sheet.errors.iter().filter(of_kind).nth(1) else { continue };
+        let derivatives = |value: f64| {
+            let systems = perturb(&scene.lens, &[(tolerance.error, value)])?;
+            let lens = NominalLens { systems, ..scene.lens.clone() };
+            let found = sensitivities(&lens, &scene.beam, scene.options, &[tolerance.error])?;
+            let mut found = found[0].mean_square();
+            if kind == PerturbationKind::Abbe {
+                // Two changes multiply instead of adding.
+                found.first /= 1.0 + value;
+            }
+            Ok::<_, ToleranceError>(found)
+        };
+        let step = tolerance.half_range;
+        let [a, b, c, d] = [-2.0, -1.0, 1.0, 2.0].map(|i| derivatives(i * step));
+        let difference = 8.0 * (c?.first - b?.first) - (d?.first - a?.first);
+        let exact = derivatives(0.0)?.second;
+        worst = worst.max((difference / (12.0 * step) - exact).abs() / exact.abs());
+    }
+    Ok(worst)
+}
+
+/// The times of gradients of the as-built merit and of the spot, in turn, each the shortest of many.
+fn gradient_costs(lens: &Lens, sheet: &ToleranceSheet) -> Result<Vec<AsBuiltCost>, MeritError> {
+    let mut lens = lens.clone();
+    lens.variables.clear();
+    add_variables(&mut lens, &[ParameterKind::Curvatures, ParameterKind::Thicknesses]);
+    let merit = |tolerances: Option<ToleranceSheet>, term: Term| {
+        let goal = Goal {
+            terms: vec![WeightedTerm::new(term, 1.0)],
+            pupil: PupilEdge::Moving,
+            zoom_ratios: Vec::new(),
+            limits: LimitTreatment::default(),
+        };
+        Merit::new(&Lens { tolerances, ..lens.clone() }, &goal, ACCURACY)
+    };
+    let made = |count: usize| {
+        let errors = sheet.errors.iter().cycle().take(count);
+        let shared = (count.div_ceil(sheet.errors.len()) as f64).sqrt();
+        let part = |t: &Tolerance| Tolerance { half_range: t.half_range / shared, ..*t };
+        let tolerances = ToleranceSheet { errors: errors.map(part).collect(), focus_travel: None };
+        merit(Some(tolerances), Term::AsBuilt { grade: None })
+    };
+    let mut merits = vec![merit(None, Term::Spot)?];
+    for count in COUNTS {
+        merits.push(made(count)?);
+    }
+    let values = merits[0].values(&lens);
+    let evaluate = |merit: &Merit| merit.evaluate(&values, DerivativeLevel::Gradient);
+    merits.iter().try_for_each(|merit| evaluate(merit).map(|_| ()))?;
+    let case = |merit| -> TimedCase<'_> {
+        let repetition = Box::new(move || drop(black_box(evaluate(merit))));
+        TimedCase { work: 1.0, repetition }
+    };
+    let mut cases: Vec<TimedCase<'_>> = merits.iter().map(case).collect();
+    let (rates, _) = time_interleaved(&mut cases, TURNS, TURN_SECONDS, &AtomicBool::new(false));
+    let ms = |i: usize| 1e3 / rates[i].max;
+    let cost = |(i, tolerances): (usize, usize)| {
+        let ordinary_gradients = ms(i + 1) / ms(0);
+        AsBuiltCost { tolerances, ms: ms(i + 1), ordinary_gradients }
+    };
+    Ok(COUNTS.into_iter().enumerate().map(cost).collect())
+}
+
+/// A design that is optimized for its spot as designed, and one for its spot as built.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct AsBuiltComparison {
+    /// The class of the tolerances.
+    pub grade: ToleranceGrade,
+    /// The number of real lenses behind each quantile.
+    pub samples: usize,
+    /// Optimized as designed.
+    pub nominal: MadeDesign,
+    /// Optimized as built, from there on, with limits and light alike.
+    pub as_built: MadeDesign,
+}
+
+/// A design and the lenses that are made by it, refocused.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct MadeDesign {
+    /// The rms spot radius as designed, in mm.
+    pub rms: f64,
+    /// The mean rms of lenses that are made, by Monte Carlo, with its standard error, in mm.
+    pub mean: [f64; 2],
+    /// The rms that nine of ten lenses do not exceed, by Monte Carlo, in mm.
+    pub quantile: f64,
+    /// The mean area of the pupils, in mm².
+    pub light: f64,
+    /// The number of steps.
+    pub steps: usize,
+}
+
+/// Optimizes a lens for its spot as designed, then from there for its spot as built by a class of
+/// tolerances; both with the default limits, and with at least the light that they start with, up to this many
+/// steps each. `None` once `stop` is true.
+///
+/// # Errors
+/// A lens without a merit or without tolerances.
+pub fn compare_as_built(
+    lens: &Lens,
+    grade: ToleranceGrade,
+    (steps, samples): (usize, usize),
+    stop: &AtomicBool,
+) -> Result<Option<AsBuiltComparison>, ToleranceBenchmarkError> {
+    let lens = super::limits::with_variables(lens);
+    let scene = ToleranceScene::new(&lens, 0, ACCURACY)?;
+    let sheet = graded_sheet(&lens, &scene.lens, grade);
+    let lens = Lens { tolerances: Some(sheet.clone()), merit: None, ..lens };
+    let goal = Goal::default_for(&lens)?;
+    let made_goal = goal.clone().as_built(None);
+    let Some((nominal, taken)) = descend(&lens, &goal, steps, stop)? else { return Ok(None) };
+    let judge = |lens: &Lens, steps: usize| judge(lens, &goal, &sheet, (steps, samples));
+    let first = judge(&nominal, taken)?;
+    let Some((made, taken)) = descend(&nominal, &made_goal, steps, stop)? else { return Ok(None) };
+    let as_built = judge(&made, taken)?;
+    Ok(Some(AsBuiltComparison { grade, samples, nominal: first, as_built }))
+}
+
+/// The best lens of a descent and the number of its steps; `None` once `stop` is true.
+fn descend(
+    lens: &Lens,
+    goal: &Goal,
+    steps: usize,
+    stop: &AtomicBool,
+) -> Result<Option<(Lens, usize)>, MeritError> {
+    let mut optimizer = start(DescentMethod::TrustRegion, lens, goal, ACCURACY)?;
+    let mut taken = 0;
+    while taken < steps {
+        if stop.load(Ordering::Relaxed) {
+            return Ok(None);
+        }
+        taken += 1;
+        if optimizer.step().finished {
+            break;
+        }
+    }
+    optimizer.verify_best();
+    Ok(Some((optimizer.best().clone(), taken)))
+}
+
+/// The lenses that are made by a design.
+fn judge(
+    lens: &Lens,
+    goal: &Goal,
+    sheet: &ToleranceSheet,
+    (steps, samples): (usize, usize),
+) -> Result<MadeDesign, ToleranceBenchmarkError> {
+    let scene = ToleranceScene::new(lens, 0, ACCURACY)?;
+    let request = ToleranceRequest { seed: 1, samples, limit: None };
+    let found = analyze(&scene, sheet, request)?;
+    let spot = &found.spots[1];
+    let quantile = spot.quantiles.iter().find(|quantile| quantile.share == 0.9);
+    Ok(MadeDesign {
+        rms: spot.nominal_rms,
+        mean: spot.mean_rms,
+        quantile: quantile.map_or(f64::NAN, |quantile| quantile.corrected),
+        light: Merit::new(lens, goal, ACCURACY)?.light(),
+        steps,
+    })
+}
