@@ -31,7 +31,7 @@ mod view;
 
 pub use analysis::{
     Analyses, AnalysisResults, AnalysisSettings, AsBuiltLens, FieldContrast, FieldContrasts,
-    FieldCurvePoint, FieldCurves, FieldPupils, ScenePicture, analyze, predict_as_built,
+    FieldCurvePoint, FieldCurves, FieldFans, FieldPupils, ScenePicture, analyze, predict_as_built,
 };
 pub use clock::Timed;
 pub use command::{Command, PanelSetting};

@@ -15,6 +15,9 @@ use super::draw::RenderBackend;
 use super::panels::{Panel, PanelKind};
 use crate::session::{Command, GrinCommand, PanelSetting, SessionView};
 
+/// Makes the setting that has a panel computed or not.
+type SetVisible = fn(bool) -> PanelSetting;
+
 /// The arranged panels.
 pub struct Dock {
     tree: Tree<PanelKind>,
@@ -131,7 +134,7 @@ impl Dock {
     /// Asks for the analyses of those panels alone that are visible.
     fn request_analyses(&self, view: &SessionView, actions: &mut Actions) {
         let settings = &view.settings;
-        let asked: [(PanelKind, bool, fn(bool) -> PanelSetting); 6] = [
+        let asked: [(PanelKind, bool, SetVisible); 6] = [
             (PanelKind::Pupil, settings.pupils, PanelSetting::Pupils),
             (PanelKind::Contrast, settings.contrasts, PanelSetting::Contrasts),
             (PanelKind::Fans, settings.fans, PanelSetting::Fans),

@@ -31,6 +31,9 @@ use std::io;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+/// The ray fans of each field, or the reason why it has none.
+pub type FieldFans = Vec<Result<Vec<Fan>, AnalysisError>>;
+
 /// The analyses of one version of the design.
 #[derive(Debug, Clone)]
 pub struct AnalysisResults {
@@ -77,7 +80,7 @@ pub struct Analyses {
     /// and at first: it takes longer than all else.
     pub as_built: Option<Arc<Timed<Result<AsBuiltLens, String>>>>,
     /// The ray fans of each field; `None` while no panel shows them.
-    pub fans: Option<Timed<Vec<Result<Vec<Fan>, AnalysisError>>>>,
+    pub fans: Option<Timed<FieldFans>>,
     /// Distortion, field curvature and illumination over the field; `None` while no panel shows them.
     pub field_curves: Option<Timed<FieldCurves>>,
 }
