@@ -21,7 +21,7 @@ use crate::trace::Fates;
 use serde::Serialize;
 use std::fmt::{self, Display};
 use std::ops::ControlFlow;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::Ordering;
 
 /// A picture of a scene through the lens, by rays traced backwards, with its error
@@ -120,7 +120,9 @@ const STEPS: usize = 1000;
 
 impl PictureArgs {
     pub(super) fn run(&self, output: &Output) -> Result<(), CliError> {
-        let mut paths = OutputPaths::reading([("the lens", self.lens.path())]);
+        let lens = [("the lens", self.lens.path())];
+        let scene = self.scene_file().map(|file| ("the scene", file));
+        let mut paths = OutputPaths::reading(lens.into_iter().chain(scene));
         paths.file("--out", Some(&self.out), &["png"])?;
         let sensor = self.sensor_preset()?;
         let opened = self.lens.open()?;
@@ -141,6 +143,11 @@ impl PictureArgs {
 
     fn built_in(&self) -> Option<BuiltInScene> {
         BuiltInScene::ALL.iter().find(|(_, name)| *name == self.scene).map(|(scene, _)| *scene)
+    }
+
+    /// The file of the scene; `None` for a built-in one.
+    fn scene_file(&self) -> Option<&Path> {
+        self.built_in().is_none().then_some(Path::new(&self.scene))
     }
 
     /// The lens as it is focused, and the distance of the focus; `None` at infinity.
@@ -214,7 +221,7 @@ impl PictureArgs {
         if let Some(scene) = self.built_in() {
             return Ok(scene.build(model, frame, *distance));
         }
-        let path = PathBuf::from(&self.scene);
+        let path = Path::new(&self.scene);
         if !path.exists() {
             let names = BuiltInScene::ALL.map(|(_, name)| name).join(", ");
             let text = format!(
@@ -223,7 +230,7 @@ impl PictureArgs {
             );
             return Err(CliError::Input(text));
         }
-        let raster = Raster::new(read_color(&path)?);
+        let raster = Raster::new(read_color(path)?);
         Ok(Scene::of_raster(raster, model, frame, *distance))
     }
 

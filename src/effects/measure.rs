@@ -9,7 +9,9 @@ use super::simplify::{collimate_fields, reduce_to_conic};
 use crate::lens::{FieldPoint, Lens, Object, Shape, System};
 use crate::math::Vec3;
 use crate::paraxial::Beam;
-use crate::pupil::{Aiming, Launch, PupilPattern, RayModel, RayModelError, pattern_points};
+use crate::pupil::{
+    Aiming, Channel, Launch, PupilPattern, RayModel, RayModelError, pattern_points,
+};
 use crate::trace::{Fate, Fates, GrinStepPlan, ImagePoints, Ray, Rays, TraceSink as _, Tracer};
 use rayon::prelude::*;
 use std::f64::consts::TAU;
@@ -65,6 +67,12 @@ pub struct RimClearance {
 
 /// The rings of points inside the pupil, of equal areas.
 const RINGS: usize = 3;
+/// The factor by which rays are denser that tell how far those between them may reach.
+const DENSER: usize = 2;
+/// The largest height that denser rays may still add, in what they added to that of the sparse ones: the
+/// sum of a series in which every doubling adds 3/4 of the one before. Heights that are smooth over the
+/// pupil add a quarter; those near the end of total reflection about 0.7.
+const BETWEEN_RAYS: f64 = 3.0;
 /// Square grids of rays that look for light beyond the beam, which rims may have to stop: cells along
 /// a side, and half a side in radii of the pupil. They are those that the search for the pupil begins
 /// with, so that it finds no light that they miss.
@@ -148,8 +156,13 @@ fn add_fates(a: Fates, b: Fates) -> Fates {
 
 /// The sampled points of the pupil; those inside come first.
 pub(super) fn sample_points() -> Vec<[f64; 2]> {
-    let rim = (0..ON_RIM).map(|i| (TAU * i as f64 / ON_RIM as f64).sin_cos().into());
-    pattern_points(PupilPattern::HexapolarInside(RINGS)).into_iter().chain(rim).collect()
+    pupil_points(RINGS, ON_RIM)
+}
+
+/// Points on rings inside the pupil, and then on its rim.
+fn pupil_points(rings: usize, on_rim: usize) -> Vec<[f64; 2]> {
+    let rim = (0..on_rim).map(|i| (TAU * i as f64 / on_rim as f64).sin_cos().into());
+    pattern_points(PupilPattern::HexapolarInside(rings)).into_iter().chain(rim).collect()
 }
 
 /// The sampled rays of one field at one wavelength.
@@ -206,20 +219,37 @@ impl SampledBundle {
     }
 
     /// The root mean square distance of the image points from those in another lens; infinite if a
-    /// ray is lost there.
+    /// ray is lost there, or if so few arrive here that they do not tell.
     fn rms_shift(&self, otherwise: impl Fn(usize, Ray<f64>) -> Option<Vec3<f64>>) -> f64 {
-        let (mut sum, mut count) = (0.0, 0);
-        for (i, (ray, landed)) in self.rays.iter().zip(&self.landed).enumerate() {
-            let (Some(ray), Some(here)) = (ray, landed) else { continue };
-            let there = otherwise(i, *ray);
-            sum += there.map_or(f64::INFINITY, |t| (t.x - here.x).powi(2) + (t.y - here.y).powi(2));
-            count += 1;
-        }
-        if count == 0 { 0.0 } else { (sum / f64::from(count)).sqrt() }
+        let arriving = self.rays.iter().zip(&self.landed).enumerate();
+        root_mean_square(arriving.filter_map(|(i, (ray, landed))| {
+            let here = (*landed)?;
+            Some(otherwise(i, (*ray)?).map_or(f64::INFINITY, |there| square_distance(here, there)))
+        }))
+    }
+
+    /// The root mean square distance of the image points from those of the same rays of another bundle;
+    /// infinite if so few arrive in both that they do not tell.
+    fn rms_distance(&self, other: &Self) -> f64 {
+        let pairs = self.landed.iter().zip(&other.landed);
+        root_mean_square(
+            pairs.filter_map(|(here, there)| Some(square_distance((*here)?, (*there)?))),
+        )
     }
 }
 
-/// The smallest number of rays that gives the size of a spot.
+/// The square of the distance of two points of the image plane, in mm².
+fn square_distance(a: Vec3<f64>, b: Vec3<f64>) -> f64 {
+    (a.x - b.x).powi(2) + (a.y - b.y).powi(2)
+}
+
+/// The root of the mean of some squares; infinite if they are too few.
+fn root_mean_square(squares: impl Iterator<Item = f64>) -> f64 {
+    let (sum, count) = squares.fold((0.0, 0), |(sum, count), square| (sum + square, count + 1));
+    if count < FEW { f64::INFINITY } else { (sum / count as f64).sqrt() }
+}
+
+/// The smallest number of rays that gives the size of a spot, or of a shift.
 const FEW: usize = 8;
 
 /// The smallest RMS radius of any field, over all wavelengths.
@@ -236,18 +266,29 @@ fn smallest_spot(model: &RayModel, bundles: &[SampledBundle]) -> f64 {
     model.fields.iter().filter_map(spot).fold(f64::INFINITY, f64::min)
 }
 
-/// `√(Σ share |p_λ − p|²)` over the rays that arrive at both wavelengths, of the worst field.
+/// `√(Σ share |p_λ − p|²)` over the rays that arrive at both wavelengths, of the worst field; infinite if
+/// they are too few in one.
 fn dispersion(model: &RayModel, bundles: &[SampledBundle]) -> f64 {
+    let primary = &model.channels[model.primary].system;
+    if model.channels.iter().all(|channel| channel.system == *primary) {
+        return 0.0;
+    }
     let weights: f64 = model.channels.iter().map(|channel| channel.weight).sum();
     let worst = |field: &FieldPoint| -> f64 {
-        let of_field = |bundle: &&SampledBundle| bundle.field == *field;
-        let primary = bundles.iter().filter(of_field).find(|s| s.wavelength == model.primary);
-        let square = |bundle: &SampledBundle| {
-            let share = model.channels[bundle.wavelength].weight / weights;
-            let there = |i: usize, _| primary.and_then(|p| p.landed[i]).or(bundle.landed[i]);
-            share * bundle.rms_shift(there).powi(2)
+        let find =
+            |wavelength| bundles.iter().find(|b| b.field == *field && b.wavelength == wavelength);
+        let square = |(wavelength, channel): (usize, &Channel)| {
+            let distance = match (find(model.primary), find(wavelength)) {
+                (Some(primary), Some(bundle)) => primary.rms_distance(bundle),
+                // A field without a beam at either wavelength is dark.
+                (None, None) => 0.0,
+                _ => f64::INFINITY,
+            };
+            channel.weight / weights * distance.powi(2)
         };
-        bundles.iter().filter(of_field).map(square).sum::<f64>().sqrt()
+        let others = model.channels.iter().enumerate();
+        let others = others.filter(|(i, channel)| *i != model.primary && channel.weight > 0.0);
+        others.map(square).sum::<f64>().sqrt()
     };
     model.fields.iter().map(worst).fold(0.0, f64::max)
 }
@@ -313,7 +354,7 @@ fn without_rims(model: &RayModel) -> System<f64> {
 }
 
 /// The clearance at each rim, for the rays that fill the stop and arrive through the lens
-/// [`without_rims`], and for those beyond the beam that do.
+/// [`without_rims`], with those between the traced ones, and for those beyond the beam that do.
 fn rims(model: &RayModel) -> Result<Vec<RimClearance>, RayModelError> {
     let limited = without_rims(model);
     let mut open = limited.clone();
@@ -322,16 +363,22 @@ fn rims(model: &RayModel) -> Result<Vec<RimClearance>, RayModelError> {
         open.surfaces[model.stop()].semi_diameter = f64::INFINITY;
     }
     let (open, limited) = (Tracer::new(&open)?, Tracer::new(&limited)?);
-    let beam = sample_points();
+    let (beam, denser) = (sample_points(), pupil_points(DENSER * RINGS, DENSER * ON_RIM));
     let reached = |field: &FieldPoint| -> Vec<f64> {
         let mut reached = vec![0.0; open.surfaces()];
         for wavelength in 0..model.channels.len() {
             if let Ok(launch) = model.launch_at_stop(*field, wavelength) {
-                raise_heights(&mut reached, &launch, &beam, &open);
+                let sparse = heights(&launch, &beam, &open);
+                let dense = heights(&launch, &denser, &open);
+                let between = sparse.iter().zip(&dense).map(|(sparse, dense)| {
+                    let added = (dense - sparse).max(0.0);
+                    sparse.max(*dense) + BETWEEN_RAYS * added
+                });
+                raise(&mut reached, between);
             }
             if let Ok(launch) = model.launch(*field, wavelength) {
                 let beyond = stray_points(launch.is_symmetric());
-                raise_heights(&mut reached, &launch, &beyond, &limited);
+                raise(&mut reached, heights(&launch, &beyond, &limited));
             }
         }
         reached
@@ -361,19 +408,22 @@ fn stray_points(half: bool) -> Vec<[f64; 2]> {
     STRAY.into_iter().flat_map(grid).collect()
 }
 
-/// Raises the heights at each surface to those of the rays of some pupil points that arrive.
-fn raise_heights(
-    reached: &mut [f64],
-    launch: &Launch<'_>,
-    points: &[[f64; 2]],
-    tracer: &Tracer<f64>,
-) {
+/// Raises the height at each surface to another one.
+fn raise(reached: &mut [f64], heights: impl IntoIterator<Item = f64>) {
+    reached.iter_mut().zip(heights).for_each(|(reached, height)| *reached = reached.max(height));
+}
+
+/// The largest distance from the axis in mm, at each surface, of the rays of some pupil points that
+/// arrive.
+fn heights(launch: &Launch<'_>, points: &[[f64; 2]], tracer: &Tracer<f64>) -> Vec<f64> {
     let rays: Rays<f64> = launch.rays(points).into_iter().flatten().collect();
     let mut landed = ImagePoints::default();
     tracer.trace_batch(&rays, &mut landed);
+    let mut reached = vec![0.0_f64; tracer.surfaces()];
     for i in (0..rays.len()).filter(|i| landed.fate(*i).is_imaged()) {
         tracer.visit(rays.get(i), |i, p| reached[i] = reached[i].max(p.x.hypot(p.y)));
     }
+    reached
 }
 
 fn index_drops(system: &System<f64>) -> Vec<usize> {

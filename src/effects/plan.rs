@@ -199,6 +199,9 @@ fn dispersion(
         count if measured.dispersion == 0.0 => {
             format!("all {count} wavelengths take the same path")
         }
+        count if !measured.dispersion.is_finite() => {
+            format!("too few rays of a field arrive to compare its {count} wavelengths")
+        }
         count => format!(
             "the {count} wavelengths land {} apart; {}",
             micrometres(measured.dispersion),
@@ -249,7 +252,7 @@ fn asphere(
 /// The shift of rays in words.
 fn shift_text(moved: f64, allowed: f64) -> String {
     if !moved.is_finite() {
-        return "rays would be lost".to_owned();
+        return "rays would be lost, or too few arrive to tell".to_owned();
     }
     format!("rays would land {} away; {}", micrometres(moved), allowed_text(allowed))
 }

@@ -244,6 +244,11 @@ fn a_full_disk_loses_no_result() {
     assert!(on_a_full_disk(&best)["lens"].is_object());
     let field = on_a_full_disk(&["grin", "luneburg", "--iterations", "1", "--out", &out]);
     assert!(field["field"]["index"].is_array());
+    let all = folder.path("");
+    let search = ["search", LENS, "--iterations", "4", "--reservoir-dir", &all];
+    let found = on_a_full_disk(&search);
+    assert_eq!(found["files"], json!([]));
+    assert!(found["lens"]["surfaces"].is_array(), "{found}");
     assert_eq!(folder.names(), [""; 0], "nothing is left behind");
 }
 

@@ -120,6 +120,44 @@ fn no_command_writes_over_what_it_reads() {
     assert_eq!(fs::read(folder.path("values.raw")).unwrap(), values);
 }
 
+#[test]
+fn a_scene_is_not_written_over_by_its_picture() {
+    let folder = Folder::new("own-scene");
+    let scene = folder.path("scene.png");
+    fs::write(&scene, b"of a user").unwrap();
+    let detour = folder.path("./scene.png");
+    for out in [&scene, &detour] {
+        let picture = ["picture", LENS, "--scene", &scene, "--out", out];
+        refused(2, &picture, "", &["--out", "is the scene; expected another file"]);
+    }
+    #[cfg(unix)]
+    {
+        let link = folder.path("link.png");
+        std::os::unix::fs::symlink("scene.png", &link).unwrap();
+        let picture = ["picture", LENS, "--scene", &scene, "--out", &link];
+        refused(2, &picture, "", &["--out", "is the scene"]);
+    }
+    assert_eq!(fs::read(&scene).unwrap(), b"of a user");
+}
+
+/// A design writes lenses beside the one that is named.
+#[test]
+fn a_specification_is_not_written_over_by_a_lens_beside_the_best_one() {
+    let folder = Folder::new("own-design");
+    let text = r#"{"focal_length_mm": 100, "f_number": 10, "half_field_deg": 1}"#;
+    for merit in ["simplest", "brightest"] {
+        let spec = folder.file(&format!("a_{merit}.json"), text);
+        let design = ["design", &spec, "--out", &folder.path("a.json"), "--gradients", "1"];
+        refused(2, &design, "", &[&spec, "is the specification; expected another file"]);
+        assert_eq!(fs::read_to_string(&spec).unwrap(), text);
+    }
+    let spec = folder.file("spec.json", text);
+    let best = ["design", &spec, "--out", &folder.path("a.json"), "--checkpoint"];
+    let checkpoint = folder.path("a_simplest.json");
+    fs::remove_file(&checkpoint).unwrap();
+    refused(2, &[&best[..], &[&checkpoint]].concat(), "", &["--checkpoint", "is --out"]);
+}
+
 /// A folder is filled with files of certain names, which nothing else may have.
 #[test]
 fn a_folder_and_a_file_in_it_do_not_share_a_name() {

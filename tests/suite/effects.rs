@@ -290,3 +290,69 @@ fn a_rim_that_holds_back_light_far_from_the_beam_is_kept() {
     let (auto, on) = (rms(&auto), rms(&on));
     assert!((auto.value - on.value).abs() <= auto.error + on.error, "{auto:?} {on:?}");
 }
+
+/// Points spread evenly over the unit disc, and more just inside its edge.
+fn disc_points() -> Vec<[f64; 2]> {
+    let turn = std::f64::consts::PI * (3.0 - 5f64.sqrt());
+    let spiral = (0..1200).map(|i| (((f64::from(i) + 0.5) / 1200.0).sqrt(), turn * f64::from(i)));
+    let edge = (0..400).map(|i| (0.99999, 0.01 + std::f64::consts::TAU * f64::from(i) / 400.0));
+    spiral.chain(edge).map(|(r, angle)| [r * angle.sin(), r * angle.cos()]).collect()
+}
+
+/// The rays of a plan that leaves rims out and those with all rims which end otherwise, and all.
+fn rays_let_through(lens: &Lens) -> (usize, usize) {
+    let every = Effect::ALL.iter().filter(|effect| **effect != Effect::Clipping);
+    let all_on = EffectOverrides::default();
+    let open = every.fold(all_on, |choices, effect| choices.with(*effect, EffectOverride::On));
+    let closed = open.clone().with(Effect::Clipping, EffectOverride::On);
+    let model = |choices: &EffectOverrides| {
+        build_ray_model(lens, 0, &planned(lens, 0, TASK, choices)).unwrap()
+    };
+    let (open, closed, points) = (model(&open), model(&closed), disc_points());
+    let (mut different, mut all) = (0, 0);
+    for field in &open.fields {
+        for wavelength in 0..open.channels.len() {
+            let landed = |model: &RayModel| {
+                let (indices, landed) =
+                    model.launch(*field, wavelength).ok()?.trace_points(&points);
+                let imaged = |i: &usize| landed.fate(*i).is_imaged();
+                let arrived = (0..indices.len()).filter(imaged).map(|i| indices[i]);
+                Some(arrived.collect::<std::collections::BTreeSet<_>>())
+            };
+            let (Some(open), Some(closed)) = (landed(&open), landed(&closed)) else { continue };
+            different += open.symmetric_difference(&closed).count();
+            all += closed.len();
+        }
+    }
+    (different, all)
+}
+
+/// Rims that a plan leaves out hold back no ray: on every lens of the library, with rays that the plan
+/// has not seen.
+#[test]
+fn a_rim_that_is_left_out_holds_back_no_ray() {
+    let mut rays = 0;
+    for entry in files::library_lenses() {
+        let lens = files::json::read(entry.text().unwrap(), &entry.name).unwrap();
+        let (different, all) = rays_let_through(&lens);
+        assert_eq!(different, 0, "{}: of {all} rays", entry.name);
+        rays += all;
+    }
+    assert!(rays > 1_000_000, "{rays} rays");
+}
+
+/// A few sampled rays that all end at rims do not show that colours take the same path.
+#[test]
+fn a_field_of_little_light_is_traced_at_all_its_wavelengths() {
+    let mut lens = lens("wide_nikkor_28_f35");
+    lens.fields.values = vec![FieldPoint { x: 0.0, y: 37.65, weight: 1.0 }];
+    for task in [TASK, TracePurpose::Exact] {
+        let auto = planned(&lens, 0, task, &EffectOverrides::default());
+        let decision = auto.decision(Effect::Dispersion).unwrap();
+        assert!(decision.computed && decision.reason.contains("too few rays"), "{decision:?}");
+    }
+    lens.wavelengths.truncate(1);
+    lens.wavelengths[0].primary = true;
+    let auto = planned(&lens, 0, TASK, &EffectOverrides::default());
+    assert!(!auto.computes(Effect::Dispersion));
+}

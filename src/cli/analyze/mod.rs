@@ -162,6 +162,15 @@ const GHOST_RULES: [EffectRule; 3] = [
         reason: "reflected light leaves the beam",
     },
 ];
+/// The rules for light at a point of the image, which comes from other fields than those of the plan.
+const IRRADIANCE_RULES: [EffectRule; 2] = [
+    ONE_WAVELENGTH,
+    EffectRule {
+        effect: Effect::Clipping,
+        allowed: AllowedSetting::AlwaysOn,
+        reason: "light reaches a point of the image from every direction",
+    },
+];
 /// The rule for image heights compared with ideal ones.
 const OBJECT_IN_PLACE: EffectRule = EffectRule {
     effect: Effect::FiniteObject,
@@ -177,6 +186,7 @@ impl AnalysisKind {
             Self::LateralColor | Self::Longitudinal => &[COLORS],
             Self::Distortion => &[ONE_WAVELENGTH, OBJECT_IN_PLACE],
             Self::Ghosts => &GHOST_RULES,
+            Self::Illumination => &IRRADIANCE_RULES,
             _ => &[ONE_WAVELENGTH],
         }
     }

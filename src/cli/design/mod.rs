@@ -12,8 +12,8 @@ use super::progress::{stop_flag, styled_bar};
 use crate::files::{self, FileError, FileLock};
 use crate::measure::Stopwatch;
 use crate::search::design::{
-    DesignRun, DesignSettings, DesignedLens, JUDGEMENT_TOLERANCE, LensJudgement, LensRequirements,
-    LensSpecification, judge_lens,
+    DesignMerit, DesignRun, DesignSettings, DesignedLens, JUDGEMENT_TOLERANCE, LensJudgement,
+    LensRequirements, LensSpecification, judge_lens,
 };
 use indicatif::ProgressBar;
 use report::{DesignReport, JudgementReport};
@@ -111,6 +111,11 @@ impl DesignArgs {
         let judged = self.judge.as_deref().map(|path| ("--judge", path));
         let mut paths = OutputPaths::reading(read.into_iter().chain(judged));
         paths.file("--out", self.out.as_deref(), &["json", "zmx"])?;
+        let others = self
+            .out
+            .iter()
+            .flat_map(|out| DesignMerit::ALL.map(|merit| beside(out, report::merit_name(merit))));
+        others.into_iter().try_for_each(|other| paths.take("--out", &other))?;
         paths.file("--checkpoint", self.checkpoint.as_deref(), &["json"])
     }
 
@@ -212,7 +217,6 @@ fn judge(path: &Path, asked: &LensRequirements) -> Result<LensJudgement, CliErro
 mod tests {
     use super::*;
     use crate::lens::{Lens, blank};
-    use crate::search::design::DesignMerit;
 
     #[test]
     fn the_best_lens_has_the_name_that_is_asked_for_and_others_their_merit() {

@@ -135,6 +135,7 @@ impl SearchArgs {
         if let Some(finished) = &finished {
             unsaved = self.save_best(&finished.lens, &original, &mut failures);
         }
+        let unsaved = unsaved.or_else(|| self.unstored_best(&run, &stored, &original));
         let printed = Stopwatch::start();
         let compared = StartAgainstBest::new(&landscape, &run.best().point).map_err(refused)?;
         let report = SearchReport::new(report::SearchResults {
@@ -300,6 +301,17 @@ impl SearchArgs {
         let best = lens_to_write(best, original);
         let path = self.out.as_ref()?;
         failures.note(files::save(&best, path)).is_none().then_some(best)
+    }
+
+    /// The best lens, if the folder of the reservoir was the only place for it and took none.
+    fn unstored_best(
+        &self,
+        run: &SearchRunOn<LensLandscape>,
+        stored: &[PathBuf],
+        original: &Lens,
+    ) -> Option<Lens> {
+        let lost = self.out.is_none() && self.reservoir_dir.is_some() && stored.is_empty();
+        lost.then(|| lens_to_write(&run.best().point, original))
     }
 
     /// The lenses of an earlier run in the folder of the reservoir.

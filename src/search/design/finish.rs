@@ -23,6 +23,11 @@ pub enum DesignMerit {
     Brightest,
 }
 
+impl DesignMerit {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Best, Self::Simplest, Self::Brightest];
+}
+
 /// A designed lens.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct DesignedLens {

@@ -297,8 +297,12 @@ impl Analyses {
             .fans
             .then(|| time(|| for_each_field(&b, |field| analysis::fan(&b, field, FAN_POINTS))));
         unless_interrupted()?;
-        let field_curves =
-            settings.field_curves.then(|| time(|| field_curves::field_curves(&b, accuracy)));
+        let field_curves = settings.field_curves.then(|| {
+            time(|| {
+                let model = model_with_all_rims(lens, settings.zoom, &b, &plan.value);
+                field_curves::field_curves(&model, accuracy)
+            })
+        });
         unless_interrupted()?;
         Some(Self {
             seidel: time(|| b.seidel()),
@@ -317,6 +321,22 @@ impl Analyses {
             field_curves,
         })
     }
+}
+
+/// The rays of a plan with all its rims: light at a point of the image comes from other fields than those
+/// of the plan.
+fn model_with_all_rims(
+    lens: &Lens,
+    zoom: usize,
+    planned: &Arc<RayModel>,
+    plan: &EffectPlan,
+) -> Arc<RayModel> {
+    if plan.unclipped.is_empty() {
+        return Arc::clone(planned);
+    }
+    let plan = EffectPlan { unclipped: Vec::new(), ..plan.clone() };
+    let model = effects::build_ray_model(lens, zoom, &plan);
+    model.map_or_else(|_| Arc::clone(planned), Arc::new)
 }
 
 /// The clear semi-diameters over all zoom positions; one at which nothing can be traced counts for
