@@ -30,14 +30,12 @@ impl Arrangement {
 }
 
 /// The panels of the light in the image.
-const LIGHT: [PanelKind; 7] = [
+const LIGHT: [PanelKind; 5] = [
     PanelKind::Spot,
     PanelKind::Fans,
     PanelKind::Contrast,
-    PanelKind::FieldCurves,
     PanelKind::Pupil,
-    PanelKind::Picture,
-    PanelKind::Seidel,
+    PanelKind::FieldCurves,
 ];
 
 fn default_arrangement() -> Tree<PanelKind> {
@@ -46,8 +44,9 @@ fn default_arrangement() -> Tree<PanelKind> {
     let facts = tabs(&mut tiles, &[Kind::FirstOrder, Kind::Effects]);
     let light = tabs(&mut tiles, &LIGHT);
     let better = tabs(&mut tiles, &[Kind::Optimizer, Kind::Pareto, Kind::Search, Kind::History]);
-    let drawings = tabs(&mut tiles, &[Kind::Layout, Kind::Slice]);
-    let table = tabs(&mut tiles, &[Kind::Prescription, Kind::System, Kind::Zoom, Kind::Tolerances]);
+    let drawings = tabs(&mut tiles, &[Kind::Layout, Kind::Slice, Kind::Picture]);
+    let table = [Kind::Prescription, Kind::System, Kind::Zoom, Kind::Tolerances, Kind::Seidel];
+    let table = tabs(&mut tiles, &table);
     let table = row(&mut tiles, &[(table, 0.71), (facts, 0.29)]);
     let left = column(&mut tiles, &[(drawings, 0.52), (table, 0.48)]);
     let right = column(&mut tiles, &[(light, 0.44), (better, 0.56)]);
@@ -58,13 +57,14 @@ fn default_arrangement() -> Tree<PanelKind> {
 fn search_arrangement() -> Tree<PanelKind> {
     use PanelKind as Kind;
     let mut tiles = Tiles::default();
-    let drawings = tabs(&mut tiles, &[Kind::Layout, Kind::Slice]);
+    let drawings = tabs(&mut tiles, &[Kind::Layout, Kind::Slice, Kind::Picture]);
     let light = tabs(&mut tiles, &LIGHT);
     let numbers = [
         Kind::Prescription,
         Kind::System,
         Kind::Zoom,
         Kind::Tolerances,
+        Kind::Seidel,
         Kind::FirstOrder,
         Kind::Effects,
     ];

@@ -55,7 +55,9 @@ fn a_typed_radius_is_committed_by_enter() {
     let mut harness = prescription();
     type_into(&mut harness, "Radius of surface 1", "15*1.1", Key::Enter);
     let wanted = Edit::set_radius(0, 15.0 * 1.1);
-    assert_eq!(harness.state().commands, [Command::Edit(wanted), Command::CommitEdit]);
+    let [first, second] = [0, 1].map(|surface| Command::Select(Some(surface)));
+    let entered = [first, Command::Edit(wanted), Command::CommitEdit, second];
+    assert_eq!(harness.state().commands, entered, "the surface of the cell is the selected one");
     assert!(harness.get_by_label("Radius of surface 2").is_focused(), "Enter goes down");
 }
 
@@ -74,7 +76,7 @@ fn a_typed_thickness_is_committed_by_tab() {
 fn an_invalid_number_stays_in_its_cell_with_the_reason() {
     let mut harness = prescription();
     type_into(&mut harness, "Radius of surface 3", "abc", Key::Enter);
-    assert_eq!(harness.state().commands, []);
+    assert_eq!(harness.state().commands, [Command::Select(Some(2))]);
     let cell = harness.get_by_label("Radius of surface 3");
     assert_eq!(cell.value().as_deref(), Some("abc"), "nothing is lost");
     assert!(harness.query_by_label_contains("is no number; expected").is_some());
@@ -84,7 +86,7 @@ fn an_invalid_number_stays_in_its_cell_with_the_reason() {
 fn an_unknown_glass_is_refused_with_its_surface() {
     let mut harness = prescription();
     type_into(&mut harness, "Glass of surface 3", "SCHOTT BK7", Key::Enter);
-    assert_eq!(harness.state().commands, []);
+    assert_eq!(harness.state().commands, [Command::Select(Some(2))]);
     harness.get_by_label_contains("Unknown glass `SCHOTT BK7` after surface 3; similar names");
 }
 
@@ -92,7 +94,7 @@ fn an_unknown_glass_is_refused_with_its_surface() {
 fn escape_discards_a_typed_value() {
     let mut harness = prescription();
     type_into(&mut harness, "Radius of surface 1", "99", Key::Escape);
-    assert_eq!(harness.state().commands, []);
+    assert_eq!(harness.state().commands, [Command::Select(Some(0))]);
     let value = harness.get_by_label("Radius of surface 1").value();
     assert_eq!(value.as_deref(), Some("14.1615"));
 }

@@ -144,9 +144,9 @@ fn a_range_is_copied_pasted_and_cleared() {
     assert_eq!((title.as_str(), &pasted[..]), ("paste", &wanted[..]));
 }
 
-#[test]
-fn all_numbers_of_a_range_are_varied_and_fixed_together() {
-    let mut harness = table(double_gauss());
+/// The numbers of a range that Ctrl+Shift+V makes variable (true) or fixed, by surface.
+fn varied_range(lens: Lens) -> Vec<(usize, bool)> {
+    let mut harness = table(lens);
     enter(&mut harness, "Radius of surface 1");
     for _ in 0..2 {
         harness.key_press_modifiers(Modifiers::SHIFT, Key::ArrowDown);
@@ -154,17 +154,22 @@ fn all_numbers_of_a_range_are_varied_and_fixed_together() {
     }
     harness.key_press_modifiers(Modifiers::COMMAND | Modifiers::SHIFT, Key::V);
     harness.run();
+    let found = edits(&harness);
+    let [Edit::Sequence { edits, .. }] = &found[..] else { panic!("{found:?}") };
     let varied = |edit: &Edit| match edit {
-        Edit::AddVariable(variable) => Some(variable.parameter.surface),
-        _ => None,
-    };
-    match &edits(&harness)[..] {
-        [Edit::Sequence { edits, .. }] => {
-            let surfaces: Option<Vec<usize>> = edits.iter().map(varied).collect();
-            assert_eq!(surfaces, Some(vec![0, 1, 2]));
-        }
+        Edit::AddVariable(variable) => (variable.parameter.surface, true),
+        Edit::RemoveVariable(parameter) => (parameter.surface, false),
         other => panic!("{other:?}"),
-    }
+    };
+    edits.iter().map(varied).collect()
+}
+
+#[test]
+fn all_numbers_of_a_range_are_varied_and_fixed_together() {
+    let varied = double_gauss();
+    assert_eq!(varied_range(varied.clone()), [0, 1, 2].map(|surface| (surface, false)));
+    let fixed = Lens { variables: Vec::new(), ..varied };
+    assert_eq!(varied_range(fixed), [0, 1, 2].map(|surface| (surface, true)));
 }
 
 /// Undo and pasting change the text under the cursor: what is typed next replaces all of it.

@@ -18,7 +18,7 @@ pub use scene_picture::ScenePicture;
 use super::clock::{Timed, now, time};
 use super::run::{LatestRequestWorker, WorkerOutput, catch_panic};
 use crate::analysis::{self, AnalysisError, Fan, RayLayout, Spot, SpotPoints};
-use crate::effects::{self, EffectOverrides, EffectPlan, TracePurpose};
+use crate::effects::{self, Effect, EffectOverride, EffectOverrides, EffectPlan, TracePurpose};
 use crate::lens::{FieldPoint, Lens};
 use crate::measure::EffectTask;
 use crate::paraxial::{FirstOrder, Seidel};
@@ -331,7 +331,9 @@ fn model_with_all_rims(
     planned: &Arc<RayModel>,
     plan: &EffectPlan,
 ) -> Arc<RayModel> {
-    if plan.unclipped.is_empty() {
+    let clipping = plan.decision(Effect::Clipping);
+    let is_off = clipping.is_some_and(|decision| decision.choice == EffectOverride::Off);
+    if is_off || plan.unclipped.is_empty() {
         return Arc::clone(planned);
     }
     let plan = EffectPlan { unclipped: Vec::new(), ..plan.clone() };
