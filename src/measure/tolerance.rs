@@ -26,6 +26,9 @@ const ACCURACY: f64 = 1e-4;
 /// The numbers of tolerances for which the gradient of the as-built merit is timed.
 const COUNTS: [usize; 3] = [10, 100, 1000];
 
+/// The step of the differences of derivatives, as a share of the half range of an error.
+const STEP: f64 = 0.125;
+
 /// The turns in which gradients are timed, and the least seconds of each.
 const TURNS: usize = 15;
 const TURN_SECONDS: f64 = 0.02;
@@ -149,7 +152,8 @@ fn second_error(scene: &ToleranceScene, sheet: &ToleranceSheet) -> Result<f64, T
             }
             Ok::<_, ToleranceError>(found)
         };
-        let step = tolerance.half_range;
+        // Terms of the sixth order fall with the fourth power of the step, rounding grows with its inverse.
+        let step = STEP * tolerance.half_range;
         let [a, b, c, d] = [-2.0, -1.0, 1.0, 2.0].map(|i| derivatives(i * step));
         let difference = 8.0 * (c?.first - b?.first) - (d?.first - a?.first);
         let exact = derivatives(0.0)?.second;
