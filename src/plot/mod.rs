@@ -7,6 +7,7 @@
 mod canvas;
 mod chart;
 mod color;
+mod curve_sheet;
 mod document;
 mod font;
 mod vector;
@@ -14,6 +15,7 @@ mod vector;
 pub use canvas::{Canvas, NamedPlot, Stroke, TextAlign, draw_image_row, gray_levels};
 pub use chart::{Axis, Chart, Legend};
 pub use color::{BLACK, Color, GREY, GRID, PALETTE, diverging, gray_level};
+pub use curve_sheet::{ChartCurve, CurveChart, CurveSheet};
 pub use document::{DocumentBlock, DocumentTable, ReportDocument, html_text, paper_pages};
 pub use vector::{
     DxfError, LinePattern, Mark, PaperChart, PdfError, Pen, SheetArc, SheetScale, VectorDrawing,

@@ -158,6 +158,36 @@ fn a_specification_is_not_written_over_by_a_lens_beside_the_best_one() {
     refused(2, &[&best[..], &[&checkpoint]].concat(), "", &["--checkpoint", "is --out"]);
 }
 
+/// Curves as polylines of 0.35 mm: two sections at three fields and three wavelengths.
+#[test]
+fn curves_of_an_analysis_are_drawn() {
+    let (folder, lens) = (Folder::new("curves"), "lenses/cooke_triplet_100_f27.json");
+    let [svg, pdf, png] = ["svg", "pdf", "png"].map(|kind| folder.path(&format!("fan.{kind}")));
+    for path in [&svg, &pdf, &png] {
+        done_json(&["analyze", lens, "fan", "--plot", path], "");
+    }
+    let text = fs::read_to_string(&svg).unwrap();
+    let curves = text.lines().filter(|line| line.contains("polyline") && line.contains("0.35"));
+    let samples = 3 * 3;
+    assert_eq!(curves.count(), 2 * 3 * 3 + samples, "{text}");
+    assert!(["tangential", "dy, mm", "0.5875618 um"].iter().all(|word| text.contains(word)));
+    assert!(fs::read(&pdf).unwrap().starts_with(b"%PDF"));
+    assert!(image::open(&png).unwrap().width() > 1000);
+    for kind in ["opd-fan", "longitudinal", "through-focus", "mtf", "through-focus-mtf"] {
+        done_json(&["analyze", lens, kind, "--error", "1%", "--plot", &svg], "");
+        let text = fs::read_to_string(&svg).unwrap();
+        assert!(text.matches("0.35").count() >= 2, "{kind}");
+    }
+    let expected = ["--plot", "`spot` has no curves", "fan", "encircled-energy"];
+    refused(2, &["analyze", lens, "spot", "--plot", &svg], "", &expected);
+    refused(
+        2,
+        &["analyze", lens, "fan", "--plot", "fan.gif"],
+        "",
+        &["fan.gif", "`.png` or `.svg`"],
+    );
+}
+
 /// A folder is filled with files of certain names, which nothing else may have.
 #[test]
 fn a_folder_and_a_file_in_it_do_not_share_a_name() {

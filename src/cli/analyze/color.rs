@@ -10,6 +10,7 @@ use crate::cli::error::CliError;
 use crate::cli::output::{ShortNumber, counted, or_dash, without_rounding};
 use crate::lens::FieldPoint;
 use crate::measure::time_ms;
+use crate::plot::{ChartCurve, CurveChart};
 use serde::Serialize;
 
 /// The number of zones of the pupil.
@@ -132,6 +133,17 @@ impl TextLines for LongitudinalJson {
             }));
         }
         lines
+    }
+
+    /// The pupil stands upright, as is usual for this curve.
+    fn charts(&self) -> Vec<CurveChart> {
+        let curve = |(i, color): (usize, &ZonesJson)| {
+            let zones = color.zones.iter().map(|zone| (zone.pupil, zone.focus));
+            ChartCurve::new(format!("{} um", color.wavelength_um), i, zones).transposed()
+        };
+        let curves = self.colors.iter().enumerate().map(curve).collect();
+        let axes = ["focus behind the image plane, mm", "pupil"];
+        vec![CurveChart { title: "longitudinal aberration".to_owned(), axes, curves }]
     }
 }
 

@@ -8,6 +8,7 @@ use crate::analysis::{
 };
 use crate::cli::output::{ShortNumber, counted};
 use crate::measure::time_ms;
+use crate::plot::{ChartCurve, CurveChart};
 use serde::Serialize;
 
 /// The contrast of a field.
@@ -104,6 +105,34 @@ impl TextLines for MtfJson {
         }
         lines
     }
+
+    fn charts(&self) -> Vec<CurveChart> {
+        let curves = |(color, name, curve): (usize, &str, &CurveJson)| match curve {
+            CurveJson::Curve { curve, .. } => contrast_curves(name, color, &curve.points),
+            CurveJson::Refused { .. } => Vec::new(),
+        };
+        let both = [
+            (0, "diffraction", &self.polychromatic_diffraction),
+            (1, "rays", &self.polychromatic_geometric),
+        ];
+        vec![CurveChart {
+            title: "all wavelengths".to_owned(),
+            axes: ["cycles/mm", "contrast"],
+            curves: both.into_iter().flat_map(curves).collect(),
+        }]
+    }
+}
+
+/// The tangential contrast, full, and the sagittal one, dashed.
+fn contrast_curves(name: &str, color: usize, points: &[MtfPoint]) -> Vec<ChartCurve> {
+    let curve = |section: &str, of: fn(&MtfPoint) -> f64| {
+        let points = points.iter().map(|point| (point.frequency, Some(of(point))));
+        ChartCurve::new(format!("{name}, {section}"), color, points)
+    };
+    vec![
+        curve("tangential", |point| point.tangential.modulus.value),
+        curve("sagittal", |point| point.sagittal.modulus.value).dashed(),
+    ]
 }
 
 fn gate_text(gate: &DiffractionGate) -> String {
@@ -169,5 +198,13 @@ impl TextLines for FocusContrastJson {
         let head = format!("at {frequency} cycles/mm, {:.3} ms", self.milliseconds);
         let heads = [head, column_heads("shift, mm")];
         heads.into_iter().chain(self.positions.iter().map(point_text)).collect()
+    }
+
+    fn charts(&self) -> Vec<CurveChart> {
+        vec![CurveChart {
+            title: format!("{} cycles/mm", ShortNumber(self.frequency)),
+            axes: ["shift of the image plane, mm", "contrast"],
+            curves: contrast_curves("diffraction", 0, &self.positions),
+        }]
     }
 }

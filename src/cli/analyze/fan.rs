@@ -4,6 +4,7 @@ use super::{AnalysisRun, AtField, SelectedField, TextLines};
 use crate::analysis::{AnalysisError, Fan, FanPoint, fan};
 use crate::cli::output::{ShortNumber, counted, or_dash};
 use crate::measure::time_ms;
+use crate::plot::{ChartCurve, CurveChart};
 use serde::Serialize;
 
 /// Rays of a fan, which is a curve to look at and not an integral.
@@ -94,5 +95,22 @@ impl TextLines for FanJson {
             }
         }
         lines
+    }
+
+    fn charts(&self) -> Vec<CurveChart> {
+        type Section = fn(&ColorFanJson) -> &[FanPointJson];
+        type Error = fn(&FanPointJson) -> Option<f64>;
+        let chart = |title: &str, error_name, section: Section, error: Error| {
+            let curve = |(i, color): (usize, &ColorFanJson)| {
+                let points = section(color).iter().map(|point| (point.pupil, error(point)));
+                ChartCurve::new(format!("{} um", color.wavelength_um), i, points)
+            };
+            let curves = self.colors.iter().enumerate().map(curve).collect();
+            CurveChart { title: title.to_owned(), axes: ["pupil", error_name], curves }
+        };
+        vec![
+            chart("tangential", "dy, mm", |color| &color.tangential, |point| point.dy),
+            chart("sagittal", "dx, mm", |color| &color.sagittal, |point| point.dx),
+        ]
     }
 }

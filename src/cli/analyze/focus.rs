@@ -7,6 +7,7 @@ use crate::cli::output::ShortNumber;
 use crate::effects::build_ray_model_at;
 use crate::lens::{FieldPoint, Lens, Parameter, Quantity};
 use crate::measure::time_ms;
+use crate::plot::{ChartCurve, CurveChart};
 use serde::Serialize;
 
 /// The number of image planes on each side of that of the lens.
@@ -112,5 +113,12 @@ impl TextLines for ThroughFocusJson {
                 .map_or(format!("{name:<22} no light"), |rms| estimate_text(&name, rms))
         };
         self.positions.iter().map(line).collect()
+    }
+
+    fn charts(&self) -> Vec<CurveChart> {
+        let radius = |at: &FocusPosition| (at.defocus, at.rms.map(|rms| rms.value));
+        let curve = ChartCurve::new("all colours", 0, self.positions.iter().map(radius));
+        let axes = ["shift of the image plane, mm", "rms radius, mm"];
+        vec![CurveChart { title: "through focus".to_owned(), axes, curves: vec![curve] }]
     }
 }

@@ -1,6 +1,7 @@
 //! `analyze`: the results that a designer reads, each number with its error, rays and milliseconds.
 
 mod aberration_names;
+mod charts;
 mod chief;
 mod color;
 mod contrast;
@@ -24,6 +25,7 @@ use crate::effects::{self, Effect, EffectPlan, TracePurpose};
 use crate::files;
 use crate::lens::{FieldKind, FieldPoint, SurfaceNumber};
 use crate::measure::time_ms;
+use crate::plot::CurveChart;
 use crate::pupil::{Accuracy, RayModel};
 use crate::trace::{Fate, Fates};
 use clap::ValueEnum;
@@ -78,6 +80,11 @@ pub(super) struct AnalyzeArgs {
     /// Writes all numbers as CSV into this file too
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
+
+    /// Draws the curves of fan, opd-fan, longitudinal, through-focus, mtf, through-focus-mtf or
+    /// encircled-energy: .png, .svg or .pdf
+    #[arg(long, value_name = "FILE")]
+    plot: Option<PathBuf>,
 
     #[command(flatten)]
     effects: EffectArgs,
@@ -191,6 +198,15 @@ impl AnalysisKind {
         }
     }
 
+    /// True for curves, which can be drawn.
+    fn has_curves(self) -> bool {
+        match self {
+            Self::Fan | Self::OpdFan | Self::Longitudinal | Self::ThroughFocus => true,
+            Self::Mtf | Self::ThroughFocusMtf | Self::EncircledEnergy => true,
+            _ => false,
+        }
+    }
+
     /// The purpose that effects are planned for.
     fn purpose(self, tolerance: f64) -> TracePurpose {
         match self {
@@ -215,6 +231,8 @@ impl AnalyzeArgs {
     pub(super) fn run(&self, output: &Output) -> Result<(), CliError> {
         let mut paths = OutputPaths::reading([("the lens", self.lens.path())]);
         paths.file("--csv", self.csv.as_deref(), &["csv"])?;
+        paths.file("--plot", self.plot.as_deref(), &charts::EXTENSIONS)?;
+        self.check_plot()?;
         let run = AnalysisRun::new(self)?;
         match self.what {
             AnalysisKind::Spot => self.finish(&run, spot::spots(&run), output),
@@ -263,8 +281,23 @@ impl AnalyzeArgs {
                 .map_err(|why| CliError::Failed(format!("{}: {why}", path.display())))?;
             failures.note(files::write_atomic(path, csv::csv(&value).as_bytes()));
         }
+        if let Some(path) = &self.plot {
+            failures.note(charts::save(&report, &run.opened.lens.name, path));
+        }
         failures.note(output.print(&report));
         failures.into_result()
+    }
+
+    /// Refuses a plot of an analysis that has no curves.
+    fn check_plot(&self) -> Result<(), CliError> {
+        if self.plot.is_none() || self.what.has_curves() {
+            return Ok(());
+        }
+        let name = |kind: &AnalysisKind| kind.to_possible_value().map(|v| v.get_name().to_owned());
+        let all = AnalysisKind::value_variants().iter().filter(|kind| kind.has_curves());
+        let curves = all.filter_map(name).collect::<Vec<_>>().join(", ");
+        let asked = name(&self.what).unwrap_or_default();
+        Err(CliError::Input(format!("--plot: `{asked}` has no curves; expected one of {curves}")))
     }
 
     /// Refuses frequencies that are no positive numbers.
@@ -447,6 +480,10 @@ trait TextLines {
     const TITLE: &'static str;
     /// The lines of a field.
     fn lines(&self) -> Vec<String>;
+    /// The curves of a field, as charts.
+    fn charts(&self) -> Vec<CurveChart> {
+        Vec::new()
+    }
 }
 
 impl<T: TextLines> Display for AnalysisReport<T> {

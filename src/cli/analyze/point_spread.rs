@@ -6,6 +6,7 @@ use crate::analysis::{
 };
 use crate::cli::output::{ShortNumber, without_rounding};
 use crate::measure::time_ms;
+use crate::plot::{ChartCurve, CurveChart};
 use serde::Serialize;
 
 /// The diffraction image of a field.
@@ -148,5 +149,13 @@ impl TextLines for EncircledJson {
         };
         let head = format!("{:<22} {:>13}", "radius, mm", "share");
         std::iter::once(head).chain(self.circles.iter().map(line)).collect()
+    }
+
+    fn charts(&self) -> Vec<CurveChart> {
+        let circles = self.circles.iter().map(|circle| (circle.radius, Some(circle.energy.value)));
+        let points = std::iter::once((0.0, Some(0.0))).chain(circles);
+        let curve = ChartCurve::new("diffraction", 0, points);
+        let axes = ["radius, mm", "share of the light"];
+        vec![CurveChart { title: "encircled energy".to_owned(), axes, curves: vec![curve] }]
     }
 }

@@ -8,6 +8,7 @@ use crate::analysis::{
 };
 use crate::cli::output::{ShortNumber, counted, or_dash};
 use crate::measure::time_ms;
+use crate::plot::{ChartCurve, CurveChart};
 use serde::Serialize;
 
 /// The wavefront of a field.
@@ -147,6 +148,17 @@ impl TextLines for PathFanJson {
             lines.push(format!("{:>8}  {along:>14}  {across:>14}", ShortNumber(t.py)));
         }
         lines
+    }
+
+    fn charts(&self) -> Vec<CurveChart> {
+        let tangential = self.tangential.iter().map(|path| (path.py, path.waves));
+        let sagittal = self.sagittal.iter().map(|path| (path.px, path.waves));
+        let curves = vec![
+            ChartCurve::new("tangential", 0, tangential),
+            ChartCurve::new("sagittal", 1, sagittal),
+        ];
+        let axes = ["pupil", "wavelengths"];
+        vec![CurveChart { title: "path differences".to_owned(), axes, curves }]
     }
 }
 

@@ -1,0 +1,50 @@
+//! The curves of an analysis as a picture or on paper: a row of charts for each field.
+
+use super::{AnalysisReport, FieldOutcome, TextLines};
+use crate::cli::error::CliError;
+use crate::cli::output::ShortNumber;
+use crate::files;
+use crate::lens::FieldKind;
+use crate::plot::{CurveChart, CurveSheet, pdf_bytes, svg_text};
+use crate::report::has_extension;
+use std::path::Path;
+
+/// The extensions of the files that can be written.
+pub(super) const EXTENSIONS: [&str; 3] = ["png", "svg", "pdf"];
+
+/// Draws the curves of all fields that have light into a file.
+pub(super) fn save<T: TextLines>(
+    report: &AnalysisReport<T>,
+    lens: &str,
+    path: &Path,
+) -> Result<(), CliError> {
+    let sheet = CurveSheet { title: format!("{lens}: {}", T::TITLE), rows: rows(report) };
+    let fail = |why: String| CliError::Failed(format!("{}: {why}", path.display()));
+    let bytes = if has_extension(path, "png") {
+        sheet.canvas().png().map_err(|why| fail(why.to_string()))?
+    } else if has_extension(path, "svg") {
+        svg_text(&sheet.drawing()).into_bytes()
+    } else {
+        pdf_bytes(lens, &[sheet.drawing()]).map_err(|why| fail(why.to_string()))?
+    };
+    Ok(files::write_atomic(path, &bytes)?)
+}
+
+/// The charts of each field, with its name before their titles.
+fn rows<T: TextLines>(report: &AnalysisReport<T>) -> Vec<Vec<CurveChart>> {
+    let unit = match report.field_kind {
+        FieldKind::Angle => "°",
+        FieldKind::ObjectHeight | FieldKind::ImageHeight => " mm",
+    };
+    let row = |field: &super::AtField<T>| {
+        let FieldOutcome::Transmitted(found) = &field.outcome else { return None };
+        let (x, y) = (ShortNumber(field.x), ShortNumber(field.y));
+        let x = if field.x == 0.0 { String::new() } else { format!("x {x}{unit}, ") };
+        let named = |chart: CurveChart| {
+            let title = format!("{x}y {y}{unit}: {}", chart.title);
+            CurveChart { title, ..chart }
+        };
+        Some(found.charts().into_iter().map(named).collect())
+    };
+    report.fields.iter().filter_map(row).collect()
+}

@@ -1,0 +1,230 @@
+//! Charts of curves in rows, one row for each field of a lens, as pixels and on paper.
+
+use super::{
+    Axis, BLACK, Canvas, Chart, Legend, LinePattern, PALETTE, PaperChart, Pen, Stroke, TextAlign,
+    VectorDrawing,
+};
+
+/// A curve in pieces: it is not drawn where a quantity has no value.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ChartCurve {
+    /// Its name in the legend.
+    pub name: String,
+    /// Its colour, by its number in [`PALETTE`].
+    pub color: usize,
+    /// Dashes instead of a full line.
+    pub dashed: bool,
+    /// The points of each piece.
+    pub pieces: Vec<Vec<[f64; 2]>>,
+}
+
+impl ChartCurve {
+    /// A full curve through the points that have a value.
+    pub fn new(
+        name: impl Into<String>,
+        color: usize,
+        points: impl IntoIterator<Item = (f64, Option<f64>)>,
+    ) -> Self {
+        let mut pieces = vec![Vec::new()];
+        for (x, y) in points {
+            match (y, pieces.last_mut()) {
+                (Some(y), Some(piece)) => piece.push([x, y]),
+                _ => pieces.push(Vec::new()),
+            }
+        }
+        pieces.retain(|piece| !piece.is_empty());
+        Self { name: name.into(), color: color % PALETTE.len(), dashed: false, pieces }
+    }
+
+    /// The same with dashes.
+    #[must_use]
+    pub fn dashed(self) -> Self {
+        Self { dashed: true, ..self }
+    }
+
+    /// Its points with the two quantities exchanged, as for a curve that is drawn upright.
+    #[must_use]
+    pub fn transposed(mut self) -> Self {
+        self.pieces.iter_mut().flatten().for_each(|point| point.reverse());
+        self
+    }
+}
+
+/// Curves over the same axes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CurveChart {
+    /// The words above it.
+    pub title: String,
+    /// The names of the quantities to the right and upwards, with their units.
+    pub axes: [&'static str; 2],
+    /// The curves.
+    pub curves: Vec<ChartCurve>,
+}
+
+impl CurveChart {
+    /// The axes, which contain all curves.
+    fn drawn_axes(&self) -> [Axis; 2] {
+        let values = |k: usize| {
+            let points = self.curves.iter().flat_map(|curve| curve.pieces.iter().flatten());
+            points.map(move |point| point[k])
+        };
+        [0, 1].map(|k| Axis::linear(self.axes[k], values(k)))
+    }
+}
+
+/// Charts in rows below a title, with a legend beside each row.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CurveSheet {
+    /// The title.
+    pub title: String,
+    /// The charts of each row; those of a row share the legend of the first one.
+    pub rows: Vec<Vec<CurveChart>>,
+}
+
+/// The size of a chart and the room around it, in mm.
+const CHART: [f64; 2] = [80.0, 50.0];
+const ROOM: [f64; 2] = [24.0, 24.0];
+/// The height of the title, and the width of the legend, in mm.
+const TITLE: f64 = 10.0;
+const LEGEND: f64 = 52.0;
+/// The number of pixels of a millimetre.
+const PIXELS: f64 = 8.0;
+
+impl CurveSheet {
+    /// Width and height, in mm.
+    fn size(&self) -> [f64; 2] {
+        let columns = self.rows.iter().map(Vec::len).max().unwrap_or(0).max(1) as f64;
+        let rows = self.rows.len().max(1) as f64;
+        [columns * (CHART[0] + ROOM[0]) + LEGEND, TITLE + rows * (CHART[1] + ROOM[1])]
+    }
+
+    /// The upper left corner of a chart, in mm.
+    fn corner(row: usize, column: usize) -> [f64; 2] {
+        let [width, height] = [0, 1].map(|k| CHART[k] + ROOM[k]);
+        [0.75 * ROOM[0] + column as f64 * width, TITLE + 0.4 * ROOM[1] + row as f64 * height]
+    }
+
+    /// All charts with their corners, in mm.
+    fn charts(&self) -> impl Iterator<Item = ([f64; 2], &CurveChart)> {
+        self.rows.iter().enumerate().flat_map(|(row, charts)| {
+            let of_row = charts.iter().enumerate();
+            of_row.map(move |(column, chart)| (Self::corner(row, column), chart))
+        })
+    }
+
+    /// The curves of the first chart of each row, with the corner of its legend, in mm.
+    fn legends(&self) -> impl Iterator<Item = ([f64; 2], &CurveChart)> {
+        let left = self.size()[0] - LEGEND;
+        let first = |(row, charts)| Some(([left, Self::corner(row, 0)[1]], <[_]>::first(charts)?));
+        self.rows.iter().map(Vec::as_slice).enumerate().filter_map(first)
+    }
+
+    /// The sheet on paper.
+    pub fn drawing(&self) -> VectorDrawing {
+        let mut sheet = VectorDrawing::new(self.size());
+        sheet.text([0.5 * ROOM[0], 0.6 * TITLE], self.title.clone(), 3.4, TextAlign::Left);
+        let pen = |curve: &ChartCurve| {
+            let pattern = if curve.dashed { LinePattern::Dashes } else { LinePattern::Full };
+            Pen::colored(PALETTE[curve.color]).with_width(0.35).with_pattern(pattern)
+        };
+        for (corner, chart) in self.charts() {
+            let axes = PaperChart::new(corner, CHART, chart.drawn_axes());
+            axes.draw(&mut sheet, &chart.title);
+            for curve in &chart.curves {
+                for piece in &curve.pieces {
+                    let points: Vec<_> = piece.iter().map(|p| axes.to_sheet(*p)).collect();
+                    sheet.line(&points, pen(curve));
+                }
+            }
+        }
+        for ([x, top], chart) in self.legends() {
+            for (i, curve) in chart.curves.iter().enumerate() {
+                let y = top + 4.6 * i as f64;
+                sheet.line(&[[x, y], [x + 8.0, y]], pen(curve));
+                sheet.text([x + 10.0, y + 0.9], curve.name.clone(), 2.6, TextAlign::Left);
+            }
+        }
+        sheet
+    }
+
+    /// The sheet in pixels, eight to a millimetre.
+    pub fn canvas(&self) -> Canvas {
+        let mut canvas = Canvas::new(self.size().map(|mm| (PIXELS * mm).round() as u32));
+        let scaled = |point: [f64; 2]| point.map(|mm| PIXELS * mm);
+        let stroke = |curve: &ChartCurve| {
+            if curve.dashed { Stroke::Dashed } else { Stroke::Solid }
+        };
+        let title = scaled([0.5 * ROOM[0], 0.2 * TITLE]);
+        canvas.text(title, &self.title, BLACK, TextAlign::Left);
+        for (corner, chart) in self.charts() {
+            let end = [corner[0] + CHART[0], corner[1] + CHART[1]];
+            let [x, y] = chart.drawn_axes();
+            let axes = Chart::new(scaled(corner), scaled(end), x, y);
+            axes.draw(&mut canvas, &chart.title);
+            for curve in &chart.curves {
+                for piece in &curve.pieces {
+                    canvas.curve(&axes.to_pixels(piece), PALETTE[curve.color], stroke(curve));
+                }
+            }
+        }
+        for (corner, chart) in self.legends() {
+            let mut legend = Legend::new(scaled(corner));
+            for curve in &chart.curves {
+                legend.curve(&mut canvas, &curve.name, PALETTE[curve.color], stroke(curve));
+            }
+        }
+        canvas
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plot::Mark;
+
+    fn sheet() -> CurveSheet {
+        let points =
+            [(0.0, Some(1.0)), (1.0, Some(3.0)), (2.0, None), (3.0, Some(5.0)), (4.0, Some(4.0))];
+        let curve = ChartCurve::new("blue", 0, points);
+        let chart =
+            CurveChart { title: "y 14°".to_owned(), axes: ["pupil", "mm"], curves: vec![curve] };
+        CurveSheet {
+            title: "fans".to_owned(),
+            rows: vec![vec![chart.clone(), chart.clone()], vec![chart]],
+        }
+    }
+
+    #[test]
+    fn a_curve_is_interrupted_where_it_has_no_value() {
+        let pieces = sheet().rows[0][0].curves[0].pieces.clone();
+        assert_eq!(pieces, [vec![[0.0, 1.0], [1.0, 3.0]], vec![[3.0, 5.0], [4.0, 4.0]]]);
+        let none = ChartCurve::new("", 0, [(0.0, None), (1.0, None)]);
+        assert_eq!(none.pieces, Vec::<Vec<[f64; 2]>>::new());
+        assert_eq!(CurveSheet { title: String::new(), rows: Vec::new() }.drawing().marks.len(), 1);
+    }
+
+    /// The axes end at whole steps: 0 to 4 and 1 to 5.
+    #[test]
+    fn the_points_of_a_curve_lie_at_their_places_on_paper() {
+        let drawing = sheet().drawing();
+        let [x, y] = CurveSheet::corner(1, 0);
+        let first = [x, y + CHART[1]];
+        let found = drawing.marks.iter().any(|mark| match mark {
+            Mark::Line { points, .. } => {
+                let close = |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]).hypot(a[1] - b[1]) < 1e-9;
+                points.len() == 2
+                    && close(points[0], first)
+                    && close(points[1], [x + 0.25 * CHART[0], y + 0.5 * CHART[1]])
+            }
+            _ => false,
+        });
+        assert!(found);
+    }
+
+    #[test]
+    fn a_sheet_becomes_a_picture_in_the_colour_of_its_curves() {
+        let canvas = sheet().canvas();
+        assert_eq!(canvas.size(), sheet().size().map(|mm| (8.0 * mm) as u32));
+        assert!(canvas.pixels().chunks(3).any(|pixel| pixel == PALETTE[0]));
+    }
+}
