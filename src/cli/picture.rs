@@ -13,8 +13,8 @@ use crate::measure::time_ms;
 use crate::picture::{
     BitDepth, BuiltInScene, ColorBand, Coloring, ExactRenderer, ExactSettings, Exposure,
     ImageFrame, MID_GREY, OmittedEffect, Picture, PictureError, QuickRenderer, Raster, Scene,
-    SensorModel, SensorPreset, encode_png, field_diagonal, focused, omitted_effects, photon_count,
-    picture_model, quick_error,
+    SensorModel, SensorPreset, ToneCurve, encode_png, field_diagonal, focused, omitted_effects,
+    photon_count, picture_model, quick_error,
 };
 use crate::pupil::RayModel;
 use crate::trace::Fates;
@@ -31,7 +31,7 @@ pub(super) struct PictureArgs {
     #[command(flatten)]
     lens: LensFile,
 
-    /// The scene: white, target, star, edge, checkerboard, still-life, or a PNG or JPEG file
+    /// The scene: white, target, star, edge, checkerboard, lights, still-life, or a PNG or JPEG file
     #[arg(long, value_name = "SCENE")]
     scene: String,
 
@@ -88,6 +88,14 @@ pub(super) struct PictureArgs {
     #[arg(long, value_name = "NAME")]
     sensor: Option<String>,
 
+    /// Gives the pixels of the sensor one colour filter each (Bayer) and interpolates the others
+    #[arg(long, requires = "sensor")]
+    bayer: bool,
+
+    /// The tone curve: srgb, or the G of light to the power 1/G, 1 for numbers that are linear in light
+    #[arg(long, default_value = "srgb", value_name = "CURVE", value_parser = parse_tone_curve)]
+    gamma: ToneCurve,
+
     /// The exposure time in seconds; absent: until white fills 80 % of the range of the sensor
     #[arg(long, value_name = "S", requires = "sensor")]
     seconds: Option<f64>,
@@ -106,6 +114,13 @@ pub(super) fn parse_pixels(text: &str) -> Result<[usize; 2], String> {
     let count = |part: &str| part.trim().parse::<usize>().ok().filter(|n| (1..=16_384).contains(n));
     let pair = text.split_once('x').and_then(|(w, h)| Some([count(w)?, count(h)?]));
     pair.ok_or_else(|| "expected columns and rows from 1 to 16384, as in `480x320`".to_owned())
+}
+
+/// A tone curve.
+fn parse_tone_curve(text: &str) -> Result<ToneCurve, String> {
+    let gamma = || text.parse::<f64>().ok().and_then(ToneCurve::power);
+    let curve = if text == "srgb" { Some(ToneCurve::Srgb) } else { gamma() };
+    curve.ok_or_else(|| "expected srgb, or a number from 0.1 to 10".to_owned())
 }
 
 /// The distance in mm at which a scene with depth is placed and focused if none is given.
@@ -260,7 +275,10 @@ impl PictureArgs {
         let sensor = &preset.model;
         let seconds = self.seconds.unwrap_or_else(|| sensor.normal_exposure(picture, luminance));
         let exposure = Exposure { luminance, seconds, seed: u64::from(self.seed) };
-        let image = sensor.expose(picture, &exposure);
+        let mut image = sensor.expose(picture, &exposure);
+        if self.bayer {
+            image = image.through_filters(picture.frame.pixels[0]);
+        }
         let photons = |level: f64| {
             photon_count(level * luminance * picture.white, picture.frame.pitch, seconds)
         };
@@ -269,6 +287,7 @@ impl PictureArgs {
             name: preset.name,
             source: preset.source,
             model: *sensor,
+            bayer: self.bayer,
             luminance,
             seconds,
             white_photons: photons(1.0),
@@ -316,7 +335,7 @@ impl PictureArgs {
         let depth = if self.bits == "16" { BitDepth::Sixteen } else { BitDepth::Eight };
         let data = serde_json::to_string(report).unwrap_or_default();
         let texts = [("Software", "Aplanat".to_owned()), ("Aplanat picture", data)];
-        let bytes = encode_png(picture, depth, &texts)
+        let bytes = encode_png(picture, depth, self.gamma, &texts)
             .map_err(|error| CliError::Failed(format!("{}: {error}", self.out.display())))?;
         Ok(write_atomic(&self.out, &bytes)?)
     }
@@ -388,6 +407,7 @@ struct SensorReport {
     source: &'static str,
     #[serde(flatten)]
     model: SensorModel,
+    bayer: bool,
     luminance: f64,
     seconds: f64,
     white_photons: f64,

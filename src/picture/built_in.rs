@@ -23,18 +23,27 @@ pub enum BuiltInScene {
     Edge,
     /// Black and white squares.
     Checkerboard,
+    /// Small lights on black, in rows and columns.
+    Lights,
     /// A candle before a wall, with two balls at other distances.
     StillLife,
 }
 
+/// The number of lights along the height, and their radiance over that of white: a sharp image of one, some
+/// 1.5 pixels of a coarse picture wide, is far brighter than white, and one that is spread over a hundred
+/// times that area can still be seen.
+const LIGHTS: f64 = 8.0;
+const LIGHT: f64 = 100.0;
+
 impl BuiltInScene {
     /// Every scene with its name.
-    pub const ALL: [(Self, &'static str); 6] = [
+    pub const ALL: [(Self, &'static str); 7] = [
         (Self::White, "white"),
         (Self::Target, "target"),
         (Self::Star, "star"),
         (Self::Edge, "edge"),
         (Self::Checkerboard, "checkerboard"),
+        (Self::Lights, "lights"),
         (Self::StillLife, "still-life"),
     ];
 
@@ -66,6 +75,7 @@ impl BuiltInScene {
             Self::Star => Pattern::Star(36.0),
             Self::Edge => Pattern::SlantedEdge,
             Self::Checkerboard => Pattern::Checkerboard(10.0),
+            Self::Lights => Pattern::Lights { count: LIGHTS, radiance: LIGHT },
             Self::StillLife => return still_life(half_size, distance),
         };
         let layer =

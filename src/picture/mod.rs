@@ -6,6 +6,7 @@
 //! is left out (diffraction, losses at surfaces, ghosts) is named in the metadata of the file. A
 //! [`SensorModel`] makes noisy numbers of the light.
 
+mod bayer;
 mod beamlets;
 mod built_in;
 mod color_band;
@@ -35,7 +36,7 @@ pub use lit_directions::{DrawnDirection, LitDirections};
 pub use omitted::{OmittedEffect, omitted_effects};
 pub use pattern::{Paint, PaintedPoint, Pattern};
 pub use picture_data::Picture;
-pub use png_file::{BitDepth, encode_png};
+pub use png_file::{BitDepth, ToneCurve, encode_png};
 pub use quick::{QuickRenderer, quick_error};
 pub use raster::Raster;
 pub use scene::{Radiance, Scene, SceneLayer};

@@ -52,6 +52,14 @@ pub enum Pattern {
     /// Groups of three horizontal and three vertical black bars on white; each group is
     /// the sixth root of two finer than the one before (USAF 1951).
     Bars,
+    /// Small discs of this radiance on black, this many along the height, each a hundredth of their
+    /// distance in radius: lights whose images are point spreads.
+    Lights {
+        /// The number along the height.
+        count: f64,
+        /// The radiance of a disc.
+        radiance: f64,
+    },
     /// A disc that shines evenly, with the brightness of a lit ball if it is shaded.
     Ball {
         /// The radiance in its middle.
@@ -80,6 +88,8 @@ fn grey(level: f64) -> Paint {
 
 const CLEAR: Paint = Paint { radiance: [0.0; 3], cover: 0.0 };
 const EDGE_SLOPE: f64 = 0.087_488_663_525_924; // tan 5°
+/// The radius of a light over the distance of its neighbours.
+const LIGHT_RADIUS: f64 = 0.01;
 const EDGE_LEVELS: [f64; 2] = [0.2, 0.8];
 
 impl Pattern {
@@ -102,6 +112,12 @@ impl Pattern {
                 let inside = x.hypot(y) <= half_width.min(half_height);
                 let sector = (y.atan2(x) / TAU * sectors).rem_euclid(1.0);
                 grey(f64::from(u8::from(!inside || sector < 0.5)))
+            }
+            Self::Lights { count, radiance } => {
+                let distance = 2.0 * half_height / count;
+                let off = |v: f64| v - distance * (v / distance).round();
+                let is_lit = off(x).hypot(off(y)) <= LIGHT_RADIUS * distance;
+                grey(if is_lit { *radiance } else { 0.0 })
             }
             Self::Bars => grey(bars([x / half_height, v])),
             Self::Ball { radiance, lit_from } => ball([u, v], *radiance, *lit_from),
@@ -194,6 +210,10 @@ mod tests {
         let board = Pattern::Checkerboard(4.0);
         assert_eq!([level(&board, [0.1, 0.1]), level(&board, [0.6, 0.1])], [0.0, 1.0]);
         assert_eq!(level(&board, [-0.1, 0.1]), 1.0);
+        // Two along the height, one of them in the middle: their distance is 1, their radius 0.01.
+        let lights = Pattern::Lights { count: 2.0, radiance: 50.0 };
+        let shown = [[0.0, 0.0], [1.0, -1.0], [0.0, 0.009], [0.0, 0.011], [0.5, 0.5]];
+        assert_eq!(shown.map(|place| level(&lights, place)), [50.0, 50.0, 50.0, 0.0, 0.0]);
         let edge = Pattern::SlantedEdge;
         assert_eq!([level(&edge, [0.08, 0.9]), level(&edge, [0.08, 0.93])], [0.8, 0.2]);
         let star = Pattern::Star(4.0);

@@ -1,7 +1,7 @@
 //! A picture as a PNG file of 8 or 16 bits, with its data as text inside.
 
 use super::Picture;
-use png::{BitDepth as PngDepth, ColorType, Encoder, EncodingError};
+use png::{BitDepth as PngDepth, ColorType, Encoder, EncodingError, ScaledFloat};
 
 /// The bits of a colour of a pixel.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -23,16 +23,42 @@ impl BitDepth {
     }
 }
 
-/// The file of a picture in sRGB, whose white is the picture's, with texts by their keywords.
+/// The numbers of a file against light, both 0 to 1.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum ToneCurve {
+    /// That of sRGB.
+    Srgb,
+    /// Light to the power of one over this number.
+    Power(f64),
+}
+
+impl ToneCurve {
+    /// Light to the power of one over a number from 0.1 to 10.
+    pub fn power(gamma: f64) -> Option<Self> {
+        (0.1..=10.0).contains(&gamma).then_some(Self::Power(gamma))
+    }
+
+    /// The number of a light.
+    fn number(self, light: f64) -> f64 {
+        match self {
+            Self::Srgb => srgb_value(light),
+            Self::Power(gamma) => light.clamp(0.0, 1.0).powf(gamma.recip()),
+        }
+    }
+}
+
+/// The file of a picture whose white is the picture's, with texts by their keywords. A viewer is told of a
+/// tone curve that is not that of sRGB.
 ///
 /// # Errors
 /// A text that PNG does not hold.
 pub fn encode_png(
     picture: &Picture,
     depth: BitDepth,
+    curve: ToneCurve,
     texts: &[(&str, String)],
 ) -> Result<Vec<u8>, EncodingError> {
-    let pixels = picture.srgb_bytes(depth);
+    let pixels = picture.bytes(depth, curve);
     let mut bytes = Vec::new();
     let [width, height] = picture.frame.pixels.map(|count| count as u32);
     let mut encoder = Encoder::new(&mut bytes, width, height);
@@ -41,6 +67,9 @@ pub fn encode_png(
         BitDepth::Eight => PngDepth::Eight,
         BitDepth::Sixteen => PngDepth::Sixteen,
     });
+    if let ToneCurve::Power(gamma) = curve {
+        encoder.set_source_gamma(ScaledFloat::new(gamma.recip() as f32));
+    }
     for (keyword, text) in texts {
         encoder.add_itxt_chunk((*keyword).to_owned(), text.clone())?;
     }
@@ -54,9 +83,14 @@ impl Picture {
     /// The pixels in sRGB whose white is the picture's, row by row from the upper left corner: red, green
     /// and blue, those of 16 bits with the big end first.
     pub fn srgb_bytes(&self, depth: BitDepth) -> Vec<u8> {
+        self.bytes(depth, ToneCurve::Srgb)
+    }
+
+    /// The same by another tone curve.
+    fn bytes(&self, depth: BitDepth, curve: ToneCurve) -> Vec<u8> {
         let mut bytes = Vec::new();
         for value in self.values.iter().flatten() {
-            depth.push(srgb_value(value / self.white), &mut bytes);
+            depth.push(curve.number(value / self.white), &mut bytes);
         }
         bytes
     }
@@ -93,7 +127,7 @@ mod tests {
     fn files_hold_both_depths_and_their_texts() {
         let text = [("Left out", "diffraction, 1 %".to_owned())];
         for (depth, white) in [(BitDepth::Eight, 255), (BitDepth::Sixteen, 65535)] {
-            let bytes = encode_png(&picture(), depth, &text).unwrap();
+            let bytes = encode_png(&picture(), depth, ToneCurve::Srgb, &text).unwrap();
             let image = image::load_from_memory(&bytes).unwrap();
             let level = image.clone().into_rgb16().get_pixel(0, 0).0;
             assert_eq!(level, [0, 65535, 65535]);
@@ -108,5 +142,20 @@ mod tests {
                 ("Left out", text[0].1.clone())
             );
         }
+    }
+
+    /// A quarter of white by the power 1 is a quarter of the scale, by 1/2 a half; the file says so.
+    #[test]
+    fn a_file_says_which_power_of_light_its_numbers_are() {
+        for (gamma, share) in [(1.0, 0.5), (2.0, 0.5_f64.sqrt())] {
+            let curve = ToneCurve::power(gamma).unwrap();
+            let bytes = encode_png(&picture(), BitDepth::Sixteen, curve, &[]).unwrap();
+            let level = image::load_from_memory(&bytes).unwrap().into_rgb16().get_pixel(1, 0).0[1];
+            assert!((f64::from(level) / 65535.0 - share).abs() < 1e-4, "{gamma}: {level}");
+            let reader = png::Decoder::new(std::io::Cursor::new(&bytes)).read_info().unwrap();
+            let stored = reader.info().source_gamma.unwrap().into_value();
+            assert!((f64::from(stored) - 1.0 / gamma).abs() < 1e-4, "{stored}");
+        }
+        assert!([0.0, -1.0, f64::NAN, 11.0].iter().all(|wrong| ToneCurve::power(*wrong).is_none()));
     }
 }

@@ -6,8 +6,9 @@
 //! numbers depend on the place of a pixel, its colour and the seed alone, so that a picture does not depend
 //! on the number of threads, and the noise of the rendering is never taken for that of photons.
 //!
-//! Each colour of a pixel is a sensor of its own (no mosaic of filters), that counts its light as light of
-//! 555 nm. All pixels are alike (no PRNU, no DSNU).
+//! Each colour of a pixel is a sensor of its own, of which a mosaic of filters
+//! ([`SensorImage::through_filters`]) leaves one; it counts its light as light of 555 nm. All pixels are
+//! alike (no PRNU, no DSNU).
 
 use super::scene::Radiance;
 use super::{Picture, PictureError};

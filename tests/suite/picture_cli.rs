@@ -54,6 +54,36 @@ fn a_sensor_shows_its_noise() {
     assert_eq!(dark["sensor"]["signal_to_noise"], serde_json::json!([0.0, 0.0, 0.0]));
 }
 
+/// The mean of the numbers of a file, in red, green and blue.
+fn mean_colors(path: &str) -> [f64; 3] {
+    let image = image::open(path).unwrap().into_rgb16();
+    let count = image.pixels().len() as f64;
+    let sum = |c: usize| image.pixels().map(|pixel| f64::from(pixel.0[c])).sum::<f64>();
+    [0, 1, 2].map(|c| sum(c) / count / 65535.0)
+}
+
+/// Interpolation between filters keeps the mean of even light, and a linear curve its share of white.
+#[test]
+fn filters_and_tone_curves_keep_the_light() {
+    let folder = Folder::new("picture-bayer");
+    let out = folder.path("white.png");
+    let base = ["picture", LENS, "--scene", "white", "--out", &out, "--pixels", "60x40"];
+    let options = ["--sensor", "canon-7d", "--diagonal", "0.5", "--error", "10%", "--quick"];
+    let linear = ["--gamma", "1", "--bits", "16"];
+    let base = [&base[..], &options, &linear].concat();
+    assert_eq!(done_json(&base, "")["sensor"]["bayer"], false);
+    let all = mean_colors(&out);
+    assert_eq!(done_json(&[&base[..], &["--bayer"]].concat(), "")["sensor"]["bayer"], true);
+    let filtered = mean_colors(&out);
+    for (all, filtered) in all.iter().zip(filtered) {
+        assert!((all - filtered).abs() < 2e-3 && (all - 1.0).abs() < 0.02, "{all} {filtered}");
+    }
+    let [bayer, curve] = [&["--bayer"][..], &["--gamma", "0"]];
+    let plain = ["picture", LENS, "--scene", "lights", "--out", &out];
+    refused(2, &[&plain[..], bayer].concat(), "", &["--bayer", "--sensor"]);
+    refused(2, &[&plain[..], curve].concat(), "", &["srgb, or a number"]);
+}
+
 #[test]
 fn wrong_pictures_are_refused() {
     let out = std::env::temp_dir().join("aplanat-refused.png").display().to_string();

@@ -22,7 +22,7 @@ pub(super) struct MeasurePictureArgs {
     #[arg(value_name = "LENS", required = true)]
     lenses: Vec<PathBuf>,
 
-    /// The scene: white, target, star, edge or checkerboard
+    /// The scene: white, target, star, edge, checkerboard or lights
     #[arg(long, value_name = "SCENE", default_value = "star")]
     scene: String,
 

@@ -4,7 +4,7 @@ use super::live_goal::propose_goal;
 use super::{Session, SessionEvent};
 use crate::files;
 use crate::lens::{Edit, ElementEdit, Lens, apply_edit};
-use crate::picture::{BitDepth, encode_png};
+use crate::picture::{BitDepth, ToneCurve, encode_png};
 use crate::pupil::limited_by_stop;
 use crate::report::{
     PaperKind, ReportSettings, drawing_bytes, has_extension, report_bytes, solids_file,
@@ -246,7 +246,8 @@ impl Session {
             ("Error", format!("{error} of mid grey (rms)")),
             ("Left out", "diffraction, losses, ghosts".to_owned()),
         ];
-        let bytes = encode_png(picture, BitDepth::Eight, &texts).map_err(|why| why.to_string())?;
+        let bytes = encode_png(picture, BitDepth::Eight, ToneCurve::Srgb, &texts)
+            .map_err(|why| why.to_string())?;
         files::write_atomic(path, &bytes).map_err(|why| why.to_string())
     }
 
