@@ -8,6 +8,7 @@ use aplanat::effects::{
 use aplanat::files;
 use aplanat::lens::{FieldKind, FieldPoint, Lens, Object, Row, Shape};
 use aplanat::pupil::{Accuracy, Aiming, RayModel};
+use aplanat::trace::TraceSink as _;
 
 const TASK: TracePurpose = TracePurpose::Spot(1e-3);
 
