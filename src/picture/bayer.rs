@@ -7,7 +7,7 @@
 use super::sensor::SensorImage;
 
 /// The colour that a pixel measures: 0 for red, 1 for green, 2 for blue; red is in the upper left corner.
-pub const fn filter_color([column, row]: [usize; 2]) -> usize {
+const fn filter_color([column, row]: [usize; 2]) -> usize {
     column % 2 + row % 2
 }
 

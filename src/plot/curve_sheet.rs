@@ -115,8 +115,10 @@ impl CurveSheet {
     /// The curves of the first chart of each row, with the corner of its legend, in mm.
     fn legends(&self) -> impl Iterator<Item = ([f64; 2], &CurveChart)> {
         let left = self.size()[0] - LEGEND;
-        let first = |(row, charts)| Some(([left, Self::corner(row, 0)[1]], <[_]>::first(charts)?));
-        self.rows.iter().map(Vec::as_slice).enumerate().filter_map(first)
+        let rows = self.rows.iter().enumerate();
+        rows.filter_map(move |(row, charts)| {
+            Some(([left, Self::corner(row, 0)[1]], charts.first()?))
+        })
     }
 
     /// The sheet on paper.
