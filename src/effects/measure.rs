@@ -315,7 +315,7 @@ fn aspheres(
     let system = &model.channels[model.primary].system;
     let figured = (0..system.surfaces.len()).into_par_iter().filter(|i| is_aspheric(system, *i));
     let moved = |i: usize| {
-        let mut plain = without_rims(model);
+        let mut plain = without_rims(model, model.primary);
         reduce_to_conic(&mut plain.surfaces[i]);
         Ok((i, largest_shift(model, bundles, &plain)?))
     };
@@ -328,7 +328,7 @@ fn grin_gaps(
     bundles: &[SampledBundle],
 ) -> Result<Vec<(GrinStepPlan, f64)>, RayModelError> {
     let moved = |plan: &GrinStepPlan| {
-        let mut glass = without_rims(model);
+        let mut glass = without_rims(model, model.primary);
         glass.surfaces[plan.surface].grin = None;
         Ok((*plan, largest_shift(model, bundles, &glass)?))
     };
@@ -339,10 +339,10 @@ fn is_aspheric(system: &System<f64>, surface: usize) -> bool {
     matches!(system.surfaces[surface].shape, Shape::Asphere { .. })
 }
 
-/// The lens at the primary wavelength with no semi-diameters but those of its aspheres and, where it
+/// The lens at a wavelength with no semi-diameters but those of its aspheres and, where it
 /// limits the beam, that of the stop.
-fn without_rims(model: &RayModel) -> System<f64> {
-    let mut system = model.channels[model.primary].system.clone();
+fn without_rims(model: &RayModel, wavelength: usize) -> System<f64> {
+    let mut system = model.channels[wavelength].system.clone();
     for i in 0..system.surfaces.len() {
         system.surfaces[i].obstruction = 0.0;
         let limits = !model.ends_at_disc() && i == model.stop();
@@ -353,33 +353,55 @@ fn without_rims(model: &RayModel) -> System<f64> {
     system
 }
 
-/// The clearance at each rim, for the rays that fill the stop and arrive through the lens
-/// [`without_rims`], with those between the traced ones, and for those beyond the beam that do.
-fn rims(model: &RayModel) -> Result<Vec<RimClearance>, RayModelError> {
-    let limited = without_rims(model);
-    let mut open = limited.clone();
-    if !is_aspheric(&open, model.stop()) {
-        // Rounding must not decide whether rays at its rim pass.
-        open.surfaces[model.stop()].semi_diameter = f64::INFINITY;
+/// A lens at a wavelength [`without_rims`].
+struct OpenLens {
+    /// That lens.
+    limited: Tracer<f64>,
+    /// The same without the rim of the stop.
+    open: Tracer<f64>,
+}
+
+impl OpenLens {
+    fn new(model: &RayModel, wavelength: usize) -> Result<Self, RayModelError> {
+        let mut system = without_rims(model, wavelength);
+        let limited = Tracer::new(&system)?;
+        if !is_aspheric(&system, model.stop()) {
+            // Rounding must not decide whether rays at its rim pass.
+            system.surfaces[model.stop()].semi_diameter = f64::INFINITY;
+        }
+        Ok(Self { limited, open: Tracer::new(&system)? })
     }
-    let (open, limited) = (Tracer::new(&open)?, Tracer::new(&limited)?);
-    let (beam, denser) = (sample_points(), pupil_points(DENSER * RINGS, DENSER * ON_RIM));
-    let reached = |field: &FieldPoint| -> Vec<f64> {
-        let mut reached = vec![0.0; open.surfaces()];
-        for wavelength in 0..model.channels.len() {
-            if let Ok(launch) = model.launch_at_stop(*field, wavelength) {
-                let sparse = heights(&launch, &beam, &open);
-                let dense = heights(&launch, &denser, &open);
-                let between = sparse.iter().zip(&dense).map(|(sparse, dense)| {
-                    let added = (dense - sparse).max(0.0);
-                    sparse.max(*dense) + BETWEEN_RAYS * added
-                });
-                raise(&mut reached, between);
-            }
-            if let Ok(launch) = model.launch(*field, wavelength) {
-                let beyond = stray_points(launch.is_symmetric());
-                raise(&mut reached, heights(&launch, &beyond, &limited));
-            }
+
+    /// The largest heights at each surface in mm of the rays that fill the stop and arrive, those between
+    /// the traced ones too, and of rays beyond the beam that arrive.
+    fn heights(&self, model: &RayModel, field: FieldPoint, wavelength: usize) -> Vec<f64> {
+        let mut reached = vec![0.0; self.open.surfaces()];
+        if let Ok(launch) = model.launch_at_stop(field, wavelength) {
+            let [sparse, dense] = [1, DENSER].map(|factor| {
+                let points = pupil_points(factor * RINGS, factor * ON_RIM);
+                heights(&launch, &points, &self.open)
+            });
+            let between = sparse.iter().zip(&dense).map(|(sparse, dense)| {
+                sparse.max(*dense) + BETWEEN_RAYS * (dense - sparse).max(0.0)
+            });
+            raise(&mut reached, between);
+        }
+        if let Ok(launch) = model.launch(field, wavelength) {
+            let beyond = stray_points(launch.is_symmetric());
+            raise(&mut reached, heights(&launch, &beyond, &self.limited));
+        }
+        reached
+    }
+}
+
+/// The clearance at each rim, for the light of all fields and wavelengths.
+fn rims(model: &RayModel) -> Result<Vec<RimClearance>, RayModelError> {
+    let lenses = (0..model.channels.len()).map(|wavelength| OpenLens::new(model, wavelength));
+    let lenses = lenses.collect::<Result<Vec<_>, _>>()?;
+    let reached = |field: &FieldPoint| {
+        let mut reached = vec![0.0; lenses[model.primary].open.surfaces()];
+        for (wavelength, lens) in lenses.iter().enumerate() {
+            raise(&mut reached, lens.heights(model, *field, wavelength));
         }
         reached
     };
