@@ -83,6 +83,63 @@ pub fn distortion(
     Ok(Distortion { field, height, ideal, distortion: against(ideal), f_theta })
 }
 
+/// A point of a square grid in the scene and in the image.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GridPoint {
+    /// The field.
+    pub field: FieldPoint,
+    /// The image point of a lens without distortion, in mm.
+    pub ideal: [f64; 2],
+    /// The image point of the chief ray in mm, or the reason why there is none.
+    pub real: Result<[f64; 2], AnalysisError>,
+}
+
+impl GridPoint {
+    /// The distance of the image point from the ideal one over the height of the ideal one; `None` on the
+    /// axis and without an image point.
+    pub fn distortion(&self) -> Option<f64> {
+        let real = self.real.ok()?;
+        let height = self.ideal[0].hypot(self.ideal[1]);
+        let off = (real[0] - self.ideal[0]).hypot(real[1] - self.ideal[1]);
+        (height > 0.0).then(|| off / height)
+    }
+}
+
+/// The images of a square grid of points, row by row from below, whose corners are as far from the axis as
+/// the farthest field: squares in a plane across the axis, so that a lens without distortion images
+/// squares. `steps` is the number of squares along a side.
+///
+/// # Errors
+/// The lens has no focal length to compare with, or all fields are on the axis.
+pub fn distortion_grid(
+    model: &RayModel,
+    wavelength: usize,
+    steps: usize,
+) -> Result<Vec<GridPoint>, AnalysisError> {
+    let size = |field: &FieldPoint| field.x.hypot(field.y);
+    let corner = model.fields.iter().map(size).fold(0.0, f64::max);
+    if corner == 0.0 {
+        return Err(AnalysisError::NoChief);
+    }
+    let is_angle = model.beam.field == FieldKind::Angle;
+    let reach = if is_angle { corner.to_radians().tan() } else { corner } / 2f64.sqrt();
+    let side = |i: usize| reach * (2.0 * i as f64 / steps.max(1) as f64 - 1.0);
+    let point = |i: usize| {
+        let (x, y) = (side(i % (steps + 1)), side(i / (steps + 1)));
+        let length = x.hypot(y);
+        let size = if is_angle { length.atan().to_degrees() } else { length };
+        // No rounding on the axis.
+        let scale = if length > 1e-12 * reach { size / length } else { 0.0 };
+        let field = FieldPoint { x: scale * x, y: scale * y, weight: 1.0 };
+        let height = model.ideal_height(field).filter(|height| height.is_finite());
+        let height = height.ok_or(AnalysisError::NoChief)?;
+        let share = if scale == 0.0 { 0.0 } else { height / length };
+        let real = model.chief_point(field, wavelength);
+        Ok(GridPoint { field, ideal: [share * x, share * y], real })
+    };
+    (0..(steps + 1).pow(2)).map(point).collect()
+}
+
 /// The tangential and sagittal focus of a field at a wavelength, from the derivatives of the chief
 /// ray: the same numbers as Coddington's equations give.
 ///

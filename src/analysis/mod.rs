@@ -38,7 +38,9 @@ pub use diffraction::{
     diffraction_gate, diffraction_mtf, encircled_energy, point_spread,
     polychromatic_diffraction_mtf, strehl, through_focus_mtf,
 };
-pub use distortion::{Distortion, FieldCurvature, distortion, field_curvature};
+pub use distortion::{
+    Distortion, FieldCurvature, GridPoint, distortion, distortion_grid, field_curvature,
+};
 pub use fan::{Fan, FanPoint, fan};
 pub use fitted_wavefront::{
     FittedWavefront, ImageRay, WavefrontCost, WavefrontReference, brightest_strehl, image_rays,

@@ -69,6 +69,12 @@ impl Axis {
         })
     }
 
+    /// Two axes of these lengths, widened so that both have the same scale.
+    pub(super) fn equally_scaled([x, y]: [Self; 2], [width, height]: [f64; 2]) -> [Self; 2] {
+        let unit = ((x.high - x.low) / width).max((y.high - y.low) / height);
+        [x.widened(unit * width), y.widened(unit * height)]
+    }
+
     /// The axis widened on both sides to this length.
     fn widened(mut self, length: f64) -> Self {
         let more = 0.5 * (length - (self.high - self.low)).max(0.0);
@@ -123,11 +129,8 @@ impl Chart {
     /// The chart with the same scale, in pixels per unit, on both axes, as for a map.
     #[must_use]
     pub fn with_equal_scales(mut self) -> Self {
-        let (width, height) = (self.right - self.left, self.bottom - self.top);
-        let (x, y) = (self.x.high - self.x.low, self.y.high - self.y.low);
-        let unit = (x / width).max(y / height);
-        self.x = self.x.widened(unit * width);
-        self.y = self.y.widened(unit * height);
+        let size = [self.right - self.left, self.bottom - self.top];
+        [self.x, self.y] = Axis::equally_scaled([self.x, self.y], size);
         self
     }
 

@@ -59,16 +59,30 @@ pub struct CurveChart {
     pub axes: [&'static str; 2],
     /// The curves.
     pub curves: Vec<ChartCurve>,
+    /// True for the same scale on both axes, as in a map.
+    pub is_map: bool,
 }
 
 impl CurveChart {
+    /// A chart whose axes have scales of their own.
+    pub fn new(title: impl Into<String>, axes: [&'static str; 2], curves: Vec<ChartCurve>) -> Self {
+        Self { title: title.into(), axes, curves, is_map: false }
+    }
+
+    /// The first curve of each name.
+    fn named_curves(&self) -> impl Iterator<Item = &ChartCurve> {
+        let is_first = |i: usize| self.curves[..i].iter().all(|c| c.name != self.curves[i].name);
+        self.curves.iter().enumerate().filter(move |(i, _)| is_first(*i)).map(|(_, curve)| curve)
+    }
+
     /// The axes, which contain all curves.
     fn drawn_axes(&self) -> [Axis; 2] {
         let values = |k: usize| {
             let points = self.curves.iter().flat_map(|curve| curve.pieces.iter().flatten());
             points.map(move |point| point[k])
         };
-        [0, 1].map(|k| Axis::linear(self.axes[k], values(k)))
+        let axes = [0, 1].map(|k| Axis::linear(self.axes[k], values(k)));
+        if self.is_map { Axis::equally_scaled(axes, CHART) } else { axes }
     }
 }
 
@@ -140,7 +154,7 @@ impl CurveSheet {
             }
         }
         for ([x, top], chart) in self.legends() {
-            for (i, curve) in chart.curves.iter().enumerate() {
+            for (i, curve) in chart.named_curves().enumerate() {
                 let y = top + 4.6 * i as f64;
                 sheet.line(&[[x, y], [x + 8.0, y]], pen(curve));
                 sheet.text([x + 10.0, y + 0.9], curve.name.clone(), 2.6, TextAlign::Left);
@@ -171,7 +185,7 @@ impl CurveSheet {
         }
         for (corner, chart) in self.legends() {
             let mut legend = Legend::new(scaled(corner));
-            for curve in &chart.curves {
+            for curve in chart.named_curves() {
                 legend.curve(&mut canvas, &curve.name, PALETTE[curve.color], stroke(curve));
             }
         }
@@ -188,8 +202,7 @@ mod tests {
         let points =
             [(0.0, Some(1.0)), (1.0, Some(3.0)), (2.0, None), (3.0, Some(5.0)), (4.0, Some(4.0))];
         let curve = ChartCurve::new("blue", 0, points);
-        let chart =
-            CurveChart { title: "y 14°".to_owned(), axes: ["pupil", "mm"], curves: vec![curve] };
+        let chart = CurveChart::new("y 14°", ["pupil", "mm"], vec![curve]);
         CurveSheet {
             title: "fans".to_owned(),
             rows: vec![vec![chart.clone(), chart.clone()], vec![chart]],

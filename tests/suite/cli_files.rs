@@ -188,6 +188,28 @@ fn curves_of_an_analysis_are_drawn() {
     );
 }
 
+/// A corner of the grid is as far from the axis as the farthest field: 22 lines of each of two grids.
+#[test]
+fn the_corners_of_a_distortion_grid_are_the_farthest_field() {
+    let (folder, lens) = (Folder::new("grid"), "lenses/wide_nikkor_28_f35.json");
+    let svg = folder.path("grid.svg");
+    let grid = done_json(&["analyze", lens, "distortion-grid", "--plot", &svg], "");
+    let fields = done_json(&["analyze", lens, "distortion"], "")["fields"].clone();
+    let farthest = fields.as_array().unwrap().last().unwrap();
+    let expected = &farthest["distortion"];
+    let found = &grid["fields"][0];
+    let corner = &found["points"][120];
+    let off = |k: usize| corner["real"][k].as_f64().unwrap() / corner["ideal"][k].as_f64().unwrap();
+    let value = expected["value"].as_f64().unwrap();
+    assert!((off(0) - off(1)).abs() < 1e-9 && (off(0) - 1.0 - value).abs() < 1e-9, "{corner}");
+    assert_eq!(found["points"].as_array().unwrap().len(), 121);
+    assert_eq!(found["points"][60]["ideal"], json!([0.0, 0.0]));
+    let text = fs::read_to_string(&svg).unwrap();
+    let lines = text.lines().filter(|line| line.contains("polyline") && line.contains("0.35"));
+    assert_eq!(lines.count(), 2 * 22 + 2, "with a sample of each in the legend");
+    refused(2, &["analyze", LENS, "distortion-grid", "--field", "1e9"], "", &["1e9"]);
+}
+
 /// A folder is filled with files of certain names, which nothing else may have.
 #[test]
 fn a_folder_and_a_file_in_it_do_not_share_a_name() {

@@ -1,8 +1,11 @@
 //! Results from chief rays: distortion and field curvature.
 
 use super::{AnalysisRun, AtField, SelectedField, TextLines, estimate_text};
-use crate::analysis::{Estimate, distortion, field_curvature};
+use crate::analysis::{Estimate, GridPoint, distortion, distortion_grid, field_curvature};
+use crate::cli::output::{ShortNumber, counted};
+use crate::lens::FieldPoint;
 use crate::measure::time_ms;
+use crate::plot::{ChartCurve, CurveChart};
 use serde::Serialize;
 
 /// The distortion at a field.
@@ -44,6 +47,86 @@ impl TextLines for DistortionJson {
         lines.extend(self.distortion.iter().map(|e| estimate_text("against f tan(theta)", e)));
         lines.extend(self.f_theta.iter().map(|e| estimate_text("against f theta", e)));
         lines
+    }
+}
+
+/// The number of squares along a side of a grid.
+const SQUARES: usize = 10;
+
+/// The images of a square grid.
+#[derive(Serialize)]
+pub(super) struct GridJson {
+    error: f64,
+    rays: usize,
+    milliseconds: f64,
+    /// The largest distance from the ideal point over its height.
+    largest: Option<f64>,
+    points: Vec<GridPointJson>,
+}
+
+#[derive(Serialize)]
+struct GridPointJson {
+    field: [f64; 2],
+    ideal: [f64; 2],
+    real: Option<[f64; 2]>,
+}
+
+pub(super) fn grid(run: &AnalysisRun) -> Vec<AtField<GridJson>> {
+    let axis = FieldPoint { x: 0.0, y: 0.0, weight: 1.0 };
+    let (found, milliseconds) = time_ms(|| distortion_grid(&run.model, run.model.primary, SQUARES));
+    let point = |point: &GridPoint| GridPointJson {
+        field: [point.field.x, point.field.y],
+        ideal: point.ideal,
+        real: point.real.ok(),
+    };
+    let keys = found.map(|points| GridJson {
+        error: run.rounding() + run.model.neglected.ray_shift,
+        rays: points.iter().filter(|point| point.real.is_ok()).count(),
+        milliseconds,
+        largest: points.iter().filter_map(GridPoint::distortion).reduce(f64::max),
+        points: points.iter().map(point).collect(),
+    });
+    vec![AtField::new(&SelectedField { given: axis, traced: axis }, keys)]
+}
+
+impl TextLines for GridJson {
+    const TITLE: &'static str =
+        "distortion grid at the primary wavelength: image points of chief rays, in mm";
+
+    fn lines(&self) -> Vec<String> {
+        let Self { error, rays, milliseconds, points, .. } = self;
+        let largest = self.largest.map_or("-".to_owned(), |most| format!("{:.4} %", 100.0 * most));
+        let counts =
+            format!("{}, {milliseconds:.3} ms, error {error:.0e} mm", counted(*rays, "ray"));
+        let mut lines = vec![counts, format!("largest distortion {largest}")];
+        lines.push(
+            ["field x", "y", "ideal x", "y", "x", "y"].map(|head| format!("{head:>11}")).concat(),
+        );
+        for GridPointJson { field, ideal, real } in points {
+            let numbers = field.iter().chain(ideal).map(|v| Some(*v));
+            let real = [0, 1].map(|k| real.map(|real| real[k]));
+            let cell = |v: Option<f64>| v.map_or("-".to_owned(), |v| ShortNumber(v).to_string());
+            lines.push(numbers.chain(real).map(|v| format!("{:>11}", cell(v))).collect());
+        }
+        lines
+    }
+
+    fn charts(&self) -> Vec<CurveChart> {
+        let line =
+            |indices: Vec<usize>, color: usize, of: fn(&GridPointJson) -> Option<[f64; 2]>| {
+                let points = indices.into_iter().filter_map(|i| of(&self.points[i])).collect();
+                let name = if color == 0 { "image" } else { "without distortion" };
+                ChartCurve { name: name.to_owned(), color, dashed: color > 0, pieces: vec![points] }
+            };
+        let count = SQUARES + 1;
+        let rows = (0..count).map(|i| (0..count).map(|k| count * i + k).collect());
+        let columns = (0..count).map(|i| (0..count).map(|k| count * k + i).collect());
+        let lines: Vec<Vec<usize>> = rows.chain(columns).collect();
+        let ideal = lines.iter().map(|of| line(of.clone(), 1, |point| Some(point.ideal)));
+        let real = lines.iter().map(|of| line(of.clone(), 0, |point| point.real));
+        let all = ideal.chain(real).collect();
+        let chart = CurveChart::new("distortion", ["x, mm", "y, mm"], all);
+        vec![CurveChart { is_map: true, ..chart }]
     }
 }
 

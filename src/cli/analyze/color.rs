@@ -143,7 +143,7 @@ impl TextLines for LongitudinalJson {
         };
         let curves = self.colors.iter().enumerate().map(curve).collect();
         let axes = ["focus behind the image plane, mm", "pupil"];
-        vec![CurveChart { title: "longitudinal aberration".to_owned(), axes, curves }]
+        vec![CurveChart::new("longitudinal aberration", axes, curves)]
     }
 }
 

@@ -115,11 +115,8 @@ impl TextLines for MtfJson {
             (0, "diffraction", &self.polychromatic_diffraction),
             (1, "rays", &self.polychromatic_geometric),
         ];
-        vec![CurveChart {
-            title: "all wavelengths".to_owned(),
-            axes: ["cycles/mm", "contrast"],
-            curves: both.into_iter().flat_map(curves).collect(),
-        }]
+        let curves = both.into_iter().flat_map(curves).collect();
+        vec![CurveChart::new("all wavelengths", ["cycles/mm", "contrast"], curves)]
     }
 }
 
@@ -201,10 +198,8 @@ impl TextLines for FocusContrastJson {
     }
 
     fn charts(&self) -> Vec<CurveChart> {
-        vec![CurveChart {
-            title: format!("{} cycles/mm", ShortNumber(self.frequency)),
-            axes: ["shift of the image plane, mm", "contrast"],
-            curves: contrast_curves("diffraction", 0, &self.positions),
-        }]
+        let title = format!("{} cycles/mm", ShortNumber(self.frequency));
+        let curves = contrast_curves("diffraction", 0, &self.positions);
+        vec![CurveChart::new(title, ["shift of the image plane, mm", "contrast"], curves)]
     }
 }

@@ -106,7 +106,7 @@ impl TextLines for FanJson {
                 ChartCurve::new(format!("{} um", color.wavelength_um), i, points)
             };
             let curves = self.colors.iter().enumerate().map(curve).collect();
-            CurveChart { title: title.to_owned(), axes: ["pupil", error_name], curves }
+            CurveChart::new(title, ["pupil", error_name], curves)
         };
         vec![
             chart("tangential", "dy, mm", |color| &color.tangential, |point| point.dy),

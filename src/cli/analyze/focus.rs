@@ -119,6 +119,6 @@ impl TextLines for ThroughFocusJson {
         let radius = |at: &FocusPosition| (at.defocus, at.rms.map(|rms| rms.value));
         let curve = ChartCurve::new("all colours", 0, self.positions.iter().map(radius));
         let axes = ["shift of the image plane, mm", "rms radius, mm"];
-        vec![CurveChart { title: "through focus".to_owned(), axes, curves: vec![curve] }]
+        vec![CurveChart::new("through focus", axes, vec![curve])]
     }
 }

@@ -81,8 +81,8 @@ pub(super) struct AnalyzeArgs {
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
 
-    /// Draws the curves of fan, opd-fan, longitudinal, through-focus, mtf, through-focus-mtf or
-    /// encircled-energy: .png, .svg or .pdf
+    /// Draws the curves of fan, distortion-grid, longitudinal, through-focus, opd-fan, encircled-energy,
+    /// mtf or through-focus-mtf: .png, .svg or .pdf
     #[arg(long, value_name = "FILE")]
     plot: Option<PathBuf>,
 
@@ -113,6 +113,8 @@ enum AnalysisKind {
     Fan,
     /// Chief rays compared with `f tan(theta)` and `f theta`
     Distortion,
+    /// Chief rays of a square grid of points against the grid of a lens without distortion
+    DistortionGrid,
     /// Chief rays of every wavelength against that of the primary one
     LateralColor,
     /// Crossings of the rays of the axial point with the axis, zone by zone; axial colour
@@ -191,7 +193,7 @@ impl AnalysisKind {
         match self {
             Self::Spot | Self::Fan | Self::ThroughFocus | Self::Mtf => &[],
             Self::LateralColor | Self::Longitudinal => &[COLORS],
-            Self::Distortion => &[ONE_WAVELENGTH, OBJECT_IN_PLACE],
+            Self::Distortion | Self::DistortionGrid => &[ONE_WAVELENGTH, OBJECT_IN_PLACE],
             Self::Ghosts => &GHOST_RULES,
             Self::Illumination => &IRRADIANCE_RULES,
             _ => &[ONE_WAVELENGTH],
@@ -203,6 +205,7 @@ impl AnalysisKind {
         match self {
             Self::Fan | Self::OpdFan | Self::Longitudinal | Self::ThroughFocus => true,
             Self::Mtf | Self::ThroughFocusMtf | Self::EncircledEnergy => true,
+            Self::DistortionGrid => true,
             _ => false,
         }
     }
@@ -211,7 +214,7 @@ impl AnalysisKind {
     fn purpose(self, tolerance: f64) -> TracePurpose {
         match self {
             Self::Spot | Self::ThroughFocus => TracePurpose::Spot(tolerance),
-            Self::Fan | Self::Distortion => TracePurpose::Trace,
+            Self::Fan | Self::Distortion | Self::DistortionGrid => TracePurpose::Trace,
             _ => TracePurpose::Exact,
         }
     }
@@ -219,9 +222,8 @@ impl AnalysisKind {
     /// The report of the effects: a shift of rays bounds the errors of some analyses only.
     fn effect_report(self, plan: EffectPlan) -> EffectReport {
         match self {
-            Self::Spot | Self::ThroughFocus | Self::Fan | Self::Distortion => {
-                EffectReport::counted(plan)
-            }
+            Self::Spot | Self::ThroughFocus => EffectReport::counted(plan),
+            Self::Fan | Self::Distortion | Self::DistortionGrid => EffectReport::counted(plan),
             _ => EffectReport::uncounted(plan.decisions),
         }
     }
@@ -238,6 +240,7 @@ impl AnalyzeArgs {
             AnalysisKind::Spot => self.finish(&run, spot::spots(&run), output),
             AnalysisKind::Fan => self.finish(&run, fan::fans(&run), output),
             AnalysisKind::Distortion => self.finish(&run, chief::distortions(&run), output),
+            AnalysisKind::DistortionGrid => self.finish(&run, chief::grid(&run), output),
             AnalysisKind::LateralColor => self.finish(&run, color::lateral_colors(&run), output),
             AnalysisKind::Longitudinal => self.finish(&run, color::longitudinal(&run), output),
             AnalysisKind::Footprint => {

@@ -156,6 +156,6 @@ impl TextLines for EncircledJson {
         let points = std::iter::once((0.0, Some(0.0))).chain(circles);
         let curve = ChartCurve::new("diffraction", 0, points);
         let axes = ["radius, mm", "share of the light"];
-        vec![CurveChart { title: "encircled energy".to_owned(), axes, curves: vec![curve] }]
+        vec![CurveChart::new("encircled energy", axes, vec![curve])]
     }
 }

@@ -158,7 +158,7 @@ impl TextLines for PathFanJson {
             ChartCurve::new("sagittal", 1, sagittal),
         ];
         let axes = ["pupil", "wavelengths"];
-        vec![CurveChart { title: "path differences".to_owned(), axes, curves }]
+        vec![CurveChart::new("path differences", axes, curves)]
     }
 }
 
