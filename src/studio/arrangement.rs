@@ -50,7 +50,7 @@ fn default_arrangement() -> Tree<PanelKind> {
     let table = row(&mut tiles, &[(table, 0.71), (facts, 0.29)]);
     let left = column(&mut tiles, &[(drawings, 0.52), (table, 0.48)]);
     let right = column(&mut tiles, &[(light, 0.44), (better, 0.56)]);
-    let root = row(&mut tiles, &[(left, 0.665), (right, 0.335)]);
+    let root = row(&mut tiles, &[(left, 0.652), (right, 0.348)]);
     Tree::new(Id::unique("dock"), root, tiles)
 }
 

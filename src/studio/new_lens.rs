@@ -36,6 +36,8 @@ pub(super) struct NewLensDialog {
     distance: f64,
     /// True once the first field has had the cursor.
     entered: bool,
+    /// True if a number had the cursor in the frame before: Escape takes it away before a frame begins.
+    was_typing: bool,
 }
 
 impl Default for NewLensDialog {
@@ -52,6 +54,7 @@ impl Default for NewLensDialog {
             at_infinity: true,
             distance: 200.0,
             entered: false,
+            was_typing: false,
         }
     }
 }
@@ -60,8 +63,7 @@ impl NewLensDialog {
     /// Shows the dialog; true once it is closed.
     pub(super) fn ui(&mut self, context: &Context, actions: &mut Actions) -> bool {
         let mut done = false;
-        // Escape leaves a number first, then the dialog.
-        let typing = context.egui_wants_keyboard_input();
+        let was_typing = self.was_typing;
         let modal = Modal::new(Id::unique("new lens")).frame(dialog_frame(context));
         let modal = modal.show(context, |ui| {
             ui.set_width(430.0);
@@ -72,8 +74,10 @@ impl NewLensDialog {
             ui.separator();
             done = self.buttons(ui, actions);
         });
+        // Escape leaves a number first, then the dialog.
+        self.was_typing = context.egui_wants_keyboard_input();
         let escape = context.input(|input| input.key_pressed(Key::Escape));
-        done || (modal.should_close() && !(typing && escape))
+        done || (modal.should_close() && !(was_typing && escape))
     }
 
     fn rows(&mut self, ui: &mut Ui) {

@@ -259,7 +259,7 @@ fn errors_count_what_is_switched_off() {
 #[test]
 fn what_no_error_counts_is_said() {
     for (what, effect) in
-        [("spot", "clipping"), ("field-curvature", "asphere"), ("illumination", "clipping")]
+        [("spot", "clipping"), ("field-curvature", "asphere"), ("wavefront", "clipping")]
     {
         let [off, on] = switched_off(ASPHERE, what, effect);
         assert_eq!(off["not_counted"], json!([effect]), "{what}");
@@ -295,6 +295,8 @@ fn a_switch_that_cannot_be_followed_is_refused_by_name() {
     }
     let one = [&search[..], &["--wavelength", "0.55"]].concat();
     refuse(&one, "dispersion=on", &["on here", "--wavelength leaves one"]);
+    let irradiance = ["analyze", GAUSS, "illumination"];
+    refuse(&irradiance, "clipping=off", &["off here", "from every direction"]);
     refuse(&["gradient", GAUSS], "aiming=off", &["real stop"]);
     refuse(&["trace", GAUSS, "--rays", "-"], "aiming=on", &["none is aimed"]);
     refuse(&["trace", GAUSS, "--rays", "-"], "dispersion=on", &["one wavelength"]);
