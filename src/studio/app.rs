@@ -9,7 +9,6 @@ use egui::{
 };
 
 use super::actions::{Actions, UiAction};
-use super::candidate_bar::candidate_bar;
 use super::dialogs::Dialogs;
 use super::dock::Dock;
 use super::draw::RenderBackend;
@@ -117,7 +116,6 @@ impl Studio {
         let menus = menu_context(&self.dock, &self.recent, &view, ui.ctx());
         menu::shortcuts(ui, &menus, self.dock.is_typing(ui.ctx()), &mut actions);
         bar_frame(ui, Side::top("menu"), |ui| menu::bar(ui, &menus, &mut actions));
-        candidate_bar(ui, &view, &mut actions);
         self.dialogs.ui(ui.ctx(), &menus, &mut actions);
         bar_frame(ui, Side::bottom("status"), |ui| Self::status_bar(ui, &view, &mut actions));
         CentralPanel::no_frame().show(ui, |ui| self.dock.ui(ui, &view, &mut actions));

@@ -65,6 +65,31 @@ impl<P: Panel> PanelState<P> {
     }
 }
 
+/// A harness around a panel with the room that the default arrangement gives it in a window of
+/// 1280 by 800 points, at the right and below.
+pub(super) fn small_harness<P: Panel + 'static>(
+    panel: P,
+    view: SessionView,
+) -> Harness<'static, PanelState<P>> {
+    let state = PanelState { panel, view, commands: Vec::new(), requests: Vec::new() };
+    let builder = Harness::builder().with_size([414.0, 392.0]).with_context_setup(theme::apply);
+    builder.build_ui_state(|ui, state: &mut PanelState<P>| state.show(ui), state)
+}
+
+/// The texts that a frame has painted, those without an accessible name too.
+pub(super) fn painted_texts<S>(harness: &Harness<'_, S>) -> Vec<String> {
+    fn add(shape: &egui::Shape, all: &mut Vec<String>) {
+        match shape {
+            egui::Shape::Vec(parts) => parts.iter().for_each(|part| add(part, all)),
+            egui::Shape::Text(text) => all.push(text.galley.text().to_owned()),
+            _ => {}
+        }
+    }
+    let mut all = Vec::new();
+    harness.output().shapes.iter().for_each(|clipped| add(&clipped.shape, &mut all));
+    all
+}
+
 /// A harness around a panel, large enough for all of it.
 pub(super) fn panel_harness<P: Panel + 'static>(
     panel: P,

@@ -88,6 +88,24 @@ fn versions_are_compared_named_and_gone_to() {
 }
 
 #[test]
+fn changes_of_the_merit_are_no_noise_and_no_thousands_of_percent() {
+    let mut view = branched();
+    let nodes = Arc::make_mut(&mut view.history);
+    for (node, merit) in nodes.iter_mut().zip([0.02, 0.02 * (1.0 + 1e-15), 35.51]) {
+        Arc::make_mut(node).merit = Some(merit);
+    }
+    view.version_id = 0;
+    let mut harness = panel_harness(HistoryPanel::default(), view);
+    harness.run();
+    harness.get_by_label("Accept the optimized lens: merit 35.51 (1776 times), seed 7").click();
+    harness.run();
+    harness.get_by_label("1776 times");
+    harness.get_by_label("Thickness of surface 3: merit 0.02").click();
+    harness.run();
+    harness.get_by_label("0 %");
+}
+
+#[test]
 fn the_course_of_an_optimization_can_be_rewound() {
     let mut harness = history();
     harness.get_by_label_contains("Present version").click();

@@ -700,3 +700,28 @@ fn a_failed_sweep_shows_its_reason() {
     assert_eq!(harness.state().commands, []);
     harness.get_by_label("No light gets through this lens");
 }
+
+/// The image plane lies where a solve puts it: what is left of its distance is rounding.
+#[test]
+fn a_defocus_of_nothing_but_rounding_is_zero() {
+    for bundled in aplanat::files::bundled_lenses() {
+        let opened = aplanat::files::parse(bundled.text.as_bytes(), bundled.name).unwrap();
+        let mut lens = opened.lens;
+        if lens.zoom_positions() > 1 {
+            continue;
+        }
+        lens.image_solve = Some(0.0);
+        let view = crate::harness::view_of(lens);
+        let analyses = view.results.as_ref().unwrap().analyses.as_ref();
+        if analyses.is_ok_and(|numbers| numbers.first_order().image_defocus.is_none()) {
+            continue;
+        }
+        let mut harness = panel_harness(FirstOrderPanel, view);
+        harness.run();
+        let at = |label: &str| harness.get_by_label(label).rect().center().y;
+        let line = at("Defocus");
+        let zero = harness.get_all_by_label("0 mm");
+        let beside = zero.filter(|text| (text.rect().center().y - line).abs() < 3.0).count();
+        assert_eq!(beside, 1, "{}", bundled.name);
+    }
+}

@@ -360,3 +360,59 @@ fn a_panel_can_have_the_window_and_a_search_can_be_watched() {
     harness.get_by_label("Paraxial projection");
     harness.get_by_label("Radius of surface 1");
 }
+
+/// The double Gauss with a larger gap.
+fn candidate() -> aplanat::lens::Lens {
+    let mut lens = double_gauss();
+    lens.surfaces[1].thickness += 0.4;
+    lens
+}
+
+/// A candidate is shown without moving anything that a person may be about to click.
+#[test]
+fn a_candidate_moves_no_row() {
+    let mut harness = window();
+    let rows = |harness: &Harness<'_, Studio>| {
+        ["Row of surface 1", "Row of surface 5", "Section of Double Gauss", "Undo"]
+            .map(|name| harness.get_all_by_label_contains(name).next().unwrap().rect())
+    };
+    let before = rows(&harness);
+    harness.state_mut().session_mut().apply(Command::Preview(Some(Box::new(candidate()))));
+    wait(&mut harness, "the candidate", |harness| {
+        harness.state().session().view().preview_results.is_some()
+    });
+    harness.run_steps(3);
+    let text = harness.get_by_label_contains("Candidate: a changed lens");
+    assert!(text.rect().bottom() < before[3].bottom() + 2.0, "it is in the menu bar");
+    assert_eq!(rows(&harness), before);
+    harness.get_by_label("Keep both").click();
+    harness.run_steps(3);
+    assert_eq!(harness.state().session().view().kept.len(), 1);
+}
+
+/// The merit above the drawing is that of the lens in the drawing.
+#[test]
+fn the_layout_tells_the_merit_of_the_candidate() {
+    let mut harness = window();
+    let goal = harness.state().session().view().goal.unwrap();
+    let tolerance = harness.state().session().view().settings.tolerance;
+    let own = aplanat::merit::Merit::new(&double_gauss(), &goal, tolerance).unwrap();
+    let lens = candidate();
+    let merit = aplanat::merit::Merit::new(&lens, &goal, tolerance).unwrap();
+    let merit = merit.with_initial_light(own.initial_light());
+    let wanted = merit.value(&merit.values(&lens)).unwrap();
+    harness.state_mut().session_mut().apply(Command::Preview(Some(Box::new(lens))));
+    wait(&mut harness, "the merit of the candidate", |harness| {
+        let view = harness.state().session().view();
+        view.preview_merit.is_some() && view.merit.is_some()
+    });
+    harness.run_steps(3);
+    let view = harness.state().session().view();
+    let total = |report: &Option<std::sync::Arc<aplanat::session::MeritReport>>| {
+        report.as_ref().unwrap().values.as_ref().unwrap().total
+    };
+    let (new, old) = (total(&view.preview_merit), total(&view.merit));
+    assert!((new / wanted - 1.0).abs() < 1e-9, "{new} {wanted}");
+    assert!((new / old - 1.0).abs() > 1e-3, "{new} {old}");
+    harness.get_by_label_contains(&format!("merit {}", &new.to_string()[..4]));
+}

@@ -16,7 +16,7 @@ use super::drag::DragState;
 use super::experiment::{ExperimentStatus, ExperimentWorker};
 use super::grin_design::GrinState;
 use super::history::DesignHistory;
-use super::live_merit::LiveMerit;
+use super::live_merit::{LiveMerit, MeritReport, MeritRequest};
 use super::optimization::{OptimizationEngine, OptimizationRequest, OptimizerFactory};
 use super::pareto::ParetoState;
 use super::run::{BackgroundRun, RunId, RunKind, RunStatus};
@@ -93,6 +93,10 @@ pub struct Session {
     kept: Arc<Vec<KeptLens>>,
     /// Analyzes that lens, or the one that a run shows.
     preview_analysis: AnalysisWorker,
+    /// Evaluates its merit.
+    preview_merit: LiveMerit,
+    /// The merit of the candidate before.
+    outdated_merit: Option<Arc<MeritReport>>,
     /// The lens whose analysis was requested last.
     preview_request: Option<PreviewRequest>,
     /// The version of the analyses of one source.
@@ -170,7 +174,9 @@ impl Session {
             preview_title: String::new(),
             shows_candidate: true,
             kept: Arc::default(),
-            preview_analysis: spawn_analysis(EffectTiming::Skipped, wake)?,
+            preview_analysis: spawn_analysis(EffectTiming::Skipped, wake.clone())?,
+            preview_merit: LiveMerit::spawn(wake)?,
+            outdated_merit: None,
             preview_request: None,
             preview_version: 0,
             events: Vec::new(),
@@ -293,6 +299,7 @@ impl Session {
             candidate: self.candidate(),
             kept: Arc::clone(&self.kept),
             preview_results: self.preview_results(),
+            preview_merit: self.candidate_merit(),
             experiment: self.experiment.run(),
             drag: self.drag.view(),
             messages: Arc::clone(&self.messages),
@@ -337,6 +344,14 @@ impl Session {
         if same_source && same_lens {
             return;
         }
+        if !same_source || source == PreviewSource::Panel {
+            self.outdated_merit = self.preview_merit.latest();
+        }
+        if let Some(goal) = self.goal() {
+            let (lens, design) = (Arc::clone(&lens), Arc::clone(&self.lens));
+            let tolerance = self.settings.tolerance;
+            self.preview_merit.request(MeritRequest { lens, design, goal, tolerance });
+        }
         self.preview_version += u64::from(!same_source);
         let (version, settings) = (self.preview_version, self.settings.clone());
         self.preview_analysis.request(AnalysisRequest {
@@ -378,7 +393,9 @@ impl Session {
         });
         // While a handle is dragged, its slopes come with the merit.
         if let Some(goal) = self.goal().filter(|_| self.drag.handle().is_none()) {
-            self.live_merit.request(Arc::clone(&self.lens), goal, self.settings.tolerance);
+            let [lens, design] = [&self.lens; 2].map(Arc::clone);
+            let tolerance = self.settings.tolerance;
+            self.live_merit.request(MeritRequest { lens, design, goal, tolerance });
         }
     }
 

@@ -18,6 +18,8 @@ use crate::studio::thumbnails::Thumbnails;
 const CELL: [f32; 2] = [12.0, 20.0];
 /// The size of the drawing of a version.
 const THUMBNAIL: Vec2 = vec2(44.0, 18.0);
+/// The smallest change of the merit that is told, relative to it.
+const LEAST_CHANGE: f64 = 5e-4;
 /// The height of the curve of an optimization.
 const CURVE_HEIGHT: f32 = 64.0;
 
@@ -102,10 +104,11 @@ fn line_text(view: &SessionView, version: &HistoryNode) -> String {
     let Some(merit) = version.merit else { return title };
     let short = number::format_digits(merit, 4);
     let before = version.parent.and_then(|id| node(view, id)?.merit);
-    let change = before.filter(|before| *before != 0.0).map(|before| merit / before - 1.0);
+    let changed = before.filter(|before| (merit - before).abs() >= LEAST_CHANGE * before.abs());
+    let change = changed.and_then(|before| number::format_change(before, merit, 1));
     let seed = version.seed.map(|seed| format!(", seed {seed}")).unwrap_or_default();
-    match change.filter(|change| change.abs() >= 5e-4) {
-        Some(change) => format!("{title}: merit {short} ({:+.1} %){seed}", 100.0 * change),
+    match change {
+        Some(change) => format!("{title}: merit {short} ({change}){seed}"),
         None => format!("{title}: merit {short}{seed}"),
     }
 }

@@ -184,9 +184,8 @@ pub(super) fn changes_text(view: &SessionView) -> Vec<String> {
     // A search that does not ask for light may buy sharpness with it: it is told beside the spots.
     let (old, new) = (mean_pupil_area(before), mean_pupil_area(after));
     if old > 0.0 {
-        let change = number::format_digits(100.0 * (new / old - 1.0), 3);
-        let sign = if new > old { "+" } else { "" };
-        texts.push(format!("light {} to {} mm² ({sign}{change} %)", short(old), short(new)));
+        let change = number::format_change(old, new, 2).unwrap_or_default();
+        texts.push(format!("light {} to {} mm² ({change})", short(old), short(new)));
     }
     texts
 }
