@@ -92,6 +92,20 @@ pub fn without_rounding(value: f64, size: f64) -> f64 {
 /// The change of a number in percent with some decimals: `0 %` where nothing but rounding has
 /// changed, and a factor beyond 1000 %. `None` for a number that was zero, or for an infinite one.
 pub fn format_change(before: f64, after: f64, decimals: usize) -> Option<String> {
+    change_with(before, after, |percent| {
+        let text = format!("{percent:.decimals$}");
+        let is_zero = text.chars().all(|digit| matches!(digit, '0' | '.'));
+        // A change that is small is not none.
+        if is_zero { format_digits(percent, 1) } else { text }
+    })
+}
+
+/// The same with three digits, without trailing zeros.
+pub fn short_change(before: f64, after: f64) -> Option<String> {
+    change_with(before, after, |percent| format_digits(percent, 3))
+}
+
+fn change_with(before: f64, after: f64, show: impl Fn(f64) -> String) -> Option<String> {
     let ratio = after / before;
     if !ratio.is_finite() || before.is_infinite() {
         return None;
@@ -104,11 +118,7 @@ pub fn format_change(before: f64, after: f64, decimals: usize) -> Option<String>
         return Some(format!("{} times", format_digits(ratio, 4)));
     }
     let sign = if percent > 0.0 { "+" } else { "-" };
-    let text = format!("{:.decimals$}", percent.abs());
-    let is_zero = text.chars().all(|digit| matches!(digit, '0' | '.'));
-    // A change that is small is not none.
-    let text = if is_zero { format_digits(percent.abs(), 1) } else { text };
-    Some(format!("{sign}{text} %"))
+    Some(format!("{sign}{} %", show(percent.abs())))
 }
 
 /// The radius of a surface, as it is shown for a curvature.
@@ -185,6 +195,7 @@ mod tests {
         for (before, after, text) in cases {
             assert_eq!(format_change(before, after, 1).as_deref(), Some(text), "{before} {after}");
         }
+        assert_eq!(short_change(50.0, 10.0).as_deref(), Some("-80 %"));
         let none = [(0.0, 1.0), (0.0, 0.0), (f64::INFINITY, 50.0), (50.0, f64::INFINITY)];
         assert!(none.iter().all(|(before, after)| format_change(*before, *after, 1).is_none()));
     }

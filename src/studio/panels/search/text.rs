@@ -136,7 +136,7 @@ fn scored_design(scored: &ScoredLens) -> Option<&ParetoPoint> {
 }
 
 fn change_text(name: &str, old: f64, new: f64, unit: &str) -> String {
-    let change = number::format_change(old, new, 2);
+    let change = number::short_change(old, new);
     let change = change.map(|change| format!(" ({change})")).unwrap_or_default();
     format!("{name} {} to {} {unit}{change}", short(old), short(new))
 }
