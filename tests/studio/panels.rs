@@ -725,3 +725,38 @@ fn a_defocus_of_nothing_but_rounding_is_zero() {
         assert_eq!(beside, 1, "{}", bundled.name);
     }
 }
+
+/// The numbers below each pupil are whole in the default arrangement.
+#[test]
+fn the_captions_of_pupils_fit() {
+    let mut harness =
+        crate::harness::small_harness(PupilPanel::default(), view(), crate::harness::UPPER);
+    harness.run();
+    let pupils = harness.get_all_by_label_contains("Pupil of field").count();
+    let rays: Vec<_> = harness.get_all_by_label_contains(" rays, ").map(|n| n.rect()).collect();
+    assert_eq!((pupils, rays.len()), (3, 3));
+    let clipped: Vec<_> = harness
+        .output()
+        .shapes
+        .iter()
+        .filter_map(|painted| {
+            let egui::Shape::Text(text) = &painted.shape else { return None };
+            let is_caption = text.galley.text().contains(" rays, ");
+            is_caption.then(|| (text.visual_bounding_rect(), painted.clip_rect))
+        })
+        .collect();
+    assert_eq!(clipped.len(), 3);
+    for (text, clip) in clipped {
+        assert!(clip.expand(0.5).contains_rect(text), "{text:?} in {clip:?}");
+    }
+}
+
+/// One ray is no rays, and one variable no variables.
+#[test]
+fn counts_of_one_are_singular() {
+    let mut lens = double_gauss();
+    lens.variables.truncate(1);
+    let mut harness = panel_harness(ParetoPanel::default(), crate::harness::view_of(lens));
+    harness.run();
+    harness.get_by_label_contains("the 1 variable and all semi-diameters");
+}

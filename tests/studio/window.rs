@@ -3,6 +3,8 @@
 use std::time::Duration;
 
 use aplanat::experiments::{self, Effort, Experiment};
+use aplanat::lens::{Edit, Parameter, Quantity};
+use aplanat::paraxial::{DragSettings, FirstOrderLock};
 use aplanat::session::{Command, ExperimentStatus, Session};
 use aplanat::studio::Studio;
 use aplanat::studio::draw::RenderBackend;
@@ -415,4 +417,67 @@ fn the_layout_tells_the_merit_of_the_candidate() {
     assert!((new / wanted - 1.0).abs() < 1e-9, "{new} {wanted}");
     assert!((new / old - 1.0).abs() > 1e-3, "{new} {old}");
     harness.get_by_label_contains(&format!("merit {}", &new.to_string()[..4]));
+}
+
+/// The menu of panels opens the table with its first number ready to be typed over.
+#[test]
+fn the_table_has_the_focus_when_a_key_opens_it() {
+    let mut harness = window();
+    // The first time closes it.
+    for _ in 0..2 {
+        harness.key_press_modifiers(Modifiers::COMMAND, Key::Num3);
+        harness.run_steps(3);
+    }
+    assert!(harness.get_by_label("Radius of surface 1").is_focused());
+}
+
+#[test]
+fn save_as_proposes_the_name_of_the_lens() {
+    let mut harness = window();
+    harness.key_press_modifiers(Modifiers::COMMAND | Modifiers::SHIFT, Key::S);
+    harness.run_steps(3);
+    let proposed = harness.get_by_label("Path").value().unwrap();
+    assert!(proposed.starts_with("Double Gauss") && proposed.ends_with(".json"), "{proposed}");
+}
+
+/// A window on a file whose program was killed says what it has recovered, and holds what was held.
+#[test]
+fn a_file_that_was_open_when_the_program_was_killed_is_told() {
+    let folder = std::env::temp_dir().join(format!("aplanat-told-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    let [journals, copy] = ["journals", "copy"].map(|name| folder.join(name));
+    let file = folder.join("lens.json");
+    aplanat::files::save(&double_gauss(), &file).unwrap();
+    let mut session = Session::new(double_gauss(), || {}).unwrap();
+    session.set_journal_folder(&journals, || {}).unwrap();
+    session.apply(Command::Open(file.clone()));
+    let parameter = Parameter::new(1, Quantity::Thickness);
+    session.apply(Edit::Set { parameter, value: 2.5 }.into());
+    session.apply(Command::CommitEdit);
+    let locks = DragSettings { locks: vec![FirstOrderLock::FocalLength], ..Default::default() };
+    session.apply(Command::SetDragSettings(locks.clone()));
+    session.sync_journal();
+    // The journals as a killed program leaves them.
+    std::fs::create_dir_all(&copy).unwrap();
+    for journal in std::fs::read_dir(&journals).unwrap().flatten() {
+        if journal.path().extension().is_some_and(|end| end == "journal") {
+            std::fs::copy(journal.path(), copy.join(journal.file_name())).unwrap();
+        }
+    }
+    let mut again = Session::new(double_gauss(), || {}).unwrap();
+    again.set_journal_folder(&copy, || {}).unwrap();
+    let studio = Studio::new(again, RenderBackend::Software, Persistence::Disabled, None);
+    let builder = Harness::builder().with_size([1280.0, 800.0]).with_context_setup(theme::apply);
+    let mut harness = builder.build_ui_state(|ui, studio: &mut Studio| studio.ui(ui), studio);
+    harness.state_mut().session_mut().apply(Command::Open(file));
+    harness.state_mut().session_mut().tell_unfinished();
+    settle(&mut harness);
+    let view = harness.state().session().view();
+    assert_eq!((view.lens.surfaces[1].thickness, &view.drag.settings), (2.5, &locks));
+    let told = harness.get_by_label_contains("with 1 unsaved change (").value().unwrap();
+    assert!(told.starts_with("Recovered") && told.contains("thickness"), "{told}");
+    assert!(!told.contains("other design"), "{told}");
+    drop(harness);
+    drop(session);
+    std::fs::remove_dir_all(folder).unwrap();
 }

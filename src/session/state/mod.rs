@@ -252,6 +252,8 @@ impl Session {
     }
 
     fn show(&mut self, setting: PanelSetting) {
+        // A panel that comes to the front contradicts no message.
+        let is_recent = self.message_is_recent;
         self.change_settings(|settings| match setting {
             PanelSetting::Rays(rays) => settings.rays = rays.min(MAX_RAYS),
             PanelSetting::Pupils(shown) => settings.pupils = shown,
@@ -265,6 +267,7 @@ impl Session {
             PanelSetting::GoodRms(rms) => settings.good_rms = rms,
             PanelSetting::PupilWavelength(wavelength) => settings.pupil_wavelength = wavelength,
         });
+        self.message_is_recent = is_recent;
     }
 
     fn set_effect(&mut self, effect: Effect, choice: EffectOverride) {
