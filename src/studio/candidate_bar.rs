@@ -1,7 +1,7 @@
 //! The part of the menu bar that names the lens in the panels while it is not the design. It takes
 //! room that is free, so that no panel moves when a candidate appears.
 
-use egui::{Align, Button, CornerRadius, Frame, Label, Layout, Margin, MenuBar, RichText, Ui};
+use egui::{Align, Button, CornerRadius, Frame, Label, Layout, Margin, RichText, Ui};
 
 use super::actions::Actions;
 use super::number;
@@ -88,14 +88,12 @@ fn kept_menu(ui: &mut Ui, view: &SessionView, actions: &mut Actions) {
     if view.kept.is_empty() {
         return;
     }
-    MenuBar::new().ui(ui, |ui| {
-        ui.menu_button(format!("Kept ({})", view.kept.len()), |ui| {
-            for kept in view.kept.iter() {
-                if ui.button(&kept.title).on_hover_text("Show it as a candidate").clicked() {
-                    actions.push(Command::Preview(Some(Box::new(Lens::clone(&kept.lens)))));
-                    ui.close();
-                }
+    ui.menu_button(format!("Kept ({})", view.kept.len()), |ui| {
+        for kept in view.kept.iter() {
+            if ui.button(&kept.title).on_hover_text("Show it as a candidate").clicked() {
+                actions.push(Command::Preview(Some(Box::new(Lens::clone(&kept.lens)))));
+                ui.close();
             }
-        });
+        }
     });
 }

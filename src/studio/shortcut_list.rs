@@ -19,7 +19,7 @@ const OTHERS: [(&str, &str, &str); 21] = [
     ("Table", "Delete", "Delete the selected surface"),
     ("Table", "Ctrl+Shift+V", "Make the number with the cursor variable, or fix it"),
     ("Drawing", "Double click", "Show the whole lens"),
-    ("Handle", "Tab", "Go to the next handle of the drawing"),
+    ("Handle", "Tab", "Go to the next handle of the selected surface or of the lens"),
     ("Handle", "Arrows", "Move the handle"),
     ("Handle", "Shift+arrows", "Move it in small steps"),
     ("Handle", "Digits, Enter", "Type its value, and set it"),

@@ -113,12 +113,14 @@ enum PreviewSource {
     Run(RunId),
 }
 
-/// A lens that is shown in place of the design, with the settings of its analysis.
+/// A lens that is shown in place of the design, with what its numbers depend on.
 #[derive(Debug)]
 struct PreviewRequest {
     source: PreviewSource,
     lens: Arc<Lens>,
     settings: AnalysisSettings,
+    /// The merit function of the design, by which its merit is told.
+    goal: Option<Arc<Goal>>,
 }
 
 impl Session {
@@ -344,13 +346,15 @@ impl Session {
         let same_source = last.is_some_and(|last| last.source == source);
         let same_lens = last
             .is_some_and(|last| Arc::ptr_eq(&last.lens, &lens) && last.settings == self.settings);
-        if same_source && same_lens {
+        let goal = self.goal();
+        let same_goal = last.is_some_and(|last| last.goal == goal);
+        if same_source && same_lens && same_goal {
             return;
         }
-        if !same_source || source == PreviewSource::Panel {
+        if !same_source || !same_goal || source == PreviewSource::Panel {
             self.outdated_merit = self.preview_merit.latest();
         }
-        if let Some(goal) = self.goal() {
+        if let Some(goal) = goal.clone() {
             let (lens, design) = (Arc::clone(&lens), Arc::clone(&self.lens));
             let tolerance = self.settings.tolerance;
             self.preview_merit.request(MeritRequest { lens, design, goal, tolerance });
@@ -362,7 +366,7 @@ impl Session {
             lens: Arc::clone(&lens),
             settings: settings.clone(),
         });
-        self.preview_request = Some(PreviewRequest { source, lens, settings });
+        self.preview_request = Some(PreviewRequest { source, lens, settings, goal });
     }
 
     /// The analyses of the lens that is shown in place of the design, maybe of one step before.

@@ -316,10 +316,9 @@ impl MeritRow {
         ui.allocate_ui_with_layout(room, wrapping, |ui| {
             ui.spacing_mut().item_spacing = vec2(2.0, 2.0);
             let targets = targets(&mut self.weighted.term);
-            let width = if targets.len() > 1 { 48.0 } else { 60.0 };
             for (what, value) in targets {
                 let name = format!("{what} of {title}");
-                number_field(ui, buffers, &name, value, width);
+                number_field(ui, buffers, &name, value, 46.0);
             }
             scope::bounds(ui, buffers, &title, &mut self.weighted.term);
             ui.weak(unit(term));

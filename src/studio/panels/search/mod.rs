@@ -38,6 +38,8 @@ const INTRODUCTION: &str = "Which lens of another structure is better? Chains de
 
 /// The height of the bar of the selected lens: buttons and two lines.
 const SELECTION_HEIGHT: f32 = 62.0;
+/// Its height while nothing is selected.
+const HINT_HEIGHT: f32 = 24.0;
 /// With less height than this, the bar is above the page and scrolls with it.
 const MIN_HEIGHT: f32 = 240.0;
 
@@ -249,7 +251,8 @@ impl SearchPanel {
         }
         let frame = Frame::new().inner_margin(Margin { top: 4, ..Margin::ZERO });
         let side = Side::bottom("chosen lens of the search").frame(frame);
-        let side = side.show_separator_line(false).exact_size(SELECTION_HEIGHT);
+        let height = if self.selected.is_some() { SELECTION_HEIGHT } else { HINT_HEIGHT };
+        let side = side.show_separator_line(false).exact_size(height);
         side.show(ui, |ui| self.selection(ui, search, actions));
     }
 
