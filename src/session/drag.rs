@@ -7,9 +7,7 @@ use super::run::{LatestRequestWorker, catch_panic};
 use crate::lens::{Lens, Parameter, ParameterKind, add_variables};
 use crate::math::format_short;
 use crate::merit::{DerivativeLevel, Goal, Merit, MeritError, SumOfSquares, TermValue};
-use crate::paraxial::{
-    DragOutcome, DragSettings, Handle, HandleDrag, MovedNumber, short_name, tangents,
-};
+use crate::paraxial::{DragOutcome, DragSettings, Handle, HandleDrag, MovedNumber, tangents};
 use std::borrow::Cow;
 use std::collections::HashMap;
 use std::io;
@@ -179,8 +177,9 @@ impl DragState {
         }
     }
 
-    /// Lets the slopes be requested anew, because what is held has changed.
-    pub(super) const fn forget_slopes(&mut self) {
+    /// Holds other quantities, for which the slopes are requested anew.
+    pub(super) fn hold(&mut self, settings: DragSettings) {
+        self.settings = settings;
         self.requested = 0;
     }
 
@@ -223,9 +222,8 @@ impl DragProgress {
             return None;
         }
         let change = |moved: &MovedNumber| {
-            let name = short_name(moved.parameter);
             let [before, after] = [moved.before, moved.after].map(rounded).map(format_short);
-            format!("{name} {before} to {after}")
+            format!("{} from {before} to {after}", moved.parameter)
         };
         let named: Vec<String> = self.moved.iter().take(NAMED_NUMBERS).map(change).collect();
         let more = self.moved.len().saturating_sub(NAMED_NUMBERS);

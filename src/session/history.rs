@@ -226,6 +226,14 @@ impl DesignHistory {
         meeting.unwrap_or(ours.len())
     }
 
+    /// The titles of the edits from another version to the present one, the newest first; of an edit
+    /// that was undone there is none.
+    pub(super) fn titles_since(&self, from: u64) -> Vec<&str> {
+        let before: Vec<u64> = std::iter::successors(Some(from), |id| self.parent(*id)).collect();
+        let new = self.ancestry().into_iter().take_while(|id| !before.contains(id));
+        new.filter_map(|id| Some(self.node(id)?.title.as_str())).collect()
+    }
+
     /// Forgets the oldest versions beyond a number of them: first those that lead nowhere, then the
     /// first one. Returns the number of those forgotten.
     pub(super) fn prune(&mut self, limit: usize) -> usize {

@@ -4,7 +4,9 @@
 use super::clock::{Timed, time};
 use super::run::{LatestRequestWorker, catch_panic};
 use crate::lens::Lens;
-use crate::merit::{ConstraintMargin, Goal, Merit, MeritError, TermValue, constraint_margins};
+use crate::merit::{
+    ConstraintMargin, Goal, Merit, MeritError, Term, TermValue, constraint_margins,
+};
 use std::io;
 use std::sync::Arc;
 
@@ -41,10 +43,22 @@ impl MeritValues {
         share.is_finite().then_some(share)
     }
 
-    fn evaluate(lens: &Lens, goal: &Goal, tolerance: f64) -> Result<Self, String> {
-        let merit = Merit::new(lens, goal, tolerance).map_err(|why| why.to_string())?;
-        let terms = merit.terms(&merit.values(lens)).map_err(|why| why.to_string())?;
-        Self::new(lens, &merit, terms).map_err(|why| why.to_string())
+    fn evaluate(request: &MeritRequest) -> Result<Self, MeritError> {
+        let MeritRequest { lens, design, goal, tolerance } = request;
+        let mut merit = Merit::new(lens, goal, *tolerance)?;
+        let about_light = goal.terms.iter().any(|asked| matches!(asked.term, Term::Light(_)));
+        if about_light && !Arc::ptr_eq(lens, design) {
+            let own = Merit::new(design, goal, *tolerance)?;
+            let counts = |merit: &Merit| -> Vec<usize> {
+                merit.initial_light().iter().map(Vec::len).collect()
+            };
+            // Lenses with other fields have no light to compare.
+            if counts(&own) == counts(&merit) {
+                merit = merit.with_initial_light(own.initial_light());
+            }
+        }
+        let terms = merit.terms(&merit.values(lens))?;
+        Self::new(lens, &merit, terms)
     }
 
     /// The values of terms that were evaluated for a lens, with its limits.
@@ -63,10 +77,18 @@ impl MeritValues {
     }
 }
 
-/// A lens to evaluate with its merit function, and the tolerance of the spots.
-type MeritRequest = (Arc<Lens>, Arc<Goal>, f64);
+/// A lens to evaluate.
+#[derive(Debug)]
+pub(super) struct MeritRequest {
+    pub(super) lens: Arc<Lens>,
+    /// The design, with whose light it is compared.
+    pub(super) design: Arc<Lens>,
+    pub(super) goal: Arc<Goal>,
+    /// The relative error allowed of the spots.
+    pub(super) tolerance: f64,
+}
 
-/// Evaluates the merit of the design, the newest version only.
+/// Evaluates the merit of the design or of a candidate, the newest version only.
 #[derive(Debug)]
 pub(super) struct LiveMerit {
     worker: LatestRequestWorker<MeritRequest, MeritReport>,
@@ -75,17 +97,17 @@ pub(super) struct LiveMerit {
 impl LiveMerit {
     pub(super) fn spawn(wake: impl Fn() + Send + 'static) -> io::Result<Self> {
         let worker = LatestRequestWorker::spawn("merit", wake, |request: MeritRequest, output| {
-            let (lens, goal, tolerance) = request;
-            let evaluate = || catch_panic(|| MeritValues::evaluate(&lens, &goal, tolerance));
-            let Timed { value: values, ms } = time(evaluate);
+            let values = || MeritValues::evaluate(&request).map_err(|why| why.to_string());
+            let Timed { value: values, ms } = time(|| catch_panic(values));
+            let MeritRequest { lens, goal, .. } = request;
             output.publish(MeritReport { lens, goal, values, ms });
         })?;
         Ok(Self { worker })
     }
 
     /// Requests the merit of another version.
-    pub(super) fn request(&self, lens: Arc<Lens>, goal: Arc<Goal>, tolerance: f64) {
-        self.worker.request((lens, goal, tolerance));
+    pub(super) fn request(&self, request: MeritRequest) {
+        self.worker.request(request);
     }
 
     /// The newest merit, maybe of an earlier version.

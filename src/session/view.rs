@@ -48,6 +48,8 @@ pub struct SessionView {
     pub kept: Arc<Vec<KeptLens>>,
     /// The analyses of that lens, or of the one that a run shows, maybe of an earlier step.
     pub preview_results: Option<Arc<AnalysisResults>>,
+    /// The merit of that lens by the merit function of the design, maybe of an earlier step.
+    pub preview_merit: Option<Arc<MeritReport>>,
     /// The experiment, until it is dismissed.
     pub experiment: Option<Arc<ExperimentRun>>,
     /// The handles of the design: what is held while they are dragged, and the drag that goes on.
@@ -94,6 +96,7 @@ impl Default for SessionView {
             candidate: None,
             kept: Arc::default(),
             preview_results: None,
+            preview_merit: None,
             experiment: None,
             drag: DragView::default(),
             messages: Arc::default(),

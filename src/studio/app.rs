@@ -9,7 +9,6 @@ use egui::{
 };
 
 use super::actions::{Actions, UiAction};
-use super::candidate_bar::candidate_bar;
 use super::dialogs::Dialogs;
 use super::dock::Dock;
 use super::draw::RenderBackend;
@@ -20,7 +19,7 @@ use super::file_dialog::{FileDialog, FileRequest};
 use super::input_order::InputQueue;
 use super::menu;
 use super::menu_items::{MenuContext, PanelState};
-use super::panels::PanelKind;
+use super::panels::{PanelKind, first_radius_field};
 use super::text::capitalize;
 use super::unsaved::{PendingAction, PendingState};
 use super::window::Persistence;
@@ -36,6 +35,8 @@ const DOCK: &str = "dock";
 
 /// The key under which the files that were opened last are stored.
 const RECENT: &str = "recent files";
+/// The number of words of the name of a lens in that of its file.
+const NAME_WORDS: usize = 6;
 /// The number of those files.
 const MAX_RECENT: usize = 12;
 
@@ -117,7 +118,6 @@ impl Studio {
         let menus = menu_context(&self.dock, &self.recent, &view, ui.ctx());
         menu::shortcuts(ui, &menus, self.dock.is_typing(ui.ctx()), &mut actions);
         bar_frame(ui, Side::top("menu"), |ui| menu::bar(ui, &menus, &mut actions));
-        candidate_bar(ui, &view, &mut actions);
         self.dialogs.ui(ui.ctx(), &menus, &mut actions);
         bar_frame(ui, Side::bottom("status"), |ui| Self::status_bar(ui, &view, &mut actions));
         CentralPanel::no_frame().show(ui, |ui| self.dock.ui(ui, &view, &mut actions));
@@ -142,7 +142,13 @@ impl Studio {
                 context.request_repaint();
             }
             UiAction::ShowPanel(kind) => self.dock.show(kind),
-            UiAction::TogglePanel(kind) => self.dock.toggle(kind),
+            UiAction::TogglePanel(kind) => {
+                self.dock.toggle(kind);
+                if kind == PanelKind::Prescription && self.dock.is_visible(kind) {
+                    // Its keys work at once.
+                    context.memory_mut(|memory| memory.request_focus(first_radius_field()));
+                }
+            }
             UiAction::MaximizePanel(kind) => self.dock.maximize(kind),
             UiAction::ArrangePanels(arrangement) => self.dock.arrange(arrangement),
             UiAction::SetTheme(theme) => context.set_theme(theme),
@@ -356,8 +362,8 @@ fn likely_path(view: &SessionView, request: FileRequest) -> Option<PathBuf> {
             Some(beside.unwrap_or_else(|| PathBuf::from("picture.png")))
         }
         FileRequest::ExportPaper(kind) => {
-            let name = PathBuf::from("lens");
-            let beside = view.path.clone().unwrap_or(name);
+            let name = || named_file(&view.lens.name, "pdf");
+            let beside = view.path.clone().unwrap_or_else(name);
             Some(beside.with_extension(kind.extensions().first().unwrap_or(&"pdf")))
         }
         FileRequest::OpenSearch => checkpoint().or_else(|| search.unfinished.clone()),
@@ -367,8 +373,24 @@ fn likely_path(view: &SessionView, request: FileRequest) -> Option<PathBuf> {
             let beside = open_field_path(view).map(|path| path.with_extension("npz"));
             Some(beside.unwrap_or_else(|| PathBuf::from("field.npz")))
         }
+        FileRequest::Save | FileRequest::ExportJson => {
+            Some(view.path.clone().unwrap_or_else(|| named_file(&view.lens.name, "json")))
+        }
+        FileRequest::ExportZemax => {
+            let beside = view.path.as_ref().map(|path| path.with_extension("zmx"));
+            Some(beside.unwrap_or_else(|| named_file(&view.lens.name, "zmx")))
+        }
         _ => view.path.clone(),
     }
+}
+
+/// A file with the name of a lens, without the characters that some systems refuse.
+fn named_file(name: &str, extension: &str) -> PathBuf {
+    let kept = |c: char| c.is_alphanumeric() || matches!(c, ' ' | '-' | '_');
+    let name: String = name.chars().map(|c| if kept(c) { c } else { ' ' }).collect();
+    let name = name.split_whitespace().take(NAME_WORDS).collect::<Vec<_>>().join(" ");
+    let name = if name.is_empty() { "lens" } else { &name };
+    PathBuf::from(format!("{name}.{extension}"))
 }
 
 /// The file of the gradient-index field that is open.
@@ -423,5 +445,21 @@ fn timing_text(view: &SessionView) -> String {
     match &view.results {
         Some(results) if view.is_current() => format!("all numbers in {:.1} ms", results.ms),
         _ => "computing…".to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_lens_without_a_file_proposes_its_name() {
+        for (name, file) in [
+            ("Double Gauss: 50/2", "Double Gauss 50 2.json"),
+            ("  ..  ", "lens.json"),
+            ("a b c d e f g h", "a b c d e f.json"),
+        ] {
+            assert_eq!(named_file(name, "json"), PathBuf::from(file));
+        }
     }
 }

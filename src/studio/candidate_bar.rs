@@ -1,6 +1,7 @@
-//! The bar above the panels that names the lens they show while it is not the design.
+//! The part of the menu bar that names the lens in the panels while it is not the design. It takes
+//! room that is free, so that no panel moves when a candidate appears.
 
-use egui::{Button, Frame, Margin, MenuBar, Panel as Side, RichText, Ui};
+use egui::{Align, Button, CornerRadius, Frame, Label, Layout, Margin, RichText, Ui};
 
 use super::actions::Actions;
 use super::number;
@@ -8,7 +9,7 @@ use super::panels::mean_spot;
 use crate::lens::Lens;
 use crate::session::{AnalysisResults, CandidateSource, CandidateView, Command, SessionView};
 
-/// Shows the bar while there is a candidate, or a lens that was kept.
+/// Shows the candidate while there is one, and the lenses that were kept, from the right to the left.
 pub(super) fn candidate_bar(ui: &mut Ui, view: &SessionView, actions: &mut Actions) {
     if view.candidate.is_none() && view.kept.is_empty() {
         return;
@@ -17,15 +18,18 @@ pub(super) fn candidate_bar(ui: &mut Ui, view: &SessionView, actions: &mut Actio
     let visuals = ui.visuals();
     let fill = if shown { visuals.warn_fg_color.gamma_multiply(0.18) } else { visuals.panel_fill };
     let fill = visuals.panel_fill.blend(fill);
-    let frame = Frame::new().fill(fill).inner_margin(Margin::symmetric(6, 3));
-    Side::top("candidate").frame(frame).show_separator_line(false).show(ui, |ui| {
-        ui.horizontal_wrapped(|ui| {
-            if let Some(candidate) = &view.candidate {
-                describe(ui, view, candidate);
-                buttons(ui, candidate, actions);
-            }
-            kept_menu(ui, view, actions);
-        });
+    let frame = Frame::new().fill(fill).corner_radius(CornerRadius::same(3));
+    frame.inner_margin(Margin::symmetric(6, 0)).show(ui, |ui| {
+        ui.reset_style();
+        ui.spacing_mut().item_spacing.x = 4.0;
+        kept_menu(ui, view, actions);
+        if let Some(candidate) = &view.candidate {
+            buttons(ui, candidate, actions);
+            // The text takes what the buttons leave.
+            ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
+                describe(ui, view, candidate)
+            });
+        }
     });
 }
 
@@ -42,10 +46,11 @@ fn describe(ui: &mut Ui, view: &SessionView, candidate: &CandidateView) {
     } else {
         format!("The design; a candidate waits: {}", candidate.title)
     };
-    ui.label(RichText::new(text).strong()).on_hover_text(
-        "All panels show the same lens. Mean RMS radius of the spots. Numbers of the prescription \
-         that differ from the design are marked, with the old value in the tooltip.",
+    let hint = format!(
+        "{text}\n\nAll panels show the same lens. Mean RMS radius of the spots. Numbers of the \
+         prescription that differ from the design are marked, with the old value in the tooltip."
     );
+    ui.add(Label::new(RichText::new(text).strong()).truncate()).on_hover_text(hint);
 }
 
 fn buttons(ui: &mut Ui, candidate: &CandidateView, actions: &mut Actions) {
@@ -55,7 +60,7 @@ fn buttons(ui: &mut Ui, candidate: &CandidateView, actions: &mut Actions) {
             "Show the design again; the run goes on"
         }
     };
-    let show = if candidate.shown { "Show the design" } else { "Show the candidate" };
+    let show = if candidate.shown { "Show design" } else { "Show candidate" };
     let choices = [
         ("Accept", Command::AcceptCandidate, "Make it the design, as one undo step"),
         (
@@ -63,14 +68,15 @@ fn buttons(ui: &mut Ui, candidate: &CandidateView, actions: &mut Actions) {
             Command::KeepCandidate,
             "Keep it beside the design, to be shown and compared again; the design stays",
         ),
-        ("Discard candidate", Command::DiscardCandidate, discard),
+        ("Discard", Command::DiscardCandidate, discard),
         (
             show,
             Command::ShowCandidate(!candidate.shown),
             "Switch between the two; numbers can be edited while the design is shown",
         ),
     ];
-    for (text, command, hint) in choices {
+    // The bar is filled from the right.
+    for (text, command, hint) in choices.into_iter().rev() {
         if ui.add(Button::new(text).small()).on_hover_text(hint).clicked() {
             actions.push(command);
         }
@@ -82,14 +88,12 @@ fn kept_menu(ui: &mut Ui, view: &SessionView, actions: &mut Actions) {
     if view.kept.is_empty() {
         return;
     }
-    MenuBar::new().ui(ui, |ui| {
-        ui.menu_button(format!("Kept lenses ({})", view.kept.len()), |ui| {
-            for kept in view.kept.iter() {
-                if ui.button(&kept.title).on_hover_text("Show it as a candidate").clicked() {
-                    actions.push(Command::Preview(Some(Box::new(Lens::clone(&kept.lens)))));
-                    ui.close();
-                }
+    ui.menu_button(format!("Kept ({})", view.kept.len()), |ui| {
+        for kept in view.kept.iter() {
+            if ui.button(&kept.title).on_hover_text("Show it as a candidate").clicked() {
+                actions.push(Command::Preview(Some(Box::new(Lens::clone(&kept.lens)))));
+                ui.close();
             }
-        });
+        }
     });
 }

@@ -78,7 +78,7 @@ impl Dock {
     }
 
     /// True if a panel is open and not behind another one.
-    fn is_visible(&self, kind: PanelKind) -> bool {
+    pub fn is_visible(&self, kind: PanelKind) -> bool {
         if let Some(shown) = self.maximized {
             return shown == kind;
         }

@@ -11,7 +11,7 @@ use egui::{
 
 use super::actions::{Actions, UiAction};
 use super::form::number_field;
-use super::text::counted;
+use super::text::{counted, degrees};
 use super::thumbnails::Thumbnails;
 use crate::files::{LibraryLens, LibraryQuery, ShortRange, library_lenses};
 use crate::lens::Lens;
@@ -256,7 +256,12 @@ fn words(ui: &Ui, painter: &Painter, lens: &LibraryLens, rect: Rect) {
     painter.galley(at, galley, visuals.text_color());
     let lines = [
         format!("{}, {}", lens.design, parts(lens)),
-        format!("{} mm  {}  {}", ShortRange(&lens.focal_length), lens.aperture, lens.field),
+        degrees(&format!(
+            "{} mm  {}  {}",
+            ShortRange(&lens.focal_length),
+            lens.aperture,
+            lens.field
+        )),
     ];
     for (i, line) in lines.into_iter().enumerate() {
         let at = at + vec2(0.0, 15.0 + 13.0 * i as f32);

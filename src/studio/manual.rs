@@ -4,13 +4,15 @@ use egui::{Align2, Context, Id, ScrollArea, TextEdit, Ui, Window, vec2};
 use egui_commonmark::{CommonMarkCache, CommonMarkViewer};
 
 /// The pages in their order; the title of each is its first line.
-const PAGES: [&str; 7] = [
+const PAGES: [&str; 9] = [
     include_str!("../../assets/manual/begin.md"),
     include_str!("../../assets/manual/system.md"),
     include_str!("../../assets/manual/table.md"),
     include_str!("../../assets/manual/elements.md"),
     include_str!("../../assets/manual/quality.md"),
     include_str!("../../assets/manual/improve.md"),
+    include_str!("../../assets/manual/search.md"),
+    include_str!("../../assets/manual/history.md"),
     include_str!("../../assets/manual/files.md"),
 ];
 
@@ -117,6 +119,8 @@ mod tests {
         assert_eq!(titles("").len(), PAGES.len());
         assert_eq!(titles("cemented Split"), ["Whole elements"]);
         assert!(titles("zmx").contains(&"Files"));
+        assert_eq!(titles("temperature chain"), ["Search over structure"]);
+        assert_eq!(titles("rewind"), ["History"]);
         assert!(titles("no such word").is_empty());
     }
 }

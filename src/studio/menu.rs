@@ -5,6 +5,7 @@ use egui::{
 };
 
 use super::actions::Actions;
+use super::candidate_bar::candidate_bar;
 use super::experiment_window;
 use super::menu_items::{self, MenuContext, MenuItem};
 use super::panels::widgets::hint_beside;
@@ -40,7 +41,10 @@ pub(super) fn bar(ui: &mut Ui, menus: &MenuContext<'_>, actions: &mut Actions) {
         ui.menu_button("Help", |ui| help_menu(ui, actions));
         ui.separator();
         undo_buttons(ui, menus.view, actions);
-        ui.with_layout(Layout::right_to_left(Align::Center), theme_button);
+        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+            theme_button(ui);
+            candidate_bar(ui, menus.view, actions);
+        });
     });
 }
 

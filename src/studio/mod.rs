@@ -73,6 +73,7 @@ pub fn run(path: Option<&Path>) -> Result<(), StudioError> {
         let mut studio = Studio::new(session, backend, Persistence::Enabled, context.storage);
         if let Some(path) = path {
             studio.apply(&context.egui_ctx, Command::Open(path.to_owned()));
+            studio.session_mut().tell_unfinished();
         }
         Ok(Box::new(studio))
     })

@@ -47,6 +47,9 @@ pub fn format_within(value: f64, characters: usize) -> String {
 /// The error relative to a number below which it is nothing but rounding.
 const ROUNDING: f64 = 1e-12;
 
+/// The largest change that is told in percent.
+const MAX_PERCENT: f64 = 1000.0;
+
 /// True if an error is larger than the rounding of its number.
 pub fn is_error(value: f64, error: f64) -> bool {
     error.is_finite() && error.abs() > ROUNDING * value.abs()
@@ -79,6 +82,43 @@ pub fn digits_between(size: f64, step: f64, least: i32) -> i32 {
     #[expect(clippy::cast_possible_truncation, reason = "an exponent between -324 and 309")]
     let digits = apart.ceil() as i32 + 1;
     digits.clamp(least, least.max(MAX_DIGITS))
+}
+
+/// A number, or zero where it is nothing but the rounding of numbers of a size; zero has no sign.
+pub fn without_rounding(value: f64, size: f64) -> f64 {
+    if value == 0.0 || value.abs() <= ROUNDING * size.abs() { 0.0 } else { value }
+}
+
+/// The change of a number in percent with some decimals: `0 %` where nothing but rounding has
+/// changed, and a factor beyond 1000 %. `None` for a number that was zero, or for an infinite one.
+pub fn format_change(before: f64, after: f64, decimals: usize) -> Option<String> {
+    change_with(before, after, |percent| {
+        let text = format!("{percent:.decimals$}");
+        let is_zero = text.chars().all(|digit| matches!(digit, '0' | '.'));
+        // A change that is small is not none.
+        if is_zero { format_digits(percent, 1) } else { text }
+    })
+}
+
+/// The same with three digits, without trailing zeros.
+pub fn short_change(before: f64, after: f64) -> Option<String> {
+    change_with(before, after, |percent| format_digits(percent, 3))
+}
+
+fn change_with(before: f64, after: f64, show: impl Fn(f64) -> String) -> Option<String> {
+    let ratio = after / before;
+    if !ratio.is_finite() || before.is_infinite() {
+        return None;
+    }
+    let percent = 100.0 * without_rounding(ratio - 1.0, ratio.abs().max(1.0));
+    if percent == 0.0 {
+        return Some("0 %".to_owned());
+    }
+    if percent.abs() > MAX_PERCENT {
+        return Some(format!("{} times", format_digits(ratio, 4)));
+    }
+    let sign = if percent > 0.0 { "+" } else { "-" };
+    Some(format!("{sign}{} %", show(percent.abs())))
 }
 
 /// The radius of a surface, as it is shown for a curvature.
@@ -130,6 +170,34 @@ mod tests {
         assert_eq!([show(1.000225, 7.5e-5), show(1.00015, 5e-5)], ["1.00022", "1.00015"]);
         assert_eq!([show(1.5, 0.1), show(1.05, 0.0)], ["1.5", "1.05"]);
         assert!(show(1.0, 1e-300).len() < 12);
+    }
+
+    #[test]
+    fn rounding_is_shown_as_zero_without_a_sign() {
+        let thin = without_rounding(-3.552_71e-15, 57.0);
+        assert_eq!(format_number(thin), "0");
+        assert!(without_rounding(-0.0, 1.0).is_sign_positive());
+        assert_eq!(without_rounding(1e-6, 57.0), 1e-6, "a picometre is no rounding");
+    }
+
+    #[test]
+    fn changes_are_told_in_percent_or_as_a_factor() {
+        let cases = [
+            (2.0, 2.0 * (1.0 - 3.33e-16), "0 %"),
+            (0.02, 0.01, "-50.0 %"),
+            (0.02, 0.021, "+5.0 %"),
+            (1.0, 1.0 - 2e-6, "-0.0002 %"),
+            (1e-3, 1.775_519, "1776 times"),
+            (1.0, 11.0, "+1000.0 %"),
+            (1.0, -15.0, "-15 times"),
+            (5.0, 0.0, "-100.0 %"),
+        ];
+        for (before, after, text) in cases {
+            assert_eq!(format_change(before, after, 1).as_deref(), Some(text), "{before} {after}");
+        }
+        assert_eq!(short_change(50.0, 10.0).as_deref(), Some("-80 %"));
+        let none = [(0.0, 1.0), (0.0, 0.0), (f64::INFINITY, 50.0), (50.0, f64::INFINITY)];
+        assert!(none.iter().all(|(before, after)| format_change(*before, *after, 1).is_none()));
     }
 
     #[test]

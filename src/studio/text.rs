@@ -14,6 +14,11 @@ pub fn micrometres(text: &str) -> String {
     text.replace(" um", " µm")
 }
 
+/// A text of the library, whose angles are in `deg`, with the sign for degrees.
+pub fn degrees(text: &str) -> String {
+    text.replace(" deg", "°")
+}
+
 /// A count with its noun, in the plural unless it is 1.
 pub fn counted(count: u64, noun: &str) -> String {
     format!("{count} {noun}{}", if count == 1 { "" } else { "s" })
@@ -42,6 +47,7 @@ mod tests {
     fn texts_begin_with_a_capital_and_counts_have_plurals() {
         assert_eq!(capitalize("édition"), "Édition");
         assert_eq!(micrometres("3 um apart"), "3 µm apart");
+        assert_eq!(degrees("14 deg"), "14°");
         assert_eq!([counted(1, "ray"), counted(0, "ray")], ["1 ray", "0 rays"]);
     }
 }

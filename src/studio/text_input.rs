@@ -1,6 +1,6 @@
-//! A one-line text field whose text is kept until it is accepted or discarded.
+//! A text field whose text is kept until it is accepted or discarded.
 //!
-//! Enter, Tab and a click elsewhere end the editing, Escape discards it. A rejected text remains in
+//! Enter, Tab and a click elsewhere end the editing of a line, Escape discards it. A rejected text remains in
 //! its field, marked, with the reason as a tooltip.
 
 use egui::text::{CCursor, CCursorRange};
@@ -59,6 +59,8 @@ pub enum InputPlacement {
     Table,
     /// A form, in which every field has a frame of its own.
     Form,
+    /// The same for text of several lines, in which Enter begins another one.
+    Paragraph,
 }
 
 /// The result of showing a field.
@@ -215,7 +217,7 @@ fn edit(ui: &mut Ui, id: Id, field: TextInput<'_>, text: &mut String, refused: b
     let focused = ui.memory(|memory| memory.has_focus(id));
     let hovered = ui.ctx().read_response(id).is_some_and(|last| last.hovered());
     let visuals = ui.visuals();
-    let boxed = field.placement == InputPlacement::Form;
+    let boxed = field.placement != InputPlacement::Table;
     let line = if refused {
         visuals.error_fg_color
     } else if focused {
@@ -231,7 +233,11 @@ fn edit(ui: &mut Ui, id: Id, field: TextInput<'_>, text: &mut String, refused: b
         .corner_radius(2)
         .fill(fill)
         .stroke(Stroke::new(1.0, line));
-    let line = TextEdit::singleline(text)
+    let line = match field.placement {
+        InputPlacement::Paragraph => TextEdit::multiline(text).desired_rows(2),
+        InputPlacement::Form | InputPlacement::Table => TextEdit::singleline(text),
+    };
+    let line = line
         .id(id)
         .hint_text(field.hint)
         .frame(frame)

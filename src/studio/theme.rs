@@ -30,7 +30,7 @@ fn set_spacing(style: &mut Style) {
     style.text_styles.insert(TextStyle::Monospace, FontId::monospace(12.0));
 }
 
-/// The greys of a theme and its accent.
+/// The greys of a theme and its accent; `selected` is the text on `selection`.
 struct ThemeColors {
     panel: Color32,
     sunken: Color32,
@@ -42,6 +42,7 @@ struct ThemeColors {
     weak: Color32,
     accent: Color32,
     selection: Color32,
+    selected: Color32,
     error: Color32,
     warning: Color32,
 }
@@ -58,6 +59,7 @@ impl ThemeColors {
         weak: Color32::from_rgb(146, 152, 164),
         accent: Color32::from_rgb(98, 170, 255),
         selection: Color32::from_rgb(36, 76, 128),
+        selected: Color32::from_rgb(206, 227, 255),
         error: Color32::from_rgb(255, 112, 104),
         warning: Color32::from_rgb(240, 178, 70),
     };
@@ -73,6 +75,7 @@ impl ThemeColors {
         weak: Color32::from_rgb(102, 109, 122),
         accent: Color32::from_rgb(20, 96, 200),
         selection: Color32::from_rgb(186, 214, 250),
+        selected: Color32::from_rgb(10, 52, 120),
         error: Color32::from_rgb(190, 24, 20),
         warning: Color32::from_rgb(150, 88, 0),
     };
@@ -89,7 +92,7 @@ fn set_colors(visuals: &mut Visuals, greys: &ThemeColors) {
     visuals.error_fg_color = greys.error;
     visuals.warn_fg_color = greys.warning;
     visuals.selection.bg_fill = greys.selection;
-    visuals.selection.stroke = Stroke::new(1.0, greys.accent);
+    visuals.selection.stroke = Stroke::new(1.0, greys.selected);
     visuals.text_cursor.blink = false;
     visuals.text_cursor.stroke = Stroke::new(1.5, greys.accent);
     set_widget_colors(visuals, greys);

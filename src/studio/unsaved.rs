@@ -133,7 +133,7 @@ impl Studio {
             UnsavedDocument::Lens if view.path.is_some() => {
                 self.apply(context, Command::Save(None));
             }
-            UnsavedDocument::Lens => self.file_dialog.ask(context, FileRequest::Save, None),
+            UnsavedDocument::Lens => self.ask_path(context, view, FileRequest::Save),
             UnsavedDocument::Field => {
                 // A field that still changes is paused before it is saved.
                 if view.grin.run.status == RunStatus::Running {

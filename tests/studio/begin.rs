@@ -457,3 +457,46 @@ fn escape_closes_the_dialogs_that_leave_the_window_usable() {
     assert!(harness.query_by_label("Apply").is_none());
     assert!(harness.state().session().view().preview_lens.is_none(), "the design is shown again");
 }
+
+/// The focal length of the whole lens stays when one of its lenses becomes two.
+#[test]
+fn splitting_a_lens_keeps_the_focal_length_of_the_whole() {
+    let focal_length = |lens: &Lens| {
+        let view = view_of(lens.clone());
+        let analyses = view.results.as_ref().unwrap().analyses.as_ref().unwrap();
+        analyses.first_order().efl.unwrap()
+    };
+    let lens = double_gauss();
+    let split = apply_edit(&lens, &Edit::Element(ElementEdit::Split(0))).unwrap();
+    assert_eq!(split.surfaces.len(), lens.surfaces.len() + 2);
+    let [before, after] = [&lens, &split].map(focal_length);
+    assert!((after / before - 1.0).abs() < 1e-10, "{before} {after}");
+}
+
+/// Elements on both sides of a stop that stands alone are not cemented, and the message says why.
+#[test]
+fn cementing_across_the_stop_names_the_stop() {
+    let lens = double_gauss();
+    let stop = lens.stop().unwrap();
+    assert!(lens.element_around(stop).is_none(), "it stands alone");
+    let refused = apply_edit(&lens, &Edit::Element(ElementEdit::Cement(stop - 1))).unwrap_err();
+    let text = refused.to_string();
+    assert!(text.starts_with(&format!("surface {}, the stop, stands between", stop + 1)), "{text}");
+}
+
+/// The coordinates of a field fit into their cells, and notes of two lines are two lines.
+#[test]
+fn the_system_shows_whole_coordinates_and_lines() {
+    let mut lens = double_gauss();
+    lens.fields.values[1].y = -7.071_068;
+    lens.notes = "first line\nsecond line".to_owned();
+    let mut harness = panel_harness(SystemPanel::default(), view_of(lens));
+    harness.run();
+    let cell = harness.get_by_label("Field 2 y");
+    let galleys = crate::harness::painted_galleys(&harness);
+    let number = galleys.iter().find(|galley| galley.text() == "-7.071068").unwrap();
+    // The frame of a field has a margin of four points on each side.
+    assert!(number.size().x + 8.0 <= cell.rect().width(), "{:?}", cell.rect());
+    let notes = galleys.iter().find(|galley| galley.text().starts_with("first line")).unwrap();
+    assert_eq!(notes.rows.len(), 2);
+}

@@ -11,6 +11,10 @@ use aplanat::studio::theme;
 use aplanat::studio::{Actions, UiAction};
 use egui_kittest::Harness;
 
+/// The heights of the panels at the right, the upper and the lower ones.
+pub(super) const UPPER: f32 = 296.0;
+pub(super) const LOWER: f32 = 392.0;
+
 /// The lens that the studio opens with.
 pub(super) fn double_gauss() -> Lens {
     let bundled = &files::bundled_lenses()[0];
@@ -63,6 +67,37 @@ impl<P: Panel> PanelState<P> {
         }
         self.commands.push(command);
     }
+}
+
+/// A harness around a panel with the room that the default arrangement gives it at the right in a
+/// window of 1280 by 800 points.
+pub(super) fn small_harness<P: Panel + 'static>(
+    panel: P,
+    view: SessionView,
+    height: f32,
+) -> Harness<'static, PanelState<P>> {
+    let state = PanelState { panel, view, commands: Vec::new(), requests: Vec::new() };
+    let builder = Harness::builder().with_size([414.0, height]).with_context_setup(theme::apply);
+    builder.build_ui_state(|ui, state: &mut PanelState<P>| state.show(ui), state)
+}
+
+/// The texts that a frame has painted, those without an accessible name too.
+pub(super) fn painted_texts<S>(harness: &Harness<'_, S>) -> Vec<String> {
+    painted_galleys(harness).iter().map(|galley| galley.text().to_owned()).collect()
+}
+
+/// The same as they are laid out.
+pub(super) fn painted_galleys<S>(harness: &Harness<'_, S>) -> Vec<Arc<egui::Galley>> {
+    fn add(shape: &egui::Shape, all: &mut Vec<Arc<egui::Galley>>) {
+        match shape {
+            egui::Shape::Vec(parts) => parts.iter().for_each(|part| add(part, all)),
+            egui::Shape::Text(text) => all.push(Arc::clone(&text.galley)),
+            _ => {}
+        }
+    }
+    let mut all = Vec::new();
+    harness.output().shapes.iter().for_each(|clipped| add(&clipped.shape, &mut all));
+    all
 }
 
 /// A harness around a panel, large enough for all of it.

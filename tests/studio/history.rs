@@ -3,7 +3,9 @@
 use std::sync::Arc;
 
 use aplanat::lens::{Edit, Lens, Parameter, Quantity};
-use aplanat::merit::{ConstraintMargin, Goal, OperandKind, Term, TermScope, TermValue};
+use aplanat::merit::{
+    ConstraintMargin, Goal, OperandKind, Term, TermScope, TermValue, WeightedTerm,
+};
 use aplanat::session::{
     AnalysisResults, Command, CurvePoint, HistoryNode, MeritReport, MeritValues, OptimizationCurve,
     SessionView,
@@ -13,7 +15,10 @@ use egui::Key;
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
 
-use crate::harness::{PanelState, double_gauss, panel_harness, view};
+use crate::harness::{
+    LOWER, PanelState, double_gauss, painted_galleys, painted_texts, panel_harness, small_harness,
+    view,
+};
 
 fn version(id: u64, parent: Option<u64>, title: &str, merit: f64, lens: &Arc<Lens>) -> HistoryNode {
     HistoryNode {
@@ -87,6 +92,43 @@ fn versions_are_compared_named_and_gone_to() {
     assert_eq!(harness.state().commands[1..], [named, Command::GoTo(1)]);
 }
 
+/// A row has what the version knows: time and seed too, and its title is not cut.
+#[test]
+fn a_version_is_told_in_full_in_a_narrow_panel() {
+    let mut view = branched();
+    let title = "accept lens 17 of the search, which bends the second element";
+    let nodes = Arc::make_mut(&mut view.history);
+    Arc::make_mut(&mut nodes[2]).title = title.to_owned();
+    let mut harness = small_harness(HistoryPanel::default(), view, LOWER);
+    harness.run();
+    let texts = painted_texts(&harness);
+    let facts = "merit 0.01 (-50.0 %), seed 7, 01:02:03 UTC";
+    assert!(texts.iter().any(|text| text == facts), "{texts:?}");
+    let row = harness.get_by_label_contains("Present version: Accept lens 17");
+    assert!(row.rect().right() <= 414.0 && row.rect().height() > 40.0, "{:?}", row.rect());
+    let painted = painted_galleys(&harness);
+    let shown = painted.iter().find(|galley| galley.text().starts_with("Accept lens 17")).unwrap();
+    assert!(!shown.elided, "{}", shown.text());
+}
+
+#[test]
+fn changes_of_the_merit_are_no_noise_and_no_thousands_of_percent() {
+    let mut view = branched();
+    let nodes = Arc::make_mut(&mut view.history);
+    for (node, merit) in nodes.iter_mut().zip([0.02, 0.02 * (1.0 + 1e-15), 35.52]) {
+        Arc::make_mut(node).merit = Some(merit);
+    }
+    view.version_id = 0;
+    let mut harness = panel_harness(HistoryPanel::default(), view);
+    harness.run();
+    harness.get_by_label("Accept the optimized lens: merit 35.52 (1776 times), seed 7").click();
+    harness.run();
+    harness.get_by_label("1776 times");
+    harness.get_by_label("Thickness of surface 3: merit 0.02").click();
+    harness.run();
+    harness.get_by_label("0 %");
+}
+
 #[test]
 fn the_course_of_an_optimization_can_be_rewound() {
     let mut harness = history();
@@ -140,6 +182,65 @@ fn the_merit_of_the_design_and_its_limits_are_shown_without_asking() {
     harness.run();
     let commands = &harness.state().commands;
     assert_eq!(*commands, [Command::ShowZoom(0), Command::Select(Some(4))]);
+}
+
+/// Nothing of a term is cut at the right of the panel in a window of 1280 points.
+#[test]
+fn the_terms_fit_into_a_narrow_panel() {
+    let mut view = view();
+    let mut goal = Goal::default_for(&view.lens).unwrap();
+    let long = Term::RelativeIllumination { field: 2, min: 0.5 };
+    let kind = OperandKind::Astigmatism;
+    let bounded = Term::Operand { kind, min: Some(-0.125), max: Some(0.125) };
+    goal.terms.extend([long, bounded].map(|term| WeightedTerm::new(term, 1000.0)));
+    let value = |weighted: &WeightedTerm| TermValue {
+        term: weighted.term.name(),
+        weight: weighted.weight,
+        value: if weighted.term == Term::Spot { 1.2345e-6 } else { 0.0 },
+        error: 1e-9,
+        rays: 4200,
+        reached: true,
+    };
+    let terms: Vec<TermValue> = goal.terms.iter().map(value).collect();
+    let values = MeritValues { total: 4e-4, terms, limits: Vec::new() };
+    let (lens, goal) = (Arc::clone(&view.lens), Arc::new(goal));
+    view.goal = Some(Arc::clone(&goal));
+    view.merit = Some(Arc::new(MeritReport { lens, goal, values: Ok(values), ms: 1.0 }));
+    let mut harness = small_harness(OptimizerPanel::default(), view, LOWER);
+    harness.run();
+    let right = |label: &str| {
+        let found = harness.query_all_by_label_contains(label);
+        found.map(|node| node.rect().right()).fold(0.0, f32::max)
+    };
+    let labels = ["Remove ", "satisfied", "1.11 µm", "Weight of", "Minimum of", "Scope of"];
+    for label in labels.into_iter().chain(["Maximum of", "Value, share"]) {
+        assert!((1.0..=414.0).contains(&right(label)), "{label}: {}", right(label));
+    }
+}
+
+/// The curve of an optimization has titles, and marks however little the merit has changed.
+#[test]
+fn the_merit_curve_has_titles_and_marks() {
+    let mut view = branched();
+    let mut nodes = (*view.history).clone();
+    let points = (0..5).map(|step| CurvePoint {
+        step,
+        merit: 0.02 - 0.001 * step as f64,
+        values: vec![0.02],
+    });
+    let curve = OptimizationCurve { parameters: Vec::new(), points: points.collect() };
+    Arc::make_mut(&mut nodes[2]).curve = Some(Arc::new(curve));
+    view.history = Arc::new(nodes);
+    let mut harness = panel_harness(HistoryPanel::default(), view);
+    harness.run();
+    harness.get_by_label_contains("Present version").click();
+    harness.run();
+    let texts = painted_texts(&harness);
+    for title in ["step", "merit"] {
+        assert!(texts.iter().any(|text| text == title), "{title} in {texts:?}");
+    }
+    let is_mark = |text: &&String| text.parse().is_ok_and(|v: f64| (0.015..=0.021).contains(&v));
+    assert!(texts.iter().filter(is_mark).count() >= 2, "{texts:?}");
 }
 
 #[test]

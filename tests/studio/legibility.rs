@@ -173,3 +173,30 @@ fn the_explanation_of_a_menu_item_covers_no_item() {
         }
     }
 }
+
+/// What is written on a selected row is read as well as anything else.
+#[test]
+fn the_text_of_a_selected_row_is_readable_in_both_themes() {
+    let mut harness = window();
+    harness.state_mut().session_mut().apply(Command::Select(Some(2)));
+    for theme in [Theme::Dark, Theme::Light] {
+        harness.ctx.set_theme(theme);
+        harness.run_steps(3);
+        let selection = harness.ctx.global_style().visuals.selection.bg_fill;
+        let painted = harness.output().shapes.clone();
+        let all = shapes(&painted);
+        let mut count = 0;
+        for (i, shape) in all.iter().enumerate() {
+            let Shape::Text(text) = shape else { continue };
+            let place = text.visual_bounding_rect().center();
+            let words = text.galley.text();
+            if ground(&all[..i], place) == Some(selection) && words.contains(char::is_alphanumeric)
+            {
+                count += usize::from(text_color(text).is_opaque());
+                let contrast = contrast(text_color(text), selection);
+                assert!(contrast >= READABLE, "{theme:?}: {words}: {contrast}");
+            }
+        }
+        assert!(count >= 4, "{theme:?}: {count} texts of the row");
+    }
+}

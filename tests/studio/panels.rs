@@ -700,3 +700,63 @@ fn a_failed_sweep_shows_its_reason() {
     assert_eq!(harness.state().commands, []);
     harness.get_by_label("No light gets through this lens");
 }
+
+/// The image plane lies where a solve puts it: what is left of its distance is rounding.
+#[test]
+fn a_defocus_of_nothing_but_rounding_is_zero() {
+    for bundled in aplanat::files::bundled_lenses().iter().take(8) {
+        let opened = aplanat::files::parse(bundled.text.as_bytes(), bundled.name).unwrap();
+        let mut lens = opened.lens;
+        if lens.zoom_positions() > 1 {
+            continue;
+        }
+        lens.image_solve = Some(0.0);
+        let view = crate::harness::view_of(lens);
+        let analyses = view.results.as_ref().unwrap().analyses.as_ref();
+        if !analyses.is_ok_and(|numbers| numbers.first_order().image_defocus.is_some()) {
+            continue;
+        }
+        let mut harness = panel_harness(FirstOrderPanel, view);
+        harness.run();
+        let at = |label: &str| harness.get_by_label(label).rect().center().y;
+        let line = at("Defocus");
+        let zero = harness.get_all_by_label("0 mm");
+        let beside = zero.filter(|text| (text.rect().center().y - line).abs() < 3.0).count();
+        assert_eq!(beside, 1, "{}", bundled.name);
+    }
+}
+
+/// The numbers below each pupil are whole in the default arrangement.
+#[test]
+fn the_captions_of_pupils_fit() {
+    let mut harness =
+        crate::harness::small_harness(PupilPanel::default(), view(), crate::harness::UPPER);
+    harness.run();
+    let pupils = harness.get_all_by_label_contains("Pupil of field").count();
+    let rays: Vec<_> = harness.get_all_by_label_contains(" rays, ").map(|n| n.rect()).collect();
+    assert_eq!((pupils, rays.len()), (3, 3));
+    let clipped: Vec<_> = harness
+        .output()
+        .shapes
+        .iter()
+        .filter_map(|painted| {
+            let egui::Shape::Text(text) = &painted.shape else { return None };
+            let is_caption = text.galley.text().contains(" rays, ");
+            is_caption.then(|| (text.visual_bounding_rect(), painted.clip_rect))
+        })
+        .collect();
+    assert_eq!(clipped.len(), 3);
+    for (text, clip) in clipped {
+        assert!(clip.expand(0.5).contains_rect(text), "{text:?} in {clip:?}");
+    }
+}
+
+/// One ray is no rays, and one variable no variables.
+#[test]
+fn counts_of_one_are_singular() {
+    let mut lens = double_gauss();
+    lens.variables.truncate(1);
+    let mut harness = panel_harness(ParetoPanel::default(), crate::harness::view_of(lens));
+    harness.run();
+    harness.get_by_label_contains("the 1 variable and all semi-diameters");
+}

@@ -397,3 +397,33 @@ fn the_table_shows_the_candidate_with_what_it_changes() {
     harness.run();
     harness.get_by_label("Thickness of surface 2");
 }
+
+/// A candidate has the automatic semi-diameters and the badges that the design has.
+#[test]
+fn a_candidate_shows_semi_diameters_and_badges() {
+    let mut lens = double_gauss();
+    lens.surfaces[1].semi_diameter = None;
+    let design = view_of(lens.clone());
+    lens.surfaces[1].thickness = 7.5;
+    let candidate =
+        CandidateView { source: CandidateSource::Chosen, title: "a lens".into(), shown: true };
+    let shown = view_of(lens);
+    let reached = shown.results.as_ref().unwrap().analyses.as_ref().unwrap();
+    let reached = format!("{:.3}", reached.semi_diameters.value[1]);
+    let view = SessionView { candidate: Some(candidate), preview_results: shown.results, ..design };
+    let mut harness = panel_harness(PrescriptionPanel::default(), view);
+    harness.run();
+    let cell = "Semi-diameter of surface 2 of the candidate: ";
+    let cells = harness.get_all_by_label_contains(cell).filter_map(|node| node.value());
+    let cells: Vec<String> = cells.filter(|text| text.starts_with("Semi")).collect();
+    let is_reached = |text: &String| text.contains(&reached[..4]);
+    assert!(cells.len() == 1 && is_reached(&cells[0]), "{cells:?}, rays reach {reached}");
+    for (cell, status) in [
+        ("Radius of surface 1", "variable"),
+        ("Semi-diameter of surface 1", "fixed, clips"),
+        ("Semi-diameter of surface 2", "automatic"),
+        ("Conic of surface 1", "fixed"),
+    ] {
+        harness.get_by_label(&format!("Badge of {cell} of the candidate: {status}"));
+    }
+}

@@ -21,7 +21,9 @@ use aplanat::studio::panels::SearchPanel;
 use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT as _, Queryable};
 
-use crate::harness::{PanelState, double_gauss, panel_harness, view, view_of};
+use crate::harness::{
+    LOWER, PanelState, double_gauss, painted_texts, panel_harness, small_harness, view, view_of,
+};
 
 fn panel(view: SessionView) -> Harness<'static, PanelState<SearchPanel>> {
     let mut harness = panel_harness(SearchPanel::default(), view);
@@ -439,4 +441,24 @@ fn the_line_of_a_lens_is_replayed_from_the_oldest_on() {
     harness.run_steps(200);
     assert_eq!(shown(&harness), [0, 1]);
     assert!(harness.query_by_label("Replay").is_some(), "it has ended");
+}
+
+/// In the default arrangement of a window of 1280 by 800 points a row of cards is visible whole, and
+/// the curves have a page of their own with titles.
+#[test]
+fn a_narrow_panel_shows_whole_cards() {
+    let mut harness = small_harness(SearchPanel::default(), searching(RunStatus::Running), LOWER);
+    harness.run();
+    let cards = harness.get_all_by_label_contains("Lens 1").map(|card| card.rect());
+    let card = cards.reduce(|a, b| if a.height() > b.height() { a } else { b }).unwrap();
+    assert!(card.height() > 100.0, "{card:?}");
+    let bar = harness.get_by_label_contains("Click a lens or a mark").rect();
+    assert!(card.bottom() <= bar.top() || card.top() >= bar.bottom(), "{card:?} {bar:?}");
+    assert!(card.bottom() <= 392.0 && card.right() <= 414.0, "{card:?}");
+    press(&mut harness, "Curves");
+    harness.get_by_label_contains("Merit against iterations");
+    let texts = painted_texts(&harness);
+    for title in ["merit", "iteration", "elements"] {
+        assert!(texts.iter().any(|text| text == title), "{title} in {texts:?}");
+    }
 }

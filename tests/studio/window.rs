@@ -3,6 +3,8 @@
 use std::time::Duration;
 
 use aplanat::experiments::{self, Effort, Experiment};
+use aplanat::lens::{Edit, Parameter, Quantity};
+use aplanat::paraxial::{DragSettings, FirstOrderLock};
 use aplanat::session::{Command, ExperimentStatus, Session};
 use aplanat::studio::Studio;
 use aplanat::studio::draw::RenderBackend;
@@ -359,4 +361,123 @@ fn a_panel_can_have_the_window_and_a_search_can_be_watched() {
     harness.run_steps(3);
     harness.get_by_label("Paraxial projection");
     harness.get_by_label("Radius of surface 1");
+}
+
+/// The double Gauss with a larger gap.
+fn candidate() -> aplanat::lens::Lens {
+    let mut lens = double_gauss();
+    lens.surfaces[1].thickness += 0.4;
+    lens
+}
+
+/// A candidate is shown without moving anything that a person may be about to click.
+#[test]
+fn a_candidate_moves_no_row() {
+    let mut harness = window();
+    let rows = |harness: &Harness<'_, Studio>| {
+        ["Row of surface 1", "Row of surface 5", "Section of Double Gauss", "Undo"]
+            .map(|name| harness.get_all_by_label_contains(name).next().unwrap().rect())
+    };
+    let before = rows(&harness);
+    harness.state_mut().session_mut().apply(Command::Preview(Some(Box::new(candidate()))));
+    wait(&mut harness, "the candidate", |harness| {
+        harness.state().session().view().preview_results.is_some()
+    });
+    harness.run_steps(3);
+    let text = harness.get_by_label_contains("Candidate: a changed lens");
+    assert!(text.rect().bottom() < before[3].bottom() + 2.0, "it is in the menu bar");
+    assert_eq!(rows(&harness), before);
+    harness.get_by_label("Keep both").click();
+    harness.run_steps(3);
+    assert_eq!(harness.state().session().view().kept.len(), 1);
+}
+
+/// The merit above the drawing is that of the lens in the drawing.
+#[test]
+fn the_layout_tells_the_merit_of_the_candidate() {
+    let mut harness = window();
+    let goal = harness.state().session().view().goal.unwrap();
+    let tolerance = harness.state().session().view().settings.tolerance;
+    let own = aplanat::merit::Merit::new(&double_gauss(), &goal, tolerance).unwrap();
+    let lens = candidate();
+    let merit = aplanat::merit::Merit::new(&lens, &goal, tolerance).unwrap();
+    let merit = merit.with_initial_light(own.initial_light());
+    let wanted = merit.value(&merit.values(&lens)).unwrap();
+    harness.state_mut().session_mut().apply(Command::Preview(Some(Box::new(lens))));
+    wait(&mut harness, "the merit of the candidate", |harness| {
+        let view = harness.state().session().view();
+        view.preview_merit.is_some() && view.merit.is_some()
+    });
+    harness.run_steps(3);
+    let view = harness.state().session().view();
+    let total = |report: &Option<std::sync::Arc<aplanat::session::MeritReport>>| {
+        report.as_ref().unwrap().values.as_ref().unwrap().total
+    };
+    let (new, old) = (total(&view.preview_merit), total(&view.merit));
+    assert!((new / wanted - 1.0).abs() < 1e-9, "{new} {wanted}");
+    assert!((new / old - 1.0).abs() > 1e-3, "{new} {old}");
+    harness.get_by_label_contains(&format!("merit {}", &new.to_string()[..4]));
+}
+
+/// The menu of panels opens the table with its first number ready to be typed over.
+#[test]
+fn the_table_has_the_focus_when_a_key_opens_it() {
+    let mut harness = window();
+    // The first time closes it.
+    for _ in 0..2 {
+        harness.key_press_modifiers(Modifiers::COMMAND, Key::Num3);
+        harness.run_steps(3);
+    }
+    assert!(harness.get_by_label("Radius of surface 1").is_focused());
+}
+
+#[test]
+fn save_as_proposes_the_name_of_the_lens() {
+    let mut harness = window();
+    harness.key_press_modifiers(Modifiers::COMMAND | Modifiers::SHIFT, Key::S);
+    harness.run_steps(3);
+    let proposed = harness.get_by_label("Path").value().unwrap();
+    assert!(proposed.starts_with("Double Gauss") && proposed.ends_with(".json"), "{proposed}");
+}
+
+/// A window on a file whose program was killed says what it has recovered, and holds what was held.
+#[test]
+fn a_file_that_was_open_when_the_program_was_killed_is_told() {
+    let folder = std::env::temp_dir().join(format!("aplanat-told-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    let [journals, copy] = ["journals", "copy"].map(|name| folder.join(name));
+    let file = folder.join("lens.json");
+    aplanat::files::save(&double_gauss(), &file).unwrap();
+    let mut session = Session::new(double_gauss(), || {}).unwrap();
+    session.set_journal_folder(&journals, || {}).unwrap();
+    session.apply(Command::Open(file.clone()));
+    let parameter = Parameter::new(1, Quantity::Thickness);
+    session.apply(Edit::Set { parameter, value: 2.5 }.into());
+    session.apply(Command::CommitEdit);
+    let locks = DragSettings { locks: vec![FirstOrderLock::FocalLength], ..Default::default() };
+    session.apply(Command::SetDragSettings(locks.clone()));
+    session.sync_journal();
+    // The journals as a killed program leaves them.
+    std::fs::create_dir_all(&copy).unwrap();
+    for journal in std::fs::read_dir(&journals).unwrap().flatten() {
+        if journal.path().extension().is_some_and(|end| end == "journal") {
+            std::fs::copy(journal.path(), copy.join(journal.file_name())).unwrap();
+        }
+    }
+    let mut again = Session::new(double_gauss(), || {}).unwrap();
+    again.set_journal_folder(&copy, || {}).unwrap();
+    let studio = Studio::new(again, RenderBackend::Software, Persistence::Disabled, None);
+    let builder = Harness::builder().with_size([1280.0, 800.0]).with_context_setup(theme::apply);
+    let mut harness = builder.build_ui_state(|ui, studio: &mut Studio| studio.ui(ui), studio);
+    harness.state_mut().session_mut().apply(Command::Open(file));
+    harness.state_mut().session_mut().tell_unfinished();
+    settle(&mut harness);
+    let view = harness.state().session().view();
+    assert_eq!((view.lens.surfaces[1].thickness, &view.drag.settings), (2.5, &locks));
+    let told = harness.get_by_label_contains("with 1 unsaved change (").value().unwrap();
+    assert!(told.starts_with("Recovered") && told.contains("thickness"), "{told}");
+    assert!(!told.contains("other design"), "{told}");
+    drop(harness);
+    drop(session);
+    std::fs::remove_dir_all(folder).unwrap();
 }

@@ -253,11 +253,37 @@ fn keep_power(lens: &mut Lens, first: usize, last: usize, kept: f64) -> Result<(
     Ok(())
 }
 
+/// The power of the whole lens as written, at the primary wavelength; `None` where it cannot be
+/// computed.
+fn lens_power(lens: &Lens) -> Option<f64> {
+    let um = lens.wavelengths[lens.primary()].um;
+    let front = index_in_front(lens, 0, um).ok()?;
+    power(&lens.surfaces, um, front).ok().filter(|power| power.is_finite())
+}
+
+/// Sets the curvature of a surface to that with which the whole lens has a power, if there is one.
+fn keep_lens_power(lens: &mut Lens, surface: usize, kept: Option<f64>) {
+    let before = lens.surfaces[surface].curvature;
+    // The power is linear in each curvature; the second step removes what rounding has left.
+    for _ in 0..2 {
+        let curvature = lens.surfaces[surface].curvature;
+        let step = curvature.abs().max(1e-3);
+        let Some((kept, now)) = kept.zip(lens_power(lens)) else { return };
+        lens.surfaces[surface].curvature = curvature + step;
+        let slope = lens_power(lens).map(|there| (there - now) / step);
+        let change = slope.map(|slope| (kept - now) / slope).filter(|change| change.is_finite());
+        lens.surfaces[surface].curvature = change.map_or(before, |change| curvature + change);
+    }
+}
+
 /// Cements a surface to the next one across the air between them: the new surface has the mean of
 /// their curvatures, and what stands behind the element stays where it is.
 fn cement(lens: &mut Lens, surface: usize) -> Result<(), EditError> {
     let (_, last) = element(lens, surface)?;
     let next = last + 1;
+    if lens.surfaces.get(next).is_some_and(|row| row.stop && row.medium == Medium::Air) {
+        return Err(EditError::StopBetween(next.into()));
+    }
     let Some((_, end)) = lens.element_around(next).filter(|(first, _)| *first == next) else {
         return Err(EditError::NothingToCement(surface.into()));
     };
@@ -316,6 +342,7 @@ fn separate(lens: &mut Lens, surface: usize, last: usize) -> Result<(), EditErro
 fn halve(lens: &mut Lens, first: usize) -> Result<(), EditError> {
     let last = first + 1;
     let kept = element_power(lens, first, last)?;
+    let whole = lens_power(lens);
     let [front, back] = [lens.surfaces[first].clone(), lens.surfaces[last].clone()];
     let height = back.semi_diameter.or(front.semi_diameter).unwrap_or(front.thickness);
     // Two concave surfaces that face each other touch at their rims.
@@ -332,5 +359,7 @@ fn halve(lens: &mut Lens, first: usize) -> Result<(), EditError> {
     rows::replace(lens, last + 2, &Row { thickness: back.thickness, ..half(&back) })?;
     keep_power(lens, first, last + 2, kept)?;
     absorb(lens, last + 2, -gap);
+    // The principal planes of two lenses lie elsewhere than those of one, which the lens feels.
+    keep_lens_power(lens, last + 2, whole);
     Ok(())
 }

@@ -68,6 +68,12 @@ pub enum EditError {
     /// The surface belongs to no element.
     #[error("surface {0} belongs to no element; expected a surface of glass")]
     NotAnElement(SurfaceNumber),
+    /// The stop stands alone between the elements that are to be cemented.
+    #[error(
+        "surface {0}, the stop, stands between the elements; make a surface of one of them the stop \
+         and remove this one first"
+    )]
+    StopBetween(SurfaceNumber),
     /// No element follows the one of the surface across a gap of air.
     #[error("no element follows that of surface {0}; expected one behind it to cement it to")]
     NothingToCement(SurfaceNumber),

@@ -1,6 +1,7 @@
 //! The lines of a journal: JSON behind a checksum.
 
 use crate::lens::Lens;
+use crate::paraxial::DragSettings;
 use crate::session::history::HistoryNode;
 use crate::session::run::RunKind;
 use serde::{Deserialize, Serialize};
@@ -35,6 +36,8 @@ pub(in crate::session) enum JournalEntry {
     Saved { node: u64, path: PathBuf },
     /// A running computation has found lenses.
     Run(RunRecord),
+    /// The quantities that drags hold have changed.
+    Locks(DragSettings),
     /// The lenses of the run of a kind are accepted, discarded or dismissed.
     RunEnded(RunKind),
     /// The design was closed: there is nothing to recover.

@@ -1,6 +1,7 @@
 //! The state of a design that a journal leads to.
 
 use super::entry::{JournalEntry, RunRecord, VERSION};
+use crate::paraxial::DragSettings;
 use crate::session::history::DesignHistory;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -16,6 +17,8 @@ pub(in crate::session) struct JournalState {
     pub(in crate::session) saved: Option<u64>,
     /// The results of running computations.
     pub(in crate::session) runs: Vec<RunRecord>,
+    /// The quantities that drags hold.
+    pub(in crate::session) locks: DragSettings,
     /// True if the design was closed in order.
     closed: bool,
 }
@@ -24,7 +27,13 @@ impl JournalState {
     /// The state of a design to which nothing has happened.
     pub(in crate::session) fn begin(path: Option<PathBuf>, history: DesignHistory) -> Self {
         let saved = Some(history.present());
-        Self { path, history, saved, runs: Vec::new(), closed: false }
+        let (runs, locks) = (Vec::new(), DragSettings::default());
+        Self { path, history, saved, runs, locks, closed: false }
+    }
+
+    /// The same with quantities that drags hold.
+    pub(in crate::session) fn holding(self, locks: DragSettings) -> Self {
+        Self { locks, ..self }
     }
 
     /// The state after the first lines: the beginning and the first version. The number of lines
@@ -40,7 +49,8 @@ impl JournalState {
         };
         let history = DesignHistory::from_first(Arc::clone(first));
         let (path, runs) = (path.clone(), Vec::new());
-        let mut state = Self { path, history, saved: *saved, runs, closed: false };
+        let locks = DragSettings::default();
+        let mut state = Self { path, history, saved: *saved, runs, locks, closed: false };
         rest.iter().for_each(|entry| state.apply(entry));
         Some(state)
     }
@@ -62,6 +72,7 @@ impl JournalState {
                 (self.saved, self.path) = (Some(*node), Some(path.clone()));
             }
             JournalEntry::Run(record) => self.add_run(record),
+            JournalEntry::Locks(locks) => self.locks.clone_from(locks),
             JournalEntry::RunEnded(kind) => self.runs.retain(|record| record.kind != *kind),
             JournalEntry::Begin { .. } | JournalEntry::Closed => {}
         }
@@ -75,6 +86,11 @@ impl JournalState {
             Some(known) => known.clone_from(record),
             None => self.runs.push(record.clone()),
         }
+    }
+
+    /// True if the program ended without closing the design.
+    pub(in crate::session) const fn was_interrupted(&self) -> bool {
+        !self.closed
     }
 
     /// True if the design was not closed, and differs from its file or has a run that was going on.
@@ -91,6 +107,30 @@ impl JournalState {
         let nodes = self.history.nodes().iter().map(|node| JournalEntry::Node(Arc::clone(node)));
         let runs = self.runs.iter().cloned().map(JournalEntry::Run);
         let present = JournalEntry::Present(self.history.present());
-        std::iter::once(begin).chain(nodes).chain(runs).chain([present]).collect()
+        let locks = (self.locks != DragSettings::default())
+            .then(|| JournalEntry::Locks(self.locks.clone()));
+        std::iter::once(begin).chain(nodes).chain(runs).chain(locks).chain([present]).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lens::blank;
+    use crate::paraxial::FirstOrderLock;
+
+    #[test]
+    fn what_is_held_is_in_the_lines() {
+        let history = DesignHistory::new(Arc::new(blank()));
+        let mut state = JournalState::begin(None, history);
+        let count = state.entries().len();
+        let locks = vec![FirstOrderLock::FocalLength];
+        state.apply(&JournalEntry::Locks(DragSettings { locks, ..DragSettings::default() }));
+        let entries = state.entries();
+        assert_eq!(entries.len(), count + 1);
+        let lines: Vec<_> = entries.iter().filter_map(JournalEntry::line).collect();
+        let read = |line: &Vec<u8>| JournalEntry::from_line(&line[..line.len() - 1]);
+        let again: Vec<_> = lines.iter().filter_map(read).collect();
+        assert_eq!(JournalState::read(&again).unwrap().locks, state.locks);
     }
 }

@@ -3,6 +3,7 @@
 use super::runs::without_fixed_variables;
 use super::{PreviewSource, Session};
 use crate::lens::Lens;
+use crate::session::MeritReport;
 use crate::session::history::VersionOrigin;
 use crate::session::journal::JournalEntry;
 use crate::session::view::{CandidateSource, CandidateView, KeptLens, Severity};
@@ -22,6 +23,14 @@ impl Session {
         }
         let run = self.optimization.view();
         Some((PreviewSource::Run(run.id?), Arc::clone(run.displayed_lens()?)))
+    }
+
+    /// The merit of the candidate that is shown, maybe of one step before.
+    pub(super) fn candidate_merit(&self) -> Option<Arc<MeritReport>> {
+        self.candidate().filter(|candidate| candidate.shown)?;
+        let latest = self.preview_merit.latest()?;
+        let is_new = self.outdated_merit.as_ref().is_none_or(|old| !Arc::ptr_eq(old, &latest));
+        is_new.then_some(latest)
     }
 
     /// The lens that is shown in place of the design, with its source.

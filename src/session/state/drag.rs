@@ -3,6 +3,7 @@
 use super::Session;
 use crate::paraxial::{DragSettings, Handle};
 use crate::session::history::VersionOrigin;
+use crate::session::journal::JournalEntry;
 use crate::session::view::Severity;
 use std::sync::Arc;
 
@@ -48,8 +49,8 @@ impl Session {
 
     pub(super) fn set_drag_settings(&mut self, settings: DragSettings) {
         if self.drag.settings != settings {
-            self.drag.settings = settings;
-            self.drag.forget_slopes();
+            self.record(JournalEntry::Locks(settings.clone()));
+            self.drag.hold(settings);
         }
     }
 

@@ -16,6 +16,9 @@ use std::time::Duration;
 /// The shortest time between two records of running computations.
 const RUN_INTERVAL: Duration = Duration::from_millis(500);
 
+/// The number of unsaved changes that are told by their titles.
+const TOLD_CHANGES: usize = 3;
+
 /// A title, a merit and a lens that a run has found.
 type RunLens = (String, Option<f64>, Arc<Lens>);
 
@@ -61,10 +64,35 @@ impl Session {
         let others = unfinished.count();
         self.continue_journal(file);
         if others > 0 {
-            let text = format!("{others} more designs were not closed; the next start reopens one");
-            self.post(Severity::Note, text);
+            let designs = counted_designs(others, "more design");
+            self.post_beside(format!("{designs} not closed; the next start reopens one"));
         }
         true
+    }
+
+    /// Says how many designs other than this one wait to be reopened.
+    pub fn tell_unfinished(&mut self) {
+        let Some(journal) = &self.journaling.journal else { return };
+        // The journal of this design is in use and does not count.
+        journal.sync();
+        let others = JournalFile::unfinished(journal.folder()).len();
+        if others > 0 {
+            let designs = counted_designs(others, "other design");
+            let text = format!("{designs} not closed; a start without a file reopens one");
+            self.post_beside(text);
+        }
+    }
+
+    /// Posts a note, together with the last one if that is recent: one line shows both.
+    fn post_beside(&mut self, text: String) {
+        let last = self.messages.last().filter(|_| self.message_is_recent).cloned();
+        match last.filter(|last| last.severity == Severity::Note) {
+            Some(last) => {
+                Arc::make_mut(&mut self.messages).pop();
+                self.post(Severity::Note, format!("{}; {text}", last.text));
+            }
+            None => self.post(Severity::Note, text),
+        }
     }
 
     /// Waits until the journal is on the disk.
@@ -97,7 +125,8 @@ impl Session {
 
     /// The present state as a journal begins with it.
     fn journal_state(&self) -> JournalState {
-        JournalState::begin(self.path.clone(), self.history.clone())
+        let locks = self.drag.settings.clone();
+        JournalState::begin(self.path.clone(), self.history.clone()).holding(locks)
     }
 
     /// Closes the journal of the design before and begins one of this design.
@@ -122,10 +151,23 @@ impl Session {
         self.history = file.state.history.clone();
         self.saved = Arc::clone(&lens);
         self.set_design(lens);
+        let interrupted = file.state.was_interrupted();
+        if interrupted {
+            self.drag.hold(file.state.locks.clone());
+        }
         if let Some(journal) = &self.journaling.journal {
             journal.go_on_with(file);
         }
         self.record_present();
+        if interrupted {
+            let (name, count) = (&self.lens.name, self.history.nodes().len());
+            let versions = if count == 1 { "version" } else { "versions" };
+            let text = format!(
+                "reopened {name} as it was saved, with the {count} {versions} of its history: the \
+                 program ended without closing it"
+            );
+            self.post(Severity::Note, text);
+        }
     }
 
     /// Makes the design of a journal that was not closed the design.
@@ -144,6 +186,7 @@ impl Session {
         self.saved =
             saved.map_or_else(|| Arc::new(crate::lens::blank()), |node| Arc::clone(&node.lens));
         self.set_design(Arc::clone(&present.lens));
+        self.drag.hold(state.locks);
         if let Some(journal) = &self.journaling.journal {
             journal.go_on_with(file);
         }
@@ -223,8 +266,21 @@ fn recovery_text(state: &JournalState, lens: &Lens) -> String {
         _ => format!(" and {found} lenses of interrupted runs, which are in the history"),
     };
     let plural = if changes == 1 { "change" } else { "changes" };
+    let titles = state.saved.map(|saved| state.history.titles_since(saved)).unwrap_or_default();
+    let told = titles.iter().take(TOLD_CHANGES).copied().collect::<Vec<_>>().join(", ");
+    let told = match titles.len() {
+        0 => String::new(),
+        1..=TOLD_CHANGES => format!(" ({told})"),
+        _ => format!(" (the last: {told})"),
+    };
     format!(
-        "recovered {} with {changes} unsaved {plural}{lenses}: the program ended without closing it",
+        "recovered {} with {changes} unsaved {plural}{told}{lenses}: the program ended without \
+         closing it",
         lens.name
     )
+}
+
+/// A number of designs that were not closed, up to the verb.
+fn counted_designs(count: usize, noun: &str) -> String {
+    if count == 1 { format!("1 {noun} was") } else { format!("{count} {noun}s were") }
 }

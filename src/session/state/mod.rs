@@ -16,7 +16,7 @@ use super::drag::DragState;
 use super::experiment::{ExperimentStatus, ExperimentWorker};
 use super::grin_design::GrinState;
 use super::history::DesignHistory;
-use super::live_merit::LiveMerit;
+use super::live_merit::{LiveMerit, MeritReport, MeritRequest};
 use super::optimization::{OptimizationEngine, OptimizationRequest, OptimizerFactory};
 use super::pareto::ParetoState;
 use super::run::{BackgroundRun, RunId, RunKind, RunStatus};
@@ -93,6 +93,10 @@ pub struct Session {
     kept: Arc<Vec<KeptLens>>,
     /// Analyzes that lens, or the one that a run shows.
     preview_analysis: AnalysisWorker,
+    /// Evaluates its merit.
+    preview_merit: LiveMerit,
+    /// The merit of the candidate before.
+    outdated_merit: Option<Arc<MeritReport>>,
     /// The lens whose analysis was requested last.
     preview_request: Option<PreviewRequest>,
     /// The version of the analyses of one source.
@@ -109,12 +113,14 @@ enum PreviewSource {
     Run(RunId),
 }
 
-/// A lens that is shown in place of the design, with the settings of its analysis.
+/// A lens that is shown in place of the design, with what its numbers depend on.
 #[derive(Debug)]
 struct PreviewRequest {
     source: PreviewSource,
     lens: Arc<Lens>,
     settings: AnalysisSettings,
+    /// The merit function of the design, by which its merit is told.
+    goal: Option<Arc<Goal>>,
 }
 
 impl Session {
@@ -170,7 +176,9 @@ impl Session {
             preview_title: String::new(),
             shows_candidate: true,
             kept: Arc::default(),
-            preview_analysis: spawn_analysis(EffectTiming::Skipped, wake)?,
+            preview_analysis: spawn_analysis(EffectTiming::Skipped, wake.clone())?,
+            preview_merit: LiveMerit::spawn(wake)?,
+            outdated_merit: None,
             preview_request: None,
             preview_version: 0,
             events: Vec::new(),
@@ -246,6 +254,8 @@ impl Session {
     }
 
     fn show(&mut self, setting: PanelSetting) {
+        // A panel that comes to the front contradicts no message.
+        let is_recent = self.message_is_recent;
         self.change_settings(|settings| match setting {
             PanelSetting::Rays(rays) => settings.rays = rays.min(MAX_RAYS),
             PanelSetting::Pupils(shown) => settings.pupils = shown,
@@ -259,6 +269,7 @@ impl Session {
             PanelSetting::GoodRms(rms) => settings.good_rms = rms,
             PanelSetting::PupilWavelength(wavelength) => settings.pupil_wavelength = wavelength,
         });
+        self.message_is_recent = is_recent;
     }
 
     fn set_effect(&mut self, effect: Effect, choice: EffectOverride) {
@@ -293,6 +304,7 @@ impl Session {
             candidate: self.candidate(),
             kept: Arc::clone(&self.kept),
             preview_results: self.preview_results(),
+            preview_merit: self.candidate_merit(),
             experiment: self.experiment.run(),
             drag: self.drag.view(),
             messages: Arc::clone(&self.messages),
@@ -334,8 +346,18 @@ impl Session {
         let same_source = last.is_some_and(|last| last.source == source);
         let same_lens = last
             .is_some_and(|last| Arc::ptr_eq(&last.lens, &lens) && last.settings == self.settings);
-        if same_source && same_lens {
+        let goal = self.goal();
+        let same_goal = last.is_some_and(|last| last.goal == goal);
+        if same_source && same_lens && same_goal {
             return;
+        }
+        if !same_source || !same_goal || source == PreviewSource::Panel {
+            self.outdated_merit = self.preview_merit.latest();
+        }
+        if let Some(goal) = goal.clone() {
+            let (lens, design) = (Arc::clone(&lens), Arc::clone(&self.lens));
+            let tolerance = self.settings.tolerance;
+            self.preview_merit.request(MeritRequest { lens, design, goal, tolerance });
         }
         self.preview_version += u64::from(!same_source);
         let (version, settings) = (self.preview_version, self.settings.clone());
@@ -344,7 +366,7 @@ impl Session {
             lens: Arc::clone(&lens),
             settings: settings.clone(),
         });
-        self.preview_request = Some(PreviewRequest { source, lens, settings });
+        self.preview_request = Some(PreviewRequest { source, lens, settings, goal });
     }
 
     /// The analyses of the lens that is shown in place of the design, maybe of one step before.
@@ -378,7 +400,9 @@ impl Session {
         });
         // While a handle is dragged, its slopes come with the merit.
         if let Some(goal) = self.goal().filter(|_| self.drag.handle().is_none()) {
-            self.live_merit.request(Arc::clone(&self.lens), goal, self.settings.tolerance);
+            let [lens, design] = [&self.lens; 2].map(Arc::clone);
+            let tolerance = self.settings.tolerance;
+            self.live_merit.request(MeritRequest { lens, design, goal, tolerance });
         }
     }
 

@@ -30,7 +30,9 @@ impl EditForm<'_> {
         (shown, width): (&str, f32),
         edit: impl Fn(&str) -> Result<Edit, String>,
     ) -> Response {
-        let placement = InputPlacement::Form;
+        // A text that has several lines is shown as such.
+        let has_lines = shown.contains('\n');
+        let placement = if has_lines { InputPlacement::Paragraph } else { InputPlacement::Form };
         let input = TextInput { name, value: shown, hint: "", align: Align::Min, placement };
         self.field(ui, input, width, edit)
     }

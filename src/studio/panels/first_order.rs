@@ -60,6 +60,9 @@ fn data(ui: &mut Ui, lens: &Lens, first: &FirstOrder<f64>) {
 
 fn lines(lens: &Lens, first: &FirstOrder<f64>) -> Vec<DataLine> {
     let track: f64 = lens.surfaces.iter().map(|row| row.thickness).sum();
+    // What lengths of this size leave by rounding is zero.
+    let size = track.abs() + first.efl.unwrap_or(0.0).abs();
+    let mm = |value: Option<f64>| mm(value.map(|value| number::without_rounding(value, size)));
     vec![
         DataLine("Focal length", mm(first.efl), "Equivalent focal length, one over the power"),
         DataLine(
@@ -78,9 +81,9 @@ fn lines(lens: &Lens, first: &FirstOrder<f64>) -> Vec<DataLine> {
             plain(first.working_f_number),
             "One over twice the numerical aperture in the image space",
         ),
-        pupil_place("Entrance pupil at", first.entrance_pupil, "From the first vertex"),
+        pupil_place("Entrance pupil at", first.entrance_pupil, size, "From the first vertex"),
         pupil_diameter("Entrance pupil diameter", first.entrance_pupil),
-        pupil_place("Exit pupil at", first.exit_pupil, "From the last vertex"),
+        pupil_place("Exit pupil at", first.exit_pupil, size, "From the last vertex"),
         pupil_diameter("Exit pupil diameter", first.exit_pupil),
         DataLine(
             "Stop semi-diameter",
@@ -99,8 +102,15 @@ fn lines(lens: &Lens, first: &FirstOrder<f64>) -> Vec<DataLine> {
     ]
 }
 
-fn pupil_place(name: &'static str, pupil: ParaxialPupil<f64>, from: &'static str) -> DataLine {
-    let place = pupil.position.map_or_else(|| "Infinity".to_owned(), |z| mm(Some(z)));
+/// The place of a pupil of a lens of a size.
+fn pupil_place(
+    name: &'static str,
+    pupil: ParaxialPupil<f64>,
+    size: f64,
+    from: &'static str,
+) -> DataLine {
+    let place = pupil.position.map(|z| mm(Some(number::without_rounding(z, size))));
+    let place = place.unwrap_or_else(|| "Infinity".to_owned());
     DataLine(name, place, from)
 }
 

@@ -1,9 +1,19 @@
 //! Widgets that several panels share.
 
 use egui::{Button, Color32, ProgressBar, RectAlign, Response, RichText, Sense, Tooltip, Ui, vec2};
-use egui_plot::Plot;
+use egui_plot::{GridMark, Plot};
 
 use crate::studio::actions::{Actions, UiAction};
+use crate::studio::number;
+
+/// The room for the numbers at the left of a plot, in points.
+const AXIS_WIDTH: f32 = 40.0;
+/// The height of a line of text, in points.
+const LINE: f32 = 18.0;
+/// The distance of two marks of an axis, in lines.
+const LINES: f64 = 1.6;
+/// The share of that distance which two marks have at least.
+const CROWDED: f64 = 0.6;
 
 /// A button that asks for one action.
 #[derive(Debug)]
@@ -74,8 +84,111 @@ pub(super) fn fixed_plot(name: &str, height: f32) -> Plot<'static> {
     plot.allow_zoom(false).allow_boxed_zoom(false)
 }
 
+/// Gives a plot of decimal logarithms an axis with round numbers as its marks, and a title.
+pub(super) fn log_axis(plot: Plot<'static>, title: &str) -> Plot<'static> {
+    let plot = plot.y_axis_label(title).y_axis_min_width(AXIS_WIDTH);
+    let plot = plot.grid_spacing(LINE..=6.0 * LINE).y_grid_spacer(|input| {
+        let step_size = input.bounds.1 - input.bounds.0;
+        let marks = log_marks(input.bounds, LINES * input.base_step_size);
+        marks.into_iter().map(|value| GridMark { value, step_size }).collect()
+    });
+    plot.y_axis_formatter(|mark, range| {
+        let value = 10_f64.powf(mark.value);
+        // A third of the range is about the distance of two marks.
+        let step = value * (10_f64.powf(0.3 * (range.end() - range.start())) - 1.0);
+        number::format_digits(value, number::digits_between(value, step, 2))
+    })
+}
+
+/// The decimal logarithms of round numbers between two places, about `apart` from each other: of
+/// decades, else of 1, 2 and 5 in each, else of multiples of one step.
+fn log_marks((low, high): (f64, f64), apart: f64) -> Vec<f64> {
+    if !(low.is_finite() && high.is_finite() && low < high && apart > 0.0) {
+        return Vec::new();
+    }
+    let mut found: Vec<f64> = multiples((low, high), apart.max(1.0).ceil()).collect();
+    if found.len() < 3 && CROWDED * apart <= 2_f64.log10() {
+        let all = multiples((low - 1.0, high), 1.0);
+        let parts = all.flat_map(|decade| [1.0_f64, 2.0, 5.0].map(|part| decade + part.log10()));
+        let parts: Vec<f64> = parts.filter(|place| (low..=high).contains(place)).collect();
+        found = if parts.len() > found.len() { parts } else { found };
+    }
+    if found.len() < 3 {
+        let even = even_marks((low, high), apart);
+        found = if even.len() > found.len() { even } else { found };
+    }
+    found
+}
+
+/// The logarithms of multiples of the smallest round step whose marks have their distance; two marks
+/// may be nearer to each other than that.
+fn even_marks((low, high): (f64, f64), apart: f64) -> Vec<f64> {
+    let [first, last] = [low, high].map(|place| 10_f64.powf(place));
+    let mut step = round_above(last - first);
+    let mut found = Vec::new();
+    for _ in 0..12 {
+        let marks = multiples((first, last), step).map(f64::log10);
+        let marks: Vec<f64> = marks.filter(|place| (low..=high).contains(place)).collect();
+        let least = if found.len() < 2 { CROWDED * apart } else { apart };
+        if marks.windows(2).any(|two| two[1] - two[0] < least) {
+            break;
+        }
+        found = marks;
+        // From 5 to 2, and else by half.
+        let is_five = (step / 10_f64.powf(step.log10().floor())).round() == 5.0;
+        step *= if is_five { 0.4 } else { 0.5 };
+    }
+    found
+}
+
+/// The multiples of a step between two numbers, a hundred at most.
+fn multiples((low, high): (f64, f64), step: f64) -> impl Iterator<Item = f64> {
+    let first = (low / step).ceil();
+    (0..100).map(move |i| (first + f64::from(i)) * step).take_while(move |value| *value <= high)
+}
+
+/// The smallest of 1, 2 and 5 times a power of ten that is not below a number.
+fn round_above(value: f64) -> f64 {
+    let decade = 10_f64.powf(value.log10().floor());
+    let parts = [1.0, 2.0, 5.0, 10.0].map(|part| part * decade);
+    parts.into_iter().find(|part| *part >= value).unwrap_or(10.0 * decade)
+}
+
 /// A small square of a colour, as in a legend.
 pub(super) fn swatch(ui: &mut Ui, color: Color32) {
     let (rect, _) = ui.allocate_exact_size(vec2(9.0, 9.0), Sense::hover());
     ui.painter().rect_filled(rect, 1.0, color);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_logarithmic_axis_has_marks_however_short_it_is() {
+        for range in [0.001, 0.03, 0.1, 0.3, 0.5, 0.9, 1.5, 3.0, 6.0, 20.0] {
+            for low in [-7.3, -2.3, 0.1] {
+                let apart = 0.29 * range;
+                let marks = log_marks((low, low + range), apart);
+                let inside = marks.iter().all(|mark| (low..=low + range).contains(mark));
+                let apart = marks.windows(2).all(|two| two[1] - two[0] > 0.59 * apart);
+                assert!(marks.len() >= 2 && inside && apart, "{low} {range}: {marks:?}");
+            }
+        }
+        assert!(log_marks((1.0, f64::INFINITY), 0.1).is_empty());
+    }
+
+    #[test]
+    fn the_marks_of_a_logarithmic_axis_are_round() {
+        let values = |low: f64, high: f64, apart| {
+            let marks = log_marks((low.log10(), high.log10()), apart);
+            marks.into_iter().map(|mark| number::format_digits(10_f64.powf(mark), 4)).collect()
+        };
+        let near: Vec<String> = values(0.0119, 0.021, 0.07);
+        assert_eq!(near, ["0.015", "0.02"]);
+        let parts: Vec<String> = values(0.09, 2.2, 0.29);
+        assert_eq!(parts, ["0.1", "0.2", "0.5", "1", "2"]);
+        let decades: Vec<String> = values(0.9e-6, 2.0, 1.8);
+        assert_eq!(decades, ["1e-6", "0.0001", "0.01", "1"]);
+    }
 }

@@ -28,15 +28,10 @@ pub(super) fn table(ui: &mut Ui, view: &SessionView, selected: &HistoryNode) {
         ui.end_row();
         for ComparedNumber { name, present, selected } in &numbers {
             ui.label(name);
-            let change = 100.0 * (selected / present - 1.0);
             let digits = number::digits_between(*present, selected - present, 5);
             ui.label(number::format_digits(*present, digits));
             ui.label(number::format_digits(*selected, digits));
-            if change.is_finite() {
-                ui.label(format!("{change:+.2} %"));
-            } else {
-                ui.label(number::format_digits(selected - present, 3));
-            }
+            ui.label(difference_text(*present, *selected));
             ui.end_row();
         }
         for (name, present, selected) in words {
@@ -49,6 +44,14 @@ pub(super) fn table(ui: &mut Ui, view: &SessionView, selected: &HistoryNode) {
     if let Some((present, selected)) = both(view, selected) {
         spots::beside_each_other(ui, present, selected);
     }
+}
+
+/// The change of a number, as a length where there is no ratio; nothing between a plane and a sphere.
+fn difference_text(present: f64, selected: f64) -> String {
+    let change = number::format_change(present, selected, 2);
+    let difference = selected - present;
+    let as_length = || difference.is_finite().then(|| number::format_digits(difference, 3));
+    change.or_else(as_length).unwrap_or_default()
 }
 
 /// The present version and the selected one with their numbers, once both are known.

@@ -2,24 +2,28 @@
 
 use std::collections::BTreeMap;
 
-use egui::{Button, Pos2, RichText, Role, Sense, Stroke, Ui, Vec2, WidgetInfo, pos2, vec2};
+use egui::text::{LayoutJob, TextFormat, TextWrapping};
+use egui::{Color32, Pos2, Rect, Role, Sense, Stroke, TextStyle, Ui, Vec2, WidgetInfo, pos2, vec2};
 use egui_plot::{Line, PlotPoints};
 
 use super::node;
 use crate::session::{HistoryNode, OptimizationCurve, SessionView};
 use crate::studio::number;
-use crate::studio::panels::decade_name;
 use crate::studio::panels::optimizer::clicked_step;
-use crate::studio::panels::widgets::fixed_plot;
+use crate::studio::panels::widgets::{fixed_plot, log_axis};
 use crate::studio::text::capitalize;
 use crate::studio::thumbnails::Thumbnails;
 
 /// The width of a branch and the height of a version.
-const CELL: [f32; 2] = [12.0, 20.0];
+const CELL: [f32; 2] = [12.0, 46.0];
 /// The size of the drawing of a version.
-const THUMBNAIL: Vec2 = vec2(44.0, 18.0);
+const THUMBNAIL: Vec2 = vec2(84.0, 42.0);
+/// The most branches beside each other that leave room for the words.
+const MAX_BRANCHES: usize = 8;
+/// The smallest change of the merit that is told, relative to it.
+const LEAST_CHANGE: f64 = 5e-4;
 /// The height of the curve of an optimization.
-const CURVE_HEIGHT: f32 = 64.0;
+const CURVE_HEIGHT: f32 = 92.0;
 
 /// Shows the tree, the newest version first; the one that was clicked, if one was.
 pub(super) fn tree(
@@ -29,7 +33,7 @@ pub(super) fn tree(
     thumbnails: &mut Thumbnails,
 ) -> Option<u64> {
     let columns = columns(view);
-    let count = columns.values().max().map_or(1, |last| last + 1);
+    let count = columns.values().max().map_or(1, |last| last + 1).min(MAX_BRANCHES);
     let mut marks: BTreeMap<u64, Pos2> = BTreeMap::new();
     let mut clicked = None;
     ui.spacing_mut().item_spacing.y = 0.0;
@@ -37,30 +41,67 @@ pub(super) fn tree(
         ui.horizontal(|ui| {
             let size = vec2(CELL[0] * count as f32, CELL[1]);
             let (rect, _) = ui.allocate_exact_size(size, Sense::hover());
-            let column = columns.get(&version.id).copied().unwrap_or(0);
+            let column = columns.get(&version.id).copied().unwrap_or(0).min(count - 1);
             let place = pos2(rect.left() + CELL[0] * (column as f32 + 0.5), rect.center().y);
             marks.insert(version.id, place);
             let (drawing, _) = ui.allocate_exact_size(THUMBNAIL, Sense::hover());
             if ui.is_rect_visible(drawing) {
                 thumbnails.paint(ui, &version.lens, &version.lens, drawing);
             }
-            let text = line_text(view, version);
-            let is_present = version.id == view.version_id;
-            let mut words = RichText::new(&text);
-            if is_present {
-                words = words.strong();
-            }
-            let button = Button::selectable(selected == Some(version.id), words);
-            let response = ui.add(button.truncate());
-            let label = if is_present { format!("Present version: {text}") } else { text.clone() };
-            response.widget_info(|| WidgetInfo::labeled(Role::Button, true, &label));
-            if response.on_hover_text(time_text(version)).clicked() {
+            if version_button(ui, view, version, selected == Some(version.id)) {
                 clicked = Some(version.id);
             }
         });
     }
     paint_branches(ui, view, &marks);
     clicked
+}
+
+/// The title of a version above its merit, its seed and its time; true if it was clicked.
+fn version_button(
+    ui: &mut Ui,
+    view: &SessionView,
+    version: &HistoryNode,
+    is_selected: bool,
+) -> bool {
+    let is_present = version.id == view.version_id;
+    let size = vec2(ui.available_width(), CELL[1]);
+    let (rect, response) = ui.allocate_exact_size(size, Sense::click());
+    let look = ui.style().interact_selectable(&response, is_selected);
+    if is_selected || response.hovered() || response.has_focus() {
+        ui.painter().rect_filled(rect, look.corner_radius, look.weak_bg_fill);
+    }
+    let visuals = ui.visuals();
+    let own = |color| if is_selected { visuals.selection.stroke.color } else { color };
+    let first = if is_present { visuals.strong_text_color() } else { visuals.text_color() };
+    let facts = [facts_text(view, version), clock_text(version)];
+    let facts = facts.into_iter().filter(|fact| !fact.is_empty()).collect::<Vec<_>>().join(", ");
+    let lines = [
+        (title_text(version), TextStyle::Body, own(first), 2),
+        (facts, TextStyle::Small, own(visuals.weak_text_color()), 1),
+    ];
+    paint_lines(ui, rect.shrink2(vec2(5.0, 0.0)), lines);
+    let label = line_text(view, version);
+    let label = if is_present { format!("Present version: {label}") } else { label };
+    response.widget_info(|| WidgetInfo::labeled(Role::Button, true, &label));
+    response.on_hover_text(format!("{label}\n{}", time_text(version))).clicked()
+}
+
+/// Texts below each other in the middle of a place; each is cut after some rows.
+fn paint_lines(ui: &Ui, rect: Rect, lines: [(String, TextStyle, Color32, usize); 2]) {
+    let galleys = lines.map(|(text, style, color, max_rows)| {
+        let format = TextFormat::simple(style.resolve(ui.style()), color);
+        let mut job = LayoutJob::single_section(text, format);
+        job.wrap = TextWrapping { max_width: rect.width(), max_rows, ..TextWrapping::default() };
+        ui.painter().layout_job(job)
+    });
+    let height: f32 = galleys.iter().map(|galley| galley.size().y).sum();
+    let mut place = rect.left_center() - vec2(0.0, 0.5 * height);
+    for galley in galleys {
+        let step = galley.size().y;
+        ui.painter_at(rect).galley(place, galley, ui.visuals().text_color());
+        place.y += step;
+    }
 }
 
 /// The column of each version: that of its parent for the first child, a new one for the others.
@@ -96,25 +137,41 @@ fn paint_branches(ui: &Ui, view: &SessionView, marks: &BTreeMap<u64, Pos2>) {
     }
 }
 
-/// The name or title of a version, its merit, and the change of the merit.
-fn line_text(view: &SessionView, version: &HistoryNode) -> String {
-    let title = capitalize(version.name.as_deref().unwrap_or(&version.title));
-    let Some(merit) = version.merit else { return title };
-    let short = number::format_digits(merit, 4);
+/// The name or title of a version.
+fn title_text(version: &HistoryNode) -> String {
+    capitalize(version.name.as_deref().unwrap_or(&version.title))
+}
+
+/// The merit of a version, its change, and the seed of the run that found it.
+fn facts_text(view: &SessionView, version: &HistoryNode) -> String {
     let before = version.parent.and_then(|id| node(view, id)?.merit);
-    let change = before.filter(|before| *before != 0.0).map(|before| merit / before - 1.0);
-    let seed = version.seed.map(|seed| format!(", seed {seed}")).unwrap_or_default();
-    match change.filter(|change| change.abs() >= 5e-4) {
-        Some(change) => format!("{title}: merit {short} ({:+.1} %){seed}", 100.0 * change),
-        None => format!("{title}: merit {short}{seed}"),
-    }
+    let merit = version.merit.map(|merit| {
+        let changed = before.filter(|old| (merit - old).abs() >= LEAST_CHANGE * old.abs());
+        let change = changed.and_then(|before| number::format_change(before, merit, 1));
+        let change = change.map(|change| format!(" ({change})")).unwrap_or_default();
+        format!("merit {}{change}", number::format_digits(merit, 4))
+    });
+    let seed = version.seed.map(|seed| format!("seed {seed}"));
+    merit.into_iter().chain(seed).collect::<Vec<_>>().join(", ")
+}
+
+/// The title of a version with what is known of it.
+fn line_text(view: &SessionView, version: &HistoryNode) -> String {
+    let facts = facts_text(view, version);
+    let separator = if facts.is_empty() { "" } else { ": " };
+    format!("{}{separator}{facts}", title_text(version))
+}
+
+/// The time of day of a version.
+fn clock_text(version: &HistoryNode) -> String {
+    let [hours, minutes, seconds] =
+        [version.time / 3600 % 24, version.time / 60 % 60, version.time % 60];
+    format!("{hours:02}:{minutes:02}:{seconds:02} UTC")
 }
 
 /// The time of a version and what led to it.
 fn time_text(version: &HistoryNode) -> String {
-    let [hours, minutes, seconds] =
-        [version.time / 3600 % 24, version.time / 60 % 60, version.time % 60];
-    format!("{}, {hours:02}:{minutes:02}:{seconds:02} UTC", capitalize(&version.title))
+    format!("{}, {}", capitalize(&version.title), clock_text(version))
 }
 
 /// The merit of an optimization against its steps; the step that was clicked, if one was.
@@ -122,9 +179,8 @@ pub(super) fn curve_plot(ui: &mut Ui, curve: &OptimizationCurve) -> Option<usize
     let points = curve.points.iter().filter(|point| point.merit > 0.0);
     let points: PlotPoints<'_> =
         points.map(|point| [point.step as f64, point.merit.log10()]).collect();
-    let plot = fixed_plot("course of the optimization", CURVE_HEIGHT)
-        .y_axis_min_width(40.0)
-        .y_axis_formatter(|mark, _| decade_name(mark.value));
+    let plot = fixed_plot("course of the optimization", CURVE_HEIGHT).x_axis_label("step");
+    let plot = log_axis(plot, "merit");
     let color = ui.visuals().hyperlink_color;
     let shown = plot.show(ui, |plot| plot.line(Line::new("merit", points).color(color)));
     let label = "Merit against steps of this version";

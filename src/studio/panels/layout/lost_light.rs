@@ -10,6 +10,7 @@ use crate::session::Command;
 use crate::studio::actions::Actions;
 use crate::studio::number;
 use crate::studio::panels::widgets::hint_beside;
+use crate::studio::text::counted;
 use crate::trace::Fate;
 
 /// A rim that clips rays of the drawing.
@@ -82,8 +83,8 @@ impl ClippingRim {
         let now = row.and_then(|row| row.semi_diameter).unwrap_or_default();
         let name = if row.is_some_and(|row| row.stop) { "stop" } else { "rim" };
         let [now, needed] = [now, self.needed].map(|mm| number::format_digits(mm, 5));
-        let (surface, rays) = (self.surface + 1, self.rays);
-        format!("Widen the {name} of surface {surface} from {now} to {needed} mm ({rays} rays)")
+        let (surface, rays) = (self.surface + 1, counted(self.rays as u64, "ray"));
+        format!("Widen the {name} of surface {surface} from {now} to {needed} mm ({rays})")
     }
 
     fn widened(&self, lens: &Lens) -> Lens {

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use egui::{Response, Ui};
+use egui::{Response, RichText, Ui};
 
 use super::terms::value_text;
 use crate::merit::{Term, TermValue, WeightedTerm};
@@ -49,16 +49,13 @@ impl LiveTerm {
         ui.colored_label(color, text).on_hover_text(error)
     }
 
-    /// Shows the value, and the share if there is one.
+    /// Shows the value, and below it the share if there is one.
     pub(super) fn cell(self, ui: &mut Ui, term: Term) {
         let share = self.share.filter(|share| *share >= SMALLEST_SHARE);
-        ui.horizontal(|ui| {
-            ui.spacing_mut().item_spacing.x = 4.0;
-            self.value(ui, term);
-            if let Some(share) = share {
-                ui.weak(share_text(share));
-            }
-        });
+        self.value(ui, term);
+        if let Some(share) = share {
+            ui.label(RichText::new(share_text(share)).small().weak());
+        }
     }
 }
 

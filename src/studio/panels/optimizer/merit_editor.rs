@@ -1,7 +1,7 @@
 //! The editor of the merit function: terms with weights and targets, and the treatment of the pupil
 //! edge.
 
-use egui::{Align, ComboBox, Grid, Id, Layout as Arrange, RichText, Ui, vec2};
+use egui::{Align, Button, ComboBox, Grid, Id, Layout as Arrange, RichText, Ui, vec2};
 use std::sync::Arc;
 
 use super::limits;
@@ -31,6 +31,12 @@ pub(super) struct MeritEditor {
     /// The merit function that was made of the terms last, until the design has it.
     written: Option<Goal>,
 }
+
+/// The room for all that is not a target in a row, in points.
+const OTHER_COLUMNS: f32 = 326.0;
+/// The least and the most room for targets.
+const MIN_TARGETS: f32 = 76.0;
+const MAX_TARGETS: f32 = 210.0;
 
 /// A term, and whether it counts.
 #[derive(Debug, Clone, Copy)]
@@ -130,13 +136,14 @@ impl MeritEditor {
         let search = view.optimization.snapshot.as_deref();
         let mut unwanted = None;
         let repeats = self.repeats();
-        Grid::new("terms").num_columns(6).spacing([6.0, 2.0]).striped(true).show(ui, |ui| {
+        let target_width = (ui.available_width() - OTHER_COLUMNS).clamp(MIN_TARGETS, MAX_TARGETS);
+        Grid::new("terms").num_columns(4).spacing([6.0, 2.0]).striped(true).show(ui, |ui| {
             for (text, what) in [("Term", ""), ("Weight", ""), ("Target", "")] {
                 heading(ui, text, what);
             }
             if search.is_some() {
-                heading(ui, "Value", "Its value for the design");
-                heading(ui, "Best", "Its value for the best lens of the optimization so far");
+                let what = "Its value for the design, and for the best lens of the optimization";
+                heading(ui, "Value, best", what);
             } else {
                 let what = "Its value for the design, and its part of the merit by magnitude";
                 heading(ui, "Value, share", what);
@@ -146,7 +153,7 @@ impl MeritEditor {
             for (i, row) in self.terms.iter_mut().enumerate() {
                 let live = row.active.then(|| LiveTerm::of(view, place, row.weighted)).flatten();
                 let number = repeats[i];
-                if row.ui(ui, view, buffers, TermPlace { number, place, live }) {
+                if row.ui(ui, view, buffers, TermPlace { number, place, live, target_width }) {
                     unwanted = Some(i);
                 }
                 place += usize::from(row.active);
@@ -259,6 +266,8 @@ struct TermPlace {
     number: usize,
     place: usize,
     live: Option<LiveTerm>,
+    /// The room for its targets, in points.
+    target_width: f32,
 }
 
 /// True if the stop alone limits the beam, at every zoom position.
@@ -298,34 +307,59 @@ impl MeritRow {
             0 => title(term).to_owned(),
             before => format!("{} {}", title(term), before + 1),
         };
-        ui.checkbox(&mut self.active, &title).on_hover_text(hint(term));
+        let removed = self.name_cell(ui, view, &title);
         let name = format!("Weight of {title}");
-        number_field(ui, buffers, &name, &mut self.weighted.weight, 50.0);
-        ui.horizontal(|ui| {
-            ui.spacing_mut().item_spacing.x = 2.0;
+        number_field(ui, buffers, &name, &mut self.weighted.weight, 46.0);
+        // A narrow panel has the targets below each other.
+        let room = vec2(at.target_width, ui.spacing().interact_size.y);
+        let wrapping = Arrange::left_to_right(Align::Center).with_main_wrap(true);
+        ui.allocate_ui_with_layout(room, wrapping, |ui| {
+            ui.spacing_mut().item_spacing = vec2(2.0, 2.0);
             let targets = targets(&mut self.weighted.term);
-            let width = if targets.len() > 1 { 48.0 } else { 60.0 };
             for (what, value) in targets {
                 let name = format!("{what} of {title}");
-                number_field(ui, buffers, &name, value, width);
+                number_field(ui, buffers, &name, value, 46.0);
             }
             scope::bounds(ui, buffers, &title, &mut self.weighted.term);
             ui.weak(unit(term));
             self.field_choice(ui, view, &title);
             scope::button(ui, buffers, &view.lens, &title, &mut self.weighted);
         });
+        self.value_cell(ui, view, at);
+        removed
+    }
+
+    /// The button that removes the term, and its title, by which it counts or not.
+    fn name_cell(&mut self, ui: &mut Ui, view: &SessionView, title: &str) -> bool {
+        let term = self.weighted.term;
+        let possible = !view.optimization.is_active();
+        ui.horizontal(|ui| {
+            ui.spacing_mut().item_spacing.x = 4.0;
+            let remove = ui.add_enabled(possible, Button::new("×").small());
+            let remove = remove.accessible_name(format!("Remove {title}"));
+            let removed = remove.on_hover_text("Remove the term").clicked();
+            ui.checkbox(&mut self.active, title).on_hover_text(hint(term));
+            removed
+        })
+        .inner
+    }
+
+    /// The value for the design, and below it the share or the value for the best lens.
+    fn value_cell(&self, ui: &mut Ui, view: &SessionView, at: TermPlace) {
+        let term = self.weighted.term;
         let search = view.optimization.snapshot.as_deref();
-        match at.live {
-            // The value for the best lens takes the place of the share.
-            Some(live) if search.is_some() => drop(live.value(ui, term)),
-            Some(live) => live.cell(ui, term),
-            None => drop(ui.label("")),
-        }
-        if let Some(search) = search {
-            self.best_cell(ui, search, at.place);
-        }
-        let fixed = view.optimization.is_active();
-        !fixed && ui.small_button("×").on_hover_text("Remove the term").clicked()
+        ui.vertical(|ui| {
+            ui.spacing_mut().item_spacing.y = 0.0;
+            match at.live {
+                // The value for the best lens takes the place of the share.
+                Some(live) if search.is_some() => drop(live.value(ui, term)),
+                Some(live) => live.cell(ui, term),
+                None => {}
+            }
+            if let Some(search) = search {
+                self.best_cell(ui, search, at.place);
+            }
+        });
     }
 
     /// The choice of the field where the term is about one.
@@ -354,7 +388,10 @@ impl MeritRow {
             |asked: &&WeightedTerm| self.active && (asked.term, asked.scope) == (term, scope);
         let asked = search.request.goal.terms.get(place).filter(is_asked);
         let value = asked.and_then(|_| search.best_terms.get(place));
-        ui.label(value.map(|value| value_text(term, value.value)).unwrap_or_default());
+        if let Some(value) = value {
+            let text = format!("best {}", value_text(term, value.value));
+            ui.label(RichText::new(text).small());
+        }
     }
 }
 

@@ -16,12 +16,14 @@ use egui::{
 };
 use egui_plot::{Line, PlotPoints, PlotTransform};
 
-use super::{Panel, decade_name, mean_pupil_area, mean_spot};
+use super::{Panel, mean_pupil_area, mean_spot};
 use crate::optimize::DescentMethod;
 use crate::session::{Command, MeritSample, OptimizationSnapshot, RunStatus, SessionView};
 use crate::studio::actions::Actions;
 use crate::studio::number;
-use crate::studio::panels::widgets::{ActionButton, action_buttons, fixed_plot, main_button};
+use crate::studio::panels::widgets::{
+    ActionButton, action_buttons, fixed_plot, log_axis, main_button,
+};
 use crate::studio::text::{capitalize, status_text};
 use crate::studio::text_input::EditBuffers;
 use merit_editor::MeritEditor;
@@ -184,9 +186,8 @@ pub(super) fn changes_text(view: &SessionView) -> Vec<String> {
     // A search that does not ask for light may buy sharpness with it: it is told beside the spots.
     let (old, new) = (mean_pupil_area(before), mean_pupil_area(after));
     if old > 0.0 {
-        let change = number::format_digits(100.0 * (new / old - 1.0), 3);
-        let sign = if new > old { "+" } else { "" };
-        texts.push(format!("light {} to {} mm² ({sign}{change} %)", short(old), short(new)));
+        let change = number::short_change(old, new).unwrap_or_default();
+        texts.push(format!("light {} to {} mm² ({change})", short(old), short(new)));
     }
     texts
 }
@@ -202,12 +203,10 @@ fn history_plot(ui: &mut Ui, search: &OptimizationSnapshot) -> Option<usize> {
     let (current, best) = (curve(|point| point.current), curve(|point| point.best));
     let visuals = ui.visuals();
     let (weak, strong) = (visuals.weak_text_color(), visuals.hyperlink_color);
-    let plot = fixed_plot("merit history", ui.available_height())
-        .y_axis_min_width(40.0)
+    let plot = log_axis(fixed_plot("merit history", ui.available_height()), "merit")
+        .x_axis_label("step")
         .grid_color(visuals.widgets.noninteractive.bg_stroke.color)
-        .grid_spacing(18.0..=120.0)
-        .set_margin_fraction(vec2(0.01, 0.08))
-        .y_axis_formatter(|mark, _| decade_name(mark.value));
+        .set_margin_fraction(vec2(0.01, 0.08));
     let shown = plot.show(ui, |plot| {
         plot.line(Line::new("current", current).color(weak).width(1.0));
         plot.line(Line::new("best", best).color(strong).width(2.0));

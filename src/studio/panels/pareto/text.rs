@@ -6,7 +6,7 @@ use crate::lens::{Lens, Quantity};
 use crate::optimize::pareto::ParetoPoint;
 use crate::session::{ParetoRun, RunStatus, SessionView};
 use crate::studio::number;
-use crate::studio::text::{capitalize, status_text};
+use crate::studio::text::{capitalize, counted, status_text};
 
 /// The variables of the sweep.
 pub(super) fn variables_label(ui: &mut Ui, view: &SessionView) {
@@ -16,7 +16,10 @@ pub(super) fn variables_label(ui: &mut Ui, view: &SessionView) {
         None if view.lens.variables.is_empty() => {
             "all curvatures, gaps and semi-diameters".to_owned()
         }
-        None => format!("the {} variables and all semi-diameters", view.lens.variables.len()),
+        None => {
+            let variables = counted(view.lens.variables.len() as u64, "variable");
+            format!("the {variables} and all semi-diameters")
+        }
     };
     let text = format!(
         "Variables: {free}. Fields and wavelengths are those of the lens; its aperture becomes \
@@ -99,7 +102,7 @@ pub(super) fn design_text(design: &ParetoPoint, start: &ParetoPoint) -> String {
         Some(weight) => format!("rim blur {} µm", number::format_digits(1e3 * weight.sqrt(), 3)),
     };
     format!(
-        "RMS {spot} µm\nlight {light} mm², {percent} % of the start\n{blur}\n{} rays",
-        design.rays
+        "RMS {spot} µm\nlight {light} mm², {percent} % of the start\n{blur}\n{}",
+        counted(design.rays as u64, "ray")
     )
 }

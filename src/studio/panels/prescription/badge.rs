@@ -1,8 +1,8 @@
 //! The badge of a number: fixed, variable, picked up from another number, or solved.
 
 use egui::{
-    Button, Color32, CornerRadius, Popup, PopupCloseBehavior, Response, RichText, Sense, Ui,
-    Visuals, vec2,
+    Button, Color32, CornerRadius, Popup, PopupCloseBehavior, Response, RichText, Role, Sense, Ui,
+    Visuals, WidgetInfo, vec2,
 };
 
 use super::badge_menu::StatusMenu;
@@ -13,6 +13,8 @@ use crate::studio::text_input::EditBuffers;
 
 /// The width of a badge, in points.
 pub(super) const WIDTH: f32 = 18.0;
+/// The part of it at the right that stays free.
+pub(super) const GAP: f32 = 2.0;
 
 /// The status of a number.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -58,6 +60,18 @@ impl ParameterStatus {
         }
     }
 
+    /// The status in a word, for a reader of the screen.
+    const fn word(self) -> &'static str {
+        match self {
+            Self::Fixed => "fixed",
+            Self::Automatic => "automatic",
+            Self::Clipping => "fixed, clips",
+            Self::Variable(_) => "variable",
+            Self::Pickup(_) => "picked up",
+            Self::ImageSolve(_) => "solved",
+        }
+    }
+
     fn hint(self) -> String {
         match self {
             Self::Fixed => "Fixed. Click to make it variable (Ctrl+Shift+V).".into(),
@@ -89,7 +103,7 @@ pub(super) fn show(
 ) {
     let decides = ParameterStatus::of(lens, parameter);
     let name = format!("{} variable", parameter_name(parameter));
-    let button = badge(ui, decides).accessible_name(name);
+    let button = badge(ui, decides, Sense::CLICK).accessible_name(name);
     let simple = matches!(
         decides,
         ParameterStatus::Fixed | ParameterStatus::Clipping | ParameterStatus::Variable(_)
@@ -113,7 +127,15 @@ pub(super) fn toggle_edit(decides: ParameterStatus, parameter: Parameter) -> Edi
     }
 }
 
-fn badge(ui: &mut Ui, decides: ParameterStatus) -> Response {
+/// Shows the badge of a number that cannot be edited now; `name` is that of its cell.
+pub(super) fn show_fixed(ui: &mut Ui, lens: &Lens, parameter: Parameter, name: &str) {
+    let status = ParameterStatus::of(lens, parameter);
+    let shown = badge(ui, status, Sense::hover());
+    let name = format!("Badge of {name}: {}", status.word());
+    shown.widget_info(|| WidgetInfo::labeled(Role::Label, true, &name));
+}
+
+fn badge(ui: &mut Ui, decides: ParameterStatus, sense: Sense) -> Response {
     let visuals = ui.visuals();
     let (fill, text) = match decides {
         ParameterStatus::Fixed | ParameterStatus::Automatic => {
@@ -130,9 +152,9 @@ fn badge(ui: &mut Ui, decides: ParameterStatus) -> Response {
         .fill(fill)
         .corner_radius(CornerRadius::same(3))
         // Tab goes from number to number.
-        .sense(Sense::CLICK);
+        .sense(sense);
     ui.spacing_mut().button_padding = vec2(0.0, 0.0);
-    ui.add_sized(vec2(WIDTH - 2.0, 16.0), button)
+    ui.add_sized(vec2(WIDTH - GAP, 16.0), button)
 }
 
 /// Dark enough for white letters on dark and on light.

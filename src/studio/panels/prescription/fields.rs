@@ -37,7 +37,7 @@ impl PrescriptionTable<'_> {
     }
 
     /// The semi-diameter that an automatic one shows; `None` in other columns.
-    fn shown_clear(&self, place: CellPlace) -> Option<f64> {
+    pub(super) fn shown_clear(&self, place: CellPlace) -> Option<f64> {
         let surface = place.surface().filter(|_| place.column == TableColumn::SemiDiameter)?;
         self.clear_semi_diameter(surface).filter(|height| *height > 0.0)
     }

@@ -57,10 +57,11 @@ impl Panel for PrescriptionPanel {
         let lens = candidate.map_or(&view.lens, |results| &results.lens);
         let columns = columns::shown(ui, lens);
         let before = self.cursor.active();
+        // What is above the rows stays while there is a candidate, so that they do not move.
         ui.add_enabled_ui(candidate.is_none(), |ui| self.toolbar(ui, view, actions));
+        clipping_note(ui, &view.lens);
         if candidate.is_none() {
             keys(ui, view, actions);
-            clipping_note(ui, lens);
             self.cursor_keys(ui, view, &columns, actions);
             self.error_line(ui);
         }

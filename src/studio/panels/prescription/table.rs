@@ -78,7 +78,8 @@ impl PrescriptionTable<'_> {
     fn row(&mut self, mut row: TableRow<'_, '_>) {
         let index = row.index();
         let surface = index.checked_sub(1).filter(|surface| *surface < self.lens.surfaces.len());
-        row.set_selected(surface.is_some() && surface == self.view.selected);
+        let chosen = surface.is_some() && surface == self.view.selected;
+        row.set_selected(chosen);
         row.col(|ui| match surface {
             Some(surface) => self.surface_name(ui, surface),
             None if index == OBJECT => {
@@ -90,6 +91,10 @@ impl PrescriptionTable<'_> {
         });
         for column in self.columns {
             row.col(|ui| {
+                if chosen {
+                    // Grey would not stand out from the selection.
+                    ui.visuals_mut().weak_text_color = ui.visuals().override_text_color;
+                }
                 let tint =
                     surface.and_then(|surface| tint(ui, &self.lens.surfaces[surface].medium));
                 if let Some(tint) = tint {
@@ -105,7 +110,7 @@ impl PrescriptionTable<'_> {
             self.image_cell(ui, place.column);
         } else if let Some(candidate) = &self.candidate {
             let text = self.shown_text(place, room_in(ui, place));
-            candidate.cell(ui, place, &text, self.view.settings.zoom);
+            candidate.cell(ui, place, (&text, self.shown_clear(place)), self.view.settings.zoom);
         } else if place.is_editable(&self.lens) {
             if self.cursor.is_in_range(self.grid(), place) {
                 let fill = ui.visuals().selection.bg_fill.gamma_multiply(0.45);

@@ -13,7 +13,7 @@ use crate::pupil::{PupilLimit, PupilOutline};
 use crate::studio::number;
 use crate::studio::palette::Palette;
 use crate::studio::panels::{field_name, relative_error};
-use crate::studio::text::capitalize;
+use crate::studio::text::{capitalize, counted};
 use crate::trace::{Fate, RayLimit};
 
 /// The gap between two limits in a line, in points.
@@ -75,7 +75,7 @@ impl PupilView<'_> {
             }
             PupilShape::Dark(_) | PupilShape::Unbounded | PupilShape::NoRays(_) => {}
         }
-        let cost = format!("{} rays, {:.2} ms", pupil.value.rays, pupil.ms);
+        let cost = cost_text(pupil.value.rays, pupil.ms);
         ui.label(RichText::new(cost).small().weak())
             .on_hover_text("Rays traced for outline and numbers, and the time");
     }
@@ -111,8 +111,9 @@ impl PupilView<'_> {
 
     /// The number of lines of this width that the shares of a pupil take.
     pub(super) fn lines(&self, ui: &Ui, pupil: &FieldPupil, width: f32) -> usize {
-        let PupilShape::Outlined(outline) = &pupil.shape else { return 1 };
-        let (mut lines, mut used) = (1, 0.0);
+        let wrapped = self.wrapped_lines(ui, pupil, width);
+        let PupilShape::Outlined(outline) = &pupil.shape else { return 1 + wrapped };
+        let (mut lines, mut used) = (1 + wrapped, 0.0);
         for (limit, share) in outline.limits_by_share() {
             let text = galley(ui, self.share(outline, limit, share), &TextStyle::Small);
             let long = MARK + text.size().x;
@@ -122,6 +123,19 @@ impl PupilView<'_> {
             used += long + GAP;
         }
         lines
+    }
+
+    /// The lines that area, share and rays of a pupil take beyond one each.
+    fn wrapped_lines(&self, ui: &Ui, pupil: &FieldPupil, width: f32) -> usize {
+        let area = pupil.extent.as_ref().map(|light| area_text(light.area));
+        let share = self.pupils.axis.and_then(|axis| pupil.share_of(axis)).map(share_text);
+        let texts = area.into_iter().chain(share).chain([cost_text(pupil.rays, 999.99)]);
+        let font = TextStyle::Small.resolve(ui.style());
+        let rows = |text: String| {
+            let color = ui.visuals().text_color();
+            ui.painter().layout(text, font.clone(), color, width).rows.len()
+        };
+        texts.map(|text| rows(text).saturating_sub(1)).sum()
     }
 
     /// One limit with its share, as short as can be.
@@ -260,6 +274,11 @@ fn paint_marked(ui: &Ui, rect: Rect, color: Color32, words: Arc<Galley>) {
 
 fn pieces_text(pieces: usize) -> String {
     if pieces == 1 { "edge not followed".to_owned() } else { format!("{pieces} pieces") }
+}
+
+/// The rays of a pupil and their time.
+fn cost_text(rays: usize, ms: f64) -> String {
+    format!("{}, {ms:.2} ms", counted(rays as u64, "ray"))
 }
 
 /// An area with its relative error, in m² where mm² would be too many.

@@ -138,15 +138,19 @@ pub(super) fn progress(ui: &mut Ui, search: ShownSearch<'_>) {
     violations(ui, run);
 }
 
-/// The live controls: the temperature, the chain that is previewed, and the order of the cards.
+/// The live controls: the temperature where there is room, the chain that is previewed, and the
+/// order of the cards.
 pub(super) fn live_controls(
     ui: &mut Ui,
     search: ShownSearch<'_>,
+    is_roomy: bool,
     order: &mut CardOrder,
     actions: &mut Actions,
 ) {
     ui.horizontal_wrapped(|ui| {
-        temperature(ui, search, actions);
+        if is_roomy {
+            temperature(ui, search, actions);
+        }
         preview_choice(ui, search, actions);
         let hint = "Give the search the window: the lens of a chain large, the retained lenses \
                     beside it";
@@ -171,7 +175,7 @@ fn order_choice(ui: &mut Ui, order: &mut CardOrder) {
     combo.response.accessible_name("Order of the lenses");
 }
 
-fn temperature(ui: &mut Ui, search: ShownSearch<'_>, actions: &mut Actions) {
+pub(super) fn temperature(ui: &mut Ui, search: ShownSearch<'_>, actions: &mut Actions) {
     let ShownSearch { view, run } = search;
     ui.weak("Temperature").on_hover_text(
         "The merit at which the density of a lens is 1/e. At a higher temperature, descents from \

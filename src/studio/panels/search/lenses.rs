@@ -15,8 +15,10 @@ use crate::studio::file_dialog::FileRequest;
 use crate::studio::panels::widgets::{ActionButton, action_buttons};
 use crate::studio::thumbnails::Thumbnails;
 
-/// The smallest card.
+/// The least width and the height of a card.
 const CARD: Vec2 = vec2(148.0, 112.0);
+/// The least height of a card.
+const MIN_HEIGHT: f32 = 84.0;
 /// The part of a card for its words.
 const WORDS: f32 = 30.0;
 
@@ -84,7 +86,9 @@ pub(super) fn cards(
     let width = ui.available_width();
     let gap = 4.0;
     let columns = ((width + gap) / (CARD.x + gap)).floor().max(1.0);
-    let size = vec2((width - gap * (columns - 1.0)) / columns, CARD.y);
+    // A row of cards is visible whole where that is possible.
+    let height = (ui.available_height() - gap).clamp(MIN_HEIGHT, CARD.y);
+    let size = vec2((width - gap * (columns - 1.0)) / columns, height);
     let mut clicked = None;
     ui.spacing_mut().item_spacing = vec2(gap, gap);
     #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a small number")]

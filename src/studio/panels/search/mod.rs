@@ -38,6 +38,8 @@ const INTRODUCTION: &str = "Which lens of another structure is better? Chains de
 
 /// The height of the bar of the selected lens: buttons and two lines.
 const SELECTION_HEIGHT: f32 = 62.0;
+/// Its height while nothing is selected.
+const HINT_HEIGHT: f32 = 24.0;
 /// With less height than this, the bar is above the page and scrolls with it.
 const MIN_HEIGHT: f32 = 240.0;
 
@@ -47,17 +49,20 @@ enum SearchPage {
     /// The settings of the next search.
     #[default]
     Setup,
-    /// The merit history, and the retained lenses.
+    /// The retained lenses, below the merit history where there is room for both.
     Lenses,
+    /// The merit history alone.
+    Curves,
     /// The outcome of each kind of mutation.
     Moves,
     /// The ancestors of a lens.
     Family,
 }
 
-const PAGES: [(SearchPage, &str, &str); 4] = [
+const PAGES: [(SearchPage, &str, &str); 5] = [
     (SearchPage::Setup, "Setup", "Settings of the next search"),
-    (SearchPage::Lenses, "Lenses", "Merit history and retained lenses"),
+    (SearchPage::Lenses, "Lenses", "Retained lenses"),
+    (SearchPage::Curves, "Curves", "Merit and number of elements against iterations"),
     (SearchPage::Moves, "Statistics", "Attempts and outcomes of each kind of mutation"),
     (SearchPage::Family, "Family", "Ancestors of a lens, mutation by mutation"),
 ];
@@ -125,13 +130,15 @@ impl Panel for SearchPanel {
             ui.weak("Preparing…");
         }
         self.pages(ui, search.is_some());
-        if let (SearchPage::Lenses | SearchPage::Family, Some(search)) = (self.page, search) {
+        let chooses = !matches!(self.page, SearchPage::Setup | SearchPage::Moves);
+        if let Some(search) = search.filter(|_| chooses) {
             self.selection_bar(ui, search, actions);
         }
         let scroll = ScrollArea::vertical().id_salt(self.page as u8).auto_shrink([false, false]);
         scroll.show(ui, |ui| match (self.page, search) {
             (SearchPage::Setup, _) | (_, None) => self.setup_page(ui, view),
             (SearchPage::Lenses, Some(search)) => self.lenses_page(ui, search, actions),
+            (SearchPage::Curves, Some(search)) => self.curves_page(ui, search, actions),
             (SearchPage::Moves, Some(search)) => moves::table(ui, search, actions),
             (SearchPage::Family, Some(search)) => self.family_page(ui, search, actions),
         });
@@ -178,17 +185,25 @@ impl SearchPanel {
         self.setup.ui(ui, view);
     }
 
-    /// The merit history and the retained lenses.
+    /// The retained lenses, and the merit history where it leaves room for them.
     fn lenses_page(&mut self, ui: &mut Ui, search: ShownSearch<'_>, actions: &mut Actions) {
-        controls::live_controls(ui, search, &mut self.order, actions);
+        let is_roomy = plot::has_room(ui);
+        controls::live_controls(ui, search, is_roomy, &mut self.order, actions);
         let chosen = self.selected_number();
-        let marked = plot::plots(ui, search, chosen);
+        let marked = if is_roomy { plot::plots(ui, search, chosen) } else { None };
         let chosen = self.selected.as_ref();
         let card = lenses::cards(ui, search, chosen, self.order, &mut self.thumbnails);
         match card {
             Some(found) => self.select(search.view, found.number, &found.lens, actions),
             None => self.select_number(search.view, marked, actions),
         }
+    }
+
+    /// The merit history alone.
+    fn curves_page(&mut self, ui: &mut Ui, search: ShownSearch<'_>, actions: &mut Actions) {
+        ui.horizontal(|ui| controls::temperature(ui, search, actions));
+        let marked = plot::large_plots(ui, search, self.selected_number());
+        self.select_number(search.view, marked, actions);
     }
 
     /// The line of the lens that was clicked, or of the best one.
@@ -236,7 +251,8 @@ impl SearchPanel {
         }
         let frame = Frame::new().inner_margin(Margin { top: 4, ..Margin::ZERO });
         let side = Side::bottom("chosen lens of the search").frame(frame);
-        let side = side.show_separator_line(false).exact_size(SELECTION_HEIGHT);
+        let height = if self.selected.is_some() { SELECTION_HEIGHT } else { HINT_HEIGHT };
+        let side = side.show_separator_line(false).exact_size(height);
         side.show(ui, |ui| self.selection(ui, search, actions));
     }
 

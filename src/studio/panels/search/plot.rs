@@ -6,30 +6,51 @@ use egui_plot::{Line, LineStyle, Plot, PlotPoint, PlotPoints, PlotResponse, Plot
 
 use super::{ShownSearch, moves, text};
 use crate::session::{DescentMark, HistorySample, StructureSearchSnapshot};
-use crate::studio::panels::decade_name;
-use crate::studio::panels::widgets::fixed_plot;
+use crate::studio::panels::widgets::{fixed_plot, log_axis};
 
 /// The distance in points within which the pointer picks a mark.
 const NEAR: f32 = 10.0;
-/// The height of the plot of elements.
-const STRIP: f32 = 44.0;
-/// The height of a page that has room for the plot of elements and for the legend.
-const ROOMY: f32 = 250.0;
+/// The height of the plot of elements, with the title of its axis.
+const STRIP: f32 = 68.0;
+/// The height of the legend.
+const LEGEND: f32 = 22.0;
+/// The height of a page that has room for the curves and the retained lenses.
+const ROOMY: f32 = 340.0;
 /// The room for the numbers at the left.
 const AXIS: f32 = 40.0;
 
-/// Shows both; the generation of the mark that was clicked, if one was.
+/// True if a page has room for the curves above the retained lenses.
+pub(super) fn has_room(ui: &Ui) -> bool {
+    ui.available_height() > ROOMY
+}
+
+/// Shows both above other things; the generation of the mark that was clicked, if one was.
 pub(super) fn plots(ui: &mut Ui, search: ShownSearch<'_>, chosen: Option<u64>) -> Option<u64> {
+    let height = (0.3 * ui.available_height()).clamp(80.0, 260.0);
+    plots_with(ui, search, chosen, height)
+}
+
+/// The same on a page of their own.
+pub(super) fn large_plots(
+    ui: &mut Ui,
+    search: ShownSearch<'_>,
+    chosen: Option<u64>,
+) -> Option<u64> {
+    let height = (ui.available_height() - STRIP - LEGEND - 12.0).clamp(80.0, 600.0);
+    plots_with(ui, search, chosen, height)
+}
+
+fn plots_with(
+    ui: &mut Ui,
+    search: ShownSearch<'_>,
+    chosen: Option<u64>,
+    height: f32,
+) -> Option<u64> {
     let ShownSearch { view, run } = search;
     let chain = view.structure_search.previewed_chain.unwrap_or(0);
-    let height = (0.3 * ui.available_height()).clamp(80.0, 260.0);
-    // With little room, the retained lenses come first.
-    let is_roomy = ui.available_height() > ROOMY;
     let clicked = merit_plot(ui, run, chain, chosen, height);
-    if is_roomy {
-        elements_plot(ui, run, chain);
-        legend(ui, run);
-    }
+    elements_plot(ui, run, chain);
+    legend(ui, run);
     clicked
 }
 
@@ -53,11 +74,9 @@ fn merit_plot(
     chosen: Option<u64>,
     height: f32,
 ) -> Option<u64> {
-    let plot = plot("merit of the search", height)
+    let plot = log_axis(plot("merit of the search", height), "merit")
         .show_axes([false, true])
-        .grid_color(ui.visuals().widgets.noninteractive.bg_stroke.color)
-        .grid_spacing(16.0..=110.0)
-        .y_axis_formatter(|mark, _| decade_name(mark.value));
+        .grid_color(ui.visuals().widgets.noninteractive.bg_stroke.color);
     let visuals = ui.visuals().clone();
     let shown = plot.show(ui, |plot| {
         let faint = visuals.weak_text_color().gamma_multiply(0.4);
@@ -180,6 +199,8 @@ fn elements_plot(ui: &mut Ui, run: &StructureSearchSnapshot, chain: usize) {
         .grid_color(grid)
         .y_grid_spacer(egui_plot::uniform_grid_spacer(|_| [1.0, 1.0, 1.0]))
         .grid_spacing(9.0..=60.0)
+        .x_axis_label("iteration")
+        .y_axis_label("elements")
         .y_axis_formatter(|mark, _| format!("{:.0}", mark.value));
     let shown = plot.show(ui, |plot| {
         if low <= high {

@@ -10,6 +10,7 @@ use crate::lens::{Lens, Medium};
 use crate::search::element::piece_count;
 use crate::search::{MutationKind, SearchMethod, SearchRules, SearchSettings};
 use crate::session::{SessionView, StructureSearchRequest};
+use crate::studio::text::counted;
 
 /// The settings of the panel.
 #[derive(Debug)]
@@ -270,8 +271,9 @@ fn variables_choice(ui: &mut Ui, lens: &Lens, free: &mut bool) {
             .to_owned()
     } else {
         format!(
-            "Variables: structure, semi-diameters, the {count} variables of the design and all \
-             new elements; other curvatures and gaps are fixed."
+            "Variables: structure, semi-diameters, the {} of the design and all new elements; \
+             other curvatures and gaps are fixed.",
+            counted(count as u64, "variable")
         )
     };
     ui.add(Label::new(RichText::new(text).small().weak()).wrap());

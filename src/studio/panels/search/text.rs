@@ -136,9 +136,9 @@ fn scored_design(scored: &ScoredLens) -> Option<&ParetoPoint> {
 }
 
 fn change_text(name: &str, old: f64, new: f64, unit: &str) -> String {
-    let percent = number::format_digits(100.0 * (new / old - 1.0), 3);
-    let sign = if new > old { "+" } else { "" };
-    format!("{name} {} to {} {unit} ({sign}{percent} %)", short(old), short(new))
+    let change = number::short_change(old, new);
+    let change = change.map(|change| format!(" ({change})")).unwrap_or_default();
+    format!("{name} {} to {} {unit}{change}", short(old), short(new))
 }
 
 /// The mutation with which a generation began.

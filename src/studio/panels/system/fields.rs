@@ -14,8 +14,12 @@ const KINDS: [(FieldKind, &str, &str); 3] = [
     (FieldKind::ObjectHeight, "Object height", "mm"),
     (FieldKind::ImageHeight, "Paraxial image height", "mm"),
 ];
-/// The name of a number of a field, its value, and what sets it.
-type FieldColumn = (&'static str, f64, fn(&mut FieldPoint, f64));
+/// The name of a number of a field, its value and width, and what sets it.
+type FieldColumn = (&'static str, (f64, f32), fn(&mut FieldPoint, f64));
+/// The width of a coordinate of seven digits with its sign, in points.
+const NUMBER: f32 = 78.0;
+/// The width of a weight, in points.
+const WEIGHT: f32 = 48.0;
 
 /// The number of field points that can be made at once.
 const MAX_STEPS: usize = 20;
@@ -108,14 +112,14 @@ fn table(ui: &mut Ui, form: &mut EditForm<'_>) {
         ui.end_row();
         for (i, field) in fields.values.iter().enumerate() {
             let numbers: [FieldColumn; 3] = [
-                ("x", field.x, |field, value| field.x = value),
-                ("y", field.y, |field, value| field.y = value),
-                ("weight", field.weight, |field, value| field.weight = value),
+                ("x", (field.x, NUMBER), |field, value| field.x = value),
+                ("y", (field.y, NUMBER), |field, value| field.y = value),
+                ("weight", (field.weight, WEIGHT), |field, value| field.weight = value),
             ];
             ui.weak((i + 1).to_string());
             for (what, value, set) in numbers {
                 let name = format!("Field {} {what}", i + 1);
-                form.number(ui, &name, (value, 58.0), |value| {
+                form.number(ui, &name, value, |value| {
                     let mut changed = fields.clone();
                     set(&mut changed.values[i], value);
                     Edit::SetFields(changed)

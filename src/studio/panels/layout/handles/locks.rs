@@ -5,8 +5,9 @@ use egui::{Align, Layout, Ui};
 use super::paint::{is_merit_current, merit_text};
 use crate::lens::Object;
 use crate::paraxial::{DragSettings, FirstOrderLock, FreeNumbers};
-use crate::session::{Command, SessionView};
+use crate::session::{Command, MeritReport, SessionView};
 use crate::studio::actions::Actions;
+use crate::studio::number;
 
 /// Shows what can be held, and changes it.
 pub(in crate::studio::panels::layout) fn locks_row(
@@ -70,8 +71,34 @@ fn free_numbers(ui: &mut Ui, settings: &mut DragSettings) {
     }
 }
 
-/// The merit of the design, from which the arrows at the handles come.
+/// The merit of the lens that is drawn.
 fn merit(ui: &mut Ui, view: &SessionView) {
+    match &view.candidate {
+        Some(candidate) if candidate.shown => candidate_merit(ui, view),
+        _ => design_merit(ui, view),
+    }
+}
+
+/// The merit of the candidate beside that of the design.
+fn candidate_merit(ui: &mut Ui, view: &SessionView) {
+    let design = view.merit.as_deref().and_then(|report| total(report).ok());
+    let design = design.map(|merit| format!(", design {merit}")).unwrap_or_default();
+    match view.preview_merit.as_deref().map(total) {
+        None => ui.weak(format!("merit …{design}")),
+        Some(Ok(merit)) => ui
+            .weak(format!("merit {merit}{design}"))
+            .on_hover_text("The candidate and the design by the merit function of the design"),
+        Some(Err(why)) => ui.weak(format!("no merit{design}")).on_hover_text(why),
+    };
+}
+
+/// A merit, or the reason why there is none.
+fn total(report: &MeritReport) -> Result<String, &String> {
+    report.values.as_ref().map(|values| number::format_digits(values.total, 4))
+}
+
+/// The merit of the design, from which the arrows at the handles come.
+fn design_merit(ui: &mut Ui, view: &SessionView) {
     let Some(slopes) = &view.drag.slopes else { return };
     match &slopes.result {
         Ok(_) if !is_merit_current(view) => ui.weak("merit …"),
