@@ -84,6 +84,21 @@ pub(super) struct PictureArgs {
     #[arg(long, default_value_t = 0, value_name = "SEED")]
     seed: u32,
 
+    #[command(flatten)]
+    exposed: SensorArgs,
+
+    /// The tone curve: srgb, or the G of light to the power 1/G, 1 for numbers that are linear in light
+    #[arg(long, default_value = "srgb", value_name = "CURVE", value_parser = parse_tone_curve)]
+    gamma: ToneCurve,
+
+    /// The zoom position, counted from 0
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    zoom: usize,
+}
+
+/// The sensor that a picture falls on.
+#[derive(Debug, clap::Args)]
+struct SensorArgs {
     /// Shows the numbers of a sensor with its noise: canon-7d, phone or industrial
     #[arg(long, value_name = "NAME")]
     sensor: Option<String>,
@@ -92,10 +107,6 @@ pub(super) struct PictureArgs {
     #[arg(long, requires = "sensor")]
     bayer: bool,
 
-    /// The tone curve: srgb, or the G of light to the power 1/G, 1 for numbers that are linear in light
-    #[arg(long, default_value = "srgb", value_name = "CURVE", value_parser = parse_tone_curve)]
-    gamma: ToneCurve,
-
     /// The exposure time in seconds; absent: until white fills 80 % of the range of the sensor
     #[arg(long, value_name = "S", requires = "sensor")]
     seconds: Option<f64>,
@@ -103,10 +114,6 @@ pub(super) struct PictureArgs {
     /// The luminance of white in the scene in cd/m2; absent: 100, and 1 for still-life
     #[arg(long, value_name = "CD")]
     luminance: Option<f64>,
-
-    /// The zoom position, counted from 0
-    #[arg(long, value_name = "N", default_value_t = 0)]
-    zoom: usize,
 }
 
 /// The numbers of columns and rows.
@@ -252,14 +259,14 @@ impl PictureArgs {
     /// The sensor, and a check of the numbers that belong to it.
     fn sensor_preset(&self) -> Result<Option<&'static SensorPreset>, CliError> {
         let is_positive = |v: &f64| *v > 0.0 && v.is_finite();
-        if let Some(wrong) = self.luminance.filter(|v| !is_positive(v)) {
+        if let Some(wrong) = self.exposed.luminance.filter(|v| !is_positive(v)) {
             let text = format!("--luminance: found {wrong}; expected a positive number of cd/m2");
             return Err(CliError::Input(text));
         }
-        if let Some(wrong) = self.seconds.filter(|v| !(*v >= 0.0 && v.is_finite())) {
+        if let Some(wrong) = self.exposed.seconds.filter(|v| !(*v >= 0.0 && v.is_finite())) {
             return Err(CliError::Input(format!("--seconds: found {wrong}; expected 0 or more")));
         }
-        let Some(name) = &self.sensor else { return Ok(None) };
+        let Some(name) = &self.exposed.sensor else { return Ok(None) };
         let Some(preset) = SensorPreset::find(name) else {
             let names = SensorPreset::ALL.map(|preset| preset.name).join(", ");
             let text = format!("--sensor: no sensor `{name}`; expected one of {names}");
@@ -271,12 +278,13 @@ impl PictureArgs {
     /// The picture as a sensor sees it.
     fn expose(&self, preset: &'static SensorPreset, picture: &Picture) -> (Picture, SensorReport) {
         let of_scene = if self.built_in() == Some(BuiltInScene::StillLife) { 1.0 } else { 100.0 };
-        let luminance = self.luminance.unwrap_or(of_scene);
+        let luminance = self.exposed.luminance.unwrap_or(of_scene);
         let sensor = &preset.model;
-        let seconds = self.seconds.unwrap_or_else(|| sensor.normal_exposure(picture, luminance));
+        let seconds =
+            self.exposed.seconds.unwrap_or_else(|| sensor.normal_exposure(picture, luminance));
         let exposure = Exposure { luminance, seconds, seed: u64::from(self.seed) };
         let mut image = sensor.expose(picture, &exposure);
-        if self.bayer {
+        if self.exposed.bayer {
             image = image.through_filters(picture.frame.pixels[0]);
         }
         let photons = |level: f64| {
@@ -287,7 +295,7 @@ impl PictureArgs {
             name: preset.name,
             source: preset.source,
             model: *sensor,
-            bayer: self.bayer,
+            bayer: self.exposed.bayer,
             luminance,
             seconds,
             white_photons: photons(1.0),

@@ -27,7 +27,7 @@ pub(super) fn candidate_bar(ui: &mut Ui, view: &SessionView, actions: &mut Actio
             buttons(ui, candidate, actions);
             // The text takes what the buttons leave.
             ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
-                describe(ui, view, candidate)
+                describe(ui, view, candidate);
             });
         }
     });

@@ -106,7 +106,9 @@ impl TextLines for GridJson {
             let numbers = field.iter().chain(ideal).map(|v| Some(*v));
             let real = [0, 1].map(|k| real.map(|real| real[k]));
             let cell = |v: Option<f64>| v.map_or("-".to_owned(), |v| ShortNumber(v).to_string());
-            lines.push(numbers.chain(real).map(|v| format!("{:>11}", cell(v))).collect());
+            let cells: Vec<String> =
+                numbers.chain(real).map(|v| format!("{:>11}", cell(v))).collect();
+            lines.push(cells.concat());
         }
         lines
     }

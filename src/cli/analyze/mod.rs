@@ -202,12 +202,10 @@ impl AnalysisKind {
 
     /// True for curves, which can be drawn.
     fn has_curves(self) -> bool {
-        match self {
-            Self::Fan | Self::OpdFan | Self::Longitudinal | Self::ThroughFocus => true,
-            Self::Mtf | Self::ThroughFocusMtf | Self::EncircledEnergy => true,
-            Self::DistortionGrid => true,
-            _ => false,
-        }
+        let by_rays =
+            matches!(self, Self::Fan | Self::OpdFan | Self::Longitudinal | Self::ThroughFocus);
+        let by_light = matches!(self, Self::Mtf | Self::ThroughFocusMtf | Self::EncircledEnergy);
+        by_rays || by_light || self == Self::DistortionGrid
     }
 
     /// The purpose that effects are planned for.
@@ -222,8 +220,11 @@ impl AnalysisKind {
     /// The report of the effects: a shift of rays bounds the errors of some analyses only.
     fn effect_report(self, plan: EffectPlan) -> EffectReport {
         match self {
-            Self::Spot | Self::ThroughFocus => EffectReport::counted(plan),
-            Self::Fan | Self::Distortion | Self::DistortionGrid => EffectReport::counted(plan),
+            Self::Spot
+            | Self::ThroughFocus
+            | Self::Fan
+            | Self::Distortion
+            | Self::DistortionGrid => EffectReport::counted(plan),
             _ => EffectReport::uncounted(plan.decisions),
         }
     }
