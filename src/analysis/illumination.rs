@@ -162,13 +162,17 @@ const FIELD_STEP: f64 = 0.01;
 /// that its brightness varies within a spot.
 ///
 /// # Errors
-/// No light arrives from the field or its neighbours, or the lens has no image of it.
+/// No light arrives from the field or its neighbours, the lens has no image of it, or the lens is not
+/// symmetric about its axis: an element of its field is no annulus.
 pub fn energy_irradiance(
     model: &RayModel,
     field: FieldPoint,
     wavelength: usize,
     accuracy: Accuracy,
 ) -> Result<Estimate, AnalysisError> {
+    if !model.channels[wavelength].system.is_round() {
+        return Err(AnalysisError::NotSymmetric);
+    }
     let element = FieldElement { model, field, wavelength, accuracy };
     let region = lit_region(model, field, wavelength)?;
     let accepted = element.acceptance(&region)?;

@@ -121,6 +121,15 @@ pub enum AnalysisError {
     /// The edge of the pupil is not known, or it cannot be divided into parts about one point each.
     #[error("the pupil is irregular: diffraction needs an edge that is known and star-shaped")]
     IrregularPupil,
+    /// The lens is not symmetric about an axis.
+    #[error("the lens is not symmetric about its axis, as this number needs")]
+    NotSymmetric,
+    /// A paraxial lens meets light that is no plane wave.
+    #[error(
+        "the optical path through a paraxial lens is known for a plane wave alone; expected an object at \
+         infinity, and one paraxial lens without power in front of it"
+    )]
+    IdealPath,
 }
 
 /// The pupil of a field at a wavelength, if rays get through.

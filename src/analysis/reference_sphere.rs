@@ -9,6 +9,7 @@
 //! pupil at infinity they are those of the ray, and the path is `−a`.
 
 use super::AnalysisError;
+use crate::lens::{IdealAction, Object, Shape, Surface};
 use crate::math::{Real, Vec3};
 use crate::pupil::{Launch, Region};
 use crate::trace::{Ray, TraceSink as _};
@@ -97,6 +98,21 @@ pub(super) struct SphereRay<R> {
     pub(super) cosines: [R; 2],
 }
 
+/// Refuses a lens through which the optical paths are not known.
+pub(super) fn check_paths(launch: &Launch<'_>) -> Result<(), AnalysisError> {
+    let surfaces = &launch.channel().system.surfaces;
+    let is_lens = |s: &Surface<f64>| matches!(s.ideal, Some(IdealAction::Lens { .. }));
+    let Some(first) = surfaces.iter().position(is_lens) else { return Ok(()) };
+    let is_plane = |s: &Surface<f64>| {
+        let is_flat = s.curvature() == 0.0 && !matches!(s.shape, Shape::Asphere { .. });
+        is_flat && s.freeform.is_none() && s.grin.is_none() && s.ideal.is_none()
+    };
+    let (before, behind) = (&surfaces[..first], &surfaces[first + 1..]);
+    let is_collimated = launch.model.beam.object == Object::Infinity;
+    let is_known = is_collimated && before.iter().all(is_plane) && !behind.iter().any(is_lens);
+    if is_known { Ok(()) } else { Err(AnalysisError::IdealPath) }
+}
+
 /// A sphere closer to the image than this many errors of its rays is replaced.
 const CLEAR_OF_RAYS: f64 = 4.0;
 /// The radius of the sphere in its place, in focal lengths.
@@ -111,6 +127,7 @@ impl ReferenceSphere {
     /// The sphere of a pupil: about the image point of the chief ray, or of the ray at the centroid
     /// of the pupil if the chief ray is lost; away from the image if the exit pupil lies there.
     pub(super) fn for_region(region: &Region<'_>) -> Result<Self, AnalysisError> {
+        check_paths(&region.launch)?;
         let nodes = region.nodes(1.min(region.orders().saturating_sub(1)));
         let (launched, landed) = region.launch.trace_points(&nodes.points);
         let lit: Vec<usize> =

@@ -4,7 +4,7 @@
 //! first vertex, to the [reference sphere](super::ReferenceForm). An undercorrected lens has
 //! positive differences.
 
-use super::reference_sphere::{ReferenceForm, ReferenceSphere};
+use super::reference_sphere::{ReferenceForm, ReferenceSphere, check_paths};
 use super::{AnalysisError, Estimate, lit_region, rms_without_tilt};
 use crate::lens::FieldPoint;
 use crate::math::Vec3;
@@ -93,6 +93,7 @@ pub fn path_differences(
     points: &[[f64; 2]],
 ) -> Result<Vec<Result<f64, PathError>>, AnalysisError> {
     let launch = model.launch(field, wavelength).map_err(AnalysisError::NoRays)?;
+    check_paths(&launch)?;
     let sphere = ReferenceSphere::new(&launch).ok_or(AnalysisError::NoChief)?;
     let at = |p: &[f64; 2]| {
         let ray = launch.ray(*p).ok_or(PathError::NoRay)?;

@@ -195,7 +195,11 @@ fn fields(
     let point = |field: &Value| {
         let field = attributes(field);
         let weight = field["wt"].as_f64().unwrap_or(1.0);
-        FieldPoint { x: number(&field["x"]) * scale, y: number(&field["y"]) * scale, weight }
+        let [x, y] = ["x", "y"].map(|key| number(&field[key]) * scale);
+        match kind {
+            FieldKind::Angle => FieldPoint::from_projected_angles([x, y], weight),
+            FieldKind::ObjectHeight | FieldKind::ImageHeight => FieldPoint { x, y, weight },
+        }
     };
     let values: Vec<FieldPoint> =
         view["fields"].as_array().into_iter().flatten().map(point).collect();

@@ -148,6 +148,31 @@ pub struct FieldPoint {
     pub weight: f64,
 }
 
+impl FieldPoint {
+    /// The field of angles in degrees in the planes of x and y, as other programs state them: their
+    /// tangents are the slopes of its direction. Angles of 90 degrees and more are taken as they are.
+    pub fn from_projected_angles([x, y]: [f64; 2], weight: f64) -> Self {
+        let is_skew = x != 0.0 && y != 0.0 && x.abs() < 90.0 && y.abs() < 90.0;
+        if !is_skew {
+            return Self { x, y, weight };
+        }
+        let [across, along] = [x, y].map(|angle| angle.to_radians().tan());
+        let slope = across.hypot(along);
+        let scale = slope.atan().to_degrees() / slope;
+        Self { x: scale * across, y: scale * along, weight }
+    }
+
+    /// The angles in degrees in the planes of x and y of a field that is an angle.
+    pub fn projected_angles(&self) -> [f64; 2] {
+        let size = self.x.hypot(self.y);
+        if self.x == 0.0 || self.y == 0.0 || size >= 90.0 {
+            return [self.x, self.y];
+        }
+        let scale = size.to_radians().tan() / size;
+        [self.x, self.y].map(|part| (scale * part).atan().to_degrees())
+    }
+}
+
 /// The field points of a lens.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -156,6 +181,18 @@ pub struct Fields {
     pub kind: FieldKind,
     /// The points in the order in which they are displayed.
     pub values: Vec<FieldPoint>,
+}
+
+impl Fields {
+    /// The points in x and y as other programs state them: angles as
+    /// [`FieldPoint::projected_angles`], heights as they are.
+    pub fn projected_points(&self) -> Vec<[f64; 2]> {
+        let point = |field: &FieldPoint| match self.kind {
+            FieldKind::Angle => field.projected_angles(),
+            FieldKind::ObjectHeight | FieldKind::ImageHeight => [field.x, field.y],
+        };
+        self.values.iter().map(point).collect()
+    }
 }
 
 /// One wavelength.

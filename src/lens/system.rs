@@ -352,6 +352,14 @@ impl<R: Real> System<R> {
         self.surfaces.iter().any(Surface::is_mounted)
     }
 
+    /// True if every surface is symmetric about one axis.
+    pub fn is_round(&self) -> bool {
+        self.surfaces.iter().all(|surface| {
+            let is_grating = matches!(surface.ideal, Some(IdealAction::Grating { .. }));
+            !surface.is_mounted() && surface.freeform.is_none() && !is_grating
+        })
+    }
+
     /// True if the axis is broken at any surface.
     pub fn has_broken_axis(&self) -> bool {
         self.surfaces.iter().any(|surface| surface.axis.is_some())

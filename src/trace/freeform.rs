@@ -12,6 +12,13 @@ use crate::lens::{BaseSag, Freeform};
 use crate::math::{Arithmetic, Interval, Real, Vec3};
 use std::sync::Arc;
 
+/// The length in mm that stands for the size of a surface where neither it nor the ray has one: at the
+/// vertex.
+const LEAST_LENGTH: f64 = 1e-3;
+/// The square of the slope up to which a ray counts as parallel to the axis: over any lens it stays at its
+/// distance from it to rounding.
+const PARALLEL: f64 = 1e-34;
+
 /// A freeform with bounds of its sag.
 #[derive(Debug, Clone)]
 pub(super) struct FreeformFace<R> {
@@ -232,7 +239,8 @@ impl PartSearch<'_> {
         let at_vertex_plane = if k.z == 0.0 { 0.0 } else { (p.z / k.z).abs() * across };
         let lengths = self.face.form.kind.lengths().into_iter().fold(0.0, f64::max);
         let start = p.x.hypot(p.y) + at_vertex_plane;
-        4.0 * start.max(p.z.abs()).max(self.start.abs() * across).max(lengths)
+        let largest = start.max(p.z.abs()).max(self.start.abs() * across).max(lengths);
+        4.0 * largest.max(LEAST_LENGTH)
     }
 
     /// The first crossing behind the start of the ray, or else the last one in front of it, within
@@ -260,9 +268,9 @@ impl PartSearch<'_> {
         let (p, k) = (self.p, self.k);
         let (r2, square) = (p.x * p.x + p.y * p.y, k.x * k.x + k.y * k.y);
         let size = (p.x.abs() + p.y.abs() + p.z.abs()) / k.dot(k).sqrt();
-        if square == 0.0 {
+        if square <= PARALLEL * k.dot(k) {
             let s = (self.face.sag(p.x, p.y)[0] - p.z) / k.z;
-            let width = s.abs().max(size) * 1e-6;
+            let width = s.abs().max(size).max(LEAST_LENGTH) * 1e-6;
             return (r2 <= radius * radius && s.is_finite()).then_some([s - width, s + width]);
         }
         let slant = p.x * k.x + p.y * k.y;

@@ -487,6 +487,37 @@ fn wild_freeforms_end_in_a_fate() {
 }
 
 /// A ray beside a base that ends, and rays along the axis of a cone and of a cylinder.
+/// The vertex of these forms is on them: the ray along the axis arrives there, from afar and from the
+/// vertex itself, whatever the rim.
+#[test]
+fn the_ray_along_the_axis_meets_the_vertex() {
+    let at_vertex = [0, 1, 2, 3].map(|i| forms().swap_remove(i));
+    for form in at_vertex {
+        for semi_diameter in [f64::INFINITY, 100.0, 30.0, 5.0] {
+            let tracer = Tracer::new(&single(&form, semi_diameter)).unwrap();
+            let (far, near) = ([0.0, 0.0, -10.0], [0.0; 3]);
+            for (start, slopes) in [
+                (far, [0.0, 0.0]),
+                (far, [0.0, 1e-30]),
+                (far, [1e-18, 1e-18]),
+                (near, [0.0, 0.0]),
+                (near, [0.0, 0.3]),
+            ] {
+                let mut met = Vec::new();
+                let traced = tracer.visit(ray(start, slopes), |i, p| met.push((i, p)));
+                let place = format!("{:?} {semi_diameter} {start:?} {slopes:?}", form.1.kind);
+                assert!(traced.fate.is_imaged(), "{place}: {:?}", traced.fate);
+                let at: Vec3<f64> = met[0].1;
+                assert!(at.x.hypot(at.y).hypot(at.z) < 1e-12, "{place}: {at:?}");
+            }
+        }
+    }
+    for form in forms() {
+        let tracer = Tracer::new(&single(&form, f64::INFINITY)).unwrap();
+        assert!(tracer.trace(ray([0.0, 0.0, -10.0], [0.0; 2])).fate.is_imaged(), "{form:?}");
+    }
+}
+
 #[test]
 fn special_rays_have_known_ends() {
     let of = |curvature, kind, numbers: &[f64]| {

@@ -477,3 +477,25 @@ fn an_asphere_in_front_of_a_gradient_is_never_lost_in_silence() {
     }
     std::fs::remove_dir_all(folder).unwrap();
 }
+
+/// A skew field of 10 degrees in both planes: the tangents of both are the slopes of its direction.
+#[test]
+fn skew_angles_are_those_of_both_planes() {
+    let text = achromat();
+    let line = |word: &str| text.lines().find(|line| line.trim_start().starts_with(word)).unwrap();
+    let replaced = text.replacen(line("XFLN"), "XFLN 10 0 4", 1);
+    let replaced = replaced.replacen(line("YFLN"), "YFLN 10 3 0", 1);
+    let field = lens(&replaced).fields.values[0];
+    let slope = field.x.hypot(field.y).to_radians().tan() / 2f64.sqrt();
+    assert!((slope - 10f64.to_radians().tan()).abs() < 1e-15, "{field:?}");
+    assert!((field.x - field.y).abs() < 1e-15, "{field:?}");
+    let [x, y] = field.projected_angles();
+    assert!((x - 10.0).abs() < 1e-13 && (y - 10.0).abs() < 1e-13, "{x} {y}");
+    let read = lens(&replaced);
+    let (written, _) = files::zemax::write(&read).unwrap();
+    let again = lens(&written);
+    let pairs = read.fields.values.iter().zip(&again.fields.values);
+    for (a, b) in pairs {
+        assert!((a.x - b.x).abs() < 1e-13 && (a.y - b.y).abs() < 1e-13, "{a:?} {b:?}");
+    }
+}

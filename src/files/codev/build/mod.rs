@@ -114,10 +114,13 @@ fn fields(file: &CodeVFile) -> Fields {
     let scale = if kind == FieldKind::Angle { 1.0 } else { unit(file) };
     let count = file.fields_x.len().max(file.fields_y.len()).max(1);
     let at = |values: &[f64], i: usize, otherwise: f64| values.get(i).copied().unwrap_or(otherwise);
-    let point = |i| FieldPoint {
-        x: at(&file.fields_x, i, 0.0) * scale,
-        y: at(&file.fields_y, i, 0.0) * scale,
-        weight: at(&file.field_weights, i, 1.0),
+    let point = |i| {
+        let [x, y] = [&file.fields_x, &file.fields_y].map(|values| at(values, i, 0.0) * scale);
+        let weight = at(&file.field_weights, i, 1.0);
+        match kind {
+            FieldKind::Angle => FieldPoint::from_projected_angles([x, y], weight),
+            FieldKind::ObjectHeight | FieldKind::ImageHeight => FieldPoint { x, y, weight },
+        }
     };
     Fields { kind, values: (0..count).map(point).collect() }
 }

@@ -92,8 +92,11 @@ impl CodeVWriter {
         self.line(format!("WTW {}", numbers(waves.iter().map(|wave| wave.weight))));
         let fields = self.lens.fields.clone();
         let suffix = field_suffix(fields.kind);
-        self.line(format!("X{suffix} {}", numbers(fields.values.iter().map(|field| field.x))));
-        self.line(format!("Y{suffix} {}", numbers(fields.values.iter().map(|field| field.y))));
+        let points = fields.projected_points();
+        for (k, axis) in ["X", "Y"].into_iter().enumerate() {
+            let values = points.iter().map(|point| point[k]);
+            self.line(format!("{axis}{suffix} {}", numbers(values)));
+        }
         self.line(format!("WTF {}", numbers(fields.values.iter().map(|field| field.weight))));
         self.private_glasses();
     }

@@ -72,10 +72,13 @@ pub(super) fn fields(file: &ZemaxFile) -> Result<Fields, ParseError> {
     let at = |values: &[f64], i: usize, default: f64| values.get(i).copied().unwrap_or(default);
     let scale = if matches!(kind, 0 | 4) { 1.0 } else { file.unit };
     let values: Vec<FieldPoint> = (0..count)
-        .map(|i| FieldPoint {
-            x: at(&lines.x, i, 0.0) * scale,
-            y: at(&lines.y, i, 0.0) * scale,
-            weight: at(&lines.weights, i, 1.0),
+        .map(|i| {
+            let [x, y] = [&lines.x, &lines.y].map(|values| at(values, i, 0.0) * scale);
+            let weight = at(&lines.weights, i, 1.0);
+            match kind {
+                0 => FieldPoint::from_projected_angles([x, y], weight),
+                _ => FieldPoint { x, y, weight },
+            }
         })
         .collect();
     if kind == 4 && values.iter().any(|field| field.x != 0.0) {

@@ -87,8 +87,8 @@ impl ZemaxWriter {
         let padded = |values: Vec<f64>, padding: f64| {
             numbers(values.into_iter().chain(std::iter::repeat(padding)).take(slots))
         };
-        let x = padded(fields.values.iter().map(|field| field.x).collect(), 0.0);
-        let y = padded(fields.values.iter().map(|field| field.y).collect(), 0.0);
+        let points = fields.projected_points();
+        let [x, y] = [0, 1].map(|k| padded(points.iter().map(|point| point[k]).collect(), 0.0));
         let weights = padded(fields.values.iter().map(|field| field.weight).collect(), 1.0);
         for (keyword, values) in [("XFLN", x), ("YFLN", y), ("FWGN", weights)] {
             self.line(format!("{keyword} {values}"));
