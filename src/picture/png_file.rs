@@ -153,7 +153,7 @@ mod tests {
             let level = image::load_from_memory(&bytes).unwrap().into_rgb16().get_pixel(1, 0).0[1];
             assert!((f64::from(level) / 65535.0 - share).abs() < 1e-4, "{gamma}: {level}");
             let reader = png::Decoder::new(std::io::Cursor::new(&bytes)).read_info().unwrap();
-            let stored = reader.info().source_gamma.unwrap().into_value();
+            let stored = reader.info().gama_chunk.unwrap().into_value();
             assert!((f64::from(stored) - 1.0 / gamma).abs() < 1e-4, "{stored}");
         }
         assert!([0.0, -1.0, f64::NAN, 11.0].iter().all(|wrong| ToneCurve::power(*wrong).is_none()));
