@@ -37,8 +37,6 @@ pub(super) struct Dialogs {
     library: Option<LibraryWindow>,
     manual: ManualWindow,
     shows_shortcuts: bool,
-    /// True if a text had the cursor in the frame before: Escape takes it away before a frame begins.
-    was_typing: bool,
 }
 
 impl Dialogs {
@@ -59,7 +57,8 @@ impl Dialogs {
     /// Shows all dialogs that are open.
     pub(super) fn ui(&mut self, context: &Context, menus: &MenuContext<'_>, actions: &mut Actions) {
         // Escape in a text field leaves the field; the next one closes the dialogs.
-        let escapes = !self.was_typing && context.input(|input| input.key_pressed(Key::Escape));
+        let escapes = !context.egui_wants_keyboard_input()
+            && context.input(|input| input.key_pressed(Key::Escape));
         if self.new_lens.as_mut().is_some_and(|dialog| dialog.ui(context, actions)) {
             self.new_lens = None;
         }
@@ -79,7 +78,6 @@ impl Dialogs {
         if escapes {
             self.close_windows(actions);
         }
-        self.was_typing = context.egui_wants_keyboard_input();
     }
 
     /// Closes the dialogs that leave the rest of the window usable.
