@@ -276,6 +276,14 @@ fn rows(sheet: &ToleranceSheet, analysis: &ToleranceAnalysis) -> Vec<Sensitivity
 
 fn warnings(analysis: &ToleranceAnalysis) -> Vec<String> {
     let mut warnings = Vec::new();
+    let (lost, samples) = (analysis.lost, analysis.samples);
+    if 2 * lost > samples {
+        warnings.push(format!(
+            "{lost} of {samples} lenses lose rays: the means and quantiles are those of the others and say \
+             nothing of lenses with these tolerances"
+        ));
+        return warnings;
+    }
     for spot in analysis.spots.iter().filter(|spot| !spot.form_agrees) {
         let [apart, error] = spot.difference.map(|v| 100.0 * v / spot.form_mean_rms);
         warnings.push(format!(

@@ -59,7 +59,8 @@ pub struct AsBuiltSpot {
     /// The mean of the rms of the real lenses minus that of the form on the same errors, in mm, with
     /// its standard error.
     pub difference: [f64; 2],
-    /// True if that difference is within twice its error, or below half a per cent.
+    /// True if that difference is within twice its error, or below half a per cent, and most of the real
+    /// lenses have a spot to compare.
     pub form_agrees: bool,
     /// True if the change where rims clip is within twice its error, or below half a per cent.
     pub rims_agree: bool,
@@ -216,7 +217,7 @@ fn as_built(
         mean_rms: [corrected, difference[1].hypot(spread) + clipped],
         clipping,
         difference,
-        form_agrees: is_small(difference),
+        form_agrees: is_small(difference) && 2 * pairs.len() >= real.len(),
         rims_agree: clipping.is_none_or(is_small),
         quantiles: SHARES.map(|share| quantile(share, &many, &pairs)).to_vec(),
         distribution: (0..=STEPS)

@@ -292,13 +292,14 @@ fn a_rim_that_holds_back_light_far_from_the_beam_is_kept() {
     assert!((auto.value - on.value).abs() <= auto.error + on.error, "{auto:?} {on:?}");
 }
 
-/// Points spread evenly over the unit disc, and more just inside its edge.
+/// Points spread evenly over the unit disc, and more about its edge: the rim of a stop on a curved surface
+/// lies inside it on one side and outside on the other.
 fn disc_points() -> Vec<[f64; 2]> {
     let turn = std::f64::consts::PI * (3.0 - 5f64.sqrt());
     let spiral = (0..1200).map(|i| (((f64::from(i) + 0.5) / 1200.0).sqrt(), turn * f64::from(i)));
-    let around = |i: i32| 0.01 + std::f64::consts::TAU * f64::from(i) / 200.0;
-    let edges = [0.99, 0.997, 0.999, 0.99999];
-    let edges = edges.into_iter().flat_map(|r| (0..200).map(move |i| (r, around(i))));
+    let around = |i: i32| 0.01 + std::f64::consts::TAU * f64::from(i) / 120.0;
+    let edges = [0.99, 0.995, 0.998, 0.999, 0.99999, 1.001, 1.002, 1.003, 1.004, 1.01];
+    let edges = edges.into_iter().flat_map(|r| (0..120).map(move |i| (r, around(i))));
     spiral.chain(edges).map(|(r, angle)| [r * angle.sin(), r * angle.cos()]).collect()
 }
 

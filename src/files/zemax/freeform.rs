@@ -23,6 +23,8 @@ pub(super) fn surface_form(surface: &ZemaxSurface) -> Option<Result<ZemaxShape, 
         "PARAXIAL" | "DGRATING" => return Some(ideal(base, surface)),
         "BICONICX" => return Some(Ok(biconic(base, surface))),
         "TOROIDAL" => toroid(surface),
+        // Without terms it is its conic, whatever the unit.
+        "XPOLYNOM" if !(extra(surface, 1) >= 1.0) => return Some(Ok(base)),
         "XPOLYNOM" => polynomial(surface),
         "SZERNSAG" | "FZERNSAG" => return Some(zernike(&base, surface)),
         _ => return None,
@@ -134,7 +136,7 @@ fn zernike(base: &ZemaxShape, surface: &ZemaxSurface) -> Result<ZemaxShape, Stri
     trim(&mut asphere);
     let note = "the Zernike terms continue beyond their normalization radius here";
     let note = (parameter(surface, 0) == 0.0)
-        .then(|| (surface.kind.1, ConversionOutcome::Used, note.to_owned()));
+        .then(|| (surface.kind.1, ConversionOutcome::Approximated, note.to_owned()));
     Ok(ZemaxShape { asphere, freeform: Some(checked(kind, terms)?), note, ..*base })
 }
 

@@ -403,6 +403,9 @@ mod tests {
         assert_eq!(form.numbers, [0.1, 0.0, 0.0, -0.2]);
         s.extra[1].1 = 0.0;
         assert!(surface_shape(&s).unwrap_err().contains("normalization radius 0"));
+        s.extra[0].1 = 0.0;
+        let plain = surface_shape(&s).unwrap();
+        assert_eq!((plain.curvature, plain.conic, plain.freeform), (0.02, 0.5, None));
     }
 
     /// The term in r² of a Zernike sag is its focus with a piston, both orders.
@@ -422,7 +425,9 @@ mod tests {
                 assert!((apart - 3e-3 * (x * x + y * y)).abs() < 1e-16, "{kind}: {apart}");
             }
             s.parameters[0].1 = 0.0;
-            assert!(surface_shape(&s).unwrap().note.unwrap().2.contains("continue beyond"));
+            let note = surface_shape(&s).unwrap().note.unwrap();
+            assert_eq!(note.1, ConversionOutcome::Approximated);
+            assert!(note.2.contains("continue beyond"));
             s.parameters.push((9, 1.0, 10));
             assert!(surface_shape(&s).unwrap_err().contains("decentred Zernike"));
         }
