@@ -226,6 +226,13 @@ fn breaks(edges: &[Edge; 2]) -> Vec<f64> {
             found.push(crossing(&mut difference, [grid[i - 1], grid[i]], values[i]));
         }
     }
+    for i in (0..grid.len() - 1).filter(|i| values[*i] == 0.0) {
+        // A crossing at a place of the grid, as on the plane of symmetry; the first place is the last too.
+        let before = values[i.checked_sub(1).unwrap_or(grid.len() - 2)];
+        if before * values[i + 1] < 0.0 {
+            found.push(grid[i]);
+        }
+    }
     if found.is_empty() {
         // A smooth closed edge: four parts are enough for Gauss nodes.
         found.extend((0..4).map(|i| 0.25 * TAU * f64::from(i)));
@@ -336,4 +343,22 @@ fn frame(polygon: &[[f64; 2]], least: f64) -> Option<([f64; 2], [[f64; 2]; 2])> 
 fn inverse([[a, b], [c, d]]: [[f64; 2]; 2]) -> [[f64; 2]; 2] {
     let determinant = a * d - b * c;
     [[d / determinant, -c / determinant], [-b / determinant, a / determinant]]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two kites moved apart across their axis by a part of their half width: their edges cross on that axis,
+    /// and their common part is a smaller kite.
+    #[test]
+    fn edges_that_cross_on_the_plane_of_symmetry_divide_the_common_part() {
+        let kite = PupilCurve::polygon(&[[0.0, 0.1], [0.1, 0.03], [0.0, -0.1], [-0.1, 0.03]]);
+        for part in [0.1, 0.37, 0.8] {
+            let common = Overlap::new([&kite, &kite], [0.1 * part, 0.0]).unwrap().unwrap();
+            let area: f64 = common.nodes(5).iter().map(|node| node.weight).sum();
+            let exact = 0.02 * (1.0 - part) * (1.0 - part);
+            assert!((area / exact - 1.0).abs() < 1e-11, "{part}: {area} {exact}");
+        }
+    }
 }
