@@ -197,7 +197,7 @@ impl FreeformKind {
 
     /// True if a number changes its sign with that of the sag.
     pub fn has_sign(self, number: usize) -> bool {
-        !(self == Self::Biconic && number == 1) && !self.is_phase()
+        !(self.is_phase() || self == Self::Biconic && number == 1)
     }
 
     /// True if a number is a coefficient of a function that is the same at x and at −x.
