@@ -74,8 +74,8 @@ impl<R: Real> Mount<R> {
         if let Some(face) = &self.face {
             let met = face.intersect(surface, start, k);
             let arrived = PropagatedRay::met_at(surface, met, k);
-            let ideal = self.ideal.map(|action| Deflection::new(action, surface));
-            return ideal.map_or(arrived, |ideal| arrived.deflected_by(ideal));
+            let Some(action) = self.ideal else { return arrived };
+            return arrived.deflected_by(Deflection::new(action, &face.form, surface, met.point));
         }
         match self.astigmatism {
             None => PropagatedRay::straight(surface, start, k),
