@@ -83,6 +83,13 @@ pub fn distortion(
     Ok(Distortion { field, height, ideal, distortion: against(ideal), f_theta })
 }
 
+/// The image points of the chief rays of a field at all wavelengths, x and y in mm, without clipping;
+/// `None` where one does not reach the image.
+pub fn chief_points(model: &RayModel, field: FieldPoint) -> Vec<Option<[f64; 2]>> {
+    let point = |wavelength: usize| model.chief_point(field, wavelength).ok();
+    (0..model.channels.len()).map(point).collect()
+}
+
 /// A point of a square grid in the scene and in the image.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GridPoint {

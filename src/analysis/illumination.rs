@@ -10,11 +10,12 @@
 //! cosines (Rimmer, "Relative illumination calculations", Proc. SPIE 655, 1986): the irradiance only
 //! where the image is sharp, since rays of other fields arrive at the same point too.
 
-use super::seen_from_image::SeenFromImage;
+use super::seen_from_image::{BackwardLens, SeenFromImage};
 use super::{AnalysisError, Estimate, lit_region};
 use crate::lens::{FieldKind, FieldPoint};
+use crate::math::Vec3;
 use crate::pupil::{Accuracy, Nodes, RayModel, Region, converge};
-use crate::trace::TraceSink as _;
+use crate::trace::{Ray, TraceSink as _};
 use rayon::prelude::*;
 
 /// The light at a field.
@@ -150,6 +151,36 @@ pub fn irradiance(
         seen.index_ratio * found.errors[0],
         found.rays,
     ))
+}
+
+/// The irradiance at a point of the image, x and y in mm, of a scene: its radiance along a ray that leads
+/// away from the lens, in the frame of the first vertex.
+///
+/// # Errors
+/// No light arrives at the point.
+pub fn scene_irradiance(
+    model: &RayModel,
+    wavelength: usize,
+    point: [f64; 2],
+    radiance: impl Fn(&Ray<f64>) -> f64,
+    accuracy: Accuracy,
+) -> Result<Estimate, AnalysisError> {
+    let seen = SeenFromImage::new(model, wavelength, point)?;
+    let backward = BackwardLens::new(model, wavelength).map_err(|_error| AnalysisError::NoLight)?;
+    let region = lit_region(&seen.model, seen.model.fields[0], 0)?;
+    let of_ray = |landed: Ray<f64>, mirrored: bool| {
+        let ray = backward.scene_ray(landed);
+        let Ray { point: p, direction: d } = ray;
+        // A node of half a pupil stands for its mirror image, which sees another part of the scene.
+        let mirror =
+            || Ray { point: Vec3::new(-p.x, p.y, p.z), direction: Vec3::new(-d.x, d.y, d.z) };
+        if mirrored { 0.5 * (radiance(&ray) + radiance(&mirror())) } else { radiance(&ray) }
+    };
+    let numbers = |nodes: &Nodes| seen.light(&region, nodes, of_ray);
+    let found = converge(&region, accuracy, numbers, |light| *light);
+    let found = found.ok_or(AnalysisError::NoLight)?;
+    let [value, error] = [found.values[0], found.errors[0]].map(|v| seen.index_ratio * v);
+    Ok(Estimate::new(value, error, found.rays))
 }
 
 /// The step of the field in the energy of a field element, relative to the field, and in radians or

@@ -39,7 +39,8 @@ pub use diffraction::{
     polychromatic_diffraction_mtf, strehl, through_focus_mtf,
 };
 pub use distortion::{
-    Distortion, FieldCurvature, GridPoint, distortion, distortion_grid, field_curvature,
+    Distortion, FieldCurvature, GridPoint, chief_points, distortion, distortion_grid,
+    field_curvature,
 };
 pub use fan::{Fan, FanPoint, fan};
 pub use fitted_wavefront::{
@@ -48,10 +49,12 @@ pub use fitted_wavefront::{
 };
 pub use footprint::{Footprint, footprint};
 pub use ghosts::{
-    Ghost, GhostError, GhostPatch, GhostPath, GhostRanking, GhostRay, ParaxialGhost, ghosts,
-    rank_ghosts,
+    CoatedLens, Ghost, GhostError, GhostPatch, GhostPath, GhostRanking, GhostRay, ParaxialGhost,
+    PassedLight, ghosts, rank_ghosts,
 };
-pub use illumination::{Illumination, energy_irradiance, illumination, image_cone, irradiance};
+pub use illumination::{
+    Illumination, energy_irradiance, illumination, image_cone, irradiance, scene_irradiance,
+};
 pub use image_quality::{ImageQuality, field_qualities, field_quality, image_quality};
 pub use mtf::{
     MtfCurve, MtfPoint, TransferValue, geometric_mtf, perfect_contrast,
@@ -66,7 +69,10 @@ pub use semi_diameters::{
 };
 pub use spot::{MonochromaticSpot, Spot, airy_radius, rounding_error, spot, spots};
 pub use spot_points::{SpotPoints, spot_points};
-pub use wavefront::{PathError, Wavefront, path_differences, wavefront};
+pub use wavefront::{
+    ChiefPath, FieldPaths, PathDifference, PathError, Wavefront, field_paths, path_differences,
+    wavefront,
+};
 pub use zernike::{ZernikeIndex, ZernikeMethod, ZernikeOrder, ZernikeSum, zernike};
 
 use crate::lens::FieldPoint;

@@ -82,7 +82,8 @@ impl ReferenceForm {
 pub(super) struct ReferenceSphere {
     pub(super) center: Vec3<f64>,
     direction: Vec3<f64>,
-    path: f64,
+    /// The optical path of the chief ray to the image, in mm.
+    pub(super) path: f64,
     pub(super) form: ReferenceForm,
     index: f64,
     /// The wavelength, in mm.

@@ -67,17 +67,29 @@ impl SeenFromImage {
 
     /// The area in cosines against the tangent plane; `None` if no ray gets through.
     pub(super) fn solid_angle(&self, region: &Region<'_>, nodes: &Nodes) -> Option<[f64; 1]> {
+        self.light(region, nodes, |_, _| 1.0)
+    }
+
+    /// The same area, each part of it times the radiance of its ray: the function is told where the ray
+    /// has left the lens, and that nodes mirror others.
+    pub(super) fn light(
+        &self,
+        region: &Region<'_>,
+        nodes: &Nodes,
+        radiance: impl Fn(Ray<f64>, bool) -> f64,
+    ) -> Option<[f64; 1]> {
         let launch = &region.launch;
-        let (launched, landed) = launch.trace_points(&nodes.points);
+        let (launched, landed) = launch.trace_points_into::<Landings<f64>>(&nodes.points);
         let (mut sum, mut lit) = (0.0, false);
         for (ray, node) in launched.iter().enumerate() {
             if !landed.fate(ray).is_imaged() {
                 continue;
             }
+            let seen = radiance(landed.ray(ray), nodes.mirrored);
             let Some(ray) = launch.dual_ray(nodes.points[*node]) else { continue };
             let along = |t: Vec3<f64>| ray.direction.dot(Vec3::<Dual2>::from_f64(t)).slope;
             let [u, v] = self.tangents.map(along);
-            sum += nodes.weights[*node] * (u[0] * v[1] - u[1] * v[0]).abs();
+            sum += nodes.weights[*node] * seen * (u[0] * v[1] - u[1] * v[0]).abs();
             lit = true;
         }
         lit.then_some([sum])
@@ -85,7 +97,7 @@ impl SeenFromImage {
 }
 
 /// The model limited by the rims of its surfaces alone, that of the stop among them.
-fn limited(model: &RayModel) -> Result<Cow<'_, RayModel>, SystemError> {
+pub(super) fn limited(model: &RayModel) -> Result<Cow<'_, RayModel>, SystemError> {
     if model.ends_at_disc() {
         model.limited_by_stop().map(Cow::Owned)
     } else {
@@ -106,7 +118,7 @@ fn index_ratio(system: &System<f64>) -> f64 {
 
 /// The reversed lens with a sphere around its front in place of the object, and the radius of that
 /// sphere in mm: any light that leaves the lens comes from the scene.
-fn surrounded(system: &System<f64>) -> (System<f64>, f64) {
+pub(super) fn surrounded(system: &System<f64>) -> (System<f64>, f64) {
     let rims = system.surfaces.iter().map(|surface| surface.semi_diameter);
     let widest = rims.filter(|rim| rim.is_finite()).fold(1.0, f64::max);
     let radius = AROUND * (system.total_track() + widest);

@@ -82,6 +82,30 @@ pub fn wavefront(
     })
 }
 
+/// The chief ray of a field, which the paths of the others are compared with.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ChiefPath {
+    /// The point where it meets the image, x and y in mm: the centre of the reference sphere.
+    pub point: [f64; 2],
+    /// Its optical path to the image in mm, from the object point, or from a plane wave through the first
+    /// vertex.
+    pub path: f64,
+    /// The reference sphere.
+    pub reference: ReferenceForm,
+}
+
+/// A ray where it meets the reference sphere.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PathDifference {
+    /// The path of the chief ray less that of the ray, in wavelengths.
+    pub waves: f64,
+    /// The direction cosines along x and y of the line from the point of the sphere to its centre.
+    pub cosines: [f64; 2],
+}
+
+/// The chief ray of a field, and the path differences of the rays at some pupil points.
+pub type FieldPaths = (ChiefPath, Vec<Result<PathDifference, PathError>>);
+
 /// The path differences at some pupil points in wavelengths, or why there is none.
 ///
 /// # Errors
@@ -92,6 +116,21 @@ pub fn path_differences(
     wavelength: usize,
     points: &[[f64; 2]],
 ) -> Result<Vec<Result<f64, PathError>>, AnalysisError> {
+    let (_, found) = field_paths(model, field, wavelength, points)?;
+    Ok(found.into_iter().map(|found| found.map(|path| path.waves)).collect())
+}
+
+/// The chief ray of a field at a wavelength, and the rays at some pupil points on its reference sphere, or
+/// why there is none.
+///
+/// # Errors
+/// The field has no rays or its chief ray does not reach the image.
+pub fn field_paths(
+    model: &RayModel,
+    field: FieldPoint,
+    wavelength: usize,
+    points: &[[f64; 2]],
+) -> Result<FieldPaths, AnalysisError> {
     let launch = model.launch(field, wavelength).map_err(AnalysisError::NoRays)?;
     check_paths(&launch)?;
     let sphere = ReferenceSphere::new(&launch).ok_or(AnalysisError::NoChief)?;
@@ -103,9 +142,11 @@ pub fn path_differences(
         }
         let path = launch.optical_path_to(ray) + landing.opl;
         let found = sphere.project(landing.ray, path).ok_or(PathError::MissesSphere)?;
-        Ok(found.waves)
+        Ok(PathDifference { waves: found.waves, cosines: found.cosines })
     };
-    Ok(points.iter().map(at).collect())
+    let Vec3 { x, y, .. } = sphere.center;
+    let chief = ChiefPath { point: [x, y], path: sphere.path, reference: sphere.form };
+    Ok((chief, points.iter().map(at).collect()))
 }
 
 /// The standard deviation, the mean and the share of rays that miss the sphere; `None` if no ray

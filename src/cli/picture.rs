@@ -1,20 +1,22 @@
 //! `picture`: what a camera with a lens sees of a scene.
 
+use super::analyze::parse_coating;
 use super::error::CliError;
 use super::failures::Failures;
 use super::input::{LensFile, LoadedLens, Tolerance};
 use super::output::{Output, ShortNumber, print_note};
 use super::output_paths::OutputPaths;
 use super::progress::{progress_bar, stop_flag};
-use crate::analysis::Estimate;
+use crate::analysis::{Coating, Estimate};
 use crate::files::{read_color, write_atomic};
 use crate::lens::{Lens, Object};
 use crate::measure::time_ms;
 use crate::picture::{
-    BitDepth, BuiltInScene, ColorBand, Coloring, ExactRenderer, ExactSettings, Exposure,
-    ImageFrame, MID_GREY, OmittedEffect, Picture, PictureError, QuickRenderer, Raster, Scene,
-    SensorModel, SensorPreset, ToneCurve, encode_png, field_diagonal, focused, omitted_effects,
-    photon_count, picture_model, quick_error,
+    BitDepth, BuiltInScene, ColorBand, Coloring, ErrorMap, ExactRenderer, ExactSettings, Exposure,
+    GhostLight, GhostReport, ImageFrame, LossReport, MID_GREY, OmittedEffect, Picture,
+    PictureError, QuickRenderer, Raster, Scene, SensorModel, SensorPreset, ToneCurve,
+    encode_colors, encode_png, field_diagonal, focused, omitted_beside, photon_count,
+    picture_model, quick_error,
 };
 use crate::pupil::RayModel;
 use crate::trace::Fates;
@@ -67,6 +69,15 @@ pub(super) struct PictureArgs {
     /// Focuses at this distance in front of the first surface in mm, by moving the image plane
     #[arg(long, value_name = "MM", allow_negative_numbers = true)]
     focus: Option<f64>,
+
+    /// The coating of all surfaces between air and glass: none (bare glass), single-layer, v, or a reflected
+    /// share as `0.3%`; with it losses count, and ghosts where they matter. Absent: nothing is reflected
+    #[arg(long, value_name = "COATING", value_parser = parse_coating)]
+    coating: Option<Coating>,
+
+    /// Writes a map of the error into this file too, PNG: black without error, white at the largest
+    #[arg(long, value_name = "FILE")]
+    error_map: Option<PathBuf>,
 
     /// Grey, at the wavelengths of the lens with their weights
     #[arg(long)]
@@ -136,6 +147,8 @@ const NEAR: f64 = 1000.0;
 /// The tiles on which the quick way is compared with the exact one, and the samples of their pixels.
 const CHECKED_TILES: usize = 24;
 const CHECKED_SAMPLES: usize = 128;
+/// The samples of a pixel for the map of the error.
+const MAPPED_SAMPLES: usize = 64;
 
 /// The number of steps of the progress bar.
 const STEPS: usize = 1000;
@@ -146,19 +159,22 @@ impl PictureArgs {
         let scene = self.scene_file().map(|file| ("the scene", file));
         let mut paths = OutputPaths::reading(lens.into_iter().chain(scene));
         paths.file("--out", Some(&self.out), &["png"])?;
+        paths.file("--error-map", self.error_map.as_deref(), &["png"])?;
         let sensor = self.sensor_preset()?;
         let opened = self.lens.open()?;
         opened.check_zoom(self.zoom)?;
         let (picture, ms) = time_ms(|| self.render(&opened));
-        let (RenderedPicture { picture, error, way }, shot) = picture?;
+        let (rendered, shot) = picture?;
+        let picture = rendered.picture.clone();
         let exposed = sensor.map(|preset| self.expose(preset, &picture));
-        let mut report = self.report(&picture, (way, error), &shot, ms);
+        let mut report = self.report(&rendered, &shot, ms);
         let shown = exposed.map_or(picture, |(image, exposed)| {
             report.sensor = Some(exposed);
             image
         });
         let mut failures = Failures::default();
         failures.note(self.save(&shown, &report));
+        failures.note(self.save_error_map(rendered.error_map.as_ref()));
         failures.note(output.print(&report));
         failures.into_result()
     }
@@ -195,11 +211,41 @@ impl PictureArgs {
         let scene = self.scene(&shot)?.map_err(refuse)?;
         let CameraShot { model, bands, frame, .. } = &shot;
         let renderer = ExactRenderer::new(model, bands, &scene, *frame).map_err(refuse)?;
+        let renderer = match self.coating {
+            Some(coating) => renderer.with_losses(model, bands, coating, self.error.0),
+            None => Ok(renderer),
+        };
+        let renderer = renderer.map_err(refuse)?;
         let quick = if self.exact { None } else { Some(quick_picture(&shot, &renderer)) };
         let quick = quick.transpose().map_err(refuse)?;
         let is_kept = |quick: &RenderedPicture| self.quick || quick.error.value <= self.error.0;
         let picture = quick.filter(is_kept).unwrap_or_else(|| self.exact_picture(&renderer));
+        let error_map = self
+            .error_map
+            .as_ref()
+            .map(|_| ErrorMap::measure(&renderer, &picture.picture, usize::MAX, MAPPED_SAMPLES));
+        let losses = renderer.losses().cloned();
+        let mut picture = RenderedPicture { error_map, losses, ..picture };
+        if let Some(coating) = self.coating {
+            let light = (coating, self.error.0);
+            let (ghosts, ms) =
+                time_ms(|| GhostLight::new((model, bands), &scene, &picture.picture, light));
+            let ghosts = ghosts.map_err(refuse)?;
+            ghosts.add_to(&mut picture.picture);
+            picture.ghosts = Some((ghosts.report, ms));
+        }
         Ok((picture, shot))
+    }
+
+    /// Writes the map of the error if that is asked for.
+    fn save_error_map(&self, map: Option<&ErrorMap>) -> Result<(), CliError> {
+        let (Some(path), Some(map)) = (&self.error_map, map) else { return Ok(()) };
+        let white = map.largest();
+        let scale = format!("black 0, white {white:.4e} of mid grey, rms of tiles");
+        let texts = [("Software", "Aplanat".to_owned()), ("Scale", scale)];
+        let bytes = encode_colors(map.pixels(), &map.heat(white), &texts)
+            .map_err(|error| CliError::Failed(format!("{}: {error}", path.display())))?;
+        Ok(write_atomic(path, &bytes)?)
     }
 
     fn exact_picture(&self, renderer: &ExactRenderer<'_>) -> RenderedPicture {
@@ -224,7 +270,7 @@ impl PictureArgs {
             print_note("note: stopped; what was not sampled is black");
         }
         let error = Estimate::new(picture.rms_error(), 0.0, 0);
-        RenderedPicture { picture, error, way: "exact" }
+        RenderedPicture::new(picture, error, "exact")
     }
 
     fn shot(&self, opened: &LoadedLens) -> Result<CameraShot, PictureError> {
@@ -308,11 +354,12 @@ impl PictureArgs {
 
     fn report(
         &self,
-        picture: &Picture,
-        (way, error): (&'static str, Estimate),
+        rendered: &RenderedPicture,
         shot: &CameraShot,
         milliseconds: f64,
     ) -> PictureReport {
+        let RenderedPicture { picture, error, way, error_map, losses, ghosts } = rendered;
+        let found = ghosts.as_ref().map(|(report, _)| report);
         let pixels = (picture.frame.pixels[0] * picture.frame.pixels[1]) as f64;
         PictureReport {
             scene: self.scene.clone(),
@@ -320,7 +367,7 @@ impl PictureArgs {
             size: picture.frame.size(),
             focus: shot.focus,
             distance: shot.distance,
-            way,
+            way: *way,
             error: error.value,
             error_of_error: error.error,
             tolerance: self.error.0,
@@ -331,7 +378,21 @@ impl PictureArgs {
             rays: picture.rays,
             rays_per_pixel: picture.rays as f64 / pixels,
             fates: picture.fates,
-            left_out: omitted_effects(&shot.model, &picture.frame, self.error.0),
+            left_out: omitted_beside(
+                &shot.model,
+                &picture.frame,
+                self.error.0,
+                (losses.as_ref(), found),
+            ),
+            losses: losses.clone(),
+            ghosts: found.cloned(),
+            ghosts_milliseconds: ghosts.as_ref().map(|(_, ms)| *ms),
+            error_map: error_map.as_ref().map(|map| ErrorMapReport {
+                tiles: map.tiles(),
+                error: map.rms().value,
+                error_of_error: map.rms().error,
+                largest: map.largest(),
+            }),
             sensor: None,
             quick_milliseconds: error.milliseconds,
             milliseconds,
@@ -359,7 +420,7 @@ fn quick_picture(
     let error = quick_error(exact, &picture, CHECKED_TILES, CHECKED_SAMPLES);
     picture.rays = error.rays;
     let error = Estimate { milliseconds: Some(ms), ..error };
-    Ok(RenderedPicture { picture, error, way: "quick" })
+    Ok(RenderedPicture::new(picture, error, "quick"))
 }
 
 /// A picture with its error.
@@ -369,6 +430,16 @@ struct RenderedPicture {
     /// picture without its preparation and its error where it is made the quick way.
     error: Estimate,
     way: &'static str,
+    error_map: Option<ErrorMap>,
+    losses: Option<LossReport>,
+    /// With the time in milliseconds.
+    ghosts: Option<(GhostReport, f64)>,
+}
+
+impl RenderedPicture {
+    const fn new(picture: Picture, error: Estimate, way: &'static str) -> Self {
+        Self { picture, error, way, error_map: None, losses: None, ghosts: None }
+    }
 }
 
 /// A lens focused for a picture, with its sensor.
@@ -402,10 +473,23 @@ struct PictureReport {
     rays_per_pixel: f64,
     fates: Fates,
     left_out: Vec<OmittedEffect>,
+    losses: Option<LossReport>,
+    ghosts: Option<GhostReport>,
+    ghosts_milliseconds: Option<f64>,
+    error_map: Option<ErrorMapReport>,
     sensor: Option<SensorReport>,
     quick_milliseconds: Option<f64>,
     milliseconds: f64,
     out: String,
+}
+
+/// The map of the error.
+#[derive(Serialize)]
+struct ErrorMapReport {
+    tiles: usize,
+    error: f64,
+    error_of_error: f64,
+    largest: f64,
 }
 
 /// The exposure of a sensor.
@@ -435,6 +519,42 @@ impl Display for SensorReport {
             "  signal to noise {white:.1} at white, {grey:.1} at mid grey, {dark:.1} at 1 %"
         )?;
         writeln!(f, "  {:.2} % saturated; {}", 100.0 * self.saturated, self.source)
+    }
+}
+
+impl PictureReport {
+    /// What losses, ghosts and the map of the error are.
+    fn write_reflections(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let percent = |share: f64| 100.0 * share;
+        if let Some(map) = &self.error_map {
+            let (error, largest) = (percent(map.error), percent(map.largest));
+            let spread = percent(map.error_of_error);
+            let tiles = map.tiles;
+            writeln!(
+                f,
+                "error of all {tiles} tiles {error:.3} ± {spread:.3} %, at most {largest:.2} %"
+            )?;
+        }
+        if let Some(losses) = &self.losses {
+            let LossReport { coating, transmission, variation, by_ray, .. } = losses;
+            let how = if *by_ray { "each ray by itself" } else { "one share for each colour" };
+            let (passed, varied) = (percent(*transmission), percent(*variation));
+            writeln!(
+                f,
+                "losses on: {coating}, {passed:.1} % arrives on the axis; it varies by {varied:.2} %: {how}"
+            )?;
+        }
+        if let Some(GhostReport { on: true, change, error, pairs, rays, .. }) = &self.ghosts {
+            let (change, error) = (percent(*change), percent(*error));
+            let [followed, all] = pairs;
+            writeln!(
+                f,
+                "ghosts on: up to {change:.2} ± {error:.2} % of mid grey, {followed} of {all} pairs, {rays} \
+                 rays, {:.0} ms",
+                self.ghosts_milliseconds.unwrap_or(0.0)
+            )?;
+        }
+        Ok(())
     }
 }
 
@@ -473,6 +593,7 @@ impl Display for PictureReport {
             "{} rays ({:.0} a pixel{lost}), {:.0} ms",
             self.rays, self.rays_per_pixel, self.milliseconds
         )?;
+        self.write_reflections(f)?;
         for OmittedEffect { effect, change, reason } in &self.left_out {
             let change = change.map(|c| format!("{:.2} %, ", 100.0 * c)).unwrap_or_default();
             writeln!(f, "left out: {effect} ({change}{reason})")?;

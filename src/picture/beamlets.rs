@@ -8,7 +8,7 @@
 
 use super::PictureError;
 use super::color_band::ColorBand;
-use super::lit_directions::LitDirections;
+use super::exact::ExactRenderer;
 use crate::analysis::BackwardLens;
 use crate::pupil::RayModel;
 use crate::trace::{Landings, Ray, Rays, TraceSink as _};
@@ -161,7 +161,7 @@ impl BeamletTable {
     pub(super) fn new(
         model: &RayModel,
         bands: &[ColorBand],
-        directions: &LitDirections,
+        exact: &ExactRenderer<'_>,
         reach: f64,
     ) -> Result<Self, PictureError> {
         let lenses = |band: &ColorBand| {
@@ -172,7 +172,7 @@ impl BeamletTable {
         };
         let lenses = bands.iter().map(lenses).collect::<Result<Vec<_>, PictureError>>()?;
         let step = reach / RADII as f64;
-        let row = |i: usize| BeamletRow::new(&lenses, directions, step * i as f64);
+        let row = |i: usize| BeamletRow::new(&lenses, exact, step * i as f64);
         Ok(Self { step, rows: (0..=RADII).into_par_iter().map(row).collect() })
     }
 
@@ -204,16 +204,20 @@ impl PointBeamlets<'_> {
 }
 
 impl BeamletRow {
-    fn new(bands: &[Vec<(f64, BackwardLens)>], directions: &LitDirections, radius: f64) -> Self {
+    fn new(bands: &[Vec<(f64, BackwardLens)>], exact: &ExactRenderer<'_>, radius: f64) -> Self {
         let mut row = Self {
             beamlets: vec![Beamlet::default(); bands.len() * CELLS * CELLS],
             sideways: vec![0.0; bands.len()],
         };
-        let Some(bounds) = directions.bounds(radius) else { return row };
+        let Some(bounds) = exact.directions().bounds(radius) else { return row };
         for (color, lenses) in bands.iter().enumerate() {
             let mut sums = vec![BeamletSums::default(); CELLS * CELLS];
-            for (share, lens) in lenses {
-                row.sideways[color] += trace_box(lens, *share, radius, bounds, &mut sums);
+            for (w, (share, lens)) in lenses.iter().enumerate() {
+                let passed = |cosines: [f64; 2]| {
+                    let losses = exact.loss_table();
+                    share * losses.map_or(1.0, |table| table.passed([color, w], radius, cosines))
+                };
+                row.sideways[color] += trace_box(lens, passed, radius, bounds, &mut sums);
             }
             for (cell, sum) in sums.iter().enumerate() {
                 row.beamlets[color * CELLS * CELLS + cell] = sum.beamlet();
@@ -223,17 +227,18 @@ impl BeamletRow {
     }
 }
 
-/// Traces the rays of all cells from the point `(0, radius)` and adds them to the sums; returns the
+/// Traces the rays of all cells from the point `(0, radius)` and adds them to the sums, each with the share
+/// of its direction; returns the
 /// irradiance of those that leave the lens sideways.
 fn trace_box(
     lens: &BackwardLens,
-    share: f64,
+    share: impl Fn([f64; 2]) -> f64,
     radius: f64,
     [center, half]: [[f64; 2]; 2],
     sums: &mut [BeamletSums],
 ) -> f64 {
     let side = CELLS * SUBRAYS;
-    let area = 4.0 * half[0] * half[1] / (side * side) as f64 * share * lens.index_ratio;
+    let area = 4.0 * half[0] * half[1] / (side * side) as f64 * lens.index_ratio;
     let mut rays = Rays::with_capacity(side * side);
     let mut cells = Vec::with_capacity(side * side);
     for i in 0..side * side {
@@ -241,9 +246,11 @@ fn trace_box(
             center[k] + half[k] * (2.0 * (index as f64 + 0.5) / side as f64 - 1.0)
         };
         let (column, row) = (i % side, i / side);
-        if let Some((ray, cosine)) = lens.ray([0.0, radius], [at(0, column), at(1, row)]) {
+        let cosines = [at(0, column), at(1, row)];
+        if let Some((ray, cosine)) = lens.ray([0.0, radius], cosines) {
             rays.push(ray);
-            cells.push((row / SUBRAYS * CELLS + column / SUBRAYS, area * cosine));
+            let weight = area * cosine * share(cosines);
+            cells.push((row / SUBRAYS * CELLS + column / SUBRAYS, weight));
         }
     }
     let mut landings = Landings::default();

@@ -1,6 +1,6 @@
 //! The reasons for which there is no picture.
 
-use crate::analysis::AnalysisError;
+use crate::analysis::{AnalysisError, GhostError};
 use crate::lens::{SurfaceNumber, SystemError};
 use crate::pupil::RayModelError;
 
@@ -21,6 +21,9 @@ pub enum PictureError {
         /// The reason.
         source: AnalysisError,
     },
+    /// The lens has surfaces whose reflections are not known.
+    #[error(transparent)]
+    Reflection(#[from] GhostError),
     /// No light arrives anywhere in the picture.
     #[error("no light arrives anywhere in the picture")]
     NoLight,

@@ -12,9 +12,10 @@
 //! the number of threads.
 
 use super::lit_directions::LitDirections;
+use super::losses::{LensLosses, LossReport};
 use super::scene::{Radiance, Scene};
 use super::{ColorBand, ImageFrame, Picture, PictureError};
-use crate::analysis::{BackwardLens, irradiance};
+use crate::analysis::{BackwardLens, Coating, irradiance};
 use crate::lens::{Surface, SurfaceNumber};
 use crate::pupil::{Accuracy, RayModel};
 use crate::trace::{Fates, Landings, Rays, TraceSink as _};
@@ -69,6 +70,8 @@ pub struct ExactRenderer<'a> {
     frame: ImageFrame,
     bands: Vec<BackwardBand>,
     directions: LitDirections,
+    /// What surfaces reflect; `None` if they let all light pass.
+    losses: Option<LensLosses>,
     /// The irradiance of a white card on the axis, or where the image is brightest.
     white: f64,
 }
@@ -114,13 +117,17 @@ struct TileSums {
 }
 
 /// A tile of a picture: columns and rows.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct PictureTile {
     columns: Range<usize>,
     rows: Range<usize>,
 }
 
 impl PictureTile {
+    pub(super) const fn new(columns: Range<usize>, rows: Range<usize>) -> Self {
+        Self { columns, rows }
+    }
+
     pub(super) fn pixels(&self) -> impl Iterator<Item = [usize; 2]> + '_ {
         self.rows.clone().flat_map(|row| self.columns.clone().map(move |column| [column, row]))
     }
@@ -159,7 +166,36 @@ impl<'a> ExactRenderer<'a> {
         let bands_of = backward.collect::<Result<_, _>>()?;
         let directions = LitDirections::new(model, &outer(model, bands), frame.reach(), RINGS)?;
         let white = brightest(model, frame.reach())?;
-        Ok(Self { scene, frame, bands: bands_of, directions, white })
+        Ok(Self { scene, frame, bands: bands_of, directions, losses: None, white })
+    }
+
+    /// The same with what the surfaces of the lens reflect taken away, for the model and the colours of
+    /// this renderer; one share for each colour where it varies by less than a tolerance.
+    ///
+    /// # Errors
+    /// A lens with other surfaces than centred refracting ones.
+    pub fn with_losses(
+        mut self,
+        model: &RayModel,
+        bands: &[ColorBand],
+        coating: Coating,
+        tolerance: f64,
+    ) -> Result<Self, PictureError> {
+        let light = (&self.directions, self.frame.reach());
+        let losses = LensLosses::new(model, bands, light, (coating, tolerance))?;
+        self.white *= losses.report.transmission;
+        self.losses = Some(losses);
+        Ok(self)
+    }
+
+    /// The losses at the surfaces of the lens, if they are in the picture.
+    pub fn losses(&self) -> Option<&LossReport> {
+        self.losses.as_ref().map(|losses| &losses.report)
+    }
+
+    /// The shares of light that pass.
+    pub(super) fn loss_table(&self) -> Option<&LensLosses> {
+        self.losses.as_ref()
     }
 
     /// The irradiance of a white card on the axis, or where the image is brightest if that is dark.
@@ -182,7 +218,7 @@ impl<'a> ExactRenderer<'a> {
         let [columns, rows] = self.frame.pixels;
         let cut =
             |count: usize| (0..count).step_by(TILE).map(move |from| from..(from + TILE).min(count));
-        let tile = |(rows, columns)| PictureTile { columns, rows };
+        let tile = |(rows, columns)| PictureTile::new(columns, rows);
         let of_rows = |rows: Range<usize>| cut(columns).map(move |columns| (rows.clone(), columns));
         cut(rows).flat_map(of_rows).map(tile).collect()
     }
@@ -312,7 +348,11 @@ impl<'a> ExactRenderer<'a> {
             let Some((ray, share)) = lens.ray([x, y], cosines) else { continue };
             let queue = &mut sums.queues[band][chosen];
             queue.rays.push(ray);
-            let weight = drawn.area * share * lens.index_ratio;
+            let passed = self
+                .losses
+                .as_ref()
+                .map_or(1.0, |losses| losses.passed([band, chosen], radius, drawn.cosines));
+            let weight = drawn.area * share * lens.index_ratio * passed;
             queue.slots.push(((slot + band) as u32, weight, time * seconds));
             if queue.slots.len() >= BATCH {
                 self.flush(sums, band, chosen);
@@ -366,7 +406,7 @@ impl<'a> ExactRenderer<'a> {
 }
 
 /// The mean of replicates and its standard error.
-fn mean_with_error(values: [f64; REPLICATES]) -> (f64, f64) {
+pub(super) fn mean_with_error(values: [f64; REPLICATES]) -> (f64, f64) {
     let count = REPLICATES as f64;
     let mean = values.iter().sum::<f64>() / count;
     let square: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();

@@ -61,6 +61,14 @@ impl ImageFrame {
         ]
     }
 
+    /// The place of a point of the image plane, x and y in mm, as shares of the picture's width and height
+    /// from its upper left corner; the inverse of [`ImageFrame::point`].
+    pub fn place(&self, [x, y]: [f64; 2]) -> [f64; 2] {
+        let facing = if self.inverted { -1.0 } else { 1.0 };
+        let [width, height] = self.size();
+        [0.5 + facing * (x - self.center[0]) / width, 0.5 - facing * (y - self.center[1]) / height]
+    }
+
     /// The largest distance of a point of the frame from the axis, in mm.
     pub fn reach(&self) -> f64 {
         let side = |k: usize| self.center[k].abs() + 0.5 * self.pitch * self.pixels[k] as f64;

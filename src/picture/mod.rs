@@ -3,7 +3,8 @@
 //! A [`Scene`] is painted planes at depths. An [`ExactRenderer`] follows rays backwards from every pixel
 //! through the lens into it, with the rims clipping: distortion, lateral colour, blur that varies over the
 //! field, vignetting and depth of field need no model of their own. The error by sampling is stated; what
-//! is left out (diffraction, losses at surfaces, ghosts) is named in the metadata of the file. A
+//! is left out (diffraction; losses at surfaces and ghosts without a coating) is named in the metadata of
+//! the file. A
 //! [`SensorModel`] makes noisy numbers of the light.
 
 mod bayer;
@@ -11,10 +12,13 @@ mod beamlets;
 mod built_in;
 mod color_band;
 mod error;
+mod error_map;
 mod exact;
 mod focus;
 mod frame;
+mod ghost_light;
 mod lit_directions;
+mod losses;
 mod mip_texture;
 mod omitted;
 mod pattern;
@@ -29,15 +33,18 @@ mod sensor_law;
 pub use built_in::BuiltInScene;
 pub use color_band::{ColorBand, Coloring, picture_model};
 pub use error::PictureError;
+pub use error_map::{ErrorMap, quick_error};
 pub use exact::{ExactRenderer, ExactSettings, MID_GREY, PictureProgress, REPLICATES};
 pub use focus::focused;
 pub use frame::{ImageFrame, field_diagonal, filling_size};
+pub use ghost_light::{GhostLight, GhostReport};
 pub use lit_directions::{DrawnDirection, LitDirections};
-pub use omitted::{OmittedEffect, omitted_effects};
+pub use losses::LossReport;
+pub use omitted::{OmittedEffect, omitted_beside, omitted_effects};
 pub use pattern::{Paint, PaintedPoint, Pattern};
 pub use picture_data::Picture;
-pub use png_file::{BitDepth, ToneCurve, encode_png};
-pub use quick::{QuickRenderer, quick_error};
+pub use png_file::{BitDepth, ToneCurve, encode_colors, encode_png};
+pub use quick::QuickRenderer;
 pub use raster::Raster;
 pub use scene::{Radiance, Scene, SceneLayer};
 pub use sensor::{Exposure, SensorImage, SensorModel, SensorPreset, photon_count};

@@ -1,7 +1,9 @@
 //! The effects that a picture leaves out, each with the number that it rests on where there is one.
 
 use super::ImageFrame;
-use crate::analysis::diffraction_gate;
+use super::ghost_light::GhostReport;
+use super::losses::LossReport;
+use crate::analysis::{Coating, diffraction_gate, rank_ghosts};
 use crate::lens::FieldPoint;
 use crate::pupil::RayModel;
 use serde::Serialize;
@@ -11,15 +13,26 @@ use serde::Serialize;
 pub struct OmittedEffect {
     /// The name of the effect.
     pub effect: &'static str,
-    /// The largest change of contrast that it would make, if that was computed.
+    /// The largest change that it would make, if that was computed.
     pub change: Option<f64>,
     /// The reason, or the meaning of the number.
     pub reason: &'static str,
 }
 
-/// The effects that a picture by rays leaves out. The change by diffraction is that on the axis, up to
-/// half of a period per pixel.
+/// The effects that a picture by rays leaves out which counts neither losses nor ghosts; see
+/// [`omitted_beside`].
 pub fn omitted_effects(model: &RayModel, frame: &ImageFrame, tolerance: f64) -> Vec<OmittedEffect> {
+    omitted_beside(model, frame, tolerance, (None, None))
+}
+
+/// The effects that a picture by rays leaves out, given what it has of losses and ghosts. The change by
+/// diffraction is that of contrast on the axis, up to half of a period per pixel.
+pub fn omitted_beside(
+    model: &RayModel,
+    frame: &ImageFrame,
+    tolerance: f64,
+    (losses, ghosts): (Option<&LossReport>, Option<&GhostReport>),
+) -> Vec<OmittedEffect> {
     let axis = FieldPoint { x: 0.0, y: 0.0, weight: 1.0 };
     let highest = 0.5 / frame.pitch;
     let gate = diffraction_gate(model, axis, model.primary, highest, tolerance);
@@ -30,10 +43,36 @@ pub fn omitted_effects(model: &RayModel, frame: &ImageFrame, tolerance: f64) -> 
         },
         Err(_) => (None, "the change of contrast on the axis is not known"),
     };
-    let none = |effect, reason| OmittedEffect { effect, change: None, reason };
-    vec![
-        OmittedEffect { effect: "diffraction", change, reason },
-        none("losses", "surfaces and glasses take nothing away"),
-        none("ghosts", "surfaces reflect nothing"),
-    ]
+    let mut left_out = vec![OmittedEffect { effect: "diffraction", change, reason }];
+    left_out.push(match losses {
+        // Bare surfaces on the axis.
+        None => OmittedEffect {
+            effect: "losses",
+            change: rank_ghosts(model, model.primary, Coating::Bare)
+                .ok()
+                .map(|ranking| 1.0 - ranking.direct),
+            reason: "surfaces and glasses take nothing away; of the light on the axis bare surfaces \
+                     would, and --coating counts it",
+        },
+        Some(losses) => OmittedEffect {
+            effect: "polarisation",
+            change: Some(losses.polarisation),
+            reason: "light is taken for unpolarised at every surface; the difference of both \
+                     polarisations over their sum",
+        },
+    });
+    match ghosts {
+        None => left_out.push(OmittedEffect {
+            effect: "ghosts",
+            change: None,
+            reason: "surfaces reflect nothing; --coating says how they would",
+        }),
+        Some(ghosts) if !ghosts.on => left_out.push(OmittedEffect {
+            effect: "ghosts",
+            change: Some(ghosts.change),
+            reason: "the light of all where it is brightest, as a share of mid grey",
+        }),
+        Some(_) => {}
+    }
+    left_out
 }

@@ -1,6 +1,7 @@
 //! A picture as a PNG file of 8 or 16 bits, with its data as text inside.
 
 use super::Picture;
+use crate::plot::Color;
 use png::{BitDepth as PngDepth, ColorType, Encoder, EncodingError, ScaledFloat};
 
 /// The bits of a colour of a pixel.
@@ -58,25 +59,52 @@ pub fn encode_png(
     curve: ToneCurve,
     texts: &[(&str, String)],
 ) -> Result<Vec<u8>, EncodingError> {
-    let pixels = picture.bytes(depth, curve);
     let mut bytes = Vec::new();
-    let [width, height] = picture.frame.pixels.map(|count| count as u32);
-    let mut encoder = Encoder::new(&mut bytes, width, height);
+    let mut encoder = rgb_encoder(&mut bytes, picture.frame.pixels, depth, texts)?;
+    if let ToneCurve::Power(gamma) = curve {
+        encoder.set_source_gamma(ScaledFloat::new(gamma.recip() as f32));
+    }
+    let mut writer = encoder.write_header()?;
+    writer.write_image_data(&picture.bytes(depth, curve))?;
+    writer.finish()?;
+    Ok(bytes)
+}
+
+/// The file of an image of colours, row by row from the upper left corner, with texts by their keywords.
+///
+/// # Errors
+/// A text that PNG does not hold, or colours that do not fill the image.
+pub fn encode_colors(
+    pixels: [usize; 2],
+    colors: &[Color],
+    texts: &[(&str, String)],
+) -> Result<Vec<u8>, EncodingError> {
+    let mut bytes = Vec::new();
+    let encoder = rgb_encoder(&mut bytes, pixels, BitDepth::Eight, texts)?;
+    let mut writer = encoder.write_header()?;
+    writer.write_image_data(colors.as_flattened())?;
+    writer.finish()?;
+    Ok(bytes)
+}
+
+/// The encoder of an image in red, green and blue with texts by their keywords.
+fn rgb_encoder<'a>(
+    bytes: &'a mut Vec<u8>,
+    pixels: [usize; 2],
+    depth: BitDepth,
+    texts: &[(&str, String)],
+) -> Result<Encoder<'a, &'a mut Vec<u8>>, EncodingError> {
+    let [width, height] = pixels.map(|count| count as u32);
+    let mut encoder = Encoder::new(bytes, width, height);
     encoder.set_color(ColorType::Rgb);
     encoder.set_depth(match depth {
         BitDepth::Eight => PngDepth::Eight,
         BitDepth::Sixteen => PngDepth::Sixteen,
     });
-    if let ToneCurve::Power(gamma) = curve {
-        encoder.set_source_gamma(ScaledFloat::new(gamma.recip() as f32));
-    }
     for (keyword, text) in texts {
         encoder.add_itxt_chunk((*keyword).to_owned(), text.clone())?;
     }
-    let mut writer = encoder.write_header()?;
-    writer.write_image_data(&pixels)?;
-    writer.finish()?;
-    Ok(bytes)
+    Ok(encoder)
 }
 
 impl Picture {

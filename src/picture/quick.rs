@@ -3,17 +3,15 @@
 //! Nothing is traced for a pixel, and nothing is sampled: a few beamlets lead from it to the planes of the
 //! scene, each of which is averaged over the spot of the beamlet and the pixel together. Distortion, lateral
 //! colour, blur, vignetting and depth stay; what is lost is the fine structure of spots within a cell of the
-//! directions, and the exact order of planes within a spot. The error is measured against the exact way on
-//! some tiles: with two independent renderings A and B of them, the mean of `(A − V)(B − V)` is the squared
-//! error of V without the noise of A and B.
+//! directions, and the exact order of planes within a spot. An [`ErrorMap`](super::ErrorMap) measures the
+//! error against the exact way.
 
 use super::beamlets::{Beamlet, BeamletTable};
-use super::exact::{ExactRenderer, ExactSettings, MID_GREY, PictureTile};
+use super::exact::ExactRenderer;
 use super::frame::filling_size;
 use super::mip_texture::MipTexture;
 use super::scene::{Radiance, Scene, SceneLayer};
 use super::{ColorBand, ImageFrame, Picture, PictureError};
-use crate::analysis::Estimate;
 use crate::pupil::RayModel;
 use crate::trace::Fates;
 use rayon::prelude::*;
@@ -58,7 +56,7 @@ impl<'a> QuickRenderer<'a> {
         exact: &ExactRenderer<'a>,
     ) -> Result<Self, PictureError> {
         let (scene, frame, colors) = exact.subject();
-        let table = BeamletTable::new(model, bands, exact.directions(), frame.reach())?;
+        let table = BeamletTable::new(model, bands, exact, frame.reach())?;
         let painting =
             |layer: &SceneLayer| QuickPainting::new(model, &frame, &table, colors, layer);
         let paintings = scene.layers().iter().map(painting).collect::<Result<_, _>>()?;
@@ -193,62 +191,4 @@ fn seen_part(
         [0, 1].map(|k| inside(k, low[k] - margin, -1.0)),
         [0, 1].map(|k| inside(k, high[k] + margin, 1.0)),
     ]
-}
-
-/// The root mean square error of a picture against the exact way, as a share of mid grey, or of the pixel
-/// where that is brighter, from about `count` of the tiles with this many samples of each pixel in each of
-/// two independent renderings; with its own standard error.
-pub fn quick_error(
-    exact: &ExactRenderer<'_>,
-    picture: &Picture,
-    count: usize,
-    samples: usize,
-) -> Estimate {
-    let tiles = exact.tiles();
-    let chosen = spread_out(tiles.len(), count).into_par_iter();
-    let errors: Vec<(f64, usize)> =
-        chosen.map(|i| tile_error(exact, picture, &tiles[i], samples)).collect();
-    let n = errors.len().max(1) as f64;
-    let mean = errors.iter().map(|(square, _)| square).sum::<f64>() / n;
-    let spread = errors.iter().map(|(square, _)| (square - mean).powi(2)).sum::<f64>();
-    let of_mean = (spread / (n * (n - 1.0).max(1.0))).sqrt();
-    let value = mean.max(0.0).sqrt();
-    // The error of a root: never above the root of the error.
-    let error = (0.5 * of_mean / value.max(f64::MIN_POSITIVE)).min(of_mean.sqrt());
-    Estimate::new(value, error, errors.iter().map(|(_, rays)| rays).sum())
-}
-
-/// At most `count` places among `all`, in steps of the golden ratio, which reach all parts.
-fn spread_out(all: usize, count: usize) -> Vec<usize> {
-    let part = |i: usize| (0.5 + 0.618_033_988_749_895 * i as f64).fract();
-    (0..count.min(all)).map(|i| (part(i) * all as f64) as usize).collect()
-}
-
-/// The mean squared error of a tile, and the rays traced for it.
-fn tile_error(
-    exact: &ExactRenderer<'_>,
-    picture: &Picture,
-    tile: &PictureTile,
-    samples: usize,
-) -> (f64, usize) {
-    let render = |seed: u32| {
-        let settings = ExactSettings {
-            tolerance: -1.0,
-            max_samples: samples,
-            seed,
-            ..ExactSettings::default()
-        };
-        exact.sample_tile(tile, &settings)
-    };
-    let (a, b) = (render(0x5EED_0001), render(0x5EED_0002));
-    let grey = MID_GREY * picture.white;
-    let (mut sum, mut count) = (0.0, 0.0);
-    for (i, [column, row]) in tile.pixels().enumerate() {
-        let shown = picture.values[row * picture.frame.pixels[0] + column];
-        for ((shown, a), b) in shown.into_iter().zip(a.values[i]).zip(b.values[i]) {
-            sum += (a - shown) * (b - shown) / (0.5 * (a + b)).max(grey).powi(2);
-            count += 1.0;
-        }
-    }
-    (sum / count, a.samples + b.samples)
 }

@@ -33,6 +33,11 @@ pub fn diverging(value: f64) -> Color {
     if value < 0.0 { [faded, faded, 0xff] } else { [0xff, faded, faded] }
 }
 
+/// A colour map of growing brightness: black at 0, then red, orange and yellow, white at 1.
+pub fn glow(value: f64) -> Color {
+    [0.0, 1.0, 2.0].map(|step| byte(3.0 * value - step))
+}
+
 fn byte(share: f64) -> u8 {
     (255.0 * share.clamp(0.0, 1.0)).round() as u8
 }
@@ -49,5 +54,7 @@ mod tests {
         );
         assert_eq!(diverging(0.0), [0xff; 3]);
         assert_eq!([diverging(-2.0), diverging(1.0)], [[0, 0, 0xff], [0xff, 0, 0]]);
+        assert_eq!([glow(-1.0), glow(0.0), glow(2.0)], [BLACK, BLACK, [0xff; 3]]);
+        assert_eq!([glow(1.0 / 3.0), glow(2.0 / 3.0)], [[0xff, 0, 0], [0xff, 0xff, 0]]);
     }
 }

@@ -14,7 +14,7 @@ mod vector;
 
 pub use canvas::{Canvas, NamedPlot, Stroke, TextAlign, draw_image_row, gray_levels};
 pub use chart::{Axis, Chart, Legend};
-pub use color::{BLACK, Color, GREY, GRID, PALETTE, diverging, gray_level};
+pub use color::{BLACK, Color, GREY, GRID, PALETTE, diverging, glow, gray_level};
 pub use curve_sheet::{ChartCurve, CurveChart, CurveSheet};
 pub use document::{DocumentBlock, DocumentTable, ReportDocument, html_text, paper_pages};
 pub use vector::{

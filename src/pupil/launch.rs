@@ -11,7 +11,7 @@ use super::ray_aiming::{AimedRay, aim_all_from_chief_ray, aim_at, aim_from_chief
 use super::ray_model::{Aiming, Channel, Dual2, PupilMeasure, RayModel};
 use crate::lens::{FieldKind, FieldPoint};
 use crate::math::Real;
-use crate::trace::{ImagePoints, Ray, Rays, TracedRay};
+use crate::trace::{ImagePoints, Ray, Rays, TraceSink, TracedRay};
 use serde::Serialize;
 
 /// The reason why a field has no rays.
@@ -271,6 +271,14 @@ impl<'a> Launch<'a> {
     /// Traces the rays of some pupil points: the indices of those points from which a ray could be
     /// launched, and the ends of these rays in the same order.
     pub fn trace_points(&self, points: &[[f64; 2]]) -> (Vec<usize>, ImagePoints<f64>) {
+        self.trace_points_into(points)
+    }
+
+    /// The same with the ends of the rays in another form.
+    pub fn trace_points_into<S: TraceSink<f64> + Default>(
+        &self,
+        points: &[[f64; 2]],
+    ) -> (Vec<usize>, S) {
         let mut rays = Rays::with_capacity(points.len());
         let mut launched = Vec::with_capacity(points.len());
         for (i, ray) in self.rays(points).into_iter().enumerate() {
@@ -279,7 +287,7 @@ impl<'a> Launch<'a> {
                 launched.push(i);
             }
         }
-        let mut traced = ImagePoints::default();
+        let mut traced = S::default();
         self.channel().tracer.trace_batch(&rays, &mut traced);
         (launched, traced)
     }

@@ -36,6 +36,7 @@ mod ideal;
 mod image_hard_cases;
 mod images;
 mod images_cli;
+mod images_lenses_cli;
 mod lens_library;
 mod library;
 mod limits;

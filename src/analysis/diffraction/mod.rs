@@ -11,7 +11,8 @@
 //! ```
 //!
 //! U is a sum over the quadrature nodes of the pupil itself. For the OTF, W and A are polynomials
-//! fitted to rays, and the overlap of the two shifted pupils is integrated between its own edges.
+//! fitted to rays, and the overlap of the two shifted pupils is integrated between its own edges; where
+//! polynomials leave more than the tolerance, each node of that integral has a ray of its own.
 //! Light is a scalar here, which is not enough beyond a numerical aperture of about 0.6.
 
 mod contrast;
@@ -22,6 +23,7 @@ mod point_spread;
 mod polynomial;
 mod pupil_function;
 mod pupil_samples;
+mod ray_pupil;
 mod strehl;
 
 pub use contrast::{

@@ -4,9 +4,11 @@ use super::outline::PupilCurve;
 use super::overlap::{OVERLAP_ORDERS, Overlap};
 use super::polynomial::{FitSample, PolynomialBasis, WavePolynomial};
 use super::pupil_samples::PupilSamples;
+use super::ray_pupil::RayPupil;
 use crate::analysis::reference_sphere::ReferenceSphere;
 use crate::analysis::{AnalysisError, TransferValue};
 use crate::pupil::{EdgeArc, Nodes, Region};
+use std::cell::Cell;
 use std::f64::consts::TAU;
 
 /// A pupil as a function of direction cosines: the path difference and the amplitude as polynomials,
@@ -24,6 +26,13 @@ pub struct PupilFunction {
     fit_error: [f64; 2],
     /// The number of rays traced.
     rays: usize,
+}
+
+/// Half of the shift of a pupil against itself in cosines, and that of the image plane in mm.
+#[derive(Debug, Clone, Copy)]
+struct TransferShift {
+    cosines: [f64; 2],
+    defocus: f64,
 }
 
 /// The points of an arc of the edge.
@@ -139,7 +148,9 @@ impl PupilFunction {
 
     /// The integral of the squared amplitude between the curves.
     fn overlap_energy(&self) -> Result<f64, AnalysisError> {
-        let found = self.converge([0.0; 2], 0.0, 1e-13, 1.0)?;
+        let shift = TransferShift { cosines: [0.0; 2], defocus: 0.0 };
+        let light = |cosines: [f64; 2]| self.polynomial.at(cosines);
+        let found = self.converge(shift, 1e-13, 1.0, &light)?;
         Ok(found.0[0])
     }
 
@@ -180,27 +191,60 @@ impl PupilFunction {
         if frequency == [0.0; 2] {
             return Ok(TransferValue::new(1.0, 0.0, 0.0, self.rays));
         }
-        let shift = frequency.map(|nu| 0.5 * self.wavelength * nu);
-        let ([re, im], change) = self.converge(shift, defocus, tolerance, self.energy)?;
-        // What the polynomials leave of the two phases and amplitudes.
+        let shift = self.shift(frequency, defocus);
+        let light = |cosines: [f64; 2]| self.polynomial.at(cosines);
+        let ([re, im], change) = self.converge(shift, tolerance, self.energy, &light)?;
+        Ok(TransferValue::new(re, im, change + self.transfer_error(), self.rays))
+    }
+
+    fn shift(&self, frequency: [f64; 2], defocus: f64) -> TransferShift {
+        TransferShift { cosines: frequency.map(|nu| 0.5 * self.wavelength * nu), defocus }
+    }
+
+    /// The error of contrast by what the polynomials leave of the two phases and amplitudes.
+    pub(super) fn transfer_error(&self) -> f64 {
         let [waves, amplitude] = self.fit_error;
-        let error = change + 2f64.sqrt() * (TAU * waves + amplitude);
-        Ok(TransferValue::new(re, im, error, self.rays))
+        2f64.sqrt() * (TAU * waves + amplitude)
+    }
+
+    /// [`PupilFunction::transfer`] by a ray for each node in place of the polynomials; `None` if some node
+    /// has no ray.
+    ///
+    /// # Errors
+    /// The common part of the shifted pupils cannot be integrated over.
+    pub(super) fn transfer_by_rays(
+        &self,
+        frequency: [f64; 2],
+        pupil: &RayPupil<'_>,
+        tolerance: f64,
+    ) -> Result<Option<TransferValue>, AnalysisError> {
+        let (traced, lost) = (Cell::new(0), Cell::new(false));
+        let light = |cosines: [f64; 2]| {
+            traced.set(traced.get() + 1);
+            pupil.light(cosines).unwrap_or_else(|| {
+                lost.set(true);
+                [0.0; 2]
+            })
+        };
+        let shift = self.shift(frequency, 0.0);
+        let ([re, im], change) = self.converge(shift, tolerance, self.energy, &light)?;
+        let rays = self.rays + traced.get();
+        Ok((!lost.get()).then(|| TransferValue::new(re, im, change, rays)))
     }
 
     /// The sum over the pieces of the overlap integrals divided by an energy, and its last change.
     fn converge(
         &self,
-        shift: [f64; 2],
-        defocus: f64,
+        shift: TransferShift,
         tolerance: f64,
         energy: f64,
+        light: &impl Fn([f64; 2]) -> [f64; 2],
     ) -> Result<([f64; 2], f64), AnalysisError> {
         let mut overlaps = Vec::new();
         for (first, sign) in &self.pieces {
             for (second, other) in &self.pieces {
                 // The point plus the shift lies in the first, the point minus it in the second.
-                let back = shift.map(|v| -v);
+                let back = shift.cosines.map(|v| -v);
                 let common = Overlap::new([first, second], back);
                 if let Some(common) = common.map_err(|_error| AnalysisError::IrregularPupil)? {
                     overlaps.push((common, sign * other));
@@ -213,7 +257,7 @@ impl PupilFunction {
         }
         for order in 0..OVERLAP_ORDERS {
             let parts = overlaps.iter().map(|(common, sign)| {
-                let [re, im] = self.integrate(common, shift, defocus, order);
+                let [re, im] = self.integrate(common, shift, order, light);
                 [sign * re / energy, sign * im / energy]
             });
             let now = parts.fold([0.0; 2], |sum, part| [sum[0] + part[0], sum[1] + part[1]]);
@@ -229,13 +273,19 @@ impl PupilFunction {
     }
 
     /// The integral over the common part of two pieces.
-    fn integrate(&self, common: &Overlap, shift: [f64; 2], defocus: f64, order: usize) -> [f64; 2] {
+    fn integrate(
+        &self,
+        common: &Overlap,
+        TransferShift { cosines: shift, defocus }: TransferShift,
+        order: usize,
+        light: &impl Fn([f64; 2]) -> [f64; 2],
+    ) -> [f64; 2] {
         let turns = defocus / self.wavelength;
         let mut sum = [0.0; 2];
         for node in common.nodes(order) {
             let plus = [node.at[0] + shift[0], node.at[1] + shift[1]];
             let minus = [node.at[0] - shift[0], node.at[1] - shift[1]];
-            let (p, m) = (self.polynomial.at(plus), self.polynomial.at(minus));
+            let (p, m) = (light(plus), light(minus));
             let mut waves = p[0] - m[0];
             if defocus != 0.0 {
                 waves -= turns * (third_cosine(plus) - third_cosine(minus));

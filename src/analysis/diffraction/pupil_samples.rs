@@ -12,6 +12,8 @@ use std::f64::consts::TAU;
 pub struct PupilSamples {
     /// The direction cosines across the axis from the sphere to its centre.
     pub cosines: Vec<[f64; 2]>,
+    /// The pupil point of each; empty for a pupil that is given by a formula.
+    pub points: Vec<[f64; 2]>,
     /// The path difference at each point, in wavelengths.
     pub waves: Vec<f64>,
     /// The integrals of the amplitude over the cosines around each point.
@@ -94,6 +96,7 @@ impl PupilSamples {
             (least, most) = (least.min(area), most.max(area));
             let energy = nodes.weights[node] * share;
             samples.cosines.push([a.value, b.value]);
+            samples.points.push(p);
             samples.waves.push(found.waves.value);
             samples.amplitudes.push(energy * area.abs().sqrt());
             samples.energies.push(energy);

@@ -62,7 +62,8 @@ impl GhostPath {
     pub fn trace(&self, ray: Ray<f64>, wavelength: f64, coating: Coating) -> GhostRay {
         let mut met = Vec::with_capacity(self.steps.len());
         let traced = self.tracer.visit(ray, |_, point| met.push(point));
-        GhostRay { traced, intensity: self.intensity(ray, &met, wavelength, coating) }
+        let intensity = intensity(&self.system, (&self.indices, coating), ray, &met, wavelength);
+        GhostRay { traced, intensity }
     }
 
     /// The same path without rims and obstructions that clip.
@@ -74,31 +75,6 @@ impl GhostPath {
     /// The surface of the lens at which a ray is lost.
     pub fn lost_at(&self, fate: Fate) -> Option<usize> {
         fate.surface().and_then(|step| self.steps.get(step)).copied()
-    }
-
-    /// The share of the light of a ray that all steps in front of the last let pass or reflect.
-    fn intensity(
-        &self,
-        ray: Ray<f64>,
-        met: &[Vec3<f64>],
-        wavelength: f64,
-        coating: Coating,
-    ) -> [f64; 2] {
-        let mut shares = [1.0; 2];
-        let mut direction = ray.direction;
-        for (k, point) in met.iter().enumerate().take(self.steps.len() - 1) {
-            if k > 0 {
-                let gap = self.system.surfaces[k - 1].thickness;
-                direction = unit(*point + Vec3::new(0.0, 0.0, gap) - met[k - 1], direction);
-            }
-            let surface = &self.system.surfaces[k];
-            let cosine = direction.dot(normal_at(surface, *point)).abs();
-            let reflected = coating.reflectance(self.indices[k], wavelength, cosine);
-            for (share, r) in shares.iter_mut().zip(reflected) {
-                *share *= if surface.mirror { r } else { 1.0 - r };
-            }
-        }
-        shares
     }
 
     /// The ghost by first-order optics.
@@ -168,6 +144,32 @@ impl GhostPath {
         }
         least
     }
+}
+
+/// The share of the light of a ray that all surfaces in front of the last let pass, or reflect where they
+/// are mirrors, from the points where it meets them; the indices in front of each surface and behind it.
+pub(super) fn intensity(
+    system: &System<f64>,
+    (indices, coating): (&[[f64; 2]], Coating),
+    ray: Ray<f64>,
+    met: &[Vec3<f64>],
+    wavelength: f64,
+) -> [f64; 2] {
+    let mut shares = [1.0; 2];
+    let mut direction = ray.direction;
+    for (k, point) in met.iter().enumerate().take(system.surfaces.len() - 1) {
+        if k > 0 {
+            let gap = system.surfaces[k - 1].thickness;
+            direction = unit(*point + Vec3::new(0.0, 0.0, gap) - met[k - 1], direction);
+        }
+        let surface = &system.surfaces[k];
+        let cosine = direction.dot(normal_at(surface, *point)).abs();
+        let reflected = coating.reflectance(indices[k], wavelength, cosine);
+        for (share, r) in shares.iter_mut().zip(reflected) {
+            *share *= if surface.mirror { r } else { 1.0 - r };
+        }
+    }
+    shares
 }
 
 /// The lens that light meets along some steps: gaps run backwards between the two mirrors.

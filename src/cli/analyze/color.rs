@@ -3,7 +3,7 @@
 
 use super::{AnalysisRun, AtField, SelectedField, TextLines};
 use crate::analysis::{
-    LateralColor, LongitudinalAberration, ZoneFocus, footprint, lateral_color,
+    LateralColor, LongitudinalAberration, ZoneFocus, chief_points, footprint, lateral_color,
     longitudinal_aberration,
 };
 use crate::cli::error::CliError;
@@ -30,15 +30,19 @@ struct ColorShiftJson {
     wavelength_um: f64,
     dx: f64,
     dy: f64,
+    /// The image point of the chief ray; `None` where it is lost.
+    point: Option<[f64; 2]>,
 }
 
 pub(super) fn lateral_colors(run: &AnalysisRun) -> Vec<AtField<LateralColorJson>> {
     let at = |field: &SelectedField| {
         let (result, milliseconds) = time_ms(|| lateral_color(&run.model, field.traced));
+        let points = chief_points(&run.model, field.traced);
         let color = |color: &LateralColor| ColorShiftJson {
             wavelength_um: run.model.channels[color.wavelength].um,
             dx: color.shift[0],
             dy: color.shift[1],
+            point: points[color.wavelength],
         };
         let keys = result.map(|colors| LateralColorJson {
             error: 2.0 * (run.rounding() + run.model.neglected.ray_shift),
@@ -59,7 +63,7 @@ impl TextLines for LateralColorJson {
         let Self { error, rays, milliseconds, colors } = self;
         let mut lines =
             vec![format!("{}, {milliseconds:.3} ms, error {error:.0e} mm", counted(*rays, "ray"))];
-        lines.extend(colors.iter().map(|ColorShiftJson { wavelength_um, dx, dy }| {
+        lines.extend(colors.iter().map(|ColorShiftJson { wavelength_um, dx, dy, .. }| {
             format!(
                 "{wavelength_um:>9} um  dx {:>12}  dy {:>12}",
                 ShortNumber(*dx),

@@ -1,11 +1,15 @@
 //! The illumination of the fields.
 
 use super::{AnalysisRun, AtField, SelectedField, TextLines, estimate_text};
-use crate::analysis::{Estimate, Illumination, energy_irradiance, illumination, irradiance};
+use crate::analysis::{
+    Estimate, Illumination, energy_irradiance, illumination, irradiance, scene_irradiance,
+};
 use crate::cli::output::ShortNumber;
 use crate::lens::FieldPoint;
 use crate::measure::time_ms;
+use crate::picture::{Pattern, PictureError, Scene, SceneLayer};
 use crate::pupil::RayModel;
+use crate::trace::Ray;
 use serde::Serialize;
 
 /// The light at a field; a field without light has 0 and the reason.
@@ -32,20 +36,51 @@ struct PointLight {
     irradiance: Option<Estimate>,
 }
 
-/// The irradiance at the points that were asked for.
-fn point_lights(run: &AnalysisRun) -> Vec<PointLight> {
+/// The contrast of a wave.
+const WAVE_CONTRAST: f64 = 0.5;
+
+/// The scene of a wave by its two frequencies and its phase: on a plane at a distance in mm, or by the
+/// tangents of the direction of light.
+///
+/// # Errors
+/// A plane that is not in front of the lens.
+pub(super) fn wave_scene(
+    [fx, fy, phase]: [f64; 3],
+    distance: Option<f64>,
+) -> Result<Scene, PictureError> {
+    // Light comes from the opposite side of where it goes.
+    let frequency = if distance.is_some() { [fx, fy] } else { [-fx, -fy] };
+    let pattern = Pattern::Wave { contrast: WAVE_CONTRAST, frequency, phase };
+    let half_size = [f64::INFINITY; 2];
+    let layer = SceneLayer { distance, center: [0.0; 2], half_size, velocity: [0.0; 2], pattern };
+    Scene::new(vec![layer], [0.0; 3], 1.0)
+}
+
+/// The irradiance at the points that were asked for, of a scene or of radiance 1 everywhere.
+fn point_lights(run: &AnalysisRun, scene: Option<&Scene>) -> Vec<PointLight> {
     // The plan of the fields' beams says nothing about rims that other points see.
     let model = RayModel::from_lens(&run.opened.lens, run.zoom);
     let model = model.as_ref().unwrap_or(&run.model);
     let at = |point: &[f64; 2]| {
-        let (found, ms) = time_ms(|| irradiance(model, model.primary, *point, run.accuracy));
+        let (w, accuracy) = (model.primary, run.accuracy);
+        let (found, ms) = time_ms(|| match scene {
+            None => irradiance(model, w, *point, accuracy),
+            Some(scene) => {
+                let radiance = |ray: &Ray<f64>| scene.radiance(ray, 0.0)[0];
+                scene_irradiance(model, w, *point, radiance, accuracy)
+            }
+        });
         let timed = |e| Estimate { milliseconds: Some(ms), ..e };
         PointLight { x: point[0], y: point[1], irradiance: found.ok().map(timed) }
     };
     run.points.iter().map(at).collect()
 }
 
-pub(super) fn illuminations(run: &AnalysisRun) -> Vec<AtField<IlluminationJson>> {
+pub(super) fn illuminations(
+    run: &AnalysisRun,
+    scene: Option<&Scene>,
+) -> Vec<AtField<IlluminationJson>> {
+    let points = point_lights(run, scene);
     // The reference is the first field of the lens, even if it is not selected.
     let first = run.model.fields.first();
     let selected: Vec<FieldPoint> = run.fields.iter().map(|field| field.traced).collect();
@@ -56,7 +91,7 @@ pub(super) fn illuminations(run: &AnalysisRun) -> Vec<AtField<IlluminationJson>>
     let dark = results.iter().all(|light| light.error.is_some());
     let found = |(field, light): (&SelectedField, &Illumination)| match light.error {
         Some(why) if dark => AtField::new(field, Err(why)),
-        _ => keys(run, field, light, ms),
+        _ => keys(run, field, (light, &points), ms),
     };
     run.fields.iter().zip(&results[skipped..]).map(found).collect()
 }
@@ -64,7 +99,7 @@ pub(super) fn illuminations(run: &AnalysisRun) -> Vec<AtField<IlluminationJson>>
 fn keys(
     run: &AnalysisRun,
     field: &SelectedField,
-    light: &Illumination,
+    (light, points): (&Illumination, &[PointLight]),
     milliseconds: f64,
 ) -> AtField<IlluminationJson> {
     let timed = |estimate, milliseconds| Estimate { milliseconds: Some(milliseconds), ..estimate };
@@ -79,7 +114,7 @@ fn keys(
         cone: timed(light.cone, milliseconds),
         relative_cone: light.relative_cone.map(|e| timed(e, milliseconds)),
         dark: light.error.map(|dark| dark.to_string()),
-        points: point_lights(run),
+        points: points.to_vec(),
     };
     AtField::new(field, Ok(keys))
 }

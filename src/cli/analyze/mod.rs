@@ -69,6 +69,25 @@ pub(super) struct AnalyzeArgs {
     #[arg(long = "at", value_name = "X,Y", value_parser = parse_point, allow_hyphen_values = true)]
     points: Vec<[f64; 2]>,
 
+    /// A point of the pupil for `wavefront`, as `px,py` in units of its radius; may be repeated; absent: a
+    /// map of the disc
+    #[arg(long = "pupil", value_name = "PX,PY", value_parser = parse_point, allow_hyphen_values = true)]
+    pupil_points: Vec<[f64; 2]>,
+
+    /// The radii of the circles of `encircled-energy` in mm; absent: ten up to 6 lambda F
+    #[arg(long, value_name = "MM", value_delimiter = ',')]
+    radii: Vec<f64>,
+
+    /// The scene at the points of `illumination`: the radiance 1 + 0.5 cos(2 pi (FX X + FY Y) + PHASE), X
+    /// and Y being the tangents of the light's direction, or mm with --distance; absent: 1
+    #[arg(long, value_name = "FX,FY,PHASE", value_parser = parse_wave, allow_hyphen_values = true)]
+    wave: Option<[f64; 3]>,
+
+    /// The distance in mm of the plane in front of the first surface that --wave is painted on; absent:
+    /// infinity
+    #[arg(long, value_name = "MM", requires = "wave")]
+    distance: Option<f64>,
+
     /// The coating of `ghosts` between air and glass: none, single-layer, v, or a reflected share as `0.3%`
     #[arg(long, value_name = "COATING", default_value = "none", value_parser = parse_coating)]
     coating: Coating,
@@ -95,6 +114,14 @@ pub(super) fn parse_point(text: &str) -> Result<[f64; 2], String> {
     let number = |part: &str| part.trim().parse::<f64>().ok().filter(|v| v.is_finite());
     let pair = text.split_once(',').and_then(|(x, y)| Some([number(x)?, number(y)?]));
     pair.ok_or_else(|| "expected two numbers in mm, as in `0.002,-0.001`".to_owned())
+}
+
+/// The frequencies and the phase of a wave.
+fn parse_wave(text: &str) -> Result<[f64; 3], String> {
+    let numbers: Option<Vec<f64>> = text.split(',').map(|part| part.trim().parse().ok()).collect();
+    let finite = numbers.filter(|list| list.iter().all(|v| v.is_finite()));
+    let wave = finite.and_then(|list| <[f64; 3]>::try_from(list).ok());
+    wave.ok_or_else(|| "expected two frequencies and a phase, as in `300,0,0.3`".to_owned())
 }
 
 /// A coating.
@@ -249,15 +276,20 @@ impl AnalyzeArgs {
             }
             AnalysisKind::FieldCurvature => self.finish(&run, chief::curvatures(&run), output),
             AnalysisKind::Illumination => {
-                self.finish(&run, illumination::illuminations(&run), output)
+                let wave = self.wave.map(|wave| illumination::wave_scene(wave, self.distance));
+                let scene =
+                    wave.transpose().map_err(|why| CliError::Input(format!("--wave: {why}")))?;
+                self.finish(&run, illumination::illuminations(&run, scene.as_ref()), output)
             }
             AnalysisKind::ThroughFocus => self.finish(&run, focus::through_focus(&run)?, output),
-            AnalysisKind::Wavefront => self.finish(&run, wavefront::wavefronts(&run), output),
+            AnalysisKind::Wavefront => {
+                self.finish(&run, wavefront::wavefronts(&run, &self.pupil_points), output)
+            }
             AnalysisKind::OpdFan => self.finish(&run, wavefront::path_fans(&run), output),
             AnalysisKind::Zernike => self.finish(&run, wavefront::zernikes(&run), output),
             AnalysisKind::Psf => self.finish(&run, point_spread::point_spreads(&run), output),
             AnalysisKind::EncircledEnergy => {
-                self.finish(&run, point_spread::encircled(&run), output)
+                self.finish(&run, point_spread::encircled(&run, &self.radii), output)
             }
             AnalysisKind::Mtf => self.finish(&run, contrast::contrasts(&run), output),
             AnalysisKind::ThroughFocusMtf => {
@@ -304,8 +336,13 @@ impl AnalyzeArgs {
         Err(CliError::Input(format!("--plot: `{asked}` has no curves; expected one of {curves}")))
     }
 
-    /// Refuses frequencies that are no positive numbers.
-    fn check_frequencies(&self) -> Result<(), CliError> {
+    /// Refuses radii that are no positive numbers, and frequencies below zero.
+    fn check_numbers(&self) -> Result<(), CliError> {
+        if let Some(wrong) = self.radii.iter().find(|r| !(**r > 0.0 && r.is_finite())) {
+            return Err(CliError::Input(format!(
+                "--radii: found {wrong}; expected mm, above zero"
+            )));
+        }
         match self.frequencies.iter().find(|nu| !(nu.is_finite() && **nu >= 0.0)) {
             Some(wrong) => Err(CliError::Input(format!(
                 "--frequencies: found {wrong}; expected cycles/mm, zero or more"
@@ -342,7 +379,7 @@ struct SelectedField {
 
 impl AnalysisRun {
     fn new(analyze: &AnalyzeArgs) -> Result<Self, CliError> {
-        analyze.check_frequencies()?;
+        analyze.check_numbers()?;
         let choices = analyze.effects.choices(analyze.what.effect_rules())?;
         let opened = analyze.lens.open()?;
         let AnalyzeArgs { what, zoom, .. } = *analyze;

@@ -121,8 +121,9 @@ struct CircleJson {
 /// The radii of the circles, in λF.
 const RADII: [f64; 10] = [0.25, 0.5, 0.75, 1.0, 1.22, 1.5, 2.0, 3.0, 4.0, 6.0];
 
-pub(super) fn encircled(run: &AnalysisRun) -> Vec<AtField<EncircledJson>> {
-    let radii = RADII.map(|r| r * unit(run));
+pub(super) fn encircled(run: &AnalysisRun, asked: &[f64]) -> Vec<AtField<EncircledJson>> {
+    let usual = || RADII.iter().map(|r| r * unit(run)).collect();
+    let radii: Vec<f64> = if asked.is_empty() { usual() } else { asked.to_vec() };
     let at = |field: &SelectedField| {
         let (found, ms) = time_ms(|| {
             let (model, w) = (&run.model, run.model.primary);

@@ -3,8 +3,8 @@
 use super::aberration_names::aberration_name;
 use super::{AnalysisRun, AtField, SelectedField, TextLines, estimate_text};
 use crate::analysis::{
-    AnalysisError, Estimate, ReferenceForm, ZernikeMethod, ZernikeOrder, path_differences,
-    wavefront, zernike,
+    AnalysisError, ChiefPath, Estimate, PathDifference, PathError, ReferenceForm, ZernikeMethod,
+    ZernikeOrder, field_paths, wavefront, zernike,
 };
 use crate::cli::output::{ShortNumber, counted, or_dash};
 use crate::measure::time_ms;
@@ -20,7 +20,24 @@ pub(super) struct WavefrontJson {
     reached: bool,
     reference: ReferenceForm,
     missed: f64,
+    chief: ChiefJson,
     map: Vec<PathJson>,
+}
+
+/// The chief ray, and the sphere on which the paths of the map are compared with its own.
+#[derive(Serialize)]
+struct ChiefJson {
+    x: f64,
+    y: f64,
+    path: f64,
+    reference: ReferenceForm,
+}
+
+impl ChiefJson {
+    const fn new(chief: &ChiefPath) -> Self {
+        let ChiefPath { point: [x, y], path, reference } = *chief;
+        Self { x, y, path, reference }
+    }
 }
 
 /// The path difference at a pupil point.
@@ -29,6 +46,9 @@ struct PathJson {
     px: f64,
     py: f64,
     waves: Option<f64>,
+    /// The direction cosines of the line from the point of the sphere to its centre.
+    alpha: Option<f64>,
+    beta: Option<f64>,
     #[serde(skip_serializing_if = "Option::is_none")]
     why: Option<String>,
 }
@@ -36,15 +56,21 @@ struct PathJson {
 /// The steps of the map from −1 to 1.
 const MAP_STEPS: i32 = 10;
 
-pub(super) fn wavefronts(run: &AnalysisRun) -> Vec<AtField<WavefrontJson>> {
+/// The points of a map of the pupil.
+fn map_points() -> Vec<[f64; 2]> {
+    let side = |i: i32| f64::from(2 * i - MAP_STEPS) / f64::from(MAP_STEPS);
+    let points = (0..=MAP_STEPS).flat_map(|j| (0..=MAP_STEPS).map(move |i| [side(i), side(j)]));
+    points.filter(|p| p[0].hypot(p[1]) <= 1.0 + 1e-12).collect()
+}
+
+pub(super) fn wavefronts(run: &AnalysisRun, asked: &[[f64; 2]]) -> Vec<AtField<WavefrontJson>> {
+    let points = if asked.is_empty() { map_points() } else { asked.to_vec() };
     let at = |field: &SelectedField| {
         let primary = run.model.primary;
         let (found, ms) = time_ms(|| wavefront(&run.model, field.traced, primary, run.accuracy));
-        let side = |i: i32| f64::from(2 * i - MAP_STEPS) / f64::from(MAP_STEPS);
-        let points = (0..=MAP_STEPS).flat_map(|j| (0..=MAP_STEPS).map(move |i| [side(i), side(j)]));
-        let points: Vec<[f64; 2]> = points.filter(|p| p[0].hypot(p[1]) <= 1.0 + 1e-12).collect();
         let keys = found.and_then(|found| {
             let timed = |e| Estimate { milliseconds: Some(ms), ..e };
+            let (chief, map) = paths(run, field, &points)?;
             Ok(WavefrontJson {
                 rms: timed(found.rms),
                 rms_without_tilt: found.rms_without_tilt.map(timed),
@@ -52,7 +78,8 @@ pub(super) fn wavefronts(run: &AnalysisRun) -> Vec<AtField<WavefrontJson>> {
                 reached: found.converged,
                 reference: found.reference,
                 missed: found.missed,
-                map: paths(run, field, &points)?,
+                chief,
+                map,
             })
         });
         AtField::new(field, keys)
@@ -60,20 +87,22 @@ pub(super) fn wavefronts(run: &AnalysisRun) -> Vec<AtField<WavefrontJson>> {
     run.fields.iter().map(at).collect()
 }
 
-/// The path differences at some pupil points.
+/// The chief ray and the path differences at some pupil points.
 fn paths(
     run: &AnalysisRun,
     field: &SelectedField,
     points: &[[f64; 2]],
-) -> Result<Vec<PathJson>, AnalysisError> {
-    let found = path_differences(&run.model, field.traced, run.model.primary, points)?;
-    let keys = |(p, found): (&[f64; 2], Result<f64, crate::analysis::PathError>)| PathJson {
+) -> Result<(ChiefJson, Vec<PathJson>), AnalysisError> {
+    let (chief, found) = field_paths(&run.model, field.traced, run.model.primary, points)?;
+    let keys = |(p, found): (&[f64; 2], Result<PathDifference, PathError>)| PathJson {
         px: p[0],
         py: p[1],
-        waves: found.ok(),
+        waves: found.ok().map(|path| path.waves),
+        alpha: found.ok().map(|path| path.cosines[0]),
+        beta: found.ok().map(|path| path.cosines[1]),
         why: found.err().map(|why| why.to_string()),
     };
-    Ok(points.iter().zip(found).map(keys).collect())
+    Ok((ChiefJson::new(&chief), points.iter().zip(found).map(keys).collect()))
 }
 
 impl TextLines for WavefrontJson {
@@ -117,7 +146,8 @@ pub(super) fn path_fans(run: &AnalysisRun) -> Vec<AtField<PathFanJson>> {
         let side = |i: i32| f64::from(2 * i - FAN_POINTS) / f64::from(FAN_POINTS);
         let section = |axis: usize| {
             let point = |i: i32| if axis == 0 { [side(i), 0.0] } else { [0.0, side(i)] };
-            paths(run, field, &(0..=FAN_POINTS).map(point).collect::<Vec<_>>())
+            let points: Vec<_> = (0..=FAN_POINTS).map(point).collect();
+            Ok(paths(run, field, &points)?.1)
         };
         let (found, milliseconds) = time_ms(|| Ok((section(1)?, section(0)?)));
         let keys = found.map(|(tangential, sagittal)| PathFanJson {

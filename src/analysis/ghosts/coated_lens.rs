@@ -1,0 +1,75 @@
+//! The light that the surfaces of a lens let pass, on its way to a point of the image.
+
+use super::path::intensity;
+use super::{GhostError, check};
+use crate::analysis::coating::Coating;
+use crate::analysis::seen_from_image::{limited, surrounded};
+use crate::lens::System;
+use crate::pupil::RayModel;
+use crate::trace::{Ray, Tracer};
+
+/// A lens with coatings at one wavelength, as seen from points of its image.
+#[derive(Debug, Clone)]
+pub struct CoatedLens {
+    system: System<f64>,
+    indices: Vec<[f64; 2]>,
+    tracer: Tracer<f64>,
+    open: Tracer<f64>,
+    /// The wavelength, in mm.
+    wavelength: f64,
+    coating: Coating,
+}
+
+/// The light of a ray that the surfaces let pass.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PassedLight {
+    /// The shares of light polarised across (s) and in (p) the planes of incidence, as if these were one
+    /// plane all along the way.
+    pub shares: [f64; 2],
+    /// True if no rim clips the ray.
+    pub is_lit: bool,
+}
+
+impl PassedLight {
+    /// The share of unpolarised light.
+    pub fn mean(&self) -> f64 {
+        0.5 * (self.shares[0] + self.shares[1])
+    }
+}
+
+impl CoatedLens {
+    /// The lens of a model at a wavelength.
+    ///
+    /// # Errors
+    /// A lens with other surfaces than centred refracting ones.
+    pub fn new(model: &RayModel, wavelength: usize, coating: Coating) -> Result<Self, GhostError> {
+        let channel = &model.channels[wavelength];
+        check(&channel.system)?;
+        let not_traced = |_error| GhostError::NotPlain(0.into());
+        let limited = limited(model).map_err(not_traced)?;
+        let (system, _) = surrounded(&limited.channels[wavelength].system);
+        let tracer = Tracer::new(&system).map_err(not_traced)?;
+        let sides = |k: usize| [system.index_before(k), system.surfaces[k].index];
+        Ok(Self {
+            indices: (0..system.surfaces.len()).map(sides).collect(),
+            open: tracer.clone().without_rims(),
+            tracer,
+            system,
+            wavelength: 1e-3 * channel.um,
+            coating,
+        })
+    }
+
+    /// The light of a ray backwards from the image, as a [`BackwardLens`](super::super::BackwardLens)
+    /// begins it; `None` if the ray misses a surface or is totally reflected.
+    pub fn passed(&self, ray: Ray<f64>) -> Option<PassedLight> {
+        let mut met = Vec::with_capacity(self.indices.len());
+        let end = self.open.visit(ray, |_, point| met.push(point));
+        if !end.fate.is_imaged() {
+            return None;
+        }
+        let shares =
+            intensity(&self.system, (&self.indices, self.coating), ray, &met, self.wavelength);
+        Some(PassedLight { shares, is_lit: self.tracer.trace(ray).fate.is_imaged() })
+    }
+}
