@@ -27,6 +27,7 @@ mod beam;
 mod covariance;
 mod draw;
 mod error;
+mod folded;
 mod form;
 mod grade;
 mod inverse;
