@@ -50,7 +50,7 @@ pub use beam::{Beam, ColourRays, FieldBeam};
 pub use covariance::{LeverArm, MadeKind, MadeNumber, NumberCovariance, TiltingBody};
 pub use error::ToleranceError;
 pub use form::{FocusStop, FocusTreatment, QuadraticForm};
-pub use grade::{PriceClass, graded_sheet, price_classes};
+pub use grade::{PriceClass, bounded_tolerances, graded_sheet, price_classes};
 pub use inverse::{form_yield, loosest_for_yield, loosest_tolerances};
 pub use merits::{MeritOptions, Merits, merits};
 pub use monte_carlo::{RealLens, real_lenses, wilson_interval};
