@@ -233,10 +233,11 @@ impl RayProducts {
         let count = sensitivities.len();
         let (effects, with_slopes) = (DMatrix::zeros(count, count), vec![0.0; count]);
         let mut sums = Self { effects, with_slopes, slopes: 0.0 };
+        let Some(any) = sensitivities.first() else { return sums };
         // The derivative of the slopes counts where the best focus is not the image plane.
-        let shift = match (focus, sensitivities.first()) {
-            (FocusTreatment::Refocused, Some(any)) => any.focus().value,
-            _ => 0.0,
+        let shift = match focus {
+            FocusTreatment::Fixed => 0.0,
+            FocusTreatment::Refocused => any.focus().value,
         };
         let mut starts = vec![0];
         for field in &scene.beam.fields {

@@ -119,12 +119,11 @@ impl BeamColumns {
             let mut image_rays = Vec::new();
             for (wavelength, rays, weights) in colours {
                 tracers[*wavelength].trace_batch(rays, &mut landed);
-                for (i, weight) in weights.iter().enumerate() {
-                    if !landed.fate(i).is_imaged() {
-                        return None;
-                    }
-                    image_rays.push((image_ray(&landed.ray(i)), *weight));
+                if (0..weights.len()).any(|i| !landed.fate(i).is_imaged()) {
+                    return None;
                 }
+                let weighted = weights.iter().enumerate();
+                image_rays.extend(weighted.map(|(i, w)| (image_ray(&landed.ray(i)), *w)));
             }
             spots.push(SpotMoments::new(&image_rays).weighted(*weight));
         }
