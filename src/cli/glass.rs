@@ -17,6 +17,16 @@ pub(super) struct GlassArgs {
     #[arg(value_name = "WORD")]
     words: Vec<String>,
 
+    /// The glasses nearest to an index and an Abbe number at the d line, the nearest first
+    #[arg(
+        long,
+        value_names = ["ND", "VD"],
+        num_args = 2,
+        allow_negative_numbers = true,
+        conflicts_with_all = ["add", "remove"]
+    )]
+    nearest: Option<Vec<f64>>,
+
     /// Adds a catalogue for good, in place of one of the same name
     #[arg(long, value_name = "FILE", conflicts_with = "words")]
     add: Option<PathBuf>,
@@ -39,7 +49,11 @@ impl GlassArgs {
         let conditions: Vec<GlassCondition> =
             self.words.iter().map(|word| GlassCondition::new(word)).collect::<Result<_, _>>()?;
         let is_meant = |glass: &&Glass| conditions.iter().all(|c| c.is_met_by(glass));
-        let found: Vec<GlassRow> = glass::known().filter(is_meant).map(GlassRow::new).collect();
+        let mut meant: Vec<&'static Glass> = glass::known().filter(is_meant).collect();
+        if let Some([nd, vd]) = self.nearest.as_deref() {
+            sort_by_distance(&mut meant, *nd, *vd)?;
+        }
+        let found: Vec<GlassRow> = meant.into_iter().map(GlassRow::new).collect();
         if found.is_empty() {
             let query = self.words.join(" ");
             let text = format!("found no glass for `{query}`; `aplanat glass` lists all");
@@ -47,6 +61,22 @@ impl GlassArgs {
         }
         output.print(&GlassList(found))
     }
+}
+
+/// The number of glasses that are listed by their distance.
+const NEAREST: usize = 10;
+
+/// The nearest glasses to an index and an Abbe number, in order.
+fn sort_by_distance(glasses: &mut Vec<&'static Glass>, nd: f64, vd: f64) -> Result<(), CliError> {
+    if !(nd > 1.0 && nd < 10.0 && vd > 0.0 && vd < 1e3) {
+        let text =
+            format!("found nd {nd} and vd {vd}; expected those of a glass, such as 1.62 36.4");
+        return Err(CliError::Input(text));
+    }
+    let distance = |glass: &Glass| glass::distance(glass, nd, vd);
+    glasses.sort_by(|a, b| distance(a).total_cmp(&distance(b)));
+    glasses.truncate(NEAREST);
+    Ok(())
 }
 
 /// A condition on a glass.

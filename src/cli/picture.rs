@@ -367,7 +367,7 @@ impl PictureArgs {
             size: picture.frame.size(),
             focus: shot.focus,
             distance: shot.distance,
-            way: *way,
+            way,
             error: error.value,
             error_of_error: error.error,
             tolerance: self.error.0,

@@ -10,12 +10,13 @@ use crate::files;
 use crate::lens::{Lens, PerturbationKind, SurfaceNumber, Tolerance, ToleranceSheet};
 use crate::tolerance::{
     AsBuiltSpot, Derivatives, PriceClass, QuadraticForm, ToleranceAnalysis, ToleranceError,
-    ToleranceGrade, ToleranceRequest, ToleranceScene, analyze_until, form_yield, graded_sheet,
-    loosest_for_yield, loosest_tolerances, price_classes,
+    ToleranceGrade, ToleranceRequest, ToleranceScene, analyze_until, bounded_tolerances,
+    form_yield, graded_sheet, loosest_for_yield, loosest_tolerances, price_classes, real_lenses,
 };
 use serde::Serialize;
 use std::fmt::{self, Display};
 use std::path::PathBuf;
+use std::sync::atomic::AtomicBool;
 
 fn parse_sample_count(text: &str) -> Result<usize, &'static str> {
     text.parse().ok().filter(|count| *count >= 2).ok_or("expected a whole number, 2 or more")
@@ -83,10 +84,19 @@ impl ToleranceArgs {
         let stop = stop_flag();
         let analysis = analyze_until(&scene, &sheet, request, &stop).map_err(refuse)?;
         note_if_stopped(&stop);
+        refuse_lost_lenses(analysis.lost, analysis.samples, "these tolerances")
+            .map_err(|why| CliError::Failed(format!("{}: {why}", opened.file)))?;
         let loosest =
             self.loosest(&analysis.forms[1], &sheet.errors).transpose().map_err(refuse)?;
+        let loosest = loosest.map(|found| {
+            let place = (&opened.lens, &scene);
+            let (bounded, held) = bounded_tolerances(place.0, &scene.lens, (&sheet.errors, &found));
+            let loosest = Loosest::new(bounded, &analysis.forms[1], self.rms, place);
+            loosest.confirmed(&analysis.forms[1], (&scene, &sheet), held, (self.seed, &stop))
+        });
         let loosest = loosest
-            .map(|found| Loosest::new(found, &analysis.forms[1], self.rms, (&opened.lens, &scene)));
+            .transpose()
+            .map_err(|why| CliError::Failed(format!("{}: {why}", opened.file)))?;
         let report = ToleranceReport::new(self, &scene, &sheet, analysis, loosest);
         let mut failures = Failures::default();
         if let Some(path) = &self.csv {
@@ -130,6 +140,18 @@ impl ToleranceArgs {
     }
 }
 
+/// Refuses means over lenses of which most are lost: those of the others tell nothing.
+fn refuse_lost_lenses(lost: usize, samples: usize, what: &str) -> Result<(), String> {
+    if 2 * lost <= samples {
+        return Ok(());
+    }
+    Err(format!(
+        "{lost} of {samples} lenses with {what} lose rays, so that no mean or quantile tells anything \
+         of them; expected tighter ones: a tighter --grade, smaller half ranges in the file, or less \
+         asked of --loosest"
+    ))
+}
+
 fn tolerance_error(opened: &LoadedLens, source: &ToleranceError) -> CliError {
     CliError::Input(format!("{}: {source}", opened.file))
 }
@@ -155,7 +177,13 @@ struct ToleranceReport {
 struct Loosest {
     tolerances: Vec<Tolerance>,
     prices: LoosestPrices,
+    warnings: Vec<String>,
 }
+
+/// The number of real lenses by which the loosest tolerances are confirmed.
+const CONFIRMING: usize = 100;
+/// The share of the mean square spot up to which the form and these lenses are said to agree.
+const CONFIRMED: f64 = 0.05;
 
 /// The prices of the loosest tolerances, and the yield with them.
 #[derive(Serialize)]
@@ -165,6 +193,9 @@ struct LoosestPrices {
     /// The share of good lenses with the loosest tolerances, and with each as its class has it; `None`
     /// without a limit.
     good: Option<[f64; 2]>,
+    /// The refocused root mean square of lenses with random errors within these tolerances, by their
+    /// rays and by the quadratic model on the same errors, in mm.
+    confirmed: Option<[f64; 2]>,
 }
 
 impl Loosest {
@@ -184,7 +215,49 @@ impl Loosest {
             [&tolerances, &by_class].map(|tolerances| form_yield(form, tolerances, limit))
         });
         let classes = prices.into_iter().map(|price| price.map(|(class, _)| class)).collect();
-        Self { tolerances, prices: LoosestPrices { classes, good } }
+        let prices = LoosestPrices { classes, good, confirmed: None };
+        Self { tolerances, prices, warnings: Vec::new() }
+    }
+
+    /// Confirmed by rays of lenses with these tolerances, of which `held` are not as wide as the form
+    /// has them.
+    fn confirmed(
+        mut self,
+        form: &QuadraticForm,
+        (scene, sheet): (&ToleranceScene, &ToleranceSheet),
+        held: usize,
+        (seed, stop): (u64, &AtomicBool),
+    ) -> Result<Self, String> {
+        if held > 0 {
+            self.warnings.push(format!(
+                "{held} of the loosest tolerances are held at ten times the commercial class, or ten \
+                 times what they were: the quadratic model would have them wider"
+            ));
+        }
+        let sheet = ToleranceSheet { errors: self.tolerances.clone(), ..sheet.clone() };
+        let lenses = real_lenses(scene, &sheet, seed, CONFIRMING, 0, stop);
+        let lenses = lenses.map_err(|why| why.to_string())?;
+        let arrived: Vec<[f64; 2]> = lenses
+            .iter()
+            .filter_map(|lens| Some([lens.mean_square?[1], form.at(&lens.errors)]))
+            .collect();
+        refuse_lost_lenses(lenses.len() - arrived.len(), lenses.len(), "the loosest tolerances")?;
+        if arrived.is_empty() {
+            return Ok(self);
+        }
+        let mean =
+            |i: usize| arrived.iter().map(|pair| pair[i]).sum::<f64>() / arrived.len() as f64;
+        let [real, by_form] = [mean(0), mean(1)];
+        self.prices.confirmed = Some([real.sqrt(), by_form.sqrt()]);
+        if (real - by_form).abs() > CONFIRMED * by_form {
+            self.warnings.push(format!(
+                "with the loosest tolerances the mean square spot of {} lenses by their rays differs \
+                 from the quadratic model by {:.0} %; the tolerances are not to be trusted so far",
+                arrived.len(),
+                100.0 * (real / by_form - 1.0)
+            ));
+        }
+        Ok(self)
     }
 }
 
@@ -218,7 +291,8 @@ impl ToleranceReport {
         analysis: ToleranceAnalysis,
         loosest: Option<Loosest>,
     ) -> Self {
-        let warnings = warnings(&analysis);
+        let mut warnings = warnings(&analysis);
+        warnings.extend(loosest.iter().flat_map(|loosest| loosest.warnings.clone()));
         let (loosest, prices) = loosest.map(|l| (l.tolerances, l.prices)).unzip();
         Self {
             errors: sheet.errors.len(),
@@ -276,14 +350,6 @@ fn rows(sheet: &ToleranceSheet, analysis: &ToleranceAnalysis) -> Vec<Sensitivity
 
 fn warnings(analysis: &ToleranceAnalysis) -> Vec<String> {
     let mut warnings = Vec::new();
-    let (lost, samples) = (analysis.lost, analysis.samples);
-    if 2 * lost > samples {
-        warnings.push(format!(
-            "{lost} of {samples} lenses lose rays: the means and quantiles are those of the others and say \
-             nothing of lenses with these tolerances"
-        ));
-        return warnings;
-    }
     for spot in analysis.spots.iter().filter(|spot| !spot.form_agrees) {
         let [apart, error] = spot.difference.map(|v| 100.0 * v / spot.form_mean_rms);
         warnings.push(format!(
@@ -339,6 +405,13 @@ impl Display for ToleranceReport {
             if let Some([good, by_class]) = prices.good {
                 let [good, by_class] = [good, by_class].map(percent);
                 writeln!(f, "yield by the quadratic model: {good}; each at its class: {by_class}")?;
+            }
+            if let Some([real, form]) = prices.confirmed.map(|rms| rms.map(ShortNumber)) {
+                writeln!(
+                    f,
+                    "refocused rms of {CONFIRMING} lenses with them: {real} mm by rays, {form} mm by \
+                     the quadratic model"
+                )?;
             }
         }
         self.warnings.iter().try_for_each(|warning| writeln!(f, "warning: {warning}"))

@@ -9,6 +9,7 @@
 mod adjoint_memory;
 mod aperture_stop;
 mod camera;
+mod candle_light;
 mod entrance_pupil;
 mod fibre;
 mod gradient_image;
@@ -51,6 +52,7 @@ pub const ALL: &[Experiment] = &[
     entrance_pupil::EXPERIMENT,
     gradient_image::EXPERIMENT,
     pareto_front::EXPERIMENT,
+    candle_light::EXPERIMENT,
     motion::EXPERIMENT,
     vignetting::EXPERIMENT,
     zoom::EXPERIMENT,

@@ -2,20 +2,25 @@
 //! exposed to equal brightness of the image. The bright lens is less sharp, but its shorter
 //! exposure makes the moving target sharper.
 //!
-//! The brightness of an extended scene on the axis is its radiance times the projected solid angle of the
-//! light there, so that exposures are in the inverse ratio of these. Pictures of moving bars by rays from
-//! every pixel check it, and the contrasts. Contrast is that of the spot on the axis, `|∫ exp(2πi ν x) dw| / ∫ dw`, times that
-//! of the motion `s` of the image during the exposure, `|sin(π ν s) / (π ν s)|`.
+//! The brightness of a point of the image of an extended scene is its radiance times the projected solid
+//! angle of the light there. Both images have the same overall brightness, its mean over the circle of the
+//! fields, so that exposures are in the inverse ratio of these means. Pictures of moving bars on the axis by
+//! rays from every pixel check the solid angle there, and the contrasts. Contrast is that of the spot on the
+//! axis, `|∫ exp(2πi ν x) dw| / ∫ dw`, times that of the motion `s` of the image during the exposure,
+//! `|sin(π ν s) / (π ν s)|`.
 
 use super::camera::{CameraFrame, darkest_and_brightest, draw_pictures, take};
 use super::{
     Claim, DataTable, Effort, Experiment, ExperimentError, ExperimentOutcome, ExperimentResult,
     NamedPlot, ProgressFn, report_progress,
 };
-use crate::analysis::{distortion, irradiance};
+use crate::analysis::{Estimate, distortion, irradiance};
 use crate::lens::{FieldPoint, Lens};
+use crate::math::quadrature::gauss_legendre;
 use crate::optimize::pareto::ParetoPoint;
-use crate::picture::{ExactSettings, Pattern, Picture, Scene, SceneLayer, filling_size};
+use crate::picture::{
+    ExactSettings, Pattern, Picture, Scene, SceneLayer, field_diagonal, filling_size,
+};
 use crate::plot::{Axis, Canvas, Chart, Color, Legend, PALETTE, Stroke};
 use crate::pupil::{Accuracy, RayModel, Region};
 use std::f64::consts::PI;
@@ -56,8 +61,8 @@ fn run(effort: Effort, progress: &mut ProgressFn<'_>) -> ExperimentResult {
     let mut rays = 0;
     let [dark, bright] =
         [MovingShot::of(&designs[0], &mut rays)?, MovingShot::of(&designs[1], &mut rays)?];
-    let times = bright.brightness / dark.brightness;
-    let pair = ExposurePair { dark, bright, exposure_ratio: times };
+    let exposure_ratio = bright.brightness.value / dark.brightness.value;
+    let pair = ExposurePair { dark, bright, exposure_ratio };
     report_progress(progress, 0.7, "pictures of moving bars")?;
     let mut claims = pair.claims();
     claims.extend(pair.picture_claims(&mut rays)?);
@@ -84,9 +89,9 @@ struct MovingShot {
     /// The height of the image over the tangent of its field angle near the axis, in mm: the focal length
     /// but for the defocus of the image plane.
     scale: f64,
-    /// The projected solid angle of the light on the axis, and its relative error.
-    brightness: f64,
-    error: f64,
+    /// The projected solid angle of the light on the axis, and its mean over the image.
+    on_axis: Estimate,
+    brightness: Estimate,
     /// The x coordinates in mm and the weights of the rays of the field on the axis.
     spot: Vec<[f64; 2]>,
 }
@@ -95,16 +100,9 @@ impl MovingShot {
     fn of(design: &ParetoPoint, rays: &mut usize) -> ExperimentResult<Self> {
         let spot = spot(&design.lens, rays)?;
         let model = RayModel::from_lens(&design.lens, 0)?;
-        let light = irradiance(&model, model.primary, [0.0; 2], ACCURACY);
-        let light = light.map_err(|error| ExperimentError::Failed(error.to_string()))?;
-        *rays += design.rays + light.rays;
-        Ok(Self {
-            scale: image_scale(&model)?,
-            brightness: light.value,
-            error: light.error / light.value,
-            spot,
-            design: design.clone(),
-        })
+        let (on_axis, brightness) = (solid_angle(&model, 0.0)?, mean_solid_angle(&model)?);
+        *rays += design.rays + on_axis.rays + brightness.rays;
+        Ok(Self { scale: image_scale(&model)?, on_axis, brightness, spot, design: design.clone() })
     }
 
     /// A picture during an exposure of this many seconds of a layer that the image of moves by [`WAY`] to the
@@ -191,6 +189,32 @@ fn spot(lens: &Lens, rays: &mut usize) -> ExperimentResult<Vec<[f64; 2]>> {
     Ok(places.collect())
 }
 
+/// The projected solid angle of the light at a distance from the axis in mm.
+fn solid_angle(model: &RayModel, height: f64) -> ExperimentResult<Estimate> {
+    let found = irradiance(model, model.primary, [0.0, height], ACCURACY);
+    found.map_err(|error| ExperimentError::Failed(error.to_string()))
+}
+
+/// The orders of the quadrature over the image, whose difference is its error.
+const IMAGE_ORDERS: [usize; 2] = [4, 8];
+
+/// The mean projected solid angle over the circle of the fields.
+fn mean_solid_angle(model: &RayModel) -> ExperimentResult<Estimate> {
+    let radius = 0.5 * field_diagonal(model)?;
+    let (mut rays, mut error) = (0, 0.0);
+    let mut mean = |order: usize| {
+        // Nodes in the square of the height stand for rings of equal area.
+        gauss_legendre(order, 0.0, 1.0).into_iter().try_fold(0.0, |sum, (place, weight)| {
+            let found = solid_angle(model, radius * place.sqrt())?;
+            rays += found.rays;
+            error = found.error.max(error);
+            Ok::<_, ExperimentError>(sum + weight * found.value)
+        })
+    };
+    let [coarse, fine] = [mean(IMAGE_ORDERS[0])?, mean(IMAGE_ORDERS[1])?];
+    Ok(Estimate::new(fine, (fine - coarse).abs() + error, rays))
+}
+
 /// The number of azimuths to which a radius of the spot on the axis is rotated.
 const AZIMUTHS: usize = 32;
 
@@ -225,7 +249,8 @@ impl ExposurePair {
 
     fn claims(&self) -> Vec<Claim> {
         let [dark, bright, moving_dark, moving_bright] = self.contrasts(COMPARED);
-        let error = self.exposure_ratio * (self.dark.error + self.bright.error);
+        let relative = |shot: &MovingShot| shot.brightness.error / shot.brightness.value;
+        let error = self.exposure_ratio * (relative(&self.dark) + relative(&self.bright));
         let sharper = self.dark.design.spot / self.bright.design.spot;
         vec![
             Claim::at_least(
@@ -256,14 +281,13 @@ impl ExposurePair {
         let [_, _, moving_dark, moving_bright] = self.contrasts(COMPARED);
         let predicted = moving_bright / moving_dark;
         let error = (dark_error / dark).hypot(bright_error / bright);
-        // The mean of bars is half of the light; each picture counts its own time.
-        let equal = bright_light * seconds / dark_light;
+        let solid_angles = self.bright.on_axis.value / self.dark.on_axis.value;
         let light_error = (dark_error.hypot(bright_error)) / 2f64.sqrt();
         Ok(vec![
             Claim::at_most(
-                "exposures by the inverse ratio of solid angles: brightness of the pictures over each \
-                 other, less 1",
-                (equal - 1.0).abs(),
+                "light of the pictures on the axis, bright over dark, over the ratio of the solid angles \
+                 there, less 1",
+                (bright_light / dark_light / solid_angles - 1.0).abs(),
                 EQUAL,
             )
             .with_error(light_error),
@@ -296,12 +320,14 @@ impl ExposurePair {
     }
 
     fn lenses(&self) -> DataTable {
-        let columns = ["lens", "spot_mm", "light_mm2", "brightness", "exposure"];
+        let columns =
+            ["lens", "spot_mm", "light_mm2", "solid_angle_on_axis", "mean_solid_angle", "exposure"];
         let mut table = DataTable::new("lenses", &columns);
         let exposures =
             [("darkest", &self.dark, self.exposure_ratio), ("brightest", &self.bright, 1.0)];
         for (name, shot, exposure) in exposures {
-            let numbers = [shot.design.spot, shot.design.light, shot.brightness, exposure];
+            let light = [shot.on_axis.value, shot.brightness.value];
+            let numbers = [shot.design.spot, shot.design.light, light[0], light[1], exposure];
             table.push_row(std::iter::once(name.into()).chain(numbers.map(Into::into)));
         }
         table

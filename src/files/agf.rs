@@ -93,7 +93,8 @@ pub fn parse_agf(bytes: &[u8], maker: &str, file: &str) -> Result<AgfCatalogue, 
         match records.glass(maker) {
             Ok(glass) if names.insert(glass.glass.name.clone()) => {
                 let name = || glass.glass.name.clone();
-                let remark = records.contradiction(&glass.glass).map(|text| (name(), text));
+                let remark =
+                    contradiction(&glass.glass, records.stated_index()).map(|text| (name(), text));
                 catalogue.contradictory.extend(remark);
                 catalogue.glasses.push(glass);
             }
@@ -191,12 +192,9 @@ impl<'a> GlassRecords<'a> {
         })
     }
 
-    /// The index at the d line by the file and by the formula, if they differ.
-    fn contradiction(&self, glass: &Glass) -> Option<String> {
-        let said = self.words("NM").get(3).copied().map(number).filter(|nd| *nd > 0.0)?;
-        let found = glass.index(line::D)?;
-        let text = || format!("nd is {said} by the file, {found:.5} by its formula");
-        ((found - said).abs() > SAME_INDEX).then(text)
+    /// The index at the d line that the file gives; 0 stands for none.
+    fn stated_index(&self) -> Option<f64> {
+        self.words("NM").get(3).copied().map(number).filter(|nd| *nd > 0.0)
     }
 
     fn range(&self) -> Result<[f64; 2], String> {
@@ -214,6 +212,13 @@ impl<'a> GlassRecords<'a> {
             .filter(|line| line.iter().all(|value| value.is_finite()))
             .collect()
     }
+}
+
+/// The index at the d line by the file and by the formula, if they differ.
+pub(super) fn contradiction(glass: &Glass, stated: Option<f64>) -> Option<String> {
+    let (said, found) = (stated?, glass.index(line::D)?);
+    let text = || format!("nd is {said} by the file, {found:.5} by its formula");
+    ((found - said).abs() > SAME_INDEX).then(text)
 }
 
 fn number(word: &str) -> f64 {

@@ -79,7 +79,7 @@ fn add_material(path: &Path, file: &str) -> Result<(AgfCatalogue, Vec<PathBuf>),
         return refuse(found, "one in a folder with the name of its maker");
     }
     let added = match parse_material(&bytes, &maker, &name) {
-        Ok(glass) => glass,
+        Ok(material) => material,
         Err(found) => return refuse(found, "a material with a formula"),
     };
     let settings = folder_for_writing(file)?;
@@ -93,7 +93,7 @@ fn add_material(path: &Path, file: &str) -> Result<(AgfCatalogue, Vec<PathBuf>),
     let target = folder.join(format!("{name}.yml"));
     write_atomic(&target, &bytes)?;
     add_glasses(&read_materials(&folder));
-    Ok((AgfCatalogue { glasses: vec![added], ..AgfCatalogue::default() }, vec![target]))
+    Ok((added, vec![target]))
 }
 
 /// Adds a catalogue for good: it is copied into the folder of the settings, in place of one of the same

@@ -1,15 +1,15 @@
 //! The models of the program ray-optics, `.roa`: reading.
 //!
-//! A model is JSON that names the classes of the program. What this program has no counterpart of, a thin
-//! lens or a diffractive surface, becomes a locked row with its JSON.
+//! A model is JSON that names the classes of the program. What this program has no counterpart of, a
+//! hologram, becomes a locked row with its JSON.
 
 use super::codev::{Placement, frames};
 use super::error::{FileError, ParseError};
 use super::report::{ConversionOutcome, ConversionReport};
 use super::zemax::named_medium;
 use crate::lens::{
-    ASPHERE_TERMS, Aperture, FieldKind, FieldPoint, Fields, Lens, LockedSurface, Medium, Object,
-    Row, SurfaceNumber, Wavelength,
+    ASPHERE_TERMS, Aperture, FieldKind, FieldPoint, Fields, Freeform, FreeformKind, IdealElement,
+    Lens, LockedSurface, Medium, Object, Row, SurfaceNumber, Wavelength,
 };
 use serde_json::Value;
 
@@ -265,10 +265,25 @@ impl RowSource<'_> {
         let phase = data.get("phase_element").filter(|phase| !phase.is_null());
         let kind = match (class(self.surface), phase) {
             ("Surface", None) => shape.err(),
+            ("Surface", Some(phase)) if shape.is_ok() && row.freeform.is_none() => {
+                row.freeform = self.phase(phase);
+                row.freeform.is_none().then(|| class(phase).to_owned())
+            }
+            ("ThinLens", _) => match self.thin_lens(data) {
+                None => Some("ThinLens".to_owned()),
+                found => {
+                    (row.ideal, row.curvature) = (found, 0.0);
+                    let note = "a paraxial lens in place of a hologram of two points";
+                    let what = format!("{place}: ThinLens");
+                    report.add(ConversionOutcome::Approximated, &what, note);
+                    None
+                }
+            },
             ("Surface", Some(phase)) => Some(class(phase).to_owned()),
             (other, _) => Some(other.to_owned()),
         };
         if let Some(kind) = kind {
+            row.freeform = None;
             let note = "cannot be traced: the row is locked and rays meet its conic alone";
             report.add(ConversionOutcome::Locked, &format!("{place}: {kind}"), note);
             row.locked = Some(LockedSurface { kind, lines: vec![self.surface.to_string()] });
@@ -302,17 +317,50 @@ impl RowSource<'_> {
             "RadialPolynomial" => 1,
             other => return Err(other.to_owned()),
         };
-        let (unit, terms) = (self.unit, self::numbers(&numbers["coefs"]));
-        let mut asphere = vec![0.0; ASPHERE_TERMS];
-        for (power, value) in (first..).step_by(first).zip(terms).filter(|(_, a)| *a != 0.0) {
-            let slot = asphere.get_mut((power / 2).wrapping_sub(2)).filter(|_| power % 2 == 0);
-            *slot.ok_or_else(|| format!("{} with a term in r^{power}", class(profile)))? =
-                value * unit.powi(1 - i32::try_from(power).unwrap_or(i32::MAX));
+        let terms = self::numbers(&numbers["coefs"]);
+        let powers: Vec<(usize, f64)> =
+            (first..).step_by(first).zip(terms).filter(|(_, a)| *a != 0.0).collect();
+        let is_asphere = |(power, _): &(usize, f64)| {
+            power.is_multiple_of(2) && (4..2 * ASPHERE_TERMS + 4).contains(power)
+        };
+        let last = powers.last().map_or(0, |(power, _)| *power);
+        if powers.iter().all(is_asphere) {
+            row.asphere = vec![0.0; (last / 2).saturating_sub(1)];
+            for (power, a) in powers {
+                let scale = self.unit.powi(1 - i32::try_from(power).unwrap_or(i32::MAX));
+                row.asphere[power / 2 - 2] = a * scale;
+            }
+            return Ok(());
         }
-        let used = asphere.iter().rposition(|a| *a != 0.0).map_or(0, |last| last + 1);
-        asphere.truncate(used);
-        row.asphere = asphere;
+        let mut numbers = vec![0.0; last];
+        powers.into_iter().for_each(|(power, a)| numbers[power - 1] = a);
+        let form = Freeform { kind: FreeformKind::OddAsphere, numbers }.scaled(self.unit);
+        if form.fault().is_some() {
+            return Err(format!("{} with a term in r^{last}", class(profile)));
+        }
+        row.freeform = Some(form);
         Ok(())
+    }
+
+    /// The paraxial lens in air of the power of a thin lens; `None` for one without any.
+    fn thin_lens(&self, data: &Value) -> Option<IdealElement> {
+        let power = data.get("_power").or_else(|| data.get("power"))?.as_f64()?;
+        let focal_length = self.unit / power;
+        (focal_length.abs() < 1e50).then_some(IdealElement::Lens { focal_length })
+    }
+
+    /// The phase of a diffractive element, whose coefficients are optical paths at its wavelength; `None`
+    /// for another element, and for a function that is not known.
+    fn phase(&self, element: &Value) -> Option<Freeform<f64>> {
+        let data = attributes(element);
+        let known =
+            class(element) == "DiffractiveElement" && data["phase_fct_name"] == "radial_phase_fct";
+        let (nm, order) = (number(&data["ref_wl"]), data["order"].as_f64()?);
+        let per_mm = std::f64::consts::TAU / (nm * 1e-6);
+        let numbers = numbers(&data["coefficients"]).into_iter().map(|c| c * per_mm).collect();
+        let kind = FreeformKind::RadialPhase { radius: 1.0, order };
+        let form = Freeform { kind, numbers }.scaled(self.unit);
+        (known && nm > 0.0 && form.fault().is_none()).then_some(form)
     }
 
     fn place(&self, data: &Value, row: &mut Row) {

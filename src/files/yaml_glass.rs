@@ -5,7 +5,7 @@
 //! formulas are those of the database's document *Dispersion formulas*, numbers 1 to 9; tables of indices are
 //! refused by name, since between their rows every index would be a guess.
 
-use super::agf::{AgfCatalogue, AgfGlass, check_index};
+use super::agf::{AgfCatalogue, AgfGlass, check_index, contradiction};
 use super::bounded::{MAX_LENS_BYTES, read_file};
 use super::text;
 use crate::lens::glass::{DispersionFormula, Glass};
@@ -73,18 +73,23 @@ pub(super) fn read_materials(folder: &Path) -> AgfCatalogue {
         let bytes = read_file(&path, MAX_LENS_BYTES).map_err(|why| why.to_string());
         let read = bytes.and_then(|b| parse_material(&b, &maker_of_folder(folder), &name));
         match read {
-            Ok(glass) => catalogue.glasses.push(glass),
+            Ok(material) => catalogue.append(material),
             Err(why) => catalogue.refused.push((name, why)),
         }
     }
     catalogue
 }
 
-/// The material of a file.
+/// The material of a file, alone in a catalogue, with a remark if its formula contradicts the index that it
+/// gives.
 ///
 /// # Errors
 /// The reason why it has no index: no YAML, a table, or a formula that has no value in its own range.
-pub(super) fn parse_material(bytes: &[u8], maker: &str, name: &str) -> Result<AgfGlass, String> {
+pub(super) fn parse_material(
+    bytes: &[u8],
+    maker: &str,
+    name: &str,
+) -> Result<AgfCatalogue, String> {
     if let Some(found) = text::binary_kind(bytes) {
         return Err(found);
     }
@@ -122,7 +127,13 @@ pub(super) fn parse_material(bytes: &[u8], maker: &str, name: &str) -> Result<Ag
         density: file.density(),
     };
     check_index(&mut glass)?;
-    Ok(AgfGlass::without_remarks(glass))
+    let remark = contradiction(&glass, number("nd")).map(|text| (name.to_owned(), text));
+    let glasses = vec![AgfGlass::without_remarks(glass)];
+    Ok(AgfCatalogue {
+        glasses,
+        contradictory: remark.into_iter().collect(),
+        ..AgfCatalogue::default()
+    })
 }
 
 impl MaterialFile {
@@ -202,8 +213,8 @@ mod tests {
 
     fn index(kind: &str, coefficients: &str) -> f64 {
         let text = material(kind, coefficients);
-        let glass = parse_material(text.as_bytes(), "MAKER", "G").unwrap().glass;
-        glass.index(0.6).unwrap()
+        let material = parse_material(text.as_bytes(), "MAKER", "G").unwrap();
+        material.glasses[0].glass.index(0.6).unwrap()
     }
 
     #[test]
@@ -242,7 +253,9 @@ mod tests {
         let coefficients =
             "0 1.03961212 0.00600069867 0.231792344 0.0200179144 1.01046945 103.560653";
         let text = material("formula 2", coefficients);
-        let glass = parse_material(text.as_bytes(), "SCHOTT", "N-BK7").unwrap().glass;
+        let material = parse_material(text.as_bytes(), "SCHOTT", "N-BK7").unwrap();
+        assert_eq!(material.contradictory, []);
+        let glass = &material.glasses[0].glass;
         // The data sheet: nd 1.51680, vd 64.17.
         assert!((glass.nd - 1.51680).abs() < 5e-6 && (glass.vd - 64.17).abs() < 5e-3);
         assert_eq!(glass.density, Some(2.51));
@@ -275,13 +288,28 @@ mod tests {
     }
 
     #[test]
+    fn an_index_that_contradicts_the_formula_is_named() {
+        let remarks = |nd: &str| {
+            let text = material("formula 2", "0 1.1 0.01").replace("nd: 1.5168", nd);
+            parse_material(text.as_bytes(), "M", "G").unwrap().contradictory
+        };
+        // n² = 1 + 1.1 λ²/(λ² − 0.01) at 0.5875618 µm.
+        let text = "nd is 1.5168 by the file, 1.46042 by its formula".to_owned();
+        assert_eq!(remarks("nd: 1.5168"), [("G".to_owned(), text)]);
+        assert_eq!(remarks("nd: 1.46042"), []);
+        assert_eq!(remarks("Vd: 50"), []);
+    }
+
+    #[test]
     fn densities_of_both_ages_of_the_database_are_in_grams() {
         let list = material("formula 2", "0 1.1 0.01")
             .replace("density: 2.51 g/cm<sup>3</sup>", "density:\n      - value: 2510");
-        let glass = parse_material(list.as_bytes(), "M", "G").unwrap().glass;
-        assert!((glass.density.unwrap() - 2.51).abs() < 1e-12);
+        let density = |text: &str| {
+            parse_material(text.as_bytes(), "M", "G").unwrap().glasses[0].glass.density
+        };
+        assert!((density(&list).unwrap() - 2.51).abs() < 1e-12);
         let bare = material("formula 2", "0 1.1 0.01").replace("2.51 g/cm<sup>3</sup>", "2510");
-        assert_eq!(parse_material(bare.as_bytes(), "M", "G").unwrap().glass.density, None);
+        assert_eq!(density(&bare), None);
     }
 
     #[test]
@@ -299,7 +327,8 @@ mod tests {
             let mut damaged = text.clone();
             let at = i.wrapping_mul(2_654_435_761) % damaged.len();
             damaged[at] = (i / 7 % 256) as u8;
-            if let Ok(glass) = parse_material(&damaged, "M", "G") {
+            if let Ok(material) = parse_material(&damaged, "M", "G") {
+                let glass = &material.glasses[0];
                 assert!(
                     glass.glass.index(0.5 * glass.glass.range_um.iter().sum::<f64>()).is_some()
                 );

@@ -322,6 +322,11 @@ impl Row {
     }
 
     fn check_freeform(&self, surface: SurfaceNumber) -> Result<(), LensError> {
+        if self.locked.is_some() && (self.freeform.is_some() || self.ideal.is_some()) {
+            let why = "is locked and has a freeform or a rule beside; expected one of them, since \
+                       nobody knows what a locked surface is";
+            return Err(LensError::Inconsistent(format!("surface {surface} {why}")));
+        }
         if let Some(why) = self.ideal.and_then(|ideal| ideal.fault(self)) {
             return Err(LensError::Inconsistent(format!("surface {surface}: {why}")));
         }

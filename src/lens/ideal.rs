@@ -1,6 +1,6 @@
 //! Surfaces that deflect light by a rule: a paraxial lens and a ruled grating.
 
-use super::Row;
+use super::{FreeformKind, Row};
 use crate::math::Real;
 use serde::{Deserialize, Serialize};
 
@@ -39,6 +39,11 @@ pub enum IdealAction<R> {
         /// The growth of the optical direction along y.
         shift: R,
     },
+    /// The phase of the freeform of the surface.
+    Phase {
+        /// The optical path that a phase of one radian in the first order adds, in mm.
+        path: R,
+    },
 }
 
 impl IdealElement {
@@ -71,6 +76,10 @@ impl IdealElement {
 
     /// The fault of the element on a surface, as the rest of a sentence; `None` if there is none.
     pub(super) fn fault(self, row: &Row) -> Option<String> {
+        if let Some(form) = row.freeform.as_ref().filter(|form| form.kind.is_phase()) {
+            let (own, other) = (self.name(), form.kind.name());
+            return Some(format!("a {own} and a {other} on one surface; expected one of them"));
+        }
         match self {
             Self::Lens { focal_length } => {
                 let plain = row.curvature == 0.0 && row.asphere.iter().all(|a| *a == 0.0);
@@ -97,12 +106,20 @@ impl IdealElement {
     }
 }
 
+impl IdealAction<f64> {
+    /// The rule of a freeform at a wavelength `um` in micrometres; `None` for one that adds to the sag.
+    pub(super) fn of_form(kind: FreeformKind, um: f64) -> Option<Self> {
+        kind.order().map(|order| Self::Phase { path: order * um * 1e-3 / std::f64::consts::TAU })
+    }
+}
+
 impl<R: Real> IdealAction<R> {
     /// The same rule with its number mapped by `f`.
     pub fn map<S: Real>(self, f: impl Fn(R) -> S) -> IdealAction<S> {
         match self {
             Self::Lens { power } => IdealAction::Lens { power: f(power) },
             Self::Grating { shift } => IdealAction::Grating { shift: f(shift) },
+            Self::Phase { path } => IdealAction::Phase { path: f(path) },
         }
     }
 
@@ -110,7 +127,7 @@ impl<R: Real> IdealAction<R> {
     pub fn power(self) -> R {
         match self {
             Self::Lens { power } => power,
-            Self::Grating { .. } => R::ZERO,
+            Self::Grating { .. } | Self::Phase { .. } => R::ZERO,
         }
     }
 
@@ -119,6 +136,7 @@ impl<R: Real> IdealAction<R> {
         match self {
             Self::Lens { power } => power,
             Self::Grating { shift } => shift,
+            Self::Phase { path } => path,
         }
     }
 }

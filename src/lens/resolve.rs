@@ -2,7 +2,8 @@
 
 use super::system::{Surface, System};
 use super::{
-    Lens, LensError, Medium, MediumPlace, Object, Parameter, Pickup, Pose, Row, SystemError,
+    IdealAction, Lens, LensError, Medium, MediumPlace, Object, Parameter, Pickup, Pose, Row,
+    SystemError,
 };
 use super::{glass, grin};
 use crate::math::Real;
@@ -131,7 +132,11 @@ impl Row {
             axis: self.axis(),
             astigmatism: None,
             freeform: self.freeform.clone().map(Box::new),
-            ideal: self.ideal.map(|ideal| ideal.action(um)),
+            ideal: match (self.ideal, &self.freeform) {
+                (Some(ideal), _) => Some(ideal.action(um)),
+                (None, Some(form)) => IdealAction::of_form(form.kind, um),
+                (None, None) => None,
+            },
         }
     }
 }

@@ -427,9 +427,15 @@ impl<R: Real> Surface<R> {
         form.vertex_curvatures(&self.shape)[1]
     }
 
-    /// The power in 1/mm that a paraxial lens adds to that of refraction.
+    /// The power in 1/mm that a paraxial lens, or a phase in the section with the y-z plane, adds to that
+    /// of refraction.
     pub fn added_power(&self) -> R {
-        self.ideal.map_or(R::ZERO, IdealAction::power)
+        match (self.ideal, &self.freeform) {
+            (Some(IdealAction::Phase { path }), Some(form)) => {
+                -(path * form.phase_bends(R::ZERO, R::ZERO)[2])
+            }
+            (ideal, _) => ideal.map_or(R::ZERO, IdealAction::power),
+        }
     }
 
     /// True if the surface and the axis behind it mirror themselves at the y-z plane.

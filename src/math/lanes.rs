@@ -62,15 +62,31 @@ const PARTS: usize = 32;
 /// [`run_vectorized`].
 #[inline(always)]
 pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
+    sum_of_products([a, b])
+}
+
+/// The sum of the products of some columns, in an order that vector instructions preserve; meant for
+/// [`run_vectorized`].
+#[inline(always)]
+pub(crate) fn sum_of_products<const K: usize>(columns: [&[f64]; K]) -> f64 {
+    let count = columns.iter().map(|column| column.len()).min().unwrap_or(0);
+    let whole = count / PARTS * PARTS;
     let mut parts = [0.0; PARTS];
-    let (a, b) = (a.chunks_exact(PARTS), b.chunks_exact(PARTS));
-    let rest = a.remainder().iter().zip(b.remainder());
-    let rest: f64 = rest.map(|(x, y)| x * y).sum();
-    for (x, y) in a.zip(b) {
+    for from in (0..whole).step_by(PARTS) {
+        let chunks = columns.map(|column| &column[from..from + PARTS]);
         for k in 0..PARTS {
-            parts[k] += x[k] * y[k];
+            let mut product = chunks[0][k];
+            for chunk in &chunks[1..] {
+                product *= chunk[k];
+            }
+            parts[k] += product;
         }
     }
+    let rest = (whole..count).map(|i| {
+        let factors = columns[1..].iter().map(|column| column[i]);
+        factors.fold(columns[0][i], |product, factor| product * factor)
+    });
+    let rest: f64 = rest.sum();
     let mut half = PARTS;
     while half > 1 {
         half /= 2;

@@ -22,7 +22,7 @@ pub(crate) use format::{ShortNumber, format_short};
 pub use interval::{Arithmetic, Interval};
 pub use jet::Jet;
 pub use lanes::SimdWidth;
-pub(crate) use lanes::{dot, run_vectorized};
+pub(crate) use lanes::{dot, run_vectorized, sum_of_products};
 pub(crate) use normal_law::{erfc, excess_beyond};
 pub use real::Real;
 pub use vec3::Vec3;

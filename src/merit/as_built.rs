@@ -23,7 +23,7 @@ use super::spot::lost_ray_error;
 use super::sum::{DerivativeLevel, SumOfSquares};
 use super::{EvaluationContext, MeritError, SampledPupil};
 use crate::lens::{FieldPoint, Lens, LensError, System, Term, TermScope, Tolerance};
-use crate::math::excess_beyond;
+use crate::math::{SimdWidth, dot, excess_beyond, run_vectorized, sum_of_products};
 use crate::pupil::TracedPupil;
 use crate::tolerance::{
     MadeKind, MadeNumber, NominalLens, NumberCovariance, graded_sheet, perturb,
@@ -261,9 +261,12 @@ impl<'a> Growth<'a> {
         let mean = |row: &dyn Fn(&NumberEffects) -> &[f64]| {
             let part = |(wavelength, rays): &(usize, Range<usize>)| {
                 let channel = &self.channels[*wavelength];
-                let pairs =
-                    channel.weights[rays.clone()].iter().zip(&row(&channel.effects)[rays.clone()]);
-                pairs.map(|(weight, value)| weight * value).sum::<f64>()
+                let (weights, row) = (&channel.weights[rays.clone()], row(&channel.effects));
+                run_vectorized(
+                    SimdWidth::detect(),
+                    #[inline(always)]
+                    || dot(weights, &row[rays.clone()]),
+                )
             };
             if share > 0.0 { rays.iter().map(part).sum::<f64>() / share } else { 0.0 }
         };
@@ -430,6 +433,11 @@ impl<'a> Growth<'a> {
 
     /// The derivatives by the variables of the motion of the edges of the pupils.
     fn edge_motion(&self) -> Result<DVector<f64>, MeritError> {
+        if self.context.traced_pupils.is_empty() {
+            return Ok(DVector::zeros(self.context.values.len()));
+        }
+        let of_channels: Vec<Vec<f64>> =
+            self.channels.par_iter().map(|channel| self.costs(&channel.effects)).collect();
         self.context.sum_over_pupils(|sampled, traced| {
             let range = self.context.sampling.channels[sampled.wavelength].range(sampled.field);
             let channel = &self.channels[sampled.wavelength];
@@ -438,7 +446,7 @@ impl<'a> Growth<'a> {
             if !(share > 0.0) {
                 return Ok(None);
             }
-            let costs = &self.costs(&channel.effects)[range];
+            let costs = &of_channels[sampled.wavelength][range];
             let mean = weights.iter().zip(costs).map(|(w, cost)| w * cost).sum::<f64>() / share;
             self.edge_of_pupil(sampled, traced, [share / sampled.moments.area, mean]).map(Some)
         })
@@ -560,5 +568,9 @@ fn combined(factors: &[(usize, f64)], rows: &[Vec<f64>]) -> Vec<f64> {
 }
 
 fn weighted_dot(weights: &[f64], a: &[f64], b: &[f64]) -> f64 {
-    weights.iter().zip(a.iter().zip(b)).map(|(w, (a, b))| w * a * b).sum()
+    run_vectorized(
+        SimdWidth::detect(),
+        #[inline(always)]
+        || sum_of_products([weights, a, b]),
+    )
 }

@@ -168,6 +168,12 @@ pub enum ParetoError {
     /// The lens has no merit.
     #[error(transparent)]
     Merit(#[from] MeritError),
+    /// The merit function of the lens asks for what a front does not compare.
+    #[error(
+        "the merit function of the lens has the term `as_built`, and a front compares lenses as they \
+         are designed; expected the term `spot` in its place, or `aplanat optimize --as-built`"
+    )]
+    AsBuilt,
     /// A setting is out of its range.
     #[error("{what} is {found}; expected {expected}")]
     Settings {
@@ -252,6 +258,7 @@ impl ParetoSweep {
     /// A lens without a merit, or a setting out of its range.
     pub fn new(lens: &Lens, settings: &ParetoSettings) -> Result<Self, ParetoError> {
         settings.check()?;
+        check_goal(lens)?;
         let lens = with_sweep_variables(&limited_by_stop(lens)?, settings.semi_diameter_factors);
         lens.check()?;
         let start = ParetoPoint::evaluate(&lens, None, EVALUATION_TOLERANCE)?;
@@ -440,6 +447,13 @@ pub fn weighted_sum_goal(lens: &Lens, light: f64, pupil: PupilEdge) -> Result<Go
         zoom_ratios: default_goal.zoom_ratios,
         limits: LimitTreatment::Penalties,
     })
+}
+
+/// Refuses a merit function of the lens that counts how it is made.
+fn check_goal(lens: &Lens) -> Result<(), ParetoError> {
+    let mut terms = lens.merit.iter().flat_map(|goal| &goal.terms);
+    let is_as_built = |weighted: &WeightedTerm| matches!(weighted.term, Term::AsBuilt { .. });
+    if terms.any(is_as_built) { Err(ParetoError::AsBuilt) } else { Ok(()) }
 }
 
 /// The spot radius in mm at which a violated minimum of light outweighs sharpness.

@@ -1,6 +1,7 @@
 //! The commands of a session.
 
 use super::grin_design::GrinCommand;
+use super::specified_design::SpecifiedDesignCommand;
 use super::structure_search::StructureSearchCommand;
 use crate::effects::{Effect, EffectOverride};
 use crate::experiments::Effort;
@@ -129,6 +130,8 @@ pub enum Command {
     StructureSearch(StructureSearchCommand),
     /// A command for the gradient-index field.
     Grin(GrinCommand),
+    /// A command for the design from a specification.
+    SpecifiedDesign(SpecifiedDesignCommand),
     /// Shows another lens in place of the design, which does not change; `None` shows the design.
     Preview(Option<Box<Lens>>),
     /// Makes the lens that is shown in place of the design the design, as one undo step.
@@ -208,6 +211,7 @@ impl Command {
                 | Self::CancelDrag
                 | Self::CommitEdit
                 | Self::Grin(_)
+                | Self::SpecifiedDesign(_)
                 | Self::Select(_)
                 | Self::Show(PanelSetting::Pupils(_) | PanelSetting::Rays(_))
                 | Self::ClearMessages
@@ -218,6 +222,12 @@ impl Command {
 impl From<StructureSearchCommand> for Command {
     fn from(command: StructureSearchCommand) -> Self {
         Self::StructureSearch(command)
+    }
+}
+
+impl From<SpecifiedDesignCommand> for Command {
+    fn from(command: SpecifiedDesignCommand) -> Self {
+        Self::SpecifiedDesign(command)
     }
 }
 

@@ -23,8 +23,10 @@ mod live_merit;
 mod optimization;
 mod pareto;
 mod run;
+mod saved_runs;
 mod score;
 mod slot;
+mod specified_design;
 mod state;
 mod structure_search;
 mod view;
@@ -51,6 +53,9 @@ pub use pareto::{ParetoPass, ParetoRun, ParetoView};
 pub use run::{RunId, RunKind, RunStatus, RunView};
 pub use score::ScoredLens;
 pub use slot::Slot;
+pub use specified_design::{
+    OfferedLens, SpecificationRequest, SpecifiedDesign, SpecifiedDesignCommand, SpecifiedDesignView,
+};
 pub use state::{Session, SessionEvent};
 pub use structure_search::{
     CheckpointStatus, DescentMark, EndReason, FoundLens, HistorySample, SearchHistory,

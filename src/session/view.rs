@@ -10,6 +10,7 @@ use super::optimization::OptimizationSnapshot;
 use super::pareto::ParetoView;
 use super::run::RunView;
 use super::score::ScoredLens;
+use super::specified_design::SpecifiedDesignView;
 use super::structure_search::StructureSearchView;
 use crate::lens::{Lens, blank};
 use crate::merit::Goal;
@@ -37,6 +38,8 @@ pub struct SessionView {
     pub structure_search: StructureSearchView,
     /// The gradient-index field that is open.
     pub grin: GrinView,
+    /// The design from a specification.
+    pub specified_design: SpecifiedDesignView,
     /// The sharpness and light of the design, maybe of an earlier version; `None` without a run to
     /// compare with.
     pub design_score: Option<Arc<ScoredLens>>,
@@ -91,6 +94,7 @@ impl Default for SessionView {
             pareto: ParetoView::default(),
             structure_search: StructureSearchView::default(),
             grin: GrinView::default(),
+            specified_design: SpecifiedDesignView::default(),
             design_score: None,
             preview_lens: None,
             candidate: None,

@@ -8,7 +8,7 @@ use super::file_dialog::FileRequest;
 use super::panels::PanelKind;
 use crate::files::{BundledLens, LibraryLens};
 use crate::lens::Edit;
-use crate::session::{Command, GrinCommand, StructureSearchCommand};
+use crate::session::{Command, GrinCommand, SpecifiedDesignCommand, StructureSearchCommand};
 
 /// A request of the user to the window.
 #[expect(clippy::large_enum_variant, reason = "made once for each action of a person")]
@@ -65,6 +65,12 @@ impl From<StructureSearchCommand> for UiAction {
 impl From<GrinCommand> for UiAction {
     fn from(command: GrinCommand) -> Self {
         Self::Run(Command::Grin(command))
+    }
+}
+
+impl From<SpecifiedDesignCommand> for UiAction {
+    fn from(command: SpecifiedDesignCommand) -> Self {
+        Self::Run(Command::SpecifiedDesign(command))
     }
 }
 

@@ -44,7 +44,8 @@ fn default_arrangement() -> Tree<PanelKind> {
     let facts = tabs(&mut tiles, &[Kind::FirstOrder, Kind::Effects]);
     let light = tabs(&mut tiles, &LIGHT);
     let better = tabs(&mut tiles, &[Kind::Optimizer, Kind::Pareto, Kind::Search, Kind::History]);
-    let drawings = tabs(&mut tiles, &[Kind::Layout, Kind::Slice, Kind::Picture]);
+    let drawings =
+        tabs(&mut tiles, &[Kind::Layout, Kind::Slice, Kind::Picture, Kind::Specification]);
     let table = [Kind::Prescription, Kind::System, Kind::Zoom, Kind::Tolerances, Kind::Seidel];
     let table = tabs(&mut tiles, &table);
     let table = row(&mut tiles, &[(table, 0.71), (facts, 0.29)]);
@@ -57,7 +58,8 @@ fn default_arrangement() -> Tree<PanelKind> {
 fn search_arrangement() -> Tree<PanelKind> {
     use PanelKind as Kind;
     let mut tiles = Tiles::default();
-    let drawings = tabs(&mut tiles, &[Kind::Layout, Kind::Slice, Kind::Picture]);
+    let drawings =
+        tabs(&mut tiles, &[Kind::Layout, Kind::Slice, Kind::Picture, Kind::Specification]);
     let light = tabs(&mut tiles, &LIGHT);
     let numbers = [
         Kind::Prescription,
@@ -79,7 +81,7 @@ fn search_arrangement() -> Tree<PanelKind> {
 fn large_arrangement() -> Tree<PanelKind> {
     use PanelKind as Kind;
     let mut tiles = Tiles::default();
-    let drawings = tabs(&mut tiles, &[Kind::Layout, Kind::Slice]);
+    let drawings = tabs(&mut tiles, &[Kind::Layout, Kind::Slice, Kind::Specification]);
     let table = tabs(&mut tiles, &[Kind::Prescription]);
     let system = tabs(&mut tiles, &[Kind::System, Kind::Zoom, Kind::Tolerances]);
     let table = row(&mut tiles, &[(table, 0.66), (system, 0.34)]);

@@ -141,6 +141,15 @@ impl MenuContext<'_> {
             MenuItem::new(MENU, "New…", DialogKind::NewLens)
                 .control(Key::N)
                 .hint("Begin a lens: focal length, aperture, fields, wavelengths, object"),
+            MenuItem::new(
+                MENU,
+                "New from specification…",
+                UiAction::ShowPanel(PanelKind::Specification),
+            )
+            .control_shift(Key::N)
+            .hint(
+                "Design a lens: focal length, aperture, field, and the limits that it has to keep",
+            ),
             MenuItem::new(MENU, "Open or import…", FileRequest::Open).control(Key::O),
             MenuItem::new(MENU, "Lens library…", DialogKind::Library)
                 .control(Key::L)

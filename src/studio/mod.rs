@@ -64,6 +64,7 @@ pub fn run(path: Option<&Path>) -> Result<(), StudioError> {
         if let Some(folder) = eframe::storage_dir("aplanat") {
             session.set_save_folder(folder.join("searches"));
             session.set_field_folder(folder.join("fields"));
+            session.set_design_folder(folder.join("designs"));
             let wake = context.egui_ctx.clone();
             session.set_journal_folder(folder.join("journals"), move || wake.request_repaint())?;
         }

@@ -9,7 +9,8 @@ use crate::optimize::DescentMethod;
 use crate::optimize::pareto::ParetoSettings;
 use crate::paraxial::FirstOrderLock;
 use crate::session::{
-    Command, GrinCommand, RunStatus, RunView, SessionView, StructureSearchCommand,
+    Command, GrinCommand, RunStatus, RunView, SessionView, SpecifiedDesignCommand,
+    StructureSearchCommand,
 };
 use crate::studio::panels::add_variables_edit;
 
@@ -23,6 +24,7 @@ pub(super) fn commands(view: &SessionView) -> Vec<MenuItem> {
         ("Front", front(view)),
         ("Search", search(view)),
         ("Gradient index", field(view)),
+        ("Specification", specified_design(view)),
         ("Candidate", candidate(view)),
         ("Variables", variables(&view.lens)),
     ];
@@ -117,6 +119,31 @@ fn field(view: &SessionView) -> Vec<Request> {
         ),
         ("Stop the design of the field", for_run(run, wish(GrinCommand::Stop))),
         ("Close the field", run.snapshot.as_ref().map(|_| wish(GrinCommand::Close))),
+    ]
+}
+
+fn specified_design(view: &SessionView) -> Vec<Request> {
+    let run = &view.specified_design.run;
+    let is_paused = run.status == RunStatus::Paused;
+    let wish = Command::SpecifiedDesign;
+    let unfinished = view.specified_design.unfinished.as_ref().filter(|_| !run.is_active());
+    let best = run.snapshot.as_ref().and_then(|design| design.lenses.first());
+    let pause = wish(SpecifiedDesignCommand::Pause);
+    vec![
+        ("Pause the design from a specification", for_run(run, pause).filter(|_| !is_paused)),
+        (
+            "Resume the design from a specification",
+            match (is_paused, unfinished) {
+                (true, _) => Some(wish(SpecifiedDesignCommand::Resume)),
+                (false, Some(_)) => Some(wish(SpecifiedDesignCommand::ResumeUnfinished)),
+                (false, None) => None,
+            },
+        ),
+        ("Stop the design from a specification", for_run(run, wish(SpecifiedDesignCommand::Stop))),
+        (
+            "Open the best lens from the specification",
+            best.map(|best| Command::New(Box::new(best.designed.lens.clone()))),
+        ),
     ]
 }
 

@@ -1,12 +1,10 @@
 //! The whole analysis: sensitivities, the quadratic form, real lenses, and how well both agree.
 
-use super::draw::draw_errors;
 use super::{
     FocusTreatment, QuadraticForm, RealLens, Sensitivity, ToleranceError, ToleranceScene,
     real_lenses, sensitivities, wilson_interval,
 };
 use crate::lens::{Perturbation, Tolerance, ToleranceSheet};
-use rayon::prelude::*;
 use serde::Serialize;
 use std::sync::atomic::AtomicBool;
 
@@ -232,8 +230,8 @@ pub fn form_spots(form: &QuadraticForm, sheet: &ToleranceSheet, seed: u64) -> Ve
     let reduced = form.reduced(&sheet.errors);
     // Other errors than those of the real lenses.
     let other = seed ^ 0x5DEE_CE66_D1CE_CAFE;
-    let rms = |i: u64| reduced.at(&draw_errors(&sheet.errors, other, i)).sqrt();
-    (0..FORM_SAMPLES).into_par_iter().map(rms).collect()
+    let lenses = reduced.random_lenses(&sheet.errors, other, FORM_SAMPLES);
+    lenses.iter().map(|errors| reduced.at_multiple(errors, 1.0).sqrt()).collect()
 }
 
 fn quantile(share: f64, many: &[f64], pairs: &[[f64; 2]]) -> Quantile {

@@ -9,11 +9,24 @@ type Generator = rand_xoshiro::Xoshiro256PlusPlus;
 
 /// The errors of the lens with this number, in the units of the errors.
 pub(super) fn draw_errors(tolerances: &[Tolerance], seed: u64, number: u64) -> Vec<f64> {
+    let mut errors = vec![0.0; tolerances.len()];
+    draw_errors_into(tolerances, seed, number, &mut errors);
+    errors
+}
+
+/// The same as numbers that are overwritten.
+pub(super) fn draw_errors_into(
+    tolerances: &[Tolerance],
+    seed: u64,
+    number: u64,
+    errors: &mut [f64],
+) {
     // Numbers and seeds next to each other must give independent streams.
     let mixed = seed ^ number.wrapping_add(1).wrapping_mul(0x9E37_79B9_7F4A_7C15);
     let mut generator = Generator::seed_from_u64(mixed);
-    let draw = |t: &Tolerance| t.half_range * unit_error(t.distribution, &mut generator);
-    tolerances.iter().map(draw).collect()
+    for (error, tolerance) in errors.iter_mut().zip(tolerances) {
+        *error = tolerance.half_range * unit_error(tolerance.distribution, &mut generator);
+    }
 }
 
 /// An error with a half range of 1.

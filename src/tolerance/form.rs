@@ -6,9 +6,12 @@
 //! an error gives each ray is reduced by the part that a displacement of the image plane undoes:
 //! `εᵢ' = εᵢ − s <<s·εᵢ>>/<<s·s>>`, with the slopes `s` of the rays and means over all fields.
 
+use super::draw::draw_errors_into;
+use super::folded::{ErrorParity, FoldedField, folded_fields};
 use super::{Sensitivity, ToleranceScene};
 use crate::lens::Tolerance;
 use nalgebra::{DMatrix, SymmetricEigen};
+use rayon::prelude::*;
 
 /// The image plane at which a spot is judged.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
@@ -61,7 +64,7 @@ impl QuadraticForm {
         focus: FocusTreatment,
         travel: Option<f64>,
     ) -> Self {
-        let rows = ray_rows(scene, sensitivities, focus);
+        let products = RayProducts::new(scene, sensitivities, focus);
         let count = sensitivities.len();
         let mut second = DMatrix::zeros(count, count);
         let (mut first, mut nominal) = (Vec::with_capacity(count), 0.0);
@@ -73,7 +76,7 @@ impl QuadraticForm {
             nominal = own.value;
             first.push(own.first);
             for j in 0..i {
-                let product = 2.0 * dot(&rows[i], &rows[j]);
+                let product = 2.0 * products.of(i, j, focus);
                 (second[(i, j)], second[(j, i)]) = (product, product);
             }
             second[(i, i)] = own.second;
@@ -124,48 +127,74 @@ impl QuadraticForm {
                 break;
             }
             sum += eigenvalues[m].abs();
-            let direction =
-                (0..count)
-                    .map(|i| {
-                        if deviations[i] > 0.0 { eigenvectors[(i, m)] / deviations[i] } else { 0.0 }
-                    })
-                    .collect();
-            kept.push((eigenvalues[m], direction));
+            kept.push(m);
         }
-        let carried: f64 = kept.iter().map(|(value, _)| value).sum();
-        let (nominal, neglected) = (self.nominal, 0.5 * (trace - carried));
-        let (first, stop) = (self.first.clone(), self.stop.clone());
-        ReducedForm { nominal, neglected, first, kept, stop }
+        let direction = |row: usize, i: usize| match row {
+            LINEAR => self.first[i],
+            FOCUS => self.stop.as_ref().map_or(0.0, |stop| stop.first[i]),
+            _ if deviations[i] > 0.0 => eigenvectors[(i, kept[row - OWN])] / deviations[i],
+            _ => 0.0,
+        };
+        let directions = DMatrix::from_fn(OWN + kept.len(), count, direction);
+        let values: Vec<f64> = kept.iter().map(|m| eigenvalues[*m]).collect();
+        let neglected = 0.5 * (trace - values.iter().sum::<f64>());
+        let (nominal, stop) = (self.nominal, self.stop.clone());
+        ReducedForm { nominal, neglected, values, directions, stop }
     }
 }
 
 /// The share of the form whose scatter, though not its mean, is left out of samples.
 const NEGLECTED: f64 = 1e-4;
 
+/// The rows of [`ReducedForm::directions`] for the first derivatives and for the best focus, and the
+/// first one of the combinations.
+const LINEAR: usize = 0;
+const FOCUS: usize = 1;
+const OWN: usize = 2;
+
+/// The number of lenses whose errors are combined at once.
+const LENSES: u64 = 256;
+
 /// A quadratic form in few combinations of its variables.
 pub(super) struct ReducedForm {
     nominal: f64,
     /// The mean of the part that is left out, for the tolerances themselves.
     neglected: f64,
-    first: Vec<f64>,
-    /// Eigenvalues, and the combinations of errors that they belong to.
-    kept: Vec<(f64, Vec<f64>)>,
+    /// The eigenvalue of each combination.
+    values: Vec<f64>,
+    /// The first derivatives of the form, those of the best focus, and the combinations.
+    directions: DMatrix<f64>,
     stop: Option<FocusStop>,
 }
 
 impl ReducedForm {
-    /// The mean square spot radius of a lens with these errors, in mm².
-    pub(super) fn at(&self, errors: &[f64]) -> f64 {
-        self.at_multiple(&self.along(errors), 1.0)
+    /// The terms of the form for this many lenses with random errors, and for all multiples of these.
+    pub(super) fn random_lenses(
+        &self,
+        tolerances: &[Tolerance],
+        seed: u64,
+        count: u64,
+    ) -> Vec<ErrorMultiples> {
+        let part = |part: u64| {
+            let lenses = part * LENSES..count.min((part + 1) * LENSES);
+            let mut errors = DMatrix::zeros(tolerances.len(), (lenses.end - lenses.start) as usize);
+            for (number, mut column) in lenses.zip(errors.column_iter_mut()) {
+                draw_errors_into(tolerances, seed, number, column.as_mut_slice());
+            }
+            let along = &self.directions * errors;
+            along.column_iter().map(|along| self.multiples(along.as_slice())).collect::<Vec<_>>()
+        };
+        let parts = (0..count.div_ceil(LENSES)).into_par_iter().map(part);
+        parts.collect::<Vec<_>>().into_iter().flatten().collect()
     }
 
-    /// The terms of the form for all multiples of some errors.
-    pub(super) fn along(&self, errors: &[f64]) -> ErrorMultiples {
-        let kept = self.kept.iter().map(|(value, v)| 0.5 * value * dot(v, errors).powi(2));
+    fn multiples(&self, along: &[f64]) -> ErrorMultiples {
+        let kept = self.values.iter().zip(&along[OWN..]);
+        let square: f64 = kept.map(|(value, along)| 0.5 * value * along * along).sum();
         ErrorMultiples {
-            linear: dot(&self.first, errors),
-            square: self.neglected + kept.sum::<f64>(),
-            focus: self.stop.as_ref().map_or(0.0, |stop| dot(&stop.first, errors)),
+            linear: along[LINEAR],
+            square: self.neglected + square,
+            focus: along[FOCUS],
         }
     }
 
@@ -189,41 +218,86 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
-/// The effect of each error on the rays: for each, the displacements of all rays from the centroids of
-/// their fields, multiplied by the roots of their weights.
-fn ray_rows(
-    scene: &ToleranceScene,
-    sensitivities: &[Sensitivity],
-    focus: FocusTreatment,
-) -> Vec<Vec<f64>> {
-    let roots: Vec<f64> = scene
-        .beam
-        .fields
-        .iter()
-        .flat_map(|field| {
-            let weights = field.colours.iter().flat_map(|colour| &colour.weights);
-            weights.map(|w| (w * field.weight).sqrt())
-        })
-        .collect();
-    let Some(any) = sensitivities.first() else { return Vec::new() };
-    let slopes = weighted(any.rays.iter().map(|ray| ray.slope), &roots);
-    let square = dot(&slopes, &slopes);
-    let row = |sensitivity: &Sensitivity| {
-        let mut row = weighted(sensitivity.rays.iter().map(|ray| ray.displacement), &roots);
-        if focus == FocusTreatment::Refocused {
-            // The derivative of the slopes counts where the best focus is not the image plane.
-            let shift = sensitivity.focus().value;
-            let bend = weighted(sensitivity.rays.iter().map(|ray| ray.bend), &roots);
-            row.iter_mut().zip(&bend).for_each(|(x, bend)| *x += shift * bend);
-            let along = dot(&row, &slopes) / square;
-            row.iter_mut().zip(&slopes).for_each(|(x, slope)| *x -= along * slope);
-        }
-        row
-    };
-    sensitivities.iter().map(row).collect()
+/// Mean products over the rays of all fields of what errors do to them.
+struct RayProducts {
+    /// Of the displacements by two errors from the centroids.
+    effects: DMatrix<f64>,
+    /// Of the displacements and the slopes.
+    with_slopes: Vec<f64>,
+    /// Of the slopes with themselves.
+    slopes: f64,
 }
 
-/// Pairs of numbers of each ray, multiplied by the roots of their weights.
-fn weighted(rays: impl Iterator<Item = [f64; 2]>, roots: &[f64]) -> Vec<f64> {
-    rays.zip(roots).flat_map(|([x, y], root)| [x * root, y * root]).collect()
+impl RayProducts {
+    fn new(scene: &ToleranceScene, sensitivities: &[Sensitivity], focus: FocusTreatment) -> Self {
+        let count = sensitivities.len();
+        let (effects, with_slopes) = (DMatrix::zeros(count, count), vec![0.0; count]);
+        let mut sums = Self { effects, with_slopes, slopes: 0.0 };
+        let Some(any) = sensitivities.first() else { return sums };
+        // The derivative of the slopes counts where the best focus is not the image plane.
+        let shift = match focus {
+            FocusTreatment::Fixed => 0.0,
+            FocusTreatment::Refocused => any.focus().value,
+        };
+        let mut starts = vec![0];
+        for field in &scene.beam.fields {
+            let rays: usize = field.colours.iter().map(|colour| colour.rays.len()).sum();
+            starts.push(starts[starts.len() - 1] + rays);
+        }
+        for field in folded_fields(scene) {
+            sums.add_field(&field, sensitivities, (starts[field.number], shift));
+        }
+        sums
+    }
+
+    /// Adds the products over the rays of a field, of which the first one is at `start`, at an image
+    /// plane that is displaced by `shift`.
+    fn add_field(
+        &mut self,
+        field: &FoldedField<'_>,
+        sensitivities: &[Sensitivity],
+        (start, shift): (usize, f64),
+    ) {
+        let (mut places, mut from) = (Vec::new(), start);
+        for colour in &field.field.colours {
+            places.extend(field.rays(colour).map(|(i, weight)| (from + i, weight)));
+            from += colour.rays.len();
+        }
+        let count = sensitivities.len();
+        let column = |k: usize, i: usize| {
+            let (place, weight) = places[i / 2];
+            let ray = &sensitivities[k.min(count - 1)].rays[place];
+            let value = match k {
+                _ if k == count => ray.slope[i % 2],
+                _ => ray.displacement[i % 2] + shift * ray.bend[i % 2],
+            };
+            (weight * field.weight).sqrt() * value
+        };
+        let rows = DMatrix::from_fn(count + 1, 2 * places.len(), column);
+        let products = &rows * rows.transpose();
+        let parity = |k: usize| match sensitivities.get(k) {
+            Some(sensitivity) => ErrorParity::of(sensitivity.error.kind),
+            None => ErrorParity::EVEN,
+        };
+        for i in 0..count {
+            for j in 0..count {
+                if !field.symmetry.cancels_product(parity(i), parity(j)) {
+                    self.effects[(i, j)] += products[(i, j)];
+                }
+            }
+            if !field.symmetry.cancels_product(parity(i), ErrorParity::EVEN) {
+                self.with_slopes[i] += products[(i, count)];
+            }
+        }
+        self.slopes += products[(count, count)];
+    }
+
+    /// The mean product of what two errors do to the rays.
+    fn of(&self, i: usize, j: usize, focus: FocusTreatment) -> f64 {
+        let refocused = match focus {
+            FocusTreatment::Fixed => 0.0,
+            FocusTreatment::Refocused => self.with_slopes[i] * self.with_slopes[j] / self.slopes,
+        };
+        self.effects[(i, j)] - refocused
+    }
 }

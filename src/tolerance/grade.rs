@@ -133,6 +133,33 @@ pub fn price_classes(
     tolerances.iter().map(price).collect()
 }
 
+/// A tolerance is never wider than the commercial class, or than it was, by more than this factor.
+const WIDEST: f64 = 10.0;
+
+/// The same tolerances, none wider than ten times the commercial class, or than ten times its half
+/// range in `proposed` where classes say nothing; and the number of those that are held so.
+///
+/// An error that does little by the quadratic form would else have any width at all, far beyond the
+/// errors for which the form holds.
+pub fn bounded_tolerances(
+    lens: &Lens,
+    nominal: &NominalLens,
+    (proposed, loosest): (&[Tolerance], &[Tolerance]),
+) -> (Vec<Tolerance>, usize) {
+    let sheet = graded_sheet(lens, nominal, ToleranceGrade::Commercial);
+    let class: BTreeMap<_, _> = sheet.errors.iter().map(|t| (t.error, t.half_range)).collect();
+    let mut held = 0;
+    let bounded = |(own, loosest): (&Tolerance, &Tolerance)| {
+        let range = class.get(&loosest.error).copied().unwrap_or(own.half_range);
+        // A tolerance that was wider at the start may stay so.
+        let widest = WIDEST * range.max(own.half_range);
+        held += usize::from(loosest.half_range > widest);
+        Tolerance { half_range: loosest.half_range.min(widest), ..*loosest }
+    };
+    let bounded = proposed.iter().zip(loosest).map(bounded).collect();
+    (bounded, held)
+}
+
 /// Tolerances that are being collected.
 struct GradedSheet<'a> {
     nominal: &'a NominalLens,

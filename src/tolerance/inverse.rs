@@ -1,6 +1,5 @@
 //! The loosest tolerances for a spot, or for a share of good lenses, that is asked for.
 
-use super::draw::draw_errors;
 use super::{QuadraticForm, ToleranceError};
 use crate::lens::Tolerance;
 
@@ -71,8 +70,7 @@ fn yield_at_factor(
     limit: f64,
 ) -> impl Fn(f64) -> f64 {
     let reduced = form.reduced(tolerances);
-    let lenses: Vec<_> =
-        (0..LENSES).map(|i| reduced.along(&draw_errors(tolerances, SEED, i))).collect();
+    let lenses = reduced.random_lenses(tolerances, SEED, LENSES);
     move |factor| {
         let is_good = |errors| reduced.at_multiple(errors, factor) <= limit * limit;
         lenses.iter().filter(|errors| is_good(errors)).count() as f64 / LENSES as f64

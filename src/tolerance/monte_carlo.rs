@@ -1,11 +1,10 @@
 //! Real lenses: random errors of making, and rays traced through each lens.
 
 use super::draw::draw_errors;
-use super::{
-    Beam, Merits, SpotMoments, ToleranceError, ToleranceScene, best_focus, merits, perturb,
-};
+use super::merits::{image_ray, open_tracers};
+use super::{Beam, SpotMoments, ToleranceError, ToleranceScene, best_focus, perturb};
 use crate::lens::{Perturbation, System, ToleranceSheet};
-use crate::trace::Tracer;
+use crate::trace::{ImagePoints, Landings, Rays, TraceSink as _, Tracer};
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -36,7 +35,8 @@ pub fn real_lenses(
     with_rims: usize,
     stop: &AtomicBool,
 ) -> Result<Vec<RealLens>, ToleranceError> {
-    let lens = |i: usize| real_lens(scene, sheet, seed, (i, i < with_rims));
+    let columns = BeamColumns::new(&scene.beam);
+    let lens = |i: usize| real_lens(scene, sheet, (seed, i), &columns, i < with_rims);
     let mut lenses = Vec::new();
     while lenses.len() < count && !stop.load(Ordering::Relaxed) {
         let part = lenses.len()..count.min(lenses.len() + PART);
@@ -52,8 +52,9 @@ const PART: usize = 128;
 fn real_lens(
     scene: &ToleranceScene,
     sheet: &ToleranceSheet,
-    seed: u64,
-    (number, with_rims): (usize, bool),
+    (seed, number): (u64, usize),
+    columns: &BeamColumns,
+    with_rims: bool,
 ) -> Result<RealLens, ToleranceError> {
     let errors = draw_errors(&sheet.errors, seed, number as u64);
     let set: Vec<(Perturbation, f64)> =
@@ -63,9 +64,7 @@ fn real_lens(
         let travel = sheet.focus_travel.unwrap_or(f64::INFINITY);
         [mean.a, mean.at(best_focus(mean).clamp(-travel, travel))]
     };
-    let judged = merits(&systems, &scene.beam, scene.options);
-    let finite = |m: &Merits<f64>| m.mean.a.is_finite() && m.focus.is_finite();
-    let mean_square = judged.ok().filter(finite).map(|merits| focused(&merits.mean));
+    let mean_square = columns.mean_spot(&systems).map(|mean| focused(&mean));
     let clipped = if with_rims { clipped_spot(scene, systems) } else { None };
     let clipped = clipped.map(|(mean, lost)| (focused(&mean), lost));
     Ok(RealLens { errors, mean_square, clipped })
@@ -84,8 +83,53 @@ fn clipped_spot(
     }
     let tracers: Result<Vec<_>, _> = systems.iter().map(Tracer::new).collect();
     let (beam, lost) = transmitted(&scene.beam, &tracers.ok()?)?;
-    let judged = merits(&systems, &beam, scene.options).ok()?;
-    Some((judged.mean, lost))
+    Some((BeamColumns::new(&beam).mean_spot(&systems)?, lost))
+}
+
+/// The rays of a beam, to be traced in blocks.
+struct BeamColumns {
+    fields: Vec<FieldColumns>,
+}
+
+/// The rays of one field.
+struct FieldColumns {
+    weight: f64,
+    /// For each colour the wavelength, the rays, and the weight of each ray.
+    colours: Vec<(usize, Rays<f64>, Vec<f64>)>,
+}
+
+impl BeamColumns {
+    fn new(beam: &Beam) -> Self {
+        let colour = |colour: &super::ColourRays| {
+            (colour.wavelength, colour.rays.iter().copied().collect(), colour.weights.clone())
+        };
+        let field = |field: &super::FieldBeam| FieldColumns {
+            weight: field.weight,
+            colours: field.colours.iter().map(colour).collect(),
+        };
+        Self { fields: beam.fields.iter().map(field).collect() }
+    }
+
+    /// The mean spot of all fields without rims; `None` if a ray does not arrive, or if there is no
+    /// best focus.
+    fn mean_spot(&self, systems: &[System<f64>]) -> Option<SpotMoments<f64>> {
+        let tracers = open_tracers(systems).ok()?;
+        let (mut landed, mut spots) = (Landings::default(), Vec::new());
+        for FieldColumns { weight, colours } in &self.fields {
+            let mut image_rays = Vec::new();
+            for (wavelength, rays, weights) in colours {
+                tracers[*wavelength].trace_batch(rays, &mut landed);
+                if (0..weights.len()).any(|i| !landed.fate(i).is_imaged()) {
+                    return None;
+                }
+                let weighted = weights.iter().enumerate();
+                image_rays.extend(weighted.map(|(i, w)| (image_ray(&landed.ray(i)), *w)));
+            }
+            spots.push(SpotMoments::new(&image_rays).weighted(*weight));
+        }
+        let mean = SpotMoments::sum(spots.into_iter());
+        (mean.a.is_finite() && best_focus(&mean).is_finite()).then_some(mean)
+    }
 }
 
 /// The rays of a beam that arrive, and the share of the light of those that do not; `None` if a field
@@ -96,8 +140,10 @@ fn transmitted(beam: &Beam, tracers: &[Tracer<f64>]) -> Option<(Beam, f64)> {
         for colour in &mut field.colours {
             let tracer = &tracers[colour.wavelength];
             let mut arrived = super::ColourRays::new(colour.wavelength);
+            let mut landed = ImagePoints::default();
+            tracer.trace_batch(&colour.rays.iter().copied().collect(), &mut landed);
             for (i, ray) in colour.rays.iter().enumerate() {
-                if tracer.trace(*ray).fate.is_imaged() {
+                if landed.fate(i).is_imaged() {
                     arrived.push(*ray, colour.weights[i], colour.pupil[i], colour.paths[i]);
                 }
             }

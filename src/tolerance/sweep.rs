@@ -6,10 +6,12 @@
 //! it.
 
 use super::covariance::{MadeKind, MadeNumber, number_changes};
+use super::folded::{ErrorParity, FoldedField, RaySymmetry, folded_fields};
 use super::merits::open_tracers;
-use super::{FieldBeam, ToleranceError, ToleranceScene};
+use super::{ToleranceError, ToleranceScene};
 use crate::lens::Perturbation;
-use crate::trace::{ErrorNumber, ErrorSlopes, ImagePoints, Rays, TraceSink as _, Tracer};
+use crate::math::{SimdWidth, dot, run_vectorized};
+use crate::trace::{ErrorNumber, ErrorRows, ImagePoints, Rays, TraceSink as _, Tracer};
 
 /// The effect of an error on the mean square spot, without second derivatives of rays.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize)]
@@ -51,17 +53,17 @@ pub fn swept_sensitivities(
     }
     let primary = &lens.systems[lens.primary];
     let vertices = primary.vertex_positions();
-    let changes: Vec<_> = errors
-        .iter()
-        .map(|e| number_changes(*e, primary, &vertices, &lens.semi_diameters).changes)
-        .collect();
+    let changes = |e: &Perturbation| {
+        let changes = number_changes(*e, primary, &vertices, &lens.semi_diameters).changes;
+        (ErrorParity::of(e.kind), changes)
+    };
+    let changes: Vec<_> = errors.iter().map(changes).collect();
     let mut sums = vec![EffectMoments::default(); errors.len()];
     let mut slopes = 0.0;
-    for (number, field) in scene.beam.fields.iter().enumerate() {
-        let rays = SweptField::new(scene, &tracers, (number, field))?;
+    for field in folded_fields(scene) {
+        let rays = SweptField::new(scene, &tracers, &field)?;
         slopes += field.weight * rays.slope_square();
-        for (sum, changes) in sums.iter_mut().zip(&changes) {
-            let found = rays.moments(changes);
+        for (sum, found) in sums.iter_mut().zip(rays.all_moments(&changes)) {
             sum.square += field.weight * found.square;
             sum.offset += field.weight * found.offset;
             sum.slope += field.weight * found.slope;
@@ -74,109 +76,142 @@ pub fn swept_sensitivities(
     Ok(sums.into_iter().map(of).collect())
 }
 
-/// The rays of one field with their derivatives by the numbers of surfaces.
-struct SweptField<'a> {
-    field: &'a FieldBeam,
+/// The rays of one field with their derivatives by the numbers of surfaces, all wavelengths one after
+/// the other.
+struct SweptField {
+    symmetry: RaySymmetry,
     colours: Vec<SweptColour>,
-    /// The means of the slopes.
-    slopes: [f64; 2],
-    /// The centroid, in mm.
-    center: [f64; 2],
+    /// The weight of each ray.
+    weights: Vec<f64>,
+    /// The distances from the centroid in mm, along x and y.
+    offsets: [Vec<f64>; 2],
+    /// The slopes relative to their means.
+    slopes: [Vec<f64>; 2],
 }
 
-/// The rays of one field and wavelength.
+/// The derivatives of the rays of one wavelength.
 struct SweptColour {
-    points: [Vec<f64>; 2],
-    found: ErrorSlopes,
+    rows: ErrorRows,
+    /// The place of its first ray.
+    start: usize,
     /// The index less that at the primary wavelength, behind each surface.
     dispersion: Vec<f64>,
 }
 
-impl<'a> SweptField<'a> {
+impl SweptField {
     fn new(
         scene: &ToleranceScene,
         tracers: &[Tracer<f64>],
-        (number, field): (usize, &'a FieldBeam),
+        folded: &FoldedField<'_>,
     ) -> Result<Self, ToleranceError> {
         let primary = &scene.lens.systems[scene.lens.primary];
-        let mut colours = Vec::new();
-        for colour in &field.colours {
-            let rays: Rays<f64> = colour.rays.iter().copied().collect();
+        let (mut colours, mut weights) = (Vec::new(), Vec::new());
+        let (mut offsets, mut slopes) = ([Vec::new(), Vec::new()], [Vec::new(), Vec::new()]);
+        for colour in &folded.field.colours {
+            let start = weights.len();
+            let rays: Rays<f64> = folded.rays(colour).map(|(i, _)| colour.rays[i]).collect();
+            weights.extend(folded.rays(colour).map(|(_, weight)| weight));
             let tracer = &tracers[colour.wavelength];
             let mut landed = ImagePoints::default();
             tracer.trace_batch(&rays, &mut landed);
-            if let Some(ray) = (0..rays.len()).find(|i| !landed.fate(*i).is_imaged()) {
-                let fate = landed.fate(ray);
-                return Err(ToleranceError::RayLost { field: number, ray, fate });
+            if let Some(lost) = (0..rays.len()).find(|i| !landed.fate(*i).is_imaged()) {
+                let fate = landed.fate(lost);
+                let ray = folded.rays(colour).nth(lost).map_or(lost, |(ray, _)| ray);
+                return Err(ToleranceError::RayLost { field: folded.number, ray, fate });
             }
             let own = &scene.lens.systems[colour.wavelength].surfaces;
             let pairs = own.iter().zip(&primary.surfaces);
             let dispersion = pairs.map(|(own, primary)| own.index - primary.index).collect();
             let found = tracer.error_slopes(&rays);
-            colours.push(SweptColour { points: [landed.x, landed.y], found, dispersion });
+            for (axis, points) in [landed.x, landed.y].into_iter().enumerate() {
+                offsets[axis].extend(points);
+                slopes[axis].extend_from_slice(&found.slopes[axis]);
+            }
+            colours.push(SweptColour { rows: found.rows, start, dispersion });
         }
-        let mut swept = Self { field, colours, slopes: [0.0; 2], center: [0.0; 2] };
-        for axis in 0..2 {
-            swept.slopes[axis] = swept.mean(|colour, i| colour.found.slopes[axis][i]);
-            swept.center[axis] = swept.mean(|colour, i| colour.points[axis][i]);
+        let symmetry = folded.symmetry;
+        for columns in [&mut offsets, &mut slopes] {
+            for (axis, column) in columns.iter_mut().enumerate() {
+                let cancels = symmetry.cancels_mean(axis, ErrorParity::EVEN);
+                let mean = if cancels { 0.0 } else { dot(&weights, column) };
+                column.iter_mut().for_each(|value| *value -= mean);
+            }
         }
-        Ok(swept)
-    }
-
-    /// The mean of a number of each ray.
-    fn mean(&self, of: impl Fn(&SweptColour, usize) -> f64) -> f64 {
-        let colours = self.colours.iter().zip(&self.field.colours);
-        let sum = |(swept, colour): (&SweptColour, &super::ColourRays)| {
-            colour.weights.iter().enumerate().map(|(i, w)| w * of(swept, i)).sum::<f64>()
-        };
-        colours.map(sum).sum()
+        Ok(Self { symmetry, colours, weights, offsets, slopes })
     }
 
     fn slope_square(&self) -> f64 {
         let along = |axis: usize| {
-            let mean = self.slopes[axis];
-            self.mean(|colour, i| (colour.found.slopes[axis][i] - mean).powi(2))
+            let pairs = self.weights.iter().zip(&self.slopes[axis]);
+            pairs.map(|(weight, slope)| weight * slope * slope).sum::<f64>()
         };
         along(0) + along(1)
     }
 
-    /// The moments of an error that changes these numbers.
-    fn moments(&self, changes: &[(MadeNumber, f64)]) -> EffectMoments {
+    /// The moments of errors that change these numbers.
+    fn all_moments(&self, errors: &[ErrorChanges]) -> Vec<EffectMoments> {
+        run_vectorized(
+            SimdWidth::detect(),
+            #[inline(always)]
+            || {
+                let mut buffers = EffectBuffers {
+                    effect: vec![0.0; self.weights.len()],
+                    weighted: vec![0.0; self.weights.len()],
+                };
+                errors.iter().map(|changes| self.moments(changes, &mut buffers)).collect()
+            },
+        )
+    }
+
+    #[inline(always)]
+    fn moments(
+        &self,
+        (parity, changes): &ErrorChanges,
+        EffectBuffers { effect, weighted }: &mut EffectBuffers,
+    ) -> EffectMoments {
         let mut sum = EffectMoments::default();
         for axis in 0..2 {
-            let effects: Vec<Vec<f64>> =
-                self.colours.iter().map(|colour| colour.effect(axis, changes)).collect();
-            let pairs = || effects.iter().zip(&self.colours).zip(&self.field.colours);
-            let mean: f64 = pairs()
-                .map(|((effect, _), rays)| {
-                    effect.iter().zip(&rays.weights).map(|(e, w)| e * w).sum::<f64>()
-                })
-                .sum();
-            for ((effect, colour), rays) in pairs() {
-                for (i, weight) in rays.weights.iter().enumerate() {
-                    let weighted = weight * (effect[i] - mean);
-                    sum.square += weighted * (effect[i] - mean);
-                    sum.offset += weighted * (colour.points[axis][i] - self.center[axis]);
-                    sum.slope += weighted * (colour.found.slopes[axis][i] - self.slopes[axis]);
-                }
+            self.fill_effect(axis, changes, effect);
+            let cancels = self.symmetry.cancels_mean(axis, *parity);
+            let mean = if cancels { 0.0 } else { dot(&self.weights, effect) };
+            for i in 0..effect.len() {
+                effect[i] -= mean;
+                weighted[i] = self.weights[i] * effect[i];
+            }
+            sum.square += dot(weighted, effect);
+            if !self.symmetry.cancels_product(*parity, ErrorParity::EVEN) {
+                sum.offset += dot(weighted, &self.offsets[axis]);
+                sum.slope += dot(weighted, &self.slopes[axis]);
             }
         }
         sum
     }
+
+    /// The derivative of x or y of each ray by an error that changes these numbers.
+    #[inline(always)]
+    fn fill_effect(&self, axis: usize, changes: &[(MadeNumber, f64)], effect: &mut [f64]) {
+        effect.fill(0.0);
+        for colour in &self.colours {
+            for (MadeNumber { surface, kind }, factor) in changes {
+                let (number, factor) = match kind {
+                    MadeKind::Number(number) => (*number, *factor),
+                    MadeKind::Abbe => (ErrorNumber::Index, -factor * colour.dispersion[*surface]),
+                };
+                let row = colour.rows.row(axis, *surface, number);
+                let to = &mut effect[colour.start..colour.start + row.len()];
+                for i in 0..row.len() {
+                    to[i] += factor * row[i];
+                }
+            }
+        }
+    }
 }
 
-impl SweptColour {
-    /// The derivative of x or y of each ray by an error that changes these numbers.
-    fn effect(&self, axis: usize, changes: &[(MadeNumber, f64)]) -> Vec<f64> {
-        let mut effect = vec![0.0; self.points[axis].len()];
-        for (MadeNumber { surface, kind }, factor) in changes {
-            let (number, factor) = match kind {
-                MadeKind::Number(number) => (*number, *factor),
-                MadeKind::Abbe => (ErrorNumber::Index, -factor * self.dispersion[*surface]),
-            };
-            let row = self.found.rows.row(axis, *surface, number);
-            effect.iter_mut().zip(row).for_each(|(to, by)| *to += factor * by);
-        }
-        effect
-    }
+/// The numbers that an error changes, and its parity.
+type ErrorChanges = (ErrorParity, Vec<(MadeNumber, f64)>);
+
+/// Numbers of each ray that are overwritten for each error.
+struct EffectBuffers {
+    effect: Vec<f64>,
+    weighted: Vec<f64>,
 }

@@ -10,6 +10,7 @@ use super::asphere;
 use super::asphere_crossing;
 use super::fate::{self, CLIPPED, Fate, MISSED, TOTAL_REFLECTION};
 use super::interface::{Interface, Intersection, Refraction, SurfaceForm};
+use super::mount::{Mount, irregular_crossings};
 use super::propagation::PropagatedRay;
 use super::single::{Ray, optical_direction};
 use super::{Fates, Tracer};
@@ -344,7 +345,9 @@ impl<R: Real> Tracer<R> {
         block.load(rays, from, count, self.index_before);
         self.mask(block, count);
         for (i, interface) in self.interfaces.iter().enumerate() {
-            if self.is_general(i) {
+            if let Some(mount) = self.vector_mount(i) {
+                block.cross_mounted_into::<S>(interface, i as u32, mount);
+            } else if self.is_general(i) {
                 block.cross_general_into::<S>(self, i);
             } else {
                 block.cross::<S>(interface, i as u32);
@@ -458,6 +461,131 @@ impl<R: Real, const N: usize> RayBlock<R, N> {
             }
         });
         self.opl = opl;
+    }
+
+    /// Crosses a surface that is decentred, tilted or irregular. Never part of the loop over centred
+    /// surfaces, whose registers it would occupy.
+    #[inline(never)]
+    fn cross_mounted_into<S: TraceSink<R>>(
+        &mut self,
+        interface: &Interface<R>,
+        number: u32,
+        mount: &Mount<R>,
+    ) {
+        let mut opl = self.opl;
+        run_vectorized(
+            SimdWidth::detect(),
+            #[inline(always)]
+            || {
+                self.cross_mounted(
+                    interface,
+                    number,
+                    mount,
+                    #[inline(always)]
+                    |j, met| {
+                        if S::WITH_PATH {
+                            opl[j] += met.s * interface.n2;
+                        }
+                    },
+                );
+            },
+        );
+        self.opl = opl;
+    }
+
+    #[inline(always)]
+    fn cross_mounted(
+        &mut self,
+        interface: &Interface<R>,
+        number: u32,
+        mount: &Mount<R>,
+        keep: impl FnMut(usize, &Intersection<R>),
+    ) {
+        for j in 0..N {
+            let (p, k) = self.state(j);
+            let p = Vec3::new(p.x, p.y, p.z - interface.gap);
+            self.set(j, mount.pose.point_in(p), mount.pose.direction_in(k));
+        }
+        // The gap in front belongs to the frame of the centred vertex.
+        let own = Interface { gap: R::ZERO, ..*interface };
+        match mount.astigmatism {
+            None => self.cross_with(&own, number, keep),
+            Some(q) => self.cross_irregular(&own, number, q, keep),
+        }
+        for j in 0..N {
+            let (p, k) = self.state(j);
+            self.set(j, mount.behind.point_out(p), mount.behind.direction_out(k));
+        }
+    }
+
+    /// Crosses the sag `z(r²) + q y²`.
+    #[inline(always)]
+    fn cross_irregular(
+        &mut self,
+        interface: &Interface<R>,
+        number: u32,
+        q: R,
+        keep: impl FnMut(usize, &Intersection<R>),
+    ) {
+        let mut rays = asphere::RayStarts::<R, N>::new();
+        let mut from = self.revolution_distances(interface);
+        for (j, from) in from.iter_mut().enumerate() {
+            let (p, k) = self.state(j);
+            let (start, before) = interface.closest_approach(p, k);
+            *from -= before;
+            rays.set(j, start, k);
+        }
+        let s = irregular_crossings(interface, q, &rays, from);
+        self.cross_form(
+            interface,
+            number,
+            #[inline(always)]
+            |i, j, p, k| i.intersection_on_irregular(i.closest_approach(p, k), k, s[j], q),
+            keep,
+        );
+        if interface.obstruction2 > R::ZERO {
+            self.clip_obstruction(interface, number);
+        }
+    }
+
+    /// The distance along `k` of every ray to the surface of revolution; NaN for a miss.
+    #[inline(always)]
+    fn revolution_distances(&self, interface: &Interface<R>) -> [R; N] {
+        match interface.form {
+            SurfaceForm::Plane => self.distances_by(
+                #[inline(always)]
+                |_, p, k| interface.intersect_plane(p, k),
+            ),
+            SurfaceForm::Sphere => self.distances_by(
+                #[inline(always)]
+                |_, p, k| interface.intersect_sphere(p, k),
+            ),
+            SurfaceForm::Conic => self.distances_by(
+                #[inline(always)]
+                |_, p, k| interface.intersect_conic(p, k),
+            ),
+            SurfaceForm::Asphere => {
+                let s = self.asphere_distances(interface);
+                self.distances_by(
+                    #[inline(always)]
+                    |j, p, k| {
+                        let (start, before) = interface.closest_approach(p, k);
+                        interface.intersection_on_asphere(start, k, s[j], before)
+                    },
+                )
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn distances_by(&self, meet: impl Fn(usize, Vec3<R>, Vec3<R>) -> Intersection<R>) -> [R; N] {
+        let mut distances = [R::ZERO; N];
+        for (j, distance) in distances.iter_mut().enumerate() {
+            let (p, k) = self.state(j);
+            let met = meet(j, p, k);
+            *distance = R::select(met.missed, R::from_f64(f64::NAN), met.s);
+        }
+        distances
     }
 
     /// Crosses a surface that a GRIN medium touches or that is not centred, ray by ray.

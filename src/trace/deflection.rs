@@ -1,20 +1,51 @@
-//! Deflection by a rule: a paraxial lens and a grating, forwards and backwards.
+//! Deflection by a rule: a paraxial lens, a grating and a phase, forwards and backwards.
 //!
-//! With `k` the optical direction and `N` the normal, a grating takes `q = k + g ŷ` in place of `k` into
-//! Snell's law: `k' = q + Γ N` with `|k'| = n'`, so that the component along the surface grows by that
-//! of `g ŷ`; its optical path grows by `g y`. Behind a paraxial lens at the height h the slope times the
+//! With `k` the optical direction and `N` the normal, a surface that adds `g(x, y)` to the optical path
+//! takes `q = k + ∇g` in place of `k` into Snell's law: `k' = q + Γ N` with `|k'| = n'`, so that the
+//! component along the surface grows by that of `∇g`. A grating adds `g y`, a phase Φ in the order m
+//! `m λ Φ/2π`. Behind a paraxial lens at the height h the slope times the
 //! index is `w = n u − h φ`. The path of a plane wave from the vertex to the focus is the same for all
 //! heights, which leaves for the lens `n' (2 n u·h − φ h²)/(A + B) − k·h` with `A² = n'² + n² u²` and
 //! `B² = n'² + w²`.
 
 use super::interface::{Interface, Intersection};
-use crate::lens::IdealAction;
+use crate::lens::{Freeform, IdealAction};
 use crate::math::{Real, Vec3};
 
-/// A rule at a surface with the media on both sides.
+/// A rule at one point of a surface.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum LocalRule<R> {
+    /// A thin lens of this power in 1/mm.
+    Lens(R),
+    /// A path that the surface adds to the optical one.
+    Added {
+        /// The gradient along x and y.
+        slopes: [R; 2],
+        /// The path, in mm.
+        path: R,
+    },
+}
+
+impl<R: Real> LocalRule<R> {
+    /// The rule of a surface with a form at a point.
+    fn new(action: IdealAction<R>, form: &Freeform<R>, point: Vec3<R>) -> Self {
+        match action {
+            IdealAction::Lens { power } => Self::Lens(power),
+            IdealAction::Grating { shift } => {
+                Self::Added { slopes: [R::ZERO, shift], path: shift * point.y }
+            }
+            IdealAction::Phase { path } => {
+                let [phase, by_x, by_y] = form.phase(point.x, point.y);
+                Self::Added { slopes: [path * by_x, path * by_y], path: path * phase }
+            }
+        }
+    }
+}
+
+/// A rule at a point of a surface with the media on both sides.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Deflection<R> {
-    pub(super) action: IdealAction<R>,
+    pub(super) rule: LocalRule<R>,
     /// The sense of travel in front.
     pub(super) sense: R,
     pub(super) mirror: bool,
@@ -23,22 +54,28 @@ pub(super) struct Deflection<R> {
 }
 
 impl<R: Real> Deflection<R> {
-    pub(super) fn new(action: IdealAction<R>, surface: &Interface<R>) -> Self {
+    pub(super) fn new(
+        action: IdealAction<R>,
+        form: &Freeform<R>,
+        surface: &Interface<R>,
+        point: Vec3<R>,
+    ) -> Self {
         let Interface { sense, mirror, index_before, index_behind, .. } = *surface;
-        Self { action, sense, mirror, before: index_before, behind: index_behind }
+        let rule = LocalRule::new(action, form, point);
+        Self { rule, sense, mirror, before: index_before, behind: index_behind }
     }
 
     /// The direction of which the component along the surface remains.
     fn shifted(&self, k: Vec3<R>) -> Vec3<R> {
-        match self.action {
-            IdealAction::Lens { .. } => k,
-            IdealAction::Grating { shift } => Vec3::new(k.x, k.y + shift, k.z),
+        match self.rule {
+            LocalRule::Lens(_) => k,
+            LocalRule::Added { slopes: [x, y], .. } => Vec3::new(k.x + x, k.y + y, k.z),
         }
     }
 
     /// The square of `k'·N`, negative for an order that no light is in; one for a lens.
     pub(super) fn margin(&self, k: Vec3<R>, normal: Vec3<R>) -> R {
-        if matches!(self.action, IdealAction::Lens { .. }) {
+        if matches!(self.rule, LocalRule::Lens(_)) {
             return R::ONE;
         }
         let q = self.shifted(k);
@@ -54,7 +91,7 @@ impl<R: Real> Deflection<R> {
 
     /// The optical direction behind, NaN where there is none.
     pub(super) fn deflect(&self, point: Vec3<R>, k: Vec3<R>, normal: Vec3<R>) -> Vec3<R> {
-        if let IdealAction::Lens { power } = self.action {
+        if let LocalRule::Lens(power) = self.rule {
             let along = self.sense * self.before / k.z;
             let w = [k.x * along - point.x * power, k.y * along - point.y * power];
             return directed(w, self.behind, self.sense);
@@ -68,14 +105,14 @@ impl<R: Real> Deflection<R> {
 
     /// The optical direction in front of a ray with the direction `k` behind.
     pub(super) fn undeflect(&self, point: Vec3<R>, k: Vec3<R>, normal: Vec3<R>) -> Vec3<R> {
-        match self.action {
-            IdealAction::Lens { power } => {
+        match self.rule {
+            LocalRule::Lens(power) => {
                 let along = self.sense * self.behind / k.z;
                 let w = [k.x * along + point.x * power, k.y * along + point.y * power];
                 directed(w, self.before, self.sense)
             }
-            IdealAction::Grating { shift } => {
-                let q = Vec3::new(k.x, k.y - shift, k.z);
+            LocalRule::Added { slopes: [x, y], .. } => {
+                let q = Vec3::new(k.x - x, k.y - y, k.z);
                 let (a, m) = (q.dot(normal), normal.dot(normal));
                 let before2 = a * a + (self.before * self.before - q.dot(q)) * m;
                 q + normal * ((self.sense * before2.sqrt() - a) / m)
@@ -85,9 +122,9 @@ impl<R: Real> Deflection<R> {
 
     /// The optical path that the rule adds, in mm.
     pub(super) fn path(&self, point: Vec3<R>, k: Vec3<R>) -> R {
-        let power = match self.action {
-            IdealAction::Grating { shift } => return shift * point.y,
-            IdealAction::Lens { power } => power,
+        let power = match self.rule {
+            LocalRule::Added { path, .. } => return path,
+            LocalRule::Lens(power) => power,
         };
         let along = self.sense * self.before / k.z;
         let u = [k.x * along, k.y * along];

@@ -8,7 +8,7 @@
 //! not decided after [`MAX_PARTS`] counts as a miss.
 
 use super::interface::{Interface, Intersection};
-use crate::lens::{BaseSag, Freeform};
+use crate::lens::{BaseSag, Freeform, FreeformKind};
 use crate::math::{Arithmetic, Interval, Real, Vec3};
 use std::sync::Arc;
 
@@ -94,6 +94,8 @@ struct FreeformSearch {
 
 /// The number of cells along each side of the square in which a surface is bounded.
 const CELLS: u32 = 8;
+/// The number of rings in which a form of revolution is bounded.
+const RINGS: u32 = 64;
 
 /// The number of parts of a ray after which it counts as one that misses.
 const MAX_PARTS: u32 = 2_000;
@@ -117,7 +119,8 @@ impl FreeformSearch {
 
     fn is_plane(&self) -> bool {
         let of_row = [self.surface.curvature, self.astigmatism].into_iter();
-        let mut all = of_row.chain(self.surface.terms).chain(self.form.numbers.iter().copied());
+        let numbers: &[f64] = if self.form.kind.is_phase() { &[] } else { &self.form.numbers };
+        let mut all = of_row.chain(self.surface.terms).chain(numbers.iter().copied());
         all.all(|number| number == 0.0)
     }
 
@@ -129,7 +132,7 @@ impl FreeformSearch {
 
     fn sag_bounds(&self, x: Interval, y: Interval) -> [Interval; 3] {
         let base = self.bounds.sag(x, y);
-        let series = self.form.series_sag(x, y, Interval::constant);
+        let series = self.form.series_sag(&self.bounds, x, y, Interval::constant);
         let q = Interval::constant(self.astigmatism);
         let lean = q * y;
         let irregular = [q * y.square(), Interval::constant(0.0), lean + lean];
@@ -141,6 +144,9 @@ impl FreeformSearch {
     fn bounds_inside(&self, radius: f64) -> Option<([f64; 2], Interval)> {
         if !radius.is_finite() {
             return None;
+        }
+        if self.form.kind.is_round() && self.form.kind != FreeformKind::OddAsphere {
+            return Some(self.bounds_in_rings(radius));
         }
         let (mut steepest, mut sags) = ([0.0_f64; 2], Interval::EMPTY);
         let edge = |i: u32| radius * (2.0 * f64::from(i) / f64::from(CELLS) - 1.0);
@@ -161,6 +167,30 @@ impl FreeformSearch {
             }
         }
         Some((steepest, sags))
+    }
+
+    /// As [`FreeformSearch::bounds_inside`] for a form of revolution: no slope is larger than that along
+    /// the radius. Narrow rings keep the bounds of its recurrences tight.
+    fn bounds_in_rings(&self, radius: f64) -> ([f64; 2], Interval) {
+        let (mut steepest, mut sags) = (0.0_f64, Interval::EMPTY);
+        let edge = |i: u32| radius * f64::from(i) / f64::from(RINGS);
+        for ring in 0..RINGS {
+            let x = Interval::between(edge(ring), edge(ring + 1));
+            let y = Interval::constant(0.0);
+            let (own, series) = (
+                self.bounds.sag(x, y),
+                self.form.series_sag(&self.bounds, x, y, Interval::constant),
+            );
+            let (z, slope) = (own[0] + series[0], (own[1] + series[1]).magnitude());
+            if z.is_empty() {
+                continue;
+            }
+            sags = sags.hull(z);
+            steepest = if slope.is_nan() { f64::INFINITY } else { steepest.max(slope) };
+        }
+        let most = self.astigmatism * radius;
+        let lean = Interval::between(0.0, most * radius);
+        ([steepest, steepest + 2.0 * most.abs()], sags + lean)
     }
 
     /// The parameter along `k` of the first crossing in the sense of travel: inside the semi-diameter if

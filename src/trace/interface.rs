@@ -296,6 +296,7 @@ impl<R: Real> Interface<R> {
     }
 
     /// The intersection at a point that lies on the surface.
+    #[inline(always)]
     pub(super) fn intersection_at(&self, point: Vec3<R>, k: Vec3<R>, s: R) -> Intersection<R> {
         let (_, dz_dr2) = self.surface_sag(point.x * point.x + point.y * point.y);
         self.intersection_with_slope(point, k, s, dz_dr2)
@@ -377,6 +378,7 @@ impl<R: Real> Interface<R> {
     }
 
     /// As [`Interface::sag`], without computing a plane.
+    #[inline(always)]
     fn surface_sag(&self, r2: R) -> (R, R) {
         if self.form == SurfaceForm::Plane { (R::ZERO, R::ZERO) } else { self.sag(r2) }
     }

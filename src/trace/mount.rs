@@ -8,6 +8,7 @@
 //! Newton's iteration. A freeform has a search of its own (`freeform`).
 
 use super::Tracer;
+use super::asphere::RayStarts;
 use super::deflection::Deflection;
 use super::freeform::FreeformFace;
 use super::interface::{Interface, Intersection};
@@ -18,6 +19,35 @@ use crate::math::{Real, Vec3};
 /// The number of steps of Newton's iteration after which the crossing with an irregular surface is
 /// exact to rounding: each squares the error, which begins with some wavelengths.
 const NEWTON_STEPS: usize = 4;
+
+/// The crossings of rays with the sag `z(r²) + q y²`, from those with the surface of revolution. Each
+/// ray stops on its own, so that its result does not depend on the other rays.
+#[inline(always)]
+pub(super) fn irregular_crossings<R: Real, const W: usize>(
+    surface: &Interface<R>,
+    q: R,
+    rays: &RayStarts<R, W>,
+    mut s: [R; W],
+) -> [R; W] {
+    let mut moving = [R::ONE; W];
+    let tolerance = R::from_f64(R::EPSILON.powf(2.0 / 3.0));
+    for _ in 0..NEWTON_STEPS {
+        for j in 0..W {
+            let (p, k) = rays.get(j);
+            let (f, slope) = surface.height_above_irregular(p + k * s[j], k, q);
+            let step = f / slope;
+            // The next step would be smaller than the square of this one.
+            let size = p.x.abs() + p.y.abs() + p.z.abs();
+            let settled = step * step * surface.n2 <= tolerance * tolerance * size * size;
+            s[j] = R::select(moving[j] > R::ZERO, s[j] - step, s[j]);
+            moving[j] = R::select(settled, R::ZERO, moving[j]);
+        }
+        if moving.iter().all(|moving| *moving == R::ZERO) {
+            break;
+        }
+    }
+    s
+}
 
 /// The position and the irregularity of a surface.
 #[derive(Debug, Clone)]
@@ -74,8 +104,8 @@ impl<R: Real> Mount<R> {
         if let Some(face) = &self.face {
             let met = face.intersect(surface, start, k);
             let arrived = PropagatedRay::met_at(surface, met, k);
-            let ideal = self.ideal.map(|action| Deflection::new(action, surface));
-            return ideal.map_or(arrived, |ideal| arrived.deflected_by(ideal));
+            let Some(action) = self.ideal else { return arrived };
+            return arrived.deflected_by(Deflection::new(action, &face.form, surface, met.point));
         }
         match self.astigmatism {
             None => PropagatedRay::straight(surface, start, k),
@@ -102,17 +132,27 @@ impl<R: Real> Interface<R> {
     fn intersect_irregular(&self, p: Vec3<R>, k: Vec3<R>, q: R) -> Intersection<R> {
         let plain = self.value().intersect(p.value(), k.value());
         let (start, before) = self.closest_approach(p, k);
-        let mut s = plain.s - before.value();
-        for _ in 0..NEWTON_STEPS {
-            let at = (start.value() + k.value() * s, k.value());
-            let (f, slope) = self.value().height_above_irregular(at.0, at.1, q.value());
-            s -= f / slope;
-        }
-        let mut s = R::from_f64(if plain.missed { f64::NAN } else { s });
+        let mut ray = RayStarts::<f64, 1>::new();
+        ray.set(0, start.value(), k.value());
+        let from = if plain.missed { f64::NAN } else { plain.s - before.value() };
+        let [s] = irregular_crossings(&self.value(), q.value(), &ray, [from]);
+        let mut s = R::from_f64(s);
         for _ in 0..R::ORDER {
             let (f, slope) = self.height_above_irregular(start + k * s, k, q);
             s -= f / slope;
         }
+        self.intersection_on_irregular((start, before), k, s, q)
+    }
+
+    /// The intersection at `start + s k`, which lies on the sag `z(r²) + q y²`; missed if `s` is NaN.
+    #[inline(always)]
+    pub(super) fn intersection_on_irregular(
+        &self,
+        (start, before): (Vec3<R>, R),
+        k: Vec3<R>,
+        s: R,
+        q: R,
+    ) -> Intersection<R> {
         let met = self.intersection_at(start + k * s, k, before + s);
         let twice = q * met.point.y;
         let normal = Vec3::new(met.normal.x, met.normal.y - (twice + twice), met.normal.z);
@@ -122,6 +162,7 @@ impl<R: Real> Interface<R> {
     }
 
     /// `z(r²) + q y² − z` at a point, and its derivative along `k`.
+    #[inline(always)]
     fn height_above_irregular(&self, point: Vec3<R>, k: Vec3<R>, q: R) -> (R, R) {
         let (height, slope) = self.height_above(point, k);
         let lean = q * point.y;
@@ -140,6 +181,17 @@ impl<R: Real> Tracer<R> {
     #[inline(always)]
     pub(super) fn mount(&self, surface: usize) -> Option<&Mount<R>> {
         self.mounts.get(surface)?.as_ref()
+    }
+
+    /// The mount of a surface that vector instructions cross: between homogeneous media, with the sag
+    /// of a conic or an asphere, irregular or not. `None` for numbers that are not plain ones of 64
+    /// bits, whose iteration is another.
+    #[inline(always)]
+    pub(super) fn vector_mount(&self, surface: usize) -> Option<&Mount<R>> {
+        let is_plain_number = R::ORDER == 0 && R::EPSILON == f64::EPSILON;
+        let mount =
+            self.mount(surface).filter(|_| is_plain_number && !self.touches_grin(surface))?;
+        (mount.face.is_none() && mount.ideal.is_none()).then_some(mount)
     }
 
     /// A point in the own frame of a surface, in the frame behind it.

@@ -500,3 +500,17 @@ fn the_system_shows_whole_coordinates_and_lines() {
     let notes = galleys.iter().find(|galley| galley.text().starts_with("first line")).unwrap();
     assert_eq!(notes.rows.len(), 2);
 }
+
+#[test]
+fn a_lens_from_a_specification_is_found_in_the_menu_and_in_the_palette() {
+    let mut harness = window(double_gauss());
+    press(&mut harness, "File");
+    press_item(&mut harness, "New from specification…");
+    harness.get_by_label("Design a lens");
+    press(&mut harness, "Layout");
+    assert!(harness.query_by_label("Design a lens").is_none());
+    keys(&mut harness, Modifiers::COMMAND, Key::K);
+    enter_text(&mut harness, "Find a command", "new from specification");
+    keys(&mut harness, Modifiers::NONE, Key::Enter);
+    harness.get_by_label("Design a lens");
+}

@@ -15,6 +15,7 @@ mod panels;
 mod prescription;
 mod search;
 mod shaders;
+mod specification;
 mod tolerances;
 mod unsaved;
 mod window;

@@ -167,6 +167,13 @@ fn what_no_lens_can_do_is_refused_by_name() {
     let with = |rest: &str| format!("{{\"focal_length_mm\": 50, {rest}}}");
     for (rest, words) in [
         (r#""f_number": 0.4, "half_field_deg": 5"#, "f/0.4; an image in air"),
+        (r#""f_number": 0.5, "half_field_deg": 5"#, "f/0.5; an image in air"),
+        (r#""numerical_aperture": 1.0, "half_field_deg": 5"#, "f/0.5; an image in air"),
+        (r#""f_number": 4, "half_field_deg": 85"#, "a field of 170 degrees"),
+        (
+            r#""f_number": 4, "half_field_deg": 5, "min_back_focus_mm": 80, "max_track_mm": 60"#,
+            "a back focus of 80 mm within a track of 60 mm",
+        ),
         (
             r#""f_number": 4, "half_field_deg": 85, "max_abs_distortion": 0.0"#,
             "170 degrees with a distortion of at most 0",

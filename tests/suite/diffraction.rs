@@ -367,6 +367,7 @@ fn the_energy_of_two_beams_within_a_circle_follows_their_fringes() {
     let (wavelength, a, energy) = (0.5e-3, 0.1, 3.0);
     let beams = PupilSamples {
         cosines: vec![[a, 0.0], [-a, 0.0]],
+        points: Vec::new(),
         waves: vec![0.0; 2],
         amplitudes: vec![1.0; 2],
         energies: vec![energy; 2],

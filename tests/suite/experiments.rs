@@ -101,6 +101,15 @@ fn the_unbiased_front_dominates_the_biased_designs() {
 }
 
 #[test]
+fn a_fast_lens_has_less_noise_by_candle_light() {
+    let outcome = outcome("3.7");
+    let shares = ["darkest_share", "brightest_share"].map(|name| column(&outcome.tables[1], name));
+    assert!(shares.iter().all(|shares| (shares.iter().sum::<f64>() - 1.0).abs() < 1e-12));
+    let numbers = column(&outcome.tables[0], "grey_number");
+    assert!(numbers[0] < numbers[1], "{numbers:?}");
+}
+
+#[test]
 fn a_fast_lens_resolves_moving_targets_better() {
     let outcome = outcome("3.8");
     let [dark, bright] =

@@ -2,7 +2,9 @@
 //! the edge of the pupil, and with their derivatives.
 
 use aplanat::files;
-use aplanat::lens::{Freeform, FreeformKind, Lens, Pose, Shape, Surface, System, blank};
+use aplanat::lens::{
+    Freeform, FreeformKind, IdealAction, Lens, Pose, Shape, Surface, System, blank,
+};
 use aplanat::math::{Dual, Vec3};
 use aplanat::trace::{
     AdjointSeed, Fate, Landings, Ray, RayLimit, Rays, SurfaceParameter, TraceSink as _, Tracer,
@@ -35,13 +37,41 @@ fn forms() -> Vec<(Shape<f64>, Freeform<f64>)> {
             FreeformKind::Chebyshev { half_widths: [5.0, 4.0] },
             &[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.1, 0.0, -0.05, 0.02],
         ),
+        of(
+            conic(0.03, -0.4, &[]),
+            FreeformKind::QCon { radius },
+            &[0.05, -0.03, 0.01, 0.002, -0.004],
+        ),
+        of(
+            conic(-0.03, 0.3, &[]),
+            FreeformKind::QBfs { radius },
+            &[0.03, -0.01, 0.004, 0.001, -5e-4, 3e-4],
+        ),
+        of(
+            conic(0.02, -0.5, &[1e-5]),
+            FreeformKind::RadialPhase { radius, order: 2.0 },
+            &[-150.0, 20.0, -8.0],
+        ),
+        of(
+            conic(0.01, 0.0, &[]),
+            FreeformKind::XyPhase { radius, order: -1.0 },
+            &[40.0, -60.0, -150.0, 30.0, -90.0, 25.0, -10.0],
+        ),
     ]
+}
+
+/// The rule of a form that adds to the phase, at 0.55 µm.
+fn action(form: &Freeform<f64>) -> Option<IdealAction<f64>> {
+    let order = form.kind.order()?;
+    Some(IdealAction::Phase { path: order * 0.55e-3 / std::f64::consts::TAU })
 }
 
 /// One freeform into glass and a plane 20 mm behind its vertex.
 fn single((shape, form): &(Shape<f64>, Freeform<f64>), semi_diameter: f64) -> System<f64> {
     let freeform = Some(Box::new(form.clone()));
-    let face = Surface { shape: *shape, freeform, semi_diameter, ..Surface::plane(20.0, 1.6) };
+    let ideal = action(form);
+    let face =
+        Surface { shape: *shape, freeform, ideal, semi_diameter, ..Surface::plane(20.0, 1.6) };
     let surfaces = vec![face, Surface::plane(0.0, 1.6)];
     System { index_before: 1.0, surfaces, stop: None }
 }
@@ -63,7 +93,7 @@ fn some_rays(count: usize) -> Rays<f64> {
 
 /// Landing x, y, direction cosines l, m and optical path in 40 digits: crossing by a root finder on
 /// the sag of the definition, numerical derivatives for the normal, refraction by the angles.
-const EXPECTED: [[[f64; 5]; 2]; 6] = [
+const EXPECTED: [[[f64; 5]; 2]; 10] = [
     [
         [
             2.7664311580552203,
@@ -160,6 +190,70 @@ const EXPECTED: [[[f64; 5]; 2]; 6] = [
             35.131302315754844,
         ],
     ],
+    [
+        [
+            2.5433417950943515,
+            -0.8742745893631126,
+            0.03655530625729781,
+            0.06115600543067707,
+            35.02123258181152,
+        ],
+        [
+            -2.9168031836220396,
+            3.7069709197437697,
+            0.0014868098212746114,
+            0.10310549608489297,
+            35.12123570756198,
+        ],
+    ],
+    [
+        [
+            3.454341308394126,
+            -1.946950784312058,
+            0.08243828740517294,
+            0.007815299435974405,
+            35.19610648363985,
+        ],
+        [
+            -4.357280745245839,
+            4.493762573664296,
+            -0.07017810045720889,
+            0.14266092952667592,
+            35.57694604439911,
+        ],
+    ],
+    [
+        [
+            2.736889277217406,
+            -1.0996633967209244,
+            0.04643273856823665,
+            0.04985207773027497,
+            35.03952621635509,
+        ],
+        [
+            -3.159900540771356,
+            3.8421969611314366,
+            -0.010935859589451206,
+            0.1102147747969734,
+            35.18706348783643,
+        ],
+    ],
+    [
+        [
+            2.935097919053624,
+            -1.3192609419844652,
+            0.056442861543590114,
+            0.03887627589244263,
+            35.07134273441366,
+        ],
+        [
+            -3.5223179888856695,
+            4.043491796717738,
+            -0.02909720342663917,
+            0.12033095036139277,
+            35.29261764799914,
+        ],
+    ],
 ];
 
 #[test]
@@ -216,6 +310,7 @@ fn a_freeform_is_met_from_behind_too() {
         let face = |thickness: f64, index: f64| Surface {
             shape,
             freeform: Some(Box::new(form.clone())),
+            ideal: action(&form),
             ..Surface::plane(thickness, index)
         };
         let mirror = Surface { mirror: true, ..Surface::plane(-8.0, 1.6) };
@@ -278,14 +373,20 @@ fn landing_sum(system: &System<f64>, rays: &Rays<f64>) -> f64 {
     (0..rays.len()).filter(|i| hits.fate(*i).is_imaged()).map(one).sum()
 }
 
-/// A step of a number that changes the sag at 4 mm by about 0.1 µm.
+/// A step of a number that changes the sag at 4 to 5 mm by about 0.1 µm.
 fn step(system: &System<f64>, surface: usize, parameter: SurfaceParameter) -> f64 {
     match parameter {
-        SurfaceParameter::AsphereTerm(k) => 1e-4 * 4.2_f64.powi(-(2 * k as i32 + 3)),
+        SurfaceParameter::AsphereTerm(k) => 1e-4 * 5.0_f64.powi(-(2 * k as i32 + 3)),
         SurfaceParameter::Freeform(k) => {
             let kind = system.surfaces[surface].freeform.as_ref().unwrap().kind;
             let power = kind.power(k);
-            if power == 0 { 1e-2 } else { 1e-4 * 4.0_f64.powi(power - 1) }
+            if kind.is_phase() {
+                0.1
+            } else if power == 0 {
+                1e-2
+            } else {
+                1e-4 * 4.0_f64.powi(power - 1)
+            }
         }
         _ => 1e-4,
     }
@@ -338,6 +439,7 @@ fn freeforms_have_the_derivatives_of_their_landings() {
         let (shape, other) = forms[(i + 1) % forms.len()].clone();
         let second = Surface {
             shape,
+            ideal: action(&other),
             freeform: Some(Box::new(other)),
             pose: Some(Pose::new([0.2, -0.1], [0.01, 0.02])),
             astigmatism: Some(1e-3),
@@ -374,7 +476,9 @@ fn margins_of_freeforms_have_the_derivatives_of_their_values() {
                     SurfaceParameter::Freeform(k) => form.1.kind.power(k) - 1,
                     _ => 0,
                 };
-                let step = 1e-4 * 3.0_f64.powi(power);
+                let is_phase = form.1.kind.is_phase();
+                let phase = is_phase && matches!(parameter, SurfaceParameter::Freeform(_));
+                let step = if phase { 0.1 } else { 1e-4 * 3.0_f64.powi(power) };
                 let moved = |step: f64| {
                     let mut moved = system.clone();
                     *parameter.value_mut(&mut moved, 0) += step;

@@ -21,7 +21,8 @@ fn assert_near(name: &str, found: [f64; 3], expected: [f64; 3]) {
 }
 
 fn assert_series(kind: FreeformKind, number: usize, expected: [f64; 3]) {
-    let found = single(kind, number).series_sag(AT[0], AT[1], |a| a);
+    let form = single(kind, number);
+    let found = form.series_sag(&form.base(&Shape::Plane), AT[0], AT[1], |a| a);
     assert_near(&format!("{} {number}", kind.name()), found, expected);
 }
 
@@ -145,7 +146,8 @@ fn curvatures_at_the_vertex_and_symmetries_are_known() {
     ] {
         for number in 0..6 {
             let form = single(kind, number);
-            let at = |x: f64| form.series_sag(x, 0.3, |a| a)[0];
+            let base = form.base(&Shape::Plane);
+            let at = |x: f64| form.series_sag(&base, x, 0.3, |a| a)[0];
             assert_eq!(
                 (at(0.4) - at(-0.4)).abs() < 1e-15,
                 form.mirrors_in_x(),
@@ -170,6 +172,8 @@ fn bounds_contain_every_sag_and_gradients_are_derivatives() {
         FreeformKind::Zernike { radius },
         FreeformKind::FringeZernike { radius },
         FreeformKind::Chebyshev { half_widths: [5.0, 7.0] },
+        FreeformKind::QCon { radius },
+        FreeformKind::QBfs { radius },
     ] {
         let count = kind.counts()[1].min(numbers.len());
         // The same sag at 5 mm from every number.
@@ -180,7 +184,7 @@ fn bounds_contain_every_sag_and_gradients_are_derivatives() {
         let bounds = {
             let base = base.map(Interval::constant);
             let (x, y) = (Interval::between(0.9, 1.1), Interval::between(-2.1, -2.0));
-            let (a, b) = (base.sag(x, y), form.series_sag(x, y, Interval::constant));
+            let (a, b) = (base.sag(x, y), form.series_sag(&base, x, y, Interval::constant));
             [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
         };
         for i in 0..25 {
@@ -215,4 +219,79 @@ fn faults_are_named() {
     assert!(fault(zernike, vec![]).unwrap().contains("normalised to 0 mm"));
     let wrong = fault(FreeformKind::OddAsphere, vec![0.0, f64::NAN]).unwrap();
     assert!(wrong.contains("number 2 of the odd asphere is NaN"), "{wrong}");
+}
+
+/// `Qₘ(u²)` of a kind, with u along x; `weight` is what it is multiplied by in the sag.
+fn q(kind: FreeformKind, m: usize, u: f64, weight: f64) -> f64 {
+    let form = single(kind, m);
+    form.series_sag(&form.base(&Shape::Plane), 2.0 * u, 0.0, |a| a)[0] / weight
+}
+
+/// The first polynomials as Forbes prints them (Optics Express 15, 5218, 2007, eqs. 2.5 and 3.6).
+#[test]
+fn polynomials_of_forbes_are_those_that_he_prints() {
+    for u in [0.3_f64, 0.77, 0.999] {
+        let x = u * u;
+        let strong = [
+            1.0,
+            -(5.0 - 6.0 * x),
+            15.0 - 14.0 * x * (3.0 - 2.0 * x),
+            -(35.0 - 12.0 * x * (14.0 - x * (21.0 - 10.0 * x))),
+        ];
+        let mild = [
+            1.0,
+            (13.0 - 16.0 * x) / 19.0_f64.sqrt(),
+            (2.0_f64 / 95.0).sqrt() * (29.0 - 4.0 * x * (25.0 - 19.0 * x)),
+            (2.0_f64 / 2545.0).sqrt() * (207.0 - 4.0 * x * (315.0 - x * (577.0 - 320.0 * x))),
+        ];
+        for (m, (strong, mild)) in strong.into_iter().zip(mild).enumerate() {
+            let found = q(FreeformKind::QCon { radius: 2.0 }, m, u, x * x);
+            assert!((found - strong).abs() < 1e-13, "{m} {u}: {found} {strong}");
+            let found = q(FreeformKind::QBfs { radius: 2.0 }, m, u, x * (1.0 - x));
+            assert!((found - mild).abs() < 1e-11, "{m} {u}: {found} {mild}");
+        }
+    }
+}
+
+/// Up to the highest order the slopes of the mild polynomials are orthonormal over the aperture with the
+/// weight 1/√(1 − u²), and the strong polynomials are orthogonal with the weight u⁸ u (2007, eqs. 2.3 and
+/// 3.4): Gauss's quadrature at the nodes of Chebyshev is exact for both.
+#[test]
+fn polynomials_of_forbes_are_orthogonal() {
+    let count = 20_usize;
+    let nodes = 200_u32;
+    let angle = |i: u32| std::f64::consts::PI * (f64::from(i) + 0.5) / f64::from(2 * nodes);
+    let (mild, strong) = (FreeformKind::QBfs { radius: 1.0 }, FreeformKind::QCon { radius: 1.0 });
+    let table = |kind: FreeformKind, place: usize| -> Vec<Vec<f64>> {
+        let all = Freeform { kind, numbers: vec![1.0; count] };
+        let at = |i: u32| {
+            let mut row = vec![0.0; count];
+            let base = all.base(&Shape::Plane);
+            all.visit_series(&base, angle(i).sin(), 0.0, |k, term: [f64; 3]| row[k] = term[place]);
+            row
+        };
+        (0..nodes).map(at).collect()
+    };
+    let (slopes, values) = (table(mild, 1), table(strong, 0));
+    let norm = |m: usize| 1.0 / (4.0 * (m as f64) + 10.0);
+    let mut worst: [f64; 2] = [0.0; 2];
+    for m in 0..count {
+        for n in 0..=m {
+            let mean = |of: &dyn Fn(u32) -> f64| (0..nodes).map(of).sum::<f64>() / f64::from(nodes);
+            let found = mean(&|i| slopes[i as usize][m] * slopes[i as usize][n]);
+            let expected = if m == n { 1.0 } else { 0.0 };
+            worst[0] = worst[0].max((found - expected).abs());
+            // ∫ (u⁴ Qₘ)(u⁴ Qₙ) u du with du = cos θ dθ.
+            let found = std::f64::consts::FRAC_PI_2
+                * mean(&|i| {
+                    let row = &values[i as usize];
+                    row[m] * row[n] * angle(i).sin() * angle(i).cos()
+                });
+            let expected = if m == n { norm(m) } else { 0.0 };
+            worst[1] = worst[1].max((found - expected).abs());
+        }
+    }
+    println!("{worst:?}");
+    assert!(worst[0] < 1e-11, "{worst:?}");
+    assert!(worst[1] < 1e-5, "{worst:?}");
 }

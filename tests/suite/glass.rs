@@ -266,11 +266,33 @@ fn a_catalogue_is_added_and_its_glass_found_in_a_lens() {
         (vec!["glass", "nothing-like-it"], "found no glass"),
         (vec!["glass", "nd=high"], "expected `1.6..1.7`"),
         (vec!["glass", "weight=1"], "expected nd or vd"),
+        (vec!["glass", "--nearest", "0.2", "50"], "found nd 0.2 and vd 50"),
+        (vec!["glass", "--nearest", "1.5", "nan"], "found nd 1.5 and vd NaN"),
         (vec!["glass", "--add", lens], "expected a glass catalogue"),
     ] {
         let (status, _, errors) = run(&words);
         assert!(status == Some(2) && errors.contains(expected), "{words:?}: {errors}");
     }
+}
+
+/// The glasses that stand for a model glass, by the distance that the program states.
+#[test]
+fn the_nearest_glasses_are_listed_in_their_order() {
+    let list = |words: &[&str]| -> Vec<Value> {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_aplanat"));
+        command.args(["glass", "--nearest", "1.6204", "36.4", "--json"]).args(words);
+        let output = command.env("APLANAT_GLASSES", "nowhere").output().unwrap();
+        serde_json::from_slice(&output.stdout).unwrap()
+    };
+    let distance = |glass: &Value| {
+        let [nd, vd] = ["nd", "vd"].map(|key| glass[key].as_f64().unwrap());
+        ((nd - 1.6204) / 1e-3).hypot((vd - 36.4) / 0.5)
+    };
+    let all = list(&[]);
+    assert!(all.len() == 10 && all.is_sorted_by_key(&distance));
+    let far = list(&["schott", "vd=60.."]);
+    assert!(far.is_sorted_by_key(&distance) && far.iter().all(|glass| glass["maker"] == "SCHOTT"));
+    assert!(distance(&far[0]) > distance(&all[9]));
 }
 
 /// A member of an archive of Zemax in its first layout, not compressed.

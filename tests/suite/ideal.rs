@@ -1,7 +1,10 @@
 //! Paraxial lenses and gratings: closed forms, wavefronts, reversal, derivatives, files.
 
 use aplanat::files;
-use aplanat::lens::{IdealAction, IdealElement, Lens, Medium, Pose, Shape, Surface, System, blank};
+use aplanat::lens::{
+    Edit, Freeform, FreeformKind, IdealAction, IdealElement, Lens, Medium, Pose, Shape, Surface,
+    System, Wavelength, apply_edit, blank,
+};
 use aplanat::math::Vec3;
 use aplanat::trace::{Fate, Ray, Rays, Tracer};
 
@@ -133,7 +136,9 @@ fn behind_a_lens(action: IdealAction<f64>) -> System<f64> {
     };
     let shape = match action {
         IdealAction::Lens { .. } => Shape::Plane,
-        IdealAction::Grating { .. } => Shape::Conic { curvature: -0.02, conic: -0.6 },
+        IdealAction::Grating { .. } | IdealAction::Phase { .. } => {
+            Shape::Conic { curvature: -0.02, conic: -0.6 }
+        }
     };
     let element = Surface {
         shape,
@@ -208,5 +213,140 @@ fn ideal_elements_survive_their_files() {
     focused.surfaces[1].curvature = 0.01;
     let error = focused.check().unwrap_err().to_string();
     assert!(error.contains("surface 2: a paraxial lens is a plane"), "{error}");
+    std::fs::remove_dir_all(&folder).unwrap();
+}
+
+/// A lens with a phase on the plane that light leaves.
+fn diffractive(kind: FreeformKind, numbers: &[f64]) -> Lens {
+    let mut lens = blank();
+    lens.surfaces[0].medium = Medium::Air;
+    lens.surfaces[1].freeform = Some(Freeform { kind, numbers: numbers.to_vec() });
+    lens
+}
+
+/// A phase that grows evenly is a grating: `m λ a/(2π R)` is its `m λ/d`.
+#[test]
+fn an_even_phase_is_a_grating() {
+    let (radius, order) = (4.0, -2.0);
+    let phase = diffractive(FreeformKind::XyPhase { radius, order }, &[0.0, 700.0]);
+    let lines_per_mm = 700.0 / (std::f64::consts::TAU * radius);
+    let ruled = lens(IdealElement::Grating { lines_per_mm, order });
+    let [a, b] =
+        [&phase, &ruled].map(|lens| Tracer::new(&lens.resolve(0, 0.486).unwrap()).unwrap());
+    for i in 0..20 {
+        let (p, q) = (a.trace(some_rays().get(i)), b.trace(some_rays().get(i)));
+        assert_eq!(p.fate, Fate::Imaged);
+        let apart = p.ray.point - q.ray.point;
+        assert!(apart.dot(apart).sqrt() < 1e-12 && (p.opl - q.opl).abs() < 1e-12, "{p:?} {q:?}");
+    }
+}
+
+/// `f = −π R²/(m a₁ λ)`: the focal length of a diffractive lens is inversely proportional to the
+/// wavelength and to the order, whether rays or first-order optics say it.
+#[test]
+fn a_diffractive_lens_focuses_by_wavelength_and_order() {
+    for (order, um) in [(1.0, 0.5875618), (1.0, 0.4861), (3.0, 0.6563), (-1.0, 0.55)] {
+        let kind = FreeformKind::RadialPhase { radius: 5.0, order };
+        let first = if order < 0.0 { 900.0 } else { -900.0 };
+        let mut lens = diffractive(kind, &[first]);
+        lens.image_solve = Some(0.0);
+        lens.wavelengths = vec![Wavelength { um, weight: 1.0, primary: true }];
+        let system = lens.resolve(0, um).unwrap();
+        let focus = -std::f64::consts::PI * 25.0 / (order * first * um * 1e-3);
+        let gap = system.surfaces[1].thickness;
+        assert!((gap / focus - 1.0).abs() < 1e-13, "{gap} {focus}");
+        let y = Tracer::new(&system).unwrap().trace(ray([0.0, 1e-4, -1.0], [0.0; 2])).ray.point.y;
+        assert!(y.abs() < 1e-10, "{y}");
+        // Without an order light goes straight on, at any phase.
+        let none = FreeformKind::RadialPhase { radius: 5.0, order: 0.0 };
+        let system = diffractive(none, &[first, 1e5]).resolve(0, um).unwrap();
+        let found = Tracer::new(&system).unwrap().trace(ray([0.3, 1.5, -1.0], [0.0; 2]));
+        assert_eq!((found.ray.point.x, found.ray.point.y), (0.3, 1.5));
+        assert_eq!((found.ray.direction.x, found.ray.direction.y), (0.0, 0.0));
+    }
+}
+
+/// Far outside the radius of its unit the phase continues until no light is in its order.
+#[test]
+fn a_phase_ends_by_name_where_its_order_is_evanescent() {
+    let kind = FreeformKind::RadialPhase { radius: 1.0, order: 1.0 };
+    let tracer = Tracer::new(&diffractive(kind, &[-800.0]).resolve(0, 0.55).unwrap()).unwrap();
+    // sin θ' = λ |a₁| r/(π R²) reaches 1 at r = 7.14 mm.
+    let limit = std::f64::consts::PI / (0.55e-3 * 800.0);
+    let fate = |y: f64| tracer.trace(ray([0.0, y, -1.0], [0.0; 2])).fate;
+    assert_eq!(fate(0.999 * limit), Fate::Imaged);
+    assert_eq!(fate(1.001 * limit), Fate::TotalReflection(1));
+    let wild = diffractive(kind, &[1e90]).resolve(0, 0.55).unwrap();
+    let found = Tracer::new(&wild).unwrap().trace(ray([0.0, 1.0, -1.0], [0.0; 2]));
+    assert_eq!(found.fate, Fate::TotalReflection(1));
+    assert!(found.ray.point.is_finite() && found.opl.is_finite());
+}
+
+/// A lens that is scaled keeps its angles, a phase grows with it; a file in inches keeps the phase.
+#[test]
+fn a_phase_is_scaled_as_a_path_and_read_as_an_angle() {
+    let kind = FreeformKind::RadialPhase { radius: 5.0, order: 1.0 };
+    let lens = diffractive(kind, &[-900.0, 40.0]);
+    let large = apply_edit(&lens, &Edit::Scale(3.0)).unwrap();
+    let [a, b] = [&lens, &large].map(|l| Tracer::new(&l.resolve(0, 0.55).unwrap()).unwrap());
+    let (p, q) =
+        (a.trace(ray([1.0, 2.0, -1.0], [0.1, 0.0])), b.trace(ray([3.0, 6.0, -3.0], [0.1, 0.0])));
+    let apart = q.ray.point - p.ray.point * 3.0;
+    assert!(apart.dot(apart).sqrt() < 1e-12 && (q.opl - 3.0 * p.opl).abs() < 1e-11, "{apart:?}");
+    let form = lens.surfaces[1].freeform.as_ref().unwrap().in_mm(25.4);
+    assert_eq!(form.numbers, [-900.0, 40.0]);
+    assert_eq!(form.kind, FreeformKind::RadialPhase { radius: 127.0, order: 1.0 });
+}
+
+/// What contradicts itself is refused by its surface.
+#[test]
+fn a_phase_and_a_rule_on_one_surface_are_refused() {
+    let kind = FreeformKind::RadialPhase { radius: 5.0, order: 1.0 };
+    let mut both = diffractive(kind, &[-900.0]);
+    both.surfaces[1].ideal = Some(IdealElement::Grating { lines_per_mm: 100.0, order: 1.0 });
+    let error = both.check().unwrap_err().to_string();
+    assert!(error.contains("surface 2: a grating and a radial phase on one surface"), "{error}");
+    let kind = FreeformKind::RadialPhase { radius: 5.0, order: f64::NAN };
+    let error = diffractive(kind, &[1.0]).check().unwrap_err().to_string();
+    assert!(error.contains("the order of the radial phase is NaN"), "{error}");
+}
+
+/// The coefficients of the other programs are optical paths at one wavelength, `Σ c r^(2k)`.
+#[test]
+fn a_radial_phase_survives_a_sequence_file() {
+    let folder = std::env::temp_dir().join(format!("aplanat-phase-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    let path = folder.join("phase.seq");
+    let kind = FreeformKind::RadialPhase { radius: 4.0, order: 2.0 };
+    let mut written = diffractive(kind, &[-300.0, 20.0, 0.0, 5.0]);
+    written.surfaces[1].curvature = 0.01;
+    written.surfaces[1].conic = -0.7;
+    written.surfaces[1].asphere = vec![1e-6];
+    files::save(&written, &path).unwrap();
+    let again = files::open(&path).unwrap().lens;
+    let [a, b] = [&written, &again].map(|l| Tracer::new(&l.resolve(0, 0.486).unwrap()).unwrap());
+    for i in 0..20 {
+        let (p, q) = (a.trace(some_rays().get(i)), b.trace(some_rays().get(i)));
+        let apart = p.ray.point - q.ray.point;
+        assert!(p.fate == Fate::Imaged && apart.dot(apart).sqrt() < 1e-11, "{apart:?}");
+        assert!((p.opl - q.opl).abs() < 1e-11);
+    }
+    let inches = "RDM;LEN\nDIM I\nEPD 0.2\nWL 500\nYAN 0\nSO 0 1E14\nS 0 2\n STO\n DIF DOE\n \
+                  HOR 1\n HWL 500\n HCT R\n HCO C1 -0.25\nSI 0 0\nGO\n";
+    std::fs::write(&path, inches).unwrap();
+    let lens = files::open(&path).unwrap().lens;
+    // A path of −r²/4 in inches is a lens of 2 inches at its wavelength.
+    let mut focused = lens.clone();
+    focused.image_solve = Some(0.0);
+    let gap = focused.resolve(0, 0.5).unwrap().surfaces[0].thickness;
+    assert!((gap - 2.0 * 25.4).abs() < 1e-10, "{gap}");
+    for (from, to) in [("HCT R", "HCT X"), (" HWL 500\n", "")] {
+        std::fs::write(&path, inches.replace(from, to)).unwrap();
+        let locked = files::open(&path).unwrap().lens;
+        assert!(locked.surfaces[0].locked.is_some() && locked.surfaces[0].freeform.is_none());
+    }
+    std::fs::write(&path, inches.replace("HCO C1", "HCO C99")).unwrap();
+    let error = files::open(&path).unwrap_err().to_string();
+    assert!(error.contains("C1 to C20"), "{error}");
     std::fs::remove_dir_all(&folder).unwrap();
 }

@@ -332,17 +332,31 @@ fn distortion_of_every_colour_and_both_pupils() {
         for (aiming, key) in [("off", "paraxial_pupil"), ("on", "stop_centre")] {
             let aiming = format!("--effects=aiming={aiming}");
             let found = folder.analyze(&lens, "lateral-color", &[aiming]);
-            for (found, exact) in list(&found).iter().zip(points) {
-                for (found, exact) in list(&found["colors"]).iter().zip(list(&exact["colors"])) {
-                    let (found, exact) = (numbers(&found["point"]), numbers(&exact[key]));
-                    for k in 0..2 {
-                        worst.note(found[k], exact[k], 1e-11, format!("{key} {exact:?}"));
-                    }
-                }
+            let fields = list(&found).iter().zip(points);
+            let pairs = fields.flat_map(|(found, exact)| {
+                list(&found["colors"]).iter().zip(list(&exact["colors"]))
+            });
+            for (found, exact) in pairs {
+                let (found, exact) = (numbers(&found["point"]), numbers(&exact[key]));
+                let place = format!("{key} {exact:?}");
+                worst.note(found[0], exact[0], 1e-11, &place);
+                worst.note(found[1], exact[1], 1e-11, &place);
             }
         }
         worst.check(&format!("distortion {}", folder.id()), 1.0);
     }
+}
+
+/// The irradiance that the command line finds at a point of the image for a wave of the scene.
+fn light_of_wave(folder: &LensFolder, lens: &str, point: &Value, wave: &Value) -> f64 {
+    let far = wave["kind"] == "infinity";
+    let keys = if far { ["fx", "fy"] } else { ["gx", "gy"] };
+    let [x, y] = keys.map(|key| &wave[key]);
+    let at = format!("--at={},{}", point["x"], point["y"]);
+    let mut asked = vec![at, format!("--wave={x},{y},{}", wave["phase"])];
+    asked.extend((!far).then(|| format!("--distance={}", wave["distance"])));
+    let found = folder.analyze(lens, "illumination", &asked);
+    number(&found[0]["points"][0]["irradiance"]["value"])
 }
 
 #[test]
@@ -375,17 +389,10 @@ fn irradiance_of_white_cards_and_of_waves() {
         if scene["lens"] == folder.data["id"] {
             let lens = folder.lens(true, &json!([{"y": 0.0}]), false);
             for point in list(&scene["points"]) {
-                let at = format!("--at={},{}", point["x"], point["y"]);
-                for wave in list(&point["scenes"]) {
-                    let far = wave["kind"] == "infinity";
-                    let keys = if far { ["fx", "fy"] } else { ["gx", "gy"] };
-                    let [x, y] = keys.map(|key| &wave[key]);
-                    let mut asked = vec![at.clone(), format!("--wave={x},{y},{}", wave["phase"])];
-                    asked.extend((!far).then(|| format!("--distance={}", wave["distance"])));
-                    let found = folder.analyze(&lens, "illumination", &asked)[0].clone();
-                    let value = number(&found["points"][0]["irradiance"]["value"]);
+                list(&point["scenes"]).iter().for_each(|wave| {
+                    let value = light_of_wave(&folder, &lens, point, wave);
                     worst.note(value, number(&wave["value"]), 1e-9, format!("{point}"));
-                }
+                });
             }
         }
         worst.check(&format!("irradiance {}", folder.id()), 1.0);

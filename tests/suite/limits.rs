@@ -1,7 +1,7 @@
 //! Limits that the optimizer keeps.
 
 use super::merit::{bundled, vary};
-use aplanat::lens::{Lens, ParameterKind, Quantity, add_variables};
+use aplanat::lens::{Lens, ParameterKind, Quantity, ZoomPosition, ZoomThickness, add_variables};
 use aplanat::merit::{
     DerivativeLevel, Goal, Limit, LimitTreatment, Merit, MeritError, PupilEdge, Term, WeightedTerm,
 };
@@ -188,6 +188,37 @@ fn equal_surfaces_do_no_harm() {
     let (_, before) = judge(&lens, &lens, &goal);
     let (violation, merit) = judge(run(&lens, &goal, 25).best(), &lens, &goal);
     assert!(violation <= KEPT && merit <= before, "{violation:e} {before:e} {merit:e}");
+}
+
+/// Every position of the zoom has gaps of its own, a thousand variables in all, and its own track and
+/// back focus to keep.
+#[test]
+fn a_zoom_of_a_thousand_variables_gets_sharper() {
+    let mut lens = bundled("achromat_ac254_100");
+    lens.fields.values.truncate(1);
+    lens.wavelengths.retain(|line| line.primary);
+    lens.variables.clear();
+    let gaps: Vec<f64> = lens.surfaces.iter().map(|row| row.thickness).collect();
+    let position = |i: usize| ZoomPosition {
+        thicknesses: gaps
+            .iter()
+            .enumerate()
+            .map(|(surface, gap)| ZoomThickness { surface, thickness: gap + 1e-4 * i as f64 })
+            .collect(),
+        ..ZoomPosition::default()
+    };
+    let positions = 1000 / gaps.len() + 1;
+    lens.zoom = (0..positions).map(position).collect();
+    for i in 0..positions {
+        (0..gaps.len()).for_each(|gap| vary(&mut lens, gap, Quantity::ZoomThickness(i)));
+    }
+    assert!(lens.variables.len() >= 1000, "{}", lens.variables.len());
+    let goal = goal(&[Term::Spot, Term::TotalTrack(120.0), Term::BackFocus(80.0)]);
+    let merit = Merit::new(&lens, &goal, 1e-2).unwrap();
+    let before = merit.value(&merit.values(&lens)).unwrap();
+    let optimizer = run(&lens, &goal, 2);
+    let after = merit.value(&merit.values(optimizer.best())).unwrap();
+    assert!(after < before, "{before:e} {after:e}");
 }
 
 /// A new goal has constraints, and its file says so; one without the key was written before there

@@ -2,8 +2,9 @@
 
 use super::merit::bundled;
 use aplanat::lens::{FieldPoint, Lens, Wavelength};
-use aplanat::merit::PupilEdge;
+use aplanat::merit::{Goal, PupilEdge};
 use aplanat::optimize::pareto::{Front, ParetoError, ParetoPoint, ParetoSettings, ParetoSweep};
+use aplanat::tolerance::ToleranceGrade;
 
 /// A lens in one colour at three fields.
 fn lens() -> Lens {
@@ -89,6 +90,11 @@ fn settings_without_meaning_and_lenses_without_light_are_refused() {
         let refused = ParetoSweep::new(&lens(), &settings).unwrap_err();
         assert!(matches!(refused, ParetoError::Settings { .. }), "{refused}");
     }
+    let mut made = lens();
+    let grade = Some(ToleranceGrade::Precision);
+    made.merit = Some(Goal::default_for(&made).unwrap().as_built(grade));
+    let refused = ParetoSweep::new(&made, &ParetoSettings::default()).unwrap_err();
+    assert!(refused.to_string().contains("the term `as_built`"), "{refused}");
     let mut dark = lens();
     dark.surfaces[0].semi_diameter = Some(0.0);
     assert!(matches!(

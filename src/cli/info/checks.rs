@@ -80,6 +80,14 @@ pub(super) fn unusual_parts(lens: &Lens) -> Vec<LensCheck> {
             checks.push(LensCheck { surface: Some(i), found });
         }
         let Some(form) = &row.freeform else { continue };
+        if let Some(order) = form.kind.order() {
+            let found = format!(
+                "{}: all light is taken to be in the order {order}, and Seidel sums leave the phase out",
+                form.kind.name()
+            );
+            checks.push(LensCheck { surface: Some(i), found });
+            continue;
+        }
         let found = format!(
             "{}: first-order data are those of the y-z section, and Seidel sums leave its powers \
              beyond the curvature out",

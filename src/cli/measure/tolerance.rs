@@ -35,8 +35,9 @@ pub(super) struct MeasureToleranceArgs {
     steps: usize,
 }
 
-/// The lens without a file.
+/// The lens without a file: that of costs, and that which is optimized.
 const DOUBLE_GAUSS: &str = "double_gauss_rudolph_50";
+const SENSITIVE: &str = "double_gauss_canon_ef50_f18";
 
 impl MeasureToleranceArgs {
     pub(super) fn run(&self, output: &Output) -> Result<(), CliError> {
@@ -44,8 +45,12 @@ impl MeasureToleranceArgs {
         let fail = |e: ToleranceBenchmarkError| CliError::Failed(format!("{file}: {e}"));
         let cost = measure_tolerances(&lens, self.grade, self.samples).map_err(fail)?;
         let stop = stop_flag();
+        // The bundled lens on which costs are measured has little to gain: its spot as designed is
+        // nine tenths of that as built.
+        let designed = if self.lens.is_some() { lens } else { bundled(SENSITIVE)?.0 };
         let designs = if self.steps > 0 {
-            compare_as_built(&lens, self.grade, (self.steps, self.samples), &stop).map_err(fail)?
+            let effort = (self.steps, self.samples);
+            compare_as_built(&designed, self.grade, effort, &stop).map_err(fail)?
         } else {
             None
         };
@@ -59,12 +64,17 @@ impl MeasureToleranceArgs {
             let opened = LensFile::of(path).open()?;
             return Ok((opened.lens, opened.file));
         }
-        let missing = || CliError::Failed(format!("there is no bundled lens {DOUBLE_GAUSS}"));
-        let found = files::bundled_lenses().iter().find(|lens| lens.name == DOUBLE_GAUSS);
-        let found = found.ok_or_else(missing)?;
-        let lens = files::json::read(found.text, found.name)?;
-        Ok((lens, DOUBLE_GAUSS.to_owned()))
+        bundled(DOUBLE_GAUSS)
     }
+}
+
+/// A bundled lens and its name.
+fn bundled(name: &str) -> Result<(Lens, String), CliError> {
+    let missing = || CliError::Failed(format!("there is no bundled lens {name}"));
+    let found = files::bundled_lenses().iter().find(|lens| lens.name == name);
+    let found = found.ok_or_else(missing)?;
+    let lens = files::json::read(found.text, found.name)?;
+    Ok((lens, name.to_owned()))
 }
 
 #[derive(Serialize)]
@@ -90,6 +100,7 @@ impl MeasureToleranceReport {
         let exact = |error: f64| format!("{error:.1e}");
         row("first derivatives".into(), "1.0e-9".into(), exact(cost.first_error));
         row("second derivatives".into(), "1.0e-7".into(), exact(cost.second_error));
+        row("growth of the spot by each error".into(), "1.0e-4".into(), exact(cost.sampling_error));
         let sweep = format!("sensitivities by {errors} errors, {rays} rays, one core");
         row(sweep, ms(5.0), ms(cost.sweep_ms));
         row("the same with second derivatives of rays".into(), String::new(), ms(cost.jets_ms));
@@ -108,8 +119,8 @@ impl Display for MeasureToleranceReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "{}\n{}\n\n{}", self.machine, self.file, self.costs())?;
         let Some(designs) = &self.designs else { return Ok(()) };
-        let AsBuiltComparison { samples, nominal, as_built, .. } = designs;
-        writeln!(f, "refocused rms spots in mm, {samples} lenses by Monte Carlo:\n")?;
+        let AsBuiltComparison { name, samples, nominal, as_built, .. } = designs;
+        writeln!(f, "{name}: refocused rms spots in mm, {samples} lenses by Monte Carlo:\n")?;
         let head = ["optimized", "as designed", "mean as built", "90 %", "light mm^2", "steps"];
         let mut table = TextTable::new(&head);
         for (name, design) in [("as designed", nominal), ("as built", as_built)] {
@@ -120,13 +131,13 @@ impl Display for MeasureToleranceReport {
             table.row(std::iter::once(name.to_owned()).chain(cells));
         }
         writeln!(f, "{table}")?;
-        let gain = 1.0 - as_built.quantile / nominal.quantile;
         let cost = as_built.rms / nominal.rms - 1.0;
+        let [gain, most] = [designs.gain(), designs.most()].map(|share| 100.0 * share);
         writeln!(
             f,
-            "asked: the 90 % quantile {:.0} % less; reached: {:.1} % less, and {:.1} % more as designed",
+            "asked: the 90 % quantile {:.0} % less; reached: {gain:.1} % less, and {:.1} % more as \
+             designed; without any errors it would be {most:.1} % less",
             100.0 * GAIN,
-            100.0 * gain,
             100.0 * cost
         )
     }

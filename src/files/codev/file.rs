@@ -70,6 +70,8 @@ pub(super) struct CodeVSurface {
     pub(super) across: f64,
     /// The conic constant of that section.
     pub(super) conic_across: f64,
+    /// The diffractive phase on the surface (`DIF DOE`).
+    pub(super) diffraction: Option<CodeVDiffraction>,
     /// True if the aperture is displaced.
     pub(super) is_offset: bool,
     pub(super) label: String,
@@ -91,6 +93,21 @@ pub(super) enum CodeVProfile {
     Toroid,
     /// A biconic (`AAS`).
     Biconic,
+}
+
+/// A diffractive phase, `Σ cₖ r^(2k)` in the unit of the file at one wavelength.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct CodeVDiffraction {
+    /// The line of the command that begins it.
+    pub(super) line: usize,
+    /// The diffraction order (`HOR`).
+    pub(super) order: f64,
+    /// The wavelength of the coefficients in nanometres (`HWL`), 0 if the file does not say it.
+    pub(super) nm: f64,
+    /// True for powers of r (`HCT R`), the one form that is known.
+    pub(super) is_radial: bool,
+    /// The coefficients (`HCO`).
+    pub(super) terms: Vec<f64>,
 }
 
 /// The frames that the decentre and the tilt of a surface move.

@@ -1,10 +1,11 @@
 //! The commands of a surface: its form, aperture, place and label.
 
 use super::command::{Command, parse_number};
-use super::file::{CodeVProfile, CodeVSurface, Placement};
+use super::file::{CodeVDiffraction, CodeVProfile, CodeVSurface, Placement};
 use super::parse::{CommandOutcome, dropped, preserved, used};
 use crate::files::error::ParseError;
 use crate::files::report::ConversionOutcome;
+use crate::lens::FreeformKind;
 
 /// The glass of `S bend thickness glass`; older files give an index and an Abbe number.
 pub(super) fn glass_word(words: &[String]) -> Option<String> {
@@ -51,6 +52,7 @@ pub(super) fn read(
         "CCY" => surface.is_curvature_free = command.last_number()? == 0.0,
         "THC" => surface.is_thickness_free = command.last_number()? == 0.0,
         "SPH" | "CON" | "ASP" => {}
+        "DIF" | "HOR" | "HWL" | "HCT" | "HCO" => return diffraction(surface, command),
         _ => return place(surface, command),
     }
     Ok(used())
@@ -92,6 +94,37 @@ fn circle(surface: &mut CodeVSurface, command: &Command) -> Result<CommandOutcom
     let inner = command.has_word("OBS") || command.has_word("HOL");
     let target = if inner { &mut surface.obstruction } else { &mut surface.clip };
     *target = Some(radius);
+    Ok(used())
+}
+
+/// The commands of a diffractive phase: `DIF DOE`, `HOR order`, `HWL nm`, `HCT R`, `HCO Ck value`.
+fn diffraction(
+    surface: &mut CodeVSurface,
+    command: &Command,
+) -> Result<CommandOutcome, ParseError> {
+    if command.name == "DIF" && command.has_word("DOE") {
+        let (line, terms) = (command.line, Vec::new());
+        let new = || CodeVDiffraction { line, order: 1.0, nm: 0.0, is_radial: false, terms };
+        surface.diffraction.get_or_insert_with(new);
+        return Ok(used());
+    }
+    let Some(phase) = &mut surface.diffraction else { return Ok(other(surface, command)) };
+    match command.name.as_str() {
+        "HOR" => phase.order = command.last_number()?,
+        "HWL" => phase.nm = command.last_number()?,
+        "HCT" => phase.is_radial = command.has_word("R"),
+        _ => {
+            let digits = command.words.first().and_then(|word| word.strip_prefix(['C', 'c']));
+            let most = FreeformKind::RadialPhase { radius: 1.0, order: 1.0 }.counts()[1];
+            let number = digits.and_then(|digits| digits.parse::<usize>().ok());
+            let Some(number) = number.filter(|number| (1..=most).contains(number)) else {
+                let expected = format!("a coefficient C1 to C{most}");
+                return Err(command.malformed(format!("`{}`", command.text), &expected));
+            };
+            phase.terms.resize(phase.terms.len().max(number), 0.0);
+            phase.terms[number - 1] = command.last_number()?;
+        }
+    }
     Ok(used())
 }
 

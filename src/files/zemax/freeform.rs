@@ -9,10 +9,13 @@
 //! | `XPOLYNOM` | | 1 count, 2 unit R, then x, y, x², xy, … |
 //! | `PARAXIAL` | 1 focal length; 2 mode of the optical path | |
 //! | `DGRATING` | 1 lines per µm; 2 order | |
+//! | `QED_TYPE` | | 1 kind: 0 mild, 1 strong; 2 count, 3 radius R, then terms |
+//! | `BINARY_2` | 0 order; 1 to 8: r² to r¹⁶ | 1 count, 2 radius R, then radians of (r/R)^(2k) |
+//! | `BINARY_1` | as `BINARY_2` | 1 count, 2 radius R, then radians of x, y, x², xy, … |
 //! | `SZERNSAG`, `FZERNSAG` | 0 continued beyond R; 1 to 8: r² to r¹⁶ | 1 count, 2 radius R, then terms |
 
 use super::file::ZemaxSurface;
-use super::shape::ZemaxShape;
+use super::shape::{self, ZemaxShape};
 use crate::files::report::ConversionOutcome;
 use crate::lens::{Freeform, FreeformKind, IdealElement, Row};
 
@@ -26,6 +29,8 @@ pub(super) fn surface_form(surface: &ZemaxSurface) -> Option<Result<ZemaxShape, 
         // Without terms it is its conic, whatever the unit.
         "XPOLYNOM" if !(extra(surface, 1) >= 1.0) => return Some(Ok(base)),
         "XPOLYNOM" => polynomial(surface),
+        "QED_TYPE" => forbes(surface),
+        "BINARY_1" | "BINARY_2" => return Some(phase(surface)),
         "SZERNSAG" | "FZERNSAG" => return Some(zernike(&base, surface)),
         _ => return None,
     };
@@ -58,11 +63,12 @@ fn extra(surface: &ZemaxSurface, index: usize) -> f64 {
     found.map_or(0.0, |(_, value, _)| *value)
 }
 
-/// The terms of the extra data, as many as count, without zeros at the end; `unit` is the radius R.
-fn extra_terms(surface: &ZemaxSurface) -> Result<(f64, Vec<f64>), String> {
-    let (count, unit) = (extra(surface, 1), extra(surface, 2));
-    let mut terms: Vec<f64> =
-        (3..1_003).take_while(|i| (*i - 2) as f64 <= count).map(|i| extra(surface, i)).collect();
+/// The terms of the extra data, as many as the count at `first`, without zeros at the end; behind the
+/// count is the radius R.
+fn extra_terms(surface: &ZemaxSurface, first: usize) -> Result<(f64, Vec<f64>), String> {
+    let (count, unit) = (extra(surface, first), extra(surface, first + 1));
+    let places = (1..1_001_u32).take_while(|i| f64::from(*i) <= count);
+    let mut terms: Vec<f64> = places.map(|i| extra(surface, first + 1 + i as usize)).collect();
     trim(&mut terms);
     if terms.iter().any(|a| !a.is_finite()) || !(unit > 0.0 && unit.is_finite()) {
         return Err(format!("the normalization radius {unit}"));
@@ -96,7 +102,7 @@ fn biconic(base: ZemaxShape, surface: &ZemaxSurface) -> ZemaxShape {
 }
 
 fn toroid(surface: &ZemaxSurface) -> Result<Freeform<f64>, String> {
-    let zernike = extra_terms(surface).is_ok_and(|(_, terms)| !terms.is_empty());
+    let zernike = extra_terms(surface, 1).is_ok_and(|(_, terms)| !terms.is_empty());
     if zernike {
         return Err("Zernike terms".to_owned());
     }
@@ -107,13 +113,45 @@ fn toroid(surface: &ZemaxSurface) -> Result<Freeform<f64>, String> {
 }
 
 fn polynomial(surface: &ZemaxSurface) -> Result<Freeform<f64>, String> {
-    let (radius, terms) = extra_terms(surface)?;
+    let (radius, terms) = extra_terms(surface, 1)?;
     checked(FreeformKind::XyPolynomial { radius }, terms)
+}
+
+/// An asphere of Forbes.
+fn forbes(surface: &ZemaxSurface) -> Result<Freeform<f64>, String> {
+    let kind = extra(surface, 1);
+    let (radius, terms) = extra_terms(surface, 2)?;
+    match kind {
+        0.0 => checked(FreeformKind::QBfs { radius }, terms),
+        1.0 => checked(FreeformKind::QCon { radius }, terms),
+        _ => Err(format!("the kind {kind}")),
+    }
+}
+
+/// A diffractive surface on an even asphere.
+fn phase(surface: &ZemaxSurface) -> Result<ZemaxShape, String> {
+    let powers = shape::parameter_terms(&surface.parameters, |i| 2 * i);
+    let base = shape::even_polynomial(surface, &powers)?;
+    if !(extra(surface, 1) >= 1.0) {
+        return Ok(base);
+    }
+    let (radius, terms) = extra_terms(surface, 1)?;
+    let stated = surface.parameters.iter().any(|(i, ..)| *i == 0);
+    let order = if stated { parameter(surface, 0) } else { 1.0 };
+    let kind = if surface.kind.0 == "BINARY_2" {
+        FreeformKind::RadialPhase { radius, order }
+    } else {
+        FreeformKind::XyPhase { radius, order }
+    };
+    let note = "the file states no diffraction order; order 1 is taken";
+    let note = (surface.kind.1, ConversionOutcome::Approximated, note.to_owned());
+    let note = if stated { base.note } else { Some(note) };
+    Ok(ZemaxShape { freeform: Some(checked(kind, terms)?), note, ..base })
 }
 
 /// A Zernike sag; its term in r² is split exactly between the focus and the piston.
 fn zernike(base: &ZemaxShape, surface: &ZemaxSurface) -> Result<ZemaxShape, String> {
-    let (radius, mut terms) = extra_terms(surface)?;
+    let (radius, mut terms) = extra_terms(surface, 1)?;
     let decenters = [9, 10].map(|i| parameter(surface, i));
     if decenters != [0.0; 2] {
         return Err("decentred Zernike terms".to_owned());
@@ -197,11 +235,23 @@ pub(super) fn form_lines(row: &Row, form: &Freeform<f64>) -> Option<FormLines> {
         FreeformKind::XyPolynomial { radius } if plain => {
             lines("XPOLYNOM", Vec::new(), normalised(radius))
         }
+        FreeformKind::QCon { radius } | FreeformKind::QBfs { radius } if plain => {
+            let strong = matches!(form.kind, FreeformKind::QCon { .. });
+            let mut extra = normalised(radius);
+            extra.insert(0, f64::from(u8::from(strong)));
+            lines("QED_TYPE", Vec::new(), extra)
+        }
+        FreeformKind::RadialPhase { radius, order } => {
+            lines("BINARY_2", even_parameters(row, order), normalised(radius))
+        }
+        FreeformKind::XyPhase { radius, order } => {
+            lines("BINARY_1", even_parameters(row, order), normalised(radius))
+        }
         FreeformKind::Zernike { radius } => {
-            lines("SZERNSAG", zernike_parameters(row), normalised(radius))
+            lines("SZERNSAG", even_parameters(row, 1.0), normalised(radius))
         }
         FreeformKind::FringeZernike { radius } => {
-            lines("FZERNSAG", zernike_parameters(row), normalised(radius))
+            lines("FZERNSAG", even_parameters(row, 1.0), normalised(radius))
         }
         _ => None,
     }
@@ -233,10 +283,11 @@ pub(super) fn row_lines(row: &Row) -> Option<FormLines> {
     }
 }
 
-/// The terms continue beyond the radius; the powers begin with r⁴.
-fn zernike_parameters(row: &Row) -> Vec<(usize, f64)> {
+/// The first parameter, which is the order or says that the terms continue beyond the radius; then the
+/// powers from r⁴ on.
+fn even_parameters(row: &Row, first: f64) -> Vec<(usize, f64)> {
     let powers = row.asphere.iter().enumerate().map(|(term, a)| (term + 2, *a));
-    std::iter::once((0, 1.0)).chain(powers).collect()
+    std::iter::once((0, first)).chain(powers).collect()
 }
 
 /// All powers of r beside the conic, from the first on.

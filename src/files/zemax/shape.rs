@@ -41,15 +41,17 @@ pub(super) fn surface_shape(surface: &ZemaxSurface) -> Result<ZemaxShape, String
         "ODDASPHE" => polynomial(surface, &parameter_terms(&surface.parameters, |i| i)),
         "XASPHERE" => polynomial(surface, &extended_terms(&surface.extra, |i| 2 * i)),
         "XOSPHERE" => polynomial(surface, &extended_terms(&surface.extra, |i| i)),
-        "QED_TYPE" => forbes(form, surface),
         _ => freeform::surface_form(surface).unwrap_or_else(|| Err(String::new())),
     }
 }
 
 /// A term: power of r, coefficient, line.
-type PowerTerm = (usize, f64, usize);
+pub(super) type PowerTerm = (usize, f64, usize);
 
-fn parameter_terms(parameters: &[PowerTerm], power: fn(usize) -> usize) -> Vec<PowerTerm> {
+pub(super) fn parameter_terms(
+    parameters: &[PowerTerm],
+    power: fn(usize) -> usize,
+) -> Vec<PowerTerm> {
     let terms = parameters.iter().filter(|(i, ..)| (1..=8).contains(i));
     terms.map(|(i, value, line)| (power(*i), *value, *line)).collect()
 }
@@ -85,7 +87,10 @@ fn polynomial(surface: &ZemaxSurface, terms: &[PowerTerm]) -> Result<ZemaxShape,
 }
 
 /// A conic with even powers of r: exactly, or else by the even asphere nearest to it.
-fn even_polynomial(surface: &ZemaxSurface, terms: &[PowerTerm]) -> Result<ZemaxShape, String> {
+pub(super) fn even_polynomial(
+    surface: &ZemaxSurface,
+    terms: &[PowerTerm],
+) -> Result<ZemaxShape, String> {
     let base = ZemaxShape::base(surface);
     add_terms(ZemaxShape::base(surface), terms).or_else(|why| {
         let reach = surface.semi_diameter.map(|given| given.value);
@@ -140,76 +145,6 @@ fn fold_parabola(form: &mut ZemaxShape, (alpha, line): (f64, usize)) -> Result<(
     Ok(())
 }
 
-/// An asphere of Forbes with `u = r/R` (Forbes, Optics Express 15, 5218, 2007). Extra data: 1 the kind,
-/// 0 for the mild one, 1 for the strong one; 2 the number of terms; 3 R; then the coefficients.
-fn forbes(form: ZemaxShape, surface: &ZemaxSurface) -> Result<ZemaxShape, String> {
-    let value = |index: usize| {
-        let found = surface.extra.iter().rfind(|(i, ..)| *i == index);
-        found.map_or(0.0, |(_, value, _)| *value)
-    };
-    let (kind, count, radius) = (value(1), value(2), value(3));
-    let terms: Vec<f64> = (4..36).take_while(|i| (*i - 3) as f64 <= count).map(value).collect();
-    let used = terms.iter().rposition(|a| *a != 0.0).map_or(0, |last| last + 1);
-    if !(radius > 0.0) {
-        return Err(format!("the radius {radius}"));
-    }
-    if kind == 0.0 {
-        let sag = |r: f64| mild_sag(&form, &terms[..used], r / radius, r);
-        let bend = 2.0 * mild_sum(&terms[..used], 0.0) / (radius * radius);
-        let curvature = form.curvature + bend;
-        let reach = surface.semi_diameter.map_or(radius, |given| given.value);
-        return fitted(curvature, reach, sag, surface.kind.1);
-    }
-    if kind != 1.0 || used > ASPHERE_TERMS {
-        return Err(format!("the kind {kind} and {used} terms"));
-    }
-    Ok(strong(form, &terms[..used], radius, surface.kind.1))
-}
-
-/// `u⁴ Σ aₘ Qₘ(u²)` on a conic, where `Qₘ(x) = (−1)^m P_m^(4,0)(1 − 2x)` (eq. 2.2): a polynomial in r².
-fn strong(mut form: ZemaxShape, terms: &[f64], radius: f64, line: usize) -> ZemaxShape {
-    let used = terms.len();
-    let power = |k: usize| radius.powi(-(2 * k as i32 + 4));
-    let term = |k: usize| (k..used).map(|m| terms[m] * q_con_coefficient(m, k)).sum::<f64>();
-    form.asphere = (0..used).map(|k| term(k) * power(k)).collect();
-    let note = "converted exactly into coefficients of r^4 and higher powers".to_owned();
-    form.note = Some((line, ConversionOutcome::Used, note));
-    form
-}
-
-/// A conic with `u² (1 − u²) Σ aₘ Qₘ(u²)` along its normal (eq. 3.2, with the normal of the conic in place
-/// of that of the sphere).
-fn mild_sag(form: &ZemaxShape, terms: &[f64], u: f64, r: f64) -> f64 {
-    let (c2, k) = (form.curvature * form.curvature * r * r, form.conic);
-    let root = (1.0 - (1.0 + k) * c2).sqrt();
-    let conic = form.curvature * r * r / (1.0 + root);
-    conic + u * u * (1.0 - u * u) * (1.0 - k * c2).sqrt() / root * mild_sum(terms, u * u)
-}
-
-/// `Σ aₘ Qₘ(x)` by the recurrences of Forbes, Optics Express 18, 13851, 2010, eqs. A.14 to A.16.
-fn mild_sum(terms: &[f64], x: f64) -> f64 {
-    let (mut p, mut p_before) = (2.0, 0.0);
-    let (mut q, mut q_before) = (1.0, 0.0);
-    let (mut f, mut f_before, mut g) = (2.0, 0.0, 0.0);
-    let mut sum = 0.0;
-    for (m, a) in terms.iter().enumerate() {
-        if m > 0 {
-            let n = m as f64;
-            let next = if m == 1 { 6.0 - 8.0 * x } else { (2.0 - 4.0 * x) * p - p_before };
-            (p, p_before) = (next, p);
-            let h = if m == 1 { 0.0 } else { -n * (n - 1.0) / (2.0 * f_before) };
-            g = if m == 1 { -0.5 } else { -(1.0 + g * h) / f };
-            (f, f_before) = ((n * (n + 1.0) + 3.0 - g * g - h * h).sqrt(), f);
-            if m == 1 {
-                f = 19.0_f64.sqrt() / 2.0;
-            }
-            (q, q_before) = ((p - g * q - h * q_before) / f, q);
-        }
-        sum += a * q;
-    }
-    sum
-}
-
 /// The even asphere in place of another sag, if it is near enough.
 fn fitted(
     curvature: f64,
@@ -233,16 +168,6 @@ fn fitted(
         ideal: None,
         note,
     })
-}
-
-/// The coefficient of `x^k` in `Qₘ(x)`: `(−1)^(m+k) C(m+4, m−k) C(m+4+k, k)`.
-fn q_con_coefficient(m: usize, k: usize) -> f64 {
-    let sign = if (m + k).is_multiple_of(2) { 1.0 } else { -1.0 };
-    sign * binomial(m + 4, m - k) * binomial(m + 4 + k, k)
-}
-
-fn binomial(n: usize, k: usize) -> f64 {
-    (0..k).fold(1.0, |product, i| product * (n - i) as f64 / (i + 1) as f64)
 }
 
 #[cfg(test)]
@@ -323,59 +248,45 @@ mod tests {
         assert!((odd.numbers[2] - 1e-3).abs() < 1e-18 && (odd.numbers[3] - 1e-4).abs() < 1e-19);
     }
 
-    /// The first polynomials as Forbes prints them, eq. 2.5.
     #[test]
-    fn aspheres_of_forbes_become_polynomials() {
-        let printed: [fn(f64) -> f64; 4] = [
-            |_| 1.0,
-            |x| -(5.0 - 6.0 * x),
-            |x| 15.0 - 14.0 * x * (3.0 - 2.0 * x),
-            |x| -(35.0 - 12.0 * x * (14.0 - x * (21.0 - 10.0 * x))),
-        ];
-        let coefficients = [0.3, -0.2, 0.05, 0.01];
+    fn aspheres_of_forbes_keep_their_kind() {
         let mut s = surface("QED_TYPE", 0.05, -0.6);
-        s.extra = vec![(1, 1.0, 7), (2, 4.0, 8), (3, 8.0, 9)];
-        s.extra.extend((4..).zip(coefficients).map(|(i, a)| (i, a, 10)));
-        let form = surface_shape(&s).unwrap();
-        for r in [0.5_f64, 3.0, 8.0] {
-            let u = r / 8.0;
-            let sum = |(a, q): (&f64, fn(f64) -> f64)| a * q(u * u);
-            let expected = u.powi(4) * coefficients.iter().zip(printed).map(sum).sum::<f64>();
-            let powers = form.asphere.iter().zip((4..).step_by(2));
-            let found: f64 = powers.map(|(a, power)| a * r.powi(power)).sum();
-            assert!((found - expected).abs() < 1e-15, "{r}: {found} {expected}");
-        }
+        s.extra = vec![(1, 1.0, 7), (2, 4.0, 8), (3, 8.0, 9), (4, 0.3, 10), (6, -0.2, 11)];
+        let strong = surface_shape(&s).unwrap();
+        let form = strong.freeform.unwrap();
+        assert_eq!((strong.curvature, strong.conic, strong.note), (0.05, -0.6, None));
+        assert_eq!(form.kind, FreeformKind::QCon { radius: 8.0 });
+        assert_eq!(form.numbers, [0.3, 0.0, -0.2]);
+        s.extra[0].1 = 0.0;
+        let mild = surface_shape(&s).unwrap().freeform.unwrap();
+        assert_eq!((mild.kind, mild.numbers), (FreeformKind::QBfs { radius: 8.0 }, form.numbers));
         s.extra[0].1 = 2.0;
-        assert!(surface_shape(&s).is_err());
+        assert!(surface_shape(&s).unwrap_err().contains("the kind 2"));
+        s.extra[2].1 = 0.0;
+        assert!(surface_shape(&s).unwrap_err().contains("normalization radius 0"));
     }
 
-    /// The mild polynomials as Forbes prints them (2007, eq. 3.6), and an asphere of them.
+    /// The sag of a diffractive surface is that of an even asphere.
     #[test]
-    fn mild_aspheres_are_fitted() {
-        for x in [0.0_f64, 0.3, 1.0] {
-            let printed = [
-                1.0,
-                (13.0 - 16.0 * x) / 19.0_f64.sqrt(),
-                (2.0_f64 / 95.0).sqrt() * (29.0 - 4.0 * x * (25.0 - 19.0 * x)),
-                (2.0_f64 / 2545.0).sqrt() * (207.0 - 4.0 * x * (315.0 - x * (577.0 - 320.0 * x))),
-            ];
-            for (m, expected) in printed.into_iter().enumerate() {
-                let mut terms = [0.0; 4];
-                terms[m] = 1.0;
-                assert!((mild_sum(&terms, x) - expected).abs() < 1e-13, "{m} {x}");
-            }
-        }
-        let mut s = surface("QED_TYPE", 0.05, -0.6);
-        s.extra = vec![(2, 3.0, 8), (3, 8.0, 9), (4, -0.02, 10), (5, 0.003, 10), (6, 1e-4, 10)];
-        let form = surface_shape(&s).unwrap();
-        let (_, outcome, note) = form.note.clone().unwrap();
-        assert_eq!(outcome, ConversionOutcome::Approximated);
-        assert!(note.contains("within"), "{note}");
-        let base = ZemaxShape::base(&s);
-        let shape = crate::lens::Shape::new(form.curvature, form.conic, &form.asphere, 0).unwrap();
-        for r in [1.0, 4.5, 7.9] {
-            let exact = mild_sag(&base, &[-0.02, 0.003, 1e-4], r / 8.0, r);
-            assert!((shape.sag(r * r).unwrap().0 - exact).abs() < 1e-6, "{r}");
+    fn diffractive_surfaces_keep_their_order_and_phase() {
+        for (name, kind) in [
+            ("BINARY_2", FreeformKind::RadialPhase { radius: 5.0, order: -2.0 }),
+            ("BINARY_1", FreeformKind::XyPhase { radius: 5.0, order: -2.0 }),
+        ] {
+            let mut s = surface(name, 0.02, -0.5);
+            s.parameters = vec![(0, -2.0, 6), (2, 1e-5, 7)];
+            s.extra = vec![(1, 3.0, 8), (2, 5.0, 8), (3, -300.0, 9), (4, 12.0, 9), (6, 9.0, 9)];
+            let read = surface_shape(&s).unwrap();
+            assert_eq!((read.curvature, read.conic, &read.asphere[..]), (0.02, -0.5, &[1e-5][..]));
+            let form = read.freeform.unwrap();
+            assert_eq!((form.kind, &form.numbers[..]), (kind, &[-300.0, 12.0][..]));
+            s.extra[0].1 = 0.0;
+            assert_eq!(surface_shape(&s).unwrap().freeform, None);
+            s.extra[0].1 = 3.0;
+            s.parameters.remove(0);
+            let (_, outcome, note) = surface_shape(&s).unwrap().note.unwrap();
+            assert_eq!(outcome, ConversionOutcome::Approximated);
+            assert!(note.contains("order 1"), "{note}");
         }
     }
 
@@ -421,7 +332,9 @@ mod tests {
             for (x, y) in [(0.0, 0.0), (1.5, -2.0), (3.0, 4.0)] {
                 let mut fifth = form.clone();
                 fifth.numbers[..4].fill(0.0);
-                let apart = form.series_sag(x, y, |a| a)[0] - fifth.series_sag(x, y, |a| a)[0];
+                let base = form.base(&crate::lens::Shape::Plane);
+                let sag = |form: &Freeform<f64>| form.series_sag(&base, x, y, |a| a)[0];
+                let apart = sag(&form) - sag(&fifth);
                 assert!((apart - 3e-3 * (x * x + y * y)).abs() < 1e-16, "{kind}: {apart}");
             }
             s.parameters[0].1 = 0.0;

@@ -47,6 +47,20 @@ impl<N: Arithmetic> BaseSag<N> {
         std::array::from_fn(|i| own[i] + powers[i])
     }
 
+    /// The factor of a series that stands on the normal of the conic, one over the cosine of its
+    /// inclination, with its derivatives by x and y; `None` for a series along the axis.
+    pub fn series_factor(&self, x: N, y: N) -> Option<[N; 3]> {
+        let FreeformKind::QBfs { .. } = self.kind else { return None };
+        let (one, half) = (N::constant(1.0), N::constant(0.5));
+        let (r2, c2) = (x.square() + y.square(), self.curvature.square());
+        let (above, below) = (self.conic * c2, (one + self.conic) * c2);
+        let (a, b) = (one - above * r2, one - below * r2);
+        let factor = a.root() / b.root();
+        let slope = factor * half * (below / b - above / a);
+        let twice = slope + slope;
+        Some([factor, x * twice, y * twice])
+    }
+
     fn conic(&self, x: N, y: N) -> [N; 3] {
         let (z, slope) = self.section(x.square() + y.square());
         let twice = slope + slope;

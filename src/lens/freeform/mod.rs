@@ -4,7 +4,8 @@
 //! numbers, second derivatives and derivatives by the coefficients for dual numbers, and bounds for
 //! intervals, by which a ray finds its first crossing. The sag is a base, `z = c r²/(1 + √(1 − (1+κ)
 //! c² r²)) + Σ aⱼ r^(2j+4)` or the biconic or toroid in place of the conic, plus a series of terms
-//! that are linear in their coefficients. A further form is a base or a series more, nothing else.
+//! that are linear in their coefficients. A further form is a base or a series more, nothing else. The
+//! series of a diffractive form adds to the phase of the light in place of the sag.
 
 mod base;
 mod series;
@@ -58,6 +59,36 @@ pub enum FreeformKind {
         /// The half widths X and Y of the rectangle, in mm.
         half_widths: [f64; 2],
     },
+    /// Adds `u⁴ Σ aₘ Qₘ(u²)` with `u = r/R` along the axis, the strong aspheres of Forbes (Optics Express
+    /// 15, 5218, 2007, eq. 2.2). The numbers are in mm. Beyond R the polynomials continue.
+    QCon {
+        /// The radius R, in mm.
+        radius: f64,
+    },
+    /// Adds `u² (1 − u²) Σ aₘ Qₘ(u²)` with `u = r/R` along the normal of the conic, the mild aspheres of
+    /// Forbes (2007, eq. 3.2, there on a sphere). The numbers are in mm; they leave vertex and rim on the
+    /// conic, and the squares of their slopes against it add up. Beyond R the polynomials continue.
+    QBfs {
+        /// The radius R, in mm.
+        radius: f64,
+    },
+    /// Adds nothing to the sag, but `m Σ aₖ (r/R)^(2k)` from k = 1 on to the phase of the light: an ideal
+    /// diffractive surface, all of whose light is in the order m. The numbers are in radians. The optical
+    /// path grows by the phase times the wavelength over 2π; a lens of positive power has a negative a₁.
+    RadialPhase {
+        /// The radius R, in mm.
+        radius: f64,
+        /// The diffraction order m.
+        order: f64,
+    },
+    /// As [`FreeformKind::RadialPhase`] with `m Σ a u^i v^j` in the order of
+    /// [`FreeformKind::XyPolynomial`].
+    XyPhase {
+        /// The radius R, in mm.
+        radius: f64,
+        /// The diffraction order m.
+        order: f64,
+    },
 }
 
 impl FreeformKind {
@@ -71,6 +102,10 @@ impl FreeformKind {
             Self::Zernike { .. } => "Zernike sag",
             Self::FringeZernike { .. } => "fringe Zernike sag",
             Self::Chebyshev { .. } => "Chebyshev polynomial",
+            Self::QCon { .. } => "Qcon asphere",
+            Self::QBfs { .. } => "Qbfs asphere",
+            Self::RadialPhase { .. } => "radial phase",
+            Self::XyPhase { .. } => "XY phase",
         }
     }
 
@@ -79,13 +114,36 @@ impl FreeformKind {
         matches!(self, Self::Biconic | Self::Toroid)
     }
 
+    /// True if the series adds to the phase of the light, not to the sag.
+    pub const fn is_phase(self) -> bool {
+        matches!(self, Self::RadialPhase { .. } | Self::XyPhase { .. })
+    }
+
+    /// True if every number multiplies a function of the distance from the axis alone.
+    pub const fn is_round(self) -> bool {
+        matches!(
+            self,
+            Self::OddAsphere | Self::QCon { .. } | Self::QBfs { .. } | Self::RadialPhase { .. }
+        )
+    }
+
+    /// The diffraction order of a form that adds to the phase.
+    pub const fn order(self) -> Option<f64> {
+        match self {
+            Self::RadialPhase { order, .. } | Self::XyPhase { order, .. } => Some(order),
+            _ => None,
+        }
+    }
+
     /// The least and the largest number of numbers.
     pub const fn counts(self) -> [usize; 2] {
         match self {
             Self::Biconic => [2, 2],
             Self::Toroid => [1, BASE_NUMBERS],
-            Self::OddAsphere => [0, 20],
-            Self::XyPolynomial { .. } => [0, FREEFORM_NUMBERS - 1],
+            Self::OddAsphere | Self::QCon { .. } | Self::QBfs { .. } | Self::RadialPhase { .. } => {
+                [0, 20]
+            }
+            Self::XyPolynomial { .. } | Self::XyPhase { .. } => [0, FREEFORM_NUMBERS - 1],
             Self::FringeZernike { .. } => [0, 37],
             Self::Zernike { .. } | Self::Chebyshev { .. } => [0, FREEFORM_NUMBERS],
         }
@@ -97,7 +155,11 @@ impl FreeformKind {
             Self::OddAsphere | Self::Biconic | Self::Toroid => Vec::new(),
             Self::XyPolynomial { radius }
             | Self::Zernike { radius }
-            | Self::FringeZernike { radius } => vec![radius],
+            | Self::FringeZernike { radius }
+            | Self::QCon { radius }
+            | Self::QBfs { radius }
+            | Self::RadialPhase { radius, .. }
+            | Self::XyPhase { radius, .. } => vec![radius],
             Self::Chebyshev { half_widths } => half_widths.to_vec(),
         }
     }
@@ -105,18 +167,23 @@ impl FreeformKind {
     /// The same kind with the lengths multiplied by `factor`.
     #[must_use]
     pub fn scaled(self, factor: f64) -> Self {
-        match self {
-            Self::OddAsphere | Self::Biconic | Self::Toroid => self,
-            Self::XyPolynomial { radius } => Self::XyPolynomial { radius: radius * factor },
-            Self::Zernike { radius } => Self::Zernike { radius: radius * factor },
-            Self::FringeZernike { radius } => Self::FringeZernike { radius: radius * factor },
-            Self::Chebyshev { half_widths } => {
-                Self::Chebyshev { half_widths: half_widths.map(|half| half * factor) }
-            }
+        let mut scaled = self;
+        match &mut scaled {
+            Self::OddAsphere | Self::Biconic | Self::Toroid => {}
+            Self::XyPolynomial { radius }
+            | Self::Zernike { radius }
+            | Self::FringeZernike { radius }
+            | Self::QCon { radius }
+            | Self::QBfs { radius }
+            | Self::RadialPhase { radius, .. }
+            | Self::XyPhase { radius, .. } => *radius *= factor,
+            Self::Chebyshev { half_widths } => half_widths.iter_mut().for_each(|h| *h *= factor),
         }
+        scaled
     }
 
-    /// The power of mm in the unit of a number.
+    /// The power of a length with which a number grows when the lens is scaled: that of mm in its unit,
+    /// or 1 for a phase, which is an optical path at the same wavelength.
     pub fn power(self, number: usize) -> i32 {
         let k = i32::try_from(number).unwrap_or(i32::MAX);
         match self {
@@ -130,17 +197,21 @@ impl FreeformKind {
 
     /// True if a number changes its sign with that of the sag.
     pub fn has_sign(self, number: usize) -> bool {
-        !(self == Self::Biconic && number == 1)
+        !(self.is_phase() || self == Self::Biconic && number == 1)
     }
 
     /// True if a number is a coefficient of a function that is the same at x and at −x.
     fn is_even_in_x(self, number: usize) -> bool {
         match self {
-            Self::OddAsphere | Self::Biconic | Self::Toroid => true,
-            Self::XyPolynomial { .. } => series::powers(number + 1)[0].is_multiple_of(2),
+            Self::Biconic | Self::Toroid => true,
+            _ if self.is_round() => true,
+            Self::XyPolynomial { .. } | Self::XyPhase { .. } => {
+                series::powers(number + 1)[0].is_multiple_of(2)
+            }
             Self::Chebyshev { .. } => series::powers(number)[0].is_multiple_of(2),
             Self::Zernike { .. } => series::noll(number).is_even_in_x(),
             Self::FringeZernike { .. } => series::fringe(number).is_even_in_x(),
+            _ => false,
         }
     }
 }
@@ -190,33 +261,75 @@ impl<R: Real> Freeform<R> {
         BaseSag { kind: self.kind, curvature, conic, terms, own }
     }
 
-    /// The numbers of the series, over another kind of number.
+    /// The numbers of the series in the sag.
     fn series_numbers(&self) -> &[R] {
-        if self.kind.has_own_base() { &[] } else { &self.numbers }
+        if self.kind.has_own_base() || self.kind.is_phase() { &[] } else { &self.numbers }
     }
 
     /// The sag of the series in mm, and its derivatives by x and y. `number` makes a coefficient a
     /// number of the arithmetic.
-    pub fn series_sag<N: Arithmetic>(&self, x: N, y: N, number: impl Fn(R) -> N) -> [N; 3] {
-        let numbers = self.series_numbers();
+    pub fn series_sag<N: Arithmetic>(
+        &self,
+        base: &BaseSag<N>,
+        x: N,
+        y: N,
+        number: impl Fn(R) -> N,
+    ) -> [N; 3] {
         let mut sum = [N::constant(0.0); 3];
-        series::visit(self.kind, numbers.len(), x, y, |k, term| {
-            let a = number(numbers[k]);
+        self.visit_series(base, x, y, |k, term| {
+            let a = number(self.numbers[k]);
             sum = std::array::from_fn(|i| sum[i] + a * term[i]);
         });
         sum
     }
 
-    /// Calls `visit` with each number of the series and the function that it multiplies, with its
+    /// Calls `visit` with each number of the series in the sag and the function that it multiplies, with
+    /// its derivatives by x and y.
+    pub fn visit_series<N: Arithmetic>(
+        &self,
+        base: &BaseSag<N>,
+        x: N,
+        y: N,
+        mut visit: impl FnMut(usize, [N; 3]),
+    ) {
+        let count = self.series_numbers().len();
+        let Some([f, fx, fy]) = base.series_factor(x, y) else {
+            return series::visit(self.kind, count, x, y, visit);
+        };
+        series::visit(self.kind, count, x, y, |k, [t, tx, ty]| {
+            visit(k, [f * t, fx * t + f * tx, fy * t + f * ty]);
+        });
+    }
+
+    /// The phase in radians of the first order, and its derivatives by x and y in mm; zero for a form
+    /// that adds to the sag.
+    pub fn phase(&self, x: R, y: R) -> [R; 3] {
+        let mut sum = [R::ZERO; 3];
+        self.visit_phase(x, y, |k, term| {
+            let a = self.numbers[k];
+            sum = std::array::from_fn(|i| sum[i] + a * term[i]);
+        });
+        sum
+    }
+
+    /// Calls `visit` with each number of the phase and the function that it multiplies, with its
     /// derivatives by x and y.
-    pub fn visit_series<N: Arithmetic>(&self, x: N, y: N, visit: impl FnMut(usize, [N; 3])) {
-        series::visit(self.kind, self.series_numbers().len(), x, y, visit);
+    pub fn visit_phase(&self, x: R, y: R, visit: impl FnMut(usize, [R; 3])) {
+        let count = if self.kind.is_phase() { self.numbers.len() } else { 0 };
+        series::visit(self.kind, count, x, y, visit);
+    }
+
+    /// The second derivatives of [`Freeform::phase`] at a point: by x and x, x and y, y and y.
+    pub fn phase_bends(&self, x: R, y: R) -> [R; 3] {
+        let at = |value, direction| Dual::<R, 2>::variable(value, direction);
+        let [_, by_x, by_y] = self.map(Dual::<R, 2>::constant).phase(at(x, 0), at(y, 1));
+        [by_x.slope[0], by_x.slope[1], by_y.slope[1]]
     }
 
     /// The sag in mm on a base, and its derivatives by x and y; NaN where the base does not exist.
     pub fn sag(&self, base: &BaseSag<R>, x: R, y: R) -> [R; 3] {
-        let (base, series) = (base.sag(x, y), self.series_sag(x, y, |a| a));
-        std::array::from_fn(|i| base[i] + series[i])
+        let (own, series) = (base.sag(x, y), self.series_sag(base, x, y, |a| a));
+        std::array::from_fn(|i| own[i] + series[i])
     }
 
     /// The curvatures of the sections with the x-z and the y-z plane at the vertex, in 1/mm. The tip
@@ -238,6 +351,16 @@ impl Freeform<f64> {
         let scale = |(k, a): (usize, &f64)| a * factor.powi(self.kind.power(k));
         let numbers = self.numbers.iter().enumerate().map(scale).collect();
         Self { kind: self.kind.scaled(factor), numbers }
+    }
+
+    /// The same form with its lengths in mm, given in a unit of `unit` mm. Unlike a lens that is scaled, a
+    /// phase remains what it is.
+    #[must_use]
+    pub fn in_mm(&self, unit: f64) -> Self {
+        if self.kind.is_phase() {
+            return Self { kind: self.kind.scaled(unit), numbers: self.numbers.clone() };
+        }
+        self.scaled(unit)
     }
 
     /// The sag in mm of the section with the y-z plane; beyond the edge of the base that at the
@@ -266,6 +389,9 @@ impl Freeform<f64> {
         }
         if let Some(length) = self.kind.lengths().into_iter().find(|l| !(*l > 0.0 && *l < 1e50)) {
             return Some(format!("the {name} is normalised to {length} mm; expected more than 0"));
+        }
+        if let Some(order) = self.kind.order().filter(|order| !(order.abs() <= 1e9)) {
+            return Some(format!("the order of the {name} is {order}; expected a finite one"));
         }
         let wrong = self.numbers.iter().position(|a| !(a.abs() <= 1e100))?;
         let (number, found) = (wrong + 1, self.numbers[wrong]);

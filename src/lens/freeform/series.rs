@@ -18,7 +18,10 @@ pub(super) fn visit<N: Arithmetic>(
     match kind {
         FreeformKind::Biconic | FreeformKind::Toroid => {}
         FreeformKind::OddAsphere => visit_odd(count, x, y, visit),
-        FreeformKind::XyPolynomial { radius } => {
+        FreeformKind::QCon { radius } => visit_strong(radius, count, (x, y), visit),
+        FreeformKind::QBfs { radius } => visit_mild(radius, count, (x, y), visit),
+        FreeformKind::RadialPhase { radius, .. } => visit_even(radius, count, (x, y), visit),
+        FreeformKind::XyPolynomial { radius } | FreeformKind::XyPhase { radius, .. } => {
             let (x, y) = (PowerTable::monomials(x, radius), PowerTable::monomials(y, radius));
             visit_products((&x, &y), 1, count, visit);
         }
@@ -49,6 +52,126 @@ fn visit_odd<N: Arithmetic>(count: usize, x: N, y: N, mut visit: impl FnMut(usiz
         };
         visit(k - 1, [power, slopes[0], slopes[1]]);
         (before, last) = (last, power);
+    }
+}
+
+/// A polynomial in `t = (r/R)²` with its derivative by t.
+#[derive(Clone, Copy)]
+struct RadialTerm<N> {
+    value: N,
+    slope: N,
+}
+
+/// `t = (r/R)²` at a point, and its derivatives by x and y.
+struct RadialArgument<N> {
+    t: N,
+    slopes: [N; 2],
+}
+
+impl<N: Arithmetic> RadialArgument<N> {
+    fn new(radius: f64, (x, y): (N, N)) -> Self {
+        let inverse = N::constant(1.0 / radius);
+        let (u, v) = (x * inverse, y * inverse);
+        let twice = inverse + inverse;
+        Self { t: u.square() + v.square(), slopes: [twice * u, twice * v] }
+    }
+
+    /// The function of x and y that a polynomial in t is, with its derivatives.
+    fn term(&self, of: RadialTerm<N>) -> [N; 3] {
+        [of.value, of.slope * self.slopes[0], of.slope * self.slopes[1]]
+    }
+}
+
+/// The even powers of r/R from the second on.
+fn visit_even<N: Arithmetic>(
+    radius: f64,
+    count: usize,
+    point: (N, N),
+    mut visit: impl FnMut(usize, [N; 3]),
+) {
+    let at = RadialArgument::new(radius, point);
+    let mut before = N::constant(1.0);
+    for k in 0..count {
+        let slope = N::constant((k + 1) as f64) * before;
+        before = before * at.t;
+        visit(k, at.term(RadialTerm { value: before, slope }));
+    }
+}
+
+/// `t² Qₘ(t)` with the Jacobi polynomials `Qₘ(t) = P_m^(0,4)(2t − 1)`, by their recurrence (Abramowitz and
+/// Stegun, eq. 22.7.1).
+fn visit_strong<N: Arithmetic>(
+    radius: f64,
+    count: usize,
+    point: (N, N),
+    mut visit: impl FnMut(usize, [N; 3]),
+) {
+    let at = RadialArgument::new(radius, point);
+    let (t, twice) = (at.t, N::constant(2.0));
+    let z = twice * t - N::constant(1.0);
+    let zero = N::constant(0.0);
+    let mut last = RadialTerm { value: N::constant(1.0), slope: zero };
+    let mut before = RadialTerm { value: zero, slope: zero };
+    for m in 0..count {
+        if m > 0 {
+            let n = m as f64;
+            let scale = 2.0 * n * (n + 4.0) * (2.0 * n + 2.0);
+            let linear = (2.0 * n + 3.0) * (2.0 * n + 4.0) * (2.0 * n + 2.0) / scale;
+            let fixed = N::constant(-16.0 * (2.0 * n + 3.0) / scale);
+            let second = N::constant(2.0 * (n - 1.0) * (n + 3.0) * (2.0 * n + 4.0) / scale);
+            let factor = N::constant(linear) * z + fixed;
+            let by_t = N::constant(2.0 * linear);
+            let value = factor * last.value - second * before.value;
+            let slope = factor * last.slope + by_t * last.value - second * before.slope;
+            (before, last) = (last, RadialTerm { value, slope });
+        }
+        let square = t.square();
+        let slope = twice * t * last.value + square * last.slope;
+        visit(m, at.term(RadialTerm { value: square * last.value, slope }));
+    }
+}
+
+/// `t (1 − t) Qₘ(t)` by the recurrences of Forbes, Optics Express 18, 13851, 2010, eqs. A.14 to A.16:
+/// `Q` is made of polynomials P by steps f, g and h that orthogonalise their slopes.
+fn visit_mild<N: Arithmetic>(
+    radius: f64,
+    count: usize,
+    point: (N, N),
+    mut visit: impl FnMut(usize, [N; 3]),
+) {
+    let at = RadialArgument::new(radius, point);
+    let t = at.t;
+    let number = N::constant;
+    let zero = RadialTerm { value: number(0.0), slope: number(0.0) };
+    let (mut p, mut p_before) = (RadialTerm { value: number(2.0), ..zero }, zero);
+    let (mut q, mut q_before) = (RadialTerm { value: number(1.0), ..zero }, zero);
+    let (mut f, mut f_before, mut g) = (2.0_f64, 0.0, 0.0);
+    for m in 0..count {
+        if m > 0 {
+            let n = m as f64;
+            let next = if m == 1 {
+                RadialTerm { value: number(6.0) - number(8.0) * t, slope: number(-8.0) }
+            } else {
+                let factor = number(2.0) - number(4.0) * t;
+                RadialTerm {
+                    value: factor * p.value - p_before.value,
+                    slope: factor * p.slope - number(4.0) * p.value - p_before.slope,
+                }
+            };
+            (p, p_before) = (next, p);
+            let h = if m == 1 { 0.0 } else { -n * (n - 1.0) / (2.0 * f_before) };
+            g = if m == 1 { -0.5 } else { -(1.0 + g * h) / f };
+            let square = if m == 1 { 4.75 } else { n * (n + 1.0) + 3.0 - g * g - h * h };
+            (f, f_before) = (square.sqrt(), f);
+            let [inverse, by_q, by_before] = [1.0 / f, g / f, h / f].map(number);
+            let step = |p: N, q: N, before: N| p * inverse - by_q * q - by_before * before;
+            let value = step(p.value, q.value, q_before.value);
+            let slope = step(p.slope, q.slope, q_before.slope);
+            (q, q_before) = (RadialTerm { value, slope }, q);
+        }
+        let rest = number(1.0) - t;
+        let slope = (rest - t) * q.value + t * rest * q.slope;
+        visit(m, at.term(RadialTerm { value: t * rest * q.value, slope }));
     }
 }
 

@@ -157,11 +157,16 @@ pub fn similar_names(name: &str) -> Vec<String> {
     catalogue().iter().filter(near).take(3).map(Glass::full_name).collect()
 }
 
-/// The catalogue glass nearest to an index and an Abbe number at the d line, with weights that count
-/// 0.001 in the index as much as 0.5 in the Abbe number.
+/// The distance of a glass from an index and an Abbe number at the d line: 0.001 in the index counts as
+/// much as 0.5 in the Abbe number, and both as 1.
+pub fn distance(glass: &Glass, nd: f64, vd: f64) -> f64 {
+    ((glass.nd - nd) / 1e-3).hypot((glass.vd - vd) / 0.5)
+}
+
+/// The catalogue glass nearest to an index and an Abbe number at the d line, by [`distance`].
 pub fn nearest(nd: f64, vd: f64) -> Option<&'static Glass> {
-    let distance = |glass: &&Glass| ((glass.nd - nd) / 1e-3).hypot((glass.vd - vd) / 0.5);
-    catalogue().iter().min_by(|a, b| distance(a).total_cmp(&distance(b)))
+    let from = |glass: &&Glass| distance(glass, nd, vd);
+    catalogue().iter().min_by(|a, b| from(a).total_cmp(&from(b)))
 }
 
 /// The index of a model glass at a wavelength in micrometres, from index and Abbe number at the d

@@ -7,8 +7,9 @@ use super::LensRequirements;
 use super::draft::{BeamPlan, Freedom, LensDraft, USED_TERMS, descend};
 use super::finish::{DesignedLens, finished_lenses};
 use super::glasses::{exchanged, in_catalogue, snapped};
+use super::rims::with_rims;
 use super::starts::{NamedDraft, achromats, draft_of, library_starts, random_starts};
-use crate::lens::{Aperture, Parameter, Quantity, Variable};
+use crate::lens::{Aperture, Lens, Parameter, Quantity, Variable};
 use crate::search::element::piece_count;
 use crate::search::{MutationKind, Random, SearchRules, propose};
 use rand::{RngExt as _, SeedableRng as _};
@@ -140,6 +141,11 @@ impl DesignRun {
     /// there is a lens.
     pub fn best(&self) -> f64 {
         self.pool.first().map_or(f64::INFINITY, |candidate| candidate.value.sqrt())
+    }
+
+    /// The best lens so far with rims; `None` before there is one through which light gets.
+    pub fn best_lens(&self) -> Option<Lens> {
+        with_rims(&self.pool.first()?.draft, &self.asked)
     }
 
     /// Runs a round; `used` is the share of the budget that is used so far. Returns false if the
@@ -315,7 +321,7 @@ impl DesignRun {
         });
         let parent = drawn.map(|(_, parent)| parent).or(self.pool.first())?;
         let rules = self.rules();
-        let mut lens = super::rims::with_rims(&parent.draft, &self.asked)?;
+        let mut lens = with_rims(&parent.draft, &self.asked)?;
         lens.aperture = Aperture::EntrancePupilDiameter(2.0 * self.asked.beam_radius());
         lens.variables = variables(&lens);
         for _ in 0..4 {
@@ -405,7 +411,7 @@ impl DesignRun {
 }
 
 /// All curvatures and gaps as variables.
-fn variables(lens: &crate::lens::Lens) -> Vec<Variable> {
+fn variables(lens: &Lens) -> Vec<Variable> {
     let shape = [Quantity::Curvature, Quantity::Thickness];
     let all = (0..lens.surfaces.len()).flat_map(|row| shape.map(|q| Parameter::new(row, q)));
     let is_shape = |p: &Parameter| {

@@ -15,6 +15,8 @@ pub enum RunKind {
     StructureSearch,
     /// The design of a gradient-index field.
     GrinDesign,
+    /// The design of a lens from a specification.
+    SpecifiedDesign,
 }
 
 /// Identifies a run of a session.

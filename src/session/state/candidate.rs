@@ -67,6 +67,9 @@ impl Session {
         match found {
             Some(number) => format!("lens {number} of the search"),
             None if self.pareto.has_found(lens) => "a lens of the Pareto front".to_owned(),
+            None if self.specified_design.has_found(lens) => {
+                "a lens from a specification".to_owned()
+            }
             None => "a changed lens".to_owned(),
         }
     }

@@ -21,6 +21,7 @@ use super::optimization::{OptimizationEngine, OptimizationRequest, OptimizerFact
 use super::pareto::ParetoState;
 use super::run::{BackgroundRun, RunId, RunKind, RunStatus};
 use super::score::DesignScore;
+use super::specified_design::SpecifiedDesignState;
 use super::structure_search::StructureSearchState;
 use super::view::{KeptLens, Message, SessionView, Severity};
 use crate::effects::{Effect, EffectOverride};
@@ -79,6 +80,7 @@ pub struct Session {
     pareto: ParetoState,
     structure_search: StructureSearchState,
     grin: GrinState,
+    specified_design: SpecifiedDesignState,
     experiment: ExperimentWorker,
     design_score: DesignScore,
     drag: DragState,
@@ -168,6 +170,7 @@ impl Session {
             pareto: ParetoState::spawn(wake.clone())?,
             structure_search: StructureSearchState::spawn(wake.clone())?,
             grin: GrinState::spawn(wake.clone())?,
+            specified_design: SpecifiedDesignState::spawn(wake.clone())?,
             experiment: ExperimentWorker::spawn(wake.clone())?,
             design_score: DesignScore::spawn(wake.clone())?,
             drag: DragState::spawn(wake.clone())?,
@@ -233,6 +236,7 @@ impl Session {
             Command::ExportPareto(folder) => self.export_pareto(folder),
             Command::StructureSearch(command) => self.structure_search_command(command),
             Command::Grin(command) => self.grin_command(command),
+            Command::SpecifiedDesign(command) => self.specified_design_command(command),
             Command::Preview(lens) => self.preview(lens),
             Command::AcceptPreview => self.accept_preview(),
             Command::AcceptCandidate => self.accept_candidate(),
@@ -299,6 +303,7 @@ impl Session {
             pareto: self.pareto.view(),
             structure_search: self.structure_search.view(),
             grin: self.grin.view(),
+            specified_design: self.specified_design.view(),
             design_score: self.design_score.latest(),
             preview_lens: self.preview_lens.clone(),
             candidate: self.candidate(),

@@ -10,6 +10,7 @@ use crate::session::history::VersionOrigin;
 use crate::session::optimization::{OptimizationRequest, OptimizationSnapshot};
 use crate::session::pareto::ParetoExport;
 use crate::session::run::{RunEvent, RunKind, RunStatus};
+use crate::session::specified_design::{DesignNotSaved, SpecifiedDesignCommand};
 use crate::session::structure_search::{StructureSearchCommand, StructureSearchReport};
 use crate::session::view::Severity;
 use std::path::PathBuf;
@@ -30,6 +31,12 @@ impl Session {
             let text = format!("recovered the field of an interrupted design: {file}");
             self.post(Severity::Note, text);
         }
+    }
+
+    /// Saves designs from specifications in a folder from now on, and offers to resume the unfinished
+    /// one in it.
+    pub fn set_design_folder(&mut self, folder: impl Into<PathBuf>) {
+        self.specified_design.set_save_folder(folder.into());
     }
 
     /// Takes the events of all runs.
@@ -53,6 +60,11 @@ impl Session {
         for event in self.grin.drain_events() {
             if let Some(export) = self.receive(RunKind::GrinDesign, event) {
                 self.post_grin_export(export);
+            }
+        }
+        for event in self.specified_design.drain_events() {
+            if let Some(DesignNotSaved(why)) = self.receive(RunKind::SpecifiedDesign, event) {
+                self.post(Severity::Error, why);
             }
         }
     }
@@ -207,6 +219,12 @@ impl Session {
 
     pub(super) fn grin_command(&mut self, command: GrinCommand) {
         if let Err(why) = self.grin.handle(command) {
+            self.post(Severity::Warning, why);
+        }
+    }
+
+    pub(super) fn specified_design_command(&mut self, command: SpecifiedDesignCommand) {
+        if let Err(why) = self.specified_design.handle(command) {
             self.post(Severity::Warning, why);
         }
     }

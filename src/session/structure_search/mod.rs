@@ -12,6 +12,7 @@ pub use request::StructureSearchRequest;
 pub use snapshot::{CheckpointStatus, EndReason, FoundLens, StructureSearchSnapshot};
 
 use super::run::{BackgroundRun, RunEvent, RunId, RunView};
+use super::saved_runs::newest_file;
 use crate::lens::Lens;
 use crate::search::SteerCommand;
 use engine::{EngineRequest, StructureSearchEngine, StructureSearchInput};
@@ -74,7 +75,7 @@ impl StructureSearchState {
 
     /// Saves searches in a folder from now on, and looks for an unfinished one in it.
     pub(super) fn set_save_folder(&mut self, folder: PathBuf) {
-        self.unfinished = newest_search(&folder);
+        self.unfinished = newest_file(&folder, EXTENSION);
         self.folder = Some(folder);
     }
 
@@ -202,14 +203,6 @@ impl StructureSearchState {
     }
 }
 
-/// The latest search file in a folder.
-fn newest_search(folder: &Path) -> Option<PathBuf> {
-    let files = fs::read_dir(folder).ok()?.flatten();
-    let searches = files.filter(|file| file.file_name().to_string_lossy().ends_with(EXTENSION));
-    let dated = searches.filter_map(|file| Some((file.metadata().ok()?.modified().ok()?, file)));
-    dated.max_by_key(|(date, _)| *date).map(|(_, file)| file.path())
-}
-
 /// The file in which a search is resumed: a dismissed one gets a file of its own again.
 fn restore_dismissed(path: PathBuf) -> Result<PathBuf, String> {
     if path.file_name().is_none_or(|name| name != DISMISSED) {
@@ -284,14 +277,14 @@ mod tests {
     fn a_new_search_has_a_file_of_its_own_and_the_newest_is_found_again() -> io::Result<()> {
         let folder = std::env::temp_dir().join(format!("aplanat-kept-{}", std::process::id()));
         fs::create_dir_all(&folder)?;
-        assert_eq!(newest_search(&folder), None);
+        assert_eq!(newest_file(&folder, EXTENSION), None);
         let first = unused_path(&folder, "Nikkor-S 50/1.4 (1962)").unwrap_or_default();
         assert_eq!(first, folder.join("Nikkor-S_50_1.4_1962_1.search.json"));
         fs::write(&first, "")?;
         let second = unused_path(&folder, "Nikkor-S 50/1.4 (1962)").unwrap_or_default();
         assert_eq!(second, folder.join("Nikkor-S_50_1.4_1962_2.search.json"));
         fs::write(folder.join("other.json"), "")?;
-        assert_eq!(newest_search(&folder), Some(first));
+        assert_eq!(newest_file(&folder, EXTENSION), Some(first));
         assert_eq!(unused_path(&folder, " / "), Some(folder.join("lens_1.search.json")));
         fs::remove_dir_all(&folder)
     }

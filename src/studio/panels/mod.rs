@@ -17,6 +17,7 @@ mod prescription;
 mod pupil;
 mod search;
 mod seidel;
+mod specification;
 mod spot;
 mod system;
 mod tolerances;
@@ -39,6 +40,7 @@ pub(super) use prescription::first_radius_field;
 pub use pupil::PupilPanel;
 pub use search::SearchPanel;
 pub use seidel::SeidelPanel;
+pub use specification::SpecificationPanel;
 pub use spot::SpotPanel;
 pub use system::SystemPanel;
 pub use tolerances::TolerancesPanel;
@@ -93,6 +95,8 @@ pub enum PanelKind {
     FieldCurves,
     /// A scene seen through the lens.
     Picture,
+    /// A lens from a specification.
+    Specification,
     /// Manufacturing errors and what they do to the lens.
     Tolerances,
     /// The search for a better lens.
@@ -117,7 +121,7 @@ pub enum PanelKind {
 
 impl PanelKind {
     /// Every panel. A new one is a file in this folder, an entry here and a place in the window.
-    pub const ALL: [Self; 19] = [
+    pub const ALL: [Self; 20] = [
         Self::Layout,
         Self::Slice,
         Self::Prescription,
@@ -127,6 +131,7 @@ impl PanelKind {
         Self::Fans,
         Self::FieldCurves,
         Self::Picture,
+        Self::Specification,
         Self::Tolerances,
         Self::Optimizer,
         Self::Pareto,
@@ -151,6 +156,7 @@ impl PanelKind {
             Self::Fans => Box::new(FansPanel),
             Self::FieldCurves => Box::new(FieldCurvesPanel),
             Self::Picture => Box::new(PicturePanel::default()),
+            Self::Specification => Box::new(SpecificationPanel::default()),
             Self::Tolerances => Box::new(TolerancesPanel::default()),
             Self::Optimizer => Box::new(OptimizerPanel::default()),
             Self::Pareto => Box::new(ParetoPanel::default()),

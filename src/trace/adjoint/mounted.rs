@@ -9,10 +9,10 @@ use super::block::AdjointBlock;
 use super::refraction::{
     RefractionAdjoint, SagDerivatives, SagRefractionAdjoint, SurfaceNormal, unrefract,
 };
-use crate::lens::{ASPHERE_TERMS, BASE_NUMBERS, Pose};
+use crate::lens::{ASPHERE_TERMS, BASE_NUMBERS, Freeform, FreeformKind, IdealAction, Pose};
 use crate::math::{Dual, Real, Vec3};
 use crate::trace::batch::BLOCK;
-use crate::trace::deflection::Deflection;
+use crate::trace::deflection::{Deflection, LocalRule};
 use crate::trace::freeform::FreeformFace;
 use crate::trace::interface::Interface;
 use crate::trace::mount::Mount;
@@ -36,8 +36,7 @@ impl<R: Real> Tracer<R> {
         let mut columns = Vec::new();
         match (mount.astigmatism, &mount.face) {
             (_, Some(face)) => {
-                let ideal = mount.ideal.map(|action| Deflection::new(action, &own));
-                columns = adjoint.retrace_freeform(&own, face, ideal.as_ref());
+                columns = adjoint.retrace_freeform(&own, face, mount.ideal);
             }
             (None, None) => adjoint.retrace_surface(&own, None),
             (Some(q), None) => adjoint.retrace_irregular(&own, q),
@@ -98,7 +97,7 @@ impl<R: Real> AdjointBlock<R> {
         &mut self,
         surface: &Interface<R>,
         face: &FreeformFace<R>,
-        ideal: Option<&Deflection<R>>,
+        ideal: Option<IdealAction<R>>,
     ) -> Vec<[R; BLOCK]> {
         let mut columns = vec![[R::ZERO; BLOCK]; face.form.numbers.len()];
         for j in 0..BLOCK {
@@ -109,8 +108,15 @@ impl<R: Real> AdjointBlock<R> {
             let sag = FreeformSlopes::new(surface, face, p);
             let vector = Vec3::new(-sag.gradient[0], -sag.gradient[1], R::ONE);
             let normal = SurfaceNormal { vector, m: vector.dot(vector), unit: false };
-            let deflected = ideal.map(|ideal| {
-                DeflectionAdjoint::new(ideal, (p, behind, vector), self.by_k(j), self.by_opl[j])
+            let deflected = ideal.map(|action| {
+                let ideal = Deflection::new(action, &face.form, surface, p);
+                let back = DeflectionAdjoint::new(
+                    &ideal,
+                    (p, behind, vector),
+                    self.by_k(j),
+                    self.by_opl[j],
+                );
+                back.through_phase(action, &face.form, p)
             });
             let back = match &deflected {
                 Some(deflected) => deflected.back,
@@ -124,11 +130,14 @@ impl<R: Real> AdjointBlock<R> {
             let lambda = (by_point.dot(back.k) + self.by_opl[j] * surface.n2) / back.a;
             let weights = [lambda, -n.x, -n.y];
             self.set_base_derivatives(j, &sag, weights, &mut columns);
-            face.form.visit_series(p.x, p.y, |k, by| columns[k][j] = dot3(weights, by));
+            let numbers = face.base(surface);
+            face.form.visit_series(&numbers, p.x, p.y, |k, by| columns[k][j] = dot3(weights, by));
             self.transfer_back(surface, j, p, &back, by_point - vector * lambda);
             if let Some(deflected) = deflected {
                 self.by_index_before[j] += deflected.by_indices[0];
                 self.by_index_behind[j] += deflected.by_indices[1];
+                let weights = deflected.by_phase;
+                face.form.visit_phase(p.x, p.y, |k, by| columns[k][j] = dot3(weights, by));
             }
         }
         columns
@@ -164,7 +173,15 @@ struct DeflectionAdjoint<R> {
     by_point: Vec3<R>,
     /// By the indices in front and behind.
     by_indices: [R; 2],
+    /// By the optical path that the surface adds, and by its gradient along x and y.
+    by_added: [R; 3],
+    /// The same by the phase of a form and its gradient.
+    by_phase: [R; 3],
 }
+
+/// The number of inputs of a deflection: point, direction, normal, indices and the gradient of what is
+/// added to the optical path.
+const DEFLECTION_INPUTS: usize = 13;
 
 impl<R: Real> DeflectionAdjoint<R> {
     /// From the point, the direction behind and the normal, and the derivatives by that direction and
@@ -176,12 +193,18 @@ impl<R: Real> DeflectionAdjoint<R> {
         by_opl: R,
     ) -> Self {
         let k = ideal.undeflect(point, behind, normal);
-        let input = Dual::<R, 11>::variable;
+        let input = Dual::<R, DEFLECTION_INPUTS>::variable;
         let vector = |v: Vec3<R>, first: usize| {
             Vec3::new(input(v.x, first), input(v.y, first + 1), input(v.z, first + 2))
         };
         let varied = Deflection {
-            action: ideal.action.map(Dual::constant),
+            rule: match ideal.rule {
+                LocalRule::Lens(power) => LocalRule::Lens(Dual::constant(power)),
+                LocalRule::Added { slopes: [x, y], path } => LocalRule::Added {
+                    slopes: [input(x, 11), input(y, 12)],
+                    path: Dual::constant(path),
+                },
+            },
             sense: Dual::constant(ideal.sense),
             mirror: ideal.mirror,
             before: input(ideal.before, 9),
@@ -197,7 +220,29 @@ impl<R: Real> DeflectionAdjoint<R> {
         let by_vector = |first: usize| Vec3::new(by(first), by(first + 1), by(first + 2));
         let (a, by_dn2) = (k.dot(normal), R::ZERO);
         let back = RefractionAdjoint { k, a, by_k: by_vector(3), by_normal: by_vector(6), by_dn2 };
-        Self { back, by_point: by_vector(0), by_indices: [by(9), by(10)] }
+        let mut by_point = by_vector(0);
+        if let LocalRule::Added { slopes, .. } = ideal.rule {
+            (by_point.x, by_point.y) =
+                (by_point.x + by_opl * slopes[0], by_point.y + by_opl * slopes[1]);
+        }
+        Self {
+            back,
+            by_point,
+            by_indices: [by(9), by(10)],
+            by_added: [by_opl, by(11), by(12)],
+            by_phase: [R::ZERO; 3],
+        }
+    }
+
+    /// The same with the dependence of the gradient of a phase on the point, and the derivatives by the
+    /// phase.
+    fn through_phase(mut self, action: IdealAction<R>, form: &Freeform<R>, p: Vec3<R>) -> Self {
+        let IdealAction::Phase { path } = action else { return self };
+        self.by_phase = self.by_added.map(|by| path * by);
+        let [_, x, y] = self.by_phase;
+        let [xx, xy, yy] = form.phase_bends(p.x, p.y);
+        self.by_point = self.by_point + Vec3::new(xx * x + xy * y, xy * x + yy * y, R::ZERO);
+        self
     }
 }
 
@@ -217,9 +262,28 @@ impl<R: Real> FreeformSlopes<R> {
         base.conic = input(base.conic.value, CONIC);
         base.terms = std::array::from_fn(|i| input(base.terms[i].value, TERMS + i));
         base.own = std::array::from_fn(|i| input(base.own[i].value, OWN + i));
-        let base = base.sag(input(p.x, 0), input(p.y, 1));
+        let inputs = (input(p.x, 0), input(p.y, 1));
+        let numbers = base;
+        let mut base = numbers.sag(inputs.0, inputs.1);
+        if let FreeformKind::QBfs { .. } = face.form.kind {
+            // The series stands on the normal of the base and depends on its numbers.
+            let series = face.form.series_sag(&numbers, inputs.0, inputs.1, Dual::constant);
+            base = std::array::from_fn(|i| base[i] + series[i]);
+            return Self::of(face, p, base, [Dual::constant(R::ZERO); 2]);
+        }
         let (x, y) = (Dual::<R, 2>::variable(p.x, 0), Dual::<R, 2>::variable(p.y, 1));
-        let [_, by_x, by_y] = face.form.series_sag(x, y, Dual::constant);
+        let plain = face.base(surface).map(Dual::constant);
+        let [_, by_x, by_y] = face.form.series_sag(&plain, x, y, Dual::constant);
+        Self::of(face, p, base, [by_x, by_y])
+    }
+
+    /// From the base and the gradient of a series that stands beside it.
+    fn of(
+        face: &FreeformFace<R>,
+        p: Vec3<R>,
+        base: [Dual<R, INPUTS>; 3],
+        [by_x, by_y]: [Dual<R, 2>; 2],
+    ) -> Self {
         let twice = face.astigmatism + face.astigmatism;
         let bend = |base: &Dual<R, INPUTS>, series: Dual<R, 2>| {
             [base.slope[0] + series.slope[0], base.slope[1] + series.slope[1]]

@@ -2,7 +2,7 @@
 
 use super::foreign;
 use aplanat::files::{self, ConversionOutcome, LensFormat};
-use aplanat::lens::{Aperture, FieldKind, Medium, Object};
+use aplanat::lens::{Aperture, FieldKind, FreeformKind, IdealElement, Medium, Object};
 use serde_json::Value;
 
 fn text() -> String {
@@ -32,20 +32,46 @@ fn a_model_is_read() {
     for turn in [mirror.break_before, mirror.break_after] {
         assert!((turn.unwrap().tilt[0] + 45.0).abs() < 1e-12);
     }
-    let locked = lens.surfaces[3].locked.as_ref().unwrap();
-    assert_eq!(locked.kind, "ThinLens");
+    let thin = IdealElement::Lens { focal_length: 100.0 };
+    assert_eq!(lens.surfaces[3].ideal, Some(thin));
     let report = opened.report.unwrap();
-    assert_eq!(report.count(ConversionOutcome::Locked), 1);
+    assert_eq!(report.count(ConversionOutcome::Locked), 0);
+    assert_eq!(report.count(ConversionOutcome::Approximated), 1);
+}
+
+/// Coefficients are optical paths in the unit of the file at the wavelength of the element.
+#[test]
+fn a_radial_phase_is_read() {
+    let element = |function: &str| {
+        format!(
+            "\"phase_element\": {{\"__instance_type__\": [\"rayoptics.oprops.doe\", \
+             \"DiffractiveElement\"], \"attributes\": {{\"coefficients\": [-0.005, 1e-6], \
+             \"ref_wl\": 500.0, \"order\": 1, \"phase_fct_name\": \"{function}\"}}}}, \
+             \"label\": \"front\""
+        )
+    };
+    let read = |function: &str| {
+        let text = text().replace("\"label\": \"front\"", &element(function));
+        files::parse(text.as_bytes(), "a.roa").unwrap().lens.surfaces[0].clone()
+    };
+    let row = read("radial_phase_fct");
+    let form = row.freeform.unwrap();
+    assert_eq!(form.kind, FreeformKind::RadialPhase { radius: 1.0, order: 1.0 });
+    let waves = form.numbers.iter().map(|a| a / std::f64::consts::TAU).collect::<Vec<f64>>();
+    assert!((waves[0] + 10.0).abs() < 1e-12 && (waves[1] - 2e-3).abs() < 1e-15, "{waves:?}");
+    assert_eq!((row.locked, row.asphere), (None, vec![1e-6, -2e-9]));
+    assert_eq!(read("another_fct").locked.unwrap().kind, "DiffractiveElement");
 }
 
 #[test]
-fn odd_powers_are_locked_and_missing_parts_named() {
-    let odd = text().replace("EvenPolynomial", "RadialPolynomial");
-    let opened = files::parse(odd.as_bytes(), "a.roa").unwrap();
-    assert_eq!(
-        opened.lens.surfaces[0].locked.as_ref().unwrap().kind,
-        "RadialPolynomial with a term in r^2"
-    );
+fn odd_powers_are_read_and_what_is_missing_or_unknown_is_named() {
+    let first = |profile: &str| {
+        let text = text().replace("EvenPolynomial", profile);
+        files::parse(text.as_bytes(), "a.roa").unwrap().lens.surfaces[0].clone()
+    };
+    let odd = first("RadialPolynomial").freeform.unwrap();
+    assert_eq!((odd.kind, &odd.numbers[..]), (FreeformKind::OddAsphere, &[0.0, 1e-6, -2e-9][..]));
+    assert_eq!(first("YToroid").locked.unwrap().kind, "YToroid");
     let infinite =
         text().replace("\"interact_mode\"", "\"max_aperture\": -Infinity, \"interact_mode\"");
     let read = |text: &str| files::parse(text.as_bytes(), "a.roa").unwrap().lens;

@@ -210,7 +210,8 @@ fn the_normal_matrix_of_the_term_is_that_of_the_spot_and_one_residual() {
     assert_close(made.normal[(0, 0)], expected, 1e-9 * expected, "normal");
 }
 
-/// First derivatives by the sweep are those by jets, error by error.
+/// First derivatives and growths by the sweep, which traces only rays that symmetry does not give, are
+/// those by jets of all rays, error by error.
 #[test]
 fn one_sweep_back_gives_the_derivatives_by_every_error() {
     for name in ["double_gauss_rudolph_50", "phone_us7558005_1"] {
@@ -225,6 +226,15 @@ fn one_sweep_back_gives_the_derivatives_by_every_error() {
             let scale = exact.first.abs().max((exact.value * exact.second).abs().sqrt());
             let what = format!("{name} {:?}", jet.error);
             assert_close(swept.first, exact.first, 1e-9 * scale, &what);
+            let fields = scene.beam.fields.iter();
+            let weights = fields.flat_map(|field| {
+                let weights = field.colours.iter().flat_map(|colour| &colour.weights);
+                weights.map(|weight| field.weight * weight)
+            });
+            let square = |[x, y]: [f64; 2]| x * x + y * y;
+            let pairs = weights.zip(&jet.rays);
+            let growth: f64 = pairs.map(|(weight, ray)| weight * square(ray.displacement)).sum();
+            assert_close(swept.growth[0], growth, 1e-9 * growth, &what);
         }
     }
 }

@@ -148,11 +148,21 @@ fn the_command_shows_sensitivities_and_spots() {
     assert_eq!(json["spots"].as_array().unwrap().len(), 2);
     assert!(json["spots"][1]["good"]["interval"][1].as_f64().unwrap() <= 1.0);
     assert_eq!(json["loosest"].as_array().unwrap().len(), 3);
+    // Far more is asked for than any shop makes wide: held, and confirmed by rays.
+    let confirmed = &json["prices"]["confirmed"];
+    let [real, form] = [0, 1].map(|i| confirmed[i].as_f64().unwrap());
+    assert!(real < 0.5 && (real / form - 1.0).abs() < 0.5, "{real} {form}");
+    assert!(json["warnings"].to_string().contains("held at ten times"), "{}", json["warnings"]);
     refused(2, &["tolerance", lens, "--rms=-1"], "", &["--rms"]);
     refused(2, &["tolerance", lens, "--rms=0"], "", &["--rms"]);
     refused(2, &["tolerance", lens, "--loosest=0"], "", &["--loosest"]);
     refused(2, &["tolerance", lens, "--samples", "1"], "", &["--samples", "2 or more"]);
     refused(2, &["tolerance", lens, "--grade", "good"], "", &["commercial"]);
+    // A tilt of the rear by 80 degrees: nearly all lenses lose rays.
+    let broken =
+        SINGLET.replace("0.05, \"distribution\": \"uniform\"", "80.0, \"distribution\": \"ends\"");
+    std::fs::write(&path, broken).unwrap();
+    refused(1, &few, "", &["of 4 lenses", "lose rays", "tighter"]);
     std::fs::write(&path, SINGLET.replace("\"last\": 1", "\"last\": 7")).unwrap();
     refused(2, &few, "", &["surfaces 1 to 8; expected 1 to 2"]);
     std::fs::remove_dir_all(&folder).unwrap();

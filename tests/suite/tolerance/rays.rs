@@ -5,7 +5,7 @@ use crate::reference::{count, number, numbers};
 use aplanat::lens::System;
 use aplanat::math::Vec3;
 use aplanat::tolerance::{Merits, merits, perturb};
-use aplanat::trace::Tracer;
+use aplanat::trace::{Landings, TraceSink as _, Tracer};
 use serde_json::Value;
 
 #[test]
@@ -63,6 +63,30 @@ fn rays_of_perturbed_lenses_are_exact() {
         }
         println!("{}: worst hit {worst:.1e} mm", lens.id());
         assert!(worst < 1e-13, "{}: {worst}", lens.id());
+    }
+}
+
+/// Surfaces that are tilted, irregular or both are crossed in blocks, and ray by ray.
+#[test]
+fn rays_of_perturbed_lenses_in_batches_have_the_same_bits() {
+    for lens in lenses() {
+        for case in lens.data["cases"].as_array().unwrap() {
+            let errors: Vec<_> =
+                case["perturbations"].as_array().unwrap().iter().map(valued).collect();
+            let systems = perturb(&lens.nominal(), &errors).unwrap();
+            assert!(systems[0].has_poses());
+            for colour in &lens.beam(5, 16).fields[1].colours {
+                let tracer = Tracer::new(&systems[colour.wavelength]).unwrap();
+                let mut landed = Landings::default();
+                tracer.trace_batch(&colour.rays.iter().copied().collect(), &mut landed);
+                for (i, ray) in colour.rays.iter().enumerate() {
+                    let alone = tracer.trace(*ray);
+                    assert_eq!(landed.fate(i), alone.fate);
+                    assert!(alone.fate.is_imaged());
+                    assert_eq!((landed.ray(i), landed.opl[i]), (alone.ray, alone.opl));
+                }
+            }
+        }
     }
 }
 

@@ -1,7 +1,9 @@
 //! The surfaces between object and image, and their place on the axis.
 
 use super::glass;
-use crate::files::codev::file::{CodeVFile, CodeVProfile, CodeVSurface, PickupCommand, Placement};
+use crate::files::codev::file::{
+    CodeVDiffraction, CodeVFile, CodeVProfile, CodeVSurface, PickupCommand, Placement,
+};
 use crate::files::report::{ConversionOutcome, ConversionReport};
 use crate::lens::{
     ASPHERE_TERMS, AxisBreak, BASE_NUMBERS, Freeform, FreeformKind, Lens, LockedSurface, Parameter,
@@ -60,7 +62,8 @@ fn row(file: &CodeVFile, number: usize, radii: bool, report: &mut ConversionRepo
         Some(name) if surface.label.is_empty() => format!("glass {name} is not known"),
         _ => surface.label.clone(),
     };
-    let form = freeform(surface);
+    let locked = locked(surface, unit, report);
+    let form = freeform(surface).filter(|_| locked.is_none());
     let is_toroid = form.as_ref().is_some_and(|form| form.kind == FreeformKind::Toroid);
     Row {
         curvature: bend / unit,
@@ -71,7 +74,7 @@ fn row(file: &CodeVFile, number: usize, radii: bool, report: &mut ConversionRepo
         medium: imported.medium,
         semi_diameter: clip(surface).map(|radius| radius * unit),
         obstruction: obstruction(surface).map(|radius| radius * unit),
-        locked: locked(surface, unit),
+        locked,
         comment,
         ..Row::default()
     }
@@ -80,6 +83,9 @@ fn row(file: &CodeVFile, number: usize, radii: bool, report: &mut ConversionRepo
 /// The form that is none of revolution, in the unit of the file. The coefficients of a toroid are those of
 /// its curve.
 fn freeform(surface: &CodeVSurface) -> Option<Freeform<f64>> {
+    if let Some(phase) = &surface.diffraction {
+        return Some(radial_phase(phase));
+    }
     let profile = surface.profile.filter(|_| surface.locked.is_none())?;
     Some(match profile {
         CodeVProfile::Biconic => {
@@ -93,6 +99,13 @@ fn freeform(surface: &CodeVSurface) -> Option<Freeform<f64>> {
             Freeform { kind: FreeformKind::Toroid, numbers }
         }
     })
+}
+
+/// A phase of which `2π cₖ/λ` radians are the numbers for r in the unit of the file.
+fn radial_phase(phase: &CodeVDiffraction) -> Freeform<f64> {
+    let per_mm = std::f64::consts::TAU / (phase.nm * 1e-6);
+    let numbers = phase.terms.iter().map(|c| c * per_mm).collect();
+    Freeform { kind: FreeformKind::RadialPhase { radius: 1.0, order: phase.order }, numbers }
 }
 
 /// The coefficients up to r¹⁶.
@@ -118,9 +131,26 @@ fn obstruction(surface: &CodeVSurface) -> Option<f64> {
     clip(surface).is_none_or(|outer| inner < outer).then_some(inner)
 }
 
-fn locked(surface: &CodeVSurface, unit: f64) -> Option<LockedSurface> {
-    let kind = surface.locked.clone()?;
+/// The command that makes a surface impossible to trace, with all its lines.
+fn locked(
+    surface: &CodeVSurface,
+    unit: f64,
+    report: &mut ConversionReport,
+) -> Option<LockedSurface> {
     let lengths = (unit != 1.0).then(|| format!("UNIT {unit} mm"));
+    let unknown = surface
+        .diffraction
+        .as_ref()
+        .filter(|phase| !phase.is_radial || !(phase.nm > 0.0) || surface.profile.is_some());
+    if let Some(phase) = unknown {
+        let note = "only a phase of powers of r (HCT R) with its wavelength (HWL) on a surface of \
+                    revolution can be traced: the row is locked and rays meet its asphere alone";
+        for row in report.rows.iter_mut().filter(|row| row.line == Some(phase.line)) {
+            row.outcome = ConversionOutcome::Locked;
+            note.clone_into(&mut row.note);
+        }
+    }
+    let kind = surface.locked.clone().or_else(|| unknown.map(|_| "DIF DOE".to_owned()))?;
     let lines = lengths.into_iter().chain(surface.lines.iter().cloned()).collect();
     Some(LockedSurface { kind, lines })
 }

@@ -77,6 +77,7 @@ impl CodeVWriter {
             lines.into_iter().for_each(|line| self.line(format!("  {line}")));
             return;
         }
+        phase_lines(row).into_iter().for_each(|line| self.line(format!("  {line}")));
         let aspheric = row.asphere.iter().any(|a| *a != 0.0);
         if aspheric || row.conic != 0.0 {
             self.line(if aspheric { "  ASP" } else { "  CON" });
@@ -172,7 +173,26 @@ impl CodeVWriter {
 
 /// True for a freeform or an ideal element that the format does not have.
 pub(super) fn has_no_form(row: &Row) -> bool {
-    (row.freeform.is_some() || row.ideal.is_some()) && form_lines(row).is_none()
+    let special = row.freeform.is_some() || row.ideal.is_some();
+    special && form_lines(row).is_none() && phase_lines(row).is_empty()
+}
+
+/// The wavelength at which phases are written, in nanometres.
+const PHASE_NM: f64 = 587.5618;
+
+/// The lines of a radial phase; none for another form.
+fn phase_lines(row: &Row) -> Vec<String> {
+    let Some(form) = row.freeform.as_ref().filter(|_| row.ideal.is_none()) else {
+        return Vec::new();
+    };
+    let FreeformKind::RadialPhase { radius, order } = form.kind else { return Vec::new() };
+    let order = number(order);
+    let head = [format!("DIF DOE; HOR {order}; HWL {}; HCT R", number(PHASE_NM))];
+    let mm = PHASE_NM * 1e-6 / std::f64::consts::TAU;
+    let terms = (1..)
+        .zip(&form.numbers)
+        .map(|(k, a)| format!("HCO C{k} {}", number(a * mm / radius.powi(2 * k))));
+    head.into_iter().chain(terms).collect()
 }
 
 /// The lines of a form that is none of revolution; `None` for another one, and for what the format does not

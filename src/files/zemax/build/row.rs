@@ -30,7 +30,7 @@ pub(super) fn row(
         curvature: form.curvature / unit,
         conic: form.conic,
         asphere: scaled.collect(),
-        freeform: form.freeform.map(|form| form.scaled(unit)),
+        freeform: form.freeform.map(|form| form.in_mm(unit)),
         ideal: form.ideal.map(|ideal| ideal.scaled(unit)),
         thickness: thickness(file, planned)? * unit,
         medium,

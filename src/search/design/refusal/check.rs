@@ -5,7 +5,8 @@ use crate::search::design::requirements::{FOCAL_LENGTH_TOLERANCE, LensRequiremen
 use crate::search::design::spec::LensSpecification;
 use std::f64::consts::PI;
 
-/// The smallest f-number of an image in air, where the beam fills a hemisphere (sine condition).
+/// The f-number of an image in air at which the beam fills a hemisphere (sine condition): its edge grazes
+/// the image plane, so that a lens has a larger one.
 const SMALLEST_F_NUMBER: f64 = 0.5;
 /// The largest field, in degrees, at which a flat image without distortion is known.
 const WIDEST_RECTILINEAR: f64 = 70.0;
@@ -109,10 +110,10 @@ pub(in crate::search::design) fn check_feasible(
     check_lengths(asked)?;
     let impossible = |text: String| Err(SpecificationError::Impossible(text));
     let n = asked.f_number;
-    if n < SMALLEST_F_NUMBER {
+    if n <= SMALLEST_F_NUMBER {
         return impossible(format!(
-            "f/{n}; an image in air has an f-number of at least {SMALLEST_F_NUMBER}, where the \
-             beam fills a hemisphere"
+            "f/{n}; an image in air has an f-number above {SMALLEST_F_NUMBER}, where the beam fills \
+             a hemisphere"
         ));
     }
     if asked.track <= asked.back_focus {
