@@ -336,7 +336,8 @@ fn distortion_of_every_colour_and_both_pupils() {
             let pairs = fields.flat_map(|(found, exact)| {
                 list(&found["colors"]).iter().zip(list(&exact["colors"]))
             });
-            for (found, exact) in pairs {
+            // Where the reference has no ray it has no number.
+            for (found, exact) in pairs.filter(|(_, exact)| !exact[key][0].is_null()) {
                 let (found, exact) = (numbers(&found["point"]), numbers(&exact[key]));
                 let place = format!("{key} {exact:?}");
                 worst.note(found[0], exact[0], 1e-11, &place);
