@@ -24,12 +24,14 @@ const COLUMNS: usize = 32;
 const AROUND: f64 = 1.5;
 /// The cells of the map of brightness along a side, and the places that are looked at in each.
 const MAP: usize = 64;
-const LOOKS: usize = 4;
+const LOOKS: usize = 16;
 /// The share of samples that is drawn evenly.
 const EVEN: f64 = 0.1;
 /// The samples of a set for each path and colour: to decide, and for the picture.
 const FEW: usize = 128;
 const MANY: usize = 2048;
+/// The standard errors that a number is surely away from another.
+const SURE: f64 = 2.0;
 /// The pairs are followed that carry this share of the light of all, and no more than this many.
 const CARRIED: f64 = 0.999;
 const MOST_PAIRS: usize = 66;
@@ -94,8 +96,7 @@ impl GhostLight {
         let all = rank_ghosts(model, model.primary, coating)?.ghosts.len();
         let decide = |samples: usize| {
             let (values, rays) = ghosts.values(samples);
-            let grey = MID_GREY * picture.white;
-            let (change, error) = brightest(&values, grey);
+            let (change, error) = brightest(&values, MID_GREY * picture.white);
             let pairs = [ghosts.paths.first().map_or(0, Vec::len), all];
             let on = change > tolerance;
             let coating = coating.to_string();
@@ -104,7 +105,8 @@ impl GhostLight {
         };
         let few = decide(FEW);
         // What is below the tolerance by chance may be above it.
-        let clear = few.report.change + 2.0 * few.report.error < tolerance;
+        let highest = few.values.iter().flatten().map(|(value, error)| value + SURE * error);
+        let clear = highest.fold(0.0, f64::max) < tolerance * MID_GREY * picture.white;
         Ok(if clear { few } else { decide(MANY) })
     }
 
@@ -142,12 +144,13 @@ impl GhostLight {
     }
 }
 
-/// The largest light of a cell over mid grey, and its standard error.
+/// The light of the cell over mid grey that is surely brightest, and its standard error: of many cells the
+/// largest value is that of the largest error.
 fn brightest(values: &[[(f64, f64); 3]], grey: f64) -> (f64, f64) {
+    let surely = |(value, error): (f64, f64)| value - SURE * error;
     let all = values.iter().flatten().copied();
-    let (value, error) =
-        all.fold((0.0, 0.0), |best: (f64, f64), cell| if cell.0 > best.0 { cell } else { best });
-    (value / grey, error / grey)
+    let best = all.max_by(|a, b| surely(*a).total_cmp(&surely(*b)));
+    best.map_or((0.0, 0.0), |(value, error)| (value / grey, error / grey))
 }
 
 impl<'a> GhostScene<'a> {
@@ -276,7 +279,7 @@ impl BrightnessMap {
             looks.fold(0.0, f64::max)
         };
         let mut weights: Vec<Vec<f64>> =
-            (0..MAP).map(|row| (0..MAP).map(|column| cell(column, row)).collect()).collect();
+            (0..MAP).into_par_iter().map(|row| (0..MAP).map(|c| cell(c, row)).collect()).collect();
         let mean = weights.iter().flatten().sum::<f64>() / (MAP * MAP) as f64;
         let even = if mean > 0.0 { EVEN * mean } else { 1.0 };
         weights.iter_mut().flatten().for_each(|weight| *weight += even);

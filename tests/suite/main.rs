@@ -47,6 +47,7 @@ mod optimize;
 mod paraxial;
 mod pareto;
 mod picture_cli;
+mod picture_reflections;
 mod pictures;
 mod plume;
 mod pupil;
