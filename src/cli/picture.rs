@@ -523,7 +523,7 @@ impl Display for SensorReport {
 }
 
 impl PictureReport {
-    /// What losses, ghosts and the map of the error are.
+    /// The losses, the ghosts and the map of the error.
     fn write_reflections(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let percent = |share: f64| 100.0 * share;
         if let Some(map) = &self.error_map {

@@ -221,7 +221,7 @@ fn gradient_costs(lens: &Lens, sheet: &ToleranceSheet) -> Result<Vec<AsBuiltCost
     Ok(COUNTS.into_iter().enumerate().map(cost).collect())
 }
 
-/// What is varied in a lens without variables.
+/// The variables of a lens that names none.
 const VARIED: [ParameterKind; 4] = [
     ParameterKind::Curvatures,
     ParameterKind::Thicknesses,

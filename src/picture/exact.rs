@@ -70,7 +70,7 @@ pub struct ExactRenderer<'a> {
     frame: ImageFrame,
     bands: Vec<BackwardBand>,
     directions: LitDirections,
-    /// What surfaces reflect; `None` if they let all light pass.
+    /// The light that surfaces reflect; `None` if they let all light pass.
     losses: Option<LensLosses>,
     /// The irradiance of a white card on the axis, or where the image is brightest.
     white: f64,

@@ -62,7 +62,7 @@ pub struct GhostLight {
     cells: [usize; 2],
     /// The mean and the standard error of every cell.
     values: Vec<[(f64, f64); 3]>,
-    /// What it does.
+    /// The size of that light, its error and its rays.
     pub report: GhostReport,
 }
 

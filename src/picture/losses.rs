@@ -19,7 +19,7 @@ const CELLS: usize = 10;
 /// The nodes along a side.
 const NODES: usize = CELLS + 1;
 
-/// What losses do to a picture.
+/// The losses of a picture.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct LossReport {
     /// The coatings.

@@ -2,8 +2,10 @@
 
 use super::path::intensity;
 use super::{GhostError, check};
-use crate::analysis::coating::Coating;
-use crate::analysis::seen_from_image::{limited, surrounded};
+use crate::analysis::{
+    coating::Coating,
+    seen_from_image::{limited, surrounded},
+};
 use crate::lens::System;
 use crate::pupil::RayModel;
 use crate::trace::{Ray, Tracer};
@@ -60,7 +62,7 @@ impl CoatedLens {
         })
     }
 
-    /// The light of a ray backwards from the image, as a [`BackwardLens`](super::super::BackwardLens)
+    /// The light of a ray backwards from the image, as a [`BackwardLens`](crate::analysis::BackwardLens)
     /// begins it; `None` if the ray misses a surface or is totally reflected.
     pub fn passed(&self, ray: Ray<f64>) -> Option<PassedLight> {
         let mut met = Vec::with_capacity(self.indices.len());

@@ -29,7 +29,7 @@ const ENDING: &str = ".design.json";
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SpecificationRequest {
-    /// What is asked of the lens.
+    /// The specification of the lens.
     pub specification: LensSpecification,
     /// The seed and the starts.
     pub settings: DesignSettings,

@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 /// The longest file, in bytes.
 const LONGEST: u64 = 1 << 26;
 
-/// What is in the file.
+/// The contents of the file.
 #[derive(Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct SavedDesign {

@@ -11,7 +11,7 @@ use std::sync::Arc;
 /// The state of a design from a specification.
 #[derive(Debug, Clone)]
 pub struct SpecifiedDesign {
-    /// What was asked for.
+    /// The specification.
     pub request: Arc<SpecificationRequest>,
     /// The same with everything that was not stated.
     pub requirements: Arc<LensRequirements>,

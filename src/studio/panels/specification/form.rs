@@ -1,4 +1,4 @@
-//! What is asked of the lens: three numbers, and limits each of which may be left open.
+//! The form of a specification: three numbers, and limits each of which may be left open.
 
 use egui::{Context, DragValue, Grid, Id, TextEdit, Ui};
 
@@ -114,7 +114,7 @@ impl<T: Copy> Optional<T> {
     }
 }
 
-/// What was typed.
+/// The text as it was typed.
 #[derive(Debug)]
 pub(super) struct SpecificationForm {
     focal_length: f64,
