@@ -5,7 +5,7 @@ use crate::search::design::{DesignMerit, DesignStage, FilledValue, LensJudgement
 use crate::session::SpecifiedDesign;
 use crate::studio::number::format_digits;
 
-/// What is taken for a value that is not stated, in the unit of the form.
+/// The value taken for one that is not stated, in the unit of the form.
 pub(super) fn filled_text(taken: Option<&FilledValue>, scale: f64, unit: &str) -> String {
     let Some(FilledValue { value, reason, .. }) = taken else { return "not stated".to_owned() };
     format!("{}{unit} ({reason})", scaled(value, scale))
@@ -20,7 +20,7 @@ fn scaled(value: &str, scale: f64) -> String {
     texts.join(", ")
 }
 
-/// What is taken for values that have no row of their own.
+/// The values taken for those that have no row of their own.
 pub(super) fn other_filled(filled: &[FilledValue], rows: [&str; 5], counts: [&str; 2]) -> String {
     let has_row = |key: &str| rows.contains(&key) || counts.contains(&key);
     let others = filled.iter().filter(|value| !has_row(value.key));
@@ -45,7 +45,7 @@ pub(super) fn stage_text(design: &SpecifiedDesign) -> &'static str {
     }
 }
 
-/// What a design has done and found so far.
+/// The progress and the findings of a design.
 pub(super) fn progress_text(design: &SpecifiedDesign) -> String {
     let count = design.candidates;
     let lenses = if count == 1 { "lens" } else { "lenses" };
@@ -92,7 +92,7 @@ pub(super) fn facts(judgement: &LensJudgement, length: f64) -> Vec<(&'static str
     ]
 }
 
-/// What a limit costs.
+/// The cost of a limit.
 pub(super) fn cost_text(cost: &LimitCost) -> String {
     let name = cost.term.replace('_', " ");
     let place = cost
