@@ -69,9 +69,15 @@ fn rounded_files_trace_alike_in_every_format() {
         let lens = files::parse(&foreign(name), name).unwrap().lens;
         let through = files::parse(json::write(&lens).as_bytes(), "a.json").unwrap().lens;
         assert_eq!(through, lens, "{name}");
+        // A thin lens is a surface of its own in one of the formats, and refused by the other.
+        let has_ideal = lens.surfaces.iter().any(|row| row.ideal.is_some());
         for target in ["a.zmx", "a.seq"] {
             let proof = match files::save(&lens, folder.join(target)) {
                 Ok(saved) => saved.proof.unwrap(),
+                Err(error) if has_ideal && target == "a.seq" => {
+                    assert!(error.to_string().contains("ideal element"), "{name}: {error}");
+                    continue;
+                }
                 Err(error) => panic!("{name} as {target}: {error}"),
             };
             assert!(proof.imaged > 0 && proof.worst_mm < 1e-10, "{name}: {proof:?}");
