@@ -199,7 +199,7 @@ impl SpecificationForm {
 
     fn with_wavelengths(&self) -> LensSpecification {
         let preset = self.wavelengths.and_then(|i| WavelengthPreset::ALL.get(i));
-        let lines = preset.map(|preset| preset.wavelengths());
+        let lines = preset.map(WavelengthPreset::wavelengths);
         let list = |of: fn(&crate::lens::Wavelength) -> f64| {
             lines.as_ref().map(|lines| lines.iter().map(of).collect())
         };
