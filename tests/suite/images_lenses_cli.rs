@@ -5,11 +5,30 @@
 
 use crate::reference::{Worst, count, number, numbers, read};
 use serde_json::{Value, json};
+use std::fmt::Write as _;
 use std::path::PathBuf;
 use std::process::Command;
 
 fn list(value: &Value) -> &Vec<Value> {
     value.as_array().unwrap()
+}
+
+/// Whether the rims of a lens clip.
+#[derive(Clone, Copy, PartialEq)]
+enum Rims {
+    Open,
+    Clip,
+}
+
+/// The wavelengths of a lens file.
+#[derive(Clone, Copy, PartialEq)]
+enum Colors {
+    Primary,
+    All,
+}
+
+fn rims_of(exact: &Value) -> Rims {
+    if exact["pupil"] == "clip" { Rims::Clip } else { Rims::Open }
 }
 
 /// A folder with a catalogue of glasses, gone when the test ends.
@@ -53,7 +72,7 @@ impl LensFolder {
         let mut catalogue = "CC glasses through the indices of a file\n".to_owned();
         for (i, row) in list(&data["surfaces"]).iter().enumerate() {
             let [a, b, c] = schott(&um, &numbers(&row["n"]));
-            catalogue += &format!("NM G{i} 1 0 - -\nCD {a:e} {b:e} {c:e}\nLD 0.3 1.0\n");
+            writeln!(catalogue, "NM G{i} 1 0 - -\nCD {a:e} {b:e} {c:e}\nLD 0.3 1.0").unwrap();
         }
         std::fs::write(path.join("IMAGES.agf"), catalogue).unwrap();
         Self { path, data: data.clone() }
@@ -61,7 +80,8 @@ impl LensFolder {
 
     /// A lens file for some fields: over the unit disc without rims, or limited by rims alone; with the
     /// primary wavelength by its index, or with all of them.
-    fn lens(&self, clipped: bool, fields: &Value, all_colors: bool) -> String {
+    fn lens(&self, rims: Rims, fields: &Value, colors: Colors) -> String {
+        let (clipped, all_colors) = (rims == Rims::Clip, colors == Colors::All);
         let primary = count(&self.data["primary"]);
         let stop = count(&self.data["stop_surface"]);
         let rows = list(&self.data["surfaces"]);
@@ -126,7 +146,7 @@ impl LensFolder {
     fn fields(&self) -> impl Iterator<Item = (&Value, String)> + '_ {
         list(&self.data["fields"]).iter().map(|field| {
             let place = json!([{"y": field["field_deg"]}]);
-            (field, self.lens(field["pupil"] == "clip", &place, false))
+            (field, self.lens(rims_of(field), &place, Colors::Primary))
         })
     }
 
@@ -156,8 +176,11 @@ fn paths_and_chief_rays() {
     let mut compared = 0;
     for folder in folders("paths") {
         let mut worst = Worst::default();
-        let info =
-            folder.run(&["info", &folder.lens(false, &json!([{"y": 1.0}]), false), "--json"]);
+        let info = folder.run(&[
+            "info",
+            &folder.lens(Rims::Open, &json!([{"y": 1.0}]), Colors::Primary),
+            "--json",
+        ]);
         let first = &folder.data["first_order"];
         for (found, key) in [
             (&info["efl"], "efl"),
@@ -170,7 +193,8 @@ fn paths_and_chief_rays() {
         }
         for (exact, _) in folder.fields() {
             // No rim clips the rays of the table.
-            let open = folder.lens(false, &json!([{"y": exact["field_deg"]}]), false);
+            let open =
+                folder.lens(Rims::Open, &json!([{"y": exact["field_deg"]}]), Colors::Primary);
             let rays = list(&exact["opd"]);
             let mut asked = vec![paraxial()];
             asked.extend(rays.iter().map(|ray| format!("--pupil={},{}", ray["px"], ray["py"])));
@@ -217,7 +241,12 @@ fn wavefronts_point_spreads_and_zernike_sums() {
             }
             let spot = folder.analyze(&lens, "spot", &[paraxial()])[0].clone();
             let (area, known) = (&spot["colors"][0]["lit_area"], &exact["lit_area"]);
-            worst.note(number(area), number(&known["value"]), allowed(&known["err"]), "lit area");
+            worst.note(
+                number(&area["value"]),
+                number(&known["value"]),
+                allowed(&known["err"]),
+                "lit area",
+            );
             let points = list(&exact["psf"]);
             let mut asked = vec![paraxial()];
             asked.extend(points.iter().map(|p| format!("--at={},{}", p["x"], p["y"])));
@@ -299,7 +328,7 @@ fn contrast_of_all_wavelengths() {
         let mut worst = Worst::default();
         for exact in list(&folder.data["fields"]).iter().filter(|exact| !exact["poly"].is_null()) {
             let place = json!([{"y": exact["field_deg"]}]);
-            let lens = folder.lens(exact["pupil"] == "clip", &place, true);
+            let lens = folder.lens(rims_of(exact), &place, Colors::All);
             let exact = &exact["poly"]["mtf"];
             let found = folder.analyze(&lens, "mtf", &[paraxial(), frequencies(exact)])[0].clone();
             let curves = [&found["polychromatic_diffraction"], &found["polychromatic_geometric"]];
@@ -328,7 +357,7 @@ fn distortion_of_every_colour_and_both_pupils() {
             })
             .collect();
         // Rims have no say.
-        let lens = folder.lens(false, &json!(fields), true);
+        let lens = folder.lens(Rims::Open, &json!(fields), Colors::All);
         for (aiming, key) in [("off", "paraxial_pupil"), ("on", "stop_centre")] {
             let aiming = format!("--effects=aiming={aiming}");
             let found = folder.analyze(&lens, "lateral-color", &[aiming]);
@@ -367,7 +396,8 @@ fn irradiance_of_white_cards_and_of_waves() {
     for folder in folders("light") {
         let mut worst = Worst::default();
         for exact in list(&folder.data["irradiance"]) {
-            let lens = folder.lens(true, &json!([{"y": exact["field_deg"]}]), false);
+            let lens =
+                folder.lens(Rims::Clip, &json!([{"y": exact["field_deg"]}]), Colors::Primary);
             let at = format!("--at=0,{}", number(&exact["image_y"]));
             let found = folder.analyze(&lens, "illumination", &[paraxial(), at])[0].clone();
             let place = exact["field_deg"].to_string();
@@ -388,7 +418,7 @@ fn irradiance_of_white_cards_and_of_waves() {
             worst.note(number(&found["point"][1]), number(&exact["centroid_y"]), 1e-9, &place);
         }
         if scene["lens"] == folder.data["id"] {
-            let lens = folder.lens(true, &json!([{"y": 0.0}]), false);
+            let lens = folder.lens(Rims::Clip, &json!([{"y": 0.0}]), Colors::Primary);
             for point in list(&scene["points"]) {
                 list(&point["scenes"]).iter().for_each(|wave| {
                     let value = light_of_wave(&folder, &lens, point, wave);
