@@ -64,7 +64,7 @@ impl<'a> QuickRenderer<'a> {
         Ok(Self { scene, frame, colors, table, paintings, white: exact.white(), overshoot })
     }
 
-    /// The picture, without errors of its pixels; see [`quick_error`].
+    /// The picture, without errors of its pixels.
     pub fn render(&self) -> Picture {
         let [columns, rows] = self.frame.pixels;
         let mut values = vec![[0.0; 3]; columns * rows];
