@@ -44,10 +44,7 @@ impl SpecificationPanel {
         let design = &view.specified_design;
         let completed = self.form.complete();
         self.buttons(ui, design, &completed, actions);
-        if let Err(why) = &completed {
-            let why = capitalize(&why.to_string());
-            ui.colored_label(ui.visuals().warn_fg_color, why);
-        }
+        summary(ui, &completed);
         unfinished(ui, design, actions);
         if let Some(why) = &design.run.error {
             ui.colored_label(ui.visuals().error_fg_color, capitalize(why));
@@ -100,6 +97,16 @@ impl SpecificationPanel {
             Some(_) => drop(ui.weak("Stopped before there was a lens.")),
         }
     }
+}
+
+/// What is asked for in one line, or why no lens is designed to it. There is always one label: a number
+/// that is being typed keeps the cursor while it is refused for a moment.
+fn summary(ui: &mut Ui, completed: &Completed) {
+    let (summary, color) = match completed {
+        Ok((asked, _)) => (text::summary_text(asked), ui.visuals().weak_text_color()),
+        Err(why) => (capitalize(&why.to_string()), ui.visuals().warn_fg_color),
+    };
+    ui.colored_label(color, summary);
 }
 
 fn run_buttons(design: &SpecifiedDesignView) -> [ActionButton<'static>; 3] {

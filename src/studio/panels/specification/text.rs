@@ -1,7 +1,9 @@
 //! The words of the panel.
 
 use crate::lens::SurfaceNumber;
-use crate::search::design::{DesignMerit, DesignStage, FilledValue, LensJudgement, LimitCost};
+use crate::search::design::{
+    DesignMerit, DesignStage, FilledValue, LensJudgement, LensRequirements, LimitCost,
+};
 use crate::session::SpecifiedDesign;
 use crate::studio::number::format_digits;
 
@@ -25,11 +27,28 @@ pub(super) fn other_filled(filled: &[FilledValue], rows: [&str; 5], counts: [&st
     let has_row = |key: &str| rows.contains(&key) || counts.contains(&key);
     let others = filled.iter().filter(|value| !has_row(value.key));
     let texts: Vec<String> = others
-        .map(|FilledValue { key, value, .. }| {
-            format!("{} {}", key.replace('_', " "), scaled(value, 1.0))
-        })
+        .map(|FilledValue { key, value, .. }| format!("{} {}", key_text(key), scaled(value, 1.0)))
         .collect();
     if texts.is_empty() { String::new() } else { format!("Also taken: {}", texts.join("; ")) }
+}
+
+/// A key of the specification in words, with its unit.
+fn key_text(key: &str) -> String {
+    let units = [("_deg", " in °"), ("_um", " in µm"), ("_mm2", " in mm²"), ("_mm", " in mm")];
+    let unit = units.into_iter().find(|(ending, _)| key.ends_with(ending));
+    let (ending, unit) = unit.unwrap_or_default();
+    let name =
+        key.strip_suffix(ending).unwrap_or(key).replace("min_", "least ").replace("max_", "most ");
+    format!("{}{unit}:", name.replace('_', " "))
+}
+
+/// What is asked for in one line.
+pub(super) fn summary_text(asked: &LensRequirements) -> String {
+    let LensRequirements { focal_length, f_number, elements, .. } = asked;
+    let [focal_length, f_number, half] =
+        [*focal_length, *f_number, asked.half_field()].map(|value| format_digits(value, 4));
+    let elements = if *elements == 1 { "1 element" } else { &format!("{elements} elements") };
+    format!("{focal_length} mm, f/{f_number}, {half}° from the axis, at most {elements}")
 }
 
 /// The stage of a design.
@@ -104,6 +123,18 @@ pub(super) fn cost_text(cost: &LimitCost) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn keys_are_words_with_their_units() {
+        for (key, words) in [
+            ("fields_deg", "fields in °:"),
+            ("min_clear_area_mm2", "least clear area in mm²:"),
+            ("min_edge_mm", "least edge in mm:"),
+            ("wavelength_weights", "wavelength weights:"),
+        ] {
+            assert_eq!(key_text(key), words);
+        }
+    }
 
     #[test]
     fn a_value_that_is_taken_is_shown_in_the_unit_of_its_row() {
