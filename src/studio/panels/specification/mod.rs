@@ -99,7 +99,7 @@ impl SpecificationPanel {
     }
 }
 
-/// What is asked for in one line, or why no lens is designed to it. There is always one label: a number
+/// The specification in one line, or the reason why no lens is designed to it. There is always one label: a number
 /// that is being typed keeps the cursor while it is refused for a moment.
 fn summary(ui: &mut Ui, completed: &Completed) {
     let (summary, color) = match completed {

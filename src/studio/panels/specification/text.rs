@@ -42,7 +42,7 @@ fn key_text(key: &str) -> String {
     format!("{}{unit}:", name.replace('_', " "))
 }
 
-/// What is asked for in one line.
+/// The specification in one line.
 pub(super) fn summary_text(asked: &LensRequirements) -> String {
     let LensRequirements { focal_length, f_number, elements, .. } = asked;
     let [focal_length, f_number, half] =
