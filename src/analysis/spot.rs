@@ -14,7 +14,7 @@ pub struct MonochromaticSpot {
     pub rms: Estimate,
     /// The centroid, in mm.
     pub centroid: [Estimate; 2],
-    /// The area of the pupil that is lit, in pupil coordinates: π if nothing is clipped.
+    /// The light as an area of the unit disc of the paraxial entrance pupil: π where the rays fill it.
     pub area: Estimate,
     /// The same area in mm² of the plane through the first vertex: the light of the spot.
     pub light: Estimate,
@@ -238,15 +238,16 @@ fn monochromatic_spot(region: &Region<'_>, accuracy: Accuracy) -> Option<Monochr
         Estimate::new(found.values[k], found.errors[k].max(least) + neglected, found.rays)
     };
     let rms = estimate(0, rounding, neglected.shift);
-    let area = estimate(3, f64::EPSILON, neglected.light * found.values[3]);
-    let scale = region.launch.area();
+    let lit = estimate(3, f64::EPSILON, neglected.light * found.values[3]);
+    let scaled = |scale: f64| Estimate::new(scale * lit.value, scale * lit.error, lit.rays);
+    let (unit, paraxial_unit) = (region.launch.area(), region.launch.paraxial_area());
     let reached = neglected.light <= accuracy.tolerance
         && neglected.shift <= (accuracy.tolerance * rms.value).max(rounding);
     Some(MonochromaticSpot {
         rms,
         centroid: [1, 2].map(|k| estimate(k, rounding, neglected.shift)),
-        area,
-        light: Estimate::new(scale * area.value, scale * area.error, area.rays),
+        area: scaled(unit / paraxial_unit),
+        light: scaled(unit),
         slopes: ArrivalSlopes {
             variance: found.values[4],
             covariance: found.values[5],

@@ -265,9 +265,9 @@ impl RaySampling {
         let asked = self.demand.wavefront;
         let reference = asked.then(|| ReferenceForm::of_region(&region).ok()).flatten();
         let accuracy = Accuracy { tolerance, ..Accuracy::default() };
-        let mut orders = 0_usize;
+        let mut count = 0_usize;
         let numbers = |nodes: &Nodes| {
-            orders += 1;
+            count += 1;
             self.demand.numbers(&region, nodes, reference)
         };
         let found = converge_list(&region, accuracy, numbers, |list| self.demand.scales(list));
@@ -283,8 +283,10 @@ impl RaySampling {
             }
         }
         self.transfer_error = self.transfer_error.max(transfer_error);
+        // The change to the last order is the error of the one before, which is enough if it is small.
+        let back = if found.is_some_and(|found| found.converged) { 2 } else { 1 };
+        let order = region.compared_orders().get(count.saturating_sub(back)).copied();
         let (kind, moments) = (region.kind, PupilMoments::default());
-        let order = orders.saturating_sub(1);
         self.pupils.push(SampledPupil {
             field,
             wavelength,
@@ -293,7 +295,7 @@ impl RaySampling {
             cosine,
             fixed_launch,
             kind,
-            order,
+            order: order.unwrap_or(0),
             reference,
             moments,
             area: 0.0,

@@ -155,7 +155,17 @@ impl<'a> Launch<'a> {
     /// integrals over a pupil. For a collimated beam that grazes that plane (a direction cosine
     /// below 0.05), the area perpendicular to the beam.
     pub fn area(&self) -> f64 {
-        let [[a, b], [c, d]] = self.map.columns;
+        self.area_of(&self.map)
+    }
+
+    /// The same for the paraxial entrance pupil, which a unit of the coordinates of an aimed beam only
+    /// resembles: where a beam fills the stop, its light is π times this but for aberrations of the pupil.
+    pub fn paraxial_area(&self) -> f64 {
+        self.area_of(&paraxial_map(self.model, &self.source))
+    }
+
+    fn area_of(&self, map: &PupilMap) -> f64 {
+        let [[a, b], [c, d]] = map.columns;
         let area = (a * d - b * c).abs();
         match self.source {
             FieldSource::Collimated { direction, .. } if direction.z > GRAZING => {

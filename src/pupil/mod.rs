@@ -42,5 +42,6 @@ pub use region::{
     Accuracy, Annulus, Boundary, BoundaryArc, ConvergedList, ConvergedValues, DarkPupil, EdgeArc,
     EdgeCurves, EdgePoint, Nodes, OutlineSide, PolarFrame, PupilLimit, PupilMoments, PupilOutline,
     PupilRadius, Region, RegionKind, TracedNodes, TracedPupil, converge, converge_list,
+    converge_resolved,
 };
 pub use stop_limited::limited_by_stop;

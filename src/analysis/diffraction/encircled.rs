@@ -25,8 +25,9 @@ pub fn encircled_energy(
 ) -> Result<Vec<Estimate>, AnalysisError> {
     let region = lit_region(model, field, wavelength)?;
     let sphere = ReferenceSphere::for_region(&region)?;
-    let found =
-        PupilSamples::converge(&region, &sphere, accuracy, |light| light.encircled(center, radii))?;
+    // Circles matter up to where light arrives, whose phases the path differences tell.
+    let encircled = |light: &PupilSamples| light.encircled(center, radii);
+    let found = PupilSamples::converge(&region, &sphere, 0.0, accuracy, encircled)?;
     let estimate = |k: usize| Estimate::new(found.values[k], found.errors[k], found.rays);
     Ok((0..radii.len()).map(estimate).collect())
 }

@@ -3,7 +3,7 @@
 use crate::analysis::AnalysisError;
 use crate::analysis::reference_sphere::ReferenceSphere;
 use crate::math::Dual;
-use crate::pupil::{Accuracy, ConvergedList, Nodes, Region, converge_list};
+use crate::pupil::{Accuracy, ConvergedList, Nodes, Region, converge_resolved};
 use crate::trace::TraceSink as _;
 use std::f64::consts::TAU;
 
@@ -29,24 +29,28 @@ pub struct PupilSamples {
 
 /// The order of quadrature of few rays.
 const FEW: usize = 2;
+/// The fewest nodes along a radius for each turn of the phase: sums over fewer are as small as those of a
+/// dark place, and agree with each other.
+const NODES_PER_TURN: f64 = 2.0;
 
 /// A complex number as its real and imaginary part.
 pub(super) type Complex = [f64; 2];
 
 impl PupilSamples {
-    /// Numbers of the light of a pupil, of so many nodes that the tolerance is kept; errors are
-    /// absolute.
+    /// Numbers of the light of a pupil at points of the image up to a distance from the centre of the
+    /// sphere, in mm, of so many nodes that the tolerance is kept; errors are absolute.
     ///
     /// # Errors
     /// The pupil is dark or folds.
     pub(super) fn converge(
         region: &Region<'_>,
         sphere: &ReferenceSphere,
+        reach: f64,
         accuracy: Accuracy,
         mut numbers: impl FnMut(&Self) -> Vec<f64>,
     ) -> Result<ConvergedList, AnalysisError> {
         // A pupil that folds does so for few rays already.
-        Self::of_nodes(region, sphere, &region.nodes(FEW))?;
+        let few = Self::of_nodes(region, sphere, &region.nodes(FEW))?;
         let mut refused = None;
         let at_nodes = |nodes: &Nodes| match Self::of_nodes(region, sphere, nodes) {
             Ok(light) => Some(numbers(&light)),
@@ -55,11 +59,34 @@ impl PupilSamples {
                 None
             }
         };
-        let found = converge_list(region, accuracy, at_nodes, |list| vec![1.0; list.len()]);
+        let least = (NODES_PER_TURN * few.turns(reach)).ceil() as usize;
+        let ones = |list: &[f64]| vec![1.0; list.len()];
+        let mut found = converge_resolved(region, accuracy, least, at_nodes, ones);
+        if let Some(found) = &mut found
+            && least > region.radial_nodes(region.orders())
+        {
+            found.converged = false;
+            for (error, value) in found.errors.iter_mut().zip(&found.values) {
+                *error = error.max(value.abs());
+            }
+        }
         match refused.filter(|why| *why != AnalysisError::NoLight) {
             Some(why) => Err(why),
             None => found.ok_or(AnalysisError::NoLight),
         }
+    }
+
+    /// The turns of the phase over a radius of the pupil, in the light towards a point of the image at a
+    /// distance from the centre of the sphere in mm: those of the path differences and those of the way.
+    fn turns(&self, reach: f64) -> f64 {
+        let range = |values: &mut dyn Iterator<Item = f64>| {
+            let ends = values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| {
+                [low.min(value), high.max(value)]
+            });
+            ends[1] - ends[0]
+        };
+        let height = range(&mut self.cosines.iter().map(|cosine| cosine[1]));
+        range(&mut self.waves.iter().copied()) + 0.5 * height * reach / self.wavelength
     }
 
     /// The light of a pupil at some nodes.

@@ -7,6 +7,7 @@ use crate::analysis::{
 use crate::cli::output::{ShortNumber, without_rounding};
 use crate::measure::time_ms;
 use crate::plot::{ChartCurve, CurveChart};
+use crate::pupil::Accuracy;
 use serde::Serialize;
 
 /// The diffraction image of a field.
@@ -32,6 +33,8 @@ struct IntensityJson {
     intensity: Estimate,
 }
 
+/// The largest number of rays of an image: a phase that turns a hundred times over the pupil takes many.
+const MOST_RAYS: usize = 1_000_000;
 /// The points of a profile on each side of its centre.
 const PROFILE: i32 = 10;
 
@@ -54,7 +57,8 @@ pub(super) fn point_spreads(run: &AnalysisRun) -> Vec<AtField<PointSpreadJson>> 
     let at = |field: &SelectedField| {
         let (model, w) = (&run.model, run.model.primary);
         let (found, ms) = time_ms(|| {
-            let spread = point_spread(model, field.traced, w, &points, run.accuracy)?;
+            let accuracy = Accuracy { max_rays: MOST_RAYS, ..run.accuracy };
+            let spread = point_spread(model, field.traced, w, &points, accuracy)?;
             Ok((spread, strehl(model, field.traced, w, run.accuracy)?))
         });
         let keys = found.map(|(spread, strehl)| PointSpreadJson {

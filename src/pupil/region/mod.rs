@@ -34,5 +34,6 @@ pub use outline::{OutlineSide, PupilOutline};
 pub use pupil_radius::PupilRadius;
 pub use quadrature::{
     Accuracy, ConvergedList, ConvergedValues, TracedNodes, converge, converge_list,
+    converge_resolved,
 };
 pub use traced_pupil::TracedPupil;

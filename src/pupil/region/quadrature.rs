@@ -63,10 +63,16 @@ const STAR_ORDERS: [(usize, usize); 15] = [
     (144, 112),
     (192, 144),
 ];
+/// The orders of these that are compared with each other. Where a spot is much aberrated, the lowest one and
+/// a next one with a single node more along the radius agree by chance while both are wrong: their change was
+/// up to 11 times below their error in spots of published lenses, that of these is never below it.
+const COMPARED_STAR_ORDERS: [usize; 13] = [1, 2, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14];
 /// The number of points of the lowest order for an irregular pupil, sampled by a low-discrepancy
 /// sequence.
 const IRREGULAR_POINTS: usize = 1024;
 const IRREGULAR_ORDERS: usize = 8;
+/// The highest order that such a pupil is begun with: the next one takes 65,536 points.
+const SAMPLED_START: usize = 2;
 
 impl Region<'_> {
     /// The number of orders of quadrature.
@@ -78,6 +84,26 @@ impl Region<'_> {
                 STAR_ORDERS.len()
             }
             RegionKind::Irregular { .. } => IRREGULAR_ORDERS,
+        }
+    }
+
+    /// The orders that [`converge`] compares with each other, ascending.
+    pub fn compared_orders(&self) -> Vec<usize> {
+        match self.kind {
+            RegionKind::StarShaped(_) | RegionKind::Irregular { annulus: Some(_), .. } => {
+                COMPARED_STAR_ORDERS.to_vec()
+            }
+            _ => (0..self.orders()).collect(),
+        }
+    }
+
+    /// The number of nodes along a radius of an order.
+    pub fn radial_nodes(&self, order: usize) -> usize {
+        match self.kind {
+            RegionKind::Clear => CLEAR_ORDERS[order.min(CLEAR_ORDERS.len() - 1)],
+            // Half of a side of the square.
+            RegionKind::Irregular { annulus: None, .. } => 16 << order.min(IRREGULAR_ORDERS - 1),
+            _ => STAR_ORDERS[order.min(STAR_ORDERS.len() - 1)].1,
         }
     }
 
@@ -280,12 +306,27 @@ pub fn converge<const K: usize>(
 pub fn converge_list(
     region: &Region<'_>,
     accuracy: Accuracy,
+    numbers: impl FnMut(&Nodes) -> Option<Vec<f64>>,
+    scales: impl Fn(&[f64]) -> Vec<f64>,
+) -> Option<ConvergedList> {
+    converge_resolved(region, accuracy, 0, numbers, scales)
+}
+
+/// The same from the first order with so many nodes along a radius that they resolve an integrand that
+/// oscillates, or from the last but one.
+pub fn converge_resolved(
+    region: &Region<'_>,
+    accuracy: Accuracy,
+    least: usize,
     mut numbers: impl FnMut(&Nodes) -> Option<Vec<f64>>,
     scales: impl Fn(&[f64]) -> Vec<f64>,
 ) -> Option<ConvergedList> {
     let mut rays = region.rays;
     let mut before: Option<ConvergedList> = None;
-    for order in 0..region.orders() {
+    let orders = region.compared_orders();
+    let coarse = orders.iter().take_while(|order| region.radial_nodes(**order) < least).count();
+    let most = if region.is_sampled() { SAMPLED_START } else { orders.len().saturating_sub(2) };
+    for &order in orders.iter().skip(coarse.min(most)) {
         let nodes = region.nodes(order);
         let cost = nodes.points.len() + nodes.rays;
         let has_error = before.as_ref().is_some_and(|b| b.errors.iter().all(|e| e.is_finite()));
