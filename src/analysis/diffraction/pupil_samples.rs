@@ -5,7 +5,7 @@ use crate::analysis::reference_sphere::ReferenceSphere;
 use crate::math::Dual;
 use crate::pupil::{Accuracy, ConvergedList, Nodes, Region, converge_resolved};
 use crate::trace::TraceSink as _;
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 
 /// The light of a pupil at some of its points.
 #[derive(Debug, Clone, Default)]
@@ -29,9 +29,9 @@ pub struct PupilSamples {
 
 /// The order of quadrature of few rays.
 const FEW: usize = 2;
-/// The fewest nodes along a radius for each turn of the phase: sums over fewer are as small as those of a
-/// dark place, and agree with each other.
-const NODES_PER_TURN: f64 = 2.0;
+/// The nodes along a radius for each turn of the phase from which on Gauss rules converge: sums over fewer are
+/// as small as those of a dark place, and agree with each other.
+const NODES_PER_TURN: f64 = PI;
 
 /// A complex number as its real and imaginary part.
 pub(super) type Complex = [f64; 2];
