@@ -198,6 +198,9 @@ impl SampledPupil {
     }
 }
 
+/// The orders that are compared at least: two agreements.
+const EARLIEST: usize = 3;
+
 impl RaySampling {
     /// Finds the pupils of a lens, each sampled so that the radius of its spot is accurate to a
     /// relative tolerance. A lens without any light is an error unless `dark_too`.
@@ -283,8 +286,10 @@ impl RaySampling {
             }
         }
         self.transfer_error = self.transfer_error.max(transfer_error);
-        // The change to the last order is the error of the one before, which is enough if it is small.
-        let back = if found.is_some_and(|found| found.converged) { 2 } else { 1 };
+        // The change to an order is the error of the one before: that is enough where the first order
+        // that may end the comparison does.
+        let is_first = count == EARLIEST && found.is_some_and(|found| found.converged);
+        let back = if is_first { 2 } else { 1 };
         let order = region.compared_orders().get(count.saturating_sub(back)).copied();
         let (kind, moments) = (region.kind, PupilMoments::default());
         self.pupils.push(SampledPupil {
