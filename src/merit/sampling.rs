@@ -200,6 +200,8 @@ impl SampledPupil {
 
 /// The orders that are compared at least: two agreements.
 const EARLIEST: usize = 3;
+/// The tolerance of an optimization, down to which rays are spared.
+const LOOSE: f64 = 1e-5;
 
 impl RaySampling {
     /// Finds the pupils of a lens, each sampled so that the radius of its spot is accurate to a
@@ -289,7 +291,7 @@ impl RaySampling {
         // The change to an order is the error of the one before: that is enough where the first order
         // that may end the comparison does.
         let is_first = count == EARLIEST && found.is_some_and(|found| found.converged);
-        let back = if is_first { 2 } else { 1 };
+        let back = if is_first && tolerance >= LOOSE { 2 } else { 1 };
         let order = region.compared_orders().get(count.saturating_sub(back)).copied();
         let (kind, moments) = (region.kind, PupilMoments::default());
         self.pupils.push(SampledPupil {

@@ -90,9 +90,7 @@ impl Region<'_> {
     /// The orders that [`converge`] compares with each other, ascending.
     pub fn compared_orders(&self) -> Vec<usize> {
         match self.kind {
-            RegionKind::StarShaped(_) | RegionKind::Irregular { annulus: Some(_), .. } => {
-                COMPARED_STAR_ORDERS.to_vec()
-            }
+            RegionKind::StarShaped(_) => COMPARED_STAR_ORDERS.to_vec(),
             _ => (0..self.orders()).collect(),
         }
     }
