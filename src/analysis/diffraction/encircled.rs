@@ -25,9 +25,8 @@ pub fn encircled_energy(
 ) -> Result<Vec<Estimate>, AnalysisError> {
     let region = lit_region(model, field, wavelength)?;
     let sphere = ReferenceSphere::for_region(&region)?;
-    // Circles matter up to where light arrives, whose phases the path differences tell.
     let encircled = |light: &PupilSamples| light.encircled(center, radii);
-    let found = PupilSamples::converge(&region, &sphere, 0.0, accuracy, encircled)?;
+    let found = PupilSamples::converge(&region, &sphere, None, accuracy, encircled)?;
     let estimate = |k: usize| Estimate::new(found.values[k], found.errors[k], found.rays);
     Ok((0..radii.len()).map(estimate).collect())
 }

@@ -36,7 +36,7 @@ pub fn point_spread(
     let region = lit_region(model, field, wavelength)?;
     let sphere = ReferenceSphere::for_region(&region)?;
     let reach = points.iter().map(|[x, y]| x.hypot(*y)).fold(0.0, f64::max);
-    let found = PupilSamples::converge(&region, &sphere, reach, accuracy, |light| {
+    let found = PupilSamples::converge(&region, &sphere, Some(reach), accuracy, |light| {
         let all = std::iter::once([0.0; 2]).chain(points.iter().copied());
         all.map(|point| light.intensity(point)).collect()
     })?;

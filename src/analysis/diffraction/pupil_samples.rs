@@ -37,15 +37,16 @@ const NODES_PER_TURN: f64 = PI;
 pub(super) type Complex = [f64; 2];
 
 impl PupilSamples {
-    /// Numbers of the light of a pupil at points of the image up to a distance from the centre of the
-    /// sphere, in mm, of so many nodes that the tolerance is kept; errors are absolute.
+    /// Numbers of the light of a pupil, of so many nodes that the tolerance is kept; errors are absolute.
+    /// With the largest distance in mm from the centre of the sphere of the points that they belong to, the
+    /// first order resolves the phase of the light there.
     ///
     /// # Errors
     /// The pupil is dark or folds.
     pub(super) fn converge(
         region: &Region<'_>,
         sphere: &ReferenceSphere,
-        reach: f64,
+        reach: Option<f64>,
         accuracy: Accuracy,
         mut numbers: impl FnMut(&Self) -> Vec<f64>,
     ) -> Result<ConvergedList, AnalysisError> {
@@ -59,7 +60,8 @@ impl PupilSamples {
                 None
             }
         };
-        let least = (NODES_PER_TURN * few.turns(reach)).ceil() as usize;
+        let turns = reach.map_or(0.0, |reach| few.turns(reach));
+        let least = (NODES_PER_TURN * turns).ceil() as usize;
         let ones = |list: &[f64]| vec![1.0; list.len()];
         let mut found = converge_resolved(region, accuracy, least, at_nodes, ones);
         if let Some(found) = &mut found

@@ -37,7 +37,7 @@ pub fn strehl(
     let region = lit_region(model, field, wavelength)?;
     let sphere = ReferenceSphere::for_region(&region)?;
     let mut best_at = [0.0; 3];
-    let found = PupilSamples::converge(&region, &sphere, 0.0, accuracy, |light| {
+    let found = PupilSamples::converge(&region, &sphere, None, accuracy, |light| {
         best_at = brightest(light);
         vec![light.intensity([0.0; 2]), light.intensity_at(best_at)]
     })?;
