@@ -5,7 +5,7 @@ use crate::analysis::{ReferenceForm, brightest_strehl, rms_without_tilt, transfe
 use crate::lens::{FieldPoint, Lens, TermScope, TermSelection};
 use crate::pupil::{
     Accuracy, Aiming, FixedLaunch, Launch, Nodes, PupilMoments, RayModel, Region, RegionKind,
-    TracedPupil, converge_list,
+    TracedPupil, converge_every_order,
 };
 use crate::trace::{Ray, Rays};
 use rayon::prelude::*;
@@ -198,11 +198,6 @@ impl SampledPupil {
     }
 }
 
-/// The orders that are compared at least: two agreements.
-const EARLIEST: usize = 3;
-/// The tolerance of an optimization, down to which rays are spared.
-const LOOSE: f64 = 1e-5;
-
 impl RaySampling {
     /// Finds the pupils of a lens, each sampled so that the radius of its spot is accurate to a
     /// relative tolerance. A lens without any light is an error unless `dark_too`.
@@ -270,12 +265,13 @@ impl RaySampling {
         let asked = self.demand.wavefront;
         let reference = asked.then(|| ReferenceForm::of_region(&region).ok()).flatten();
         let accuracy = Accuracy { tolerance, ..Accuracy::default() };
-        let mut count = 0_usize;
+        let mut orders = 0_usize;
         let numbers = |nodes: &Nodes| {
-            count += 1;
+            orders += 1;
             self.demand.numbers(&region, nodes, reference)
         };
-        let found = converge_list(&region, accuracy, numbers, |list| self.demand.scales(list));
+        let found =
+            converge_every_order(&region, accuracy, numbers, |list| self.demand.scales(list));
         let relative = if reference.is_some() { 2 } else { 1 };
         let [mut error, mut transfer_error] = [0.0f64; 2];
         for (i, (value, change)) in
@@ -288,12 +284,8 @@ impl RaySampling {
             }
         }
         self.transfer_error = self.transfer_error.max(transfer_error);
-        // The change to an order is the error of the one before: that is enough where the first order
-        // that may end the comparison does.
-        let is_first = count == EARLIEST && found.is_some_and(|found| found.converged);
-        let back = if is_first && tolerance >= LOOSE { 2 } else { 1 };
-        let order = region.compared_orders().get(count.saturating_sub(back)).copied();
         let (kind, moments) = (region.kind, PupilMoments::default());
+        let order = orders.saturating_sub(1);
         self.pupils.push(SampledPupil {
             field,
             wavelength,
@@ -302,7 +294,7 @@ impl RaySampling {
             cosine,
             fixed_launch,
             kind,
-            order: order.unwrap_or(0),
+            order,
             reference,
             moments,
             area: 0.0,

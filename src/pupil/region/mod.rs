@@ -33,7 +33,7 @@ pub use nodes::Nodes;
 pub use outline::{OutlineSide, PupilOutline};
 pub use pupil_radius::PupilRadius;
 pub use quadrature::{
-    Accuracy, ConvergedList, ConvergedValues, TracedNodes, converge, converge_list,
-    converge_resolved,
+    Accuracy, ConvergedList, ConvergedValues, TracedNodes, converge, converge_every_order,
+    converge_list, converge_resolved,
 };
 pub use traced_pupil::TracedPupil;

@@ -88,7 +88,7 @@ impl Region<'_> {
     }
 
     /// The orders that [`converge`] compares with each other, ascending.
-    pub fn compared_orders(&self) -> Vec<usize> {
+    fn compared_orders(&self) -> Vec<usize> {
         match self.kind {
             RegionKind::StarShaped(_) => COMPARED_STAR_ORDERS.to_vec(),
             _ => (0..self.orders()).collect(),
@@ -316,15 +316,37 @@ pub fn converge_resolved(
     region: &Region<'_>,
     accuracy: Accuracy,
     least: usize,
+    numbers: impl FnMut(&Nodes) -> Option<Vec<f64>>,
+    scales: impl Fn(&[f64]) -> Vec<f64>,
+) -> Option<ConvergedList> {
+    let orders = region.compared_orders();
+    let coarse = orders.iter().take_while(|order| region.radial_nodes(**order) < least).count();
+    let most = if region.is_sampled() { SAMPLED_START } else { orders.len().saturating_sub(2) };
+    converge_orders(region, accuracy, &orders[coarse.min(most)..], numbers, scales)
+}
+
+/// The same with every order in turn, of which the numbers and their derivatives need the last: from the
+/// coarse ones on, whose changes leave a larger part in the errors of those that follow.
+pub fn converge_every_order(
+    region: &Region<'_>,
+    accuracy: Accuracy,
+    numbers: impl FnMut(&Nodes) -> Option<Vec<f64>>,
+    scales: impl Fn(&[f64]) -> Vec<f64>,
+) -> Option<ConvergedList> {
+    let orders: Vec<usize> = (0..region.orders()).collect();
+    converge_orders(region, accuracy, &orders, numbers, scales)
+}
+
+fn converge_orders(
+    region: &Region<'_>,
+    accuracy: Accuracy,
+    orders: &[usize],
     mut numbers: impl FnMut(&Nodes) -> Option<Vec<f64>>,
     scales: impl Fn(&[f64]) -> Vec<f64>,
 ) -> Option<ConvergedList> {
     let mut rays = region.rays;
     let mut before: Option<ConvergedList> = None;
-    let orders = region.compared_orders();
-    let coarse = orders.iter().take_while(|order| region.radial_nodes(**order) < least).count();
-    let most = if region.is_sampled() { SAMPLED_START } else { orders.len().saturating_sub(2) };
-    for &order in orders.iter().skip(coarse.min(most)) {
+    for &order in orders {
         let nodes = region.nodes(order);
         let cost = nodes.points.len() + nodes.rays;
         let has_error = before.as_ref().is_some_and(|b| b.errors.iter().all(|e| e.is_finite()));
