@@ -20,10 +20,6 @@ pub const SEARCH_CHECKPOINT: CheckpointFormat =
 const LOSS_ROUNDING: f64 = 1e-6;
 /// The relative difference of two numbers of a search up to which they are the same.
 const NUMBER_ROUNDING: f64 = 1e-12;
-/// The same for light, which is integrated over the rays of the start: another version may take others.
-const LIGHT_ROUNDING: f64 = 1e-6;
-/// The field of [`Landscape::fingerprint`] that holds it.
-const LIGHT: &str = "light";
 /// The field of [`Landscape::fingerprint`] that holds the start of the search, if there is one.
 const START: &str = "start";
 /// The maximum number of characters of a value in a message.
@@ -204,16 +200,6 @@ fn fixed_settings(settings: &SearchSettings) -> Result<Value, SearchError> {
 /// The first difference of two values: its path and both values. Scalars are compared before arrays
 /// and objects, since they give shorter messages.
 fn first_difference(name: &str, a: &Value, b: &Value) -> Option<(String, String, String)> {
-    first_difference_beyond(NUMBER_ROUNDING, name, a, b)
-}
-
-/// The same for numbers that may differ by a part of them.
-fn first_difference_beyond(
-    rounding: f64,
-    name: &str,
-    a: &Value,
-    b: &Value,
-) -> Option<(String, String, String)> {
     match (a, b) {
         (Value::Object(a), Value::Object(b)) => {
             let keys: BTreeSet<&String> = a.keys().chain(b.keys()).collect();
@@ -224,28 +210,23 @@ fn first_difference_beyond(
             let (nested, plain): (Vec<_>, Vec<_>) =
                 pairs.partition(|(_, a, b)| is_nested(a) || is_nested(b));
             let mut all = plain.into_iter().chain(nested);
-            all.find_map(|(key, a, b)| {
-                let rounding = if key == LIGHT { LIGHT_ROUNDING } else { rounding };
-                first_difference_beyond(rounding, &format!("{name}.{key}"), &a, &b)
-            })
+            all.find_map(|(key, a, b)| first_difference(&format!("{name}.{key}"), &a, &b))
         }
         (Value::Array(a), Value::Array(b)) if a.len() == b.len() => {
             let mut pairs = a.iter().zip(b).enumerate();
-            pairs.find_map(|(i, (a, b))| {
-                first_difference_beyond(rounding, &format!("{name}[{i}]"), a, b)
-            })
+            pairs.find_map(|(i, (a, b))| first_difference(&format!("{name}[{i}]"), a, b))
         }
-        _ => (!is_same_scalar(rounding, a, b))
-            .then(|| (name.to_owned(), abbreviate(a), abbreviate(b))),
+        _ => (!is_same_scalar(a, b)).then(|| (name.to_owned(), abbreviate(a), abbreviate(b))),
     }
 }
 
-/// True for equal values, and for numbers that differ by a part of them at most: some are computed from the start,
+/// True for equal values, and for numbers that differ by rounding: some are computed from the start,
 /// and another build may round them otherwise.
-fn is_same_scalar(rounding: f64, a: &Value, b: &Value) -> bool {
+fn is_same_scalar(a: &Value, b: &Value) -> bool {
     let (Value::Number(x), Value::Number(y)) = (a, b) else { return a == b };
     let (Some(p), Some(q)) = (x.as_f64(), y.as_f64()) else { return a == b };
-    let rounded = x.is_f64() && y.is_f64() && (p - q).abs() <= rounding * p.abs().max(q.abs());
+    let rounded =
+        x.is_f64() && y.is_f64() && (p - q).abs() <= NUMBER_ROUNDING * p.abs().max(q.abs());
     rounded || a == b
 }
 

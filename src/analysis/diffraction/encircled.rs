@@ -115,12 +115,7 @@ impl PupilSamples {
     pub fn encircled(&self, center: [f64; 2], radii: &[f64]) -> Vec<f64> {
         // ∫ |U|² dx dy over the whole plane is λ² ∫ A² dα dβ (Parseval).
         let total = self.wavelength.powi(2) * self.energy();
-        let widest = self.cosines.iter().map(|[a, b]| a.hypot(*b)).fold(0.0, f64::max);
-        let middle = self.cosines.iter().fold([0.0; 2], |s, c| [s[0] + c[0], s[1] + c[1]]);
-        let middle = middle.map(|sum| sum / self.cosines.len() as f64);
-        let reach = |c: &[f64; 2]| (c[0] - middle[0]).hypot(c[1] - middle[1]);
-        let spread = if self.mirrored { widest } else { 0.0 }
-            .max(self.cosines.iter().map(reach).fold(0.0, f64::max));
+        let spread = self.spread();
         let (mut sum, mut from) = (0.0, 0.0);
         let share = |radius: &f64| {
             let fringes = 2.0 * spread * (radius - from) / self.wavelength;

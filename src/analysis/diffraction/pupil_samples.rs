@@ -63,15 +63,7 @@ impl PupilSamples {
         let turns = reach.map_or(0.0, |reach| few.turns(reach));
         let least = (NODES_PER_TURN * turns).ceil() as usize;
         let ones = |list: &[f64]| vec![1.0; list.len()];
-        let mut found = converge_resolved(region, accuracy, least, at_nodes, ones);
-        if let Some(found) = &mut found
-            && least > region.radial_nodes(region.orders())
-        {
-            found.converged = false;
-            for (error, value) in found.errors.iter_mut().zip(&found.values) {
-                *error = error.max(value.abs());
-            }
-        }
+        let found = converge_resolved(region, accuracy, least, at_nodes, ones);
         match refused.filter(|why| *why != AnalysisError::NoLight) {
             Some(why) => Err(why),
             None => found.ok_or(AnalysisError::NoLight),
@@ -81,14 +73,19 @@ impl PupilSamples {
     /// The turns of the phase over a radius of the pupil, in the light towards a point of the image at a
     /// distance from the centre of the sphere in mm: those of the path differences and those of the way.
     fn turns(&self, reach: f64) -> f64 {
-        let range = |values: &mut dyn Iterator<Item = f64>| {
-            let ends = values.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], value| {
-                [low.min(value), high.max(value)]
-            });
-            ends[1] - ends[0]
-        };
-        let height = range(&mut self.cosines.iter().map(|cosine| cosine[1]));
-        range(&mut self.waves.iter().copied()) + 0.5 * height * reach / self.wavelength
+        let most = self.waves.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        let least = self.waves.iter().copied().fold(f64::INFINITY, f64::min);
+        most - least + self.spread() * reach / self.wavelength
+    }
+
+    /// The radius of the pupil about its middle, in direction cosines.
+    pub(super) fn spread(&self) -> f64 {
+        let widest = self.cosines.iter().map(|[a, b]| a.hypot(*b)).fold(0.0, f64::max);
+        let middle = self.cosines.iter().fold([0.0; 2], |s, c| [s[0] + c[0], s[1] + c[1]]);
+        let middle = middle.map(|sum| sum / self.cosines.len() as f64);
+        let reach = |c: &[f64; 2]| (c[0] - middle[0]).hypot(c[1] - middle[1]);
+        if self.mirrored { widest } else { 0.0 }
+            .max(self.cosines.iter().map(reach).fold(0.0, f64::max))
     }
 
     /// The light of a pupil at some nodes.

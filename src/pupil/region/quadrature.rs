@@ -96,7 +96,7 @@ impl Region<'_> {
     }
 
     /// The number of nodes along a radius of an order.
-    pub fn radial_nodes(&self, order: usize) -> usize {
+    fn radial_nodes(&self, order: usize) -> usize {
         match self.kind {
             RegionKind::Clear => CLEAR_ORDERS[order.min(CLEAR_ORDERS.len() - 1)],
             // Half of a side of the square.
@@ -310,8 +310,8 @@ pub fn converge_list(
     converge_resolved(region, accuracy, 0, numbers, scales)
 }
 
-/// The same from the first order with so many nodes along a radius that they resolve an integrand that
-/// oscillates, or from the last but one.
+/// The same for an integrand that oscillates, from the first order with so many nodes along a radius that they
+/// resolve it. Where none has so many, the numbers themselves are errors, and do not converge.
 pub fn converge_resolved(
     region: &Region<'_>,
     accuracy: Accuracy,
@@ -322,7 +322,7 @@ pub fn converge_resolved(
     let orders = region.compared_orders();
     let coarse = orders.iter().take_while(|order| region.radial_nodes(**order) < least).count();
     let most = if region.is_sampled() { SAMPLED_START } else { orders.len().saturating_sub(2) };
-    converge_orders(region, accuracy, &orders[coarse.min(most)..], numbers, scales)
+    converge_orders(region, accuracy, &orders[coarse.min(most)..], least, numbers, scales)
 }
 
 /// The same with every order in turn, of which the numbers and their derivatives need the last: from the
@@ -334,35 +334,41 @@ pub fn converge_every_order(
     scales: impl Fn(&[f64]) -> Vec<f64>,
 ) -> Option<ConvergedList> {
     let orders: Vec<usize> = (0..region.orders()).collect();
-    converge_orders(region, accuracy, &orders, numbers, scales)
+    converge_orders(region, accuracy, &orders, 0, numbers, scales)
 }
 
 fn converge_orders(
     region: &Region<'_>,
     accuracy: Accuracy,
     orders: &[usize],
+    least: usize,
     mut numbers: impl FnMut(&Nodes) -> Option<Vec<f64>>,
     scales: impl Fn(&[f64]) -> Vec<f64>,
 ) -> Option<ConvergedList> {
     let mut rays = region.rays;
     let mut before: Option<ConvergedList> = None;
+    let (mut changes, needed) = (0, if region.is_sampled() { 1 } else { 2 });
     for &order in orders {
         let nodes = region.nodes(order);
         let cost = nodes.points.len() + nodes.rays;
-        let has_error = before.as_ref().is_some_and(|b| b.errors.iter().all(|e| e.is_finite()));
-        if has_error && rays + cost > accuracy.max_rays {
+        if changes >= needed && rays + cost > accuracy.max_rays {
             break;
         }
         rays += cost;
         let Some(values) = numbers(&nodes) else { continue };
-        let errors = before.map_or_else(
+        changes += usize::from(before.is_some());
+        let mut errors = before.map_or_else(
             || vec![f64::INFINITY; values.len()],
             |last| last.changes(region, &values),
         );
+        let is_resolved = region.radial_nodes(order) >= least;
+        if !is_resolved {
+            errors.iter_mut().zip(&values).for_each(|(error, v)| *error = error.max(v.abs()));
+        }
         let allowed = scales(&values).into_iter().map(|scale| accuracy.tolerance * scale.abs());
         let small = errors.iter().zip(allowed).all(|(error, allowed)| *error <= allowed);
         // A first change alone does not tell an agreement by chance.
-        let converged = small && (has_error || region.is_sampled());
+        let converged = small && is_resolved && changes >= needed;
         let now = ConvergedList { values, errors, rays, converged };
         if converged {
             return Some(now);

