@@ -152,3 +152,17 @@ pub fn lit_region(
         RegionKind::Clear | RegionKind::StarShaped(_) | RegionKind::Irregular { .. } => Ok(region),
     }
 }
+
+/// Refuses a field of which no ray gets through at any wavelength, for results that a single ray gives.
+///
+/// # Errors
+/// The reason why there is no light at the primary wavelength. A beam that nothing limits has light.
+pub fn check_light(model: &RayModel, field: FieldPoint) -> Result<(), AnalysisError> {
+    let dark = |wavelength: usize| match lit_region(model, field, wavelength) {
+        Ok(_) | Err(AnalysisError::Unbounded) => None,
+        Err(reason) => Some(reason),
+    };
+    let Some(reason) = dark(model.primary) else { return Ok(()) };
+    let mut others = (0..model.channels.len()).filter(|wavelength| *wavelength != model.primary);
+    if others.any(|wavelength| dark(wavelength).is_none()) { Ok(()) } else { Err(reason) }
+}

@@ -352,9 +352,12 @@ pub(super) fn decision_text(decision: &EffectDecision) -> String {
         EffectOverride::Off => "switched off: ",
     };
     let saving = if *computed { "without it" } else { "saves" };
+    let error =
+        if error.is_finite() { ShortNumber(*error).to_string() } else { "unknown".to_owned() };
     let numbers = match *limit {
-        0.0 => format!("{} {unit}, none is allowed", ShortNumber(*error)),
-        limit => format!("{} of {} {unit}", ShortNumber(*error), ShortNumber(limit)),
+        0.0 => format!("{error} {unit}, none is allowed"),
+        limit if limit.is_finite() => format!("{error} of {} {unit}", ShortNumber(limit)),
+        _ => format!("{error} {unit}, any is allowed"),
     };
     let time = cost.map_or_else(String::new, |cost| {
         let (share, ms, error) = (100.0 * cost.saved_share, cost.saved_ms, cost.error_ms);

@@ -21,10 +21,12 @@ use crate::picture::{
 use crate::pupil::RayModel;
 use crate::trace::Fates;
 use serde::Serialize;
+use std::env;
 use std::fmt::{self, Display};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
-use std::sync::atomic::Ordering;
+use std::process;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// A picture of a scene through the lens, by rays traced backwards, with its error
 #[derive(Debug, clap::Args)]
@@ -163,7 +165,7 @@ impl PictureArgs {
         let sensor = self.sensor_preset()?;
         let opened = self.lens.open()?;
         opened.check_zoom(self.zoom)?;
-        let (picture, ms) = time_ms(|| self.render(&opened));
+        let (picture, ms) = time_ms(|| self.render(&opened, &stop_flag()));
         let (rendered, shot) = picture?;
         let picture = rendered.picture.clone();
         let exposed = sensor.map(|preset| self.expose(preset, &picture));
@@ -173,7 +175,7 @@ impl PictureArgs {
             image
         });
         let mut failures = Failures::default();
-        failures.note(self.save(&shown, &report));
+        report.out = failures.note(self.save(&shown, &report));
         failures.note(self.save_error_map(rendered.error_map.as_ref()));
         failures.note(output.print(&report));
         failures.into_result()
@@ -205,7 +207,11 @@ impl PictureArgs {
         }
     }
 
-    fn render(&self, opened: &LoadedLens) -> Result<(RenderedPicture, CameraShot), CliError> {
+    fn render(
+        &self,
+        opened: &LoadedLens,
+        stop: &AtomicBool,
+    ) -> Result<(RenderedPicture, CameraShot), CliError> {
         let refuse = |error: PictureError| CliError::Input(format!("{}: {error}", opened.file));
         let shot = self.shot(opened).map_err(refuse)?;
         let scene = self.scene(&shot)?.map_err(refuse)?;
@@ -216,17 +222,24 @@ impl PictureArgs {
             None => Ok(renderer),
         };
         let renderer = renderer.map_err(refuse)?;
-        let quick = if self.exact { None } else { Some(quick_picture(&shot, &renderer)) };
+        let quick = if self.exact { None } else { Some(quick_picture(&shot, &renderer, stop)) };
         let quick = quick.transpose().map_err(refuse)?;
-        let is_kept = |quick: &RenderedPicture| self.quick || quick.error.value <= self.error.0;
-        let picture = quick.filter(is_kept).unwrap_or_else(|| self.exact_picture(&renderer));
-        let error_map = self
-            .error_map
-            .as_ref()
-            .map(|_| ErrorMap::measure(&renderer, &picture.picture, usize::MAX, MAPPED_SAMPLES));
+        let is_stopped = || stop.load(Ordering::Relaxed);
+        let is_kept = |quick: &RenderedPicture| {
+            self.quick || quick.error.value <= self.error.0 || is_stopped()
+        };
+        let picture = quick.filter(is_kept);
+        let picture = picture.unwrap_or_else(|| self.exact_picture(&renderer, stop));
+        if !picture.picture.complete {
+            print_note("note: stopped; what was not sampled is black");
+        }
+        let map = |picture: &Picture| {
+            ErrorMap::measure(&renderer, picture, usize::MAX, MAPPED_SAMPLES, stop)
+        };
+        let error_map = self.error_map.as_ref().map(|_| map(&picture.picture));
         let losses = renderer.losses().cloned();
         let mut picture = RenderedPicture { error_map, losses, ..picture };
-        if let Some(coating) = self.coating {
+        if let Some(coating) = self.coating.filter(|_| !is_stopped()) {
             let light = (coating, self.error.0);
             let (ghosts, ms) =
                 time_ms(|| GhostLight::new((model, bands), &scene, &picture.picture, light));
@@ -248,14 +261,14 @@ impl PictureArgs {
         Ok(write_atomic(path, &bytes)?)
     }
 
-    fn exact_picture(&self, renderer: &ExactRenderer<'_>) -> RenderedPicture {
+    fn exact_picture(&self, renderer: &ExactRenderer<'_>, stop: &AtomicBool) -> RenderedPicture {
         let settings = ExactSettings {
             tolerance: self.error.0,
             max_samples: self.max_samples,
             seed: self.seed,
             seconds: 0.0,
         };
-        let (stop, bar) = (stop_flag(), progress_bar(STEPS));
+        let bar = progress_bar(STEPS);
         let watch = |done: f64| {
             bar.set_position((STEPS as f64 * done) as u64);
             if stop.load(Ordering::Relaxed) {
@@ -266,9 +279,6 @@ impl PictureArgs {
         };
         let picture = renderer.render(&settings, &watch);
         bar.finish_and_clear();
-        if !picture.complete {
-            print_note("note: stopped; what was not sampled is black");
-        }
         let error = Estimate::new(picture.rms_error(), 0.0, 0);
         RenderedPicture::new(picture, error, "exact")
     }
@@ -396,17 +406,28 @@ impl PictureArgs {
             sensor: None,
             quick_milliseconds: error.milliseconds,
             milliseconds,
-            out: self.out.display().to_string(),
+            out: Some(self.out.display().to_string()),
         }
     }
 
-    fn save(&self, picture: &Picture, report: &PictureReport) -> Result<(), CliError> {
+    fn save(&self, picture: &Picture, report: &PictureReport) -> Result<String, CliError> {
         let depth = if self.bits == "16" { BitDepth::Sixteen } else { BitDepth::Eight };
         let data = serde_json::to_string(report).unwrap_or_default();
         let texts = [("Software", "Aplanat".to_owned()), ("Aplanat picture", data)];
         let bytes = encode_png(picture, depth, self.gamma, &texts)
             .map_err(|error| CliError::Failed(format!("{}: {error}", self.out.display())))?;
-        Ok(write_atomic(&self.out, &bytes)?)
+        write_atomic(&self.out, &bytes).inspect_err(|_| self.keep_elsewhere(&bytes))?;
+        Ok(self.out.display().to_string())
+    }
+
+    /// Saves a picture that cannot be written where it should be in the folder of temporary files, since
+    /// it cannot be printed.
+    fn keep_elsewhere(&self, bytes: &[u8]) {
+        let name = self.out.file_name().unwrap_or_default().to_string_lossy();
+        let elsewhere = env::temp_dir().join(format!("aplanat-{}-{name}", process::id()));
+        if write_atomic(&elsewhere, bytes).is_ok() {
+            print_note(format!("note: the picture is kept as {}", elsewhere.display()));
+        }
     }
 }
 
@@ -414,9 +435,10 @@ impl PictureArgs {
 fn quick_picture(
     shot: &CameraShot,
     exact: &ExactRenderer<'_>,
+    stop: &AtomicBool,
 ) -> Result<RenderedPicture, PictureError> {
     let quick = QuickRenderer::new(&shot.model, &shot.bands, exact)?;
-    let (mut picture, ms) = time_ms(|| quick.render());
+    let (mut picture, ms) = time_ms(|| quick.render(stop));
     let error = quick_error(exact, &picture, CHECKED_TILES, CHECKED_SAMPLES);
     picture.rays = error.rays;
     let error = Estimate { milliseconds: Some(ms), ..error };
@@ -480,7 +502,7 @@ struct PictureReport {
     sensor: Option<SensorReport>,
     quick_milliseconds: Option<f64>,
     milliseconds: f64,
-    out: String,
+    out: Option<String>,
 }
 
 /// The map of the error.
@@ -599,6 +621,6 @@ impl Display for PictureReport {
             writeln!(f, "left out: {effect} ({change}{reason})")?;
         }
         self.sensor.iter().try_for_each(|sensor| write!(f, "{sensor}"))?;
-        writeln!(f, "saved as {}", self.out)
+        self.out.as_ref().map_or(Ok(()), |out| writeln!(f, "saved as {out}"))
     }
 }

@@ -15,8 +15,8 @@ pub enum FileError {
         /// The error of the system.
         source: io::Error,
     },
-    /// The system cannot write the file; the previous content is unchanged.
-    #[error("{file}: cannot be written: {source}; the file is unchanged")]
+    /// The system cannot write the file; its previous content, if there was any, is unchanged.
+    #[error("{file}: cannot be written: {source}; no file was changed")]
     Unwritable {
         /// The file.
         file: String,

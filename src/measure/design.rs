@@ -69,10 +69,11 @@ pub fn measure_design(
     let watch = Stopwatch::start();
     let mut run = DesignRun::new(&asked, &settings);
     while watch.seconds() < seconds && run.advance(watch.seconds() / seconds, stop) {}
+    let designed = run.finish(stop).into_iter().next();
+    // What was broken off depends on time.
     if stop.load(Ordering::Relaxed) {
         return Ok(None);
     }
-    let designed = run.finish().into_iter().next();
     let judged = designed
         .as_ref()
         .and_then(|found| judge_lens(&found.lens, &asked, JUDGEMENT_TOLERANCE).ok());

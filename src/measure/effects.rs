@@ -8,6 +8,7 @@ use crate::effects::{
 };
 use crate::lens::Lens;
 use crate::pupil::{Accuracy, RayModelError};
+use rayon::ThreadPoolBuilder;
 
 /// The fewest pairs of measurements, with an effect and without it. Of each kind the shortest counts:
 /// whatever else the machine does only makes a run longer.
@@ -76,13 +77,19 @@ impl EffectTask<'_> {
         if computes_same(&plans) {
             return Some(EffectCost::default());
         }
+        // Threads of its own: work that waits for the shared ones is no cost of an effect.
+        let pool = ThreadPoolBuilder::new().build().ok();
+        let run = |plan: &EffectPlan| match &pool {
+            Some(pool) => pool.install(|| time_ms(|| self.compute_spots(plan)).1),
+            None => time_ms(|| self.compute_spots(plan)).1,
+        };
         let (watch, mut times) = (Stopwatch::start(), [ShortestTimes::NONE; 2]);
         for pair in 1.. {
             for (times, plan) in times.iter_mut().zip(&plans) {
                 if interrupted() {
                     return None;
                 }
-                times.add(time_ms(|| self.compute_spots(plan)).1);
+                times.add(run(plan));
             }
             let is_known = pair >= MIN_PAIRS && is_resolved(&times);
             if is_known || (pair >= MIN_PAIRS && watch.seconds() > MAX_SECONDS) {

@@ -14,6 +14,7 @@ use crate::picture::{
 use crate::pupil::RayModel;
 use serde::Serialize;
 use std::ops::ControlFlow;
+use std::sync::atomic::AtomicBool;
 
 /// The way of making a picture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -147,7 +148,7 @@ impl PreparedCamera<'_> {
     fn quick(&self, tiles: Option<usize>) -> Result<PictureRow, PictureError> {
         let (made, ms) = time_ms(|| {
             let quick = QuickRenderer::new(self.model, self.bands, self.renderer)?;
-            Ok::<_, PictureError>(quick.render())
+            Ok::<_, PictureError>(quick.render(&AtomicBool::new(false)))
         });
         let picture = made?;
         let error = tiles.map(|tiles| quick_error(self.renderer, &picture, tiles, SAMPLES).value);

@@ -9,6 +9,7 @@ use super::exact::{ExactRenderer, ExactSettings, MID_GREY, PictureTile};
 use crate::analysis::Estimate;
 use crate::plot::{Color, GREY, glow};
 use rayon::prelude::*;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// The error of a picture on some of its tiles.
 #[derive(Debug, Clone, PartialEq)]
@@ -35,9 +36,11 @@ impl ErrorMap {
         picture: &Picture,
         count: usize,
         samples: usize,
+        stop: &AtomicBool,
     ) -> Self {
         let tiles = exact.tiles();
         let chosen = spread_out(tiles.len(), count).into_par_iter();
+        let chosen = chosen.filter(|_| !stop.load(Ordering::Relaxed));
         let measured = chosen.map(|i| TileError::measure(exact, picture, &tiles[i], samples));
         Self { pixels: picture.frame.pixels, tiles: measured.collect() }
     }
@@ -135,7 +138,7 @@ pub fn quick_error(
     count: usize,
     samples: usize,
 ) -> Estimate {
-    ErrorMap::measure(exact, picture, count, samples).rms()
+    ErrorMap::measure(exact, picture, count, samples, &AtomicBool::new(false)).rms()
 }
 
 #[cfg(test)]

@@ -15,6 +15,7 @@ use super::{ColorBand, ImageFrame, Picture, PictureError};
 use crate::pupil::RayModel;
 use crate::trace::Fates;
 use rayon::prelude::*;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// The side of a texel over that of a pixel.
 const TEXEL: f64 = 0.5;
@@ -64,11 +65,13 @@ impl<'a> QuickRenderer<'a> {
         Ok(Self { scene, frame, colors, table, paintings, white: exact.white(), overshoot })
     }
 
-    /// The picture, without errors of its pixels.
-    pub fn render(&self) -> Picture {
+    /// The picture, without errors of its pixels. Once `stop` is true, the rest stays black.
+    pub fn render(&self, stop: &AtomicBool) -> Picture {
         let [columns, rows] = self.frame.pixels;
         let mut values = vec![[0.0; 3]; columns * rows];
-        values.par_chunks_mut(columns).enumerate().for_each(|(row, line)| {
+        let is_stopped = || stop.load(Ordering::Relaxed);
+        let lines = values.par_chunks_mut(columns).enumerate().filter(|_| !is_stopped());
+        lines.for_each(|(row, line)| {
             line.iter_mut().enumerate().for_each(|(i, pixel)| *pixel = self.pixel([i, row]));
         });
         Picture {
@@ -79,7 +82,7 @@ impl<'a> QuickRenderer<'a> {
             rays: 0,
             fates: Fates::default(),
             reached: true,
-            complete: true,
+            complete: !is_stopped(),
             overshoot: self.overshoot,
         }
     }

@@ -1,6 +1,7 @@
 //! The errors of reports and drawings.
 
 use super::body::BodyError;
+use crate::analysis::AnalysisError;
 use crate::paraxial::ParaxialError;
 use crate::plot::{DxfError, PdfError};
 use crate::pupil::RayModelError;
@@ -14,6 +15,9 @@ pub enum ReportError {
     /// The lens has no first-order data.
     #[error(transparent)]
     Paraxial(#[from] ParaxialError),
+    /// No light gets through at any field and zoom position.
+    #[error("{0}; expected a lens that forms an image")]
+    Dark(AnalysisError),
     /// The PDF file cannot be made.
     #[error(transparent)]
     Pdf(#[from] PdfError),

@@ -190,8 +190,7 @@ fn as_built(
     real: &[RealLens],
     request: ToleranceRequest,
 ) -> AsBuiltSpot {
-    let mut many = form_spots(form, sheet, request.seed);
-    many.sort_by(f64::total_cmp);
+    let many = sorted(form_spots(form, sheet, request.seed));
     let form_mean_rms = mean(&many);
     let which = usize::from(focus == FocusTreatment::Refocused);
     // Real lenses and the form on the same errors.
@@ -207,6 +206,8 @@ fn as_built(
     let clipped = clipping.map_or(0.0, |[change, _]| change.abs());
     let spread = mean_with_error(&many)[1];
     let corrected = form_mean_rms + difference[0];
+    let columns = [0, 1].map(|i| sorted(pairs.iter().map(|pair| pair[i]).collect()));
+    let at_share = |share: f64| quantile(share, &many, &columns);
     AsBuiltSpot {
         focus,
         nominal_rms: form.nominal.sqrt(),
@@ -217,10 +218,8 @@ fn as_built(
         difference,
         form_agrees: is_small(difference) && 2 * pairs.len() >= real.len(),
         rims_agree: clipping.is_none_or(is_small),
-        quantiles: SHARES.map(|share| quantile(share, &many, &pairs)).to_vec(),
-        distribution: (0..=STEPS)
-            .map(|i| quantile(i as f64 / STEPS as f64, &many, &pairs))
-            .collect(),
+        quantiles: SHARES.map(at_share).to_vec(),
+        distribution: (0..=STEPS).map(|i| at_share(i as f64 / STEPS as f64)).collect(),
         good: request.limit.map(|limit| good_share(limit, &many, &pairs, real.len())),
     }
 }
@@ -234,14 +233,16 @@ pub fn form_spots(form: &QuadraticForm, sheet: &ToleranceSheet, seed: u64) -> Ve
     lenses.iter().map(|errors| reduced.at_multiple(errors, 1.0).sqrt()).collect()
 }
 
-fn quantile(share: f64, many: &[f64], pairs: &[[f64; 2]]) -> Quantile {
+fn sorted(mut values: Vec<f64>) -> Vec<f64> {
+    values.sort_unstable_by(f64::total_cmp);
+    values
+}
+
+/// A quantile of lenses by the form, corrected by the real lenses and the form on the same errors, all
+/// of them sorted.
+fn quantile(share: f64, many: &[f64], [real, same]: &[Vec<f64>; 2]) -> Quantile {
     let form = at_share(many, share);
-    let of = |i: usize| {
-        let mut column: Vec<f64> = pairs.iter().map(|pair| pair[i]).collect();
-        column.sort_by(f64::total_cmp);
-        at_share(&column, share)
-    };
-    let change = if pairs.is_empty() { 0.0 } else { of(0) - of(1) };
+    let change = if real.is_empty() { 0.0 } else { at_share(real, share) - at_share(same, share) };
     Quantile { share, form, corrected: form + change }
 }
 

@@ -36,17 +36,23 @@ pub fn real_lenses(
     stop: &AtomicBool,
 ) -> Result<Vec<RealLens>, ToleranceError> {
     let columns = BeamColumns::new(&scene.beam);
-    let lens = |i: usize| real_lens(scene, sheet, (seed, i), &columns, i < with_rims);
+    let is_stopped = || stop.load(Ordering::Relaxed);
+    let lens = |i: usize| {
+        (!is_stopped()).then(|| real_lens(scene, sheet, (seed, i), &columns, i < with_rims))
+    };
     let mut lenses = Vec::new();
-    while lenses.len() < count && !stop.load(Ordering::Relaxed) {
+    while lenses.len() < count && !is_stopped() {
         let part = lenses.len()..count.min(lenses.len() + PART);
-        let part: Result<Vec<_>, _> = part.into_par_iter().map(lens).collect();
-        lenses.extend(part?);
+        let part: Vec<Option<_>> = part.into_par_iter().map(lens).collect();
+        // Of a part that was broken off, the lenses in front of the first one that is missing.
+        for traced in part.into_iter().map_while(|traced| traced) {
+            lenses.push(traced?);
+        }
     }
     Ok(lenses)
 }
 
-/// The number of lenses between two looks at the request to stop.
+/// The number of lenses that are traced in parallel before they are collected.
 const PART: usize = 128;
 
 fn real_lens(

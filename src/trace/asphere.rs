@@ -149,30 +149,26 @@ impl<R: Real, const W: usize> RayStarts<R, W> {
     }
 }
 
-/// Newton's iteration from the conic, or from the vertex plane for a ray that misses the conic. Each
-/// ray stops on its own, so that its result does not depend on the other rays.
+/// At most `STEPS` steps of Newton's iteration for the distances `s` along rays in a medium whose index
+/// has the square `n2`, by the height above a surface and its slope along the ray. Returns which rays
+/// still move: each stops on its own, so that its result does not depend on the other rays.
 #[inline(always)]
-pub(super) fn newton_crossings<R: Real, const W: usize>(
-    surface: &Interface<R>,
+pub(super) fn iterate_newton<R: Real, const W: usize, const STEPS: usize>(
     rays: &RayStarts<R, W>,
-) -> NewtonResult<R, W> {
-    let near = Interface { starts_far: false, ..*surface };
-    let mut s = [R::ZERO; W];
+    n2: R,
+    s: &mut [R; W],
+    height: impl Fn(Vec3<R>, Vec3<R>) -> (R, R),
+) -> [R; W] {
     let mut moving = [R::ONE; W];
     let tolerance = R::from_f64(R::EPSILON.powf(2.0 / 3.0));
-    for (j, s) in s.iter_mut().enumerate() {
-        let (p, k) = rays.get(j);
-        let conic = near.intersect_conic(p, k);
-        *s = R::select(conic.missed, -(p.z / k.z), conic.s);
-    }
-    for _ in 0..NEWTON_STEPS {
+    for _ in 0..STEPS {
         for j in 0..W {
             let (p, k) = rays.get(j);
-            let (f, slope) = surface.height_above(p + k * s[j], k);
+            let (f, slope) = height(p + k * s[j], k);
             let step = f / slope;
             // The next step would be smaller than the square of this one.
             let size = p.x.abs() + p.y.abs() + p.z.abs();
-            let settled = step * step * surface.n2 <= tolerance * tolerance * size * size;
+            let settled = step * step * n2 <= tolerance * tolerance * size * size;
             s[j] = R::select(moving[j] > R::ZERO, s[j] - step, s[j]);
             moving[j] = R::select(settled, R::ZERO, moving[j]);
         }
@@ -180,6 +176,25 @@ pub(super) fn newton_crossings<R: Real, const W: usize>(
             break;
         }
     }
+    moving
+}
+
+/// Newton's iteration from the conic, or from the vertex plane for a ray that misses the conic.
+#[inline(always)]
+pub(super) fn newton_crossings<R: Real, const W: usize>(
+    surface: &Interface<R>,
+    rays: &RayStarts<R, W>,
+) -> NewtonResult<R, W> {
+    let near = Interface { starts_far: false, ..*surface };
+    let mut s = [R::ZERO; W];
+    for (j, s) in s.iter_mut().enumerate() {
+        let (p, k) = rays.get(j);
+        let conic = near.intersect_conic(p, k);
+        *s = R::select(conic.missed, -(p.z / k.z), conic.s);
+    }
+    let moving = iterate_newton::<R, W, NEWTON_STEPS>(rays, surface.n2, &mut s, |point, k| {
+        surface.height_above(point, k)
+    });
     let bound = R::from_f64(surface.slope_bound);
     let bound2 = bound * bound;
     let trusted = std::array::from_fn(|j| {

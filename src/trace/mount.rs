@@ -8,7 +8,7 @@
 //! Newton's iteration. A freeform has a search of its own (`freeform`).
 
 use super::Tracer;
-use super::asphere::RayStarts;
+use super::asphere::{RayStarts, iterate_newton};
 use super::deflection::Deflection;
 use super::freeform::FreeformFace;
 use super::interface::{Interface, Intersection};
@@ -20,8 +20,7 @@ use crate::math::{Real, Vec3};
 /// exact to rounding: each squares the error, which begins with some wavelengths.
 const NEWTON_STEPS: usize = 4;
 
-/// The crossings of rays with the sag `z(r²) + q y²`, from those with the surface of revolution. Each
-/// ray stops on its own, so that its result does not depend on the other rays.
+/// The crossings of rays with the sag `z(r²) + q y²`, from those with the surface of revolution.
 #[inline(always)]
 pub(super) fn irregular_crossings<R: Real, const W: usize>(
     surface: &Interface<R>,
@@ -29,23 +28,9 @@ pub(super) fn irregular_crossings<R: Real, const W: usize>(
     rays: &RayStarts<R, W>,
     mut s: [R; W],
 ) -> [R; W] {
-    let mut moving = [R::ONE; W];
-    let tolerance = R::from_f64(R::EPSILON.powf(2.0 / 3.0));
-    for _ in 0..NEWTON_STEPS {
-        for j in 0..W {
-            let (p, k) = rays.get(j);
-            let (f, slope) = surface.height_above_irregular(p + k * s[j], k, q);
-            let step = f / slope;
-            // The next step would be smaller than the square of this one.
-            let size = p.x.abs() + p.y.abs() + p.z.abs();
-            let settled = step * step * surface.n2 <= tolerance * tolerance * size * size;
-            s[j] = R::select(moving[j] > R::ZERO, s[j] - step, s[j]);
-            moving[j] = R::select(settled, R::ZERO, moving[j]);
-        }
-        if moving.iter().all(|moving| *moving == R::ZERO) {
-            break;
-        }
-    }
+    iterate_newton::<R, W, NEWTON_STEPS>(rays, surface.n2, &mut s, |point, k| {
+        surface.height_above_irregular(point, k, q)
+    });
     s
 }
 

@@ -472,6 +472,60 @@ fn a_wavelength_without_light_is_told_and_the_tolerance_not_reached() {
     assert_eq!(done_json(&["gradient", lens, "--field", "37.65"], "")["reached"], true);
 }
 
+/// A triplet with a small hole far in front of it, which the light of its only field does not meet.
+fn dark_lens() -> Scratch {
+    let text = std::fs::read_to_string("lenses/cooke_triplet_100_f27.json").unwrap();
+    let mut lens: Value = serde_json::from_str(&text).unwrap();
+    lens["fields"]["values"] = json!([{"y": 14.0, "weight": 1.0}]);
+    let rows = lens["surfaces"].as_array_mut().unwrap();
+    rows.insert(0, json!({"thickness": 500.0, "semi_diameter": 1.0}));
+    Scratch::with("dark_field.json", &lens.to_string())
+}
+
+#[test]
+fn a_lens_without_light_is_refused_by_every_analysis_and_by_the_report() {
+    let dark = dark_lens();
+    let kinds = [
+        "spot",
+        "fan",
+        "distortion",
+        "distortion-grid",
+        "lateral-color",
+        "longitudinal",
+        "footprint",
+        "field-curvature",
+        "illumination",
+        "through-focus",
+        "wavefront",
+        "opd-fan",
+        "zernike",
+        "psf",
+        "encircled-energy",
+        "mtf",
+        "through-focus-mtf",
+        "ghosts",
+    ];
+    for kind in kinds {
+        refused(
+            2,
+            &["analyze", dark.path(), kind],
+            "",
+            &["no light", "expected a lens that forms"],
+        );
+    }
+    let report = Scratch::new("dark_field.html");
+    let arguments = ["report", dark.path(), "--out", report.path()];
+    refused(2, &arguments, "", &["no light", "expected a lens that forms"]);
+    assert!(!std::path::Path::new(report.path()).exists());
+}
+
+#[test]
+fn more_frequencies_than_are_computed_in_a_short_time_are_refused() {
+    let many = vec!["10"; 20_000].join(",");
+    let arguments = ["analyze", LENS, "mtf", "--frequencies", &many];
+    refused(2, &arguments, "", &["--frequencies", "20000", "at most 1000"]);
+}
+
 #[test]
 fn an_unknown_parameter_is_refused_by_name() {
     refused(2, &["gradient", LENS, "--term", "distortion"], "", &["distortion", "throughput"]);

@@ -420,6 +420,69 @@ fn every_benchmark_ends_when_it_is_asked_to() {
     panic!("the work never began");
 }
 
+/// A picture and a design that are asked to end are saved as far as they are.
+#[cfg(unix)]
+#[test]
+fn pictures_and_designs_are_saved_when_they_are_asked_to_end() {
+    let folder = Folder::new("ended");
+    let asked =
+        r#"{"focal_length_mm": 60.0, "f_number": 4.0, "half_field_deg": 10.0, "max_elements": 4}"#;
+    let spec = folder.file("spec.json", asked);
+    let outs = ["exact.png", "map.png", "lens.json"].map(|name| folder.path(name));
+    let error_map = folder.path("error.png");
+    let scene = ["--scene", "target", "--pixels", "1200x800"];
+    let exact = ["--exact", "--error", "1e-6", "--max-samples", "100000000", "--out", &outs[0]];
+    let mapped = ["--quick", "--error-map", &error_map, "--out", &outs[1]];
+    let commands = [
+        [&["picture", LENS][..], &scene, &exact].concat(),
+        [&["picture", LENS][..], &scene, &mapped].concat(),
+        vec!["design", &spec, "--gradients", "100000000", "--out", &outs[2]],
+    ];
+    // A busy machine may need longer until the work begins.
+    for wait in [1500, 6000, 30000] {
+        let running: Vec<Running> =
+            commands.iter().map(|command| Running::start(command)).collect();
+        std::thread::sleep(Duration::from_millis(wait));
+        running.iter().for_each(|running| running.signal("-TERM"));
+        let ended: Vec<Output> = running.into_iter().map(Running::output).collect();
+        let said: Vec<String> = ended.iter().map(|output| text(&output.stderr)).collect();
+        let is_early = ended.iter().any(|output| output.status.code().is_none());
+        if is_early || said[2].contains("no start led to a lens") {
+            continue;
+        }
+        assert!(ended.iter().all(|output| output.status.code() == Some(0)), "{said:?}");
+        assert!(said[0].contains("stopped; what was not sampled is black"), "{}", said[0]);
+        assert!(outs.iter().all(|path| Path::new(path).exists()), "{said:?}");
+        aplanat::files::open(&outs[2]).unwrap();
+        return;
+    }
+    panic!("the work never began");
+}
+
+/// A picture that cannot be written where it should be is kept elsewhere.
+#[cfg(unix)]
+#[test]
+fn a_picture_that_cannot_be_saved_is_kept() {
+    let folder = Folder::new("kept-picture");
+    let out = folder.path("seen.png");
+    let picture = ["picture", SINGLET, "--scene", "white", "--pixels", "12x8", "--out", &out];
+    protect(&out);
+    let mut command = Command::new(env!("CARGO_BIN_EXE_aplanat"));
+    let spare = folder.path("spare");
+    fs::create_dir(&spare).unwrap();
+    let output = Running::of(command.args(picture).arg("--json").env("TMPDIR", &spare)).output();
+    let said = text(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    assert!(
+        said.contains("cannot be written") && said.contains("the picture is kept as"),
+        "{said}"
+    );
+    let report: Value = serde_json::from_slice(&output.stdout).unwrap();
+    assert!(report["out"].is_null(), "{report}");
+    let kept: Vec<_> = fs::read_dir(&spare).unwrap().collect();
+    assert_eq!(kept.len(), 1);
+}
+
 /// A benchmark of nothing has no result.
 #[test]
 fn no_repetition_is_wrong_input() {

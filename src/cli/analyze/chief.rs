@@ -1,7 +1,9 @@
 //! Results from chief rays: distortion and field curvature.
 
 use super::{AnalysisRun, AtField, SelectedField, TextLines, estimate_text};
-use crate::analysis::{Estimate, GridPoint, distortion, distortion_grid, field_curvature};
+use crate::analysis::{
+    AnalysisError, Estimate, GridPoint, check_light, distortion, distortion_grid, field_curvature,
+};
 use crate::cli::output::{ShortNumber, counted};
 use crate::lens::FieldPoint;
 use crate::measure::time_ms;
@@ -19,7 +21,10 @@ pub(super) struct DistortionJson {
 
 pub(super) fn distortions(run: &AnalysisRun) -> Vec<AtField<DistortionJson>> {
     let at = |field: &SelectedField| {
-        let (result, ms) = time_ms(|| distortion(&run.model, field.traced, run.model.primary));
+        let (result, ms) = time_ms(|| {
+            check_light(&run.model, field.traced)?;
+            distortion(&run.model, field.traced, run.model.primary)
+        });
         let keys = result.map(|d| {
             let height = run.single_ray_estimate(d.height, ms);
             let error = height.error + run.model.neglected.ray_shift;
@@ -73,7 +78,10 @@ struct GridPointJson {
 
 pub(super) fn grid(run: &AnalysisRun) -> Vec<AtField<GridJson>> {
     let axis = FieldPoint { x: 0.0, y: 0.0, weight: 1.0 };
-    let (found, milliseconds) = time_ms(|| distortion_grid(&run.model, run.model.primary, SQUARES));
+    let (found, milliseconds) = time_ms(|| {
+        check_some_light(run)?;
+        distortion_grid(&run.model, run.model.primary, SQUARES)
+    });
     let point = |point: &GridPoint| GridPointJson {
         field: [point.field.x, point.field.y],
         ideal: point.ideal,
@@ -87,6 +95,13 @@ pub(super) fn grid(run: &AnalysisRun) -> Vec<AtField<GridJson>> {
         points: points.iter().map(point).collect(),
     });
     vec![AtField::new(&SelectedField { given: axis, traced: axis }, keys)]
+}
+
+/// Refuses a lens all of whose fields are dark.
+fn check_some_light(run: &AnalysisRun) -> Result<(), AnalysisError> {
+    let mut reasons = run.model.fields.iter().map(|field| check_light(&run.model, *field).err());
+    let first = reasons.next().flatten();
+    first.filter(|_| reasons.all(|reason| reason.is_some())).map_or(Ok(()), Err)
 }
 
 impl TextLines for GridJson {
@@ -143,7 +158,10 @@ pub(super) fn curvatures(run: &AnalysisRun) -> Vec<AtField<FieldCurvatureJson>> 
     // Rays cross at the focus at a small angle, so rounding across the axis is enlarged along it.
     let cone = run.model.first_order.working_f_number.unwrap_or(1.0).abs().max(1.0);
     let at = |field: &SelectedField| {
-        let (result, ms) = time_ms(|| field_curvature(&run.model, field.traced, run.model.primary));
+        let (result, ms) = time_ms(|| {
+            check_light(&run.model, field.traced)?;
+            field_curvature(&run.model, field.traced, run.model.primary)
+        });
         let estimate = |value: f64| {
             let one = run.single_ray_estimate(value, ms);
             Estimate { error: one.error * cone, ..one }

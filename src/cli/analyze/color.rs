@@ -3,8 +3,8 @@
 
 use super::{AnalysisRun, AtField, SelectedField, TextLines};
 use crate::analysis::{
-    LateralColor, LongitudinalAberration, ZoneFocus, chief_points, footprint, lateral_color,
-    longitudinal_aberration,
+    LateralColor, LongitudinalAberration, ZoneFocus, check_light, chief_points, footprint,
+    lateral_color, longitudinal_aberration,
 };
 use crate::cli::error::CliError;
 use crate::cli::output::{ShortNumber, counted, or_dash, without_rounding};
@@ -36,7 +36,10 @@ struct ColorShiftJson {
 
 pub(super) fn lateral_colors(run: &AnalysisRun) -> Vec<AtField<LateralColorJson>> {
     let at = |field: &SelectedField| {
-        let (result, milliseconds) = time_ms(|| lateral_color(&run.model, field.traced));
+        let (result, milliseconds) = time_ms(|| {
+            check_light(&run.model, field.traced)?;
+            lateral_color(&run.model, field.traced)
+        });
         let points = chief_points(&run.model, field.traced);
         let color = |color: &LateralColor| ColorShiftJson {
             wavelength_um: run.model.channels[color.wavelength].um,

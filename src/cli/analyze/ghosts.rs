@@ -1,7 +1,7 @@
 //! Ghosts: the pairs of reflecting surfaces, ranked, with the light of real rays.
 
 use super::{AnalysisRun, AtField, SelectedField, TextLines};
-use crate::analysis::{AnalysisError, Coating, Ghost, GhostRanking, ParaxialGhost, ghosts};
+use crate::analysis::{Coating, Ghost, GhostRanking, ParaxialGhost, check_light, ghosts};
 use crate::cli::error::CliError;
 use crate::cli::output::{ShortNumber, TextTable, counted};
 use crate::lens::SurfaceNumber;
@@ -88,7 +88,10 @@ pub(super) fn ghost_lists(
         let (ranking, found) =
             found.map_err(|why| CliError::Input(format!("{}: {why}", run.opened.file)))?;
         let keys = keys(&ranking, &found, coating, milliseconds);
-        Ok(AtField::new(field, Ok::<_, AnalysisError>(keys)))
+        // Light that the image does not get may still arrive there by reflections.
+        let arrives = found.iter().any(|ghost| ghost.patch.fates.imaged > 0);
+        let lit = if arrives { Ok(()) } else { check_light(&run.model, field.traced) };
+        Ok(AtField::new(field, lit.map(|()| keys)))
     };
     run.fields.iter().map(at).collect()
 }

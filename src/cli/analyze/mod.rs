@@ -336,11 +336,18 @@ impl AnalyzeArgs {
         Err(CliError::Input(format!("--plot: `{asked}` has no curves; expected one of {curves}")))
     }
 
-    /// Refuses radii that are no positive numbers, and frequencies below zero.
+    /// Refuses radii that are no positive numbers, frequencies below zero, and more frequencies than are
+    /// computed in a short time.
     fn check_numbers(&self) -> Result<(), CliError> {
         if let Some(wrong) = self.radii.iter().find(|r| !(**r > 0.0 && r.is_finite())) {
             return Err(CliError::Input(format!(
                 "--radii: found {wrong}; expected mm, above zero"
+            )));
+        }
+        let count = self.frequencies.len();
+        if count > MOST_FREQUENCIES {
+            return Err(CliError::Input(format!(
+                "--frequencies: found {count} of them; expected at most {MOST_FREQUENCIES}"
             )));
         }
         match self.frequencies.iter().find(|nu| !(nu.is_finite() && **nu >= 0.0)) {
@@ -351,6 +358,9 @@ impl AnalyzeArgs {
         }
     }
 }
+
+/// The largest number of spatial frequencies, each of which takes an integral over the pupil.
+const MOST_FREQUENCIES: usize = 1000;
 
 /// A lens and the options of its analysis.
 struct AnalysisRun {

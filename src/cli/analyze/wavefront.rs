@@ -150,7 +150,13 @@ pub(super) fn path_fans(run: &AnalysisRun) -> Vec<AtField<PathFanJson>> {
             Ok(paths(run, field, &points)?.1)
         };
         let (found, milliseconds) = time_ms(|| Ok((section(1)?, section(0)?)));
-        let keys = found.map(|(tangential, sagittal)| PathFanJson {
+        let lit = found.and_then(|(tangential, sagittal)| {
+            let mut paths = tangential.iter().chain(&sagittal);
+            // The ray through the centre alone carries no light.
+            let dark = paths.all(|path| path.waves.is_none() || (path.px == 0.0 && path.py == 0.0));
+            if dark { Err(AnalysisError::NoLight) } else { Ok((tangential, sagittal)) }
+        });
+        let keys = lit.map(|(tangential, sagittal)| PathFanJson {
             error: run.rounding() / (run.primary_um() * 1e-3),
             rays: tangential.len() + sagittal.len(),
             milliseconds,

@@ -82,7 +82,7 @@ impl DesignArgs {
         let mut failures = Failures::default();
         self.run_rounds(&mut run, &stop, &mut failures);
         let stopped = stop.load(Ordering::Relaxed);
-        let lenses = if stopped { run.finish_best() } else { run.finish() };
+        let lenses = if stopped { run.finish_best() } else { run.finish(&stop) };
         if lenses.is_empty() {
             let why = if stopped { "stopped: " } else { "" };
             return Err(CliError::Failed(format!("{why}no start led to a lens")));

@@ -73,11 +73,13 @@ impl Launch<'_> {
             if limit == wanted {
                 probe.margin_at_limit = -margin;
             }
-            if deepest.is_none_or(|(_, least)| margin < least) {
-                deepest = Some((limit, margin));
+            // A margin that is no number blocks, as it does at every other limit.
+            let depth = if margin.is_nan() { -1.0 } else { margin };
+            if deepest.is_none_or(|(_, least)| depth < least) {
+                deepest = Some((limit, depth));
             }
         });
-        probe.failed = deepest.filter(|(_, m)| *m >= 0.0).map(|(limit, margin)| (limit, -margin));
+        probe.failed = deepest.filter(|(_, d)| *d >= 0.0).map(|(limit, depth)| (limit, -depth));
         probe
     }
 

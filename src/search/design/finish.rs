@@ -10,6 +10,7 @@ use super::run::Candidate;
 use crate::lens::Lens;
 use rayon::prelude::*;
 use serde::Serialize;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// The quality in which a designed lens is best.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -62,15 +63,19 @@ const FINISHED: usize = 4;
 const MORE_LIGHT: f64 = 1.15;
 
 /// The best, the simplest and the brightest lens of some candidates; one lens may be several of
-/// them, and is then listed once.
-pub(super) fn finished_lenses(pool: &[Candidate], asked: &LensRequirements) -> Vec<DesignedLens> {
+/// them, and is then listed once. Once `stop` is true, none is improved further.
+pub(super) fn finished_lenses(
+    pool: &[Candidate],
+    asked: &LensRequirements,
+    stop: &AtomicBool,
+) -> Vec<DesignedLens> {
     let buildable: Vec<&Candidate> = pool.iter().filter(|c| c.is_buildable(asked)).collect();
     let mut chosen: Vec<&Candidate> = buildable.iter().take(FINISHED).copied().collect();
     let cheapest = buildable.iter().min_by(|a, b| a.price().total_cmp(&b.price()));
     chosen.extend(cheapest.filter(|c| chosen.iter().all(|other| other.value != c.value)));
     let mut all: Vec<(f64, DesignedLens)> = chosen
         .par_iter()
-        .filter_map(|candidate| Some((candidate.price(), finish(candidate, asked)?)))
+        .filter_map(|candidate| Some((candidate.price(), finish(candidate, asked, stop)?)))
         .collect();
     all.sort_by(|a, b| rank(&a.1.judgement).total_cmp(&rank(&b.1.judgement)));
     let Some((best_price, best)) = all.first().cloned() else { return Vec::new() };
@@ -80,15 +85,21 @@ pub(super) fn finished_lenses(pool: &[Candidate], asked: &LensRequirements) -> V
     lenses.extend(
         simplest.map(|(_, lens)| DesignedLens { merit: DesignMerit::Simplest, ..lens.clone() }),
     );
-    lenses.extend(brightest(&buildable, asked));
+    if !stop.load(Ordering::Relaxed) {
+        lenses.extend(brightest(&buildable, asked, stop));
+    }
     lenses
 }
 
 /// The best candidate with more light than asked for, if it then keeps every limit.
-fn brightest(pool: &[&Candidate], asked: &LensRequirements) -> Option<DesignedLens> {
+fn brightest(
+    pool: &[&Candidate],
+    asked: &LensRequirements,
+    stop: &AtomicBool,
+) -> Option<DesignedLens> {
     let clear_area = asked.clear_area.iter().map(|area| MORE_LIGHT * area).collect();
     let bright = LensRequirements { clear_area, ..asked.clone() };
-    let lens = finish(pool.first()?, &bright)?;
+    let lens = finish(pool.first()?, &bright, stop)?;
     lens.judgement.is_valid().then_some(DesignedLens { merit: DesignMerit::Brightest, ..lens })
 }
 
@@ -98,8 +109,13 @@ fn rank(judgement: &LensJudgement) -> f64 {
 }
 
 /// A lens that can be built; `None` if no light gets through. In every round the limits that the lens
-/// before broke are tightened by what it broke them by, since a penalty never keeps its limit.
-fn finish(candidate: &Candidate, asked: &LensRequirements) -> Option<DesignedLens> {
+/// before broke are tightened by what it broke them by, since a penalty never keeps its limit. Once
+/// `stop` is true, the first lens that can be judged is the result.
+fn finish(
+    candidate: &Candidate,
+    asked: &LensRequirements,
+    stop: &AtomicBool,
+) -> Option<DesignedLens> {
     let mut draft = settled(&candidate.draft, asked);
     let mut best: Option<(LensJudgement, Lens, Vec<LimitCost>)> = None;
     let mut costs = limit_costs(&draft, asked, &settling(), freedom(asked));
@@ -117,7 +133,8 @@ fn finish(candidate: &Candidate, asked: &LensRequirements) -> Option<DesignedLen
                 best = Some((judgement, refocused(&lens, asked), costs));
             }
         }
-        if idle >= PATIENCE && best.as_ref().is_some_and(|(found, ..)| found.is_valid()) {
+        let is_valid = best.as_ref().is_some_and(|(found, ..)| found.is_valid());
+        if idle >= PATIENCE && is_valid || best.is_some() && stop.load(Ordering::Relaxed) {
             break;
         }
         let Some(beams) = traced_beams(&lens) else { break };
@@ -273,8 +290,12 @@ mod tests {
         let (asked, draft, _) = finished();
         let draft = settled(&snapped(&draft, &asked), &asked);
         let candidate = Candidate { origin: "an achromat".to_owned(), draft, value: 0.0 };
-        let lenses = finished_lenses(&[candidate], &asked);
+        let lenses = finished_lenses(&[candidate.clone()], &asked, &AtomicBool::new(false));
         assert!(lenses[0].judgement.is_valid(), "{:?}", lenses[0].judgement.failures());
         assert!(lenses.iter().all(|lens| lens.merit != DesignMerit::Simplest));
+        // A request to end leaves the lens that there is.
+        let broken_off = finished_lenses(&[candidate], &asked, &AtomicBool::new(true));
+        assert_eq!(broken_off.len(), 1);
+        assert!(rank(&broken_off[0].judgement) >= rank(&lenses[0].judgement));
     }
 }

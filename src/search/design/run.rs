@@ -164,21 +164,23 @@ impl DesignRun {
         !self.pool.is_empty()
     }
 
-    /// Makes lenses that can be built of the best candidates: the best one first.
-    pub fn finish(&self) -> Vec<DesignedLens> {
+    /// Makes lenses that can be built of the best candidates: the best one first. Once `stop` is true,
+    /// each stays as it is as soon as it can be built.
+    pub fn finish(&self, stop: &AtomicBool) -> Vec<DesignedLens> {
         let snapped: Vec<Candidate> = match self.stage {
             DesignStage::Glasses => self.pool.clone(),
-            _ => self.catalogued(&AtomicBool::new(false)),
+            _ => self.catalogued(stop),
         };
-        finished_lenses(&snapped, &self.asked)
+        finished_lenses(&snapped, &self.asked, stop)
     }
 
     /// The same of the best candidate alone, in less time.
     pub fn finish_best(&self) -> Vec<DesignedLens> {
         let mut first = self.clone();
         first.pool.truncate(1);
-        let lenses = first.finish();
-        if lenses.is_empty() { self.finish() } else { lenses }
+        let go_on = AtomicBool::new(false);
+        let lenses = first.finish(&go_on);
+        if lenses.is_empty() { self.finish(&go_on) } else { lenses }
     }
 
     /// The generator of a round: the same whatever was drawn before.

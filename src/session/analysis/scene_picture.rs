@@ -10,6 +10,7 @@ use crate::picture::{
     field_diagonal, focused, picture_model, quick_error,
 };
 use crate::pupil::RayModel;
+use std::sync::atomic::AtomicBool;
 
 /// A picture of a scene through the lens.
 #[derive(Debug, Clone)]
@@ -69,8 +70,10 @@ fn scene_picture(
     let frame = ImageFrame::new(&model, pixels, diagonal)?;
     let painted = scene.build(&model, &frame, focus)?;
     let exact = ExactRenderer::new(&model, &bands, &painted, frame)?;
-    let (picture, ms) =
-        time_ms(|| QuickRenderer::new(&model, &bands, &exact).map(|quick| quick.render()));
+    let (picture, ms) = time_ms(|| {
+        QuickRenderer::new(&model, &bands, &exact)
+            .map(|quick| quick.render(&AtomicBool::new(false)))
+    });
     let picture = picture?;
     let measured = tiles.map(|tiles| quick_error(&exact, &picture, tiles, SAMPLES));
     let error = measured.map(|error| Estimate { milliseconds: Some(ms), ..error });

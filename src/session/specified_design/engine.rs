@@ -97,7 +97,7 @@ impl SpecificationEngine {
     }
 
     fn finish(&mut self) -> Result<(), String> {
-        self.state.offer(self.run.finish());
+        self.state.offer(self.run.finish(&self.stop));
         self.state.is_finishing = false;
         if self.state.lenses.is_empty() {
             return Err("no start led to a lens; loosen a limit, or allow more elements".to_owned());

@@ -3,6 +3,7 @@
 mod derivatives;
 mod errors;
 mod files;
+mod images;
 mod light;
 mod symmetry;
 
