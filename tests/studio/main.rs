@@ -12,6 +12,7 @@ mod harness;
 mod history;
 mod legibility;
 mod panels;
+mod picture;
 mod prescription;
 mod search;
 mod shaders;
