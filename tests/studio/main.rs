@@ -6,6 +6,7 @@
 mod begin;
 mod drawing;
 mod file_dialog;
+mod glass;
 mod grin;
 mod handles;
 mod harness;
