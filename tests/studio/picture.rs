@@ -10,7 +10,7 @@ use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
 use std::sync::Arc;
 
-use crate::harness::{PanelState, double_gauss, painted_texts, panel_harness};
+use crate::harness::{PanelState, double_gauss, painted_texts, panel_harness, view};
 
 type Bench = Harness<'static, PanelState<PicturePanel>>;
 
@@ -110,7 +110,8 @@ fn the_error_is_measured_everywhere_only_while_it_is_shown() {
         let last = harness.state().commands.last().cloned();
         matches!(last, Some(Command::Show(PanelSetting::PictureErrors(true))))
     };
-    let mut harness = bench(double_gauss());
+    let mut harness = panel_harness(PicturePanel::default(), view());
+    harness.run();
     assert!(!asked(&harness));
     harness.get_by_label("Error").click();
     harness.run_steps(2);

@@ -196,10 +196,39 @@ impl PicturePanel {
         let white = first.picture.white.max(f64::MIN_POSITIVE);
         let seen: Vec<&Picture> =
             pictures.iter().filter_map(|p| Some(&p.picture()?.picture)).collect();
-        histogram(ui, &seen, white);
-        self.choose_sensor(ui);
-        match self.areas(ui, pictures, &seen, white) {
-            Some(at) => self.readout(ui, pictures, &seen, at, white),
+        let columns = if self.mode == PictureMode::Beside { seen.len() } else { 1 };
+        let room = ui.available_size();
+        let aspect = columns as f32 * shape(seen[0]).x / shape(seen[0]).y;
+        // A wide panel has room for the numbers at the right.
+        if room.x - aspect * room.y > BESIDE {
+            ui.horizontal_top(|ui| {
+                let at = self.areas(ui, pictures, (&seen, white), room);
+                ui.vertical(|ui| {
+                    histogram(ui, &seen, white);
+                    self.choose_sensor(ui);
+                    self.numbers(ui, pictures, (&seen, white), at);
+                });
+            });
+        } else {
+            histogram(ui, &seen, white);
+            self.choose_sensor(ui);
+            let words = WORDS * (1 + seen.len()) as f32;
+            let room = ui.available_size() - vec2(0.0, words);
+            let at = self.areas(ui, pictures, (&seen, white), room);
+            self.numbers(ui, pictures, (&seen, white), at);
+        }
+    }
+
+    /// What is known of the place under the pointer, or what pointing does.
+    fn numbers(
+        &self,
+        ui: &mut Ui,
+        pictures: &[NamedPicture],
+        (seen, white): (&[&Picture], f64),
+        at: Option<Pos2>,
+    ) {
+        match at {
+            Some(at) => self.readout(ui, pictures, (seen, white), at),
             None => drop(ui.weak(POINT)),
         }
     }
@@ -231,16 +260,15 @@ impl PicturePanel {
         &mut self,
         ui: &mut Ui,
         pictures: &[NamedPicture],
-        seen: &[&Picture],
-        white: f64,
+        (seen, white): (&[&Picture], f64),
+        room: Vec2,
     ) -> Option<Pos2> {
-        let [width, height] = seen[0].frame.pixels.map(|count| count as f32);
+        let shape = shape(seen[0]);
         let columns = if self.mode == PictureMode::Beside { seen.len() } else { 1 };
         let gap = ui.spacing().item_spacing.x;
-        let words = WORDS * (1 + seen.len()) as f32;
-        let room = ui.available_size() - vec2(gap * (columns - 1) as f32, words);
-        let scale = (room.x / (width * columns as f32)).min(room.y / height).max(0.1);
-        let size = vec2(width, height) * scale;
+        let width = room.x - gap * (columns - 1) as f32;
+        let scale = (width / (shape.x * columns as f32)).min(room.y / shape.y).max(0.1);
+        let size = shape * scale;
         let mut found = None;
         ui.horizontal(|ui| {
             for column in 0..columns {
@@ -338,9 +366,8 @@ impl PicturePanel {
         &self,
         ui: &mut Ui,
         pictures: &[NamedPicture],
-        seen: &[&Picture],
+        (seen, white): (&[&Picture], f64),
         at: Pos2,
-        white: f64,
     ) {
         let sensor = &SensorPreset::ALL[self.sensor.min(SensorPreset::ALL.len() - 1)].model;
         // The same exposure for all: normal for the first.
@@ -362,6 +389,8 @@ impl PicturePanel {
     }
 }
 
+/// The width that is left beside the picture for its numbers to stand there, in points.
+const BESIDE: f32 = 230.0;
 /// The height of a line of numbers below the picture, in points.
 const WORDS: f32 = 18.0;
 /// The luminance of white in the scene, in cd/m²: a room by day.
@@ -371,6 +400,12 @@ const POINT: &str =
 const EXPOSURE: &str = "The signal-to-noise ratio of a pixel of the sensor, by the mean of its colours: white \
                         has 100 cd/m², and the exposure is that at which white of the first picture \
                         fills 80 % of the range; the same time for both";
+
+/// The columns and rows of a picture.
+fn shape(picture: &Picture) -> Vec2 {
+    let [columns, rows] = picture.frame.pixels.map(|count| count as f32);
+    vec2(columns, rows)
+}
 
 /// The column and the row at a place in shares of a picture.
 fn pixel_at(picture: &Picture, at: Pos2) -> [usize; 2] {
