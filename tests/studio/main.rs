@@ -17,6 +17,7 @@ mod picture;
 mod prescription;
 mod search;
 mod shaders;
+mod shapes;
 mod specification;
 mod tolerances;
 mod unsaved;
