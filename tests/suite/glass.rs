@@ -102,7 +102,7 @@ fn every_formula_has_the_index_of_its_definition() {
         let found = entry.glass.index(um).unwrap();
         assert!((found - expected).abs() < 1e-13, "formula {formula}: {found}, {expected}");
         assert!(entry.glass.index(0.39).is_none() && entry.glass.index(0.81).is_none());
-        assert_eq!((entry.glass.density, entry.status), (Some(2.51), Some("preferred")));
+        assert_eq!((entry.glass.density, entry.glass.status), (Some(2.51), Some("preferred")));
     }
 }
 

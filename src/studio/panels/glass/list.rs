@@ -232,8 +232,8 @@ mod tests {
         assert!(known > 100 && known < all.len(), "{known}");
         assert!(all[known..].iter().all(|listed| listed.glass.density.is_none()));
         assert!(all[..known].is_sorted_by(|a, b| a.glass.density >= b.glass.density));
-        assert_eq!(order.clicked(GlassColumn::Density).descending, false);
-        assert_eq!(order.clicked(GlassColumn::Name).descending, false);
+        assert!(!order.clicked(GlassColumn::Density).descending);
+        assert!(!order.clicked(GlassColumn::Name).descending);
     }
 
     #[test]

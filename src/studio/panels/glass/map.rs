@@ -1,7 +1,9 @@
 //! The map of glasses: index or partial dispersion over the Abbe number, with those of the lens marked.
 
-use egui::{Align2, Color32, PointerButton, Role, Ui, Visuals, WidgetInfo, vec2};
-use egui_plot::{Line, LineStyle, Plot, PlotPoint, PlotPoints, PlotResponse, PlotUi, Points, Text};
+use egui::{Align2, Color32, PointerButton, Rangef, Role, Ui, Visuals, WidgetInfo, vec2};
+use egui_plot::{
+    AxisHints, Line, LineStyle, Plot, PlotPoint, PlotPoints, PlotResponse, PlotUi, Points, Text,
+};
 
 use super::list::{GlassNumbers, ListedGlass};
 use crate::lens::Lens;
@@ -15,6 +17,12 @@ const NEAR: f32 = 10.0;
 const ABBE: [f64; 2] = [15.0, 100.0];
 const INDEX: [f64; 2] = [1.4, 2.15];
 const PARTIAL: [f64; 2] = [0.5, 0.68];
+
+/// The distances in points of numbers below the map at which they begin to be shown, and are.
+const NUMBERS: Rangef = Rangef { min: 22.0, max: 30.0 };
+/// The places of the numbers of surfaces beside their marks, in turn, so that near ones do not overlap.
+const SIDES: [Align2; 4] =
+    [Align2::LEFT_BOTTOM, Align2::RIGHT_TOP, Align2::LEFT_TOP, Align2::RIGHT_BOTTOM];
 
 /// What the axes of the map are.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -81,7 +89,7 @@ impl GlassMap<'_> {
         let visuals = ui.visuals().clone();
         let plot = Plot::new(self.axes.name())
             .height(height)
-            .x_axis_label(x)
+            .custom_x_axes(vec![AxisHints::new_x().label(x).label_spacing(NUMBERS)])
             .y_axis_label(y)
             .invert_x(self.axes != MapAxes::PartialIndex)
             .default_x_bounds(left, right)
@@ -110,14 +118,14 @@ impl GlassMap<'_> {
         if let Some(place) = self.pointed.and_then(|glass| self.place_of(glass)) {
             points(plot, "pointed", vec![place], (5.0, visuals.hyperlink_color, false));
         }
-        for (place, surfaces) in self.marks() {
+        for ((place, surfaces), side) in self.marks().into_iter().zip(SIDES.iter().cycle()) {
             let chosen = self.surface.is_some_and(|surface| surfaces.contains(&surface));
             let color = if chosen { visuals.selection.stroke.color } else { visuals.warn_fg_color };
             points(plot, "glass of the lens", vec![place], (4.0, color, true));
             let numbers: Vec<String> = surfaces.iter().map(|i| (i + 1).to_string()).collect();
-            let text = egui::RichText::new(format!("  {}", numbers.join(", "))).color(color);
+            let text = egui::RichText::new(format!("  {}  ", numbers.join(", "))).color(color);
             let text = Text::new("surfaces", PlotPoint::from(place), text.strong());
-            plot.text(text.color(color).anchor(Align2::LEFT_BOTTOM));
+            plot.text(text.color(color).anchor(*side));
         }
     }
 

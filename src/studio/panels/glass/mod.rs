@@ -24,7 +24,7 @@ use table::table;
 /// The least width of the panel at which the map stands beside the table.
 const BESIDE: f32 = 640.0;
 /// The width of the table beside the map.
-const TABLE: f32 = 508.0;
+const TABLE: f32 = 522.0;
 /// The share of the height that the map has above the table.
 const ABOVE: f32 = 0.45;
 

@@ -44,7 +44,7 @@ pub(super) fn table(
             table = table.column(Column::exact(width(column)).clip(true));
         }
         if let Some(row) = listed.iter().position(is_present).filter(|_| follows) {
-            table = table.scroll_to_row(row, Some(Align::Center));
+            table = table.scroll_to_row(row, None);
         }
         table.header(ROW + 2.0, |row| header(row, order, &mut outcome)).body(|body| {
             body.rows(ROW, listed.len(), |row| {
@@ -58,8 +58,8 @@ pub(super) fn table(
 
 const fn width(column: GlassColumn) -> f32 {
     match column {
-        GlassColumn::Name => 104.0,
-        GlassColumn::Maker => 76.0,
+        GlassColumn::Name => 98.0,
+        GlassColumn::Maker => 70.0,
         GlassColumn::Index | GlassColumn::Status => 58.0,
         GlassColumn::Partial => 52.0,
         _ => 46.0,

@@ -303,7 +303,7 @@ mod tests {
     #[test]
     fn a_new_form_leaves_the_sag_as_it_is_but_for_the_conic_constant_of_a_toroid() {
         let shape: Shape<f64> = row().shape();
-        let conic = shape.sag(25.0).unwrap();
+        let (conic, _) = shape.sag(25.0).unwrap();
         for choice in FormChoice::ALL.into_iter().filter(|c| *c != FormChoice::Conic) {
             let form = choice.form(&row(), 12.0).unwrap();
             assert_eq!(form.fault(), None, "{choice:?}");

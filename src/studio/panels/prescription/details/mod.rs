@@ -185,7 +185,7 @@ impl SurfaceDetails {
             let value = if is_radius { 1.0 / value } else { value };
             Edit::Set { parameter, value }
         });
-        badge::show(ui, &view.lens, parameter, None, &mut self.badges, actions)
+        badge::show(ui, &view.lens, parameter, None, &mut self.badges, actions);
     }
 
     /// Adds a coefficient at the end, or removes the last one.
@@ -259,7 +259,8 @@ fn choose<T: Copy + PartialEq>(
         let size = vec2(TITLE, ui.spacing().interact_size.y);
         let layout = Layout::left_to_right(Align::Center);
         ui.allocate_ui_with_layout(size, layout, |ui| ui.label(title));
-        let combo = ComboBox::from_id_salt(name).selected_text(text(chosen).0).width(176.0);
+        let combo = ComboBox::from_id_salt(name).selected_text(text(chosen).0);
+        let combo = combo.width(176.0).height(310.0);
         let shown = combo.show_ui(ui, |ui| {
             for choice in all {
                 let (title, hint) = text(*choice);

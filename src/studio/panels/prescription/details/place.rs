@@ -8,7 +8,7 @@ use crate::studio::panels::edit_form::{EditForm, heading};
 use crate::studio::panels::widgets::hint_beside;
 
 /// The width of a number.
-const FIELD: f32 = 54.0;
+const FIELD: f32 = 52.0;
 /// The axes of the numbers.
 const AXES: [&str; 3] = ["x", "y", "z"];
 
