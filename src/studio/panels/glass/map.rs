@@ -24,7 +24,7 @@ const NUMBERS: Rangef = Rangef { min: 22.0, max: 30.0 };
 const SIDES: [Align2; 4] =
     [Align2::LEFT_BOTTOM, Align2::RIGHT_TOP, Align2::LEFT_TOP, Align2::RIGHT_BOTTOM];
 
-/// What the axes of the map are.
+/// The quantities on the axes of the map.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) enum MapAxes {
     #[default]
@@ -71,7 +71,7 @@ impl MapAxes {
     }
 }
 
-/// What the map shows in one frame.
+/// The map in one frame.
 pub(super) struct GlassMap<'a> {
     pub(super) axes: MapAxes,
     pub(super) listed: &'a [ListedGlass],

@@ -28,7 +28,7 @@ const TABLE: f32 = 522.0;
 /// The share of the height that the map has above the table.
 const ABOVE: f32 = 0.45;
 
-/// What a list was made of: the search, the order, what distances count from, and the number of glasses.
+/// The origin of a list: the search, the order, what distances count from, and the number of glasses.
 type ListKey = (String, GlassOrder, Option<GlassNumbers>, usize);
 
 /// The panel.
@@ -109,7 +109,7 @@ impl GlassPanel {
         });
     }
 
-    /// What the surface has now and the nearest glass to it, or what a click needs.
+    /// The glass of the surface and the nearest one to it, or what a click needs.
     fn status(
         &mut self,
         ui: &mut Ui,

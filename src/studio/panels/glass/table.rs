@@ -11,7 +11,7 @@ use crate::lens::glass::Glass;
 /// The height of a row, in points.
 const ROW: f32 = 18.0;
 
-/// What was done in the table in one frame.
+/// The actions of a person in the table in one frame.
 #[derive(Debug, Default)]
 pub(super) struct TableOutcome {
     /// The title that was clicked.

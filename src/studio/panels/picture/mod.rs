@@ -219,7 +219,7 @@ impl PicturePanel {
         }
     }
 
-    /// What is known of the place under the pointer, or what pointing does.
+    /// Shows the numbers of the place under the pointer, or a hint to point there.
     fn numbers(
         &self,
         ui: &mut Ui,

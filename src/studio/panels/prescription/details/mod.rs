@@ -1,4 +1,4 @@
-//! What the columns of the table do not hold of the selected surface: the form of its sag beyond a conic, the
+//! The selected surface beyond the columns of the table: the form of its sag beyond a conic, the
 //! rule by which it deflects light, its decentre and tilt, those of its element, and breaks of the axis.
 
 mod forms;
