@@ -2,11 +2,10 @@
 
 use super::error::CliError;
 use super::output::{Output, ShortNumber, TextTable};
-use crate::files::{self, AgfCatalogue, AgfGlass, parse_range};
-use crate::lens::glass::{self, Glass, line};
+use crate::files::{self, AgfCatalogue, AgfGlass, GlassQuery};
+use crate::lens::glass::{self, Glass};
 use serde::Serialize;
 use std::fmt;
-use std::ops::RangeInclusive;
 use std::path::PathBuf;
 
 /// Lists the glasses that lenses can name, and adds the catalogues of makers, .agf
@@ -46,10 +45,10 @@ impl GlassArgs {
             let removed = files::remove_catalogue(name)?.display().to_string();
             return output.print(&RemovedCatalogue { removed });
         }
-        let conditions: Vec<GlassCondition> =
-            self.words.iter().map(|word| GlassCondition::new(word)).collect::<Result<_, _>>()?;
-        let is_meant = |glass: &&Glass| conditions.iter().all(|c| c.is_met_by(glass));
-        let mut meant: Vec<&'static Glass> = glass::known().filter(is_meant).collect();
+        let query = GlassQuery::new(self.words.iter().map(String::as_str))
+            .map_err(|why| CliError::Input(why.to_string()))?;
+        let mut meant: Vec<&'static Glass> =
+            glass::known().filter(|glass| query.is_met_by(glass)).collect();
         if let Some([nd, vd]) = self.nearest.as_deref() {
             sort_by_distance(&mut meant, *nd, *vd)?;
         }
@@ -79,40 +78,6 @@ fn sort_by_distance(glasses: &mut Vec<&'static Glass>, nd: f64, vd: f64) -> Resu
     Ok(())
 }
 
-/// A condition on a glass.
-enum GlassCondition {
-    /// The maker or the name contains these letters, which are capitals.
-    Word(String),
-    Index(RangeInclusive<f64>),
-    Abbe(RangeInclusive<f64>),
-}
-
-impl GlassCondition {
-    fn new(word: &str) -> Result<Self, CliError> {
-        let Some((name, text)) = word.split_once('=') else {
-            return Ok(Self::Word(word.to_uppercase()));
-        };
-        let range = parse_range(text).ok_or_else(|| {
-            CliError::Input(format!(
-                "found the range `{text}`; expected `1.6..1.7`, `50..` or one number"
-            ))
-        })?;
-        match name {
-            "nd" => Ok(Self::Index(range)),
-            "vd" => Ok(Self::Abbe(range)),
-            _ => Err(CliError::Input(format!("found the number `{name}`; expected nd or vd"))),
-        }
-    }
-
-    fn is_met_by(&self, glass: &Glass) -> bool {
-        match self {
-            Self::Word(word) => glass.full_name().to_uppercase().contains(word),
-            Self::Index(range) => range.contains(&glass.nd),
-            Self::Abbe(range) => range.contains(&glass.vd),
-        }
-    }
-}
-
 /// A glass of the list.
 #[derive(Serialize)]
 struct GlassRow {
@@ -126,20 +91,22 @@ struct GlassRow {
     range_um: [f64; 2],
     #[serde(rename = "density_g_cm3")]
     density: Option<f64>,
+    status: Option<&'static str>,
+    relative_cost: Option<f64>,
 }
 
 impl GlassRow {
     fn new(glass: &'static Glass) -> Self {
-        let [g, f, c] = [line::G, line::F, line::C].map(|um| glass.index(um));
-        let partial = || Some((g? - f?) / (f? - c?));
         Self {
             maker: &glass.manufacturer,
             name: &glass.name,
             nd: glass.nd,
             vd: glass.vd,
-            partial_dispersion: partial(),
+            partial_dispersion: glass.partial_dispersion(),
             range_um: glass.range_um,
             density: glass.density,
+            status: glass.status,
+            relative_cost: glass.relative_cost,
         }
     }
 }
@@ -189,6 +156,8 @@ struct AddedGlass {
     name: String,
     nd: f64,
     vd: f64,
+    status: Option<&'static str>,
+    relative_cost: Option<f64>,
     #[serde(flatten)]
     further: AgfGlass,
 }
@@ -202,8 +171,8 @@ struct GlassRemark {
 impl AddedCatalogue {
     fn new(catalogue: AgfCatalogue, saved: &[PathBuf]) -> Self {
         let added = |further: AgfGlass| {
-            let Glass { name, nd, vd, .. } = further.glass.clone();
-            AddedGlass { name, nd, vd, further }
+            let Glass { name, nd, vd, status, relative_cost, .. } = further.glass.clone();
+            AddedGlass { name, nd, vd, status, relative_cost, further }
         };
         let remarks = |found: Vec<(String, String)>| {
             found.into_iter().map(|(name, why)| GlassRemark { name, why }).collect()

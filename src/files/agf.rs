@@ -50,15 +50,11 @@ pub struct AgfGlass {
     /// The glass as lenses find it.
     #[serde(skip)]
     pub glass: Glass,
-    /// Its availability, if it is known.
-    pub status: Option<&'static str>,
     /// The expansion from −30 to 70 °C, in 1e-6/K.
     pub expansion: Option<f64>,
     /// D₀, D₁, D₂, E₀, E₁, λtk of the change of the index with temperature, and the reference
     /// temperature in °C; empty if the catalogue does not have them.
     pub thermal: Vec<f64>,
-    /// The cost relative to that of N-BK7.
-    pub relative_cost: Option<f64>,
     /// The resistance to climate, stains, acid, alkali and phosphate; −1 if it is unknown.
     pub resistance: Vec<f64>,
     /// Wavelength in µm, internal transmission and thickness in mm.
@@ -116,10 +112,8 @@ impl AgfGlass {
     pub(super) fn without_remarks(glass: Glass) -> Self {
         Self {
             glass,
-            status: None,
             expansion: None,
             thermal: Vec::new(),
-            relative_cost: None,
             resistance: Vec::new(),
             transmission: Vec::new(),
         }
@@ -179,13 +173,13 @@ impl<'a> GlassRecords<'a> {
             coefficients,
             range_um: [low, high],
             density: positive(self.numbers("ED").get(2)),
+            status: head.get(6).and_then(|word| status(word)),
+            relative_cost: positive(self.numbers("OD").first()),
         };
         check_index(&mut glass)?;
         Ok(AgfGlass {
-            status: head.get(6).and_then(|word| status(word)),
             expansion: self.numbers("ED").first().copied().filter(|value| value.is_finite()),
             thermal: finite_numbers(self.numbers("TD")),
-            relative_cost: positive(self.numbers("OD").first()),
             resistance: finite_numbers(self.numbers("OD").into_iter().skip(1).collect()),
             transmission: self.transmission(),
             glass,

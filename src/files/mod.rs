@@ -13,6 +13,7 @@ pub mod codev;
 mod convert;
 mod error;
 mod folder;
+mod glass_query;
 mod identity;
 mod image_file;
 mod image_side;
@@ -40,6 +41,7 @@ pub use checkpoint::{CheckpointError, CheckpointFormat};
 pub use convert::{Conversion, convert};
 pub use error::FileError;
 pub use folder::{own_files, stale_files};
+pub use glass_query::{GlassQuery, GlassQueryError};
 pub use identity::FileIdentity;
 pub use image_file::{ColorImage, GrayscaleImage, read_color, read_grayscale};
 pub use library::{

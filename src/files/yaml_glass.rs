@@ -125,6 +125,8 @@ pub(super) fn parse_material(
         coefficients,
         range_um: [low, high],
         density: file.density(),
+        status: None,
+        relative_cost: None,
     };
     check_index(&mut glass)?;
     let remark = contradiction(&glass, number("nd")).map(|text| (name.to_owned(), text));

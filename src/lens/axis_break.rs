@@ -6,7 +6,7 @@
 //! the coordinate break of Zemax with the order flag 0, and the basic decentre of CODE V apart from
 //! signs.
 
-use super::{Pose, Row};
+use super::{Lens, Pose, Row};
 use crate::math::Vec3;
 use serde::{Deserialize, Serialize};
 
@@ -64,6 +64,45 @@ impl Row {
         } else {
             (self.break_before, self.break_after) = (written(before), written(after));
         }
+    }
+}
+
+impl Lens {
+    /// Moves the surfaces `first` to `last` as one body: by a break of the axis in front of the first one,
+    /// and by one behind the last one that takes the axis back to where it was. Breaks that were there are
+    /// replaced. A thickness between the surfaces that changes afterwards leaves the second break as it is.
+    pub fn set_group_place(&mut self, (first, last): (usize, usize), place: &AxisBreak) {
+        let back = self.way_back((first, last), place);
+        let is_there = *place == AxisBreak::default();
+        if let Some(row) = self.surfaces.get_mut(first) {
+            row.break_before = (!is_there).then_some(*place);
+        }
+        if let Some(row) = self.surfaces.get_mut(last) {
+            row.break_after = if is_there { None } else { written(&back) };
+        }
+    }
+
+    /// The place of the surfaces `first` to `last` as [`Lens::set_group_place`] sets it; zero for a group
+    /// without breaks, and `None` for one with breaks that do not take the axis back.
+    pub fn group_place(&self, (first, last): (usize, usize)) -> Option<AxisBreak> {
+        let rows = self.surfaces.get(first..=last)?;
+        let (front, back) = (rows.first()?, rows.last()?);
+        let place = front.break_before.unwrap_or_default();
+        let inner = rows.iter().enumerate().any(|(i, row)| {
+            (i > 0 && row.break_before.is_some())
+                || (i + 1 < rows.len() && row.break_after.is_some())
+        });
+        let found = back.break_after.unwrap_or_default().pose();
+        let rest = self.way_back((first, last), &place).inverse().then(&found);
+        (!inner && rest.is_nearly_centred()).then_some(place)
+    }
+
+    /// The frame of the old axis at the last surface of a group in that of the group.
+    fn way_back(&self, (first, last): (usize, usize), place: &AxisBreak) -> Pose<f64> {
+        let rows = self.surfaces.get(first..last).unwrap_or_default();
+        let length = rows.iter().map(|row| row.thickness).sum();
+        let gap = Pose { shift: Vec3::new(0.0, 0.0, length), ..Pose::centred() };
+        place.pose().then(&gap).inverse().then(&gap)
     }
 }
 
@@ -135,6 +174,27 @@ mod tests {
             let back = AxisBreak::from_pose(&pose).pose();
             assert!(largest_difference(&pose, &back) < 1e-14);
         }
+    }
+
+    #[test]
+    fn a_group_is_turned_as_a_body_and_what_follows_stays() {
+        let mut lens = crate::lens::blank();
+        let frames = |lens: &Lens| lens.resolve(0, 0.5876).unwrap().frames();
+        let straight = frames(&lens);
+        let place = AxisBreak { decenter: [0.0, 1.0, 0.0], tilt: [10.0, 0.0, 0.0] };
+        lens.set_group_place((0, 1), &place);
+        let turned = frames(&lens);
+        assert!(largest_difference(&turned[2], &straight[2]) < 1e-14);
+        // The plate is 5 mm thick, and a turn about x takes z to (0, -sin, cos).
+        let (sin, cos) = 10.0_f64.to_radians().sin_cos();
+        let back = turned[1].shift - Vec3::new(0.0, 1.0 - 5.0 * sin, 5.0 * cos);
+        assert!(back.dot(back).sqrt() < 1e-14, "{back:?}");
+        assert_eq!(lens.group_place((0, 1)), Some(place));
+        lens.surfaces[0].thickness = 6.0;
+        assert_eq!(lens.group_place((0, 1)), None);
+        lens.set_group_place((0, 1), &AxisBreak::default());
+        assert_eq!(lens.group_place((0, 1)), Some(AxisBreak::default()));
+        assert!(lens.surfaces.iter().all(|row| row.break_after.is_none()));
     }
 
     #[test]

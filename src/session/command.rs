@@ -191,6 +191,8 @@ pub enum PanelSetting {
     Picture(bool),
     /// The scene of the picture.
     Scene(BuiltInScene),
+    /// True to measure the error of the picture everywhere.
+    PictureErrors(bool),
     /// True to compute the lens as it is made.
     Tolerances(bool),
     /// The class of care in making of a lens without tolerances of its own.

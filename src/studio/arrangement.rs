@@ -38,14 +38,22 @@ const LIGHT: [PanelKind; 5] = [
     PanelKind::FieldCurves,
 ];
 
+/// The large panels, which stand above the table.
+const DRAWINGS: [PanelKind; 5] = [
+    PanelKind::Layout,
+    PanelKind::Slice,
+    PanelKind::Picture,
+    PanelKind::Glass,
+    PanelKind::Specification,
+];
+
 fn default_arrangement() -> Tree<PanelKind> {
     use PanelKind as Kind;
     let mut tiles = Tiles::default();
     let facts = tabs(&mut tiles, &[Kind::FirstOrder, Kind::Effects]);
     let light = tabs(&mut tiles, &LIGHT);
     let better = tabs(&mut tiles, &[Kind::Optimizer, Kind::Pareto, Kind::Search, Kind::History]);
-    let drawings =
-        tabs(&mut tiles, &[Kind::Layout, Kind::Slice, Kind::Picture, Kind::Specification]);
+    let drawings = tabs(&mut tiles, &DRAWINGS);
     let table = [Kind::Prescription, Kind::System, Kind::Zoom, Kind::Tolerances, Kind::Seidel];
     let table = tabs(&mut tiles, &table);
     let table = row(&mut tiles, &[(table, 0.71), (facts, 0.29)]);
@@ -58,8 +66,7 @@ fn default_arrangement() -> Tree<PanelKind> {
 fn search_arrangement() -> Tree<PanelKind> {
     use PanelKind as Kind;
     let mut tiles = Tiles::default();
-    let drawings =
-        tabs(&mut tiles, &[Kind::Layout, Kind::Slice, Kind::Picture, Kind::Specification]);
+    let drawings = tabs(&mut tiles, &DRAWINGS);
     let light = tabs(&mut tiles, &LIGHT);
     let numbers = [
         Kind::Prescription,
@@ -81,7 +88,7 @@ fn search_arrangement() -> Tree<PanelKind> {
 fn large_arrangement() -> Tree<PanelKind> {
     use PanelKind as Kind;
     let mut tiles = Tiles::default();
-    let drawings = tabs(&mut tiles, &[Kind::Layout, Kind::Slice, Kind::Specification]);
+    let drawings = tabs(&mut tiles, &[Kind::Layout, Kind::Slice, Kind::Specification, Kind::Glass]);
     let table = tabs(&mut tiles, &[Kind::Prescription]);
     let system = tabs(&mut tiles, &[Kind::System, Kind::Zoom, Kind::Tolerances]);
     let table = row(&mut tiles, &[(table, 0.66), (system, 0.34)]);

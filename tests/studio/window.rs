@@ -263,6 +263,7 @@ fn a_scene_is_seen_through_the_lens_while_its_panel_is_shown() {
     harness.run_steps(3);
     let image = image::open(&path).unwrap();
     assert!(image.width() >= 96 && image.height() >= 64);
+    assert_eq!(image.color(), image::ColorType::Rgb16, "16 bits for a colour of a pixel");
     std::fs::remove_file(&path).unwrap();
 }
 

@@ -102,7 +102,7 @@ fn every_formula_has_the_index_of_its_definition() {
         let found = entry.glass.index(um).unwrap();
         assert!((found - expected).abs() < 1e-13, "formula {formula}: {found}, {expected}");
         assert!(entry.glass.index(0.39).is_none() && entry.glass.index(0.81).is_none());
-        assert_eq!((entry.glass.density, entry.status), (Some(2.51), Some("preferred")));
+        assert_eq!((entry.glass.density, entry.glass.status), (Some(2.51), Some("preferred")));
     }
 }
 
@@ -121,7 +121,7 @@ fn a_glass_has_everything_that_its_maker_says() {
         assert!((entry.glass.index(um).unwrap() - index).abs() < 5e-6);
     }
     assert!((entry.glass.vd - 64.17).abs() < 0.005);
-    assert_eq!((entry.expansion, entry.relative_cost), (Some(7.1), Some(1.0)));
+    assert_eq!((entry.expansion, entry.glass.relative_cost), (Some(7.1), Some(1.0)));
     assert_eq!(entry.thermal[0], 1.86e-6);
     assert_eq!(entry.resistance, [2.0, 0.0, 1.0, 2.3, 2.3]);
     assert_eq!(entry.transmission, [[0.4, 0.997, 10.0], [0.5, 0.998, 10.0]]);

@@ -149,6 +149,16 @@ impl FreeformKind {
         }
     }
 
+    /// The degrees in x and y of the term that a number multiplies; `None` for a form whose terms are no
+    /// products of a function of x and one of y.
+    pub fn degrees(self, number: usize) -> Option<[usize; 2]> {
+        match self {
+            Self::XyPolynomial { .. } | Self::XyPhase { .. } => Some(series::powers(number + 1)),
+            Self::Chebyshev { .. } => Some(series::powers(number)),
+            _ => None,
+        }
+    }
+
     /// The lengths over which the coordinates are normalised, in mm; empty for a form without any.
     pub fn lengths(self) -> Vec<f64> {
         match self {
@@ -205,13 +215,9 @@ impl FreeformKind {
         match self {
             Self::Biconic | Self::Toroid => true,
             _ if self.is_round() => true,
-            Self::XyPolynomial { .. } | Self::XyPhase { .. } => {
-                series::powers(number + 1)[0].is_multiple_of(2)
-            }
-            Self::Chebyshev { .. } => series::powers(number)[0].is_multiple_of(2),
             Self::Zernike { .. } => series::noll(number).is_even_in_x(),
             Self::FringeZernike { .. } => series::fringe(number).is_even_in_x(),
-            _ => false,
+            _ => self.degrees(number).is_some_and(|[x, _]| x.is_multiple_of(2)),
         }
     }
 }

@@ -48,6 +48,12 @@ pub struct Glass {
     /// The density in g/cm³; `None` if the catalogue does not have it.
     #[serde(rename = "density_g_cm3", default)]
     pub density: Option<f64>,
+    /// Whether the maker still makes it, such as `preferred`; `None` if its catalogue does not say.
+    #[serde(skip)]
+    pub status: Option<&'static str>,
+    /// The price relative to that of N-BK7; `None` if the catalogue does not have it.
+    #[serde(skip)]
+    pub relative_cost: Option<f64>,
 }
 
 impl Glass {
@@ -58,6 +64,13 @@ impl Glass {
             return None;
         }
         self.formula.index(&self.coefficients, um)
+    }
+
+    /// The partial dispersion `PgF = (ng − nF)/(nF − nC)`; `None` if the formula does not reach these lines.
+    pub fn partial_dispersion(&self) -> Option<f64> {
+        let [g, f, c] = [line::G, line::F, line::C].map(|um| self.index(um));
+        let (g, f, c) = (g?, f?, c?);
+        Some((g - f) / (f - c)).filter(|partial| partial.is_finite())
     }
 
     /// The manufacturer and the name, as in lens files.
@@ -169,9 +182,15 @@ pub fn nearest(nd: f64, vd: f64) -> Option<&'static Glass> {
     catalogue().iter().min_by(|a, b| from(a).total_cmp(&from(b)))
 }
 
+/// The partial dispersion `PgF` of a glass on the normal line through K7 and F2, by its Abbe number:
+/// `0.6438 − 0.001682 vd` (Schott TIE-29).
+pub fn normal_partial_dispersion(vd: f64) -> f64 {
+    0.6438 - 0.001682 * vd
+}
+
 /// The index of a model glass at a wavelength in micrometres, from index and Abbe number at the d
 /// line, by Conrady's form `n = A + B/λ + C/λ^3.5` through nd, the difference nF − nC, and the
-/// partial dispersion of the normal line `PgF = 0.6438 − 0.001682 vd`; constant for `vd = 0`.
+/// partial dispersion of the normal line, [`normal_partial_dispersion`]; constant for `vd = 0`.
 pub fn model_index(nd: f64, vd: f64, um: f64) -> f64 {
     if vd == 0.0 {
         return nd;
@@ -179,7 +198,7 @@ pub fn model_index(nd: f64, vd: f64, um: f64) -> f64 {
     let p = |l: f64| 1.0 / l;
     let q = |l: f64| l.powf(-3.5);
     let spread = (nd - 1.0) / vd;
-    let partial = (0.6438 - 0.001682 * vd) * spread;
+    let partial = normal_partial_dispersion(vd) * spread;
     // B and C from nF − nC and ng − nF.
     let (a11, a12) = (p(line::F) - p(line::C), q(line::F) - q(line::C));
     let (a21, a22) = (p(line::G) - p(line::F), q(line::G) - q(line::F));

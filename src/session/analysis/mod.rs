@@ -203,7 +203,9 @@ fn refine(mut results: AnalysisResults, output: &AnalysisOutput) -> AnalysisResu
         analyses.as_built = Some(Arc::new(confirmed));
     }
     if settings.picture && !output.is_interrupted() {
-        let fine = time(|| catch_panic(|| scene_picture::fine_picture(&results.lens, zoom, scene)));
+        let all = settings.picture_errors;
+        let fine =
+            time(|| catch_panic(|| scene_picture::fine_picture(&results.lens, zoom, scene, all)));
         analyses.picture = Some(Arc::new(fine));
     }
     output.publish(results.clone());
@@ -397,6 +399,9 @@ pub struct AnalysisSettings {
     /// The scene of the picture.
     #[serde(default)]
     pub scene: BuiltInScene,
+    /// True if the error of the picture is measured everywhere, because a panel shows it.
+    #[serde(default)]
+    pub picture_errors: bool,
     /// True if the lens as it is made is computed, because a panel shows it.
     #[serde(default)]
     pub tolerances: bool,
@@ -423,6 +428,7 @@ impl Default for AnalysisSettings {
             field_curves: false,
             picture: false,
             scene: BuiltInScene::default(),
+            picture_errors: false,
             tolerances: false,
             grade: ToleranceGrade::default(),
             good_rms: None,

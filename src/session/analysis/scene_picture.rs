@@ -6,8 +6,8 @@ use crate::analysis::Estimate;
 use crate::lens::{Lens, Object};
 use crate::measure::time_ms;
 use crate::picture::{
-    BuiltInScene, Coloring, ExactRenderer, ImageFrame, Picture, PictureError, QuickRenderer,
-    field_diagonal, focused, picture_model, quick_error,
+    BuiltInScene, Coloring, ErrorMap, ExactRenderer, ImageFrame, Picture, PictureError,
+    QuickRenderer, field_diagonal, focused, picture_model,
 };
 use crate::pupil::RayModel;
 use std::sync::atomic::AtomicBool;
@@ -22,6 +22,8 @@ pub struct ScenePicture {
     /// The root mean square error against rays from every pixel, as a share of mid grey, with the
     /// milliseconds of the picture; `None` of a coarse picture, whose error is not measured.
     pub error: Option<Estimate>,
+    /// The error tile by tile; `None` of a coarse picture.
+    pub error_map: Option<ErrorMap>,
     /// The distance in mm to which the lens is focused; `None` at infinity.
     pub focus: Option<f64>,
 }
@@ -34,6 +36,8 @@ const NEAR: f64 = 1000.0;
 /// The tiles on which a fine picture is compared with rays, and the samples of their pixels.
 const TILES: usize = 4;
 const SAMPLES: usize = 32;
+/// The samples of a pixel if all tiles are compared.
+const MAP_SAMPLES: usize = 16;
 
 /// A coarse picture of a lens.
 pub(super) fn coarse_picture(
@@ -44,13 +48,15 @@ pub(super) fn coarse_picture(
     scene_picture(lens, zoom, scene, COARSE, None).map_err(|error| error.to_string())
 }
 
-/// A fine picture of a lens, with its error.
+/// A fine picture of a lens, with its error on some tiles, or on all of them.
 pub(super) fn fine_picture(
     lens: &Lens,
     zoom: usize,
     scene: BuiltInScene,
+    all_tiles: bool,
 ) -> Result<ScenePicture, String> {
-    scene_picture(lens, zoom, scene, FINE, Some(TILES)).map_err(|error| error.to_string())
+    let compared = if all_tiles { (usize::MAX, MAP_SAMPLES) } else { (TILES, SAMPLES) };
+    scene_picture(lens, zoom, scene, FINE, Some(compared)).map_err(|error| error.to_string())
 }
 
 fn scene_picture(
@@ -58,7 +64,7 @@ fn scene_picture(
     zoom: usize,
     scene: BuiltInScene,
     pixels: [usize; 2],
-    tiles: Option<usize>,
+    compared: Option<(usize, usize)>,
 ) -> Result<ScenePicture, PictureError> {
     let diagonal = field_diagonal(&RayModel::from_lens(lens, zoom)?)?;
     let (focus, moved) = match lens.object {
@@ -75,7 +81,9 @@ fn scene_picture(
             .map(|quick| quick.render(&AtomicBool::new(false)))
     });
     let picture = picture?;
-    let measured = tiles.map(|tiles| quick_error(&exact, &picture, tiles, SAMPLES));
-    let error = measured.map(|error| Estimate { milliseconds: Some(ms), ..error });
-    Ok(ScenePicture { scene, picture, error, focus })
+    let measure = |(tiles, samples)| ErrorMap::measure(&exact, &picture, tiles, samples);
+    let error_map = compared.map(measure);
+    let timed = |map: &ErrorMap| Estimate { milliseconds: Some(ms), ..map.rms() };
+    let error = error_map.as_ref().map(timed);
+    Ok(ScenePicture { scene, picture, error, error_map, focus })
 }

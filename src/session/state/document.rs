@@ -224,7 +224,7 @@ impl Session {
         files::write_atomic(path, &bytes).map_err(|why| why.to_string())
     }
 
-    /// Saves the newest picture of the scene.
+    /// Saves the newest picture of the scene, with 16 bits for a colour of a pixel.
     pub(super) fn save_picture(&mut self, path: &Path) {
         match self.write_picture(path) {
             Ok(()) => self.post(Severity::Note, format!("saved as {}", path.display())),
@@ -246,7 +246,7 @@ impl Session {
             ("Error", format!("{error} of mid grey (rms)")),
             ("Left out", "diffraction, losses, ghosts".to_owned()),
         ];
-        let bytes = encode_png(picture, BitDepth::Eight, ToneCurve::Srgb, &texts)
+        let bytes = encode_png(picture, BitDepth::Sixteen, ToneCurve::Srgb, &texts)
             .map_err(|why| why.to_string())?;
         files::write_atomic(path, &bytes).map_err(|why| why.to_string())
     }

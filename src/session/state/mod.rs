@@ -268,6 +268,7 @@ impl Session {
             PanelSetting::FieldCurves(shown) => settings.field_curves = shown,
             PanelSetting::Picture(shown) => settings.picture = shown,
             PanelSetting::Scene(scene) => settings.scene = scene,
+            PanelSetting::PictureErrors(shown) => settings.picture_errors = shown,
             PanelSetting::Tolerances(shown) => settings.tolerances = shown,
             PanelSetting::ToleranceGrade(grade) => settings.grade = grade,
             PanelSetting::GoodRms(rms) => settings.good_rms = rms,

@@ -18,6 +18,7 @@ pub mod software;
 pub use camera::{BoundingBox, Camera, round_length_below};
 pub use canvas::{RenderBackend, SceneCanvas, install_gpu_cache};
 pub use scene::{Rgba, Scene, Segment, TriangleVertex};
+pub(super) use scene_view::zoom_factor;
 pub use scene_view::{SceneResponse, SceneView, length_text};
 
 /// A drawn scene: rows from the top, four bytes a pixel, colour multiplied by alpha.

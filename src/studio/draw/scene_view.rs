@@ -167,7 +167,7 @@ fn to_dvec(v: egui::Vec2) -> DVec2 {
 /// By how much the wheel or two fingers bring the scene nearer.
 ///
 /// The events themselves are read: the smoothed ones would draw the scene ten times for a notch.
-fn zoom_factor(ui: &Ui) -> f64 {
+pub(in crate::studio) fn zoom_factor(ui: &Ui) -> f64 {
     ui.input(|input| {
         input.events.iter().fold(1.0, |factor, event| match event {
             Event::Zoom(nearer) => factor * f64::from(*nearer),

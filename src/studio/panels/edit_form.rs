@@ -3,7 +3,8 @@
 
 use egui::{Align, Id, Layout as Arrange, Response, RichText, Ui, vec2};
 
-use crate::lens::{Edit, apply_edit};
+use super::valid_edit;
+use crate::lens::Edit;
 use crate::math::expression::evaluate;
 use crate::session::{Command, SessionView};
 use crate::studio::actions::Actions;
@@ -72,10 +73,7 @@ impl EditForm<'_> {
 
     /// Asks for an edit if the lens stays valid; otherwise the field shows the reason.
     fn try_edit(&mut self, id: Id, edit: Result<Edit, String>) {
-        let tried = edit.and_then(|edit| {
-            apply_edit(&self.view.lens, &edit).map(|_| edit).map_err(|why| why.to_string())
-        });
-        match tried {
+        match edit.and_then(|edit| valid_edit(&self.view.lens, edit)) {
             Ok(edit) => {
                 self.buffers.accept(id);
                 self.actions.extend([Command::Edit(edit), Command::CommitEdit]);

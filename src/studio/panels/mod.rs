@@ -7,6 +7,7 @@ mod effects;
 mod fans;
 mod field_curves;
 mod first_order;
+mod glass;
 pub(super) mod grin;
 mod history;
 mod layout;
@@ -29,6 +30,7 @@ pub use effects::EffectsPanel;
 pub use fans::FansPanel;
 pub use field_curves::FieldCurvesPanel;
 pub use first_order::FirstOrderPanel;
+pub use glass::GlassPanel;
 pub use grin::GrinPanel;
 pub use history::HistoryPanel;
 pub use layout::LayoutPanel;
@@ -55,7 +57,7 @@ use super::draw::RenderBackend;
 use super::number;
 use super::text::capitalize;
 use crate::analysis::{Estimate, ImageQuality, Spot};
-use crate::lens::{Edit, FieldKind, FieldPoint, Lens, ParameterKind, add_variables};
+use crate::lens::{Edit, FieldKind, FieldPoint, Lens, ParameterKind, add_variables, apply_edit};
 use crate::session::{Analyses, AnalysisResults, SessionView};
 use crate::studio::actions::Actions;
 
@@ -95,6 +97,8 @@ pub enum PanelKind {
     FieldCurves,
     /// A scene seen through the lens.
     Picture,
+    /// The glasses of all catalogues.
+    Glass,
     /// A lens from a specification.
     Specification,
     /// Manufacturing errors and what they do to the lens.
@@ -121,7 +125,7 @@ pub enum PanelKind {
 
 impl PanelKind {
     /// Every panel. A new one is a file in this folder, an entry here and a place in the window.
-    pub const ALL: [Self; 20] = [
+    pub const ALL: [Self; 21] = [
         Self::Layout,
         Self::Slice,
         Self::Prescription,
@@ -131,6 +135,7 @@ impl PanelKind {
         Self::Fans,
         Self::FieldCurves,
         Self::Picture,
+        Self::Glass,
         Self::Specification,
         Self::Tolerances,
         Self::Optimizer,
@@ -156,6 +161,7 @@ impl PanelKind {
             Self::Fans => Box::new(FansPanel),
             Self::FieldCurves => Box::new(FieldCurvesPanel),
             Self::Picture => Box::new(PicturePanel::default()),
+            Self::Glass => Box::new(GlassPanel::default()),
             Self::Specification => Box::new(SpecificationPanel::default()),
             Self::Tolerances => Box::new(TolerancesPanel::default()),
             Self::Optimizer => Box::new(OptimizerPanel::default()),
@@ -208,6 +214,14 @@ fn mean_pupil_area(numbers: &Analyses) -> f64 {
     let fields = numbers.spots.value.iter().zip(&numbers.ray_model.value.fields);
     let parts = fields.map(|(spot, field)| (field.weight, ImageQuality::of_spot(spot)));
     ImageQuality::mean(&parts.collect::<Vec<_>>()).light.value
+}
+
+/// The edit, if the lens stays valid with it.
+///
+/// # Errors
+/// The reason why it would not.
+fn valid_edit(lens: &Lens, edit: Edit) -> Result<Edit, String> {
+    apply_edit(lens, &edit).map(|_| edit).map_err(|why| why.to_string())
 }
 
 /// The edit that lets the optimizer change some kinds of numbers too.

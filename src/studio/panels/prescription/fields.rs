@@ -10,9 +10,10 @@ use super::clipboard::cells;
 use super::columns::TableColumn;
 use super::glass;
 use super::table::{PrescriptionTable, room_in};
-use crate::lens::{Edit, Parameter, apply_edit};
+use crate::lens::{Edit, Parameter};
 use crate::session::Command;
 use crate::studio::number;
+use crate::studio::panels::valid_edit;
 use crate::studio::text::capitalize;
 use crate::studio::text_input::TextInput;
 
@@ -103,11 +104,7 @@ impl PrescriptionTable<'_> {
     /// Asks for an edit if the lens stays valid; otherwise the cell shows the reason.
     fn try_edit(&mut self, place: CellPlace, text: &str) -> bool {
         let edit = place.edit(&self.lens, self.view.settings.zoom, text);
-        let tried = edit.and_then(|edit| {
-            let lens = apply_edit(&self.lens, &edit);
-            lens.map(|_| edit).map_err(|why| why.to_string())
-        });
-        match tried {
+        match edit.and_then(|edit| valid_edit(&self.lens, edit)) {
             Ok(edit) => {
                 self.buffers.accept(place.id());
                 self.actions.extend([Command::Edit(edit), Command::CommitEdit]);

@@ -13,6 +13,7 @@ mod cells;
 mod clipboard;
 mod columns;
 mod cursor;
+mod details;
 mod fields;
 mod glass;
 mod radius_bounds;
@@ -24,9 +25,9 @@ use std::sync::Arc;
 
 use egui::{Button, Context, Frame, Id, Key, Margin, Panel as SidePanel, RichText, Ui};
 
-use super::Panel;
+use super::{Panel, valid_edit};
 use crate::lens::glass::Glass;
-use crate::lens::{Edit, Lens, apply_edit};
+use crate::lens::{Edit, Lens};
 use crate::session::{AnalysisResults, SessionView};
 use crate::studio::actions::Actions;
 use crate::studio::text::capitalize;
@@ -36,6 +37,7 @@ use candidate::Candidate;
 use cells::CellPlace;
 use columns::TableColumn;
 use cursor::{CellCursor, CellGrid, RangeCommand};
+use details::SurfaceDetails;
 use table::PrescriptionTable;
 
 /// The panel.
@@ -45,6 +47,8 @@ pub struct PrescriptionPanel {
     cursor: CellCursor,
     /// The reason why the last paste was refused.
     refused: Option<String>,
+    /// The shape and the place of the selected surface, beside the table.
+    details: SurfaceDetails,
 }
 
 impl Panel for PrescriptionPanel {
@@ -64,6 +68,7 @@ impl Panel for PrescriptionPanel {
             keys(ui, view, actions);
             self.cursor_keys(ui, view, &columns, actions);
             self.error_line(ui);
+            self.details.show(ui, view, actions);
         }
         let table = PrescriptionTable {
             view,
@@ -83,7 +88,7 @@ impl Panel for PrescriptionPanel {
     }
 
     fn is_typing(&self, context: &Context) -> bool {
-        self.buffers.is_typing(context)
+        self.buffers.is_typing(context) || self.details.is_typing(context)
     }
 }
 
@@ -146,7 +151,7 @@ impl PrescriptionPanel {
         }
     }
 
-    fn toolbar(&self, ui: &mut Ui, view: &SessionView, actions: &mut Actions) {
+    fn toolbar(&mut self, ui: &mut Ui, view: &SessionView, actions: &mut Actions) {
         let lens = &view.lens;
         let in_cell = self.cursor.active().and_then(CellPlace::surface);
         let row = view.selected.or(in_cell).filter(|row| *row < lens.surfaces.len());
@@ -162,6 +167,7 @@ impl PrescriptionPanel {
             }
             variables::menu(ui, lens, actions);
             columns::menu(ui, lens);
+            self.details.toggle(ui);
         });
     }
 }
@@ -214,10 +220,7 @@ fn remove_edit(surfaces: Vec<usize>) -> Option<Edit> {
 
 /// The edit if the lens stays valid, else the reason why not.
 fn checked(lens: &Lens, edit: Option<Edit>) -> Result<Option<Edit>, String> {
-    match edit {
-        Some(edit) => apply_edit(lens, &edit).map(|_| Some(edit)).map_err(|why| why.to_string()),
-        None => Ok(None),
-    }
+    edit.map(|edit| valid_edit(lens, edit)).transpose()
 }
 
 /// Says once what clips, in a lens with fixed and automatic semi-diameters.

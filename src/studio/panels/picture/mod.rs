@@ -1,0 +1,466 @@
+//! A scene seen through the lens: coarse while the lens changes, finer when it is still; beside that of
+//! another lens, or with its error.
+
+mod histogram;
+mod magnifier;
+
+use std::sync::Arc;
+
+use egui::{
+    Color32, ColorImage, ComboBox, Pos2, Rect, Response, RichText, Sense, Slider, TextureFilter,
+    TextureHandle, TextureOptions, Ui, Vec2, WidgetInfo, pos2, vec2,
+};
+
+use super::widgets::hint_beside;
+use super::{Panel, displayed_results, show_missing_results};
+use crate::picture::{BitDepth, BuiltInScene, Picture, SensorPreset, photon_count};
+use crate::session::{AnalysisResults, Command, PanelSetting, ScenePicture, SessionView, Timed};
+use crate::studio::actions::Actions;
+use crate::studio::cached::{ByAddress, Cached};
+use crate::studio::draw::zoom_factor;
+use crate::studio::file_dialog::FileRequest;
+use crate::studio::text::capitalize;
+use histogram::histogram;
+use magnifier::Magnifier;
+
+type ShownPicture = Timed<Result<ScenePicture, String>>;
+
+/// The way in which two pictures are compared, or one is looked at.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+enum PictureMode {
+    /// One picture.
+    #[default]
+    One,
+    /// Both beside each other.
+    Beside,
+    /// Both in one, to the left and to the right of a line.
+    Wipe,
+    /// The error of the picture.
+    Errors,
+}
+
+impl PictureMode {
+    const ALL: [(Self, &'static str, &'static str); 4] = [
+        (Self::One, "One", "The picture alone"),
+        (Self::Beside, "Side by side", "Beside the picture of the other lens, as bright as it is"),
+        (Self::Wipe, "Wipe", "The other lens to the left of a line"),
+        (
+            Self::Errors,
+            "Error",
+            "The error against rays from every pixel, tile by tile: black is none, white the largest",
+        ),
+    ];
+}
+
+/// A picture that is shown, with its name.
+#[derive(Clone)]
+struct NamedPicture {
+    name: &'static str,
+    shown: Arc<ShownPicture>,
+}
+
+impl NamedPicture {
+    fn new(name: &'static str, results: &AnalysisResults) -> Option<Self> {
+        let shown = results.analyses.as_ref().ok()?.picture.as_ref()?;
+        Some(Self { name, shown: Arc::clone(shown) })
+    }
+
+    fn picture(&self) -> Option<&ScenePicture> {
+        self.shown.value.as_ref().ok()
+    }
+}
+
+/// The picture whose texture is kept, and the white that it is shown with.
+type TextureKey = (ByAddress<ShownPicture>, u64);
+
+/// The panel.
+pub struct PicturePanel {
+    textures: [Cached<TextureKey, TextureHandle>; 2],
+    heat: Cached<ByAddress<ShownPicture>, TextureHandle>,
+    mode: PictureMode,
+    magnifier: Magnifier,
+    /// The place of the line of a wipe, as a share of the width.
+    line: f32,
+    /// A picture that was kept to compare others with.
+    kept: Option<NamedPicture>,
+    sensor: usize,
+}
+
+impl Default for PicturePanel {
+    fn default() -> Self {
+        Self {
+            textures: Default::default(),
+            heat: Cached::new(),
+            mode: PictureMode::default(),
+            magnifier: Magnifier::default(),
+            line: 0.5,
+            kept: None,
+            sensor: 0,
+        }
+    }
+}
+
+impl std::fmt::Debug for PicturePanel {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("PicturePanel").field("mode", &self.mode).finish_non_exhaustive()
+    }
+}
+
+impl Panel for PicturePanel {
+    fn title(&self) -> &'static str {
+        "Picture"
+    }
+
+    fn ui(&mut self, ui: &mut Ui, view: &SessionView, actions: &mut Actions) {
+        let Some((results, _)) = displayed_results(view) else {
+            return show_missing_results(ui, view);
+        };
+        let present = NamedPicture::new("present", results);
+        self.controls(ui, view, present.as_ref(), actions);
+        let Some(present) = present else {
+            ui.weak("Computing …");
+            return;
+        };
+        match &present.shown.value {
+            Ok(picture) => {
+                facts(ui, picture, present.shown.ms);
+                let others = self.compared(view, &present);
+                self.show(ui, &others);
+            }
+            Err(why) => {
+                ui.label(RichText::new(why).color(ui.visuals().warn_fg_color));
+            }
+        }
+    }
+}
+
+impl PicturePanel {
+    /// The choices above the picture.
+    fn controls(
+        &mut self,
+        ui: &mut Ui,
+        view: &SessionView,
+        present: Option<&NamedPicture>,
+        actions: &mut Actions,
+    ) {
+        let has_picture = present.is_some_and(|present| present.picture().is_some());
+        ui.horizontal_wrapped(|ui| {
+            choose_scene(ui, view, actions);
+            let save = "Saves the picture as PNG with 16 bits for a colour";
+            if has_picture && ui.button("Save …").on_hover_text(save).clicked() {
+                actions.push(FileRequest::SavePicture);
+            }
+            for (mode, name, hint) in PictureMode::ALL {
+                ui.selectable_value(&mut self.mode, mode, name).on_hover_text(hint);
+            }
+            let hint = "Compares what comes with the picture as it is now; a candidate is compared with \
+                        the design without";
+            if has_picture && ui.button("Keep").on_hover_text(hint).clicked() {
+                self.kept = present.map(|present| NamedPicture { name: "kept", ..present.clone() });
+            }
+            if self.kept.is_some() && ui.button("Forget").clicked() {
+                self.kept = None;
+            }
+        });
+        let measured = self.mode == PictureMode::Errors;
+        if measured != view.settings.picture_errors {
+            actions.push(Command::Show(PanelSetting::PictureErrors(measured)));
+        }
+    }
+
+    /// The pictures that are compared: the design and the candidate, or the one kept and the present one;
+    /// the present one alone if there is no other.
+    fn compared(&self, view: &SessionView, present: &NamedPicture) -> Vec<NamedPicture> {
+        if !matches!(self.mode, PictureMode::Beside | PictureMode::Wipe) {
+            return vec![present.clone()];
+        }
+        let design = view.preview_results.is_some().then_some(view.results.as_ref()).flatten();
+        let design = design.and_then(|results| NamedPicture::new("design", results));
+        let scene = |named: &NamedPicture| named.picture().map(|picture| picture.scene);
+        let other = self.kept.clone().or(design).filter(|other| scene(other) == scene(present));
+        let name = if view.preview_results.is_some() { "candidate" } else { "present" };
+        let mut pictures: Vec<NamedPicture> = other.into_iter().collect();
+        pictures.push(NamedPicture { name, ..present.clone() });
+        pictures
+    }
+
+    fn show(&mut self, ui: &mut Ui, pictures: &[NamedPicture]) {
+        let Some(first) = pictures.first().and_then(NamedPicture::picture) else { return };
+        let compares = matches!(self.mode, PictureMode::Beside | PictureMode::Wipe);
+        if compares && pictures.len() < 2 {
+            ui.weak(
+                "Nothing to compare with: keep a picture of this scene, or let a run offer a candidate.",
+            );
+        }
+        // Both as bright as their lenses make them: the white of the first.
+        let white = first.picture.white.max(f64::MIN_POSITIVE);
+        let seen: Vec<&Picture> =
+            pictures.iter().filter_map(|p| Some(&p.picture()?.picture)).collect();
+        let columns = if self.mode == PictureMode::Beside { seen.len() } else { 1 };
+        let room = ui.available_size();
+        let aspect = columns as f32 * shape(seen[0]).x / shape(seen[0]).y;
+        // A wide panel has room for the numbers at the right.
+        if room.x - aspect * room.y > BESIDE {
+            ui.horizontal_top(|ui| {
+                let at = self.areas(ui, pictures, (&seen, white), room);
+                ui.vertical(|ui| {
+                    histogram(ui, &seen, white);
+                    self.choose_sensor(ui);
+                    self.numbers(ui, pictures, (&seen, white), at);
+                });
+            });
+        } else {
+            histogram(ui, &seen, white);
+            self.choose_sensor(ui);
+            let words = WORDS * (1 + seen.len()) as f32;
+            let room = ui.available_size() - vec2(0.0, words);
+            let at = self.areas(ui, pictures, (&seen, white), room);
+            self.numbers(ui, pictures, (&seen, white), at);
+        }
+    }
+
+    /// Shows the numbers of the place under the pointer, or a hint to point there.
+    fn numbers(
+        &self,
+        ui: &mut Ui,
+        pictures: &[NamedPicture],
+        (seen, white): (&[&Picture], f64),
+        at: Option<Pos2>,
+    ) {
+        match at {
+            Some(at) => self.readout(ui, pictures, (seen, white), at),
+            None => drop(ui.weak(POINT)),
+        }
+    }
+
+    fn choose_sensor(&mut self, ui: &mut Ui) {
+        ui.horizontal(|ui| {
+            let chosen = &SensorPreset::ALL[self.sensor.min(SensorPreset::ALL.len() - 1)];
+            ui.label("Sensor");
+            let combo = ComboBox::from_id_salt("sensor").selected_text(chosen.name);
+            let shown = combo.show_ui(ui, |ui| {
+                for (i, preset) in SensorPreset::ALL.iter().enumerate() {
+                    let item = ui.selectable_value(&mut self.sensor, i, preset.name);
+                    hint_beside(item, preset.source);
+                }
+            });
+            shown.response.accessible_name("Sensor of the signal-to-noise ratio");
+            if self.mode == PictureMode::Wipe {
+                let slider = Slider::new(&mut self.line, 0.0..=1.0).show_value(false).text("Line");
+                ui.add(slider);
+            }
+            if !self.magnifier.is_whole() && ui.button("Whole picture").clicked() {
+                self.magnifier = Magnifier::default();
+            }
+        });
+    }
+
+    /// Shows the pictures; the place under the pointer in shares of the picture.
+    fn areas(
+        &mut self,
+        ui: &mut Ui,
+        pictures: &[NamedPicture],
+        (seen, white): (&[&Picture], f64),
+        room: Vec2,
+    ) -> Option<Pos2> {
+        let shape = shape(seen[0]);
+        let columns = if self.mode == PictureMode::Beside { seen.len() } else { 1 };
+        let gap = ui.spacing().item_spacing.x;
+        let width = room.x - gap * (columns - 1) as f32;
+        let scale = (width / (shape.x * columns as f32)).min(room.y / shape.y).max(0.1);
+        let size = shape * scale;
+        let mut found = None;
+        ui.horizontal(|ui| {
+            for column in 0..columns {
+                let (rect, response) = ui.allocate_exact_size(size, Sense::click_and_drag());
+                describe(&response, pictures, column);
+                self.navigate(ui, &response);
+                self.paint(ui, rect, pictures, column, white);
+                let pointer = response.hover_pos().filter(|_| response.contains_pointer());
+                if let Some(pointer) = pointer {
+                    found = Some(self.magnifier.place(share_of(rect, pointer)));
+                }
+            }
+        });
+        found
+    }
+
+    fn navigate(&mut self, ui: &Ui, response: &Response) {
+        if response.double_clicked() {
+            self.magnifier = Magnifier::default();
+        }
+        let rect = response.rect;
+        if response.dragged() {
+            let by = response.drag_delta() / rect.size();
+            self.magnifier = self.magnifier.dragged(by);
+        }
+        let pointer = response.hover_pos().filter(|_| response.contains_pointer());
+        if let Some(pointer) = pointer {
+            let factor = zoom_factor(ui) as f32;
+            if factor != 1.0 {
+                self.magnifier = self.magnifier.zoomed(factor, share_of(rect, pointer));
+            }
+        }
+    }
+
+    /// Paints what a column shows.
+    fn paint(&mut self, ui: &Ui, rect: Rect, pictures: &[NamedPicture], column: usize, white: f64) {
+        let painter = ui.painter_at(rect);
+        let part = self.magnifier.part();
+        if self.mode == PictureMode::Errors {
+            match self.heat_texture(ui, &pictures[0]) {
+                Some(id) => painter.image(id, rect, part, Color32::WHITE),
+                None => painter.rect_filled(rect, 0.0, ui.visuals().extreme_bg_color),
+            };
+            return;
+        }
+        let id = self.texture(ui, column, &pictures[column], white);
+        painter.image(id, rect, part, Color32::WHITE);
+        if self.mode == PictureMode::Wipe && pictures.len() > 1 {
+            let id = self.texture(ui, 1, &pictures[1], white);
+            let at = rect.left() + self.line * rect.width();
+            let right = Rect::from_min_max(pos2(at, rect.top()), rect.max);
+            let from = part.left() + self.line * part.width();
+            painter.image(
+                id,
+                right,
+                Rect::from_min_max(pos2(from, part.top()), part.max),
+                Color32::WHITE,
+            );
+            painter.vline(at, rect.y_range(), (1.0, ui.visuals().strong_text_color()));
+        }
+    }
+
+    /// The texture of a picture with the white of another.
+    fn texture(
+        &mut self,
+        ui: &Ui,
+        slot: usize,
+        named: &NamedPicture,
+        white: f64,
+    ) -> egui::TextureId {
+        let key = (ByAddress::from(&named.shown), white.to_bits());
+        let texture = self.textures[slot].get(key, |_| {
+            let picture = named.picture().map(|shown| Picture { white, ..shown.picture.clone() });
+            let (size, bytes) = picture.map_or(([1, 1], vec![0; 3]), |picture| {
+                (picture.frame.pixels, picture.srgb_bytes(BitDepth::Eight))
+            });
+            let image = ColorImage::from_rgb(size, &bytes);
+            ui.ctx().load_texture(format!("picture {slot}"), image, PIXELS)
+        });
+        texture.id()
+    }
+
+    /// The texture of the error of a picture; `None` while it is not measured.
+    fn heat_texture(&mut self, ui: &Ui, named: &NamedPicture) -> Option<egui::TextureId> {
+        let map = named.picture()?.error_map.as_ref()?;
+        let texture = self.heat.get(ByAddress::from(&named.shown), |_| {
+            let image = ColorImage::from_rgb(map.pixels(), map.heat(map.largest()).as_flattened());
+            ui.ctx().load_texture("picture errors", image, PIXELS)
+        });
+        Some(texture.id())
+    }
+
+    /// The numbers of the pixels at a place in shares of the pictures.
+    fn readout(
+        &self,
+        ui: &mut Ui,
+        pictures: &[NamedPicture],
+        (seen, white): (&[&Picture], f64),
+        at: Pos2,
+    ) {
+        let sensor = &SensorPreset::ALL[self.sensor.min(SensorPreset::ALL.len() - 1)].model;
+        // The same exposure for all: normal for the first.
+        let seconds = sensor.normal_exposure(seen[0], LUMINANCE);
+        for (named, picture) in pictures.iter().zip(seen) {
+            let [column, row] = pixel_at(picture, at);
+            let values = picture.values[row * picture.frame.pixels[0] + column];
+            let [red, green, blue] = values.map(|value| 100.0 * value / white);
+            let lux = LUMINANCE * picture.gray([column, row]);
+            let photons = photon_count(lux, picture.frame.pitch, seconds);
+            let noise = sensor.signal_to_noise(photons, sensor.dark_current * seconds);
+            let text = format!(
+                "{}, pixel {column}, {row}: red {red:.1}, green {green:.1}, blue {blue:.1} % of white, \
+                 SNR {noise:.1}",
+                capitalize(named.name)
+            );
+            ui.label(RichText::new(text).small()).on_hover_text(EXPOSURE);
+        }
+    }
+}
+
+/// The width that is left beside the picture for its numbers to stand there, in points.
+const BESIDE: f32 = 230.0;
+/// The height of a line of numbers below the picture, in points.
+const WORDS: f32 = 18.0;
+/// The luminance of white in the scene, in cd/m²: a room by day.
+const LUMINANCE: f64 = 100.0;
+const POINT: &str =
+    "Point at the picture: light and signal-to-noise ratio of a pixel; the wheel magnifies";
+const EXPOSURE: &str = "The signal-to-noise ratio of a pixel of the sensor, by the mean of its colours: white \
+                        has 100 cd/m², and the exposure is that at which white of the first picture \
+                        fills 80 % of the range; the same time for both";
+
+/// The columns and rows of a picture.
+fn shape(picture: &Picture) -> Vec2 {
+    let [columns, rows] = picture.frame.pixels.map(|count| count as f32);
+    vec2(columns, rows)
+}
+
+/// The column and the row at a place in shares of a picture.
+fn pixel_at(picture: &Picture, at: Pos2) -> [usize; 2] {
+    let [columns, rows] = picture.frame.pixels;
+    let place = |share: f32, count: usize| ((share * count as f32) as usize).min(count - 1);
+    [place(at.x, columns), place(at.y, rows)]
+}
+
+/// Pixels that are magnified keep their edges.
+const PIXELS: TextureOptions =
+    TextureOptions { magnification: TextureFilter::Nearest, ..TextureOptions::LINEAR };
+
+/// A place of an area in shares of its width and height.
+fn share_of(rect: Rect, place: Pos2) -> Pos2 {
+    Pos2::ZERO + (place - rect.min) / rect.size().max(Vec2::splat(1.0))
+}
+
+/// The name of what a column shows.
+fn describe(response: &Response, pictures: &[NamedPicture], column: usize) {
+    let Some(named) = pictures.get(column) else { return };
+    let Some(picture) = named.picture() else { return };
+    let scene = picture.scene.name();
+    let label = if pictures.len() > 1 {
+        format!("Picture of {scene} through the {} lens", named.name)
+    } else {
+        format!("Picture of {scene} through the lens")
+    };
+    response.widget_info(|| WidgetInfo::labeled(egui::Role::Image, true, &label));
+}
+
+fn choose_scene(ui: &mut Ui, view: &SessionView, actions: &mut Actions) {
+    let chosen = view.settings.scene;
+    let combo = ComboBox::from_id_salt("scene").selected_text(chosen.name());
+    let shown = combo.show_ui(ui, |ui| {
+        for (scene, name) in BuiltInScene::ALL {
+            if ui.selectable_label(chosen == scene, name).clicked() {
+                actions.push(Command::Show(PanelSetting::Scene(scene)));
+            }
+        }
+    });
+    shown.response.accessible_name("Scene");
+}
+
+/// Pixels, error, focus and time.
+fn facts(ui: &mut Ui, picture: &ScenePicture, ms: f64) {
+    let [width, height] = picture.picture.frame.pixels;
+    let focus = picture.focus.map_or("infinity".to_owned(), |mm| format!("{mm:.0} mm"));
+    let error = picture
+        .error
+        .map_or("coarse".to_owned(), |error| format!("± {:.1} % of mid grey", 100.0 * error.value));
+    let largest = picture.error_map.as_ref().map_or(String::new(), |map| {
+        format!(", at most {:.1} % in {} tiles", 100.0 * map.largest(), map.tiles())
+    });
+    let text = format!("{width} x {height}, {error}{largest}, focus at {focus}, {ms:.0} ms");
+    let hover = "The error is measured against rays from every pixel, on some tiles. Diffraction, losses \
+                 and ghosts are left out";
+    ui.label(RichText::new(text).small().weak()).on_hover_text(hover);
+}
