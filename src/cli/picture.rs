@@ -234,7 +234,7 @@ impl PictureArgs {
             print_note("note: stopped; what was not sampled is black");
         }
         let map = |picture: &Picture| {
-            ErrorMap::measure(&renderer, picture, usize::MAX, MAPPED_SAMPLES, stop)
+            ErrorMap::measure_until(&renderer, picture, (usize::MAX, MAPPED_SAMPLES), stop)
         };
         let error_map = self.error_map.as_ref().map(|_| map(&picture.picture));
         let losses = renderer.losses().cloned();
@@ -438,7 +438,7 @@ fn quick_picture(
     stop: &AtomicBool,
 ) -> Result<RenderedPicture, PictureError> {
     let quick = QuickRenderer::new(&shot.model, &shot.bands, exact)?;
-    let (mut picture, ms) = time_ms(|| quick.render(stop));
+    let (mut picture, ms) = time_ms(|| quick.render_until(stop));
     let error = quick_error(exact, &picture, CHECKED_TILES, CHECKED_SAMPLES);
     picture.rays = error.rays;
     let error = Estimate { milliseconds: Some(ms), ..error };

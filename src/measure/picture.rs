@@ -14,7 +14,6 @@ use crate::picture::{
 use crate::pupil::RayModel;
 use serde::Serialize;
 use std::ops::ControlFlow;
-use std::sync::atomic::AtomicBool;
 
 /// The way of making a picture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -148,7 +147,7 @@ impl PreparedCamera<'_> {
     fn quick(&self, tiles: Option<usize>) -> Result<PictureRow, PictureError> {
         let (made, ms) = time_ms(|| {
             let quick = QuickRenderer::new(self.model, self.bands, self.renderer)?;
-            Ok::<_, PictureError>(quick.render(&AtomicBool::new(false)))
+            Ok::<_, PictureError>(quick.render())
         });
         let picture = made?;
         let error = tiles.map(|tiles| quick_error(self.renderer, &picture, tiles, SAMPLES).value);

@@ -36,6 +36,15 @@ impl ErrorMap {
         picture: &Picture,
         count: usize,
         samples: usize,
+    ) -> Self {
+        Self::measure_until(exact, picture, (count, samples), &AtomicBool::new(false))
+    }
+
+    /// The same; once `stop` is true, no further tile is measured.
+    pub fn measure_until(
+        exact: &ExactRenderer<'_>,
+        picture: &Picture,
+        (count, samples): (usize, usize),
         stop: &AtomicBool,
     ) -> Self {
         let tiles = exact.tiles();
@@ -138,7 +147,7 @@ pub fn quick_error(
     count: usize,
     samples: usize,
 ) -> Estimate {
-    ErrorMap::measure(exact, picture, count, samples, &AtomicBool::new(false)).rms()
+    ErrorMap::measure(exact, picture, count, samples).rms()
 }
 
 #[cfg(test)]

@@ -65,8 +65,13 @@ impl<'a> QuickRenderer<'a> {
         Ok(Self { scene, frame, colors, table, paintings, white: exact.white(), overshoot })
     }
 
-    /// The picture, without errors of its pixels. Once `stop` is true, the rest stays black.
-    pub fn render(&self, stop: &AtomicBool) -> Picture {
+    /// The picture, without errors of its pixels.
+    pub fn render(&self) -> Picture {
+        self.render_until(&AtomicBool::new(false))
+    }
+
+    /// The same; once `stop` is true, the rest stays black.
+    pub fn render_until(&self, stop: &AtomicBool) -> Picture {
         let [columns, rows] = self.frame.pixels;
         let mut values = vec![[0.0; 3]; columns * rows];
         let is_stopped = || stop.load(Ordering::Relaxed);

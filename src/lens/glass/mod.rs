@@ -48,7 +48,7 @@ pub struct Glass {
     /// The density in g/cm³; `None` if the catalogue does not have it.
     #[serde(rename = "density_g_cm3", default)]
     pub density: Option<f64>,
-    /// Whether the maker still makes it, such as `preferred`; `None` if its catalogue does not say.
+    /// Its status with the maker, such as `preferred`; `None` if its catalogue does not say.
     #[serde(skip)]
     pub status: Option<&'static str>,
     /// The price relative to that of N-BK7; `None` if the catalogue does not have it.

@@ -235,6 +235,7 @@ mod tests {
     use crate::search::design::LensSpecification;
     use crate::search::design::glasses::snapped;
     use crate::search::design::starts::achromats;
+    use std::slice;
 
     fn finished() -> (LensRequirements, LensDraft, Lens) {
         let spec: LensSpecification = serde_json::from_str(
@@ -290,11 +291,12 @@ mod tests {
         let (asked, draft, _) = finished();
         let draft = settled(&snapped(&draft, &asked), &asked);
         let candidate = Candidate { origin: "an achromat".to_owned(), draft, value: 0.0 };
-        let lenses = finished_lenses(&[candidate.clone()], &asked, &AtomicBool::new(false));
+        let lenses = finished_lenses(slice::from_ref(&candidate), &asked, &AtomicBool::new(false));
         assert!(lenses[0].judgement.is_valid(), "{:?}", lenses[0].judgement.failures());
         assert!(lenses.iter().all(|lens| lens.merit != DesignMerit::Simplest));
         // A request to end leaves the lens that there is.
-        let broken_off = finished_lenses(&[candidate], &asked, &AtomicBool::new(true));
+        let broken_off =
+            finished_lenses(slice::from_ref(&candidate), &asked, &AtomicBool::new(true));
         assert_eq!(broken_off.len(), 1);
         assert!(rank(&broken_off[0].judgement) >= rank(&lenses[0].judgement));
     }

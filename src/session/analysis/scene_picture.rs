@@ -10,7 +10,6 @@ use crate::picture::{
     QuickRenderer, field_diagonal, focused, picture_model,
 };
 use crate::pupil::RayModel;
-use std::sync::atomic::AtomicBool;
 
 /// A picture of a scene through the lens.
 #[derive(Debug, Clone)]
@@ -76,10 +75,8 @@ fn scene_picture(
     let frame = ImageFrame::new(&model, pixels, diagonal)?;
     let painted = scene.build(&model, &frame, focus)?;
     let exact = ExactRenderer::new(&model, &bands, &painted, frame)?;
-    let (picture, ms) = time_ms(|| {
-        QuickRenderer::new(&model, &bands, &exact)
-            .map(|quick| quick.render(&AtomicBool::new(false)))
-    });
+    let (picture, ms) =
+        time_ms(|| QuickRenderer::new(&model, &bands, &exact).map(|quick| quick.render()));
     let picture = picture?;
     let measure = |(tiles, samples)| ErrorMap::measure(&exact, &picture, tiles, samples);
     let error_map = compared.map(measure);

@@ -94,7 +94,8 @@ fn the_energy_in_a_circle_grows_with_it() {
         let Some(f_number) = model.first_order.working_f_number else { return Ok(false) };
         let ring = 1e-3 * model.channels[wavelength].um * f_number.abs();
         let radii = [0.5, 1.0, 2.0, 4.0, 8.0].map(|radius| radius * ring);
-        let center = model.chief_point(field, wavelength).map_err(text)?;
+        let spot = spot(model, field, ROUGH).map_err(text)?;
+        let center = spot.channels[wavelength].map_err(text)?.centroid.map(|x| x.value);
         let energy = encircled_energy(model, field, wavelength, center, &radii, ROUGH);
         let energy = energy.map_err(text)?;
         for pair in energy.windows(2) {
