@@ -243,7 +243,7 @@ impl Region<'_> {
     ) -> Result<PupilDerivative, DerivativeError> {
         let mut rays = self.rays;
         let mut before: Option<PupilDerivative> = None;
-        let mut last = 0;
+        let (mut last, mut changes) = (0, 0);
         for order in 0..self.orders() {
             // An order takes about twice the rays of the one before.
             if rays + 2 * last > asked.max_rays && before.is_some() {
@@ -254,7 +254,9 @@ impl Region<'_> {
             rays += last;
             now.rays = rays;
             now.add_order_error(before.as_ref());
-            now.reached = now.reaches(asked.tolerance);
+            changes += usize::from(before.is_some());
+            // A first change alone does not tell an agreement by chance.
+            now.reached = changes >= 2 && now.reaches(asked.tolerance);
             if now.reached {
                 return Ok(now);
             }
@@ -329,7 +331,8 @@ const DIFFERENCE_ROUNDING: f64 = 1e-9;
 impl PupilDerivative {
     /// Adds the change by the last raising of the order to the errors; all of the derivative if
     /// this is the first order. The relative error of a number is at least that of the worst of its
-    /// kind, since some change little by chance.
+    /// kind, since some change little by chance, and at least the square of that of the order before:
+    /// twice the nodes do not gain more.
     fn add_order_error(&mut self, before: Option<&Self>) {
         let Some(before) = before else {
             self.error = self.gradient.zip_with(&self.gradient, |_, _| f64::INFINITY);
@@ -338,8 +341,13 @@ impl PupilDerivative {
         let change = self.gradient.zip_with(&before.gradient, |a, b| (a - b).abs());
         self.error = self.error.zip_with(&change, |a, b| a + b);
         for slot in SurfaceParameter::all() {
-            let [worst, largest] = [&self.error, &self.gradient].map(|g| g.largest(slot));
-            let share = if largest > 0.0 { (worst / largest).min(1.0) } else { 0.0 };
+            let [worst, largest, earlier] =
+                [&self.error, &self.gradient, &before.error].map(|g| g.largest(slot));
+            let relative =
+                |error: f64| if largest > 0.0 { (error / largest).min(1.0) } else { 0.0 };
+            // Of a first change there is no order before.
+            let least = if earlier.is_finite() { relative(earlier).powi(2) } else { 0.0 };
+            let share = relative(worst).max(least);
             for (error, by) in self.error.surfaces.iter_mut().zip(&self.gradient.surfaces) {
                 let larger = error.by(slot).max(share * by.by(slot).abs());
                 error.set(slot, larger);
