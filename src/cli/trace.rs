@@ -36,7 +36,7 @@ pub(super) struct TraceArgs {
     coating: Coating,
 
     /// Rims clip no ray
-    #[arg(long, requires = "ghost")]
+    #[arg(long)]
     unclipped: bool,
 
     #[command(flatten)]
@@ -96,6 +96,7 @@ impl TraceArgs {
         let effects = simplify_as_asked(&mut system, &opened, zoom, &choices)?;
         let refuse = |source| CliError::Rays { file: input::display_name(&self.rays), source };
         let tracer = Tracer::new(&system).map_err(refuse)?;
+        let tracer = if self.unclipped { tracer.without_rims() } else { tracer };
         let rays: Vec<Ray<f64>> = request.rays.into_iter().map(Ray::from).collect();
         rays.iter().enumerate().try_for_each(|(i, ray)| ray.check(i)).map_err(refuse)?;
         let last = tracer.surfaces() - 1;

@@ -219,6 +219,10 @@ fn trace_gives_every_ray_its_fate() {
     assert_eq!(traced["fates"]["imaged"], 1);
     assert_eq!(rays[0]["z"], 0.0);
     assert!(rays[0].get("backwards").is_none());
+    // The ray that a rim clips meets no rim.
+    let request = json!({"rays": [ray(6.2, 0.0, 1.0)]}).to_string();
+    let free = done_json(&["trace", LENS, "--rays", "-", "--unclipped"], &request);
+    assert_eq!(free["rays"][0]["fate"], "imaged");
 }
 
 #[test]

@@ -321,6 +321,9 @@ impl Region<'_> {
     }
 }
 
+/// Relative changes above this are those of coarse orders, which do not fall evenly: errors are up to
+/// three times as large.
+const COARSE: f64 = 1e-4;
 /// The part of the natural size that the noise of numbers without an effect is compared with.
 const NOTABLE: f64 = 0.1;
 /// A derivative this much smaller than its natural size is rounding.
@@ -347,7 +350,8 @@ impl PupilDerivative {
                 |error: f64| if largest > 0.0 { (error / largest).min(1.0) } else { 0.0 };
             // Of a first change there is no order before.
             let least = if earlier.is_finite() { relative(earlier).powi(2) } else { 0.0 };
-            let share = relative(worst).max(least);
+            let share = relative(worst);
+            let share = (share * (1.0 + 2.0 * (share / COARSE).min(1.0))).max(least);
             for (error, by) in self.error.surfaces.iter_mut().zip(&self.gradient.surfaces) {
                 let larger = error.by(slot).max(share * by.by(slot).abs());
                 error.set(slot, larger);
