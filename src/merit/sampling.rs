@@ -362,8 +362,9 @@ impl RaySampling {
         let mut channels: Vec<ChannelRays> =
             model.channels.iter().map(|c| ChannelRays::new(c.um)).collect();
         for (wavelength, channel) in channels.iter_mut().enumerate() {
+            let mirrors_in_x = model.channels[wavelength].system.mirrors_in_x();
             for field in 0..self.fields.len() {
-                channel.mirrored.push(self.fields[field].x == 0.0);
+                channel.mirrored.push(mirrors_in_x && self.fields[field].x == 0.0);
                 let is_same = |(pupil, _): &(&SampledPupil, &TracedPupil<'_>)| {
                     (pupil.wavelength, pupil.field) == (wavelength, field)
                 };

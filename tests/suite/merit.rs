@@ -362,6 +362,38 @@ fn goal_of(term: Term) -> Goal {
     }
 }
 
+/// On the axis a tilt about y is one about x, turned by a right angle: a lens without a plane of symmetry has
+/// spots about their own centroids.
+#[test]
+fn a_lens_without_symmetry_has_the_merit_of_the_same_lens_turned() {
+    let tilted = |tilt: [f64; 2]| {
+        let mut lens = achromat();
+        lens.fields.values.truncate(1);
+        lens.surfaces[0].tilt = tilt;
+        lens.variables.clear();
+        (0..3).for_each(|surface| vary(&mut lens, surface, Quantity::Curvature));
+        lens
+    };
+    let contrast = Term::GeometricMtf { frequency: 10.0, min: 1.0 };
+    for term in [Term::Spot, Term::SpotIntegral, Term::Wavefront, Term::Strehl, contrast] {
+        let sum = |tilt| {
+            let lens = tilted(tilt);
+            let merit = Merit::new(&lens, &goal_of(term), 1e-4).unwrap();
+            merit.evaluate(&merit.values(&lens), DerivativeLevel::Normal).unwrap()
+        };
+        let [about_x, about_y] = [sum([0.2, 0.0]), sum([0.0, 0.2])];
+        assert!(about_x.value > 0.0, "{term:?}");
+        assert!(
+            (about_y.value / about_x.value - 1.0).abs() < 2e-3,
+            "{term:?}: {about_x:?} {about_y:?}"
+        );
+        let off = (&about_y.gradient - &about_x.gradient).norm();
+        assert!(off < 1e-2 * about_x.gradient.norm(), "{term:?}: {about_x:?} {about_y:?}");
+        let off = (&about_y.normal - &about_x.normal).norm();
+        assert!(off < 1e-2 * about_x.normal.norm(), "{term:?}: {about_x:?} {about_y:?}");
+    }
+}
+
 /// A spherical mirror of radius 200 mm with a beam of semi-diameter 10 mm.
 fn spherical_mirror() -> Lens {
     let mut lens = bundled("double_gauss_rudolph_50");

@@ -112,7 +112,9 @@ fn spots_know_the_symmetry_of_a_lens() {
     };
     let [about_x, about_y] = [rms([3.0, 0.0]), rms([0.0, 3.0])];
     assert!((about_x.0.value / about_y.0.value - 1.0).abs() < 1e-6);
-    println!("{:?} {:?}", about_x.1, about_y.1);
+    let [x, y] = about_y.1.map(|at| at.value);
+    assert!(x.abs() > 0.1 && y.abs() < 1e-6, "{x} {y}");
+    assert!((x.abs() - about_x.1[1].value.abs()).abs() < 1e-5, "{x} {:?}", about_x.1);
 }
 
 #[test]
