@@ -58,7 +58,7 @@ pub fn lateral_color(
 /// The longitudinal aberration at every wavelength, at evenly spaced heights in the pupil.
 ///
 /// # Errors
-/// The axial point has no rays, or none that reaches the image.
+/// The axial point has no rays, or none that reaches the image, or the lens is not symmetric about its axis.
 pub fn longitudinal_aberration(
     model: &RayModel,
     zones: usize,
@@ -72,6 +72,9 @@ fn longitudinal(
     wavelength: usize,
     zones: usize,
 ) -> Result<LongitudinalAberration, AnalysisError> {
+    if !model.channels[wavelength].system.has_rotational_symmetry() {
+        return Err(AnalysisError::NotSymmetric);
+    }
     let axis = FieldPoint { x: 0.0, y: 0.0, weight: 1.0 };
     let launch = model.launch(axis, wavelength).map_err(AnalysisError::NoRays)?;
     let rounding = rounding_error(model);

@@ -134,6 +134,19 @@ pub enum FieldKind {
     ImageHeight,
 }
 
+/// True if all fields with a weight lie on one ray from the axis: in a lens that is symmetric about it they
+/// stand for those opposite to them too.
+pub fn lie_on_one_side(fields: &[FieldPoint]) -> bool {
+    let lit = || fields.iter().filter(|field| field.weight > 0.0);
+    let square = |field: &FieldPoint| field.x * field.x + field.y * field.y;
+    let Some(outer) = lit().max_by(|a, b| square(a).total_cmp(&square(b))) else { return true };
+    lit().all(|field| {
+        let across = field.x * outer.y - field.y * outer.x;
+        let along = field.x * outer.x + field.y * outer.y;
+        across.abs() <= 1e-12 * square(outer) && along >= 0.0
+    })
+}
+
 /// One field point.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]

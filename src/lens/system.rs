@@ -360,6 +360,16 @@ impl<R: Real> System<R> {
         })
     }
 
+    /// True if the lens is the same after any turn about its axis.
+    pub fn has_rotational_symmetry(&self) -> bool {
+        self.surfaces.iter().all(|surface| {
+            let is_centred = surface.pose.is_none() && surface.axis.is_none();
+            let is_grating = matches!(surface.ideal, Some(IdealAction::Grating { .. }));
+            let is_round = surface.freeform.as_ref().is_none_or(|form| form.kind.is_round());
+            is_centred && is_round && surface.astigmatism.is_none() && !is_grating
+        })
+    }
+
     /// True if the axis is broken at any surface.
     pub fn has_broken_axis(&self) -> bool {
         self.surfaces.iter().any(|surface| surface.axis.is_some())

@@ -22,7 +22,7 @@ use super::scoped_part::ScopedPart;
 use super::spot::lost_ray_error;
 use super::sum::{DerivativeLevel, SumOfSquares};
 use super::{EvaluationContext, MeritError, SampledPupil};
-use crate::lens::{FieldPoint, Lens, LensError, System, Term, TermScope, Tolerance};
+use crate::lens::{Lens, LensError, System, Term, TermScope, Tolerance, lie_on_one_side};
 use crate::math::{SimdWidth, dot, excess_beyond, run_vectorized, sum_of_products};
 use crate::pupil::TracedPupil;
 use crate::tolerance::{
@@ -287,7 +287,7 @@ impl<'a> Growth<'a> {
     /// Finds the mean products of slopes and effects. In a lens whose fields stand for those on the
     /// other side of the axis too, no error across the axis displaces the common focus.
     fn find_focus(&mut self) {
-        let two_sided = stands_for_both_sides(&self.context.sampling.fields);
+        let two_sided = lie_on_one_side(&self.context.sampling.fields);
         for field in 0..self.context.sampling.fields.len() {
             let mirrored = self.is_mirrored(field);
             let rays: Vec<_> = self.rays_of_field(field).collect();
@@ -548,14 +548,6 @@ impl MadeChannel {
         let of = |slopes: &Vec<f64>| weighted_dot(&self.weights, slopes, slopes);
         self.effects.slopes.iter().map(of).sum()
     }
-}
-
-/// True if the fields of a centred lens lie on one side of its axis and stand for both.
-fn stands_for_both_sides(fields: &[FieldPoint]) -> bool {
-    let lit = || fields.iter().filter(|field| field.weight > 0.0);
-    let upper = lit().all(|field| field.x == 0.0 && field.y >= 0.0);
-    let lower = lit().all(|field| field.x == 0.0 && field.y <= 0.0);
-    upper || lower
 }
 
 /// The sum of some rows, each times a factor.

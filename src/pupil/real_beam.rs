@@ -40,8 +40,12 @@ pub fn filled_stop_radius<R: Real>(system: &System<R>, beam: &Beam) -> Result<R,
     let stop = system.stop.unwrap_or(0);
     let tracer = Tracer::new(&front_part(system, stop))?.without_rims();
     let ray = marginal_ray(&first, beam.object);
-    let height = stop_height(&tracer, stop, ray);
-    Ok(height.unwrap_or(first.stop_semi_diameter))
+    let radius = if system.has_rotational_symmetry() {
+        stop_height(&tracer, stop, ray)
+    } else {
+        stop_radius(&tracer, stop, ray)
+    };
+    Ok(radius.unwrap_or(first.stop_semi_diameter))
 }
 
 /// The system up to and including a surface. A gradient behind that has nothing to end at.
@@ -82,8 +86,38 @@ fn from_axial_point<R: Real>(distance: f64, along: Vec3<R>) -> Ray<R> {
 
 /// The height of a ray at the stop in mm; `None` if it does not get there.
 fn stop_height<R: Real>(tracer: &Tracer<R>, stop: usize, ray: Ray<R>) -> Option<R> {
+    let height = stop_point(tracer, stop, ray)?.y.abs();
+    (height.value() > 0.0).then_some(height)
+}
+
+/// The radius in mm of what the beam of a marginal ray fills of the stop of a lens that is not symmetric
+/// about its axis: the geometric mean of the half distances of opposite rays, since the middle of the
+/// beam is not on the axis. `None` if one of the four rays does not get there.
+fn stop_radius<R: Real>(tracer: &Tracer<R>, stop: usize, ray: Ray<R>) -> Option<R> {
+    let mut turned = ray;
+    let mut points = [Vec3::default(); 4];
+    for point in &mut points {
+        *point = stop_point(tracer, stop, turned)?;
+        turned = quarter_turn(turned);
+    }
+    let distance2 = |i: usize| {
+        let Vec3 { x, y, .. } = points[i + 2] - points[i];
+        x * x + y * y
+    };
+    let radius = R::from_f64(0.5) * (distance2(0) * distance2(1)).sqrt().sqrt();
+    (radius.value() > 0.0).then_some(radius)
+}
+
+/// The point of a ray at the stop; `None` if it does not get there.
+fn stop_point<R: Real>(tracer: &Tracer<R>, stop: usize, ray: Ray<R>) -> Option<Vec3<R>> {
     let landing = tracer.trace_to(ray, stop);
-    let height = landing.ray.point.y.abs();
-    let reached = landing.fate.is_imaged() && height.value() > 0.0 && height.value().is_finite();
-    reached.then_some(height)
+    let point = landing.ray.point;
+    let is_finite = [point.x, point.y].iter().all(|at| at.value().is_finite());
+    (landing.fate.is_imaged() && is_finite).then_some(point)
+}
+
+/// A ray that is turned by a right angle about the axis.
+fn quarter_turn<R: Real>(ray: Ray<R>) -> Ray<R> {
+    let turn = |v: Vec3<R>| Vec3::new(R::ZERO - v.y, v.x, v.z);
+    Ray { point: turn(ray.point), direction: turn(ray.direction) }
 }

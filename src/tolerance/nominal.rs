@@ -5,7 +5,7 @@
 
 use super::merits::open_tracers;
 use super::{Beam, ColourRays, FieldBeam, MeritOptions, NominalLens, ToleranceError};
-use crate::lens::{Lens, System};
+use crate::lens::{Lens, System, lie_on_one_side};
 use crate::math::Vec3;
 use crate::pupil::{Accuracy, Launch, Nodes, RayModel, Region, converge};
 use crate::trace::{ImagePoints, Ray};
@@ -58,10 +58,7 @@ fn other(error: &dyn std::fmt::Display) -> ToleranceError {
 /// True if all fields lie on one side of the axis of a centred lens.
 fn has_one_side(model: &RayModel) -> bool {
     let centred = !model.channels[model.primary].system.has_poses();
-    let fields = || model.fields.iter().filter(|field| field.weight > 0.0);
-    let upper = fields().all(|field| field.x == 0.0 && field.y >= 0.0);
-    let lower = fields().all(|field| field.x == 0.0 && field.y <= 0.0);
-    centred && (upper || lower)
+    centred && lie_on_one_side(&model.fields)
 }
 
 /// A field off the axis and the one opposite to it, with half of the weight each.

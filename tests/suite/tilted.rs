@@ -1,8 +1,8 @@
 //! Lenses with a broken axis and with decentred and tilted surfaces.
 
-use aplanat::analysis::spot;
+use aplanat::analysis::{AnalysisError, longitudinal_aberration, spot};
 use aplanat::files;
-use aplanat::lens::{AxisBreak, Lens, Medium, System};
+use aplanat::lens::{Aperture, AxisBreak, Lens, Medium, System};
 use aplanat::math::Vec3;
 use aplanat::pupil::{Accuracy, Aiming, RayModel};
 use aplanat::trace::{Ray, Tracer};
@@ -115,6 +115,28 @@ fn spots_know_the_symmetry_of_a_lens() {
     let [x, y] = about_y.1.map(|at| at.value);
     assert!(x.abs() > 0.1 && y.abs() < 1e-6, "{x} {y}");
     assert!((x.abs() - about_x.1[1].value.abs()).abs() < 1e-5, "{x} {:?}", about_x.1);
+}
+
+/// A beam fills the same part of the stop whichever way its lens is turned about the axis: the chief ray, which
+/// a tilt moves aside, does not count as radius.
+#[test]
+fn the_part_of_a_stop_that_a_beam_fills_knows_no_direction() {
+    let spot_of = |tilt: [f64; 2]| {
+        let mut lens = files::open("lenses/cooke_triplet_100_f27.json").unwrap().lens;
+        lens.aperture = Aperture::EntrancePupilDiameter(20.0);
+        lens.fields.values.truncate(1);
+        lens.surfaces[1].tilt = tilt;
+        let model = RayModel::from_lens(&lens, 0).unwrap();
+        let found = longitudinal_aberration(&model, 3);
+        assert_eq!(found, Err(AnalysisError::NotSymmetric));
+        let accuracy = Accuracy { tolerance: 1e-5, max_rays: 100_000 };
+        spot(&model, model.fields[0], accuracy).unwrap()
+    };
+    let [first, others @ ..] = [[2.0, 0.0], [-2.0, 0.0], [0.0, 2.0], [0.0, -2.0]].map(spot_of);
+    for other in others {
+        assert!((other.rms.value / first.rms.value - 1.0).abs() < 1e-4);
+        assert!((other.light.value / first.light.value - 1.0).abs() < 1e-4);
+    }
 }
 
 #[test]

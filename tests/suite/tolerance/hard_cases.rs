@@ -2,9 +2,12 @@
 
 use super::reference::{lenses, tolerances};
 use crate::cli::{done, done_json, refused};
-use aplanat::lens::{ErrorDistribution, Perturbation, PerturbationKind, ToleranceSheet};
+use aplanat::lens::{
+    ErrorDistribution, FieldPoint, Perturbation, PerturbationKind, ToleranceSheet, lie_on_one_side,
+};
 use aplanat::tolerance::{
-    MeritOptions, ToleranceError, ToleranceRequest, ToleranceScene, analyze, merits, perturb,
+    MeritOptions, ToleranceError, ToleranceGrade, ToleranceRequest, ToleranceScene, analyze,
+    graded_sheet, merits, perturb,
 };
 
 fn scene(number: usize, rule: (usize, usize)) -> ToleranceScene {
@@ -32,6 +35,28 @@ fn an_error_that_ends_rays_is_reported_with_their_fate() {
         let judged = merits(&systems, &scene.beam, scene.options);
         assert!(matches!(judged, Err(ToleranceError::RayLost { .. })), "{kind:?}");
     }
+}
+
+/// Fields along x stand for both sides of the axis of a lens that is symmetric about it, as those along y do.
+#[test]
+fn tolerances_know_no_direction_of_the_field() {
+    let as_built = |[x, y]: [f64; 2]| {
+        let mut lens = aplanat::files::open("lenses/cooke_triplet_100_f27.json").unwrap().lens;
+        lens.fields.values = vec![FieldPoint { x, y, weight: 1.0 }];
+        let scene = ToleranceScene::new(&lens, 0, 1e-4).unwrap();
+        let sheet = graded_sheet(&lens, &scene.lens, ToleranceGrade::Commercial);
+        let request = ToleranceRequest { seed: 1, samples: 2, limit: None };
+        analyze(&scene, &sheet, request).unwrap().spots[1].form_root_mean_square
+    };
+    let along_y = as_built([0.0, 5.0]);
+    for field in [[-5.0, 0.0], [3.0, -4.0]] {
+        let other = as_built(field);
+        assert!((other / along_y - 1.0).abs() < 5e-4, "{field:?}: {other} {along_y}");
+    }
+    let [near, opposite, aside] = [[0.3, 0.4], [-0.3, -0.4], [0.3, 0.0]].map(|[x, y]| {
+        [FieldPoint { x, y, weight: 1.0 }, FieldPoint { x: 0.6, y: 0.8, weight: 1.0 }]
+    });
+    assert!(lie_on_one_side(&near) && !lie_on_one_side(&opposite) && !lie_on_one_side(&aside));
 }
 
 /// Lenses that lose rays are counted as bad and leave finite numbers.
