@@ -230,13 +230,12 @@ impl PictureArgs {
         };
         let picture = quick.filter(is_kept);
         let picture = picture.unwrap_or_else(|| self.exact_picture(&renderer, stop));
-        if !picture.picture.complete {
-            print_note("note: stopped; what was not sampled is black");
-        }
         let map = |picture: &Picture| {
             ErrorMap::measure_until(&renderer, picture, (usize::MAX, MAPPED_SAMPLES), stop)
         };
         let error_map = self.error_map.as_ref().map(|_| map(&picture.picture));
+        // A part is no map.
+        let error_map = error_map.filter(ErrorMap::is_whole);
         let losses = renderer.losses().cloned();
         let mut picture = RenderedPicture { error_map, losses, ..picture };
         if let Some(coating) = self.coating.filter(|_| !is_stopped()) {
@@ -246,6 +245,11 @@ impl PictureArgs {
             let ghosts = ghosts.map_err(refuse)?;
             ghosts.add_to(&mut picture.picture);
             picture.ghosts = Some((ghosts.report, ms));
+        }
+        if !picture.picture.complete {
+            print_note("note: stopped; what was not sampled is black");
+        } else if is_stopped() {
+            print_note("note: stopped; an error map, ghosts or an exact picture may be missing");
         }
         Ok((picture, shot))
     }

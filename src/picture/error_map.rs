@@ -77,6 +77,12 @@ impl ErrorMap {
         self.pixels
     }
 
+    /// True if every pixel is in a tile that was measured.
+    pub fn is_whole(&self) -> bool {
+        self.tiles.iter().map(|tile| tile.tile.len()).sum::<usize>()
+            == self.pixels[0] * self.pixels[1]
+    }
+
     /// The number of tiles that were measured.
     pub fn tiles(&self) -> usize {
         self.tiles.len()

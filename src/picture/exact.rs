@@ -132,7 +132,7 @@ impl PictureTile {
         self.rows.clone().flat_map(|row| self.columns.clone().map(move |column| [column, row]))
     }
 
-    fn len(&self) -> usize {
+    pub(super) fn len(&self) -> usize {
         self.columns.len() * self.rows.len()
     }
 }

@@ -76,9 +76,10 @@ impl<'a> QuickRenderer<'a> {
         let mut values = vec![[0.0; 3]; columns * rows];
         let is_stopped = || stop.load(Ordering::Relaxed);
         let lines = values.par_chunks_mut(columns).enumerate().filter(|_| !is_stopped());
-        lines.for_each(|(row, line)| {
+        let seen = lines.map(|(row, line)| {
             line.iter_mut().enumerate().for_each(|(i, pixel)| *pixel = self.pixel([i, row]));
         });
+        let complete = seen.count() == rows;
         Picture {
             frame: self.frame,
             errors: vec![[0.0; 3]; values.len()],
@@ -87,7 +88,7 @@ impl<'a> QuickRenderer<'a> {
             rays: 0,
             fates: Fates::default(),
             reached: true,
-            complete: !is_stopped(),
+            complete,
             overshoot: self.overshoot,
         }
     }

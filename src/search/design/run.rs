@@ -360,9 +360,11 @@ impl DesignRun {
         };
         let snapped: Vec<Candidate> = self.pool.iter().take(POOL).map(snap).collect();
         let found = self.improve(&snapped, CHOSEN_TRIALS, false, stop);
-        let mut all: Vec<Candidate> = found.into_iter().filter_map(|(c, _)| c).collect();
-        all.sort_by(|a, b| a.value.total_cmp(&b.value));
-        all
+        // One without gradients stayed as it was: its value is that with the glasses before.
+        let mut all: Vec<(bool, Candidate)> =
+            found.into_iter().filter_map(|(c, used)| Some((used == 0, c?))).collect();
+        all.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.value.total_cmp(&b.1.value)));
+        all.into_iter().map(|(_, candidate)| candidate).collect()
     }
 
     fn choose_glasses(&mut self, stop: &AtomicBool) {

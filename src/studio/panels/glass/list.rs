@@ -14,7 +14,16 @@ pub(super) struct ListedGlass {
     pub(super) partial: Option<f64>,
 }
 
+/// False for a glass that is not known at the lines of the Abbe number, as those for the infrared.
+fn has_abbe_number(glass: &Glass) -> bool {
+    glass.vd > 0.0
+}
+
 impl ListedGlass {
+    pub(super) fn new(glass: &'static Glass) -> Self {
+        Self { glass, partial: glass.partial_dispersion() }
+    }
+
     pub(super) fn numbers(self) -> GlassNumbers {
         GlassNumbers { nd: self.glass.nd, vd: self.glass.vd, partial: self.partial }
     }
@@ -26,7 +35,7 @@ impl ListedGlass {
             GlassColumn::Name => Some(CellValue::Word(&glass.name)),
             GlassColumn::Maker => Some(CellValue::Word(&glass.manufacturer)),
             GlassColumn::Index => Some(CellValue::Number(glass.nd)),
-            GlassColumn::Abbe => Some(CellValue::Number(glass.vd)),
+            GlassColumn::Abbe => has_abbe_number(glass).then_some(CellValue::Number(glass.vd)),
             GlassColumn::Partial => self.partial.map(CellValue::Number),
             GlassColumn::Density => glass.density.map(CellValue::Number),
             GlassColumn::Price => glass.relative_cost.map(CellValue::Number),
@@ -78,8 +87,8 @@ impl GlassNumbers {
     pub(super) fn of(medium: &Medium) -> Option<Self> {
         match medium {
             Medium::Glass(name) => {
-                let glass = glass::find(name)?;
-                Some(ListedGlass { glass, partial: glass.partial_dispersion() }.numbers())
+                let glass = glass::find(name).filter(|glass| has_abbe_number(glass))?;
+                Some(ListedGlass::new(glass).numbers())
             }
             Medium::Model { nd, vd } if *vd > 0.0 => {
                 let partial = Some(glass::normal_partial_dispersion(*vd));
@@ -192,8 +201,7 @@ pub(super) fn list(
 ) -> Result<Vec<ListedGlass>, String> {
     let query = GlassQuery::new(query.split_whitespace()).map_err(|why| why.to_string())?;
     let found = glass::known().filter(|glass| query.is_met_by(glass));
-    let mut listed: Vec<ListedGlass> =
-        found.map(|glass| ListedGlass { glass, partial: glass.partial_dispersion() }).collect();
+    let mut listed: Vec<ListedGlass> = found.map(ListedGlass::new).collect();
     listed.sort_by(|a, b| {
         let values = [a, b].map(|listed| listed.value(order.column, near));
         let names = [a, b].map(|listed| (&listed.glass.name, &listed.glass.manufacturer));
@@ -205,11 +213,17 @@ pub(super) fn list(
 /// The order of two cells: one without a value comes last, whatever the direction.
 fn compare([a, b]: [Option<CellValue>; 2], descending: bool) -> Ordering {
     let (Some(a), Some(b)) = (a, b) else { return a.is_none().cmp(&b.is_none()) };
-    let order = a.partial_cmp(&b).unwrap_or(Ordering::Equal);
+    let order = match (a, b) {
+        (CellValue::Number(a), CellValue::Number(b)) => a.total_cmp(&b),
+        (CellValue::Word(a), CellValue::Word(b)) => a.cmp(b),
+        // A column has one kind.
+        (CellValue::Number(_), CellValue::Word(_)) => Ordering::Less,
+        (CellValue::Word(_), CellValue::Number(_)) => Ordering::Greater,
+    };
     if descending { order.reverse() } else { order }
 }
 
-/// The nearest glass of a list to some numbers, but for one of a name.
+/// The nearest glass of a list to some numbers, other than `but`.
 pub(super) fn nearest(
     listed: &[ListedGlass],
     near: GlassNumbers,

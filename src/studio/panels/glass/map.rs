@@ -61,11 +61,11 @@ impl MapAxes {
         }
     }
 
-    /// The place of a glass; `None` if its partial dispersion is needed and unknown.
+    /// The place of a glass; `None` if its Abbe number or partial dispersion is needed and unknown.
     fn place(self, GlassNumbers { nd, vd, partial }: GlassNumbers) -> Option<[f64; 2]> {
         match self {
-            Self::IndexAbbe => Some([vd, nd]),
-            Self::PartialAbbe => Some([vd, partial?]),
+            Self::IndexAbbe => (vd > 0.0).then_some([vd, nd]),
+            Self::PartialAbbe => partial.filter(|_| vd > 0.0).map(|partial| [vd, partial]),
             Self::PartialIndex => Some([nd, partial?]),
         }
     }
@@ -130,8 +130,7 @@ impl GlassMap<'_> {
     }
 
     fn place_of(&self, glass: &'static Glass) -> Option<[f64; 2]> {
-        let partial = glass.partial_dispersion();
-        self.axes.place(ListedGlass { glass, partial }.numbers())
+        self.axes.place(ListedGlass::new(glass).numbers())
     }
 
     /// The places of the glasses of the lens, each with its surfaces.

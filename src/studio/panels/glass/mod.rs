@@ -43,7 +43,7 @@ pub struct GlassPanel {
     /// The glass of the surface in the frame before, to which the table has scrolled.
     present: Option<&'static Glass>,
     /// The reason why the last click has replaced nothing.
-    refused: Option<String>,
+    refused: Option<(RefusalPlace, String)>,
 }
 
 impl Panel for GlassPanel {
@@ -118,7 +118,8 @@ impl GlassPanel {
         actions: &mut Actions,
     ) {
         ui.horizontal_wrapped(|ui| {
-            if let Some(why) = &self.refused {
+            let of_now = |(place, _): &&(RefusalPlace, String)| *place == refusal_place(view);
+            if let Some((_, why)) = self.refused.as_ref().filter(of_now) {
                 ui.label(RichText::new(why).color(error_color(ui)));
                 return;
             }
@@ -190,9 +191,16 @@ impl GlassPanel {
                 actions.extend([Command::Edit(edit), Command::CommitEdit]);
                 None
             }
-            Err(why) => Some(capitalize(&why)),
+            Err(why) => Some((refusal_place(view), capitalize(&why))),
         };
     }
+}
+
+/// The selected surface, and whether a candidate is shown: a refusal holds as long as they stay.
+type RefusalPlace = (Option<usize>, bool);
+
+fn refusal_place(view: &SessionView) -> RefusalPlace {
+    (view.selected, view.candidate.as_ref().is_some_and(|candidate| candidate.shown))
 }
 
 /// The edit that replaces the glass behind the selected surface.

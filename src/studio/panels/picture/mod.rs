@@ -177,7 +177,8 @@ impl PicturePanel {
         let design = view.preview_results.is_some().then_some(view.results.as_ref()).flatten();
         let design = design.and_then(|results| NamedPicture::new("design", results));
         let scene = |named: &NamedPicture| named.picture().map(|picture| picture.scene);
-        let other = self.kept.clone().or(design).filter(|other| scene(other) == scene(present));
+        let same = |other: &NamedPicture| scene(other) == scene(present);
+        let other = self.kept.clone().filter(same).or(design.filter(same));
         let name = if view.preview_results.is_some() { "candidate" } else { "present" };
         let mut pictures: Vec<NamedPicture> = other.into_iter().collect();
         pictures.push(NamedPicture { name, ..present.clone() });

@@ -37,6 +37,8 @@ pub(super) struct SurfaceDetails {
     badges: EditBuffers,
     /// The reason why the last choice was refused, and the surface that it was for.
     refused: Option<(usize, String)>,
+    /// The surface and the choices whose fields were shown last.
+    shown: Option<(usize, FormChoice, RuleChoice)>,
 }
 
 impl SurfaceDetails {
@@ -69,6 +71,7 @@ impl SurfaceDetails {
     }
 
     fn surface(&mut self, ui: &mut Ui, view: &SessionView, surface: usize, actions: &mut Actions) {
+        self.forget_other_fields(view, surface);
         ui.label(RichText::new(format!("Surface {}", surface + 1)).strong());
         let why = self.buffers.last_error().map(str::to_owned).or_else(|| {
             self.refused.as_ref().filter(|(i, _)| *i == surface).map(|(_, why)| why.clone())
@@ -92,6 +95,17 @@ impl SurfaceDetails {
         place::show(ui, &mut fields, surface);
     }
 
+    /// Forgets what was typed into fields that are no longer shown, with its errors.
+    fn forget_other_fields(&mut self, view: &SessionView, surface: usize) {
+        let row = &view.lens.surfaces[surface];
+        let now = Some((surface, FormChoice::of(row), RuleChoice::of(row)));
+        if self.shown != now {
+            self.shown = now;
+            self.buffers = EditBuffers::default();
+            self.badges = EditBuffers::default();
+        }
+    }
+
     fn choose_form(
         &mut self,
         ui: &mut Ui,
@@ -106,8 +120,12 @@ impl SurfaceDetails {
         if let Some(choice) = picked {
             let size = row.semi_diameter.or_else(|| clear_semi_diameter(view, surface));
             let freeform = choice.form(row, size.unwrap_or(10.0));
-            let changed = Row { freeform, ..row.clone() };
-            self.try_row(view, (surface, changed), actions);
+            // Variables and pickups of the numbers of the form before do not pass to the new one.
+            let plain = row_edit(&view.lens, surface, |row| row.freeform = None);
+            let formed = row_edit(&view.lens, surface, |row| row.freeform = freeform);
+            let title = format!("form of surface {}", surface + 1);
+            let edit = Edit::Sequence { title, edits: vec![plain, formed] };
+            self.try_edit(view, (surface, edit), actions);
         }
     }
 
@@ -123,14 +141,19 @@ impl SurfaceDetails {
         let name = format!("Deflection at surface {}", surface + 1);
         let picked = choose(ui, ("Light", &name), (chosen, &RuleChoice::ALL), RuleChoice::text);
         if let Some(choice) = picked {
-            let changed = Row { ideal: choice.rule(), ..row.clone() };
-            self.try_row(view, (surface, changed), actions);
+            let edit = row_edit(&view.lens, surface, |row| row.ideal = choice.rule());
+            self.try_edit(view, (surface, edit), actions);
         }
     }
 
-    /// Asks for another row as one undo step, or keeps the reason why it is refused.
-    fn try_row(&mut self, view: &SessionView, (surface, row): (usize, Row), actions: &mut Actions) {
-        self.refused = match valid_edit(&view.lens, Edit::SetRow { surface, row }) {
+    /// Asks for an edit of a surface as one undo step, or keeps the reason why it is refused.
+    fn try_edit(
+        &mut self,
+        view: &SessionView,
+        (surface, edit): (usize, Edit),
+        actions: &mut Actions,
+    ) {
+        self.refused = match valid_edit(&view.lens, edit) {
             Ok(edit) => {
                 actions.extend([Command::Edit(edit), Command::CommitEdit]);
                 None
@@ -214,7 +237,7 @@ impl SurfaceDetails {
         });
         if changed.numbers.len() != count {
             let row = Row { freeform: Some(changed), ..view.lens.surfaces[surface].clone() };
-            self.try_row(view, (surface, row), actions);
+            self.try_edit(view, (surface, Edit::SetRow { surface, row }), actions);
         }
     }
 
