@@ -227,16 +227,15 @@ impl<'a> ExactRenderer<'a> {
     pub fn render(&self, settings: &ExactSettings, progress: PictureProgress<'_>) -> Picture {
         let tiles = self.tiles();
         let (done, stopped) = (AtomicUsize::new(0), AtomicBool::new(false));
+        let is_stopped = || {
+            let share = done.load(Ordering::Relaxed) as f64 / tiles.len() as f64;
+            stopped.fetch_or(progress(share).is_break(), Ordering::Relaxed);
+            stopped.load(Ordering::Relaxed)
+        };
         let work = |tile: &PictureTile| {
-            if stopped.load(Ordering::Relaxed) {
-                return None;
-            }
-            let sampled = self.sample_tile(tile, settings);
-            let share = (done.fetch_add(1, Ordering::Relaxed) + 1) as f64 / tiles.len() as f64;
-            if progress(share).is_break() {
-                stopped.store(true, Ordering::Relaxed);
-            }
-            Some(sampled)
+            let sampled = self.sample_tile_until(tile, settings, &is_stopped);
+            done.fetch_add(1, Ordering::Relaxed);
+            sampled
         };
         let sampled: Vec<_> = tiles.par_iter().map(work).collect();
         self.assemble(&tiles, sampled)
@@ -272,8 +271,19 @@ impl<'a> ExactRenderer<'a> {
         picture
     }
 
-    /// Samples a tile until its error is small enough; each pass doubles the samples.
+    /// Samples a tile until its error is small enough.
     pub(super) fn sample_tile(&self, tile: &PictureTile, settings: &ExactSettings) -> SampledTile {
+        self.sample_tile_until(tile, settings, &|| false).unwrap_or_default()
+    }
+
+    /// The same, each pass doubles the samples. Once `is_stopped` is true, that of the
+    /// passes that have ended; `None` if there is none.
+    fn sample_tile_until(
+        &self,
+        tile: &PictureTile,
+        settings: &ExactSettings,
+        is_stopped: &dyn Fn() -> bool,
+    ) -> Option<SampledTile> {
         let most = (settings.max_samples / REPLICATES).clamp(1, LONGEST);
         let first = FIRST.max(FIRST_OF_TILE / tile.len().max(1));
         let queues =
@@ -284,25 +294,32 @@ impl<'a> ExactRenderer<'a> {
             queues: self.bands.iter().map(queues).collect(),
         };
         let (mut from, mut to) = (0, first.min(most));
-        loop {
-            self.sample(tile, from..to, settings, &mut sums);
+        let mut ended = None;
+        while self.sample(tile, from..to, settings, &mut sums, is_stopped) {
             let mut sampled = self.estimate(&sums, to);
             sampled.reached = self.rms_error(&sampled) <= settings.tolerance;
             if sampled.reached || to >= most {
-                return sampled;
+                return Some(sampled);
             }
+            ended = Some(sampled);
             (from, to) = (to, (2 * to).min(most));
         }
+        ended
     }
 
+    /// Samples the pixels of a tile; false if that was stopped.
     fn sample(
         &self,
         tile: &PictureTile,
         samples: Range<usize>,
         settings: &ExactSettings,
         sums: &mut TileSums,
-    ) {
+        is_stopped: &dyn Fn() -> bool,
+    ) -> bool {
         for (i, pixel) in tile.pixels().enumerate() {
+            if is_stopped() {
+                return false;
+            }
             for replicate in 0..REPLICATES {
                 let seed = self.seed(pixel, replicate, settings.seed);
                 let slot = (i * REPLICATES + replicate) * self.bands.len();
@@ -314,6 +331,7 @@ impl<'a> ExactRenderer<'a> {
         for band in 0..self.bands.len() {
             (0..self.bands[band].lenses.len()).for_each(|lens| self.flush(sums, band, lens));
         }
+        true
     }
 
     /// The seed of a replicate of a pixel (the finalizer of `MurmurHash3`).

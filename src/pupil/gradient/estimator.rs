@@ -243,7 +243,7 @@ impl Region<'_> {
     ) -> Result<PupilDerivative, DerivativeError> {
         let mut rays = self.rays;
         let mut before: Option<PupilDerivative> = None;
-        let (mut last, mut changes) = (0, 0);
+        let (mut last, mut changes) = (0, Vec::new());
         for order in 0..self.orders() {
             // An order takes about twice the rays of the one before.
             if rays + 2 * last > asked.max_rays && before.is_some() {
@@ -253,10 +253,10 @@ impl Region<'_> {
             last = now.rays;
             rays += last;
             now.rays = rays;
-            now.add_order_error(before.as_ref());
-            changes += usize::from(before.is_some());
             // A first change alone does not tell an agreement by chance.
-            now.reached = changes >= 2 && now.reaches(asked.tolerance);
+            let is_confirmed = !changes.is_empty();
+            changes = now.add_order_error(before.as_ref(), &changes);
+            now.reached = is_confirmed && now.reaches(asked.tolerance);
             if now.reached {
                 return Ok(now);
             }
@@ -334,29 +334,30 @@ const DIFFERENCE_ROUNDING: f64 = 1e-9;
 impl PupilDerivative {
     /// Adds the change by the last raising of the order to the errors; all of the derivative if
     /// this is the first order. The relative error of a number is at least that of the worst of its
-    /// kind, since some change little by chance, and at least the square of that of the order before:
-    /// twice the nodes do not gain more.
-    fn add_order_error(&mut self, before: Option<&Self>) {
+    /// kind, since some change little by chance, and at least the square of the change before: twice the
+    /// nodes do not gain more. Takes the largest change of each kind before, and returns that of now.
+    fn add_order_error(&mut self, before: Option<&Self>, earlier: &[f64]) -> Vec<f64> {
         let Some(before) = before else {
             self.error = self.gradient.zip_with(&self.gradient, |_, _| f64::INFINITY);
-            return;
+            return Vec::new();
         };
         let change = self.gradient.zip_with(&before.gradient, |a, b| (a - b).abs());
         self.error = self.error.zip_with(&change, |a, b| a + b);
-        for slot in SurfaceParameter::all() {
-            let [worst, largest, earlier] =
-                [&self.error, &self.gradient, &before.error].map(|g| g.largest(slot));
+        let mut changes = Vec::new();
+        for (k, slot) in SurfaceParameter::all().enumerate() {
+            let [worst, largest] = [&self.error, &self.gradient].map(|g| g.largest(slot));
+            changes.push(worst);
             let relative =
                 |error: f64| if largest > 0.0 { (error / largest).min(1.0) } else { 0.0 };
-            // Of a first change there is no order before.
-            let least = if earlier.is_finite() { relative(earlier).powi(2) } else { 0.0 };
             let share = relative(worst);
+            let least = earlier.get(k).map_or(0.0, |earlier| relative(*earlier).powi(2));
             let share = (share * (1.0 + 2.0 * (share / COARSE).min(1.0))).max(least);
             for (error, by) in self.error.surfaces.iter_mut().zip(&self.gradient.surfaces) {
                 let larger = error.by(slot).max(share * by.by(slot).abs());
                 error.set(slot, larger);
             }
         }
+        changes
     }
 
     /// Sets the kinds of numbers to zero on which the integral depends by no more than rounding.
