@@ -205,7 +205,7 @@ pub fn energy_irradiance(
     wavelength: usize,
     accuracy: Accuracy,
 ) -> Result<Estimate, AnalysisError> {
-    if !model.channels[wavelength].system.is_round() {
+    if model.channels[wavelength].system.has_poses() {
         return Err(AnalysisError::NotSymmetric);
     }
     let element = FieldElement { model, field, wavelength, accuracy };

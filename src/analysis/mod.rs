@@ -166,3 +166,16 @@ pub fn check_light(model: &RayModel, field: FieldPoint) -> Result<(), AnalysisEr
     let mut others = (0..model.channels.len()).filter(|wavelength| *wavelength != model.primary);
     if others.any(|wavelength| dark(wavelength).is_none()) { Ok(()) } else { Err(reason) }
 }
+
+/// Refuses fields of models all of which are dark, with the reason of the first one.
+///
+/// # Errors
+/// As those of [`check_light`].
+pub fn check_some_light<'a>(
+    mut fields: impl Iterator<Item = (&'a RayModel, FieldPoint)>,
+) -> Result<(), AnalysisError> {
+    let Some((model, field)) = fields.next() else { return Ok(()) };
+    let Err(reason) = check_light(model, field) else { return Ok(()) };
+    let is_lit = fields.any(|(model, field)| check_light(model, field).is_ok());
+    if is_lit { Ok(()) } else { Err(reason) }
+}

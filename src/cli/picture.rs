@@ -231,7 +231,7 @@ impl PictureArgs {
         let picture = quick.filter(is_kept);
         let picture = picture.unwrap_or_else(|| self.exact_picture(&renderer, stop));
         let map = |picture: &Picture| {
-            ErrorMap::measure_until(&renderer, picture, (usize::MAX, MAPPED_SAMPLES), stop)
+            ErrorMap::measure_until(&renderer, picture, (usize::MAX, MAPPED_SAMPLES), is_stopped)
         };
         let error_map = self.error_map.as_ref().map(|_| map(&picture.picture));
         // A part is no map.
@@ -601,8 +601,9 @@ impl Display for PictureReport {
         let of_quick = of_quick.unwrap_or_else(|| " by sampling".to_owned());
         writeln!(
             f,
-            "error {:.3} % of mid grey (rms){of_quick}; asked for {percent} %{reached}",
-            100.0 * self.error
+            "error {:.3} % of mid grey (rms){of_quick}; asked for {} %{reached}",
+            100.0 * self.error,
+            ShortNumber(percent)
         )?;
         writeln!(
             f,

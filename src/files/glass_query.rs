@@ -24,7 +24,7 @@ pub enum GlassQueryError {
     #[error("found the range `{0}`; expected `1.6..1.7`, `50..` or one number")]
     Range(String),
     /// A range of a number that glasses are not searched by.
-    #[error("found the number `{0}`; expected nd or vd")]
+    #[error("glasses are not searched by `{0}`; expected nd or vd")]
     Quantity(String),
 }
 
@@ -49,7 +49,7 @@ impl GlassCondition {
             return Ok(Self::Word(word.to_uppercase()));
         };
         let range = parse_range(text).ok_or_else(|| GlassQueryError::Range(text.to_owned()))?;
-        match name {
+        match name.to_lowercase().as_str() {
             "nd" => Ok(Self::Index(range)),
             "vd" => Ok(Self::Abbe(range)),
             _ => Err(GlassQueryError::Quantity(name.to_owned())),

@@ -73,12 +73,12 @@ impl Lens {
     /// replaced. A thickness between the surfaces that changes afterwards leaves the second break as it is.
     pub fn set_group_place(&mut self, (first, last): (usize, usize), place: &AxisBreak) {
         let back = self.way_back((first, last), place);
-        let is_there = *place == AxisBreak::default();
+        let is_moved = *place != AxisBreak::default();
         if let Some(row) = self.surfaces.get_mut(first) {
-            row.break_before = (!is_there).then_some(*place);
+            row.break_before = is_moved.then_some(*place);
         }
         if let Some(row) = self.surfaces.get_mut(last) {
-            row.break_after = if is_there { None } else { written(&back) };
+            row.break_after = if is_moved { written(&back) } else { None };
         }
     }
 

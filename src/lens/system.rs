@@ -352,14 +352,6 @@ impl<R: Real> System<R> {
         self.surfaces.iter().any(Surface::is_mounted)
     }
 
-    /// True if every surface is symmetric about one axis.
-    pub fn is_round(&self) -> bool {
-        self.surfaces.iter().all(|surface| {
-            let is_grating = matches!(surface.ideal, Some(IdealAction::Grating { .. }));
-            !surface.is_mounted() && surface.freeform.is_none() && !is_grating
-        })
-    }
-
     /// True if the lens is the same after any turn about its axis.
     pub fn has_rotational_symmetry(&self) -> bool {
         self.surfaces.iter().all(|surface| {

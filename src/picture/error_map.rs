@@ -9,7 +9,6 @@ use super::exact::{ExactRenderer, ExactSettings, MID_GREY, PictureTile};
 use crate::analysis::Estimate;
 use crate::plot::{Color, GREY, glow};
 use rayon::prelude::*;
-use std::sync::atomic::{AtomicBool, Ordering};
 
 /// The error of a picture on some of its tiles.
 #[derive(Debug, Clone, PartialEq)]
@@ -37,19 +36,19 @@ impl ErrorMap {
         count: usize,
         samples: usize,
     ) -> Self {
-        Self::measure_until(exact, picture, (count, samples), &AtomicBool::new(false))
+        Self::measure_until(exact, picture, (count, samples), || false)
     }
 
-    /// The same; once `stop` is true, no further tile is measured.
+    /// The same; once `is_stopped` is true, no further tile is measured.
     pub fn measure_until(
         exact: &ExactRenderer<'_>,
         picture: &Picture,
         (count, samples): (usize, usize),
-        stop: &AtomicBool,
+        is_stopped: impl Fn() -> bool + Sync,
     ) -> Self {
         let tiles = exact.tiles();
         let chosen = spread_out(tiles.len(), count).into_par_iter();
-        let chosen = chosen.filter(|_| !stop.load(Ordering::Relaxed));
+        let chosen = chosen.filter(|_| !is_stopped());
         let measured = chosen.map(|i| TileError::measure(exact, picture, &tiles[i], samples));
         Self { pixels: picture.frame.pixels, tiles: measured.collect() }
     }

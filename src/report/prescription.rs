@@ -6,7 +6,7 @@ use super::layout_drawing::LayoutScene;
 use super::materials::bill_of_material;
 use super::prescription_tables::{add_first_order, add_prescription};
 use crate::analysis::{
-    AnalysisError, Estimate, MtfCurve, Spot, airy_radius, check_light, perfect_contrast,
+    AnalysisError, Estimate, MtfCurve, Spot, airy_radius, check_some_light, perfect_contrast,
     polychromatic_geometric_mtf, spot_points, spots,
 };
 use crate::effects::{self, EffectOverrides, EffectPlan, TracePurpose};
@@ -46,7 +46,9 @@ pub fn prescription_report(
     let positions: Vec<ReportPosition<'_>> = (0..lens.zoom_positions())
         .map(|zoom| ReportPosition::new(lens, zoom, settings))
         .collect::<Result<_, _>>()?;
-    check_some_light(&positions)?;
+    let fields =
+        positions.iter().flat_map(|at| at.exact.fields.iter().map(|field| (&at.exact, *field)));
+    check_some_light(fields).map_err(ReportError::Dark)?;
     introduce(&mut document, lens);
     positions.iter().for_each(|position| position.add_layout(&mut document));
     add_prescription(&mut document, lens);
@@ -71,17 +73,6 @@ pub fn prescription_report(
         }
     }
     Ok(document)
-}
-
-/// Refuses a lens that is dark at all fields and zoom positions.
-fn check_some_light(positions: &[ReportPosition<'_>]) -> Result<(), ReportError> {
-    let fields =
-        positions.iter().flat_map(|at| at.exact.fields.iter().map(move |field| (at, *field)));
-    let mut reasons = fields.map(|(at, field)| check_light(&at.exact, field).err());
-    let first = reasons.next().flatten();
-    first
-        .filter(|_| reasons.all(|other| other.is_some()))
-        .map_or(Ok(()), |why| Err(ReportError::Dark(why)))
 }
 
 /// A lens at one zoom position with all that the report computes.

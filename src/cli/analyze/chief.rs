@@ -2,7 +2,8 @@
 
 use super::{AnalysisRun, AtField, SelectedField, TextLines, estimate_text};
 use crate::analysis::{
-    AnalysisError, Estimate, GridPoint, check_light, distortion, distortion_grid, field_curvature,
+    Estimate, GridPoint, check_light, check_some_light, distortion, distortion_grid,
+    field_curvature,
 };
 use crate::cli::output::{ShortNumber, counted};
 use crate::lens::FieldPoint;
@@ -79,7 +80,7 @@ struct GridPointJson {
 pub(super) fn grid(run: &AnalysisRun) -> Vec<AtField<GridJson>> {
     let axis = FieldPoint { x: 0.0, y: 0.0, weight: 1.0 };
     let (found, milliseconds) = time_ms(|| {
-        check_some_light(run)?;
+        check_some_light(run.model.fields.iter().map(|field| (&run.model, *field)))?;
         distortion_grid(&run.model, run.model.primary, SQUARES)
     });
     let point = |point: &GridPoint| GridPointJson {
@@ -95,13 +96,6 @@ pub(super) fn grid(run: &AnalysisRun) -> Vec<AtField<GridJson>> {
         points: points.iter().map(point).collect(),
     });
     vec![AtField::new(&SelectedField { given: axis, traced: axis }, keys)]
-}
-
-/// Refuses a lens all of whose fields are dark.
-fn check_some_light(run: &AnalysisRun) -> Result<(), AnalysisError> {
-    let mut reasons = run.model.fields.iter().map(|field| check_light(&run.model, *field).err());
-    let first = reasons.next().flatten();
-    first.filter(|_| reasons.all(|reason| reason.is_some())).map_or(Ok(()), Err)
 }
 
 impl TextLines for GridJson {

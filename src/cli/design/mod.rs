@@ -83,6 +83,9 @@ impl DesignArgs {
         self.run_rounds(&mut run, &stop, &mut failures);
         let stopped = stop.load(Ordering::Relaxed);
         let lenses = if stopped { run.finish_best() } else { run.finish(&stop) };
+        if !stopped && stop.load(Ordering::Relaxed) {
+            print_note("note: stopped; the lenses are as they were before their last improvements");
+        }
         if lenses.is_empty() {
             let why = if stopped { "stopped: " } else { "" };
             return Err(CliError::Failed(format!("{why}no start led to a lens")));

@@ -9,9 +9,12 @@ use std::sync::{PoisonError, RwLock, RwLockReadGuard};
 struct AddedGlasses {
     glasses: Vec<&'static Glass>,
     names: Option<HashMap<String, Option<&'static Glass>>>,
+    /// The number of additions.
+    additions: usize,
 }
 
-static ADDED: RwLock<AddedGlasses> = RwLock::new(AddedGlasses { glasses: Vec::new(), names: None });
+static ADDED: RwLock<AddedGlasses> =
+    RwLock::new(AddedGlasses { glasses: Vec::new(), names: None, additions: 0 });
 
 /// Adds glasses, which every lens finds by name from now on, in place of those that were added of the
 /// same manufacturers. Of two with the same manufacturer and name the first one is found.
@@ -22,6 +25,12 @@ pub fn add(glasses: Vec<Glass>) {
     added.glasses.retain(|old| !makers.contains(old.manufacturer.as_str()));
     added.glasses.extend(glasses);
     added.names = Some(index_names(added.glasses.iter().copied()));
+    added.additions += 1;
+}
+
+/// The number of times that glasses were added: lists of glasses with another one are out of date.
+pub fn additions() -> usize {
+    read().additions
 }
 
 /// Every added glass, in the order in which they were added.

@@ -8,7 +8,7 @@
 mod added;
 mod dispersion;
 
-pub use added::{add, added_glasses};
+pub use added::{add, added_glasses, additions};
 pub use dispersion::DispersionFormula;
 
 use serde::Deserialize;

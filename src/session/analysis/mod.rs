@@ -203,9 +203,10 @@ fn refine(mut results: AnalysisResults, output: &AnalysisOutput) -> AnalysisResu
         analyses.as_built = Some(Arc::new(confirmed));
     }
     if settings.picture && !output.is_interrupted() {
-        let all = settings.picture_errors;
-        let fine =
-            time(|| catch_panic(|| scene_picture::fine_picture(&results.lens, zoom, scene, all)));
+        let (lens, all) = (&results.lens, settings.picture_errors);
+        let is_interrupted = output.interruption();
+        let draw = || scene_picture::fine_picture(lens, zoom, scene, all, &is_interrupted);
+        let fine = time(|| catch_panic(draw));
         analyses.picture = Some(Arc::new(fine));
     }
     output.publish(results.clone());

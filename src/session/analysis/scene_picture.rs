@@ -19,9 +19,9 @@ pub struct ScenePicture {
     /// The picture.
     pub picture: Picture,
     /// The root mean square error against rays from every pixel, as a share of mid grey, with the
-    /// milliseconds of the picture; `None` of a coarse picture, whose error is not measured.
+    /// milliseconds of the picture; `None` where it is not measured, as of a coarse picture.
     pub error: Option<Estimate>,
-    /// The error tile by tile; `None` of a coarse picture.
+    /// The error tile by tile; `None` where it is not measured.
     pub error_map: Option<ErrorMap>,
     /// The distance in mm to which the lens is focused; `None` at infinity.
     pub focus: Option<f64>,
@@ -47,15 +47,25 @@ pub(super) fn coarse_picture(
     scene_picture(lens, zoom, scene, COARSE, None).map_err(|error| error.to_string())
 }
 
-/// A fine picture of a lens, with its error on some tiles, or on all of them.
+/// A fine picture of a lens, with its error on some tiles, or on all of them; without an error once
+/// `is_interrupted` is true.
 pub(super) fn fine_picture(
     lens: &Lens,
     zoom: usize,
     scene: BuiltInScene,
     all_tiles: bool,
+    is_interrupted: &(dyn Fn() -> bool + Sync),
 ) -> Result<ScenePicture, String> {
-    let compared = if all_tiles { (usize::MAX, MAP_SAMPLES) } else { (TILES, SAMPLES) };
+    let (tiles, samples) = if all_tiles { (usize::MAX, MAP_SAMPLES) } else { (TILES, SAMPLES) };
+    let compared = ComparedTiles { tiles, samples, is_interrupted };
     scene_picture(lens, zoom, scene, FINE, Some(compared)).map_err(|error| error.to_string())
+}
+
+/// The tiles on which a picture is compared with rays.
+struct ComparedTiles<'a> {
+    tiles: usize,
+    samples: usize,
+    is_interrupted: &'a (dyn Fn() -> bool + Sync),
 }
 
 fn scene_picture(
@@ -63,7 +73,7 @@ fn scene_picture(
     zoom: usize,
     scene: BuiltInScene,
     pixels: [usize; 2],
-    compared: Option<(usize, usize)>,
+    compared: Option<ComparedTiles<'_>>,
 ) -> Result<ScenePicture, PictureError> {
     let diagonal = field_diagonal(&RayModel::from_lens(lens, zoom)?)?;
     let (focus, moved) = match lens.object {
@@ -78,8 +88,11 @@ fn scene_picture(
     let (picture, ms) =
         time_ms(|| QuickRenderer::new(&model, &bands, &exact).map(|quick| quick.render()));
     let picture = picture?;
-    let measure = |(tiles, samples)| ErrorMap::measure(&exact, &picture, tiles, samples);
-    let error_map = compared.map(measure);
+    let measure = |ComparedTiles { tiles, samples, is_interrupted }: ComparedTiles<'_>| {
+        let map = ErrorMap::measure_until(&exact, &picture, (tiles, samples), is_interrupted);
+        (!is_interrupted()).then_some(map)
+    };
+    let error_map = compared.and_then(measure);
     let timed = |map: &ErrorMap| Estimate { milliseconds: Some(ms), ..map.rms() };
     let error = error_map.as_ref().map(timed);
     Ok(ScenePicture { scene, picture, error, error_map, focus })

@@ -84,6 +84,14 @@ impl<Q, A> Drop for LatestRequestWorker<Q, A> {
     }
 }
 
+impl<Q: Send, A> WorkerOutput<Q, A> {
+    /// A test for other threads: true if a newer request waits or the worker is to end.
+    pub(in crate::session) fn interruption(&self) -> impl Fn() -> bool + Sync {
+        let requests = &self.requests;
+        move || requests.is_interrupted()
+    }
+}
+
 impl<Q, A> WorkerOutput<Q, A> {
     /// Publishes a result in place of the one before and wakes the window.
     pub(in crate::session) fn publish(&self, result: A) {

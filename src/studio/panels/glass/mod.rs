@@ -28,7 +28,7 @@ const TABLE: f32 = 522.0;
 /// The share of the height that the map has above the table.
 const ABOVE: f32 = 0.45;
 
-/// The origin of a list: the search, the order, what distances count from, and the number of glasses.
+/// The origin of a list: the search, the order, what distances count from, and the additions of glasses.
 type ListKey = (String, GlassOrder, Option<GlassNumbers>, usize);
 
 /// The panel.
@@ -56,7 +56,7 @@ impl Panel for GlassPanel {
         let medium = surface.map(|surface| &view.lens.surfaces[surface].medium);
         let numbers = medium.and_then(GlassNumbers::of);
         let near = numbers.filter(|_| self.order.column == GlassColumn::Distance);
-        let key = (self.query.clone(), self.order, near, glass::known().count());
+        let key = (self.query.clone(), self.order, near, glass::additions());
         let listed = Arc::clone(
             self.listed
                 .get(key, |(query, order, near, _)| Arc::new(list::list(query, *order, *near))),

@@ -2,7 +2,7 @@
 
 use egui::{Pos2, Rect, Vec2, pos2, vec2};
 
-/// The most points of the screen for a pixel are about those of a picture of this many columns.
+/// The largest magnification.
 const MOST: f32 = 60.0;
 
 /// A part of a picture, in shares of its width and height.

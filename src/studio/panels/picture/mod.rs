@@ -206,13 +206,13 @@ impl PicturePanel {
                 let at = self.areas(ui, pictures, (&seen, white), room);
                 ui.vertical(|ui| {
                     histogram(ui, &seen, white);
-                    self.choose_sensor(ui);
+                    self.settings(ui);
                     self.numbers(ui, pictures, (&seen, white), at);
                 });
             });
         } else {
             histogram(ui, &seen, white);
-            self.choose_sensor(ui);
+            self.settings(ui);
             let words = WORDS * (1 + seen.len()) as f32;
             let room = ui.available_size() - vec2(0.0, words);
             let at = self.areas(ui, pictures, (&seen, white), room);
@@ -234,11 +234,15 @@ impl PicturePanel {
         }
     }
 
-    fn choose_sensor(&mut self, ui: &mut Ui) {
+    fn sensor(&self) -> &'static SensorPreset {
+        &SensorPreset::ALL[self.sensor]
+    }
+
+    /// The sensor, the line of a wipe, and the way back to the whole picture.
+    fn settings(&mut self, ui: &mut Ui) {
         ui.horizontal(|ui| {
-            let chosen = &SensorPreset::ALL[self.sensor.min(SensorPreset::ALL.len() - 1)];
             ui.label("Sensor");
-            let combo = ComboBox::from_id_salt("sensor").selected_text(chosen.name);
+            let combo = ComboBox::from_id_salt("sensor").selected_text(self.sensor().name);
             let shown = combo.show_ui(ui, |ui| {
                 for (i, preset) in SensorPreset::ALL.iter().enumerate() {
                     let item = ui.selectable_value(&mut self.sensor, i, preset.name);
@@ -370,7 +374,7 @@ impl PicturePanel {
         (seen, white): (&[&Picture], f64),
         at: Pos2,
     ) {
-        let sensor = &SensorPreset::ALL[self.sensor.min(SensorPreset::ALL.len() - 1)].model;
+        let sensor = &self.sensor().model;
         // The same exposure for all: normal for the first.
         let seconds = sensor.normal_exposure(seen[0], LUMINANCE);
         for (named, picture) in pictures.iter().zip(seen) {
@@ -461,7 +465,7 @@ fn facts(ui: &mut Ui, picture: &ScenePicture, ms: f64) {
         format!(", at most {:.1} % in {} tiles", 100.0 * map.largest(), map.tiles())
     });
     let text = format!("{width} x {height}, {error}{largest}, focus at {focus}, {ms:.0} ms");
-    let hover = "The error is measured against rays from every pixel, on some tiles. Diffraction, losses \
-                 and ghosts are left out";
+    let hover = "The error is measured against rays from every pixel of the tiles. Diffraction, losses and \
+                 ghosts are left out";
     ui.label(RichText::new(text).small().weak()).on_hover_text(hover);
 }
