@@ -138,6 +138,16 @@ pub enum AnalysisError {
     IdealPath,
 }
 
+impl AnalysisError {
+    /// True if rays are lost or not limited; false if the lens has light, but not this number.
+    pub fn is_loss_of_light(&self) -> bool {
+        match self {
+            Self::NoLight | Self::NoRays(_) | Self::Unbounded | Self::NoChief => true,
+            Self::FoldedPupil | Self::IrregularPupil | Self::NotSymmetric | Self::IdealPath => false,
+        }
+    }
+}
+
 /// The pupil of a field at a wavelength, if rays get through.
 pub fn lit_region(
     model: &RayModel,

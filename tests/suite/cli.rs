@@ -523,6 +523,19 @@ fn a_lens_without_light_is_refused_by_every_analysis_and_by_the_report() {
     assert!(!std::path::Path::new(report.path()).exists());
 }
 
+/// A lens with light that lacks a number is not said to form no image.
+#[test]
+fn longitudinal_aberration_of_a_tilted_lens_is_refused_for_its_tilt_alone() {
+    let triplet = std::fs::read_to_string("lenses/cooke_triplet_100_f27.json").unwrap();
+    let mut lens: Value = serde_json::from_str(&triplet).unwrap();
+    lens["surfaces"][1]["tilt"] = json!([0.5, 0.0]);
+    let tilted = Scratch::with("tilted_triplet.json", &lens.to_string());
+    let arguments = ["analyze", tilted.path(), "longitudinal"];
+    refused(2, &arguments, "", &["the lens is not symmetric about its axis"]);
+    let message = text(&aplanat(&arguments, "").stderr);
+    assert!(!message.contains("forms an image"), "{message}");
+}
+
 #[test]
 fn more_frequencies_than_are_computed_in_a_short_time_are_refused() {
     let many = vec!["10"; 20_000].join(",");

@@ -1,7 +1,7 @@
 //! Encircled energy: the share of the light within a circle.
 
 use super::pupil_function::PupilFunction;
-use super::pupil_samples::PupilSamples;
+use super::pupil_samples::{Complex, PupilSamples};
 use crate::analysis::reference_sphere::ReferenceSphere;
 use crate::analysis::{AnalysisError, Estimate, lit_region};
 use crate::lens::FieldPoint;
@@ -106,7 +106,7 @@ fn bessel_j1(x: f64) -> f64 {
     (0..count).map(node).sum::<f64>() / count as f64
 }
 
-/// The nodes of a radius and of a turn for each fringe of the pattern that they cross, and at least.
+/// The nodes of a radius for each fringe of the pattern that it crosses, and at least.
 const FRINGE_NODES: f64 = 3.0;
 const LEAST_NODES: usize = 8;
 
@@ -116,26 +116,168 @@ impl PupilSamples {
         // ∫ |U|² dx dy over the whole plane is λ² ∫ A² dα dβ (Parseval).
         let total = self.wavelength.powi(2) * self.energy();
         let spread = self.spread();
-        let (mut sum, mut from) = (0.0, 0.0);
-        let share = |radius: &f64| {
+        let (mut nodes, mut ends, mut from) = (Vec::new(), Vec::new(), 0.0);
+        for radius in radii {
             let fringes = 2.0 * spread * (radius - from) / self.wavelength;
             let count = LEAST_NODES + (FRINGE_NODES * fringes) as usize;
-            for (r, weight) in gauss_legendre(count, from, *radius) {
-                let fringes = 2.0 * spread * r / self.wavelength;
-                let turn = LEAST_NODES + (TAU * FRINGE_NODES * fringes) as usize;
-                let mean: f64 = (0..turn)
-                    .map(|j| {
-                        let (sin, cos) = (TAU * j as f64 / turn as f64).sin_cos();
-                        let [re, im] = self.field([center[0] + r * sin, center[1] + r * cos]);
-                        re * re + im * im
-                    })
-                    .sum::<f64>()
-                    / turn as f64;
-                sum += weight * TAU * r * mean;
-            }
+            nodes.extend(gauss_legendre(count, from, *radius));
+            ends.push(nodes.len());
             from = *radius;
-            sum / total
+        }
+        let waves = self.polar_waves(center);
+        let part = |(r, weight): &(f64, f64)| weight * TAU * r * ring_intensity(&waves, *r);
+        let parts: Vec<f64> = nodes.par_iter().map(part).collect();
+        let share = |end: &usize| parts[..*end].iter().sum::<f64>() / total;
+        ends.iter().map(share).collect()
+    }
+
+    /// The light of every point of the pupil as a plane wave about a point of the image. A common inclination
+    /// is taken away, which changes no intensity.
+    fn polar_waves(&self, [x, y]: [f64; 2]) -> Vec<PolarWave> {
+        let wave_number = TAU / self.wavelength;
+        let mean = |k: usize| {
+            self.cosines.iter().map(|c| c[k]).sum::<f64>() / self.cosines.len().max(1) as f64
         };
-        radii.iter().map(share).collect()
+        let middle = [if self.mirrored { 0.0 } else { mean(0) }, mean(1)];
+        let wave = |((cosines, waves), amplitude): ((&[f64; 2], &f64), &f64)| {
+            let [a, b] = [0, 1].map(|k| cosines[k] - middle[k]);
+            let (sin, cos) = (wave_number * y * b - TAU * waves).sin_cos();
+            let (across_sin, across_cos) = (wave_number * x * a).sin_cos();
+            let turn = |[c, s]: [f64; 2]| {
+                [amplitude * (cos * c - sin * s), amplitude * (sin * c + cos * s)]
+            };
+            let length = a.hypot(b);
+            let direction = if length > 0.0 { [b / length, a / length] } else { [1.0, 0.0] };
+            let whole = turn([across_cos, across_sin]);
+            let (even, odd) = if self.mirrored {
+                (turn([across_cos, 0.0]), turn([0.0, across_sin]))
+            } else {
+                (whole, whole)
+            };
+            PolarWave { wave_number: wave_number * length, direction, even, odd }
+        };
+        self.cosines.iter().zip(&self.waves).zip(&self.amplitudes).map(wave).collect()
+    }
+}
+
+/// A plane wave from a point of the pupil, or from it and its mirror image.
+#[derive(Debug, Clone, Copy)]
+struct PolarWave {
+    /// The wave number across the axis, in 1/mm.
+    wave_number: f64,
+    /// Cosine and sine of its azimuth from the plane of symmetry.
+    direction: [f64; 2],
+    /// The complex amplitude of its part that is even in the azimuth.
+    even: Complex,
+    /// The same of the odd part.
+    odd: Complex,
+}
+
+/// The mean intensity of plane waves on a circle of radius r in mm. A wave is there a series of harmonics,
+/// `exp(i k r cos(θ − φ)) = Σ iᵐ Jₘ(kr) exp(im(θ − φ))` (Jacobi and Anger), and the mean of the square is the
+/// sum of the squares of all harmonics.
+fn ring_intensity(waves: &[PolarWave], r: f64) -> f64 {
+    let largest = waves.iter().map(|wave| wave.wave_number * r).fold(0.0, f64::max);
+    let mut harmonics = vec![[0.0; 4]; last_order(largest) + 1];
+    let mut bessel = Vec::with_capacity(harmonics.len());
+    for wave in waves {
+        bessel_orders(wave.wave_number * r, &mut bessel);
+        let [cos, sin] = wave.direction;
+        let [mut c, mut s] = [1.0, 0.0];
+        for (sums, order) in harmonics.iter_mut().zip(&bessel) {
+            let (even, odd) = (order * c, order * s);
+            sums[0] += wave.even[0] * even;
+            sums[1] += wave.even[1] * even;
+            sums[2] += wave.odd[0] * odd;
+            sums[3] += wave.odd[1] * odd;
+            [c, s] = [c * cos - s * sin, s * cos + c * sin];
+        }
+    }
+    let square = |sums: &[f64; 4]| sums.iter().map(|sum| sum * sum).sum::<f64>();
+    // Harmonics of the orders m and −m.
+    2.0 * harmonics.iter().map(square).sum::<f64>() - harmonics.first().map_or(0.0, square)
+}
+
+/// The order above which Bessel functions of an argument are below the rounding of numbers.
+fn last_order(x: f64) -> usize {
+    (x + 12.0 * x.cbrt() + 16.0) as usize
+}
+
+/// The Bessel functions J₀, J₁, … of an argument up to the last order that matters, by Miller's downward
+/// recurrence (Abramowitz and Stegun, 9.12); their sum `J₀ + 2 Σ J₂ₖ` is 1.
+fn bessel_orders(x: f64, orders: &mut Vec<f64>) {
+    /// Below it, the square of J₁ is rounding.
+    const NO_ARGUMENT: f64 = 1e-8;
+    orders.clear();
+    if x < NO_ARGUMENT {
+        orders.push(1.0);
+        return;
+    }
+    let last = last_order(x);
+    orders.resize(last + 1, 0.0);
+    let (mut above, mut this, mut sum) = (0.0, f64::MIN_POSITIVE.sqrt(), 0.0);
+    for order in (0..=last).rev() {
+        orders[order] = this;
+        if order.is_multiple_of(2) {
+            sum += if order == 0 { this } else { 2.0 * this };
+        }
+        (above, this) = (this, 2.0 * order as f64 / x * this - above);
+    }
+    orders.iter_mut().for_each(|value| *value /= sum);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Abramowitz and Stegun, tables 9.1 and 9.2; the sum of all squares is 1.
+    #[test]
+    fn bessel_functions_have_their_tabulated_values() {
+        let mut orders = Vec::new();
+        for (x, order, tabulated) in [
+            (1.0, 0, 0.765_197_686_557_966_6),
+            (1.0, 1, 0.440_050_585_744_933_5),
+            (5.0, 2, 0.046_565_116_277_752_2),
+            (10.0, 0, -0.245_935_764_451_348_3),
+            (17.5, 1, -0.163_419_969_425_754_9),
+        ] {
+            bessel_orders(x, &mut orders);
+            assert!((orders[order] - tabulated).abs() < 1e-14, "J{order}({x}) = {}", orders[order]);
+        }
+        for x in [0.0, 1e-9, 1e-7, 1e-3, 0.5, 40.0, 700.0, 1e4] {
+            bessel_orders(x, &mut orders);
+            let squares: f64 = orders.iter().map(|j| j * j).sum();
+            let sum = 2.0 * squares - orders[0] * orders[0];
+            assert!((sum - 1.0).abs() < 1e-12, "{x}: {sum}");
+        }
+    }
+
+    /// The mean over a circle is that of the field at many of its points, with and without symmetry.
+    #[test]
+    fn the_mean_intensity_of_a_circle_is_that_of_its_points() {
+        let number = |i: usize, k: f64| (k * i as f64).sin();
+        let mut light = PupilSamples { wavelength: 5e-4, ..PupilSamples::default() };
+        for i in 0..40 {
+            let across = if i % 2 == 0 { 0.11 } else { 0.07 };
+            light.cosines.push([across * number(i, 1.3).abs(), 0.2 + 0.1 * number(i, 2.9)]);
+            light.waves.push(1.5 * number(i, 0.7));
+            light.amplitudes.push(1.0 + 0.5 * number(i, 4.1));
+        }
+        for (mirrored, center) in
+            [(true, [0.0, 0.002]), (true, [0.001, -0.003]), (false, [0.002, 0.001])]
+        {
+            light.mirrored = mirrored;
+            let waves = light.polar_waves(center);
+            for r in [0.0, 1e-7, 1e-3, 0.01] {
+                let square = |angle: f64| {
+                    let (sin, cos) = angle.sin_cos();
+                    let [re, im] = light.field([center[0] + r * sin, center[1] + r * cos]);
+                    re * re + im * im
+                };
+                let mean = (0..400).map(|i| square(TAU * f64::from(i) / 400.0)).sum::<f64>() / 400.0;
+                let found = ring_intensity(&waves, r);
+                assert!((found - mean).abs() < 1e-9 * mean.max(1.0), "{r}: {found} {mean}");
+            }
+        }
     }
 }

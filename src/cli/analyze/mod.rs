@@ -29,7 +29,7 @@ use crate::plot::CurveChart;
 use crate::pupil::{Accuracy, RayModel};
 use crate::trace::{Fate, Fates};
 use clap::ValueEnum;
-use serde::Serialize;
+use serde::{Serialize, Serializer};
 use std::collections::BTreeMap;
 use std::fmt::{self, Display};
 use std::path::PathBuf;
@@ -435,7 +435,7 @@ impl AnalysisRun {
         fields: Vec<AtField<T>>,
     ) -> Result<AnalysisReport<T>, CliError> {
         if let Some(reason) = common_reason(&fields) {
-            return Err(self.no_light(reason));
+            return Err(self.refuse(reason));
         }
         let first = &self.model.first_order;
         let um = self.primary_um();
@@ -451,8 +451,16 @@ impl AnalysisRun {
         })
     }
 
+    /// The error that no field has a result.
+    fn refuse(&self, reason: &AnalysisError) -> CliError {
+        if reason.is_loss_of_light() {
+            return self.no_light(reason);
+        }
+        CliError::Input(format!("{}: {reason}", self.opened.file))
+    }
+
     /// The error that there is no light, with the surface where most of it is lost.
-    fn no_light(&self, reason: &str) -> CliError {
+    fn no_light(&self, reason: &AnalysisError) -> CliError {
         let mut ends: BTreeMap<Fate, usize> = BTreeMap::new();
         let mut fates = Fates::default();
         let color = &self.model.channels[self.model.primary];
@@ -476,7 +484,7 @@ impl AnalysisRun {
     }
 }
 
-fn common_reason<T>(fields: &[AtField<T>]) -> Option<&str> {
+fn common_reason<T>(fields: &[AtField<T>]) -> Option<&AnalysisError> {
     let reason = |field: &AtField<T>| matches!(field.outcome, FieldOutcome::Dark { .. });
     match fields.first().map(|field| &field.outcome) {
         Some(FieldOutcome::Dark { dark }) if fields.iter().all(reason) => Some(dark),
@@ -512,14 +520,21 @@ struct AtField<T> {
 #[serde(untagged)]
 enum FieldOutcome<T> {
     Transmitted(T),
-    Dark { dark: String },
+    Dark {
+        #[serde(serialize_with = "as_text")]
+        dark: AnalysisError,
+    },
+}
+
+fn as_text<S: Serializer>(error: &AnalysisError, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_str(error)
 }
 
 impl<T> AtField<T> {
     fn new(field: &SelectedField, result: Result<T, AnalysisError>) -> Self {
         let outcome = match result {
             Ok(lit) => FieldOutcome::Transmitted(lit),
-            Err(dark) => FieldOutcome::Dark { dark: dark.to_string() },
+            Err(dark) => FieldOutcome::Dark { dark },
         };
         Self { x: field.given.x, y: field.given.y, outcome }
     }
