@@ -143,7 +143,9 @@ impl AnalysisError {
     pub fn is_loss_of_light(&self) -> bool {
         match self {
             Self::NoLight | Self::NoRays(_) | Self::Unbounded | Self::NoChief => true,
-            Self::FoldedPupil | Self::IrregularPupil | Self::NotSymmetric | Self::IdealPath => false,
+            Self::FoldedPupil | Self::IrregularPupil | Self::NotSymmetric | Self::IdealPath => {
+                false
+            }
         }
     }
 }

@@ -50,6 +50,8 @@ pub struct Studio {
     dialogs: Dialogs,
     /// The files that were opened or saved last, the newest first.
     recent: Vec<PathBuf>,
+    /// The file of the design in the frame before.
+    path: Option<PathBuf>,
     persistence: Persistence,
     /// The action that waits until the user has decided about unsaved changes.
     pub(super) pending: Option<PendingState>,
@@ -77,6 +79,7 @@ impl Studio {
             experiment_window: ExperimentWindow::default(),
             dialogs: Dialogs::default(),
             recent: storage.and_then(|s| eframe::get_value(s, RECENT)).unwrap_or_default(),
+            path: None,
             persistence,
             pending: None,
             message: None,
@@ -114,6 +117,7 @@ impl Studio {
         self.on_events(events);
         let view = self.session.view();
         self.update_title(ui.ctx(), &view);
+        self.remember_design(&view);
         let mut actions = Actions::default();
         let menus = menu_context(&self.dock, &self.recent, &view, ui.ctx());
         menu::shortcuts(ui, &menus, self.dock.is_typing(ui.ctx()), &mut actions);
@@ -247,6 +251,16 @@ impl Studio {
                 && (message.text.lines().count() > 1 || message.severity == Severity::Error)
             {
                 self.message = Some(message.text);
+            }
+        }
+    }
+
+    /// Remembers the file of the design when it has another one: opened, saved, or named at the start.
+    fn remember_design(&mut self, view: &SessionView) {
+        if view.path != self.path {
+            self.path.clone_from(&view.path);
+            if let Some(path) = &view.path {
+                self.remember(path);
             }
         }
     }

@@ -138,10 +138,11 @@ fn disabled_hint(item: &MenuItem) -> &'static str {
 }
 
 /// The items that have all words of a text: those that can be asked for first, and among them those
-/// with this very title and those that begin with it.
+/// with this very title and those that begin with it. A title counts with its menu too, as it is listed.
 pub(super) fn found(items: Vec<MenuItem>, text: &str) -> Vec<MenuItem> {
     let text = text.to_lowercase();
-    let words: Vec<&str> = text.split_whitespace().collect();
+    let is_between = |c: char| c.is_whitespace() || c == ':';
+    let words: Vec<&str> = text.split(is_between).filter(|word| !word.is_empty()).collect();
     let name =
         |item: &MenuItem| format!("{} {} {}", item.title, item.menu, item.hint).to_lowercase();
     let fits = |item: &MenuItem| {
@@ -151,7 +152,9 @@ pub(super) fn found(items: Vec<MenuItem>, text: &str) -> Vec<MenuItem> {
     let mut items: Vec<MenuItem> = items.into_iter().filter(fits).collect();
     let rank = |item: &MenuItem| {
         let title = item.title.to_lowercase();
-        let (is, begins) = (title == text.trim(), title.starts_with(text.trim()));
+        let titles = [title.clone(), format!("{}: {title}", item.menu.to_lowercase())];
+        let is = titles.iter().any(|title| title == text.trim());
+        let begins = titles.iter().any(|title| title.starts_with(text.trim()));
         let has = words.iter().all(|word| title.contains(word));
         (!item.is_enabled(), !is, !begins, !has)
     };

@@ -4,7 +4,7 @@
 use egui::{Align2, Button, Context, Grid, Id, Response, RichText, Ui, Window, vec2};
 
 use super::actions::Actions;
-use super::form::{choice, number_field};
+use super::form::{choice, enter_number, is_confirmed, number_field};
 use super::number;
 use super::text::capitalize;
 use crate::lens::{Edit, ElementEdit, ElementForm, Lens, Medium, NewElement, apply_edit};
@@ -108,29 +108,29 @@ impl ElementDialog {
             ElementTask::Move(_) => {
                 ui.label("Towards the image by");
                 let first = number_field(ui, "Distance", &mut self.by, " mm");
-                self.enter(&first);
+                self.enter(ui, &first);
                 ui.end_row();
             }
             ElementTask::Bend(_) => {
                 ui.label("Change of the curvatures");
                 let first = number_field(ui, "Change of the curvatures", &mut self.by, " /mm");
-                self.enter(&first);
+                self.enter(ui, &first);
                 ui.end_row();
             }
             ElementTask::Scale => {
                 ui.label("Focal length");
                 let name = "Focal length of the lens";
                 let first = number_field(ui, name, &mut self.focal_length, " mm");
-                self.enter(&first);
+                self.enter(ui, &first);
                 ui.end_row();
             }
         }
     }
 
     /// Gives the cursor to the first number of the dialog that has just been opened.
-    fn enter(&mut self, first: &Response) {
+    fn enter(&mut self, ui: &Ui, first: &Response) {
         if !std::mem::replace(&mut self.entered, true) {
-            first.request_focus();
+            enter_number(ui, first);
         }
     }
 
@@ -143,7 +143,7 @@ impl ElementDialog {
         ui.label("Focal length");
         let name = "Focal length of the element";
         let first = number_field(ui, name, &mut self.focal_length, " mm");
-        self.enter(&first);
+        self.enter(ui, &first);
         first.on_hover_text("Negative for a diverging element");
         ui.end_row();
         ui.label("Thick enough up to the height");
@@ -197,7 +197,8 @@ impl ElementDialog {
         }
         let mut pressed = false;
         ui.horizontal(|ui| {
-            if ui.add_enabled(tried.is_ok(), Button::new("Apply")).clicked() {
+            let apply = ui.add_enabled(tried.is_ok(), Button::new("Apply")).clicked();
+            if apply || (tried.is_ok() && is_confirmed(ui)) {
                 pressed = true;
                 let command = match &tried {
                     Ok(Some((edit, _))) => edit.clone().into(),

@@ -1,8 +1,9 @@
 //! Fields of the dialogs: numbers that are dragged or typed, and choices from a few.
 
-use egui::{ComboBox, Context, DragValue, Frame, Margin, Response, Ui};
+use egui::{ComboBox, Context, DragValue, Frame, Key, Margin, Response, Ui};
 
 use super::number;
+use super::text_input::select_whole;
 use crate::math::expression::evaluate;
 
 /// The digits of a number in a dialog.
@@ -25,6 +26,19 @@ pub(super) fn number_field(ui: &mut Ui, name: &str, value: &mut f64, unit: &str)
             evaluate(text.trim().trim_end_matches(unit_of_text.as_str()), old).ok()
         });
     ui.add(drag).accessible_name(name)
+}
+
+/// Gives a number of a dialog the cursor, with its whole text selected so that typing replaces it.
+pub(super) fn enter_number(ui: &Ui, field: &Response) {
+    field.request_focus();
+    select_whole(ui.ctx(), field.id);
+}
+
+/// True if Enter confirms a dialog whose fields have been shown: a number has given the cursor back at this
+/// key, and no button or list has it.
+pub(super) fn is_confirmed(ui: &Ui) -> bool {
+    ui.input(|input| input.key_pressed(Key::Enter))
+        && ui.memory(|memory| memory.focused().is_none())
 }
 
 /// Shows a choice from a few.

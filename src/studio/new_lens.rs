@@ -3,7 +3,7 @@
 use egui::{Button, Context, DragValue, Grid, Id, Key, Modal, RichText, Ui};
 
 use super::actions::Actions;
-use super::form::{choice, dialog_frame, number_field};
+use super::form::{choice, dialog_frame, enter_number, is_confirmed, number_field};
 use super::number;
 use super::text::capitalize;
 use crate::lens::{
@@ -84,7 +84,7 @@ impl NewLensDialog {
         ui.label("Focal length");
         let first = number_field(ui, "Focal length", &mut self.focal_length, " mm");
         if !std::mem::replace(&mut self.entered, true) {
-            first.request_focus();
+            enter_number(ui, &first);
         }
         ui.end_row();
         ui.label("Object");
@@ -257,7 +257,8 @@ impl NewLensDialog {
         ui.horizontal(|ui| {
             let fill = ui.visuals().selection.bg_fill;
             let create = Button::new(RichText::new("Create").strong()).fill(fill);
-            if let (true, Ok(lens)) = (ui.add_enabled(lens.is_ok(), create).clicked(), &lens) {
+            let pressed = ui.add_enabled(lens.is_ok(), create).clicked() || is_confirmed(ui);
+            if let (true, Ok(lens)) = (pressed, &lens) {
                 actions.push(Command::New(Box::new(lens.clone())));
                 done = true;
             }

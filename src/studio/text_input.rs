@@ -201,7 +201,7 @@ impl EditBuffers {
 }
 
 /// Selects the whole text of a field.
-fn select_whole(context: &Context, field: Id) {
+pub(super) fn select_whole(context: &Context, field: Id) {
     let mut state = TextEditState::load(context, field).unwrap_or_default();
     let all = CCursorRange::two(CCursor::new(0), CCursor::new(usize::MAX >> 1));
     state.cursor.set_char_range(Some(all));

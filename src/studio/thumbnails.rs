@@ -9,7 +9,9 @@ use super::cached::ByAddress;
 use super::draw::{BoundingBox, Camera, Scene, software};
 use super::palette::Palette;
 use super::section::SectionDrawing;
+use crate::analysis::clear_semi_diameters;
 use crate::lens::{Lens, added_glass};
+use crate::pupil::RayModel;
 
 /// The number of drawings that are cached.
 const CAPACITY: usize = 64;
@@ -78,10 +80,19 @@ impl Thumbnails {
     }
 }
 
+/// The heights of the rays at each surface, in mm, if a semi-diameter follows them; otherwise none.
+fn ray_heights(lens: &Lens) -> Vec<f64> {
+    if lens.surfaces.iter().all(|row| row.semi_diameter.is_some()) {
+        return Vec::new();
+    }
+    let model = RayModel::from_lens(lens, 0);
+    model.map(|model| clear_semi_diameters([&model])).unwrap_or_default()
+}
+
 fn draw(ui: &Ui, key: &ThumbnailKey) -> Option<TextureHandle> {
     let ThumbnailKey { lens, design, palette, size } = key;
     let system = lens.resolve(0, lens.wavelengths[lens.primary()].um).ok()?;
-    let section = SectionDrawing::new(&system, &[]);
+    let section = SectionDrawing::new(&system, &ray_heights(lens));
     let mut scene = Scene::on([0, 0, 0, 0]);
     section.draw_glass(&mut scene, palette, &added_glass(lens, design));
     section.draw_outlines(&mut scene, palette);

@@ -73,6 +73,12 @@ fn lens(harness: &Harness<'_, Studio>) -> Arc<Lens> {
     Arc::clone(harness.state().session().lens())
 }
 
+fn focal_length(lens: &Lens) -> f64 {
+    let view = view_of(lens.clone());
+    let analyses = view.results.as_ref().unwrap().analyses.as_ref().unwrap();
+    analyses.first_order().efl.unwrap()
+}
+
 #[test]
 fn a_new_lens_comes_from_the_dialog() {
     let mut harness = window(double_gauss());
@@ -168,6 +174,45 @@ fn the_cursor_is_in_the_first_number_of_a_dialog() {
     harness.get_by_label("New lens");
     keys(&mut harness, Modifiers::NONE, Key::Escape);
     assert!(harness.query_by_label("New lens").is_none());
+}
+
+/// What is typed into a dialog that has just been opened replaces its first number, and Enter confirms it.
+#[test]
+fn a_dialog_is_filled_in_and_confirmed_by_keys_alone() {
+    let mut harness = window(double_gauss());
+    keys(&mut harness, Modifiers::COMMAND, Key::N);
+    harness.input_mut().events.push(egui::Event::Text("35".into()));
+    harness.run_steps(2);
+    keys(&mut harness, Modifiers::NONE, Key::Enter);
+    assert!(harness.query_by_label("New lens").is_none(), "Enter creates the lens");
+    assert!((focal_length(&lens(&harness)) - 35.0).abs() < 1e-6);
+    keys(&mut harness, Modifiers::COMMAND | Modifiers::SHIFT, Key::F);
+    harness.input_mut().events.push(egui::Event::Text("70".into()));
+    harness.run_steps(2);
+    keys(&mut harness, Modifiers::NONE, Key::Enter);
+    assert!((focal_length(&lens(&harness)) - 70.0).abs() < 1e-6);
+}
+
+/// A file that was saved under a new name, or named at the start, is a recent one.
+#[test]
+fn a_file_is_recent_however_it_became_that_of_the_design() {
+    let path = std::env::temp_dir().join(format!("aplanat-{}-recent.json", std::process::id()));
+    let mut harness = window(achromat());
+    let command = Command::Save(Some(path.clone()));
+    harness.state_mut().session_mut().apply(command);
+    harness.run_steps(2);
+    keys(&mut harness, Modifiers::COMMAND, Key::K);
+    enter_text(&mut harness, "Find a command", "recent.json");
+    harness.get_by_label_contains("Recent file: ");
+    std::fs::remove_file(path).unwrap();
+}
+
+#[test]
+fn the_palette_finds_an_item_as_it_lists_it() {
+    let mut harness = window(achromat());
+    keys(&mut harness, Modifiers::COMMAND, Key::K);
+    enter_text(&mut harness, "Find a command", "optimizer: optimize");
+    harness.get_by_label("Optimizer: Optimize");
 }
 
 #[test]
@@ -461,11 +506,6 @@ fn escape_closes_the_dialogs_that_leave_the_window_usable() {
 /// The focal length of the whole lens stays when one of its lenses becomes two.
 #[test]
 fn splitting_a_lens_keeps_the_focal_length_of_the_whole() {
-    let focal_length = |lens: &Lens| {
-        let view = view_of(lens.clone());
-        let analyses = view.results.as_ref().unwrap().analyses.as_ref().unwrap();
-        analyses.first_order().efl.unwrap()
-    };
     let lens = double_gauss();
     let split = apply_edit(&lens, &Edit::Element(ElementEdit::Split(0))).unwrap();
     assert_eq!(split.surfaces.len(), lens.surfaces.len() + 2);

@@ -274,7 +274,8 @@ mod tests {
                     let [re, im] = light.field([center[0] + r * sin, center[1] + r * cos]);
                     re * re + im * im
                 };
-                let mean = (0..400).map(|i| square(TAU * f64::from(i) / 400.0)).sum::<f64>() / 400.0;
+                let mean =
+                    (0..400).map(|i| square(TAU * f64::from(i) / 400.0)).sum::<f64>() / 400.0;
                 let found = ring_intensity(&waves, r);
                 assert!((found - mean).abs() < 1e-9 * mean.max(1.0), "{r}: {found} {mean}");
             }

@@ -26,7 +26,8 @@ impl Panel for FirstOrderPanel {
             if numbers.first_order().efl.is_none() {
                 ui.weak(without_focus(&results.lens));
             }
-            data(ui, &results.lens, numbers.first_order());
+            let track = total_track(&results.lens, results.settings.zoom);
+            data(ui, track, numbers.first_order());
         });
     }
 }
@@ -40,12 +41,19 @@ fn without_focus(lens: &Lens) -> &'static str {
     }
 }
 
+/// The length from the first vertex to the image plane, which may follow a solve; `None` if the lens does not
+/// resolve.
+fn total_track(lens: &Lens, zoom: usize) -> Option<f64> {
+    let system = lens.resolve(zoom, lens.wavelengths[lens.primary()].um).ok()?;
+    Some(system.total_track())
+}
+
 /// A name, a value with its unit, and an explanation.
 struct DataLine(&'static str, String, &'static str);
 
-fn data(ui: &mut Ui, lens: &Lens, first: &FirstOrder<f64>) {
+fn data(ui: &mut Ui, track: Option<f64>, first: &FirstOrder<f64>) {
     ui.spacing_mut().item_spacing.y = 1.0;
-    for (i, DataLine(name, value, meaning)) in lines(lens, first).into_iter().enumerate() {
+    for (i, DataLine(name, value, meaning)) in lines(track, first).into_iter().enumerate() {
         let striped = if i % 2 == 0 { ui.visuals().faint_bg_color } else { Color32::TRANSPARENT };
         // The scroll bar floats over the right end.
         let margin = Margin { left: 3, right: 10, top: 1, bottom: 1 };
@@ -58,10 +66,9 @@ fn data(ui: &mut Ui, lens: &Lens, first: &FirstOrder<f64>) {
     }
 }
 
-fn lines(lens: &Lens, first: &FirstOrder<f64>) -> Vec<DataLine> {
-    let track: f64 = lens.surfaces.iter().map(|row| row.thickness).sum();
+fn lines(track: Option<f64>, first: &FirstOrder<f64>) -> Vec<DataLine> {
     // What lengths of this size leave by rounding is zero.
-    let size = track.abs() + first.efl.unwrap_or(0.0).abs();
+    let size = track.unwrap_or(0.0) + first.efl.unwrap_or(0.0).abs();
     let mm = |value: Option<f64>| mm(value.map(|value| number::without_rounding(value, size)));
     vec![
         DataLine("Focal length", mm(first.efl), "Equivalent focal length, one over the power"),
@@ -98,7 +105,7 @@ fn lines(lens: &Lens, first: &FirstOrder<f64>) -> Vec<DataLine> {
             mm(first.petzval_radius()),
             "Radius of the image surface without astigmatism",
         ),
-        DataLine("Total track", mm(Some(track)), "From the first vertex to the image, as written"),
+        DataLine("Total track", mm(track), "From the first vertex to the image plane"),
     ]
 }
 

@@ -14,12 +14,15 @@ use crate::studio::panels::widgets::{fixed_plot, log_axis};
 use crate::studio::text::capitalize;
 use crate::studio::thumbnails::Thumbnails;
 
-/// The width of a branch and the height of a version.
+/// The largest width of a branch and the height of a version.
 const CELL: [f32; 2] = [12.0, 46.0];
+/// The width of all branches that leaves room for the words, and the smallest width of one.
+const BRANCHES_WIDTH: f32 = 96.0;
+const LEAST_BRANCH_WIDTH: f32 = 4.0;
 /// The size of the drawing of a version.
 const THUMBNAIL: Vec2 = vec2(84.0, 42.0);
-/// The most branches beside each other that leave room for the words.
-const MAX_BRANCHES: usize = 8;
+/// The most branches beside each other; those beyond have no lines.
+const MAX_BRANCHES: usize = 40;
 /// The smallest change of the merit that is told, relative to it.
 const LEAST_CHANGE: f64 = 5e-4;
 /// The height of the curve of an optimization.
@@ -34,16 +37,19 @@ pub(super) fn tree(
 ) -> Option<u64> {
     let columns = columns(view);
     let count = columns.values().max().map_or(1, |last| last + 1).min(MAX_BRANCHES);
+    let width = (BRANCHES_WIDTH / count as f32).clamp(LEAST_BRANCH_WIDTH, CELL[0]);
     let mut marks: BTreeMap<u64, Pos2> = BTreeMap::new();
     let mut clicked = None;
     ui.spacing_mut().item_spacing.y = 0.0;
     for version in view.history.iter().rev() {
         ui.horizontal(|ui| {
-            let size = vec2(CELL[0] * count as f32, CELL[1]);
+            let size = vec2(width * count as f32, CELL[1]);
             let (rect, _) = ui.allocate_exact_size(size, Sense::hover());
-            let column = columns.get(&version.id).copied().unwrap_or(0).min(count - 1);
-            let place = pos2(rect.left() + CELL[0] * (column as f32 + 0.5), rect.center().y);
-            marks.insert(version.id, place);
+            let column = columns.get(&version.id).copied().unwrap_or(0);
+            if column < count {
+                let place = pos2(rect.left() + width * (column as f32 + 0.5), rect.center().y);
+                marks.insert(version.id, place);
+            }
             let (drawing, _) = ui.allocate_exact_size(THUMBNAIL, Sense::hover());
             if ui.is_rect_visible(drawing) {
                 thumbnails.paint(ui, &version.lens, &version.lens, drawing);
@@ -104,21 +110,48 @@ fn paint_lines(ui: &Ui, rect: Rect, lines: [(String, TextStyle, Color32, usize);
     }
 }
 
-/// The column of each version: that of its parent for the first child, a new one for the others.
+/// The column of each version.
 fn columns(view: &SessionView) -> BTreeMap<u64, usize> {
-    let mut columns = BTreeMap::new();
-    let mut followed = BTreeMap::new();
-    let mut next = 0;
-    for version in view.history.iter() {
-        let parent = version.parent.and_then(|parent| columns.get(&parent).copied());
-        let is_first = version.parent.is_none_or(|id| followed.insert(id, version.id).is_none());
-        let column = parent.filter(|_| is_first).unwrap_or_else(|| {
-            next += 1;
-            next - 1
-        });
-        columns.insert(version.id, column);
+    let rows: BTreeMap<u64, usize> =
+        view.history.iter().enumerate().map(|(row, version)| (version.id, row)).collect();
+    let parent = |version: &HistoryNode| rows.get(&version.parent?).copied();
+    let parents: Vec<Option<usize>> = view.history.iter().map(|version| parent(version)).collect();
+    view.history.iter().map(|version| version.id).zip(assign_columns(&parents)).collect()
+}
+
+/// The column of each version by the row of its parent: that of the parent for its first child. Any other one
+/// begins a branch, which has a column to itself from the row of the parent to its last version.
+fn assign_columns(parents: &[Option<usize>]) -> Vec<usize> {
+    let branches = branches(parents);
+    let mut last = vec![0; parents.len()];
+    branches.iter().enumerate().for_each(|(row, first)| last[*first] = row);
+    let mut taken: Vec<Vec<[usize; 2]>> = Vec::new();
+    let mut columns = vec![0; parents.len()];
+    for (row, first) in branches.into_iter().enumerate() {
+        if first != row {
+            columns[row] = columns[first];
+            continue;
+        }
+        let span = [parents[row].unwrap_or(row), last[row]];
+        let is_free = |spans: &Vec<[usize; 2]>| {
+            spans.iter().all(|other| other[1] < span[0] || span[1] < other[0])
+        };
+        columns[row] = taken.iter().position(is_free).unwrap_or(taken.len());
+        taken.resize(taken.len().max(columns[row] + 1), Vec::new());
+        taken[columns[row]].push(span);
     }
     columns
+}
+
+/// The row of the first version of the branch of each version.
+fn branches(parents: &[Option<usize>]) -> Vec<usize> {
+    let mut is_followed = vec![false; parents.len()];
+    let mut branches: Vec<usize> = Vec::with_capacity(parents.len());
+    for (row, parent) in parents.iter().enumerate() {
+        let goes_on = parent.filter(|parent| !std::mem::replace(&mut is_followed[*parent], true));
+        branches.push(goes_on.map_or(row, |parent| branches[parent]));
+    }
+    branches
 }
 
 fn paint_branches(ui: &Ui, view: &SessionView, marks: &BTreeMap<u64, Pos2>) {
@@ -186,4 +219,27 @@ pub(super) fn curve_plot(ui: &mut Ui, curve: &OptimizationCurve) -> Option<usize
     let label = "Merit against steps of this version";
     shown.response.widget_info(|| WidgetInfo::labeled(Role::Image, true, label));
     clicked_step(&shown.response, &shown.transform)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn versions_that_are_tried_from_one_version_have_columns_of_their_own() {
+        let parents: Vec<Option<usize>> =
+            std::iter::once(None).chain((1..13).map(|_| Some(0))).collect();
+        assert_eq!(assign_columns(&parents), [0, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11]);
+    }
+
+    #[test]
+    fn a_column_is_taken_again_where_its_branch_has_ended() {
+        // A trial from each of the versions 0, 2, and 4 of a chain.
+        let parents =
+            [None, Some(0), Some(0), Some(1), Some(3), Some(3), Some(4), Some(6), Some(6)];
+        assert_eq!(assign_columns(&parents), [0, 0, 1, 0, 0, 1, 0, 0, 1]);
+        // A branch that goes on beside the first one.
+        let parents = [None, Some(0), Some(0), Some(2), Some(1), Some(3), Some(1)];
+        assert_eq!(assign_columns(&parents), [0, 0, 1, 1, 0, 1, 2]);
+    }
 }

@@ -294,9 +294,10 @@ fn snapped(unit: HandleUnit, value: f64, other: f64) -> f64 {
             if radius.abs() > PLANE_RADIUS {
                 return 0.0;
             }
-            let step = round_length_below(((other - value) * radius * radius).abs());
-            let round = (radius / step).round() * step;
-            if round == 0.0 { value } else { 1.0 / round }
+            // A few points of motion are more than the radius of a weakly curved surface.
+            let moved = ((other - value) * radius * radius).abs().min(radius.abs());
+            let step = round_length_below(moved);
+            1.0 / ((radius / step).round() * step)
         }
         _ => {
             let step = round_length_below((other - value).abs());
@@ -355,5 +356,20 @@ fn text_of(unit: HandleUnit, value: f64) -> String {
         HandleUnit::Angle => format!("{}°", number::format_digits(value, 6)),
         HandleUnit::Number => number::format_digits(value, 6),
         HandleUnit::Surface => format!("surface {}", value + 1.0),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A few points of motion change a weak curvature by more than itself.
+    #[test]
+    fn a_long_radius_snaps_to_a_round_one() {
+        for (change, round) in [(1e-3, 75.0), (0.05, 50.0), (10.0, 50.0)] {
+            let value = 1.0 / 73.6;
+            let radius = 1.0 / snapped(HandleUnit::Curvature, value, value + change);
+            assert!((radius - round).abs() < 1e-9, "{change}: {radius}");
+        }
     }
 }
