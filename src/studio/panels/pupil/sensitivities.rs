@@ -4,8 +4,8 @@
 use std::ops::RangeInclusive;
 
 use egui::{
-    Align, Align2, Color32, Layout as Arrange, Pos2, Rect, RichText, Role, ScrollArea, Sense,
-    Shape, Stroke, TextStyle, Ui, WidgetInfo, pos2, vec2,
+    Align, Align2, Color32, Label, Layout as Arrange, Pos2, Rect, RichText, Role, ScrollArea,
+    Sense, Shape, Stroke, TextStyle, Ui, WidgetInfo, pos2, vec2,
 };
 use egui_extras::{Column as Width, TableBuilder, TableRow};
 
@@ -100,15 +100,15 @@ fn limiting_surfaces(table: &SensitivityTable<'_>, all: &RimSensitivities) -> Ve
 fn title(ui: &mut Ui, shown: &PupilView<'_>, all: &RimSensitivities, significant: &[usize]) {
     ui.horizontal(|ui| {
         ui.strong("+0.1 mm of semi-diameter").on_hover_text(HINT);
-        let others = remaining_surfaces(significant, shown.results.lens.surfaces.len());
-        if !others.is_empty() {
-            let text = format!("inactive: {others}");
-            ui.label(RichText::new(text).small().weak())
-                .on_hover_text("No ray is limited by the semi-diameters of these surfaces");
-        }
         ui.with_layout(Arrange::right_to_left(Align::Center), |ui| {
             let cost = format!("{} rays in {:.2} ms", all.rays, shown.pupils.sensitivities.ms);
             ui.label(RichText::new(cost).small().weak());
+            let others = remaining_surfaces(significant, shown.results.lens.surfaces.len());
+            if !others.is_empty() {
+                let text = RichText::new(format!("inactive: {others}")).small().weak();
+                ui.add(Label::new(text).truncate())
+                    .on_hover_text("No ray is limited by the semi-diameters of these surfaces");
+            }
         });
     });
 }
