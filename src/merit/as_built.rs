@@ -22,11 +22,12 @@ use super::scoped_part::ScopedPart;
 use super::spot::lost_ray_error;
 use super::sum::{DerivativeLevel, SumOfSquares};
 use super::{EvaluationContext, MeritError, SampledPupil};
-use crate::lens::{Lens, LensError, System, Term, TermScope, Tolerance, lie_on_one_side};
+use crate::lens::{Lens, LensError, System, Term, TermScope, lie_on_one_side};
 use crate::math::{SimdWidth, dot, excess_beyond, run_vectorized, sum_of_products};
 use crate::pupil::TracedPupil;
 use crate::tolerance::{
-    MadeKind, MadeNumber, NominalLens, NumberCovariance, graded_sheet, perturb,
+    IndependentError, MadeKind, MadeNumber, NominalLens, NumberCovariance, graded_sheet,
+    independent_errors, perturb,
 };
 use crate::trace::{
     ErrorDirections, ErrorNumber, ErrorRows, Landings, Rays, SystemGradient, TraceSink as _, Tracer,
@@ -41,7 +42,7 @@ const TERM: &str = "as_built";
 /// The tolerances of a term.
 #[derive(Debug, Clone)]
 pub(super) struct MadeTolerances {
-    errors: Vec<Tolerance>,
+    errors: Vec<IndependentError>,
     /// The travel of the focus on either side, in mm.
     travel: f64,
     /// The semi-diameters in mm, the units of irregularities.
@@ -63,6 +64,14 @@ impl MadeTolerances {
             (grade, _) => graded_sheet(lens, &nominal, grade.unwrap_or_default()),
         };
         let refuse = |why| MeritError::DoesNotApply { term: TERM, why };
+        if !sheet.compensators.is_empty() {
+            return Err(refuse(
+                "the tolerances of the lens have compensators besides focus, which this term does not \
+                 adjust; expected none, or a term with a grade",
+            ));
+        }
+        let errors = independent_errors(&sheet);
+        let errors = errors.map_err(|_| refuse("the correlations of the tolerances contradict"))?;
         let unmade: Vec<_> = sheet.errors.iter().map(|t| (t.error, 0.0)).collect();
         if perturb(&nominal, &unmade).is_err() {
             return Err(refuse("a tolerance of the lens is not possible on its surface"));
@@ -74,7 +83,7 @@ impl MadeTolerances {
         }
         let travel = sheet.focus_travel.unwrap_or(f64::INFINITY);
         let semi_diameters = nominal.semi_diameters;
-        Ok(Some(Self { errors: sheet.errors, travel, semi_diameters }))
+        Ok(Some(Self { errors, travel, semi_diameters }))
     }
 }
 

@@ -62,7 +62,7 @@ fn as_built(
     let request = ToleranceRequest { seed: SEED, samples, limit: settings.good_rms };
     let analysis = analyze(&scene, &sheet, request)?;
     Ok(AsBuiltLens {
-        shares: analysis.growth_shares(&sheet.errors),
+        shares: analysis.growth_shares(&sheet)?,
         sheet,
         from_lens: lens.tolerances.is_some(),
         analysis,

@@ -84,7 +84,11 @@ fn each_kind_of_error_adds_to_the_term_what_jets_say() {
         let distribution = ErrorDistribution::Uniform;
         let errors = vec![Tolerance { error, half_range, distribution }];
         for focus_travel in [None, Some(0.0)] {
-            let sheet = ToleranceSheet { errors: errors.clone(), focus_travel };
+            let sheet = ToleranceSheet {
+                errors: errors.clone(),
+                focus_travel,
+                ..ToleranceSheet::default()
+            };
             let expected = growth_by_jets(&lens, &sheet, focus_travel.is_none());
             let made = Lens { tolerances: Some(sheet), ..lens.clone() };
             let found = growth(&made, OWN);
@@ -116,7 +120,7 @@ fn ten_thousand_tolerances_are_as_many_as_their_sum() {
         once.errors.iter().flat_map(|t| std::iter::repeat_n(small(t), 130)).collect();
     assert!(errors.len() > 10_000, "{}", errors.len());
     let expected = growth(&lens, GRADED);
-    lens.tolerances = Some(ToleranceSheet { errors, focus_travel: None });
+    lens.tolerances = Some(ToleranceSheet::of_errors(errors));
     assert_close(growth(&lens, OWN), expected, 1e-9 * expected, "sum");
 }
 
@@ -136,7 +140,7 @@ fn a_focus_of_bounded_travel_wins_back_a_part() {
     assert!(travels[2] > 2.0 * travels[0], "{travels:?}");
     let mut none = lens;
     let errors = sheet.errors.iter().map(|t| Tolerance { half_range: 0.0, ..*t }).collect();
-    none.tolerances = Some(ToleranceSheet { errors, focus_travel: None });
+    none.tolerances = Some(ToleranceSheet::of_errors(errors));
     assert!(growth(&none, OWN).abs() < 1e-12 * travels[0], "{}", growth(&none, OWN));
 }
 
@@ -167,7 +171,8 @@ fn the_term_has_the_derivative_of_its_value_for_every_error() {
         error(PerturbationKind::Irregularity, 5, 5, 1e-3),
         error(PerturbationKind::Thickness, 4, 4, 0.05),
     ];
-    lens.tolerances = Some(ToleranceSheet { errors, focus_travel: Some(0.03) });
+    lens.tolerances =
+        Some(ToleranceSheet { errors, focus_travel: Some(0.03), ..ToleranceSheet::default() });
     for pupil in [PupilEdge::Frozen, PupilEdge::Moving] {
         check(&lens, OWN, pupil, |quantity| 0.3 * step(quantity));
     }
@@ -192,7 +197,7 @@ fn a_lens_that_the_term_does_not_apply_to_is_refused() {
     let error = Perturbation::of_surface(PerturbationKind::ThicknessAdjusted, 6);
     let distribution = ErrorDistribution::Normal;
     let errors = vec![Tolerance { error, half_range: 0.1, distribution }];
-    plain.tolerances = Some(ToleranceSheet { errors, focus_travel: None });
+    plain.tolerances = Some(ToleranceSheet::of_errors(errors));
     assert!(refusal(&plain, OWN).contains("not possible"));
 }
 

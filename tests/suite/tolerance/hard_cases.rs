@@ -66,7 +66,7 @@ fn lenses_that_lose_rays_count_as_bad() {
     let mut errors = tolerances(&lenses()[0], ErrorDistribution::Ends);
     errors.retain(|t| t.error.kind == PerturbationKind::ElementDecenterY);
     errors.iter_mut().for_each(|t| t.half_range = 25.0);
-    let sheet = ToleranceSheet { errors, focus_travel: None };
+    let sheet = ToleranceSheet::of_errors(errors);
     let request = ToleranceRequest { seed: 1, samples: 8, limit: Some(1.0) };
     let found = analyze(&scene, &sheet, request).unwrap();
     assert!(found.lost > 0);
@@ -90,7 +90,7 @@ fn no_tolerance_and_impossible_errors() {
     let mut errors = tolerances(&lenses()[0], ErrorDistribution::NormalCut);
     errors.truncate(4);
     errors.iter_mut().for_each(|t| t.half_range = 0.0);
-    let sheet = ToleranceSheet { errors, focus_travel: Some(0.0) };
+    let sheet = ToleranceSheet { errors, focus_travel: Some(0.0), ..ToleranceSheet::default() };
     let request = ToleranceRequest { seed: 1, samples: 4, limit: None };
     let found = analyze(&scene, &sheet, request).unwrap();
     for spot in &found.spots {
@@ -113,7 +113,11 @@ fn a_compensator_at_its_stop_leaves_the_rest() {
     let mut errors = tolerances(&lenses()[0], ErrorDistribution::NormalCut);
     errors.retain(|t| t.error.kind == PerturbationKind::Thickness);
     let run = |travel: Option<f64>| {
-        let sheet = ToleranceSheet { errors: errors.clone(), focus_travel: travel };
+        let sheet = ToleranceSheet {
+            errors: errors.clone(),
+            focus_travel: travel,
+            ..ToleranceSheet::default()
+        };
         let request = ToleranceRequest { seed: 1, samples: 30, limit: None };
         analyze(&scene, &sheet, request).unwrap().spots
     };
@@ -130,7 +134,7 @@ fn a_form_that_fails_says_so() {
     let mut errors = tolerances(&lenses()[2], ErrorDistribution::Normal);
     errors.retain(|t| t.error.kind == PerturbationKind::ElementDecenterY);
     errors.iter_mut().for_each(|t| t.half_range *= 10.0);
-    let sheet = ToleranceSheet { errors, focus_travel: None };
+    let sheet = ToleranceSheet::of_errors(errors);
     let request = ToleranceRequest { seed: 2, samples: 40, limit: None };
     let found = analyze(&scene, &sheet, request).unwrap();
     assert!(!found.spots[1].form_agrees, "{:?}", found.spots[1].difference);
