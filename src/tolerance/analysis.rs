@@ -37,6 +37,11 @@ pub struct ToleranceAnalysis {
     pub samples: usize,
     /// The number of those of which a ray does not arrive; they count as bad.
     pub lost: usize,
+    /// The number of lenses that are traced with rims that clip too, and of those of which a field gets
+    /// no light through them though all rays arrive without.
+    pub with_rims: usize,
+    /// The number of the latter.
+    pub dark: usize,
     /// The mean relative change of the mean square spot, at the fixed image plane and refocused, and
     /// the mean share of light lost where rims clip, which the spots leave out; `None` without rays.
     pub clipping: Option<[f64; 3]>,
@@ -162,8 +167,22 @@ pub fn analyze_until(
     let lost = real.iter().filter(|lens| lens.mean_square.is_none()).count();
     let clipping = clipping(&real);
     let samples = real.len();
+    let with_rims = samples.min(WITH_RIMS);
+    let is_dark = |lens: &&RealLens| lens.mean_square.is_some() && lens.clipped.is_none();
+    let dark = real[..with_rims].iter().filter(is_dark).count();
     let sensitivities = found;
-    Ok(ToleranceAnalysis { sensitivities, forms, spots, travels, stopped, samples, lost, clipping })
+    Ok(ToleranceAnalysis {
+        sensitivities,
+        forms,
+        spots,
+        travels,
+        stopped,
+        samples,
+        lost,
+        with_rims,
+        dark,
+        clipping,
+    })
 }
 
 impl ToleranceAnalysis {

@@ -138,18 +138,7 @@ impl QuadraticForm {
         let scaled = mixture.scaled(&self.second);
         let count = sheet.errors.len();
         let trace: f64 = (0..count).map(|i| scaled[(i, i)]).sum();
-        let SymmetricEigen { eigenvectors, eigenvalues } = SymmetricEigen::new(scaled);
-        let mut order: Vec<usize> = (0..count).collect();
-        order.sort_by(|a, b| eigenvalues[*b].abs().total_cmp(&eigenvalues[*a].abs()));
-        let total: f64 = eigenvalues.iter().map(|v| v.abs()).sum();
-        let (mut kept, mut sum) = (Vec::new(), 0.0);
-        for m in order {
-            if sum >= (1.0 - NEGLECTED) * total {
-                break;
-            }
-            sum += eigenvalues[m].abs();
-            kept.push(m);
-        }
+        let (kept, eigenvectors) = principal(scaled);
         let mut rows = vec![mixture.by_independent(&self.first)];
         let adjusted = self.adjusted.clone();
         for row in adjusted.iter().flat_map(|adjusted| adjusted.first.row_iter()) {
@@ -157,14 +146,13 @@ impl QuadraticForm {
         }
         let own = rows.len();
         let deviations = mixture.deviations();
-        for m in &kept {
-            let column = eigenvectors.column(*m);
+        for column in eigenvectors.column_iter() {
             rows.push(column.iter().zip(deviations).map(|(v, deviation)| v / deviation).collect());
         }
         let directions = DMatrix::from_fn(rows.len(), count, |row, i| rows[row][i]);
-        let values: Vec<f64> = kept.iter().map(|m| eigenvalues[*m]).collect();
-        let neglected = 0.5 * (trace - values.iter().sum::<f64>());
-        Ok(ReducedForm { nominal: self.nominal, neglected, values, own, directions, adjusted })
+        let neglected = 0.5 * (trace - kept.iter().sum::<f64>());
+        let (nominal, values) = (self.nominal, kept);
+        Ok(ReducedForm { nominal, neglected, values, own, directions, adjusted })
     }
 }
 
@@ -263,6 +251,64 @@ fn spot_at(merits: &Merits<Jet2>, shift: f64) -> (Jet2, Jet2) {
 
 /// The share of the form whose scatter, though not its mean, is left out of samples.
 const NEGLECTED: f64 = 1e-4;
+
+/// The eigenvalues of a symmetric matrix that carry nearly all of it, with their eigenvectors as columns.
+///
+/// A matrix of mean products has few of them: they are those of its first pivoted Cholesky factors. One
+/// of which these leave too much, as it is not positive, is decomposed as a whole.
+fn principal(matrix: DMatrix<f64>) -> (Vec<f64>, DMatrix<f64>) {
+    let (values, vectors) = match few_factors(&matrix) {
+        Some(factors) => {
+            let small = SymmetricEigen::new(factors.tr_mul(&factors));
+            let mut vectors = factors * small.eigenvectors;
+            for (mut column, value) in vectors.column_iter_mut().zip(small.eigenvalues.iter()) {
+                column *= 1.0 / value.max(f64::MIN_POSITIVE).sqrt();
+            }
+            (small.eigenvalues, vectors)
+        }
+        None => {
+            let SymmetricEigen { eigenvectors, eigenvalues } = SymmetricEigen::new(matrix);
+            (eigenvalues, eigenvectors)
+        }
+    };
+    let mut order: Vec<usize> = (0..values.len()).collect();
+    order.sort_by(|a, b| values[*b].abs().total_cmp(&values[*a].abs()));
+    let total: f64 = values.iter().map(|v| v.abs()).sum();
+    let (mut kept, mut sum) = (Vec::new(), 0.0);
+    for m in order {
+        if sum >= (1.0 - NEGLECTED) * total {
+            break;
+        }
+        sum += values[m].abs();
+        kept.push(m);
+    }
+    let columns = DMatrix::from_fn(vectors.nrows(), kept.len(), |i, k| vectors[(i, kept[k])]);
+    (kept.iter().map(|m| values[*m]).collect(), columns)
+}
+
+/// Columns `f` of which the sum of `f fᵀ` is a matrix but for a tenth of what may be left out; `None` if
+/// there are none, or as many as the matrix has.
+fn few_factors(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let count = matrix.nrows();
+    let mut rest: Vec<f64> = (0..count).map(|i| matrix[(i, i)]).collect();
+    let left = |rest: &[f64]| rest.iter().map(|value| value.abs()).sum::<f64>();
+    let enough = 0.1 * NEGLECTED * left(&rest);
+    let mut factors: Vec<DVector<f64>> = Vec::new();
+    while left(&rest) > enough {
+        let (pivot, own) = rest.iter().copied().enumerate().max_by(|a, b| a.1.total_cmp(&b.1))?;
+        if factors.len() + 1 >= count || !(own > 0.0) {
+            return None;
+        }
+        let mut column = matrix.column(pivot).into_owned();
+        for factor in &factors {
+            column.axpy(-factor[pivot], factor, 1.0);
+        }
+        column *= 1.0 / own.sqrt();
+        rest.iter_mut().zip(column.iter()).for_each(|(rest, by)| *rest -= by * by);
+        factors.push(column);
+    }
+    (!factors.is_empty()).then(|| DMatrix::from_columns(&factors))
+}
 
 /// The row of [`ReducedForm::directions`] for the first derivatives; those of the best adjustments come
 /// next.
@@ -423,13 +469,11 @@ struct RayRow<'a> {
 }
 
 impl RayRow<'_> {
-    fn value(&self, ray: usize, axis: usize) -> f64 {
-        let ray = &self.rays[ray];
-        if self.slope {
-            ray.slope[axis]
-        } else {
-            ray.displacement[axis] + self.shift * ray.bend[axis]
-        }
+    /// The numbers of a ray along x and y times a factor.
+    fn weighted(&self, ray: usize, factor: f64) -> [f64; 2] {
+        let RaySensitivity { displacement: [x, y], slope, bend: [u, v] } = &self.rays[ray];
+        let [x, y] = if self.slope { *slope } else { [x + self.shift * u, y + self.shift * v] };
+        [factor * x, factor * y]
     }
 }
 
@@ -445,10 +489,12 @@ fn add_field(
         places.extend(field.rays(colour).map(|(i, weight)| (from + i, weight)));
         from += colour.rays.len();
     }
-    let values = DMatrix::from_fn(2 * places.len(), rows.len(), |i, row| {
-        let (place, weight) = places[i / 2];
-        (weight * field.weight).sqrt() * rows[row].value(place, i % 2)
-    });
+    places.iter_mut().for_each(|(_, weight)| *weight = (*weight * field.weight).sqrt());
+    let mut values = Vec::with_capacity(2 * places.len() * rows.len());
+    for row in rows {
+        values.extend(places.iter().flat_map(|(place, root)| row.weighted(*place, *root)));
+    }
+    let values = DMatrix::from_vec(2 * places.len(), rows.len(), values);
     let found = values.transpose() * &values;
     for (i, row) in rows.iter().enumerate() {
         for (j, other) in rows.iter().enumerate() {

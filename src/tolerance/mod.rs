@@ -59,7 +59,7 @@ pub use covariance::{
     IndependentError, LeverArm, MadeKind, MadeNumber, NumberCovariance, TiltingBody,
     independent_errors,
 };
-pub use error::ToleranceError;
+pub use error::{ToleranceError, refuse_lost_lenses};
 pub use form::{AdjustedForm, FocusTreatment, QuadraticForm};
 pub use grade::{PriceClass, bounded_tolerances, graded_sheet, price_classes};
 pub use inverse::{form_yield, loosest_for_yield, loosest_tolerances};

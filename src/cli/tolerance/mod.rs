@@ -15,7 +15,7 @@ use crate::tolerance::{
     AsBuiltSpot, Derivatives, PriceClass, QuadraticForm, StoppedLenses, ToleranceAnalysis,
     ToleranceError, ToleranceGrade, ToleranceRequest, ToleranceScene, analyze_until,
     bounded_tolerances, form_yield, graded_sheet, loosest_for_yield, loosest_tolerances,
-    price_classes, real_lenses,
+    price_classes, real_lenses, refuse_lost_lenses,
 };
 use serde::Serialize;
 use std::fmt::{self, Display};
@@ -93,8 +93,7 @@ impl ToleranceArgs {
         let stop = stop_flag();
         let analysis = analyze_until(&scene, &sheet, request, &stop).map_err(refuse)?;
         note_if_stopped(&stop);
-        refuse_lost_lenses(analysis.lost, analysis.samples, "these tolerances")
-            .map_err(|why| CliError::Failed(format!("{}: {why}", opened.file)))?;
+        refuse_lost_lenses(analysis.lost, analysis.samples, "these tolerances").map_err(refuse)?;
         let form = &analysis.forms[1];
         let loosest = match self.loosest(form, &sheet).transpose().map_err(refuse)? {
             Some(found) => {
@@ -104,7 +103,7 @@ impl ToleranceArgs {
                 let place = (&opened.lens, &scene);
                 let loosest = Loosest::new(loosest, form, self.rms, place).map_err(refuse)?;
                 let confirmed = loosest.confirmed(form, &scene, held, (self.seed, &stop));
-                Some(confirmed.map_err(|why| CliError::Failed(format!("{}: {why}", opened.file)))?)
+                Some(confirmed.map_err(refuse)?)
             }
             None => None,
         };
@@ -160,31 +159,25 @@ impl ToleranceArgs {
     }
 }
 
-/// Refuses means over lenses of which most are lost: those of the others tell nothing.
-fn refuse_lost_lenses(lost: usize, samples: usize, what: &str) -> Result<(), String> {
-    if 2 * lost <= samples {
-        return Ok(());
-    }
-    Err(format!(
-        "{lost} of {samples} lenses with {what} lose rays, so that no mean or quantile tells anything \
-         of them; expected tighter ones: a tighter --grade, smaller half ranges in the file, or less \
-         asked of --loosest"
-    ))
-}
-
 fn tolerance_error(opened: &LoadedLens, source: &ToleranceError) -> CliError {
-    CliError::Input(format!("{}: {source}", opened.file))
+    let text = format!("{}: {source}", opened.file);
+    match source {
+        ToleranceError::MostLost { .. } => CliError::Failed(text),
+        _ => CliError::Input(text),
+    }
 }
 
 /// The result.
 #[derive(Serialize)]
 struct ToleranceReport {
     errors: usize,
+    correlations: usize,
     rays: usize,
     sampling_error: f64,
     samples: usize,
     seed: u64,
     lost: usize,
+    dark: usize,
     clipping: Option<[f64; 3]>,
     spots: [AsBuiltSpot; 2],
     compensators: Vec<CompensatorRow>,
@@ -253,15 +246,14 @@ impl Loosest {
         scene: &ToleranceScene,
         held: usize,
         (seed, stop): (u64, &AtomicBool),
-    ) -> Result<Self, String> {
+    ) -> Result<Self, ToleranceError> {
         if held > 0 {
             self.warnings.push(format!(
                 "{held} of the loosest tolerances are held at ten times the commercial class, or ten \
                  times what they were: the quadratic model would have them wider"
             ));
         }
-        let lenses = real_lenses(scene, &self.sheet, seed, CONFIRMING, 0, stop);
-        let lenses = lenses.map_err(|why| why.to_string())?;
+        let lenses = real_lenses(scene, &self.sheet, seed, CONFIRMING, 0, stop)?;
         let arrived: Vec<[f64; 2]> = lenses
             .iter()
             .filter_map(|lens| Some([lens.mean_square?[1], form.at(&lens.errors)]))
@@ -321,11 +313,13 @@ impl ToleranceReport {
         let (loosest, prices) = loosest.map(|l| (l.sheet.errors, l.prices)).unzip();
         Ok(Self {
             errors: sheet.errors.len(),
+            correlations: sheet.correlations.len(),
             rays: scene.beam.rays(),
             sampling_error: scene.sampling_error,
             samples: analysis.samples,
             seed: arguments.seed,
             lost: analysis.lost,
+            dark: analysis.dark,
             clipping: analysis.clipping,
             sensitivities: rows(sheet, &analysis)?,
             compensators: compensator_rows(&analysis),
@@ -404,6 +398,12 @@ fn warnings(analysis: &ToleranceAnalysis) -> Vec<String> {
             focus_name(spot)
         ));
     }
+    if analysis.dark > 0 {
+        warnings.push(format!(
+            "in {} of {} lenses with rims a field gets no light; what rims change leaves these out",
+            analysis.dark, analysis.with_rims
+        ));
+    }
     if analysis.lost > 0 {
         warnings.push(format!(
             "{} of {} lenses lose rays and count as bad; the means leave them out",
@@ -425,8 +425,15 @@ impl Display for ToleranceReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(
             f,
-            "{} manufacturing errors, {} rays, {} lenses by Monte Carlo; spots as rms in mm\n",
-            self.errors, self.rays, self.samples
+            "{} manufacturing errors, {}{} rays, {} lenses by Monte Carlo; spots as rms in mm\n",
+            self.errors,
+            match self.correlations {
+                0 => String::new(),
+                1 => "1 correlation, ".to_owned(),
+                count => format!("{count} correlations, "),
+            },
+            self.rays,
+            self.samples
         )?;
         writeln!(f, "{}", self.spot_table())?;
         writeln!(f, "{}", compensator_table(&self.compensators))?;

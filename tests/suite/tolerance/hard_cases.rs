@@ -10,7 +10,7 @@ use aplanat::tolerance::{
     graded_sheet, merits, perturb,
 };
 
-fn scene(number: usize, rule: (usize, usize)) -> ToleranceScene {
+pub(super) fn scene(number: usize, rule: (usize, usize)) -> ToleranceScene {
     let lens = &lenses()[number];
     ToleranceScene {
         lens: lens.nominal(),
