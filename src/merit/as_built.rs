@@ -361,9 +361,10 @@ impl<'a> Growth<'a> {
         for axis in 0..2 {
             let displaced = self.displaced(channel, axis);
             self.add_lever_arms(channel, axis, &displaced, &mut primary);
+            let mut direction = Vec::new();
             for (place, MadeNumber { surface, kind }) in self.covariance.numbers.iter().enumerate()
             {
-                let direction = combined(&self.covariance.rows[place], &displaced);
+                combine(&self.covariance.rows[place], &displaced, &mut direction);
                 let (number, factor) = match kind {
                     MadeKind::Number(number) => (*number, 1.0),
                     MadeKind::Abbe => (ErrorNumber::Index, -channel.dispersion[*surface]),
@@ -427,8 +428,9 @@ impl<'a> Growth<'a> {
         displaced: &[Vec<f64>],
         gradient: &mut SystemGradient<f64>,
     ) {
+        let mut tilted = Vec::new();
         for body in &self.covariance.bodies {
-            let tilted = combined(&body.changes, displaced);
+            combine(&body.changes, displaced, &mut tilted);
             for arm in &body.arms {
                 let shifted = &channel.effects.by_number[axis][arm.number];
                 let product = weighted_dot(&channel.weights, &tilted, shifted);
@@ -486,11 +488,11 @@ impl<'a> Growth<'a> {
 
     /// The derivative of the growth by the weight of each ray.
     fn costs(&self, effects: &NumberEffects) -> Vec<f64> {
-        let mut costs = vec![0.0; effects.slopes[0].len()];
+        let (mut costs, mut varied) = (vec![0.0; effects.slopes[0].len()], Vec::new());
         for axis in 0..2 {
             let rows = &effects.by_number[axis];
             for (row, covariances) in rows.iter().zip(&self.covariance.rows) {
-                let varied = combined(covariances, rows);
+                combine(covariances, rows, &mut varied);
                 let products = row.iter().zip(&varied);
                 costs.iter_mut().zip(products).for_each(|(cost, (a, b))| *cost += a * b);
             }
@@ -544,10 +546,11 @@ impl MadeChannel {
 
     /// The sum over all numbers of their effects' products, each by its covariance.
     fn mean_square(&self, covariance: &NumberCovariance) -> f64 {
-        let mut sum = 0.0;
+        let (mut sum, mut varied) = (0.0, Vec::new());
         for rows in &self.effects.by_number {
             for (row, covariances) in rows.iter().zip(&covariance.rows) {
-                sum += weighted_dot(&self.weights, row, &combined(covariances, rows));
+                combine(covariances, rows, &mut varied);
+                sum += weighted_dot(&self.weights, row, &varied);
             }
         }
         sum
@@ -559,13 +562,21 @@ impl MadeChannel {
     }
 }
 
-/// The sum of some rows, each times a factor.
-fn combined(factors: &[(usize, f64)], rows: &[Vec<f64>]) -> Vec<f64> {
-    let mut sum = vec![0.0; rows.first().map_or(0, Vec::len)];
-    for (place, factor) in factors {
-        sum.iter_mut().zip(&rows[*place]).for_each(|(to, value)| *to += factor * value);
-    }
-    sum
+/// Makes a row the sum of some others, each times a factor.
+fn combine(factors: &[(usize, f64)], rows: &[Vec<f64>], sum: &mut Vec<f64>) {
+    sum.clear();
+    sum.resize(rows.first().map_or(0, Vec::len), 0.0);
+    run_vectorized(
+        SimdWidth::detect(),
+        #[inline(always)]
+        || {
+            for (place, factor) in factors {
+                for (to, value) in sum.iter_mut().zip(&rows[*place]) {
+                    *to += factor * value;
+                }
+            }
+        },
+    );
 }
 
 fn weighted_dot(weights: &[f64], a: &[f64], b: &[f64]) -> f64 {

@@ -121,23 +121,16 @@ impl Stages {
     fn new(lens: &NominalLens, beam: &Beam, options: MeritOptions) -> Result<Self, ToleranceError> {
         // Every ray has to arrive.
         merits(&lens.systems, beam, options)?;
+        let tracers = open_tracers(&lens.systems)?;
         let mut beams = vec![beam.clone()];
         // The rear of a lens that begins to run backwards would be another lens.
         let system = &lens.systems[lens.primary];
         let mirror = system.surfaces.iter().position(|s| s.mirror || s.grin.is_some());
         for surface in 1..mirror.unwrap_or(system.surfaces.len()) {
-            // From the surface before, which a second one makes one that refracts.
-            let pass = |system: &System<f64>| System {
-                index_before: system.index_before(surface - 1),
-                surfaces: system.surfaces[surface - 1..=surface].to_vec(),
-                stop: None,
-            };
-            let systems: Vec<_> = lens.systems.iter().map(pass).collect();
-            let tracers = open_tracers(&systems)?;
-            let gaps = systems.iter().map(|s| s.surfaces[0].thickness).collect();
-            let passage = Passage { tracers: &tracers, gaps };
-            let next = passage.beam(&beams[surface - 1], lens.primary);
-            beams.push(next);
+            let gaps = lens.systems.iter().map(|s| s.surfaces[surface - 1].thickness).collect();
+            beams.push(
+                Propagation { tracers: &tracers, gaps, to: surface - 1 }.beam(beam, lens.primary),
+            );
         }
         Ok(Self { beams })
     }
@@ -165,14 +158,15 @@ impl Stages {
     }
 }
 
-/// The passage of a beam through a surface, to the frame of the next vertex.
-struct Passage<'a> {
+/// Propagation of a beam through the first surfaces, to the frame of the next vertex.
+struct Propagation<'a> {
     tracers: &'a [Tracer<f64>],
     /// The gap in front of that vertex at each wavelength, in mm.
     gaps: Vec<f64>,
+    to: usize,
 }
 
-impl Passage<'_> {
+impl Propagation<'_> {
     fn beam(&self, beam: &Beam, primary: usize) -> Beam {
         let field = |field: &FieldBeam| FieldBeam {
             weight: field.weight,
@@ -192,7 +186,7 @@ impl Passage<'_> {
     }
 
     fn ray(&self, wavelength: usize, ray: Ray<f64>, path: f64) -> (Ray<f64>, f64) {
-        let traced = self.tracers[wavelength].trace_to(ray, 0);
+        let traced = self.tracers[wavelength].trace_to(ray, self.to);
         let Vec3 { x, y, z } = traced.ray.point;
         let point = Vec3::new(x, y, z - self.gaps[wavelength]);
         (Ray { point, ..traced.ray }, path + traced.opl)

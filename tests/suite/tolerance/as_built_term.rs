@@ -4,8 +4,8 @@
 use super::reference::assert_close;
 use crate::merit::{bundled, check, step, vary};
 use aplanat::lens::{
-    ErrorDistribution, Lens, Perturbation, PerturbationKind, Quantity, Tolerance, ToleranceGrade,
-    ToleranceSheet,
+    AdjustedPart, Compensator, ErrorCorrelation, ErrorDistribution, Lens, Perturbation,
+    PerturbationKind, Quantity, Tolerance, ToleranceGrade, ToleranceSheet,
 };
 use aplanat::merit::{DerivativeLevel, Goal, LimitTreatment, Merit, PupilEdge, Term, WeightedTerm};
 use aplanat::tolerance::{
@@ -178,6 +178,44 @@ fn the_term_has_the_derivative_of_its_value_for_every_error() {
     }
 }
 
+/// Elements that share all of their decentres and tilts move as one group would, and the term has the
+/// derivative of its value for errors that share a part, lever arms and gaps included.
+#[test]
+fn correlated_errors_are_those_of_a_group() {
+    let mut lens = lens("double_gauss_rudolph_50");
+    let error = |kind: PerturbationKind, first: usize, last: usize, half_range: f64| Tolerance {
+        error: Perturbation { kind, first, last },
+        half_range,
+        distribution: ErrorDistribution::Normal,
+    };
+    let decenter = PerturbationKind::ElementDecenterY;
+    let apart = vec![error(decenter, 2, 3, 0.05), error(decenter, 4, 6, 0.05)];
+    let pair = |coefficient: f64| ErrorCorrelation { errors: vec![0, 1], coefficient };
+    let with = |errors: Vec<Tolerance>, correlations: Vec<ErrorCorrelation>| {
+        let sheet = ToleranceSheet { correlations, ..ToleranceSheet::of_errors(errors) };
+        growth(&Lens { tolerances: Some(sheet), ..lens.clone() }, OWN)
+    };
+    let group = with(vec![error(decenter, 2, 6, 0.05)], Vec::new());
+    let [none, half, all] =
+        [0.0, 0.5, 1.0].map(|coefficient| with(apart.clone(), vec![pair(coefficient)]));
+    assert_close(all, group, 1e-9 * group, "group");
+    assert_close(2.0 * half, none + all, 1e-9 * group, "half");
+    lens.variables.clear();
+    for surface in [1, 2, 5] {
+        vary(&mut lens, surface, Quantity::Curvature);
+        vary(&mut lens, surface, Quantity::Thickness);
+    }
+    let errors = vec![
+        error(PerturbationKind::ElementRollX, 2, 3, 2e-3),
+        error(PerturbationKind::ElementTiltX, 1, 8, 1e-3),
+        error(PerturbationKind::Thickness, 4, 4, 0.05),
+        error(PerturbationKind::Thickness, 2, 2, 0.05),
+    ];
+    let correlations = vec![pair(0.6), ErrorCorrelation { errors: vec![2, 3], coefficient: -1.0 }];
+    lens.tolerances = Some(ToleranceSheet { correlations, ..ToleranceSheet::of_errors(errors) });
+    check(&lens, OWN, PupilEdge::Frozen, |quantity| 0.3 * step(quantity));
+}
+
 #[test]
 fn a_lens_that_the_term_does_not_apply_to_is_refused() {
     let refusal = |lens: &Lens, term: Term| {
@@ -199,6 +237,9 @@ fn a_lens_that_the_term_does_not_apply_to_is_refused() {
     let errors = vec![Tolerance { error, half_range: 0.1, distribution }];
     plain.tolerances = Some(ToleranceSheet::of_errors(errors));
     assert!(refusal(&plain, OWN).contains("not possible"));
+    let compensators = vec![Compensator { part: AdjustedPart::SensorTiltX, travel: 0.01 }];
+    plain.tolerances = Some(ToleranceSheet { compensators, ..ToleranceSheet::default() });
+    assert!(refusal(&plain, OWN).contains("compensators besides focus"));
 }
 
 /// The Gauss-Newton matrix has the growth as one residual and gives the same gradient.

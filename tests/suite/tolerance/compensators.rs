@@ -78,7 +78,8 @@ fn a_real_lens_is_adjusted_to_its_least_spot() {
     }
 }
 
-/// With an object at infinity the focal surface of a lens turns with the lens: so does the sensor.
+/// With an object at infinity the focal surface of a lens turns with the lens: so does the sensor, but
+/// for the curvature of the field, which is met at another place and turns it back by an eighth here.
 #[test]
 fn a_sensor_follows_a_lens_that_is_tilted_as_a_whole() {
     let scene = scene(0, (2, 6));
@@ -93,7 +94,7 @@ fn a_sensor_follows_a_lens_that_is_tilted_as_a_whole() {
         let found = analysis(&scene, &sheet, 8);
         for lens in made(&scene, &sheet, 8) {
             let (tilt, other) = (lens.adjustments[1 + i], lens.adjustments[2 - i]);
-            assert_close(tilt, lens.errors[0], 0.03 * lens.errors[0].abs(), "tilt");
+            assert_close(tilt, 0.88 * lens.errors[0], 0.02 * lens.errors[0].abs(), "tilt");
             assert!(other.abs() < 1e-4, "{other}");
             let [fixed, adjusted] = lens.mean_square.unwrap().map(f64::sqrt);
             let nominal = found.spots[1].nominal_rms;
@@ -101,8 +102,8 @@ fn a_sensor_follows_a_lens_that_is_tilted_as_a_whole() {
         }
         assert!(found.spots[1].form_agrees, "{:?}", found.spots[1].difference);
         let [form, real] = [found.travels[1 + i].form, found.travels[1 + i].real.unwrap()];
-        assert_close(form.deviation, 2e-3, 0.03 * 2e-3, "form");
-        assert_close(real.deviation, 2e-3, 0.03 * 2e-3, "real");
+        assert_close(form.deviation, 0.88 * 2e-3, 0.03 * 2e-3, "form");
+        assert_close(real.deviation, 0.88 * 2e-3, 0.03 * 2e-3, "real");
     }
 }
 
@@ -131,9 +132,13 @@ fn the_form_knows_what_compensators_win_back() {
         assert_eq!(found.travels.len(), compensators.len() + 1);
         for own in &found.travels {
             let real = own.real.unwrap();
+            // The gap is not the best one by design: it goes to its end in every lens.
+            let is_gap = own.part == AdjustedPart::Lens(gap);
+            assert_eq!(real.at_stop, if is_gap { 1.0 } else { 0.0 }, "{own:?}");
+            assert_eq!(real.at_stop, own.form.at_stop, "{own:?}");
             // Forty lenses tell a deviation to 11 %.
-            assert!((real.deviation / own.form.deviation - 1.0).abs() < 0.4, "{own:?}");
-            assert_eq!(real.at_stop, 0.0, "{own:?}");
+            let ratio = real.deviation / own.form.deviation;
+            assert!(is_gap || (ratio - 1.0).abs() < 0.4, "{own:?}");
         }
     }
 }
@@ -152,7 +157,7 @@ fn compensators_at_their_stops_leave_the_rest() {
     let [free, some, none, absent] = [Some(1.0), Some(0.02), Some(0.0), None].map(run);
     let mean = |found: &ToleranceAnalysis| found.spots[1].mean_rms[0];
     assert!(mean(&free) < mean(&some) && mean(&some) < mean(&none));
-    assert_close(mean(&none), mean(&absent), 1e-9 * mean(&absent), "no travel");
+    assert_close(mean(&none), mean(&absent), 1e-6 * mean(&absent), "no travel");
     assert!(free.stopped.is_none() && none.stopped.is_none() && absent.stopped.is_none());
     let stopped = some.stopped.unwrap();
     assert!(stopped.share > 0.3, "{stopped:?}");
