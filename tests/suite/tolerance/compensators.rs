@@ -4,13 +4,15 @@ use super::hard_cases::scene;
 use super::reference::{assert_close, lenses, tolerances};
 use crate::cli::{Scratch, done, done_json, refused};
 use aplanat::lens::{
-    AdjustedPart, Compensator, ErrorDistribution, Perturbation, PerturbationKind, Tolerance,
+    AdjustedPart, Compensator, ErrorDistribution, Perturbation, PerturbationKind, Pose, Tolerance,
     ToleranceSheet,
 };
+use aplanat::math::Vec3;
 use aplanat::tolerance::{
-    RealLens, ToleranceAnalysis, ToleranceRequest, ToleranceScene, analyze, merits, perturb,
-    real_lenses,
+    ColourRays, FieldBeam, RealLens, ToleranceAnalysis, ToleranceRequest, ToleranceScene, analyze,
+    merits, perturb, real_lenses,
 };
+use aplanat::trace::Tracer;
 use std::sync::atomic::AtomicBool;
 
 const MIDDLE: Perturbation =
@@ -92,18 +94,67 @@ fn a_sensor_follows_a_lens_that_is_tilted_as_a_whole() {
         let compensators = sensor(0.02).to_vec();
         let sheet = ToleranceSheet { compensators, ..ToleranceSheet::of_errors(errors) };
         let found = analysis(&scene, &sheet, 8);
+        // The fields are not even about the axis, so that the sensor of the lens itself is tilted too.
+        let nominal = [1, 2].map(|k| found.travels[k].nominal);
         for lens in made(&scene, &sheet, 8) {
-            let (tilt, other) = (lens.adjustments[1 + i], lens.adjustments[2 - i]);
-            assert_close(tilt, 0.88 * lens.errors[0], 0.02 * lens.errors[0].abs(), "tilt");
-            assert!(other.abs() < 1e-4, "{other}");
+            let turned = |k: usize| lens.adjustments[1 + k] - nominal[k];
+            assert_close(turned(i), 0.88 * lens.errors[0], 0.01 * lens.errors[0].abs(), "tilt");
+            assert!(turned(1 - i).abs() < 0.03 * lens.errors[0].abs(), "{}", turned(1 - i));
             let [fixed, adjusted] = lens.mean_square.unwrap().map(f64::sqrt);
             let nominal = found.spots[1].nominal_rms;
-            assert!(adjusted < 1.01 * nominal && fixed > 1.01 * nominal, "{adjusted} {nominal}");
+            assert!(adjusted < 1.01 * nominal && adjusted < fixed, "{adjusted} {nominal} {fixed}");
         }
         assert!(found.spots[1].form_agrees, "{:?}", found.spots[1].difference);
         let [form, real] = [found.travels[1 + i].form, found.travels[1 + i].real.unwrap()];
-        assert_close(form.deviation, 0.88 * 2e-3, 0.03 * 2e-3, "form");
-        assert_close(real.deviation, 0.88 * 2e-3, 0.03 * 2e-3, "real");
+        assert_close(form.deviation, 0.88 * 2e-3, 0.01 * 2e-3, "form");
+        assert_close(real.deviation, 0.88 * 2e-3, 0.01 * 2e-3, "real");
+    }
+}
+
+/// The mean square spot of a lens on a sensor that is tilted and displaced, by rays that end on it.
+fn on_sensor(scene: &ToleranceScene, lens: &RealLens, error: Perturbation, at: [f64; 3]) -> f64 {
+    let mut systems = perturb(&scene.lens, &[(error, lens.errors[0])]).unwrap();
+    for system in &mut systems {
+        let last = system.surfaces.len() - 1;
+        system.surfaces[last - 1].thickness += at[0];
+        system.surfaces[last].pose = Some(Pose::new([0.0; 2], [at[1], at[2]]));
+    }
+    let tracers: Vec<_> = systems.iter().map(|s| Tracer::new(s).unwrap()).collect();
+    let field = |field: &FieldBeam| {
+        let ends = |colour: &ColourRays| -> Vec<(Vec3<f64>, f64)> {
+            let tracer = &tracers[colour.wavelength];
+            let rays = colour.rays.iter().zip(&colour.weights);
+            rays.map(|(ray, weight)| (tracer.trace(*ray).ray.point, *weight)).collect()
+        };
+        let ends: Vec<_> = field.colours.iter().flat_map(ends).collect();
+        let center = ends.iter().fold(Vec3::default(), |sum, (p, weight)| sum + *p * *weight);
+        let square = |(p, weight): &(Vec3<f64>, f64)| weight * (*p - center).dot(*p - center);
+        field.weight * ends.iter().map(square).sum::<f64>()
+    };
+    scene.beam.fields.iter().map(field).sum()
+}
+
+/// The adjusted sensor is that on which traced rays end with the least spot.
+#[test]
+fn rays_that_end_on_the_adjusted_sensor_make_its_spot() {
+    let scene = scene(0, (2, 6));
+    let error = Perturbation { kind: PerturbationKind::ElementTiltX, first: 0, last: 6 };
+    let distribution = ErrorDistribution::Ends;
+    let errors = vec![Tolerance { error, half_range: 0.01, distribution }];
+    let compensators = sensor(0.1).to_vec();
+    let sheet = ToleranceSheet { compensators, ..ToleranceSheet::of_errors(errors) };
+    for lens in made(&scene, &sheet, 3) {
+        let at = [lens.adjustments[0], lens.adjustments[1], lens.adjustments[2]];
+        let found = on_sensor(&scene, &lens, error, at);
+        let adjusted = lens.mean_square.unwrap()[1];
+        assert_close(found, adjusted, 1e-9 * adjusted, "spot");
+        for (i, step) in [(0, 0.01), (1, 1e-3), (2, 1e-3)] {
+            for sign in [-1.0, 1.0] {
+                let mut moved = at;
+                moved[i] += sign * step;
+                assert!(on_sensor(&scene, &lens, error, moved) > adjusted, "{i} {sign}");
+            }
+        }
     }
 }
 
