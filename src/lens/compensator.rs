@@ -181,7 +181,7 @@ impl FromStr for Compensator {
             )
         };
         let (what, travel) = text.split_once('=').ok_or_else(expected)?;
-        let travel: f64 = travel.trim().parse().map_err(|_| expected())?;
+        let Ok(travel) = travel.trim().parse::<f64>() else { return Err(expected()) };
         let (name, place) = what.split_once('@').map_or((what, None), |(n, p)| (n, Some(p)));
         let name = name.trim().replace('-', "_");
         if name == "focus" && place.is_none() {

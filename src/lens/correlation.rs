@@ -95,23 +95,21 @@ impl CorrelatedErrors {
             let text = format!("correlations: {count} errors together; expected at most {MOST}");
             return Err(LensError::Inconsistent(text));
         }
-        let matrix = DMatrix::from_fn(count, count, |i, j| match i == j {
-            true => 1.0,
-            false => {
-                let (a, b) = (errors[i.min(j)], errors[i.max(j)]);
-                pairs.get(&(a, b)).copied().unwrap_or(0.0)
+        let matrix = DMatrix::from_fn(count, count, |i, j| {
+            if i == j {
+                return 1.0;
             }
+            let pair = (errors[i.min(j)], errors[i.max(j)]);
+            pairs.get(&pair).copied().unwrap_or(0.0)
         });
-        match lower_factor(&matrix) {
-            Some(factor) => Ok(Self { errors, factor }),
-            None => {
-                let lowest = matrix.symmetric_eigenvalues().min();
-                Err(LensError::Inconsistent(format!(
-                    "correlations: those of the errors {errors:?} contradict each other, as their \
-                     matrix has the eigenvalue {lowest:.3}; expected a positive semidefinite one"
-                )))
-            }
+        if let Some(factor) = lower_factor(&matrix) {
+            return Ok(Self { errors, factor });
         }
+        let lowest = matrix.symmetric_eigenvalues().min();
+        Err(LensError::Inconsistent(format!(
+            "correlations: those of the errors {errors:?} contradict each other, as their matrix has \
+             the eigenvalue {lowest:.3}; expected a positive semidefinite one"
+        )))
     }
 
     /// The coefficient of correlation of two of the errors, by their places in this group.

@@ -70,8 +70,9 @@ impl MadeTolerances {
                  adjust; expected none, or a term with a grade",
             ));
         }
-        let errors = independent_errors(&sheet);
-        let errors = errors.map_err(|_| refuse("the correlations of the tolerances contradict"))?;
+        let Ok(errors) = independent_errors(&sheet) else {
+            return Err(refuse("the correlations of its tolerances contradict each other"));
+        };
         let unmade: Vec<_> = sheet.errors.iter().map(|t| (t.error, 0.0)).collect();
         if perturb(&nominal, &unmade).is_err() {
             return Err(refuse("a tolerance of the lens is not possible on its surface"));

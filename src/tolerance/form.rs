@@ -257,19 +257,16 @@ const NEGLECTED: f64 = 1e-4;
 /// A matrix of mean products has few of them: they are those of its first pivoted Cholesky factors. One
 /// of which these leave too much, as it is not positive, is decomposed as a whole.
 fn principal(matrix: DMatrix<f64>) -> (Vec<f64>, DMatrix<f64>) {
-    let (values, vectors) = match few_factors(&matrix) {
-        Some(factors) => {
-            let small = SymmetricEigen::new(factors.tr_mul(&factors));
-            let mut vectors = factors * small.eigenvectors;
-            for (mut column, value) in vectors.column_iter_mut().zip(small.eigenvalues.iter()) {
-                column *= 1.0 / value.max(f64::MIN_POSITIVE).sqrt();
-            }
-            (small.eigenvalues, vectors)
+    let (values, vectors) = if let Some(factors) = few_factors(&matrix) {
+        let small = SymmetricEigen::new(factors.tr_mul(&factors));
+        let mut vectors = factors * small.eigenvectors;
+        for (mut column, value) in vectors.column_iter_mut().zip(small.eigenvalues.iter()) {
+            column *= 1.0 / value.max(f64::MIN_POSITIVE).sqrt();
         }
-        None => {
-            let SymmetricEigen { eigenvectors, eigenvalues } = SymmetricEigen::new(matrix);
-            (eigenvalues, eigenvectors)
-        }
+        (small.eigenvalues, vectors)
+    } else {
+        let SymmetricEigen { eigenvectors, eigenvalues } = SymmetricEigen::new(matrix);
+        (eigenvalues, eigenvectors)
     };
     let mut order: Vec<usize> = (0..values.len()).collect();
     order.sort_by(|a, b| values[*b].abs().total_cmp(&values[*a].abs()));

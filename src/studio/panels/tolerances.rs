@@ -290,7 +290,7 @@ fn travels(ui: &mut Ui, made: &AsBuiltLens) {
             let place =
                 own.part.in_lens().map_or_else(String::new, |part| format!(" {}", surfaces(part)));
             ui.label(RichText::new(format!("{}{place}", own.part.name())).small());
-            ui.label(own.travel.map_or_else(|| "unlimited".to_owned(), |travel| shown(travel)));
+            ui.label(own.travel.map_or_else(|| "unlimited".to_owned(), shown));
             ui.label(format!("{} ± {}", shown(found.mean), shown(found.deviation)));
             let stopped = format!("{:.1} %", 100.0 * found.at_stop);
             let color = if found.at_stop > 0.01 {

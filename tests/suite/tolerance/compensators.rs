@@ -107,7 +107,8 @@ fn a_sensor_follows_a_lens_that_is_tilted_as_a_whole() {
         assert!(found.spots[1].form_agrees, "{:?}", found.spots[1].difference);
         let [form, real] = [found.travels[1 + i].form, found.travels[1 + i].real.unwrap()];
         assert_close(form.deviation, 0.88 * 2e-3, 0.01 * 2e-3, "form");
-        assert_close(real.deviation, 0.88 * 2e-3, 0.01 * 2e-3, "real");
+        // Eight lenses at one end or the other.
+        assert_close(real.deviation, 0.88 * 2e-3, 0.1 * 2e-3, "real");
     }
 }
 
