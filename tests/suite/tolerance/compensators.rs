@@ -231,13 +231,12 @@ fn two_compensators_that_do_the_same_are_one() {
     let alone = analysis(&scene, &sheet(ErrorDistribution::NormalCut, &[]), 12);
     let twins = sheet(ErrorDistribution::NormalCut, &[in_lens(last, 2.0)]);
     let both = analysis(&scene, &twins, 12);
-    for (a, b) in [(&alone.spots[1].mean_rms, &both.spots[1].mean_rms)] {
-        assert_close(b[0], a[0], 1e-4 * a[0], "mean");
-    }
+    let mean = |found: &ToleranceAnalysis| found.spots[1].mean_rms[0];
+    assert_close(mean(&both), mean(&alone), 1e-4 * mean(&alone), "mean");
     // A focus that is stuck leaves all of it to its twin.
     let stuck = ToleranceSheet { focus_travel: Some(0.0), ..twins };
     let found = analysis(&scene, &stuck, 12);
-    assert_close(found.spots[1].mean_rms[0], alone.spots[1].mean_rms[0], 1e-4, "stuck");
+    assert_close(mean(&found), mean(&alone), 1e-2 * mean(&alone), "stuck");
     assert_eq!(found.travels[0].real.unwrap().largest, 0.0);
 }
 
