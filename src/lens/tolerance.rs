@@ -93,7 +93,7 @@ pub struct ToleranceSheet {
     /// unlimited one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub focus_travel: Option<f64>,
-    /// What is adjusted besides focus.
+    /// The parts that are adjusted besides focus.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub compensators: Vec<Compensator>,
     /// The errors that are not independent.

@@ -12,7 +12,7 @@ pub struct BoxedQuadratic {
     ranges: Vec<[f64; 2]>,
 }
 
-/// What is added to the diagonal of the matrix, relatively: variables that do the same to the function
+/// A share that is added to the diagonal of the matrix: variables that do the same to the function
 /// then share the work.
 const RIDGE: f64 = 1e-10;
 /// An eigenvalue of the matrix, scaled to a diagonal of ones, below this is zero.

@@ -16,7 +16,7 @@ use nalgebra::{DMatrix, DVector};
 const STEPS: usize = 12;
 /// A step that promises less than this share of the mean square ends the adjustment.
 const ENOUGH: f64 = 1e-10;
-/// How often a step that does not lower the mean square is halved.
+/// The number of times that a step which does not lower the mean square is halved.
 const HALVINGS: usize = 6;
 /// The step of derivatives, as a share of the travel.
 const DIFFERENCE: f64 = 1e-4;

@@ -29,7 +29,7 @@ pub struct ToleranceAnalysis {
     pub forms: [QuadraticForm; 2],
     /// The spots at the fixed image plane and refocused.
     pub spots: [AsBuiltSpot; 2],
-    /// How far focus and the other compensators travel, in their order.
+    /// The travels of focus and of the other compensators, in their order.
     pub travels: Vec<AdjustmentTravel>,
     /// The real lenses of which a compensator ends at its stop; `None` if none does.
     pub stopped: Option<StoppedLenses>,

@@ -1,4 +1,4 @@
-//! What compensators do to the rays of a lens as designed.
+//! The effects of compensators on the rays of a lens as designed.
 
 use super::folded::ErrorParity;
 use super::merits::{Rear, merits_of};

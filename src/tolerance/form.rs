@@ -49,7 +49,7 @@ pub struct AdjustedForm {
     pub nominal: Vec<f64>,
     /// The derivatives of the best adjustments by the errors, a row for each compensator.
     pub first: DMatrix<f64>,
-    /// What the mean square gains by adjustments within their travel other than the best ones, in mm².
+    /// The growth of the mean square by adjustments within their travel other than the best ones, in mm².
     travel: BoxedQuadratic,
 }
 

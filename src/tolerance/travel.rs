@@ -1,4 +1,4 @@
-//! How far compensators travel, and what it costs that some end at their stops.
+//! The travels of compensators, and the cost of those that end at their stops.
 
 use super::analysis::{mean, mean_with_error};
 use super::{QuadraticForm, RealLens};

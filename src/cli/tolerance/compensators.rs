@@ -73,7 +73,7 @@ pub(super) fn compensator_table(rows: &[CompensatorRow]) -> TextTable {
 /// The share of lenses at a stop above which a warning tells of it.
 const MANY: f64 = 0.01;
 
-/// What the stops of compensators do to the quadratic model, where many lenses are at one.
+/// A warning of the effect of stops on the quadratic model, where many lenses are at one.
 pub(super) fn stop_warning(stopped: Option<StoppedLenses>) -> Option<String> {
     let StoppedLenses { share, difference } = stopped.filter(|stopped| stopped.share > MANY)?;
     Some(format!(

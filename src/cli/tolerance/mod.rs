@@ -66,7 +66,7 @@ pub(super) struct ToleranceArgs {
     #[arg(long, value_name = "SHARE", requires = "rms", conflicts_with = "loosest")]
     loosest_yield: Option<RelativeError>,
 
-    /// What is adjusted after assembly, with its largest travel in mm or degrees, beside what the file
+    /// A part that is adjusted after assembly, with its largest travel in mm or degrees, beside what the file
     /// names: `focus=0.3`, `sensor_tilt_x=0.2`, `thickness@3=0.1`, `element_decenter_y@3-4=0.05`
     #[arg(long = "compensator", value_name = "KIND@SURFACES=TRAVEL")]
     compensators: Vec<Compensator>,

@@ -275,7 +275,7 @@ fn summary(ui: &mut Ui, made: &AsBuiltLens) {
     });
 }
 
-/// How far focus and the other compensators travel.
+/// The travels of focus and of the other compensators.
 fn travels(ui: &mut Ui, made: &AsBuiltLens) {
     Grid::new("compensators").num_columns(4).striped(true).show(ui, |ui| {
         for (title, hint) in TRAVEL_COLUMNS {
