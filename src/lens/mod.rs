@@ -9,6 +9,8 @@
 
 mod axis_break;
 mod check;
+mod compensator;
+mod correlation;
 mod diff;
 mod edit;
 mod element;
@@ -37,6 +39,8 @@ pub use crate::grin::field::{
 };
 pub use axis_break::AxisBreak;
 pub use check::LensError;
+pub use compensator::{AdjustedPart, Compensator};
+pub use correlation::{CorrelatedErrors, ErrorCorrelation};
 pub use diff::added_glass;
 pub use edit::{Edit, EditError, EditedCell, ElementEdit, apply_edit};
 pub use element::{ElementForm, NewElement};

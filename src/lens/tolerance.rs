@@ -1,7 +1,11 @@
 //! The tolerances of a lens: how large each error of making may be, and how it is distributed.
 
 use super::check::check_number;
-use super::{LensError, Perturbation, PerturbationKind};
+use super::correlation::correlated_errors;
+use super::{
+    AdjustedPart, Compensator, CorrelatedErrors, ErrorCorrelation, LensError, Perturbation,
+    PerturbationKind,
+};
 use serde::{Deserialize, Serialize};
 
 /// The distribution of an error between plus and minus its half range.
@@ -89,6 +93,12 @@ pub struct ToleranceSheet {
     /// unlimited one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub focus_travel: Option<f64>,
+    /// The parts that are adjusted besides focus.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub compensators: Vec<Compensator>,
+    /// The errors that are not independent.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub correlations: Vec<ErrorCorrelation>,
 }
 
 /// The keys of a tolerance in a file: angles in degrees.
@@ -123,6 +133,41 @@ impl From<Tolerance> for ToleranceJson {
 }
 
 impl ToleranceSheet {
+    /// Independent tolerances of lenses that are refocused without end.
+    pub fn of_errors(errors: Vec<Tolerance>) -> Self {
+        Self { errors, ..Self::default() }
+    }
+
+    /// The groups of errors that are not independent.
+    ///
+    /// # Errors
+    /// Coefficients that no errors can have, and errors that do not exist.
+    pub fn correlated_errors(&self) -> Result<Vec<CorrelatedErrors>, LensError> {
+        correlated_errors(&self.correlations, self.errors.len())
+    }
+
+    /// Adds a compensator in place of one of the same part.
+    pub fn set_compensator(&mut self, compensator: Compensator) {
+        if compensator.part == AdjustedPart::Focus {
+            self.focus_travel = Some(compensator.travel);
+            return;
+        }
+        self.compensators.retain(|own| own.part != compensator.part);
+        self.compensators.push(compensator);
+    }
+
+    fn check_compensators(&self, surfaces: usize) -> Result<(), LensError> {
+        for (place, compensator) in self.compensators.iter().enumerate() {
+            compensator.check(surfaces)?;
+            if self.compensators[..place].iter().any(|other| other.part == compensator.part) {
+                let name = compensator.part.name();
+                let text = format!("the compensator `{name}` of one part is there twice");
+                return Err(LensError::Inconsistent(text));
+            }
+        }
+        Ok(())
+    }
+
     /// Checks the numbers and that the surfaces exist; `surfaces` is their number.
     pub(super) fn check(&self, surfaces: usize) -> Result<(), LensError> {
         for Tolerance { error, half_range, .. } in &self.errors {
@@ -137,21 +182,39 @@ impl ToleranceSheet {
             }
         }
         let travel = self.focus_travel.unwrap_or(0.0);
-        check_number("travel of the focus", travel, travel >= 0.0, "zero or more, in mm")
+        check_number("travel of the focus", travel, travel >= 0.0, "zero or more, in mm")?;
+        self.check_compensators(surfaces)?;
+        self.correlated_errors().map(|_| ())
     }
 
-    /// Maps the surfaces of all tolerances; those of which one is mapped to `None` are removed.
+    /// Maps the surfaces of all tolerances and compensators; those of which one is mapped to `None` are
+    /// removed, from correlations too.
     pub(super) fn renumber(&mut self, map: impl Fn(PerturbationKind, usize) -> Option<usize>) {
-        self.errors = self
-            .errors
-            .iter()
-            .filter_map(|tolerance| {
-                let Perturbation { kind, first, last } = tolerance.error;
-                let ends = (map(kind, first)?, map(kind, last)?);
-                let (first, last) = (ends.0.min(ends.1), ends.0.max(ends.1));
-                let error = Perturbation { first, last, ..tolerance.error };
-                Some(Tolerance { error, ..*tolerance })
-            })
-            .collect();
+        let mapped = |part: Perturbation| {
+            let Perturbation { kind, first, last } = part;
+            let ends = (map(kind, first)?, map(kind, last)?);
+            let (first, last) = (ends.0.min(ends.1), ends.0.max(ends.1));
+            Some(Perturbation { kind, first, last })
+        };
+        let mut places = Vec::with_capacity(self.errors.len());
+        let mut kept = Vec::with_capacity(self.errors.len());
+        for tolerance in &self.errors {
+            let error = mapped(tolerance.error);
+            places.push(error.map(|_| kept.len()));
+            kept.extend(error.map(|error| Tolerance { error, ..*tolerance }));
+        }
+        self.errors = kept;
+        for ErrorCorrelation { errors, .. } in &mut self.correlations {
+            *errors = errors.iter().filter_map(|i| places.get(*i).copied()?).collect();
+        }
+        self.correlations.retain(|correlation| correlation.errors.len() > 1);
+        let compensator = |own: &Compensator| {
+            let part = match own.part {
+                AdjustedPart::Lens(part) => AdjustedPart::Lens(mapped(part)?),
+                other => other,
+            };
+            Some(Compensator { part, ..*own })
+        };
+        self.compensators = self.compensators.iter().filter_map(compensator).collect();
     }
 }

@@ -12,9 +12,9 @@ use crate::merit::{
 };
 use crate::optimize::{DescentMethod, start};
 use crate::tolerance::{
-    Derivatives, FocusTreatment, NominalLens, QuadraticForm, SweptSensitivity, ToleranceError,
-    ToleranceRequest, ToleranceScene, analyze, form_spots, graded_sheet, perturb, real_lenses,
-    sensitivities, swept_sensitivities,
+    Compensation, Derivatives, FocusTreatment, NominalLens, QuadraticForm, SweptSensitivity,
+    ToleranceError, ToleranceRequest, ToleranceScene, analyze, form_spots, graded_sheet, perturb,
+    real_lenses, sensitivities, swept_sensitivities,
 };
 use rayon::ThreadPoolBuilder;
 use serde::Serialize;
@@ -107,11 +107,13 @@ pub fn measure_tolerances(
         one.install(|| time_median(3..=50, || swept_sensitivities(&scene, &errors)));
     let (found, jets_ms) = one.install(|| time_median(1..=5, jets));
     let (swept, found) = (swept?, found?);
+    let compensation = Compensation::new(&scene, &sheet)?;
     let form = || {
-        let form = QuadraticForm::new(&scene, &found, FocusTreatment::Refocused, None);
-        form_spots(&form, &sheet, 1).len()
+        let form = QuadraticForm::new(&scene, &found, FocusTreatment::Refocused, &compensation);
+        form_spots(&form, &sheet, 1).map(|spots| spots.len())
     };
-    let (_, form_ms) = one.install(|| time_median(3..=9, form));
+    let (spots, form_ms) = one.install(|| time_median(3..=9, form));
+    spots?;
     let go_on = AtomicBool::new(false);
     let real = || real_lenses(&scene, &sheet, 1, samples, 0, &go_on).map(|lenses| lenses.len());
     let (traced, samples_ms) = two.install(|| time_median(1..=5, real));
@@ -197,7 +199,7 @@ fn gradient_costs(lens: &Lens, sheet: &ToleranceSheet) -> Result<Vec<AsBuiltCost
         let errors = sheet.errors.iter().cycle().take(count);
         let shared = (count.div_ceil(sheet.errors.len()) as f64).sqrt();
         let part = |t: &Tolerance| Tolerance { half_range: t.half_range / shared, ..*t };
-        let tolerances = ToleranceSheet { errors: errors.map(part).collect(), focus_travel: None };
+        let tolerances = ToleranceSheet::of_errors(errors.map(part).collect());
         merit(Some(tolerances), Term::AsBuilt { grade: None })
     };
     let mut merits = vec![merit(None, Term::Spot)?];

@@ -22,11 +22,12 @@ use super::scoped_part::ScopedPart;
 use super::spot::lost_ray_error;
 use super::sum::{DerivativeLevel, SumOfSquares};
 use super::{EvaluationContext, MeritError, SampledPupil};
-use crate::lens::{Lens, LensError, System, Term, TermScope, Tolerance, lie_on_one_side};
+use crate::lens::{Lens, LensError, System, Term, TermScope, lie_on_one_side};
 use crate::math::{SimdWidth, dot, excess_beyond, run_vectorized, sum_of_products};
 use crate::pupil::TracedPupil;
 use crate::tolerance::{
-    MadeKind, MadeNumber, NominalLens, NumberCovariance, graded_sheet, perturb,
+    IndependentError, MadeKind, MadeNumber, NominalLens, NumberCovariance, graded_sheet,
+    independent_errors, perturb,
 };
 use crate::trace::{
     ErrorDirections, ErrorNumber, ErrorRows, Landings, Rays, SystemGradient, TraceSink as _, Tracer,
@@ -41,7 +42,7 @@ const TERM: &str = "as_built";
 /// The tolerances of a term.
 #[derive(Debug, Clone)]
 pub(super) struct MadeTolerances {
-    errors: Vec<Tolerance>,
+    errors: Vec<IndependentError>,
     /// The travel of the focus on either side, in mm.
     travel: f64,
     /// The semi-diameters in mm, the units of irregularities.
@@ -63,6 +64,15 @@ impl MadeTolerances {
             (grade, _) => graded_sheet(lens, &nominal, grade.unwrap_or_default()),
         };
         let refuse = |why| MeritError::DoesNotApply { term: TERM, why };
+        if !sheet.compensators.is_empty() {
+            return Err(refuse(
+                "the tolerances of the lens have compensators besides focus, which this term does not \
+                 adjust; expected none, or a term with a grade",
+            ));
+        }
+        let Ok(errors) = independent_errors(&sheet) else {
+            return Err(refuse("the correlations of its tolerances contradict each other"));
+        };
         let unmade: Vec<_> = sheet.errors.iter().map(|t| (t.error, 0.0)).collect();
         if perturb(&nominal, &unmade).is_err() {
             return Err(refuse("a tolerance of the lens is not possible on its surface"));
@@ -74,7 +84,7 @@ impl MadeTolerances {
         }
         let travel = sheet.focus_travel.unwrap_or(f64::INFINITY);
         let semi_diameters = nominal.semi_diameters;
-        Ok(Some(Self { errors: sheet.errors, travel, semi_diameters }))
+        Ok(Some(Self { errors, travel, semi_diameters }))
     }
 }
 
@@ -352,9 +362,10 @@ impl<'a> Growth<'a> {
         for axis in 0..2 {
             let displaced = self.displaced(channel, axis);
             self.add_lever_arms(channel, axis, &displaced, &mut primary);
+            let mut direction = Vec::new();
             for (place, MadeNumber { surface, kind }) in self.covariance.numbers.iter().enumerate()
             {
-                let direction = combined(&self.covariance.rows[place], &displaced);
+                combine(&self.covariance.rows[place], &displaced, &mut direction);
                 let (number, factor) = match kind {
                     MadeKind::Number(number) => (*number, 1.0),
                     MadeKind::Abbe => (ErrorNumber::Index, -channel.dispersion[*surface]),
@@ -418,8 +429,9 @@ impl<'a> Growth<'a> {
         displaced: &[Vec<f64>],
         gradient: &mut SystemGradient<f64>,
     ) {
+        let mut tilted = Vec::new();
         for body in &self.covariance.bodies {
-            let tilted = combined(&body.changes, displaced);
+            combine(&body.changes, displaced, &mut tilted);
             for arm in &body.arms {
                 let shifted = &channel.effects.by_number[axis][arm.number];
                 let product = weighted_dot(&channel.weights, &tilted, shifted);
@@ -477,11 +489,11 @@ impl<'a> Growth<'a> {
 
     /// The derivative of the growth by the weight of each ray.
     fn costs(&self, effects: &NumberEffects) -> Vec<f64> {
-        let mut costs = vec![0.0; effects.slopes[0].len()];
+        let (mut costs, mut varied) = (vec![0.0; effects.slopes[0].len()], Vec::new());
         for axis in 0..2 {
             let rows = &effects.by_number[axis];
             for (row, covariances) in rows.iter().zip(&self.covariance.rows) {
-                let varied = combined(covariances, rows);
+                combine(covariances, rows, &mut varied);
                 let products = row.iter().zip(&varied);
                 costs.iter_mut().zip(products).for_each(|(cost, (a, b))| *cost += a * b);
             }
@@ -535,10 +547,11 @@ impl MadeChannel {
 
     /// The sum over all numbers of their effects' products, each by its covariance.
     fn mean_square(&self, covariance: &NumberCovariance) -> f64 {
-        let mut sum = 0.0;
+        let (mut sum, mut varied) = (0.0, Vec::new());
         for rows in &self.effects.by_number {
             for (row, covariances) in rows.iter().zip(&covariance.rows) {
-                sum += weighted_dot(&self.weights, row, &combined(covariances, rows));
+                combine(covariances, rows, &mut varied);
+                sum += weighted_dot(&self.weights, row, &varied);
             }
         }
         sum
@@ -550,13 +563,21 @@ impl MadeChannel {
     }
 }
 
-/// The sum of some rows, each times a factor.
-fn combined(factors: &[(usize, f64)], rows: &[Vec<f64>]) -> Vec<f64> {
-    let mut sum = vec![0.0; rows.first().map_or(0, Vec::len)];
-    for (place, factor) in factors {
-        sum.iter_mut().zip(&rows[*place]).for_each(|(to, value)| *to += factor * value);
-    }
-    sum
+/// Makes a row the sum of some others, each times a factor.
+fn combine(factors: &[(usize, f64)], rows: &[Vec<f64>], sum: &mut Vec<f64>) {
+    sum.clear();
+    sum.resize(rows.first().map_or(0, Vec::len), 0.0);
+    run_vectorized(
+        SimdWidth::detect(),
+        #[inline(always)]
+        || {
+            for (place, factor) in factors {
+                for (to, value) in sum.iter_mut().zip(&rows[*place]) {
+                    *to += factor * value;
+                }
+            }
+        },
+    );
 }
 
 fn weighted_dot(weights: &[f64], a: &[f64], b: &[f64]) -> f64 {

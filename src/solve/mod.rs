@@ -5,6 +5,7 @@
 
 mod adam;
 mod bounds;
+mod boxed_quadratic;
 mod cgls;
 mod conflict;
 mod constrained;
@@ -19,6 +20,7 @@ mod trust_region;
 
 pub use adam::{Adam, AdamMoments};
 pub use bounds::ParameterBounds;
+pub use boxed_quadratic::{BoxedQuadratic, scaled_pseudoinverse};
 pub use cgls::cgls;
 pub use conflict::smallest_conflict;
 pub use constrained::LimitedTrustRegion;

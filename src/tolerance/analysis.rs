@@ -1,10 +1,11 @@
 //! The whole analysis: sensitivities, the quadratic form, real lenses, and how well both agree.
 
+use super::travel::{AdjustmentTravel, StoppedLenses, stopped_lenses, travels};
 use super::{
-    FocusTreatment, QuadraticForm, RealLens, Sensitivity, ToleranceError, ToleranceScene,
-    real_lenses, sensitivities, wilson_interval,
+    Compensation, FocusTreatment, QuadraticForm, RealLens, Sensitivity, ToleranceError,
+    ToleranceScene, real_lenses, sensitivities, wilson_interval,
 };
-use crate::lens::{Perturbation, Tolerance, ToleranceSheet};
+use crate::lens::{Perturbation, ToleranceSheet};
 use serde::Serialize;
 use std::sync::atomic::AtomicBool;
 
@@ -28,10 +29,19 @@ pub struct ToleranceAnalysis {
     pub forms: [QuadraticForm; 2],
     /// The spots at the fixed image plane and refocused.
     pub spots: [AsBuiltSpot; 2],
+    /// The travels of focus and of the other compensators, in their order.
+    pub travels: Vec<AdjustmentTravel>,
+    /// The real lenses of which a compensator ends at its stop; `None` if none does.
+    pub stopped: Option<StoppedLenses>,
     /// The number of real lenses.
     pub samples: usize,
     /// The number of those of which a ray does not arrive; they count as bad.
     pub lost: usize,
+    /// The number of lenses that are traced with rims that clip too, and of those of which a field gets
+    /// no light through them though all rays arrive without.
+    pub with_rims: usize,
+    /// The number of the latter.
+    pub dark: usize,
     /// The mean relative change of the mean square spot, at the fixed image plane and refocused, and
     /// the mean share of light lost where rims clip, which the spots leave out; `None` without rays.
     pub clipping: Option<[f64; 3]>,
@@ -135,31 +145,59 @@ pub fn analyze_until(
         return Err(ToleranceError::Other("no tolerances; expected at least one".to_owned()));
     }
     let treatments = [FocusTreatment::Fixed, FocusTreatment::Refocused];
-    let forms =
-        treatments.map(|focus| QuadraticForm::new(scene, &found, focus, sheet.focus_travel));
+    let compensation = Compensation::new(scene, sheet)?;
+    let forms = treatments.map(|focus| QuadraticForm::new(scene, &found, focus, &compensation));
     let real = real_lenses(scene, sheet, request.seed, request.samples, WITH_RIMS, stop)?;
-    let spot = |i: usize| as_built(treatments[i], &forms[i], sheet, &real, request);
-    let spots = [spot(0), spot(1)];
+    let [fixed, refocused] =
+        forms.each_ref().map(|form| FormLenses::new(form, sheet, request.seed));
+    let (fixed, refocused) = (fixed?, refocused?);
+    let travels = travels(&compensation.adjustments, &forms[1], &refocused.adjustments, &real);
+    let stopped = stopped_lenses(&compensation.adjustments, &forms[1], &real);
+    let spot = |i: usize, lenses: FormLenses| {
+        let expected = forms[i].expectation(sheet)?;
+        Ok::<_, ToleranceError>(as_built(
+            treatments[i],
+            (&forms[i], expected),
+            lenses,
+            &real,
+            request,
+        ))
+    };
+    let spots = [spot(0, fixed)?, spot(1, refocused)?];
     let lost = real.iter().filter(|lens| lens.mean_square.is_none()).count();
     let clipping = clipping(&real);
     let samples = real.len();
-    Ok(ToleranceAnalysis { sensitivities: found, forms, spots, samples, lost, clipping })
+    let with_rims = samples.min(WITH_RIMS);
+    let is_dark = |lens: &&RealLens| lens.mean_square.is_some() && lens.clipped.is_none();
+    let dark = real[..with_rims].iter().filter(is_dark).count();
+    let sensitivities = found;
+    Ok(ToleranceAnalysis {
+        sensitivities,
+        forms,
+        spots,
+        travels,
+        stopped,
+        samples,
+        lost,
+        with_rims,
+        dark,
+        clipping,
+    })
 }
 
 impl ToleranceAnalysis {
     /// The share of each error in the growth of the expected mean square spot, at the fixed image plane
-    /// and refocused.
-    pub fn growth_shares(&self, tolerances: &[Tolerance]) -> Vec<[f64; 2]> {
-        let total = [0, 1].map(|i| {
-            let form: &QuadraticForm = &self.forms[i];
-            (form.expectation(tolerances) - form.nominal).abs().max(f64::MIN_POSITIVE)
-        });
-        let share = |(tolerance, found): (&Tolerance, &Sensitivity)| {
-            let half = 0.5 * tolerance.deviation().powi(2);
-            let by = [found.mean_square(), found.mean_square_focused()];
-            [half * by[0].second / total[0], half * by[1].second / total[1]]
-        };
-        tolerances.iter().zip(&self.sensitivities).map(share).collect()
+    /// and refocused; correlated errors share what they do together.
+    ///
+    /// # Errors
+    /// Correlations that no errors can have.
+    pub fn growth_shares(&self, sheet: &ToleranceSheet) -> Result<Vec<[f64; 2]>, ToleranceError> {
+        let [fixed, refocused] = self.forms.each_ref().map(|form| form.growth(sheet));
+        let (fixed, refocused) = (fixed?, refocused?);
+        let total = |growth: &[f64]| growth.iter().sum::<f64>().abs().max(f64::MIN_POSITIVE);
+        let totals = [total(&fixed), total(&refocused)];
+        let pairs = fixed.into_iter().zip(refocused);
+        Ok(pairs.map(|(a, b)| [a / totals[0], b / totals[1]]).collect())
     }
 }
 
@@ -185,12 +223,12 @@ fn rms_changes(real: &[RealLens], which: usize) -> Option<[f64; 2]> {
 
 fn as_built(
     focus: FocusTreatment,
-    form: &QuadraticForm,
-    sheet: &ToleranceSheet,
+    (form, expected): (&QuadraticForm, f64),
+    lenses: FormLenses,
     real: &[RealLens],
     request: ToleranceRequest,
 ) -> AsBuiltSpot {
-    let many = sorted(form_spots(form, sheet, request.seed));
+    let many = sorted(lenses.rms);
     let form_mean_rms = mean(&many);
     let which = usize::from(focus == FocusTreatment::Refocused);
     // Real lenses and the form on the same errors.
@@ -210,8 +248,8 @@ fn as_built(
     let at_share = |share: f64| quantile(share, &many, &columns);
     AsBuiltSpot {
         focus,
-        nominal_rms: form.nominal.sqrt(),
-        form_root_mean_square: form.expectation(&sheet.errors).max(0.0).sqrt(),
+        nominal_rms: form.as_designed().sqrt(),
+        form_root_mean_square: expected.max(0.0).sqrt(),
         form_mean_rms,
         mean_rms: [corrected, difference[1].hypot(spread) + clipped],
         clipping,
@@ -224,13 +262,41 @@ fn as_built(
     }
 }
 
+/// Lenses with random errors, by a form.
+struct FormLenses {
+    /// The rms of each, in mm.
+    rms: Vec<f64>,
+    /// The adjustments of each, focus first; none at the fixed image plane.
+    adjustments: Vec<Vec<f64>>,
+}
+
+impl FormLenses {
+    fn new(
+        form: &QuadraticForm,
+        sheet: &ToleranceSheet,
+        seed: u64,
+    ) -> Result<Self, ToleranceError> {
+        let reduced = form.reduced(sheet)?;
+        // Other errors than those of the real lenses.
+        let other = seed ^ 0x5DEE_CE66_D1CE_CAFE;
+        let lenses = reduced.random_lenses(&sheet.errors, other, FORM_SAMPLES);
+        Ok(Self {
+            rms: lenses.iter().map(|errors| reduced.at_multiple(errors, 1.0).sqrt()).collect(),
+            adjustments: lenses.iter().map(|errors| reduced.adjustments(errors)).collect(),
+        })
+    }
+}
+
 /// The rms in mm of 20,000 lenses with random errors, by a form.
-pub fn form_spots(form: &QuadraticForm, sheet: &ToleranceSheet, seed: u64) -> Vec<f64> {
-    let reduced = form.reduced(&sheet.errors);
-    // Other errors than those of the real lenses.
-    let other = seed ^ 0x5DEE_CE66_D1CE_CAFE;
-    let lenses = reduced.random_lenses(&sheet.errors, other, FORM_SAMPLES);
-    lenses.iter().map(|errors| reduced.at_multiple(errors, 1.0).sqrt()).collect()
+///
+/// # Errors
+/// Correlations that no errors can have.
+pub fn form_spots(
+    form: &QuadraticForm,
+    sheet: &ToleranceSheet,
+    seed: u64,
+) -> Result<Vec<f64>, ToleranceError> {
+    Ok(FormLenses::new(form, sheet, seed)?.rms)
 }
 
 fn sorted(mut values: Vec<f64>) -> Vec<f64> {
@@ -266,12 +332,12 @@ fn good_share(limit: f64, many: &[f64], pairs: &[[f64; 2]], count: usize) -> Yie
     YieldEstimate { form, real, interval: wilson_interval(good, count), corrected }
 }
 
-fn mean(values: &[f64]) -> f64 {
+pub(super) fn mean(values: &[f64]) -> f64 {
     values.iter().sum::<f64>() / values.len().max(1) as f64
 }
 
 /// The mean of values and its standard error.
-fn mean_with_error(values: &[f64]) -> [f64; 2] {
+pub(super) fn mean_with_error(values: &[f64]) -> [f64; 2] {
     let (count, middle) = (values.len() as f64, mean(values));
     if values.len() < 2 {
         return [middle, 0.0];

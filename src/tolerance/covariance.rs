@@ -6,7 +6,8 @@
 //! coefficients of r⁴ and y². Errors of the same kind in the same place add their variances, so that
 //! the covariance is as large as the lens, however many tolerances there are.
 
-use crate::lens::{Perturbation, PerturbationKind, System, Tolerance};
+use super::ToleranceError;
+use crate::lens::{Perturbation, PerturbationKind, System, ToleranceSheet};
 use crate::trace::ErrorNumber;
 use std::collections::BTreeMap;
 
@@ -46,7 +47,7 @@ impl MadeKind {
 pub struct LeverArm {
     /// The place of the displaced number of the surface.
     pub number: usize,
-    /// The displacement over the tilt and the distance: 1 or −1.
+    /// The displacement over the independent error and the distance: 1 or −1 for the tilt alone.
     pub sign: f64,
     /// The first surface of the body, from which the distance counts.
     pub first: usize,
@@ -57,12 +58,12 @@ pub struct LeverArm {
     pub by_curvature: f64,
 }
 
-/// A body that tilts.
+/// An independent error by which bodies tilt.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TiltingBody {
-    /// The variance of its tilt.
+    /// Its variance: for one body that of the tilt.
     pub variance: f64,
-    /// The changes of the numbers of its surfaces over the tilt, by their places.
+    /// The changes of the numbers of surfaces by one unit of it, by their places.
     pub changes: Vec<(usize, f64)>,
     /// The distances on which these depend.
     pub arms: Vec<LeverArm>,
@@ -86,30 +87,75 @@ pub(super) struct NumberChanges {
     tilt: Option<f64>,
 }
 
+/// An error of making that is independent of all others: one of a kind and place, or what errors that are
+/// correlated have in common.
+#[derive(Debug, Clone, PartialEq)]
+pub struct IndependentError {
+    /// The errors that it adds to, and their changes by one unit of it.
+    pub parts: Vec<(Perturbation, f64)>,
+    /// Its variance.
+    pub variance: f64,
+}
+
+/// The independent errors of some tolerances. Those of the same kind in the same place are one.
+///
+/// # Errors
+/// Correlations that no errors can have.
+pub fn independent_errors(sheet: &ToleranceSheet) -> Result<Vec<IndependentError>, ToleranceError> {
+    let groups = sheet.correlated_errors()?;
+    let mut is_alone = vec![true; sheet.errors.len()];
+    groups.iter().flat_map(|group| &group.errors).for_each(|error| is_alone[*error] = false);
+    let mut variances: BTreeMap<Perturbation, f64> = BTreeMap::new();
+    for (tolerance, _) in sheet.errors.iter().zip(&is_alone).filter(|(_, alone)| **alone) {
+        *variances.entry(tolerance.error).or_insert(0.0) += tolerance.deviation().powi(2);
+    }
+    variances.retain(|_, variance| *variance > 0.0);
+    let alone = variances.into_iter();
+    let mut independent: Vec<IndependentError> = alone
+        .map(|(error, variance)| IndependentError { parts: vec![(error, 1.0)], variance })
+        .collect();
+    for group in &groups {
+        let count = group.errors.len();
+        independent.extend((0..count).map(|k| {
+            let part = |i: usize| {
+                let own = &sheet.errors[group.errors[i]];
+                (own.error, own.deviation() * group.factor[(i, k)])
+            };
+            let parts = (k..count).map(part).filter(|(_, factor)| *factor != 0.0).collect();
+            IndependentError { parts, variance: 1.0 }
+        }));
+    }
+    Ok(independent)
+}
+
+/// The changes of numbers by each part of an independent error.
+type PartChanges = Vec<(Perturbation, f64, NumberChanges)>;
+
 impl NumberCovariance {
-    /// The covariance that tolerances give the numbers of a lens. The unit of an irregularity is the
-    /// semi-diameter of its surface.
-    pub fn new(tolerances: &[Tolerance], system: &System<f64>, semi_diameters: &[f64]) -> Self {
-        let mut variances: BTreeMap<Perturbation, f64> = BTreeMap::new();
-        for tolerance in tolerances {
-            *variances.entry(tolerance.error).or_insert(0.0) += tolerance.deviation().powi(2);
-        }
-        variances.retain(|_, variance| *variance > 0.0);
+    /// The covariance that independent errors give the numbers of a lens. The unit of an irregularity is
+    /// the semi-diameter of its surface.
+    pub fn new(errors: &[IndependentError], system: &System<f64>, semi_diameters: &[f64]) -> Self {
         let vertices = system.vertex_positions();
-        let of = |error: &Perturbation| number_changes(*error, system, &vertices, semi_diameters);
-        let effects: Vec<(Perturbation, f64, NumberChanges)> =
-            variances.iter().map(|(error, variance)| (*error, *variance, of(error))).collect();
-        let mut covariance = Self::with_numbers(&effects);
-        for (error, variance, effect) in &effects {
-            covariance.add(*error, *variance, effect);
+        let of = |error: &IndependentError| -> PartChanges {
+            let changes = |(error, factor): &(Perturbation, f64)| {
+                (*error, *factor, number_changes(*error, system, &vertices, semi_diameters))
+            };
+            error.parts.iter().map(changes).collect()
+        };
+        let effects: Vec<PartChanges> = errors.iter().map(of).collect();
+        let mut covariance = Self::with_numbers(effects.iter().flatten());
+        for (error, parts) in errors.iter().zip(&effects) {
+            covariance.add(error.variance, parts);
         }
         covariance
     }
 
     /// No covariance yet of the numbers that errors change; an Abbe number comes with its index.
-    fn with_numbers(effects: &[(Perturbation, f64, NumberChanges)]) -> Self {
+    fn with_numbers<'a>(
+        effects: impl Iterator<Item = &'a (Perturbation, f64, NumberChanges)>,
+    ) -> Self {
         let mut numbers: Vec<MadeNumber> = Vec::new();
-        for (number, _) in effects.iter().flat_map(|(_, _, effect)| &effect.changes) {
+        for (number, _) in effects.flat_map(|(_, _, effect)| &effect.changes) {
             numbers.push(*number);
             if number.kind == MadeKind::Abbe {
                 numbers.push(MadeNumber { kind: MadeKind::Number(ErrorNumber::Index), ..*number });
@@ -126,9 +172,21 @@ impl NumberCovariance {
         self.numbers.binary_search(&number).ok()
     }
 
-    fn add(&mut self, error: Perturbation, variance: f64, effect: &NumberChanges) {
-        let places: Vec<(usize, f64)> =
-            effect.changes.iter().filter_map(|(n, by)| Some((self.place(*n)?, *by))).collect();
+    /// Adds an independent error.
+    fn add(&mut self, variance: f64, parts: &PartChanges) {
+        let mut sums: BTreeMap<usize, f64> = BTreeMap::new();
+        let mut arms = Vec::new();
+        for (error, factor, effect) in parts {
+            for (number, by) in &effect.changes {
+                if let Some(place) = self.place(*number) {
+                    *sums.entry(place).or_insert(0.0) += factor * by;
+                }
+            }
+            if let Some(radius) = effect.tilt {
+                arms.extend(self.arms((*error, *factor), effect, radius));
+            }
+        }
+        let places: Vec<(usize, f64)> = sums.into_iter().collect();
         for (row, by_row) in &places {
             for (column, by_column) in &places {
                 let product = variance * by_row * by_column;
@@ -139,26 +197,31 @@ impl NumberCovariance {
                 }
             }
         }
-        if let Some(radius) = effect.tilt {
-            let arms = self.arms(error, &places, radius);
+        if !arms.is_empty() {
             self.bodies.push(TiltingBody { variance, changes: places, arms });
         }
     }
 
-    /// The distances on which the changes by a tilt depend.
-    fn arms(&self, error: Perturbation, places: &[(usize, f64)], radius: f64) -> Vec<LeverArm> {
-        let arm = |(number, _): &(usize, f64)| {
-            let MadeNumber { surface, kind } = self.numbers[*number];
+    /// The distances on which the changes by a tilt depend, which is `factor` times an independent error.
+    fn arms(
+        &self,
+        (error, factor): (Perturbation, f64),
+        effect: &NumberChanges,
+        radius: f64,
+    ) -> Vec<LeverArm> {
+        let arm = |(number, _): &(MadeNumber, f64)| {
+            let MadeNumber { surface, kind } = *number;
             let sign = match kind {
-                MadeKind::Number(ErrorNumber::DecenterX) => 1.0,
-                MadeKind::Number(ErrorNumber::DecenterY) => -1.0,
+                MadeKind::Number(ErrorNumber::DecenterX) => factor,
+                MadeKind::Number(ErrorNumber::DecenterY) => -factor,
                 _ => return None,
             };
             // The distance is Z − Z₁ − 1/c.
             let by_curvature = radius * radius;
-            Some(LeverArm { number: *number, sign, first: error.first, surface, by_curvature })
+            let number = self.place(*number)?;
+            Some(LeverArm { number, sign, first: error.first, surface, by_curvature })
         };
-        places.iter().filter_map(arm).collect()
+        effect.changes.iter().filter_map(arm).collect()
     }
 
     /// The covariance times a vector, number by number.

@@ -3,6 +3,18 @@
 use crate::lens::{LensError, Perturbation, SurfaceNumber, SystemError};
 use crate::trace::Fate;
 
+/// Refuses means over lenses of which most are lost.
+///
+/// # Errors
+/// More than half of the lenses.
+pub fn refuse_lost_lenses(
+    lost: usize,
+    samples: usize,
+    what: &'static str,
+) -> Result<(), ToleranceError> {
+    if 2 * lost <= samples { Ok(()) } else { Err(ToleranceError::MostLost { lost, samples, what }) }
+}
+
 /// A fault that makes a tolerance analysis impossible.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ToleranceError {
@@ -43,6 +55,19 @@ pub enum ToleranceError {
         ray: usize,
         /// Its end.
         fate: Fate,
+    },
+    /// Most lenses with random errors lose rays: means over the others tell nothing.
+    #[error(
+        "{lost} of {samples} lenses with {what} lose rays, so that no mean or quantile tells anything of \
+         them; expected tighter tolerances: a tighter grade or smaller half ranges"
+    )]
+    MostLost {
+        /// The number of lenses that lose rays.
+        lost: usize,
+        /// The number of lenses.
+        samples: usize,
+        /// The tolerances, in words.
+        what: &'static str,
     },
     /// Something else about the lens or the request.
     #[error("{0}")]

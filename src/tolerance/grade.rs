@@ -76,7 +76,7 @@ pub fn graded_sheet(lens: &Lens, nominal: &NominalLens, grade: ToleranceGrade) -
             _ => first += 1,
         }
     }
-    ToleranceSheet { errors: sheet.errors, focus_travel: None }
+    ToleranceSheet::of_errors(sheet.errors)
 }
 
 /// The price of a tolerance: the loosest class of care that keeps it.

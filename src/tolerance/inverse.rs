@@ -1,7 +1,7 @@
 //! The loosest tolerances for a spot, or for a share of good lenses, that is asked for.
 
 use super::{QuadraticForm, ToleranceError};
-use crate::lens::Tolerance;
+use crate::lens::{Tolerance, ToleranceSheet};
 
 /// A tolerance is widened or narrowed by at most this factor before all are scaled together.
 const MOST: f64 = 10.0;
@@ -14,7 +14,7 @@ const MOST: f64 = 10.0;
 /// A target that the lens without errors does not reach.
 pub fn loosest_tolerances(
     form: &QuadraticForm,
-    tolerances: &[Tolerance],
+    sheet: &ToleranceSheet,
     target: f64,
 ) -> Result<Vec<Tolerance>, ToleranceError> {
     if !(target > form.nominal) {
@@ -25,24 +25,29 @@ pub fn loosest_tolerances(
             target.max(0.0).sqrt()
         )));
     }
-    let (factors, total) = equal_costs(form, tolerances);
+    let (factors, total) = equal_costs(form, sheet)?;
     let scale = if total > 0.0 { ((target - form.nominal) / total).sqrt() } else { 1.0 };
-    Ok(widened(tolerances, |i| factors[i] * scale))
+    Ok(widened(&sheet.errors, |i| factors[i] * scale))
 }
 
 /// The factors by which tolerances are widened so that each costs about the same, and what all cost
 /// then, in mm².
-fn equal_costs(form: &QuadraticForm, tolerances: &[Tolerance]) -> (Vec<f64>, f64) {
+fn equal_costs(
+    form: &QuadraticForm,
+    sheet: &ToleranceSheet,
+) -> Result<(Vec<f64>, f64), ToleranceError> {
+    // What an error costs alone; what correlated ones cost together is in the sum.
     let cost = |(i, t): (usize, &Tolerance)| 0.5 * form.second[(i, i)] * t.deviation().powi(2);
-    let costs: Vec<f64> = tolerances.iter().enumerate().map(cost).collect();
+    let costs: Vec<f64> = sheet.errors.iter().enumerate().map(cost).collect();
     let paid = costs.iter().filter(|cost| **cost > 0.0).count().max(1);
     let mean = costs.iter().filter(|cost| **cost > 0.0).sum::<f64>() / paid as f64;
     let factor = |cost: &f64| {
         if *cost > 0.0 { (mean / cost).sqrt().clamp(1.0 / MOST, MOST) } else { MOST }
     };
     let factors: Vec<f64> = costs.iter().map(factor).collect();
-    let total = costs.iter().zip(&factors).map(|(cost, factor)| cost * factor * factor).sum();
-    (factors, total)
+    let wider = ToleranceSheet { errors: widened(&sheet.errors, |i| factors[i]), ..sheet.clone() };
+    let total = form.growth(&wider)?.iter().sum();
+    Ok((factors, total))
 }
 
 fn widened(tolerances: &[Tolerance], factor: impl Fn(usize) -> f64) -> Vec<Tolerance> {
@@ -59,22 +64,29 @@ const HALVINGS: usize = 40;
 const WIDEST: f64 = 1e4;
 
 /// The share of lenses with these tolerances whose rms spot is at most `limit` mm, by the form.
-pub fn form_yield(form: &QuadraticForm, tolerances: &[Tolerance], limit: f64) -> f64 {
-    yield_at_factor(form, tolerances, limit)(1.0)
+///
+/// # Errors
+/// Correlations that no errors can have.
+pub fn form_yield(
+    form: &QuadraticForm,
+    sheet: &ToleranceSheet,
+    limit: f64,
+) -> Result<f64, ToleranceError> {
+    Ok(yield_at_factor(form, sheet, limit)?(1.0))
 }
 
 /// The yield as a function of a factor of all tolerances, by the same random lenses for all factors.
 fn yield_at_factor(
     form: &QuadraticForm,
-    tolerances: &[Tolerance],
+    sheet: &ToleranceSheet,
     limit: f64,
-) -> impl Fn(f64) -> f64 {
-    let reduced = form.reduced(tolerances);
-    let lenses = reduced.random_lenses(tolerances, SEED, LENSES);
-    move |factor| {
+) -> Result<impl Fn(f64) -> f64 + use<>, ToleranceError> {
+    let reduced = form.reduced(sheet)?;
+    let lenses = reduced.random_lenses(&sheet.errors, SEED, LENSES);
+    Ok(move |factor| {
         let is_good = |errors| reduced.at_multiple(errors, factor) <= limit * limit;
         lenses.iter().filter(|errors| is_good(errors)).count() as f64 / LENSES as f64
-    }
+    })
 }
 
 /// The seed of the lenses from which a yield is told.
@@ -87,7 +99,7 @@ const SEED: u64 = 0x7E1D;
 /// A limit that the lens without errors does not reach, and a share that is not between 0 and 1.
 pub fn loosest_for_yield(
     form: &QuadraticForm,
-    tolerances: &[Tolerance],
+    sheet: &ToleranceSheet,
     limit: f64,
     share: f64,
 ) -> Result<Vec<Tolerance>, ToleranceError> {
@@ -95,20 +107,21 @@ pub fn loosest_for_yield(
         let text = format!("a yield of {share} is asked for; expected more than 0 and less than 1");
         return Err(ToleranceError::Other(text));
     }
-    if !(limit * limit > form.nominal) {
-        let rms = form.nominal.max(0.0).sqrt();
+    if !(limit * limit > form.as_designed()) {
+        let rms = form.as_designed().sqrt();
         return Err(ToleranceError::Other(format!(
             "lenses with an rms of {limit} mm are asked for; expected more than {rms:.6} mm, that of \
              the lens without errors"
         )));
     }
-    let (factors, _) = equal_costs(form, tolerances);
-    let shaped = widened(tolerances, |i| factors[i]);
-    let good = yield_at_factor(form, &shaped, limit);
+    let (factors, _) = equal_costs(form, sheet)?;
+    let shaped = widened(&sheet.errors, |i| factors[i]);
+    let shaped = ToleranceSheet { errors: shaped, ..sheet.clone() };
+    let good = yield_at_factor(form, &shaped, limit)?;
     let (mut low, mut high) = (1.0 / WIDEST, WIDEST);
     for _ in 0..HALVINGS {
         let middle = (low * high).sqrt();
         if good(middle) >= share { low = middle } else { high = middle }
     }
-    Ok(widened(&shaped, |_| low))
+    Ok(widened(&shaped.errors, |_| low))
 }

@@ -18,12 +18,17 @@
 //! on the same draws tell how far the form is to be trusted, and their difference corrects it
 //! ([`analyze`]).
 //!
+//! What is adjusted after assembly, focus first, is adjusted within its travel in both alike; errors that
+//! are correlated are sums of independent ones.
+//!
 //! Rays are held: an error changes the lens and not the rays in object space, and rims clip nothing;
 //! what rims would clip is measured and shown.
 
+mod adjusted;
 mod analysis;
 mod as_built;
 mod beam;
+mod compensation;
 mod covariance;
 mod draw;
 mod error;
@@ -32,12 +37,14 @@ mod form;
 mod grade;
 mod inverse;
 mod merits;
+mod mixture;
 mod monte_carlo;
 mod nominal;
 mod perturb;
 mod sensitivity;
 mod spot;
 mod sweep;
+mod travel;
 mod wavefront;
 
 pub use crate::lens::ToleranceGrade;
@@ -47,9 +54,13 @@ pub use analysis::{
 };
 pub use as_built::{AsBuiltGradient, FixedAndRefocused, as_built_gradient};
 pub use beam::{Beam, ColourRays, FieldBeam};
-pub use covariance::{LeverArm, MadeKind, MadeNumber, NumberCovariance, TiltingBody};
-pub use error::ToleranceError;
-pub use form::{FocusStop, FocusTreatment, QuadraticForm};
+pub use compensation::{Compensation, adjustments};
+pub use covariance::{
+    IndependentError, LeverArm, MadeKind, MadeNumber, NumberCovariance, TiltingBody,
+    independent_errors,
+};
+pub use error::{ToleranceError, refuse_lost_lenses};
+pub use form::{AdjustedForm, FocusTreatment, QuadraticForm};
 pub use grade::{PriceClass, bounded_tolerances, graded_sheet, price_classes};
 pub use inverse::{form_yield, loosest_for_yield, loosest_tolerances};
 pub use merits::{MeritOptions, Merits, merits};
@@ -59,4 +70,5 @@ pub use perturb::{NominalLens, perturb};
 pub use sensitivity::{Derivatives, Jet2, RaySensitivity, Sensitivity, sensitivities};
 pub use spot::{SpotMoments, best_focus};
 pub use sweep::{SweptSensitivity, swept_sensitivities};
+pub use travel::{AdjustmentTravel, StoppedLenses, TravelStatistics};
 pub use wavefront::WavefrontVariance;

@@ -1,9 +1,13 @@
 //! Real lenses: random errors of making, and rays traced through each lens.
 
+use super::adjusted::{LensToAdjust, mean_spot};
+use super::compensation::adjustments;
 use super::draw::draw_errors;
 use super::merits::{image_ray, open_tracers};
-use super::{Beam, SpotMoments, ToleranceError, ToleranceScene, best_focus, perturb};
-use crate::lens::{Perturbation, System, ToleranceSheet};
+use super::mixture::ErrorMixture;
+use super::spot::ImageRay;
+use super::{Beam, ToleranceError, ToleranceScene, best_focus};
+use crate::lens::{Compensator, Perturbation, System, ToleranceSheet};
 use crate::trace::{ImagePoints, Landings, Rays, TraceSink as _, Tracer};
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -13,10 +17,12 @@ use std::sync::atomic::{AtomicBool, Ordering};
 pub struct RealLens {
     /// The errors, in their units.
     pub errors: Vec<f64>,
-    /// The mean square spot radius in mm² at the image plane and at the best focus within its travel;
-    /// `None` if a ray does not arrive.
+    /// The mean square spot radius in mm² at the image plane, and with focus and compensators adjusted
+    /// within their travel; `None` if a ray does not arrive.
     pub mean_square: Option<[f64; 2]>,
-    /// The same with the rims that clip, of the rays that they leave, and the share of the light that
+    /// The adjustments, focus first, in mm or radians; none if a ray does not arrive.
+    pub adjustments: Vec<f64>,
+    /// The mean squares with the rims that clip, of the rays that they leave, and the share of the light that
     /// they take; `None` if it was not asked for or no light is left.
     pub clipped: Option<([f64; 2], f64)>,
 }
@@ -35,11 +41,16 @@ pub fn real_lenses(
     with_rims: usize,
     stop: &AtomicBool,
 ) -> Result<Vec<RealLens>, ToleranceError> {
-    let columns = BeamColumns::new(&scene.beam);
-    let is_stopped = || stop.load(Ordering::Relaxed);
-    let lens = |i: usize| {
-        (!is_stopped()).then(|| real_lens(scene, sheet, (seed, i), &columns, i < with_rims))
+    let made = RandomLenses {
+        scene,
+        sheet,
+        seed,
+        mixture: ErrorMixture::new(sheet)?,
+        adjustments: adjustments(sheet),
+        columns: BeamColumns::new(&scene.beam),
     };
+    let is_stopped = || stop.load(Ordering::Relaxed);
+    let lens = |i: usize| (!is_stopped()).then(|| made.lens(i, i < with_rims));
     let mut lenses = Vec::new();
     while lenses.len() < count && !is_stopped() {
         let part = lenses.len()..count.min(lenses.len() + PART);
@@ -55,33 +66,74 @@ pub fn real_lenses(
 /// The number of lenses that are traced in parallel before they are collected.
 const PART: usize = 128;
 
-fn real_lens(
-    scene: &ToleranceScene,
-    sheet: &ToleranceSheet,
-    (seed, number): (u64, usize),
-    columns: &BeamColumns,
-    with_rims: bool,
-) -> Result<RealLens, ToleranceError> {
-    let errors = draw_errors(&sheet.errors, seed, number as u64);
-    let set: Vec<(Perturbation, f64)> =
-        sheet.errors.iter().zip(&errors).map(|(t, value)| (t.error, *value)).collect();
-    let systems = perturb(&scene.lens, &set)?;
-    let focused = |mean: &SpotMoments<f64>| {
-        let travel = sheet.focus_travel.unwrap_or(f64::INFINITY);
-        [mean.a, mean.at(best_focus(mean).clamp(-travel, travel))]
-    };
-    let mean_square = columns.mean_spot(&systems).map(|mean| focused(&mean));
-    let clipped = if with_rims { clipped_spot(scene, systems) } else { None };
-    let clipped = clipped.map(|(mean, lost)| (focused(&mean), lost));
-    Ok(RealLens { errors, mean_square, clipped })
+/// The lenses that are made.
+struct RandomLenses<'a> {
+    scene: &'a ToleranceScene,
+    sheet: &'a ToleranceSheet,
+    seed: u64,
+    mixture: ErrorMixture,
+    /// The compensators, focus first.
+    adjustments: Vec<Compensator>,
+    columns: BeamColumns,
 }
 
-/// The mean spot of the rays that the rims of a lens leave, and the share of the light that they take;
-/// `None` if a field is dark.
-fn clipped_spot(
+impl RandomLenses<'_> {
+    fn lens(&self, number: usize, with_rims: bool) -> Result<RealLens, ToleranceError> {
+        let tolerances = &self.sheet.errors;
+        let errors = draw_errors((tolerances, &self.mixture), self.seed, number as u64);
+        let set: Vec<(Perturbation, f64)> =
+            tolerances.iter().zip(&errors).map(|(t, value)| (t.error, *value)).collect();
+        let made = LensToAdjust {
+            lens: &self.scene.lens,
+            columns: &self.columns,
+            errors: &set,
+            adjustments: &self.adjustments,
+        };
+        let unadjusted = made.systems(&[])?;
+        let mut lens =
+            RealLens { errors, mean_square: None, adjustments: Vec::new(), clipped: None };
+        if let Some(landed) = self.columns.landings(&unadjusted) {
+            let adjusted = made.adjust(&landed)?;
+            lens.mean_square = Some([mean_spot(&landed).a, adjusted.mean_square]);
+            lens.adjustments = adjusted.positions;
+        }
+        if with_rims {
+            lens.clipped = self.clipped(&made, unadjusted, &lens.adjustments)?;
+        }
+        Ok(lens)
+    }
+
+    /// The mean squares with rims that clip, at the image plane and with the adjustments of the lens
+    /// without rims, of which those of the sensor are found again; and the share of the light that is
+    /// lost. `None` if a field is dark.
+    fn clipped(
+        &self,
+        made: &LensToAdjust<'_>,
+        unadjusted: Vec<System<f64>>,
+        positions: &[f64],
+    ) -> Result<Option<([f64; 2], f64)>, ToleranceError> {
+        let Some((fixed, lost)) = clipped_rays(self.scene, unadjusted) else { return Ok(None) };
+        let of_sensor = |own: &&Compensator| own.part.in_lens().is_none();
+        let sensor: Vec<Compensator> = made.adjustments.iter().filter(of_sensor).copied().collect();
+        let mut adjusted = fixed.clone();
+        if sensor.len() < made.adjustments.len() {
+            match clipped_rays(self.scene, made.systems(positions)?) {
+                Some((landed, _)) => adjusted = landed,
+                None => return Ok(None),
+            }
+        }
+        let made = LensToAdjust { adjustments: &sensor, ..*made };
+        let found = made.adjust(&adjusted)?;
+        Ok(Some(([mean_spot(&fixed).a, found.mean_square], lost)))
+    }
+}
+
+/// The rays that the rims of a lens leave, and the share of the light that they take; `None` if a field
+/// is dark.
+fn clipped_rays(
     scene: &ToleranceScene,
     mut systems: Vec<System<f64>>,
-) -> Option<(SpotMoments<f64>, f64)> {
+) -> Option<(Vec<LandedField>, f64)> {
     for system in &mut systems {
         for (surface, (rim, obstruction)) in system.surfaces.iter_mut().zip(&scene.lens.rims) {
             (surface.semi_diameter, surface.obstruction) = (*rim, *obstruction);
@@ -89,11 +141,20 @@ fn clipped_spot(
     }
     let tracers: Result<Vec<_>, _> = systems.iter().map(Tracer::new).collect();
     let (beam, lost) = transmitted(&scene.beam, &tracers.ok()?)?;
-    Some((BeamColumns::new(&beam).mean_spot(&systems)?, lost))
+    Some((BeamColumns::new(&beam).landings(&systems)?, lost))
+}
+
+/// The rays of one field at the image plane.
+#[derive(Debug, Clone)]
+pub(super) struct LandedField {
+    /// The weight of the field.
+    pub(super) weight: f64,
+    /// The rays with their weights, which add up to 1.
+    pub(super) rays: Vec<(ImageRay<f64>, f64)>,
 }
 
 /// The rays of a beam, to be traced in blocks.
-struct BeamColumns {
+pub(super) struct BeamColumns {
     fields: Vec<FieldColumns>,
 }
 
@@ -116,11 +177,11 @@ impl BeamColumns {
         Self { fields: beam.fields.iter().map(field).collect() }
     }
 
-    /// The mean spot of all fields without rims; `None` if a ray does not arrive, or if there is no
-    /// best focus.
-    fn mean_spot(&self, systems: &[System<f64>]) -> Option<SpotMoments<f64>> {
+    /// The rays of all fields at the image plane, without rims; `None` if one does not arrive, or if
+    /// there is no best focus.
+    pub(super) fn landings(&self, systems: &[System<f64>]) -> Option<Vec<LandedField>> {
         let tracers = open_tracers(systems).ok()?;
-        let (mut landed, mut spots) = (Landings::default(), Vec::new());
+        let (mut landed, mut fields) = (Landings::default(), Vec::with_capacity(self.fields.len()));
         for FieldColumns { weight, colours } in &self.fields {
             let mut image_rays = Vec::new();
             for (wavelength, rays, weights) in colours {
@@ -131,10 +192,10 @@ impl BeamColumns {
                 let weighted = weights.iter().enumerate();
                 image_rays.extend(weighted.map(|(i, w)| (image_ray(&landed.ray(i)), *w)));
             }
-            spots.push(SpotMoments::new(&image_rays).weighted(*weight));
+            fields.push(LandedField { weight: *weight, rays: image_rays });
         }
-        let mean = SpotMoments::sum(spots.into_iter());
-        (mean.a.is_finite() && best_focus(&mean).is_finite()).then_some(mean)
+        let mean = mean_spot(&fields);
+        (mean.a.is_finite() && best_focus(&mean).is_finite()).then_some(fields)
     }
 }
 

@@ -191,7 +191,11 @@ fn every_edit(lens: &Lens) -> Vec<Edit> {
             edits: [0, 1].map(|surface| Edit::SetComment { surface, text: "remark".into() }).into(),
         },
         Edit::SetObstruction { surface: 0, value: Some(1.5) },
-        Edit::SetTolerances(Some(ToleranceSheet { errors: Vec::new(), focus_travel: Some(0.2) })),
+        Edit::SetTolerances(Some(ToleranceSheet {
+            errors: Vec::new(),
+            focus_travel: Some(0.2),
+            ..ToleranceSheet::default()
+        })),
     ]
 }
 

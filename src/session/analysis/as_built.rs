@@ -7,6 +7,7 @@ use super::AnalysisSettings;
 use crate::lens::{Lens, ToleranceSheet};
 use crate::tolerance::{
     ToleranceAnalysis, ToleranceError, ToleranceRequest, ToleranceScene, analyze, graded_sheet,
+    refuse_lost_lenses,
 };
 
 /// The tolerances of a lens and what they do to it.
@@ -61,8 +62,9 @@ fn as_built(
     let sheet = lens.tolerances.clone().unwrap_or_else(graded);
     let request = ToleranceRequest { seed: SEED, samples, limit: settings.good_rms };
     let analysis = analyze(&scene, &sheet, request)?;
+    refuse_lost_lenses(analysis.lost, analysis.samples, "these tolerances")?;
     Ok(AsBuiltLens {
-        shares: analysis.growth_shares(&sheet.errors),
+        shares: analysis.growth_shares(&sheet)?,
         sheet,
         from_lens: lens.tolerances.is_some(),
         analysis,

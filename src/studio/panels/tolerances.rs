@@ -84,6 +84,7 @@ impl TolerancesPanel {
                 summary(ui, made);
                 distribution(ui, made);
             }
+            travels(ui, made);
             self.errors(ui, made, actions);
         });
     }
@@ -273,6 +274,43 @@ fn summary(ui: &mut Ui, made: &AsBuiltLens) {
         }
     });
 }
+
+/// The travels of focus and of the other compensators.
+fn travels(ui: &mut Ui, made: &AsBuiltLens) {
+    Grid::new("compensators").num_columns(4).striped(true).show(ui, |ui| {
+        for (title, hint) in TRAVEL_COLUMNS {
+            hint_beside(ui.weak(title), hint);
+        }
+        ui.end_row();
+        for own in &made.analysis.travels {
+            let (factor, unit) =
+                if own.part.is_angle() { (60.0_f64.to_degrees(), "'") } else { (1e3, " µm") };
+            let shown = |value: f64| format!("{}{unit}", number::format_digits(factor * value, 3));
+            let found = own.real.unwrap_or(own.form);
+            let place =
+                own.part.in_lens().map_or_else(String::new, |part| format!(" {}", surfaces(part)));
+            ui.label(RichText::new(format!("{}{place}", own.part.name())).small());
+            ui.label(own.travel.map_or_else(|| "unlimited".to_owned(), shown));
+            ui.label(format!("{} ± {}", shown(found.mean), shown(found.deviation)));
+            let stopped = format!("{:.1} %", 100.0 * found.at_stop);
+            let color = if found.at_stop > 0.01 {
+                ui.visuals().warn_fg_color
+            } else {
+                ui.visuals().text_color()
+            };
+            ui.label(RichText::new(stopped).color(color));
+            ui.end_row();
+        }
+    });
+}
+
+/// The columns of the compensators with their explanations.
+const TRAVEL_COLUMNS: [(&str, &str); 4] = [
+    ("Compensator", "What is adjusted in each lens after assembly"),
+    ("Travel", "The largest adjustment to either side; compensators are kept in the lens file"),
+    ("Adjustment", "Its mean and its standard deviation"),
+    ("At its stop", "The share of lenses at the end of the travel, where the rest remains"),
+];
 
 fn with_error([value, error]: [f64; 2]) -> String {
     format!("{} µm", number::with_error(1e3 * value, 1e3 * error))

@@ -215,23 +215,26 @@ impl ErrorColumns {
     fn load(rows: &ErrorRows, axis: usize, surface: (usize, &Interface<f64>), rays: Lane) -> Self {
         let (i, interface) = surface;
         let mut columns = Self::NONE;
-        let mut copy = |to: usize, surface: usize, number: ErrorNumber| {
-            let row = &rows.row(axis, surface, number)[rays.from..rays.from + rays.count];
-            columns.0[to][..rays.count].copy_from_slice(row);
-        };
         for number in ErrorNumber::ALL {
-            copy(number as usize, i, number);
+            columns.copy(number as usize, rows.row(axis, i, number), rays);
         }
         if let Some(before) = i.checked_sub(1) {
-            copy(ErrorNumber::COUNT, before, ErrorNumber::Thickness);
+            columns.copy(ErrorNumber::COUNT, rows.row(axis, before, ErrorNumber::Thickness), rays);
         }
         if let Some(medium) = interface.medium_before {
-            copy(ErrorNumber::COUNT + 1, medium, ErrorNumber::Index);
+            let row = rows.row(axis, medium, ErrorNumber::Index);
+            columns.copy(ErrorNumber::COUNT + 1, row, rays);
             if interface.mirror {
-                copy(ErrorNumber::Index as usize, medium, ErrorNumber::Index);
+                columns.copy(ErrorNumber::Index as usize, row, rays);
             }
         }
         columns
+    }
+
+    /// Copies the part of a row for some rays.
+    #[inline(always)]
+    fn copy(&mut self, to: usize, row: &[f64], Lane { from, count }: Lane) {
+        self.0[to][..count].copy_from_slice(&row[from..from + count]);
     }
 }
 
@@ -295,8 +298,10 @@ impl<R: ErrorReal> AdjointColumns<R> {
         hits: &HitColumns<R>,
         is_last: bool,
     ) {
+        // A copy of which no other code has the address: else the loop is not vectorized.
+        let interface = *interface;
         for j in 0..LANES {
-            let surface = PerturbedSurface::<R, QUADRIC>::new(interface, errors.get(j));
+            let surface = PerturbedSurface::<R, QUADRIC>::new(&interface, errors.get(j));
             let (hit, behind) = (hits.get(j), (self.by.point.get(j), self.by.k.get(j)));
             let met = if is_last {
                 surface.end_adjoint(&hit, behind.0, behind.1)
@@ -368,8 +373,10 @@ fn cross_form<R: ErrorReal, const QUADRIC: bool>(
     distances: &[f64; LANES],
     is_last: bool,
 ) {
+    // Copies of which no other code has the address: else the loop is not vectorized.
+    let (interface, distances) = (*interface, *distances);
     for (j, distance) in distances.iter().enumerate() {
-        let surface = PerturbedSurface::<R, QUADRIC>::new(interface, errors.get(j));
+        let surface = PerturbedSurface::<R, QUADRIC>::new(&interface, errors.get(j));
         let mut hit = surface.meet(rays.point.get(j), rays.k.get(j), *distance);
         if !is_last {
             let (point, k) = surface.refract(&mut hit);
@@ -556,49 +563,55 @@ impl AdjointColumns<f64> {
         rows: &mut ErrorRows,
         axis: usize,
         (i, interface): (usize, &Interface<f64>),
-        Lane { from, count }: Lane,
+        lane: Lane,
     ) {
-        let mut add = |surface: usize, number: ErrorNumber, lanes: &[f64; LANES]| {
-            let row = &mut rows.row_mut(axis, surface, number)[from..from + count];
-            row.iter_mut().zip(lanes).for_each(|(to, by)| *to += by);
-        };
         for number in ErrorNumber::ALL {
             let lanes = &self.numbers[number as usize];
             match number {
                 ErrorNumber::Index if interface.mirror => {}
-                _ => add(i, number, lanes),
+                _ => add_lanes(rows.row_mut(axis, i, number), lanes, lane),
             }
         }
         if let Some(before) = i.checked_sub(1) {
-            add(before, ErrorNumber::Thickness, &self.by_gap);
+            add_lanes(rows.row_mut(axis, before, ErrorNumber::Thickness), &self.by_gap, lane);
         }
         if let Some(medium) = interface.medium_before {
-            add(medium, ErrorNumber::Index, &self.by_index_before);
+            add_lanes(rows.row_mut(axis, medium, ErrorNumber::Index), &self.by_index_before, lane);
         }
     }
+}
+
+/// Adds the numbers of some rays to a row.
+#[inline(always)]
+fn add_lanes(row: &mut [f64], lanes: &[f64; LANES], Lane { from, count }: Lane) {
+    row[from..from + count].iter_mut().zip(lanes).for_each(|(to, by)| *to += by);
+}
+
+/// The sum of derivatives along an error.
+#[inline(always)]
+fn sum_along(lanes: &[ErrorDual; LANES]) -> f64 {
+    lanes.iter().map(|dual| dual.slope[0]).sum()
 }
 
 impl AdjointColumns<ErrorDual> {
     /// Adds the derivatives along the error to those by the numbers of a system.
     #[inline(always)]
     fn add_to(&self, gradient: &mut SystemGradient<f64>, (i, interface): (usize, &Interface<f64>)) {
-        let sum = |lanes: &[ErrorDual; LANES]| lanes.iter().map(|d| d.slope[0]).sum::<f64>();
-        let of = |number: ErrorNumber| sum(&self.numbers[number as usize]);
         let surface = &mut gradient.surfaces[i];
-        surface.curvature += of(ErrorNumber::Curvature);
-        surface.conic += of(ErrorNumber::Conic);
+        surface.curvature += sum_along(&self.numbers[ErrorNumber::Curvature as usize]);
+        surface.conic += sum_along(&self.numbers[ErrorNumber::Conic as usize]);
         if !is_quadric(interface) {
-            surface.terms.iter_mut().zip(&self.by_terms).for_each(|(to, by)| *to += sum(by));
+            surface.terms.iter_mut().zip(&self.by_terms).for_each(|(to, by)| *to += sum_along(by));
         }
         if !interface.mirror {
-            surface.index += of(ErrorNumber::Index);
+            surface.index += sum_along(&self.numbers[ErrorNumber::Index as usize]);
         }
         if let Some(before) = i.checked_sub(1) {
-            gradient.surfaces[before].thickness += sum(&self.by_gap);
+            gradient.surfaces[before].thickness += sum_along(&self.by_gap);
         }
         match interface.medium_before {
-            Some(medium) => gradient.surfaces[medium].index += sum(&self.by_index_before),
-            None => gradient.index_before += sum(&self.by_index_before),
+            Some(medium) => gradient.surfaces[medium].index += sum_along(&self.by_index_before),
+            None => gradient.index_before += sum_along(&self.by_index_before),
         }
     }
 }

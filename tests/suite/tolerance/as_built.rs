@@ -19,7 +19,7 @@ fn scene(lens: &ToleranceCase, rule: (usize, usize)) -> ToleranceScene {
 }
 
 fn sheet(lens: &ToleranceCase, distribution: ErrorDistribution) -> ToleranceSheet {
-    ToleranceSheet { errors: tolerances(lens, distribution), focus_travel: None }
+    ToleranceSheet::of_errors(tolerances(lens, distribution))
 }
 
 /// The triplet with normal errors: expectation, mean, quantiles and yields by the form and by real
@@ -77,9 +77,10 @@ fn the_loosest_tolerances_reach_the_spot_that_was_asked_for() {
     let request = ToleranceRequest { seed: 3, samples: 0, limit: None };
     let form = &analyze(&scene, &sheet, request).unwrap().forms[1];
     let target = 0.02_f64.powi(2);
-    let loosest = loosest_tolerances(form, &sheet.errors, target).unwrap();
-    assert_close(form.expectation(&loosest), target, 1e-12 * target, "expectation");
-    let refused = loosest_tolerances(form, &sheet.errors, 0.25 * form.nominal);
+    let loosest = loosest_tolerances(form, &sheet, target).unwrap();
+    let expected = form.expectation(&ToleranceSheet::of_errors(loosest)).unwrap();
+    assert_close(expected, target, 1e-12 * target, "expectation");
+    let refused = loosest_tolerances(form, &sheet, 0.25 * form.nominal);
     assert!(refused.unwrap_err().to_string().contains("expected more than"));
 }
 
@@ -93,16 +94,17 @@ fn the_loosest_tolerances_give_the_yield_that_was_asked_for() {
     let form = &analyze(&scene, &tight, request).unwrap().forms[1];
     let limit = 1.15 * form.nominal.sqrt();
     for share in [0.5, 0.9] {
-        let errors = loosest_for_yield(form, &tight.errors, limit, share).unwrap();
-        assert_close(form_yield(form, &errors, limit), share, 2e-3, "the same lenses");
-        let loose = ToleranceSheet { errors, focus_travel: None };
+        let errors = loosest_for_yield(form, &tight, limit, share).unwrap();
+        let loose = ToleranceSheet::of_errors(errors);
+        let good = form_yield(form, &loose, limit).unwrap();
+        assert_close(good, share, 2e-3, "the same lenses");
         let request = ToleranceRequest { seed: 11, samples: 150, limit: Some(limit) };
         let good = analyze(&scene, &loose, request).unwrap().spots[1].good.unwrap();
         assert_close(good.form, share, 0.025, "the form, other lenses");
         assert!(good.interval[0] < share && share < good.interval[1], "{good:?}");
     }
     for (limit, share) in [(0.5 * form.nominal.sqrt(), 0.9), (limit, 1.0)] {
-        let refused = loosest_for_yield(form, &tight.errors, limit, share).unwrap_err();
+        let refused = loosest_for_yield(form, &tight, limit, share).unwrap_err();
         assert!(refused.to_string().contains("expected more than"), "{refused}");
     }
 }

@@ -4,8 +4,8 @@
 use super::reference::assert_close;
 use crate::merit::{bundled, check, step, vary};
 use aplanat::lens::{
-    ErrorDistribution, Lens, Perturbation, PerturbationKind, Quantity, Tolerance, ToleranceGrade,
-    ToleranceSheet,
+    AdjustedPart, Compensator, ErrorCorrelation, ErrorDistribution, Lens, Perturbation,
+    PerturbationKind, Quantity, Tolerance, ToleranceGrade, ToleranceSheet,
 };
 use aplanat::merit::{DerivativeLevel, Goal, LimitTreatment, Merit, PupilEdge, Term, WeightedTerm};
 use aplanat::tolerance::{
@@ -84,7 +84,11 @@ fn each_kind_of_error_adds_to_the_term_what_jets_say() {
         let distribution = ErrorDistribution::Uniform;
         let errors = vec![Tolerance { error, half_range, distribution }];
         for focus_travel in [None, Some(0.0)] {
-            let sheet = ToleranceSheet { errors: errors.clone(), focus_travel };
+            let sheet = ToleranceSheet {
+                errors: errors.clone(),
+                focus_travel,
+                ..ToleranceSheet::default()
+            };
             let expected = growth_by_jets(&lens, &sheet, focus_travel.is_none());
             let made = Lens { tolerances: Some(sheet), ..lens.clone() };
             let found = growth(&made, OWN);
@@ -116,7 +120,7 @@ fn ten_thousand_tolerances_are_as_many_as_their_sum() {
         once.errors.iter().flat_map(|t| std::iter::repeat_n(small(t), 130)).collect();
     assert!(errors.len() > 10_000, "{}", errors.len());
     let expected = growth(&lens, GRADED);
-    lens.tolerances = Some(ToleranceSheet { errors, focus_travel: None });
+    lens.tolerances = Some(ToleranceSheet::of_errors(errors));
     assert_close(growth(&lens, OWN), expected, 1e-9 * expected, "sum");
 }
 
@@ -136,7 +140,7 @@ fn a_focus_of_bounded_travel_wins_back_a_part() {
     assert!(travels[2] > 2.0 * travels[0], "{travels:?}");
     let mut none = lens;
     let errors = sheet.errors.iter().map(|t| Tolerance { half_range: 0.0, ..*t }).collect();
-    none.tolerances = Some(ToleranceSheet { errors, focus_travel: None });
+    none.tolerances = Some(ToleranceSheet::of_errors(errors));
     assert!(growth(&none, OWN).abs() < 1e-12 * travels[0], "{}", growth(&none, OWN));
 }
 
@@ -167,10 +171,49 @@ fn the_term_has_the_derivative_of_its_value_for_every_error() {
         error(PerturbationKind::Irregularity, 5, 5, 1e-3),
         error(PerturbationKind::Thickness, 4, 4, 0.05),
     ];
-    lens.tolerances = Some(ToleranceSheet { errors, focus_travel: Some(0.03) });
+    lens.tolerances =
+        Some(ToleranceSheet { errors, focus_travel: Some(0.03), ..ToleranceSheet::default() });
     for pupil in [PupilEdge::Frozen, PupilEdge::Moving] {
         check(&lens, OWN, pupil, |quantity| 0.3 * step(quantity));
     }
+}
+
+/// Elements that share all of their decentres and tilts move as one group would, and the term has the
+/// derivative of its value for errors that share a part, lever arms and gaps included.
+#[test]
+fn correlated_errors_are_those_of_a_group() {
+    let mut lens = lens("double_gauss_rudolph_50");
+    let error = |kind: PerturbationKind, first: usize, last: usize, half_range: f64| Tolerance {
+        error: Perturbation { kind, first, last },
+        half_range,
+        distribution: ErrorDistribution::Normal,
+    };
+    let decenter = PerturbationKind::ElementDecenterY;
+    let apart = vec![error(decenter, 2, 3, 0.05), error(decenter, 4, 6, 0.05)];
+    let pair = |coefficient: f64| ErrorCorrelation { errors: vec![0, 1], coefficient };
+    let with = |errors: Vec<Tolerance>, correlations: Vec<ErrorCorrelation>| {
+        let sheet = ToleranceSheet { correlations, ..ToleranceSheet::of_errors(errors) };
+        growth(&Lens { tolerances: Some(sheet), ..lens.clone() }, OWN)
+    };
+    let group = with(vec![error(decenter, 2, 6, 0.05)], Vec::new());
+    let [none, half, all] =
+        [0.0, 0.5, 1.0].map(|coefficient| with(apart.clone(), vec![pair(coefficient)]));
+    assert_close(all, group, 1e-9 * group, "group");
+    assert_close(2.0 * half, none + all, 1e-9 * group, "half");
+    lens.variables.clear();
+    for surface in [1, 2, 5] {
+        vary(&mut lens, surface, Quantity::Curvature);
+        vary(&mut lens, surface, Quantity::Thickness);
+    }
+    let errors = vec![
+        error(PerturbationKind::ElementRollX, 2, 3, 2e-3),
+        error(PerturbationKind::ElementTiltX, 1, 8, 1e-3),
+        error(PerturbationKind::Thickness, 4, 4, 0.05),
+        error(PerturbationKind::Thickness, 2, 2, 0.05),
+    ];
+    let correlations = vec![pair(0.6), ErrorCorrelation { errors: vec![2, 3], coefficient: -1.0 }];
+    lens.tolerances = Some(ToleranceSheet { correlations, ..ToleranceSheet::of_errors(errors) });
+    check(&lens, OWN, PupilEdge::Frozen, |quantity| 0.3 * step(quantity));
 }
 
 #[test]
@@ -192,8 +235,11 @@ fn a_lens_that_the_term_does_not_apply_to_is_refused() {
     let error = Perturbation::of_surface(PerturbationKind::ThicknessAdjusted, 6);
     let distribution = ErrorDistribution::Normal;
     let errors = vec![Tolerance { error, half_range: 0.1, distribution }];
-    plain.tolerances = Some(ToleranceSheet { errors, focus_travel: None });
+    plain.tolerances = Some(ToleranceSheet::of_errors(errors));
     assert!(refusal(&plain, OWN).contains("not possible"));
+    let compensators = vec![Compensator { part: AdjustedPart::SensorTiltX, travel: 0.01 }];
+    plain.tolerances = Some(ToleranceSheet { compensators, ..ToleranceSheet::default() });
+    assert!(refusal(&plain, OWN).contains("compensators besides focus"));
 }
 
 /// The Gauss-Newton matrix has the growth as one residual and gives the same gradient.

@@ -1,7 +1,7 @@
 //! Errors of making that end rays, do nothing, or ask too much of a quadratic form.
 
 use super::reference::{lenses, tolerances};
-use crate::cli::{done, done_json, refused};
+use crate::cli::{Scratch, done, done_json, refused};
 use aplanat::lens::{
     ErrorDistribution, FieldPoint, Perturbation, PerturbationKind, ToleranceSheet, lie_on_one_side,
 };
@@ -10,7 +10,7 @@ use aplanat::tolerance::{
     graded_sheet, merits, perturb,
 };
 
-fn scene(number: usize, rule: (usize, usize)) -> ToleranceScene {
+pub(super) fn scene(number: usize, rule: (usize, usize)) -> ToleranceScene {
     let lens = &lenses()[number];
     ToleranceScene {
         lens: lens.nominal(),
@@ -66,11 +66,51 @@ fn lenses_that_lose_rays_count_as_bad() {
     let mut errors = tolerances(&lenses()[0], ErrorDistribution::Ends);
     errors.retain(|t| t.error.kind == PerturbationKind::ElementDecenterY);
     errors.iter_mut().for_each(|t| t.half_range = 25.0);
-    let sheet = ToleranceSheet { errors, focus_travel: None };
+    let sheet = ToleranceSheet::of_errors(errors);
     let request = ToleranceRequest { seed: 1, samples: 8, limit: Some(1.0) };
     let found = analyze(&scene, &sheet, request).unwrap();
     assert!(found.lost > 0);
     assert!(found.spots.iter().all(|spot| spot.mean_rms[0].is_finite()));
+}
+
+/// A chief ray that an error sends past a surface is reported where the wavefront asks for it.
+#[test]
+fn a_chief_ray_that_is_lost_ends_the_wavefront_alone() {
+    let mut scene = scene(0, (2, 4));
+    scene.beam.fields[1].chief.0.point.y += 500.0;
+    let spots = merits(&scene.lens.systems, &scene.beam, scene.options).unwrap();
+    assert!(spots.mean_square().is_finite() && spots.wavefronts.is_empty());
+    let judged = merits(&scene.lens.systems, &scene.beam, lenses()[0].options());
+    assert!(matches!(judged, Err(ToleranceError::RayLost { field: 1, .. })), "{judged:?}");
+}
+
+/// A stop that is pushed out of the beam takes all light: such lenses are counted, and no mean over the
+/// others stands for them.
+#[test]
+fn a_rim_that_closes_the_pupil_is_counted() {
+    let lens = |half_range: f64| {
+        format!(
+            r#"{{ "aplanat": 1, "name": "Stop in front", "object": "infinity",
+  "aperture": {{"entrance_pupil_diameter": 8.0}},
+  "fields": {{"kind": "angle", "values": [{{"y": 0.0}}]}},
+  "wavelengths": [{{"um": 0.5875618}}],
+  "surfaces": [
+    {{"curvature": 0.0, "thickness": 5.0, "semi_diameter": 4.0, "stop": true}},
+    {{"radius": 100, "thickness": 5.0, "glass": {{"index": 1.5}}, "semi_diameter": 12.0}},
+    {{"radius": -100, "thickness": 98.0, "semi_diameter": 12.0}}],
+  "tolerances": {{"errors": [{{"kind": "surface_decenter_y", "first": 0,
+    "half_range": {half_range}, "distribution": "ends"}}]}} }}"#
+        )
+    };
+    let run = |half_range: f64| {
+        let file = Scratch::with("stop_in_front.json", &lens(half_range));
+        done_json(&["tolerance", file.path(), "--samples", "6", "--error", "1%"], "")
+    };
+    let (closed, open) = (run(20.0), run(0.5));
+    assert_eq!((closed["dark"].as_u64(), open["dark"].as_u64()), (Some(6), Some(0)));
+    assert_eq!(closed["lost"].as_u64(), Some(0));
+    assert!(closed["clipping"].is_null() && open["clipping"][2].as_f64().unwrap() > 0.01);
+    assert!(closed["warnings"].to_string().contains("gets no light"), "{}", closed["warnings"]);
 }
 
 /// A gap that becomes negative moves surfaces through each other: rays follow the order of the list.
@@ -90,7 +130,7 @@ fn no_tolerance_and_impossible_errors() {
     let mut errors = tolerances(&lenses()[0], ErrorDistribution::NormalCut);
     errors.truncate(4);
     errors.iter_mut().for_each(|t| t.half_range = 0.0);
-    let sheet = ToleranceSheet { errors, focus_travel: Some(0.0) };
+    let sheet = ToleranceSheet { errors, focus_travel: Some(0.0), ..ToleranceSheet::default() };
     let request = ToleranceRequest { seed: 1, samples: 4, limit: None };
     let found = analyze(&scene, &sheet, request).unwrap();
     for spot in &found.spots {
@@ -113,7 +153,11 @@ fn a_compensator_at_its_stop_leaves_the_rest() {
     let mut errors = tolerances(&lenses()[0], ErrorDistribution::NormalCut);
     errors.retain(|t| t.error.kind == PerturbationKind::Thickness);
     let run = |travel: Option<f64>| {
-        let sheet = ToleranceSheet { errors: errors.clone(), focus_travel: travel };
+        let sheet = ToleranceSheet {
+            errors: errors.clone(),
+            focus_travel: travel,
+            ..ToleranceSheet::default()
+        };
         let request = ToleranceRequest { seed: 1, samples: 30, limit: None };
         analyze(&scene, &sheet, request).unwrap().spots
     };
@@ -130,7 +174,7 @@ fn a_form_that_fails_says_so() {
     let mut errors = tolerances(&lenses()[2], ErrorDistribution::Normal);
     errors.retain(|t| t.error.kind == PerturbationKind::ElementDecenterY);
     errors.iter_mut().for_each(|t| t.half_range *= 10.0);
-    let sheet = ToleranceSheet { errors, focus_travel: None };
+    let sheet = ToleranceSheet::of_errors(errors);
     let request = ToleranceRequest { seed: 2, samples: 40, limit: None };
     let found = analyze(&scene, &sheet, request).unwrap();
     assert!(!found.spots[1].form_agrees, "{:?}", found.spots[1].difference);

@@ -2,6 +2,8 @@
 
 mod as_built;
 mod as_built_term;
+mod compensators;
+mod correlations;
 mod derivatives;
 mod hard_cases;
 mod rays;

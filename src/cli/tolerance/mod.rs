@@ -1,17 +1,21 @@
 //! `tolerance`: what manufacturing errors do to a lens.
 
-use super::error::CliError;
-use super::failures::Failures;
-use super::input::{LensFile, LoadedLens, Tolerance as RelativeError};
-use super::output::{Output, ShortNumber, TextTable};
-use super::output_paths::OutputPaths;
-use super::progress::{note_if_stopped, stop_flag};
+mod compensators;
+
+use self::compensators::{CompensatorRow, compensator_rows, compensator_table, stop_warning};
+use crate::cli::error::CliError;
+use crate::cli::failures::Failures;
+use crate::cli::input::{LensFile, LoadedLens, Tolerance as RelativeError};
+use crate::cli::output::{Output, ShortNumber, TextTable};
+use crate::cli::output_paths::OutputPaths;
+use crate::cli::progress::{note_if_stopped, stop_flag};
 use crate::files;
-use crate::lens::{Lens, PerturbationKind, SurfaceNumber, Tolerance, ToleranceSheet};
+use crate::lens::{Compensator, Lens, PerturbationKind, SurfaceNumber, Tolerance, ToleranceSheet};
 use crate::tolerance::{
-    AsBuiltSpot, Derivatives, PriceClass, QuadraticForm, ToleranceAnalysis, ToleranceError,
-    ToleranceGrade, ToleranceRequest, ToleranceScene, analyze_until, bounded_tolerances,
-    form_yield, graded_sheet, loosest_for_yield, loosest_tolerances, price_classes, real_lenses,
+    AsBuiltSpot, Derivatives, PriceClass, QuadraticForm, StoppedLenses, ToleranceAnalysis,
+    ToleranceError, ToleranceGrade, ToleranceRequest, ToleranceScene, analyze_until,
+    bounded_tolerances, form_yield, graded_sheet, loosest_for_yield, loosest_tolerances,
+    price_classes, real_lenses, refuse_lost_lenses,
 };
 use serde::Serialize;
 use std::fmt::{self, Display};
@@ -24,7 +28,7 @@ fn parse_sample_count(text: &str) -> Result<usize, &'static str> {
 
 /// Shows what manufacturing errors do to a lens: sensitivities, expected spot, quantiles, yield
 #[derive(Debug, clap::Args)]
-#[command(after_long_help = include_str!("help/tolerance.txt"))]
+#[command(after_long_help = include_str!("../help/tolerance.txt"))]
 pub(super) struct ToleranceArgs {
     #[command(flatten)]
     lens: LensFile,
@@ -62,6 +66,11 @@ pub(super) struct ToleranceArgs {
     #[arg(long, value_name = "SHARE", requires = "rms", conflicts_with = "loosest")]
     loosest_yield: Option<RelativeError>,
 
+    /// A part that is adjusted after assembly, with its largest travel in mm or degrees, beside what the file
+    /// names: `focus=0.3`, `sensor_tilt_x=0.2`, `thickness@3=0.1`, `element_decenter_y@3-4=0.05`
+    #[arg(long = "compensator", value_name = "KIND@SURFACES=TRAVEL")]
+    compensators: Vec<Compensator>,
+
     /// A file for the table of sensitivities, as CSV
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
@@ -79,25 +88,27 @@ impl ToleranceArgs {
         opened.check_zoom(self.zoom)?;
         let refuse = |source: ToleranceError| tolerance_error(&opened, &source);
         let scene = ToleranceScene::new(&opened.lens, self.zoom, self.error.0).map_err(refuse)?;
-        let sheet = self.sheet(&opened, &scene);
+        let sheet = self.sheet(&opened, &scene)?;
         let request = ToleranceRequest { seed: self.seed, samples: self.samples, limit: self.rms };
         let stop = stop_flag();
         let analysis = analyze_until(&scene, &sheet, request, &stop).map_err(refuse)?;
         note_if_stopped(&stop);
-        refuse_lost_lenses(analysis.lost, analysis.samples, "these tolerances")
-            .map_err(|why| CliError::Failed(format!("{}: {why}", opened.file)))?;
-        let loosest =
-            self.loosest(&analysis.forms[1], &sheet.errors).transpose().map_err(refuse)?;
-        let loosest = loosest.map(|found| {
-            let place = (&opened.lens, &scene);
-            let (bounded, held) = bounded_tolerances(place.0, &scene.lens, (&sheet.errors, &found));
-            let loosest = Loosest::new(bounded, &analysis.forms[1], self.rms, place);
-            loosest.confirmed(&analysis.forms[1], (&scene, &sheet), held, (self.seed, &stop))
-        });
-        let loosest = loosest
-            .transpose()
-            .map_err(|why| CliError::Failed(format!("{}: {why}", opened.file)))?;
-        let report = ToleranceReport::new(self, &scene, &sheet, analysis, loosest);
+        refuse_lost_lenses(analysis.lost, analysis.samples, "these tolerances").map_err(refuse)?;
+        let form = &analysis.forms[1];
+        let loosest = match self.loosest(form, &sheet).transpose().map_err(refuse)? {
+            Some(found) => {
+                let errors = (&sheet.errors[..], &found[..]);
+                let (bounded, held) = bounded_tolerances(&opened.lens, &scene.lens, errors);
+                let loosest = ToleranceSheet { errors: bounded, ..sheet.clone() };
+                let place = (&opened.lens, &scene);
+                let loosest = Loosest::new(loosest, form, self.rms, place).map_err(refuse)?;
+                let confirmed = loosest.confirmed(form, &scene, held, (self.seed, &stop));
+                Some(confirmed.map_err(refuse)?)
+            }
+            None => None,
+        };
+        let report =
+            ToleranceReport::new(self, &scene, &sheet, analysis, loosest).map_err(refuse)?;
         let mut failures = Failures::default();
         if let Some(path) = &self.csv {
             failures.note(files::write_atomic(path, report.csv().as_bytes()));
@@ -110,12 +121,12 @@ impl ToleranceArgs {
     fn loosest(
         &self,
         form: &QuadraticForm,
-        errors: &[Tolerance],
+        sheet: &ToleranceSheet,
     ) -> Option<Result<Vec<Tolerance>, ToleranceError>> {
         match (self.loosest, self.loosest_yield, self.rms) {
-            (Some(rms), ..) => Some(loosest_tolerances(form, errors, rms * rms)),
+            (Some(rms), ..) => Some(loosest_tolerances(form, sheet, rms * rms)),
             (None, Some(share), Some(limit)) => {
-                Some(loosest_for_yield(form, errors, limit, share.0))
+                Some(loosest_for_yield(form, sheet, limit, share.0))
             }
             _ => None,
         }
@@ -131,42 +142,46 @@ impl ToleranceArgs {
         Ok(())
     }
 
-    /// The tolerances of the lens file, or those of the class.
-    fn sheet(&self, opened: &LoadedLens, scene: &ToleranceScene) -> ToleranceSheet {
-        match (&opened.lens.tolerances, self.grade) {
+    /// The tolerances of the lens file, or those of the class, with the compensators that are asked for.
+    fn sheet(
+        &self,
+        opened: &LoadedLens,
+        scene: &ToleranceScene,
+    ) -> Result<ToleranceSheet, CliError> {
+        let mut sheet = match (&opened.lens.tolerances, self.grade) {
             (Some(sheet), None) => sheet.clone(),
             (_, grade) => graded_sheet(&opened.lens, &scene.lens, grade.unwrap_or_default()),
-        }
+        };
+        self.compensators.iter().for_each(|own| sheet.set_compensator(*own));
+        let with = Lens { tolerances: Some(sheet.clone()), ..opened.lens.clone() };
+        with.check().map_err(|why| CliError::Input(format!("{}: {why}", opened.file)))?;
+        Ok(sheet)
     }
-}
-
-/// Refuses means over lenses of which most are lost: those of the others tell nothing.
-fn refuse_lost_lenses(lost: usize, samples: usize, what: &str) -> Result<(), String> {
-    if 2 * lost <= samples {
-        return Ok(());
-    }
-    Err(format!(
-        "{lost} of {samples} lenses with {what} lose rays, so that no mean or quantile tells anything \
-         of them; expected tighter ones: a tighter --grade, smaller half ranges in the file, or less \
-         asked of --loosest"
-    ))
 }
 
 fn tolerance_error(opened: &LoadedLens, source: &ToleranceError) -> CliError {
-    CliError::Input(format!("{}: {source}", opened.file))
+    let text = format!("{}: {source}", opened.file);
+    match source {
+        ToleranceError::MostLost { .. } => CliError::Failed(text),
+        _ => CliError::Input(text),
+    }
 }
 
 /// The result.
 #[derive(Serialize)]
 struct ToleranceReport {
     errors: usize,
+    correlations: usize,
     rays: usize,
     sampling_error: f64,
     samples: usize,
     seed: u64,
     lost: usize,
+    dark: usize,
     clipping: Option<[f64; 3]>,
     spots: [AsBuiltSpot; 2],
+    compensators: Vec<CompensatorRow>,
+    stopped: Option<StoppedLenses>,
     sensitivities: Vec<SensitivityRow>,
     loosest: Option<Vec<Tolerance>>,
     prices: Option<LoosestPrices>,
@@ -175,7 +190,7 @@ struct ToleranceReport {
 
 /// The loosest tolerances.
 struct Loosest {
-    tolerances: Vec<Tolerance>,
+    sheet: ToleranceSheet,
     prices: LoosestPrices,
     warnings: Vec<String>,
 }
@@ -200,23 +215,27 @@ struct LoosestPrices {
 
 impl Loosest {
     fn new(
-        tolerances: Vec<Tolerance>,
+        sheet: ToleranceSheet,
         form: &QuadraticForm,
         limit: Option<f64>,
         (lens, scene): (&Lens, &ToleranceScene),
-    ) -> Self {
-        let prices = price_classes(lens, &scene.lens, &tolerances);
+    ) -> Result<Self, ToleranceError> {
+        let prices = price_classes(lens, &scene.lens, &sheet.errors);
         let by_class = |(tolerance, price): (&Tolerance, &Option<(PriceClass, f64)>)| {
             let half_range = price.map_or(tolerance.half_range, |(_, half_range)| half_range);
             Tolerance { half_range, ..*tolerance }
         };
-        let by_class: Vec<Tolerance> = tolerances.iter().zip(&prices).map(by_class).collect();
-        let good = limit.map(|limit| {
-            [&tolerances, &by_class].map(|tolerances| form_yield(form, tolerances, limit))
-        });
+        let errors = sheet.errors.iter().zip(&prices).map(by_class).collect();
+        let by_class = ToleranceSheet { errors, ..sheet.clone() };
+        let good = match limit {
+            Some(limit) => {
+                Some([form_yield(form, &sheet, limit)?, form_yield(form, &by_class, limit)?])
+            }
+            None => None,
+        };
         let classes = prices.into_iter().map(|price| price.map(|(class, _)| class)).collect();
         let prices = LoosestPrices { classes, good, confirmed: None };
-        Self { tolerances, prices, warnings: Vec::new() }
+        Ok(Self { sheet, prices, warnings: Vec::new() })
     }
 
     /// Confirmed by rays of lenses with these tolerances, of which `held` are not as wide as the form
@@ -224,19 +243,17 @@ impl Loosest {
     fn confirmed(
         mut self,
         form: &QuadraticForm,
-        (scene, sheet): (&ToleranceScene, &ToleranceSheet),
+        scene: &ToleranceScene,
         held: usize,
         (seed, stop): (u64, &AtomicBool),
-    ) -> Result<Self, String> {
+    ) -> Result<Self, ToleranceError> {
         if held > 0 {
             self.warnings.push(format!(
                 "{held} of the loosest tolerances are held at ten times the commercial class, or ten \
                  times what they were: the quadratic model would have them wider"
             ));
         }
-        let sheet = ToleranceSheet { errors: self.tolerances.clone(), ..sheet.clone() };
-        let lenses = real_lenses(scene, &sheet, seed, CONFIRMING, 0, stop);
-        let lenses = lenses.map_err(|why| why.to_string())?;
+        let lenses = real_lenses(scene, &self.sheet, seed, CONFIRMING, 0, stop)?;
         let arrived: Vec<[f64; 2]> = lenses
             .iter()
             .filter_map(|lens| Some([lens.mean_square?[1], form.at(&lens.errors)]))
@@ -290,24 +307,28 @@ impl ToleranceReport {
         sheet: &ToleranceSheet,
         analysis: ToleranceAnalysis,
         loosest: Option<Loosest>,
-    ) -> Self {
+    ) -> Result<Self, ToleranceError> {
         let mut warnings = warnings(&analysis);
         warnings.extend(loosest.iter().flat_map(|loosest| loosest.warnings.clone()));
-        let (loosest, prices) = loosest.map(|l| (l.tolerances, l.prices)).unzip();
-        Self {
+        let (loosest, prices) = loosest.map(|l| (l.sheet.errors, l.prices)).unzip();
+        Ok(Self {
             errors: sheet.errors.len(),
+            correlations: sheet.correlations.len(),
             rays: scene.beam.rays(),
             sampling_error: scene.sampling_error,
             samples: analysis.samples,
             seed: arguments.seed,
             lost: analysis.lost,
+            dark: analysis.dark,
             clipping: analysis.clipping,
-            sensitivities: rows(sheet, &analysis),
+            sensitivities: rows(sheet, &analysis)?,
+            compensators: compensator_rows(&analysis),
+            stopped: analysis.stopped,
             spots: analysis.spots,
             loosest,
             prices,
             warnings,
-        }
+        })
     }
 
     fn csv(&self) -> String {
@@ -327,11 +348,20 @@ impl ToleranceReport {
 }
 
 /// The sensitivities, sorted by their share after refocusing.
-fn rows(sheet: &ToleranceSheet, analysis: &ToleranceAnalysis) -> Vec<SensitivityRow> {
-    let shares = analysis.growth_shares(&sheet.errors);
-    let both = sheet.errors.iter().zip(&analysis.sensitivities).zip(shares);
+fn rows(
+    sheet: &ToleranceSheet,
+    analysis: &ToleranceAnalysis,
+) -> Result<Vec<SensitivityRow>, ToleranceError> {
+    let shares = analysis.growth_shares(sheet)?;
+    let adjusted = &analysis.forms[1];
+    let both = sheet.errors.iter().zip(&analysis.sensitivities).zip(shares).enumerate();
     let mut rows: Vec<SensitivityRow> = both
-        .map(|((tolerance, found), [fixed, refocused])| {
+        .map(|(i, ((tolerance, found), [fixed, refocused]))| {
+            let by_adjusted = Derivatives {
+                value: adjusted.nominal,
+                first: adjusted.first[i],
+                second: adjusted.second[(i, i)],
+            };
             let sigma = tolerance.deviation();
             SensitivityRow {
                 kind: tolerance.error.kind,
@@ -340,12 +370,12 @@ fn rows(sheet: &ToleranceSheet, analysis: &ToleranceAnalysis) -> Vec<Sensitivity
                 half_range: tolerance.half_range,
                 sigma,
                 fixed: ShareOfGrowth { by: found.mean_square(), share: fixed },
-                refocused: ShareOfGrowth { by: found.mean_square_focused(), share: refocused },
+                refocused: ShareOfGrowth { by: by_adjusted, share: refocused },
             }
         })
         .collect();
     rows.sort_by(|a, b| b.refocused.share.total_cmp(&a.refocused.share));
-    rows
+    Ok(rows)
 }
 
 fn warnings(analysis: &ToleranceAnalysis) -> Vec<String> {
@@ -358,6 +388,7 @@ fn warnings(analysis: &ToleranceAnalysis) -> Vec<String> {
             focus_name(spot)
         ));
     }
+    warnings.extend(stop_warning(analysis.stopped));
     for spot in analysis.spots.iter().filter(|spot| !spot.rims_agree) {
         let [change, error] =
             spot.clipping.unwrap_or_default().map(|v| 100.0 * v / spot.form_mean_rms);
@@ -365,6 +396,12 @@ fn warnings(analysis: &ToleranceAnalysis) -> Vec<String> {
             "{}: rims that clip change the mean rms by {change:.2} % ± {error:.2} %; the errors of the \
              means count that, the quantiles and the yield leave it out",
             focus_name(spot)
+        ));
+    }
+    if analysis.dark > 0 {
+        warnings.push(format!(
+            "in {} of {} lenses with rims a field gets no light; what rims change leaves these out",
+            analysis.dark, analysis.with_rims
         ));
     }
     if analysis.lost > 0 {
@@ -388,10 +425,18 @@ impl Display for ToleranceReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(
             f,
-            "{} manufacturing errors, {} rays, {} lenses by Monte Carlo; spots as rms in mm\n",
-            self.errors, self.rays, self.samples
+            "{} manufacturing errors, {}{} rays, {} lenses by Monte Carlo; spots as rms in mm\n",
+            self.errors,
+            match self.correlations {
+                0 => String::new(),
+                1 => "1 correlation, ".to_owned(),
+                count => format!("{count} correlations, "),
+            },
+            self.rays,
+            self.samples
         )?;
         writeln!(f, "{}", self.spot_table())?;
+        writeln!(f, "{}", compensator_table(&self.compensators))?;
         writeln!(f, "{}", self.sensitivity_table())?;
         if let Some([fixed, refocused, light]) = self.clipping.map(|c| c.map(|v| 100.0 * v)) {
             writeln!(
