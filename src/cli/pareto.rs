@@ -39,6 +39,11 @@ pub(super) struct ParetoArgs {
     #[arg(long, value_enum, default_value_t = Scalarization::default())]
     scalarization: Scalarization,
 
+    /// The least and the most light that is asked for, relative to that at the start
+    #[arg(long, num_args = 2, value_names = ["LEAST", "MOST"],
+          default_values_t = ParetoSettings::default().light)]
+    light: Vec<f64>,
+
     /// The optimization method of weighted sums; absent: adam
     #[arg(long, value_enum)]
     method: Option<DescentMethod>,
@@ -144,6 +149,7 @@ impl ParetoArgs {
             method,
             steps: asked.unwrap_or(if few { SECOND_ORDER_STEPS } else { default.steps }),
             pupil,
+            light: [self.light[0], self.light[1]],
             tolerance: self.error.0,
             ..default
         }

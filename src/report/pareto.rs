@@ -29,7 +29,8 @@ pub struct ParetoReport<'a> {
 }
 
 /// The head of the table.
-const HEAD: &str = "spot_mm,spot_error_mm,light_mm2,light_error_mm2,weight_mm2,min_light_mm2,rays,file\n";
+const HEAD: &str =
+    "spot_mm,spot_error_mm,light_mm2,light_error_mm2,weight_mm2,min_light_mm2,rays,file\n";
 /// The width and height of the plot in pixels, and its margins: left, top, right, bottom.
 const SIZE: [u32; 2] = [1000, 720];
 const MARGINS: [f64; 4] = [110.0, 200.0, 40.0, 90.0];

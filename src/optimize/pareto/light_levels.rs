@@ -6,7 +6,10 @@
 //! from the lens of the level before. Every trial that is accepted on the way is a candidate for
 //! the front: those that the merit function tells to be worse than others are not evaluated.
 
-use super::{EVALUATION_TOLERANCE, FIRST, MIN_LIGHT, ParetoPoint, STEPS_PER_SLICE, SweepChain};
+use super::{
+    EVALUATION_TOLERANCE, FIRST, MIN_LIGHT, ParetoPoint, ParetoSettings, STEPS_PER_SLICE,
+    SweepChain,
+};
 use crate::lens::Lens;
 use crate::merit::{
     Goal, LimitTreatment, MAX_STEEPNESS, Merit, MeritError, PupilEdge, Term, WeightedTerm,
@@ -45,15 +48,15 @@ pub(super) struct LightWalk {
 
 /// What stays the same on a walk.
 #[derive(Debug, Clone)]
-pub(super) struct WalkSettings {
+struct WalkSettings {
     /// The goal without the light that is asked for.
-    pub(super) goal: Goal,
+    goal: Goal,
     /// The mean area of the pupils at the start, in mm².
-    pub(super) light: f64,
+    light: f64,
     /// The steps of a level.
-    pub(super) steps: usize,
+    steps: usize,
     /// The relative tolerance of the spot radii.
-    pub(super) tolerance: f64,
+    tolerance: f64,
 }
 
 /// Light that is asked for.
@@ -83,7 +86,7 @@ struct Candidate {
 
 /// The direction in which a walk leaves the light of the start.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum FirstTurn {
+enum FirstTurn {
     /// To the brightest lens, and from there to the darkest one.
     Brighter,
     /// To the darkest lens, and from there to the brightest one.
@@ -91,8 +94,22 @@ pub(super) enum FirstTurn {
 }
 
 impl LightWalk {
+    /// The walks of a sweep from a lens with this mean area of its pupils in mm². A walk up to the
+    /// brightest lens ends in other lenses than one down from it.
+    pub(super) fn all(
+        lens: &Lens,
+        light: f64,
+        settings: &ParetoSettings,
+    ) -> Result<Vec<Self>, MeritError> {
+        let ParetoSettings { steps, tolerance, .. } = *settings;
+        let walk = WalkSettings { goal: spot_goal(lens)?, light, steps, tolerance };
+        let shares = settings.light_shares();
+        let turns = [FirstTurn::Brighter, FirstTurn::Darker].into_iter();
+        turns.map(|turn| Self::new(lens, &walk, &shares, turn)).collect()
+    }
+
     /// A walk from a lens, which is corrected first, through levels in multiples of its light.
-    pub(super) fn new(
+    fn new(
         lens: &Lens,
         settings: &WalkSettings,
         shares: &[f64],
@@ -203,11 +220,14 @@ impl LightWalk {
             }
             let asked = Some(candidate.share * self.settings.light);
             let point = ParetoPoint::evaluate(&candidate.lens, None, EVALUATION_TOLERANCE);
-            if let Ok(point) = point {
+            // A spot without the fields that are dark would seem sharp.
+            if let Ok(point) = point
+                && point.has_light
+            {
                 self.learn([point.spot, point.light]);
+                self.learn(candidate.numbers);
                 found.push(ParetoPoint { min_light: asked, ..point });
             }
-            self.learn(candidate.numbers);
         }
         found
     }
@@ -264,8 +284,7 @@ impl ActiveLevel {
 /// side of it, then all.
 fn levels(shares: &[f64], turn: FirstTurn, steps: usize) -> Vec<Level> {
     let level = |share: &f64| Level { share: *share, steps };
-    let rising = shares.iter().map(level);
-    let falling = shares.iter().rev().map(level);
+    let (rising, falling) = (shares.iter().map(level), shares.iter().rev().map(level));
     let mut walk = vec![Level { share: 1.0, steps: FIRST * steps }];
     match turn {
         FirstTurn::Brighter => {
@@ -286,7 +305,7 @@ fn levels(shares: &[f64], turn: FirstTurn, steps: usize) -> Vec<Level> {
 ///
 /// # Errors
 /// A lens without first-order data.
-pub(super) fn spot_goal(lens: &Lens) -> Result<Goal, MeritError> {
+fn spot_goal(lens: &Lens) -> Result<Goal, MeritError> {
     let default_goal = Goal::default_for(lens)?;
     let mut terms = default_goal.terms;
     terms.retain(|w| !matches!(w.term, Term::Light(_)));

@@ -1,16 +1,11 @@
 //! The Pareto front of sharpness against light: the lenses that cannot gain one without losing the
 //! other.
 //!
-//! For each weight β the objective `L_spot + β L_throughput` (Teh, *Computational Lens Design*, eq.
-//! 3.26) is minimized, starting from the result of the weight before. At the optimum the marginal
-//! ray misses the centroid by √β, so weights are given as this blur. Every lens evaluated on the
-//! way may join the front; dominated lenses are removed.
-//!
-//! A descent gives up light faster than it corrects aberrations, and does not regain light lost at
-//! the start. So a chain of weights begins with a corrected lens: once corrected at the largest
-//! weight, and once with frozen pupils, as without the derivative of light. From either, the
-//! weights fall in one chain and rise in another. The four chains run in parallel, so that the
-//! result does not depend on the number of cores. The caller owns the loop.
+//! A front is found by problems of one number each, every one starting from the result of the one
+//! before: for levels of light the sharpest lens with at least so much, or for weights β the least
+//! `L_spot + β L_throughput` (Teh, *Computational Lens Design*, eq. 3.26). Every lens evaluated on
+//! the way may join the front; dominated lenses are removed. Several chains of problems run in
+//! parallel, so that the result does not depend on the number of cores. The caller owns the loop.
 
 mod light_levels;
 mod weighted_sum;
@@ -22,7 +17,7 @@ use crate::analysis::{AnalysisError, image_quality};
 use crate::lens::{Lens, LensError, ParameterKind, Quantity, add_variables};
 use crate::merit::{Merit, MeritError, PupilEdge, Term, WeightedTerm};
 use crate::pupil::{RayModelError, limited_by_stop};
-use light_levels::{FirstTurn, LightWalk, WalkSettings, spot_goal};
+use light_levels::LightWalk;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::fmt::Debug;
@@ -61,7 +56,7 @@ impl Default for ParetoSettings {
             scalarization: Scalarization::default(),
             method: DescentMethod::Adam,
             steps: LEVEL_STEPS,
-            light: [0.4, 2.0],
+            light: [0.4, 4.0],
             blur: [4e-5, 3.5e-3],
             pupil: PupilEdge::Moving,
             tolerance: 1e-3,
@@ -415,19 +410,8 @@ fn chains(
         let chains = WeightChain::all(lens, &goal, settings).into_iter();
         return Ok(chains.map(|chain| Box::new(chain) as Box<dyn SweepChain>).collect());
     }
-    let walk = WalkSettings {
-        goal: spot_goal(lens)?,
-        light,
-        steps: settings.steps,
-        tolerance: settings.tolerance,
-    };
-    let shares = settings.light_shares();
-    let both = [FirstTurn::Brighter, FirstTurn::Darker];
-    let chain = |turn| {
-        let chain = LightWalk::new(lens, &walk, &shares, turn)?;
-        Ok(Box::new(chain) as Box<dyn SweepChain>)
-    };
-    both.into_iter().map(chain).collect()
+    let walks = LightWalk::all(lens, light, settings)?.into_iter();
+    Ok(walks.map(|walk| Box::new(walk) as Box<dyn SweepChain>).collect())
 }
 
 fn remaining_steps(chains: &[Box<dyn SweepChain>]) -> usize {

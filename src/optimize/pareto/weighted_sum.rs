@@ -1,4 +1,11 @@
-//! The weighted sum of the thesis: `L_spot + β L_throughput` for a sequence of weights β.
+//! The weighted sum `L_spot + β L_throughput` (Teh, *Computational Lens Design*, eq. 3.26) for a
+//! sequence of weights β.
+//!
+//! At the optimum the marginal ray misses the centroid by √β, so weights are given as this blur. A
+//! descent gives up light faster than it corrects aberrations, and does not regain light lost at
+//! the start. So a chain of weights begins with a corrected lens: once corrected at the largest
+//! weight, and once with frozen pupils, as without the derivative of light. From either, the
+//! weights fall in one chain and rise in another.
 
 use super::{
     EVALUATION_TOLERANCE, FIRST, MIN_LIGHT, ParetoPoint, ParetoSettings, STEPS_PER_SLICE,

@@ -74,8 +74,9 @@ pub(super) fn hypervolume_label(ui: &mut Ui, run: &ParetoRun) {
     );
     if let Some(why) = &run.current_pass().rejection {
         let text = RichText::new(capitalize(why)).small();
-        ui.label(text.color(ui.visuals().warn_fg_color))
-            .on_hover_text("A weight whose optimization fails is skipped, and so is light that no lens near has");
+        ui.label(text.color(ui.visuals().warn_fg_color)).on_hover_text(
+            "A weight whose optimization fails is skipped, and so is light that no lens near has",
+        );
     }
 }
 
@@ -103,7 +104,9 @@ pub(super) fn design_text(design: &ParetoPoint, start: &ParetoPoint) -> String {
             format!("found where at least {percent} % of the light was asked for")
         }
         (Some(0.0), _) => "found without a weight for light".to_owned(),
-        (Some(weight), _) => format!("rim blur {} µm", number::format_digits(1e3 * weight.sqrt(), 3)),
+        (Some(weight), _) => {
+            format!("rim blur {} µm", number::format_digits(1e3 * weight.sqrt(), 3))
+        }
     };
     format!(
         "RMS {spot} µm\nlight {light} mm², {percent} % of the start\n{asked}\n{}",
