@@ -17,8 +17,8 @@ use std::ops::ControlFlow;
 /// The lens of the front.
 const LENS: &str = "double_gauss_rudolph_50";
 
-/// The darkest and the brightest design of the front of sharpness against light, as the first part of an
-/// experiment up to a completed fraction.
+/// The darkest and the brightest design of the front of sharpness against light that are as sharp as the lens
+/// at the start, as the first part of an experiment up to a completed fraction.
 pub(super) fn darkest_and_brightest(
     effort: Effort,
     to: f64,
@@ -36,8 +36,11 @@ pub(super) fn darkest_and_brightest(
             break;
         }
     }
-    match sweep.front().points() {
-        [dark, .., bright] => Ok([dark.clone(), bright.clone()]),
+    // Beyond the light that can be had a front goes on with lenses that form no image any more.
+    let is_sharp = |design: &&ParetoPoint| design.spot <= sweep.start.spot;
+    let designs = || sweep.front().points().iter().filter(is_sharp);
+    match [designs().next(), designs().next_back()] {
+        [Some(dark), Some(bright)] if dark != bright => Ok([dark.clone(), bright.clone()]),
         _ => Err(ExperimentError::Failed("no design was found".to_owned())),
     }
 }

@@ -56,7 +56,7 @@ impl Default for ParetoSettings {
             scalarization: Scalarization::default(),
             method: DescentMethod::Adam,
             steps: LEVEL_STEPS,
-            light: [0.4, 4.0],
+            light: [0.4, 2.0],
             blur: [4e-5, 3.5e-3],
             pupil: PupilEdge::Moving,
             tolerance: 1e-3,
