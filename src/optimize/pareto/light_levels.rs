@@ -46,7 +46,7 @@ pub(super) struct LightWalk {
     refused: Option<String>,
 }
 
-/// What stays the same on a walk.
+/// The numbers that stay the same on a walk.
 #[derive(Debug, Clone)]
 struct WalkSettings {
     /// The goal without the light that is asked for.

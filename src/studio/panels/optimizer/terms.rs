@@ -74,8 +74,7 @@ pub(super) const fn hint(term: Term) -> &'static str {
              20 % more"
         }
         Term::MeanLight(_) => {
-            "At least this share of the present light in the mean over the fields: one field may \
-             give away what another one gains"
+            "At least this share of the present light, as the mean over the fields"
         }
         Term::RelativeIllumination { .. } => {
             "The light of a field over that on the axis not below this share: the ratio of the \
