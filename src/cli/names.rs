@@ -3,6 +3,7 @@
 use crate::lens::ParameterKind;
 use crate::measure::Integral;
 use crate::optimize::DescentMethod;
+use crate::optimize::pareto::Scalarization;
 use crate::search::SearchMethod;
 use crate::tolerance::ToleranceGrade;
 use clap::ValueEnum;
@@ -15,6 +16,23 @@ pub(super) fn value_name(value: &impl ValueEnum) -> String {
 
 fn value(name: &'static str, help: &'static str) -> PossibleValue {
     PossibleValue::new(name).help(help)
+}
+
+impl ValueEnum for Scalarization {
+    fn value_variants<'a>() -> &'a [Self] {
+        &[Self::EpsilonConstraint, Self::WeightedSum]
+    }
+
+    fn to_possible_value(&self) -> Option<PossibleValue> {
+        Some(match self {
+            Self::EpsilonConstraint => {
+                value("epsilon-constraint", "The sharpest lens with at least so much light")
+            }
+            Self::WeightedSum => {
+                value("weighted-sum", "The least weighted sum of spot and light (Teh, 3.26)")
+            }
+        })
+    }
 }
 
 impl ValueEnum for DescentMethod {

@@ -384,8 +384,8 @@ impl OptimizeReport {
 }
 
 /// The terms that depend on the transmitted light.
-const LIGHT_TERMS: [&str; 5] =
-    ["throughput", "throughput_loss", "light", "relative_illumination", "f_number"];
+const LIGHT_TERMS: [&str; 6] =
+    ["throughput", "throughput_loss", "light", "mean_light", "relative_illumination", "f_number"];
 
 impl Display for OptimizeReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

@@ -11,7 +11,9 @@ use crate::lens::Lens;
 use crate::measure::time_ms;
 use crate::merit::PupilEdge;
 use crate::optimize::DescentMethod;
-use crate::optimize::pareto::{ParetoError, ParetoPoint, ParetoSettings, ParetoSweep};
+use crate::optimize::pareto::{
+    ParetoError, ParetoPoint, ParetoSettings, ParetoSweep, Scalarization,
+};
 use crate::report::ParetoReport;
 use serde::Serialize;
 use std::fmt::{self, Display};
@@ -29,15 +31,25 @@ pub(super) struct ParetoArgs {
     #[arg(long, value_name = "FOLDER")]
     out: Option<PathBuf>,
 
-    /// The number of weights of light
+    /// The number of levels of light, or of weights
     #[arg(long, default_value_t = ParetoSettings::default().points, value_name = "N")]
     points: usize,
 
-    /// The optimization method
-    #[arg(long, value_enum, default_value_t = DescentMethod::Adam)]
-    method: DescentMethod,
+    /// The problems whose solutions make up the front
+    #[arg(long, value_enum, default_value_t = Scalarization::default())]
+    scalarization: Scalarization,
 
-    /// Maximum number of steps for each weight; absent: 100 for dls, 500 for adam
+    /// The least and the most light that is asked for, relative to that at the start
+    #[arg(long, num_args = 2, value_names = ["LEAST", "MOST"],
+          default_values_t = ParetoSettings::default().light)]
+    light: Vec<f64>,
+
+    /// The optimization method of weighted sums; absent: adam
+    #[arg(long, value_enum)]
+    method: Option<DescentMethod>,
+
+    /// Maximum number of steps for each level of light or weight; absent: 60 for a level, 500 for a
+    /// weight by adam, 100 by other methods
     #[arg(long, value_name = "N")]
     steps: Option<usize>,
 
@@ -53,8 +65,12 @@ pub(super) struct ParetoArgs {
     effects: EffectArgs,
 }
 
+/// The default number of steps of a method with second derivatives for each weight.
+const SECOND_ORDER_STEPS: usize = 100;
+
 impl ParetoArgs {
     pub(super) fn run(&self, output: &Output) -> Result<(), CliError> {
+        self.check_method()?;
         let mut paths = OutputPaths::reading([("the lens", self.lens.path())]);
         paths.folder("--out", self.out.as_deref(), ParetoReport::is_own_file)?;
         let design = DesignEffects::new(&self.effects)?;
@@ -95,18 +111,7 @@ impl ParetoArgs {
         pupil: PupilEdge,
         stop: &AtomicBool,
     ) -> Result<(ParetoSweep, f64), ParetoError> {
-        let steps = match self.method {
-            DescentMethod::TrustRegion | DescentMethod::DampedLeastSquares => 100,
-            DescentMethod::Adam => 500,
-        };
-        let settings = ParetoSettings {
-            points: self.points,
-            method: self.method,
-            steps: self.steps.unwrap_or(steps),
-            pupil,
-            tolerance: self.error.0,
-            ..ParetoSettings::default()
-        };
+        let settings = self.settings(pupil);
         let (sweep, ms) = time_ms(|| -> Result<ParetoSweep, ParetoError> {
             let mut sweep = ParetoSweep::new(lens, &settings)?;
             let bar = progress_bar(0);
@@ -123,6 +128,48 @@ impl ParetoArgs {
             Ok(sweep)
         });
         Ok((sweep?, ms))
+    }
+
+    fn settings(&self, pupil: PupilEdge) -> ParetoSettings {
+        let scalarization = match pupil {
+            PupilEdge::Moving => self.scalarization,
+            PupilEdge::Frozen => Scalarization::WeightedSum,
+        };
+        let default = match scalarization {
+            Scalarization::EpsilonConstraint => ParetoSettings::default(),
+            Scalarization::WeightedSum => ParetoSettings::weighted_sum(),
+        };
+        let method = self.method.unwrap_or(default.method);
+        let is_second_order = method != DescentMethod::Adam;
+        let few = is_second_order && scalarization == Scalarization::WeightedSum;
+        // The steps that are asked for are those of the scalarization that is asked for.
+        let asked = self.steps.filter(|_| scalarization == self.scalarization);
+        ParetoSettings {
+            points: self.points,
+            method,
+            steps: asked.unwrap_or(if few { SECOND_ORDER_STEPS } else { default.steps }),
+            pupil,
+            light: [self.light[0], self.light[1]],
+            tolerance: self.error.0,
+            ..default
+        }
+    }
+
+    /// Refuses a method that would not be used.
+    fn check_method(&self) -> Result<(), CliError> {
+        let is_level = self.scalarization == Scalarization::EpsilonConstraint;
+        let Some(method) = self.method.filter(|method| *method != DescentMethod::TrustRegion)
+        else {
+            return Ok(());
+        };
+        if !is_level {
+            return Ok(());
+        }
+        let text = format!(
+            "--method is {}; expected trust-region, or --scalarization weighted-sum",
+            method.name()
+        );
+        Err(CliError::Input(text))
     }
 }
 
@@ -202,24 +249,21 @@ impl Display for ParetoSweepReport<'_> {
             writeln!(f, "{hypervolume:.4}; {dominated} of them are dominated")?;
         }
         writeln!(f)?;
-        let mut table = TextTable::new(&[
-            "rms spot, um",
-            "error",
-            "light, mm^2",
-            "error",
-            "rim blur, um",
-            "rays",
-        ]);
+        let mut table =
+            TextTable::new(&["rms spot, um", "error", "light, mm^2", "error", "asked for", "rays"]);
         let every = count.div_ceil(MAX_LISTED).max(1);
         for point in std::iter::once(self.start).chain(front.iter().step_by(every)) {
-            let blur =
-                point.weight.map_or("start".to_owned(), |w| format!("{:.1}", 1e3 * w.sqrt()));
+            let asked = match (point.weight, point.min_light) {
+                (Some(weight), _) => format!("{:.1} um at the rim", 1e3 * weight.sqrt()),
+                (None, Some(light)) => format!("{light:.3} mm^2"),
+                (None, None) => "start".to_owned(),
+            };
             table.row([
                 format!("{:.3}", 1e3 * point.spot),
                 format!("{:.0e}", 1e3 * point.spot_error),
                 format!("{:.3}", point.light),
                 format!("{:.0e}", point.light_error),
-                blur,
+                asked,
                 point.rays.to_string(),
             ]);
         }

@@ -1,11 +1,11 @@
 //! Shared parts of figures 3.7 to 3.9: pictures through designs of a front, and their drawing.
 
-use super::pareto_front::{ANGLES, plan};
-use super::sharpness_vs_light::{ProgressSpan, run_sweep, with_field_angles};
-use super::{Effort, ExperimentError, ExperimentResult, ProgressFn, lens};
+use super::pareto_front::ANGLES;
+use super::sharpness_vs_light::with_field_angles;
+use super::{Effort, ExperimentError, ExperimentResult, ProgressFn, lens, report_progress};
 use crate::analysis::irradiance;
 use crate::lens::Lens;
-use crate::optimize::pareto::ParetoPoint;
+use crate::optimize::pareto::{ParetoPoint, ParetoSettings, ParetoSweep};
 use crate::picture::{
     Coloring, ExactRenderer, ExactSettings, ImageFrame, Picture, PictureError, Scene,
     field_diagonal, picture_model,
@@ -17,20 +17,32 @@ use std::ops::ControlFlow;
 /// The lens of the front.
 const LENS: &str = "double_gauss_rudolph_50";
 
-/// The darkest and the brightest design of the front of sharpness against light, as the first part of an
-/// experiment up to a completed fraction.
+/// The darkest and the brightest design of the front of sharpness against light that are as sharp as the lens
+/// at the start, as the first part of an experiment up to a completed fraction.
 pub(super) fn darkest_and_brightest(
     effort: Effort,
     to: f64,
     progress: &mut ProgressFn<'_>,
 ) -> ExperimentResult<[ParetoPoint; 2]> {
     let start = with_field_angles(lens(LENS)?, &ANGLES);
-    let part = ProgressSpan { from: 0.0, to, name: "front of sharpness and light" };
-    let designs = run_sweep(&start, &plan(effort), part, progress)?;
-    let [Some(bright), Some(dark)] = [designs.get(1), designs.last()] else {
-        return Err(ExperimentError::Failed("no design was found".to_owned()));
-    };
-    Ok([dark.clone(), bright.clone()])
+    let settings = ParetoSettings { points: effort.select(14, 6), ..ParetoSettings::default() };
+    let mut sweep = ParetoSweep::new(&start, &settings)?;
+    let mut done = 0.0;
+    loop {
+        report_progress(progress, to * done, "front of sharpness and light")?;
+        let slice = sweep.step();
+        done = slice.done as f64 / slice.total as f64;
+        if slice.finished {
+            break;
+        }
+    }
+    // Beyond the light that can be had a front goes on with lenses that form no image any more.
+    let is_sharp = |design: &&ParetoPoint| design.spot <= sweep.start.spot;
+    let designs = || sweep.front().points().iter().filter(is_sharp);
+    match [designs().next(), designs().next_back()] {
+        [Some(dark), Some(bright)] if dark != bright => Ok([dark.clone(), bright.clone()]),
+        _ => Err(ExperimentError::Failed("no design was found".to_owned())),
+    }
 }
 
 /// A picture with the rays of its lens.

@@ -52,7 +52,7 @@ const PUBLISHED: [PublishedValues; 3] = [
 ];
 
 /// The sweep that finds the designs of a front.
-pub(super) fn plan(effort: Effort) -> WeightSweep {
+fn plan(effort: Effort) -> WeightSweep {
     WeightSweep::new(4.0, effort.select(14, 8), 1200)
 }
 

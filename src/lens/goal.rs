@@ -127,6 +127,9 @@ pub enum Term {
     /// The mean squared shortfall of the area of each pupil from this fraction of its area in the
     /// starting lens.
     Light(f64),
+    /// The squared shortfall of the mean area of the pupils over fields and wavelengths by weight
+    /// from this fraction of that of the starting lens.
+    MeanLight(f64),
     /// The squared shortfall of a field's relative illumination from a minimum: the ratio of its
     /// pupil area to that on the axis, times cos⁴ of the field angle, as for a lens without
     /// distortion.
@@ -210,6 +213,7 @@ impl Term {
             Self::Throughput => "throughput",
             Self::ThroughputLoss(_) => "throughput_loss",
             Self::Light(_) => "light",
+            Self::MeanLight(_) => "mean_light",
             Self::RelativeIllumination { .. } => "relative_illumination",
             Self::FNumber(_) => "f_number",
             Self::Steepness(_) => "steepness",
@@ -247,6 +251,7 @@ impl Term {
             Self::Operand { min, max, .. } => min.into_iter().chain(max).collect(),
             Self::ThroughputLoss(v)
             | Self::Light(v)
+            | Self::MeanLight(v)
             | Self::FNumber(v)
             | Self::Steepness(v)
             | Self::FocalLength(v)
@@ -269,7 +274,8 @@ impl Term {
             | Self::GeometricMtf { .. }
             | Self::Throughput
             | Self::ThroughputLoss(_)
-            | Self::Light(_) => &[Fields, Wavelengths, Zooms],
+            | Self::Light(_)
+            | Self::MeanLight(_) => &[Fields, Wavelengths, Zooms],
             Self::Distortion => &[Fields, Zooms],
             Self::GlassCenter { .. }
             | Self::GlassEdge(_)
@@ -326,6 +332,7 @@ impl Term {
             | Self::Strehl
             | Self::Throughput
             | Self::Light(_)
+            | Self::MeanLight(_)
             | Self::RelativeIllumination { .. }
             | Self::FNumber(_)
             | Self::Distortion
@@ -341,6 +348,7 @@ impl Term {
             Self::ThroughputLoss(_)
             | Self::GeometricMtf { .. }
             | Self::Light(_)
+            | Self::MeanLight(_)
             | Self::RelativeIllumination { .. }
             | Self::FNumber(_)
             | Self::Steepness(_) => 0,

@@ -183,6 +183,7 @@ pub fn default_terms(lens: &Lens, zoom: usize, figures: &LensFigures) -> Vec<Wei
         weighted(Term::Wavefront, (WAVE_BLUR * f_number * PRIMARY).powi(2)),
         weighted(Term::GeometricMtf { frequency: MTF_FREQUENCY, min: MTF_MIN }, spot),
         weighted(Term::Light(1.0), given_away),
+        weighted(Term::MeanLight(1.0), given_away),
         weighted(Term::FNumber(f_number), given_away / f_number.powi(2)),
         weighted(Term::RelativeIllumination { field, min: CORNER_ILLUMINATION }, given_away),
         weighted(Term::ThroughputLoss(light), spot),

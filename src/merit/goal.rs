@@ -15,6 +15,7 @@ impl Term {
             Self::Throughput
                 | Self::ThroughputLoss(_)
                 | Self::Light(_)
+                | Self::MeanLight(_)
                 | Self::RelativeIllumination { .. }
                 | Self::FNumber(_)
         )
@@ -72,8 +73,11 @@ impl Term {
     /// Returns an error if the term asks for light that is undefined for the lens.
     fn check_light(self, lens: &Lens) -> Result<(), MeritError> {
         let refuse = |why| Err(MeritError::DoesNotApply { term: self.name(), why });
-        if let Self::ThroughputLoss(v) | Self::Light(v) | Self::FNumber(v) | Self::Steepness(v) =
-            self
+        if let Self::ThroughputLoss(v)
+        | Self::Light(v)
+        | Self::MeanLight(v)
+        | Self::FNumber(v)
+        | Self::Steepness(v) = self
             && !(v > 0.0)
         {
             return refuse("its target is not positive");

@@ -31,6 +31,7 @@ pub(super) fn add_light_term(
             light_loss(&mean_area(context, scope, sum.level), 1.0 / full, 1.0, sum);
         }
         Term::Light(share) => light_shortfall(context, share, scope, sum),
+        Term::MeanLight(share) => mean_light_shortfall(context, share, scope, sum),
         Term::RelativeIllumination { field, min } => illumination(context, field, min, sum),
         Term::FNumber(target) => f_number(context, target, sum),
         _ => {}
@@ -54,6 +55,33 @@ fn light_shortfall(
             sum.add_residual(pupil.weight / total, 1.0 - pupil.area / least, &slope);
         }
     }
+}
+
+/// Adds the squared shortfall of the mean area of the pupils from a fraction of the initial one,
+/// relative to that fraction.
+fn mean_light_shortfall(
+    context: &EvaluationContext<'_>,
+    share: f64,
+    scope: TermScope,
+    sum: &mut SumOfSquares,
+) {
+    let now = mean_light(context, scope, sum.level);
+    if now.value < share {
+        sum.add_residual(1.0, 1.0 - now.value / share, &(now.slope * (-1.0 / share)));
+    }
+}
+
+/// The mean area of the pupils of a scope relative to that in the starting lens.
+pub(super) fn mean_light(
+    context: &EvaluationContext<'_>,
+    scope: TermScope,
+    level: DerivativeLevel,
+) -> WithGradient {
+    let pupils = context.sampling.pupils.iter().zip(context.initial_areas);
+    let in_scope = pupils.filter(|(pupil, _)| pupil.is_in(scope));
+    let before: f64 = in_scope.map(|(pupil, before)| pupil.weight * before).sum();
+    let pupils = &context.sampling.pupils;
+    weighted_area(context, level, |i| pupils[i].is_in(scope), 1.0 / before)
 }
 
 /// Adds `initial_areas − factor × weighted_area`. It is no square. For least squares it is replaced

@@ -7,7 +7,7 @@
 use super::constraints::{Constraint, ConstraintMargin, smooth_constraints};
 use super::first_order::focal_length_of;
 use super::light::{
-    WithGradient, axial_f_number, light_shares, relative_illumination, total_weight,
+    WithGradient, axial_f_number, light_shares, mean_light, relative_illumination, total_weight,
 };
 use super::operands::operand_values;
 use super::sum::{DerivativeLevel, SumOfSquares};
@@ -197,6 +197,10 @@ impl Merit {
                         let weight = weight * part / (share * share);
                         add(Some(pupil.field), Some(um), now, [Some(share), None], weight);
                     }
+                }
+                Term::MeanLight(share) => {
+                    let now = mean_light(context, weighted.scope, level);
+                    add(None, None, now, [Some(share), None], weight / (share * share));
                 }
                 Term::RelativeIllumination { field, min } => {
                     if let Some(found) = relative_illumination(context, field, level) {

@@ -29,7 +29,8 @@ pub struct ParetoReport<'a> {
 }
 
 /// The head of the table.
-const HEAD: &str = "spot_mm,spot_error_mm,light_mm2,light_error_mm2,weight_mm2,rays,file\n";
+const HEAD: &str =
+    "spot_mm,spot_error_mm,light_mm2,light_error_mm2,weight_mm2,min_light_mm2,rays,file\n";
 /// The width and height of the plot in pixels, and its margins: left, top, right, bottom.
 const SIZE: [u32; 2] = [1000, 720];
 const MARGINS: [f64; 4] = [110.0, 200.0, 40.0, 90.0];
@@ -85,13 +86,15 @@ impl ParetoReport<'_> {
     }
 
     /// The numbers as comma-separated values, a line for every lens: the start, the front, the
-    /// biased front. The lens at the start has no weight.
+    /// biased front. A lens has the weight or the light that
+    /// was asked for, the one at the start neither.
     pub fn table(&self) -> String {
         let mut text = HEAD.to_owned();
         for (file, design) in self.lenses() {
             let ParetoPoint { spot, spot_error, light, light_error, rays, .. } = design;
-            let weight = design.weight.map(|weight| weight.to_string()).unwrap_or_default();
-            let numbers = format!("{spot},{spot_error},{light},{light_error},{weight},{rays}");
+            let number = |value: Option<f64>| value.map(|v| v.to_string()).unwrap_or_default();
+            let asked = [design.weight, design.min_light].map(number).join(",");
+            let numbers = format!("{spot},{spot_error},{light},{light_error},{asked},{rays}");
             text.extend([numbers.as_str(), ",", file.as_str(), "\n"]);
         }
         text

@@ -46,7 +46,8 @@ impl MeritValues {
     fn evaluate(request: &MeritRequest) -> Result<Self, MeritError> {
         let MeritRequest { lens, design, goal, tolerance } = request;
         let mut merit = Merit::new(lens, goal, *tolerance)?;
-        let about_light = goal.terms.iter().any(|asked| matches!(asked.term, Term::Light(_)));
+        let compares = |term| matches!(term, Term::Light(_) | Term::MeanLight(_));
+        let about_light = goal.terms.iter().any(|asked| compares(asked.term));
         if about_light && !Arc::ptr_eq(lens, design) {
             let own = Merit::new(design, goal, *tolerance)?;
             let counts = |merit: &Merit| -> Vec<usize> {

@@ -152,7 +152,7 @@ impl ParetoEngine {
 
     fn start_biased_pass(&mut self) -> Result<(), String> {
         self.state.main.update(&self.sweep);
-        let settings = ParetoSettings { pupil: PupilEdge::Frozen, ..self.state.settings.clone() };
+        let settings = self.state.settings.biased();
         let sweep = ParetoSweep::new(&self.state.lens, &settings).map_err(|why| why.to_string())?;
         self.state.biased = Some(ParetoPass::new(&sweep));
         self.sweep = sweep;

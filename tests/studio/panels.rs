@@ -573,6 +573,7 @@ pub(super) fn fronts(standing: RunStatus) -> SessionView {
     let design = |i: usize| pareto::ParetoPoint {
         lens: Lens { name: format!("lens {i}"), ..double_gauss() },
         weight: Some(1e-6 * i as f64),
+        min_light: None,
         spot: 0.01 * (1 + i) as f64,
         spot_error: 1e-6,
         light: 10.0 * (3 + i) as f64,

@@ -68,6 +68,7 @@ fn found(number: u64, merit: f64) -> Arc<FoundLens> {
     let design = ParetoPoint {
         lens: Lens::clone(&lens),
         weight: None,
+        min_light: None,
         spot: 0.5 * merit,
         spot_error: 1e-6,
         light: 90.0,

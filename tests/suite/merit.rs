@@ -161,6 +161,7 @@ fn every_term_includes_the_motion_of_the_pupil() {
             Term::RelativeIllumination { field: 1, min: 2.0 },
             Term::FNumber(3.0),
             Term::Light(1.01),
+            Term::MeanLight(1.02),
             Term::Steepness(0.1),
             Term::SemiDiameter { min: 5.0, max: 6.0 },
         ];
@@ -246,7 +247,9 @@ fn half_dark() -> Lens {
 #[test]
 fn pupils_without_light_have_a_derivative_towards_light() {
     let lens = half_dark();
-    for term in [Term::Throughput, Term::ThroughputLoss(200.0), Term::Light(0.8)] {
+    let terms =
+        [Term::Throughput, Term::ThroughputLoss(200.0), Term::Light(0.8), Term::MeanLight(1.2)];
+    for term in terms {
         check(&lens, term, PupilEdge::Moving, |quantity| 0.02 * step(quantity));
     }
     let goal = Goal {

@@ -1,9 +1,12 @@
 //! The front of sharpness against light.
 
 use super::merit::bundled;
-use aplanat::lens::{FieldPoint, Lens, Wavelength};
+use aplanat::lens::{FieldPoint, Lens, Parameter, Quantity, Variable, Wavelength};
 use aplanat::merit::{Goal, PupilEdge};
-use aplanat::optimize::pareto::{Front, ParetoError, ParetoPoint, ParetoSettings, ParetoSweep};
+use aplanat::optimize::pareto::{
+    Front, ParetoError, ParetoPoint, ParetoSettings, ParetoSweep, Scalarization,
+};
+use aplanat::pupil::RayModel;
 use aplanat::tolerance::ToleranceGrade;
 
 /// A lens in one colour at three fields.
@@ -16,7 +19,8 @@ fn lens() -> Lens {
 }
 
 fn swept(pupil: PupilEdge) -> ParetoSweep {
-    let settings = ParetoSettings { points: 4, steps: 100, pupil, ..ParetoSettings::default() };
+    let thesis = ParetoSettings::weighted_sum();
+    let settings = ParetoSettings { points: 4, steps: 100, pupil, ..thesis };
     let mut sweep = ParetoSweep::new(&lens(), &settings).unwrap();
     let mut before = 0.0;
     loop {
@@ -62,6 +66,114 @@ fn a_front_is_the_same_on_one_thread_and_on_two() {
     assert_eq!(one, two);
 }
 
+/// The sweep of a lens, and the reasons for which levels were not reached.
+fn finished(lens: &Lens, settings: &ParetoSettings) -> (ParetoSweep, Vec<String>) {
+    let mut sweep = ParetoSweep::new(lens, settings).unwrap();
+    let mut refusals = Vec::new();
+    loop {
+        let slice = sweep.step();
+        assert!(slice.done <= slice.total);
+        refusals.extend(slice.refused);
+        if slice.finished {
+            return (sweep, refusals);
+        }
+    }
+}
+
+/// At every level of light there is a lens, and all keep the focal length and the bounds of the rims.
+#[test]
+fn levels_of_light_are_reached_by_lenses_that_keep_the_limits() {
+    let settings =
+        ParetoSettings { points: 3, steps: 30, light: [0.7, 1.2], ..ParetoSettings::default() };
+    let (sweep, _) = finished(&lens(), &settings);
+    let start = &sweep.start;
+    let focal_length = |lens: &Lens| RayModel::from_lens(lens, 0).unwrap().first_order.efl.unwrap();
+    for share in [0.7, (0.7f64 * 1.2).sqrt(), 1.2] {
+        let has = |p: &&ParetoPoint| p.light >= share * start.light * (1.0 - 1e-4);
+        let best = sweep.front().points().iter().find(has).unwrap();
+        assert!(best.spot < 0.5 * start.spot, "{share}: {} {}", best.spot, start.spot);
+    }
+    for point in sweep.front().points() {
+        let [found, asked] = [&point.lens, &start.lens].map(focal_length);
+        assert!((found - asked).abs() < 1e-5, "{found} {asked}");
+        for variable in &point.lens.variables {
+            let value = point.lens.get(variable.parameter).unwrap();
+            assert!(variable.min.is_none_or(|min| value >= min));
+            assert!(variable.max.is_none_or(|max| value <= max));
+        }
+    }
+}
+
+#[test]
+fn light_that_no_lens_has_is_named_and_the_rest_of_the_front_is_found() {
+    let settings =
+        ParetoSettings { points: 2, steps: 20, light: [0.8, 30.0], ..ParetoSettings::default() };
+    let (sweep, refusals) = finished(&lens(), &settings);
+    assert!(refusals.iter().any(|why| why.contains("mm^2 of light")), "{refusals:?}");
+    let dark = sweep.front().points().iter().find(|p| p.light >= 0.8 * sweep.start.light).unwrap();
+    assert!(dark.spot < 0.5 * sweep.start.spot);
+    assert!(sweep.front().points().iter().all(|p| p.light < 30.0 * sweep.start.light));
+}
+
+/// A field without light at the start: a limit asks for light there.
+#[test]
+fn a_field_that_is_dark_at_the_start_is_lit() {
+    let mut dark = lens();
+    dark.fields = bundled("double_gauss_rudolph_50").fields;
+    dark.surfaces[10].semi_diameter = Some(0.5);
+    let settings = ParetoSettings {
+        points: 1,
+        steps: 40,
+        light: [0.5, 0.5],
+        semi_diameter_factors: [0.25, 30.0],
+        ..ParetoSettings::default()
+    };
+    let (sweep, _) = finished(&dark, &settings);
+    assert!(!sweep.start.has_light);
+    let brightest = sweep.front().points().last().unwrap();
+    assert!(brightest.has_light && brightest.light > sweep.start.light);
+}
+
+#[test]
+fn a_sweep_of_one_variable_and_one_without_room_end() {
+    let mut one = bundled("achromat_ac254_100");
+    for row in &mut one.surfaces {
+        row.semi_diameter = None;
+    }
+    one.surfaces[0].semi_diameter = Some(10.0);
+    let rim = Parameter::new(0, Quantity::SemiDiameter);
+    one.variables = vec![Variable { parameter: rim, min: None, max: None }];
+    let settings =
+        ParetoSettings { points: 3, steps: 10, light: [0.5, 1.0], ..ParetoSettings::default() };
+    let (sweep, refusals) = finished(&one, &settings);
+    assert!(sweep.start.lens.variables.len() == 1 && refusals.is_empty(), "{refusals:?}");
+    // The sharpest lens has more than the least light: its focus is that of a wide pupil.
+    let sharpest = &sweep.front().points()[0];
+    assert!(sharpest.spot < sweep.start.spot);
+    assert!((0.5..1.0).contains(&(sharpest.light / sweep.start.light)), "{}", sharpest.light);
+
+    let mut held = sweep.start.lens.clone();
+    let values: Vec<_> = held.variables.iter().map(|v| held.get(v.parameter)).collect();
+    for (variable, value) in held.variables.iter_mut().zip(values) {
+        (variable.min, variable.max) = (value, value);
+    }
+    let (sweep, refusals) = finished(&held, &ParetoSettings { light: [0.5, 1.4], ..settings });
+    assert_eq!(sweep.front().points().len(), 1);
+    assert!(!refusals.is_empty());
+}
+
+#[test]
+fn a_sweep_with_frozen_pupils_is_one_of_weighted_sums() {
+    let biased = ParetoSettings::default().biased();
+    assert_eq!(biased.scalarization, Scalarization::WeightedSum);
+    assert_eq!(biased, ParetoSettings::weighted_sum().biased());
+    let few = ParetoSettings { points: 1, steps: 1, ..biased };
+    let frozen = ParetoSettings { pupil: PupilEdge::Frozen, ..ParetoSettings::default() };
+    let named = ParetoSettings { points: 1, steps: 1, ..frozen };
+    let [one, other] = [few, named].map(|settings| finished(&lens(), &settings).0);
+    assert_eq!(one.front(), other.front());
+}
+
 #[test]
 fn a_front_drops_dominated_points() {
     let start = ParetoPoint::evaluate(&lens(), None, 1e-4).unwrap();
@@ -82,6 +194,9 @@ fn settings_without_meaning_and_lenses_without_light_are_refused() {
     for settings in [
         ParetoSettings { points: 0, ..ParetoSettings::default() },
         ParetoSettings { steps: 0, ..ParetoSettings::default() },
+        ParetoSettings { light: [0.0, 1.0], ..ParetoSettings::default() },
+        ParetoSettings { light: [1.0, 0.9], ..ParetoSettings::default() },
+        ParetoSettings { light: [1.0, f64::INFINITY], ..ParetoSettings::default() },
         ParetoSettings { blur: [0.0, 1e-3], ..ParetoSettings::default() },
         ParetoSettings { blur: [f64::NAN, 1e-3], ..ParetoSettings::default() },
         ParetoSettings { semi_diameter_factors: [1.1, 1.3], ..ParetoSettings::default() },

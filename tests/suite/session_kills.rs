@@ -69,7 +69,8 @@ fn start(session: &mut Session, run: &str) {
             session.apply(Command::Optimize { method: DescentMethod::Adam, goal });
         }
         "front" => {
-            let settings = ParetoSettings { points: 2, steps: 1_000_000, ..Default::default() };
+            let few = ParetoSettings::weighted_sum();
+            let settings = ParetoSettings { points: 2, steps: 1_000_000, ..few };
             session.apply(Command::StartPareto { settings, compare: false });
         }
         "search" => {

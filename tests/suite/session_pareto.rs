@@ -20,7 +20,7 @@ fn double_gauss() -> Lens {
 /// A sweep that ends soon, or not by itself.
 fn start(steps: usize, compare: bool) -> Command {
     Command::StartPareto {
-        settings: ParetoSettings { points: 2, steps, ..ParetoSettings::default() },
+        settings: ParetoSettings { points: 2, steps, ..ParetoSettings::weighted_sum() },
         compare,
     }
 }

@@ -12,7 +12,7 @@ mod settlement;
 use super::state::OptimizerState;
 use super::{LimitPrice, OptimizationEnd, OptimizationProgress, Optimizer};
 use crate::lens::Lens;
-use crate::merit::{DerivativeLevel, Limit, Merit, MeritError, SumOfSquares, TermValue};
+use crate::merit::{DerivativeLevel, Limit, Merit, MeritError, SumOfSquares, Term, TermValue};
 use crate::solve::{LimitValues, LimitedPoint, LimitedStep, LimitedTrustRegion, SLACK};
 use nalgebra::{DMatrix, DVector};
 
@@ -89,6 +89,24 @@ impl LimitedOptimizer {
         this.best_violation = this.counted_violation();
         this.note_prices();
         Ok(this)
+    }
+
+    /// The merit of the current lens without its limits.
+    pub(super) fn objective(&self) -> f64 {
+        self.state.value
+    }
+
+    /// The mean light of the current lens over that of the first one, the least over the zoom
+    /// positions; `None` if it is not limited.
+    pub(super) fn light_share(&self) -> Option<f64> {
+        let found = self.limits.iter().filter(|limit| is_mean_light(limit));
+        found.map(|limit| limit.margin.value).reduce(f64::min)
+    }
+
+    /// True if the current lens keeps the limits to this violation but for that of the mean light.
+    pub(super) fn is_kept_but_for_light(&self, violation: f64) -> bool {
+        let others = self.limits.iter().filter(|limit| !is_mean_light(limit));
+        others.into_iter().all(|limit| limit.violation() <= violation)
     }
 
     /// The largest violation, 0 up to the slack that is allowed on the way.
@@ -303,6 +321,10 @@ impl LimitedOptimizer {
             self.conflict = self.conflict_here();
         }
     }
+}
+
+fn is_mean_light(limit: &Limit) -> bool {
+    limit.margin.term == Term::MeanLight(0.0).name()
 }
 
 /// The limits with their derivatives by scaled variables.

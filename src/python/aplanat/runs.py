@@ -79,7 +79,7 @@ class pareto(_Run):  # noqa: N801, a verb like the command
     """The front of sharpness against light. `front` has the lenses so far."""
 
     def __init__(self, lens: Lens, **settings: Any) -> None:
-        """The settings are those of `aplanat pareto`: `points=20`, `steps=500`, `method="adam"`."""
+        """The settings are those of `aplanat pareto`: `points=20`, `steps=60`, `light=[0.4, 2.0]`."""
         self._native = _aplanat.ParetoSweep(lens._native, _settings(settings or None))
 
     @property

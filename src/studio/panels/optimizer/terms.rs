@@ -21,6 +21,7 @@ pub(super) const fn title(term: Term) -> &'static str {
         Term::Throughput => "Throughput",
         Term::ThroughputLoss(_) => "Throughput loss",
         Term::Light(_) => "Light",
+        Term::MeanLight(_) => "Mean light",
         Term::RelativeIllumination { .. } => "Relative illumination",
         Term::FNumber(_) => "F-number",
         Term::FocalLength(_) => "Focal length",
@@ -72,6 +73,9 @@ pub(super) const fn hint(term: Term) -> &'static str {
             "At least this share of the present light of each field: 1 retains it, 1.2 asks for \
              20 % more"
         }
+        Term::MeanLight(_) => {
+            "At least this share of the present light, as the mean over the fields"
+        }
         Term::RelativeIllumination { .. } => {
             "The light of a field over that on the axis not below this share: the ratio of the \
              pupils' areas times cos⁴ of the field angle"
@@ -100,7 +104,7 @@ pub(super) const fn hint(term: Term) -> &'static str {
 pub(super) const fn unit(term: Term) -> &'static str {
     match term {
         Term::ThroughputLoss(_) => "mm²",
-        Term::Light(_) => "× now",
+        Term::Light(_) | Term::MeanLight(_) => "× now",
         Term::RelativeIllumination { .. } => "× axis",
         Term::Spot
         | Term::AsBuilt { .. }
@@ -145,6 +149,7 @@ pub(super) fn targets(term: &mut Term) -> Vec<(&'static str, &mut f64)> {
         Term::FocalLength(target) | Term::FNumber(target) => vec![("Target", target)],
         Term::ThroughputLoss(full) => vec![("Full light", full)],
         Term::Light(least)
+        | Term::MeanLight(least)
         | Term::RelativeIllumination { min: least, .. }
         | Term::GlassEdge(least)
         | Term::AirEdge(least)
@@ -164,7 +169,7 @@ pub(super) fn value_text(term: Term, value: f64) -> String {
         Term::Wavefront => format!("{} waves", short(root)),
         Term::Strehl => format!("{} of 1", short(1.0 - value)),
         _ if root < ROUNDING => "satisfied".to_owned(),
-        Term::Light(_) | Term::RelativeIllumination { .. } => {
+        Term::Light(_) | Term::MeanLight(_) | Term::RelativeIllumination { .. } => {
             format!("{} % short", short(100.0 * root))
         }
         Term::FNumber(_) => format!("off by {}", short(root)),
@@ -179,7 +184,7 @@ pub(super) fn value_text(term: Term, value: f64) -> String {
 /// True if the term may ask for more light than the lens has.
 pub(super) fn can_ask_for_more_light(term: Term) -> bool {
     match term {
-        Term::Light(share) => share > 1.0,
+        Term::Light(share) | Term::MeanLight(share) => share > 1.0,
         Term::Throughput | Term::ThroughputLoss(_) | Term::FNumber(_) => true,
         _ => false,
     }

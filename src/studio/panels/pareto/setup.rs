@@ -1,10 +1,10 @@
-//! The settings of a sweep: the number of weights, the steps of each, the range of blur.
+//! The settings of a sweep: levels of light or weights, their number and range, the steps of each.
 
 use std::ops::RangeInclusive;
 
-use egui::{DragValue, Ui};
+use egui::{ComboBox, DragValue, Ui};
 
-use crate::optimize::pareto::ParetoSettings;
+use crate::optimize::pareto::{ParetoSettings, Scalarization};
 use crate::session::{Command, SessionView};
 use crate::studio::panels::design_results;
 use crate::studio::panels::optimizer::method_menu;
@@ -23,23 +23,38 @@ impl ParetoSetup {
     }
 
     pub(super) fn ui(&mut self, ui: &mut Ui, view: &SessionView) {
-        let ParetoSettings { points, steps, blur, method, .. } = &mut self.settings;
+        let before = self.settings.scalarization;
+        let ParetoSettings { points, steps, blur, light, method, scalarization, .. } =
+            &mut self.settings;
         ui.horizontal_wrapped(|ui| {
             ui.spacing_mut().item_spacing.x = 4.0;
-            count(ui, "points", points, 1..=200, "Number of weights between sharpness and light");
-            count(ui, "steps each", steps, 1..=100_000, "Maximum steps for each weight");
-            method_menu(ui, method);
+            scalarization_menu(ui, scalarization);
+            count(ui, "points", points, 1..=200, "Number of levels of light, or of weights");
+            count(ui, "steps each", steps, 1..=100_000, "Maximum steps for each of them");
+            if *scalarization == Scalarization::WeightedSum {
+                method_menu(ui, method);
+            }
         });
+        if *scalarization != before {
+            *steps = default_steps(*scalarization);
+        }
         ui.horizontal_wrapped(|ui| {
             ui.spacing_mut().item_spacing.x = 4.0;
-            ui.weak("Rim blur").on_hover_text(BLUR);
-            blurs(ui, blur, focal_length(view));
+            match scalarization {
+                Scalarization::EpsilonConstraint => lights(ui, light),
+                Scalarization::WeightedSum => {
+                    ui.weak("Rim blur").on_hover_text(BLUR);
+                    blurs(ui, blur, focal_length(view));
+                }
+            }
             ui.add_space(6.0);
             ui.checkbox(&mut self.compare, "Compare with fixed rays").on_hover_text(COMPARE);
         });
     }
 }
 
+const LIGHT: &str = "For levels of light between these, in per cent of that of the lens, the sharpest \
+    lens is found that has at least as much.";
 const BLUR: &str = "The transverse error of a ray at the rim of the pupil at which light and \
     sharpness are worth the same: the root of the weight. A small blur gives sharp lenses, a \
     large one bright lenses.";
@@ -50,6 +65,47 @@ fn count(ui: &mut Ui, name: &str, value: &mut usize, range: RangeInclusive<usize
     let drag = DragValue::new(value).range(range).speed(0.5);
     ui.add(drag).on_hover_text(hint).accessible_name(name);
     ui.weak(name);
+}
+
+fn scalarization_menu(ui: &mut Ui, chosen: &mut Scalarization) {
+    let name = |scalarization: Scalarization| match scalarization {
+        Scalarization::EpsilonConstraint => "Levels of light",
+        Scalarization::WeightedSum => "Weighted sums",
+    };
+    let combo = ComboBox::from_id_salt("scalarization").selected_text(name(*chosen));
+    let combo = combo.show_ui(ui, |ui| {
+        for each in [Scalarization::EpsilonConstraint, Scalarization::WeightedSum] {
+            ui.selectable_value(chosen, each, name(each));
+        }
+    });
+    combo.response.on_hover_text(SCALARIZATION).accessible_name("Scalarization");
+}
+
+const SCALARIZATION: &str = "Levels of light: the sharpest lens with at least so much light, which \
+    spans the range that is asked for. Weighted sums: the least sum of spot and weighted light.";
+
+fn default_steps(scalarization: Scalarization) -> usize {
+    match scalarization {
+        Scalarization::EpsilonConstraint => ParetoSettings::default().steps,
+        Scalarization::WeightedSum => ParetoSettings::weighted_sum().steps,
+    }
+}
+
+/// The least and the most light that is asked for, in per cent of that of the lens.
+fn lights(ui: &mut Ui, [low, high]: &mut [f64; 2]) {
+    ui.weak("Light").on_hover_text(LIGHT);
+    percent(ui, "Least light", low, 0.01..=*high);
+    ui.weak("to");
+    percent(ui, "Most light", high, *low..=100.0);
+}
+
+fn percent(ui: &mut Ui, name: &str, share: &mut f64, range: RangeInclusive<f64>) {
+    let mut value = 100.0 * *share;
+    let drag = DragValue::new(&mut value).range(100.0 * range.start()..=100.0 * range.end());
+    let drag = ui.add(drag.max_decimals(1).suffix(" %")).on_hover_text(LIGHT);
+    if drag.accessible_name(name).changed() {
+        *share = value / 100.0;
+    }
 }
 
 /// The smallest and the largest blur, in µm of this focal length in mm.

@@ -74,8 +74,9 @@ pub(super) fn hypervolume_label(ui: &mut Ui, run: &ParetoRun) {
     );
     if let Some(why) = &run.current_pass().rejection {
         let text = RichText::new(capitalize(why)).small();
-        ui.label(text.color(ui.visuals().warn_fg_color))
-            .on_hover_text("A weight whose optimization fails is skipped");
+        ui.label(text.color(ui.visuals().warn_fg_color)).on_hover_text(
+            "A weight whose optimization fails is skipped, and so is light that no lens near has",
+        );
     }
 }
 
@@ -96,13 +97,19 @@ pub(super) fn design_text(design: &ParetoPoint, start: &ParetoPoint) -> String {
     let spot = number::with_error(1e3 * design.spot, 1e3 * design.spot_error);
     let light = number::with_error(design.light, design.light_error);
     let percent = number::format_digits(100.0 * design.light / start.light, 4);
-    let blur = match design.weight {
-        None => "start of the sweep".to_owned(),
-        Some(0.0) => "found without a weight for light".to_owned(),
-        Some(weight) => format!("rim blur {} µm", number::format_digits(1e3 * weight.sqrt(), 3)),
+    let asked = match (design.weight, design.min_light) {
+        (None, None) => "start of the sweep".to_owned(),
+        (None, Some(light)) => {
+            let percent = number::format_digits(100.0 * light / start.light, 3);
+            format!("found where at least {percent} % of the light was asked for")
+        }
+        (Some(0.0), _) => "found without a weight for light".to_owned(),
+        (Some(weight), _) => {
+            format!("rim blur {} µm", number::format_digits(1e3 * weight.sqrt(), 3))
+        }
     };
     format!(
-        "RMS {spot} µm\nlight {light} mm², {percent} % of the start\n{blur}\n{}",
+        "RMS {spot} µm\nlight {light} mm², {percent} % of the start\n{asked}\n{}",
         counted(design.rays as u64, "ray")
     )
 }
