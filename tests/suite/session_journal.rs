@@ -42,7 +42,7 @@ pub(crate) fn rename(session: &mut Session, name: &str) {
 }
 
 /// The journals as a killed program would leave them at this moment.
-fn killed(session: &Session, journals: &Path, copy: &Path) {
+pub(crate) fn killed(session: &Session, journals: &Path, copy: &Path) {
     session.sync_journal();
     fs::create_dir_all(copy).unwrap();
     for file in fs::read_dir(journals).unwrap().flatten() {

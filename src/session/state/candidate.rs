@@ -149,7 +149,9 @@ impl Session {
     /// Adds a lens to the history as a version after the present one, which stays present.
     fn branch(&mut self, lens: &Arc<Lens>, title: String) {
         let own = self.with_own_variables(lens).map_or_else(|_| Arc::clone(lens), Arc::new);
-        let node = self.history.branch(self.history.present(), own, VersionOrigin::new(title));
+        let proposal = Some(self.proposal.followed(&self.lens, &own));
+        let origin = VersionOrigin { proposal, ..VersionOrigin::new(title) };
+        let node = self.history.branch(self.history.present(), own, origin);
         self.record(JournalEntry::Node(node));
     }
 }

@@ -1,7 +1,6 @@
 //! The entries that a session writes into its journal, and the recovery of a design from one.
 
 use super::Session;
-use super::live_goal::propose_goal;
 use crate::lens::Lens;
 use crate::session::clock::Throttle;
 use crate::session::history::VersionOrigin;
@@ -146,9 +145,17 @@ impl Session {
             return self.continue_journal(file);
         }
         let saved = file.state.saved.and_then(|id| file.state.history.go_to(id));
-        // Another program may have changed the file meanwhile: its history is of another lens.
-        let Some(lens) = saved.filter(|lens| **lens == *self.lens) else { return };
+        let Some(lens) = saved else { return };
+        let opened = (Arc::clone(&self.lens), self.history.clone());
         self.history = file.state.history.clone();
+        self.lens = Arc::clone(&lens);
+        self.proposal = self.proposal_of_history();
+        if !self.is_written_as(&opened.0) {
+            // Another program has changed the file meanwhile: the history is of another lens.
+            (self.lens, self.history) = opened;
+            self.proposal = self.proposal_of_history();
+            return;
+        }
         self.saved = Arc::clone(&lens);
         self.set_design(lens);
         let interrupted = file.state.was_interrupted();
@@ -178,10 +185,6 @@ impl Session {
         let text = recovery_text(&state, &present.lens);
         self.replace_design(Lens::clone(&present.lens), state.path.clone());
         self.history = state.history;
-        // The targets of the merit function that was proposed for the lens as it was opened.
-        if let Some(first) = self.history.nodes().first() {
-            self.proposed_goal = propose_goal(&first.lens);
-        }
         // A lens that was never saved differs from every file.
         self.saved =
             saved.map_or_else(|| Arc::new(crate::lens::blank()), |node| Arc::clone(&node.lens));
