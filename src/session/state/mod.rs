@@ -335,6 +335,11 @@ impl Session {
         &self.lens
     }
 
+    /// The file of the design.
+    pub fn path(&self) -> Option<&Path> {
+        self.path.as_deref()
+    }
+
     /// The newest analyses, maybe of an earlier version.
     pub fn results(&self) -> Option<Arc<AnalysisResults>> {
         self.analysis.latest()
