@@ -36,7 +36,7 @@ pub use color_error::{
 pub use diffraction::{
     DiffractionGate, PointSpread, PupilCurve, PupilFunction, PupilSamples, Strehl,
     diffraction_gate, diffraction_mtf, encircled_energy, point_spread,
-    polychromatic_diffraction_mtf, strehl, through_focus_mtf,
+    polychromatic_diffraction_mtf, polychromatic_diffraction_mtf_unless, strehl, through_focus_mtf,
 };
 pub use distortion::{
     Distortion, FieldCurvature, GridPoint, chief_points, distortion, distortion_grid,
@@ -136,6 +136,9 @@ pub enum AnalysisError {
          infinity, and one paraxial lens without power in front of it"
     )]
     IdealPath,
+    /// The computation was interrupted.
+    #[error("interrupted")]
+    Interrupted,
 }
 
 impl AnalysisError {
@@ -143,9 +146,11 @@ impl AnalysisError {
     pub fn is_loss_of_light(&self) -> bool {
         match self {
             Self::NoLight | Self::NoRays(_) | Self::Unbounded | Self::NoChief => true,
-            Self::FoldedPupil | Self::IrregularPupil | Self::NotSymmetric | Self::IdealPath => {
-                false
-            }
+            Self::FoldedPupil
+            | Self::IrregularPupil
+            | Self::NotSymmetric
+            | Self::IdealPath
+            | Self::Interrupted => false,
         }
     }
 }

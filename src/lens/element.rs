@@ -2,6 +2,7 @@
 
 use super::resolve::index;
 use super::{Lens, LensError, Medium, MediumPlace, Row, glass};
+use serde::{Deserialize, Serialize};
 
 /// The crown glass of new elements.
 const CROWN: &str = "SCHOTT N-BK7";
@@ -11,7 +12,8 @@ const FLINT: &str = "SCHOTT N-SF2";
 const STEEPEST: f64 = 0.9;
 
 /// The form of a new element.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum ElementForm {
     /// One lens of N-BK7.
     Singlet,

@@ -5,9 +5,11 @@ use super::{
     Aperture, FieldKind, FieldPoint, Fields, Lens, LensError, Object, Row, Wavelength, blank,
 };
 use crate::math::format_short;
+use serde::{Deserialize, Serialize};
 
 /// The content of a new lens.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum StartingForm {
     /// A stop and an image plane one focal length behind it, without any glass.
     Empty,
@@ -16,7 +18,8 @@ pub enum StartingForm {
 }
 
 /// The system that a new lens is for.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct StartingLens {
     /// Its content.
     pub form: StartingForm,
@@ -71,6 +74,23 @@ impl StartingLens {
         let um = lens.wavelengths[lens.primary()].um;
         lens.resolve(0, um)?;
         Ok(lens)
+    }
+
+    /// A lens that has grown from one without glass, with the aperture and the fields that were asked
+    /// for. What a person has changed meanwhile stays as it is.
+    #[must_use]
+    pub fn with_asked_focus(&self, lens: &Lens) -> Lens {
+        let (aperture, fields) = (self.aperture, self.fields.clone());
+        let mut without = Lens { aperture, fields, ..blank() };
+        self.replace_focus(&mut without);
+        let mut lens = lens.clone();
+        if lens.aperture == without.aperture {
+            lens.aperture = self.aperture;
+        }
+        if lens.fields == without.fields {
+            lens.fields = self.fields.clone();
+        }
+        lens
     }
 
     /// The distance of the paraxial image from a thin lens in mm.

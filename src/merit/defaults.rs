@@ -86,9 +86,18 @@ impl Goal {
     /// # Errors
     /// A lens without first-order data.
     pub fn default_for(lens: &Lens) -> Result<Self, MeritError> {
+        Self::default_at(lens, None)
+    }
+
+    /// The default goal for a lens that is to have a focal length in mm, by default the one that it
+    /// has. An afocal lens is asked for none.
+    ///
+    /// # Errors
+    /// A lens without first-order data.
+    pub fn default_at(lens: &Lens, target: Option<f64>) -> Result<Self, MeritError> {
         let focal_lengths = focal_lengths(lens)?;
-        let first = focal_lengths[0];
-        let track = lens.total_track();
+        let first = focal_lengths[0].map(|own| target.unwrap_or(own));
+        let [track, _] = focused_gaps(lens);
         let size = first.map_or(track, f64::abs);
         let now = MinimumThickness::measure(lens)?;
         let (glass, air) = (0.012 * size, 0.002 * size);
@@ -131,9 +140,8 @@ impl Goal {
     ) -> Result<Self, MeritError> {
         let focal_lengths = focal_lengths(lens)?;
         let target = target.or(focal_lengths[0]);
-        let track = lens.total_track();
+        let [track, rear] = focused_gaps(lens);
         let size = target.map_or(track, f64::abs);
-        let rear = lens.surfaces.last().map_or(0.0, |row| row.thickness);
         let mut terms = vec![unit(Term::Spot)];
         terms.extend(target.map(focal_length));
         terms.push(in_spots(Term::Light(light), size));
@@ -199,6 +207,22 @@ pub fn default_terms(lens: &Lens, zoom: usize, figures: &LensFigures) -> Vec<Wei
         weighted(Term::Steepness(largest_steepness(lens).max(MAX_STEEPNESS)), given_away),
         unit(Term::SemiDiameter { min: 0.5 * narrowest, max: 1.5 * widest }),
     ]
+}
+
+/// The total track and the last gap of a lens in mm, the image plane where its solve has it: what is
+/// written of the last gap is from before the last edit.
+fn focused_gaps(lens: &Lens) -> [f64; 2] {
+    let written = [lens.total_track(), lens.surfaces.last().map_or(0.0, |row| row.thickness)];
+    if lens.image_solve.is_none() {
+        return written;
+    }
+    let um = lens.wavelengths.get(lens.primary()).map_or(0.0, |wavelength| wavelength.um);
+    let system = lens.resolve(0, um).ok();
+    let solved = system.and_then(|system| {
+        let last = system.surfaces.get(lens.surfaces.len().checked_sub(1)?)?;
+        Some([system.total_track(), last.thickness])
+    });
+    solved.unwrap_or(written)
 }
 
 fn unit(term: Term) -> WeightedTerm {

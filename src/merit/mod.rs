@@ -200,10 +200,7 @@ impl Merit {
             .map(|zoom| RaySampling::new(lens, zoom, self.tolerance, dark, demand.clone()))
             .collect();
         self.samplings = found?;
-        if self.goal.terms.iter().any(|weighted| weighted.term.concerns_rims()) {
-            let rims = constraints::automatic_rims(lens);
-            self.zooms.iter_mut().for_each(|zoom| zoom.set_clear_rims(&rims));
-        }
+        self.follow_rims(lens);
         let of_zoom = |(zoom, sampling): (usize, &RaySampling)| {
             let of_term = |w: &WeightedTerm| MadeTolerances::of_term(lens, zoom, sampling, w.term);
             self.goal.terms.iter().map(of_term).collect()
@@ -211,6 +208,15 @@ impl Merit {
         let tolerances: Result<_, _> = self.samplings.iter().enumerate().map(of_zoom).collect();
         self.tolerances = tolerances?;
         Ok(())
+    }
+
+    /// Takes the edges of glass and air at the automatic rims of a lens of the same structure, which
+    /// are held while the variables change.
+    pub fn follow_rims(&mut self, lens: &Lens) {
+        if self.goal.terms.iter().any(|weighted| weighted.term.concerns_rims()) {
+            let rims = constraints::automatic_rims(lens);
+            self.zooms.iter_mut().for_each(|zoom| zoom.set_clear_rims(&rims));
+        }
     }
 
     /// The areas of the pupils of the lens with which the search began, by zoom position: what

@@ -5,7 +5,7 @@ use super::specified_design::SpecifiedDesignCommand;
 use super::structure_search::StructureSearchCommand;
 use crate::effects::{Effect, EffectOverride};
 use crate::experiments::Effort;
-use crate::lens::{Edit, Lens};
+use crate::lens::{Edit, Lens, StartingLens};
 use crate::merit::Goal;
 use crate::optimize::{DescentMethod, pareto};
 use crate::paraxial::{DragSettings, Handle};
@@ -75,6 +75,9 @@ pub enum Command {
     },
     /// Starts with another lens that has no file yet.
     New(Box<Lens>),
+    /// Begins a lens for a focal length, an aperture and fields, which stay asked for while it has no
+    /// focus yet.
+    Begin(Box<StartingLens>),
     /// Reads a lens from a file of any known format.
     Open(PathBuf),
     /// Writes the lens to its own file, or to this one, which becomes its own.

@@ -282,6 +282,7 @@ fn slopes(
         None => MeritReference::new(&request.before, goal, request.tolerance)?,
     };
     let known = reference.insert(known);
+    let before = known.value;
     let lens = with_all_variables(&request.lens);
     let (merit, sum, terms) = known.evaluate(&lens).map_err(|why| why.to_string())?;
     let values = MeritValues::new(&lens, &merit, terms).map_err(|why| why.to_string())?;
@@ -293,7 +294,7 @@ fn slopes(
     let tangents = tangents(&request.lens, request.zoom, &request.settings);
     let slopes = tangents.into_iter().map(|(handle, tangent)| (handle, along(tangent)));
     let slopes = slopes.filter(|(_, slope)| slope.is_finite()).collect();
-    Ok(MeritSlopes { merit: sum.value, before: known.value, slopes, values })
+    Ok(MeritSlopes { merit: sum.value, before, slopes, values })
 }
 
 impl MeritReference {
@@ -305,13 +306,15 @@ impl MeritReference {
     }
 
     /// The merit of a lens with its derivatives and its terms, by the pupils of the lens before,
-    /// which follow the lens; where they cannot, by new ones.
+    /// which follow the lens; where they cannot, by new ones. Its edges are those at its own rims, as
+    /// they are once the handle is released.
     fn evaluate(
-        &self,
+        &mut self,
         lens: &Lens,
     ) -> Result<(Cow<'_, Merit>, SumOfSquares, Vec<TermValue>), MeritError> {
         let values = self.merit.values(lens);
         if self.merit.lens(&values) == *lens {
+            self.merit.follow_rims(lens);
             let found = self.merit.evaluate_with_terms(&values, DerivativeLevel::Gradient);
             if let Ok((sum, terms)) = found {
                 return Ok((Cow::Borrowed(&self.merit), sum, terms));

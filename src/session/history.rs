@@ -3,6 +3,7 @@
 
 use super::clock::unix_seconds;
 use super::optimization::OptimizationCurve;
+use super::proposal::MeritProposal;
 use crate::lens::{EditedCell, Lens};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -38,6 +39,9 @@ pub struct HistoryNode {
     /// The course of the optimization that led to it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub curve: Option<Arc<OptimizationCurve>>,
+    /// The merit function that is proposed for it; `None` for that of the version before.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub proposal: Option<Arc<MeritProposal>>,
 }
 
 /// The origin of a version.
@@ -51,6 +55,8 @@ pub(super) struct VersionOrigin {
     pub(super) seed: Option<u64>,
     /// The course of the optimization.
     pub(super) curve: Option<Arc<OptimizationCurve>>,
+    /// The merit function that is proposed for it; `None` for that of the version before.
+    pub(super) proposal: Option<Arc<MeritProposal>>,
 }
 
 impl VersionOrigin {
@@ -73,8 +79,8 @@ pub(super) struct DesignHistory {
 }
 
 impl DesignHistory {
-    /// The history of a lens that was just opened.
-    pub(super) fn new(lens: Arc<Lens>) -> Self {
+    /// The history of a lens that was just opened, with the merit function that is proposed for it.
+    pub(super) fn new(lens: Arc<Lens>, proposal: Option<Arc<MeritProposal>>) -> Self {
         let first = HistoryNode {
             id: 0,
             parent: None,
@@ -85,6 +91,7 @@ impl DesignHistory {
             seed: None,
             lens,
             curve: None,
+            proposal,
         };
         Self::from_first(Arc::new(first))
     }
@@ -127,7 +134,8 @@ impl DesignHistory {
         self.edited = origin.cell;
         let now = self.node(self.present).filter(|node| merges && node.parent.is_some()).cloned();
         if let Some(now) = now {
-            let merged = HistoryNode { lens, merit: None, ..HistoryNode::clone(&now) };
+            let proposal = origin.proposal.or_else(|| now.proposal.clone());
+            let merged = HistoryNode { lens, merit: None, proposal, ..HistoryNode::clone(&now) };
             return self.insert(merged);
         }
         let node = self.branch(self.present, lens, origin);
@@ -143,11 +151,13 @@ impl DesignHistory {
         lens: Arc<Lens>,
         origin: VersionOrigin,
     ) -> Arc<HistoryNode> {
-        let VersionOrigin { title, seed, curve, .. } = origin;
+        let VersionOrigin { title, seed, curve, proposal, .. } = origin;
         let id = self.nodes.last().map_or(0, |node| node.id + 1);
         let (name, merit, time) = (None, None, unix_seconds());
         let parent = Some(parent);
-        self.insert(HistoryNode { id, parent, title, name, merit, time, seed, lens, curve })
+        let node =
+            HistoryNode { id, parent, title, name, merit, time, seed, lens, curve, proposal };
+        self.insert(node)
     }
 
     /// Adds a version, or replaces the one of its number.
@@ -217,6 +227,12 @@ impl DesignHistory {
         std::iter::successors(Some(self.present), |id| self.parent(*id)).collect()
     }
 
+    /// The merit function that is proposed for the present version, or for the nearest one before it
+    /// that has one.
+    pub(super) fn proposal(&self) -> Option<Arc<MeritProposal>> {
+        self.ancestry().into_iter().find_map(|id| self.node(id)?.proposal.clone())
+    }
+
     /// The number of edits between two versions.
     pub(super) fn distance(&self, from: u64) -> usize {
         let ours = self.ancestry();
@@ -264,7 +280,7 @@ mod tests {
     use crate::lens::blank;
 
     fn grown(count: usize) -> DesignHistory {
-        let mut history = DesignHistory::new(Arc::new(blank()));
+        let mut history = DesignHistory::new(Arc::new(blank()), None);
         for i in 0..count {
             history.push(Arc::new(blank()), VersionOrigin::new(format!("edit {i}")));
         }

@@ -22,6 +22,7 @@ mod journal;
 mod live_merit;
 mod optimization;
 mod pareto;
+mod proposal;
 mod run;
 mod saved_runs;
 mod score;
@@ -50,6 +51,7 @@ pub use optimization::{
     OptimizerFactory,
 };
 pub use pareto::{ParetoPass, ParetoRun, ParetoView};
+pub use proposal::MeritProposal;
 pub use run::{RunId, RunKind, RunStatus, RunView};
 pub use score::ScoredLens;
 pub use slot::Slot;

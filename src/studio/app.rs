@@ -1,6 +1,7 @@
 //! The studio: one session, the panels that show it, the menu, and the dialogs.
 
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 
 use eframe::{App, Storage};
 use egui::{
@@ -35,6 +36,9 @@ const DOCK: &str = "dock";
 
 /// The key under which the files that were opened last are stored.
 const RECENT: &str = "recent files";
+/// The time after which the arrangement of the panels and the recent files are stored, so that a program
+/// that is killed loses little of them.
+const SETTINGS_INTERVAL: Duration = Duration::from_secs(3);
 /// The number of words of the name of a lens in that of its file.
 const NAME_WORDS: usize = 6;
 /// The number of those files.
@@ -244,8 +248,13 @@ impl Studio {
     /// Keeps a message that does not fit into the status bar for the dialog.
     fn on_events(&mut self, events: Vec<SessionEvent>) {
         for event in events {
-            if let SessionEvent::Opened(path) = &event {
-                self.remember(path);
+            match &event {
+                SessionEvent::Opened(path) => self.remember(path),
+                // Pictures, reports and copies in other formats are no files of the design.
+                SessionEvent::Saved(path) if self.session.path() == Some(path.as_path()) => {
+                    self.remember(path);
+                }
+                _ => {}
             }
             if let SessionEvent::Message(message) = event
                 && (message.text.lines().count() > 1 || message.severity == Severity::Error)
@@ -331,6 +340,11 @@ impl App for Studio {
 
     fn ui(&mut self, ui: &mut Ui, _frame: &mut eframe::Frame) {
         Self::ui(self, ui);
+        // Settings are stored in a frame, and without input there is none.
+        let is_changed = ui.input(|input| !input.events.is_empty());
+        if is_changed && self.persistence == Persistence::Enabled {
+            ui.ctx().request_repaint_after(SETTINGS_INTERVAL.saturating_mul(2));
+        }
     }
 
     fn save(&mut self, storage: &mut dyn Storage) {
@@ -338,6 +352,10 @@ impl App for Studio {
             eframe::set_value(storage, DOCK, self.dock.tree());
             eframe::set_value(storage, RECENT, &self.recent);
         }
+    }
+
+    fn auto_save_interval(&self) -> Duration {
+        SETTINGS_INTERVAL
     }
 
     fn persist_egui_memory(&self) -> bool {

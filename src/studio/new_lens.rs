@@ -226,6 +226,11 @@ impl NewLensDialog {
 
     /// The lens that the numbers stand for.
     fn lens(&self) -> Result<Lens, String> {
+        self.starting_lens().lens().map_err(|why| capitalize(&why.to_string()))
+    }
+
+    /// The numbers.
+    fn starting_lens(&self) -> StartingLens {
         let value = self.aperture_value;
         let aperture = match self.aperture {
             ApertureChoice::FNumber => Aperture::FNumber(value),
@@ -236,15 +241,14 @@ impl NewLensDialog {
         let object =
             if self.at_infinity { Object::Infinity } else { Object::Finite(self.distance) };
         let presets = &WavelengthPreset::ALL;
-        let starting = StartingLens {
+        StartingLens {
             form: self.form,
             focal_length: self.focal_length,
             aperture,
             fields: Fields::equal_area(self.field, self.field_max, self.field_count),
             wavelengths: presets[self.wavelengths.min(presets.len() - 1)].wavelengths(),
             object,
-        };
-        starting.lens().map_err(|why| capitalize(&why.to_string()))
+        }
     }
 
     /// Shows the buttons, and above them why the lens cannot be made; true if it was.
@@ -258,8 +262,8 @@ impl NewLensDialog {
             let fill = ui.visuals().selection.bg_fill;
             let create = Button::new(RichText::new("Create").strong()).fill(fill);
             let pressed = ui.add_enabled(lens.is_ok(), create).clicked() || is_confirmed(ui);
-            if let (true, Ok(lens)) = (pressed, &lens) {
-                actions.push(Command::New(Box::new(lens.clone())));
+            if pressed && lens.is_ok() {
+                actions.push(Command::Begin(Box::new(self.starting_lens())));
                 done = true;
             }
             if ui.button("Cancel").clicked() {

@@ -26,7 +26,9 @@ impl PendingAction {
     fn discards(&self) -> &'static [UnsavedDocument] {
         match self {
             Self::Quit => &[UnsavedDocument::Lens, UnsavedDocument::Field],
-            Self::Run(Command::New(_) | Command::Open(_)) => &[UnsavedDocument::Lens],
+            Self::Run(Command::New(_) | Command::Begin(_) | Command::Open(_)) => {
+                &[UnsavedDocument::Lens]
+            }
             Self::Run(Command::Grin(
                 GrinCommand::OpenFile(_)
                 | GrinCommand::OpenBuiltin(_)

@@ -31,6 +31,7 @@ fn version(id: u64, parent: Option<u64>, title: &str, merit: f64, lens: &Arc<Len
         seed: None,
         lens: Arc::clone(lens),
         curve: None,
+        proposal: None,
     }
 }
 

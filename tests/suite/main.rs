@@ -60,6 +60,7 @@ mod search_cli;
 mod semi_diameters;
 mod sensor;
 mod session;
+mod session_begin;
 mod session_design;
 mod session_drag;
 mod session_grin;

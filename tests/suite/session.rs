@@ -1018,3 +1018,22 @@ fn a_selected_surface_is_shown_while_the_lens_has_it() {
         assert_eq!(session.view().selected, shown, "{chosen:?}");
     }
 }
+
+/// The contrast takes longer than all else: what is known of the lens is not computed again because
+/// another panel is opened.
+#[test]
+fn another_panel_does_not_compute_the_contrast_again() {
+    let mut session = session(lens("singlet_la1131"));
+    session.apply(Command::SetTolerance(1e-2));
+    session.apply(Command::Show(PanelSetting::Contrasts(true)));
+    let contrasts = |view: &SessionView| {
+        let results = view.results.clone().filter(|results| results.version == view.version)?;
+        let analyses = results.analyses.as_ref().unwrap();
+        analyses.contrasts.as_ref().map(|contrasts| (contrasts.ms, analyses.fans.is_some()))
+    };
+    wait(&mut session, "the contrast", |view, _| contrasts(view).is_some());
+    let (ms, _) = contrasts(&session.view()).unwrap();
+    session.apply(Command::Show(PanelSetting::Fans(true)));
+    wait(&mut session, "the contrast beside the fans", |view, _| contrasts(view).is_some());
+    assert_eq!(contrasts(&session.view()), Some((ms, true)), "the time of the first computation");
+}

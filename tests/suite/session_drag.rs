@@ -3,7 +3,7 @@
 
 use aplanat::files::{bundled_lenses, json};
 use aplanat::lens::{Edit, Lens};
-use aplanat::merit::{Goal, Merit, TermValue};
+use aplanat::merit::{Goal, Merit, Term, TermValue, WeightedTerm};
 use aplanat::paraxial::{DragSettings, FirstOrderLock, Handle};
 use aplanat::session::{Command, MeritSlopes, Session};
 use std::thread;
@@ -178,4 +178,32 @@ fn the_merit_of_a_dragged_lens_comes_with_its_slopes() {
     let fresh = spot(&merit.terms(&merit.values(session.lens())).unwrap());
     let followed = spot(&found.values.terms);
     assert!((followed / fresh - 1.0).abs() < 5e-3, "{followed} and {fresh}");
+}
+
+/// Rims that nobody has fixed follow the dragged lens, and the edges at them: the merit is the same once
+/// the handle is released.
+#[test]
+fn the_edges_of_a_dragged_lens_are_those_at_its_own_rims() {
+    let mut lens = bundled("cooke_triplet_100_f27");
+    lens.surfaces.iter_mut().for_each(|row| row.semi_diameter = None);
+    let terms = [Term::Spot, Term::GlassEdge(20.0)];
+    let terms = terms.map(|term| WeightedTerm::new(term, 1.0)).to_vec();
+    lens.merit = Some(Goal { terms, ..Goal::default_for(&lens).unwrap() });
+    let mut session = Session::new(lens.clone(), || {}).unwrap();
+    slopes(&mut session);
+    let edges = |lens: &Lens, of: &Lens| {
+        let mut merit = Merit::new(lens, lens.merit.as_ref().unwrap(), 1e-2).unwrap();
+        merit.follow_rims(of);
+        let terms = merit.terms(&merit.values(lens)).unwrap();
+        terms.iter().find(|term| term.term == "glass_edge").unwrap().value
+    };
+    let handle = Handle::Vertex(3);
+    let start = handle.value(&lens, 0).unwrap();
+    session.apply(drag(handle, start + 4.0));
+    let found = slopes(&mut session);
+    let held = found.values.terms.iter().find(|term| term.term == "glass_edge").unwrap().value;
+    let dragged = Lens::clone(session.lens());
+    let [own, outdated] = [&dragged, &lens].map(|of| edges(&dragged, of));
+    assert!((held / own - 1.0).abs() < 1e-9, "{held} {own}");
+    assert!((outdated / own - 1.0).abs() > 1e-3, "the two are told apart: {outdated} {own}");
 }

@@ -42,7 +42,7 @@ pub(crate) fn rename(session: &mut Session, name: &str) {
 }
 
 /// The journals as a killed program would leave them at this moment.
-fn killed(session: &Session, journals: &Path, copy: &Path) {
+pub(crate) fn killed(session: &Session, journals: &Path, copy: &Path) {
     session.sync_journal();
     fs::create_dir_all(copy).unwrap();
     for file in fs::read_dir(journals).unwrap().flatten() {
@@ -101,7 +101,7 @@ fn a_killed_design_reopens_where_it_was() {
 }
 
 #[test]
-fn a_closed_or_saved_design_leaves_nothing_to_recover() {
+fn a_saved_design_reopens_as_it_was_and_a_closed_one_does_not() {
     let folder = Folder::new("journal-closed");
     let mut session = journaled(blank(), &folder.journals());
     rename(&mut session, "given up");
@@ -114,7 +114,12 @@ fn a_closed_or_saved_design_leaves_nothing_to_recover() {
     session.apply(Command::Save(Some(file.clone())));
     let copy = folder.0.join("copy");
     killed(&session, &folder.journals(), &copy);
-    assert_eq!(reopened(&copy).1, None, "it is saved");
+    let (again, text) = reopened(&copy);
+    let text = text.unwrap();
+    assert!(text.starts_with("reopened kept as it was saved, with the 2 versions"), "{text}");
+    assert_eq!(text.lines().count(), 1);
+    assert_eq!((again.lens().name.as_str(), again.view().path), ("kept", Some(file.clone())));
+    assert!(!again.is_dirty(), "it is as it was saved");
     rename(&mut session, "changed");
     let changed = folder.0.join("changed");
     killed(&session, &folder.journals(), &changed);
@@ -244,4 +249,30 @@ fn a_killed_design_that_followed_another_reopens_without_it() {
     assert!(text.unwrap().starts_with("recovered second with 1 unsaved change"));
     assert_eq!((again.lens(), again.view().path), (session.lens(), None));
     assert_eq!(again.view().history.len(), session.view().history.len());
+}
+
+/// A lens that was begun and saved without any edit is where the work was, and so is one whose file has
+/// changed since.
+#[test]
+fn a_lens_that_was_only_saved_reopens_unless_another_one_was_used_later() {
+    let folder = Folder::new("journal-saved");
+    let mut session = journaled(blank(), &folder.journals());
+    let lens = Lens { name: "begun".to_owned(), ..blank() };
+    session.apply(Command::New(Box::new(lens.clone())));
+    let file = folder.0.join("begun.json");
+    session.apply(Command::Save(Some(file.clone())));
+    let [copy, second] = ["copy", "second"].map(|name| folder.0.join(name));
+    killed(&session, &folder.journals(), &copy);
+    killed(&session, &folder.journals(), &second);
+    let (again, text) = reopened(&copy);
+    assert!(text.unwrap().starts_with("reopened begun as it was saved"));
+    assert_eq!(again.view().path, Some(file.clone()));
+    drop(again);
+    assert_eq!(reopened(&copy).1, None, "it was closed in order");
+    let other = Lens { notes: "by another program".to_owned(), ..lens };
+    files::save(&other, &file).unwrap();
+    let (again, text) = reopened(&second);
+    let text = text.unwrap();
+    assert!(text.contains("begun.json contains now") && text.lines().count() == 1, "{text}");
+    assert!(again.is_dirty() && again.lens().notes.is_empty());
 }

@@ -25,18 +25,39 @@ pub fn diffraction_mtf(
     frequencies: &[f64],
     accuracy: Accuracy,
 ) -> Result<MtfCurve, AnalysisError> {
+    diffraction_mtf_unless(model, field, wavelength, frequencies, accuracy, &never)
+}
+
+/// A test that is asked often whether a computation is to end early.
+type Interruption<'a> = dyn Fn() -> bool + Sync + 'a;
+
+fn never() -> bool {
+    false
+}
+
+fn diffraction_mtf_unless(
+    model: &RayModel,
+    field: FieldPoint,
+    wavelength: usize,
+    frequencies: &[f64],
+    accuracy: Accuracy,
+    interrupted: &Interruption<'_>,
+) -> Result<MtfCurve, AnalysisError> {
+    if interrupted() {
+        return Err(AnalysisError::Interrupted);
+    }
     let region = lit_region(model, field, wavelength)?;
     let sphere = ReferenceSphere::for_region(&region)?;
     let function = PupilFunction::of_region(&region, &sphere, accuracy.tolerance)?;
     let origin = origin(model, field, &region)?;
-    let mut values = function.values(frequencies, 0.0, accuracy.tolerance)?;
+    let mut values = function.values(frequencies, 0.0, accuracy.tolerance, interrupted)?;
     if accuracy.tolerance < BY_RAYS && function.transfer_error() > accuracy.tolerance {
         refine(&mut values, frequencies, &function, (&region, &sphere), accuracy.tolerance)?;
     }
     if is_uncertain(&sphere, &region) {
         let tolerance = accuracy.tolerance.max(COARSE);
         let wide = PupilFunction::of_region(&region, &sphere.doubled(), tolerance)?;
-        let other = wide.values(frequencies, 0.0, tolerance)?;
+        let other = wide.values(frequencies, 0.0, tolerance, interrupted)?;
         for (value, other) in values.iter_mut().flatten().zip(other.iter().flatten()) {
             value.modulus.error += (value.re - other.re).hypot(value.im - other.im);
         }
@@ -119,8 +140,12 @@ impl PupilFunction {
         frequencies: &[f64],
         defocus: f64,
         tolerance: f64,
+        interrupted: &Interruption<'_>,
     ) -> Result<Vec<[TransferValue; 2]>, AnalysisError> {
         let at = |nu: &f64| {
+            if interrupted() {
+                return Err(AnalysisError::Interrupted);
+            }
             let tangential = self.transfer([0.0, *nu], defocus, tolerance)?;
             Ok([tangential, self.transfer([*nu, 0.0], defocus, tolerance)?])
         };
@@ -139,9 +164,25 @@ pub fn polychromatic_diffraction_mtf(
     frequencies: &[f64],
     accuracy: Accuracy,
 ) -> Result<MtfCurve, AnalysisError> {
-    sum_wavelengths(model, |wavelength| {
-        diffraction_mtf(model, field, wavelength, frequencies, accuracy)
-    })
+    polychromatic_diffraction_mtf_unless(model, field, frequencies, accuracy, never)
+}
+
+/// The same unless it is interrupted, which is asked for before every frequency of every wavelength.
+///
+/// # Errors
+/// The same, and [`AnalysisError::Interrupted`].
+pub fn polychromatic_diffraction_mtf_unless(
+    model: &RayModel,
+    field: FieldPoint,
+    frequencies: &[f64],
+    accuracy: Accuracy,
+    interrupted: impl Fn() -> bool + Sync,
+) -> Result<MtfCurve, AnalysisError> {
+    let whole = sum_wavelengths(model, |wavelength| {
+        diffraction_mtf_unless(model, field, wavelength, frequencies, accuracy, &interrupted)
+    });
+    // A sum over a part of the wavelengths is of no use.
+    if interrupted() { Err(AnalysisError::Interrupted) } else { whole }
 }
 
 /// The contrast by diffraction of a field at one wavelength and frequency against displacements of the
@@ -162,7 +203,7 @@ pub fn through_focus_mtf(
     let sphere = ReferenceSphere::for_region(&region)?;
     let function = PupilFunction::of_region(&region, &sphere, accuracy.tolerance)?;
     let at = |defocus: &f64| {
-        let values = function.values(&[frequency], *defocus, accuracy.tolerance)?;
+        let values = function.values(&[frequency], *defocus, accuracy.tolerance, &never)?;
         let [tangential, sagittal] = values[0];
         Ok(MtfPoint { frequency: *defocus, tangential, sagittal })
     };

@@ -28,7 +28,7 @@ mod strehl;
 
 pub use contrast::{
     DiffractionGate, diffraction_gate, diffraction_mtf, polychromatic_diffraction_mtf,
-    through_focus_mtf,
+    polychromatic_diffraction_mtf_unless, through_focus_mtf,
 };
 pub use encircled::encircled_energy;
 pub use outline::PupilCurve;

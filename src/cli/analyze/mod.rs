@@ -452,7 +452,7 @@ impl AnalysisRun {
     }
 
     /// The error that no field has a result.
-    fn refuse(&self, reason: &AnalysisError) -> CliError {
+    fn refuse(&self, reason: AnalysisError) -> CliError {
         if reason.is_loss_of_light() {
             return self.no_light(reason);
         }
@@ -460,7 +460,7 @@ impl AnalysisRun {
     }
 
     /// The error that there is no light, with the surface where most of it is lost.
-    fn no_light(&self, reason: &AnalysisError) -> CliError {
+    fn no_light(&self, reason: AnalysisError) -> CliError {
         let mut ends: BTreeMap<Fate, usize> = BTreeMap::new();
         let mut fates = Fates::default();
         let color = &self.model.channels[self.model.primary];
@@ -484,10 +484,10 @@ impl AnalysisRun {
     }
 }
 
-fn common_reason<T>(fields: &[AtField<T>]) -> Option<&AnalysisError> {
+fn common_reason<T>(fields: &[AtField<T>]) -> Option<AnalysisError> {
     let reason = |field: &AtField<T>| matches!(field.outcome, FieldOutcome::Dark { .. });
     match fields.first().map(|field| &field.outcome) {
-        Some(FieldOutcome::Dark { dark }) if fields.iter().all(reason) => Some(dark),
+        Some(FieldOutcome::Dark { dark }) if fields.iter().all(reason) => Some(*dark),
         _ => None,
     }
 }
@@ -521,13 +521,13 @@ struct AtField<T> {
 enum FieldOutcome<T> {
     Transmitted(T),
     Dark {
-        #[serde(serialize_with = "as_text")]
+        #[serde(serialize_with = "collect_text")]
         dark: AnalysisError,
     },
 }
 
-fn as_text<S: Serializer>(error: &AnalysisError, serializer: S) -> Result<S::Ok, S::Error> {
-    serializer.collect_str(error)
+fn collect_text<S: Serializer>(text: impl Display, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.collect_str(&text)
 }
 
 impl<T> AtField<T> {

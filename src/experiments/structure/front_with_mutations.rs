@@ -44,7 +44,7 @@ fn run(effort: Effort, progress: &mut ProgressFn<'_>) -> ExperimentResult {
     let settings = ParetoSettings {
         points: effort.select(8, 2),
         steps: effort.select(400, 25),
-        ..ParetoSettings::default()
+        ..ParetoSettings::weighted_sum()
     };
     let sweep = run_sweep(&start, &settings, progress)?;
     let chosen = select_designs(sweep.front(), effort.select(8, 2));

@@ -1,7 +1,7 @@
 //! The contrast of all fields against spatial frequency.
 
 use crate::analysis::{
-    self, AnalysisError, Estimate, MtfCurve, Spot, Wavefront, polychromatic_diffraction_mtf,
+    self, AnalysisError, Estimate, MtfCurve, Spot, Wavefront, polychromatic_diffraction_mtf_unless,
     polychromatic_geometric_mtf,
 };
 use crate::lens::FieldPoint;
@@ -40,25 +40,29 @@ const REACH: f64 = 2.0;
 const LARGEST_ERROR: f64 = 1e-3;
 
 /// The contrast of all fields up to a frequency that the sharpest one still shows; `None` if it was
-/// interrupted between two fields.
+/// interrupted.
 pub(super) fn field_contrasts(
     model: &RayModel,
     spots: &[Result<Spot, AnalysisError>],
     tolerance: f64,
-    interrupted: impl Fn() -> bool,
+    interrupted: impl Fn() -> bool + Sync,
 ) -> Option<FieldContrasts> {
     let highest = highest_frequency(model, spots);
     let step = highest / FREQUENCIES as f64;
     let frequencies: Vec<f64> = (0..=FREQUENCIES).map(|i| step * i as f64).collect();
     let accuracy = Accuracy { tolerance: tolerance.min(LARGEST_ERROR), ..Accuracy::default() };
-    let contrast =
-        |field: &FieldPoint| time(|| field_contrast(model, *field, &frequencies, accuracy));
+    let contrast = |field: &FieldPoint| {
+        time(|| field_contrast(model, *field, &frequencies, accuracy, &interrupted))
+    };
     let mut fields = Vec::with_capacity(model.fields.len());
     for together in model.fields.chunks(rayon::current_num_threads()) {
         if interrupted() {
             return None;
         }
         fields.par_extend(together.par_iter().map(contrast));
+    }
+    if interrupted() {
+        return None;
     }
     let cutoff = cutoff(model);
     let limit = |nu: &f64| cutoff.map(|cutoff| analysis::perfect_contrast(nu / cutoff));
@@ -70,9 +74,10 @@ fn field_contrast(
     field: FieldPoint,
     frequencies: &[f64],
     accuracy: Accuracy,
+    interrupted: &(impl Fn() -> bool + Sync),
 ) -> Result<FieldContrast, AnalysisError> {
     let wavefront = analysis::wavefront(model, field, model.primary, accuracy);
-    match polychromatic_diffraction_mtf(model, field, frequencies, accuracy) {
+    match polychromatic_diffraction_mtf_unless(model, field, frequencies, accuracy, interrupted) {
         Ok(curve) => Ok(FieldContrast { curve, without_diffraction: None, wavefront }),
         Err(why @ (AnalysisError::FoldedPupil | AnalysisError::IrregularPupil)) => {
             let curve = polychromatic_geometric_mtf(model, field, frequencies, accuracy)?;
@@ -104,4 +109,26 @@ fn highest_frequency(model: &RayModel, spots: &[Result<Spot, AnalysisError>]) ->
         .map(|digit| digit * power)
         .find(|nu| *nu <= most)
         .unwrap_or(most)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::files;
+    use std::sync::atomic::{AtomicUsize, Ordering};
+
+    /// A field takes long where the image is blurred: the next version of the design does not wait for
+    /// its end.
+    #[test]
+    fn contrast_is_interrupted_within_a_field() {
+        let bundled = files::bundled_lenses().iter().find(|lens| lens.name == "singlet_la1131");
+        let lens = files::json::read(bundled.map_or("", |lens| lens.text), "singlet").unwrap();
+        let model = RayModel::from_lens(&lens, 0).unwrap();
+        let asked = AtomicUsize::new(0);
+        let chunks = model.fields.len().div_ceil(rayon::current_num_threads());
+        let found = field_contrasts(&model, &[], 1e-2, || {
+            asked.fetch_add(1, Ordering::SeqCst) > chunks + 2
+        });
+        assert!(found.is_none(), "it was asked {} times", asked.load(Ordering::SeqCst));
+    }
 }

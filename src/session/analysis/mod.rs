@@ -1,6 +1,7 @@
 //! The analyses of all panels, computed in the background for the latest lens only.
 //!
-//! A newer request replaces one that has not begun, and interrupts one that has between two analyses.
+//! A newer request replaces one that has not begun, and interrupts one that has between two analyses,
+//! the contrast also between two frequencies.
 //! Results carry the version of the design that they belong to and the time of each analysis.
 
 mod as_built;
@@ -128,9 +129,11 @@ pub(super) fn spawn_analysis(
     wake: impl Fn() + Send + 'static,
 ) -> io::Result<AnalysisWorker> {
     let mut published = None;
+    let mut known = None;
     AnalysisWorker::spawn("analysis", wake, move |request, output| {
         let results = answer(request, output, &mut published);
-        let slower = |results| publish_prediction(publish_contrasts(results, output), output);
+        let mut slower =
+            |results| publish_prediction(publish_contrasts(results, output, &mut known), output);
         let refined = results.map(|results| refine(slower(results), output));
         if let (Some(results), EffectTiming::Measured) = (refined, timing) {
             measure(results, output);
@@ -158,21 +161,56 @@ fn answer(
     Some(results)
 }
 
-/// Publishes the results once more with the contrast of the fields if a panel shows it, unless another
-/// request interrupts that: where the image is blurred it takes longer than all else.
-fn publish_contrasts(mut results: AnalysisResults, output: &AnalysisOutput) -> AnalysisResults {
-    let Ok(analyses) = &mut results.analyses else { return results };
-    let AnalysisSettings { contrasts, tolerance, .. } = results.settings;
-    if contrasts && !output.is_interrupted() {
-        let (model, spots) = (&analyses.ray_model.value, &analyses.spots.value);
-        let interrupted = || output.is_interrupted();
-        let found = time(|| contrast::field_contrasts(model, spots, tolerance, interrupted));
-        if let Some(value) = found.value {
-            analyses.contrasts = Some(Timed { value, ms: found.ms });
-            output.publish(results.clone());
-        }
+/// The contrast of a lens with the settings on which it depends.
+struct KnownContrasts {
+    lens: Arc<Lens>,
+    settings: AnalysisSettings,
+    contrasts: Timed<FieldContrasts>,
+}
+
+impl KnownContrasts {
+    /// True if these are the contrasts that results need.
+    fn serve(&self, results: &AnalysisResults) -> bool {
+        let (own, other) = (&self.settings, &results.settings);
+        Arc::ptr_eq(&self.lens, &results.lens)
+            && own.zoom == other.zoom
+            && own.tolerance == other.tolerance
+            && own.overrides == other.overrides
     }
+}
+
+/// Publishes the results once more with the contrast of the fields if a panel shows it, unless another
+/// request interrupts that: where the image is blurred it takes longer than all else. What is known from
+/// before is not computed again because another panel is opened.
+fn publish_contrasts(
+    mut results: AnalysisResults,
+    output: &AnalysisOutput,
+    known: &mut Option<KnownContrasts>,
+) -> AnalysisResults {
+    if !results.settings.contrasts {
+        return results;
+    }
+    let mut found = known.take().filter(|known| known.serve(&results));
+    if found.is_none() && !output.is_interrupted() {
+        found = compute_contrasts(&results, output);
+    }
+    if let (Ok(analyses), Some(found)) = (&mut results.analyses, &found) {
+        analyses.contrasts = Some(found.contrasts.clone());
+        output.publish(results.clone());
+    }
+    *known = found;
     results
+}
+
+/// The contrast of the fields of a lens that was analysed; `None` if it was interrupted.
+fn compute_contrasts(results: &AnalysisResults, output: &AnalysisOutput) -> Option<KnownContrasts> {
+    let analyses = results.analyses.as_ref().ok()?;
+    let (model, spots) = (&analyses.ray_model.value, &analyses.spots.value);
+    let (lens, settings) = (Arc::clone(&results.lens), results.settings.clone());
+    let interrupted = output.interruption();
+    let found = time(|| contrast::field_contrasts(model, spots, settings.tolerance, interrupted));
+    let contrasts = Timed { value: found.value?, ms: found.ms };
+    Some(KnownContrasts { lens, settings, contrasts })
 }
 
 /// Publishes the results once more with the lens as it is made if a panel shows it and no request

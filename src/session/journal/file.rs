@@ -62,6 +62,14 @@ impl JournalFile {
         paths.filter_map(|path| Self::open(&path)).filter(|j| j.state.needs_recovery()).collect()
     }
 
+    /// The newest journal in a folder if it is of a file whose program ended without closing it, saved
+    /// or not: somebody was at work on it. Older ones of saved designs tell of nothing that is missed.
+    pub(in crate::session) fn interrupted_last(folder: &Path) -> Option<Self> {
+        let newest = journals(folder).into_iter().next()?;
+        let is_open = |state: &JournalState| state.was_interrupted() && state.path.is_some();
+        Self::open(&newest).filter(|journal| is_open(&journal.state))
+    }
+
     /// Appends an entry. Returns the number of versions that were forgotten since the file became
     /// too long.
     pub(super) fn append(&mut self, entry: &JournalEntry) -> io::Result<usize> {
@@ -203,7 +211,7 @@ mod tests {
         drop(fs::remove_dir_all(&folder));
         // Versions of 0.7 MB, of which half of the room holds some eleven.
         let lens = Arc::new(Lens { notes: "n".repeat(700_000), ..blank() });
-        let mut history = DesignHistory::new(Arc::clone(&lens));
+        let mut history = DesignHistory::new(Arc::clone(&lens), None);
         for i in 0..12 {
             history.push(Arc::clone(&lens), VersionOrigin::new(format!("edit {i}")));
         }

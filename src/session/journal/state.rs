@@ -121,7 +121,7 @@ mod tests {
 
     #[test]
     fn what_is_held_is_in_the_lines() {
-        let history = DesignHistory::new(Arc::new(blank()));
+        let history = DesignHistory::new(Arc::new(blank()), None);
         let mut state = JournalState::begin(None, history);
         let count = state.entries().len();
         let locks = vec![FirstOrderLock::FocalLength];

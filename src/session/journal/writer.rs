@@ -184,7 +184,10 @@ impl JournalWriter {
 
     fn try_append(&mut self, entry: &JournalEntry) -> io::Result<usize> {
         if self.file.is_none() {
-            let matters = matches!(entry, JournalEntry::Node(_) | JournalEntry::Run(_));
+            let matters = matches!(
+                entry,
+                JournalEntry::Node(_) | JournalEntry::Run(_) | JournalEntry::Saved { .. }
+            );
             let Some(state) = &mut self.begun else { return Ok(0) };
             if !matters {
                 state.apply(entry);

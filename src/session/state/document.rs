@@ -1,17 +1,18 @@
 //! The document of a session: edits, undo, and its files.
 
-use super::live_goal::propose_goal;
 use super::{Session, SessionEvent};
 use crate::files;
-use crate::lens::{Edit, ElementEdit, Lens, apply_edit};
+use crate::lens::{Aperture, Edit, ElementEdit, Lens, StartingLens, apply_edit};
+use crate::math::format_short;
 use crate::picture::{BitDepth, ToneCurve, encode_png};
-use crate::pupil::limited_by_stop;
+use crate::pupil::{RayModel, limited_by_stop};
 use crate::report::{
     PaperKind, ReportSettings, drawing_bytes, has_extension, report_bytes, solids_file,
 };
 use crate::session::ScenePicture;
 use crate::session::history::{DesignHistory, VersionOrigin};
 use crate::session::journal::JournalEntry;
+use crate::session::proposal::MeritProposal;
 use crate::session::view::Severity;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -21,13 +22,10 @@ impl Session {
         match apply_edit(&self.lens, edit) {
             Ok(lens) if lens == *self.lens => {}
             Ok(lens) => {
-                let keeps_targets = lens.zoom.len() == self.lens.zoom.len()
-                    && !matches!(edit, Edit::Scale(_) | Edit::Replace(_));
-                if !keeps_targets {
-                    self.proposed_goal = propose_goal(&lens);
-                }
-                let origin =
-                    VersionOrigin { cell: edit.cell(), ..VersionOrigin::new(edit.title()) };
+                let is_other = matches!(edit, Edit::Scale(_) | Edit::Replace(_));
+                let proposal = is_other.then(|| MeritProposal::of(&lens));
+                let cell = edit.cell();
+                let origin = VersionOrigin { cell, proposal, ..VersionOrigin::new(edit.title()) };
                 self.add_version(Arc::new(lens), origin);
             }
             Err(why) => self.post(Severity::Warning, why.to_string()),
@@ -50,7 +48,8 @@ impl Session {
             apply_edit(&self.lens, &Edit::Scale(factor)).map_err(|why| why.to_string())
         });
         let title = format!("scale to the focal length {focal_length} mm");
-        self.accept(scaled, VersionOrigin::new(title));
+        let proposal = scaled.as_ref().ok().map(MeritProposal::of);
+        self.accept(scaled, VersionOrigin { proposal, ..VersionOrigin::new(title) });
     }
 
     pub(super) fn insert_lens(&mut self, path: &Path, at: usize) {
@@ -71,10 +70,22 @@ impl Session {
     }
 
     fn add_version(&mut self, lens: Arc<Lens>, origin: VersionOrigin) {
+        let given = origin.proposal.clone();
+        let mut proposal = given.unwrap_or_else(|| self.proposal.followed(&self.lens, &lens));
+        let focused = proposal.asked.as_ref().and_then(|asked| with_asked_focus(&lens, asked));
+        let told = focused.as_ref().map(focus_text);
+        if focused.is_some() {
+            proposal = Arc::new(proposal.fulfilled());
+        }
+        let lens = focused.map_or(lens, Arc::new);
+        let origin = VersionOrigin { proposal: Some(proposal), ..origin };
         let node = self.history.push(Arc::clone(&lens), origin);
         self.record(JournalEntry::Node(node));
         self.record_present();
         self.set_design(lens);
+        if let Some(told) = told {
+            self.post(Severity::Note, told);
+        }
     }
 
     pub(super) fn undo(&mut self) {
@@ -113,25 +124,47 @@ impl Session {
 
     /// Makes another lens the design.
     pub(super) fn set_design(&mut self, lens: Arc<Lens>) {
+        // While a handle is dragged, the lens is no version yet.
+        self.proposal = self.proposal_of_history();
         self.settings.zoom = self.settings.zoom.min(lens.zoom_positions() - 1);
         self.lens = lens;
         self.preview_lens = None;
         self.invalidate();
     }
 
+    /// Begins a lens that has no file yet.
+    pub(super) fn begin(&mut self, starting: &StartingLens) {
+        match starting.lens() {
+            Ok(lens) => {
+                let proposal = MeritProposal::of_new(&lens, starting);
+                self.replace_by_version(lens, None, proposal);
+            }
+            Err(why) => self.post(Severity::Warning, why.to_string()),
+        }
+    }
+
     /// Replaces the design by another one with an undo history of its own.
     pub(super) fn replace_design(&mut self, lens: Lens, path: Option<PathBuf>) {
+        let proposal = MeritProposal::of(&lens);
+        self.replace_by_version(lens, path, proposal);
+    }
+
+    fn replace_by_version(
+        &mut self,
+        lens: Lens,
+        path: Option<PathBuf>,
+        proposal: Arc<MeritProposal>,
+    ) {
         if let Err(why) = lens.check() {
             return self.post(Severity::Error, why.to_string());
         }
         self.optimization.clear();
         self.pareto.clear();
         let lens = Arc::new(lens);
-        self.history = DesignHistory::new(Arc::clone(&lens));
+        self.history = DesignHistory::new(Arc::clone(&lens), Some(proposal));
         self.saved = Arc::clone(&lens);
         self.path = path;
         self.begin_journal();
-        self.proposed_goal = propose_goal(&lens);
         self.settings.zoom = 0;
         self.settings.pupil_wavelength = None;
         self.selected = None;
@@ -160,7 +193,7 @@ impl Session {
             let text = "the lens has no file yet; choose where to save it";
             return self.post(Severity::Warning, text);
         };
-        match files::save(&self.lens, &path) {
+        match files::save(&self.lens_for(&path), &path) {
             Ok(saved) if saved.format == files::LensFormat::Native => {
                 self.saved = Arc::clone(&self.lens);
                 self.path = Some(path.clone());
@@ -175,8 +208,13 @@ impl Session {
         }
     }
 
+    /// The design as it is written to a file. Foreign formats have no place for a merit function.
+    fn lens_for(&self, path: &Path) -> Arc<Lens> {
+        if has_extension(path, "json") { self.lens_with_merit() } else { Arc::clone(&self.lens) }
+    }
+
     pub(super) fn export(&mut self, path: &Path) {
-        match files::save(&self.lens, path) {
+        match files::save(&self.lens_for(path), path) {
             Ok(saved) => self.post_export(path, saved),
             Err(why) => self.post(Severity::Error, why.to_string()),
         }
@@ -259,4 +297,24 @@ impl Session {
         self.post(Severity::Note, parts.into_iter().flatten().collect::<Vec<_>>().join("\n"));
         self.events.push(SessionEvent::Saved(path.to_owned()));
     }
+}
+
+/// The lens with the aperture and the fields that were asked for before it had a focus; `None` if it
+/// has no real focus yet, or nothing of it changes.
+fn with_asked_focus(lens: &Arc<Lens>, asked: &StartingLens) -> Option<Lens> {
+    let focused = asked.with_asked_focus(lens);
+    if focused == **lens || focused.check().is_err() {
+        return None;
+    }
+    let model = RayModel::from_lens(&focused, 0).ok()?;
+    model.first_order.efl.is_some_and(|focal_length| focal_length > 0.0).then_some(focused)
+}
+
+/// The line that tells that a lens has the aperture and the fields that were asked for.
+fn focus_text(lens: &Lens) -> String {
+    let beam = match lens.aperture {
+        Aperture::FNumber(number) => format!("aperture f/{}", format_short(number)),
+        _ => "image height".to_owned(),
+    };
+    format!("the lens has a focus now, and with it the {beam} that was asked for")
 }

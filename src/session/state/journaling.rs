@@ -1,7 +1,7 @@
 //! The entries that a session writes into its journal, and the recovery of a design from one.
 
 use super::Session;
-use super::live_goal::propose_goal;
+use crate::files;
 use crate::lens::Lens;
 use crate::session::clock::Throttle;
 use crate::session::history::VersionOrigin;
@@ -55,12 +55,14 @@ impl Session {
         Ok(())
     }
 
-    /// Reopens the design whose program ended last without closing it, as it was then. Returns true
-    /// if there was one.
+    /// Reopens the design whose program ended last without closing it, as it was then, whether it was
+    /// saved or not. Returns true if there was one.
     pub fn recover(&mut self) -> bool {
         let Some(journal) = &self.journaling.journal else { return false };
+        // An open journal is locked, so that it is not among the others.
+        let last = JournalFile::interrupted_last(journal.folder());
         let mut unfinished = JournalFile::unfinished(journal.folder()).into_iter();
-        let Some(file) = unfinished.next() else { return false };
+        let Some(file) = last.or_else(|| unfinished.next()) else { return false };
         let others = unfinished.count();
         self.continue_journal(file);
         if others > 0 {
@@ -146,9 +148,17 @@ impl Session {
             return self.continue_journal(file);
         }
         let saved = file.state.saved.and_then(|id| file.state.history.go_to(id));
-        // Another program may have changed the file meanwhile: its history is of another lens.
-        let Some(lens) = saved.filter(|lens| **lens == *self.lens) else { return };
+        let Some(lens) = saved else { return };
+        let opened = (Arc::clone(&self.lens), self.history.clone());
         self.history = file.state.history.clone();
+        self.lens = Arc::clone(&lens);
+        self.proposal = self.proposal_of_history();
+        if !self.is_written_as(&opened.0) {
+            // Another program has changed the file meanwhile: the history is of another lens.
+            (self.lens, self.history) = opened;
+            self.proposal = self.proposal_of_history();
+            return;
+        }
         self.saved = Arc::clone(&lens);
         self.set_design(lens);
         let interrupted = file.state.was_interrupted();
@@ -160,13 +170,7 @@ impl Session {
         }
         self.record_present();
         if interrupted {
-            let (name, count) = (&self.lens.name, self.history.nodes().len());
-            let versions = if count == 1 { "version" } else { "versions" };
-            let text = format!(
-                "reopened {name} as it was saved, with the {count} {versions} of its history: the \
-                 program ended without closing it"
-            );
-            self.post(Severity::Note, text);
+            self.post(Severity::Note, reopening_text(&self.lens.name, self.history.nodes().len()));
         }
     }
 
@@ -175,23 +179,33 @@ impl Session {
         let state = file.state.clone();
         let Some(present) = state.history.node(state.history.present()).cloned() else { return };
         let saved = state.saved.and_then(|id| state.history.node(id)).cloned();
-        let text = recovery_text(&state, &present.lens);
+        let mut text = if state.needs_recovery() {
+            recovery_text(&state, &present.lens)
+        } else {
+            reopening_text(&present.lens.name, state.history.nodes().len())
+        };
         self.replace_design(Lens::clone(&present.lens), state.path.clone());
         self.history = state.history;
-        // The targets of the merit function that was proposed for the lens as it was opened.
-        if let Some(first) = self.history.nodes().first() {
-            self.proposed_goal = propose_goal(&first.lens);
-        }
         // A lens that was never saved differs from every file.
         self.saved =
             saved.map_or_else(|| Arc::new(crate::lens::blank()), |node| Arc::clone(&node.lens));
         self.set_design(Arc::clone(&present.lens));
+        if let Some(path) = self.path.clone().filter(|_| !self.is_dirty() && !self.is_in_file()) {
+            self.saved = Arc::new(crate::lens::blank());
+            text = format!("{text}; it is not what {} contains now", path.display());
+        }
         self.drag.hold(state.locks);
         if let Some(journal) = &self.journaling.journal {
             journal.go_on_with(file);
         }
         state.runs.iter().for_each(|run| self.keep_interrupted(run));
         self.post(Severity::Note, text);
+    }
+
+    /// True if the file of the design contains it.
+    fn is_in_file(&self) -> bool {
+        let opened = self.path.as_ref().and_then(|path| files::open(path).ok());
+        opened.is_some_and(|opened| self.is_written_as(&opened.lens))
     }
 
     /// Adds the lenses of an interrupted run to the history.
@@ -254,6 +268,15 @@ impl Session {
         }
         found
     }
+}
+
+/// The line that tells that a design was reopened which was saved before its program ended.
+fn reopening_text(name: &str, versions: usize) -> String {
+    let noun = if versions == 1 { "version" } else { "versions" };
+    format!(
+        "reopened {name} as it was saved, with the {versions} {noun} of its history: the program \
+         ended without closing it"
+    )
 }
 
 /// The line that tells what was recovered.

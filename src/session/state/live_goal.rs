@@ -5,13 +5,42 @@ use crate::lens::Lens;
 use crate::merit::Goal;
 use crate::session::MeritReport;
 use crate::session::journal::JournalEntry;
+use crate::session::proposal::MeritProposal;
 use std::sync::Arc;
 
 impl Session {
     /// The merit function of the design: its own, or else the proposed one.
     pub(super) fn goal(&self) -> Option<Arc<Goal>> {
         let own = self.lens.merit.as_ref().map(|goal| Arc::new(goal.clone()));
-        own.or_else(|| self.proposed_goal.clone())
+        own.or_else(|| self.proposal.goal.clone())
+    }
+
+    /// The design as it is written: with the merit function that is shown, unless a reader of the file
+    /// would propose the same one.
+    pub(super) fn lens_with_merit(&self) -> Arc<Lens> {
+        if self.lens.merit.is_some() {
+            return Arc::clone(&self.lens);
+        }
+        let shown = self.proposal.goal.as_deref().filter(|goal| goal.check(&self.lens).is_ok());
+        match shown {
+            Some(goal) if Goal::default_for(&self.lens).as_ref() != Ok(goal) => {
+                let merit = Some(goal.clone());
+                Arc::new(Lens { merit, ..Lens::clone(&self.lens) })
+            }
+            _ => Arc::clone(&self.lens),
+        }
+    }
+
+    /// True if the lens of a file is the design, which may have no merit function of its own where
+    /// the file has the one that was proposed.
+    pub(super) fn is_written_as(&self, file: &Lens) -> bool {
+        *self.lens == *file || *self.lens_with_merit() == *file
+    }
+
+    /// The merit function that is proposed for the present version of the history.
+    pub(super) fn proposal_of_history(&self) -> Arc<MeritProposal> {
+        let of_first = || self.history.nodes().first().map(|first| MeritProposal::of(&first.lens));
+        self.history.proposal().or_else(of_first).unwrap_or_default()
     }
 
     /// The newest merit, of the lens that is dragged if one is.
@@ -35,9 +64,4 @@ impl Session {
             }
         }
     }
-}
-
-/// The merit function that is proposed for a lens without one.
-pub(super) fn propose_goal(lens: &Lens) -> Option<Arc<Goal>> {
-    Goal::default_for(lens).ok().map(Arc::new)
 }

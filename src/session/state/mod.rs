@@ -3,6 +3,7 @@
 mod candidate;
 mod document;
 mod drag;
+mod found_lens;
 mod journaling;
 mod live_goal;
 mod runs;
@@ -19,6 +20,7 @@ use super::history::DesignHistory;
 use super::live_merit::{LiveMerit, MeritReport, MeritRequest};
 use super::optimization::{OptimizationEngine, OptimizationRequest, OptimizerFactory};
 use super::pareto::ParetoState;
+use super::proposal::MeritProposal;
 use super::run::{BackgroundRun, RunId, RunKind, RunStatus};
 use super::score::DesignScore;
 use super::specified_design::SpecifiedDesignState;
@@ -30,7 +32,6 @@ use crate::lens::Lens;
 use crate::merit::Goal;
 use crate::optimize;
 use journaling::Journaling;
-use live_goal::propose_goal;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -65,8 +66,8 @@ pub struct Session {
     path: Option<PathBuf>,
     /// The lens as it is in its file.
     saved: Arc<Lens>,
-    /// The merit function of a design that has none of its own; `None` if none can be proposed.
-    proposed_goal: Option<Arc<Goal>>,
+    /// The merit function of a design that has none of its own.
+    proposal: Arc<MeritProposal>,
     settings: AnalysisSettings,
     /// The surface that every panel highlights.
     selected: Option<usize>,
@@ -150,16 +151,16 @@ impl Session {
     ) -> io::Result<Self> {
         lens.check().map_err(io::Error::other)?;
         let lens = Arc::new(lens);
-        let proposed_goal = propose_goal(&lens);
+        let proposal = MeritProposal::of(&lens);
         let optimize = move |request, _: &_| OptimizationEngine::start(&factory, request);
         let session = Self {
             saved: Arc::clone(&lens),
-            history: DesignHistory::new(Arc::clone(&lens)),
+            history: DesignHistory::new(Arc::clone(&lens), Some(Arc::clone(&proposal))),
             journaling: Journaling::default(),
             lens,
             version: 1,
             path: None,
-            proposed_goal,
+            proposal,
             settings: AnalysisSettings::default(),
             selected: None,
             messages: Arc::default(),
@@ -216,6 +217,7 @@ impl Session {
             Command::NameVersion { id, name } => self.name_version(id, &name),
             Command::Rewind { version, step } => self.rewind(version, step),
             Command::New(lens) => self.replace_design(*lens, None),
+            Command::Begin(starting) => self.begin(&starting),
             Command::Open(path) => self.open(&path),
             Command::Save(path) => self.save(path),
             Command::Export(path) => self.export(&path),
@@ -332,6 +334,11 @@ impl Session {
     /// The design.
     pub fn lens(&self) -> &Arc<Lens> {
         &self.lens
+    }
+
+    /// The file of the design.
+    pub fn path(&self) -> Option<&Path> {
+        self.path.as_deref()
     }
 
     /// The newest analyses, maybe of an earlier version.
