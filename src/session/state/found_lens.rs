@@ -47,7 +47,7 @@ impl Session {
         }
         let stop = aperture_text(found.aperture);
         let own = self.with_aperture_of_design(&found);
-        let areas = [&own, &found, design].map(|lens| self.pupil_areas(lens));
+        let areas = [&own, &found, design].map(pupil_areas);
         let [Some(own_areas), Some(found_areas), Some(design_areas)] = areas else {
             let text = format!("the aperture is the {stop} now, as in the search");
             return (found, Some(text));
@@ -93,12 +93,12 @@ impl Session {
         let merit = Merit::new(lens, self.goal()?.as_ref(), COARSE).ok()?;
         merit.value(&merit.values(lens)).ok().filter(|value| value.is_finite())
     }
+}
 
-    /// The areas of the pupils of a lens; `None` if it has no merit.
-    fn pupil_areas(&self, lens: &Lens) -> Option<Vec<f64>> {
-        let goal: Goal = Goal::default_for(lens).ok()?;
-        Some(Merit::new(lens, &goal, COARSE).ok()?.initial_light().concat())
-    }
+/// The areas of the pupils of a lens; `None` if it has no merit.
+fn pupil_areas(lens: &Lens) -> Option<Vec<f64>> {
+    let goal: Goal = Goal::default_for(lens).ok()?;
+    Some(Merit::new(lens, &goal, COARSE).ok()?.initial_light().concat())
 }
 
 /// The name of an aperture with its value.
