@@ -248,13 +248,8 @@ impl Studio {
     /// Keeps a message that does not fit into the status bar for the dialog.
     fn on_events(&mut self, events: Vec<SessionEvent>) {
         for event in events {
-            match &event {
-                SessionEvent::Opened(path) => self.remember(path),
-                // Pictures, reports and copies in other formats are no files of the design.
-                SessionEvent::Saved(path) if self.session.path() == Some(path.as_path()) => {
-                    self.remember(path);
-                }
-                _ => {}
+            if let SessionEvent::Opened(path) = &event {
+                self.remember(path);
             }
             if let SessionEvent::Message(message) = event
                 && (message.text.lines().count() > 1 || message.severity == Severity::Error)

@@ -29,12 +29,13 @@ fn a_front_is_written_with_every_lens() {
     let table = std::fs::read_to_string(&written[0]).unwrap();
     let lines: Vec<Vec<&str>> = table.lines().map(|line| line.split(',').collect()).collect();
     assert_eq!(lines[0][0], "spot_mm");
+    let file = lines[0].iter().position(|name| *name == "file").unwrap();
     assert_eq!(lines.len(), 2 + 2 * designs.len());
     for (line, design) in lines[2..].iter().zip(designs.iter().chain(designs)) {
         let numbers = [design.spot, design.spot_error, design.light, design.light_error];
         let read: Vec<f64> = line[..4].iter().map(|word| word.parse().unwrap()).collect();
         assert_eq!(read, numbers, "digits that bring back the same number");
-        let lens = files::open(folder.join("new").join(line[6])).unwrap().lens;
+        let lens = files::open(folder.join("new").join(line[file])).unwrap().lens;
         assert_eq!(lens, design.lens);
         let again = ParetoPoint::evaluate(&lens, design.weight, 1e-4).unwrap();
         assert!((again.spot - design.spot).abs() < 1e-3 * design.spot);

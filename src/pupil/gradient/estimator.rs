@@ -321,9 +321,9 @@ impl Region<'_> {
     }
 }
 
-/// The error of an order of a derivative in multiples of its last change: orders close to the edge fall
-/// unevenly.
-const CHANGES: f64 = 2.0;
+/// The error of an order of a derivative in multiples of its last change: where an edge is a total
+/// reflection, changes fall unevenly.
+const CHANGES: f64 = 3.0;
 /// The part of the natural size that the noise of numbers without an effect is compared with.
 const NOTABLE: f64 = 0.1;
 /// A derivative this much smaller than its natural size is rounding.
@@ -332,7 +332,7 @@ const ROUNDING: f64 = 1e-13;
 const DIFFERENCE_ROUNDING: f64 = 1e-9;
 
 impl PupilDerivative {
-    /// Adds twice the change by the last raising of the order to the errors; all of the derivative if this
+    /// Adds three times the change by the last raising of the order to the errors; all of the derivative if this
     /// is the first order. The relative error of a number is at least that of the worst of its kind, since
     /// some change little by chance, and that of a kind falls as those of other integrals over the pupil.
     fn add_order_error(&mut self, before: Option<&Self>) {
