@@ -1,9 +1,9 @@
 //! A search of a lens, described by one value and run by one call.
 
-use super::{DescentSettings, LandscapeError, LensLandscape, violations};
+use super::{DescentSettings, LandscapeError, LensLandscape};
 use crate::files::CheckpointError;
 use crate::lens::Lens;
-use crate::merit::{DerivativeLevel, Goal, Term, WeightedTerm};
+use crate::merit::{DerivativeLevel, Goal};
 use crate::optimize::DescentMethod;
 use crate::search::{
     MutationKind, SEARCH_CHECKPOINT, SearchError, SearchEvent, SearchRules, SearchRun, SearchRunOn,
@@ -82,79 +82,6 @@ impl SearchPlan {
         // Without the gradient of its start a search would only try mutations for ever.
         merit.evaluate(&merit.values(&start), DerivativeLevel::Gradient)?;
         Ok(landscape)
-    }
-
-    /// The goal of a search from a design with a merit function of its own, and the names of its terms
-    /// that a search cannot have. What the plan asks for beside the defaults tightens its limits, and
-    /// those that it does not have are added.
-    ///
-    /// # Errors
-    /// Invalid rules, or a lens without first-order data.
-    pub fn goal_of_design(
-        &self,
-        lens: &Lens,
-        own: &Goal,
-    ) -> Result<(Goal, Vec<&'static str>), LandscapeError> {
-        let share = if let [share] = self.light[..] { share } else { 1.0 };
-        let rules = self.rules.normalize()?;
-        let usual = Goal::with_limits(lens, &rules.goal_limits(), self.focal_length, share)?;
-        let (mut terms, left_out): (Vec<WeightedTerm>, Vec<WeightedTerm>) =
-            own.terms.iter().copied().partition(violations::is_of_whole_lens);
-        for asked in usual.terms.into_iter().filter(|weighted| weighted.term.is_limit()) {
-            let name = asked.term.name();
-            let known = terms.iter_mut().find(|w| w.term.name() == name && w.scope.is_all());
-            match known {
-                Some(known) => known.term = self.tightened(known.term, asked.term),
-                None => terms.push(asked),
-            }
-        }
-        let zoom_ratios = own.zoom_ratios.clone();
-        let goal = Goal { terms, pupil: usual.pupil, zoom_ratios, limits: usual.limits };
-        Ok((goal, left_out.iter().map(|weighted| weighted.term.name()).collect()))
-    }
-
-    /// A limit of a design, or the one that the plan asks for where that is set and tighter.
-    fn tightened(&self, own: Term, asked: Term) -> Term {
-        let (rules, usual) = (&self.rules, SearchRules::default());
-        let both = |is_set: bool, [min, max]: [f64; 2], [low, high]: [f64; 2]| {
-            if is_set { [min.max(low), max.min(high)] } else { [min, max] }
-        };
-        match (own, asked) {
-            (Term::FocalLength(_), _) if self.focal_length.is_some() => asked,
-            (Term::Light(_), _) if self.light != [1.0] => asked,
-            (Term::GlassCenter { min, max }, Term::GlassCenter { min: low, max: high }) => {
-                let is_set = rules.glass_center != usual.glass_center;
-                let [min, max] = both(is_set, [min, max], [low, high]);
-                Term::GlassCenter { min, max }
-            }
-            (Term::AirCenter { min, max }, Term::AirCenter { min: low, max: high }) => {
-                let is_set = rules.air_center != usual.air_center;
-                let [min, max] = both(is_set, [min, max], [low, high]);
-                Term::AirCenter { min, max }
-            }
-            (Term::SemiDiameter { min, max }, Term::SemiDiameter { min: low, max: high }) => {
-                let [min, max] = both(true, [min, max], [low, high]);
-                Term::SemiDiameter { min, max }
-            }
-            (Term::GlassEdge(min), Term::GlassEdge(low))
-                if rules.glass_edge != usual.glass_edge =>
-            {
-                Term::GlassEdge(min.max(low))
-            }
-            (Term::AirEdge(min), Term::AirEdge(low)) if rules.air_edge != usual.air_edge => {
-                Term::AirEdge(min.max(low))
-            }
-            (Term::Steepness(max), Term::Steepness(high)) if rules.steepness != usual.steepness => {
-                Term::Steepness(max.min(high))
-            }
-            (Term::TotalTrack(max), Term::TotalTrack(high)) if rules.track.is_some() => {
-                Term::TotalTrack(max.min(high))
-            }
-            (Term::BackFocus(min), Term::BackFocus(low)) if rules.back_focus.is_some() => {
-                Term::BackFocus(min.max(low))
-            }
-            _ => own,
-        }
     }
 
     /// The landscape of the search, and the run before its first round.
