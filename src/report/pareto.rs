@@ -86,8 +86,7 @@ impl ParetoReport<'_> {
     }
 
     /// The numbers as comma-separated values, a line for every lens: the start, the front, the
-    /// biased front. A lens has the weight or the light that
-    /// was asked for, the one at the start neither.
+    /// biased front. A lens has the weight or the light that was asked for, the one at the start neither.
     pub fn table(&self) -> String {
         let mut text = HEAD.to_owned();
         for (file, design) in self.lenses() {

@@ -312,8 +312,7 @@ impl MeritRow {
         number_field(ui, buffers, &name, &mut self.weighted.weight, 46.0);
         // A narrow panel has the targets below each other.
         let room = vec2(at.target_width, ui.spacing().interact_size.y);
-        // From the top: the rows of a cell are not centred in the height that it had in the frame before.
-        let wrapping = Arrange::left_to_right(Align::Min).with_main_wrap(true);
+        let wrapping = Arrange::left_to_right(Align::Center).with_main_wrap(true);
         ui.allocate_ui_with_layout(room, wrapping, |ui| {
             ui.spacing_mut().item_spacing = vec2(2.0, 2.0);
             let targets = targets(&mut self.weighted.term);
