@@ -6,7 +6,7 @@ use super::{PupilDerivative, QuadraticIntegrand, WarpSampling};
 use crate::lens::{RADIAL_TERMS, SurfaceNumber, SystemError};
 use crate::pupil::launch::LaunchError;
 use crate::pupil::ray_model::Aiming;
-use crate::pupil::region::{Accuracy, PupilMoments, Region, RegionKind};
+use crate::pupil::region::{Accuracy, PupilMoments, Region, RegionKind, order_error};
 use crate::trace::{Fate, SurfaceParameter, SystemGradient, WarpTracer};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
@@ -243,7 +243,7 @@ impl Region<'_> {
     ) -> Result<PupilDerivative, DerivativeError> {
         let mut rays = self.rays;
         let mut before: Option<PupilDerivative> = None;
-        let (mut last, mut changes) = (0, Vec::new());
+        let mut last = 0;
         for order in 0..self.orders() {
             // An order takes about twice the rays of the one before.
             if rays + 2 * last > asked.max_rays && before.is_some() {
@@ -254,8 +254,8 @@ impl Region<'_> {
             rays += last;
             now.rays = rays;
             // A first change alone does not tell an agreement by chance.
-            let is_confirmed = !changes.is_empty();
-            changes = now.add_order_error(before.as_ref(), &changes);
+            let is_confirmed = order > 1;
+            now.add_order_error(before.as_ref());
             now.reached = is_confirmed && now.reaches(asked.tolerance);
             if now.reached {
                 return Ok(now);
@@ -321,9 +321,9 @@ impl Region<'_> {
     }
 }
 
-/// Relative changes above this are those of coarse orders, which do not fall evenly: errors are up to
-/// three times as large.
-const COARSE: f64 = 1e-4;
+/// The error of an order of a derivative in multiples of its last change: where an edge is a total
+/// reflection, changes fall unevenly.
+const CHANGES: f64 = 3.0;
 /// The part of the natural size that the noise of numbers without an effect is compared with.
 const NOTABLE: f64 = 0.1;
 /// A derivative this much smaller than its natural size is rounding.
@@ -332,32 +332,25 @@ const ROUNDING: f64 = 1e-13;
 const DIFFERENCE_ROUNDING: f64 = 1e-9;
 
 impl PupilDerivative {
-    /// Adds the change by the last raising of the order to the errors; all of the derivative if
-    /// this is the first order. The relative error of a number is at least that of the worst of its
-    /// kind, since some change little by chance, and at least the square of the change before: twice the
-    /// nodes do not gain more. Takes the largest change of each kind before, and returns that of now.
-    fn add_order_error(&mut self, before: Option<&Self>, earlier: &[f64]) -> Vec<f64> {
+    /// Adds three times the change by the last raising of the order to the errors; all of the derivative if this
+    /// is the first order. The relative error of a number is at least that of the worst of its kind, since
+    /// some change little by chance, and that of a kind falls as those of other integrals over the pupil.
+    fn add_order_error(&mut self, before: Option<&Self>) {
         let Some(before) = before else {
             self.error = self.gradient.zip_with(&self.gradient, |_, _| f64::INFINITY);
-            return Vec::new();
+            return;
         };
-        let change = self.gradient.zip_with(&before.gradient, |a, b| (a - b).abs());
+        let change = self.gradient.zip_with(&before.gradient, |a, b| CHANGES * (a - b).abs());
         self.error = self.error.zip_with(&change, |a, b| a + b);
-        let mut changes = Vec::new();
-        for (k, slot) in SurfaceParameter::all().enumerate() {
-            let [worst, largest] = [&self.error, &self.gradient].map(|g| g.largest(slot));
-            changes.push(worst);
-            let relative =
-                |error: f64| if largest > 0.0 { (error / largest).min(1.0) } else { 0.0 };
-            let share = relative(worst);
-            let least = earlier.get(k).map_or(0.0, |earlier| relative(*earlier).powi(2));
-            let share = (share * (1.0 + 2.0 * (share / COARSE).min(1.0))).max(least);
+        for slot in SurfaceParameter::all() {
+            let worst = order_error(self.error.largest(slot), before.error.largest(slot));
+            let largest = self.gradient.largest(slot);
+            let share = if largest > 0.0 { (worst / largest).min(1.0) } else { 0.0 };
             for (error, by) in self.error.surfaces.iter_mut().zip(&self.gradient.surfaces) {
                 let larger = error.by(slot).max(share * by.by(slot).abs());
                 error.set(slot, larger);
             }
         }
-        changes
     }
 
     /// Sets the kinds of numbers to zero on which the integral depends by no more than rounding.

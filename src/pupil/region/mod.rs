@@ -32,6 +32,7 @@ pub use moments::PupilMoments;
 pub use nodes::Nodes;
 pub use outline::{OutlineSide, PupilOutline};
 pub use pupil_radius::PupilRadius;
+pub(super) use quadrature::order_error;
 pub use quadrature::{
     Accuracy, ConvergedList, ConvergedValues, TracedNodes, converge, converge_every_order,
     converge_list, converge_resolved,

@@ -279,7 +279,7 @@ pub struct ConvergedList {
 const LEAST_FALL: f64 = 1.0 / 6.0;
 
 /// The error of an order of Gauss rules from the last change.
-fn order_error(change: f64, error_before: f64) -> f64 {
+pub(in crate::pupil) fn order_error(change: f64, error_before: f64) -> f64 {
     let least = if error_before.is_finite() { LEAST_FALL * error_before } else { 0.0 };
     change.max(least)
 }

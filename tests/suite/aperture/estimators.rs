@@ -91,7 +91,7 @@ fn aperture_gradients_meet_the_requested_and_stated_accuracy() {
     for case in cases() {
         let model = case.model();
         let region = Region::new(case.launch(&model));
-        let lit = region.trace_pupil(10);
+        let lit = region.trace_pupil(13);
         for cost in
             [QuadraticIntegrand::spread(lit.moments.centroid), QuadraticIntegrand::throughput()]
         {

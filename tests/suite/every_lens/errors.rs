@@ -6,7 +6,11 @@ use aplanat::effects::{
     self, Effect, EffectOverride, EffectOverrides, EffectPlan, TracePurpose, build_ray_model_at,
 };
 use aplanat::lens::{FieldPoint, Lens};
-use aplanat::pupil::{Accuracy, ConvergedValues, Nodes, RayModel, Region, converge};
+use aplanat::pupil::{
+    Accuracy, ConvergedValues, DerivativeEstimator, Nodes, PupilDerivative, QuadraticIntegrand,
+    RayModel, Region, choose_estimator, converge, differentiate,
+};
+use aplanat::trace::SurfaceParameter;
 
 /// What a higher order changes is in the stated error of a lower one, however loose: at every wavelength,
 /// on the axis, in the middle and at the edge of the field.
@@ -72,6 +76,54 @@ fn stated_errors_of_diffraction_hold_what_a_higher_order_changes() {
     .into_iter()
     .sum();
     assert!(compared > 30, "{compared}");
+}
+
+/// The same for derivatives by order: what a higher order changes, over the largest of its kind.
+#[test]
+fn stated_errors_of_derivatives_hold_what_a_higher_order_changes() {
+    let compared: usize = check_every_lens(|_, model| {
+        let mut compared = 0;
+        for field in [model.fields[0], edge(model)] {
+            let region = Region::new(model.launch(field, model.primary).unwrap());
+            let center = region.trace_pupil(5).moments.centroid;
+            for cost in [QuadraticIntegrand::spread(center), QuadraticIntegrand::throughput()] {
+                let (estimator, _) = choose_estimator(&region, ROUGH).map_err(text)?;
+                // Random rays have a standard error, which a result may exceed.
+                if estimator == DerivativeEstimator::Warp {
+                    continue;
+                }
+                let found = |tolerance| {
+                    let accuracy = Accuracy { tolerance, ..ACCURACY };
+                    differentiate(&region, &cost, estimator, accuracy).map_err(text)
+                };
+                let exact = found(1e-6)?;
+                for tolerance in [1e-1, 1e-2, 1e-3] {
+                    let name = |why| format!("at {}, to {tolerance}: {why}", field.y);
+                    compared += compare_by_kind(&found(tolerance)?, &exact).map_err(name)?;
+                }
+            }
+        }
+        Ok(compared)
+    })
+    .into_iter()
+    .sum();
+    assert!(compared > 188 * 60, "{compared}");
+}
+
+/// Compares the derivatives by each kind of number with exact ones, within the stated errors of the kind; the
+/// number of kinds.
+fn compare_by_kind(rough: &PupilDerivative, exact: &PupilDerivative) -> Result<usize, String> {
+    let mut compared = 0;
+    for slot in SurfaceParameter::all() {
+        let all = exact.gradient.surfaces.iter().zip(&rough.gradient.surfaces);
+        let off = all.map(|(a, b)| (a.by(slot) - b.by(slot)).abs()).fold(0.0, f64::max);
+        let largest = exact.gradient.largest(slot);
+        // Numbers without an effect are dropped at either order.
+        let error = rough.error.largest(slot) + exact.error.largest(slot) + 1e-9 * largest;
+        ensure(off <= error, || format!("{slot:?}: off by {off:e} of {largest:e}, not {error:e}"))?;
+        compared += 1;
+    }
+    Ok(compared)
 }
 
 /// The intensities in the image of a field, at its chief ray and beside.
