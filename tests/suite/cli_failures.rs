@@ -490,7 +490,6 @@ fn a_design_ends_within_a_round() {
     let design = ["design", &spec, "--out", &out, "--minutes", "1000", "--checkpoint", &checkpoint];
     let running = Running::start(&design);
     wait_for(&checkpoint);
-    std::thread::sleep(Duration::from_millis(100));
     running.signal("-TERM");
     let output = running.output();
     assert_eq!(output.status.code(), Some(0), "{}", text(&output.stderr));
@@ -506,7 +505,8 @@ fn a_design_ends_within_a_round() {
 fn design_of_rounds(spec: &str, rounds: u64) -> Value {
     let spec = serde_json::from_str(&fs::read_to_string(spec).unwrap()).unwrap();
     let (asked, _) = LensRequirements::complete(&spec).unwrap();
-    let mut run = DesignRun::new(&asked, &DesignSettings::with_seed(0));
+    // The usual seed of the command.
+    let mut run = DesignRun::new(&asked, &DesignSettings::with_seed(1));
     let saved = |run: &DesignRun| -> Value {
         serde_json::from_str(&serde_json::to_string(run).unwrap()).unwrap()
     };
