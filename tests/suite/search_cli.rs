@@ -1,6 +1,8 @@
 //! The search command from outside: its keys, its errors, and runs that are killed.
 
 use super::cli::{Scratch, done, done_json, has_keys, refused};
+use aplanat::files;
+use aplanat::merit::{Goal, Term, TermScope, WeightedTerm};
 use serde_json::Value;
 use std::process::{Command, Stdio};
 use std::time::Duration;
@@ -149,7 +151,7 @@ fn a_search_writes_its_lens_and_its_reservoir() {
     for word in words.into_iter().chain(["total_track", "the best lens"]) {
         assert!(text.contains(word), "{text}");
     }
-    aplanat::files::open(&out.0).unwrap().lens.check().unwrap();
+    files::open(&out.0).unwrap().lens.check().unwrap();
     let count = std::fs::read_dir(folder.path()).unwrap().count();
     assert!(count > 0);
     std::fs::remove_dir_all(folder.path()).unwrap();
@@ -220,4 +222,28 @@ fn signs_are_read() {
     let base = ["search", LENS, "--iterations", "8", "--heights", "-7,0", "--focal-length", "-100"];
     let report = done_json(&base, "");
     assert!(report["start"]["fields"][0]["y"].as_f64().unwrap() > 4.0 - 1e-9);
+}
+
+/// The merit function of the file counts without being asked for, but for what it asks of surfaces that
+/// a mutation may remove.
+#[test]
+fn a_search_has_the_merit_function_of_its_file() {
+    let mut lens = files::open(LENS).unwrap().lens;
+    let mut goal = Goal::default_for(&lens).unwrap();
+    goal.terms.retain(|weighted| !matches!(weighted.term, Term::TotalTrack(_)));
+    goal.terms.push(WeightedTerm::new(Term::TotalTrack(90.0), 1.0));
+    let mut edge = WeightedTerm::new(Term::GlassEdge(7.0), 1.0);
+    edge.scope = TermScope { surfaces: Some([0, 1]), ..TermScope::default() };
+    goal.terms.push(edge);
+    lens.merit = Some(goal);
+    let file = Scratch::new("own-merit.json");
+    files::save(&lens, &file.0).unwrap();
+    let base = ["search", file.path(), "--iterations", "20"];
+    let report = done_json(&base, "");
+    let start = report["start_breaks"].as_array().unwrap();
+    let track = start.iter().find(|limit| limit["term"] == "total_track").unwrap();
+    assert_eq!(track["max"].as_f64(), Some(90.0), "{track}");
+    let said = Command::new(env!("CARGO_BIN_EXE_aplanat")).args(base).output().unwrap();
+    let said = String::from_utf8(said.stderr).unwrap();
+    assert!(said.contains("leaves out what the merit function asks of some surfaces"), "{said}");
 }

@@ -2,7 +2,8 @@
 
 use super::merit::bundled;
 use super::session_pareto::wait;
-use aplanat::lens::Lens;
+use aplanat::lens::{Aperture, Lens};
+use aplanat::merit::{Goal, Merit, Term, WeightedTerm};
 use aplanat::search::{MutationKind, SearchRules, SearchSettings, SteerCommand, Temperature};
 use aplanat::session::{
     Command, EndReason, RunKind, RunStatus, Session, SessionEvent, SessionView, Severity,
@@ -345,4 +346,68 @@ fn an_impossible_lens_is_refused_with_the_limit() {
     let first = "nothing is written: the lens cannot be manufactured within its constraints\n";
     assert!(said.text.starts_with(first) && said.text.contains("total track"), "{}", said.text);
     assert!(!path.exists());
+}
+
+/// The search asks for what the merit function of the design asks for, under the tighter ones of its
+/// limits and those of the search.
+#[test]
+fn a_search_has_the_merit_function_of_the_design() {
+    let mut session = session(double_gauss());
+    let track = 1.05 * session.lens().total_track();
+    let mut own = Goal::default_for(session.lens()).unwrap();
+    let is_track = |weighted: &WeightedTerm| matches!(weighted.term, Term::TotalTrack(_));
+    own.terms.iter_mut().filter(|w| is_track(w)).for_each(|w| w.term = Term::TotalTrack(track));
+    session.apply(aplanat::lens::Edit::SetMerit(Some(own.clone())).into());
+    start(&mut session, Some(2));
+    stands(&mut session, RunStatus::Finished);
+    let found = run(&session);
+    let asked = found.request.plan.goal.clone().unwrap();
+    for term in own.terms.iter().filter(|weighted| !weighted.term.is_limit() || is_track(weighted))
+    {
+        assert!(asked.terms.contains(term), "{term:?}");
+    }
+    let merit = Merit::new(session.lens(), &own, 1e-3).unwrap();
+    let value = merit.value(&merit.values(session.lens())).unwrap();
+    assert!((found.start.merit / value - 1.0).abs() < 0.2, "{} {value}", found.start.merit);
+    let thinnest = |goal: &Goal| {
+        goal.terms.iter().find_map(|weighted| match weighted.term {
+            Term::GlassCenter { min, .. } => Some(min),
+            _ => None,
+        })
+    };
+    assert!(thinnest(&own) < thinnest(&asked), "{asked:?}");
+    assert_eq!(thinnest(&asked), Some(SearchRules::default().glass_center[0]));
+    // A limit that is set for the search alone counts if it is tighter.
+    let mut shorter = quest(Some(2));
+    shorter.plan.rules.track = Some(0.9 * track);
+    explore(&mut session, StructureSearchCommand::Start(Box::new(shorter)));
+    stands(&mut session, RunStatus::Finished);
+    let asked = run(&session).request.plan.goal.clone().unwrap();
+    let limit = WeightedTerm::new(Term::TotalTrack(0.9 * track), 1.0);
+    assert!(asked.terms.contains(&limit), "{asked:?}");
+}
+
+/// The stop that a search varies does not replace the aperture of the design without a word, and rims
+/// that nobody has fixed are not fixed by it.
+#[test]
+fn a_found_lens_has_the_kind_of_aperture_of_the_design() {
+    let mut lens = bundled("cooke_triplet_100_f27");
+    let f_number = Aperture::FNumber(4.0);
+    lens.aperture = f_number;
+    lens.surfaces.iter_mut().for_each(|row| row.semi_diameter = None);
+    let mut session = session(lens);
+    start(&mut session, Some(6));
+    stands(&mut session, RunStatus::Finished);
+    let best = Arc::clone(&run(&session).reservoir[0]);
+    assert!(matches!(best.lens.aperture, Aperture::StopSemiDiameter(_)));
+    explore(&mut session, StructureSearchCommand::Accept(best.number));
+    let text = session.view().messages.last().unwrap().text.clone();
+    let lens = session.lens();
+    if lens.aperture == f_number {
+        assert!(text.contains("f/4 as before"), "{text}");
+        let stop = lens.stop().unwrap();
+        assert_eq!(lens.surfaces[stop].semi_diameter, None, "nobody has fixed it");
+    } else {
+        assert!(text.contains("would be darker"), "{text}");
+    }
 }

@@ -18,7 +18,9 @@ use crate::files::{self, CheckpointError, FileLock};
 use crate::lens::Lens;
 use crate::measure::Stopwatch;
 use crate::merit::MeritError;
-use crate::search::lens_landscape::{LandscapeError, LensLandscape, SearchPlan, finalize};
+use crate::search::lens_landscape::{
+    LandscapeError, LensLandscape, SearchPlan, describe_left_out, finalize,
+};
 use crate::search::{FoundPoint, RunEnd, SearchError, SearchMethod, SearchRun, SearchRunOn};
 use report::SearchReport;
 use result::StartAgainstBest;
@@ -101,6 +103,18 @@ enum SearchEnd {
     Interrupted,
 }
 
+/// Gives a search without a merit function that of the lens, if there is one, and says which terms a
+/// search cannot have.
+fn give_goal(plan: &mut SearchPlan, lens: &Lens) -> Result<(), LandscapeError> {
+    let Some(own) = lens.merit.as_ref().filter(|_| plan.goal.is_none()) else { return Ok(()) };
+    let (goal, left_out) = plan.goal_of_design(lens, own)?;
+    plan.goal = Some(goal);
+    if let Some(text) = describe_left_out(&left_out) {
+        print_note(format!("note: {text}"));
+    }
+    Ok(())
+}
+
 impl SearchArgs {
     pub(super) fn run(&self, output: &Output) -> Result<(), CliError> {
         self.check()?;
@@ -109,13 +123,14 @@ impl SearchArgs {
         let design = self.design_effects()?;
         let opened = self.lens.open()?;
         let _lock = self.checkpoint.as_deref().map(FileLock::acquire).transpose()?;
-        let plan = self.plan(&opened.lens)?;
+        let mut plan = self.plan(&opened.lens)?;
         let start = self.plan_args.start_lens(&opened.lens)?;
         let lens = design.working_lens(&start);
         let effects = design.report(&start, &opened.file)?;
         let Lens { wavelengths, .. } = start;
         let original = Lens { wavelengths, ..opened.lens.clone() };
         let refused = |cause: LandscapeError| self.landscape_error(&opened.file, cause);
+        give_goal(&mut plan, &lens).map_err(refused)?;
         let landscape = plan.landscape(&lens).map_err(refused)?;
         let start_breaks = landscape.violations(landscape.start()).map_err(refused)?;
         let (mut run, resumed) = self.start_or_resume(&landscape, &plan, &opened.file)?;

@@ -13,7 +13,8 @@ use std::str::FromStr;
 /// The options of a structure search.
 #[derive(Debug, clap::Args)]
 pub(in crate::cli) struct SearchPlanArgs {
-    /// The merit function, as JSON; absent: sharp spots with the present light and focal length
+    /// The merit function, as JSON; absent: that of the lens file, or sharp spots with the present light
+    /// and focal length
     #[arg(long, value_name = "FILE")]
     goal: Option<PathBuf>,
 

@@ -19,7 +19,7 @@ mod violations;
 pub use descent_settings::DescentSettings;
 pub use finalize::{CrossCheck, FinalizedLens, GlassSubstitution, UnlistedGlass, finalize};
 pub use open_apertures::with_open_apertures;
-pub use plan::{SearchPlan, SearchSetupError, run};
+pub use plan::{SearchPlan, SearchSetupError, describe_left_out, run};
 pub use summary::{FieldSummary, LensSummary};
 pub use violations::describe_violation;
 

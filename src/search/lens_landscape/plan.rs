@@ -1,9 +1,9 @@
 //! A search of a lens, described by one value and run by one call.
 
-use super::{DescentSettings, LandscapeError, LensLandscape};
+use super::{DescentSettings, LandscapeError, LensLandscape, violations};
 use crate::files::CheckpointError;
 use crate::lens::Lens;
-use crate::merit::{DerivativeLevel, Goal};
+use crate::merit::{DerivativeLevel, Goal, Term, WeightedTerm};
 use crate::optimize::DescentMethod;
 use crate::search::{
     MutationKind, SEARCH_CHECKPOINT, SearchError, SearchEvent, SearchRules, SearchRun, SearchRunOn,
@@ -56,6 +56,16 @@ pub enum SearchSetupError {
     Search(#[from] SearchError),
 }
 
+/// Says which terms of the merit function of a design a search leaves out; `None` if it has all.
+pub fn describe_left_out(terms: &[&str]) -> Option<String> {
+    (!terms.is_empty()).then(|| {
+        let names = terms.join(", ").replace('_', " ");
+        format!(
+            "the search leaves out what the merit function asks of some surfaces or fields only: {names}"
+        )
+    })
+}
+
 impl SearchPlan {
     /// The landscape of the search.
     ///
@@ -82,6 +92,59 @@ impl SearchPlan {
         // Without the gradient of its start a search would only try mutations for ever.
         merit.evaluate(&merit.values(&start), DerivativeLevel::Gradient)?;
         Ok(landscape)
+    }
+
+    /// The goal of a search from a design with a merit function of its own, and the names of its terms
+    /// that a search cannot have. Of each limit of the merit function and of the plan the tighter one
+    /// counts.
+    ///
+    /// # Errors
+    /// Invalid rules, or a lens without first-order data.
+    pub fn goal_of_design(
+        &self,
+        lens: &Lens,
+        own: &Goal,
+    ) -> Result<(Goal, Vec<&'static str>), LandscapeError> {
+        let share = if let [share] = self.light[..] { share } else { 1.0 };
+        let rules = self.rules.normalize()?;
+        let usual = Goal::with_limits(lens, &rules.goal_limits(), self.focal_length, share)?;
+        let (mut terms, left_out): (Vec<WeightedTerm>, Vec<WeightedTerm>) =
+            own.terms.iter().copied().partition(violations::is_of_whole_lens);
+        for asked in usual.terms.into_iter().filter(|weighted| weighted.term.is_limit()) {
+            let name = asked.term.name();
+            let known = terms.iter_mut().find(|w| w.term.name() == name && w.scope.is_all());
+            match known {
+                Some(known) => known.term = self.tighter(known.term, asked.term),
+                None => terms.push(asked),
+            }
+        }
+        let zoom_ratios = own.zoom_ratios.clone();
+        let goal = Goal { terms, pupil: usual.pupil, zoom_ratios, limits: usual.limits };
+        Ok((goal, left_out.iter().map(|weighted| weighted.term.name()).collect()))
+    }
+
+    /// The tighter of two limits of one kind; of targets the design's, unless the plan has its own.
+    fn tighter(&self, own: Term, asked: Term) -> Term {
+        use Term::{AirCenter, AirEdge, BackFocus, GlassCenter, GlassEdge, Steepness};
+        match (own, asked) {
+            (Term::FocalLength(_), _) if self.focal_length.is_some() => asked,
+            (Term::Light(_), _) if self.light != [1.0] => asked,
+            (GlassCenter { min, max }, GlassCenter { min: low, max: high }) => {
+                GlassCenter { min: min.max(low), max: max.min(high) }
+            }
+            (AirCenter { min, max }, AirCenter { min: low, max: high }) => {
+                AirCenter { min: min.max(low), max: max.min(high) }
+            }
+            (Term::SemiDiameter { min, max }, Term::SemiDiameter { min: low, max: high }) => {
+                Term::SemiDiameter { min: min.max(low), max: max.min(high) }
+            }
+            (GlassEdge(min), GlassEdge(low)) => GlassEdge(min.max(low)),
+            (AirEdge(min), AirEdge(low)) => AirEdge(min.max(low)),
+            (Steepness(max), Steepness(high)) => Steepness(max.min(high)),
+            (Term::TotalTrack(max), Term::TotalTrack(high)) => Term::TotalTrack(max.min(high)),
+            (BackFocus(min), BackFocus(low)) => BackFocus(min.max(low)),
+            _ => own,
+        }
     }
 
     /// The landscape of the search, and the run before its first round.

@@ -112,11 +112,17 @@ impl LensLandscape {
     }
 }
 
+/// True for a term that a search over structures can have: surfaces have no fixed numbers in it, and the
+/// light of a part of the fields is not tested in a finished lens.
+pub(super) fn is_of_whole_lens(weighted: &WeightedTerm) -> bool {
+    let about_light = weighted.term.concerns_light() && !weighted.scope.is_all();
+    weighted.scope.surfaces.is_none() && !about_light
+}
+
 /// Refuses terms about some surfaces, whose numbers change with the structure, and terms about the
 /// light of a part of the fields, which a finished lens is not tested for.
 pub(super) fn check_scopes(goal: &Goal) -> Result<(), LandscapeError> {
-    let about_light = |w: &&WeightedTerm| w.term.concerns_light() && !w.scope.is_all();
-    let refused = goal.terms.iter().find(|w| w.scope.surfaces.is_some() || about_light(w));
+    let refused = goal.terms.iter().find(|weighted| !is_of_whole_lens(weighted));
     refused.map_or(Ok(()), |weighted| {
         Err(LandscapeError::Setting {
             what: "the scope of a term of the merit function",

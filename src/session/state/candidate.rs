@@ -54,17 +54,7 @@ impl Session {
             let name = version.name.as_deref().unwrap_or(&version.title);
             return format!("the version \"{name}\"");
         }
-        let search = self.structure_search.view().run.snapshot;
-        let found = search.as_ref().and_then(|search| {
-            let retained = search.reservoir.iter().chain([&search.best, &search.start]);
-            let mut retained = retained.map(|found| (found.number, &found.lens));
-            let earlier = search.lineage.iter().map(|node| (node.number, &node.point));
-            retained
-                .find(|found| **found.1 == *lens)
-                .or_else(|| earlier.into_iter().find(|found| **found.1 == *lens))
-                .map(|found| found.0)
-        });
-        match found {
+        match self.number_in_search(lens) {
             Some(number) => format!("lens {number} of the search"),
             None if self.pareto.has_found(lens) => "a lens of the Pareto front".to_owned(),
             None if self.specified_design.has_found(lens) => {
@@ -72,6 +62,18 @@ impl Session {
             }
             None => "a changed lens".to_owned(),
         }
+    }
+
+    /// The number of a lens in the structure search; `None` if the search has not found it.
+    pub(super) fn number_in_search(&self, lens: &Lens) -> Option<u64> {
+        let search = self.structure_search.view().run.snapshot?;
+        let retained = search.reservoir.iter().chain([&search.best, &search.start]);
+        let mut retained = retained.map(|found| (found.number, &found.lens));
+        let earlier = search.lineage.iter().map(|node| (node.number, &node.point));
+        retained
+            .find(|found| **found.1 == *lens)
+            .or_else(|| earlier.into_iter().find(|found| **found.1 == *lens))
+            .map(|found| found.0)
     }
 
     /// The candidate, whether it is shown or the design is.
@@ -100,7 +102,7 @@ impl Session {
                 };
                 self.structure_search.end_preview();
                 let own = self.with_own_variables(&lens);
-                self.accept(own, VersionOrigin::new(format!("accept {title}")));
+                self.accept_of_search(own, VersionOrigin::new(format!("accept {title}")));
             }
         }
         self.shows_candidate = true;

@@ -147,8 +147,13 @@ impl Session {
         let Some(shown) = self.preview_lens.take() else {
             return self.post(Severity::Warning, "there is no preview to accept");
         };
-        let title = format!("accept {}", self.preview_title);
-        self.accept(self.with_own_variables(&shown), VersionOrigin::new(title));
+        let origin = VersionOrigin::new(format!("accept {}", self.preview_title));
+        let own = self.with_own_variables(&shown);
+        if self.number_in_search(&shown).is_some() {
+            self.accept_of_search(own, origin);
+        } else {
+            self.accept(own, origin);
+        }
     }
 
     pub(super) fn export_pareto(&mut self, folder: PathBuf) {
@@ -184,6 +189,10 @@ impl Session {
         if starts {
             self.preview_lens = None;
         }
+        let mut command = command;
+        if let StructureSearchCommand::Start(request) = &mut command {
+            self.give_goal(request);
+        }
         if let Err(why) = self.structure_search.handle(command, &self.lens) {
             self.post(Severity::Warning, why);
         }
@@ -201,7 +210,20 @@ impl Session {
         let search = self.structure_search.view().run.snapshot;
         let seed = search.map(|search| search.request.plan.settings.seed);
         let title = format!("accept lens {number} of the search");
-        self.accept(found, VersionOrigin { seed, ..VersionOrigin::new(title) });
+        self.accept_of_search(found, VersionOrigin { seed, ..VersionOrigin::new(title) });
+    }
+
+    /// Makes a lens of the structure search the design, and says what becomes of its aperture.
+    pub(super) fn accept_of_search(&mut self, found: Result<Lens, String>, origin: VersionOrigin) {
+        match found.map(|lens| self.with_design_aperture(lens)) {
+            Ok((lens, told)) => {
+                self.accept(Ok(lens), origin);
+                if let Some(told) = told {
+                    self.post(Severity::Note, told);
+                }
+            }
+            Err(why) => self.post(Severity::Warning, why),
+        }
     }
 
     fn post_search_report(&mut self, report: StructureSearchReport) {

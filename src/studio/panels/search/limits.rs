@@ -1,6 +1,6 @@
 //! Limits of a search: manufacturing, light of the fields, and settings of the sampler.
 
-use egui::{ComboBox, DragValue, Grid, Ui};
+use egui::{ComboBox, DragValue, Grid, RichText, Ui};
 
 use super::setup::{drag, length, optional};
 use crate::lens::{FieldPoint, Lens};
@@ -11,6 +11,8 @@ use crate::studio::panels::field_name;
 /// The limits of the factory.
 pub(super) fn limits_section(ui: &mut Ui, rules: &mut SearchRules) {
     ui.collapsing("Manufacturing limits", |ui| {
+        let text = "Of these and the limits of the merit function, the tighter ones hold.";
+        ui.label(RichText::new(text).small().weak());
         Grid::new("factory").num_columns(2).spacing([8.0, 3.0]).show(ui, |ui| {
             let ranges = [
                 ("Glass on the axis", "glass on the axis", &mut rules.glass_center),
