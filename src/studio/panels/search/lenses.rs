@@ -68,21 +68,72 @@ impl CardOrder {
     }
 }
 
+/// The places of the cards, which they keep while the pointer is over them: a click gets the lens that
+/// is seen, although the search goes on.
+#[derive(Debug, Default)]
+pub(super) struct CardPlaces {
+    placed: Vec<Arc<FoundLens>>,
+    /// Where the cards were last.
+    area: Option<Rect>,
+}
+
+impl CardPlaces {
+    /// The lenses, sorted, in the places of their cards.
+    fn arrange(&mut self, ui: &Ui, sorted: Vec<Arc<FoundLens>>) -> Vec<Arc<FoundLens>> {
+        let is_pointed_at = self.area.is_some_and(|area| ui.rect_contains_pointer(area));
+        self.placed = if is_pointed_at { keep_places(&self.placed, sorted) } else { sorted };
+        self.placed.clone()
+    }
+}
+
+/// The lenses in the places that they had; others come where one has left, or at the end.
+fn keep_places(before: &[Arc<FoundLens>], lenses: Vec<Arc<FoundLens>>) -> Vec<Arc<FoundLens>> {
+    let is_same = |a: &FoundLens, b: &FoundLens| a.number == b.number && a.lens == b.lens;
+    let (mut known, new): (Vec<_>, Vec<_>) =
+        lenses.into_iter().partition(|lens| before.iter().any(|placed| is_same(placed, lens)));
+    let mut new = new.into_iter();
+    let mut places: Vec<Arc<FoundLens>> = before
+        .iter()
+        .filter_map(|placed| match known.iter().position(|lens| is_same(placed, lens)) {
+            Some(i) => Some(known.swap_remove(i)),
+            None => new.next(),
+        })
+        .collect();
+    places.extend(new);
+    places
+}
+
 /// Shows the retained lenses in an order; the clicked one, if any.
 pub(super) fn cards(
     ui: &mut Ui,
     search: ShownSearch<'_>,
     chosen: Option<&SelectedLens>,
     order: CardOrder,
+    places: &mut CardPlaces,
     thumbnails: &mut Thumbnails,
 ) -> Option<Arc<FoundLens>> {
-    let ShownSearch { view, run } = search;
+    let run = search.run;
     let same =
         |found: &Arc<FoundLens>| (found.number, found.merit) == (run.best.number, run.best.merit);
     let is_retained = run.reservoir.iter().any(same);
     let best = (!is_retained).then_some(&run.best);
-    let mut shown: Vec<&Arc<FoundLens>> = best.into_iter().chain(&run.reservoir).collect();
+    let mut shown: Vec<_> = best.into_iter().chain(&run.reservoir).map(Arc::clone).collect();
     shown.sort_by(|a, b| order.key(a).total_cmp(&order.key(b)));
+    let shown = places.arrange(ui, shown);
+    let drawn = ui.scope(|ui| card_rows(ui, search, chosen, &shown, thumbnails));
+    places.area = Some(drawn.response.rect);
+    drawn.inner
+}
+
+/// Shows cards side by side in rows; the lens of the clicked one, if any.
+fn card_rows(
+    ui: &mut Ui,
+    search: ShownSearch<'_>,
+    chosen: Option<&SelectedLens>,
+    shown: &[Arc<FoundLens>],
+    thumbnails: &mut Thumbnails,
+) -> Option<Arc<FoundLens>> {
+    let ShownSearch { view, run } = search;
     let width = ui.available_width();
     let gap = 4.0;
     let columns = ((width + gap) / (CARD.x + gap)).floor().max(1.0);
@@ -98,7 +149,9 @@ pub(super) fn cards(
                 let look = CardStyle {
                     selected: chosen.is_some_and(|chosen| chosen.is(found)),
                     mark: match found.number {
-                        _ if best.is_some_and(|best| Arc::ptr_eq(best, found)) => CardMark::Best,
+                        _ if !run.reservoir.iter().any(|kept| Arc::ptr_eq(kept, found)) => {
+                            CardMark::Best
+                        }
                         number if run.pinned == Some(number) => CardMark::Pinned,
                         _ => CardMark::None,
                     },
@@ -230,4 +283,29 @@ pub(super) fn lens_buttons(
         actions.push(Command::Preview(None));
     }
     back
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lens::blank;
+
+    fn found(number: u64) -> Arc<FoundLens> {
+        let lens = Arc::new(blank());
+        Arc::new(FoundLens { number, merit: 1.0, elements: 1, lens, score: None })
+    }
+
+    /// A lens that is better than all others does not push their cards aside.
+    #[test]
+    fn cards_keep_their_places_and_a_new_one_takes_that_of_one_that_left() {
+        let kept = |before: &[u64], now: &[u64]| -> Vec<u64> {
+            let before: Vec<_> = before.iter().map(|number| found(*number)).collect();
+            let now = now.iter().map(|number| found(*number)).collect();
+            keep_places(&before, now).iter().map(|lens| lens.number).collect()
+        };
+        assert_eq!(kept(&[1, 2, 3], &[4, 3, 1]), [1, 4, 3]);
+        assert_eq!(kept(&[1, 2, 3], &[5, 4, 2, 3, 1]), [1, 2, 3, 5, 4]);
+        assert_eq!(kept(&[1, 2, 3], &[3, 1]), [1, 3]);
+        assert_eq!(kept(&[], &[2, 1]), [2, 1]);
+    }
 }

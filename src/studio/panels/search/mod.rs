@@ -77,6 +77,8 @@ pub struct SearchPanel {
     order: CardOrder,
     /// The lens that was clicked.
     selected: Option<SelectedLens>,
+    /// The places of the cards.
+    places: lenses::CardPlaces,
     /// The mutations of a line that are shown one after the other.
     replay: Replay,
     /// The search that was shown last: a new one turns the page.
@@ -192,7 +194,8 @@ impl SearchPanel {
         let chosen = self.selected_number();
         let marked = if is_roomy { plot::plots(ui, search, chosen) } else { None };
         let chosen = self.selected.as_ref();
-        let card = lenses::cards(ui, search, chosen, self.order, &mut self.thumbnails);
+        let card =
+            lenses::cards(ui, search, chosen, self.order, &mut self.places, &mut self.thumbnails);
         match card {
             Some(found) => self.select(search.view, found.number, &found.lens, actions),
             None => self.select_number(search.view, marked, actions),
