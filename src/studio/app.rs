@@ -6,7 +6,7 @@ use std::time::Duration;
 use eframe::{App, Storage};
 use egui::{
     Align, CentralPanel, Context, Frame, Id, Label, Layout, Margin, Modal, Panel as Side, RawInput,
-    Response, RichText, ScrollArea, Ui, ViewportCommand, vec2,
+    Response, RichText, ScrollArea, Sense, Ui, ViewportCommand, vec2,
 };
 
 use super::actions::{Actions, UiAction};
@@ -127,7 +127,9 @@ impl Studio {
         menu::shortcuts(ui, &menus, self.dock.is_typing(ui.ctx()), &mut actions);
         bar_frame(ui, Side::top("menu"), |ui| menu::bar(ui, &menus, &mut actions));
         self.dialogs.ui(ui.ctx(), &menus, &mut actions);
-        bar_frame(ui, Side::bottom("status"), |ui| Self::status_bar(ui, &view, &mut actions));
+        bar_frame(ui, Side::bottom("status"), |ui| {
+            status_bar(ui, &view, &mut self.message, &mut actions);
+        });
         CentralPanel::no_frame().show(ui, |ui| self.dock.ui(ui, &view, &mut actions));
         let context = ui.ctx().clone();
         self.receive_dropped_files(&context, &mut actions);
@@ -291,7 +293,12 @@ impl Studio {
                 });
             }
             ui.add_space(8.0);
-            read = ui.button("OK").clicked();
+            ui.horizontal(|ui| {
+                read = ui.button("OK").clicked();
+                if ui.button("Copy").on_hover_text("Copy the whole text").clicked() {
+                    ui.copy_text(text.clone());
+                }
+            });
         });
         if read || modal.should_close() {
             self.message = None;
@@ -307,22 +314,6 @@ impl Studio {
             context.send_viewport_cmd(ViewportCommand::Title(title.clone()));
             self.title = title;
         }
-    }
-
-    /// The line at the bottom: the last message, and the time of the analysis.
-    fn status_bar(ui: &mut Ui, view: &SessionView, actions: &mut Actions) {
-        let size = vec2(ui.available_width(), ui.spacing().interact_size.y);
-        // A long message ends where the texts at the right begin.
-        ui.allocate_ui_with_layout(size, Layout::right_to_left(Align::Center), |ui| {
-            ui.weak(timing_text(view))
-                .on_hover_text("Time to compute all numbers of all panels after the last edit");
-            if view.dirty {
-                ui.separator();
-                ui.weak("unsaved changes");
-            }
-            let left = Layout::left_to_right(Align::Center);
-            ui.with_layout(left, |ui| messages(ui, view, actions));
-        });
     }
 }
 
@@ -433,8 +424,25 @@ fn bar_frame(ui: &mut Ui, side: Side, show: impl FnOnce(&mut Ui)) {
     side.frame(frame).show_separator_line(false).show(ui, show);
 }
 
+/// The line at the bottom: the last message, and the time of the analysis. A message that is clicked is
+/// shown whole.
+fn status_bar(ui: &mut Ui, view: &SessionView, shown: &mut Option<String>, actions: &mut Actions) {
+    let size = vec2(ui.available_width(), ui.spacing().interact_size.y);
+    // A long message ends where the texts at the right begin.
+    ui.allocate_ui_with_layout(size, Layout::right_to_left(Align::Center), |ui| {
+        ui.weak(timing_text(view))
+            .on_hover_text("Time to compute all numbers of all panels after the last edit");
+        if view.dirty {
+            ui.separator();
+            ui.weak("unsaved changes");
+        }
+        let left = Layout::left_to_right(Align::Center);
+        ui.with_layout(left, |ui| messages(ui, view, shown, actions));
+    });
+}
+
 /// The last message until something else is done, and a menu of all messages.
-fn messages(ui: &mut Ui, view: &SessionView, actions: &mut Actions) {
+fn messages(ui: &mut Ui, view: &SessionView, shown: &mut Option<String>, actions: &mut Actions) {
     let messages = &view.messages;
     let Some(last) = messages.last() else {
         ui.weak("Ready");
@@ -443,7 +451,12 @@ fn messages(ui: &mut Ui, view: &SessionView, actions: &mut Actions) {
     ui.menu_button(format!("Messages ({})", messages.len()), |ui| {
         ui.set_min_width(420.0);
         ScrollArea::vertical().max_height(300.0).show(ui, |ui| {
-            messages.iter().rev().for_each(|message| drop(message_label(ui, message)));
+            let clicked =
+                messages.iter().rev().filter(|message| message_label(ui, message).clicked());
+            if let Some(message) = clicked.last() {
+                *shown = Some(message.text.clone());
+                ui.close();
+            }
         });
         if ui.button("Clear").clicked() {
             actions.push(Command::ClearMessages);
@@ -451,8 +464,8 @@ fn messages(ui: &mut Ui, view: &SessionView, actions: &mut Actions) {
         }
     });
     // An old message would contradict what was done since.
-    if view.message_is_recent {
-        message_label(ui, last);
+    if view.message_is_recent && message_label(ui, last).clicked() {
+        *shown = Some(last.text.clone());
     }
 }
 
@@ -465,7 +478,8 @@ fn message_label(ui: &mut Ui, message: &Message) -> Response {
     };
     let line = message.text.lines().next().unwrap_or_default();
     let text = RichText::new(capitalize(line)).color(color);
-    ui.add(Label::new(text).truncate()).on_hover_text(capitalize(&message.text))
+    let label = Label::new(text).truncate().sense(Sense::click());
+    ui.add(label).on_hover_text(capitalize(&message.text))
 }
 
 fn timing_text(view: &SessionView) -> String {

@@ -1,7 +1,7 @@
 //! The document of a session: edits, undo, and its files.
 
 use super::{Session, SessionEvent};
-use crate::files;
+use crate::files::{self, ConversionReport, SelfCheck};
 use crate::lens::{Aperture, Edit, ElementEdit, Lens, StartingLens, apply_edit};
 use crate::math::format_short;
 use crate::picture::{BitDepth, ToneCurve, encode_png};
@@ -180,7 +180,8 @@ impl Session {
                 self.replace_design(opened.lens, own);
                 self.resume_journal();
                 if let Some(report) = opened.report {
-                    self.post(Severity::Note, format!("imported {}\n{report}", path.display()));
+                    let text = import_text(path, &report, &opened.checks);
+                    self.post(Severity::Note, text);
                 }
                 self.events.push(SessionEvent::Opened(path.to_owned()));
             }
@@ -308,6 +309,18 @@ fn with_asked_focus(lens: &Arc<Lens>, asked: &StartingLens) -> Option<Lens> {
     }
     let model = RayModel::from_lens(&focused, 0).ok()?;
     model.first_order.efl.is_some_and(|focal_length| focal_length > 0.0).then_some(focused)
+}
+
+/// What is said of a foreign file: the numbers to compare with the program that wrote it, and what became
+/// of its lines.
+fn import_text(path: &Path, report: &ConversionReport, checks: &[SelfCheck]) -> String {
+    let mut lines = vec![format!("imported {}", path.display())];
+    if !checks.is_empty() {
+        lines.push("To compare with the program that wrote it:".to_owned());
+        lines.extend(checks.iter().map(|check| format!("  {check}")));
+    }
+    lines.push(report.to_string());
+    lines.join("\n")
 }
 
 /// The line that tells that a lens has the aperture and the fields that were asked for.
