@@ -12,7 +12,7 @@ use crate::session::{
     Command, GrinCommand, RunStatus, RunView, SessionView, SpecifiedDesignCommand,
     StructureSearchCommand,
 };
-use crate::studio::panels::add_variables_edit;
+use crate::studio::panels::{add_variables_edit, term_edits};
 
 /// A request with its title; `None` while it makes no sense.
 type Request = (&'static str, Option<Command>);
@@ -37,7 +37,10 @@ pub(super) fn commands(view: &SessionView) -> Vec<MenuItem> {
         let open = GrinCommand::OpenBuiltin(task.name.to_owned());
         MenuItem::new("Gradient index", format!("Open the task {}", task.name), open)
     });
-    groups.into_iter().flat_map(items).chain(tasks).collect()
+    let terms = term_edits(view)
+        .into_iter()
+        .map(|(title, edit)| MenuItem::new("Merit function", format!("Add a term: {title}"), edit));
+    groups.into_iter().flat_map(items).chain(tasks).chain(terms).collect()
 }
 
 /// A command for a run that waits, or takes steps.

@@ -232,6 +232,7 @@ fn the_palette_finds_commands_panels_and_lenses_by_words() {
         ("task luneburg-radial", "Gradient index: Open the task luneburg-radial"),
         ("hold focal", "Setting: Hold the focal length in drags"),
         ("effect never aim", "Setting: Effect"),
+        ("add term track", "Merit function: Add a term: Total track"),
     ] {
         keys(&mut harness, Modifiers::COMMAND, Key::K);
         harness.get_by_label("Find a command").type_text(words);

@@ -35,6 +35,7 @@ pub use grin::GrinPanel;
 pub use history::HistoryPanel;
 pub use layout::LayoutPanel;
 pub use optimizer::OptimizerPanel;
+pub(super) use optimizer::term_edits;
 pub use pareto::ParetoPanel;
 pub use picture::PicturePanel;
 pub use prescription::PrescriptionPanel;

@@ -248,6 +248,25 @@ impl MeritEditor {
     }
 }
 
+/// Every term that can be added to the merit function, with its title and the edit that adds it.
+pub(in crate::studio) fn term_edits(view: &SessionView) -> Vec<(String, Edit)> {
+    let goal = goal_of(view);
+    let edit = |weighted| {
+        let terms = [&goal.terms[..], &[weighted]].concat();
+        Edit::SetMerit(Some(Goal { terms, ..goal.clone() }))
+    };
+    let usual = terms::default_terms(view)
+        .into_iter()
+        .map(|weighted| (title(weighted.term).to_owned(), edit(weighted)));
+    let operands = scope::GROUPS.iter().flat_map(|(group, kinds)| {
+        kinds.iter().map(move |kind| {
+            let term = Term::Operand { kind: *kind, min: None, max: None };
+            (format!("{} ({group})", title(term)), edit(WeightedTerm::new(term, 1.0)))
+        })
+    });
+    usual.chain(operands).collect()
+}
+
 /// The merit function of the design.
 fn goal_of(view: &SessionView) -> Goal {
     let own = view.goal.as_ref().map(|goal| Goal::clone(goal));
@@ -310,23 +329,45 @@ impl MeritRow {
         let removed = self.name_cell(ui, view, &title);
         let name = format!("Weight of {title}");
         number_field(ui, buffers, &name, &mut self.weighted.weight, 46.0);
-        // A narrow panel has the targets below each other.
-        let room = vec2(at.target_width, ui.spacing().interact_size.y);
-        let wrapping = Arrange::left_to_right(Align::Center).with_main_wrap(true);
-        ui.allocate_ui_with_layout(room, wrapping, |ui| {
-            ui.spacing_mut().item_spacing = vec2(2.0, 2.0);
-            let targets = targets(&mut self.weighted.term);
-            for (what, value) in targets {
-                let name = format!("{what} of {title}");
-                number_field(ui, buffers, &name, value, 46.0);
-            }
-            scope::bounds(ui, buffers, &title, &mut self.weighted.term);
-            ui.weak(unit(term));
-            self.field_choice(ui, view, &title);
-            scope::button(ui, buffers, &view.lens, &title, &mut self.weighted);
-        });
+        self.target_cell(ui, view, buffers, &title, at.target_width);
         self.value_cell(ui, view, at);
         removed
+    }
+
+    /// The targets, below each other in a narrow panel. A table centres a cell by the height that is
+    /// asked for: that of the frame before.
+    fn target_cell(
+        &mut self,
+        ui: &mut Ui,
+        view: &SessionView,
+        buffers: &mut EditBuffers,
+        title: &str,
+        width: f32,
+    ) {
+        let line = ui.spacing().interact_size.y;
+        let id = Id::unique(("height of targets", title));
+        let height = ui.data(|data| data.get_temp(id)).unwrap_or(line);
+        let from_top = Arrange::top_down(Align::Min);
+        let cell = ui.allocate_ui_with_layout(vec2(width, height), from_top, |ui| {
+            let wrapping = Arrange::left_to_right(Align::Center).with_main_wrap(true);
+            let targets = ui.allocate_ui_with_layout(vec2(width, line), wrapping, |ui| {
+                self.targets(ui, view, buffers, title);
+            });
+            targets.response.rect.height()
+        });
+        ui.data_mut(|data| data.insert_temp(id, cell.inner));
+    }
+
+    fn targets(&mut self, ui: &mut Ui, view: &SessionView, buffers: &mut EditBuffers, title: &str) {
+        ui.spacing_mut().item_spacing = vec2(2.0, 2.0);
+        for (what, value) in targets(&mut self.weighted.term) {
+            let name = format!("{what} of {title}");
+            number_field(ui, buffers, &name, value, 46.0);
+        }
+        scope::bounds(ui, buffers, title, &mut self.weighted.term);
+        ui.weak(unit(self.weighted.term));
+        self.field_choice(ui, view, title);
+        scope::button(ui, buffers, &view.lens, title, &mut self.weighted);
     }
 
     /// The button that removes the term, and its title, by which it counts or not.

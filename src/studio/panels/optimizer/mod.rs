@@ -27,6 +27,7 @@ use crate::studio::panels::widgets::{
 use crate::studio::text::{capitalize, status_text};
 use crate::studio::text_input::EditBuffers;
 use merit_editor::MeritEditor;
+pub(in crate::studio) use merit_editor::term_edits;
 
 /// The height of the merit history, in points; less if there is little room.
 const HISTORY: f32 = 130.0;
