@@ -4,11 +4,12 @@ use egui::{Align2, Context, Id, ScrollArea, TextEdit, Ui, Window, vec2};
 use egui_commonmark::{CommonMarkCache, CommonMarkViewer};
 
 /// The pages in their order; the title of each is its first line.
-const PAGES: [&str; 9] = [
+const PAGES: [&str; 10] = [
     include_str!("../../assets/manual/begin.md"),
     include_str!("../../assets/manual/system.md"),
     include_str!("../../assets/manual/table.md"),
     include_str!("../../assets/manual/elements.md"),
+    include_str!("../../assets/manual/sculpt.md"),
     include_str!("../../assets/manual/quality.md"),
     include_str!("../../assets/manual/improve.md"),
     include_str!("../../assets/manual/search.md"),

@@ -340,7 +340,7 @@ fn values_follow_the_pointer() {
 #[test]
 fn numbers_that_move_have_short_names() {
     let name = |surface, quantity| short_name(Parameter::new(surface, quantity));
-    assert_eq!(name(2, Quantity::Curvature), "c3");
+    assert_eq!(name(2, Quantity::Curvature), "R3");
     assert_eq!(name(0, Quantity::Thickness), "t1");
     assert_eq!(name(4, Quantity::ZoomThickness(1)), "t5 (zoom 2)");
 }

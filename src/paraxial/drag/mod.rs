@@ -294,11 +294,12 @@ pub fn tangents(
     Handle::all(lens, zoom).into_iter().filter_map(of_handle).collect()
 }
 
-/// A short name of a number, as in `c3` or `t4`, counted from 1.
+/// A short name of a number, as in `R3` for a radius or `t4`, counted from 1.
 pub fn short_name(parameter: Parameter) -> String {
     let surface = SurfaceNumber::new(parameter.surface);
     match parameter.quantity {
-        Quantity::Curvature => format!("c{surface}"),
+        // The prescription shows radii.
+        Quantity::Curvature => format!("R{surface}"),
         Quantity::Thickness => format!("t{surface}"),
         Quantity::ZoomThickness(zoom) => format!("t{surface} (zoom {})", zoom + 1),
         _ => parameter.to_string(),
