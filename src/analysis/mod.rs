@@ -11,6 +11,7 @@ mod color_error;
 mod diffraction;
 mod distortion;
 mod fan;
+mod field_curves;
 mod fitted_wavefront;
 mod footprint;
 mod geometric_radius;
@@ -43,6 +44,7 @@ pub use distortion::{
     field_curvature,
 };
 pub use fan::{Fan, FanPoint, fan};
+pub use field_curves::{FieldCurvePoint, FieldCurves, field_curves};
 pub use fitted_wavefront::{
     FittedWavefront, ImageRay, WavefrontCost, WavefrontReference, brightest_strehl, image_rays,
     rms_without_tilt,

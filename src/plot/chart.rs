@@ -93,7 +93,7 @@ fn range(values: impl IntoIterator<Item = f64>) -> Option<(f64, f64)> {
 }
 
 /// The smallest of 1, 2 and 5 times a power of ten that is not less.
-fn round_step(step: f64) -> f64 {
+pub fn round_step(step: f64) -> f64 {
     let power = 10f64.powf(step.log10().floor());
     let digits = [1.0, 2.0, 5.0, 10.0];
     power * digits.into_iter().find(|digit| digit * power >= 0.999 * step).unwrap_or(10.0)

@@ -36,6 +36,22 @@ impl ChartCurve {
         Self { name: name.into(), color: color % PALETTE.len(), dashed: false, pieces }
     }
 
+    /// Crosses of a size in the unit of the axes.
+    pub fn crosses(name: impl Into<String>, color: usize, points: &[[f64; 2]], size: f64) -> Self {
+        let arm = 0.5 * size;
+        let cross = |[x, y]: &[f64; 2]| {
+            [vec![[x - arm, *y], [x + arm, *y]], vec![[*x, y - arm], [*x, y + arm]]]
+        };
+        let pieces = points.iter().flat_map(cross).collect();
+        Self { name: name.into(), color: color % PALETTE.len(), dashed: false, pieces }
+    }
+
+    /// Upright lines from a floor to each point.
+    pub fn bars(name: impl Into<String>, color: usize, points: &[[f64; 2]], floor: f64) -> Self {
+        let pieces = points.iter().map(|[x, y]| vec![[*x, floor], [*x, *y]]).collect();
+        Self { name: name.into(), color: color % PALETTE.len(), dashed: false, pieces }
+    }
+
     /// The same with dashes.
     #[must_use]
     pub fn dashed(self) -> Self {
@@ -67,6 +83,11 @@ impl CurveChart {
     /// A chart whose axes have scales of their own.
     pub fn new(title: impl Into<String>, axes: [&'static str; 2], curves: Vec<ChartCurve>) -> Self {
         Self { title: title.into(), axes, curves, is_map: false }
+    }
+
+    /// A map: both axes have the same scale.
+    pub fn map(title: impl Into<String>, axes: [&'static str; 2], curves: Vec<ChartCurve>) -> Self {
+        Self { is_map: true, ..Self::new(title, axes, curves) }
     }
 
     /// The first curve of each name.

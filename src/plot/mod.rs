@@ -7,14 +7,16 @@
 mod canvas;
 mod chart;
 mod color;
+mod contour;
 mod curve_sheet;
 mod document;
 mod font;
 mod vector;
 
 pub use canvas::{Canvas, NamedPlot, Stroke, TextAlign, draw_image_row, gray_levels};
-pub use chart::{Axis, Chart, Legend};
+pub use chart::{Axis, Chart, Legend, round_step};
 pub use color::{BLACK, Color, GREY, GRID, PALETTE, diverging, glow, gray_level};
+pub use contour::ContourGrid;
 pub use curve_sheet::{ChartCurve, CurveChart, CurveSheet};
 pub use document::{DocumentBlock, DocumentTable, ReportDocument, html_text, paper_pages};
 pub use vector::{

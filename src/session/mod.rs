@@ -34,7 +34,7 @@ mod view;
 
 pub use analysis::{
     Analyses, AnalysisResults, AnalysisSettings, AsBuiltLens, FieldContrast, FieldContrasts,
-    FieldCurvePoint, FieldCurves, FieldFans, FieldPupils, ScenePicture, analyze, predict_as_built,
+    FieldFans, FieldPupils, ScenePicture, analyze, predict_as_built,
 };
 pub use clock::Timed;
 pub use command::{Command, PanelSetting};

@@ -178,8 +178,23 @@ fn curves_of_an_analysis_are_drawn() {
         let text = fs::read_to_string(&svg).unwrap();
         assert!(text.matches("0.35").count() >= 2, "{kind}");
     }
-    let expected = ["--plot", "`spot` has no curves", "fan", "encircled-energy"];
-    refused(2, &["analyze", lens, "spot", "--plot", &svg], "", &expected);
+    // A kind, a word of its drawing and the least number of its lines.
+    for (kind, word, lines) in [
+        ("spot", "0.6562725 um", 1000),
+        ("footprint", "beam on surface 1", 6),
+        ("wavefront", "wavelengths", 300),
+        ("zernike", "fringe", 200),
+        ("psf", "lg intensity", 12),
+        ("ghosts", "lg irradiance", 90),
+        ("distortion", "against f theta", 4),
+        ("field-curvature", "sagittal", 4),
+        ("lateral-color", "0.4861327 um", 6),
+        ("illumination", "relative illumination, %", 2),
+    ] {
+        done_json(&["analyze", lens, kind, "--error", "1%", "--plot", &svg], "");
+        let text = fs::read_to_string(&svg).unwrap();
+        assert!(text.matches("0.35").count() >= lines && text.contains(word), "{kind}: {text}");
+    }
     refused(
         2,
         &["analyze", lens, "fan", "--plot", "fan.gif"],

@@ -1,6 +1,6 @@
 //! The curves of an analysis as a picture or on paper: a row of charts for each field.
 
-use super::{AnalysisReport, FieldOutcome, TextLines};
+use super::{AnalysisReport, AnalysisRun, FieldOutcome, TextLines, field_charts};
 use crate::cli::error::CliError;
 use crate::cli::output::ShortNumber;
 use crate::files;
@@ -12,14 +12,20 @@ use std::path::Path;
 /// The extensions of the files that can be written.
 pub(super) const EXTENSIONS: [&str; 3] = ["png", "svg", "pdf"];
 
-/// Draws the curves of all fields that have light into a file.
+/// Draws a result into a file: over the field, or for each field that has light.
 pub(super) fn save<T: TextLines>(
+    run: &AnalysisRun,
     report: &AnalysisReport<T>,
-    lens: &str,
     path: &Path,
 ) -> Result<(), CliError> {
-    let sheet = CurveSheet { title: format!("{lens}: {}", T::TITLE), rows: rows(report) };
+    let lens = run.opened.lens.name.as_str();
+    let over_field = field_charts::charts(run);
+    let rows = if over_field.is_empty() { rows(report) } else { vec![over_field] };
     let fail = |why: String| CliError::Failed(format!("{}: {why}", path.display()));
+    if rows.iter().flatten().all(|chart| chart.curves.is_empty()) {
+        return Err(fail("there is nothing to draw".to_owned()));
+    }
+    let sheet = CurveSheet { title: format!("{lens}: {}", T::TITLE), rows };
     let bytes = if has_extension(path, "png") {
         sheet.canvas().png().map_err(|why| fail(why.to_string()))?
     } else if has_extension(path, "svg") {

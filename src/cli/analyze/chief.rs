@@ -136,8 +136,7 @@ impl TextLines for GridJson {
         let ideal = lines.iter().map(|of| line(of.clone(), 1, |point| Some(point.ideal)));
         let real = lines.iter().map(|of| line(of.clone(), 0, |point| point.real));
         let all = ideal.chain(real).collect();
-        let chart = CurveChart::new("distortion", ["x, mm", "y, mm"], all);
-        vec![CurveChart { is_map: true, ..chart }]
+        vec![CurveChart::map("distortion", ["x, mm", "y, mm"], all)]
     }
 }
 

@@ -12,6 +12,7 @@ use crate::lens::FieldPoint;
 use crate::measure::time_ms;
 use crate::plot::{ChartCurve, CurveChart};
 use serde::Serialize;
+use std::f64::consts::TAU;
 
 /// The number of zones of the pupil.
 const ZONES: usize = 10;
@@ -217,5 +218,25 @@ impl TextLines for FootprintJson {
         };
         lines.extend(self.outline.iter().step_by(6).map(corner));
         lines
+    }
+
+    /// The edge of the beam, and the rim.
+    fn charts(&self) -> Vec<CurveChart> {
+        let closed = self.outline.iter().chain(self.outline.first()).copied().collect();
+        let line = |name: &str, color, points| {
+            let pieces = vec![points];
+            ChartCurve { name: name.to_owned(), color, dashed: false, pieces }
+        };
+        let on_rim = |radius: f64| {
+            let point = |i: usize| {
+                let (sin, cos) = (TAU * i as f64 / EDGE as f64).sin_cos();
+                [radius * cos, radius * sin]
+            };
+            line("rim", 1, (0..=EDGE).map(point).collect()).dashed()
+        };
+        let curves = self.semi_diameter.map(on_rim).into_iter();
+        let curves = std::iter::once(line("beam", 0, closed)).chain(curves).collect();
+        let title = format!("beam on surface {}", self.surface + 1);
+        vec![CurveChart::map(title, ["x, mm", "y, mm"], curves)]
     }
 }

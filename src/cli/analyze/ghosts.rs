@@ -6,6 +6,7 @@ use crate::cli::error::CliError;
 use crate::cli::output::{ShortNumber, TextTable, counted};
 use crate::lens::SurfaceNumber;
 use crate::measure::time_ms;
+use crate::plot::{ChartCurve, CurveChart};
 use crate::trace::Fates;
 use serde::Serialize;
 
@@ -141,7 +142,29 @@ impl TextLines for GhostsJson {
         lines.extend(table.to_string().lines().map(str::to_owned));
         lines
     }
+
+    /// The irradiances by rank; the brightest have names.
+    fn charts(&self) -> Vec<CurveChart> {
+        let lit = || self.ghosts.iter().filter(|ghost| ghost.irradiance > 0.0);
+        let logarithms: Vec<f64> = lit().map(|ghost| ghost.irradiance.log10()).collect();
+        let floor = logarithms.iter().fold(0.0, |least: f64, value| least.min(*value)).floor();
+        let bar = |(rank, (ghost, value)): (usize, (&GhostJson, &f64))| {
+            let number = |surface: usize| SurfaceNumber::new(surface);
+            let [first, second] = [ghost.first_reflection, ghost.second_reflection].map(number);
+            let (name, color) = if rank < NAMED {
+                (format!("surfaces {first}, {second}"), rank)
+            } else {
+                ("others".to_owned(), NAMED)
+            };
+            ChartCurve::bars(name, color, &[[rank as f64 + 1.0, *value]], floor)
+        };
+        let curves = lit().zip(&logarithms).enumerate().map(bar).collect();
+        vec![CurveChart::new("ghosts", ["rank", "lg irradiance"], curves)]
+    }
 }
+
+/// The number of ghosts with a colour of their own.
+const NAMED: usize = 7;
 
 fn cells(ghost: &GhostJson) -> Vec<String> {
     let short = |value: f64| format!("{value:.3}");

@@ -7,6 +7,7 @@ mod color;
 mod contrast;
 mod csv;
 mod fan;
+mod field_charts;
 mod focus;
 mod ghosts;
 mod illumination;
@@ -100,8 +101,7 @@ pub(super) struct AnalyzeArgs {
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
 
-    /// Draws the curves of fan, distortion-grid, longitudinal, through-focus, opd-fan, encircled-energy,
-    /// mtf or through-focus-mtf: .png, .svg or .pdf
+    /// Draws the result: .png, .svg or .pdf
     #[arg(long, value_name = "FILE")]
     plot: Option<PathBuf>,
 
@@ -227,14 +227,6 @@ impl AnalysisKind {
         }
     }
 
-    /// True for curves, which can be drawn.
-    fn has_curves(self) -> bool {
-        let by_rays =
-            matches!(self, Self::Fan | Self::OpdFan | Self::Longitudinal | Self::ThroughFocus);
-        let by_light = matches!(self, Self::Mtf | Self::ThroughFocusMtf | Self::EncircledEnergy);
-        by_rays || by_light || self == Self::DistortionGrid
-    }
-
     /// The purpose that effects are planned for.
     fn purpose(self, tolerance: f64) -> TracePurpose {
         match self {
@@ -262,7 +254,6 @@ impl AnalyzeArgs {
         let mut paths = OutputPaths::reading([("the lens", self.lens.path())]);
         paths.file("--csv", self.csv.as_deref(), &["csv"])?;
         paths.file("--plot", self.plot.as_deref(), &charts::EXTENSIONS)?;
-        self.check_plot()?;
         let run = AnalysisRun::new(self)?;
         match self.what {
             AnalysisKind::Spot => self.finish(&run, spot::spots(&run), output),
@@ -318,22 +309,10 @@ impl AnalyzeArgs {
             failures.note(files::write_atomic(path, csv::csv(&value).as_bytes()));
         }
         if let Some(path) = &self.plot {
-            failures.note(charts::save(&report, &run.opened.lens.name, path));
+            failures.note(charts::save(run, &report, path));
         }
         failures.note(output.print(&report));
         failures.into_result()
-    }
-
-    /// Refuses a plot of an analysis that has no curves.
-    fn check_plot(&self) -> Result<(), CliError> {
-        if self.plot.is_none() || self.what.has_curves() {
-            return Ok(());
-        }
-        let name = |kind: &AnalysisKind| kind.to_possible_value().map(|v| v.get_name().to_owned());
-        let all = AnalysisKind::value_variants().iter().filter(|kind| kind.has_curves());
-        let curves = all.filter_map(name).collect::<Vec<_>>().join(", ");
-        let asked = name(&self.what).unwrap_or_default();
-        Err(CliError::Input(format!("--plot: `{asked}` has no curves; expected one of {curves}")))
     }
 
     /// Refuses radii that are no positive numbers, frequencies below zero, and more frequencies than are
@@ -376,6 +355,8 @@ struct AnalysisRun {
     frequencies: Vec<f64>,
     /// The points of a diffraction image, in mm from the image point of the chief ray.
     points: Vec<[f64; 2]>,
+    /// True if the result is drawn as well.
+    is_drawn: bool,
 }
 
 /// A selected field.
@@ -410,7 +391,19 @@ impl AnalysisRun {
         fields.truncate(chosen.map_or(fields.len(), |_| 1));
         let accuracy = Accuracy { tolerance: analyze.error.0, ..Accuracy::default() };
         let (frequencies, points) = (analyze.frequencies.clone(), analyze.points.clone());
-        Ok(Self { what, opened, plan, model, fields, zoom, accuracy, frequencies, points })
+        let is_drawn = analyze.plot.is_some();
+        Ok(Self {
+            what,
+            opened,
+            plan,
+            model,
+            fields,
+            zoom,
+            accuracy,
+            frequencies,
+            points,
+            is_drawn,
+        })
     }
 
     fn primary_um(&self) -> f64 {
@@ -546,7 +539,7 @@ trait TextLines {
     const TITLE: &'static str;
     /// The lines of a field.
     fn lines(&self) -> Vec<String>;
-    /// The curves of a field, as charts.
+    /// The curves of a field, as charts; none for a result that is drawn over the field.
     fn charts(&self) -> Vec<CurveChart> {
         Vec::new()
     }

@@ -23,6 +23,9 @@ pub(super) struct PointSpreadJson {
     /// The rounding error of a length, in mm.
     #[serde(skip)]
     rounding: f64,
+    /// The intensities along x and along y, if they are drawn.
+    #[serde(skip)]
+    profiles: [Vec<[f64; 2]>; 2],
 }
 
 /// The intensity at a point, in mm from the image point of the chief ray.
@@ -63,11 +66,34 @@ pub(super) fn point_spreads(run: &AnalysisRun) -> Vec<AtField<PointSpreadJson>> 
         });
         let keys = found.map(|(spread, strehl)| PointSpreadJson {
             rounding: run.rounding(),
+            profiles: if run.is_drawn { profiles(run, field) } else { Default::default() },
             ..keys(&spread, strehl, &points, ms)
         });
         AtField::new(field, keys)
     };
     run.fields.iter().map(at).collect()
+}
+
+/// The points of a drawn profile on each side of its centre, and the distance that they reach in λF.
+const DRAWN: (i32, f64) = (40, 5.0);
+/// The rays of the drawn profiles.
+const DRAWN_RAYS: usize = 100_000;
+
+/// The intensities along x and along y through the image point of the chief ray, over the distance in
+/// micrometres.
+fn profiles(run: &AnalysisRun, field: &SelectedField) -> [Vec<[f64; 2]>; 2] {
+    let (count, reach) = DRAWN;
+    let place = |i: i32| f64::from(i) / f64::from(count) * reach * unit(run);
+    let along_x = (-count..=count).map(|i| [place(i), 0.0]);
+    let along_y = (-count..=count).map(|i| [0.0, place(i)]);
+    let points: Vec<[f64; 2]> = along_x.chain(along_y).collect();
+    let accuracy = Accuracy { max_rays: DRAWN_RAYS, ..run.accuracy };
+    let found = point_spread(&run.model, field.traced, run.model.primary, &points, accuracy);
+    let Ok(found) = found else { return Default::default() };
+    let drawn = points.iter().zip(&found.intensities);
+    let drawn: Vec<_> = drawn.map(|(at, e)| [1e3 * (at[0] + at[1]), e.value]).collect();
+    let (x, y) = drawn.split_at(drawn.len() / 2);
+    [x.to_vec(), y.to_vec()]
 }
 
 fn keys(spread: &PointSpread, strehl: Strehl, points: &[[f64; 2]], ms: f64) -> PointSpreadJson {
@@ -83,6 +109,7 @@ fn keys(spread: &PointSpread, strehl: Strehl, points: &[[f64; 2]], ms: f64) -> P
         reached: spread.reached && strehl.reached,
         points: points.iter().zip(&spread.intensities).map(point).collect(),
         rounding: 0.0,
+        profiles: Default::default(),
     }
 }
 
@@ -108,7 +135,27 @@ impl TextLines for PointSpreadJson {
         }
         lines
     }
+
+    /// The profiles, linear and logarithmic.
+    fn charts(&self) -> Vec<CurveChart> {
+        let chart = |title: &str, axis: &'static str, number: fn(f64) -> Option<f64>| {
+            let curve = |(i, name): (usize, &str)| {
+                let points = self.profiles[i].iter().map(|[at, value]| (*at, number(*value)));
+                ChartCurve::new(name, i, points)
+            };
+            let curves = ["along x", "along y"].into_iter().enumerate().map(curve).collect();
+            CurveChart::new(title, ["distance, um", axis], curves)
+        };
+        let logarithm = |value: f64| (value > DARK).then(|| value.log10());
+        vec![
+            chart("diffraction image", "intensity", Some),
+            chart("its logarithm", "lg intensity", logarithm),
+        ]
+    }
 }
+
+/// Intensities below this are not drawn on a logarithmic scale.
+const DARK: f64 = 1e-6;
 
 /// The encircled energy of a field.
 #[derive(Serialize)]

@@ -1,7 +1,11 @@
 //! The spot of a field.
 
 use super::{AnalysisRun, AtField, SelectedField, TextLines, estimate_text, with_time};
-use crate::analysis::{AnalysisError, Estimate, MonochromaticSpot, Spot, spot};
+use crate::analysis::{
+    AnalysisError, Estimate, MonochromaticSpot, Spot, SpotPoints, spot, spot_points,
+};
+use crate::plot::{ChartCurve, CurveChart};
+use crate::pupil::RayModel;
 use serde::Serialize;
 
 /// The spot of a field.
@@ -14,6 +18,9 @@ pub(super) struct SpotJson {
     reached: bool,
     radius_reached: bool,
     colors: Vec<ColorSpotJson>,
+    /// The points of the diagram, if it is drawn.
+    #[serde(skip)]
+    points: Vec<SpotPoints>,
 }
 
 /// The spot at one wavelength.
@@ -37,7 +44,8 @@ enum ColorSpotJson {
 pub(super) fn spots(run: &AnalysisRun) -> Vec<AtField<SpotJson>> {
     let at = |field: &SelectedField| {
         let result = with_time(|| spot(&run.model, field.traced, run.accuracy), note_time);
-        AtField::new(field, result.map(|spot| SpotJson::new(run, &spot)))
+        let points = if run.is_drawn { diagram(run, field) } else { Vec::new() };
+        AtField::new(field, result.map(|spot| SpotJson { points, ..SpotJson::new(run, &spot) }))
     };
     run.fields.iter().map(at).collect()
 }
@@ -69,7 +77,23 @@ impl SpotJson {
                 && spot.channels.iter().flatten().all(|color| color.converged),
             radius_reached: spot.radius.error <= allowed,
             colors: colors.map(|(color, spot)| ColorSpotJson::new(color.um, spot)).collect(),
+            points: Vec::new(),
         }
+    }
+}
+
+/// The points of the diagram of a field.
+fn diagram(run: &AnalysisRun, field: &SelectedField) -> Vec<SpotPoints> {
+    spot_points(&RayModel { fields: vec![field.traced], ..run.model.clone() })
+}
+
+/// The size of a cross, in parts of the geometric radius.
+const CROSS: f64 = 0.04;
+
+impl ColorSpotJson {
+    const fn wavelength_um(&self) -> f64 {
+        let (Self::Transmitted { wavelength_um, .. } | Self::Dark { wavelength_um, .. }) = self;
+        *wavelength_um
     }
 }
 
@@ -118,5 +142,19 @@ impl TextLines for SpotJson {
         }
         lines.extend(self.colors.iter().map(ColorSpotJson::line));
         lines
+    }
+
+    /// The diagram about the centroid.
+    fn charts(&self) -> Vec<CurveChart> {
+        let centroid = [self.centroid_x.value, self.centroid_y.value];
+        let um = |point: &[f64; 2]| [0, 1].map(|k| 1e3 * (point[k] - centroid[k]));
+        let size = 1e3 * CROSS * self.radius.value;
+        let of_color = |spot: &SpotPoints| {
+            let name = format!("{} um", self.colors[spot.wavelength].wavelength_um());
+            let points: Vec<_> = spot.points.iter().map(um).collect();
+            ChartCurve::crosses(name, spot.wavelength, &points, size)
+        };
+        let curves = self.points.iter().map(of_color).collect();
+        vec![CurveChart::map("spot about its centroid", ["x, um", "y, um"], curves)]
     }
 }

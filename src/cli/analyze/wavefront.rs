@@ -8,7 +8,7 @@ use crate::analysis::{
 };
 use crate::cli::output::{ShortNumber, counted, or_dash};
 use crate::measure::time_ms;
-use crate::plot::{ChartCurve, CurveChart};
+use crate::plot::{ChartCurve, ContourGrid, CurveChart, round_step};
 use serde::Serialize;
 
 /// The wavefront of a field.
@@ -22,6 +22,9 @@ pub(super) struct WavefrontJson {
     missed: f64,
     chief: ChiefJson,
     map: Vec<PathJson>,
+    /// The path differences over the pupil, if they are drawn.
+    #[serde(skip)]
+    grid: Option<ContourGrid>,
 }
 
 /// The chief ray, and the sphere on which the paths of the map are compared with its own.
@@ -71,6 +74,7 @@ pub(super) fn wavefronts(run: &AnalysisRun, asked: &[[f64; 2]]) -> Vec<AtField<W
         let keys = found.and_then(|found| {
             let timed = |e| Estimate { milliseconds: Some(ms), ..e };
             let (chief, map) = paths(run, field, &points)?;
+            let grid = run.is_drawn.then(|| path_grid(run, field)).transpose()?;
             Ok(WavefrontJson {
                 rms: timed(found.rms),
                 rms_without_tilt: found.rms_without_tilt.map(timed),
@@ -80,11 +84,48 @@ pub(super) fn wavefronts(run: &AnalysisRun, asked: &[[f64; 2]]) -> Vec<AtField<W
                 missed: found.missed,
                 chief,
                 map,
+                grid,
             })
         });
         AtField::new(field, keys)
     };
     run.fields.iter().map(at).collect()
+}
+
+/// The number of intervals of the grid of a drawing from the centre of the pupil to its rim.
+const GRID: i32 = 40;
+
+/// The path differences on a grid over the pupil.
+fn path_grid(run: &AnalysisRun, field: &SelectedField) -> Result<ContourGrid, AnalysisError> {
+    let side: Vec<f64> = (-GRID..=GRID).map(|i| f64::from(i) / f64::from(GRID)).collect();
+    let points: Vec<[f64; 2]> = side.iter().flat_map(|y| side.iter().map(|x| [*x, *y])).collect();
+    let (_, found) = paths(run, field, &points)?;
+    let values = found.iter().map(|path| path.waves.filter(|_| path.px.hypot(path.py) <= 1.0));
+    Ok(ContourGrid { places: [side.clone(), side], values: values.collect() })
+}
+
+/// The largest number of contour lines.
+const CONTOURS: f64 = 10.0;
+
+/// The contour lines of the path differences, full where they are positive.
+fn contours(grid: &ContourGrid) -> Vec<ChartCurve> {
+    let Some([least, most]) = grid.range().filter(|[least, most]| most > least) else {
+        return Vec::new();
+    };
+    let step = round_step((most - least) / CONTOURS);
+    #[expect(clippy::cast_possible_truncation, reason = "about ten lines")]
+    let [first, last] = [(least / step).ceil(), (most / step).floor()].map(|i| i as i64);
+    let line = |i: i64| {
+        let name = match i {
+            0 => "0".to_owned(),
+            1.. => format!("above, every {} wavelengths", ShortNumber(step)),
+            _ => "below".to_owned(),
+        };
+        let color = usize::from(i < 0) + 2 * usize::from(i == 0);
+        let pieces = grid.line(i as f64 * step);
+        ChartCurve { name, color, dashed: i < 0, pieces }
+    };
+    (first..=last).map(line).collect()
 }
 
 /// The chief ray and the path differences at some pupil points.
@@ -125,6 +166,12 @@ impl TextLines for WavefrontJson {
             lines.push("the tolerance was not reached".to_owned());
         }
         lines
+    }
+
+    /// The contour lines over the pupil.
+    fn charts(&self) -> Vec<CurveChart> {
+        let curves = self.grid.as_ref().map(contours).unwrap_or_default();
+        vec![CurveChart::map("wavefront", ["pupil x", "pupil y"], curves)]
     }
 }
 
@@ -249,6 +296,17 @@ impl TextLines for ZernikeJson {
             lines.push(format!("{:>4}  {noll:>20}  {first:<22}  {fringe:>20}  {second}", i + 1));
         }
         lines
+    }
+
+    /// The coefficients as bars.
+    fn charts(&self) -> Vec<CurveChart> {
+        let bars = |name: &str, color: usize, list: &[Estimate], shift: f64| {
+            let place = |(i, e): (usize, &Estimate)| [i as f64 + 1.0 + shift, e.value];
+            let points: Vec<_> = list.iter().enumerate().map(place).collect();
+            ChartCurve::bars(name, color, &points, 0.0)
+        };
+        let curves = vec![bars("Noll", 0, &self.noll, 0.0), bars("fringe", 1, &self.fringe, 0.3)];
+        vec![CurveChart::new("Zernike coefficients", ["number", "wavelengths"], curves)]
     }
 }
 

@@ -6,19 +6,17 @@
 
 mod as_built;
 mod contrast;
-mod field_curves;
 mod pupils;
 mod scene_picture;
 
 pub use as_built::{AsBuiltLens, predict_as_built};
 pub use contrast::{FieldContrast, FieldContrasts};
-pub use field_curves::{FieldCurvePoint, FieldCurves};
 pub use pupils::FieldPupils;
 pub use scene_picture::ScenePicture;
 
 use super::clock::{Timed, now, time};
 use super::run::{LatestRequestWorker, WorkerOutput, catch_panic};
-use crate::analysis::{self, AnalysisError, Fan, RayLayout, Spot, SpotPoints};
+use crate::analysis::{self, AnalysisError, Fan, FieldCurves, RayLayout, Spot, SpotPoints};
 use crate::effects::{self, Effect, EffectOverride, EffectOverrides, EffectPlan, TracePurpose};
 use crate::lens::{FieldPoint, Lens};
 use crate::measure::EffectTask;
@@ -341,7 +339,7 @@ impl Analyses {
         let field_curves = settings.field_curves.then(|| {
             time(|| {
                 let model = model_with_all_rims(lens, settings.zoom, &b, &plan.value);
-                field_curves::field_curves(&model, accuracy)
+                analysis::field_curves(&model, accuracy)
             })
         });
         unless_interrupted()?;

@@ -1,12 +1,14 @@
-//! Distortion, field curvature and relative illumination over the field, as lens data sheets show them.
+//! Distortion, field curvature, lateral colour and relative illumination over the field, as lens data sheets
+//! show them.
 
 use egui::{RichText, Ui, WidgetInfo};
 use egui_plot::{Corner, HLine, Legend, Line, LineStyle, PlotPoints};
 
 use super::widgets::fixed_plot;
 use super::{Panel, displayed_results, show_missing_results};
-use crate::lens::FieldKind;
-use crate::session::{FieldCurvePoint, FieldCurves, SessionView};
+use crate::analysis::{FieldCurvePoint, FieldCurves};
+use crate::lens::{FieldKind, Lens, Wavelength};
+use crate::session::SessionView;
 use crate::studio::actions::Actions;
 use crate::studio::draw::Rgba;
 use crate::studio::number;
@@ -40,9 +42,10 @@ impl Panel for FieldCurvesPanel {
         }
         let kind = results.lens.fields_at(results.settings.zoom).kind;
         summary(ui, &curves.value, curves.ms);
-        let height = (ui.available_height() / 3.0 - TITLE).max(LOWEST);
+        let charts = charts(&curves.value, &results.lens, Palette::for_visuals(ui.visuals()));
+        let height = (ui.available_height() / charts.len() as f32 - TITLE).max(LOWEST);
         egui::ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
-            for chart in charts(&curves.value, Palette::for_visuals(ui.visuals())) {
+            for chart in charts {
                 chart.show(ui, unit(kind), height);
             }
         });
@@ -69,7 +72,7 @@ fn summary(ui: &mut Ui, curves: &FieldCurves, ms: f64) {
 
 /// A curve with its name, its colour and how it is drawn.
 struct Curve {
-    name: &'static str,
+    name: String,
     points: Vec<[f64; 2]>,
     color: Rgba,
     dashed: bool,
@@ -83,13 +86,14 @@ struct Chart {
     from_zero: bool,
 }
 
-fn charts(curves: &FieldCurves, palette: Palette) -> [Chart; 3] {
+fn charts(curves: &FieldCurves, lens: &Lens, palette: Palette) -> Vec<Chart> {
     let [first, second] = [palette.field(0), palette.field(1)];
     let against = |number: &dyn Fn(&FieldCurvePoint) -> Option<f64>| {
         let point = |point: &FieldCurvePoint| Some([point.height, number(point)?]);
         curves.points.iter().filter_map(point).collect::<Vec<_>>()
     };
-    let curve = |name, color, dashed, points| Curve { name, points, color, dashed };
+    let curve =
+        |name: &str, color, dashed, points| Curve { name: name.to_owned(), points, color, dashed };
     let distortion = |point: &FieldCurvePoint| {
         let found = point.distortion.as_ref().ok()?;
         Some(found.distortion.map_or(0.0, |share| 100.0 * share))
@@ -98,7 +102,7 @@ fn charts(curves: &FieldCurves, palette: Palette) -> [Chart; 3] {
     let tangential = against(&|point| focus(point)?.tangential);
     let sagittal = against(&|point| focus(point)?.sagittal);
     let light = |point: &FieldCurvePoint| Some(100.0 * point.illumination.relative?.value);
-    [
+    let mut charts = vec![
         Chart {
             title: "Distortion, %",
             hint: "Real over ideal height of the chief ray, less 1; for a distant object the ideal \
@@ -121,7 +125,35 @@ fn charts(curves: &FieldCurves, palette: Palette) -> [Chart; 3] {
             curves: vec![curve("illumination", first, false, against(&light))],
             from_zero: true,
         },
-    ]
+    ];
+    if lens.wavelengths.len() > 1 {
+        charts.insert(2, lateral_color(curves, lens, palette));
+    }
+    charts
+}
+
+/// The lateral colour: a curve for each wavelength but the primary one.
+fn lateral_color(curves: &FieldCurves, lens: &Lens, palette: Palette) -> Chart {
+    let primary = lens.primary();
+    let others = lens.wavelengths.iter().enumerate().filter(|(i, _)| *i != primary);
+    let curve = |(k, (i, wavelength)): (usize, (usize, &Wavelength))| {
+        let point = |point: &FieldCurvePoint| {
+            let shift = point.lateral_color.as_ref().ok()?.get(i)?;
+            Some([point.height, 1e3 * shift])
+        };
+        Curve {
+            name: format!("{} um", number::format_digits(wavelength.um, 4)),
+            points: curves.points.iter().filter_map(point).collect(),
+            color: palette.field(k),
+            dashed: k > 0,
+        }
+    };
+    Chart {
+        title: "Lateral colour, um",
+        hint: "Chief ray of a wavelength against that of the primary one, positive away from the axis",
+        curves: others.enumerate().map(curve).collect(),
+        from_zero: false,
+    }
 }
 
 impl Chart {

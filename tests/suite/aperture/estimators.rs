@@ -6,8 +6,8 @@ use crate::reference::Worst;
 use aplanat::files;
 use aplanat::lens::FieldPoint;
 use aplanat::pupil::{
-    Accuracy, DerivativeEstimator, Launch, PupilDerivative, QuadraticIntegrand, RayModel, Region,
-    choose_estimator, differentiate,
+    Accuracy, DerivativeEstimator, Launch, QuadraticIntegrand, RayModel, Region, choose_estimator,
+    differentiate,
 };
 use aplanat::trace::{SurfaceParameter, SystemGradient};
 use std::path::PathBuf;

@@ -1,13 +1,15 @@
-//! Distortion, field curvature and relative illumination from the axis to the edge of the field.
+//! Distortion, field curvature, lateral colour and relative illumination from the axis to the edge of the
+//! field.
 
-use crate::analysis::{
-    self, AnalysisError, Distortion, FieldCurvature, Illumination, distortion, field_curvature,
+use super::{
+    AnalysisError, Distortion, FieldCurvature, Illumination, distortion, field_curvature,
+    illumination, lateral_color,
 };
 use crate::lens::FieldPoint;
 use crate::pupil::{Accuracy, RayModel};
 use rayon::prelude::*;
 
-/// The curves of a lens over its field, at the primary wavelength.
+/// The curves of a lens over its field, at the primary wavelength but for the lateral colour.
 #[derive(Debug, Clone)]
 pub struct FieldCurves {
     /// Points from the axis to the field farthest from it, evenly spaced along its direction.
@@ -23,6 +25,9 @@ pub struct FieldCurvePoint {
     pub distortion: Result<Distortion, AnalysisError>,
     /// The field curvature, or the reason why there is none.
     pub curvature: Result<FieldCurvature, AnalysisError>,
+    /// The lateral colour at every wavelength in mm, positive away from the axis, or the reason why there
+    /// is none.
+    pub lateral_color: Result<Vec<f64>, AnalysisError>,
     /// The illumination.
     pub illumination: Illumination,
 }
@@ -31,7 +36,7 @@ pub struct FieldCurvePoint {
 const INTERVALS: u32 = 10;
 
 /// The curves of a lens up to the field point farthest from the axis.
-pub(super) fn field_curves(model: &RayModel, accuracy: Accuracy) -> FieldCurves {
+pub fn field_curves(model: &RayModel, accuracy: Accuracy) -> FieldCurves {
     let edge = model.fields.iter().max_by(|a, b| height(a).total_cmp(&height(b)));
     let Some(edge) = edge.filter(|edge| height(edge) > 0.0) else {
         return FieldCurves { points: Vec::new() };
@@ -39,14 +44,24 @@ pub(super) fn field_curves(model: &RayModel, accuracy: Accuracy) -> FieldCurves 
     let at = |share: f64| FieldPoint { x: share * edge.x, y: share * edge.y, ..*edge };
     let fields = (0..=INTERVALS).map(|i| at(f64::from(i) / f64::from(INTERVALS))).collect();
     let model = RayModel { fields, ..model.clone() };
-    let lights = analysis::illumination(&model, model.primary, accuracy);
+    let lights = illumination(&model, model.primary, accuracy);
     let point = |(field, illumination): (&FieldPoint, Illumination)| FieldCurvePoint {
         height: height(field),
         distortion: distortion(&model, *field, model.primary),
         curvature: field_curvature(&model, *field, model.primary),
+        lateral_color: radial_color(&model, *field),
         illumination,
     };
     FieldCurves { points: model.fields.par_iter().zip(lights).map(point).collect() }
+}
+
+/// The lateral colour along the line from the axis to the image point.
+fn radial_color(model: &RayModel, field: FieldPoint) -> Result<Vec<f64>, AnalysisError> {
+    let [x, y] = model.chief_point(field, model.primary)?;
+    let distance = x.hypot(y);
+    let outwards = if distance > 0.0 { [x / distance, y / distance] } else { [0.0; 2] };
+    let colors = lateral_color(model, field)?;
+    Ok(colors.iter().map(|c| c.shift[0] * outwards[0] + c.shift[1] * outwards[1]).collect())
 }
 
 fn height(field: &FieldPoint) -> f64 {

@@ -1,0 +1,87 @@
+//! Contour lines of a function that is known on a grid.
+
+/// A point of a grid: its place and its value.
+type Node = ([f64; 2], f64);
+
+/// The values of a function at the nodes of a grid.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ContourGrid {
+    /// The places of the columns and of the rows, ascending.
+    pub places: [Vec<f64>; 2],
+    /// The values row by row; `None` where the function has none.
+    pub values: Vec<Option<f64>>,
+}
+
+impl ContourGrid {
+    /// The least and the largest value; `None` if the function has no value at all.
+    pub fn range(&self) -> Option<[f64; 2]> {
+        let values = self.values.iter().flatten();
+        values.fold(None, |range, value| {
+            let [least, most] = range.unwrap_or([*value; 2]);
+            Some([value.min(least), value.max(most)])
+        })
+    }
+
+    /// The pieces of the line on which the function has a value: straight across triangles, two for each
+    /// cell of the grid, in which it is interpolated linearly.
+    pub fn line(&self, level: f64) -> Vec<Vec<[f64; 2]>> {
+        let [columns, rows] = [self.places[0].len(), self.places[1].len()];
+        let cells = (1..rows).flat_map(|j| (1..columns).map(move |i| [i, j]));
+        let triangles = cells.flat_map(|[i, j]| {
+            let [a, b] = [[i - 1, j - 1], [i, j]];
+            [[a, [i, j - 1], b], [a, [i - 1, j], b]]
+        });
+        triangles.filter_map(|corners| self.crossing(corners, level)).collect()
+    }
+
+    fn node(&self, [i, j]: [usize; 2]) -> Option<Node> {
+        let value = *self.values.get(j * self.places[0].len() + i)?;
+        Some(([self.places[0][i], self.places[1][j]], value?))
+    }
+
+    /// The line across a triangle.
+    fn crossing(&self, corners: [[usize; 2]; 3], level: f64) -> Option<Vec<[f64; 2]>> {
+        let [a, b, c] = corners.map(|corner| self.node(corner));
+        let [a, b, c] = [a?, b?, c?];
+        let on_side = |(from, to): (Node, Node)| {
+            let (low, high) = (from.1 - level, to.1 - level);
+            // A corner that lies on the line counts as above it.
+            if (low < 0.0) == (high < 0.0) {
+                return None;
+            }
+            let t = low / (low - high);
+            Some([0, 1].map(|k| from.0[k] + t * (to.0[k] - from.0[k])))
+        };
+        let ends: Vec<[f64; 2]> =
+            [(a, b), (b, c), (c, a)].into_iter().filter_map(on_side).collect();
+        (ends.len() == 2).then_some(ends)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn places(count: i32) -> Vec<f64> {
+        (-count..=count).map(|i| f64::from(i) / f64::from(count)).collect()
+    }
+
+    /// The contours of a paraboloid are circles; without a value there is no line.
+    #[test]
+    fn a_paraboloid_has_circles() {
+        let side = places(40);
+        let value = |y: f64| side.iter().map(move |x| (*x > -0.5).then_some(x * x + y * y));
+        let values = side.iter().flat_map(|y| value(*y)).collect();
+        let grid = ContourGrid { places: [side.clone(), side.clone()], values };
+        let pieces = grid.line(0.64);
+        let points: Vec<&[f64; 2]> = pieces.iter().flatten().collect();
+        assert!(points.len() > 100);
+        for [x, y] in points {
+            assert!((x.hypot(*y) - 0.8).abs() < 1e-3 && *x > -0.51, "{x} {y}");
+        }
+        assert_eq!(grid.range().map(|range| range.map(|v| (1e9 * v).round())), Some([0.0, 2e9]));
+        assert!(grid.line(3.0).is_empty());
+        let dark = ContourGrid { values: vec![None; 81 * 81], ..grid };
+        assert_eq!((dark.range(), dark.line(0.5).len()), (None, 0));
+    }
+}
