@@ -5,6 +5,7 @@
 //! computed in parallel; the results are in the order of the lens, whatever the number of threads.
 //! A field without light gives an [`AnalysisError`] with the reason, never a NaN.
 
+mod aberration_names;
 mod clear_semi_diameters;
 mod coating;
 mod color_error;
@@ -29,6 +30,7 @@ mod spot_points;
 mod wavefront;
 mod zernike;
 
+pub use aberration_names::aberration_name;
 pub use clear_semi_diameters::clear_semi_diameters;
 pub use coating::{Coating, ThinFilm, film_reflectance};
 pub use color_error::{

@@ -190,6 +190,8 @@ pub enum PanelSetting {
     FieldCurves(bool),
     /// True to compute the contrast of the fields.
     Contrasts(bool),
+    /// True to compute the wavefronts of the fields.
+    Wavefronts(bool),
     /// True to compute the picture of a scene.
     Picture(bool),
     /// The scene of the picture.

@@ -30,10 +30,11 @@ impl Arrangement {
 }
 
 /// The panels of the light in the image.
-const LIGHT: [PanelKind; 5] = [
+const LIGHT: [PanelKind; 6] = [
     PanelKind::Spot,
     PanelKind::Fans,
     PanelKind::Contrast,
+    PanelKind::Wavefront,
     PanelKind::Pupil,
     PanelKind::FieldCurves,
 ];
@@ -94,7 +95,8 @@ fn large_arrangement() -> Tree<PanelKind> {
     let table = row(&mut tiles, &[(table, 0.66), (system, 0.34)]);
     let left = column(&mut tiles, &[(drawings, 0.54), (table, 0.46)]);
     let spots = tabs(&mut tiles, &[Kind::Spot, Kind::Fans, Kind::Pupil]);
-    let contrast = tabs(&mut tiles, &[Kind::Contrast, Kind::FieldCurves, Kind::Picture]);
+    let contrast = [Kind::Contrast, Kind::Wavefront, Kind::FieldCurves, Kind::Picture];
+    let contrast = tabs(&mut tiles, &contrast);
     let facts = tabs(&mut tiles, &[Kind::FirstOrder, Kind::Effects]);
     let sums = tabs(&mut tiles, &[Kind::Seidel]);
     let numbers = row(&mut tiles, &[(facts, 0.42), (sums, 0.58)]);

@@ -134,9 +134,10 @@ impl Dock {
     /// Asks for the analyses of those panels alone that are visible.
     fn request_analyses(&self, view: &SessionView, actions: &mut Actions) {
         let settings = &view.settings;
-        let asked: [(PanelKind, bool, SetVisible); 6] = [
+        let asked: [(PanelKind, bool, SetVisible); 7] = [
             (PanelKind::Pupil, settings.pupils, PanelSetting::Pupils),
             (PanelKind::Contrast, settings.contrasts, PanelSetting::Contrasts),
+            (PanelKind::Wavefront, settings.wavefronts, PanelSetting::Wavefronts),
             (PanelKind::Fans, settings.fans, PanelSetting::Fans),
             (PanelKind::FieldCurves, settings.field_curves, PanelSetting::FieldCurves),
             (PanelKind::Picture, settings.picture, PanelSetting::Picture),

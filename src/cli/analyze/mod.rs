@@ -1,6 +1,5 @@
 //! `analyze`: the results that a designer reads, each number with its error, rays and milliseconds.
 
-mod aberration_names;
 mod charts;
 mod chief;
 mod color;

@@ -1,10 +1,9 @@
 //! The wavefront: RMS, map, fans of path differences and Zernike sums.
 
-use super::aberration_names::aberration_name;
 use super::{AnalysisRun, AtField, SelectedField, TextLines, estimate_text};
 use crate::analysis::{
     AnalysisError, ChiefPath, Estimate, PathDifference, PathError, ReferenceForm, ZernikeMethod,
-    ZernikeOrder, field_paths, wavefront, zernike,
+    ZernikeOrder, aberration_name, field_paths, wavefront, zernike,
 };
 use crate::cli::output::{ShortNumber, counted, or_dash};
 use crate::measure::time_ms;

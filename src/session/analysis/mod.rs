@@ -8,11 +8,13 @@ mod as_built;
 mod contrast;
 mod pupils;
 mod scene_picture;
+mod wavefronts;
 
 pub use as_built::{AsBuiltLens, predict_as_built};
 pub use contrast::{FieldContrast, FieldContrasts};
 pub use pupils::FieldPupils;
 pub use scene_picture::ScenePicture;
+pub use wavefronts::{FieldWavefront, FieldWavefronts, GridValues, PointImage};
 
 use super::clock::{Timed, now, time};
 use super::run::{LatestRequestWorker, WorkerOutput, catch_panic};
@@ -73,6 +75,8 @@ pub struct Analyses {
     /// The contrast of the fields; `None` while no panel shows it, and at first: it may take longer than
     /// all else.
     pub contrasts: Option<Timed<FieldContrasts>>,
+    /// The wavefronts of the fields; `None` while no panel shows them, and at first.
+    pub wavefronts: Option<Arc<Timed<FieldWavefronts>>>,
     /// A scene through the lens, or the reason why there is none; `None` while no panel shows it.
     pub picture: Option<Arc<Timed<Result<ScenePicture, String>>>>,
     /// The lens as it is made, or the reason why nothing is known of it; `None` while no panel shows it,
@@ -127,11 +131,13 @@ pub(super) fn spawn_analysis(
     wake: impl Fn() + Send + 'static,
 ) -> io::Result<AnalysisWorker> {
     let mut published = None;
-    let mut known = None;
+    let (mut contrasts, mut wavefronts) = (None, None);
     AnalysisWorker::spawn("analysis", wake, move |request, output| {
         let results = answer(request, output, &mut published);
-        let mut slower =
-            |results| publish_prediction(publish_contrasts(results, output, &mut known), output);
+        let mut slower = |results| {
+            let results = publish_contrasts(results, output, &mut contrasts);
+            publish_prediction(publish_wavefronts(results, output, &mut wavefronts), output)
+        };
         let refined = results.map(|results| refine(slower(results), output));
         if let (Some(results), EffectTiming::Measured) = (refined, timing) {
             measure(results, output);
@@ -159,15 +165,19 @@ fn answer(
     Some(results)
 }
 
-/// The contrast of a lens with the settings on which it depends.
-struct KnownContrasts {
+/// Numbers of a lens that take long, with the settings on which they depend.
+struct KnownNumbers<T> {
     lens: Arc<Lens>,
     settings: AnalysisSettings,
-    contrasts: Timed<FieldContrasts>,
+    numbers: T,
 }
 
-impl KnownContrasts {
-    /// True if these are the contrasts that results need.
+impl<T> KnownNumbers<T> {
+    fn new(results: &AnalysisResults, numbers: T) -> Self {
+        Self { lens: Arc::clone(&results.lens), settings: results.settings.clone(), numbers }
+    }
+
+    /// True if these are the numbers that results need.
     fn serve(&self, results: &AnalysisResults) -> bool {
         let (own, other) = (&self.settings, &results.settings);
         Arc::ptr_eq(&self.lens, &results.lens)
@@ -183,7 +193,7 @@ impl KnownContrasts {
 fn publish_contrasts(
     mut results: AnalysisResults,
     output: &AnalysisOutput,
-    known: &mut Option<KnownContrasts>,
+    known: &mut Option<KnownNumbers<Timed<FieldContrasts>>>,
 ) -> AnalysisResults {
     if !results.settings.contrasts {
         return results;
@@ -193,7 +203,7 @@ fn publish_contrasts(
         found = compute_contrasts(&results, output);
     }
     if let (Ok(analyses), Some(found)) = (&mut results.analyses, &found) {
-        analyses.contrasts = Some(found.contrasts.clone());
+        analyses.contrasts = Some(found.numbers.clone());
         output.publish(results.clone());
     }
     *known = found;
@@ -201,14 +211,42 @@ fn publish_contrasts(
 }
 
 /// The contrast of the fields of a lens that was analysed; `None` if it was interrupted.
-fn compute_contrasts(results: &AnalysisResults, output: &AnalysisOutput) -> Option<KnownContrasts> {
+fn compute_contrasts(
+    results: &AnalysisResults,
+    output: &AnalysisOutput,
+) -> Option<KnownNumbers<Timed<FieldContrasts>>> {
     let analyses = results.analyses.as_ref().ok()?;
     let (model, spots) = (&analyses.ray_model.value, &analyses.spots.value);
-    let (lens, settings) = (Arc::clone(&results.lens), results.settings.clone());
+    let tolerance = results.settings.tolerance;
     let interrupted = output.interruption();
-    let found = time(|| contrast::field_contrasts(model, spots, settings.tolerance, interrupted));
+    let found = time(|| contrast::field_contrasts(model, spots, tolerance, interrupted));
     let contrasts = Timed { value: found.value?, ms: found.ms };
-    Some(KnownContrasts { lens, settings, contrasts })
+    Some(KnownNumbers::new(results, contrasts))
+}
+
+/// Publishes the results once more with the wavefronts of the fields, as their contrasts are.
+fn publish_wavefronts(
+    mut results: AnalysisResults,
+    output: &AnalysisOutput,
+    known: &mut Option<KnownNumbers<Arc<Timed<FieldWavefronts>>>>,
+) -> AnalysisResults {
+    if !results.settings.wavefronts {
+        return results;
+    }
+    let mut found = known.take().filter(|known| known.serve(&results));
+    if let (None, Ok(analyses), false) = (&found, &results.analyses, output.is_interrupted()) {
+        let model = &analyses.ray_model.value;
+        let (tolerance, interrupted) = (results.settings.tolerance, output.interruption());
+        let timed = time(|| wavefronts::field_wavefronts(model, tolerance, interrupted));
+        let timed = timed.value.map(|value| Arc::new(Timed { value, ms: timed.ms }));
+        found = timed.map(|wavefronts| KnownNumbers::new(&results, wavefronts));
+    }
+    if let (Ok(analyses), Some(found)) = (&mut results.analyses, &found) {
+        analyses.wavefronts = Some(Arc::clone(&found.numbers));
+        output.publish(results.clone());
+    }
+    *known = found;
+    results
 }
 
 /// Publishes the results once more with the lens as it is made if a panel shows it and no request
@@ -354,6 +392,7 @@ impl Analyses {
             spots,
             pupils,
             contrasts: None,
+            wavefronts: None,
             picture,
             as_built: None,
             fans,
@@ -423,6 +462,9 @@ pub struct AnalysisSettings {
     /// True if the contrast is computed, because a panel shows it.
     #[serde(default)]
     pub contrasts: bool,
+    /// True if the wavefronts are computed, because a panel shows them.
+    #[serde(default)]
+    pub wavefronts: bool,
     /// True if the ray fans are computed, because a panel shows them.
     #[serde(default)]
     pub fans: bool,
@@ -461,6 +503,7 @@ impl Default for AnalysisSettings {
             overrides: EffectOverrides::default(),
             pupils: false,
             contrasts: false,
+            wavefronts: false,
             fans: false,
             field_curves: false,
             picture: false,

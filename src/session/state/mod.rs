@@ -266,6 +266,7 @@ impl Session {
             PanelSetting::Rays(rays) => settings.rays = rays.min(MAX_RAYS),
             PanelSetting::Pupils(shown) => settings.pupils = shown,
             PanelSetting::Contrasts(shown) => settings.contrasts = shown,
+            PanelSetting::Wavefronts(shown) => settings.wavefronts = shown,
             PanelSetting::Fans(shown) => settings.fans = shown,
             PanelSetting::FieldCurves(shown) => settings.field_curves = shown,
             PanelSetting::Picture(shown) => settings.picture = shown,

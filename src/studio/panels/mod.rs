@@ -22,6 +22,7 @@ mod specification;
 mod spot;
 mod system;
 mod tolerances;
+mod wavefront;
 pub(super) mod widgets;
 mod zoom;
 
@@ -47,6 +48,7 @@ pub use specification::SpecificationPanel;
 pub use spot::SpotPanel;
 pub use system::SystemPanel;
 pub use tolerances::TolerancesPanel;
+pub use wavefront::WavefrontPanel;
 pub use zoom::ZoomPanel;
 
 use std::sync::Arc;
@@ -92,6 +94,8 @@ pub enum PanelKind {
     Pupil,
     /// The contrast of every field against spatial frequency.
     Contrast,
+    /// The wavefront of every field, and the image of a point by diffraction.
+    Wavefront,
     /// The transverse aberration of every field over its pupil.
     Fans,
     /// Distortion, field curvature and illumination over the field.
@@ -126,13 +130,14 @@ pub enum PanelKind {
 
 impl PanelKind {
     /// Every panel. A new one is a file in this folder, an entry here and a place in the window.
-    pub const ALL: [Self; 21] = [
+    pub const ALL: [Self; 22] = [
         Self::Layout,
         Self::Slice,
         Self::Prescription,
         Self::Spot,
         Self::Pupil,
         Self::Contrast,
+        Self::Wavefront,
         Self::Fans,
         Self::FieldCurves,
         Self::Picture,
@@ -159,6 +164,7 @@ impl PanelKind {
             Self::Spot => Box::new(SpotPanel::new(backend)),
             Self::Pupil => Box::new(PupilPanel::default()),
             Self::Contrast => Box::new(ContrastPanel::default()),
+            Self::Wavefront => Box::new(WavefrontPanel::default()),
             Self::Fans => Box::new(FansPanel),
             Self::FieldCurves => Box::new(FieldCurvesPanel),
             Self::Picture => Box::new(PicturePanel::default()),

@@ -1,6 +1,6 @@
 //! The names of the aberrations that Zernike polynomials describe.
 
-use crate::analysis::ZernikeIndex;
+use super::ZernikeIndex;
 
 /// The names by azimuthal frequency from 0, with the radial degree of the first polynomial that has
 /// the name.
@@ -19,7 +19,7 @@ const FAMILIES: [(&str, u32); 8] = [
 const ORDERS: [&str; 4] = ["", "secondary ", "tertiary ", "quaternary "];
 
 /// The name of the aberration of a polynomial.
-pub(super) fn aberration_name(index: ZernikeIndex) -> String {
+pub fn aberration_name(index: ZernikeIndex) -> String {
     let frequency = index.frequency.unsigned_abs();
     let direction = direction(index.frequency);
     match (index.degree, frequency) {

@@ -1,0 +1,141 @@
+//! The wavefront of every field at the primary wavelength, and what diffraction makes of a point.
+
+use crate::analysis::{
+    self, AnalysisError, Estimate, Strehl, Wavefront, ZernikeOrder, ZernikeSum, encircled_energy,
+    field_paths, point_spread, strehl, zernike,
+};
+use crate::lens::FieldPoint;
+use crate::pupil::{Accuracy, RayModel};
+use crate::session::clock::{Timed, time};
+
+/// The wavefronts of all fields.
+#[derive(Debug, Clone)]
+pub struct FieldWavefronts {
+    /// The wavelength in micrometres.
+    pub um: f64,
+    /// The wavefront of each field, in order, or the reason why it has none.
+    pub fields: Vec<Timed<Result<FieldWavefront, AnalysisError>>>,
+}
+
+/// The wavefront of a field, and the image of a point.
+#[derive(Debug, Clone)]
+pub struct FieldWavefront {
+    /// Its mean square against the reference sphere.
+    pub wavefront: Wavefront,
+    /// The path differences over the square about the pupil, in wavelengths.
+    pub map: GridValues<Option<f64>>,
+    /// The Zernike coefficients in Noll's order, or the reason why there are none.
+    pub zernike: Result<ZernikeSum, AnalysisError>,
+    /// The image of a point, or the reason why there is none.
+    pub image: Result<PointImage, AnalysisError>,
+}
+
+/// The image of a point by diffraction.
+#[derive(Debug, Clone)]
+pub struct PointImage {
+    /// The Strehl ratios.
+    pub strehl: Strehl,
+    /// The intensity over that of a perfect peak, about the image point of the chief ray.
+    pub intensity: GridValues<f64>,
+    /// The largest error of an intensity.
+    pub error: f64,
+    /// The share of the light within circles about the same point, and their radii in mm.
+    pub energy: Vec<(f64, Estimate)>,
+    /// The number of rays.
+    pub rays: usize,
+}
+
+/// Numbers on a square grid, row by row from below.
+#[derive(Debug, Clone)]
+pub struct GridValues<T> {
+    /// The number of columns and of rows.
+    pub count: usize,
+    /// The place of the last column: 1 at the rim of the pupil, mm in the image.
+    pub half_width: f64,
+    /// The numbers.
+    pub values: Vec<T>,
+}
+
+/// The number of columns of a map of the pupil.
+const MAP: usize = 61;
+/// The number of columns of an image of a point.
+const IMAGE: usize = 49;
+/// The half width of an image in λF, and in RMS radii of the spot.
+const WIDTH: [f64; 2] = [5.0, 2.5];
+/// The radii of the circles, as parts of the half width of the image.
+const CIRCLES: usize = 16;
+/// The number of Zernike coefficients.
+const TERMS: usize = 15;
+/// The tolerance of what is looked at, and the rays that it may take.
+const LOOKED_AT: Accuracy = Accuracy { tolerance: 1e-2, max_rays: 30_000 };
+
+/// The wavefronts of all fields; `None` if it was interrupted.
+pub(super) fn field_wavefronts(
+    model: &RayModel,
+    tolerance: f64,
+    interrupted: impl Fn() -> bool + Sync,
+) -> Option<FieldWavefronts> {
+    let accuracy = Accuracy { tolerance, ..Accuracy::default() };
+    let mut fields = Vec::with_capacity(model.fields.len());
+    for field in &model.fields {
+        if interrupted() {
+            return None;
+        }
+        fields.push(time(|| field_wavefront(model, *field, accuracy, &interrupted)));
+    }
+    (!interrupted()).then(|| FieldWavefronts { um: model.channels[model.primary].um, fields })
+}
+
+fn field_wavefront(
+    model: &RayModel,
+    field: FieldPoint,
+    accuracy: Accuracy,
+    interrupted: &impl Fn() -> bool,
+) -> Result<FieldWavefront, AnalysisError> {
+    let wavefront = analysis::wavefront(model, field, model.primary, accuracy)?;
+    let places = places(MAP, 1.0);
+    let (_, paths) = field_paths(model, field, model.primary, &places)?;
+    let is_lit = |place: &[f64; 2]| place[0].hypot(place[1]) <= 1.0;
+    let waves = places
+        .iter()
+        .zip(paths)
+        .map(|(place, path)| path.ok().filter(|_| is_lit(place)).map(|path| path.waves));
+    let map = GridValues { count: MAP, half_width: 1.0, values: waves.collect() };
+    let order = (ZernikeOrder::Noll, TERMS);
+    let zernike = zernike(model, field, model.primary, order, accuracy);
+    let image =
+        if interrupted() { Err(AnalysisError::Interrupted) } else { point_image(model, field) };
+    Ok(FieldWavefront { wavefront, map, zernike, image })
+}
+
+fn point_image(model: &RayModel, field: FieldPoint) -> Result<PointImage, AnalysisError> {
+    let w = model.primary;
+    let half_width = half_width(model, field)?;
+    let spread = point_spread(model, field, w, &places(IMAGE, half_width), LOOKED_AT)?;
+    let part = |k: usize| half_width * (k + 1) as f64 / CIRCLES as f64;
+    let radii: Vec<f64> = (0..CIRCLES).map(part).collect();
+    let energy = encircled_energy(model, field, w, [0.0; 2], &radii, LOOKED_AT)?;
+    let values = spread.intensities.iter().map(|intensity| intensity.value).collect();
+    Ok(PointImage {
+        strehl: strehl(model, field, w, LOOKED_AT)?,
+        intensity: GridValues { count: IMAGE, half_width, values },
+        error: spread.intensities.iter().map(|intensity| intensity.error).fold(0.0, f64::max),
+        energy: radii.into_iter().zip(energy).collect(),
+        rays: spread.strehl.rays,
+    })
+}
+
+/// The half width of an image in mm: that of diffraction, or of the spot where that is larger.
+fn half_width(model: &RayModel, field: FieldPoint) -> Result<f64, AnalysisError> {
+    let f_number = model.first_order.working_f_number.unwrap_or(1.0).abs();
+    let by_diffraction = WIDTH[0] * model.channels[model.primary].um * 1e-3 * f_number;
+    let spot = analysis::spot(model, field, LOOKED_AT)?;
+    let rms = spot.channels[model.primary].as_ref().map_or(0.0, |color| color.rms.value);
+    Ok(by_diffraction.max(WIDTH[1] * rms))
+}
+
+/// The nodes of a square grid about zero, row by row from below.
+fn places(count: usize, half_width: f64) -> Vec<[f64; 2]> {
+    let at = move |i: usize| half_width * (2.0 * i as f64 / (count - 1) as f64 - 1.0);
+    (0..count).flat_map(|j| (0..count).map(move |i| [at(i), at(j)])).collect()
+}
