@@ -8,13 +8,13 @@ use aplanat::merit::{Goal, PupilEdge, Term};
 use aplanat::optimize::{DescentMethod, OptimizationEnd, OptimizationProgress, pareto};
 use aplanat::session::{
     Command, OptimizationRequest, OptimizationSnapshot, PanelSetting, ParetoPass, ParetoRun,
-    ParetoView, RunId, RunKind, RunStatus, RunView, SessionView,
+    ParetoView, RunId, RunKind, RunStatus, RunView, Session, SessionView,
 };
 use aplanat::studio::draw::RenderBackend;
 use aplanat::studio::file_dialog::FileRequest;
 use aplanat::studio::panels::{
     EffectsPanel, FirstOrderPanel, LayoutPanel, OptimizerPanel, Panel, ParetoPanel,
-    PrescriptionPanel, PupilPanel, SeidelPanel, SpotPanel,
+    PrescriptionPanel, PupilPanel, SeidelPanel, SpotPanel, WavefrontPanel,
 };
 use egui::{Key, Modifiers};
 use egui_kittest::Harness;
@@ -760,4 +760,46 @@ fn counts_of_one_are_singular() {
     let mut harness = panel_harness(ParetoPanel::default(), crate::harness::view_of(lens));
     harness.run();
     harness.get_by_label_contains("the 1 variable and all semi-diameters");
+}
+
+/// Every page of the wavefront panel shows every field, with the numbers of the analyses.
+#[test]
+fn the_wavefront_panel_shows_maps_images_and_coefficients() {
+    let mut session = Session::new(double_gauss(), || {}).unwrap();
+    session.apply(Command::Show(PanelSetting::Wavefronts(true)));
+    let mut results = || {
+        let mut left = 1000;
+        loop {
+            session.poll();
+            let results = session.view().results;
+            if let Some(results) = results.filter(|results| {
+                results.analyses.as_ref().is_ok_and(|numbers| numbers.wavefronts.is_some())
+            }) {
+                return results;
+            }
+            left -= 1;
+            assert!(left > 0, "no wavefronts");
+            std::thread::sleep(std::time::Duration::from_millis(100));
+        }
+    };
+    let shown = SessionView { results: Some(results()), ..view() };
+    let mut harness = panel_harness(WavefrontPanel::default(), shown);
+    harness.run_steps(3);
+    let numbers = harness.state().view.results.clone().unwrap();
+    let waves = numbers.analyses.as_ref().unwrap().wavefronts.clone().unwrap();
+    let maps = |harness: &Harness<'_, PanelState<WavefrontPanel>>, what: &str| {
+        harness.get_all_by_label_contains(what).count()
+    };
+    assert_eq!(maps(&harness, "Wavefront at "), waves.value.fields.len());
+    harness.get_by_label("Point spread").click();
+    harness.run_steps(3);
+    assert_eq!(maps(&harness, "Point spread at "), waves.value.fields.len());
+    harness.get_by_label("Logarithmic").click();
+    harness.get_by_label("Encircled energy").click();
+    harness.run_steps(3);
+    harness.get_by_label("Zernike").click();
+    harness.run_steps(3);
+    harness.get_by_label("coma y");
+    let first = waves.value.fields[0].value.as_ref().unwrap().zernike.as_ref().unwrap();
+    harness.get_by_label(&format!("{:.4}", first.coefficients[10].value));
 }

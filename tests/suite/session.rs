@@ -1,5 +1,6 @@
 //! A session: its design stays valid under any commands, and its background threads behave.
 
+use aplanat::analysis::wavefront;
 use aplanat::effects::{Effect, EffectOverride};
 use aplanat::experiments::{self, Effort, Experiment};
 use aplanat::files;
@@ -9,7 +10,7 @@ use aplanat::lens::{
 };
 use aplanat::merit::{Goal, LimitTreatment, MeritError, PupilEdge, Term, TermValue, WeightedTerm};
 use aplanat::optimize::{DescentMethod, OptimizationProgress, Optimizer};
-use aplanat::pupil::RayModel;
+use aplanat::pupil::{Accuracy, RayModel};
 use aplanat::session::{
     AnalysisSettings, Command, ExperimentStatus, OptimizerFactory, PanelSetting, RunStatus,
     Session, SessionEvent, SessionView, Severity, analyze,
@@ -781,6 +782,7 @@ fn what_no_panel_shows_is_not_computed() {
     let numbers = analyze(&double_gauss(), &AnalysisSettings::default()).unwrap();
     assert!(numbers.fans.is_none() && numbers.field_curves.is_none());
     assert!(numbers.pupils.is_none() && numbers.contrasts.is_none() && numbers.picture.is_none());
+    assert!(numbers.wavefronts.is_none());
 }
 
 #[test]
@@ -1036,4 +1038,37 @@ fn another_panel_does_not_compute_the_contrast_again() {
     session.apply(Command::Show(PanelSetting::Fans(true)));
     wait(&mut session, "the contrast beside the fans", |view, _| contrasts(view).is_some());
     assert_eq!(contrasts(&session.view()), Some((ms, true)), "the time of the first computation");
+}
+
+/// The wavefronts of the window are those of the analyses: the chief ray has no path difference, the mean
+/// square of the map over the clear pupil is that of the quadrature, and circles hold ever more light.
+#[test]
+fn wavefronts_are_computed_while_a_panel_shows_them() {
+    let mut session = session(lens("cooke_triplet_100_f27"));
+    session.apply(Command::Show(PanelSetting::Wavefronts(true)));
+    let found = |view: &SessionView| {
+        let results = view.results.clone().filter(|results| results.version == view.version)?;
+        results.analyses.as_ref().unwrap().wavefronts.clone()
+    };
+    wait(&mut session, "the wavefronts", |view, _| found(view).is_some());
+    let waves = found(&session.view()).unwrap();
+    let model = RayModel::from_lens(session.lens(), 0).unwrap();
+    assert_eq!((waves.value.fields.len(), waves.value.um), (3, 0.5875618));
+    for (field, point) in waves.value.fields.iter().zip(&model.fields) {
+        let found = field.value.as_ref().unwrap();
+        let exact = wavefront(&model, *point, model.primary, Accuracy::default()).unwrap();
+        assert!((found.wavefront.rms.value / exact.rms.value - 1.0).abs() < 1e-2);
+        let middle = found.map.values[found.map.values.len() / 2].unwrap();
+        assert!(middle.abs() < 1e-6, "{middle}");
+        let image = found.image.as_ref().unwrap();
+        assert!(image.intensity.values.iter().all(|v| (-1e-2..1.01).contains(v)));
+        let shares: Vec<f64> = image.energy.iter().map(|(_, share)| share.value).collect();
+        assert!(shares.is_sorted() && shares[0] > 0.0 && shares[15] < 1.01, "{shares:?}");
+        assert_eq!(found.zernike.as_ref().unwrap().coefficients.len(), 15);
+    }
+    let axis = waves.value.fields[0].value.as_ref().unwrap();
+    let lit: Vec<f64> = axis.map.values.iter().flatten().copied().collect();
+    let mean = lit.iter().sum::<f64>() / lit.len() as f64;
+    let rms = (lit.iter().map(|w| (w - mean).powi(2)).sum::<f64>() / lit.len() as f64).sqrt();
+    assert!((rms / axis.wavefront.rms.value - 1.0).abs() < 0.1, "{rms} {:?}", axis.wavefront.rms);
 }
