@@ -75,6 +75,9 @@ fn a_surface_becomes_biconic_and_its_other_radius_is_typed() {
     enter(&mut harness, "Radius x of surface 1", "40");
     let form = edited(&mut harness).surfaces[0].freeform.clone().unwrap();
     assert_eq!(form.numbers[0], 1.0 / 40.0);
+    enter(&mut harness, "Radius x of surface 1", "0");
+    let form = edited(&mut harness).surfaces[0].freeform.clone().unwrap();
+    assert_eq!(form.numbers[0], 0.0, "a plane, as in the table");
     press(&mut harness, "Freeform number 1 of surface 1 variable");
     let added = harness.state().commands.iter().any(|command| {
         let parameter = Parameter::new(0, Quantity::Freeform(0));

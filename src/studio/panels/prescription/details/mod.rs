@@ -205,7 +205,8 @@ impl SurfaceDetails {
         let label = format!("{name} of surface {}", surface + 1);
         let mut fields = EditForm { view, buffers: &mut self.buffers, actions };
         fields.number(ui, &label, (shown, FIELD), |value| {
-            let value = if is_radius { 1.0 / value } else { value };
+            // As in the table, 0 is a plane.
+            let value = if is_radius && value != 0.0 { 1.0 / value } else { value };
             Edit::Set { parameter, value }
         });
         badge::show(ui, &view.lens, parameter, None, &mut self.badges, actions);
