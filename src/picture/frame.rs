@@ -41,7 +41,7 @@ impl ImageFrame {
             });
         }
         if !(diagonal > 0.0 && diagonal < 1e6) {
-            let expected = "a positive number of mm";
+            let expected = "more than 0 mm, and less than 1e6";
             return Err(PictureError::Size { what: "the diagonal", found: diagonal, expected });
         }
         let pitch = diagonal / (width as f64).hypot(height as f64);
