@@ -5,6 +5,8 @@ use super::color::{BLACK, Color, GRID};
 
 /// The approximate number of ticks of a linear axis.
 const TICKS: f64 = 5.0;
+/// The largest number of tick intervals of a widened axis.
+const MOST_TICKS: f64 = 8.0;
 /// A tick this close beyond the end of an axis, in tick intervals, still belongs to it.
 const END_TOLERANCE: f64 = 1e-6;
 /// The distance of tick labels from an axis, in pixels.
@@ -80,6 +82,7 @@ impl Axis {
         let more = 0.5 * (length - (self.high - self.low)).max(0.0);
         self.low -= more;
         self.high += more;
+        self.step = self.step.max(round_step((self.high - self.low) / MOST_TICKS));
         self
     }
 }

@@ -185,7 +185,7 @@ fn curves_of_an_analysis_are_drawn() {
         ("wavefront", "wavelengths", 300),
         ("zernike", "fringe", 200),
         ("psf", "lg intensity", 12),
-        ("ghosts", "lg irradiance", 90),
+        ("ghosts", "lg irradiance", 12),
         ("distortion", "against f theta", 4),
         ("field-curvature", "sagittal", 4),
         ("lateral-color", "0.4861327 um", 6),

@@ -366,7 +366,7 @@ fn a_search_has_the_merit_function_of_the_design() {
     {
         assert!(asked.terms.contains(term), "{term:?}");
     }
-    let merit = Merit::new(session.lens(), &own, 1e-3).unwrap();
+    let merit = Merit::new(session.lens(), &asked, 1e-3).unwrap();
     let value = merit.value(&merit.values(session.lens())).unwrap();
     assert!((found.start.merit / value - 1.0).abs() < 0.2, "{} {value}", found.start.merit);
     let thinnest = |goal: &Goal| {

@@ -25,7 +25,9 @@ pub(super) fn save<T: TextLines>(
     if rows.iter().flatten().all(|chart| chart.curves.is_empty()) {
         return Err(fail("there is nothing to draw".to_owned()));
     }
-    let sheet = CurveSheet { title: format!("{lens}: {}", T::TITLE), rows };
+    // The rest of the title explains the printed table.
+    let title = T::TITLE.split([';', ':']).next().unwrap_or_default();
+    let sheet = CurveSheet { title: format!("{lens}: {title}"), rows };
     let bytes = if has_extension(path, "png") {
         sheet.canvas().png().map_err(|why| fail(why.to_string()))?
     } else if has_extension(path, "svg") {
@@ -39,7 +41,7 @@ pub(super) fn save<T: TextLines>(
 /// The charts of each field, with its name before their titles.
 fn rows<T: TextLines>(report: &AnalysisReport<T>) -> Vec<Vec<CurveChart>> {
     let unit = match report.field_kind {
-        FieldKind::Angle => "°",
+        FieldKind::Angle => " deg",
         FieldKind::ObjectHeight | FieldKind::ImageHeight => " mm",
     };
     let row = |field: &super::AtField<T>| {

@@ -311,8 +311,8 @@ fn with_asked_focus(lens: &Arc<Lens>, asked: &StartingLens) -> Option<Lens> {
     model.first_order.efl.is_some_and(|focal_length| focal_length > 0.0).then_some(focused)
 }
 
-/// What is said of a foreign file: the numbers to compare with the program that wrote it, and what became
-/// of its lines.
+/// The message about a foreign file: the numbers to compare with the program that wrote it, and the
+/// outcome of its lines.
 fn import_text(path: &Path, report: &ConversionReport, checks: &[SelfCheck]) -> String {
     let mut lines = vec![format!("imported {}", path.display())];
     if !checks.is_empty() {

@@ -32,7 +32,7 @@ const DECADES: f64 = 4.0;
 /// The opacity of what belongs to the lens before.
 const FAINT: f32 = 0.45;
 
-/// What is shown of every field.
+/// A view of every field.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 enum WavefrontPage {
     #[default]
@@ -53,7 +53,7 @@ const PAGES: [(WavefrontPage, &str, &str); 4] = [
     (WavefrontPage::Zernike, "Zernike", "Coefficients in Noll's order, in wavelengths"),
 ];
 
-/// How the numbers of a field become a picture.
+/// The style in which the numbers of a field become a picture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct PictureStyle {
     page: WavefrontPage,
@@ -210,7 +210,7 @@ fn raster<T>(grid: &GridValues<T>, color: impl Fn(&T) -> Option<Color32>) -> Col
     ColorImage::new([count, count], (0..count * count).map(pixel).collect())
 }
 
-/// What a cell shows of a field.
+/// The content of the cell of a field.
 type CellContent<'a> =
     (WavefrontPage, &'a Timed<Result<FieldWavefront, AnalysisError>>, Option<&'a TextureHandle>);
 

@@ -73,7 +73,7 @@ impl CardOrder {
 #[derive(Debug, Default)]
 pub(super) struct CardPlaces {
     placed: Vec<Arc<FoundLens>>,
-    /// Where the cards were last.
+    /// The area of the cards in the last frame.
     area: Option<Rect>,
 }
 
