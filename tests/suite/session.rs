@@ -1044,7 +1044,7 @@ fn another_panel_does_not_compute_the_contrast_again() {
 /// square of the map over the clear pupil is that of the quadrature, and circles hold ever more light.
 #[test]
 fn wavefronts_are_computed_while_a_panel_shows_them() {
-    let mut session = session(lens("cooke_triplet_100_f27"));
+    let mut session = session(lens("achromat_ac254_100"));
     session.apply(Command::Show(PanelSetting::Wavefronts(true)));
     let found = |view: &SessionView| {
         let results = view.results.clone().filter(|results| results.version == view.version)?;

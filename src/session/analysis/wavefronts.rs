@@ -59,7 +59,7 @@ pub struct GridValues<T> {
 /// The number of columns of a map of the pupil.
 const MAP: usize = 61;
 /// The number of columns of an image of a point.
-const IMAGE: usize = 49;
+const IMAGE: usize = 41;
 /// The half width of an image in λF, and in RMS radii of the spot.
 const WIDTH: [f64; 2] = [5.0, 2.5];
 /// The radii of the circles, as parts of the half width of the image.
@@ -67,7 +67,7 @@ const CIRCLES: usize = 16;
 /// The number of Zernike coefficients.
 const TERMS: usize = 15;
 /// The tolerance of what is looked at, and the rays that it may take.
-const LOOKED_AT: Accuracy = Accuracy { tolerance: 1e-2, max_rays: 30_000 };
+const LOOKED_AT: Accuracy = Accuracy { tolerance: 1e-2, max_rays: 10_000 };
 
 /// The wavefronts of all fields; `None` if it was interrupted.
 pub(super) fn field_wavefronts(
