@@ -142,6 +142,10 @@ fn every_term_includes_the_motion_of_the_pupil() {
     for name in ["double_gauss_rudolph_50", "double_gauss_nikkor_s_50"] {
         let mut lens = bundled(name);
         lens.variables.clear();
+        if name == "double_gauss_nikkor_s_50" {
+            // The first lens has the weights of colours.
+            lens.wavelengths = vec![lens.wavelengths[lens.primary()]];
+        }
         for surface in 0..lens.surfaces.len() {
             // Equal rims would make the larger of two a number with two slopes.
             let rim = Parameter::new(surface, Quantity::SemiDiameter);

@@ -28,7 +28,7 @@ pub(in crate::experiments) const BRUTE_FORCE: Experiment = Experiment {
     title: "RESTORE against brute force on four lenses",
     claim: "With the same number of gradients RESTORE finds a better lens than either baseline",
     omits: "runs of 40 minutes; equal numbers of gradients are compared",
-    seconds: 750.0,
+    seconds: 1300.0,
     run: run_brute_force,
 };
 
