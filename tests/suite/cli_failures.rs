@@ -292,7 +292,10 @@ fn a_checkpoint_has_one_writer() {
     let again = start_search(&checkpoint, &[]);
     again.signal("-INT");
     assert_eq!(again.output().status.code(), Some(0));
-    assert_eq!(folder.names(), ["link.json", "run.json"], "the lock is gone with its holder");
+    // A process that is killed while it saves leaves a part.
+    let names = folder.names().into_iter().filter(|name| !name.ends_with(".part"));
+    let names: Vec<String> = names.collect();
+    assert_eq!(names, ["link.json", "run.json"], "the lock is gone with its holder");
 }
 
 /// To save a checkpoint under one of two names would part them.
