@@ -72,12 +72,10 @@ fn graded(lens: &Lens) -> ToleranceSheet {
     graded_sheet(lens, &scene.lens, ToleranceGrade::Commercial)
 }
 
-/// Every kind of error by itself, on a double Gauss with cemented elements; a group of two of them. Colours
-/// add up alike for every kind: a whole class of tolerances has them.
+/// Every kind of error by itself, on a double Gauss with cemented elements; a group of two of them.
 #[test]
 fn each_kind_of_error_adds_to_the_term_what_jets_say() {
     let mut lens = lens("double_gauss_rudolph_50");
-    lens.wavelengths = vec![lens.wavelengths[lens.primary()]];
     lens.surfaces[2].conic = -0.4;
     for kind in PerturbationKind::ALL {
         let (first, last) = if kind.moves_a_body() { (2, 6) } else { (2, 2) };
