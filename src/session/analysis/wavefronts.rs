@@ -62,6 +62,9 @@ const MAP: usize = 61;
 const IMAGE: usize = 41;
 /// The half width of an image in λF, and in RMS radii of the spot.
 const WIDTH: [f64; 2] = [5.0, 2.5];
+/// The largest half width in λF: rays to resolve an image grow with the square of its width, and the
+/// next version of the design waits for them.
+const WIDEST: f64 = 15.0;
 /// The radii of the circles, as parts of the half width of the image.
 const CIRCLES: usize = 16;
 /// The number of Zernike coefficients.
@@ -125,13 +128,13 @@ fn point_image(model: &RayModel, field: FieldPoint) -> Result<PointImage, Analys
     })
 }
 
-/// The half width of an image in mm: that of diffraction, or of the spot where that is larger.
+/// The half width of an image in mm: that of diffraction, or of a spot that is somewhat larger.
 fn half_width(model: &RayModel, field: FieldPoint) -> Result<f64, AnalysisError> {
     let f_number = model.first_order.working_f_number.unwrap_or(1.0).abs();
-    let by_diffraction = WIDTH[0] * model.channels[model.primary].um * 1e-3 * f_number;
+    let unit = model.channels[model.primary].um * 1e-3 * f_number;
     let spot = analysis::spot(model, field, LOOKED_AT)?;
     let rms = spot.channels[model.primary].as_ref().map_or(0.0, |color| color.rms.value);
-    Ok(by_diffraction.max(WIDTH[1] * rms))
+    Ok((WIDTH[1] * rms).min(WIDEST * unit).max(WIDTH[0] * unit))
 }
 
 /// The nodes of a square grid about zero, row by row from below.
