@@ -235,9 +235,9 @@ fn publish_wavefronts(
     }
     let mut found = known.take().filter(|known| known.serve(&results));
     if let (None, Ok(analyses), false) = (&found, &results.analyses, output.is_interrupted()) {
-        let model = &analyses.ray_model.value;
+        let (model, spots) = (&analyses.ray_model.value, &analyses.spots.value);
         let (tolerance, interrupted) = (results.settings.tolerance, output.interruption());
-        let timed = time(|| wavefronts::field_wavefronts(model, tolerance, interrupted));
+        let timed = time(|| wavefronts::field_wavefronts(model, spots, tolerance, interrupted));
         let timed = timed.value.map(|value| Arc::new(Timed { value, ms: timed.ms }));
         found = timed.map(|wavefronts| KnownNumbers::new(&results, wavefronts));
     }

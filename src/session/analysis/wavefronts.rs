@@ -1,8 +1,8 @@
 //! The wavefront of every field at the primary wavelength, and what diffraction makes of a point.
 
 use crate::analysis::{
-    self, AnalysisError, Estimate, Strehl, Wavefront, ZernikeOrder, ZernikeSum, encircled_energy,
-    field_paths, point_spread, strehl, zernike,
+    self, AnalysisError, Estimate, Spot, Strehl, Wavefront, ZernikeOrder, ZernikeSum,
+    encircled_energy, field_paths, point_spread, strehl, zernike,
 };
 use crate::lens::FieldPoint;
 use crate::pupil::{Accuracy, RayModel};
@@ -65,7 +65,7 @@ const WIDTH: [f64; 2] = [5.0, 2.5];
 /// The largest half width in λF: rays to resolve an image grow with the square of its width, and the
 /// next version of the design waits for them.
 const WIDEST: f64 = 15.0;
-/// The radii of the circles, as parts of the half width of the image.
+/// The number of circles, the largest of which is as wide as the image.
 const CIRCLES: usize = 16;
 /// The number of Zernike coefficients.
 const TERMS: usize = 15;
@@ -75,16 +75,18 @@ const LOOKED_AT: Accuracy = Accuracy { tolerance: 1e-2, max_rays: 10_000 };
 /// The wavefronts of all fields; `None` if it was interrupted.
 pub(super) fn field_wavefronts(
     model: &RayModel,
+    spots: &[Result<Spot, AnalysisError>],
     tolerance: f64,
-    interrupted: impl Fn() -> bool + Sync,
+    interrupted: impl Fn() -> bool,
 ) -> Option<FieldWavefronts> {
     let accuracy = Accuracy { tolerance, ..Accuracy::default() };
     let mut fields = Vec::with_capacity(model.fields.len());
-    for field in &model.fields {
+    for (field, spot) in model.fields.iter().zip(spots) {
         if interrupted() {
             return None;
         }
-        fields.push(time(|| field_wavefront(model, *field, accuracy, &interrupted)));
+        let half_width = half_width(model, spot);
+        fields.push(time(|| field_wavefront(model, *field, half_width, accuracy, &interrupted)));
     }
     (!interrupted()).then(|| FieldWavefronts { um: model.channels[model.primary].um, fields })
 }
@@ -92,6 +94,7 @@ pub(super) fn field_wavefronts(
 fn field_wavefront(
     model: &RayModel,
     field: FieldPoint,
+    half_width: f64,
     accuracy: Accuracy,
     interrupted: &impl Fn() -> bool,
 ) -> Result<FieldWavefront, AnalysisError> {
@@ -106,14 +109,20 @@ fn field_wavefront(
     let map = GridValues { count: MAP, half_width: 1.0, values: waves.collect() };
     let order = (ZernikeOrder::Noll, TERMS);
     let zernike = zernike(model, field, model.primary, order, accuracy);
-    let image =
-        if interrupted() { Err(AnalysisError::Interrupted) } else { point_image(model, field) };
+    let image = if interrupted() {
+        Err(AnalysisError::Interrupted)
+    } else {
+        point_image(model, field, half_width)
+    };
     Ok(FieldWavefront { wavefront, map, zernike, image })
 }
 
-fn point_image(model: &RayModel, field: FieldPoint) -> Result<PointImage, AnalysisError> {
+fn point_image(
+    model: &RayModel,
+    field: FieldPoint,
+    half_width: f64,
+) -> Result<PointImage, AnalysisError> {
     let w = model.primary;
-    let half_width = half_width(model, field)?;
     let spread = point_spread(model, field, w, &places(IMAGE, half_width), LOOKED_AT)?;
     let part = |k: usize| half_width * (k + 1) as f64 / CIRCLES as f64;
     let radii: Vec<f64> = (0..CIRCLES).map(part).collect();
@@ -129,12 +138,12 @@ fn point_image(model: &RayModel, field: FieldPoint) -> Result<PointImage, Analys
 }
 
 /// The half width of an image in mm: that of diffraction, or of a spot that is somewhat larger.
-fn half_width(model: &RayModel, field: FieldPoint) -> Result<f64, AnalysisError> {
+fn half_width(model: &RayModel, spot: &Result<Spot, AnalysisError>) -> f64 {
     let f_number = model.first_order.working_f_number.unwrap_or(1.0).abs();
     let unit = model.channels[model.primary].um * 1e-3 * f_number;
-    let spot = analysis::spot(model, field, LOOKED_AT)?;
-    let rms = spot.channels[model.primary].as_ref().map_or(0.0, |color| color.rms.value);
-    Ok((WIDTH[1] * rms).min(WIDEST * unit).max(WIDTH[0] * unit))
+    let color = spot.as_ref().ok().and_then(|spot| spot.channels.get(model.primary)?.as_ref().ok());
+    let rms = color.map_or(0.0, |color| color.rms.value);
+    (WIDTH[1] * rms).min(WIDEST * unit).max(WIDTH[0] * unit)
 }
 
 /// The nodes of a square grid about zero, row by row from below.
