@@ -4,7 +4,7 @@ use crate::cli::error::CliError;
 use crate::cli::input::LensFile;
 use crate::cli::output::{Output, ShortNumber, TextTable};
 use crate::cli::progress::{note_if_stopped, stop_flag};
-use crate::cli::search::SearchPlanArgs;
+use crate::cli::search::{SearchPlanArgs, give_goal};
 use crate::measure::{Machine, SearchBenchmark, SearchBudget, SearchRow, compare_searches};
 use crate::search::SearchMethod;
 use serde::Serialize;
@@ -41,8 +41,10 @@ impl MeasureSearchArgs {
             return Err(CliError::Input("--seeds: found 0; expected 1 or more".into()));
         }
         let opened = self.lens.open()?;
-        let plan = self.plan_args.plan(&opened.lens)?;
+        let mut plan = self.plan_args.plan(&opened.lens)?;
         let lens = self.plan_args.start_lens(&opened.lens)?;
+        give_goal(&mut plan, &lens)
+            .map_err(|cause| CliError::Input(format!("{}: {cause}", opened.file)))?;
         let stop = stop_flag();
         let found = compare_searches(&lens, &plan, SearchBudget { seconds, seeds }, &stop)
             .map_err(|cause| CliError::Input(format!("{}: {cause}", opened.file)))?;

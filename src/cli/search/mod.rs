@@ -105,7 +105,7 @@ enum SearchEnd {
 
 /// Gives a search without a merit function that of the lens, if there is one, and says which terms a
 /// search cannot have.
-fn give_goal(plan: &mut SearchPlan, lens: &Lens) -> Result<(), LandscapeError> {
+pub(super) fn give_goal(plan: &mut SearchPlan, lens: &Lens) -> Result<(), LandscapeError> {
     let Some(own) = lens.merit.as_ref().filter(|_| plan.goal.is_none()) else { return Ok(()) };
     let (goal, left_out) = plan.goal_of_design(lens, own)?;
     plan.goal = Some(goal);
