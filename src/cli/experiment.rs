@@ -250,7 +250,8 @@ impl Display for ExperimentList {
 
 /// Fails if a claim does not hold.
 fn check_claims(report: &ExperimentReport) -> Result<(), CliError> {
-    let failed: Vec<&str> = report.outcome.failed().map(|claim| claim.says.as_str()).collect();
+    let says = |claim: &Claim| format!("{} ({})", claim.says, claim.verdict());
+    let failed: Vec<String> = report.outcome.failed().map(says).collect();
     if failed.is_empty() {
         return Ok(());
     }
@@ -280,13 +281,13 @@ impl Display for ExperimentReport {
 }
 
 fn cells(claim: &Claim) -> [String; 5] {
-    let Claim { says, value, error, unit, rule, limit, holds } = claim;
+    let Claim { says, value, error, unit, rule, limit, .. } = claim;
     let error = if *error == 0.0 { String::new() } else { format!("± {error:.1e}") };
     [
         says.clone(),
         format!("{} {unit}", ShortNumber(*value)).trim_end().to_owned(),
         error,
         format!("{rule} {}", ShortNumber(*limit)),
-        if *holds { "holds" } else { "FAILS" }.to_owned(),
+        claim.verdict().to_string(),
     ]
 }

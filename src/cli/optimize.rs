@@ -323,9 +323,7 @@ const THICKNESS_TERMS: [&str; 8] = [
 
 /// True if a lens varies thicknesses that none of these terms limits.
 fn has_free_thicknesses(lens: &Lens, terms: &[TermValue]) -> bool {
-    let is_thickness = |variable: &Variable| {
-        matches!(variable.parameter.quantity, Quantity::Thickness | Quantity::ZoomThickness(_))
-    };
+    let is_thickness = |variable: &Variable| variable.parameter.quantity == Quantity::Thickness;
     let is_limited = terms.iter().any(|term| THICKNESS_TERMS.contains(&term.term));
     lens.variables.iter().any(is_thickness) && !is_limited
 }

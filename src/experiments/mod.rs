@@ -28,7 +28,7 @@ mod structure;
 mod vignetting;
 mod zoom;
 
-pub use outcome::{Claim, ClaimRelation, DataTable, ExperimentOutcome, TableCell};
+pub use outcome::{Claim, ClaimRelation, ClaimVerdict, DataTable, ExperimentOutcome, TableCell};
 pub use report::{ExperimentReport, PhaseTiming};
 
 use crate::files::{self, FileError};

@@ -70,6 +70,28 @@ impl Display for ClaimRelation {
     }
 }
 
+/// The verdict of the data on a claim.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ClaimVerdict {
+    /// The number satisfies its limit even if it is wrong by its error.
+    Holds,
+    /// The limit is within the error of the number: the data show neither that the claim holds nor
+    /// that it is wrong.
+    NoEffect,
+    /// The number does not satisfy its limit, even if it is wrong by its error.
+    Fails,
+}
+
+impl Display for ClaimVerdict {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Holds => "holds",
+            Self::NoEffect => "no effect beyond its error",
+            Self::Fails => "fails",
+        })
+    }
+}
+
 impl Claim {
     /// A claim that a number is not above a limit.
     pub fn at_most(says: impl Into<String>, value: f64, limit: f64) -> Self {
@@ -103,6 +125,18 @@ impl Claim {
     pub fn with_error(mut self, error: f64) -> Self {
         self.error = error;
         self.check()
+    }
+
+    /// The verdict of the data on the claim.
+    pub fn verdict(&self) -> ClaimVerdict {
+        let Self { value, error, limit, .. } = *self;
+        if self.holds {
+            ClaimVerdict::Holds
+        } else if self.rule != ClaimRelation::Exactly && (value - limit).abs() <= error {
+            ClaimVerdict::NoEffect
+        } else {
+            ClaimVerdict::Fails
+        }
     }
 
     fn check(mut self) -> Self {
@@ -214,6 +248,19 @@ mod tests {
         assert!(Claim::exactly("c", 0.0, 0.0).holds && !Claim::exactly("c", 1e-300, 0.0).holds);
         assert!(!Claim::at_most("d", f64::NAN, 1.0).holds);
         assert!(!Claim::at_least("e", f64::NAN, 1.0).holds);
+    }
+
+    #[test]
+    fn a_number_within_its_error_of_the_limit_decides_nothing() {
+        let gain = |value: f64| Claim::at_least("gain", value, 0.0).with_error(0.05).verdict();
+        for value in [0.01, -0.01] {
+            assert_eq!(gain(value), ClaimVerdict::NoEffect);
+        }
+        assert_eq!(gain(0.06), ClaimVerdict::Holds);
+        assert_eq!(gain(-0.06), ClaimVerdict::Fails);
+        assert_eq!(gain(f64::NAN), ClaimVerdict::Fails);
+        let count = Claim::exactly("count", 1.0, 0.0).with_error(2.0);
+        assert_eq!(count.verdict(), ClaimVerdict::Fails);
     }
 
     #[test]

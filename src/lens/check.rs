@@ -1,7 +1,7 @@
 //! Checks of a lens as written, before anything is computed from it.
 
 use super::{Aperture, FieldKind, Goal, Lens, Medium, MediumPlace, Object};
-use super::{Parameter, Quantity, Row, SurfaceNumber, SystemError};
+use super::{Parameter, Quantity, Row, SurfaceNumber, SystemError, ZoomNumber};
 use crate::lens::glass;
 use crate::math::format_short;
 use std::fmt;
@@ -212,14 +212,40 @@ impl Lens {
 
     fn check_zoom(&self) -> Result<(), LensError> {
         for (i, position) in self.zoom.iter().enumerate() {
-            for gap in &position.thicknesses {
-                self.row_exists(gap.surface, &format!("zoom position {i}"))?;
-                let what = Parameter::new(gap.surface, Quantity::ZoomThickness(i));
-                check_number(what, gap.thickness, true, FINITE)?;
+            for (k, own) in position.numbers.iter().enumerate() {
+                self.check_zoom_number(i, own)?;
+                let same = |other: &ZoomNumber| {
+                    (other.surface, other.quantity) == (own.surface, own.quantity)
+                };
+                if position.numbers[..k].iter().any(same) {
+                    let twice = Parameter::at_zoom(own.surface, own.quantity, i);
+                    let text = format!("two numbers for the {twice}; expected one");
+                    return Err(LensError::Inconsistent(text));
+                }
             }
             if let Some(aperture) = position.aperture {
                 check_aperture(aperture, self.object)?;
             }
+            if position.numbers.iter().any(|own| own.quantity != Quantity::Thickness) {
+                let mut there = self.clone();
+                there.take_numbers_of(i);
+                there.check_rows()?;
+            }
+        }
+        Ok(())
+    }
+
+    fn check_zoom_number(&self, zoom: usize, own: &ZoomNumber) -> Result<(), LensError> {
+        let whose = format!("zoom position {zoom}");
+        self.row_exists(own.surface, &whose)?;
+        let parameter = Parameter::at_zoom(own.surface, own.quantity, zoom);
+        check_number(parameter, own.value, true, FINITE)?;
+        self.parameter_exists(parameter, &whose)?;
+        let is_aperture = matches!(self.aperture_at(zoom), Aperture::StopSemiDiameter(_));
+        let sets_stop = own.quantity == Quantity::SemiDiameter && self.surfaces[own.surface].stop;
+        if sets_stop && is_aperture {
+            let text = format!("the {parameter} differs; expected the aperture of the position");
+            return Err(LensError::Inconsistent(text));
         }
         Ok(())
     }
@@ -269,11 +295,7 @@ impl Lens {
 
     fn parameter_exists(&self, parameter: Parameter, whose: &str) -> Result<(), LensError> {
         self.row_exists(parameter.surface, whose)?;
-        let position = match parameter.quantity {
-            Quantity::ZoomThickness(zoom) => zoom < self.zoom.len(),
-            _ => true,
-        };
-        if position && self.get(parameter).is_some() {
+        if self.get(parameter).is_some() {
             return Ok(());
         }
         let text = format!("{whose} names the {parameter}, which this lens does not have");

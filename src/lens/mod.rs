@@ -33,6 +33,7 @@ mod surface_number;
 mod system;
 mod tolerance;
 mod variables;
+mod zoom;
 
 pub use crate::grin::field::{
     AXIAL_TERMS, PROFILE_TERMS, ProfileCoefficients, ProfileLaw, RADIAL_TERMS, RotationalProfile,
@@ -60,6 +61,7 @@ pub use surface_number::{MediumPlace, SurfaceNumber};
 pub use system::{Shape, Surface, System, SystemError};
 pub use tolerance::{ErrorDistribution, Tolerance, ToleranceGrade, ToleranceSheet};
 pub use variables::{ParameterKind, add_variable, add_variables, at_zoom};
+pub use zoom::{ZoomNumber, ZoomPosition};
 
 use serde::{Deserialize, Serialize};
 
@@ -303,33 +305,6 @@ pub enum Medium {
     Mirror,
     /// A gradient-index (GRIN) medium.
     Grin(Box<GradientIndex>),
-}
-
-/// One position of a zoom lens: the data that differ from the prescription.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, Default)]
-#[serde(deny_unknown_fields)]
-pub struct ZoomPosition {
-    /// The name of the position.
-    #[serde(default, skip_serializing_if = "String::is_empty")]
-    pub name: String,
-    /// The thicknesses that differ.
-    pub thicknesses: Vec<ZoomThickness>,
-    /// The aperture at this position, if it differs.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub aperture: Option<Aperture>,
-    /// The field points at this position, if they differ.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub fields: Option<Fields>,
-}
-
-/// A thickness at one zoom position.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct ZoomThickness {
-    /// The index of the row in front of the gap.
-    pub surface: usize,
-    /// The thickness of the gap, in mm.
-    pub thickness: f64,
 }
 
 /// A parameter that an optimizer may change.

@@ -23,12 +23,13 @@ impl Lens {
                 format!("no zoom position {zoom}; expected 0 to {}", self.zoom_positions() - 1);
             return Err(LensError::Inconsistent(text));
         }
-        let lens = self.with_pickups()?;
-        let mut system = lens.resolve_unsolved(zoom, um)?;
+        let mut lens = self.with_pickups()?;
+        lens.take_numbers_of(zoom);
+        let mut system = lens.resolve_unsolved(um)?;
         if let Some(offset) = lens.image_solve {
             let primary = lens.wavelengths[lens.primary()].um;
-            let gap = paraxial_image_distance(&lens.resolve_unsolved(zoom, primary)?, lens.object)
-                + offset;
+            let gap =
+                paraxial_image_distance(&lens.resolve_unsolved(primary)?, lens.object) + offset;
             let last = lens.surfaces.len() - 1;
             system.surfaces[last].thickness = gap;
         }
@@ -47,6 +48,16 @@ impl Lens {
             lens.set(pickup.parameter, pickup.offset + pickup.scale * source);
         }
         Ok(lens)
+    }
+
+    /// Writes the numbers of a zoom position into the rows.
+    pub(super) fn take_numbers_of(&mut self, zoom: usize) {
+        let Some(position) = self.zoom.get(zoom) else { return };
+        for own in &position.numbers {
+            if let Some(row) = self.surfaces.get_mut(own.surface) {
+                row.set(own.quantity, own.value);
+            }
+        }
     }
 
     /// Every parameter that changes with `parameter`, with its derivative; `parameter` itself, with
@@ -78,14 +89,13 @@ impl Lens {
         Ok(ordered)
     }
 
-    fn resolve_unsolved(&self, zoom: usize, um: f64) -> Result<System<f64>, LensError> {
+    fn resolve_unsolved(&self, um: f64) -> Result<System<f64>, LensError> {
         let index_before = index(&self.object_medium, MediumPlace::Object, um, 1.0)?;
         let mut surfaces = Vec::with_capacity(self.surfaces.len() + 1);
         let mut current = index_before;
         for (i, row) in self.surfaces.iter().enumerate() {
             current = index(&row.medium, MediumPlace::behind(i), um, current)?;
-            let thickness = self.thickness_at(i, zoom).unwrap_or(row.thickness);
-            let mut surface = row.surface(thickness, current, um);
+            let mut surface = row.surface(current, um);
             // A GRIN medium with a constant index is homogeneous.
             surface.grin = self.grin_coefficients(i).filter(|grin| !grin.is_constant());
             check_lowest_index(i, &surface)?;
@@ -118,10 +128,10 @@ impl Row {
         }
     }
 
-    fn surface(&self, thickness: f64, index: f64, um: f64) -> Surface<f64> {
+    fn surface(&self, index: f64, um: f64) -> Surface<f64> {
         Surface {
             shape: self.shape(),
-            thickness,
+            thickness: self.thickness,
             index,
             grin: None,
             semi_diameter: self.semi_diameter.unwrap_or(f64::INFINITY),

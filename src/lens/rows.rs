@@ -1,9 +1,7 @@
 //! Renumbering and reversing rows, along with the variables, pickups and zoom positions that name
 //! them.
 
-use super::{
-    Lens, Medium, Parameter, Pickup, Quantity, Row, TermSelection, Variable, ZoomThickness,
-};
+use super::{Lens, Medium, Parameter, Pickup, Quantity, Row, TermSelection, Variable, ZoomNumber};
 
 impl Lens {
     /// Maps the parameters of all variables and pickups; those mapped to `None` are removed.
@@ -29,10 +27,9 @@ impl Lens {
             goal.renumber(TermSelection::Surfaces, |_, i| map(i));
         }
         for position in &mut self.zoom {
-            let gap = |gap: &ZoomThickness| {
-                map(gap.surface).map(|surface| ZoomThickness { surface, ..*gap })
-            };
-            position.thicknesses = position.thicknesses.iter().filter_map(gap).collect();
+            let number =
+                |own: &ZoomNumber| map(own.surface).map(|surface| ZoomNumber { surface, ..*own });
+            position.numbers = position.numbers.iter().filter_map(number).collect();
         }
     }
 
@@ -60,8 +57,8 @@ impl Lens {
                 Some(if term.is_of_gaps() { reversal.gap(i) } else { reversal.surface(i) })
             });
         }
-        for gap in self.zoom.iter_mut().flat_map(|position| &mut position.thicknesses) {
-            gap.surface = reversal.gap(gap.surface);
+        for own in self.zoom.iter_mut().flat_map(|position| &mut position.numbers) {
+            *own = reversal.zoom_number(*own, &rows);
         }
     }
 }
@@ -105,10 +102,9 @@ impl Reversal {
 
     fn parameter(self, parameter: Parameter) -> Parameter {
         let surface = match parameter.quantity {
-            Quantity::Thickness
-            | Quantity::ZoomThickness(_)
-            | Quantity::Index
-            | Quantity::Grin(_) => self.gap(parameter.surface),
+            Quantity::Thickness | Quantity::Index | Quantity::Grin(_) => {
+                self.gap(parameter.surface)
+            }
             Quantity::Curvature
             | Quantity::Conic
             | Quantity::Asphere(_)
@@ -127,6 +123,12 @@ impl Reversal {
             _ => false,
         };
         signed && (self.first..=self.last).contains(&parameter.surface)
+    }
+
+    fn zoom_number(self, own: ZoomNumber, rows: &[Row]) -> ZoomNumber {
+        let moved = self.parameter(Parameter::new(own.surface, own.quantity));
+        let value = if self.changes_sign(moved, rows) { negate(own.value) } else { own.value };
+        ZoomNumber { surface: moved.surface, value, ..own }
     }
 
     fn swap_bounds(self, variable: &mut Variable, rows: &[Row]) {

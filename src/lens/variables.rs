@@ -45,33 +45,32 @@ pub fn add_variable(lens: &mut Lens, parameter: Parameter) -> bool {
 
 /// True for the last thickness of a lens with an image solve.
 fn is_solved(lens: &Lens, parameter: Parameter) -> bool {
-    let gap = matches!(parameter.quantity, Quantity::Thickness | Quantity::ZoomThickness(_));
-    lens.image_solve.is_some() && gap && parameter.surface + 1 == lens.surfaces.len()
+    let is_gap = parameter.quantity == Quantity::Thickness;
+    lens.image_solve.is_some() && is_gap && parameter.surface + 1 == lens.surfaces.len()
 }
 
 fn parameters(lens: &Lens, kind: ParameterKind) -> Vec<Parameter> {
     let rows = 0..lens.surfaces.len();
-    let all = |quantity: Quantity| rows.clone().map(move |i| Parameter::new(i, quantity));
-    match kind {
+    let row = |i: usize| &lens.surfaces[i];
+    let of_rows = |quantity: Quantity| rows.clone().map(move |i| (i, quantity));
+    let written: Vec<(usize, Quantity)> = match kind {
         ParameterKind::Curvatures => {
-            all(Quantity::Curvature).filter(|p| refracts(lens, p.surface)).collect()
+            of_rows(Quantity::Curvature).filter(|(i, _)| refracts(lens, *i)).collect()
         }
-        ParameterKind::Thicknesses => {
-            rows.flat_map(|surface| thickness_parameters(lens, surface)).collect()
-        }
+        ParameterKind::Thicknesses => of_rows(Quantity::Thickness).collect(),
         ParameterKind::Conics => {
-            all(Quantity::Conic).filter(|p| lens.surfaces[p.surface].conic != 0.0).collect()
+            of_rows(Quantity::Conic).filter(|(i, _)| row(*i).conic != 0.0).collect()
         }
         ParameterKind::Aspheres => rows
-            .flat_map(|i| asphere_quantities(&lens.surfaces[i]).map(move |term| (i, term)))
-            .map(|(i, quantity)| Parameter::new(i, quantity))
+            .flat_map(|i| asphere_quantities(row(i)).map(move |quantity| (i, quantity)))
             .collect(),
-        ParameterKind::Indices => all(Quantity::Index).collect(),
-        ParameterKind::SemiDiameters => all(Quantity::SemiDiameter).collect(),
-        ParameterKind::GrinCoefficients => {
-            rows.flat_map(|surface| grin_parameters(lens, surface)).collect()
-        }
-    }
+        ParameterKind::Indices => of_rows(Quantity::Index).collect(),
+        ParameterKind::SemiDiameters => of_rows(Quantity::SemiDiameter).collect(),
+        ParameterKind::GrinCoefficients => rows
+            .flat_map(|i| grin_quantities(row(i)).into_iter().map(move |quantity| (i, quantity)))
+            .collect(),
+    };
+    written.into_iter().flat_map(|(i, quantity)| at_all_positions(lens, i, quantity)).collect()
 }
 
 /// True if light changes its direction at a surface.
@@ -93,38 +92,35 @@ fn asphere_quantities(row: &Row) -> impl Iterator<Item = Quantity> + use<> {
     terms.chain((0..numbers).map(Quantity::Freeform))
 }
 
-/// The GRIN coefficients behind a surface.
-fn grin_parameters(lens: &Lens, surface: usize) -> Vec<Parameter> {
-    let Medium::Grin(grin) = &lens.surfaces[surface].medium else { return Vec::new() };
-    grin.written_terms().map(|k| Parameter::new(surface, Quantity::Grin(k))).collect()
+/// The GRIN coefficients behind a surface that are written.
+fn grin_quantities(row: &Row) -> Vec<Quantity> {
+    let Medium::Grin(grin) = &row.medium else { return Vec::new() };
+    grin.written_terms().map(Quantity::Grin).collect()
 }
 
-/// The thickness parameters of a gap: the common one, and those of zoom positions that differ.
-fn thickness_parameters(lens: &Lens, surface: usize) -> Vec<Parameter> {
-    let own = |zoom: &usize| lens.zoom[*zoom].thicknesses.iter().any(|gap| gap.surface == surface);
-    let moving: Vec<usize> = (0..lens.zoom.len()).filter(own).collect();
-    let fixed = moving.len() < lens.zoom_positions();
-    let fixed = fixed.then_some(Parameter::new(surface, Quantity::Thickness));
-    let own = moving.iter().map(|z| Parameter::new(surface, Quantity::ZoomThickness(*z)));
-    fixed.into_iter().chain(own).collect()
+/// The parameters of a quantity: the common one, and those of zoom positions with numbers of their
+/// own.
+fn at_all_positions(lens: &Lens, surface: usize, quantity: Quantity) -> Vec<Parameter> {
+    let is_own = |zoom: &usize| lens.is_own_at(*zoom, surface, quantity);
+    let own: Vec<usize> = (0..lens.zoom.len()).filter(is_own).collect();
+    let common = (own.len() < lens.zoom_positions()).then_some(Parameter::new(surface, quantity));
+    let own = own.into_iter().map(|zoom| Parameter::at_zoom(surface, quantity, zoom));
+    common.into_iter().chain(own).collect()
 }
 
 /// The lens at one of its zoom positions, as a lens with a fixed focal length.
 pub fn at_zoom(lens: &Lens, zoom: usize) -> Lens {
-    let mut single = lens.clone();
+    let mut single = lens.with_pickups().unwrap_or_else(|_| lens.clone());
+    single.take_numbers_of(zoom);
     single.zoom.clear();
     single.fields = lens.fields_at(zoom).clone();
     single.aperture = lens.aperture_at(zoom);
-    for (i, row) in single.surfaces.iter_mut().enumerate() {
-        row.thickness = lens.thickness_at(i, zoom).unwrap_or(row.thickness);
-    }
-    // A pickup to or from a thickness of another position is dropped.
-    let here = |parameter: Parameter| match parameter.quantity {
-        Quantity::ZoomThickness(z) if z == zoom => {
-            Some(Parameter::new(parameter.surface, Quantity::Thickness))
-        }
-        Quantity::ZoomThickness(_) => None,
-        _ => Some(parameter),
+    // A pickup to or from a number that is not that of this position is dropped.
+    let here = |parameter: Parameter| {
+        let Parameter { surface, quantity, zoom: at } = parameter;
+        let is_own = lens.is_own_at(zoom, surface, quantity);
+        let holds = at.map_or(!is_own, |other| other == zoom);
+        holds.then_some(Parameter::new(surface, quantity))
     };
     single.pickups = lens
         .pickups
@@ -137,6 +133,6 @@ pub fn at_zoom(lens: &Lens, zoom: usize) -> Lens {
     if let Some(goal) = &mut single.merit {
         goal.restrict_to_zoom(zoom);
     }
-    single.variables.retain(|v| !matches!(v.parameter.quantity, Quantity::ZoomThickness(_)));
+    single.variables.retain(|v| v.parameter.zoom.is_none());
     single
 }

@@ -7,8 +7,8 @@
 use super::{MeritError, SLOPES, VariableDual};
 use crate::lens::glass::model_index;
 use crate::lens::{
-    Aperture, FieldKind, Lens, Medium, Object, Quantity, Shape, Surface, System,
-    paraxial_image_distance,
+    Aperture, FieldKind, Lens, Medium, Object, Parameter, Quantity, Shape, Surface, System,
+    at_zoom, paraxial_image_distance,
 };
 use crate::paraxial::Beam;
 use crate::pupil::{Aiming, RayModel, filled_stop_radius};
@@ -397,23 +397,19 @@ fn bind_parameters(
     for (variable, free) in lens.variables.iter().enumerate() {
         let start = lens.get(free.parameter).unwrap_or(0.0);
         for (parameter, factor) in lens.dependents(free.parameter) {
-            let surface = parameter.surface;
-            let own_gap = has_own_gap(lens, zoom, surface);
-            let target = match parameter.quantity {
+            let Parameter { surface, quantity, zoom: of } = parameter;
+            let is_moved = of.map_or(!lens.is_own_at(zoom, surface, quantity), |of| of == zoom);
+            let target = match quantity {
+                _ if !is_moved => continue,
                 Quantity::Curvature => SurfaceParameter::Curvature,
                 Quantity::Conic => SurfaceParameter::Conic,
                 Quantity::Asphere(term) => SurfaceParameter::AsphereTerm(term),
-                Quantity::Thickness if !own_gap => SurfaceParameter::Thickness,
-                Quantity::ZoomThickness(z) if z == zoom => SurfaceParameter::Thickness,
+                Quantity::Thickness => SurfaceParameter::Thickness,
                 Quantity::Index => SurfaceParameter::Index,
                 Quantity::Grin(k) => SurfaceParameter::GrinTerm(k),
                 Quantity::Freeform(k) => SurfaceParameter::Freeform(k),
-                Quantity::SemiDiameter if !has_own_aperture(lens, zoom, surface) => {
-                    SurfaceParameter::SemiDiameter
-                }
-                Quantity::Thickness | Quantity::ZoomThickness(_) | Quantity::SemiDiameter => {
-                    continue;
-                }
+                Quantity::SemiDiameter if has_own_aperture(lens, zoom, surface) => continue,
+                Quantity::SemiDiameter => SurfaceParameter::SemiDiameter,
             };
             let growth = if target == SurfaceParameter::Index {
                 index_slope(lens, surface, um)
@@ -424,7 +420,7 @@ fn bind_parameters(
             for surface in followers_of_index(lens, surface, target) {
                 if let SurfaceParameter::GrinTerm(_) = target {
                     let graded = &mut system.surfaces[surface].grin;
-                    *graded = graded.or_else(|| lens.grin_coefficients(surface));
+                    *graded = graded.or_else(|| at_zoom(lens, zoom).grin_coefficients(surface));
                 }
                 target.promote_shape(system, surface);
                 let now = *target.value_mut(system, surface);
@@ -434,11 +430,6 @@ fn bind_parameters(
         }
     }
     bindings
-}
-
-fn has_own_gap(lens: &Lens, zoom: usize, surface: usize) -> bool {
-    let position = lens.zoom.get(zoom);
-    position.is_some_and(|p| p.thicknesses.iter().any(|gap| gap.surface == surface))
 }
 
 /// True if the surface is the stop and the zoom position defines its size by an aperture of its

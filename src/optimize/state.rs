@@ -357,7 +357,7 @@ fn scale(lens: &Lens, variable: &Variable) -> f64 {
             let power = 2 * term.min(ASPHERE_TERMS) as i32 + 4;
             0.05 / rim.powi(power - 1)
         }
-        Quantity::Thickness | Quantity::ZoomThickness(_) | Quantity::SemiDiameter => 0.1 * rim,
+        Quantity::Thickness | Quantity::SemiDiameter => 0.1 * rim,
         Quantity::Index => 0.1,
         // The same index change at the rim, or at the other face, for all coefficients.
         Quantity::Grin(k) => match &lens.surfaces[variable.parameter.surface].medium {

@@ -8,16 +8,25 @@
 
 use super::signed_indices;
 use crate::lens::{
-    Lens, LensError, Parameter, ParameterKind, ParaxialGrin, Quantity, RotationalProfile,
+    Lens, LensError, Parameter, ParameterKind, ParaxialGrin, Quantity, RotationalProfile, Surface,
     add_variables,
 };
 use crate::math::Real;
 
-/// The effect of a coordinate on a curvature or a gap.
+/// The effect of a coordinate on a number at a zoom position.
 #[derive(Debug, Clone, Copy)]
-enum CoordinateEffect {
-    Curvature { row: usize, factor: f64 },
-    Gap { zoom: usize, row: usize, factor: f64 },
+struct CoordinateEffect {
+    on: AffectedNumber,
+    zoom: usize,
+    row: usize,
+    factor: f64,
+}
+
+/// The kind of a number that a coordinate changes.
+#[derive(Debug, Clone, Copy)]
+enum AffectedNumber {
+    Curvature,
+    Gap,
 }
 
 /// The media and gaps of a lens at one zoom position.
@@ -25,6 +34,7 @@ enum CoordinateEffect {
 struct ParametricPosition {
     indices: Vec<f64>,
     gradients: Vec<Option<RotationalProfile<f64>>>,
+    curvatures: Vec<f64>,
     gaps: Vec<f64>,
 }
 
@@ -33,7 +43,6 @@ struct ParametricPosition {
 #[derive(Debug, Clone)]
 pub struct ParametricLens {
     positions: Vec<ParametricPosition>,
-    curvatures: Vec<f64>,
     effects: Vec<Vec<CoordinateEffect>>,
 }
 
@@ -71,11 +80,7 @@ impl ParametricLens {
         let effects = |parts: &Vec<(Parameter, f64)>| {
             parts.iter().flat_map(|(parameter, by)| effects_of(lens, *parameter, *by)).collect()
         };
-        Ok(Self {
-            positions: positions(lens)?,
-            curvatures: lens.surfaces.iter().map(|row| row.curvature).collect(),
-            effects: coordinates.iter().map(effects).collect(),
-        })
+        Ok(Self { positions: positions(lens)?, effects: coordinates.iter().map(effects).collect() })
     }
 
     /// The number of zoom positions.
@@ -94,21 +99,18 @@ impl ParametricLens {
         self.positions[zoom].indices.last().copied().unwrap_or(1.0)
     }
 
-    /// Curvatures, and gaps by zoom position.
-    pub fn curvatures_and_gaps<R: Real>(&self, at: &[R]) -> (Vec<R>, Vec<Vec<R>>) {
+    /// Curvatures and gaps, both by zoom position.
+    pub fn curvatures_and_gaps<R: Real>(&self, at: &[R]) -> (Vec<Vec<R>>, Vec<Vec<R>>) {
         let lifted = |numbers: &[f64]| numbers.iter().map(|v| R::from_f64(*v)).collect::<Vec<R>>();
-        let mut curvatures = lifted(&self.curvatures);
+        let mut curvatures: Vec<_> = self.positions.iter().map(|p| lifted(&p.curvatures)).collect();
         let mut gaps: Vec<_> = self.positions.iter().map(|p| lifted(&p.gaps)).collect();
         for (reaches, z) in self.effects.iter().zip(at) {
-            for reach in reaches {
-                match *reach {
-                    CoordinateEffect::Curvature { row, factor } => {
-                        curvatures[row] += *z * R::from_f64(factor);
-                    }
-                    CoordinateEffect::Gap { zoom, row, factor } => {
-                        gaps[zoom][row] += *z * R::from_f64(factor);
-                    }
-                }
+            for CoordinateEffect { on, zoom, row, factor } in reaches {
+                let numbers = match on {
+                    AffectedNumber::Curvature => &mut curvatures,
+                    AffectedNumber::Gap => &mut gaps,
+                };
+                numbers[*zoom][*row] += *z * R::from_f64(*factor);
             }
         }
         (curvatures, gaps)
@@ -211,9 +213,11 @@ fn positions(lens: &Lens) -> Result<Vec<ParametricPosition>, LensError> {
         let system = lens.resolve(zoom, um)?;
         let mut indices = signed_indices(&system);
         indices.truncate(rows + 1);
-        let gaps = system.surfaces[..rows].iter().map(|surface| surface.thickness).collect();
+        let surfaces = &system.surfaces[..rows];
+        let curvatures = surfaces.iter().map(Surface::curvature).collect();
+        let gaps = surfaces.iter().map(|surface| surface.thickness).collect();
         let gradients = (0..rows).map(|row| system.grin_profile(row)).collect();
-        Ok(ParametricPosition { indices, gradients, gaps })
+        Ok(ParametricPosition { indices, gradients, curvatures, gaps })
     };
     (0..lens.zoom_positions()).map(position).collect()
 }
@@ -236,16 +240,12 @@ fn sum_effects<R: Real>(
     by_gap: &[R],
 ) -> R {
     let mut sum = R::ZERO;
-    for reach in reaches {
-        match *reach {
-            CoordinateEffect::Curvature { row, factor } => {
-                sum += by_curvature[row] * R::from_f64(factor);
-            }
-            CoordinateEffect::Gap { zoom, row, factor } if zoom == at_zoom => {
-                sum += by_gap[row] * R::from_f64(factor);
-            }
-            CoordinateEffect::Gap { .. } => {}
-        }
+    for CoordinateEffect { on, row, factor, .. } in reaches.iter().filter(|r| r.zoom == at_zoom) {
+        let by_number = match on {
+            AffectedNumber::Curvature => by_curvature,
+            AffectedNumber::Gap => by_gap,
+        };
+        sum += by_number[*row] * R::from_f64(*factor);
     }
     sum
 }
@@ -256,26 +256,21 @@ fn effects_of(lens: &Lens, parameter: Parameter, factor: f64) -> Vec<CoordinateE
         if lens.pickups.is_empty() { vec![(parameter, 1.0)] } else { lens.dependents(parameter) };
     let mut found = Vec::with_capacity(moving.len());
     for (moved, share) in moving {
-        let (row, factor) = (moved.surface, factor * share);
-        match moved.quantity {
-            Quantity::Curvature => found.push(CoordinateEffect::Curvature { row, factor }),
-            Quantity::ZoomThickness(zoom) => {
-                found.push(CoordinateEffect::Gap { zoom, row, factor });
-            }
-            Quantity::Thickness => {
-                let shared = |zoom: &usize| !has_own(lens, *zoom, row);
-                let zooms = (0..lens.zoom_positions()).filter(shared);
-                found.extend(zooms.map(|zoom| CoordinateEffect::Gap { zoom, row, factor }));
-            }
-            _ => {}
-        }
+        let on = match moved.quantity {
+            Quantity::Curvature => AffectedNumber::Curvature,
+            Quantity::Thickness => AffectedNumber::Gap,
+            _ => continue,
+        };
+        let Parameter { surface: row, quantity, zoom } = moved;
+        let is_moved = |at: &usize| match zoom {
+            Some(zoom) => *at == zoom,
+            None => !lens.is_own_at(*at, row, quantity),
+        };
+        let zooms = (0..lens.zoom_positions()).filter(is_moved);
+        let factor = factor * share;
+        found.extend(zooms.map(|zoom| CoordinateEffect { on, zoom, row, factor }));
     }
     found
-}
-
-fn has_own(lens: &Lens, zoom: usize, row: usize) -> bool {
-    let position = lens.zoom.get(zoom);
-    position.is_some_and(|p| p.thicknesses.iter().any(|gap| gap.surface == row))
 }
 
 #[cfg(test)]

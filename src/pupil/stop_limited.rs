@@ -1,7 +1,7 @@
 //! Beams that the rim of the stop limits: the pupil then has a derivative by every semi-diameter.
 
 use super::ray_model::{Aiming, Channel, RayModel, RayModelError};
-use crate::lens::{Aperture, Lens, SystemError};
+use crate::lens::{Aperture, Lens, Quantity, SystemError};
 use crate::paraxial::Beam;
 use crate::trace::Tracer;
 
@@ -20,10 +20,14 @@ pub fn limited_by_stop(lens: &Lens) -> Result<Lens, RayModelError> {
     let mut limited = lens.clone();
     let stop = lens.stop().unwrap_or(0);
     limited.surfaces[stop].stop = true;
-    let rim = lens.surfaces[stop].semi_diameter.unwrap_or(f64::INFINITY);
+    let rim = |zoom: usize| {
+        let parameter = lens.parameter_at(zoom, stop, Quantity::SemiDiameter);
+        lens.get(parameter).unwrap_or(f64::INFINITY)
+    };
     let radius = |zoom| match lens.aperture_at(zoom) {
         Aperture::StopSemiDiameter(radius) => Ok(radius),
-        _ => RayModel::with_aiming(lens, zoom, Aiming::Paraxial).map(|m| m.stop_radius().min(rim)),
+        _ => RayModel::with_aiming(lens, zoom, Aiming::Paraxial)
+            .map(|model| model.stop_radius().min(rim(zoom))),
     };
     let radii: Vec<f64> = (0..lens.zoom_positions()).map(radius).collect::<Result<_, _>>()?;
     let first = radii[0];
@@ -33,6 +37,9 @@ pub fn limited_by_stop(lens: &Lens) -> Result<Lens, RayModelError> {
         }
     } else {
         limited.zoom.iter_mut().for_each(|position| position.aperture = None);
+    }
+    for position in &mut limited.zoom {
+        position.remove_number(stop, Quantity::SemiDiameter);
     }
     let widest = radii.iter().fold(0.0, |widest: f64, radius| widest.max(*radius));
     limited.aperture = Aperture::StopSemiDiameter(widest);

@@ -2,7 +2,7 @@
 
 use super::first_order_table::first_order_numbers;
 use super::materials::{index_and_abbe, material_name};
-use crate::lens::{AxisBreak, Lens, Row, SurfaceNumber};
+use crate::lens::{AxisBreak, Lens, Parameter, Quantity, Row, SurfaceNumber};
 use crate::math::ShortNumber;
 use crate::paraxial::FirstOrder;
 use crate::plot::{DocumentTable, ReportDocument};
@@ -27,17 +27,12 @@ pub(super) fn add_prescription(document: &mut ReportDocument, lens: &Lens) {
 }
 
 fn surface_row(i: usize, row: &Row) -> [String; 8] {
-    let radius = if row.curvature == 0.0 {
-        "plane".to_owned()
-    } else {
-        ShortNumber(1.0 / row.curvature).to_string()
-    };
     let (nd, vd) = index_and_abbe(&row.medium).map_or_else(Default::default, |(nd, vd)| {
         (format!("{nd:.5}"), vd.map(|v| format!("{v:.2}")))
     });
     [
         SurfaceNumber::new(i).to_string(),
-        radius,
+        radius_text(row.curvature),
         ShortNumber(row.thickness).to_string(),
         material_name(&row.medium),
         nd,
@@ -45,6 +40,13 @@ fn surface_row(i: usize, row: &Row) -> [String; 8] {
         row.semi_diameter.map_or_else(|| "-".to_owned(), |r| ShortNumber(r).to_string()),
         remarks(row).join(", "),
     ]
+}
+
+fn radius_text(curvature: f64) -> String {
+    match curvature {
+        0.0 => "plane".to_owned(),
+        _ => ShortNumber(curvature.recip()).to_string(),
+    }
 }
 
 fn remarks(row: &Row) -> Vec<String> {
@@ -143,27 +145,31 @@ fn place_table(lens: &Lens) -> DocumentTable {
     table
 }
 
-/// The thicknesses that differ between zoom positions.
+/// The numbers that differ between zoom positions.
 fn zoom_table(lens: &Lens) -> DocumentTable {
-    let mut gaps: Vec<usize> = lens
-        .zoom
-        .iter()
-        .flat_map(|position| &position.thicknesses)
-        .map(|gap| gap.surface)
-        .collect();
-    gaps.sort_unstable();
-    gaps.dedup();
+    let numbers = lens.zoom.iter().flat_map(|position| &position.numbers);
+    let mut differing: Vec<(usize, Quantity)> =
+        numbers.map(|own| (own.surface, own.quantity)).collect();
+    differing.sort_unstable();
+    differing.dedup();
     let head = ["zoom position".to_owned()].into_iter();
-    let gap_name = |i: &usize| format!("behind {}", SurfaceNumber::new(*i));
-    let head = head.chain(gaps.iter().map(gap_name)).collect();
+    let name = |(surface, quantity): &(usize, Quantity)| match quantity {
+        Quantity::Thickness => format!("behind {}", SurfaceNumber::new(*surface)),
+        Quantity::Curvature => format!("radius of {}", SurfaceNumber::new(*surface)),
+        _ => format!("{quantity} {}", SurfaceNumber::new(*surface)),
+    };
+    let head = head.chain(differing.iter().map(name)).collect();
     let mut table = DocumentTable { head, rows: Vec::new(), left: vec![0] };
-    for (i, position) in lens.zoom.iter().enumerate().filter(|_| !gaps.is_empty()) {
-        let thickness = |gap: &usize| {
-            let own = position.thicknesses.iter().find(|own| own.surface == *gap);
-            ShortNumber(own.map_or(lens.surfaces[*gap].thickness, |own| own.thickness)).to_string()
+    for (i, position) in lens.zoom.iter().enumerate().filter(|_| !differing.is_empty()) {
+        let value = |(surface, quantity): &(usize, Quantity)| {
+            let value = lens.get(Parameter::at_zoom(*surface, *quantity, i)).unwrap_or(f64::NAN);
+            match quantity {
+                Quantity::Curvature => radius_text(value),
+                _ => ShortNumber(value).to_string(),
+            }
         };
         let name = format!("{i} {}", position.name).trim_end().to_owned();
-        table.row([name].into_iter().chain(gaps.iter().map(thickness)));
+        table.row([name].into_iter().chain(differing.iter().map(value)));
     }
     table
 }

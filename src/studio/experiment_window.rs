@@ -11,7 +11,7 @@ use super::file_dialog::FileRequest;
 use super::number;
 use super::palette::{Palette, color32};
 use super::text::capitalize;
-use crate::experiments::{ALL, Claim, Effort, Experiment, ExperimentReport};
+use crate::experiments::{ALL, Claim, ClaimVerdict, Effort, Experiment, ExperimentReport};
 use crate::plot::NamedPlot;
 use crate::session::{Command, ExperimentRun, ExperimentStatus};
 
@@ -169,12 +169,13 @@ fn claims(ui: &mut Ui, claims: &[Claim]) {
         }
         ui.end_row();
         for claim in claims {
-            let (word, color) = if claim.holds {
-                ("holds", color32(Palette::for_visuals(ui.visuals()).better))
-            } else {
-                ("fails", ui.visuals().error_fg_color)
+            let verdict = claim.verdict();
+            let color = match verdict {
+                ClaimVerdict::Holds => color32(Palette::for_visuals(ui.visuals()).better),
+                ClaimVerdict::NoEffect => ui.visuals().warn_fg_color,
+                ClaimVerdict::Fails => ui.visuals().error_fg_color,
             };
-            ui.label(RichText::new(word).strong().color(color));
+            ui.label(RichText::new(verdict.to_string()).strong().color(color));
             ui.label(value_text(claim));
             ui.label(format!("{} {} {}", claim.rule, short(claim.limit), claim.unit));
             ui.label(capitalize(&claim.says));

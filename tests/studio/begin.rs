@@ -4,8 +4,8 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use aplanat::lens::{
-    Aperture, Edit, ElementEdit, ElementForm, FieldKind, Fields, Lens, Object, StartingForm,
-    StartingLens, WavelengthPreset, ZoomPosition, apply_edit,
+    Aperture, Edit, ElementEdit, ElementForm, FieldKind, Fields, Lens, Object, Quantity,
+    StartingForm, StartingLens, WavelengthPreset, ZoomPosition, apply_edit,
 };
 use aplanat::session::{Command, Session, SessionView};
 use aplanat::studio::Studio;
@@ -381,6 +381,26 @@ fn zoom_positions_are_added_varied_and_edited() {
     assert_eq!(lens.zoom[0].name, "Wide");
     click(&mut harness, "Do not vary the aperture");
     assert!(edited(&harness).zoom.iter().all(|position| position.aperture.is_none()));
+}
+
+#[test]
+fn any_number_of_a_surface_can_differ_between_positions() {
+    let mut harness = panel(ZoomPanel::default(), zoom_lens());
+    click(&mut harness, "Vary");
+    click(&mut harness, "Radius");
+    click(&mut harness, "Radius of surface 2");
+    let varied = edited(&harness);
+    let curvature = varied.surfaces[1].curvature;
+    assert_eq!(varied.zoom[1].number(1, Quantity::Curvature), Some(curvature));
+
+    let mut harness = panel(ZoomPanel::default(), varied);
+    type_into(&mut harness, "Radius of surface 2 at position 2", "-50");
+    let lens = edited(&harness);
+    assert_eq!(lens.zoom[1].number(1, Quantity::Curvature), Some(-0.02));
+    assert_eq!(lens.zoom[0].number(1, Quantity::Curvature), Some(curvature));
+    click(&mut harness, "Do not vary the radius of surface 2");
+    let same = edited(&harness);
+    assert!(same.zoom.iter().all(|position| position.numbers.is_empty()));
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use aplanat::files;
 use aplanat::lens::{
     Aperture, Edit, ElementEdit, ElementForm, FieldKind, Fields, Lens, Medium, NewElement, Object,
-    Row, StartingForm, StartingLens, WavelengthPreset, ZoomPosition, ZoomThickness, apply_edit,
+    Row, StartingForm, StartingLens, WavelengthPreset, ZoomNumber, ZoomPosition, apply_edit,
 };
 use aplanat::paraxial::{Beam, FirstOrder, first_order, seidel};
 use aplanat::session::{AnalysisSettings, Command, Session, analyze};
@@ -162,7 +162,7 @@ fn an_inserted_element_divides_the_air_of_each_zoom_position() {
     let at = lens.surfaces.len();
     lens.image_solve = None;
     let gap = |thickness| ZoomPosition {
-        thicknesses: vec![ZoomThickness { surface: 0, thickness }],
+        numbers: vec![ZoomNumber::thickness(0, thickness)],
         ..ZoomPosition::default()
     };
     lens.zoom = vec![gap(4.0), gap(8.0)];

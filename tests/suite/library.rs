@@ -211,7 +211,7 @@ fn a_zoom_lens_at_a_position_is_that_lens() {
     }
     add_variables(&mut lens, &[ParameterKind::Thicknesses]);
     assert!(lens.check().is_ok());
-    let moving = lens.zoom[0].thicknesses.len() * lens.zoom.len();
-    let fixed = lens.surfaces.len() - lens.zoom[0].thicknesses.len();
+    let moving = lens.zoom[0].numbers.len() * lens.zoom.len();
+    let fixed = lens.surfaces.len() - lens.zoom[0].numbers.len();
     assert_eq!(lens.variables.len(), moving + fixed);
 }

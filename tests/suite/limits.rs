@@ -1,7 +1,9 @@
 //! Limits that the optimizer keeps.
 
-use super::merit::{bundled, vary};
-use aplanat::lens::{Lens, ParameterKind, Quantity, ZoomPosition, ZoomThickness, add_variables};
+use super::merit::{bundled, vary, vary_at};
+use aplanat::lens::{
+    Lens, Parameter, ParameterKind, Quantity, ZoomNumber, ZoomPosition, add_variables,
+};
 use aplanat::merit::{
     DerivativeLevel, Goal, Limit, LimitTreatment, Merit, MeritError, PupilEdge, Term, WeightedTerm,
 };
@@ -200,17 +202,18 @@ fn a_zoom_of_a_thousand_variables_gets_sharper() {
     lens.variables.clear();
     let gaps: Vec<f64> = lens.surfaces.iter().map(|row| row.thickness).collect();
     let position = |i: usize| ZoomPosition {
-        thicknesses: gaps
+        numbers: gaps
             .iter()
             .enumerate()
-            .map(|(surface, gap)| ZoomThickness { surface, thickness: gap + 1e-4 * i as f64 })
+            .map(|(surface, gap)| ZoomNumber::thickness(surface, gap + 1e-4 * i as f64))
             .collect(),
         ..ZoomPosition::default()
     };
     let positions = 1000 / gaps.len() + 1;
     lens.zoom = (0..positions).map(position).collect();
     for i in 0..positions {
-        (0..gaps.len()).for_each(|gap| vary(&mut lens, gap, Quantity::ZoomThickness(i)));
+        (0..gaps.len())
+            .for_each(|gap| vary_at(&mut lens, Parameter::at_zoom(gap, Quantity::Thickness, i)));
     }
     assert!(lens.variables.len() >= 1000, "{}", lens.variables.len());
     let goal = goal(&[Term::Spot, Term::TotalTrack(120.0), Term::BackFocus(80.0)]);

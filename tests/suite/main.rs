@@ -73,3 +73,4 @@ mod tilted;
 mod tolerance;
 mod trace;
 mod variable_system;
+mod zoom_numbers;

@@ -14,7 +14,11 @@ pub(crate) fn bundled(name: &str) -> Lens {
 }
 
 pub(crate) fn vary(lens: &mut Lens, surface: usize, quantity: Quantity) {
-    let parameter = Parameter::new(surface, quantity);
+    vary_at(lens, Parameter::new(surface, quantity));
+}
+
+/// Makes a number a variable without bounds.
+pub(crate) fn vary_at(lens: &mut Lens, parameter: Parameter) {
     lens.variables.push(Variable { parameter, min: None, max: None });
 }
 
@@ -116,10 +120,7 @@ pub(crate) fn step(quantity: Quantity) -> f64 {
     match quantity {
         Quantity::Curvature => 2e-5,
         Quantity::Asphere(term) => 1e-6 * 0.03_f64.powi(2 * term as i32),
-        Quantity::Conic
-        | Quantity::Thickness
-        | Quantity::ZoomThickness(_)
-        | Quantity::SemiDiameter => 1e-2,
+        Quantity::Conic | Quantity::Thickness | Quantity::SemiDiameter => 1e-2,
         Quantity::Index | Quantity::Grin(_) | Quantity::Freeform(_) => 1e-4,
     }
 }
@@ -324,9 +325,9 @@ fn a_pupil_in_pieces_has_the_derivative_of_the_warp_field() {
 fn a_zoom_lens_has_derivatives_by_its_moving_gaps() {
     let mut lens = bundled("zoom_nikkor_28_80");
     lens.variables.clear();
-    for gap in lens.zoom[0].thicknesses.clone() {
+    for gap in lens.zoom[0].numbers.clone() {
         for zoom in 0..lens.zoom.len() {
-            vary(&mut lens, gap.surface, Quantity::ZoomThickness(zoom));
+            vary_at(&mut lens, Parameter::at_zoom(gap.surface, gap.quantity, zoom));
         }
     }
     vary(&mut lens, 3, Quantity::Curvature);

@@ -6,7 +6,7 @@ use aplanat::experiments::{self, Effort, Experiment};
 use aplanat::files;
 use aplanat::lens::{
     Aperture, Edit, ElementEdit, FieldKind, FieldPoint, Fields, Lens, Medium, Object, Parameter,
-    Pickup, Quantity, Row, ToleranceSheet, Variable, ZoomPosition, ZoomThickness,
+    Pickup, Quantity, Row, ToleranceSheet, Variable, ZoomNumber, ZoomPosition,
 };
 use aplanat::merit::{Goal, LimitTreatment, MeritError, PupilEdge, Term, TermValue, WeightedTerm};
 use aplanat::optimize::{DescentMethod, OptimizationProgress, Optimizer};
@@ -145,7 +145,7 @@ fn every_edit(lens: &Lens) -> Vec<Edit> {
     let angles = vec![FieldPoint { x: 0.0, y: 3.0, weight: 2.0 }];
     let position = ZoomPosition {
         name: "near".into(),
-        thicknesses: vec![ZoomThickness { surface: 1, thickness: 0.7 }],
+        numbers: vec![ZoomNumber::thickness(1, 0.7)],
         ..ZoomPosition::default()
     };
     let thickness = lens.surfaces[last].thickness;
@@ -330,7 +330,11 @@ fn wired() -> Lens {
     let number = Parameter::new;
     lens.variables = vec![
         Variable { parameter: number(2, Quantity::Curvature), min: None, max: Some(0.5) },
-        Variable { parameter: number(7, Quantity::ZoomThickness(1)), min: Some(1.0), max: None },
+        Variable {
+            parameter: Parameter::at_zoom(7, Quantity::Thickness, 1),
+            min: Some(1.0),
+            max: None,
+        },
     ];
     lens.pickups = vec![Pickup {
         parameter: number(16, Quantity::SemiDiameter),
@@ -350,14 +354,14 @@ fn references_to_rows_follow_insertions_and_deletions() {
     assert_eq!(lens.variables[0].parameter.surface, 2);
     assert_eq!(lens.variables[1].parameter.surface, 8);
     assert_eq!((lens.pickups[0].parameter.surface, lens.pickups[0].source.surface), (17, 16));
-    assert_eq!(lens.zoom[2].thicknesses.iter().map(|g| g.surface).collect::<Vec<_>>(), [8, 17]);
+    assert_eq!(lens.zoom[2].numbers.iter().map(|g| g.surface).collect::<Vec<_>>(), [8, 17]);
     session.apply(Edit::RemoveRow(3).into());
     assert_eq!(*session.lens(), before);
     session.apply(Edit::RemoveRow(2).into());
     assert_eq!(session.lens().variables.len(), 1);
     session.apply(Edit::RemoveRow(6).into());
     assert_eq!(session.lens().variables.len(), 0, "its gap is gone at every zoom position");
-    assert_eq!(session.lens().zoom[0].thicknesses.len(), 1);
+    assert_eq!(session.lens().zoom[0].numbers.len(), 1);
 }
 
 #[test]
@@ -842,12 +846,12 @@ impl Random {
             0 => Quantity::Curvature,
             1 => Quantity::Conic,
             2 => Quantity::Asphere(self.below(9)),
-            3 => Quantity::Thickness,
-            4 => Quantity::ZoomThickness(self.below(4)),
+            3 | 4 => Quantity::Thickness,
             5 => Quantity::Index,
             _ => Quantity::SemiDiameter,
         };
-        Parameter::new(self.below(20), quantity)
+        let zoom = (self.below(4) == 0).then(|| self.below(4));
+        Parameter { surface: self.below(20), quantity, zoom }
     }
 
     fn medium(&mut self) -> Medium {
@@ -862,8 +866,9 @@ impl Random {
     }
 
     fn position(&mut self) -> ZoomPosition {
-        let gap = ZoomThickness { surface: self.below(20), thickness: self.number() };
-        ZoomPosition { thicknesses: vec![gap], ..ZoomPosition::default() }
+        let Parameter { surface, quantity, .. } = self.parameter();
+        let number = ZoomNumber { surface, quantity, value: self.number() };
+        ZoomPosition { numbers: vec![number], ..ZoomPosition::default() }
     }
 
     fn row(&mut self) -> Row {

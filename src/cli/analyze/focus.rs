@@ -5,7 +5,7 @@ use crate::analysis::{AnalysisError, Estimate};
 use crate::cli::error::CliError;
 use crate::cli::output::ShortNumber;
 use crate::effects::build_ray_model_at;
-use crate::lens::{FieldPoint, Lens, Parameter, Quantity};
+use crate::lens::{FieldPoint, Lens, Quantity};
 use crate::measure::time_ms;
 use crate::plot::{ChartCurve, CurveChart};
 use serde::Serialize;
@@ -72,13 +72,8 @@ fn shift_image(lens: &mut Lens, zoom: usize, defocus: f64) {
         return;
     }
     let last = lens.surfaces.len() - 1;
-    let own = |z: &crate::lens::ZoomPosition| z.thicknesses.iter().any(|gap| gap.surface == last);
-    let quantity = match lens.zoom.get(zoom) {
-        Some(position) if own(position) => Quantity::ZoomThickness(zoom),
-        _ => Quantity::Thickness,
-    };
-    lens.pickups.retain(|pickup| pickup.parameter != Parameter::new(last, quantity));
-    let parameter = Parameter::new(last, quantity);
+    let parameter = lens.parameter_at(zoom, last, Quantity::Thickness);
+    lens.pickups.retain(|pickup| pickup.parameter != parameter);
     let gap = lens.get(parameter).unwrap_or(0.0);
     lens.set(parameter, gap + defocus);
 }

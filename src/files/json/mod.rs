@@ -100,8 +100,7 @@ fn serialize_numbers<S: Serializer>(to: S, numbers: &[(&str, f64)]) -> Result<S:
 mod tests {
     use super::*;
     use crate::lens::{
-        Aperture, Medium, Object, Parameter, Pickup, Quantity, Variable, ZoomPosition,
-        ZoomThickness,
+        Aperture, Medium, Object, Parameter, Pickup, Quantity, Variable, ZoomNumber, ZoomPosition,
     };
 
     const ACHROMAT: &str = r#"{ "aplanat": 1, "name": "Achromat", "source": "", "notes": "",
@@ -149,16 +148,19 @@ mod tests {
         lens.surfaces[2].tilt = [0.0, -0.7];
         lens.surfaces[2].asphere = vec![0.1 + 0.2, -1.2345678901234567e-19];
         lens.image_solve = Some(0.0);
-        let gap = ZoomThickness { surface: 0, thickness: 1e23 };
+        let radius = ZoomNumber { surface: 1, quantity: Quantity::Curvature, value: -0.1 - 0.2 };
         let aperture = Some(Aperture::FNumber(2.0));
         lens.zoom = vec![ZoomPosition {
             name: "wide".into(),
-            thicknesses: vec![gap],
+            numbers: vec![ZoomNumber::thickness(0, 1e23), radius],
             aperture,
             fields: None,
         }];
-        let thickness = Parameter::new(0, Quantity::ZoomThickness(0));
-        lens.variables = vec![Variable { parameter: thickness, min: Some(0.1), max: None }];
+        let free = |parameter: Parameter| Variable { parameter, min: Some(-1.0), max: None };
+        lens.variables = vec![
+            free(Parameter::at_zoom(0, Quantity::Thickness, 0)),
+            free(Parameter::at_zoom(1, Quantity::Curvature, 0)),
+        ];
         lens.pickups = vec![Pickup {
             parameter: Parameter::new(2, Quantity::Asphere(1)),
             source: Parameter::new(0, Quantity::Conic),

@@ -3,7 +3,7 @@
 use super::{Edit, EditError, rows, scale};
 use crate::lens::{
     Aperture, FieldPoint, Fields, Lens, LensError, Medium, Parameter, Pickup, Quantity, Row,
-    TermSelection, Variable, Wavelength, ZoomPosition, ZoomThickness,
+    TermSelection, Variable, Wavelength, ZoomNumber, ZoomPosition,
 };
 
 /// The lens after an edit. The values of parameters that follow others are up to date in it.
@@ -14,6 +14,7 @@ use crate::lens::{
 pub fn apply_edit(lens: &Lens, edit: &Edit) -> Result<Lens, EditError> {
     let mut changed = lens.clone();
     changed.apply(edit)?;
+    changed.drop_lost_zoom_numbers();
     changed.check()?;
     let changed = changed.with_pickups()?;
     changed.check()?;
@@ -89,8 +90,8 @@ impl Lens {
         if let Some(pickup) = self.pickups.iter().find(|p| p.parameter == parameter) {
             return Err(EditError::PickedUp(parameter, pickup.source));
         }
-        let gap = matches!(parameter.quantity, Quantity::Thickness | Quantity::ZoomThickness(_));
-        if gap && self.image_solve.is_some() && parameter.surface + 1 == self.surfaces.len() {
+        let is_gap = parameter.quantity == Quantity::Thickness;
+        if is_gap && self.image_solve.is_some() && parameter.surface + 1 == self.surfaces.len() {
             return Err(EditError::Solved);
         }
         Ok(())
@@ -130,6 +131,29 @@ impl Lens {
     pub(super) fn drop_references(&mut self, parameter: Parameter) {
         self.variables.retain(|v| v.parameter != parameter);
         self.pickups.retain(|p| p.parameter != parameter && p.source != parameter);
+    }
+
+    /// Removes the numbers of zoom positions that their rows do not have any more, with what refers to
+    /// them: the index where a glass of a catalogue has been chosen, or the rim of a stop that is the
+    /// aperture now.
+    fn drop_lost_zoom_numbers(&mut self) {
+        for zoom in 0..self.zoom.len() {
+            let is_aperture = matches!(self.aperture_at(zoom), Aperture::StopSemiDiameter(_));
+            let rows = &self.surfaces;
+            let exists = |own: &ZoomNumber| {
+                let row = rows.get(own.surface);
+                row.is_some_and(|row| {
+                    let is_stop = row.stop && own.quantity == Quantity::SemiDiameter;
+                    row.get(own.quantity).is_some() && !(is_stop && is_aperture)
+                })
+            };
+            let (kept, lost): (Vec<_>, Vec<_>) =
+                std::mem::take(&mut self.zoom[zoom].numbers).into_iter().partition(exists);
+            self.zoom[zoom].numbers = kept;
+            for own in lost {
+                self.drop_references(Parameter::at_zoom(own.surface, own.quantity, zoom));
+            }
+        }
     }
 
     /// Moves the stop. An aperture given by the size of the stop takes that of the new stop.
@@ -178,8 +202,8 @@ impl Lens {
         self.image_solve = offset;
         let last = self.surfaces.len() - 1;
         if offset.is_some() {
-            let solved = |q| matches!(q, Quantity::Thickness | Quantity::ZoomThickness(_));
-            self.variables.retain(|v| v.parameter.surface != last || !solved(v.parameter.quantity));
+            let is_solved = |p: Parameter| p.surface == last && p.quantity == Quantity::Thickness;
+            self.variables.retain(|v| !is_solved(v.parameter));
         }
         Ok(())
     }
@@ -197,8 +221,7 @@ impl Lens {
         let gaps = gaps?;
         self.surfaces[last].thickness = gaps[0];
         for (position, thickness) in self.zoom.iter_mut().zip(gaps) {
-            position.thicknesses.retain(|gap| gap.surface != last);
-            position.thicknesses.push(ZoomThickness { surface: last, thickness });
+            position.set_number(last, Quantity::Thickness, thickness);
         }
         self.image_solve = None;
         Ok(())
@@ -251,10 +274,9 @@ impl Lens {
     }
 
     fn renumber_zooms(&mut self, map: impl Fn(usize) -> Option<usize>) {
-        self.map_parameters(|parameter| match parameter.quantity {
-            Quantity::ZoomThickness(zoom) => map(zoom)
-                .map(|zoom| Parameter { quantity: Quantity::ZoomThickness(zoom), ..parameter }),
-            _ => Some(parameter),
+        self.map_parameters(|parameter| match parameter.zoom {
+            Some(zoom) => map(zoom).map(|zoom| Parameter { zoom: Some(zoom), ..parameter }),
+            None => Some(parameter),
         });
         if let Some(goal) = &mut self.merit {
             goal.renumber(TermSelection::Zooms, |_, zoom| map(zoom));

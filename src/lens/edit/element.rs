@@ -4,7 +4,9 @@
 use super::{EditError, rows};
 use crate::lens::element::{power, trace};
 use crate::lens::resolve::index;
-use crate::lens::{Lens, Medium, MediumPlace, Object, Parameter, Quantity, Row, SurfaceNumber};
+use crate::lens::{
+    Lens, Medium, MediumPlace, Object, Parameter, Quantity, Row, SurfaceNumber, ZoomNumber,
+};
 use serde::{Deserialize, Serialize};
 
 /// The smallest gap of air beside a new element, as a share of its length.
@@ -109,7 +111,7 @@ fn insert(lens: &mut Lens, at: usize, rows: &[Row]) -> Result<(), EditError> {
     if let Some(front) = at.checked_sub(1) {
         lens.set(Parameter::new(front, Quantity::Thickness), gaps[0].0);
         for zoom in 0..lens.zoom.len() {
-            if lens.zoom[zoom].thicknesses.iter().any(|gap| gap.surface == front) {
+            if lens.is_own_at(zoom, front, Quantity::Thickness) {
                 set_at_zoom(lens, front, zoom, gaps[zoom + 1].0);
                 set_at_zoom(lens, end, zoom, gaps[zoom + 1].1);
             }
@@ -144,7 +146,7 @@ fn gaps_around(lens: &Lens, at: usize, length: f64) -> Result<Vec<(f64, f64)>, E
 }
 
 fn set_at_zoom(lens: &mut Lens, surface: usize, zoom: usize, thickness: f64) {
-    lens.set(Parameter::new(surface, Quantity::ZoomThickness(zoom)), thickness);
+    lens.set(Parameter::at_zoom(surface, Quantity::Thickness, zoom), thickness);
 }
 
 /// The first and the last surface of the element of a surface.
@@ -201,10 +203,12 @@ fn change_gap(lens: &mut Lens, surface: usize, by: f64) -> Result<(), EditError>
     let row = &mut lens.surfaces[surface];
     let written = row.thickness;
     row.thickness += by;
-    let own = lens.zoom.iter_mut().flat_map(|position| &mut position.thicknesses);
-    let own = own.filter(|gap| gap.surface == surface).map(|gap| {
-        let before = gap.thickness;
-        gap.thickness += by;
+    let numbers = lens.zoom.iter_mut().flat_map(|position| &mut position.numbers);
+    let is_gap =
+        |own: &&mut ZoomNumber| own.surface == surface && own.quantity == Quantity::Thickness;
+    let own = numbers.filter(is_gap).map(|gap| {
+        let before = gap.value;
+        gap.value += by;
         before
     });
     let before = own.chain([written]).filter(|gap| *gap >= 0.0).fold(f64::INFINITY, f64::min);
@@ -301,7 +305,9 @@ fn cement(lens: &mut Lens, surface: usize) -> Result<(), EditError> {
     lens.surfaces[next].stop = false;
     rows::remove(lens, next)?;
     rows::replace(lens, last, &joined)?;
-    lens.zoom.iter_mut().for_each(|position| position.thicknesses.retain(|g| g.surface != last));
+    for position in &mut lens.zoom {
+        position.remove_number(last, Quantity::Thickness);
+    }
     absorb(lens, end - 1, gap);
     Ok(())
 }

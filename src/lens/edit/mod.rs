@@ -180,8 +180,14 @@ pub enum EditedCell {
 impl Edit {
     /// Sets the radius of a surface, in mm; 0 and infinity give a plane.
     pub fn set_radius(surface: usize, radius: f64) -> Self {
+        Self::set_curvature(Parameter::new(surface, Quantity::Curvature), radius)
+    }
+
+    /// Sets a curvature, at all zoom positions or at one of them, to that of a radius in mm; 0 and
+    /// infinity give a plane.
+    pub fn set_curvature(parameter: Parameter, radius: f64) -> Self {
         let value = if radius == 0.0 { 0.0 } else { 1.0 / radius };
-        Self::Set { parameter: Parameter::new(surface, Quantity::Curvature), value }
+        Self::Set { parameter, value }
     }
 
     /// The cell to which the edit writes, if it writes to a single one.

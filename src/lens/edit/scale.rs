@@ -9,7 +9,7 @@ fn power(rows: &[Row], parameter: Parameter) -> i32 {
         Quantity::Curvature => -1,
         Quantity::Conic | Quantity::Index => 0,
         Quantity::Asphere(term) => -(2 * term as i32 + 3),
-        Quantity::Thickness | Quantity::ZoomThickness(_) | Quantity::SemiDiameter => 1,
+        Quantity::Thickness | Quantity::SemiDiameter => 1,
         Quantity::Grin(k) => match &rows[parameter.surface].medium {
             Medium::Grin(gradient) => gradient.power(k),
             _ => 0,
@@ -53,7 +53,10 @@ pub(super) fn scale(lens: &mut Lens, factor: f64) -> Result<(), EditError> {
     scale_aperture(&mut lens.aperture, factor);
     scale_fields(&mut lens.fields, factor);
     for position in &mut lens.zoom {
-        position.thicknesses.iter_mut().for_each(|gap| gap.thickness *= factor);
+        for own in &mut position.numbers {
+            let parameter = Parameter::new(own.surface, own.quantity);
+            own.value *= factor.powi(power(&lens.surfaces, parameter));
+        }
         position.aperture.iter_mut().for_each(|aperture| scale_aperture(aperture, factor));
         position.fields.iter_mut().for_each(|fields| scale_fields(fields, factor));
     }

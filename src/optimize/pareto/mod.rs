@@ -433,11 +433,9 @@ fn with_sweep_variables(lens: &Lens, [narrow, wide]: [f64; 2]) -> Lens {
         add_variables(&mut lens, &[ParameterKind::Curvatures, ParameterKind::Thicknesses]);
     }
     add_variables(&mut lens, &[ParameterKind::SemiDiameters]);
-    let sizes: Vec<Option<f64>> = lens.surfaces.iter().map(|row| row.semi_diameter).collect();
-    for variable in &mut lens.variables {
-        if let (Quantity::SemiDiameter, Some(size)) =
-            (variable.parameter.quantity, sizes[variable.parameter.surface])
-        {
+    let sizes: Vec<Option<f64>> = lens.variables.iter().map(|v| lens.get(v.parameter)).collect();
+    for (variable, size) in lens.variables.iter_mut().zip(sizes) {
+        if let (Quantity::SemiDiameter, Some(size)) = (variable.parameter.quantity, size) {
             variable.min = variable.min.or(Some(narrow * size));
             variable.max = variable.max.or(Some(wide * size));
         }

@@ -141,9 +141,11 @@ impl Handle {
         let rows = lens.surfaces.len();
         match self {
             Self::Curvature(surface) | Self::Bending { front: surface, .. } => {
-                lens.surfaces.get(surface).map(|row| row.curvature)
+                lens.get(lens.parameter_at(zoom, surface, Quantity::Curvature))
             }
-            Self::Rim(surface) => lens.surfaces.get(surface)?.semi_diameter,
+            Self::Rim(surface) => {
+                lens.get(lens.parameter_at(zoom, surface, Quantity::SemiDiameter))
+            }
             Self::Vertex(_) | Self::Element { .. } => {
                 let (front, back) = self.span(lens)?;
                 let gap = front.checked_sub(1).unwrap_or(back);
@@ -174,11 +176,13 @@ impl Handle {
     /// The parameters that it moves, each with its change per unit of the value; empty for those
     /// that move none.
     pub fn motion(self, lens: &Lens, zoom: usize) -> Vec<(Parameter, f64)> {
-        let curvature = |surface| (Parameter::new(surface, Quantity::Curvature), 1.0);
+        let curvature = |surface| (lens.parameter_at(zoom, surface, Quantity::Curvature), 1.0);
         match self {
             Self::Curvature(surface) => vec![curvature(surface)],
             Self::Bending { front, back } => (front..=back).map(curvature).collect(),
-            Self::Rim(surface) => vec![(Parameter::new(surface, Quantity::SemiDiameter), 1.0)],
+            Self::Rim(surface) => {
+                vec![(lens.parameter_at(zoom, surface, Quantity::SemiDiameter), 1.0)]
+            }
             Self::Vertex(_) | Self::Element { .. } | Self::StopPosition => {
                 self.span(lens).map_or_else(Vec::new, |span| shift(lens, span, zoom))
             }
@@ -218,7 +222,7 @@ impl Handle {
         let missing = || DragError::NoHandle(self);
         match self {
             Self::Rim(surface) => {
-                let rim = Parameter::new(surface, Quantity::SemiDiameter);
+                let rim = lens.parameter_at(zoom, surface, Quantity::SemiDiameter);
                 changed.set(rim, value).then_some(()).ok_or_else(missing)?;
             }
             Self::FieldHeight => {
@@ -347,20 +351,18 @@ fn shift(lens: &Lens, (front, back): (usize, usize), zoom: usize) -> Vec<(Parame
 /// The parameters of gaps: those of one zoom position where all of the gaps have their own there,
 /// or else those of all zoom positions, so that what stays in place does so at each of them.
 fn gap_motion(lens: &Lens, gaps: &[(usize, f64)], zoom: usize) -> Vec<(Parameter, f64)> {
-    let has_own = |zoom: usize, gap: usize| {
-        lens.zoom.get(zoom).is_some_and(|at| at.thicknesses.iter().any(|own| own.surface == gap))
-    };
+    let has_own = |zoom: usize, gap: usize| lens.is_own_at(zoom, gap, Quantity::Thickness);
     if gaps.iter().all(|(gap, _)| has_own(zoom, *gap)) {
         let own =
-            |(gap, by): &(usize, f64)| (Parameter::new(*gap, Quantity::ZoomThickness(zoom)), *by);
+            |(gap, by): &(usize, f64)| (Parameter::at_zoom(*gap, Quantity::Thickness, zoom), *by);
         return gaps.iter().map(own).collect();
     }
     let all = |(gap, by): &(usize, f64)| {
         let (gap, by) = (*gap, *by);
-        let own =
-            (0..lens.zoom.len()).filter(|zoom| has_own(*zoom, gap)).map(Quantity::ZoomThickness);
-        let quantities: Vec<_> = [Quantity::Thickness].into_iter().chain(own).collect();
-        quantities.into_iter().map(move |quantity| (Parameter::new(gap, quantity), by))
+        let zooms = (0..lens.zoom.len()).filter(move |zoom| has_own(*zoom, gap)).map(Some);
+        let parameter = Parameter::new(gap, Quantity::Thickness);
+        let zooms = [None].into_iter().chain(zooms);
+        zooms.map(move |zoom| (Parameter { zoom, ..parameter }, by)).collect::<Vec<_>>()
     };
     gaps.iter().flat_map(all).collect()
 }

@@ -1,6 +1,6 @@
 //! The range over which a drag can move the numbers of a lens, and the cause of its ends.
 
-use crate::lens::{Lens, Parameter, Quantity, SurfaceNumber};
+use crate::lens::{Lens, Parameter, Quantity, Row, SurfaceNumber};
 use std::fmt;
 
 /// The largest part of the radius at which a surface ends that its rim may reach.
@@ -57,17 +57,17 @@ pub(super) fn parameter_range(lens: &Lens, parameter: Parameter) -> [(f64, DragL
 
 fn natural_range(lens: &Lens, parameter: Parameter) -> [(f64, DragLimit); 2] {
     let surface = SurfaceNumber::new(parameter.surface);
-    let row = &lens.surfaces[parameter.surface];
+    let row = lens.row_at(parameter.surface, parameter.zoom).unwrap_or_default();
     match parameter.quantity {
         Quantity::Curvature => {
-            let most = steepest(lens, parameter.surface);
+            let most = steepest(&row);
             [-most, most].map(|end| (end, DragLimit::Rim(surface)))
         }
         Quantity::SemiDiameter => {
             let edge = MAX_STEEPNESS * row.shape().edge();
             [(0.0, DragLimit::Positive), (edge, DragLimit::Rim(surface))]
         }
-        Quantity::Thickness | Quantity::ZoomThickness(_) => {
+        Quantity::Thickness => {
             let limit = DragLimit::Gap(surface);
             if lens.light_direction(parameter.surface) < 0.0 {
                 [(f64::NEG_INFINITY, limit), (0.0, limit)]
@@ -80,8 +80,7 @@ fn natural_range(lens: &Lens, parameter: Parameter) -> [(f64, DragLimit); 2] {
 }
 
 /// The largest curvature with which a surface reaches its rim, in 1/mm.
-fn steepest(lens: &Lens, surface: usize) -> f64 {
-    let row = &lens.surfaces[surface];
+fn steepest(row: &Row) -> f64 {
     let rim = row.semi_diameter.unwrap_or(0.0);
     let square = (1.0 + row.conic) * rim * rim;
     if square > 0.0 && !row.hyperhemisphere { MAX_STEEPNESS / square.sqrt() } else { f64::INFINITY }

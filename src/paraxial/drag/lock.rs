@@ -103,7 +103,7 @@ pub(super) fn length_scale(lens: &Lens) -> Result<f64, LockError> {
     let (curvatures, gaps) = model.curvatures_and_gaps::<f64>(&[]);
     let track = lens.total_track();
     let power = |(zoom, gaps): (usize, &Vec<f64>)| {
-        model.ray(zoom, (1.0, 0.0), &curvatures, gaps).image_slope().abs()
+        model.ray(zoom, (1.0, 0.0), &curvatures[zoom], gaps).image_slope().abs()
     };
     let strongest = gaps.iter().enumerate().map(power).fold(0.0, f64::max);
     let size = if track > 0.0 { track } else { 1.0 };
@@ -146,9 +146,9 @@ impl LockConstraints {
     ) -> Result<Option<Constraint>, LockError> {
         let named = (lens.zoom_positions() > 1).then_some(zoom);
         let (curvatures, gaps) = self.lens.curvatures_and_gaps(start);
-        let gaps = &gaps[zoom];
+        let (curvatures, gaps) = (&curvatures[zoom], &gaps[zoom]);
         let track: f64 = gaps.iter().map(|gap| gap.abs()).sum();
-        let ray = |start| self.lens.ray(zoom, start, &curvatures, gaps);
+        let ray = |start| self.lens.ray(zoom, start, curvatures, gaps);
         let weak = |slope: f64| !(slope.abs() * track.max(1e-3) > AFOCAL);
         let image = || {
             let ray = ray(self.object_ray(zoom));
@@ -219,10 +219,10 @@ impl LockConstraints {
     fn value(
         &self,
         (zoom, constraint): (usize, Constraint),
-        at: &(Vec<f64>, Vec<Vec<f64>>),
+        (curvatures, gaps): &(Vec<Vec<f64>>, Vec<Vec<f64>>),
     ) -> f64 {
-        let gaps = gaps_until(constraint, &at.1[zoom]);
-        let ray = || self.trace(zoom, constraint, &at.0, &gaps);
+        let gaps = gaps_until(constraint, &gaps[zoom]);
+        let ray = || self.trace(zoom, constraint, &curvatures[zoom], &gaps);
         match constraint {
             Constraint::Power | Constraint::ObjectSlope => ray().image_slope() * self.scale,
             Constraint::HeightBehindVertex(_) | Constraint::HeightBeforeImage(_) => {
@@ -242,8 +242,9 @@ impl LockConstraints {
     fn derivatives(
         &self,
         (zoom, constraint): (usize, Constraint),
-        (curvatures, gaps): &(Vec<f64>, Vec<Vec<f64>>),
+        (curvatures, gaps): &(Vec<Vec<f64>>, Vec<Vec<f64>>),
     ) -> (Vec<f64>, Vec<f64>) {
+        let curvatures = &curvatures[zoom];
         let gaps = gaps_until(constraint, &gaps[zoom]);
         let along = || self.directions.iter().map(|direction| direction / self.scale);
         if let Constraint::Track { solved: None } = constraint {

@@ -297,11 +297,11 @@ pub fn tangents(
 /// A short name of a number, as in `R3` for a radius or `t4`, counted from 1.
 pub fn short_name(parameter: Parameter) -> String {
     let surface = SurfaceNumber::new(parameter.surface);
-    match parameter.quantity {
+    let name = match parameter.quantity {
         // The prescription shows radii.
         Quantity::Curvature => format!("R{surface}"),
         Quantity::Thickness => format!("t{surface}"),
-        Quantity::ZoomThickness(zoom) => format!("t{surface} (zoom {})", zoom + 1),
-        _ => parameter.to_string(),
-    }
+        _ => return parameter.to_string(),
+    };
+    parameter.zoom.map_or_else(|| name.clone(), |zoom| format!("{name} (zoom {})", zoom + 1))
 }

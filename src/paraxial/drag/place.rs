@@ -80,10 +80,9 @@ impl HandlePlaces<'_> {
     /// The value of a handle after its place has moved by `[dz, dy]` mm.
     pub fn value_after(&self, handle: Handle, start: f64, [dz, dy]: [f64; 2]) -> Option<f64> {
         let [_, y] = self.place(handle)?;
-        let surface = |i: usize| self.lens.surfaces.get(i);
         Some(match handle {
             Handle::Curvature(i) | Handle::Bending { front: i, .. } => {
-                let row = surface(i)?;
+                let row = self.lens.row_at(i, Some(self.zoom))?;
                 start + bent(row.curvature, row.conic, y, dz) - row.curvature
             }
             Handle::Vertex(_) | Handle::Element { .. } => self.moved_along(handle, start, dz),

@@ -11,7 +11,7 @@ use crate::search::LossGradient;
 fn langevin_unit(lens: &Lens, parameter: Parameter, size: f64) -> f64 {
     match parameter.quantity {
         Quantity::Curvature => 0.5 / size,
-        Quantity::Thickness | Quantity::ZoomThickness(_) | Quantity::SemiDiameter => 0.02 * size,
+        Quantity::Thickness | Quantity::SemiDiameter => 0.02 * size,
         Quantity::Conic => 1.0,
         Quantity::Asphere(term) => 0.05 / (0.2 * size).powi(2 * term as i32 + 3),
         Quantity::Index => 0.1,

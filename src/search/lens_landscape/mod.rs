@@ -27,7 +27,7 @@ use super::{
     Landscape, LossGradient, MutatedPoint, MutationError, MutationKind, MutationWeights, Random,
     Refusal, RuleError, SearchRules, element, mutation,
 };
-use crate::lens::{Lens, LensError};
+use crate::lens::{Lens, LensError, Parameter, Quantity};
 use crate::merit::{Goal, Merit, MeritError};
 use crate::optimize::{DescentState, SegmentResult, SegmentSettings, run_segment};
 use crate::pupil::{RayModelError, limited_by_stop};
@@ -82,6 +82,19 @@ pub struct LensLandscape {
     focal_length: f64,
 }
 
+/// Refuses a lens whose surfaces or media change with the zoom position: mutations know the gaps alone.
+fn check_zoom_numbers(lens: &Lens) -> Result<(), LandscapeError> {
+    let mut numbers = lens.zoom.iter().flat_map(|position| &position.numbers);
+    let other = numbers.find(|own| own.quantity != Quantity::Thickness);
+    other.map_or(Ok(()), |own| {
+        Err(LandscapeError::Setting {
+            what: "a number that differs between the zoom positions",
+            found: format!("the {}", Parameter::new(own.surface, own.quantity)),
+            expected: "thicknesses, aperture and fields alone",
+        })
+    })
+}
+
 impl LensLandscape {
     /// The landscape of lenses that start from this one. The start becomes limited by its stop: an
     /// aperture given as a pupil or cone is replaced by the semi-diameter of the stop. The bounds
@@ -96,6 +109,7 @@ impl LensLandscape {
         local: &DescentSettings,
     ) -> Result<Self, LandscapeError> {
         local.check()?;
+        check_zoom_numbers(lens)?;
         let rules = rules.normalize()?;
         rules.check_fixed_ends(lens.surfaces.len())?;
         violations::check_glasses(lens, &rules)?;

@@ -51,7 +51,7 @@ fn remove_diaphragm(lens: &mut Lens, i: usize) {
     let bounds = (gap(lens, i - 1), gap(lens, i));
     for zoom in 0..lens.zoom.len() {
         let sum = [i - 1, i].map(|row| lens.thickness_at(row, zoom).unwrap_or(0.0));
-        lens.set(Parameter::new(i - 1, Quantity::ZoomThickness(zoom)), sum[0] + sum[1]);
+        lens.set(Parameter::at_zoom(i - 1, Quantity::Thickness, zoom), sum[0] + sum[1]);
     }
     lens.surfaces[i - 1].thickness += lens.surfaces[i].thickness;
     lens.surfaces.remove(i);

@@ -27,7 +27,7 @@ pub(super) fn random_lens(
     for parameter in &scattered {
         let range = match parameter.quantity {
             Quantity::Curvature => [-MAX_CURVATURE / focal_length, MAX_CURVATURE / focal_length],
-            Quantity::Thickness | Quantity::ZoomThickness(_) => {
+            Quantity::Thickness => {
                 let is_glass = lens.surfaces[parameter.surface].medium != Medium::Air;
                 let [min, _] = if is_glass { rules.glass_center } else { rules.air_center };
                 [min, min.max(MAX_GAP * focal_length)]
@@ -46,9 +46,7 @@ pub(super) fn random_lens(
         let value = drawn.get(*parameter)?;
         match parameter.quantity {
             Quantity::Curvature => scaled.set(*parameter, value / factor),
-            Quantity::Thickness | Quantity::ZoomThickness(_) => {
-                scaled.set(*parameter, value * factor)
-            }
+            Quantity::Thickness => scaled.set(*parameter, value * factor),
             _ => continue,
         };
     }

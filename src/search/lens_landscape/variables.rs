@@ -44,7 +44,7 @@ pub(super) fn freeze_others(lens: &mut Lens) {
 }
 
 fn is_shape(quantity: Quantity) -> bool {
-    matches!(quantity, Quantity::Curvature | Quantity::Thickness | Quantity::ZoomThickness(_))
+    matches!(quantity, Quantity::Curvature | Quantity::Thickness)
 }
 
 /// All curvatures of refracting surfaces and all gaps, including gaps of single zoom positions.
@@ -90,9 +90,7 @@ fn bounds(lens: &Lens, rules: &SearchRules, size: f64, parameter: Parameter) -> 
     let both = |[min, max]: [f64; 2]| [Some(min), Some(max)];
     match parameter.quantity {
         Quantity::Curvature => both([-MAX_CURVATURE / size, MAX_CURVATURE / size]),
-        Quantity::Thickness | Quantity::ZoomThickness(_) => {
-            gap_bounds(lens, rules, parameter.surface)
-        }
+        Quantity::Thickness => gap_bounds(lens, rules, parameter.surface),
         Quantity::SemiDiameter => [Some(MIN_SEMI_DIAMETER * size), rules.semi_diameter],
         Quantity::Index => both(MODEL_INDICES),
         Quantity::Conic | Quantity::Asphere(_) | Quantity::Grin(_) | Quantity::Freeform(_) => {

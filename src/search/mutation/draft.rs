@@ -5,7 +5,7 @@ use super::queries::{has_solve, is_gap, is_zoomed};
 use super::record::StructureChange;
 use super::singlet::SingletProposal;
 use super::spacing::SpacingChoice;
-use crate::lens::{Lens, Parameter, Quantity, Row, ZoomThickness, add_variable};
+use crate::lens::{Lens, Parameter, Quantity, Row, ZoomNumber, add_variable};
 use crate::search::SearchRules;
 use crate::search::projection::{ProjectionMap, RowOrigin, scale};
 
@@ -111,18 +111,14 @@ impl MutationDraft {
             let surface = if p.surface == from && is_gap(p.quantity) { to } else { p.surface };
             Some(Parameter { surface, ..p })
         });
-        for gap in self.lens.zoom.iter_mut().flat_map(|position| &mut position.thicknesses) {
-            if gap.surface == from {
-                gap.surface = to;
-            }
-        }
+        zoom_gaps(&mut self.lens, from).for_each(|gap| gap.surface = to);
     }
 
     /// Removes all references to the gap behind a row.
     pub(super) fn drop_gap_references(&mut self, row: usize) {
         self.lens.map_parameters(|p| (p.surface != row || !is_gap(p.quantity)).then_some(p));
         for position in &mut self.lens.zoom {
-            position.thicknesses.retain(|gap| gap.surface != row);
+            position.remove_number(row, Quantity::Thickness);
         }
     }
 
@@ -135,11 +131,7 @@ impl MutationDraft {
     pub(super) fn lengthen(&mut self, row: usize, by: f64) {
         let by = by * self.lens.light_direction(row);
         self.lens.surfaces[row].thickness += by;
-        for gap in self.lens.zoom.iter_mut().flat_map(|position| &mut position.thicknesses) {
-            if gap.surface == row {
-                gap.thickness += by;
-            }
-        }
+        zoom_gaps(&mut self.lens, row).for_each(|gap| gap.value += by);
     }
 
     /// Adds the gap behind row `from` to the one behind row `to`, at every zoom position.
@@ -152,8 +144,7 @@ impl MutationDraft {
         lens.surfaces[to].thickness += lens.surfaces[from].thickness;
         if zooming.contains(&true) {
             for (position, thickness) in lens.zoom.iter_mut().zip(sums) {
-                position.thicknesses.retain(|gap| gap.surface != to);
-                position.thicknesses.push(ZoomThickness { surface: to, thickness });
+                position.set_number(to, Quantity::Thickness, thickness);
             }
         }
     }
@@ -162,7 +153,8 @@ impl MutationDraft {
     /// widens the bounds of parameters that lie outside, since the mutation has changed their
     /// meaning.
     pub(super) fn inherit_variables(&mut self, rows: &[usize]) {
-        let has = |quantity| self.lens.variables.iter().any(|v| v.parameter.quantity == quantity);
+        let varies = |p: Parameter, quantity| p.quantity == quantity && p.zoom.is_none();
+        let has = |quantity| self.lens.variables.iter().any(|v| varies(v.parameter, quantity));
         let kinds = [Quantity::Curvature, Quantity::Thickness].map(|q| (q, has(q)));
         for (row, (quantity, wanted)) in rows.iter().flat_map(|row| kinds.map(|kind| (*row, kind)))
         {
@@ -190,4 +182,10 @@ impl MutationDraft {
             self.origins[last].gap = None;
         }
     }
+}
+
+/// The thicknesses of a gap at the zoom positions with one of their own.
+fn zoom_gaps(lens: &mut Lens, row: usize) -> impl Iterator<Item = &mut ZoomNumber> {
+    let numbers = lens.zoom.iter_mut().flat_map(|position| &mut position.numbers);
+    numbers.filter(move |own| own.surface == row && is_gap(own.quantity))
 }

@@ -4,7 +4,7 @@ use crate::lens::{Lens, Medium, Parameter, Quantity, Row};
 
 /// True if a quantity is the gap behind a row.
 pub(super) fn is_gap(quantity: Quantity) -> bool {
-    matches!(quantity, Quantity::Thickness | Quantity::ZoomThickness(_))
+    quantity == Quantity::Thickness
 }
 
 /// True if a quantity belongs to the medium behind a row: the index or a gradient-index
@@ -21,7 +21,7 @@ pub(super) fn has_pickup(lens: &Lens, row: usize, is_it: impl Fn(Quantity) -> bo
 
 /// True if a gap has its own thickness at some zoom position.
 pub(super) fn is_zoomed(lens: &Lens, row: usize) -> bool {
-    lens.zoom.iter().any(|position| position.thicknesses.iter().any(|gap| gap.surface == row))
+    lens.is_zoomed(row, Quantity::Thickness)
 }
 
 /// True if a surface is a plain sphere or plane.

@@ -269,7 +269,7 @@ fn coordinates(
             _ => (origin.gap.map(|row| (row, 1.0)), 0.01 * scale),
         };
         let Some((row, sign)) = from else { continue };
-        let old = Parameter::new(row, new.quantity);
+        let old = Parameter { surface: row, ..new };
         let value = mutated.get(new).unwrap_or(0.0);
         if known.contains(&old) && rules.may_change(new.surface, rows) {
             found.push(ProjectionCoordinate { old, new, sign, value, step });

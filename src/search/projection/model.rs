@@ -41,7 +41,7 @@ pub(in crate::search) fn scale(lens: &Lens) -> Result<f64, ProjectionError> {
     let (curvatures, gaps) = model.lens.curvatures_and_gaps::<f64>(&[]);
     let mut smallest = f64::INFINITY;
     for (zoom, gaps) in gaps.iter().enumerate() {
-        let slope = model.ray(zoom, &curvatures, gaps).image_slope().abs();
+        let slope = model.ray(zoom, &curvatures[zoom], gaps).image_slope().abs();
         let length = match lens.object {
             Object::Infinity => 1.0 / slope,
             Object::Finite(distance) => distance.abs() / (1.0 + slope * distance.abs()),
@@ -98,12 +98,13 @@ impl MarginalRayModel {
         let (curvatures, gaps) = self.lens.curvatures_and_gaps(at);
         let mut gradient = vec![R::ZERO; at.len()];
         for (zoom, gaps) in gaps.iter().enumerate() {
-            let ray = self.ray(zoom, &curvatures, gaps);
+            let ray = self.ray(zoom, &curvatures[zoom], gaps);
             let first = zoom * self.constraints_per_zoom();
             let slope = R::from_f64(multipliers[first] * self.scale);
             let height = if self.solved { 0.0 } else { multipliers[first + 1] };
             let seed = (R::from_f64(height), slope);
-            let (by_curvature, by_gap) = self.lens.adjoint(zoom, &ray, &curvatures, gaps, seed);
+            let (by_curvature, by_gap) =
+                self.lens.adjoint(zoom, &ray, &curvatures[zoom], gaps, seed);
             let here = self.lens.by_coordinates(zoom, &by_curvature, &by_gap);
             gradient.iter_mut().zip(here).for_each(|(sum, by)| *sum += by);
         }
@@ -122,7 +123,7 @@ impl ConstraintFunction for MarginalRayModel {
         let (curvatures, gaps) = self.lens.curvatures_and_gaps(at);
         let mut values = Vec::with_capacity(self.constraints());
         for (zoom, gaps) in gaps.iter().enumerate() {
-            let ray = self.ray(zoom, &curvatures, gaps);
+            let ray = self.ray(zoom, &curvatures[zoom], gaps);
             values.push(ray.image_slope() * self.scale);
             if !self.solved {
                 values.push(ray.image_height());
@@ -135,10 +136,11 @@ impl ConstraintFunction for MarginalRayModel {
         let (curvatures, gaps) = self.lens.curvatures_and_gaps(at);
         let mut jacobian = DMatrix::zeros(self.constraints(), at.len());
         for (zoom, gaps) in gaps.iter().enumerate() {
-            let ray = self.ray(zoom, &curvatures, gaps);
+            let ray = self.ray(zoom, &curvatures[zoom], gaps);
             for constraint in 0..self.constraints_per_zoom() {
                 let seed = if constraint == 0 { (0.0, self.scale) } else { (1.0, 0.0) };
-                let (by_curvature, by_gap) = self.lens.adjoint(zoom, &ray, &curvatures, gaps, seed);
+                let (by_curvature, by_gap) =
+                    self.lens.adjoint(zoom, &ray, &curvatures[zoom], gaps, seed);
                 let row = zoom * self.constraints_per_zoom() + constraint;
                 let here = self.lens.by_coordinates(zoom, &by_curvature, &by_gap);
                 here.enumerate().for_each(|(column, by)| jacobian[(row, column)] = by);

@@ -4,7 +4,7 @@
 use super::model::{MarginalRayModel, ProjectionCoordinate, scale};
 use super::{SearchRules, curvature_range, free_parameters};
 use crate::lens::{
-    GradientIndex, Lens, Medium, Object, ProfileLaw, Quantity, ZoomPosition, ZoomThickness,
+    GradientIndex, Lens, Medium, Object, ProfileLaw, Quantity, ZoomNumber, ZoomPosition,
 };
 use crate::math::Dual;
 use crate::paraxial::{paraxial_ray, signed_indices};
@@ -45,10 +45,7 @@ fn zoom() -> Lens {
         .rfind(|i| matches!(lens.surfaces[*i].medium, Medium::Grin(_)))
         .unwrap();
     let at = |by: f64| ZoomPosition {
-        thicknesses: vec![ZoomThickness {
-            surface: row,
-            thickness: lens.surfaces[row].thickness + by,
-        }],
+        numbers: vec![ZoomNumber::thickness(row, lens.surfaces[row].thickness + by)],
         ..ZoomPosition::default()
     };
     lens.zoom = vec![at(0.0), at(1.5)];

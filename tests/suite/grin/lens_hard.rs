@@ -6,7 +6,7 @@ use aplanat::effects::{self, Effect, EffectOverride, EffectOverrides, TracePurpo
 use aplanat::files::{self, json};
 use aplanat::lens::{
     Lens, Medium, PROFILE_TERMS, Parameter, ParameterKind, ProfileCoefficients, ProfileLaw,
-    Quantity, Shape, System, Variable, ZoomPosition, ZoomThickness, add_variables,
+    Quantity, Shape, System, Variable, ZoomNumber, ZoomPosition, add_variables,
 };
 use aplanat::math::{Real, Vec3};
 use aplanat::merit::{Goal, LimitTreatment, Merit, PupilEdge, Term, WeightedTerm};
@@ -304,7 +304,7 @@ fn grin_lens_every_term_has_the_derivative_of_its_value_by_the_gradient() {
 fn grin_lens_a_gradient_moves_with_the_zoom() {
     let mut lens = busy("index", &[-0.01, 2e-4], &[0.01]);
     let at = |thickness: f64| ZoomPosition {
-        thicknesses: vec![ZoomThickness { surface: 0, thickness }],
+        numbers: vec![ZoomNumber::thickness(0, thickness)],
         ..ZoomPosition::default()
     };
     lens.zoom = vec![at(3.0), at(3.5)];
@@ -313,7 +313,7 @@ fn grin_lens_a_gradient_moves_with_the_zoom() {
         first_order(&system, &Beam::for_lens(&lens, zoom)).unwrap().efl.unwrap()
     });
     assert!((lengths[0] - lengths[1]).abs() > 1e-3);
-    crate::merit::vary(&mut lens, 0, Quantity::ZoomThickness(1));
+    crate::merit::vary_at(&mut lens, Parameter::at_zoom(0, Quantity::Thickness, 1));
     crate::merit::vary(&mut lens, 0, Quantity::Grin(1));
     crate::merit::check(&lens, Term::Spot, PupilEdge::Frozen, step);
 }

@@ -312,7 +312,7 @@ fn without_projection_numbers_stay() {
 
 /// The approximate memory of a lens: everything in it that could grow.
 fn size(lens: &Lens) -> usize {
-    let zoom: usize = lens.zoom.iter().map(|position| position.thicknesses.len()).sum();
+    let zoom: usize = lens.zoom.iter().map(|position| position.numbers.len()).sum();
     let text: usize = lens.surfaces.iter().map(|row| row.comment.len()).sum();
     lens.surfaces.len() + lens.variables.len() + lens.pickups.len() + zoom + text
 }

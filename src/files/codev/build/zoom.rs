@@ -2,7 +2,7 @@
 
 use crate::files::codev::file::{CodeVFile, ZoomCommand};
 use crate::files::report::{ConversionOutcome, ConversionReport};
-use crate::lens::{Aperture, Lens, Object, ZoomPosition, ZoomThickness};
+use crate::lens::{Aperture, Lens, Object, Parameter, Quantity, ZoomPosition};
 
 /// Adds the zoom positions of the file to the lens.
 pub(super) fn add_positions(file: &CodeVFile, lens: &mut Lens, report: &mut ConversionReport) {
@@ -35,7 +35,13 @@ fn drop_command(command: &ZoomCommand, why: &str, report: &mut ConversionReport)
 fn apply(command: &ZoomCommand, unit: f64, lens: &mut Lens) -> Result<(), &'static str> {
     for (zoom, value) in command.values.iter().copied().enumerate() {
         match command.name.as_str() {
-            "THI" => thickness(command.target, zoom, value * unit, lens)?,
+            "THI" => number(command.target, Quantity::Thickness, zoom, value * unit, lens)?,
+            "CUY" => number(command.target, Quantity::Curvature, zoom, value / unit, lens)?,
+            "RDY" => {
+                let curvature = if value == 0.0 { 0.0 } else { (value * unit).recip() };
+                number(command.target, Quantity::Curvature, zoom, curvature, lens)?;
+            }
+            "K" => number(command.target, Quantity::Conic, zoom, value, lens)?,
             "EPD" if value > 0.0 => {
                 lens.zoom[zoom].aperture = Some(Aperture::EntrancePupilDiameter(value * unit));
             }
@@ -46,26 +52,37 @@ fn apply(command: &ZoomCommand, unit: f64, lens: &mut Lens) -> Result<(), &'stat
             "XAN" | "YAN" | "XOB" | "YOB" | "XIM" | "YIM" => {
                 field(command, zoom, value, unit, lens)?;
             }
-            _ => return Err("only thicknesses, aperture and fields can differ between positions"),
+            name => {
+                let term = name.len() == 1 && "ABCDEFG".contains(name);
+                let term = term.then(|| usize::from(name.as_bytes()[0] - b'A'));
+                let term = term.ok_or("this cannot differ between positions")?;
+                let value = value / unit.powi(2 * term as i32 + 3);
+                number(command.target, Quantity::Asphere(term), zoom, value, lens)?;
+            }
         }
     }
     Ok(())
 }
 
-fn thickness(target: usize, zoom: usize, value: f64, lens: &mut Lens) -> Result<(), &'static str> {
+fn number(
+    target: usize,
+    quantity: Quantity,
+    zoom: usize,
+    value: f64,
+    lens: &mut Lens,
+) -> Result<(), &'static str> {
     let rows = lens.surfaces.len();
     let surface = target.checked_sub(1).filter(|surface| *surface < rows);
-    let surface = surface.ok_or("there is no such gap")?;
+    let surface = surface.ok_or("there is no such surface")?;
     // The defocus of the image is part of the last gap.
-    if surface + 1 == rows {
+    if surface + 1 == rows && quantity == Quantity::Thickness {
         return Err("the last gap is that of the lens");
     }
-    let gaps = &mut lens.zoom[zoom].thicknesses;
-    if gaps.iter().any(|gap| gap.surface == surface) {
-        return Err("a second value for this gap; the first one is used");
+    if lens.is_own_at(zoom, surface, quantity) {
+        return Err("a second value for this number; the first one is used");
     }
-    gaps.push(ZoomThickness { surface, thickness: value });
-    Ok(())
+    let is_set = lens.set(Parameter::at_zoom(surface, quantity, zoom), value);
+    if is_set { Ok(()) } else { Err("the surface has no such number") }
 }
 
 fn field(

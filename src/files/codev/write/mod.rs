@@ -11,6 +11,20 @@ use crate::lens::{
     Aperture, FieldKind, Lens, LensError, Object, Parameter, Pickup, Quantity, SystemError,
 };
 
+/// The commands of the numbers that can differ between the zoom positions.
+const ZOOMED: [(&str, Quantity); 10] = [
+    ("THI", Quantity::Thickness),
+    ("CUY", Quantity::Curvature),
+    ("K", Quantity::Conic),
+    ("A", Quantity::Asphere(0)),
+    ("B", Quantity::Asphere(1)),
+    ("C", Quantity::Asphere(2)),
+    ("D", Quantity::Asphere(3)),
+    ("E", Quantity::Asphere(4)),
+    ("F", Quantity::Asphere(5)),
+    ("G", Quantity::Asphere(6)),
+];
+
 /// The text of the file, and the report of everything that is not exact.
 ///
 /// # Errors
@@ -129,7 +143,7 @@ impl CodeVWriter {
         self.line(format!("SI 0.0 {}", number(defocus)));
     }
 
-    /// Thicknesses and apertures of the zoom positions; the rest is reported.
+    /// Numbers of the zoom positions; the rest is reported.
     fn zoom(&mut self) {
         let positions = self.lens.zoom.len();
         if positions < 2 {
@@ -137,13 +151,31 @@ impl CodeVWriter {
         }
         self.line(format!("ZOO {positions}"));
         for surface in 0..self.lens.surfaces.len() {
-            let zoom = &self.lens.zoom;
-            let own = zoom.iter().flat_map(|position| &position.thicknesses);
-            if own.into_iter().any(|gap| gap.surface == surface) {
-                let gap = |zoom| self.lens.thickness_at(surface, zoom).unwrap_or(0.0);
-                let values = numbers((0..positions).map(gap));
-                self.line(format!("ZOO THI S{} {values}", surface + 1));
+            for (name, quantity) in ZOOMED {
+                if self.lens.is_zoomed(surface, quantity) {
+                    let value = |zoom| Parameter::at_zoom(surface, quantity, zoom);
+                    let value = |zoom| self.lens.get(value(zoom)).unwrap_or(0.0);
+                    let values = numbers((0..positions).map(value));
+                    self.line(format!("ZOO {name} S{} {values}", surface + 1));
+                }
             }
+        }
+        self.report_zoom_losses();
+    }
+
+    /// Records the numbers of zoom positions that are not written.
+    fn report_zoom_losses(&mut self) {
+        let is_written = |quantity| ZOOMED.iter().any(|(_, written)| *written == quantity);
+        let numbers = self.lens.zoom.iter().enumerate();
+        let lost: Vec<Parameter> = numbers
+            .flat_map(|(zoom, at)| {
+                let lost = at.numbers.iter().filter(|own| !is_written(own.quantity));
+                lost.map(move |own| Parameter::at_zoom(own.surface, own.quantity, zoom))
+            })
+            .collect();
+        for parameter in lost {
+            let note = "the number of the lens is used at every position";
+            self.record(ConversionOutcome::Dropped, parameter.to_string(), note);
         }
         if self.lens.zoom.iter().any(|position| position.aperture.is_some()) {
             let note = "the aperture of the lens is used at every position";
@@ -158,9 +190,10 @@ impl CodeVWriter {
     fn pickups(&mut self) {
         for pickup in self.lens.pickups.clone() {
             let Pickup { parameter, source, scale, offset } = pickup;
+            let is_zoomed = parameter.zoom.is_some() || source.zoom.is_some();
             let name = match (parameter.quantity, source.quantity) {
-                (Quantity::Thickness, Quantity::Thickness) => "THI",
-                (Quantity::Curvature, Quantity::Curvature) if offset == 0.0 => "RDY",
+                (Quantity::Thickness, Quantity::Thickness) if !is_zoomed => "THI",
+                (Quantity::Curvature, Quantity::Curvature) if !is_zoomed && offset == 0.0 => "RDY",
                 _ => {
                     let what = format!("pickup: {parameter} from the {source}");
                     let note = "the present value, without the pickup";

@@ -4,9 +4,7 @@ use crate::files::error::ParseError;
 use crate::files::report::{ConversionOutcome, ConversionReport};
 use crate::files::zemax::file::{ConfigurationOperand, ZemaxFile};
 use crate::files::zemax::row_plan::RowPlan;
-use crate::lens::{
-    Aperture, FieldKind, Lens, Object, Parameter, Quantity, Variable, ZoomPosition, ZoomThickness,
-};
+use crate::lens::{Aperture, FieldKind, Lens, Object, Parameter, Quantity, Variable, ZoomPosition};
 use std::collections::BTreeMap;
 
 /// Adds zoom positions to the lens, if the file has more than one configuration.
@@ -63,10 +61,12 @@ fn apply(
     match operand.name.as_str() {
         "THIC" => thickness(unit, plan, lens, operand),
         "APER" => aperture(unit, lens, operand),
+        "CRVT" => of_surface(plan, lens, operand, (Quantity::Curvature, unit.recip())),
+        "CONN" => of_surface(plan, lens, operand, (Quantity::Conic, 1.0)),
         "SDIA" => {
             let stop = lens.stop().is_some() && lens.stop() == plan.row(operand.target);
             if !(stop && matches!(lens.aperture, Aperture::StopSemiDiameter(_))) {
-                return Err("only the size of the stop can change with the zoom position");
+                return of_surface(plan, lens, operand, (Quantity::SemiDiameter, unit));
             }
             lens.zoom[zoom].aperture = Some(Aperture::StopSemiDiameter(operand.value * unit));
             Ok(())
@@ -90,13 +90,34 @@ fn thickness(
     if operand.value.abs() >= 1e10 {
         return Err("an infinite gap");
     }
+    number(lens, operand, (surface, Quantity::Thickness), unit)
+}
+
+/// A number of a surface, whose unit is that of the file times a factor.
+fn of_surface(
+    plan: &RowPlan,
+    lens: &mut Lens,
+    operand: &ConfigurationOperand,
+    (quantity, factor): (Quantity, f64),
+) -> Result<(), &'static str> {
+    let surface = plan.row(operand.target).ok_or("there is no such surface")?;
+    number(lens, operand, (surface, quantity), factor)
+}
+
+fn number(
+    lens: &mut Lens,
+    operand: &ConfigurationOperand,
+    (surface, quantity): (usize, Quantity),
+    factor: f64,
+) -> Result<(), &'static str> {
     let zoom = operand.configuration - 1;
-    let parameter = Parameter::new(surface, Quantity::ZoomThickness(zoom));
-    let gaps = &mut lens.zoom[zoom].thicknesses;
-    if gaps.iter().any(|gap| gap.surface == surface) {
-        return Err("a second value for this gap; the first one is used");
+    let parameter = Parameter::at_zoom(surface, quantity, zoom);
+    if lens.is_own_at(zoom, surface, quantity) {
+        return Err("a second value for this number; the first one is used");
     }
-    gaps.push(ZoomThickness { surface, thickness: operand.value * unit });
+    if !lens.set(parameter, operand.value * factor) {
+        return Err("the surface has no such number here");
+    }
     if operand.variable {
         lens.variables.push(Variable { parameter, min: None, max: None });
     }

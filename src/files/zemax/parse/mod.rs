@@ -121,7 +121,7 @@ impl ZemaxReader {
         if self.file.configurations == 1 {
             return preserved();
         }
-        dropped("only thicknesses, aperture and fields can differ between zoom positions")
+        dropped("this cannot differ between zoom positions")
     }
 }
 
@@ -129,11 +129,11 @@ impl ZemaxReader {
 const MAX_CONFIGURATIONS: usize = 1000;
 
 /// The operands of the multi-configuration table that are read.
-const TABLE: &[&str] = &["THIC", "APER", "XFIE", "YFIE", "SDIA"];
+const TABLE: &[&str] = &["THIC", "CRVT", "CONN", "APER", "XFIE", "YFIE", "SDIA"];
 
 /// Operands that change the lens and are not read.
 const OTHER_OPERANDS: &[&str] = &[
-    "CRVT", "CONN", "GLSS", "PRAM", "PAR1", "PAR2", "PAR3", "PAR4", "PAR5", "PAR6", "PAR7", "PAR8",
-    "WAVE", "WLWT", "PRWV", "FLTP", "FLWT", "FVDX", "FVDY", "FVCX", "FVCY", "FVAN", "IGNR", "APMX",
-    "APMN", "STPS", "TEMP", "PRES", "MIND", "MABB",
+    "GLSS", "PRAM", "PAR1", "PAR2", "PAR3", "PAR4", "PAR5", "PAR6", "PAR7", "PAR8", "WAVE", "WLWT",
+    "PRWV", "FLTP", "FLWT", "FVDX", "FVDY", "FVCX", "FVCY", "FVAN", "IGNR", "APMX", "APMN", "STPS",
+    "TEMP", "PRES", "MIND", "MABB",
 ];

@@ -14,7 +14,7 @@ use crate::files::zemax::INFINITE_GAP;
 use crate::files::zemax::freeform::{self, FormLines};
 use crate::lens::{
     Lens, LensError, Parameter, Pickup, Quantity, Row, SurfaceNumber, SystemError, Variable,
-    ZoomThickness,
+    at_zoom,
 };
 use place::{FileNumbers, RowBreaks, file_numbers, row_breaks};
 
@@ -53,8 +53,8 @@ fn check_thicknesses(lens: &Lens) -> Result<(), LensError> {
     let gaps = lens.surfaces.iter().enumerate();
     let gaps = gaps.map(|(i, row)| (Parameter::new(i, Quantity::Thickness), row.thickness));
     let zoomed = lens.zoom.iter().enumerate().flat_map(|(zoom, position)| {
-        let named = move |surface| Parameter::new(surface, Quantity::ZoomThickness(zoom));
-        position.thicknesses.iter().map(move |gap| (named(gap.surface), gap.thickness))
+        let gaps = position.numbers.iter().filter(|own| own.quantity == Quantity::Thickness);
+        gaps.map(move |gap| (Parameter::at_zoom(gap.surface, gap.quantity, zoom), gap.value))
     });
     match gaps.chain(zoomed).find(|(_, thickness)| !(thickness.abs() < INFINITE_GAP)) {
         Some((gap, found)) => Err(LensError::InvalidNumber {
@@ -113,17 +113,7 @@ impl ZemaxWriter {
         if self.lens.zoom.len() != 1 {
             return;
         }
-        self.lens.aperture = self.lens.aperture_at(0);
-        self.lens.fields = self.lens.fields_at(0).clone();
-        for i in 0..self.lens.surfaces.len() {
-            let gap = self.lens.thickness_at(i, 0);
-            let row = &mut self.lens.surfaces[i];
-            row.thickness = gap.unwrap_or(row.thickness);
-        }
-        self.lens.zoom.clear();
-        let moves = |p: Parameter| matches!(p.quantity, Quantity::ZoomThickness(_));
-        self.lens.variables.retain(|variable| !moves(variable.parameter));
-        self.lens.pickups.retain(|pickup| !moves(pickup.parameter) && !moves(pickup.source));
+        self.lens = at_zoom(&self.lens, 0);
         let note = "one position is written as a lens that does not zoom";
         self.record(ConversionOutcome::Approximated, "zoom positions: 1", note);
     }
@@ -143,10 +133,10 @@ impl ZemaxWriter {
             self.lens.surfaces[last].thickness = gap;
         }
         for (zoom, gap) in gaps.into_iter().enumerate().take(self.lens.zoom.len()) {
-            self.lens.zoom[zoom].thicknesses.retain(|other| other.surface != last);
+            let position = &mut self.lens.zoom[zoom];
+            position.remove_number(last, Quantity::Thickness);
             if let Some(thickness) = gap.filter(|_| offset != 0.0) {
-                let gap = ZoomThickness { surface: last, thickness };
-                self.lens.zoom[zoom].thicknesses.push(gap);
+                position.set_number(last, Quantity::Thickness, thickness);
             }
         }
         if offset != 0.0 {
@@ -213,7 +203,13 @@ impl ZemaxWriter {
     fn report_variable(&mut self, variable: &Variable) {
         let is_bounded = variable.min.is_some() || variable.max.is_some();
         let has_both_bounds = variable.min.is_some() && variable.max.is_some();
-        let note = match variable.parameter.quantity {
+        let Parameter { quantity, zoom, .. } = variable.parameter;
+        let is_written = matches!(
+            quantity,
+            Quantity::Curvature | Quantity::Conic | Quantity::Thickness | Quantity::SemiDiameter
+        );
+        let note = match quantity {
+            _ if zoom.is_some() && !is_written => "the number has no operand in the file",
             Quantity::SemiDiameter => "semi-diameters cannot be variables there",
             Quantity::Freeform(k) if !self.is_varied_there(variable.parameter.surface, k) => {
                 "this number cannot be a variable in the file"
@@ -237,9 +233,10 @@ impl ZemaxWriter {
 
     /// Records a pickup that the format does not know.
     fn report_pickup(&mut self, pickup: &Pickup) {
-        let like = pickup.parameter.quantity == pickup.source.quantity;
-        let is_supported =
-            matches!(pickup.parameter.quantity, Quantity::Curvature | Quantity::Thickness);
+        let Pickup { parameter, source, .. } = pickup;
+        let like = parameter.quantity == source.quantity && source.zoom.is_none();
+        let is_supported = parameter.zoom.is_none()
+            && matches!(parameter.quantity, Quantity::Curvature | Quantity::Thickness);
         if !(like && is_supported) {
             let what = format!("pickup: {} from the {}", pickup.parameter, pickup.source);
             let note = "the present value, without the pickup";

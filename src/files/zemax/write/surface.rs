@@ -166,7 +166,10 @@ impl ZemaxWriter {
     fn pickup(&self, surface: usize, quantity: Quantity) -> Option<Pickup> {
         let parameter = Parameter::new(surface, quantity);
         let mut pickups = self.lens.pickups.iter();
-        pickups.find(|p| p.parameter == parameter && p.source.quantity == quantity).copied()
+        let is_it = |p: &&Pickup| {
+            p.parameter == parameter && p.source.quantity == quantity && p.source.zoom.is_none()
+        };
+        pickups.find(is_it).copied()
     }
 
     fn curvature(&mut self, i: usize, curvature: f64) {

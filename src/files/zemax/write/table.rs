@@ -2,8 +2,16 @@
 
 use super::{ZemaxWriter, number};
 use crate::files::report::ConversionOutcome;
-use crate::lens::{Aperture, Fields, Parameter, Quantity};
+use crate::lens::{Aperture, Fields, Parameter, Quantity, ZoomNumber};
 use std::mem::discriminant;
+
+/// The operands of the numbers that can differ.
+const OPERANDS: [(&str, Quantity); 4] = [
+    ("THIC", Quantity::Thickness),
+    ("CRVT", Quantity::Curvature),
+    ("CONN", Quantity::Conic),
+    ("SDIA", Quantity::SemiDiameter),
+];
 
 impl ZemaxWriter {
     pub(super) fn table(&mut self) {
@@ -12,7 +20,7 @@ impl ZemaxWriter {
             return;
         }
         self.line(format!("MNUM {positions} 1"));
-        self.thicknesses();
+        self.zoom_numbers();
         self.apertures();
         self.zoom_fields();
     }
@@ -28,22 +36,34 @@ impl ZemaxWriter {
         }
     }
 
-    fn thicknesses(&mut self) {
+    /// The numbers that differ, as far as they have operands.
+    fn zoom_numbers(&mut self) {
         for surface in 0..self.lens.surfaces.len() {
-            let positions = &self.lens.zoom;
-            let moves = |p: &crate::lens::ZoomPosition| {
-                p.thicknesses.iter().any(|gap| gap.surface == surface)
-            };
-            if !positions.iter().any(moves) {
-                continue;
+            for (name, quantity) in OPERANDS {
+                if !self.lens.is_zoomed(surface, quantity) {
+                    continue;
+                }
+                let value = |zoom| {
+                    let parameter = Parameter::at_zoom(surface, quantity, zoom);
+                    let value = self.lens.get(parameter).unwrap_or(0.0);
+                    (value, self.lens.variable(parameter).is_some())
+                };
+                let values: Vec<(f64, bool)> = (0..self.lens.zoom.len()).map(value).collect();
+                let numbers = self.numbers[surface];
+                let is_gap = quantity == Quantity::Thickness;
+                self.operand(name, if is_gap { numbers.gap } else { numbers.surface }, &values);
             }
-            let value = |zoom| {
-                let parameter = Parameter::new(surface, Quantity::ZoomThickness(zoom));
-                let gap = self.lens.thickness_at(surface, zoom).unwrap_or(0.0);
-                (gap, self.lens.variable(parameter).is_some())
-            };
-            let values: Vec<(f64, bool)> = (0..positions.len()).map(value).collect();
-            self.operand("THIC", self.numbers[surface].gap, &values);
+        }
+        let is_lost = |own: &&ZoomNumber| OPERANDS.iter().all(|(_, known)| *known != own.quantity);
+        let lost: Vec<Parameter> = (0..self.lens.zoom.len())
+            .flat_map(|zoom| {
+                let lost = self.lens.zoom[zoom].numbers.iter().filter(is_lost);
+                lost.map(move |own| Parameter::at_zoom(own.surface, own.quantity, zoom))
+            })
+            .collect();
+        for parameter in lost {
+            let note = "the number of the lens is used at every position";
+            self.record(ConversionOutcome::Dropped, parameter.to_string(), note);
         }
     }
 

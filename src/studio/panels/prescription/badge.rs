@@ -33,8 +33,8 @@ impl ParameterStatus {
     /// The status of a number of a lens.
     pub(super) fn of(lens: &Lens, parameter: Parameter) -> Self {
         let last = parameter.surface + 1 == lens.surfaces.len();
-        let gap = matches!(parameter.quantity, Quantity::Thickness | Quantity::ZoomThickness(_));
-        if let Some(offset) = lens.image_solve.filter(|_| last && gap) {
+        let is_gap = parameter.quantity == Quantity::Thickness;
+        if let Some(offset) = lens.image_solve.filter(|_| last && is_gap) {
             return Self::ImageSolve(offset);
         }
         if let Some(pickup) = lens.pickups.iter().find(|p| p.parameter == parameter) {

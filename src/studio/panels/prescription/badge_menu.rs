@@ -53,7 +53,7 @@ impl StatusMenu<'_> {
         }
         let mut freed = fixed.clone();
         freed.push(free);
-        if self.parameter.quantity == Quantity::SemiDiameter {
+        if self.parameter.quantity == Quantity::SemiDiameter && self.parameter.zoom.is_none() {
             let edit = Edit::SetSemiDiameter { surface: self.parameter.surface, value: None };
             let on = decides == ParameterStatus::Automatic;
             choice(ui, on, "Automatic: follows the rays, clips nothing", vec![edit]);
@@ -95,9 +95,9 @@ impl StatusMenu<'_> {
     /// A pickup from the same number of the row before, scaled so that the value is unchanged if
     /// possible.
     fn new_pickup(&self) -> Option<Pickup> {
-        let Parameter { surface, quantity } = self.parameter;
+        let surface = self.parameter.surface;
         let other = if surface == 0 { 1 } else { surface - 1 };
-        let source = Parameter::new(other, quantity);
+        let source = Parameter { surface: other, ..self.parameter };
         let (own, theirs) = (self.lens.get(self.parameter)?, self.lens.get(source)?);
         let scale = if theirs == 0.0 || own == 0.0 { 1.0 } else { own / theirs };
         Some(Pickup { parameter: self.parameter, source, scale, offset: 0.0 })
@@ -105,6 +105,7 @@ impl StatusMenu<'_> {
 
     fn is_last_gap(&self) -> bool {
         self.parameter.quantity == Quantity::Thickness
+            && self.parameter.zoom.is_none()
             && self.parameter.surface + 1 == self.lens.surfaces.len()
     }
 
@@ -120,7 +121,7 @@ impl StatusMenu<'_> {
             return self.radius_bounds_lines(ui, variable, buffers, actions);
         }
         let unit = match self.parameter.quantity {
-            Quantity::Thickness | Quantity::ZoomThickness(_) | Quantity::SemiDiameter => "mm",
+            Quantity::Thickness | Quantity::SemiDiameter => "mm",
             _ => "number",
         };
         ui.weak(format!("Bounds, {unit}; empty for none"));

@@ -152,9 +152,9 @@ fn number_edit(lens: &Lens, parameter: Parameter, text: &str) -> Result<Edit, St
         Quantity::Curvature => {
             let empty = text.trim().is_empty();
             let old = number::radius(value.unwrap_or(0.0));
-            Ok(Edit::set_radius(surface, if empty { f64::INFINITY } else { number(old)? }))
+            Ok(Edit::set_curvature(parameter, if empty { f64::INFINITY } else { number(old)? }))
         }
-        Quantity::SemiDiameter => {
+        Quantity::SemiDiameter if parameter.zoom.is_none() => {
             Ok(Edit::SetSemiDiameter { surface, value: optional(text, value)? })
         }
         _ => Ok(Edit::Set { parameter, value: number(value.unwrap_or(0.0))? }),

@@ -110,30 +110,22 @@ impl TableColumn {
     pub(super) fn parameter(self, lens: &Lens, zoom: usize, surface: usize) -> Option<Parameter> {
         let quantity = match self {
             Self::Radius => Quantity::Curvature,
-            Self::Thickness => thickness_at(lens, surface, zoom),
+            Self::Thickness => Quantity::Thickness,
             Self::SemiDiameter => Quantity::SemiDiameter,
             Self::Conic => Quantity::Conic,
             Self::Asphere(term) => Quantity::Asphere(term),
             Self::Grin(term) => Quantity::Grin(term),
             Self::Glass | Self::Comment | Self::Obstruction => return None,
         };
-        Some(Parameter::new(surface, quantity))
+        Some(lens.parameter_at(zoom, surface, quantity))
     }
-}
-
-/// The gap as it is at a zoom position: its own number where it has one there.
-fn thickness_at(lens: &Lens, surface: usize, zoom: usize) -> Quantity {
-    let own = lens.zoom.get(zoom).is_some_and(|position| {
-        position.thicknesses.iter().any(|thickness| thickness.surface == surface)
-    });
-    if own { Quantity::ZoomThickness(zoom) } else { Quantity::Thickness }
 }
 
 /// The name of a number.
 pub(super) fn parameter_name(parameter: Parameter) -> String {
     let what = match parameter.quantity {
         Quantity::Curvature => "Radius",
-        Quantity::Thickness | Quantity::ZoomThickness(_) => "Thickness",
+        Quantity::Thickness => "Thickness",
         Quantity::SemiDiameter => "Semi-diameter",
         Quantity::Conic => "Conic",
         Quantity::Index => "Index",
@@ -141,7 +133,11 @@ pub(super) fn parameter_name(parameter: Parameter) -> String {
         Quantity::Asphere(term) => TableColumn::Asphere(term).title(),
         Quantity::Freeform(number) => &format!("Freeform number {}", number + 1),
     };
-    format!("{what} of surface {}", parameter.surface + 1)
+    let name = format!("{what} of surface {}", parameter.surface + 1);
+    match parameter.zoom {
+        Some(zoom) => format!("{name} at position {}", zoom + 1),
+        None => name,
+    }
 }
 
 /// The columns that a lens needs.

@@ -3,8 +3,8 @@
 use egui::{Align, Button, Layout, RichText, Ui};
 
 use crate::lens::{
-    Aperture, Edit, FieldKind, FieldPoint, Fields, Lens, Parameter, Quantity, ZoomPosition,
-    ZoomThickness,
+    Aperture, Edit, FREEFORM_NUMBERS, FieldKind, FieldPoint, Fields, Lens, PROFILE_TERMS,
+    Parameter, Quantity, SurfaceNumber, ZoomPosition,
 };
 use crate::paraxial::{Beam, first_order};
 use crate::session::Command;
@@ -13,6 +13,7 @@ use crate::studio::number;
 use crate::studio::panels::edit_form::EditForm;
 use crate::studio::panels::system::{aperture_kind, aperture_value, aperture_with_value};
 use crate::studio::panels::zoom_name;
+use crate::studio::text::capitalize;
 
 /// The width of a number, in points.
 const WIDTH: f32 = 82.0;
@@ -22,8 +23,8 @@ pub(super) fn ui(ui: &mut Ui, form: &mut EditForm<'_>) {
     header(ui, form);
     names(ui, form);
     let lens = form.view.lens.clone();
-    for surface in varied_gaps(&lens) {
-        gap(ui, form, surface);
+    for (surface, quantity) in varied_numbers(&lens) {
+        number_row(ui, form, surface, quantity);
     }
     if lens.zoom.iter().any(|position| position.aperture.is_some()) {
         aperture(ui, form);
@@ -34,12 +35,25 @@ pub(super) fn ui(ui: &mut Ui, form: &mut EditForm<'_>) {
     first_order_rows(ui, &lens);
 }
 
-/// The surfaces behind which the gap varies.
-fn varied_gaps(lens: &Lens) -> Vec<usize> {
-    let has = |surface: &usize| {
-        lens.zoom.iter().any(|zoom| zoom.thicknesses.iter().any(|gap| gap.surface == *surface))
-    };
-    (0..lens.surfaces.len()).filter(has).collect()
+/// The quantities of rows that vary.
+fn varied_numbers(lens: &Lens) -> Vec<(usize, Quantity)> {
+    let numbers = lens.zoom.iter().flat_map(|position| &position.numbers);
+    let mut varied: Vec<_> = numbers.map(|own| (own.surface, own.quantity)).collect();
+    varied.sort_unstable();
+    varied.dedup();
+    varied
+}
+
+/// The name of a number of a row, as in "thickness after surface 3", with its unit.
+fn number_name(surface: usize, quantity: Quantity) -> (String, &'static str) {
+    let number = SurfaceNumber::new(surface);
+    match quantity {
+        Quantity::Curvature => (format!("radius of surface {number}"), ", mm"),
+        Quantity::Thickness | Quantity::SemiDiameter => {
+            (format!("{quantity} surface {number}"), ", mm")
+        }
+        _ => (format!("{quantity} surface {number}"), ""),
+    }
 }
 
 fn header(ui: &mut Ui, form: &mut EditForm<'_>) {
@@ -71,19 +85,29 @@ fn names(ui: &mut Ui, form: &mut EditForm<'_>) {
     ui.end_row();
 }
 
-fn gap(ui: &mut Ui, form: &mut EditForm<'_>, surface: usize) {
+fn number_row(ui: &mut Ui, form: &mut EditForm<'_>, surface: usize, quantity: Quantity) {
     let lens = form.view.lens.clone();
-    ui.label(format!("Thickness after surface {}, mm", surface + 1));
+    let (name, unit) = number_name(surface, quantity);
+    ui.label(format!("{}{unit}", capitalize(&name)));
     for zoom in 0..lens.zoom.len() {
-        let name = format!("Thickness after surface {} at position {}", surface + 1, zoom + 1);
-        let value = lens.thickness_at(surface, zoom).unwrap_or(0.0);
-        let parameter = Parameter::new(surface, Quantity::ZoomThickness(zoom));
-        form.number(ui, &name, (value, WIDTH), |value| Edit::Set { parameter, value });
+        let cell = format!("{} at position {}", capitalize(&name), zoom + 1);
+        let parameter = Parameter::at_zoom(surface, quantity, zoom);
+        let value = lens.get(parameter).unwrap_or(0.0);
+        if quantity == Quantity::Curvature {
+            form.number(ui, &cell, (number::radius(value), WIDTH), |radius| {
+                Edit::set_curvature(parameter, radius)
+            });
+        } else {
+            form.number(ui, &cell, (value, WIDTH), |value| Edit::Set { parameter, value });
+        }
     }
-    same_button(ui, form, &format!("the thickness after surface {}", surface + 1), |lens| {
-        lens.surfaces[surface].thickness = lens.thickness_at(surface, 0).unwrap_or(0.0);
+    same_button(ui, form, &format!("the {name}"), |lens| {
+        let value = lens.get(Parameter::at_zoom(surface, quantity, 0));
+        if let (Some(value), Some(row)) = (value, lens.surfaces.get_mut(surface)) {
+            row.set(quantity, value);
+        }
         for position in &mut lens.zoom {
-            position.thicknesses.retain(|gap| gap.surface != surface);
+            position.remove_number(surface, quantity);
         }
     });
     ui.end_row();
@@ -151,12 +175,12 @@ fn same_button(ui: &mut Ui, form: &mut EditForm<'_>, what: &str, change: impl Fn
     if button.accessible_name(&name).on_hover_text(&name).clicked() {
         let mut lens = Lens::clone(&form.view.lens);
         change(&mut lens);
-        let zooms = |parameter: Parameter| match parameter.quantity {
-            Quantity::ZoomThickness(_) if lens.get(parameter).is_none() => None,
-            _ => Some(parameter),
+        let varies = |parameter: &Parameter| {
+            let Parameter { surface, quantity, zoom } = *parameter;
+            zoom.is_none_or(|zoom| lens.is_own_at(zoom, surface, quantity))
         };
         let mut kept = lens.clone();
-        kept.map_parameters(zooms);
+        kept.map_parameters(|parameter| Some(parameter).filter(varies));
         form.actions.push(Edit::Replace(Box::new(kept)));
     }
 }
@@ -192,16 +216,10 @@ fn first_order_rows(ui: &mut Ui, lens: &Lens) {
 pub(super) fn vary_menu(ui: &mut Ui, lens: &Lens, actions: &mut Actions) {
     let menu = ui.menu_button("Vary", |ui| {
         ui.set_min_width(230.0);
-        let varied = varied_gaps(lens);
-        for (surface, row) in lens.surfaces.iter().enumerate() {
-            let text = format!("Thickness after surface {}", surface + 1);
-            let text =
-                if row.comment.is_empty() { text } else { format!("{text} ({})", row.comment) };
-            vary_item(ui, &text, varied.contains(&surface), lens, actions, |_, position| {
-                let thickness = row.thickness;
-                position.thicknesses.push(ZoomThickness { surface, thickness });
-            });
-        }
+        let thickness = |surface: usize| vec![(surface, Quantity::Thickness)];
+        vary_submenu(ui, "Thickness", lens, actions, thickness);
+        vary_submenu(ui, "Radius", lens, actions, |surface| vec![(surface, Quantity::Curvature)]);
+        vary_submenu(ui, "Other number of a surface", lens, actions, |i| other_numbers(lens, i));
         ui.separator();
         let has = lens.zoom.iter().any(|position| position.aperture.is_some());
         vary_item(ui, "Aperture", has, lens, actions, |lens, position| {
@@ -213,6 +231,45 @@ pub(super) fn vary_menu(ui: &mut Ui, lens: &Lens, actions: &mut Actions) {
         });
     });
     menu.response.on_hover_text("Choose what is different from position to position");
+}
+
+/// Shows a menu of numbers of the rows, as `numbers` gives them for each.
+fn vary_submenu(
+    ui: &mut Ui,
+    title: &str,
+    lens: &Lens,
+    actions: &mut Actions,
+    numbers: impl Fn(usize) -> Vec<(usize, Quantity)>,
+) {
+    let varied = varied_numbers(lens);
+    ui.menu_button(title, |ui| {
+        ui.set_min_width(230.0);
+        for (surface, quantity) in (0..lens.surfaces.len()).flat_map(numbers) {
+            let (name, _) = number_name(surface, quantity);
+            let comment = &lens.surfaces[surface].comment;
+            let name = capitalize(&name);
+            let text = if comment.is_empty() { name } else { format!("{name} ({comment})") };
+            let has = varied.contains(&(surface, quantity));
+            vary_item(ui, &text, has, lens, actions, |lens, position| {
+                if let Some(value) = lens.surfaces[surface].get(quantity) {
+                    position.set_number(surface, quantity, value);
+                }
+            });
+        }
+    });
+}
+
+/// The numbers of a row beside its radius and its thickness. The size of a stop that is the aperture
+/// varies with that.
+fn other_numbers(lens: &Lens, surface: usize) -> Vec<(usize, Quantity)> {
+    let row = &lens.surfaces[surface];
+    let is_aperture = row.stop && matches!(lens.aperture, Aperture::StopSemiDiameter(_));
+    let rim = (!is_aperture).then_some(Quantity::SemiDiameter);
+    let plain = [Quantity::Conic, Quantity::Index].into_iter().chain(rim);
+    let terms = (0..row.asphere.len()).map(Quantity::Asphere);
+    let freeform = (0..FREEFORM_NUMBERS).map(Quantity::Freeform);
+    let all = plain.chain(terms).chain(freeform).chain((0..PROFILE_TERMS).map(Quantity::Grin));
+    all.filter(|quantity| row.get(*quantity).is_some()).map(|q| (surface, q)).collect()
 }
 
 fn vary_item(
