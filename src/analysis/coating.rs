@@ -14,6 +14,7 @@
 
 use crate::math::format_short;
 use nalgebra::Complex;
+use serde::{Deserialize, Serialize};
 use std::f64::consts::{PI, TAU};
 use std::fmt;
 
@@ -27,9 +28,11 @@ pub struct ThinFilm {
 }
 
 /// The coating of every surface between air and glass; surfaces between two glasses are bare.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Coating {
     /// No coating: Fresnel's equations.
+    #[default]
     Bare,
     /// A quarter wave of magnesium fluoride, of index 1.38, at 550 nm.
     SingleLayer,

@@ -1,7 +1,7 @@
 //! The footprint of a beam on a surface: the edge of its light there.
 
 use super::{AnalysisError, lit_region};
-use crate::lens::FieldPoint;
+use crate::lens::{FieldPoint, Surface};
 use crate::pupil::{RayModel, RegionKind};
 use std::f64::consts::TAU;
 
@@ -27,27 +27,41 @@ pub fn footprint(
     surface: usize,
     count: usize,
 ) -> Result<Footprint, AnalysisError> {
+    let all = footprints(model, field, wavelength, count)?;
+    all.into_iter().nth(surface).ok_or(AnalysisError::NoLight)
+}
+
+/// The footprints of a field at a wavelength on all surfaces, the image plane last.
+///
+/// # Errors
+/// As of [`footprint`].
+pub fn footprints(
+    model: &RayModel,
+    field: FieldPoint,
+    wavelength: usize,
+    count: usize,
+) -> Result<Vec<Footprint>, AnalysisError> {
     let region = lit_region(model, field, wavelength)?;
     if matches!(region.kind, RegionKind::Irregular { annulus: None, .. }) {
         return Err(AnalysisError::IrregularPupil);
     }
     let channel = region.launch.channel();
-    let point = |i: usize| {
-        let radius = region.pupil_radius(TAU * i as f64 / count as f64)?;
-        let ray = region.launch.ray(radius.point(1.0))?;
-        let mut met = None;
-        channel.tracer.visit(ray, |number, at| {
-            if number == surface {
-                met = Some([at.x, at.y]);
-            }
-        });
-        met
-    };
-    let outline: Vec<[f64; 2]> = (0..count).filter_map(point).collect();
-    if outline.is_empty() {
+    let surfaces = &channel.system.surfaces;
+    let mut outlines = vec![Vec::with_capacity(count); surfaces.len()];
+    for i in 0..count {
+        let radius = region.pupil_radius(TAU * i as f64 / count as f64);
+        let Some(ray) = radius.and_then(|radius| region.launch.ray(radius.point(1.0))) else {
+            continue;
+        };
+        channel.tracer.visit(ray, |number, at| outlines[number].push([at.x, at.y]));
+    }
+    if outlines.iter().any(Vec::is_empty) {
         return Err(AnalysisError::NoLight);
     }
-    let reach = outline.iter().map(|[x, y]| x.hypot(*y)).fold(0.0, f64::max);
-    let semi_diameter = channel.system.surfaces.get(surface).map(|s| s.semi_diameter);
-    Ok(Footprint { outline, reach, semi_diameter: semi_diameter.filter(|rim| rim.is_finite()) })
+    let print = |(outline, surface): (Vec<[f64; 2]>, &Surface<f64>)| Footprint {
+        reach: outline.iter().map(|[x, y]| x.hypot(*y)).fold(0.0, f64::max),
+        semi_diameter: Some(surface.semi_diameter).filter(|rim| rim.is_finite()),
+        outline,
+    };
+    Ok(outlines.into_iter().zip(surfaces).map(print).collect())
 }

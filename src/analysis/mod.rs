@@ -20,12 +20,14 @@ mod ghosts;
 mod illumination;
 mod image_quality;
 mod mtf;
+mod path_map;
 mod pupil;
 mod ray_layout;
 mod reference_sphere;
 mod seen_from_image;
 mod semi_diameters;
 mod spot;
+mod spot_map;
 mod spot_points;
 mod wavefront;
 mod zernike;
@@ -51,10 +53,10 @@ pub use fitted_wavefront::{
     FittedWavefront, ImageRay, WavefrontCost, WavefrontReference, brightest_strehl, image_rays,
     rms_without_tilt,
 };
-pub use footprint::{Footprint, footprint};
+pub use footprint::{Footprint, footprint, footprints};
 pub use ghosts::{
     CoatedLens, Ghost, GhostError, GhostPatch, GhostPath, GhostRanking, GhostRay, ParaxialGhost,
-    PassedLight, ghosts, rank_ghosts,
+    PassedLight, ghost_section, ghosts, rank_ghosts,
 };
 pub use illumination::{
     Illumination, energy_irradiance, illumination, image_cone, irradiance, scene_irradiance,
@@ -64,6 +66,7 @@ pub use mtf::{
     MtfCurve, MtfPoint, TransferValue, geometric_mtf, perfect_contrast,
     polychromatic_geometric_mtf, transfer,
 };
+pub use path_map::{SquareGrid, grid_nodes, grid_sides, path_map};
 pub use pupil::{FieldPupil, PupilExtent, PupilShape, RayLoss, pupil};
 pub use ray_layout::{LayoutRay, RayLayout, ray_layout};
 pub use reference_sphere::ReferenceForm;
@@ -72,6 +75,7 @@ pub use semi_diameters::{
     RimSensitivities, RimSensitivity, mean_rim_sensitivities, rim_sensitivities,
 };
 pub use spot::{MonochromaticSpot, Spot, airy_radius, rounding_error, spot, spots};
+pub use spot_map::{SpotMap, spot_map};
 pub use spot_points::{SpotPoints, spot_points};
 pub use wavefront::{
     ChiefPath, FieldPaths, PathDifference, PathError, Wavefront, field_paths, path_differences,
@@ -134,6 +138,9 @@ pub enum AnalysisError {
     /// The lens is not symmetric about an axis.
     #[error("the lens is not symmetric about its axis, as this number needs")]
     NotSymmetric,
+    /// No field lies beside the axis.
+    #[error("all fields are on the axis; expected one beside it")]
+    OnlyAxis,
     /// A paraxial lens meets light that is no plane wave.
     #[error(
         "the optical path through a paraxial lens is known for a plane wave alone; expected an object at \
@@ -153,6 +160,7 @@ impl AnalysisError {
             Self::FoldedPupil
             | Self::IrregularPupil
             | Self::NotSymmetric
+            | Self::OnlyAxis
             | Self::IdealPath
             | Self::Interrupted => false,
         }

@@ -1,6 +1,9 @@
 //! The name of one number of a lens, and access to the number by it.
 
-use super::{ASPHERE_TERMS, Aperture, Lens, Medium, RADIAL_TERMS, Row, SurfaceNumber};
+use super::{
+    ASPHERE_TERMS, Aperture, FREEFORM_NUMBERS, Lens, Medium, PROFILE_TERMS, RADIAL_TERMS, Row,
+    SurfaceNumber,
+};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
@@ -158,6 +161,23 @@ impl Medium {
 }
 
 impl Row {
+    /// The quantities of which the row has a number; asphere coefficients as far as they are written.
+    pub fn quantities(&self) -> Vec<Quantity> {
+        let plain = [
+            Quantity::Curvature,
+            Quantity::Conic,
+            Quantity::Thickness,
+            Quantity::Index,
+            Quantity::SemiDiameter,
+        ];
+        let all = plain
+            .into_iter()
+            .chain((0..self.asphere.len()).map(Quantity::Asphere))
+            .chain((0..PROFILE_TERMS).map(Quantity::Grin))
+            .chain((0..FREEFORM_NUMBERS).map(Quantity::Freeform));
+        all.filter(|quantity| self.get(*quantity).is_some()).collect()
+    }
+
     /// The value of a quantity; `None` if the row has no such number (the index of a catalogue glass,
     /// an unlimited semi-diameter).
     pub fn get(&self, quantity: Quantity) -> Option<f64> {
@@ -213,6 +233,21 @@ impl Row {
 }
 
 impl Lens {
+    /// Every parameter, row by row: those at all zoom positions, then those of which positions have
+    /// numbers of their own.
+    pub fn parameters(&self) -> Vec<Parameter> {
+        let of_row = |(surface, row): (usize, &Row)| {
+            let shared = row.quantities().into_iter().map(move |q| Parameter::new(surface, q));
+            let positions = self.zoom.iter().enumerate();
+            let numbers =
+                positions.flat_map(|(zoom, at)| at.numbers.iter().map(move |own| (zoom, own)));
+            let own = numbers.filter(move |(_, own)| own.surface == surface);
+            shared
+                .chain(own.map(move |(zoom, own)| Parameter::at_zoom(surface, own.quantity, zoom)))
+        };
+        self.surfaces.iter().enumerate().flat_map(of_row).collect()
+    }
+
     /// The value of a parameter as written, at a zoom position without a number of its own that of all
     /// positions; `None` if the lens has no such number (no such row or zoom position, the index of a
     /// catalogue glass, an unlimited semi-diameter).

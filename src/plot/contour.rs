@@ -1,5 +1,8 @@
 //! Contour lines of a function that is known on a grid.
 
+use super::{ChartCurve, round_step};
+use crate::math::ShortNumber;
+
 /// A point of a grid: its place and its value.
 type Node = ([f64; 2], f64);
 
@@ -56,6 +59,31 @@ impl ContourGrid {
             [(a, b), (b, c), (c, a)].into_iter().filter_map(on_side).collect();
         (ends.len() == 2).then_some(ends)
     }
+}
+
+/// The largest number of contour lines.
+const CONTOURS: f64 = 10.0;
+
+/// Contour lines at round numbers, dashed below zero; their step is named in the unit of the values.
+pub fn contour_curves(grid: &ContourGrid, unit: &str) -> Vec<ChartCurve> {
+    let Some([least, most]) = grid.range().filter(|[least, most]| most > least) else {
+        return Vec::new();
+    };
+    let step = round_step((most - least) / CONTOURS);
+    #[expect(clippy::cast_possible_truncation, reason = "about ten lines")]
+    let [first, last] = [(least / step).ceil(), (most / step).floor()].map(|i| i as i64);
+    let line = |i: i64| {
+        let name = match i {
+            0 => "0".to_owned(),
+            1.. if least < 0.0 => format!("above, every {} {unit}", ShortNumber(step)),
+            1.. => format!("every {} {unit}", ShortNumber(step)),
+            _ => "below".to_owned(),
+        };
+        let color = usize::from(i < 0) + 2 * usize::from(i == 0);
+        let pieces = grid.line(i as f64 * step);
+        ChartCurve { name, color, dashed: i < 0, pieces }
+    };
+    (first..=last).map(line).collect()
 }
 
 #[cfg(test)]

@@ -16,7 +16,7 @@ mod vector;
 pub use canvas::{Canvas, NamedPlot, Stroke, TextAlign, draw_image_row, gray_levels};
 pub use chart::{Axis, Chart, Legend, round_step};
 pub use color::{BLACK, Color, GREY, GRID, PALETTE, diverging, glow, gray_level};
-pub use contour::ContourGrid;
+pub use contour::{ContourGrid, contour_curves};
 pub use curve_sheet::{ChartCurve, CurveChart, CurveSheet};
 pub use document::{DocumentBlock, DocumentTable, ReportDocument, html_text, paper_pages};
 pub use vector::{

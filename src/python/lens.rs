@@ -1,7 +1,7 @@
 //! A lens: from and to every file format, with every number by its name.
 
 use super::error::{failed_work, wrong_input};
-use super::names::{parameter_name, parameters_of, parse_parameter};
+use super::names::{parameter_name, parse_parameter};
 use crate::files::{self, json};
 use crate::lens::Lens;
 use pyo3::prelude::*;
@@ -51,7 +51,7 @@ impl PyLens {
 
     /// The names of all its numbers.
     fn names(&self) -> Vec<String> {
-        parameters_of(&self.lens).into_iter().map(parameter_name).collect()
+        self.lens.parameters().into_iter().map(parameter_name).collect()
     }
 
     /// The number of a name.

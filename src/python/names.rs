@@ -4,7 +4,7 @@
 //! or a GRIN medium; one more is the zoom position. All are counted from 0.
 
 use super::error::wrong_input;
-use crate::lens::{ASPHERE_TERMS, FREEFORM_NUMBERS, Lens, PROFILE_TERMS, Parameter, Quantity};
+use crate::lens::{Parameter, Quantity};
 use pyo3::PyResult;
 
 /// The name of a parameter.
@@ -56,36 +56,4 @@ fn parameter_of(name: &str) -> Option<Parameter> {
         _ => return None,
     };
     Some(Parameter { surface: numbers[0], quantity, zoom })
-}
-
-/// Every parameter that a lens has: the coefficients that are written, and the numbers at a zoom
-/// position where it has some of its own.
-pub(super) fn parameters_of(lens: &Lens) -> Vec<Parameter> {
-    let of_surface = |i: usize| {
-        let terms = lens.surfaces[i].asphere.len().min(ASPHERE_TERMS);
-        let plain = [
-            Quantity::Curvature,
-            Quantity::Conic,
-            Quantity::Thickness,
-            Quantity::Index,
-            Quantity::SemiDiameter,
-        ];
-        let quantities = plain
-            .into_iter()
-            .chain((0..terms).map(Quantity::Asphere))
-            .chain((0..PROFILE_TERMS).map(Quantity::Grin))
-            .chain((0..FREEFORM_NUMBERS).map(Quantity::Freeform));
-        let shared = quantities.map(move |quantity| Parameter::new(i, quantity));
-        shared.chain(own_numbers(lens, i))
-    };
-    let all = (0..lens.surfaces.len()).flat_map(of_surface);
-    all.filter(|parameter| lens.get(*parameter).is_some()).collect()
-}
-
-/// The numbers of a row that zoom positions have of their own.
-fn own_numbers(lens: &Lens, surface: usize) -> impl Iterator<Item = Parameter> {
-    let positions = lens.zoom.iter().enumerate();
-    let numbers = positions.flat_map(|(zoom, at)| at.numbers.iter().map(move |own| (zoom, own)));
-    let of_row = numbers.filter(move |(_, own)| own.surface == surface);
-    of_row.map(|(zoom, own)| Parameter::at_zoom(own.surface, own.quantity, zoom))
 }

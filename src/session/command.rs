@@ -3,6 +3,7 @@
 use super::grin_design::GrinCommand;
 use super::specified_design::SpecifiedDesignCommand;
 use super::structure_search::StructureSearchCommand;
+use crate::analysis::Coating;
 use crate::effects::{Effect, EffectOverride};
 use crate::experiments::Effort;
 use crate::lens::{Edit, Lens, StartingLens};
@@ -192,6 +193,16 @@ pub enum PanelSetting {
     Contrasts(bool),
     /// True to compute the wavefronts of the fields.
     Wavefronts(bool),
+    /// True to compute the footprints of the fields.
+    Footprints(bool),
+    /// True to compute the spot over the whole field.
+    SpotMap(bool),
+    /// True to compute the ghosts.
+    Ghosts(bool),
+    /// The coating of the surfaces that make ghosts.
+    Coating(Coating),
+    /// The surfaces of the ghost that the layout shows.
+    Ghost(Option<[usize; 2]>),
     /// True to compute the picture of a scene.
     Picture(bool),
     /// The scene of the picture.

@@ -34,8 +34,8 @@ mod view;
 
 pub use analysis::{
     Analyses, AnalysisResults, AnalysisSettings, AsBuiltLens, FieldContrast, FieldContrasts,
-    FieldFans, FieldPupils, FieldWavefront, FieldWavefronts, GridValues, PointImage, ScenePicture,
-    analyze, predict_as_built,
+    FieldFans, FieldFootprints, FieldGhosts, FieldPupils, FieldWavefront, FieldWavefronts,
+    PointImage, ScenePicture, analyze, predict_as_built,
 };
 pub use clock::Timed;
 pub use command::{Command, PanelSetting};

@@ -30,13 +30,16 @@ impl Arrangement {
 }
 
 /// The panels of the light in the image.
-const LIGHT: [PanelKind; 6] = [
+const LIGHT: [PanelKind; 9] = [
     PanelKind::Spot,
     PanelKind::Fans,
     PanelKind::Contrast,
     PanelKind::Wavefront,
     PanelKind::Pupil,
     PanelKind::FieldCurves,
+    PanelKind::SpotMap,
+    PanelKind::Footprint,
+    PanelKind::Ghosts,
 ];
 
 /// The large panels, which stand above the table.
@@ -95,7 +98,15 @@ fn large_arrangement() -> Tree<PanelKind> {
     let table = row(&mut tiles, &[(table, 0.66), (system, 0.34)]);
     let left = column(&mut tiles, &[(drawings, 0.54), (table, 0.46)]);
     let spots = tabs(&mut tiles, &[Kind::Spot, Kind::Fans, Kind::Pupil]);
-    let contrast = [Kind::Contrast, Kind::Wavefront, Kind::FieldCurves, Kind::Picture];
+    let contrast = [
+        Kind::Contrast,
+        Kind::Wavefront,
+        Kind::FieldCurves,
+        Kind::SpotMap,
+        Kind::Footprint,
+        Kind::Ghosts,
+        Kind::Picture,
+    ];
     let contrast = tabs(&mut tiles, &contrast);
     let facts = tabs(&mut tiles, &[Kind::FirstOrder, Kind::Effects]);
     let sums = tabs(&mut tiles, &[Kind::Seidel]);

@@ -134,12 +134,15 @@ impl Dock {
     /// Asks for the analyses of those panels alone that are visible.
     fn request_analyses(&self, view: &SessionView, actions: &mut Actions) {
         let settings = &view.settings;
-        let asked: [(PanelKind, bool, SetVisible); 7] = [
+        let asked: [(PanelKind, bool, SetVisible); 10] = [
             (PanelKind::Pupil, settings.pupils, PanelSetting::Pupils),
             (PanelKind::Contrast, settings.contrasts, PanelSetting::Contrasts),
             (PanelKind::Wavefront, settings.wavefronts, PanelSetting::Wavefronts),
             (PanelKind::Fans, settings.fans, PanelSetting::Fans),
             (PanelKind::FieldCurves, settings.field_curves, PanelSetting::FieldCurves),
+            (PanelKind::Footprint, settings.footprints, PanelSetting::Footprints),
+            (PanelKind::SpotMap, settings.spot_map, PanelSetting::SpotMap),
+            (PanelKind::Ghosts, settings.ghosts, PanelSetting::Ghosts),
             (PanelKind::Picture, settings.picture, PanelSetting::Picture),
             (PanelKind::Tolerances, settings.tolerances, PanelSetting::Tolerances),
         ];

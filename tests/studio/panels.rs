@@ -7,14 +7,16 @@ use aplanat::lens::{Aperture, Edit, Lens, Medium, Object, Parameter, Quantity, R
 use aplanat::merit::{Goal, PupilEdge, Term};
 use aplanat::optimize::{DescentMethod, OptimizationEnd, OptimizationProgress, pareto};
 use aplanat::session::{
-    Command, OptimizationRequest, OptimizationSnapshot, PanelSetting, ParetoPass, ParetoRun,
-    ParetoView, RunId, RunKind, RunStatus, RunView, Session, SessionView,
+    Analyses, Command, OptimizationRequest, OptimizationSnapshot, PanelSetting, ParetoPass,
+    ParetoRun, ParetoView, RunId, RunKind, RunStatus, RunView, Session, SessionView,
 };
 use aplanat::studio::draw::RenderBackend;
 use aplanat::studio::file_dialog::FileRequest;
+use aplanat::studio::number;
 use aplanat::studio::panels::{
-    EffectsPanel, FirstOrderPanel, LayoutPanel, OptimizerPanel, Panel, ParetoPanel,
-    PrescriptionPanel, PupilPanel, SeidelPanel, SpotPanel, WavefrontPanel,
+    EffectsPanel, FirstOrderPanel, FootprintPanel, GhostsPanel, LayoutPanel, OptimizerPanel, Panel,
+    ParetoPanel, PrescriptionPanel, PupilPanel, SeidelPanel, SpotMapPanel, SpotPanel,
+    WavefrontPanel,
 };
 use egui::{Key, Modifiers};
 use egui_kittest::Harness;
@@ -762,27 +764,114 @@ fn counts_of_one_are_singular() {
     harness.get_by_label_contains("the 1 variable and all semi-diameters");
 }
 
+/// A view with the numbers that a setting asks for, once they are there.
+fn results_with(setting: PanelSetting, are_there: impl Fn(&Analyses) -> bool) -> SessionView {
+    let mut session = Session::new(double_gauss(), || {}).unwrap();
+    session.apply(Command::Show(setting));
+    for _ in 0..1000 {
+        session.poll();
+        let (results, settings) = (session.view().results, session.view().settings);
+        let found = results.filter(|found| found.analyses.as_ref().is_ok_and(&are_there));
+        if let Some(found) = found {
+            return SessionView { results: Some(found), settings, ..view() };
+        }
+        std::thread::sleep(std::time::Duration::from_millis(100));
+    }
+    panic!("no numbers for {setting:?}");
+}
+
+/// Every field has an outline on the surface that is chosen, and all are smaller than its rim.
+#[test]
+fn the_footprint_panel_shows_a_surface() {
+    let shown = results_with(PanelSetting::Footprints(true), |all| all.footprints.is_some());
+    let lens = double_gauss();
+    let mut harness = panel_harness(FootprintPanel::default(), shown);
+    harness.run_steps(3);
+    harness.get_by_label_contains("Footprint: field 1 reaches");
+    harness.get_by_label_contains("Surface of the footprint").click();
+    harness.run_steps(3);
+    harness.get_by_label("Image plane").click();
+    harness.run_steps(3);
+    harness.get_by_label("nothing clips here");
+    harness.get_by_label_contains("Surface of the footprint").click();
+    harness.run_steps(3);
+    harness.get_by_label("Surface 2").click();
+    harness.run_steps(3);
+    let rim = lens.surfaces[1].semi_diameter.unwrap();
+    harness.get_by_label(&format!("rim {} mm", number::format_digits(rim, 5)));
+    let results = harness.state().view.results.clone().unwrap();
+    let prints = results.analyses.as_ref().unwrap().footprints.clone().unwrap();
+    let reach = |prints: &Result<Vec<_>, _>| prints.as_ref().ok().map(|all: &Vec<_>| reach_of(all));
+    assert!(prints.value.iter().filter_map(reach).all(|reach| reach <= rim * (1.0 + 1e-6)));
+}
+
+/// How far the light of a field reaches on the second surface.
+fn reach_of(prints: &[aplanat::analysis::Footprint]) -> f64 {
+    prints[1].reach
+}
+
+/// The map has the spots of the list of fields, in words for those who do not see colours.
+#[test]
+fn the_spot_map_panel_shows_the_range_of_the_spots() {
+    let shown = results_with(PanelSetting::SpotMap(true), |all| all.spot_map.is_some());
+    let mut harness = panel_harness(SpotMapPanel::default(), shown);
+    harness.run_steps(3);
+    harness.get_by_label("RMS spot radius over the field");
+    harness.get_by_label_contains("RMS radius, ±");
+    harness.get_by_label_contains("µm");
+    let results = harness.state().view.results.clone().unwrap();
+    let numbers = results.analyses.as_ref().unwrap();
+    let map = numbers.spot_map.clone().unwrap();
+    let map = map.value.as_ref().unwrap();
+    let center = map.values[map.values.len() / 2].as_ref().unwrap().as_ref().unwrap();
+    let axis = numbers.spots.value[0].as_ref().unwrap();
+    let off = (center.value - axis.rms.value).abs();
+    assert!(off <= center.error + axis.rms.error, "{} and {}", center.value, axis.rms.value);
+}
+
+/// A click on a pair shows its light in the layout, another click hides it.
+#[test]
+fn a_ghost_of_the_list_is_shown_in_the_layout() {
+    let shown = results_with(PanelSetting::Ghosts(true), |all| all.ghosts.is_some());
+    let mut harness = panel_harness(GhostsPanel::default(), shown);
+    harness.run_steps(3);
+    let results = harness.state().view.results.clone().unwrap();
+    let ghosts = results.analyses.as_ref().unwrap().ghosts.clone().unwrap();
+    let ghosts = ghosts.value.as_ref().unwrap();
+    let brightest = &ghosts.fields[0][0];
+    let pair = [brightest.paraxial.first, brightest.paraxial.second];
+    let name = format!("Ghost of surfaces {} and {}", pair[0] + 1, pair[1] + 1);
+    harness.get_by_label(&name).click();
+    harness.run_steps(3);
+    let asked = Command::Show(PanelSetting::Ghost(Some(pair)));
+    assert!(harness.state().commands.contains(&asked), "{:?}", harness.state().commands);
+    harness.get_by_label("Coating between air and glass").click();
+    harness.run_steps(3);
+    harness.get_by_label_contains("V coat").click();
+    harness.run_steps(3);
+    let coated = Command::Show(PanelSetting::Coating(aplanat::analysis::Coating::VCoat));
+    assert!(harness.state().commands.contains(&coated), "{:?}", harness.state().commands);
+
+    let drawn = results_with(PanelSetting::Ghost(Some(pair)), |all| !all.ghost_rays.is_empty());
+    let rays = &drawn.results.as_ref().unwrap().analyses.as_ref().unwrap().ghost_rays;
+    // Some light gets through, and goes back and forth on its way.
+    let turns = |ray: &Vec<aplanat::math::Vec3<f64>>| {
+        ray.windows(2).filter(|step| step[1].z < step[0].z).count()
+    };
+    assert!(rays.iter().any(|ray| turns(ray) > 0), "{rays:?}");
+    let mut layout = panel_harness(LayoutPanel::new(RenderBackend::Software), drawn);
+    layout.run_steps(3);
+    layout.get_by_label(&format!("ghost {}, {}", pair[0] + 1, pair[1] + 1)).click();
+    layout.run_steps(3);
+    let hidden = Command::Show(PanelSetting::Ghost(None));
+    assert!(layout.state().commands.contains(&hidden), "{:?}", layout.state().commands);
+}
+
 /// Every page of the wavefront panel shows every field, with the numbers of the analyses.
 #[test]
 fn the_wavefront_panel_shows_maps_images_and_coefficients() {
-    let mut session = Session::new(double_gauss(), || {}).unwrap();
-    session.apply(Command::Show(PanelSetting::Wavefronts(true)));
-    let mut results = || {
-        let mut left = 1000;
-        loop {
-            session.poll();
-            let results = session.view().results;
-            if let Some(results) = results.filter(|results| {
-                results.analyses.as_ref().is_ok_and(|numbers| numbers.wavefronts.is_some())
-            }) {
-                return results;
-            }
-            left -= 1;
-            assert!(left > 0, "no wavefronts");
-            std::thread::sleep(std::time::Duration::from_millis(100));
-        }
-    };
-    let shown = SessionView { results: Some(results()), ..view() };
+    let shown =
+        results_with(PanelSetting::Wavefronts(true), |numbers| numbers.wavefronts.is_some());
     let mut harness = panel_harness(WavefrontPanel::default(), shown);
     harness.run_steps(3);
     let numbers = harness.state().view.results.clone().unwrap();

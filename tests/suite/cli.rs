@@ -494,6 +494,7 @@ fn a_lens_without_light_is_refused_by_every_analysis_and_by_the_report() {
         "fan",
         "distortion",
         "distortion-grid",
+        "spot-map",
         "lateral-color",
         "longitudinal",
         "footprint",

@@ -224,6 +224,34 @@ fn the_corners_of_a_distortion_grid_are_the_farthest_field() {
     assert_eq!(lines.count(), 2 * 22 + 2, "with a sample of each in the legend");
 }
 
+/// A map of the field has the spots of the fields of the lens: the farthest is at the top of the grid.
+#[test]
+fn a_spot_map_has_the_spots_of_the_fields() {
+    let (folder, lens) = (Folder::new("spot-map"), "lenses/tessar_50_f28.json");
+    let svg = folder.path("map.svg");
+    let arguments = ["analyze", lens, "spot-map", "--error", "1%", "--plot", &svg];
+    let found = done_json(&arguments, "")["fields"][0].clone();
+    let spots = done_json(&["analyze", lens, "spot"], "")["fields"].clone();
+    let points = found["points"].as_array().unwrap();
+    let at = |x: f64, y: f64| {
+        let is_it = |point: &&Value| {
+            let off = |k: usize, v: f64| (point["field"][k].as_f64().unwrap() - v).abs();
+            off(0, x) < 1e-9 && off(1, y) < 1e-9
+        };
+        points.iter().find(is_it).unwrap()["rms"].clone()
+    };
+    for spot in spots.as_array().unwrap().iter().filter(|spot| spot["y"] != json!(16.36)) {
+        let y = spot["y"].as_f64().unwrap();
+        for map in [at(0.0, y), at(-y, 0.0)] {
+            let [map, own] = [&map, &spot["rms"]].map(|e| [&e["value"], &e["error"]]);
+            let number = |v: &Value| v.as_f64().unwrap();
+            let off = (number(map[0]) - number(own[0])).abs();
+            assert!(off <= number(map[1]) + number(own[1]), "{y}: {map:?} {own:?}");
+        }
+    }
+    assert!(fs::read_to_string(&svg).unwrap().contains("every"));
+}
+
 /// A folder is filled with files of certain names, which nothing else may have.
 #[test]
 fn a_folder_and_a_file_in_it_do_not_share_a_name() {

@@ -6,7 +6,7 @@ use crate::merit::{check, step, vary, vary_at};
 use aplanat::analysis::spot;
 use aplanat::files;
 use aplanat::lens::{
-    Aperture, Edit, Lens, Medium, Object, Parameter, Quantity, ZoomNumber, ZoomPosition,
+    Aperture, Edit, Lens, Medium, Object, Parameter, Quantity, Row, ZoomNumber, ZoomPosition,
     apply_edit, at_zoom,
 };
 use aplanat::merit::{Goal, PupilEdge, Term};

@@ -17,6 +17,7 @@ pub use real::GhostPatch;
 
 use super::coating::Coating;
 use crate::lens::{FieldPoint, SurfaceNumber, System};
+use crate::math::Vec3;
 use crate::pupil::RayModel;
 use rayon::prelude::*;
 
@@ -152,6 +153,34 @@ pub fn ghosts(
     found.sort_by(|a, b| b.patch.irradiance.total_cmp(&a.patch.irradiance));
     Ok((ranking, found))
 }
+
+/// The rays of a ghost in the section of a field, from in front of the lens to where each ends: about
+/// `count` of them, which fill the entrance pupil.
+///
+/// # Errors
+/// As of [`rank_ghosts`], or a pair that does not reflect.
+pub fn ghost_section(
+    model: &RayModel,
+    (field, wavelength): (FieldPoint, usize),
+    pair: [usize; 2],
+    count: usize,
+) -> Result<Vec<Vec<Vec3<f64>>>, GhostError> {
+    let system = &model.channels[wavelength].system;
+    let path = GhostPath::new(system, pair)?;
+    let Ok(launch) = model.launch(field, wavelength) else { return Ok(Vec::new()) };
+    let front = -FRONT * system.total_track().abs();
+    let height = |i: usize| 2.0 * (i as f64 + 0.5) / count as f64 - 1.0;
+    let rays = (0..count).filter_map(|i| launch.ray([0.0, height(i)]));
+    let points = rays.map(|ray| {
+        let back = (front - ray.point.z) / ray.direction.z;
+        let start = ray.point + ray.direction * back.min(0.0);
+        std::iter::once(start).chain(path.points(ray)).collect()
+    });
+    Ok(points.collect())
+}
+
+/// The distance in front of the lens at which drawn rays begin, over the length of the lens.
+const FRONT: f64 = 0.2;
 
 fn check(system: &System<f64>) -> Result<(), GhostError> {
     let is_other = |i: &usize| {

@@ -17,6 +17,8 @@ pub struct GhostPath {
     pub steps: Vec<usize>,
     /// The indices in front of every surface on the way and on its other side.
     indices: Vec<[f64; 2]>,
+    /// The z of the vertex of every surface on the way, from the first vertex.
+    vertices: Vec<f64>,
     system: System<f64>,
     tracer: Tracer<f64>,
 }
@@ -46,7 +48,9 @@ impl GhostPath {
         let back = (second..first).rev();
         let steps: Vec<usize> =
             (0..=first).chain(back).chain(second + 1..lens.surfaces.len()).collect();
-        let system = unfolded(lens, pair, &steps);
+        let z = vertices(lens);
+        let vertices = steps.iter().map(|step| z[*step]).collect();
+        let system = unfolded(lens, &z, pair, &steps);
         let other = |(k, i): (usize, &usize)| {
             let (front, behind) = (lens.index_before(*i), lens.surfaces[*i].index);
             // Backwards light comes from behind.
@@ -55,7 +59,7 @@ impl GhostPath {
         };
         let indices = steps.iter().enumerate().map(other).collect();
         let tracer = Tracer::new(&system).map_err(|_error| GhostError::NotPlain(first.into()))?;
-        Ok(Self { pair, steps, indices, system, tracer })
+        Ok(Self { pair, steps, indices, vertices, system, tracer })
     }
 
     /// A ray that starts in the frame of the first vertex; with rims it ends where one clips it.
@@ -64,6 +68,14 @@ impl GhostPath {
         let traced = self.tracer.visit(ray, |_, point| met.push(point));
         let intensity = intensity(&self.system, (&self.indices, coating), ray, &met, wavelength);
         GhostRay { traced, intensity }
+    }
+
+    /// The points where a ray meets the surfaces on the way, as far as it gets, from the first vertex.
+    pub fn points(&self, ray: Ray<f64>) -> Vec<Vec3<f64>> {
+        let mut met = Vec::with_capacity(self.steps.len());
+        self.tracer.visit(ray, |_, point| met.push(point));
+        let place = |(point, z): (Vec3<f64>, &f64)| point + Vec3::new(0.0, 0.0, *z);
+        met.into_iter().zip(&self.vertices).map(place).collect()
     }
 
     /// The same path without rims and obstructions that clip.
@@ -172,12 +184,22 @@ pub(super) fn intensity(
     shares
 }
 
-/// The lens that light meets along some steps: gaps run backwards between the two mirrors.
-fn unfolded(lens: &System<f64>, [first, second]: [usize; 2], steps: &[usize]) -> System<f64> {
+/// The z of every vertex, from the first one.
+fn vertices(lens: &System<f64>) -> Vec<f64> {
     let mut z = vec![0.0; lens.surfaces.len()];
     for i in 1..z.len() {
         z[i] = z[i - 1] + lens.surfaces[i - 1].thickness;
     }
+    z
+}
+
+/// The lens that light meets along some steps: gaps run backwards between the two mirrors.
+fn unfolded(
+    lens: &System<f64>,
+    z: &[f64],
+    [first, second]: [usize; 2],
+    steps: &[usize],
+) -> System<f64> {
     let turned = 2 * first - second;
     let surface = |(k, i): (usize, &usize)| {
         let surface = lens.surfaces[*i].clone();

@@ -12,6 +12,7 @@ mod ghosts;
 mod illumination;
 mod point_spread;
 mod spot;
+mod spot_map;
 mod wavefront;
 
 use super::effects::{AllowedSetting, EffectArgs, EffectReport, EffectRule};
@@ -135,6 +136,8 @@ pub(super) fn parse_coating(text: &str) -> Result<Coating, String> {
 enum AnalysisKind {
     /// RMS and geometric radius, centroid, colours
     Spot,
+    /// RMS radius over the whole field
+    SpotMap,
     /// Transverse ray errors along both sections of the pupil
     Fan,
     /// Chief rays compared with `f tan(theta)` and `f theta`
@@ -206,6 +209,12 @@ const IRRADIANCE_RULES: [EffectRule; 2] = [
         reason: "light reaches a point of the image from every direction",
     },
 ];
+/// The rule for fields that the lens does not list.
+const ALL_FIELDS: EffectRule = EffectRule {
+    effect: Effect::Clipping,
+    allowed: AllowedSetting::AlwaysOn,
+    reason: "the plan has measured the fields of the lens alone",
+};
 /// The rule for image heights compared with ideal ones.
 const OBJECT_IN_PLACE: EffectRule = EffectRule {
     effect: Effect::FiniteObject,
@@ -220,6 +229,7 @@ impl AnalysisKind {
             Self::Spot | Self::Fan | Self::ThroughFocus | Self::Mtf => &[],
             Self::LateralColor | Self::Longitudinal => &[COLORS],
             Self::Distortion | Self::DistortionGrid => &[ONE_WAVELENGTH, OBJECT_IN_PLACE],
+            Self::SpotMap => &[ALL_FIELDS],
             Self::Ghosts => &GHOST_RULES,
             Self::Illumination => &IRRADIANCE_RULES,
             _ => &[ONE_WAVELENGTH],
@@ -229,7 +239,7 @@ impl AnalysisKind {
     /// The purpose that effects are planned for.
     fn purpose(self, tolerance: f64) -> TracePurpose {
         match self {
-            Self::Spot | Self::ThroughFocus => TracePurpose::Spot(tolerance),
+            Self::Spot | Self::SpotMap | Self::ThroughFocus => TracePurpose::Spot(tolerance),
             Self::Fan | Self::Distortion | Self::DistortionGrid => TracePurpose::Trace,
             _ => TracePurpose::Exact,
         }
@@ -239,6 +249,7 @@ impl AnalysisKind {
     fn effect_report(self, plan: EffectPlan) -> EffectReport {
         match self {
             Self::Spot
+            | Self::SpotMap
             | Self::ThroughFocus
             | Self::Fan
             | Self::Distortion
@@ -256,6 +267,7 @@ impl AnalyzeArgs {
         let run = AnalysisRun::new(self)?;
         match self.what {
             AnalysisKind::Spot => self.finish(&run, spot::spots(&run), output),
+            AnalysisKind::SpotMap => self.finish(&run, spot_map::map(&run), output),
             AnalysisKind::Fan => self.finish(&run, fan::fans(&run), output),
             AnalysisKind::Distortion => self.finish(&run, chief::distortions(&run), output),
             AnalysisKind::DistortionGrid => self.finish(&run, chief::grid(&run), output),

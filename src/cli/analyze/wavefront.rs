@@ -3,11 +3,11 @@
 use super::{AnalysisRun, AtField, SelectedField, TextLines, estimate_text};
 use crate::analysis::{
     AnalysisError, ChiefPath, Estimate, PathDifference, PathError, ReferenceForm, ZernikeMethod,
-    ZernikeOrder, aberration_name, field_paths, wavefront, zernike,
+    ZernikeOrder, aberration_name, field_paths, grid_sides, path_map, wavefront, zernike,
 };
 use crate::cli::output::{ShortNumber, counted, or_dash};
 use crate::measure::time_ms;
-use crate::plot::{ChartCurve, ContourGrid, CurveChart, round_step};
+use crate::plot::{ChartCurve, ContourGrid, CurveChart, contour_curves};
 use serde::Serialize;
 
 /// The wavefront of a field.
@@ -91,40 +91,14 @@ pub(super) fn wavefronts(run: &AnalysisRun, asked: &[[f64; 2]]) -> Vec<AtField<W
     run.fields.iter().map(at).collect()
 }
 
-/// The number of intervals of the grid of a drawing from the centre of the pupil to its rim.
-const GRID: i32 = 40;
+/// The number of columns of the map of a drawing.
+const MAP: usize = 81;
 
-/// The path differences on a grid over the pupil.
+/// The path differences over the pupil, to be drawn.
 fn path_grid(run: &AnalysisRun, field: &SelectedField) -> Result<ContourGrid, AnalysisError> {
-    let side: Vec<f64> = (-GRID..=GRID).map(|i| f64::from(i) / f64::from(GRID)).collect();
-    let points: Vec<[f64; 2]> = side.iter().flat_map(|y| side.iter().map(|x| [*x, *y])).collect();
-    let (_, found) = paths(run, field, &points)?;
-    let values = found.iter().map(|path| path.waves.filter(|_| path.px.hypot(path.py) <= 1.0));
-    Ok(ContourGrid { places: [side.clone(), side], values: values.collect() })
-}
-
-/// The largest number of contour lines.
-const CONTOURS: f64 = 10.0;
-
-/// The contour lines of the path differences, full where they are positive.
-fn contours(grid: &ContourGrid) -> Vec<ChartCurve> {
-    let Some([least, most]) = grid.range().filter(|[least, most]| most > least) else {
-        return Vec::new();
-    };
-    let step = round_step((most - least) / CONTOURS);
-    #[expect(clippy::cast_possible_truncation, reason = "about ten lines")]
-    let [first, last] = [(least / step).ceil(), (most / step).floor()].map(|i| i as i64);
-    let line = |i: i64| {
-        let name = match i {
-            0 => "0".to_owned(),
-            1.. => format!("above, every {} wavelengths", ShortNumber(step)),
-            _ => "below".to_owned(),
-        };
-        let color = usize::from(i < 0) + 2 * usize::from(i == 0);
-        let pieces = grid.line(i as f64 * step);
-        ChartCurve { name, color, dashed: i < 0, pieces }
-    };
-    (first..=last).map(line).collect()
+    let map = path_map(&run.model, field.traced, run.model.primary, MAP)?;
+    let side = grid_sides(map.count, map.half_width);
+    Ok(ContourGrid { places: [side.clone(), side], values: map.values })
 }
 
 /// The chief ray and the path differences at some pupil points.
@@ -169,7 +143,8 @@ impl TextLines for WavefrontJson {
 
     /// The contour lines over the pupil.
     fn charts(&self) -> Vec<CurveChart> {
-        let curves = self.grid.as_ref().map(contours).unwrap_or_default();
+        let curves = self.grid.as_ref().map(|grid| contour_curves(grid, "wavelengths"));
+        let curves = curves.unwrap_or_default();
         vec![CurveChart::map("wavefront", ["pupil x", "pupil y"], curves)]
     }
 }

@@ -6,21 +6,28 @@
 
 mod as_built;
 mod contrast;
+mod ghosts;
 mod pupils;
 mod scene_picture;
+mod slow;
 mod wavefronts;
 
 pub use as_built::{AsBuiltLens, predict_as_built};
 pub use contrast::{FieldContrast, FieldContrasts};
+pub use ghosts::FieldGhosts;
 pub use pupils::FieldPupils;
 pub use scene_picture::ScenePicture;
-pub use wavefronts::{FieldWavefront, FieldWavefronts, GridValues, PointImage};
+pub use wavefronts::{FieldWavefront, FieldWavefronts, PointImage};
 
 use super::clock::{Timed, now, time};
 use super::run::{LatestRequestWorker, WorkerOutput, catch_panic};
-use crate::analysis::{self, AnalysisError, Fan, FieldCurves, RayLayout, Spot, SpotPoints};
+use crate::analysis::{
+    self, AnalysisError, Coating, Fan, FieldCurves, Footprint, GhostError, RayLayout, Spot,
+    SpotMap, SpotPoints,
+};
 use crate::effects::{self, Effect, EffectOverride, EffectOverrides, EffectPlan, TracePurpose};
 use crate::lens::{FieldPoint, Lens};
+use crate::math::Vec3;
 use crate::measure::EffectTask;
 use crate::paraxial::{FirstOrder, Seidel};
 use crate::picture::BuiltInScene;
@@ -28,12 +35,16 @@ use crate::pupil::{Accuracy, RayModel, RayModelError};
 use crate::tolerance::ToleranceGrade;
 use pupils::{field_pupils, for_each_field};
 use serde::{Deserialize, Serialize};
+use slow::SlowAnalysis;
 use std::io;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 /// The ray fans of each field, or the reason why it has none.
 pub type FieldFans = Vec<Result<Vec<Fan>, AnalysisError>>;
+
+/// The footprints of each field, or the reason why it has none.
+pub type FieldFootprints = Vec<Result<Vec<Footprint>, AnalysisError>>;
 
 /// The analyses of one version of the design.
 #[derive(Debug, Clone)]
@@ -74,7 +85,7 @@ pub struct Analyses {
     pub pupils: Option<Timed<FieldPupils>>,
     /// The contrast of the fields; `None` while no panel shows it, and at first: it may take longer than
     /// all else.
-    pub contrasts: Option<Timed<FieldContrasts>>,
+    pub contrasts: Option<Arc<Timed<FieldContrasts>>>,
     /// The wavefronts of the fields; `None` while no panel shows them, and at first.
     pub wavefronts: Option<Arc<Timed<FieldWavefronts>>>,
     /// A scene through the lens, or the reason why there is none; `None` while no panel shows it.
@@ -86,6 +97,15 @@ pub struct Analyses {
     pub fans: Option<Timed<FieldFans>>,
     /// Distortion, field curvature and illumination over the field; `None` while no panel shows them.
     pub field_curves: Option<Timed<FieldCurves>>,
+    /// The footprints of each field on all surfaces, the image plane last; `None` while no panel shows
+    /// them.
+    pub footprints: Option<Timed<FieldFootprints>>,
+    /// The spot radius over the whole field; `None` while no panel shows it, and at first.
+    pub spot_map: Option<Arc<Timed<Result<SpotMap, AnalysisError>>>>,
+    /// The ghosts of the fields; `None` while no panel shows them, and at first.
+    pub ghosts: Option<Arc<Timed<Result<FieldGhosts, GhostError>>>>,
+    /// The rays of the ghost that is looked at, from in front of the lens.
+    pub ghost_rays: Vec<Vec<Vec3<f64>>>,
 }
 
 impl Analyses {
@@ -131,19 +151,85 @@ pub(super) fn spawn_analysis(
     wake: impl Fn() + Send + 'static,
 ) -> io::Result<AnalysisWorker> {
     let mut published = None;
-    let (mut contrasts, mut wavefronts) = (None, None);
+    let mut slow = SlowAnalyses::new();
     AnalysisWorker::spawn("analysis", wake, move |request, output| {
         let results = answer(request, output, &mut published);
-        let mut slower = |results| {
-            let results = publish_contrasts(results, output, &mut contrasts);
-            publish_prediction(publish_wavefronts(results, output, &mut wavefronts), output)
-        };
+        let mut slower = |results| publish_prediction(slow.publish(results, output), output);
         let refined = results.map(|results| refine(slower(results), output));
         if let (Some(results), EffectTiming::Measured) = (refined, timing) {
             measure(results, output);
         }
     })
 }
+
+/// The analyses that take longer than all else, in the order in which they follow.
+struct SlowAnalyses {
+    ghosts: SlowAnalysis<Result<FieldGhosts, GhostError>>,
+    spot_map: SlowAnalysis<Result<SpotMap, AnalysisError>>,
+    contrasts: SlowAnalysis<FieldContrasts>,
+    wavefronts: SlowAnalysis<FieldWavefronts>,
+}
+
+impl SlowAnalyses {
+    fn new() -> Self {
+        Self {
+            ghosts: SlowAnalysis {
+                is_asked: |settings| settings.ghosts,
+                compute: |results, analyses, interrupted| {
+                    let model = &analyses.ray_model.value;
+                    ghosts::field_ghosts(model, &results.settings, interrupted)
+                },
+                slot: |analyses| &mut analyses.ghosts,
+                known: None,
+            },
+            spot_map: SlowAnalysis {
+                is_asked: |settings| settings.spot_map,
+                compute: |AnalysisResults { lens, settings, .. }, analyses, interrupted| {
+                    let (model, plan) = (&analyses.ray_model.value, &analyses.plan.value);
+                    let model = model_with_all_rims(lens, settings.zoom, model, plan);
+                    let map = analysis::spot_map(&model, MAP_COLUMNS, LOOKED_AT, interrupted);
+                    (map != Err(AnalysisError::Interrupted)).then_some(map)
+                },
+                slot: |analyses| &mut analyses.spot_map,
+                known: None,
+            },
+            contrasts: SlowAnalysis {
+                is_asked: |settings| settings.contrasts,
+                compute: |results, analyses, interrupted| {
+                    let (model, spots) = (&analyses.ray_model.value, &analyses.spots.value);
+                    let tolerance = results.settings.tolerance;
+                    contrast::field_contrasts(model, spots, tolerance, interrupted)
+                },
+                slot: |analyses| &mut analyses.contrasts,
+                known: None,
+            },
+            wavefronts: SlowAnalysis {
+                is_asked: |settings| settings.wavefronts,
+                compute: |results, analyses, interrupted| {
+                    let (model, spots) = (&analyses.ray_model.value, &analyses.spots.value);
+                    let tolerance = results.settings.tolerance;
+                    wavefronts::field_wavefronts(model, spots, tolerance, interrupted)
+                },
+                slot: |analyses| &mut analyses.wavefronts,
+                known: None,
+            },
+        }
+    }
+
+    fn publish(&mut self, results: AnalysisResults, output: &AnalysisOutput) -> AnalysisResults {
+        let results = self.ghosts.publish(results, output);
+        let results = self.spot_map.publish(results, output);
+        let results = self.contrasts.publish(results, output);
+        self.wavefronts.publish(results, output)
+    }
+}
+
+/// The number of columns of a map of the field.
+const MAP_COLUMNS: usize = 21;
+/// The number of points on the edge of a footprint.
+const FOOTPRINT_POINTS: usize = 72;
+/// The tolerance of what is looked at in a map, and the rays that each number may take.
+const LOOKED_AT: Accuracy = Accuracy { tolerance: 1e-2, max_rays: 10_000 };
 
 /// Publishes the results of a request. `None` if it was interrupted.
 fn answer(
@@ -163,90 +249,6 @@ fn answer(
     *published = Some(now());
     output.publish(results.clone());
     Some(results)
-}
-
-/// Numbers of a lens that take long, with the settings on which they depend.
-struct KnownNumbers<T> {
-    lens: Arc<Lens>,
-    settings: AnalysisSettings,
-    numbers: T,
-}
-
-impl<T> KnownNumbers<T> {
-    fn new(results: &AnalysisResults, numbers: T) -> Self {
-        Self { lens: Arc::clone(&results.lens), settings: results.settings.clone(), numbers }
-    }
-
-    /// True if these are the numbers that results need.
-    fn serve(&self, results: &AnalysisResults) -> bool {
-        let (own, other) = (&self.settings, &results.settings);
-        Arc::ptr_eq(&self.lens, &results.lens)
-            && own.zoom == other.zoom
-            && own.tolerance == other.tolerance
-            && own.overrides == other.overrides
-    }
-}
-
-/// Publishes the results once more with the contrast of the fields if a panel shows it, unless another
-/// request interrupts that: where the image is blurred it takes longer than all else. What is known from
-/// before is not computed again because another panel is opened.
-fn publish_contrasts(
-    mut results: AnalysisResults,
-    output: &AnalysisOutput,
-    known: &mut Option<KnownNumbers<Timed<FieldContrasts>>>,
-) -> AnalysisResults {
-    if !results.settings.contrasts {
-        return results;
-    }
-    let mut found = known.take().filter(|known| known.serve(&results));
-    if found.is_none() && !output.is_interrupted() {
-        found = compute_contrasts(&results, output);
-    }
-    if let (Ok(analyses), Some(found)) = (&mut results.analyses, &found) {
-        analyses.contrasts = Some(found.numbers.clone());
-        output.publish(results.clone());
-    }
-    *known = found;
-    results
-}
-
-/// The contrast of the fields of a lens that was analysed; `None` if it was interrupted.
-fn compute_contrasts(
-    results: &AnalysisResults,
-    output: &AnalysisOutput,
-) -> Option<KnownNumbers<Timed<FieldContrasts>>> {
-    let analyses = results.analyses.as_ref().ok()?;
-    let (model, spots) = (&analyses.ray_model.value, &analyses.spots.value);
-    let tolerance = results.settings.tolerance;
-    let interrupted = output.interruption();
-    let found = time(|| contrast::field_contrasts(model, spots, tolerance, interrupted));
-    let contrasts = Timed { value: found.value?, ms: found.ms };
-    Some(KnownNumbers::new(results, contrasts))
-}
-
-/// Publishes the results once more with the wavefronts of the fields, as their contrasts are.
-fn publish_wavefronts(
-    mut results: AnalysisResults,
-    output: &AnalysisOutput,
-    known: &mut Option<KnownNumbers<Arc<Timed<FieldWavefronts>>>>,
-) -> AnalysisResults {
-    if !results.settings.wavefronts {
-        return results;
-    }
-    let mut found = known.take().filter(|known| known.serve(&results));
-    if let (None, Ok(analyses), false) = (&found, &results.analyses, output.is_interrupted()) {
-        let (model, spots) = (&analyses.ray_model.value, &analyses.spots.value);
-        let (tolerance, interrupted) = (results.settings.tolerance, output.interruption());
-        let timed = time(|| wavefronts::field_wavefronts(model, spots, tolerance, interrupted));
-        let timed = timed.value.map(|value| Arc::new(Timed { value, ms: timed.ms }));
-        found = timed.map(|wavefronts| KnownNumbers::new(&results, wavefronts));
-    }
-    if let (Ok(analyses), Some(found)) = (&mut results.analyses, &found) {
-        analyses.wavefronts = Some(Arc::clone(&found.numbers));
-        output.publish(results.clone());
-    }
-    *known = found;
-    results
 }
 
 /// Publishes the results once more with the lens as it is made if a panel shows it and no request
@@ -381,6 +383,12 @@ impl Analyses {
             })
         });
         unless_interrupted()?;
+        let footprints = settings.footprints.then(|| {
+            let edge = |field| analysis::footprints(&b, field, b.primary, FOOTPRINT_POINTS);
+            time(|| for_each_field(&b, edge))
+        });
+        let ghost_rays = ghosts::ghost_rays(&b, settings);
+        unless_interrupted()?;
         Some(Self {
             seidel: time(|| b.seidel()),
             airy: analysis::airy_radius(&b),
@@ -397,6 +405,10 @@ impl Analyses {
             as_built: None,
             fans,
             field_curves,
+            footprints,
+            spot_map: None,
+            ghosts: None,
+            ghost_rays,
         })
     }
 }
@@ -472,6 +484,21 @@ pub struct AnalysisSettings {
     /// shows them.
     #[serde(default)]
     pub field_curves: bool,
+    /// True if the footprints are computed, because a panel shows them.
+    #[serde(default)]
+    pub footprints: bool,
+    /// True if the spot is computed over the whole field, because a panel shows it.
+    #[serde(default)]
+    pub spot_map: bool,
+    /// True if the ghosts are computed, because a panel shows them.
+    #[serde(default)]
+    pub ghosts: bool,
+    /// The coating of the surfaces that make ghosts.
+    #[serde(default)]
+    pub coating: Coating,
+    /// The surfaces of the first and of the second reflection of the ghost that the layout shows.
+    #[serde(default)]
+    pub ghost: Option<[usize; 2]>,
     /// True if the picture of a scene is computed, because a panel shows it.
     #[serde(default)]
     pub picture: bool,
@@ -506,6 +533,11 @@ impl Default for AnalysisSettings {
             wavefronts: false,
             fans: false,
             field_curves: false,
+            footprints: false,
+            spot_map: false,
+            ghosts: false,
+            coating: Coating::default(),
+            ghost: None,
             picture: false,
             scene: BuiltInScene::default(),
             picture_errors: false,

@@ -1,8 +1,8 @@
 //! The wavefront of every field at the primary wavelength, and what diffraction makes of a point.
 
 use crate::analysis::{
-    self, AnalysisError, Estimate, Spot, Strehl, Wavefront, ZernikeOrder, ZernikeSum,
-    encircled_energy, field_paths, point_spread, strehl, zernike,
+    self, AnalysisError, Estimate, Spot, SquareGrid, Strehl, Wavefront, ZernikeOrder, ZernikeSum,
+    encircled_energy, grid_nodes, path_map, point_spread, strehl, zernike,
 };
 use crate::lens::FieldPoint;
 use crate::pupil::{Accuracy, RayModel};
@@ -23,7 +23,7 @@ pub struct FieldWavefront {
     /// Its mean square against the reference sphere.
     pub wavefront: Wavefront,
     /// The path differences over the square about the pupil, in wavelengths.
-    pub map: GridValues<Option<f64>>,
+    pub map: SquareGrid<Option<f64>>,
     /// The Zernike coefficients in Noll's order, or the reason why there are none.
     pub zernike: Result<ZernikeSum, AnalysisError>,
     /// The image of a point, or the reason why there is none.
@@ -36,24 +36,13 @@ pub struct PointImage {
     /// The Strehl ratios.
     pub strehl: Strehl,
     /// The intensity over that of a perfect peak, about the image point of the chief ray.
-    pub intensity: GridValues<f64>,
+    pub intensity: SquareGrid<f64>,
     /// The largest error of an intensity.
     pub error: f64,
     /// The share of the light within circles about the same point, and their radii in mm.
     pub energy: Vec<(f64, Estimate)>,
     /// The number of rays.
     pub rays: usize,
-}
-
-/// Numbers on a square grid, row by row from below.
-#[derive(Debug, Clone)]
-pub struct GridValues<T> {
-    /// The number of columns and of rows.
-    pub count: usize,
-    /// The place of the last column: 1 at the rim of the pupil, mm in the image.
-    pub half_width: f64,
-    /// The numbers.
-    pub values: Vec<T>,
 }
 
 /// The number of columns of a map of the pupil.
@@ -99,14 +88,7 @@ fn field_wavefront(
     interrupted: &impl Fn() -> bool,
 ) -> Result<FieldWavefront, AnalysisError> {
     let wavefront = analysis::wavefront(model, field, model.primary, accuracy)?;
-    let places = places(MAP, 1.0);
-    let (_, paths) = field_paths(model, field, model.primary, &places)?;
-    let is_lit = |place: &[f64; 2]| place[0].hypot(place[1]) <= 1.0;
-    let waves = places
-        .iter()
-        .zip(paths)
-        .map(|(place, path)| path.ok().filter(|_| is_lit(place)).map(|path| path.waves));
-    let map = GridValues { count: MAP, half_width: 1.0, values: waves.collect() };
+    let map = path_map(model, field, model.primary, MAP)?;
     let order = (ZernikeOrder::Noll, TERMS);
     let zernike = zernike(model, field, model.primary, order, accuracy);
     let image = if interrupted() {
@@ -123,14 +105,14 @@ fn point_image(
     half_width: f64,
 ) -> Result<PointImage, AnalysisError> {
     let w = model.primary;
-    let spread = point_spread(model, field, w, &places(IMAGE, half_width), LOOKED_AT)?;
+    let spread = point_spread(model, field, w, &grid_nodes(IMAGE, half_width), LOOKED_AT)?;
     let part = |k: usize| half_width * (k + 1) as f64 / CIRCLES as f64;
     let radii: Vec<f64> = (0..CIRCLES).map(part).collect();
     let energy = encircled_energy(model, field, w, [0.0; 2], &radii, LOOKED_AT)?;
     let values = spread.intensities.iter().map(|intensity| intensity.value).collect();
     Ok(PointImage {
         strehl: strehl(model, field, w, LOOKED_AT)?,
-        intensity: GridValues { count: IMAGE, half_width, values },
+        intensity: SquareGrid { count: IMAGE, half_width, values },
         error: spread.intensities.iter().map(|intensity| intensity.error).fold(0.0, f64::max),
         energy: radii.into_iter().zip(energy).collect(),
         rays: spread.strehl.rays,
@@ -144,10 +126,4 @@ fn half_width(model: &RayModel, spot: &Result<Spot, AnalysisError>) -> f64 {
     let color = spot.as_ref().ok().and_then(|spot| spot.channels.get(model.primary)?.as_ref().ok());
     let rms = color.map_or(0.0, |color| color.rms.value);
     (WIDTH[1] * rms).min(WIDEST * unit).max(WIDTH[0] * unit)
-}
-
-/// The nodes of a square grid about zero, row by row from below.
-fn places(count: usize, half_width: f64) -> Vec<[f64; 2]> {
-    let at = move |i: usize| half_width * (2.0 * i as f64 / (count - 1) as f64 - 1.0);
-    (0..count).flat_map(|j| (0..count).map(move |i| [at(i), at(j)])).collect()
 }

@@ -7,6 +7,8 @@ mod effects;
 mod fans;
 mod field_curves;
 mod first_order;
+mod footprint;
+mod ghosts;
 mod glass;
 pub(super) mod grin;
 mod history;
@@ -20,6 +22,7 @@ mod search;
 mod seidel;
 mod specification;
 mod spot;
+mod spot_map;
 mod system;
 mod tolerances;
 mod wavefront;
@@ -31,6 +34,8 @@ pub use effects::EffectsPanel;
 pub use fans::FansPanel;
 pub use field_curves::FieldCurvesPanel;
 pub use first_order::FirstOrderPanel;
+pub use footprint::FootprintPanel;
+pub use ghosts::GhostsPanel;
 pub use glass::GlassPanel;
 pub use grin::GrinPanel;
 pub use history::HistoryPanel;
@@ -46,6 +51,7 @@ pub use search::SearchPanel;
 pub use seidel::SeidelPanel;
 pub use specification::SpecificationPanel;
 pub use spot::SpotPanel;
+pub use spot_map::SpotMapPanel;
 pub use system::SystemPanel;
 pub use tolerances::TolerancesPanel;
 pub use wavefront::WavefrontPanel;
@@ -100,6 +106,12 @@ pub enum PanelKind {
     Fans,
     /// Distortion, field curvature and illumination over the field.
     FieldCurves,
+    /// The edge of every field's beam on a surface.
+    Footprint,
+    /// The spot over the whole field.
+    SpotMap,
+    /// Light that two surfaces reflect.
+    Ghosts,
     /// A scene seen through the lens.
     Picture,
     /// The glasses of all catalogues.
@@ -130,7 +142,7 @@ pub enum PanelKind {
 
 impl PanelKind {
     /// Every panel. A new one is a file in this folder, an entry here and a place in the window.
-    pub const ALL: [Self; 22] = [
+    pub const ALL: [Self; 25] = [
         Self::Layout,
         Self::Slice,
         Self::Prescription,
@@ -140,6 +152,9 @@ impl PanelKind {
         Self::Wavefront,
         Self::Fans,
         Self::FieldCurves,
+        Self::Footprint,
+        Self::SpotMap,
+        Self::Ghosts,
         Self::Picture,
         Self::Glass,
         Self::Specification,
@@ -167,6 +182,9 @@ impl PanelKind {
             Self::Wavefront => Box::new(WavefrontPanel::default()),
             Self::Fans => Box::new(FansPanel),
             Self::FieldCurves => Box::new(FieldCurvesPanel),
+            Self::Footprint => Box::new(FootprintPanel::default()),
+            Self::SpotMap => Box::new(SpotMapPanel::default()),
+            Self::Ghosts => Box::new(GhostsPanel::default()),
             Self::Picture => Box::new(PicturePanel::default()),
             Self::Glass => Box::new(GlassPanel::default()),
             Self::Specification => Box::new(SpecificationPanel::default()),

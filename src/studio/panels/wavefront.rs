@@ -10,10 +10,10 @@ use egui_plot::{Line, PlotPoints};
 
 use super::widgets::{fixed_plot, swatch};
 use super::{Panel, displayed_results, field_name, relative_error, show_missing_results};
-use crate::analysis::{AnalysisError, Estimate, ZernikeOrder, aberration_name};
+use crate::analysis::{AnalysisError, Estimate, SquareGrid, ZernikeOrder, aberration_name};
 use crate::lens::Fields;
 use crate::session::{
-    AnalysisResults, FieldWavefront, FieldWavefronts, GridValues, PointImage, SessionView, Timed,
+    AnalysisResults, FieldWavefront, FieldWavefronts, PointImage, SessionView, Timed,
 };
 use crate::studio::actions::Actions;
 use crate::studio::cached::{ByAddress, Cached};
@@ -148,7 +148,8 @@ impl WavefrontPanel {
         let room = ui.available_size() - vec2(0.0, WORDS);
         let side = (room.x / count - GAP).min(room.y).clamp(SIDE[0], SIDE[1]);
         ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
-            ui.horizontal_wrapped(|ui| {
+            let from_top = Layout::left_to_right(Align::Min).with_main_wrap(true);
+            ui.with_layout(from_top, |ui| {
                 ui.spacing_mut().item_spacing = vec2(GAP, 4.0);
                 for (i, (texture, field)) in textures.iter().zip(&waves.value.fields).enumerate() {
                     cell(ui, (fields, i), (style.page, field, texture.as_ref()), side);
@@ -196,12 +197,12 @@ fn picture(field: &FieldWavefront, style: PictureStyle) -> Option<ColorImage> {
 }
 
 /// The largest size of a path difference.
-fn largest(map: &GridValues<Option<f64>>) -> f64 {
+fn largest(map: &SquareGrid<Option<f64>>) -> f64 {
     map.values.iter().flatten().map(|waves| waves.abs()).fold(0.0, f64::max)
 }
 
 /// The pixels of a grid, the highest row first.
-fn raster<T>(grid: &GridValues<T>, color: impl Fn(&T) -> Option<Color32>) -> ColorImage {
+fn raster<T>(grid: &SquareGrid<T>, color: impl Fn(&T) -> Option<Color32>) -> ColorImage {
     let count = grid.count;
     let pixel = |n: usize| {
         let value = &grid.values[(count - 1 - n / count) * count + n % count];

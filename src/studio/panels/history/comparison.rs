@@ -87,31 +87,25 @@ fn numbers(view: &SessionView, selected: &HistoryNode) -> Vec<ComparedNumber> {
     found
 }
 
-/// Radii and thicknesses that differ, of lenses with as many surfaces.
+/// The numbers that differ, of lenses with as many surfaces; a curvature as its radius.
 fn differing_parameters(present: &Lens, selected: &Lens) -> Vec<ComparedNumber> {
     if present.surfaces.len() != selected.surfaces.len() {
         return Vec::new();
     }
-    let mut found = Vec::new();
-    for surface in 0..present.surfaces.len() {
-        for quantity in [
-            Quantity::Curvature,
-            Quantity::Thickness,
-            Quantity::Conic,
-            Quantity::SemiDiameter,
-            Quantity::Index,
-        ] {
-            let parameter = Parameter::new(surface, quantity);
-            let values = present.get(parameter).zip(selected.get(parameter));
-            let Some((old, new)) = values.filter(|(old, new)| old != new) else { continue };
-            let is_radius = quantity == Quantity::Curvature;
-            let shown = |value: f64| if is_radius { number::radius(value) } else { value };
-            let name = parameter.to_string();
-            let name = if is_radius { name.replacen("curvature", "radius", 1) } else { name };
-            found.push(ComparedNumber { name, present: shown(old), selected: shown(new) });
-        }
-    }
-    found
+    let mut parameters = present.parameters();
+    parameters.extend(selected.parameters());
+    parameters.sort_unstable();
+    parameters.dedup();
+    let differing = |parameter: Parameter| {
+        let values = present.get(parameter).zip(selected.get(parameter));
+        let (old, new) = values.filter(|(old, new)| old != new)?;
+        let is_radius = parameter.quantity == Quantity::Curvature;
+        let shown = |value: f64| if is_radius { number::radius(value) } else { value };
+        let name = parameter.to_string();
+        let name = if is_radius { name.replacen("curvature", "radius", 1) } else { name };
+        Some(ComparedNumber { name, present: shown(old), selected: shown(new) })
+    };
+    parameters.into_iter().filter_map(differing).collect()
 }
 
 /// Glasses and counts that differ.

@@ -19,8 +19,10 @@ use crate::studio::actions::Actions;
 use crate::studio::text_input::{EditBuffers, InputPlacement, TextInput};
 use crate::studio::thumbnails::Thumbnails;
 
-/// The height of the part about the selected version.
-const DETAILS_HEIGHT: f32 = 190.0;
+/// The least and the first height of the part about the selected version.
+const DETAILS_HEIGHT: [f32; 2] = [120.0, 230.0];
+/// The largest share of the panel that it takes.
+const DETAILS_SHARE: f32 = 0.75;
 
 /// The panel.
 #[derive(Debug, Default)]
@@ -40,10 +42,12 @@ impl Panel for HistoryPanel {
 
     fn ui(&mut self, ui: &mut Ui, view: &SessionView, actions: &mut Actions) {
         let selected = self.selected.and_then(|id| node(view, id));
-        let height = DETAILS_HEIGHT.min(0.6 * ui.available_height());
+        let [least, first] = DETAILS_HEIGHT;
+        let most = (DETAILS_SHARE * ui.available_height()).max(least);
         let frame = Frame::new().inner_margin(Margin { top: 4, ..Margin::ZERO });
         let side = Side::bottom("selected version").frame(frame).show_separator_line(true);
-        side.exact_size(height).show(ui, |ui| {
+        let side = side.resizable(true).default_size(first.min(most)).size_range(least..=most);
+        side.show(ui, |ui| {
             ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| match selected {
                 Some(selected) => self.details(ui, view, selected, actions),
                 None => drop(ui.weak("Click a version to compare it with the present one.")),

@@ -163,6 +163,16 @@ impl LayoutPanel {
                 lost_rays_menu(ui, text, &drawing.clipping, &view.lens, actions);
             }
         }
+        if let Some([first, second]) = view.settings.ghost {
+            let color = color32(palette.worse);
+            swatch(ui, color);
+            let text = format!("ghost {}, {}", first + 1, second + 1);
+            let hint = "Light along the axis that two surfaces reflect; click to hide it";
+            let label = ui.button(RichText::new(text).color(color)).on_hover_text(hint);
+            if label.clicked() {
+                actions.push(Command::Show(PanelSetting::Ghost(None)));
+            }
+        }
         if drawing.added_glass > 0 {
             swatch(ui, color32(palette.added_glass).to_opaque());
             ui.label("new glass").on_hover_text("Glass that the design does not have");
@@ -245,6 +255,10 @@ impl LayoutDrawing {
         let added = added.unwrap_or_default();
         section.draw_glass(&mut scene, &palette, &added);
         layout.rays.iter().for_each(|ray| draw_ray(&mut scene, ray, &palette));
+        for ray in &numbers.ghost_rays {
+            let points: Vec<DVec2> = ray.iter().map(|p| DVec2::new(p.z, p.y)).collect();
+            scene.polyline(&points, 1.2, palette.worse);
+        }
         section.draw_outlines(&mut scene, &palette);
         draw_image(&mut scene, &section, layout, &palette);
         Some(Self {

@@ -3,8 +3,8 @@
 use egui::{Align, Button, Layout, RichText, Ui};
 
 use crate::lens::{
-    Aperture, Edit, FREEFORM_NUMBERS, FieldKind, FieldPoint, Fields, Lens, PROFILE_TERMS,
-    Parameter, Quantity, SurfaceNumber, ZoomPosition,
+    Aperture, Edit, FieldKind, FieldPoint, Fields, Lens, Parameter, Quantity, SurfaceNumber,
+    ZoomPosition,
 };
 use crate::paraxial::{Beam, first_order};
 use crate::session::Command;
@@ -264,12 +264,13 @@ fn vary_submenu(
 fn other_numbers(lens: &Lens, surface: usize) -> Vec<(usize, Quantity)> {
     let row = &lens.surfaces[surface];
     let is_aperture = row.stop && matches!(lens.aperture, Aperture::StopSemiDiameter(_));
-    let rim = (!is_aperture).then_some(Quantity::SemiDiameter);
-    let plain = [Quantity::Conic, Quantity::Index].into_iter().chain(rim);
-    let terms = (0..row.asphere.len()).map(Quantity::Asphere);
-    let freeform = (0..FREEFORM_NUMBERS).map(Quantity::Freeform);
-    let all = plain.chain(terms).chain(freeform).chain((0..PROFILE_TERMS).map(Quantity::Grin));
-    all.filter(|quantity| row.get(*quantity).is_some()).map(|q| (surface, q)).collect()
+    let is_other = |quantity: &Quantity| match quantity {
+        Quantity::Curvature | Quantity::Thickness => false,
+        Quantity::SemiDiameter => !is_aperture,
+        _ => true,
+    };
+    let others = row.quantities().into_iter().filter(is_other);
+    others.map(|quantity| (surface, quantity)).collect()
 }
 
 fn vary_item(
