@@ -6,9 +6,15 @@ use crate::pupil::{Accuracy, RayModel};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 
-/// The RMS spot radius in mm over the square about the disc of the farthest field, in the unit of the
-/// fields; `None` beside the disc, and an error where no light arrives.
-pub type SpotMap = SquareGrid<Option<Result<Estimate, AnalysisError>>>;
+/// The spot over the whole field.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SpotMap {
+    /// The RMS spot radius in mm over the square about the disc of the farthest field, in the unit of
+    /// the fields; `None` beside the disc, and an error where no light arrives.
+    pub grid: SquareGrid<Option<Result<Estimate, AnalysisError>>>,
+    /// The number of rays.
+    pub rays: usize,
+}
 
 /// The spot radius of the fields of a square grid with an odd number of columns. Fields at the same
 /// distance from the axis of a lens with rotational symmetry have the same spot.
@@ -49,7 +55,8 @@ pub fn spot_map(
     let found = found?;
     let value = |step: &[i64; 2]| is_inside(&step).then(|| found[&key(step)]);
     let values = steps.iter().map(value).collect();
-    Ok(SquareGrid { count, half_width: farthest, values })
+    let rays = found.values().flatten().map(|radius| radius.rays).sum();
+    Ok(SpotMap { grid: SquareGrid { count, half_width: farthest, values }, rays })
 }
 
 /// The columns and the rows of the nodes of a square grid, counted from its centre.
@@ -68,14 +75,14 @@ fn field_at([x, y]: &[i64; 2], step: f64, symmetric: bool) -> FieldPoint {
 
 #[cfg(test)]
 mod tests {
-    use super::super::grid_nodes;
     use super::*;
-    use crate::files;
+    use crate::analysis::grid_nodes;
 
     fn model(change: impl Fn(&mut crate::lens::Lens)) -> RayModel {
-        let bundled = files::bundled_lenses().iter().find(|lens| lens.name == "tessar_50_f28");
+        let bundled =
+            crate::files::bundled_lenses().iter().find(|lens| lens.name == "tessar_50_f28");
         let bundled = bundled.unwrap();
-        let mut lens = files::parse(bundled.text.as_bytes(), bundled.name).unwrap().lens;
+        let mut lens = crate::files::parse(bundled.text.as_bytes(), bundled.name).unwrap().lens;
         change(&mut lens);
         RayModel::from_lens(&lens, 0).unwrap()
     }
@@ -86,7 +93,7 @@ mod tests {
         let accuracy = Accuracy { tolerance: 1e-4, ..Accuracy::default() };
         let tilted = model(|lens| lens.surfaces[2].tilt = [0.0, 0.5]);
         for model in [model(|_| {}), tilted] {
-            let map = spot_map(&model, 5, accuracy, || false).unwrap();
+            let map = spot_map(&model, 5, accuracy, || false).unwrap().grid;
             let edge = map.half_width;
             for (node, value) in grid_nodes(5, edge).into_iter().zip(&map.values) {
                 let [x, y] = node;

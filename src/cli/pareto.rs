@@ -7,7 +7,7 @@ use super::input::{LensFile, Tolerance};
 use super::output::{Output, ShortNumber, TextTable, print_note, write_saved};
 use super::output_paths::{OutputPaths, stale_note};
 use super::progress::{progress_bar, stop_flag};
-use crate::lens::Lens;
+use crate::lens::{Lens, ToleranceGrade};
 use crate::measure::time_ms;
 use crate::merit::PupilEdge;
 use crate::optimize::DescentMethod;
@@ -57,6 +57,11 @@ pub(super) struct ParetoArgs {
     #[arg(long, default_value = "1e-3", value_name = "TOLERANCE")]
     error: Tolerance,
 
+    /// Compares lenses as they are built, with this class of care in making; absent: as the merit
+    /// function of the lens says, or else as designed
+    #[arg(long, value_enum, value_name = "GRADE")]
+    as_built: Option<ToleranceGrade>,
+
     /// Omits the comparison with biased derivatives, which hold the transmitted rays fixed
     #[arg(long)]
     no_biased: bool,
@@ -81,7 +86,9 @@ impl ParetoArgs {
         let search = |pupil| self.search(&lens, pupil, &stop).map_err(refuse);
         let effects = design.report(&opened.lens, &opened.file)?;
         let (sweep, ms) = search(PupilEdge::Moving)?;
-        let biased = if self.no_biased { None } else { Some(search(PupilEdge::Frozen)?) };
+        let is_as_built = sweep.start.as_built.is_some();
+        let with_biased = !self.no_biased && !is_as_built;
+        let biased = if with_biased { Some(search(PupilEdge::Frozen)?) } else { None };
         let stopped = stop.load(Ordering::Relaxed);
         let mut report = ParetoSweepReport::new(&sweep, ms, biased.as_ref(), stopped, effects);
         let mut failures = Failures::default();
@@ -150,6 +157,7 @@ impl ParetoArgs {
             steps: asked.unwrap_or(if few { SECOND_ORDER_STEPS } else { default.steps }),
             pupil,
             light: [self.light[0], self.light[1]],
+            as_built: self.as_built,
             tolerance: self.error.0,
             ..default
         }
@@ -249,8 +257,12 @@ impl Display for ParetoSweepReport<'_> {
             writeln!(f, "{hypervolume:.4}; {dominated} of them are dominated")?;
         }
         writeln!(f)?;
-        let mut table =
-            TextTable::new(&["rms spot, um", "error", "light, mm^2", "error", "asked for", "rays"]);
+        let is_as_built = self.start.as_built.is_some();
+        let made = if is_as_built { "as built, um" } else { "" };
+        let head = ["rms spot, um", "error", made, "light, mm^2", "error", "asked for", "rays"];
+        let shown = |i: &usize| is_as_built || *i != 2;
+        let columns: Vec<usize> = (0..head.len()).filter(shown).collect();
+        let mut table = TextTable::new(&columns.iter().map(|i| head[*i]).collect::<Vec<_>>());
         let every = count.div_ceil(MAX_LISTED).max(1);
         for point in std::iter::once(self.start).chain(front.iter().step_by(every)) {
             let asked = match (point.weight, point.min_light) {
@@ -258,14 +270,16 @@ impl Display for ParetoSweepReport<'_> {
                 (None, Some(light)) => format!("{light:.3} mm^2"),
                 (None, None) => "start".to_owned(),
             };
-            table.row([
+            let cells = [
                 format!("{:.3}", 1e3 * point.spot),
                 format!("{:.0e}", 1e3 * point.spot_error),
+                format!("{:.3}", 1e3 * point.radius()),
                 format!("{:.3}", point.light),
                 format!("{:.0e}", point.light_error),
                 asked,
                 point.rays.to_string(),
-            ]);
+            ];
+            table.row(columns.iter().map(|i| cells[*i].clone()));
         }
         write!(f, "{table}\n{}", self.effects)?;
         if let Some(first) = self.files.first() {

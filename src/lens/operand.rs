@@ -40,6 +40,9 @@ pub enum OperandKind {
     ThirdOrderDistortion,
     /// The distance from the paraxial image at the longest wavelength to that at the shortest, in mm.
     AxialColor,
+    /// The distance from the middle between the paraxial images at the shortest and the longest
+    /// wavelength to that at the primary one, in mm: what is left of axial colour where these two agree.
+    SecondarySpectrum,
     /// The distance from the image point of a chief ray at the longest wavelength to that at the
     /// shortest, in mm.
     LateralColor,
@@ -47,7 +50,7 @@ pub enum OperandKind {
 
 impl OperandKind {
     /// All kinds, in the order in which an editor lists them.
-    pub const ALL: [Self; 14] = [
+    pub const ALL: [Self; 15] = [
         Self::Gap,
         Self::Track,
         Self::Sag,
@@ -61,6 +64,7 @@ impl OperandKind {
         Self::PetzvalCurvature,
         Self::ThirdOrderDistortion,
         Self::AxialColor,
+        Self::SecondarySpectrum,
         Self::LateralColor,
     ];
 
@@ -80,6 +84,7 @@ impl OperandKind {
             Self::PetzvalCurvature => "petzval_curvature",
             Self::ThirdOrderDistortion => "third_order_distortion",
             Self::AxialColor => "axial_color",
+            Self::SecondarySpectrum => "secondary_spectrum",
             Self::LateralColor => "lateral_color",
         }
     }
@@ -114,7 +119,7 @@ impl OperandKind {
                 &[Surfaces, Fields, Wavelengths, Zooms]
             }
             Self::Telecentricity | Self::LateralColor => &[Fields, Wavelengths, Zooms],
-            Self::AxialColor => &[Wavelengths, Zooms],
+            Self::AxialColor | Self::SecondarySpectrum => &[Wavelengths, Zooms],
             // Distances, sags and third-order sums.
             _ => &[Surfaces, Zooms],
         }

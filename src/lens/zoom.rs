@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 pub struct ZoomPosition {
     /// The name of the position.
     pub name: String,
-    /// The numbers that differ, at most one for a quantity of a row.
+    /// The numbers that differ, at most one for a quantity of a row; thicknesses first, as in a file.
     pub numbers: Vec<ZoomNumber>,
     /// The aperture at this position, if it differs.
     pub aperture: Option<Aperture>,
@@ -49,10 +49,15 @@ impl ZoomPosition {
 
     /// Gives a quantity a number of its own.
     pub fn set_number(&mut self, surface: usize, quantity: Quantity, value: f64) {
-        match self.numbers.iter_mut().find(|own| own.is(surface, quantity)) {
-            Some(own) => own.value = value,
-            None => self.numbers.push(ZoomNumber { surface, quantity, value }),
+        if let Some(own) = self.numbers.iter_mut().find(|own| own.is(surface, quantity)) {
+            own.value = value;
+            return;
         }
+        let own = ZoomNumber { surface, quantity, value };
+        let is_gap = |own: &ZoomNumber| own.quantity == Quantity::Thickness;
+        let gaps = self.numbers.partition_point(is_gap);
+        let at = if is_gap(&own) { gaps } else { self.numbers.len() };
+        self.numbers.insert(at, own);
     }
 
     /// Makes a quantity that of the prescription.

@@ -144,7 +144,10 @@ impl Operand<'_> {
 
     /// The wavelengths at which a chief ray is traced by itself.
     fn wavelengths(&self) -> Vec<Option<usize>> {
-        let compares = matches!(self.kind, OperandKind::LateralColor | OperandKind::AxialColor);
+        let compares = matches!(
+            self.kind,
+            OperandKind::LateralColor | OperandKind::AxialColor | OperandKind::SecondarySpectrum
+        );
         match self.scope.wavelengths {
             Some([first, last]) if !compares => (first..=last).map(Some).collect(),
             _ => vec![None],
@@ -170,6 +173,17 @@ impl Operand<'_> {
                 let object = self.context.zoom.object;
                 paraxial_image_distance(&systems[short], object)
                     - paraxial_image_distance(&systems[long], object)
+            }
+            OperandKind::SecondarySpectrum => {
+                let [short, long] = self.outer_wavelengths();
+                let primary = self.context.zoom.primary;
+                if [short, long].contains(&primary) {
+                    let why = "the primary wavelength is not between two others";
+                    return Err(MeritError::DoesNotApply { term: self.kind.name(), why });
+                }
+                let [short, middle, long] = [short, primary, long]
+                    .map(|i| paraxial_image_distance(&systems[i], self.context.zoom.object));
+                middle - (short + long) * R::from_f64(0.5)
             }
             OperandKind::LateralColor => {
                 let [short, long] = self.outer_wavelengths();

@@ -29,8 +29,7 @@ pub struct ParetoReport<'a> {
 }
 
 /// The head of the table.
-const HEAD: &str =
-    "spot_mm,spot_error_mm,light_mm2,light_error_mm2,weight_mm2,min_light_mm2,rays,file\n";
+const HEAD: &str = "spot_mm,spot_error_mm,light_mm2,light_error_mm2,weight_mm2,min_light_mm2,as_built_mm,rays,file\n";
 /// The width and height of the plot in pixels, and its margins: left, top, right, bottom.
 const SIZE: [u32; 2] = [1000, 720];
 const MARGINS: [f64; 4] = [110.0, 200.0, 40.0, 90.0];
@@ -92,7 +91,8 @@ impl ParetoReport<'_> {
         for (file, design) in self.lenses() {
             let ParetoPoint { spot, spot_error, light, light_error, rays, .. } = design;
             let number = |value: Option<f64>| value.map(|v| v.to_string()).unwrap_or_default();
-            let asked = [design.weight, design.min_light].map(number).join(",");
+            let as_built = design.as_built.map(|as_built| as_built.value);
+            let asked = [design.weight, design.min_light, as_built].map(number).join(",");
             let numbers = format!("{spot},{spot_error},{light},{light_error},{asked},{rays}");
             text.extend([numbers.as_str(), ",", file.as_str(), "\n"]);
         }
@@ -115,7 +115,8 @@ impl ParetoReport<'_> {
         let mut canvas = Canvas::new(SIZE);
         let (front, start) = (places(self.front.points()), place(self.start));
         let biased = places(self.biased.map_or(&[], Front::points));
-        let chart = chart(&[&front, &biased, &[start]]);
+        let is_as_built = self.start.as_built.is_some();
+        let chart = chart(&[&front, &biased, &[start]], is_as_built);
         let room = SIZE[0] as usize - 20;
         let name = shortened(self.name, Canvas::letters(room));
         canvas.text(NAME, &name, BLACK, TextAlign::Middle);
@@ -159,10 +160,11 @@ fn shortened(text: &str, letters: usize) -> String {
 }
 
 /// The chart, with axes that contain the fronts and the start but not all lenses evaluated.
-fn chart(shown: &[&[[f64; 2]]]) -> Chart {
+fn chart(shown: &[&[[f64; 2]]], is_as_built: bool) -> Chart {
+    let radius = if is_as_built { "RMS spot as built, um" } else { "RMS spot, um" };
     let all = || shown.iter().flat_map(|points| points.iter());
     let x = Axis::linear("light, mm^2", all().map(|point| point[0]));
-    let y = Axis::linear("RMS spot, um", all().map(|point| point[1]).chain([0.0]));
+    let y = Axis::linear(radius, all().map(|point| point[1]).chain([0.0]));
     let [left, top, right, bottom] = MARGINS;
     let [width, height] = SIZE.map(f64::from);
     Chart::new([left, top], [width - right, height - bottom], x, y)
@@ -170,7 +172,7 @@ fn chart(shown: &[&[[f64; 2]]]) -> Chart {
 
 /// Light in mm² and spot in µm.
 fn place(design: &ParetoPoint) -> [f64; 2] {
-    [design.light, 1e3 * design.spot]
+    [design.light, 1e3 * design.radius()]
 }
 
 fn places(designs: &[ParetoPoint]) -> Vec<[f64; 2]> {

@@ -4,7 +4,9 @@ use super::clock::{Timed, time};
 use super::run::{BackgroundRun, Engine, EventSender, RunEvent, RunKind, RunStatus, RunView};
 use crate::lens::Lens;
 use crate::merit::PupilEdge;
-use crate::optimize::pareto::{Front, ParetoPoint, ParetoSettings, ParetoSweep, SweepProgress};
+use crate::optimize::pareto::{
+    Front, ParetoPoint, ParetoSettings, ParetoSweep, SweepProgress, as_built_term,
+};
 use crate::report::ParetoReport;
 use std::io;
 use std::path::PathBuf;
@@ -36,7 +38,7 @@ pub struct ParetoRun {
 pub struct ParetoPass {
     /// The front so far.
     pub front: Arc<Front>,
-    /// The spot in mm and the light in mm² of every lens that was evaluated.
+    /// The radius in mm and the light in mm² of every lens that was evaluated.
     pub evaluated: Arc<Vec<[f64; 2]>>,
     /// The hypervolume of the front, relative to twice the spot and the light of the first lens.
     pub hypervolume: f64,
@@ -140,7 +142,10 @@ impl ParetoEngine {
         let ParetoRequest { lens, settings, compare } = request;
         let sweep = ParetoSweep::new(&lens, &settings).map_err(|why| why.to_string())?;
         let state = ParetoRun {
-            compare: compare && settings.pupil != PupilEdge::Frozen,
+            // Weighted sums, which hold the rays fixed, know lenses as designed alone.
+            compare: compare
+                && settings.pupil != PupilEdge::Frozen
+                && as_built_term(&lens, &settings).is_none(),
             settings,
             lens,
             start: Arc::new(sweep.start.clone()),

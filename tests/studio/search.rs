@@ -71,6 +71,7 @@ fn found(number: u64, merit: f64) -> Arc<FoundLens> {
         min_light: None,
         spot: 0.5 * merit,
         spot_error: 1e-6,
+        as_built: None,
         light: 90.0,
         light_error: 1e-3,
         has_light: true,

@@ -3,8 +3,8 @@
 
 use super::merit::{bundled, check_term, step, vary};
 use aplanat::lens::{
-    Aperture, Edit, ElementEdit, Fields, Lens, ParameterKind, Quantity, Row, add_variables,
-    apply_edit,
+    Aperture, Edit, ElementEdit, Fields, Lens, Medium, ParameterKind, Quantity, Row, Wavelength,
+    add_variables, apply_edit, glass,
 };
 use aplanat::merit::{
     DerivativeLevel, Goal, LimitTreatment, Merit, MeritError, OperandKind, PupilEdge, Term,
@@ -87,6 +87,51 @@ fn angles_of_chief_rays_follow_from_the_law_of_refraction() {
     let image = values(&lens, OperandKind::Telecentricity, TermScope::ALL);
     assert_eq!(image, values(&lens, OperandKind::ChiefRayAngle, TermScope::ALL));
     assert_near(image[0], 0.0, 1e-12);
+}
+
+/// Two thin lenses in contact with powers φν₁/(ν₁ − ν₂) and −φν₂/(ν₁ − ν₂) have F and C in one focus,
+/// and d at (P₁ − P₂)/(ν₁ − ν₂) of the focal length from it (Kingslake, *Lens Design Fundamentals*, 2010,
+/// section 5.5), P being `(n_F − n_d)/(n_F − n_C)`.
+#[test]
+fn the_secondary_spectrum_of_a_thin_achromat_is_that_of_its_glasses() {
+    let mut lens = bundled("achromat_ac254_100");
+    lens.wavelengths = [0.4861327, 0.5875618, 0.6562725]
+        .map(|um| Wavelength { um, weight: 1.0, primary: um == 0.5875618 })
+        .to_vec();
+    lens.fields.values.truncate(1);
+    lens.variables.clear();
+    lens.aperture = Aperture::EntrancePupilDiameter(0.1);
+    let names = ["SCHOTT N-BK7", "SCHOTT N-SF5"];
+    let indices = names.map(|name| {
+        let glass = glass::find(name).unwrap();
+        lens.wavelengths.iter().map(|line| glass.index(line.um).unwrap()).collect::<Vec<_>>()
+    });
+    let abbe = |n: &[f64]| (n[1] - 1.0) / (n[0] - n[2]);
+    let partial = |n: &[f64]| (n[0] - n[1]) / (n[0] - n[2]);
+    let [v1, v2] = [abbe(&indices[0]), abbe(&indices[1])];
+    let focal = 100.0;
+    let bend = |power: f64, n: &[f64]| power / (n[1] - 1.0);
+    let [first, second] =
+        [bend(v1 / (v1 - v2) / focal, &indices[0]), bend(-v2 / (v1 - v2) / focal, &indices[1])];
+    let curvatures = [0.5 * first, -0.5 * first, -0.5 * first - second];
+    let media = [Medium::Glass(names[0].into()), Medium::Glass(names[1].into()), Medium::Air];
+    lens.surfaces = std::iter::zip(curvatures, media)
+        .map(|(curvature, medium)| Row { curvature, medium, thickness: 1e-6, ..Row::default() })
+        .collect();
+    lens.surfaces[0].stop = true;
+    lens.surfaces[2].thickness = focal;
+    let axial = values(&lens, OperandKind::AxialColor, TermScope::ALL)[0];
+    assert_near(axial, 0.0, 1e-4);
+    let expected = focal * (partial(&indices[0]) - partial(&indices[1])) / (v1 - v2);
+    let found = values(&lens, OperandKind::SecondarySpectrum, TermScope::ALL)[0];
+    assert_near(found, expected, 0.01 * expected.abs());
+
+    // Without a wavelength between two others there is none.
+    lens.wavelengths.truncate(2);
+    let terms = goal(vec![scoped(operand(OperandKind::SecondarySpectrum), TermScope::ALL)]);
+    let refused = Merit::new(&lens, &terms, 1e-3)
+        .and_then(|merit| merit.operand_margins(&merit.values(&lens)).map(drop));
+    assert!(matches!(refused, Err(MeritError::DoesNotApply { .. })), "{refused:?}");
 }
 
 /// A chief ray through a stop in the front focal plane leaves parallel to the axis, near the axis.

@@ -2,7 +2,7 @@
 
 use super::merit::bundled;
 use aplanat::lens::{FieldPoint, Lens, Parameter, Quantity, Variable, Wavelength};
-use aplanat::merit::{Goal, PupilEdge};
+use aplanat::merit::{Goal, Merit, PupilEdge};
 use aplanat::optimize::pareto::{
     Front, ParetoError, ParetoPoint, ParetoSettings, ParetoSweep, Scalarization,
 };
@@ -205,15 +205,48 @@ fn settings_without_meaning_and_lenses_without_light_are_refused() {
         let refused = ParetoSweep::new(&lens(), &settings).unwrap_err();
         assert!(matches!(refused, ParetoError::Settings { .. }), "{refused}");
     }
-    let mut made = lens();
-    let grade = Some(ToleranceGrade::Precision);
-    made.merit = Some(Goal::default_for(&made).unwrap().as_built(grade));
-    let refused = ParetoSweep::new(&made, &ParetoSettings::default()).unwrap_err();
-    assert!(refused.to_string().contains("the term `as_built`"), "{refused}");
     let mut dark = lens();
     dark.surfaces[0].semi_diameter = Some(0.0);
     assert!(matches!(
         ParetoSweep::new(&dark, &ParetoSettings::default()),
         Err(ParetoError::NoLight(_))
     ));
+}
+
+/// Lenses that are compared as built are in the order of what errors of making leave of their sharpness.
+#[test]
+fn a_front_of_lenses_as_built_compares_them_with_their_errors() {
+    let mut lens = bundled("tessar_50_f28");
+    lens.variables.clear();
+    lens.wavelengths.truncate(2);
+    lens.fields.values.truncate(2);
+    let grade = Some(ToleranceGrade::Commercial);
+    let light = [0.8, 1.2];
+    let few = ParetoSettings { points: 2, steps: 4, light, ..ParetoSettings::default() };
+    let settings = ParetoSettings { as_built: grade, ..few.clone() };
+    let mut sweep = ParetoSweep::new(&lens, &settings).unwrap();
+    while !sweep.step().finished {}
+    let designs = sweep.front().points();
+    assert!(designs.len() > 1);
+    for pair in designs.windows(2) {
+        assert!(pair[0].light < pair[1].light && pair[0].radius() < pair[1].radius());
+    }
+    for design in designs {
+        let made = design.as_built.unwrap();
+        assert!(made.value > design.spot && made.error < 1e-3 * made.value, "{made:?}");
+        let goal = Goal::default_for(&design.lens).unwrap().as_built(grade);
+        let merit = Merit::new(&design.lens, &goal, 1e-6).unwrap();
+        let terms = merit.terms(&merit.values(&design.lens)).unwrap();
+        let term = terms.iter().find(|term| term.term == "as_built").unwrap();
+        assert!((term.value.sqrt() / made.value - 1.0).abs() < 1e-3, "{} {made:?}", term.value);
+    }
+
+    // The merit function of a lens may ask for the same.
+    let mut asked = lens.clone();
+    asked.merit = Some(Goal::default_for(&asked).unwrap().as_built(grade));
+    let own = ParetoSweep::new(&asked, &few).unwrap();
+    assert_eq!(own.start.as_built, sweep.start.as_built);
+    let sums = ParetoSettings { as_built: grade, ..ParetoSettings::weighted_sum() };
+    let refused = ParetoSweep::new(&lens, &sums).unwrap_err();
+    assert_eq!(refused, ParetoError::AsBuilt);
 }

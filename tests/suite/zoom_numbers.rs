@@ -25,12 +25,12 @@ fn lens() -> Lens {
     let number = |surface, quantity, value| ZoomNumber { surface, quantity, value };
     let row = |i: usize| &lens.surfaces[i];
     let numbers = vec![
+        number(4, Quantity::Thickness, 1.1 * row(4).thickness),
         number(0, Quantity::Curvature, 1.02 * row(0).curvature),
         number(0, Quantity::Index, 1.58),
         number(3, Quantity::Conic, -0.05),
         number(9, Quantity::Asphere(0), -2e-7),
         number(8, Quantity::SemiDiameter, 0.9 * row(8).semi_diameter.unwrap()),
-        number(4, Quantity::Thickness, 1.1 * row(4).thickness),
     ];
     let near = ZoomPosition { numbers, ..ZoomPosition::default() };
     lens.zoom = vec![ZoomPosition::default(), near];
@@ -146,13 +146,14 @@ fn a_number_that_a_row_loses_is_lost_at_every_position() {
     // The size of a stop that is the aperture is one number, not two.
     let stop = lens.stop().unwrap();
     let mut limited = lens.clone();
+    limited.aperture = Aperture::EntrancePupilDiameter(9.0);
     limited.zoom[1].set_number(stop, Quantity::SemiDiameter, 5.0);
     limited.check().unwrap();
     limited.aperture = Aperture::StopSemiDiameter(6.0);
     let text = limited.check().unwrap_err().to_string();
     assert!(text.contains("expected the aperture of the position"), "{text}");
     let aperture = Edit::SetAperture(Aperture::StopSemiDiameter(6.0));
-    limited.aperture = lens.aperture;
+    limited.aperture = Aperture::EntrancePupilDiameter(9.0);
     let edited = apply_edit(&limited, &aperture).unwrap();
     assert_eq!(edited.zoom[1].number(stop, Quantity::SemiDiameter), None);
 }

@@ -42,19 +42,20 @@ pub(super) fn map(run: &AnalysisRun) -> Vec<AtField<SpotMapJson>> {
 
 impl SpotMapJson {
     fn new(map: &SpotMap, milliseconds: f64) -> Self {
-        let nodes = grid_nodes(map.count, map.half_width).into_iter().zip(&map.values);
+        let SpotMap { grid, rays } = map;
+        let nodes = grid_nodes(grid.count, grid.half_width).into_iter().zip(&grid.values);
         let point = |(field, found): ([f64; 2], &Option<Result<Estimate, _>>)| {
             let found = found.as_ref()?;
             let dark = found.as_ref().err().map(ToString::to_string);
             Some(MapPointJson { field, rms: found.as_ref().ok().copied(), dark })
         };
         let points: Vec<MapPointJson> = nodes.filter_map(point).collect();
-        let side = grid_sides(map.count, map.half_width);
+        let side = grid_sides(grid.count, grid.half_width);
         let value =
             |found: &Option<Result<Estimate, _>>| Some(found.as_ref()?.as_ref().ok()?.value);
-        let values = map.values.iter().map(value).collect();
+        let values = grid.values.iter().map(value).collect();
         Self {
-            rays: points.iter().filter_map(|point| point.rms).map(|rms| rms.rays).sum(),
+            rays: *rays,
             milliseconds,
             points,
             grid: ContourGrid { places: [side.clone(), side], values },

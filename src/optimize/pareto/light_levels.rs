@@ -8,7 +8,7 @@
 
 use super::{
     EVALUATION_TOLERANCE, FIRST, MIN_LIGHT, ParetoPoint, ParetoSettings, STEPS_PER_SLICE,
-    SweepChain,
+    SweepChain, as_built_term,
 };
 use crate::lens::Lens;
 use crate::merit::{
@@ -39,7 +39,7 @@ pub(super) struct LightWalk {
     active: Option<ActiveLevel>,
     /// Lenses that were accepted since the last evaluation.
     candidates: Vec<AcceptedTrial>,
-    /// The spot and the light of the lenses that were evaluated and that no other one dominates.
+    /// The radius and the light of the lenses that were evaluated and that no other one dominates.
     known: Vec<[f64; 2]>,
     /// True once the levels above the reachable light were spread anew.
     is_spread: bool,
@@ -51,6 +51,8 @@ pub(super) struct LightWalk {
 struct WalkSettings {
     /// The goal without the light that is asked for.
     goal: Goal,
+    /// Its term for lenses as built, if there is one.
+    made: Option<Term>,
     /// The mean area of the pupils at the start, in mm².
     light: f64,
     /// The steps of a level.
@@ -102,7 +104,9 @@ impl LightWalk {
         settings: &ParetoSettings,
     ) -> Result<Vec<Self>, MeritError> {
         let ParetoSettings { steps, tolerance, .. } = *settings;
-        let walk = WalkSettings { goal: spot_goal(lens)?, light, steps, tolerance };
+        let made = as_built_term(lens, settings);
+        let goal = spot_goal(lens, made)?;
+        let walk = WalkSettings { goal, made, light, steps, tolerance };
         let shares = settings.light_shares();
         let turns = [FirstTurn::Brighter, FirstTurn::Darker].into_iter();
         turns.map(|turn| Self::new(lens, &walk, &shares, turn)).collect()
@@ -223,11 +227,13 @@ impl LightWalk {
             }
             let asked = Some(candidate.share * self.settings.light);
             let point = ParetoPoint::evaluate(&candidate.lens, None, EVALUATION_TOLERANCE);
+            let made = self.settings.made;
+            let point = point.and_then(|point| point.with_as_built(made, EVALUATION_TOLERANCE));
             // A spot without the fields that are dark would seem sharp.
             if let Ok(point) = point
                 && point.has_light
             {
-                self.learn([point.spot, point.light]);
+                self.learn([point.radius(), point.light]);
                 self.learn(candidate.numbers);
                 found.push(ParetoPoint { min_light: asked, ..point });
             }
@@ -303,14 +309,18 @@ fn levels(shares: &[f64], turn: FirstTurn, steps: usize) -> Vec<Level> {
     walk
 }
 
-/// The goal of a walk without the light that is asked for: sharp spots under the limits of the
+/// The goal of a walk without the light that is asked for: sharp spots, as built if `made` is a term for
+/// that, under the limits of the
 /// default goal, limited steepness, and a minimum of light at every field.
 ///
 /// # Errors
 /// A lens without first-order data.
-fn spot_goal(lens: &Lens) -> Result<Goal, MeritError> {
+fn spot_goal(lens: &Lens, made: Option<Term>) -> Result<Goal, MeritError> {
     let default_goal = Goal::default_for(lens)?;
     let mut terms = default_goal.terms;
+    for weighted in terms.iter_mut().filter(|weighted| weighted.term == Term::Spot) {
+        weighted.term = made.unwrap_or(Term::Spot);
+    }
     terms.retain(|w| !matches!(w.term, Term::Light(_)));
     terms.push(WeightedTerm::new(Term::Steepness(MAX_STEEPNESS), 1.0));
     terms.push(WeightedTerm::new(Term::Light(MIN_LIGHT), super::goal_size(lens).powi(2)));
@@ -341,8 +351,8 @@ mod tests {
         let found = found.iter().find(|b| b.name == "tessar_50_f28").unwrap();
         let lens = crate::files::json::read(found.text, found.name).unwrap();
         let lens = with_sweep_variables(&limited_by_stop(&lens).unwrap(), [0.5, 1.5]);
-        let goal = spot_goal(&lens).unwrap();
-        let settings = WalkSettings { goal, light: 200.0, steps: 10, tolerance: 1e-2 };
+        let goal = spot_goal(&lens, None).unwrap();
+        let settings = WalkSettings { goal, made: None, light: 200.0, steps: 10, tolerance: 1e-2 };
         LightWalk::new(&lens, &settings, shares, turn).unwrap()
     }
 

@@ -1,5 +1,6 @@
 //! The Pareto front of sharpness against light: the lenses that cannot gain one without losing the
-//! other.
+//! other. The sharpness is that of the spots of a lens as designed, or as built, where its merit function
+//! or the settings ask for that.
 //!
 //! A front is found by problems of one number each, every one starting from the result of the one
 //! before: for levels of light the sharpest lens with at least so much, or for weights β the least
@@ -14,8 +15,8 @@ pub use weighted_sum::weighted_sum_goal;
 
 use super::DescentMethod;
 use crate::analysis::{AnalysisError, image_quality};
-use crate::lens::{Lens, LensError, ParameterKind, Quantity, add_variables};
-use crate::merit::{Merit, MeritError, PupilEdge, Term, WeightedTerm};
+use crate::lens::{Lens, LensError, ParameterKind, Quantity, ToleranceGrade, add_variables};
+use crate::merit::{Goal, LimitTreatment, Merit, MeritError, PupilEdge, Term, WeightedTerm};
 use crate::pupil::{RayModelError, limited_by_stop};
 use light_levels::LightWalk;
 use rayon::prelude::*;
@@ -44,6 +45,9 @@ pub struct ParetoSettings {
     pub pupil: PupilEdge,
     /// The relative error allowed for the radius of each spot during the sweep.
     pub tolerance: f64,
+    /// The class of care in making of lenses that are compared as they are built; `None` to compare
+    /// them as designed, or as the term `as_built` of the merit function of the lens says.
+    pub as_built: Option<ToleranceGrade>,
     /// The factors by which a semi-diameter may shrink and grow.
     #[serde(rename = "rims")]
     pub semi_diameter_factors: [f64; 2],
@@ -60,6 +64,7 @@ impl Default for ParetoSettings {
             blur: [4e-5, 3.5e-3],
             pupil: PupilEdge::Moving,
             tolerance: 1e-3,
+            as_built: None,
             semi_diameter_factors: [0.25, 1.3],
         }
     }
@@ -110,6 +115,10 @@ pub struct ParetoPoint {
     pub spot: f64,
     /// Its estimated error, in mm.
     pub spot_error: f64,
+    /// The RMS spot radius as built, in mm, when each lens is refocused; `None` for lenses that are
+    /// compared as designed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub as_built: Option<AsBuiltRadius>,
     /// The mean area of its pupils in the first vertex plane, in mm².
     pub light: f64,
     /// Its estimated error, in mm².
@@ -121,7 +130,44 @@ pub struct ParetoPoint {
     pub rays: usize,
 }
 
+/// The expected RMS spot radius of lenses as they are built.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct AsBuiltRadius {
+    /// The radius in mm.
+    pub value: f64,
+    /// Its estimated error by the rays, in mm.
+    pub error: f64,
+}
+
 impl ParetoPoint {
+    /// The number that lenses are compared by, in mm: the RMS spot radius, as built if that is known.
+    pub fn radius(&self) -> f64 {
+        self.as_built.map_or(self.spot, |as_built| as_built.value)
+    }
+
+    /// The same point with the radius of a term for lenses as built, if there is one.
+    ///
+    /// # Errors
+    /// A lens to which the term does not apply.
+    fn with_as_built(self, made: Option<Term>, tolerance: f64) -> Result<Self, ParetoError> {
+        let Some(term) = made else { return Ok(self) };
+        let mut lens = self.lens.clone();
+        if lens.variables.is_empty() {
+            add_variables(&mut lens, &[ParameterKind::Curvatures]);
+        }
+        let goal = Goal {
+            terms: vec![WeightedTerm::new(term, 1.0)],
+            pupil: PupilEdge::Frozen,
+            zoom_ratios: Vec::new(),
+            limits: LimitTreatment::Penalties,
+        };
+        let merit = Merit::new(&lens, &goal, tolerance)?;
+        let square = merit.value(&merit.values(&lens))?;
+        let value = square.max(0.0).sqrt();
+        let relative = merit.spot_samplings().iter().map(|spot| spot.error).fold(0.0, f64::max);
+        Ok(Self { as_built: Some(AsBuiltRadius { value, error: relative * value }), ..self })
+    }
+
     /// Evaluates the sharpness and light of a lens; spot radii are accurate to a relative tolerance.
     ///
     /// # Errors
@@ -135,6 +181,7 @@ impl ParetoPoint {
             min_light: None,
             spot: spot.value,
             spot_error: spot.error,
+            as_built: None,
             light: quality.light.value,
             light_error: quality.light.error,
             has_light: quality.is_fully_lit,
@@ -144,8 +191,9 @@ impl ParetoPoint {
 
     /// True if it is at least as sharp and as bright as another one, and better in one of the two.
     pub fn dominates(&self, other: &Self) -> bool {
-        let no_worse = self.spot <= other.spot && self.light >= other.light;
-        no_worse && (self.spot < other.spot || self.light > other.light)
+        let (own, theirs) = (self.radius(), other.radius());
+        let no_worse = own <= theirs && self.light >= other.light;
+        no_worse && (own < theirs || self.light > other.light)
     }
 }
 
@@ -164,8 +212,9 @@ impl Front {
     /// Inserts a lens unless one of the front is at least as good, and removes those that it
     /// dominates. Returns true if it was inserted.
     pub fn insert(&mut self, design: ParetoPoint) -> bool {
-        let no_worse = |d: &ParetoPoint| d.spot <= design.spot && d.light >= design.light;
-        let sound = design.spot.is_finite() && design.light.is_finite() && design.has_light;
+        let radius = design.radius();
+        let no_worse = |d: &ParetoPoint| d.radius() <= radius && d.light >= design.light;
+        let sound = radius.is_finite() && design.light.is_finite() && design.has_light;
         if !sound || self.points.iter().any(no_worse) {
             return false;
         }
@@ -180,8 +229,8 @@ impl Front {
     /// and Thiele, PPSN V, 1998).
     pub fn hypervolume(&self, spot: f64, light: f64) -> f64 {
         let (mut covered, mut below) = (0.0, 0.0);
-        for design in self.points.iter().filter(|design| design.spot < spot) {
-            covered += (spot - design.spot) * (design.light - below);
+        for design in self.points.iter().filter(|design| design.radius() < spot) {
+            covered += (spot - design.radius()) * (design.light - below);
             below = design.light;
         }
         covered / (spot * light)
@@ -190,7 +239,7 @@ impl Front {
     /// The hypervolume relative to a starting lens: up to twice its spot, in multiples of its spot
     /// times its light.
     pub fn relative_hypervolume(&self, start: &ParetoPoint) -> f64 {
-        self.hypervolume(REFERENCE_SPOT * start.spot, start.light)
+        self.hypervolume(REFERENCE_SPOT * start.radius(), start.light)
     }
 }
 
@@ -209,10 +258,10 @@ pub enum ParetoError {
     /// The lens has no merit.
     #[error(transparent)]
     Merit(#[from] MeritError),
-    /// The merit function of the lens asks for what a front does not compare.
+    /// A weighted sum of the light and of the spots as built is asked for.
     #[error(
-        "the merit function of the lens has the term `as_built`, and a front compares lenses as they \
-         are designed; expected the term `spot` in its place, or `aplanat optimize --as-built`"
+        "a front of lenses as built is one of levels of light; expected these, with derivatives that \
+         follow the edge of the pupil"
     )]
     AsBuilt,
     /// A setting is out of its range.
@@ -289,10 +338,14 @@ impl ParetoSweep {
     /// A lens without a merit, or a setting out of its range.
     pub fn new(lens: &Lens, settings: &ParetoSettings) -> Result<Self, ParetoError> {
         settings.check()?;
-        check_goal(lens)?;
+        let made = as_built_term(lens, settings);
+        if made.is_some() && settings.effective_scalarization() == Scalarization::WeightedSum {
+            return Err(ParetoError::AsBuilt);
+        }
         let lens = with_sweep_variables(&limited_by_stop(lens)?, settings.semi_diameter_factors);
         lens.check()?;
         let start = ParetoPoint::evaluate(&lens, None, EVALUATION_TOLERANCE)?;
+        let start = start.with_as_built(made, EVALUATION_TOLERANCE)?;
         let chains = chains(&lens, start.light, settings)?;
         let mut front = Front::default();
         front.insert(start.clone());
@@ -306,7 +359,7 @@ impl ParetoSweep {
             self.chains.par_iter_mut().map(|chain| chain.run_slice()).collect();
         let mut joined = 0;
         for design in found.into_iter().flatten() {
-            self.evaluated.push([design.spot, design.light]);
+            self.evaluated.push([design.radius(), design.light]);
             joined += usize::from(self.front.insert(design));
         }
         let left = remaining_steps(&self.chains);
@@ -418,11 +471,14 @@ fn remaining_steps(chains: &[Box<dyn SweepChain>]) -> usize {
     chains.iter().map(|chain| chain.remaining_steps()).sum()
 }
 
-/// Refuses a merit function of the lens that counts how it is made.
-fn check_goal(lens: &Lens) -> Result<(), ParetoError> {
-    let mut terms = lens.merit.iter().flat_map(|goal| &goal.terms);
-    let is_as_built = |weighted: &WeightedTerm| matches!(weighted.term, Term::AsBuilt { .. });
-    if terms.any(is_as_built) { Err(ParetoError::AsBuilt) } else { Ok(()) }
+/// The term for lenses as built that a sweep compares by: that of the settings, or else that of the merit
+/// function of the lens; `None` for lenses as designed.
+pub fn as_built_term(lens: &Lens, settings: &ParetoSettings) -> Option<Term> {
+    if let Some(grade) = settings.as_built {
+        return Some(Term::AsBuilt { grade: Some(grade) });
+    }
+    let terms = lens.merit.iter().flat_map(|goal| &goal.terms).map(|weighted| weighted.term);
+    terms.into_iter().find(|term| matches!(term, Term::AsBuilt { .. }))
 }
 
 /// The lens with the variables of a sweep and the bounds of its semi-diameters.

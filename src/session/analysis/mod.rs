@@ -356,6 +356,7 @@ impl Analyses {
     ) -> Option<Self> {
         let unless_interrupted = || (!interrupted()).then_some(());
         let b = Arc::clone(&ray_model.value);
+        let ghost_rays = ghosts::ghost_rays(&b, settings);
         let accuracy = Accuracy { tolerance: settings.tolerance, ..Accuracy::default() };
         let layout = time(|| analysis::ray_layout(&b, settings.rays));
         unless_interrupted()?;
@@ -372,9 +373,7 @@ impl Analyses {
             Arc::new(time(|| scene_picture::coarse_picture(lens, zoom, scene)))
         });
         unless_interrupted()?;
-        let fans = settings
-            .fans
-            .then(|| time(|| for_each_field(&b, |field| analysis::fan(&b, field, FAN_POINTS))));
+        let fans = settings.fans.then(|| time(|| field_fans(&b)));
         unless_interrupted()?;
         let field_curves = settings.field_curves.then(|| {
             time(|| {
@@ -383,11 +382,7 @@ impl Analyses {
             })
         });
         unless_interrupted()?;
-        let footprints = settings.footprints.then(|| {
-            let edge = |field| analysis::footprints(&b, field, b.primary, FOOTPRINT_POINTS);
-            time(|| for_each_field(&b, edge))
-        });
-        let ghost_rays = ghosts::ghost_rays(&b, settings);
+        let footprints = settings.footprints.then(|| time(|| field_footprints(&b)));
         unless_interrupted()?;
         Some(Self {
             seidel: time(|| b.seidel()),
@@ -411,6 +406,15 @@ impl Analyses {
             ghost_rays,
         })
     }
+}
+
+fn field_fans(model: &RayModel) -> FieldFans {
+    for_each_field(model, |field| analysis::fan(model, field, FAN_POINTS))
+}
+
+fn field_footprints(model: &RayModel) -> FieldFootprints {
+    let edge = |field| analysis::footprints(model, field, model.primary, FOOTPRINT_POINTS);
+    for_each_field(model, edge)
 }
 
 /// The rays of a plan with all its rims: light at a point of the image comes from other fields than those

@@ -1,8 +1,8 @@
 //! Distortion, field curvature, lateral colour and relative illumination over the field, as lens data sheets
 //! show them.
 
-use egui::{RichText, Ui, WidgetInfo};
-use egui_plot::{Corner, HLine, Legend, Line, LineStyle, PlotPoints};
+use egui::{Label, RichText, Ui, WidgetInfo};
+use egui_plot::{HLine, Line, LineStyle, PlotPoints};
 
 use super::widgets::fixed_plot;
 use super::{Panel, displayed_results, show_missing_results};
@@ -16,8 +16,9 @@ use crate::studio::palette::{Palette, color32};
 
 /// The height of the title of a plot.
 const TITLE: f32 = 24.0;
-/// The lowest plot.
+/// The lowest plot, and the narrowest one of two beside each other.
 const LOWEST: f32 = 80.0;
+const NARROWEST: f32 = 190.0;
 
 /// The panel.
 #[derive(Debug, Default)]
@@ -43,11 +44,15 @@ impl Panel for FieldCurvesPanel {
         let kind = results.lens.fields_at(results.settings.zoom).kind;
         summary(ui, &curves.value, curves.ms);
         let charts = charts(&curves.value, &results.lens, Palette::for_visuals(ui.visuals()));
-        let height = (ui.available_height() / charts.len() as f32 - TITLE).max(LOWEST);
+        let columns = if ui.available_width() < 2.0 * NARROWEST { 1 } else { 2 };
+        let rows = charts.len().div_ceil(columns);
+        let height = (ui.available_height() / rows as f32 - TITLE).max(LOWEST);
         egui::ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
-            for chart in charts {
-                chart.show(ui, unit(kind), height);
-            }
+            ui.columns(columns, |uis| {
+                for (i, chart) in charts.into_iter().enumerate() {
+                    chart.show(&mut uis[i % columns], unit(kind), height);
+                }
+            });
         });
     }
 }
@@ -111,8 +116,9 @@ fn charts(curves: &FieldCurves, lens: &Lens, palette: Palette) -> Vec<Chart> {
             from_zero: false,
         },
         Chart {
-            title: "Field curvature, mm from the image plane",
-            hint: "Foci of a narrow beam about the chief ray (Coddington), positive along the light",
+            title: "Field curvature, mm",
+            hint: "Foci of a narrow beam about the chief ray (Coddington) from the image plane, positive \
+                   along the light",
             curves: vec![
                 curve("tangential", first, false, tangential),
                 curve("sagittal", second, true, sagittal),
@@ -158,13 +164,10 @@ fn lateral_color(curves: &FieldCurves, lens: &Lens, palette: Palette) -> Chart {
 
 impl Chart {
     fn show(self, ui: &mut Ui, unit: &'static str, height: f32) {
-        ui.label(RichText::new(self.title).small().strong()).on_hover_text(self.hint);
+        self.heading(ui);
         let label = self.describe(unit);
         let weak = ui.visuals().weak_text_color();
         let mut plot = fixed_plot(self.title, height).include_x(0.0).include_y(0.0);
-        if self.curves.len() > 1 {
-            plot = plot.legend(Legend::default().position(Corner::LeftBottom));
-        }
         if self.from_zero {
             plot = plot.include_y(100.0);
         }
@@ -177,6 +180,19 @@ impl Chart {
             }
         });
         shown.response.widget_info(|| WidgetInfo::labeled(egui::Role::Image, true, &label));
+    }
+
+    /// The title, with the names of several curves in their colours: a legend would hide them.
+    fn heading(&self, ui: &mut Ui) {
+        ui.horizontal(|ui| {
+            ui.spacing_mut().item_spacing.x = 6.0;
+            let title = RichText::new(self.title).small().strong();
+            ui.add(Label::new(title).truncate()).on_hover_text(self.hint);
+            for curve in self.curves.iter().filter(|_| self.curves.len() > 1) {
+                let name = RichText::new(&curve.name).small().color(color32(curve.color));
+                ui.add(Label::new(name).truncate());
+            }
+        });
     }
 
     /// The chart in words, with its values at the edge of the field.

@@ -8,14 +8,16 @@ use egui_plot::{Line, LineStyle, PlotPoints};
 use super::widgets::{fixed_plot, swatch};
 use super::{Panel, displayed_results, field_name, show_missing_results};
 use crate::analysis::Footprint;
-use crate::lens::Lens;
-use crate::session::{AnalysisResults, FieldFootprints, SessionView, Timed};
+use crate::lens::{Lens, Quantity};
+use crate::session::{AnalysisResults, FieldFootprints, SessionView};
 use crate::studio::actions::Actions;
 use crate::studio::number;
 use crate::studio::palette::{Palette, color32};
 
 /// The lowest plot, in points.
 const LOWEST: f32 = 120.0;
+/// The height of the list of surfaces, in points.
+const MENU: f32 = 360.0;
 /// The number of corners of a drawn rim.
 const CORNERS: usize = 96;
 
@@ -42,8 +44,11 @@ impl Panel for FootprintPanel {
         let image = results.lens.surfaces.len();
         let surface = self.surface.or(view.selected).unwrap_or(0).min(image);
         self.header(ui, &results.lens, surface, footprints.ms);
-        legend(ui, results, &footprints.value, surface);
-        outlines(ui, footprints, surface);
+        let zoom = results.settings.zoom;
+        let rim = results.lens.parameter_at(zoom, surface, Quantity::SemiDiameter);
+        let rim = results.lens.get(rim);
+        legend(ui, results, &footprints.value, (surface, rim));
+        outlines(ui, &footprints.value, (surface, rim));
     }
 }
 
@@ -51,7 +56,7 @@ impl FootprintPanel {
     /// The choice of the surface, and the time.
     fn header(&mut self, ui: &mut Ui, lens: &Lens, shown: usize, ms: f64) {
         ui.horizontal(|ui| {
-            let combo = ComboBox::from_id_salt("footprint surface");
+            let combo = ComboBox::from_id_salt("footprint surface").height(MENU);
             let combo = combo.selected_text(surface_name(lens, shown)).show_ui(ui, |ui| {
                 ui.selectable_value(&mut self.surface, None, "The selected surface");
                 for surface in 0..=lens.surfaces.len() {
@@ -74,7 +79,12 @@ fn surface_name(lens: &Lens, surface: usize) -> String {
 }
 
 /// The fields with how far their beams reach from the axis, and the rim.
-fn legend(ui: &mut Ui, results: &AnalysisResults, found: &FieldFootprints, surface: usize) {
+fn legend(
+    ui: &mut Ui,
+    results: &AnalysisResults,
+    found: &FieldFootprints,
+    (surface, rim): (usize, Option<f64>),
+) {
     let palette = Palette::for_visuals(ui.visuals());
     let fields = results.lens.fields_at(results.settings.zoom);
     ui.horizontal_wrapped(|ui| {
@@ -88,11 +98,8 @@ fn legend(ui: &mut Ui, results: &AnalysisResults, found: &FieldFootprints, surfa
             let name = field_name(fields.kind, *point);
             ui.label(RichText::new(format!("{name}: {reach}")).color(color));
         }
-        let rim = footprints_on(found, surface).find_map(|(_, print)| print.semi_diameter);
-        let rim = rim.map_or("nothing clips here".to_owned(), |rim| {
-            format!("rim {} mm", number::format_digits(rim, 5))
-        });
-        ui.weak(rim);
+        let rim = rim.map(|rim| format!("rim {} mm", number::format_digits(rim, 5)));
+        ui.weak(rim.unwrap_or_else(|| "no rim".to_owned()));
     });
 }
 
@@ -105,12 +112,11 @@ fn footprints_on(
     prints.filter_map(move |(i, prints)| Some((i, prints.as_ref().ok()?.get(surface)?)))
 }
 
-fn outlines(ui: &mut Ui, found: &Timed<FieldFootprints>, surface: usize) {
+fn outlines(ui: &mut Ui, found: &FieldFootprints, (surface, rim): (usize, Option<f64>)) {
     let palette = Palette::for_visuals(ui.visuals());
     let height = (ui.available_height() - 4.0).max(LOWEST);
     let plot = fixed_plot("footprint", height).data_aspect(1.0);
     let shown = plot.show(ui, |plot| {
-        let rim = footprints_on(&found.value, surface).find_map(|(_, print)| print.semi_diameter);
         if let Some(rim) = rim {
             let corner = |i: usize| {
                 let (sin, cos) = (TAU * i as f64 / CORNERS as f64).sin_cos();
@@ -120,14 +126,14 @@ fn outlines(ui: &mut Ui, found: &Timed<FieldFootprints>, surface: usize) {
             let line = Line::new("rim", circle).style(LineStyle::dashed_dense());
             plot.line(line.color(color32(palette.strong)));
         }
-        for (i, print) in footprints_on(&found.value, surface) {
+        for (i, print) in footprints_on(found, surface) {
             let edge = print.outline.iter().chain(print.outline.first()).copied();
             let points: PlotPoints<'_> = edge.collect();
             let line = Line::new(format!("field {}", i + 1), points).width(1.5);
             plot.line(line.color(color32(palette.field(i))));
         }
     });
-    let words = footprints_on(&found.value, surface)
+    let words = footprints_on(found, surface)
         .map(|(i, print)| format!("field {} reaches {:.4} mm", i + 1, print.reach));
     let words = format!("Footprint: {}", words.collect::<Vec<_>>().join(", "));
     shown.response.widget_info(|| WidgetInfo::labeled(Role::Image, true, &words));

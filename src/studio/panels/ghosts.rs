@@ -134,6 +134,7 @@ fn row(ui: &mut Ui, ghost: &Ghost, shown: Option<[usize; 2]>, actions: &mut Acti
     }
     let patch = &ghost.patch;
     let centre = patch.center.map_or("no ray arrives".to_owned(), |[x, y]| {
+        let [x, y] = [x, y].map(|v| number::without_rounding(v, patch.radius));
         format!("{}, {}", number::format_digits(x, 3), number::format_digits(y, 3))
     });
     let focus = ghost.paraxial.focus.map(|focus| number::format_digits(focus, 4));

@@ -73,7 +73,7 @@ impl Panel for SpotMapPanel {
 
 /// The fields with light.
 fn spots(map: &SpotMap) -> impl Iterator<Item = &Estimate> {
-    map.values.iter().flatten().filter_map(|found| found.as_ref().ok())
+    map.grid.values.iter().flatten().filter_map(|found| found.as_ref().ok())
 }
 
 /// The least and the largest radius in mm; `None` without light.
@@ -100,8 +100,7 @@ fn summary(ui: &mut Ui, map: &SpotMap, range: [f64; 2], ms: f64) {
         }
         ui.label(format!("{most} µm"));
         let error = spots(map).map(|spot| spot.error / spot.value).fold(0.0, f64::max);
-        let rays: usize = spots(map).map(|spot| spot.rays).sum();
-        let text = format!("RMS radius, ± {:.1} %, {rays} rays, {ms:.0} ms", 100.0 * error);
+        let text = format!("RMS radius, ± {:.1} %, {} rays, {ms:.0} ms", 100.0 * error, map.rays);
         ui.label(RichText::new(text).small().weak());
     });
 }
@@ -113,9 +112,9 @@ fn color(share: f64) -> Color32 {
 
 /// The pixels of the map, the highest row first.
 fn raster(map: &SpotMap, [least, most]: [f64; 2]) -> ColorImage {
-    let count = map.count;
+    let count = map.grid.count;
     let span = if most > least { most - least } else { 1.0 };
-    let pixel = |n: usize| match &map.values[(count - 1 - n / count) * count + n % count] {
+    let pixel = |n: usize| match &map.grid.values[(count - 1 - n / count) * count + n % count] {
         Some(Ok(spot)) => color((spot.value - least) / span),
         Some(Err(_)) => Color32::BLACK,
         None => Color32::TRANSPARENT,
@@ -133,7 +132,7 @@ fn plot(ui: &mut Ui, map: &SpotMap, texture: &TextureHandle, kind: FieldKind) {
     let plot = fixed_plot("spot map", height).data_aspect(1.0);
     let plot = plot.x_axis_label(format!("field x, {unit}")).y_axis_label("field y");
     // A pixel has its field in the middle.
-    let width = 2.0 * map.half_width * map.count as f64 / (map.count - 1) as f64;
+    let width = 2.0 * map.grid.half_width * map.grid.count as f64 / (map.grid.count - 1) as f64;
     let size = vec2(width as f32, width as f32);
     let shown = plot.show(ui, |plot| {
         let image = PlotImage::new("spot map", texture.id(), PlotPoint::new(0.0, 0.0), size);
@@ -154,15 +153,15 @@ fn field_text([x, y]: [f64; 2]) -> String {
 
 /// The field under the pointer with its spot.
 fn under_pointer(map: &SpotMap, at: PlotPoint) -> Option<([f64; 2], String)> {
-    let half = (map.count / 2) as f64;
-    let step = map.half_width / half;
+    let half = (map.grid.count / 2) as f64;
+    let step = map.grid.half_width / half;
     let [column, row] = [at.x, at.y].map(|v| (v / step).round() + half);
-    let is_inside = |i: f64| i >= 0.0 && i < map.count as f64;
+    let is_inside = |i: f64| i >= 0.0 && i < map.grid.count as f64;
     if !(is_inside(column) && is_inside(row)) {
         return None;
     }
     let field = [column, row].map(|i| (i - half) * step);
-    let text = match map.values[row as usize * map.count + column as usize].as_ref()? {
+    let text = match map.grid.values[row as usize * map.grid.count + column as usize].as_ref()? {
         Ok(spot) => format!("{} µm", number::with_error(1e3 * spot.value, 1e3 * spot.error)),
         Err(why) => why.to_string(),
     };

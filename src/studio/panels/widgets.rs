@@ -78,10 +78,14 @@ pub(in crate::studio) fn hint_beside(item: Response, text: &str) -> Response {
     item
 }
 
+/// The distances in points from which a mark appears and from which its number is seen well.
+const MARKS: [f32; 2] = [8.0, 44.0];
+
 /// A plot that can be neither moved nor zoomed.
 pub(super) fn fixed_plot(name: &str, height: f32) -> Plot<'static> {
     let plot = Plot::new(name).height(height).allow_drag(false).allow_scroll(false);
-    plot.allow_zoom(false).allow_boxed_zoom(false)
+    // The marks of a low plot have numbers too.
+    plot.allow_zoom(false).allow_boxed_zoom(false).grid_spacing(MARKS[0]..=MARKS[1])
 }
 
 /// Gives a plot of decimal logarithms an axis with round numbers as its marks, and a title.

@@ -164,7 +164,7 @@ impl LayoutPanel {
             }
         }
         if let Some([first, second]) = view.settings.ghost {
-            let color = color32(palette.worse);
+            let color = color32(palette.strong);
             swatch(ui, color);
             let text = format!("ghost {}, {}", first + 1, second + 1);
             let hint = "Light along the axis that two surfaces reflect; click to hide it";
@@ -257,7 +257,7 @@ impl LayoutDrawing {
         layout.rays.iter().for_each(|ray| draw_ray(&mut scene, ray, &palette));
         for ray in &numbers.ghost_rays {
             let points: Vec<DVec2> = ray.iter().map(|p| DVec2::new(p.z, p.y)).collect();
-            scene.polyline(&points, 1.2, palette.worse);
+            scene.polyline(&points, 1.2, palette.strong);
         }
         section.draw_outlines(&mut scene, &palette);
         draw_image(&mut scene, &section, layout, &palette);

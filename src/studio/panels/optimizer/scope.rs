@@ -31,7 +31,10 @@ pub(super) const GROUPS: &[(&str, &[OperandKind])] = &[
             OperandKind::ThirdOrderDistortion,
         ],
     ),
-    ("Colour", &[OperandKind::AxialColor, OperandKind::LateralColor]),
+    (
+        "Colour",
+        &[OperandKind::AxialColor, OperandKind::SecondarySpectrum, OperandKind::LateralColor],
+    ),
 ];
 
 /// The title of an operand.
@@ -50,6 +53,7 @@ pub(super) const fn title(kind: OperandKind) -> &'static str {
         OperandKind::PetzvalCurvature => "Seidel: Petzval",
         OperandKind::ThirdOrderDistortion => "Seidel: distortion",
         OperandKind::AxialColor => "Axial colour",
+        OperandKind::SecondarySpectrum => "Secondary spectrum",
         OperandKind::LateralColor => "Lateral colour",
     }
 }
@@ -75,6 +79,10 @@ pub(super) const fn hint(kind: OperandKind) -> &'static str {
         }
         OperandKind::AxialColor => {
             "From the paraxial image at the longest wavelength to that at the shortest"
+        }
+        OperandKind::SecondarySpectrum => {
+            "From the middle between the paraxial images at the shortest and the longest wavelength to \
+             that at the primary one"
         }
         OperandKind::LateralColor => {
             "From the image of a chief ray at the longest wavelength to that at the shortest"

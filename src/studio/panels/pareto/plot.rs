@@ -31,7 +31,7 @@ pub(super) struct ClickedDesign {
 
 /// Light in mm² and spot in µm.
 fn plot_point(design: &ParetoPoint) -> [f64; 2] {
-    [design.light, 1e3 * design.spot]
+    [design.light, 1e3 * design.radius()]
 }
 
 fn plot_points(front: &Front) -> Vec<[f64; 2]> {
@@ -53,7 +53,11 @@ pub(super) fn plot(
         .height(ui.available_height())
         .legend(Legend::default().position(free_corner(view, run, &bounds)).background_alpha(0.6))
         .custom_x_axes(vec![light])
-        .y_axis_label("RMS spot, µm")
+        .y_axis_label(if run.start.as_built.is_some() {
+            "RMS spot as built, µm"
+        } else {
+            "RMS spot, µm"
+        })
         .y_axis_min_width(36.0)
         .allow_scroll(false)
         .allow_double_click_reset(false)

@@ -108,8 +108,12 @@ pub(super) fn design_text(design: &ParetoPoint, start: &ParetoPoint) -> String {
             format!("rim blur {} µm", number::format_digits(1e3 * weight.sqrt(), 3))
         }
     };
+    let as_built = design.as_built.map_or_else(String::new, |as_built| {
+        let radius = number::with_error(1e3 * as_built.value, 1e3 * as_built.error);
+        format!("as built {radius} µm\n")
+    });
     format!(
-        "RMS {spot} µm\nlight {light} mm², {percent} % of the start\n{asked}\n{}",
+        "RMS {spot} µm\n{as_built}light {light} mm², {percent} % of the start\n{asked}\n{}",
         counted(design.rays as u64, "ray")
     )
 }
