@@ -21,6 +21,9 @@ from pathlib import Path
 import aplanat
 from aplanat import ray as cluster
 
+# Ray's workers would yield to every other process of the machine.
+os.environ.setdefault("RAY_worker_niceness", "0")
+
 ACTOR, WORKER = "ray::SearchActor", "ray::work_alone"
 
 

@@ -3,9 +3,9 @@
     python assets/cluster/scheduling.py --seconds 10
 
 A simulated worker sleeps as long as a period and its judgement take, and returns the real outcome of a
-short one with its verdict. Actor, checkpoint and messages are those of a real search. Efficiency is the time that all workers slept
-over the time that all of them were there. The traffic of 1,000 machines follows from the sizes of a real
-period and outcome.
+short one with its verdict. Actor, checkpoint and messages are those of a real search. Efficiency is the
+time that all workers slept over the time that all of them were there. The traffic of 1,000 machines
+follows from the sizes of a real period and outcome, and from the processor time of the actor.
 """
 
 from __future__ import annotations
@@ -24,6 +24,9 @@ import aplanat
 from aplanat import ray as cluster
 from aplanat.ray.actor import RayMachines, SearchActor
 from aplanat.ray.coordinator import SHARED
+
+# Ray's workers would yield to every other process of the machine.
+os.environ.setdefault("RAY_worker_niceness", "0")
 
 Judged = tuple[cluster.Outcome, cluster.Verdict]
 

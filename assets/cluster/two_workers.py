@@ -19,6 +19,9 @@ from statistics import median
 import aplanat
 from aplanat import ray as cluster
 
+# Ray's workers would yield to every other process of the machine.
+os.environ.setdefault("RAY_worker_niceness", "0")
+
 
 def ticks_of_children() -> float:
     """The processor seconds of all processes that descend from this one and still run."""

@@ -255,9 +255,9 @@ def test_slices_of_a_front_are_neighbours_in_its_levels():
 
 @pytest.fixture(scope="module")
 def two_workers():
-    import ray
-
-    ray.init(num_cpus=2, include_dashboard=False, log_to_driver=False)
+    # Ray's workers would yield to every other process of the machine.
+    os.environ.setdefault("RAY_worker_niceness", "0")
+    ray = cluster.connect(2)
     yield
     ray.shutdown()
 

@@ -44,21 +44,24 @@ def _milliseconds(work: Callable[[], object]) -> float:
 
 
 def measure_trace(lens: Lens, rays: int = 1_000_000, turns: int = 15) -> dict[str, float]:
-    """`Lens.trace` against the library, which allocates its results too, or has done so before."""
+    """`Lens.trace` against the library, both with new arrays and with those of an earlier result."""
     points, directions = random_rays(lens, rays)
-    lens.trace(points, directions)
+    out = lens.trace(points, directions)
     times = []
     for _ in range(turns):
-        new, again = _aplanat.time_trace(lens._native, points, directions)
-        times.append((_milliseconds(lambda: lens.trace(points, directions)), new, again))
-    python, new, again = (median(column) for column in zip(*times, strict=True))
+        times.append(
+            (
+                _milliseconds(lambda: lens.trace(points, directions)),
+                _milliseconds(lambda: lens.trace(points, directions, out=out)),
+                *_aplanat.time_trace(lens._native, points, directions),
+            )
+        )
+    names = ("python_ms", "python_reused_ms", "library_ms", "library_reused_ms")
     return {
         "rays": rays,
-        "python_ms": python,
-        "library_ms": new,
-        "library_reused_ms": again,
-        "ratio": median(python / new for python, new, _ in times),
-        "ratio_reused": median(python / again for python, _, again in times),
+        **{name: median(column) for name, column in zip(names, zip(*times, strict=True), strict=True)},
+        "ratio": median(row[0] / row[2] for row in times),
+        "ratio_reused": median(row[1] / row[3] for row in times),
     }
 
 

@@ -203,15 +203,20 @@ def judge_alone(period: Period, outcome: Outcome) -> Verdict:
 
 def connect(machines: str | int | None = None) -> Any:
     """Ray, connected with the cluster of an address, or with so many cores of this machine; absent: with
-    what it is connected with, or with all cores."""
+    what it is connected with, with the cluster of `RAY_ADDRESS`, or with all cores of this machine."""
     import ray
 
     if not ray.is_initialized():
-        quiet = {"log_to_driver": False, "include_dashboard": False}
-        if isinstance(machines, int):
-            ray.init(num_cpus=machines, **quiet)
-        else:
-            ray.init(address=machines, **quiet)
+        cores = machines if isinstance(machines, int) else None
+        address = None if cores else machines or os.environ.get("RAY_ADDRESS")
+        # Ray itself would join any cluster that was ever started on this machine.
+        here = address is None
+        ray.init(
+            address="local" if here else address,
+            num_cpus=cores,
+            include_dashboard=False if here else None,
+            log_to_driver=False,
+        )
     return ray
 
 

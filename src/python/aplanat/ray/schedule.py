@@ -19,8 +19,8 @@ ATTEMPTS = 5
 """A period is tried so often before the search gives up."""
 SLOW = 3.0
 """A period that takes so many times the usual one is begun a second time where a machine is free."""
-LEAST = 1.0
-"""A period of fewer seconds is never slow."""
+LEAST = 10.0
+"""A period of fewer seconds is never slow: a new worker takes seconds to start."""
 
 
 class Machines(Protocol):
