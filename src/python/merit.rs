@@ -15,7 +15,7 @@ use pyo3::prelude::*;
 #[pyclass(name = "Merit", module = "aplanat._aplanat")]
 #[derive(Debug)]
 pub(super) struct PyMerit {
-    merit: Merit,
+    pub(super) merit: Merit,
 }
 
 #[pymethods]
@@ -86,7 +86,7 @@ impl PyMerit {
 
 impl PyMerit {
     /// The values of an array that has as many as there are variables.
-    fn checked(&self, values: &PyReadonlyArray1<'_, f64>) -> PyResult<Vec<f64>> {
+    pub(super) fn checked(&self, values: &PyReadonlyArray1<'_, f64>) -> PyResult<Vec<f64>> {
         let (found, expected) = (values.len(), self.merit.variables().len());
         if found != expected {
             return Err(wrong_input(format!("found {found} values; expected {expected}")));

@@ -14,7 +14,9 @@ mod lens;
 mod merit;
 mod names;
 mod rays;
+mod rows;
 mod runs;
+mod timing;
 
 use pyo3::pymodule;
 
@@ -34,13 +36,15 @@ mod extension {
     use super::rays::{ray_gradient, trace_rays};
     #[pymodule_export]
     use super::runs::{PyGrinRun, PyOptimizer, PyParetoSweep, PySearch};
+    #[pymodule_export]
+    use super::timing::{time_gradient, time_ray_gradient, time_trace};
     use pyo3::prelude::*;
 
     #[pymodule_init]
     fn add_constants(module: &Bound<'_, PyModule>) -> PyResult<()> {
         // A catalogue that cannot be read is said by the command `glass`, and is no reason to end.
         drop(crate::files::load_own_glasses());
-        module.add("FATES", super::rays::FATES)?;
+        module.add("FATES", super::rows::FATES)?;
         module.add("__version__", env!("CARGO_PKG_VERSION"))
     }
 }

@@ -34,6 +34,14 @@ class TracedRays:
     surface: npt.NDArray[np.uint32]
     """Shape (rays,), the surface at which a ray ends."""
 
+    @classmethod
+    def allocate(cls, rays: int) -> TracedRays:
+        """Arrays for the ends of so many rays, with nothing in them."""
+        points, directions = np.empty((rays, 3)), np.empty((rays, 3))
+        return cls(
+            points, directions, np.empty(rays), np.empty(rays, np.uint8), np.empty(rays, np.uint32)
+        )
+
     @property
     def imaged(self) -> npt.NDArray[np.bool_]:
         """Shape (rays,), true for a ray that arrives."""
@@ -125,19 +133,20 @@ class Lens:
         *,
         wavelength: float | None = None,
         zoom: int = 0,
+        out: TracedRays | None = None,
     ) -> TracedRays:
         """Traces rays on all cores; other threads of Python run meanwhile.
 
         `points` and `directions` have shape (rays, 3): mm and direction cosines in the frame of the
-        first vertex. `wavelength` is in µm; the primary one if it is absent.
+        first vertex. Arrays of 64-bit numbers are read where they lie, whatever their strides: change
+        them only afterwards. `wavelength` is in µm; the primary one if it is absent. The arrays of
+        `out`, such as an earlier result for as many rays, are written again and returned.
         """
-        columns, fate, surface = _aplanat.trace_rays(
-            self._native, as_rays(points), as_rays(directions), wavelength, zoom
-        )
-        x, y, z, l, m, n, opl = columns
-        return TracedRays(
-            np.stack([x, y, z], axis=1), np.stack([l, m, n], axis=1), opl, fate, surface
-        )
+        rays = as_rays(points), as_rays(directions)
+        ends = TracedRays.allocate(len(rays[0])) if out is None else out
+        arrays = (ends.points, ends.directions, ends.opl, ends.fate, ends.surface)
+        _aplanat.trace_rays(self._native, *rays, wavelength, zoom, arrays)
+        return ends
 
     def ray_gradient(
         self,
