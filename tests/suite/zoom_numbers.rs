@@ -190,15 +190,16 @@ fn files_have_the_numbers_of_positions() {
         ("seq", [(0, Quantity::Index), (8, Quantity::SemiDiameter)]),
     ] {
         let file = folder.join(format!("aplanat-{}-zoom.{extension}", std::process::id()));
-        let report = files::save(&lens, &file).unwrap().report.unwrap();
-        let back = files::open(&file).unwrap().lens;
-        std::fs::remove_file(&file).unwrap();
+        // What the format cannot hold would change the rays, and is refused.
+        let refused = files::save(&lens, &file).unwrap_err().to_string();
+        assert!(refused.contains("zoom 1"), "{refused}");
         let mut kept = lens.clone();
         for (surface, quantity) in lost {
-            let name = Parameter::at_zoom(surface, quantity, 1).to_string();
-            assert!(report.rows.iter().any(|row| row.text == name), "{extension}: {name}");
             kept.zoom[1].remove_number(surface, quantity);
         }
+        files::save(&kept, &file).unwrap();
+        let back = files::open(&file).unwrap().lens;
+        std::fs::remove_file(&file).unwrap();
         for zoom in 0..2 {
             let [a, b] = [&kept, &back].map(|lens| lens.resolve(zoom, um).unwrap());
             for (a, b) in a.surfaces.iter().zip(&b.surfaces) {
