@@ -223,6 +223,10 @@ impl Studio {
     fn on_path_chosen(&mut self, context: &Context, request: FileRequest, path: PathBuf) {
         let search = Command::StructureSearch;
         let command = match request {
+            FileRequest::Open if dropped::is_search(&path) => {
+                self.dock.show(PanelKind::Search);
+                search(StructureSearchCommand::Follow(path))
+            }
             FileRequest::Open => Command::Open(path),
             FileRequest::InsertLens => {
                 let view = self.session.view();

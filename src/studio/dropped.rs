@@ -27,8 +27,9 @@ pub(super) fn open_actions(path: &Path) -> Result<Vec<UiAction>, String> {
     match file_kind(&path)? {
         FileKind::Lens => Ok(vec![Command::Open(path).into()]),
         FileKind::Search => {
-            let resume = StructureSearchCommand::ResumeFrom(path);
-            Ok(vec![resume.into(), panel(PanelKind::Search)])
+            // It may be running: it is shown first, and goes on here when a person asks for it.
+            let follow = StructureSearchCommand::Follow(path);
+            Ok(vec![follow.into(), panel(PanelKind::Search)])
         }
         FileKind::GrinField => {
             Ok(vec![GrinCommand::OpenFile(path).into(), panel(PanelKind::Slice)])
@@ -40,6 +41,11 @@ pub(super) fn open_actions(path: &Path) -> Result<Vec<UiAction>, String> {
              that file",
         )),
     }
+}
+
+/// True for the checkpoint of a search.
+pub(super) fn is_search(path: &Path) -> bool {
+    file_kind(path).is_ok_and(|kind| kind == FileKind::Search)
 }
 
 fn refusal(path: &Path, why: &str) -> String {

@@ -168,7 +168,7 @@ fn searching(standing: RunStatus) -> SessionView {
         checkpoint: CheckpointStatus {
             path: Some("a/b.json".into()),
             moves: Some(50),
-            error: None,
+            ..CheckpointStatus::default()
         },
     };
     view.design_score = Some(Arc::new(run.start.score.clone().unwrap()));
@@ -274,6 +274,17 @@ fn a_search_can_be_paused_stopped_saved_and_dismissed() {
     harness.get_by_label_contains("The best lens violates 1 limit;");
     harness.get_by_label_contains("Merit against iterations: 30 moments, 1 descents");
     harness.get_by_label("Elements of chain 1 against iterations: 6 now");
+}
+
+#[test]
+fn a_followed_search_says_who_runs_it_and_goes_on_here_when_asked() {
+    let mut view = searching(RunStatus::Running);
+    let run = Arc::make_mut(view.structure_search.run.snapshot.as_mut().unwrap());
+    run.checkpoint.is_followed = true;
+    let mut harness = panel(view);
+    harness.get_by_label("Followed, not run here: b.json has it up to move 50");
+    press(&mut harness, "Resume here");
+    assert_eq!(asked(&harness), [StructureSearchCommand::ResumeFrom("a/b.json".into())]);
 }
 
 #[test]

@@ -223,6 +223,50 @@ fn a_search_left_unfinished_resumes_unchanged() {
     std::fs::remove_dir_all(&folder).unwrap();
 }
 
+/// The search of another process is shown as it goes on, without writing its file; it goes on here once that
+/// process has left it.
+#[test]
+fn a_search_of_another_process_is_followed_and_then_resumed() {
+    let folder = folder("followed");
+    let path = folder.join("run.search.json");
+    let mut worker = session(double_gauss());
+    explore(&mut worker, StructureSearchCommand::SaveTo(path.clone()));
+    start(&mut worker, None);
+    wait(&mut worker, "a move", |view, _| moves(view) > 0);
+
+    let mut watcher = session(double_gauss());
+    explore(&mut watcher, StructureSearchCommand::Follow(path.clone()));
+    wait(&mut watcher, "what was saved", |view, _| moves(view) > 0);
+    let seen = moves(&watcher.view());
+    wait(&mut watcher, "what is saved since", |view, _| moves(view) > seen + 2);
+    assert!(run(&watcher).checkpoint.is_followed && !run(&watcher).lineage.is_empty());
+    let reheat = StructureSearchCommand::Control(SteerCommand::Reheat);
+    explore(&mut watcher, reheat);
+    wait(&mut watcher, "a refusal", |view, _| {
+        view.messages
+            .last()
+            .is_some_and(|said| said.text.starts_with("this search is followed, not run here"))
+    });
+    explore(&mut watcher, StructureSearchCommand::ResumeFrom(path.clone()));
+    stands(&mut watcher, RunStatus::Failed);
+
+    explore(&mut worker, StructureSearchCommand::Stop);
+    stands(&mut worker, RunStatus::Stopped);
+    let last = moves(&worker.view());
+    drop(worker);
+    let bytes = std::fs::read(&path).unwrap();
+    explore(&mut watcher, StructureSearchCommand::Follow(path.clone()));
+    wait(&mut watcher, "the end of it", |view, _| moves(view) == last);
+    explore(&mut watcher, StructureSearchCommand::Stop);
+    stands(&mut watcher, RunStatus::Stopped);
+    assert_eq!(std::fs::read(&path).unwrap(), bytes, "who follows does not write");
+    explore(&mut watcher, StructureSearchCommand::ResumeFrom(path.clone()));
+    wait(&mut watcher, "moves of its own", |view, _| moves(view) > last);
+    assert!(!run(&watcher).checkpoint.is_followed);
+    drop(watcher);
+    std::fs::remove_dir_all(&folder).unwrap();
+}
+
 #[test]
 fn a_dismissed_search_with_light_per_field_can_be_resumed() {
     let folder = folder("forgotten");

@@ -184,7 +184,9 @@ impl Session {
         }
         let starts = matches!(
             command,
-            StructureSearchCommand::Start(_) | StructureSearchCommand::ResumeFrom(_)
+            StructureSearchCommand::Start(_)
+                | StructureSearchCommand::ResumeFrom(_)
+                | StructureSearchCommand::Follow(_)
         );
         if starts {
             self.preview_lens = None;

@@ -11,7 +11,7 @@ use crate::session::run::{Engine, EventSender, RunKind, RunStatus, catch_panic};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::thread;
-use std::time::Duration;
+use std::time::{Duration, SystemTime};
 
 /// The shortest time between two checkpoints.
 const SAVE_INTERVAL: Duration = Duration::from_secs(1);
@@ -19,6 +19,8 @@ const SAVE_INTERVAL: Duration = Duration::from_secs(1);
 const EXAMINE_INTERVAL: Duration = Duration::from_secs(5);
 /// The largest part of the time that checkpoints take.
 const SAVE_SHARE: f64 = 0.05;
+/// The time between two looks at the file of another process.
+const FOLLOW_INTERVAL: Duration = Duration::from_millis(200);
 
 /// A search to start or to resume.
 #[derive(Debug)]
@@ -27,6 +29,8 @@ pub(super) enum StructureSearchInput {
     New { lens: Arc<Lens>, request: Box<StructureSearchRequest>, path: Option<PathBuf> },
     /// The search of a checkpoint.
     Saved(PathBuf),
+    /// The search that another process saves in a checkpoint, shown as far as that is.
+    Followed(PathBuf),
 }
 
 /// A request to a search.
@@ -62,6 +66,8 @@ pub(super) struct StructureSearchEngine {
     examinations: Throttle,
     /// The exclusive use of the checkpoint, from the first time that it is saved or loaded.
     lock: Option<FileLock>,
+    /// The checkpoint of another process that is shown.
+    followed: Option<FollowedFile>,
     /// True after an error, when the search is not to be saved any more.
     is_broken: bool,
     sender: EventSender<StructureSearchReport>,
@@ -72,22 +78,30 @@ impl StructureSearchEngine {
         input: StructureSearchInput,
         sender: &EventSender<StructureSearchReport>,
     ) -> Result<Self, String> {
-        let (search, request, mut sidecar, path, lock) = match input {
+        let (search, request, mut sidecar, path, lock, followed) = match input {
             StructureSearchInput::New { lens, request, path } => {
                 let search = LensSearch::new(&lens, &request).map_err(|why| why.to_string())?;
                 let minutes = request.minutes;
                 let sidecar = CheckpointSidecar { minutes, ..CheckpointSidecar::default() };
-                (search, *request, sidecar, path, None)
+                (search, *request, sidecar, path, None, None)
             }
             StructureSearchInput::Saved(path) => {
                 let lock = FileLock::acquire(&path).map_err(|why| why.to_string())?;
                 let (search, request, sidecar) =
                     LensSearch::resume(&path).map_err(|why| why.to_string())?;
-                (search, request, sidecar, Some(path), Some(lock))
+                (search, request, sidecar, Some(path), Some(lock), None)
+            }
+            StructureSearchInput::Followed(path) => {
+                let followed = FollowedFile::new(path.clone());
+                let (search, request, sidecar) =
+                    LensSearch::resume(&path).map_err(|why| why.to_string())?;
+                (search, request, sidecar, Some(path), None, Some(followed))
             }
         };
         let mut state = StructureSearchSnapshot::new(request, &search.run, path);
         state.start_violations = violations(&search, &search.run.start().point);
+        state.checkpoint.is_followed = followed.is_some();
+        state.checkpoint.moves = followed.is_some().then(|| search.run.statistics().moves);
         sidecar.history.begin(&search.run);
         let mut saves = Throttle::new(SAVE_INTERVAL);
         saves.ready();
@@ -100,6 +114,7 @@ impl StructureSearchEngine {
             saves,
             examinations,
             lock,
+            followed,
             is_broken: false,
             sender: sender.clone(),
         })
@@ -121,12 +136,20 @@ impl StructureSearchEngine {
     }
 
     fn control(&mut self, command: SteerCommand) {
+        if self.followed.is_some() {
+            let why = "this search is followed, not run here: it cannot be steered";
+            return self.sender.report(StructureSearchReport::Rejected(why.to_owned()));
+        }
         if let Err(why) = self.search.control(command) {
             self.sender.report(StructureSearchReport::Rejected(why.to_string()));
         }
     }
 
     fn save_to(&mut self, path: PathBuf) {
+        if self.followed.is_some() {
+            let why = "this search is followed, not run here: resume it here to save it elsewhere";
+            return self.sender.report(StructureSearchReport::Rejected(why.to_owned()));
+        }
         self.lock = None;
         self.state.checkpoint.path = Some(path);
         self.state.checkpoint.moves = None;
@@ -135,7 +158,7 @@ impl StructureSearchEngine {
 
     /// Writes the checkpoint, and reports a failure once.
     fn save(&mut self) {
-        if self.is_broken {
+        if self.is_broken || self.followed.is_some() {
             return;
         }
         let error = catch_panic(|| Ok(self.try_save())).unwrap_or_else(Some);
@@ -145,6 +168,23 @@ impl StructureSearchEngine {
             self.sender.report(StructureSearchReport::NotSaved(text));
         }
         self.state.checkpoint.error = error;
+    }
+
+    /// Takes over what another process has saved since the last time.
+    fn follow(&mut self) {
+        let Some(path) = self.followed.as_mut().and_then(FollowedFile::changed) else {
+            return thread::sleep(FOLLOW_INTERVAL);
+        };
+        match LensSearch::resume(&path) {
+            Ok((search, request, mut sidecar)) => {
+                sidecar.history.begin(&search.run);
+                self.state.request = Arc::new(request);
+                self.state.checkpoint.moves = Some(search.run.statistics().moves);
+                self.state.checkpoint.error = None;
+                (self.search, self.sidecar) = (search, sidecar);
+            }
+            Err(why) => self.state.checkpoint.error = Some(why.to_string()),
+        }
     }
 
     /// Writes the checkpoint if there is a file for it; the reason if that failed.
@@ -190,8 +230,15 @@ impl Engine for StructureSearchEngine {
     type Report = StructureSearchReport;
     type Snapshot = StructureSearchSnapshot;
 
-    /// One turn of every chain.
+    /// One turn of every chain, or a look at the file of another process.
     fn step(&mut self) -> Result<bool, String> {
+        if self.followed.is_some() {
+            self.follow();
+            if self.examinations.ready() {
+                self.evaluate_best();
+            }
+            return Ok(false);
+        }
         let before = self.search.run.statistics().gradients;
         let Timed { value: events, ms } = time(|| self.search.round());
         self.sidecar.seconds += 1e-3 * ms;
@@ -243,6 +290,32 @@ impl Engine for StructureSearchEngine {
     fn close(&mut self) {
         self.save();
     }
+}
+
+/// A checkpoint that another process writes.
+struct FollowedFile {
+    path: PathBuf,
+    /// The time of the version that was read last.
+    modified: Option<SystemTime>,
+}
+
+impl FollowedFile {
+    fn new(path: PathBuf) -> Self {
+        let modified = modified(&path);
+        Self { path, modified }
+    }
+
+    /// The path if the file is another one than at the last time; a file that is gone is waited for.
+    fn changed(&mut self) -> Option<PathBuf> {
+        let modified = modified(&self.path);
+        let is_new = modified.is_some() && modified != self.modified;
+        self.modified = modified.or(self.modified);
+        is_new.then(|| self.path.clone())
+    }
+}
+
+fn modified(path: &Path) -> Option<SystemTime> {
+    std::fs::metadata(path).and_then(|data| data.modified()).ok()
 }
 
 /// The constraints that a lens violates.

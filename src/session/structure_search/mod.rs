@@ -94,6 +94,9 @@ impl StructureSearchState {
             StructureSearchCommand::ResumeFrom(path) => {
                 self.start(StructureSearchInput::Saved(restore_dismissed(path)?));
             }
+            StructureSearchCommand::Follow(path) => {
+                self.start(StructureSearchInput::Followed(path));
+            }
             StructureSearchCommand::Pause => self.run.pause(),
             StructureSearchCommand::Resume => self.run.resume(),
             StructureSearchCommand::Stop => self.run.stop(),
@@ -233,6 +236,8 @@ pub enum StructureSearchCommand {
     Start(Box<StructureSearchRequest>),
     /// Resumes the search of a file.
     ResumeFrom(PathBuf),
+    /// Shows the search that another process saves in a file, as it goes on.
+    Follow(PathBuf),
     /// Pauses the search after its current round.
     Pause,
     /// Resumes the search.

@@ -71,8 +71,10 @@ pub struct CheckpointStatus {
     pub path: Option<PathBuf>,
     /// The number of local moves in the file; `None` before it was written.
     pub moves: Option<u64>,
-    /// The reason why the last save has failed.
+    /// The reason why the last save has failed; of a followed search, why it could not be read.
     pub error: Option<String>,
+    /// True if another process runs and saves the search.
+    pub is_followed: bool,
 }
 
 /// A lens of the search.

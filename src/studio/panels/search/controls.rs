@@ -114,7 +114,7 @@ fn violations(ui: &mut Ui, run: &StructureSearchSnapshot) {
 }
 
 /// The progress of the search.
-pub(super) fn progress(ui: &mut Ui, search: ShownSearch<'_>) {
+pub(super) fn progress(ui: &mut Ui, search: ShownSearch<'_>, actions: &mut Actions) {
     let ShownSearch { view, run } = search;
     let text = text::status_text(run, view.structure_search.run.status);
     match run.fraction_done() {
@@ -135,7 +135,19 @@ pub(super) fn progress(ui: &mut Ui, search: ShownSearch<'_>) {
     let path = run.checkpoint.path.as_ref().map(|path| path.display().to_string());
     let label = Label::new(RichText::new(text).small().color(color)).truncate();
     ui.add(label).on_hover_text(path.unwrap_or_default());
+    resume_followed(ui, run, actions);
     violations(ui, run);
+}
+
+/// Offers to continue a search that another process has saved.
+fn resume_followed(ui: &mut Ui, run: &StructureSearchSnapshot, actions: &mut Actions) {
+    let path = run.checkpoint.path.as_ref().filter(|_| run.checkpoint.is_followed);
+    let Some(path) = path else { return };
+    let hint = "Continue this search in this window, which then saves it; refused while a process of this \
+                machine runs it";
+    if ui.button("Resume here").on_hover_text(hint).clicked() {
+        actions.push(StructureSearchCommand::ResumeFrom(path.clone()));
+    }
 }
 
 /// The live controls: the temperature where there is room, the chain that is previewed, and the

@@ -127,7 +127,7 @@ impl Panel for SearchPanel {
         let run = view.structure_search.run.snapshot.as_deref();
         let search = run.map(|run| ShownSearch { view, run });
         if let Some(search) = search {
-            controls::progress(ui, search);
+            controls::progress(ui, search, actions);
         } else if view.structure_search.run.is_active() {
             ui.weak("Preparing…");
         }

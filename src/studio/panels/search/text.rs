@@ -78,10 +78,15 @@ pub(super) fn violations_text(lens: &str, count: usize) -> String {
 
 /// The file of the search; true if writing it has failed.
 pub(super) fn checkpoint_text(checkpoint: &CheckpointStatus) -> (String, bool) {
-    if let Some(why) = &checkpoint.error {
-        return (format!("Not saved: {why}"), true);
-    }
     let name = checkpoint.path.as_ref().and_then(|path| path.file_name());
+    if let Some(why) = &checkpoint.error {
+        let what = if checkpoint.is_followed { "Not read" } else { "Not saved" };
+        return (format!("{what}: {why}"), true);
+    }
+    if let (true, Some(name), Some(moves)) = (checkpoint.is_followed, name, checkpoint.moves) {
+        let name = name.to_string_lossy();
+        return (format!("Followed, not run here: {name} has it up to move {moves}"), false);
+    }
     match (name, checkpoint.moves) {
         (None, _) => ("Not saved: no file is chosen".to_owned(), false),
         (Some(name), None) => (format!("Will be saved to {}", name.to_string_lossy()), false),
