@@ -235,7 +235,14 @@ impl<'a> EdgeSearch<'a> {
             let inside = secant > low && secant < high && slow < 3;
             let r = if inside { secant } else { low + 0.5 * width };
             if (r - last).abs() <= ROUNDING * high || r <= low || r >= high {
-                return EdgePoint { radius: r, limit };
+                let Some(closer) = self.closer_limit(azimuth, low, EdgePoint { radius: r, limit })
+                else {
+                    return EdgePoint { radius: r, limit };
+                };
+                (high, limit, at_high) = closer;
+                at_low = self.probe(azimuth, low, limit).margin_at_limit;
+                (last, slow) = (f64::INFINITY, 0);
+                continue;
             }
             last = r;
             let probe = self.probe(azimuth, r, limit);
@@ -257,6 +264,22 @@ impl<'a> EdgeSearch<'a> {
             slow = if high - low > 0.5 * width { slow + 1 } else { 0 };
         }
         EdgePoint { radius: low, limit }
+    }
+
+    /// A limit that ends the pupil before an edge that was approached from outside, with a radius at which
+    /// it does and the margin there; `low` is a radius that passes.
+    fn closer_limit(
+        &mut self,
+        azimuth: f64,
+        low: f64,
+        edge: EdgePoint,
+    ) -> Option<(f64, PupilLimit, f64)> {
+        let inside = edge.radius * (1.0 - INSIDE);
+        if inside <= low {
+            return None;
+        }
+        let (limit, margin) = self.probe(azimuth, inside, edge.limit).failed?;
+        (limit != edge.limit).then_some((inside, limit, margin))
     }
 
     /// The margin of a ray at one limit; NaN if it does not get there.
@@ -405,12 +428,21 @@ impl<'a> EdgeSearch<'a> {
         }
         let half = end < 1.5 * PI;
         margins.truncate(if half { azimuths + 1 } else { azimuths });
+        let azimuth_of = |place: f64| {
+            if half { (step * place).clamp(0.0, end) } else { (step * place).rem_euclid(end) }
+        };
         for dip in margin_minima(&margins, half) {
-            let azimuth =
-                if half { (step * dip).clamp(0.0, end) } else { (step * dip).rem_euclid(end) };
-            let distance = |sample: &&(f64, EdgePoint)| (sample.0 - azimuth).abs();
-            let near = samples.iter().min_by(|a, b| distance(a).total_cmp(&distance(b)))?;
-            samples.push((azimuth, self.edge(azimuth, near.1.radius, 0.02)?));
+            let near = samples[dip.ray].1;
+            let place = dip.lowest(|place| {
+                let azimuth = azimuth_of(place);
+                let edge = self.edge(azimuth, near.radius, 0.02)?;
+                self.rays += 1;
+                let inside = self.frame.point(azimuth, edge.radius * (1.0 - INSIDE));
+                let margins = self.launch.margins_if_passing(inside)?;
+                margins.get(dip.margin).copied().filter(|_| edge.limit == near.limit)
+            });
+            let azimuth = azimuth_of(place);
+            samples.push((azimuth, self.edge(azimuth, near.radius, 0.02)?));
         }
         samples.sort_by(|a, b| a.0.total_cmp(&b.0));
         samples.dedup_by(|a, b| a.0 == b.0);
@@ -455,10 +487,76 @@ fn hides_light(a: EdgePoint, b: EdgePoint) -> bool {
     jump && (shadow(a) || shadow(b))
 }
 
-/// The minima of margins between rays at equal steps of azimuth, in steps from the first: the
-/// vertices of the parabolas through a least margin and its neighbours, if they are much lower than
-/// that. Over half a turn the rays beyond its ends are mirror images.
-pub(super) fn margin_minima(margins: &[Vec<f64>], half: bool) -> Vec<f64> {
+/// A minimum of a margin between rays at equal steps of azimuth.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct MarginMinimum {
+    /// The ray at which the margin is least.
+    ray: usize,
+    /// The number of the margin.
+    pub(super) margin: usize,
+    /// The margins of that ray and of those beside it.
+    values: [f64; 3],
+}
+
+/// A minimum below this part of the least margin of a ray may be an arc of another limit, however short.
+const NEARLY_ENDING: f64 = 0.05;
+/// The largest number of parabolas to a minimum, and the step to the next one, in steps of azimuth, at
+/// which it is found.
+const PARABOLAS: usize = 8;
+const FOUND: f64 = 1e-4;
+
+impl MarginMinimum {
+    /// The rays of the first parabola: their places in steps of azimuth, and their margins.
+    fn rays(&self) -> [[f64; 2]; 3] {
+        let at = self.ray as f64;
+        [[at - 1.0, self.values[0]], [at, self.values[1]], [at + 1.0, self.values[2]]]
+    }
+
+    /// The place of the minimum in steps of azimuth. One that is low is followed by ever narrower
+    /// parabolas, to the first ray that has not this margin: `margin` gives `None`.
+    pub(super) fn lowest(&self, mut margin: impl FnMut(f64) -> Option<f64>) -> f64 {
+        let mut rays = self.rays();
+        let Some([mut place, bottom]) = vertex(rays) else { return rays[1][0] };
+        if bottom > NEARLY_ENDING * self.values[1] {
+            return place;
+        }
+        for _ in 0..PARABOLAS {
+            let Some(value) = margin(place) else { return place };
+            let Some(next) = narrower(rays, [place, value]) else { return place };
+            rays = next;
+            match vertex(rays) {
+                Some([at, _]) if (at - place).abs() > FOUND => place = at,
+                _ => return place,
+            }
+        }
+        place
+    }
+}
+
+/// The place and the value of the minimum of the parabola through three points; `None` without one.
+fn vertex([a, b, c]: [[f64; 2]; 3]) -> Option<[f64; 2]> {
+    let slopes = [(b[1] - a[1]) / (b[0] - a[0]), (c[1] - b[1]) / (c[0] - b[0])];
+    let bend = (slopes[1] - slopes[0]) / (c[0] - a[0]);
+    let slope = slopes[0] + bend * (b[0] - a[0]);
+    let place = b[0] - 0.5 * slope / bend;
+    let is_between = place > a[0] && place < c[0];
+    (bend > 0.0 && is_between).then(|| [place, b[1] - 0.25 * slope * slope / bend])
+}
+
+/// The three points about the least one of four; `None` if that is at an end.
+fn narrower([a, b, c]: [[f64; 2]; 3], new: [f64; 2]) -> Option<[[f64; 2]; 3]> {
+    let mut all = [a, b, c, new];
+    all.sort_by(|a, b| a[0].total_cmp(&b[0]));
+    let middle = if all[1][1] <= all[2][1] { 1 } else { 2 };
+    let around = [all[middle - 1], all[middle], all[middle + 1]];
+    let apart = around[0][0] < around[1][0] && around[1][0] < around[2][0];
+    (apart && around[1][1] <= around[0][1] && around[1][1] <= around[2][1]).then_some(around)
+}
+
+/// The minima of margins between rays at equal steps of azimuth: where the parabola through a least margin
+/// and its neighbours is much lower than that. Over half a turn the rays beyond its ends are mirror
+/// images.
+pub(super) fn margin_minima(margins: &[Vec<f64>], half: bool) -> Vec<MarginMinimum> {
     let count = margins.len();
     let mut dips = Vec::new();
     for i in 0..count {
@@ -468,17 +566,15 @@ pub(super) fn margin_minima(margins: &[Vec<f64>], half: bool) -> Vec<f64> {
             _ => ((i + count - 1) % count, (i + 1) % count),
         };
         let neighbours = margins[before].iter().zip(&margins[i]).zip(&margins[after]);
-        for ((left, here), right) in neighbours {
-            let (left, here, right) = (*left, *here, *right);
-            let bend = left - 2.0 * here + right;
+        for (margin, ((left, here), right)) in neighbours.enumerate() {
+            let values = [*left, *here, *right];
+            let [left, here, right] = values;
             // A margin that ends the pupil here is zero but for rounding, and not a minimum.
             let open = here > ENDING * left.max(right);
-            if open && here <= left && here <= right && bend > 0.0 {
-                let place = 0.5 * (left - right) / bend;
-                let bottom = here - 0.25 * (left - right) * place;
-                if bottom < 0.5 * here {
-                    dips.push(i as f64 + place);
-                }
+            let minimum = MarginMinimum { ray: i, margin, values };
+            let is_low = |[_, bottom]: [f64; 2]| bottom < 0.5 * here;
+            if open && here <= left && here <= right && vertex(minimum.rays()).is_some_and(is_low) {
+                dips.push(minimum);
             }
         }
     }

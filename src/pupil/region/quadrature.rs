@@ -325,8 +325,9 @@ pub fn converge_resolved(
     converge_orders(region, accuracy, &orders[coarse.min(most)..], least, numbers, scales)
 }
 
-/// The same with every order in turn, of which the numbers and their derivatives need the last: from the
-/// coarse ones on, whose changes leave a larger part in the errors of those that follow.
+/// The same with every order in turn, of which the derivatives of the numbers need the last: from the coarse
+/// ones on, whose changes leave a larger part in the errors of those that follow. It ends at an order that
+/// [`converge`] compares too, and its errors are at least those.
 pub fn converge_every_order(
     region: &Region<'_>,
     accuracy: Accuracy,
@@ -347,28 +348,28 @@ fn converge_orders(
 ) -> Option<ConvergedList> {
     let mut rays = region.rays;
     let mut before: Option<ConvergedList> = None;
-    let (mut changes, needed) = (0, if region.is_sampled() { 1 } else { 2 });
+    let (mut every, mut compared) = (OrderChanges::new(region), OrderChanges::new(region));
+    let compared_orders = region.compared_orders();
     for &order in orders {
         let nodes = region.nodes(order);
         let cost = nodes.points.len() + nodes.rays;
-        if changes >= needed && rays + cost > accuracy.max_rays {
+        if compared.is_told() && rays + cost > accuracy.max_rays {
             break;
         }
         rays += cost;
         let Some(values) = numbers(&nodes) else { continue };
-        changes += usize::from(before.is_some());
-        let mut errors = before.map_or_else(
-            || vec![f64::INFINITY; values.len()],
-            |last| last.changes(region, &values),
-        );
         let is_resolved = region.radial_nodes(order) >= least;
-        if !is_resolved {
-            errors.iter_mut().zip(&values).for_each(|(error, v)| *error = error.max(v.abs()));
+        let unresolved = |k: usize| if is_resolved { 0.0 } else { values[k].abs() };
+        every.add(&values, unresolved);
+        let is_compared = compared_orders.contains(&order);
+        if is_compared {
+            compared.add(&values, unresolved);
         }
+        let error = |k: usize| every.error_of(k).max(compared.error_of(k));
+        let errors: Vec<f64> = (0..values.len()).map(error).collect();
         let allowed = scales(&values).into_iter().map(|scale| accuracy.tolerance * scale.abs());
         let small = errors.iter().zip(allowed).all(|(error, allowed)| *error <= allowed);
-        // A first change alone does not tell an agreement by chance.
-        let converged = small && is_resolved && changes >= needed;
+        let converged = small && is_resolved && is_compared && compared.is_told();
         let now = ConvergedList { values, errors, rays, converged };
         if converged {
             return Some(now);
@@ -378,12 +379,43 @@ fn converge_orders(
     before
 }
 
-impl ConvergedList {
-    /// The errors of the numbers at the next order, from their changes.
-    fn changes(&self, region: &Region<'_>, values: &[f64]) -> Vec<f64> {
+/// The changes of some numbers from order to order, and the errors that follow from them.
+struct OrderChanges {
+    /// The error of an order from its change and the error before.
+    error: fn(f64, f64) -> f64,
+    /// The changes that are needed: a first one alone does not tell an agreement by chance.
+    needed: usize,
+    orders: usize,
+    values: Vec<f64>,
+    errors: Vec<f64>,
+}
+
+impl OrderChanges {
+    fn new(region: &Region<'_>) -> Self {
         let error = if region.is_sampled() { sampling_error } else { order_error };
-        let change = |k: usize| (values[k] - self.values[k]).abs();
-        (0..values.len()).map(|k| error(change(k), self.errors[k])).collect()
+        let needed = if region.is_sampled() { 1 } else { 2 };
+        Self { error, needed, orders: 0, values: Vec::new(), errors: Vec::new() }
+    }
+
+    /// Adds the numbers of the next order; the error of number `k` is at least `least(k)`.
+    fn add(&mut self, values: &[f64], least: impl Fn(usize) -> f64) {
+        let error = |k: usize| match self.values.get(k) {
+            Some(last) => (self.error)((values[k] - last).abs(), self.errors[k]).max(least(k)),
+            None => f64::INFINITY,
+        };
+        self.errors = (0..values.len()).map(error).collect();
+        self.values = values.to_vec();
+        self.orders += 1;
+    }
+
+    /// The error of number `k`; infinite before there is any.
+    fn error_of(&self, k: usize) -> f64 {
+        self.errors.get(k).copied().unwrap_or(f64::INFINITY)
+    }
+
+    /// True if there are as many changes as are needed.
+    fn is_told(&self) -> bool {
+        self.orders > self.needed
     }
 }
 

@@ -79,12 +79,19 @@ impl Launch<'_> {
             margins.push(found);
         }
         *rays += 1;
-        let dips = margin_minima(&margins, half);
-        *rays += dips.len();
+        let mut margins_at = |p: [f64; 2]| {
+            *rays += 1;
+            self.margins_if_passing(p)
+        };
+        let passes_dips = margin_minima(&margins, half).into_iter().all(|dip| {
+            let margin = |place: f64| margins_at(rim_point(step * place))?.get(dip.margin).copied();
+            let place = dip.lowest(margin);
+            margins_at(rim_point(step * place)).is_some()
+        });
         let passes = |p: [f64; 2]| self.margins_if_passing(p).is_some();
         *rays += shadows.len();
         passes([0.0, 0.0])
-            && dips.into_iter().all(|dip| passes(rim_point(step * dip)))
+            && passes_dips
             && shadows.iter().all(|shadow| shadow.is_some_and(|p| passes(nearest_in_disc(p))))
     }
 }

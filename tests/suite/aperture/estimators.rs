@@ -165,3 +165,23 @@ fn a_connected_pupil_selects_the_boundary_estimator() {
         assert!(reason.contains("one piece"), "{reason}");
     }
 }
+
+/// A limit that ends the pupil over so few azimuths that the rays along the edge miss it has an arc of its
+/// own: without it low orders agree with each other, and not with high ones.
+#[test]
+fn an_arc_between_the_rays_of_the_edge_is_found() {
+    for (name, part) in [("more/zoom_canon_ef_21_34_f28", 1.0), ("more/telescope_jwst_f166", 0.9)] {
+        let model = model(name, 0);
+        let region = Region::new(launch(&model, part));
+        let [low, high] = [7, 13].map(|order| {
+            let lit = region.trace_pupil(order);
+            lit.boundary_derivative(&QuadraticIntegrand::throughput()).unwrap()
+        });
+        for slot in SurfaceParameter::all() {
+            let pairs = low.of_kind(slot).zip(high.of_kind(slot));
+            let off = pairs.map(|(low, high)| (low - high).abs()).fold(0.0, f64::max);
+            let largest = high.largest(slot).max(FLOOR);
+            assert!(off <= 1e-7 * largest, "{slot:?} of {name}: {off:e} of {largest:e}");
+        }
+    }
+}

@@ -5,10 +5,11 @@ use aplanat::analysis::{Estimate, point_spread, rounding_error, spot};
 use aplanat::effects::{
     self, Effect, EffectOverride, EffectOverrides, EffectPlan, TracePurpose, build_ray_model_at,
 };
-use aplanat::lens::{FieldPoint, Lens};
+use aplanat::lens::{FieldPoint, Goal, Lens, LimitTreatment, PupilEdge, Term, WeightedTerm};
+use aplanat::merit::{Merit, MeritError, TermValue};
 use aplanat::pupil::{
     Accuracy, ConvergedValues, DerivativeEstimator, Nodes, PupilDerivative, QuadraticIntegrand,
-    RayModel, Region, choose_estimator, converge, differentiate,
+    RayModel, Region, RegionKind, choose_estimator, converge, differentiate,
 };
 use aplanat::trace::SurfaceParameter;
 
@@ -53,6 +54,70 @@ fn stated_errors_hold_what_a_higher_order_changes() {
     .into_iter()
     .sum();
     assert!(compared > 188 * 27, "{compared}");
+}
+
+/// The same for the spots of a merit function, one field and one colour at a time.
+#[test]
+fn stated_errors_of_merit_functions_hold_what_more_rays_change() {
+    let goal = Goal {
+        terms: vec![WeightedTerm::new(Term::Spot, 1.0)],
+        zoom_ratios: Vec::new(),
+        limits: LimitTreatment::default(),
+        pupil: PupilEdge::default(),
+    };
+    let compared: usize = check_every_lens(|lens, model| {
+        let mut compared = 0;
+        for field in
+            [model.fields[0], FieldPoint { y: 0.4 * edge(model).y, ..edge(model) }, edge(model)]
+        {
+            let mut single = lens.clone();
+            single.fields.values = vec![field];
+            single.wavelengths = vec![lens.wavelengths[model.primary]];
+            let square = |tolerance| -> Result<TermValue, MeritError> {
+                let merit = Merit::new(&single, &goal, tolerance)?;
+                Ok(merit.terms(&merit.values(&single))?.remove(0))
+            };
+            // A field between those of the lens may be dark.
+            let Ok(exact) = square(1e-6) else { continue };
+            for tolerance in [3e-2, 1e-2, 1e-3] {
+                let rough = square(tolerance).map_err(text)?;
+                let error =
+                    rough.error + exact.error + 1e-12 * exact.value + rounding_error(model).powi(2);
+                let what = format!("spot at {}, to {tolerance}", field.y);
+                near(&what, rough.value, exact.value, error)?;
+                compared += 1;
+            }
+        }
+        Ok(compared)
+    })
+    .into_iter()
+    .sum();
+    assert!(compared > 188 * 8, "{compared}");
+}
+
+/// Every arc of the edge is found, however short: the area of the light is then the same at all high orders,
+/// but for rounding.
+#[test]
+fn no_arc_of_an_edge_is_missed() {
+    let compared: usize = check_every_lens(|_, model| {
+        let mut compared = 0;
+        for part in [0.2, 0.4, 0.6, 0.7, 0.9, 1.0] {
+            let field = FieldPoint { y: part * edge(model).y, ..edge(model) };
+            for wavelength in 0..model.channels.len() {
+                // A field between those of the lens may be dark.
+                let Ok(launch) = model.launch(field, wavelength) else { continue };
+                let region = Region::new(launch);
+                let RegionKind::StarShaped(_) = region.kind else { continue };
+                let [low, high] = [8, 10].map(|order| region.moments(&region.nodes(order)).area);
+                near(&format!("area at {part}, {wavelength}"), low, high, 1e-10 * high)?;
+                compared += 1;
+            }
+        }
+        Ok(compared)
+    })
+    .into_iter()
+    .sum();
+    assert!(compared > 1000, "{compared}");
 }
 
 /// The same for images by diffraction, those of lenses far from the limit too: about a quarter of all lenses.
