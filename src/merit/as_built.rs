@@ -146,6 +146,17 @@ impl NumberEffects {
         Self { by_number, slopes: found.slopes }
     }
 
+    /// For x and y and each number, the sum of the effects of all numbers, each by its covariance with it.
+    fn covaried(&self, covariance: &NumberCovariance) -> [Vec<Vec<f64>>; 2] {
+        let row = |rows: &[Vec<f64>], covariances: &[(usize, f64)]| {
+            let mut sum = Vec::new();
+            combine(covariances, rows, &mut sum);
+            sum
+        };
+        let all = |rows: &Vec<Vec<f64>>| covariance.rows.iter().map(|c| row(rows, c)).collect();
+        [all(&self.by_number[0]), all(&self.by_number[1])]
+    }
+
     /// Subtracts the values at the centroid of the field of some rays.
     fn center(&mut self, rays: Range<usize>, center: &FieldCenter) {
         for axis in 0..2 {
@@ -168,6 +179,8 @@ struct FieldCenter {
 struct MadeChannel {
     tracer: Tracer<f64>,
     effects: NumberEffects,
+    /// For x and y and each number, the sum of the effects of all numbers, each by its covariance with it.
+    covaried: [Vec<Vec<f64>>; 2],
     /// The weight of each ray in the term.
     weights: Vec<f64>,
     /// The index less that at the primary wavelength, behind each surface.
@@ -236,6 +249,7 @@ impl<'a> Growth<'a> {
             by_slopes: 0.0,
         };
         growth.center_fields();
+        growth.channels.par_iter_mut().for_each(|channel| channel.covary(&growth.covariance));
         growth.find_focus();
         growth.find_value(*travel);
         Ok(growth)
@@ -317,7 +331,7 @@ impl<'a> Growth<'a> {
     /// Finds the growth and its derivatives by the sums that it consists of.
     fn find_value(&mut self, travel: f64) {
         let channels = self.channels.par_iter();
-        let squares: Vec<f64> = channels.map(|c| c.mean_square(&self.covariance)).collect();
+        let squares: Vec<f64> = channels.map(MadeChannel::mean_square).collect();
         let slopes: f64 = self.channels.iter().map(MadeChannel::slope_square).sum();
         let focus: f64 = self.focus.iter().zip(&self.covaried_focus).map(|(a, b)| a * b).sum();
         let variance = focus / (slopes * slopes);
@@ -360,12 +374,11 @@ impl<'a> Growth<'a> {
         let mut of_index = SystemGradient::zero(surfaces);
         let mut primary = SystemGradient::zero(surfaces);
         for axis in 0..2 {
-            let displaced = self.displaced(channel, axis);
-            self.add_lever_arms(channel, axis, &displaced, &mut primary);
+            self.add_lever_arms(channel, axis, &mut primary);
             let mut direction = Vec::new();
             for (place, MadeNumber { surface, kind }) in self.covariance.numbers.iter().enumerate()
             {
-                combine(&self.covariance.rows[place], &displaced, &mut direction);
+                self.displaced(channel, axis, place, &mut direction);
                 let (number, factor) = match kind {
                     MadeKind::Number(number) => (*number, 1.0),
                     MadeKind::Abbe => (ErrorNumber::Index, -channel.dispersion[*surface]),
@@ -392,14 +405,12 @@ impl<'a> Growth<'a> {
         place.map_or(&[], |place| &channel.effects.by_number[axis][place])
     }
 
-    /// For each number its effects, with the part that is due to the displacement of the focus.
-    fn displaced(&self, channel: &MadeChannel, axis: usize) -> Vec<Vec<f64>> {
-        let slopes = &channel.effects.slopes[axis];
-        let row = |(row, focus): (&Vec<f64>, &f64)| {
-            let factor = self.by_focus * focus;
-            row.iter().zip(slopes).map(|(effect, slope)| effect + factor * slope).collect()
-        };
-        channel.effects.by_number[axis].iter().zip(&self.focus).map(row).collect()
+    /// The covaried effects of a number, with the part that is due to the displacement of the focus.
+    fn displaced(&self, channel: &MadeChannel, axis: usize, place: usize, sum: &mut Vec<f64>) {
+        let factor = self.by_focus * self.covaried_focus[place];
+        let pairs = channel.covaried[axis][place].iter().zip(&channel.effects.slopes[axis]);
+        sum.clear();
+        sum.extend(pairs.map(|(effect, slope)| effect + factor * slope));
     }
 
     /// The derivative of the growth by the slope of each ray.
@@ -426,14 +437,17 @@ impl<'a> Growth<'a> {
         &self,
         channel: &MadeChannel,
         axis: usize,
-        displaced: &[Vec<f64>],
         gradient: &mut SystemGradient<f64>,
     ) {
+        let (effects, slopes) = (&channel.effects.by_number[axis], &channel.effects.slopes[axis]);
         let mut tilted = Vec::new();
         for body in &self.covariance.bodies {
-            combine(&body.changes, displaced, &mut tilted);
+            combine(&body.changes, effects, &mut tilted);
+            let focus: f64 = body.changes.iter().map(|(place, by)| by * self.focus[*place]).sum();
+            let factor = self.by_focus * focus;
+            tilted.iter_mut().zip(slopes).for_each(|(to, slope)| *to += factor * slope);
             for arm in &body.arms {
-                let shifted = &channel.effects.by_number[axis][arm.number];
+                let shifted = &effects[arm.number];
                 let product = weighted_dot(&channel.weights, &tilted, shifted);
                 let by_distance = 2.0 * body.variance * arm.sign * product;
                 gradient.surfaces[arm.first].curvature += by_distance * arm.by_curvature;
@@ -449,7 +463,7 @@ impl<'a> Growth<'a> {
             return Ok(DVector::zeros(self.context.values.len()));
         }
         let of_channels: Vec<Vec<f64>> =
-            self.channels.par_iter().map(|channel| self.costs(&channel.effects)).collect();
+            self.channels.par_iter().map(|c| self.costs(&c.effects, &c.covaried)).collect();
         self.context.sum_over_pupils(|sampled, traced| {
             let range = self.context.sampling.channels[sampled.wavelength].range(sampled.field);
             let channel = &self.channels[sampled.wavelength];
@@ -478,7 +492,7 @@ impl<'a> Growth<'a> {
             let mut effects =
                 NumberEffects::new(&channel.tracer, rays, covariance, &channel.dispersion);
             effects.center(all.clone(), &self.centers[sampled.field]);
-            let costs = self.costs(&effects);
+            let costs = self.costs(&effects, &effects.covaried(covariance));
             let excess = |i: usize| if landed.fate(i).is_imaged() { costs[i] - mean } else { 0.0 };
             all.map(|i| factor * excess(i)).collect()
         };
@@ -487,15 +501,12 @@ impl<'a> Growth<'a> {
         traced.edge_motion_of_rays(costs).ok_or(MeritError::DoesNotApply { term: TERM, why })
     }
 
-    /// The derivative of the growth by the weight of each ray.
-    fn costs(&self, effects: &NumberEffects) -> Vec<f64> {
-        let (mut costs, mut varied) = (vec![0.0; effects.slopes[0].len()], Vec::new());
+    /// The derivative of the growth by the weight of each ray, from effects and covaried ones.
+    fn costs(&self, effects: &NumberEffects, covaried: &[Vec<Vec<f64>>; 2]) -> Vec<f64> {
+        let mut costs = vec![0.0; effects.slopes[0].len()];
         for axis in 0..2 {
-            let rows = &effects.by_number[axis];
-            for (row, covariances) in rows.iter().zip(&self.covariance.rows) {
-                combine(covariances, rows, &mut varied);
-                let products = row.iter().zip(&varied);
-                costs.iter_mut().zip(products).for_each(|(cost, (a, b))| *cost += a * b);
+            for (row, covaried) in effects.by_number[axis].iter().zip(&covaried[axis]) {
+                add_products(row, covaried, &mut costs);
             }
             let along = self.along_focus(effects, axis);
             for (cost, (along, slope)) in
@@ -532,7 +543,12 @@ impl MadeChannel {
             let factor = part.factor(field, wavelength);
             weights[channel.range(field)].iter_mut().for_each(|weight| *weight *= factor);
         }
-        Ok(Self { tracer, effects, weights, dispersion })
+        Ok(Self { tracer, effects, covaried: Default::default(), weights, dispersion })
+    }
+
+    /// Finds the covaried effects, once the effects are centred.
+    fn covary(&mut self, covariance: &NumberCovariance) {
+        self.covaried = self.effects.covaried(covariance);
     }
 
     /// The sum of the products of slopes and the effects of a number over some rays.
@@ -546,15 +562,9 @@ impl MadeChannel {
     }
 
     /// The sum over all numbers of their effects' products, each by its covariance.
-    fn mean_square(&self, covariance: &NumberCovariance) -> f64 {
-        let (mut sum, mut varied) = (0.0, Vec::new());
-        for rows in &self.effects.by_number {
-            for (row, covariances) in rows.iter().zip(&covariance.rows) {
-                combine(covariances, rows, &mut varied);
-                sum += weighted_dot(&self.weights, row, &varied);
-            }
-        }
-        sum
+    fn mean_square(&self) -> f64 {
+        let rows = self.effects.by_number.iter().flatten().zip(self.covaried.iter().flatten());
+        rows.map(|(row, covaried)| weighted_dot(&self.weights, row, covaried)).sum()
     }
 
     fn slope_square(&self) -> f64 {
@@ -586,4 +596,17 @@ fn weighted_dot(weights: &[f64], a: &[f64], b: &[f64]) -> f64 {
         #[inline(always)]
         || sum_of_products([weights, a, b]),
     )
+}
+
+/// Adds the products of two rows to a sum.
+fn add_products(a: &[f64], b: &[f64], sum: &mut [f64]) {
+    run_vectorized(
+        SimdWidth::detect(),
+        #[inline(always)]
+        || {
+            for (to, (a, b)) in sum.iter_mut().zip(a.iter().zip(b)) {
+                *to += a * b;
+            }
+        },
+    );
 }
