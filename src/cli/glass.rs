@@ -2,7 +2,8 @@
 
 use super::error::CliError;
 use super::output::{Output, ShortNumber, TextTable};
-use crate::files::{self, AgfCatalogue, AgfGlass, GlassQuery};
+use super::output_paths::OutputPaths;
+use crate::files::{self, AgfCatalogue, AgfExport, AgfGlass, GlassQuery};
 use crate::lens::glass::{self, Glass};
 use serde::Serialize;
 use std::fmt;
@@ -30,6 +31,10 @@ pub(super) struct GlassArgs {
     #[arg(long, value_name = "FILE", conflicts_with = "words")]
     add: Option<PathBuf>,
 
+    /// Writes the glasses as a catalogue .agf for other programs
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["add", "remove"])]
+    out: Option<PathBuf>,
+
     /// Removes the catalogue of this name that was added
     #[arg(long, value_name = "NAME", conflicts_with_all = ["words", "add"])]
     remove: Option<String>,
@@ -52,13 +57,17 @@ impl GlassArgs {
         if let Some([nd, vd]) = self.nearest.as_deref() {
             sort_by_distance(&mut meant, *nd, *vd)?;
         }
-        let found: Vec<GlassRow> = meant.into_iter().map(GlassRow::new).collect();
-        if found.is_empty() {
+        if meant.is_empty() {
             let query = self.words.join(" ");
             let text = format!("found no glass for `{query}`; `aplanat glass` lists all");
             return Err(CliError::Input(text));
         }
-        output.print(&GlassList(found))
+        if let Some(path) = &self.out {
+            OutputPaths::default().file("--out", Some(path), &["agf"])?;
+            let export = files::write_agf(meant, path)?;
+            return output.print(&WrittenCatalogue { file: path.display().to_string(), export });
+        }
+        output.print(&GlassList(meant.into_iter().map(GlassRow::new).collect()))
     }
 }
 
@@ -197,6 +206,24 @@ impl fmt::Display for AddedCatalogue {
         )?;
         let remarks = self.refused.iter().chain(&self.contradictory);
         remarks.into_iter().try_for_each(|glass| writeln!(f, "  {}: {}", glass.name, glass.why))
+    }
+}
+
+/// The report on a catalogue that was written.
+#[derive(Serialize)]
+struct WrittenCatalogue {
+    file: String,
+    #[serde(flatten)]
+    export: AgfExport,
+}
+
+impl fmt::Display for WrittenCatalogue {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { file, export: AgfExport { glasses, refused, worst_index } } = self;
+        let (count, left) = (counted_glasses(*glasses), refused.len());
+        writeln!(f, "{count} written to {file}, {left} left out")?;
+        writeln!(f, "read back: indices at most {worst_index:e} apart over the range of each")?;
+        refused.iter().try_for_each(|(name, why)| writeln!(f, "  {name}: {why}"))
     }
 }
 

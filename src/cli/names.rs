@@ -1,5 +1,6 @@
 //! The names by which options call the choices of the library.
 
+use crate::files::VignettingChoice;
 use crate::lens::ParameterKind;
 use crate::measure::Integral;
 use crate::optimize::DescentMethod;
@@ -16,6 +17,20 @@ pub(super) fn value_name(value: &impl ValueEnum) -> String {
 
 fn value(name: &'static str, help: &'static str) -> PossibleValue {
     PossibleValue::new(name).help(help)
+}
+
+impl ValueEnum for VignettingChoice {
+    fn value_variants<'a>() -> &'a [Self] {
+        &Self::ALL
+    }
+
+    fn to_possible_value(&self) -> Option<PossibleValue> {
+        let help = match self {
+            Self::Rims => "The apertures of the file clip, its factors are left out",
+            Self::Factors => "Surfaces are as wide as the rays at the edges of the factors need",
+        };
+        Some(value(self.name(), help))
+    }
 }
 
 impl ValueEnum for Scalarization {

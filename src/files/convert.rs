@@ -1,6 +1,6 @@
 //! Conversion of a lens file into another format.
 
-use super::{ConversionReport, FileError, OpenedLens, SaveReport, SelfCheck};
+use super::{ConversionReport, FileError, OpenedLens, SaveReport, SelfCheck, StatedNumber};
 use serde::Serialize;
 use std::fmt;
 use std::path::Path;
@@ -14,6 +14,9 @@ pub struct Conversion {
     /// Numbers to compare with the program that wrote the file.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub checks: Vec<SelfCheck>,
+    /// Numbers that the file states although they follow from the lens, beside those of this program.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub stated: Vec<StatedNumber>,
     /// The report on the written file.
     pub export: SaveReport,
 }
@@ -33,7 +36,8 @@ impl OpenedLens {
     /// Those of [`save`](super::save).
     pub fn convert_to(self, to: impl AsRef<Path>) -> Result<Conversion, FileError> {
         let export = super::save(&self.lens, to)?;
-        Ok(Conversion { import: self.report, checks: self.checks, export })
+        let Self { report: import, checks, stated, .. } = self;
+        Ok(Conversion { import, checks, stated, export })
     }
 }
 
@@ -45,6 +49,7 @@ impl fmt::Display for Conversion {
         for check in &self.checks {
             writeln!(f, "{check}")?;
         }
+        self.stated.iter().try_for_each(|number| writeln!(f, "{number}"))?;
         write!(f, "{}", self.export)
     }
 }

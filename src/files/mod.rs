@@ -12,15 +12,19 @@ mod checkpoint;
 pub mod codev;
 mod convert;
 mod error;
+mod first_order_beam;
 mod folder;
+mod foreign_lens;
 mod glass_query;
 mod identity;
 mod image_file;
 mod image_side;
+mod imported_file;
 pub mod json;
 mod library;
 mod lock;
 mod oslo;
+mod outline;
 mod own_glass;
 mod probe_rays;
 mod ray_optics;
@@ -28,12 +32,13 @@ mod report;
 mod round_trip;
 mod self_check;
 mod text;
+mod vignetting;
 mod volume;
 mod yaml_glass;
 mod zar;
 pub mod zemax;
 
-pub use agf::{AgfCatalogue, AgfGlass, parse_agf, read_agf};
+pub use agf::{AgfCatalogue, AgfExport, AgfGlass, parse_agf, read_agf, write_agf};
 pub use atomic::{check_writable, write_atomic};
 pub use bounded::{MAX_DATA_BYTES, MAX_LENS_BYTES, read_bounded, read_file};
 pub use bundled::{BundledLens, bundled_lenses};
@@ -41,9 +46,11 @@ pub use checkpoint::{CheckpointError, CheckpointFormat};
 pub use convert::{Conversion, convert};
 pub use error::FileError;
 pub use folder::{own_files, stale_files};
+pub use foreign_lens::{ImportSettings, StatedNumber};
 pub use glass_query::{GlassQuery, GlassQueryError};
 pub use identity::FileIdentity;
 pub use image_file::{ColorImage, GrayscaleImage, read_color, read_grayscale};
+pub use imported_file::ImportedFile;
 pub use library::{
     LensScaleError, LibraryLens, LibraryQuery, LibraryQueryError, ShortRange, StatedAperture,
     StatedField, focal_length_factor, library_lenses, parse_range, scale_to_focal_length,
@@ -56,6 +63,7 @@ pub use report::{ConversionOutcome, ConversionReport, ConversionRow};
 pub use round_trip::RoundTripCheck;
 pub use self_check::SelfCheck;
 pub use text::decode_unicode;
+pub use vignetting::VignettingChoice;
 pub use volume::{
     MAX_VOLUME_BYTES, Volume, is_npz, raw_path, read_volume, volume_files, write_volume,
 };
@@ -86,9 +94,9 @@ pub enum LensFormat {
     Zemax,
     /// CODE V, `.seq`.
     CodeV,
-    /// The program ray-optics, `.roa`; only read.
+    /// The program ray-optics, `.roa`.
     RayOptics,
-    /// The program OSLO, `.len`; only read.
+    /// The program OSLO, `.len`.
     Oslo,
     /// An archive of Zemax with a lens and its catalogues, `.zar`; only read.
     Archive,
@@ -96,8 +104,8 @@ pub enum LensFormat {
 
 impl LensFormat {
     /// True for a format that lenses are written in.
-    fn is_written(self) -> bool {
-        matches!(self, Self::Native | Self::Zemax | Self::CodeV)
+    const fn is_written(self) -> bool {
+        !matches!(self, Self::Archive)
     }
 }
 
@@ -113,6 +121,10 @@ pub struct OpenedLens {
     /// Numbers to compare with the program that wrote a foreign file; empty for JSON, and for a lens
     /// whose glasses have no index at its wavelengths.
     pub checks: Vec<SelfCheck>,
+    /// Numbers that a foreign file states although they follow from the lens, beside those of this program.
+    pub stated: Vec<StatedNumber>,
+    /// The treatment of the vignetting factors of a foreign file; `None` if it has none.
+    pub vignetting: Option<VignettingChoice>,
 }
 
 /// The report on a saved lens.
@@ -136,9 +148,20 @@ const READABLE: &str = "a lens: JSON with the key `aplanat`, Zemax .zmx or .zar,
 /// # Errors
 /// A file that cannot be read or is too long, and those of [`parse`].
 pub fn open(path: impl AsRef<Path>) -> Result<OpenedLens, FileError> {
+    open_with(path, ImportSettings::default())
+}
+
+/// The same with the choices of a person on foreign files.
+///
+/// # Errors
+/// As [`open`].
+pub fn open_with(
+    path: impl AsRef<Path>,
+    settings: ImportSettings,
+) -> Result<OpenedLens, FileError> {
     let path = path.as_ref();
     let file = path.display().to_string();
-    parse(&read_file(path, MAX_LENS_BYTES)?, &file)
+    parse_with(&read_file(path, MAX_LENS_BYTES)?, &file, settings)
 }
 
 /// Reads a lens from the bytes of a file. `name` is its name in messages, and its extension decides
@@ -147,11 +170,31 @@ pub fn open(path: impl AsRef<Path>) -> Result<OpenedLens, FileError> {
 /// # Errors
 /// Bytes that are not a lens, malformed text, or an invalid lens.
 pub fn parse(bytes: &[u8], name: &str) -> Result<OpenedLens, FileError> {
-    if zar::is_archive(bytes) { parse_archive(bytes, name) } else { parse_text(bytes, name) }
+    parse_with(bytes, name, ImportSettings::default())
+}
+
+/// The same with the choices of a person on foreign files.
+///
+/// # Errors
+/// As [`parse`].
+pub fn parse_with(
+    bytes: &[u8],
+    name: &str,
+    settings: ImportSettings,
+) -> Result<OpenedLens, FileError> {
+    if zar::is_archive(bytes) {
+        parse_archive(bytes, name, settings)
+    } else {
+        parse_text(bytes, name, settings)
+    }
 }
 
 /// The lens of an archive. Its other files are listed in the report.
-fn parse_archive(bytes: &[u8], name: &str) -> Result<OpenedLens, FileError> {
+fn parse_archive(
+    bytes: &[u8],
+    name: &str,
+    settings: ImportSettings,
+) -> Result<OpenedLens, FileError> {
     let members = zar::members(bytes, name)?;
     let lens = members.iter().position(|member| member.has_extension("zmx"));
     let Some(lens) = lens else {
@@ -159,7 +202,7 @@ fn parse_archive(bytes: &[u8], name: &str) -> Result<OpenedLens, FileError> {
         return Err(FileError::NotALens { file: name.to_owned(), found, expected: READABLE });
     };
     let file = format!("{name}/{}", members[lens].name());
-    let mut opened = parse_text(&members[lens].contents(name)?, &file)?;
+    let mut opened = parse_text(&members[lens].contents(name)?, &file, settings)?;
     opened.format = LensFormat::Archive;
     let report = opened.report.get_or_insert_default();
     for (i, member) in members.iter().enumerate() {
@@ -175,34 +218,33 @@ fn parse_archive(bytes: &[u8], name: &str) -> Result<OpenedLens, FileError> {
     Ok(opened)
 }
 
-fn parse_text(bytes: &[u8], name: &str) -> Result<OpenedLens, FileError> {
+fn parse_text(bytes: &[u8], name: &str, settings: ImportSettings) -> Result<OpenedLens, FileError> {
     let nothing = |found| FileError::NotALens { file: name.to_owned(), found, expected: READABLE };
     if let Some(found) = text::binary_kind(bytes) {
         return Err(nothing(found));
     }
     let text = text::decode(bytes);
     let format = format_by_content(&text).or_else(|| format_by_extension(Path::new(name)));
-    match format.ok_or_else(|| nothing("text that is not a lens".to_owned()))? {
+    let format = format.ok_or_else(|| nothing("text that is not a lens".to_owned()))?;
+    let read = match format {
         LensFormat::Native => {
-            let lens = json::read(&decode_unicode(bytes, name)?, name)?;
-            Ok(OpenedLens { lens, format: LensFormat::Native, report: None, checks: Vec::new() })
+            return Ok(OpenedLens::native(json::read(&decode_unicode(bytes, name)?, name)?));
         }
-        LensFormat::Zemax => Ok(foreign(zemax::read(&text, name)?, LensFormat::Zemax)),
-        LensFormat::RayOptics => {
-            let text = decode_unicode(bytes, name)?;
-            Ok(foreign(ray_optics::read(&text, name)?, LensFormat::RayOptics))
-        }
-        LensFormat::CodeV => Ok(foreign(codev::read(&text, name)?, LensFormat::CodeV)),
-        LensFormat::Oslo => Ok(foreign(oslo::read(&text, name)?, LensFormat::Oslo)),
-        LensFormat::Archive => Err(nothing("a damaged archive".to_owned())),
-    }
+        LensFormat::Zemax => zemax::read_foreign(&text, name)?,
+        LensFormat::RayOptics => ray_optics::read(&decode_unicode(bytes, name)?, name)?.into(),
+        LensFormat::CodeV => codev::read_foreign(&text, name)?,
+        LensFormat::Oslo => oslo::read(&text, name)?.into(),
+        LensFormat::Archive => return Err(nothing("a damaged archive".to_owned())),
+    };
+    Ok(read.opened(format, settings))
 }
 
-/// A lens from a foreign file, with numbers to compare.
-fn foreign((mut lens, mut report): (Lens, ConversionReport), format: LensFormat) -> OpenedLens {
-    image_side::face_image(&mut lens, &mut report);
-    let checks = self_check::self_checks(&lens).unwrap_or_default();
-    OpenedLens { lens, format, report: Some(report), checks }
+impl OpenedLens {
+    /// A lens of the native format, which holds every lens exactly.
+    fn native(lens: Lens) -> Self {
+        let (checks, stated) = (Vec::new(), Vec::new());
+        Self { lens, format: LensFormat::Native, report: None, checks, stated, vignetting: None }
+    }
 }
 
 fn format_by_content(text: &str) -> Option<LensFormat> {
@@ -236,8 +278,8 @@ fn format_by_extension(path: &Path) -> Option<LensFormat> {
     }
 }
 
-/// Writes a lens to a file, in the format of its extension: `.json`, `.zmx` or `.seq`. A foreign file is read
-/// back and traced first. On failure the target is unchanged.
+/// Writes a lens to a file, in the format of its extension: `.json`, `.zmx`, `.seq`, `.len` or `.roa`. A
+/// foreign file is read back and traced first. On failure the target is unchanged.
 ///
 /// # Errors
 /// An invalid lens, another extension, a foreign file that does not trace like the lens, or a target
@@ -249,7 +291,7 @@ pub fn save(lens: &Lens, path: impl AsRef<Path>) -> Result<SaveReport, FileError
     let Some(format) = format_by_extension(path).filter(|format| format.is_written()) else {
         let extension = path.extension().unwrap_or_default().to_string_lossy();
         let found = format!("the extension `{extension}`");
-        let expected = "`.json`, `.zmx` or `.seq` to write to";
+        let expected = "`.json`, `.zmx`, `.seq`, `.len` or `.roa` to write to";
         return Err(FileError::NotALens { file, found, expected });
     };
     let (bytes, report, proof) = if format == LensFormat::Native {
@@ -280,13 +322,14 @@ fn checked_foreign(
     file: &str,
 ) -> Result<(Vec<u8>, ConversionReport, RoundTripCheck), FileError> {
     let unusable = |source| FileError::Lens { file: file.to_owned(), source };
-    let (bytes, report) = if format == LensFormat::CodeV {
-        let (text, report) = codev::write(lens).map_err(unusable)?;
-        (text.into_bytes(), report)
-    } else {
-        let (text, report) = zemax::write(lens).map_err(unusable)?;
-        (text::encode_utf16(&text), report)
+    let (text, report) = match format {
+        LensFormat::CodeV => codev::write(lens).map_err(unusable)?,
+        LensFormat::Oslo => oslo::write(lens, file)?,
+        LensFormat::RayOptics => ray_optics::write(lens, file)?,
+        _ => zemax::write(lens).map_err(unusable)?,
     };
+    let is_zemax = format == LensFormat::Zemax;
+    let bytes = if is_zemax { text::encode_utf16(&text) } else { text.into_bytes() };
     let back = parse(&bytes, file).map_err(|error| unreadable_export(file, &error))?;
     let proof = round_trip::check_round_trip(lens, &back.lens, file)?;
     Ok((bytes, report, proof))

@@ -43,8 +43,26 @@ impl ProbeLaunch {
         field: FieldPoint,
         count: usize,
     ) -> impl Iterator<Item = Ray<f64>> {
+        self.rays_through(field, sunflower(count))
+    }
+
+    /// The same rays, each with its point of the unit disc.
+    pub(super) fn points_and_rays(
+        &self,
+        field: FieldPoint,
+        count: usize,
+    ) -> impl Iterator<Item = ([f64; 2], Ray<f64>)> {
+        sunflower(count).zip(self.many_rays(field, count))
+    }
+
+    /// The rays of one field point through points of the pupil, whose edge is the unit circle.
+    pub(super) fn rays_through(
+        &self,
+        field: FieldPoint,
+        points: impl Iterator<Item = [f64; 2]>,
+    ) -> impl Iterator<Item = Ray<f64>> {
         let origin = self.origin(field);
-        sunflower(count).map(move |(x, y)| {
+        points.map(move |[x, y]| {
             let (z, radius) = self.pupil;
             let target = Vec3::new(x * radius, y * radius, z);
             match origin {
@@ -103,12 +121,12 @@ fn launch_point(target: Vec3<f64>, direction: Vec3<f64>) -> Vec3<f64> {
 }
 
 /// Points distributed evenly over the unit disc, on a golden-angle spiral.
-fn sunflower(count: usize) -> impl Iterator<Item = (f64, f64)> {
+fn sunflower(count: usize) -> impl Iterator<Item = [f64; 2]> {
     let golden = std::f64::consts::PI * (3.0 - 5.0_f64.sqrt());
     (0..count).map(move |i| {
         let radius = ((i as f64 + 0.5) / count as f64).sqrt();
         let (sin, cos) = (golden * i as f64).sin_cos();
-        (radius * cos, radius * sin)
+        [radius * cos, radius * sin]
     })
 }
 

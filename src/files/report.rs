@@ -66,6 +66,13 @@ impl ConversionReport {
         self.rows_with(outcome).count()
     }
 
+    /// The number of rows with each outcome, as one line.
+    pub fn counts(&self) -> String {
+        let count =
+            |outcome| format!("{} {}", self.count(outcome), ConversionOutcome::name(outcome));
+        ConversionOutcome::ALL.map(count).join(", ")
+    }
+
     /// The rows with this outcome.
     pub fn rows_with(&self, outcome: ConversionOutcome) -> impl Iterator<Item = &ConversionRow> {
         self.rows.iter().filter(move |row| row.outcome == outcome)
@@ -99,11 +106,7 @@ impl ConversionReport {
 
 impl fmt::Display for ConversionReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for (i, outcome) in ConversionOutcome::ALL.into_iter().enumerate() {
-            let gap = if i == 0 { "" } else { ", " };
-            write!(f, "{gap}{} {}", self.count(outcome), outcome.name())?;
-        }
-        writeln!(f)?;
+        writeln!(f, "{}", self.counts())?;
         for row in ConversionOutcome::ALL.into_iter().flat_map(|outcome| self.rows_with(outcome)) {
             let line = row.line.map(|line| line.to_string()).unwrap_or_default();
             let text: String = row.text.chars().take(60).collect();

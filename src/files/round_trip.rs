@@ -3,7 +3,7 @@
 
 use super::FileError;
 use super::probe_rays::ProbeLaunch;
-use crate::lens::{Lens, LensError, SurfaceNumber};
+use crate::lens::{Lens, LensError, SurfaceNumber, Wavelength};
 use crate::trace::{Fate, Ray, Tracer};
 use serde::Serialize;
 use std::fmt;
@@ -43,9 +43,14 @@ pub(super) fn check_round_trip(
         let what = format!("{} zoom positions instead of {positions}", back.zoom_positions());
         return Err(FileError::RoundTripFailed { file: file.to_owned(), what });
     }
+    if !has_wavelengths_of(back, lens) {
+        let what = "other wavelengths".to_owned();
+        return Err(FileError::RoundTripFailed { file: file.to_owned(), what });
+    }
     for zoom in 0..positions {
-        let written = tracers(lens, zoom).map_err(unusable)?;
-        let read = tracers(back, zoom).map_err(unusable)?;
+        let waves = &lens.wavelengths;
+        let written = tracers(lens, zoom, waves).map_err(unusable)?;
+        let read = tracers(back, zoom, waves).map_err(unusable)?;
         let launch = ProbeLaunch::new(lens, zoom).map_err(unusable)?;
         for (number, field) in lens.fields_at(zoom).values.iter().enumerate() {
             for (i, ray) in launch.rays(*field).enumerate() {
@@ -60,10 +65,23 @@ pub(super) fn check_round_trip(
     Ok(proof)
 }
 
-/// The tracers of a lens at a zoom position, one for each wavelength.
-fn tracers(lens: &Lens, zoom: usize) -> Result<Vec<Tracer<f64>>, LensError> {
+/// True if two lenses have the same wavelengths in any order, within the rounding of another unit.
+fn has_wavelengths_of(back: &Lens, lens: &Lens) -> bool {
+    let sorted = |lens: &Lens| {
+        let mut waves: Vec<f64> = lens.wavelengths.iter().map(|wave| wave.um).collect();
+        waves.sort_by(f64::total_cmp);
+        waves
+    };
+    let (read, written) = (sorted(back), sorted(lens));
+    let same = |(a, b): (&f64, &f64)| (a - b).abs() <= 1e-14 * b.abs();
+    read.len() == written.len() && read.iter().zip(&written).all(same)
+}
+
+/// The tracers of a lens at a zoom position, one for each of some wavelengths. Formats may have another
+/// order of them.
+fn tracers(lens: &Lens, zoom: usize, waves: &[Wavelength]) -> Result<Vec<Tracer<f64>>, LensError> {
     let at = |um| Ok(Tracer::new(&lens.resolve(zoom, um)?)?);
-    lens.wavelengths.iter().map(|wave| at(wave.um)).collect()
+    waves.iter().map(|wave| at(wave.um)).collect()
 }
 
 fn compare(

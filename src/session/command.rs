@@ -6,6 +6,7 @@ use super::structure_search::StructureSearchCommand;
 use crate::analysis::Coating;
 use crate::effects::{Effect, EffectOverride};
 use crate::experiments::Effort;
+use crate::files::VignettingChoice;
 use crate::lens::{Edit, Lens, StartingLens};
 use crate::merit::Goal;
 use crate::optimize::{DescentMethod, pareto};
@@ -81,6 +82,8 @@ pub enum Command {
     Begin(Box<StartingLens>),
     /// Reads a lens from a file of any known format.
     Open(PathBuf),
+    /// Sets how the vignetting factors of foreign files are treated that are opened from now on.
+    SetVignetting(VignettingChoice),
     /// Writes the lens to its own file, or to this one, which becomes its own.
     Save(Option<PathBuf>),
     /// Writes a copy in the format of the extension.
@@ -92,6 +95,8 @@ pub enum Command {
         /// The file.
         path: PathBuf,
     },
+    /// Writes the report on the file of another program that the design was read from, as text.
+    SaveImportReport(PathBuf),
     /// Adds a glass catalogue for good, whose glasses lenses can name from now on.
     AddGlasses(PathBuf),
     /// Starts a local optimization of a copy of the design.

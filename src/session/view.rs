@@ -12,6 +12,7 @@ use super::run::RunView;
 use super::score::ScoredLens;
 use super::specified_design::SpecifiedDesignView;
 use super::structure_search::StructureSearchView;
+use crate::files::{ImportedFile, VignettingChoice};
 use crate::lens::{Lens, blank};
 use crate::merit::Goal;
 use serde::{Deserialize, Serialize};
@@ -71,6 +72,11 @@ pub struct SessionView {
     pub version_id: u64,
     /// The file of the design; `None` if it was never saved.
     pub path: Option<PathBuf>,
+    /// The file of another program that the design was read from, with its report; `None` for any other
+    /// design.
+    pub imported: Option<Arc<ImportedFile>>,
+    /// The treatment of the vignetting factors of foreign files that are opened.
+    pub vignetting: VignettingChoice,
     /// The merit function of the design: its own, or else the one that was proposed when the design
     /// was opened; `None` if none can be proposed for it.
     pub goal: Option<Arc<Goal>>,
@@ -111,6 +117,8 @@ impl Default for SessionView {
             history: Arc::default(),
             version_id: 0,
             path: None,
+            imported: None,
+            vignetting: VignettingChoice::default(),
             goal: None,
             merit: None,
             dirty: false,

@@ -235,6 +235,7 @@ impl Studio {
             }
             FileRequest::ExperimentFolder => Command::SaveExperiment(path),
             FileRequest::AddGlasses => Command::AddGlasses(path),
+            FileRequest::SaveImportReport => Command::SaveImportReport(path),
             FileRequest::Save => Command::Save(Some(path)),
             FileRequest::ExportFront => Command::ExportPareto(path),
             FileRequest::OpenSearch => search(StructureSearchCommand::ResumeFrom(path)),
@@ -256,6 +257,9 @@ impl Studio {
         for event in events {
             if let SessionEvent::Opened(path) = &event {
                 self.remember(path);
+                if self.session.view().imported.is_some() {
+                    self.dock.show(PanelKind::ImportReport);
+                }
             }
             if let SessionEvent::Message(message) = event
                 && (message.text.lines().count() > 1 || message.severity == Severity::Error)
@@ -397,6 +401,10 @@ fn likely_path(view: &SessionView, request: FileRequest) -> Option<PathBuf> {
         }
         FileRequest::Save | FileRequest::ExportJson => {
             Some(view.path.clone().unwrap_or_else(|| named_file(&view.lens.name, "json")))
+        }
+        FileRequest::SaveImportReport => {
+            let file = view.imported.as_ref().map(|imported| imported.path.with_extension("txt"));
+            Some(file.unwrap_or_else(|| PathBuf::from("import.txt")))
         }
         FileRequest::ExportZemax => {
             let beside = view.path.as_ref().map(|path| path.with_extension("zmx"));

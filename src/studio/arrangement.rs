@@ -56,7 +56,8 @@ fn default_arrangement() -> Tree<PanelKind> {
     let mut tiles = Tiles::default();
     let facts = tabs(&mut tiles, &[Kind::FirstOrder, Kind::Effects]);
     let light = tabs(&mut tiles, &LIGHT);
-    let better = tabs(&mut tiles, &[Kind::Optimizer, Kind::Pareto, Kind::Search, Kind::History]);
+    let better = [Kind::Optimizer, Kind::Pareto, Kind::Search, Kind::History, Kind::ImportReport];
+    let better = tabs(&mut tiles, &better);
     let drawings = tabs(&mut tiles, &DRAWINGS);
     let table = [Kind::Prescription, Kind::System, Kind::Zoom, Kind::Tolerances, Kind::Seidel];
     let table = tabs(&mut tiles, &table);
@@ -80,6 +81,7 @@ fn search_arrangement() -> Tree<PanelKind> {
         Kind::Seidel,
         Kind::FirstOrder,
         Kind::Effects,
+        Kind::ImportReport,
     ];
     let numbers = tabs(&mut tiles, &numbers);
     let better = tabs(&mut tiles, &[Kind::Search, Kind::Optimizer, Kind::Pareto, Kind::History]);
@@ -113,7 +115,7 @@ fn large_arrangement() -> Tree<PanelKind> {
     let numbers = row(&mut tiles, &[(facts, 0.42), (sums, 0.58)]);
     let middle = column(&mut tiles, &[(spots, 0.3), (contrast, 0.3), (numbers, 0.4)]);
     let better = tabs(&mut tiles, &[Kind::Optimizer, Kind::Search, Kind::Pareto]);
-    let history = tabs(&mut tiles, &[Kind::History]);
+    let history = tabs(&mut tiles, &[Kind::History, Kind::ImportReport]);
     let right = column(&mut tiles, &[(better, 0.58), (history, 0.42)]);
     let root = row(&mut tiles, &[(left, 0.46), (middle, 0.3), (right, 0.24)]);
     Tree::new(Id::unique("dock"), root, tiles)

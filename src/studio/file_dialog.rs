@@ -18,9 +18,11 @@ pub enum FileRequest {
     InsertLens,
     /// To add the glass catalogue of a maker.
     AddGlasses,
+    /// To write the report on the file of another program as text.
+    SaveImportReport,
     /// To write the lens in our own form.
     Save,
-    /// To write the lens as Zemax reads it.
+    /// To write the lens as Zemax or, by the extension, another program reads it.
     ExportZemax,
     /// To write a copy of the lens in our own form.
     ExportJson,
@@ -50,8 +52,11 @@ impl FileRequest {
             Self::Open => "Open a lens",
             Self::InsertLens => "Add a lens from a file",
             Self::AddGlasses => "Add a glass catalogue",
+            Self::SaveImportReport => "Save the import report",
             Self::Save => "Save the lens",
-            Self::ExportZemax => "Export the lens for Zemax",
+            Self::ExportZemax => {
+                "Export the lens for Zemax (.zmx), CODE V (.seq), OSLO (.len) or ray-optics (.roa)"
+            }
             Self::ExportJson => "Export a copy of the lens",
             Self::ExportFront => "Export the front into a folder",
             Self::ExperimentFolder => "Save the experiment into a folder",
@@ -75,10 +80,11 @@ impl FileRequest {
             Self::Save | Self::ExportJson | Self::OpenSearch | Self::SaveSearch => &["json"],
             Self::ExportSearchLens(_) => &["json", "zmx"],
             Self::AddGlasses => &["agf", "AGF", "zar", "ZAR", "yml", "YML", "yaml", "YAML"],
-            Self::ExportZemax => &["zmx"],
+            Self::ExportZemax => &["zmx", "seq", "len", "roa"],
             Self::OpenField => &["json", "npz"],
             Self::SaveField(_) => &["npz", "json"],
             Self::SavePicture => &["png"],
+            Self::SaveImportReport => &["txt"],
             Self::ExportPaper(kind) => kind.extensions(),
             Self::ExportFront | Self::ExperimentFolder => &[],
         }
@@ -90,7 +96,7 @@ impl FileRequest {
             Self::OpenField | Self::SaveField(_) => "GRIN fields",
             Self::SavePicture => "Pictures",
             Self::AddGlasses => "Glass catalogues",
-            Self::ExportPaper(PaperKind::Report) => "Reports",
+            Self::ExportPaper(PaperKind::Report) | Self::SaveImportReport => "Reports",
             Self::ExportPaper(PaperKind::Layout) => "Drawings",
             Self::ExportPaper(PaperKind::Solids) => "Solids",
             _ => "Lenses",

@@ -13,7 +13,7 @@ use super::file_dialog::FileRequest;
 use super::panels::PanelKind;
 use super::run_items;
 use crate::experiments::{self, Effort};
-use crate::files;
+use crate::files::{self, VignettingChoice};
 use crate::lens::{Edit, ElementEdit, Lens};
 use crate::report::PaperKind;
 use crate::session::{Command, PanelSetting, SessionView};
@@ -158,7 +158,9 @@ impl MenuContext<'_> {
                 .hint("The glasses of a maker, .agf, .zar or .yml; they stay for later sessions"),
             MenuItem::new(MENU, "Save", save).control(Key::S).separated(),
             MenuItem::new(MENU, "Save as…", FileRequest::Save).control_shift(Key::S),
-            MenuItem::new(MENU, "Export for Zemax…", FileRequest::ExportZemax).control(Key::E),
+            MenuItem::new(MENU, "Export for Zemax…", FileRequest::ExportZemax)
+                .control(Key::E)
+                .hint("As .zmx, or for CODE V .seq, OSLO .len and ray-optics .roa"),
             MenuItem::new(MENU, "Export a copy as JSON…", FileRequest::ExportJson),
             MenuItem::new(MENU, "Export report…", FileRequest::ExportPaper(PaperKind::Report))
                 .hint("Data, layout, spots, MTF, effects and weights as PDF or HTML"),
@@ -292,7 +294,12 @@ impl MenuContext<'_> {
             let item = MenuItem::new(MENU, title, Command::Show(PanelSetting::Rays(rays)));
             MenuItem { checked: Some(self.view.settings.rays == rays), ..item }
         });
-        themes.into_iter().chain(errors).chain(rays).collect()
+        let vignetting = VignettingChoice::ALL.map(|choice| {
+            let title = format!("Vignetting factors of opened files: {}", choice.name());
+            let item = MenuItem::new(MENU, title, Command::SetVignetting(choice));
+            MenuItem { checked: Some(self.view.vignetting == choice), ..item }
+        });
+        themes.into_iter().chain(errors).chain(rays).chain(vignetting).collect()
     }
 }
 

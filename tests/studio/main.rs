@@ -11,6 +11,7 @@ mod grin;
 mod handles;
 mod harness;
 mod history;
+mod import_report;
 mod legibility;
 mod panels;
 mod picture;

@@ -1,6 +1,7 @@
 //! Glass catalogues of makers: every dispersion formula, damaged files, and lenses that name their glasses.
 
-use aplanat::files::{AgfCatalogue, parse_agf};
+use aplanat::files::{AgfCatalogue, parse_agf, read_agf, write_agf};
+use aplanat::lens::glass;
 use serde_json::Value;
 use std::path::PathBuf;
 use std::process::Command;
@@ -356,4 +357,49 @@ fn materials_and_the_catalogues_of_an_archive_are_added_and_removed() {
         assert!(run(&["glass", "--remove", name]).1.contains("removed"));
     }
     assert_eq!(std::fs::read_dir(&folder).unwrap().count(), 0);
+}
+
+/// Every formula of the catalogues that come with the program is one of those of `.agf`.
+#[test]
+fn glasses_are_written_as_a_catalogue_and_read_back_with_their_indices() {
+    let folder = std::env::temp_dir().join(format!("aplanat-agf-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    let path = folder.join("OWN.agf");
+    let all: Vec<_> = glass::known().collect();
+    let export = write_agf(all.iter().copied(), &path).unwrap();
+    assert_eq!(export.glasses + export.refused.len(), all.len());
+    let second = |(_, why): &(String, String)| why.starts_with("a second glass of the name");
+    assert!(export.refused.iter().all(second), "{:?}", export.refused);
+    assert!(export.glasses > 1000 && export.worst_index <= 1e-12, "{export:?}");
+    let read = read_agf(&path).unwrap();
+    assert_eq!((read.glasses.len(), read.refused.len()), (export.glasses, 0));
+    assert!(read.contradictory.is_empty(), "{:?}", read.contradictory);
+    let schott = read.glasses.iter().find(|own| own.glass.name == "N-BK7").unwrap();
+    let own = glass::find("SCHOTT N-BK7").unwrap();
+    assert_eq!((schott.glass.range_um, schott.glass.density), (own.range_um, own.density));
+    assert_eq!(schott.glass.manufacturer, "OWN");
+    // Schott's datasheet.
+    assert!((schott.glass.nd - 1.51680).abs() < 5e-6 && (schott.glass.vd - 64.17).abs() < 5e-3);
+    assert!(write_agf([], &path).is_err());
+    std::fs::remove_dir_all(folder).unwrap();
+}
+
+#[test]
+fn a_catalogue_is_written_by_the_command_line() {
+    let folder = std::env::temp_dir().join(format!("aplanat-agf-cli-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    let path = folder.join("PICK.agf");
+    let run = |out: &str| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_aplanat"));
+        command.args(["glass", "schott", "nd=1.7..", "--out", out, "--json"]).output().unwrap()
+    };
+    let output = run(path.to_str().unwrap());
+    assert!(output.status.success(), "{output:?}");
+    let report: Value = serde_json::from_slice(&output.stdout).unwrap();
+    let read = read_agf(&path).unwrap();
+    assert_eq!(report["glasses"], read.glasses.len());
+    assert!(read.glasses.len() > 10 && read.glasses.iter().all(|own| own.glass.nd >= 1.7));
+    let wrong = run(folder.join("PICK.txt").to_str().unwrap());
+    assert_eq!(wrong.status.code(), Some(2));
+    std::fs::remove_dir_all(folder).unwrap();
 }

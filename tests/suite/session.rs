@@ -816,6 +816,34 @@ fn a_grin_design_is_saved_and_opened() {
     std::fs::remove_dir_all(folder).unwrap();
 }
 
+#[test]
+fn the_report_on_a_foreign_file_stays_until_another_lens_is_opened() {
+    let folder = std::env::temp_dir().join(format!("aplanat-import-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    let path = std::path::PathBuf::from("tests/files/achromat.zmx");
+    let mut session = session(double_gauss());
+    assert!(session.view().imported.is_none());
+    session.apply(Command::Open(path.clone()));
+    let imported = session.view().imported.unwrap();
+    assert_eq!(imported.path, path);
+    let message = session.view().messages.last().unwrap().text.clone();
+    assert!(message.contains(&imported.report.counts()) && message.lines().count() == 1);
+    session.apply(Edit::SetName("Mine".into()).into());
+    assert!(session.view().imported.is_some(), "an edit is the same document");
+    let text = folder.join("import.txt");
+    session.apply(Command::SaveImportReport(text.clone()));
+    assert_eq!(std::fs::read_to_string(&text).unwrap(), imported.to_string());
+    session.apply(Command::SetVignetting(files::VignettingChoice::Factors));
+    session.apply(Command::Open(path));
+    let vignetting = session.view().imported.unwrap().vignetting;
+    assert_eq!(vignetting, Some(files::VignettingChoice::Factors));
+    session.apply(Command::New(Box::new(double_gauss())));
+    assert!(session.view().imported.is_none());
+    session.apply(Command::SaveImportReport(text));
+    assert!(session.view().messages.last().unwrap().text.contains("no file of another program"));
+    std::fs::remove_dir_all(folder).unwrap();
+}
+
 /// Steele, Lea and Flood's generator.
 struct Random(u64);
 

@@ -21,6 +21,8 @@ pub(super) struct CodeVFile {
     pub(super) fields_x: Vec<f64>,
     pub(super) fields_y: Vec<f64>,
     pub(super) field_weights: Vec<f64>,
+    /// The vignetting factors of each field: VUX, VLX, VUY and VLY.
+    pub(super) vignetting: [Vec<f64>; 4],
     /// The object first, the image last.
     pub(super) surfaces: Vec<CodeVSurface>,
     /// True from `SI` on.
@@ -72,8 +74,14 @@ pub(super) struct CodeVSurface {
     pub(super) conic_across: f64,
     /// The diffractive phase on the surface (`DIF DOE`).
     pub(super) diffraction: Option<CodeVDiffraction>,
-    /// True if the aperture is displaced.
-    pub(super) is_offset: bool,
+    /// The half widths of an aperture that is no circle.
+    pub(super) outline: CodeVOutline,
+    /// The half widths of an obscuration that is no circle.
+    pub(super) block: CodeVOutline,
+    /// The displacement of the apertures.
+    pub(super) offset: [f64; 2],
+    /// The lines of the commands of apertures, but for centred circles.
+    pub(super) aperture_lines: Vec<usize>,
     pub(super) label: String,
     pub(super) decenter: [f64; 3],
     /// ADE, BDE and CDE in degrees.
@@ -84,6 +92,13 @@ pub(super) struct CodeVSurface {
     /// The command that makes the surface impossible to trace.
     pub(super) locked: Option<String>,
     pub(super) lines: Vec<String>,
+}
+
+/// The half widths of a rectangle (`REX`, `REY`) or an ellipse (`ELX`, `ELY`).
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct CodeVOutline {
+    pub(super) is_ellipse: bool,
+    pub(super) half: [Option<f64>; 2],
 }
 
 /// A form that is none of revolution.

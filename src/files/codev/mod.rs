@@ -15,9 +15,11 @@ mod write;
 
 pub(super) use build::frames;
 pub(super) use file::Placement;
+pub(super) use write::place;
 pub use write::write;
 
 use super::error::FileError;
+use super::foreign_lens::ForeignLens;
 use super::report::ConversionReport;
 use crate::lens::Lens;
 
@@ -27,11 +29,17 @@ use crate::lens::Lens;
 /// # Errors
 /// A malformed command, or an invalid lens.
 pub fn read(text: &str, file: &str) -> Result<(Lens, ConversionReport), FileError> {
+    let ForeignLens { lens, report, .. } = read_foreign(text, file)?;
+    Ok((lens, report))
+}
+
+/// The same with what the file says of the beam.
+pub(super) fn read_foreign(text: &str, file: &str) -> Result<ForeignLens, FileError> {
     let text = text.replace("\r\n", "\n").replace('\r', "\n");
     let (parsed, mut report) = parse::parse(&text).map_err(|wrong| wrong.in_file(file))?;
     let mut lens = build::build(&parsed, &mut report).map_err(|wrong| wrong.in_file(file))?;
     crate::files::set_origin(&mut lens, file);
     lens.check().map_err(|source| FileError::Lens { file: file.to_owned(), source })?;
     build::solve_focus(&parsed, &mut lens, &mut report);
-    Ok((lens, report))
+    Ok(build::with_beam(&parsed, lens, report))
 }

@@ -151,7 +151,7 @@ fn header(file: &mut CodeVFile, command: &Command) -> Result<Option<CommandOutco
         "WTW" => file.wave_weights = command.numbers()?,
         "REF" => file.reference = Some(count(command)?),
         "WTF" => file.field_weights = command.numbers()?,
-        "VUX" | "VLX" | "VUY" | "VLY" => return Ok(Some(vignetting(command))),
+        "VUX" | "VLX" | "VUY" | "VLY" => return Ok(Some(vignetting(file, command))),
         "LEN" | "GO" | "TEM" | "PRE" | "INI" | "CA" | "POL" | "DER" | "CLS" | "UID" | "WID" => {
             return Ok(Some(preserved()));
         }
@@ -190,13 +190,16 @@ fn count(command: &Command) -> Result<usize, ParseError> {
     })
 }
 
-fn vignetting(command: &Command) -> CommandOutcome {
-    let zero = |word: &String| parse_number(word) == Some(0.0);
-    if command.words.iter().all(zero) {
-        preserved()
-    } else {
-        dropped("vignetting factors: rays are clipped by semi-diameters in this program")
+fn vignetting(file: &mut CodeVFile, command: &Command) -> CommandOutcome {
+    let values = command.numbers().ok();
+    if values.as_ref().is_some_and(|values| values.iter().all(|value| *value == 0.0)) {
+        return preserved();
     }
+    let known = ["VUX", "VLX", "VUY", "VLY"].iter().position(|name| *name == command.name);
+    if let (Some(values), Some(kind)) = (values, known) {
+        file.vignetting[kind] = values;
+    }
+    dropped(crate::files::vignetting::LEFT_OUT)
 }
 
 /// `XAN`, `YOB` and the like: one coordinate of all field points.

@@ -42,13 +42,15 @@ pub(super) fn read(
         "A" | "B" | "C" | "D" | "E" | "F" | "G" | "H" | "J" => term(surface, command)?,
         "SLB" => surface.label = command.words.first().cloned().unwrap_or_default(),
         "CIR" => return circle(surface, command),
-        "REX" | "REY" | "ELX" | "ELY" | "ARO" => {
-            return Ok(dropped("only circular, centred apertures are supported"));
-        }
+        "REX" | "REY" | "ELX" | "ELY" => return outline(surface, command),
         "ADX" | "ADY" => {
-            surface.is_offset |= command.last_number()? != 0.0;
-            return Ok(dropped("a decentred aperture: only centred ones clip here"));
+            surface.offset[usize::from(command.name == "ADY")] = command.last_number()?;
+            surface.aperture_lines.push(command.line);
         }
+        "ARO" if command.last_number()? != 0.0 => {
+            return Ok(dropped("the aperture is turned in the file"));
+        }
+        "ARO" => return Ok(preserved()),
         "CCY" => surface.is_curvature_free = command.last_number()? == 0.0,
         "THC" => surface.is_thickness_free = command.last_number()? == 0.0,
         "SPH" | "CON" | "ASP" => {}
@@ -94,6 +96,23 @@ fn circle(surface: &mut CodeVSurface, command: &Command) -> Result<CommandOutcom
     let inner = command.has_word("OBS") || command.has_word("HOL");
     let target = if inner { &mut surface.obstruction } else { &mut surface.clip };
     *target = Some(radius);
+    Ok(used())
+}
+
+/// `REX`, `REY`, `ELX` and `ELY` with `[CLR|EDG|OBS|HOL] [label] half width`.
+fn outline(surface: &mut CodeVSurface, command: &Command) -> Result<CommandOutcome, ParseError> {
+    let half = command.last_number()?;
+    if half <= 0.0 {
+        return Ok(dropped("a half width that is not above 0"));
+    }
+    if command.has_word("EDG") {
+        return Ok(preserved());
+    }
+    let inner = command.has_word("OBS") || command.has_word("HOL");
+    let outline = if inner { &mut surface.block } else { &mut surface.outline };
+    outline.is_ellipse = command.name.starts_with('E');
+    outline.half[usize::from(command.name.ends_with('Y'))] = Some(half);
+    surface.aperture_lines.push(command.line);
     Ok(used())
 }
 

@@ -1,5 +1,7 @@
 //! The content of a `.zmx` file before it is interpreted. Lengths are in the unit of the file.
 
+use crate::files::outline::OutlineForm;
+
 /// The content of a file.
 #[derive(Debug)]
 pub(super) struct ZemaxFile {
@@ -9,6 +11,8 @@ pub(super) struct ZemaxFile {
     pub(super) notes: Vec<String>,
     pub(super) aperture: Option<(ApertureLine, usize)>,
     pub(super) fields: FieldLines,
+    /// The vignetting factors of each field: VDX, VDY, VCX, VCY and VAN.
+    pub(super) vignetting: [Vec<f64>; 5],
     pub(super) waves: WaveLines,
     /// Names of glass catalogues, in the order in which they are searched.
     pub(super) catalogues: Vec<String>,
@@ -26,6 +30,7 @@ impl Default for ZemaxFile {
             notes: Vec::new(),
             aperture: None,
             fields: FieldLines::default(),
+            vignetting: [const { Vec::new() }; 5],
             waves: WaveLines::default(),
             catalogues: Vec::new(),
             surfaces: Vec::new(),
@@ -99,6 +104,10 @@ pub(super) struct ZemaxSurface {
     pub(super) clip: Option<(f64, usize)>,
     /// The inner radius of an aperture or the outer one of an obscuration, and its line.
     pub(super) obstruction: Option<(f64, usize)>,
+    /// An aperture that is no circle.
+    pub(super) outline: Option<OutlineLine>,
+    /// An obscuration that is no circle.
+    pub(super) block: Option<OutlineLine>,
     pub(super) variable_thickness: Option<(f64, f64, usize)>,
     pub(super) thickness_pickup: Option<PickupLine>,
     /// Height, zone and line of a marginal ray height solve.
@@ -106,6 +115,15 @@ pub(super) struct ZemaxSurface {
     pub(super) variable_conic: Option<usize>,
     /// Parameter numbers that are variable, with their line.
     pub(super) variable_parameters: Vec<(usize, usize)>,
+}
+
+/// A rectangular or elliptical aperture or obscuration.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct OutlineLine {
+    pub(super) form: OutlineForm,
+    /// The half widths along x and y.
+    pub(super) half: [f64; 2],
+    pub(super) line: usize,
 }
 
 /// The solve of a curvature.

@@ -19,6 +19,7 @@ pub(super) use glass::{ImportedMedium, is_general, named_medium};
 pub use write::write;
 
 use super::error::{FileError, ParseError};
+use super::foreign_lens::ForeignLens;
 use super::report::ConversionReport;
 use crate::lens::Lens;
 
@@ -37,15 +38,21 @@ const ZOOM_NAME: &str = "Zoom position: ";
 /// # Errors
 /// A malformed line, a surface that cannot be traced, or an invalid lens.
 pub fn read(text: &str, file: &str) -> Result<(Lens, ConversionReport), FileError> {
-    let text = text.replace("\r\n", "\n").replace('\r', "\n");
-    let (mut lens, report) = parse_lens(&text).map_err(|wrong| wrong.in_file(file))?;
-    crate::files::set_origin(&mut lens, file);
-    lens.check().map_err(|source| FileError::Lens { file: file.to_owned(), source })?;
-    apply_focus_solve(&mut lens);
+    let ForeignLens { lens, report, .. } = read_foreign(text, file)?;
     Ok((lens, report))
 }
 
-fn parse_lens(text: &str) -> Result<(Lens, ConversionReport), ParseError> {
+/// The same with what the file says of the beam.
+pub(super) fn read_foreign(text: &str, file: &str) -> Result<ForeignLens, FileError> {
+    let text = text.replace("\r\n", "\n").replace('\r', "\n");
+    let mut read = parse_lens(&text).map_err(|wrong| wrong.in_file(file))?;
+    crate::files::set_origin(&mut read.lens, file);
+    read.lens.check().map_err(|source| FileError::Lens { file: file.to_owned(), source })?;
+    apply_focus_solve(&mut read.lens);
+    Ok(read)
+}
+
+fn parse_lens(text: &str) -> Result<ForeignLens, ParseError> {
     let (file, mut report) = parse::parse(text)?;
     if file.surfaces.is_empty() {
         let expected = "SURF lines: is this a Zemax lens file?".to_owned();
@@ -53,7 +60,7 @@ fn parse_lens(text: &str) -> Result<(Lens, ConversionReport), ParseError> {
         return Err(ParseError { place: "the whole file".to_owned(), found, expected });
     }
     let lens = build::build(&file, &mut report)?;
-    Ok((lens, report))
+    Ok(build::with_beam(&file, lens, report))
 }
 
 /// Writes the solved gap into the lens, so that its prescription shows the position of the focus.

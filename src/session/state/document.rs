@@ -1,7 +1,7 @@
 //! The document of a session: edits, undo, and its files.
 
 use super::{Session, SessionEvent};
-use crate::files::{self, ConversionReport, SelfCheck};
+use crate::files::{self, ConversionOutcome, ImportedFile};
 use crate::lens::{Aperture, Edit, ElementEdit, Lens, StartingLens, apply_edit};
 use crate::math::format_short;
 use crate::picture::{BitDepth, ToneCurve, encode_png};
@@ -164,6 +164,7 @@ impl Session {
         self.history = DesignHistory::new(Arc::clone(&lens), Some(proposal));
         self.saved = Arc::clone(&lens);
         self.path = path;
+        self.imported = None;
         self.begin_journal();
         self.settings.zoom = 0;
         self.settings.pupil_wavelength = None;
@@ -173,18 +174,37 @@ impl Session {
     }
 
     pub(super) fn open(&mut self, path: &Path) {
-        match files::open(path) {
+        match files::open_with(path, self.import_settings) {
             Ok(opened) => {
                 // A foreign file is not overwritten under its own name without asking.
                 let own = (opened.format == files::LensFormat::Native).then(|| path.to_owned());
+                let imported = opened.imported_from(path);
                 self.replace_design(opened.lens, own);
                 self.resume_journal();
-                if let Some(report) = opened.report {
-                    let text = import_text(path, &report, &opened.checks);
-                    self.post(Severity::Note, text);
-                }
+                self.set_imported(imported);
                 self.events.push(SessionEvent::Opened(path.to_owned()));
             }
+            Err(why) => self.post(Severity::Error, why.to_string()),
+        }
+    }
+
+    /// Keeps the report on the file of another program, and says whether something of it is lost.
+    fn set_imported(&mut self, imported: Option<ImportedFile>) {
+        self.imported = imported.map(Arc::new);
+        let Some(imported) = self.imported.clone() else { return };
+        let lost = imported.report.count(ConversionOutcome::Dropped);
+        let severity = if lost == 0 { Severity::Note } else { Severity::Warning };
+        let counts = imported.report.counts();
+        self.post(severity, format!("imported {}: {counts}", imported.path.display()));
+    }
+
+    /// Writes the report on the file of another program as text.
+    pub(super) fn save_import_report(&mut self, path: &Path) {
+        let Some(imported) = &self.imported else {
+            return self.post(Severity::Warning, "the lens comes from no file of another program");
+        };
+        match files::write_atomic(path, imported.to_string().as_bytes()) {
+            Ok(()) => self.post(Severity::Note, format!("saved as {}", path.display())),
             Err(why) => self.post(Severity::Error, why.to_string()),
         }
     }
@@ -309,18 +329,6 @@ fn with_asked_focus(lens: &Arc<Lens>, asked: &StartingLens) -> Option<Lens> {
     }
     let model = RayModel::from_lens(&focused, 0).ok()?;
     model.first_order.efl.is_some_and(|focal_length| focal_length > 0.0).then_some(focused)
-}
-
-/// The message about a foreign file: the numbers to compare with the program that wrote it, and the
-/// outcome of its lines.
-fn import_text(path: &Path, report: &ConversionReport, checks: &[SelfCheck]) -> String {
-    let mut lines = vec![format!("imported {}", path.display())];
-    if !checks.is_empty() {
-        lines.push("To compare with the program that wrote it:".to_owned());
-        lines.extend(checks.iter().map(|check| format!("  {check}")));
-    }
-    lines.push(report.to_string());
-    lines.join("\n")
 }
 
 /// The line that tells that a lens has the aperture and the fields that were asked for.

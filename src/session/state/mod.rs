@@ -28,6 +28,7 @@ use super::structure_search::StructureSearchState;
 use super::view::{KeptLens, Message, SessionView, Severity};
 use crate::effects::{Effect, EffectOverride};
 use crate::experiments::{self, Effort, ExperimentReport};
+use crate::files::{ImportSettings, ImportedFile};
 use crate::lens::Lens;
 use crate::merit::Goal;
 use crate::optimize;
@@ -64,6 +65,10 @@ pub struct Session {
     history: DesignHistory,
     journaling: Journaling,
     path: Option<PathBuf>,
+    /// The file of another program that the design was read from.
+    imported: Option<Arc<ImportedFile>>,
+    /// The choices with which foreign files are opened.
+    import_settings: ImportSettings,
     /// The lens as it is in its file.
     saved: Arc<Lens>,
     /// The merit function of a design that has none of its own.
@@ -160,6 +165,8 @@ impl Session {
             lens,
             version: 1,
             path: None,
+            imported: None,
+            import_settings: ImportSettings::default(),
             proposal,
             settings: AnalysisSettings::default(),
             selected: None,
@@ -219,9 +226,11 @@ impl Session {
             Command::New(lens) => self.replace_design(*lens, None),
             Command::Begin(starting) => self.begin(&starting),
             Command::Open(path) => self.open(&path),
+            Command::SetVignetting(choice) => self.import_settings.vignetting = choice,
             Command::Save(path) => self.save(path),
             Command::Export(path) => self.export(&path),
             Command::ExportPaper { kind, path } => self.export_paper(kind, &path),
+            Command::SaveImportReport(path) => self.save_import_report(&path),
             Command::AddGlasses(path) => self.add_glasses(&path),
             Command::Optimize { method, goal } => self.optimize(method, goal),
             Command::Pause => self.optimization.pause(),
@@ -329,6 +338,8 @@ impl Session {
             undo: self.history.undo_title().map(str::to_owned),
             redo: self.history.redo_title().map(str::to_owned),
             path: self.path.clone(),
+            imported: self.imported.clone(),
+            vignetting: self.import_settings.vignetting,
             goal: self.goal(),
             merit: self.merit_report(),
             dirty: self.is_dirty(),

@@ -12,6 +12,7 @@ mod ghosts;
 mod glass;
 pub(super) mod grin;
 mod history;
+mod import_report;
 mod layout;
 mod optimizer;
 mod pareto;
@@ -39,6 +40,7 @@ pub use ghosts::GhostsPanel;
 pub use glass::GlassPanel;
 pub use grin::GrinPanel;
 pub use history::HistoryPanel;
+pub use import_report::ImportReportPanel;
 pub use layout::LayoutPanel;
 pub use optimizer::OptimizerPanel;
 pub(super) use optimizer::term_edits;
@@ -138,11 +140,13 @@ pub enum PanelKind {
     System,
     /// The differences between zoom positions.
     Zoom,
+    /// The outcome of the lines of a foreign file.
+    ImportReport,
 }
 
 impl PanelKind {
     /// Every panel. A new one is a file in this folder, an entry here and a place in the window.
-    pub const ALL: [Self; 25] = [
+    pub const ALL: [Self; 26] = [
         Self::Layout,
         Self::Slice,
         Self::Prescription,
@@ -168,6 +172,7 @@ impl PanelKind {
         Self::Effects,
         Self::System,
         Self::Zoom,
+        Self::ImportReport,
     ];
 
     /// A new panel of this kind.
@@ -198,6 +203,7 @@ impl PanelKind {
             Self::Effects => Box::new(EffectsPanel),
             Self::System => Box::new(SystemPanel::default()),
             Self::Zoom => Box::new(ZoomPanel::default()),
+            Self::ImportReport => Box::new(ImportReportPanel),
         }
     }
 }

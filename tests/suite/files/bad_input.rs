@@ -93,7 +93,9 @@ fn a_failed_write_leaves_the_existing_file() {
     assert!(error.to_string().contains("cannot be written"), "{error}");
     let error = files::save(&lens, folder.join("a.doc")).unwrap_err().to_string();
     assert!(
-        error.contains("found the extension `doc`; expected `.json`, `.zmx` or `.seq`"),
+        error.contains(
+            "found the extension `doc`; expected `.json`, `.zmx`, `.seq`, `.len` or `.roa`"
+        ),
         "{error}"
     );
 

@@ -223,3 +223,31 @@ fn every_zoom_position_is_written_and_read_back() {
         assert_eq!(back.thickness_at(2, position), lens.thickness_at(2, position), "{position}");
     }
 }
+
+#[test]
+fn apertures_that_are_no_centred_circles_have_circles_that_stand_for_them() {
+    let read = |to: &str| {
+        let opened = changed("  CIR 8.6", to);
+        let row = &opened.lens.surfaces[0];
+        let (sizes, decenter) = ((row.semi_diameter, row.obstruction), row.decenter);
+        assert_eq!(decenter, [0.0; 2], "the surface is curved");
+        (sizes, outcome(&opened.report.unwrap(), to.trim().split(';').next().unwrap()))
+    };
+    let (used, approximated) = (ConversionOutcome::Used, ConversionOutcome::Approximated);
+    assert_eq!(read("  REX 3; REY 4"), ((Some(5.0), None), approximated));
+    assert_eq!(read("  ELX 3; ELY 2"), ((Some(3.0), None), approximated));
+    assert_eq!(read("  ELX 3; ELY 3"), ((Some(3.0), None), used));
+    assert_eq!(read("  ADX 1; CIR 6"), ((Some(7.0), None), approximated));
+    assert_eq!(read("  REX OBS 3; REY OBS 2; CIR 8.6"), ((Some(8.6), Some(2.0)), approximated));
+    assert_eq!(read("  REX EDG 3").1, ConversionOutcome::Preserved);
+    assert_eq!(read("  ARO 30").1, ConversionOutcome::Dropped);
+    // The fifth surface is a plane, but tilted and decentred itself.
+    let tilted = changed("  XDE 0.25; ADE 3.0; DAR", "  XDE 0.25; ADE 3.0; DAR; CIR 6; ADX 1");
+    assert_eq!(tilted.lens.surfaces[4].semi_diameter, Some(7.0));
+    // A plane moves with its aperture.
+    let third = "S     -154.5 30.0\n  ASP; A 1.5e-7; B -2.0E-10";
+    let plane = changed(third, "S     0.0 30.0\n  CIR 6; ADX 1; ADY 2");
+    let row = &plane.lens.surfaces[2];
+    assert_eq!((row.semi_diameter, row.decenter), (Some(6.0), [1.0, 2.0]));
+    assert_eq!(outcome(&plane.report.unwrap(), "ADX"), used);
+}

@@ -7,7 +7,9 @@ mod old_files;
 mod oslo;
 mod ray_optics;
 mod round_trip;
+mod vignetting;
 mod volume;
+mod writers;
 mod zemax;
 
 use std::path::PathBuf;

@@ -6,6 +6,8 @@ use aplanat::lens::{
     Aperture, FieldKind, FreeformKind, GradientIndex, Lens, Medium, Object, Parameter, Pickup,
     ProfileLaw, Quantity, Variable,
 };
+use aplanat::math::Vec3;
+use aplanat::trace::{Fate, Ray, Tracer};
 
 fn achromat() -> String {
     String::from_utf8(foreign("achromat.zmx")).unwrap()
@@ -242,10 +244,12 @@ fn obscurations_and_inner_radii_obstruct() {
         read("  OBSC 1 2.5 0"),
         ((None, Some(8.6)), dropped, ConversionOutcome::Approximated)
     );
+    // The circle about a rectangle; the drawn semi-diameter does not clip beside it.
     assert_eq!(
-        read("  SQAP 1 2.5 0"),
-        ((None, Some(8.6)), dropped, ConversionOutcome::Approximated)
+        read("  SQAP 1.5 2 0"),
+        ((None, Some(2.5)), ConversionOutcome::Approximated, ConversionOutcome::Preserved)
     );
+    assert_eq!(read("  SPID 1 2 0").1, dropped);
     let both = read("  CLAP 1 8.6 0\r\n  OBSC 0 2.5 0").0;
     assert_eq!(both, (Some(2.5), Some(8.6)));
     let inches = achromat().replace("UNIT MM", "UNIT IN").replace("CLAP 0 8.6", "CLAP 1 8.6");
@@ -257,6 +261,59 @@ fn obscurations_and_inner_radii_obstruct() {
     let at_image = achromat().replace("  DIAM 3.6 0", "  OBSC 0 1 0\r\n  DIAM 3.6 0");
     let report = open(at_image.as_bytes()).unwrap().report.unwrap();
     assert_eq!(outcome(&report, "OBSC").0, ConversionOutcome::Dropped);
+}
+
+/// A circle beside the vertex is exact on a plane, which moves with it; on a sphere the circle about the
+/// vertex stands for it that contains it.
+#[test]
+fn apertures_beside_the_vertex_are_exact_on_planes() {
+    let beside = "  CLAP 0 6 0\r\n  OBDC 1.5 -2 0";
+    let opened = changed("  CLAP 0 8.6 0", beside).unwrap();
+    let (row, report) = (opened.lens.surfaces[0].clone(), opened.report.unwrap());
+    assert_eq!((row.semi_diameter, row.decenter), (Some(8.5), [0.0; 2]));
+    for line in ["CLAP 0 6 0", "OBDC 1.5 -2 0"] {
+        let (outcome, note) = outcome(&report, line);
+        assert_eq!(outcome, ConversionOutcome::Approximated, "{line}");
+        assert!(note.contains("a circle of 6 at (1.5, -2)"), "{note}");
+    }
+    let plane = achromat()
+        .replace("CURV 2.0491803278688523E-2 1 0 0 0", "CURV 0 0 0 0 0")
+        .replace("  CLAP 0 8.6 0", beside);
+    let opened = open(plane.as_bytes()).unwrap();
+    let (row, report) = (opened.lens.surfaces[0].clone(), opened.report.unwrap());
+    assert_eq!((row.semi_diameter, row.decenter), (Some(6.0), [1.5, -2.0]));
+    assert_eq!(outcome(&report, "OBDC").0, ConversionOutcome::Used);
+    // A ray passes if it meets the plane within 6 mm of (1.5, -2).
+    let system = opened.lens.resolve(0, 0.5875618).unwrap();
+    let tracer = Tracer::<f64>::new(&system).unwrap();
+    for i in 0..400 {
+        let [x, y] = [i % 20, i / 20].map(|k| f64::from(k) - 9.5);
+        let direction = Vec3::new(0.0, 0.0, 1.0);
+        let fate = tracer.trace(Ray { point: Vec3::new(x, y, -1.0), direction }).fate;
+        let inside = (x - 1.5).hypot(y + 2.0) <= 6.0;
+        assert_eq!(fate != Fate::Clipped(0), inside, "{x} {y}: {fate:?}");
+    }
+}
+
+#[test]
+fn rectangles_and_ellipses_have_circles_that_stand_for_them() {
+    let read = |to: &str| {
+        let opened = changed("  CLAP 0 8.6 0", to).unwrap_or_else(|error| panic!("{error}"));
+        let row = &opened.lens.surfaces[0];
+        let sizes = (row.semi_diameter, row.obstruction);
+        let report = opened.report.unwrap();
+        let line = to.trim().lines().next().unwrap().trim().to_owned();
+        (sizes, outcome(&report, &line).0)
+    };
+    let (used, approximated) = (ConversionOutcome::Used, ConversionOutcome::Approximated);
+    assert_eq!(read("  ELAP 3 4 0"), ((Some(4.0), None), approximated));
+    assert_eq!(read("  ELAP 4 4 0"), ((Some(4.0), None), used));
+    assert_eq!(read("  SQAP 2 3 0\r\n  OBDC 1 -1 0"), ((Some(5.0), None), approximated));
+    // The largest circle inside an obscuration; the drawn semi-diameter clips here.
+    assert_eq!(read("  SQOB 2 3 0"), ((Some(8.6), Some(2.0)), approximated));
+    assert_eq!(read("  ELOB 2 3 0\r\n  OBDC 0 0.5 0"), ((Some(8.6), Some(1.5)), approximated));
+    assert_eq!(read("  ELOB 2 3 0\r\n  OBDC 0 5 0").1, ConversionOutcome::Dropped);
+    assert_eq!(read("  SQAP 0 3 0").1, ConversionOutcome::Dropped);
 }
 
 #[test]

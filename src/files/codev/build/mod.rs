@@ -3,15 +3,18 @@
 //! Surface 0 of the file is the object and the last one the image; surface k between them is row
 //! k − 1 here. Lengths become millimetres.
 
+mod aperture;
 mod glass;
 mod row;
 mod zoom;
 
 pub(in crate::files) use row::frames;
 
-use super::file::{ApertureCommand, CodeVFile};
+use super::file::{ApertureCommand, CodeVFile, CodeVSurface};
 use crate::files::error::ParseError;
+use crate::files::foreign_lens::ForeignLens;
 use crate::files::report::{ConversionOutcome, ConversionReport};
+use crate::files::vignetting::PupilFactors;
 use crate::lens::{
     Aperture, FieldKind, FieldPoint, Fields, Lens, Medium, Object, Wavelength,
     paraxial_image_distance,
@@ -56,6 +59,25 @@ pub(super) fn build(file: &CodeVFile, report: &mut ConversionReport) -> Result<L
     zoom::add_positions(file, &mut lens, report);
     row::add_variables(file, &mut lens, report);
     Ok(lens)
+}
+
+/// The lens with its report, and the vignetting factors and apertures of the file.
+pub(super) fn with_beam(file: &CodeVFile, lens: Lens, report: ConversionReport) -> ForeignLens {
+    let image = file.surfaces.len() - 1;
+    let has_aperture =
+        |surface: &CodeVSurface| surface.clip.is_some() || surface.outline.half != [None; 2];
+    let clips = file.surfaces[1..image].iter().map(has_aperture).collect();
+    let [ux, lx, uy, ly] = &file.vignetting;
+    let is_given = file.vignetting.iter().any(|values| !values.is_empty());
+    let fields = if is_given { lens.fields.values.len() } else { 0 };
+    let at = |values: &[f64], i: usize| values.get(i).copied().unwrap_or(0.0);
+    let factors = (0..fields).map(|i| {
+        let [dx, cx] = PupilFactors::of_edges(at(ux, i), at(lx, i));
+        let [dy, cy] = PupilFactors::of_edges(at(uy, i), at(ly, i));
+        PupilFactors { decenter: [dx, dy], compression: [cx, cy], angle: 0.0 }
+    });
+    let factors = factors.collect();
+    ForeignLens { lens, report, factors, clips, automatic: Vec::new() }
 }
 
 /// Millimetres per unit.

@@ -1,6 +1,6 @@
 //! The surfaces between object and image, and their place on the axis.
 
-use super::glass;
+use super::{aperture, glass};
 use crate::files::codev::file::{
     CodeVDiffraction, CodeVFile, CodeVProfile, CodeVSurface, PickupCommand, Placement,
 };
@@ -31,6 +31,7 @@ pub(super) fn rows(file: &CodeVFile, stop: usize, report: &mut ConversionReport)
             after
         };
         rows[k - 1].place_on_axis(&before, &after);
+        aperture::apply(&file.surfaces[k], unit, &mut rows[k - 1], report);
     }
     rows
 }
@@ -72,8 +73,6 @@ fn row(file: &CodeVFile, number: usize, radii: bool, report: &mut ConversionRepo
         freeform: form.map(|form| form.scaled(unit)),
         thickness: surface.thickness * unit,
         medium: imported.medium,
-        semi_diameter: clip(surface).map(|radius| radius * unit),
-        obstruction: obstruction(surface).map(|radius| radius * unit),
         locked,
         comment,
         ..Row::default()
@@ -119,16 +118,6 @@ fn asphere(surface: &CodeVSurface, unit: f64, report: &mut ConversionReport) -> 
     }
     let terms = surface.terms[..used.min(ASPHERE_TERMS)].iter();
     terms.zip((4..).step_by(2)).map(|(a, power)| a * unit.powi(1 - power)).collect()
-}
-
-fn clip(surface: &CodeVSurface) -> Option<f64> {
-    surface.clip.filter(|radius| *radius > 0.0 && !surface.is_offset)
-}
-
-/// The obstruction, unless it would block everything.
-fn obstruction(surface: &CodeVSurface) -> Option<f64> {
-    let inner = surface.obstruction.filter(|inner| *inner > 0.0 && !surface.is_offset)?;
-    clip(surface).is_none_or(|outer| inner < outer).then_some(inner)
 }
 
 /// The command that makes a surface impossible to trace, with all its lines.

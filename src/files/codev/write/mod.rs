@@ -5,6 +5,8 @@
 
 mod surface;
 
+pub(in crate::files) use surface::place;
+
 use crate::files::report::{ConversionOutcome, ConversionReport};
 use crate::files::text::{number, numbers};
 use crate::lens::{
@@ -31,7 +33,7 @@ const ZOOMED: [(&str, Quantity); 10] = [
 /// An invalid lens, or a place of a surface that the format cannot hold.
 pub fn write(lens: &Lens) -> Result<(String, ConversionReport), LensError> {
     lens.check()?;
-    let unplaced = lens.surfaces.iter().position(|row| surface::place(row).is_none());
+    let unplaced = lens.surfaces.iter().position(|row| place(row).is_none());
     let unplaced = unplaced.or(lens.surfaces.iter().position(surface::has_no_form));
     if let Some(surface) = unplaced {
         let (what, hint) = ("the export as .seq", "; expected .zmx or the native format (.json)");

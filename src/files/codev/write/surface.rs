@@ -9,11 +9,11 @@ use crate::lens::{
 };
 
 /// Decentre and tilt of a surface, and the word that says what they move.
-type Place = Option<(AxisBreak, &'static str)>;
+pub(in crate::files) type Place = Option<(AxisBreak, &'static str)>;
 
 /// The place of a surface, which has none if it is centred; `None` for one that the format cannot hold
 /// without a surface of its own.
-pub(super) fn place(row: &Row) -> Option<Place> {
+pub(in crate::files) fn place(row: &Row) -> Option<Place> {
     let [x, y] = row.decenter;
     let own = row.decenter != [0.0; 2] || row.tilt != [0.0; 2];
     match (row.break_before, row.break_after) {

@@ -2,6 +2,7 @@
 
 use crate::files::error::ParseError;
 use crate::files::report::{ConversionOutcome, ConversionReport};
+use crate::files::vignetting::PupilFactors;
 use crate::files::zemax::file::{ApertureLine, ZemaxFile};
 use crate::lens::glass;
 use crate::lens::{Aperture, FieldKind, FieldPoint, Fields, Lens, Medium, Object, Wavelength};
@@ -92,6 +93,21 @@ pub(super) fn fields(file: &ZemaxFile) -> Result<Fields, ParseError> {
         _ => FieldKind::Angle,
     };
     Ok(Fields { kind, values })
+}
+
+/// The vignetting factors of some fields; empty without lines of factors.
+pub(super) fn vignetting(file: &ZemaxFile, fields: usize) -> Vec<PupilFactors> {
+    let [dx, dy, cx, cy, angle] = &file.vignetting;
+    if file.vignetting.iter().all(Vec::is_empty) {
+        return Vec::new();
+    }
+    let at = |values: &[f64], i: usize| values.get(i).copied().unwrap_or(0.0);
+    let factors = |i| PupilFactors {
+        decenter: [at(dx, i), at(dy, i)],
+        compression: [at(cx, i), at(cy, i)],
+        angle: at(angle, i),
+    };
+    (0..fields).map(factors).collect()
 }
 
 /// Wavelength and weight of unused wavelength lines.

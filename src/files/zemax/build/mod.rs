@@ -3,15 +3,17 @@
 //! Surface 0 of the file is the object and the last one the image; surface k between them is row
 //! k − 1 here. Lengths become millimetres.
 
+mod aperture;
 mod beam;
 mod row;
 mod solve;
 mod zoom;
 
-use super::file::ZemaxFile;
+use super::file::{ZemaxFile, ZemaxSurface};
 use super::row_plan::{RowPlan, is_break};
 use super::{glass, gradient};
 use crate::files::error::ParseError;
+use crate::files::foreign_lens::ForeignLens;
 use crate::files::report::{ConversionOutcome, ConversionReport};
 use crate::lens::{Lens, Medium, Object, Row};
 
@@ -48,6 +50,21 @@ pub(super) fn build(file: &ZemaxFile, report: &mut ConversionReport) -> Result<L
     solve::add_solves(file, &plan, &mut lens, report);
     beam::infinite_f_number(file, &mut lens, report);
     Ok(lens)
+}
+
+/// The lens with its report, the vignetting factors of the file, and its semi-diameters.
+pub(super) fn with_beam(file: &ZemaxFile, lens: Lens, report: ConversionReport) -> ForeignLens {
+    let plan = RowPlan::new(&file.surfaces);
+    let surfaces = || plan.rows.iter().map(|row| &file.surfaces[row.surface]);
+    let has_aperture = |surface: &ZemaxSurface| surface.clip.is_some() || surface.outline.is_some();
+    let clips = surfaces().map(has_aperture).collect();
+    let computed = |(i, surface): (usize, &ZemaxSurface)| {
+        let given = surface.semi_diameter.filter(|given| !given.fixed && given.value > 0.0)?;
+        Some((i, given.value * file.unit))
+    };
+    let automatic = surfaces().enumerate().filter_map(computed).collect();
+    let factors = beam::vignetting(file, lens.fields.values.len());
+    ForeignLens { lens, report, factors, clips, automatic }
 }
 
 /// Refuses a truncated file.
@@ -171,7 +188,8 @@ fn report_breaks(file: &ZemaxFile, report: &mut ConversionReport) {
     for surface in file.surfaces.iter().filter(|surface| is_break(surface)) {
         report.amend(surface.kind.1, ConversionOutcome::Used, "a break of the axis");
         let clip = surface.clip.map(|(_, line)| line);
-        let lines = [surface.glass.as_ref().map(|glass| glass.line), clip];
+        let outline = surface.outline.map(|own| own.line);
+        let lines = [surface.glass.as_ref().map(|glass| glass.line), clip, outline];
         for line in lines.into_iter().flatten() {
             report.amend(line, ConversionOutcome::Preserved, "on a coordinate break");
         }
@@ -197,7 +215,9 @@ fn report_image(file: &ZemaxFile, report: &mut ConversionReport) {
                 "object and image do not clip in this program",
             );
         }
-        for (_, line) in surface.clip.into_iter().chain(surface.obstruction) {
+        let circles = surface.clip.into_iter().chain(surface.obstruction).map(|(_, line)| line);
+        let others = surface.outline.into_iter().chain(surface.block).map(|own| own.line);
+        for line in circles.chain(others) {
             report.amend(
                 line,
                 ConversionOutcome::Dropped,

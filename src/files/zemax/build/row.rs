@@ -1,9 +1,10 @@
 //! One surface between object and image.
 
+use super::aperture;
 use crate::files::error::ParseError;
 use crate::files::report::{ConversionOutcome, ConversionReport};
 use crate::files::zemax::INFINITE_GAP;
-use crate::files::zemax::file::{ApertureLine, ZemaxFile, ZemaxSurface};
+use crate::files::zemax::file::{ZemaxFile, ZemaxSurface};
 use crate::files::zemax::row_plan::PlannedRow;
 use crate::files::zemax::shape::{self, ZemaxShape};
 use crate::lens::{LockedSurface, Medium, Pose, Row};
@@ -34,14 +35,13 @@ pub(super) fn row(
         ideal: form.ideal.map(|ideal| ideal.scaled(unit)),
         thickness: thickness(file, planned)? * unit,
         medium,
-        semi_diameter: semi_diameter(file, number, stop, report).map(|radius| radius * unit),
-        obstruction: obstruction(surface).map(|radius| radius * unit),
         stop: number == stop,
         locked,
         comment: surface.comment.clone(),
         ..Row::default()
     };
     row.place_on_axis(&scaled_pose(planned.before), &scaled_pose(planned.after));
+    aperture::apply(file, number, stop, &mut row, report);
     Ok(row)
 }
 
@@ -78,51 +78,4 @@ fn thickness(file: &ZemaxFile, planned: &PlannedRow) -> Result<f64, ParseError> 
     let found = format!("an infinite thickness after surface {number}");
     let expected = "INFINITY only behind the object".to_owned();
     Err(ParseError { place: format!("line {line}"), found, expected })
-}
-
-/// The radius of the obstruction, which is centred.
-fn obstruction(surface: &ZemaxSurface) -> Option<f64> {
-    let (radius, _) = surface.obstruction?;
-    surface.aperture_offset.is_none().then_some(radius)
-}
-
-/// The clipping radius. In the file only circular apertures clip: a fixed semi-diameter is drawn there
-/// and clips here, an automatic one is wide enough for every ray and is not read.
-fn semi_diameter(
-    file: &ZemaxFile,
-    number: usize,
-    stop: usize,
-    report: &mut ConversionReport,
-) -> Option<f64> {
-    let surface = &file.surfaces[number];
-    if let Some((.., line)) = surface.aperture_offset {
-        let note = "a decentred aperture: only centred ones clip here, so nothing clips";
-        let clip = surface.clip.map(|(_, line)| line);
-        let drawn = surface.semi_diameter.map(|given| given.line);
-        for line in [Some(line), clip, drawn].into_iter().flatten() {
-            report.amend(line, ConversionOutcome::Dropped, note);
-        }
-        return None;
-    }
-    if let Some((radius, _)) = surface.clip {
-        return Some(radius);
-    }
-    let given = surface.semi_diameter?;
-    let floating = matches!(file.aperture, Some((ApertureLine::FloatByStop, _)));
-    if floating && number == stop {
-        return None; // it is the aperture of the lens
-    }
-    if given.fixed && surface.obstruction.is_some_and(|(inner, _)| inner >= given.value) {
-        let note = "the drawn size of the obscuration; nothing is clipped outside it";
-        report.amend(given.line, ConversionOutcome::Preserved, note);
-        return None;
-    }
-    if given.fixed && given.value > 0.0 {
-        let note = "clips in this program; in the file it is only drawn";
-        report.amend(given.line, ConversionOutcome::Approximated, note);
-        return Some(given.value);
-    }
-    let note = "automatic in the file; nothing is clipped";
-    report.amend(given.line, ConversionOutcome::Preserved, note);
-    None
 }

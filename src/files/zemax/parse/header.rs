@@ -29,7 +29,7 @@ pub(super) fn read(
             used()
         }
         "VDXN" | "VDYN" | "VCXN" | "VCYN" | "VANN" | "VDXF" | "VDYF" | "VCXF" | "VCYF" => {
-            vignetting(line)
+            vignetting(file, line)
         }
         "VERS" | "GFAC" | "RAIM" | "PUSH" | "SDMA" | "ROPD" | "PICB" | "POLS" | "GLRS" | "GSTD"
         | "NSCD" | "COFN" | "PFIL" | "LANG" | "TOL" => preserved(),
@@ -144,10 +144,17 @@ fn waves(file: &mut ZemaxFile, line: &ZemaxLine<'_>) -> Result<LineOutcome, Pars
     Ok(used())
 }
 
-fn vignetting(line: &ZemaxLine<'_>) -> LineOutcome {
-    if (0..line.fields.len()).all(|field| line.number(field).is_ok_and(|value| value == 0.0)) {
-        preserved()
-    } else {
-        dropped("vignetting factors: rays are clipped by semi-diameters in this program")
+/// The lines of vignetting factors, one number for each field.
+const VIGNETTING: [&str; 5] = ["VDXN", "VDYN", "VCXN", "VCYN", "VANN"];
+
+fn vignetting(file: &mut ZemaxFile, line: &ZemaxLine<'_>) -> LineOutcome {
+    let values = line.numbers().ok();
+    if values.as_ref().is_some_and(|values| values.iter().all(|value| *value == 0.0)) {
+        return preserved();
     }
+    let known = VIGNETTING.iter().position(|keyword| *keyword == line.keyword);
+    if let (Some(values), Some(kind)) = (values, known) {
+        file.vignetting[kind] = values;
+    }
+    dropped(crate::files::vignetting::LEFT_OUT)
 }

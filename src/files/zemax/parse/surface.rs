@@ -2,8 +2,9 @@
 
 use super::{LineOutcome, approximated, dropped, preserved, used};
 use crate::files::error::ParseError;
+use crate::files::outline::OutlineForm;
 use crate::files::zemax::file::{
-    CurvatureSolve, GlassLine, PickupLine, SemiDiameterLine, ZemaxFile, ZemaxSurface,
+    CurvatureSolve, GlassLine, OutlineLine, PickupLine, SemiDiameterLine, ZemaxFile, ZemaxSurface,
 };
 use crate::files::zemax::line::ZemaxLine;
 
@@ -42,6 +43,7 @@ pub(super) fn read(
         "DIAM" => surface.semi_diameter = Some(semi_diameter(line)?),
         "CLAP" | "FLAP" => clip(surface, line)?,
         "OBSC" => return obscuration(surface, line),
+        "SQAP" | "ELAP" | "SQOB" | "ELOB" => return Ok(outline(surface, line)),
         "VCON" => surface.variable_conic = Some(line.number),
         "VPAR" => surface.variable_parameters.push((line.count(0)?, line.number)),
         "VDSZ" => {
@@ -66,8 +68,8 @@ pub(super) fn read(
 /// The outcome of the other lines of a surface: those that affect rays are dropped or approximated.
 fn read_other(line: &ZemaxLine<'_>) -> LineOutcome {
     match line.keyword {
-        "SQAP" | "ELAP" | "UDAD" | "UDOB" | "SQOB" | "ELOB" | "SPID" => {
-            dropped("only circular, centred apertures and obstructions are supported")
+        "UDAD" | "UDOB" | "SPID" => {
+            dropped("only circular, rectangular and elliptical apertures and obscurations are read")
         }
         "PPAR" | "CHZH" | "TOLE" | "TCOM" | "EDGE" | "PMVA" | "PUPZ" | "CENT" => {
             approximated("the present value of the solve is used")
@@ -181,6 +183,23 @@ fn obscuration(
     }
     obstruct(surface, outer, line);
     Ok(used())
+}
+
+/// `SQAP`, `ELAP`, `SQOB`, `ELOB`: the half widths along x and y of an aperture or an obscuration.
+fn outline(surface: &mut ZemaxSurface, line: &ZemaxLine<'_>) -> LineOutcome {
+    let half = [line.number(0), line.number(1)].map(|half| half.unwrap_or(0.0));
+    if !half.iter().all(|half| *half > 0.0) {
+        return dropped("its half widths are not above 0");
+    }
+    let is_ellipse = line.keyword.starts_with("EL");
+    let form = if is_ellipse { OutlineForm::Ellipse } else { OutlineForm::Rectangle };
+    let found = Some(OutlineLine { form, half, line: line.number });
+    if line.keyword.ends_with("AP") {
+        surface.outline = found;
+    } else {
+        surface.block = found;
+    }
+    used()
 }
 
 /// The two radii of a circular aperture.

@@ -1,8 +1,12 @@
-//! Lenses of the program OSLO, `.len`: reading.
+//! Lenses of the program OSLO, `.len`: reading and writing.
 //!
 //! A file is a list of commands, one a line. The data of a surface end with `NXT`; the first surface is
 //! the object, the last one the image. Commands of the whole lens may stand anywhere, most of them in
 //! front or at the end. A command that this program has no counterpart of is listed as dropped.
+
+mod write;
+
+pub(super) use write::write;
 
 use super::error::{FileError, ParseError};
 use super::report::{ConversionOutcome, ConversionReport, ConversionRow};

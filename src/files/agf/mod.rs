@@ -12,6 +12,10 @@
 //!
 //! A missing number is `-`; a line that begins with a number continues the record before it. Makers give the index relative to air, as this program does.
 
+mod write;
+
+pub use write::{AgfExport, write_agf};
+
 use super::bounded::read_file;
 use super::error::FileError;
 use super::own_glass::{MAX_CATALOGUE_BYTES, maker};

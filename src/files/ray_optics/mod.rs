@@ -1,7 +1,11 @@
-//! The models of the program ray-optics, `.roa`: reading.
+//! The models of the program ray-optics, `.roa`: reading and writing.
 //!
 //! A model is JSON that names the classes of the program. What this program has no counterpart of, a
 //! hologram, becomes a locked row with its JSON.
+
+mod write;
+
+pub(super) use write::write;
 
 use super::codev::{Placement, frames};
 use super::error::{FileError, ParseError};
@@ -195,7 +199,9 @@ fn fields(
     let point = |field: &Value| {
         let field = attributes(field);
         let weight = field["wt"].as_f64().unwrap_or(1.0);
-        let [x, y] = ["x", "y"].map(|key| number(&field[key]) * scale);
+        // Newer versions of the program have a line in front of the names.
+        let value = |key: &str| field.get(key).or_else(|| field.get(format!("_{key}")));
+        let [x, y] = ["x", "y"].map(|key| value(key).map_or(0.0, number) * scale);
         match kind {
             FieldKind::Angle => FieldPoint::from_projected_angles([x, y], weight),
             FieldKind::ObjectHeight | FieldKind::ImageHeight => FieldPoint { x, y, weight },
@@ -231,7 +237,10 @@ fn medium(gap: &Value, place: &str, report: &mut ConversionReport) -> Medium {
         _ => {}
     }
     let name = data["gname"].as_str().or_else(|| data["label"].as_str()).unwrap_or_default();
-    let maker = class(glass).trim_end_matches("Glass").to_ascii_uppercase();
+    let maker = match data["_catalog"].as_str() {
+        Some(maker) => maker.to_ascii_uppercase(),
+        None => class(glass).trim_end_matches("Glass").to_ascii_uppercase(),
+    };
     let imported = named_medium(name, &[maker]);
     if imported.outcome != ConversionOutcome::Used {
         let what = format!("glass {name} of {place}");
