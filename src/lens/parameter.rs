@@ -79,6 +79,19 @@ impl Parameter {
     pub const fn at_zoom(surface: usize, quantity: Quantity, zoom: usize) -> Self {
         Self { surface, quantity, zoom: Some(zoom) }
     }
+
+    /// The name in the window, which shows a curvature as its radius and counts zoom positions from 1.
+    pub fn shown_name(self) -> String {
+        let surface = SurfaceNumber::new(self.surface);
+        let name = match self.quantity {
+            Quantity::Curvature => format!("radius of surface {surface}"),
+            quantity => format!("{quantity} surface {surface}"),
+        };
+        match self.zoom {
+            Some(zoom) => format!("{name} at zoom position {}", zoom + 1),
+            None => name,
+        }
+    }
 }
 
 /// The keys of a parameter in a file. A thickness at a zoom position is a quantity there.

@@ -4,7 +4,7 @@
 use super::clock::now;
 use super::live_merit::{MeritReport, MeritValues};
 use super::run::{LatestRequestWorker, catch_panic};
-use crate::lens::{Lens, Parameter, ParameterKind, add_variables};
+use crate::lens::{Lens, Parameter, ParameterKind, Quantity, add_variables};
 use crate::math::format_short;
 use crate::merit::{DerivativeLevel, Goal, Merit, MeritError, SumOfSquares, TermValue};
 use crate::paraxial::{DragOutcome, DragSettings, Handle, HandleDrag, MovedNumber, tangents};
@@ -222,8 +222,14 @@ impl DragProgress {
             return None;
         }
         let change = |moved: &MovedNumber| {
-            let [before, after] = [moved.before, moved.after].map(rounded).map(format_short);
-            format!("{} from {before} to {after}", moved.parameter)
+            let is_curvature = moved.parameter.quantity == Quantity::Curvature;
+            let shown = |value: f64| if is_curvature { value.recip() } else { value };
+            let text = |value| match shown(value) {
+                value if value.is_infinite() => "Infinity".to_owned(),
+                value => format_short(rounded(value)),
+            };
+            let [before, after] = [moved.before, moved.after].map(text);
+            format!("{} from {before} to {after}", moved.parameter.shown_name())
         };
         let named: Vec<String> = self.moved.iter().take(NAMED_NUMBERS).map(change).collect();
         let more = self.moved.len().saturating_sub(NAMED_NUMBERS);

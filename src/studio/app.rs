@@ -295,14 +295,20 @@ impl Studio {
             ui.set_max_width(if table.is_empty() { 460.0 } else { 820.0 });
             ui.label(capitalize(words));
             if !table.is_empty() {
-                ScrollArea::both().max_height(440.0).show(ui, |ui| {
+                let scroll = ScrollArea::both().max_height(440.0).min_scrolled_height(440.0);
+                scroll.show(ui, |ui| {
                     let table = RichText::new(table).monospace();
                     ui.add(Label::new(table).extend().selectable(true));
                 });
             }
             ui.add_space(8.0);
             ui.horizontal(|ui| {
-                read = ui.button("OK").clicked();
+                let ok = ui.button("OK");
+                if ui.memory(|memory| memory.focused().is_none()) {
+                    // Enter closes the message, too.
+                    ok.request_focus();
+                }
+                read = ok.clicked();
                 if ui.button("Copy").on_hover_text("Copy the whole text").clicked() {
                     ui.copy_text(text.clone());
                 }

@@ -11,6 +11,8 @@ use super::menu_items::{MenuContext, MenuItem};
 
 /// The number of items that are listed at most.
 const MAX_ITEMS: usize = 60;
+/// The greatest height of the list, in points.
+const LIST_HEIGHT: f32 = 380.0;
 
 /// The text and the selection.
 #[derive(Debug, Default)]
@@ -89,7 +91,10 @@ impl CommandPalette {
     /// Shows the items; the index of one that was pressed.
     fn list(&self, ui: &mut Ui, items: &[MenuItem], moved: bool) -> Option<usize> {
         let mut pressed = None;
-        ScrollArea::vertical().max_height(380.0).auto_shrink([false, true]).show(ui, |ui| {
+        // A list that follows a shorter one has its full height too.
+        let scroll =
+            ScrollArea::vertical().max_height(LIST_HEIGHT).min_scrolled_height(LIST_HEIGHT);
+        scroll.auto_shrink([false, true]).show(ui, |ui| {
             ui.spacing_mut().item_spacing.y = 1.0;
             for (i, item) in items.iter().enumerate() {
                 let row = show_item(ui, item, i == self.selected);

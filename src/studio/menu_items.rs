@@ -233,6 +233,7 @@ impl MenuContext<'_> {
         ];
         let panels = self.panels.iter().enumerate().map(|(i, panel)| {
             let item = MenuItem::new(MENU, panel.title, UiAction::TogglePanel(panel.kind));
+            let item = item.hint(panel.kind.contents());
             let item = MenuItem { checked: Some(panel.is_open), ..item };
             KEYS.get(i).map_or(item.clone(), |key| item.control(*key))
         });

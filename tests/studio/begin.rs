@@ -17,7 +17,7 @@ use egui::{Key, Modifiers};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
 
-use crate::harness::{PanelState, double_gauss, panel_harness, view_of};
+use crate::harness::{PanelState, double_gauss, painted_texts, panel_harness, view_of};
 
 fn starting(form: StartingForm) -> Lens {
     let starting = StartingLens {
@@ -150,6 +150,48 @@ fn the_palette_shows_an_open_panel_and_ranks_an_exact_title_first() {
         found.min_by(f32::total_cmp).unwrap()
     };
     assert!(top("Optimizer: Optimize") < top("View: Optimizer"));
+}
+
+/// A panel is found by what it shows.
+#[test]
+fn the_palette_finds_a_panel_by_its_contents() {
+    let mut harness = window(double_gauss());
+    for (words, panel) in [
+        ("relative illumination", "View: Field curves"),
+        ("encircled energy", "View: Wavefront"),
+        ("multi-configuration", "View: Zoom positions"),
+    ] {
+        keys(&mut harness, Modifiers::COMMAND, Key::K);
+        enter_text(&mut harness, "Find a command", words);
+        let texts = painted_texts(&harness);
+        assert!(texts.iter().any(|text| text == panel), "{panel} in {texts:?}");
+        keys(&mut harness, Modifiers::NONE, Key::Escape);
+    }
+}
+
+/// A palette that had found little keeps no small window.
+#[test]
+fn a_long_list_of_the_palette_is_shown_after_a_short_one() {
+    let mut harness = window(double_gauss());
+    keys(&mut harness, Modifiers::COMMAND, Key::K);
+    enter_text(&mut harness, "Find a command", "no such words");
+    keys(&mut harness, Modifiers::NONE, Key::Escape);
+    keys(&mut harness, Modifiers::COMMAND, Key::K);
+    let texts = painted_texts(&harness);
+    let listed = texts.iter().filter(|text| text.starts_with("File: ")).count();
+    assert!(listed > 10, "{listed} in {texts:?}");
+}
+
+#[test]
+fn enter_closes_a_message() {
+    let mut harness = window(double_gauss());
+    let command = Command::Open(PathBuf::from("no such file.json"));
+    let context = harness.ctx.clone();
+    harness.state_mut().apply(&context, command);
+    harness.run_steps(3);
+    harness.get_by_label("OK");
+    keys(&mut harness, Modifiers::NONE, Key::Enter);
+    assert!(harness.query_by_label("OK").is_none());
 }
 
 /// A slow frame delivers the shortcut and the first letters together.
@@ -401,6 +443,33 @@ fn any_number_of_a_surface_can_differ_between_positions() {
     click(&mut harness, "Do not vary the radius of surface 2");
     let same = edited(&harness);
     assert!(same.zoom.iter().all(|position| position.numbers.is_empty()));
+}
+
+/// A list of all numbers would end below the window; and what is varied is named in the undo step.
+#[test]
+fn every_number_that_can_vary_is_within_the_window() {
+    let mut lens = double_gauss();
+    lens.zoom = vec![ZoomPosition::default(), ZoomPosition::default()];
+    let mut harness = panel(ZoomPanel::default(), lens);
+    click(&mut harness, "Vary");
+    click(&mut harness, "Other number of a surface");
+    click(&mut harness, "Surface 11");
+    let item = harness.get_by_label("Conic constant of surface 11").rect();
+    assert!(item.bottom() <= 620.0, "{item:?}");
+    click(&mut harness, "Conic constant of surface 11");
+    assert_eq!(edited(&harness).zoom[1].number(10, Quantity::Conic), Some(0.0));
+    let Some(Command::Edit(edit)) = harness.state().commands.last() else { panic!("no edit") };
+    assert_eq!(edit.title(), "vary the conic constant of surface 11 between the zoom positions");
+}
+
+#[test]
+fn equal_area_fields_reach_a_typed_largest_one() {
+    let mut lens = achromat();
+    lens.fields = Fields::equal_area(FieldKind::Angle, 0.0, 1);
+    let mut harness = panel(SystemPanel::default(), lens);
+    type_into(&mut harness, "Largest equal-area field", "20");
+    click(&mut harness, "equal-area steps");
+    assert_eq!(edited(&harness).fields, Fields::equal_area(FieldKind::Angle, 20.0, 3));
 }
 
 #[test]

@@ -76,8 +76,17 @@ pub(super) fn small_harness<P: Panel + 'static>(
     view: SessionView,
     height: f32,
 ) -> Harness<'static, PanelState<P>> {
+    sized_harness(panel, view, [414.0, height])
+}
+
+/// A harness around a panel with some room.
+pub(super) fn sized_harness<P: Panel + 'static>(
+    panel: P,
+    view: SessionView,
+    size: [f32; 2],
+) -> Harness<'static, PanelState<P>> {
     let state = PanelState { panel, view, commands: Vec::new(), requests: Vec::new() };
-    let builder = Harness::builder().with_size([414.0, height]).with_context_setup(theme::apply);
+    let builder = Harness::builder().with_size(size).with_context_setup(theme::apply);
     builder.build_ui_state(|ui, state: &mut PanelState<P>| state.show(ui), state)
 }
 
@@ -105,7 +114,5 @@ pub(super) fn panel_harness<P: Panel + 'static>(
     panel: P,
     view: SessionView,
 ) -> Harness<'static, PanelState<P>> {
-    let state = PanelState { panel, view, commands: Vec::new(), requests: Vec::new() };
-    let builder = Harness::builder().with_size([900.0, 620.0]).with_context_setup(theme::apply);
-    builder.build_ui_state(|ui, state: &mut PanelState<P>| state.show(ui), state)
+    sized_harness(panel, view, [900.0, 620.0])
 }

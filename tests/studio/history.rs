@@ -274,7 +274,58 @@ fn the_spots_of_two_versions_stand_beside_each_other() {
     harness.run();
     for which in ["present", "selected"] {
         harness.get_by_label_contains(&format!("Spot of field 1 of the {which} version: RMS"));
+        let label = format!("of the {which} version: RMS");
+        let all = harness.get_all_by_label_contains(&label);
+        let lefts: Vec<f32> = all.map(|picture| picture.rect().left()).collect();
+        assert!(lefts.iter().all(|left| *left == lefts[0]), "{which}: {lefts:?}");
     }
+}
+
+/// Until a version is clicked, all the room is for the tree.
+#[test]
+fn the_tree_has_the_room_while_no_version_is_selected() {
+    let mut harness = small_harness(HistoryPanel::default(), branched(), LOWER);
+    harness.run();
+    let hint = harness.get_by_label("Click a version to compare it with the present one.").rect();
+    assert!(hint.top() > LOWER - 40.0, "{hint:?}");
+}
+
+/// In a wide panel the selected version stands beside the tree.
+#[test]
+fn a_version_is_compared_beside_the_tree_where_there_is_room() {
+    let mut harness = history();
+    harness.get_by_label_contains("Thickness of surface 3").click();
+    harness.run();
+    let row = harness.get_by_label_contains("Present version").rect();
+    let button = harness.get_by_label("Go to").rect();
+    assert!(button.left() > row.right() - 1.0 && button.top() < row.bottom(), "{button:?} {row:?}");
+}
+
+/// A last thickness that is solved is that of the solve, and not the written one.
+#[test]
+fn the_track_of_a_solved_image_plane_is_compared_as_it_is() {
+    let mut view = branched();
+    let mut solved = double_gauss();
+    solved.image_solve = Some(0.0);
+    let mut other = solved.clone();
+    other.surfaces.last_mut().unwrap().thickness += 20.0;
+    other.surfaces[2].thickness += 0.5;
+    view.lens = Arc::new(solved);
+    Arc::make_mut(&mut Arc::make_mut(&mut view.history)[1]).lens = Arc::new(other);
+    let track = |lens: &Lens| {
+        let system = lens.resolve(0, lens.wavelengths[lens.primary()].um).unwrap();
+        system.total_track()
+    };
+    let [own, selected] = [track(&view.lens), track(&view.history[1].lens)];
+    let change = aplanat::studio::number::format_change(own, selected, 2).unwrap();
+    let mut harness = panel_harness(HistoryPanel::default(), view);
+    harness.run();
+    harness.get_by_label_contains("Thickness of surface 3").click();
+    harness.run();
+    let row = harness.get_by_label("total track, mm").rect();
+    let cells = harness.get_all_by_label(&change);
+    let mut heights = cells.map(|cell| cell.rect().center().y);
+    assert!(heights.any(|y| (y - row.center().y).abs() < 3.0), "{change}");
 }
 
 #[test]

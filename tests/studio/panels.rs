@@ -7,22 +7,26 @@ use aplanat::lens::{Aperture, Edit, Lens, Medium, Object, Parameter, Quantity, R
 use aplanat::merit::{Goal, PupilEdge, Term};
 use aplanat::optimize::{DescentMethod, OptimizationEnd, OptimizationProgress, pareto};
 use aplanat::session::{
-    Analyses, Command, OptimizationRequest, OptimizationSnapshot, PanelSetting, ParetoPass,
-    ParetoRun, ParetoView, RunId, RunKind, RunStatus, RunView, Session, SessionView,
+    Analyses, Command, HandleSlopes, MeritReport, MeritSlopes, MeritValues, OptimizationRequest,
+    OptimizationSnapshot, PanelSetting, ParetoPass, ParetoRun, ParetoView, RunId, RunKind,
+    RunStatus, RunView, Session, SessionView,
 };
 use aplanat::studio::draw::RenderBackend;
 use aplanat::studio::file_dialog::FileRequest;
 use aplanat::studio::number;
 use aplanat::studio::panels::{
-    EffectsPanel, FirstOrderPanel, FootprintPanel, GhostsPanel, LayoutPanel, OptimizerPanel, Panel,
-    ParetoPanel, PrescriptionPanel, PupilPanel, SeidelPanel, SpotMapPanel, SpotPanel,
-    WavefrontPanel,
+    EffectsPanel, FieldCurvesPanel, FirstOrderPanel, FootprintPanel, GhostsPanel, LayoutPanel,
+    OptimizerPanel, Panel, ParetoPanel, PrescriptionPanel, PupilPanel, SeidelPanel, SpotMapPanel,
+    SpotPanel, WavefrontPanel,
 };
 use egui::{Key, Modifiers};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
 
-use crate::harness::{PanelState, double_gauss, panel_harness, view};
+use crate::harness::{
+    PanelState, UPPER, double_gauss, painted_galleys, painted_texts, panel_harness, sized_harness,
+    small_harness, view, view_of,
+};
 
 fn prescription() -> Harness<'static, PanelState<PrescriptionPanel>> {
     let mut harness = panel_harness(PrescriptionPanel::default(), view());
@@ -257,7 +261,7 @@ fn goal_of(commands: &[Command]) -> &Goal {
 fn a_light_term_is_added_in_a_few_clicks() {
     let mut lens = double_gauss();
     lens.aperture = Aperture::EntrancePupilDiameter(10.9);
-    let mut harness = optimizer(crate::harness::view_of(lens.clone()));
+    let mut harness = optimizer(view_of(lens.clone()));
     assert!(harness.query_by_label("Limit the beam by the stop").is_none(), "nobody asks for more");
     type_into(&mut harness, "Minimum of Light", "1.2", Key::Enter);
     press(&mut harness, "Limit the beam by the stop");
@@ -276,7 +280,7 @@ fn a_light_term_is_added_in_a_few_clicks() {
 
     let mut lens = aplanat::pupil::limited_by_stop(&lens).unwrap();
     lens.variables.clone_from(freed);
-    let mut ready = optimizer(crate::harness::view_of(lens));
+    let mut ready = optimizer(view_of(lens));
     type_into(&mut ready, "Minimum of Light", "1.2", Key::Enter);
     assert!(ready.query_by_label_contains("Limit the beam").is_none());
     assert!(ready.query_by_label_contains("Vary the semi").is_none());
@@ -359,10 +363,54 @@ fn a_finished_optimization_says_why_it_ended() {
 fn a_lens_without_variables_cannot_be_optimized() {
     let mut lens = double_gauss();
     lens.variables.clear();
-    let mut harness = optimizer(crate::harness::view_of(lens));
+    let mut harness = optimizer(view_of(lens));
     harness.get_by_label("Optimize").click();
     harness.run();
     assert_eq!(harness.state().commands, []);
+}
+
+#[test]
+fn radii_and_thicknesses_are_varied_from_the_optimizer() {
+    let mut lens = double_gauss();
+    lens.variables.clear();
+    let mut harness = optimizer(view_of(lens));
+    press(&mut harness, "Vary all radii and thicknesses");
+    let [Command::Edit(Edit::SetVariables(variables))] = &harness.state().commands[..] else {
+        panic!("{:?}", harness.state().commands);
+    };
+    let count = |quantity| variables.iter().filter(|v| v.parameter.quantity == quantity).count();
+    assert_eq!((count(Quantity::Curvature), count(Quantity::Thickness)), (10, 11));
+}
+
+/// The merit above the drawing is that of the other panels: the slopes have coarser rays.
+#[test]
+fn the_layout_has_the_merit_of_the_optimizer() {
+    let mut view = view();
+    let goal = Arc::new(Goal::default_for(&view.lens).unwrap());
+    let values = MeritValues { total: 0.5, ..MeritValues::default() };
+    let lens = Arc::clone(&view.lens);
+    view.merit = Some(Arc::new(MeritReport { lens, goal, values: Ok(values), ms: 1.0 }));
+    let slopes = MeritSlopes { merit: 0.4, before: 0.4, ..MeritSlopes::default() };
+    let slopes = HandleSlopes { version: view.version, result: Ok(slopes), ms: 1.0 };
+    view.drag.slopes = Some(Arc::new(slopes));
+    let mut harness = panel_harness(LayoutPanel::new(RenderBackend::Software), view);
+    harness.run();
+    harness.get_by_label("merit 0.5");
+}
+
+/// In a narrow cell the radii stand in one line each; the tooltip has their errors.
+#[test]
+fn radii_of_spots_are_not_cut_in_a_narrow_panel() {
+    let panel = SpotPanel::new(RenderBackend::Software);
+    let mut harness = sized_harness(panel, view(), [346.0, 260.0]);
+    harness.run();
+    let painted = painted_galleys(&harness);
+    let is_radius = |text: &str| text.starts_with("RMS ") || text.starts_with("GEO ");
+    let radii: Vec<_> = painted.iter().filter(|galley| is_radius(galley.text())).collect();
+    assert_eq!(radii.len(), 6);
+    for galley in radii {
+        assert!(galley.rows.len() == 1 && !galley.elided, "{}", galley.text());
+    }
 }
 
 #[test]
@@ -387,7 +435,7 @@ fn the_error_of_spots_can_be_chosen() {
 }
 
 fn pupils(lens: Lens) -> Harness<'static, PanelState<PupilPanel>> {
-    let mut harness = panel_harness(PupilPanel::default(), crate::harness::view_of(lens));
+    let mut harness = panel_harness(PupilPanel::default(), view_of(lens));
     harness.run();
     harness
 }
@@ -715,7 +763,7 @@ fn a_defocus_of_nothing_but_rounding_is_zero() {
             continue;
         }
         lens.image_solve = Some(0.0);
-        let view = crate::harness::view_of(lens);
+        let view = view_of(lens);
         let analyses = view.results.as_ref().unwrap().analyses.as_ref();
         if !analyses.is_ok_and(|numbers| numbers.first_order().image_defocus.is_some()) {
             continue;
@@ -733,8 +781,7 @@ fn a_defocus_of_nothing_but_rounding_is_zero() {
 /// The numbers below each pupil are whole in the default arrangement.
 #[test]
 fn the_captions_of_pupils_fit() {
-    let mut harness =
-        crate::harness::small_harness(PupilPanel::default(), view(), crate::harness::UPPER);
+    let mut harness = small_harness(PupilPanel::default(), view(), UPPER);
     harness.run();
     let pupils = harness.get_all_by_label_contains("Pupil of field").count();
     let rays: Vec<_> = harness.get_all_by_label_contains(" rays, ").map(|n| n.rect()).collect();
@@ -760,7 +807,7 @@ fn the_captions_of_pupils_fit() {
 fn counts_of_one_are_singular() {
     let mut lens = double_gauss();
     lens.variables.truncate(1);
-    let mut harness = panel_harness(ParetoPanel::default(), crate::harness::view_of(lens));
+    let mut harness = panel_harness(ParetoPanel::default(), view_of(lens));
     harness.run();
     harness.get_by_label_contains("the 1 variable and all semi-diameters");
 }
@@ -779,6 +826,20 @@ fn results_with(setting: PanelSetting, are_there: impl Fn(&Analyses) -> bool) ->
         std::thread::sleep(std::time::Duration::from_millis(100));
     }
     panic!("no numbers for {setting:?}");
+}
+
+/// Every chart has numbers along both axes, in the notation of the titles.
+#[test]
+fn the_axes_of_field_curves_have_numbers() {
+    let shown = results_with(PanelSetting::FieldCurves(true), |all| all.field_curves.is_some());
+    let mut harness = small_harness(FieldCurvesPanel, shown, UPPER);
+    harness.run_steps(3);
+    let texts = painted_texts(&harness);
+    let numbers = texts.iter().filter(|text| text.parse::<f64>().is_ok()).count();
+    assert!(numbers >= 4 * (3 + 2), "{numbers} in {texts:?}");
+    for text in ["Lateral colour, µm", "486 nm", "656 nm"] {
+        assert!(texts.iter().any(|painted| painted == text), "{text} in {texts:?}");
+    }
 }
 
 /// Every field has an outline on the surface that is chosen, and all are smaller than its rim.

@@ -346,6 +346,9 @@ fn a_search_that_cannot_start_gives_a_reason() {
     stands(&mut session, RunStatus::Failed);
     let failed = session.view().structure_search.run.error.unwrap();
     assert!(failed.contains("no checkpoint of a search over lenses"), "{failed}");
+    // The reason is that of a search of this design, and not of the next one.
+    session.apply(Command::New(Box::new(double_gauss())));
+    assert_eq!(session.view().structure_search.run.error, None);
     std::fs::remove_file(&file).unwrap();
 
     start(&mut session, Some(4));

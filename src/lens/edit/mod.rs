@@ -206,7 +206,7 @@ impl Edit {
     pub fn title(&self) -> String {
         let number = |surface: &usize| SurfaceNumber::new(*surface);
         match self {
-            Self::Set { parameter, .. } => parameter.to_string(),
+            Self::Set { parameter, .. } => parameter.shown_name(),
             Self::SetSemiDiameter { surface, .. } => {
                 format!("semi-diameter of surface {}", number(surface))
             }
@@ -234,12 +234,16 @@ impl Edit {
             Self::SetFields(_) => "fields".to_owned(),
             Self::SetWavelengths(_) => "wavelengths".to_owned(),
             Self::SetImageSolve(_) => "image solve".to_owned(),
-            Self::AddVariable(variable) => format!("add the variable {}", variable.parameter),
-            Self::RemoveVariable(parameter) => format!("remove the variable {parameter}"),
+            Self::AddVariable(variable) => {
+                format!("vary the {}", variable.parameter.shown_name())
+            }
+            Self::RemoveVariable(parameter) => format!("fix the {}", parameter.shown_name()),
             Self::SetVariables(_) => "variables".to_owned(),
             Self::SetTolerances(_) => "tolerances".to_owned(),
-            Self::SetPickup(pickup) => format!("pickup of the {}", pickup.parameter),
-            Self::RemovePickup(parameter) => format!("remove the pickup of the {parameter}"),
+            Self::SetPickup(pickup) => format!("pickup of the {}", pickup.parameter.shown_name()),
+            Self::RemovePickup(parameter) => {
+                format!("remove the pickup of the {}", parameter.shown_name())
+            }
             Self::InsertZoom { at, .. } => format!("insert zoom position {}", at + 1),
             Self::RemoveZoom(at) => format!("remove zoom position {}", at + 1),
             Self::SetZoom { at, .. } => format!("zoom position {}", at + 1),

@@ -20,6 +20,7 @@ mod tests;
 use super::SearchRules;
 use super::element::glass_gaps;
 use crate::lens::{Lens, LensError, Parameter, Quantity};
+use crate::math::format_short;
 use crate::paraxial::free_parameters;
 use crate::solve::{
     ConstrainedPoint, ConstraintError, ConstraintFunction as _, CoordinateBounds, nearest_point,
@@ -50,8 +51,14 @@ impl Display for Projection {
         let Self { steps, curvature, distance, .. } = self;
         let ending = if *steps == 1 { "" } else { "s" };
         write!(f, "projected in {steps} step{ending}: curvatures changed by at most ")?;
-        write!(f, "{curvature:.1e}/mm, gaps by at most {distance:.1e} mm")
+        let [curvature, distance] = [curvature, distance].map(|size| two_digits(*size));
+        write!(f, "{curvature}/mm, gaps by at most {distance} mm")
     }
+}
+
+/// A number with two significant digits, without an exponent where it can be read without.
+fn two_digits(value: f64) -> String {
+    format_short(format!("{value:.1e}").parse().unwrap_or(value))
 }
 
 /// The reasons that a projection fails.

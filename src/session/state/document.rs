@@ -160,6 +160,7 @@ impl Session {
         }
         self.optimization.clear();
         self.pareto.clear();
+        self.structure_search.forget_failed_start();
         let lens = Arc::new(lens);
         self.history = DesignHistory::new(Arc::clone(&lens), Some(proposal));
         self.saved = Arc::clone(&lens);

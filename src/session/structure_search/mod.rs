@@ -11,7 +11,7 @@ pub use history::{DescentMark, HistorySample, SearchHistory};
 pub use request::StructureSearchRequest;
 pub use snapshot::{CheckpointStatus, EndReason, FoundLens, StructureSearchSnapshot};
 
-use super::run::{BackgroundRun, RunEvent, RunId, RunView};
+use super::run::{BackgroundRun, RunEvent, RunId, RunStatus, RunView};
 use super::saved_runs::newest_file;
 use crate::lens::Lens;
 use crate::search::SteerCommand;
@@ -129,6 +129,14 @@ impl StructureSearchState {
             StructureSearchCommand::Accept(_) => {}
         }
         Ok(())
+    }
+
+    /// Forgets why a search could not start: another design is open.
+    pub(super) fn forget_failed_start(&mut self) {
+        if self.run.status() == RunStatus::Failed && self.run.snapshot().is_none() {
+            self.run.clear();
+            self.previewed_chain = None;
+        }
     }
 
     fn start(&mut self, input: StructureSearchInput) {

@@ -6,7 +6,7 @@ use egui::{Response, RichText, Ui, WidgetInfo};
 use egui_plot::{Line, LineStyle, PlotPoints};
 
 use super::widgets::{fixed_plot, swatch};
-use super::{Panel, displayed_results, field_name, show_missing_results};
+use super::{Panel, displayed_results, field_name, plain_error, show_missing_results};
 use crate::analysis::{AnalysisError, MtfCurve, TransferValue};
 use crate::lens::Fields;
 use crate::session::{AnalysisResults, FieldContrast, FieldContrasts, SessionView, Timed};
@@ -75,7 +75,7 @@ fn legend(ui: &mut Ui, is_current: bool) {
 fn plot(ui: &mut Ui, contrasts: &FieldContrasts, height: f32) {
     let palette = Palette::for_visuals(ui.visuals());
     let highest = contrasts.frequencies.last().copied().unwrap_or(1.0);
-    let plot = fixed_plot("contrast", height).include_x(0.0).include_x(highest);
+    let plot = fixed_plot(ui, "contrast", height).include_x(0.0).include_x(highest);
     let shown = plot.include_y(0.0).include_y(1.0).show(ui, |plot| {
         if let Some(limit) = &contrasts.limit {
             let points = contrasts.frequencies.iter().zip(limit).map(|(nu, value)| [*nu, *value]);
@@ -148,7 +148,8 @@ fn numbers(ui: &mut Ui, contrast: &FieldContrast, ms: f64) {
         ui.label(RichText::new(format!("RMS W {rms} λ")).small())
             .on_hover_text("Standard deviation of the path difference at the primary wavelength");
     }
-    let rays = format!("± {error:.0e}, {} rays, {ms:.1} ms", curve.rays);
+    let error = plain_error(error, "");
+    let rays = format!("{error}, {} rays, {ms:.1} ms", curve.rays);
     ui.label(RichText::new(rays).small().weak())
         .on_hover_text("The largest error of the curves, the rays traced for them, and the time");
     if let Some(why) = contrast.without_diffraction {

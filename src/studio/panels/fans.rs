@@ -69,7 +69,7 @@ fn legend(ui: &mut Ui, numbers: &Analyses, scale: f64, ms: f64) {
     ui.horizontal(|ui| {
         for channel in &numbers.ray_model.value.channels {
             swatch(ui, color32(palette.wavelength(channel.um)));
-            ui.label(RichText::new(format!("{} µm", channel.um)).small());
+            ui.label(RichText::new(format!("{:.0} nm", 1e3 * channel.um)).small());
         }
         let text = format!("± {} µm, {ms:.1} ms", number::format_digits(scale, 3));
         ui.label(RichText::new(text).small().weak()).on_hover_text(
@@ -119,7 +119,7 @@ fn section(
     curves: impl Fn(&Fan) -> Vec<Vec<[f64; 2]>>,
 ) {
     let palette = Palette::for_visuals(ui.visuals());
-    let plot = fixed_plot(name, height).include_x(-1.0).include_x(1.0);
+    let plot = fixed_plot(ui, name, height).include_x(-1.0).include_x(1.0);
     let plot = plot.include_y(-scale).include_y(scale).show_axes([false, true]);
     let shown = plot.show(ui, |plot| {
         for fan in fans {
@@ -127,7 +127,7 @@ fn section(
             let color = color32(palette.wavelength(um));
             for points in curves(fan) {
                 let points: PlotPoints<'_> = points.into_iter().collect();
-                let line = Line::new(format!("{um} µm"), points).style(LineStyle::Solid);
+                let line = Line::new(format!("{:.0} nm", 1e3 * um), points).style(LineStyle::Solid);
                 plot.line(line.color(color).width(1.4));
             }
         }

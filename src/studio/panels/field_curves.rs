@@ -5,7 +5,7 @@ use egui::{Label, RichText, Ui, WidgetInfo};
 use egui_plot::{HLine, Line, LineStyle, PlotPoints};
 
 use super::widgets::fixed_plot;
-use super::{Panel, displayed_results, show_missing_results};
+use super::{Panel, displayed_results, plain_error, show_missing_results};
 use crate::analysis::{FieldCurvePoint, FieldCurves};
 use crate::lens::{FieldKind, Lens, Wavelength};
 use crate::session::SessionView;
@@ -71,7 +71,8 @@ fn summary(ui: &mut Ui, curves: &FieldCurves, ms: f64) {
     let lights = || curves.points.iter().filter_map(|point| point.illumination.relative);
     let error = lights().map(|light| light.error).fold(0.0, f64::max);
     let rays: usize = lights().map(|light| light.rays).sum();
-    let text = format!("illumination ± {error:.0e}, {rays} rays, {ms:.1} ms; primary wavelength");
+    let error = plain_error(100.0 * error, " %");
+    let text = format!("illumination {error}, {rays} rays, {ms:.1} ms; primary wavelength");
     ui.label(RichText::new(text).small().weak());
 }
 
@@ -148,14 +149,14 @@ fn lateral_color(curves: &FieldCurves, lens: &Lens, palette: Palette) -> Chart {
             Some([point.height, 1e3 * shift])
         };
         Curve {
-            name: format!("{} um", number::format_digits(wavelength.um, 4)),
+            name: format!("{:.0} nm", 1e3 * wavelength.um),
             points: curves.points.iter().filter_map(point).collect(),
             color: palette.field(k),
             dashed: k > 0,
         }
     };
     Chart {
-        title: "Lateral colour, um",
+        title: "Lateral colour, µm",
         hint: "Chief ray of a wavelength against that of the primary one, positive away from the axis",
         curves: others.enumerate().map(curve).collect(),
         from_zero: false,
@@ -167,7 +168,7 @@ impl Chart {
         self.heading(ui);
         let label = self.describe(unit);
         let weak = ui.visuals().weak_text_color();
-        let mut plot = fixed_plot(self.title, height).include_x(0.0).include_y(0.0);
+        let mut plot = fixed_plot(ui, self.title, height).include_x(0.0).include_y(0.0);
         if self.from_zero {
             plot = plot.include_y(100.0);
         }

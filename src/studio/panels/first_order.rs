@@ -2,7 +2,7 @@
 
 use egui::{Align, Color32, Frame, Label, Layout as Arrange, Margin, RichText, ScrollArea, Ui};
 
-use super::{Panel, displayed_results, show_missing_results};
+use super::{Panel, displayed_results, show_missing_results, total_track};
 use crate::lens::{Lens, Medium};
 use crate::paraxial::{FirstOrder, ParaxialPupil};
 use crate::session::SessionView;
@@ -39,13 +39,6 @@ fn without_focus(lens: &Lens) -> &'static str {
     } else {
         "Parallel light stays parallel: the lens has no focal length."
     }
-}
-
-/// The length from the first vertex to the image plane, which may follow a solve; `None` if the lens does not
-/// resolve.
-fn total_track(lens: &Lens, zoom: usize) -> Option<f64> {
-    let system = lens.resolve(zoom, lens.wavelengths[lens.primary()].um).ok()?;
-    Some(system.total_track())
 }
 
 /// A name, a value with its unit, and an explanation.

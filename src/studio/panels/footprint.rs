@@ -115,7 +115,7 @@ fn footprints_on(
 fn outlines(ui: &mut Ui, found: &FieldFootprints, (surface, rim): (usize, Option<f64>)) {
     let palette = Palette::for_visuals(ui.visuals());
     let height = (ui.available_height() - 4.0).max(LOWEST);
-    let plot = fixed_plot("footprint", height).data_aspect(1.0);
+    let plot = fixed_plot(ui, "footprint", height).data_aspect(1.0);
     let shown = plot.show(ui, |plot| {
         if let Some(rim) = rim {
             let corner = |i: usize| {

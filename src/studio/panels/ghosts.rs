@@ -114,11 +114,11 @@ const HEADS: [(&str, &str); 6] = [
 fn summary(ui: &mut Ui, ghosts: &FieldGhosts, listed: &[Ghost], ms: f64) {
     let rays: usize = listed.iter().map(|ghost| ghost.patch.fates.total()).sum();
     let text = format!(
-        "{:.2} % passes without reflection; {} pairs send {:.1e} of the light to the image plane; {rays} \
+        "{:.2} % passes without reflection; {} pairs send {} % of the light to the image plane; {rays} \
          rays, {ms:.0} ms",
         100.0 * ghosts.ranking.direct,
         ghosts.ranking.ghosts.len(),
-        ghosts.ranking.flux,
+        number::format_digits(100.0 * ghosts.ranking.flux, 2),
     );
     ui.label(RichText::new(text).small().weak());
 }

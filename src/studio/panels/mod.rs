@@ -175,6 +175,41 @@ impl PanelKind {
         Self::ImportReport,
     ];
 
+    /// What the panel shows, in the words by which a designer looks for it.
+    pub const fn contents(self) -> &'static str {
+        match self {
+            Self::Layout => "The section with its rays, and the handles that shape the lens",
+            Self::Slice => "A gradient-index field (GRIN) designed for given light",
+            Self::Prescription => "Lens data: radii, thicknesses, glasses, variables, pickups",
+            Self::Spot => "Where the rays of each field land: RMS and GEO radius",
+            Self::Pupil => "Vignetting: the part of the pupil that gets through, and its limits",
+            Self::Contrast => "Modulation transfer function: contrast against spatial frequency",
+            Self::Wavefront => {
+                "OPD maps, point spread (PSF), Strehl ratio, encircled energy, Zernike"
+            }
+            Self::Fans => "Transverse aberration over the pupil",
+            Self::FieldCurves => {
+                "Distortion, field curvature, astigmatism, lateral colour, relative illumination"
+            }
+            Self::Footprint => "The beam of each field on a surface, with its rim",
+            Self::SpotMap => "A map of the RMS radius, full field",
+            Self::Ghosts => "Light that two surfaces reflect, stray light, by coating",
+            Self::Picture => "Image simulation: a scene through the lens",
+            Self::Glass => "Glass catalogues as a list and as a map of nd and vd",
+            Self::Specification => "A lens from focal length, aperture, field and limits",
+            Self::Tolerances => "Manufacturing errors, sensitivities, yield, compensators",
+            Self::Optimizer => "Merit function, operands, limits, local optimization",
+            Self::Pareto => "The best lenses between sharpness and light",
+            Self::Search => "Global search over the structure: elements come and go",
+            Self::History => "Every version of the design as a tree; branches, comparison",
+            Self::FirstOrder => "Cardinal points: focal lengths, pupils, f-numbers, track",
+            Self::Seidel => "Third-order aberrations of each surface",
+            Self::Effects => "Which physical effects are computed, and why",
+            Self::System => "Aperture, fields, wavelengths, object, image plane, name, notes",
+            Self::Zoom => "Multi-configuration: what differs between zoom positions",
+        }
+    }
+
     /// A new panel of this kind.
     pub fn panel(self, backend: RenderBackend) -> Box<dyn Panel> {
         match self {
@@ -264,6 +299,8 @@ pub(super) fn add_variables_edit(lens: &Lens, kinds: &[ParameterKind]) -> Edit {
 
 /// The smallest relative error that is shown as a number, in percent.
 const SMALLEST_PERCENT: f64 = 0.001;
+/// The smallest error of a share that is told as a number.
+const SMALLEST_ERROR: f64 = 1e-5;
 
 /// The relative error of a number in percent, as a suffix; nothing if it is only rounding.
 fn relative_error(estimate: Estimate) -> String {
@@ -277,6 +314,14 @@ fn relative_error(estimate: Estimate) -> String {
     format!(" ± {} %", number::format_digits(percent, 2))
 }
 
+/// The error of a number beside 1, as a share or in percent, in the notation of such numbers.
+fn plain_error(error: f64, unit: &str) -> String {
+    if error < SMALLEST_ERROR {
+        return format!("± <{SMALLEST_ERROR}{unit}");
+    }
+    format!("± {}{unit}", number::format_digits(error, 1))
+}
+
 /// Shows why there are no results.
 fn show_missing_results(ui: &mut Ui, view: &SessionView) {
     let why = match view.results.as_deref().map(|results| &results.analyses) {
@@ -284,6 +329,13 @@ fn show_missing_results(ui: &mut Ui, view: &SessionView) {
         _ => "Computing…".to_owned(),
     };
     ui.weak(why);
+}
+
+/// The length from the first vertex to the image plane, which may follow a solve; `None` if the lens does not
+/// resolve.
+fn total_track(lens: &Lens, zoom: usize) -> Option<f64> {
+    let system = lens.resolve(zoom, lens.wavelengths[lens.primary()].um).ok()?;
+    Some(system.total_track())
 }
 
 /// The name of a zoom position.

@@ -6,7 +6,10 @@
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
-use egui::{Align, ComboBox, Layout as Arrange, Rect, Response, RichText, Sense, Ui, WidgetInfo};
+use egui::{
+    Align, Color32, ComboBox, Label, Layout as Arrange, Rect, RichText, Sense, TextStyle, Ui,
+    WidgetInfo,
+};
 use glam::DVec2;
 
 use super::cell_layout::{CellLayout, scale_bar, show_within};
@@ -260,22 +263,33 @@ fn clipped_label(ui: &mut Ui, lit: f64) {
 }
 
 fn radii(ui: &mut Ui, spot: &Spot) {
-    let line = |ui: &mut Ui, text: String| -> Response { ui.label(RichText::new(text).small()) };
-    line(ui, format!("RMS {}", in_um(spot.rms))).on_hover_text(
+    radius_line(
+        ui,
+        "RMS",
+        spot.rms,
         "Root mean square distance from the centroid of all colours, by quadrature over the \
          pupil; the dots are other rays",
     );
-    line(ui, format!("GEO {}", in_um(spot.radius)))
-        .on_hover_text("Geometric radius: the largest distance from the centroid of all colours");
+    radius_line(
+        ui,
+        "GEO",
+        spot.radius,
+        "Geometric radius: the largest distance from the centroid of all colours",
+    );
     let time = spot.rms.milliseconds.map(|ms| format!(", {ms:.2} ms")).unwrap_or_default();
     let rays = RichText::new(format!("{} rays{time}", spot.radius.rays)).small();
     ui.label(rays.weak()).on_hover_text("Rays traced for these numbers, and the time");
 }
 
-/// A length with its relative error.
-fn in_um(estimate: Estimate) -> String {
-    let value = number::format_digits(1e3 * estimate.value, 4);
-    format!("{value} µm{}", relative_error(estimate))
+/// A radius with its relative error in one line; in a narrow cell the error stands in the tooltip.
+fn radius_line(ui: &mut Ui, name: &str, radius: Estimate, hint: &str) {
+    let value = format!("{name} {} µm", number::format_digits(1e3 * radius.value, 4));
+    let whole = format!("{value}{}", relative_error(radius));
+    let font = TextStyle::Small.resolve(ui.style());
+    let layout = ui.painter().layout_no_wrap(whole.clone(), font, Color32::PLACEHOLDER);
+    let fits = layout.size().x <= ui.available_width();
+    let label = Label::new(RichText::new(if fits { &whole } else { &value }).small()).truncate();
+    ui.add(label).on_hover_text(format!("{whole}\n{hint}"));
 }
 
 /// The scale of all cells, in the first one.

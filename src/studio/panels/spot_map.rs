@@ -129,7 +129,7 @@ fn plot(ui: &mut Ui, map: &SpotMap, texture: &TextureHandle, kind: FieldKind) {
         FieldKind::ImageHeight => "mm in the image",
     };
     let height = (ui.available_height() - 4.0).max(LOWEST);
-    let plot = fixed_plot("spot map", height).data_aspect(1.0);
+    let plot = fixed_plot(ui, "spot map", height).data_aspect(1.0);
     let plot = plot.x_axis_label(format!("field x, {unit}")).y_axis_label("field y");
     // A pixel has its field in the middle.
     let width = 2.0 * map.grid.half_width * map.grid.count as f64 / (map.grid.count - 1) as f64;

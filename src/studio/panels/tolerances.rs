@@ -333,7 +333,7 @@ fn distribution(ui: &mut Ui, made: &AsBuiltLens) {
     let palette = Palette::for_visuals(ui.visuals());
     let text = "share of lenses against RMS, µm; fixed focus dashed";
     ui.label(RichText::new(text).small().weak());
-    let shown = fixed_plot("as built", PLOT).include_y(0.0).include_y(1.0).show(ui, |plot| {
+    let shown = fixed_plot(ui, "as built", PLOT).include_y(0.0).include_y(1.0).show(ui, |plot| {
         for (i, spot) in made.analysis.spots.iter().enumerate() {
             let points = spot.distribution.iter().map(|q| [1e3 * q.corrected, q.share]);
             let style = if i == 0 { LineStyle::dashed_loose() } else { LineStyle::Solid };

@@ -9,7 +9,9 @@ use egui::{
 use egui_plot::{Line, PlotPoints};
 
 use super::widgets::{fixed_plot, swatch};
-use super::{Panel, displayed_results, field_name, relative_error, show_missing_results};
+use super::{
+    Panel, displayed_results, field_name, plain_error, relative_error, show_missing_results,
+};
 use crate::analysis::{AnalysisError, Estimate, SquareGrid, ZernikeOrder, aberration_name};
 use crate::lens::Fields;
 use crate::session::{
@@ -169,7 +171,7 @@ fn summary(ui: &mut Ui, waves: &Timed<FieldWavefronts>, is_current: bool) {
                 field.wavefront.rms.rays + image
             })
             .sum();
-        format!("at {} um, {rays} rays, {:.1} ms", waves.value.um, waves.ms)
+        format!("at {:.0} nm, {rays} rays, {:.1} ms", 1e3 * waves.value.um, waves.ms)
     } else {
         "of the lens before; computing …".to_owned()
     };
@@ -278,7 +280,7 @@ fn image_lines(image: &PointImage) -> Vec<String> {
     vec![
         format!("Strehl {}", estimate_text(image.strehl.at_chief)),
         format!("best {}", estimate_text(image.strehl.best)),
-        format!("{width} um wide, ± {:.0e}", image.error),
+        format!("{width} µm wide, {}", plain_error(image.error, "")),
     ]
 }
 
@@ -296,8 +298,9 @@ fn energies(ui: &mut Ui, fields: &Fields, waves: &FieldWavefronts) {
         return;
     }
     let height = (ui.available_height() - 24.0).max(SIDE[0]);
-    let plot = fixed_plot("encircled energy", height).include_x(0.0).include_y(0.0).include_y(1.0);
-    let plot = plot.x_axis_label("radius, um").y_axis_label("share of the light");
+    let plot =
+        fixed_plot(ui, "encircled energy", height).include_x(0.0).include_y(0.0).include_y(1.0);
+    let plot = plot.x_axis_label("radius, µm").y_axis_label("share of the light");
     plot.show(ui, |plot| {
         for (i, image) in &lit {
             let circles = image.energy.iter().map(|(radius, share)| [1e3 * radius, share.value]);
@@ -307,7 +310,7 @@ fn energies(ui: &mut Ui, fields: &Fields, waves: &FieldWavefronts) {
     });
     let errors = lit.iter().flat_map(|(_, image)| image.energy.iter().map(|(_, e)| e.error));
     let error = errors.fold(0.0, f64::max);
-    ui.label(RichText::new(format!("± {error:.0e}")).small().weak());
+    ui.label(RichText::new(plain_error(error, "")).small().weak());
 }
 
 /// The fields that have an image, with their indices.

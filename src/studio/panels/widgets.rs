@@ -1,18 +1,21 @@
 //! Widgets that several panels share.
 
 use egui::{Button, Color32, ProgressBar, RectAlign, Response, RichText, Sense, Tooltip, Ui, vec2};
-use egui_plot::{GridMark, Plot};
+use egui_plot::{AxisHints, GridInput, GridMark, Plot};
 
 use crate::studio::actions::{Actions, UiAction};
 use crate::studio::number;
 
 /// The room for the numbers at the left of a plot, in points.
 const AXIS_WIDTH: f32 = 40.0;
-/// The height of a line of text, in points.
-const LINE: f32 = 18.0;
-/// The distance of two marks of an axis, in lines.
-const LINES: f64 = 1.6;
-/// The share of that distance which two marks have at least.
+/// The least distance of two marks with their numbers in points, along an axis to the right and one
+/// upwards.
+const APART: [f64; 2] = [48.0, 22.0];
+/// The digits of the number of a mark.
+const MARK_DIGITS: i32 = 6;
+/// The distance of two marks of a logarithmic axis in points, and the share of it which two have at
+/// least.
+const LOG_APART: f64 = 29.0;
 const CROWDED: f64 = 0.6;
 
 /// A button that asks for one action.
@@ -78,22 +81,39 @@ pub(in crate::studio) fn hint_beside(item: Response, text: &str) -> Response {
     item
 }
 
-/// The distances in points from which a mark appears and from which its number is seen well.
-const MARKS: [f32; 2] = [8.0, 44.0];
+/// The distances in points from which a mark appears and from which it is seen well.
+const MARKS: [f32; 2] = [8.0, 20.0];
 
-/// A plot that can be neither moved nor zoomed.
-pub(super) fn fixed_plot(name: &str, height: f32) -> Plot<'static> {
+/// A plot that can be neither moved nor zoomed. Its marks are round, and each has its number.
+pub(super) fn fixed_plot(ui: &Ui, name: &str, height: f32) -> Plot<'static> {
     let plot = Plot::new(name).height(height).allow_drag(false).allow_scroll(false);
-    // The marks of a low plot have numbers too.
-    plot.allow_zoom(false).allow_boxed_zoom(false).grid_spacing(MARKS[0]..=MARKS[1])
+    let plot = plot.allow_zoom(false).allow_boxed_zoom(false).grid_spacing(MARKS[0]..=MARKS[1]);
+    let plot = plot.grid_color(ui.visuals().widgets.noninteractive.bg_stroke.color);
+    let numbered = |axis: AxisHints<'static>| {
+        let axis = axis.label_spacing(MARKS[0]..=MARKS[1]);
+        axis.formatter(|mark, _| number::format_digits(mark.value, MARK_DIGITS))
+    };
+    plot.custom_x_axes(vec![numbered(AxisHints::new_x())])
+        .custom_y_axes(vec![numbered(AxisHints::new_y())])
+        .x_grid_spacer(|input| round_marks(&input, APART[0]))
+        .y_grid_spacer(|input| round_marks(&input, APART[1]))
+}
+
+/// The multiples of 1, 2 or 5 times a power of ten, some points apart from each other.
+fn round_marks(input: &GridInput, apart: f64) -> Vec<GridMark> {
+    // The base step is that of the least distance at which a mark is drawn.
+    let step_size = round_above(input.base_step_size * apart / f64::from(MARKS[0]));
+    let marks = multiples(input.bounds, step_size);
+    marks.map(|value| GridMark { value, step_size }).collect()
 }
 
 /// Gives a plot of decimal logarithms an axis with round numbers as its marks, and a title.
 pub(super) fn log_axis(plot: Plot<'static>, title: &str) -> Plot<'static> {
     let plot = plot.y_axis_label(title).y_axis_min_width(AXIS_WIDTH);
-    let plot = plot.grid_spacing(LINE..=6.0 * LINE).y_grid_spacer(|input| {
+    let plot = plot.y_grid_spacer(|input| {
         let step_size = input.bounds.1 - input.bounds.0;
-        let marks = log_marks(input.bounds, LINES * input.base_step_size);
+        let apart = LOG_APART / f64::from(MARKS[0]);
+        let marks = log_marks(input.bounds, apart * input.base_step_size);
         marks.into_iter().map(|value| GridMark { value, step_size }).collect()
     });
     plot.y_axis_formatter(|mark, range| {

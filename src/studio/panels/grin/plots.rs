@@ -40,10 +40,8 @@ fn free_corner<'a>(curves: impl Iterator<Item = &'a [[f64; 2]]>) -> Corner {
 
 /// A plot that only shows, in all the room that is left.
 fn plot(ui: &Ui, name: &str, legend: Corner) -> Plot<'static> {
-    fixed_plot(name, ui.available_height().max(120.0))
+    fixed_plot(ui, name, ui.available_height().max(120.0))
         .y_axis_min_width(44.0)
-        .grid_color(ui.visuals().widgets.noninteractive.bg_stroke.color)
-        .grid_spacing(18.0..=110.0)
         .set_margin_fraction(vec2(0.02, 0.06))
         .legend(Legend::default().position(legend).background_alpha(0.6))
 }

@@ -7,8 +7,7 @@ use super::spots;
 use crate::lens::{Lens, Parameter, Quantity, SurfaceNumber};
 use crate::session::{Analyses, AnalysisResults, HistoryNode, SessionView};
 use crate::studio::number;
-use crate::studio::panels::mean_pupil_area;
-use crate::studio::panels::mean_spot;
+use crate::studio::panels::{mean_pupil_area, mean_spot, total_track};
 
 /// A quantity of two versions.
 struct ComparedNumber {
@@ -28,7 +27,8 @@ pub(super) fn table(ui: &mut Ui, view: &SessionView, selected: &HistoryNode) {
         ui.end_row();
         for ComparedNumber { name, present, selected } in &numbers {
             ui.label(name);
-            let digits = number::digits_between(*present, selected - present, 5);
+            let change = number::without_rounding(selected - present, *present);
+            let digits = number::digits_between(*present, change, 5);
             ui.label(number::format_digits(*present, digits));
             ui.label(number::format_digits(*selected, digits));
             ui.label(difference_text(*present, *selected));
@@ -82,7 +82,8 @@ fn numbers(view: &SessionView, selected: &HistoryNode) -> Vec<ComparedNumber> {
         add("focal length, mm", of(|numbers| numbers.first_order().efl));
         add("light, mm²", of(|numbers| Some(mean_pupil_area(numbers))));
     }
-    add("total track, mm", Some((view.lens.total_track(), selected.lens.total_track())));
+    let track = |lens: &Lens| total_track(lens, view.settings.zoom);
+    add("total track, mm", track(&view.lens).zip(track(&selected.lens)));
     found.extend(differing_parameters(&view.lens, &selected.lens));
     found
 }
@@ -101,8 +102,7 @@ fn differing_parameters(present: &Lens, selected: &Lens) -> Vec<ComparedNumber> 
         let (old, new) = values.filter(|(old, new)| old != new)?;
         let is_radius = parameter.quantity == Quantity::Curvature;
         let shown = |value: f64| if is_radius { number::radius(value) } else { value };
-        let name = parameter.to_string();
-        let name = if is_radius { name.replacen("curvature", "radius", 1) } else { name };
+        let name = parameter.shown_name();
         Some(ComparedNumber { name, present: shown(old), selected: shown(new) })
     };
     parameters.into_iter().filter_map(differing).collect()

@@ -19,8 +19,13 @@ use crate::studio::actions::Actions;
 use crate::studio::text_input::{EditBuffers, InputPlacement, TextInput};
 use crate::studio::thumbnails::Thumbnails;
 
-/// The least and the first height of the part about the selected version.
+/// The least and the first height of the part about the selected version below the tree.
 const DETAILS_HEIGHT: [f32; 2] = [120.0, 230.0];
+/// The same of its width beside the tree, and the width of the panel from which it is there.
+const DETAILS_WIDTH: [f32; 2] = [360.0, 480.0];
+const BESIDE: f32 = 820.0;
+/// The height of the line in its place while no version is selected.
+const HINT_HEIGHT: f32 = 22.0;
 /// The largest share of the panel that it takes.
 const DETAILS_SHARE: f32 = 0.75;
 
@@ -41,18 +46,10 @@ impl Panel for HistoryPanel {
     }
 
     fn ui(&mut self, ui: &mut Ui, view: &SessionView, actions: &mut Actions) {
-        let selected = self.selected.and_then(|id| node(view, id));
-        let [least, first] = DETAILS_HEIGHT;
-        let most = (DETAILS_SHARE * ui.available_height()).max(least);
-        let frame = Frame::new().inner_margin(Margin { top: 4, ..Margin::ZERO });
-        let side = Side::bottom("selected version").frame(frame).show_separator_line(true);
-        let side = side.resizable(true).default_size(first.min(most)).size_range(least..=most);
-        side.show(ui, |ui| {
-            ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| match selected {
-                Some(selected) => self.details(ui, view, selected, actions),
-                None => drop(ui.weak("Click a version to compare it with the present one.")),
-            });
-        });
+        match self.selected.and_then(|id| node(view, id)) {
+            Some(selected) => self.selection(ui, view, selected, actions),
+            None => hint(ui),
+        }
         let scroll = ScrollArea::vertical().id_salt("versions").auto_shrink([false, false]);
         let clicked =
             scroll.show(ui, |ui| tree::tree(ui, view, self.selected, &mut self.thumbnails)).inner;
@@ -66,7 +63,40 @@ impl Panel for HistoryPanel {
     }
 }
 
+/// The line that takes the place of a selected version.
+fn hint(ui: &mut Ui) {
+    let line = Side::bottom("no version").frame(Frame::new()).show_separator_line(false);
+    line.exact_size(HINT_HEIGHT).show(ui, |ui| {
+        ui.weak("Click a version to compare it with the present one.");
+    });
+}
+
 impl HistoryPanel {
+    /// The part about the selected version: below the tree, or beside it where there is room.
+    fn selection(
+        &mut self,
+        ui: &mut Ui,
+        view: &SessionView,
+        selected: &Arc<HistoryNode>,
+        actions: &mut Actions,
+    ) {
+        let (side, room, [least, first], margin) = if ui.available_width() < BESIDE {
+            let margin = Margin { top: 4, ..Margin::ZERO };
+            (Side::bottom("selected version"), ui.available_height(), DETAILS_HEIGHT, margin)
+        } else {
+            let margin = Margin { left: 8, ..Margin::ZERO };
+            (Side::right("version beside"), ui.available_width(), DETAILS_WIDTH, margin)
+        };
+        let most = (DETAILS_SHARE * room).max(least);
+        let side = side.frame(Frame::new().inner_margin(margin)).show_separator_line(true);
+        let side = side.resizable(true).default_size(first.min(most)).size_range(least..=most);
+        side.show(ui, |ui| {
+            ScrollArea::vertical()
+                .auto_shrink([false, false])
+                .show(ui, |ui| self.details(ui, view, selected, actions));
+        });
+    }
+
     /// Shows a version in place of the design, unless it is the present one.
     fn select(&mut self, view: &SessionView, id: u64, actions: &mut Actions) {
         let Some(node) = node(view, id) else { return };

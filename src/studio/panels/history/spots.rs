@@ -1,6 +1,9 @@
 //! The spots of two versions beside each other, all to one scale.
 
-use egui::{Color32, Painter, Rect, Role, Sense, Ui, WidgetInfo, pos2, vec2};
+use egui::{
+    Align2, Color32, Label, Painter, Rect, RichText, Role, Sense, TextStyle, Ui, WidgetInfo, pos2,
+    vec2,
+};
 
 use crate::analysis::Spot;
 use crate::session::{Analyses, AnalysisResults};
@@ -13,6 +16,8 @@ use crate::studio::panels::spot::half_width;
 const SIDE: f32 = 84.0;
 /// The width of the names of the fields.
 const NAMES: f32 = 58.0;
+/// The height of the names of the versions.
+const HEADING: f32 = 18.0;
 /// The radius of a dot.
 const DOT: f32 = 1.0;
 
@@ -25,12 +30,19 @@ pub(super) fn beside_each_other(ui: &mut Ui, present: Shown<'_>, selected: Shown
     let rows = present.1.spots.value.len().max(selected.1.spots.value.len());
     ui.add_space(4.0);
     let width = 2000.0 * half;
-    ui.weak(format!("Spots, each {} µm wide", number::format_digits(width, 3)));
+    let width = number::format_digits(width, 3);
+    ui.weak(format!("Spots with their RMS radius, each picture {width} µm wide"));
+    ui.horizontal(|ui| {
+        for (text, width) in [("", NAMES), ("present", SIDE), ("this one", SIDE)] {
+            ui.add_sized([width, HEADING], Label::new(RichText::new(text).weak()));
+        }
+    });
     for field in 0..rows {
         ui.horizontal(|ui| {
             let fields = present.0.lens.fields_at(present.0.settings.zoom);
             let name = fields.values.get(field).map(|point| field_name(fields.kind, *point));
-            ui.allocate_ui(vec2(NAMES, SIDE), |ui| ui.weak(name.unwrap_or_default()));
+            let name = RichText::new(name.unwrap_or_default()).weak();
+            ui.add_sized([NAMES, SIDE], Label::new(name));
             for (shown, which) in [(present, "present"), (selected, "selected")] {
                 picture(ui, shown.1, (field, half), which);
             }
@@ -57,6 +69,10 @@ fn picture(ui: &mut Ui, numbers: &Analyses, (field, half): (usize, f64), which: 
     painter.vline(rect.center().x, rect.y_range(), faint);
     if let Some(spot) = spot {
         dots(&painter, rect, numbers, (field, spot), half, palette);
+        let rms = format!("{} µm", number::format_digits(1e3 * spot.rms.value, 4));
+        let (at, font) =
+            (rect.left_bottom() + vec2(4.0, -2.0), TextStyle::Small.resolve(ui.style()));
+        painter.text(at, Align2::LEFT_BOTTOM, rms, font, ui.visuals().text_color());
     }
 }
 

@@ -212,7 +212,7 @@ pub(super) fn curve_plot(ui: &mut Ui, curve: &OptimizationCurve) -> Option<usize
     let points = curve.points.iter().filter(|point| point.merit > 0.0);
     let points: PlotPoints<'_> =
         points.map(|point| [point.step as f64, point.merit.log10()]).collect();
-    let plot = fixed_plot("course of the optimization", CURVE_HEIGHT).x_axis_label("step");
+    let plot = fixed_plot(ui, "course of the optimization", CURVE_HEIGHT).x_axis_label("step");
     let plot = log_axis(plot, "merit");
     let color = ui.visuals().hyperlink_color;
     let shown = plot.show(ui, |plot| plot.line(Line::new("merit", points).color(color)));

@@ -44,7 +44,7 @@ impl LiveTerm {
         let text = value_text(term, self.value);
         let error = match self.error {
             0.0 => "exact to rounding".to_owned(),
-            error => format!("{} ± {error:.1e}", number::format_digits(self.value, 5)),
+            error => number::with_error(self.value, error),
         };
         ui.colored_label(color, text).on_hover_text(error)
     }

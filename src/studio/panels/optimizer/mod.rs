@@ -11,12 +11,13 @@ mod scope;
 mod terms;
 
 use egui::{
-    ComboBox, Context, Frame, Margin, Panel as Side, Response, RichText, Role, ScrollArea, Ui,
-    WidgetInfo, vec2,
+    Button, ComboBox, Context, Frame, Margin, Panel as Side, Response, RichText, Role, ScrollArea,
+    Ui, WidgetInfo, vec2,
 };
 use egui_plot::{Line, PlotPoints, PlotTransform};
 
-use super::{Panel, mean_pupil_area, mean_spot};
+use super::{Panel, add_variables_edit, mean_pupil_area, mean_spot};
+use crate::lens::{Edit, Lens, ParameterKind};
 use crate::optimize::DescentMethod;
 use crate::session::{Command, MeritSample, OptimizationSnapshot, RunStatus, SessionView};
 use crate::studio::actions::Actions;
@@ -63,7 +64,7 @@ impl Panel for OptimizerPanel {
             });
         }
         if view.lens.variables.is_empty() {
-            ui.colored_label(ui.visuals().warn_fg_color, NO_VARIABLES);
+            no_variables(ui, &view.lens, actions);
         }
         ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
             self.merit.ui(ui, view, &mut self.buffers, actions);
@@ -130,6 +131,16 @@ impl OptimizerPanel {
             ui.weak("Method");
             method_menu(ui, &mut self.method);
         });
+    }
+}
+
+/// Says that nothing is variable, with a button for what is varied first.
+fn no_variables(ui: &mut Ui, lens: &Lens, actions: &mut Actions) {
+    ui.colored_label(ui.visuals().warn_fg_color, NO_VARIABLES);
+    let edit = add_variables_edit(lens, &[ParameterKind::Curvatures, ParameterKind::Thicknesses]);
+    let button = Button::new("Vary all radii and thicknesses");
+    if ui.add_enabled(edit != Edit::SetVariables(Vec::new()), button).clicked() {
+        actions.push(edit);
     }
 }
 
@@ -204,9 +215,8 @@ fn history_plot(ui: &mut Ui, search: &OptimizationSnapshot) -> Option<usize> {
     let (current, best) = (curve(|point| point.current), curve(|point| point.best));
     let visuals = ui.visuals();
     let (weak, strong) = (visuals.weak_text_color(), visuals.hyperlink_color);
-    let plot = log_axis(fixed_plot("merit history", ui.available_height()), "merit")
+    let plot = log_axis(fixed_plot(ui, "merit history", ui.available_height()), "merit")
         .x_axis_label("step")
-        .grid_color(visuals.widgets.noninteractive.bg_stroke.color)
         .set_margin_fraction(vec2(0.01, 0.08));
     let shown = plot.show(ui, |plot| {
         plot.line(Line::new("current", current).color(weak).width(1.0));

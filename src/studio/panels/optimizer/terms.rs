@@ -176,8 +176,23 @@ pub(super) fn value_text(term: Term, value: f64) -> String {
         Term::GeometricMtf { .. } => format!("{} short", short(root)),
         Term::Steepness(_) => format!("{} over", short(root)),
         Term::Operand { kind, .. } if kind.is_angle() => format!("{}° off", short(root)),
-        _ if root < 0.1 => format!("{} µm", short(1e3 * root)),
-        _ => format!("{} mm", short(root)),
+        _ => format!("{}{}", length_text(root), deviation(term)),
+    }
+}
+
+fn length_text(mm: f64) -> String {
+    let short = |value: f64| number::format_digits(value, 3);
+    if mm < 0.1 { format!("{} µm", short(1e3 * mm)) } else { format!("{} mm", short(mm)) }
+}
+
+/// The word behind a length that is no size but the distance from a target or beyond a limit.
+const fn deviation(term: Term) -> &'static str {
+    match term {
+        Term::FocalLength(_) | Term::Operand { .. } => " off",
+        Term::GlassEdge(_) | Term::AirEdge(_) | Term::BackFocus(_) => " short",
+        Term::TotalTrack(_) => " over",
+        Term::GlassCenter { .. } | Term::AirCenter { .. } | Term::SemiDiameter { .. } => " beyond",
+        _ => "",
     }
 }
 
@@ -228,4 +243,20 @@ fn rounded(mut weighted: WeightedTerm) -> WeightedTerm {
         *target = short(*target);
     }
     weighted
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_deviation_is_not_taken_for_the_quantity_itself() {
+        let square = |mm: f64| mm * mm;
+        let shown = |term, mm| value_text(term, square(mm));
+        assert_eq!(shown(Term::Spot, 0.0847), "84.7 µm");
+        assert_eq!(shown(Term::FocalLength(35.0), 9.05), "9.05 mm off");
+        assert_eq!(shown(Term::GlassEdge(0.5), 0.02), "20 µm short");
+        assert_eq!(shown(Term::TotalTrack(50.0), 1.99), "1.99 mm over");
+        assert_eq!(shown(Term::FocalLength(35.0), 0.0), "satisfied");
+    }
 }

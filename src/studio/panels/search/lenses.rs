@@ -12,6 +12,7 @@ use crate::search::SteerCommand;
 use crate::session::{Command, FoundLens, SessionView, StructureSearchCommand};
 use crate::studio::actions::Actions;
 use crate::studio::file_dialog::FileRequest;
+use crate::studio::panels::total_track;
 use crate::studio::panels::widgets::{ActionButton, action_buttons};
 use crate::studio::thumbnails::Thumbnails;
 
@@ -62,7 +63,7 @@ impl CardOrder {
             Self::Spot => score.map(|point| point.spot),
             Self::Light => score.map(|point| -point.light),
             Self::Elements => Some(found.elements as f64),
-            Self::Length => Some(found.lens.total_track()),
+            Self::Length => total_track(&found.lens, 0),
         };
         key.unwrap_or(f64::INFINITY)
     }
@@ -117,8 +118,10 @@ pub(super) fn cards(
         |found: &Arc<FoundLens>| (found.number, found.merit) == (run.best.number, run.best.merit);
     let is_retained = run.reservoir.iter().any(same);
     let best = (!is_retained).then_some(&run.best);
-    let mut shown: Vec<_> = best.into_iter().chain(&run.reservoir).map(Arc::clone).collect();
-    shown.sort_by(|a, b| order.key(a).total_cmp(&order.key(b)));
+    let keyed = best.into_iter().chain(&run.reservoir).map(|found| (order.key(found), found));
+    let mut shown: Vec<_> = keyed.collect();
+    shown.sort_by(|(a, _), (b, _)| a.total_cmp(b));
+    let shown = shown.into_iter().map(|(_, found)| Arc::clone(found)).collect();
     let shown = places.arrange(ui, shown);
     let drawn = ui.scope(|ui| card_rows(ui, search, chosen, &shown, thumbnails));
     places.area = Some(drawn.response.rect);

@@ -17,7 +17,7 @@ const LEGEND: f32 = 22.0;
 /// The height of a page that has room for the curves and the retained lenses.
 const ROOMY: f32 = 340.0;
 /// The room for the numbers at the left.
-const AXIS: f32 = 40.0;
+const AXIS: f32 = 68.0;
 
 /// True if a page has room for the curves above the retained lenses.
 pub(super) fn has_room(ui: &Ui) -> bool {
@@ -54,8 +54,8 @@ fn plots_with(
     clicked
 }
 
-fn plot(name: &str, height: f32) -> Plot<'static> {
-    fixed_plot(name, height)
+fn plot(ui: &Ui, name: &str, height: f32) -> Plot<'static> {
+    fixed_plot(ui, name, height)
         .show_crosshair(false)
         .label_formatter(|_| None)
         .y_axis_min_width(AXIS)
@@ -74,9 +74,7 @@ fn merit_plot(
     chosen: Option<u64>,
     height: f32,
 ) -> Option<u64> {
-    let plot = log_axis(plot("merit of the search", height), "merit")
-        .show_axes([false, true])
-        .grid_color(ui.visuals().widgets.noninteractive.bg_stroke.color);
+    let plot = log_axis(plot(ui, "merit of the search", height), "merit").show_axes([false, true]);
     let visuals = ui.visuals().clone();
     let shown = plot.show(ui, |plot| {
         let faint = visuals.weak_text_color().gamma_multiply(0.4);
@@ -193,12 +191,8 @@ fn elements_plot(ui: &mut Ui, run: &StructureSearchSnapshot, chain: usize) {
     let counts = steps.iter().map(|[_, count]| *count);
     let (low, high) = counts.fold((f64::MAX, f64::MIN), |(l, h), c| (l.min(c), h.max(c)));
     let visuals = ui.visuals();
-    let (line, grid) =
-        (visuals.strong_text_color(), visuals.widgets.noninteractive.bg_stroke.color);
-    let plot = plot("elements of the search", STRIP)
-        .grid_color(grid)
-        .y_grid_spacer(egui_plot::uniform_grid_spacer(|_| [1.0, 1.0, 1.0]))
-        .grid_spacing(9.0..=60.0)
+    let line = visuals.strong_text_color();
+    let plot = plot(ui, "elements of the search", STRIP)
         .x_axis_label("iteration")
         .y_axis_label("elements")
         .y_axis_formatter(|mark, _| format!("{:.0}", mark.value));

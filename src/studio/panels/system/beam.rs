@@ -146,7 +146,8 @@ fn far_edit(lens: &Lens) -> Edit {
             field.y = (field.y / distance).atan().to_degrees();
         }
     }
-    Edit::Replace(Box::new(far))
+    let title = "object at infinity".to_owned();
+    Edit::Sequence { title, edits: vec![Edit::Replace(Box::new(far))] }
 }
 
 fn image(ui: &mut Ui, form: &mut EditForm<'_>) {

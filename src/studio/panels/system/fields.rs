@@ -5,6 +5,7 @@ use egui::{Button, ComboBox, DragValue, Grid, Ui};
 use super::beam::own_positions;
 use crate::lens::{Edit, FieldKind, FieldPoint, Fields, Object};
 use crate::session::{Analyses, SessionView};
+use crate::studio::form::number_field;
 use crate::studio::panels::design_results;
 use crate::studio::panels::edit_form::{EditForm, heading};
 
@@ -24,22 +25,29 @@ const WEIGHT: f32 = 48.0;
 /// The number of field points that can be made at once.
 const MAX_STEPS: usize = 20;
 
-/// The number of field points that a button makes.
+/// The field points that a button makes.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct EqualAreaSteps(usize);
+pub(super) struct EqualAreaSteps {
+    count: usize,
+    /// The largest one; `None` for that of the lens.
+    largest: Option<f64>,
+}
 
 impl Default for EqualAreaSteps {
     fn default() -> Self {
-        Self(3)
+        Self { count: 3, largest: None }
     }
 }
 
 /// Shows the group of fields.
 pub(super) fn ui(ui: &mut Ui, form: &mut EditForm<'_>, steps: &mut EqualAreaSteps) {
     heading(ui, "Fields");
-    kind(ui, form);
+    ui.horizontal(|ui| {
+        kind(ui, form);
+        add_button(ui, form);
+    });
     table(ui, form);
-    buttons(ui, form, steps);
+    equal_area(ui, form, steps);
     let own = own_positions(&form.view.lens, |position| position.fields.is_some());
     if !own.is_empty() {
         ui.weak(format!("{own} of its own, see Zoom positions"));
@@ -141,28 +149,39 @@ pub(super) fn delete_button(ui: &mut Ui, name: &str, enabled: bool) -> bool {
     button.on_hover_text(name).on_disabled_hover_text("The last one stays.").clicked()
 }
 
-fn buttons(ui: &mut Ui, form: &mut EditForm<'_>, steps: &mut EqualAreaSteps) {
+fn add_button(ui: &mut Ui, form: &mut EditForm<'_>) {
+    if ui.button("Add field").on_hover_text("Like the last one, to be changed").clicked() {
+        let mut more = form.view.lens.fields.clone();
+        let last = more.values.last().copied();
+        more.values.push(last.unwrap_or(FieldPoint { x: 0.0, y: 0.0, weight: 1.0 }));
+        form.actions.push(Edit::SetFields(more));
+    }
+}
+
+/// Fields from the axis to a largest one in steps of equal area.
+fn equal_area(ui: &mut Ui, form: &mut EditForm<'_>, steps: &mut EqualAreaSteps) {
     let fields = &form.view.lens.fields;
-    let largest = fields.values.iter().fold(0.0, |largest: f64, f| largest.max(f.x.hypot(f.y)));
+    let present = fields.values.iter().fold(0.0, |largest: f64, f| largest.max(f.x.hypot(f.y)));
+    let mut largest = steps.largest.unwrap_or(present);
     ui.horizontal(|ui| {
-        if ui.button("Add field").clicked() {
-            let mut more = fields.clone();
-            let last = more.values.last().copied();
-            more.values.push(last.unwrap_or(FieldPoint { x: 0.0, y: 0.0, weight: 1.0 }));
-            form.actions.push(Edit::SetFields(more));
+        ui.label("Up to");
+        let unit = if fields.kind == FieldKind::Angle { "°" } else { " mm" };
+        if number_field(ui, "Largest equal-area field", &mut largest, unit).changed() {
+            steps.largest = Some(largest);
         }
-        ui.separator();
-        let count = DragValue::new(&mut steps.0).range(2..=MAX_STEPS).speed(0.05);
+        ui.label("in");
+        let count = DragValue::new(&mut steps.count).range(2..=MAX_STEPS).speed(0.05);
         ui.add(count).accessible_name("Number of equal-area fields");
-        let make = ui.add_enabled(largest > 0.0, Button::new("Equal-area steps"));
+        let make = ui.add_enabled(largest > 0.0, Button::new("equal-area steps"));
         let make = make.on_hover_text(
-            "Replace all fields by so many, from the axis to the largest one along y, in rings of \
-             equal area",
+            "Replace all fields by so many, from the axis to this one along y, in rings of equal \
+             area",
         );
-        let make =
-            make.on_disabled_hover_text("Every field lies on the axis: set one of them first.");
+        let make = make.on_disabled_hover_text("Type the largest field first.");
         if make.clicked() {
-            form.actions.push(Edit::SetFields(Fields::equal_area(fields.kind, largest, steps.0)));
+            let made = Fields::equal_area(fields.kind, largest, steps.count);
+            form.actions.push(Edit::SetFields(made));
+            steps.largest = None;
         }
     });
 }

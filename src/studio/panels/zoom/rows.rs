@@ -1,6 +1,6 @@
 //! The rows of the table: names, focal lengths, and what varies: thicknesses, aperture, fields.
 
-use egui::{Align, Button, Layout, RichText, Ui};
+use egui::{Align, Button, Layout, RichText, ScrollArea, Ui};
 
 use crate::lens::{
     Aperture, Edit, FieldKind, FieldPoint, Fields, Lens, Parameter, Quantity, SurfaceNumber,
@@ -17,6 +17,8 @@ use crate::studio::text::capitalize;
 
 /// The width of a number, in points.
 const WIDTH: f32 = 82.0;
+/// The largest share of the window's height that a list of a menu takes.
+const MENU_SHARE: f32 = 0.7;
 
 /// Shows the rows, a column for each position.
 pub(super) fn ui(ui: &mut Ui, form: &mut EditForm<'_>) {
@@ -181,7 +183,8 @@ fn same_button(ui: &mut Ui, form: &mut EditForm<'_>, what: &str, change: impl Fn
         };
         let mut kept = lens.clone();
         kept.map_parameters(|parameter| Some(parameter).filter(varies));
-        form.actions.push(Edit::Replace(Box::new(kept)));
+        let title = format!("do not vary {what} between the zoom positions");
+        form.actions.push(replaced(title, kept));
     }
 }
 
@@ -214,47 +217,74 @@ fn first_order_rows(ui: &mut Ui, lens: &Lens) {
 
 /// Shows the menu of everything that can vary between the positions and does not yet.
 pub(super) fn vary_menu(ui: &mut Ui, lens: &Lens, actions: &mut Actions) {
+    let of_rows = |quantity| (0..lens.surfaces.len()).map(|i| (i, quantity)).collect::<Vec<_>>();
     let menu = ui.menu_button("Vary", |ui| {
         ui.set_min_width(230.0);
-        let thickness = |surface: usize| vec![(surface, Quantity::Thickness)];
-        vary_submenu(ui, "Thickness", lens, actions, thickness);
-        vary_submenu(ui, "Radius", lens, actions, |surface| vec![(surface, Quantity::Curvature)]);
-        vary_submenu(ui, "Other number of a surface", lens, actions, |i| other_numbers(lens, i));
+        vary_submenu(ui, "Thickness", &of_rows(Quantity::Thickness), lens, actions);
+        vary_submenu(ui, "Radius", &of_rows(Quantity::Curvature), lens, actions);
+        ui.menu_button("Other number of a surface", |ui| {
+            menu_list(ui, |ui| other_menus(ui, lens, actions));
+        });
         ui.separator();
         let has = lens.zoom.iter().any(|position| position.aperture.is_some());
-        vary_item(ui, "Aperture", has, lens, actions, |lens, position| {
+        vary_item(ui, ("Aperture", "aperture"), has, lens, actions, |lens, position| {
             position.aperture = Some(lens.aperture);
         });
         let has = lens.zoom.iter().any(|position| position.fields.is_some());
-        vary_item(ui, "Fields", has, lens, actions, |lens, position| {
+        vary_item(ui, ("Fields", "fields"), has, lens, actions, |lens, position| {
             position.fields = Some(lens.fields.clone());
         });
     });
     menu.response.on_hover_text("Choose what is different from position to position");
 }
 
-/// Shows a menu of numbers of the rows, as `numbers` gives them for each.
+/// Shows a menu for each surface: all numbers in one list would be longer than the window.
+fn other_menus(ui: &mut Ui, lens: &Lens, actions: &mut Actions) {
+    for surface in 0..lens.surfaces.len() {
+        let title = format!("Surface {}", SurfaceNumber::new(surface));
+        vary_submenu(ui, &title, &other_numbers(lens, surface), lens, actions);
+    }
+}
+
+/// Shows a menu of numbers of the rows.
 fn vary_submenu(
     ui: &mut Ui,
     title: &str,
+    numbers: &[(usize, Quantity)],
     lens: &Lens,
     actions: &mut Actions,
-    numbers: impl Fn(usize) -> Vec<(usize, Quantity)>,
 ) {
     let varied = varied_numbers(lens);
     ui.menu_button(title, |ui| {
-        ui.set_min_width(230.0);
-        for (surface, quantity) in (0..lens.surfaces.len()).flat_map(numbers) {
-            let (name, _) = number_name(surface, quantity);
-            let comment = &lens.surfaces[surface].comment;
-            let name = capitalize(&name);
-            let text = if comment.is_empty() { name } else { format!("{name} ({comment})") };
-            let has = varied.contains(&(surface, quantity));
-            vary_item(ui, &text, has, lens, actions, |lens, position| {
-                if let Some(value) = lens.surfaces[surface].get(quantity) {
-                    position.set_number(surface, quantity, value);
-                }
-            });
+        menu_list(ui, |ui| {
+            for number in numbers {
+                vary_number(ui, *number, varied.contains(number), lens, actions);
+            }
+        });
+    });
+}
+
+/// Shows the items of a menu, which scroll where the window is too low for them.
+fn menu_list(ui: &mut Ui, show: impl FnOnce(&mut Ui)) {
+    ui.set_min_width(230.0);
+    let height = MENU_SHARE * ui.ctx().content_rect().height();
+    ScrollArea::vertical().max_height(height).min_scrolled_height(height).show(ui, show);
+}
+
+fn vary_number(
+    ui: &mut Ui,
+    (surface, quantity): (usize, Quantity),
+    varied: bool,
+    lens: &Lens,
+    actions: &mut Actions,
+) {
+    let (name, _) = number_name(surface, quantity);
+    let comment = &lens.surfaces[surface].comment;
+    let text = capitalize(&name);
+    let text = if comment.is_empty() { text } else { format!("{text} ({comment})") };
+    vary_item(ui, (&text, &name), varied, lens, actions, |lens, position| {
+        if let Some(value) = lens.surfaces[surface].get(quantity) {
+            position.set_number(surface, quantity, value);
         }
     });
 }
@@ -273,9 +303,10 @@ fn other_numbers(lens: &Lens, surface: usize) -> Vec<(usize, Quantity)> {
     others.map(|quantity| (surface, quantity)).collect()
 }
 
+/// Shows an item with its text, and with the name of what it varies in an undo step.
 fn vary_item(
     ui: &mut Ui,
-    text: &str,
+    (text, name): (&str, &str),
     varied: bool,
     lens: &Lens,
     actions: &mut Actions,
@@ -284,7 +315,13 @@ fn vary_item(
     if ui.add_enabled(!varied, Button::new(text)).clicked() {
         let mut changed = lens.clone();
         changed.zoom.iter_mut().for_each(|position| vary(lens, position));
-        actions.push(Edit::Replace(Box::new(changed)));
+        let title = format!("vary the {name} between the zoom positions");
+        actions.push(replaced(title, changed));
         ui.close();
     }
+}
+
+/// An edit of the zoom positions as one step with its own title: the lens is no other one by it.
+fn replaced(title: String, lens: Lens) -> Edit {
+    Edit::Sequence { title, edits: vec![Edit::Replace(Box::new(lens))] }
 }

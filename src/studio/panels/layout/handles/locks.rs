@@ -1,5 +1,7 @@
 //! The row above the drawing: what is held while handles are dragged, and the merit.
 
+use std::sync::Arc;
+
 use egui::{Align, Layout, Ui};
 
 use super::paint::{is_merit_current, merit_text};
@@ -97,15 +99,24 @@ fn total(report: &MeritReport) -> Result<String, &String> {
     report.values.as_ref().map(|values| number::format_digits(values.total, 4))
 }
 
-/// The merit of the design, from which the arrows at the handles come.
+/// The merit of the design as all panels have it; during a drag that of the slopes, beside the merit
+/// before the drag by the same rays.
 fn design_merit(ui: &mut Ui, view: &SessionView) {
-    let Some(slopes) = &view.drag.slopes else { return };
-    match &slopes.result {
-        Ok(_) if !is_merit_current(view) => ui.weak("merit …"),
-        Ok(found) => ui.weak(merit_text(found)).on_hover_text(
-            "The merit function of the lens, or the one that the program proposes. \
-             The arrows at the handles show where it falls.",
-        ),
-        Err(why) => ui.weak("no merit").on_hover_text(why),
+    let Some(report) = &view.merit else { return };
+    let dragged = view.drag.progress.as_ref().filter(|_| is_merit_current(view));
+    let slopes =
+        dragged.and(view.drag.slopes.as_ref()).and_then(|found| found.result.as_ref().ok());
+    let text = match (slopes, total(report)) {
+        (Some(slopes), _) => merit_text(slopes),
+        _ if !Arc::ptr_eq(&report.lens, &view.lens) => "merit …".to_owned(),
+        (None, Ok(total)) => format!("merit {total}"),
+        (None, Err(why)) => {
+            ui.weak("no merit").on_hover_text(why);
+            return;
+        }
     };
+    ui.weak(text).on_hover_text(
+        "The merit function of the lens, or the one that the program proposes. \
+         The arrows at the handles show where it falls.",
+    );
 }
