@@ -168,6 +168,12 @@ pub fn run_collecting(arguments: &[String]) -> CommandOutcome {
     CommandOutcome { json: output.into_collected(), error, status }
 }
 
+/// Ends the long commands of [`run_collecting`] that other threads run, as Ctrl-C ends those of the command
+/// line: with what they have.
+pub fn stop_collecting() {
+    progress::stop_of_host();
+}
+
 impl CliArgs {
     /// The arguments of the process.
     fn read() -> Result<Self, clap::Error> {

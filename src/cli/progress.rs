@@ -5,24 +5,34 @@ use indicatif::{ProgressBar, ProgressStyle};
 #[cfg(unix)]
 use signal_hook::consts::{SIGHUP, SIGTERM};
 use std::ops::ControlFlow;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, LazyLock};
 
 /// True if the signals belong to a program that this library is a part of.
 static SIGNALS_ARE_OF_HOST: AtomicBool = AtomicBool::new(false);
 
-/// Leaves all signals to the program that this library is a part of.
+/// The flag of all commands that such a program runs.
+static HOST_FLAG: LazyLock<Arc<AtomicBool>> = LazyLock::new(Arc::default);
+
+/// Leaves all signals to the program that this library is a part of, which ends commands by
+/// [`stop_of_host`].
 pub(super) fn leave_signals_to_host() {
     SIGNALS_ARE_OF_HOST.store(true, Ordering::Relaxed);
+    HOST_FLAG.store(false, Ordering::Relaxed);
+}
+
+/// Ends the commands that the program runs which this library is a part of.
+pub(super) fn stop_of_host() {
+    HOST_FLAG.store(true, Ordering::Relaxed);
 }
 
 /// A flag that is raised by Ctrl-C, by a request to terminate, and by the end of the terminal; once
 /// it is raised, further signals have no effect.
 pub(super) fn stop_flag() -> Arc<AtomicBool> {
-    let flag = Arc::new(AtomicBool::new(false));
     if SIGNALS_ARE_OF_HOST.load(Ordering::Relaxed) {
-        return flag;
+        return Arc::clone(&HOST_FLAG);
     }
+    let flag = Arc::new(AtomicBool::new(false));
     let raised = Arc::clone(&flag);
     if let Err(error) = ctrlc::set_handler(move || raised.store(true, Ordering::Relaxed)) {
         log::warn!("Ctrl-C will not save the best lens: {error}");

@@ -16,6 +16,8 @@ use pyo3::prelude::*;
 #[derive(Debug)]
 pub(super) struct PyMerit {
     pub(super) merit: Merit,
+    /// The variables that the lens itself has.
+    variables: Vec<Variable>,
 }
 
 #[pymethods]
@@ -31,6 +33,7 @@ impl PyMerit {
         names: Option<Vec<String>>,
         tolerance: f64,
     ) -> PyResult<Self> {
+        let variables = lens.lens.variables.clone();
         let lens = match names {
             Some(names) => with_variables(&lens.lens, &names)?,
             None => lens.lens.clone(),
@@ -38,7 +41,7 @@ impl PyMerit {
         check_tolerance(tolerance)?;
         let goal = read_goal(goal, &lens)?;
         let merit = py.detach(|| Merit::new(&lens, &goal, tolerance)).map_err(wrong_input)?;
-        Ok(Self { merit })
+        Ok(Self { merit, variables })
     }
 
     /// The values of its variables in a lens.
@@ -49,7 +52,8 @@ impl PyMerit {
     /// The lens at some values of the variables.
     fn lens(&self, values: PyReadonlyArray1<'_, f64>) -> PyResult<PyLens> {
         let values = self.checked(&values)?;
-        Ok(PyLens { lens: self.merit.lens(&values) })
+        let variables = self.variables.clone();
+        Ok(PyLens { lens: Lens { variables, ..self.merit.lens(&values) } })
     }
 
     /// The merit.
@@ -100,6 +104,9 @@ pub(super) fn with_variables(lens: &Lens, names: &[String]) -> PyResult<Lens> {
     let parameters = names.iter().map(|name| parse_parameter(name));
     let parameters: Vec<_> = parameters.collect::<PyResult<_>>()?;
     check_has(lens, &parameters)?;
+    if let Some(twice) = (1..names.len()).find(|i| parameters[..*i].contains(&parameters[*i])) {
+        return Err(wrong_input(format!("found {} twice; expected every name once", names[twice])));
+    }
     let variable = |parameter| Variable { parameter, min: None, max: None };
     let variables = parameters.into_iter().map(variable).collect();
     let lens = Lens { variables, ..lens.clone() };

@@ -25,7 +25,7 @@ use pyo3::pymodule;
 #[pyo3(name = "_aplanat")]
 mod extension {
     #[pymodule_export]
-    use super::command::run_command;
+    use super::command::{run_command, stop_commands};
     #[pymodule_export]
     use super::error::{InputError, WorkError};
     #[pymodule_export]

@@ -12,6 +12,7 @@ use numpy::{
     PyReadwriteArray2, PyUntypedArrayMethods as _,
 };
 use pyo3::prelude::*;
+use std::ops::RangeInclusive;
 
 /// The arrays of the ends of rays: points and directions with a ray a row, optical paths, the codes of
 /// the fates, which are indices of `FATES`, and the surfaces at which the rays end.
@@ -22,6 +23,9 @@ type EndArrays<'py> = (
     PyReadwriteArray1<'py, u8>,
     PyReadwriteArray1<'py, u32>,
 );
+
+/// The wavelengths of light that lenses image, in µm; others are in another unit.
+const WAVELENGTHS: RangeInclusive<f64> = 0.05..=50.0;
 
 /// Traces rays through a lens on all cores, into the arrays `ends`.
 ///
@@ -126,5 +130,9 @@ fn check_zoom(lens: &Lens, zoom: usize) -> PyResult<()> {
 /// A system at a wavelength, the primary one if there is none.
 pub(super) fn resolve(lens: &Lens, um: Option<f64>, zoom: usize) -> PyResult<System<f64>> {
     check_zoom(lens, zoom)?;
+    if let Some(um) = um.filter(|um| !WAVELENGTHS.contains(um)) {
+        let text = format!("found the wavelength {um} um; expected one from 0.05 to 50 um");
+        return Err(wrong_input(text));
+    }
     lens.resolve(zoom, um.unwrap_or_else(|| primary_um(lens))).map_err(wrong_input)
 }

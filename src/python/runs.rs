@@ -5,7 +5,7 @@ use super::lens::PyLens;
 use super::merit::{check_tolerance, read_goal, with_variables};
 use crate::files::json;
 use crate::grin_design::{GrinOptimizer, GrinTask, find_builtin, read_task};
-use crate::lens::Lens;
+use crate::lens::{Lens, Variable};
 use crate::optimize::pareto::{ParetoSettings, ParetoSweep};
 use crate::optimize::{DescentMethod, Optimizer, start};
 use crate::search::SearchRunOn;
@@ -31,6 +31,8 @@ fn read_settings<T: DeserializeOwned + Default>(text: Option<&str>, what: &str) 
 #[derive(Debug)]
 pub(super) struct PyOptimizer {
     optimizer: Box<dyn Optimizer>,
+    /// The variables that the lens itself has.
+    variables: Vec<Variable>,
 }
 
 #[pymethods]
@@ -46,6 +48,7 @@ impl PyOptimizer {
         method: &str,
         tolerance: f64,
     ) -> PyResult<Self> {
+        let variables = lens.lens.variables.clone();
         let lens = match names {
             Some(names) => with_variables(&lens.lens, &names)?,
             None => lens.lens.clone(),
@@ -55,7 +58,7 @@ impl PyOptimizer {
         let method = json!(method).to_string();
         let method: DescentMethod = json::read_json(&method, "the method").map_err(wrong_input)?;
         let started = py.detach(|| start(method, &lens, &goal, tolerance));
-        Ok(Self { optimizer: started.map_err(wrong_input)? })
+        Ok(Self { optimizer: started.map_err(wrong_input)?, variables })
     }
 
     /// Takes a step; returns its progress as JSON.
@@ -66,7 +69,8 @@ impl PyOptimizer {
 
     /// The best lens so far.
     fn best(&self) -> PyLens {
-        PyLens { lens: self.optimizer.best().clone() }
+        let variables = self.variables.clone();
+        PyLens { lens: Lens { variables, ..self.optimizer.best().clone() } }
     }
 
     /// Evaluates the best lens with rays that are found anew.
@@ -254,6 +258,9 @@ impl PyGrinRun {
 
     /// The best field: the index at the nodes of a grid, its lowest corner and its spacing in mm.
     fn field<'py>(&self, py: Python<'py>, nodes: usize) -> PyResult<GridField<'py>> {
+        if !(2..=513).contains(&nodes) {
+            return Err(wrong_input(format!("nodes: found {nodes}; expected 2 to 513")));
+        }
         let task = self.optimizer.task();
         let volume = task.volume(self.optimizer.best(), nodes).map_err(failed_work)?;
         let (counts, low, spacing) =

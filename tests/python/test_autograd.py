@@ -64,3 +64,36 @@ def test_jax_has_the_derivatives_of_differences(double_gauss, what):
         step[i] = 1e-6
         difference = float(function(values + step) - function(values - step)) / 2e-6
         assert slope == pytest.approx(difference, rel=1e-3, abs=1e-6 * np.abs(slopes).max())
+
+
+@needs_torch
+def test_torch_refuses_what_it_does_not_differentiate(double_gauss):
+    import torch
+
+    from aplanat import torch as optics
+
+    value = torch.tensor(double_gauss[NAMES[0]], dtype=torch.float64, requires_grad=True)
+    spot = optics.spot(double_gauss, {NAMES[0]: value})
+    (slope,) = torch.autograd.grad(spot, value, create_graph=True)
+    with pytest.raises(RuntimeError, match="once_differentiable"):
+        torch.autograd.grad(slope, value)
+    points, directions = rays()
+    with pytest.raises(aplanat.InputError, match="require a gradient"):
+        optics.trace(double_gauss, {}, torch.tensor(points, requires_grad=True), directions)
+
+
+@needs_torch
+def test_torch_evaluates_a_lens_as_it_is(double_gauss):
+    from aplanat import torch as optics
+
+    whole = optics.spot(double_gauss, {NAMES[0]: double_gauss[NAMES[0]]})
+    assert float(optics.spot(double_gauss, {})) == pytest.approx(float(whole), rel=1e-12)
+    assert bool(optics.trace(double_gauss, {}, *rays())[3].all())
+
+
+@needs_jax
+def test_jax_evaluates_a_lens_as_it_is(double_gauss):
+    from aplanat import jax as optics
+
+    whole = optics.spot(double_gauss, {NAMES[0]: double_gauss[NAMES[0]]})
+    assert float(optics.spot(double_gauss, {})) == pytest.approx(float(whole), rel=1e-6)

@@ -120,3 +120,21 @@ def test_wavelengths_and_zoom_positions_are_those_asked_for(singlet):
         singlet.trace(points, directions, zoom=1)
     with pytest.raises(aplanat.InputError, match="9"):
         singlet.trace(points, directions, wavelength=9.0)
+
+
+def test_directions_of_fewer_bits_are_scaled_and_wrong_ones_refused(double_gauss):
+    points, directions = beam(50, 3.0)
+    exact = double_gauss.trace(points, directions)
+    rounded = double_gauss.trace(points.astype(np.float32), directions.astype(np.float32))
+    assert (rounded.fate == exact.fate).all()
+    np.testing.assert_allclose(rounded.points, exact.points, atol=1e-4)
+    with pytest.raises(aplanat.InputError, match="ray 0"):
+        double_gauss.trace(points, (2 * directions).astype(np.float32))
+    with pytest.raises(aplanat.InputError, match="complex"):
+        double_gauss.trace(points + 0j, directions)
+
+
+def test_a_wavelength_in_another_unit_is_refused(double_gauss):
+    for wavelength in (550.0, 0.0, -1.0, float("nan")):
+        with pytest.raises(aplanat.InputError, match="expected one from 0.05 to 50 um"):
+            double_gauss.trace(*beam(2, 1.0), wavelength=wavelength)

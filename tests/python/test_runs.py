@@ -1,5 +1,9 @@
 """Merit functions and runs that are watched and stopped."""
 
+import signal
+import threading
+import time
+
 import numpy as np
 import pytest
 
@@ -86,3 +90,32 @@ def test_a_grin_task_gives_its_field():
     assert low.shape == spacing.shape == (3,) and (spacing > 0).all()
     with pytest.raises(aplanat.InputError):
         aplanat.GrinTask("nothing")
+
+
+def test_the_variables_of_a_lens_stay_its_own(double_gauss):
+    variables = double_gauss.data["variables"]
+    merit = aplanat.Merit(double_gauss, SPOT, CURVATURES)
+    assert merit.lens(merit.values(double_gauss)) == double_gauss
+    assert aplanat.Optimizer(double_gauss, SPOT, CURVATURES).best.data["variables"] == variables
+    with pytest.raises(aplanat.InputError, match="twice"):
+        aplanat.Merit(double_gauss, SPOT, [CURVATURES[0], CURVATURES[0]])
+
+
+def test_commands_that_list_return_lists(double_gauss):
+    assert "luneburg" in {task.name for task in aplanat.run("grin")}
+    assert all(lens.name for lens in aplanat.run("library", "tessar"))
+    points = aplanat.analyze(double_gauss, "psf", at=[(0, 0), (0, 0.01)], error=1e-2).fields[0].points
+    assert [point.y for point in points] == [0.0, 0.01]
+    mtf = aplanat.analyze(double_gauss, "mtf", frequencies=np.array([10.0, 20.0]), error=1e-2)
+    assert [point.frequency for point in mtf.fields[0].geometric.points] == [10.0, 20.0]
+    assert f"{mtf.fields[0].geometric.points[0].tangential.modulus:.2f}".startswith("0.")
+
+
+def test_control_c_ends_a_long_command(double_gauss, tmp_path):
+    stop = threading.Timer(1.0, signal.raise_signal, [signal.SIGINT])
+    stop.start()
+    begin = time.perf_counter()
+    with pytest.raises(KeyboardInterrupt):
+        out = tmp_path / "best.json"
+        aplanat.run("search", double_gauss, "--iterations", "1000000", "--out", out)
+    assert time.perf_counter() - begin < 20.0

@@ -1,7 +1,9 @@
 """Differentiable functions of a lens for JAX.
 
 As `aplanat.torch`, with arrays in place of tensors. The numbers are computed with 64 bits; JAX keeps
-them so if `jax_enable_x64` is on. The functions may be differentiated and compiled, not mapped.
+them so if `jax_enable_x64` is on. The functions may be differentiated by the numbers of the lens and
+compiled, not mapped; given rays are no tracers. JAX wraps what goes wrong while they run, such as a lens
+without light, in its own `JaxRuntimeError`, which ends with the text.
 """
 
 from __future__ import annotations
@@ -41,7 +43,8 @@ _merit.defvjp(_merit_with_slopes, lambda _function, slopes, by: (by * slopes,))
 
 
 def _vector(arrays: Arrays) -> jax.Array:
-    return jnp.stack([jnp.asarray(value, float) for value in arrays.values()])
+    values = [jnp.asarray(value, float) for value in arrays.values()]
+    return jnp.stack(values) if values else jnp.zeros(0)
 
 
 def merit(
@@ -72,8 +75,7 @@ class _RayCall:
 
     def __init__(self, lens: Lens, names: list[str], points: Any, directions: Any, options: Any) -> None:
         self.lens, self.names, self.options = lens, names, options
-        self.points = np.asarray(points, np.float64)
-        self.directions = np.asarray(directions, np.float64)
+        self.points, self.directions = np.asarray(points), np.asarray(directions)
 
     def at(self, values: Any) -> Lens:
         return self.lens.with_numbers(dict(zip(self.names, map(float, values), strict=True)))

@@ -56,7 +56,7 @@ class Lens:
     """
 
     def __init__(self, data: Mapping[str, Any] | _aplanat.Lens) -> None:
-        """A lens from the content of a lens file."""
+        """A lens from the content of a lens file; `Lens.open` reads a file."""
         is_native = isinstance(data, _aplanat.Lens)
         self._native = data if is_native else _aplanat.Lens.from_json(json.dumps(data))
         self._merits: dict[Any, Any] = {}
@@ -72,7 +72,7 @@ class Lens:
         return cls(_aplanat.Lens.bundled(name))
 
     def save(self, path: str | os.PathLike[str]) -> dict[str, Any]:
-        """Writes the lens in the format of the extension: .json, .zmx or .seq.
+        """Writes the lens in the format of the extension: .json, .zmx, .seq, .len or .roa.
 
         Returns the report: what the format cannot hold, and how rays through the file compare.
         """
@@ -86,6 +86,9 @@ class Lens:
     def names(self) -> list[str]:
         """The names of all its numbers."""
         return self._native.names()
+
+    def __contains__(self, name: object) -> bool:
+        return name in self.names()
 
     def __getitem__(self, name: str) -> float:
         return self._native.get(name)
@@ -139,10 +142,11 @@ class Lens:
 
         `points` and `directions` have shape (rays, 3): mm and direction cosines in the frame of the
         first vertex. Arrays of 64-bit numbers are read where they lie, whatever their strides: change
-        them only afterwards. `wavelength` is in µm; the primary one if it is absent. The arrays of
-        `out`, such as an earlier result for as many rays, are written again and returned.
+        them only afterwards; directions of fewer bits are scaled to the length 1. `wavelength` is in µm; the
+        primary one if it is absent. The arrays of `out`, such as an earlier result for as many rays, are
+        written again and returned.
         """
-        rays = as_rays(points), as_rays(directions)
+        rays = as_rays(points), as_directions(directions)
         ends = TracedRays.allocate(len(rays[0])) if out is None else out
         arrays = (ends.points, ends.directions, ends.opl, ends.fate, ends.surface)
         _aplanat.trace_rays(self._native, *rays, wavelength, zoom, arrays)
@@ -170,13 +174,28 @@ class Lens:
         seeds = [as_rays(by_point), zeros if by_direction is None else as_rays(by_direction)]
         paths = np.zeros(len(points)) if by_opl is None else np.ascontiguousarray(by_opl, np.float64)
         return _aplanat.ray_gradient(
-            self._native, points, as_rays(directions), wavelength, zoom, list(names), *seeds, paths
+            self._native, points, as_directions(directions), wavelength, zoom, list(names), *seeds, paths
         )
 
 
 def as_rays(rays: npt.ArrayLike) -> Floats:
     """An array of 64-bit numbers, a ray a row; what is one already is not copied."""
-    array = np.asarray(rays, np.float64)
+    given = np.asarray(rays)
+    if np.iscomplexobj(given):
+        raise _aplanat.InputError("found complex numbers; expected real ones")
+    array = np.asarray(given, np.float64)
     if array.ndim != 2:
         raise _aplanat.InputError(f"found an array of shape {array.shape}; expected (rays, 3)")
     return array
+
+
+def as_directions(rays: npt.ArrayLike) -> Floats:
+    """The same for directions; those of fewer bits have the length 1 only to their own rounding."""
+    given = np.asarray(rays)
+    array = as_rays(given)
+    if given.dtype.kind != "f" or given.dtype.itemsize >= 8:
+        return array
+    length = np.linalg.norm(array, axis=1, keepdims=True)
+    # Others are no rounded directions, and are refused by their number.
+    is_rounded = np.abs(length - 1.0) < 32 * np.finfo(given.dtype).eps
+    return np.divide(array, length, out=array.copy(), where=is_rounded)

@@ -23,6 +23,9 @@ class Estimate:
     def __float__(self) -> float:
         return float(self.value)
 
+    def __format__(self, spec: str) -> str:
+        return format(self.value, spec) if spec else str(self)
+
     def __str__(self) -> str:
         return f"{self.value:.6g}" if self.error is None else f"{self.value:.6g} ± {self.error:.1g}"
 

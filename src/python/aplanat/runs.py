@@ -79,7 +79,8 @@ class pareto(_Run):  # noqa: N801, a verb like the command
     """The front of sharpness against light. `front` has the lenses so far."""
 
     def __init__(self, lens: Lens, **settings: Any) -> None:
-        """The settings are those of `aplanat pareto`: `points=20`, `steps=60`, `light=[0.4, 2.0]`."""
+        """The settings are those of `aplanat pareto`: `points=20`, `steps=60`, `light=[0.4, 2.0]`,
+        `tolerance=1e-2` for the spots, `scalarization="weighted_sum"`."""
         self._native = _aplanat.ParetoSweep(lens._native, _settings(settings or None))
 
     @property
@@ -99,8 +100,9 @@ class Search(_Run):
         *,
         checkpoint: str | os.PathLike[str] | None = None,
     ) -> None:
-        """`plan` has `goal`, `rules`, `local` and `settings`, as `aplanat help search` describes them.
-        With a checkpoint the search goes on from there."""
+        """`plan` has `goal`, `rules`, `local` and `settings`, as `aplanat help search` describes them; of
+        the settings, `gradients` and `moves` are limits without which it goes on. With a checkpoint, for
+        the same lens and plan, the search goes on from there."""
         path = None if checkpoint is None else os.fspath(checkpoint)
         self._native = _aplanat.Search(lens._native, _settings(plan), path)
 
@@ -139,7 +141,7 @@ class GrinTask(_Run):
     """The design of a field of refractive index by the adjoint method."""
 
     def __init__(self, task: str | Mapping[str, Any]) -> None:
-        """The name of a built-in task, or the content of a task file."""
+        """The name of a built-in task, which `run("grin")` lists, or the content of a task file."""
         self._native = _aplanat.GrinRun(task if isinstance(task, str) else json.dumps(task))
 
     def finish(self) -> None:
@@ -150,6 +152,7 @@ class GrinTask(_Run):
         self, nodes: int = 65
     ) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64], npt.NDArray[np.float64]]:
         """The index of the best field at the nodes of a grid, of shape (x, y, z), with the lowest corner
-        and the spacing of the grid in mm."""
+        and the spacing of the grid in mm. A field that is a grid has its own nodes; one that is a function
+        of a radius or of the axis is taken at 2 to 513 `nodes` along each side."""
         values, low, spacing = self._native.field(nodes)
         return values, np.asarray(low), np.asarray(spacing)

@@ -2,8 +2,9 @@
 
 Every function takes a lens and a dictionary of tensors, one number each, by the names of the numbers of
 the lens that they replace; the others are those of the lens. Derivatives are those of the adjoint trace,
-with the motion of the pupil's edge. Rays are found for the lens as it is given: once the tensors have
-moved far, go on with `lens.with_numbers(...)`.
+with the motion of the pupil's edge. There are first derivatives, by the numbers of the lens: second ones, those
+by given rays, and the transforms of `torch.func` are refused. Rays are found for the lens as it is given:
+once the tensors have moved far, go on with `lens.with_numbers(...)`.
 """
 
 from __future__ import annotations
@@ -13,7 +14,9 @@ from typing import Any
 
 import numpy as np
 import torch
+from torch.autograd.function import once_differentiable
 
+from . import _aplanat
 from .lens import Lens
 from .merit import Goal, Merit, goal_of_term, merit_of
 
@@ -25,9 +28,10 @@ class _Merit(torch.autograd.Function):
     def forward(ctx: Any, function: Merit, *values: torch.Tensor) -> torch.Tensor:
         value, gradient = function.gradient(_numbers(values))
         ctx.gradient = gradient
-        return values[0].new_tensor(value)
+        return _like(values, value)
 
     @staticmethod
+    @once_differentiable
     def backward(ctx: Any, by: torch.Tensor) -> tuple[Any, ...]:
         return (None, *(by * float(slope) for slope in ctx.gradient))
 
@@ -42,9 +46,10 @@ class _Trace(torch.autograd.Function):
         imaged = torch.from_numpy(traced.imaged)
         ctx.mark_non_differentiable(imaged)
         ends = (traced.points, traced.directions, traced.opl)
-        return (*(values[0].new_tensor(end) for end in ends), imaged)
+        return (*(_like(values, end) for end in ends), imaged)
 
     @staticmethod
+    @once_differentiable
     def backward(ctx: Any, *by: torch.Tensor) -> tuple[Any, ...]:
         lens, names, points, directions, options = ctx.call
         seeds = [part.detach().cpu().double().numpy() for part in by[:3]]
@@ -52,8 +57,24 @@ class _Trace(torch.autograd.Function):
         return (None, *(by[0].new_tensor(slope) for slope in slopes))
 
 
+def _like(values: tuple[torch.Tensor, ...], number: Any) -> torch.Tensor:
+    """A tensor of the kind of the values; of 64 bits without any."""
+    return values[0].new_tensor(number) if values else torch.as_tensor(number, dtype=torch.float64)
+
+
 def _numbers(values: tuple[torch.Tensor, ...]) -> np.ndarray:
     return np.array([float(value.detach()) for value in values])
+
+
+def _tensors(tensors: Tensors) -> list[torch.Tensor]:
+    return [torch.as_tensor(value) for value in tensors.values()]
+
+
+def _fixed(rays: Any) -> np.ndarray:
+    given = torch.as_tensor(rays)
+    if given.requires_grad:
+        raise _aplanat.InputError("found rays that require a gradient; expected `rays.detach()`: there is none")
+    return given.cpu().numpy()
 
 
 def trace(
@@ -70,16 +91,16 @@ def trace(
     Returns points and directions at the image, of shape (rays, 3), optical paths, of shape (rays,), and
     which rays arrive, of shape (rays,); zeros for a ray that is lost.
     """
-    given = [np.asarray(torch.as_tensor(rays).detach().cpu(), np.float64) for rays in (points, directions)]
+    given = [_fixed(rays) for rays in (points, directions)]
     options = {"wavelength": wavelength, "zoom": zoom}
-    return _Trace.apply((lens, list(tensors), *given, options), *tensors.values())
+    return _Trace.apply((lens, list(tensors), *given, options), *_tensors(tensors))
 
 
 def merit(
     lens: Lens, tensors: Tensors, goal: Goal | None = None, *, tolerance: float = 1e-6
 ) -> torch.Tensor:
     """The merit function, a scalar; that of the lens file without a goal."""
-    return _Merit.apply(merit_of(lens, list(tensors), goal, tolerance), *tensors.values())
+    return _Merit.apply(merit_of(lens, list(tensors), goal, tolerance), *_tensors(tensors))
 
 
 def spot(lens: Lens, tensors: Tensors, *, tolerance: float = 1e-6) -> torch.Tensor:

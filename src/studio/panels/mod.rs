@@ -207,6 +207,9 @@ impl PanelKind {
             Self::Effects => "Which physical effects are computed, and why",
             Self::System => "Aperture, fields, wavelengths, object, image plane, name, notes",
             Self::Zoom => "Multi-configuration: what differs between zoom positions",
+            Self::ImportReport => {
+                "What was lost, locked or approximated of a file of another program"
+            }
         }
     }
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import shlex
 import sys
 from collections.abc import Callable
@@ -14,14 +15,16 @@ import numpy as np
 
 import aplanat
 
-from . import LostPeriodError, commands, connect, grin, pareto, search, studies
+from . import LostPeriodError, commands, grin, pareto, search, studies
 
+EXTENSIONS = (".json", ".zmx", ".seq", ".len", ".roa")
 LENS_HELP = "the lens: .json, .zmx, .zar, .seq, .len or .roa"
 
 
 def _search(options: argparse.Namespace) -> dict[str, Any]:
     plan = json.loads(Path(options.plan).read_text(encoding="utf-8")) if options.plan else {}
     plan.setdefault("settings", {})["seed"] = options.seed
+    _check_out(Path(options.out))
     begun = search(
         aplanat.Lens.open(options.lens),
         plan,
@@ -41,6 +44,14 @@ def _search(options: argparse.Namespace) -> dict[str, Any]:
         best.save(options.out)
     fingerprint = progress.fingerprint
     return {"merit": merit, "gradients": progress.gradients, "fingerprint": fingerprint}
+
+
+def _check_out(path: Path) -> None:
+    """Refuses a file that cannot hold a lens before any work is done for it."""
+    if path.suffix not in EXTENSIONS:
+        raise aplanat.InputError(f"{path}: expected a name that ends in {', '.join(EXTENSIONS)}")
+    if not path.absolute().parent.is_dir():
+        raise aplanat.InputError(f"{path}: its folder does not exist")
 
 
 def _pareto(options: argparse.Namespace) -> list[dict[str, Any]]:
@@ -139,11 +150,11 @@ def _command(
 def _add_search(commands: Any) -> None:
     search = _command(commands, "search", _search, "optimizes the structure of a lens")
     search.add_argument("lens", help=LENS_HELP)
-    search.add_argument("--out", required=True, help="the file for the best lens: .json or .zmx")
-    search.add_argument("--gradients", type=int, default=12_000, help="gradients of all groups")
-    search.add_argument("--groups", type=int, default=2, help="groups of chains, at least one a core")
-    search.add_argument("--period", type=int, default=1000, help="gradients between two exchanges")
-    search.add_argument("--seed", type=int, default=1, help="the seed of all random numbers")
+    search.add_argument("--out", required=True, help="the file for the best lens, by its extension")
+    search.add_argument("--gradients", type=int, default=12_000, help="gradients of all groups (12000); a checkpoint keeps its own")
+    search.add_argument("--groups", type=int, default=2, help="groups of chains, at least one a core (2)")
+    search.add_argument("--period", type=int, default=1000, help="gradients between two exchanges (1000)")
+    search.add_argument("--seed", type=int, default=1, help="the seed of all random numbers (1)")
     search.add_argument("--plan", help="the plan as JSON: goal, rules, local, settings")
     search.add_argument("--checkpoint", help="saves the search here; goes on from it if it exists")
     search.add_argument("--watch", help="saves the best group here, for the studio")
@@ -152,7 +163,9 @@ def _add_search(commands: Any) -> None:
 def _main() -> int:
     options = _arguments().parse_args()
     try:
-        connect(options.address)
+        # What is wrong with the words is refused before Ray is started, which takes seconds.
+        if options.address:
+            os.environ["RAY_ADDRESS"] = options.address
         result = options.function(options)
     except ImportError:
         print("error: Ray is not installed; expected `pip install 'aplanat[ray]'`", file=sys.stderr)

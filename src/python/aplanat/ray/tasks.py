@@ -80,6 +80,8 @@ def pareto(
 
     The settings are those of `aplanat.pareto`.
     """
+    if points < 1:
+        raise _aplanat.InputError(f"points: found {points}; expected 1 or more")
     if not 1 <= slices <= points:
         raise _aplanat.InputError(f"slices: found {slices}; expected 1 to the number of points")
     text = lens._native.to_json()
