@@ -75,7 +75,7 @@ def test_torch_refuses_what_it_does_not_differentiate(double_gauss):
     value = torch.tensor(double_gauss[NAMES[0]], dtype=torch.float64, requires_grad=True)
     spot = optics.spot(double_gauss, {NAMES[0]: value})
     (slope,) = torch.autograd.grad(spot, value, create_graph=True)
-    with pytest.raises(RuntimeError, match="once_differentiable"):
+    with pytest.raises(RuntimeError):
         torch.autograd.grad(slope, value)
     points, directions = rays()
     with pytest.raises(aplanat.InputError, match="require a gradient"):

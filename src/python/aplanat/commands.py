@@ -50,7 +50,9 @@ def _run_interruptibly(words: list[str]) -> tuple[str, str | None, int]:
     thread = threading.Thread(target=work, daemon=True)
     thread.start()
     try:
-        thread.join()
+        # A signal that another thread receives is noticed between two waits.
+        while thread.is_alive():
+            thread.join(0.1)
     except KeyboardInterrupt:
         _aplanat.stop_commands()
         raise

@@ -67,7 +67,11 @@ def _numbers(values: tuple[torch.Tensor, ...]) -> np.ndarray:
 
 
 def _tensors(tensors: Tensors) -> list[torch.Tensor]:
-    return [torch.as_tensor(value) for value in tensors.values()]
+    """The tensors; plain numbers have 64 bits, as Python has them."""
+    return [
+        value if isinstance(value, torch.Tensor) else torch.tensor(value, dtype=torch.float64)
+        for value in tensors.values()
+    ]
 
 
 def _fixed(rays: Any) -> np.ndarray:
