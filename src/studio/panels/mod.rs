@@ -175,7 +175,7 @@ impl PanelKind {
         Self::ImportReport,
     ];
 
-    /// What the panel shows, in the words by which a designer looks for it.
+    /// The content of the panel, in the words by which a designer looks for it.
     pub const fn contents(self) -> &'static str {
         match self {
             Self::Layout => "The section with its rays, and the handles that shape the lens",
