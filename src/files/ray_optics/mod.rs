@@ -23,6 +23,9 @@ const INFINITE_DISTANCE: f64 = 1e10;
 /// The largest accepted number of surfaces.
 const MAX_SURFACES: usize = 1000;
 
+/// The key of nd and vd beside the table of indices of a model glass.
+const MODEL_KEY: &str = "nd_vd";
+
 /// True for JSON that is a model of ray-optics, and no lens of this program.
 pub(super) fn is_model(text: &str) -> bool {
     let start = text.trim_start().strip_prefix('{').map(str::trim_start);
@@ -235,6 +238,9 @@ fn medium(gap: &Value, place: &str, report: &mut ConversionReport) -> Medium {
         "ModelGlass" => return Medium::Model { nd: number(&data["n"]), vd: number(&data["v"]) },
         "ConstantIndex" => return Medium::Index(number(&data["n"])),
         _ => {}
+    }
+    if let [nd, vd] = numbers(&data[MODEL_KEY])[..] {
+        return Medium::Model { nd, vd };
     }
     let name = data["gname"].as_str().or_else(|| data["label"].as_str()).unwrap_or_default();
     let maker = match data["_catalog"].as_str() {

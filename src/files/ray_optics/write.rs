@@ -3,6 +3,7 @@
 //! Glasses are written as tables of their indices, which the other program interpolates: at the wavelengths
 //! of the lens the table has the very index of this program.
 
+use super::MODEL_KEY;
 use crate::files::codev::place;
 use crate::files::error::FileError;
 use crate::files::first_order_beam::FirstOrderBeam;
@@ -241,36 +242,45 @@ impl RayOpticsWriter {
                 medium_instance("opticalmedium", "ConstantIndex", data)
             }
             Medium::Model { nd, vd } => {
-                let note = "each program has its own dispersion formula for nd and vd";
-                self.record(ConversionOutcome::Approximated, format!("model glass {place}"), note);
-                let data = json!({"label": "", "n": nd, "v": vd, "_catalog_name": "user"});
-                medium_instance("modelglass", "ModelGlass", data)
+                // Each program has a dispersion formula of its own for these two numbers.
+                let note = "a table of its indices, with nd and vd beside it";
+                self.record(ConversionOutcome::Used, format!("model glass {place}"), note);
+                let index = |um| Some(glass::model_index(*nd, *vd, um));
+                let mut data = self.table([0.0, f64::INFINITY], index);
+                data["label"] = format!("{nd},{vd}").into();
+                data["_catalog"] = "model".into();
+                data[MODEL_KEY] = json!([nd, vd]);
+                medium_instance("opticalmedium", "InterpolatedMedium", data)
             }
-            Medium::Glass(name) => self.table_of_indices(name),
+            Medium::Glass(name) => self.table_of_glass(name),
             // Refused before.
             Medium::Grin(gradient) => self.medium(&gradient.base, place),
         }
     }
 
     /// A catalogue glass as a table of indices.
-    fn table_of_indices(&self, name: &str) -> Value {
+    fn table_of_glass(&self, name: &str) -> Value {
         let Some(glass) = glass::find(name) else {
             return medium_instance("opticalmedium", "Air", json!({}));
         };
+        let mut data = self.table(glass.range_um, |um| glass.index(um));
+        data["label"] = glass.name.clone().into();
+        data["_catalog"] = glass.manufacturer.clone().into();
+        medium_instance("opticalmedium", "InterpolatedMedium", data)
+    }
+
+    /// The indices at the wavelengths of the lens and between, within the range of a medium in µm.
+    fn table(&self, range: [f64; 2], index: impl Fn(f64) -> Option<f64>) -> Value {
         let own = self.lens.wavelengths.iter().map(|wave| wave.um);
-        let [low, high] = self.table_range(glass.range_um);
+        let [low, high] = self.table_range(range);
         let even = (0..ENTRIES).map(|k| low + (high - low) * k as f64 / (ENTRIES - 1) as f64);
         let mut waves: Vec<f64> = own.chain(even).collect();
         waves.sort_by(f64::total_cmp);
         // Entries that nearly coincide would spoil the interpolation.
         waves.dedup_by(|b, a| *b == *a || *b - *a < 1e-4 && !self.is_own(*b));
-        let table = waves.iter().filter_map(|um| Some((um * 1e3, glass.index(*um)?)));
+        let table = waves.iter().filter_map(|um| Some((um * 1e3, index(*um)?)));
         let (nm, n): (Vec<f64>, Vec<f64>) = table.unzip();
-        let data = json!({
-            "label": glass.name, "_catalog": glass.manufacturer,
-            "wvls": nm, "rndx": n, "kvals": null, "kvals_wvls": null,
-        });
-        medium_instance("opticalmedium", "InterpolatedMedium", data)
+        json!({"wvls": nm, "rndx": n, "kvals": null, "kvals_wvls": null})
     }
 
     fn is_own(&self, um: f64) -> bool {

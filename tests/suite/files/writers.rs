@@ -189,6 +189,11 @@ fn places_and_forms_go_through_a_model_of_ray_optics() {
     let saved = files::save(&lens, &target).unwrap_or_else(|error| panic!("{error}"));
     assert!(saved.proof.unwrap().imaged > 100);
     let back = files::open(&target).unwrap();
+    // A model glass keeps its numbers beside the table of its indices.
+    let media =
+        |lens: &Lens| lens.surfaces.iter().map(|row| row.medium.clone()).collect::<Vec<_>>();
+    assert!(media(&lens).iter().any(|medium| matches!(medium, Medium::Model { .. })));
+    assert_eq!(media(&back.lens), media(&lens));
     let kinds = |lens: &Lens| {
         let rows = lens.surfaces.iter();
         rows.map(|row| row.freeform.as_ref().map(|form| form.kind.name())).collect::<Vec<_>>()
