@@ -120,7 +120,8 @@ fn wait(
     happened: impl Fn(&SessionView, &[SessionEvent]) -> bool,
 ) {
     let mut events = Vec::new();
-    for _ in 0..10_000 {
+    // Random aspheres may have rays that take long to cross: two minutes at most.
+    for _ in 0..60_000 {
         events.extend(session.poll());
         if happened(&session.view(), &events) {
             return;

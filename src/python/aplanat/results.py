@@ -18,7 +18,7 @@ class Estimate:
     rays: int | None = None
     """The rays that it is computed from."""
     seconds: float | None = None
-    """The time that it took."""
+    """The time that it took, together with the numbers that were computed with it."""
 
     def __float__(self) -> float:
         return float(self.value)
@@ -33,8 +33,8 @@ class Estimate:
 class Result(Mapping[str, Any]):
     """The result of a command: its entries by name, as attributes or by `[]`."""
 
-    def __init__(self, entries: Mapping[str, Any]) -> None:
-        self._entries = {name: from_json(value) for name, value in entries.items()}
+    def __init__(self, entries: Mapping[str, Any], seconds: float | None = None) -> None:
+        self._entries = {name: from_json(value, seconds) for name, value in entries.items()}
 
     def __getattr__(self, name: str) -> Any:
         entries = self.__dict__.get("_entries", {})
@@ -68,14 +68,16 @@ def _result_of(entries: dict[str, Any]) -> Result:
     return result
 
 
-def from_json(value: Any) -> Any:
-    """A value of JSON with estimates and results in place of objects."""
+def from_json(value: Any, seconds: float | None = None) -> Any:
+    """A value of JSON with estimates and results in place of objects. Numbers without a time of their own
+    have that of what they are a part of."""
     if isinstance(value, list):
-        return [from_json(entry) for entry in value]
+        return [from_json(entry, seconds) for entry in value]
     if not isinstance(value, dict):
         return value
+    milliseconds = value.get("milliseconds")
+    if isinstance(milliseconds, (int, float)):
+        seconds = 1e-3 * milliseconds
     if value.keys() <= {"value", "error", "rays", "milliseconds"} and {"value", "error"} <= value.keys():
-        milliseconds = value.get("milliseconds")
-        seconds = None if milliseconds is None else 1e-3 * milliseconds
         return Estimate(value["value"], value["error"], value.get("rays"), seconds)
-    return Result(value)
+    return Result(value, seconds)
