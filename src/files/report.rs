@@ -1,5 +1,6 @@
 //! The report of a conversion between two formats: the outcome of each part of the lens.
 
+use crate::lens::{Row, SurfaceNumber};
 use serde::Serialize;
 use std::fmt;
 
@@ -87,6 +88,18 @@ impl ConversionReport {
             text: what.to_owned(),
             note: note.into(),
         });
+    }
+
+    /// Adds what a format without sheets of hyperhemispheres and without foreign shapes loses of a row.
+    pub(super) fn add_row_losses(&mut self, surface: SurfaceNumber, row: &Row) {
+        if row.hyperhemisphere {
+            let what = format!("hyperhemisphere of surface {surface}");
+            self.add(ConversionOutcome::Dropped, &what, "the other program decides by itself");
+        }
+        if let Some(locked) = &row.locked {
+            let what = format!("surface {surface}: {}", locked.kind);
+            self.add(ConversionOutcome::Locked, &what, "written as its conic or asphere alone");
+        }
     }
 
     /// Changes the outcome of a line that was read before.

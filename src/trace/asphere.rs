@@ -96,13 +96,18 @@ impl Interface<f64> {
         let conic = Self { terms: [0.0; ASPHERE_TERMS], ..*self };
         // A conic rises or falls all the way to its edge.
         let (a, b) = (conic.sag(from * from).0, conic.sag(to * to).0);
-        let middle = 0.5 * (from + to);
         let flat = Self { curvature: 0.0, ..*self };
-        let z = flat.sag(middle * middle).0;
+        let flat_sag = |terms, r: f64| Self { terms, ..flat }.sag(r * r).0;
+        let middle = flat_sag(self.terms, 0.5 * (from + to));
         let largest = Self { terms: self.terms.map(f64::abs), ..flat };
         let change = (to - from) * to * largest.sag(to * to).1;
-        let size = a.abs() + b.abs() + z.abs() + change;
-        (a.min(b) + z - change, a.max(b) + z + change, size)
+        // Terms of one sign rise or fall all the way: far better in a wide interval.
+        let (rising, falling) = (self.terms.map(|a| a.max(0.0)), self.terms.map(|a| a.min(0.0)));
+        let lowest = flat_sag(rising, from) + flat_sag(falling, to);
+        let highest = flat_sag(rising, to) + flat_sag(falling, from);
+        let (low, high) = (lowest.max(middle - change), highest.min(middle + change));
+        let size = a.abs() + b.abs() + largest.sag(to * to).0;
+        (a.min(b) + low, a.max(b) + high, size)
     }
 }
 
@@ -214,7 +219,7 @@ const NEWTON_STEPS: usize = 10;
 
 #[cfg(test)]
 mod tests {
-    use crate::lens::{Shape, Surface, System};
+    use crate::lens::{ASPHERE_TERMS, Shape, Surface, System};
     use crate::trace::Tracer;
 
     #[test]
@@ -237,6 +242,19 @@ mod tests {
             let own = (sag(range.1) - sag(range.0)).abs();
             assert!(high - low < 10.0 * own + 1e-3, "{low} {high}, but it changes by {own}");
         }
+    }
+
+    #[test]
+    fn the_bounds_of_terms_of_one_sign_are_their_ends() {
+        let mut terms = [0.0; ASPHERE_TERMS];
+        (terms[1], terms[2]) = (3e-4, 0.046);
+        let shape = Shape::Asphere { curvature: 0.0, conic: 0.0, terms };
+        let surface = Surface { shape, ..Surface::plane(1.0, 1.5) };
+        let surfaces = vec![surface, Surface::plane(0.0, 1.5)];
+        let tracer = Tracer::new(&System { index_before: 1.0, surfaces, stop: None }).unwrap();
+        let interface = tracer.interfaces[0];
+        let (low, high, _) = interface.sag_bounds((5.0, 22.0));
+        assert_eq!([low, high], [25.0, 484.0].map(|r2| interface.sag(r2).0));
     }
 
     /// The second differences of the sag, by `z = c r²/(1 + √(1 − (1 + k) c² r²)) + Σ a r^(4 + 2 j)`, are

@@ -344,7 +344,7 @@ mod tests {
     #[test]
     fn no_surface_takes_many_intervals_of_a_ray() {
         let phone = [0.123_512, 0.076_650_2, -0.050_375_5, 0.108_034];
-        let cases: [(f64, f64, &[f64], f64, f64); 6] = [
+        let cases: [(f64, f64, &[f64], f64, f64); 7] = [
             // Conics that end 8 µm and 0.2 nm from the axis.
             (0.127, 1e6, &phone, 0.008, 20.0),
             (4e9, 14.8, &phone, 6e-11, 20.0),
@@ -354,6 +354,8 @@ mod tests {
             // A small ball that rays touch, and a wall.
             (-35.66, -0.1476, &[2e-9], 0.04, 60.0),
             (0.0, 0.0, &[1e6, -1e5, 1e4], 3.0, 250.0),
+            // A floor that rises to 4e8 mm at the rim.
+            (-0.008, 0.0, &[0.0, 0.0, 6e4], 3.0, 30.0),
         ];
         for (curvature, conic, terms, half, limit) in cases {
             let (mean, most) = cost(surface(curvature, conic, terms), half);

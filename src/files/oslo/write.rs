@@ -238,7 +238,7 @@ impl OsloWriter {
             self.line("AST");
         }
         self.pickups(i);
-        self.report_row(i, &row);
+        self.report.add_row_losses(SurfaceNumber::new(i), &row);
     }
 
     fn glass(&mut self, medium: &Medium, place: MediumPlace) {
@@ -282,18 +282,6 @@ impl OsloWriter {
             let what = format!("pickup: {parameter} from the {source}");
             let note = "the present value, without the pickup";
             self.record(ConversionOutcome::Approximated, what, note);
-        }
-    }
-
-    fn report_row(&mut self, i: usize, row: &Row) {
-        let surface = SurfaceNumber::new(i);
-        if row.hyperhemisphere {
-            let what = format!("hyperhemisphere of surface {surface}");
-            self.record(ConversionOutcome::Dropped, what, "the other program decides by itself");
-        }
-        if let Some(locked) = &row.locked {
-            let what = format!("surface {surface}: {}", locked.kind);
-            self.record(ConversionOutcome::Locked, what, "written as its conic or asphere alone");
         }
     }
 

@@ -188,7 +188,7 @@ impl RayOpticsWriter {
 
     fn surface(&mut self, i: usize, reach: Option<f64>) -> Value {
         let row = self.lens.surfaces[i].clone();
-        self.report_row(i, &row);
+        self.report.add_row_losses(SurfaceNumber::new(i), &row);
         let rims: Vec<Value> = row.semi_diameter.iter().map(|radius| circle(*radius)).collect();
         let mirror = row.medium == Medium::Mirror;
         let mut attributes = json!({
@@ -365,18 +365,6 @@ impl RayOpticsWriter {
             "fields": points.iter().zip(weights).map(field).collect::<Vec<_>>(),
         });
         instance("raytr.opticalspec", "FieldSpec", attributes)
-    }
-
-    fn report_row(&mut self, i: usize, row: &Row) {
-        let surface = SurfaceNumber::new(i);
-        if row.hyperhemisphere {
-            let what = format!("hyperhemisphere of surface {surface}");
-            self.record(ConversionOutcome::Dropped, what, "the other program decides by itself");
-        }
-        if let Some(locked) = &row.locked {
-            let what = format!("surface {surface}: {}", locked.kind);
-            self.record(ConversionOutcome::Locked, what, "written as its conic or asphere alone");
-        }
     }
 
     fn report_losses(&mut self) {

@@ -122,7 +122,8 @@ fn numbers(ui: &mut Ui, lens: &Lens, imported: &ImportedFile) {
     } else {
         let hint =
             "Of the lens as it was opened. Rays for the spots fill the paraxial entrance pupil.";
-        ui.label("To compare with the program that wrote the file:").on_hover_text(hint);
+        ui.label("To compare with the program that wrote the file, at the primary wavelength:")
+            .on_hover_text(hint);
         Grid::new("import checks").striped(true).spacing([12.0, 2.0]).show(ui, |ui| {
             check_rows(ui, lens, &imported.checks);
         });

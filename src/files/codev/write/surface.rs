@@ -56,7 +56,7 @@ impl CodeVWriter {
             .map(|quantity| if self.is_variable(i, quantity) { 0 } else { 100 });
         self.line(format!("  CCY {bend}; THC {gap}"));
         self.place(&row);
-        self.report_row(i, &row);
+        self.report.add_row_losses(SurfaceNumber::new(i), &row);
     }
 
     fn aperture_of(&mut self, row: &Row) {
@@ -98,18 +98,6 @@ impl CodeVWriter {
         }
         if !word.is_empty() {
             self.line(format!("  {word}"));
-        }
-    }
-
-    fn report_row(&mut self, i: usize, row: &Row) {
-        let surface = SurfaceNumber::new(i);
-        if row.hyperhemisphere {
-            let what = format!("hyperhemisphere of surface {surface}");
-            self.record(ConversionOutcome::Dropped, what, "the other program decides by itself");
-        }
-        if let Some(locked) = &row.locked {
-            let what = format!("surface {surface}: {}", locked.kind);
-            self.record(ConversionOutcome::Locked, what, "written as its conic or asphere alone");
         }
     }
 
