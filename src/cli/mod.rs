@@ -18,6 +18,7 @@ mod error;
 mod experiment;
 mod failures;
 mod glass;
+mod glass_exchange;
 mod gradient;
 mod grin;
 mod help;

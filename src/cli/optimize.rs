@@ -3,6 +3,7 @@
 use super::effects::{DesignEffects, EffectArgs, EffectReport};
 use super::error::CliError;
 use super::failures::Failures;
+use super::glass_exchange::{GlassExchangeArgs, GlassExchangeReport, exchange, failure};
 use super::input::{self, LensFile, LoadedLens, Tolerance};
 use super::limit_prices;
 use super::names::value_name;
@@ -67,6 +68,9 @@ pub(super) struct OptimizeArgs {
     history: Option<PathBuf>,
 
     #[command(flatten)]
+    glasses: GlassExchangeArgs,
+
+    #[command(flatten)]
     effects: EffectArgs,
 }
 
@@ -89,6 +93,7 @@ impl OptimizeArgs {
         add_variables(&mut lens, &self.vary);
         let refuse = |source| self.merit_error(&opened, source);
         let goal = self.goal(&lens).map_err(|e| e.or_else(refuse))?;
+        let glasses = self.glasses.search(&opened, &lens, &goal, self.error.0)?;
         let started = start(self.method, &lens, &goal, self.error.0);
         let mut optimizer = started.map_err(refuse)?;
         let before = optimizer.terms().map_err(refuse)?;
@@ -99,17 +104,23 @@ impl OptimizeArgs {
         }
         let effects = design.report(&opened.lens, &opened.file)?;
         let (search, ms) = time_ms(|| self.search(optimizer.as_mut(), &stop));
+        let mut failures = Failures::default();
+        let exchanged = glasses.map(|found| exchange(found, &mut optimizer, &stop)).transpose();
+        let glasses = failures.note(exchanged.map_err(|why| failure(&opened.file, why))).flatten();
         // The lens is saved before anything else is computed from it.
         let Lens { variables, wavelengths, .. } = opened.lens.clone();
-        let best = Lens { wavelengths, variables, ..optimizer.best().clone() };
-        let mut failures = Failures::default();
+        let mut best = Lens { wavelengths, variables, ..optimizer.best().clone() };
+        // A glass of the catalogue in place of a model glass has no index that varies.
+        let values = best.clone();
+        best.variables.retain(|variable| values.get(variable.parameter).is_some());
         let saved = failures.note(files::save(&best, &self.out)).is_some();
         failures.note(self.write_history(&search));
         let after = optimizer.terms().map_err(refuse)?;
         let light = [at_start.light(), merit(optimizer.best())?.light()];
         let limits = optimizer.binding_limits().to_vec();
+        let search = &search;
         let found =
-            OptimizeOutcome { search: &search, ms, light, before, after, limits, saved, effects };
+            OptimizeOutcome { search, ms, light, before, after, limits, glasses, saved, effects };
         failures.note(output.print(&OptimizeReport::new(self, &lens, &best, found)));
         failures.note(check_conflict(optimizer.as_ref()).map_err(refuse));
         failures.into_result()
@@ -237,6 +248,7 @@ struct OptimizeOutcome<'a> {
     before: Vec<TermValue>,
     after: Vec<TermValue>,
     limits: Vec<LimitPrice>,
+    glasses: Option<GlassExchangeReport>,
     /// True if the best lens was saved.
     saved: bool,
     effects: EffectReport,
@@ -264,6 +276,9 @@ struct OptimizeReport {
     /// The limits that hold the best lens, with their prices.
     limits: Vec<LimitPrice>,
     variables: Vec<VariableComparison>,
+    /// The exchange of glasses, if that was asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    glasses: Option<GlassExchangeReport>,
     /// True if thicknesses vary that no term limits.
     #[serde(skip)]
     free_thicknesses: bool,
@@ -330,7 +345,8 @@ fn has_free_thicknesses(lens: &Lens, terms: &[TermValue]) -> bool {
 
 impl OptimizeReport {
     fn new(args: &OptimizeArgs, lens: &Lens, best: &Lens, found: OptimizeOutcome<'_>) -> Self {
-        let OptimizeOutcome { search, ms, light, before, after, limits, saved, effects } = found;
+        let OptimizeOutcome { search, ms, light, before, after, limits, glasses, saved, effects } =
+            found;
         let merit = |terms: &[TermValue]| terms.iter().map(|t| t.weight * t.value).sum();
         let refusals = || search.steps.iter().filter_map(|step| step.refused.as_ref());
         let variable = |v: &Variable| VariableComparison {
@@ -355,6 +371,7 @@ impl OptimizeReport {
             terms: TermComparison::compare(&before, &after),
             limits,
             variables: lens.variables.iter().map(variable).collect(),
+            glasses,
             effects,
             out: saved.then(|| args.out.display().to_string()),
             lens: (!saved).then(|| best.clone()),
@@ -397,6 +414,9 @@ impl Display for OptimizeReport {
         writeln!(f, "{steps} steps in {:.3} s: {ended}", 1e-3 * ms)?;
         if let Some(refusal) = &self.last_refusal {
             writeln!(f, "{} steps rejected or shortened, the last: {refusal}", self.refused_steps)?;
+        }
+        if let Some(glasses) = &self.glasses {
+            write!(f, "{glasses}")?;
         }
         writeln!(f, "merit {} -> {}", ShortNumber(*merit_before), ShortNumber(*merit_after))?;
         let [before, after] = [self.light_before, self.light_after];

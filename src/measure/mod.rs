@@ -8,6 +8,7 @@ mod arrival;
 mod design;
 mod double_gauss;
 mod effects;
+mod glasses;
 mod gradient;
 mod grin;
 mod grin_starts;
@@ -27,6 +28,7 @@ pub use arrival::{ArrivalComparison, ArrivalRow, measure_arrival};
 pub use design::{SheetReference, SheetScore, SpecificationSheet, measure_design};
 pub use double_gauss::double_gauss;
 pub use effects::EffectTask;
+pub use glasses::{GlassComparison, GlassCourse, compare_glass_exchange};
 pub use gradient::{
     GradientBenchmark, GradientBenchmarkError, GradientCost, GradientCurves, GradientRow, Integral,
     ParameterClass, measure_gradients,

@@ -4,6 +4,7 @@
 //! lets it become invalid, and always has a best lens.
 
 mod adam;
+mod glasses;
 mod least_squares;
 mod limited;
 pub mod pareto;
@@ -11,6 +12,7 @@ mod segment;
 mod state;
 mod trust_region;
 
+pub use glasses::{ExchangeOrder, GlassExchange, GlassRound, GlassSearch, GlassSearchError};
 pub use segment::{DescentState, SegmentResult, SegmentSettings, run_segment};
 
 use crate::lens::Lens;
@@ -141,7 +143,16 @@ pub fn start(
     goal: &Goal,
     tolerance: f64,
 ) -> Result<Box<dyn Optimizer>, MeritError> {
-    let merit = Merit::new(lens, goal, tolerance)?;
+    start_with(method, Merit::new(lens, goal, tolerance)?, lens, tolerance)
+}
+
+/// As [`start`], from a merit function of the lens.
+fn start_with(
+    method: DescentMethod,
+    merit: Merit,
+    lens: &Lens,
+    tolerance: f64,
+) -> Result<Box<dyn Optimizer>, MeritError> {
     Ok(match method {
         DescentMethod::Adam => {
             Box::new(adam::AdamOptimizer::new(merit, lens, adam::LearningRate::ReduceOnPlateau)?)

@@ -25,6 +25,7 @@ mod files;
 mod freeform;
 mod freeform_sag;
 mod glass;
+mod glass_search;
 mod goals;
 mod grin;
 mod grin_design;

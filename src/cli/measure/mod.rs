@@ -2,6 +2,7 @@
 
 mod arrival;
 mod design;
+mod glasses;
 mod gradient;
 mod grin;
 mod limits;
@@ -37,6 +38,7 @@ enum BenchmarkCommand {
     Grin(grin::MeasureGrinArgs),
     Optimize(optimize::MeasureOptimizeArgs),
     Limits(limits::MeasureLimitsArgs),
+    Glasses(glasses::MeasureGlassesArgs),
     Search(Box<search::MeasureSearchArgs>),
     Design(design::MeasureDesignArgs),
     Tolerance(tolerance::MeasureToleranceArgs),
@@ -54,6 +56,7 @@ impl MeasureArgs {
             BenchmarkCommand::Grin(grin) => grin.run(output),
             BenchmarkCommand::Optimize(optimize) => optimize.run(output),
             BenchmarkCommand::Limits(limits) => limits.run(output),
+            BenchmarkCommand::Glasses(glasses) => glasses.run(output),
             BenchmarkCommand::Search(search) => search.run(output),
             BenchmarkCommand::Design(design) => design.run(output),
             BenchmarkCommand::Tolerance(tolerance) => tolerance.run(output),

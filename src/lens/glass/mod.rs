@@ -27,6 +27,9 @@ pub mod line {
     pub const C: f64 = 0.6562725;
 }
 
+/// The largest distance in index and Abbe number of two glasses that are the same.
+const TWIN: [f64; 2] = [2e-4, 0.1];
+
 /// One glass of the catalogue.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 pub struct Glass {
@@ -73,6 +76,11 @@ impl Glass {
         Some((g - f) / (f - c)).filter(|partial| partial.is_finite())
     }
 
+    /// True if another glass has nearly the same index and Abbe number: another maker's name for it.
+    pub fn is_twin_of(&self, other: &Self) -> bool {
+        (self.nd - other.nd).abs() < TWIN[0] && (self.vd - other.vd).abs() < TWIN[1]
+    }
+
     /// The manufacturer and the name, as in lens files.
     pub fn full_name(&self) -> String {
         format!("{} {}", self.manufacturer, self.name)
@@ -94,6 +102,17 @@ pub fn catalogue() -> &'static [Glass] {
 fn further_catalogue() -> &'static [Glass] {
     static CATALOGUE: OnceLock<Vec<Glass>> = OnceLock::new();
     CATALOGUE.get_or_init(|| parse_catalogue(include_str!("../../../assets/further_glasses.json")))
+}
+
+/// Some glasses, of twins only the first.
+pub fn distinct<'a>(glasses: impl IntoIterator<Item = &'a Glass>) -> Vec<&'a Glass> {
+    let mut found: Vec<&Glass> = Vec::new();
+    for glass in glasses {
+        if !found.iter().any(|other| other.is_twin_of(glass)) {
+            found.push(glass);
+        }
+    }
+    found
 }
 
 fn parse_catalogue(text: &str) -> Vec<Glass> {

@@ -10,8 +10,6 @@ use rand::RngExt as _;
 const UNIT: [f64; 2] = [0.01, 1.2];
 /// The number of glasses that are tried in place of one.
 const TRIED: usize = 10;
-/// The largest distance in index and Abbe number of two glasses that are the same.
-const TWIN: [f64; 2] = [2e-4, 0.1];
 
 /// True if every glass is permitted.
 pub(super) fn in_catalogue(lens: &Lens, asked: &LensRequirements) -> bool {
@@ -23,17 +21,10 @@ pub(super) fn in_catalogue(lens: &Lens, asked: &LensRequirements) -> bool {
 
 /// The permitted glasses with data at every wavelength, without twins.
 fn permitted(asked: &LensRequirements) -> Vec<&'static glass::Glass> {
-    let mut found: Vec<&'static glass::Glass> = Vec::new();
-    for glass in glass::catalogue() {
+    glass::distinct(glass::catalogue().iter().filter(|glass| {
         let known = asked.wavelengths.iter().all(|(um, _)| glass.index(*um).is_some());
-        let twin = |other: &&glass::Glass| {
-            (other.nd - glass.nd).abs() < TWIN[0] && (other.vd - glass.vd).abs() < TWIN[1]
-        };
-        if known && asked.glasses.allows(&glass.full_name()) && !found.iter().any(twin) {
-            found.push(glass);
-        }
-    }
-    found
+        known && asked.glasses.allows(&glass.full_name())
+    }))
 }
 
 /// The permitted glasses, the nearest to an index and an Abbe number first.
@@ -123,9 +114,7 @@ mod tests {
         let all = permitted(&requirements(""));
         assert!(all.len() > 100, "{}", all.len());
         for (i, a) in all.iter().enumerate() {
-            let twin =
-                |b: &&&glass::Glass| (a.nd - b.nd).abs() < TWIN[0] && (a.vd - b.vd).abs() < TWIN[1];
-            assert!(!all[i + 1..].iter().any(|b| twin(&b)), "{}", a.full_name());
+            assert!(!all[i + 1..].iter().any(|b| a.is_twin_of(b)), "{}", a.full_name());
         }
         let two = requirements(r#", "glasses": ["SCHOTT N-BK7", "SCHOTT N-SF5"]"#);
         let mut names: Vec<String> =

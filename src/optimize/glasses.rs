@@ -1,0 +1,447 @@
+//! Exchange of glasses, guided by predictions of the merit behind it.
+//!
+//! Another glass moves the focus by more than one step of the variables takes back, so the powers of its
+//! surfaces are held first: their curvatures follow the change of the index. From there the step of
+//! Gauss and Newton, with the normal matrix of the lens as it is, says what optimization will gain; one
+//! factorization serves all glasses. The most promising ones are then really optimized.
+
+use super::{DescentMethod, Optimizer, start_with};
+use crate::lens::glass::{self, Glass};
+use crate::lens::{Lens, Medium, Parameter, Quantity, SurfaceNumber, System};
+use crate::merit::{DerivativeLevel, Goal, LimitTreatment, Merit, MeritError};
+use nalgebra::{Cholesky, DVector, Dyn};
+use rand::SeedableRng as _;
+use rand::seq::SliceRandom as _;
+use rand_xoshiro::Xoshiro256PlusPlus;
+use rayon::prelude::*;
+use serde::Serialize;
+
+/// The number of exchanges that are optimized in a round.
+const TRIALS: usize = 8;
+/// The largest number of them at one surface.
+const TRIALS_OF_SURFACE: usize = 4;
+/// The steps of such a trial, and those of the best one of a round.
+const TRIAL_STEPS: usize = 20;
+const FINAL_STEPS: usize = 200;
+/// The merit of the best trial, relative to the present one, up to which it is optimized further.
+const PROMISING: f64 = 1.5;
+/// The least gain of an exchange that is taken, relative to the merit.
+const LEAST_GAIN: f64 = 1e-3;
+/// The rounds without a gain after which the search ends.
+const PATIENCE: usize = 2;
+/// The relative tolerance of the spots of predictions.
+const PREDICTION_TOLERANCE: f64 = 1e-2;
+/// The damping of the step that predicts, relative to the diagonal of the normal matrix.
+const DAMPING: f64 = 1e-4;
+/// The change of a curvature up to which it follows the index.
+const LARGEST_BENDING: f64 = 2.0;
+
+/// The order in which exchanges are tried.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ExchangeOrder {
+    /// The lowest predicted merit first.
+    Predicted,
+    /// A random one with this seed, for comparison; nothing is predicted.
+    Random(u64),
+}
+
+/// Another glass in place of one.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct GlassExchange {
+    /// The surface in front of the glass.
+    pub surface: SurfaceNumber,
+    /// The glass before, as in lens files.
+    pub from: String,
+    /// The glass in its place.
+    pub to: String,
+    /// The merit that is predicted behind it; `None` without a prediction.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub predicted: Option<f64>,
+    /// The merit after optimization; `None` if the lens with it cannot be optimized.
+    pub merit: Option<f64>,
+}
+
+/// The result of a round.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct GlassRound {
+    /// The exchanges that were optimized, the most promising one first.
+    pub tried: Vec<GlassExchange>,
+    /// The exchange that was taken, with its merit at the end.
+    pub accepted: Option<GlassExchange>,
+    /// The best merit so far.
+    pub merit: f64,
+    /// The evaluations of the merit so far, with derivatives or without them.
+    pub evaluations: usize,
+    /// True if further rounds would gain nothing.
+    pub finished: bool,
+}
+
+/// The fault of a search among glasses.
+#[derive(Debug, thiserror::Error)]
+pub enum GlassSearchError {
+    /// The lens has no glass of the catalogue and no model glass.
+    #[error("the lens has no glass that another one could replace")]
+    NoGlass,
+    /// No permitted glass has an index at every wavelength.
+    #[error("no glass that matches has an index at every wavelength of the lens")]
+    NoCandidate,
+    /// The lens has no merit.
+    #[error(transparent)]
+    Merit(#[from] MeritError),
+}
+
+/// A search among glasses, one round at a time: the caller owns the loop.
+///
+/// Model glasses are replaced first, one a round, by the glass with which the merit is lowest, even if
+/// that is higher than before: nobody melts a model glass.
+#[derive(Debug)]
+pub struct GlassSearch {
+    goal: Goal,
+    tolerance: f64,
+    glasses: Vec<&'static Glass>,
+    order: ExchangeOrder,
+    /// The light of the first lens, which limits of light compare with.
+    initial_light: Vec<Vec<f64>>,
+    best: Lens,
+    merit: f64,
+    /// The exchanges of the best lens that were not tried yet, the next one last.
+    waiting: Option<Vec<Exchanged>>,
+    evaluations: usize,
+    rounds: u64,
+    idle: usize,
+}
+
+/// A lens with another glass.
+#[derive(Debug, Clone)]
+struct Exchanged {
+    exchange: GlassExchange,
+    lens: Lens,
+}
+
+/// A trial and the evaluations that it took.
+type Trial = (Exchanged, usize);
+
+impl GlassSearch {
+    /// A search from a lens that was optimized, among some glasses.
+    ///
+    /// # Errors
+    /// A lens without a glass to exchange, glasses without an index, or a lens without a merit.
+    pub fn new(
+        lens: &Lens,
+        goal: &Goal,
+        tolerance: f64,
+        glasses: impl IntoIterator<Item = &'static Glass>,
+        order: ExchangeOrder,
+    ) -> Result<Self, GlassSearchError> {
+        if sites(lens).is_empty() {
+            return Err(GlassSearchError::NoGlass);
+        }
+        let has_index =
+            |glass: &&Glass| lens.wavelengths.iter().all(|wave| glass.index(wave.um).is_some());
+        let glasses = glass::distinct(glasses.into_iter().filter(has_index));
+        if glasses.is_empty() {
+            return Err(GlassSearchError::NoCandidate);
+        }
+        let merit = Merit::new(lens, goal, tolerance)?;
+        Ok(Self {
+            merit: merit.value(&merit.values(lens))?,
+            initial_light: merit.initial_light().to_vec(),
+            goal: goal.clone(),
+            tolerance,
+            glasses,
+            order,
+            best: lens.clone(),
+            waiting: None,
+            evaluations: 1,
+            rounds: 0,
+            idle: 0,
+        })
+    }
+
+    /// The best lens so far.
+    pub fn best(&self) -> &Lens {
+        &self.best
+    }
+
+    /// The merit of the best lens.
+    pub fn merit(&self) -> f64 {
+        self.merit
+    }
+
+    /// An optimizer of the best lens, whose light is compared with that of the first one.
+    ///
+    /// # Errors
+    /// A lens without a merit.
+    pub fn resume(&self) -> Result<Box<dyn Optimizer>, MeritError> {
+        let merit = Merit::new(&self.best, &self.goal, self.tolerance)?;
+        let merit = merit.with_initial_light(&self.initial_light);
+        start_with(DescentMethod::TrustRegion, merit, &self.best, self.tolerance)
+    }
+
+    /// Goes on from another lens with glasses to exchange, whose light is compared with that of the first
+    /// one.
+    ///
+    /// # Errors
+    /// A lens without a merit.
+    pub fn restart(&mut self, lens: &Lens) -> Result<(), MeritError> {
+        let merit = Merit::new(lens, &self.goal, self.tolerance)?;
+        let merit = merit.with_initial_light(&self.initial_light);
+        self.merit = merit.value(&merit.values(lens))?;
+        self.best = lens.clone();
+        (self.waiting, self.idle) = (None, 0);
+        Ok(())
+    }
+
+    /// Optimizes the next exchanges, and takes the best one if it gains.
+    ///
+    /// # Errors
+    /// A lens without a merit.
+    pub fn round(&mut self) -> Result<GlassRound, GlassSearchError> {
+        self.rounds += 1;
+        let mut waiting = match self.waiting.take() {
+            Some(waiting) => waiting,
+            None => self.exchanges()?,
+        };
+        let chosen = choose(&mut waiting);
+        let trials: Vec<Trial> = chosen
+            .into_par_iter()
+            .map(|exchanged| self.optimized(exchanged, TRIAL_STEPS))
+            .collect();
+        self.evaluations += trials.iter().map(|(_, used)| used).sum::<usize>();
+        let tried = trials.iter().map(|(tried, _)| tried.exchange.clone()).collect();
+        let accepted = self.take_best(trials);
+        self.idle = if accepted.is_some() { 0 } else { self.idle + 1 };
+        let is_over = waiting.is_empty() || self.idle >= PATIENCE;
+        self.waiting = accepted.is_none().then_some(waiting);
+        Ok(GlassRound {
+            tried,
+            finished: accepted.is_none() && is_over,
+            accepted,
+            merit: self.merit,
+            evaluations: self.evaluations,
+        })
+    }
+
+    /// Optimizes the best trial further, and makes it the best lens if it gains, or if it replaces a
+    /// model glass.
+    fn take_best(&mut self, trials: Vec<Trial>) -> Option<GlassExchange> {
+        let is_forced = has_model_glass(&self.best);
+        let value = |trial: &Trial| trial.0.exchange.merit.unwrap_or(f64::INFINITY);
+        let best = trials.into_iter().min_by(|a, b| value(a).total_cmp(&value(b)))?;
+        if value(&best) == f64::INFINITY || !(is_forced || value(&best) < PROMISING * self.merit) {
+            return None;
+        }
+        let (found, used) = self.optimized(best.0, FINAL_STEPS);
+        self.evaluations += used;
+        let merit = found.exchange.merit?;
+        if !is_forced && merit > (1.0 - LEAST_GAIN) * self.merit {
+            return None;
+        }
+        (self.best, self.merit) = (found.lens, merit);
+        Some(found.exchange)
+    }
+
+    /// A lens with another glass after some steps; its merit is `None` if it cannot be optimized.
+    fn optimized(&self, mut exchanged: Exchanged, steps: usize) -> Trial {
+        let found = self.descend(&exchanged.lens, steps);
+        exchanged.exchange.merit = found.as_ref().map(|(_, merit, _)| *merit);
+        let used = found.as_ref().map_or(1, |(_, _, used)| *used);
+        exchanged.lens = found.map_or(exchanged.lens, |(lens, _, _)| lens);
+        (exchanged, used)
+    }
+
+    /// A lens after some steps, its merit with its limits as penalties, and the evaluations.
+    fn descend(&self, lens: &Lens, steps: usize) -> Option<(Lens, f64, usize)> {
+        let merit = Merit::new(lens, &self.goal, self.tolerance).ok()?;
+        let merit = merit.with_initial_light(&self.initial_light);
+        let method = DescentMethod::TrustRegion;
+        let mut optimizer = start_with(method, merit, lens, self.tolerance).ok()?;
+        let mut evaluations = 0;
+        for _ in 0..steps {
+            let progress = optimizer.step();
+            evaluations = progress.evaluations;
+            if progress.finished {
+                break;
+            }
+        }
+        optimizer.verify_best();
+        let terms = optimizer.terms().ok()?;
+        let merit = terms.iter().map(|term| term.weight * term.value).sum::<f64>();
+        let lit = Merit::new(optimizer.best(), &self.goal, self.tolerance).ok()?.has_light();
+        (merit.is_finite() && lit).then(|| (optimizer.best().clone(), merit, evaluations))
+    }
+
+    /// All exchanges of the best lens, the next one last.
+    fn exchanges(&mut self) -> Result<Vec<Exchanged>, MeritError> {
+        let pairs: Vec<(usize, &Glass)> = sites(&self.best)
+            .into_iter()
+            .flat_map(|row| self.glasses.iter().map(move |glass| (row, *glass)))
+            .collect();
+        let with = |(row, glass): &(usize, &Glass)| exchanged(&self.best, *row, glass);
+        let all: Vec<Exchanged> = pairs.par_iter().filter_map(with).collect();
+        match self.order {
+            ExchangeOrder::Random(seed) => {
+                let mut all = all;
+                all.shuffle(&mut Xoshiro256PlusPlus::seed_from_u64(seed.wrapping_add(self.rounds)));
+                Ok(all)
+            }
+            ExchangeOrder::Predicted => self.predicted(all),
+        }
+    }
+
+    /// Exchanges with their predictions, the lowest merit last; without those that have none.
+    fn predicted(&mut self, all: Vec<Exchanged>) -> Result<Vec<Exchanged>, MeritError> {
+        let predictor = Predictor::new(&self.best, &self.goal, &self.initial_light)?;
+        self.evaluations += 1 + 2 * all.len();
+        let predict = |exchanged: Exchanged| predictor.predict(exchanged);
+        let mut found: Vec<Exchanged> = all.into_par_iter().filter_map(predict).collect();
+        let merit = |found: &Exchanged| found.exchange.predicted.unwrap_or(f64::INFINITY);
+        found.sort_by(|a, b| merit(b).total_cmp(&merit(a)));
+        Ok(found)
+    }
+}
+
+/// The normal matrix of a lens, factorized, with which the merit of others is predicted.
+struct Predictor {
+    merit: Merit,
+    factors: Cholesky<f64, Dyn>,
+}
+
+impl Predictor {
+    fn new(lens: &Lens, goal: &Goal, light: &[Vec<f64>]) -> Result<Self, MeritError> {
+        let goal = Goal { limits: LimitTreatment::Penalties, ..goal.clone() };
+        let (mut lens, rows) = (lens.clone(), sites(lens));
+        without_indices(&mut lens, &rows);
+        let merit = Merit::new(&lens, &goal, PREDICTION_TOLERANCE)?.with_initial_light(light);
+        let sum = merit.evaluate(&merit.values(&lens), DerivativeLevel::Normal)?;
+        let mut matrix = sum.normal;
+        let smallest = f64::MIN_POSITIVE.max(1e-12 * matrix.diagonal().amax());
+        for i in 0..matrix.nrows() {
+            matrix[(i, i)] += DAMPING * matrix[(i, i)] + smallest;
+        }
+        let factors = matrix.cholesky().ok_or(MeritError::NoVariables)?;
+        Ok(Self { merit, factors })
+    }
+
+    /// The merit of a lens with another glass after one step; `None` if it has none.
+    fn predict(&self, exchanged: Exchanged) -> Option<Exchanged> {
+        let Exchanged { exchange, lens } = exchanged;
+        let merit = self.merit.with_lens(&lens).ok()?;
+        let values = merit.values(&lens);
+        let sum = merit.evaluate(&values, DerivativeLevel::Gradient).ok()?;
+        let step = self.factors.solve(&(-0.5 * sum.gradient));
+        let stepped = within_bounds(&merit, &values, &step);
+        let found = merit.value(&stepped).unwrap_or(f64::INFINITY);
+        if found < sum.value {
+            Some(with_prediction(exchange, merit.lens(&stepped), found))
+        } else {
+            Some(with_prediction(exchange, lens, sum.value))
+        }
+    }
+}
+
+fn with_prediction(exchange: GlassExchange, lens: Lens, merit: f64) -> Exchanged {
+    Exchanged { exchange: GlassExchange { predicted: Some(merit), ..exchange }, lens }
+}
+
+/// Values after a step, within the bounds of the variables.
+fn within_bounds(merit: &Merit, values: &[f64], step: &DVector<f64>) -> Vec<f64> {
+    let variables = merit.variables().iter().zip(values.iter().zip(step.iter()));
+    let bounded = |(variable, (value, step)): (&crate::lens::Variable, (&f64, &f64))| {
+        let to = value + step;
+        to.max(variable.min.unwrap_or(f64::NEG_INFINITY)).min(variable.max.unwrap_or(f64::INFINITY))
+    };
+    variables.map(bounded).collect()
+}
+
+/// The next exchanges, taken from the end of those that wait: not too many at one surface.
+fn choose(waiting: &mut Vec<Exchanged>) -> Vec<Exchanged> {
+    let mut chosen: Vec<Exchanged> = Vec::new();
+    let mut left = Vec::new();
+    while chosen.len() < TRIALS {
+        let Some(next) = waiting.pop() else { break };
+        let is_there = |other: &&Exchanged| other.exchange.surface == next.exchange.surface;
+        if chosen.iter().filter(is_there).count() < TRIALS_OF_SURFACE {
+            chosen.push(next);
+        } else {
+            left.push(next);
+        }
+    }
+    waiting.extend(left.into_iter().rev());
+    chosen
+}
+
+/// True if a glass is a model.
+fn is_model(medium: &Medium) -> bool {
+    matches!(medium, Medium::Model { .. })
+}
+
+fn has_model_glass(lens: &Lens) -> bool {
+    lens.surfaces.iter().any(|row| is_model(&row.medium))
+}
+
+/// The rows whose glass is exchanged: the first model glass, or else all glasses of the catalogue.
+fn sites(lens: &Lens) -> Vec<usize> {
+    let of = |is_it: fn(&Medium) -> bool| {
+        let rows = lens.surfaces.iter().enumerate();
+        rows.filter(move |(_, row)| is_it(&row.medium)).map(|(i, _)| i)
+    };
+    match of(is_model).next() {
+        Some(first) => vec![first],
+        None => of(|medium| matches!(medium, Medium::Glass(_))).collect(),
+    }
+}
+
+/// The lens with another glass behind a row, and with the powers of its two surfaces as they were;
+/// `None` if it is the same glass, or the lens cannot have it.
+fn exchanged(lens: &Lens, row: usize, glass: &Glass) -> Option<Exchanged> {
+    let to = glass.full_name();
+    let from = match &lens.surfaces[row].medium {
+        Medium::Glass(name) => glass::find(name).map_or_else(|| name.clone(), Glass::full_name),
+        Medium::Model { nd, vd } => format!("nd {nd}, vd {vd}"),
+        _ => return None,
+    };
+    if from == to {
+        return None;
+    }
+    let mut other = lens.clone();
+    other.surfaces[row].medium = Medium::Glass(to.clone());
+    without_indices(&mut other, &[row]);
+    hold_powers(&mut other, lens, row)?;
+    let other = other.with_pickups().ok()?;
+    other.check().ok()?;
+    let surface = SurfaceNumber::new(row);
+    let exchange = GlassExchange { surface, from, to, predicted: None, merit: None };
+    Some(Exchanged { exchange, lens: other })
+}
+
+/// Takes the indices behind some rows from the variables: a glass of the catalogue has none that varies.
+fn without_indices(lens: &mut Lens, rows: &[usize]) {
+    let is_index = |parameter: Parameter| {
+        parameter.quantity == Quantity::Index && rows.contains(&parameter.surface)
+    };
+    lens.variables.retain(|variable| !is_index(variable.parameter));
+}
+
+/// Bends the surfaces around a gap whose curvatures are variables, so that they keep their powers.
+fn hold_powers(lens: &mut Lens, before: &Lens, gap: usize) -> Option<()> {
+    let um = before.wavelengths[before.primary()].um;
+    let [old, new] = [before.resolve(0, um).ok()?, lens.resolve(0, um).ok()?];
+    let step = |system: &System<f64>, surface: usize| {
+        let front = surface.checked_sub(1).map(|i| system.surfaces[i].index);
+        system.surfaces[surface].index - front.unwrap_or(system.index_before)
+    };
+    for surface in [gap, gap + 1].into_iter().filter(|i| *i < before.surfaces.len()) {
+        let curvature = Parameter::new(surface, Quantity::Curvature);
+        let ratio = step(&old, surface) / step(&new, surface);
+        let is_bent = (1.0 / LARGEST_BENDING..LARGEST_BENDING).contains(&ratio);
+        let variable = before.variables.iter().find(|variable| variable.parameter == curvature);
+        if let Some(variable) = variable.filter(|_| is_bent) {
+            let bent = ratio * before.surfaces[surface].curvature;
+            let low = variable.min.unwrap_or(f64::NEG_INFINITY);
+            lens.surfaces[surface].curvature =
+                bent.max(low).min(variable.max.unwrap_or(f64::INFINITY));
+        }
+    }
+    Some(())
+}
