@@ -123,7 +123,7 @@ impl Studio {
         self.update_title(ui.ctx(), &view);
         self.remember_design(&view);
         let mut actions = Actions::default();
-        let menus = menu_context(&self.dock, &self.recent, &view, ui.ctx());
+        let menus = menu_context(&self.dock, &self.dialogs, (&self.recent, &view), ui.ctx());
         menu::shortcuts(ui, &menus, self.dock.is_typing(ui.ctx()), &mut actions);
         bar_frame(ui, Side::top("menu"), |ui| menu::bar(ui, &menus, &mut actions));
         self.dialogs.ui(ui.ctx(), &menus, &mut actions);
@@ -147,7 +147,7 @@ impl Studio {
             UiAction::OpenBundled(bundled) => self.open_bundled(context, bundled),
             UiAction::OpenLibrary(lens, scale) => self.open_library_lens(context, lens, scale),
             UiAction::ShowDialog(kind) => {
-                let menus = menu_context(&self.dock, &self.recent, view, context);
+                let menus = menu_context(&self.dock, &self.dialogs, (&self.recent, view), context);
                 self.dialogs.open(kind, &menus);
                 context.request_repaint();
             }
@@ -366,8 +366,8 @@ impl App for Studio {
 /// The state on which the items of the menus depend.
 fn menu_context<'a>(
     dock: &Dock,
-    recent: &'a [PathBuf],
-    view: &'a SessionView,
+    dialogs: &Dialogs,
+    (recent, view): (&'a [PathBuf], &'a SessionView),
     context: &Context,
 ) -> MenuContext<'a> {
     let panels = PanelKind::ALL.map(|kind| PanelState {
@@ -377,7 +377,8 @@ fn menu_context<'a>(
     });
     let front = dock.front();
     let maximized = dock.maximized().is_some();
-    MenuContext { view, panels: panels.into(), front, maximized, recent, theme: context.theme() }
+    let (theme, has_preview) = (context.theme(), dialogs.has_preview());
+    MenuContext { view, panels: panels.into(), front, maximized, recent, theme, has_preview }
 }
 
 /// The path with which a file dialog starts.

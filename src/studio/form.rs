@@ -1,6 +1,6 @@
 //! Fields of the dialogs: numbers that are dragged or typed, and choices from a few.
 
-use egui::{ComboBox, Context, DragValue, Frame, Key, Margin, Response, Ui};
+use egui::{ComboBox, Context, DragValue, Frame, InnerResponse, Key, Margin, Response, Ui};
 
 use super::number;
 use super::text_input::select_whole;
@@ -58,5 +58,17 @@ pub(super) fn choice<T: PartialEq + Copy>(
             }
         }
     });
+    return_cursor(ui, &shown);
     shown.response.accessible_name(name);
+}
+
+/// Gives the cursor to the button of a list that a key has just closed, so that the next Tab goes on from
+/// there and not from the first field of the dialog.
+fn return_cursor<T>(ui: &Ui, list: &InnerResponse<Option<T>>) {
+    let was_open = list.inner.is_some();
+    let closes = |key| ui.input(|input| input.key_pressed(key));
+    let by_key = [Key::Escape, Key::Enter, Key::Space].into_iter().any(closes);
+    if was_open && by_key && !ComboBox::is_open(ui.ctx(), list.response.id) {
+        list.response.request_focus();
+    }
 }

@@ -43,7 +43,7 @@ pub(super) fn bar(ui: &mut Ui, menus: &MenuContext<'_>, actions: &mut Actions) {
         undo_buttons(ui, menus.view, actions);
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
             theme_button(ui);
-            candidate_bar(ui, menus.view, actions);
+            candidate_bar(ui, menus, actions);
         });
     });
 }
