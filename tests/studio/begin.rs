@@ -288,6 +288,22 @@ fn scaling_is_shown_before_it_is_done() {
     assert_eq!(*lens(&harness), achromat());
 }
 
+/// At 800 points of height every panel and every setting of the menu is within the window.
+#[test]
+fn the_menu_of_views_fits_into_a_small_window() {
+    let mut harness = window(achromat());
+    press(&mut harness, "View");
+    let is_inside = |node: egui_kittest::Node<'_>| {
+        let rect = node.rect();
+        rect.top() >= 0.0 && rect.bottom() <= 800.0
+    };
+    assert!(harness.get_all_by_label_contains("Layout").all(is_inside));
+    assert!(harness.get_all_by_label_contains("Import report").all(is_inside));
+    assert!(is_inside(harness.get_by_label("Default arrangement")));
+    press_item(&mut harness, "Settings");
+    assert!(is_inside(harness.get_by_label("51 rays of each field in the layout")));
+}
+
 /// A file that was saved under a new name, or named at the start, is a recent one.
 #[test]
 fn a_file_is_recent_however_it_became_that_of_the_design() {
