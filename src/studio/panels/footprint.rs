@@ -116,6 +116,7 @@ fn outlines(ui: &mut Ui, found: &FieldFootprints, (surface, rim): (usize, Option
     let palette = Palette::for_visuals(ui.visuals());
     let height = (ui.available_height() - 4.0).max(LOWEST);
     let plot = fixed_plot(ui, "footprint", height).data_aspect(1.0);
+    let plot = plot.x_axis_label("x, mm").y_axis_label("y, mm");
     let shown = plot.show(ui, |plot| {
         if let Some(rim) = rim {
             let corner = |i: usize| {
