@@ -27,8 +27,8 @@ use super::window::Persistence;
 use crate::files;
 use crate::files::{BundledLens, LibraryLens};
 use crate::session::{
-    Command, DocumentSource, GrinCommand, Message, Session, SessionEvent, SessionView, Severity,
-    StructureSearchCommand,
+    Analyses, AnalysisSettings, Command, DocumentSource, GrinCommand, Message, Session,
+    SessionEvent, SessionView, Severity, StructureSearchCommand,
 };
 
 /// The key under which the arrangement of the panels is stored.
@@ -502,15 +502,45 @@ fn message_label(ui: &mut Ui, message: &Message) -> Response {
 }
 
 fn timing_text(view: &SessionView) -> String {
-    match &view.results {
-        Some(results) if view.is_current() => format!("all numbers in {:.1} ms", results.ms),
-        _ => "computing…".to_owned(),
+    let Some(results) = view.results.as_ref().filter(|_| view.is_current()) else {
+        return "computing…".to_owned();
+    };
+    let found = results.analyses.as_ref().ok();
+    match found.and_then(|found| pending_numbers(&view.settings, found)) {
+        Some(name) => format!("computing the {name}…"),
+        None => format!("all numbers in {:.1} ms", results.ms),
     }
+}
+
+/// The numbers that a visible panel waits for after the others are there.
+fn pending_numbers(settings: &AnalysisSettings, found: &Analyses) -> Option<&'static str> {
+    let waits = [
+        (settings.contrasts && found.contrasts.is_none(), "MTF"),
+        (settings.wavefronts && found.wavefronts.is_none(), "wavefronts"),
+        (settings.field_curves && found.field_curves.is_none(), "field curves"),
+        (settings.spot_map && found.spot_map.is_none(), "spot over the field"),
+        (settings.ghosts && found.ghosts.is_none(), "ghosts"),
+        (settings.tolerances && found.as_built.is_none(), "tolerances"),
+        (settings.picture && found.picture.is_none(), "picture"),
+    ];
+    waits.into_iter().find_map(|(waits, name)| waits.then_some(name))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::session::analyze;
+
+    #[test]
+    fn numbers_that_a_visible_panel_waits_for_are_named() {
+        let bundled = &files::bundled_lenses()[0];
+        let lens = files::parse(bundled.text.as_bytes(), bundled.name).unwrap().lens;
+        let settings = AnalysisSettings::default();
+        let found = analyze(&lens, &settings).unwrap();
+        assert_eq!(pending_numbers(&settings, &found), None);
+        let shown = AnalysisSettings { ghosts: true, ..settings };
+        assert_eq!(pending_numbers(&shown, &found), Some("ghosts"));
+    }
 
     #[test]
     fn a_lens_without_a_file_proposes_its_name() {
