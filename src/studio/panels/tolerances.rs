@@ -251,7 +251,7 @@ fn summary(ui: &mut Ui, made: &AsBuiltLens) {
     let um = |mm: f64| format!("{} µm", number::format_digits(1e3 * mm, 3));
     let mut rows: Vec<(String, [String; 2])> = vec![
         ("As designed".into(), spots.each_ref().map(|s| um(s.nominal_rms))),
-        ("Mean rms".into(), spots.each_ref().map(|s| with_error(s.mean_rms))),
+        ("Mean RMS".into(), spots.each_ref().map(|s| with_error(s.mean_rms))),
     ];
     for (i, quantile) in spots[0].quantiles.iter().enumerate() {
         let name = format!("{:.0} % of the lenses, at most", 100.0 * quantile.share);
