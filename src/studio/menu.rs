@@ -1,8 +1,8 @@
 //! The menu bar and its keys.
 
 use egui::{
-    Align, Atom, Button, Checkbox, Key, KeyboardShortcut, Layout, MenuBar, Modifiers, RichText,
-    ScrollArea, Theme, Ui,
+    Align, Atom, Atoms, Button, Checkbox, Key, KeyboardShortcut, Layout, MenuBar, Modifiers,
+    RichText, ScrollArea, Theme, Ui,
 };
 
 use super::actions::Actions;
@@ -120,8 +120,11 @@ fn panel_columns(ui: &mut Ui, mut panels: Vec<MenuItem>, actions: &mut Actions) 
 /// Shows an item that is on or off, with its mark; its explanation stands right of the edge of the menu.
 fn show_switch(ui: &mut Ui, item: MenuItem, edge: f32, actions: &mut Actions) {
     let mut checked = item.checked == Some(true);
-    let keys = item.shortcut.map(|key| ui.ctx().format_shortcut(&key)).unwrap_or_default();
-    let text = (item.title.as_str(), Atom::grow(), RichText::new(keys).weak());
+    let mut text = Atoms::new(item.title.as_str());
+    if let Some(key) = &item.shortcut {
+        text.push_right(Atom::grow());
+        text.push_right(RichText::new(ui.ctx().format_shortcut(key)).weak());
+    }
     let mut response = ui.add_enabled(item.is_enabled(), Checkbox::new(&mut checked, text));
     if !item.hint.is_empty() {
         response = hint_right_of(response, edge, item.hint);
