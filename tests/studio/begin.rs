@@ -263,6 +263,23 @@ fn escape_in_a_list_leaves_the_dialog_of_an_element_open() {
     assert!(harness.query_by_label("Apply").is_none());
 }
 
+/// A list of a panel is used by keys alone: what Enter chooses closes it, and Tab goes on from its button.
+#[test]
+fn a_key_that_chooses_from_a_list_closes_it() {
+    let mut harness = panel(SystemPanel::default(), achromat());
+    harness.get_by_label("Field kind").focus();
+    harness.run_steps(2);
+    harness.key_press(Key::Space);
+    harness.run_steps(3);
+    harness.get_by_label("Paraxial image height").focus();
+    harness.run_steps(2);
+    harness.key_press(Key::Enter);
+    harness.run_steps(3);
+    assert!(!harness.state().commands.is_empty(), "it is chosen");
+    assert!(harness.query_by_label("Paraxial image height").is_none(), "the list is closed");
+    assert!(harness.get_by_label("Field kind").is_focused());
+}
+
 /// What a dialog would give is applied or left there, and not made the design behind its back.
 #[test]
 fn the_preview_of_a_dialog_is_accepted_in_the_dialog_alone() {

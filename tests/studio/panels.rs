@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use aplanat::effects::{Effect, EffectOverride};
 use aplanat::lens::{Aperture, Edit, Lens, Medium, Object, Parameter, Quantity, Row, Variable};
-use aplanat::merit::{Goal, PupilEdge, Term};
+use aplanat::merit::{Goal, PupilEdge, Term, WeightedTerm};
 use aplanat::optimize::{DescentMethod, OptimizationEnd, OptimizationProgress, pareto};
 use aplanat::session::{
     Analyses, Command, HandleSlopes, MeritReport, MeritSlopes, MeritValues, OptimizationRequest,
@@ -243,6 +243,23 @@ fn optimizer(view: SessionView) -> Harness<'static, PanelState<OptimizerPanel>> 
     let mut harness = panel_harness(OptimizerPanel::default(), view);
     harness.run();
     harness
+}
+
+/// A bound of a twentieth of a millimetre is read to its last digit.
+#[test]
+fn the_numbers_of_the_merit_function_fit_into_their_fields() {
+    let mut view = view();
+    let mut goal = Goal::default_for(&view.lens).unwrap();
+    goal.terms = vec![WeightedTerm::new(Term::AirEdge(0.049_388), 0.975_66)];
+    view.goal = Some(Arc::new(goal));
+    let harness = optimizer(view);
+    for (name, text) in [("Minimum of Air edge", "0.0494"), ("Weight of Air edge", "0.9757")] {
+        let cell = harness.get_by_label(name).rect();
+        let galleys = painted_galleys(&harness);
+        let number = galleys.iter().find(|galley| galley.text() == text).unwrap();
+        // The frame of a field has a line and a margin of four points on each side.
+        assert!(number.size().x + 10.0 <= cell.width(), "{text} in {cell:?}");
+    }
 }
 
 #[test]

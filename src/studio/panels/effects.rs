@@ -7,6 +7,7 @@ use super::{Panel, displayed_results, show_missing_results};
 use crate::effects::{EffectCost, EffectDecision, EffectOverride, EffectPlan};
 use crate::session::{Command, SessionView};
 use crate::studio::actions::Actions;
+use crate::studio::form::named_list;
 use crate::studio::number;
 use crate::studio::text::{capitalize, micrometres};
 
@@ -78,7 +79,7 @@ fn override_menu(
             }
         });
         let label = format!("Choice of {}", decision.effect.name());
-        combo.response.accessible_name(label).on_hover_text("Auto follows the plan for this lens");
+        named_list(ui, combo, label).on_hover_text("Auto follows the plan for this lens");
     });
     if chosen != old {
         actions.push(Command::SetEffect(decision.effect, chosen));
