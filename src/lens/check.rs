@@ -1,9 +1,9 @@
 //! Checks of a lens as written, before anything is computed from it.
 
 use super::{Aperture, FieldKind, Goal, Lens, Medium, MediumPlace, Object};
-use super::{Parameter, Quantity, Row, SurfaceNumber, SystemError, ZoomNumber};
+use super::{Parameter, Quantity, Row, SurfaceNumber, SystemError, Variable, ZoomNumber};
 use crate::lens::glass;
-use crate::math::format_short;
+use crate::math::{ShortNumber, format_short};
 use std::fmt;
 
 /// The expected value of a number that is not otherwise limited.
@@ -89,6 +89,27 @@ pub(super) fn check_number(
     } else {
         Err(LensError::InvalidNumber { what: what.to_string(), found, expected })
     }
+}
+
+/// The reason why a variable is not within its bounds, which it names. A curvature is told as a radius, too,
+/// which is how the window shows it.
+fn beyond_bounds(variable: &Variable, value: f64) -> String {
+    let [value_text, low, high] = [Some(value), variable.min, variable.max]
+        .map(|number| number.map(|number| ShortNumber(number).to_string()));
+    let bounds = match (low, high) {
+        (Some(low), Some(high)) => format!("{low} to {high}"),
+        (Some(low), None) => format!("at least {low}"),
+        (None, Some(high)) => format!("at most {high}"),
+        (None, None) => "a finite number".to_owned(),
+    };
+    let is_curvature = variable.parameter.quantity == Quantity::Curvature && value != 0.0;
+    let radius = if is_curvature {
+        format!(", a radius of {} mm", ShortNumber(1.0 / value))
+    } else {
+        String::new()
+    };
+    let value = value_text.unwrap_or_default();
+    format!("{} is {value}{radius}; expected {bounds}, its bounds", variable.parameter)
 }
 
 impl Lens {
@@ -261,6 +282,9 @@ impl Lens {
                 check_number(what, low, low <= high, "at most the upper bound")?;
             }
             let inside = min.is_none_or(|low| value >= low) && max.is_none_or(|high| value <= high);
+            if value.is_finite() && !inside {
+                return Err(LensError::Inconsistent(beyond_bounds(variable, value)));
+            }
             check_number(name, value, inside, "a value between its bounds")?;
         }
         Ok(())

@@ -27,8 +27,8 @@ use super::window::Persistence;
 use crate::files;
 use crate::files::{BundledLens, LibraryLens};
 use crate::session::{
-    Command, DocumentSource, GrinCommand, Message, Session, SessionEvent, SessionView, Severity,
-    StructureSearchCommand,
+    Analyses, AnalysisSettings, Command, DocumentSource, GrinCommand, Message, Session,
+    SessionEvent, SessionView, Severity, StructureSearchCommand,
 };
 
 /// The key under which the arrangement of the panels is stored.
@@ -123,7 +123,7 @@ impl Studio {
         self.update_title(ui.ctx(), &view);
         self.remember_design(&view);
         let mut actions = Actions::default();
-        let menus = menu_context(&self.dock, &self.recent, &view, ui.ctx());
+        let menus = menu_context(&self.dock, &self.dialogs, (&self.recent, &view), ui.ctx());
         menu::shortcuts(ui, &menus, self.dock.is_typing(ui.ctx()), &mut actions);
         bar_frame(ui, Side::top("menu"), |ui| menu::bar(ui, &menus, &mut actions));
         self.dialogs.ui(ui.ctx(), &menus, &mut actions);
@@ -147,7 +147,7 @@ impl Studio {
             UiAction::OpenBundled(bundled) => self.open_bundled(context, bundled),
             UiAction::OpenLibrary(lens, scale) => self.open_library_lens(context, lens, scale),
             UiAction::ShowDialog(kind) => {
-                let menus = menu_context(&self.dock, &self.recent, view, context);
+                let menus = menu_context(&self.dock, &self.dialogs, (&self.recent, view), context);
                 self.dialogs.open(kind, &menus);
                 context.request_repaint();
             }
@@ -366,8 +366,8 @@ impl App for Studio {
 /// The state on which the items of the menus depend.
 fn menu_context<'a>(
     dock: &Dock,
-    recent: &'a [PathBuf],
-    view: &'a SessionView,
+    dialogs: &Dialogs,
+    (recent, view): (&'a [PathBuf], &'a SessionView),
     context: &Context,
 ) -> MenuContext<'a> {
     let panels = PanelKind::ALL.map(|kind| PanelState {
@@ -377,7 +377,8 @@ fn menu_context<'a>(
     });
     let front = dock.front();
     let maximized = dock.maximized().is_some();
-    MenuContext { view, panels: panels.into(), front, maximized, recent, theme: context.theme() }
+    let (theme, has_preview) = (context.theme(), dialogs.has_preview());
+    MenuContext { view, panels: panels.into(), front, maximized, recent, theme, has_preview }
 }
 
 /// The path with which a file dialog starts.
@@ -501,15 +502,45 @@ fn message_label(ui: &mut Ui, message: &Message) -> Response {
 }
 
 fn timing_text(view: &SessionView) -> String {
-    match &view.results {
-        Some(results) if view.is_current() => format!("all numbers in {:.1} ms", results.ms),
-        _ => "computing…".to_owned(),
+    let Some(results) = view.results.as_ref().filter(|_| view.is_current()) else {
+        return "computing…".to_owned();
+    };
+    let found = results.analyses.as_ref().ok();
+    match found.and_then(|found| pending_numbers(&view.settings, found)) {
+        Some(name) => format!("computing the {name}…"),
+        None => format!("all numbers in {:.1} ms", results.ms),
     }
+}
+
+/// The numbers that a visible panel waits for after the others are there.
+fn pending_numbers(settings: &AnalysisSettings, found: &Analyses) -> Option<&'static str> {
+    let waits = [
+        (settings.contrasts && found.contrasts.is_none(), "MTF"),
+        (settings.wavefronts && found.wavefronts.is_none(), "wavefronts"),
+        (settings.field_curves && found.field_curves.is_none(), "field curves"),
+        (settings.spot_map && found.spot_map.is_none(), "spot over the field"),
+        (settings.ghosts && found.ghosts.is_none(), "ghosts"),
+        (settings.tolerances && found.as_built.is_none(), "tolerances"),
+        (settings.picture && found.picture.is_none(), "picture"),
+    ];
+    waits.into_iter().find_map(|(waits, name)| waits.then_some(name))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::session::analyze;
+
+    #[test]
+    fn numbers_that_a_visible_panel_waits_for_are_named() {
+        let bundled = &files::bundled_lenses()[0];
+        let lens = files::parse(bundled.text.as_bytes(), bundled.name).unwrap().lens;
+        let settings = AnalysisSettings::default();
+        let found = analyze(&lens, &settings).unwrap();
+        assert_eq!(pending_numbers(&settings, &found), None);
+        let shown = AnalysisSettings { ghosts: true, ..settings };
+        assert_eq!(pending_numbers(&shown, &found), Some("ghosts"));
+    }
 
     #[test]
     fn a_lens_without_a_file_proposes_its_name() {

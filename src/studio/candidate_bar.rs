@@ -4,13 +4,15 @@
 use egui::{Align, Button, CornerRadius, Frame, Label, Layout, Margin, RichText, Ui};
 
 use super::actions::Actions;
+use super::menu_items::MenuContext;
 use super::number;
 use super::panels::mean_spot;
 use crate::lens::Lens;
 use crate::session::{AnalysisResults, CandidateSource, CandidateView, Command, SessionView};
 
 /// Shows the candidate while there is one, and the lenses that were kept, from the right to the left.
-pub(super) fn candidate_bar(ui: &mut Ui, view: &SessionView, actions: &mut Actions) {
+pub(super) fn candidate_bar(ui: &mut Ui, menus: &MenuContext<'_>, actions: &mut Actions) {
+    let view = menus.view;
     if view.candidate.is_none() && view.kept.is_empty() {
         return;
     }
@@ -24,16 +26,16 @@ pub(super) fn candidate_bar(ui: &mut Ui, view: &SessionView, actions: &mut Actio
         ui.spacing_mut().item_spacing.x = 4.0;
         kept_menu(ui, view, actions);
         if let Some(candidate) = &view.candidate {
-            buttons(ui, candidate, actions);
+            buttons(ui, candidate, menus.has_preview, actions);
             // The text takes what the buttons leave.
             ui.with_layout(Layout::left_to_right(Align::Center), |ui| {
-                describe(ui, view, candidate);
+                describe(ui, view, candidate, menus.has_preview);
             });
         }
     });
 }
 
-fn describe(ui: &mut Ui, view: &SessionView, candidate: &CandidateView) {
+fn describe(ui: &mut Ui, view: &SessionView, candidate: &CandidateView, has_preview: bool) {
     let spot = |results: &Option<std::sync::Arc<AnalysisResults>>| {
         let analyses = results.as_ref()?.analyses.as_ref().ok()?;
         mean_spot(analyses).map(|mm| format!("{} µm", number::format_digits(1e3 * mm, 4)))
@@ -42,7 +44,8 @@ fn describe(ui: &mut Ui, view: &SessionView, candidate: &CandidateView) {
     let text = if candidate.shown {
         let numbers = [spot(&view.preview_results), own].into_iter().flatten();
         let numbers = numbers.collect::<Vec<_>>().join(", ");
-        format!("Candidate: {}, {numbers}", candidate.title)
+        let what = if has_preview { "Preview of the dialog" } else { "Candidate" };
+        format!("{what}: {}, {numbers}", candidate.title)
     } else {
         format!("The design; a candidate waits: {}", candidate.title)
     };
@@ -53,7 +56,8 @@ fn describe(ui: &mut Ui, view: &SessionView, candidate: &CandidateView) {
     ui.add(Label::new(RichText::new(text).strong()).truncate()).on_hover_text(hint);
 }
 
-fn buttons(ui: &mut Ui, candidate: &CandidateView, actions: &mut Actions) {
+/// Shows the choices. What an open dialog would give is applied or left in that dialog.
+fn buttons(ui: &mut Ui, candidate: &CandidateView, has_preview: bool, actions: &mut Actions) {
     let discard = match candidate.source {
         CandidateSource::Optimization => "End the optimization and discard its lens",
         CandidateSource::Chosen | CandidateSource::Search => {
@@ -77,7 +81,10 @@ fn buttons(ui: &mut Ui, candidate: &CandidateView, actions: &mut Actions) {
     ];
     // The bar is filled from the right.
     for (text, command, hint) in choices.into_iter().rev() {
-        if ui.add(Button::new(text).small()).on_hover_text(hint).clicked() {
+        let is_offered = !has_preview || matches!(command, Command::ShowCandidate(_));
+        let button = ui.add_enabled(is_offered, Button::new(text).small());
+        let button = button.on_disabled_hover_text("Apply or cancel it in its dialog");
+        if button.on_hover_text(hint).clicked() {
             actions.push(command);
         }
     }

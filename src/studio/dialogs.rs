@@ -1,6 +1,6 @@
 //! The dialogs of the window, at most one of each kind at a time.
 
-use egui::{Context, Key};
+use egui::{Context, Key, Popup};
 
 use super::actions::Actions;
 use super::command_palette::CommandPalette;
@@ -37,6 +37,8 @@ pub(super) struct Dialogs {
     library: Option<LibraryWindow>,
     manual: ManualWindow,
     shows_shortcuts: bool,
+    /// True if a list or a menu was open in the frame before: Escape closes it and nothing else.
+    had_list: bool,
 }
 
 impl Dialogs {
@@ -56,8 +58,9 @@ impl Dialogs {
 
     /// Shows all dialogs that are open.
     pub(super) fn ui(&mut self, context: &Context, menus: &MenuContext<'_>, actions: &mut Actions) {
-        // Escape in a text field leaves the field; the next one closes the dialogs.
+        // Escape belongs to what keeps it to itself, such as a handle of the layout, and to an open list.
         let escapes = !context.egui_wants_keyboard_input()
+            && !self.had_list
             && context.input(|input| input.key_pressed(Key::Escape));
         if self.new_lens.as_mut().is_some_and(|dialog| dialog.ui(context, actions)) {
             self.new_lens = None;
@@ -78,6 +81,12 @@ impl Dialogs {
         if escapes {
             self.close_windows(actions);
         }
+        self.had_list = Popup::is_any_open(context);
+    }
+
+    /// True while the drawings show what an open dialog would give: it alone accepts or discards that.
+    pub(super) fn has_preview(&self) -> bool {
+        self.element.as_ref().is_some_and(ElementDialog::has_preview)
     }
 
     /// Closes the dialogs that leave the rest of the window usable.

@@ -7,6 +7,7 @@ use super::actions::Actions;
 use super::form::{choice, enter_number, is_confirmed, number_field};
 use super::number;
 use super::text::capitalize;
+use crate::files::focal_length_factor;
 use crate::lens::{Edit, ElementEdit, ElementForm, Lens, Medium, NewElement, apply_edit};
 use crate::session::{Analyses, Command, SessionView};
 
@@ -86,6 +87,11 @@ impl ElementDialog {
         ended
     }
 
+    /// True once what the dialog would give has been shown.
+    pub(super) const fn has_preview(&self) -> bool {
+        self.shown.is_some()
+    }
+
     /// Shows the design again in place of what the dialog would give.
     pub(super) fn end_preview(&self, actions: &mut Actions) {
         if self.shown.is_some() {
@@ -158,10 +164,14 @@ impl ElementDialog {
         ui.end_row();
     }
 
-    /// The edit that the numbers stand for; scaling is a command of its own.
-    fn edit(&self, lens: &Lens) -> Result<Option<Edit>, String> {
+    /// The edit that the numbers stand for.
+    fn edit(&self, view: &SessionView) -> Result<Edit, String> {
+        let lens = &view.lens;
         let edit = match self.task {
-            ElementTask::Scale => return Ok(None),
+            ElementTask::Scale => {
+                let factor = focal_length_factor(lens, view.settings.zoom, self.focal_length);
+                return factor.map(Edit::Scale).map_err(|why| why.to_string());
+            }
             ElementTask::Move(surface) => ElementEdit::Move { surface, by: self.by },
             ElementTask::Bend(surface) => ElementEdit::Bend { surface, by: self.by },
             ElementTask::Add => {
@@ -172,24 +182,28 @@ impl ElementDialog {
                 ElementEdit::Insert { at: self.at, rows }
             }
         };
-        Ok(Some(Edit::Element(edit)))
+        Ok(Edit::Element(edit))
+    }
+
+    /// The command that carries the edit out; scaling is one that names the focal length.
+    fn command(&self, edit: Edit) -> Command {
+        match self.task {
+            ElementTask::Scale => Command::ScaleToFocalLength(self.focal_length),
+            _ => edit.into(),
+        }
     }
 
     /// Shows the result in the drawings, and the buttons; true if one of them was pressed.
     fn finish(&mut self, ui: &mut Ui, view: &SessionView, actions: &mut Actions) -> bool {
-        let edit = self.edit(&view.lens);
-        let tried = edit.and_then(|edit| match edit {
-            None => Ok(None),
-            Some(edit) => {
-                let lens = apply_edit(&view.lens, &edit).map_err(|why| why.to_string())?;
-                Ok(Some((edit, lens)))
-            }
+        let tried = self.edit(view).and_then(|edit| {
+            let lens = apply_edit(&view.lens, &edit).map_err(|why| why.to_string())?;
+            Ok((edit, lens))
         });
         match &tried {
             Err(why) => {
                 ui.label(RichText::new(capitalize(why)).color(ui.visuals().warn_fg_color));
             }
-            Ok(Some((edit, lens))) if self.shown.as_ref() != Some(edit) => {
+            Ok((edit, lens)) if self.shown.as_ref() != Some(edit) => {
                 actions.push(Command::Preview(Some(Box::new(lens.clone()))));
                 self.shown = Some(edit.clone());
             }
@@ -198,13 +212,10 @@ impl ElementDialog {
         let mut pressed = false;
         ui.horizontal(|ui| {
             let apply = ui.add_enabled(tried.is_ok(), Button::new("Apply")).clicked();
-            if apply || (tried.is_ok() && is_confirmed(ui)) {
+            let is_asked = apply || is_confirmed(ui);
+            if let Some((edit, _)) = tried.ok().filter(|_| is_asked) {
                 pressed = true;
-                let command = match &tried {
-                    Ok(Some((edit, _))) => edit.clone().into(),
-                    _ => Command::ScaleToFocalLength(self.focal_length),
-                };
-                actions.push(command);
+                actions.push(self.command(edit));
             }
             pressed |= ui.button("Cancel").clicked();
         });

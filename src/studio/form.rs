@@ -1,6 +1,6 @@
 //! Fields of the dialogs: numbers that are dragged or typed, and choices from a few.
 
-use egui::{ComboBox, Context, DragValue, Frame, Key, Margin, Response, Ui};
+use egui::{ComboBox, Context, DragValue, Frame, InnerResponse, Key, Margin, Popup, Response, Ui};
 
 use super::number;
 use super::text_input::select_whole;
@@ -50,13 +50,36 @@ pub(super) fn choice<T: PartialEq + Copy>(
 ) {
     let title = all.iter().find(|(value, _)| value == chosen).map_or("", |(_, title)| *title);
     let combo = ComboBox::from_id_salt(name).selected_text(title).width(190.0);
-    let shown = combo.show_ui(ui, |ui| {
+    let list = combo.show_ui(ui, |ui| {
         for (value, title) in all {
-            // A pointer closes the list by itself, a key does not.
-            if ui.selectable_value(chosen, *value, *title).clicked() {
-                ui.close();
-            }
+            ui.selectable_value(chosen, *value, *title);
         }
     });
-    shown.response.accessible_name(name);
+    named_list(ui, list, name);
+}
+
+/// Names the button of a list, and lets keys use the list as a pointer does: Enter and Space close it when
+/// they choose, and the button has the cursor afterwards, so that the next Tab goes on from there.
+pub(super) fn named_list<T>(
+    ui: &Ui,
+    list: InnerResponse<Option<T>>,
+    name: impl Into<String>,
+) -> Response {
+    let InnerResponse { inner, response: button } = list;
+    if inner.is_some() {
+        close_by_key(ui, &button);
+    }
+    button.accessible_name(name)
+}
+
+/// Closes the list of a button after a key that chooses, and gives the cursor back after one that closes.
+fn close_by_key(ui: &Ui, button: &Response) {
+    let pressed = |key| ui.input(|input| input.key_pressed(key));
+    // The key that opens the list is pressed on its button.
+    if (pressed(Key::Enter) || pressed(Key::Space)) && !button.clicked() {
+        Popup::close_id(ui.ctx(), Popup::default_response_id(button));
+        button.request_focus();
+    } else if pressed(Key::Escape) {
+        button.request_focus();
+    }
 }

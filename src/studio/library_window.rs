@@ -10,7 +10,7 @@ use egui::{
 };
 
 use super::actions::{Actions, UiAction};
-use super::form::number_field;
+use super::form::{named_list, number_field};
 use super::text::{counted, degrees};
 use super::thumbnails::Thumbnails;
 use crate::files::{LibraryLens, LibraryQuery, ShortRange, library_lenses};
@@ -117,7 +117,7 @@ impl LibraryWindow {
                     ui.selectable_value(&mut self.design, design.to_owned(), design);
                 }
             });
-            shown.response.accessible_name("Lens type");
+            named_list(ui, shown, "Lens type");
             for ((_, title, example), text) in RANGES.iter().zip(&mut self.ranges) {
                 ui.label(*title);
                 let line = TextEdit::singleline(text).hint_text(*example).desired_width(54.0);

@@ -1,18 +1,22 @@
 //! The menu bar and its keys.
 
 use egui::{
-    Align, Button, Key, KeyboardShortcut, Layout, MenuBar, Modifiers, ScrollArea, Theme, Ui,
+    Align, Atom, Atoms, Button, Checkbox, Key, KeyboardShortcut, Layout, MenuBar, Modifiers,
+    RichText, ScrollArea, Theme, Ui,
 };
 
 use super::actions::Actions;
 use super::candidate_bar::candidate_bar;
 use super::experiment_window;
 use super::menu_items::{self, MenuContext, MenuItem};
-use super::panels::widgets::hint_beside;
+use super::panels::widgets::{hint_beside, hint_right_of};
 use crate::session::{Command, SessionView};
 
 /// Redo has a second shortcut, which other programs use.
 const REDO_TOO: KeyboardShortcut = KeyboardShortcut::new(Modifiers::COMMAND, Key::Y);
+/// The widths in points of the menu of views, whose panels have two columns, and of its settings.
+const VIEW_WIDTH: f32 = 420.0;
+const SETTINGS_WIDTH: f32 = 260.0;
 
 /// Collects what shortcuts ask for. Undo and redo are left to a text field that is being edited.
 pub(super) fn shortcuts(ui: &Ui, menus: &MenuContext<'_>, typing: bool, actions: &mut Actions) {
@@ -43,7 +47,7 @@ pub(super) fn bar(ui: &mut Ui, menus: &MenuContext<'_>, actions: &mut Actions) {
         undo_buttons(ui, menus.view, actions);
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
             theme_button(ui);
-            candidate_bar(ui, menus.view, actions);
+            candidate_bar(ui, menus, actions);
         });
     });
 }
@@ -90,14 +94,44 @@ fn file_menu(ui: &mut Ui, menus: &MenuContext<'_>, actions: &mut Actions) {
 }
 
 fn view_menu(ui: &mut Ui, menus: &MenuContext<'_>, actions: &mut Actions) {
-    show_items(ui, 240.0, menus.view(), actions);
+    let (panels, others): (Vec<_>, Vec<_>) =
+        menus.view().into_iter().partition(|item| item.checked.is_some());
+    panel_columns(ui, panels, actions);
+    others.into_iter().for_each(|item| show_item(ui, item, actions));
     ui.separator();
-    for item in menus.settings() {
-        let mut checked = item.checked == Some(true);
-        if ui.checkbox(&mut checked, &item.title).clicked() {
-            actions.extend(item.action);
-            ui.close();
-        }
+    ui.menu_button("Settings", |ui| {
+        ui.set_min_width(SETTINGS_WIDTH);
+        let edge = ui.max_rect().right();
+        menus.settings().into_iter().for_each(|item| show_switch(ui, item, edge, actions));
+    });
+}
+
+/// Shows the panels in two columns, since one is higher than a window of 800 points.
+fn panel_columns(ui: &mut Ui, mut panels: Vec<MenuItem>, actions: &mut Actions) {
+    ui.set_width(VIEW_WIDTH);
+    let edge = ui.max_rect().right();
+    let others = panels.split_off(panels.len().div_ceil(2));
+    ui.columns_const(|[left, right]| {
+        panels.into_iter().for_each(|item| show_switch(left, item, edge, actions));
+        others.into_iter().for_each(|item| show_switch(right, item, edge, actions));
+    });
+}
+
+/// Shows an item that is on or off, with its mark; its explanation stands right of the edge of the menu.
+fn show_switch(ui: &mut Ui, item: MenuItem, edge: f32, actions: &mut Actions) {
+    let mut checked = item.checked == Some(true);
+    let mut text = Atoms::new(item.title.as_str());
+    if let Some(key) = &item.shortcut {
+        text.push_right(Atom::grow());
+        text.push_right(RichText::new(ui.ctx().format_shortcut(key)).weak());
+    }
+    let mut response = ui.add_enabled(item.is_enabled(), Checkbox::new(&mut checked, text));
+    if !item.hint.is_empty() {
+        response = hint_right_of(response, edge, item.hint);
+    }
+    if response.clicked() {
+        actions.extend(item.action);
+        ui.close();
     }
 }
 

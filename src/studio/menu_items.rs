@@ -107,6 +107,8 @@ pub(super) struct MenuContext<'a> {
     pub(super) maximized: bool,
     pub(super) recent: &'a [PathBuf],
     pub(super) theme: Theme,
+    /// True while the candidate is the preview of an open dialog.
+    pub(super) has_preview: bool,
 }
 
 impl MenuContext<'_> {
@@ -118,7 +120,7 @@ impl MenuContext<'_> {
     /// Every item.
     pub(super) fn all(&self) -> Vec<MenuItem> {
         let lists = [
-            run_items::commands(self.view),
+            run_items::commands(self.view, self.has_preview),
             self.recent(),
             bundled_lenses(),
             library_lenses(),

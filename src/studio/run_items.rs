@@ -17,15 +17,16 @@ use crate::studio::panels::{add_variables_edit, term_edits};
 /// A request with its title; `None` while it makes no sense.
 type Request = (&'static str, Option<Command>);
 
-/// The commands of the optimization, the front, the search, the field and the candidate.
-pub(super) fn commands(view: &SessionView) -> Vec<MenuItem> {
+/// The commands of the optimization, the front, the search, the field and the candidate, which waits for
+/// its dialog if it is the preview of one.
+pub(super) fn commands(view: &SessionView, has_preview: bool) -> Vec<MenuItem> {
     let groups = [
         ("Optimizer", optimizer(view)),
         ("Front", front(view)),
         ("Search", search(view)),
         ("Gradient index", field(view)),
         ("Specification", specified_design(view)),
-        ("Candidate", candidate(view)),
+        ("Candidate", candidate(view, has_preview)),
         ("Variables", variables(&view.lens)),
     ];
     let items = |(menu, requests): (&'static str, Vec<Request>)| {
@@ -150,12 +151,13 @@ fn specified_design(view: &SessionView) -> Vec<Request> {
     ]
 }
 
-fn candidate(view: &SessionView) -> Vec<Request> {
+fn candidate(view: &SessionView, has_preview: bool) -> Vec<Request> {
     let shown = view.candidate.as_ref().map(|candidate| candidate.shown);
+    let own = shown.filter(|_| !has_preview);
     vec![
-        ("Accept the candidate", shown.map(|_| Command::AcceptCandidate)),
-        ("Keep the candidate and the design", shown.map(|_| Command::KeepCandidate)),
-        ("Discard the candidate", shown.map(|_| Command::DiscardCandidate)),
+        ("Accept the candidate", own.map(|_| Command::AcceptCandidate)),
+        ("Keep the candidate and the design", own.map(|_| Command::KeepCandidate)),
+        ("Discard the candidate", own.map(|_| Command::DiscardCandidate)),
         (
             "Switch between the candidate and the design",
             shown.map(|shown| Command::ShowCandidate(!shown)),

@@ -38,7 +38,7 @@ pub(super) fn ui(context: &Context, menus: &MenuContext<'_>) -> bool {
         .collapsible(false)
         .pivot(Align2::CENTER_CENTER)
         .default_pos(context.content_rect().center())
-        .default_size(vec2(460.0, 520.0));
+        .default_size(vec2(540.0, 520.0));
     window.show(context, |ui| {
         let scroll = ScrollArea::vertical().auto_shrink([false, false]);
         scroll.show(ui, |ui| list(ui, menus));

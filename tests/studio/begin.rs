@@ -235,6 +235,92 @@ fn a_dialog_is_filled_in_and_confirmed_by_keys_alone() {
     assert!((focal_length(&lens(&harness)) - 70.0).abs() < 1e-6);
 }
 
+/// Escape closes the list alone, and the next Tab goes on from the list.
+#[test]
+fn a_list_of_a_dialog_that_a_key_closes_keeps_the_cursor() {
+    let mut harness = window(double_gauss());
+    keys(&mut harness, Modifiers::COMMAND, Key::N);
+    press(&mut harness, "Aperture of the new lens");
+    harness.get_by_label("numerical aperture, image");
+    keys(&mut harness, Modifiers::NONE, Key::Escape);
+    assert!(harness.query_by_label("numerical aperture, image").is_none(), "the list is closed");
+    harness.get_by_label("New lens");
+    assert!(harness.get_by_label("Aperture of the new lens").is_focused());
+    keys(&mut harness, Modifiers::NONE, Key::Tab);
+    assert!(harness.get_by_label("Aperture value").is_focused());
+}
+
+/// The same in a dialog that leaves the window usable: it stays open.
+#[test]
+fn escape_in_a_list_leaves_the_dialog_of_an_element_open() {
+    let mut harness = window(starting(StartingForm::Empty));
+    keys(&mut harness, Modifiers::COMMAND | Modifiers::SHIFT, Key::A);
+    press(&mut harness, "Element form");
+    keys(&mut harness, Modifiers::NONE, Key::Escape);
+    assert!(harness.query_by_label("Cemented doublet").is_none(), "the list is closed");
+    harness.get_by_label("Apply");
+    keys(&mut harness, Modifiers::NONE, Key::Escape);
+    assert!(harness.query_by_label("Apply").is_none());
+}
+
+/// A list of a panel is used by keys alone: what Enter chooses closes it, and Tab goes on from its button.
+#[test]
+fn a_key_that_chooses_from_a_list_closes_it() {
+    let mut harness = panel(SystemPanel::default(), achromat());
+    harness.get_by_label("Field kind").focus();
+    harness.run_steps(2);
+    harness.key_press(Key::Space);
+    harness.run_steps(3);
+    harness.get_by_label("Paraxial image height").focus();
+    harness.run_steps(2);
+    harness.key_press(Key::Enter);
+    harness.run_steps(3);
+    assert!(!harness.state().commands.is_empty(), "it is chosen");
+    assert!(harness.query_by_label("Paraxial image height").is_none(), "the list is closed");
+    assert!(harness.get_by_label("Field kind").is_focused());
+}
+
+/// What a dialog would give is applied or left there, and not made the design behind its back.
+#[test]
+fn the_preview_of_a_dialog_is_accepted_in_the_dialog_alone() {
+    let mut harness = window(starting(StartingForm::Empty));
+    keys(&mut harness, Modifiers::COMMAND | Modifiers::SHIFT, Key::A);
+    let texts = painted_texts(&harness);
+    assert!(texts.iter().any(|text| text.starts_with("Preview of the dialog")), "{texts:?}");
+    keys(&mut harness, Modifiers::COMMAND, Key::K);
+    enter_text(&mut harness, "Find a command", "accept the candidate");
+    keys(&mut harness, Modifiers::NONE, Key::Enter);
+    assert_eq!(lens(&harness).surfaces.len(), 1, "nothing was added");
+}
+
+/// The whole lens at another size is seen before it is asked for, as a moved element is.
+#[test]
+fn scaling_is_shown_before_it_is_done() {
+    let mut harness = window(achromat());
+    keys(&mut harness, Modifiers::COMMAND | Modifiers::SHIFT, Key::F);
+    harness.input_mut().events.push(egui::Event::Text("70".into()));
+    harness.run_steps(4);
+    let shown = harness.state().session().view().preview_lens.unwrap();
+    assert!((focal_length(&shown) - 70.0).abs() < 1e-6);
+    assert_eq!(*lens(&harness), achromat());
+}
+
+/// At 800 points of height every panel and every setting of the menu is within the window.
+#[test]
+fn the_menu_of_views_fits_into_a_small_window() {
+    let mut harness = window(achromat());
+    press(&mut harness, "View");
+    let is_inside = |node: egui_kittest::Node<'_>| {
+        let rect = node.rect();
+        rect.top() >= 0.0 && rect.bottom() <= 800.0
+    };
+    assert!(harness.get_all_by_label_contains("Layout").all(is_inside));
+    assert!(harness.get_all_by_label_contains("Import report").all(is_inside));
+    assert!(is_inside(harness.get_by_label("Default arrangement")));
+    press_item(&mut harness, "Settings");
+    assert!(is_inside(harness.get_by_label("51 rays of each field in the layout")));
+}
+
 /// A file that was saved under a new name, or named at the start, is a recent one.
 #[test]
 fn a_file_is_recent_however_it_became_that_of_the_design() {

@@ -4,7 +4,7 @@ use std::sync::Arc;
 
 use aplanat::effects::{Effect, EffectOverride};
 use aplanat::lens::{Aperture, Edit, Lens, Medium, Object, Parameter, Quantity, Row, Variable};
-use aplanat::merit::{Goal, PupilEdge, Term};
+use aplanat::merit::{Goal, PupilEdge, Term, WeightedTerm};
 use aplanat::optimize::{DescentMethod, OptimizationEnd, OptimizationProgress, pareto};
 use aplanat::session::{
     Analyses, Command, HandleSlopes, MeritReport, MeritSlopes, MeritValues, OptimizationRequest,
@@ -94,6 +94,29 @@ fn an_unknown_glass_is_refused_with_its_surface() {
     type_into(&mut harness, "Glass of surface 3", "SCHOTT BK7", Key::Enter);
     assert_eq!(harness.state().commands, [Command::Select(Some(2))]);
     harness.get_by_label_contains("Unknown glass `SCHOTT BK7` after surface 3; similar names");
+}
+
+/// A number that its variable does not allow is refused with the bounds that it breaks.
+#[test]
+fn a_number_beyond_its_bounds_is_refused_with_them() {
+    let mut harness = prescription();
+    type_into(&mut harness, "Thickness of surface 1", "0.5", Key::Enter);
+    harness
+        .get_by_label_contains("Thickness after surface 1 is 0.5; expected 0.8 to 8, its bounds");
+    let mut harness = prescription();
+    type_into(&mut harness, "Radius of surface 1", "4", Key::Enter);
+    let text = "is 0.25, a radius of 4 mm; expected -0.151 to 0.151, its bounds";
+    harness.get_by_label_contains(text);
+}
+
+/// In a wide panel the numbers stay beside their names.
+#[test]
+fn the_numbers_of_first_order_stay_near_their_names() {
+    let mut harness = sized_harness(FirstOrderPanel, view(), [1280.0, 700.0]);
+    harness.run();
+    let name = harness.get_by_label("Focal length").rect();
+    let value = harness.get_by_label("49.389 mm").rect();
+    assert!(value.left() - name.right() < 300.0, "{name:?} {value:?}");
 }
 
 #[test]
@@ -220,6 +243,23 @@ fn optimizer(view: SessionView) -> Harness<'static, PanelState<OptimizerPanel>> 
     let mut harness = panel_harness(OptimizerPanel::default(), view);
     harness.run();
     harness
+}
+
+/// A bound of a twentieth of a millimetre is read to its last digit.
+#[test]
+fn the_numbers_of_the_merit_function_fit_into_their_fields() {
+    let mut view = view();
+    let mut goal = Goal::default_for(&view.lens).unwrap();
+    goal.terms = vec![WeightedTerm::new(Term::AirEdge(0.049_388), 0.975_66)];
+    view.goal = Some(Arc::new(goal));
+    let harness = optimizer(view);
+    for (name, text) in [("Minimum of Air edge", "0.0494"), ("Weight of Air edge", "0.9757")] {
+        let cell = harness.get_by_label(name).rect();
+        let galleys = painted_galleys(&harness);
+        let number = galleys.iter().find(|galley| galley.text() == text).unwrap();
+        // The frame of a field has a line and a margin of four points on each side.
+        assert!(number.size().x + 10.0 <= cell.width(), "{text} in {cell:?}");
+    }
 }
 
 #[test]
@@ -849,6 +889,10 @@ fn the_footprint_panel_shows_a_surface() {
     let lens = double_gauss();
     let mut harness = panel_harness(FootprintPanel::default(), shown);
     harness.run_steps(3);
+    let texts = painted_texts(&harness);
+    for axis in ["x, mm", "y, mm"] {
+        assert!(texts.iter().any(|text| text == axis), "{axis} in {texts:?}");
+    }
     harness.get_by_label_contains("Footprint: field 1 reaches");
     harness.get_by_label_contains("Surface of the footprint").click();
     harness.run_steps(3);
@@ -875,6 +919,9 @@ fn the_spot_map_panel_shows_the_range_of_the_spots() {
     harness.run_steps(3);
     harness.get_by_label("RMS spot radius over the field");
     harness.get_by_label_contains("RMS radius, ±");
+    let texts = painted_texts(&harness);
+    assert!(texts.iter().any(|text| text == "field y, degrees"), "{texts:?}");
+    assert!(texts.iter().all(|text| !text.contains("± 0.0 %")), "{texts:?}");
     harness.get_by_label_contains("µm");
     let results = harness.state().view.results.clone().unwrap();
     let numbers = results.analyses.as_ref().unwrap();

@@ -362,6 +362,7 @@ fn a_panel_can_have_the_window_and_a_search_can_be_watched() {
     harness.run_steps(3);
     harness.get_by_label("Paraxial projection");
     harness.get_by_label("Radius of surface 1");
+    harness.get_by_label("Spots");
 }
 
 /// The double Gauss with a larger gap.

@@ -64,14 +64,13 @@ fn every_version_learns_its_merit_without_being_asked() {
     assert!((shares - 1.0).abs() < 1e-12, "{shares}");
 }
 
-#[test]
-fn an_accepted_optimization_keeps_its_course_and_can_be_rewound() {
+/// A session whose optimization of one curvature, 0.02 at the start, has ended.
+fn optimized() -> Session {
     let mut session = session();
     let parameter = Parameter::new(0, Quantity::Curvature);
     let variable = Variable { parameter, min: None, max: None };
     session.apply(Edit::Set { parameter, value: 0.02 }.into());
     session.apply(Edit::AddVariable(variable).into());
-    let start = session.view().version_id;
     let terms = vec![WeightedTerm::new(Term::FocalLength(150.0), 1.0)];
     let goal = Goal {
         terms,
@@ -81,6 +80,23 @@ fn an_accepted_optimization_keeps_its_course_and_can_be_rewound() {
     };
     session.apply(Command::Optimize { method: DescentMethod::DampedLeastSquares, goal });
     wait(&mut session, "the end", |view, _| !view.optimization.is_active());
+    session
+}
+
+/// Whoever clicks a place of the curve sees that lens, and not the result that still waits.
+#[test]
+fn a_rewound_lens_is_shown_while_the_result_waits() {
+    let mut session = optimized();
+    assert!(session.view().candidate.is_some_and(|candidate| candidate.shown));
+    session.apply(Command::Rewind { version: None, step: 0 });
+    assert_eq!(session.lens().surfaces[0].curvature, 0.02);
+    assert!(session.view().candidate.is_some_and(|candidate| !candidate.shown));
+}
+
+#[test]
+fn an_accepted_optimization_keeps_its_course_and_can_be_rewound() {
+    let mut session = optimized();
+    let start = session.view().version_id;
     session.apply(Command::AcceptResult);
     let accepted = session.view().version_id;
     let node = versions(&session).last().unwrap().clone();

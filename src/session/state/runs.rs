@@ -139,6 +139,8 @@ impl Session {
             self.history.go_to(*parent);
         }
         self.accept(checked, VersionOrigin::new(format!("optimization, step {}", point.step)));
+        // The lens that was asked for is shown, and not the result that still waits to be accepted.
+        self.shows_candidate = false;
     }
 
     /// Makes the lens that is shown in place of the design the design. It keeps the variables of the

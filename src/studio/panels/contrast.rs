@@ -67,8 +67,7 @@ fn legend(ui: &mut Ui, is_current: bool) {
         ui.label(RichText::new("of the lens before; computing …").small());
         return;
     }
-    let text = "tangential solid, sagittal dashed, diffraction limit dotted; all wavelengths, \
-                cycles/mm";
+    let text = "tangential solid, sagittal dashed, diffraction limit dotted; all wavelengths";
     ui.label(RichText::new(text).small().weak());
 }
 
@@ -76,6 +75,7 @@ fn plot(ui: &mut Ui, contrasts: &FieldContrasts, height: f32) {
     let palette = Palette::for_visuals(ui.visuals());
     let highest = contrasts.frequencies.last().copied().unwrap_or(1.0);
     let plot = fixed_plot(ui, "contrast", height).include_x(0.0).include_x(highest);
+    let plot = plot.x_axis_label("cycles/mm").y_axis_label("contrast");
     let shown = plot.include_y(0.0).include_y(1.0).show(ui, |plot| {
         if let Some(limit) = &contrasts.limit {
             let points = contrasts.frequencies.iter().zip(limit).map(|(nu, value)| [*nu, *value]);

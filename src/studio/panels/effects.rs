@@ -7,6 +7,7 @@ use super::{Panel, displayed_results, show_missing_results};
 use crate::effects::{EffectCost, EffectDecision, EffectOverride, EffectPlan};
 use crate::session::{Command, SessionView};
 use crate::studio::actions::Actions;
+use crate::studio::form::named_list;
 use crate::studio::number;
 use crate::studio::text::{capitalize, micrometres};
 
@@ -78,7 +79,7 @@ fn override_menu(
             }
         });
         let label = format!("Choice of {}", decision.effect.name());
-        combo.response.accessible_name(label).on_hover_text("Auto follows the plan for this lens");
+        named_list(ui, combo, label).on_hover_text("Auto follows the plan for this lens");
     });
     if chosen != old {
         actions.push(Command::SetEffect(decision.effect, chosen));
@@ -99,11 +100,33 @@ fn reason_text(decision: &EffectDecision) -> String {
     let EffectDecision { error, limit, unit, cost, .. } = decision;
     let (scale, unit) = if *unit == "mm" { (1e3, "µm") } else { (1.0, *unit) };
     let rests = format!("{} {unit}, limit {} {unit}", digits(scale * error), digits(scale * limit));
-    let Some(EffectCost { saved_share, saved_ms, error_ms }) = *cost else { return rests };
-    if saved_share == 0.0 {
-        return rests;
+    match *cost {
+        Some(cost) if cost.saved_share != 0.0 => {
+            format!("{rests}; {}", cost_text(cost, decision.computed))
+        }
+        _ => rests,
     }
-    let verb = if decision.computed { "would save" } else { "saves" };
+}
+
+/// The time at stake; none where the difference is not larger than its error.
+fn cost_text(EffectCost { saved_share, saved_ms, error_ms }: EffectCost, computed: bool) -> String {
+    let verb = if computed { "would save" } else { "saves" };
+    if saved_ms <= error_ms {
+        return format!("{verb} no time that can be measured");
+    }
     let percent = 100.0 * saved_share;
-    format!("{rests}; {verb} {percent:.0} % of the spots ({saved_ms:.2} ± {error_ms:.2} ms)")
+    format!("{verb} {percent:.0} % of the spots ({saved_ms:.2} ± {error_ms:.2} ms)")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_saving_below_its_error_is_none() {
+        let cost = |saved_ms| EffectCost { saved_share: 0.1 * saved_ms, saved_ms, error_ms: 0.5 };
+        assert_eq!(cost_text(cost(-2.0), true), "would save no time that can be measured");
+        assert_eq!(cost_text(cost(0.2), false), "saves no time that can be measured");
+        assert_eq!(cost_text(cost(2.0), false), "saves 20 % of the spots (2.00 ± 0.50 ms)");
+    }
 }

@@ -101,8 +101,8 @@ fn charts(curves: &FieldCurves, lens: &Lens, palette: Palette) -> Vec<Chart> {
     let curve =
         |name: &str, color, dashed, points| Curve { name: name.to_owned(), points, color, dashed };
     let distortion = |point: &FieldCurvePoint| {
-        let found = point.distortion.as_ref().ok()?;
-        Some(found.distortion.map_or(0.0, |share| 100.0 * share))
+        // On the axis both heights vanish, and their ratio has no value.
+        point.distortion.as_ref().ok()?.distortion.map(|share| 100.0 * share)
     };
     let focus = |point: &FieldCurvePoint| point.curvature.as_ref().ok().copied();
     let tangential = against(&|point| focus(point)?.tangential);
@@ -112,7 +112,8 @@ fn charts(curves: &FieldCurves, lens: &Lens, palette: Palette) -> Vec<Chart> {
         Chart {
             title: "Distortion, %",
             hint: "Real over ideal height of the chief ray, less 1; for a distant object the ideal \
-                   height is f tan θ",
+                   height is f tan θ. Away from the paraxial focus the image is larger or smaller, \
+                   near the axis too",
             curves: vec![curve("distortion", first, false, against(&distortion))],
             from_zero: false,
         },
@@ -205,5 +206,24 @@ impl Chart {
         };
         let edges: Vec<String> = self.curves.iter().filter_map(edge).collect();
         format!("{}: {}", self.title, edges.join(", "))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::files;
+    use crate::session::{AnalysisSettings, analyze};
+
+    /// The double Gauss is out of its paraxial focus: a curve that began at 0 would jump.
+    #[test]
+    fn the_distortion_begins_beside_the_axis() {
+        let bundled = &files::bundled_lenses()[0];
+        let lens = files::parse(bundled.text.as_bytes(), bundled.name).unwrap().lens;
+        let settings = AnalysisSettings { field_curves: true, ..AnalysisSettings::default() };
+        let curves = analyze(&lens, &settings).unwrap().field_curves.unwrap().value;
+        let charts = charts(&curves, &lens, Palette::DARK);
+        let points = &charts[0].curves[0].points;
+        assert!(points.len() > 2 && points[0][0] > 0.0, "{points:?}");
     }
 }

@@ -9,6 +9,11 @@ use crate::session::SessionView;
 use crate::studio::actions::Actions;
 use crate::studio::number;
 
+/// The greatest width of a line in points: with more, name and value are not read together.
+const WIDEST: f32 = 380.0;
+/// The length in mm below which a value is not told by its digits: a nanometre.
+const SHORTEST: f64 = 1e-6;
+
 /// The panel.
 #[derive(Debug)]
 pub struct FirstOrderPanel;
@@ -26,6 +31,7 @@ impl Panel for FirstOrderPanel {
             if numbers.first_order().efl.is_none() {
                 ui.weak(without_focus(&results.lens));
             }
+            ui.set_max_width(ui.available_width().min(WIDEST));
             let track = total_track(&results.lens, results.settings.zoom);
             data(ui, track, numbers.first_order());
         });
@@ -123,9 +129,12 @@ fn plain(value: Option<f64>) -> String {
     value.map_or_else(|| "none".to_owned(), |value| number::format_digits(value, 6))
 }
 
-/// A length with its unit: micrometres below a hundredth of a millimetre.
+/// A length with its unit: micrometres below a hundredth of a millimetre, no digits below a nanometre.
 fn mm(value: Option<f64>) -> String {
     let Some(value) = value else { return "none".to_owned() };
+    if value != 0.0 && value.abs() < SHORTEST {
+        return "below 0.001 µm".to_owned();
+    }
     let is_small = value != 0.0 && value.abs() < 0.01;
     let (value, unit) = if is_small { (1e3 * value, "µm") } else { (value, "mm") };
     format!("{} {unit}", number::format_digits(value, 6))
@@ -141,7 +150,7 @@ mod tests {
 
     #[test]
     fn small_lengths_are_short() {
-        let texts = [6.500_74e-5, 0.5, 0.0, -0.009].map(|value| mm(Some(value)));
-        assert_eq!(texts, ["0.0650074 µm", "0.5 mm", "0 mm", "-9 µm"]);
+        let texts = [6.500_74e-5, 0.5, 0.0, -0.009, -8.9e-10].map(|value| mm(Some(value)));
+        assert_eq!(texts, ["0.0650074 µm", "0.5 mm", "0 mm", "-9 µm", "below 0.001 µm"]);
     }
 }

@@ -11,6 +11,7 @@ use crate::analysis::Footprint;
 use crate::lens::{Lens, Quantity};
 use crate::session::{AnalysisResults, FieldFootprints, SessionView};
 use crate::studio::actions::Actions;
+use crate::studio::form::named_list;
 use crate::studio::number;
 use crate::studio::palette::{Palette, color32};
 
@@ -64,7 +65,7 @@ impl FootprintPanel {
                     ui.selectable_value(&mut self.surface, Some(surface), name);
                 }
             });
-            combo.response.accessible_name("Surface of the footprint");
+            named_list(ui, combo, "Surface of the footprint");
             ui.label(RichText::new(format!("primary wavelength, {ms:.1} ms")).small().weak());
         });
     }
@@ -116,6 +117,7 @@ fn outlines(ui: &mut Ui, found: &FieldFootprints, (surface, rim): (usize, Option
     let palette = Palette::for_visuals(ui.visuals());
     let height = (ui.available_height() - 4.0).max(LOWEST);
     let plot = fixed_plot(ui, "footprint", height).data_aspect(1.0);
+    let plot = plot.x_axis_label("x, mm").y_axis_label("y, mm");
     let shown = plot.show(ui, |plot| {
         if let Some(rim) = rim {
             let corner = |i: usize| {

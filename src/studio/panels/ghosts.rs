@@ -8,6 +8,7 @@ use crate::analysis::{Coating, Ghost};
 use crate::lens::{Fields, SurfaceNumber};
 use crate::session::{Command, FieldGhosts, PanelSetting, SessionView};
 use crate::studio::actions::Actions;
+use crate::studio::form::named_list;
 use crate::studio::number;
 use crate::studio::text::capitalize;
 
@@ -64,7 +65,7 @@ impl GhostsPanel {
                     ui.selectable_value(&mut coating, choice, name(choice));
                 }
             });
-            shown.response.accessible_name("Coating between air and glass");
+            named_list(ui, shown, "Coating between air and glass");
             if coating != view.settings.coating {
                 actions.push(Command::Show(PanelSetting::Coating(coating)));
             }

@@ -23,6 +23,7 @@ use crate::session::{Analyses, AnalysisResults, Command, SessionView};
 use crate::studio::actions::Actions;
 use crate::studio::cached::{ByAddress, Cached};
 use crate::studio::draw::{Camera, RenderBackend, Scene, SceneCanvas};
+use crate::studio::form::named_list;
 use crate::studio::number;
 use crate::studio::palette::{Palette, color32};
 
@@ -123,9 +124,7 @@ fn tolerance(ui: &mut Ui, view: &SessionView, actions: &mut Actions) {
             ui.selectable_value(&mut chosen, error, name);
         }
     });
-    shown
-        .response
-        .accessible_name("Allowed error")
+    named_list(ui, shown, "Allowed error")
         .on_hover_text("The tolerance of the numbers. As many rays are traced as it needs.");
     ui.weak("error below");
     if chosen != view.settings.tolerance {

@@ -6,7 +6,7 @@ use egui::{
 use egui_plot::{PlotImage, PlotPoint};
 
 use super::widgets::fixed_plot;
-use super::{Panel, displayed_results, show_missing_results};
+use super::{Panel, displayed_results, plain_error, show_missing_results};
 use crate::analysis::{AnalysisError, Estimate, SpotMap};
 use crate::lens::FieldKind;
 use crate::session::{SessionView, Timed};
@@ -100,7 +100,8 @@ fn summary(ui: &mut Ui, map: &SpotMap, range: [f64; 2], ms: f64) {
         }
         ui.label(format!("{most} µm"));
         let error = spots(map).map(|spot| spot.error / spot.value).fold(0.0, f64::max);
-        let text = format!("RMS radius, ± {:.1} %, {} rays, {ms:.0} ms", 100.0 * error, map.rays);
+        let error = plain_error(100.0 * error, " %");
+        let text = format!("RMS radius, {error}, {} rays, {ms:.0} ms", map.rays);
         ui.label(RichText::new(text).small().weak());
     });
 }
@@ -130,7 +131,8 @@ fn plot(ui: &mut Ui, map: &SpotMap, texture: &TextureHandle, kind: FieldKind) {
     };
     let height = (ui.available_height() - 4.0).max(LOWEST);
     let plot = fixed_plot(ui, "spot map", height).data_aspect(1.0);
-    let plot = plot.x_axis_label(format!("field x, {unit}")).y_axis_label("field y");
+    let [x, y] = ["x", "y"].map(|axis| format!("field {axis}, {unit}"));
+    let plot = plot.x_axis_label(x).y_axis_label(y);
     // A pixel has its field in the middle.
     let width = 2.0 * map.grid.half_width * map.grid.count as f64 / (map.grid.count - 1) as f64;
     let size = vec2(width as f32, width as f32);

@@ -11,6 +11,7 @@ use super::{Panel, displayed_results, show_missing_results};
 use crate::lens::{Edit, Perturbation, PerturbationKind, SurfaceNumber, Tolerance};
 use crate::session::{AsBuiltLens, Command, PanelSetting, SessionView, Timed};
 use crate::studio::actions::Actions;
+use crate::studio::form::named_list;
 use crate::studio::number;
 use crate::studio::palette::{Palette, color32};
 use crate::tolerance::{AsBuiltSpot, ToleranceGrade};
@@ -191,7 +192,7 @@ fn choose_grade(
         }
     });
     let hint = "The class of care in making that proposes tolerances";
-    shown.response.accessible_name("Care in making").on_hover_text(hint);
+    named_list(ui, shown, "Care in making").on_hover_text(hint);
     let Some(made) = made else { return };
     let hint = "Keeps these tolerances in the lens, so that they are saved and can be changed";
     if ui.button("Keep in the lens").on_hover_text(hint).clicked() {
@@ -251,7 +252,7 @@ fn summary(ui: &mut Ui, made: &AsBuiltLens) {
     let um = |mm: f64| format!("{} µm", number::format_digits(1e3 * mm, 3));
     let mut rows: Vec<(String, [String; 2])> = vec![
         ("As designed".into(), spots.each_ref().map(|s| um(s.nominal_rms))),
-        ("Mean rms".into(), spots.each_ref().map(|s| with_error(s.mean_rms))),
+        ("Mean RMS".into(), spots.each_ref().map(|s| with_error(s.mean_rms))),
     ];
     for (i, quantile) in spots[0].quantiles.iter().enumerate() {
         let name = format!("{:.0} % of the lenses, at most", 100.0 * quantile.share);

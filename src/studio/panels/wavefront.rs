@@ -264,22 +264,23 @@ fn heading(ui: &mut Ui, fields: &Fields, index: usize) -> String {
     name
 }
 
-/// A number with its error.
-fn estimate_text(estimate: Estimate) -> String {
+/// A number with its unit and its error.
+fn estimate_text(estimate: Estimate, unit: &str) -> String {
     let value = number::format_digits(estimate.value, 3);
-    format!("{value}{}", relative_error(estimate))
+    format!("{value}{unit}{}", relative_error(estimate))
 }
 
 fn map_lines(found: &FieldWavefront) -> Vec<String> {
     let most = number::format_digits(largest(&found.map), 3);
-    vec![format!("RMS {} λ", estimate_text(found.wavefront.rms)), format!("within ± {most} λ")]
+    let rms = estimate_text(found.wavefront.rms, " λ");
+    vec![format!("RMS {rms}"), format!("within ± {most} λ")]
 }
 
 fn image_lines(image: &PointImage) -> Vec<String> {
     let width = number::format_digits(2e3 * image.intensity.half_width, 3);
     vec![
-        format!("Strehl {}", estimate_text(image.strehl.at_chief)),
-        format!("best {}", estimate_text(image.strehl.best)),
+        format!("Strehl {}", estimate_text(image.strehl.at_chief, "")),
+        format!("best {}", estimate_text(image.strehl.best, "")),
         format!("{width} µm wide, {}", plain_error(image.error, "")),
     ]
 }

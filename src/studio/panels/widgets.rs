@@ -72,8 +72,15 @@ pub(in crate::studio) fn progress_bar(ui: &Ui, share: f32, text: impl Into<Strin
 
 /// Explains an item of a menu beside it, where the explanation covers no other item.
 pub(in crate::studio) fn hint_beside(item: Response, text: &str) -> Response {
+    let right = item.rect.right();
+    hint_right_of(item, right, text)
+}
+
+/// The same right of a place, for an item with others beside it.
+pub(in crate::studio) fn hint_right_of(item: Response, right: f32, text: &str) -> Response {
+    let beside = item.rect.with_max_x(right.max(item.rect.right()));
     let mut hint = Tooltip::for_enabled(&item);
-    hint.popup = hint.popup.align(RectAlign::RIGHT_START);
+    hint.popup = hint.popup.anchor(beside).align(RectAlign::RIGHT_START);
     hint.show(|ui| {
         ui.set_max_width(ui.spacing().tooltip_width);
         ui.label(text)

@@ -89,6 +89,7 @@ impl GlassMap<'_> {
         let visuals = ui.visuals().clone();
         let plot = Plot::new(self.axes.name())
             .height(height)
+            .grid_color(visuals.widgets.noninteractive.bg_stroke.color)
             .custom_x_axes(vec![AxisHints::new_x().label(x).label_spacing(NUMBERS)])
             .y_axis_label(y)
             .invert_x(self.axes != MapAxes::PartialIndex)

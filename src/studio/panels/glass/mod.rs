@@ -14,6 +14,7 @@ use crate::lens::{Edit, GradientIndex, Lens, Medium, SurfaceNumber};
 use crate::session::{Command, SessionView};
 use crate::studio::actions::Actions;
 use crate::studio::cached::Cached;
+use crate::studio::form::named_list;
 use crate::studio::number;
 use crate::studio::text::capitalize;
 use crate::studio::text_input::error_color;
@@ -103,7 +104,7 @@ impl GlassPanel {
                     ui.selectable_value(&mut self.axes, axes, name);
                 }
             });
-            shown.response.accessible_name("Axes of the map");
+            named_list(ui, shown, "Axes of the map");
             let noun = if count == 1 { "glass" } else { "glasses" };
             ui.weak(format!("{count} {noun}"));
         });
@@ -255,7 +256,7 @@ fn choose_surface(ui: &mut Ui, lens: &Lens, surface: Option<usize>, actions: &mu
             }
         }
     });
-    shown.response.accessible_name("Surface whose glass is replaced");
+    named_list(ui, shown, "Surface whose glass is replaced");
 }
 
 fn medium_name(medium: &Medium) -> String {

@@ -12,6 +12,7 @@ use crate::session::{
 };
 use crate::studio::actions::Actions;
 use crate::studio::file_dialog::FileRequest;
+use crate::studio::form::named_list;
 use crate::studio::panels::widgets::{ActionButton, action_buttons, main_button, progress_bar};
 
 /// Nodes along a side of a written volume, where the field is a spline, unless it is changed.
@@ -228,8 +229,5 @@ fn quantity_choice(ui: &mut Ui, run: &GrinRun, settings: &mut SliceSettings) {
             ui.selectable_value(&mut settings.quantity, quantity, quantity.name());
         }
     });
-    combo
-        .response
-        .on_hover_text("Quantity of the colours")
-        .accessible_name("Quantity of the slice");
+    named_list(ui, combo, "Quantity of the slice").on_hover_text("Quantity of the colours");
 }

@@ -21,6 +21,7 @@ use crate::session::{Analyses, AnalysisResults, Command, PanelSetting, SessionVi
 use crate::studio::actions::Actions;
 use crate::studio::cached::{ByAddress, Cached};
 use crate::studio::draw::{BoundingBox, RenderBackend, Rgba, Scene, SceneResponse, SceneView};
+use crate::studio::form::named_list;
 use crate::studio::number;
 use crate::studio::palette::{Palette, color32};
 use crate::studio::section::SectionDrawing;
@@ -218,7 +219,7 @@ fn zoom_position(ui: &mut Ui, view: &SessionView, actions: &mut Actions) {
             ui.selectable_value(&mut chosen, i, name(i));
         }
     });
-    shown.response.accessible_name("Zoom position");
+    named_list(ui, shown, "Zoom position");
     if chosen != view.settings.zoom {
         actions.push(Command::ShowZoom(chosen));
     }

@@ -13,6 +13,7 @@ use crate::math::expression::evaluate;
 use crate::merit::{Goal, LimitTreatment, OperandKind, PupilEdge, Term, WeightedTerm};
 use crate::session::{Command, OptimizationSnapshot, SessionView};
 use crate::studio::actions::Actions;
+use crate::studio::form::named_list;
 use crate::studio::number;
 use crate::studio::panels::widgets::hint_beside;
 use crate::studio::panels::{add_variables_edit, field_name};
@@ -33,7 +34,9 @@ pub(super) struct MeritEditor {
 }
 
 /// The room for all that is not a target in a row, in points.
-const OTHER_COLUMNS: f32 = 326.0;
+const OTHER_COLUMNS: f32 = 318.0;
+/// The width of a number in points: six characters such as `0.5927`.
+pub(super) const NUMBER: f32 = 51.0;
 /// The least and the most room for targets.
 const MIN_TARGETS: f32 = 76.0;
 const MAX_TARGETS: f32 = 210.0;
@@ -305,6 +308,12 @@ fn warning_with_fix(ui: &mut Ui, what: &str, button: &str, hint: &str) -> bool {
     .inner
 }
 
+/// A number in the characters for which a field has room: a small one has a digit less.
+pub(super) fn short_number(value: f64) -> String {
+    let digits = if value.abs() < 0.1 { 3 } else { 4 };
+    number::format_digits(value, digits)
+}
+
 fn heading(ui: &mut Ui, text: &str, what: &str) {
     let label = ui.weak(text);
     if !what.is_empty() {
@@ -328,7 +337,7 @@ impl MeritRow {
         };
         let removed = self.name_cell(ui, view, &title);
         let name = format!("Weight of {title}");
-        number_field(ui, buffers, &name, &mut self.weighted.weight, 46.0);
+        number_field(ui, buffers, &name, &mut self.weighted.weight, NUMBER);
         self.target_cell(ui, view, buffers, &title, at.target_width);
         self.value_cell(ui, view, at);
         removed
@@ -362,7 +371,7 @@ impl MeritRow {
         ui.spacing_mut().item_spacing = vec2(2.0, 2.0);
         for (what, value) in targets(&mut self.weighted.term) {
             let name = format!("{what} of {title}");
-            number_field(ui, buffers, &name, value, 46.0);
+            number_field(ui, buffers, &name, value, NUMBER);
         }
         scope::bounds(ui, buffers, title, &mut self.weighted.term);
         ui.weak(unit(self.weighted.term));
@@ -418,7 +427,7 @@ impl MeritRow {
                 ui.selectable_value(field, i, name(i));
             }
         });
-        combo.response.accessible_name(format!("Field of {title}"));
+        named_list(ui, combo, format!("Field of {title}"));
     }
 
     /// The value of the term for the best lens of the optimization, if that has the term.
@@ -439,7 +448,7 @@ impl MeritRow {
 /// A number that belongs to the panel itself.
 fn number_field(ui: &mut Ui, buffers: &mut EditBuffers, name: &str, value: &mut f64, width: f32) {
     let id = Id::unique(("optimizer", name));
-    let shown = number::format_digits(*value, 4);
+    let shown = short_number(*value);
     let field = TextInput {
         name,
         value: &shown,

@@ -21,6 +21,7 @@ use crate::lens::{Edit, Lens, ParameterKind};
 use crate::optimize::DescentMethod;
 use crate::session::{Command, MeritSample, OptimizationSnapshot, RunStatus, SessionView};
 use crate::studio::actions::Actions;
+use crate::studio::form::named_list;
 use crate::studio::number;
 use crate::studio::panels::widgets::{
     ActionButton, action_buttons, fixed_plot, log_axis, main_button,
@@ -151,7 +152,7 @@ pub(super) fn method_menu(ui: &mut Ui, chosen: &mut DescentMethod) {
             ui.selectable_value(chosen, method, method.name());
         }
     });
-    combo.response.accessible_name("Method");
+    named_list(ui, combo, "Method");
 }
 
 /// The status of the optimization, and spot, focal length and light before and after it.

@@ -3,10 +3,10 @@
 use egui::containers::menu::{MenuButton, MenuConfig};
 use egui::{Align, Grid, Id, Layout as Arrange, PopupCloseBehavior, Ui, vec2};
 
+use super::merit_editor::{NUMBER, short_number};
 use crate::lens::{IndexRange, Lens, last_index};
 use crate::math::expression::evaluate;
 use crate::merit::{OperandKind, Term, TermScope, TermSelection, WeightedTerm};
-use crate::studio::number;
 use crate::studio::text_input::{EditBuffers, InputPlacement, TextInput};
 
 /// The operands in the groups of a menu.
@@ -97,9 +97,9 @@ pub(super) fn bounds(ui: &mut Ui, buffers: &mut EditBuffers, title: &str, term: 
     for (what, bound) in [("Minimum", min), ("Maximum", max)] {
         let name = format!("{what} of {title}");
         let id = Id::unique(("optimizer", &name));
-        let value = bound.map(|value| number::format_digits(value, 4)).unwrap_or_default();
+        let value = bound.map(short_number).unwrap_or_default();
         let hint = if what == "Minimum" { "min" } else { "max" };
-        let Some(text) = field(ui, buffers, id, (&name, &value, hint), 48.0) else { continue };
+        let Some(text) = field(ui, buffers, id, (&name, &value, hint), NUMBER) else { continue };
         if text.trim().is_empty() {
             *bound = None;
             buffers.accept(id);

@@ -6,6 +6,7 @@ use egui::{ComboBox, DragValue, Ui};
 
 use crate::optimize::pareto::{ParetoSettings, Scalarization};
 use crate::session::{Command, SessionView};
+use crate::studio::form::named_list;
 use crate::studio::panels::design_results;
 use crate::studio::panels::optimizer::method_menu;
 
@@ -78,7 +79,7 @@ fn scalarization_menu(ui: &mut Ui, chosen: &mut Scalarization) {
             ui.selectable_value(chosen, each, name(each));
         }
     });
-    combo.response.on_hover_text(SCALARIZATION).accessible_name("Scalarization");
+    named_list(ui, combo, "Scalarization").on_hover_text(SCALARIZATION);
 }
 
 const SCALARIZATION: &str = "Levels of light: the sharpest lens with at least so much light, which \

@@ -19,6 +19,7 @@ use crate::studio::actions::Actions;
 use crate::studio::cached::{ByAddress, Cached};
 use crate::studio::draw::zoom_factor;
 use crate::studio::file_dialog::FileRequest;
+use crate::studio::form::named_list;
 use crate::studio::text::capitalize;
 use histogram::histogram;
 use magnifier::Magnifier;
@@ -249,7 +250,7 @@ impl PicturePanel {
                     hint_beside(item, preset.source);
                 }
             });
-            shown.response.accessible_name("Sensor of the signal-to-noise ratio");
+            named_list(ui, shown, "Sensor of the signal-to-noise ratio");
             if self.mode == PictureMode::Wipe {
                 let slider = Slider::new(&mut self.line, 0.0..=1.0).show_value(false).text("Line");
                 ui.add(slider);
@@ -451,7 +452,7 @@ fn choose_scene(ui: &mut Ui, view: &SessionView, actions: &mut Actions) {
             }
         }
     });
-    shown.response.accessible_name("Scene");
+    named_list(ui, shown, "Scene");
 }
 
 /// Pixels, error, focus and time.

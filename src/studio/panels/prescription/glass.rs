@@ -97,8 +97,10 @@ pub(super) fn parse_medium(text: &str) -> Medium {
         .filter(|part| !part.is_empty())
         .map(|part| part.parse().ok())
         .collect();
+    // `/2` would be arithmetic in a column of numbers: it is no index.
+    let is_whole = text.starts_with(|c: char| c.is_ascii_digit() || "+-.".contains(c));
     match numbers.as_slice() {
-        [Some(index)] => Medium::Index(*index),
+        [Some(index)] if is_whole => Medium::Index(*index),
         [Some(nd), Some(vd)] => Medium::Model { nd: *nd, vd: *vd },
         _ => Medium::Glass(glass::find(text).map_or_else(|| text.to_owned(), Glass::full_name)),
     }
@@ -178,6 +180,13 @@ mod tests {
         for medium in media {
             assert_eq!(parse_medium(&format_medium(&medium)), medium);
         }
+    }
+
+    /// Arithmetic belongs to the columns of numbers.
+    #[test]
+    fn arithmetic_is_no_index() {
+        assert_eq!(parse_medium("/2"), Medium::Glass("/2".into()));
+        assert_eq!(parse_medium("1.62/36.4"), Medium::Model { nd: 1.62, vd: 36.4 });
     }
 
     #[test]

@@ -113,7 +113,7 @@ impl PrescriptionTable<'_> {
             candidate.cell(ui, place, (&text, self.shown_clear(place)), self.view.settings.zoom);
         } else if place.is_editable(&self.lens) {
             if self.cursor.is_in_range(self.grid(), place) {
-                let fill = ui.visuals().selection.bg_fill.gamma_multiply(0.45);
+                let fill = ui.visuals().selection.bg_fill.gamma_multiply(0.7);
                 ui.painter().rect_filled(ui.max_rect(), 0.0, fill);
             }
             self.editable_cell(ui, place);

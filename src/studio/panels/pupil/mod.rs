@@ -18,6 +18,7 @@ use crate::analysis::{FieldPupil, PupilShape};
 use crate::pupil::{PupilLimit, RayModel};
 use crate::session::{self, Analyses, AnalysisResults, Command, PanelSetting, SessionView, Timed};
 use crate::studio::actions::Actions;
+use crate::studio::form::named_list;
 use crate::studio::palette::{Palette, color32};
 use crate::studio::text::capitalize;
 use picture::{PupilPicture, PupilWindow};
@@ -137,7 +138,7 @@ fn wavelength(ui: &mut Ui, view: &SessionView, shown: usize, actions: &mut Actio
             ui.selectable_value(&mut chosen, i, format!("{}{primary}", name(i)));
         }
     });
-    combo.response.accessible_name("Wavelength of the pupils");
+    named_list(ui, combo, "Wavelength of the pupils");
     if chosen != shown {
         actions.push(Command::Show(PanelSetting::PupilWavelength(Some(chosen))));
     }

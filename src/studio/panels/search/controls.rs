@@ -13,6 +13,7 @@ use crate::session::{
 use crate::studio::actions::{Actions, UiAction};
 use crate::studio::arrangement::Arrangement;
 use crate::studio::file_dialog::FileRequest;
+use crate::studio::form::named_list;
 use crate::studio::number;
 use crate::studio::panels::widgets::{ActionButton, action_buttons, main_button, progress_bar};
 use crate::studio::panels::{NO_LIGHT, is_dark};
@@ -184,7 +185,7 @@ fn order_choice(ui: &mut Ui, order: &mut CardOrder) {
             ui.selectable_value(order, choice, choice.text());
         }
     });
-    combo.response.accessible_name("Order of the lenses");
+    named_list(ui, combo, "Order of the lenses");
 }
 
 pub(super) fn temperature(ui: &mut Ui, search: ShownSearch<'_>, actions: &mut Actions) {

@@ -6,6 +6,7 @@ use super::setup::{drag, length, optional};
 use crate::lens::{FieldPoint, Lens};
 use crate::search::lens_landscape::{DescentSettings, SearchPlan};
 use crate::search::{SearchRules, SearchSettings, Termination};
+use crate::studio::form::named_list;
 use crate::studio::panels::field_name;
 
 /// The limits of the factory.
@@ -89,7 +90,7 @@ fn termination_row(ui: &mut Ui, chosen: &mut Termination) {
             ui.selectable_value(chosen, end, name).on_hover_text(hint);
         }
     });
-    combo.response.accessible_name("How descents end");
+    named_list(ui, combo, "How descents end");
     ui.end_row();
 }
 

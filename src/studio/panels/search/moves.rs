@@ -1,6 +1,6 @@
 //! The outcome and the weight of each kind of mutation, and its colour and symbol in plots.
 
-use egui::{Color32, DragValue, Grid, RichText, Sense, Shape, Stroke, Ui, Visuals, pos2, vec2};
+use egui::{Color32, DragValue, Grid, RichText, Sense, Shape, Stroke, Ui, Vec2, Visuals, pos2};
 use egui_plot::MarkerShape;
 
 use super::ShownSearch;
@@ -128,9 +128,12 @@ pub(super) fn shape(kind: MutationKind) -> MarkerShape {
 const PLUS: [[f32; 4]; 2] = [[-1.0, 0.0, 1.0, 0.0], [0.0, -1.0, 0.0, 1.0]];
 const CROSS: [[f32; 4]; 2] = [[-0.8, -0.8, 0.8, 0.8], [-0.8, 0.8, 0.8, -0.8]];
 
+/// The side of a mark in a line of text, in points.
+pub(super) const SYMBOL: f32 = 11.0;
+
 /// The mark of a kind, in a line of text.
 pub(super) fn symbol(ui: &mut Ui, kind: MutationKind) {
-    let (rect, _) = ui.allocate_exact_size(vec2(11.0, 11.0), Sense::hover());
+    let (rect, _) = ui.allocate_exact_size(Vec2::splat(SYMBOL), Sense::hover());
     let (center, color) = (rect.center(), color(ui.visuals(), Some(kind)));
     let corner = |x: f32, y: f32| pos2(center.x + 4.5 * x, center.y + 4.5 * y);
     let filled = |corners: Vec<egui::Pos2>| Shape::convex_polygon(corners, color, Stroke::NONE);

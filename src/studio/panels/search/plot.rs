@@ -1,10 +1,13 @@
 //! The merit against iterations with a mark for every mutation (figure 4.6 of Teh, *Computational
 //! Lens Design*), and below it how many elements the lens of the chain has.
 
-use egui::{Id, PointerButton, RichText, Role, Ui, WidgetInfo, vec2};
+use egui::{
+    Id, PointerButton, RichText, Role, TextStyle, TextWrapMode, Ui, WidgetInfo, WidgetText, vec2,
+};
 use egui_plot::{Line, LineStyle, Plot, PlotPoint, PlotPoints, PlotResponse, PlotUi, Points};
 
 use super::{ShownSearch, moves, text};
+use crate::search::MutationKind;
 use crate::session::{DescentMark, HistorySample, StructureSearchSnapshot};
 use crate::studio::panels::widgets::{fixed_plot, log_axis};
 
@@ -233,12 +236,24 @@ fn legend(ui: &mut Ui, run: &StructureSearchSnapshot) {
         ui.spacing_mut().item_spacing.x = 4.0;
         for kind in moves::kinds() {
             if run.history.marks.iter().any(|mark| mark.kind == Some(kind)) {
-                moves::symbol(ui, kind);
-                ui.label(RichText::new(kind.name()).small());
-                ui.add_space(4.0);
+                legend_entry(ui, kind);
             }
         }
     });
+}
+
+/// A mark with its name, on one line with it.
+fn legend_entry(ui: &mut Ui, kind: MutationKind) {
+    let name = WidgetText::from(RichText::new(kind.name()).small());
+    let extend = Some(TextWrapMode::Extend);
+    let name = name.into_galley(ui, extend, f32::INFINITY, TextStyle::Small);
+    let width = moves::SYMBOL + ui.spacing().item_spacing.x + name.size().x;
+    if ui.available_size_before_wrap().x < width {
+        ui.end_row();
+    }
+    moves::symbol(ui, kind);
+    ui.label(name);
+    ui.add_space(4.0);
 }
 
 #[cfg(test)]

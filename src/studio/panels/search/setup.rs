@@ -10,6 +10,7 @@ use crate::lens::{Lens, Medium};
 use crate::search::element::piece_count;
 use crate::search::{MutationKind, SearchMethod, SearchRules, SearchSettings};
 use crate::session::{SessionView, StructureSearchRequest};
+use crate::studio::form::named_list;
 use crate::studio::text::counted;
 
 /// The settings of the panel.
@@ -106,7 +107,7 @@ impl SearchSetup {
                 ui.selectable_value(&mut settings.method, method, name).on_hover_text(hint);
             }
         });
-        combo.response.accessible_name("Search method");
+        named_list(ui, combo, "Search method");
         ui.end_row();
         ui.weak("Sampling");
         ui.horizontal(|ui| {

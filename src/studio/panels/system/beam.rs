@@ -4,6 +4,7 @@ use egui::{ComboBox, Ui};
 
 use crate::lens::{Aperture, Edit, FieldKind, Lens, Object};
 use crate::paraxial::FirstOrder;
+use crate::studio::form::named_list;
 use crate::studio::number;
 use crate::studio::panels::design_results;
 use crate::studio::panels::edit_form::{EditForm, heading};
@@ -73,7 +74,7 @@ fn aperture(ui: &mut Ui, form: &mut EditForm<'_>) {
                 }
             }
         });
-        shown.response.accessible_name("Aperture kind");
+        named_list(ui, shown, "Aperture kind");
         form.number(ui, "Aperture value", (value(aperture), 66.0), |value| {
             Edit::SetAperture(with_value(aperture, value))
         });

@@ -5,6 +5,7 @@ use egui::{Button, ComboBox, DragValue, Grid, Ui};
 use super::beam::own_positions;
 use crate::lens::{Edit, FieldKind, FieldPoint, Fields, Object};
 use crate::session::{Analyses, SessionView};
+use crate::studio::form::named_list;
 use crate::studio::form::number_field;
 use crate::studio::panels::design_results;
 use crate::studio::panels::edit_form::{EditForm, heading};
@@ -69,7 +70,7 @@ fn kind(ui: &mut Ui, form: &mut EditForm<'_>) {
             }
         }
     });
-    shown.response.accessible_name("Field kind");
+    named_list(ui, shown, "Field kind");
 }
 
 /// The fields as another quantity, by first-order optics where the lens has it.

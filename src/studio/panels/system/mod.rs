@@ -8,7 +8,7 @@ pub(super) use beam::{
     kind_of as aperture_kind, value as aperture_value, with_value as aperture_with_value,
 };
 
-use egui::{Context, ScrollArea, Ui, UiBuilder};
+use egui::{Align, Context, Layout, ScrollArea, Ui, UiBuilder, vec2};
 
 use super::Panel;
 use super::edit_form::{EditForm, heading};
@@ -20,6 +20,8 @@ use fields::EqualAreaSteps;
 
 /// The width in points from which the groups stand in two columns.
 const TWO_COLUMNS: f32 = 540.0;
+/// The width in points of the names of the texts, whose fields begin below each other.
+const NAMES: f32 = 46.0;
 
 /// The panel.
 #[derive(Debug, Default)]
@@ -81,7 +83,11 @@ fn texts(ui: &mut Ui, form: &mut EditForm<'_>) {
     ];
     for (name, shown, edit) in texts {
         ui.horizontal(|ui| {
-            ui.label(name);
+            let size = vec2(NAMES, ui.spacing().interact_size.y);
+            ui.allocate_ui_with_layout(size, Layout::left_to_right(Align::Center), |ui| {
+                ui.set_min_width(NAMES);
+                ui.label(name);
+            });
             let width = ui.available_width();
             let accessible = format!("{name} of the lens");
             form.text(ui, &accessible, (shown, width), |text| Ok(edit(text.to_owned())));

@@ -4,6 +4,7 @@ use egui::{ComboBox, Grid, Ui};
 
 use super::fields::delete_button;
 use crate::lens::{Edit, Wavelength, WavelengthPreset};
+use crate::studio::form::named_list;
 use crate::studio::palette::{Palette, color32};
 use crate::studio::panels::edit_form::{EditForm, heading};
 use crate::studio::panels::widgets::swatch;
@@ -35,7 +36,7 @@ fn presets(ui: &mut Ui, form: &mut EditForm<'_>) {
             }
         }
     });
-    shown.response.accessible_name("Wavelength preset");
+    named_list(ui, shown, "Wavelength preset");
 }
 
 fn table(ui: &mut Ui, form: &mut EditForm<'_>) {

@@ -13,6 +13,7 @@ use super::badge;
 use crate::lens::{Edit, Freeform, IdealElement, Lens, Parameter, Quantity, Row};
 use crate::session::{Command, SessionView};
 use crate::studio::actions::Actions;
+use crate::studio::form::named_list;
 use crate::studio::number;
 use crate::studio::panels::edit_form::EditForm;
 use crate::studio::panels::valid_edit;
@@ -294,7 +295,7 @@ fn choose<T: Copy + PartialEq>(
                 }
             }
         });
-        shown.response.accessible_name(name);
+        named_list(ui, shown, name);
     });
     picked
 }
