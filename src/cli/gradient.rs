@@ -96,6 +96,11 @@ impl GradientArgs {
         opened.check_zoom(self.zoom)?;
         let refuse = |source| CliError::RayModel { file: opened.file.clone(), source };
         let mut lens = self.selected_lens(&opened)?;
+        if lens.stop().is_some_and(|stop| lens.surfaces[stop].hyperhemisphere) {
+            let text = "the stop is a hyperhemisphere, of which both halves have the same height; \
+                        expected the stop on a surface of its own";
+            return Err(CliError::Input(format!("{}: {text}", opened.file)));
+        }
         let measured = effects::measure_effects(&lens, 0).map_err(refuse)?;
         let plan = choices.plan(&measured, TracePurpose::Exact);
         let model = effects::build_ray_model(&lens, 0, &plan).map_err(refuse)?;
@@ -104,10 +109,11 @@ impl GradientArgs {
         let (found, ms) = time_ms(|| self.differentiate(&model));
         let found = found.map_err(|cause| {
             let text = format!("{}: {cause}", opened.file);
-            if matches!(cause, DerivativeError::Dark(..) | DerivativeError::Launch(_)) {
-                CliError::Input(text)
-            } else {
-                CliError::Failed(text)
+            match cause {
+                DerivativeError::Dark(..)
+                | DerivativeError::Launch(_)
+                | DerivativeError::Unbounded => CliError::Input(text),
+                _ => CliError::Failed(text),
             }
         })?;
         if found.least_rays > self.rays {

@@ -103,16 +103,12 @@ impl OptimizeArgs {
             return Err(CliError::no_light(&opened.file));
         }
         let effects = design.report(&opened.lens, &opened.file)?;
-        let (search, ms) = time_ms(|| self.search(optimizer.as_mut(), &stop));
+        let (search, ms) = time_ms(|| self.search(optimizer.as_mut(), &opened.lens, &stop));
         let mut failures = Failures::default();
         let exchanged = glasses.map(|found| exchange(found, &mut optimizer, &stop)).transpose();
         let glasses = failures.note(exchanged.map_err(|why| failure(&opened.file, why))).flatten();
         // The lens is saved before anything else is computed from it.
-        let Lens { variables, wavelengths, .. } = opened.lens.clone();
-        let mut best = Lens { wavelengths, variables, ..optimizer.best().clone() };
-        // A glass of the catalogue in place of a model glass has no index that varies.
-        let values = best.clone();
-        best.variables.retain(|variable| values.get(variable.parameter).is_some());
+        let best = with_own_parts(optimizer.best(), &opened.lens);
         let saved = failures.note(files::save(&best, &self.out)).is_some();
         failures.note(self.write_history(&search));
         let after = optimizer.terms().map_err(refuse)?;
@@ -168,7 +164,12 @@ impl OptimizeArgs {
     }
 
     /// Steps until convergence, the maximum number of steps or Ctrl-C.
-    fn search(&self, optimizer: &mut dyn Optimizer, stop: &AtomicBool) -> OptimizeRun {
+    fn search(
+        &self,
+        optimizer: &mut dyn Optimizer,
+        opened: &Lens,
+        stop: &AtomicBool,
+    ) -> OptimizeRun {
         let most = self.steps.unwrap_or(default_steps(self.method));
         let bar = progress_bar(most);
         let mut search = OptimizeRun { steps: Vec::new(), ended: OptimizeEnd::Steps };
@@ -187,10 +188,24 @@ impl OptimizeArgs {
                 break;
             }
         }
+        if search.ended == OptimizeEnd::Stopped {
+            // Whoever asks for an end may not wait for the check; a failure is told by the save behind it.
+            let _ = files::save(&with_own_parts(optimizer.best(), opened), &self.out);
+        }
         optimizer.verify_best();
         bar.finish_and_clear();
         search
     }
+}
+
+/// A lens with the variables and wavelengths of the file from which it comes.
+fn with_own_parts(lens: &Lens, opened: &Lens) -> Lens {
+    let Lens { variables, wavelengths, .. } = opened.clone();
+    let mut lens = Lens { wavelengths, variables, ..lens.clone() };
+    // A glass of the catalogue in place of a model glass has no index that varies.
+    let values = lens.clone();
+    lens.variables.retain(|variable| values.get(variable.parameter).is_some());
+    lens
 }
 
 /// An error of the merit function.

@@ -124,6 +124,11 @@ impl Row {
         terms.iter_mut().zip(&self.asphere).for_each(|(to, from)| *to = *from);
         Shape::simplest(self.curvature, self.conic, terms)
     }
+
+    /// True if the surface curves back to the axis, as a sphere and an ellipsoid do, and so has a far half.
+    pub fn has_far_half(&self) -> bool {
+        self.curvature != 0.0 && self.conic > -1.0 && self.asphere.iter().all(|term| *term == 0.0)
+    }
 }
 
 impl<R: Real> System<R> {

@@ -15,7 +15,7 @@ use rayon::ThreadPoolBuilder;
 const MIN_PAIRS: usize = 4;
 /// The longest time for the pairs of one effect, in seconds: behind it only two pairs are measured, which tell
 /// an error.
-const MAX_SECONDS: f64 = 1.0;
+const MAX_SECONDS: f64 = 0.4;
 /// A saving is known once its error is below this part of it.
 const RELATIVE_ERROR: f64 = 0.25;
 /// A saving of this part of the time with the effect is too small to be told from none.

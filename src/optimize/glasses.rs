@@ -1,15 +1,16 @@
 //! Exchange of glasses, guided by predictions of the merit behind it.
 //!
 //! Another glass moves the focus by more than one step of the variables takes back, so the powers of its
-//! surfaces are held first: their curvatures follow the change of the index. From there the step of
-//! Gauss and Newton, with the normal matrix of the lens as it is, says what optimization will gain; one
-//! factorization serves all glasses. The most promising ones are then really optimized.
+//! surfaces are held first: their curvatures follow the change of the index. How the merit and its gradient
+//! follow index and Abbe number of each glass, and the normal matrix of the variables, tell to second order
+//! what is left after optimization; one factorization serves all glasses. The most promising ones are then
+//! really optimized.
 
 use super::{DescentMethod, Optimizer, start_with};
 use crate::lens::glass::{self, Glass};
 use crate::lens::{Lens, Medium, Parameter, Quantity, SurfaceNumber, System};
-use crate::merit::{DerivativeLevel, Goal, LimitTreatment, Merit, MeritError};
-use nalgebra::{Cholesky, DVector, Dyn};
+use crate::merit::{DerivativeLevel, Goal, LimitTreatment, Merit, MeritError, SumOfSquares};
+use nalgebra::{Cholesky, DMatrix, Dyn, Matrix2, Vector2};
 use rand::SeedableRng as _;
 use rand::seq::SliceRandom as _;
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -31,7 +32,9 @@ const LEAST_GAIN: f64 = 1e-3;
 const PATIENCE: usize = 2;
 /// The relative tolerance of the spots of predictions.
 const PREDICTION_TOLERANCE: f64 = 1e-2;
-/// The damping of the step that predicts, relative to the diagonal of the normal matrix.
+/// The changes of index and Abbe number by which predictions are made.
+const STEPS: [f64; 2] = [1e-3, 0.2];
+/// The damping of the matrix that predicts, relative to the diagonal of the normal matrix.
 const DAMPING: f64 = 1e-4;
 /// The change of a curvature up to which it follows the index.
 const LARGEST_BENDING: f64 = 2.0;
@@ -289,70 +292,109 @@ impl GlassSearch {
         }
     }
 
-    /// Exchanges with their predictions, the lowest merit last; without those that have none.
+    /// Exchanges with their predictions, the lowest merit last.
     fn predicted(&mut self, all: Vec<Exchanged>) -> Result<Vec<Exchanged>, MeritError> {
-        let predictor = Predictor::new(&self.best, &self.goal, &self.initial_light)?;
-        self.evaluations += 1 + 2 * all.len();
-        let predict = |exchanged: Exchanged| predictor.predict(exchanged);
-        let mut found: Vec<Exchanged> = all.into_par_iter().filter_map(predict).collect();
+        let (predictor, used) = Predictor::new(&self.best, &self.goal, &self.initial_light)?;
+        self.evaluations += used;
+        let predict = |mut found: Exchanged| {
+            let glass = glass::find(&found.exchange.to)?;
+            found.exchange.predicted = predictor.predict(found.exchange.surface.index(), glass);
+            Some(found)
+        };
+        let mut found: Vec<Exchanged> = all.into_iter().filter_map(predict).collect();
         let merit = |found: &Exchanged| found.exchange.predicted.unwrap_or(f64::INFINITY);
         found.sort_by(|a, b| merit(b).total_cmp(&merit(a)));
         Ok(found)
     }
 }
 
-/// The normal matrix of a lens, factorized, with which the merit of others is predicted.
+/// What a lens becomes with other glasses, after optimization, to second order.
+///
+/// With the gradient `g` and the matrix `H` of the variables, changes `Δ` of index and Abbe number of one
+/// glass add `F' Δ + ½ Δᵀ F'' Δ` to the merit and `G Δ` to the gradient; the variables take back
+/// `½ (g + G Δ)ᵀ H⁻¹ (g + G Δ)`.
 struct Predictor {
-    merit: Merit,
-    factors: Cholesky<f64, Dyn>,
+    merit: f64,
+    /// The numbers of each glass that is exchanged.
+    sites: Vec<(usize, SiteModel)>,
+}
+
+/// The merit after optimization as a function of the index and the Abbe number of one glass.
+struct SiteModel {
+    /// Index and Abbe number of the present glass.
+    numbers: [f64; 2],
+    slope: Vector2<f64>,
+    bend: Matrix2<f64>,
 }
 
 impl Predictor {
-    fn new(lens: &Lens, goal: &Goal, light: &[Vec<f64>]) -> Result<Self, MeritError> {
+    /// Predicts from a lens; the second number is that of evaluations.
+    fn new(lens: &Lens, goal: &Goal, light: &[Vec<f64>]) -> Result<(Self, usize), MeritError> {
         let goal = Goal { limits: LimitTreatment::Penalties, ..goal.clone() };
         let (mut lens, rows) = (lens.clone(), sites(lens));
         without_indices(&mut lens, &rows);
         let merit = Merit::new(&lens, &goal, PREDICTION_TOLERANCE)?.with_initial_light(light);
         let sum = merit.evaluate(&merit.values(&lens), DerivativeLevel::Normal)?;
-        let mut matrix = sum.normal;
+        let mut matrix = 2.0 * sum.normal;
         let smallest = f64::MIN_POSITIVE.max(1e-12 * matrix.diagonal().amax());
         for i in 0..matrix.nrows() {
             matrix[(i, i)] += DAMPING * matrix[(i, i)] + smallest;
         }
         let factors = matrix.cholesky().ok_or(MeritError::NoVariables)?;
-        Ok(Self { merit, factors })
+        let model = |row: &usize| Some((*row, SiteModel::new(&lens, *row, &merit, &factors)?));
+        let sites: Vec<_> = rows.par_iter().filter_map(model).collect();
+        Ok((Self { merit: sum.value, sites }, 1 + 6 * rows.len()))
     }
 
-    /// The merit of a lens with another glass after one step; `None` if it has none.
-    fn predict(&self, exchanged: Exchanged) -> Option<Exchanged> {
-        let Exchanged { exchange, lens } = exchanged;
-        let merit = self.merit.with_lens(&lens).ok()?;
-        let values = merit.values(&lens);
-        let sum = merit.evaluate(&values, DerivativeLevel::Gradient).ok()?;
-        let step = self.factors.solve(&(-0.5 * sum.gradient));
-        let stepped = within_bounds(&merit, &values, &step);
-        let found = merit.value(&stepped).unwrap_or(f64::INFINITY);
-        if found < sum.value {
-            Some(with_prediction(exchange, merit.lens(&stepped), found))
-        } else {
-            Some(with_prediction(exchange, lens, sum.value))
-        }
+    /// The merit with another glass; `None` if nothing is known of the glass before.
+    fn predict(&self, row: usize, glass: &Glass) -> Option<f64> {
+        let (_, site) = self.sites.iter().find(|(other, _)| *other == row)?;
+        let change = Vector2::new(glass.nd - site.numbers[0], glass.vd - site.numbers[1]);
+        Some(self.merit + site.slope.dot(&change) + 0.5 * change.dot(&(site.bend * change)))
     }
 }
 
-fn with_prediction(exchange: GlassExchange, lens: Lens, merit: f64) -> Exchanged {
-    Exchanged { exchange: GlassExchange { predicted: Some(merit), ..exchange }, lens }
+impl SiteModel {
+    /// Differences of the merit and of its gradient by index and Abbe number of the glass behind a row.
+    fn new(lens: &Lens, row: usize, merit: &Merit, factors: &Cholesky<f64, Dyn>) -> Option<Self> {
+        let numbers = match &lens.surfaces[row].medium {
+            Medium::Glass(name) => glass::find(name).map(|glass| [glass.nd, glass.vd])?,
+            Medium::Model { nd, vd } => [*nd, *vd],
+            _ => return None,
+        };
+        let at = |steps: [f64; 2]| {
+            let [nd, vd] = [0, 1].map(|i| numbers[i] + steps[i] * STEPS[i]);
+            let lens = with_medium(lens, row, Medium::Model { nd, vd })?;
+            let merit = merit.with_lens(&lens).ok()?;
+            merit.evaluate(&merit.values(&lens), DerivativeLevel::Gradient).ok()
+        };
+        let middle = at([0.0; 2])?;
+        let ends = [[1.0, 0.0], [0.0, 1.0]].map(|s| Some((at(s)?, at(s.map(|v| -v))?)));
+        let [Some(index), Some(abbe)] = ends else { return None };
+        let both = at([1.0, 1.0])?;
+        let slope = |(up, down): &Ends, i: usize| 0.5 * (up.value - down.value) / STEPS[i];
+        let bend = |(up, down): &Ends, i: usize| {
+            (up.value - 2.0 * middle.value + down.value) / STEPS[i].powi(2)
+        };
+        let mixed =
+            (both.value - index.0.value - abbe.0.value + middle.value) / (STEPS[0] * STEPS[1]);
+        let change =
+            |(up, down): &Ends, i: usize| (&up.gradient - &down.gradient) / (2.0 * STEPS[i]);
+        let by = DMatrix::from_columns(&[change(&index, 0), change(&abbe, 1)]);
+        let taken_back = factors.solve(&by);
+        let (linear, square) =
+            (taken_back.transpose() * &middle.gradient, by.transpose() * taken_back);
+        Some(Self {
+            numbers,
+            slope: Vector2::new(slope(&index, 0), slope(&abbe, 1)) - linear.fixed_rows::<2>(0),
+            bend: Matrix2::new(bend(&index, 0), mixed, mixed, bend(&abbe, 1))
+                - square.fixed_view::<2, 2>(0, 0),
+        })
+    }
 }
 
-/// Values after a step, within the bounds of the variables.
-fn within_bounds(merit: &Merit, values: &[f64], step: &DVector<f64>) -> Vec<f64> {
-    let variables = merit.variables().iter().zip(values.iter().zip(step.iter()));
-    let bounded = |(variable, (value, step)): (&crate::lens::Variable, (&f64, &f64))| {
-        let to = value + step;
-        to.max(variable.min.unwrap_or(f64::NEG_INFINITY)).min(variable.max.unwrap_or(f64::INFINITY))
-    };
-    variables.map(bounded).collect()
-}
+/// The merit above and below a number.
+type Ends = (SumOfSquares, SumOfSquares);
 
 /// The next exchanges, taken from the end of those that wait: not too many at one surface.
 fn choose(waiting: &mut Vec<Exchanged>) -> Vec<Exchanged> {
@@ -404,15 +446,22 @@ fn exchanged(lens: &Lens, row: usize, glass: &Glass) -> Option<Exchanged> {
     if from == to {
         return None;
     }
+    let other = with_medium(lens, row, Medium::Glass(to.clone()))?;
+    let surface = SurfaceNumber::new(row);
+    let exchange = GlassExchange { surface, from, to, predicted: None, merit: None };
+    Some(Exchanged { exchange, lens: other })
+}
+
+/// The lens with another medium behind a row, and with the powers of its two surfaces as they were;
+/// `None` if the lens cannot have it.
+fn with_medium(lens: &Lens, row: usize, medium: Medium) -> Option<Lens> {
     let mut other = lens.clone();
-    other.surfaces[row].medium = Medium::Glass(to.clone());
+    other.surfaces[row].medium = medium;
     without_indices(&mut other, &[row]);
     hold_powers(&mut other, lens, row)?;
     let other = other.with_pickups().ok()?;
     other.check().ok()?;
-    let surface = SurfaceNumber::new(row);
-    let exchange = GlassExchange { surface, from, to, predicted: None, merit: None };
-    Some(Exchanged { exchange, lens: other })
+    Some(other)
 }
 
 /// Takes the indices behind some rows from the variables: a glass of the catalogue has none that varies.

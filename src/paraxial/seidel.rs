@@ -34,6 +34,11 @@ pub struct SeidelSums<R> {
 }
 
 impl<R: Real> SeidelSums<R> {
+    fn is_finite(&self) -> bool {
+        let Self { s1, s2, s3, s4, s5, c1, c2 } = *self;
+        [s1, s2, s3, s4, s5, c1, c2].into_iter().all(|sum| sum.value().is_finite())
+    }
+
     fn plus(self, o: &Self) -> Self {
         Self {
             s1: self.s1 + o.s1,
@@ -58,8 +63,8 @@ pub struct Seidel<R> {
 
 /// The third-order sums along the marginal and chief ray of `data`, which belongs to `system`.
 /// `outer` is the same lens at the shortest and the longest wavelength; without it the chromatic
-/// sums are zero. `None` without a chief ray, and for a lens with a GRIN medium, whose third-order
-/// contributions are not implemented.
+/// sums are zero. `None` without a chief ray, for surfaces so steep that a sum is no finite number, and
+/// for a lens with a GRIN medium, whose third-order contributions are not implemented.
 pub fn seidel<R: Real>(
     system: &System<R>,
     data: &FirstOrder<R>,
@@ -91,7 +96,8 @@ pub fn seidel<R: Real>(
     };
     let surfaces: Vec<_> = (0..system.surfaces.len().saturating_sub(1)).map(at).collect();
     let total = surfaces.iter().fold(SeidelSums::default(), SeidelSums::plus);
-    Some(Seidel { surfaces, total })
+    let is_finite = surfaces.iter().chain([&total]).all(SeidelSums::is_finite);
+    is_finite.then_some(Seidel { surfaces, total })
 }
 
 /// `δn/n` of every gap.

@@ -71,6 +71,11 @@ pub(super) fn unusual_parts(lens: &Lens) -> Vec<LensCheck> {
         checks.push(LensCheck { surface: None, found: found.to_owned() });
     }
     for (i, row) in rows() {
+        if row.hyperhemisphere && !row.has_far_half() {
+            let found = "a hyperhemisphere without a far half, which only a sphere or an ellipsoid has: \
+                         `hyper` changes nothing";
+            checks.push(LensCheck { surface: Some(i), found: found.to_owned() });
+        }
         if let Some(ideal) = row.ideal {
             let found = format!(
                 "{}: Seidel sums leave it out; the optical path of a paraxial lens is that of a plane \

@@ -117,12 +117,14 @@ impl ZoomReport {
             stop_surface: system.stop,
             total_track: system.image_position(),
             seidel: seidel_sums(opened, zoom, &data)?,
-            first_order: data,
             no_seidel: if system.has_grin() {
                 "those of a gradient-index medium are not implemented"
-            } else {
+            } else if data.chief.is_none() || data.lagrange.is_none() {
                 "there is no chief ray"
+            } else {
+                "a surface is so steep that they are no finite numbers"
             },
+            first_order: data,
             checks,
             effects,
         })
@@ -142,10 +144,16 @@ fn seidel_sums(
     Ok(seidel(&system, data, Some((&outer.0, &outer.1))))
 }
 
+/// The Seidel sum in mm from which on it is written with an exponent.
+const LARGEST_PLAIN_SUM: f64 = 1e5;
+
 /// A row of the table of Seidel sums.
 fn seidel_row(name: String, sums: &SeidelSums<f64>) -> impl Iterator<Item = String> {
     let SeidelSums { s1, s2, s3, s4, s5, c1, c2 } = *sums;
-    let cells = [s1, s2, s3, s4, s5, c1, c2].map(|sum| format!("{sum:.6}"));
+    let cell = |sum: f64| {
+        if sum.abs() < LARGEST_PLAIN_SUM { format!("{sum:.6}") } else { format!("{sum:.5e}") }
+    };
+    let cells = [s1, s2, s3, s4, s5, c1, c2].map(cell);
     std::iter::once(name).chain(cells)
 }
 

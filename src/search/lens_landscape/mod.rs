@@ -82,6 +82,19 @@ pub struct LensLandscape {
     focal_length: f64,
 }
 
+/// The most surfaces of a lens whose structure is searched: a gradient of more takes minutes.
+const MAX_SURFACES: usize = 200;
+
+/// Refuses a lens with too many surfaces.
+fn check_size(lens: &Lens) -> Result<(), LandscapeError> {
+    let found = lens.surfaces.len();
+    if found <= MAX_SURFACES {
+        return Ok(());
+    }
+    let what = "the number of surfaces";
+    Err(LandscapeError::Setting { what, found: found.to_string(), expected: "at most 200" })
+}
+
 /// Refuses a lens whose surfaces or media change with the zoom position: mutations know the gaps alone.
 fn check_zoom_numbers(lens: &Lens) -> Result<(), LandscapeError> {
     let mut numbers = lens.zoom.iter().flat_map(|position| &position.numbers);
@@ -109,6 +122,7 @@ impl LensLandscape {
         local: &DescentSettings,
     ) -> Result<Self, LandscapeError> {
         local.check()?;
+        check_size(lens)?;
         check_zoom_numbers(lens)?;
         let rules = rules.normalize()?;
         rules.check_fixed_ends(lens.surfaces.len())?;
