@@ -189,8 +189,11 @@ impl OptimizeArgs {
             }
         }
         if search.ended == OptimizeEnd::Stopped {
-            // Whoever asks for an end may not wait for the check; a failure is told by the save behind it.
-            let _ = files::save(&with_own_parts(optimizer.best(), opened), &self.out);
+            // Whoever asks for an end may not wait for the check behind it.
+            let best = with_own_parts(optimizer.best(), opened);
+            if let Err(why) = files::save(&best, &self.out) {
+                log::warn!("not saved yet: {why}");
+            }
         }
         optimizer.verify_best();
         bar.finish_and_clear();

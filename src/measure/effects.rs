@@ -9,6 +9,7 @@ use crate::effects::{
 use crate::lens::Lens;
 use crate::pupil::{Accuracy, RayModelError};
 use rayon::ThreadPoolBuilder;
+use std::ops::ControlFlow;
 
 /// The fewest pairs of measurements, with an effect and without it. Of each kind the shortest counts:
 /// whatever else the machine does only makes a run longer.
@@ -16,6 +17,10 @@ const MIN_PAIRS: usize = 4;
 /// The longest time for the pairs of one effect, in seconds: behind it only two pairs are measured, which tell
 /// an error.
 const MAX_SECONDS: f64 = 0.4;
+/// The longest time for a pair that is measured again, and that after which no other effect is measured, in
+/// seconds.
+const MAX_SECONDS_OF_PAIR: f64 = 1.0;
+const MAX_SECONDS_IN_ALL: f64 = 4.0;
 /// A saving is known once its error is below this part of it.
 const RELATIVE_ERROR: f64 = 0.25;
 /// A saving of this part of the time with the effect is too small to be told from none.
@@ -37,8 +42,8 @@ pub struct EffectTask<'a> {
 }
 
 impl EffectTask<'_> {
-    /// Plans the effects and measures the cost of each. Returns `None` if `interrupted` returns true
-    /// between two measurements.
+    /// Plans the effects and measures the cost of each, but for those whose spots take too long. Returns
+    /// `None` if `interrupted` returns true between two measurements.
     ///
     /// # Errors
     /// A lens or aperture through which nothing can be traced.
@@ -48,8 +53,15 @@ impl EffectTask<'_> {
         interrupted: impl Fn() -> bool,
     ) -> Option<EffectPlan> {
         let mut plan = self.plan(facts, self.overrides);
+        let watch = Stopwatch::start();
         for decision in &mut plan.decisions {
-            decision.cost = Some(self.cost(facts, decision.effect, &interrupted)?);
+            if watch.seconds() > MAX_SECONDS_IN_ALL {
+                break;
+            }
+            decision.cost = match self.cost(facts, decision.effect, &interrupted) {
+                ControlFlow::Continue(cost) => cost,
+                ControlFlow::Break(()) => return None,
+            };
         }
         Some(plan)
     }
@@ -66,17 +78,18 @@ impl EffectTask<'_> {
         effects::plan(facts, TracePurpose::Spot(self.tolerance), overrides)
     }
 
-    /// The time that an effect takes, by alternating runs with it and without it.
+    /// The time that an effect takes, by alternating runs with it and without it; `None` if one pair takes
+    /// too long for an error. It breaks off if it is interrupted.
     fn cost(
         &self,
         facts: &EffectMeasurements,
         effect: Effect,
         interrupted: &impl Fn() -> bool,
-    ) -> Option<EffectCost> {
+    ) -> ControlFlow<(), Option<EffectCost>> {
         let plans = [EffectOverride::On, EffectOverride::Off]
             .map(|choice| self.plan(facts, &self.overrides.clone().with(effect, choice)));
         if computes_same(&plans) {
-            return Some(EffectCost::default());
+            return ControlFlow::Continue(Some(EffectCost::default()));
         }
         // Threads of its own: work that waits for the shared ones is no cost of an effect.
         let pool = ThreadPoolBuilder::new().build().ok();
@@ -88,7 +101,7 @@ impl EffectTask<'_> {
         for pair in 1.. {
             for (times, plan) in times.iter_mut().zip(&plans) {
                 if interrupted() {
-                    return None;
+                    return ControlFlow::Break(());
                 }
                 times.add(run(plan));
             }
@@ -96,8 +109,11 @@ impl EffectTask<'_> {
             if is_known || (pair >= 2 && watch.seconds() > MAX_SECONDS) {
                 break;
             }
+            if watch.seconds() > MAX_SECONDS_OF_PAIR {
+                return ControlFlow::Continue(None);
+            }
         }
-        Some(saving(&times))
+        ControlFlow::Continue(Some(saving(&times)))
     }
 
     /// The number of spots of the lens resolved by a plan; 0 if it cannot be.

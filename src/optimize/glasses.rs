@@ -20,7 +20,7 @@ use serde::Serialize;
 /// The number of exchanges that are optimized in a round.
 const TRIALS: usize = 8;
 /// The largest number of them at one surface.
-const TRIALS_OF_SURFACE: usize = 4;
+const TRIALS_OF_SURFACE: usize = 2;
 /// The steps of such a trial, and those of the best one of a round.
 const TRIAL_STEPS: usize = 20;
 const FINAL_STEPS: usize = 200;
@@ -28,8 +28,17 @@ const FINAL_STEPS: usize = 200;
 const PROMISING: f64 = 1.5;
 /// The least gain of an exchange that is taken, relative to the merit.
 const LEAST_GAIN: f64 = 1e-3;
-/// The rounds without a gain after which the search ends.
-const PATIENCE: usize = 2;
+/// The rounds without a gain after which the search ends: by then the reach is all of the glass map.
+const PATIENCE: usize = 5;
+/// The changes of index and Abbe number that count as one unit of distance.
+const NEAR: [f64; 2] = [0.02, 3.0];
+/// The distance up to which glasses are tried first: predictions hold nearby. It doubles with every round
+/// without a gain.
+const FIRST_REACH: f64 = 2.0;
+/// Half of the trials may be this much farther, where predictions are rough and gains large.
+const FARTHER: f64 = 6.0;
+/// A lens that needs this many times the rays of the present one is not optimized: its pupils are in pieces.
+const MOST_RAYS: usize = 8;
 /// The relative tolerance of the spots of predictions.
 const PREDICTION_TOLERANCE: f64 = 1e-2;
 /// The changes of index and Abbe number by which predictions are made.
@@ -107,11 +116,16 @@ pub struct GlassSearch {
     initial_light: Vec<Vec<f64>>,
     best: Lens,
     merit: f64,
+    /// The rays of one evaluation of the first lens.
+    rays: usize,
     /// The exchanges of the best lens that were not tried yet, the next one last.
     waiting: Option<Vec<Exchanged>>,
     evaluations: usize,
     rounds: u64,
+    /// The rounds since the last gain.
     idle: usize,
+    /// The distance up to which glasses are tried now.
+    reach: f64,
 }
 
 /// A lens with another glass.
@@ -119,6 +133,8 @@ pub struct GlassSearch {
 struct Exchanged {
     exchange: GlassExchange,
     lens: Lens,
+    /// The distance of the two glasses, in units of [`NEAR`].
+    distance: f64,
 }
 
 /// A trial and the evaluations that it took.
@@ -149,6 +165,7 @@ impl GlassSearch {
         Ok(Self {
             merit: merit.value(&merit.values(lens))?,
             initial_light: merit.initial_light().to_vec(),
+            rays: rays(&merit),
             goal: goal.clone(),
             tolerance,
             glasses,
@@ -158,6 +175,7 @@ impl GlassSearch {
             evaluations: 1,
             rounds: 0,
             idle: 0,
+            reach: first_reach(order),
         })
     }
 
@@ -191,7 +209,7 @@ impl GlassSearch {
         let merit = merit.with_initial_light(&self.initial_light);
         self.merit = merit.value(&merit.values(lens))?;
         self.best = lens.clone();
-        (self.waiting, self.idle) = (None, 0);
+        (self.waiting, self.idle, self.reach) = (None, 0, first_reach(self.order));
         Ok(())
     }
 
@@ -205,7 +223,12 @@ impl GlassSearch {
             Some(waiting) => waiting,
             None => self.exchanges()?,
         };
-        let chosen = choose(&mut waiting);
+        let mut chosen = choose(&mut waiting, self.reach, TRIALS / 2);
+        chosen.extend(choose(&mut waiting, FARTHER * self.reach, TRIALS - chosen.len()));
+        if chosen.is_empty() {
+            self.reach = f64::INFINITY;
+            chosen = choose(&mut waiting, self.reach, TRIALS);
+        }
         let trials: Vec<Trial> = chosen
             .into_par_iter()
             .map(|exchanged| self.optimized(exchanged, TRIAL_STEPS))
@@ -213,7 +236,11 @@ impl GlassSearch {
         self.evaluations += trials.iter().map(|(_, used)| used).sum::<usize>();
         let tried = trials.iter().map(|(tried, _)| tried.exchange.clone()).collect();
         let accepted = self.take_best(trials);
-        self.idle = if accepted.is_some() { 0 } else { self.idle + 1 };
+        if accepted.is_some() {
+            (self.idle, self.reach) = (0, (0.5 * self.reach).max(FIRST_REACH));
+        } else {
+            (self.idle, self.reach) = (self.idle + 1, 2.0 * self.reach);
+        }
         let is_over = waiting.is_empty() || self.idle >= PATIENCE;
         self.waiting = accepted.is_none().then_some(waiting);
         Ok(GlassRound {
@@ -256,6 +283,9 @@ impl GlassSearch {
     /// A lens after some steps, its merit with its limits as penalties, and the evaluations.
     fn descend(&self, lens: &Lens, steps: usize) -> Option<(Lens, f64, usize)> {
         let merit = Merit::new(lens, &self.goal, self.tolerance).ok()?;
+        if rays(&merit) > MOST_RAYS * self.rays {
+            return None;
+        }
         let merit = merit.with_initial_light(&self.initial_light);
         let method = DescentMethod::TrustRegion;
         let mut optimizer = start_with(method, merit, lens, self.tolerance).ok()?;
@@ -357,11 +387,7 @@ impl Predictor {
 impl SiteModel {
     /// Differences of the merit and of its gradient by index and Abbe number of the glass behind a row.
     fn new(lens: &Lens, row: usize, merit: &Merit, factors: &Cholesky<f64, Dyn>) -> Option<Self> {
-        let numbers = match &lens.surfaces[row].medium {
-            Medium::Glass(name) => glass::find(name).map(|glass| [glass.nd, glass.vd])?,
-            Medium::Model { nd, vd } => [*nd, *vd],
-            _ => return None,
-        };
+        let numbers = numbers(&lens.surfaces[row].medium)?;
         let at = |steps: [f64; 2]| {
             let [nd, vd] = [0, 1].map(|i| numbers[i] + steps[i] * STEPS[i]);
             let lens = with_medium(lens, row, Medium::Model { nd, vd })?;
@@ -396,14 +422,26 @@ impl SiteModel {
 /// The merit above and below a number.
 type Ends = (SumOfSquares, SumOfSquares);
 
-/// The next exchanges, taken from the end of those that wait: not too many at one surface.
-fn choose(waiting: &mut Vec<Exchanged>) -> Vec<Exchanged> {
+/// The rays of one evaluation.
+fn rays(merit: &Merit) -> usize {
+    merit.spot_samplings().iter().map(|spot| spot.rays).sum()
+}
+
+/// The distance up to which glasses are tried first; a random order has no distance.
+fn first_reach(order: ExchangeOrder) -> f64 {
+    if order == ExchangeOrder::Predicted { FIRST_REACH } else { f64::INFINITY }
+}
+
+/// The next exchanges, at most so many, taken from the end of those that wait: not too many at one
+/// surface, and none farther than `reach`.
+fn choose(waiting: &mut Vec<Exchanged>, reach: f64, most: usize) -> Vec<Exchanged> {
     let mut chosen: Vec<Exchanged> = Vec::new();
     let mut left = Vec::new();
-    while chosen.len() < TRIALS {
+    while chosen.len() < most {
         let Some(next) = waiting.pop() else { break };
         let is_there = |other: &&Exchanged| other.exchange.surface == next.exchange.surface;
-        if chosen.iter().filter(is_there).count() < TRIALS_OF_SURFACE {
+        let is_near = next.distance <= reach;
+        if is_near && chosen.iter().filter(is_there).count() < TRIALS_OF_SURFACE {
             chosen.push(next);
         } else {
             left.push(next);
@@ -449,7 +487,22 @@ fn exchanged(lens: &Lens, row: usize, glass: &Glass) -> Option<Exchanged> {
     let other = with_medium(lens, row, Medium::Glass(to.clone()))?;
     let surface = SurfaceNumber::new(row);
     let exchange = GlassExchange { surface, from, to, predicted: None, merit: None };
-    Some(Exchanged { exchange, lens: other })
+    Some(Exchanged { exchange, lens: other, distance: distance(lens, row, glass)? })
+}
+
+/// The distance of a glass from that behind a row, in units of [`NEAR`].
+fn distance(lens: &Lens, row: usize, glass: &Glass) -> Option<f64> {
+    let [nd, vd] = numbers(&lens.surfaces[row].medium)?;
+    Some(((glass.nd - nd) / NEAR[0]).hypot((glass.vd - vd) / NEAR[1]))
+}
+
+/// The index and the Abbe number of a glass of the catalogue or a model glass.
+fn numbers(medium: &Medium) -> Option<[f64; 2]> {
+    match medium {
+        Medium::Glass(name) => glass::find(name).map(|glass| [glass.nd, glass.vd]),
+        Medium::Model { nd, vd } => Some([*nd, *vd]),
+        _ => None,
+    }
 }
 
 /// The lens with another medium behind a row, and with the powers of its two surfaces as they were;

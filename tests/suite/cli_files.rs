@@ -494,4 +494,44 @@ fn a_lens_file_has_hyperhemispheres() {
     let lost = |row: &&Value| row["text"] == "hyperhemisphere of surface 1";
     assert_eq!(rows.iter().find(lost).unwrap()["outcome"], "dropped");
     assert!(done(&["help", "lens-file"], "").contains("hyperhemisphere"));
+    // Both halves of such a stop have the same height, which limits no beam.
+    refused(2, &["gradient", &whole], "", &["whole.json", "the stop is a hyperhemisphere"]);
+    let file = fs::read_to_string(&whole).unwrap();
+    let plain = folder.file("plain.json", &file.replace("\"curvature\":0.1", "\"curvature\":0.0"));
+    let said = done(&["info", &plain], "");
+    assert!(said.contains("`hyper` changes nothing"), "{said}");
+}
+
+/// A surface of curvature 1e90 with an aspheric term: no sum and no beam, and every command says so.
+#[test]
+fn a_lens_with_a_needle_is_described_without_numbers_that_are_none() {
+    let folder = Folder::new("needle");
+    let text = fs::read_to_string("lenses/cooke_triplet_100_f27.json").unwrap();
+    let mut lens: Value = serde_json::from_str(&text).unwrap();
+    for row in [2, 3] {
+        lens["surfaces"][row]["curvature"] = 1e90.into();
+        lens["surfaces"][row]["asphere"] = json!([1e-7]);
+    }
+    let path = folder.file("needle.json", &lens.to_string());
+    let said = done(&["info", &path], "");
+    assert!(!said.contains("NaN") && !said.contains("inf "), "{said}");
+    assert!(said.lines().all(|line| line.len() < 400), "{said}");
+    for command in [vec!["gradient", &path], vec!["analyze", &path, "spot"]] {
+        refused(2, &command, "", &["needle.json"]);
+    }
+}
+
+#[test]
+fn a_search_refuses_a_lens_of_a_thousand_surfaces_by_name() {
+    let folder = Folder::new("many");
+    let text = fs::read_to_string("lenses/cooke_triplet_100_f27.json").unwrap();
+    let mut lens: Value = serde_json::from_str(&text).unwrap();
+    let rows = lens["surfaces"].as_array().unwrap().clone();
+    let plane = json!({"thickness": 0.001});
+    let many: Vec<Value> = rows.into_iter().chain(vec![plane; 900]).collect();
+    lens["surfaces"] = many.into();
+    let path = folder.file("many.json", &lens.to_string());
+    let out = folder.path("out.json");
+    let words = ["the number of surfaces is 907", "at most 200"];
+    refused(2, &["search", &path, "--iterations", "5", "--out", &out], "", &words);
 }

@@ -6,7 +6,7 @@ use aplanat::lens::glass::{self, Glass};
 use aplanat::lens::{Lens, Medium, Parameter, ParameterKind, Quantity, Variable, add_variables};
 use aplanat::merit::Goal;
 use aplanat::optimize::{
-    DescentMethod, ExchangeOrder, GlassRound, GlassSearch, GlassSearchError, Optimizer, start,
+    DescentMethod, ExchangeOrder, GlassRound, GlassSearch, GlassSearchError, start,
 };
 
 /// The relative accuracy of the spots.
@@ -24,7 +24,11 @@ fn lens(name: &str) -> Lens {
 /// A lens after a descent with its own glasses.
 fn optimized(lens: &Lens, goal: &Goal) -> Lens {
     let mut optimizer = start(DescentMethod::TrustRegion, lens, goal, TOLERANCE).unwrap();
-    while !optimizer.step().finished {}
+    for _ in 0..60 {
+        if optimizer.step().finished {
+            break;
+        }
+    }
     optimizer.verify_best();
     optimizer.best().clone()
 }
@@ -51,27 +55,31 @@ fn names(lens: &Lens) -> Vec<String> {
 }
 
 #[test]
-fn other_glasses_make_a_triplet_sharper_within_its_limits() {
-    let triplet = lens("cooke_triplet_100_f27");
-    let goal = Goal::default_for(&triplet).unwrap();
-    let mut search = search(&triplet, &goal, ExchangeOrder::Predicted);
+fn other_glasses_make_a_double_gauss_sharper_within_its_limits() {
+    let lens = lens("double_gauss_rudolph_50");
+    let goal = Goal::default_for(&lens).unwrap();
+    let mut search = search(&lens, &goal, ExchangeOrder::Predicted);
     let before = search.merit();
-    let first = search.round().unwrap();
-    let accepted = first.accepted.unwrap();
-    assert_eq!(first.tried.len(), 8);
+    let mut exchanged = Vec::new();
+    for _ in 0..3 {
+        let round = search.round().unwrap();
+        assert_eq!(round.tried.len(), 8);
+        assert_eq!(round.merit, search.merit());
+        exchanged.extend(round.accepted);
+    }
     assert!(search.merit() < 0.9 * before, "{before} -> {}", search.merit());
     assert!(violation(&search) < 1e-15, "{}", violation(&search));
-    let now = names(search.best());
-    let exchanged = now.iter().zip(names(&triplet)).filter(|(now, before)| *now != before).count();
-    assert_eq!(exchanged, 1, "{accepted:?}: {now:?}");
-    assert!(now.contains(&accepted.to) && accepted.merit == Some(search.merit()));
+    let (now, first) = (names(search.best()), names(&lens));
+    let changed = now.iter().zip(first).filter(|(now, first)| *now != first).count();
+    assert!((1..=exchanged.len()).contains(&changed), "{exchanged:?}: {now:?}");
+    assert!(now.contains(&exchanged.last().unwrap().to));
 }
 
-/// The eight that are predicted to be best are better than eight at random, after the same steps.
+/// The eight that are tried first are better than eight at random, after the same steps.
 #[test]
 fn predicted_exchanges_are_better_than_random_ones() {
     let mut better = 0;
-    for name in ["cooke_triplet_100_f27", "tessar_50_f28", "heliar_100_f45"] {
+    for name in ["achromat_ac254_100", "double_gauss_rudolph_50"] {
         let lens = lens(name);
         let goal = Goal::default_for(&lens).unwrap();
         let middle = |order| {
@@ -82,12 +90,10 @@ fn predicted_exchanges_are_better_than_random_ones() {
             0.5 * (merits[3] + merits[4])
         };
         let predicted = middle(ExchangeOrder::Predicted);
-        for seed in 1..=3 {
-            better += usize::from(predicted < middle(ExchangeOrder::Random(seed)));
-        }
+        better += (1..=4).filter(|seed| predicted < middle(ExchangeOrder::Random(*seed))).count();
     }
-    // By chance 7 of 9 or more once in eleven.
-    assert!(better >= 8, "{better} of 9");
+    // By chance 7 of 8 or more once in 28.
+    assert!(better >= 7, "{better} of 8");
 }
 
 #[test]
@@ -156,7 +162,7 @@ fn the_command_line_exchanges_glasses() {
     }
     let saved = files::json::read(&std::fs::read_to_string(&out).unwrap(), path).unwrap();
     let opened = names(&saved);
-    for exchange in glasses["accepted"].as_array().unwrap().last() {
+    if let Some(exchange) = glasses["accepted"].as_array().unwrap().last() {
         assert!(opened.contains(&exchange["to"].as_str().unwrap().to_owned()), "{opened:?}");
     }
     std::fs::remove_file(out).unwrap();

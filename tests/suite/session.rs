@@ -120,8 +120,7 @@ fn wait(
     happened: impl Fn(&SessionView, &[SessionEvent]) -> bool,
 ) {
     let mut events = Vec::new();
-    // Random aspheres may have rays that take long to cross: two minutes at most.
-    for _ in 0..60_000 {
+    for _ in 0..10_000 {
         events.extend(session.poll());
         if happened(&session.view(), &events) {
             return;
