@@ -249,14 +249,14 @@ impl Region<'_> {
             if rays + 2 * last > asked.max_rays && before.is_some() {
                 break;
             }
-            let mut now = self.at_order(cost, estimator, order)?;
+            let (mut now, natural) = self.at_order(cost, estimator, order)?;
             last = now.rays;
             rays += last;
             now.rays = rays;
             // A first change alone does not tell an agreement by chance.
             let is_confirmed = order > 1;
             now.add_order_error(before.as_ref());
-            now.reached = is_confirmed && now.reaches(asked.tolerance);
+            now.reached = is_confirmed && now.reaches_but_for_rounding(asked.tolerance, natural);
             if now.reached {
                 return Ok(now);
             }
@@ -265,20 +265,21 @@ impl Region<'_> {
         before.ok_or(DerivativeError::Unbounded)
     }
 
-    /// The derivative at one order; the rays are those of this order alone.
+    /// The derivative at one order, and the natural size of that by a number of each kind; the rays are those
+    /// of this order alone.
     fn at_order(
         &self,
         cost: &QuadraticIntegrand,
         estimator: DerivativeEstimator,
         order: usize,
-    ) -> Result<PupilDerivative, DerivativeError> {
+    ) -> Result<(PupilDerivative, impl Fn(SurfaceParameter) -> f64 + use<>), DerivativeError> {
         let lit = self.trace_pupil(order);
         let natural = natural_size(cost, &lit.moments);
         if estimator == DerivativeEstimator::Difference {
             let found = self.difference_derivative(cost, order);
             let mut found = found.ok_or(DerivativeError::Unbounded)?;
-            found.drop_rounding(DIFFERENCE_ROUNDING, natural);
-            return Ok(found);
+            found.drop_rounding(DIFFERENCE_ROUNDING, &natural);
+            return Ok((found, natural));
         }
         let by = match estimator {
             DerivativeEstimator::Biased => lit.biased_derivative(cost),
@@ -287,8 +288,8 @@ impl Region<'_> {
         let error = SystemGradient::zero(by.surfaces.len());
         let mut found =
             PupilDerivative { error, gradient: by, rays: lit.rays_traced, reached: false };
-        found.drop_rounding(ROUNDING, natural);
-        Ok(found)
+        found.drop_rounding(ROUNDING, &natural);
+        Ok((found, natural))
     }
 
     /// Raises the number of samples of the warp field.
@@ -351,6 +352,22 @@ impl PupilDerivative {
                 error.set(slot, larger);
             }
         }
+    }
+
+    /// True if the error of every number is within a tolerance of the largest of its kind, or is no more than
+    /// the rounding of the numbers on which the integral depends most: the indices of a large telescope
+    /// change its spot by what is left of terms that cancel.
+    fn reaches_but_for_rounding(
+        &self,
+        tolerance: f64,
+        natural: impl Fn(SurfaceParameter) -> f64,
+    ) -> bool {
+        let ratio = |slot| self.gradient.largest(slot) / natural(slot);
+        let [curvature, thickness] =
+            [SurfaceParameter::Curvature, SurfaceParameter::Thickness].map(ratio);
+        let largest = curvature.max(thickness).max(1.0);
+        let rounding = |slot| ROUNDING * largest * natural(slot);
+        self.excess(tolerance, |slot| rounding(slot) / tolerance) <= 1.0
     }
 
     /// Sets the kinds of numbers to zero on which the integral depends by no more than rounding.
