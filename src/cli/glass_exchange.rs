@@ -8,9 +8,7 @@ use crate::files::GlassQuery;
 use crate::lens::Lens;
 use crate::lens::glass::{self, Glass};
 use crate::merit::Goal;
-use crate::optimize::{
-    ExchangeOrder, GlassExchange, GlassRound, GlassSearch, GlassSearchError, Optimizer,
-};
+use crate::optimize::{GlassExchange, GlassRound, GlassSearch, GlassSearchError, Optimizer};
 use serde::Serialize;
 use std::fmt;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -22,6 +20,10 @@ pub(super) struct GlassExchangeArgs {
     /// ("schott nd=1.5..1.8"; without any: every glass), and replaces model glasses
     #[arg(long, value_name = "WORDS", num_args = 0..=1, default_missing_value = "")]
     glasses: Option<String>,
+
+    /// The seed of the order in which --glasses tries them
+    #[arg(long, default_value_t = 0, value_name = "N", requires = "glasses")]
+    glass_seed: u64,
 }
 
 /// The exchanges of a run.
@@ -52,8 +54,7 @@ impl GlassExchangeArgs {
         tolerance: f64,
     ) -> Result<Option<GlassSearch>, CliError> {
         let Some(words) = &self.glasses else { return Ok(None) };
-        let search =
-            GlassSearch::new(lens, goal, tolerance, permitted(words)?, ExchangeOrder::Predicted);
+        let search = GlassSearch::new(lens, goal, tolerance, permitted(words)?, self.glass_seed);
         search.map(Some).map_err(|why| failure(&opened.file, why))
     }
 }
@@ -116,16 +117,10 @@ impl fmt::Display for GlassExchangeReport {
         if self.accepted.is_empty() {
             return writeln!(f, "no glass was exchanged\n");
         }
-        let mut table = TextTable::new(&["surface", "from", "to", "predicted", "merit"]);
+        let mut table = TextTable::new(&["surface", "from", "to", "merit"]);
         for row in &self.accepted {
-            let [predicted, merit] = [row.predicted, row.merit].map(or_dash);
-            table.row([
-                row.surface.to_string(),
-                row.from.clone(),
-                row.to.clone(),
-                predicted,
-                merit,
-            ]);
+            let merit = or_dash(row.merit);
+            table.row([row.surface.to_string(), row.from.clone(), row.to.clone(), merit]);
         }
         writeln!(f, "{table}")
     }

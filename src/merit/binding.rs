@@ -129,11 +129,6 @@ impl Configuration {
         self.clear_rims = rims.to_vec();
     }
 
-    /// Takes the semi-diameters of the light from another lens with as many surfaces.
-    pub(super) fn take_clear_rims(&mut self, other: &Self) {
-        self.clear_rims.clone_from(&other.clear_rims);
-    }
-
     /// The semi-diameters of the light at a surface and the next one, as far as their rims follow it;
     /// else infinite.
     pub(super) fn clear_rims(&self, surface: usize) -> [f64; 2] {

@@ -189,23 +189,6 @@ impl Merit {
         Ok(merit)
     }
 
-    /// The merit function of a lens that differs in its glasses, its variables and their values alone, with
-    /// the same rays.
-    ///
-    /// # Errors
-    /// A lens that is not valid, or whose glasses have no index at its wavelengths.
-    pub fn with_lens(&self, lens: &Lens) -> Result<Self, MeritError> {
-        lens.check()?;
-        let follow = |(number, before): (usize, &Configuration)| {
-            let mut zoom = Configuration::new(lens, number)?;
-            zoom.take_clear_rims(before);
-            Ok(zoom)
-        };
-        let zooms: Result<_, MeritError> = self.zooms.iter().enumerate().map(follow).collect();
-        let variables = lens.variables.clone();
-        Ok(Self { lens: lens.clone(), variables, zooms: zooms?, ..self.clone() })
-    }
-
     /// Finds the rays of the spots anew for a lens of the same structure.
     pub fn resample(&mut self, lens: &Lens) -> Result<(), MeritError> {
         let positions = 0..lens.zoom_positions();

@@ -12,7 +12,7 @@ mod segment;
 mod state;
 mod trust_region;
 
-pub use glasses::{ExchangeOrder, GlassExchange, GlassRound, GlassSearch, GlassSearchError};
+pub use glasses::{GlassExchange, GlassRound, GlassSearch, GlassSearchError};
 pub use segment::{DescentState, SegmentResult, SegmentSettings, run_segment};
 
 use crate::lens::Lens;
