@@ -535,3 +535,13 @@ fn a_search_refuses_a_lens_of_a_thousand_surfaces_by_name() {
     let words = ["the number of surfaces is 907", "at most 200"];
     refused(2, &["search", &path, "--iterations", "5", "--out", &out], "", &words);
 }
+
+/// The indices change the spot of a telescope of 4 m by what is left of terms that cancel: rounding, which no
+/// more rays improve.
+#[test]
+fn derivatives_of_large_telescopes_reach_their_tolerance() {
+    for lens in ["lenses/telescope_rc_f8.json", "lenses/more/telescope_hubble_f24.json"] {
+        let report = done_json(&["gradient", lens, "--error", "1e-3"], "");
+        assert_eq!(report["reached"], true, "{lens}: {report}");
+    }
+}
