@@ -1,4 +1,4 @@
-//! What the exchange of glasses gains, and its cost.
+//! The gain by an exchange of glasses, and its cost.
 
 use super::limits::with_variables;
 use super::timing::Stopwatch;
