@@ -96,10 +96,8 @@ impl GradientArgs {
         opened.check_zoom(self.zoom)?;
         let refuse = |source| CliError::RayModel { file: opened.file.clone(), source };
         let mut lens = self.selected_lens(&opened)?;
-        if lens.stop().is_some_and(|stop| lens.surfaces[stop].hyperhemisphere) {
-            let text = "the stop is a hyperhemisphere, of which both halves have the same height; \
-                        expected the stop on a surface of its own";
-            return Err(CliError::Input(format!("{}: {text}", opened.file)));
+        if let Some(why) = lens.stop().and_then(|stop| lens.surfaces[stop].stop_fault()) {
+            return Err(CliError::Input(format!("{}: {why}", opened.file)));
         }
         let measured = effects::measure_effects(&lens, 0).map_err(refuse)?;
         let plan = choices.plan(&measured, TracePurpose::Exact);

@@ -125,6 +125,14 @@ impl Row {
         Shape::simplest(self.curvature, self.conic, terms)
     }
 
+    /// The reason why the surface cannot limit a beam by its height, if there is one.
+    pub fn stop_fault(&self) -> Option<&'static str> {
+        self.hyperhemisphere.then_some(
+            "the stop is a hyperhemisphere, of which both halves have the same height; expected the \
+             stop on a surface of its own",
+        )
+    }
+
     /// True if the surface curves back to the axis, as a sphere and an ellipsoid do, and so has a far half.
     pub fn has_far_half(&self) -> bool {
         self.curvature != 0.0 && self.conic > -1.0 && self.asphere.iter().all(|term| *term == 0.0)

@@ -80,9 +80,7 @@ impl ResolvedSystems {
 impl Configuration {
     pub(super) fn new(lens: &Lens, zoom: usize) -> Result<Self, MeritError> {
         let stop = lens.stop().unwrap_or(0);
-        if lens.surfaces[stop].hyperhemisphere {
-            let why = "the stop is a hyperhemisphere, of which both halves have the same height; \
-                       expected the stop on a surface of its own";
+        if let Some(why) = lens.surfaces[stop].stop_fault() {
             return Err(MeritError::DoesNotApply { term: "pupil", why });
         }
         let beam = Beam::for_lens(lens, zoom);

@@ -340,19 +340,13 @@ fn distance(lens: &Lens, row: usize, glass: &Glass) -> Option<f64> {
 fn with_medium(lens: &Lens, row: usize, medium: Medium) -> Option<Lens> {
     let mut other = lens.clone();
     other.surfaces[row].medium = medium;
-    without_indices(&mut other, &[row]);
+    // A glass of the catalogue has no index that varies.
+    let index = Parameter::new(row, Quantity::Index);
+    other.variables.retain(|variable| variable.parameter != index);
     hold_powers(&mut other, lens, row)?;
     let other = other.with_pickups().ok()?;
     other.check().ok()?;
     Some(other)
-}
-
-/// Takes the indices behind some rows from the variables: a glass of the catalogue has none that varies.
-fn without_indices(lens: &mut Lens, rows: &[usize]) {
-    let is_index = |parameter: Parameter| {
-        parameter.quantity == Quantity::Index && rows.contains(&parameter.surface)
-    };
-    lens.variables.retain(|variable| !is_index(variable.parameter));
 }
 
 /// Bends the surfaces around a gap whose curvatures are variables, so that they keep their powers.
