@@ -110,11 +110,12 @@ impl OptimizeArgs {
         // The lens is saved before anything else is computed from it.
         let best = with_own_parts(optimizer.best(), &opened.lens);
         let saved = failures.note(files::save(&best, &self.out)).is_some();
-        failures.note(self.write_history(&search));
+        let kept = failures.note(self.write_history(&search)).is_some();
         let after = optimizer.terms().map_err(refuse)?;
         let light = [at_start.light(), merit(optimizer.best())?.light()];
         let limits = optimizer.binding_limits().to_vec();
         let search = &search;
+        let saved = SavedParts { lens: saved, history: kept };
         let found =
             OptimizeOutcome { search, ms, light, before, after, limits, glasses, saved, effects };
         failures.note(output.print(&OptimizeReport::new(self, &lens, &best, found)));
@@ -267,9 +268,14 @@ struct OptimizeOutcome<'a> {
     after: Vec<TermValue>,
     limits: Vec<LimitPrice>,
     glasses: Option<GlassExchangeReport>,
-    /// True if the best lens was saved.
-    saved: bool,
+    saved: SavedParts,
     effects: EffectReport,
+}
+
+/// The parts of a result that are in files, or were not asked for there.
+struct SavedParts {
+    lens: bool,
+    history: bool,
 }
 
 /// The printed result.
@@ -306,6 +312,9 @@ struct OptimizeReport {
     /// The best lens, if it could not be saved.
     #[serde(skip_serializing_if = "Option::is_none")]
     lens: Option<Lens>,
+    /// The steps of the history, if they could not be saved.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    history: Option<Vec<OptimizationProgress>>,
 }
 
 /// The focal length of a lens at a zoom position, in mm; `None` for an afocal one.
@@ -391,8 +400,9 @@ impl OptimizeReport {
             variables: lens.variables.iter().map(variable).collect(),
             glasses,
             effects,
-            out: saved.then(|| args.out.display().to_string()),
-            lens: (!saved).then(|| best.clone()),
+            out: saved.lens.then(|| args.out.display().to_string()),
+            lens: (!saved.lens).then(|| best.clone()),
+            history: (!saved.history).then(|| search.steps.clone()),
         }
     }
 }

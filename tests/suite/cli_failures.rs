@@ -244,6 +244,9 @@ fn a_full_disk_loses_no_result() {
     assert_eq!(made["samples"], 4);
     let best = ["optimize", SINGLET, "--vary", "curvatures", "--steps", "1", "--out", &out];
     assert!(on_a_full_disk(&best)["lens"].is_object());
+    let history = folder.path("history.json");
+    let best = on_a_full_disk(&[&best[..], &["--history", &history]].concat());
+    assert_eq!(best["history"].as_array().unwrap().len(), 1, "{best}");
     let field = on_a_full_disk(&["grin", "luneburg", "--iterations", "1", "--out", &out]);
     assert!(field["field"]["index"].is_array());
     let all = folder.path("");

@@ -1,6 +1,7 @@
 //! Warnings about a lens that cannot be manufactured or used as written: negative gaps, semi-diameters
 //! beyond the surface, an aperture beyond the stop, fields without rays.
 
+use crate::analysis::check_some_light;
 use crate::cli::output::ShortNumber;
 use crate::lens::{FieldPoint, Lens, Medium, SurfaceNumber, System};
 use crate::pupil::RayModel;
@@ -47,12 +48,26 @@ pub(super) fn checks(
     // Behind a mirror gaps are negative, and the edge thickness has another meaning.
     let straight = media.iter().position(|m| *m == Medium::Mirror).unwrap_or(rows);
     checks.extend((0..straight.min(rows - 1)).filter_map(|i| gap(system, i)));
-    let lost = fates.total() - fates.imaged;
-    if fates.imaged == 0 && lost > 0 {
-        let found = format!("no light: none of {lost} rays reaches the image");
-        checks.push(LensCheck { surface: None, found });
-    }
+    checks.extend(no_light(model, fates));
     checks
+}
+
+/// Checks that a ray of the entrance pupil reaches the image. Where none does, parts of the pupil between
+/// them may still be lit, which the search for its boundary tells.
+fn no_light(model: &RayModel, fates: Fates) -> Option<LensCheck> {
+    let lost = fates.total();
+    if fates.imaged > 0 || lost == 0 {
+        return None;
+    }
+    let fields = || model.fields.iter().map(|field| (model, *field));
+    let found = match check_some_light(fields()) {
+        Err(_) => format!("no light: none of {lost} rays reaches the image"),
+        Ok(()) => format!(
+            "none of {lost} rays over the entrance pupil reaches the image: light passes in small \
+             parts of it"
+        ),
+    };
+    Some(LensCheck { surface: None, found })
 }
 
 /// Checks for parts that first-order data or rays leave out: tilts, breaks of the axis, and surfaces that
