@@ -174,19 +174,20 @@ pub(super) fn combine_channels(
     let shares: Vec<f64> = lit.iter().map(|(w, spot)| w * spot.light.value / sum).collect();
     let rays = lit.iter().map(|(_, spot)| spot.rms.rays).sum();
     let shared = || lit.iter().map(|(_, spot)| spot).zip(&shares);
-    let center = [0, 1].map(|i| shared().map(|(c, share)| share * c.centroid[i].value).sum());
+    let center: [f64; 2] =
+        [0, 1].map(|i| shared().map(|(c, share)| share * c.centroid[i].value).sum());
     let center_error = [0, 1].map(|i| shared().map(|(c, share)| share * c.centroid[i].error).sum());
-    let (mut square, mut error) = (0.0, 0.0);
-    for (spot, share) in shared() {
-        let off: [f64; 2] = [0, 1].map(|i| spot.centroid[i].value - center[i]);
-        square += share * (spot.rms.value.powi(2) + off[0] * off[0] + off[1] * off[1]);
-        error += share * product(spot.rms.value, spot.rms.error);
-        error += share * (0..2).map(|i| product(off[i].abs(), spot.centroid[i].error)).sum::<f64>();
+    let (mut square, mut change) = (0.0_f64, 0.0);
+    for (spot, share) in shared().filter(|(_, share)| **share > 0.0) {
+        let off = |i: usize| (spot.centroid[i].value - center[i]).abs();
+        let parts = [(spot.rms.value, spot.rms.error)].into_iter();
+        for (value, error) in parts.chain([0, 1].map(|i| (off(i), spot.centroid[i].error))) {
+            square += share * value * value;
+            change += share * error * (2.0 * value + error);
+        }
     }
-    let rms = square.sqrt();
-    let error = if rms > 0.0 { error / rms } else { 0.0 };
     Ok(PolychromaticSpot {
-        rms: Estimate::new(rms, error, rays),
+        rms: Estimate::new(square.sqrt(), change_of_root(square, change), rays),
         centroid: [0, 1].map(|i| Estimate::new(center[i], center_error[i], rays)),
         light: mean_light(model, &lit),
         is_fully_lit: weighted().all(|(weight, channel)| weight == 0.0 || channel.is_ok()),
@@ -194,9 +195,12 @@ pub(super) fn combine_channels(
     })
 }
 
-/// A distance times an error, which may be infinite; 0 for no distance.
-fn product(distance: f64, error: f64) -> f64 {
-    if distance == 0.0 { 0.0 } else { distance * error }
+/// The change of the root of a square that grows by `change`, which may be infinite.
+fn change_of_root(square: f64, change: f64) -> f64 {
+    match square.sqrt() + (square + change).sqrt() {
+        sum if sum.is_finite() && sum > 0.0 => change / sum,
+        _ => change,
+    }
 }
 
 /// The mean area of the pupils over the wavelengths by weight; a dark one counts as 0.
@@ -294,4 +298,18 @@ fn spot_moments(region: &Region<'_>, nodes: &Nodes) -> Option<[f64; 8]> {
     };
     let covariance = traced.arrivals().map(|(i, w)| w * product(i)).sum::<f64>() / area;
     (area > 0.0).then(|| [points.rms_radius(), x, y, area, slopes.spread / area, covariance, u, v])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_error_of_a_root_is_exact_and_known_at_zero() {
+        assert_eq!(change_of_root(9.0, 2.0 * 3.0 + 1.0), 1.0);
+        assert_eq!(change_of_root(0.0, 4.0), 2.0);
+        assert_eq!(change_of_root(0.0, 0.0), 0.0);
+        assert_eq!(change_of_root(1.0, f64::INFINITY), f64::INFINITY);
+        assert!((change_of_root(4.0, 4e-18) / 1e-18 - 1.0).abs() < 1e-15);
+    }
 }

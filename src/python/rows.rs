@@ -150,6 +150,12 @@ impl<'a> RayEnds<'a> {
         store_rows(self.points, [x, y, z]);
         store_rows(self.directions, [l, m, n]);
         self.opl.copy_from_slice(opl);
+        if landings.all_arrive() {
+            // Most tasks: no look at each ray.
+            self.fates.fill(fate_code(Fate::Imaged));
+            self.surfaces.fill(last);
+            return;
+        }
         for (i, (code, surface)) in self.fates.iter_mut().zip(&mut *self.surfaces).enumerate() {
             let fate = landings.fate(i);
             *code = fate_code(fate);

@@ -140,6 +140,11 @@ pub struct Landings<R> {
 }
 
 impl<R: Real> Landings<R> {
+    /// True if every ray arrives.
+    pub fn all_arrive(&self) -> bool {
+        self.codes.iter().fold(0, |all, code| all | code) == 0
+    }
+
     /// The point and the direction of a ray behind the last surface, in its frame.
     ///
     /// # Panics
