@@ -9,8 +9,7 @@ use egui::{
     StrokeKind, Style, Ui, Vec2, Visuals, WidgetInfo, WidgetText, vec2,
 };
 use egui_tiles::{
-    Behavior, Container, SimplificationOptions, TabState, Tabs, Tile, TileId, Tiles, Tree,
-    UiResponse,
+    Behavior, SimplificationOptions, TabState, Tabs, Tile, TileId, Tiles, Tree, UiResponse,
 };
 
 use super::actions::{Actions, UiAction};
@@ -160,7 +159,10 @@ impl Dock {
         } else {
             let Self { tree, panels, front, to_focus, tabs, .. } = self;
             tabs.begin_frame(ui);
-            tree.ui(&mut DockFrame { panels, front, to_focus, tabs, view, actions }, ui);
+            tree.ui(
+                &mut DockFrame { panels, front, to_focus, tabs, active: None, view, actions },
+                ui,
+            );
         }
         self.request_analyses(view, actions);
         let watched = self.is_visible(PanelKind::Slice);
@@ -278,12 +280,6 @@ fn maximize_button(ui: &mut Ui, name: &str) -> Response {
     response.on_hover_text(format!("{name}: give it all the room"))
 }
 
-/// True if a tab is the one whose panel is shown.
-fn is_in_front(tiles: &Tiles<PanelKind>, tile: TileId) -> bool {
-    let parent = tiles.parent_of(tile).and_then(|parent| tiles.get(parent));
-    matches!(parent, Some(Tile::Container(Container::Tabs(tabs))) if tabs.is_active(tile))
-}
-
 /// The panels in one frame.
 struct DockFrame<'a> {
     panels: &'a mut Vec<(PanelKind, Box<dyn Panel>)>,
@@ -291,6 +287,8 @@ struct DockFrame<'a> {
     front: &'a mut PanelKind,
     to_focus: &'a mut Option<(PanelKind, u8)>,
     tabs: &'a mut TabPlaces,
+    /// The tab in front of the bar that is being drawn.
+    active: Option<TileId>,
     view: &'a SessionView,
     actions: &'a mut Actions,
 }
@@ -323,11 +321,11 @@ impl Behavior<PanelKind> for DockFrame<'_> {
         if let (true, Some(Tile::Pane(kind))) = (button_response.clicked(), tiles.get(tile)) {
             *self.front = *kind;
         }
-        self.tabs.keep_in_view(is_in_front(tiles, tile), tile, &button_response);
+        self.tabs.keep_in_view(self.active == Some(tile), tile, &button_response);
         button_response
     }
 
-    /// A button that gives the panel in front all the room.
+    /// A button that gives the panel in front all the room. It is drawn before the tabs of its bar.
     fn top_bar_right_ui(
         &mut self,
         tiles: &Tiles<PanelKind>,
@@ -336,6 +334,7 @@ impl Behavior<PanelKind> for DockFrame<'_> {
         tabs: &Tabs,
         _scroll_offset: &mut f32,
     ) {
+        self.active = tabs.active;
         let Some(Tile::Pane(kind)) = tabs.active.and_then(|tile| tiles.get(tile)) else { return };
         let title = self.panels.iter().find(|(other, _)| other == kind);
         let title = format!("Maximize {}", title.map_or("", |(_, panel)| panel.title()));
@@ -345,8 +344,8 @@ impl Behavior<PanelKind> for DockFrame<'_> {
     }
 
     /// Only the tab in front has a sign to close it: more tabs fit beside each other.
-    fn is_tab_closable(&self, tiles: &Tiles<PanelKind>, tile: TileId) -> bool {
-        is_in_front(tiles, tile)
+    fn is_tab_closable(&self, _tiles: &Tiles<PanelKind>, tile: TileId) -> bool {
+        self.active == Some(tile)
     }
 
     /// A closed panel is hidden, so that the menu can bring it back to its place.

@@ -298,6 +298,7 @@ fn broken_limits_are_named_and_can_be_allowed() {
     );
     harness
         .get_by_label_contains("light at 24°, 588 nm: 60 mm² instead of at least 80, and 1 more");
+    harness.get_by_label_contains("the optimizer keeps those of the merit function alone");
     press(&mut harness, "Allow what the start has");
     press(&mut harness, "Search");
     let quest = started(&harness);

@@ -144,9 +144,9 @@ fn distortion(curves: &FieldCurves, [first, second]: [Rgba; 2]) -> Chart {
     let is_defocused = in_plane.iter().zip(&in_focus).any(|(a, b)| (a[1] - b[1]).abs() > 1e-3);
     let curve =
         |name: &str, color, dashed, points| Curve { name: name.into(), points, color, dashed };
-    let mut shown = vec![curve("in the image plane", first, false, in_plane)];
+    let mut shown = vec![curve("image plane", first, false, in_plane)];
     if is_defocused {
-        shown.push(curve("against the paraxial image", second, true, in_focus));
+        shown.push(curve("paraxial image", second, true, in_focus));
     }
     Chart {
         title: "Distortion, %",

@@ -23,13 +23,13 @@ pub(super) fn broken_limits(ui: &mut Ui, run: &StructureSearchSnapshot, next: &m
         let title = RichText::new(format!("The {lens} breaks {count} of this search")).small();
         let title = title.color(ui.visuals().warn_fg_color);
         let header = CollapsingHeader::new(title).id_salt(("broken limits", lens));
-        let header = header.show(ui, |ui| {
+        header.show(ui, |ui| {
+            ui.add(Label::new(RichText::new(WHY).small().weak()).wrap());
             for line in lines(run, limits) {
                 ui.add(Label::new(RichText::new(line).small()).wrap());
             }
             loosen_button(ui, lens, (run, limits), next);
         });
-        header.header_response.on_hover_text(WHY);
     }
 }
 
