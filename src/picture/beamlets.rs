@@ -203,13 +203,12 @@ impl BeamletTable {
             let bounds = directions.bounds(radius);
             let box_of = |(color, lenses): (usize, &Vec<(f64, BackwardLens)>)| {
                 let mut traced = TracedBox::new(size, i, lenses.len());
-                if let Some(bounds) = bounds {
-                    for (w, (share, lens)) in lenses.iter().enumerate() {
-                        let passed = |cosines: [f64; 2]| {
-                            share * losses.map_or(1.0, |l| l.passed([color, w], radius, cosines))
-                        };
-                        traced.trace(lens, passed, (radius, bounds), w);
-                    }
+                let Some(bounds) = bounds else { return traced };
+                for (w, (share, lens)) in lenses.iter().enumerate() {
+                    let passed = |cosines: [f64; 2]| {
+                        share * losses.map_or(1.0, |l| l.passed([color, w], radius, cosines))
+                    };
+                    traced.trace(lens, passed, (radius, bounds), w);
                 }
                 traced
             };
@@ -301,18 +300,23 @@ impl<'a> TracedBox<'a> {
             if landings.fate(i).is_imaged() {
                 let ray = lens.scene_ray(landings.ray(i));
                 if ray.direction.z < -1e-3 {
-                    let moments = RayMoments::of_ray(&ray);
-                    for line in &mut self.line {
-                        for (window, part) in windows_at(place[0], line.len()) {
-                            line[window].add(&moments, part * weight);
-                        }
-                    }
+                    self.add_ray(&ray, *weight, place[0]);
                 } else {
                     self.sideways += weight;
                 }
             }
             if origins.get(i + 1).is_none_or(|(next, _)| next[1] != place[1]) {
                 self.add_line(place[1]);
+            }
+        }
+    }
+
+    /// Adds a ray to the sums of the line of the box that it belongs to.
+    fn add_ray(&mut self, ray: &Ray<f64>, weight: f64, place: f64) {
+        let moments = RayMoments::of_ray(ray);
+        for line in &mut self.line {
+            for (window, part) in windows_at(place, line.len()) {
+                line[window].add(&moments, part * weight);
             }
         }
     }
