@@ -203,12 +203,8 @@ impl BeamletTable {
             let bounds = directions.bounds(radius);
             let box_of = |(color, lenses): (usize, &Vec<(f64, BackwardLens)>)| {
                 let mut traced = TracedBox::new(size, i, lenses.len());
-                let Some(bounds) = bounds else { return traced };
-                for (w, (share, lens)) in lenses.iter().enumerate() {
-                    let passed = |cosines: [f64; 2]| {
-                        share * losses.map_or(1.0, |l| l.passed([color, w], radius, cosines))
-                    };
-                    traced.trace(lens, passed, (radius, bounds), w);
+                if let Some(bounds) = bounds {
+                    traced.trace_all((color, lenses), losses, (radius, bounds));
                 }
                 traced
             };
@@ -269,6 +265,22 @@ impl<'a> TracedBox<'a> {
             line: size.windows.iter().map(|n| vec![RayMoments::default(); *n]).collect(),
             size,
             sideways: 0.0,
+        }
+    }
+
+    /// Adds the rays of all wavelengths of a colour from the point `(0, radius)` within a box of directions,
+    /// its middle and half of its sides.
+    fn trace_all(
+        &mut self,
+        (color, lenses): (usize, &[(f64, BackwardLens)]),
+        losses: Option<&LensLosses>,
+        (radius, bounds): (f64, [[f64; 2]; 2]),
+    ) {
+        for (w, (share, lens)) in lenses.iter().enumerate() {
+            let passed = |cosines: [f64; 2]| {
+                share * losses.map_or(1.0, |losses| losses.passed([color, w], radius, cosines))
+            };
+            self.trace(lens, passed, (radius, bounds), w);
         }
     }
 
