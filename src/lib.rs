@@ -58,8 +58,8 @@ pub mod effects;
 // Local optimization of a lens, one step at a time; the Pareto front of sharpness against light.
 pub mod optimize;
 
-// Search over structure: a chain that descends, mutates, regenerates; reservoir, family tree; a lens
-// from a specification.
+// Search over structure: races of mutants; a chain that descends, mutates, regenerates; reservoir, family
+// tree; a lens from a specification.
 pub mod search;
 
 // Charts and images as PNG, drawings and documents on paper; knows nothing of what it draws.

@@ -2,7 +2,7 @@
 
 use crate::files::VignettingChoice;
 use crate::lens::ParameterKind;
-use crate::measure::Integral;
+use crate::measure::{Integral, SearchContender};
 use crate::optimize::DescentMethod;
 use crate::optimize::pareto::Scalarization;
 use crate::search::SearchMethod;
@@ -83,17 +83,36 @@ impl ValueEnum for ToleranceGrade {
 
 impl ValueEnum for SearchMethod {
     fn value_variants<'a>() -> &'a [Self] {
-        &[Self::Restore, Self::Metropolis, Self::BruteForce]
+        &[Self::IteratedLocalSearch, Self::Restore, Self::Metropolis, Self::BruteForce]
     }
 
     fn to_possible_value(&self) -> Option<PossibleValue> {
         Some(match self {
+            Self::IteratedLocalSearch => {
+                value("iterated", "Mutants of the best lenses race; the better lens goes on")
+            }
             Self::Restore => {
                 value("restore", "Descents that end at random and restart from the reservoir")
             }
             Self::Metropolis => value("metropolis", "Metropolis-Hastings with Langevin steps"),
             Self::BruteForce => value("brute", "Each element added and removed once"),
         })
+    }
+}
+
+impl ValueEnum for SearchContender {
+    fn value_variants<'a>() -> &'a [Self] {
+        &Self::ALL
+    }
+
+    fn to_possible_value(&self) -> Option<PossibleValue> {
+        match self {
+            Self::Sampler(method) => method.to_possible_value(),
+            Self::BasinHopping => {
+                Some(value("basin-hopping", "As `iterated`, with one mutant at a time"))
+            }
+            Self::Descent => Some(value("descent", "From the start without mutations")),
+        }
     }
 }
 

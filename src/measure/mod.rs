@@ -43,7 +43,10 @@ pub use mtf::{TransferCurves, TransferMethod, TransferRow, measure_transfer};
 pub use optimize::{StepCosts, StepRow, measure_step_costs};
 pub use picture::{PictureCurves, PictureRow, PictureWay, measure_picture};
 pub use rounding::{Rounding, measure_rounding};
-pub use search::{MeritQuantiles, SearchBenchmark, SearchBudget, SearchRow, compare_searches};
+pub use search::{
+    MeritQuantiles, SearchBenchmark, SearchBudget, SearchContender, SearchLength, SearchRow,
+    SignTest, compare_searches,
+};
 pub use spot::{
     Precision, PupilClipping, PupilSampling, SpotCurves, SpotCurvesError, SpotRow,
     measure_spot_curves,

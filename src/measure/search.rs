@@ -1,5 +1,5 @@
-//! The merit reached by a structure search over time, for all samplers and several tolerances of
-//! the spots.
+//! The merit reached by a structure search over time or over gradients, for all samplers; over time
+//! also for several tolerances of the spots.
 //!
 //! Every lens compared is evaluated anew with the same fine sampling, so that a search with a
 //! coarse one does not look better than it is.
@@ -8,45 +8,122 @@ use super::timing::Stopwatch;
 use crate::lens::Lens;
 use crate::merit::MeritError;
 use crate::search::lens_landscape::{LensLandscape, SearchPlan, SearchSetupError};
-use crate::search::{SearchMethod, SearchSettings};
+use crate::search::{SearchMethod, SearchRunOn, SearchSettings};
 use serde::Serialize;
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// The fractions of the time after which the merit is recorded.
+/// The fractions of the time or of the gradients after which the merit is recorded.
 const MARKS: [f64; 4] = [0.125, 0.25, 0.5, 1.0];
 /// The tolerances compared.
 const TOLERANCES: [f64; 4] = [1e-1, 1e-2, 1e-3, 1e-4];
 /// The tolerance with which lenses are compared.
 const EVALUATION_TOLERANCE: f64 = 1e-4;
 
-/// The duration and the number of runs of a benchmark.
+/// The length of each search of a benchmark.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct SearchBudget {
-    /// The duration of each search, in seconds.
-    pub seconds: f64,
-    /// The number of seeds, from 1 on.
-    pub seeds: u64,
+#[serde(rename_all = "snake_case")]
+pub enum SearchLength {
+    /// A time in seconds.
+    Seconds(f64),
+    /// A number of gradients.
+    Gradients(u64),
 }
 
-/// The results of a sampler at a tolerance.
+/// The length and the number of the runs of a benchmark.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct SearchBudget {
+    /// The length of each search.
+    #[serde(flatten)]
+    pub length: SearchLength,
+    /// The number of seeds.
+    pub seeds: u64,
+    /// The first seed.
+    pub first_seed: u64,
+}
+
+/// What is compared.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum SearchContender {
+    /// An iterated local search with one trial at a time, which does not race: basin hopping (Wales,
+    /// Doye, J. Phys. Chem. A 101, 1997) that accepts improvements alone.
+    BasinHopping,
+    /// A descent from the start without mutations, the same for every seed.
+    Descent,
+    /// A search by a sampler.
+    #[serde(untagged)]
+    Sampler(SearchMethod),
+}
+
+impl SearchContender {
+    /// All contenders.
+    pub const ALL: [Self; 6] = [
+        Self::Sampler(SearchMethod::IteratedLocalSearch),
+        Self::Descent,
+        Self::BasinHopping,
+        Self::Sampler(SearchMethod::BruteForce),
+        Self::Sampler(SearchMethod::Metropolis),
+        Self::Sampler(SearchMethod::Restore),
+    ];
+
+    fn settings(self, usual: &SearchSettings) -> SearchSettings {
+        match self {
+            Self::Sampler(method) => SearchSettings { method, ..usual.clone() },
+            Self::BasinHopping => {
+                let method = SearchMethod::IteratedLocalSearch;
+                SearchSettings { method, trials: 1, ..usual.clone() }
+            }
+            Self::Descent => usual.without_mutations(),
+        }
+    }
+}
+
+/// The results of a contender at a tolerance.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SearchRow {
-    /// The sampler.
-    pub method: SearchMethod,
+    /// What is compared.
+    pub method: SearchContender,
     /// The relative tolerance of the spot radii.
     pub tolerance: f64,
     /// The number of gradients, all seeds together.
     pub gradients: u64,
-    /// The merit after fractions of the time.
+    /// The merit after fractions of the time or of the gradients.
     pub marks: Vec<MeritQuantiles>,
+    /// The merit at the end for each seed.
+    pub ends: Vec<f64>,
+    /// The comparison of the first contender with this one; `None` for the first one itself.
+    pub against: Option<SignTest>,
 }
 
-/// The merit of the best lens after some time: best, median and worst of all seeds.
+/// The paired comparison of two contenders, seed by seed.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct SignTest {
+    /// The number of seeds with which the first contender ends below the other one.
+    pub below: usize,
+    /// The number of seeds with which they do not end alike.
+    pub seeds: usize,
+    /// The probability of at least so many if both were as good: the sign test, one-sided.
+    pub probability: f64,
+}
+
+impl SignTest {
+    /// The test for pairs of merits, the smaller one being better.
+    pub fn new(first: &[f64], other: &[f64]) -> Self {
+        let pairs = || first.iter().zip(other);
+        let below = pairs().filter(|(a, b)| a < b).count();
+        let seeds = pairs().filter(|(a, b)| a != b).count();
+        let choose = |k: usize| (0..k).fold(1.0, |c, i| c * (seeds - i) as f64 / (i + 1) as f64);
+        let tail: f64 = (below..=seeds).map(choose).sum();
+        Self { below, seeds, probability: tail / 2f64.powi(seeds as i32) }
+    }
+}
+
+/// The merit of the best lens after some time or some gradients: best, median and worst of all seeds.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct MeritQuantiles {
-    /// The time since the start, in seconds.
-    pub seconds: f64,
+    /// The seconds or the gradients since the start.
+    pub after: f64,
     /// The best of all seeds.
     pub best: f64,
     /// The median.
@@ -58,50 +135,59 @@ pub struct MeritQuantiles {
 /// The benchmark of the samplers and of the tolerances.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SearchBenchmark {
-    /// The duration and the number of seeds.
+    /// The length and the number of seeds.
     pub race: SearchBudget,
     /// The merit of the starting lens.
     pub start: f64,
-    /// The samplers at the tolerance asked for.
+    /// The contenders at the tolerance asked for.
     pub methods: Vec<SearchRow>,
-    /// RESTORE at other tolerances.
+    /// RESTORE at other tolerances, whose effect is one of time: empty for equal gradients.
     pub tolerances: Vec<SearchRow>,
 }
 
-/// Runs a search from a lens with every sampler and at every tolerance, all for the same time. Once
-/// `stop` is true, the runs so far are returned.
+/// Runs a search from a lens with each contender, the others being compared with the first one, and over
+/// equal times at every tolerance. Once `stop` is true, the runs so far are returned.
 ///
 /// # Errors
 /// A lens that a search cannot start from.
 pub fn compare_searches(
     lens: &Lens,
     plan: &SearchPlan,
+    contenders: &[SearchContender],
     race: SearchBudget,
     stop: &AtomicBool,
 ) -> Result<SearchBenchmark, SearchSetupError> {
     let landscape = plan.landscape(lens)?;
-    let row = |method, tolerance, gradients| {
+    let row = |method: SearchContender, tolerance, gradients| {
         let mut plan = plan.clone();
         (plan.local.tolerance, plan.local.coarse) = (tolerance, tolerance);
-        plan.settings = SearchSettings { method, gradients, moves: None, ..plan.settings };
-        run_seeds(lens, &plan, race, stop)
+        let usual = SearchSettings { gradients, moves: None, ..plan.settings };
+        plan.settings = method.settings(&usual);
+        run_seeds(lens, &plan, method, race, stop)
     };
     let usual = plan.local.tolerance;
-    let restore = row(SearchMethod::Restore, usual, None)?;
-    // Brute force divides the number of gradients that another sampler computed in the same time.
-    let share = restore.gradients / race.seeds.max(1);
-    let mut methods = vec![restore];
-    for (method, gradients) in
-        [(SearchMethod::Metropolis, None), (SearchMethod::BruteForce, Some(share.max(1)))]
-    {
-        if !stop.load(Ordering::Relaxed) {
-            methods.push(row(method, usual, gradients)?);
+    let mut methods: Vec<SearchRow> = Vec::new();
+    for method in contenders.iter().copied() {
+        if stop.load(Ordering::Relaxed) {
+            break;
         }
+        // Brute force divides the number of gradients that the first contender computed in the time.
+        let share = methods.first().map(|first| (first.gradients / race.seeds.max(1)).max(1));
+        let is_divided = method == SearchContender::Sampler(SearchMethod::BruteForce);
+        let gradients = match race.length {
+            SearchLength::Gradients(gradients) => Some(gradients),
+            SearchLength::Seconds(_) => share.filter(|_| is_divided),
+        };
+        let mut found = row(method, usual, gradients)?;
+        found.against = methods.first().map(|first| SignTest::new(&first.ends, &found.ends));
+        methods.push(found);
     }
     let mut tolerances = Vec::new();
-    for tolerance in TOLERANCES {
+    let is_timed = matches!(race.length, SearchLength::Seconds(_));
+    for tolerance in TOLERANCES.into_iter().filter(|_| is_timed) {
         if !stop.load(Ordering::Relaxed) {
-            tolerances.push(row(SearchMethod::Restore, tolerance, None)?);
+            let restore = SearchContender::Sampler(SearchMethod::Restore);
+            tolerances.push(row(restore, tolerance, None)?);
         }
     }
     let start = merit_of(&landscape, landscape.start()).unwrap_or(f64::INFINITY);
@@ -116,21 +202,28 @@ fn merit_of(landscape: &LensLandscape, lens: &Lens) -> Result<f64, MeritError> {
 fn run_seeds(
     lens: &Lens,
     plan: &SearchPlan,
+    method: SearchContender,
     race: SearchBudget,
     stop: &AtomicBool,
 ) -> Result<SearchRow, SearchSetupError> {
     let mut gradients = 0;
     let mut found: Vec<Vec<f64>> = vec![Vec::new(); MARKS.len()];
-    for seed in (1..=race.seeds).take_while(|_| !stop.load(Ordering::Relaxed)) {
+    let seeds = race.first_seed..race.first_seed.saturating_add(race.seeds);
+    for seed in seeds.take_while(|_| !stop.load(Ordering::Relaxed)) {
         let mut plan = plan.clone();
         plan.settings.seed = seed;
-        gradients += run_seed(lens, &plan, race.seconds, stop, &mut found)?;
+        if method == SearchContender::Descent && seed > race.first_seed {
+            found.iter_mut().for_each(|merits| merits.extend(merits.last().copied()));
+        } else {
+            gradients += run_seed(lens, &plan, race.length, stop, &mut found)?;
+        }
     }
+    let ends = found.last().cloned().unwrap_or_default();
     let mark = |(part, merits): (f64, &mut Vec<f64>)| {
         merits.sort_by(f64::total_cmp);
         let at = |i: usize| merits.get(i).copied().unwrap_or(f64::INFINITY);
         MeritQuantiles {
-            seconds: part * race.seconds,
+            after: part * race.length.value(),
             best: at(0),
             median: at(merits.len() / 2),
             worst: at(merits.len().saturating_sub(1)),
@@ -138,8 +231,26 @@ fn run_seeds(
     };
     let reached = MARKS.into_iter().zip(&mut found).filter(|(_, merits)| !merits.is_empty());
     let marks = reached.map(mark).collect();
-    let (method, tolerance) = (plan.settings.method, plan.local.tolerance);
-    Ok(SearchRow { method, tolerance, gradients, marks })
+    let tolerance = plan.local.tolerance;
+    Ok(SearchRow { method, tolerance, gradients, marks, ends, against: None })
+}
+
+impl SearchLength {
+    /// The seconds or the gradients.
+    pub fn value(self) -> f64 {
+        match self {
+            Self::Seconds(seconds) => seconds,
+            Self::Gradients(gradients) => gradients as f64,
+        }
+    }
+
+    /// The seconds or the gradients of a run so far.
+    fn passed(self, watch: Stopwatch, run: &SearchRunOn<LensLandscape>) -> f64 {
+        match self {
+            Self::Seconds(_) => watch.seconds(),
+            Self::Gradients(_) => run.statistics().gradients as f64,
+        }
+    }
 }
 
 /// Runs one search; adds the merit of its best lens at every mark, and returns the number of its
@@ -147,7 +258,7 @@ fn run_seeds(
 fn run_seed(
     lens: &Lens,
     plan: &SearchPlan,
-    seconds: f64,
+    length: SearchLength,
     stop: &AtomicBool,
     found: &mut [Vec<f64>],
 ) -> Result<u64, SearchSetupError> {
@@ -155,8 +266,9 @@ fn run_seed(
     let watch = Stopwatch::start();
     let mut best = Vec::new();
     let end = run.advance(&landscape, |run, _| {
-        let passed =
-            MARKS[best.len()..].iter().take_while(|mark| watch.seconds() >= *mark * seconds);
+        let passed = MARKS[best.len()..]
+            .iter()
+            .take_while(|mark| length.passed(watch, run) >= *mark * length.value());
         for _ in 0..passed.count() {
             best.push(run.best().point.clone());
         }

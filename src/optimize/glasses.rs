@@ -343,14 +343,21 @@ fn with_medium(lens: &Lens, row: usize, medium: Medium) -> Option<Lens> {
     // A glass of the catalogue has no index that varies.
     let index = Parameter::new(row, Quantity::Index);
     other.variables.retain(|variable| variable.parameter != index);
-    hold_powers(&mut other, lens, row)?;
+    hold_powers(&mut other, lens, row, |surface| curvature_bounds(lens, surface))?;
     let other = other.with_pickups().ok()?;
     other.check().ok()?;
     Some(other)
 }
 
-/// Bends the surfaces around a gap whose curvatures are variables, so that they keep their powers.
-fn hold_powers(lens: &mut Lens, before: &Lens, gap: usize) -> Option<()> {
+/// Bends the surfaces around the gap behind a row of a lens with another medium there, so that they
+/// keep the powers that they have in the lens `before`. `range` gives the curvatures that a surface may
+/// have, in 1/mm; `None` for one that may not be bent. `None` if one of the lenses cannot be resolved.
+pub(crate) fn hold_powers(
+    lens: &mut Lens,
+    before: &Lens,
+    gap: usize,
+    range: impl Fn(usize) -> Option<[f64; 2]>,
+) -> Option<()> {
     let um = before.wavelengths[before.primary()].um;
     let [old, new] = [before.resolve(0, um).ok()?, lens.resolve(0, um).ok()?];
     let step = |system: &System<f64>, surface: usize| {
@@ -358,16 +365,19 @@ fn hold_powers(lens: &mut Lens, before: &Lens, gap: usize) -> Option<()> {
         system.surfaces[surface].index - front.unwrap_or(system.index_before)
     };
     for surface in [gap, gap + 1].into_iter().filter(|i| *i < before.surfaces.len()) {
-        let curvature = Parameter::new(surface, Quantity::Curvature);
         let ratio = step(&old, surface) / step(&new, surface);
         let is_bent = (1.0 / LARGEST_BENDING..LARGEST_BENDING).contains(&ratio);
-        let variable = before.variables.iter().find(|variable| variable.parameter == curvature);
-        if let Some(variable) = variable.filter(|_| is_bent) {
-            let bent = ratio * before.surfaces[surface].curvature;
-            let low = variable.min.unwrap_or(f64::NEG_INFINITY);
+        if let Some([low, high]) = range(surface).filter(|_| is_bent) {
             lens.surfaces[surface].curvature =
-                bent.max(low).min(variable.max.unwrap_or(f64::INFINITY));
+                (ratio * before.surfaces[surface].curvature).max(low).min(high);
         }
     }
     Some(())
+}
+
+/// The bounds of the variable curvature of a surface; `None` if it is no variable.
+fn curvature_bounds(lens: &Lens, surface: usize) -> Option<[f64; 2]> {
+    let variable = lens.variable(Parameter::new(surface, Quantity::Curvature))?;
+    let (low, high) = (variable.min, variable.max);
+    Some([low.unwrap_or(f64::NEG_INFINITY), high.unwrap_or(f64::INFINITY)])
 }

@@ -12,6 +12,7 @@ mod segment;
 mod state;
 mod trust_region;
 
+pub(crate) use glasses::hold_powers;
 pub use glasses::{GlassExchange, GlassRound, GlassSearch, GlassSearchError};
 pub use segment::{DescentState, SegmentResult, SegmentSettings, run_segment};
 

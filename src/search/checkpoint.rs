@@ -2,6 +2,7 @@
 //!
 //! The losses of a file are not trusted: those of its best points are computed again.
 
+use super::sampler::race::Race;
 use super::{
     Landscape, ReservoirEntry, SearchError, SearchMethod, SearchPoint, SearchRun, SearchSettings,
 };
@@ -164,9 +165,15 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
     fn check_consistency(&self) -> Result<(), String> {
         self.settings.check().map_err(|error| error.to_string())?;
         let numbers = self.lineage.nodes().iter().map(|node| node.number);
-        if self.chains.len() != self.settings.chains {
-            let [found, expected] = [self.chains.len(), self.settings.chains];
+        if self.chains.len() != self.settings.chain_count() {
+            let [found, expected] = [self.chains.len(), self.settings.chain_count()];
             return Err(format!("found {found} chains; expected {expected}"));
+        }
+        let is_iterated = self.settings.method == SearchMethod::IteratedLocalSearch;
+        let held = self.chains.first().is_some_and(|chain| chain.descent.is_some());
+        let is_sound = |race: &Race| held && race.is_of_chains(self.chains.len());
+        if self.race.is_some() != is_iterated || !self.race.iter().all(is_sound) {
+            return Err("the state of the races does not match the chains".to_owned());
         }
         if !numbers.clone().is_sorted_by(|a, b| a < b)
             || numbers.last().is_some_and(|last| last >= self.lineage.total())

@@ -57,6 +57,17 @@ pub trait Landscape: Sync {
         random: &mut Random,
     ) -> Result<MutatedPoint<Self::Point>, MutationError>;
 
+    /// A mutation of a point for a search that takes the better of two points and needs no way back, so
+    /// that it may be drawn from a distribution without a reverse; by default as [`Landscape::mutate`].
+    fn perturb(
+        &self,
+        point: &Self::Point,
+        weights: &MutationWeights,
+        random: &mut Random,
+    ) -> Result<MutatedPoint<Self::Point>, MutationError> {
+        self.mutate(point, weights, random)
+    }
+
     /// The topology of a point, the same for all points of one structure: a reservoir may hold one
     /// of each.
     fn topology(&self, point: &Self::Point) -> String;

@@ -1,5 +1,6 @@
-//! Search over structure: a Markov chain that mixes descent with adding, removing, gluing and
-//! splitting elements (Teh, *Computational Lens Design*, chapter 4).
+//! Search over structure: descents and mutations that add, remove, glue and split elements or exchange
+//! glasses. An iterated local search races mutants and goes on from what is better; the Markov chains
+//! that mix descents with mutations are those of Teh, *Computational Lens Design*, chapter 4.
 //!
 //! A [`Landscape`] defines the points of a search, their loss, descent and mutations. The samplers
 //! do not depend on lenses, so that a toy problem tests the same code that searches lenses. A run
@@ -28,7 +29,7 @@ pub use error::SearchError;
 pub use landscape::{Landscape, LossGradient, MutatedPoint, SearchPoint};
 pub use mutation::{
     MutatedLens, MutationError, MutationKind, MutationRecord, MutationWeights, Refusal,
-    StructureChange, mutate, propose,
+    StructureChange, mutate, perturb, propose,
 };
 pub use projection::{Projection, ProjectionError};
 pub use rules::{RuleError, SearchRules};

@@ -41,9 +41,9 @@ pub(super) struct SearchArgs {
     #[arg(long, value_name = "FILE")]
     out: Option<PathBuf>,
 
-    /// The sampler
-    #[arg(long, value_enum, default_value_t = SearchMethod::Restore)]
-    method: SearchMethod,
+    /// The sampler; absent: iterated, or that of the checkpoint if there is one
+    #[arg(long, value_enum)]
+    method: Option<SearchMethod>,
 
     /// The seed of all random numbers
     #[arg(long, default_value_t = 1, value_name = "N")]
@@ -225,12 +225,13 @@ impl SearchArgs {
 
     fn plan(&self, lens: &Lens) -> Result<SearchPlan, CliError> {
         let mut plan = self.plan_args.plan(lens)?;
-        plan.settings.method = self.method;
         plan.settings.seed = self.seed;
-        if let (None, Some(path)) = (self.plan_args.descent, &self.checkpoint) {
-            // What is wrong with a checkpoint is said when it is resumed.
-            plan.local.method = SearchPlan::stored_method(path).unwrap_or(plan.local.method);
-        }
+        // What is wrong with a checkpoint is said when it is resumed.
+        let stored =
+            self.checkpoint.as_deref().and_then(|path| SearchPlan::stored_methods(path).ok());
+        let (descent, sampler) = stored.unzip();
+        plan.local.method = self.plan_args.descent.or(descent).unwrap_or(plan.local.method);
+        plan.settings.method = self.method.or(sampler).unwrap_or(plan.settings.method);
         let usual = if self.minutes.is_none() { Some(DEFAULT_ITERATIONS) } else { None };
         plan.settings.gradients = self.iterations.or(usual);
         plan.settings.check().map_err(search_error)?;

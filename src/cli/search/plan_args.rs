@@ -79,9 +79,13 @@ pub(in crate::cli) struct SearchPlanArgs {
     #[arg(long, value_name = "UM", allow_negative_numbers = true)]
     wavelength: Option<f64>,
 
-    /// The number of chains that share the reservoir
+    /// The number of chains that share the reservoir; an iterated local search has --trials in their place
     #[arg(long, value_name = "N")]
     chains: Option<usize>,
+
+    /// The number of mutants that race in an iterated local search
+    #[arg(long, value_name = "N")]
+    trials: Option<usize>,
 
     /// The number of lenses in the reservoir
     #[arg(long, value_name = "N")]
@@ -202,6 +206,7 @@ impl SearchPlanArgs {
         plan.local.method = self.descent.unwrap_or(plan.local.method);
         let settings = &mut plan.settings;
         settings.chains = self.chains.unwrap_or(settings.chains);
+        settings.trials = self.trials.unwrap_or(settings.trials);
         settings.reservoir = self.reservoir.unwrap_or(settings.reservoir);
         settings.temperature = self.temperature.map(|heat| heat.0);
         settings.c = self.c.unwrap_or(settings.c);

@@ -237,6 +237,7 @@ fn plan(start: &ParetoPoint, weight: f64, gradients: u64) -> ExperimentResult<Se
     let rules = SearchRules { semi_diameter: Some(widest), ..rules() };
     let default = SearchPlan::default();
     let settings = crate::search::SearchSettings {
+        method: crate::search::SearchMethod::Restore,
         chains: 1,
         gradients: Some(gradients),
         ..default.settings.clone()

@@ -20,7 +20,7 @@ use crate::lens::{Lens, at_zoom};
 use crate::merit::{ConstraintMargin, Goal, MeritError, Term, WeightedTerm, constraint_margins};
 use crate::pupil::limited_by_stop;
 use crate::search::lens_landscape::SearchPlan;
-use crate::search::{SearchRules, SearchSettings};
+use crate::search::{SearchMethod, SearchRules, SearchSettings};
 
 /// The image heights in mm: from the centre of a full frame nearly to its corner.
 const HEIGHTS: [f64; 4] = [0.0, 7.0, 14.0, 21.0];
@@ -54,13 +54,18 @@ fn rules() -> SearchRules {
     SearchRules { elements: [2, 12], ..SearchRules::default() }
 }
 
-/// A search from a lens with one chain, as in the thesis, over a number of gradients: sharp spots,
+/// A search by RESTORE from a lens with one chain, as in the thesis, over a number of gradients: sharp spots,
 /// all of the light, the relaxed limits.
 fn plan(start: &Lens, rules: SearchRules, gradients: u64) -> ExperimentResult<SearchPlan> {
     let usual = Goal::with_limits(start, &rules.goal_limits(), None, 1.0)?;
     let relaxed = relax_limits(start, &usual)?;
     let default = SearchPlan::default();
-    let settings = SearchSettings { chains: 1, gradients: Some(gradients), ..default.settings };
+    let settings = SearchSettings {
+        method: SearchMethod::Restore,
+        chains: 1,
+        gradients: Some(gradients),
+        ..default.settings
+    };
     Ok(SearchPlan { goal: Some(relaxed), rules, settings, ..default })
 }
 

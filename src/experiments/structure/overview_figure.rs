@@ -19,7 +19,7 @@ use crate::lens::Lens;
 use crate::plot::{Axis, BLACK, Canvas, Chart, PALETTE, TextAlign};
 use crate::pupil::RayModel;
 use crate::search::lens_landscape::{LensSummary, SearchPlan, with_open_apertures};
-use crate::search::{SearchRules, SearchSettings};
+use crate::search::{SearchMethod, SearchRules, SearchSettings};
 
 pub(in crate::experiments) const EXPERIMENT: Experiment = Experiment {
     id: "teaser",
@@ -67,7 +67,8 @@ fn run(effort: Effort, progress: &mut ProgressFn<'_>) -> ExperimentResult {
 fn plan(shares: Vec<f64>, gradients: u64) -> SearchPlan {
     let rules = SearchRules { semi_diameter: Some(WIDEST), ..rules() };
     let default = SearchPlan::default();
-    let settings = SearchSettings { gradients: Some(gradients), ..default.settings };
+    let (method, gradients) = (SearchMethod::Restore, Some(gradients));
+    let settings = SearchSettings { method, gradients, ..default.settings };
     SearchPlan { light: shares, rules, settings, ..default }
 }
 

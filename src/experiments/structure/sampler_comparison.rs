@@ -7,8 +7,8 @@ use crate::experiments::{
     Claim, DataTable, Effort, ExperimentOutcome, ExperimentResult, NamedPlot, ProgressFn, TableCell,
 };
 use crate::plot::{Axis, BLACK, Canvas, Chart, PALETTE, Stroke, TextAlign};
+use crate::search::SearchMethod;
 use crate::search::lens_landscape::SearchPlan;
-use crate::search::{SearchMethod, SearchSettings, Temperature, Termination};
 
 /// A sampler of the comparison.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -39,20 +39,9 @@ impl SamplerKind {
             Self::Brute => SearchMethod::BruteForce,
         };
         if self == Self::Descent {
-            own.settings = without_termination(&own.settings);
+            own.settings = own.settings.without_mutations();
         }
         own
-    }
-}
-
-/// The settings of a descent that never terminates.
-fn without_termination(settings: &SearchSettings) -> SearchSettings {
-    SearchSettings {
-        temperature: Temperature::new(f64::INFINITY),
-        termination: Termination::Relative,
-        c: 0.0,
-        longest: usize::MAX,
-        ..settings.clone()
     }
 }
 

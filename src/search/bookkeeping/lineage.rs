@@ -62,6 +62,11 @@ pub enum DescentEnd {
     Mutation,
     /// The gradient budget was used up; brute force only.
     Budget,
+    /// Others were better: of its race, or the one that has taken the place of the best point; iterated
+    /// local search only.
+    Outranked,
+    /// It would not have overtaken the best point soon; iterated local search only.
+    Unpromising,
 }
 
 /// The generations of a run. Only the last ones and the ancestors of retained ones are remembered,

@@ -20,6 +20,7 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
             let node = LineageNode { offer: Some(offer), ..self.new_node(0, start) };
             self.lineage.add(node);
             self.update_best(&entry);
+            self.take_over(landscape, &entry);
         }
         offer
     }

@@ -246,6 +246,13 @@ impl LensLandscape {
         optical_merit().unwrap_or_else(|| self.loss(&self.start))
     }
 
+    /// The rules with the relative frequencies of mutations multiplied by weights.
+    fn weighted_rules(&self, weights: &MutationWeights) -> SearchRules {
+        let own =
+            MutationKind::MUTATIONS.map(|kind| (kind, self.rules.weight(kind) * weights.of(kind)));
+        SearchRules { weights: own.to_vec(), ..self.rules.clone() }
+    }
+
     /// The loss of a lens with its own pupils.
     fn evaluate(&self, lens: &Lens) -> Result<f64, MeritError> {
         let merit = self.merit(lens, self.local.tolerance)?;
@@ -337,10 +344,16 @@ impl Landscape for LensLandscape {
         weights: &MutationWeights,
         random: &mut Random,
     ) -> Result<MutatedPoint<Arc<Lens>>, MutationError> {
-        let own =
-            MutationKind::MUTATIONS.map(|kind| (kind, self.rules.weight(kind) * weights.of(kind)));
-        let rules = SearchRules { weights: own.to_vec(), ..self.rules.clone() };
-        mutation::propose(lens, &rules, random).map(Into::into)
+        mutation::propose(lens, &self.weighted_rules(weights), random).map(Into::into)
+    }
+
+    fn perturb(
+        &self,
+        lens: &Arc<Lens>,
+        weights: &MutationWeights,
+        random: &mut Random,
+    ) -> Result<MutatedPoint<Arc<Lens>>, MutationError> {
+        mutation::perturb(lens, &self.weighted_rules(weights), random).map(Into::into)
     }
 
     fn topology(&self, lens: &Arc<Lens>) -> String {

@@ -6,8 +6,8 @@ use crate::lens::Lens;
 use crate::merit::{DerivativeLevel, Goal, Term, WeightedTerm};
 use crate::optimize::DescentMethod;
 use crate::search::{
-    MutationKind, SEARCH_CHECKPOINT, SearchError, SearchEvent, SearchRules, SearchRun, SearchRunOn,
-    SearchSettings, Temperature,
+    MutationKind, SEARCH_CHECKPOINT, SearchError, SearchEvent, SearchMethod, SearchRules,
+    SearchRun, SearchRunOn, SearchSettings, Temperature,
 };
 use serde::{Deserialize, Serialize};
 use std::ops::ControlFlow;
@@ -161,13 +161,13 @@ impl SearchPlan {
         Ok((landscape, run))
     }
 
-    /// The method of the local moves of a checkpoint.
+    /// The method of the local moves of a checkpoint, and its sampler.
     ///
     /// # Errors
     /// The file cannot be read, or is no checkpoint of a search over lenses.
-    pub fn stored_method(path: &Path) -> Result<DescentMethod, CheckpointError> {
+    pub fn stored_methods(path: &Path) -> Result<(DescentMethod, SearchMethod), CheckpointError> {
         let stored: StoredSearch = SEARCH_CHECKPOINT.read(path)?;
-        Ok(stored.landscape.local.method)
+        Ok((stored.landscape.local.method, stored.run.settings.method))
     }
 
     /// The run of a checkpoint, which keeps its temperature if none is given.
@@ -195,10 +195,16 @@ impl SearchPlan {
     }
 }
 
-/// The part of a checkpoint that tells its method.
+/// The part of a checkpoint that tells its methods.
 #[derive(Deserialize)]
 struct StoredSearch {
     landscape: StoredLandscape,
+    run: StoredRun,
+}
+
+#[derive(Deserialize)]
+struct StoredRun {
+    settings: SearchSettings,
 }
 
 #[derive(Deserialize)]

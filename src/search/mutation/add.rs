@@ -20,6 +20,9 @@ use crate::search::element::{glass_gaps, piece_count};
 use crate::search::projection::ProjectionMap;
 use crate::search::{Random, SearchRules};
 
+/// The deviation of the curvatures of a meniscus relative to that of the singlets of the thesis.
+const MENISCUS_SPREAD: f64 = 0.2;
+
 /// A place for a new singlet.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct SingletSite {
@@ -70,6 +73,29 @@ pub(super) fn draw(
     context: &MutationContext<'_>,
     random: &mut Random,
 ) -> Result<MutationDraft, Refusal> {
+    draw_with(context, 1.0, random)
+}
+
+/// Adds a thin meniscus, both of whose surfaces have nearly the curvature of the surface beside it; it
+/// has no reverse.
+///
+/// In contact with that surface and without a thickness it would change no ray. For curvatures on
+/// either side of the common one two descents lead to different lenses: the old lens is a saddle point
+/// of the merit over those two curvatures (Bociort, van Turnhout, "Looking for order in the optical
+/// design landscape", Proc. SPIE 6288, 2006). The limits leave it a small power.
+pub(super) fn draw_meniscus(
+    context: &MutationContext<'_>,
+    random: &mut Random,
+) -> Result<MutationDraft, Refusal> {
+    let draft = draw_with(context, MENISCUS_SPREAD, random)?;
+    Ok(MutationDraft { reverse: None, ..draft })
+}
+
+fn draw_with(
+    context: &MutationContext<'_>,
+    spread: f64,
+    random: &mut Random,
+) -> Result<MutationDraft, Refusal> {
     let sites = sites(&context.lens, context.rules)?;
     let glasses = usable_glasses(&context.lens, context.rules);
     let site = choose(&sites, random).copied().ok_or(Refusal::NoAirGap)?;
@@ -79,6 +105,7 @@ pub(super) fn draw(
         site.neighbour(),
         context.rules,
         context.scale,
+        spread,
         random,
     );
     let keeping = keep_probability(&context.lens, site.gap, context.rules, singlet.length());

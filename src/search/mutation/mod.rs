@@ -79,15 +79,40 @@ pub fn propose(
     rules: &SearchRules,
     random: &mut Random,
 ) -> Result<MutatedLens, MutationError> {
-    let sum: f64 = MutationKind::MUTATIONS.iter().map(|kind| rules.weight(*kind).max(0.0)).sum();
+    mutate(draw_kind(rules, random)?, lens, rules, random)
+}
+
+/// As [`propose`], for a search that takes the better lens and needs no way back: glasses are drawn
+/// from the whole catalogue, and new singlets are thin menisci that change the rays as little as the
+/// limits permit. No mutation is reversible.
+///
+/// # Errors
+/// As those of [`propose`].
+pub fn perturb(
+    lens: &Lens,
+    rules: &SearchRules,
+    random: &mut Random,
+) -> Result<MutatedLens, MutationError> {
+    let kind = draw_kind(rules, random)?;
+    let draw = match kind {
+        MutationKind::AddSinglet => add::draw_meniscus,
+        MutationKind::ExchangeGlass => exchange::draw_any,
+        _ => operator(kind)?.draw,
+    };
+    let mutated = apply(kind, draw, lens, rules, random)?;
+    Ok(MutatedLens { log_ratio: None, ..mutated })
+}
+
+/// Draws a kind by the weights of the rules.
+fn draw_kind(rules: &SearchRules, random: &mut Random) -> Result<MutationKind, MutationError> {
+    let weight = |kind: &MutationKind| rules.weight(*kind).max(0.0);
+    let sum: f64 = MutationKind::MUTATIONS.iter().map(weight).sum();
     let mut left = random.random::<f64>() * sum;
-    for kind in MutationKind::MUTATIONS {
-        left -= rules.weight(kind).max(0.0);
-        if left < 0.0 {
-            return mutate(kind, lens, rules, random);
-        }
-    }
-    Err(MutationError::new(MutationKind::MUTATIONS[0], Refusal::AllExcluded))
+    let drawn = MutationKind::MUTATIONS.into_iter().find(|kind| {
+        left -= weight(kind);
+        left < 0.0
+    });
+    drawn.ok_or(MutationError::new(MutationKind::MUTATIONS[0], Refusal::AllExcluded))
 }
 
 /// Makes a mutation of a kind at a uniformly random site.
@@ -100,9 +125,24 @@ pub fn mutate(
     rules: &SearchRules,
     random: &mut Random,
 ) -> Result<MutatedLens, MutationError> {
-    let refuse = |refusal| MutationError { kind, refusal };
+    apply(kind, operator(kind)?.draw, lens, rules, random)
+}
+
+/// The implementation of a kind.
+fn operator(kind: MutationKind) -> Result<&'static MutationOperator, MutationError> {
     let mutation = MUTATIONS.iter().find(|mutation| mutation.kind == kind);
-    let Some(mutation) = mutation else { return Err(refuse(Refusal::NotAMutation)) };
+    mutation.ok_or(MutationError::new(kind, Refusal::NotAMutation))
+}
+
+/// Draws a mutation of a lens and completes it.
+fn apply(
+    kind: MutationKind,
+    draw: MutationDraw,
+    lens: &Lens,
+    rules: &SearchRules,
+    random: &mut Random,
+) -> Result<MutatedLens, MutationError> {
+    let refuse = |refusal| MutationError { kind, refusal };
     lens.check().map_err(|error| refuse(error.into()))?;
     let resolved = lens.with_pickups().map_err(|error| refuse(error.into()))?;
     let size = match scale(&resolved) {
@@ -111,7 +151,7 @@ pub fn mutate(
         Err(error) => return Err(refuse(Refusal::from(&error))),
     };
     let context = MutationContext::new(resolved, rules, size);
-    let draft = (mutation.draw)(&context, random).map_err(refuse)?;
+    let draft = draw(&context, random).map_err(refuse)?;
     complete(&context, kind, draft).map_err(refuse)
 }
 
@@ -120,8 +160,11 @@ struct MutationOperator {
     kind: MutationKind,
     /// Counts the sites of a lens where it could be made.
     count_sites: fn(&Lens, &SearchRules) -> Result<usize, Refusal>,
-    draw: fn(&MutationContext<'_>, &mut Random) -> Result<MutationDraft, Refusal>,
+    draw: MutationDraw,
 }
+
+/// Draws a mutation.
+type MutationDraw = fn(&MutationContext<'_>, &mut Random) -> Result<MutationDraft, Refusal>;
 
 macro_rules! mutations {
     ($($kind:ident: $module:ident,)*) => {

@@ -85,6 +85,9 @@ pub enum Refusal {
     /// No other permitted glass is similar.
     #[error("no other glass of the rules is similar")]
     NoSimilarGlass,
+    /// There is no other permitted glass.
+    #[error("no other glass of the rules")]
+    NoOtherGlass,
     /// The lens has no stop.
     #[error("there is no stop")]
     NoStop,

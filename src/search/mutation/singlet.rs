@@ -25,16 +25,19 @@ pub(super) struct SingletParameters {
 }
 
 impl SingletParameters {
-    /// Random numbers for a singlet next to a surface of a lens of a scale.
+    /// Random numbers for a singlet next to a surface of a lens of a scale; `spread` multiplies the
+    /// deviation of its curvatures from that of the surface.
     pub(super) fn draw(
         lens: &Lens,
         neighbour: Neighbour,
         rules: &SearchRules,
         scale: f64,
+        spread: f64,
         random: &mut Random,
     ) -> Self {
         let mean = lens.surfaces[neighbour.row].curvature;
-        let mut curvature = || mean + sample_normal(curvature_deviation(scale), random);
+        let deviation = spread * curvature_deviation(scale);
+        let mut curvature = || mean + sample_normal(deviation, random);
         let curvatures = [curvature(), curvature()];
         let (thickness, air) = length_distributions(lens, neighbour, curvatures, rules, scale);
         Self { curvatures, thickness: thickness.draw(random), air: air.draw(random) }

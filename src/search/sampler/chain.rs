@@ -99,6 +99,8 @@ pub(in crate::search) struct RoundContext<'a, L: Landscape> {
     pub(in crate::search) start: &'a ReservoirEntry<L::Point>,
     pub(in crate::search) reservoir: &'a Reservoir<L::Point>,
     pub(in crate::search) pinned: Option<&'a ReservoirEntry<L::Point>>,
+    /// The points that an iterated local search mutates, the best one first.
+    pub(in crate::search) parents: Vec<ReservoirEntry<L::Point>>,
 }
 
 /// An event of a chain's turn.
@@ -151,14 +153,17 @@ impl<L: Landscape> RoundContext<'_, L> {
         if most == 0 {
             return events;
         }
+        if self.settings.method == SearchMethod::IteratedLocalSearch {
+            self.iterated_turn(chain, most, &mut events);
+            return events;
+        }
         if chain.descent.is_none() {
             self.begin_descent(chain, &mut events);
         }
-        match self.settings.method {
-            SearchMethod::Metropolis => self.metropolis_turn(chain, most, &mut events),
-            SearchMethod::Restore | SearchMethod::BruteForce => {
-                self.descend(chain, most, &mut events);
-            }
+        if self.settings.method == SearchMethod::Metropolis {
+            self.metropolis_turn(chain, most, &mut events);
+        } else {
+            self.descend(chain, most, &mut events);
         }
         events
     }

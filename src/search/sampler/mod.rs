@@ -2,8 +2,10 @@
 
 pub(super) mod chain;
 pub mod competing_clocks;
+mod iterated;
 mod langevin;
 mod metropolis;
+pub(super) mod race;
 mod run;
 mod settings;
 mod steer;

@@ -7,6 +7,7 @@
 use super::chain::{
     BruteForceJob, Chain, ChainDescent, LocalMove, NewDescent, RoundContext, TurnEvent,
 };
+use super::race::Race;
 use super::{SearchMethod, SearchSettings, Temperature};
 use crate::search::{
     Landscape, Lineage, LineageNode, MutationKind, MutationWeights, Random, Reservoir,
@@ -41,6 +42,9 @@ pub struct SearchRun<P, M> {
     pub(in crate::search) statistics: SearchStatistics,
     #[serde(rename = "tasks")]
     jobs: VecDeque<BruteForceJob>,
+    /// The state of an iterated local search; `None` for the other methods.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub(in crate::search) race: Option<Race>,
 }
 
 /// An event of a round.
@@ -75,7 +79,7 @@ pub enum RunEnd {
     Gradients,
     /// All brute-force jobs are done.
     Done,
-    /// For a hundred rounds no descent could be started, or none could compute a gradient.
+    /// In a hundred rounds no descent could be started, or none could compute a gradient.
     Stuck,
 }
 
@@ -83,7 +87,8 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
     /// Creates a run.
     ///
     /// The first chain descends from the start, every other one from a mutation of it; all chains
-    /// of Metropolis–Hastings begin at the start.
+    /// of Metropolis–Hastings begin at the start. In an iterated local search the first chain holds the
+    /// best point, and the others are the trials.
     ///
     /// # Errors
     /// A setting is invalid, or the start has no finite loss.
@@ -111,6 +116,7 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
             reservoir,
             statistics: SearchStatistics::default(),
             jobs,
+            race: (settings.method == SearchMethod::IteratedLocalSearch).then(|| Race::new(loss)),
             settings: settings.clone(),
             start,
         };
@@ -216,16 +222,18 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
             return Vec::new();
         }
         self.assign_jobs();
+        let shares = self.gradient_budgets();
+        let weights = self.race.as_ref().map(|race| race.weights(&self.weights));
         let context = RoundContext {
             landscape,
             settings: &self.settings,
             temperature: self.temperature,
-            weights: &self.weights,
+            weights: weights.as_ref().unwrap_or(&self.weights),
             start: &self.start,
             reservoir: &self.reservoir,
             pinned: self.pinned.as_ref(),
+            parents: self.parents(landscape),
         };
-        let shares = self.gradient_budgets();
         let chains = self.chains.par_iter_mut().zip(shares);
         let turns: Vec<_> = chains.map(|(chain, most)| context.turn(chain, most)).collect();
         let is_progress = |m: &LocalMove| m.gradients > 0 || m.loss.is_finite();
@@ -234,6 +242,7 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
             .flatten()
             .any(|event| matches!(event, TurnEvent::Moved(local_move) if is_progress(local_move)));
         let mut events = Vec::new();
+        let before = self.statistics.gradients;
         for (chain, turn) in turns.into_iter().enumerate() {
             for event in turn {
                 self.record(chain, event, landscape, &mut events);
@@ -241,7 +250,8 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
             self.update_best_from_chain(chain, landscape, &mut events);
         }
         self.statistics.rounds += 1;
-        self.statistics.idle = if moved { 0 } else { self.statistics.idle + 1 };
+        self.statistics.idle = self.idle_rounds(moved);
+        self.advance_race(landscape, self.statistics.gradients - before, &mut events);
         self.prune_lineage();
         events
     }
@@ -268,16 +278,19 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
         }
     }
 
-    /// The gradient budget of each chain in its turn: an equal part of the remaining gradients, far
-    /// more than a turn takes except in the last rounds. Brute force has divided the gradients
+    /// The gradient budget of each chain in its turn: for those that take one an equal part of the
+    /// remaining gradients, far more than a turn takes except in the last rounds. Brute force has divided the gradients
     /// among its jobs.
     fn gradient_budgets(&self) -> Vec<usize> {
         let SearchSettings { method, gradients, .. } = self.settings;
         let limit = gradients.filter(|_| method != SearchMethod::BruteForce);
         let left = limit.map_or(u64::MAX, |limit| limit.saturating_sub(self.statistics.gradients));
-        let count = self.chains.len().max(1) as u64;
+        let active = self.active_chains();
+        let count = active.iter().filter(|active| **active).count().max(1) as u64;
         let share = |i: u64| left / count + u64::from(i < left % count);
-        (0..count).map(|i| usize::try_from(share(i)).unwrap_or(usize::MAX)).collect()
+        let mut shares = (0..count).map(|i| usize::try_from(share(i)).unwrap_or(usize::MAX));
+        let budget = |active: bool| if active { shares.next().unwrap_or(0) } else { 0 };
+        active.into_iter().map(budget).collect()
     }
 
     /// The lineage node of a new descent.
@@ -315,7 +328,7 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
     /// Starts the chains that begin at the start.
     fn start_chains(&mut self) {
         let count = match self.settings.method {
-            SearchMethod::Restore => 1,
+            SearchMethod::Restore | SearchMethod::IteratedLocalSearch => 1,
             SearchMethod::Metropolis => self.chains.len(),
             SearchMethod::BruteForce => 0,
         };
@@ -351,7 +364,7 @@ fn new_chains<P, M>(settings: &SearchSettings) -> Vec<Chain<P, M>> {
             scales: BTreeMap::new(),
         }
     };
-    (0..settings.chains).map(|_| next()).collect()
+    (0..settings.chain_count()).map(|_| next()).collect()
 }
 
 /// The jobs of brute force, which divide the gradients by twice the number of elements.

@@ -18,6 +18,9 @@ pub struct SearchSettings {
     pub seed: u64,
     /// The number of chains that share the reservoir, independent of the number of threads.
     pub chains: usize,
+    /// The number of trials in a race of an iterated local search, which has a chain for each of them and
+    /// one for the best point in place of [`SearchSettings::chains`].
+    pub trials: usize,
     /// The capacity of the reservoir.
     pub reservoir: usize,
     /// True to hold at most one point of each topology in the reservoir.
@@ -51,9 +54,10 @@ pub struct SearchSettings {
 impl Default for SearchSettings {
     fn default() -> Self {
         Self {
-            method: SearchMethod::Restore,
+            method: SearchMethod::IteratedLocalSearch,
             seed: 1,
             chains: 4,
+            trials: 8,
             reservoir: 5,
             one_per_topology: true,
             gamma: 0.02,
@@ -78,13 +82,17 @@ impl SearchSettings {
     pub fn check(&self) -> Result<(), SearchError> {
         let wrong =
             |name, found: String, expected| Err(SearchError::Setting { name, found, expected });
-        for (name, count) in [("chains", self.chains), ("reservoir", self.reservoir)] {
+        let counts =
+            [("chains", self.chains), ("trials", self.trials), ("reservoir", self.reservoir)];
+        for (name, count) in counts {
             if count == 0 {
                 return wrong(name, "0".to_owned(), "1 or more");
             }
         }
-        if self.chains > MAX_CHAINS {
-            return wrong("chains", self.chains.to_string(), "1024 at most");
+        for (name, count) in &counts[..2] {
+            if *count > MAX_CHAINS {
+                return wrong(name, count.to_string(), "1024 at most");
+            }
         }
         if self.longest == 0 {
             return wrong("longest", "0".to_owned(), "1 or more");
@@ -115,10 +123,38 @@ impl SearchSettings {
     }
 }
 
+impl SearchSettings {
+    /// The same settings for a descent from the start without mutations, which never ends by itself.
+    #[must_use]
+    pub fn without_mutations(&self) -> Self {
+        Self {
+            method: SearchMethod::Restore,
+            chains: 1,
+            temperature: Temperature::new(f64::INFINITY),
+            termination: Termination::Relative,
+            c: 0.0,
+            longest: usize::MAX,
+            ..self.clone()
+        }
+    }
+
+    /// The number of chains of a run.
+    pub(in crate::search) fn chain_count(&self) -> usize {
+        match self.method {
+            SearchMethod::IteratedLocalSearch => self.trials + 1,
+            _ => self.chains,
+        }
+    }
+}
+
 /// The method of a search.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum SearchMethod {
+    /// Descends, mutates the best points, descends from several mutants that race, and goes on from what
+    /// is better.
+    #[serde(rename = "iterated")]
+    IteratedLocalSearch,
     /// Descents that end at random and regenerate from the reservoir: algorithm 1, the Restore
     /// process.
     Restore,

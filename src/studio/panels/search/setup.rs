@@ -52,7 +52,13 @@ impl Default for SearchSetup {
     }
 }
 
-const METHODS: [(SearchMethod, &str, &str); 3] = [
+const METHODS: [(SearchMethod, &str, &str); 4] = [
+    (
+        SearchMethod::IteratedLocalSearch,
+        "Iterated local search",
+        "Several mutants of the best lenses descend for a short while; the best of them goes on, and is \
+         kept if it overtakes",
+    ),
     (
         SearchMethod::Restore,
         "RESTORE",
@@ -120,9 +126,16 @@ impl SearchSetup {
                 "The same seed gives the same search",
             );
             ui.weak("seed,");
-            let hint = "Parallel descents that share the retained lenses";
-            drag(ui, "Chains", &mut settings.chains, 1..=64, 0.05, hint);
-            ui.weak("chains");
+            if settings.method == SearchMethod::IteratedLocalSearch {
+                let hint =
+                    "Mutants that descend for a short while in each round; the best one goes on";
+                drag(ui, "Trials", &mut settings.trials, 1..=64, 0.05, hint);
+                ui.weak("trials");
+            } else {
+                let hint = "Parallel descents that share the retained lenses";
+                drag(ui, "Chains", &mut settings.chains, 1..=64, 0.05, hint);
+                ui.weak("chains");
+            }
         });
         ui.end_row();
     }

@@ -170,6 +170,8 @@ pub(super) fn outcome_text<P>(node: &LineageNode<P>) -> String {
         Some(DescentEnd::InfiniteLoss) => "ended without light",
         Some(DescentEnd::Mutation) => "ended by an accepted mutation",
         Some(DescentEnd::Budget) => "ended by its budget of gradients",
+        Some(DescentEnd::Outranked) => "ended: others were better",
+        Some(DescentEnd::Unpromising) => "ended: it would not overtake the best lens soon",
     };
     let offer = match node.offer {
         None => String::new(),

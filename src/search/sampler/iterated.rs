@@ -1,0 +1,357 @@
+//! Iterated local search: the turns of its chains, and what follows from them after a round.
+
+use super::SearchRun;
+use super::chain::{
+    Chain, ChainDescent, LocalMove, NewDescent, RoundContext, TurnEvent, TurnEvents, end_descent,
+};
+use super::race::{Race, RaceStage};
+use crate::search::{
+    DescentEnd, Landscape, MutationError, MutationKind, Random, Refusal, ReservoirEntry,
+    SearchEvent, SearchPoint,
+};
+use rand::RngExt as _;
+
+/// Attempts per turn to find a mutation that applies.
+const MAX_ATTEMPTS: usize = 16;
+/// The number of points that are mutated: the best one, and the best ones of other structures.
+const MAX_PARENTS: usize = 4;
+/// The gradients of a trial, those of a challenger divided among all of them.
+const TRIAL_GRADIENTS: u64 = 40;
+
+impl<L: Landscape> RoundContext<'_, L> {
+    /// One turn: a local move, from a mutation if the chain has no descent.
+    pub(super) fn iterated_turn(
+        &self,
+        chain: &mut Chain<L::Point, L::Memory>,
+        most: usize,
+        events: &mut TurnEvents<L>,
+    ) {
+        if chain.descent.is_none() {
+            let Some(started) = self.perturb(&mut chain.random, events) else { return };
+            chain.descent = Some(ChainDescent::new(started.point.clone(), started.loss));
+            events.push(TurnEvent::Started(started));
+        }
+        let Some(descent) = &mut chain.descent else { return };
+        let (point, loss, gradients) =
+            self.landscape.descend_within(&descent.point, &mut descent.memory, most);
+        let gradients = gradients as u64;
+        descent.moves += 1;
+        descent.gradients += gradients;
+        descent.move_to(point, loss);
+        let best = descent.best_loss;
+        events.push(TurnEvent::Moved(LocalMove { loss, best, gradients, rejected: false }));
+    }
+
+    /// A mutation of one of the parents.
+    fn perturb(
+        &self,
+        random: &mut Random,
+        events: &mut TurnEvents<L>,
+    ) -> Option<NewDescent<L::Point>> {
+        for _ in 0..MAX_ATTEMPTS {
+            match self.try_perturbation(random) {
+                Ok(started) => return Some(started),
+                Err(error) => events.push(TurnEvent::Refused(error)),
+            }
+        }
+        None
+    }
+
+    fn try_perturbation(&self, random: &mut Random) -> Result<NewDescent<L::Point>, MutationError> {
+        let empty = || MutationError::new(MutationKind::Global, Refusal::EmptyReservoir);
+        let parent = self.draw_parent(random).ok_or_else(empty)?;
+        let mutated = self.landscape.perturb(&parent.point, self.weights, random)?;
+        self.new_descent(Some((parent.number, parent.loss)), mutated)
+    }
+
+    /// One of the parents, which are ordered from the best to the worst: the one at rank n, from 1 on,
+    /// with a probability in proportion to 1/n².
+    fn draw_parent(&self, random: &mut Random) -> Option<&ReservoirEntry<L::Point>> {
+        let weight = |rank: usize| 1.0 / ((rank + 1) * (rank + 1)) as f64;
+        let sum: f64 = (0..self.parents.len()).map(weight).sum();
+        let mut left = random.random::<f64>() * sum;
+        let mut ranked = self.parents.iter().enumerate();
+        let drawn = ranked.find(|(rank, _)| {
+            left -= weight(*rank);
+            left < 0.0
+        });
+        drawn.map(|(_, parent)| parent).or(self.parents.last())
+    }
+}
+
+impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
+    /// For each chain, true if it takes a turn in the next round.
+    pub(super) fn active_chains(&self) -> Vec<bool> {
+        let all = 0..self.chains.len();
+        let Some(race) = &self.race else { return vec![true; self.chains.len()] };
+        let is_active = |i: usize| match race.stage {
+            RaceStage::Best => i == 0,
+            RaceStage::Trials(0) => i > 0,
+            RaceStage::Trials(_) => i > 0 && self.chains[i].descent.is_some(),
+            RaceStage::Challenger(chain) => i == chain,
+        };
+        all.map(is_active).collect()
+    }
+
+    /// The points that are mutated in the next round, the best one first: the pinned one alone, or the
+    /// best one and the best ones of other structures.
+    pub(super) fn parents<L>(&self, landscape: &L) -> Vec<ReservoirEntry<P>>
+    where
+        L: Landscape<Point = P, Memory = M>,
+    {
+        if self.race.as_ref().is_none_or(|race| race.stage != RaceStage::Trials(0)) {
+            return Vec::new();
+        }
+        if let Some(pinned) = &self.pinned {
+            return vec![pinned.clone()];
+        }
+        let Some(best) = self.entry_of(0, landscape) else { return Vec::new() };
+        let entries = self.reservoir.entries().iter();
+        let mut others: Vec<_> =
+            entries.filter(|entry| entry.topology != best.topology).cloned().collect();
+        others.sort_by(ReservoirEntry::rank);
+        others.truncate(MAX_PARENTS - 1);
+        std::iter::once(best).chain(others).collect()
+    }
+
+    /// The best point of the descent of a chain.
+    fn entry_of<L>(&self, chain: usize, landscape: &L) -> Option<ReservoirEntry<P>>
+    where
+        L: Landscape<Point = P, Memory = M>,
+    {
+        let chain = self.chains.get(chain)?;
+        let (point, loss) = chain.best()?;
+        Some(ReservoirEntry::new(landscape, chain.generation, loss, point.clone()))
+    }
+
+    /// Draws the conclusions from a round in which these gradients were made.
+    pub(super) fn advance_race<L>(
+        &mut self,
+        landscape: &L,
+        gradients: u64,
+        events: &mut Vec<SearchEvent>,
+    ) where
+        L: Landscape<Point = P, Memory = M>,
+    {
+        let Some(mut race) = self.race.take() else { return };
+        race.count(gradients);
+        match race.stage {
+            RaceStage::Best => self.after_best(&mut race, landscape),
+            RaceStage::Trials(moves) => {
+                self.after_trials(&mut race, moves + 1, landscape, events);
+            }
+            RaceStage::Challenger(chain) => {
+                self.after_challenge(&mut race, chain, landscape, events);
+            }
+        }
+        self.race = Some(race);
+    }
+
+    /// After a move of the best point: its descent pauses once races gain faster, and at once if its
+    /// structure is not permitted.
+    fn after_best<L>(&mut self, race: &mut Race, landscape: &L)
+    where
+        L: Landscape<Point = P, Memory = M>,
+    {
+        let Some(descent) = &mut self.chains[0].descent else { return };
+        let (gradients, loss) = (descent.gradients, descent.best_loss);
+        let is_lost = !descent.loss.is_finite();
+        if is_lost {
+            descent.point = descent.best.clone();
+            descent.loss = loss;
+            descent.memory = M::default();
+        }
+        let is_outside = landscape.structure_violation(&descent.best) > 0;
+        let ended = (is_lost || is_outside).then_some(0.0);
+        let Some(rate) = ended.or_else(|| race.measured(gradients, loss)) else { return };
+        race.best_rate = rate;
+        if rate <= self.required_rate(race) {
+            race.settle(loss, gradients);
+            race.stage = RaceStage::Trials(0);
+        }
+    }
+
+    /// The rate below which the descent of the best point pauses: that of races, or 0 once there are
+    /// too few gradients for one more.
+    fn required_rate(&self, race: &Race) -> f64 {
+        let done = self.statistics.gradients;
+        let left = self.settings.gradients.map(|limit| limit.saturating_sub(done));
+        let needed = TRIAL_GRADIENTS * self.settings.trials as u64;
+        if left.is_some_and(|left| left < needed) { 0.0 } else { race.rate() }
+    }
+
+    /// The consecutive rounds without progress, after one more that made some or none. Those of the best
+    /// point do not count: a search is idle while no trial can start.
+    pub(super) fn idle_rounds(&self, moved: bool) -> u64 {
+        let is_best = self.race.as_ref().is_some_and(|race| race.stage == RaceStage::Best);
+        match (moved, is_best) {
+            (true, true) => self.statistics.idle,
+            (true, false) => 0,
+            (false, _) => self.statistics.idle + 1,
+        }
+    }
+
+    /// After a move of the trials.
+    fn after_trials<L>(
+        &mut self,
+        race: &mut Race,
+        moves: u64,
+        landscape: &L,
+        events: &mut Vec<SearchEvent>,
+    ) where
+        L: Landscape<Point = P, Memory = M>,
+    {
+        race.stage = RaceStage::Trials(moves);
+        let is_lost = |chain: &Chain<P, M>| {
+            chain.descent.as_ref().is_some_and(|descent| !descent.loss.is_finite())
+        };
+        let lost: Vec<usize> =
+            (1..self.chains.len()).filter(|i| is_lost(&self.chains[*i])).collect();
+        for chain in lost {
+            self.end_trial(race, chain, DescentEnd::InfiniteLoss, landscape, events);
+        }
+        let running = (1..self.chains.len()).filter(|i| self.chains[*i].descent.is_some());
+        let mut entries: Vec<(usize, ReservoirEntry<P>)> =
+            running.filter_map(|i| Some((i, self.entry_of(i, landscape)?))).collect();
+        if entries.len() > 1 {
+            entries.sort_by(|(_, a), (_, b)| a.rank(b));
+            for (chain, _) in entries.split_off(Race::kept(entries.len())) {
+                self.end_trial(race, chain, DescentEnd::Outranked, landscape, events);
+            }
+        }
+        match entries[..] {
+            [] => self.end_race(race),
+            [(chain, _)] => {
+                race.stage = RaceStage::Challenger(chain);
+                if let Some(descent) = &self.chains[chain].descent {
+                    race.measure_from(descent.gradients, descent.best_loss);
+                }
+                self.try_overtaking(race, chain, landscape, events);
+            }
+            _ => {}
+        }
+    }
+
+    /// After a move of the challenger.
+    fn after_challenge<L>(
+        &mut self,
+        race: &mut Race,
+        chain: usize,
+        landscape: &L,
+        events: &mut Vec<SearchEvent>,
+    ) where
+        L: Landscape<Point = P, Memory = M>,
+    {
+        if self.try_overtaking(race, chain, landscape, events) {
+            return;
+        }
+        let best = self.chains[0].best().map_or(f64::INFINITY, |(_, loss)| loss);
+        let Some(descent) = &self.chains[chain].descent else { return self.end_race(race) };
+        let (gradients, loss) = (descent.gradients, descent.best_loss);
+        let end = if !descent.loss.is_finite() {
+            DescentEnd::InfiniteLoss
+        } else {
+            let Some(rate) = race.measured(gradients, loss) else { return };
+            // A better loss with a structure farther from the permitted ones never overtakes.
+            if loss > best && race.may_catch_up(loss, best, rate) {
+                return;
+            }
+            DescentEnd::Unpromising
+        };
+        self.end_trial(race, chain, end, landscape, events);
+        self.end_race(race);
+    }
+
+    /// Makes the challenger the best point if it is better; true if it is.
+    fn try_overtaking<L>(
+        &mut self,
+        race: &mut Race,
+        chain: usize,
+        landscape: &L,
+        events: &mut Vec<SearchEvent>,
+    ) -> bool
+    where
+        L: Landscape<Point = P, Memory = M>,
+    {
+        let [best, challenger] = [0, chain].map(|i| self.entry_of(i, landscape));
+        let Some(challenger) = challenger else { return false };
+        if best.as_ref().is_some_and(|best| !challenger.is_better_than(best)) {
+            return false;
+        }
+        let node = self.lineage.node_mut(challenger.number);
+        let kind = node.and_then(|node| {
+            node.chain = 0;
+            node.kind
+        });
+        let before = best.map_or(challenger.loss, |best| best.loss);
+        race.note_winner(kind, before);
+        let (first, others) = self.chains.split_at_mut(chain);
+        std::mem::swap(&mut first[0].descent, &mut others[0].descent);
+        std::mem::swap(&mut first[0].generation, &mut others[0].generation);
+        self.end_chain(chain, DescentEnd::Outranked, landscape, events);
+        if let Some(descent) = &self.chains[0].descent {
+            race.measure_from(descent.gradients, descent.best_loss);
+        }
+        race.stage = RaceStage::Best;
+        true
+    }
+
+    /// Makes a point that another run has found, and that has this generation, the best one if it is
+    /// better; without effect in a run of another method.
+    pub(in crate::search) fn take_over<L>(&mut self, landscape: &L, found: &ReservoirEntry<P>)
+    where
+        L: Landscape<Point = P, Memory = M>,
+    {
+        let is_better = |best: ReservoirEntry<P>| found.is_better_than(&best);
+        if self.race.is_none() || !self.entry_of(0, landscape).is_none_or(is_better) {
+            return;
+        }
+        self.end_chain(0, DescentEnd::Outranked, landscape, &mut Vec::new());
+        self.chains[0].generation = found.number;
+        self.chains[0].descent = Some(ChainDescent::new(found.point.clone(), found.loss));
+        if let Some(race) = &mut self.race {
+            race.note_other_best(found.loss);
+        }
+    }
+
+    /// Ends a race without a winner.
+    fn end_race(&self, race: &mut Race) {
+        let required = if race.is_empty() { 0.0 } else { self.required_rate(race) };
+        race.settle(0.0, 0);
+        race.stage = if race.best_rate > required { RaceStage::Best } else { RaceStage::Trials(0) };
+    }
+
+    fn end_trial<L>(
+        &mut self,
+        race: &mut Race,
+        chain: usize,
+        end: DescentEnd,
+        landscape: &L,
+        events: &mut Vec<SearchEvent>,
+    ) where
+        L: Landscape<Point = P, Memory = M>,
+    {
+        let node = self.lineage.node(self.chains[chain].generation);
+        if let Some((kind, gradients)) = node.and_then(|node| Some((node.kind?, node.gradients))) {
+            race.note_trial(kind, gradients);
+        }
+        self.end_chain(chain, end, landscape, events);
+    }
+
+    /// Ends the descent of a chain.
+    fn end_chain<L>(
+        &mut self,
+        chain: usize,
+        end: DescentEnd,
+        landscape: &L,
+        events: &mut Vec<SearchEvent>,
+    ) where
+        L: Landscape<Point = P, Memory = M>,
+    {
+        let mut ended = Vec::new();
+        end_descent(&mut self.chains[chain], end, &mut ended);
+        for event in ended {
+            self.record(chain, event, landscape, events);
+        }
+    }
+}
