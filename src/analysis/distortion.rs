@@ -16,6 +16,9 @@ pub struct Distortion {
     pub ideal: f64,
     /// `height / ideal − 1`; `None` on the axis.
     pub distortion: Option<f64>,
+    /// The same relative to the paraxial chief ray in the image plane in use, so that a defocus counts
+    /// as none; `None` on the axis.
+    pub in_plane: Option<f64>,
     /// The same relative to `f θ`; `None` on the axis and for an object at a finite distance.
     pub f_theta: Option<f64>,
 }
@@ -60,6 +63,15 @@ impl RayModel {
             }
         }
     }
+
+    /// The height of a paraxial chief ray in the image plane over that in the paraxial image: from the exit
+    /// pupil it goes on in a straight line.
+    fn height_by_defocus(&self) -> Option<f64> {
+        let first = &self.first_order;
+        let (image, defocus) = (first.paraxial_image?, first.image_defocus?);
+        let ratio = first.exit_pupil.position.map_or(1.0, |pupil| 1.0 + defocus / (image - pupil));
+        ratio.is_finite().then_some(ratio)
+    }
 }
 
 /// The distortion of a field at a wavelength.
@@ -80,7 +92,8 @@ pub fn distortion(
     let collimated = model.beam.object == Object::Infinity && model.beam.field == FieldKind::Angle;
     let efl = model.first_order.efl.filter(|_| collimated);
     let f_theta = efl.and_then(|f| against(f * size.to_radians()));
-    Ok(Distortion { field, height, ideal, distortion: against(ideal), f_theta })
+    let in_plane = model.height_by_defocus().and_then(|ratio| against(ratio * ideal));
+    Ok(Distortion { field, height, ideal, distortion: against(ideal), in_plane, f_theta })
 }
 
 /// The image points of the chief rays of a field at all wavelengths, x and y in mm, without clipping;

@@ -314,8 +314,9 @@ fn clipping(measured: &EffectMeasurements, choice: EffectOverride) -> (EffectDec
     } else {
         let (clipped, rays) = (measured.fates.clipped, measured.fates.total());
         let limiting = measured.rims.iter().filter(|rim| ratio(rim) > NEAR_RIM).count();
+        let noun = if limiting == 1 { "surface" } else { "surfaces" };
         format!(
-            "rays reach {:.0} % of a semi-diameter, and come near the rim at {limiting} surfaces; \
+            "rays reach {:.0} % of a semi-diameter, and come near the rim at {limiting} {noun}; \
              {clipped} of {rays} are lost there{obstructing}",
             100.0 * nearest
         )

@@ -90,7 +90,7 @@ impl Goal {
     }
 
     /// The default goal for a lens that is to have a focal length in mm, by default the one that it
-    /// has. An afocal lens is asked for none.
+    /// has: a longer one leaves room for a longer track. An afocal lens is asked for none.
     ///
     /// # Errors
     /// A lens without first-order data.
@@ -98,6 +98,7 @@ impl Goal {
         let focal_lengths = focal_lengths(lens)?;
         let first = focal_lengths[0].map(|own| target.unwrap_or(own));
         let [track, _] = focused_gaps(lens);
+        let track = track * growth(target, focal_lengths[0]);
         let size = first.map_or(track, f64::abs);
         let now = MinimumThickness::measure(lens)?;
         let (glass, air) = (0.012 * size, 0.002 * size);
@@ -164,6 +165,12 @@ impl Goal {
         let limits = LimitTreatment::Penalties;
         Ok(Self { terms, pupil: PupilEdge::Moving, zoom_ratios, limits })
     }
+}
+
+/// The factor by which a lens grows when it is scaled to a longer focal length, else 1.
+fn growth(target: Option<f64>, present: Option<f64>) -> f64 {
+    let ratio = target.zip(present).map_or(1.0, |(target, present)| target / present);
+    if ratio.is_finite() { ratio.max(1.0) } else { 1.0 }
 }
 
 /// Every kind of term once, with targets that the lens satisfies or nearly satisfies at a zoom

@@ -3,7 +3,7 @@
 use super::MutationKind;
 use crate::lens::glass;
 use crate::math::format_short;
-use crate::merit::{GoalLimits, MAX_STEEPNESS};
+use crate::merit::{ConstraintMargin, GoalLimits, MAX_STEEPNESS};
 use serde::{Deserialize, Serialize};
 
 /// Permitted changes of a lens and the limits of manufacturing.
@@ -77,6 +77,37 @@ impl SearchRules {
             semi_diameter: self.semi_diameter,
             track: self.track,
             back_focus: self.back_focus,
+        }
+    }
+
+    /// The number of these rules that a lens breaks with a constrained quantity; `None` if no rule is about
+    /// it.
+    pub fn broken_rule(&mut self, limit: &ConstraintMargin) -> Option<&mut f64> {
+        let is_small = limit.min.is_some_and(|min| limit.value < min);
+        match (limit.term, is_small) {
+            ("glass_center", true) => Some(&mut self.glass_center[0]),
+            ("glass_center", false) => Some(&mut self.glass_center[1]),
+            ("glass_edge", true) => Some(&mut self.glass_edge),
+            ("air_center", true) => Some(&mut self.air_center[0]),
+            ("air_center", false) => Some(&mut self.air_center[1]),
+            ("air_edge", true) => Some(&mut self.air_edge),
+            ("steepness", false) => Some(&mut self.steepness),
+            ("semi_diameter", false) => self.semi_diameter.as_mut(),
+            ("total_track", false) => self.track.as_mut(),
+            ("back_focus", true) => self.back_focus.as_mut(),
+            _ => None,
+        }
+    }
+
+    /// Loosens the rule that a lens breaks until it does not, by thousandths of a millimetre; surfaces that
+    /// cross are never allowed.
+    pub fn admit(&mut self, limit: &ConstraintMargin) {
+        let is_small = limit.min.is_some_and(|min| limit.value < min);
+        if let Some(bound) = self.broken_rule(limit) {
+            let thousandths = 1e3 * limit.value;
+            let whole = if is_small { thousandths.floor() } else { thousandths.ceil() };
+            let admitted = (whole / 1e3).max(0.0);
+            *bound = if is_small { bound.min(admitted) } else { bound.max(admitted) };
         }
     }
 

@@ -24,7 +24,7 @@ pub enum UiAction {
     AskPath(FileRequest),
     /// Opens a dialog.
     ShowDialog(DialogKind),
-    /// Shows a panel in front of the others.
+    /// Shows a panel in front of the others, with the keyboard in it.
     ShowPanel(PanelKind),
     /// Shows a panel in front of the others, or hides it if it is there.
     TogglePanel(PanelKind),

@@ -20,7 +20,7 @@ use super::file_dialog::{FileDialog, FileRequest};
 use super::input_order::InputQueue;
 use super::menu;
 use super::menu_items::{MenuContext, PanelState};
-use super::panels::{PanelKind, first_radius_field};
+use super::panels::PanelKind;
 use super::text::capitalize;
 use super::unsaved::{PendingAction, PendingState};
 use super::window::Persistence;
@@ -151,12 +151,14 @@ impl Studio {
                 self.dialogs.open(kind, &menus);
                 context.request_repaint();
             }
-            UiAction::ShowPanel(kind) => self.dock.show(kind),
+            UiAction::ShowPanel(kind) => {
+                self.dock.show(kind);
+                self.dock.put_keyboard_in(context, kind);
+            }
             UiAction::TogglePanel(kind) => {
                 self.dock.toggle(kind);
                 if kind == PanelKind::Prescription && self.dock.is_visible(kind) {
-                    // Its keys work at once.
-                    context.memory_mut(|memory| memory.request_focus(first_radius_field()));
+                    self.dock.put_keyboard_in(context, kind);
                 }
             }
             UiAction::MaximizePanel(kind) => self.dock.maximize(kind),

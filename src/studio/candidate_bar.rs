@@ -6,7 +6,7 @@ use egui::{Align, Button, CornerRadius, Frame, Label, Layout, Margin, RichText, 
 use super::actions::Actions;
 use super::menu_items::MenuContext;
 use super::number;
-use super::panels::mean_spot;
+use super::panels::{RMS_OVER_FIELDS_HINT, rms_over_fields};
 use crate::lens::Lens;
 use crate::session::{AnalysisResults, CandidateSource, CandidateView, Command, SessionView};
 
@@ -38,7 +38,7 @@ pub(super) fn candidate_bar(ui: &mut Ui, menus: &MenuContext<'_>, actions: &mut 
 fn describe(ui: &mut Ui, view: &SessionView, candidate: &CandidateView, has_preview: bool) {
     let spot = |results: &Option<std::sync::Arc<AnalysisResults>>| {
         let analyses = results.as_ref()?.analyses.as_ref().ok()?;
-        mean_spot(analyses).map(|mm| format!("{} µm", number::format_digits(1e3 * mm, 4)))
+        rms_over_fields(analyses).map(|mm| format!("{} µm", number::format_digits(1e3 * mm, 4)))
     };
     let own = spot(&view.results).map(|spot| format!("design {spot}"));
     let text = if candidate.shown {
@@ -50,7 +50,7 @@ fn describe(ui: &mut Ui, view: &SessionView, candidate: &CandidateView, has_prev
         format!("The design; a candidate waits: {}", candidate.title)
     };
     let hint = format!(
-        "{text}\n\nAll panels show the same lens. Mean RMS radius of the spots. Numbers of the \
+        "{text}\n\nAll panels show the same lens. {RMS_OVER_FIELDS_HINT}. Numbers of the \
          prescription that differ from the design are marked, with the old value in the tooltip."
     );
     ui.add(Label::new(RichText::new(text).strong()).truncate()).on_hover_text(hint);

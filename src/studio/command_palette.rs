@@ -110,8 +110,9 @@ impl CommandPalette {
     }
 }
 
-/// The action of an item that was looked for: a panel is shown, and not hidden because it is open.
-fn shown_at_least(action: UiAction) -> UiAction {
+/// The action of an item that was asked for by the keyboard: a panel is shown, and not hidden because it is
+/// open.
+pub(super) fn shown_at_least(action: UiAction) -> UiAction {
     match action {
         UiAction::TogglePanel(kind) => UiAction::ShowPanel(kind),
         other => other,

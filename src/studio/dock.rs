@@ -1,9 +1,12 @@
 //! The arrangement of the panels: tabs that can be dragged side by side, on top of each other, or
 //! closed and opened again from the menu.
 
+use std::collections::HashMap;
+
+use egui::style::ScrollAnimation;
 use egui::{
-    Color32, Context, Frame, Margin, Rect, Response, Role, Sense, Stroke, StrokeKind, Style, Ui,
-    Vec2, Visuals, WidgetInfo, WidgetText, vec2,
+    Color32, Context, FocusDirection, Frame, Id, Margin, Rect, Response, Role, Sense, Stroke,
+    StrokeKind, Style, Ui, Vec2, Visuals, WidgetInfo, WidgetText, vec2,
 };
 use egui_tiles::{
     Behavior, SimplificationOptions, TabState, Tabs, Tile, TileId, Tiles, Tree, UiResponse,
@@ -12,7 +15,7 @@ use egui_tiles::{
 use super::actions::{Actions, UiAction};
 use super::arrangement::Arrangement;
 use super::draw::RenderBackend;
-use super::panels::{Panel, PanelKind};
+use super::panels::{Panel, PanelKind, first_radius_field};
 use crate::session::{Command, GrinCommand, PanelSetting, SessionView};
 
 /// Makes the setting that has a panel computed or not.
@@ -26,7 +29,22 @@ pub struct Dock {
     front: PanelKind,
     /// The panel that alone is shown.
     maximized: Option<PanelKind>,
+    /// The panel whose first widget gets the keyboard, with the frames that are left for it: while a dialog
+    /// closes, none gets it.
+    to_focus: Option<(PanelKind, u8)>,
+    tabs: TabPlaces,
 }
+
+/// The tabs in front, each with the frames that are left to bring it into its bar, and the width of the
+/// window for which that was done.
+#[derive(Debug, Default)]
+struct TabPlaces {
+    front: HashMap<TileId, u8>,
+    window_width: f32,
+}
+
+/// The frames until a tab bar has found the place of its arrows, and until a closed dialog is forgotten.
+const FRAMES: u8 = 4;
 
 impl std::fmt::Debug for Dock {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
@@ -42,7 +60,14 @@ impl Dock {
         };
         let tree = left.filter(whole).unwrap_or_else(|| Arrangement::Default.tree());
         let panels = PanelKind::ALL.map(|kind| (kind, kind.panel(backend))).into();
-        Self { tree, panels, front: PanelKind::Layout, maximized: None }
+        Self {
+            tree,
+            panels,
+            front: PanelKind::Layout,
+            maximized: None,
+            to_focus: None,
+            tabs: TabPlaces::default(),
+        }
     }
 
     /// The arrangement of the panels.
@@ -96,9 +121,20 @@ impl Dock {
         self.set_visible(kind, !self.is_visible(kind));
     }
 
+    /// Gives the keyboard to the first widget of a panel, of the table to its first number.
+    pub fn put_keyboard_in(&mut self, context: &Context, kind: PanelKind) {
+        if kind == PanelKind::Prescription {
+            context.memory_mut(|memory| memory.request_focus(first_radius_field()));
+        } else {
+            self.to_focus = Some((kind, FRAMES));
+        }
+        context.request_repaint();
+    }
+
     fn set_visible(&mut self, kind: PanelKind, open: bool) {
         self.maximized = None;
         self.front = kind;
+        self.tabs.front.clear();
         if let Some(tile) = self.tree.tiles.find_pane(&kind) {
             self.tree.set_visible(tile, open);
             self.tree.make_active(|id, _| id == tile);
@@ -121,8 +157,12 @@ impl Dock {
         if let Some(kind) = self.maximized {
             self.maximized_ui(ui, kind, view, actions);
         } else {
-            let Self { tree, panels, front, .. } = self;
-            tree.ui(&mut DockFrame { panels, front, view, actions }, ui);
+            let Self { tree, panels, front, to_focus, tabs, .. } = self;
+            tabs.begin_frame(ui);
+            tree.ui(
+                &mut DockFrame { panels, front, to_focus, tabs, active: None, view, actions },
+                ui,
+            );
         }
         self.request_analyses(view, actions);
         let watched = self.is_visible(PanelKind::Slice);
@@ -174,9 +214,52 @@ impl Dock {
             });
             ui.set_min_size(ui.available_size());
             if let Some((_, panel)) = self.panels.iter_mut().find(|(other, _)| *other == kind) {
+                begin_focus(ui, kind, &mut self.to_focus);
                 panel.ui(ui, view, actions);
             }
         });
+    }
+}
+
+/// Lets the next widget have the keyboard if the panel is the one that gets it.
+fn begin_focus(ui: &Ui, kind: PanelKind, to_focus: &mut Option<(PanelKind, u8)>) {
+    let Some((_, left)) = to_focus.filter(|(other, _)| *other == kind) else { return };
+    let start = Id::unique("start of the panel");
+    let is_done = ui.memory(|memory| memory.focused()).is_some_and(|id| id != start);
+    if left == 0 || (left < FRAMES && is_done) {
+        *to_focus = None;
+        return;
+    }
+    *to_focus = Some((kind, left - 1));
+    ui.memory_mut(|memory| {
+        memory.request_focus(start);
+        memory.move_focus(FocusDirection::Next);
+    });
+    let place = Rect::from_min_size(ui.cursor().min, Vec2::ZERO);
+    ui.interact(place, start, Sense::focusable_noninteractive());
+    ui.request_repaint();
+}
+
+impl TabPlaces {
+    fn begin_frame(&mut self, ui: &Ui) {
+        let width = ui.ctx().content_rect().width();
+        if width != self.window_width {
+            *self = Self { window_width: width, ..Self::default() };
+        }
+    }
+
+    /// Scrolls the bar of a tab that has come to the front, or whose window has another width, to it.
+    fn keep_in_view(&mut self, is_in_front: bool, tile: TileId, tab: &Response) {
+        if !is_in_front {
+            self.front.remove(&tile);
+            return;
+        }
+        let left = self.front.entry(tile).or_insert(FRAMES);
+        if *left > 0 {
+            *left -= 1;
+            tab.scroll_to_me_animation(None, ScrollAnimation::none());
+            tab.ctx.request_repaint();
+        }
     }
 }
 
@@ -202,6 +285,10 @@ struct DockFrame<'a> {
     panels: &'a mut Vec<(PanelKind, Box<dyn Panel>)>,
     /// The panel that was brought to the front last.
     front: &'a mut PanelKind,
+    to_focus: &'a mut Option<(PanelKind, u8)>,
+    tabs: &'a mut TabPlaces,
+    /// The tab in front of the bar that is being drawn.
+    active: Option<TileId>,
     view: &'a SessionView,
     actions: &'a mut Actions,
 }
@@ -213,6 +300,7 @@ impl Behavior<PanelKind> for DockFrame<'_> {
             let frame = Frame::new().fill(ui.visuals().panel_fill).inner_margin(Margin::same(5));
             frame.show(ui, |ui| {
                 ui.set_min_size(ui.available_size());
+                begin_focus(ui, *kind, self.to_focus);
                 panel.ui(ui, self.view, self.actions);
             });
         }
@@ -233,10 +321,11 @@ impl Behavior<PanelKind> for DockFrame<'_> {
         if let (true, Some(Tile::Pane(kind))) = (button_response.clicked(), tiles.get(tile)) {
             *self.front = *kind;
         }
+        self.tabs.keep_in_view(self.active == Some(tile), tile, &button_response);
         button_response
     }
 
-    /// A button that gives the panel in front all the room.
+    /// A button that gives the panel in front all the room. It is drawn before the tabs of its bar.
     fn top_bar_right_ui(
         &mut self,
         tiles: &Tiles<PanelKind>,
@@ -245,6 +334,7 @@ impl Behavior<PanelKind> for DockFrame<'_> {
         tabs: &Tabs,
         _scroll_offset: &mut f32,
     ) {
+        self.active = tabs.active;
         let Some(Tile::Pane(kind)) = tabs.active.and_then(|tile| tiles.get(tile)) else { return };
         let title = self.panels.iter().find(|(other, _)| other == kind);
         let title = format!("Maximize {}", title.map_or("", |(_, panel)| panel.title()));
@@ -253,8 +343,9 @@ impl Behavior<PanelKind> for DockFrame<'_> {
         }
     }
 
-    fn is_tab_closable(&self, _tiles: &Tiles<PanelKind>, _tile: TileId) -> bool {
-        true
+    /// Only the tab in front has a sign to close it: more tabs fit beside each other.
+    fn is_tab_closable(&self, _tiles: &Tiles<PanelKind>, tile: TileId) -> bool {
+        self.active == Some(tile)
     }
 
     /// A closed panel is hidden, so that the menu can bring it back to its place.

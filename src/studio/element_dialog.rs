@@ -9,6 +9,7 @@ use super::number;
 use super::text::capitalize;
 use crate::files::focal_length_factor;
 use crate::lens::{Edit, ElementEdit, ElementForm, Lens, Medium, NewElement, apply_edit};
+use crate::merit::Term;
 use crate::session::{Analyses, Command, SessionView};
 
 /// A change of an element or of the whole lens. Surfaces are indices from 0.
@@ -44,12 +45,19 @@ impl ElementDialog {
     pub(super) fn new(task: ElementTask, view: &SessionView) -> Self {
         let first = view.results.as_ref().and_then(|results| results.analyses.as_ref().ok());
         let first = first.map(Analyses::first_order);
-        let focal_length = first.and_then(|first| first.efl).map_or(50.0, f64::abs);
+        let present = first.and_then(|first| first.efl).map_or(50.0, f64::abs);
+        // A lens is scaled to what its merit function asks for, or exactly to what it has.
+        let asked = if task == ElementTask::Scale { asked_focal_length(view) } else { None };
+        let focal_length = asked.unwrap_or(present);
         let pupil = first.and_then(|first| first.entrance_pupil.diameter);
         Self {
             task,
             form: ElementForm::Singlet,
-            focal_length: rounded(focal_length),
+            focal_length: if task == ElementTask::Scale {
+                focal_length
+            } else {
+                rounded(focal_length)
+            },
             semi_diameter: rounded(0.55 * pupil.map_or(0.2 * focal_length, f64::abs)),
             at: place_for_element(&view.lens, view.selected),
             by: 0.0,
@@ -221,6 +229,14 @@ impl ElementDialog {
         });
         pressed
     }
+}
+
+/// The focal length that the merit function has as its target, in mm.
+fn asked_focal_length(view: &SessionView) -> Option<f64> {
+    view.goal.iter().flat_map(|goal| &goal.terms).find_map(|weighted| match weighted.term {
+        Term::FocalLength(target) => Some(target.abs()),
+        _ => None,
+    })
 }
 
 fn rounded(value: f64) -> f64 {

@@ -3,6 +3,7 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
+use egui::text::{LayoutJob, TextWrapping};
 use egui::{
     Align2, Button, ComboBox, Context, CursorIcon, FontId, Id, Painter, Rect, Response, RichText,
     Role, ScrollArea, Sense, Stroke, StrokeKind, TextEdit, Ui, Vec2, WidgetInfo, Window, pos2,
@@ -246,14 +247,12 @@ fn words(ui: &Ui, painter: &Painter, lens: &LibraryLens, rect: Rect) {
     let visuals = ui.visuals();
     let title = FontId::proportional(12.0);
     let width = rect.width() - 12.0;
-    let mut job = egui::text::LayoutJob::simple_singleline(
-        lens.title.clone(),
-        title,
-        visuals.strong_text_color(),
-    );
-    job.wrap = egui::text::TextWrapping::truncate_at_width(width);
-    let galley = painter.layout_job(job);
-    painter.galley(at, galley, visuals.text_color());
+    let write = |at, text: String, font, color| {
+        let mut job = LayoutJob::simple_singleline(text, font, color);
+        job.wrap = TextWrapping::truncate_at_width(width);
+        painter.galley(at, painter.layout_job(job), color);
+    };
+    write(at, lens.title.clone(), title, visuals.strong_text_color());
     let lines = [
         format!("{}, {}", lens.design, parts(lens)),
         degrees(&format!(
@@ -265,8 +264,7 @@ fn words(ui: &Ui, painter: &Painter, lens: &LibraryLens, rect: Rect) {
     ];
     for (i, line) in lines.into_iter().enumerate() {
         let at = at + vec2(0.0, 15.0 + 13.0 * i as f32);
-        let color = visuals.weak_text_color();
-        painter.text(at, Align2::LEFT_TOP, line, FontId::proportional(11.0), color);
+        write(at, line, FontId::proportional(11.0), visuals.weak_text_color());
     }
 }
 

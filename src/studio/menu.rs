@@ -7,6 +7,7 @@ use egui::{
 
 use super::actions::Actions;
 use super::candidate_bar::candidate_bar;
+use super::command_palette::shown_at_least;
 use super::experiment_window;
 use super::menu_items::{self, MenuContext, MenuItem};
 use super::panels::widgets::{hint_beside, hint_right_of};
@@ -27,7 +28,7 @@ pub(super) fn shortcuts(ui: &Ui, menus: &MenuContext<'_>, typing: bool, actions:
     let selected = |item: &MenuItem| !(typing && item.yields_to_text);
     for item in items.into_iter().filter(selected) {
         if item.shortcut.as_ref().is_some_and(pressed) {
-            actions.extend(item.action);
+            actions.extend(item.action.map(shown_at_least));
         }
     }
     if !typing && pressed(&REDO_TOO) {

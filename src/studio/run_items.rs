@@ -86,7 +86,7 @@ fn search(view: &SessionView) -> Vec<Request> {
     let run = &view.structure_search.run;
     let is_paused = run.status == RunStatus::Paused;
     let wish = |command| Command::StructureSearch(command);
-    let start = wish(StructureSearchCommand::Start(Box::default()));
+    let start = wish(StructureSearchCommand::StartShown(Box::default()));
     let unfinished = view.structure_search.unfinished.clone();
     let active = |command| for_run(run, wish(command));
     vec![

@@ -7,7 +7,9 @@ use aplanat::studio::panels::GlassPanel;
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
 
-use crate::harness::{PanelState, double_gauss, painted_texts, panel_harness, view_of};
+use crate::harness::{
+    PanelState, double_gauss, painted_places, painted_texts, panel_harness, view_of,
+};
 
 type Bench = Harness<'static, PanelState<GlassPanel>>;
 
@@ -127,4 +129,27 @@ fn a_glass_is_named_on_the_map_and_replaces_by_a_click() {
     press(&mut harness, "Axes of the map");
     press(&mut harness, "PgF over vd");
     harness.get_by_label("Map of glasses, PgF over vd: 1");
+}
+
+/// The numbers of surfaces stand beside the marks of their glasses, and glasses near each other have both
+/// names readable.
+#[test]
+fn the_labels_of_near_glasses_do_not_overlap() {
+    let mut lens = double_gauss();
+    // Two more glasses beside those of the lens, in places where labels on fixed sides would meet.
+    for (surface, nd, vd) in [(0, 1.5725, 57.3), (2, 1.5737, 57.0)] {
+        lens.surfaces[surface].medium = Medium::Model { nd, vd };
+    }
+    let harness = bench(lens, None);
+    let all = painted_places(&harness);
+    let labels = ["1", "3", "4, 7", "8, 10"];
+    let place = |label: &str| {
+        let found = all.iter().filter(|(text, _)| text.trim() == label).map(|(_, place)| *place);
+        // The names of surfaces stand elsewhere, too; the map is at the right.
+        found.last().unwrap_or_else(|| panic!("{label}: {all:?}"))
+    };
+    let places = labels.map(place);
+    for (i, one) in places.iter().enumerate() {
+        assert!(places[..i].iter().all(|other| !one.intersects(*other)), "{places:?}");
+    }
 }

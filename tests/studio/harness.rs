@@ -109,6 +109,23 @@ pub(super) fn painted_galleys<S>(harness: &Harness<'_, S>) -> Vec<Arc<egui::Gall
     all
 }
 
+/// The places of the texts that a frame has painted.
+pub(super) fn painted_places<S>(harness: &Harness<'_, S>) -> Vec<(String, egui::Rect)> {
+    fn add(shape: &egui::Shape, all: &mut Vec<(String, egui::Rect)>) {
+        match shape {
+            egui::Shape::Vec(parts) => parts.iter().for_each(|part| add(part, all)),
+            egui::Shape::Text(text) => {
+                let place = text.galley.rect.translate(text.pos.to_vec2());
+                all.push((text.galley.text().to_owned(), place));
+            }
+            _ => {}
+        }
+    }
+    let mut all = Vec::new();
+    harness.output().shapes.iter().for_each(|clipped| add(&clipped.shape, &mut all));
+    all
+}
+
 /// A harness around a panel, large enough for all of it.
 pub(super) fn panel_harness<P: Panel + 'static>(
     panel: P,

@@ -48,9 +48,7 @@ fn asked(harness: &Harness<'_, PanelState<SearchPanel>>) -> Vec<StructureSearchC
 
 fn started(harness: &Harness<'_, PanelState<SearchPanel>>) -> StructureSearchRequest {
     match asked(harness).as_slice() {
-        [StructureSearchCommand::Preview(Some(0)), StructureSearchCommand::Start(quest)] => {
-            StructureSearchRequest::clone(quest)
-        }
+        [StructureSearchCommand::StartShown(quest)] => StructureSearchRequest::clone(quest),
         other => panic!("{other:?}"),
     }
 }
@@ -270,10 +268,41 @@ fn a_search_can_be_paused_stopped_saved_and_dismissed() {
     harness.get_by_label_contains("merit 0.1 to 0.02");
     harness.get_by_label_contains("60 moves, 1200 gradients of 300 rays, 100 gradients/s (10 ms");
     harness.get_by_label("Saved up to move 50 to b.json");
-    harness.get_by_label_contains("The start violates 2 limits");
-    harness.get_by_label_contains("The best lens violates 1 limit;");
+    harness.get_by_label_contains("The start breaks 2 limits of this search");
+    harness.get_by_label_contains("The best lens breaks 1 limit of this search");
     harness.get_by_label_contains("Merit against iterations: 30 moments, 1 descents");
     harness.get_by_label("Elements of chain 1 against iterations: 6 now");
+}
+
+/// A lens that keeps its merit function can break the limits of a search: it is said which, whose they are,
+/// and they can be loosened for the next one.
+#[test]
+fn broken_limits_are_named_and_can_be_allowed() {
+    let mut view = searching(RunStatus::Stopped);
+    let mut run =
+        StructureSearchSnapshot::clone(view.structure_search.run.snapshot.as_ref().unwrap());
+    let dark = |field: usize, value: f64| ConstraintMargin {
+        term: "light",
+        surface: Some(field),
+        um: Some(0.5876),
+        value,
+        min: Some(80.0),
+        ..thin(0.0)
+    };
+    run.start_violations = vec![thin(0.2), thin(0.3), dark(0, 72.0), dark(2, 60.0)];
+    view.structure_search.run.snapshot = Some(Arc::new(run));
+    let mut harness = panel(view);
+    press(&mut harness, "The start breaks 4 limits of this search");
+    harness.get_by_label_contains(
+        "glass edge, surface 3: 0.2000 instead of at least 0.8000 (limit of Setup)",
+    );
+    harness
+        .get_by_label_contains("light at 24°, 588 nm: 60 mm² instead of at least 80, and 1 more");
+    harness.get_by_label_contains("the optimizer keeps those of the merit function alone");
+    press(&mut harness, "Allow what the start has");
+    press(&mut harness, "Search");
+    let quest = started(&harness);
+    assert_eq!((quest.plan.rules.glass_edge, quest.plan.light), (0.2, vec![0.75]));
 }
 
 #[test]

@@ -12,7 +12,7 @@ use aplanat::studio::theme;
 use aplanat::studio::window::Persistence;
 use egui::{Key, Modifiers};
 use egui_kittest::Harness;
-use egui_kittest::kittest::Queryable;
+use egui_kittest::kittest::{NodeT as _, Queryable};
 
 use crate::harness::double_gauss;
 
@@ -394,6 +394,22 @@ fn a_candidate_moves_no_row() {
     assert_eq!(harness.state().session().view().kept.len(), 1);
 }
 
+/// The sharpness beside a candidate is the one of the merit function, the front and the search.
+#[test]
+fn one_number_is_the_sharpness_everywhere() {
+    let mut harness = window();
+    let view = harness.state().session().view();
+    let spots = &view.results.as_ref().unwrap().analyses.as_ref().unwrap().spots.value;
+    let squares = spots.iter().map(|spot| (1e3 * spot.as_ref().unwrap().rms.value).powi(2));
+    let expected = (squares.sum::<f64>() / spots.len() as f64).sqrt();
+    harness.state_mut().session_mut().apply(Command::Preview(Some(Box::new(candidate()))));
+    wait(&mut harness, "the candidate", |harness| {
+        harness.state().session().view().preview_results.is_some()
+    });
+    harness.run_steps(3);
+    harness.get_by_label_contains(&format!("design {expected:.2} µm"));
+}
+
 /// The merit above the drawing is that of the lens in the drawing.
 #[test]
 fn the_layout_tells_the_merit_of_the_candidate() {
@@ -421,16 +437,39 @@ fn the_layout_tells_the_merit_of_the_candidate() {
     harness.get_by_label_contains(&format!("merit {}", &new.to_string()[..4]));
 }
 
-/// The menu of panels opens the table with its first number ready to be typed over.
+/// The key of a panel brings it to the front with the keyboard in it, and never hides it: the menu does that.
 #[test]
-fn the_table_has_the_focus_when_a_key_opens_it() {
+fn the_key_of_a_panel_puts_the_keyboard_in_it() {
     let mut harness = window();
-    // The first time closes it.
     for _ in 0..2 {
         harness.key_press_modifiers(Modifiers::COMMAND, Key::Num3);
         harness.run_steps(3);
+        assert!(harness.get_by_label("Radius of surface 1").is_focused());
     }
-    assert!(harness.get_by_label("Radius of surface 1").is_focused());
+    harness.key_press_modifiers(Modifiers::COMMAND, Key::Num1);
+    harness.run_steps(8);
+    harness.key_press(Key::Tab);
+    harness.run_steps(3);
+    assert!(harness.get_by_label("Fit").is_focused());
+}
+
+/// The tab of the panel that is shown is in its bar, however narrow that is.
+#[test]
+fn the_tab_in_front_is_seen() {
+    for (name, title) in [("import report", "Import report"), ("view: ghosts", "Ghosts")] {
+        let mut harness = window();
+        harness.key_press_modifiers(Modifiers::COMMAND, Key::K);
+        harness.run_steps(4);
+        harness.event(egui::Event::Text(name.to_owned()));
+        harness.run_steps(4);
+        harness.key_press(Key::Enter);
+        harness.run_steps(12);
+        let tab = harness
+            .get_all_by_label(title)
+            .find(|node| node.accesskit_node().is_selected() == Some(true));
+        let place = tab.unwrap().rect();
+        assert!(place.left() > 836.0 && place.right() < 1256.0, "{title}: {place}");
+    }
 }
 
 #[test]

@@ -86,6 +86,22 @@ fn a_lens_that_begins_without_glass_keeps_what_was_asked_for() {
     assert_eq!(session.lens().aperture, Aperture::FNumber(2.0));
 }
 
+/// An element that shortens the focal length shortens the track, but not the room for the one that is asked
+/// for: a limit of the short track would make it a telephoto lens.
+#[test]
+fn an_added_element_leaves_room_for_the_focal_length_that_is_asked_for() {
+    let mut session = Session::new(blank(), || {}).unwrap();
+    let form = StartingForm::Element(ElementForm::CementedDoublet);
+    session.apply(Command::Begin(Box::new(StartingLens { form, ..starting() })));
+    let before = longest_track(&goal(&session));
+    add(&mut session, ElementForm::Singlet, 35.0);
+    let after = longest_track(&goal(&session));
+    assert!(after >= before, "{before} {after}");
+    session.apply(Command::ScaleToFocalLength(35.0));
+    let scaled = longest_track(&goal(&session));
+    assert!((after / scaled - 1.0).abs() < 1e-6, "{after} {scaled}");
+}
+
 #[test]
 fn an_aperture_that_was_set_by_hand_stays() {
     let mut session = Session::new(blank(), || {}).unwrap();

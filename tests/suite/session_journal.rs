@@ -83,7 +83,12 @@ fn a_killed_design_reopens_where_it_was() {
     killed(&session, &folder.journals(), &copy);
     let (again, text) = reopened(&copy);
     let text = text.unwrap();
-    assert!(text.starts_with("recovered b with 3 unsaved changes"), "{text}");
+    assert!(
+        text.starts_with(
+            "recovered b, which the program ended without closing, with 3 unsaved changes"
+        ),
+        "{text}"
+    );
     assert_eq!(text.lines().count(), 1);
     assert_eq!(again.lens(), session.lens());
     assert_eq!(again.view().goal.as_deref(), Some(&goal));
@@ -246,7 +251,11 @@ fn a_killed_design_that_followed_another_reopens_without_it() {
     let copy = folder.0.join("copy");
     killed(&session, &folder.journals(), &copy);
     let (again, text) = reopened(&copy);
-    assert!(text.unwrap().starts_with("recovered second with 1 unsaved change"));
+    assert!(
+        text.unwrap().starts_with(
+            "recovered second, which the program ended without closing, with 1 unsaved"
+        )
+    );
     assert_eq!((again.lens(), again.view().path), (session.lens(), None));
     assert_eq!(again.view().history.len(), session.view().history.len());
 }

@@ -17,6 +17,7 @@ pub(super) struct DistortionJson {
     height: Estimate,
     ideal: f64,
     distortion: Option<Estimate>,
+    in_plane: Option<Estimate>,
     f_theta: Option<Estimate>,
 }
 
@@ -36,6 +37,7 @@ pub(super) fn distortions(run: &AnalysisRun) -> Vec<AtField<DistortionJson>> {
                 height,
                 ideal: d.ideal,
                 distortion: d.distortion.map(relative),
+                in_plane: d.in_plane.map(relative),
                 f_theta: d.f_theta.map(relative),
             }
         });
@@ -51,6 +53,10 @@ impl TextLines for DistortionJson {
     fn lines(&self) -> Vec<String> {
         let mut lines = vec![estimate_text("chief ray height", &self.height)];
         lines.extend(self.distortion.iter().map(|e| estimate_text("against f tan(theta)", e)));
+        let in_plane = self.in_plane.iter();
+        lines.extend(
+            in_plane.map(|e| estimate_text("against the paraxial chief ray in the plane", e)),
+        );
         lines.extend(self.f_theta.iter().map(|e| estimate_text("against f theta", e)));
         lines
     }

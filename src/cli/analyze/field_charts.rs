@@ -45,10 +45,16 @@ fn distortion(_: &AnalysisRun, points: &[FieldCurvePoint]) -> (&'static str, Vec
     let tangent = |point: &FieldCurvePoint| {
         point.distortion.as_ref().ok().map(|found| percent(found.distortion))
     };
+    let in_plane = |point: &FieldCurvePoint| {
+        point.distortion.as_ref().ok().map(|found| percent(found.in_plane))
+    };
     let angle = |point: &FieldCurvePoint| {
         point.distortion.as_ref().ok().map(|found| percent(found.f_theta))
     };
-    let mut curves = vec![curve("against f tan(theta)", 0, points, tangent)];
+    let mut curves = vec![
+        curve("against f tan(theta)", 0, points, tangent),
+        curve("against the paraxial chief ray in the plane", 2, points, in_plane),
+    ];
     let has_angle =
         |point: &FieldCurvePoint| point.distortion.as_ref().is_ok_and(|d| d.f_theta.is_some());
     if points.iter().any(has_angle) {

@@ -297,8 +297,8 @@ fn recovery_text(state: &JournalState, lens: &Lens) -> String {
         _ => format!(" (the last: {told})"),
     };
     format!(
-        "recovered {} with {changes} unsaved {plural}{told}{lenses}: the program ended without \
-         closing it",
+        "recovered {}, which the program ended without closing, with {changes} unsaved \
+         {plural}{told}{lenses}",
         lens.name
     )
 }

@@ -187,6 +187,7 @@ impl Session {
         let starts = matches!(
             command,
             StructureSearchCommand::Start(_)
+                | StructureSearchCommand::StartShown(_)
                 | StructureSearchCommand::ResumeFrom(_)
                 | StructureSearchCommand::Follow(_)
         );
@@ -194,7 +195,9 @@ impl Session {
             self.preview_lens = None;
         }
         let mut command = command;
-        if let StructureSearchCommand::Start(request) = &mut command {
+        if let StructureSearchCommand::Start(request)
+        | StructureSearchCommand::StartShown(request) = &mut command
+        {
             self.give_goal(request);
         }
         if let Err(why) = self.structure_search.handle(command, &self.lens) {

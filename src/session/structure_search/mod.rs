@@ -91,6 +91,10 @@ impl StructureSearchState {
                 let path = chosen.or_else(|| unused_path(self.folder.as_ref()?, &lens.name));
                 self.start(StructureSearchInput::New { lens: Arc::clone(lens), request, path });
             }
+            StructureSearchCommand::StartShown(request) => {
+                self.previewed_chain = Some(0);
+                return self.handle(StructureSearchCommand::Start(request), lens);
+            }
             StructureSearchCommand::ResumeFrom(path) => {
                 self.start(StructureSearchInput::Saved(restore_dismissed(path)?));
             }
@@ -242,6 +246,8 @@ fn unused_path(folder: &Path, name: &str) -> Option<PathBuf> {
 pub enum StructureSearchCommand {
     /// Starts a search from the design, in place of the one before.
     Start(Box<StructureSearchRequest>),
+    /// Starts it and shows the lens of its first chain as it changes: what a person wants to see first.
+    StartShown(Box<StructureSearchRequest>),
     /// Resumes the search of a file.
     ResumeFrom(PathBuf),
     /// Shows the search that another process saves in a file, as it goes on.

@@ -6,7 +6,7 @@ use egui_plot::{HLine, Line, LineStyle, PlotPoints};
 
 use super::widgets::fixed_plot;
 use super::{Panel, displayed_results, plain_error, show_missing_results};
-use crate::analysis::{FieldCurvePoint, FieldCurves};
+use crate::analysis::{Distortion, FieldCurvePoint, FieldCurves};
 use crate::lens::{FieldKind, Lens, Wavelength};
 use crate::session::SessionView;
 use crate::studio::actions::Actions;
@@ -100,23 +100,12 @@ fn charts(curves: &FieldCurves, lens: &Lens, palette: Palette) -> Vec<Chart> {
     };
     let curve =
         |name: &str, color, dashed, points| Curve { name: name.to_owned(), points, color, dashed };
-    let distortion = |point: &FieldCurvePoint| {
-        // On the axis both heights vanish, and their ratio has no value.
-        point.distortion.as_ref().ok()?.distortion.map(|share| 100.0 * share)
-    };
     let focus = |point: &FieldCurvePoint| point.curvature.as_ref().ok().copied();
     let tangential = against(&|point| focus(point)?.tangential);
     let sagittal = against(&|point| focus(point)?.sagittal);
     let light = |point: &FieldCurvePoint| Some(100.0 * point.illumination.relative?.value);
     let mut charts = vec![
-        Chart {
-            title: "Distortion, %",
-            hint: "Real over ideal height of the chief ray, less 1; for a distant object the ideal \
-                   height is f tan θ. Away from the paraxial focus the image is larger or smaller, \
-                   near the axis too",
-            curves: vec![curve("distortion", first, false, against(&distortion))],
-            from_zero: false,
-        },
+        distortion(curves, [first, second]),
         Chart {
             title: "Field curvature, mm",
             hint: "Foci of a narrow beam about the chief ray (Coddington) from the image plane, positive \
@@ -138,6 +127,35 @@ fn charts(curves: &FieldCurves, lens: &Lens, palette: Palette) -> Vec<Chart> {
         charts.insert(2, lateral_color(curves, lens, palette));
     }
     charts
+}
+
+/// The distortion in the image plane, and that of the paraxial image where a defocus tells them apart.
+fn distortion(curves: &FieldCurves, [first, second]: [Rgba; 2]) -> Chart {
+    let against = |number: fn(&Distortion) -> Option<f64>| {
+        // On the axis both heights vanish, and their ratio has no value.
+        let point = |point: &FieldCurvePoint| {
+            let share = number(point.distortion.as_ref().ok()?)?;
+            Some([point.height, 100.0 * share])
+        };
+        curves.points.iter().filter_map(point).collect::<Vec<_>>()
+    };
+    let in_plane = against(|found| found.in_plane.or(found.distortion));
+    let in_focus = against(|found| found.distortion);
+    let is_defocused = in_plane.iter().zip(&in_focus).any(|(a, b)| (a[1] - b[1]).abs() > 1e-3);
+    let curve =
+        |name: &str, color, dashed, points| Curve { name: name.into(), points, color, dashed };
+    let mut shown = vec![curve("image plane", first, false, in_plane)];
+    if is_defocused {
+        shown.push(curve("paraxial image", second, true, in_focus));
+    }
+    Chart {
+        title: "Distortion, %",
+        hint: "Height of the real over that of the paraxial chief ray in the image plane in use, less 1. \
+               Dashed, where the plane is out of the paraxial focus: over the height in the paraxial \
+               image, f tan θ for a distant object, which a defocus changes near the axis too",
+        curves: shown,
+        from_zero: false,
+    }
 }
 
 /// The lateral colour: a curve for each wavelength but the primary one.
@@ -215,7 +233,8 @@ mod tests {
     use crate::files;
     use crate::session::{AnalysisSettings, analyze};
 
-    /// The double Gauss is out of its paraxial focus: a curve that began at 0 would jump.
+    /// The double Gauss is out of its paraxial focus: that is no distortion, and against the paraxial image
+    /// it is one on the axis too, where a curve that began at 0 would jump.
     #[test]
     fn the_distortion_begins_beside_the_axis() {
         let bundled = &files::bundled_lenses()[0];
@@ -223,7 +242,11 @@ mod tests {
         let settings = AnalysisSettings { field_curves: true, ..AnalysisSettings::default() };
         let curves = analyze(&lens, &settings).unwrap().field_curves.unwrap().value;
         let charts = charts(&curves, &lens, Palette::DARK);
-        let points = &charts[0].curves[0].points;
-        assert!(points.len() > 2 && points[0][0] > 0.0, "{points:?}");
+        let [in_plane, in_focus] = [0, 1].map(|i| &charts[0].curves[i].points);
+        assert!(in_plane.len() > 2 && in_plane[0][0] > 0.0, "{in_plane:?}");
+        assert!(
+            in_plane[0][1].abs() < 0.02 && in_focus[0][1].abs() > 0.05,
+            "{in_plane:?} {in_focus:?}"
+        );
     }
 }

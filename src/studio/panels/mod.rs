@@ -271,18 +271,24 @@ fn pupil_share(spot: Option<&Spot>) -> f64 {
     colors.map(|color| color.area.value).fold(0.0, f64::max) / std::f64::consts::PI
 }
 
-/// The mean RMS radius of the fields with light, in mm.
-pub(super) fn mean_spot(numbers: &Analyses) -> Option<f64> {
-    let lit = numbers.spots.value.iter().filter_map(|spot| spot.as_ref().ok());
-    let radii: Vec<f64> = lit.map(|spot| spot.rms.value).collect();
-    (!radii.is_empty()).then(|| radii.iter().sum::<f64>() / radii.len() as f64)
+/// What the one number for the sharpness of a lens is called wherever it stands, and what it is.
+pub(super) const RMS_OVER_FIELDS: &str = "RMS over the fields";
+pub(super) const RMS_OVER_FIELDS_HINT: &str = "RMS over the fields: the root mean square of the RMS spot radii of all fields, by their weights";
+
+/// The RMS spot radius over the fields with light in mm, as the Pareto front and the search have it.
+pub(super) fn rms_over_fields(numbers: &Analyses) -> Option<f64> {
+    quality(numbers).spot.ok().map(|spot| spot.value)
 }
 
 /// The light of a lens: the mean area of its pupils in mm², over fields and wavelengths by weight.
 fn mean_pupil_area(numbers: &Analyses) -> f64 {
+    quality(numbers).light.value
+}
+
+fn quality(numbers: &Analyses) -> ImageQuality {
     let fields = numbers.spots.value.iter().zip(&numbers.ray_model.value.fields);
     let parts = fields.map(|(spot, field)| (field.weight, ImageQuality::of_spot(spot)));
-    ImageQuality::mean(&parts.collect::<Vec<_>>()).light.value
+    ImageQuality::mean(&parts.collect::<Vec<_>>())
 }
 
 /// The edit, if the lens stays valid with it.

@@ -7,7 +7,9 @@ use egui::{Role, WidgetInfo};
 use egui_plot::{Line, LineStyle, PlotPoints, VLine};
 
 use super::widgets::{fixed_plot, hint_beside};
-use super::{Panel, displayed_results, show_missing_results};
+use super::{
+    Panel, RMS_OVER_FIELDS, RMS_OVER_FIELDS_HINT, displayed_results, show_missing_results,
+};
 use crate::lens::{Edit, Perturbation, PerturbationKind, SurfaceNumber, Tolerance};
 use crate::session::{AsBuiltLens, Command, PanelSetting, SessionView, Timed};
 use crate::studio::actions::Actions;
@@ -252,7 +254,7 @@ fn summary(ui: &mut Ui, made: &AsBuiltLens) {
     let um = |mm: f64| format!("{} µm", number::format_digits(1e3 * mm, 3));
     let mut rows: Vec<(String, [String; 2])> = vec![
         ("As designed".into(), spots.each_ref().map(|s| um(s.nominal_rms))),
-        ("Mean RMS".into(), spots.each_ref().map(|s| with_error(s.mean_rms))),
+        ("Mean of the lenses".into(), spots.each_ref().map(|s| with_error(s.mean_rms))),
     ];
     for (i, quantile) in spots[0].quantiles.iter().enumerate() {
         let name = format!("{:.0} % of the lenses, at most", 100.0 * quantile.share);
@@ -262,7 +264,7 @@ fn summary(ui: &mut Ui, made: &AsBuiltLens) {
         rows.push(("Good lenses".into(), spots.each_ref().map(good_share)));
     }
     Grid::new("spots as made").num_columns(3).striped(true).show(ui, |ui| {
-        ui.weak("RMS spot radius");
+        ui.weak(RMS_OVER_FIELDS).on_hover_text(RMS_OVER_FIELDS_HINT);
         ui.weak("fixed focus");
         ui.weak("refocused");
         ui.end_row();
@@ -332,7 +334,7 @@ fn good_share(spot: &AsBuiltSpot) -> String {
 /// The share of lenses against the RMS that they do not exceed.
 fn distribution(ui: &mut Ui, made: &AsBuiltLens) {
     let palette = Palette::for_visuals(ui.visuals());
-    let text = "share of lenses against RMS, µm; fixed focus dashed";
+    let text = "share of lenses against RMS over the fields, µm; fixed focus dashed";
     ui.label(RichText::new(text).small().weak());
     let shown = fixed_plot(ui, "as built", PLOT).include_y(0.0).include_y(1.0).show(ui, |plot| {
         for (i, spot) in made.analysis.spots.iter().enumerate() {
@@ -346,7 +348,7 @@ fn distribution(ui: &mut Ui, made: &AsBuiltLens) {
             plot.vline(designed.color(color).style(LineStyle::dotted_dense()));
         }
     });
-    let label = "Share of lenses against their RMS spot radius";
+    let label = "Share of lenses against their RMS over the fields";
     shown.response.widget_info(|| WidgetInfo::labeled(Role::Image, true, label));
 }
 

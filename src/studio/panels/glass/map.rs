@@ -1,10 +1,13 @@
 //! The map of glasses: index or partial dispersion over the Abbe number, with those of the lens marked.
 
-use egui::{Align2, Color32, PointerButton, Rangef, Role, Ui, Visuals, WidgetInfo, vec2};
+use egui::{
+    Color32, PointerButton, Rangef, Role, Stroke, TextStyle, Ui, Visuals, WidgetInfo, vec2,
+};
 use egui_plot::{
-    AxisHints, Line, LineStyle, Plot, PlotPoint, PlotPoints, PlotResponse, PlotUi, Points, Text,
+    AxisHints, Line, LineStyle, Plot, PlotPoint, PlotPoints, PlotResponse, PlotUi, Points,
 };
 
+use super::labels::{MARGIN, label_places};
 use super::list::{GlassNumbers, ListedGlass};
 use crate::lens::Lens;
 use crate::lens::glass::{Glass, normal_partial_dispersion};
@@ -20,9 +23,8 @@ const PARTIAL: [f64; 2] = [0.5, 0.68];
 
 /// The distances in points of numbers below the map at which they begin to be shown, and are.
 const NUMBERS: Rangef = Rangef { min: 22.0, max: 30.0 };
-/// The places of the numbers of surfaces beside their marks, in turn, so that near ones do not overlap.
-const SIDES: [Align2; 4] =
-    [Align2::LEFT_BOTTOM, Align2::RIGHT_TOP, Align2::LEFT_TOP, Align2::RIGHT_BOTTOM];
+/// The radius of the mark of a glass of the lens, in points.
+const MARK: f32 = 4.0;
 
 /// The quantities on the axes of the map.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -103,6 +105,7 @@ impl GlassMap<'_> {
         let (name, count) = (self.axes.name(), self.listed.len());
         let label = format!("Map of glasses, {name}: {count}");
         shown.response.widget_info(|| WidgetInfo::labeled(Role::Image, true, &label));
+        self.label_marks(ui, &shown);
         self.hovered(ui, &shown)
     }
 
@@ -119,14 +122,37 @@ impl GlassMap<'_> {
         if let Some(place) = self.pointed.and_then(|glass| self.place_of(glass)) {
             points(plot, "pointed", vec![place], (5.0, visuals.hyperlink_color, false));
         }
-        for ((place, surfaces), side) in self.marks().into_iter().zip(SIDES.iter().cycle()) {
-            let chosen = self.surface.is_some_and(|surface| surfaces.contains(&surface));
-            let color = if chosen { visuals.selection.stroke.color } else { visuals.warn_fg_color };
-            points(plot, "glass of the lens", vec![place], (4.0, color, true));
+        for (place, surfaces) in self.marks() {
+            let color = self.mark_color(&surfaces, visuals);
+            points(plot, "glass of the lens", vec![place], (MARK, color, true));
+        }
+    }
+
+    fn mark_color(&self, surfaces: &[usize], visuals: &Visuals) -> Color32 {
+        let chosen = self.surface.is_some_and(|surface| surfaces.contains(&surface));
+        if chosen { visuals.selection.stroke.color } else { visuals.warn_fg_color }
+    }
+
+    /// Names the surfaces beside the marks of their glasses, above the points of all other glasses.
+    fn label_marks(&self, ui: &Ui, shown: &PlotResponse<()>) {
+        let (painter, frame) = (ui.painter_at(shown.response.rect), *shown.transform.frame());
+        let visuals = ui.visuals();
+        let label = |([x, y], surfaces): ([f64; 2], Vec<usize>)| {
+            let place = shown.transform.position_from_point(&PlotPoint::new(x, y));
             let numbers: Vec<String> = surfaces.iter().map(|i| (i + 1).to_string()).collect();
-            let text = egui::RichText::new(format!("  {}  ", numbers.join(", "))).color(color);
-            let text = Text::new("surfaces", PlotPoint::from(place), text.strong());
-            plot.text(text.color(color).anchor(*side));
+            let color = self.mark_color(&surfaces, visuals);
+            let font = TextStyle::Body.resolve(ui.style());
+            (place, painter.layout_no_wrap(numbers.join(", "), font, color), color)
+        };
+        let labels = self.marks().into_iter().map(label);
+        let labels: Vec<_> = labels.filter(|(place, ..)| frame.contains(*place)).collect();
+        let sizes: Vec<_> = labels.iter().map(|(place, text, _)| (*place, text.size())).collect();
+        let places = label_places(&sizes, MARK, frame);
+        for ((place, text, color), label) in labels.into_iter().zip(places) {
+            painter.line_segment([place, label.clamp(place)], Stroke::new(1.0, color));
+            let ground = visuals.extreme_bg_color.gamma_multiply(0.85);
+            painter.rect_filled(label.expand(MARGIN), 2.0, ground);
+            painter.galley(label.min, text, color);
         }
     }
 

@@ -1,5 +1,6 @@
 //! Glasses: a table to search and to sort, and a map; a click replaces the glass of the selected surface.
 
+mod labels;
 mod list;
 mod map;
 mod table;

@@ -7,7 +7,7 @@ use super::spots;
 use crate::lens::{Lens, Parameter, Quantity, SurfaceNumber};
 use crate::session::{Analyses, AnalysisResults, HistoryNode, SessionView};
 use crate::studio::number;
-use crate::studio::panels::{mean_pupil_area, mean_spot, total_track};
+use crate::studio::panels::{RMS_OVER_FIELDS, mean_pupil_area, rms_over_fields, total_track};
 
 /// A quantity of two versions.
 struct ComparedNumber {
@@ -78,7 +78,8 @@ fn numbers(view: &SessionView, selected: &HistoryNode) -> Vec<ComparedNumber> {
     add("merit", present.and_then(|node| node.merit).zip(selected.merit));
     if let Some(((_, own), (_, other))) = both(view, selected) {
         let of = |value: fn(&Analyses) -> Option<f64>| value(own).zip(value(other));
-        add("mean RMS spot, µm", of(|numbers| mean_spot(numbers).map(|spot| 1e3 * spot)));
+        let rms = of(|numbers| rms_over_fields(numbers).map(|spot| 1e3 * spot));
+        add(&format!("{RMS_OVER_FIELDS}, µm"), rms);
         add("focal length, mm", of(|numbers| numbers.first_order().efl));
         add("light, mm²", of(|numbers| Some(mean_pupil_area(numbers))));
     }

@@ -16,7 +16,10 @@ use egui::{
 };
 use egui_plot::{Line, PlotPoints, PlotTransform};
 
-use super::{Panel, add_variables_edit, mean_pupil_area, mean_spot};
+use super::{
+    Panel, RMS_OVER_FIELDS, RMS_OVER_FIELDS_HINT, add_variables_edit, mean_pupil_area,
+    rms_over_fields,
+};
 use crate::lens::{Edit, Lens, ParameterKind};
 use crate::optimize::DescentMethod;
 use crate::session::{Command, MeritSample, OptimizationSnapshot, RunStatus, SessionView};
@@ -171,10 +174,10 @@ fn progress(ui: &mut Ui, view: &SessionView, search: &OptimizationSnapshot) {
     if let Some(end) = search.progress.as_ref().and_then(|progress| progress.end) {
         ui.weak(format!("Ended: {}.", end.text()));
     }
-    ui.label(changes_text(view).join(", ")).on_hover_text(
-        "Mean RMS radius of the spots, focal length and mean area of the pupils, of the design \
-         and of the optimized lens",
-    );
+    ui.label(changes_text(view).join(", ")).on_hover_text(format!(
+        "Focal length, mean area of the pupils and sharpness, of the design and of the optimized \
+         lens. {RMS_OVER_FIELDS_HINT}"
+    ));
     let refused = search.progress.as_ref().and_then(|progress| progress.refused.as_ref());
     if let Some(why) = refused {
         let text = RichText::new(capitalize(why)).small();
@@ -190,8 +193,8 @@ pub(super) fn changes_text(view: &SessionView) -> Vec<String> {
     let before = view.results.as_ref().and_then(|results| results.analyses.as_ref().ok());
     let after = view.preview_results.as_ref().and_then(|results| results.analyses.as_ref().ok());
     let (Some(before), Some(after)) = (before, after) else { return texts };
-    if let (Some(old), Some(new)) = (mean_spot(before), mean_spot(after)) {
-        texts.push(format!("mean RMS {} to {} µm", short(1e3 * old), short(1e3 * new)));
+    if let (Some(old), Some(new)) = (rms_over_fields(before), rms_over_fields(after)) {
+        texts.push(format!("{RMS_OVER_FIELDS} {} to {} µm", short(1e3 * old), short(1e3 * new)));
     }
     if let (Some(old), Some(new)) = (before.first_order().efl, after.first_order().efl) {
         texts.push(format!("f {} to {} mm", short(old), short(new)));

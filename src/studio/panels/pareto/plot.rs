@@ -12,6 +12,7 @@ use egui_plot::{
 use super::text;
 use crate::optimize::pareto::{Front, ParetoPoint};
 use crate::session::{ParetoRun, RunView, SessionView};
+use crate::studio::panels::RMS_OVER_FIELDS;
 
 /// The distance in points within which the pointer picks a lens.
 const NEAR: f32 = 14.0;
@@ -54,9 +55,9 @@ pub(super) fn plot(
         .legend(Legend::default().position(free_corner(view, run, &bounds)).background_alpha(0.6))
         .custom_x_axes(vec![light])
         .y_axis_label(if run.start.as_built.is_some() {
-            "RMS spot as built, µm"
+            format!("{RMS_OVER_FIELDS} as built, µm")
         } else {
-            "RMS spot, µm"
+            format!("{RMS_OVER_FIELDS}, µm")
         })
         .y_axis_min_width(36.0)
         .allow_scroll(false)

@@ -6,6 +6,7 @@ use crate::lens::{Lens, Quantity};
 use crate::optimize::pareto::ParetoPoint;
 use crate::session::{ParetoRun, RunStatus, SessionView};
 use crate::studio::number;
+use crate::studio::panels::RMS_OVER_FIELDS;
 use crate::studio::text::{capitalize, counted, status_text};
 
 /// The variables of the sweep.
@@ -113,7 +114,7 @@ pub(super) fn design_text(design: &ParetoPoint, start: &ParetoPoint) -> String {
         format!("as built {radius} µm\n")
     });
     format!(
-        "RMS {spot} µm\n{as_built}light {light} mm², {percent} % of the start\n{asked}\n{}",
+        "{RMS_OVER_FIELDS} {spot} µm\n{as_built}light {light} mm², {percent} % of the start\n{asked}\n{}",
         counted(design.rays as u64, "ray")
     )
 }

@@ -5,7 +5,6 @@ use egui::{Button, Checkbox, ComboBox, DragValue, Label, RichText, Ui};
 use super::lenses::CardOrder;
 use super::setup::SearchSetup;
 use super::{ShownSearch, text};
-use crate::search::lens_landscape::describe_violation;
 use crate::search::{SteerCommand, Temperature};
 use crate::session::{
     Command, RunStatus, SessionView, StructureSearchCommand, StructureSearchSnapshot,
@@ -63,10 +62,7 @@ fn start_button(
     let hint = "Search over structure in the background, on a copy of the design";
     let reason = if dark { NO_LIGHT } else { "A search is already running" };
     if main_button(ui, "Search", ready, hint, reason) {
-        // What the search does is what a person wants to see first.
-        actions.push(Command::Preview(None));
-        actions.push(StructureSearchCommand::Preview(Some(0)));
-        actions.push(StructureSearchCommand::Start(Box::new(setup.request(view))));
+        actions.push(StructureSearchCommand::StartShown(Box::new(setup.request(view))));
     }
     if dark {
         ui.colored_label(ui.visuals().warn_fg_color, NO_LIGHT);
@@ -102,18 +98,6 @@ const GRADIENT: &str = "A move of a chain consists of gradient steps; a gradient
     derivatives of all spots, pupils and limits by every variable. The number of rays is that of \
     the best lens";
 
-/// Limits that the start and the best lens violate; only an exported lens has to satisfy them.
-fn violations(ui: &mut Ui, run: &StructureSearchSnapshot) {
-    for (lens, limits) in [("start", &run.start_violations), ("best lens", &run.best_violations)] {
-        if !limits.is_empty() {
-            let text = text::violations_text(lens, limits.len());
-            let all: Vec<String> = limits.iter().map(describe_violation).collect();
-            let label = Label::new(RichText::new(text).small().color(ui.visuals().warn_fg_color));
-            ui.add(label).on_hover_text(all.join("\n"));
-        }
-    }
-}
-
 /// The progress of the search.
 pub(super) fn progress(ui: &mut Ui, search: ShownSearch<'_>, actions: &mut Actions) {
     let ShownSearch { view, run } = search;
@@ -137,7 +121,6 @@ pub(super) fn progress(ui: &mut Ui, search: ShownSearch<'_>, actions: &mut Actio
     let label = Label::new(RichText::new(text).small().color(color)).truncate();
     ui.add(label).on_hover_text(path.unwrap_or_default());
     resume_followed(ui, run, actions);
-    violations(ui, run);
 }
 
 /// Offers to continue a search that another process has saved.

@@ -3,6 +3,7 @@
 //! Every lens that the search retains can be compared with the design, traced back through its
 //! ancestors, pinned, accepted or exported. The search works on its own copy.
 
+mod broken_limits;
 mod controls;
 mod family;
 mod lenses;
@@ -128,6 +129,7 @@ impl Panel for SearchPanel {
         let search = run.map(|run| ShownSearch { view, run });
         if let Some(search) = search {
             controls::progress(ui, search, actions);
+            broken_limits::broken_limits(ui, search.run, self.setup.plan());
         } else if view.structure_search.run.is_active() {
             ui.weak("Preparing…");
         }

@@ -8,6 +8,7 @@ use egui::{ComboBox, DragValue, Grid, Label, RichText, Ui};
 use super::{limits, moves};
 use crate::lens::{Lens, Medium};
 use crate::search::element::piece_count;
+use crate::search::lens_landscape::SearchPlan;
 use crate::search::{MutationKind, SearchMethod, SearchRules, SearchSettings};
 use crate::session::{SessionView, StructureSearchRequest};
 use crate::studio::form::named_list;
@@ -88,6 +89,11 @@ impl SearchSetup {
             request.plan.settings.gradients = Some(self.brute_force_gradients);
         }
         request
+    }
+
+    /// The plan of the next search.
+    pub(super) const fn plan(&mut self) -> &mut SearchPlan {
+        &mut self.request.plan
     }
 
     pub(super) fn ui(&mut self, ui: &mut Ui, view: &SessionView) {

@@ -11,6 +11,7 @@ use crate::session::{
 };
 use crate::studio::number;
 use crate::studio::panels::optimizer::changes_text;
+use crate::studio::panels::{RMS_OVER_FIELDS, RMS_OVER_FIELDS_HINT};
 use crate::studio::text::{self, counted};
 
 fn short(value: f64) -> String {
@@ -70,12 +71,6 @@ fn duration_text(seconds: f64) -> String {
     }
 }
 
-/// The number of limits that a lens violates.
-pub(super) fn violations_text(lens: &str, count: usize) -> String {
-    let limits = if count == 1 { "limit" } else { "limits" };
-    format!("The {lens} violates {count} {limits}; an exported lens has to satisfy them")
-}
-
 /// The file of the search; true if writing it has failed.
 pub(super) fn checkpoint_text(checkpoint: &CheckpointStatus) -> (String, bool) {
     let name = checkpoint.path.as_ref().and_then(|path| path.file_name());
@@ -122,7 +117,7 @@ pub(super) fn comparison(ui: &mut Ui, search: ShownSearch<'_>, selected: &Select
         found.and_then(scored_design).zip(view.design_score.as_deref().and_then(scored_design));
     match pair {
         Some((new, own)) => {
-            parts.push(change_text("RMS", 1e3 * own.spot, 1e3 * new.spot, "µm"));
+            parts.push(change_text(RMS_OVER_FIELDS, 1e3 * own.spot, 1e3 * new.spot, "µm"));
             parts.push(change_text("light", own.light, new.light, "mm²"));
         }
         None => parts.extend(changes_text(view)),
@@ -130,10 +125,10 @@ pub(super) fn comparison(ui: &mut Ui, search: ShownSearch<'_>, selected: &Select
     let (new, own) = (piece_count(lens), piece_count(&view.lens));
     parts.push(format!("elements {own} to {new}"));
     let text = format!("Lens {number}: {}", parts.join(", "));
-    ui.add(Label::new(text).wrap()).on_hover_text(
-        "The design and this lens: RMS spot radius, mean area of the pupils, number of elements. \
-         The beam of both is limited by the stop",
-    );
+    ui.add(Label::new(text).wrap()).on_hover_text(format!(
+        "The design and this lens: sharpness, mean area of the pupils, number of elements. The beam \
+         of both is limited by the stop. {RMS_OVER_FIELDS_HINT}"
+    ));
 }
 
 fn scored_design(scored: &ScoredLens) -> Option<&ParetoPoint> {

@@ -124,4 +124,4 @@ fn show_costs(ui: &mut Ui, found: &OfferedLens) {
     }
 }
 
-const COST: &str = "The decrease of the RMS spot radius by a bound looser by 1 mm.";
+const COST: &str = "The decrease of the RMS over the fields by a bound looser by 1 mm.";

@@ -6,6 +6,7 @@ use crate::search::design::{
 };
 use crate::session::SpecifiedDesign;
 use crate::studio::number::format_digits;
+use crate::studio::panels::RMS_OVER_FIELDS;
 
 /// The value taken for one that is not stated, in the unit of the form.
 pub(super) fn filled_text(taken: Option<&FilledValue>, scale: f64, unit: &str) -> String {
@@ -104,7 +105,7 @@ pub(super) fn facts(judgement: &LensJudgement, length: f64) -> Vec<(&'static str
         count => format!(", {count} aspheres"),
     };
     vec![
-        ("RMS spot", format!("{} µm", format_digits(1e3 * judgement.rms, 4))),
+        (RMS_OVER_FIELDS, format!("{} µm", format_digits(1e3 * judgement.rms, 4))),
         ("Light", format!("{} to {} mm²", light[0], light[1])),
         ("Elements", format!("{}{aspheres}", judgement.elements)),
         ("Length", format!("{} mm", format_digits(length, 4))),

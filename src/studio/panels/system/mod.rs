@@ -90,7 +90,12 @@ fn texts(ui: &mut Ui, form: &mut EditForm<'_>) {
             });
             let width = ui.available_width();
             let accessible = format!("{name} of the lens");
-            form.text(ui, &accessible, (shown, width), |text| Ok(edit(text.to_owned())));
+            let entry =
+                form.text(ui, &accessible, (shown, width), |text| Ok(edit(text.to_owned())));
+            if !shown.is_empty() {
+                // A long one is cut in its field.
+                entry.on_hover_text(shown);
+            }
         });
     }
 }
