@@ -33,6 +33,7 @@ mod output;
 mod output_paths;
 mod pareto;
 mod picture;
+mod picture_device;
 mod progress;
 mod report;
 mod search;

@@ -6,6 +6,7 @@ use super::failures::Failures;
 use super::input::{LensFile, LoadedLens, Tolerance};
 use super::output::{Output, ShortNumber, print_note};
 use super::output_paths::OutputPaths;
+use super::picture_device::DeviceChoice;
 use super::progress::{progress_bar, stop_flag};
 use crate::analysis::{Coating, Estimate};
 use crate::files::{read_color, write_atomic};
@@ -14,7 +15,7 @@ use crate::measure::time_ms;
 use crate::picture::{
     BitDepth, BuiltInScene, ColorBand, Coloring, ErrorMap, ExactRenderer, ExactSettings, Exposure,
     GhostLight, GhostReport, ImageFrame, LossReport, MID_GREY, OmittedEffect, Picture,
-    PictureError, QuickRenderer, Raster, Scene, SensorModel, SensorPreset, ToneCurve,
+    PictureError, QuickPicture, QuickRenderer, Raster, Scene, SensorModel, SensorPreset, ToneCurve,
     encode_colors, encode_png, field_diagonal, focused, omitted_beside, photon_count,
     picture_model, quick_error,
 };
@@ -50,6 +51,10 @@ pub(super) struct PictureArgs {
     /// The quick way, by the map from image to scene, even if its error is larger than asked for
     #[arg(long, conflicts_with = "exact")]
     quick: bool,
+
+    /// The device of the quick way: auto (a graphics card where there is one), gpu or cpu
+    #[arg(long, value_name = "DEVICE", default_value = "auto", conflicts_with = "exact")]
+    device: DeviceChoice,
 
     /// The error: root mean square over the pixels, as a share of mid grey, or of the pixel where that
     /// is brighter
@@ -163,6 +168,9 @@ impl PictureArgs {
         paths.file("--out", Some(&self.out), &["png"])?;
         paths.file("--error-map", self.error_map.as_deref(), &["png"])?;
         let sensor = self.sensor_preset()?;
+        if !self.exact {
+            self.device.install()?;
+        }
         let opened = self.lens.open()?;
         opened.check_zoom(self.zoom)?;
         let (picture, ms) = time_ms(|| self.render(&opened, &stop_flag()));
@@ -372,7 +380,7 @@ impl PictureArgs {
         shot: &CameraShot,
         milliseconds: f64,
     ) -> PictureReport {
-        let RenderedPicture { picture, error, way, error_map, losses, ghosts } = rendered;
+        let RenderedPicture { picture, error, way, device, error_map, losses, ghosts } = rendered;
         let found = ghosts.as_ref().map(|(report, _)| report);
         let pixels = (picture.frame.pixels[0] * picture.frame.pixels[1]) as f64;
         PictureReport {
@@ -382,6 +390,7 @@ impl PictureArgs {
             focus: shot.focus,
             distance: shot.distance,
             way,
+            device: device.clone(),
             error: error.value,
             error_of_error: error.error,
             tolerance: self.error.0,
@@ -442,11 +451,15 @@ fn quick_picture(
     stop: &AtomicBool,
 ) -> Result<RenderedPicture, PictureError> {
     let quick = QuickRenderer::new(&shot.model, &shot.bands, exact)?;
-    let (mut picture, ms) = time_ms(|| quick.render_until(stop));
+    let (made, ms) = time_ms(|| quick.render_fast(stop));
+    let QuickPicture { mut picture, device, refused } = made;
+    if let Some(why) = refused {
+        print_note(format!("note: {why}; the processor made the picture"));
+    }
     let error = quick_error(exact, &picture, CHECKED_TILES, CHECKED_SAMPLES);
     picture.rays = error.rays;
     let error = Estimate { milliseconds: Some(ms), ..error };
-    Ok(RenderedPicture::new(picture, error, "quick"))
+    Ok(RenderedPicture { device, ..RenderedPicture::new(picture, error, "quick") })
 }
 
 /// A picture with its error.
@@ -456,6 +469,8 @@ struct RenderedPicture {
     /// picture without its preparation and its error where it is made the quick way.
     error: Estimate,
     way: &'static str,
+    /// The name of the graphics card that made it; `None` for the processor.
+    device: Option<String>,
     error_map: Option<ErrorMap>,
     losses: Option<LossReport>,
     /// With the time in milliseconds.
@@ -464,7 +479,7 @@ struct RenderedPicture {
 
 impl RenderedPicture {
     const fn new(picture: Picture, error: Estimate, way: &'static str) -> Self {
-        Self { picture, error, way, error_map: None, losses: None, ghosts: None }
+        Self { picture, error, way, device: None, error_map: None, losses: None, ghosts: None }
     }
 }
 
@@ -488,6 +503,7 @@ struct PictureReport {
     focus: Option<f64>,
     distance: Option<f64>,
     way: &'static str,
+    device: Option<String>,
     error: f64,
     error_of_error: f64,
     tolerance: f64,
@@ -596,7 +612,10 @@ impl Display for PictureReport {
         let percent = 100.0 * self.tolerance;
         let of_quick = self.quick_milliseconds.map(|ms| {
             let error = 100.0 * self.error_of_error;
-            format!(" ± {error:.3} %, against the exact way on some tiles; made in {ms:.0} ms")
+            let device = self.device.as_deref().unwrap_or("the processor");
+            format!(
+                " ± {error:.3} %, against the exact way on some tiles; made in {ms:.0} ms on {device}"
+            )
         });
         let of_quick = of_quick.unwrap_or_else(|| " by sampling".to_owned());
         writeln!(

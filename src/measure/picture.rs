@@ -9,11 +9,12 @@ use super::timing::time_ms;
 use crate::lens::Lens;
 use crate::picture::{
     BuiltInScene, ColorBand, Coloring, ExactRenderer, ExactSettings, ImageFrame, PictureError,
-    QuickRenderer, field_diagonal, picture_model, quick_error,
+    QuickPicture, QuickRenderer, field_diagonal, picture_model, quick_error,
 };
 use crate::pupil::RayModel;
 use serde::Serialize;
 use std::ops::ControlFlow;
+use std::sync::atomic::AtomicBool;
 
 /// The way of making a picture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -56,6 +57,8 @@ pub struct PictureCurves {
     pub pixels: [usize; 2],
     /// The time of what both ways need before their first pixel, in milliseconds.
     pub prepare_ms: f64,
+    /// The name of the graphics card that made the quick picture; `None` for the processor.
+    pub device: Option<String>,
     /// The pictures.
     pub rows: Vec<PictureRow>,
 }
@@ -96,11 +99,13 @@ pub fn measure_picture(
         ms: first,
         whole_ms: first,
     };
-    let mut curves = PictureCurves { scene: scene.name(), pixels, prepare_ms, rows: vec![row] };
+    let mut curves =
+        PictureCurves { scene: scene.name(), pixels, prepare_ms, device: None, rows: vec![row] };
     if report(1, parts).is_break() {
         return Ok(curves);
     }
-    let quick = camera(lens, scene, pixels, three, |c| c.quick(Some(TILES)))?;
+    let (quick, device) = camera(lens, scene, pixels, three, |c| c.quick(Some(TILES)))?;
+    curves.device = device;
     curves.rows.push(PictureRow { whole_ms: quick.ms + prepare_ms, ..quick });
     let factor = (pixels[0] * pixels[1]) as f64 / (exact[0] * exact[1]) as f64;
     for (done, tolerance) in TOLERANCES.into_iter().enumerate() {
@@ -143,15 +148,15 @@ fn camera<T>(
 }
 
 impl PreparedCamera<'_> {
-    /// A picture the quick way, with its error on some tiles.
-    fn quick(&self, tiles: Option<usize>) -> Result<PictureRow, PictureError> {
+    /// A picture the quick way, with its error on some tiles, and the device that made it.
+    fn quick(&self, tiles: Option<usize>) -> Result<(PictureRow, Option<String>), PictureError> {
         let (made, ms) = time_ms(|| {
             let quick = QuickRenderer::new(self.model, self.bands, self.renderer)?;
-            Ok::<_, PictureError>(quick.render())
+            Ok::<_, PictureError>(quick.render_fast(&AtomicBool::new(false)))
         });
-        let picture = made?;
+        let QuickPicture { picture, device, .. } = made?;
         let error = tiles.map(|tiles| quick_error(self.renderer, &picture, tiles, SAMPLES).value);
-        Ok(PictureRow {
+        let row = PictureRow {
             way: PictureWay::Quick,
             pixels: self.pixels,
             tolerance: None,
@@ -159,7 +164,8 @@ impl PreparedCamera<'_> {
             reached: true,
             ms,
             whole_ms: ms,
-        })
+        };
+        Ok((row, device))
     }
 
     fn exact(&self, tolerance: f64) -> PictureRow {

@@ -5,7 +5,8 @@
 //! for the mean over tiles; a single tile then counts as without error.
 
 use super::Picture;
-use super::exact::{ExactRenderer, ExactSettings, MID_GREY, PictureTile};
+use super::exact::{ExactRenderer, ExactSettings, MID_GREY};
+use super::tile_sampler::PictureTile;
 use crate::analysis::Estimate;
 use crate::plot::{Color, GREY, glow};
 use rayon::prelude::*;

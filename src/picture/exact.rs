@@ -4,37 +4,44 @@
 //! radiance of the scene over the area, the directions from which light arrives there, the wavelengths
 //! of a colour and the time. Each sample is a ray from the pixel backwards through the lens, whose rims
 //! clip it, into the scene. Samples are Owen-scrambled Sobol points (Burley, JCGT 9, 2020), in
-//! [`REPLICATES`] sets that are independent of each other: their spread is the error of the mean. A tile
-//! is sampled until its error is small enough. All colours of a pixel share its points, so that grey stays
-//! grey.
+//! [`REPLICATES`] sets that are independent of each other: their spread is the error of the mean. All
+//! colours of a pixel share its points, so that grey stays grey.
 //!
-//! The seed of a pixel is its place, and tiles are of a fixed size, so that a picture does not depend on
-//! the number of threads.
+//! Tiles are sampled in groups until the error of a group is small enough. Those whose squared error falls
+//! most for a ray get more samples first, so that an edge takes what an even wall leaves over.
+//!
+//! The seed of a pixel is its place, and tiles and groups are of a fixed size, so that a picture does not
+//! depend on the number of threads.
 
 use super::lit_directions::LitDirections;
 use super::losses::{LensLosses, LossReport};
+use super::sample_points::LONGEST;
 use super::scene::{Radiance, Scene};
+use super::tile_sampler::{PictureTile, SampledTile, TileSampler, TileWork};
 use super::{ColorBand, ImageFrame, Picture, PictureError};
-use crate::analysis::{BackwardLens, Coating, irradiance};
+use crate::analysis::{Coating, irradiance};
 use crate::lens::{Surface, SurfaceNumber};
 use crate::pupil::{Accuracy, RayModel};
-use crate::trace::{Fates, Landings, Rays, TraceSink as _};
+use crate::trace::Fates;
 use rayon::prelude::*;
 use std::ops::{ControlFlow, Range};
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
 /// The number of independent sets of samples.
 pub const REPLICATES: usize = 4;
 /// The side of a tile, in pixels.
 const TILE: usize = 16;
+/// The number of tiles that share an error.
+const GROUP: usize = 1024;
 /// The samples of the first pass: at least so many for each replicate of a tile, so that its error is not
 /// taken for nothing because no sample met what there is, and at least so many for each of its pixels.
 const FIRST_OF_TILE: usize = 1024;
 const FIRST: usize = 4;
-/// The largest number of samples of a replicate: the length of the Sobol sequence.
-const LONGEST: usize = 1 << 16;
-/// The number of rays that are traced together.
-const BATCH: usize = 2048;
+/// The share of the squared error of a tile that twice the samples are expected to leave: between that of
+/// independent samples and that of an even integrand.
+const LEFT_BY_DOUBLING: f64 = 0.35;
+/// The share of the work that the first pass is taken for.
+const FIRST_SHARE: f64 = 0.1;
 /// The reflectance of mid grey.
 pub const MID_GREY: f64 = 0.18;
 /// The number of rings of the image for which directions are tabulated.
@@ -43,8 +50,8 @@ const RINGS: usize = 12;
 /// The accuracy of a picture, and what it is made with.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ExactSettings {
-    /// The error that is asked for, as a share of mid grey, or of the pixel where that is brighter; a
-    /// negative one takes all samples.
+    /// The error that is asked for: root mean square over a group of tiles, as a share of mid grey, or of
+    /// the pixel where that is brighter; a negative one takes all samples.
     pub tolerance: f64,
     /// The largest number of samples of a pixel.
     pub max_samples: usize,
@@ -68,83 +75,50 @@ pub type PictureProgress<'a> = &'a (dyn Fn(f64) -> ControlFlow<()> + Sync);
 pub struct ExactRenderer<'a> {
     scene: &'a Scene,
     frame: ImageFrame,
-    bands: Vec<BackwardBand>,
-    directions: LitDirections,
-    /// The light that surfaces reflect; `None` if they let all light pass.
-    losses: Option<LensLosses>,
+    sampler: TileSampler,
     /// The irradiance of a white card on the axis, or where the image is brightest.
     white: f64,
 }
 
-/// A colour: lenses at its wavelengths, each with the sum of the shares up to it.
-#[derive(Debug)]
-struct BackwardBand {
-    lenses: Vec<(f64, BackwardLens)>,
+/// A scene in front of a lens as any way of making pictures sees it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct PictureSubject<'a> {
+    pub(super) scene: &'a Scene,
+    pub(super) frame: ImageFrame,
+    /// The directions of light at the points of the image.
+    pub(super) directions: &'a LitDirections,
+    /// The shares of light that pass.
+    pub(super) losses: Option<&'a LensLosses>,
+    /// The irradiance of a white card on the axis.
+    pub(super) white: f64,
 }
 
-impl BackwardBand {
-    fn new(model: &RayModel, band: &ColorBand) -> Result<Self, PictureError> {
-        let mut sum = 0.0;
-        let lens = |(wavelength, share): &(usize, f64)| {
-            sum += share;
-            Ok((sum, BackwardLens::new(model, *wavelength)?))
-        };
-        Ok(Self { lenses: band.wavelengths.iter().map(lens).collect::<Result<_, PictureError>>()? })
+/// Asks whether to go on, and tells the share of the work that is done.
+struct RenderWatch<'a> {
+    progress: PictureProgress<'a>,
+    /// The bits of the share.
+    share: AtomicU64,
+    stopped: AtomicBool,
+}
+
+impl<'a> RenderWatch<'a> {
+    fn new(progress: PictureProgress<'a>) -> Self {
+        Self { progress, share: AtomicU64::new(0), stopped: AtomicBool::new(false) }
     }
 
-    /// The index of the lens for a number from 0 to 1.
-    fn choose(&self, unit: f64) -> usize {
-        self.lenses.partition_point(|(sum, _)| *sum <= unit).min(self.lenses.len() - 1)
-    }
-}
-
-/// Rays of one colour and wavelength that wait to be traced.
-#[derive(Debug, Default)]
-struct RayQueue {
-    rays: Rays<f64>,
-    /// The place of each ray's light in the sums, its weight, and its time in seconds.
-    slots: Vec<(u32, f64, f64)>,
-    landings: Landings<f64>,
-}
-
-/// The light of the samples of a tile.
-#[derive(Debug)]
-struct TileSums {
-    /// By pixel, replicate and colour.
-    sums: Vec<f64>,
-    fates: Fates,
-    queues: Vec<Vec<RayQueue>>,
-}
-
-/// A tile of a picture: columns and rows.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct PictureTile {
-    columns: Range<usize>,
-    rows: Range<usize>,
-}
-
-impl PictureTile {
-    pub(super) const fn new(columns: Range<usize>, rows: Range<usize>) -> Self {
-        Self { columns, rows }
+    /// Raises the share that is done.
+    fn reach(&self, share: f64) {
+        // Positive numbers are in the order of their bits.
+        self.share.fetch_max(share.clamp(0.0, 1.0).to_bits(), Ordering::Relaxed);
     }
 
-    pub(super) fn pixels(&self) -> impl Iterator<Item = [usize; 2]> + '_ {
-        self.rows.clone().flat_map(|row| self.columns.clone().map(move |column| [column, row]))
+    fn is_stopped(&self) -> bool {
+        let share = f64::from_bits(self.share.load(Ordering::Relaxed));
+        if !self.stopped.load(Ordering::Relaxed) && (self.progress)(share).is_break() {
+            self.stopped.store(true, Ordering::Relaxed);
+        }
+        self.stopped.load(Ordering::Relaxed)
     }
-
-    pub(super) fn len(&self) -> usize {
-        self.columns.len() * self.rows.len()
-    }
-}
-
-/// The pixels of a tile with their standard errors.
-#[derive(Debug, Clone, Default)]
-pub(super) struct SampledTile {
-    pub(super) values: Vec<Radiance>,
-    errors: Vec<Radiance>,
-    pub(super) samples: usize,
-    fates: Fates,
-    reached: bool,
 }
 
 impl<'a> ExactRenderer<'a> {
@@ -162,11 +136,10 @@ impl<'a> ExactRenderer<'a> {
         if let Some(surface) = system.surfaces.iter().position(Surface::is_mounted) {
             return Err(PictureError::NotCentred(SurfaceNumber::new(surface)));
         }
-        let backward = bands.iter().map(|band| BackwardBand::new(model, band));
-        let bands_of = backward.collect::<Result<_, _>>()?;
         let directions = LitDirections::new(model, &outer(model, bands), frame.reach(), RINGS)?;
+        let sampler = TileSampler::new(model, bands, directions)?;
         let white = brightest(model, frame.reach())?;
-        Ok(Self { scene, frame, bands: bands_of, directions, losses: None, white })
+        Ok(Self { scene, frame, sampler, white })
     }
 
     /// The same with what the surfaces of the lens reflect taken away, for the model and the colours of
@@ -181,21 +154,21 @@ impl<'a> ExactRenderer<'a> {
         coating: Coating,
         tolerance: f64,
     ) -> Result<Self, PictureError> {
-        let light = (&self.directions, self.frame.reach());
+        let light = (&self.sampler.directions, self.frame.reach());
         let losses = LensLosses::new(model, bands, light, (coating, tolerance))?;
         self.white *= losses.report.transmission;
-        self.losses = Some(losses);
+        self.sampler.losses = Some(losses);
         Ok(self)
     }
 
     /// The losses at the surfaces of the lens, if they are in the picture.
     pub fn losses(&self) -> Option<&LossReport> {
-        self.losses.as_ref().map(|losses| &losses.report)
+        self.loss_table().map(|losses| &losses.report)
     }
 
     /// The shares of light that pass.
-    pub(super) fn loss_table(&self) -> Option<&LensLosses> {
-        self.losses.as_ref()
+    fn loss_table(&self) -> Option<&LensLosses> {
+        self.sampler.losses.as_ref()
     }
 
     /// The irradiance of a white card on the axis, or where the image is brightest if that is dark.
@@ -204,13 +177,19 @@ impl<'a> ExactRenderer<'a> {
     }
 
     /// The directions of light at the points of the image.
-    pub(super) fn directions(&self) -> &LitDirections {
-        &self.directions
+    fn directions(&self) -> &LitDirections {
+        &self.sampler.directions
     }
 
-    /// The scene, the frame and the number of colours.
-    pub(super) fn subject(&self) -> (&'a Scene, ImageFrame, usize) {
-        (self.scene, self.frame, self.bands.len())
+    /// What the pictures show.
+    pub(super) fn subject(&self) -> PictureSubject<'_> {
+        PictureSubject {
+            scene: self.scene,
+            frame: self.frame,
+            directions: self.directions(),
+            losses: self.loss_table(),
+            white: self.white(),
+        }
     }
 
     /// The tiles of the picture, row by row.
@@ -226,24 +205,22 @@ impl<'a> ExactRenderer<'a> {
     /// The picture; what is missing when the work is ended early stays black, and the picture says so.
     pub fn render(&self, settings: &ExactSettings, progress: PictureProgress<'_>) -> Picture {
         let tiles = self.tiles();
-        let (done, stopped) = (AtomicUsize::new(0), AtomicBool::new(false));
-        let is_stopped = || {
-            let share = done.load(Ordering::Relaxed) as f64 / tiles.len() as f64;
-            stopped.fetch_or(progress(share).is_break(), Ordering::Relaxed);
-            stopped.load(Ordering::Relaxed)
-        };
-        let work = |tile: &PictureTile| {
-            let sampled = self.sample_tile_until(tile, settings, &is_stopped);
-            done.fetch_add(1, Ordering::Relaxed);
-            sampled
-        };
-        let sampled: Vec<_> = tiles.par_iter().map(work).collect();
-        self.assemble(&tiles, sampled)
+        let watch = RenderWatch::new(progress);
+        let mut picture = self.black();
+        for (done, group) in tiles.chunks(GROUP).enumerate() {
+            let part = |share: f64| {
+                ((done * GROUP) as f64 + share * group.len() as f64) / tiles.len() as f64
+            };
+            let sampled = self.sample_group(group, settings, &watch, &part);
+            self.add(&mut picture, group, sampled, settings.tolerance);
+        }
+        picture.reached &= picture.complete;
+        picture
     }
 
-    fn assemble(&self, tiles: &[PictureTile], sampled: Vec<Option<SampledTile>>) -> Picture {
+    fn black(&self) -> Picture {
         let [columns, rows] = self.frame.pixels;
-        let mut picture = Picture {
+        Picture {
             frame: self.frame,
             values: vec![[0.0; 3]; columns * rows],
             errors: vec![[0.0; 3]; columns * rows],
@@ -252,14 +229,27 @@ impl<'a> ExactRenderer<'a> {
             fates: Fates::default(),
             reached: true,
             complete: true,
-            overshoot: self.directions.overshoot,
-        };
+            overshoot: self.directions().overshoot,
+        }
+    }
+
+    /// Adds the tiles of a group to a picture.
+    fn add(
+        &self,
+        picture: &mut Picture,
+        tiles: &[PictureTile],
+        sampled: Vec<Option<SampledTile>>,
+        tolerance: f64,
+    ) {
+        let columns = self.frame.pixels[0];
+        let (mut square, mut pixels) = (0.0, 0);
         for (tile, sampled) in tiles.iter().zip(sampled) {
             let Some(sampled) = sampled else {
                 picture.complete = false;
                 continue;
             };
-            picture.reached &= sampled.reached;
+            square += self.squared_error(&sampled);
+            pixels += tile.len();
             picture.fates.add(sampled.fates);
             picture.rays += sampled.samples;
             for (i, [column, row]) in tile.pixels().enumerate() {
@@ -267,160 +257,83 @@ impl<'a> ExactRenderer<'a> {
                 picture.errors[row * columns + column] = sampled.errors[i];
             }
         }
-        picture.reached &= picture.complete;
-        picture
+        picture.reached &= square <= pixels as f64 * tolerance * tolerance.abs();
     }
 
     /// Samples a tile until its error is small enough.
     pub(super) fn sample_tile(&self, tile: &PictureTile, settings: &ExactSettings) -> SampledTile {
-        self.sample_tile_until(tile, settings, &|| false).unwrap_or_default()
+        let watch = RenderWatch::new(&|_| ControlFlow::Continue(()));
+        let found = self.sample_group(std::slice::from_ref(tile), settings, &watch, &|share| share);
+        found.into_iter().flatten().next().unwrap_or_default()
     }
 
-    /// The same, each pass doubles the samples. Once `is_stopped` is true, that of the
-    /// passes that have ended; `None` if there is none.
-    fn sample_tile_until(
+    /// Samples the tiles of a group until their common error is small enough. Once that is stopped, each as
+    /// it was after the last of its passes that ended; `None` if there is none.
+    fn sample_group(
         &self,
-        tile: &PictureTile,
+        tiles: &[PictureTile],
         settings: &ExactSettings,
-        is_stopped: &dyn Fn() -> bool,
-    ) -> Option<SampledTile> {
+        watch: &RenderWatch<'_>,
+        part: &(dyn Fn(f64) -> f64 + Sync),
+    ) -> Vec<Option<SampledTile>> {
         let most = (settings.max_samples / REPLICATES).clamp(1, LONGEST);
-        let first = FIRST.max(FIRST_OF_TILE / tile.len().max(1));
-        let queues =
-            |band: &BackwardBand| band.lenses.iter().map(|_| RayQueue::default()).collect();
-        let mut sums = TileSums {
-            sums: vec![0.0; tile.len() * REPLICATES * self.bands.len()],
-            fates: Fates::default(),
-            queues: self.bands.iter().map(queues).collect(),
+        let start =
+            |tile: &PictureTile| self.sampler.begin(&self.frame, tile.clone(), settings.seed);
+        let mut works: Vec<TileWork> = tiles.par_iter().map(start).collect();
+        let wanted = {
+            let pixels: usize = tiles.iter().map(PictureTile::len).sum();
+            pixels as f64 * settings.tolerance * settings.tolerance.abs()
         };
-        let (mut from, mut to) = (0, first.min(most));
-        let mut ended = None;
-        while self.sample(tile, from..to, settings, &mut sums, is_stopped) {
-            let mut sampled = self.estimate(&sums, to);
-            sampled.reached = self.rms_error(&sampled) <= settings.tolerance;
-            if sampled.reached || to >= most {
-                return Some(sampled);
-            }
-            ended = Some(sampled);
-            (from, to) = (to, (2 * to).min(most));
-        }
-        ended
-    }
-
-    /// Samples the pixels of a tile; false if that was stopped.
-    fn sample(
-        &self,
-        tile: &PictureTile,
-        samples: Range<usize>,
-        settings: &ExactSettings,
-        sums: &mut TileSums,
-        is_stopped: &dyn Fn() -> bool,
-    ) -> bool {
-        for (i, pixel) in tile.pixels().enumerate() {
-            if is_stopped() {
-                return false;
-            }
-            for replicate in 0..REPLICATES {
-                let seed = self.seed(pixel, replicate, settings.seed);
-                let slot = (i * REPLICATES + replicate) * self.bands.len();
-                for sample in samples.clone() {
-                    self.launch(pixel, (sample as u32, seed), slot, settings.seconds, sums);
-                }
-            }
-        }
-        for band in 0..self.bands.len() {
-            (0..self.bands[band].lenses.len()).for_each(|lens| self.flush(sums, band, lens));
-        }
-        true
-    }
-
-    /// The seed of a replicate of a pixel (the finalizer of `MurmurHash3`).
-    fn seed(&self, [column, row]: [usize; 2], replicate: usize, seed: u32) -> u32 {
-        let place = (row * self.frame.pixels[0] + column) * REPLICATES + replicate;
-        let mut hash = (place as u32) ^ seed.wrapping_mul(0x9E37_79B9);
-        hash = (hash ^ (hash >> 16)).wrapping_mul(0x85EB_CA6B);
-        hash = (hash ^ (hash >> 13)).wrapping_mul(0xC2B2_AE35);
-        hash ^ (hash >> 16)
-    }
-
-    /// Queues the rays of a sample, one for each colour.
-    fn launch(
-        &self,
-        pixel: [usize; 2],
-        (index, seed): (u32, u32),
-        slot: usize,
-        seconds: f64,
-        sums: &mut TileSums,
-    ) {
-        let [right, down, u, v] = sobol_burley::sample_4d(index, 0, seed).map(f64::from);
-        let [x, y] = self.frame.point(pixel, [right, down]);
-        let radius = x.hypot(y);
-        let Some(drawn) = self.directions.draw(radius, [u, v]) else { return };
-        let [across, outwards] = drawn.cosines;
-        let [ex, ey] = if radius > 0.0 { [x / radius, y / radius] } else { [0.0, 1.0] };
-        let cosines = [across * ey + outwards * ex, outwards * ey - across * ex];
-        let [color, time, ..] = sobol_burley::sample_4d(index, 1, seed).map(f64::from);
-        for (band, color_band) in self.bands.iter().enumerate() {
-            let chosen = color_band.choose(color);
-            let lens = &color_band.lenses[chosen].1;
-            let Some((ray, share)) = lens.ray([x, y], cosines) else { continue };
-            let queue = &mut sums.queues[band][chosen];
-            queue.rays.push(ray);
-            let passed = self
-                .losses
-                .as_ref()
-                .map_or(1.0, |losses| losses.passed([band, chosen], radius, drawn.cosines));
-            let weight = drawn.area * share * lens.index_ratio * passed;
-            queue.slots.push(((slot + band) as u32, weight, time * seconds));
-            if queue.slots.len() >= BATCH {
-                self.flush(sums, band, chosen);
-            }
-        }
-    }
-
-    /// Traces the rays of a queue and adds their light.
-    fn flush(&self, sums: &mut TileSums, band: usize, lens: usize) {
-        let backward = &self.bands[band].lenses[lens].1;
-        let queue = &mut sums.queues[band][lens];
-        backward.trace(&queue.rays, &mut queue.landings);
-        sums.fates.add(queue.landings.fates());
-        for (i, (slot, weight, seconds)) in queue.slots.iter().enumerate() {
-            if queue.landings.fate(i).is_imaged() {
-                let ray = backward.scene_ray(queue.landings.ray(i));
-                let radiance = self.scene.radiance(&ray, *seconds);
-                sums.sums[*slot as usize] += weight * self.seen(radiance, band);
-            }
-        }
-        queue.slots.clear();
-        queue.rays.clear();
-    }
-
-    /// The radiance that a colour sees.
-    fn seen(&self, radiance: Radiance, band: usize) -> f64 {
-        if self.bands.len() == 3 { radiance[band] } else { luminance(radiance) }
-    }
-
-    /// Means and standard errors of the pixels of a tile after `count` samples of each replicate.
-    fn estimate(&self, tile: &TileSums, count: usize) -> SampledTile {
-        let bands = self.bands.len();
-        let mut sampled = SampledTile { fates: tile.fates, ..SampledTile::default() };
-        sampled.samples = tile.fates.total();
-        for pixel in tile.sums.chunks(REPLICATES * bands) {
-            let statistics = |band: usize| {
-                let means: [f64; REPLICATES] =
-                    std::array::from_fn(|r| pixel[r * bands + band] / count as f64);
-                mean_with_error(means)
+        let mut chosen = vec![true; works.len()];
+        while chosen.contains(&true) {
+            let pass = |(work, _): (&mut TileWork, &bool)| {
+                let first = FIRST.max(FIRST_OF_TILE / work.tile.len().max(1));
+                let count = if work.count == 0 { first } else { 2 * work.count };
+                let scene = |ray: &_, seconds| self.scene.radiance(ray, seconds);
+                self.sampler.sample(work, count.min(most), (&scene, settings.seconds), &|| {
+                    watch.is_stopped()
+                })
             };
-            let colors: [(f64, f64); 3] = std::array::from_fn(|c| statistics(c.min(bands - 1)));
-            sampled.values.push(colors.map(|(mean, _)| mean));
-            sampled.errors.push(colors.map(|(_, error)| error));
+            let some = works.par_iter_mut().zip(&chosen).filter(|(_, is_chosen)| **is_chosen);
+            if !some.map(pass).all(|ended| ended) {
+                break;
+            }
+            let squares: Vec<f64> =
+                works.iter().map(|work| self.squared_error(&work.sampled)).collect();
+            let share = (wanted / squares.iter().sum::<f64>()).max(0.0).powf(2.0 / 3.0).min(1.0);
+            watch.reach(part(FIRST_SHARE + (1.0 - FIRST_SHARE) * share));
+            chosen = worst(&works, &squares, wanted, most);
         }
-        sampled
+        works.into_iter().map(|work| (work.count > 0).then_some(work.sampled)).collect()
     }
 
-    fn rms_error(&self, tile: &SampledTile) -> f64 {
-        relative_rms(&tile.values, &tile.errors, MID_GREY * self.white())
+    /// The sum over the pixels of a tile of the squared errors as a share of mid grey, or of the pixel where
+    /// that is brighter; the mean over its colours.
+    fn squared_error(&self, tile: &SampledTile) -> f64 {
+        let rms = relative_rms(&tile.values, &tile.errors, MID_GREY * self.white());
+        tile.values.len() as f64 * rms * rms
     }
+}
+
+/// The tiles that need twice the samples for a sum of squared errors, those first whose error falls most for
+/// a ray; none if the sum is reached, or if no tile can have more.
+fn worst(works: &[TileWork], squares: &[f64], wanted: f64, most: usize) -> Vec<bool> {
+    let mut chosen = vec![false; works.len()];
+    let mut rest: f64 = squares.iter().sum();
+    if rest <= wanted {
+        return chosen;
+    }
+    let gain = |i: &usize| squares[*i] / (works[*i].count * works[*i].tile.len().max(1)) as f64;
+    let mut order: Vec<usize> = (0..works.len()).filter(|i| works[*i].count < most).collect();
+    order.sort_by(|a, b| gain(b).total_cmp(&gain(a)));
+    for i in order {
+        chosen[i] = true;
+        rest -= (1.0 - LEFT_BY_DOUBLING) * squares[i];
+        if rest <= wanted {
+            break;
+        }
+    }
+    chosen
 }
 
 /// The mean of replicates and its standard error.

@@ -15,6 +15,8 @@ use std::f64::consts::{PI, TAU};
 
 /// The number of corners of a polygon.
 const CORNERS: usize = 64;
+/// The number of equal shares of the area of a polygon whose first corner is known.
+const SHARES: usize = 256;
 /// The number of rays on an outline.
 const OUTLINE: usize = 128;
 /// The parts into which a side of an outline is divided, so that it reaches every corner.
@@ -46,6 +48,8 @@ struct RingPolygon {
     corners: Vec<[f64; 2]>,
     /// The areas of the triangles between the centre and the sides, summed up.
     areas: Vec<f64>,
+    /// For equal shares of the area, the first triangle that reaches into each.
+    guide: [u8; SHARES],
 }
 
 /// A direction drawn from a polygon.
@@ -177,12 +181,14 @@ impl RingPolygon {
             [sin, cos].map(|v| v * radius * WIDER / (PI / CORNERS as f64).cos())
         };
         let corners: Vec<[f64; 2]> = radii.into_iter().enumerate().map(corner).collect();
-        Some(Self { centers, areas: areas(&corners), corners })
+        let areas = areas(&corners);
+        Some(Self { centers, guide: guide(&areas), areas, corners })
     }
 
     fn widen(&mut self, factor: f64) {
         self.corners.iter_mut().for_each(|corner| *corner = corner.map(|v| v * factor));
         self.areas = areas(&self.corners);
+        self.guide = guide(&self.areas);
     }
 
     /// The distance of a direction from the centre over that of the side of the polygon there.
@@ -199,7 +205,10 @@ impl RingPolygon {
     fn draw(&self, part: f64, [u, v]: [f64; 2]) -> DrawnDirection {
         let area = self.areas[CORNERS - 1];
         let wanted = u * area;
-        let side = self.areas.partition_point(|sum| *sum <= wanted).min(CORNERS - 1);
+        let mut side = usize::from(self.guide[((u * SHARES as f64) as usize).min(SHARES - 1)]);
+        while side < CORNERS - 1 && self.areas[side] <= wanted {
+            side += 1;
+        }
         let before = side.checked_sub(1).map_or(0.0, |i| self.areas[i]);
         let along = ((wanted - before) / (self.areas[side] - before)).clamp(0.0, 1.0);
         let on_side = between([self.corners[side], self.corners[(side + 1) % CORNERS]], along);
@@ -229,6 +238,15 @@ fn enclose(radii: &mut [f64; CORNERS], outline: &[[f64; 2]], center: [f64; 2]) {
             }
         }
     }
+}
+
+/// For equal shares of the area, the first triangle that reaches into each.
+fn guide(areas: &[f64]) -> [u8; SHARES] {
+    let area = areas[CORNERS - 1];
+    std::array::from_fn(|i| {
+        let wanted = i as f64 / SHARES as f64 * area;
+        areas.partition_point(|sum| *sum <= wanted).min(CORNERS - 1) as u8
+    })
 }
 
 /// The areas of the triangles between the centre and the sides, summed up.

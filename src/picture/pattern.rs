@@ -91,12 +91,28 @@ const EDGE_SLOPE: f64 = 0.087_488_663_525_924; // tan 5°
 /// The radius of a light over the distance of its neighbours.
 const LIGHT_RADIUS: f64 = 0.01;
 const EDGE_LEVELS: [f64; 2] = [0.2, 0.8];
+/// The largest number of sectors of a star whose power of the place does not overflow.
+const MOST_SECTORS: f64 = 512.0;
 
 impl Pattern {
+    /// True if red, green and blue are the same everywhere.
+    pub(super) fn is_grey(&self) -> bool {
+        match self {
+            Self::Uniform { radiance: [red, green, blue], .. } => red == green && green == blue,
+            Self::Ball { .. } | Self::Flame(_) | Self::LitWall { .. } | Self::Raster(_) => false,
+            Self::Wave { .. }
+            | Self::Checkerboard(_)
+            | Self::SlantedEdge
+            | Self::Star(_)
+            | Self::Bars
+            | Self::Lights { .. } => true,
+        }
+    }
+
     /// The paint at a point.
     pub fn paint(&self, point: PaintedPoint) -> Paint {
         let PaintedPoint { place: [x, y], half_size: [half_width, half_height] } = point;
-        let (u, v) = (x / half_width, y / half_height);
+        let relative = || [x / half_width, y / half_height];
         match self {
             Self::Uniform { radiance, cover } => Paint { radiance: *radiance, cover: *cover },
             Self::Wave { contrast, frequency: [f, g], phase } => {
@@ -109,9 +125,9 @@ impl Pattern {
             }
             Self::SlantedEdge => grey(EDGE_LEVELS[usize::from(x > EDGE_SLOPE * y)]),
             Self::Star(sectors) => {
-                let inside = x.hypot(y) <= half_width.min(half_height);
-                let sector = (y.atan2(x) / TAU * sectors).rem_euclid(1.0);
-                grey(f64::from(u8::from(!inside || sector < 0.5)))
+                let radius = half_width.min(half_height);
+                let inside = x * x + y * y <= radius * radius;
+                grey(f64::from(u8::from(!inside || is_white_sector([x, y], *sectors))))
             }
             Self::Lights { count, radiance } => {
                 let distance = 2.0 * half_height / count;
@@ -119,18 +135,42 @@ impl Pattern {
                 let is_lit = off(x).hypot(off(y)) <= LIGHT_RADIUS * distance;
                 grey(if is_lit { *radiance } else { 0.0 })
             }
-            Self::Bars => grey(bars([x / half_height, v])),
-            Self::Ball { radiance, lit_from } => ball([u, v], *radiance, *lit_from),
-            Self::Flame(radiance) => flame([u, v], *radiance),
+            Self::Bars => grey(bars([x / half_height, y / half_height])),
+            Self::Ball { radiance, lit_from } => ball(relative(), *radiance, *lit_from),
+            Self::Flame(radiance) => flame(relative(), *radiance),
             Self::LitWall { radiance, light, distance } => {
                 let square = (x - light[0]).powi(2) + (y - light[1]).powi(2);
                 // The inverse square of the distance times the cosine on the wall.
                 let share = (1.0 + square / (distance * distance)).powf(-1.5);
                 Paint { radiance: radiance.map(|v| v * share), cover: 1.0 }
             }
-            Self::Raster(raster) => raster.paint([0.5 * (u + 1.0), 0.5 * (1.0 - v)]),
+            Self::Raster(raster) => {
+                let [u, v] = relative();
+                raster.paint([0.5 * (u + 1.0), 0.5 * (1.0 - v)])
+            }
         }
     }
+}
+
+/// True in the first half of each of this many sectors, counted from the right upwards.
+fn is_white_sector([x, y]: [f64; 2], sectors: f64) -> bool {
+    let largest = x.abs().max(y.abs());
+    if !(sectors.fract() == 0.0 && (1.0..=MOST_SECTORS).contains(&sectors) && largest > 0.0) {
+        return (y.atan2(x) / TAU * sectors).rem_euclid(1.0) < 0.5;
+    }
+    // The sine of so many times the angle is the imaginary part of that power of x + iy, whose modulus is at
+    // most √2 here.
+    let (mut base, mut power) = ([x / largest, y / largest], [1.0, 0.0]);
+    let times = |a: [f64; 2], b: [f64; 2]| [a[0] * b[0] - a[1] * b[1], a[0] * b[1] + a[1] * b[0]];
+    let mut rest = sectors as u32;
+    while rest > 0 {
+        if rest & 1 == 1 {
+            power = times(power, base);
+        }
+        base = times(base, base);
+        rest >>= 1;
+    }
+    power[1] > 0.0 || power[1] == 0.0 && power[0] > 0.0
 }
 
 /// The height of the largest group of bars, over half of the height of the target.

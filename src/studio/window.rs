@@ -6,8 +6,9 @@ use std::sync::Arc;
 use eframe::egui_wgpu::{RenderState, WgpuConfiguration, WgpuSetup, WgpuSetupCreateNew};
 use eframe::{App, CreationContext, NativeOptions, Renderer};
 
-use super::draw::{RenderBackend, install_gpu_cache};
+use super::draw::{PicturePass, RenderBackend, install_gpu_cache};
 use super::theme;
+use crate::picture::install_picture_device;
 
 /// An error that keeps the studio from opening.
 #[derive(Debug, thiserror::Error)]
@@ -102,6 +103,7 @@ fn open_with(
             Some(state) => {
                 report_errors(state);
                 install_gpu_cache(state);
+                make_pictures_on(state);
                 RenderBackend::Gpu
             }
             None => RenderBackend::Software,
@@ -143,6 +145,14 @@ fn wgpu_setup() -> WgpuSetup {
 }
 
 /// Logs errors of the graphics card, which would otherwise end the program.
+/// Lets pictures be made on the graphics card; one in software is slower than the processor's own way.
+fn make_pictures_on(state: &RenderState) {
+    let pass = PicturePass::new(&state.adapter, &state.device, &state.queue);
+    if !pass.is_software() {
+        install_picture_device(Some(Arc::new(pass)));
+    }
+}
+
 fn report_errors(state: &RenderState) {
     state.device.on_uncaptured_error(Arc::new(|error| log::error!("graphics card: {error}")));
     state.device.set_device_lost_callback(|reason, message| {

@@ -15,6 +15,7 @@ mod import_report;
 mod legibility;
 mod panels;
 mod picture;
+mod picture_pass;
 mod prescription;
 mod search;
 mod shaders;

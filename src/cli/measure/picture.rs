@@ -6,6 +6,7 @@ use crate::cli::failures::Failures;
 use crate::cli::input::{LensFile, LoadedLens};
 use crate::cli::output::{Output, TextTable};
 use crate::cli::picture::parse_pixels;
+use crate::cli::picture_device::DeviceChoice;
 use crate::cli::progress::{stop_flag, with_bar};
 use crate::measure::{Machine, PictureCurves, PictureRow, PictureWay, measure_picture};
 use crate::picture::BuiltInScene;
@@ -34,6 +35,10 @@ pub(super) struct MeasurePictureArgs {
     #[arg(long, value_name = "WxH", default_value = "240x135", value_parser = parse_pixels)]
     exact_pixels: [usize; 2],
 
+    /// The device of the quick way: auto (a graphics card where there is one), gpu or cpu
+    #[arg(long, value_name = "DEVICE", default_value = "auto")]
+    device: DeviceChoice,
+
     #[command(flatten)]
     plot: PlotArgs,
 }
@@ -41,6 +46,7 @@ pub(super) struct MeasurePictureArgs {
 impl MeasurePictureArgs {
     pub(super) fn run(&self, output: &Output) -> Result<(), CliError> {
         let scene = self.scene()?;
+        self.device.install()?;
         self.plot.check(self.lenses.iter().map(|path| ("the lens", path.as_path())))?;
         let open = |path: &PathBuf| LensFile::of(path).open();
         let opened: Vec<LoadedLens> = self.lenses.iter().map(open).collect::<Result<_, _>>()?;
@@ -124,6 +130,8 @@ impl Display for MeasurePictureReport {
             let [width, height] = curves.pixels;
             let (scene, prepare) = (curves.scene, curves.prepare_ms);
             writeln!(f, "\n{lens}: {scene}, {width} x {height} pixels in three colours")?;
+            let device = curves.device.as_deref().unwrap_or("the processor");
+            writeln!(f, "the quick way on {device}")?;
             writeln!(f, "{prepare:.0} ms before the first pixel, counted in every whole picture")?;
             let head = ["", "tolerance", "error", "pixels", "ms", "ms of the whole", ""];
             let mut table = TextTable::new(&head);

@@ -7,9 +7,10 @@ use crate::lens::{Lens, Object};
 use crate::measure::time_ms;
 use crate::picture::{
     BuiltInScene, Coloring, ErrorMap, ExactRenderer, ImageFrame, Picture, PictureError,
-    QuickRenderer, field_diagonal, focused, picture_model,
+    QuickPicture, QuickRenderer, field_diagonal, focused, picture_model,
 };
 use crate::pupil::RayModel;
+use std::sync::atomic::AtomicBool;
 
 /// A picture of a scene through the lens.
 #[derive(Debug, Clone)]
@@ -25,6 +26,8 @@ pub struct ScenePicture {
     pub error_map: Option<ErrorMap>,
     /// The distance in mm to which the lens is focused; `None` at infinity.
     pub focus: Option<f64>,
+    /// The name of the graphics card that made the picture; `None` for the processor.
+    pub device: Option<String>,
 }
 
 /// The pixels of a picture while the lens changes, and of one of a lens that is still.
@@ -85,9 +88,11 @@ fn scene_picture(
     let frame = ImageFrame::new(&model, pixels, diagonal)?;
     let painted = scene.build(&model, &frame, focus)?;
     let exact = ExactRenderer::new(&model, &bands, &painted, frame)?;
-    let (picture, ms) =
-        time_ms(|| QuickRenderer::new(&model, &bands, &exact).map(|quick| quick.render()));
-    let picture = picture?;
+    let go_on = AtomicBool::new(false);
+    let (picture, ms) = time_ms(|| {
+        QuickRenderer::new(&model, &bands, &exact).map(|quick| quick.render_fast(&go_on))
+    });
+    let QuickPicture { picture, device, .. } = picture?;
     let measure = |ComparedTiles { tiles, samples, is_interrupted }: ComparedTiles<'_>| {
         let map = ErrorMap::measure_until(&exact, &picture, (tiles, samples), is_interrupted);
         (!is_interrupted()).then_some(map)
@@ -95,5 +100,5 @@ fn scene_picture(
     let error_map = compared.and_then(measure);
     let timed = |map: &ErrorMap| Estimate { milliseconds: Some(ms), ..map.rms() };
     let error = error_map.as_ref().map(timed);
-    Ok(ScenePicture { scene, picture, error, error_map, focus })
+    Ok(ScenePicture { scene, picture, error, error_map, focus, device })
 }

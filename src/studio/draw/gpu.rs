@@ -297,7 +297,7 @@ pub fn render_image(
     Ok(RgbaImage { size, rgba })
 }
 
-fn read_buffer(device: &Device, buffer: &Buffer) -> Result<Vec<u8>, GpuError> {
+pub(super) fn read_buffer(device: &Device, buffer: &Buffer) -> Result<Vec<u8>, GpuError> {
     let (done, mapped) = std::sync::mpsc::channel();
     buffer.map_async(MapMode::Read, .., move |result| {
         // Nobody listens only if waiting failed, which is then the error.

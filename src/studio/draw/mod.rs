@@ -11,12 +11,14 @@
 mod camera;
 mod canvas;
 pub mod gpu;
+mod picture_pass;
 mod scene;
 mod scene_view;
 pub mod software;
 
 pub use camera::{BoundingBox, Camera, round_length_below};
 pub use canvas::{RenderBackend, SceneCanvas, install_gpu_cache};
+pub use picture_pass::PicturePass;
 pub use scene::{Rgba, Scene, Segment, TriangleVertex};
 pub(super) use scene_view::zoom_factor;
 pub use scene_view::{SceneResponse, SceneView, length_text};

@@ -465,7 +465,9 @@ fn facts(ui: &mut Ui, picture: &ScenePicture, ms: f64) {
     let largest = picture.error_map.as_ref().map_or(String::new(), |map| {
         format!(", at most {:.1} % in {} tiles", 100.0 * map.largest(), map.tiles())
     });
-    let text = format!("{width} x {height}, {error}{largest}, focus at {focus}, {ms:.0} ms");
+    let device = picture.device.as_deref().unwrap_or("processor");
+    let text =
+        format!("{width} x {height}, {error}{largest}, focus at {focus}, {ms:.0} ms, {device}");
     let hover = "The error is measured against rays from every pixel of the tiles. Diffraction, losses and \
                  ghosts are left out";
     ui.label(RichText::new(text).small().weak()).on_hover_text(hover);
