@@ -80,11 +80,6 @@ impl PupilCurve {
         self.segments.iter().map(|segment| segment.ends[0])
     }
 
-    /// The area inside.
-    pub(super) fn area(&self) -> f64 {
-        0.5 * self.signed_area().abs()
-    }
-
     /// Twice the area inside, positive if azimuth from +y towards +x grows along the curve.
     fn signed_area(&self) -> f64 {
         self.segments.iter().map(|Segment { ends: [a, b], .. }| a[1] * b[0] - a[0] * b[1]).sum()
@@ -178,6 +173,8 @@ impl Segment {
     }
 }
 
+/// An edge rises more steeply than this towards a square root.
+const STEEP: f64 = 1.5;
 /// The largest number of steps that find the parameter of a cubic at a value of t, and the last one: the error
 /// behind it is of the order of its square, or where the curve turns back of its size.
 const STEPS: usize = 40;
@@ -246,10 +243,15 @@ impl Chain {
         cubic.at(1, s)[0]
     }
 
-    /// The derivative of v by t; infinite where the curve turns back.
-    pub(super) fn slope(&self, t: f64) -> f64 {
+    /// The distance in t, in the sense of 1 or −1, at which v has the end of a square root, as it has where the
+    /// curve turns back; `None` if v is not steep, or grows less so. The slope of `c √x` over its
+    /// curvature is `−2x`.
+    pub(super) fn root_beyond(&self, t: f64, sense: f64) -> Option<f64> {
         let (cubic, s) = self.find(t);
-        cubic.at(1, s)[1] / cubic.at(0, s)[1]
+        let [[_, dt], [_, dv]] = [0, 1].map(|k| cubic.at(k, s));
+        let [ddt, ddv] = cubic.powers.map(|[_, _, c, d]| 2.0 * c + 6.0 * d * s);
+        let distance = 0.5 * sense * dv * dt * dt / (ddv * dt - dv * ddt);
+        (dv.abs() > STEEP * dt.abs() && distance >= 0.0).then_some(distance)
     }
 }
 

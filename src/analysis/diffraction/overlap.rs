@@ -4,7 +4,7 @@
 //! most. Between the places where chains begin, end or cross, each column of constant t runs from one
 //! chain to another, whatever the shape of the pupils: the common part is a list of strips with two smooth
 //! edges. Gauss nodes lie across a strip and along its columns; where an edge is steep, as a round one
-//! at its end, columns lie closer, so that the square root there becomes smooth.
+//! at its end, they lie across in the square root of the distance from where it turns back, in which it is smooth.
 
 use super::outline::Chain;
 #[cfg(test)]
@@ -26,8 +26,8 @@ pub(super) struct Strip<'a> {
     range: [f64; 2],
     /// The lower and the upper edge.
     edges: [MovedChain<'a>; 2],
-    /// True at an end where an edge is steep.
-    steep: [bool; 2],
+    /// The end, 0 or 1, beyond which an edge has a square root, and the distance from there.
+    root: Option<(usize, f64)>,
 }
 
 /// A chain of a pupil that has been moved; without one, the line of symmetry.
@@ -76,8 +76,6 @@ const ROUNDING: f64 = 4.0 * f64::EPSILON;
 const COMPARED: usize = 24;
 /// Edges closer than this part of the size of a pupil do not cross but coincide.
 const COINCIDENT: f64 = 1e-11;
-/// An edge rises more steeply than this towards a square root.
-const STEEP: f64 = 1.5;
 
 impl<'a> Strip<'a> {
     /// The strips of the points that lie in the first pupil moved by `shift` and in the second moved by
@@ -119,15 +117,31 @@ impl Strip<'_> {
         nodes
     }
 
+    /// The strip between two edges; two halves if either end has a root.
+    fn with_roots<'a>(axis: usize, range: [f64; 2], edges: [MovedChain<'a>; 2]) -> Vec<Strip<'a>> {
+        let root = |end: usize| {
+            let sense = if end == 0 { -1.0 } else { 1.0 };
+            let roots = edges.iter().filter_map(|edge| edge.root_beyond(range[end], sense));
+            roots.min_by(f64::total_cmp).map(|beyond| (end, beyond))
+        };
+        let strip = |range, root| Strip { axis, range, edges, root };
+        match (root(0), root(1)) {
+            (Some(first), Some(second)) => {
+                let middle = 0.5 * (range[0] + range[1]);
+                let halves = [[range[0], middle], [middle, range[1]]];
+                vec![strip(halves[0], Some(first)), strip(halves[1], Some(second))]
+            }
+            (first, second) => vec![strip(range, first.or(second))],
+        }
+    }
+
     /// The columns at shares of the strip from 0 to 1, each with its weight.
     pub(super) fn columns(&self, shares: &[(f64, f64)]) -> Columns {
         let mut columns = Columns::default();
-        let [from, to] = self.range;
         for (u, share) in shares {
-            let (place, slope) = self.place(*u);
-            let t = from + (to - from) * place;
+            let (t, slope) = self.place(*u);
             columns.t.push(t);
-            columns.weight.push((to - from) * slope * share);
+            columns.weight.push(slope * share);
             let [low, high] = self.edges.map(|edge| edge.value(t));
             columns.ends[0].push(low);
             columns.ends[1].push(high.max(low));
@@ -135,15 +149,17 @@ impl Strip<'_> {
         columns
     }
 
-    /// The place of a share, from 0 to 1, and the derivative of that map: squares make the square root of
-    /// the distance from a steep end smooth.
+    /// The value of t at a share of the strip, and its derivative by that: even in the square root of the
+    /// distance from a root, in which edges are smooth.
     fn place(&self, u: f64) -> (f64, f64) {
-        match self.steep {
-            [false, false] => (u, 1.0),
-            [true, false] => (u * u, 2.0 * u),
-            [false, true] => (u * (2.0 - u), 2.0 * (1.0 - u)),
-            [true, true] => (u * u * (3.0 - 2.0 * u), 6.0 * u * (1.0 - u)),
-        }
+        let [from, to] = self.range;
+        let Some((end, beyond)) = self.root else { return (from + u * (to - from), to - from) };
+        let [near, far] = [beyond, beyond + to - from].map(f64::sqrt);
+        let share = if end == 0 { u } else { 1.0 - u };
+        let root = near + share * (far - near);
+        let distance = (root * root - beyond).clamp(0.0, to - from);
+        let t = if end == 0 { from + distance } else { to - distance };
+        (t, 2.0 * root * (far - near))
     }
 }
 
@@ -161,8 +177,8 @@ impl MovedChain<'_> {
         self.chain.map_or(0.0, |chain| chain.value(t - self.by[0]) + self.by[1])
     }
 
-    fn is_steep(&self, t: f64) -> bool {
-        self.chain.is_some_and(|chain| !(chain.slope(t - self.by[0]).abs() < STEEP))
+    fn root_beyond(&self, t: f64, sense: f64) -> Option<f64> {
+        self.chain?.root_beyond(t - self.by[0], sense)
     }
 }
 
@@ -216,14 +232,35 @@ fn crossings(
         let u = i as f64 / COMPARED as f64;
         from + (to - from) * u * u * (3.0 - 2.0 * u)
     };
-    let values: Vec<f64> = (0..=COMPARED).map(|i| difference(place(i))).collect();
-    for i in 1..values.len() {
-        if values[i - 1] * values[i] < 0.0 {
-            found.push(crossing(&difference, [place(i - 1), place(i)], [values[i - 1], values[i]]));
-        } else if i + 1 < values.len() && values[i] == 0.0 && values[i - 1] * values[i + 1] < 0.0 {
-            found.push(place(i));
-        }
+    let mut samples: Vec<[f64; 2]> =
+        (0..=COMPARED).map(|i| [place(i), difference(place(i))]).collect();
+    let dips: Vec<[f64; 2]> =
+        samples.windows(3).filter_map(|near| dip(near, &difference)).collect();
+    samples.extend(dips);
+    samples.sort_by(|a, b| a[0].total_cmp(&b[0]));
+    for pair in samples.windows(2).filter(|pair| pair[0][1] * pair[1][1] < 0.0) {
+        let ([a, fa], [b, fb]) = (pair[0], pair[1]);
+        found.push(crossing(&difference, [a, b], [fa, fb]));
     }
+    for near in samples.windows(3).filter(|near| near[1][1] == 0.0 && near[0][1] * near[2][1] < 0.0)
+    {
+        found.push(near[1][0]);
+    }
+}
+
+/// A place between three others of the same sign where a difference has another one, at the vertex of the
+/// parabola through them: two chains that touch nearly cross twice.
+fn dip(near: &[[f64; 2]], difference: &impl Fn(f64) -> f64) -> Option<[f64; 2]> {
+    let [[a, fa], [b, fb], [c, fc]] = [near[0], near[1], near[2]];
+    let is_least = fb.abs() <= fa.abs().min(fc.abs());
+    if !(fa * fb > 0.0 && fb * fc > 0.0 && is_least) {
+        return None;
+    }
+    let (left, right) = ((fb - fa) / (b - a), (fc - fb) / (c - b));
+    let bend = (right - left) / (c - a);
+    let vertex = 0.5 * (a + b) - 0.5 * left / bend;
+    let value = difference(vertex);
+    (vertex > a && vertex < c && value * fb < 0.0).then_some([vertex, value])
 }
 
 /// The place between two others at which a difference changes its sign (Anderson and Björck, BIT 13,
@@ -273,9 +310,7 @@ fn strips<'a>(
                 low = (0.0, MovedChain { chain: None, by: [0.0; 2] });
             }
             if low.0 < high.0 {
-                let edges = [low.1, high.1];
-                let steep = range.map(|t| edges.iter().any(|edge| edge.is_steep(t)));
-                found.push(Strip { axis, range, edges, steep });
+                found.extend(Strip::with_roots(axis, range, [low.1, high.1]));
             }
         }
     }
@@ -326,6 +361,26 @@ mod tests {
         }
         let apart = area([&circle, &circle], [0.25, 0.0], 0, OverlapHalf::None);
         assert_eq!(apart, 0.0);
+    }
+
+    /// Two circles of different size that hardly cross: what one cuts off from the other is a sliver.
+    #[test]
+    fn circles_that_nearly_touch_cross_twice() {
+        let [small, large] = [0.2, 0.25].map(|radius| PupilCurve::circle([0.0; 2], radius));
+        for beyond in [1e-2, 1e-4, 1e-6] {
+            let apart = 0.05 + 0.2 * beyond;
+            let angle = |own: f64, other: f64| {
+                let cos = (apart * apart + own * own - other * other) / (2.0 * apart * own);
+                2.0 * cos.acos()
+            };
+            let sector = |radius: f64, angle: f64| 0.5 * radius * radius * (angle - angle.sin());
+            let exact = sector(0.2, angle(0.2, 0.25)) + sector(0.25, angle(0.25, 0.2));
+            for axis in [0, 1] {
+                let shift = [0.0, 0.5 * apart];
+                let found = area([&small, &large], shift, axis, OverlapHalf::None);
+                assert!((found / exact - 1.0).abs() < 1e-9, "{beyond} {axis}: {found} {exact}");
+            }
+        }
     }
 
     /// A crescent, which no point sees whole, and a square whose sides coincide with themselves.

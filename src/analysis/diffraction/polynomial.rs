@@ -311,17 +311,13 @@ mod tests {
             assert!(found.terms[1].len() <= 6, "a polynomial of degree 2");
             let t = [-0.05, 0.0, 0.01, 0.07];
             let v = [0.01, -0.03, 0.06, 0.02];
-            for axis in [0, 1] {
-                for part in [0, 1] {
-                    let mut places = [0.0; WIDTH];
-                    places[..3].copy_from_slice(&v[1..]);
-                    let values = found.columns(part, axis, &t).values(1, 3, &places);
-                    for k in 1..4 {
-                        let p = if axis == 0 { [t[k], v[k]] } else { [v[k], t[k]] };
-                        let exact = found.at(p)[part];
-                        assert!((values[k - 1] - exact).abs() < 1e-13, "{axis} {part} {k}");
-                    }
-                }
+            for (axis, part) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
+                let mut places = [0.0; WIDTH];
+                places[..3].copy_from_slice(&v[1..]);
+                let values = found.columns(part, axis, &t).values(1, 3, &places);
+                let at = |k: usize| if axis == 0 { [t[k], v[k]] } else { [v[k], t[k]] };
+                let is_exact = |k: usize| (values[k - 1] - found.at(at(k))[part]).abs() < 1e-13;
+                assert!((1..4).all(is_exact), "{axis} {part}: {values:?}");
             }
         }
     }

@@ -79,16 +79,16 @@ const MOST_NODES: usize = 1 << 22;
 
 /// The columns of a strip and the nodes of each, of samples.
 const SAMPLE_ORDERS: [[usize; 2]; 10] = [
-    [12, 10],
-    [16, 14],
-    [24, 20],
-    [32, 28],
-    [48, 40],
-    [68, 56],
-    [96, 80],
-    [136, 112],
-    [192, 160],
-    [272, 224],
+    [8, 10],
+    [10, 14],
+    [14, 20],
+    [20, 28],
+    [28, 40],
+    [40, 56],
+    [56, 80],
+    [80, 112],
+    [112, 160],
+    [160, 224],
 ];
 /// The points of an arc of the edge.
 const EDGE_POINTS: usize = 40;
