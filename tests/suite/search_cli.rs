@@ -21,13 +21,20 @@ fn lasting(mut report: Value) -> Value {
 /// comes to in the end is what it would have come to undisturbed.
 #[test]
 fn a_search_killed_twenty_times_ends_with_the_same_result() {
-    let base = ["search", LENS, "--seed", "3", "--chains", "2", "--iterations", "1200"];
+    for method in ["iterated", "restore"] {
+        kill_search(method);
+    }
+}
+
+fn kill_search(method: &str) {
+    let options = ["--seed", "3", "--chains", "2", "--iterations", "1200"];
+    let base = [&["search", LENS, "--method", method][..], &options].concat();
     let whole = done_json(&base, "");
-    let checkpoint = Scratch::new("killed.json");
+    let checkpoint = Scratch::new(&format!("killed-{method}.json"));
     let mut killed = 0;
     for round in 0..20_u64 {
         let mut child = Command::new(env!("CARGO_BIN_EXE_aplanat"))
-            .args(base)
+            .args(&base)
             .args(["--checkpoint", checkpoint.path(), "--checkpoint-every", "0"])
             .stdout(Stdio::null())
             .stderr(Stdio::null())
@@ -57,6 +64,13 @@ fn a_checkpoint_of_another_search_is_refused() {
     );
     assert_eq!(again["gradients_in_all"], 40);
     assert!(done(&base, "").contains("nothing to do: 40 of 40"));
+    let sampler = [&base[..], &["--method", "restore"]].concat();
+    refused(
+        2,
+        &sampler,
+        "",
+        &["another search", "method is \"iterated\" there and \"restore\" here"],
+    );
     let more = [&base[..], &["--seed", "9"]].concat();
     refused(2, &more, "", &["another search", "settings.seed is 1 there and 9 here"]);
     let chains = [&base[..], &["--chains", "2"]].concat();
@@ -167,6 +181,20 @@ fn samplers_are_compared() {
             assert!(marks.iter().all(|mark| mark["best"].as_f64().is_some()));
         }
     }
+    assert_eq!(report["methods"][0]["method"], "iterated");
+    let equal = ["measure", "search", LENS, "--iterations", "40", "--seeds", "3", "--methods"];
+    let report = done_json(&[&equal[..], &["iterated,descent,brute"]].concat(), "");
+    let rows = report["methods"].as_array().unwrap();
+    assert_eq!((rows.len(), report["tolerances"].as_array().unwrap().len()), (3, 0));
+    for row in rows {
+        let ends: Vec<f64> =
+            row["ends"].as_array().unwrap().iter().map(|end| end.as_f64().unwrap()).collect();
+        assert_eq!(ends.len(), 3);
+        let alike = ends[1..].iter().all(|end| *end == ends[0]);
+        assert!(alike || row["method"] != "descent", "{row}");
+    }
+    assert!(rows[0]["against"].is_null() && rows[1]["against"]["seeds"].as_u64().is_some());
+    assert!(done(&equal[..7], "").contains("first is better"));
     refused(2, &["measure", "search", LENS, "--seconds", "0"], "", &["--seconds"]);
     refused(2, &["measure", "search", LENS, "--seeds", "0"], "", &["--seeds"]);
 }

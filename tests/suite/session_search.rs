@@ -4,7 +4,9 @@ use super::merit::bundled;
 use super::session_pareto::wait;
 use aplanat::lens::{Aperture, Lens};
 use aplanat::merit::{Goal, Merit, Term, WeightedTerm};
-use aplanat::search::{MutationKind, SearchRules, SearchSettings, SteerCommand, Temperature};
+use aplanat::search::{
+    MutationKind, SearchMethod, SearchRules, SearchSettings, SteerCommand, Temperature,
+};
 use aplanat::session::{
     Command, EndReason, RunKind, RunStatus, Session, SessionEvent, SessionView, Severity,
     StructureSearchCommand, StructureSearchRequest, StructureSearchSnapshot,
@@ -21,12 +23,12 @@ fn double_gauss() -> Lens {
     bundled("double_gauss_rudolph_50")
 }
 
-/// A search by two chains with short moves that ends after some of them, or not by itself.
+/// A search by RESTORE with two chains with short moves that ends after some of them, or not by itself.
 fn quest(moves: Option<u64>) -> StructureSearchRequest {
     let mut quest = StructureSearchRequest::default();
-    let settings = quest.plan.settings;
+    let (settings, method) = (quest.plan.settings, SearchMethod::Restore);
     quest.plan.settings =
-        SearchSettings { chains: 2, moves, gradients: None, remembered: 8, ..settings };
+        SearchSettings { method, chains: 2, moves, gradients: None, remembered: 8, ..settings };
     quest.plan.local.steps = 2;
     quest.minutes = Some(10.0);
     quest

@@ -117,11 +117,11 @@ pub(super) fn draw_any(
     let new = choose(&choice, random).copied().ok_or(Refusal::NoOtherGlass)?;
     let mut draft = context.start_draft(sites.len());
     draft.lens.surfaces[row].medium = Medium::Glass(new.full_name());
+    // A glass of the catalogue has no index that varies.
+    draft.drop_parameters(row, |quantity| quantity == Quantity::Index);
     let free = free_parameters(lens);
     let range = |surface| bending_range(lens, context.rules, &free, surface);
     hold_powers(&mut draft.lens, lens, row, range).ok_or(Refusal::InvalidLens)?;
-    // A glass of the catalogue has no index that varies.
-    draft.drop_parameters(row, |quantity| quantity == Quantity::Index);
     draft.new_glass = vec![row];
     draft.change =
         StructureChange::ExchangeGlass { surface: row.into(), from, to: new.full_name() };

@@ -248,16 +248,15 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
         let best = self.chains[0].best().map_or(f64::INFINITY, |(_, loss)| loss);
         let Some(descent) = &self.chains[chain].descent else { return self.end_race(race) };
         let (gradients, loss) = (descent.gradients, descent.best_loss);
-        let end = if !descent.loss.is_finite() {
-            DescentEnd::InfiniteLoss
-        } else {
+        let mut end = DescentEnd::InfiniteLoss;
+        if descent.loss.is_finite() {
             let Some(rate) = race.measured(gradients, loss) else { return };
             // A better loss with a structure farther from the permitted ones never overtakes.
-            if loss > best && race.may_catch_up(loss, best, rate) {
+            if loss > best && Race::may_catch_up(loss, best, rate) {
                 return;
             }
-            DescentEnd::Unpromising
-        };
+            end = DescentEnd::Unpromising;
+        }
         self.end_trial(race, chain, end, landscape, events);
         self.end_race(race);
     }

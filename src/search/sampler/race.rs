@@ -166,7 +166,7 @@ impl Race {
     }
 
     /// True if a descent at this rate may overtake the best point soon.
-    pub(super) fn may_catch_up(&self, loss: f64, best: f64, rate: f64) -> bool {
+    pub(super) fn may_catch_up(loss: f64, best: f64, rate: f64) -> bool {
         rate > 0.0 && relative_gain(loss, best) <= rate * CATCH_UP_GRADIENTS
     }
 

@@ -7,6 +7,13 @@ use aplanat::search::{RunEnd, SearchMethod, SearchRun, SearchRunOn, SearchSettin
 use std::fs;
 use std::path::PathBuf;
 
+const METHODS: [SearchMethod; 4] = [
+    SearchMethod::IteratedLocalSearch,
+    SearchMethod::Restore,
+    SearchMethod::Metropolis,
+    SearchMethod::BruteForce,
+];
+
 fn begin(settings: &SearchSettings) -> SearchRunOn<Rugged> {
     SearchRun::new(&Rugged::default(), START, settings).unwrap()
 }
@@ -29,7 +36,9 @@ fn whole(settings: &SearchSettings) -> (SearchRunOn<Rugged>, RunEnd) {
 #[test]
 fn a_gradient_budget_is_used_up_and_not_exceeded() {
     for gradients in [1, 2, 3, 4, 7, 19, 20, 21, 50, 137, 1000] {
-        for method in [SearchMethod::Restore, SearchMethod::Metropolis] {
+        for method in
+            [SearchMethod::IteratedLocalSearch, SearchMethod::Restore, SearchMethod::Metropolis]
+        {
             let (run, over) = whole(&of(method, gradients));
             let made = run.statistics().gradients;
             assert_eq!((over, made), (RunEnd::Gradients, gradients), "{method:?}");
@@ -43,7 +52,7 @@ fn a_gradient_budget_is_used_up_and_not_exceeded() {
 
 #[test]
 fn the_remaining_budget_is_divided_independently_of_threads() {
-    for method in [SearchMethod::Restore, SearchMethod::Metropolis, SearchMethod::BruteForce] {
+    for method in METHODS {
         let on = |threads: usize| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             pool.install(|| whole(&of(method, 137)).0)
@@ -74,7 +83,7 @@ fn a_resumed_run_distributes_the_remaining_budget_alike() {
     let folder = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("search").join("budget");
     fs::create_dir_all(&folder).unwrap();
     let path = folder.join("run.json");
-    for method in [SearchMethod::Restore, SearchMethod::Metropolis, SearchMethod::BruteForce] {
+    for method in METHODS {
         let settings = of(method, 137);
         let (undisturbed, _) = whole(&settings);
         let mut run = begin(&settings);

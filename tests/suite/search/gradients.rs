@@ -14,7 +14,8 @@ use aplanat::search::lens_landscape::{
     LensLandscape, SearchPlan, finalize, run, with_open_apertures,
 };
 use aplanat::search::{
-    Landscape, MutationKind, Refusal, SearchRules, SearchRunOn, SearchSettings, mutate, propose,
+    Landscape, MutationKind, Refusal, SearchMethod, SearchRules, SearchRunOn, SearchSettings,
+    mutate, propose,
 };
 use std::ops::ControlFlow;
 use std::sync::Arc;
@@ -275,8 +276,9 @@ fn variable_coefficients_move_with_their_medium() {
 }
 
 fn whole(lens: &Lens, rules: SearchRules) -> SearchRunOn<LensLandscape> {
-    let usual = SearchPlan::default().settings;
-    let settings = SearchSettings { gradients: Some(520), chains: 2, seed: 7, c: 0.3, ..usual };
+    let (usual, method) = (SearchPlan::default().settings, SearchMethod::Restore);
+    let settings =
+        SearchSettings { method, gradients: Some(520), chains: 2, seed: 7, c: 0.3, ..usual };
     let plan = SearchPlan { settings, rules, ..SearchPlan::default() };
     run(lens, &plan, |_, _| ControlFlow::Continue(())).unwrap()
 }

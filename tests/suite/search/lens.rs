@@ -13,7 +13,7 @@ use aplanat::search::lens_landscape::{
     DescentSettings, LensLandscape, LensSummary, SearchPlan, finalize, run, with_open_apertures,
 };
 use aplanat::search::{
-    Landscape, MutationKind, SearchRules, SearchRunOn, SearchSettings, Temperature,
+    Landscape, MutationKind, SearchMethod, SearchRules, SearchRunOn, SearchSettings, Temperature,
 };
 use std::f64::consts::PI;
 use std::ops::ControlFlow;
@@ -40,9 +40,9 @@ fn triplet() -> Lens {
 }
 
 fn plan(gradients: u64) -> SearchPlan {
-    let usual = SearchPlan::default().settings;
+    let (usual, method) = (SearchPlan::default().settings, SearchMethod::Restore);
     let settings =
-        SearchSettings { gradients: Some(gradients), chains: 3, seed: 5, c: 0.3, ..usual };
+        SearchSettings { method, gradients: Some(gradients), chains: 3, seed: 5, c: 0.3, ..usual };
     SearchPlan { settings, ..SearchPlan::default() }
 }
 

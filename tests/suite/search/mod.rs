@@ -7,6 +7,7 @@ mod chain;
 mod checkpoint;
 mod density;
 mod gradients;
+mod iterated;
 mod lens;
 mod mutations;
 mod projection;

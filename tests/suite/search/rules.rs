@@ -5,7 +5,7 @@ use aplanat::lens::{Lens, Medium};
 use aplanat::search::lens_landscape::{
     LensLandscape, SearchPlan, describe_violation, finalize, run,
 };
-use aplanat::search::{Landscape as _, MutationKind, SearchRules, SearchSettings};
+use aplanat::search::{Landscape as _, MutationKind, SearchMethod, SearchRules, SearchSettings};
 use std::ops::ControlFlow;
 
 fn triplet() -> Lens {
@@ -148,8 +148,13 @@ fn a_merit_is_the_sum_of_its_terms() {
 fn an_excess_of_elements_is_reduced() {
     let lens = bundled("double_gauss_nikkor_s_50");
     let rules = SearchRules { elements: [1, 5], ..SearchRules::default() };
-    let settings =
-        SearchSettings { gradients: Some(600), c: 0.3, seed: 2, ..SearchSettings::default() };
+    let settings = SearchSettings {
+        method: SearchMethod::Restore,
+        gradients: Some(600),
+        c: 0.3,
+        seed: 2,
+        ..SearchSettings::default()
+    };
     let plan = SearchPlan { rules, settings, ..SearchPlan::default() };
     let landscape = plan.landscape(&lens).unwrap();
     assert_eq!(landscape.structure_violation(landscape.start()), 2);
