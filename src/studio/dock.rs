@@ -225,7 +225,7 @@ impl Dock {
 fn begin_focus(ui: &Ui, kind: PanelKind, to_focus: &mut Option<(PanelKind, u8)>) {
     let Some((_, left)) = to_focus.filter(|(other, _)| *other == kind) else { return };
     let start = Id::unique("start of the panel");
-    let is_done = ui.memory(|memory| memory.focused()).is_some_and(|id| id != start);
+    let is_done = ui.memory(egui::Memory::focused).is_some_and(|id| id != start);
     if left == 0 || (left < FRAMES && is_done) {
         *to_focus = None;
         return;

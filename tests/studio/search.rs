@@ -326,7 +326,9 @@ fn a_retained_lens_is_compared_pinned_accepted_and_exported() {
     let choose = StructureSearchCommand::Choose { number: 1, lens: lens.clone() };
     let preview = Command::Preview(Some(lens));
     assert_eq!(harness.state().commands, [choose.clone().into(), preview]);
-    harness.get_by_label_contains("Lens 1: RMS 50 to 10 µm (-80 %), light 90 to 90 mm² (0 %)");
+    harness.get_by_label_contains(
+        "Lens 1: RMS over the fields 50 to 10 µm (-80 %), light 90 to 90 mm² (0 %)",
+    );
     for button in ["Pin", "Accept", "Export…"] {
         press(&mut harness, button);
     }

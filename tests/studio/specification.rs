@@ -171,7 +171,7 @@ fn the_lenses_at_the_end_tell_their_numbers_and_open_as_designs() {
     let best = &snapshot.lenses[0];
     let mut harness = panel(SessionView { specified_design, ..view() });
     harness.get_by_label("Best");
-    for (name, unit) in [("RMS spot", " µm"), ("Light", " mm²"), ("Length", " mm")] {
+    for (name, unit) in [("RMS over the fields", " µm"), ("Light", " mm²"), ("Length", " mm")] {
         assert!(harness.query_all_by_label(name).next().is_some(), "{name}");
         assert!(harness.query_all_by_label_contains(unit).next().is_some(), "{name}");
     }

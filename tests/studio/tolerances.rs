@@ -48,7 +48,7 @@ fn a_class_of_tolerances_is_proposed_and_kept_on_request() {
     for text in [
         "As designed",
         "90 % of the lenses, at most",
-        "Share of lenses against their RMS spot radius",
+        "Share of lenses against their RMS over the fields",
     ] {
         harness.get_by_label(text);
     }
