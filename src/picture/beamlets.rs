@@ -204,12 +204,7 @@ impl BeamletTable {
             let box_of = |(color, lenses): (usize, &Vec<(f64, BackwardLens)>)| {
                 let mut traced = TracedBox::new(size, i, lenses.len());
                 if let Some(bounds) = bounds {
-                    for (w, (share, lens)) in lenses.iter().enumerate() {
-                        let passed = |cosines: [f64; 2]| {
-                            share * losses.map_or(1.0, |l| l.passed([color, w], radius, cosines))
-                        };
-                        traced.trace(lens, passed, (radius, bounds), w);
-                    }
+                    traced.trace_all((color, lenses), losses, (radius, bounds));
                 }
                 traced
             };
@@ -273,6 +268,22 @@ impl<'a> TracedBox<'a> {
         }
     }
 
+    /// Adds the rays of all wavelengths of a colour from the point `(0, radius)` within a box of directions,
+    /// its middle and half of its sides.
+    fn trace_all(
+        &mut self,
+        (color, lenses): (usize, &[(f64, BackwardLens)]),
+        losses: Option<&LensLosses>,
+        (radius, bounds): (f64, [[f64; 2]; 2]),
+    ) {
+        for (w, (share, lens)) in lenses.iter().enumerate() {
+            let passed = |cosines: [f64; 2]| {
+                share * losses.map_or(1.0, |losses| losses.passed([color, w], radius, cosines))
+            };
+            self.trace(lens, passed, (radius, bounds), w);
+        }
+    }
+
     /// Adds the rays of a wavelength from the point `(0, radius)` within a box of directions, its middle and
     /// half of its sides, each with the share of its direction.
     fn trace(
@@ -301,18 +312,23 @@ impl<'a> TracedBox<'a> {
             if landings.fate(i).is_imaged() {
                 let ray = lens.scene_ray(landings.ray(i));
                 if ray.direction.z < -1e-3 {
-                    let moments = RayMoments::of_ray(&ray);
-                    for line in &mut self.line {
-                        for (window, part) in windows_at(place[0], line.len()) {
-                            line[window].add(&moments, part * weight);
-                        }
-                    }
+                    self.add_ray(&ray, *weight, place[0]);
                 } else {
                     self.sideways += weight;
                 }
             }
             if origins.get(i + 1).is_none_or(|(next, _)| next[1] != place[1]) {
                 self.add_line(place[1]);
+            }
+        }
+    }
+
+    /// Adds a ray to the sums of the line of the box that it belongs to.
+    fn add_ray(&mut self, ray: &Ray<f64>, weight: f64, place: f64) {
+        let moments = RayMoments::of_ray(ray);
+        for line in &mut self.line {
+            for (window, part) in windows_at(place, line.len()) {
+                line[window].add(&moments, part * weight);
             }
         }
     }

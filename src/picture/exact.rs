@@ -181,7 +181,7 @@ impl<'a> ExactRenderer<'a> {
         &self.sampler.directions
     }
 
-    /// What the pictures show.
+    /// The scene and the light of the pictures.
     pub(super) fn subject(&self) -> PictureSubject<'_> {
         PictureSubject {
             scene: self.scene,

@@ -262,6 +262,24 @@ mod tests {
         assert!((level(&wave, [0.25, 0.7]) - 0.5).abs() < 1e-15);
     }
 
+    /// The power of the place tells the same sectors as the angle.
+    #[test]
+    fn sectors_are_those_of_the_angle() {
+        for i in 0..5000_u32 {
+            let angle = TAU * 0.618_033_988_749_895 * f64::from(i);
+            let (sin, cos) = angle.sin_cos();
+            for (radius, sectors) in [(1e-9, 36.0), (0.7, 1.0), (3e8, 511.0)] {
+                let share = (angle / TAU * sectors).rem_euclid(1.0);
+                // Within rounding of an edge either is right.
+                if (share - 0.5).abs().min(share).min(1.0 - share) > 1e-9 {
+                    let found = is_white_sector([radius * cos, radius * sin], sectors);
+                    assert_eq!(found, share < 0.5, "{angle} {sectors}");
+                }
+            }
+        }
+        assert!(is_white_sector([0.0, 0.0], 36.0) && !is_white_sector([0.0, -1.0], 1.5));
+    }
+
     #[test]
     fn half_of_a_group_of_bars_is_black_and_groups_do_not_touch() {
         // The first group: three horizontal bars from its upper left corner.

@@ -1,4 +1,4 @@
-//! What is to be evaluated in a block: beams, each with its views of the paintings.
+//! The plan of a block: the beams that are evaluated in it, each with its views of the paintings.
 //!
 //! A beam is a beamlet of one colour over a block. The picture of a beam is smooth if its spot is wide, and
 //! is evaluated on a lattice of pixels then, between which cubic B-splines interpolate. These blur by a third
@@ -70,7 +70,7 @@ pub(super) struct BlockPlan {
     pub(super) sideways: Vec<f64>,
 }
 
-/// What plans are made of.
+/// The tables that plans are made of.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct PlanSource<'a> {
     pub(super) table: &'a BeamletTable,
