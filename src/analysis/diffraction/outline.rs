@@ -208,13 +208,12 @@ impl Cubic {
                 high = s;
             }
             let next = s - off / slope;
-            let is_between = (next - low) * (next - high) < 0.0;
-            let next = if is_between { next } else { 0.5 * (low + high) };
-            let is_found = (next - s).abs() <= LAST_STEP;
-            s = next;
-            if is_found || off == 0.0 {
-                break;
+            // Before the bounds: rounding may put the last step beyond one of them.
+            if (next - s).abs() <= LAST_STEP {
+                return next;
             }
+            let is_between = (next - low) * (next - high) < 0.0;
+            s = if is_between { next } else { 0.5 * (low + high) };
         }
         s
     }
