@@ -202,6 +202,9 @@ impl Cubic {
         for _ in 0..STEPS {
             let [value, slope] = self.at(0, s);
             let off = value - t;
+            if off == 0.0 {
+                return s;
+            }
             if off < 0.0 {
                 low = s;
             } else {
