@@ -202,19 +202,21 @@ impl Cubic {
         for _ in 0..STEPS {
             let [value, slope] = self.at(0, s);
             let off = value - t;
+            if off == 0.0 {
+                return s;
+            }
             if off < 0.0 {
                 low = s;
             } else {
                 high = s;
             }
             let next = s - off / slope;
-            let is_between = (next - low) * (next - high) < 0.0;
-            let next = if is_between { next } else { 0.5 * (low + high) };
-            let is_found = (next - s).abs() <= LAST_STEP;
-            s = next;
-            if is_found || off == 0.0 {
-                break;
+            // Before the bounds: rounding may put the last step beyond one of them.
+            if (next - s).abs() <= LAST_STEP {
+                return next;
             }
+            let is_between = (next - low) * (next - high) < 0.0;
+            s = if is_between { next } else { 0.5 * (low + high) };
         }
         s
     }
