@@ -42,7 +42,7 @@ pub struct SearchBudget {
     pub first_seed: u64,
 }
 
-/// What is compared.
+/// A search that is compared with others.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum SearchContender {
@@ -82,7 +82,7 @@ impl SearchContender {
 /// The results of a contender at a tolerance.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SearchRow {
-    /// What is compared.
+    /// The search.
     pub method: SearchContender,
     /// The relative tolerance of the spot radii.
     pub tolerance: f64,

@@ -22,7 +22,7 @@ pub(super) struct MeasureSearchArgs {
     #[command(flatten)]
     lens: LensFile,
 
-    /// What is compared; the others are compared with the first one
+    /// The searches that are compared; the first one is compared with each of the others
     #[arg(long, value_enum, value_name = "METHODS", value_delimiter = ',',
         default_values_t = SearchContender::ALL)]
     methods: Vec<SearchContender>,

@@ -54,7 +54,7 @@ pub struct SearchSettings {
 impl Default for SearchSettings {
     fn default() -> Self {
         Self {
-            method: SearchMethod::IteratedLocalSearch,
+            method: SearchMethod::Restore,
             seed: 1,
             chains: 4,
             trials: 8,

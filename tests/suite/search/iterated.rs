@@ -259,7 +259,8 @@ fn a_model_glass_is_exchanged_for_one_of_the_catalogue() {
     assert!(matches!(lens.surfaces[0].medium, Medium::Model { .. }));
     let index = Parameter::new(0, Quantity::Index);
     lens.variables.push(Variable { parameter: index, min: None, max: None });
-    let rules = SearchRules { fixed_ends: [0, 6], ..only(MutationKind::ExchangeGlass) };
+    let rules =
+        SearchRules { fixed_ends: [0, 6], projection: false, ..only(MutationKind::ExchangeGlass) };
     let mutant = perturbed(&lens, &rules, 1).unwrap();
     assert!(matches!(mutant.lens.surfaces[0].medium, Medium::Glass(_)));
     assert!(mutant.lens.variable(index).is_none());
