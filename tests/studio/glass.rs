@@ -144,9 +144,10 @@ fn the_labels_of_near_glasses_do_not_overlap() {
     let all = painted_places(&harness);
     let labels = ["1", "3", "4, 7", "8, 10"];
     let place = |label: &str| {
-        let found = all.iter().filter(|(text, _)| text.trim() == label).map(|(_, place)| *place);
+        let mut found =
+            all.iter().filter(|(text, _)| text.trim() == label).map(|(_, place)| *place);
         // The names of surfaces stand elsewhere, too; the map is at the right.
-        found.last().unwrap_or_else(|| panic!("{label}: {all:?}"))
+        found.next_back().unwrap_or_else(|| panic!("{label}: {all:?}"))
     };
     let places = labels.map(place);
     for (i, one) in places.iter().enumerate() {

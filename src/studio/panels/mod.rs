@@ -271,7 +271,7 @@ fn pupil_share(spot: Option<&Spot>) -> f64 {
     colors.map(|color| color.area.value).fold(0.0, f64::max) / std::f64::consts::PI
 }
 
-/// What the one number for the sharpness of a lens is called wherever it stands, and what it is.
+/// The name of the one number for the sharpness of a lens, the same everywhere, and what it is.
 pub(super) const RMS_OVER_FIELDS: &str = "RMS over the fields";
 pub(super) const RMS_OVER_FIELDS_HINT: &str = "RMS over the fields: the root mean square of the RMS spot radii of all fields, by their weights";
 

@@ -9,7 +9,7 @@ use crate::studio::number::format_digits;
 use crate::studio::panels::field_name;
 use crate::studio::text::counted;
 
-/// Why a lens that keeps the limits of its merit function can break those of a search.
+/// The reason why a lens that keeps the limits of its merit function can break those of a search.
 const WHY: &str = "Setup has limits of its own, of manufacturing and of light, beside those of the merit \
     function; the tighter ones hold in a search, and the optimizer keeps those of the merit function \
     alone. The search moves towards all of them, and a lens that is exported has to satisfy them.";
@@ -91,7 +91,7 @@ fn light_line(run: &StructureSearchSnapshot, limit: &ConstraintMargin, count: us
     format!("light at {field}{nm}: {value} mm² instead of at least {least}{more} (Light of Setup)")
 }
 
-/// Where a broken limit was set.
+/// The place where a broken limit was set.
 fn owner(plan: &SearchPlan, limit: &ConstraintMargin) -> &'static str {
     let is_of_setup = match plan.rules.clone().broken_rule(limit) {
         Some(bound) => Some(*bound) == limit.min || Some(*bound) == limit.max,
