@@ -135,8 +135,8 @@ fn searches_with_extreme_settings_stay_finite() {
         with(&|s| s.reservoir = 1),
         with(&|s| s.gamma = 1.0),
         with(&|s| (s.c, s.chains) = (0.0, 1)),
-        with(&|s| s.method = aplanat::search::SearchMethod::Metropolis),
-        with(&|s| s.method = aplanat::search::SearchMethod::BruteForce),
+        with(&|s| s.method = SearchMethod::Metropolis),
+        with(&|s| s.method = SearchMethod::BruteForce),
     ] {
         let run = whole(&lens, &plan);
         assert!(run.best().loss.is_finite() && run.best().loss <= run.start().loss);
