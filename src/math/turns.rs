@@ -17,7 +17,7 @@ const fn series(first: i32) -> [f64; 9] {
     while n < first + 18 {
         if n % 2 == first {
             let k = (n / 2) as usize;
-            terms[k] = if k % 2 == 0 { term } else { -term };
+            terms[k] = if k.is_multiple_of(2) { term } else { -term };
         }
         n += 1;
         term *= TAU / n as f64;

@@ -101,7 +101,7 @@ pub fn measure_transfer(
     let edge = model.beam.edge;
     let fields = ZONES.map(|zone| FieldPoint { x: 0.0, y: zone * edge, weight: 1.0 }).to_vec();
     let model = &RayModel { fields: fields.clone(), ..model.clone() };
-    let (_, pupils_ms) = pool.install(|| time_median(1..=9, || find_pupils(&model.clone())));
+    let ((), pupils_ms) = pool.install(|| time_median(1..=9, || find_pupils(&model.clone())));
     find_pupils(model);
     let chart = TransferChart {
         model,

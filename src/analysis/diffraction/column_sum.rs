@@ -93,9 +93,9 @@ impl ColumnPair {
         );
         let change = |a: f64, b: f64| PI * (b - a).abs() / step;
         let mut nodes = [0.0f64; 2];
-        for i in 0..LOOKED {
+        for (i, row) in phases.iter().enumerate() {
             for k in 1..LOOKED {
-                nodes[0] = nodes[0].max(change(phases[i][k - 1], phases[i][k]));
+                nodes[0] = nodes[0].max(change(row[k - 1], row[k]));
                 nodes[1] = nodes[1].max(change(phases[k - 1][i], phases[k][i]));
             }
         }

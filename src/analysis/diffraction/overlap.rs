@@ -118,7 +118,7 @@ impl Strip<'_> {
     }
 
     /// The strip between two edges; two halves if either end has a root.
-    fn with_roots<'a>(axis: usize, range: [f64; 2], edges: [MovedChain<'a>; 2]) -> Vec<Strip<'a>> {
+    fn with_roots(axis: usize, range: [f64; 2], edges: [MovedChain<'_>; 2]) -> Vec<Strip<'_>> {
         let root = |end: usize| {
             let sense = if end == 0 { -1.0 } else { 1.0 };
             let roots = edges.iter().filter_map(|edge| edge.root_beyond(range[end], sense));

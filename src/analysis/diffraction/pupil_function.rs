@@ -300,7 +300,7 @@ impl PupilFunction {
     fn parts(&self, shift: TransferShift) -> Vec<OverlapPart<'_>> {
         // Along columns across the shift both polynomials have the same argument.
         let [x, y] = shift.cosines;
-        let axis = if x.abs() > y.abs() { 0 } else { 1 };
+        let axis = usize::from(x.abs() <= y.abs());
         let half = match (self.polynomial.is_even(), x == 0.0, y == 0.0) {
             (true, true, _) => OverlapHalf::Along,
             (true, _, true) => OverlapHalf::Across,
