@@ -93,14 +93,10 @@ impl ColumnPair {
         );
         let change = |a: f64, b: f64| PI * (b - a).abs() / step;
         let mut nodes = [0.0f64; 2];
-        for place in &phases {
-            for pair in place[..LOOKED].windows(2) {
-                nodes[0] = nodes[0].max(change(pair[0], pair[1]));
-            }
-        }
-        for pair in phases.windows(2) {
-            for (a, b) in pair[0].iter().zip(pair[1]).take(LOOKED) {
-                nodes[1] = nodes[1].max(change(*a, b));
+        for (i, row) in phases.iter().enumerate() {
+            for k in 1..LOOKED {
+                nodes[0] = nodes[0].max(change(row[k - 1], row[k]));
+                nodes[1] = nodes[1].max(change(phases[k - 1][i], phases[k][i]));
             }
         }
         nodes

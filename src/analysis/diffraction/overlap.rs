@@ -122,7 +122,9 @@ impl Strip<'_> {
         let root = |end: usize| {
             let sense = if end == 0 { -1.0 } else { 1.0 };
             let roots = edges.iter().filter_map(|edge| edge.root_beyond(range[end], sense));
-            roots.min_by(f64::total_cmp).map(|beyond| (end, beyond))
+            // One that is far away, as beyond a straight edge, leaves the strip smooth.
+            let near = roots.filter(|beyond| *beyond < range[1] - range[0]);
+            near.min_by(f64::total_cmp).map(|beyond| (end, beyond))
         };
         let strip = |range, root| Strip { axis, range, edges, root };
         match (root(0), root(1)) {
