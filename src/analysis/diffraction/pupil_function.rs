@@ -258,10 +258,11 @@ impl PupilFunction {
         TransferShift { cosines, defocus: defocus / self.wavelength }
     }
 
-    /// The error of contrast by what the polynomials leave of the two phases and amplitudes.
+    /// The error of contrast by what the polynomials leave of the phases and amplitudes: at most their RMS for
+    /// each of the two pupils (Cauchy and Schwarz), which often have the same sign.
     pub(super) fn transfer_error(&self) -> f64 {
         let [waves, amplitude] = self.fit_error;
-        2f64.sqrt() * (TAU * waves + amplitude)
+        2.0 * (TAU * waves + amplitude)
     }
 
     /// [`PupilFunction::transfer`] by a ray for each node in place of the polynomials; `None` if some node
