@@ -357,7 +357,12 @@ mod tests {
                 for axis in [0, 1] {
                     let shift = shift.map(|v| 0.25 * v);
                     let found = area([&circle, &circle], shift, axis, OverlapHalf::None);
-                    assert!((found / exact - 1.0).abs() < 1e-9, "{shift:?} {axis} {found} {exact}");
+                    // Cubics are wrong by 6e-11 of the radius, of a sliver by more of its width.
+                    let allowed = 1e-9 + 1e-10 / (1.0 - part);
+                    assert!(
+                        (found / exact - 1.0).abs() < allowed,
+                        "{shift:?} {axis} {found} {exact}"
+                    );
                 }
             }
         }
