@@ -187,6 +187,19 @@ impl WavePolynomial {
         self.terms.each_ref().map(|terms| terms.iter().map(|([i, j], c)| c * u[*i] * v[*j]).sum())
     }
 
+    /// The weighted RMS of what the polynomials leave of some samples.
+    pub(super) fn rest(&self, samples: &[FitSample]) -> [f64; 2] {
+        let (mut squares, mut weight) = ([0.0; 2], 0.0);
+        for sample in samples {
+            let found = self.at(sample.cosines);
+            for k in [0, 1] {
+                squares[k] += sample.weight * (found[k] - sample.values[k]).powi(2);
+            }
+            weight += sample.weight;
+        }
+        squares.map(|square| if weight > 0.0 { (square / weight).sqrt() } else { 0.0 })
+    }
+
     /// True if the polynomials are even in the first cosine.
     pub(super) fn is_even(&self) -> bool {
         self.basis.even

@@ -183,14 +183,20 @@ impl PupilFunction {
             FIT_SHARE * tolerance.max(1e-14),
         ];
         let mut order = FIRST_FIT;
+        // The rays of the order before tell what a fit leaves between its own.
+        let before = region.nodes(FIRST_FIT - 1);
+        rays += before.rays + 2 * before.points.len();
+        let mut others = FitLight::new(region, sphere, &before)?;
         while order < region.orders() {
             let nodes = region.nodes(order);
             rays += nodes.rays + 2 * nodes.points.len();
             if nodes.points.len() > MOST_SAMPLES {
                 break;
             }
-            let (fit, light) = fit_nodes(region, sphere, &nodes, allowed)?;
-            energy = light;
+            let light = FitLight::new(region, sphere, &nodes)?;
+            energy = light.energy;
+            let fit = light.fit(&others, allowed);
+            others = light;
             order += 1;
             let Some(fit) = fit else { continue };
             let excess = (fit.1[0] / allowed[0]).max(fit.1[1] / allowed[1]);
@@ -412,32 +418,46 @@ const TERM_SAMPLES: usize = 4;
 /// The largest number of samples of a fit.
 const MOST_SAMPLES: usize = 4000;
 
-/// The polynomials of the light at some nodes with their errors, and its energy.
-type NodeFit = (Option<(WavePolynomial, [f64; 2])>, f64);
+/// The light at some nodes, to fit polynomials to and to check them.
+struct FitLight {
+    samples: Vec<FitSample>,
+    mirrored: bool,
+    energy: f64,
+    /// Makes an amplitude a number of the order of one: the size of the pupil.
+    scale: f64,
+}
 
-fn fit_nodes(
-    region: &Region<'_>,
-    sphere: &ReferenceSphere,
-    nodes: &Nodes,
-    allowed: [f64; 2],
-) -> Result<NodeFit, AnalysisError> {
-    let light = PupilSamples::of_nodes(region, sphere, nodes)?;
-    let sample = |i: usize| {
-        let amplitude = light.energies[i] / light.amplitudes[i];
-        FitSample {
+impl FitLight {
+    fn new(
+        region: &Region<'_>,
+        sphere: &ReferenceSphere,
+        nodes: &Nodes,
+    ) -> Result<Self, AnalysisError> {
+        let light = PupilSamples::of_nodes(region, sphere, nodes)?;
+        let sample = |i: usize| FitSample {
             cosines: light.cosines[i],
-            values: [light.waves[i], amplitude],
+            values: [light.waves[i], light.energies[i] / light.amplitudes[i]],
             weight: light.energies[i],
-        }
-    };
-    let samples: Vec<_> = (0..light.cosines.len()).map(sample).collect();
-    let points = samples.iter().map(|sample| sample.cosines);
-    let basis = PolynomialBasis::new(points, samples.len() / TERM_SAMPLES, light.mirrored);
-    let energy = light.energy();
-    // The amplitude is of the order of one over the size of the pupil.
-    let scale = light.peak() / energy;
-    let fit = basis.fit(&samples, [allowed[0], allowed[1] / scale]);
-    Ok((fit.map(|(polynomial, [waves, rest])| (polynomial, [waves, rest * scale])), energy))
+        };
+        let energy = light.energy();
+        Ok(Self {
+            samples: (0..light.cosines.len()).map(sample).collect(),
+            mirrored: light.mirrored,
+            energy,
+            scale: light.peak() / energy,
+        })
+    }
+
+    /// The polynomials nearest to this light, with what they leave of it or of other light, whichever is more.
+    fn fit(&self, others: &Self, allowed: [f64; 2]) -> Option<(WavePolynomial, [f64; 2])> {
+        let points = self.samples.iter().map(|sample| sample.cosines);
+        let basis = PolynomialBasis::new(points, self.samples.len() / TERM_SAMPLES, self.mirrored);
+        let allowed = [allowed[0], allowed[1] / self.scale];
+        let (polynomial, own) = basis.fit(&self.samples, allowed)?;
+        let between = polynomial.rest(&others.samples);
+        let left = [0, 1].map(|k| own[k].max(between[k]));
+        Some((polynomial, [left[0], left[1] * self.scale]))
+    }
 }
 
 /// A curve of the pupil in cosines.

@@ -3,7 +3,7 @@
 use egui::{Pos2, Rect, Vec2, vec2};
 
 /// The distances from a mark at which a label may stand, in points.
-const DISTANCES: [f32; 4] = [8.0, 20.0, 36.0, 56.0];
+const DISTANCES: [f32; 7] = [8.0, 20.0, 36.0, 56.0, 80.0, 108.0, 140.0];
 /// The room around a label, in points.
 pub(super) const MARGIN: f32 = 2.0;
 /// The directions from a mark in which a label may stand, the usual ones first.
