@@ -151,6 +151,9 @@ const GROWTH: f64 = 0.15;
 /// the order is left at least.
 const MANY: usize = 6;
 const LEAST_FALL: f64 = 1.0 / 6.0;
+/// So often the changes of few frequencies count: two directions of one spot differ by up to 1.7 times the sum of
+/// their changes.
+const FEW_CHANGES: f64 = 2.0;
 
 /// For the numbers of each frequency, their largest change among all frequencies up to it: single numbers agree
 /// by chance.
@@ -218,12 +221,13 @@ impl PhaseNodes {
             let many = frequencies.len() >= MANY;
             let errors = match &before {
                 None => vec![f64::INFINITY; values.len()],
-                Some(before) if many => changes_up_to(frequencies, &values, &before.values),
                 Some(before) => {
-                    let least =
-                        |k: usize| if order > 1 { LEAST_FALL * before.errors[k] } else { 0.0 };
-                    let change = |k: usize| (values[k] - before.values[k]).abs().max(least(k));
-                    (0..values.len()).map(change).collect()
+                    let mut errors = changes_up_to(frequencies, &values, &before.values);
+                    for (error, earlier) in errors.iter_mut().zip(&before.errors) {
+                        let least = if order > 1 { LEAST_FALL * earlier } else { 0.0 };
+                        *error = if many { *error } else { (FEW_CHANGES * *error).max(least) };
+                    }
+                    errors
                 }
             };
             let is_told = order > 1 || many;

@@ -64,8 +64,10 @@ fn diffraction_mtf_unless(
         let (_, far) = wave(&sphere.doubled(), tolerance)?;
         let pairs = values.iter().flatten().zip(far.iter().flatten());
         changes = pairs.map(|(a, b)| (a.re - b.re).hypot(a.im - b.im)).collect();
-        // More digits than the choice of the sphere leaves are not worth the time.
-        if accuracy.tolerance < tolerance && largest(&changes) <= HOPELESS {
+        // More digits than the choice of the sphere leaves are not worth the time, unless somebody asks for
+        // those of this sphere.
+        let is_worth_it = largest(&changes) <= HOPELESS || accuracy.tolerance < BY_RAYS;
+        if accuracy.tolerance < tolerance && is_worth_it {
             tolerance = accuracy.tolerance;
             (function, values) = wave(&sphere, tolerance)?;
         }
