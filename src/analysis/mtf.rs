@@ -219,15 +219,17 @@ impl PhaseNodes {
             rays += cost;
             let values = numbers(&nodes)?;
             let many = frequencies.len() >= MANY;
+            let (times, fall) = if many { (1.0, 0.0) } else { (FEW_CHANGES, LEAST_FALL) };
             let errors = match &before {
                 None => vec![f64::INFINITY; values.len()],
                 Some(before) => {
-                    let mut errors = changes_up_to(frequencies, &values, &before.values);
-                    for (error, earlier) in errors.iter_mut().zip(&before.errors) {
-                        let least = if order > 1 { LEAST_FALL * earlier } else { 0.0 };
-                        *error = if many { *error } else { (FEW_CHANGES * *error).max(least) };
-                    }
-                    errors
+                    // A first change has no error before it.
+                    let least =
+                        |earlier: f64| if earlier < f64::INFINITY { fall * earlier } else { 0.0 };
+                    let error =
+                        |(change, earlier): (f64, &f64)| (times * change).max(least(*earlier));
+                    let changes = changes_up_to(frequencies, &values, &before.values);
+                    changes.into_iter().zip(&before.errors).map(error).collect()
                 }
             };
             let is_told = order > 1 || many;
