@@ -497,7 +497,7 @@ fn a_contrast_says_what_limits_it() {
     let lens = image_lenses().into_iter().find(|l| l.id() == "double_gauss_rudolph_50").unwrap();
     let field = FieldPoint { x: 0.0, y: 24.0, weight: 1.0 };
     let model = lens.model(true);
-    let [coarse, fine] = [1e-4, 1e-9].map(|tolerance| {
+    let [coarse, fine] = [1e-4, 2e-5].map(|tolerance| {
         let accuracy = Accuracy { tolerance, ..ACCURACY };
         diffraction_mtf(&model, field, lens.primary(), &[5.0, 20.0], accuracy).unwrap()
     });
