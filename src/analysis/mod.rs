@@ -63,7 +63,7 @@ pub use illumination::{
 };
 pub use image_quality::{ImageQuality, field_qualities, field_quality, image_quality};
 pub use mtf::{
-    MtfCurve, MtfPoint, TransferValue, geometric_mtf, perfect_contrast,
+    ContrastLimit, MtfCurve, MtfPoint, TransferValue, geometric_mtf, perfect_contrast,
     polychromatic_geometric_mtf, transfer,
 };
 pub use path_map::{SquareGrid, grid_nodes, grid_sides, path_map};

@@ -7,10 +7,12 @@
 
 use super::{AnalysisError, Estimate, lit_region};
 use crate::lens::FieldPoint;
-use crate::pupil::{Accuracy, ConvergedList, Nodes, RayModel, Region, converge_list};
-use crate::trace::ImagePoints;
+use crate::math::{SimdWidth, run_vectorized, sin_cos_turns};
+use crate::pupil::{Accuracy, ConvergedList, Nodes, RayModel, Region, converge_resolved};
+use crate::trace::{ImagePoints, TraceSink as _};
 use serde::Serialize;
-use std::f64::consts::{FRAC_2_PI, TAU};
+use std::f64::consts::FRAC_2_PI;
+use std::fmt::{self, Display};
 
 /// The optical transfer function at one spatial frequency.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -43,10 +45,43 @@ pub struct MtfCurve {
     pub origin: [f64; 2],
     /// True if the tolerance was reached at every frequency.
     pub reached: bool,
+    /// The cause of errors above the tolerance; `None` if it was reached.
+    pub limit: Option<ContrastLimit>,
     /// The number of rays traced.
     pub rays: usize,
     /// The share of the weight of wavelengths without light, which are left out.
     pub dark_share: f64,
+}
+
+/// The cause of errors of a contrast above the tolerance, with the largest error that it leaves.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ContrastLimit {
+    /// The choice of the reference sphere: the change on doubling its radius.
+    Sphere(f64),
+    /// The rest that polynomials leave of path differences and amplitudes.
+    Polynomials(f64),
+    /// The number of rays and of quadrature nodes.
+    Nodes(f64),
+}
+
+impl ContrastLimit {
+    /// The largest error that it leaves.
+    pub fn error(self) -> f64 {
+        let (Self::Sphere(error) | Self::Polynomials(error) | Self::Nodes(error)) = self;
+        error
+    }
+}
+
+impl Display for ContrastLimit {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let what = match self {
+            Self::Sphere(_) => "the choice of the reference sphere",
+            Self::Polynomials(_) => "what polynomials leave of the wavefront",
+            Self::Nodes(_) => "the number of rays",
+        };
+        write!(f, "limited by {what}: {:.1e}", self.error())
+    }
 }
 
 impl TransferValue {
@@ -72,10 +107,16 @@ pub fn geometric_mtf(
     let origin = origin(model, field, &region)?;
     let numbers = |nodes: &Nodes| transfer(&region, nodes, origin, frequencies);
     let half = Accuracy { tolerance: accuracy.tolerance / CHANGES, ..accuracy };
-    let found = converge_list(&region, half, numbers, |list| vec![1.0; list.len()]);
+    let ones = |list: &[f64]| vec![1.0; list.len()];
+    let phase = PhaseNodes::new(&region, frequencies);
+    let found = phase.converge(&region, half, frequencies, numbers);
+    let found = found
+        .or_else(|| converge_resolved(&region, half, phase.along.ceil() as usize, numbers, ones));
     let mut found = found.ok_or(AnalysisError::NoLight)?;
     found.errors.iter_mut().for_each(|error| *error *= CHANGES);
-    Ok(curve(frequencies, origin, &found))
+    let largest = found.errors.iter().copied().fold(0.0, f64::max);
+    let limit = (!found.converged).then_some(ContrastLimit::Nodes(largest));
+    Ok(curve(frequencies, origin, &found, limit))
 }
 
 /// The error of a contrast in changes by the last raising of the order. Its integrand oscillates, so
@@ -83,9 +124,133 @@ pub fn geometric_mtf(
 /// the sum of the last changes.
 const CHANGES: f64 = 2.0;
 
+/// The Gauss nodes that resolve the phase of a frequency over a pupil.
+#[derive(Debug, Clone, Copy)]
+struct PhaseNodes {
+    /// The nodes along a radius.
+    along: f64,
+    /// The azimuths for each radian of an arc.
+    around: f64,
+}
+
+/// The nodes of each order beyond those that resolve the phase, which grow by a part as well: along a radius,
+/// and azimuths along an arc.
+const ORDERS: [[f64; 2]; 9] = [
+    [4.0, 6.0],
+    [7.0, 10.0],
+    [10.0, 14.0],
+    [14.0, 20.0],
+    [20.0, 28.0],
+    [28.0, 40.0],
+    [40.0, 56.0],
+    [56.0, 80.0],
+    [80.0, 112.0],
+];
+const GROWTH: f64 = 0.15;
+/// The numbers of so many frequencies do not all agree by chance; of fewer, a part of the error before a change of
+/// the order is left at least.
+const MANY: usize = 6;
+const LEAST_FALL: f64 = 1.0 / 6.0;
+/// So often the changes of few frequencies count: two directions of one spot differ by up to 1.7 times the sum of
+/// their changes.
+const FEW_CHANGES: f64 = 2.0;
+
+/// For the numbers of each frequency, their largest change among all frequencies up to it: single numbers agree
+/// by chance.
+fn changes_up_to(frequencies: &[f64], values: &[f64], before: &[f64]) -> Vec<f64> {
+    let change = |k: usize| (values[k] - before[k]).abs();
+    let mut order: Vec<usize> = (0..frequencies.len()).collect();
+    order.sort_by(|i, j| frequencies[*i].abs().total_cmp(&frequencies[*j].abs()));
+    let mut errors = vec![0.0; values.len()];
+    let mut largest = 0.0;
+    for i in order {
+        let numbers = 4 * i..4 * (i + 1);
+        largest = numbers.clone().map(change).fold(largest, f64::max);
+        errors[numbers].fill(largest);
+    }
+    errors
+}
+
+impl PhaseNodes {
+    /// Those of the highest frequency. Gauss rules need π times the change of the phase in turns by the angle of
+    /// Chebyshev points, looked at on some radii.
+    fn new(region: &Region<'_>, frequencies: &[f64]) -> Self {
+        let radii = region.radii();
+        let points: Vec<[f64; 2]> = radii.iter().flatten().copied().collect();
+        let (launched, landed) = region.launch.trace_points(&points);
+        let mut places = vec![None; points.len()];
+        for (ray, point) in launched.into_iter().enumerate() {
+            let arrives = landed.fate(ray).is_imaged();
+            places[point] = arrives.then(|| [landed.x[ray], landed.y[ray]]);
+        }
+        let count = radii.first().map_or(1, Vec::len);
+        let change = |apart: usize, is_pair: &dyn Fn(usize) -> bool| {
+            let pairs = places.iter().zip(places.iter().skip(apart)).enumerate();
+            let near = pairs.filter(|(i, _)| is_pair(*i)).filter_map(|(_, (a, b))| a.zip(*b));
+            near.map(|([a, b], [c, d])| (a - c).abs().max((b - d).abs())).fold(0.0, f64::max)
+        };
+        let highest = frequencies.iter().fold(0.0f64, |highest, nu| highest.max(nu.abs()));
+        let along = change(1, &|i| i % count != count - 1);
+        let around = change(count, &|_| true);
+        // Eight steps of angle along a radius, and of azimuth over half a turn.
+        Self { along: 8.0 * highest * along, around: 4.0 * highest * around }
+    }
+
+    /// Raises the order until some numbers change by less than the tolerance; `None` if no order has so many
+    /// nodes.
+    fn converge(
+        self,
+        region: &Region<'_>,
+        accuracy: Accuracy,
+        frequencies: &[f64],
+        numbers: impl Fn(&Nodes) -> Option<Vec<f64>>,
+    ) -> Option<ConvergedList> {
+        let mut rays = region.rays;
+        let mut before: Option<ConvergedList> = None;
+        for (order, [radii, azimuths]) in ORDERS.into_iter().enumerate() {
+            let growth = 1.0 + GROWTH * order as f64;
+            let azimuths = |arc: f64| (growth * self.around * arc + azimuths).ceil() as usize;
+            let radii = (growth * self.along + radii).ceil() as usize;
+            let Some(nodes) = region.nodes_along(azimuths, radii) else { break };
+            let cost = nodes.points.len() + nodes.rays;
+            if order > 1 && rays + cost > accuracy.max_rays {
+                break;
+            }
+            rays += cost;
+            let values = numbers(&nodes)?;
+            let many = frequencies.len() >= MANY;
+            let (times, fall) = if many { (1.0, 0.0) } else { (FEW_CHANGES, LEAST_FALL) };
+            let errors = match &before {
+                None => vec![f64::INFINITY; values.len()],
+                Some(before) => {
+                    // A first change has no error before it.
+                    let least =
+                        |earlier: f64| if earlier < f64::INFINITY { fall * earlier } else { 0.0 };
+                    let error =
+                        |(change, earlier): (f64, &f64)| (times * change).max(least(*earlier));
+                    let changes = changes_up_to(frequencies, &values, &before.values);
+                    changes.into_iter().zip(&before.errors).map(error).collect()
+                }
+            };
+            let is_told = order > 1 || many;
+            let converged = is_told && errors.iter().all(|error| *error <= accuracy.tolerance);
+            before = Some(ConvergedList { values, errors, rays, converged });
+            if converged {
+                break;
+            }
+        }
+        before.filter(|found| found.errors.iter().all(|error| error.is_finite()))
+    }
+}
+
 /// The curve of converged numbers: four a frequency, the real and imaginary parts of the tangential
 /// and the sagittal value.
-pub(super) fn curve(frequencies: &[f64], origin: [f64; 2], found: &ConvergedList) -> MtfCurve {
+pub(super) fn curve(
+    frequencies: &[f64],
+    origin: [f64; 2],
+    found: &ConvergedList,
+    limit: Option<ContrastLimit>,
+) -> MtfCurve {
     let value = |k: usize| {
         let (v, e) = (&found.values[k..k + 2], &found.errors[k..k + 2]);
         TransferValue::new(v[0], v[1], e[0].hypot(e[1]), found.rays)
@@ -98,7 +263,8 @@ pub(super) fn curve(frequencies: &[f64], origin: [f64; 2], found: &ConvergedList
     MtfCurve {
         points: frequencies.iter().enumerate().map(point).collect(),
         origin,
-        reached: found.converged,
+        reached: limit.is_none(),
+        limit,
         rays: found.rays,
         dark_share: 0.0,
     }
@@ -125,27 +291,30 @@ pub(super) fn origin(
 pub fn transfer(
     region: &Region<'_>,
     nodes: &Nodes,
-    [x0, y0]: [f64; 2],
+    origin: [f64; 2],
     frequencies: &[f64],
 ) -> Option<Vec<f64>> {
-    let landed = region.trace::<ImagePoints<f64>>(nodes);
-    let points = &landed.sink;
-    let arrived: Vec<_> =
-        landed.arrivals().map(|(i, w)| ([points.x[i] - x0, points.y[i] - y0], w)).collect();
-    let area: f64 = arrived.iter().map(|(_, w)| w).sum();
-    let [sagittal, tangential] = [0, 1].map(|axis| {
-        let mut sums = vec![[0.0; 2]; frequencies.len()];
-        let rays: Vec<[f64; 2]> = arrived.iter().map(|(off, w)| [off[axis], *w]).collect();
-        match equal_steps(frequencies) {
-            Some(step) => add_in_steps(&rays, frequencies[0], step, &mut sums),
-            None => add_each(&rays, frequencies, &mut sums),
+    let mut sums = [0, 1].map(|_| vec![[[0.0; LANES]; 2]; frequencies.len()]);
+    let mut area = [[[0.0; LANES]; 2]];
+    for from in (0..nodes.points.len()).step_by(TRACED) {
+        let part = from..(from + TRACED).min(nodes.points.len());
+        let (points, weights) = (nodes.points[part.clone()].to_vec(), nodes.weights[part].to_vec());
+        let landed = region.trace::<ImagePoints<f64>>(&Nodes { points, weights, ..*nodes });
+        let lost = |i: &usize| !landed.sink.fate(*i).is_imaged();
+        let mut weights = landed.weights.clone();
+        (0..weights.len()).filter(lost).for_each(|i| weights[i] = 0.0);
+        for (axis, places) in [&landed.sink.x, &landed.sink.y].into_iter().enumerate() {
+            add_waves([places, &weights], origin[axis], frequencies, &mut sums[axis]);
         }
-        sums
-    });
+        // Summed like the others, so that the contrast of frequency 0 is exactly 1.
+        add_waves([&landed.sink.x, &weights], 0.0, &[0.0], &mut area);
+    }
+    let total = |parts: &LaneSum| parts.map(|lanes| lanes.iter().sum::<f64>());
+    let [area, _] = total(&area[0]);
     // The mirror image of a half pupil cancels the sine.
     let across = if nodes.mirrored { 0.0 } else { 1.0 };
-    let both = tangential.iter().zip(&sagittal);
-    let values = both.flat_map(|([tr, ti], [sr, si])| [*tr, *ti, *sr, across * si]);
+    let both = sums[1].iter().map(total).zip(sums[0].iter().map(total));
+    let values = both.flat_map(|([tr, ti], [sr, si])| [tr, ti, sr, across * si]);
     let values: Vec<f64> = values.map(|sum| sum / area).collect();
     (area > 0.0).then_some(values)
 }
@@ -153,8 +322,14 @@ pub fn transfer(
 /// The largest relative departure of frequencies from equal steps, and the fewest that are worth it.
 const EQUAL: f64 = 1e-12;
 const FEW: usize = 6;
-/// The number of rays whose phases are turned together.
-const TURNED: usize = 8;
+/// The number of rays whose phases are computed together, and of equal steps that they are turned by before
+/// they are computed anew, so that rounding does not grow.
+const TOGETHER: usize = 32;
+/// The number of nodes that are traced together, which stay in the cache.
+const TRACED: usize = 2048;
+/// The partial sums of a frequency, which vector instructions add to.
+const LANES: usize = 8;
+const TURNED: usize = 64;
 
 /// The step of equally spaced frequencies; `None` for others, and for few.
 fn equal_steps(frequencies: &[f64]) -> Option<f64> {
@@ -166,36 +341,64 @@ fn equal_steps(frequencies: &[f64]) -> Option<f64> {
     (frequencies.len() >= FEW && frequencies.iter().enumerate().all(is_even)).then_some(step)
 }
 
-/// Adds `w exp(−2πiν x)` of rays, given by x and w, at each frequency.
-fn add_each(rays: &[[f64; 2]], frequencies: &[f64], sums: &mut [[f64; 2]]) {
-    for (frequency, sum) in frequencies.iter().zip(sums) {
-        for [x, weight] in rays {
-            let (sin, cos) = (TAU * frequency * x).sin_cos();
-            sum[0] += weight * cos;
-            sum[1] -= weight * sin;
-        }
-    }
+/// Partial sums of the real and the imaginary part at a frequency.
+type LaneSum = [[f64; LANES]; 2];
+
+/// Adds `w exp(−2πiν (x − x₀))` of rays, given by columns of x and w, at each frequency.
+fn add_waves(
+    [places, weights]: [&[f64]; 2],
+    origin: f64,
+    frequencies: &[f64],
+    sums: &mut [LaneSum],
+) {
+    let step = equal_steps(frequencies);
+    let run = if step.is_some() { TURNED } else { 1 };
+    run_vectorized(
+        SimdWidth::detect(),
+        #[inline(always)]
+        || {
+            for (places, weights) in places.chunks(TOGETHER).zip(weights.chunks(TOGETHER)) {
+                // Places without a ray have no weight.
+                let (mut x, mut w) = ([0.0; TOGETHER], [0.0; TOGETHER]);
+                x[..places.len()].iter_mut().zip(places).for_each(|(x, place)| *x = place - origin);
+                w[..weights.len()].copy_from_slice(weights);
+                let turn = waves(&x, &[1.0; TOGETHER], step.unwrap_or(0.0));
+                for (frequencies, sums) in frequencies.chunks(run).zip(sums.chunks_mut(run)) {
+                    add_turned(waves(&x, &w, frequencies[0]), &turn, sums);
+                }
+            }
+        },
+    );
 }
 
-/// The same at frequencies in equal steps: the phase of a ray is turned by the same angle from each to the
-/// next, which a product does.
-fn add_in_steps(rays: &[[f64; 2]], first: f64, step: f64, sums: &mut [[f64; 2]]) {
-    for chunk in rays.chunks(TURNED) {
-        let [mut re, mut im, mut turn_re, mut turn_im] = [[0.0; TURNED]; 4];
-        for (k, [x, weight]) in chunk.iter().enumerate() {
-            let (sin, cos) = (TAU * first * x).sin_cos();
-            (re[k], im[k]) = (weight * cos, -weight * sin);
-            let (sin, cos) = (TAU * step * x).sin_cos();
-            (turn_re[k], turn_im[k]) = (cos, -sin);
-        }
-        for sum in &mut *sums {
-            sum[0] += re.iter().sum::<f64>();
-            sum[1] += im.iter().sum::<f64>();
-            for k in 0..TURNED {
-                let turned = re[k] * turn_re[k] - im[k] * turn_im[k];
-                im[k] = re[k] * turn_im[k] + im[k] * turn_re[k];
-                re[k] = turned;
+/// Real and imaginary parts of some rays.
+type Waves = [[f64; TOGETHER]; 2];
+
+/// `w exp(−2πiν x)` of some rays.
+#[inline(always)]
+fn waves(x: &[f64; TOGETHER], w: &[f64; TOGETHER], frequency: f64) -> Waves {
+    let mut waves = [[0.0; TOGETHER]; 2];
+    for k in 0..TOGETHER {
+        let (sin, cos) = sin_cos_turns(frequency * x[k]);
+        (waves[0][k], waves[1][k]) = (w[k] * cos, -w[k] * sin);
+    }
+    waves
+}
+
+/// Adds the waves of some rays to the first of some sums, to each next one turned once more.
+#[inline(always)]
+fn add_turned([mut re, mut im]: Waves, [cos, sin]: &Waves, sums: &mut [LaneSum]) {
+    for [re_sum, im_sum] in sums {
+        for from in (0..TOGETHER).step_by(LANES) {
+            for k in 0..LANES {
+                re_sum[k] += re[from + k];
+                im_sum[k] += im[from + k];
             }
+        }
+        for k in 0..TOGETHER {
+            let turned = re[k] * cos[k] - im[k] * sin[k];
+            im[k] = re[k] * sin[k] + im[k] * cos[k];
+            re[k] = turned;
         }
     }
 }
@@ -239,6 +442,7 @@ pub(super) fn sum_wavelengths(
         return Err(reason.unwrap_or(AnalysisError::NoLight));
     };
     let rays = lit.iter().map(|(_, curve)| curve.rays).sum();
+    let limits = lit.iter().filter_map(|(_, curve)| curve.limit);
     let sum = |of: &dyn Fn(&MtfCurve) -> TransferValue| {
         let mean = |part: &dyn Fn(&TransferValue) -> f64| -> f64 {
             lit.iter().map(|(weight, curve)| weight / light * part(&of(curve))).sum()
@@ -254,6 +458,7 @@ pub(super) fn sum_wavelengths(
         points: (0..first.points.len()).map(point).collect(),
         origin: first.origin,
         reached: lit.iter().all(|(_, curve)| curve.reached),
+        limit: limits.max_by(|a, b| a.error().total_cmp(&b.error())),
         rays,
         dark_share: (total - light) / total,
     })
@@ -262,19 +467,31 @@ pub(super) fn sum_wavelengths(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::f64::consts::TAU;
 
     #[test]
     fn phases_turned_in_steps_are_those_of_each_frequency() {
-        let rays: Vec<[f64; 2]> =
-            (0..37).map(|i| [0.05 * (1.7 * f64::from(i)).sin(), 1.0 + f64::from(i % 5)]).collect();
-        let even: Vec<f64> = (1..=200).map(|i| 0.5 * f64::from(i)).collect();
+        let ray = |i: usize| 0.05 * (1.7 * i as f64).sin();
+        let places: Vec<f64> = (0..77).map(ray).collect();
+        let weights: Vec<f64> = (0..77).map(|i| 1.0 + f64::from(i % 5)).collect();
+        let even: Vec<f64> = (0..200).map(|i| 0.5 * f64::from(i)).collect();
         assert_eq!(equal_steps(&even), Some(0.5));
-        let [mut turned, mut each] = [0, 1].map(|_| vec![[0.0; 2]; even.len()]);
-        add_in_steps(&rays, 0.5, 0.5, &mut turned);
-        add_each(&rays, &even, &mut each);
-        for (a, b) in turned.iter().flatten().zip(each.iter().flatten()) {
-            assert!((a - b).abs() < 1e-11, "{a} {b}");
+        let found = |frequencies: &[f64]| {
+            let mut sums = vec![[[0.0; LANES]; 2]; frequencies.len()];
+            add_waves([&places, &weights], 0.01, frequencies, &mut sums);
+            let total = |parts: &LaneSum| parts.map(|lanes| lanes.iter().sum::<f64>());
+            sums.iter().map(total).collect::<Vec<_>>()
+        };
+        let turned = found(&even);
+        for (nu, sum) in even.iter().zip(&turned) {
+            let angles = places.iter().map(|x| TAU * nu * (x - 0.01));
+            let parts = angles.zip(&weights).map(|(angle, w)| [w * angle.cos(), -w * angle.sin()]);
+            let exact = parts.fold([0.0; 2], |sum, part| [sum[0] + part[0], sum[1] + part[1]]);
+            assert!((0..2).all(|k| (sum[k] - exact[k]).abs() < 1e-11), "{nu}: {sum:?} {exact:?}");
+            let alone = found(&[*nu])[0];
+            assert!((0..2).all(|k| (alone[k] - exact[k]).abs() < 1e-12), "{nu}: {alone:?}");
         }
+        assert_eq!(turned[0], [weights.iter().sum(), 0.0]);
         for uneven in [&[1.0, 2.0, 3.0, 4.0, 5.0, 7.0][..], &[10.0, 20.0], &[3.0]] {
             assert_eq!(equal_steps(uneven), None);
         }

@@ -14,6 +14,7 @@ mod lanes;
 mod normal_law;
 pub mod quadrature;
 mod real;
+mod turns;
 mod vec3;
 
 pub use double::DoubleDouble;
@@ -25,4 +26,5 @@ pub use lanes::SimdWidth;
 pub(crate) use lanes::{dot, run_vectorized, sum_of_products};
 pub(crate) use normal_law::{erfc, excess_beyond};
 pub use real::Real;
+pub(crate) use turns::sin_cos_turns;
 pub use vec3::Vec3;

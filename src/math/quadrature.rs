@@ -1,6 +1,7 @@
 //! Gauss rules: nodes and weights that integrate polynomials exactly.
 
 use std::f64::consts::PI;
+use std::sync::OnceLock;
 
 /// Nodes and weights of the Gauss-Legendre rule with `count` nodes on the interval from `from` to
 /// `to`, in ascending order; exact for polynomials of degree `2 count - 1`.
@@ -15,26 +16,40 @@ pub fn gauss_legendre(count: usize, from: f64, to: f64) -> Vec<(f64, f64)> {
     (0..count).map(node).collect()
 }
 
+/// Nodes and weights on the interval from 0 to 1.
+pub type GaussRule = Vec<(f64, f64)>;
+
+/// The largest number of nodes of a remembered rule.
+pub const LARGEST_RULE: usize = 512;
+
+/// The Gauss-Legendre rule with `count` nodes, or the largest one, on the interval from 0 to 1, computed once.
+pub fn legendre_rule(count: usize) -> &'static GaussRule {
+    static RULES: [OnceLock<GaussRule>; LARGEST_RULE + 1] =
+        [const { OnceLock::new() }; LARGEST_RULE + 1];
+    let count = count.min(LARGEST_RULE);
+    RULES[count].get_or_init(|| gauss_legendre(count, 0.0, 1.0))
+}
+
 /// The `count` Chebyshev points from 0 to 1, ends included: `(1 − cos(π j/(count − 1)))/2`.
 pub fn chebyshev_points(count: usize) -> impl Iterator<Item = f64> {
     let step = PI / (count.max(2) - 1) as f64;
     (0..count).map(move |j| (0.5 * step * j as f64).sin().powi(2))
 }
 
-/// The polynomial through values at the [`chebyshev_points`], at a point from 0 to 1, by the second barycentric formula (Berrut and Trefethen, SIAM Review 46, 2004).
-pub fn chebyshev_value(values: &[f64], t: f64) -> f64 {
-    let last = values.len() - 1;
-    let (mut above, mut below) = (0.0, 0.0);
-    for ((j, value), node) in values.iter().enumerate().zip(chebyshev_points(values.len())) {
-        if t == node {
-            return *value;
-        }
-        let end = if j == 0 || j == last { 0.5 } else { 1.0 };
-        let weight = if j % 2 == 0 { end } else { -end } / (t - node);
-        above += weight * value;
-        below += weight;
+/// The shares with which values at the [`chebyshev_points`] add up to that of the polynomial through them at a
+/// point from 0 to 1, by the second barycentric formula (Berrut and Trefethen, SIAM Review 46, 2004).
+pub fn chebyshev_weights(nodes: &[f64], t: f64) -> Vec<f64> {
+    if let Some(at) = nodes.iter().position(|node| *node == t) {
+        return (0..nodes.len()).map(|j| if j == at { 1.0 } else { 0.0 }).collect();
     }
-    above / below
+    let last = nodes.len() - 1;
+    let weight = |(j, node): (usize, &f64)| {
+        let end = if j == 0 || j == last { 0.5 } else { 1.0 };
+        if j % 2 == 0 { end / (t - node) } else { -end / (t - node) }
+    };
+    let weights: Vec<f64> = nodes.iter().enumerate().map(weight).collect();
+    let total: f64 = weights.iter().sum();
+    weights.into_iter().map(|weight| weight / total).collect()
 }
 
 /// The zero of the Legendre polynomial with index `i`, from the largest down, and its weight.

@@ -2,17 +2,19 @@
 //!
 //! The work is that of a designer's chart: every field and colour, tangential and sagittal, at all
 //! frequencies, on one thread. The reference is the tightest tolerance; errors are the largest absolute
-//! differences of the complex sums over wavelengths from it.
+//! differences of the complex sums over wavelengths from it. The pupils of the fields are searched for once, as
+//! a design session does for all analyses, and that is timed by itself.
 
 use super::timing::time_median;
 use crate::analysis::{
-    AnalysisError, MtfCurve, TransferValue, polychromatic_diffraction_mtf,
+    AnalysisError, ContrastLimit, MtfCurve, TransferValue, polychromatic_diffraction_mtf,
     polychromatic_geometric_mtf,
 };
 use crate::lens::FieldPoint;
-use crate::pupil::{Accuracy, RayModel};
+use crate::pupil::{Accuracy, RayModel, Region};
 use rayon::ThreadPool;
 use serde::Serialize;
+use std::hint::black_box;
 use std::ops::ControlFlow;
 
 /// The way of computing contrast.
@@ -51,6 +53,8 @@ pub struct TransferRow {
     pub error: f64,
     /// True if every curve says that it reached the tolerance.
     pub reached: bool,
+    /// The cause of errors above the tolerance; `None` if it was reached.
+    pub limit: Option<ContrastLimit>,
     /// The rays of all curves.
     pub rays: usize,
     /// The time of the whole chart on one thread, in milliseconds.
@@ -68,6 +72,8 @@ pub struct TransferCurves {
     pub frequencies: [f64; 2],
     /// The number of frequencies.
     pub count: usize,
+    /// The time in which the pupils of all fields and colours are found, on one thread, in milliseconds.
+    pub pupils_ms: f64,
     /// The charts.
     pub rows: Vec<TransferRow>,
     /// The reason why there are no charts by diffraction.
@@ -93,10 +99,14 @@ pub fn measure_transfer(
     mut report: impl FnMut(usize, usize) -> ControlFlow<()>,
 ) -> Result<TransferCurves, AnalysisError> {
     let edge = model.beam.edge;
+    let fields = ZONES.map(|zone| FieldPoint { x: 0.0, y: zone * edge, weight: 1.0 }).to_vec();
+    let model = &RayModel { fields: fields.clone(), ..model.clone() };
+    let ((), pupils_ms) = pool.install(|| time_median(1..=9, || find_pupils(&model.clone())));
+    find_pupils(model);
     let chart = TransferChart {
         model,
         pool,
-        fields: ZONES.map(|zone| FieldPoint { x: 0.0, y: zone * edge, weight: 1.0 }).to_vec(),
+        fields,
         frequencies: (1..=count).map(|i| highest * i as f64 / count as f64).collect(),
     };
     let mut curves = TransferCurves {
@@ -104,6 +114,7 @@ pub fn measure_transfer(
         colors: model.channels.len(),
         frequencies: [highest / count as f64, highest],
         count,
+        pupils_ms,
         rows: Vec::new(),
         refused: None,
     };
@@ -127,6 +138,16 @@ pub fn measure_transfer(
         }
     }
     Ok(curves)
+}
+
+/// Finds the pupils of the fields of a model, which remembers them.
+fn find_pupils(model: &RayModel) {
+    for field in &model.fields {
+        for wavelength in 0..model.channels.len() {
+            // A field without rays has no pupil, and the charts say so.
+            drop(black_box(model.launch(*field, wavelength).map(Region::new)));
+        }
+    }
 }
 
 /// The chart of a lens: its fields and frequencies.
@@ -165,6 +186,7 @@ impl TransferChart<'_> {
         let (found, ms) = time_median(1..=9, || self.compute(method, tolerance));
         let found = found?;
         let pairs = values(&found).zip(values(exact));
+        let limits = found.iter().filter_map(|curve| curve.limit);
         let off = |(a, b): (TransferValue, TransferValue)| (a.re - b.re).hypot(a.im - b.im);
         Ok(TransferRow {
             method,
@@ -172,6 +194,7 @@ impl TransferChart<'_> {
             stated: values(&found).map(|value| value.modulus.error).fold(0.0, f64::max),
             error: pairs.map(off).fold(0.0, f64::max),
             reached: found.iter().all(|curve| curve.reached),
+            limit: limits.max_by(|a, b| a.error().total_cmp(&b.error())),
             rays: found.iter().map(|curve| curve.rays).sum(),
             ms,
         })

@@ -1,19 +1,15 @@
 //! Gauss rules of the unit disc and its pieces, computed once.
 
-use crate::math::quadrature::gauss_legendre;
+use crate::math::quadrature::{GaussRule, legendre_rule};
 use std::f64::consts::PI;
 use std::sync::OnceLock;
 
 /// The largest number of nodes.
-const LARGEST: usize = 224;
-
-/// Nodes and weights on the interval from 0 to 1.
-pub(super) type GaussRule = Vec<(f64, f64)>;
+pub(super) const LARGEST: usize = 224;
 
 /// The Gauss-Legendre rule with `count` nodes on the interval from 0 to 1.
 pub(super) fn legendre(count: usize) -> &'static GaussRule {
-    static RULES: [OnceLock<GaussRule>; LARGEST + 1] = [const { OnceLock::new() }; LARGEST + 1];
-    RULES[count.min(LARGEST)].get_or_init(|| gauss_legendre(count.min(LARGEST), 0.0, 1.0))
+    legendre_rule(count.min(LARGEST))
 }
 
 /// The Gauss rule with `count` nodes for `∫ f(r) r dr` from 0 to 1.

@@ -11,7 +11,7 @@ use super::ray_aiming::{AimedRay, aim_all_from_chief_ray, aim_at, aim_from_chief
 use super::ray_model::{Aiming, Channel, Dual2, PupilMeasure, RayModel};
 use crate::lens::{FieldKind, FieldPoint};
 use crate::math::Real;
-use crate::trace::{ImagePoints, Ray, Rays, TraceSink, TracedRay};
+use crate::trace::{ImagePoints, Landings, Ray, Rays, TraceSink, TracedRay};
 use serde::Serialize;
 
 /// The reason why a field has no rays.
@@ -336,6 +336,21 @@ impl<'a> Launch<'a> {
     pub fn unclipped_landing(&self, p: [f64; 2]) -> Option<TracedRay<Dual2>> {
         let landing = self.channel().unclipped.trace(self.dual_ray(p)?);
         landing.fate.is_imaged().then_some(landing)
+    }
+
+    /// The rays at some pupil coordinates at the image, without clipping, each with its optical path and with
+    /// their derivatives, traced together; `None` for those that do not get there.
+    pub fn unclipped_landings(
+        &self,
+        points: impl Iterator<Item = [f64; 2]>,
+    ) -> Vec<Option<(Ray<Dual2>, Dual2)>> {
+        let started: Vec<Option<Ray<Dual2>>> = points.map(|p| self.dual_ray(p)).collect();
+        let rays: Rays<Dual2> = started.iter().flatten().copied().collect();
+        let mut landed = Landings::default();
+        self.channel().unclipped.trace_batch(&rays, &mut landed);
+        let mut traced = 0..rays.len();
+        let end = |i: usize| landed.fate(i).is_imaged().then(|| (landed.ray(i), landed.opl[i]));
+        started.iter().map(|ray| ray.and_then(|_| traced.next()).and_then(end)).collect()
     }
 
     /// The derivatives of the direction cosines `L'` and `M'` at the image by the pupil

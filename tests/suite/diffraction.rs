@@ -3,11 +3,12 @@
 use crate::images::{ACCURACY, ImageLens, allowed, image_lenses};
 use crate::reference::{Worst, number, numbers, read};
 use aplanat::analysis::{
-    AnalysisError, PupilCurve, PupilFunction, PupilSamples, TransferValue, ZernikeIndex,
-    ZernikeMethod, ZernikeOrder, diffraction_gate, diffraction_mtf, encircled_energy,
-    perfect_contrast, point_spread, polychromatic_diffraction_mtf, strehl, through_focus_mtf,
-    zernike,
+    AnalysisError, ContrastLimit, PupilCurve, PupilFunction, PupilSamples, TransferValue,
+    ZernikeIndex, ZernikeMethod, ZernikeOrder, diffraction_gate, diffraction_mtf, encircled_energy,
+    geometric_mtf, perfect_contrast, point_spread, polychromatic_diffraction_mtf, strehl,
+    through_focus_mtf, zernike,
 };
+use aplanat::lens::FieldPoint;
 use aplanat::pupil::Accuracy;
 use serde_json::Value;
 use std::f64::consts::PI;
@@ -141,7 +142,7 @@ fn the_airy_disc_and_its_contrast() {
         let (um, f_number) = (number(&exact["wavelength_um"]), number(&exact["f_number"]));
         let circle = PupilCurve::circle([0.0; 2], 0.5 / f_number);
         let pupil = PupilFunction::uniform(vec![circle], um, |_| 0.0).unwrap();
-        let [light, far] = [5, 8].map(|order| pupil.samples(order).unwrap());
+        let [light, far] = [5, 8].map(|order| pupil.samples(order));
         let unit = um * 1e-3 * f_number;
         for point in exact["points"].as_array().unwrap() {
             let r = number(&point["r_over_lambdaN"]) * unit;
@@ -154,15 +155,15 @@ fn the_airy_disc_and_its_contrast() {
         }
         for otf in exact["otf"].as_array().unwrap() {
             let nu = number(&otf["frequency"]);
-            let got = pupil.transfer([0.8 * nu, 0.6 * nu], 0.0, 1e-11).unwrap();
+            let got = pupil.transfer([0.8 * nu, 0.6 * nu], 0.0, 1e-11);
             assert!((got.re - number(&otf["value"])).abs() < 1e-9, "{got:?} {otf}");
         }
         let cutoff = number(&exact["cutoff_per_mm"]);
-        assert_eq!(pupil.transfer([cutoff, 0.0], 0.0, 1e-9).unwrap().modulus.value, 0.0);
-        assert_eq!(pupil.transfer([0.0; 2], 0.0, 1e-9).unwrap().modulus.value, 1.0);
+        assert_eq!(pupil.transfer([cutoff, 0.0], 0.0, 1e-9).modulus.value, 0.0);
+        assert_eq!(pupil.transfer([0.0; 2], 0.0, 1e-9).modulus.value, 1.0);
         // A sliver: 16/(3 pi sqrt 2) * ((1 - s))^1.5 of the whole just below the cutoff.
         let rest: f64 = 1e-4;
-        let got = pupil.transfer([cutoff * (1.0 - rest), 0.0], 0.0, 1e-14).unwrap();
+        let got = pupil.transfer([cutoff * (1.0 - rest), 0.0], 0.0, 1e-14);
         let sliver = 8.0 * 2f64.sqrt() / (3.0 * PI) * rest.powf(1.5);
         assert!((got.re / sliver - 1.0).abs() < 1e-3, "{got:?} {sliver:e}");
     }
@@ -174,7 +175,7 @@ fn a_ring_has_a_shadow() {
         let inner = number(&exact["obscuration"]);
         let curves = [1.0, inner].map(|part| PupilCurve::circle([0.0; 2], 0.25 * part));
         let pupil = PupilFunction::ring(&curves, 0.5, |_| 0.0).unwrap();
-        let [light, far] = [5, 8].map(|order| pupil.samples(order).unwrap());
+        let [light, far] = [5, 8].map(|order| pupil.samples(order));
         let unit = 0.5e-3 * 2.0;
         for point in exact["points"].as_array().unwrap() {
             let r = number(&point["r_over_lambdaN"]) * unit;
@@ -187,7 +188,7 @@ fn a_ring_has_a_shadow() {
         }
         for otf in exact["otf"].as_array().unwrap() {
             let nu = number(&otf["fraction_of_cutoff"]) / unit;
-            let got = pupil.transfer([0.0, nu], 0.0, 1e-11).unwrap();
+            let got = pupil.transfer([0.0, nu], 0.0, 1e-11);
             assert!((got.re - number(&otf["value"])).abs() < 1e-9, "{got:?} {otf}");
         }
     }
@@ -200,7 +201,7 @@ fn defocus_reverses_contrast() {
         let (pupil, unit) = disc(|[x, y]| w20 * (x * x + y * y));
         for otf in exact["otf"].as_array().unwrap() {
             let nu = number(&otf["fraction_of_cutoff"]) / unit;
-            let got = pupil.transfer([nu, 0.0], 0.0, 1e-11).unwrap();
+            let got = pupil.transfer([nu, 0.0], 0.0, 1e-11);
             assert!((got.re - number(&otf["value"])).abs() < 1e-9, "{got:?} {otf}");
             assert!(got.im.abs() < 1e-9);
         }
@@ -229,7 +230,7 @@ fn aberrated_discs() {
                 + seidel("W111") * y
         };
         let (pupil, unit) = disc(waves);
-        let light = pupil.samples(8).unwrap();
+        let light = pupil.samples(8);
         for point in exact["psf"].as_array().unwrap() {
             let at = ["x_over_lambdaN", "y_over_lambdaN"].map(|key| number(&point[key]) * unit);
             let got = light.intensity(at);
@@ -237,7 +238,7 @@ fn aberrated_discs() {
         }
         for otf in exact["otf"].as_array().unwrap() {
             let nu = ["fx_over_cutoff", "fy_over_cutoff"].map(|key| number(&otf[key]) / unit);
-            let got = pupil.transfer(nu, 0.0, 1e-11).unwrap();
+            let got = pupil.transfer(nu, 0.0, 1e-11);
             let off = (got.re - number(&otf["re"])).hypot(got.im - number(&otf["im"]));
             assert!(off < 1e-9, "{got:?} {otf}");
         }
@@ -249,14 +250,14 @@ fn pupils_of_other_shapes() {
     for exact in read("images.json")["other_pupils"].as_array().unwrap() {
         let um = number(&exact["wavelength_um"]);
         let pupil = PupilFunction::uniform(curves(exact), um, |_| 0.0).unwrap();
-        let light = pupil.samples(5).unwrap();
+        let light = pupil.samples(5);
         for point in exact["psf"].as_array().unwrap() {
             let got = light.intensity([number(&point["x"]), number(&point["y"])]);
             assert!((got - number(&point["value"])).abs() < 1e-9, "{got} {point}");
         }
         for otf in exact["otf"].as_array().unwrap() {
             let nu = [number(&otf["nx"]), number(&otf["ny"])];
-            let got = pupil.transfer(nu, 0.0, 1e-11).unwrap();
+            let got = pupil.transfer(nu, 0.0, 1e-11);
             assert!((got.re - number(&otf["value"])).abs() < 1e-9, "{got:?} {otf}");
         }
     }
@@ -408,12 +409,12 @@ fn the_contrast_of_a_perfect_lens_is_the_overlap_of_two_discs() {
 fn a_contrast_states_what_the_polynomials_leave_and_no_more() {
     // An even polynomial of low degree is its own fit.
     let (smooth, unit) = disc(|[x, y]| 0.2 * (x * x + y * y));
-    let exact = smooth.transfer([0.3 / unit, 0.0], 0.0, 1e-9).unwrap();
+    let exact = smooth.transfer([0.3 / unit, 0.0], 0.0, 1e-9);
     assert!(exact.modulus.error < 1e-6, "{exact:?}");
     // A ridge is not: twice the ridge leaves twice as much.
     let error = |height: f64| {
         let (ridge, unit) = disc(|[x, _]| height * x.abs());
-        ridge.transfer([0.3 / unit, 0.0], 0.0, 1e-6).unwrap().modulus.error
+        ridge.transfer([0.3 / unit, 0.0], 0.0, 1e-6).modulus.error
     };
     let (one, two) = (error(0.02), error(0.04));
     assert!(one > 1e-5 && one < 0.1, "{one}");
@@ -435,4 +436,74 @@ fn a_contrast_is_reached_when_its_errors_are_within_the_tolerance() {
         }
     }
     assert!(unreached > 0);
+}
+
+/// A field along x has no plane of symmetry that halves its pupil, and the contrast of the same field along y.
+#[test]
+fn contrast_does_not_depend_on_the_direction_of_the_field() {
+    for (lens, degrees) in image_lenses().iter().take(3).zip([1.0, 10.0, 10.0]) {
+        for clipped in [false, true] {
+            let model = lens.model(clipped);
+            let accuracy = Accuracy { tolerance: 1e-4, ..ACCURACY };
+            let at = |x: f64, y: f64| {
+                let field = FieldPoint { x, y, weight: 1.0 };
+                diffraction_mtf(&model, field, lens.primary(), &[5.0, 30.0], accuracy).unwrap()
+            };
+            let (up, across) = (at(0.0, degrees), at(degrees, 0.0));
+            for (up, across) in up.points.iter().zip(&across.points) {
+                let pairs = [(up.tangential, across.sagittal), (up.sagittal, across.tangential)];
+                for (a, b) in pairs {
+                    let off = (a.re - b.re).hypot(a.im - b.im);
+                    let error = a.modulus.error + b.modulus.error;
+                    assert!(off <= error, "{} {clipped}: {a:?} {b:?}", lens.id());
+                }
+            }
+        }
+    }
+}
+
+/// The tangential and sagittal contrast of a field: at 0 it is 1, beyond the cutoff 0, both exactly, and a chart of
+/// many frequencies has the values of each alone.
+#[test]
+fn contrast_begins_at_one_ends_at_zero_and_is_that_of_each_frequency_alone() {
+    let lens = &image_lenses()[0];
+    let (_, model, field) = lens.fields().remove(1);
+    let cutoff = 1e3 / (0.48 * 4.0);
+    let nu: Vec<f64> = (0..12).map(|i| 9.5 * f64::from(i)).chain([3.7, 2.0 * cutoff]).collect();
+    let accuracy = Accuracy { tolerance: 1e-4, ..ACCURACY };
+    let waves = diffraction_mtf(&model, field, lens.primary(), &nu, accuracy).unwrap();
+    let rays = geometric_mtf(&model, field, lens.primary(), &nu, accuracy).unwrap();
+    for curve in [&waves, &rays] {
+        for value in [curve.points[0].tangential, curve.points[0].sagittal] {
+            assert_eq!([value.re, value.im, value.modulus.value], [1.0, 0.0, 1.0]);
+        }
+    }
+    let last = &waves.points[13];
+    assert_eq!([last.tangential.modulus.value, last.sagittal.modulus.value], [0.0; 2]);
+    for (i, nu) in nu.iter().enumerate() {
+        let alone = diffraction_mtf(&model, field, lens.primary(), &[*nu], accuracy).unwrap();
+        let traced = geometric_mtf(&model, field, lens.primary(), &[*nu], accuracy).unwrap();
+        for (all, one) in [(&waves, &alone), (&rays, &traced)] {
+            let (a, b) = (all.points[i].tangential, one.points[0].tangential);
+            let error = a.modulus.error + b.modulus.error;
+            assert!((a.re - b.re).hypot(a.im - b.im) <= error, "{nu}: {a:?} {b:?}");
+        }
+    }
+}
+
+/// Where the reference sphere leaves more than the tolerance, a curve says so, and tighter tolerances add no work.
+#[test]
+fn a_contrast_says_what_limits_it() {
+    let lens = image_lenses().into_iter().find(|l| l.id() == "double_gauss_rudolph_50").unwrap();
+    let field = FieldPoint { x: 0.0, y: 24.0, weight: 1.0 };
+    let model = lens.model(true);
+    let [coarse, fine] = [1e-4, 2e-5].map(|tolerance| {
+        let accuracy = Accuracy { tolerance, ..ACCURACY };
+        diffraction_mtf(&model, field, lens.primary(), &[5.0, 20.0], accuracy).unwrap()
+    });
+    assert!(matches!(fine.limit, Some(ContrastLimit::Sphere(left)) if left > 1e-3), "{fine:?}");
+    assert_eq!((coarse.reached, coarse.points, coarse.rays), (false, fine.points, fine.rays));
+    let (_, model, field) = image_lenses()[0].fields().remove(0);
+    let found = diffraction_mtf(&model, field, 0, &[5.0], Accuracy::default()).unwrap();
+    assert!(found.reached && found.limit.is_none(), "{found:?}");
 }

@@ -4,7 +4,9 @@ use super::pupil_function::PupilFunction;
 use super::ray_pupil::RayPupil;
 use crate::analysis::mtf::{curve, geometric_mtf, origin, sum_wavelengths};
 use crate::analysis::reference_sphere::{ReferenceForm, ReferenceSphere};
-use crate::analysis::{AnalysisError, Estimate, MtfCurve, MtfPoint, TransferValue, lit_region};
+use crate::analysis::{
+    AnalysisError, ContrastLimit, Estimate, MtfCurve, MtfPoint, TransferValue, lit_region,
+};
 use crate::lens::FieldPoint;
 use crate::pupil::{Accuracy, ConvergedList, RayModel, Region};
 use crate::trace::TraceSink as _;
@@ -48,30 +50,66 @@ fn diffraction_mtf_unless(
     }
     let region = lit_region(model, field, wavelength)?;
     let sphere = ReferenceSphere::for_region(&region)?;
-    let function = PupilFunction::of_region(&region, &sphere, accuracy.tolerance)?;
     let origin = origin(model, field, &region)?;
-    let mut values = function.values(frequencies, 0.0, accuracy.tolerance, interrupted)?;
-    if accuracy.tolerance < BY_RAYS && function.transfer_error() > accuracy.tolerance {
-        refine(&mut values, frequencies, &function, (&region, &sphere), accuracy.tolerance)?;
-    }
-    if is_uncertain(&sphere, &region) {
-        let tolerance = accuracy.tolerance.max(COARSE);
-        let wide = PupilFunction::of_region(&region, &sphere.doubled(), tolerance)?;
-        let other = wide.values(frequencies, 0.0, tolerance, interrupted)?;
-        for (value, other) in values.iter_mut().flatten().zip(other.iter().flatten()) {
-            value.modulus.error += (value.re - other.re).hypot(value.im - other.im);
+    let wave = |sphere: &ReferenceSphere, tolerance: f64| {
+        let function = PupilFunction::of_region(&region, sphere, tolerance)?;
+        let values = function.values(frequencies, 0.0, tolerance, interrupted)?;
+        Ok::<_, AnalysisError>((function, values))
+    };
+    let uncertain = is_uncertain(&sphere, &region);
+    let mut tolerance = accuracy.tolerance.max(if uncertain { COARSE } else { 0.0 });
+    let (mut function, mut values) = wave(&sphere, tolerance)?;
+    let mut changes = vec![0.0; 2 * frequencies.len()];
+    if uncertain {
+        let (_, far) = wave(&sphere.doubled(), tolerance)?;
+        let pairs = values.iter().flatten().zip(far.iter().flatten());
+        changes = pairs.map(|(a, b)| (a.re - b.re).hypot(a.im - b.im)).collect();
+        // More digits than the choice of the sphere leaves are not worth the time, unless somebody asks for
+        // those of this sphere.
+        let is_worth_it = largest(&changes) <= HOPELESS || accuracy.tolerance < BY_RAYS;
+        if accuracy.tolerance < tolerance && is_worth_it {
+            tolerance = accuracy.tolerance;
+            (function, values) = wave(&sphere, tolerance)?;
         }
     }
-    // What the choice of the sphere leaves uncertain counts too.
-    let reached = values.iter().flatten().all(|v| v.modulus.error <= accuracy.tolerance);
+    if tolerance < BY_RAYS && function.transfer_error() > tolerance {
+        refine(&mut values, frequencies, &function, (&region, &sphere), tolerance)?;
+    }
+    for (value, change) in values.iter_mut().flatten().zip(&changes) {
+        value.modulus.error += change;
+    }
+    let limit = limit(&values, &changes, &function, accuracy.tolerance);
     let offset = [sphere.center.x - origin[0], sphere.center.y - origin[1]];
     let list = ConvergedList {
         values: flatten(frequencies, &values, offset),
         errors: values.iter().flatten().flat_map(|v| [v.modulus.error, 0.0]).collect(),
         rays: function.rays(),
-        converged: reached,
+        converged: limit.is_none(),
     };
-    Ok(curve(frequencies, origin, &list))
+    Ok(curve(frequencies, origin, &list, limit))
+}
+
+fn largest(errors: &[f64]) -> f64 {
+    errors.iter().copied().fold(0.0, f64::max)
+}
+
+/// The cause of errors above a tolerance, if they are.
+fn limit(
+    values: &[[TransferValue; 2]],
+    changes: &[f64],
+    function: &PupilFunction,
+    tolerance: f64,
+) -> Option<ContrastLimit> {
+    let errors: Vec<f64> = values.iter().flatten().map(|value| value.modulus.error).collect();
+    let (error, by_sphere) = (largest(&errors), largest(changes));
+    let limit = if by_sphere >= 0.5 * error {
+        ContrastLimit::Sphere(by_sphere)
+    } else if function.transfer_error() >= 0.5 * (error - by_sphere) {
+        ContrastLimit::Polynomials(function.transfer_error())
+    } else {
+        ContrastLimit::Nodes(error)
+    };
+    (error > tolerance).then_some(limit)
 }
 
 /// The tolerance below which rays replace polynomials that are not exact enough: a thousand times the
@@ -92,7 +130,7 @@ fn refine(
         if *nu != 0.0 {
             let pairs = [(t, [0.0, *nu]), (s, [*nu, 0.0])];
             for (value, frequency) in pairs {
-                let found = function.transfer_by_rays(frequency, &pupil, tolerance)?;
+                let found = function.transfer_by_rays(frequency, &pupil, tolerance);
                 *value = found.unwrap_or(*value);
             }
         }
@@ -101,8 +139,10 @@ fn refine(
     values.par_iter_mut().zip(frequencies).try_for_each(better)
 }
 
-/// The tolerance of contrast on a second sphere.
+/// The tolerance of contrast on a second sphere, and the change of contrast above which that on the first
+/// needs no better one.
 const COARSE: f64 = 1e-4;
+const HOPELESS: f64 = 1e-3;
 /// The uncertainty of paths between two spheres, in wavelengths, below which it does not matter.
 const CERTAIN: f64 = 1e-3;
 
@@ -146,8 +186,7 @@ impl PupilFunction {
             if interrupted() {
                 return Err(AnalysisError::Interrupted);
             }
-            let tangential = self.transfer([0.0, *nu], defocus, tolerance)?;
-            Ok([tangential, self.transfer([*nu, 0.0], defocus, tolerance)?])
+            Ok([[0.0, *nu], [*nu, 0.0]].map(|nu| self.transfer(nu, defocus, tolerance)))
         };
         frequencies.iter().map(at).collect()
     }

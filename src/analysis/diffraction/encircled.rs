@@ -43,27 +43,23 @@ impl PupilFunction {
     /// contrast has corners at `1 − ε`, `1 ± ε` halved and `ε` of it for a round shadow of the share ε.
     /// All circles share the frequencies, which the largest one asks for. With each share comes the error
     /// that those of the contrasts leave in it.
-    ///
-    /// # Errors
-    /// The pupil is irregular.
     pub fn round_encircled(
         &self,
         radii: &[f64],
         cutoff: f64,
         shadow: f64,
         fine: bool,
-    ) -> Result<Vec<[f64; 2]>, AnalysisError> {
+    ) -> Vec<[f64; 2]> {
         if radii.is_empty() {
-            return Ok(Vec::new());
+            return Vec::new();
         }
         let largest = radii.iter().copied().fold(0.0, f64::max);
         let contrast = |(nu, weight): (f64, f64)| {
-            let found = self.transfer([0.0, nu], 0.0, CONTRAST_TOLERANCE)?;
-            Ok((nu, [found.re, found.modulus.error].map(|value| weight * value)))
+            let found = self.transfer([0.0, nu], 0.0, CONTRAST_TOLERANCE);
+            (nu, [found.re, found.modulus.error].map(|value| weight * value))
         };
-        let contrasts: Result<Vec<(f64, [f64; 2])>, AnalysisError> =
+        let contrasts: Vec<(f64, [f64; 2])> =
             frequencies(largest, cutoff, shadow, fine).into_par_iter().map(contrast).collect();
-        let contrasts = contrasts?;
         let share = |radius: &f64| {
             let terms = contrasts.iter().map(|(nu, [value, error])| {
                 let bessel = bessel_j1(TAU * nu * radius);
@@ -72,7 +68,7 @@ impl PupilFunction {
             let sum = terms.fold([0.0; 2], |sum, term| [sum[0] + term[0], sum[1] + term[1]]);
             sum.map(|part| TAU * radius * part)
         };
-        Ok(radii.iter().map(share).collect())
+        radii.iter().map(share).collect()
     }
 }
 

@@ -1,6 +1,6 @@
 //! The closed curve around a pupil, in direction cosines.
 
-use crate::math::quadrature::{chebyshev_points, chebyshev_value};
+use crate::math::quadrature::{chebyshev_points, chebyshev_weights};
 
 /// A closed curve of smooth arcs in direction cosines, without crossings.
 #[derive(Debug, Clone)]
@@ -80,11 +80,6 @@ impl PupilCurve {
         self.segments.iter().map(|segment| segment.ends[0])
     }
 
-    /// The area inside.
-    pub(super) fn area(&self) -> f64 {
-        0.5 * self.signed_area().abs()
-    }
-
     /// Twice the area inside, positive if azimuth from +y towards +x grows along the curve.
     fn signed_area(&self) -> f64 {
         self.segments.iter().map(|Segment { ends: [a, b], .. }| a[1] * b[0] - a[0] * b[1]).sum()
@@ -102,29 +97,163 @@ impl PupilCurve {
     }
 }
 
+/// A part of a curve along which one coordinate t grows, so that the other one, v, is a function of it.
+#[derive(Debug, Clone)]
+pub(super) struct Chain {
+    cubics: Vec<Cubic>,
+    /// The largest t of each cubic.
+    ends: Vec<f64>,
+    /// The least and the largest of either coordinate, t first.
+    pub(super) range: [[f64; 2]; 2],
+}
+
+/// A cubic in both coordinates, by the powers of a parameter, and the parameters between which t grows.
+#[derive(Debug, Clone, Copy)]
+struct Cubic {
+    powers: [[f64; 4]; 2],
+    between: [f64; 2],
+    /// The values of t there.
+    ends: [f64; 2],
+}
+
+impl PupilCurve {
+    /// The parts of the curve along which the coordinate of an axis, x (0) or y (1), grows or falls.
+    pub(super) fn chains(&self, axis: usize) -> Vec<Chain> {
+        // Each cubic with the sense of t along the curve; none where t stands still.
+        let mut parts: Vec<Option<(Cubic, bool, bool)>> = Vec::new();
+        for segment in &self.segments {
+            let mut corner = segment.begins_at_corner;
+            for cubic in segment.growing(axis) {
+                let [from, to] = cubic.ends;
+                parts.push((from != to).then_some((cubic, to > from, corner)));
+                corner = false;
+            }
+        }
+        let begins = |i: usize| {
+            let before = parts[(i + parts.len() - 1) % parts.len()];
+            let (before, here) = (before.map(|p| p.1), parts[i].map(|p| (p.1, p.2)));
+            here.is_some_and(|(sense, corner)| corner || before != Some(sense))
+        };
+        let firsts: Vec<usize> = (0..parts.len()).filter(|i| begins(*i)).collect();
+        let chain = |(k, first): (usize, &usize)| {
+            let next = firsts[(k + 1) % firsts.len()];
+            let count = (next + parts.len() - first - 1) % parts.len() + 1;
+            let members = (0..count).map_while(|i| parts[(first + i) % parts.len()]);
+            let mut cubics: Vec<Cubic> = members.map(|(cubic, ..)| cubic).collect();
+            if cubics[0].ends[0] > cubics[0].ends[1] {
+                cubics.reverse();
+                cubics.iter_mut().for_each(Cubic::reverse);
+            }
+            Chain::new(cubics)
+        };
+        firsts.iter().enumerate().map(chain).collect()
+    }
+}
+
 impl Segment {
-    /// The point at a parameter from 0 to 1.
+    /// The parts of the segment along which the coordinate of an axis grows or falls.
+    fn growing(&self, axis: usize) -> Vec<Cubic> {
+        let powers = [axis, 1 - axis].map(|k| {
+            let ([a, b], [c, d]) = (self.ends.map(|p| p[k]), self.slopes.map(|p| p[k]));
+            [a, c, 3.0 * (b - a) - 2.0 * c - d, 2.0 * (a - b) + c + d]
+        });
+        let [_, b, c, d] = powers[0];
+        // The zeros of b + 2 c s + 3 d s², without cancellation.
+        let q = -(c + c.signum() * (c * c - 3.0 * b * d).max(0.0).sqrt());
+        let is_turn = c * c > 3.0 * b * d;
+        let turns = [q / (3.0 * d), b / q].into_iter().filter(|s| is_turn && *s > 0.0 && *s < 1.0);
+        let mut ends: Vec<f64> = turns.chain([0.0, 1.0]).collect();
+        ends.sort_by(f64::total_cmp);
+        let part = |pair: &[f64]| {
+            let between = [pair[0], pair[1]];
+            let cubic = Cubic { powers, between, ends: [0.0; 2] };
+            Cubic { ends: between.map(|s| cubic.at(0, s)[0]), ..cubic }
+        };
+        ends.windows(2).filter(|pair| pair[1] > pair[0]).map(part).collect()
+    }
+}
+
+/// An edge rises more steeply than this towards a square root.
+const STEEP: f64 = 1.5;
+/// The largest number of steps that find the parameter of a cubic at a value of t, and the last one: the error
+/// behind it is of the order of its square, or where the curve turns back of its size.
+const STEPS: usize = 40;
+const LAST_STEP: f64 = 1e-12;
+
+impl Cubic {
+    /// A coordinate, t (0) or v (1), and its derivative by the parameter.
     #[inline(always)]
-    pub(super) fn at(&self, t: f64) -> [f64; 2] {
-        let s = 1.0 - t;
-        let (a, b) = (s * s * (1.0 + 2.0 * t), t * t * (1.0 + 2.0 * s));
-        let (c, d) = (t * s * s, -t * t * s);
-        [0, 1].map(|k| {
-            a * self.ends[0][k]
-                + b * self.ends[1][k]
-                + c * self.slopes[0][k]
-                + d * self.slopes[1][k]
-        })
+    fn at(&self, coordinate: usize, s: f64) -> [f64; 2] {
+        let [a, b, c, d] = self.powers[coordinate];
+        [a + s * (b + s * (c + s * d)), b + s * (2.0 * c + s * 3.0 * d)]
     }
 
-    /// The segment with its points moved and then mapped by a matrix.
-    pub(super) fn mapped(&self, by: [f64; 2], matrix: [[f64; 2]; 2]) -> Self {
-        let turn = |v: [f64; 2]| matrix.map(|row| row[0] * v[0] + row[1] * v[1]);
-        Self {
-            ends: self.ends.map(|p| turn([p[0] + by[0], p[1] + by[1]])),
-            slopes: self.slopes.map(turn),
-            ..*self
+    fn reverse(&mut self) {
+        self.between.reverse();
+        self.ends.reverse();
+    }
+
+    /// The parameter at a value of t, by Newton's method between ever closer bounds.
+    fn parameter(&self, t: f64) -> f64 {
+        let [mut low, mut high] = self.between;
+        let [first, last] = self.ends;
+        let share = ((t - first) / (last - first)).clamp(0.0, 1.0);
+        let mut s = low + share * (high - low);
+        for _ in 0..STEPS {
+            let [value, slope] = self.at(0, s);
+            let off = value - t;
+            if off == 0.0 {
+                return s;
+            }
+            if off < 0.0 {
+                low = s;
+            } else {
+                high = s;
+            }
+            let next = s - off / slope;
+            // Before the bounds: rounding may put the last step beyond one of them.
+            if (next - s).abs() <= LAST_STEP {
+                return next;
+            }
+            let is_between = (next - low) * (next - high) < 0.0;
+            s = if is_between { next } else { 0.5 * (low + high) };
         }
+        s
+    }
+}
+
+impl Chain {
+    fn new(cubics: Vec<Cubic>) -> Self {
+        let (first, last) = (cubics[0], cubics[cubics.len() - 1]);
+        let values = || cubics.iter().flat_map(|c| c.between.map(|s| c.at(1, s)[0]));
+        let low = values().fold(f64::INFINITY, f64::min);
+        let high = values().fold(f64::NEG_INFINITY, f64::max);
+        let ends = cubics.iter().map(|cubic| cubic.ends[1]).collect();
+        Self { range: [[first.ends[0], last.ends[1]], [low, high]], cubics, ends }
+    }
+
+    /// The cubic at a value of t, and its parameter there.
+    fn find(&self, t: f64) -> (&Cubic, f64) {
+        let after = self.ends.partition_point(|end| *end < t);
+        let cubic = &self.cubics[after.min(self.cubics.len() - 1)];
+        (cubic, cubic.parameter(t))
+    }
+
+    /// The value of v at a value of t.
+    pub(super) fn value(&self, t: f64) -> f64 {
+        let (cubic, s) = self.find(t);
+        cubic.at(1, s)[0]
+    }
+
+    /// The distance in t, in the sense of 1 or −1, at which v has the end of a square root, as it has where the
+    /// curve turns back; `None` if v is not steep, or grows less so. The slope of `c √x` over its
+    /// curvature is `−2x`.
+    pub(super) fn root_beyond(&self, t: f64, sense: f64) -> Option<f64> {
+        let (cubic, s) = self.find(t);
+        let [[_, dt], [_, dv]] = [0, 1].map(|k| cubic.at(k, s));
+        let [ddt, ddv] = cubic.powers.map(|[_, _, c, d]| 2.0 * c + 6.0 * d * s);
+        let distance = 0.5 * sense * dv * dt * dt / (ddv * dt - dv * ddt);
+        (dv.abs() > STEEP * dt.abs() && distance >= 0.0).then_some(distance)
     }
 }
 
@@ -133,10 +262,12 @@ fn arc(nodes: &[[f64; 2]], corner: bool) -> Vec<Segment> {
     let steps = if nodes.len() == 2 { 1 } else { SEGMENTS };
     let axes = [0, 1].map(|k| nodes.iter().map(|node| node[k]).collect::<Vec<_>>());
     let slopes = axes.each_ref().map(|axis| derivative(axis));
+    let places: Vec<f64> = chebyshev_points(nodes.len()).collect();
     let at = |i: usize| {
-        let t = i as f64 / steps as f64;
-        let point = axes.each_ref().map(|axis| chebyshev_value(axis, t));
-        (point, slopes.each_ref().map(|slope| chebyshev_value(slope, t) / steps as f64))
+        let shares = chebyshev_weights(&places, i as f64 / steps as f64);
+        let value =
+            |values: &Vec<f64>| -> f64 { values.iter().zip(&shares).map(|(v, w)| v * w).sum() };
+        (axes.each_ref().map(value), slopes.each_ref().map(|slope| value(slope) / steps as f64))
     };
     let points: Vec<_> = (0..=steps).map(at).collect();
     let pairs = points.windows(2).enumerate();

@@ -1,6 +1,6 @@
 //! Least-squares polynomials in the two direction cosines of a pupil.
 
-use nalgebra::{DMatrix, DVector};
+use crate::math::{SimdWidth, dot, run_vectorized};
 
 /// The largest total degree.
 pub(super) const LARGEST_DEGREE: usize = 36;
@@ -15,11 +15,12 @@ pub(super) struct PolynomialBasis {
     even: bool,
 }
 
-/// Two polynomials of the same terms: the path difference in waves and the amplitude.
+/// Two polynomials: the path difference in waves and the amplitude.
 #[derive(Debug, Clone)]
 pub(super) struct WavePolynomial {
     basis: PolynomialBasis,
-    coefficients: Vec<[f64; 2]>,
+    /// The terms of each, by rising total degree: the degrees in both cosines and the coefficient.
+    terms: [Vec<([usize; 2], f64)>; 2],
 }
 
 /// A sample of a pupil: its cosines, the two values there, and its weight.
@@ -28,6 +29,24 @@ pub(super) struct FitSample {
     pub(super) values: [f64; 2],
     pub(super) weight: f64,
 }
+
+/// A polynomial along columns, along each of which one coordinate is constant: a Chebyshev sum in the other
+/// one.
+#[derive(Debug)]
+pub(super) struct ColumnPolynomials {
+    /// The number of columns.
+    columns: usize,
+    /// The coefficients of one degree after the other, each for all columns.
+    coefficients: Vec<f64>,
+    /// The middle and half of the side of the box along the columns.
+    side: [f64; 2],
+    /// True if only even degrees are there.
+    even: bool,
+}
+
+/// The largest number of columns that are computed together, and a number of each.
+pub(super) const WIDTH: usize = 64;
+pub(super) type Row = [f64; WIDTH];
 
 impl PolynomialBasis {
     /// The basis of the largest degree with at most `terms` terms over the box of some points.
@@ -53,12 +72,15 @@ impl PolynomialBasis {
         [0, 1].map(|k| self.center[k] + self.half[k] * (2.0 * cell[k] - 1.0))
     }
 
-    fn step(&self) -> usize {
-        if self.even { 2 } else { 1 }
+    /// The degrees in both cosines of every term, by rising total degree.
+    fn degrees(&self) -> impl Iterator<Item = [usize; 2]> + use<> {
+        let step = if self.even { 2 } else { 1 };
+        (0..=self.degree).flat_map(move |n| (0..=n).step_by(step).map(move |i| [i, n - i]))
     }
 
+    /// The number of terms up to the largest degree.
     fn terms(&self) -> usize {
-        (0..=self.degree).map(|j| (self.degree - j) / self.step() + 1).sum()
+        self.degrees().count()
     }
 
     /// The Chebyshev polynomials of both coordinates at a point.
@@ -75,44 +97,86 @@ impl PolynomialBasis {
         })
     }
 
-    /// All terms at a point.
-    fn row(&self, p: [f64; 2]) -> Vec<f64> {
-        let [u, v] = self.factors(p);
-        let line = |j: usize| (0..=self.degree - j).step_by(self.step()).map(move |i| (i, j));
-        (0..=self.degree).flat_map(line).map(|(i, j)| u[i] * v[j]).collect()
-    }
-
-    /// The polynomials nearest to some samples, and the RMS of what each leaves.
-    pub(super) fn fit(self, samples: &[FitSample]) -> Option<(WavePolynomial, [f64; 2])> {
-        let (rows, columns) = (samples.len(), self.terms());
-        if rows < columns {
+    /// The polynomials nearest to some samples, each of the lowest degree that leaves an RMS below the
+    /// one allowed, or else of the largest, with the RMS of what each leaves.
+    pub(super) fn fit(
+        self,
+        samples: &[FitSample],
+        allowed: [f64; 2],
+    ) -> Option<(WavePolynomial, [f64; 2])> {
+        let count = self.terms();
+        if samples.len() < count {
             return None;
         }
         let roots: Vec<f64> = samples.iter().map(|sample| sample.weight.sqrt()).collect();
-        let mut matrix = DMatrix::zeros(rows, columns);
-        for (i, (sample, root)) in samples.iter().zip(&roots).enumerate() {
-            for (j, term) in self.row(sample.cosines).into_iter().enumerate() {
-                matrix[(i, j)] = root * term;
-            }
+        let mut columns = vec![Vec::with_capacity(samples.len()); count + 2];
+        let degrees: Vec<[usize; 2]> = self.degrees().collect();
+        for (sample, root) in samples.iter().zip(&roots) {
+            let [u, v] = self.factors(sample.cosines);
+            let terms = degrees.iter().map(|[i, j]| u[*i] * v[*j]).chain(sample.values);
+            columns.iter_mut().zip(terms).for_each(|(column, term)| column.push(root * term));
         }
-        let right = |k: usize| {
-            let scaled = samples.iter().zip(&roots).map(|(sample, root)| root * sample.values[k]);
-            DVector::from_iterator(rows, scaled)
-        };
-        let weight: f64 = samples.iter().map(|sample| sample.weight).sum();
-        let qr = matrix.qr();
-        let r = qr.r();
-        let solve = |k: usize| {
-            let mut projected = right(k);
-            qr.q_tr_mul(&mut projected);
-            let rest = projected.rows(columns, rows - columns).norm_squared();
-            let solution = r.solve_upper_triangular(&projected.rows(0, columns))?;
-            Some((solution, (rest / weight).sqrt()))
-        };
-        let ((waves, first), (amplitude, second)) = (solve(0)?, solve(1)?);
-        let coefficients = (0..columns).map(|i| [waves[i], amplitude[i]]).collect();
-        Some((WavePolynomial { basis: self, coefficients }, [first, second]))
+        let triangle = orthogonalize(&mut columns);
+        let total = samples.iter().map(|sample| sample.weight).sum::<f64>().sqrt();
+        let solve = |k: usize| self.solve(&triangle, count + k, allowed[k] * total);
+        let ((waves, left), (amplitude, rest)) = (solve(0)?, solve(1)?);
+        let terms = [waves, amplitude].map(|list| degrees.iter().copied().zip(list).collect());
+        Some((WavePolynomial { basis: self, terms }, [left / total, rest / total]))
     }
+
+    /// The coefficients of a right-hand side, up to the lowest degree that leaves no more than allowed,
+    /// and what they leave.
+    fn solve(&self, triangle: &[Vec<f64>], right: usize, allowed: f64) -> Option<(Vec<f64>, f64)> {
+        let parts = &triangle[right];
+        let count = self.terms();
+        let mut square =
+            parts[parts.len() - 1].powi(2) + parts[count..right].iter().map(|v| v * v).sum::<f64>();
+        let (mut used, mut left) = (count, square.sqrt());
+        for degree in (0..self.degree).rev() {
+            let fewer = Self { degree, ..self.clone() }.terms();
+            square += parts[fewer..used].iter().map(|v| v * v).sum::<f64>();
+            if square.sqrt() > allowed {
+                break;
+            }
+            (used, left) = (fewer, square.sqrt());
+        }
+        let mut solution = parts[..used].to_vec();
+        for k in (0..used).rev() {
+            solution[k] /= triangle[k][k];
+            let (known, value) = (&triangle[k], solution[k]);
+            solution[..k].iter_mut().zip(known).for_each(|(part, r)| *part -= r * value);
+        }
+        solution.iter().all(|v| v.is_finite()).then_some((solution, left))
+    }
+}
+
+/// Makes columns orthogonal to those before and of length 1; the columns of the triangular matrix that
+/// they are products with. Right-hand sides among the last ones make it as accurate as Householder's
+/// method (Björck, *Numerical Methods for Least Squares Problems*, 1996, section 2.4).
+fn orthogonalize(columns: &mut [Vec<f64>]) -> Vec<Vec<f64>> {
+    let mut triangle = Vec::with_capacity(columns.len());
+    for k in 0..columns.len() {
+        let (before, rest) = columns.split_at_mut(k);
+        let column = &mut rest[0];
+        let parts = run_vectorized(
+            SimdWidth::detect(),
+            #[inline(always)]
+            || {
+                let mut parts = Vec::with_capacity(k + 1);
+                for other in before.iter() {
+                    let part = dot(other, column);
+                    column.iter_mut().zip(other).for_each(|(value, unit)| *value -= part * unit);
+                    parts.push(part);
+                }
+                let length = dot(column, column).sqrt();
+                column.iter_mut().for_each(|value| *value /= length);
+                parts.push(length);
+                parts
+            },
+        );
+        triangle.push(parts);
+    }
+    triangle
 }
 
 impl WavePolynomial {
@@ -120,18 +184,99 @@ impl WavePolynomial {
     #[inline(always)]
     pub(super) fn at(&self, p: [f64; 2]) -> [f64; 2] {
         let [u, v] = self.basis.factors(p);
-        let (degree, step) = (self.basis.degree, self.basis.step());
-        let (mut sum, mut next) = ([0.0; 2], 0);
-        for (j, v) in v.iter().enumerate().take(degree + 1) {
-            let mut line = [0.0; 2];
-            for u in u[..=degree - j].iter().step_by(step) {
-                let c = self.coefficients[next];
-                line = [line[0] + c[0] * u, line[1] + c[1] * u];
-                next += 1;
+        self.terms.each_ref().map(|terms| terms.iter().map(|([i, j], c)| c * u[*i] * v[*j]).sum())
+    }
+
+    /// The weighted RMS of what the polynomials leave of some samples.
+    pub(super) fn rest(&self, samples: &[FitSample]) -> [f64; 2] {
+        let (mut squares, mut weight) = ([0.0; 2], 0.0);
+        for sample in samples {
+            let found = self.at(sample.cosines);
+            for k in [0, 1] {
+                squares[k] += sample.weight * (found[k] - sample.values[k]).powi(2);
             }
-            sum = [sum[0] + line[0] * v, sum[1] + line[1] * v];
+            weight += sample.weight;
         }
-        sum
+        squares.map(|square| if weight > 0.0 { (square / weight).sqrt() } else { 0.0 })
+    }
+
+    /// True if the polynomials are even in the first cosine.
+    pub(super) fn is_even(&self) -> bool {
+        self.basis.even
+    }
+
+    /// The path difference (0) or the amplitude (1) along columns at values `t` of the coordinate of an
+    /// axis, x (0) or y (1).
+    pub(super) fn columns(&self, part: usize, axis: usize, t: &[f64]) -> ColumnPolynomials {
+        let (basis, along, count) = (&self.basis, 1 - axis, t.len());
+        let even = basis.even && along == 0;
+        let step = if even { 2 } else { 1 };
+        let terms = &self.terms[part];
+        let highest = |axis: usize| terms.iter().map(|(term, _)| term[axis]).max().unwrap_or(0);
+        let mut factors = vec![1.0; count * (highest(axis) + 1).max(2)];
+        let mut coefficients = vec![0.0; count * (highest(along) / step + 1)];
+        let x = |t: f64| (t - basis.center[axis]) / basis.half[axis];
+        factors[count..2 * count].iter_mut().zip(t).for_each(|(factor, t)| *factor = x(*t));
+        run_vectorized(
+            SimdWidth::detect(),
+            #[inline(always)]
+            || {
+                for from in (2 * count..factors.len()).step_by(count) {
+                    let (known, next) = factors.split_at_mut(from);
+                    for k in 0..count {
+                        next[k] = 2.0 * known[count + k] * known[from - count + k]
+                            - known[from - 2 * count + k];
+                    }
+                }
+                for (term, c) in terms {
+                    let from = count * (term[along] / step);
+                    let sums = &mut coefficients[from..from + count];
+                    let factors = &factors[count * term[axis]..][..count];
+                    sums.iter_mut().zip(factors).for_each(|(sum, factor)| *sum += c * factor);
+                }
+            },
+        );
+        ColumnPolynomials {
+            columns: count,
+            coefficients,
+            side: [basis.center[along], basis.half[along]],
+            even,
+        }
+    }
+}
+
+impl ColumnPolynomials {
+    /// The difference from other polynomials of the same terms.
+    pub(super) fn minus(mut self, other: &Self) -> Self {
+        let pairs = self.coefficients.iter_mut().zip(&other.coefficients);
+        pairs.for_each(|(value, other)| *value -= other);
+        self
+    }
+
+    /// The values at one place of each of `count` columns from one on, by Clenshaw's recurrence; meant for
+    /// [`run_vectorized`].
+    #[inline(always)]
+    pub(super) fn values(&self, from: usize, count: usize, places: &Row) -> Row {
+        let count = count.min(WIDTH);
+        let [middle, half] = self.side;
+        let (mut twice, mut last, mut sums) = ([0.0; WIDTH], [0.0; WIDTH], [0.0; WIDTH]);
+        for k in 0..count {
+            let at = (places[k] - middle) / half;
+            twice[k] = 2.0 * if self.even { 2.0 * at * at - 1.0 } else { at };
+        }
+        for row in self.coefficients[self.columns..].chunks_exact(self.columns).rev() {
+            let row = &row[from..from + count];
+            for k in 0..count {
+                let next = row[k] - last[k] + twice[k] * sums[k];
+                last[k] = sums[k];
+                sums[k] = next;
+            }
+        }
+        let row = &self.coefficients[from..from + count];
+        for k in 0..count {
+            sums[k] = row[k] - last[k] + 0.5 * twice[k] * sums[k];
+        }
+        sums
     }
 }
 
@@ -150,7 +295,7 @@ mod tests {
         for scale in [1.0, 1e-3, 250.0] {
             let samples: Vec<FitSample> = (0..120).map(|i| sample(i, scale)).collect();
             let basis = PolynomialBasis::new((0..120).map(at), 15, false);
-            let (found, left) = basis.fit(&samples).unwrap();
+            let (found, left) = basis.fit(&samples, [0.0; 2]).unwrap();
             let total: f64 = samples.iter().map(|sample| sample.weight).sum();
             for k in [0, 1] {
                 let square =
@@ -158,6 +303,34 @@ mod tests {
                 let exact = (samples.iter().map(square).sum::<f64>() / total).sqrt();
                 assert!((left[k] - exact).abs() < 1e-9, "{scale}: {left:?} {exact}");
                 assert!(k == 1 || exact > 1e-4, "nothing is left: {exact}");
+            }
+        }
+    }
+
+    #[test]
+    fn columns_have_the_values_of_the_polynomials() {
+        let at = |i: usize| [0.1 * (0.37 * i as f64).sin(), 0.02 + 0.1 * (0.61 * i as f64).cos()];
+        for even in [false, true] {
+            let sample = |i: usize| {
+                let [a, b] = at(i);
+                let odd = if even { 0.0 } else { a.powi(3) };
+                let values = [(30.0 * a).cos() * (20.0 * b).sin() + odd, 1.0 + b - a * a];
+                FitSample { cosines: [a, b], values, weight: 1.0 }
+            };
+            let samples: Vec<FitSample> = (0..900).map(sample).collect();
+            let basis = PolynomialBasis::new((0..900).map(at), 100, even);
+            let (found, left) = basis.fit(&samples, [1e-4, 1e-12]).unwrap();
+            assert!(left[0] < 1e-4 && left[1] < 1e-12, "{left:?}");
+            assert!(found.terms[1].len() <= 6, "a polynomial of degree 2");
+            let t = [-0.05, 0.0, 0.01, 0.07];
+            let v = [0.01, -0.03, 0.06, 0.02];
+            for (axis, part) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
+                let mut places = [0.0; WIDTH];
+                places[..3].copy_from_slice(&v[1..]);
+                let values = found.columns(part, axis, &t).values(1, 3, &places);
+                let at = |k: usize| if axis == 0 { [t[k], v[k]] } else { [v[k], t[k]] };
+                let is_exact = |k: usize| (values[k - 1] - found.at(at(k))[part]).abs() < 1e-13;
+                assert!((1..4).all(is_exact), "{axis} {part}: {values:?}");
             }
         }
     }

@@ -1,13 +1,15 @@
 //! The complex amplitude over a pupil as polynomials between its edges, and its transfer function.
 
-use super::outline::PupilCurve;
-use super::overlap::{OVERLAP_ORDERS, Overlap};
+use super::column_sum::ColumnPair;
+use super::outline::{Chain, PupilCurve};
+use super::overlap::{OverlapHalf, Strip};
 use super::polynomial::{FitSample, PolynomialBasis, WavePolynomial};
 use super::pupil_samples::PupilSamples;
 use super::ray_pupil::RayPupil;
 use crate::analysis::reference_sphere::ReferenceSphere;
 use crate::analysis::{AnalysisError, TransferValue};
-use crate::pupil::{EdgeArc, Nodes, Region};
+use crate::pupil::{Dual2, EdgeArc, Nodes, Region};
+use crate::trace::Ray;
 use std::cell::Cell;
 use std::f64::consts::TAU;
 
@@ -15,8 +17,7 @@ use std::f64::consts::TAU;
 /// between the curves around its pieces.
 #[derive(Debug, Clone)]
 pub struct PupilFunction {
-    /// The curves around the pieces, with 1 for light inside and −1 for a shadow.
-    pieces: Vec<(PupilCurve, f64)>,
+    pieces: Vec<PupilPiece>,
     polynomial: WavePolynomial,
     /// The wavelength in the image space, in mm.
     wavelength: f64,
@@ -28,19 +29,75 @@ pub struct PupilFunction {
     rays: usize,
 }
 
-/// Half of the shift of a pupil against itself in cosines, and that of the image plane in mm.
-#[derive(Debug, Clone, Copy)]
-struct TransferShift {
-    cosines: [f64; 2],
-    defocus: f64,
+/// A piece of a pupil.
+#[derive(Debug, Clone)]
+struct PupilPiece {
+    curve: PupilCurve,
+    /// The parts of the curve along which x (0) or y (1) grows or falls.
+    chains: [Vec<Chain>; 2],
+    /// 1 for light inside the curve, −1 for a shadow.
+    sign: f64,
 }
 
+/// Half of the shift of a pupil against itself in cosines, and that of the image plane in wavelengths.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct TransferShift {
+    pub(super) cosines: [f64; 2],
+    pub(super) defocus: f64,
+}
+
+/// A strip of the common part of two shifted pieces.
+struct OverlapPart<'a> {
+    strip: Strip<'a>,
+    /// The product of the signs, twice that if the strip stands for its mirror image.
+    factor: f64,
+    /// The nodes that resolve the phase across the strip and along its columns.
+    resolved: [f64; 2],
+}
+
+/// The columns of each order and the nodes of a column beyond those that resolve the phase, which grow by a part
+/// as well. Columns come in multiples of eight, which fill vector instructions, and more of them each time, so
+/// that a change of the order tells both errors.
+const ORDERS: [[f64; 2]; 10] = [
+    [6.0, 6.0],
+    [14.0, 10.0],
+    [22.0, 15.0],
+    [30.0, 21.0],
+    [40.0, 29.0],
+    [52.0, 40.0],
+    [68.0, 56.0],
+    [92.0, 80.0],
+    [124.0, 112.0],
+    [172.0, 160.0],
+];
+const GROWTH: f64 = 0.12;
+/// The error of a sum in changes by the last raising of the order: two orders may agree by chance.
+const CHANGES: f64 = 2.0;
+const TOGETHER: usize = 8;
+/// The largest number of nodes of a strip.
+const MOST_NODES: usize = 1 << 22;
+
+/// The columns of a strip and the nodes of each, of samples.
+const SAMPLE_ORDERS: [[usize; 2]; 10] = [
+    [8, 10],
+    [10, 14],
+    [14, 20],
+    [20, 28],
+    [28, 40],
+    [40, 56],
+    [56, 80],
+    [80, 112],
+    [112, 160],
+    [160, 224],
+];
 /// The points of an arc of the edge.
 const EDGE_POINTS: usize = 40;
 /// The degree of the polynomials of a pupil that is given by a formula, and the samples that they are
 /// fitted to along a side of its box.
 const FORMULA_TERMS: usize = 100;
 const FORMULA_SAMPLES: usize = 30;
+/// The RMS that polynomials of lower degree may leave of it.
+const FORMULA_LEFT: f64 = 1e-15;
 /// The share of the tolerance that the polynomials may take.
 const FIT_SHARE: f64 = 0.1;
 
@@ -55,7 +112,8 @@ impl PupilFunction {
         wavelength_um: f64,
         waves: impl Fn([f64; 2]) -> f64,
     ) -> Result<Self, AnalysisError> {
-        Self::formula(pieces.into_iter().map(|p| (p, 1.0)).collect(), wavelength_um, waves)
+        let light = |curve| PupilPiece::new(curve, 1.0);
+        Self::formula(pieces.into_iter().map(light).collect(), wavelength_um, waves)
     }
 
     /// The same for a pupil with a shadow inside: the curves around the light and around the shadow.
@@ -67,15 +125,17 @@ impl PupilFunction {
         wavelength_um: f64,
         waves: impl Fn([f64; 2]) -> f64,
     ) -> Result<Self, AnalysisError> {
-        Self::formula(vec![(outer.clone(), 1.0), (inner.clone(), -1.0)], wavelength_um, waves)
+        let pieces = [(outer, 1.0), (inner, -1.0)];
+        let piece = |(curve, sign): (&PupilCurve, f64)| PupilPiece::new(curve.clone(), sign);
+        Self::formula(pieces.map(piece).to_vec(), wavelength_um, waves)
     }
 
     fn formula(
-        pieces: Vec<(PupilCurve, f64)>,
+        pieces: Vec<PupilPiece>,
         wavelength_um: f64,
         waves: impl Fn([f64; 2]) -> f64,
     ) -> Result<Self, AnalysisError> {
-        let points = || pieces.iter().flat_map(|(piece, _)| piece.points());
+        let points = || pieces.iter().flat_map(|piece| piece.curve.points());
         let basis = PolynomialBasis::new(points(), FORMULA_TERMS, false);
         let side: Vec<f64> = crate::math::quadrature::chebyshev_points(FORMULA_SAMPLES).collect();
         let cells = side.iter().flat_map(|u| side.iter().map(move |v| [*u, *v]));
@@ -84,7 +144,8 @@ impl PupilFunction {
             FitSample { cosines, values: [waves(cosines), 1.0], weight: 1.0 }
         };
         let samples: Vec<_> = cells.map(sample).collect();
-        let (polynomial, fit_error) = basis.fit(&samples).ok_or(AnalysisError::NoLight)?;
+        let (polynomial, fit_error) =
+            basis.fit(&samples, [FORMULA_LEFT; 2]).ok_or(AnalysisError::NoLight)?;
         let mut function = Self {
             pieces,
             polynomial,
@@ -93,7 +154,7 @@ impl PupilFunction {
             fit_error,
             rays: 0,
         };
-        function.energy = function.overlap_energy()?;
+        function.energy = function.overlap_energy();
         Ok(function)
     }
 
@@ -109,33 +170,46 @@ impl PupilFunction {
     ) -> Result<Self, AnalysisError> {
         let curves = region.edge_curves(EDGE_POINTS).ok_or(AnalysisError::IrregularPupil)?;
         let curve = |arcs: &[EdgeArc]| project_curve(region, sphere, arcs);
-        let mut pieces = vec![(curve(&curves.outer)?, 1.0)];
+        let mut pieces = vec![PupilPiece::new(curve(&curves.outer)?, 1.0)];
         if !curves.inner.is_empty() {
-            pieces.push((curve(&curves.inner)?, -1.0));
+            pieces.push(PupilPiece::new(curve(&curves.inner)?, -1.0));
         }
         let mut rays = region.rays + 2 * curves.rays;
-        let mut best: Option<(WavePolynomial, [f64; 2])> = None;
+        // What a fit leaves over what is allowed.
+        let mut best: Option<(WavePolynomial, [f64; 2], f64)> = None;
         let mut energy = 0.0;
-        let allowed = (FIT_SHARE * tolerance / TAU).max(0.1 * sphere.rounding());
-        for order in 2..region.orders() {
+        let allowed = [
+            (FIT_SHARE * tolerance / TAU).max(0.1 * sphere.rounding()),
+            FIT_SHARE * tolerance.max(1e-14),
+        ];
+        let mut order = FIRST_FIT;
+        // The rays of the order before tell what a fit leaves between its own.
+        let before = region.nodes(FIRST_FIT - 1);
+        rays += before.rays + 2 * before.points.len();
+        let mut others = FitLight::new(region, sphere, &before)?;
+        while order < region.orders() {
             let nodes = region.nodes(order);
             rays += nodes.rays + 2 * nodes.points.len();
             if nodes.points.len() > MOST_SAMPLES {
                 break;
             }
-            let (fit, light) = fit_nodes(region, sphere, &nodes)?;
-            energy = light;
+            let light = FitLight::new(region, sphere, &nodes)?;
+            energy = light.energy;
+            let fit = light.fit(&others, allowed);
+            others = light;
+            order += 1;
             let Some(fit) = fit else { continue };
-            let better = best.as_ref().is_none_or(|(_, [last, _])| fit.1[0] < *last);
-            let done = fit.1[0] < allowed && fit.1[1] < FIT_SHARE * tolerance.max(1e-14);
-            if better {
-                best = Some(fit);
+            let excess = (fit.1[0] / allowed[0]).max(fit.1[1] / allowed[1]);
+            // The next order would not do.
+            order += usize::from(excess > FAR && best.is_some());
+            if best.as_ref().is_none_or(|(_, _, least)| excess < *least) {
+                best = Some((fit.0, fit.1, excess));
             }
-            if done {
+            if excess < 1.0 {
                 break;
             }
         }
-        let (polynomial, fit_error) = best.ok_or(AnalysisError::IrregularPupil)?;
+        let (polynomial, fit_error, _) = best.ok_or(AnalysisError::IrregularPupil)?;
         Ok(Self {
             pieces,
             polynomial,
@@ -147,25 +221,18 @@ impl PupilFunction {
     }
 
     /// The integral of the squared amplitude between the curves.
-    fn overlap_energy(&self) -> Result<f64, AnalysisError> {
+    fn overlap_energy(&self) -> f64 {
         let shift = TransferShift { cosines: [0.0; 2], defocus: 0.0 };
-        let light = |cosines: [f64; 2]| self.polynomial.at(cosines);
-        let found = self.converge(shift, 1e-13, 1.0, &light)?;
-        Ok(found.0[0])
+        self.converge(shift, 1e-13, 1.0, &|part, counts| self.column_sum(part, shift, counts)).0[0]
     }
 
-    /// The light at the nodes of a quadrature between the curves, of an order counted from 0.
-    ///
-    /// # Errors
-    /// A curve is not star-shaped.
-    pub fn samples(&self, order: usize) -> Result<PupilSamples, AnalysisError> {
+    /// The light at the nodes of a quadrature between the curves, of an order from 0 to 9.
+    pub fn samples(&self, order: usize) -> PupilSamples {
         let mut samples = PupilSamples { wavelength: self.wavelength, ..PupilSamples::default() };
-        for (piece, sign) in &self.pieces {
-            let common = Overlap::new([piece, piece], [0.0; 2]);
-            let Some(common) = common.map_err(|_error| AnalysisError::IrregularPupil)? else {
-                continue;
-            };
-            for node in common.nodes(order.min(OVERLAP_ORDERS - 1)) {
+        let order = order.min(SAMPLE_ORDERS.len() - 1);
+        for PupilPiece { chains, sign, .. } in &self.pieces {
+            let strips = Strip::of_overlap(0, [&chains[0]; 2], [0.0; 2], OverlapHalf::None);
+            for node in strips.iter().flat_map(|strip| strip.nodes(SAMPLE_ORDERS[order])) {
                 let [waves, amplitude] = self.polynomial.at(node.at);
                 samples.cosines.push(node.at);
                 samples.waves.push(waves);
@@ -173,52 +240,47 @@ impl PupilFunction {
                 samples.energies.push(sign * node.weight * amplitude * amplitude);
             }
         }
-        Ok(samples)
+        samples
     }
 
     /// The optical transfer function at a spatial frequency, x and y in cycles/mm, to an
     /// absolute tolerance, with its origin at the centre of the reference sphere. The image plane may
     /// be moved by `defocus` mm along the light.
-    ///
-    /// # Errors
-    /// The common part of the shifted pupils cannot be integrated over.
-    pub fn transfer(
-        &self,
-        frequency: [f64; 2],
-        defocus: f64,
-        tolerance: f64,
-    ) -> Result<TransferValue, AnalysisError> {
+    pub fn transfer(&self, frequency: [f64; 2], defocus: f64, tolerance: f64) -> TransferValue {
         if frequency == [0.0; 2] {
-            return Ok(TransferValue::new(1.0, 0.0, 0.0, self.rays));
+            return TransferValue::new(1.0, 0.0, 0.0, self.rays);
         }
         let shift = self.shift(frequency, defocus);
-        let light = |cosines: [f64; 2]| self.polynomial.at(cosines);
-        let ([re, im], change) = self.converge(shift, tolerance, self.energy, &light)?;
-        Ok(TransferValue::new(re, im, change + self.transfer_error(), self.rays))
+        let sum = |part: &OverlapPart<'_>, counts| self.column_sum(part, shift, counts);
+        let left = self.transfer_error();
+        // The sum takes what the polynomials leave of the tolerance, or of half of it.
+        let tolerance = (tolerance - left).max(0.5 * tolerance);
+        let ([re, im], change) = self.converge(shift, tolerance, self.energy, &sum);
+        TransferValue::new(re, im, change + left, self.rays)
     }
 
     fn shift(&self, frequency: [f64; 2], defocus: f64) -> TransferShift {
-        TransferShift { cosines: frequency.map(|nu| 0.5 * self.wavelength * nu), defocus }
+        let cosines = frequency.map(|nu| 0.5 * self.wavelength * nu);
+        TransferShift { cosines, defocus: defocus / self.wavelength }
     }
 
-    /// The error of contrast by what the polynomials leave of the two phases and amplitudes.
+    /// The error of contrast by what the polynomials leave of the phases and amplitudes: at most their RMS for
+    /// each of the two pupils (Cauchy and Schwarz), which often have the same sign.
     pub(super) fn transfer_error(&self) -> f64 {
         let [waves, amplitude] = self.fit_error;
-        2f64.sqrt() * (TAU * waves + amplitude)
+        2.0 * (TAU * waves + amplitude)
     }
 
     /// [`PupilFunction::transfer`] by a ray for each node in place of the polynomials; `None` if some node
     /// has no ray.
-    ///
-    /// # Errors
-    /// The common part of the shifted pupils cannot be integrated over.
     pub(super) fn transfer_by_rays(
         &self,
         frequency: [f64; 2],
         pupil: &RayPupil<'_>,
         tolerance: f64,
-    ) -> Result<Option<TransferValue>, AnalysisError> {
+    ) -> Option<TransferValue> {
         let (traced, lost) = (Cell::new(0), Cell::new(false));
+        let shift = self.shift(frequency, 0.0);
         let light = |cosines: [f64; 2]| {
             traced.set(traced.get() + 1);
             pupil.light(cosines).unwrap_or_else(|| {
@@ -226,75 +288,94 @@ impl PupilFunction {
                 [0.0; 2]
             })
         };
-        let shift = self.shift(frequency, 0.0);
-        let ([re, im], change) = self.converge(shift, tolerance, self.energy, &light)?;
+        let sum = |part: &OverlapPart<'_>, counts: [usize; 2]| {
+            let nodes = part.strip.nodes(counts).into_iter();
+            nodes.fold([0.0; 2], |[re, im], node| {
+                let [p, m] = [1.0, -1.0]
+                    .map(|sign| light([0, 1].map(|k| node.at[k] + sign * shift.cosines[k])));
+                let (sin, cos) = (TAU * (p[0] - m[0])).sin_cos();
+                let amplitude = node.weight * p[1] * m[1];
+                [re + amplitude * cos, im - amplitude * sin]
+            })
+        };
+        let ([re, im], change) = self.converge(shift, tolerance, self.energy, &sum);
         let rays = self.rays + traced.get();
-        Ok((!lost.get()).then(|| TransferValue::new(re, im, change, rays)))
+        (!lost.get()).then(|| TransferValue::new(re, im, change, rays))
     }
 
-    /// The sum over the pieces of the overlap integrals divided by an energy, and its last change.
+    /// The strips of the common parts of all pairs of pieces.
+    fn parts(&self, shift: TransferShift) -> Vec<OverlapPart<'_>> {
+        // Along columns across the shift both polynomials have the same argument.
+        let [x, y] = shift.cosines;
+        let axis = usize::from(x.abs() <= y.abs());
+        let half = match (self.polynomial.is_even(), x == 0.0, y == 0.0) {
+            (true, true, _) => OverlapHalf::Along,
+            (true, _, true) => OverlapHalf::Across,
+            _ => OverlapHalf::None,
+        };
+        let copies = if half == OverlapHalf::None { 1.0 } else { 2.0 };
+        let mut parts = Vec::new();
+        for first in &self.pieces {
+            for second in &self.pieces {
+                // The point plus the shift lies in the first, the point minus it in the second.
+                let chains = [&first.chains[axis][..], &second.chains[axis]];
+                let back = shift.cosines.map(|v| -v);
+                let factor = copies * first.sign * second.sign;
+                for strip in Strip::of_overlap(axis, chains, back, half) {
+                    let resolved = ColumnPair::resolving_nodes(&self.polynomial, &strip, shift);
+                    parts.push(OverlapPart { strip, factor, resolved });
+                }
+            }
+        }
+        parts
+    }
+
+    /// The sum over the strips of overlap integrals divided by an energy, and its last change. A sum with too
+    /// few nodes for its phase is none, and its error is that of any contrast.
     fn converge(
         &self,
         shift: TransferShift,
         tolerance: f64,
         energy: f64,
-        light: &impl Fn([f64; 2]) -> [f64; 2],
-    ) -> Result<([f64; 2], f64), AnalysisError> {
-        let mut overlaps = Vec::new();
-        for (first, sign) in &self.pieces {
-            for (second, other) in &self.pieces {
-                // The point plus the shift lies in the first, the point minus it in the second.
-                let back = shift.cosines.map(|v| -v);
-                let common = Overlap::new([first, second], back);
-                if let Some(common) = common.map_err(|_error| AnalysisError::IrregularPupil)? {
-                    overlaps.push((common, sign * other));
-                }
+        sum: &impl Fn(&OverlapPart<'_>, [usize; 2]) -> [f64; 2],
+    ) -> ([f64; 2], f64) {
+        let parts = self.parts(shift);
+        // The mirror image cancels the sine if the shift is across the line of symmetry.
+        let sine = if self.polynomial.is_even() && shift.cosines[1] == 0.0 { 0.0 } else { 1.0 };
+        let (mut last, mut change) = ([0.0; 2], 1.0);
+        if parts.is_empty() {
+            return (last, 0.0);
+        }
+        for order in 0..ORDERS.len() {
+            let nodes = |part: &OverlapPart<'_>| part.counts(order).iter().product::<usize>();
+            if parts.iter().any(|part| nodes(part) > MOST_NODES) {
+                break;
             }
-        }
-        let (mut last, mut change) = ([0.0; 2], f64::INFINITY);
-        if overlaps.is_empty() {
-            return Ok((last, 0.0));
-        }
-        for order in 0..OVERLAP_ORDERS {
-            let parts = overlaps.iter().map(|(common, sign)| {
-                let [re, im] = self.integrate(common, shift, order, light);
-                [sign * re / energy, sign * im / energy]
-            });
-            let now = parts.fold([0.0; 2], |sum, part| [sum[0] + part[0], sum[1] + part[1]]);
+            let mut now = [0.0; 2];
+            for part in &parts {
+                let [re, im] = sum(part, part.counts(order));
+                now[0] += part.factor * re / energy;
+                now[1] += sine * part.factor * im / energy;
+            }
             if order > 0 {
-                change = (now[0] - last[0]).hypot(now[1] - last[1]);
+                change = CHANGES * (now[0] - last[0]).hypot(now[1] - last[1]);
             }
             last = now;
-            if change <= tolerance {
+            if change <= tolerance && order > 0 {
                 break;
             }
         }
-        Ok((last, change))
+        (last, change)
     }
 
-    /// The integral over the common part of two pieces.
-    fn integrate(
+    /// The overlap integral of the polynomials over a strip.
+    fn column_sum(
         &self,
-        common: &Overlap,
-        TransferShift { cosines: shift, defocus }: TransferShift,
-        order: usize,
-        light: &impl Fn([f64; 2]) -> [f64; 2],
+        part: &OverlapPart<'_>,
+        shift: TransferShift,
+        counts: [usize; 2],
     ) -> [f64; 2] {
-        let turns = defocus / self.wavelength;
-        let mut sum = [0.0; 2];
-        for node in common.nodes(order) {
-            let plus = [node.at[0] + shift[0], node.at[1] + shift[1]];
-            let minus = [node.at[0] - shift[0], node.at[1] - shift[1]];
-            let (p, m) = (light(plus), light(minus));
-            let mut waves = p[0] - m[0];
-            if defocus != 0.0 {
-                waves -= turns * (third_cosine(plus) - third_cosine(minus));
-            }
-            let (sin, cos) = (TAU * waves).sin_cos();
-            let amplitude = node.weight * p[1] * m[1];
-            sum = [sum[0] + amplitude * cos, sum[1] - amplitude * sin];
-        }
-        sum
+        ColumnPair::new(&self.polynomial, &part.strip, shift, counts[0]).sum(counts[1])
     }
 
     /// The number of rays traced.
@@ -305,48 +386,78 @@ impl PupilFunction {
     /// The f-number that a spatial frequency along an axis, x (0) or y (1), sees: the reciprocal of
     /// the width of the pupil in cosines, which is that of the cutoff times the wavelength.
     pub fn f_number(&self, axis: usize) -> f64 {
-        let points = || self.pieces.iter().flat_map(|(piece, _)| piece.points());
+        let points = || self.pieces.iter().flat_map(|piece| piece.curve.points());
         let high = points().map(|p| p[axis]).fold(f64::NEG_INFINITY, f64::max);
         let low = points().map(|p| p[axis]).fold(f64::INFINITY, f64::min);
         1.0 / (high - low)
     }
 }
 
+impl PupilPiece {
+    fn new(curve: PupilCurve, sign: f64) -> Self {
+        Self { chains: [0, 1].map(|axis| curve.chains(axis)), curve, sign }
+    }
+}
+
+impl OverlapPart<'_> {
+    /// The columns and the nodes of each, of an order.
+    fn counts(&self, order: usize) -> [usize; 2] {
+        let count = |k: usize| {
+            (self.resolved[k] * (1.0 + GROWTH * order as f64) + ORDERS[order][k]).ceil() as usize
+        };
+        [count(0).next_multiple_of(TOGETHER), count(1)]
+    }
+}
+
+/// The first order whose nodes polynomials are fitted to, and the RMS over the one allowed that two orders
+/// more are for.
+const FIRST_FIT: usize = 2;
+const FAR: f64 = 300.0;
 /// The samples of a fit for each term: fewer do not tell the highest azimuthal frequencies apart.
 const TERM_SAMPLES: usize = 4;
 /// The largest number of samples of a fit.
 const MOST_SAMPLES: usize = 4000;
 
-/// The third cosine of a direction.
-pub(super) fn third_cosine([a, b]: [f64; 2]) -> f64 {
-    (1.0 - a * a - b * b).max(0.0).sqrt()
+/// The light at some nodes, to fit polynomials to and to check them.
+struct FitLight {
+    samples: Vec<FitSample>,
+    mirrored: bool,
+    energy: f64,
+    /// Makes an amplitude a number of the order of one: the size of the pupil.
+    scale: f64,
 }
 
-/// The polynomials of the light at some nodes with their errors, and its energy.
-type NodeFit = (Option<(WavePolynomial, [f64; 2])>, f64);
-
-fn fit_nodes(
-    region: &Region<'_>,
-    sphere: &ReferenceSphere,
-    nodes: &Nodes,
-) -> Result<NodeFit, AnalysisError> {
-    let light = PupilSamples::of_nodes(region, sphere, nodes)?;
-    let sample = |i: usize| {
-        let amplitude = light.energies[i] / light.amplitudes[i];
-        FitSample {
+impl FitLight {
+    fn new(
+        region: &Region<'_>,
+        sphere: &ReferenceSphere,
+        nodes: &Nodes,
+    ) -> Result<Self, AnalysisError> {
+        let light = PupilSamples::of_nodes(region, sphere, nodes)?;
+        let sample = |i: usize| FitSample {
             cosines: light.cosines[i],
-            values: [light.waves[i], amplitude],
+            values: [light.waves[i], light.energies[i] / light.amplitudes[i]],
             weight: light.energies[i],
-        }
-    };
-    let samples: Vec<_> = (0..light.cosines.len()).map(sample).collect();
-    let points = samples.iter().map(|sample| sample.cosines);
-    let basis = PolynomialBasis::new(points, samples.len() / TERM_SAMPLES, light.mirrored);
-    let energy = light.energy();
-    // The amplitude is of the order of one over the size of the pupil.
-    let scale = light.peak() / energy;
-    let fit = basis.fit(&samples);
-    Ok((fit.map(|(polynomial, [waves, rest])| (polynomial, [waves, rest * scale])), energy))
+        };
+        let energy = light.energy();
+        Ok(Self {
+            samples: (0..light.cosines.len()).map(sample).collect(),
+            mirrored: light.mirrored,
+            energy,
+            scale: light.peak() / energy,
+        })
+    }
+
+    /// The polynomials nearest to this light, with what they leave of it or of other light, whichever is more.
+    fn fit(&self, others: &Self, allowed: [f64; 2]) -> Option<(WavePolynomial, [f64; 2])> {
+        let points = self.samples.iter().map(|sample| sample.cosines);
+        let basis = PolynomialBasis::new(points, self.samples.len() / TERM_SAMPLES, self.mirrored);
+        let allowed = [allowed[0], allowed[1] / self.scale];
+        let (polynomial, own) = basis.fit(&self.samples, allowed)?;
+        let between = polynomial.rest(&others.samples);
+        let left = [0, 1].map(|k| own[k].max(between[k]));
+        Some((polynomial, [left[0], left[1] * self.scale]))
+    }
 }
 
 /// A curve of the pupil in cosines.
@@ -355,14 +466,13 @@ fn project_curve(
     sphere: &ReferenceSphere,
     arcs: &[EdgeArc],
 ) -> Result<PupilCurve, AnalysisError> {
-    let launch = &region.launch;
-    let place = |p: &[f64; 2]| {
-        let end = launch.unclipped_landing(*p)?;
-        let found = sphere.project(end.ray, end.opl)?;
+    let place = |(ray, path): (Ray<Dual2>, Dual2)| {
+        let found = sphere.project(ray, path)?;
         Some(found.cosines.map(|cosine| cosine.value))
     };
     let arc = |arc: &EdgeArc| {
-        let points: Option<Vec<_>> = arc.points.iter().map(place).collect();
+        let ends = region.launch.unclipped_landings(arc.points.iter().copied());
+        let points: Option<Vec<_>> = ends.into_iter().map(|end| place(end?)).collect();
         Some((points?, arc.begins_at_corner))
     };
     let arcs: Option<Vec<_>> = arcs.iter().map(arc).collect();

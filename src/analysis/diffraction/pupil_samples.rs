@@ -104,17 +104,15 @@ impl PupilSamples {
             ..Self::default()
         };
         let (launched, landed) = launch.trace_points(&nodes.points);
+        let lit = launched.into_iter().enumerate().filter(|(ray, _)| landed.fate(*ray).is_imaged());
+        let lit: Vec<usize> = lit.map(|(_, node)| node).collect();
+        let ends = launch.unclipped_landings(lit.iter().map(|node| nodes.points[*node]));
         let (mut least, mut most) = (f64::INFINITY, f64::NEG_INFINITY);
-        for (ray, node) in launched.into_iter().enumerate() {
+        for (node, end) in lit.into_iter().zip(ends) {
             let p = nodes.points[node];
-            if !landed.fate(ray).is_imaged() {
-                continue;
-            }
-            let (Some(start), Some(end)) = (launch.ray(p), launch.unclipped_landing(p)) else {
-                continue;
-            };
-            let path = Dual::constant(launch.optical_path_to(start)) + end.opl;
-            let Some(found) = sphere.project(end.ray, path) else { continue };
+            let (Some(start), Some((ray, path))) = (launch.ray(p), end) else { continue };
+            let path = Dual::constant(launch.optical_path_to(start)) + path;
+            let Some(found) = sphere.project(ray, path) else { continue };
             let [a, b] = found.cosines;
             let share = launch.beam_share(p);
             // The area of cosines by that of the beam.

@@ -56,7 +56,7 @@ impl<'a> RayPupil<'a> {
         let points = || samples.iter().map(|sample| sample.cosines);
         let terms = (samples.len() / TERM_SAMPLES).min(START_TERMS);
         let basis = PolynomialBasis::new(points(), terms, mirrored);
-        let (start, _) = basis.fit(&samples).ok_or(AnalysisError::IrregularPupil)?;
+        let (start, _) = basis.fit(&samples, [0.0; 2]).ok_or(AnalysisError::IrregularPupil)?;
         let size = points().map(|[a, b]| a.hypot(b)).fold(0.0, f64::max);
         Ok(Self { region, sphere, start, mirrored, size })
     }

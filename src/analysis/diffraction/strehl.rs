@@ -1,6 +1,5 @@
 //! The Strehl ratio: at the image point of the chief ray, and at the brightest point in space.
 
-use super::pupil_function::third_cosine;
 use super::pupil_samples::PupilSamples;
 use crate::analysis::reference_sphere::ReferenceSphere;
 use crate::analysis::{AnalysisError, Estimate, lit_region};
@@ -160,4 +159,9 @@ impl PupilSamples {
         }
         sum
     }
+}
+
+/// The third cosine of a direction.
+fn third_cosine([a, b]: [f64; 2]) -> f64 {
+    (1.0 - a * a - b * b).max(0.0).sqrt()
 }

@@ -95,7 +95,8 @@ impl TextLines for MtfJson {
             match curve {
                 CurveJson::Refused { refused } => lines.push(format!("{name}: {refused}")),
                 CurveJson::Curve { milliseconds, curve } => {
-                    let reached = if curve.reached { "" } else { ", tolerance not reached" };
+                    let limit = |limit| format!(", tolerance not reached: {limit}");
+                    let reached = curve.limit.map_or_else(String::new, limit);
                     let rays = counted(curve.rays, "ray");
                     lines.push(format!("{name}: {rays}, {milliseconds:.3} ms{reached}"));
                     lines.push(column_heads("cycles/mm"));

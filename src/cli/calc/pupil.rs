@@ -174,7 +174,7 @@ impl PupilArgs {
             return Err(CliError::Input(format!("--radius: found {wrong}; expected more than 0")));
         }
         let (pupil, is_round) = self.pupil()?;
-        output.print(&self.report(&pupil, is_round).map_err(refuse)?)
+        output.print(&self.report(&pupil, is_round))
     }
 
     /// The pupil, and whether it is round with what it does to light.
@@ -239,53 +239,51 @@ impl PupilArgs {
         Ok((!self.discs.is_empty()).then(|| self.discs.iter().map(disc).collect()))
     }
 
-    fn report(&self, pupil: &PupilFunction, is_round: bool) -> Result<PupilReport, AnalysisError> {
-        let [few, many] = [pupil.samples(ORDERS[0])?, pupil.samples(ORDERS[1])?];
+    fn report(&self, pupil: &PupilFunction, is_round: bool) -> PupilReport {
+        let [few, many] = ORDERS.map(|order| pupil.samples(order));
         let point = |at: &[f64; 2]| {
             let [before, intensity] = [few.intensity(*at), many.intensity(*at)];
             PupilPoint { x: at[0], y: at[1], intensity, error: (intensity - before).abs() }
         };
         let transfer = |nu: &[f64; 2]| {
-            let found = pupil.transfer(*nu, 0.0, TOLERANCE)?;
+            let found = pupil.transfer(*nu, 0.0, TOLERANCE);
             let error = found.modulus.error;
-            Ok(PupilTransfer { nx: nu[0], ny: nu[1], re: found.re, im: found.im, error })
+            PupilTransfer { nx: nu[0], ny: nu[1], re: found.re, im: found.im, error }
         };
-        let transfer: Result<Vec<_>, AnalysisError> =
-            self.frequencies.iter().map(transfer).collect();
         let circles = if is_round { self.round_circles(pupil) } else { self.circles(pupil) };
-        Ok(PupilReport {
+        PupilReport {
             strehl: many.intensity([0.0; 2]),
             points: self.points.iter().map(point).collect(),
-            circles: circles?,
-            transfer: transfer?,
-        })
+            circles,
+            transfer: self.frequencies.iter().map(transfer).collect(),
+        }
     }
 
     /// The energy within circles about the centre of the image of a round pupil, by its contrast.
-    fn round_circles(&self, pupil: &PupilFunction) -> Result<Vec<PupilCircle>, AnalysisError> {
+    fn round_circles(&self, pupil: &PupilFunction) -> Vec<PupilCircle> {
         let cutoff = 1e3 / (self.um * self.f_number);
         let [few, many] = [false, true]
             .map(|fine| pupil.round_encircled(&self.radii, cutoff, self.obscuration, fine));
-        let energies = few?.into_iter().zip(many?).zip(&self.radii);
+        let energies = few.into_iter().zip(many).zip(&self.radii);
         let circle = |(([before, _], [energy, left]), radius): (([f64; 2], [f64; 2]), &f64)| {
             PupilCircle { radius: *radius, energy, error: (energy - before).abs() + left }
         };
-        Ok(energies.map(circle).collect())
+        energies.map(circle).collect()
     }
 
     /// The energy within circles about the centre, over the image.
-    fn circles(&self, pupil: &PupilFunction) -> Result<Vec<PupilCircle>, AnalysisError> {
+    fn circles(&self, pupil: &PupilFunction) -> Vec<PupilCircle> {
         self.radii.iter().map(|radius| self.circle(pupil, *radius)).collect()
     }
 
-    fn circle(&self, pupil: &PupilFunction, radius: f64) -> Result<PupilCircle, AnalysisError> {
+    fn circle(&self, pupil: &PupilFunction, radius: f64) -> PupilCircle {
         let widest = radius.min(WIDEST * 1e-3 * self.um * self.f_number);
         let share = |light: &PupilSamples| light.encircled([0.0; 2], &[widest])[0];
         let [few, many] = CIRCLE_ORDERS.map(|order| pupil.samples(order));
-        let (before, energy) = (share(&few?), share(&many?));
+        let (before, energy) = (share(&few), share(&many));
         // Of a wider circle at least that much is inside, and at most all.
         let outside = if widest < radius { 1.0 - energy } else { 0.0 };
-        Ok(PupilCircle { radius, energy, error: (energy - before).abs() + outside })
+        PupilCircle { radius, energy, error: (energy - before).abs() + outside }
     }
 }
 

@@ -129,7 +129,8 @@ impl Display for MeasureMtfReport {
             writeln!(
                 f,
                 "\n{lens}: {count} frequencies from {low} to {high} cycles/mm, {fields} fields, \
-                 {colors} colours, one core"
+                 {colors} colours, one core; pupils found in {:.2} ms",
+                curves.pupils_ms
             )?;
             let mut table = TextTable::new(&["", "tolerance", "error", "stated", "rays", "ms", ""]);
             curves.rows.iter().for_each(|row| table.row(cells(row)));
@@ -150,6 +151,6 @@ fn cells(row: &TransferRow) -> Vec<String> {
         format!("{:.1e}", row.stated),
         row.rays.to_string(),
         format!("{:.2}", row.ms),
-        if row.reached { String::new() } else { "not reached".to_owned() },
+        row.limit.map_or_else(String::new, |limit| limit.to_string()),
     ]
 }

@@ -23,7 +23,7 @@ const FILLED: f64 = 0.5;
 /// lets one through on the axis.
 const NARROWEST_PUPIL: f64 = 1e-9;
 /// The number of azimuths at which the edge is sampled first, over a half turn.
-const AZIMUTHS: usize = 24;
+pub(super) const AZIMUTHS: usize = 24;
 /// The distance from the axis to which light is searched for first if no disc limits the pupil.
 const FIRST_REACH: f64 = 1.6;
 

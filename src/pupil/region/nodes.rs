@@ -107,12 +107,13 @@ impl Grading {
     }
 }
 
-pub(super) fn clear_nodes(order: usize, mirrored: bool) -> Nodes {
-    let azimuths = if mirrored { order } else { 2 * order };
+/// The nodes of the clear disc: so many along a radius and at so many azimuths of half a turn.
+pub(super) fn clear_nodes(radii: usize, half: usize, mirrored: bool) -> Nodes {
+    let azimuths = if mirrored { half } else { 2 * half };
     let turn = if mirrored { PI } else { 2.0 * PI };
     let step = turn / azimuths as f64;
     let mut nodes = Nodes { mirrored, ..Nodes::default() };
-    for (square, share) in legendre(order) {
+    for (square, share) in legendre(radii) {
         for j in 0..azimuths {
             let (sin, cos) = (step * (j as f64 + 0.5)).sin_cos();
             let r = square.sqrt();

@@ -6,13 +6,15 @@
 //! own mirror image is integrated over one half.
 
 use super::boundary::{Boundary, PolarFrame};
-use super::edge_search::EdgeSearch;
+use super::edge_search::{EdgeSearch, INSIDE};
 use super::kind::{Region, RegionKind};
+use super::light_grid::AZIMUTHS;
 use super::nodes::{Grading, Nodes, RadialLine, clear_nodes, irregular_nodes, line_nodes};
-use crate::pupil::gauss_rules::legendre;
+use crate::math::quadrature::chebyshev_points;
+use crate::pupil::gauss_rules::{LARGEST, legendre};
 use crate::pupil::patterns::{PupilPattern, pattern_points};
 use crate::trace::{Rays, TraceSink};
-use std::f64::consts::{PI, SQRT_2};
+use std::f64::consts::{PI, SQRT_2, TAU};
 
 /// The accuracy that is asked for.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -67,6 +69,9 @@ const STAR_ORDERS: [(usize, usize); 15] = [
 /// a next one with a single node more along the radius agree by chance while both are wrong: their change was
 /// up to 11 times below their error in spots of published lenses, that of these is never below it.
 const COMPARED_STAR_ORDERS: [usize; 13] = [1, 2, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14];
+/// The radii over half a turn that phases are looked at on, and the points of each.
+const RADII: usize = 8;
+const RADIUS_POINTS: usize = 9;
 /// The number of points of the lowest order for an irregular pupil, sampled by a low-discrepancy
 /// sequence.
 const IRREGULAR_POINTS: usize = 1024;
@@ -110,6 +115,56 @@ impl Region<'_> {
         matches!(self.kind, RegionKind::Irregular { annulus: None, .. })
     }
 
+    /// Points on radii about a sixteenth of a turn apart, on each at the nine Chebyshev points of the way from
+    /// the centre, or from the edge of a central shadow, to the edge; none if that is not known.
+    pub fn radii(&self) -> Vec<Vec<[f64; 2]>> {
+        let radius = |frame: &PolarFrame, azimuth: f64, [from, to]: [f64; 2]| {
+            let place = |u: f64| frame.point(azimuth, from + u * (1.0 - INSIDE) * (to - from));
+            chebyshev_points(RADIUS_POINTS).map(place).collect()
+        };
+        match &self.kind {
+            RegionKind::Clear => {
+                let count = if self.launch.is_symmetric() { RADII + 1 } else { 2 * RADII };
+                let azimuth = |i: usize| PI * i as f64 / RADII as f64;
+                (0..count).map(|i| radius(&PolarFrame::UNIT, azimuth(i), [0.0, 1.0])).collect()
+            }
+            RegionKind::StarShaped(edge) => {
+                let samples = edge.samples.iter().step_by(AZIMUTHS / RADII);
+                samples.map(|(a, end)| radius(&edge.frame, *a, [0.0, end.radius])).collect()
+            }
+            RegionKind::Irregular { annulus: Some(ring), .. } => {
+                let samples = ring.outer.samples.iter().step_by(AZIMUTHS / RADII);
+                let ends = |a: f64, end: f64| [ring.inner.radius_guess(a), end];
+                let frame = &ring.outer.frame;
+                samples.map(|(a, end)| radius(frame, *a, ends(*a, end.radius))).collect()
+            }
+            RegionKind::Dark | RegionKind::Unbounded | RegionKind::Irregular { .. } => Vec::new(),
+        }
+    }
+
+    /// Nodes along radii, `radii` on each, at as many azimuths for each smooth arc of the edge as `azimuths` says
+    /// of its length in radians; `None` if the edge is not known or rules have not so many nodes.
+    pub fn nodes_along(&self, azimuths: impl Fn(f64) -> usize, radii: usize) -> Option<Nodes> {
+        let mirrored = self.launch.is_symmetric();
+        let most = azimuths(if mirrored { PI } else { TAU });
+        if most.max(radii) > LARGEST {
+            return None;
+        }
+        match &self.kind {
+            RegionKind::Clear => Some(clear_nodes(radii, azimuths(PI), mirrored)),
+            RegionKind::StarShaped(boundary) => {
+                let (lines, rays) = self.radial_lines(boundary, azimuths);
+                let nodes = line_nodes(&lines, &boundary.frame, radii);
+                Some(Nodes { mirrored, rays, ..nodes })
+            }
+            RegionKind::Irregular { annulus: Some(annulus), .. } => {
+                let (lines, rays) = annulus.radial_lines(&self.launch, most);
+                Some(Nodes { mirrored, rays, ..annulus.nodes(&lines, radii) })
+            }
+            RegionKind::Dark | RegionKind::Unbounded | RegionKind::Irregular { .. } => None,
+        }
+    }
+
     /// The nodes of an order, counted from 0; none if there is no light.
     pub fn nodes(&self, order: usize) -> Nodes {
         self.nodes_and_lines(order, false).0
@@ -123,11 +178,13 @@ impl Region<'_> {
         match &self.kind {
             RegionKind::Dark | RegionKind::Unbounded => Default::default(),
             RegionKind::Clear => {
-                (clear_nodes(CLEAR_ORDERS[order.min(CLEAR_ORDERS.len() - 1)], mirrored), Vec::new())
+                let count = CLEAR_ORDERS[order.min(CLEAR_ORDERS.len() - 1)];
+                (clear_nodes(count, count, mirrored), Vec::new())
             }
             RegionKind::StarShaped(boundary) => {
                 let alike = alike && self.launch.is_axial() && boundary.arcs.len() == 1;
-                let (lines, rays) = self.radial_lines(boundary, if alike { 1 } else { azimuths });
+                let azimuths = if alike { 1 } else { azimuths };
+                let (lines, rays) = self.radial_lines(boundary, |_| azimuths);
                 let nodes = line_nodes(&lines, &boundary.frame, radii);
                 (Nodes { mirrored, rays, ..nodes }, lines)
             }
@@ -143,17 +200,17 @@ impl Region<'_> {
         }
     }
 
-    /// The radii at the Gauss nodes in azimuth of every arc, and the number of rays traced to find
-    /// their ends.
+    /// The radii at the Gauss nodes in azimuth of every arc, as many as `azimuths` says of its length, and the
+    /// number of rays traced to find their ends.
     pub(super) fn radial_lines(
         &self,
         boundary: &Boundary,
-        azimuths: usize,
+        azimuths: impl Fn(f64) -> usize,
     ) -> (Vec<RadialLine>, usize) {
         let mut search = EdgeSearch::new(&self.launch, boundary.frame);
         let halves = if self.launch.is_symmetric() { 2.0 } else { 1.0 };
         let factor = halves * boundary.frame.area();
-        let mut lines = Vec::with_capacity(azimuths * boundary.arcs.len());
+        let mut lines = Vec::new();
         for (i, arc) in boundary.arcs.iter().enumerate() {
             let length = arc.to - arc.from;
             let grading = Grading::of(&boundary.arcs, i, !self.launch.is_symmetric());
@@ -161,9 +218,10 @@ impl Region<'_> {
                 let azimuth = arc.from + grading.map(*t).0 * length;
                 (azimuth, boundary.radius_guess(azimuth))
             };
-            let guesses: Vec<_> = legendre(azimuths).iter().map(guess).collect();
+            let rule = legendre(azimuths(length));
+            let guesses: Vec<_> = rule.iter().map(guess).collect();
             let edges = search.edges_along_arc(arc.limit, &guesses);
-            let nodes = legendre(azimuths).iter().zip(guesses);
+            let nodes = rule.iter().zip(guesses);
             for (((t, share), (azimuth, _)), edge) in nodes.zip(edges) {
                 let Some(edge) = edge else { continue };
                 let grazing_distance =
