@@ -3,8 +3,8 @@
 use super::error::CliError;
 use super::output::{Output, ShortNumber, TextTable};
 use super::output_paths::OutputPaths;
-use crate::files::{self, AgfCatalogue, AgfExport, AgfGlass, GlassQuery};
-use crate::lens::glass::{self, Glass};
+use crate::files::{self, AgfCatalogue, AgfExport, GlassQuery};
+use crate::lens::glass::{self, Glass, GlassProperties, GlassStatus};
 use serde::Serialize;
 use std::fmt;
 use std::path::PathBuf;
@@ -13,7 +13,8 @@ use std::path::PathBuf;
 #[derive(Debug, clap::Args)]
 #[command(after_long_help = include_str!("help/glass.txt"))]
 pub(super) struct GlassArgs {
-    /// Words of maker and name, and ranges such as nd=1.6..1.7 or vd=50..; absent: every glass
+    /// Words of maker and name, ranges of nd, vd, price and density such as nd=1.6..1.7 or vd=50.., and
+    /// status=preferred or lead=no; absent: every glass
     #[arg(value_name = "WORD")]
     words: Vec<String>,
 
@@ -100,12 +101,22 @@ struct GlassRow {
     range_um: [f64; 2],
     #[serde(rename = "density_g_cm3")]
     density: Option<f64>,
-    status: Option<&'static str>,
+    status: Option<GlassStatus>,
     relative_cost: Option<f64>,
+    /// The linear expansion in 1e-6/K.
+    expansion: Option<f64>,
+    /// The change of the index relative to air at the d line and 20 °C, in 1e-6/K.
+    #[serde(rename = "dn_dt")]
+    index_slope: Option<f64>,
+    /// The internal transmission of 10 mm at 420 nm.
+    transmission_420_nm: Option<f64>,
+    marked_lead_free: bool,
 }
 
 impl GlassRow {
     fn new(glass: &'static Glass) -> Self {
+        let none = GlassProperties::default();
+        let known = glass.properties().unwrap_or(&none);
         Self {
             maker: &glass.manufacturer,
             name: &glass.name,
@@ -114,8 +125,12 @@ impl GlassRow {
             partial_dispersion: glass.partial_dispersion(),
             range_um: glass.range_um,
             density: glass.density,
-            status: glass.status,
-            relative_cost: glass.relative_cost,
+            status: known.status,
+            relative_cost: known.relative_cost,
+            expansion: known.expansion,
+            index_slope: known.thermal.map(|thermal| 1e6 * thermal.slope_at_d(glass.nd)),
+            transmission_420_nm: known.internal_transmission(0.42, 10.0),
+            marked_lead_free: glass.is_marked_lead_free(),
         }
     }
 }
@@ -127,9 +142,13 @@ struct GlassList(Vec<GlassRow>);
 
 impl fmt::Display for GlassList {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let mut table =
-            TextTable::new(&["maker", "name", "nd", "vd", "PgF", "um", "g/cm3"]).left(&[1]);
+        let head = [
+            "maker", "name", "nd", "vd", "PgF", "um", "g/cm3", "status", "price", "1e-6/K",
+            "dn/dT", "T420",
+        ];
+        let mut table = TextTable::new(&head).left(&[1, 7]);
         let dash = || "-".to_owned();
+        let short = |value: Option<f64>| value.map_or_else(dash, |v| ShortNumber(v).to_string());
         for glass in &self.0 {
             let [low, high] = glass.range_um.map(ShortNumber);
             table.row([
@@ -140,6 +159,11 @@ impl fmt::Display for GlassList {
                 glass.partial_dispersion.map_or_else(dash, |value| format!("{value:.4}")),
                 format!("{low}..{high}"),
                 glass.density.map_or_else(dash, |value| format!("{value:.2}")),
+                glass.status.map_or_else(dash, |status| status.to_string()),
+                short(glass.relative_cost),
+                short(glass.expansion),
+                glass.index_slope.map_or_else(dash, |slope| format!("{slope:.2}")),
+                glass.transmission_420_nm.map_or_else(dash, |share| format!("{share:.3}")),
             ]);
         }
         write!(f, "{table}")?;
@@ -165,10 +189,8 @@ struct AddedGlass {
     name: String,
     nd: f64,
     vd: f64,
-    status: Option<&'static str>,
-    relative_cost: Option<f64>,
     #[serde(flatten)]
-    further: AgfGlass,
+    properties: GlassProperties,
 }
 
 #[derive(Serialize)]
@@ -179,9 +201,9 @@ struct GlassRemark {
 
 impl AddedCatalogue {
     fn new(catalogue: AgfCatalogue, saved: &[PathBuf]) -> Self {
-        let added = |further: AgfGlass| {
-            let Glass { name, nd, vd, status, relative_cost, .. } = further.glass.clone();
-            AddedGlass { name, nd, vd, status, relative_cost, further }
+        let added = |glass: Glass| {
+            let properties = glass.properties().cloned().unwrap_or_default();
+            AddedGlass { name: glass.name, nd: glass.nd, vd: glass.vd, properties }
         };
         let remarks = |found: Vec<(String, String)>| {
             found.into_iter().map(|(name, why)| GlassRemark { name, why }).collect()

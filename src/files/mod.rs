@@ -38,7 +38,7 @@ mod yaml_glass;
 mod zar;
 pub mod zemax;
 
-pub use agf::{AgfCatalogue, AgfExport, AgfGlass, parse_agf, read_agf, write_agf};
+pub use agf::{AgfCatalogue, AgfExport, parse_agf, read_agf, write_agf};
 pub use atomic::{check_writable, write_atomic};
 pub use bounded::{MAX_DATA_BYTES, MAX_LENS_BYTES, read_bounded, read_file};
 pub use bundled::{BundledLens, bundled_lenses};

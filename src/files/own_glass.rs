@@ -217,7 +217,7 @@ pub(super) fn maker(path: &Path) -> String {
 }
 
 fn add_glasses(catalogue: &AgfCatalogue) {
-    glass::add(catalogue.glasses.iter().map(|entry| entry.glass.clone()).collect());
+    glass::add(catalogue.glasses.clone());
 }
 
 fn folder_for_writing(file: &str) -> Result<PathBuf, FileError> {

@@ -5,10 +5,12 @@
 //! formulas are those of the database's document *Dispersion formulas*, numbers 1 to 9; tables of indices are
 //! refused by name, since between their rows every index would be a guess.
 
-use super::agf::{AgfCatalogue, AgfGlass, check_index, contradiction};
+use super::agf::{AgfCatalogue, check_index, contradiction};
 use super::bounded::{MAX_LENS_BYTES, read_file};
 use super::text;
-use crate::lens::glass::{DispersionFormula, Glass};
+use crate::lens::glass::{
+    DispersionFormula, Glass, GlassProperties, GlassStatus, ThermalDispersion,
+};
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::fs;
@@ -37,7 +39,13 @@ struct MaterialData {
     wavelength_range: String,
     #[serde(default)]
     coefficients: String,
+    /// The rows of a table.
+    #[serde(default)]
+    data: String,
 }
+
+/// The thickness in mm for which transmissions are kept.
+const THICKNESS: f64 = 10.0;
 
 /// The folders of the database that name a kind of file and no maker.
 const KINDS: [&str; 4] = ["optical", "nk", "infrared", "filter"];
@@ -125,12 +133,11 @@ pub(super) fn parse_material(
         coefficients,
         range_um: [low, high],
         density: file.density(),
-        status: None,
-        relative_cost: None,
+        own_properties: Some(Box::new(file.glass_properties())),
     };
     check_index(&mut glass)?;
     let remark = contradiction(&glass, number("nd")).map(|text| (name.to_owned(), text));
-    let glasses = vec![AgfGlass::without_remarks(glass)];
+    let glasses = vec![glass];
     Ok(AgfCatalogue {
         glasses,
         contradictory: remark.into_iter().collect(),
@@ -141,20 +148,54 @@ pub(super) fn parse_material(
 impl MaterialFile {
     /// A property; numbers may have a unit behind them.
     fn number(&self, key: &str) -> Option<f64> {
-        let value = self.properties.get(key).or_else(|| self.specs.get(key))?;
+        let value = self.value(key)?;
         let text = || value.as_str()?.split_whitespace().next()?.parse().ok();
         value.as_f64().or_else(text).filter(|value: &f64| value.is_finite())
     }
 
     /// The density in g/cm³: files have it in this unit, or a list of values in kg/m³.
     fn density(&self) -> Option<f64> {
-        let value = self.properties.get("density").or_else(|| self.specs.get("density"))?;
+        let value = self.value("density")?;
         let in_grams = || {
             let text = value.as_str().filter(|text| text.contains("g/cm"))?;
             text.split_whitespace().next()?.parse().ok()
         };
         let in_kilograms = || Some(value.as_array()?.first()?.get("value")?.as_f64()? / 1000.0);
         in_grams().or_else(in_kilograms).filter(|density: &f64| *density > 0.0)
+    }
+
+    fn glass_properties(&self) -> GlassProperties {
+        let classes = ["climatic", "stain", "acid", "alkali", "phosphate"];
+        let named = |status: &GlassStatus| {
+            self.value("glass_status").and_then(|value| value.as_str()) == Some(status.name())
+        };
+        GlassProperties {
+            status: GlassStatus::ALL.into_iter().find(named),
+            relative_cost: None,
+            expansion: self.expansion(),
+            thermal: self.thermal(),
+            resistance: classes.map(|class| self.number(&format!("{class}_resistance"))),
+            transmission: self.data.iter().find_map(MaterialData::transmission).unwrap_or_default(),
+        }
+    }
+
+    fn value(&self, key: &str) -> Option<&serde_json::Value> {
+        self.properties.get(key).or_else(|| self.specs.get(key))
+    }
+
+    /// The expansion in the first range of temperatures, which holds room temperature, in 1e-6/K.
+    fn expansion(&self) -> Option<f64> {
+        let first = self.value("thermal_expansion")?.as_array()?.first()?;
+        let text = first.get("coefficient")?.as_str()?;
+        let per_kelvin: f64 = text.split_whitespace().next()?.parse().ok()?;
+        Some(1e6 * per_kelvin).filter(|value| value.is_finite())
+    }
+
+    fn thermal(&self) -> Option<ThermalDispersion> {
+        let first = self.value("thermal_dispersion")?.as_array()?.first()?;
+        let coefficients = numbers(first.get("coefficients")?.as_str()?)?.try_into().ok()?;
+        let celsius = self.number("temperature").unwrap_or(20.0);
+        Some(ThermalDispersion { coefficients, celsius })
     }
 
     fn is_true(&self, key: &str) -> bool {
@@ -165,6 +206,20 @@ impl MaterialFile {
 }
 
 impl MaterialData {
+    /// The internal transmission by the table of the extinction coefficient `k`: `exp(−4πk d/λ)`.
+    fn transmission(&self) -> Option<Vec<[f64; 3]>> {
+        if self.kind.trim() != "tabulated k" {
+            return None;
+        }
+        let row = |line: &str| {
+            let [um, extinction] = numbers(line)?.try_into().ok()?;
+            let micrometres = 1e3 * THICKNESS;
+            let share = (-4.0 * std::f64::consts::PI * extinction * micrometres / um).exp();
+            (um > 0.0 && share <= 1.0).then_some([um, share, THICKNESS])
+        };
+        self.data.lines().map(row).collect()
+    }
+
     /// The formula; `None` for a table.
     fn formula(&self) -> Option<DispersionFormula> {
         use DispersionFormula as F;
@@ -216,7 +271,7 @@ mod tests {
     fn index(kind: &str, coefficients: &str) -> f64 {
         let text = material(kind, coefficients);
         let material = parse_material(text.as_bytes(), "MAKER", "G").unwrap();
-        material.glasses[0].glass.index(0.6).unwrap()
+        material.glasses[0].index(0.6).unwrap()
     }
 
     #[test]
@@ -257,7 +312,7 @@ mod tests {
         let text = material("formula 2", coefficients);
         let material = parse_material(text.as_bytes(), "SCHOTT", "N-BK7").unwrap();
         assert_eq!(material.contradictory, []);
-        let glass = &material.glasses[0].glass;
+        let glass = &material.glasses[0];
         // The data sheet: nd 1.51680, vd 64.17.
         assert!((glass.nd - 1.51680).abs() < 5e-6 && (glass.vd - 64.17).abs() < 5e-3);
         assert_eq!(glass.density, Some(2.51));
@@ -306,9 +361,8 @@ mod tests {
     fn densities_of_both_ages_of_the_database_are_in_grams() {
         let list = material("formula 2", "0 1.1 0.01")
             .replace("density: 2.51 g/cm<sup>3</sup>", "density:\n      - value: 2510");
-        let density = |text: &str| {
-            parse_material(text.as_bytes(), "M", "G").unwrap().glasses[0].glass.density
-        };
+        let density =
+            |text: &str| parse_material(text.as_bytes(), "M", "G").unwrap().glasses[0].density;
         assert!((density(&list).unwrap() - 2.51).abs() < 1e-12);
         let bare = material("formula 2", "0 1.1 0.01").replace("2.51 g/cm<sup>3</sup>", "2510");
         assert_eq!(density(&bare), None);
@@ -331,9 +385,7 @@ mod tests {
             damaged[at] = (i / 7 % 256) as u8;
             if let Ok(material) = parse_material(&damaged, "M", "G") {
                 let glass = &material.glasses[0];
-                assert!(
-                    glass.glass.index(0.5 * glass.glass.range_um.iter().sum::<f64>()).is_some()
-                );
+                assert!(glass.index(0.5 * glass.range_um.iter().sum::<f64>()).is_some());
             }
         }
     }

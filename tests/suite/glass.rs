@@ -1,7 +1,7 @@
 //! Glass catalogues of makers: every dispersion formula, damaged files, and lenses that name their glasses.
 
 use aplanat::files::{AgfCatalogue, parse_agf, read_agf, write_agf};
-use aplanat::lens::glass;
+use aplanat::lens::glass::{self, GlassStatus};
 use serde_json::Value;
 use std::path::PathBuf;
 use std::process::Command;
@@ -100,10 +100,11 @@ fn every_formula_has_the_index_of_its_definition() {
     let catalogue = parsed(&text);
     assert_eq!((catalogue.glasses.len(), catalogue.refused.len()), (13, 0));
     for ((formula, _, expected), entry) in cases.iter().zip(&catalogue.glasses) {
-        let found = entry.glass.index(um).unwrap();
+        let found = entry.index(um).unwrap();
         assert!((found - expected).abs() < 1e-13, "formula {formula}: {found}, {expected}");
-        assert!(entry.glass.index(0.39).is_none() && entry.glass.index(0.81).is_none());
-        assert_eq!((entry.glass.density, entry.glass.status), (Some(2.51), Some("preferred")));
+        assert!(entry.index(0.39).is_none() && entry.index(0.81).is_none());
+        let status = entry.properties().unwrap().status;
+        assert_eq!((entry.density, status), (Some(2.51), Some(GlassStatus::Preferred)));
     }
 }
 
@@ -119,22 +120,24 @@ fn a_glass_has_everything_that_its_maker_says() {
     let catalogue = parsed(BK7);
     let entry = &catalogue.glasses[0];
     for (um, index) in [(0.4861327, 1.52238), (0.5875618, 1.51680), (0.6562725, 1.51432)] {
-        assert!((entry.glass.index(um).unwrap() - index).abs() < 5e-6);
+        assert!((entry.index(um).unwrap() - index).abs() < 5e-6);
     }
-    assert!((entry.glass.vd - 64.17).abs() < 0.005);
-    assert_eq!((entry.expansion, entry.glass.relative_cost), (Some(7.1), Some(1.0)));
-    assert_eq!(entry.thermal[0], 1.86e-6);
-    assert_eq!(entry.resistance, [2.0, 0.0, 1.0, 2.3, 2.3]);
-    assert_eq!(entry.transmission, [[0.4, 0.997, 10.0], [0.5, 0.998, 10.0]]);
+    assert!((entry.vd - 64.17).abs() < 0.005);
+    let known = entry.properties().unwrap();
+    assert_eq!((known.expansion, known.relative_cost), (Some(7.1), Some(1.0)));
+    let thermal = known.thermal.unwrap();
+    assert_eq!((thermal.coefficients[0], thermal.celsius), (1.86e-6, 20.0));
+    assert_eq!(known.resistance, [2.0, 0.0, 1.0, 2.3, 2.3].map(Some));
+    assert_eq!(known.transmission, [[0.4, 0.997, 10.0], [0.5, 0.998, 10.0]]);
 }
 
 #[test]
 fn a_constant_index_has_no_abbe_number_and_infrared_materials_keep_that_of_the_file() {
     let constant = parsed("NM FLAT 1 0 1.5 60 0 0 -\nCD 2.25\nLD 0.3 2\n");
-    assert_eq!((constant.glasses[0].glass.nd, constant.glasses[0].glass.vd), (1.5, 0.0));
+    assert_eq!((constant.glasses[0].nd, constant.glasses[0].vd), (1.5, 0.0));
     let infrared =
         parsed("NM GE 1 0 4.0 100.5 0 0 -\nCD 16.0 0 0.5\nLD 2 14\nNM X 1 0 - -\nCD 9\nLD 2 9\n");
-    let numbers = infrared.glasses.iter().map(|entry| (entry.glass.nd, entry.glass.vd));
+    let numbers = infrared.glasses.iter().map(|entry| (entry.nd, entry.vd));
     assert_eq!(numbers.collect::<Vec<_>>(), [(4.0, 100.5), (3.0, 0.0)]);
 }
 
@@ -147,7 +150,7 @@ const WRAPPED: &str = "NM J-FK5 13 1 1.487490 70.318793 0 0 1\nED 8.9 0 2.45 2.7
 #[test]
 fn records_go_on_in_lines_that_begin_with_a_number() {
     let catalogue = parsed(WRAPPED);
-    let glass = &catalogue.glasses[0].glass;
+    let glass = &catalogue.glasses[0];
     assert!((glass.nd - 1.48749).abs() < 5e-6 && (glass.vd - 70.3188).abs() < 1e-3);
     assert!(catalogue.contradictory.is_empty());
 }
@@ -203,8 +206,8 @@ fn damaged_catalogues_do_not_panic() {
         }
         if let Ok(catalogue) = parse_agf(&bytes, "M", "m.agf") {
             for entry in catalogue.glasses {
-                let [low, high] = entry.glass.range_um;
-                assert!([low, high].map(|um| entry.glass.index(um)).iter().all(Option::is_some));
+                let [low, high] = entry.range_um;
+                assert!([low, high].map(|um| entry.index(um)).iter().all(Option::is_some));
             }
         }
     }
@@ -266,7 +269,7 @@ fn a_catalogue_is_added_and_its_glass_found_in_a_lens() {
     for (words, expected) in [
         (vec!["glass", "nothing-like-it"], "found no glass"),
         (vec!["glass", "nd=high"], "expected `1.6..1.7`"),
-        (vec!["glass", "weight=1"], "expected nd or vd"),
+        (vec!["glass", "weight=1"], "expected nd, vd, price, density, status or lead"),
         (vec!["glass", "--nearest", "0.2", "50"], "found nd 0.2 and vd 50"),
         (vec!["glass", "--nearest", "1.5", "nan"], "found nd 1.5 and vd NaN"),
         (vec!["glass", "--add", lens], "expected a glass catalogue"),
@@ -374,12 +377,12 @@ fn glasses_are_written_as_a_catalogue_and_read_back_with_their_indices() {
     let read = read_agf(&path).unwrap();
     assert_eq!((read.glasses.len(), read.refused.len()), (export.glasses, 0));
     assert!(read.contradictory.is_empty(), "{:?}", read.contradictory);
-    let schott = read.glasses.iter().find(|own| own.glass.name == "N-BK7").unwrap();
+    let schott = read.glasses.iter().find(|own| own.name == "N-BK7").unwrap();
     let own = glass::find("SCHOTT N-BK7").unwrap();
-    assert_eq!((schott.glass.range_um, schott.glass.density), (own.range_um, own.density));
-    assert_eq!(schott.glass.manufacturer, "OWN");
+    assert_eq!((schott.range_um, schott.density), (own.range_um, own.density));
+    assert_eq!(schott.manufacturer, "OWN");
     // Schott's datasheet.
-    assert!((schott.glass.nd - 1.51680).abs() < 5e-6 && (schott.glass.vd - 64.17).abs() < 5e-3);
+    assert!((schott.nd - 1.51680).abs() < 5e-6 && (schott.vd - 64.17).abs() < 5e-3);
     assert!(write_agf([], &path).is_err());
     std::fs::remove_dir_all(folder).unwrap();
 }
@@ -398,7 +401,7 @@ fn a_catalogue_is_written_by_the_command_line() {
     let report: Value = serde_json::from_slice(&output.stdout).unwrap();
     let read = read_agf(&path).unwrap();
     assert_eq!(report["glasses"], read.glasses.len());
-    assert!(read.glasses.len() > 10 && read.glasses.iter().all(|own| own.glass.nd >= 1.7));
+    assert!(read.glasses.len() > 10 && read.glasses.iter().all(|own| own.nd >= 1.7));
     let wrong = run(folder.join("PICK.txt").to_str().unwrap());
     assert_eq!(wrong.status.code(), Some(2));
     std::fs::remove_dir_all(folder).unwrap();

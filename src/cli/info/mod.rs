@@ -2,6 +2,7 @@
 
 mod checks;
 mod effects;
+mod material;
 
 use super::effects::{EffectArgs, EffectChoices, decision_text};
 use super::error::CliError;
@@ -12,6 +13,7 @@ use crate::lens::{Lens, SurfaceNumber};
 use crate::paraxial::{Beam, FirstOrder, Seidel, SeidelSums, first_order, seidel};
 use crate::report::first_order_numbers;
 use checks::{LensCheck, checks};
+use material::Material;
 use serde::Serialize;
 use std::fmt::{self, Display};
 
@@ -58,6 +60,9 @@ struct InfoReport {
     semi_diameters: Vec<Option<f64>>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
     obstructions: Vec<Option<f64>>,
+    /// The glass at the first position; `None` for a lens without any.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    glass: Option<Material>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
     positions: Vec<ZoomReport>,
 }
@@ -71,6 +76,7 @@ impl InfoReport {
             name: name.clone(),
             wavelength_um: opened.primary_um(),
             first: positions.first().cloned(),
+            glass: Material::new(&opened.lens, positions.first().map_or(0, |first| first.zoom)),
             semi_diameters: surfaces.iter().map(|row| row.semi_diameter).collect(),
             obstructions: obstructions.collect(),
             positions: if positions.len() > 1 { positions } else { Vec::new() },
@@ -166,6 +172,9 @@ impl Display for InfoReport {
         }
         for position in self.positions() {
             write!(f, "\n{}", position.effects_and_checks())?;
+        }
+        if let Some(glass) = &self.glass {
+            writeln!(f, "\n{}", glass.text())?;
         }
         writeln!(f, "\nsemi-diameters  {}", radii_text(&self.semi_diameters, "unlimited"))?;
         if self.obstructions.is_empty() {

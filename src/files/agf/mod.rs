@@ -20,8 +20,9 @@ use super::bounded::read_file;
 use super::error::FileError;
 use super::own_glass::{MAX_CATALOGUE_BYTES, maker};
 use super::text;
-use crate::lens::glass::{DispersionFormula, Glass, line};
-use serde::Serialize;
+use crate::lens::glass::{
+    DispersionFormula, Glass, GlassProperties, GlassStatus, ThermalDispersion, line,
+};
 use std::collections::BTreeSet;
 use std::path::Path;
 
@@ -32,7 +33,7 @@ const SAME_INDEX: f64 = 1e-4;
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct AgfCatalogue {
     /// The glasses, in the order of the file.
-    pub glasses: Vec<AgfGlass>,
+    pub glasses: Vec<Glass>,
     /// The names of glasses that are left out, each with the reason.
     pub refused: Vec<(String, String)>,
     /// The names of glasses whose formula contradicts the index that the file gives, each with both.
@@ -46,23 +47,6 @@ impl AgfCatalogue {
         self.refused.extend(other.refused);
         self.contradictory.extend(other.contradictory);
     }
-}
-
-/// A glass with everything that its maker says of it.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct AgfGlass {
-    /// The glass as lenses find it.
-    #[serde(skip)]
-    pub glass: Glass,
-    /// The expansion from −30 to 70 °C, in 1e-6/K.
-    pub expansion: Option<f64>,
-    /// D₀, D₁, D₂, E₀, E₁, λtk of the change of the index with temperature, and the reference
-    /// temperature in °C; empty if the catalogue does not have them.
-    pub thermal: Vec<f64>,
-    /// The resistance to climate, stains, acid, alkali and phosphate; −1 if it is unknown.
-    pub resistance: Vec<f64>,
-    /// Wavelength in µm, internal transmission and thickness in mm.
-    pub transmission: Vec<[f64; 3]>,
 }
 
 /// Reads a catalogue from a file, whose name is that of the maker.
@@ -91,16 +75,16 @@ pub fn parse_agf(bytes: &[u8], maker: &str, file: &str) -> Result<AgfCatalogue, 
     let mut names = BTreeSet::new();
     for records in split_glasses(&text) {
         match records.glass(maker) {
-            Ok(glass) if names.insert(glass.glass.name.clone()) => {
-                let name = || glass.glass.name.clone();
+            Ok(glass) if names.insert(glass.name.clone()) => {
+                let name = || glass.name.clone();
                 let remark =
-                    contradiction(&glass.glass, records.stated_index()).map(|text| (name(), text));
+                    contradiction(&glass, records.stated_index()).map(|text| (name(), text));
                 catalogue.contradictory.extend(remark);
                 catalogue.glasses.push(glass);
             }
             Ok(glass) => {
                 let why = "a second glass of this name".to_owned();
-                catalogue.refused.push((glass.glass.name, why));
+                catalogue.refused.push((glass.name, why));
             }
             Err(why) => catalogue.refused.push((records.name().to_owned(), why)),
         }
@@ -109,19 +93,6 @@ pub fn parse_agf(bytes: &[u8], maker: &str, file: &str) -> Result<AgfCatalogue, 
         return Err(refuse("text without a glass".to_owned()));
     }
     Ok(catalogue)
-}
-
-impl AgfGlass {
-    /// A glass of which nothing else is known.
-    pub(super) fn without_remarks(glass: Glass) -> Self {
-        Self {
-            glass,
-            expansion: None,
-            thermal: Vec::new(),
-            resistance: Vec::new(),
-            transmission: Vec::new(),
-        }
-    }
 }
 
 /// The records of one glass, each as its words.
@@ -159,7 +130,7 @@ impl<'a> GlassRecords<'a> {
         self.words(tag).iter().map(|word| number(word)).collect()
     }
 
-    fn glass(&self, maker: &str) -> Result<AgfGlass, String> {
+    fn glass(&self, maker: &str) -> Result<Glass, String> {
         let head = self.words("NM");
         let name = head.first().ok_or("the record NM has no name")?;
         let formula = head.get(1).copied().map_or(f64::NAN, number);
@@ -177,17 +148,32 @@ impl<'a> GlassRecords<'a> {
             coefficients,
             range_um: [low, high],
             density: positive(self.numbers("ED").get(2)),
-            status: head.get(6).and_then(|word| status(word)),
-            relative_cost: positive(self.numbers("OD").first()),
+            own_properties: Some(Box::new(self.properties())),
         };
         check_index(&mut glass)?;
-        Ok(AgfGlass {
-            expansion: self.numbers("ED").first().copied().filter(|value| value.is_finite()),
-            thermal: finite_numbers(self.numbers("TD")),
-            resistance: finite_numbers(self.numbers("OD").into_iter().skip(1).collect()),
+        Ok(glass)
+    }
+
+    fn properties(&self) -> GlassProperties {
+        let [costs, expansions] = ["OD", "ED"].map(|tag| self.numbers(tag));
+        let class = |i: usize| costs.get(i + 1).copied().filter(|class| *class >= 0.0);
+        GlassProperties {
+            status: self.words("NM").get(6).and_then(|word| status(word)),
+            relative_cost: positive(costs.first()),
+            expansion: expansions.first().copied().filter(|value| value.is_finite()),
+            thermal: self.thermal(),
+            resistance: std::array::from_fn(class),
             transmission: self.transmission(),
-            glass,
-        })
+        }
+    }
+
+    /// The change of the index with temperature; six zeros stand for none.
+    fn thermal(&self) -> Option<ThermalDispersion> {
+        let numbers = self.numbers("TD");
+        let coefficients: [f64; 6] = numbers.get(..6)?.try_into().ok()?;
+        let is_known = coefficients.iter().all(|c| c.is_finite()) && coefficients[..5] != [0.0; 5];
+        let celsius = numbers.get(6).copied().filter(|value| value.is_finite());
+        is_known.then_some(ThermalDispersion { coefficients, celsius: celsius.unwrap_or(20.0) })
     }
 
     /// The index at the d line that the file gives; 0 stands for none.
@@ -207,7 +193,7 @@ impl<'a> GlassRecords<'a> {
         let numbers = lines.map(|words| words[1..].iter().map(|word| number(word)));
         numbers
             .filter_map(|mut numbers| Some([numbers.next()?, numbers.next()?, numbers.next()?]))
-            .filter(|line| line.iter().all(|value| value.is_finite()))
+            .filter(|line| line.iter().all(|value| value.is_finite()) && line[2] > 0.0)
             .collect()
     }
 }
@@ -227,20 +213,8 @@ fn positive(value: Option<&f64>) -> Option<f64> {
     value.copied().filter(|value| *value > 0.0 && value.is_finite())
 }
 
-/// Numbers up to the first that is missing.
-fn finite_numbers(numbers: Vec<f64>) -> Vec<f64> {
-    numbers.into_iter().take_while(|value| value.is_finite()).collect()
-}
-
-fn status(word: &str) -> Option<&'static str> {
-    Some(match word {
-        "0" => "standard",
-        "1" => "preferred",
-        "2" => "obsolete",
-        "3" => "special",
-        "4" => "melt",
-        _ => return None,
-    })
+fn status(word: &str) -> Option<GlassStatus> {
+    GlassStatus::ALL.get(word.parse::<usize>().ok()?).copied()
 }
 
 /// The formula of a number with its coefficients in the order of this program.

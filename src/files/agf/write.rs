@@ -6,7 +6,7 @@ use crate::files::atomic::write_atomic;
 use crate::files::error::FileError;
 use crate::files::own_glass::maker;
 use crate::files::text::{number, numbers};
-use crate::lens::glass::{DispersionFormula, Glass};
+use crate::lens::glass::{DispersionFormula, Glass, GlassStatus};
 use serde::Serialize;
 use std::collections::BTreeSet;
 use std::fmt::Write;
@@ -29,7 +29,7 @@ pub struct AgfExport {
 }
 
 /// Writes glasses as a catalogue. Its maker is the name of the file; the records have the formula, nd and vd,
-/// the range, the density, the status and the cost, which is all that the program keeps of a glass.
+/// the range, and of the density and the properties what is known.
 ///
 /// # Errors
 /// No glass that can be written, one whose index differs when it is read back, or a file that cannot be
@@ -78,23 +78,30 @@ fn record(glass: &Glass) -> Option<String> {
     let (formula, coefficients) = agf_formula(glass.formula, &glass.coefficients)?;
     let name = short_name(glass);
     let missing = || "-".to_owned();
-    let status = status_number(glass.status).map_or_else(missing, |status| status.to_string());
+    let known = glass.properties().cloned().unwrap_or_default();
+    let status = status_number(known.status).map_or_else(missing, |status| status.to_string());
     let partial = glass.partial_dispersion().map_or_else(missing, |partial| {
         // The deviation from the line of normal glasses through K7 and F2.
         number(partial - (0.6438 - 0.001682 * glass.vd))
     });
     let density = glass.density.map_or_else(missing, number);
-    let cost = glass.relative_cost.map_or_else(missing, number);
+    let or_missing = |value: Option<f64>| value.map_or_else(missing, number);
+    let (cost, expansion) = (or_missing(known.relative_cost), or_missing(known.expansion));
+    let resistance = known.resistance.map(or_missing).join(" ");
     let code = six_digits(glass).unwrap_or_else(missing);
     let mut text = String::new();
-    let lines = [
+    let mut lines = vec![
         format!("NM {name} {formula} {code} {} 0 {status} -", numbers([glass.nd, glass.vd])),
         format!("GC {}", glass.full_name()),
-        format!("ED - - {density} {partial} 0"),
+        format!("ED {expansion} - {density} {partial} 0"),
         format!("CD {}", numbers(coefficients)),
-        format!("OD {cost} - - - - -"),
+        format!("OD {cost} {resistance}"),
         format!("LD {}", numbers(glass.range_um)),
     ];
+    lines.extend(known.thermal.map(|thermal| {
+        format!("TD {} {}", numbers(thermal.coefficients), number(thermal.celsius))
+    }));
+    lines.extend(known.transmission.iter().map(|line| format!("IT {}", numbers(*line))));
     for line in lines {
         write!(text, "{line}\r\n").ok()?;
     }
@@ -111,9 +118,8 @@ fn six_digits(glass: &Glass) -> Option<String> {
     known.then(digits)
 }
 
-fn status_number(status: Option<&str>) -> Option<usize> {
-    let all = ["standard", "preferred", "obsolete", "special", "melt"];
-    all.iter().position(|name| Some(*name) == status)
+fn status_number(status: Option<GlassStatus>) -> Option<usize> {
+    GlassStatus::ALL.iter().position(|other| Some(*other) == status)
 }
 
 /// The number of a formula and its coefficients in the order of the format.
@@ -189,7 +195,7 @@ fn largest_difference(text: &str, glasses: &[&Glass], path: &Path) -> Result<f64
         let [low, high] = glass.range_um;
         for k in 0..WAVELENGTHS {
             let um = low + (high - low) * k as f64 / (WAVELENGTHS - 1) as f64;
-            let apart = match (glass.index(um), read.glass.index(um)) {
+            let apart = match (glass.index(um), read.index(um)) {
                 (Some(own), Some(read)) => (own - read).abs(),
                 (None, None) => 0.0,
                 _ => f64::INFINITY,

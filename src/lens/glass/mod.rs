@@ -2,14 +2,18 @@
 //!
 //! The catalogue is `assets/glasses.json`, a subset of the refractiveindex.info database (CC0);
 //! `assets/further_glasses.json` holds more of it, for lenses that name those glasses.
-//! Indices are relative to air at about 20 °C, as in the catalogues of the manufacturers. A person may
-//! add catalogues of their own with [`add`].
+//! Indices are relative to air at about 20 °C, as in the catalogues of the manufacturers, or at another
+//! temperature with [`Glass::index_at`]. A person may add catalogues of their own with [`add`].
 
 mod added;
 mod dispersion;
+mod properties;
+mod thermal;
 
 pub use added::{add, added_glasses, additions};
 pub use dispersion::DispersionFormula;
+pub use properties::{GlassProperties, GlassStatus};
+pub use thermal::{THERMAL_RANGE, ThermalDispersion};
 
 use serde::Deserialize;
 use std::collections::HashMap;
@@ -51,12 +55,10 @@ pub struct Glass {
     /// The density in g/cm³; `None` if the catalogue does not have it.
     #[serde(rename = "density_g_cm3", default)]
     pub density: Option<f64>,
-    /// Its status with the maker, such as `preferred`; `None` if its catalogue does not say.
+    /// What else its catalogue says of it; `None` for a glass of the program, whose properties are found by
+    /// its name.
     #[serde(skip)]
-    pub status: Option<&'static str>,
-    /// The price relative to that of N-BK7; `None` if the catalogue does not have it.
-    #[serde(skip)]
-    pub relative_cost: Option<f64>,
+    pub own_properties: Option<Box<GlassProperties>>,
 }
 
 impl Glass {
@@ -67,6 +69,34 @@ impl Glass {
             return None;
         }
         self.formula.index(&self.coefficients, um)
+    }
+
+    /// What is known of it beside its dispersion; `None` if nothing is.
+    pub fn properties(&self) -> Option<&GlassProperties> {
+        self.own_properties.as_deref().or_else(|| properties::find(&self.full_name()))
+    }
+
+    /// The index at a wavelength in micrometres and a temperature in °C, relative to air of that
+    /// temperature; `None` outside the range of the formula, or if its change with temperature is unknown.
+    pub fn index_at(&self, um: f64, celsius: f64) -> Option<f64> {
+        let thermal = self.properties()?.thermal?;
+        Some(thermal.index_at(self.index(um)?, um, celsius))
+    }
+
+    /// True if its name says that it is free of lead and arsenic: the makers mark such glasses (Schott `N-`
+    /// and `P-`, Ohara `S-` and `L-`, CDGM `H-` and `D-`, Sumita `K-`, Hikari `J-` and `Q-`, Hoya `E-`, `M-`
+    /// and `MC-`). A glass without a mark may be free of them too.
+    pub fn is_marked_lead_free(&self) -> bool {
+        let marks: &[&str] = match self.manufacturer.as_str() {
+            "SCHOTT" => &["N-", "P-"],
+            "OHARA" => &["S-", "L-"],
+            "CDGM" => &["H-", "D-"],
+            "SUMITA" => &["K-"],
+            "HIKARI" => &["J-", "Q-"],
+            "HOYA" => &["E-", "M-", "MC-"],
+            _ => &[],
+        };
+        marks.iter().any(|mark| self.name.starts_with(mark))
     }
 
     /// The partial dispersion `PgF = (ng − nF)/(nF − nC)`; `None` if the formula does not reach these lines.

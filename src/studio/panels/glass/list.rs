@@ -4,7 +4,7 @@ use std::cmp::Ordering;
 
 use crate::files::GlassQuery;
 use crate::lens::Medium;
-use crate::lens::glass::{self, Glass};
+use crate::lens::glass::{self, Glass, GlassProperties};
 
 /// A glass of the table.
 #[derive(Debug, Clone, Copy)]
@@ -12,6 +12,7 @@ pub(super) struct ListedGlass {
     pub(super) glass: &'static Glass,
     /// The partial dispersion `PgF`.
     pub(super) partial: Option<f64>,
+    properties: Option<&'static GlassProperties>,
 }
 
 /// False for a glass that is not known at the lines of the Abbe number, as those for the infrared.
@@ -21,7 +22,7 @@ fn has_abbe_number(glass: &Glass) -> bool {
 
 impl ListedGlass {
     pub(super) fn new(glass: &'static Glass) -> Self {
-        Self { glass, partial: glass.partial_dispersion() }
+        Self { glass, partial: glass.partial_dispersion(), properties: glass.properties() }
     }
 
     pub(super) fn numbers(self) -> GlassNumbers {
@@ -38,8 +39,10 @@ impl ListedGlass {
             GlassColumn::Abbe => has_abbe_number(glass).then_some(CellValue::Number(glass.vd)),
             GlassColumn::Partial => self.partial.map(CellValue::Number),
             GlassColumn::Density => glass.density.map(CellValue::Number),
-            GlassColumn::Price => glass.relative_cost.map(CellValue::Number),
-            GlassColumn::Status => glass.status.map(CellValue::Word),
+            GlassColumn::Price => self.properties?.relative_cost.map(CellValue::Number),
+            GlassColumn::Status => {
+                self.properties?.status.map(|status| CellValue::Word(status.name()))
+            }
             GlassColumn::Distance => {
                 near.map(|near| CellValue::Number(glass::distance(glass, near.nd, near.vd)))
             }
@@ -63,7 +66,20 @@ impl ListedGlass {
             known.map(|column| format!("{} {}", column.title(), self.text(column))).collect();
         let [nd, vd, partial] = [GlassColumn::Index, GlassColumn::Abbe, GlassColumn::Partial]
             .map(|column| format!("{} {}", column.title(), self.text(column)));
-        format!("{}\n{nd}, {vd}, {partial}\n{}", self.glass.full_name(), words.join(", "))
+        let mut text =
+            format!("{}\n{nd}, {vd}, {partial}\n{}", self.glass.full_name(), words.join(", "));
+        if let Some(expansion) = self.properties.and_then(|known| known.expansion) {
+            text.push_str(&format!("\nexpansion {expansion:.1}e-6/K"));
+        }
+        if let Some(thermal) = self.properties.and_then(|known| known.thermal) {
+            let slope = 1e6 * thermal.slope_at_d(self.glass.nd);
+            text.push_str(&format!("\ndn/dT {slope:.1}e-6/K (d, 20 °C)"));
+        }
+        let passed = self.properties.and_then(|known| known.internal_transmission(0.42, 10.0));
+        if let Some(share) = passed {
+            text.push_str(&format!("\npasses {:.1} % at 420 nm through 10 mm", 100.0 * share));
+        }
+        text
     }
 }
 

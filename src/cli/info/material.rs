@@ -1,0 +1,103 @@
+//! The mass of the glass, and the light that it absorbs.
+
+use crate::cli::output::ShortNumber;
+use crate::lens::{Lens, Medium, SurfaceNumber, at_zoom, glass};
+use crate::report::{LayoutScene, LensBody};
+use serde::Serialize;
+
+/// The wavelengths in µm at which the transmission is told: glass absorbs blue light first.
+const WAVELENGTHS: [f64; 5] = [0.4, 0.42, 0.45, 0.55, 0.65];
+
+/// The glass of a lens.
+#[derive(Serialize, Clone)]
+pub(super) struct Material {
+    /// The mass in g of all elements; `None` if that of one is not known, or its solid cannot be made.
+    mass_g: Option<f64>,
+    /// Empty where no absorption is known.
+    internal_transmission: Vec<Transmission>,
+    /// The surfaces in front of media whose transmission is not known, which is taken as 1.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    unknown_transmission: Vec<SurfaceNumber>,
+}
+
+/// The light that the glass lets through along the axis, without what surfaces reflect.
+#[derive(Serialize, Clone)]
+struct Transmission {
+    um: f64,
+    /// `None` where a known glass has no data at this wavelength.
+    share: Option<f64>,
+}
+
+impl Material {
+    /// The glass of a lens at a zoom position; `None` for a lens without any.
+    pub(super) fn new(lens: &Lens, zoom: usize) -> Option<Self> {
+        let lens = at_zoom(lens, zoom);
+        let is_filled = |medium: &Medium| !matches!(medium, Medium::Air | Medium::Mirror);
+        let filled: Vec<usize> =
+            (0..lens.surfaces.len()).filter(|i| is_filled(&lens.surfaces[*i].medium)).collect();
+        if filled.is_empty() {
+            return None;
+        }
+        let (known, unknown): (Vec<usize>, Vec<usize>) =
+            filled.into_iter().partition(|i| has_transmission(&lens.surfaces[*i].medium));
+        let transmission = |um: f64| Transmission { um, share: share(&lens, &known, um) };
+        Some(Self {
+            mass_g: mass(&lens),
+            internal_transmission: if known.is_empty() {
+                Vec::new()
+            } else {
+                WAVELENGTHS.into_iter().map(transmission).collect()
+            },
+            unknown_transmission: unknown.into_iter().map(SurfaceNumber::new).collect(),
+        })
+    }
+
+    /// The lines of the report.
+    pub(super) fn text(&self) -> String {
+        let mass = self
+            .mass_g
+            .map_or_else(|| "mass unknown".to_owned(), |mass| format!("{} g", ShortNumber(mass)));
+        let passed = |at: &Transmission| {
+            let share = at.share.map_or_else(|| "?".to_owned(), |share| format!("{share:.3}"));
+            format!("{share} at {:.0} nm", 1e3 * at.um)
+        };
+        let list: Vec<String> = self.internal_transmission.iter().map(passed).collect();
+        if list.is_empty() {
+            return format!("glass           {mass}; absorption unknown");
+        }
+        let mut text = format!("glass           {mass}; passes on the axis {}", list.join(", "));
+        if !self.unknown_transmission.is_empty() {
+            let numbers: Vec<String> =
+                self.unknown_transmission.iter().map(SurfaceNumber::to_string).collect();
+            text.push_str(&format!(
+                "\n                (absorption behind surface {} unknown, taken as none)",
+                numbers.join(", ")
+            ));
+        }
+        text
+    }
+}
+
+/// The mass of all elements in g.
+fn mass(lens: &Lens) -> Option<f64> {
+    let bodies = LayoutScene::new(lens, 0).ok()?.bodies();
+    let masses = bodies.iter().map(|body| body.solid().ok().and_then(LensBody::mass));
+    let total: Option<f64> = masses.sum();
+    total.filter(|mass| mass.is_finite())
+}
+
+fn has_transmission(medium: &Medium) -> bool {
+    let Medium::Glass(name) = medium else { return false };
+    let properties = glass::find(name).and_then(|glass| glass.properties());
+    properties.is_some_and(|known| !known.transmission.is_empty())
+}
+
+/// The share of the light on the axis that passes the glass of some gaps.
+fn share(lens: &Lens, gaps: &[usize], um: f64) -> Option<f64> {
+    let through = |gap: &usize| {
+        let row = &lens.surfaces[*gap];
+        let Medium::Glass(name) = &row.medium else { return None };
+        glass::find(name)?.properties()?.internal_transmission(um, row.thickness.abs())
+    };
+    gaps.iter().map(through).product()
+}
