@@ -39,6 +39,16 @@ pub enum LensError {
         /// Similar names of the catalogue.
         similar: Vec<String>,
     },
+    /// The expansion of a medium, or the change of its index with temperature, is unknown.
+    #[error(
+        "the change of {name} {place} with temperature is unknown; expected a glass whose catalogue has it"
+    )]
+    NoThermalData {
+        /// The gap.
+        place: MediumPlace,
+        /// The medium.
+        name: String,
+    },
     /// A wavelength lies outside the data of a glass.
     #[error(
         "{name} {place} has no index at {um} um; expected a wavelength from {low} to {high} um"
@@ -126,6 +136,7 @@ impl Lens {
             return Err(LensError::Inconsistent(text));
         }
         self.check_stop()?;
+        self.environment.check()?;
         self.check_rows()?;
         self.check_object()?;
         self.check_wavelengths()?;

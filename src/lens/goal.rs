@@ -306,6 +306,11 @@ impl Term {
         )
     }
 
+    /// True if it compares the lens at several temperatures.
+    pub const fn concerns_temperature(self) -> bool {
+        matches!(self, Self::Operand { kind: OperandKind::ThermalFocus, .. })
+    }
+
     /// Multiplies its lengths by a factor.
     fn scale(&mut self, factor: f64) {
         match self {

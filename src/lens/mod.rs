@@ -14,6 +14,7 @@ mod correlation;
 mod diff;
 mod edit;
 mod element;
+mod environment;
 mod freeform;
 mod geometry;
 pub mod glass;
@@ -31,6 +32,7 @@ mod spectrum;
 mod starting;
 mod surface_number;
 mod system;
+mod thermal;
 mod tolerance;
 mod variables;
 mod zoom;
@@ -45,6 +47,7 @@ pub use correlation::{CorrelatedErrors, ErrorCorrelation};
 pub use diff::added_glass;
 pub use edit::{Edit, EditError, EditedCell, ElementEdit, apply_edit};
 pub use element::{ElementForm, NewElement};
+pub use environment::{Environment, ROOM_CELSIUS};
 pub use freeform::{BASE_NUMBERS, BaseSag, FREEFORM_NUMBERS, Freeform, FreeformKind};
 pub use goal::{Goal, LimitTreatment, PupilEdge, Term, WeightedTerm};
 pub use grin::{GradientIndex, ParaxialGrin};
@@ -59,6 +62,7 @@ pub use spectrum::WavelengthPreset;
 pub use starting::{StartingForm, StartingLens};
 pub use surface_number::{MediumPlace, SurfaceNumber};
 pub use system::{Shape, Surface, System, SystemError};
+pub use thermal::TemperatureChange;
 pub use tolerance::{ErrorDistribution, Tolerance, ToleranceGrade, ToleranceSheet};
 pub use variables::{ParameterKind, add_variable, add_variables, at_zoom};
 pub use zoom::{ZoomNumber, ZoomPosition};
@@ -98,6 +102,8 @@ pub struct Lens {
     /// The displacement in mm of the image plane from the paraxial image, to which the last
     /// thickness is solved; `None` if the last thickness is as written.
     pub image_solve: Option<f64>,
+    /// The temperature and the mount.
+    pub environment: Environment,
     /// The merit function; `None` for the one that the program proposes.
     pub merit: Option<Goal>,
     /// The tolerances; `None` for a lens that has none yet.
@@ -413,6 +419,7 @@ pub fn blank() -> Lens {
         variables: Vec::new(),
         pickups: Vec::new(),
         image_solve: None,
+        environment: Environment::default(),
         merit: None,
         tolerances: None,
     }

@@ -43,6 +43,9 @@ pub enum OperandKind {
     /// The distance from the middle between the paraxial images at the shortest and the longest
     /// wavelength to that at the primary one, in mm: what is left of axial colour where these two agree.
     SecondarySpectrum,
+    /// The motion of the paraxial image against the image plane, which the mount holds, when the lens warms
+    /// from 0 to 40 °C, in mm: zero for an athermal lens.
+    ThermalFocus,
     /// The distance from the image point of a chief ray at the longest wavelength to that at the
     /// shortest, in mm.
     LateralColor,
@@ -50,7 +53,7 @@ pub enum OperandKind {
 
 impl OperandKind {
     /// All kinds, in the order in which an editor lists them.
-    pub const ALL: [Self; 15] = [
+    pub const ALL: [Self; 16] = [
         Self::Gap,
         Self::Track,
         Self::Sag,
@@ -65,6 +68,7 @@ impl OperandKind {
         Self::ThirdOrderDistortion,
         Self::AxialColor,
         Self::SecondarySpectrum,
+        Self::ThermalFocus,
         Self::LateralColor,
     ];
 
@@ -85,6 +89,7 @@ impl OperandKind {
             Self::ThirdOrderDistortion => "third_order_distortion",
             Self::AxialColor => "axial_color",
             Self::SecondarySpectrum => "secondary_spectrum",
+            Self::ThermalFocus => "thermal_focus",
             Self::LateralColor => "lateral_color",
         }
     }
@@ -120,6 +125,7 @@ impl OperandKind {
             }
             Self::Telecentricity | Self::LateralColor => &[Fields, Wavelengths, Zooms],
             Self::AxialColor | Self::SecondarySpectrum => &[Wavelengths, Zooms],
+            Self::ThermalFocus => &[Zooms],
             // Distances, sags and third-order sums.
             _ => &[Surfaces, Zooms],
         }

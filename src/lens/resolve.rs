@@ -90,11 +90,12 @@ impl Lens {
     }
 
     fn resolve_unsolved(&self, um: f64) -> Result<System<f64>, LensError> {
-        let index_before = index(&self.object_medium, MediumPlace::Object, um, 1.0)?;
+        let celsius = self.environment.celsius;
+        let index_before = index_at(&self.object_medium, MediumPlace::Object, um, 1.0, celsius)?;
         let mut surfaces = Vec::with_capacity(self.surfaces.len() + 1);
         let mut current = index_before;
         for (i, row) in self.surfaces.iter().enumerate() {
-            current = index(&row.medium, MediumPlace::behind(i), um, current)?;
+            current = index_at(&row.medium, MediumPlace::behind(i), um, current, celsius)?;
             let mut surface = row.surface(current, um);
             // A GRIN medium with a constant index is homogeneous.
             surface.grin = self.grin_coefficients(i).filter(|grin| !grin.is_constant());
@@ -162,28 +163,50 @@ fn check_lowest_index(i: usize, surface: &Surface<f64>) -> Result<(), LensError>
     Err(SystemError::Grin { surface: i.into(), why }.into())
 }
 
-/// The index of a medium at a wavelength in micrometres; that of the gap in front for a mirror.
+/// The index of a medium at a wavelength in micrometres and the temperature of its catalogue; that of the
+/// gap in front for a mirror.
 pub(super) fn index(
     medium: &Medium,
     place: MediumPlace,
     um: f64,
     before: f64,
 ) -> Result<f64, LensError> {
+    index_at(medium, place, um, before, None)
+}
+
+/// The index of a medium at a wavelength in micrometres and a temperature in °C, or that of its catalogue;
+/// that of the gap in front for a mirror.
+pub(super) fn index_at(
+    medium: &Medium,
+    place: MediumPlace,
+    um: f64,
+    before: f64,
+    celsius: Option<f64>,
+) -> Result<f64, LensError> {
+    let known = |index: f64| match celsius {
+        Some(_) if index != 1.0 => {
+            Err(LensError::NoThermalData { place, name: format!("the index {index}") })
+        }
+        _ => Ok(index),
+    };
     match medium {
         Medium::Air => Ok(1.0),
         Medium::Mirror => Ok(before),
-        Medium::Index(n) => Ok(*n),
-        Medium::Model { nd, vd } => Ok(glass::model_index(*nd, *vd, um)),
-        Medium::Grin(grin) => index(&grin.base, place, um, before),
+        Medium::Index(n) => known(*n),
+        Medium::Model { nd, vd } => known(glass::model_index(*nd, *vd, um)),
+        Medium::Grin(grin) => index_at(&grin.base, place, um, before, celsius),
         Medium::Glass(name) => {
             let Some(found) = glass::find(name) else {
                 let similar = glass::similar_names(name);
                 return Err(LensError::UnknownGlass { place, name: name.clone(), similar });
             };
-            found.index(um).ok_or_else(|| {
+            let index = found.index(um).ok_or_else(|| {
                 let [low, high] = found.range_um;
                 LensError::WavelengthOutOfRange { place, name: name.clone(), um, low, high }
-            })
+            })?;
+            let Some(celsius) = celsius else { return Ok(index) };
+            let unknown = || LensError::NoThermalData { place, name: name.clone() };
+            found.index_at(um, celsius).ok_or_else(unknown)
         }
     }
 }

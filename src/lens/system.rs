@@ -128,6 +128,24 @@ impl<R: Real> Shape<R> {
         }
     }
 
+    /// The same form with all lengths times a factor: a curvature is divided by it, a coefficient of `rⁿ` by
+    /// its power `n − 1`.
+    #[must_use]
+    pub fn scaled(self, factor: f64) -> Self {
+        let by = |power: i32| R::from_f64(factor.powi(-power));
+        match self {
+            Self::Plane => Self::Plane,
+            Self::Sphere { curvature } => Self::Sphere { curvature: curvature * by(1) },
+            Self::Conic { curvature, conic } => Self::Conic { curvature: curvature * by(1), conic },
+            Self::Asphere { curvature, conic, mut terms } => {
+                for (term, power) in terms.iter_mut().zip((3..).step_by(2)) {
+                    *term = *term * by(power);
+                }
+                Self::Asphere { curvature: curvature * by(1), conic, terms }
+            }
+        }
+    }
+
     /// The curvature at the vertex, in 1/mm.
     pub fn curvature(&self) -> R {
         self.numbers().0

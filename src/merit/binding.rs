@@ -7,13 +7,16 @@
 use super::{MeritError, SLOPES, VariableDual};
 use crate::lens::glass::model_index;
 use crate::lens::{
-    Aperture, FieldKind, Lens, Medium, Object, Parameter, Quantity, Shape, Surface, System,
-    at_zoom, paraxial_image_distance,
+    Aperture, FieldKind, Lens, LensError, Medium, Object, OperandKind, Parameter, Quantity, Shape,
+    Surface, System, TemperatureChange, at_zoom, paraxial_image_distance,
 };
 use crate::paraxial::Beam;
 use crate::pupil::{Aiming, RayModel, filled_stop_radius};
 use crate::trace::{SurfaceParameter, SystemGradient};
 use nalgebra::{DMatrix, DVector};
+
+/// The temperatures in °C that the term of thermal focus compares.
+const THERMAL_FOCUS_CELSIUS: [f64; 2] = [0.0, 40.0];
 
 /// A number of a system that follows a variable: `offset + factor × variable`.
 #[derive(Debug, Clone, Copy)]
@@ -51,6 +54,8 @@ pub(super) struct Configuration {
     /// The semi-diameters of the light at surfaces whose rims nobody has fixed, in mm; infinite at the
     /// others.
     clear_rims: Vec<f64>,
+    /// The changes to the temperatures that a term compares; `None` if none does.
+    temperatures: Option<Result<[TemperatureChange; 2], LensError>>,
 }
 
 /// The systems of a zoom position at some values of the variables.
@@ -119,7 +124,27 @@ impl Configuration {
             bindings,
             systems,
             clear_rims: Vec::new(),
+            temperatures: None,
         })
+    }
+
+    /// Finds the changes of the lens to the temperatures that the term of thermal focus compares.
+    pub(super) fn find_temperature_changes(&mut self, lens: &Lens) {
+        let um = lens.wavelengths[self.primary].um;
+        let [cold, warm] = THERMAL_FOCUS_CELSIUS.map(|at| TemperatureChange::new(lens, um, at));
+        self.temperatures = Some(cold.and_then(|cold| Ok([cold, warm?])));
+    }
+
+    /// The changes to the temperatures that the term of thermal focus compares.
+    pub(super) fn temperature_changes(&self) -> Result<&[TemperatureChange; 2], MeritError> {
+        match &self.temperatures {
+            Some(Ok(changes)) => Ok(changes),
+            Some(Err(error)) => Err(error.clone().into()),
+            None => {
+                let why = "the changes with temperature were not asked for";
+                Err(MeritError::DoesNotApply { term: OperandKind::ThermalFocus.name(), why })
+            }
+        }
     }
 
     /// Gives surfaces whose rims nobody has fixed the semi-diameters of the light.

@@ -184,6 +184,9 @@ impl Merit {
             tolerance,
         };
         merit.goal.check(lens)?;
+        if merit.goal.terms.iter().any(|weighted| weighted.term.concerns_temperature()) {
+            merit.zooms.iter_mut().for_each(|zoom| zoom.find_temperature_changes(lens));
+        }
         merit.resample(lens)?;
         merit.initial_areas = merit.samplings.iter().map(RaySampling::areas).collect();
         Ok(merit)

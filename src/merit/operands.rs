@@ -8,8 +8,8 @@ use super::spot::lost_chief_error;
 use super::sum::{DerivativeLevel, SumOfSquares};
 use super::{EvaluationContext, MeritError, Term, WeightedTerm};
 use crate::lens::{
-    Aperture, IndexRange, LensError, OperandKind, System, TermScope, TermSelection,
-    paraxial_image_distance,
+    Aperture, IndexRange, LensError, OperandKind, System, TemperatureChange, TermScope,
+    TermSelection, paraxial_image_distance,
 };
 use crate::math::{Real, Vec3};
 use crate::paraxial::{SeidelSums, first_order, seidel};
@@ -185,6 +185,11 @@ impl Operand<'_> {
                     .map(|i| paraxial_image_distance(&systems[i], self.context.zoom.object));
                 middle - (short + long) * R::from_f64(0.5)
             }
+            OperandKind::ThermalFocus => {
+                let changes = self.context.zoom.temperature_changes()?;
+                let focus = |change: &TemperatureChange| self.defocus(&change.apply(system));
+                focus(&changes[1]) - focus(&changes[0])
+            }
             OperandKind::LateralColor => {
                 let [short, long] = self.outer_wavelengths();
                 let image = self.rows();
@@ -200,6 +205,12 @@ impl Operand<'_> {
             OperandKind::IncidenceAngle => self.chief(system, site)?.incidence(surface)?,
             kind => self.third_order(kind, systems, system)?,
         })
+    }
+
+    /// The distance from the image plane to the paraxial image, in mm.
+    fn defocus<R: Real>(&self, system: &System<R>) -> R {
+        let gap = system.surfaces[self.rows() - 1].thickness;
+        paraxial_image_distance(system, self.context.zoom.object) - gap
     }
 
     /// The wavelengths of the scope at the ends of the spectrum, the shorter one first.

@@ -13,6 +13,7 @@ mod illumination;
 mod point_spread;
 mod spot;
 mod spot_map;
+mod thermal;
 mod wavefront;
 
 use super::effects::{AllowedSetting, EffectArgs, EffectReport, EffectRule};
@@ -97,6 +98,21 @@ pub(super) struct AnalyzeArgs {
     #[arg(long, value_name = "N", default_value_t = 45)]
     ghosts: usize,
 
+    /// The temperatures of `thermal` in degrees C; the prescription is that of 20 unless the lens says another
+    #[arg(
+        long,
+        value_name = "C",
+        value_delimiter = ',',
+        allow_hyphen_values = true,
+        default_value = "-20,0,20,40,60"
+    )]
+    temperatures: Vec<f64>,
+
+    /// The linear expansion of the mount for `thermal`, in 1e-6/K; absent: that of the lens, 23.6 (aluminium)
+    /// unless it says another
+    #[arg(long, value_name = "EXPANSION", allow_negative_numbers = true)]
+    mount: Option<f64>,
+
     /// Writes all numbers as CSV into this file too
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
@@ -172,6 +188,8 @@ enum AnalysisKind {
     ThroughFocusMtf,
     /// Light that two surfaces reflect: size, irradiance, focus and the surfaces
     Ghosts,
+    /// Focus and RMS radius at several temperatures, with the image plane where the mount holds it
+    Thermal,
 }
 
 /// The rule for results at one wavelength.
@@ -226,7 +244,7 @@ impl AnalysisKind {
     /// The effects that the analysis does not leave to the plan.
     fn effect_rules(self) -> &'static [EffectRule] {
         match self {
-            Self::Spot | Self::Fan | Self::ThroughFocus | Self::Mtf => &[],
+            Self::Spot | Self::Fan | Self::ThroughFocus | Self::Mtf | Self::Thermal => &[],
             Self::LateralColor | Self::Longitudinal => &[COLORS],
             Self::Distortion | Self::DistortionGrid => &[ONE_WAVELENGTH, OBJECT_IN_PLACE],
             Self::SpotMap => &[ALL_FIELDS],
@@ -239,7 +257,9 @@ impl AnalysisKind {
     /// The purpose that effects are planned for.
     fn purpose(self, tolerance: f64) -> TracePurpose {
         match self {
-            Self::Spot | Self::SpotMap | Self::ThroughFocus => TracePurpose::Spot(tolerance),
+            Self::Spot | Self::SpotMap | Self::ThroughFocus | Self::Thermal => {
+                TracePurpose::Spot(tolerance)
+            }
             Self::Fan | Self::Distortion | Self::DistortionGrid => TracePurpose::Trace,
             _ => TracePurpose::Exact,
         }
@@ -251,6 +271,7 @@ impl AnalysisKind {
             Self::Spot
             | Self::SpotMap
             | Self::ThroughFocus
+            | Self::Thermal
             | Self::Fan
             | Self::Distortion
             | Self::DistortionGrid => EffectReport::counted(plan),
@@ -300,6 +321,10 @@ impl AnalyzeArgs {
             AnalysisKind::Ghosts => {
                 let lists = ghosts::ghost_lists(&run, self.coating, self.ghosts)?;
                 self.finish(&run, lists, output)
+            }
+            AnalysisKind::Thermal => {
+                let found = thermal::temperatures(&run, &self.temperatures, self.mount)?;
+                self.finish(&run, found, output)
             }
         }
     }

@@ -3,8 +3,8 @@
 use super::medium::is_air;
 use super::{VERSION, required_number, serialize_numbers};
 use crate::lens::{
-    Aperture, Fields, Goal, Lens, Medium, Object, Pickup, Row, ToleranceSheet, Variable,
-    Wavelength, ZoomPosition,
+    Aperture, Environment, Fields, Goal, Lens, Medium, Object, Pickup, Row, ToleranceSheet,
+    Variable, Wavelength, ZoomPosition,
 };
 use serde::de::value::MapAccessDeserializer;
 use serde::de::{Error as _, MapAccess, Unexpected, Visitor};
@@ -41,6 +41,8 @@ struct LensJson {
     variables: Vec<Variable>,
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pickups: Vec<Pickup>,
+    #[serde(default, skip_serializing_if = "Environment::is_default")]
+    environment: Environment,
     #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "required_goal")]
     merit: Option<Goal>,
     #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "required_sheet")]
@@ -75,6 +77,7 @@ impl Serialize for Lens {
             zoom: self.zoom.clone(),
             variables: self.variables.clone(),
             pickups: self.pickups.clone(),
+            environment: self.environment,
             merit: self.merit.clone(),
             tolerances: self.tolerances.clone(),
         }
@@ -103,6 +106,7 @@ impl<'de> Deserialize<'de> for Lens {
             variables: keys.variables,
             pickups: keys.pickups,
             image_solve: keys.focus,
+            environment: keys.environment,
             merit: keys.merit,
             tolerances: keys.tolerances,
         })

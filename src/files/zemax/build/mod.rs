@@ -15,7 +15,7 @@ use super::{glass, gradient};
 use crate::files::error::ParseError;
 use crate::files::foreign_lens::ForeignLens;
 use crate::files::report::{ConversionOutcome, ConversionReport};
-use crate::lens::{Lens, Medium, Object, Row};
+use crate::lens::{Environment, Lens, Medium, Object, Row};
 
 /// Builds the lens; the report receives everything that cannot be represented.
 pub(super) fn build(file: &ZemaxFile, report: &mut ConversionReport) -> Result<Lens, ParseError> {
@@ -42,6 +42,7 @@ pub(super) fn build(file: &ZemaxFile, report: &mut ConversionReport) -> Result<L
         variables: Vec::new(),
         pickups: Vec::new(),
         image_solve: None,
+        environment: Environment::default(),
         merit: None,
         tolerances: None,
     };

@@ -35,6 +35,7 @@ pub(super) const GROUPS: &[(&str, &[OperandKind])] = &[
         "Colour",
         &[OperandKind::AxialColor, OperandKind::SecondarySpectrum, OperandKind::LateralColor],
     ),
+    ("Temperature", &[OperandKind::ThermalFocus]),
 ];
 
 /// The title of an operand.
@@ -54,6 +55,7 @@ pub(super) const fn title(kind: OperandKind) -> &'static str {
         OperandKind::ThirdOrderDistortion => "Seidel: distortion",
         OperandKind::AxialColor => "Axial colour",
         OperandKind::SecondarySpectrum => "Secondary spectrum",
+        OperandKind::ThermalFocus => "Thermal focus",
         OperandKind::LateralColor => "Lateral colour",
     }
 }
@@ -83,6 +85,10 @@ pub(super) const fn hint(kind: OperandKind) -> &'static str {
         OperandKind::SecondarySpectrum => {
             "From the middle between the paraxial images at the shortest and the longest wavelength to \
              that at the primary one"
+        }
+        OperandKind::ThermalFocus => {
+            "The motion of the paraxial image against the image plane from 0 to 40 °C: glass expands and \
+             changes its index, and the mount expands"
         }
         OperandKind::LateralColor => {
             "From the image of a chief ray at the longest wavelength to that at the shortest"
