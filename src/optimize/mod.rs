@@ -4,6 +4,7 @@
 //! lets it become invalid, and always has a best lens.
 
 mod adam;
+mod exchanging;
 mod glasses;
 mod least_squares;
 mod limited;
@@ -12,6 +13,7 @@ mod segment;
 mod state;
 mod trust_region;
 
+pub use exchanging::start_exchanging;
 pub(crate) use glasses::hold_powers;
 pub use glasses::{GlassExchange, GlassRound, GlassSearch, GlassSearchError};
 pub use segment::{DescentState, SegmentResult, SegmentSettings, run_segment};

@@ -106,6 +106,13 @@ pub enum Command {
         /// The merit function.
         goal: Goal,
     },
+    /// Starts a local optimization of a copy of the design, after which its glasses are exchanged.
+    ExchangeGlasses {
+        /// The merit function.
+        goal: Goal,
+        /// The glasses that are tried, by words and ranges, as the Glass panel takes them.
+        words: String,
+    },
     /// Pauses the optimization after its current step.
     Pause,
     /// Resumes the optimization.

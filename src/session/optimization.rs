@@ -1,6 +1,7 @@
 //! Local optimization in the background, on a copy of the design.
 
 use super::run::{Engine, RunKind, RunStatus, RunView, thin_history};
+use crate::lens::glass::Glass;
 use crate::lens::{Lens, Parameter};
 use crate::merit::{Goal, TermValue};
 use crate::optimize::{DescentMethod, LimitPrice, OptimizationProgress, Optimizer};
@@ -25,6 +26,8 @@ pub struct OptimizationRequest {
     pub goal: Goal,
     /// The error allowed of the merit, relative to the size of the spots.
     pub tolerance: f64,
+    /// The glasses that those of the lens are exchanged for afterwards; `None` to keep them.
+    pub glasses: Option<Arc<[&'static Glass]>>,
 }
 
 /// Makes the optimizer of a request.
@@ -150,6 +153,10 @@ impl OptimizationEngine {
             return;
         }
         let lens = self.optimizer.current();
+        // The curve has the values of the variables alone.
+        if !has_media_of(lens, &self.state.request.lens) {
+            return;
+        }
         let curve = Arc::make_mut(&mut self.state.curve);
         if curve.points.is_empty() {
             let variables = &self.state.request.lens.variables;
@@ -165,6 +172,13 @@ impl OptimizationEngine {
     fn with_goal(&self, lens: &Lens) -> Lens {
         Lens { merit: Some(self.state.request.goal.clone()), ..lens.clone() }
     }
+}
+
+/// True if all gaps of two lenses have the same media.
+fn has_media_of(lens: &Lens, other: &Lens) -> bool {
+    let media =
+        |lens: &Lens| lens.surfaces.iter().map(|row| row.medium.clone()).collect::<Vec<_>>();
+    media(lens) == media(other)
 }
 
 impl Engine for OptimizationEngine {

@@ -54,6 +54,24 @@ fn a_glass_that_is_clicked_replaces_that_of_the_surface_in_one_step() {
 }
 
 #[test]
+fn listed_glasses_are_exchanged_by_an_optimization() {
+    let mut lens = double_gauss();
+    let button = "Optimize with these";
+    let mut harness = bench(lens.clone(), None);
+    search(&mut harness, "ohara lead=no");
+    press(&mut harness, button);
+    let [Command::ExchangeGlasses { words, .. }] = &harness.state().commands[..] else {
+        panic!("{:?}", harness.state().commands);
+    };
+    assert_eq!(words, "ohara lead=no");
+    // Without variables the lens could not follow another glass.
+    lens.variables.clear();
+    let mut harness = bench(lens, None);
+    press(&mut harness, button);
+    assert!(harness.state().commands.is_empty());
+}
+
+#[test]
 fn a_click_without_a_surface_of_glass_says_what_is_needed() {
     let air = double_gauss().surfaces.iter().position(|row| row.medium == Medium::Air).unwrap();
     for (selected, why) in [(None, "Choose a surface with glass"), (Some(air), "has air")] {

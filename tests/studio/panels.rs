@@ -212,7 +212,13 @@ fn searching(standing: RunStatus) -> SessionView {
     let view = view();
     let goal = Goal::default_for(&view.lens).unwrap();
     let method = DescentMethod::Adam;
-    let task = OptimizationRequest { method, lens: Arc::clone(&view.lens), goal, tolerance: 1e-3 };
+    let task = OptimizationRequest {
+        method,
+        lens: Arc::clone(&view.lens),
+        goal,
+        tolerance: 1e-3,
+        glasses: None,
+    };
     let refused = Some("ray 4 is lost: clipped at surface 3".to_owned());
     let progress = OptimizationProgress {
         step: 7,

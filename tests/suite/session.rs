@@ -6,7 +6,8 @@ use aplanat::experiments::{self, Effort, Experiment};
 use aplanat::files;
 use aplanat::lens::{
     Aperture, Edit, ElementEdit, FieldKind, FieldPoint, Fields, Lens, Medium, Object, Parameter,
-    Pickup, Quantity, Row, ToleranceSheet, Variable, ZoomNumber, ZoomPosition,
+    ParameterKind, Pickup, Quantity, Row, ToleranceSheet, Variable, ZoomNumber, ZoomPosition,
+    add_variables,
 };
 use aplanat::merit::{Goal, LimitTreatment, MeritError, PupilEdge, Term, TermValue, WeightedTerm};
 use aplanat::optimize::{DescentMethod, OptimizationProgress, Optimizer};
@@ -477,6 +478,37 @@ fn a_background_optimization_improves_the_double_gauss() {
     session.apply(Command::AcceptResult);
     assert_eq!(*session.lens(), session.view().lens);
     assert!(session.view().undo.is_some());
+}
+
+#[test]
+fn glasses_are_exchanged_after_an_optimization_and_taken_with_its_result() {
+    let mut lens = files::open("lenses/achromat_ac254_100.json").unwrap().lens;
+    lens.variables.clear();
+    lens.surfaces[1].medium = Medium::Glass("SCHOTT N-SF66".to_owned());
+    add_variables(&mut lens, &[ParameterKind::Curvatures]);
+    let goal = Goal::default_for(&lens).unwrap();
+    let mut session = Session::new(lens.clone(), || {}).unwrap();
+    let words = "schott vd=20..40".to_owned();
+    session.apply(Command::ExchangeGlasses { goal: goal.clone(), words });
+    wait(&mut session, "the end", |view, _| step_of(view) > 0 && !view.optimization.is_active());
+    let run = session.view().optimization.snapshot.unwrap();
+    let media =
+        |lens: &Lens| lens.surfaces.iter().map(|row| row.medium.clone()).collect::<Vec<_>>();
+    assert_ne!(media(&run.best), media(&lens));
+    // The curve is that of one set of glasses: the values of the variables are all that it has.
+    assert!(run.curve.points.iter().all(|point| point.merit > run.history.last().unwrap().best));
+    // A remark that was written meanwhile stays, and so do the new glasses.
+    session.apply(Command::Edit(Edit::SetNotes("kept".to_owned())));
+    session.apply(Command::AcceptResult);
+    let taken = session.view().lens;
+    assert_eq!((media(&taken), taken.notes.as_str()), (media(&run.best), "kept"));
+
+    for words in ["nd=x", "no such glass"] {
+        let refused = Command::ExchangeGlasses { goal: goal.clone(), words: words.to_owned() };
+        let events = session.apply(refused);
+        assert!(matches!(events.last(), Some(SessionEvent::Message(_))), "{words}: {events:?}");
+        assert!(!session.view().optimization.is_active());
+    }
 }
 
 #[test]

@@ -52,6 +52,8 @@ pub enum SessionEvent {
     Message(Message),
 }
 
+/// The seed of the order in which glasses are exchanged.
+const GLASS_SEED: u64 = 0;
 /// The maximum number of messages that are stored.
 const MAX_MESSAGES: usize = 200;
 /// The maximum number of rays of each field in the layout.
@@ -138,8 +140,14 @@ impl Session {
     /// A lens that cannot be used, or a system that cannot start a thread.
     pub fn new(lens: Lens, wake: impl Fn() + Send + Clone + 'static) -> io::Result<Self> {
         let start = |request: &OptimizationRequest| {
-            let OptimizationRequest { method, lens, goal, tolerance } = request;
-            let started = optimize::start(*method, lens, goal, *tolerance);
+            let OptimizationRequest { method, lens, goal, tolerance, glasses } = request;
+            let Some(glasses) = glasses else {
+                let started = optimize::start(*method, lens, goal, *tolerance);
+                return started.map_err(|why| why.to_string());
+            };
+            let glasses = glasses.iter().copied();
+            let started =
+                optimize::start_exchanging(*method, lens, goal, *tolerance, glasses, GLASS_SEED);
             started.map_err(|why| why.to_string())
         };
         Self::with_optimizer(lens, Box::new(start), wake)
@@ -232,7 +240,8 @@ impl Session {
             Command::ExportPaper { kind, path } => self.export_paper(kind, &path),
             Command::SaveImportReport(path) => self.save_import_report(&path),
             Command::AddGlasses(path) => self.add_glasses(&path),
-            Command::Optimize { method, goal } => self.optimize(method, goal),
+            Command::Optimize { method, goal } => self.optimize(method, goal, None),
+            Command::ExchangeGlasses { goal, words } => self.exchange_glasses(goal, &words),
             Command::Pause => self.optimization.pause(),
             Command::Resume => self.optimization.resume(),
             Command::Step => self.optimization.step(),

@@ -1,6 +1,8 @@
 //! The background runs of a session: starting them, their events, and accepting their lenses.
 
 use super::{Session, SessionEvent};
+use crate::files::GlassQuery;
+use crate::lens::glass::{self, Glass};
 use crate::lens::{Edit, Lens, apply_edit};
 use crate::merit::Goal;
 use crate::optimize::DescentMethod;
@@ -83,10 +85,29 @@ impl Session {
         None
     }
 
-    pub(super) fn optimize(&mut self, method: DescentMethod, goal: Goal) {
+    pub(super) fn optimize(
+        &mut self,
+        method: DescentMethod,
+        goal: Goal,
+        glasses: Option<Arc<[&'static Glass]>>,
+    ) {
         (self.preview_lens, self.shows_candidate) = (None, true);
         let (lens, tolerance) = (Arc::clone(&self.lens), self.settings.tolerance);
-        self.optimization.start(OptimizationRequest { method, lens, goal, tolerance });
+        self.optimization.start(OptimizationRequest { method, lens, goal, tolerance, glasses });
+    }
+
+    /// Optimizes a copy of the design and then exchanges its glasses for those that some words find.
+    pub(super) fn exchange_glasses(&mut self, goal: Goal, words: &str) {
+        let query = match GlassQuery::new(words.split_whitespace()) {
+            Ok(query) => query,
+            Err(why) => return self.post(Severity::Error, why.to_string()),
+        };
+        let found: Vec<&'static Glass> =
+            glass::known().filter(|glass| query.is_met_by(glass)).collect();
+        if found.is_empty() {
+            return self.post(Severity::Error, format!("found no glass for `{words}`"));
+        }
+        self.optimize(DescentMethod::TrustRegion, goal, Some(found.into()));
     }
 
     /// Makes the best lens of the optimization the design.
@@ -286,6 +307,12 @@ fn merge_result(run: &OptimizationSnapshot, design: &Arc<Lens>) -> Result<Lens, 
     for variable in &run.request.lens.variables {
         if let Some(value) = best.get(variable.parameter) {
             lens.set(variable.parameter, value);
+        }
+    }
+    let before = &run.request.lens.surfaces;
+    for ((row, best), before) in lens.surfaces.iter_mut().zip(&best.surfaces).zip(before) {
+        if best.medium != before.medium {
+            row.medium = best.medium.clone();
         }
     }
     let lens = apply_edit(&lens, &Edit::SetName(design.name.clone()));

@@ -7,11 +7,12 @@ mod table;
 
 use std::sync::Arc;
 
-use egui::{Align, ComboBox, Layout, RichText, TextEdit, Ui, vec2};
+use egui::{Align, Button, ComboBox, Layout, RichText, TextEdit, Ui, vec2};
 
 use super::{Panel, valid_edit};
 use crate::lens::glass::{self, Glass};
-use crate::lens::{Edit, GradientIndex, Lens, Medium, SurfaceNumber};
+use crate::lens::{Edit, GradientIndex, Lens, Medium, Row, SurfaceNumber};
+use crate::merit::Goal;
 use crate::session::{Command, SessionView};
 use crate::studio::actions::Actions;
 use crate::studio::cached::Cached;
@@ -90,7 +91,10 @@ impl GlassPanel {
                 .hint_text("Search: lak schott nd=1.7.. vd=50..")
                 .desired_width(200.0);
             let field = ui.add(line).accessible_name("Search the glasses");
-            field.on_hover_text("Parts of name and catalogue, and ranges of nd and vd: all must hold");
+            field.on_hover_text(
+                "Parts of name and catalogue, ranges of nd, vd, price and density, status=preferred, lead=no: \
+                 all must hold",
+            );
             let nearest = self.order.column == GlassColumn::Distance;
             let button = ui.selectable_label(nearest, "Nearest first");
             let hint = "The nearest glasses to that of the surface first: 0.001 in nd counts as much as \
@@ -108,7 +112,37 @@ impl GlassPanel {
             named_list(ui, shown, "Axes of the map");
             let noun = if count == 1 { "glass" } else { "glasses" };
             ui.weak(format!("{count} {noun}"));
+            self.exchange_button(ui, view, count, actions);
         });
+    }
+
+    /// A button that lets the optimizer try the listed glasses in place of those of the lens.
+    fn exchange_button(
+        &self,
+        ui: &mut Ui,
+        view: &SessionView,
+        count: usize,
+        actions: &mut Actions,
+    ) {
+        let is_glass = |row: &Row| matches!(row.medium, Medium::Glass(_) | Medium::Model { .. });
+        let reason = if view.optimization.is_active() {
+            "An optimization is running"
+        } else if view.lens.variables.is_empty() {
+            "No number is variable: the lens could not follow another glass"
+        } else if count == 0 || !view.lens.surfaces.iter().any(is_glass) {
+            "There is no glass to exchange"
+        } else {
+            ""
+        };
+        let goal = view.goal.as_ref().filter(|_| reason.is_empty());
+        let button = ui.add_enabled(goal.is_some(), Button::new("Optimize with these"));
+        let hint = "Optimizes a copy of the design, then exchanges its glasses for those listed here, as long \
+                    as the merit falls; the Optimizer has the result";
+        let button = button.on_hover_text(hint).on_disabled_hover_text(reason);
+        if let (true, Some(goal)) = (button.clicked(), goal) {
+            let (goal, words) = (Goal::clone(goal), self.query.clone());
+            actions.push(Command::ExchangeGlasses { goal, words });
+        }
     }
 
     /// The glass of the surface and the nearest one to it, or what a click needs.
