@@ -146,15 +146,18 @@ impl NumberEffects {
         Self { by_number, slopes: found.slopes }
     }
 
-    /// For x and y and each number, the sum of the effects of all numbers, each by its covariance with it.
-    fn covaried(&self, covariance: &NumberCovariance) -> [Vec<Vec<f64>>; 2] {
-        let row = |rows: &[Vec<f64>], covariances: &[(usize, f64)]| {
-            let mut sum = Vec::new();
-            combine(covariances, rows, &mut sum);
-            sum
-        };
-        let all = |rows: &Vec<Vec<f64>>| covariance.rows.iter().map(|c| row(rows, c)).collect();
-        [all(&self.by_number[0]), all(&self.by_number[1])]
+    fn covaried(&self, covariance: &NumberCovariance) -> CovariedEffects {
+        let mut products = vec![0.0; self.slopes[0].len()];
+        let mut rows = [Vec::new(), Vec::new()];
+        for (own, rows) in self.by_number.iter().zip(&mut rows) {
+            for (row, covariances) in own.iter().zip(&covariance.rows) {
+                let mut sum = Vec::new();
+                combine(covariances, own, &mut sum);
+                add_products(row, &sum, &mut products);
+                rows.push(sum);
+            }
+        }
+        CovariedEffects { rows, products }
     }
 
     /// Subtracts the values at the centroid of the field of some rays.
@@ -169,6 +172,15 @@ impl NumberEffects {
     }
 }
 
+/// The effects of numbers with those of others that are correlated with them.
+#[derive(Default)]
+struct CovariedEffects {
+    /// For x and y and each number, the sum of the effects of all numbers, each by its covariance with it.
+    rows: [Vec<Vec<f64>>; 2],
+    /// For each ray, the sum over both axes and all numbers of these sums times the effect of the number.
+    products: Vec<f64>,
+}
+
 /// The values of [`NumberEffects`] at the centroid of a field.
 struct FieldCenter {
     by_number: [Vec<f64>; 2],
@@ -179,8 +191,10 @@ struct FieldCenter {
 struct MadeChannel {
     tracer: Tracer<f64>,
     effects: NumberEffects,
-    /// For x and y and each number, the sum of the effects of all numbers, each by its covariance with it.
-    covaried: [Vec<Vec<f64>>; 2],
+    covaried: CovariedEffects,
+    /// For x and y, the effect on each ray of all numbers together, each by its covariance with the
+    /// displacement of the focus; empty unless derivatives are asked for.
+    along_focus: [Vec<f64>; 2],
     /// The weight of each ray in the term.
     weights: Vec<f64>,
     /// The index less that at the primary wavelength, behind each surface.
@@ -210,11 +224,12 @@ pub(super) fn add_growth(
     scope: TermScope,
     sum: &mut SumOfSquares,
 ) -> Result<(), MeritError> {
-    let growth = Growth::new(context, tolerances, scope)?;
+    let mut growth = Growth::new(context, tolerances, scope)?;
     sum.value += growth.value;
     if sum.level == DerivativeLevel::Value {
         return Ok(());
     }
+    growth.find_along_focus();
     let gradient = growth.gradient() + growth.edge_motion()?;
     sum.gradient += &gradient;
     if sum.level == DerivativeLevel::Normal && growth.value > 0.0 {
@@ -375,19 +390,22 @@ impl<'a> Growth<'a> {
         let mut primary = SystemGradient::zero(surfaces);
         for axis in 0..2 {
             self.add_lever_arms(channel, axis, &mut primary);
-            let mut direction = Vec::new();
+            let slopes = &channel.effects.slopes[axis];
             for (place, MadeNumber { surface, kind }) in self.covariance.numbers.iter().enumerate()
             {
-                self.displaced(channel, axis, place, &mut direction);
+                let covaried = &channel.covaried.rows[axis][place];
+                // The part that is due to the displacement of the focus.
+                let displaced = self.by_focus * self.covaried_focus[place];
                 let (number, factor) = match kind {
                     MadeKind::Number(number) => (*number, 1.0),
                     MadeKind::Abbe => (ErrorNumber::Index, -channel.dispersion[*surface]),
                 };
                 let row = directions.rows.row_mut(axis, *surface, number);
-                row.iter_mut().zip(&direction).for_each(|(to, by)| *to += factor * by);
+                add_combination(row, factor, covaried, factor * displaced, slopes);
                 if *kind == MadeKind::Abbe {
                     let by_index = self.index_row(channel, axis, *surface);
-                    let by_dispersion = -2.0 * weighted_dot(&channel.weights, &direction, by_index);
+                    let dot = |row: &[f64]| weighted_dot(&channel.weights, row, by_index);
+                    let by_dispersion = -2.0 * (dot(covaried) + displaced * dot(slopes));
                     of_index.surfaces[*surface].index += by_dispersion;
                     primary.surfaces[*surface].index -= by_dispersion;
                 }
@@ -405,31 +423,21 @@ impl<'a> Growth<'a> {
         place.map_or(&[], |place| &channel.effects.by_number[axis][place])
     }
 
-    /// The covaried effects of a number, with the part that is due to the displacement of the focus.
-    fn displaced(&self, channel: &MadeChannel, axis: usize, place: usize, sum: &mut Vec<f64>) {
-        let factor = self.by_focus * self.covaried_focus[place];
-        let pairs = channel.covaried[axis][place].iter().zip(&channel.effects.slopes[axis]);
-        sum.clear();
-        sum.extend(pairs.map(|(effect, slope)| effect + factor * slope));
-    }
-
     /// The derivative of the growth by the slope of each ray.
     fn slope_factors(&self, channel: &MadeChannel, axis: usize) -> Vec<f64> {
-        let along = self.along_focus(&channel.effects, axis);
-        let factor = |((weight, along), slope): ((&f64, f64), &f64)| {
+        let along = &channel.along_focus[axis];
+        let factor = |((weight, along), slope): ((&f64, &f64), &f64)| {
             2.0 * weight * (self.by_focus * along + self.by_slopes * slope)
         };
         channel.weights.iter().zip(along).zip(&channel.effects.slopes[axis]).map(factor).collect()
     }
 
-    /// The effect on each ray of all numbers together, each by its covariance with the displacement of
-    /// the focus.
-    fn along_focus(&self, effects: &NumberEffects, axis: usize) -> Vec<f64> {
-        let mut sum = vec![0.0; effects.slopes[axis].len()];
-        for (row, factor) in effects.by_number[axis].iter().zip(&self.covaried_focus) {
-            sum.iter_mut().zip(row).for_each(|(to, effect)| *to += factor * effect);
-        }
-        sum
+    /// Finds what derivatives need of each channel.
+    fn find_along_focus(&mut self) {
+        let by_focus = &self.covaried_focus;
+        self.channels
+            .par_iter_mut()
+            .for_each(|channel| channel.along_focus = along_focus(&channel.effects, by_focus));
     }
 
     /// Adds the derivatives by the distances of surfaces from the pivots of tilting bodies.
@@ -462,8 +470,11 @@ impl<'a> Growth<'a> {
         if self.context.traced_pupils.is_empty() {
             return Ok(DVector::zeros(self.context.values.len()));
         }
-        let of_channels: Vec<Vec<f64>> =
-            self.channels.par_iter().map(|c| self.costs(&c.effects, &c.covaried)).collect();
+        let of_channels: Vec<Vec<f64>> = self
+            .channels
+            .par_iter()
+            .map(|c| self.costs(&c.effects, &c.covaried, &c.along_focus))
+            .collect();
         self.context.sum_over_pupils(|sampled, traced| {
             let range = self.context.sampling.channels[sampled.wavelength].range(sampled.field);
             let channel = &self.channels[sampled.wavelength];
@@ -492,7 +503,8 @@ impl<'a> Growth<'a> {
             let mut effects =
                 NumberEffects::new(&channel.tracer, rays, covariance, &channel.dispersion);
             effects.center(all.clone(), &self.centers[sampled.field]);
-            let costs = self.costs(&effects, &effects.covaried(covariance));
+            let along = along_focus(&effects, &self.covaried_focus);
+            let costs = self.costs(&effects, &effects.covaried(covariance), &along);
             let excess = |i: usize| if landed.fate(i).is_imaged() { costs[i] - mean } else { 0.0 };
             all.map(|i| factor * excess(i)).collect()
         };
@@ -502,16 +514,15 @@ impl<'a> Growth<'a> {
     }
 
     /// The derivative of the growth by the weight of each ray, from effects and covaried ones.
-    fn costs(&self, effects: &NumberEffects, covaried: &[Vec<Vec<f64>>; 2]) -> Vec<f64> {
-        let mut costs = vec![0.0; effects.slopes[0].len()];
-        for axis in 0..2 {
-            for (row, covaried) in effects.by_number[axis].iter().zip(&covaried[axis]) {
-                add_products(row, covaried, &mut costs);
-            }
-            let along = self.along_focus(effects, axis);
-            for (cost, (along, slope)) in
-                costs.iter_mut().zip(along.iter().zip(&effects.slopes[axis]))
-            {
+    fn costs(
+        &self,
+        effects: &NumberEffects,
+        covaried: &CovariedEffects,
+        along_focus: &[Vec<f64>; 2],
+    ) -> Vec<f64> {
+        let mut costs = covaried.products.clone();
+        for (along, slopes) in along_focus.iter().zip(&effects.slopes) {
+            for (cost, (along, slope)) in costs.iter_mut().zip(along.iter().zip(slopes)) {
                 *cost += slope * (2.0 * self.by_focus * along + self.by_slopes * slope);
             }
         }
@@ -543,7 +554,8 @@ impl MadeChannel {
             let factor = part.factor(field, wavelength);
             weights[channel.range(field)].iter_mut().for_each(|weight| *weight *= factor);
         }
-        Ok(Self { tracer, effects, covaried: Default::default(), weights, dispersion })
+        let (covaried, along_focus) = Default::default();
+        Ok(Self { tracer, effects, covaried, along_focus, weights, dispersion })
     }
 
     /// Finds the covaried effects, once the effects are centred.
@@ -563,14 +575,24 @@ impl MadeChannel {
 
     /// The sum over all numbers of their effects' products, each by its covariance.
     fn mean_square(&self) -> f64 {
-        let rows = self.effects.by_number.iter().flatten().zip(self.covaried.iter().flatten());
-        rows.map(|(row, covaried)| weighted_dot(&self.weights, row, covaried)).sum()
+        self.weights.iter().zip(&self.covaried.products).map(|(w, product)| w * product).sum()
     }
 
     fn slope_square(&self) -> f64 {
         let of = |slopes: &Vec<f64>| weighted_dot(&self.weights, slopes, slopes);
         self.effects.slopes.iter().map(of).sum()
     }
+}
+
+/// For x and y, the effect on each ray of all numbers together, each times a factor.
+fn along_focus(effects: &NumberEffects, factors: &[f64]) -> [Vec<f64>; 2] {
+    let all: Vec<(usize, f64)> = factors.iter().copied().enumerate().collect();
+    [0, 1].map(|axis: usize| {
+        let mut sum = Vec::new();
+        combine(&all, &effects.by_number[axis], &mut sum);
+        sum.resize(effects.slopes[axis].len(), 0.0);
+        sum
+    })
 }
 
 /// Makes a row the sum of some others, each times a factor.
@@ -596,6 +618,19 @@ fn weighted_dot(weights: &[f64], a: &[f64], b: &[f64]) -> f64 {
         #[inline(always)]
         || sum_of_products([weights, a, b]),
     )
+}
+
+/// Adds two rows, each times a factor, to a sum.
+fn add_combination(sum: &mut [f64], by_a: f64, a: &[f64], by_b: f64, b: &[f64]) {
+    run_vectorized(
+        SimdWidth::detect(),
+        #[inline(always)]
+        || {
+            for (to, (a, b)) in sum.iter_mut().zip(a.iter().zip(b)) {
+                *to += by_a * a + by_b * b;
+            }
+        },
+    );
 }
 
 /// Adds the products of two rows to a sum.

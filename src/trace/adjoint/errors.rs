@@ -399,10 +399,11 @@ impl Tracer<f64> {
         let rows = ErrorRows::zeros(rays.len(), self.surfaces());
         let column = || vec![0.0; rays.len()];
         let mut found = ErrorSlopes { slopes: [column(), column()], rows };
+        let mut tape = self.empty_tape();
         self.visit_lanes(
             rays,
             #[inline(always)]
-            |traced| self.lane_slopes(traced, &mut found),
+            |traced| self.lane_slopes(traced, &mut tape, &mut found),
         );
         found
     }
@@ -415,12 +416,13 @@ impl Tracer<f64> {
         directions: &ErrorDirections,
     ) -> SystemGradient<f64> {
         let mut gradient = SystemGradient::zero(self.surfaces());
+        let mut tape = self.empty_tape();
         self.visit_lanes(
             rays,
             #[inline(always)]
             |traced| {
                 for axis in 0..2 {
-                    self.lane_gradient(traced, directions, axis, &mut gradient);
+                    self.lane_gradient(traced, &mut tape, (directions, axis), &mut gradient);
                 }
             },
         );
@@ -470,31 +472,40 @@ impl Tracer<f64> {
         TracedLanes { lane, start, distances: distances.iter().map(of).collect() }
     }
 
+    /// Room for rays at each surface, which every group overwrites.
+    fn empty_tape<R: ErrorReal>(&self) -> Vec<HitColumns<R>> {
+        vec![HitColumns::zero(); self.surfaces()]
+    }
+
     /// Takes rays to the image, and stores them at each surface.
     #[inline(always)]
-    fn tape<R: ErrorReal>(
+    fn record<R: ErrorReal>(
         &self,
         traced: &TracedLanes,
         errors: impl Fn(usize) -> ErrorColumns,
-    ) -> Vec<HitColumns<R>> {
+        tape: &mut [HitColumns<R>],
+    ) {
         let lift = |v: &Vectors<f64>| Vectors {
             x: v.x.map(R::from_f64),
             y: v.y.map(R::from_f64),
             z: v.z.map(R::from_f64),
         };
         let mut rays = RayColumns { point: lift(&traced.start.point), k: lift(&traced.start.k) };
-        let mut tape = vec![HitColumns::zero(); self.surfaces()];
-        for (i, (interface, hits)) in self.interfaces.iter().zip(&mut tape).enumerate() {
+        for (i, (interface, hits)) in self.interfaces.iter().zip(tape).enumerate() {
             let is_last = i + 1 == self.surfaces();
             let errors = errors(i);
             cross_surface(interface, &errors, (&mut rays, hits), &traced.distances[i], is_last);
         }
-        tape
     }
 
     #[inline(always)]
-    fn lane_slopes(&self, traced: &TracedLanes, found: &mut ErrorSlopes) {
-        let tape: Vec<HitColumns<f64>> = self.tape(traced, |_| ErrorColumns::NONE);
+    fn lane_slopes(
+        &self,
+        traced: &TracedLanes,
+        tape: &mut [HitColumns<f64>],
+        found: &mut ErrorSlopes,
+    ) {
+        self.record(traced, |_| ErrorColumns::NONE, tape);
         let Some(image) = tape.last() else { return };
         let Lane { from, count } = traced.lane;
         for j in 0..count {
@@ -518,13 +529,13 @@ impl Tracer<f64> {
     fn lane_gradient(
         &self,
         traced: &TracedLanes,
-        directions: &ErrorDirections,
-        axis: usize,
+        tape: &mut [HitColumns<ErrorDual>],
+        (directions, axis): (&ErrorDirections, usize),
         gradient: &mut SystemGradient<f64>,
     ) {
         let surface = |i: usize| (i, &self.interfaces[i]);
         let errors = |i: usize| ErrorColumns::load(&directions.rows, axis, surface(i), traced.lane);
-        let tape: Vec<HitColumns<ErrorDual>> = self.tape(traced, errors);
+        self.record(traced, errors, tape);
         let Some(image) = tape.last() else { return };
         let mut adjoint = AdjointColumns::<ErrorDual>::zero();
         for j in 0..traced.lane.count {
