@@ -135,7 +135,7 @@ impl TextLines for ThermalJson {
             ),
             ChartCurve::new("refocused", 1, self.temperatures.iter().map(refocused)),
         ];
-        let axes = ["temperature, °C", "rms radius, mm"];
+        let axes = ["temperature, C", "rms radius, mm"];
         vec![CurveChart::new("temperature", axes, curves)]
     }
 }
