@@ -4,6 +4,7 @@ mod bad_input;
 mod codev;
 mod mutations;
 mod old_files;
+mod optiland;
 mod oslo;
 mod ray_optics;
 mod round_trip;
