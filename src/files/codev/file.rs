@@ -179,6 +179,16 @@ impl SpecialForm {
         }
     }
 
+    /// The number of the last coefficient; those behind mean something else.
+    pub(super) const fn last(self) -> usize {
+        match self {
+            Self::XyPolynomial => 66,
+            Self::OddAsphere => 31,
+            Self::QBfs | Self::QCon => 16,
+            Self::FringeZernike => 40,
+        }
+    }
+
     /// The number of the coefficient that is the conic constant.
     pub(super) const fn conic(self) -> usize {
         match self {

@@ -73,7 +73,10 @@ pub(super) fn with_beam(file: &CodeVFile, lens: Lens, report: ConversionReport) 
 
 /// The vignetting factors of the fields at every zoom position; empty without any in the file.
 fn vignetting(file: &CodeVFile, fields: usize) -> ZoomedFactors {
-    let zoomed = || file.zoomed.iter().filter(|own| FACTORS.contains(&own.name.as_str()));
+    let zoomed = || {
+        let is_factor = |own: &&ZoomCommand| FACTORS.contains(&own.name.as_str());
+        file.zoomed.iter().filter(move |own| file.positions > 1 && is_factor(own))
+    };
     if file.vignetting.iter().all(Vec::is_empty) && zoomed().next().is_none() {
         return Vec::new();
     }

@@ -148,6 +148,9 @@ fn special_form(special: &CodeVSpecial) -> Option<Freeform<f64>> {
     let mut numbers = Vec::new();
     for (number, value) in special.terms.iter().filter(|(_, value)| **value != 0.0) {
         let at = number.checked_sub(special.form.first())?;
+        if *number > special.form.last() {
+            return None;
+        }
         numbers.resize(at + 1, 0.0);
         numbers[at] = *value;
         if kind == FreeformKind::OddAsphere {

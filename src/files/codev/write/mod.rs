@@ -230,8 +230,10 @@ impl CodeVWriter {
         }
         let suffix = field_suffix(self.lens.fields.kind);
         let points: Vec<Vec<[f64; 2]>> = all.iter().map(Fields::projected_points).collect();
+        let any_x = points.iter().flatten().any(|point| point[0] != 0.0);
+        let axes = || ["X", "Y"].into_iter().enumerate().filter(|(k, _)| any_x || *k == 1);
         for field in 0..self.lens.fields.values.len() {
-            for (k, axis) in ["X", "Y"].into_iter().enumerate() {
+            for (k, axis) in axes() {
                 let values = numbers(points.iter().map(|points| points[field][k]));
                 self.line(format!("ZOO {axis}{suffix} F{} {values}", field + 1));
             }

@@ -250,8 +250,7 @@ fn special_lines(kind: FreeformKind, numbers: &[f64], conic: &str) -> Option<Vec
         FreeformKind::FringeZernike { .. } => ("ZFR", SpecialForm::FringeZernike),
         _ => return None,
     };
-    let last = (form.first() + numbers.len()).saturating_sub(1);
-    if (form.first()..=last).contains(&form.conic()) {
+    if form.first() + numbers.len() > form.last() + 1 {
         return None;
     }
     let radius = number(*kind.lengths().first()?);

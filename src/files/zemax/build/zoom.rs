@@ -16,6 +16,8 @@ pub(super) fn add_positions(
     names: &[String],
     report: &mut ConversionReport,
 ) -> Result<(), ParseError> {
+    let is_factor = |own: &&ConfigurationOperand| FACTORS.contains(&own.name.as_str());
+    file.operands.iter().filter(is_factor).for_each(|own| report_factor(own, report));
     if file.configurations < 2 {
         return Ok(());
     }
@@ -25,9 +27,10 @@ pub(super) fn add_positions(
         .map(|i| ZoomPosition { name: name(i), ..ZoomPosition::default() })
         .collect();
     for operand in &file.operands {
-        if FACTORS.contains(&operand.name.as_str()) {
-            report_factor(operand, report);
-        } else if let Err(why) = apply(file.unit, plan, lens, operand) {
+        if is_factor(&operand) {
+            continue;
+        }
+        if let Err(why) = apply(file.unit, plan, lens, operand) {
             report.amend(operand.line, ConversionOutcome::Dropped, why);
         }
     }
