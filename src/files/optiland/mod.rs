@@ -106,6 +106,13 @@ fn lens(json: &Value, report: &mut ConversionReport) -> Result<Lens, ParseError>
         (1..image).map(|k| Row { stop: k == stop, ..row(&surfaces[k], k, report) }).collect();
     place(&mut lens.surfaces, surfaces, report);
     report_solves(json, report);
+    for end in [0, image] {
+        if curvature(&surfaces[end]["geometry"]["radius"]) != 0.0 {
+            let what = if end == 0 { "object" } else { "image" };
+            let note = "object and image are planes in this program";
+            report.add(ConversionOutcome::Dropped, what, note);
+        }
+    }
     Ok(lens)
 }
 

@@ -81,6 +81,19 @@ fn a_lens_is_what_its_file_says() {
 }
 
 #[test]
+fn a_curved_image_is_said_to_be_flat() {
+    let plane = singlet(PLANE);
+    let end = plane.rfind(PLANE).unwrap();
+    let curved = r#""type": "StandardGeometry", "radius": -100.0, "conic": 0.0"#;
+    let text = format!("{}{curved}{}", &plane[..end], &plane[end + PLANE.len()..]);
+    let dropped = |text: &str| {
+        let report = open(text).report.unwrap();
+        report.rows.iter().any(|row| row.text == "image")
+    };
+    assert!(dropped(&text) && !dropped(&plane));
+}
+
+#[test]
 fn geometries_are_forms_or_locked() {
     let kind = |geometry: &str| {
         let lens = open(&singlet(geometry)).lens;
