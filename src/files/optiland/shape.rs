@@ -25,12 +25,12 @@ pub(super) fn read(geometry: &Value, row: &mut Row) -> Result<(), String> {
         }
         "PolynomialGeometry" => {
             let kind = FreeformKind::XyPolynomial { radius: 1.0 };
-            row.freeform = product(kind, &geometry["coefficients"]).ok_or_else(lost)?;
+            product(kind, &geometry["coefficients"], row).ok_or_else(lost)?;
         }
         "ChebyshevPolynomialGeometry" => {
             let half_widths = ["norm_x", "norm_y"].map(|key| number(&geometry[key]));
             let kind = FreeformKind::Chebyshev { half_widths };
-            row.freeform = product(kind, &geometry["coefficients"]).ok_or_else(lost)?;
+            product(kind, &geometry["coefficients"], row).ok_or_else(lost)?;
         }
         _ => return Err(lost()),
     }
@@ -55,7 +55,8 @@ fn checked(kind: FreeformKind, mut numbers: Vec<f64>) -> Option<Freeform<f64>> {
 fn powers(geometry: &Value, step: usize, row: &mut Row) -> Option<()> {
     let terms = list(&geometry["coefficients"]);
     let powers = || (step..).step_by(step).zip(terms.iter().copied()).filter(|(_, a)| *a != 0.0);
-    let is_even = |power: usize| power % 2 == 0 && (4..2 * ASPHERE_TERMS + 4).contains(&power);
+    let is_even =
+        |power: usize| power.is_multiple_of(2) && (4..2 * ASPHERE_TERMS + 4).contains(&power);
     let last = powers().last().map_or(0, |(power, _)| power);
     if powers().all(|(power, _)| is_even(power)) {
         row.asphere = vec![0.0; (last / 2).saturating_sub(1)];
@@ -82,9 +83,9 @@ fn cylinder(geometry: &Value, row: &mut Row) -> Option<()> {
     Some(())
 }
 
-/// A series of products of a function of x and one of y, from its table `[i][j]`; `None` for one that
-/// cannot be traced.
-fn product(kind: FreeformKind, table: &Value) -> Option<Option<Freeform<f64>>> {
+/// Gives a row a series of products of a function of x and one of y, from its table `[i][j]`; `None` for one
+/// that cannot be traced.
+fn product(kind: FreeformKind, table: &Value, row: &mut Row) -> Option<()> {
     let mut left: usize = table
         .as_array()
         .into_iter()
@@ -92,7 +93,7 @@ fn product(kind: FreeformKind, table: &Value) -> Option<Option<Freeform<f64>>> {
         .map(|row| list(row).into_iter().filter(|a| *a != 0.0).count())
         .sum();
     if left == 0 {
-        return Some(None);
+        return Some(());
     }
     let mut numbers = Vec::new();
     for number in 0..FREEFORM_NUMBERS {
@@ -101,7 +102,8 @@ fn product(kind: FreeformKind, table: &Value) -> Option<Option<Freeform<f64>>> {
         left -= usize::from(a != 0.0);
         numbers.push(a);
         if left == 0 {
-            return checked(kind, numbers).map(Some);
+            row.freeform = Some(checked(kind, numbers)?);
+            return Some(());
         }
     }
     None

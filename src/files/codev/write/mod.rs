@@ -27,9 +27,11 @@ const ZOOMED: [(&str, Quantity); 10] = [
     ("G", Quantity::Asphere(6)),
 ];
 
-/// The commands of apertures that can differ between the zoom positions, each with its size; the size of
-/// another one is `None`.
-const APERTURES: [(&str, fn(Aperture) -> Option<f64>); 3] = [
+/// The size of an aperture of one kind; `None` for another one.
+type ApertureSize = fn(Aperture) -> Option<f64>;
+
+/// The commands of apertures that can differ between the zoom positions.
+const APERTURES: [(&str, ApertureSize); 3] = [
     ("EPD", |own| match own {
         Aperture::EntrancePupilDiameter(v) => Some(v),
         _ => None,
@@ -205,7 +207,7 @@ impl CodeVWriter {
             return;
         }
         let all = (0..self.lens.zoom.len()).map(|zoom| self.lens.aperture_at(zoom));
-        let of_kind = |(name, size): (&'static str, fn(Aperture) -> Option<f64>)| {
+        let of_kind = |(name, size): (&'static str, ApertureSize)| {
             Some((name, all.clone().map(size).collect::<Option<Vec<f64>>>()?))
         };
         let Some((name, values)) = APERTURES.into_iter().find_map(of_kind) else {
