@@ -1,8 +1,8 @@
 //! The lenses of the program Optiland, `.json`: reading and writing.
 //!
-//! Every surface has a place of its own in one frame. Here they follow an axis: a surface beside it returns
-//! to it where the next one stands on it, and breaks it elsewhere. What this program has no counterpart of
-//! becomes a locked row with its JSON.
+//! Every surface has a place of its own in one frame. Here they follow an axis, which goes on behind a surface
+//! beside it and breaks at mirrors. What this program has no counterpart of becomes a locked row with its
+//! JSON.
 
 mod shape;
 mod write;
@@ -177,7 +177,9 @@ fn is_on_axis(pose: &Pose<f64>) -> bool {
     Pose { shift, ..*pose }.is_nearly_centred()
 }
 
-/// Writes the places of all surfaces and of the image into the rows.
+/// Writes the places of all surfaces and of the image into the rows. The axis goes on behind a surface that
+/// is decentred or tilted. It breaks at a mirror, and in front of the image, if what comes next does not
+/// stand on it.
 fn place(rows: &mut [Row], surfaces: &[Value], report: &mut ConversionReport) {
     let frames: Vec<Pose<f64>> = surfaces.iter().skip(1).map(frame).collect();
     let image = frames.len() - 1;
@@ -186,18 +188,18 @@ fn place(rows: &mut [Row], surfaces: &[Value], report: &mut ConversionReport) {
         let (own, next) = (&frames[k], &frames[k + 1]);
         let before = axis.inverse().then(own);
         let ahead = axis.inverse().then(next);
-        if is_on_axis(&ahead) {
+        // No row behind can place the image.
+        let may_break = row.medium == Medium::Mirror || k + 1 == image;
+        if may_break && !is_on_axis(&ahead) {
+            let ahead = own.inverse().then(next);
+            // The mirror stands at minus this distance on the axis of the next surface.
+            row.thickness = -ahead.inverse().shift.z;
+            row.place_on_axis(&before, &ahead.then(&along(-row.thickness)));
+            axis = *next;
+        } else {
             row.thickness = ahead.shift.z;
             row.place_on_axis(&before, &before.inverse());
             axis = axis.then(&along(ahead.shift.z));
-        } else {
-            let ahead = own.inverse().then(next);
-            row.thickness = ahead.shift.z;
-            // No row behind can place the image.
-            let after =
-                if k + 1 == image { ahead.then(&along(-ahead.shift.z)) } else { Pose::centred() };
-            row.place_on_axis(&before, &after);
-            axis = own.then(&along(ahead.shift.z));
         }
     }
     for (row, surface) in rows.iter_mut().zip(surfaces.iter().skip(1)) {
