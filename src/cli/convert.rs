@@ -15,7 +15,7 @@ pub(super) struct ConvertArgs {
     #[arg(value_name = "IN")]
     from: PathBuf,
 
-    /// The file to write, in the format of its extension: .json, .zmx, .seq, .len or .roa
+    /// The file to write, in the format of its extension: .json, .zmx, .seq, .len, .roa or .optiland.json
     #[arg(value_name = "OUT")]
     to: PathBuf,
 

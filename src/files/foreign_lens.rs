@@ -1,7 +1,7 @@
 //! A lens read from a foreign file, before it is checked against the file.
 
 use super::report::{ConversionOutcome, ConversionReport};
-use super::vignetting::{PupilFactors, VignettingChoice, apply_factors, beam_reach};
+use super::vignetting::{VignettingChoice, ZoomedFactors, apply_factors, are_usable, beam_reach};
 use super::{LensFormat, OpenedLens, image_side, self_check};
 use crate::lens::{Lens, SurfaceNumber};
 use serde::Serialize;
@@ -37,8 +37,8 @@ impl fmt::Display for StatedNumber {
 pub(super) struct ForeignLens {
     pub(super) lens: Lens,
     pub(super) report: ConversionReport,
-    /// The vignetting factors of each field; empty if there are none.
-    pub(super) factors: Vec<PupilFactors>,
+    /// The vignetting factors; empty if there are none.
+    pub(super) factors: ZoomedFactors,
     /// True for each surface with an aperture that clips in the other program.
     pub(super) clips: Vec<bool>,
     /// The semi-diameters in mm of surfaces, by index, that the other program computed from its rays.
@@ -57,8 +57,7 @@ impl ForeignLens {
     pub(super) fn opened(mut self, format: LensFormat, settings: ImportSettings) -> OpenedLens {
         image_side::face_image(&mut self.lens, &mut self.report);
         let stated = self.stated();
-        let has_factors = self.factors.iter().any(|own| *own != PupilFactors::default())
-            && self.factors.iter().all(PupilFactors::is_possible);
+        let has_factors = are_usable(&self.factors);
         if has_factors && settings.vignetting == VignettingChoice::Factors {
             let Self { lens, report, factors, clips, .. } = &mut self;
             if let Err(why) = apply_factors(lens, factors, clips, report) {

@@ -20,9 +20,11 @@ mod identity;
 mod image_file;
 mod image_side;
 mod imported_file;
+mod index_table;
 pub mod json;
 mod library;
 mod lock;
+mod optiland;
 mod oslo;
 mod outline;
 mod own_glass;
@@ -96,6 +98,8 @@ pub enum LensFormat {
     CodeV,
     /// The program ray-optics, `.roa`.
     RayOptics,
+    /// The program Optiland, `.optiland.json`.
+    Optiland,
     /// The program OSLO, `.len`.
     Oslo,
     /// An archive of Zemax with a lens and its catalogues, `.zar`; only read.
@@ -140,8 +144,8 @@ pub struct SaveReport {
     pub proof: Option<RoundTripCheck>,
 }
 
-const READABLE: &str = "a lens: JSON with the key `aplanat`, Zemax .zmx or .zar, CODE V .seq, OSLO .len or \
-     ray-optics .roa";
+const READABLE: &str = "a lens: JSON with the key `aplanat`, Zemax .zmx or .zar, CODE V .seq, OSLO .len, \
+     ray-optics .roa or the JSON of Optiland";
 
 /// Reads a lens from a file of any known format.
 ///
@@ -232,6 +236,7 @@ fn parse_text(bytes: &[u8], name: &str, settings: ImportSettings) -> Result<Open
         }
         LensFormat::Zemax => zemax::read_foreign(&text, name)?,
         LensFormat::RayOptics => ray_optics::read(&decode_unicode(bytes, name)?, name)?.into(),
+        LensFormat::Optiland => optiland::read(&decode_unicode(bytes, name)?, name)?,
         LensFormat::CodeV => codev::read_foreign(&text, name)?,
         LensFormat::Oslo => oslo::read(&text, name)?.into(),
         LensFormat::Archive => return Err(nothing("a damaged archive".to_owned())),
@@ -251,6 +256,9 @@ fn format_by_content(text: &str) -> Option<LensFormat> {
     if ray_optics::is_model(text) {
         return Some(LensFormat::RayOptics);
     }
+    if optiland::is_lens(text) {
+        return Some(LensFormat::Optiland);
+    }
     if text.trim_start().starts_with('{') {
         return Some(LensFormat::Native);
     }
@@ -267,6 +275,10 @@ fn format_by_content(text: &str) -> Option<LensFormat> {
 }
 
 fn format_by_extension(path: &Path) -> Option<LensFormat> {
+    let name = path.file_name()?.to_str()?.to_ascii_lowercase();
+    if name.ends_with(".optiland.json") {
+        return Some(LensFormat::Optiland);
+    }
     match path.extension()?.to_str()?.to_ascii_lowercase().as_str() {
         "json" => Some(LensFormat::Native),
         "zmx" => Some(LensFormat::Zemax),
@@ -278,8 +290,8 @@ fn format_by_extension(path: &Path) -> Option<LensFormat> {
     }
 }
 
-/// Writes a lens to a file, in the format of its extension: `.json`, `.zmx`, `.seq`, `.len` or `.roa`. A
-/// foreign file is read back and traced first. On failure the target is unchanged.
+/// Writes a lens to a file, in the format of its extension: `.json`, `.zmx`, `.seq`, `.len`, `.roa` or
+/// `.optiland.json`. A foreign file is read back and traced first. On failure the target is unchanged.
 ///
 /// # Errors
 /// An invalid lens, another extension, a foreign file that does not trace like the lens, or a target
@@ -291,7 +303,7 @@ pub fn save(lens: &Lens, path: impl AsRef<Path>) -> Result<SaveReport, FileError
     let Some(format) = format_by_extension(path).filter(|format| format.is_written()) else {
         let extension = path.extension().unwrap_or_default().to_string_lossy();
         let found = format!("the extension `{extension}`");
-        let expected = "`.json`, `.zmx`, `.seq`, `.len` or `.roa` to write to";
+        let expected = "`.json`, `.zmx`, `.seq`, `.len` or `.roa` to write to, or `.optiland.json`";
         return Err(FileError::NotALens { file, found, expected });
     };
     let (bytes, report, proof) = if format == LensFormat::Native {
@@ -326,6 +338,7 @@ fn checked_foreign(
         LensFormat::CodeV => codev::write(lens).map_err(unusable)?,
         LensFormat::Oslo => oslo::write(lens, file)?,
         LensFormat::RayOptics => ray_optics::write(lens, file)?,
+        LensFormat::Optiland => optiland::write(lens, file)?,
         _ => zemax::write(lens).map_err(unusable)?,
     };
     let is_zemax = format == LensFormat::Zemax;

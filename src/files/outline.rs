@@ -23,6 +23,8 @@ pub(super) struct ForeignOutline {
     pub(super) half: [f64; 2],
     /// The place of its centre beside the vertex.
     pub(super) offset: [f64; 2],
+    /// True if it is turned about its centre by an angle.
+    pub(super) turned: bool,
 }
 
 /// The circle that stands for an outline, and what the report says of it.
@@ -93,6 +95,7 @@ impl ForeignOutline {
     fn circumscribed(&self) -> f64 {
         let [x, y] = self.half;
         match self.form {
+            OutlineForm::Rectangle if self.turned => self.distance() + x.hypot(y),
             OutlineForm::Rectangle => (self.offset[0].abs() + x).hypot(self.offset[1].abs() + y),
             OutlineForm::Circle | OutlineForm::Ellipse => self.distance() + x.max(y),
         }
@@ -102,6 +105,7 @@ impl ForeignOutline {
     fn inscribed(&self) -> f64 {
         let [x, y] = self.half;
         match self.form {
+            OutlineForm::Rectangle if self.turned => x.min(y) - self.distance(),
             OutlineForm::Rectangle => (x - self.offset[0].abs()).min(y - self.offset[1].abs()),
             OutlineForm::Circle | OutlineForm::Ellipse => x.min(y) - self.distance(),
         }
@@ -115,6 +119,7 @@ impl ForeignOutline {
             OutlineForm::Ellipse => format!("an ellipse of semi-axes {x} and {y}"),
         };
         match self.offset {
+            _ if self.turned => format!("{form}, turned about its centre"),
             [0.0, 0.0] => form,
             [dx, dy] => format!("{form} at ({dx}, {dy})"),
         }
@@ -140,7 +145,7 @@ mod tests {
     use super::*;
 
     fn outline(form: OutlineForm, half: [f64; 2], offset: [f64; 2]) -> ForeignOutline {
-        ForeignOutline { form, half, offset }
+        ForeignOutline { form, half, offset, turned: false }
     }
 
     /// Points of an outline, or near its edge inside.
@@ -168,6 +173,25 @@ mod tests {
                 let (outer, inner) = (own.circumscribed(), own.inscribed());
                 assert!(distances.iter().all(|d| *d <= outer * (1.0 + 1e-12)), "{own:?}");
                 assert!(distances.iter().all(|d| *d >= inner * (1.0 - 1e-12)), "{own:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn circles_hold_for_outlines_that_are_turned() {
+        let half = [3.0, 2.0];
+        for offset in [[0.0, 0.0], [0.5, -0.25]] {
+            let plain = outline(OutlineForm::Rectangle, half, offset);
+            let turned = ForeignOutline { turned: true, ..plain };
+            for angle in [0.3_f64, 1.0, 2.5] {
+                let (sin, cos) = angle.sin_cos();
+                for [x, y] in edge(&plain) {
+                    let (u, v) = (x - offset[0], y - offset[1]);
+                    let distance =
+                        (offset[0] + u * cos - v * sin).hypot(offset[1] + u * sin + v * cos);
+                    assert!(distance <= turned.circumscribed() * (1.0 + 1e-12));
+                    assert!(distance >= turned.inscribed() * (1.0 - 1e-12));
+                }
             }
         }
     }

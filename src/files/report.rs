@@ -90,6 +90,15 @@ impl ConversionReport {
         });
     }
 
+    /// Adds an aperture of a foreign file that an export does not write back.
+    pub(super) fn add_aperture_loss(&mut self, surface: SurfaceNumber, row: &Row) {
+        if row.foreign_aperture.is_some() {
+            let what = format!("aperture of surface {surface}");
+            let note = "the circle that stands for it is written, not the form of its file";
+            self.add(ConversionOutcome::Approximated, &what, note);
+        }
+    }
+
     /// Adds what a format without sheets of hyperhemispheres and without foreign shapes loses of a row.
     pub(super) fn add_row_losses(&mut self, surface: SurfaceNumber, row: &Row) {
         if row.hyperhemisphere {

@@ -37,6 +37,20 @@ impl VignettingChoice {
     }
 }
 
+/// The vignetting factors of every field, at every zoom position; empty without factors.
+pub(super) type ZoomedFactors = Vec<Vec<PupilFactors>>;
+
+/// True if some of the factors leave a part of the pupil dark, and all of them a part that is lit.
+pub(super) fn are_usable(factors: &ZoomedFactors) -> bool {
+    let all = || factors.iter().flatten();
+    all().any(|own| *own != PupilFactors::default()) && all().all(PupilFactors::is_possible)
+}
+
+/// The factors of a field at a zoom position.
+fn of_field(factors: &ZoomedFactors, zoom: usize, field: usize) -> PupilFactors {
+    factors.get(zoom).and_then(|own| own.get(field)).copied().unwrap_or_default()
+}
+
 /// The vignetting factors of a field: the ellipse of the unit pupil that its beam fills.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct PupilFactors {
@@ -79,8 +93,6 @@ impl PupilFactors {
 /// The note on factors that are left out.
 pub(super) const LEFT_OUT: &str =
     "vignetting factors are left out: the rims clip; the choice `factors` sets the rims by them";
-/// The keywords of vignetting factors in all formats.
-const KEYWORDS: [&str; 9] = ["VDXN", "VDYN", "VCXN", "VCYN", "VANN", "VUX", "VLX", "VUY", "VLY"];
 /// The number of rays at the edge of a pupil.
 const EDGE_RAYS: usize = 64;
 /// The number of rays over a pupil that tell factors and rims apart.
@@ -96,7 +108,7 @@ const MARGIN: f64 = 1e-6;
 /// A lens that cannot be resolved.
 pub(super) fn beam_reach(
     lens: &Lens,
-    factors: &[PupilFactors],
+    factors: &ZoomedFactors,
     zooms: Range<usize>,
 ) -> Result<Vec<Option<f64>>, LensError> {
     let mut reach = vec![Some(0.0_f64); lens.surfaces.len()];
@@ -105,8 +117,7 @@ pub(super) fn beam_reach(
         for wave in &lens.wavelengths {
             let tracer = Tracer::new(&lens.resolve(zoom, wave.um)?)?.without_rims();
             for (i, field) in lens.fields_at(zoom).values.iter().enumerate() {
-                let own = factors.get(i).copied().unwrap_or_default();
-                widen(&mut reach, &tracer, &launch, (*field, own));
+                widen(&mut reach, &tracer, &launch, (*field, of_field(factors, zoom, i)));
             }
         }
     }
@@ -144,7 +155,7 @@ fn widen(
 /// A lens that cannot be resolved; it stays as it is.
 pub(super) fn apply_factors(
     lens: &mut Lens,
-    factors: &[PupilFactors],
+    factors: &ZoomedFactors,
     clips: &[bool],
     report: &mut ConversionReport,
 ) -> Result<(), LensError> {
@@ -180,45 +191,64 @@ pub(super) fn apply_factors(
 
 /// Changes the outcome of the lines with factors.
 fn amend_lines(report: &mut ConversionReport) {
-    let lines = report.rows.iter_mut().filter(|row| {
-        row.outcome == ConversionOutcome::Dropped && KEYWORDS.contains(&row.keyword.as_str())
-    });
+    let lines = report
+        .rows
+        .iter_mut()
+        .filter(|row| row.outcome == ConversionOutcome::Dropped && row.note == LEFT_OUT);
     for row in lines {
         row.outcome = ConversionOutcome::Approximated;
         "the rims are as wide as the rays at the edges of the factors".clone_into(&mut row.note);
     }
 }
 
-/// Reports, for each field with factors, the part of the paraxial entrance pupil that they fill and the one
-/// that gets through the rims.
+/// Reports, for each field with factors at each zoom position, the part of the paraxial entrance pupil that
+/// they fill and the one that gets through the rims.
 fn report_differences(
     lens: &Lens,
-    factors: &[PupilFactors],
+    factors: &ZoomedFactors,
     report: &mut ConversionReport,
 ) -> Result<(), LensError> {
-    let launch = ProbeLaunch::new(lens, 0)?;
-    let tracer = Tracer::new(&lens.resolve(0, lens.wavelengths[lens.primary()].um)?)?;
-    for (i, field) in lens.fields_at(0).values.iter().enumerate() {
-        let Some(own) = factors.get(i).filter(|own| **own != PupilFactors::default()) else {
-            continue;
-        };
-        let [mut inside, mut through, mut differ] = [0_u32; 3];
-        for (point, ray) in launch.points_and_rays(*field, PUPIL_RAYS) {
-            let (wanted, passes) = (own.has_point(point), tracer.trace(ray).fate.is_imaged());
-            inside += u32::from(wanted);
-            through += u32::from(passes);
-            differ += u32::from(wanted != passes);
+    for zoom in 0..lens.zoom_positions() {
+        let launch = ProbeLaunch::new(lens, zoom)?;
+        let tracer = Tracer::new(&lens.resolve(zoom, lens.wavelengths[lens.primary()].um)?)?;
+        for (i, field) in lens.fields_at(zoom).values.iter().enumerate() {
+            let own = of_field(factors, zoom, i);
+            if own == PupilFactors::default() {
+                continue;
+            }
+            let at = if lens.zoom.len() > 1 {
+                format!(" at zoom position {}", zoom + 1)
+            } else {
+                String::new()
+            };
+            let what = format!("vignetting of field {}{at}", i + 1);
+            let note = difference(&launch, &tracer, *field, own);
+            report.add(ConversionOutcome::Approximated, &what, note);
         }
-        let [inside, through, differ] =
-            [inside, through, differ].map(|rays| 100.0 * f64::from(rays) / PUPIL_RAYS as f64);
-        let note = format!(
-            "{inside:.1} % of the entrance pupil by the factors, {through:.1} % through the rims; \
-             {differ:.1} % of the rays have another fate"
-        );
-        let what = format!("vignetting of field {}", i + 1);
-        report.add(ConversionOutcome::Approximated, &what, note);
     }
     Ok(())
+}
+
+/// The parts of the pupil of a field that its factors fill and that gets through the rims, as a text.
+fn difference(
+    launch: &ProbeLaunch,
+    tracer: &Tracer<f64>,
+    field: FieldPoint,
+    own: PupilFactors,
+) -> String {
+    let [mut inside, mut through, mut differ] = [0_u32; 3];
+    for (point, ray) in launch.points_and_rays(field, PUPIL_RAYS) {
+        let (wanted, passes) = (own.has_point(point), tracer.trace(ray).fate.is_imaged());
+        inside += u32::from(wanted);
+        through += u32::from(passes);
+        differ += u32::from(wanted != passes);
+    }
+    let [inside, through, differ] =
+        [inside, through, differ].map(|rays| 100.0 * f64::from(rays) / PUPIL_RAYS as f64);
+    format!(
+        "{inside:.1} % of the entrance pupil by the factors, {through:.1} % through the rims; \
+         {differ:.1} % of the rays have another fate"
+    )
 }
 
 #[cfg(test)]

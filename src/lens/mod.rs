@@ -218,6 +218,25 @@ impl Fields {
         };
         self.values.iter().map(point).collect()
     }
+
+    /// True if these fields differ from others in their coordinates alone.
+    pub fn are_like(&self, other: &Self) -> bool {
+        let weights = |fields: &Self| fields.values.iter().map(|f| f.weight).collect::<Vec<_>>();
+        self.kind == other.kind && weights(self) == weights(other)
+    }
+
+    /// Sets x (`axis` 0) or y (1) of a point as other programs state it; false if there is no such point.
+    pub fn set_projected(&mut self, point: usize, axis: usize, value: f64) -> bool {
+        let Some(field) = self.values.get_mut(point) else { return false };
+        if self.kind != FieldKind::Angle {
+            *[&mut field.x, &mut field.y][axis] = value;
+            return true;
+        }
+        let mut angles = field.projected_angles();
+        angles[axis] = value;
+        *field = FieldPoint::from_projected_angles(angles, field.weight);
+        true
+    }
 }
 
 /// One wavelength.
@@ -274,8 +293,27 @@ pub struct Row {
     pub break_after: Option<AxisBreak>,
     /// The lines of a foreign file on a surface that cannot be traced; `None` for a surface that can.
     pub locked: Option<LockedSurface>,
+    /// The apertures of a foreign file that are no circles about the vertex; `None` for a row that has none.
+    pub foreign_aperture: Option<ForeignAperture>,
     /// A remark on the surface.
     pub comment: String,
+}
+
+/// The lines of a foreign file on apertures and obscurations that a row cannot have, and the circles that
+/// stand for them. An export to the same format writes the lines back as long as the row has these circles.
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct ForeignAperture {
+    /// The extension of the format, such as `zmx`.
+    pub format: String,
+    /// The lines.
+    pub lines: Vec<String>,
+    /// The semi-diameter in mm that stands for them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub semi_diameter: Option<f64>,
+    /// The obstruction in mm that stands for them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub obstruction: Option<f64>,
 }
 
 /// The description of a surface that this program cannot trace, as the file has it. Rays meet the
@@ -355,6 +393,23 @@ fn is_zero(value: &f64) -> bool {
 #[expect(clippy::trivially_copy_pass_by_ref, reason = "the signature that serde calls")]
 fn is_false(value: &bool) -> bool {
     !*value
+}
+
+impl Row {
+    /// Keeps the lines of a file on apertures; the present circles stand for them.
+    pub fn keep_aperture(&mut self, format: &str, lines: Vec<String>) {
+        let (semi_diameter, obstruction) = (self.semi_diameter, self.obstruction);
+        let format = format.to_owned();
+        self.foreign_aperture = Some(ForeignAperture { format, lines, semi_diameter, obstruction });
+    }
+
+    /// The lines on apertures that an export to a format writes back; `None` without any, and once another
+    /// circle stands in their place.
+    pub fn kept_aperture(&self, format: &str) -> Option<&[String]> {
+        let kept = self.foreign_aperture.as_ref().filter(|kept| kept.format == format)?;
+        let same = (kept.semi_diameter, kept.obstruction) == (self.semi_diameter, self.obstruction);
+        same.then_some(&kept.lines)
+    }
 }
 
 impl Lens {

@@ -69,7 +69,7 @@ fn file_kind(path: &Path) -> Result<FileKind, String> {
     }
 }
 
-/// The kind of a JSON file by the key that carries its version.
+/// The kind of a JSON file by the key that carries its version, or that a lens of Optiland has.
 fn json_kind(path: &Path) -> Result<FileKind, String> {
     let bytes = files::read_file(path, MAX_LENS_BYTES).map_err(|why| why.to_string())?;
     let text = String::from_utf8_lossy(&bytes);
@@ -78,7 +78,7 @@ fn json_kind(path: &Path) -> Result<FileKind, String> {
         Ok(FileKind::GrinField)
     } else if has("aplanat_search") {
         Ok(FileKind::Search)
-    } else if has("aplanat") {
+    } else if has("aplanat") || has("surface_group") {
         Ok(FileKind::Lens)
     } else {
         Err(refusal(path, "is JSON without the key `aplanat`, which a lens of this program has"))

@@ -74,12 +74,20 @@ pub(super) struct CodeVSurface {
     pub(super) conic_across: f64,
     /// The diffractive phase on the surface (`DIF DOE`).
     pub(super) diffraction: Option<CodeVDiffraction>,
+    /// The special form (`SPS`).
+    pub(super) special: Option<CodeVSpecial>,
+    /// The grating on the surface (`DIF GRT`).
+    pub(super) grating: Option<CodeVGrating>,
+    /// The surface whose place the decentre and the tilt start from (`GLB`, `RET`).
+    pub(super) reference: Option<usize>,
     /// The half widths of an aperture that is no circle.
     pub(super) outline: CodeVOutline,
     /// The half widths of an obscuration that is no circle.
     pub(super) block: CodeVOutline,
     /// The displacement of the apertures.
     pub(super) offset: [f64; 2],
+    /// True if the apertures are turned about their centre (`ARO`).
+    pub(super) is_turned: bool,
     /// The lines of the commands of apertures, but for centred circles.
     pub(super) aperture_lines: Vec<usize>,
     pub(super) label: String,
@@ -125,6 +133,84 @@ pub(super) struct CodeVDiffraction {
     pub(super) terms: Vec<f64>,
 }
 
+/// A special form: its name, its unit of length and its coefficients by number. The conic constant is that
+/// of the surface.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct CodeVSpecial {
+    /// The line of the command that begins it.
+    pub(super) line: usize,
+    pub(super) form: SpecialForm,
+    /// The radius by which coordinates are divided (`NRADIUS`); 0 for none.
+    pub(super) radius: f64,
+    pub(super) terms: BTreeMap<usize, f64>,
+}
+
+/// The special forms that can be traced.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum SpecialForm {
+    /// `XYP`: C2 x, C3 y, C4 x², C5 xy, C6 y², ….
+    XyPolynomial,
+    /// `ODD`: C2 r, C3 r², ….
+    OddAsphere,
+    /// `QCN`: the strong asphere of Forbes, from C4 on.
+    QCon,
+    /// `QBF`: the mild asphere of Forbes, from C3 on.
+    QBfs,
+    /// `ZFR`: the fringe order of Zernike, from C4 on; C3 is the radius.
+    FringeZernike,
+}
+
+impl SpecialForm {
+    /// The forms with their names.
+    pub(super) const ALL: [(&str, Self); 5] = [
+        ("XYP", Self::XyPolynomial),
+        ("ODD", Self::OddAsphere),
+        ("QCN", Self::QCon),
+        ("QBF", Self::QBfs),
+        ("ZFR", Self::FringeZernike),
+    ];
+
+    /// The number of the coefficient that is the first number of the form here.
+    pub(super) const fn first(self) -> usize {
+        match self {
+            Self::XyPolynomial | Self::OddAsphere => 2,
+            Self::QBfs => 3,
+            Self::QCon | Self::FringeZernike => 4,
+        }
+    }
+
+    /// The number of the last coefficient; those behind mean something else.
+    pub(super) const fn last(self) -> usize {
+        match self {
+            Self::XyPolynomial => 66,
+            Self::OddAsphere => 31,
+            Self::QBfs | Self::QCon => 16,
+            Self::FringeZernike => 40,
+        }
+    }
+
+    /// The number of the coefficient that is the conic constant.
+    pub(super) const fn conic(self) -> usize {
+        match self {
+            Self::XyPolynomial | Self::OddAsphere | Self::FringeZernike => 1,
+            Self::QBfs | Self::QCon => 17,
+        }
+    }
+}
+
+/// A grating with straight grooves parallel to x.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct CodeVGrating {
+    /// The line of the command that begins it.
+    pub(super) line: usize,
+    /// The diffraction order (`GRO`).
+    pub(super) order: f64,
+    /// The distance of the grooves (`GRS`), 0 if the file does not say it.
+    pub(super) spacing: f64,
+    /// The normal of the planes of the grooves (`GRX`, `GRY`, `GRZ`).
+    pub(super) normal: [f64; 3],
+}
+
 /// The frames that the decentre and the tilt of a surface move.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(in crate::files) enum Placement {
@@ -138,6 +224,9 @@ pub(in crate::files) enum Placement {
     /// Everything behind the surface, in reverse (`REV`).
     Reverse,
 }
+
+/// The commands of vignetting factors, in the order of [`CodeVFile::vignetting`].
+pub(super) const FACTORS: [&str; 4] = ["VUX", "VLX", "VUY", "VLY"];
 
 /// A command of the zoom table: one value for each position.
 #[derive(Debug)]

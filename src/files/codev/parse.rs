@@ -1,7 +1,7 @@
 //! The commands of the whole lens: title, unit, aperture, fields, wavelengths, private glasses, zoom.
 
 use super::command::{Command, SurfaceWord, commands, parse_number, surface_word};
-use super::file::{ApertureCommand, CodeVFile, CodeVSurface, PickupCommand, ZoomCommand};
+use super::file::{ApertureCommand, CodeVFile, CodeVSurface, FACTORS, PickupCommand, ZoomCommand};
 use super::surface;
 use crate::files::error::ParseError;
 use crate::files::report::{ConversionOutcome, ConversionReport, ConversionRow};
@@ -128,8 +128,31 @@ fn stop(file: &mut CodeVFile, command: &Command) -> Result<CommandOutcome, Parse
     Ok(if second { dropped("a second stop; the first one is used") } else { used() })
 }
 
+/// `GLB Sk` and `RET Sk`: decentre and tilt of the last surface start from the place of surface k;
+/// `GLB Sj Sk` is the same for surface j.
+fn reference(file: &mut CodeVFile, command: &Command) -> CommandOutcome {
+    let last = file.surfaces.len().checked_sub(1);
+    let second = command.words.first().and_then(|word| surface_word(word));
+    let (at, source) = match (command.surface, second) {
+        (Some(SurfaceWord::Number(at)), Some(SurfaceWord::Number(source))) => (Some(at), source),
+        (Some(SurfaceWord::Number(source)), None) => (last, source),
+        _ => return dropped("this place of the surface is not supported"),
+    };
+    let at = at.filter(|at| (1..file.surfaces.len()).contains(at) && (1..*at).contains(&source));
+    let Some(at) = at else {
+        return dropped("the place of a surface that is not in front of this one");
+    };
+    let surface = &mut file.surfaces[at];
+    surface.lines.push(command.text.clone());
+    surface.reference = Some(source);
+    (ConversionOutcome::Used, format!("placed by the present place of surface {source}"))
+}
+
 /// A command of a surface.
 fn of_surface(file: &mut CodeVFile, command: &Command) -> Result<CommandOutcome, ParseError> {
+    if matches!(command.name.as_str(), "GLB" | "RET") && command.surface.is_some() {
+        return Ok(reference(file, command));
+    }
     let Some(index) = target(file, command) else { return Ok(preserved()) };
     let surface = &mut file.surfaces[index];
     surface.lines.push(command.text.clone());
@@ -195,7 +218,7 @@ fn vignetting(file: &mut CodeVFile, command: &Command) -> CommandOutcome {
     if values.as_ref().is_some_and(|values| values.iter().all(|value| *value == 0.0)) {
         return preserved();
     }
-    let known = ["VUX", "VLX", "VUY", "VLY"].iter().position(|name| *name == command.name);
+    let known = FACTORS.iter().position(|name| *name == command.name);
     if let (Some(values), Some(kind)) = (values, known) {
         file.vignetting[kind] = values;
     }

@@ -1,11 +1,15 @@
 //! The commands of a surface: its form, aperture, place and label.
 
 use super::command::{Command, parse_number};
-use super::file::{CodeVDiffraction, CodeVProfile, CodeVSurface, Placement};
+use super::file::{
+    CodeVDiffraction, CodeVGrating, CodeVProfile, CodeVSpecial, CodeVSurface, Placement,
+    SpecialForm,
+};
 use super::parse::{CommandOutcome, dropped, preserved, used};
 use crate::files::error::ParseError;
 use crate::files::report::ConversionOutcome;
 use crate::lens::FreeformKind;
+use std::collections::BTreeMap;
 
 /// The glass of `S bend thickness glass`; older files give an index and an Abbe number.
 pub(super) fn glass_word(words: &[String]) -> Option<String> {
@@ -48,13 +52,16 @@ pub(super) fn read(
             surface.aperture_lines.push(command.line);
         }
         "ARO" if command.last_number()? != 0.0 => {
-            return Ok(dropped("the aperture is turned in the file"));
+            surface.is_turned = true;
+            surface.aperture_lines.push(command.line);
         }
         "ARO" => return Ok(preserved()),
         "CCY" => surface.is_curvature_free = command.last_number()? == 0.0,
         "THC" => surface.is_thickness_free = command.last_number()? == 0.0,
         "SPH" | "CON" | "ASP" => {}
         "DIF" | "HOR" | "HWL" | "HCT" | "HCO" => return diffraction(surface, command),
+        "GRO" | "GRS" | "GRX" | "GRY" | "GRZ" => return grating(surface, command),
+        "SPS" | "SCO" => return special(surface, command),
         _ => return place(surface, command),
     }
     Ok(used())
@@ -127,6 +134,11 @@ fn diffraction(
         surface.diffraction.get_or_insert_with(new);
         return Ok(used());
     }
+    if command.name == "DIF" && command.has_word("GRT") {
+        let (line, normal) = (command.line, [0.0, 1.0, 0.0]);
+        surface.grating = Some(CodeVGrating { line, order: 1.0, spacing: 0.0, normal });
+        return Ok(used());
+    }
     let Some(phase) = &mut surface.diffraction else { return Ok(other(surface, command)) };
     match command.name.as_str() {
         "HOR" => phase.order = command.last_number()?,
@@ -147,6 +159,60 @@ fn diffraction(
     Ok(used())
 }
 
+/// The commands of a grating: `GRO order`, `GRS spacing`, `GRX`, `GRY` and `GRZ`.
+fn grating(surface: &mut CodeVSurface, command: &Command) -> Result<CommandOutcome, ParseError> {
+    let Some(grating) = &mut surface.grating else { return Ok(other(surface, command)) };
+    let value = command.last_number()?;
+    match command.name.as_str() {
+        "GRO" => grating.order = value,
+        "GRS" => grating.spacing = value,
+        name => {
+            let axis = ["GRX", "GRY", "GRZ"].iter().position(|own| *own == name);
+            grating.normal[axis.unwrap_or_default()] = value;
+        }
+    }
+    Ok(used())
+}
+
+/// `SPS name radius` and `SCO name value`: a special form and its coefficients.
+fn special(surface: &mut CodeVSurface, command: &Command) -> Result<CommandOutcome, ParseError> {
+    let word = command.words.first().map(|word| word.to_ascii_uppercase()).unwrap_or_default();
+    if command.name == "SPS" {
+        let Some((_, form)) = SpecialForm::ALL.into_iter().find(|(name, _)| *name == word) else {
+            return Ok(other(surface, command));
+        };
+        let radius = command.words.get(1).map_or(Ok(0.0), |_| command.number(1))?;
+        let (line, terms) = (command.line, BTreeMap::new());
+        surface.special = Some(CodeVSpecial { line, form, radius, terms });
+        return Ok(used());
+    }
+    let Some(special) = &mut surface.special else { return Ok(other(surface, command)) };
+    let value = command.number(1)?;
+    if word == "NRADIUS" {
+        special.radius = value;
+        return Ok(used());
+    }
+    let digits = |prefix: &str| word.strip_prefix(prefix)?.parse::<usize>().ok();
+    let odd = special.form == SpecialForm::OddAsphere;
+    let power = digits("AR").filter(|_| odd).map(|power| power.saturating_add(1));
+    match (word.as_str(), digits("C").or(power)) {
+        ("K", _) => surface.conic = value,
+        (_, Some(number)) if number == special.form.conic() => surface.conic = value,
+        (_, Some(3)) if special.form == SpecialForm::FringeZernike => special.radius = value,
+        (_, Some(number)) => {
+            special.terms.insert(number, value);
+        }
+        (_, None) if value == 0.0 => {}
+        (_, None) => {
+            surface.locked.get_or_insert_with(|| command.text.clone());
+            let note =
+                "a coefficient of unknown meaning: the row is locked and rays meet its conic";
+            return Ok((ConversionOutcome::Locked, note.to_owned()));
+        }
+    }
+    Ok(used())
+}
+
 /// Decentres, tilts, and the rest.
 fn place(surface: &mut CodeVSurface, command: &Command) -> Result<CommandOutcome, ParseError> {
     let numbers = ["XDE", "YDE", "ZDE", "ADE", "BDE", "CDE"];
@@ -159,6 +225,7 @@ fn place(surface: &mut CodeVSurface, command: &Command) -> Result<CommandOutcome
         "DAR" => Placement::Return,
         "BEN" => Placement::Bend,
         "REV" => Placement::Reverse,
+        "XOD" | "YOD" | "ZOD" if command.last_number()? == 0.0 => return Ok(preserved()),
         "RET" | "GLB" | "XOD" | "YOD" | "ZOD" => {
             return Ok(dropped("this place of the surface is not supported"));
         }

@@ -2,7 +2,7 @@
 
 use super::medium::is_air;
 use super::required_number;
-use crate::lens::{AxisBreak, Freeform, IdealElement, LockedSurface, Medium, Row};
+use crate::lens::{AxisBreak, ForeignAperture, Freeform, IdealElement, LockedSurface, Medium, Row};
 use serde::de::value::MapAccessDeserializer;
 use serde::de::{Error, MapAccess, Unexpected, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
@@ -57,6 +57,8 @@ struct RowJson {
     break_after: Option<AxisBreak>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     locked: Option<LockedSurface>,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    foreign_aperture: Option<ForeignAperture>,
     #[serde(default, skip_serializing_if = "String::is_empty")]
     comment: String,
 }
@@ -112,6 +114,7 @@ impl Serialize for Row {
             break_before: self.break_before,
             break_after: self.break_after,
             locked: self.locked.clone(),
+            foreign_aperture: self.foreign_aperture.clone(),
             comment: self.comment.clone(),
         }
         .serialize(to)
@@ -152,6 +155,7 @@ impl<'de> Visitor<'de> for RowVisitor {
             break_before: keys.break_before,
             break_after: keys.break_after,
             locked: keys.locked,
+            foreign_aperture: keys.foreign_aperture,
             comment: keys.comment,
         })
     }

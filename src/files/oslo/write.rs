@@ -239,6 +239,7 @@ impl OsloWriter {
         }
         self.pickups(i);
         self.report.add_row_losses(SurfaceNumber::new(i), &row);
+        self.report.add_aperture_loss(SurfaceNumber::new(i), &row);
     }
 
     fn glass(&mut self, medium: &Medium, place: MediumPlace) {

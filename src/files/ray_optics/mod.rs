@@ -50,7 +50,7 @@ pub(super) fn read(text: &str, file: &str) -> Result<(Lens, ConversionReport), F
 }
 
 /// The text with `null` for the words `NaN` and `Infinity`, which are no JSON.
-fn without_infinities(text: &str) -> String {
+pub(super) fn without_infinities(text: &str) -> String {
     let mut quoted = false;
     let mut plain = String::with_capacity(text.len());
     let mut rest = text;

@@ -7,6 +7,7 @@ use super::MODEL_KEY;
 use crate::files::codev::place;
 use crate::files::error::FileError;
 use crate::files::first_order_beam::FirstOrderBeam;
+use crate::files::index_table::glass_table;
 use crate::files::report::{ConversionOutcome, ConversionReport};
 use crate::files::vignetting::beam_reach;
 use crate::lens::glass;
@@ -22,8 +23,6 @@ const VERSION: &str = "0.9.8";
 const FAR: f64 = 1e10;
 /// The wavelength at which phases are written, in nanometres.
 const PHASE_NM: f64 = 587.5618;
-/// The number of entries of a table of indices beside the wavelengths of the lens.
-const ENTRIES: usize = 12;
 
 /// The text of the file, and the report of everything that is not exact. `file` is its name in messages.
 ///
@@ -160,7 +159,7 @@ impl RayOpticsWriter {
 
     /// The surfaces and gaps. Without rims the other program computes its apertures.
     fn sequence(&mut self) -> Result<Value, LensError> {
-        let reach = beam_reach(&self.lens, &[], 0..1)?;
+        let reach = beam_reach(&self.lens, &Vec::new(), 0..1)?;
         let count = self.lens.surfaces.len();
         let mut surfaces = vec![plane("Obj", 0)];
         surfaces.extend((0..count).map(|i| self.surface(i, reach[i])));
@@ -189,6 +188,7 @@ impl RayOpticsWriter {
     fn surface(&mut self, i: usize, reach: Option<f64>) -> Value {
         let row = self.lens.surfaces[i].clone();
         self.report.add_row_losses(SurfaceNumber::new(i), &row);
+        self.report.add_aperture_loss(SurfaceNumber::new(i), &row);
         let rims: Vec<Value> = row.semi_diameter.iter().map(|radius| circle(*radius)).collect();
         let mirror = row.medium == Medium::Mirror;
         let mut attributes = json!({
@@ -245,8 +245,7 @@ impl RayOpticsWriter {
                 // Each program has a dispersion formula of its own for these two numbers.
                 let note = "a table of its indices, with nd and vd beside it";
                 self.record(ConversionOutcome::Used, format!("model glass {place}"), note);
-                let index = |um| Some(glass::model_index(*nd, *vd, um));
-                let mut data = self.table([0.0, f64::INFINITY], index);
+                let mut data = self.table(medium);
                 data["label"] = format!("{nd},{vd}").into();
                 data["_catalog"] = "model".into();
                 data[MODEL_KEY] = json!([nd, vd]);
@@ -263,35 +262,17 @@ impl RayOpticsWriter {
         let Some(glass) = glass::find(name) else {
             return medium_instance("opticalmedium", "Air", json!({}));
         };
-        let mut data = self.table(glass.range_um, |um| glass.index(um));
+        let mut data = self.table(&Medium::Glass(name.to_owned()));
         data["label"] = glass.name.clone().into();
         data["_catalog"] = glass.manufacturer.clone().into();
         medium_instance("opticalmedium", "InterpolatedMedium", data)
     }
 
-    /// The indices at the wavelengths of the lens and between, within the range of a medium in µm.
-    fn table(&self, range: [f64; 2], index: impl Fn(f64) -> Option<f64>) -> Value {
-        let own = self.lens.wavelengths.iter().map(|wave| wave.um);
-        let [low, high] = self.table_range(range);
-        let even = (0..ENTRIES).map(|k| low + (high - low) * k as f64 / (ENTRIES - 1) as f64);
-        let mut waves: Vec<f64> = own.chain(even).collect();
-        waves.sort_by(f64::total_cmp);
-        // Entries that nearly coincide would spoil the interpolation.
-        waves.dedup_by(|b, a| *b == *a || *b - *a < 1e-4 && !self.is_own(*b));
-        let table = waves.iter().filter_map(|um| Some((um * 1e3, index(*um)?)));
-        let (nm, n): (Vec<f64>, Vec<f64>) = table.unzip();
+    /// A table of indices; the other program interpolates between its entries.
+    fn table(&self, medium: &Medium) -> Value {
+        let table = glass_table(&self.lens.wavelengths, medium).unwrap_or_default();
+        let (nm, n): (Vec<f64>, Vec<f64>) = table.into_iter().map(|(um, n)| (um * 1e3, n)).unzip();
         json!({"wvls": nm, "rndx": n, "kvals": null, "kvals_wvls": null})
-    }
-
-    fn is_own(&self, um: f64) -> bool {
-        self.lens.wavelengths.iter().any(|wave| wave.um == um)
-    }
-
-    /// The range of a table: somewhat wider than that of the wavelengths, as far as the formula reaches.
-    fn table_range(&self, [low, high]: [f64; 2]) -> [f64; 2] {
-        let waves = || self.lens.wavelengths.iter().map(|wave| wave.um);
-        let (least, most) = (waves().fold(high, f64::min), waves().fold(low, f64::max));
-        [low.max(0.9 * least), high.min(1.1 * most)]
     }
 
     fn specification(&mut self) -> Result<Value, LensError> {

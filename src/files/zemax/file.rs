@@ -108,6 +108,8 @@ pub(super) struct ZemaxSurface {
     pub(super) outline: Option<OutlineLine>,
     /// An obscuration that is no circle.
     pub(super) block: Option<OutlineLine>,
+    /// The lines of apertures of other forms.
+    pub(super) other_apertures: Vec<usize>,
     pub(super) variable_thickness: Option<(f64, f64, usize)>,
     pub(super) thickness_pickup: Option<PickupLine>,
     /// Height, zone and line of a marginal ray height solve.
@@ -169,6 +171,9 @@ pub(super) struct GlassLine {
     pub(super) offsets: (f64, f64),
     pub(super) line: usize,
 }
+
+/// The operands of the vignetting factors of a field, in the order of [`ZemaxFile::vignetting`].
+pub(super) const FACTORS: [&str; 5] = ["FVDX", "FVDY", "FVCX", "FVCY", "FVAN"];
 
 /// One value of the multi-configuration table.
 #[derive(Debug, Clone)]

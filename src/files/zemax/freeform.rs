@@ -291,7 +291,7 @@ fn even_parameters(row: &Row, first: f64) -> Vec<(usize, f64)> {
 }
 
 /// All powers of r beside the conic, from the first on.
-fn merged_powers(row: &Row, form: &Freeform<f64>) -> Vec<f64> {
+pub(in crate::files) fn merged_powers(row: &Row, form: &Freeform<f64>) -> Vec<f64> {
     let mut powers = form.numbers.clone();
     for (term, a) in row.asphere.iter().enumerate().filter(|(_, a)| **a != 0.0) {
         powers.resize(powers.len().max(2 * term + 4), 0.0);

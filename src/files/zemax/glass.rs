@@ -58,7 +58,8 @@ pub(in crate::files) fn named_medium(name: &str, makers: &[String]) -> ImportedM
     let line = GlassLine { name: name.to_owned(), ..GlassLine::default() };
     let found = resolve_glass(&line, makers);
     let same = match &found.medium {
-        Medium::Glass(full) => glass::find(full).filter(|g| letters(&g.name) == letters(name)),
+        Medium::Glass(full) => glass::find(full)
+            .filter(|g| letters(&g.name) == letters(name) && is_expected(g, &line, makers)),
         _ => None,
     };
     match same {
@@ -85,12 +86,29 @@ fn resolve_glass(line: &GlassLine, catalogues: &[String]) -> ImportedMedium {
         _ if name.starts_with("___BLANK") => return model_medium(line),
         _ => {}
     }
-    let exact = find_in_catalogues(&name, catalogues, line);
-    let found = exact.map(|glass| (glass, true)).or_else(|| find_similar(line, catalogues));
+    let named = find_in_catalogues(&name, catalogues, line);
+    let exact = named.filter(|glass| is_expected(glass, line, catalogues));
+    let found = exact
+        .map(|glass| (glass, true))
+        .or_else(|| find_similar(line, catalogues))
+        .or_else(|| named.map(|glass| (glass, false)));
     match found {
         Some((glass, exact)) => catalogue_medium(line, glass, exact),
         None => unlisted_medium(line),
     }
+}
+
+/// True for a glass of the catalogues of the file, of a material without a maker, or of the index that the
+/// file states: another maker may use the same name for another glass.
+fn is_expected(glass: &Glass, line: &GlassLine, catalogues: &[String]) -> bool {
+    let listed = catalogues.iter().any(|own| maker(own).eq_ignore_ascii_case(&glass.manufacturer));
+    let agrees = !is_placeholder(line) && (glass.nd - line.nd).abs() < 5e-5;
+    catalogues.is_empty() || listed || agrees || is_general(glass)
+}
+
+/// The maker of a catalogue: `OHARA_2021-04` is a version of `OHARA`.
+fn maker(catalogue: &str) -> &str {
+    catalogue.split(['_', '-']).next().unwrap_or_default()
 }
 
 /// The glass of this name, in the first of the catalogues that has it with the index of the line, or that has
@@ -112,13 +130,8 @@ fn find_among(
     catalogues: &[String],
     line: &GlassLine,
 ) -> Option<&'static Glass> {
-    let listed = || {
-        catalogues.iter().filter_map(|catalogue| {
-            // `OHARA_2021-04` is a version of the catalogue `OHARA`.
-            let maker = catalogue.split(['_', '-']).next().unwrap_or_default();
-            find(&format!("{maker} {name}"))
-        })
-    };
+    let listed =
+        || catalogues.iter().filter_map(|catalogue| find(&format!("{} {name}", maker(catalogue))));
     // Several of them may have a glass of this name: index and Abbe number on the line
     // decide.
     let agrees = |glass: &&Glass| !is_placeholder(line) && (glass.nd - line.nd).abs() < 5e-5;

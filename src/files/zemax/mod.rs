@@ -15,6 +15,7 @@ mod row_plan;
 mod shape;
 mod write;
 
+pub(super) use freeform::merged_powers;
 pub(super) use glass::{ImportedMedium, is_general, named_medium};
 pub use write::write;
 

@@ -37,6 +37,9 @@ pub(super) fn scale(lens: &mut Lens, factor: f64) -> Result<(), EditError> {
         for (term, a) in row.asphere.iter_mut().enumerate() {
             *a *= factor.powi(-(2 * term as i32 + 3));
         }
+        // Nobody knows which of the numbers in the lines of a file are lengths.
+        row.locked.iter_mut().for_each(|locked| locked.lines.clear());
+        row.foreign_aperture = None;
         row.ideal = row.ideal.map(|ideal| ideal.scaled(factor));
         row.freeform = row.freeform.as_ref().map(|form| form.scaled(factor));
         if let Medium::Grin(gradient) = &mut row.medium {

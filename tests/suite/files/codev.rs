@@ -2,7 +2,10 @@
 
 use super::foreign;
 use aplanat::files::{self, ConversionOutcome, ConversionReport, LensFormat, OpenedLens};
-use aplanat::lens::{Aperture, FieldKind, Lens, Medium, Object, Parameter, Pickup, Quantity};
+use aplanat::lens::{
+    Aperture, AxisBreak, FieldKind, FreeformKind, IdealElement, Lens, Medium, Object, Parameter,
+    Pickup, Quantity,
+};
 use aplanat::math::Vec3;
 
 fn text() -> String {
@@ -240,7 +243,9 @@ fn apertures_that_are_no_centred_circles_have_circles_that_stand_for_them() {
     assert_eq!(read("  ADX 1; CIR 6"), ((Some(7.0), None), approximated));
     assert_eq!(read("  REX OBS 3; REY OBS 2; CIR 8.6"), ((Some(8.6), Some(2.0)), approximated));
     assert_eq!(read("  REX EDG 3").1, ConversionOutcome::Preserved);
-    assert_eq!(read("  ARO 30").1, ConversionOutcome::Dropped);
+    // Turned about its centre, a rectangle stays in the circle about it; without one nothing is turned.
+    assert_eq!(read("  ARO 30; REX 3; REY 4"), ((Some(5.0), None), approximated));
+    assert_eq!(read("  ARO 30").1, ConversionOutcome::Preserved);
     // The fifth surface is a plane, but tilted and decentred itself.
     let tilted = changed("  XDE 0.25; ADE 3.0; DAR", "  XDE 0.25; ADE 3.0; DAR; CIR 6; ADX 1");
     assert_eq!(tilted.lens.surfaces[4].semi_diameter, Some(7.0));
@@ -250,4 +255,175 @@ fn apertures_that_are_no_centred_circles_have_circles_that_stand_for_them() {
     let row = &plane.lens.surfaces[2];
     assert_eq!((row.semi_diameter, row.decenter), (Some(6.0), [1.0, 2.0]));
     assert_eq!(outcome(&plane.report.unwrap(), "ADX"), used);
+}
+
+/// Two planes in air with a lens of one element, whose gaps, aperture and fields change with the position.
+const ZOOM: &str = "RDM;LEN\nEPD 5\nDIM M\nWL 587.5618\nXAN 0 1\nYAN 0 2\nSO 0 1E14\n\
+    S 50 3 517642\n  STO\nS -50 45\nSI 0 0.5\nZOO 2\nZOO THI S1 3 4\nZOO THI S2 45 44\n\
+    ZOO EPD 5 4\nZOO XAN F2 1 1.5\nZOO YAN F2 2 1\nGO\n";
+
+/// The gap in front of the image changes with the position in nearly every zoom lens, and holds the defocus.
+#[test]
+fn last_gaps_apertures_and_skew_fields_of_zoom_positions_are_written_and_read_back() {
+    let opened = open(ZOOM);
+    let dropped =
+        |opened: &OpenedLens| opened.report.as_ref().unwrap().count(ConversionOutcome::Dropped);
+    assert_eq!(dropped(&opened), 0, "{}", opened.report.unwrap());
+    let lens = opened.lens;
+    assert_eq!([0, 1].map(|zoom| lens.thickness_at(1, zoom)), [Some(45.5), Some(44.5)]);
+    let skew = lens.fields_at(1).projected_points()[1];
+    assert!((skew[0] - 1.5).abs() < 1e-12 && (skew[1] - 1.0).abs() < 1e-12, "{skew:?}");
+    let moved = ZOOM.replace("ZOO EPD", "ZOO THI SI 0.5 0.75\nZOO EPD");
+    assert_eq!(open(&moved).lens.thickness_at(1, 1), Some(44.75));
+    let folder = super::folder("codev-zoom-all");
+    for name in ["zoom.seq", "zoom.zmx"] {
+        let saved = files::save(&lens, folder.join(name)).unwrap();
+        assert_eq!(saved.report.unwrap().count(ConversionOutcome::Dropped), 0, "{name}");
+        let back = files::open(folder.join(name)).unwrap().lens;
+        for zoom in 0..2 {
+            assert_eq!(back.aperture_at(zoom), lens.aperture_at(zoom), "{name}");
+            let points = [&back, &lens].map(|lens| lens.fields_at(zoom).projected_points()[1]);
+            let apart = (points[0][0] - points[1][0]).hypot(points[0][1] - points[1][1]);
+            assert!(apart < 1e-12, "{name}: {points:?}");
+        }
+    }
+}
+
+#[test]
+fn zoom_lenses_of_the_library_are_written_as_sequences() {
+    let folder = super::folder("codev-zoom-library");
+    for name in ["zoom_nikkor_28_80", "zoom_tamron_28_75_f28"] {
+        let bundled = files::bundled_lenses().iter().find(|lens| lens.name == name).unwrap();
+        let lens = files::json::read(bundled.text, name).unwrap();
+        let saved = files::save(&lens, folder.join(format!("{name}.seq"))).unwrap();
+        assert!(saved.proof.unwrap().worst_mm < 1e-9, "{name}");
+    }
+}
+
+#[test]
+fn special_forms_are_traced_and_written_back() {
+    let folder = super::folder("codev-special");
+    let front = "S     48.8 5.5 NBAK4_SCHOTT";
+    for (special, kind, numbers) in [
+        (
+            "SPS XYP 20; SCO NRADIUS 10; SCO K -0.5; SCO C3 0.01; SCO C4 0.02",
+            FreeformKind::XyPolynomial { radius: 10.0 },
+            vec![0.0, 0.01, 0.02],
+        ),
+        (
+            "SPS ODD 0.0; SCO K -0.5; SCO AR3 1e-4; SCO C6 2e-6",
+            FreeformKind::OddAsphere,
+            vec![0.0, 0.0, 1e-4, 0.0, 2e-6],
+        ),
+        (
+            "SPS QCN 9; SCO C4 0.03; SCO C6 -0.01; SCO K -0.5",
+            FreeformKind::QCon { radius: 9.0 },
+            vec![0.03, 0.0, -0.01],
+        ),
+        (
+            "SPS QBF 9; SCO C3 0.03; SCO C4 -0.01; SCO C17 -0.5",
+            FreeformKind::QBfs { radius: 9.0 },
+            vec![0.03, -0.01],
+        ),
+        (
+            "SPS ZFR; SCO C1 -0.5; SCO C3 9; SCO C8 0.02",
+            FreeformKind::FringeZernike { radius: 9.0 },
+            vec![0.0, 0.0, 0.0, 0.0, 0.02],
+        ),
+    ] {
+        let text = text().replacen(front, &format!("{front}\n  {special}"), 1);
+        let opened = open(&text);
+        let row = &opened.lens.surfaces[0];
+        let form = row.freeform.as_ref().unwrap_or_else(|| panic!("{special}"));
+        assert_eq!((form.kind, &form.numbers, row.conic), (kind, &numbers, -0.5));
+        assert_eq!(outcome(opened.report.as_ref().unwrap(), "SPS"), ConversionOutcome::Used);
+        let saved = files::save(&opened.lens, folder.join("special.seq")).unwrap();
+        assert!(saved.proof.unwrap().worst_mm < 1e-9, "{special}");
+        let back = files::open(folder.join("special.seq")).unwrap().lens;
+        assert_eq!(back.surfaces[0].freeform, row.freeform);
+    }
+    // Coefficients of an odd asphere are those of r/R.
+    let odd = text().replacen(front, &format!("{front}\n  SPS ODD 2.0; SCO AR3 8.0"), 1);
+    assert_eq!(open(&odd).lens.surfaces[0].freeform.as_ref().unwrap().numbers[2], 1.0);
+    for unknown in ["SPS ZRN 9; SCO C4 0.1", "SPS QCN 9; SCO C2 0.1", "SPS XYP 9; SCO Q7 0.1"] {
+        let opened = open(&text().replacen(front, &format!("{front}\n  {unknown}"), 1));
+        let row = &opened.lens.surfaces[0];
+        assert!(row.locked.is_some() && row.freeform.is_none(), "{unknown}");
+        assert!(opened.report.unwrap().count(ConversionOutcome::Locked) > 0, "{unknown}");
+    }
+}
+
+#[test]
+fn gratings_are_traced_and_written_back() {
+    let front = "S     48.8 5.5 NBAK4_SCHOTT";
+    let ruled = |words: &str| open(&text().replacen(front, &format!("{front}\n  {words}"), 1));
+    let opened = ruled("DIF GRT; GRO -1; GRS 0.004");
+    let expected = IdealElement::Grating { lines_per_mm: 250.0, order: -1.0 };
+    assert_eq!(opened.lens.surfaces[0].ideal, Some(expected));
+    let path = super::folder("codev-grating").join("grating.seq");
+    let proof = files::save(&opened.lens, &path).unwrap().proof.unwrap();
+    assert!(proof.worst_mm < 1e-9, "{proof}");
+    for unknown in
+        ["DIF GRT; GRO 1", "DIF GRT; GRS 0.004; GRX 1; GRY 0", "DIF GRT; GRS 1; ASP; A 1e-6"]
+    {
+        let row = &ruled(unknown).lens.surfaces[0];
+        assert_eq!(row.locked.as_ref().unwrap().kind, "DIF GRT", "{unknown}");
+    }
+}
+
+/// A surface with the place of another one stands where that one does, whatever is between.
+#[test]
+fn surfaces_are_placed_by_others() {
+    let start = "RDM;LEN\nEPD 5\nDIM M\nWL 587.5618\nYAN 0\nSO 0 1E14\nS 0 10\n  STO\n\
+        S 0 7\n  YDE 1; ADE 20\nS 0 3\n  XDE 2; BDE -30\n";
+    let end = "  ZDE 25; ADE 5\nS 0 4\nSI 0 0\nGO\n";
+    for place in ["GLB S2", "RET S2"] {
+        let opened = open(&format!("{start}S 0 6\n  {place}\n{end}"));
+        assert_eq!(outcome(opened.report.as_ref().unwrap(), place), ConversionOutcome::Used);
+        let system = opened.lens.resolve(0, 0.5875618).unwrap();
+        let stand = |i: usize| {
+            let (frame, surface) = (system.frames()[i], &system.surfaces[i]);
+            surface.pose.map_or(frame, |pose| frame.then(&pose))
+        };
+        let frames = [0, 1, 2, 3, 4].map(stand);
+        let own = AxisBreak { decenter: [0.0, 0.0, 25.0], tilt: [-5.0, 0.0, 0.0] };
+        let (found, expected) = (&frames[3], frames[1].then(&own.pose()));
+        assert!(expected.inverse().then(found).is_nearly_centred(), "{found:?} {expected:?}");
+        let apart = found.shift - expected.shift;
+        assert!(apart.dot(apart).sqrt() < 1e-12);
+        // The next surface stands behind it.
+        let gap = frames[3].inverse().then(&frames[4]).shift;
+        assert!((gap - Vec3::new(0.0, 0.0, 6.0)).dot(gap - Vec3::new(0.0, 0.0, 6.0)) < 1e-24);
+    }
+    let named = open(&format!("{start}S 0 6\n{end}GLB S4 S2\n"));
+    assert!(outcome(named.report.as_ref().unwrap(), "GLB") == ConversionOutcome::Used);
+    let unknown = open(&format!("{start}S 0 6\n  GLB S9\n{end}"));
+    assert!(outcome(unknown.report.as_ref().unwrap(), "GLB") == ConversionOutcome::Dropped);
+}
+
+#[test]
+fn apertures_of_other_forms_are_written_back() {
+    let lens = changed("  CIR 8.6", "  REX 3; REY S1 4; ADX 0.5; ARO 30").lens;
+    let path = super::folder("codev-apertures").join("aperture.seq");
+    files::save(&lens, &path).unwrap();
+    let text = std::fs::read_to_string(&path).unwrap();
+    for command in ["REX 3", "REY 4", "ADX 0.5", "ARO 30"] {
+        assert!(text.contains(command), "{command}: {text}");
+    }
+    assert_eq!(files::open(&path).unwrap().lens.surfaces[0], lens.surfaces[0]);
+    let mut wider = lens;
+    wider.surfaces[0].semi_diameter = Some(9.0);
+    let saved = files::save(&wider, &path).unwrap();
+    assert!(!std::fs::read_to_string(&path).unwrap().contains("REX"));
+    assert_eq!(outcome(&saved.report.unwrap(), "aperture of"), ConversionOutcome::Approximated);
+}
+
+/// Another maker's glass of the same name is another glass.
+#[test]
+fn a_glass_of_another_maker_is_no_exact_one() {
+    let opened = changed("NBAK4_SCHOTT", "KZFS4_SCHOTT");
+    assert_eq!(opened.lens.surfaces[0].medium, Medium::Glass("SCHOTT N-KZFS4".to_owned()));
+    let report = opened.report.unwrap();
+    let row = report.rows.iter().find(|row| row.text.contains("KZFS4")).unwrap();
+    assert_eq!(row.outcome, ConversionOutcome::Approximated, "{}", row.note);
 }

@@ -100,3 +100,34 @@ fn factors_that_leave_no_pupil_are_left_out() {
     let zero = SEQUENCE.replace("0.4", "0").replace("0.5\n", "0\n").replace("0.9", "0");
     assert_eq!(read(&zero, "a.seq", VignettingChoice::Factors).vignetting, None);
 }
+
+/// The factors of each position set the rims together: the widest beam of all needs them.
+#[test]
+fn factors_of_zoom_positions_are_read() {
+    let zoomed = SEQUENCE.replace("GO\n", "ZOO 2\nZOO VUY F2 0.4 0.1\nZOO VLY F1 0 0\nGO\n");
+    let table = "MNUM 2 1\nFVCY 2 1 0.45 0 0 0 1 1 1 0 0 \"\" 0\nFVCY 2 2 0.3 0 0 0 1 1 1 0 0 \"\" 0\n\
+        FVDY 2 1 0.05 0 0 0 1 1 1 0 0 \"\" 0\nFVDY 2 2 0.2 0 0 0 1 1 1 0 0 \"\" 0\n";
+    let [front, pupil, _] = expected();
+    // The upper edge of the second position is at 0.9.
+    let behind = 10.0 * 20_f64.to_radians().tan() + 5.0 * 0.9;
+    for (text, name, line) in
+        [(zoomed, "a.seq", "ZOO VUY"), (format!("{ZEMAX}{table}"), "a.zmx", "FVCY 2 2")]
+    {
+        let opened = read(&text, name, VignettingChoice::Factors);
+        assert_eq!(opened.lens.zoom_positions(), 2);
+        let [first, stop, third] = rims(&opened)[..] else { panic!() };
+        assert_near(first, front);
+        assert_near(stop, pupil);
+        if name == "a.seq" {
+            assert_near(third, behind);
+        }
+        let report = opened.report.unwrap();
+        assert_eq!(note(&report, line).0, ConversionOutcome::Approximated);
+        for position in [1, 2] {
+            let row = format!("vignetting of field 2 at zoom position {position}");
+            assert!(note(&report, &row).1.contains("by the factors"));
+        }
+        let left_out = read(&text, name, VignettingChoice::Rims).report.unwrap();
+        assert_eq!(note(&left_out, line).0, ConversionOutcome::Dropped);
+    }
+}

@@ -3,8 +3,8 @@
 use super::foreign;
 use aplanat::files::{self, ConversionOutcome, ConversionReport, FileError, OpenedLens};
 use aplanat::lens::{
-    Aperture, FieldKind, FreeformKind, GradientIndex, Lens, Medium, Object, Parameter, Pickup,
-    ProfileLaw, Quantity, Variable,
+    Aperture, Edit, FieldKind, FreeformKind, GradientIndex, Lens, Medium, Object, Parameter,
+    Pickup, ProfileLaw, Quantity, Variable, apply_edit,
 };
 use aplanat::math::Vec3;
 use aplanat::trace::{Fate, Ray, Tracer};
@@ -556,4 +556,42 @@ fn skew_angles_are_those_of_both_planes() {
     for (a, b) in pairs {
         assert!((a.x - b.x).abs() < 1e-13 && (a.y - b.y).abs() < 1e-13, "{a:?} {b:?}");
     }
+}
+
+/// Nobody traces them, but the file that is written has them again.
+#[test]
+fn apertures_of_other_forms_are_written_back() {
+    let lines = "  SQAP 3 4 0\r\n  SPID 0.5 3 0\r\n  UDAD 0 1 2 3\r\n  OBDC 0.5 0 0";
+    let opened = changed("  CLAP 0 8.6 0", lines).unwrap();
+    let report = opened.report.unwrap();
+    for (line, expected) in [
+        ("SQAP", ConversionOutcome::Approximated),
+        ("SPID", ConversionOutcome::Dropped),
+        ("UDAD", ConversionOutcome::Dropped),
+    ] {
+        assert_eq!(outcome(&report, line).0, expected, "{line}");
+    }
+    assert!(outcome(&report, "SPID").1.contains("writes the line back"));
+    let (mut lens, folder) = (opened.lens, super::folder("zemax-apertures"));
+    let written = |lens: &Lens| {
+        let saved = files::save(lens, folder.join("aperture.zmx")).unwrap();
+        let text = files::decode_unicode(&std::fs::read(folder.join("aperture.zmx")).unwrap(), "a");
+        (text.unwrap(), saved.report.unwrap())
+    };
+    let (text, _) = written(&lens);
+    for line in lines.split("\r\n") {
+        assert!(text.contains(line), "{line}: {text}");
+    }
+    let back = files::open(folder.join("aperture.zmx")).unwrap().lens;
+    assert_eq!(back.surfaces[0], lens.surfaces[0]);
+    // The native format keeps them too.
+    let native = files::json::read(&files::json::write(&lens), "a.json").unwrap();
+    assert_eq!(native.surfaces, lens.surfaces);
+    // Another circle, another size: the lines are not those of this lens any more.
+    let edit = Edit::Scale(2.0);
+    assert_eq!(apply_edit(&lens, &edit).unwrap().surfaces[0].foreign_aperture, None);
+    lens.surfaces[0].semi_diameter = Some(9.0);
+    let (text, report) = written(&lens);
+    assert!(!text.contains("SPID"));
+    assert_eq!(outcome(&report, "aperture of surface 1").0, ConversionOutcome::Approximated);
 }

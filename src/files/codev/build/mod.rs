@@ -10,13 +10,13 @@ mod zoom;
 
 pub(in crate::files) use row::frames;
 
-use super::file::{ApertureCommand, CodeVFile, CodeVSurface};
+use super::file::{ApertureCommand, CodeVFile, CodeVSurface, FACTORS, ZoomCommand};
 use crate::files::error::ParseError;
 use crate::files::foreign_lens::ForeignLens;
 use crate::files::report::{ConversionOutcome, ConversionReport};
-use crate::files::vignetting::PupilFactors;
+use crate::files::vignetting::{PupilFactors, ZoomedFactors};
 use crate::lens::{
-    Aperture, FieldKind, FieldPoint, Fields, Lens, Medium, Object, Wavelength,
+    Aperture, FieldKind, FieldPoint, Fields, Lens, Medium, Object, Quantity, Wavelength,
     paraxial_image_distance,
 };
 
@@ -67,17 +67,33 @@ pub(super) fn with_beam(file: &CodeVFile, lens: Lens, report: ConversionReport) 
     let has_aperture =
         |surface: &CodeVSurface| surface.clip.is_some() || surface.outline.half != [None; 2];
     let clips = file.surfaces[1..image].iter().map(has_aperture).collect();
-    let [ux, lx, uy, ly] = &file.vignetting;
-    let is_given = file.vignetting.iter().any(|values| !values.is_empty());
-    let fields = if is_given { lens.fields.values.len() } else { 0 };
-    let at = |values: &[f64], i: usize| values.get(i).copied().unwrap_or(0.0);
-    let factors = (0..fields).map(|i| {
-        let [dx, cx] = PupilFactors::of_edges(at(ux, i), at(lx, i));
-        let [dy, cy] = PupilFactors::of_edges(at(uy, i), at(ly, i));
-        PupilFactors { decenter: [dx, dy], compression: [cx, cy], angle: 0.0 }
-    });
-    let factors = factors.collect();
+    let factors = vignetting(file, lens.fields.values.len());
     ForeignLens { lens, report, factors, clips, automatic: Vec::new() }
+}
+
+/// The vignetting factors of the fields at every zoom position; empty without any in the file.
+fn vignetting(file: &CodeVFile, fields: usize) -> ZoomedFactors {
+    let zoomed = || {
+        let is_factor = |own: &&ZoomCommand| FACTORS.contains(&own.name.as_str());
+        file.zoomed.iter().filter(move |own| file.positions > 1 && is_factor(own))
+    };
+    if file.vignetting.iter().all(Vec::is_empty) && zoomed().next().is_none() {
+        return Vec::new();
+    }
+    let at = |kind: usize, zoom: usize, field: usize| {
+        let is_it = |own: &&ZoomCommand| own.name == FACTORS[kind] && own.target == field + 1;
+        let own = zoomed().find(is_it).and_then(|own| own.values.get(zoom));
+        let base = file.vignetting[kind].get(field);
+        own.or(base).copied().unwrap_or(0.0)
+    };
+    let factors = |zoom, field| {
+        let [ux, lx, uy, ly] = [0, 1, 2, 3].map(|kind| at(kind, zoom, field));
+        let [dx, cx] = PupilFactors::of_edges(ux, lx);
+        let [dy, cy] = PupilFactors::of_edges(uy, ly);
+        PupilFactors { decenter: [dx, dy], compression: [cx, cy], angle: 0.0 }
+    };
+    let position = |zoom| (0..fields).map(|field| factors(zoom, field)).collect();
+    (0..file.positions.max(1)).map(position).collect()
 }
 
 /// Millimetres per unit.
@@ -160,11 +176,12 @@ fn wavelengths(file: &CodeVFile) -> Vec<Wavelength> {
 /// Makes the last gap follow the paraxial focus, if the file says so and its own gap is that one.
 pub(super) fn solve_focus(file: &CodeVFile, lens: &mut Lens, report: &mut ConversionReport) {
     let Some(row) = file.focus else { return };
-    let defocus = file.surfaces.last().map_or(0.0, |image| image.thickness) * unit(file);
+    let defocus = row::defocus(file);
     let written = lens.surfaces.last().map_or(0.0, |row| row.thickness);
     let system = lens.resolve(0, lens.wavelengths[lens.primary()].um);
     let solved = system.ok().map(|system| paraxial_image_distance(&system, lens.object) + defocus);
-    if solved.is_some_and(|gap| (gap - written).abs() <= FOCUS_TOLERANCE) && lens.zoom.is_empty() {
+    let is_zoomed = lens.is_zoomed(lens.surfaces.len() - 1, Quantity::Thickness);
+    if solved.is_some_and(|gap| (gap - written).abs() <= FOCUS_TOLERANCE) && !is_zoomed {
         lens.image_solve = Some(defocus);
         let last = lens.surfaces.last_mut();
         last.into_iter().for_each(|row| row.thickness = solved.unwrap_or(written));

@@ -2,12 +2,13 @@
 
 use super::{aperture, glass};
 use crate::files::codev::file::{
-    CodeVDiffraction, CodeVFile, CodeVProfile, CodeVSurface, PickupCommand, Placement,
+    CodeVDiffraction, CodeVFile, CodeVProfile, CodeVSpecial, CodeVSurface, PickupCommand,
+    Placement, SpecialForm,
 };
 use crate::files::report::{ConversionOutcome, ConversionReport};
 use crate::lens::{
-    ASPHERE_TERMS, AxisBreak, BASE_NUMBERS, Freeform, FreeformKind, Lens, LockedSurface, Parameter,
-    Pickup, Pose, Quantity, Row, Variable,
+    ASPHERE_TERMS, AxisBreak, BASE_NUMBERS, Freeform, FreeformKind, IdealElement, Lens,
+    LockedSurface, Parameter, Pickup, Pose, Quantity, Row, Variable,
 };
 use crate::math::Vec3;
 
@@ -18,13 +19,14 @@ pub(super) fn rows(file: &CodeVFile, stop: usize, report: &mut ConversionReport)
     let radii = has_radii(file, report);
     let mut rows: Vec<Row> =
         (1..image).map(|k| Row { stop: k == stop, ..row(file, k, radii, report) }).collect();
-    let defocus = file.surfaces[image].thickness * unit;
-    let at_image = before_image(file, unit);
+    let defocus = defocus(file);
+    let places = places(file, unit);
+    let (at_image, _) = places[image];
     if let Some(last) = rows.last_mut().filter(|_| at_image.is_nearly_centred()) {
         last.thickness += defocus;
     }
     for k in 1..image {
-        let (before, after) = surface_frames(&file.surfaces[k], unit);
+        let (before, after) = places[k];
         let after = if k + 1 == image {
             to_image(after, rows[k - 1].thickness, &at_image, defocus)
         } else {
@@ -34,6 +36,31 @@ pub(super) fn rows(file: &CodeVFile, stop: usize, report: &mut ConversionReport)
         aperture::apply(&file.surfaces[k], unit, &mut rows[k - 1], report);
     }
     rows
+}
+
+/// The frame of every surface in that of the axis in front of it, and that of the axis behind in that of the
+/// surface. A surface with the place of another one stands where that one does.
+fn places(file: &CodeVFile, unit: f64) -> Vec<(Pose<f64>, Pose<f64>)> {
+    let mut axis: Pose<f64> = Pose::centred();
+    let mut stands: Vec<Pose<f64>> = Vec::with_capacity(file.surfaces.len());
+    let mut places = Vec::with_capacity(file.surfaces.len());
+    for (k, surface) in file.surfaces.iter().enumerate() {
+        let (own, after) = surface_frames(surface, unit);
+        let from = surface.reference.and_then(|source| stands.get(source));
+        let before = from.map_or(own, |from| axis.inverse().then(from).then(&own));
+        let stand = axis.then(&before);
+        // The object stands in front of the first vertex, at any distance.
+        let gap = if k == 0 { 0.0 } else { surface.thickness * unit };
+        axis = stand.then(&after).then(&along(gap));
+        stands.push(stand);
+        places.push((before, after));
+    }
+    places
+}
+
+/// The frame at a distance along the axis.
+fn along(distance: f64) -> Pose<f64> {
+    Pose { shift: Vec3::new(0.0, 0.0, distance), ..Pose::centred() }
 }
 
 /// True if the file gives radii; a file that does not say so gives them if they are longer than 1 as a
@@ -65,12 +92,17 @@ fn row(file: &CodeVFile, number: usize, radii: bool, report: &mut ConversionRepo
     };
     let locked = locked(surface, unit, report);
     let form = freeform(surface).filter(|_| locked.is_none());
+    let ideal = surface.grating.filter(|_| locked.is_none()).map(|own| IdealElement::Grating {
+        lines_per_mm: 1.0 / (own.spacing * unit),
+        order: own.order,
+    });
     let is_toroid = form.as_ref().is_some_and(|form| form.kind == FreeformKind::Toroid);
     Row {
         curvature: bend / unit,
         conic: surface.conic,
         asphere: if is_toroid { Vec::new() } else { asphere(surface, unit, report) },
         freeform: form.map(|form| form.scaled(unit)),
+        ideal,
         thickness: surface.thickness * unit,
         medium: imported.medium,
         locked,
@@ -85,6 +117,9 @@ fn freeform(surface: &CodeVSurface) -> Option<Freeform<f64>> {
     if let Some(phase) = &surface.diffraction {
         return Some(radial_phase(phase));
     }
+    if let Some(special) = &surface.special {
+        return special_form(special);
+    }
     let profile = surface.profile.filter(|_| surface.locked.is_none())?;
     Some(match profile {
         CodeVProfile::Biconic => {
@@ -98,6 +133,35 @@ fn freeform(surface: &CodeVSurface) -> Option<Freeform<f64>> {
             Freeform { kind: FreeformKind::Toroid, numbers }
         }
     })
+}
+
+/// A special form; `None` for one whose numbers cannot be traced.
+fn special_form(special: &CodeVSpecial) -> Option<Freeform<f64>> {
+    let radius = if special.radius == 0.0 { 1.0 } else { special.radius };
+    let kind = match special.form {
+        SpecialForm::XyPolynomial => FreeformKind::XyPolynomial { radius },
+        SpecialForm::OddAsphere => FreeformKind::OddAsphere,
+        SpecialForm::QCon => FreeformKind::QCon { radius },
+        SpecialForm::QBfs => FreeformKind::QBfs { radius },
+        SpecialForm::FringeZernike => FreeformKind::FringeZernike { radius },
+    };
+    let mut numbers = Vec::new();
+    for (number, value) in special.terms.iter().filter(|(_, value)| **value != 0.0) {
+        let at = number.checked_sub(special.form.first())?;
+        if *number > special.form.last() {
+            return None;
+        }
+        numbers.resize(at + 1, 0.0);
+        numbers[at] = *value;
+        if kind == FreeformKind::OddAsphere {
+            numbers[at] /= radius.powi(i32::try_from(at + 1).unwrap_or(i32::MAX));
+        }
+        if numbers.len() > kind.counts()[1] {
+            return None;
+        }
+    }
+    let form = Freeform { kind, numbers };
+    form.fault().is_none().then_some(form)
 }
 
 /// A phase of which `2π cₖ/λ` radians are the numbers for r in the unit of the file.
@@ -127,21 +191,39 @@ fn locked(
     report: &mut ConversionReport,
 ) -> Option<LockedSurface> {
     let lengths = (unit != 1.0).then(|| format!("UNIT {unit} mm"));
-    let unknown = surface
-        .diffraction
-        .as_ref()
-        .filter(|phase| !phase.is_radial || !(phase.nm > 0.0) || surface.profile.is_some());
-    if let Some(phase) = unknown {
-        let note = "only a phase of powers of r (HCT R) with its wavelength (HWL) on a surface of \
-                    revolution can be traced: the row is locked and rays meet its asphere alone";
-        for row in report.rows.iter_mut().filter(|row| row.line == Some(phase.line)) {
+    let unknown = untraceable(surface);
+    if let Some((_, line, note)) = unknown {
+        for row in report.rows.iter_mut().filter(|row| row.line == Some(line)) {
             row.outcome = ConversionOutcome::Locked;
             note.clone_into(&mut row.note);
         }
     }
-    let kind = surface.locked.clone().or_else(|| unknown.map(|_| "DIF DOE".to_owned()))?;
+    let kind = surface.locked.clone().or_else(|| unknown.map(|(kind, ..)| kind.to_owned()))?;
     let lines = lengths.into_iter().chain(surface.lines.iter().cloned()).collect();
     Some(LockedSurface { kind, lines })
+}
+
+/// The command of a phase, a grating or a special form that cannot be traced, its line, and the reason.
+fn untraceable(surface: &CodeVSurface) -> Option<(&'static str, usize, &'static str)> {
+    let is_aspheric = surface.profile.is_some() || surface.special.is_some();
+    if let Some(phase) = &surface.diffraction {
+        let is_known = phase.is_radial && phase.nm > 0.0 && !is_aspheric;
+        let note = "only a phase of powers of r (HCT R) with its wavelength (HWL) on a surface of \
+                    revolution can be traced: the row is locked and rays meet its asphere alone";
+        return (!is_known).then_some(("DIF DOE", phase.line, note));
+    }
+    if let Some(grating) = &surface.grating {
+        let is_plain = !is_aspheric && surface.terms.iter().all(|a| *a == 0.0);
+        let is_known = grating.spacing != 0.0 && grating.normal == [0.0, 1.0, 0.0] && is_plain;
+        let note = "only a grating of known spacing (GRS) with grooves along x on a conic can be \
+                    traced: the row is locked and rays meet its asphere alone";
+        return (!is_known).then_some(("DIF GRT", grating.line, note));
+    }
+    let special = surface.special.as_ref()?;
+    let is_plain = surface.profile.is_none() && surface.terms.iter().all(|a| *a == 0.0);
+    let is_known = is_plain && special_form(special).is_some();
+    let note = "its coefficients cannot be traced: the row is locked and rays meet its conic alone";
+    (!is_known).then_some(("SPS", special.line, note))
 }
 
 /// The frame of a surface in that of the axis in front of it, and that of the axis behind in that of the
@@ -164,8 +246,15 @@ fn surface_frames(surface: &CodeVSurface, unit: f64) -> (Pose<f64>, Pose<f64>) {
     frames(surface.placement, surface.decenter.map(|length| length * unit), surface.tilt)
 }
 
-fn before_image(file: &CodeVFile, unit: f64) -> Pose<f64> {
-    file.surfaces.last().map_or_else(Pose::centred, |image| surface_frames(image, unit).0)
+/// The displacement in mm of the image plane along its axis.
+pub(super) fn defocus(file: &CodeVFile) -> f64 {
+    file.surfaces.last().map_or(0.0, |image| image.thickness) * super::unit(file)
+}
+
+/// True if the image plane is neither tilted nor decentred itself.
+pub(super) fn has_centred_image(file: &CodeVFile) -> bool {
+    let places = places(file, super::unit(file));
+    places.last().is_none_or(|(image, _)| image.is_nearly_centred())
 }
 
 /// The frame behind the last surface for an image that is tilted or decentred itself, and then displaced
@@ -174,7 +263,6 @@ fn to_image(after: Pose<f64>, gap: f64, image: &Pose<f64>, defocus: f64) -> Pose
     if image.is_nearly_centred() {
         return after;
     }
-    let along = |z| Pose { shift: Vec3::new(0.0, 0.0, z), ..Pose::centred() };
     after.then(&along(gap)).then(image).then(&along(defocus - gap))
 }
 

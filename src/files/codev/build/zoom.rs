@@ -1,7 +1,8 @@
 //! The zoom positions.
 
-use crate::files::codev::file::{CodeVFile, ZoomCommand};
+use crate::files::codev::file::{CodeVFile, FACTORS, ZoomCommand};
 use crate::files::report::{ConversionOutcome, ConversionReport};
+use crate::files::vignetting::LEFT_OUT;
 use crate::lens::{Aperture, Lens, Object, Parameter, Quantity, ZoomPosition};
 
 /// Adds the zoom positions of the file to the lens.
@@ -13,12 +14,16 @@ pub(super) fn add_positions(file: &CodeVFile, lens: &mut Lens, report: &mut Conv
         return;
     }
     lens.zoom = vec![ZoomPosition::default(); file.positions];
-    for command in &file.zoomed {
+    // The displacement of the image belongs to the last gap, which has to be there before it.
+    let (image, others): (Vec<_>, Vec<_>) =
+        file.zoomed.iter().partition(|command| is_image_gap(command, lens));
+    for command in others.into_iter().chain(image) {
         let complete = command.values.len() == file.positions;
-        let done = if complete {
-            apply(command, super::unit(file), lens)
-        } else {
-            Err("not one value for each position")
+        let done = match FACTORS.contains(&command.name.as_str()) {
+            _ if !complete => Err("not one value for each position"),
+            true if command.values.iter().all(|value| *value == 0.0) => Ok(()),
+            true => Err(LEFT_OUT),
+            false => apply(file, command, lens),
         };
         if let Err(why) = done {
             drop_command(command, why, report);
@@ -31,10 +36,49 @@ fn drop_command(command: &ZoomCommand, why: &str, report: &mut ConversionReport)
     why.clone_into(&mut report.rows[command.row].note);
 }
 
+/// True for a surface with one behind it that has the place of another.
+fn is_in_front_of_a_place(file: &CodeVFile, surface: usize) -> bool {
+    file.surfaces.iter().skip(surface + 1).any(|behind| behind.reference.is_some())
+}
+
+/// True for the displacement of the image plane behind the last gap.
+fn is_image_gap(command: &ZoomCommand, lens: &Lens) -> bool {
+    command.name == "THI" && command.target == lens.surfaces.len() + 1
+}
+
+/// The gap in front of the image at a position, in mm: `value` is that of the last surface, or the
+/// displacement of the image behind it.
+fn image_gap(
+    file: &CodeVFile,
+    command: &ZoomCommand,
+    zoom: usize,
+    value: f64,
+    lens: &mut Lens,
+) -> Result<(), &'static str> {
+    if !super::row::has_centred_image(file) {
+        return Err("the gap in front of a tilted image is that of the lens");
+    }
+    let last = lens.surfaces.len() - 1;
+    let defocus = super::row::defocus(file);
+    if is_image_gap(command, lens) {
+        let present = lens.thickness_at(last, zoom).unwrap_or_default();
+        lens.zoom[zoom].set_number(last, Quantity::Thickness, present - defocus + value);
+        return Ok(());
+    }
+    number(command.target, Quantity::Thickness, zoom, value + defocus, lens)
+}
+
 /// Writes the values of a command into the positions; the error is the note of the report.
-fn apply(command: &ZoomCommand, unit: f64, lens: &mut Lens) -> Result<(), &'static str> {
+fn apply(file: &CodeVFile, command: &ZoomCommand, lens: &mut Lens) -> Result<(), &'static str> {
+    let unit = super::unit(file);
     for (zoom, value) in command.values.iter().copied().enumerate() {
         match command.name.as_str() {
+            "THI" if is_in_front_of_a_place(file, command.target) => {
+                return Err("a surface behind stands where another one does");
+            }
+            "THI" if command.target >= lens.surfaces.len() => {
+                image_gap(file, command, zoom, value * unit, lens)?;
+            }
             "THI" => number(command.target, Quantity::Thickness, zoom, value * unit, lens)?,
             "CUY" => number(command.target, Quantity::Curvature, zoom, value / unit, lens)?,
             "RDY" => {
@@ -74,10 +118,6 @@ fn number(
     let rows = lens.surfaces.len();
     let surface = target.checked_sub(1).filter(|surface| *surface < rows);
     let surface = surface.ok_or("there is no such surface")?;
-    // The defocus of the image is part of the last gap.
-    if surface + 1 == rows && quantity == Quantity::Thickness {
-        return Err("the last gap is that of the lens");
-    }
     if lens.is_own_at(zoom, surface, quantity) {
         return Err("a second value for this number; the first one is used");
     }
@@ -95,10 +135,8 @@ fn field(
     let position = &mut lens.zoom[zoom];
     let fields = position.fields.get_or_insert_with(|| lens.fields.clone());
     let scale = if command.name.ends_with("AN") { 1.0 } else { unit };
+    let axis = usize::from(command.name.starts_with('Y'));
     let number = command.target.checked_sub(1);
-    let point = number.and_then(|i| fields.values.get_mut(i)).ok_or("there is no such field")?;
-    let along_x = command.name.starts_with('X');
-    let coordinate = if along_x { &mut point.x } else { &mut point.y };
-    *coordinate = value * scale;
-    Ok(())
+    let is_set = number.is_some_and(|i| fields.set_projected(i, axis, value * scale));
+    if is_set { Ok(()) } else { Err("there is no such field") }
 }

@@ -10,7 +10,7 @@ pub(in crate::files) use surface::place;
 use crate::files::report::{ConversionOutcome, ConversionReport};
 use crate::files::text::{number, numbers};
 use crate::lens::{
-    Aperture, FieldKind, Lens, LensError, Object, Parameter, Pickup, Quantity, SystemError,
+    Aperture, FieldKind, Fields, Lens, LensError, Object, Parameter, Pickup, Quantity, SystemError,
 };
 
 /// The commands of the numbers that can differ between the zoom positions.
@@ -25,6 +25,25 @@ const ZOOMED: [(&str, Quantity); 10] = [
     ("E", Quantity::Asphere(4)),
     ("F", Quantity::Asphere(5)),
     ("G", Quantity::Asphere(6)),
+];
+
+/// The size of an aperture of one kind; `None` for another one.
+type ApertureSize = fn(Aperture) -> Option<f64>;
+
+/// The commands of apertures that can differ between the zoom positions.
+const APERTURES: [(&str, ApertureSize); 3] = [
+    ("EPD", |own| match own {
+        Aperture::EntrancePupilDiameter(v) => Some(v),
+        _ => None,
+    }),
+    ("FNO", |own| match own {
+        Aperture::FNumber(v) => Some(v),
+        _ => None,
+    }),
+    ("NAO", |own| match own {
+        Aperture::ObjectNa(v) => Some(v),
+        _ => None,
+    }),
 ];
 
 /// The text of the file, and the report of everything that is not exact.
@@ -85,16 +104,31 @@ impl CodeVWriter {
         self.report.add(outcome, what.as_ref(), note);
     }
 
-    /// Writes the solved last gap into the lens.
+    /// Writes the solved last gap into the lens. A solved gap cannot differ between zoom positions there:
+    /// those of a zoom lens become numbers.
     fn solve_focus(&mut self) {
         if self.lens.image_solve.is_none() {
             return;
         }
-        let (last, primary) = (self.lens.surfaces.len() - 1, self.lens.primary());
-        let system = self.lens.resolve(0, self.lens.wavelengths[primary].um);
-        if let Ok(system) = system {
-            self.lens.surfaces[last].thickness = system.surfaces[last].thickness;
+        let last = self.lens.surfaces.len() - 1;
+        let primary = self.lens.wavelengths[self.lens.primary()].um;
+        let solved = |lens: &Lens, zoom| {
+            lens.resolve(zoom, primary).ok().map(|system| system.surfaces[last].thickness)
+        };
+        let gaps: Vec<Option<f64>> =
+            (0..self.lens.zoom_positions()).map(|zoom| solved(&self.lens, zoom)).collect();
+        if let Some(gap) = gaps[0] {
+            self.lens.surfaces[last].thickness = gap;
         }
+        if self.lens.zoom.len() < 2 {
+            return;
+        }
+        for (position, gap) in self.lens.zoom.iter_mut().zip(gaps) {
+            gap.into_iter().for_each(|gap| position.set_number(last, Quantity::Thickness, gap));
+        }
+        self.lens.image_solve = None;
+        let note = "the present gap at each zoom position is written, without the solve";
+        self.record(ConversionOutcome::Approximated, "focus solve", note);
     }
 
     fn header(&mut self) {
@@ -162,7 +196,50 @@ impl CodeVWriter {
                 }
             }
         }
+        self.zoomed_apertures();
+        self.zoomed_fields();
         self.report_zoom_losses();
+    }
+
+    /// The aperture at every position, if it has one definition.
+    fn zoomed_apertures(&mut self) {
+        if self.lens.zoom.iter().all(|position| position.aperture.is_none()) {
+            return;
+        }
+        let all = (0..self.lens.zoom.len()).map(|zoom| self.lens.aperture_at(zoom));
+        let of_kind = |(name, size): (&'static str, ApertureSize)| {
+            Some((name, all.clone().map(size).collect::<Option<Vec<f64>>>()?))
+        };
+        let Some((name, values)) = APERTURES.into_iter().find_map(of_kind) else {
+            let note = "the aperture of the lens is used at every position";
+            self.record(ConversionOutcome::Dropped, "apertures of the zoom positions", note);
+            return;
+        };
+        self.line(format!("ZOO {name} {}", numbers(values)));
+    }
+
+    /// The fields at every position, if they differ in their coordinates alone.
+    fn zoomed_fields(&mut self) {
+        if self.lens.zoom.iter().all(|position| position.fields.is_none()) {
+            return;
+        }
+        let all: Vec<Fields> =
+            (0..self.lens.zoom.len()).map(|zoom| self.lens.fields_at(zoom).clone()).collect();
+        if !all.iter().all(|fields| fields.are_like(&self.lens.fields)) {
+            let note = "the fields of the lens are used at every position";
+            self.record(ConversionOutcome::Dropped, "fields of the zoom positions", note);
+            return;
+        }
+        let suffix = field_suffix(self.lens.fields.kind);
+        let points: Vec<Vec<[f64; 2]>> = all.iter().map(Fields::projected_points).collect();
+        let any_x = points.iter().flatten().any(|point| point[0] != 0.0);
+        let axes = || ["X", "Y"].into_iter().enumerate().filter(|(k, _)| any_x || *k == 1);
+        for field in 0..self.lens.fields.values.len() {
+            for (k, axis) in axes() {
+                let values = numbers(points.iter().map(|points| points[field][k]));
+                self.line(format!("ZOO {axis}{suffix} F{} {values}", field + 1));
+            }
+        }
     }
 
     /// Records the numbers of zoom positions that are not written.
@@ -178,14 +255,6 @@ impl CodeVWriter {
         for parameter in lost {
             let note = "the number of the lens is used at every position";
             self.record(ConversionOutcome::Dropped, parameter.to_string(), note);
-        }
-        if self.lens.zoom.iter().any(|position| position.aperture.is_some()) {
-            let note = "the aperture of the lens is used at every position";
-            self.record(ConversionOutcome::Dropped, "apertures of the zoom positions", note);
-        }
-        if self.lens.zoom.iter().any(|position| position.fields.is_some()) {
-            let note = "the fields of the lens are used at every position";
-            self.record(ConversionOutcome::Dropped, "fields of the zoom positions", note);
         }
     }
 

@@ -1,11 +1,13 @@
 //! One surface: form, glass, aperture and place.
 
 use super::{CodeVWriter, number, quoted};
+use crate::files::codev::file::SpecialForm;
 use crate::files::report::ConversionOutcome;
-use crate::files::zemax::is_general;
+use crate::files::zemax::{is_general, merged_powers};
 use crate::lens::glass::{self, Glass};
 use crate::lens::{
-    Aperture, AxisBreak, FreeformKind, Medium, MediumPlace, Quantity, Row, SurfaceNumber,
+    Aperture, AxisBreak, FreeformKind, IdealElement, Medium, MediumPlace, Quantity, Row,
+    SurfaceNumber,
 };
 
 /// Decentre and tilt of a surface, and the word that says what they move.
@@ -57,6 +59,9 @@ impl CodeVWriter {
         self.line(format!("  CCY {bend}; THC {gap}"));
         self.place(&row);
         self.report.add_row_losses(SurfaceNumber::new(i), &row);
+        if row.kept_aperture("seq").is_none() {
+            self.report.add_aperture_loss(SurfaceNumber::new(i), &row);
+        }
     }
 
     fn aperture_of(&mut self, row: &Row) {
@@ -64,6 +69,10 @@ impl CodeVWriter {
             Aperture::StopSemiDiameter(radius) if row.stop => Some(radius),
             _ => None,
         };
+        if let Some(lines) = row.kept_aperture("seq").filter(|_| stop.is_none()) {
+            lines.iter().for_each(|line| self.line(format!("  {line}")));
+            return;
+        }
         if let Some(radius) = stop.or(row.semi_diameter) {
             self.line(format!("  CIR {}", number(radius)));
         }
@@ -73,7 +82,7 @@ impl CodeVWriter {
     }
 
     fn form(&mut self, row: &Row) {
-        if let Some(lines) = form_lines(row) {
+        if let Some(lines) = grating_lines(row).or_else(|| form_lines(row)) {
             lines.into_iter().for_each(|line| self.line(format!("  {line}")));
             return;
         }
@@ -162,7 +171,23 @@ impl CodeVWriter {
 /// True for a freeform or an ideal element that the format does not have.
 pub(super) fn has_no_form(row: &Row) -> bool {
     let special = row.freeform.is_some() || row.ideal.is_some();
-    special && form_lines(row).is_none() && phase_lines(row).is_empty()
+    let ruled = grating_lines(row).is_some();
+    special && !ruled && form_lines(row).is_none() && phase_lines(row).is_empty()
+}
+
+/// The lines of a grating on a conic; `None` for another row.
+fn grating_lines(row: &Row) -> Option<Vec<String>> {
+    let conic = row.freeform.is_none() && row.asphere.iter().all(|a| *a == 0.0);
+    let Some(IdealElement::Grating { lines_per_mm, order }) = row.ideal.filter(|_| conic) else {
+        return None;
+    };
+    // A distance of the grooves that reads back to the same frequency.
+    let spacing = (lines_per_mm != 0.0).then(|| number(lines_per_mm.recip()))?;
+    let mut lines = vec![format!("DIF GRT; GRO {}; GRS {spacing}", number(order))];
+    if row.conic != 0.0 {
+        lines.push(format!("CON; K {}", number(row.conic)));
+    }
+    Some(lines)
 }
 
 /// The wavelength at which phases are written, in nanometres.
@@ -187,6 +212,12 @@ fn phase_lines(row: &Row) -> Vec<String> {
 /// have.
 fn form_lines(row: &Row) -> Option<Vec<String>> {
     let form = row.freeform.as_ref().filter(|_| row.ideal.is_none())?;
+    if form.kind == FreeformKind::OddAsphere {
+        let powers = merged_powers(row, form);
+        let terms = (1..).zip(&powers).map(|(power, a)| format!("SCO AR{power} {}", number(*a)));
+        let head = ["SPS ODD 0.0".to_owned(), format!("SCO K {}", number(row.conic))];
+        return Some(head.into_iter().chain(terms).collect());
+    }
     if row.asphere.iter().any(|a| *a != 0.0) {
         return None;
     }
@@ -206,8 +237,27 @@ fn form_lines(row: &Row) -> Option<Vec<String>> {
             let terms = letters.map(|(letter, a)| format!("{letter} {}", number(*a)));
             Some(head.into_iter().chain(terms).collect())
         }
-        _ => None,
+        (kind, numbers) => special_lines(kind, numbers, &conic),
     }
+}
+
+/// The lines of a special form; `None` for a form that is none.
+fn special_lines(kind: FreeformKind, numbers: &[f64], conic: &str) -> Option<Vec<String>> {
+    let (name, form) = match kind {
+        FreeformKind::XyPolynomial { .. } => ("XYP", SpecialForm::XyPolynomial),
+        FreeformKind::QCon { .. } => ("QCN", SpecialForm::QCon),
+        FreeformKind::QBfs { .. } => ("QBF", SpecialForm::QBfs),
+        FreeformKind::FringeZernike { .. } => ("ZFR", SpecialForm::FringeZernike),
+        _ => return None,
+    };
+    if form.first() + numbers.len() > form.last() + 1 {
+        return None;
+    }
+    let radius = number(*kind.lengths().first()?);
+    let head = [format!("SPS {name} {radius}; SCO NRADIUS {radius}; SCO K {conic}")];
+    let terms = (form.first()..).zip(numbers);
+    let terms = terms.map(|(k, a)| format!("SCO C{k} {}", number(*a)));
+    Some(head.into_iter().chain(terms).collect())
 }
 
 /// A catalogue name as CODE V has it: letters and digits, then the maker if there is one.

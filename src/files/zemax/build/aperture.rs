@@ -31,10 +31,39 @@ pub(super) fn apply(
     };
     let unit = file.unit;
     row.semi_diameter = outer.map(|radius| radius * unit);
-    row.obstruction = block.and_then(|own| own.radius).map(|radius| radius * unit);
+    row.obstruction = block.as_ref().and_then(|own| own.radius).map(|radius| radius * unit);
     if let (true, Some((x, y, _))) = (moves, surface.aperture_offset) {
         row.decenter = [x * unit, y * unit];
     }
+    let is_exact =
+        [&rim, &block].into_iter().flatten().all(|own| own.outcome == ConversionOutcome::Used);
+    if !(is_exact && surface.other_apertures.is_empty()) {
+        keep_lines(file, number, row, report);
+    }
+}
+
+/// The keywords of apertures and obscurations.
+const KEYWORDS: [&str; 11] =
+    ["CLAP", "FLAP", "OBSC", "SQAP", "ELAP", "SQOB", "ELOB", "UDAD", "UDOB", "SPID", "OBDC"];
+
+/// Keeps the lines on apertures, which an export writes back. Lengths in another unit are not kept.
+fn keep_lines(file: &ZemaxFile, number: usize, row: &mut Row, report: &mut ConversionReport) {
+    let surface = &file.surfaces[number];
+    if file.unit == 1.0 {
+        let is_kept = |line: &&String| {
+            line.split_whitespace().next().is_some_and(|keyword| KEYWORDS.contains(&keyword))
+        };
+        row.keep_aperture("zmx", surface.lines.iter().filter(is_kept).cloned().collect());
+    }
+    let kept = if file.unit == 1.0 { "; an export as .zmx writes the line back" } else { "" };
+    for line in &surface.other_apertures {
+        let note = format!("no aperture of this form is traced: it clips nothing here{kept}");
+        report.amend(*line, ConversionOutcome::Dropped, note);
+    }
+}
+
+fn circle(radius: f64, offset: [f64; 2]) -> ForeignOutline {
+    ForeignOutline { form: OutlineForm::Circle, half: [radius; 2], offset, turned: false }
 }
 
 /// The place of the apertures beside the vertex.
@@ -46,12 +75,12 @@ fn offset(surface: &ZemaxSurface) -> [f64; 2] {
 fn rim(surface: &ZemaxSurface, plane: bool) -> Option<(StandIn, usize)> {
     let offset = offset(surface);
     let circle = surface.clip.map(|(radius, line)| {
-        let outline = ForeignOutline { form: OutlineForm::Circle, half: [radius; 2], offset };
+        let outline = circle(radius, offset);
         (outline.aperture(plane), line)
     });
     circle.or_else(|| {
         let OutlineLine { form, half, line } = surface.outline?;
-        Some((ForeignOutline { form, half, offset }.aperture(plane), line))
+        Some((ForeignOutline { form, half, offset, turned: false }.aperture(plane), line))
     })
 }
 
@@ -59,12 +88,12 @@ fn rim(surface: &ZemaxSurface, plane: bool) -> Option<(StandIn, usize)> {
 fn obscuration(surface: &ZemaxSurface, plane: bool) -> Option<(StandIn, usize)> {
     let offset = offset(surface);
     let circle = surface.obstruction.map(|(radius, line)| {
-        let outline = ForeignOutline { form: OutlineForm::Circle, half: [radius; 2], offset };
+        let outline = circle(radius, offset);
         (outline.obscuration(plane), line)
     });
     circle.or_else(|| {
         let OutlineLine { form, half, line } = surface.block?;
-        Some((ForeignOutline { form, half, offset }.obscuration(plane), line))
+        Some((ForeignOutline { form, half, offset, turned: false }.obscuration(plane), line))
     })
 }
 

@@ -2,8 +2,8 @@
 
 use crate::files::error::ParseError;
 use crate::files::report::{ConversionOutcome, ConversionReport};
-use crate::files::vignetting::PupilFactors;
-use crate::files::zemax::file::{ApertureLine, ZemaxFile};
+use crate::files::vignetting::{PupilFactors, ZoomedFactors};
+use crate::files::zemax::file::{ApertureLine, ConfigurationOperand, FACTORS, ZemaxFile};
 use crate::lens::glass;
 use crate::lens::{Aperture, FieldKind, FieldPoint, Fields, Lens, Medium, Object, Wavelength};
 use crate::paraxial::{Beam, first_order};
@@ -95,19 +95,26 @@ pub(super) fn fields(file: &ZemaxFile) -> Result<Fields, ParseError> {
     Ok(Fields { kind, values })
 }
 
-/// The vignetting factors of some fields; empty without lines of factors.
-pub(super) fn vignetting(file: &ZemaxFile, fields: usize) -> Vec<PupilFactors> {
-    let [dx, dy, cx, cy, angle] = &file.vignetting;
-    if file.vignetting.iter().all(Vec::is_empty) {
+/// The vignetting factors of the fields at every zoom position; empty without any in the file.
+pub(super) fn vignetting(file: &ZemaxFile, fields: usize) -> ZoomedFactors {
+    let zoomed = || file.operands.iter().filter(|own| FACTORS.contains(&own.name.as_str()));
+    if file.vignetting.iter().all(Vec::is_empty) && zoomed().next().is_none() {
         return Vec::new();
     }
-    let at = |values: &[f64], i: usize| values.get(i).copied().unwrap_or(0.0);
-    let factors = |i| PupilFactors {
-        decenter: [at(dx, i), at(dy, i)],
-        compression: [at(cx, i), at(cy, i)],
-        angle: at(angle, i),
+    let at = |zoom: usize, kind: usize, field: usize| {
+        let is_it = |own: &&ConfigurationOperand| {
+            own.name == FACTORS[kind] && (own.configuration, own.target) == (zoom + 1, field + 1)
+        };
+        let base = file.vignetting[kind].get(field).copied().unwrap_or(0.0);
+        zoomed().find(is_it).map_or(base, |own| own.value)
     };
-    (0..fields).map(factors).collect()
+    let factors = |zoom, field| PupilFactors {
+        decenter: [at(zoom, 0, field), at(zoom, 1, field)],
+        compression: [at(zoom, 2, field), at(zoom, 3, field)],
+        angle: at(zoom, 4, field),
+    };
+    let position = |zoom| (0..fields).map(|field| factors(zoom, field)).collect();
+    (0..file.configurations).map(position).collect()
 }
 
 /// Wavelength and weight of unused wavelength lines.

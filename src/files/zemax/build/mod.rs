@@ -191,7 +191,7 @@ fn report_breaks(file: &ZemaxFile, report: &mut ConversionReport) {
         let clip = surface.clip.map(|(_, line)| line);
         let outline = surface.outline.map(|own| own.line);
         let lines = [surface.glass.as_ref().map(|glass| glass.line), clip, outline];
-        for line in lines.into_iter().flatten() {
+        for line in lines.into_iter().flatten().chain(surface.other_apertures.iter().copied()) {
             report.amend(line, ConversionOutcome::Preserved, "on a coordinate break");
         }
     }
@@ -218,7 +218,8 @@ fn report_image(file: &ZemaxFile, report: &mut ConversionReport) {
         }
         let circles = surface.clip.into_iter().chain(surface.obstruction).map(|(_, line)| line);
         let others = surface.outline.into_iter().chain(surface.block).map(|own| own.line);
-        for line in circles.chain(others) {
+        let drawn = surface.other_apertures.iter().copied();
+        for line in circles.chain(others).chain(drawn) {
             report.amend(
                 line,
                 ConversionOutcome::Dropped,

@@ -2,7 +2,8 @@
 
 use crate::files::error::ParseError;
 use crate::files::report::{ConversionOutcome, ConversionReport};
-use crate::files::zemax::file::{ConfigurationOperand, ZemaxFile};
+use crate::files::vignetting::LEFT_OUT;
+use crate::files::zemax::file::{ConfigurationOperand, FACTORS, ZemaxFile};
 use crate::files::zemax::row_plan::RowPlan;
 use crate::lens::{Aperture, FieldKind, Lens, Object, Parameter, Quantity, Variable, ZoomPosition};
 use std::collections::BTreeMap;
@@ -15,6 +16,8 @@ pub(super) fn add_positions(
     names: &[String],
     report: &mut ConversionReport,
 ) -> Result<(), ParseError> {
+    let is_factor = |own: &&ConfigurationOperand| FACTORS.contains(&own.name.as_str());
+    file.operands.iter().filter(is_factor).for_each(|own| report_factor(own, report));
     if file.configurations < 2 {
         return Ok(());
     }
@@ -24,11 +27,23 @@ pub(super) fn add_positions(
         .map(|i| ZoomPosition { name: name(i), ..ZoomPosition::default() })
         .collect();
     for operand in &file.operands {
+        if is_factor(&operand) {
+            continue;
+        }
         if let Err(why) = apply(file.unit, plan, lens, operand) {
             report.amend(operand.line, ConversionOutcome::Dropped, why);
         }
     }
     Ok(())
+}
+
+/// Reports a vignetting factor of a configuration; [`super::beam::vignetting`] reads them.
+fn report_factor(operand: &ConfigurationOperand, report: &mut ConversionReport) {
+    if operand.value == 0.0 {
+        report.amend(operand.line, ConversionOutcome::Preserved, "");
+    } else {
+        report.amend(operand.line, ConversionOutcome::Dropped, LEFT_OUT);
+    }
 }
 
 /// Refuses an operand without a value for each configuration.
@@ -151,10 +166,8 @@ fn field(unit: f64, lens: &mut Lens, operand: &ConfigurationOperand) -> Result<(
     let position = &mut lens.zoom[operand.configuration - 1];
     let fields = position.fields.get_or_insert_with(|| lens.fields.clone());
     let scale = if fields.kind == FieldKind::Angle { 1.0 } else { unit };
+    let axis = usize::from(operand.name == "YFIE");
     let number = operand.target.checked_sub(1);
-    let field = number.and_then(|i| fields.values.get_mut(i)).ok_or("there is no such field")?;
-    let value = operand.value * scale;
-    let coordinate = if operand.name == "XFIE" { &mut field.x } else { &mut field.y };
-    *coordinate = value;
-    Ok(())
+    let is_set = number.is_some_and(|i| fields.set_projected(i, axis, operand.value * scale));
+    if is_set { Ok(()) } else { Err("there is no such field") }
 }

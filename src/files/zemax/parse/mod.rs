@@ -129,11 +129,12 @@ impl ZemaxReader {
 const MAX_CONFIGURATIONS: usize = 1000;
 
 /// The operands of the multi-configuration table that are read.
-const TABLE: &[&str] = &["THIC", "CRVT", "CONN", "APER", "XFIE", "YFIE", "SDIA"];
+const TABLE: &[&str] = &[
+    "THIC", "CRVT", "CONN", "APER", "XFIE", "YFIE", "SDIA", "FVDX", "FVDY", "FVCX", "FVCY", "FVAN",
+];
 
 /// Operands that change the lens and are not read.
 const OTHER_OPERANDS: &[&str] = &[
     "GLSS", "PRAM", "PAR1", "PAR2", "PAR3", "PAR4", "PAR5", "PAR6", "PAR7", "PAR8", "WAVE", "WLWT",
-    "PRWV", "FLTP", "FLWT", "FVDX", "FVDY", "FVCX", "FVCY", "FVAN", "IGNR", "APMX", "APMN", "STPS",
-    "TEMP", "PRES", "MIND", "MABB",
+    "PRWV", "FLTP", "FLWT", "IGNR", "APMX", "APMN", "STPS", "TEMP", "PRES", "MIND", "MABB",
 ];

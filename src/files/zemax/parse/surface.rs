@@ -59,6 +59,7 @@ pub(super) fn read(
             let (x, y) = (line.number(0)?, line.number(1)?);
             surface.aperture_offset = (x != 0.0 || y != 0.0).then_some((x, y, line.number));
         }
+        "UDAD" | "UDOB" | "SPID" => surface.other_apertures.push(line.number),
         "SCBD" => return own_break(surface, line),
         _ => return Ok(read_other(line)),
     }
@@ -68,9 +69,6 @@ pub(super) fn read(
 /// The outcome of the other lines of a surface: those that affect rays are dropped or approximated.
 fn read_other(line: &ZemaxLine<'_>) -> LineOutcome {
     match line.keyword {
-        "UDAD" | "UDOB" | "SPID" => {
-            dropped("only circular, rectangular and elliptical apertures and obscurations are read")
-        }
         "PPAR" | "CHZH" | "TOLE" | "TCOM" | "EDGE" | "PMVA" | "PUPZ" | "CENT" => {
             approximated("the present value of the solve is used")
         }
@@ -177,9 +175,9 @@ fn obscuration(
 ) -> Result<LineOutcome, ParseError> {
     let (inner, outer) = radii(line)?;
     if inner > 0.0 {
-        return Ok(dropped(
-            "a ring-shaped obstruction that transmits light inside is not supported",
-        ));
+        // A ring that transmits light inside.
+        surface.other_apertures.push(line.number);
+        return Ok(used());
     }
     obstruct(surface, outer, line);
     Ok(used())

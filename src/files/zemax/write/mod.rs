@@ -169,6 +169,9 @@ impl ZemaxWriter {
         }
         for (i, row) in lens.surfaces.iter().enumerate() {
             self.report_freeform(i, row);
+            if row.kept_aperture("zmx").is_none() {
+                self.report.add_aperture_loss(SurfaceNumber::new(i), row);
+            }
             if let Some(locked) = &row.locked {
                 let what = format!("surface {}: {}", SurfaceNumber::new(i), locked.kind);
                 let note = "written back with the lines of its file; rays meet its conic here";

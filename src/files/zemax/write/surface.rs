@@ -267,6 +267,10 @@ impl ZemaxWriter {
             Some(radius) => self.surface_line(format!("DIAM {} 1 0 0 1 \"\"", number(radius))),
             None => self.surface_line("DIAM 0 0 0 0 1 \"\""),
         }
+        if let Some(lines) = row.kept_aperture("zmx") {
+            lines.iter().for_each(|line| self.surface_line(line));
+            return;
+        }
         let inner = row.obstruction.filter(|radius| *radius > 0.0);
         match (row.semi_diameter, inner) {
             (Some(outer), Some(inner)) => self.clap(&number(inner), outer),

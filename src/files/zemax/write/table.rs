@@ -96,20 +96,21 @@ impl ZemaxWriter {
         let base = self.lens.fields.clone();
         let all: Vec<Fields> =
             (0..self.lens.zoom.len()).map(|zoom| self.lens.fields_at(zoom).clone()).collect();
-        if !all.iter().all(|fields| alike(fields, &base)) {
+        if !all.iter().all(|fields| fields.are_like(&base)) {
             let note = "fields of another kind, number or weight: those of the lens are used at every position";
             self.record(ConversionOutcome::Dropped, "fields of the zoom positions", note);
             return;
         }
-        let any_x = all.iter().flat_map(|fields| &fields.values).any(|field| field.x != 0.0);
+        let points: Vec<Vec<[f64; 2]>> = all.iter().map(Fields::projected_points).collect();
+        let any_x = points.iter().flatten().any(|point| point[0] != 0.0);
         for i in 0..base.values.len() {
-            let column = |f: fn(&crate::lens::FieldPoint) -> f64| -> Vec<(f64, bool)> {
-                all.iter().map(|fields| (f(&fields.values[i]), false)).collect()
+            let column = |axis: usize| -> Vec<(f64, bool)> {
+                points.iter().map(|points| (points[i][axis], false)).collect()
             };
             if any_x {
-                self.operand("XFIE", i + 1, &column(|field| field.x));
+                self.operand("XFIE", i + 1, &column(0));
             }
-            self.operand("YFIE", i + 1, &column(|field| field.y));
+            self.operand("YFIE", i + 1, &column(1));
         }
     }
 }
@@ -121,10 +122,4 @@ fn size(aperture: Aperture) -> f64 {
         | Aperture::ObjectNa(v)
         | Aperture::StopSemiDiameter(v) => v,
     }
-}
-
-/// True if only the coordinates of the fields differ.
-fn alike(fields: &Fields, base: &Fields) -> bool {
-    let weights = |fields: &Fields| fields.values.iter().map(|f| f.weight).collect::<Vec<_>>();
-    fields.kind == base.kind && weights(fields) == weights(base)
 }
