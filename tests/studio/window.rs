@@ -8,13 +8,14 @@ use aplanat::paraxial::{DragSettings, FirstOrderLock};
 use aplanat::session::{Command, ExperimentStatus, Session};
 use aplanat::studio::Studio;
 use aplanat::studio::draw::RenderBackend;
+use aplanat::studio::panels::LayoutPanel;
 use aplanat::studio::theme;
 use aplanat::studio::window::Persistence;
 use egui::{Key, Modifiers};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
 
-use crate::harness::double_gauss;
+use crate::harness::{double_gauss, sized_harness, view_of};
 
 /// The maximum time of an analysis on a slow and busy machine.
 const DEADLINE: Duration = Duration::from_mins(1);
@@ -88,6 +89,44 @@ fn a_typed_radius_reaches_every_panel_and_undo_takes_it_back() {
 /// The radii without their errors, which may differ in their last digits.
 fn radii(spots: &[String]) -> Vec<&str> {
     spots.iter().map(|text| text.split('±').next().unwrap_or_default()).collect()
+}
+
+/// The words about a field without rays end where the controls at the right begin.
+#[test]
+fn a_field_without_rays_does_not_cover_the_controls_of_the_layout() {
+    let mut lens = double_gauss();
+    lens.surfaces[0].curvature = 1.0 / 6.6;
+    let mut harness =
+        sized_harness(LayoutPanel::new(RenderBackend::Software), view_of(lens), [600.0, 400.0]);
+    harness.run_steps(3);
+    let words = harness.get_by_label_contains("no ray of this field").rect();
+    let controls = harness.get_by_label("Rays of each field").rect();
+    assert!(words.width() > 50.0 && words.right() <= controls.left(), "{words:?} {controls:?}");
+}
+
+/// A question that waits for an answer keeps the keys of the menus from the window behind it.
+#[test]
+fn shortcuts_do_nothing_behind_a_question() {
+    let mut harness = window();
+    type_radius(&mut harness, "*1.1");
+    let changed = harness.state().session().lens().surfaces[0].curvature;
+    harness.key_press_modifiers(Modifiers::COMMAND, Key::N);
+    harness.run_steps(3);
+    harness.get_by_label("Create").click();
+    harness.run_steps(3);
+    harness.get_by_label("Save the changes first?");
+    for key in [Key::Z, Key::N, Key::K] {
+        harness.key_press_modifiers(Modifiers::COMMAND, key);
+        harness.run_steps(3);
+    }
+    assert_eq!(harness.state().session().lens().surfaces[0].curvature, changed);
+    assert!(harness.query_by_label("Create").is_none());
+    assert!(harness.query_by_label("Find a command").is_none());
+    harness.get_by_label("Cancel").click();
+    harness.run_steps(3);
+    harness.key_press_modifiers(Modifiers::COMMAND, Key::Z);
+    harness.run_steps(3);
+    assert_ne!(harness.state().session().lens().surfaces[0].curvature, changed);
 }
 
 #[test]
