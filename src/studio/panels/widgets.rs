@@ -156,13 +156,13 @@ pub(super) fn log_axis(plot: Plot<'static>, title: &str) -> Plot<'static> {
 }
 
 /// The decimal logarithms of round numbers between two places, about `apart` from each other: of
-/// decades, else of 1 and 3 or of 1, 2 and 5 in each, else of multiples of one step.
+/// decades, else of 1, 2 and 5 or of 1 and 3 in each, else of multiples of one step.
 fn log_marks((low, high): (f64, f64), apart: f64) -> Vec<f64> {
     if !(low.is_finite() && high.is_finite() && low < high && apart > 0.0) {
         return Vec::new();
     }
     let mut found: Vec<f64> = multiples((low, high), apart.max(1.0).ceil()).collect();
-    for (parts, closest) in [(&[1.0_f64, 3.0][..], 3.0_f64), (&[1.0, 2.0, 5.0], 2.0)] {
+    for (parts, closest) in [(&[1.0_f64, 2.0, 5.0][..], 2.0_f64), (&[1.0, 3.0], 3.0)] {
         if found.len() < 3 && CROWDED * apart <= closest.log10() {
             let all = multiples((low - 1.0, high), 1.0);
             let parts = all.flat_map(|decade| parts.iter().map(move |part| decade + part.log10()));
