@@ -2,7 +2,7 @@
 //! undo step, and the merit tells at each handle which way would help.
 
 use super::clock::now;
-use super::live_merit::{MeritReport, MeritValues};
+use super::live_merit::{MeritReport, MeritValues, merit_error_text};
 use super::run::{LatestRequestWorker, catch_panic};
 use crate::lens::{Lens, Parameter, ParameterKind, Quantity, add_variables};
 use crate::math::format_short;
@@ -290,8 +290,9 @@ fn slopes(
     let known = reference.insert(known);
     let before = known.value;
     let lens = with_all_variables(&request.lens);
-    let (merit, sum, terms) = known.evaluate(&lens).map_err(|why| why.to_string())?;
-    let values = MeritValues::new(&lens, &merit, terms).map_err(|why| why.to_string())?;
+    let text = |why: MeritError| merit_error_text(&why, &lens);
+    let (merit, sum, terms) = known.evaluate(&lens).map_err(text)?;
+    let values = MeritValues::new(&lens, &merit, terms).map_err(text)?;
     let by_number = merit.variables().iter().map(|variable| variable.parameter);
     let by_number: HashMap<Parameter, f64> = by_number.zip(sum.gradient.iter().copied()).collect();
     let along = |tangent: Vec<(Parameter, f64)>| -> f64 {
@@ -306,8 +307,9 @@ fn slopes(
 impl MeritReference {
     fn new(lens: &Arc<Lens>, goal: &Arc<Goal>, tolerance: f64) -> Result<Self, String> {
         let free = with_all_variables(lens);
-        let merit = Merit::new(&free, goal, tolerance).map_err(|why| why.to_string())?;
-        let value = merit.value(&merit.values(&free)).map_err(|why| why.to_string())?;
+        let text = |why: MeritError| merit_error_text(&why, &free);
+        let merit = Merit::new(&free, goal, tolerance).map_err(text)?;
+        let value = merit.value(&merit.values(&free)).map_err(text)?;
         Ok(Self { lens: Arc::clone(lens), goal: Arc::clone(goal), tolerance, merit, value })
     }
 

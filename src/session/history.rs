@@ -64,6 +64,11 @@ impl VersionOrigin {
     pub(super) fn new(title: impl Into<String>) -> Self {
         Self { title: title.into(), ..Self::default() }
     }
+
+    /// The origin of the first version of a design, with the merit function that is proposed for it.
+    pub(super) fn first(title: &str, proposal: Arc<MeritProposal>) -> Self {
+        Self { proposal: Some(proposal), ..Self::new(title) }
+    }
 }
 
 /// The versions of a design, of which one is present.
@@ -79,20 +84,14 @@ pub(super) struct DesignHistory {
 }
 
 impl DesignHistory {
-    /// The history of a lens that was just opened, with the merit function that is proposed for it.
-    pub(super) fn new(lens: Arc<Lens>, proposal: Option<Arc<MeritProposal>>) -> Self {
-        let first = HistoryNode {
-            id: 0,
-            parent: None,
-            title: "opened".to_owned(),
-            name: None,
-            merit: None,
-            time: unix_seconds(),
-            seed: None,
-            lens,
-            curve: None,
-            proposal,
-        };
+    /// The history of a lens that was just opened or begun, with the merit function that is proposed
+    /// for it.
+    pub(super) fn new(lens: Arc<Lens>, origin: VersionOrigin) -> Self {
+        let VersionOrigin { title, seed, curve, proposal, .. } = origin;
+        let (name, merit, time) = (None, None, unix_seconds());
+        let (id, parent) = (0, None);
+        let first =
+            HistoryNode { id, parent, title, name, merit, time, seed, lens, curve, proposal };
         Self::from_first(Arc::new(first))
     }
 
@@ -280,7 +279,7 @@ mod tests {
     use crate::lens::blank;
 
     fn grown(count: usize) -> DesignHistory {
-        let mut history = DesignHistory::new(Arc::new(blank()), None);
+        let mut history = DesignHistory::new(Arc::new(blank()), VersionOrigin::new("opened"));
         for i in 0..count {
             history.push(Arc::new(blank()), VersionOrigin::new(format!("edit {i}")));
         }

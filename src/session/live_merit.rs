@@ -3,7 +3,7 @@
 
 use super::clock::{Timed, time};
 use super::run::{LatestRequestWorker, catch_panic};
-use crate::lens::Lens;
+use crate::lens::{Lens, SurfaceNumber};
 use crate::merit::{
     ConstraintMargin, Goal, Merit, MeritError, Term, TermValue, constraint_margins,
 };
@@ -98,7 +98,8 @@ pub(super) struct LiveMerit {
 impl LiveMerit {
     pub(super) fn spawn(wake: impl Fn() + Send + 'static) -> io::Result<Self> {
         let worker = LatestRequestWorker::spawn("merit", wake, |request: MeritRequest, output| {
-            let values = || MeritValues::evaluate(&request).map_err(|why| why.to_string());
+            let text = |why: MeritError| merit_error_text(&why, &request.lens);
+            let values = || MeritValues::evaluate(&request).map_err(text);
             let Timed { value: values, ms } = time(|| catch_panic(values));
             let MeritRequest { lens, goal, .. } = request;
             output.publish(MeritReport { lens, goal, values, ms });
@@ -114,5 +115,47 @@ impl LiveMerit {
     /// The newest merit, maybe of an earlier version.
     pub(super) fn latest(&self) -> Option<Arc<MeritReport>> {
         self.worker.latest()
+    }
+}
+
+/// The reason why a lens has no merit, with fields and zoom positions counted from 1 as the window does;
+/// the position only where there are several.
+pub(super) fn merit_error_text(why: &MeritError, lens: &Lens) -> String {
+    let place = |field: usize, zoom: usize| {
+        let field = format!("field {}", field + 1);
+        if lens.zoom.len() > 1 { format!("{field}, zoom position {}", zoom + 1) } else { field }
+    };
+    match why {
+        MeritError::Launch { field, zoom, cause } => format!("{}: {cause}", place(*field, *zoom)),
+        MeritError::NoLight { field, zoom, um } => {
+            format!("{}: no light gets through at {um} µm", place(*field, *zoom))
+        }
+        MeritError::RayLost { ray, field, zoom, um, fate } => format!(
+            "{}: ray {} at {um} µm is lost: {} at surface {}",
+            place(*field, *zoom),
+            ray + 1,
+            fate.name(),
+            SurfaceNumber::new(fate.surface().unwrap_or(0))
+        ),
+        other => other.to_string(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lens::{ZoomPosition, blank};
+    use crate::pupil::LaunchError;
+
+    #[test]
+    fn fields_and_zoom_positions_count_from_one() {
+        let why = MeritError::Launch { field: 2, zoom: 1, cause: LaunchError::NotAimed };
+        let mut lens = blank();
+        let text = "field 3: no ray of this field was found that crosses the centre of the stop";
+        assert_eq!(merit_error_text(&why, &lens), text);
+        lens.zoom = vec![ZoomPosition::default(); 2];
+        assert!(merit_error_text(&why, &lens).starts_with("field 3, zoom position 2: "));
+        let dark = MeritError::NoLight { field: 0, zoom: 0, um: 0.5 };
+        assert!(merit_error_text(&dark, &lens).starts_with("field 1, zoom position 1: no light"));
     }
 }

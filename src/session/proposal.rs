@@ -5,6 +5,7 @@
 
 use crate::lens::{Lens, Medium, StartingForm, StartingLens};
 use crate::merit::{Goal, Term};
+use crate::paraxial::{Beam, first_order};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
@@ -48,19 +49,35 @@ impl MeritProposal {
     }
 
     /// The proposal for the lens after an edit: of another structure it is a new one with the same
-    /// focal length.
+    /// focal length, which is that of the first zoom position.
     pub(super) fn followed(self: &Arc<Self>, before: &Lens, after: &Lens) -> Arc<Self> {
         if has_structure_of(before, after) {
             return Arc::clone(self);
         }
         let asked = self.asked.clone();
-        Arc::new(Self { asked, ..Self::with_focal_length(after, self.focal_length) })
+        let change = first_position_change(before, after);
+        let focal_length = self.focal_length.map(|asked| change * asked);
+        Arc::new(Self { asked, ..Self::with_focal_length(after, focal_length) })
     }
 
     /// The proposal for a lens that has what was asked for.
     pub(super) fn fulfilled(&self) -> Self {
         Self { asked: None, ..self.clone() }
     }
+}
+
+/// The focal length of the first zoom position after zoom positions were added or removed, relative to
+/// that before; 1 where both are the same position, or one of them is afocal.
+fn first_position_change(before: &Lens, after: &Lens) -> f64 {
+    if before.zoom.len() == after.zoom.len() || before.zoom.first() == after.zoom.first() {
+        return 1.0;
+    }
+    let focal_length = |lens: &Lens| {
+        let um = lens.wavelengths.get(lens.primary())?.um;
+        first_order(&lens.resolve(0, um).ok()?, &Beam::for_lens(lens, 0)).ok()?.efl
+    };
+    let change = focal_length(before).zip(focal_length(after)).map(|(old, new)| new / old);
+    change.filter(|change| change.is_finite() && *change != 0.0).unwrap_or(1.0)
 }
 
 /// True if two lenses have as many surfaces and zoom positions, and glass, air and mirrors at the same

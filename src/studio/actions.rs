@@ -32,6 +32,8 @@ pub enum UiAction {
     MaximizePanel(Option<PanelKind>),
     /// Arranges all panels.
     ArrangePanels(Arrangement),
+    /// Gives the search the window, with the lens of this chain in the drawings.
+    WatchSearch(usize),
     /// Sets the theme.
     SetTheme(Theme),
     /// Closes the window.

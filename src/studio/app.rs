@@ -10,6 +10,7 @@ use egui::{
 };
 
 use super::actions::{Actions, UiAction};
+use super::arrangement::Arrangement;
 use super::dialogs::Dialogs;
 use super::dock::Dock;
 use super::draw::RenderBackend;
@@ -54,6 +55,8 @@ pub struct Studio {
     dialogs: Dialogs,
     /// The files that were opened or saved last, the newest first.
     recent: Vec<PathBuf>,
+    /// The folder of the file that was chosen last.
+    folder: Option<PathBuf>,
     /// The file of the design in the frame before.
     path: Option<PathBuf>,
     persistence: Persistence,
@@ -83,6 +86,7 @@ impl Studio {
             experiment_window: ExperimentWindow::default(),
             dialogs: Dialogs::default(),
             recent: storage.and_then(|s| eframe::get_value(s, RECENT)).unwrap_or_default(),
+            folder: None,
             path: None,
             persistence,
             pending: None,
@@ -124,7 +128,9 @@ impl Studio {
         self.remember_design(&view);
         let mut actions = Actions::default();
         let menus = menu_context(&self.dock, &self.dialogs, (&self.recent, &view), ui.ctx());
-        menu::shortcuts(ui, &menus, self.dock.is_typing(ui.ctx()), &mut actions);
+        if !self.waits_for_answer(ui.ctx()) {
+            menu::shortcuts(ui, &menus, self.dock.is_typing(ui.ctx()), &mut actions);
+        }
         bar_frame(ui, Side::top("menu"), |ui| menu::bar(ui, &menus, &mut actions));
         self.dialogs.ui(ui.ctx(), &menus, &mut actions);
         bar_frame(ui, Side::bottom("status"), |ui| {
@@ -138,6 +144,13 @@ impl Studio {
         for action in actions {
             self.dispatch(&context, &view, action);
         }
+    }
+
+    /// True while a dialog has to be answered or closed before anything else is done: keys are its own,
+    /// those that arrive in the frame in which it opens too.
+    fn waits_for_answer(&self, context: &Context) -> bool {
+        let is_modal = context.memory(|memory| memory.top_modal_layer().is_some());
+        is_modal || self.pending.is_some() || self.message.is_some()
     }
 
     fn dispatch(&mut self, context: &Context, view: &SessionView, action: UiAction) {
@@ -163,6 +176,12 @@ impl Studio {
             }
             UiAction::MaximizePanel(kind) => self.dock.maximize(kind),
             UiAction::ArrangePanels(arrangement) => self.dock.arrange(arrangement),
+            UiAction::WatchSearch(chain) => {
+                self.dock.arrange(Arrangement::Search);
+                self.apply(context, Command::Preview(None));
+                let preview = StructureSearchCommand::Preview(Some(chain));
+                self.apply(context, Command::StructureSearch(preview));
+            }
             UiAction::SetTheme(theme) => context.set_theme(theme),
             UiAction::Quit => context.send_viewport_cmd(ViewportCommand::Close),
         }
@@ -206,7 +225,23 @@ impl Studio {
 
     /// Asks for a path, starting from the most likely one.
     pub(super) fn ask_path(&mut self, context: &Context, view: &SessionView, request: FileRequest) {
-        self.file_dialog.ask(context, request, likely_path(view, request).as_deref());
+        let near = self.in_folder(view, likely_path(view, request));
+        self.file_dialog.ask(context, request, near.as_deref());
+    }
+
+    /// A whole path for a proposed one: that of a bare name is in the folder of the lens, or else in the
+    /// one that was used last.
+    fn in_folder(&self, view: &SessionView, path: Option<PathBuf>) -> Option<PathBuf> {
+        let imported = view.imported.as_ref().map(|imported| imported.path.as_path());
+        let file = view.path.as_deref().or(imported);
+        let recent = self.recent.first().and_then(|path| path.parent());
+        let folder = file.and_then(Path::parent).or(self.folder.as_deref()).or(recent);
+        let path = path.map(|path| match folder {
+            Some(folder) if path.file_name() == Some(path.as_os_str()) => folder.join(path),
+            _ => path,
+        });
+        let path = path.or_else(|| folder.map(Path::to_owned))?;
+        std::path::absolute(&path).ok().or(Some(path))
     }
 
     fn dialogs(&mut self, context: &Context, view: &SessionView) {
@@ -223,6 +258,7 @@ impl Studio {
     }
 
     fn on_path_chosen(&mut self, context: &Context, request: FileRequest, path: PathBuf) {
+        self.folder = std::path::absolute(&path).ok().and_then(|path| Some(path.parent()?.into()));
         let search = Command::StructureSearch;
         let command = match request {
             FileRequest::Open if dropped::is_search(&path) => {

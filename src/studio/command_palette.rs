@@ -8,6 +8,7 @@ use egui::{
 use super::actions::{Actions, UiAction};
 use super::form::dialog_frame;
 use super::menu_items::{MenuContext, MenuItem};
+use super::text_input::place_cursor_at_end;
 
 /// The number of items that are listed at most.
 const MAX_ITEMS: usize = 60;
@@ -85,7 +86,12 @@ impl CommandPalette {
                 }
             }
         });
-        self.text.len() > before
+        let is_longer = self.text.len() > before;
+        if is_longer {
+            // What the field takes next follows it.
+            place_cursor_at_end(ui.ctx(), field);
+        }
+        is_longer
     }
 
     /// Shows the items; the index of one that was pressed.

@@ -184,9 +184,14 @@ fn claims(ui: &mut Ui, claims: &[Claim]) {
     });
 }
 
+/// The number of a claim with its error, both in the same notation, and its unit.
 fn value_text(claim: &Claim) -> String {
-    let error = if claim.error == 0.0 { String::new() } else { format!(" ± {:.1e}", claim.error) };
-    format!("{}{error} {}", short(claim.value), claim.unit)
+    let text = if number::is_error(claim.value, claim.error) {
+        number::with_error(claim.value, claim.error)
+    } else {
+        short(claim.value)
+    };
+    format!("{text} {}", claim.unit)
 }
 
 /// A number with few digits, at any magnitude.
@@ -203,4 +208,21 @@ fn texture(context: &Context, picture: &NamedPlot) -> TextureHandle {
     let size = picture.canvas.size().map(|side| side as usize);
     let image = ColorImage::from_rgb(size, picture.canvas.pixels());
     context.load_texture(picture.name, image, TextureOptions::LINEAR)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::experiments::ClaimRelation;
+
+    #[test]
+    fn a_number_and_its_error_have_one_notation() {
+        let claim = |value: f64, error: f64| {
+            let (says, rule) = (String::new(), ClaimRelation::AtMost);
+            Claim { says, value, error, unit: "mm", rule, limit: 1.0, holds: true }
+        };
+        assert_eq!(value_text(&claim(0.0413, 3e-5)), "0.04130 ± 0.00003 mm");
+        assert_eq!(value_text(&claim(0.0413, 2e-17)), "0.0413 mm");
+        assert_eq!(value_text(&claim(3.21e-7, 0.0)), "3.21e-7 mm");
+    }
 }

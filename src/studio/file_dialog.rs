@@ -1,7 +1,7 @@
 //! File dialogs: the desktop's own, in a thread of its own so that the window stays responsive, or
 //! a text field for a path if the desktop has no dialog.
 
-use std::path::{Path, PathBuf};
+use std::path::{MAIN_SEPARATOR, Path, PathBuf};
 use std::sync::mpsc::{Receiver, TryRecvError, channel};
 use std::thread;
 
@@ -158,12 +158,12 @@ impl FileDialog {
 
     /// Asks with a line to type a path into.
     pub fn ask_in_window(&mut self, purpose: FileRequest, near: Option<&Path>) {
-        let near = if purpose == FileRequest::ExperimentFolder {
-            near.and_then(Path::parent)
-        } else {
-            near
-        };
-        let start = near.map(|path| path.display().to_string()).unwrap_or_default();
+        let near =
+            if purpose == FileRequest::ExperimentFolder { near.and_then(folder_of) } else { near };
+        let mut start = near.map(|path| path.display().to_string()).unwrap_or_default();
+        if near.is_some_and(Path::is_dir) && !start.ends_with(MAIN_SEPARATOR) {
+            start.push(MAIN_SEPARATOR);
+        }
         self.prompt = Some((purpose, start));
     }
 
@@ -224,6 +224,11 @@ impl FileDialog {
     }
 }
 
+/// The folder itself, or that of a file.
+fn folder_of(path: &Path) -> Option<&Path> {
+    if path.is_dir() { Some(path) } else { path.parent() }
+}
+
 fn open_native(
     context: &egui::Context,
     purpose: FileRequest,
@@ -234,10 +239,11 @@ fn open_native(
     if !purpose.extensions().is_empty() {
         dialog = dialog.add_filter(purpose.filter_name(), purpose.extensions());
     }
-    if let Some(directory) = near.and_then(Path::parent).filter(|dir| dir.is_dir()) {
+    if let Some(directory) = near.and_then(folder_of).filter(|dir| dir.is_dir()) {
         dialog = dialog.set_directory(directory);
     }
-    if let Some(name) = near.and_then(Path::file_name).filter(|_| purpose.asks_for_name()) {
+    let file = near.filter(|path| purpose.asks_for_name() && !path.is_dir());
+    if let Some(name) = file.and_then(Path::file_name) {
         dialog = dialog.set_file_name(name.to_string_lossy());
     }
     let context = context.clone();

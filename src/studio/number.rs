@@ -37,6 +37,20 @@ fn without_zeros(text: &str) -> String {
     format!("{}{exponent}", decimals.trim_end_matches('0').trim_end_matches('.'))
 }
 
+/// The characters of a number above which it has an exponent if that is shorter.
+const COMPACT: usize = 7;
+
+/// A number with some digits, a long one with an exponent where that is shorter.
+pub fn format_compact(value: f64, digits: i32) -> String {
+    let plain = format_digits(value, digits);
+    if plain.len() <= COMPACT || !value.is_finite() {
+        return plain;
+    }
+    let decimals = usize::try_from(digits - 1).unwrap_or(0);
+    let short = without_zeros(&format!("{value:.decimals$e}"));
+    if short.len() < plain.len() { short } else { plain }
+}
+
 /// A number with as many digits, at most seven, as fit into some characters.
 pub fn format_within(value: f64, characters: usize) -> String {
     let texts = (1..=DIGITS).rev().map(|digits| format_digits(value, digits));
@@ -154,6 +168,21 @@ mod tests {
         assert_eq!(format_within(-1.234567e-12, 8), "-1.2e-12");
         assert_eq!(format_within(-37.123456789, 20), "-37.12346");
         assert_eq!(format_within(-37.123456789, 6), "-37.12");
+    }
+
+    #[test]
+    fn a_long_number_has_an_exponent_where_that_is_shorter() {
+        let cases = [
+            (1.234e-5, "1.23e-5"),
+            (0.00123, "0.00123"),
+            (1000.0, "1000"),
+            (1e-9, "1e-9"),
+            (-2e7, "-2e7"),
+            (0.0, "0"),
+        ];
+        for (value, text) in cases {
+            assert_eq!(format_compact(value, 3), text);
+        }
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! Requests to the runs and to what panels show, for the command palette: what a panel offers by
 //! buttons is found by words, too.
 
+use super::actions::UiAction;
 use super::menu_items::MenuItem;
 use crate::effects::{Effect, EffectOverride};
 use crate::grin_design;
@@ -41,7 +42,15 @@ pub(super) fn commands(view: &SessionView, has_preview: bool) -> Vec<MenuItem> {
     let terms = term_edits(view)
         .into_iter()
         .map(|(title, edit)| MenuItem::new("Merit function", format!("Add a term: {title}"), edit));
-    groups.into_iter().flat_map(items).chain(tasks).chain(terms).collect()
+    groups.into_iter().flat_map(items).chain([watch(view)]).chain(tasks).chain(terms).collect()
+}
+
+/// The item that gives a search the window.
+fn watch(view: &SessionView) -> MenuItem {
+    let search = &view.structure_search;
+    let chain = search.previewed_chain.unwrap_or(0);
+    let watch = search.run.snapshot.as_ref().map(|_| UiAction::WatchSearch(chain));
+    MenuItem::maybe("Search", "Watch the search in the whole window", watch)
 }
 
 /// A command for a run that waits, or takes steps.

@@ -201,10 +201,19 @@ impl EditBuffers {
 }
 
 /// Selects the whole text of a field.
-pub(super) fn select_whole(context: &Context, field: Id) {
+pub(in crate::studio) fn select_whole(context: &Context, field: Id) {
+    select_range(context, field, CCursorRange::two(CCursor::new(0), CCursor::new(usize::MAX >> 1)));
+}
+
+/// Moves the cursor of a field behind its text.
+pub(in crate::studio) fn place_cursor_at_end(context: &Context, field: Id) {
+    select_range(context, field, CCursorRange::one(CCursor::new(usize::MAX >> 1)));
+}
+
+/// Selects a part of the text of a field.
+fn select_range(context: &Context, field: Id, range: CCursorRange) {
     let mut state = TextEditState::load(context, field).unwrap_or_default();
-    let all = CCursorRange::two(CCursor::new(0), CCursor::new(usize::MAX >> 1));
-    state.cursor.set_char_range(Some(all));
+    state.cursor.set_char_range(Some(range));
     state.store(context, field);
 }
 

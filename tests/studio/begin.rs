@@ -7,6 +7,7 @@ use aplanat::lens::{
     Aperture, Edit, ElementEdit, ElementForm, FieldKind, Fields, Lens, Object, Quantity,
     StartingForm, StartingLens, WavelengthPreset, ZoomPosition, apply_edit,
 };
+use aplanat::merit::Term;
 use aplanat::session::{Command, Session, SessionView};
 use aplanat::studio::Studio;
 use aplanat::studio::draw::RenderBackend;
@@ -90,6 +91,7 @@ fn a_new_lens_comes_from_the_dialog() {
     assert_eq!(lens.aperture, Aperture::EntrancePupilDiameter(12.5));
     assert!(harness.query_by_label("Create").is_none(), "the dialog is closed");
     assert!(harness.state().session().view().messages.is_empty());
+    assert_eq!(harness.state().session().view().history[0].title, "new lens");
 }
 
 #[test]
@@ -205,6 +207,21 @@ fn letters_typed_at_once_after_the_shortcut_reach_the_palette() {
     assert_eq!(harness.get_by_label("Find a command").value().as_deref(), Some("undo"));
 }
 
+/// Letters that come while the field has no keyboard, for a frame, keep their place among the others.
+#[test]
+fn letters_of_the_palette_stay_in_order() {
+    let mut harness = window(double_gauss());
+    keys(&mut harness, Modifiers::COMMAND, Key::K);
+    enter_text(&mut harness, "Find a command", "defau");
+    let field = harness.ctx.memory(egui::Memory::focused).unwrap();
+    harness.ctx.memory_mut(|memory| memory.surrender_focus(field));
+    for text in ["lt", " arr"] {
+        harness.input_mut().events.push(egui::Event::Text(text.into()));
+        harness.step();
+    }
+    assert_eq!(harness.get_by_label("Find a command").value().as_deref(), Some("default arr"));
+}
+
 #[test]
 fn the_cursor_is_in_the_first_number_of_a_dialog() {
     let mut harness = window(double_gauss());
@@ -293,6 +310,16 @@ fn the_preview_of_a_dialog_is_accepted_in_the_dialog_alone() {
     assert_eq!(lens(&harness).surfaces.len(), 1, "nothing was added");
 }
 
+/// A preview that changes nothing yet is not taken for an old version.
+#[test]
+fn a_preview_without_a_change_is_called_the_design() {
+    let mut harness = window(double_gauss());
+    harness.state_mut().session_mut().apply(Command::Select(Some(2)));
+    keys(&mut harness, Modifiers::COMMAND | Modifiers::SHIFT, Key::M);
+    let texts = painted_texts(&harness);
+    assert!(texts.iter().any(|text| text.contains("the design itself")), "{texts:?}");
+}
+
 /// The whole lens at another size is seen before it is asked for, as a moved element is.
 #[test]
 fn scaling_is_shown_before_it_is_done() {
@@ -319,6 +346,60 @@ fn the_menu_of_views_fits_into_a_small_window() {
     assert!(is_inside(harness.get_by_label("Default arrangement")));
     press_item(&mut harness, "Settings");
     assert!(is_inside(harness.get_by_label("51 rays of each field in the layout")));
+}
+
+/// A lens without a file is proposed beside the file that was used last, and one with a file beside it.
+#[test]
+fn saving_proposes_a_folder() {
+    let path = std::env::temp_dir().join(format!("aplanat-{}-beside.json", std::process::id()));
+    let save_as = Modifiers::COMMAND | Modifiers::SHIFT;
+    let proposed = |harness: &mut Harness<'_, Studio>| {
+        keys(harness, save_as, Key::S);
+        let value = harness.get_by_label("Path").value().map(PathBuf::from);
+        press(harness, "Cancel");
+        value.unwrap()
+    };
+    let mut harness = window(achromat());
+    assert!(proposed(&mut harness).is_absolute(), "it is said where the file would be");
+    let save = Command::Save(Some(path.clone()));
+    harness.state_mut().session_mut().apply(save);
+    harness.run_steps(2);
+    assert_eq!(proposed(&mut harness), path);
+    harness.state_mut().session_mut().apply(Command::New(Box::new(double_gauss())));
+    harness.run_steps(2);
+    assert_eq!(proposed(&mut harness).parent(), path.parent());
+    std::fs::remove_file(path).unwrap();
+}
+
+/// The first position of a zoom lens gives the focal length that the proposed merit function asks for.
+#[test]
+fn the_proposed_merit_function_follows_the_first_zoom_position() {
+    let mut lens = zoom_lens();
+    let last = lens.surfaces.len() - 1;
+    let curvature = 0.5 * lens.surfaces[last].curvature;
+    lens.zoom[1].set_number(last, Quantity::Curvature, curvature);
+    let mut session = Session::new(lens, || {}).unwrap();
+    let target = |session: &Session| {
+        let goal = session.view().goal.unwrap();
+        let found = goal.terms.iter().find_map(|weighted| match weighted.term {
+            Term::FocalLength(target) => Some(target),
+            _ => None,
+        });
+        found.unwrap()
+    };
+    let own = |session: &Session| focal_length(&session.view().lens);
+    assert_close(target(&session), own(&session));
+    session.apply(Edit::RemoveZoom(0).into());
+    assert_close(target(&session), own(&session));
+    assert!((own(&session) - 50.0).abs() > 0.1, "the positions differ");
+    session.apply(Command::Undo);
+    assert_close(target(&session), 50.0);
+    session.apply(Edit::RemoveZoom(1).into());
+    assert_close(target(&session), 50.0);
+}
+
+fn assert_close(a: f64, b: f64) {
+    assert!((a - b).abs() < 1e-9 * b.abs(), "{a} {b}");
 }
 
 /// A file that was saved under a new name, or named at the start, is a recent one.
@@ -357,6 +438,7 @@ fn the_palette_finds_commands_panels_and_lenses_by_words() {
         ("start front", "Front: Start a Pareto front with default settings"),
         ("start search", "Search: Start a search with default settings"),
         ("discard candidate", "Candidate: Discard the candidate"),
+        ("watch search", "Search: Watch the search in the whole window"),
         ("task luneburg-radial", "Gradient index: Open the task luneburg-radial"),
         ("hold focal", "Setting: Hold the focal length in drags"),
         ("effect never aim", "Setting: Effect"),

@@ -219,6 +219,26 @@ fn the_terms_fit_into_a_narrow_panel() {
     }
 }
 
+/// The steps of one column of pixels are a part of the line, and no band with a wedge beside it.
+#[test]
+fn the_curve_of_many_steps_is_a_line() {
+    let mut view = branched();
+    let history = Arc::make_mut(&mut view.history);
+    let node = Arc::make_mut(&mut history[2]);
+    let curve = Arc::make_mut(node.curve.as_mut().unwrap());
+    let merit = |step: usize| if step < 700 { 0.02 } else { 0.01 };
+    let point = |step: usize| CurvePoint { step, merit: merit(step), values: vec![0.02] };
+    curve.points = (0..2000).map(point).collect();
+    let mut harness = panel_harness(HistoryPanel::default(), view);
+    harness.run();
+    harness.get_by_label_contains("Present version").click();
+    harness.run();
+    harness.get_by_label("Merit against steps of this version");
+    let is_band = |shape: &egui::Shape| matches!(shape, egui::Shape::Band(_));
+    let bands = harness.output().shapes.iter().filter(|painted| is_band(&painted.shape)).count();
+    assert_eq!(bands, 0);
+}
+
 /// The curve of an optimization has titles, and marks however little the merit has changed.
 #[test]
 fn the_merit_curve_has_titles_and_marks() {

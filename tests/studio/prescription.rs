@@ -87,6 +87,22 @@ fn after_f2_arrows_move_in_the_text() {
     assert_eq!(edits(&harness), [Edit::set_radius(0, 14.16195)]);
 }
 
+/// The second click that edits in place is one into a cell that has the keyboard.
+#[test]
+fn a_click_into_a_cell_without_the_keyboard_enters_it() {
+    let mut harness = table(double_gauss());
+    enter(&mut harness, "Radius of surface 1");
+    let cell = harness.ctx.memory(egui::Memory::focused).unwrap();
+    harness.ctx.memory_mut(|memory| memory.surrender_focus(cell));
+    harness.run();
+    assert!(!harness.get_by_label("Radius of surface 1").is_focused());
+    harness.get_by_label("Radius of surface 1").click();
+    harness.run();
+    harness.key_press(Key::ArrowDown);
+    harness.run();
+    assert!(harness.get_by_label("Radius of surface 2").is_focused());
+}
+
 #[test]
 fn a_typed_value_is_committed_by_an_arrow() {
     let mut harness = table(double_gauss());

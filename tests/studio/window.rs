@@ -8,13 +8,14 @@ use aplanat::paraxial::{DragSettings, FirstOrderLock};
 use aplanat::session::{Command, ExperimentStatus, Session};
 use aplanat::studio::Studio;
 use aplanat::studio::draw::RenderBackend;
+use aplanat::studio::panels::LayoutPanel;
 use aplanat::studio::theme;
 use aplanat::studio::window::Persistence;
 use egui::{Key, Modifiers};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
 
-use crate::harness::double_gauss;
+use crate::harness::{double_gauss, sized_harness, view_of};
 
 /// The maximum time of an analysis on a slow and busy machine.
 const DEADLINE: Duration = Duration::from_mins(1);
@@ -88,6 +89,44 @@ fn a_typed_radius_reaches_every_panel_and_undo_takes_it_back() {
 /// The radii without their errors, which may differ in their last digits.
 fn radii(spots: &[String]) -> Vec<&str> {
     spots.iter().map(|text| text.split('±').next().unwrap_or_default()).collect()
+}
+
+/// The words about a field without rays end where the controls at the right begin.
+#[test]
+fn a_field_without_rays_does_not_cover_the_controls_of_the_layout() {
+    let mut lens = double_gauss();
+    lens.surfaces[0].curvature = 0.1509;
+    let mut harness =
+        sized_harness(LayoutPanel::new(RenderBackend::Software), view_of(lens), [600.0, 400.0]);
+    harness.run_steps(3);
+    let words = harness.get_by_label_contains("no ray of this field").rect();
+    let controls = harness.get_by_label("Rays of each field").rect();
+    assert!(words.width() > 50.0 && words.right() <= controls.left(), "{words:?} {controls:?}");
+}
+
+/// A question that waits for an answer keeps the keys of the menus from the window behind it.
+#[test]
+fn shortcuts_do_nothing_behind_a_question() {
+    let mut harness = window();
+    type_radius(&mut harness, "*1.1");
+    let changed = harness.state().session().lens().surfaces[0].curvature;
+    harness.key_press_modifiers(Modifiers::COMMAND, Key::N);
+    harness.run_steps(3);
+    harness.get_by_label("Create").click();
+    harness.run_steps(3);
+    harness.get_by_label("Save the changes first?");
+    for key in [Key::Z, Key::N, Key::K] {
+        harness.key_press_modifiers(Modifiers::COMMAND, key);
+        harness.run_steps(3);
+    }
+    assert_eq!(harness.state().session().lens().surfaces[0].curvature, changed);
+    assert!(harness.query_by_label("Create").is_none());
+    assert!(harness.query_by_label("Find a command").is_none());
+    harness.get_by_label("Cancel").click();
+    harness.run_steps(3);
+    harness.key_press_modifiers(Modifiers::COMMAND, Key::Z);
+    harness.run_steps(3);
+    assert_ne!(harness.state().session().lens().surfaces[0].curvature, changed);
 }
 
 #[test]
@@ -448,9 +487,10 @@ fn the_key_of_a_panel_puts_the_keyboard_in_it() {
     }
     harness.key_press_modifiers(Modifiers::COMMAND, Key::Num1);
     harness.run_steps(8);
+    assert!(harness.get_by_label("Fit").is_focused());
     harness.key_press(Key::Tab);
     harness.run_steps(3);
-    assert!(harness.get_by_label("Fit").is_focused());
+    assert!(harness.get_by_label("Rays of each field").is_focused());
 }
 
 /// The tab of the panel that is shown is in its bar, however narrow that is.
@@ -475,7 +515,10 @@ fn save_as_proposes_the_name_of_the_lens() {
     harness.key_press_modifiers(Modifiers::COMMAND | Modifiers::SHIFT, Key::S);
     harness.run_steps(3);
     let proposed = harness.get_by_label("Path").value().unwrap();
-    assert!(proposed.starts_with("Double Gauss") && proposed.contains(".json"), "{proposed}");
+    let proposed = std::path::Path::new(&proposed);
+    let name = proposed.file_name().unwrap().to_string_lossy();
+    assert!(name.starts_with("Double Gauss") && name.ends_with(".json"), "{proposed:?}");
+    assert!(proposed.is_absolute(), "it is said where the file would be");
 }
 
 /// A window on a file whose program was killed says what it has recovered, and holds what was held.

@@ -322,6 +322,7 @@ fn a_session_scales_to_a_focal_length_and_inserts_a_file_each_as_one_undo_step()
     let at = session.lens().surfaces.len();
     session.apply(Command::InsertLens { path, at });
     assert_eq!(session.lens().surfaces.len(), at + 3);
+    assert_eq!(session.view().undo.as_deref(), Some("insert singlet.json"));
     assert_eq!(session.lens().stop(), Some(0), "the stop of the file is not a second stop");
     session.apply(Command::Undo);
     assert_eq!(**session.lens(), doublet());

@@ -211,7 +211,7 @@ mod tests {
         drop(fs::remove_dir_all(&folder));
         // Versions of 0.7 MB, of which half of the room holds some eleven.
         let lens = Arc::new(Lens { notes: "n".repeat(700_000), ..blank() });
-        let mut history = DesignHistory::new(Arc::clone(&lens), None);
+        let mut history = DesignHistory::new(Arc::clone(&lens), VersionOrigin::new("opened"));
         for i in 0..12 {
             history.push(Arc::clone(&lens), VersionOrigin::new(format!("edit {i}")));
         }

@@ -118,10 +118,11 @@ mod tests {
     use super::*;
     use crate::lens::blank;
     use crate::paraxial::FirstOrderLock;
+    use crate::session::history::VersionOrigin;
 
     #[test]
     fn what_is_held_is_in_the_lines() {
-        let history = DesignHistory::new(Arc::new(blank()), None);
+        let history = DesignHistory::new(Arc::new(blank()), VersionOrigin::new("opened"));
         let mut state = JournalState::begin(None, history);
         let count = state.entries().len();
         let locks = vec![FirstOrderLock::FocalLength];

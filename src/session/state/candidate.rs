@@ -47,6 +47,9 @@ impl Session {
 
     /// The origin of a lens that a panel shows.
     fn origin(&self, lens: &Lens) -> String {
+        if *lens == *self.lens {
+            return "the design itself".to_owned();
+        }
         if let Some(kept) = self.kept.iter().find(|kept| *kept.lens == *lens) {
             return kept.title.clone();
         }

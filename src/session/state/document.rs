@@ -58,7 +58,8 @@ impl Session {
             let edit = Edit::Element(insert);
             apply_edit(&self.lens, &edit).map_err(|why| why.to_string())
         });
-        self.accept(inserted, VersionOrigin::new(format!("insert {}", path.display())));
+        let file = path.file_name().unwrap_or(path.as_os_str());
+        self.accept(inserted, VersionOrigin::new(format!("insert {}", file.display())));
     }
 
     /// Makes a lens the design, as one undo step, or posts the reason why there is none.
@@ -137,7 +138,7 @@ impl Session {
         match starting.lens() {
             Ok(lens) => {
                 let proposal = MeritProposal::of_new(&lens, starting);
-                self.replace_by_version(lens, None, proposal);
+                self.replace_by_version(lens, None, VersionOrigin::first("new lens", proposal));
             }
             Err(why) => self.post(Severity::Warning, why.to_string()),
         }
@@ -145,16 +146,11 @@ impl Session {
 
     /// Replaces the design by another one with an undo history of its own.
     pub(super) fn replace_design(&mut self, lens: Lens, path: Option<PathBuf>) {
-        let proposal = MeritProposal::of(&lens);
-        self.replace_by_version(lens, path, proposal);
+        let origin = VersionOrigin::first("opened", MeritProposal::of(&lens));
+        self.replace_by_version(lens, path, origin);
     }
 
-    fn replace_by_version(
-        &mut self,
-        lens: Lens,
-        path: Option<PathBuf>,
-        proposal: Arc<MeritProposal>,
-    ) {
+    fn replace_by_version(&mut self, lens: Lens, path: Option<PathBuf>, origin: VersionOrigin) {
         if let Err(why) = lens.check() {
             return self.post(Severity::Error, why.to_string());
         }
@@ -162,7 +158,7 @@ impl Session {
         self.pareto.clear();
         self.structure_search.forget_failed_start();
         let lens = Arc::new(lens);
-        self.history = DesignHistory::new(Arc::clone(&lens), Some(proposal));
+        self.history = DesignHistory::new(Arc::clone(&lens), origin);
         self.saved = Arc::clone(&lens);
         self.path = path;
         self.imported = None;

@@ -16,7 +16,7 @@ use super::command::{Command, PanelSetting};
 use super::drag::DragState;
 use super::experiment::{ExperimentStatus, ExperimentWorker};
 use super::grin_design::GrinState;
-use super::history::DesignHistory;
+use super::history::{DesignHistory, VersionOrigin};
 use super::live_merit::{LiveMerit, MeritReport, MeritRequest};
 use super::optimization::{OptimizationEngine, OptimizationRequest, OptimizerFactory};
 use super::pareto::ParetoState;
@@ -166,9 +166,10 @@ impl Session {
         let lens = Arc::new(lens);
         let proposal = MeritProposal::of(&lens);
         let optimize = move |request, _: &_| OptimizationEngine::start(&factory, request);
+        let origin = VersionOrigin::first("opened", Arc::clone(&proposal));
         let session = Self {
             saved: Arc::clone(&lens),
-            history: DesignHistory::new(Arc::clone(&lens), Some(Arc::clone(&proposal))),
+            history: DesignHistory::new(Arc::clone(&lens), origin),
             journaling: Journaling::default(),
             lens,
             version: 1,

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use egui::{Response, RichText, Ui, WidgetInfo};
 use egui_plot::{Line, LineStyle, PlotPoints};
 
-use super::widgets::{fixed_plot, swatch};
+use super::widgets::{fixed_plot, plot_curve, swatch};
 use super::{Panel, displayed_results, field_name, plain_error, show_missing_results};
 use crate::analysis::{AnalysisError, MtfCurve, TransferValue};
 use crate::lens::Fields;
@@ -86,7 +86,7 @@ fn plot(ui: &mut Ui, contrasts: &FieldContrasts, height: f32) {
             let Ok(contrast) = &field.value else { continue };
             let color = color32(palette.field(i));
             let tangential = curve_points(&contrast.curve, |point| point.tangential);
-            plot.line(Line::new(format!("T {i}"), tangential).color(color).width(1.6));
+            plot.line(plot_curve(format!("T {i}"), tangential).color(color).width(1.6));
             let sagittal = curve_points(&contrast.curve, |point| point.sagittal);
             let dashed = LineStyle::dashed_loose();
             plot.line(Line::new(format!("S {i}"), sagittal).color(color).width(1.6).style(dashed));
@@ -98,7 +98,7 @@ fn plot(ui: &mut Ui, contrasts: &FieldContrasts, height: f32) {
 fn curve_points(
     curve: &MtfCurve,
     section: impl Fn(&crate::analysis::MtfPoint) -> TransferValue,
-) -> PlotPoints<'static> {
+) -> Vec<[f64; 2]> {
     let point = |point: &crate::analysis::MtfPoint| [point.frequency, section(point).modulus.value];
     curve.points.iter().map(point).collect()
 }

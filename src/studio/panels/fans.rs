@@ -1,9 +1,8 @@
 //! Ray fans: the transverse aberration of every field across two sections of its pupil.
 
 use egui::{Response, RichText, ScrollArea, Ui, WidgetInfo};
-use egui_plot::{Line, LineStyle, PlotPoints};
 
-use super::widgets::{fixed_plot, swatch};
+use super::widgets::{fixed_plot, plot_curve, swatch};
 use super::{Panel, displayed_results, field_name, show_missing_results};
 use crate::analysis::{AnalysisError, Fan, FanPoint};
 use crate::lens::Fields;
@@ -71,10 +70,10 @@ fn legend(ui: &mut Ui, numbers: &Analyses, scale: f64, ms: f64) {
             swatch(ui, color32(palette.wavelength(channel.um)));
             ui.label(RichText::new(format!("{:.0} nm", 1e3 * channel.um)).small());
         }
-        let text = format!("± {} µm, {ms:.1} ms", number::format_digits(scale, 3));
+        let text = format!("in µm, all plots to {}; {ms:.1} ms", number::format_digits(scale, 3));
         ui.label(RichText::new(text).small().weak()).on_hover_text(
-            "The scale of all plots: distance from the image point of the chief ray of the primary \
-             wavelength, against the coordinate in the stop from rim to rim",
+            "Distance from the image point of the chief ray of the primary wavelength, on one scale, \
+             against the coordinate in the stop from rim to rim",
         );
     });
 }
@@ -126,8 +125,7 @@ fn section(
             let um = numbers.ray_model.value.channels[fan.wavelength].um;
             let color = color32(palette.wavelength(um));
             for points in curves(fan) {
-                let points: PlotPoints<'_> = points.into_iter().collect();
-                let line = Line::new(format!("{:.0} nm", 1e3 * um), points).style(LineStyle::Solid);
+                let line = plot_curve(format!("{:.0} nm", 1e3 * um), points);
                 plot.line(line.color(color).width(1.4));
             }
         }

@@ -2,9 +2,9 @@
 //! show them.
 
 use egui::{Label, RichText, Ui, WidgetInfo};
-use egui_plot::{HLine, Line, LineStyle, PlotPoints};
+use egui_plot::{HLine, LineStyle};
 
-use super::widgets::fixed_plot;
+use super::widgets::{fixed_plot, plot_curve};
 use super::{Panel, displayed_results, plain_error, show_missing_results};
 use crate::analysis::{Distortion, FieldCurvePoint, FieldCurves};
 use crate::lens::{FieldKind, Lens, Wavelength};
@@ -195,8 +195,7 @@ impl Chart {
             plot.hline(HLine::new("", 0.0).color(weak).allow_hover(false));
             for Curve { name, points, color, dashed } in self.curves {
                 let style = if dashed { LineStyle::dashed_loose() } else { LineStyle::Solid };
-                let points: PlotPoints<'_> = points.into_iter().collect();
-                plot.line(Line::new(name, points).color(color32(color)).style(style).width(1.6));
+                plot.line(plot_curve(name, points).color(color32(color)).style(style).width(1.6));
             }
         });
         shown.response.widget_info(|| WidgetInfo::labeled(egui::Role::Image, true, &label));

@@ -306,7 +306,7 @@ pub(super) fn add_variables_edit(lens: &Lens, kinds: &[ParameterKind]) -> Edit {
     Edit::SetVariables(freed.variables)
 }
 
-/// The smallest relative error that is shown as a number, in percent.
+/// The smallest error that is shown as a number, in percent.
 const SMALLEST_PERCENT: f64 = 0.001;
 /// The smallest error of a share that is told as a number.
 const SMALLEST_ERROR: f64 = 1e-5;
@@ -316,11 +316,15 @@ fn relative_error(estimate: Estimate) -> String {
     if !number::is_error(estimate.value, estimate.error) || estimate.value == 0.0 {
         return String::new();
     }
-    let percent = 100.0 * (estimate.error / estimate.value).abs();
+    format!(" {}", percent_error(100.0 * (estimate.error / estimate.value).abs()))
+}
+
+/// An error in percent.
+fn percent_error(percent: f64) -> String {
     if percent < SMALLEST_PERCENT {
-        return format!(" ± <{SMALLEST_PERCENT} %");
+        return format!("± <{SMALLEST_PERCENT} %");
     }
-    format!(" ± {} %", number::format_digits(percent, 2))
+    format!("± {} %", number::format_digits(percent, 2))
 }
 
 /// The error of a number beside 1, as a share or in percent, in the notation of such numbers.

@@ -6,9 +6,8 @@ use egui::{
     Align, Button, Color32, ColorImage, Grid, Image, Layout, RichText, ScrollArea, TextureHandle,
     TextureOptions, Ui, vec2,
 };
-use egui_plot::{Line, PlotPoints};
 
-use super::widgets::{fixed_plot, swatch};
+use super::widgets::{fixed_plot, plot_curve, swatch};
 use super::{
     Panel, displayed_results, field_name, plain_error, relative_error, show_missing_results,
 };
@@ -305,8 +304,8 @@ fn energies(ui: &mut Ui, fields: &Fields, waves: &FieldWavefronts) {
     plot.show(ui, |plot| {
         for (i, image) in &lit {
             let circles = image.energy.iter().map(|(radius, share)| [1e3 * radius, share.value]);
-            let points: PlotPoints<'_> = std::iter::once([0.0; 2]).chain(circles).collect();
-            plot.line(Line::new(format!("field {i}"), points).color(color32(palette.field(*i))));
+            let points = std::iter::once([0.0; 2]).chain(circles);
+            plot.line(plot_curve(format!("field {i}"), points).color(color32(palette.field(*i))));
         }
     });
     let errors = lit.iter().flat_map(|(_, image)| image.energy.iter().map(|(_, e)| e.error));

@@ -1,7 +1,7 @@
 //! Widgets that several panels share.
 
 use egui::{Button, Color32, ProgressBar, RectAlign, Response, RichText, Sense, Tooltip, Ui, vec2};
-use egui_plot::{AxisHints, GridInput, GridMark, Plot};
+use egui_plot::{AxisHints, GridInput, GridMark, Line, Plot};
 
 use crate::studio::actions::{Actions, UiAction};
 use crate::studio::number;
@@ -106,6 +106,30 @@ pub(super) fn fixed_plot(ui: &Ui, name: &str, height: f32) -> Plot<'static> {
         .y_grid_spacer(|input| round_marks(&input, APART[1]))
 }
 
+/// The number of points of a curve above which those of one column of pixels are drawn together.
+const MANY: usize = 4000;
+/// The distance of two points below which they are one, relative to the size of their curve.
+const SAME: f64 = 1e-5;
+
+/// A curve of a plot, every point of which is drawn. The toolkit would draw those of one column of pixels
+/// together as a band, which the curve beside a steep part widens to a wedge; and three points at one
+/// place have no direction to draw a line in.
+pub(super) fn plot_curve(
+    name: impl Into<String>,
+    points: impl IntoIterator<Item = [f64; 2]>,
+) -> Line<'static> {
+    let mut points: Vec<[f64; 2]> = points.into_iter().collect();
+    let size = [0, 1].map(|axis| {
+        let values = points.iter().map(|point| point[axis]).filter(|value| value.is_finite());
+        let (low, high) = values.fold((f64::MAX, f64::MIN), |(l, h), v| (l.min(v), h.max(v)));
+        (high - low).max(0.0)
+    });
+    let is_same = |a: f64, b: f64, axis: usize| (a - b).abs() <= SAME * size[axis];
+    points.dedup_by(|a, b| is_same(a[0], b[0], 0) && is_same(a[1], b[1], 1));
+    let many = points.len() > MANY;
+    Line::new(name, points).allow_band(many)
+}
+
 /// The multiples of 1, 2 or 5 times a power of ten, some points apart from each other.
 fn round_marks(input: &GridInput, apart: f64) -> Vec<GridMark> {
     // The base step is that of the least distance at which a mark is drawn.
@@ -132,17 +156,19 @@ pub(super) fn log_axis(plot: Plot<'static>, title: &str) -> Plot<'static> {
 }
 
 /// The decimal logarithms of round numbers between two places, about `apart` from each other: of
-/// decades, else of 1, 2 and 5 in each, else of multiples of one step.
+/// decades, else of 1, 2 and 5 or of 1 and 3 in each, else of multiples of one step.
 fn log_marks((low, high): (f64, f64), apart: f64) -> Vec<f64> {
     if !(low.is_finite() && high.is_finite() && low < high && apart > 0.0) {
         return Vec::new();
     }
     let mut found: Vec<f64> = multiples((low, high), apart.max(1.0).ceil()).collect();
-    if found.len() < 3 && CROWDED * apart <= 2_f64.log10() {
-        let all = multiples((low - 1.0, high), 1.0);
-        let parts = all.flat_map(|decade| [1.0_f64, 2.0, 5.0].map(|part| decade + part.log10()));
-        let parts: Vec<f64> = parts.filter(|place| (low..=high).contains(place)).collect();
-        found = if parts.len() > found.len() { parts } else { found };
+    for (parts, closest) in [(&[1.0_f64, 2.0, 5.0][..], 2.0_f64), (&[1.0, 3.0], 3.0)] {
+        if found.len() < 3 && CROWDED * apart <= closest.log10() {
+            let all = multiples((low - 1.0, high), 1.0);
+            let parts = all.flat_map(|decade| parts.iter().map(move |part| decade + part.log10()));
+            let parts: Vec<f64> = parts.filter(|place| (low..=high).contains(place)).collect();
+            found = if parts.len() > found.len() { parts } else { found };
+        }
     }
     if found.len() < 3 {
         let even = even_marks((low, high), apart);
@@ -219,6 +245,8 @@ mod tests {
         assert_eq!(near, ["0.015", "0.02"]);
         let parts: Vec<String> = values(0.09, 2.2, 0.29);
         assert_eq!(parts, ["0.1", "0.2", "0.5", "1", "2"]);
+        let thirds: Vec<String> = values(0.000_486, 0.00718, 0.63);
+        assert_eq!(thirds, ["0.001", "0.003"]);
         let decades: Vec<String> = values(0.9e-6, 2.0, 1.8);
         assert_eq!(decades, ["1e-6", "0.0001", "0.01", "1"]);
     }

@@ -1,12 +1,12 @@
 //! Two curves: the loss against the steps, and the index along a line beside the exact one.
 
 use egui::{Role, Ui, WidgetInfo, vec2};
-use egui_plot::{AxisHints, Corner, Legend, Line, LineStyle, Plot, VLine};
+use egui_plot::{AxisHints, Corner, Legend, LineStyle, Plot, VLine};
 
 use super::text;
 use crate::session::{GrinRun, LossSample, SessionView};
 use crate::studio::panels::decade_name;
-use crate::studio::panels::widgets::fixed_plot;
+use crate::studio::panels::widgets::{fixed_plot, plot_curve};
 
 /// The share of width and height that counts as a corner.
 const NEAR: f64 = 0.4;
@@ -73,8 +73,8 @@ pub(super) fn loss_plot(ui: &mut Ui, run: &GrinRun) {
         for step in levels {
             plot.vline(VLine::new("finer", step).color(weak.gamma_multiply(0.5)).width(1.0));
         }
-        plot.line(Line::new("rays of the step", current).color(weak).width(1.0));
-        plot.line(Line::new("best, all rays", best).color(strong).width(2.0));
+        plot.line(plot_curve("rays of the step", current).color(weak).width(1.0));
+        plot.line(plot_curve("best, all rays", best).color(strong).width(2.0));
     });
     let text = format!("Loss against {} steps", run.history.len());
     shown.response.widget_info(|| WidgetInfo::labeled(Role::Image, true, &text));
@@ -102,7 +102,7 @@ pub(super) fn profile_plot(ui: &mut Ui, view: &SessionView) {
             format!("{:.digits$}", mark.value)
         });
     let shown = plot.show(ui, |plot| {
-        let line = |name: &'static str, points: &[[f64; 2]]| Line::new(name, points.to_vec());
+        let line = |name: &'static str, points: &[[f64; 2]]| plot_curve(name, points.to_vec());
         if !profile.start.is_empty() {
             plot.line(line("start", &profile.start).color(weak).width(1.0));
         }

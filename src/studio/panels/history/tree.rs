@@ -4,13 +4,12 @@ use std::collections::BTreeMap;
 
 use egui::text::{LayoutJob, TextFormat, TextWrapping};
 use egui::{Color32, Pos2, Rect, Role, Sense, Stroke, TextStyle, Ui, Vec2, WidgetInfo, pos2, vec2};
-use egui_plot::{Line, PlotPoints};
 
 use super::node;
 use crate::session::{HistoryNode, OptimizationCurve, SessionView};
 use crate::studio::number;
 use crate::studio::panels::optimizer::clicked_step;
-use crate::studio::panels::widgets::{fixed_plot, log_axis};
+use crate::studio::panels::widgets::{fixed_plot, log_axis, plot_curve};
 use crate::studio::text::capitalize;
 use crate::studio::thumbnails::Thumbnails;
 
@@ -210,12 +209,11 @@ fn time_text(version: &HistoryNode) -> String {
 /// The merit of an optimization against its steps; the step that was clicked, if one was.
 pub(super) fn curve_plot(ui: &mut Ui, curve: &OptimizationCurve) -> Option<usize> {
     let points = curve.points.iter().filter(|point| point.merit > 0.0);
-    let points: PlotPoints<'_> =
-        points.map(|point| [point.step as f64, point.merit.log10()]).collect();
+    let points = points.map(|point| [point.step as f64, point.merit.log10()]);
     let plot = fixed_plot(ui, "course of the optimization", CURVE_HEIGHT).x_axis_label("step");
     let plot = log_axis(plot, "merit");
     let color = ui.visuals().hyperlink_color;
-    let shown = plot.show(ui, |plot| plot.line(Line::new("merit", points).color(color)));
+    let shown = plot.show(ui, |plot| plot.line(plot_curve("merit", points).color(color)));
     let label = "Merit against steps of this version";
     shown.response.widget_info(|| WidgetInfo::labeled(Role::Image, true, label));
     clicked_step(&shown.response, &shown.transform)

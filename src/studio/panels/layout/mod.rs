@@ -8,7 +8,9 @@ mod lost_light;
 
 use std::sync::Arc;
 
-use egui::{Align, ComboBox, Context, DragValue, Layout as Arrange, RichText, Stroke, Ui};
+use egui::{
+    Align, ComboBox, Context, DragValue, Label, Layout as Arrange, RichText, Stroke, Ui, vec2,
+};
 use glam::DVec2;
 
 use super::widgets::swatch;
@@ -130,14 +132,16 @@ impl LayoutPanel {
     }
 
     fn header(&mut self, ui: &mut Ui, view: &SessionView, actions: &mut Actions) {
-        ui.horizontal(|ui| {
-            self.legend(ui, view, actions);
-            ui.with_layout(Arrange::right_to_left(Align::Center), |ui| {
-                if ui.button("Fit").on_hover_text("Show the whole lens (double click)").clicked() {
-                    self.scene_view.fit();
-                }
-                rays(ui, view, actions);
-                zoom_position(ui, view, actions);
+        let size = vec2(ui.available_width(), ui.spacing().interact_size.y);
+        ui.allocate_ui_with_layout(size, Arrange::right_to_left(Align::Center), |ui| {
+            if ui.button("Fit").on_hover_text("Show the whole lens (double click)").clicked() {
+                self.scene_view.fit();
+            }
+            rays(ui, view, actions);
+            zoom_position(ui, view, actions);
+            // A long text ends where the controls at the right begin.
+            ui.with_layout(Arrange::left_to_right(Align::Center), |ui| {
+                self.legend(ui, view, actions);
             });
         });
     }
@@ -178,8 +182,12 @@ impl LayoutPanel {
             swatch(ui, color32(palette.added_glass).to_opaque());
             ui.label("new glass").on_hover_text("Glass that the design does not have");
         }
-        for (field, why) in &drawing.fields_without_rays {
-            ui.colored_label(ui.visuals().warn_fg_color, format!("Field {}: {why}", field + 1));
+        let missing = &drawing.fields_without_rays;
+        if !missing.is_empty() {
+            let texts = missing.iter().map(|(field, why)| format!("Field {}: {why}", field + 1));
+            let text = texts.collect::<Vec<_>>().join("; ");
+            let label = RichText::new(&text).color(ui.visuals().warn_fg_color);
+            ui.add(Label::new(label).truncate()).on_hover_text(text);
         }
     }
 }

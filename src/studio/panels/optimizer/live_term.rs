@@ -49,13 +49,17 @@ impl LiveTerm {
         ui.colored_label(color, text).on_hover_text(error)
     }
 
-    /// Shows the value, and below it the share if there is one.
+    /// Shows the value, and below it the share if there is one: a value alone is in the middle of its row.
     pub(super) fn cell(self, ui: &mut Ui, term: Term) {
         let share = self.share.filter(|share| *share >= SMALLEST_SHARE);
-        self.value(ui, term);
-        if let Some(share) = share {
+        let Some(share) = share else {
+            return drop(self.value(ui, term));
+        };
+        ui.vertical(|ui| {
+            ui.spacing_mut().item_spacing.y = 0.0;
+            self.value(ui, term);
             ui.label(RichText::new(share_text(share)).small().weak());
-        }
+        });
     }
 }
 

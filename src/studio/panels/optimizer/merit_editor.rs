@@ -1,7 +1,9 @@
 //! The editor of the merit function: terms with weights and targets, and the treatment of the pupil
 //! edge.
 
-use egui::{Align, Button, ComboBox, Grid, Id, Layout as Arrange, RichText, Ui, vec2};
+use egui::{
+    Align, Button, Color32, ComboBox, Grid, Id, Layout as Arrange, RichText, TextStyle, Ui, vec2,
+};
 use std::sync::Arc;
 
 use super::limits;
@@ -36,7 +38,9 @@ pub(super) struct MeritEditor {
 /// The room for all that is not a target in a row, in points.
 const OTHER_COLUMNS: f32 = 318.0;
 /// The width of a number in points: six characters such as `0.5927`.
-pub(super) const NUMBER: f32 = 51.0;
+const NUMBER: f32 = 51.0;
+/// The room in a field that its text does not have, in points: the margins, and a cursor at the end.
+const FIELD_MARGINS: f32 = 11.0;
 /// The least and the most room for targets.
 const MIN_TARGETS: f32 = 76.0;
 const MAX_TARGETS: f32 = 210.0;
@@ -308,10 +312,17 @@ fn warning_with_fix(ui: &mut Ui, what: &str, button: &str, hint: &str) -> bool {
     .inner
 }
 
-/// A number in the characters for which a field has room: a small one has a digit less.
+/// A number in about the characters for which a field has room: a small one has a digit less.
 pub(super) fn short_number(value: f64) -> String {
     let digits = if value.abs() < 0.1 { 3 } else { 4 };
-    number::format_digits(value, digits)
+    number::format_compact(value, digits)
+}
+
+/// The width of the field of a number in points: that of most, or more where the number is longer.
+pub(super) fn field_width(ui: &Ui, text: &str) -> f32 {
+    let font = TextStyle::Body.resolve(ui.style());
+    let words = ui.painter().layout_no_wrap(text.to_owned(), font, Color32::PLACEHOLDER);
+    NUMBER.max(words.size().x + FIELD_MARGINS)
 }
 
 fn heading(ui: &mut Ui, text: &str, what: &str) {
@@ -337,7 +348,7 @@ impl MeritRow {
         };
         let removed = self.name_cell(ui, view, &title);
         let name = format!("Weight of {title}");
-        number_field(ui, buffers, &name, &mut self.weighted.weight, NUMBER);
+        number_field(ui, buffers, &name, &mut self.weighted.weight);
         self.target_cell(ui, view, buffers, &title, at.target_width);
         self.value_cell(ui, view, at);
         removed
@@ -371,7 +382,7 @@ impl MeritRow {
         ui.spacing_mut().item_spacing = vec2(2.0, 2.0);
         for (what, value) in targets(&mut self.weighted.term) {
             let name = format!("{what} of {title}");
-            number_field(ui, buffers, &name, value, NUMBER);
+            number_field(ui, buffers, &name, value);
         }
         scope::bounds(ui, buffers, title, &mut self.weighted.term);
         ui.weak(unit(self.weighted.term));
@@ -397,18 +408,19 @@ impl MeritRow {
     /// The value for the design, and below it the share or the value for the best lens.
     fn value_cell(&self, ui: &mut Ui, view: &SessionView, at: TermPlace) {
         let term = self.weighted.term;
-        let search = view.optimization.snapshot.as_deref();
+        let Some(search) = view.optimization.snapshot.as_deref() else {
+            return match at.live {
+                Some(live) => live.cell(ui, term),
+                None => drop(ui.label("")),
+            };
+        };
+        // The value for the best lens takes the place of the share.
         ui.vertical(|ui| {
             ui.spacing_mut().item_spacing.y = 0.0;
-            match at.live {
-                // The value for the best lens takes the place of the share.
-                Some(live) if search.is_some() => drop(live.value(ui, term)),
-                Some(live) => live.cell(ui, term),
-                None => {}
+            if let Some(live) = at.live {
+                live.value(ui, term);
             }
-            if let Some(search) = search {
-                self.best_cell(ui, search, at.place);
-            }
+            self.best_cell(ui, search, at.place);
         });
     }
 
@@ -446,7 +458,7 @@ impl MeritRow {
 }
 
 /// A number that belongs to the panel itself.
-fn number_field(ui: &mut Ui, buffers: &mut EditBuffers, name: &str, value: &mut f64, width: f32) {
+fn number_field(ui: &mut Ui, buffers: &mut EditBuffers, name: &str, value: &mut f64) {
     let id = Id::unique(("optimizer", name));
     let shown = short_number(*value);
     let field = TextInput {
@@ -457,7 +469,7 @@ fn number_field(ui: &mut Ui, buffers: &mut EditBuffers, name: &str, value: &mut 
         placement: InputPlacement::Form,
     };
     let layout = Arrange::left_to_right(Align::Center);
-    let size = vec2(width, ui.spacing().interact_size.y);
+    let size = vec2(field_width(ui, &shown), ui.spacing().interact_size.y);
     let entry = ui.allocate_ui_with_layout(size, layout, |ui| buffers.show(ui, id, field));
     let Some(text) = entry.inner.submitted else { return };
     match evaluate(&text, *value) {

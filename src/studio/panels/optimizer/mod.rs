@@ -14,7 +14,7 @@ use egui::{
     Button, ComboBox, Context, Frame, Margin, Panel as Side, Response, RichText, Role, ScrollArea,
     Ui, WidgetInfo, vec2,
 };
-use egui_plot::{Line, PlotPoints, PlotTransform};
+use egui_plot::PlotTransform;
 
 use super::{
     Panel, RMS_OVER_FIELDS, RMS_OVER_FIELDS_HINT, add_variables_edit, mean_pupil_area,
@@ -27,7 +27,7 @@ use crate::studio::actions::Actions;
 use crate::studio::form::named_list;
 use crate::studio::number;
 use crate::studio::panels::widgets::{
-    ActionButton, action_buttons, fixed_plot, log_axis, main_button,
+    ActionButton, action_buttons, fixed_plot, log_axis, main_button, plot_curve,
 };
 use crate::studio::text::{capitalize, status_text};
 use crate::studio::text_input::EditBuffers;
@@ -174,10 +174,13 @@ fn progress(ui: &mut Ui, view: &SessionView, search: &OptimizationSnapshot) {
     if let Some(end) = search.progress.as_ref().and_then(|progress| progress.end) {
         ui.weak(format!("Ended: {}.", end.text()));
     }
-    ui.label(changes_text(view).join(", ")).on_hover_text(format!(
-        "Focal length, mean area of the pupils and sharpness, of the design and of the optimized \
-         lens. {RMS_OVER_FIELDS_HINT}"
-    ));
+    let changes = changes_text(view);
+    if !changes.is_empty() {
+        ui.label(changes.join(", ")).on_hover_text(format!(
+            "Focal length, mean area of the pupils and sharpness, of the design and of the optimized \
+             lens. {RMS_OVER_FIELDS_HINT}"
+        ));
+    }
     let refused = search.progress.as_ref().and_then(|progress| progress.refused.as_ref());
     if let Some(why) = refused {
         let text = RichText::new(capitalize(why)).small();
@@ -212,19 +215,20 @@ pub(super) fn changes_text(view: &SessionView) -> Vec<String> {
 /// was clicked, if one was.
 fn history_plot(ui: &mut Ui, search: &OptimizationSnapshot) -> Option<usize> {
     let decade = |value: f64| if value > 0.0 { value.log10() } else { f64::NAN };
-    let curve = |merit: fn(&MeritSample) -> f64| -> PlotPoints<'static> {
+    let of_history = |name: &str, merit: fn(&MeritSample) -> f64| {
         let points = search.history.iter().map(|point| [point.step as f64, decade(merit(point))]);
-        points.filter(|[_, y]| y.is_finite()).collect()
+        plot_curve(name, points.filter(|[_, y]| y.is_finite()))
     };
-    let (current, best) = (curve(|point| point.current), curve(|point| point.best));
+    let current = of_history("current", |point| point.current);
+    let best = of_history("best", |point| point.best);
     let visuals = ui.visuals();
     let (weak, strong) = (visuals.weak_text_color(), visuals.hyperlink_color);
     let plot = log_axis(fixed_plot(ui, "merit history", ui.available_height()), "merit")
         .x_axis_label("step")
         .set_margin_fraction(vec2(0.01, 0.08));
     let shown = plot.show(ui, |plot| {
-        plot.line(Line::new("current", current).color(weak).width(1.0));
-        plot.line(Line::new("best", best).color(strong).width(2.0));
+        plot.line(current.color(weak).width(1.0));
+        plot.line(best.color(strong).width(2.0));
     });
     let text = "Merit against steps";
     shown.response.widget_info(|| WidgetInfo::labeled(Role::Image, true, text));

@@ -3,7 +3,7 @@
 use egui::containers::menu::{MenuButton, MenuConfig};
 use egui::{Align, Grid, Id, Layout as Arrange, PopupCloseBehavior, Ui, vec2};
 
-use super::merit_editor::{NUMBER, short_number};
+use super::merit_editor::{field_width, short_number};
 use crate::lens::{IndexRange, Lens, last_index};
 use crate::math::expression::evaluate;
 use crate::merit::{OperandKind, Term, TermScope, TermSelection, WeightedTerm};
@@ -105,7 +105,8 @@ pub(super) fn bounds(ui: &mut Ui, buffers: &mut EditBuffers, title: &str, term: 
         let id = Id::unique(("optimizer", &name));
         let value = bound.map(short_number).unwrap_or_default();
         let hint = if what == "Minimum" { "min" } else { "max" };
-        let Some(text) = field(ui, buffers, id, (&name, &value, hint), NUMBER) else { continue };
+        let width = field_width(ui, &value);
+        let Some(text) = field(ui, buffers, id, (&name, &value, hint), width) else { continue };
         if text.trim().is_empty() {
             *bound = None;
             buffers.accept(id);

@@ -6,7 +6,8 @@ use crate::session::{Analyses, SessionView};
 use crate::studio::number;
 use crate::studio::panels::{design_results, mean_pupil_area};
 
-/// A deviation below which a term counts as satisfied: it is of the size of rounding errors.
+/// The deviation below which a term counts as satisfied, relative to its targets: it is of the size of
+/// rounding errors.
 const ROUNDING: f64 = 1e-12;
 
 /// The title of a term.
@@ -168,7 +169,7 @@ pub(super) fn value_text(term: Term, value: f64) -> String {
         Term::ThroughputLoss(_) => format!("{} %", short(100.0 * value)),
         Term::Wavefront => format!("{} waves", short(root)),
         Term::Strehl => format!("{} of 1", short(1.0 - value)),
-        _ if root < ROUNDING => "satisfied".to_owned(),
+        _ if root < ROUNDING * target_size(term) => "satisfied".to_owned(),
         Term::Light(_) | Term::MeanLight(_) | Term::RelativeIllumination { .. } => {
             format!("{} % short", short(100.0 * root))
         }
@@ -178,6 +179,16 @@ pub(super) fn value_text(term: Term, value: f64) -> String {
         Term::Operand { kind, .. } if kind.is_angle() => format!("{}° off", short(root)),
         _ => format!("{}{}", length_text(root), deviation(term)),
     }
+}
+
+/// The size of the numbers that a term asks for, at least 1.
+fn target_size(mut term: Term) -> f64 {
+    let bounds = match term {
+        Term::Operand { min, max, .. } => [min, max],
+        _ => [None, None],
+    };
+    let targets = targets(&mut term).into_iter().map(|(_, target)| *target);
+    targets.chain(bounds.into_iter().flatten()).fold(1.0, |size, target| size.max(target.abs()))
 }
 
 fn length_text(mm: f64) -> String {
@@ -258,5 +269,7 @@ mod tests {
         assert_eq!(shown(Term::GlassEdge(0.5), 0.02), "20 µm short");
         assert_eq!(shown(Term::TotalTrack(50.0), 1.99), "1.99 mm over");
         assert_eq!(shown(Term::FocalLength(35.0), 0.0), "satisfied");
+        assert_eq!(shown(Term::FocalLength(49.389), 9.15e-12), "satisfied", "rounding of its size");
+        assert_eq!(shown(Term::GlassEdge(0.5), 9.15e-12), "9.15e-9 µm short");
     }
 }

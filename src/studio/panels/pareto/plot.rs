@@ -5,14 +5,15 @@ use std::ops::RangeInclusive;
 
 use egui::{Color32, CursorIcon, PointerButton, Pos2, Role, Ui, WidgetInfo};
 use egui_plot::{
-    AxisHints, Corner, Legend, Line, LineStyle, MarkerShape, Plot, PlotPoint, PlotPoints,
-    PlotTransform, PlotUi, Points,
+    AxisHints, Corner, Legend, LineStyle, MarkerShape, Plot, PlotPoint, PlotTransform, PlotUi,
+    Points,
 };
 
 use super::text;
 use crate::optimize::pareto::{Front, ParetoPoint};
 use crate::session::{ParetoRun, RunView, SessionView};
 use crate::studio::panels::RMS_OVER_FIELDS;
+use crate::studio::panels::widgets::plot_curve;
 
 /// The distance in points within which the pointer picks a lens.
 const NEAR: f32 = 14.0;
@@ -229,7 +230,7 @@ fn draw(
 
 /// A front as connected points.
 fn curve(plot: &mut PlotUi<'_>, name: &str, front: &Front, color: Color32, style: LineStyle) {
-    let line = Line::new(name, PlotPoints::from(plot_points(front))).color(color).width(1.2);
+    let line = plot_curve(name, plot_points(front)).color(color).width(1.2);
     plot.line(line.style(style).allow_hover(false));
     plot.points(Points::new(name, plot_points(front)).color(color).radius(2.6).allow_hover(false));
 }

@@ -3,14 +3,12 @@
 //! As in a spreadsheet a cell is either entered, so that typing replaces its content and arrows go
 //! to the next cell, or edited in place after F2 or a second click, so that arrows move in its text.
 
-use egui::text::{CCursor, CCursorRange};
-use egui::text_edit::TextEditState;
 use egui::{Event, Key, Modifiers, Rect, Ui};
 
 use super::cells::CellPlace;
 use super::columns::TableColumn;
 use crate::lens::Lens;
-use crate::studio::text_input::EditBuffers;
+use crate::studio::text_input::{EditBuffers, place_cursor_at_end, select_whole};
 
 /// The frames after which a cell that is never drawn no longer gets the cursor.
 const MAX_WAIT: u8 = 6;
@@ -71,6 +69,8 @@ pub(super) struct CellCursor {
     head: Option<CellPlace>,
     /// True while arrows move in the text of the cell.
     edits_in_place: bool,
+    /// True if the cell had the keyboard when the frame began.
+    has_keyboard: bool,
     /// The cell that gets the cursor in the next frame, and the frames for which it was waited for.
     pending: Option<(CellPlace, u8)>,
     /// The cells of the present frame.
@@ -115,6 +115,20 @@ impl CellCursor {
         rows.contains(&place.row) && columns.contains(&place.column)
     }
 
+    /// The sides of a cell at which a range of several cells ends: left, right, above, below.
+    pub(super) fn range_ends(&self, grid: CellGrid<'_>, place: CellPlace) -> [bool; 4] {
+        if !self.is_in_range(grid, place) {
+            return [false; 4];
+        }
+        let Some((rows, columns)) = self.range(grid) else { return [false; 4] };
+        [
+            columns.first() == Some(&place.column),
+            columns.last() == Some(&place.column),
+            rows.first() == Some(&place.row),
+            rows.last() == Some(&place.row),
+        ]
+    }
+
     /// Records a drawn cell and whether it has the cursor.
     pub(super) fn record(&mut self, place: CellPlace, rect: Rect, has_cursor: bool) {
         self.rects.push((place, rect));
@@ -138,6 +152,8 @@ impl CellCursor {
         proposals: usize,
     ) -> Vec<RangeCommand> {
         self.rects.clear();
+        let has_keyboard = |place: CellPlace| ui.memory(|memory| memory.has_focus(place.id()));
+        self.has_keyboard = self.active.is_some_and(has_keyboard);
         if let Some((place, _)) = self.pending {
             enter(ui, place);
         }
@@ -152,7 +168,7 @@ impl CellCursor {
         }
         if pressed(ui, Modifiers::NONE, Key::F2) {
             self.edits_in_place = true;
-            place_cursor_at_end(ui, active);
+            place_cursor_at_end(ui.ctx(), active.id());
         }
         if self.edits_in_place {
             return Vec::new();
@@ -224,7 +240,8 @@ impl CellCursor {
                 self.move_to(before);
                 (self.active, self.head) = (Some(before), Some(place));
             } else {
-                self.edits_in_place = before == Some(place) && self.active == before;
+                let is_second = self.has_keyboard && before == Some(place);
+                self.edits_in_place = is_second && self.active == before;
                 self.head = None;
             }
         } else if pointer.primary_down() && !shift {
@@ -283,16 +300,6 @@ fn enter(ui: &Ui, place: CellPlace) {
     if ui.memory(|memory| memory.has_focus(id)) {
         return;
     }
-    select(ui, place, CCursorRange::two(CCursor::new(0), CCursor::new(usize::MAX >> 1)));
+    select_whole(ui.ctx(), id);
     ui.memory_mut(|memory| memory.request_focus(id));
-}
-
-fn place_cursor_at_end(ui: &Ui, place: CellPlace) {
-    select(ui, place, CCursorRange::one(CCursor::new(usize::MAX >> 1)));
-}
-
-fn select(ui: &Ui, place: CellPlace, range: CCursorRange) {
-    let mut state = TextEditState::load(ui.ctx(), place.id()).unwrap_or_default();
-    state.cursor.set_char_range(Some(range));
-    state.store(ui.ctx(), place.id());
 }

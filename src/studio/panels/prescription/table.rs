@@ -3,7 +3,8 @@
 use std::sync::Arc;
 
 use egui::{
-    Align, Button, Color32, Id, Label, Layout, Response, RichText, ScrollArea, Sense, Ui, vec2,
+    Align, Button, Color32, Id, Label, Layout, Response, RichText, ScrollArea, Sense, Stroke, Ui,
+    vec2,
 };
 use egui_extras::{TableBuilder, TableRow};
 
@@ -115,8 +116,27 @@ impl PrescriptionTable<'_> {
             if self.cursor.is_in_range(self.grid(), place) {
                 let fill = ui.visuals().selection.bg_fill.gamma_multiply(0.7);
                 ui.painter().rect_filled(ui.max_rect(), 0.0, fill);
+                self.range_border(ui, place);
             }
             self.editable_cell(ui, place);
+        }
+    }
+
+    /// The border of the range, which stands out in the row that is selected too.
+    fn range_border(&self, ui: &Ui, place: CellPlace) {
+        let [left, right, top, bottom] = self.cursor.range_ends(self.grid(), place);
+        let rect = ui.max_rect().shrink(0.5);
+        let stroke = Stroke::new(1.0, ui.visuals().strong_text_color());
+        let painter = ui.painter();
+        for (ends, x) in [(left, rect.left()), (right, rect.right())] {
+            if ends {
+                painter.vline(x, rect.y_range(), stroke);
+            }
+        }
+        for (ends, y) in [(top, rect.top()), (bottom, rect.bottom())] {
+            if ends {
+                painter.hline(rect.x_range(), y, stroke);
+            }
         }
     }
 

@@ -27,6 +27,8 @@ use picture::{PupilPicture, PupilWindow};
 /// fit in one.
 const WORDS: CellLayout = CellLayout { above: 20.0, below: 62.0 };
 const LINE: f32 = 14.0;
+/// The height of a picture that is not given up for the table below.
+const PICTURE: f32 = 103.0;
 /// The largest share of a drawing's width that the scale bar takes.
 const BAR: f64 = 0.3;
 
@@ -57,13 +59,12 @@ impl Panel for PupilPanel {
         self.remember_limits(pupils, results.lens.surfaces.len());
         header(ui, view, pupils, actions);
         let shown = PupilView { known_limits: &self.known_limits, view, results, numbers, pupils };
+        shown.legend(ui, actions);
         let all = ui.available_rect_before_wrap();
-        let (above, below) =
-            all.split_top_bottom_at_y(all.bottom() - sensitivities::height(ui, &shown));
-        ui.scope_builder(UiBuilder::new().max_rect(above), |ui| {
-            shown.legend(ui, actions);
-            shown.pictures(ui, actions);
-        });
+        let (words, _) = shown.layout_cells(ui, all);
+        let table = sensitivities::height(ui, &shown, words.above + words.below + PICTURE);
+        let (above, below) = all.split_top_bottom_at_y(all.bottom() - table);
+        ui.scope_builder(UiBuilder::new().max_rect(above), |ui| shown.pictures(ui, actions));
         show_within(ui, below, |ui| sensitivities::show_table(ui, &shown, actions));
     }
 }

@@ -28,15 +28,12 @@ const CELL: f32 = 58.0;
 const ARROW: f32 = 10.0;
 /// The line above the table.
 const TITLE: f32 = 19.0;
-/// The height that the pupils with their labels need.
-const PICTURES: f32 = 205.0;
 
 const HINT: &str = "The effect of a semi-diameter that is 0.1 mm larger: the change of the light, \
     in per cent of the mean area of the pupils, and of the RMS radius of the spot at \
      this wavelength, in µm. To first order, with the motion of the pupil's edge. Blue is \
      better, orange is worse; arrow lengths compare within their kind. Where the ideal entrance \
-     pupil (dashed) limits the beam, no semi-diameter has an effect. Enlarge the panel to see the \
-     table.";
+     pupil (dashed) limits the beam, no semi-diameter has an effect.";
 
 /// The two numbers of a rim.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -61,14 +58,15 @@ struct SensitivityTable<'a> {
     selected: Option<usize>,
 }
 
-/// The height of the table below the pupils; 0 without sensitivities.
-pub(super) fn height(ui: &Ui, shown: &PupilView<'_>) -> f32 {
+/// The height of the table below the pupils, which need some height with their labels; 0 without
+/// sensitivities.
+pub(super) fn height(ui: &Ui, shown: &PupilView<'_>, pupils: f32) -> f32 {
     let Some(all) = &shown.pupils.mean_sensitivities else { return 0.0 };
     let whole = TITLE
         + HEAD
         + ROW * limiting_surfaces(&SensitivityTable::new(shown, all), all).len().max(1) as f32
         + 8.0;
-    let height = ui.available_height() - PICTURES;
+    let height = ui.available_height() - pupils;
     // Where there is little room the pictures come first, and the title stands for the table.
     if height < TITLE + HEAD + 1.5 * ROW { TITLE + 4.0 } else { whole.min(height) }
 }
@@ -81,10 +79,11 @@ pub(super) fn show_table(ui: &mut Ui, shown: &PupilView<'_>, actions: &mut Actio
     let significant = limiting_surfaces(&table, all);
     ui.separator();
     ui.spacing_mut().item_spacing.y = 1.0;
-    title(ui, shown, all, &significant);
     if height < TITLE + HEAD {
+        ui.weak("Enlarge the panel for the effect of +0.1 mm of semi-diameter").on_hover_text(HINT);
         return;
     }
+    title(ui, shown, all, &significant);
     if significant.is_empty() {
         ui.weak("No semi-diameter limits the beam: the ideal entrance pupil does.");
         return;
@@ -306,10 +305,11 @@ fn two_lines(ui: &Ui, above: &str, below: &str, align: Align2) {
     painter.text(edge(lower), align, below, font, visuals.weak_text_color());
 }
 
-/// A number with its sign.
+/// A number with its sign, and with as many digits as fit beside an arrow.
 fn signed(value: f64) -> String {
     let sign = if value > 0.0 { "+" } else { "" };
-    format!("{sign}{}", number::format_digits(value, 3))
+    let digits = if value.abs() < 0.1 { 2 } else { 3 };
+    format!("{sign}{}", number::format_compact(value, digits))
 }
 
 /// The surfaces that are not among some, as the window counts them: `2 to 5, 7 to 10`.

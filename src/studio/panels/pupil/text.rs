@@ -12,7 +12,7 @@ use crate::analysis::{Estimate, FieldPupil, PupilExtent, PupilShape, RayLoss};
 use crate::pupil::{PupilLimit, PupilOutline};
 use crate::studio::number;
 use crate::studio::palette::Palette;
-use crate::studio::panels::{field_name, relative_error};
+use crate::studio::panels::{field_name, percent_error, relative_error};
 use crate::studio::text::{capitalize, counted};
 use crate::trace::{Fate, RayLimit};
 
@@ -288,8 +288,11 @@ fn area_text(area: Estimate) -> String {
     format!("{} {unit}{}", number::format_digits(value, 4), relative_error(area))
 }
 
-/// A share with its error in percent.
+/// A share of the axis in percent with its error, which is in percent of the axis too.
 fn share_text(share: Estimate) -> String {
     let value = number::format_digits(100.0 * share.value, 4);
-    format!("{value} % of the axis{}", relative_error(share))
+    if !number::is_error(share.value, share.error) {
+        return format!("{value} % of axis");
+    }
+    format!("{value} % {} of axis", percent_error(100.0 * share.error))
 }

@@ -10,7 +10,6 @@ use crate::session::{
     Command, RunStatus, SessionView, StructureSearchCommand, StructureSearchSnapshot,
 };
 use crate::studio::actions::{Actions, UiAction};
-use crate::studio::arrangement::Arrangement;
 use crate::studio::file_dialog::FileRequest;
 use crate::studio::form::named_list;
 use crate::studio::number;
@@ -151,10 +150,8 @@ pub(super) fn live_controls(
         let hint = "Give the search the window: the lens of a chain large, the retained lenses \
                     beside it";
         if ui.button("Watch").on_hover_text(hint).clicked() {
-            actions.push(UiAction::ArrangePanels(Arrangement::Search));
             let chain = search.view.structure_search.previewed_chain.unwrap_or(0);
-            actions.push(Command::Preview(None));
-            actions.push(StructureSearchCommand::Preview(Some(chain)));
+            actions.push(UiAction::WatchSearch(chain));
         }
         order_choice(ui, order);
     });

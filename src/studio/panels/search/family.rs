@@ -51,6 +51,12 @@ pub(super) fn tree(ui: &mut Ui, run: &StructureSearchSnapshot, number: u64) -> O
     response.clicked().then_some(node.number)
 }
 
+/// Explains the places and the sizes of the tree.
+pub(super) fn legend(ui: &mut Ui) {
+    let text = "Merit downwards, logarithmic; time to the right. Large: retained.";
+    ui.label(RichText::new(text).small().weak());
+}
+
 /// The latest generations, and all those on a line of descent.
 fn shown_generations<'a>(run: &'a StructureSearchSnapshot, line: &[u64]) -> Vec<&'a Generation> {
     let first = run.lineage.len().saturating_sub(MAX_NODES);

@@ -22,6 +22,8 @@ const CARD: Vec2 = vec2(148.0, 112.0);
 const MIN_HEIGHT: f32 = 84.0;
 /// The part of a card for its words.
 const WORDS: f32 = 30.0;
+/// The part of a card for its number, above the drawing.
+const CORNER: f32 = 12.0;
 
 /// The number by which the retained lenses are sorted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -219,7 +221,10 @@ fn card(
         Stroke::new(1.0, visuals.widgets.noninteractive.bg_stroke.color)
     };
     ui.painter().rect(rect, 3.0, visuals.extreme_bg_color, stroke, StrokeKind::Inside);
-    let drawing = Rect::from_min_max(rect.min, pos2(rect.right(), rect.bottom() - WORDS));
+    let drawing = Rect::from_min_max(
+        pos2(rect.left(), rect.top() + CORNER),
+        pos2(rect.right(), rect.bottom() - WORDS),
+    );
     thumbnails.paint(ui, &found.lens, &view.lens, drawing.shrink(4.0));
     let colors = [ui.visuals().text_color(), ui.visuals().weak_text_color()];
     caption(ui, rect, &text, colors);

@@ -218,6 +218,7 @@ impl SearchPanel {
         let number = self.replay.youngest().unwrap_or(selected);
         let replayed = self.replay.ui(ui, search.run, number);
         let clicked = family::tree(ui, search.run, selected);
+        family::legend(ui);
         let clicked =
             clicked.or_else(|| family::ancestors(ui, search, number, &mut self.thumbnails));
         if clicked.is_some() {

@@ -9,7 +9,7 @@ use egui_plot::{Line, LineStyle, Plot, PlotPoint, PlotPoints, PlotResponse, Plot
 use super::{ShownSearch, moves, text};
 use crate::search::MutationKind;
 use crate::session::{DescentMark, HistorySample, StructureSearchSnapshot};
-use crate::studio::panels::widgets::{fixed_plot, log_axis};
+use crate::studio::panels::widgets::{fixed_plot, log_axis, plot_curve};
 
 /// The distance in points within which the pointer picks a mark.
 const NEAR: f32 = 10.0;
@@ -82,14 +82,14 @@ fn merit_plot(
     let shown = plot.show(ui, |plot| {
         let faint = visuals.weak_text_color().gamma_multiply(0.4);
         for other in (0..run.chains.len()).filter(|other| *other != chain) {
-            plot.line(Line::new("chain", chain_curve(run, other)).color(faint).width(0.8));
+            plot.line(plot_curve("chain", chain_curve(run, other)).color(faint).width(0.8));
         }
         let weak = visuals.weak_text_color();
-        plot.line(Line::new("previewed chain", chain_curve(run, chain)).color(weak).width(1.2));
+        plot.line(plot_curve("previewed chain", chain_curve(run, chain)).color(weak).width(1.2));
         start_line(plot, run, visuals.warn_fg_color);
         let best = run.history.moments.iter();
-        let best = best.filter_map(|m| Some([m.round as f64, decade(m.best)?])).collect();
-        plot.line(Line::new("best", distinct(best)).color(visuals.hyperlink_color).width(2.0));
+        let best = best.filter_map(|m| Some([m.round as f64, decade(m.best)?]));
+        plot.line(plot_curve("best", best).color(visuals.hyperlink_color).width(2.0));
         mutation_marks(plot, run, &visuals);
         if let Some(mark) = run.history.marks.iter().find(|mark| Some(mark.number) == chosen) {
             let ring =
@@ -114,12 +114,12 @@ fn start_line(plot: &mut PlotUi<'_>, run: &StructureSearchSnapshot, color: egui:
     }
 }
 
-fn chain_curve(run: &StructureSearchSnapshot, chain: usize) -> PlotPoints<'static> {
+fn chain_curve(run: &StructureSearchSnapshot, chain: usize) -> Vec<[f64; 2]> {
     let merit = |moment: &HistorySample| {
         let (merit, _) = moment.chains.get(chain).copied().flatten()?;
         Some([moment.round as f64, decade(merit)?])
     };
-    distinct(run.history.moments.iter().filter_map(merit).collect()).into()
+    run.history.moments.iter().filter_map(merit).collect()
 }
 
 fn mark_point(mark: &DescentMark) -> Option<[f64; 2]> {
@@ -203,7 +203,7 @@ fn elements_plot(ui: &mut Ui, run: &StructureSearchSnapshot, chain: usize) {
         if low <= high {
             plot.set_plot_bounds_y(low - 0.7..=high + 0.7);
         }
-        plot.line(Line::new("elements", step_curve(&steps)).color(line).width(1.5));
+        plot.line(plot_curve("elements", step_curve(&steps)).color(line).width(1.5));
     });
     let now = steps.last().map_or(0.0, |[_, count]| *count);
     let label = format!("Elements of chain {} against iterations: {now} now", chain + 1);
@@ -221,13 +221,8 @@ fn step_curve(steps: &[[f64; 2]]) -> Vec<[f64; 2]> {
         }
         stairs.push(*step);
     }
-    distinct(stairs)
-}
-
-/// A curve without repeated points, of which three in a row have no direction to draw a line in.
-fn distinct(mut curve: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
-    curve.dedup();
-    curve
+    stairs.dedup();
+    stairs
 }
 
 /// The marks of the kinds that have occurred.
