@@ -70,7 +70,7 @@ pub use volume::{
     MAX_VOLUME_BYTES, Volume, is_npz, raw_path, read_volume, volume_files, write_volume,
 };
 
-use crate::lens::Lens;
+use crate::lens::{Lens, Medium, SurfaceNumber};
 use serde::Serialize;
 use std::path::Path;
 
@@ -327,6 +327,17 @@ fn unreadable_export(file: &str, error: &FileError) -> FileError {
     FileError::RoundTripFailed { file: file.to_owned(), what }
 }
 
+/// Refuses a gradient-index medium, which a sequence cannot hold although rays meet it.
+fn refuse_gradients(lens: &Lens, file: &str) -> Result<(), FileError> {
+    let graded = lens.surfaces.iter().position(|row| matches!(row.medium, Medium::Grin(_)));
+    let Some(surface) = graded else { return Ok(()) };
+    let surface = SurfaceNumber::new(surface);
+    let found =
+        format!("the gradient-index medium of surface {surface}, which a .seq file cannot hold");
+    let (file, expected) = (file.to_owned(), ".zmx or .json for it".to_owned());
+    Err(FileError::Unsuitable { file, found, expected })
+}
+
 /// The bytes of a foreign file, checked by reading it back and tracing it.
 fn checked_foreign(
     lens: &Lens,
@@ -335,7 +346,10 @@ fn checked_foreign(
 ) -> Result<(Vec<u8>, ConversionReport, RoundTripCheck), FileError> {
     let unusable = |source| FileError::Lens { file: file.to_owned(), source };
     let (text, report) = match format {
-        LensFormat::CodeV => codev::write(lens).map_err(unusable)?,
+        LensFormat::CodeV => {
+            refuse_gradients(lens, file)?;
+            codev::write(lens).map_err(unusable)?
+        }
         LensFormat::Oslo => oslo::write(lens, file)?,
         LensFormat::RayOptics => ray_optics::write(lens, file)?,
         LensFormat::Optiland => optiland::write(lens, file)?,

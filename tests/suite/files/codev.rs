@@ -427,3 +427,12 @@ fn a_glass_of_another_maker_is_no_exact_one() {
     let row = report.rows.iter().find(|row| row.text.contains("KZFS4")).unwrap();
     assert_eq!(row.outcome, ConversionOutcome::Approximated, "{}", row.note);
 }
+
+#[test]
+fn a_gradient_index_medium_is_refused_by_name() {
+    let bundled = files::bundled_lenses().iter().find(|lens| lens.name == "wood_lens_60").unwrap();
+    let lens = files::json::read(bundled.text, "wood").unwrap();
+    let path = super::folder("codev-gradient").join("a.seq");
+    let error = files::save(&lens, path).unwrap_err().to_string();
+    assert!(error.contains("the gradient-index medium of surface 1"), "{error}");
+}
