@@ -28,6 +28,7 @@ mod optiland;
 mod oslo;
 mod outline;
 mod own_glass;
+mod plain_lens;
 mod probe_rays;
 mod ray_optics;
 mod report;

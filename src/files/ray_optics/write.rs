@@ -8,12 +8,13 @@ use crate::files::codev::place;
 use crate::files::error::FileError;
 use crate::files::first_order_beam::FirstOrderBeam;
 use crate::files::index_table::glass_table;
+use crate::files::plain_lens::plain_lens;
 use crate::files::report::{ConversionOutcome, ConversionReport};
 use crate::files::vignetting::beam_reach;
 use crate::lens::glass;
 use crate::lens::{
     Aperture, AxisBreak, FieldKind, FreeformKind, Lens, LensError, Medium, MediumPlace, Object,
-    Row, SurfaceNumber, at_zoom,
+    Row, SurfaceNumber,
 };
 use serde_json::{Value, json};
 
@@ -33,7 +34,7 @@ pub(in crate::files) fn write(
     file: &str,
 ) -> Result<(String, ConversionReport), FileError> {
     let unusable = |source| FileError::Lens { file: file.to_owned(), source };
-    let lens = prepared(lens).map_err(unusable)?;
+    let lens = plain_lens(lens).map_err(unusable)?;
     if let Some(found) = unwritable(&lens) {
         let (file, expected) = (file.to_owned(), ".zmx or .json for it".to_owned());
         return Err(FileError::Unsuitable { file, found, expected });
@@ -42,23 +43,6 @@ pub(in crate::files) fn write(
     let model = writer.model().map_err(unusable)?;
     writer.report_losses();
     Ok((format!("{model:#}\n"), writer.report))
-}
-
-/// The lens with its pickups, a single zoom position and the focus written into its rows.
-fn prepared(lens: &Lens) -> Result<Lens, LensError> {
-    lens.check()?;
-    let mut lens = lens.with_pickups()?;
-    if lens.zoom.len() == 1 {
-        lens = at_zoom(&lens, 0);
-    }
-    if lens.image_solve.is_some() {
-        let system = lens.resolve(0, lens.wavelengths[lens.primary()].um)?;
-        let solved = system.surfaces.iter().rev().nth(1).map(|surface| surface.thickness);
-        if let (Some(row), Some(solved)) = (lens.surfaces.last_mut(), solved) {
-            row.thickness = solved;
-        }
-    }
-    Ok(lens)
 }
 
 /// The first part that the format cannot hold although rays meet it.
