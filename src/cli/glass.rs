@@ -36,6 +36,23 @@ pub(super) struct GlassArgs {
     #[arg(long, value_name = "FILE", conflicts_with_all = ["add", "remove"])]
     out: Option<PathBuf>,
 
+    /// Adds the glass of a melt of this glass, with the indices of --index, as `MELT NAME`
+    #[arg(
+        long,
+        value_name = "GLASS",
+        requires = "indices",
+        conflicts_with_all = ["words", "add", "remove", "out", "nearest"]
+    )]
+    melt: Option<String>,
+
+    /// An index that was measured on the melt at a wavelength in um, relative to air; may be repeated
+    #[arg(long = "index", value_name = "UM=INDEX", value_parser = parse_index, requires = "melt")]
+    indices: Vec<[f64; 2]>,
+
+    /// The name of the melt; absent: that of the glass
+    #[arg(long, value_name = "NAME", requires = "melt")]
+    name: Option<String>,
+
     /// Removes the catalogue of this name that was added
     #[arg(long, value_name = "NAME", conflicts_with_all = ["words", "add"])]
     remove: Option<String>,
@@ -46,6 +63,9 @@ impl GlassArgs {
         if let Some(path) = &self.add {
             let (catalogue, saved) = files::add_catalogue(path)?;
             return output.print(&AddedCatalogue::new(catalogue, &saved));
+        }
+        if let Some(glass) = &self.melt {
+            return output.print(&self.add_melt(glass)?);
         }
         if let Some(name) = &self.remove {
             let removed = files::remove_catalogue(name)?.display().to_string();
@@ -69,6 +89,62 @@ impl GlassArgs {
             return output.print(&WrittenCatalogue { file: path.display().to_string(), export });
         }
         output.print(&GlassList(meant.into_iter().map(GlassRow::new).collect()))
+    }
+}
+
+impl GlassArgs {
+    fn add_melt(&self, name: &str) -> Result<AddedMelt, CliError> {
+        let base = glass::find(name).ok_or_else(|| {
+            CliError::Input(format!("found no glass `{name}`; `aplanat glass` lists all"))
+        })?;
+        let own = self.name.as_ref().unwrap_or(&base.name);
+        let is_name = !own.is_empty() && own.chars().all(|c| c.is_ascii_graphic());
+        if !is_name {
+            let text =
+                format!("--name: found `{}`; expected letters and digits", own.escape_debug());
+            return Err(CliError::Input(text));
+        }
+        let (melt, left) = base
+            .melt(own, &self.indices)
+            .map_err(|why| CliError::Input(format!("--index: {why}")))?;
+        let mut known = base.properties().cloned().unwrap_or_default();
+        known.status = Some(GlassStatus::Melt);
+        let melt = Glass { own_properties: Some(Box::new(known)), ..melt };
+        let saved = files::add_melt(&melt)?.display().to_string();
+        let name = format!("MELT {own}");
+        let added = glass::find(&name).unwrap_or(base);
+        Ok(AddedMelt { name, nd: added.nd, vd: added.vd, worst_index: left, saved })
+    }
+}
+
+/// A wavelength with an index.
+fn parse_index(text: &str) -> Result<[f64; 2], String> {
+    let number = |part: &str| part.trim().parse::<f64>().ok().filter(|value| value.is_finite());
+    let pair = text.split_once('=').and_then(|(um, index)| Some([number(um)?, number(index)?]));
+    pair.ok_or_else(|| {
+        "expected a wavelength in um and an index, as in `0.5875618=1.51672`".to_owned()
+    })
+}
+
+/// The report on a melt that was added.
+#[derive(Serialize)]
+struct AddedMelt {
+    name: String,
+    nd: f64,
+    vd: f64,
+    /// The largest difference between an index that was measured and that of the formula.
+    worst_index: f64,
+    saved: String,
+}
+
+impl fmt::Display for AddedMelt {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { name, nd, vd, worst_index, saved } = self;
+        writeln!(
+            f,
+            "{name}: nd {nd:.6}, vd {vd:.3}; measured indices missed by {worst_index:.1e}"
+        )?;
+        writeln!(f, "saved in {saved}")
     }
 }
 

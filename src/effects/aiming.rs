@@ -7,7 +7,8 @@
 //! measured, goes elsewhere.
 
 use crate::math::Vec3;
-use crate::pupil::{Launch, RayModel};
+use crate::pupil::{Dual2, Launch, RayModel};
+use crate::trace::Ray;
 use std::f64::consts::TAU;
 
 /// The changes of a lens's results if rays are aimed at the paraxial entrance pupil; infinite where
@@ -19,18 +20,28 @@ pub struct AimingDifference {
     pub shift: f64,
     /// The largest relative change of the light of a field at a wavelength.
     pub light: f64,
+    /// The largest distance in the image plane of two rays with the same pupil coordinates, in mm; infinite
+    /// if one of them alone arrives.
+    pub rays: f64,
 }
 
 impl AimingDifference {
-    pub(super) const UNKNOWN: Self = Self { shift: f64::INFINITY, light: f64::INFINITY };
+    pub(super) const UNKNOWN: Self =
+        Self { shift: f64::INFINITY, light: f64::INFINITY, rays: f64::INFINITY };
 
     pub(super) fn worst(self, other: Self) -> Self {
-        Self { shift: self.shift.max(other.shift), light: self.light.max(other.light) }
+        Self {
+            shift: self.shift.max(other.shift),
+            light: self.light.max(other.light),
+            rays: self.rays.max(other.rays),
+        }
     }
 }
 
 /// The rays at the rim of the paraxial entrance pupil.
 const RIM_RAYS: usize = 24;
+/// The rays at the rim of which the shift is measured.
+const SHIFTED_RAYS: usize = 8;
 
 /// The spot of a few rays of the real beam.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -62,7 +73,7 @@ impl CoarseSpot {
         let light = part / self.lit;
         // The exchanged rays lie at the edge, at most `radius` from the mean.
         let square = self.rms * self.rms + light * self.radius * self.radius;
-        AimingDifference { shift: square.sqrt() - self.rms + light * self.rms, light }
+        AimingDifference { shift: square.sqrt() - self.rms + light * self.rms, light, rays: 0.0 }
     }
 }
 
@@ -83,7 +94,26 @@ pub(super) fn aiming_difference(
     } else {
         AimingDifference::default()
     };
-    edge.worst(AimingDifference { shift: chief, light: 0.0 })
+    edge.worst(AimingDifference { shift: chief, light: 0.0, rays: ray_shift(real, &disc) })
+}
+
+/// The largest distance between the image points of rays with the same pupil coordinates, in mm: those at
+/// the rim, where the pupils differ most. A ray that arrives in one of both alone counts as infinitely far.
+fn ray_shift(a: &Launch<'_>, b: &Launch<'_>) -> f64 {
+    let landed = |launch: &Launch<'_>| {
+        let turn = TAU / SHIFTED_RAYS as f64;
+        let at = |i: usize| <[f64; 2]>::from((turn * i as f64).sin_cos());
+        launch.unclipped_landings((0..SHIFTED_RAYS).map(at))
+    };
+    let apart = |pair: (Option<(Ray<Dual2>, Dual2)>, Option<(Ray<Dual2>, Dual2)>)| match pair {
+        (Some((a, _)), Some((b, _))) => {
+            let (a, b) = (a.point.value(), b.point.value());
+            (a.x - b.x).hypot(a.y - b.y)
+        }
+        (None, None) => 0.0,
+        _ => f64::INFINITY,
+    };
+    landed(a).into_iter().zip(landed(b)).map(apart).fold(0.0, f64::max)
 }
 
 /// The distance between the image points of two chief rays, in mm.

@@ -152,7 +152,7 @@ pub fn plan(
         asphere,
         clipping,
         reflection(measured, overrides.get(Effect::TotalReflection)),
-        aiming(measured, allowed, overrides.get(Effect::Aiming)),
+        aiming(measured, (purpose, allowed), overrides.get(Effect::Aiming)),
         object(measured, allowed, overrides.get(Effect::FiniteObject)),
         grin,
     ];
@@ -398,14 +398,23 @@ fn reflection(measured: &EffectMeasurements, choice: EffectOverride) -> EffectDe
 
 /// The change of light counts as the same part of the smallest spot, so that one number compares
 /// with the tolerance.
-fn aiming(measured: &EffectMeasurements, allowed: f64, choice: EffectOverride) -> EffectDecision {
-    let AimingDifference { shift, light } = measured.paraxial_aiming;
+fn aiming(
+    measured: &EffectMeasurements,
+    (purpose, allowed): (TracePurpose, f64),
+    choice: EffectOverride,
+) -> EffectDecision {
+    let AimingDifference { shift, light, rays } = measured.paraxial_aiming;
+    // Spots and drawings are of all rays together; elsewhere each has its place in the pupil.
+    let shift = match purpose {
+        TracePurpose::Trace | TracePurpose::Exact => shift.max(rays),
+        TracePurpose::Spot(_) | TracePurpose::Layout => shift,
+    };
     let as_shift = |light: f64| if light == 0.0 { 0.0 } else { light * measured.smallest_spot };
     let decision = lens_decision(Effect::Aiming, choice, shift.max(as_shift(light)), allowed, "mm");
     let reason = if shift.is_finite() {
         format!(
-            "aimed at the paraxial entrance pupil, chief rays or spots would change by {}, light by \
-             up to {}; {}",
+            "aimed at the paraxial entrance pupil, {} would change by {}, light by up to {}; {}",
+            if shift == rays { "rays" } else { "chief rays or spots" },
             micrometres(shift),
             percent(light),
             allowed_text(allowed)

@@ -60,7 +60,7 @@ pub use library::{
 };
 pub use lock::{FileLock, check_unlocked};
 pub use own_glass::{
-    add_catalogue, glass_folder, load_own_glasses, own_catalogues, remove_catalogue,
+    add_catalogue, add_melt, glass_folder, load_own_glasses, own_catalogues, remove_catalogue,
 };
 pub use report::{ConversionOutcome, ConversionReport, ConversionRow};
 pub use round_trip::RoundTripCheck;

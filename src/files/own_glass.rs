@@ -1,7 +1,7 @@
 //! The glass catalogues that a person has added: files `.agf` in a folder of the settings, and folders of
 //! materials `.yml`, one for each maker.
 
-use super::agf::{AgfCatalogue, parse_agf, read_agf};
+use super::agf::{AgfCatalogue, parse_agf, read_agf, write_agf};
 use super::atomic::write_atomic;
 use super::bounded::{MAX_LENS_BYTES, read_file};
 use super::error::FileError;
@@ -9,7 +9,7 @@ use super::yaml_glass::{
     is_material, maker_of_folder, material_files, parse_material, read_materials,
 };
 use super::zar;
-use crate::lens::glass;
+use crate::lens::glass::{self, Glass};
 use std::env;
 use std::fs;
 use std::io;
@@ -18,6 +18,8 @@ use std::sync::Once;
 
 /// The variable of the environment that names another folder.
 const FOLDER_VARIABLE: &str = "APLANAT_GLASSES";
+/// The catalogue of melts, which stands for their maker.
+const MELTS: &str = "MELT";
 /// The largest catalogue, in bytes.
 pub(super) const MAX_CATALOGUE_BYTES: u64 = 256 << 20;
 
@@ -125,6 +127,26 @@ pub fn add_catalogue(path: &Path) -> Result<(AgfCatalogue, Vec<PathBuf>), FileEr
         saved.push(target);
     }
     Ok((found, saved))
+}
+
+/// Adds the glass of a melt for good, to the catalogue `MELT` in the folder of the settings; one of the same
+/// name is replaced. Returns the file.
+///
+/// # Errors
+/// A catalogue that cannot be read or written, or a glass that no catalogue can hold.
+pub fn add_melt(melt: &Glass) -> Result<PathBuf, FileError> {
+    let target = folder_for_writing(&melt.name)?.join(format!("{MELTS}.agf"));
+    let mut glasses = if target.exists() { read_agf(&target)?.glasses } else { Vec::new() };
+    glasses.retain(|other| other.name != melt.name);
+    glasses.push(Glass { manufacturer: MELTS.to_owned(), ..melt.clone() });
+    let export = write_agf(&glasses, &target)?;
+    if let Some((name, why)) = export.refused.first() {
+        let (file, found) = (target.display().to_string(), format!("{name}: {why}"));
+        let expected = "a glass that an .agf can hold".to_owned();
+        return Err(FileError::Unsuitable { file, found, expected });
+    }
+    add_glasses(&read_agf(&target)?);
+    Ok(target)
 }
 
 /// Refuses a catalogue whose name is no name of a file, or that of materials that were added.

@@ -68,8 +68,8 @@ impl OperandKind {
         Self::ThirdOrderDistortion,
         Self::AxialColor,
         Self::SecondarySpectrum,
-        Self::ThermalFocus,
         Self::LateralColor,
+        Self::ThermalFocus,
     ];
 
     /// Its name in files and reports.

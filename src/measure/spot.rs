@@ -106,6 +106,9 @@ pub struct SpotCurves {
     pub transmitted: f64,
     /// The points of the curves.
     pub rows: Vec<SpotRow>,
+    /// True if the measurement was stopped: what is missing was not reached.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub stopped: bool,
 }
 
 /// The error of a spot benchmark.
@@ -146,8 +149,13 @@ pub fn measure_spot_curves(
     field: FieldPoint,
     mut report: impl FnMut(usize, usize) -> ControlFlow<()>,
 ) -> Result<SpotCurves, SpotCurvesError> {
-    let mut curves =
-        SpotCurves { rms_clear: 0.0, rms_clipped: None, transmitted: 1.0, rows: Vec::new() };
+    let mut curves = SpotCurves {
+        rms_clear: 0.0,
+        rms_clipped: None,
+        transmitted: 1.0,
+        rows: Vec::new(),
+        stopped: false,
+    };
     let (mut done, all) = (0, 4 * PupilSampling::ALL.len());
     for pupil in [PupilClipping::Clear, PupilClipping::Clipped] {
         let model = ray_model(lens, zoom, pupil)?;
@@ -170,6 +178,7 @@ pub fn measure_spot_curves(
                 curves.rows.extend(scene.curve(pupil, method, precision, rms));
                 done += 1;
                 if report(done, all).is_break() {
+                    curves.stopped = true;
                     return Ok(curves);
                 }
             }

@@ -89,7 +89,7 @@ pub enum ToleranceBenchmarkError {
     Threads(#[from] BenchmarkError),
 }
 
-/// Measures the tolerances of a class on a lens, with this many real lenses.
+/// Measures the tolerances of a class on a lens, with this many real lenses. `None` once `stop` is true.
 ///
 /// # Errors
 /// A lens that has no tolerances.
@@ -97,7 +97,8 @@ pub fn measure_tolerances(
     lens: &Lens,
     grade: ToleranceGrade,
     samples: usize,
-) -> Result<ToleranceBenchmark, ToleranceBenchmarkError> {
+    stop: &AtomicBool,
+) -> Result<Option<ToleranceBenchmark>, ToleranceBenchmarkError> {
     let scene = ToleranceScene::new(lens, 0, ACCURACY)?;
     let sheet = graded_sheet(lens, &scene.lens, grade);
     let errors: Vec<Perturbation> = sheet.errors.iter().map(|t| t.error).collect();
@@ -108,6 +109,10 @@ pub fn measure_tolerances(
         one.install(|| time_median(3..=50, || swept_sensitivities(&scene, &errors)));
     let (found, jets_ms) = one.install(|| time_median(1..=5, jets));
     let (swept, found) = (swept?, found?);
+    let is_stopped = || stop.load(Ordering::Relaxed);
+    if is_stopped() {
+        return Ok(None);
+    }
     let compensation = Compensation::new(&scene, &sheet)?;
     let form = || {
         let form = QuadraticForm::new(&scene, &found, FocusTreatment::Refocused, &compensation);
@@ -115,12 +120,14 @@ pub fn measure_tolerances(
     };
     let (spots, form_ms) = one.install(|| time_median(3..=9, form));
     spots?;
-    let go_on = AtomicBool::new(false);
-    let real = || real_lenses(&scene, &sheet, 1, samples, 0, &go_on).map(|lenses| lenses.len());
+    let real = || real_lenses(&scene, &sheet, 1, samples, 0, stop).map(|lenses| lenses.len());
     let (traced, samples_ms) = two.install(|| time_median(1..=5, real));
     let pairs = found.iter().zip(&swept);
     let first_error = pairs.map(|(jet, swept)| first_difference(jet.mean_square(), swept.first));
-    Ok(ToleranceBenchmark {
+    if is_stopped() {
+        return Ok(None);
+    }
+    Ok(Some(ToleranceBenchmark {
         errors: errors.len(),
         rays: scene.beam.rays(),
         first_error: first_error.fold(0.0, f64::max),
@@ -132,7 +139,7 @@ pub fn measure_tolerances(
         samples: traced?,
         samples_ms,
         gradients: one.install(|| gradient_costs(lens, &sheet))?,
-    })
+    }))
 }
 
 /// The largest relative difference of growths at the fixed image plane from those by rays that are a

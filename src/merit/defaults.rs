@@ -107,12 +107,12 @@ impl Goal {
         terms.extend(
             [
                 Term::GlassCenter {
-                    min: now.glass_center.clamp(0.0, glass),
+                    min: now.glass_center.max(0.0).min(glass),
                     max: thickest(lens, size),
                 },
-                Term::GlassEdge(now.glass_edge.clamp(0.0, 0.8 * glass)),
-                Term::AirCenter { min: now.air_center.clamp(0.0, air), max: 3.0 * track },
-                Term::AirEdge(now.air_edge.clamp(0.0, 0.5 * air)),
+                Term::GlassEdge(now.glass_edge.max(0.0).min(0.8 * glass)),
+                Term::AirCenter { min: now.air_center.max(0.0).min(air), max: 3.0 * track },
+                Term::AirEdge(now.air_edge.max(0.0).min(0.5 * air)),
                 Term::TotalTrack(TRACK_GROWTH * track),
             ]
             .map(unit),

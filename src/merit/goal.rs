@@ -196,7 +196,10 @@ pub(super) fn focal_lengths(lens: &Lens) -> Result<Vec<Option<f64>>, MeritError>
         let system = lens.resolve(zoom, um)?;
         let first = first_order(&system, &Beam::for_lens(lens, zoom));
         let first = first.map_err(crate::pupil::RayModelError::from)?;
-        Ok(first.efl)
+        match first.efl {
+            Some(efl) if !efl.is_finite() => Err(MeritError::NotFinite { term: "focal_length" }),
+            efl => Ok(efl),
+        }
     };
     (0..lens.zoom_positions()).map(focal_length).collect()
 }

@@ -105,13 +105,10 @@ pub enum Command {
         method: DescentMethod,
         /// The merit function.
         goal: Goal,
-    },
-    /// Starts a local optimization of a copy of the design, after which its glasses are exchanged.
-    ExchangeGlasses {
-        /// The merit function.
-        goal: Goal,
-        /// The glasses that are tried, by words and ranges, as the Glass panel takes them.
-        words: String,
+        /// The glasses that those of the lens are exchanged for afterwards, by words and ranges as the Glass
+        /// panel takes them; `None` to keep them.
+        #[serde(default)]
+        glasses: Option<String>,
     },
     /// Pauses the optimization after its current step.
     Pause,

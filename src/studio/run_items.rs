@@ -64,7 +64,8 @@ fn optimizer(view: &SessionView) -> Vec<Request> {
     let ready = !run.is_active() && !view.lens.variables.is_empty();
     let goal = view.goal.as_ref().filter(|_| ready);
     let method = DescentMethod::default();
-    let start = goal.map(|goal| Command::Optimize { method, goal: (**goal).clone() });
+    let start =
+        goal.map(|goal| Command::Optimize { method, goal: (**goal).clone(), glasses: None });
     let has_result = run.snapshot.is_some();
     vec![
         ("Optimize", start),

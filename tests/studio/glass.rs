@@ -2,10 +2,12 @@
 
 use aplanat::lens::glass;
 use aplanat::lens::{Edit, Lens, Medium};
-use aplanat::session::Command;
+use aplanat::merit::Goal;
+use aplanat::session::{Command, SessionView};
 use aplanat::studio::panels::GlassPanel;
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
+use std::sync::Arc;
 
 use crate::harness::{
     PanelState, double_gauss, painted_places, painted_texts, panel_harness, view_of,
@@ -57,16 +59,23 @@ fn a_glass_that_is_clicked_replaces_that_of_the_surface_in_one_step() {
 fn listed_glasses_are_exchanged_by_an_optimization() {
     let mut lens = double_gauss();
     let button = "Optimize with these";
-    let mut harness = bench(lens.clone(), None);
+    let goal = Arc::new(Goal::default_for(&lens).unwrap());
+    let with_goal = |lens: Lens| {
+        let view = SessionView { goal: Some(Arc::clone(&goal)), ..view_of(lens) };
+        let mut harness = panel_harness(GlassPanel::default(), view);
+        harness.run();
+        harness
+    };
+    let mut harness = with_goal(lens.clone());
     search(&mut harness, "ohara lead=no");
     press(&mut harness, button);
-    let [Command::ExchangeGlasses { words, .. }] = &harness.state().commands[..] else {
+    let [Command::Optimize { glasses: Some(words), .. }] = &harness.state().commands[..] else {
         panic!("{:?}", harness.state().commands);
     };
     assert_eq!(words, "ohara lead=no");
     // Without variables the lens could not follow another glass.
     lens.variables.clear();
-    let mut harness = bench(lens, None);
+    let mut harness = with_goal(lens);
     press(&mut harness, button);
     assert!(harness.state().commands.is_empty());
 }

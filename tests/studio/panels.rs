@@ -289,7 +289,7 @@ fn optimize_requests_a_run_with_the_terms_of_the_panel() {
     harness.get_by_label("Optimize").click();
     harness.run();
     let commands = harness.state().commands.as_slice();
-    let [Command::Edit(first), Command::Edit(second), Command::Optimize { method, goal }] =
+    let [Command::Edit(first), Command::Edit(second), Command::Optimize { method, goal, .. }] =
         commands
     else {
         panic!("{commands:?}");

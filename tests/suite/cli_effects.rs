@@ -198,6 +198,34 @@ fn numbers_left_to_the_plan_agree_with_those_of_all_effects() {
     assert!(numbers > 300 && left_out > 5, "{numbers} numbers, {left_out} effects left out");
 }
 
+/// A ray of a fan has its place in the pupil of the real stop: where aiming moves it, it is aimed, even if the
+/// spot and the light are the same either way.
+#[test]
+fn rays_of_fans_have_their_places_in_the_real_stop() {
+    for name in ["singlet_la1131", "achromat_ac254_100", "telescope_rc_f8", "wood_lens_60"] {
+        let lens = format!("lenses/{name}.json");
+        for what in ["fan", "opd-fan"] {
+            let auto = done_json(&["analyze", &lens, what], "");
+            let on = done_json(&["analyze", &lens, what, "--effects", "aiming=on"], "");
+            let place = format!("{name} {what}");
+            assert!(agree(&auto["fields"], &on["fields"], &place) > 50 || what == "opd-fan");
+            assert_eq!(fates(&auto["fields"]), fates(&on["fields"]), "{place}");
+        }
+    }
+}
+
+/// The fates of all rays of a result, in order.
+fn fates(value: &Value) -> Vec<String> {
+    match value {
+        Value::Object(map) => {
+            let own = map.get("fate").and_then(Value::as_str).map(str::to_owned);
+            own.into_iter().chain(map.values().flat_map(fates)).collect()
+        }
+        Value::Array(all) => all.iter().flat_map(fates).collect(),
+        _ => Vec::new(),
+    }
+}
+
 #[test]
 fn derivatives_left_to_the_plan_agree_with_those_of_all_effects() {
     for lens in [GAUSS, TRIPLET, WOOD] {

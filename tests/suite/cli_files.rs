@@ -502,6 +502,34 @@ fn a_lens_file_has_hyperhemispheres() {
     assert!(said.contains("`hyper` changes nothing"), "{said}");
 }
 
+/// Surfaces of curvature 1e90 one behind the other: the focal length overflows, and nothing panics.
+#[test]
+fn a_focal_length_that_is_no_number_is_refused() {
+    for count in [2, 4, 6, 8, 12, 20] {
+        let mut lens: Value =
+            serde_json::from_str(&fs::read_to_string("lenses/achromat_ac254_100.json").unwrap())
+                .unwrap();
+        let surface = |i: usize| {
+            let sign = if i % 2 == 0 { 1.0 } else { -1.0 };
+            let mut row = json!({"curvature": sign * 1e90, "thickness": 0.5, "semi_diameter": 5.0});
+            if i % 2 == 0 {
+                row["glass"] = json!({"nd": 1.5, "vd": 60.0});
+            }
+            if i == 0 {
+                row["stop"] = true.into();
+            }
+            row
+        };
+        lens["surfaces"] = (0..count).map(surface).collect();
+        lens["variables"] = json!([]);
+        let file = Scratch::with(&format!("overflow_{count}.json"), &lens.to_string());
+        for vary in ["curvatures", "thicknesses"] {
+            let arguments = ["optimize", file.path(), "--vary", vary, "--steps", "1"];
+            refused(2, &arguments, "", &[]);
+        }
+    }
+}
+
 /// A surface of curvature 1e90 with an aspheric term: no sum and no beam, and every command says so.
 #[test]
 fn a_lens_with_a_needle_is_described_without_numbers_that_are_none() {

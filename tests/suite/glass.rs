@@ -279,6 +279,52 @@ fn a_catalogue_is_added_and_its_glass_found_in_a_lens() {
     }
 }
 
+/// Melts stand in a catalogue of their own, one beside the other, and lenses name them.
+#[test]
+fn melts_are_added_one_by_one() {
+    let folder = std::env::temp_dir().join(format!("aplanat-melts-{}", std::process::id()));
+    let run = |words: &[&str]| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_aplanat"));
+        let output = command.args(words).env("APLANAT_GLASSES", &folder).output().unwrap();
+        let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
+        (output.status.code(), text(output.stdout), text(output.stderr))
+    };
+    let melt = |glass: &str, name: &str, indices: &[&str]| {
+        let mut words = vec!["glass", "--json", "--melt", glass, "--name", name];
+        indices.iter().for_each(|index| words.extend(["--index", index]));
+        run(&words)
+    };
+    let (code, json, errors) =
+        melt("SCHOTT N-BK7", "BK7-1", &["0.5875618=1.51672", "0.4861327=1.52229"]);
+    assert_eq!(code, Some(0), "{errors}");
+    let added: Value = serde_json::from_str(&json).unwrap();
+    assert_eq!(added["name"], "MELT BK7-1");
+    assert!((added["nd"].as_f64().unwrap() - 1.51672).abs() < 1e-9, "{json}");
+    assert!(added["worst_index"].as_f64().unwrap() < 1e-9, "{json}");
+    assert_eq!(melt("CDGM H-K9L", "K9L-2", &["0.5875618=1.51690"]).0, Some(0));
+    // One of the same name is replaced.
+    assert_eq!(melt("SCHOTT N-BK7", "BK7-1", &["0.5875618=1.51661"]).0, Some(0));
+    let (_, json, _) = run(&["glass", "--json", "MELT", "status=melt"]);
+    let listed: Vec<Value> = serde_json::from_str(&json).unwrap();
+    assert_eq!(listed.len(), 2, "{json}");
+    let of = |name: &str| listed.iter().find(|glass| glass["name"] == name).unwrap();
+    assert!((of("BK7-1")["nd"].as_f64().unwrap() - 1.51661).abs() < 1e-9);
+    // What is known of the glass is kept.
+    assert_eq!(of("BK7-1")["expansion"], 7.1);
+    assert_eq!(of("K9L-2")["maker"], "MELT");
+    for (glass, name, index, expected) in [
+        ("SCHOTT N-BK7", "A", "0.5875618=1.6", "expected a melt within 0.01"),
+        ("SCHOTT N-BK7", "A", "0.01=1.5", "has no index at 0.01 um"),
+        ("SCHOTT N-BK7", "A", "1.5", "expected a wavelength in um"),
+        ("NO-SUCH", "A", "0.5=1.5", "found no glass `NO-SUCH`"),
+        ("SCHOTT N-BK7", "A B", "0.5875618=1.5168", "expected letters and digits"),
+    ] {
+        let (code, _, errors) = melt(glass, name, &[index]);
+        assert!(code == Some(2) && errors.contains(expected), "{index}: {errors}");
+    }
+    std::fs::remove_dir_all(&folder).unwrap();
+}
+
 /// The glasses that stand for a model glass, by the distance that the program states.
 #[test]
 fn the_nearest_glasses_are_listed_in_their_order() {

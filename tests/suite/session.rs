@@ -101,6 +101,7 @@ const OPTIMIZE: Command = Command::Optimize {
         limits: LimitTreatment::Constraints,
         pupil: PupilEdge::Moving,
     },
+    glasses: None,
 };
 
 /// A merit function of the spots alone.
@@ -466,7 +467,11 @@ fn a_background_optimization_improves_the_double_gauss() {
     let lens = double_gauss();
     let goal = Goal::default_for(&lens).unwrap();
     let mut session = Session::new(lens, || {}).unwrap();
-    session.apply(Command::Optimize { method: DescentMethod::DampedLeastSquares, goal });
+    session.apply(Command::Optimize {
+        method: DescentMethod::DampedLeastSquares,
+        goal,
+        glasses: None,
+    });
     wait(&mut session, "ten steps", |view, _| {
         let over = !view.optimization.is_active();
         step_of(view) >= 10 || over
@@ -488,8 +493,12 @@ fn glasses_are_exchanged_after_an_optimization_and_taken_with_its_result() {
     add_variables(&mut lens, &[ParameterKind::Curvatures]);
     let goal = Goal::default_for(&lens).unwrap();
     let mut session = Session::new(lens.clone(), || {}).unwrap();
-    let words = "schott vd=20..40".to_owned();
-    session.apply(Command::ExchangeGlasses { goal: goal.clone(), words });
+    let exchange = |words: &str| Command::Optimize {
+        method: DescentMethod::TrustRegion,
+        goal: goal.clone(),
+        glasses: Some(words.to_owned()),
+    };
+    session.apply(exchange("schott vd=20..40"));
     wait(&mut session, "the end", |view, _| step_of(view) > 0 && !view.optimization.is_active());
     let run = session.view().optimization.snapshot.unwrap();
     let media =
@@ -504,8 +513,7 @@ fn glasses_are_exchanged_after_an_optimization_and_taken_with_its_result() {
     assert_eq!((media(&taken), taken.notes.as_str()), (media(&run.best), "kept"));
 
     for words in ["nd=x", "no such glass"] {
-        let refused = Command::ExchangeGlasses { goal: goal.clone(), words: words.to_owned() };
-        let events = session.apply(refused);
+        let events = session.apply(exchange(words));
         assert!(matches!(events.last(), Some(SessionEvent::Message(_))), "{words}: {events:?}");
         assert!(!session.view().optimization.is_active());
     }
@@ -1049,7 +1057,11 @@ fn the_merit_function_is_saved_with_the_lens_and_undone() {
 #[test]
 fn an_accepted_result_has_the_merit_function_that_it_was_optimized_for() {
     let mut session = session(double_gauss());
-    session.apply(Command::Optimize { method: DescentMethod::Adam, goal: spot_goal() });
+    session.apply(Command::Optimize {
+        method: DescentMethod::Adam,
+        goal: spot_goal(),
+        glasses: None,
+    });
     wait(&mut session, "a step", |view, _| step_of(view) > 0);
     session.apply(Command::AcceptResult);
     assert_eq!(session.lens().merit, Some(spot_goal()));

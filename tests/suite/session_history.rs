@@ -78,7 +78,11 @@ fn optimized() -> Session {
         zoom_ratios: Vec::new(),
         limits: LimitTreatment::default(),
     };
-    session.apply(Command::Optimize { method: DescentMethod::DampedLeastSquares, goal });
+    session.apply(Command::Optimize {
+        method: DescentMethod::DampedLeastSquares,
+        goal,
+        glasses: None,
+    });
     wait(&mut session, "the end", |view, _| !view.optimization.is_active());
     session
 }

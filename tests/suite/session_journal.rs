@@ -201,7 +201,11 @@ fn an_interrupted_optimization_leaves_its_best_lens_in_the_history() {
         zoom_ratios: Vec::new(),
         limits: LimitTreatment::default(),
     };
-    session.apply(Command::Optimize { method: DescentMethod::Adam, goal: goal.clone() });
+    session.apply(Command::Optimize {
+        method: DescentMethod::Adam,
+        goal: goal.clone(),
+        glasses: None,
+    });
     wait(&mut session, "a journal", |_, _| folder.journals().join("unsaved.journal").exists());
     let copy = folder.0.join("copy");
     killed(&session, &folder.journals(), &copy);

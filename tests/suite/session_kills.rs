@@ -66,7 +66,7 @@ fn start(session: &mut Session, run: &str) {
     match run {
         "optimization" => {
             let goal = Goal::default_for(session.lens()).unwrap();
-            session.apply(Command::Optimize { method: DescentMethod::Adam, goal });
+            session.apply(Command::Optimize { method: DescentMethod::Adam, goal, glasses: None });
         }
         "front" => {
             let few = ParetoSettings::weighted_sum();

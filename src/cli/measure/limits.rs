@@ -102,6 +102,9 @@ impl Display for MeasureLimitsReport {
             refused.as_ref().map_or(Ok(()), |why| writeln!(f, "{file}: {why}"))?;
         }
         let optimized = rows.iter().filter(|row| row.found.is_some()).count();
+        if optimized == 0 {
+            return writeln!(f, "no lens was optimized to its end");
+        }
         writeln!(f, "{broken} of {optimized} lenses end with a limit broken by more than {KEPT:e}")
     }
 }

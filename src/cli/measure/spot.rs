@@ -129,6 +129,9 @@ impl Display for MeasureSpotReport {
             };
             match rms {
                 Some(rms) => writeln!(f, "\n{title}; RMS radius {} mm", ShortNumber(rms))?,
+                None if curves.stopped => {
+                    writeln!(f, "\nclipped pupil: stopped before it was reached")?
+                }
                 None => writeln!(f, "\n{title}: no light is transmitted")?,
             }
             write!(f, "{}", table(curves, pupil))?;

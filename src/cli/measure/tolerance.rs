@@ -43,8 +43,12 @@ impl MeasureToleranceArgs {
     pub(super) fn run(&self, output: &Output) -> Result<(), CliError> {
         let (lens, file) = self.lens()?;
         let fail = |e: ToleranceBenchmarkError| CliError::Failed(format!("{file}: {e}"));
-        let cost = measure_tolerances(&lens, self.grade, self.samples).map_err(fail)?;
         let stop = stop_flag();
+        let cost = measure_tolerances(&lens, self.grade, self.samples, &stop).map_err(fail)?;
+        let Some(cost) = cost else {
+            let text = "stopped before the costs were measured".to_owned();
+            return Err(CliError::Failed(text));
+        };
         // The bundled lens on which costs are measured has little to gain: its spot as designed is
         // nine tenths of that as built.
         let designed = if self.lens.is_some() { lens } else { bundled(SENSITIVE)?.0 };

@@ -7,11 +7,13 @@
 
 mod added;
 mod dispersion;
+mod melt;
 mod properties;
 mod thermal;
 
 pub use added::{add, added_glasses, additions};
 pub use dispersion::DispersionFormula;
+pub use melt::MeltError;
 pub use properties::{GlassProperties, GlassStatus};
 pub use thermal::{THERMAL_RANGE, ThermalDispersion};
 
@@ -55,7 +57,7 @@ pub struct Glass {
     /// The density in g/cm³; `None` if the catalogue does not have it.
     #[serde(rename = "density_g_cm3", default)]
     pub density: Option<f64>,
-    /// What else its catalogue says of it; `None` for a glass of the program, whose properties are found by
+    /// The properties in its own catalogue; `None` for a glass of the program, whose properties are found by
     /// its name.
     #[serde(skip)]
     pub own_properties: Option<Box<GlassProperties>>,
@@ -71,7 +73,7 @@ impl Glass {
         self.formula.index(&self.coefficients, um)
     }
 
-    /// What is known of it beside its dispersion; `None` if nothing is.
+    /// The properties beside its dispersion; `None` if none is known.
     pub fn properties(&self) -> Option<&GlassProperties> {
         self.own_properties.as_deref().or_else(|| properties::find(&self.full_name()))
     }

@@ -1,4 +1,4 @@
-//! What is known of a glass beside its dispersion.
+//! Properties of a glass beside its dispersion.
 //!
 //! Those of the program's own glasses are in `assets/glass_properties.json`, from the data sheets that
 //! the refractiveindex.info database (CC0) collects.
@@ -100,8 +100,8 @@ pub(super) fn find(full_name: &str) -> Option<&'static GlassProperties> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{find as find_glass, known};
     use super::*;
+    use crate::lens::glass::{find as find_glass, known};
 
     #[test]
     fn nearly_every_glass_has_properties() {

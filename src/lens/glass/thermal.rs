@@ -52,8 +52,8 @@ pub(super) fn air_index(um: f64, celsius: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::find;
     use super::*;
+    use crate::lens::glass::find;
 
     /// The data sheet of N-BK7 (Schott, 2014) has the mean change between two temperatures in 1e-6/K, in
     /// vacuum and relative to air, with one decimal.

@@ -85,29 +85,15 @@ impl Session {
         None
     }
 
-    pub(super) fn optimize(
-        &mut self,
-        method: DescentMethod,
-        goal: Goal,
-        glasses: Option<Arc<[&'static Glass]>>,
-    ) {
+    pub(super) fn optimize(&mut self, method: DescentMethod, goal: Goal, words: Option<String>) {
+        let glasses = match words.map(|words| find_glasses(&words)).transpose() {
+            Ok(glasses) => glasses,
+            Err(why) => return self.post(Severity::Error, why),
+        };
         (self.preview_lens, self.shows_candidate) = (None, true);
         let (lens, tolerance) = (Arc::clone(&self.lens), self.settings.tolerance);
-        self.optimization.start(OptimizationRequest { method, lens, goal, tolerance, glasses });
-    }
-
-    /// Optimizes a copy of the design and then exchanges its glasses for those that some words find.
-    pub(super) fn exchange_glasses(&mut self, goal: Goal, words: &str) {
-        let query = match GlassQuery::new(words.split_whitespace()) {
-            Ok(query) => query,
-            Err(why) => return self.post(Severity::Error, why.to_string()),
-        };
-        let found: Vec<&'static Glass> =
-            glass::known().filter(|glass| query.is_met_by(glass)).collect();
-        if found.is_empty() {
-            return self.post(Severity::Error, format!("found no glass for `{words}`"));
-        }
-        self.optimize(DescentMethod::TrustRegion, goal, Some(found.into()));
+        let request = OptimizationRequest { method, lens, goal, tolerance, glasses };
+        self.optimization.start(request);
     }
 
     /// Makes the best lens of the optimization the design.
@@ -317,6 +303,13 @@ fn merge_result(run: &OptimizationSnapshot, design: &Arc<Lens>) -> Result<Lens, 
     }
     let lens = apply_edit(&lens, &Edit::SetName(design.name.clone()));
     lens.map_err(|why| format!("the result does not fit the present design: {why}"))
+}
+
+/// The glasses that some words find.
+fn find_glasses(words: &str) -> Result<Arc<[&'static Glass]>, String> {
+    let query = GlassQuery::new(words.split_whitespace()).map_err(|why| why.to_string())?;
+    let found: Vec<_> = glass::known().filter(|glass| query.is_met_by(glass)).collect();
+    if found.is_empty() { Err(format!("found no glass for `{words}`")) } else { Ok(found.into()) }
 }
 
 /// A lens of a structure search without the variables that the search has fixed by equal bounds.

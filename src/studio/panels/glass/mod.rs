@@ -13,6 +13,7 @@ use super::{Panel, valid_edit};
 use crate::lens::glass::{self, Glass};
 use crate::lens::{Edit, GradientIndex, Lens, Medium, Row, SurfaceNumber};
 use crate::merit::Goal;
+use crate::optimize::DescentMethod;
 use crate::session::{Command, SessionView};
 use crate::studio::actions::Actions;
 use crate::studio::cached::Cached;
@@ -140,8 +141,9 @@ impl GlassPanel {
                     as the merit falls; the Optimizer has the result";
         let button = button.on_hover_text(hint).on_disabled_hover_text(reason);
         if let (true, Some(goal)) = (button.clicked(), goal) {
-            let (goal, words) = (Goal::clone(goal), self.query.clone());
-            actions.push(Command::ExchangeGlasses { goal, words });
+            let (goal, glasses) = (Goal::clone(goal), Some(self.query.clone()));
+            let method = DescentMethod::TrustRegion;
+            actions.push(Command::Optimize { method, goal, glasses });
         }
     }
 

@@ -126,7 +126,7 @@ impl OptimizerPanel {
         let reason = if active { "An optimization is already running" } else { NO_VARIABLES };
         if main_button(ui, "Optimize", ready, hint, reason) {
             let goal = self.merit.goal();
-            actions.push(Command::Optimize { method: self.method, goal });
+            actions.push(Command::Optimize { method: self.method, goal, glasses: None });
         }
     }
 
