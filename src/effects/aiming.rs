@@ -7,8 +7,7 @@
 //! measured, goes elsewhere.
 
 use crate::math::Vec3;
-use crate::pupil::{Dual2, Launch, RayModel};
-use crate::trace::Ray;
+use crate::pupil::{Launch, RayModel};
 use std::f64::consts::TAU;
 
 /// The changes of a lens's results if rays are aimed at the paraxial entrance pupil; infinite where
@@ -103,13 +102,11 @@ fn ray_shift(a: &Launch<'_>, b: &Launch<'_>) -> f64 {
     let landed = |launch: &Launch<'_>| {
         let turn = TAU / SHIFTED_RAYS as f64;
         let at = |i: usize| <[f64; 2]>::from((turn * i as f64).sin_cos());
-        launch.unclipped_landings((0..SHIFTED_RAYS).map(at))
+        let rays = launch.unclipped_landings((0..SHIFTED_RAYS).map(at)).into_iter();
+        rays.map(|ray| ray.map(|(ray, _)| ray.point.value())).collect::<Vec<_>>()
     };
-    let apart = |pair: (Option<(Ray<Dual2>, Dual2)>, Option<(Ray<Dual2>, Dual2)>)| match pair {
-        (Some((a, _)), Some((b, _))) => {
-            let (a, b) = (a.point.value(), b.point.value());
-            (a.x - b.x).hypot(a.y - b.y)
-        }
+    let apart = |(a, b): (Option<Vec3<f64>>, Option<Vec3<f64>>)| match (a, b) {
+        (Some(a), Some(b)) => (a.x - b.x).hypot(a.y - b.y),
         (None, None) => 0.0,
         _ => f64::INFINITY,
     };

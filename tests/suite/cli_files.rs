@@ -510,9 +510,9 @@ fn a_focal_length_that_is_no_number_is_refused() {
             serde_json::from_str(&fs::read_to_string("lenses/achromat_ac254_100.json").unwrap())
                 .unwrap();
         let surface = |i: usize| {
-            let sign = if i % 2 == 0 { 1.0 } else { -1.0 };
+            let sign = if i.is_multiple_of(2) { 1.0 } else { -1.0 };
             let mut row = json!({"curvature": sign * 1e90, "thickness": 0.5, "semi_diameter": 5.0});
-            if i % 2 == 0 {
+            if i.is_multiple_of(2) {
                 row["glass"] = json!({"nd": 1.5, "vd": 60.0});
             }
             if i == 0 {

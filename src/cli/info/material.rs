@@ -69,10 +69,9 @@ impl Material {
         if !self.unknown_transmission.is_empty() {
             let numbers: Vec<String> =
                 self.unknown_transmission.iter().map(SurfaceNumber::to_string).collect();
-            text.push_str(&format!(
-                "\n                (absorption behind surface {} unknown, taken as none)",
-                numbers.join(", ")
-            ));
+            text += "\n                (absorption unknown behind surface ";
+            text += &numbers.join(", ");
+            text += ", taken as none)";
         }
         text
     }

@@ -130,7 +130,7 @@ impl Display for MeasureSpotReport {
             match rms {
                 Some(rms) => writeln!(f, "\n{title}; RMS radius {} mm", ShortNumber(rms))?,
                 None if curves.stopped => {
-                    writeln!(f, "\nclipped pupil: stopped before it was reached")?
+                    writeln!(f, "\nclipped pupil: stopped before it was reached")?;
                 }
                 None => writeln!(f, "\n{title}: no light is transmitted")?,
             }

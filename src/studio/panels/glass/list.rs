@@ -66,20 +66,21 @@ impl ListedGlass {
             known.map(|column| format!("{} {}", column.title(), self.text(column))).collect();
         let [nd, vd, partial] = [GlassColumn::Index, GlassColumn::Abbe, GlassColumn::Partial]
             .map(|column| format!("{} {}", column.title(), self.text(column)));
-        let mut text =
-            format!("{}\n{nd}, {vd}, {partial}\n{}", self.glass.full_name(), words.join(", "));
-        if let Some(expansion) = self.properties.and_then(|known| known.expansion) {
-            text.push_str(&format!("\nexpansion {expansion:.1}e-6/K"));
-        }
-        if let Some(thermal) = self.properties.and_then(|known| known.thermal) {
+        let numbers = format!("{nd}, {vd}, {partial}");
+        let known = self.properties;
+        let expansion = known
+            .and_then(|known| known.expansion)
+            .map(|expansion| format!("expansion {expansion:.1}e-6/K"));
+        let slope = known.and_then(|known| known.thermal).map(|thermal| {
             let slope = 1e6 * thermal.slope_at_d(self.glass.nd);
-            text.push_str(&format!("\ndn/dT {slope:.1}e-6/K (d, 20 °C)"));
-        }
-        let passed = self.properties.and_then(|known| known.internal_transmission(0.42, 10.0));
-        if let Some(share) = passed {
-            text.push_str(&format!("\npasses {:.1} % at 420 nm through 10 mm", 100.0 * share));
-        }
-        text
+            format!("dn/dT {slope:.1}e-6/K (d, 20 °C)")
+        });
+        let passed = known
+            .and_then(|known| known.internal_transmission(0.42, 10.0))
+            .map(|share| format!("passes {:.1} % at 420 nm through 10 mm", 100.0 * share));
+        let lines = [self.glass.full_name(), numbers, words.join(", ")];
+        let more = [expansion, slope, passed].into_iter().flatten();
+        lines.into_iter().chain(more).collect::<Vec<_>>().join("\n")
     }
 }
 
