@@ -19,7 +19,7 @@ pub struct AimingDifference {
     pub shift: f64,
     /// The largest relative change of the light of a field at a wavelength.
     pub light: f64,
-    /// The largest distance in the image plane of two rays with the same pupil coordinates, in mm; infinite
+    /// The largest distance in the image plane of two rays with the same place in the stop, in mm; infinite
     /// if one of them alone arrives.
     pub rays: f64,
 }
@@ -96,14 +96,20 @@ pub(super) fn aiming_difference(
     edge.worst(AimingDifference { shift: chief, light: 0.0, rays: ray_shift(real, &disc) })
 }
 
-/// The largest distance between the image points of rays with the same pupil coordinates, in mm: those at
-/// the rim, where the pupils differ most. A ray that arrives in one of both alone counts as infinitely far.
+/// The largest distance between the image points of rays with the same places in the stop, in mm: those at
+/// its rim, where the beams differ most. A ray that arrives in one of both alone counts as infinitely far.
 fn ray_shift(a: &Launch<'_>, b: &Launch<'_>) -> f64 {
+    let turn = TAU / SHIFTED_RAYS as f64;
+    let places: Vec<[f64; 2]> =
+        (0..SHIFTED_RAYS).map(|i| (turn * i as f64).sin_cos().into()).collect();
     let landed = |launch: &Launch<'_>| {
-        let turn = TAU / SHIFTED_RAYS as f64;
-        let at = |i: usize| <[f64; 2]>::from((turn * i as f64).sin_cos());
-        let rays = launch.unclipped_landings((0..SHIFTED_RAYS).map(at)).into_iter();
-        rays.map(|ray| ray.map(|(ray, _)| ray.point.value())).collect::<Vec<_>>()
+        let tracer = launch.channel().tracer.clone().without_rims();
+        let land = |ray| {
+            let landing = tracer.trace(ray);
+            landing.fate.is_imaged().then_some(landing.ray.point)
+        };
+        let rays = launch.rays_through_stop(&places).into_iter();
+        rays.map(|ray| ray.and_then(land)).collect::<Vec<_>>()
     };
     let apart = |(a, b): (Option<Vec3<f64>>, Option<Vec3<f64>>)| match (a, b) {
         (Some(a), Some(b)) => (a.x - b.x).hypot(a.y - b.y),

@@ -219,10 +219,13 @@ impl<'a> Launch<'a> {
     /// The rays that cross the real stop at some points of it, as [`Launch::ray_through_stop`] finds
     /// each.
     pub fn rays_through_stop(&self, points: &[[f64; 2]]) -> Vec<Option<Ray<f64>>> {
-        if self.aiming != Aiming::Chief || self.model.ends_at_disc() {
+        if self.model.ends_at_disc() {
             return self.rays(points);
         }
         let inside: Vec<_> = points.iter().map(|p| p.map(|v| v * (1.0 - INSIDE_RIM))).collect();
+        if self.aiming != Aiming::Chief {
+            return self.rays(&inside);
+        }
         let found = self.aim_all_coordinates(&inside);
         let ray = |(q, p): (Option<[f64; 2]>, &[f64; 2])| {
             q.map_or_else(|| self.ray(*p), |q| Some(self.source.ray(q)))
