@@ -194,7 +194,11 @@ pub(super) fn index_at(
         Medium::Mirror => Ok(before),
         Medium::Index(n) => known(*n),
         Medium::Model { nd, vd } => known(glass::model_index(*nd, *vd, um)),
-        Medium::Grin(grin) => index_at(&grin.base, place, um, before, celsius),
+        // The change of a gradient with temperature is unknown.
+        Medium::Grin(_) if celsius.is_some() => {
+            Err(LensError::NoThermalData { place, name: "the gradient index".to_owned() })
+        }
+        Medium::Grin(grin) => index(&grin.base, place, um, before),
         Medium::Glass(name) => {
             let Some(found) = glass::find(name) else {
                 let similar = glass::similar_names(name);

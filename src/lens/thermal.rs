@@ -17,6 +17,8 @@ pub struct TemperatureChange {
     surfaces: Vec<SurfaceChange>,
     /// The growth of the mount.
     mount: f64,
+    /// The change of the index in object space.
+    index_before: f64,
 }
 
 /// The change of a surface and of the gap behind it.
@@ -54,10 +56,10 @@ impl TemperatureChange {
             bodies.push(expansion.map(|expansion| 1.0 + expansion * by));
         }
         let mut surfaces = Vec::new();
-        let mut indices = [1.0; 2];
-        for temperature in [own.celsius, Some(celsius)] {
-            index_at(&lens.object_medium, MediumPlace::Object, um, 1.0, temperature)?;
-        }
+        let object =
+            |temperature| index_at(&lens.object_medium, MediumPlace::Object, um, 1.0, temperature);
+        let mut indices = [object(own.celsius)?, object(Some(celsius))?];
+        let index_before = indices[1] - indices[0];
         for (i, row) in lens.surfaces.iter().enumerate() {
             for (index, temperature) in indices.iter_mut().zip([own.celsius, Some(celsius)]) {
                 *index = index_at(&row.medium, MediumPlace::behind(i), um, *index, temperature)?;
@@ -74,12 +76,13 @@ impl TemperatureChange {
                 index: indices[1] - indices[0],
             });
         }
-        Ok(Self { surfaces, mount })
+        Ok(Self { surfaces, mount, index_before })
     }
 
     /// The system at the other temperature, from that of the lens before.
     pub fn apply<R: Real>(&self, system: &System<R>) -> System<R> {
         let mut changed = system.clone();
+        changed.index_before += R::from_f64(self.index_before);
         for (i, change) in self.surfaces.iter().enumerate() {
             let surface = &mut changed.surfaces[i];
             scale(surface, change.growth);

@@ -176,9 +176,8 @@ impl OptimizationEngine {
 
 /// True if all gaps of two lenses have the same media.
 fn has_media_of(lens: &Lens, other: &Lens) -> bool {
-    let media =
-        |lens: &Lens| lens.surfaces.iter().map(|row| row.medium.clone()).collect::<Vec<_>>();
-    media(lens) == media(other)
+    let media = other.surfaces.iter().map(|row| &row.medium);
+    lens.surfaces.iter().map(|row| &row.medium).eq(media)
 }
 
 impl Engine for OptimizationEngine {

@@ -73,6 +73,19 @@ fn a_thin_lens_defocuses_by_its_opto_thermal_constant() {
     }
 }
 
+/// The object may lie in glass, whose index changes too; a mirror in front of the lens keeps that index.
+#[test]
+fn an_object_in_glass_is_warmed_with_the_lens() {
+    let mut lens = thin_lens("SCHOTT N-SF11");
+    lens.object_medium = Medium::Glass("SCHOTT N-BK7".to_owned());
+    let found = thermal_focus(&lens).unwrap();
+    let [cold, warm] = [0.0, 40.0].map(|celsius| lens.at_temperature(0, celsius).unwrap());
+    let difference = defocus(&warm) - defocus(&cold);
+    assert!((found - difference).abs() < 1e-9, "{found} {difference}");
+    let in_air = thermal_focus(&thin_lens("SCHOTT N-SF11")).unwrap();
+    assert!((found - in_air).abs() > 1e-4, "{found} {in_air}");
+}
+
 /// What grows as a whole stays in focus: in a telescope whose mirrors are of the mount's material all lengths
 /// grow alike, a defocus that it has included.
 #[test]
@@ -193,6 +206,9 @@ fn what_is_unknown_is_refused_by_name() {
     ));
     model.environment = Environment { celsius: Some(40.0), ..Environment::default() };
     assert!(matches!(model.resolve(0, 0.5876), Err(LensError::NoThermalData { .. })));
+    let mut gradient = bundled("grin_rod_melles_griot");
+    gradient.environment.celsius = Some(40.0);
+    assert!(matches!(gradient.resolve(0, 0.5876), Err(LensError::NoThermalData { .. })));
     for celsius in [-101.0, 141.0, f64::NAN, f64::INFINITY] {
         assert!(
             with_catalogue_glass(lens.clone()).at_temperature(0, celsius).is_err(),
