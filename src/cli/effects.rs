@@ -39,6 +39,8 @@ fn option_name(effect: Effect) -> &'static str {
         Effect::Aiming => "aiming",
         Effect::FiniteObject => "finite-object",
         Effect::GradientIndex => "gradient",
+        Effect::Poses => "poses",
+        Effect::Temperature => "temperature",
     }
 }
 
@@ -206,7 +208,7 @@ impl EffectChoices {
 }
 
 /// The rules of commands that change the lens.
-const DESIGN_RULES: [EffectRule; 6] = [
+const DESIGN_RULES: [EffectRule; 8] = [
     EffectRule {
         effect: Effect::Dispersion,
         allowed: AllowedSetting::OnUnlessOff,
@@ -236,6 +238,16 @@ const DESIGN_RULES: [EffectRule; 6] = [
         effect: Effect::GradientIndex,
         allowed: AllowedSetting::AlwaysOn,
         reason: "its coefficients are numbers of the lens that is changed",
+    },
+    EffectRule {
+        effect: Effect::Poses,
+        allowed: AllowedSetting::AlwaysOn,
+        reason: "tilts and decentres are numbers of the lens that is changed",
+    },
+    EffectRule {
+        effect: Effect::Temperature,
+        allowed: AllowedSetting::AlwaysOn,
+        reason: "the merit function is that of the lens at its temperature",
     },
 ];
 

@@ -31,6 +31,7 @@ mod names;
 mod optimize;
 mod output;
 mod output_paths;
+mod overdue;
 mod pareto;
 mod picture;
 mod picture_device;
@@ -133,7 +134,7 @@ pub fn run() -> ExitCode {
     // A catalogue that cannot be read is said, and is no reason to end.
     files::load_own_glasses().iter().for_each(|error| print_note(format!("note: {error}")));
     match CliArgs::read() {
-        Ok(arguments) => exit_code(arguments.run()),
+        Ok(arguments) => ExitCode::from(exit_status(arguments.run())),
         Err(usage) => {
             // A reader of the help that closes the pipe early is no failure.
             drop(usage.print());
@@ -216,10 +217,11 @@ fn parse_number(text: &str) -> Result<f64, &'static str> {
     text.parse().map_err(|_not_a_number| "expected a number")
 }
 
-fn exit_code(result: Result<(), CliError>) -> ExitCode {
-    let Err(failure) = result else { return ExitCode::SUCCESS };
+/// Prints the error of a command, if it has one, and returns its exit status.
+fn exit_status(result: Result<(), CliError>) -> u8 {
+    let Err(failure) = result else { return 0 };
     if !failure.is_closed_pipe() {
         print_note(format!("error: {failure}"));
     }
-    ExitCode::from(failure.exit_status())
+    failure.exit_status()
 }

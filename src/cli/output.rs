@@ -27,6 +27,11 @@ impl Output {
         Self { json: true, collected: Some(Mutex::default()) }
     }
 
+    /// True if results are printed as JSON.
+    pub(super) fn is_json(&self) -> bool {
+        self.json
+    }
+
     /// The collected results; empty if they were printed.
     pub(super) fn into_collected(self) -> String {
         let into_text =

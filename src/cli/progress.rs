@@ -21,6 +21,11 @@ pub(super) fn leave_signals_to_host() {
     HOST_FLAG.store(false, Ordering::Relaxed);
 }
 
+/// True if another program that this library is a part of decides what signals do.
+pub(super) fn are_signals_of_host() -> bool {
+    SIGNALS_ARE_OF_HOST.load(Ordering::Relaxed)
+}
+
 /// Ends the commands that the program runs which this library is a part of.
 pub(super) fn stop_of_host() {
     HOST_FLAG.store(true, Ordering::Relaxed);
@@ -29,7 +34,7 @@ pub(super) fn stop_of_host() {
 /// A flag that is raised by Ctrl-C, by a request to terminate, and by the end of the terminal; once
 /// it is raised, further signals have no effect.
 pub(super) fn stop_flag() -> Arc<AtomicBool> {
-    if SIGNALS_ARE_OF_HOST.load(Ordering::Relaxed) {
+    if are_signals_of_host() {
         return Arc::clone(&HOST_FLAG);
     }
     let flag = Arc::new(AtomicBool::new(false));

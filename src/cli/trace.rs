@@ -51,7 +51,7 @@ fn parse_pair(text: &str) -> Result<[usize; 2], String> {
 }
 
 /// The rules for given rays, which need not be those of the beam that a plan is measured on.
-const GIVEN_RAYS: [EffectRule; 6] = [
+const GIVEN_RAYS: [EffectRule; 8] = [
     EffectRule {
         effect: Effect::Dispersion,
         allowed: AllowedSetting::NotApplicable,
@@ -81,6 +81,16 @@ const GIVEN_RAYS: [EffectRule; 6] = [
         effect: Effect::GradientIndex,
         allowed: AllowedSetting::OnUnlessOff,
         reason: "given rays need not be those of the beam",
+    },
+    EffectRule {
+        effect: Effect::Poses,
+        allowed: AllowedSetting::OnUnlessOff,
+        reason: "given rays need not be those of the beam",
+    },
+    EffectRule {
+        effect: Effect::Temperature,
+        allowed: AllowedSetting::AlwaysOn,
+        reason: "the lens is traced at its temperature",
     },
 ];
 

@@ -3,7 +3,7 @@
 use super::dispersion::light_change;
 use super::effect::Effect;
 use super::plan::EffectPlan;
-use super::simplify::{collimate_fields, reduce_to_conic};
+use super::simplify::{at_room_temperature, centre, collimate_fields, reduce_to_conic};
 use crate::lens::{FieldPoint, Lens, LensError, Object, System, Wavelength};
 use crate::paraxial::Beam;
 use crate::pupil::{Aiming, RayModel, RayModelError};
@@ -65,6 +65,8 @@ fn resolve_planned(
     colors: bool,
 ) -> Result<(Vec<ResolvedWavelength>, usize), LensError> {
     let primary = lens.primary();
+    let catalogued = (!plan.computes(Effect::Temperature)).then(|| at_room_temperature(lens));
+    let lens = catalogued.as_ref().unwrap_or(lens);
     let wavelengths = if colors { &lens.wavelengths } else { &lens.wavelengths[primary..=primary] };
     let resolve = |w: &Wavelength| {
         let mut system = lens.resolve(zoom, w.um)?;
@@ -91,7 +93,7 @@ fn aim_planned(
 }
 
 /// Removes from a resolved lens what a plan leaves out: aspheric terms, semi-diameters and
-/// obstructions, index gradients.
+/// obstructions, index gradients, tilts and decentres.
 pub fn simplify(system: &mut System<f64>, plan: &EffectPlan) {
     for surface in &plan.as_conic {
         reduce_to_conic(&mut system.surfaces[*surface]);
@@ -101,5 +103,8 @@ pub fn simplify(system: &mut System<f64>, plan: &EffectPlan) {
     }
     for surface in &plan.homogeneous {
         system.surfaces[*surface].grin = None;
+    }
+    if !plan.computes(Effect::Poses) {
+        centre(system);
     }
 }

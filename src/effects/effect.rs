@@ -21,11 +21,15 @@ pub enum Effect {
     /// A gap is filled with a gradient-index medium, through which rays are traced step by step.
     #[serde(rename = "gradient")]
     GradientIndex,
+    /// Surfaces are tilted or decentred, or the axis is broken: rays are turned into the frame of each.
+    Poses,
+    /// The lens is at another temperature than its glasses are catalogued for.
+    Temperature,
 }
 
 impl Effect {
     /// Every effect, in the order of a table.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 9] = [
         Self::Dispersion,
         Self::Asphere,
         Self::Clipping,
@@ -33,6 +37,8 @@ impl Effect {
         Self::Aiming,
         Self::FiniteObject,
         Self::GradientIndex,
+        Self::Poses,
+        Self::Temperature,
     ];
 
     /// The name in reports and menus.
@@ -45,6 +51,8 @@ impl Effect {
             Self::Aiming => "ray aiming",
             Self::FiniteObject => "finite object",
             Self::GradientIndex => "gradient index",
+            Self::Poses => "tilts and decentres",
+            Self::Temperature => "temperature",
         }
     }
 }

@@ -5,8 +5,10 @@
 //! bounds the change of the RMS radius of a spot, by the triangle inequality.
 
 use super::aiming::{AimingDifference, CoarseSpot, aiming_difference};
-use super::simplify::{collimate_fields, reduce_to_conic};
-use crate::lens::{FieldPoint, Lens, Object, Shape, System};
+use super::simplify::{
+    at_room_temperature, centre, collimate_fields, placed_surfaces, reduce_to_conic,
+};
+use crate::lens::{FieldPoint, Lens, Object, ROOM_CELSIUS, Shape, System};
 use crate::math::Vec3;
 use crate::paraxial::Beam;
 use crate::pupil::{
@@ -47,6 +49,20 @@ pub struct EffectMeasurements {
     pub finite_object: Option<(f64, f64)>,
     /// The gradient-index gaps, each with the shift of rays if its gradient is left out, in mm.
     pub grin_gaps: Vec<(GrinStepPlan, f64)>,
+    /// The tilted and decentred surfaces.
+    pub poses: PlacedSurfaces,
+    /// The temperature of a lens that is not at that of its catalogues, in °C, and the shift of rays
+    /// with the indices of these, in mm.
+    pub temperature: Option<(f64, f64)>,
+}
+
+/// The surfaces that are tilted or decentred, or at which the axis is broken.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct PlacedSurfaces {
+    /// Their indices.
+    pub surfaces: Vec<usize>,
+    /// The shift of rays with all of them centred on a straight axis, in mm.
+    pub shift: f64,
 }
 
 /// The clearance between the rays and the rim of a surface.
@@ -118,6 +134,8 @@ pub fn measure_effects_at(
         paraxial_aiming: paraxial_aiming(lens, zoom, &model, &bundles)?,
         finite_object: object(lens, zoom, &model, &bundles),
         grin_gaps: grin_gaps(&model, &bundles)?,
+        poses: poses(&model, &bundles)?,
+        temperature: temperature(lens, zoom, &model, &bundles)?,
     })
 }
 
@@ -335,6 +353,35 @@ fn grin_gaps(
     model.channels[model.primary].tracer.grin_step_plans().iter().map(moved).collect()
 }
 
+/// The tilted and decentred surfaces, with the shift of rays if all are centred.
+fn poses(model: &RayModel, bundles: &[SampledBundle]) -> Result<PlacedSurfaces, RayModelError> {
+    let mut centred = without_rims(model, model.primary);
+    let surfaces = placed_surfaces(&centred);
+    if surfaces.is_empty() {
+        return Ok(PlacedSurfaces::default());
+    }
+    centre(&mut centred);
+    Ok(PlacedSurfaces { surfaces, shift: largest_shift(model, bundles, &centred)? })
+}
+
+/// The temperature of a lens and the shift of rays with the indices of its catalogues, if that is
+/// another one.
+fn temperature(
+    lens: &Lens,
+    zoom: usize,
+    model: &RayModel,
+    bundles: &[SampledBundle],
+) -> Result<Option<(f64, f64)>, RayModelError> {
+    let celsius = lens.environment.temperature();
+    if celsius == ROOM_CELSIUS {
+        return Ok(None);
+    }
+    let primary = &model.channels[model.primary];
+    let mut catalogued = at_room_temperature(lens).resolve(zoom, primary.um)?;
+    remove_rims(&mut catalogued, model);
+    Ok(Some((celsius, largest_shift(model, bundles, &catalogued)?)))
+}
+
 fn is_aspheric(system: &System<f64>, surface: usize) -> bool {
     matches!(system.surfaces[surface].shape, Shape::Asphere { .. })
 }
@@ -343,14 +390,19 @@ fn is_aspheric(system: &System<f64>, surface: usize) -> bool {
 /// limits the beam, that of the stop.
 fn without_rims(model: &RayModel, wavelength: usize) -> System<f64> {
     let mut system = model.channels[wavelength].system.clone();
+    remove_rims(&mut system, model);
+    system
+}
+
+/// Removes the semi-diameters and obstructions that [`without_rims`] does not keep.
+fn remove_rims(system: &mut System<f64>, model: &RayModel) {
     for i in 0..system.surfaces.len() {
         system.surfaces[i].obstruction = 0.0;
         let limits = !model.ends_at_disc() && i == model.stop();
-        if !(is_aspheric(&system, i) || limits) {
+        if !(is_aspheric(system, i) || limits) {
             system.surfaces[i].semi_diameter = f64::INFINITY;
         }
     }
-    system
 }
 
 /// A lens at a wavelength [`without_rims`].

@@ -19,5 +19,7 @@ mod simplify;
 pub use aiming::AimingDifference;
 pub use apply::{build_ray_model, build_ray_model_at, simplify};
 pub use effect::{Effect, EffectOverride, EffectOverrides};
-pub use measure::{EffectMeasurements, RimClearance, measure_effects, measure_effects_at};
+pub use measure::{
+    EffectMeasurements, PlacedSurfaces, RimClearance, measure_effects, measure_effects_at,
+};
 pub use plan::{EffectCost, EffectDecision, EffectPlan, TracePurpose, plan};

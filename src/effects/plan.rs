@@ -2,8 +2,8 @@
 
 use super::aiming::AimingDifference;
 use super::effect::{Effect, EffectOverride, EffectOverrides};
-use super::measure::{EffectMeasurements, RimClearance, sample_points};
-use crate::lens::SurfaceNumber;
+use super::measure::{EffectMeasurements, PlacedSurfaces, RimClearance, sample_points};
+use crate::lens::{ROOM_CELSIUS, SurfaceNumber};
 use crate::pupil::Neglected;
 use crate::trace::GrinStepPlan;
 use serde::{Deserialize, Serialize};
@@ -155,6 +155,8 @@ pub fn plan(
         aiming(measured, (purpose, allowed), overrides.get(Effect::Aiming)),
         object(measured, allowed, overrides.get(Effect::FiniteObject)),
         grin,
+        poses(measured, allowed, overrides.get(Effect::Poses)),
+        temperature(measured, allowed, overrides.get(Effect::Temperature)),
     ];
     let mut plan = EffectPlan { decisions, as_conic, unclipped, homogeneous, aiming_light: 0.0 };
     if !plan.computes(Effect::Aiming) {
@@ -435,6 +437,38 @@ fn object(measured: &EffectMeasurements, allowed: f64, choice: EffectOverride) -
         }
     };
     let computed = decision.computed && measured.finite_object.is_some();
+    EffectDecision { computed, reason, ..decision }
+}
+
+/// Keeps all tilts and decentres or none: a break of the axis is taken back by another one.
+fn poses(measured: &EffectMeasurements, allowed: f64, choice: EffectOverride) -> EffectDecision {
+    let PlacedSurfaces { surfaces, shift } = &measured.poses;
+    let decision = lens_decision(Effect::Poses, choice, *shift, allowed, "mm");
+    let reason = match surfaces.len() {
+        0 => "every surface is centred on the axis".to_owned(),
+        1 => format!("with the surface centred {}", shift_text(*shift, allowed)),
+        all => format!("with {all} surfaces centred {}", shift_text(*shift, allowed)),
+    };
+    let computed = decision.computed && !surfaces.is_empty();
+    let surfaces = if computed { surfaces.clone() } else { Vec::new() };
+    EffectDecision { computed, surfaces, reason, ..decision }
+}
+
+fn temperature(
+    measured: &EffectMeasurements,
+    allowed: f64,
+    choice: EffectOverride,
+) -> EffectDecision {
+    let moved = measured.temperature.map_or(0.0, |(_, moved)| moved);
+    let decision = lens_decision(Effect::Temperature, choice, moved, allowed, "mm");
+    let reason = match measured.temperature {
+        None => "the lens is at the temperature of its catalogues".to_owned(),
+        Some((celsius, moved)) => format!(
+            "with the indices of {ROOM_CELSIUS} in place of {celsius} C {}",
+            shift_text(moved, allowed)
+        ),
+    };
+    let computed = decision.computed && measured.temperature.is_some();
     EffectDecision { computed, reason, ..decision }
 }
 

@@ -1,6 +1,9 @@
 //! A lens with one effect left out.
 
-use crate::lens::{ASPHERE_TERMS, Aperture, FieldKind, FieldPoint, Object, Shape, Surface};
+use crate::lens::{
+    ASPHERE_TERMS, Aperture, Environment, FieldKind, FieldPoint, Lens, Object, Shape, Surface,
+    System,
+};
 use crate::paraxial::Beam;
 use crate::pupil::RayModel;
 
@@ -8,6 +11,26 @@ use crate::pupil::RayModel;
 pub(super) fn reduce_to_conic(surface: &mut Surface<f64>) {
     let (curvature, conic, _) = surface.shape.numbers();
     surface.shape = Shape::simplest(curvature, conic, [0.0; ASPHERE_TERMS]);
+}
+
+/// The indices of the surfaces that are tilted or decentred, or at which the axis is broken.
+pub(super) fn placed_surfaces(system: &System<f64>) -> Vec<usize> {
+    let is_placed = |surface: &Surface<f64>| surface.pose.is_some() || surface.axis.is_some();
+    let placed = system.surfaces.iter().enumerate().filter(|(_, surface)| is_placed(surface));
+    placed.map(|(i, _)| i).collect()
+}
+
+/// Centres all surfaces on a straight axis.
+pub(super) fn centre(system: &mut System<f64>) {
+    for surface in &mut system.surfaces {
+        (surface.pose, surface.axis) = (None, None);
+    }
+}
+
+/// The lens with the indices of its catalogues.
+pub(super) fn at_room_temperature(lens: &Lens) -> Lens {
+    let environment = Environment { celsius: None, ..lens.environment };
+    Lens { environment, ..lens.clone() }
 }
 
 /// The beam and the fields of a lens with its object points moved to infinity along their chief rays;

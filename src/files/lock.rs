@@ -38,11 +38,17 @@ impl FileLock {
         let unwritable = |source| FileError::Unwritable { file: name.clone(), source };
         let beside = lock_path(path).map_err(unwritable)?;
         for _ in 0..MAX_ATTEMPTS {
+            if beside.is_dir() {
+                return Err(foreign_lock(&beside, "a folder"));
+            }
             let mut file = open(&beside).map_err(unwritable)?;
             match file.try_lock() {
                 Ok(()) if is_current(&file, &beside) => {
                     if !is_lock(&mut file) {
-                        return Err(foreign_lock(&beside));
+                        return Err(foreign_lock(
+                            &beside,
+                            "a file that is no lock of this program",
+                        ));
                     }
                     write_holder(&mut file);
                     return Ok(Self { locked: file, path: beside });
@@ -135,11 +141,11 @@ fn open_file_number(_file: &File) -> Option<[u64; 2]> {
 }
 
 /// The error of a file that has the name of a lock and is none.
-fn foreign_lock(path: &Path) -> FileError {
+fn foreign_lock(path: &Path, found: &str) -> FileError {
     FileError::Unsuitable {
         file: path.display().to_string(),
-        found: "a file that is no lock of this program".to_owned(),
-        expected: "no file of this name".to_owned(),
+        found: found.to_owned(),
+        expected: "nothing of this name, which is that of the lock".to_owned(),
     }
 }
 

@@ -232,8 +232,11 @@ pub fn measure_gradients(
     let all = heights.len() * (2 * METHODS.len() + 1);
     let mut done = 0;
     let mut fields = Vec::new();
-    for y in heights {
-        let scene = GradientScene::new(&model, &pool, y)?;
+    let scene_at = |y| GradientScene::new(&model, &pool, y);
+    // A field without light is refused before the others take their time.
+    let scenes: Vec<GradientScene<'_>> =
+        heights.into_iter().map(scene_at).collect::<Result<_, _>>()?;
+    for scene in scenes {
         let exact = scene.reference()?;
         let mut rows = Vec::new();
         for integral in [Integral::Spot, Integral::Throughput] {
@@ -285,11 +288,12 @@ fn with_primary_system(
     RayModel::from_systems(systems, 0, model.beam, model.aiming)
 }
 
-/// The field of the lens with the least light above zero.
+/// The field of the lens with the least light above zero; the last one if all are dark.
 fn most_vignetted(model: &RayModel, lens: &Lens, zoom: usize) -> f64 {
     let heights = lens.fields_at(zoom).values.iter().map(|field| field.y);
-    let lit = heights.filter_map(|y| Some((y, area(model, y)?)));
-    lit.min_by(|a, b| a.1.total_cmp(&b.1)).map_or(0.0, |(y, _)| y)
+    let lit = heights.clone().filter_map(|y| Some((y, area(model, y)?)));
+    let least = lit.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(y, _)| y);
+    least.or(heights.last()).unwrap_or(0.0)
 }
 
 fn area(model: &RayModel, y: f64) -> Option<f64> {

@@ -179,10 +179,10 @@ impl SearchRules {
 
     fn check_elements(&self) -> Result<(), RuleError> {
         let [min, max] = self.elements;
-        if min <= max {
+        if min <= max && max > 0 {
             return Ok(());
         }
-        let expected = "two numbers, the smaller one first";
+        let expected = "two numbers, the smaller one first and the larger one above 0";
         Err(RuleError::new("elements", format!("[{min}, {max}]"), expected))
     }
 

@@ -522,6 +522,7 @@ fn a_lens_without_light_is_refused_by_every_analysis_and_by_the_report() {
     let arguments = ["report", dark.path(), "--out", report.path()];
     refused(2, &arguments, "", &["no light", "expected a lens that forms"]);
     assert!(!std::path::Path::new(report.path()).exists());
+    refused(2, &["measure", "gradient", dark.path()], "", &["no light"]);
 }
 
 /// A lens with light that lacks a number is not said to form no image.

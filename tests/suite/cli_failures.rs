@@ -301,6 +301,20 @@ fn a_checkpoint_has_one_writer() {
     assert_eq!(names, ["link.json", "run.json"], "the lock is gone with its holder");
 }
 
+/// Something that has the name of the lock is named, whatever it is.
+#[test]
+fn what_has_the_name_of_a_lock_is_left_alone() {
+    let folder = Folder::new("lock-names");
+    let [file, aside] = ["file.json", "folder.json"].map(|name| folder.path(name));
+    folder.file(".file.json.lock", "a letter");
+    fs::create_dir(folder.path(".folder.json.lock")).unwrap();
+    for (checkpoint, found) in [(&file, "a file that is no lock"), (&aside, "found a folder")] {
+        let search = ["search", LENS, "--iterations", "4", "--checkpoint", checkpoint];
+        refused(2, &search, "", &[".lock", found]);
+    }
+    assert_eq!(fs::read_to_string(folder.path(".file.json.lock")).unwrap(), "a letter");
+}
+
 /// To save a checkpoint under one of two names would part them.
 #[cfg(unix)]
 #[test]
@@ -371,6 +385,69 @@ fn every_request_to_end_saves_what_was_found() {
         let grin = ["grin", "luneburg", "--out", &field];
         assert_eq!(ends_with_its_result(&grin, signal)["stopped"], true);
         fs::remove_file(&field).unwrap();
+    }
+}
+
+/// A lens of 120 wild surfaces, for which one step takes minutes.
+#[cfg(unix)]
+fn wild_lens() -> String {
+    let mut state = 1_u64;
+    let mut random = |min: f64, max: f64| {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+        min + (max - min) * (state >> 33) as f64 / (1_u64 << 31) as f64
+    };
+    let mut surface = |i: usize| {
+        let glass = json!({"nd": random(1.45, 1.9), "vd": random(25.0, 80.0)});
+        let curvature = random(-1.0, 1.0) / 60.0;
+        let surface =
+            json!({"curvature": curvature, "thickness": random(0.5, 2.0), "stop": i == 60});
+        if i % 2 == 0 { with(surface, "glass", glass) } else { surface }
+    };
+    let surfaces: Vec<Value> = (0..120).map(&mut surface).collect();
+    let fields = [0.0, 5.0, 10.0].map(|y| json!({"y": y}));
+    json!({
+        "aplanat": 1, "name": "wild", "source": "made for a test", "object": "infinity",
+        "aperture": {"entrance_pupil_diameter": 10.0},
+        "fields": {"kind": "angle", "values": fields},
+        "wavelengths": [{"um": 0.486}, {"um": 0.5876, "primary": true}, {"um": 0.656}],
+        "surfaces": surfaces,
+    })
+    .to_string()
+}
+
+#[cfg(unix)]
+fn with(mut object: Value, key: &str, value: Value) -> Value {
+    object[key] = value;
+    object
+}
+
+/// A command that is asked to end within a step of minutes ends after some seconds, with what it has.
+#[cfg(unix)]
+#[test]
+fn a_step_that_does_not_end_keeps_no_command_alive() {
+    let folder = Folder::new("wild");
+    let (lens, out) = (folder.file("wild.json", &wild_lens()), folder.path("best.json"));
+    let commands: [&[&str]; 2] = [
+        &["optimize", &lens, "--vary", "curvatures", "--error", "1e-9", "--out", &out, "--json"],
+        &["search", &lens, "--out", &out, "--json"],
+    ];
+    for command in commands {
+        let running = Running::start(command);
+        std::thread::sleep(Duration::from_secs(2));
+        running.signal("-TERM");
+        let asked = std::time::Instant::now();
+        let output = running.output();
+        let said = text(&output.stderr);
+        assert!(asked.elapsed() < Duration::from_secs(40), "{command:?}: {said}");
+        if output.status.code() == Some(0) {
+            let report: Value = serde_json::from_slice(&output.stdout).unwrap();
+            assert_eq!(report["out"], out.as_str(), "{report}");
+            assert!(["stopped", "interrupted"].contains(&report["ended"].as_str().unwrap()));
+            has_keys(&done_json(&["info", &out], ""), &["efl"]);
+        } else {
+            assert_eq!(output.status.code(), Some(1), "{said}");
+            assert!(said.contains("stopped before the first"), "{said}");
+        }
     }
 }
 

@@ -193,6 +193,43 @@ fn distant_objects_count_as_infinite() {
 }
 
 #[test]
+fn a_tilt_or_a_temperature_that_moves_no_ray_counts_as_none() {
+    let gauss = lens("double_gauss_rudolph_50");
+    for (degrees, tilted) in [(1e-9, false), (0.2, true)] {
+        let mut lens = gauss.clone();
+        lens.surfaces[3].tilt = [degrees, 0.0];
+        let auto = planned(&lens, 0, TASK, &EffectOverrides::default());
+        let poses = auto.decision(Effect::Poses).unwrap();
+        assert_eq!(poses.computed, tilted, "{poses:?}");
+        assert!(poses.error > 0.0 && poses.residual <= poses.limit, "{poses:?}");
+        check("tilted double Gauss", 0, &lens, &auto, poses);
+        let off = planned(&lens, 0, TASK, &forced(Effect::Poses, EffectOverride::Off));
+        let mut system = lens.resolve(0, 0.5875618).unwrap();
+        simplify(&mut system, &off);
+        assert!(!system.has_poses());
+    }
+    let singlet = lens("singlet_la1131");
+    for (celsius, matters) in [(20.0001, false), (60.0, true)] {
+        let mut lens = singlet.clone();
+        lens.environment.celsius = Some(celsius);
+        let auto = planned(&lens, 0, TASK, &EffectOverrides::default());
+        let warmth = auto.decision(Effect::Temperature).unwrap();
+        assert_eq!(warmth.computed, matters, "{warmth:?}");
+        assert!(warmth.error > 0.0 && warmth.residual <= warmth.limit, "{warmth:?}");
+        check("warm singlet", 0, &lens, &auto, warmth);
+        let off = planned(&lens, 0, TASK, &forced(Effect::Temperature, EffectOverride::Off));
+        let [off, plain] = [(&lens, off), (&singlet, auto.clone())].map(|(lens, plan)| {
+            build_ray_model(lens, 0, &plan).unwrap().channels[0].system.clone()
+        });
+        assert_eq!(off, plain);
+    }
+    let idle = planned(&gauss, 0, TASK, &EffectOverrides::default());
+    for effect in [Effect::Poses, Effect::Temperature] {
+        assert!(!idle.computes(effect) && idle.decision(effect).unwrap().error == 0.0);
+    }
+}
+
+#[test]
 fn unreached_semi_diameters_are_dropped_and_others_kept() {
     let mut lens = lens("double_gauss_rudolph_50");
     lens.surfaces[0].semi_diameter = Some(50.0);

@@ -240,11 +240,19 @@ const OBJECT_IN_PLACE: EffectRule = EffectRule {
     reason: "the ideal heights are those of the object where it is",
 };
 
+/// The rule for a comparison of temperatures.
+const TEMPERATURES: EffectRule = EffectRule {
+    effect: Effect::Temperature,
+    allowed: AllowedSetting::AlwaysOn,
+    reason: "the analysis compares temperatures",
+};
+
 impl AnalysisKind {
     /// The effects that the analysis does not leave to the plan.
     fn effect_rules(self) -> &'static [EffectRule] {
         match self {
-            Self::Spot | Self::Fan | Self::ThroughFocus | Self::Mtf | Self::Thermal => &[],
+            Self::Spot | Self::Fan | Self::ThroughFocus | Self::Mtf => &[],
+            Self::Thermal => &[TEMPERATURES],
             Self::LateralColor | Self::Longitudinal => &[COLORS],
             Self::Distortion | Self::DistortionGrid => &[ONE_WAVELENGTH, OBJECT_IN_PLACE],
             Self::SpotMap => &[ALL_FIELDS],

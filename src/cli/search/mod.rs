@@ -1,5 +1,6 @@
 //! `search`: optimization of the structure, in a run that can be stopped, killed and resumed.
 
+mod best_so_far;
 mod limits;
 mod plan_args;
 mod report;
@@ -13,6 +14,7 @@ use super::failures::Failures;
 use super::input::{self, LensFile};
 use super::output::{Output, ShortNumber, print_note};
 use super::output_paths::{OutputPaths, stale_note};
+use super::overdue::FoundSoFar;
 use super::progress::{progress_bar, stop_flag};
 use crate::files::{self, CheckpointError, FileLock};
 use crate::lens::Lens;
@@ -22,6 +24,7 @@ use crate::search::lens_landscape::{
     LandscapeError, LensLandscape, SearchPlan, describe_left_out, finalize,
 };
 use crate::search::{FoundPoint, RunEnd, SearchError, SearchMethod, SearchRun, SearchRunOn};
+use best_so_far::BestSoFar;
 use report::SearchReport;
 use result::StartAgainstBest;
 use serde::Serialize;
@@ -120,6 +123,9 @@ impl SearchArgs {
         self.check()?;
         self.check_paths()?;
         let stop = stop_flag();
+        let (out, json) = (self.out.clone(), output.is_json());
+        let so_far = BestSoFar { json, out, best: None, gradients: 0 };
+        let so_far = FoundSoFar::watch(&stop, so_far, BestSoFar::save_and_print);
         let design = self.design_effects()?;
         let opened = self.lens.open()?;
         let _lock = self.checkpoint.as_deref().map(FileLock::acquire).transpose()?;
@@ -140,7 +146,17 @@ impl SearchArgs {
         let watch = Stopwatch::start();
         let before = run.statistics().gradients;
         let mut failures = Failures::default();
-        let ended = self.run_rounds(&landscape, &mut run, &stop, watch, &mut failures);
+        let tell = |run: &SearchRunOn<LensLandscape>| {
+            let best = run.best();
+            so_far.update(|so_far| {
+                so_far.gradients = run.statistics().gradients;
+                if so_far.is_improved_by(best.loss) {
+                    so_far.best = Some((lens_to_write(&best.point, &original), best.loss));
+                }
+            });
+        };
+        tell(&run);
+        let ended = self.run_rounds(&landscape, &mut run, &stop, watch, &mut failures, tell);
         let ms = 1e3 * watch.seconds();
         let mut unsaved = self.save_best(&run.best().point, &original, &mut failures);
         let stored = self.write_reservoir(&run, &original, &mut failures);
@@ -171,6 +187,7 @@ impl SearchArgs {
             finished,
             effects,
         });
+        drop(so_far);
         failures.note(output.print(&report));
         failures.note(report.check_finished());
         failures.into_result()
@@ -271,10 +288,12 @@ impl SearchArgs {
         stop: &AtomicBool,
         watch: Stopwatch,
         failures: &mut Failures,
+        tell: impl Fn(&SearchRunOn<LensLandscape>),
     ) -> SearchEnd {
         let bar = progress_bar(run.settings().gradients.unwrap_or(0) as usize);
         let (mut saved, mut is_failing) = (0.0, false);
         let flow = run.advance(landscape, |run, _| {
+            tell(run);
             bar.set_position(run.statistics().gradients);
             bar.set_message(format!("merit {}", ShortNumber(run.best().loss)));
             if watch.seconds() - saved >= self.checkpoint_every {

@@ -94,7 +94,7 @@ fn no_effect_saves_more_time_than_was_spent_and_what_does_nothing_saves_none() {
             assert!(saved < elapsed, "{name}: {effect} of {elapsed} ms");
         }
         // Spheres and planes in air with an object at infinity.
-        for idle in ["asphere", "finite_object", "gradient"] {
+        for idle in ["asphere", "finite_object", "gradient", "poses", "temperature"] {
             let effect = effects.iter().find(|effect| effect["effect"] == idle).unwrap();
             assert_eq!(effect["saved_ms"].as_f64(), Some(0.0), "{name}: {effect}");
         }

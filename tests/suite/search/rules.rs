@@ -21,7 +21,8 @@ fn under(lens: &Lens, rules: SearchRules) -> Result<LensLandscape, String> {
 fn every_rule_is_checked_by_name() {
     let usual = SearchRules::default;
     let (nan, infinite) = (f64::NAN, f64::INFINITY);
-    let bad: [(&str, &str, SearchRules); 22] = [
+    let bad: [(&str, &str, SearchRules); 23] = [
+        ("elements", "[0, 0]", SearchRules { elements: [0, 0], ..usual() }),
         ("elements", "[4, 2]", SearchRules { elements: [4, 2], ..usual() }),
         ("kept", "[3, 5]", SearchRules { fixed_ends: [3, 5], ..usual() }),
         ("kept", "7 of the lens", SearchRules { fixed_ends: [usize::MAX, usize::MAX], ..usual() }),
