@@ -20,6 +20,19 @@ pub(super) struct ZemaxFile {
     /// The number of configurations.
     pub(super) configurations: usize,
     pub(super) operands: Vec<ConfigurationOperand>,
+    /// The operands of the tolerance editor.
+    pub(super) tolerances: Vec<ToleranceLine>,
+}
+
+/// An operand of the tolerance editor.
+#[derive(Debug)]
+pub(super) struct ToleranceLine {
+    pub(super) name: String,
+    /// Its two whole numbers, as a rule surfaces.
+    pub(super) places: [usize; 2],
+    pub(super) min: f64,
+    pub(super) max: f64,
+    pub(super) line: usize,
 }
 
 impl Default for ZemaxFile {
@@ -36,6 +49,7 @@ impl Default for ZemaxFile {
             surfaces: Vec::new(),
             configurations: 1,
             operands: Vec::new(),
+            tolerances: Vec::new(),
         }
     }
 }

@@ -13,6 +13,7 @@ mod line;
 mod parse;
 mod row_plan;
 mod shape;
+mod tolerance;
 mod write;
 
 pub(super) use freeform::merged_powers;

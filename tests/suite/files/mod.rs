@@ -12,6 +12,7 @@ mod vignetting;
 mod volume;
 mod writers;
 mod zemax;
+mod zemax_tolerances;
 
 use std::path::PathBuf;
 

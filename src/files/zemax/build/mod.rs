@@ -11,7 +11,7 @@ mod zoom;
 
 use super::file::{ZemaxFile, ZemaxSurface};
 use super::row_plan::{RowPlan, is_break};
-use super::{glass, gradient};
+use super::{glass, gradient, tolerance};
 use crate::files::error::ParseError;
 use crate::files::foreign_lens::ForeignLens;
 use crate::files::report::{ConversionOutcome, ConversionReport};
@@ -50,6 +50,7 @@ pub(super) fn build(file: &ZemaxFile, report: &mut ConversionReport) -> Result<L
     zoom::add_positions(file, &plan, &mut lens, &zoom_names, report)?;
     solve::add_solves(file, &plan, &mut lens, report);
     beam::infinite_f_number(file, &mut lens, report);
+    lens.tolerances = tolerance::sheet(file, &plan, &lens, report);
     Ok(lens)
 }
 

@@ -2,7 +2,7 @@
 
 use super::{LineOutcome, dropped, preserved, used};
 use crate::files::error::ParseError;
-use crate::files::zemax::file::{ApertureLine, ZemaxFile};
+use crate::files::zemax::file::{ApertureLine, ToleranceLine, ZemaxFile};
 use crate::files::zemax::line::ZemaxLine;
 
 /// Reads a line of the header; `None` for other lines.
@@ -32,10 +32,26 @@ pub(super) fn read(
             vignetting(file, line)
         }
         "VERS" | "GFAC" | "RAIM" | "PUSH" | "SDMA" | "ROPD" | "PICB" | "POLS" | "GLRS" | "GSTD"
-        | "NSCD" | "COFN" | "PFIL" | "LANG" | "TOL" => preserved(),
+        | "NSCD" | "COFN" | "PFIL" | "LANG" => preserved(),
+        "TOL" => tolerance(file, line),
         _ => return Ok(None),
     };
     Ok(Some(verdict))
+}
+
+/// Keeps an operand of the tolerance editor; a line that is none does no harm.
+fn tolerance(file: &mut ZemaxFile, line: &ZemaxLine<'_>) -> LineOutcome {
+    let operand = || -> Result<ToleranceLine, ParseError> {
+        Ok(ToleranceLine {
+            name: line.word(0)?.to_owned(),
+            places: [line.count(1)?, line.count(2)?],
+            min: line.number(3)?,
+            max: line.number(4)?,
+            line: line.number,
+        })
+    };
+    file.tolerances.extend(operand().ok());
+    preserved()
 }
 
 fn text(to: &mut String, rest: &str) -> LineOutcome {

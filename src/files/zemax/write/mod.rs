@@ -12,11 +12,13 @@ use crate::files::report::{ConversionOutcome, ConversionReport};
 use crate::files::text::{number, numbers};
 use crate::files::zemax::INFINITE_GAP;
 use crate::files::zemax::freeform::{self, FormLines};
+use crate::files::zemax::tolerance;
 use crate::lens::{
     Lens, LensError, Parameter, Pickup, Quantity, Row, SurfaceNumber, SystemError, Variable,
     at_zoom,
 };
-use place::{FileNumbers, RowBreaks, file_numbers, row_breaks};
+pub(super) use place::FileNumbers;
+use place::{RowBreaks, file_numbers, row_breaks};
 
 /// The text of the file, and the report of everything that is not exact.
 ///
@@ -43,6 +45,7 @@ pub fn write(lens: &Lens) -> Result<(String, ConversionReport), LensError> {
     export.apply_focus_solve();
     export.header();
     export.surfaces();
+    export.tolerances();
     export.table();
     export.report_losses();
     Ok((export.text, export.report))
@@ -106,6 +109,14 @@ impl ZemaxWriter {
     /// True if the focus solve can be written as a solve of the other program.
     fn has_focus_solve(&self) -> bool {
         self.lens.image_solve == Some(0.0)
+    }
+
+    fn tolerances(&mut self) {
+        let (lines, remarks) = tolerance::operand_lines(&self.lens, &self.numbers);
+        lines.iter().for_each(|line| self.line(line));
+        for (outcome, what, note) in remarks {
+            self.record(outcome, what, note);
+        }
     }
 
     /// Turns a single zoom position into the lens itself: one configuration is not a zoom lens there.

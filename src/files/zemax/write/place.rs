@@ -20,11 +20,11 @@ pub(super) struct CoordinateBreak {
 
 /// The numbers that a surface of the lens has in the file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct FileNumbers {
+pub(in crate::files::zemax) struct FileNumbers {
     /// The surface.
-    pub(super) surface: usize,
+    pub(in crate::files::zemax) surface: usize,
     /// The surface or coordinate break in front of its gap.
-    pub(super) gap: usize,
+    pub(in crate::files::zemax) gap: usize,
 }
 
 impl RowBreaks {
