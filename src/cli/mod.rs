@@ -34,7 +34,6 @@ mod output_paths;
 mod overdue;
 mod pareto;
 mod picture;
-mod picture_device;
 mod progress;
 mod report;
 mod search;

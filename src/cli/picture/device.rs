@@ -1,12 +1,12 @@
 //! The device that quick pictures are made on: a graphics card where there is one.
 
-use super::error::CliError;
+use crate::cli::error::CliError;
 use crate::picture::{PictureDevice, install_picture_device};
 use std::sync::Arc;
 
 /// The device of quick pictures that a person asks for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, clap::ValueEnum)]
-pub(super) enum DeviceChoice {
+pub(in crate::cli) enum DeviceChoice {
     /// A graphics card where there is one, else the processor.
     #[default]
     Auto,
@@ -24,7 +24,7 @@ impl DeviceChoice {
     ///
     /// # Errors
     /// A graphics card is asked for, and there is none.
-    pub(super) fn install(self) -> Result<(), CliError> {
+    pub(in crate::cli) fn install(self) -> Result<(), CliError> {
         let found = match self {
             Self::Cpu => None,
             Self::Auto => find().ok().filter(|(_, is_software)| !is_software),

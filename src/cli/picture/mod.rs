@@ -1,12 +1,16 @@
 //! `picture`: what a camera with a lens sees of a scene.
 
+mod device;
+mod report;
+
+pub(super) use device::DeviceChoice;
+
 use super::analyze::parse_coating;
 use super::error::CliError;
 use super::failures::Failures;
 use super::input::{LensFile, LoadedLens, Tolerance};
-use super::output::{Output, ShortNumber, print_note};
+use super::output::{Output, print_note};
 use super::output_paths::OutputPaths;
-use super::picture_device::DeviceChoice;
 use super::progress::{progress_bar, stop_flag};
 use crate::analysis::{Coating, Estimate};
 use crate::files::{read_color, write_atomic};
@@ -14,16 +18,13 @@ use crate::lens::{Lens, Object};
 use crate::measure::time_ms;
 use crate::picture::{
     BitDepth, BuiltInScene, ColorBand, Coloring, ErrorMap, ExactRenderer, ExactSettings, Exposure,
-    GhostLight, GhostReport, ImageFrame, LossReport, MID_GREY, OmittedEffect, Picture,
-    PictureError, QuickPicture, QuickRenderer, Raster, Scene, SensorModel, SensorPreset, ToneCurve,
-    encode_colors, encode_png, field_diagonal, focused, omitted_beside, photon_count,
-    picture_model, quick_error,
+    GhostLight, GhostReport, ImageFrame, LossReport, MID_GREY, Picture, PictureError, QuickPicture,
+    QuickRenderer, Raster, Scene, SensorPreset, ToneCurve, encode_colors, encode_png,
+    field_diagonal, focused, omitted_beside, photon_count, picture_model, quick_error,
 };
 use crate::pupil::RayModel;
-use crate::trace::Fates;
-use serde::Serialize;
+use report::{ErrorMapReport, PictureReport, SensorReport};
 use std::env;
-use std::fmt::{self, Display};
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::process;
@@ -31,7 +32,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 /// A picture of a scene through the lens, by rays traced backwards, with its error
 #[derive(Debug, clap::Args)]
-#[command(after_long_help = include_str!("help/picture.txt"))]
+#[command(after_long_help = include_str!("../help/picture.txt"))]
 pub(super) struct PictureArgs {
     #[command(flatten)]
     lens: LensFile,
@@ -492,159 +493,4 @@ struct CameraShot {
     focus: Option<f64>,
     /// The distance of the scene in mm; `None` at infinity.
     distance: Option<f64>,
-}
-
-/// The printed result.
-#[derive(Serialize)]
-struct PictureReport {
-    scene: String,
-    pixels: [usize; 2],
-    size: [f64; 2],
-    focus: Option<f64>,
-    distance: Option<f64>,
-    way: &'static str,
-    device: Option<String>,
-    error: f64,
-    error_of_error: f64,
-    tolerance: f64,
-    reached: bool,
-    complete: bool,
-    white: f64,
-    mean: f64,
-    rays: usize,
-    rays_per_pixel: f64,
-    fates: Fates,
-    left_out: Vec<OmittedEffect>,
-    losses: Option<LossReport>,
-    ghosts: Option<GhostReport>,
-    ghosts_milliseconds: Option<f64>,
-    error_map: Option<ErrorMapReport>,
-    sensor: Option<SensorReport>,
-    quick_milliseconds: Option<f64>,
-    milliseconds: f64,
-    out: Option<String>,
-}
-
-/// The map of the error.
-#[derive(Serialize)]
-struct ErrorMapReport {
-    tiles: usize,
-    error: f64,
-    error_of_error: f64,
-    largest: f64,
-}
-
-/// The exposure of a sensor.
-#[derive(Serialize)]
-struct SensorReport {
-    name: &'static str,
-    source: &'static str,
-    #[serde(flatten)]
-    model: SensorModel,
-    bayer: bool,
-    luminance: f64,
-    seconds: f64,
-    white_photons: f64,
-    /// At white, at mid grey and at a hundredth of white.
-    signal_to_noise: [f64; 3],
-    saturated: f64,
-}
-
-impl Display for SensorReport {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let [white, grey, dark] = self.signal_to_noise;
-        let seconds = ShortNumber(self.seconds);
-        writeln!(f, "sensor {}: {seconds} s at {} cd/m2", self.name, self.luminance)?;
-        writeln!(f, "  {} photons at white", ShortNumber(self.white_photons))?;
-        writeln!(
-            f,
-            "  signal to noise {white:.1} at white, {grey:.1} at mid grey, {dark:.1} at 1 %"
-        )?;
-        writeln!(f, "  {:.2} % saturated; {}", 100.0 * self.saturated, self.source)
-    }
-}
-
-impl PictureReport {
-    /// The losses, the ghosts and the map of the error.
-    fn write_reflections(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let percent = |share: f64| 100.0 * share;
-        if let Some(map) = &self.error_map {
-            let (error, largest) = (percent(map.error), percent(map.largest));
-            let spread = percent(map.error_of_error);
-            let tiles = map.tiles;
-            writeln!(
-                f,
-                "error of all {tiles} tiles {error:.3} ± {spread:.3} %, at most {largest:.2} %"
-            )?;
-        }
-        if let Some(losses) = &self.losses {
-            let LossReport { coating, transmission, variation, by_ray, .. } = losses;
-            let how = if *by_ray { "each ray by itself" } else { "one share for each colour" };
-            let (passed, varied) = (percent(*transmission), percent(*variation));
-            writeln!(
-                f,
-                "losses on: {coating}, {passed:.1} % arrives on the axis; it varies by {varied:.2} %: {how}"
-            )?;
-        }
-        if let Some(GhostReport { on: true, change, error, pairs, rays, .. }) = &self.ghosts {
-            let (change, error) = (percent(*change), percent(*error));
-            let [followed, all] = pairs;
-            writeln!(
-                f,
-                "ghosts on: up to {change:.2} ± {error:.2} % of mid grey, {followed} of {all} pairs, {rays} \
-                 rays, {:.0} ms",
-                self.ghosts_milliseconds.unwrap_or(0.0)
-            )?;
-        }
-        Ok(())
-    }
-}
-
-impl Display for PictureReport {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let place = |distance: Option<f64>| {
-            distance.map_or("infinity".to_owned(), |mm| format!("{} mm", ShortNumber(mm)))
-        };
-        let ([width, height], [columns, rows]) = (self.size, self.pixels);
-        writeln!(f, "{} at {}, focus at {}", self.scene, place(self.distance), place(self.focus))?;
-        writeln!(f, "{columns} x {rows} pixels on {width:.3} x {height:.3} mm")?;
-        let reached = if self.reached { "" } else { ", not reached" };
-        let percent = 100.0 * self.tolerance;
-        let of_quick = self.quick_milliseconds.map(|ms| {
-            let error = 100.0 * self.error_of_error;
-            let device = self.device.as_deref().unwrap_or("the processor");
-            format!(
-                " ± {error:.3} %, against the exact way on some tiles; made in {ms:.0} ms on {device}"
-            )
-        });
-        let of_quick = of_quick.unwrap_or_else(|| " by sampling".to_owned());
-        writeln!(
-            f,
-            "error {:.3} % of mid grey (rms){of_quick}; asked for {} %{reached}",
-            100.0 * self.error,
-            ShortNumber(percent)
-        )?;
-        writeln!(
-            f,
-            "on-axis image irradiance of a white card: {} of its radiance",
-            ShortNumber(self.white)
-        )?;
-        let lost = 100.0 * (1.0 - self.fates.imaged as f64 / self.rays.max(1) as f64);
-        let lost = match self.way {
-            "exact" => format!(", {lost:.1} % lost at rims"),
-            _ => " to measure the error".to_owned(),
-        };
-        writeln!(
-            f,
-            "{} rays ({:.0} a pixel{lost}), {:.0} ms",
-            self.rays, self.rays_per_pixel, self.milliseconds
-        )?;
-        self.write_reflections(f)?;
-        for OmittedEffect { effect, change, reason } in &self.left_out {
-            let change = change.map(|c| format!("{:.2} %, ", 100.0 * c)).unwrap_or_default();
-            writeln!(f, "left out: {effect} ({change}{reason})")?;
-        }
-        self.sensor.iter().try_for_each(|sensor| write!(f, "{sensor}"))?;
-        self.out.as_ref().map_or(Ok(()), |out| writeln!(f, "saved as {out}"))
-    }
 }

@@ -1,0 +1,162 @@
+//! The printed result of `picture`.
+
+use crate::cli::output::ShortNumber;
+use crate::picture::{GhostReport, LossReport, OmittedEffect, SensorModel};
+use crate::trace::Fates;
+use serde::Serialize;
+use std::fmt::{self, Display};
+
+/// The printed result.
+#[derive(Serialize)]
+pub(super) struct PictureReport {
+    pub(super) scene: String,
+    pub(super) pixels: [usize; 2],
+    pub(super) size: [f64; 2],
+    pub(super) focus: Option<f64>,
+    pub(super) distance: Option<f64>,
+    pub(super) way: &'static str,
+    pub(super) device: Option<String>,
+    pub(super) error: f64,
+    pub(super) error_of_error: f64,
+    pub(super) tolerance: f64,
+    pub(super) reached: bool,
+    pub(super) complete: bool,
+    pub(super) white: f64,
+    pub(super) mean: f64,
+    pub(super) rays: usize,
+    pub(super) rays_per_pixel: f64,
+    pub(super) fates: Fates,
+    pub(super) left_out: Vec<OmittedEffect>,
+    pub(super) losses: Option<LossReport>,
+    pub(super) ghosts: Option<GhostReport>,
+    pub(super) ghosts_milliseconds: Option<f64>,
+    pub(super) error_map: Option<ErrorMapReport>,
+    pub(super) sensor: Option<SensorReport>,
+    pub(super) quick_milliseconds: Option<f64>,
+    pub(super) milliseconds: f64,
+    pub(super) out: Option<String>,
+}
+
+/// The map of the error.
+#[derive(Serialize)]
+pub(super) struct ErrorMapReport {
+    pub(super) tiles: usize,
+    pub(super) error: f64,
+    pub(super) error_of_error: f64,
+    pub(super) largest: f64,
+}
+
+/// The exposure of a sensor.
+#[derive(Serialize)]
+pub(super) struct SensorReport {
+    pub(super) name: &'static str,
+    pub(super) source: &'static str,
+    #[serde(flatten)]
+    pub(super) model: SensorModel,
+    pub(super) bayer: bool,
+    pub(super) luminance: f64,
+    pub(super) seconds: f64,
+    pub(super) white_photons: f64,
+    /// At white, at mid grey and at a hundredth of white.
+    pub(super) signal_to_noise: [f64; 3],
+    pub(super) saturated: f64,
+}
+
+impl Display for SensorReport {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [white, grey, dark] = self.signal_to_noise;
+        let seconds = ShortNumber(self.seconds);
+        writeln!(f, "sensor {}: {seconds} s at {} cd/m2", self.name, self.luminance)?;
+        writeln!(f, "  {} photons at white", ShortNumber(self.white_photons))?;
+        writeln!(
+            f,
+            "  signal to noise {white:.1} at white, {grey:.1} at mid grey, {dark:.1} at 1 %"
+        )?;
+        writeln!(f, "  {:.2} % saturated; {}", 100.0 * self.saturated, self.source)
+    }
+}
+
+impl PictureReport {
+    /// The losses, the ghosts and the map of the error.
+    fn write_reflections(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let percent = |share: f64| 100.0 * share;
+        if let Some(map) = &self.error_map {
+            let (error, largest) = (percent(map.error), percent(map.largest));
+            let spread = percent(map.error_of_error);
+            let tiles = map.tiles;
+            writeln!(
+                f,
+                "error of all {tiles} tiles {error:.3} ± {spread:.3} %, at most {largest:.2} %"
+            )?;
+        }
+        if let Some(losses) = &self.losses {
+            let LossReport { coating, transmission, variation, by_ray, .. } = losses;
+            let how = if *by_ray { "each ray by itself" } else { "one share for each colour" };
+            let (passed, varied) = (percent(*transmission), percent(*variation));
+            writeln!(
+                f,
+                "losses on: {coating}, {passed:.1} % arrives on the axis; it varies by {varied:.2} %: {how}"
+            )?;
+        }
+        if let Some(GhostReport { on: true, change, error, pairs, rays, .. }) = &self.ghosts {
+            let (change, error) = (percent(*change), percent(*error));
+            let [followed, all] = pairs;
+            writeln!(
+                f,
+                "ghosts on: up to {change:.2} ± {error:.2} % of mid grey, {followed} of {all} pairs, {rays} \
+                 rays, {:.0} ms",
+                self.ghosts_milliseconds.unwrap_or(0.0)
+            )?;
+        }
+        Ok(())
+    }
+}
+
+impl Display for PictureReport {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let place = |distance: Option<f64>| {
+            distance.map_or("infinity".to_owned(), |mm| format!("{} mm", ShortNumber(mm)))
+        };
+        let ([width, height], [columns, rows]) = (self.size, self.pixels);
+        writeln!(f, "{} at {}, focus at {}", self.scene, place(self.distance), place(self.focus))?;
+        writeln!(f, "{columns} x {rows} pixels on {width:.3} x {height:.3} mm")?;
+        let reached = if self.reached { "" } else { ", not reached" };
+        let percent = 100.0 * self.tolerance;
+        let of_quick = self.quick_milliseconds.map(|ms| {
+            let error = 100.0 * self.error_of_error;
+            let device = self.device.as_deref().unwrap_or("the processor");
+            format!(
+                " ± {error:.3} %, against the exact way on some tiles; made in {ms:.0} ms on {device}"
+            )
+        });
+        let of_quick = of_quick.unwrap_or_else(|| " by sampling".to_owned());
+        writeln!(
+            f,
+            "error {:.3} % of mid grey (rms){of_quick}; asked for {} %{reached}",
+            100.0 * self.error,
+            ShortNumber(percent)
+        )?;
+        writeln!(
+            f,
+            "on-axis image irradiance of a white card: {} of its radiance",
+            ShortNumber(self.white)
+        )?;
+        let lost = 100.0 * (1.0 - self.fates.imaged as f64 / self.rays.max(1) as f64);
+        let lost = match self.way {
+            "exact" => format!(", {lost:.1} % lost at rims"),
+            _ => " to measure the error".to_owned(),
+        };
+        writeln!(
+            f,
+            "{} rays ({:.0} a pixel{lost}), {:.0} ms",
+            self.rays, self.rays_per_pixel, self.milliseconds
+        )?;
+        self.write_reflections(f)?;
+        for OmittedEffect { effect, change, reason } in &self.left_out {
+            let change = change.map(|c| format!("{:.2} %, ", 100.0 * c)).unwrap_or_default();
+            writeln!(f, "left out: {effect} ({change}{reason})")?;
+        }
+        self.sensor.iter().try_for_each(|sensor| write!(f, "{sensor}"))?;
+        self.out.as_ref().map_or(Ok(()), |out| writeln!(f, "saved as {out}"))
+    }
+}
