@@ -14,6 +14,7 @@ mod grin;
 mod grin_starts;
 mod limits;
 mod machine;
+mod minima;
 mod mtf;
 mod optimize;
 mod picture;
@@ -39,6 +40,7 @@ pub use grin::{
 pub use grin_starts::GrinStarts;
 pub use limits::{LimitComparison, LimitedDescent, compare_limit_treatments};
 pub use machine::{Machine, MemoryUse, age_ms, peak_megabytes, processor_ms};
+pub use minima::{MinimaCount, count_minima};
 pub use mtf::{TransferCurves, TransferMethod, TransferRow, measure_transfer};
 pub use optimize::{StepCosts, StepRow, measure_step_costs};
 pub use picture::{PictureCurves, PictureRow, PictureWay, measure_picture};

@@ -4,7 +4,7 @@
 //! surfaces are held first: their curvatures follow the change of the index. The glasses are tried in a
 //! random order, eight at a time, each with some steps of optimization; the best of them goes on.
 
-use super::{DescentMethod, Optimizer, start_with};
+use super::{DescentMethod, Optimizer, start_from};
 use crate::lens::glass::{self, Glass};
 use crate::lens::{Lens, Medium, Parameter, Quantity, SurfaceNumber, System};
 use crate::merit::{Goal, Merit, MeritError};
@@ -163,7 +163,7 @@ impl GlassSearch {
     pub fn resume(&self) -> Result<Box<dyn Optimizer>, MeritError> {
         let merit = Merit::new(&self.best, &self.goal, self.tolerance)?;
         let merit = merit.with_initial_light(&self.initial_light);
-        start_with(DescentMethod::TrustRegion, merit, &self.best, self.tolerance)
+        start_from(DescentMethod::TrustRegion, merit, &self.best, self.tolerance)
     }
 
     /// Goes on from another lens with glasses to exchange, whose light is compared with that of the first
@@ -247,7 +247,7 @@ impl GlassSearch {
         }
         let merit = merit.with_initial_light(&self.initial_light);
         let method = DescentMethod::TrustRegion;
-        let mut optimizer = start_with(method, merit, lens, self.tolerance).ok()?;
+        let mut optimizer = start_from(method, merit, lens, self.tolerance).ok()?;
         let mut evaluations = 0;
         for _ in 0..steps {
             let progress = optimizer.step();

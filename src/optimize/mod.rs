@@ -146,11 +146,14 @@ pub fn start(
     goal: &Goal,
     tolerance: f64,
 ) -> Result<Box<dyn Optimizer>, MeritError> {
-    start_with(method, Merit::new(lens, goal, tolerance)?, lens, tolerance)
+    start_from(method, Merit::new(lens, goal, tolerance)?, lens, tolerance)
 }
 
 /// As [`start`], from a merit function of the lens.
-fn start_with(
+///
+/// # Errors
+/// As [`start`].
+pub fn start_from(
     method: DescentMethod,
     merit: Merit,
     lens: &Lens,

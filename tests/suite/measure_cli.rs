@@ -1,4 +1,4 @@
-//! `aplanat measure mtf` and `measure picture`: their numbers, and what is refused.
+//! `aplanat measure mtf`, `picture` and `minima`: their numbers, and what is refused.
 
 use super::cli::{Scratch, done, done_json, refused};
 use serde_json::Value;
@@ -62,6 +62,28 @@ fn tolerances_are_exact_and_their_costs_are_told() {
         cost["gradients"].as_array().unwrap().iter().map(|row| &row["tolerances"]).collect();
     assert_eq!(counts, [10, 100, 1000]);
     assert_eq!(report["designs"], Value::Null);
+}
+
+/// The spots of a singlet depend on its bending alone, and have one minimum in it; other ends are at
+/// limits of its thickness and rims.
+#[test]
+fn descents_of_a_singlet_end_at_few_minima() {
+    let command = ["measure", "minima", "lenses/singlet_la1131.json", "--starts", "24"];
+    let count = |report: &Value, key: &str| report[key].as_u64().unwrap();
+    let report = done_json(&command, "");
+    let [ended, distinct] = ["ended", "distinct"].map(|key| count(&report, key));
+    let parts = ["lost", "unfinished", "ended"].map(|key| count(&report, key));
+    assert_eq!(parts.iter().sum::<u64>(), 24, "{report}");
+    assert!(ended >= 12 && distinct >= 1 && 3 * distinct <= ended, "{report}");
+    assert!(count(&report, "found_once") + 2 * count(&report, "found_twice") <= ended, "{report}");
+    // The same seed, the same minima; another one, other descents.
+    let again = done_json(&command, "");
+    for key in ["ended", "distinct", "evaluations", "best"] {
+        assert_eq!(again[key], report[key], "{key}");
+    }
+    let other = done_json(&[&command[..], &["--seed", "2"]].concat(), "");
+    assert_ne!(other["evaluations"], report["evaluations"]);
+    refused(2, &["measure", "minima", LENS, "--starts", "0"], "", &["--starts", "1 or more"]);
 }
 
 #[test]

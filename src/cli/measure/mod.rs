@@ -6,6 +6,7 @@ mod glasses;
 mod gradient;
 mod grin;
 mod limits;
+mod minima;
 mod mtf;
 mod optimize;
 mod picture;
@@ -40,6 +41,7 @@ enum BenchmarkCommand {
     Limits(limits::MeasureLimitsArgs),
     Glasses(glasses::MeasureGlassesArgs),
     Search(Box<search::MeasureSearchArgs>),
+    Minima(Box<minima::MeasureMinimaArgs>),
     Design(design::MeasureDesignArgs),
     Tolerance(tolerance::MeasureToleranceArgs),
     Window(window::MeasureWindowArgs),
@@ -58,6 +60,7 @@ impl MeasureArgs {
             BenchmarkCommand::Limits(limits) => limits.run(output),
             BenchmarkCommand::Glasses(glasses) => glasses.run(output),
             BenchmarkCommand::Search(search) => search.run(output),
+            BenchmarkCommand::Minima(minima) => minima.run(output),
             BenchmarkCommand::Design(design) => design.run(output),
             BenchmarkCommand::Tolerance(tolerance) => tolerance.run(output),
             BenchmarkCommand::Window(window) => window.run(output),

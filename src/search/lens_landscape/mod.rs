@@ -201,6 +201,11 @@ impl LensLandscape {
         &self.start
     }
 
+    /// The target focal length of the start, in mm.
+    pub fn focal_length(&self) -> f64 {
+        self.focal_length
+    }
+
     /// The rules.
     pub fn rules(&self) -> &SearchRules {
         &self.rules

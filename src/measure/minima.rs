@@ -1,0 +1,248 @@
+//! The number of different minima that descents from random lenses of one structure find in a time.
+//!
+//! A descent ends at a minimum when the optimizer says so: its gradient has vanished, or nothing can be
+//! gained at the tolerance of the spots. Two minima are the same if the signs of their curvatures and
+//! powers are, and if they are near in the metric of the residuals: `d² = dxᵀ Jᵀ J dx / F` predicts the
+//! relative change of the merit between them. Near a distance of 1 the merit between them decides: a
+//! hill above both means two.
+
+use super::timing::Stopwatch;
+use crate::lens::{Lens, Medium};
+use crate::merit::{DerivativeLevel, Merit, MeritError};
+use crate::optimize::{DescentMethod, start_from};
+use crate::search::lens_landscape::{LensLandscape, SearchPlan, SearchSetupError};
+use crate::search::{Landscape as _, Random};
+use nalgebra::{DMatrix, DVector};
+use rand::SeedableRng as _;
+use rayon::prelude::*;
+use serde::Serialize;
+use std::collections::BTreeMap;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// The evaluations after which a descent that has not ended is given up.
+const MOST_EVALUATIONS: usize = 1000;
+/// The starts between two looks at the flag.
+const BATCH: u64 = 32;
+/// The curvature relative to the focal length below which a surface counts as plane.
+const PLANE: f64 = 0.05;
+/// The square of the distance below which two minima are the same, and that above which they are not.
+const SAME: f64 = 1e-2;
+const DIFFERENT: f64 = 1.0;
+/// The relative height of a hill that parts two minima.
+const HILL: f64 = 1e-2;
+/// The places between two minima where the merit is evaluated.
+const BETWEEN: [f64; 4] = [0.2, 0.4, 0.6, 0.8];
+
+/// The minima that descents from random lenses have found.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct MinimaCount {
+    /// The random lenses.
+    pub starts: u64,
+    /// The descents that lost the light, or whose lens became invalid.
+    pub lost: u64,
+    /// The descents that were given up.
+    pub unfinished: u64,
+    /// The descents that ended at a minimum.
+    pub ended: u64,
+    /// The different minima among these.
+    pub distinct: usize,
+    /// The signs of curvatures and powers among them.
+    pub families: usize,
+    /// The minima that were found once, and those found twice.
+    pub found_once: usize,
+    /// The minima that were found twice.
+    pub found_twice: usize,
+    /// The estimated number of minima that were not found: `n₁²/2n₂` (Chao, Scand. J. Stat. 11, 1984);
+    /// `None` if none was found twice.
+    pub unseen: Option<f64>,
+    /// The evaluations of the merit with its derivatives, all descents together.
+    pub evaluations: usize,
+    /// The seconds that it took.
+    pub seconds: f64,
+    /// The different minima in an hour at this rate.
+    pub distinct_an_hour: f64,
+    /// The merits of the best minima in mm².
+    pub best: Vec<f64>,
+}
+
+/// The number of the best merits that are told.
+const TOLD: usize = 10;
+
+/// A minimum and how often it was found.
+#[derive(Debug)]
+struct Minimum {
+    values: DVector<f64>,
+    merit: f64,
+    found: usize,
+}
+
+/// The end of a descent.
+enum DescentEnd {
+    Lost,
+    Unfinished,
+    Minimum(Box<EndedDescent>),
+}
+
+/// A lens at a minimum, with its merit function.
+struct EndedDescent {
+    merit: Merit,
+    signs: String,
+    values: DVector<f64>,
+    normal: DMatrix<f64>,
+    value: f64,
+}
+
+/// Counts the minima that descents from random lenses with the structure of a lens find. The same seed gives the same minima on any number of threads. Once
+/// `stop` is true, those of the descents so far are returned.
+///
+/// # Errors
+/// A lens that a search cannot start from.
+pub fn count_minima(
+    lens: &Lens,
+    plan: &SearchPlan,
+    starts: u64,
+    stop: &AtomicBool,
+) -> Result<MinimaCount, SearchSetupError> {
+    let landscape = plan.landscape(lens)?;
+    let (watch, tolerance) = (Stopwatch::start(), plan.local.tolerance);
+    let mut families: BTreeMap<String, Vec<Minimum>> = BTreeMap::new();
+    let (mut begun, mut lost, mut unfinished, mut ended, mut evaluations) = (0, 0, 0, 0, 0);
+    while begun < starts && !stop.load(Ordering::Relaxed) {
+        let batch = begun..(begun + BATCH).min(starts);
+        begun = batch.end;
+        let descend = |start| descend(&landscape, plan.settings.seed, start, tolerance);
+        let ends: Vec<(DescentEnd, usize)> = batch.into_par_iter().map(descend).collect();
+        for (end, used) in ends {
+            evaluations += used;
+            match end {
+                DescentEnd::Lost => lost += 1,
+                DescentEnd::Unfinished => unfinished += 1,
+                DescentEnd::Minimum(found) => {
+                    ended += 1;
+                    enter(families.entry(found.signs.clone()).or_default(), &found);
+                }
+            }
+        }
+    }
+    let seconds = watch.seconds();
+    let all: Vec<&Minimum> = families.values().flatten().collect();
+    let times = |count| all.iter().filter(|minimum| minimum.found == count).count();
+    let [found_once, found_twice] = [times(1), times(2)];
+    let mut best: Vec<f64> = all.iter().map(|minimum| minimum.merit).collect();
+    best.sort_by(f64::total_cmp);
+    best.truncate(TOLD);
+    Ok(MinimaCount {
+        starts: begun,
+        lost,
+        unfinished,
+        ended,
+        distinct: all.len(),
+        families: families.len(),
+        found_once,
+        found_twice,
+        unseen: (found_twice > 0)
+            .then(|| (found_once * found_once) as f64 / (2 * found_twice) as f64),
+        evaluations,
+        seconds,
+        distinct_an_hour: 3600.0 * all.len() as f64 / seconds,
+        best,
+    })
+}
+
+/// A descent from a random lens, with the number of its evaluations.
+fn descend(
+    landscape: &LensLandscape,
+    seed: u64,
+    start: u64,
+    tolerance: f64,
+) -> (DescentEnd, usize) {
+    // Each start has random numbers of its own, whatever thread it is on.
+    let mut random = Random::seed_from_u64(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ start);
+    let Ok(drawn) = landscape.draw(&mut random) else { return (DescentEnd::Lost, 0) };
+    let lens = landscape.with_variables(&drawn);
+    let optimizer = landscape
+        .merit(&drawn, tolerance)
+        .and_then(|merit| start_from(DescentMethod::TrustRegion, merit, &lens, tolerance));
+    let Ok(mut optimizer) = optimizer else { return (DescentEnd::Lost, 0) };
+    loop {
+        let progress = optimizer.step();
+        let used = progress.evaluations;
+        if progress.finished {
+            let end = EndedDescent::new(landscape, optimizer.best(), tolerance);
+            let end = end.map_or(DescentEnd::Lost, |found| DescentEnd::Minimum(Box::new(found)));
+            return (end, used);
+        }
+        if used >= MOST_EVALUATIONS {
+            return (DescentEnd::Unfinished, used);
+        }
+    }
+}
+
+impl EndedDescent {
+    fn new(landscape: &LensLandscape, lens: &Lens, tolerance: f64) -> Result<Self, MeritError> {
+        let merit = landscape.merit(lens, tolerance)?;
+        let lens = landscape.with_variables(lens);
+        let values = merit.values(&lens);
+        let sum = merit.evaluate(&values, DerivativeLevel::Normal)?;
+        Ok(Self {
+            signs: signs(&lens, landscape.focal_length()),
+            values: DVector::from_vec(values),
+            normal: sum.normal,
+            value: sum.value,
+            merit,
+        })
+    }
+
+    /// The square of the distance of another minimum.
+    fn square_distance(&self, other: &Minimum) -> f64 {
+        if other.values.len() != self.values.len() {
+            return f64::INFINITY;
+        }
+        let step = &other.values - &self.values;
+        step.dot(&(&self.normal * &step)) / self.value.max(other.merit).max(f64::MIN_POSITIVE)
+    }
+
+    fn is_same(&self, other: &Minimum) -> bool {
+        match self.square_distance(other) {
+            near if near < SAME => true,
+            near if near < DIFFERENT => !self.has_hill_before(other),
+            _ => false,
+        }
+    }
+
+    /// True if the merit between two minima rises above both, or does not exist.
+    fn has_hill_before(&self, other: &Minimum) -> bool {
+        let top = (1.0 + HILL) * self.value.max(other.merit);
+        BETWEEN.iter().any(|part| {
+            let between = &self.values + (&other.values - &self.values) * *part;
+            !self.merit.value(between.as_slice()).is_ok_and(|merit| merit <= top)
+        })
+    }
+}
+
+/// Enters a minimum among those with the same signs; of two that are the same the better one is kept.
+fn enter(family: &mut Vec<Minimum>, found: &EndedDescent) {
+    match family.iter_mut().find(|known| found.is_same(known)) {
+        Some(known) => {
+            known.found += 1;
+            if found.value < known.merit {
+                known.merit = found.value;
+                known.values.clone_from(&found.values);
+            }
+        }
+        None => family.push(Minimum { values: found.values.clone(), merit: found.value, found: 1 }),
+    }
+}
+
+/// The signs of the curvatures of a lens and of the powers of its glasses, with 0 for planes.
+fn signs(lens: &Lens, focal_length: f64) -> String {
+    let sign = |curvature: f64| match curvature * focal_length {
+        c if c.abs() < PLANE => '0',
+        c if c > 0.0 => '+',
+        _ => '-',
+    };
+    let curvatures = lens.surfaces.iter().map(|row| sign(row.curvature));
+    let powers = lens.surfaces.windows(2).filter(|pair| pair[0].medium != Medium::Air);
+    let powers = powers.map(|pair| sign(pair[0].curvature - pair[1].curvature));
+    curvatures.chain(['/']).chain(powers).collect()
+}
