@@ -30,6 +30,7 @@ mod rows;
 mod section;
 mod spectrum;
 mod starting;
+mod surface_aperture;
 mod surface_number;
 mod system;
 mod thermal;
@@ -60,6 +61,10 @@ pub use resolve::paraxial_image_distance;
 pub use section::LensSection;
 pub use spectrum::WavelengthPreset;
 pub use starting::{StartingForm, StartingLens};
+pub(crate) use surface_aperture::turn;
+pub use surface_aperture::{
+    APERTURE_NUMBERS, ApertureShape, BlockedSide, MAX_APERTURES, MAX_ARMS, MAX_CORNERS, SurfaceAperture,
+};
 pub use surface_number::{MediumPlace, SurfaceNumber};
 pub use system::{Shape, Surface, System, SystemError};
 pub use thermal::TemperatureChange;
@@ -277,6 +282,8 @@ pub struct Row {
     /// The radius of the central obstruction, or of the hole of a mirror, in mm; rays that meet the
     /// surface nearer to the axis are clipped. `None` clips nothing.
     pub obstruction: Option<f64>,
+    /// The apertures and obscurations that are no circles about the vertex.
+    pub apertures: Vec<SurfaceAperture>,
     /// True for the aperture stop.
     pub stop: bool,
     /// True for a hyperhemisphere: the far half of the sphere or ellipsoid belongs to the surface
@@ -293,7 +300,7 @@ pub struct Row {
     pub break_after: Option<AxisBreak>,
     /// The lines of a foreign file on a surface that cannot be traced; `None` for a surface that can.
     pub locked: Option<LockedSurface>,
-    /// The apertures of a foreign file that are no circles about the vertex; `None` for a row that has none.
+    /// The apertures of a foreign file that a row cannot have; `None` for a row that has none.
     pub foreign_aperture: Option<ForeignAperture>,
     /// A remark on the surface.
     pub comment: String,

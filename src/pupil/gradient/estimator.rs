@@ -3,7 +3,7 @@
 //! pupil.
 
 use super::{PupilDerivative, QuadraticIntegrand, WarpSampling};
-use crate::lens::{RADIAL_TERMS, SurfaceNumber, SystemError};
+use crate::lens::{APERTURE_NUMBERS, RADIAL_TERMS, SurfaceNumber, SystemError};
 use crate::pupil::launch::LaunchError;
 use crate::pupil::ray_model::Aiming;
 use crate::pupil::region::{Accuracy, PupilMoments, Region, RegionKind, order_error};
@@ -406,6 +406,8 @@ fn natural_size(
             SurfaceParameter::Thickness
             | SurfaceParameter::SemiDiameter
             | SurfaceParameter::Freeform(_) => -1,
+            SurfaceParameter::Aperture(k) if k % APERTURE_NUMBERS == APERTURE_NUMBERS - 1 => 0,
+            SurfaceParameter::Aperture(_) => -1,
             SurfaceParameter::GrinTerm(k) => match k.checked_sub(RADIAL_TERMS) {
                 None => 2 * (k as i32 + 1),
                 Some(j) => j as i32 + 1,

@@ -415,6 +415,7 @@ mod tests {
                 grin: graded,
                 semi_diameter,
                 obstruction,
+                apertures: Vec::new(),
                 mirror,
                 hyperhemisphere: hyper,
                 pose: None,
