@@ -63,7 +63,8 @@ pub use spectrum::WavelengthPreset;
 pub use starting::{StartingForm, StartingLens};
 pub(crate) use surface_aperture::turn;
 pub use surface_aperture::{
-    APERTURE_NUMBERS, ApertureShape, BlockedSide, MAX_APERTURES, MAX_ARMS, MAX_CORNERS, SurfaceAperture,
+    APERTURE_NUMBERS, ApertureShape, BlockedSide, MAX_APERTURES, MAX_ARMS, MAX_CORNERS,
+    SurfaceAperture,
 };
 pub use surface_number::{MediumPlace, SurfaceNumber};
 pub use system::{Shape, Surface, System, SystemError};

@@ -483,7 +483,8 @@ impl<R: Real> Surface<R> {
             pose.shift.x == R::ZERO && pose.turn[0].y == R::ZERO && pose.turn[0].z == R::ZERO
         };
         let even = self.freeform.as_ref().is_none_or(|form| form.mirrors_in_x());
-        let even = even && surface_aperture::mirror_in_x(&self.apertures);
+        // Half of a pupil would not tell the derivative by the position of a figure.
+        let even = even && surface_aperture::are_round(&self.apertures);
         even && self.pose.as_ref().is_none_or(upright) && self.axis.as_ref().is_none_or(upright)
     }
 

@@ -319,9 +319,7 @@ impl Configuration {
                 SurfaceParameter::SemiDiameter => surface.semi_diameter,
                 target @ (SurfaceParameter::GrinTerm(_)
                 | SurfaceParameter::Freeform(_)
-                | SurfaceParameter::Aperture(_)) => {
-                    surface.by(target)
-                }
+                | SurfaceParameter::Aperture(_)) => surface.by(target),
             };
             by_variable[binding.variable] += binding.factor * by_number;
         }

@@ -117,7 +117,7 @@ enum SideForm<R> {
         /// True for a circle, whose radius is one number.
         is_circle: bool,
     },
-    /// A circle or an ellipse without an area, inside of which is nothing.
+    /// A circle, an ellipse or a rectangle without an area, inside of which is nothing.
     Point,
 }
 
@@ -146,6 +146,9 @@ impl<R: Real> ApertureSet<R> {
             }
             ApertureShape::Ellipse { half_width, half_height } => {
                 self.push(index, aperture, vec![oval([*half_width, *half_height], false)], None);
+            }
+            ApertureShape::Rectangle { half_width: a, half_height: b } if *a * *b == 0.0 => {
+                self.push(index, aperture, vec![SideForm::Point], None);
             }
             ApertureShape::Rectangle { half_width: a, half_height: b } => {
                 let right = line(aperture, [1.0, 0.0], [*a, 0.0], [1.0, 0.0]);
@@ -206,6 +209,22 @@ impl<R: Real> ApertureSet<R> {
         let center = aperture.center.map(R::from_f64);
         let side = |form| Side { form, aperture: index, center, obscures };
         self.sides.extend(forms.into_iter().map(side));
+    }
+
+    /// The number of sides of all apertures.
+    pub(super) fn sides(&self) -> usize {
+        self.sides.len()
+    }
+
+    /// A length in mm of the order of the distances of sides from the vertex.
+    pub(super) fn extent(&self) -> f64 {
+        let of_side = |side: &Side<R>| match side.form {
+            SideForm::Line { offset, .. } => offset.value().abs(),
+            SideForm::Oval { semi_axes: [a, b], .. } => a.value().max(b.value()),
+            SideForm::Point => 0.0,
+        };
+        let largest = self.sides.iter().map(of_side).fold(0.0, f64::max);
+        if largest > 0.0 { largest } else { 1.0 }
     }
 
     /// The name of the limit at a side.
@@ -412,7 +431,8 @@ fn nearest_side<R: Real>(corners: &[[f64; 2]], p: Vec3<R>) -> (usize, R, bool) {
     for (i, a) in corners.iter().enumerate() {
         let b = &corners[(i + 1) % corners.len()];
         let edge = [b[0] - a[0], b[1] - a[1]];
-        let share = ((x - a[0]) * edge[0] + (y - a[1]) * edge[1]) / (edge[0].powi(2) + edge[1].powi(2));
+        let share =
+            ((x - a[0]) * edge[0] + (y - a[1]) * edge[1]) / (edge[0].powi(2) + edge[1].powi(2));
         let share = share.clamp(0.0, 1.0);
         let distance = (x - a[0] - share * edge[0]).hypot(y - a[1] - share * edge[1]);
         if distance < nearest {
@@ -511,7 +531,9 @@ mod tests {
             let set = ApertureSet::<f64>::new(std::slice::from_ref(&aperture));
             for p in spiral() {
                 set.visit(p, |limit, _| {
-                    let (RayLimit::Aperture(side) | RayLimit::Obscuration(side)) = limit else { return };
+                    let (RayLimit::Aperture(side) | RayLimit::Obscuration(side)) = limit else {
+                        return;
+                    };
                     let across = |x: f64, y: f64| {
                         (set.margin(side, p + point(x, y)) - set.margin(side, p - point(x, y)))
                             / (2.0 * step)
@@ -530,7 +552,8 @@ mod tests {
                         let found = (moved(step) - moved(-step)) / (2.0 * step);
                         // Off the edge the factor of an oval moves too.
                         let is_oval = matches!(set.sides[0].form, SideForm::Oval { .. });
-                        let slack = if is_oval && number < 2 { set.margin(side, p).abs() } else { 0.0 };
+                        let slack =
+                            if is_oval && number < 2 { set.margin(side, p).abs() } else { 0.0 };
                         assert!((by - found).abs() < 1e-8 + slack, "{aperture:?} {number}");
                     }
                 });

@@ -360,7 +360,12 @@ impl<R: Real> Tracer<R> {
         self.mask(block, count);
         for (i, interface) in self.interfaces.iter().enumerate() {
             if let Some(mount) = self.vector_mount(i) {
-                block.cross_mounted_into::<S>(interface, i as u32, mount, self.apertures.clipping(i));
+                block.cross_mounted_into::<S>(
+                    interface,
+                    i as u32,
+                    mount,
+                    self.apertures.clipping(i),
+                );
             } else if self.is_general(i) {
                 block.cross_general_into::<S>(self, i);
             } else {

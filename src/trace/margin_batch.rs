@@ -175,12 +175,7 @@ impl<R: Real> Interface<R> {
 
     /// The margin at the rim, the obstruction or an aperture for a point of the surface.
     #[inline(always)]
-    fn plain_margin(
-        &self,
-        limit: RayLimit,
-        p: Vec3<R>,
-        apertures: Option<&ApertureSet<R>>,
-    ) -> R {
+    fn plain_margin(&self, limit: RayLimit, p: Vec3<R>, apertures: Option<&ApertureSet<R>>) -> R {
         match limit {
             RayLimit::Rim => self.rim_margin(p),
             RayLimit::Aperture(side) | RayLimit::Obscuration(side) => {

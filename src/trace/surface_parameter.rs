@@ -2,8 +2,8 @@
 
 use super::adjoint::{SurfaceGradient, SystemGradient};
 use crate::lens::{
-    APERTURE_NUMBERS, ASPHERE_TERMS, FREEFORM_NUMBERS, MAX_APERTURES, PROFILE_TERMS, ProfileCoefficients, ProfileLaw, RADIAL_TERMS,
-    Shape, Surface, System,
+    APERTURE_NUMBERS, ASPHERE_TERMS, FREEFORM_NUMBERS, MAX_APERTURES, PROFILE_TERMS,
+    ProfileCoefficients, ProfileLaw, RADIAL_TERMS, Shape, Surface, System,
 };
 use crate::math::Real;
 
@@ -183,6 +183,37 @@ impl<R: Real> SystemGradient<R> {
             to.apertures = numbers.map(|number| combine(a.by(number), b.by(number))).collect();
         }
         all
+    }
+
+    /// Combines each number of some gradients of the same system, which has no freeform.
+    #[must_use]
+    pub fn combine<S: Real>(
+        all: &[Self],
+        combine: impl Fn(&mut dyn Iterator<Item = R>) -> S,
+    ) -> SystemGradient<S> {
+        let surfaces = all.first().map_or(0, |gradient| gradient.surfaces.len());
+        let fixed: Vec<Vec<R>> = all.iter().map(Self::fixed_numbers).collect();
+        let count = fixed.first().map_or(0, Vec::len);
+        let numbers = (0..count).map(|i| combine(&mut fixed.iter().map(|row| row[i])));
+        let mut found = SystemGradient::from_numbers(surfaces, numbers);
+        for (i, to) in found.surfaces.iter_mut().enumerate() {
+            let own = || all.iter().map(|gradient| &gradient.surfaces[i]);
+            let count = own().map(|own| own.apertures.len()).max().unwrap_or(0);
+            let by =
+                |k: usize| combine(&mut own().map(|own| own.by(SurfaceParameter::Aperture(k))));
+            to.apertures = (0..count).map(by).collect();
+        }
+        found
+    }
+
+    /// The numbers of [`SystemGradient::from_numbers`].
+    fn fixed_numbers(&self) -> Vec<R> {
+        let mut fixed = self.clone();
+        for surface in &mut fixed.surfaces {
+            surface.freeform.clear();
+            surface.apertures.clear();
+        }
+        fixed.numbers().collect()
     }
 
     /// The derivatives by the numbers of one kind, surface by surface; the index of object space is

@@ -13,7 +13,9 @@
 //! the edge and four quadratures a number.
 
 use super::{PupilDerivative, QuadraticIntegrand};
-use crate::lens::{APERTURE_NUMBERS, ProfileCoefficients, ProfileLaw, RADIAL_TERMS, System, SystemError};
+use crate::lens::{
+    APERTURE_NUMBERS, ProfileCoefficients, ProfileLaw, RADIAL_TERMS, System, SystemError,
+};
 use crate::pupil::region::{Region, RegionKind, TracedPupil};
 use crate::trace::{SurfaceParameter, SystemGradient};
 

@@ -35,7 +35,8 @@ impl Annulus {
             outer: edge(LimitFilter::WithoutObstructions)?,
             inner: edge(LimitFilter::Obstructions)?,
         };
-        let closed = annulus.inner.arcs.iter().all(|arc| arc.limit.is_shadow()) && annulus.is_open();
+        let closed =
+            annulus.inner.arcs.iter().all(|arc| arc.limit.is_shadow()) && annulus.is_open();
         closed.then_some(annulus)
     }
 

@@ -5,6 +5,9 @@
 //! the edges of each, a little on the blocked side, must lie outside the footprint of the pupil on their
 //! surface. If one lies inside, the pupil has not the form that was found.
 
+use super::annulus::Annulus;
+use super::boundary::Boundary;
+use super::edge_search::LimitFilter;
 use crate::lens::{ApertureShape, SurfaceAperture, System};
 use crate::pupil::launch::Launch;
 
@@ -14,6 +17,9 @@ const ON_OVAL: usize = 16;
 /// The distance of points from an edge, in sizes of the footprint; the part of an oval that they lie on.
 const INSET: f64 = 1e-3;
 const OVAL_PART: f64 = 0.8;
+
+/// The largest ratio of the radii of an edge: quadrature along a longer one begins too coarse to tell its error.
+const LONGEST: f64 = 30.0;
 
 /// A closed polygon, of pupil points or of points of a surface.
 pub(super) type ClosedCurve = Vec<[f64; 2]>;
@@ -40,6 +46,21 @@ impl DarkPoints {
         self.figures.is_empty()
     }
 
+    /// True if a pupil may be star-shaped with this edge.
+    pub(super) fn allow(&self, launch: &Launch<'_>, edge: &Boundary) -> bool {
+        let curve = edge.curve(launch, LimitFilter::All);
+        is_compact(edge, &curve) && !self.are_lit(launch, &curve, None)
+    }
+
+    /// True if a pupil may be this annulus.
+    pub(super) fn allow_annulus(&self, launch: &Launch<'_>, annulus: &Annulus) -> bool {
+        let outer = annulus.outer.curve(launch, LimitFilter::WithoutObstructions);
+        let inner = annulus.inner.curve(launch, LimitFilter::Obstructions);
+        let is_within = inner.iter().all(|p| contains(&outer, *p));
+        let are_compact = is_compact(&annulus.outer, &outer) && is_compact(&annulus.inner, &inner);
+        is_within && are_compact && !self.are_lit(launch, &outer, Some(&inner))
+    }
+
     /// True if a blocked point lies inside the footprint of the pupil within a curve of pupil points, and
     /// outside that of its shadow.
     pub(super) fn are_lit(
@@ -60,6 +81,12 @@ impl DarkPoints {
             })
         })
     }
+}
+
+/// True if an edge is not far longer in one direction than in another.
+fn is_compact(edge: &Boundary, curve: &ClosedCurve) -> bool {
+    let radii = || curve.iter().map(|p| edge.frame.polar(*p).1);
+    radii().fold(0.0, f64::max) <= LONGEST * radii().fold(f64::INFINITY, f64::min)
 }
 
 /// The footprint of a curve on a surface; `None` if too few of its rays get there to know it.
@@ -139,12 +166,7 @@ fn points(figure: &SurfaceAperture, footprint: &[[f64; 2]]) -> Vec<[f64; 2]> {
 
 /// Points on both sides of the sides of a polygon and of its corners, within a rectangle. `half` is half of
 /// the least width of the polygon, or more if that is unknown.
-fn along_sides(
-    corners: &[[f64; 2]],
-    half: f64,
-    within: [[f64; 2]; 2],
-    size: f64,
-) -> Vec<[f64; 2]> {
+fn along_sides(corners: &[[f64; 2]], half: f64, within: [[f64; 2]; 2], size: f64) -> Vec<[f64; 2]> {
     let inset = (INSET * size).min(0.5 * half);
     let mut found = Vec::new();
     for (i, a) in corners.iter().enumerate() {

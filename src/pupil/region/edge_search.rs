@@ -510,9 +510,7 @@ impl<'a> EdgeSearch<'a> {
 /// True if the edge jumps from the near side of a shadow to a limit behind it: there is light
 /// behind the shadow that is not visible from the centre. The two edges are next to a corner.
 fn hides_light(a: EdgePoint, b: EdgePoint) -> bool {
-    let shadow = |edge: EdgePoint| {
-        matches!(edge.limit, PupilLimit::Surface(_, limit) if limit.may_hide_light())
-    };
+    let shadow = |edge: EdgePoint| matches!(edge.limit, PupilLimit::Surface(_, limit) if limit.may_hide_light());
     let jump = (a.radius - b.radius).abs() > JUMP * a.radius.max(b.radius);
     jump && (shadow(a) || shadow(b))
 }
@@ -640,7 +638,7 @@ impl Boundary {
         let end = self.samples.last().map_or(0.0, |s| s.0);
         let count = if launch.is_symmetric() { CURVE / 2 } else { CURVE };
         let steps = (0..=count).map(|i| end * i as f64 / count as f64);
-        let corners = self.arcs.iter().map(|arc| arc.to);
+        let corners = self.arcs.iter().map(|arc| if arc.to > end { arc.to - end } else { arc.to });
         let mut azimuths: Vec<f64> = steps.chain(corners).collect();
         azimuths.sort_by(f64::total_cmp);
         let mut point = |azimuth: f64| {

@@ -179,8 +179,7 @@ impl LightGrid {
             && let Some(boundary) =
                 EdgeSearch::new(launch, self.frame(launch)).trace_boundary(end, azimuths)
             && self.agrees(launch, &boundary, shadows)
-            && (dark.is_empty()
-                || !dark.are_lit(launch, &boundary.curve(launch, LimitFilter::All), None))
+            && (dark.is_empty() || dark.allow(launch, &boundary))
         {
             return RegionKind::StarShaped(boundary);
         }
@@ -191,14 +190,9 @@ impl LightGrid {
             Annulus::around(launch, frame, end, azimuths)
         };
         let annuli = shadows.iter().flatten().filter_map(|middle| around(*middle));
-        let is_dark_in_light = |annulus: &Annulus| {
-            let outer = annulus.outer.curve(launch, LimitFilter::WithoutObstructions);
-            let inner = annulus.inner.curve(launch, LimitFilter::Obstructions);
-            dark.are_lit(launch, &outer, Some(&inner))
-        };
         let annulus = annuli.into_iter().find(|annulus| {
             let agrees = self.agrees_with_annulus(launch, annulus, shadows);
-            agrees && (dark.is_empty() || !is_dark_in_light(annulus))
+            agrees && (dark.is_empty() || dark.allow_annulus(launch, annulus))
         });
         // A grid may be too coarse to show that a narrow annulus is connected.
         let pieces = if annulus.is_some() { 1 } else { pieces };

@@ -112,7 +112,8 @@ impl Launch<'_> {
         let passes = |p: [f64; 2]| self.margins_if_passing(p).is_some();
         *rays += shadows.len();
         let dark = DarkPoints::of(&self.channel().system);
-        let rim: Vec<_> = (0..RIM_CURVE).map(|i| rim_point(TAU * i as f64 / RIM_CURVE as f64)).collect();
+        let rim: Vec<_> =
+            (0..RIM_CURVE).map(|i| rim_point(TAU * i as f64 / RIM_CURVE as f64)).collect();
         passes([0.0, 0.0])
             && passes_dips
             && (dark.is_empty() || !dark.are_lit(self, &rim, None))

@@ -186,6 +186,17 @@ pub(super) struct LimitAdjoint<R> {
     pub(super) obstruction: Option<[R; BLOCK]>,
     /// `None` if the edge of the conic ends no ray.
     pub(super) conic_edge: Option<[R; BLOCK]>,
+    /// Those of the sides of apertures that are no circles about the vertex.
+    pub(super) apertures: Vec<[R; BLOCK]>,
+}
+
+impl<R: Real> LimitAdjoint<R> {
+    /// The column of a side of an aperture.
+    pub(super) fn side(&mut self, side: u16) -> &mut [R; BLOCK] {
+        let side = usize::from(side);
+        self.apertures.resize(self.apertures.len().max(side + 1), [R::ZERO; BLOCK]);
+        &mut self.apertures[side]
+    }
 }
 
 /// A receiver of the derivatives of a block of rays.
@@ -448,6 +459,9 @@ impl<R: Real> Tracer<R> {
                 continue;
             }
             let limits = seeds.limit_adjoint(i);
+            if let (Some(limits), Some(apertures)) = (limits, self.apertures.of(i)) {
+                adjoint.aperture_adjoint(apertures, &limits.apertures, i, sink);
+            }
             // A factor that is known to be 1 costs nothing.
             if interface.sense > R::ZERO {
                 adjoint.retrace_surface(&Interface { sense: R::ONE, ..*interface }, limits);
