@@ -322,6 +322,9 @@ pub struct ForeignAperture {
     /// The obstruction in mm that stands for them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub obstruction: Option<f64>,
+    /// The apertures of the row that are among them.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub apertures: Vec<SurfaceAperture>,
 }
 
 /// The description of a surface that this program cannot trace, as the file has it. Rays meet the
@@ -408,7 +411,9 @@ impl Row {
     pub fn keep_aperture(&mut self, format: &str, lines: Vec<String>) {
         let (semi_diameter, obstruction) = (self.semi_diameter, self.obstruction);
         let format = format.to_owned();
-        self.foreign_aperture = Some(ForeignAperture { format, lines, semi_diameter, obstruction });
+        let apertures = self.apertures.clone();
+        let kept = ForeignAperture { format, lines, semi_diameter, obstruction, apertures };
+        self.foreign_aperture = Some(kept);
     }
 
     /// The lines on apertures that an export to a format writes back; `None` without any, and once another
@@ -416,7 +421,7 @@ impl Row {
     pub fn kept_aperture(&self, format: &str) -> Option<&[String]> {
         let kept = self.foreign_aperture.as_ref().filter(|kept| kept.format == format)?;
         let same = (kept.semi_diameter, kept.obstruction) == (self.semi_diameter, self.obstruction);
-        same.then_some(&kept.lines)
+        (same && kept.apertures == self.apertures).then_some(&kept.lines)
     }
 }
 

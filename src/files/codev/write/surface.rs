@@ -6,8 +6,8 @@ use crate::files::report::ConversionOutcome;
 use crate::files::zemax::{is_general, merged_powers};
 use crate::lens::glass::{self, Glass};
 use crate::lens::{
-    Aperture, AxisBreak, FreeformKind, IdealElement, Medium, MediumPlace, Quantity, Row,
-    SurfaceNumber,
+    Aperture, ApertureShape, AxisBreak, FreeformKind, IdealElement, Medium, MediumPlace, Quantity,
+    Row, SurfaceAperture, SurfaceNumber,
 };
 
 /// Decentre and tilt of a surface, and the word that says what they move.
@@ -52,7 +52,7 @@ impl CodeVWriter {
         if !row.comment.is_empty() {
             self.line(format!("  SLB {}", quoted(&row.comment)));
         }
-        self.aperture_of(&row);
+        self.aperture_of(i, &row);
         self.form(&row);
         let [bend, gap] = [Quantity::Curvature, Quantity::Thickness]
             .map(|quantity| if self.is_variable(i, quantity) { 0 } else { 100 });
@@ -64,7 +64,7 @@ impl CodeVWriter {
         }
     }
 
-    fn aperture_of(&mut self, row: &Row) {
+    fn aperture_of(&mut self, i: usize, row: &Row) {
         let stop = match self.lens.aperture {
             Aperture::StopSemiDiameter(radius) if row.stop => Some(radius),
             _ => None,
@@ -79,6 +79,40 @@ impl CodeVWriter {
         if let Some(inner) = row.obstruction.filter(|inner| *inner > 0.0) {
             self.line(format!("  CIR OBS {}", number(inner)));
         }
+        let circle = stop.or(row.semi_diameter).is_some() || row.obstruction.is_some();
+        self.apertures(i, row, circle);
+    }
+
+    /// The apertures that are no circles about the vertex: those of each kind that have the same centre and
+    /// the same angle, which `ADX`, `ADY` and `ARO` give for all apertures of a surface.
+    fn apertures(&mut self, i: usize, row: &Row, has_circle: bool) {
+        let mut place = has_circle.then_some(([0.0; 2], None));
+        let (mut written, mut unwritten) = (Vec::new(), Vec::new());
+        for own in &row.apertures {
+            let is_round = matches!(own.shape, ApertureShape::Circle { .. });
+            let angle = (!is_round).then_some(own.angle);
+            let fits = place.is_none_or(|(center, turned): ([f64; 2], Option<f64>)| {
+                center == own.center && (turned.is_none() || angle.is_none() || turned == angle)
+            });
+            let kind = (is_round, own.obscures());
+            let taken = written.contains(&kind) || (is_round && has_circle);
+            match aperture_commands(own).filter(|_| fits && !taken) {
+                Some(commands) => {
+                    commands.iter().for_each(|command| self.line(format!("  {command}")));
+                    written.push(kind);
+                    place = Some((own.center, place.and_then(|(_, turned)| turned).or(angle)));
+                }
+                None => unwritten.push(own.clone()),
+            }
+        }
+        if let Some(([x, y], angle)) = place.filter(|_| !written.is_empty()) {
+            for (name, value) in [("ADX", x), ("ADY", y), ("ARO", angle.unwrap_or(0.0))] {
+                if value != 0.0 {
+                    self.line(format!("  {name} {}", number(value)));
+                }
+            }
+        }
+        self.report.add_unwritten_apertures(SurfaceNumber::new(i), &unwritten);
     }
 
     fn form(&mut self, row: &Row) {
@@ -277,4 +311,22 @@ fn fictitious(nd: f64, vd: f64) -> Option<String> {
     let [index, abbe] = [nd, vd].map(|value| format!("{value:?}"));
     let (index, abbe) = (index.strip_prefix("1.")?, abbe.replace('.', ""));
     Some(format!(" {index:0<6}.{abbe:0<6}"))
+}
+
+/// The commands of an aperture without its place; `None` for one that the format does not have.
+fn aperture_commands(aperture: &SurfaceAperture) -> Option<Vec<String>> {
+    let kind = if aperture.obscures() { "OBS " } else { "" };
+    let pair = |name: &str, [x, y]: [f64; 2]| {
+        vec![format!("{name}X {kind}{}", number(x)), format!("{name}Y {kind}{}", number(y))]
+    };
+    match aperture.shape {
+        ApertureShape::Circle { radius } => Some(vec![format!("CIR {kind}{}", number(radius))]),
+        ApertureShape::Rectangle { half_width, half_height } => {
+            Some(pair("RE", [half_width, half_height]))
+        }
+        ApertureShape::Ellipse { half_width, half_height } => {
+            Some(pair("EL", [half_width, half_height]))
+        }
+        ApertureShape::Polygon { .. } | ApertureShape::Spider { .. } => None,
+    }
 }

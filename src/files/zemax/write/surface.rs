@@ -7,8 +7,8 @@ use crate::files::zemax::glass as zemax_glass;
 use crate::files::zemax::gradient;
 use crate::lens::glass;
 use crate::lens::{
-    Aperture, LockedSurface, Medium, MediumPlace, Object, Parameter, Pickup, Quantity, Row,
-    SurfaceNumber,
+    Aperture, ApertureShape, LockedSurface, Medium, MediumPlace, Object, Parameter, Pickup,
+    Quantity, Row, SurfaceAperture, SurfaceNumber,
 };
 
 impl ZemaxWriter {
@@ -85,7 +85,7 @@ impl ZemaxWriter {
         if graded.is_none() {
             self.glass(&row.medium, MediumPlace::behind(i), variable);
         }
-        self.semi_diameter(&row);
+        self.semi_diameter(i, &row);
         if row.hyperhemisphere {
             self.report_hyperhemisphere(i);
         }
@@ -258,7 +258,7 @@ impl ZemaxWriter {
 
     /// The semi-diameter, and the aperture by which it and the obstruction clip: a surface has one
     /// aperture there, with an outer and an inner radius.
-    fn semi_diameter(&mut self, row: &Row) {
+    fn semi_diameter(&mut self, i: usize, row: &Row) {
         let aperture = match self.lens.aperture {
             Aperture::StopSemiDiameter(radius) if row.stop => Some(radius),
             _ => row.semi_diameter,
@@ -271,6 +271,10 @@ impl ZemaxWriter {
             lines.iter().for_each(|line| self.surface_line(line));
             return;
         }
+        if !row.apertures.is_empty() {
+            self.figures(i, row);
+            return;
+        }
         let inner = row.obstruction.filter(|radius| *radius > 0.0);
         match (row.semi_diameter, inner) {
             (Some(outer), Some(inner)) => self.clap(&number(inner), outer),
@@ -280,7 +284,63 @@ impl ZemaxWriter {
         }
     }
 
+    /// The apertures that are no circles about the vertex: an aperture and an obscuration with the same
+    /// centre, neither turned.
+    fn figures(&mut self, i: usize, row: &Row) {
+        let mut kinds: Vec<&str> = Vec::new();
+        let mut center = None;
+        if let Some(radius) = row.semi_diameter {
+            let inner = row.obstruction.map_or_else(|| "0".to_owned(), number);
+            self.clap(&inner, radius);
+            (kinds, center) = (vec!["AP"], Some([0.0; 2]));
+        } else if let Some(radius) = row.obstruction {
+            self.surface_line(format!("OBSC 0 {} 0", number(radius)));
+            (kinds, center) = (vec!["OB"], Some([0.0; 2]));
+        }
+        let mut unwritten = Vec::new();
+        for own in &row.apertures {
+            match aperture_line(own) {
+                Some((kind, line))
+                    if !kinds.contains(&kind) && center.is_none_or(|at| at == own.center) =>
+                {
+                    self.surface_line(line);
+                    kinds.push(kind);
+                    center = Some(own.center);
+                }
+                _ => unwritten.push(own.clone()),
+            }
+        }
+        if let Some([x, y]) = center.filter(|at| *at != [0.0; 2]) {
+            self.surface_line(format!("OBDC {} 0", numbers([x, y])));
+        }
+        self.report.add_unwritten_apertures(SurfaceNumber::new(i), &unwritten);
+    }
+
     fn clap(&mut self, inner: &str, outer: f64) {
         self.surface_line(format!("CLAP {inner} {} 0", number(outer)));
     }
+}
+
+/// The kind and the line of an aperture without its place; `None` for one that the format does not have.
+fn aperture_line(aperture: &SurfaceAperture) -> Option<(&'static str, String)> {
+    let kind = if aperture.obscures() { "OB" } else { "AP" };
+    let is_round = matches!(aperture.shape, ApertureShape::Circle { .. });
+    if aperture.angle != 0.0 && !is_round {
+        return None;
+    }
+    let line = match (&aperture.shape, aperture.obscures()) {
+        (ApertureShape::Circle { radius }, true) => format!("OBSC 0 {} 0", number(*radius)),
+        (ApertureShape::Circle { radius }, false) => format!("CLAP 0 {} 0", number(*radius)),
+        (ApertureShape::Rectangle { half_width, half_height }, _) => {
+            format!("SQ{kind} {} 0", numbers([*half_width, *half_height]))
+        }
+        (ApertureShape::Ellipse { half_width, half_height }, _) => {
+            format!("EL{kind} {} 0", numbers([*half_width, *half_height]))
+        }
+        (ApertureShape::Spider { arms, width }, _) => {
+            return Some(("SPID", format!("SPID {} {arms} 0", number(*width))));
+        }
+        (ApertureShape::Polygon { .. }, _) => return None,
+    };
+    Some((kind, line))
 }
