@@ -3,8 +3,7 @@
 //! A circle about the vertex is the rim or the obstruction of a row; any other outline is one of its
 //! apertures, in the same place and with the same form.
 
-use super::report::ConversionReport;
-use crate::lens::{ApertureShape, BlockedSide, Row, SurfaceAperture, SurfaceNumber};
+use crate::lens::{ApertureShape, BlockedSide, Lens, LensError, Row, SurfaceAperture, SystemError};
 
 /// The form of an outline.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -67,19 +66,25 @@ impl ForeignOutline {
     }
 }
 
-impl ConversionReport {
-    /// Adds the apertures of a row that a format does not have, or not beside the others.
-    pub(super) fn add_unwritten_apertures<'a>(
-        &mut self,
-        surface: SurfaceNumber,
-        apertures: impl IntoIterator<Item = &'a SurfaceAperture>,
-    ) {
-        for aperture in apertures {
-            let what = format!("aperture of surface {surface}");
-            let note = format!("{}: the format has no such aperture there", aperture.text());
-            self.add(super::report::ConversionOutcome::Dropped, &what, note);
+/// Refuses an aperture that an export cannot hold, where it has no lines of a file of its own kind in place
+/// of all of them. `fault` gives the index of such an aperture of a row.
+pub(super) fn unwritten_aperture(
+    lens: &Lens,
+    format: &'static str,
+    fault: impl Fn(&Row) -> Option<usize>,
+) -> Result<(), LensError> {
+    for (i, row) in lens.surfaces.iter().enumerate() {
+        let is_kept = row.kept_aperture(format.trim_start_matches('.')).is_some();
+        let found = if is_kept || row.apertures.is_empty() { None } else { fault(row) };
+        if let Some(k) = found {
+            let own = row.apertures[k].text();
+            let why = format!(
+                "({own}) is one that a {format} file cannot hold there; expected the native format (.json)"
+            );
+            return Err(SystemError::Aperture { surface: i.into(), aperture: k + 1, why }.into());
         }
     }
+    Ok(())
 }
 
 #[cfg(test)]

@@ -115,9 +115,8 @@ fn place(row: &mut Row, outline: &ForeignOutline, blocks: BlockedSide) {
 }
 
 /// The aperture of a row; `null` for a surface that clips nothing. `stop` is the radius of the stop where
-/// that is the aperture of the lens, `infinite` stands for an infinite number. Also those apertures that the
-/// format does not have.
-pub(super) fn write(row: &Row, stop: Option<f64>, infinite: &str) -> (Value, Vec<SurfaceAperture>) {
+/// that is the aperture of the lens, `infinite` stands for an infinite number.
+pub(super) fn write(row: &Row, stop: Option<f64>, infinite: &str) -> Value {
     let inner = row.obstruction.filter(|inner| *inner > 0.0);
     let outer = stop.or(row.semi_diameter);
     let mut whole = Value::Null;
@@ -125,13 +124,8 @@ pub(super) fn write(row: &Row, stop: Option<f64>, infinite: &str) -> (Value, Vec
         let outer = outer.map_or(json!(infinite), |outer| json!(outer));
         whole = json!({"type": "RadialAperture", "r_max": outer, "r_min": inner.unwrap_or(0.0)});
     }
-    let mut unwritten = Vec::new();
     for own in &row.apertures {
-        let parts = figures(own);
-        if parts.is_empty() {
-            unwritten.push(own.clone());
-        }
-        for part in parts {
+        for part in figures(own) {
             whole = match (whole, own.obscures()) {
                 (Value::Null, false) => part,
                 (before, false) => json!({"type": "IntersectionAperture", "a": before, "b": part}),
@@ -143,7 +137,12 @@ pub(super) fn write(row: &Row, stop: Option<f64>, infinite: &str) -> (Value, Vec
             };
         }
     }
-    (whole, unwritten)
+    whole
+}
+
+/// True for an aperture that the format has.
+pub(super) fn is_writable(own: &SurfaceAperture) -> bool {
+    !figures(own).is_empty()
 }
 
 /// The figures whose union is an aperture; none for one that the format does not have.

@@ -55,6 +55,9 @@ fn unwritable_row(row: &Row) -> Option<&'static str> {
     if shape::write(row, &Value::Null).is_none() {
         return Some("the freeform");
     }
+    if !row.apertures.iter().all(aperture::is_writable) {
+        return Some("an ellipse that is turned, an aperture");
+    }
     if matches!(row.ideal, Some(IdealElement::Grating { .. })) {
         return Some("the grating");
     }
@@ -198,8 +201,7 @@ impl OptilandWriter {
             Aperture::StopSemiDiameter(radius) if row.stop => Some(radius),
             _ => None,
         };
-        let (aperture, unwritten) = aperture::write(row, stop, INFINITE);
-        self.report.add_unwritten_apertures(SurfaceNumber::new(i), &unwritten);
+        let aperture = aperture::write(row, stop, INFINITE);
         json!({
             "type": "Surface",
             "thickness": row.thickness,

@@ -52,7 +52,7 @@ impl CodeVWriter {
         if !row.comment.is_empty() {
             self.line(format!("  SLB {}", quoted(&row.comment)));
         }
-        self.aperture_of(i, &row);
+        self.aperture_of(&row);
         self.form(&row);
         let [bend, gap] = [Quantity::Curvature, Quantity::Thickness]
             .map(|quantity| if self.is_variable(i, quantity) { 0 } else { 100 });
@@ -64,7 +64,7 @@ impl CodeVWriter {
         }
     }
 
-    fn aperture_of(&mut self, i: usize, row: &Row) {
+    fn aperture_of(&mut self, row: &Row) {
         let stop = match self.lens.aperture {
             Aperture::StopSemiDiameter(radius) if row.stop => Some(radius),
             _ => None,
@@ -79,40 +79,8 @@ impl CodeVWriter {
         if let Some(inner) = row.obstruction.filter(|inner| *inner > 0.0) {
             self.line(format!("  CIR OBS {}", number(inner)));
         }
-        let circle = stop.or(row.semi_diameter).is_some() || row.obstruction.is_some();
-        self.apertures(i, row, circle);
-    }
-
-    /// The apertures that are no circles about the vertex: those of each kind that have the same centre and
-    /// the same angle, which `ADX`, `ADY` and `ARO` give for all apertures of a surface.
-    fn apertures(&mut self, i: usize, row: &Row, has_circle: bool) {
-        let mut place = has_circle.then_some(([0.0; 2], None));
-        let (mut written, mut unwritten) = (Vec::new(), Vec::new());
-        for own in &row.apertures {
-            let is_round = matches!(own.shape, ApertureShape::Circle { .. });
-            let angle = (!is_round).then_some(own.angle);
-            let fits = place.is_none_or(|(center, turned): ([f64; 2], Option<f64>)| {
-                center == own.center && (turned.is_none() || angle.is_none() || turned == angle)
-            });
-            let kind = (is_round, own.obscures());
-            let taken = written.contains(&kind) || (is_round && has_circle);
-            match aperture_commands(own).filter(|_| fits && !taken) {
-                Some(commands) => {
-                    commands.iter().for_each(|command| self.line(format!("  {command}")));
-                    written.push(kind);
-                    place = Some((own.center, place.and_then(|(_, turned)| turned).or(angle)));
-                }
-                None => unwritten.push(own.clone()),
-            }
-        }
-        if let Some(([x, y], angle)) = place.filter(|_| !written.is_empty()) {
-            for (name, value) in [("ADX", x), ("ADY", y), ("ARO", angle.unwrap_or(0.0))] {
-                if value != 0.0 {
-                    self.line(format!("  {name} {}", number(value)));
-                }
-            }
-        }
-        self.report.add_unwritten_apertures(SurfaceNumber::new(i), &unwritten);
+        let lines = figure_lines(row, stop.is_some()).unwrap_or_default();
+        lines.into_iter().for_each(|line| self.line(format!("  {line}")));
     }
 
     fn form(&mut self, row: &Row) {
@@ -311,6 +279,38 @@ fn fictitious(nd: f64, vd: f64) -> Option<String> {
     let [index, abbe] = [nd, vd].map(|value| format!("{value:?}"));
     let (index, abbe) = (index.strip_prefix("1.")?, abbe.replace('.', ""));
     Some(format!(" {index:0<6}.{abbe:0<6}"))
+}
+
+/// The commands of the apertures that are no circles about the vertex: one of each kind, all with the same
+/// centre and the same angle, which `ADX`, `ADY` and `ARO` give for all apertures of a surface. `is_stop` is
+/// true if the surface has a circle as the aperture of the lens.
+///
+/// # Errors
+/// The index of the first aperture that the format cannot hold beside the others.
+pub(super) fn figure_lines(row: &Row, is_stop: bool) -> Result<Vec<String>, usize> {
+    let has_circle = is_stop || row.semi_diameter.is_some() || row.obstruction.is_some();
+    let mut place = has_circle.then_some(([0.0; 2], None));
+    let (mut lines, mut kinds) = (Vec::new(), Vec::new());
+    for (k, own) in row.apertures.iter().enumerate() {
+        let is_round = matches!(own.shape, ApertureShape::Circle { .. });
+        let angle = (!is_round).then_some(own.angle);
+        let fits = place.is_none_or(|(center, turned): ([f64; 2], Option<f64>)| {
+            center == own.center && (turned.is_none() || angle.is_none() || turned == angle)
+        });
+        let kind = (is_round, own.obscures());
+        if !fits || kinds.contains(&kind) || (is_round && has_circle) {
+            return Err(k);
+        }
+        lines.extend(aperture_commands(own).ok_or(k)?);
+        kinds.push(kind);
+        place = Some((own.center, place.and_then(|(_, turned)| turned).or(angle)));
+    }
+    if let Some(([x, y], angle)) = place.filter(|_| !kinds.is_empty()) {
+        let places = [("ADX", x), ("ADY", y), ("ARO", angle.unwrap_or(0.0))];
+        let moved = places.iter().filter(|(_, value)| *value != 0.0);
+        lines.extend(moved.map(|(name, value)| format!("{name} {}", number(*value))));
+    }
+    Ok(lines)
 }
 
 /// The commands of an aperture without its place; `None` for one that the format does not have.

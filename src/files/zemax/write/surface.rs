@@ -85,7 +85,7 @@ impl ZemaxWriter {
         if graded.is_none() {
             self.glass(&row.medium, MediumPlace::behind(i), variable);
         }
-        self.semi_diameter(i, &row);
+        self.semi_diameter(&row);
         if row.hyperhemisphere {
             self.report_hyperhemisphere(i);
         }
@@ -258,7 +258,7 @@ impl ZemaxWriter {
 
     /// The semi-diameter, and the aperture by which it and the obstruction clip: a surface has one
     /// aperture there, with an outer and an inner radius.
-    fn semi_diameter(&mut self, i: usize, row: &Row) {
+    fn semi_diameter(&mut self, row: &Row) {
         let aperture = match self.lens.aperture {
             Aperture::StopSemiDiameter(radius) if row.stop => Some(radius),
             _ => row.semi_diameter,
@@ -272,7 +272,8 @@ impl ZemaxWriter {
             return;
         }
         if !row.apertures.is_empty() {
-            self.figures(i, row);
+            let lines = figure_lines(row).unwrap_or_default();
+            lines.into_iter().for_each(|line| self.surface_line(line));
             return;
         }
         let inner = row.obstruction.filter(|radius| *radius > 0.0);
@@ -284,41 +285,43 @@ impl ZemaxWriter {
         }
     }
 
-    /// The apertures that are no circles about the vertex: an aperture and an obscuration with the same
-    /// centre, neither turned.
-    fn figures(&mut self, i: usize, row: &Row) {
-        let mut kinds: Vec<&str> = Vec::new();
-        let mut center = None;
-        if let Some(radius) = row.semi_diameter {
-            let inner = row.obstruction.map_or_else(|| "0".to_owned(), number);
-            self.clap(&inner, radius);
-            (kinds, center) = (vec!["AP"], Some([0.0; 2]));
-        } else if let Some(radius) = row.obstruction {
-            self.surface_line(format!("OBSC 0 {} 0", number(radius)));
-            (kinds, center) = (vec!["OB"], Some([0.0; 2]));
-        }
-        let mut unwritten = Vec::new();
-        for own in &row.apertures {
-            match aperture_line(own) {
-                Some((kind, line))
-                    if !kinds.contains(&kind) && center.is_none_or(|at| at == own.center) =>
-                {
-                    self.surface_line(line);
-                    kinds.push(kind);
-                    center = Some(own.center);
-                }
-                _ => unwritten.push(own.clone()),
-            }
-        }
-        if let Some([x, y]) = center.filter(|at| *at != [0.0; 2]) {
-            self.surface_line(format!("OBDC {} 0", numbers([x, y])));
-        }
-        self.report.add_unwritten_apertures(SurfaceNumber::new(i), &unwritten);
-    }
-
     fn clap(&mut self, inner: &str, outer: f64) {
-        self.surface_line(format!("CLAP {inner} {} 0", number(outer)));
+        self.surface_line(clap_line(inner, outer));
     }
+}
+
+fn clap_line(inner: &str, outer: f64) -> String {
+    format!("CLAP {inner} {} 0", number(outer))
+}
+
+/// The lines of the apertures of a row with some that are no circles about the vertex: an aperture, an
+/// obscuration and a spider with the same centre, none of them turned.
+///
+/// # Errors
+/// The index of the first aperture that the format cannot hold beside the others.
+pub(super) fn figure_lines(row: &Row) -> Result<Vec<String>, usize> {
+    let (mut lines, mut kinds, mut center) = (Vec::new(), Vec::new(), None);
+    if let Some(radius) = row.semi_diameter {
+        let inner = row.obstruction.map_or_else(|| "0".to_owned(), number);
+        lines.push(clap_line(&inner, radius));
+        (kinds, center) = (vec!["AP"], Some([0.0; 2]));
+    } else if let Some(radius) = row.obstruction {
+        lines.push(format!("OBSC 0 {} 0", number(radius)));
+        (kinds, center) = (vec!["OB"], Some([0.0; 2]));
+    }
+    for (k, own) in row.apertures.iter().enumerate() {
+        let (kind, line) = aperture_line(own).ok_or(k)?;
+        if kinds.contains(&kind) || center.is_some_and(|at| at != own.center) {
+            return Err(k);
+        }
+        lines.push(line);
+        kinds.push(kind);
+        center = Some(own.center);
+    }
+    if let Some([x, y]) = center.filter(|at| *at != [0.0; 2]) {
+        lines.push(format!("OBDC {} 0", numbers([x, y])));
+    }
+    Ok(lines)
 }
 
 /// The kind and the line of an aperture without its place; `None` for one that the format does not have.
