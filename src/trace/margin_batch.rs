@@ -140,9 +140,7 @@ impl Tracer<f64> {
                     let at = block.state(j).0;
                     let [x, y] = set.by_point(side, at);
                     point = Vec3::new(weight * x, weight * y, 0.0);
-                    if weight != 0.0 {
-                        set.add_slopes(side, at, weight, &mut total.surfaces[surface]);
-                    }
+                    set.add_slopes(side, at, weight, &mut total.surfaces[surface]);
                 }
                 seeds.push(AdjointSeed { point, ..AdjointSeed::default() });
                 arrived += weight;

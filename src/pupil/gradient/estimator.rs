@@ -402,12 +402,12 @@ fn natural_size(
             SurfaceParameter::Curvature => 1,
             SurfaceParameter::Conic | SurfaceParameter::Index => 0,
             SurfaceParameter::AsphereTerm(term) => 2 * term as i32 + 3,
+            SurfaceParameter::Aperture(k) if k % APERTURE_NUMBERS == APERTURE_NUMBERS - 1 => 0,
             // The power of the length depends on the kind of a form; rounding is far below.
             SurfaceParameter::Thickness
             | SurfaceParameter::SemiDiameter
-            | SurfaceParameter::Freeform(_) => -1,
-            SurfaceParameter::Aperture(k) if k % APERTURE_NUMBERS == APERTURE_NUMBERS - 1 => 0,
-            SurfaceParameter::Aperture(_) => -1,
+            | SurfaceParameter::Freeform(_)
+            | SurfaceParameter::Aperture(_) => -1,
             SurfaceParameter::GrinTerm(k) => match k.checked_sub(RADIAL_TERMS) {
                 None => 2 * (k as i32 + 1),
                 Some(j) => j as i32 + 1,

@@ -23,12 +23,11 @@ pub(super) fn apply(
     }
     spider(surface, file.unit, row, report);
     report_offset(surface, row, report);
-    match &rim {
-        Some(((found, _), _)) => report_drawn(surface, found, report),
-        None => {
-            let outer = drawn(file, number, stop, report);
-            row.semi_diameter = outer.map(|radius| radius * file.unit);
-        }
+    if let Some(((found, _), _)) = &rim {
+        report_drawn(surface, found, report);
+    } else {
+        let outer = drawn(file, number, stop, report);
+        row.semi_diameter = outer.map(|radius| radius * file.unit);
     }
     if !surface.other_apertures.is_empty() {
         keep_lines(file, number, row, report);
