@@ -42,17 +42,11 @@ fn add(row: &mut Row, aperture: &Value, blocks: BlockedSide, depth: usize) -> Re
     match kind {
         "" => Ok(()),
         "RadialAperture" | "OffsetRadialAperture" => {
-            let outer = aperture["r_max"].as_f64().unwrap_or(f64::INFINITY);
-            let inner = number(&aperture["r_min"]);
-            if inside && inner > 0.0 {
+            let radii = [aperture["r_max"].as_f64().unwrap_or(WIDE), number(&aperture["r_min"])];
+            if inside && radii[1] > 0.0 {
                 return refused();
             }
-            if inner > 0.0 {
-                place(row, &outline(OutlineForm::Circle, [inner; 2], offset), BlockedSide::Inside);
-            }
-            if outer < WIDE && outer > 0.0 {
-                place(row, &outline(OutlineForm::Circle, [outer; 2], offset), blocks);
-            }
+            add_ring(row, radii, offset, blocks);
             Ok(())
         }
         "RectangularAperture" => {
@@ -69,12 +63,7 @@ fn add(row: &mut Row, aperture: &Value, blocks: BlockedSide, depth: usize) -> Re
             Ok(())
         }
         "PolygonAperture" => {
-            let column = |key: &str| -> Vec<f64> {
-                aperture[key].as_array().into_iter().flatten().map(number).collect()
-            };
-            let points = column("x").into_iter().zip(column("y")).map(|(x, y)| [x, y]).collect();
-            let shape = ApertureShape::Polygon { points };
-            let own = SurfaceAperture { blocks, ..SurfaceAperture::inside(shape) };
+            let own = SurfaceAperture { blocks, ..polygon(aperture) };
             if own.fault().is_some() {
                 return refused();
             }
@@ -96,6 +85,31 @@ fn add(row: &mut Row, aperture: &Value, blocks: BlockedSide, depth: usize) -> Re
         }
         _ => refused(),
     }
+}
+
+/// Adds a circle, and the hole in it, that block on a side.
+fn add_ring(row: &mut Row, [outer, inner]: [f64; 2], offset: [f64; 2], blocks: BlockedSide) {
+    let circle = |radius: f64| ForeignOutline {
+        form: OutlineForm::Circle,
+        half: [radius; 2],
+        offset,
+        angle: 0.0,
+    };
+    if inner > 0.0 {
+        place(row, &circle(inner), BlockedSide::Inside);
+    }
+    if outer > 0.0 && outer < WIDE {
+        place(row, &circle(outer), blocks);
+    }
+}
+
+/// A polygon by the columns of its corners.
+fn polygon(aperture: &Value) -> SurfaceAperture {
+    let column = |key: &str| -> Vec<f64> {
+        aperture[key].as_array().into_iter().flatten().map(number).collect()
+    };
+    let points = column("x").into_iter().zip(column("y")).map(|(x, y)| [x, y]).collect();
+    SurfaceAperture::inside(ApertureShape::Polygon { points })
 }
 
 /// Adds an outline: as the rim or the obstruction if that is still free, else as a further aperture.
