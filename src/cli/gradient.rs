@@ -6,8 +6,8 @@ use super::input::{LensFile, LoadedLens, Tolerance};
 use super::output::{Output, ShortNumber, TextTable, counted};
 use crate::effects::{self, Effect, EffectOverride, EffectPlan, TracePurpose};
 use crate::lens::{
-    Fields, Lens, Medium, MediumPlace, PROFILE_TERMS, ProfileLaw, RADIAL_TERMS, Row, SurfaceNumber,
-    at_zoom,
+    APERTURE_NUMBERS, Fields, Lens, Medium, MediumPlace, PROFILE_TERMS, ProfileLaw, RADIAL_TERMS,
+    Row, SurfaceNumber, at_zoom,
 };
 use crate::measure::{Integral, time_ms};
 use crate::pupil::{
@@ -291,6 +291,10 @@ struct DerivativeColumns {
     /// The numbers of a freeform; only if the lens has one.
     #[serde(skip_serializing_if = "are_none")]
     freeform: Vec<Option<Vec<f64>>>,
+    /// By the numbers of apertures of other forms, five for each: two sizes, the centre and the angle in
+    /// degrees; only if the lens has one.
+    #[serde(skip_serializing_if = "are_none")]
+    apertures: Vec<Option<Vec<f64>>>,
 }
 
 fn are_none(column: &[Option<Vec<f64>>]) -> bool {
@@ -309,6 +313,11 @@ impl DerivativeColumns {
             let count = row.freeform.as_ref()?.numbers.len();
             Some((0..count).map(|k| s.by(SurfaceParameter::Freeform(k))).collect())
         };
+        let apertures = |row: &Row, s: &SurfaceGradient<f64>| {
+            let count = APERTURE_NUMBERS * row.apertures.len();
+            let all = (0..count).map(|k| s.by(SurfaceParameter::Aperture(k)));
+            (count > 0).then(|| all.collect())
+        };
         Self {
             curvature: column(|s| s.curvature),
             thickness: column(|s| s.thickness),
@@ -318,6 +327,7 @@ impl DerivativeColumns {
             asphere: rows().map(|(r, s)| asphere(r.asphere.len(), &s.terms)).collect(),
             gradient: rows().map(|(r, s)| gradient(&r.medium, s)).collect(),
             freeform: rows().map(|(r, s)| freeform(r, s)).collect(),
+            apertures: rows().map(|(r, s)| apertures(r, s)).collect(),
         }
     }
 }

@@ -70,14 +70,15 @@ pub struct PlacedSurfaces {
 pub struct RimClearance {
     /// The index of the surface.
     pub surface: usize,
-    /// Its semi-diameter, in mm; infinite for a surface that has only an obstruction.
+    /// Its semi-diameter, in mm; infinite for a surface that has only an obstruction or other apertures.
     pub semi_diameter: f64,
     /// The largest distance from the axis at which a ray meets the surface that no rim stops, in mm.
     pub ray_height: f64,
     /// True if the surface is aspheric: its semi-diameter then bounds the search for the
     /// intersection.
     pub aspheric: bool,
-    /// True if the surface has an obstruction, with or without a semi-diameter.
+    /// True if the surface has an obstruction or an aperture of another form, with or without a
+    /// semi-diameter.
     pub obstructed: bool,
 }
 
@@ -398,6 +399,7 @@ fn without_rims(model: &RayModel, wavelength: usize) -> System<f64> {
 fn remove_rims(system: &mut System<f64>, model: &RayModel) {
     for i in 0..system.surfaces.len() {
         system.surfaces[i].obstruction = 0.0;
+        system.surfaces[i].apertures.clear();
         let limits = !model.ends_at_disc() && i == model.stop();
         if !(is_aspheric(system, i) || limits) {
             system.surfaces[i].semi_diameter = f64::INFINITY;
@@ -464,7 +466,8 @@ fn rims(model: &RayModel) -> Result<Vec<RimClearance>, RayModelError> {
         semi_diameter: system.surfaces[surface].semi_diameter,
         ray_height: all.iter().map(|field| field[surface]).fold(0.0, f64::max),
         aspheric: is_aspheric(system, surface),
-        obstructed: system.surfaces[surface].obstruction > 0.0,
+        obstructed: system.surfaces[surface].obstruction > 0.0
+            || !system.surfaces[surface].apertures.is_empty(),
     };
     let clips = |rim: &RimClearance| rim.semi_diameter.is_finite() || rim.obstructed;
     Ok((0..system.surfaces.len()).map(rim).filter(clips).collect())

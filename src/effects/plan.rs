@@ -288,7 +288,7 @@ fn allowed_text(allowed: f64) -> String {
 }
 
 /// Keeps the semi-diameters that a ray may reach, those that bound the iteration at an asphere, and
-/// every obstruction.
+/// every obstruction and aperture of another form.
 fn clipping(measured: &EffectMeasurements, choice: EffectOverride) -> (EffectDecision, Vec<usize>) {
     let ratio = |rim: &RimClearance| {
         if rim.ray_height == 0.0 { 0.0 } else { rim.ray_height / rim.semi_diameter }
@@ -308,11 +308,11 @@ fn clipping(measured: &EffectMeasurements, choice: EffectOverride) -> (EffectDec
     let obstructed = measured.rims.iter().filter(|rim| rim.obstructed).count();
     let obstructing = match obstructed {
         0 => String::new(),
-        1 => " and at an obstruction".to_owned(),
-        all => format!(" and at {all} obstructions"),
+        1 => " and at an obstruction or aperture".to_owned(),
+        all => format!(" and at {all} obstructions or apertures"),
     };
     let reason = if measured.rims.is_empty() {
-        "no surface has a semi-diameter or an obstruction".to_owned()
+        "no surface has a semi-diameter, an obstruction or another aperture".to_owned()
     } else {
         let (clipped, rays) = (measured.fates.clipped, measured.fates.total());
         let limiting = measured.rims.iter().filter(|rim| ratio(rim) > NEAR_RIM).count();

@@ -371,6 +371,7 @@ impl Row {
             let turn = |v: &f64| check_number(&place, *v, v.abs() <= 360.0, "at most 360 degrees");
             axis.tilt.iter().try_for_each(turn)?;
         }
+        super::surface_aperture::check_apertures(&self.apertures, surface)?;
         let Some(inner) = self.obstruction else { return Ok(()) };
         let transmits = self.semi_diameter.is_none_or(|sd| inner == 0.0 || inner < sd);
         let expected = "zero or more and less than the semi-diameter, in mm";

@@ -30,6 +30,7 @@ mod rows;
 mod section;
 mod spectrum;
 mod starting;
+mod surface_aperture;
 mod surface_number;
 mod system;
 mod thermal;
@@ -60,6 +61,11 @@ pub use resolve::paraxial_image_distance;
 pub use section::LensSection;
 pub use spectrum::WavelengthPreset;
 pub use starting::{StartingForm, StartingLens};
+pub(crate) use surface_aperture::turn;
+pub use surface_aperture::{
+    APERTURE_NUMBERS, ApertureShape, BlockedSide, MAX_APERTURES, MAX_ARMS, MAX_CORNERS,
+    SurfaceAperture,
+};
 pub use surface_number::{MediumPlace, SurfaceNumber};
 pub use system::{Shape, Surface, System, SystemError};
 pub use thermal::TemperatureChange;
@@ -277,6 +283,8 @@ pub struct Row {
     /// The radius of the central obstruction, or of the hole of a mirror, in mm; rays that meet the
     /// surface nearer to the axis are clipped. `None` clips nothing.
     pub obstruction: Option<f64>,
+    /// The apertures and obscurations that are no circles about the vertex.
+    pub apertures: Vec<SurfaceAperture>,
     /// True for the aperture stop.
     pub stop: bool,
     /// True for a hyperhemisphere: the far half of the sphere or ellipsoid belongs to the surface
@@ -293,7 +301,7 @@ pub struct Row {
     pub break_after: Option<AxisBreak>,
     /// The lines of a foreign file on a surface that cannot be traced; `None` for a surface that can.
     pub locked: Option<LockedSurface>,
-    /// The apertures of a foreign file that are no circles about the vertex; `None` for a row that has none.
+    /// The apertures of a foreign file that a row cannot have; `None` for a row that has none.
     pub foreign_aperture: Option<ForeignAperture>,
     /// A remark on the surface.
     pub comment: String,
@@ -314,6 +322,9 @@ pub struct ForeignAperture {
     /// The obstruction in mm that stands for them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub obstruction: Option<f64>,
+    /// The apertures of the row that are among them.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub apertures: Vec<SurfaceAperture>,
 }
 
 /// The description of a surface that this program cannot trace, as the file has it. Rays meet the
@@ -400,7 +411,9 @@ impl Row {
     pub fn keep_aperture(&mut self, format: &str, lines: Vec<String>) {
         let (semi_diameter, obstruction) = (self.semi_diameter, self.obstruction);
         let format = format.to_owned();
-        self.foreign_aperture = Some(ForeignAperture { format, lines, semi_diameter, obstruction });
+        let apertures = self.apertures.clone();
+        let kept = ForeignAperture { format, lines, semi_diameter, obstruction, apertures };
+        self.foreign_aperture = Some(kept);
     }
 
     /// The lines on apertures that an export to a format writes back; `None` without any, and once another
@@ -408,7 +421,7 @@ impl Row {
     pub fn kept_aperture(&self, format: &str) -> Option<&[String]> {
         let kept = self.foreign_aperture.as_ref().filter(|kept| kept.format == format)?;
         let same = (kept.semi_diameter, kept.obstruction) == (self.semi_diameter, self.obstruction);
-        same.then_some(&kept.lines)
+        (same && kept.apertures == self.apertures).then_some(&kept.lines)
     }
 }
 

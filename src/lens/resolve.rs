@@ -137,6 +137,7 @@ impl Row {
             grin: None,
             semi_diameter: self.semi_diameter.unwrap_or(f64::INFINITY),
             obstruction: self.obstruction.unwrap_or(0.0),
+            apertures: self.apertures.clone(),
             mirror: self.medium == Medium::Mirror,
             hyperhemisphere: self.hyperhemisphere,
             pose: self.pose(),

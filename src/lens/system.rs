@@ -2,7 +2,7 @@
 
 use super::{
     ASPHERE_TERMS, Freeform, IdealAction, MediumPlace, Pose, ProfileCoefficients,
-    RotationalProfile, SurfaceNumber,
+    RotationalProfile, SurfaceAperture, SurfaceNumber, surface_aperture,
 };
 use crate::math::{Real, format_short};
 
@@ -191,6 +191,8 @@ pub struct Surface<R> {
     /// The radius of the central obstruction in mm; rays nearer to the axis are clipped, those
     /// exactly on its edge pass. 0 for none.
     pub obstruction: R,
+    /// The apertures and obscurations that are no circles about the vertex, in the surface's own frame.
+    pub apertures: Vec<SurfaceAperture>,
     /// True for a mirror.
     pub mirror: bool,
     /// True if the far half of the sphere or ellipsoid belongs to the surface too.
@@ -267,6 +269,16 @@ pub enum SystemError {
         found: f64,
         /// The semi-diameter.
         semi_diameter: f64,
+    },
+    /// An aperture that is no circle about the vertex has a fault.
+    #[error("aperture {aperture} of surface {surface} {why}")]
+    Aperture {
+        /// The surface.
+        surface: SurfaceNumber,
+        /// The number of the aperture, from 1.
+        aperture: usize,
+        /// The fault, as the rest of a sentence.
+        why: String,
     },
     /// A surface has more asphere coefficients than [`ASPHERE_TERMS`].
     #[error("surface {surface} has {found} asphere coefficients; expected at most 7 (r^4 to r^16)")]
@@ -376,8 +388,14 @@ impl<R: Real> System<R> {
             let is_centred = surface.pose.is_none() && surface.axis.is_none();
             let is_grating = matches!(surface.ideal, Some(IdealAction::Grating { .. }));
             let is_round = surface.freeform.as_ref().is_none_or(|form| form.kind.is_round());
-            is_centred && is_round && surface.astigmatism.is_none() && !is_grating
+            let is_clear = surface_aperture::are_round(&surface.apertures);
+            is_centred && is_round && is_clear && surface.astigmatism.is_none() && !is_grating
         })
+    }
+
+    /// True if all apertures are the same after any turn about the vertex of their surface.
+    pub fn has_round_apertures(&self) -> bool {
+        self.surfaces.iter().all(|surface| surface_aperture::are_round(&surface.apertures))
     }
 
     /// True if the axis is broken at any surface.
@@ -421,6 +439,7 @@ impl<R: Real> Surface<R> {
             index,
             semi_diameter: R::from_f64(f64::INFINITY),
             obstruction: R::ZERO,
+            apertures: Vec::new(),
             mirror: false,
             hyperhemisphere: false,
             grin: None,
@@ -464,6 +483,8 @@ impl<R: Real> Surface<R> {
             pose.shift.x == R::ZERO && pose.turn[0].y == R::ZERO && pose.turn[0].z == R::ZERO
         };
         let even = self.freeform.as_ref().is_none_or(|form| form.mirrors_in_x());
+        // Half of a pupil would not tell the derivative by the position of a figure.
+        let even = even && surface_aperture::are_round(&self.apertures);
         even && self.pose.as_ref().is_none_or(upright) && self.axis.as_ref().is_none_or(upright)
     }
 
@@ -477,6 +498,11 @@ impl<R: Real> Surface<R> {
         check_index(MediumPlace::behind(i), self.index.value())?;
         if let Some(grade) = &self.grin {
             grade.terms.iter().try_for_each(|a| check_finite("GRIN coefficient", i, a.value()))?;
+        }
+        for (k, aperture) in self.apertures.iter().enumerate() {
+            if let Some(why) = aperture.fault() {
+                return Err(SystemError::Aperture { surface: i.into(), aperture: k + 1, why });
+            }
         }
         let (semi_diameter, obstruction) = (self.semi_diameter.value(), self.obstruction.value());
         if !(semi_diameter >= 0.0) {
@@ -513,10 +539,11 @@ impl<R: Real> Surface<R> {
         self.grin.map(|grade| RotationalProfile { base: self.index, coefficients: grade })
     }
 
-    /// Removes what clips: the clear aperture and the obstruction.
+    /// Removes what clips: the clear aperture, the obstruction and the other apertures.
     pub fn remove_apertures(&mut self) {
         self.semi_diameter = R::from_f64(f64::INFINITY);
         self.obstruction = R::ZERO;
+        self.apertures.clear();
     }
 
     /// The same surface with every number mapped by `f`.
@@ -528,6 +555,7 @@ impl<R: Real> Surface<R> {
             grin: self.grin.map(|grin| grin.map(&f)),
             semi_diameter: f(self.semi_diameter),
             obstruction: f(self.obstruction),
+            apertures: self.apertures.clone(),
             mirror: self.mirror,
             hyperhemisphere: self.hyperhemisphere,
             pose: self.pose.map(|pose| pose.map(&f)),

@@ -123,6 +123,7 @@ fn scale<R: Real>(surface: &mut Surface<R>, growth: f64) {
         surface.semi_diameter = surface.semi_diameter * R::from_f64(growth);
     }
     surface.obstruction = surface.obstruction * R::from_f64(growth);
+    surface.apertures.iter_mut().for_each(|own| *own = own.scaled(growth));
 }
 
 /// The expansion of what fills a gap, in 1e-6/K; `None` for air and behind a mirror.
@@ -163,6 +164,7 @@ impl Lens {
             row.asphere[..count].copy_from_slice(&terms[..count]);
             row.semi_diameter = row.semi_diameter.map(|_| surface.semi_diameter);
             row.obstruction = row.obstruction.map(|_| surface.obstruction);
+            row.apertures.clone_from(&surface.apertures);
         }
         lens.environment.celsius = Some(celsius);
         lens.image_solve = None;

@@ -317,9 +317,9 @@ impl Configuration {
                     0.0
                 }
                 SurfaceParameter::SemiDiameter => surface.semi_diameter,
-                target @ (SurfaceParameter::GrinTerm(_) | SurfaceParameter::Freeform(_)) => {
-                    surface.by(target)
-                }
+                target @ (SurfaceParameter::GrinTerm(_)
+                | SurfaceParameter::Freeform(_)
+                | SurfaceParameter::Aperture(_)) => surface.by(target),
             };
             by_variable[binding.variable] += binding.factor * by_number;
         }
@@ -392,6 +392,7 @@ fn move_focus(system: &mut System<VariableDual>, systems: &ResolvedSystems, firs
 /// polynomial is meaningless and rays may cross it several times.
 fn unclip(surface: &mut Surface<f64>) {
     surface.obstruction = 0.0;
+    surface.apertures.clear();
     surface.semi_diameter = match surface.shape {
         _ if surface.freeform.is_some() => ASPHERE_MARGIN * surface.semi_diameter,
         Shape::Asphere { .. } => ASPHERE_MARGIN * surface.semi_diameter,

@@ -267,7 +267,7 @@ impl RaySampling {
         let accuracy = Accuracy { tolerance, ..Accuracy::default() };
         let mut orders = 0_usize;
         let numbers = |nodes: &Nodes| {
-            orders += 1;
+            orders += usize::from(!nodes.is_part);
             self.demand.numbers(&region, nodes, reference)
         };
         let found =

@@ -138,7 +138,9 @@ impl<'a> Launch<'a> {
 
     /// True for a field on the axis: all azimuths of its pupil are alike.
     pub(super) fn is_axial(&self) -> bool {
-        self.field.x == 0.0 && self.field.y == 0.0 && !self.channel().system.has_poses()
+        let system = &self.channel().system;
+        let is_round = !system.has_poses() && system.has_round_apertures();
+        self.field.x == 0.0 && self.field.y == 0.0 && is_round
     }
 
     /// The lens at this wavelength.
@@ -394,13 +396,13 @@ impl<'a> Launch<'a> {
         aim_at(self.model, self.wavelength, &self.source, self.model.stop(), guess, target)
     }
 
-    /// The pupil point, inside the pupil or not, whose ray goes through the vertex of a surface
-    /// without clipping; `None` if none was found.
-    pub(super) fn through_vertex(&self, surface: usize) -> Option<[f64; 2]> {
+    /// The pupil point, inside the pupil or not, whose ray goes through a point of a surface, in its own
+    /// frame in mm, without clipping; `None` if none was found.
+    pub(super) fn through_point(&self, surface: usize, point: [f64; 2]) -> Option<[f64; 2]> {
         let (model, source) = (self.model, &self.source);
         let search = |start: [f64; 2]| {
             let guess = self.map.map(start);
-            aim_at(model, self.wavelength, source, surface, guess, [0.0; 2])
+            aim_at(model, self.wavelength, source, surface, guess, point)
         };
         let starts = [[0.0, 0.0], [0.0, 0.9], [0.0, -0.9], [0.9, 0.0], [-0.9, 0.0]];
         let q = starts.into_iter().find_map(search)?.q;

@@ -135,8 +135,10 @@ fn clipped_rays(
     mut systems: Vec<System<f64>>,
 ) -> Option<(Vec<LandedField>, f64)> {
     for system in &mut systems {
-        for (surface, (rim, obstruction)) in system.surfaces.iter_mut().zip(&scene.lens.rims) {
+        let rims = system.surfaces.iter_mut().zip(&scene.lens.rims);
+        for (surface, (rim, obstruction, apertures)) in rims {
             (surface.semi_diameter, surface.obstruction) = (*rim, *obstruction);
+            surface.apertures.clone_from(apertures);
         }
     }
     let tracers: Result<Vec<_>, _> = systems.iter().map(Tracer::new).collect();

@@ -201,7 +201,7 @@ impl NominalLens {
             rims: whole[model.primary]
                 .surfaces
                 .iter()
-                .map(|surface| (surface.semi_diameter, surface.obstruction))
+                .map(|own| (own.semi_diameter, own.obstruction, own.apertures.clone()))
                 .collect(),
         })
     }

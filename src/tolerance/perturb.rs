@@ -4,7 +4,9 @@
 //! larger ones that contain them, each of which carries along what it contains.
 
 use super::ToleranceError;
-use crate::lens::{Perturbation, PerturbationKind, Pose, RigidMotion, Surface, System};
+use crate::lens::{
+    Perturbation, PerturbationKind, Pose, RigidMotion, Surface, SurfaceAperture, System,
+};
 use crate::math::Real;
 
 /// A lens as designed, resolved at its wavelengths.
@@ -19,9 +21,9 @@ pub struct NominalLens {
     pub primary: usize,
     /// The semi-diameter of each surface in mm: the unit of an irregularity.
     pub semi_diameters: Vec<f64>,
-    /// The radii in mm of the clear aperture and of the obstruction of each surface, which clip in a
-    /// lens with its rims; empty if nothing does.
-    pub rims: Vec<(f64, f64)>,
+    /// The radii in mm of the clear aperture and of the obstruction of each surface, and its apertures of
+    /// other forms, which clip in a lens with its rims; empty if nothing does.
+    pub rims: Vec<(f64, f64, Vec<SurfaceAperture>)>,
 }
 
 /// The lens at each wavelength with errors of making; numbers without an error are as designed.

@@ -6,6 +6,7 @@
 //! reordered, so that every width, every number of threads and the single ray give the same bits.
 //! GRIN media are the exception: there every ray takes steps of its own.
 
+use super::aperture::ApertureSet;
 use super::asphere;
 use super::asphere_crossing;
 use super::fate::{self, CLIPPED, Fate, MISSED, TOTAL_REFLECTION};
@@ -320,6 +321,14 @@ impl<R: Real> Tracer<R> {
         }
     }
 
+    /// Clips a block that has crossed a surface at its apertures. The test alone is part of the loop.
+    #[inline(always)]
+    pub(super) fn clip_at_apertures<const N: usize>(&self, block: &mut RayBlock<R, N>, i: usize) {
+        if let Some(apertures) = self.apertures.clipping(i) {
+            block.clip_apertures(apertures, i as u32);
+        }
+    }
+
     #[inline(always)]
     fn trace_blocks<S: TraceSink<R>>(
         &self,
@@ -351,11 +360,17 @@ impl<R: Real> Tracer<R> {
         self.mask(block, count);
         for (i, interface) in self.interfaces.iter().enumerate() {
             if let Some(mount) = self.vector_mount(i) {
-                block.cross_mounted_into::<S>(interface, i as u32, mount);
+                block.cross_mounted_into::<S>(
+                    interface,
+                    i as u32,
+                    mount,
+                    self.apertures.clipping(i),
+                );
             } else if self.is_general(i) {
                 block.cross_general_into::<S>(self, i);
             } else {
                 block.cross::<S>(interface, i as u32);
+                self.clip_at_apertures(block, i);
             }
         }
         let index = self.interfaces.last().map_or(self.index_before, |i| i.index_behind);
@@ -476,6 +491,7 @@ impl<R: Real, const N: usize> RayBlock<R, N> {
         interface: &Interface<R>,
         number: u32,
         mount: &Mount<R>,
+        apertures: Option<&ApertureSet<R>>,
     ) {
         let mut opl = self.opl;
         run_vectorized(
@@ -485,7 +501,7 @@ impl<R: Real, const N: usize> RayBlock<R, N> {
                 self.cross_mounted(
                     interface,
                     number,
-                    mount,
+                    (mount, apertures),
                     #[inline(always)]
                     |j, met| {
                         if S::WITH_PATH {
@@ -503,7 +519,7 @@ impl<R: Real, const N: usize> RayBlock<R, N> {
         &mut self,
         interface: &Interface<R>,
         number: u32,
-        mount: &Mount<R>,
+        (mount, apertures): (&Mount<R>, Option<&ApertureSet<R>>),
         keep: impl FnMut(usize, &Intersection<R>),
     ) {
         for j in 0..N {
@@ -516,6 +532,9 @@ impl<R: Real, const N: usize> RayBlock<R, N> {
         match mount.astigmatism {
             None => self.cross_with(&own, number, keep),
             Some(q) => self.cross_irregular(&own, number, q, keep),
+        }
+        if let Some(apertures) = apertures {
+            self.clip_apertures(apertures, number);
         }
         for j in 0..N {
             let (p, k) = self.state(j);
@@ -608,7 +627,9 @@ impl<R: Real, const N: usize> RayBlock<R, N> {
             let (p, k) = self.state(j);
             let arrived = tracer.propagate::<true>(number, p, k);
             keep(j, &arrived);
-            let crossing = arrived.refract();
+            let mut crossing = arrived.refract();
+            let is_outside = tracer.is_outside_apertures(number, crossing.point);
+            crossing.clipped |= !arrived.met.missed && is_outside;
             let (p, k) = tracer.state_out(number, (crossing.point, crossing.k));
             self.set(j, p, k);
             if let Some(cause) = arrived.loss_cause(&crossing) {
@@ -657,6 +678,22 @@ impl<R: Real, const N: usize> RayBlock<R, N> {
             let code = self.code[j];
             let arrived = !(code > R::ZERO) | (code == reflected);
             self.code[j] = R::select(arrived & interface.obstructs(p), clipped, code);
+        }
+    }
+
+    /// Clips the rays that met a surface where one of its apertures blocks them. Never part of the loop
+    /// over surfaces, whose registers it would occupy.
+    #[inline(never)]
+    fn clip_apertures(&mut self, apertures: &ApertureSet<R>, number: u32) {
+        let lost = |cause: u32| R::from_f64(f64::from(fate::encode(number, cause)));
+        let (clipped, reflected) = (lost(CLIPPED), lost(TOTAL_REFLECTION));
+        for j in 0..N {
+            let (p, _) = self.state(j);
+            let code = self.code[j];
+            let arrived = !(code > R::ZERO) | (code == reflected);
+            if arrived && !apertures.passes(p) {
+                self.code[j] = clipped;
+            }
         }
     }
 

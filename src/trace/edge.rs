@@ -8,6 +8,7 @@
 //! In a GRIN medium a margin has no closed form, so that the dual numbers pass through the steps of
 //! the gap: few rays are on an edge.
 
+use super::aperture::ApertureSet;
 use super::grin_gap::GrinGap;
 use super::interface::{Interface, Intersection, SurfaceForm};
 use super::margin::RayLimit;
@@ -39,12 +40,13 @@ impl<R: Real> Tracer<R> {
     /// The margin of a ray at one limit, regardless of the rims in front; `None` for a ray that does
     /// not get there.
     pub fn margin(&self, ray: Ray<R>, surface: usize, limit: RayLimit) -> Option<R> {
+        let apertures = self.apertures.of(surface);
         if self.is_plain() {
             let (p, k) = self.state_before::<false>(ray, surface)?;
-            Some(self.propagate::<false>(surface, p, k).margin(limit))
+            Some(self.propagate::<false>(surface, p, k).margin(limit, apertures))
         } else {
             let (p, k) = self.state_before::<true>(ray, surface)?;
-            Some(self.propagate::<true>(surface, p, k).margin(limit))
+            Some(self.propagate::<true>(surface, p, k).margin(limit, apertures))
         }
     }
 
@@ -72,7 +74,7 @@ impl<R: Real> Tracer<R> {
         match limit {
             RayLimit::Rim => Some(clipping.rim_margin(arrived.met.point)),
             RayLimit::Obstruction => Some(clipping.obstruction_margin(arrived.met.point)),
-            _ => Some(arrived.margin(limit)),
+            _ => Some(arrived.margin(limit, self.apertures.of(surface))),
         }
     }
 
@@ -197,6 +199,12 @@ impl Tracer<f64> {
             } else {
                 self.margin_seed::<INPUTS>(surface, limit, (p, k), *weight, &mut total)
             };
+            if let (RayLimit::Aperture(side) | RayLimit::Obscuration(side), Some(apertures)) =
+                (limit, self.apertures.of(surface))
+            {
+                let point = self.propagate::<true>(surface, p, k).met.point;
+                apertures.add_slopes(side, point, *weight, &mut total.surfaces[surface]);
+            }
             if let Some(rim) = self.limiting_surface(surface, limit) {
                 let radius = self.interfaces[rim].rim2.sqrt();
                 total.surfaces[rim].semi_diameter += weight * 2.0 * radius;
@@ -218,7 +226,8 @@ impl Tracer<f64> {
         total: &mut SystemGradient<f64>,
     ) -> AdjointSeed<f64> {
         let mount = self.mount(surface);
-        let by = self.site(surface).margin_slopes::<N>(mount, limit, p, k);
+        let apertures = self.apertures.of(surface);
+        let by = self.site(surface).margin_slopes::<N>((mount, apertures), limit, p, k);
         let by = by.map(|slope| slope * weight);
         let own = &self.interfaces[surface];
         let by_k = Vec3::new(by[3], by[4], by[5]);
@@ -231,7 +240,8 @@ impl Tracer<f64> {
         }
         let numbers = &mut total.surfaces[surface];
         if let Some(mount) = mount {
-            own.add_freeform_slopes(mount, limit, (p, k), weight, &mut numbers.freeform);
+            let held = (mount, apertures);
+            own.add_freeform_slopes(held, limit, (p, k), weight, &mut numbers.freeform);
         }
         numbers.index += by[BEHIND];
         numbers.curvature += by[CURVATURE];
@@ -267,12 +277,14 @@ impl SurfaceSite<'_, f64> {
     /// The derivatives of a margin by its inputs, for a ray in the frame of the surface before.
     fn margin_slopes<const N: usize>(
         &self,
-        mount: Option<&Mount<f64>>,
+        (mount, apertures): (Option<&Mount<f64>>, Option<&ApertureSet<f64>>),
         limit: RayLimit,
         p: Vec3<f64>,
         k: Vec3<f64>,
     ) -> [f64; N] {
         let input = Dual::<f64, N>::variable;
+        let apertures = apertures.map(|set| set.map(Dual::constant));
+        let apertures = apertures.as_ref();
         let k = Vec3::new(input(k.x, 3), input(k.y, 4), input(k.z, 5));
         let own = self.surface;
         let indices = [(own.index_before, BEFORE), (own.index_behind, BEHIND)];
@@ -281,11 +293,11 @@ impl SurfaceSite<'_, f64> {
         let (x, y) = (input(p.x, 0), input(p.y, 1));
         if let Some(mount) = mount {
             let (mount, p) = (mount.map(Dual::constant), Vec3::new(x, y, input(p.z, 2)));
-            return mount.propagate(&surface, p, k).margin(limit).slope;
+            return mount.propagate(&surface, p, k).margin(limit, apertures).slope;
         }
         if N < GRIN_INPUTS {
             let start = Vec3::new(x, y, input(p.z - own.gap, 2));
-            return PropagatedRay::straight(&surface, start, k).margin(limit).slope;
+            return PropagatedRay::straight(&surface, start, k).margin(limit, apertures).slope;
         }
         let surface = Interface { gap: input(own.gap, GAP), ..surface };
         let entry = self.entry.map(|entry| entry.map(Dual::constant));
@@ -297,7 +309,7 @@ impl SurfaceSite<'_, f64> {
             before: before.as_ref(),
             behind: behind.as_ref(),
         };
-        site.propagate(Vec3::new(x, y, input(p.z, 2)), k).margin(limit).slope
+        site.propagate(Vec3::new(x, y, input(p.z, 2)), k).margin(limit, apertures).slope
     }
 }
 
@@ -305,12 +317,14 @@ impl Interface<f64> {
     /// Adds the derivatives of a margin by the numbers of a freeform, some at a time.
     fn add_freeform_slopes(
         &self,
-        mount: &Mount<f64>,
+        (mount, apertures): (&Mount<f64>, Option<&ApertureSet<f64>>),
         limit: RayLimit,
         (p, k): (Vec3<f64>, Vec3<f64>),
         weight: f64,
         total: &mut Vec<f64>,
     ) {
+        let apertures = apertures.map(|set| set.map(Dual::constant));
+        let apertures = apertures.as_ref();
         let count = mount.face.as_ref().map_or(0, |face| face.form.numbers.len());
         total.resize(count.max(total.len()), 0.0);
         let surface = self.map(Dual::<f64, FORM_INPUTS>::constant);
@@ -321,7 +335,7 @@ impl Interface<f64> {
             for (i, number) in numbers.skip(block * FORM_INPUTS).take(FORM_INPUTS).enumerate() {
                 *number = Dual::variable(number.value, i);
             }
-            let by = varied.propagate(&surface, p, k).margin(limit).slope;
+            let by = varied.propagate(&surface, p, k).margin(limit, apertures).slope;
             totals.iter_mut().zip(by).for_each(|(to, by)| *to += weight * by);
         }
     }

@@ -9,8 +9,8 @@ pub enum Fate {
     Imaged,
     /// The ray misses the surface, or an asphere is so wild that no intersection is found.
     Missed(u32),
-    /// The ray meets the surface outside the semi-diameter or inside the obstruction, or it leaves the
-    /// GRIN medium in front through its side.
+    /// The ray meets the surface outside the semi-diameter or another aperture, or inside the obstruction or
+    /// another obscuration, or it leaves the GRIN medium in front through its side.
     Clipped(u32),
     /// The ray is totally reflected at the surface, or no light is in the order of a grating, which is
     /// evanescent.

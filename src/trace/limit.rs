@@ -26,6 +26,7 @@
 
 use super::Tracer;
 use super::adjoint::{AdjointSeed, GradientSink, LimitAdjoint, SeedSource, SystemGradient};
+use super::aperture::ApertureSet;
 use super::batch::{BLOCK, RayBlock};
 use super::interface::{Interface, SurfaceForm};
 use super::single::Ray;
@@ -47,6 +48,9 @@ enum LimitFunction {
     Obstruction,
     Angle,
     ConicEdge,
+    /// A side of an aperture that is no circle about the vertex. It may lie inside the light beyond its
+    /// corners; a field that moves along with it there does no harm.
+    Aperture(u16),
 }
 
 impl<R: Real> Interface<R> {
@@ -65,6 +69,7 @@ impl<R: Real> Interface<R> {
         match limit {
             LimitFunction::Rim => surface.rim2 < f64::INFINITY,
             LimitFunction::Obstruction => surface.obstruction2 > 0.0,
+            LimitFunction::Aperture(_) => true,
             LimitFunction::Angle => !flat || surface.dn2 < 0.0,
             LimitFunction::ConicEdge => {
                 let closed = surface.form == SurfaceForm::Asphere
@@ -122,6 +127,8 @@ impl<R: Real> Interface<Jet<R>> {
                 let half = R::from_f64(0.5);
                 Jet::constant(half) - r2.scaled(half / self.obstruction2.value)
             }
+            // Not of the surface alone: see `aperture_values`.
+            LimitFunction::Aperture(_) => minus_one,
             LimitFunction::Angle => {
                 let inverse = R::ONE / self.n2.value;
                 let loss = self.index_drop2().value * inverse;
@@ -133,6 +140,22 @@ impl<R: Real> Interface<Jet<R>> {
             }
             LimitFunction::ConicEdge => p.z.scaled(c2) + minus_one,
         }
+    }
+}
+
+/// The limit function of a side of an aperture: minus the distance from it, whichever side of its line a ray
+/// is on, in units of the extent of the apertures.
+fn aperture_values<R: Real>(
+    apertures: Option<&ApertureSet<Jet<R>>>,
+    side: u16,
+    block: &RayBlock<Jet<R>>,
+    lanes: &mut [Jet<R>; BLOCK],
+) {
+    let Some(apertures) = apertures else { return };
+    let scale = Jet::from_f64(1.0 / apertures.extent());
+    for (j, lane) in lanes.iter_mut().enumerate() {
+        let margin = apertures.margin(side, block.state(j).0) * scale;
+        *lane = if margin < Jet::ZERO { margin } else { -margin };
     }
 }
 
@@ -187,7 +210,11 @@ impl<R: Real> WarpTracer<R> {
             LimitFunction::Angle,
             LimitFunction::ConicEdge,
         ];
-        let all = |i: usize| kinds.map(|limit| (i, limit));
+        let all = |i: usize| {
+            let sides = forward.apertures.of(i).map_or(0, ApertureSet::sides);
+            let figures = (0..sides).map(|side| LimitFunction::Aperture(side as u16));
+            kinds.into_iter().chain(figures).map(move |limit| (i, limit)).collect::<Vec<_>>()
+        };
         let limits = (0..forward.surfaces()).flat_map(all);
         let limits = limits.filter(|(i, limit)| forward.interfaces[*i].has(*limit)).collect();
         let mut backward = Tracer::<MixedDual<R>>::new(&system.cast())?;
@@ -295,6 +322,9 @@ impl<R: Real> WarpTracer<R> {
                     LimitFunction::ConicEdge => {
                         interface.limit_values(LimitFunction::ConicEdge, &block, &slants, lanes);
                     }
+                    LimitFunction::Aperture(side) => {
+                        aperture_values(self.forward.apertures.of(i), *side, &block, lanes);
+                    }
                 }
             }
         }
@@ -338,11 +368,16 @@ impl<R: Real> WarpWorkspace<R> {
         };
         let distances = vec![[MixedDual::ZERO; BLOCK]; surfaces];
         let none = [MixedDual::ZERO; BLOCK];
-        let limits =
-            vec![
-                LimitAdjoint { rim: none, angle: none, obstruction: None, conic_edge: None };
-                surfaces
-            ];
+        let limits = vec![
+            LimitAdjoint {
+                rim: none,
+                angle: none,
+                obstruction: None,
+                conic_edge: None,
+                apertures: Vec::new(),
+            };
+            surfaces
+        ];
         Self { jets, distances, limit_adjoints: limits }
     }
 
@@ -357,6 +392,7 @@ impl<R: Real> WarpWorkspace<R> {
                     limits.obstruction.get_or_insert([MixedDual::ZERO; BLOCK])
                 }
                 LimitFunction::Angle => &mut limits.angle,
+                LimitFunction::Aperture(side) => limits.side(*side),
                 LimitFunction::ConicEdge => {
                     limits.conic_edge.get_or_insert([MixedDual::ZERO; BLOCK])
                 }

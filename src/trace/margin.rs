@@ -5,6 +5,7 @@
 //! last digit, which the mere fate of rays would not permit.
 
 use super::Tracer;
+use super::aperture::ApertureSet;
 use super::interface::{Interface, SurfaceForm};
 use super::propagation::PropagatedRay;
 use super::single::{Ray, optical_direction};
@@ -22,19 +23,39 @@ pub enum RayLimit {
     Rim,
     /// The ray meets the surface inside the obstruction.
     Obstruction,
+    /// The ray meets the surface outside an aperture that is no circle about the vertex, at the side of it
+    /// with this number, counted over all such apertures of the surface.
+    Aperture(u16),
+    /// The ray meets the surface inside an obscuration that is no circle about the vertex, counted so.
+    Obscuration(u16),
     /// The ray is totally reflected.
     TotalReflection,
     /// The ray leaves the GRIN medium in front of the surface through its side.
     Side,
 }
 
+impl RayLimit {
+    /// True if light is blocked inside: the limit ends a shadow, beyond which there may be light again.
+    pub fn is_shadow(self) -> bool {
+        matches!(self, Self::Obstruction | Self::Obscuration(_))
+    }
+
+    /// True if light may go on behind the limit in the same direction: beyond a shadow, or beyond a notch of
+    /// an aperture.
+    pub fn may_hide_light(self) -> bool {
+        self.is_shadow() || matches!(self, Self::Aperture(_))
+    }
+}
+
 impl<R: Real> Tracer<R> {
     /// Traces a ray and calls `visit` with every surface, each of its limits and the margin there:
     /// positive for a ray inside the limit, negative for one outside. A ray continues behind a rim or
     /// an obstruction that clips it, but not behind a surface that it misses or that reflects it
-    /// totally.
+    /// totally. Of an obscuration with several sides, and of an aperture that is not convex, the side alone
+    /// is visited that decides.
     ///
-    /// The margin is `sd² − r²` in mm² at a rim and `r² − h²` at an obstruction, the square of the
+    /// The margin is `sd² − r²` in mm² at a rim and `r² − h²` at an obstruction, in mm the distance from a
+    /// straight side of another aperture, the square of the
     /// component of the optical direction along the normal at a miss and at a total reflection, −1 at
     /// an asphere that is missed, and the component of the normal along the axis at an equator. A
     /// surface that a GRIN medium touches is treated as an asphere, and the side of the medium as a
@@ -56,7 +77,7 @@ impl<R: Real> Tracer<R> {
         let mut point = ray.point;
         for i in 0..self.interfaces.len() {
             let arrived = self.propagate::<GENERAL>(i, point, k);
-            arrived.margins(i, &mut visit);
+            arrived.margins(i, self.apertures.clipping(i), &mut visit);
             let Some(behind) = arrived.cross_at_edge(None) else { return };
             (point, k) = self.state_out(i, behind);
         }
@@ -66,7 +87,12 @@ impl<R: Real> Tracer<R> {
 impl<R: Real> PropagatedRay<'_, R> {
     /// Visits the margins at the surface, up to the first limit that the ray cannot pass.
     #[inline(always)]
-    fn margins(&self, i: usize, visit: &mut impl FnMut(usize, RayLimit, R)) {
+    fn margins(
+        &self,
+        i: usize,
+        apertures: Option<&ApertureSet<R>>,
+        visit: &mut impl FnMut(usize, RayLimit, R),
+    ) {
         let (surface, met) = (self.surface, &self.met);
         let passes_by = met.missed && !self.is_behind_equator();
         visit(i, RayLimit::Miss, self.miss_margin(passes_by));
@@ -88,6 +114,9 @@ impl<R: Real> PropagatedRay<'_, R> {
         if surface.obstruction2.value() > 0.0 {
             visit(i, RayLimit::Obstruction, surface.obstruction_margin(met.point));
         }
+        if let Some(apertures) = apertures {
+            apertures.visit(met.point, |limit, margin| visit(i, limit, margin));
+        }
         if self.may_reflect() {
             visit(i, RayLimit::TotalReflection, self.reflection_margin());
         }
@@ -95,11 +124,14 @@ impl<R: Real> PropagatedRay<'_, R> {
 
     /// The margin at one limit of the surface; see [`Tracer::margins`].
     #[inline(always)]
-    pub(super) fn margin(&self, limit: RayLimit) -> R {
+    pub(super) fn margin(&self, limit: RayLimit, apertures: Option<&ApertureSet<R>>) -> R {
         let (surface, met) = (self.surface, &self.met);
         match limit {
             RayLimit::Rim => surface.rim_margin(met.point),
             RayLimit::Obstruction => surface.obstruction_margin(met.point),
+            RayLimit::Aperture(side) | RayLimit::Obscuration(side) => {
+                apertures.map_or(R::ONE, |apertures| apertures.margin(side, met.point))
+            }
             RayLimit::TotalReflection => self.reflection_margin(),
             RayLimit::Equator if self.has_closed_form() => self.equator_margin(),
             RayLimit::Equator => R::ONE,

@@ -5,6 +5,7 @@
 //! ray. The margins at a rim or an obstruction follow from the point alone; those at other limits,
 //! and all in GRIN media, are computed ray by ray.
 
+use super::aperture::ApertureSet;
 use super::batch::{RayBlock, Rays, SMALL_BLOCK};
 use super::interface::Interface;
 use super::margin::RayLimit;
@@ -20,6 +21,7 @@ impl<R: Real> Tracer<R> {
             return (0..rays.len()).map(|i| margin(i).unwrap_or(R::from_f64(f64::NAN))).collect();
         }
         let last = &self.interfaces[surface];
+        let apertures = self.apertures.of(surface);
         let mut margins = Vec::with_capacity(rays.len());
         self.cross_unclipped(
             rays,
@@ -32,7 +34,7 @@ impl<R: Real> Tracer<R> {
                     &last.open(),
                     surface as u32,
                     #[inline(always)]
-                    |j, met| lanes[j] = last.plain_margin(limit, met.point),
+                    |j, met| lanes[j] = last.plain_margin(limit, met.point, apertures),
                 );
                 let nan = R::from_f64(f64::NAN);
                 margins.extend((0..count).map(|j| R::select(lost[j] > R::ZERO, nan, lanes[j])));
@@ -61,7 +63,14 @@ impl<R: Real> Tracer<R> {
     /// True if the margin at a limit follows from the point on the surface alone, between homogeneous
     /// media throughout.
     fn has_plain_margin(&self, limit: RayLimit) -> bool {
-        self.is_plain() && matches!(limit, RayLimit::Rim | RayLimit::Obstruction)
+        let is_plain_limit = matches!(
+            limit,
+            RayLimit::Rim
+                | RayLimit::Obstruction
+                | RayLimit::Aperture(_)
+                | RayLimit::Obscuration(_)
+        );
+        self.is_plain() && is_plain_limit
     }
 
     /// Traces rays to behind the first `count` surfaces, whose rims and obstructions clip nothing, and
@@ -98,7 +107,7 @@ impl<R: Real> Tracer<R> {
 }
 
 impl Tracer<f64> {
-    /// As [`Tracer::margin_gradient`] at a rim or an obstruction: the adjoint of the point on that
+    /// As [`Tracer::margin_gradient`] at a rim, an obstruction or another aperture: the adjoint of the point on that
     /// surface, where the bundle ends.
     pub(super) fn plain_margin_gradient(
         &self,
@@ -112,6 +121,13 @@ impl Tracer<f64> {
         }
         let outwards = if limit == RayLimit::Rim { -2.0 } else { 2.0 };
         let front = self.ending_at(surface);
+        let side = match limit {
+            RayLimit::Aperture(side) | RayLimit::Obscuration(side) => {
+                self.apertures.of(surface).map(|set| (set, side))
+            }
+            _ => None,
+        };
+        let mut total = SystemGradient::zero(self.surfaces());
         let mut seeds = Vec::with_capacity(rays.len());
         let mut arrived = 0.0;
         front.cross_unclipped(rays, surface + 1, |block, count| {
@@ -119,12 +135,17 @@ impl Tracer<f64> {
                 let weight = weights[seeds.len()];
                 let weight = if block.code[j] > 0.0 { 0.0 } else { weight };
                 let factor = outwards * weight;
-                let point = Vec3::new(factor * block.x[j], factor * block.y[j], 0.0);
+                let mut point = Vec3::new(factor * block.x[j], factor * block.y[j], 0.0);
+                if let Some((set, side)) = side {
+                    let at = block.state(j).0;
+                    let [x, y] = set.by_point(side, at);
+                    point = Vec3::new(weight * x, weight * y, 0.0);
+                    set.add_slopes(side, at, weight, &mut total.surfaces[surface]);
+                }
                 seeds.push(AdjointSeed { point, ..AdjointSeed::default() });
                 arrived += weight;
             }
         });
-        let mut total = SystemGradient::zero(self.surfaces());
         total.add(&front.gradient(rays, |i| seeds[i]), 1.0);
         if limit == RayLimit::Rim {
             let radius = self.interfaces[surface].rim2.sqrt();
@@ -150,9 +171,15 @@ impl<R: Real> Interface<R> {
         Self { rim2: R::from_f64(f64::INFINITY), obstruction2: R::ZERO, ..*self }
     }
 
-    /// The margin at the rim or the obstruction for a point of the surface.
+    /// The margin at the rim, the obstruction or an aperture for a point of the surface.
     #[inline(always)]
-    fn plain_margin(&self, limit: RayLimit, p: Vec3<R>) -> R {
-        if limit == RayLimit::Rim { self.rim_margin(p) } else { self.obstruction_margin(p) }
+    fn plain_margin(&self, limit: RayLimit, p: Vec3<R>, apertures: Option<&ApertureSet<R>>) -> R {
+        match limit {
+            RayLimit::Rim => self.rim_margin(p),
+            RayLimit::Aperture(side) | RayLimit::Obscuration(side) => {
+                apertures.map_or(R::ONE, |apertures| apertures.margin(side, p))
+            }
+            _ => self.obstruction_margin(p),
+        }
     }
 }

@@ -14,6 +14,7 @@
 //! plain ones, or backward, by the adjoint of a block of rays (`adjoint`).
 
 mod adjoint;
+mod aperture;
 mod asphere;
 mod asphere_crossing;
 mod batch;
@@ -46,6 +47,7 @@ pub use surface_parameter::SurfaceParameter;
 
 use crate::lens::{System, SystemError};
 use crate::math::Real;
+use aperture::LensApertures;
 use grin_gap::GrinGap;
 use interface::Interface;
 use mount::Mount;
@@ -60,6 +62,8 @@ pub struct Tracer<R> {
     step_plans: Vec<GrinStepPlan>,
     /// The poses and irregularities of the surfaces; empty for a centred lens.
     mounts: Vec<Option<Mount<R>>>,
+    /// The apertures that are no circles about the vertex.
+    apertures: LensApertures<R>,
 }
 
 impl<R: Real> Tracer<R> {
@@ -78,6 +82,7 @@ impl<R: Real> Tracer<R> {
             grin_gaps: Vec::new(),
             step_plans: Vec::new(),
             mounts: Vec::new(),
+            apertures: LensApertures::new(&system.surfaces),
         };
         tracer.mounts = mount::mounts(system, &tracer.interfaces);
         if system.has_grin() {
@@ -108,7 +113,7 @@ impl<R: Real> Tracer<R> {
         &self.step_plans
     }
 
-    /// The same surfaces without rims and obstructions that clip. The intersection with an asphere is
+    /// The same surfaces without rims, obstructions and apertures that clip. The intersection with an asphere is
     /// still sought inside its semi-diameter first, since its polynomial has no meaning outside.
     #[must_use]
     pub fn without_rims(mut self) -> Self {
@@ -118,6 +123,7 @@ impl<R: Real> Tracer<R> {
         for gap in self.grin_gaps.iter_mut().flatten() {
             gap.side2 = R::from_f64(f64::INFINITY);
         }
+        self.apertures = self.apertures.opened();
         self
     }
 
@@ -134,6 +140,7 @@ impl<R: Real> Tracer<R> {
             grin_gaps: self.grin_gaps.iter().take(count).cloned().collect(),
             step_plans: Vec::new(),
             mounts: self.mounts.iter().take(count).cloned().collect(),
+            apertures: self.apertures.first(count),
         }
     }
 

@@ -93,15 +93,15 @@ impl<R: Real> Tracer<R> {
         self.trace_surfaces(ray, (surface + 1).min(self.interfaces.len()), |_, _| {})
     }
 
-    /// Compiled apart for lenses with and without GRIN media or poses, whose steps would take registers
-    /// from the loop over centred surfaces and homogeneous media.
+    /// Compiled apart for lenses with and without GRIN media, poses or apertures of other forms, whose steps
+    /// would take registers from the loop over centred surfaces and homogeneous media.
     fn trace_surfaces(
         &self,
         ray: Ray<R>,
         surfaces: usize,
         visit: impl FnMut(usize, Vec3<R>),
     ) -> TracedRay<R> {
-        if self.is_plain() {
+        if self.is_plain() && self.apertures.is_empty() {
             self.trace_loop::<false>(ray, surfaces, visit)
         } else {
             self.trace_loop::<true>(ray, surfaces, visit)
@@ -121,7 +121,8 @@ impl<R: Real> Tracer<R> {
         for i in 0..surfaces {
             let p = traced.ray.point;
             let arrived = self.propagate::<GENERAL>(i, p, k);
-            let behind = traced.cross(i, p, &arrived, &mut visit);
+            let blocks = |p| GENERAL && self.is_outside_apertures(i, p);
+            let behind = traced.cross(i, p, &arrived, blocks, &mut visit);
             (k, index) = match behind {
                 Some(behind) => (behind, arrived.indices.behind),
                 None => (arrived.k, arrived.indices.before),
@@ -152,9 +153,11 @@ impl<R: Real> TracedRay<R> {
         i: usize,
         p: Vec3<R>,
         arrived: &PropagatedRay<'_, R>,
+        blocks: impl Fn(Vec3<R>) -> bool,
         visit: &mut impl FnMut(usize, Vec3<R>),
     ) -> Option<Vec3<R>> {
-        let refraction = arrived.refract();
+        let mut refraction = arrived.refract();
+        refraction.clipped |= !arrived.met.missed && blocks(refraction.point);
         if arrived.met.missed {
             self.ray.point = arrived.end_position(p);
         } else {

@@ -2,8 +2,8 @@
 
 use super::adjoint::{SurfaceGradient, SystemGradient};
 use crate::lens::{
-    ASPHERE_TERMS, FREEFORM_NUMBERS, PROFILE_TERMS, ProfileCoefficients, ProfileLaw, RADIAL_TERMS,
-    Shape, Surface, System,
+    APERTURE_NUMBERS, ASPHERE_TERMS, FREEFORM_NUMBERS, MAX_APERTURES, PROFILE_TERMS,
+    ProfileCoefficients, ProfileLaw, RADIAL_TERMS, Shape, Surface, System,
 };
 use crate::math::Real;
 
@@ -26,6 +26,9 @@ pub enum SurfaceParameter {
     GrinTerm(usize),
     /// A number of a freeform.
     Freeform(usize),
+    /// A number of an aperture that is no circle about the vertex, five for each
+    /// ([`crate::lens::SurfaceAperture::numbers`]): the edge of a pupil depends on it, though no ray does.
+    Aperture(usize),
 }
 
 impl SurfaceParameter {
@@ -35,7 +38,8 @@ impl SurfaceParameter {
             [Self::Curvature, Self::Conic, Self::Thickness, Self::Index, Self::SemiDiameter];
         let figured = plain.into_iter().chain((0..ASPHERE_TERMS).map(Self::AsphereTerm));
         let graded = figured.chain((0..PROFILE_TERMS).map(Self::GrinTerm));
-        graded.chain((0..FREEFORM_NUMBERS).map(Self::Freeform))
+        let formed = graded.chain((0..FREEFORM_NUMBERS).map(Self::Freeform));
+        formed.chain((0..MAX_APERTURES * APERTURE_NUMBERS).map(Self::Aperture))
     }
 
     /// True if a surface has such a number; a plane has the curvature zero.
@@ -51,6 +55,10 @@ impl SurfaceParameter {
             Self::AsphereTerm(_) => matches!(shape, Shape::Asphere { .. }),
             Self::Freeform(k) => {
                 surface.freeform.as_ref().is_some_and(|form| k < form.numbers.len())
+            }
+            Self::Aperture(k) => {
+                let own = surface.apertures.get(k / APERTURE_NUMBERS);
+                own.is_some_and(|own| own.clone().number_mut(k % APERTURE_NUMBERS).is_some())
             }
         }
     }
@@ -72,7 +80,8 @@ impl SurfaceParameter {
     }
 
     /// The number itself, of a surface in a form that has it (see
-    /// [`SurfaceParameter::promote_shape`]).
+    /// [`SurfaceParameter::promote_shape`]). The numbers of apertures are plain ones in every system, which
+    /// [`SurfaceParameter::shift`] changes.
     pub fn value_mut<R: Real>(self, system: &mut System<R>, surface: usize) -> &mut R {
         let surface = &mut system.surfaces[surface];
         match (self, &mut surface.shape) {
@@ -100,6 +109,20 @@ impl SurfaceParameter {
     }
 }
 
+impl SurfaceParameter {
+    /// Adds to the number, of a surface in a form that has it (see [`SurfaceParameter::promote_shape`]).
+    pub fn shift<R: Real>(self, system: &mut System<R>, surface: usize, by: R) {
+        let Self::Aperture(k) = self else {
+            *self.value_mut(system, surface) += by;
+            return;
+        };
+        let own = system.surfaces[surface].apertures.get_mut(k / APERTURE_NUMBERS);
+        if let Some(number) = own.and_then(|own| own.number_mut(k % APERTURE_NUMBERS)) {
+            *number += by.value();
+        }
+    }
+}
+
 impl<R: Real> SurfaceGradient<R> {
     /// The derivative by one number.
     pub fn by(&self, parameter: SurfaceParameter) -> R {
@@ -112,6 +135,7 @@ impl<R: Real> SurfaceGradient<R> {
             SurfaceParameter::SemiDiameter => self.semi_diameter,
             SurfaceParameter::GrinTerm(k) => self.grin_terms[k],
             SurfaceParameter::Freeform(k) => self.freeform.get(k).copied().unwrap_or_default(),
+            SurfaceParameter::Aperture(k) => self.apertures.get(k).copied().unwrap_or_default(),
         }
     }
 
@@ -128,6 +152,8 @@ impl<R: Real> SurfaceGradient<R> {
             SurfaceParameter::GrinTerm(k) => &mut self.grin_terms[k],
             SurfaceParameter::Freeform(k) if k >= self.freeform.len() && by == R::ZERO => return,
             SurfaceParameter::Freeform(k) => self.freeform_mut(k),
+            SurfaceParameter::Aperture(k) if k >= self.apertures.len() && by == R::ZERO => return,
+            SurfaceParameter::Aperture(k) => self.aperture_mut(k),
         };
         *number = by;
     }
@@ -139,7 +165,10 @@ impl<R: Real> SystemGradient<R> {
     pub fn zip_with(&self, other: &Self, combine: impl Fn(R, R) -> R) -> Self {
         let fixed = |gradient: &Self| {
             let mut fixed = gradient.clone();
-            fixed.surfaces.iter_mut().for_each(|surface| surface.freeform.clear());
+            for surface in &mut fixed.surfaces {
+                surface.freeform.clear();
+                surface.apertures.clear();
+            }
             fixed
         };
         let (a, b) = (fixed(self), fixed(other));
@@ -149,8 +178,42 @@ impl<R: Real> SystemGradient<R> {
             let numbers =
                 (0..a.freeform.len().max(b.freeform.len())).map(SurfaceParameter::Freeform);
             to.freeform = numbers.map(|number| combine(a.by(number), b.by(number))).collect();
+            let count = a.apertures.len().max(b.apertures.len());
+            let numbers = (0..count).map(SurfaceParameter::Aperture);
+            to.apertures = numbers.map(|number| combine(a.by(number), b.by(number))).collect();
         }
         all
+    }
+
+    /// Combines each number of some gradients of the same system, which has no freeform.
+    #[must_use]
+    pub fn combine<S: Real>(
+        all: &[Self],
+        combine: impl Fn(&mut dyn Iterator<Item = R>) -> S,
+    ) -> SystemGradient<S> {
+        let surfaces = all.first().map_or(0, |gradient| gradient.surfaces.len());
+        let fixed: Vec<Vec<R>> = all.iter().map(Self::fixed_numbers).collect();
+        let count = fixed.first().map_or(0, Vec::len);
+        let numbers = (0..count).map(|i| combine(&mut fixed.iter().map(|row| row[i])));
+        let mut found = SystemGradient::from_numbers(surfaces, numbers);
+        for (i, to) in found.surfaces.iter_mut().enumerate() {
+            let own = || all.iter().map(|gradient| &gradient.surfaces[i]);
+            let count = own().map(|own| own.apertures.len()).max().unwrap_or(0);
+            let by =
+                |k: usize| combine(&mut own().map(|own| own.by(SurfaceParameter::Aperture(k))));
+            to.apertures = (0..count).map(by).collect();
+        }
+        found
+    }
+
+    /// The numbers of [`SystemGradient::from_numbers`].
+    fn fixed_numbers(&self) -> Vec<R> {
+        let mut fixed = self.clone();
+        for surface in &mut fixed.surfaces {
+            surface.freeform.clear();
+            surface.apertures.clear();
+        }
+        fixed.numbers().collect()
     }
 
     /// The derivatives by the numbers of one kind, surface by surface; the index of object space is

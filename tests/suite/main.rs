@@ -70,6 +70,7 @@ mod session_journal;
 mod session_kills;
 mod session_pareto;
 mod session_search;
+mod surface_apertures;
 mod thermal;
 mod tilted;
 mod tolerance;

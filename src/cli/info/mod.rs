@@ -9,7 +9,7 @@ use super::error::CliError;
 use super::input::{LensFile, LoadedLens};
 use super::output::{Output, ShortNumber, TextTable, or_dash};
 use crate::effects::EffectDecision;
-use crate::lens::{Lens, SurfaceNumber};
+use crate::lens::{Lens, SurfaceAperture, SurfaceNumber};
 use crate::paraxial::{Beam, FirstOrder, Seidel, SeidelSums, first_order, seidel};
 use crate::report::first_order_numbers;
 use checks::{LensCheck, checks};
@@ -60,6 +60,9 @@ struct InfoReport {
     semi_diameters: Vec<Option<f64>>,
     #[serde(skip_serializing_if = "Vec::is_empty")]
     obstructions: Vec<Option<f64>>,
+    /// The apertures of other forms of each surface; only for a lens that has one.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    apertures: Vec<Vec<SurfaceAperture>>,
     /// The glass at the first position; `None` for a lens without any.
     #[serde(skip_serializing_if = "Option::is_none")]
     glass: Option<Material>,
@@ -72,6 +75,8 @@ impl InfoReport {
         let Lens { name, surfaces, .. } = &opened.lens;
         let obstructed = surfaces.iter().any(|row| row.obstruction.is_some());
         let obstructions = surfaces.iter().filter(|_| obstructed).map(|row| row.obstruction);
+        let framed = surfaces.iter().any(|row| !row.apertures.is_empty());
+        let apertures = surfaces.iter().filter(|_| framed).map(|row| row.apertures.clone());
         Self {
             name: name.clone(),
             wavelength_um: opened.primary_um(),
@@ -79,6 +84,7 @@ impl InfoReport {
             glass: Material::new(&opened.lens, positions.first().map_or(0, |first| first.zoom)),
             semi_diameters: surfaces.iter().map(|row| row.semi_diameter).collect(),
             obstructions: obstructions.collect(),
+            apertures: apertures.collect(),
             positions: if positions.len() > 1 { positions } else { Vec::new() },
         }
     }
@@ -177,10 +183,15 @@ impl Display for InfoReport {
             writeln!(f, "\n{}", glass.text())?;
         }
         writeln!(f, "\nsemi-diameters  {}", radii_text(&self.semi_diameters, "unlimited"))?;
-        if self.obstructions.is_empty() {
-            return Ok(());
+        if !self.obstructions.is_empty() {
+            writeln!(f, "obstructions    {}", radii_text(&self.obstructions, "none"))?;
         }
-        writeln!(f, "obstructions    {}", radii_text(&self.obstructions, "none"))
+        for (i, own) in self.apertures.iter().enumerate() {
+            for aperture in own {
+                writeln!(f, "aperture of {}   {}", i + 1, aperture.text())?;
+            }
+        }
+        Ok(())
     }
 }
 

@@ -86,8 +86,8 @@ pub(super) struct CodeVSurface {
     pub(super) block: CodeVOutline,
     /// The displacement of the apertures.
     pub(super) offset: [f64; 2],
-    /// True if the apertures are turned about their centre (`ARO`).
-    pub(super) is_turned: bool,
+    /// The angle in degrees by which the apertures are turned about their centre (`ARO`).
+    pub(super) turn: f64,
     /// The lines of the commands of apertures, but for centred circles.
     pub(super) aperture_lines: Vec<usize>,
     pub(super) label: String,

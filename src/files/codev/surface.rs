@@ -52,7 +52,7 @@ pub(super) fn read(
             surface.aperture_lines.push(command.line);
         }
         "ARO" if command.last_number()? != 0.0 => {
-            surface.is_turned = true;
+            surface.turn = command.last_number()? % 360.0;
             surface.aperture_lines.push(command.line);
         }
         "ARO" => return Ok(preserved()),

@@ -2,7 +2,9 @@
 
 use super::medium::is_air;
 use super::required_number;
-use crate::lens::{AxisBreak, ForeignAperture, Freeform, IdealElement, LockedSurface, Medium, Row};
+use crate::lens::{
+    AxisBreak, ForeignAperture, Freeform, IdealElement, LockedSurface, Medium, Row, SurfaceAperture,
+};
 use serde::de::value::MapAccessDeserializer;
 use serde::de::{Error, MapAccess, Unexpected, Visitor};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
@@ -43,6 +45,8 @@ struct RowJson {
         deserialize_with = "required_number"
     )]
     obstruction: Option<f64>,
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    apertures: Vec<SurfaceAperture>,
     #[serde(default, skip_serializing_if = "is_false")]
     stop: bool,
     #[serde(default, skip_serializing_if = "is_false")]
@@ -107,6 +111,7 @@ impl Serialize for Row {
             glass: self.medium.clone(),
             semi_diameter: self.semi_diameter,
             obstruction: self.obstruction,
+            apertures: self.apertures.clone(),
             stop: self.stop,
             hyper: self.hyperhemisphere,
             decenter: self.decenter,
@@ -148,6 +153,7 @@ impl<'de> Visitor<'de> for RowVisitor {
             medium: keys.glass,
             semi_diameter: keys.semi_diameter,
             obstruction: keys.obstruction,
+            apertures: keys.apertures,
             stop: keys.stop,
             hyperhemisphere: keys.hyper,
             decenter: keys.decenter,

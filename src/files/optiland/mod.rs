@@ -4,6 +4,7 @@
 //! beside it and breaks at mirrors. What this program has no counterpart of becomes a locked row with its
 //! JSON.
 
+mod aperture;
 mod shape;
 mod write;
 
@@ -11,7 +12,6 @@ pub(super) use write::write;
 
 use super::error::{FileError, ParseError};
 use super::foreign_lens::ForeignLens;
-use super::outline::{ForeignOutline, OutlineForm, is_free_plane};
 use super::ray_optics::without_infinities;
 use super::report::{ConversionOutcome, ConversionReport};
 use super::vignetting::{PupilFactors, ZoomedFactors};
@@ -97,7 +97,7 @@ fn lens(json: &Value, report: &mut ConversionReport) -> Result<Lens, ParseError>
         name: json["name"].as_str().unwrap_or_default().to_owned(),
         object: object(surfaces)?,
         object_medium: medium(&surfaces[0]["material_post"], "the object", report),
-        aperture: aperture(&json["aperture"])?,
+        aperture: beam_aperture(&json["aperture"])?,
         fields: fields(&json["fields"], report)?,
         wavelengths: wavelengths(&json["wavelengths"]["wavelengths"])?,
         ..crate::lens::blank()
@@ -203,7 +203,7 @@ fn place(rows: &mut [Row], surfaces: &[Value], report: &mut ConversionReport) {
         }
     }
     for (row, surface) in rows.iter_mut().zip(surfaces.iter().skip(1)) {
-        clip(row, &surface["aperture"], report);
+        aperture::read(row, &surface["aperture"], report);
     }
 }
 
@@ -266,47 +266,7 @@ fn medium(material: &Value, place: &str, report: &mut ConversionReport) -> Mediu
     }
 }
 
-/// The rim and the obstruction of a surface whose place is known.
-fn clip(row: &mut Row, aperture: &Value, report: &mut ConversionReport) {
-    let kind = aperture["type"].as_str().unwrap_or_default();
-    let [x_min, x_max, y_min, y_max] =
-        ["x_min", "x_max", "y_min", "y_max"].map(|key| number(&aperture[key]));
-    let offset = ["offset_x", "offset_y"].map(|key| number(&aperture[key]));
-    let (form, half, offset) = match kind {
-        "" => return,
-        "RadialAperture" | "OffsetRadialAperture" => {
-            let outer = aperture["r_max"].as_f64().unwrap_or(f64::INFINITY);
-            row.obstruction = Some(number(&aperture["r_min"])).filter(|inner| *inner > 0.0);
-            if outer >= INFINITE_DISTANCE {
-                return;
-            }
-            (OutlineForm::Circle, [outer; 2], offset)
-        }
-        "RectangularAperture" => {
-            let half = [0.5 * (x_max - x_min), 0.5 * (y_max - y_min)];
-            (OutlineForm::Rectangle, half, [0.5 * (x_min + x_max), 0.5 * (y_min + y_max)])
-        }
-        "EllipticalAperture" => {
-            (OutlineForm::Ellipse, ["a", "b"].map(|key| number(&aperture[key])), offset)
-        }
-        _ => {
-            let note = "an aperture of this form is not traced: it clips nothing here";
-            report.add(ConversionOutcome::Dropped, kind, note);
-            return;
-        }
-    };
-    let plane = is_free_plane(row);
-    let stands = ForeignOutline { form, half, offset, turned: false }.aperture(plane);
-    row.semi_diameter = stands.radius.filter(|radius| *radius > 0.0);
-    if stands.moves {
-        row.decenter = offset;
-    }
-    if stands.outcome != ConversionOutcome::Used {
-        report.add(stands.outcome, kind, stands.note);
-    }
-}
-
-fn aperture(aperture: &Value) -> Result<Aperture, ParseError> {
+fn beam_aperture(aperture: &Value) -> Result<Aperture, ParseError> {
     let value = number(&aperture["value"]);
     if !(value > 0.0) {
         return Err(wrong("aperture", &format!("the aperture {value}"), "a number above 0"));

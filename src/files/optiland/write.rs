@@ -3,7 +3,7 @@
 //! Glasses are written as tables of their indices with the glass of this program beside, so that the rays are
 //! the same at the wavelengths of the lens.
 
-use super::{MEDIUM_KEY, shape};
+use super::{MEDIUM_KEY, aperture, shape};
 use crate::files::error::FileError;
 use crate::files::index_table::glass_table;
 use crate::files::plain_lens::plain_lens;
@@ -55,6 +55,9 @@ fn unwritable_row(row: &Row) -> Option<&'static str> {
     if shape::write(row, &Value::Null).is_none() {
         return Some("the freeform");
     }
+    if !row.apertures.iter().all(aperture::is_writable) {
+        return Some("an ellipse that is turned, an aperture");
+    }
     if matches!(row.ideal, Some(IdealElement::Grating { .. })) {
         return Some("the grating");
     }
@@ -95,17 +98,6 @@ fn interaction(row: &Row) -> Value {
         model["focal_length"] = focal_length.into();
     }
     model
-}
-
-/// A circular aperture; `null` for a surface that clips nothing.
-fn aperture(row: &Row, stop: Option<f64>) -> Value {
-    let inner = row.obstruction.filter(|inner| *inner > 0.0);
-    let outer = stop.or(row.semi_diameter);
-    if inner.is_none() && outer.is_none() {
-        return Value::Null;
-    }
-    let outer = outer.map_or(json!(INFINITE), |outer| json!(outer));
-    json!({"type": "RadialAperture", "r_max": outer, "r_min": inner.unwrap_or(0.0)})
 }
 
 /// A file that is being written.
@@ -209,13 +201,14 @@ impl OptilandWriter {
             Aperture::StopSemiDiameter(radius) if row.stop => Some(radius),
             _ => None,
         };
+        let aperture = aperture::write(row, stop, INFINITE);
         json!({
             "type": "Surface",
             "thickness": row.thickness,
             "geometry": shape::write(row, cs),
             "material_post": medium,
             "is_stop": row.stop,
-            "aperture": aperture(row, stop),
+            "aperture": aperture,
             "comment": plain_text(&row.comment),
             "interaction_model": interaction(row),
         })

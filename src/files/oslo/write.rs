@@ -88,6 +88,9 @@ fn short_name(glass: &Glass) -> String {
 }
 
 fn unwritable_row(row: &Row) -> Option<&'static str> {
+    if !row.apertures.is_empty() {
+        return Some("an aperture that is no circle about the vertex");
+    }
     let is_moved = row.decenter != [0.0; 2]
         || row.tilt != [0.0; 2]
         || row.break_before.is_some()

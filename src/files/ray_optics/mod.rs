@@ -11,9 +11,10 @@ use super::codev::{Placement, frames};
 use super::error::{FileError, ParseError};
 use super::report::{ConversionOutcome, ConversionReport};
 use super::zemax::named_medium;
+use crate::files::outline::{ForeignOutline, OutlineForm};
 use crate::lens::{
-    ASPHERE_TERMS, Aperture, FieldKind, FieldPoint, Fields, Freeform, FreeformKind, IdealElement,
-    Lens, LockedSurface, Medium, Object, Row, SurfaceNumber, Wavelength,
+    ASPHERE_TERMS, Aperture, BlockedSide, FieldKind, FieldPoint, Fields, Freeform, FreeformKind,
+    IdealElement, Lens, LockedSurface, Medium, Object, Row, SurfaceNumber, Wavelength,
 };
 use serde_json::Value;
 
@@ -272,10 +273,10 @@ impl RowSource<'_> {
         let mut row = Row {
             thickness: number(&self.gap["thi"]) * self.unit,
             medium: if mirror { Medium::Mirror } else { behind },
-            semi_diameter: self.clip(data),
             comment: data["label"].as_str().unwrap_or_default().to_owned(),
             ..Row::default()
         };
+        self.clip(data, &place, &mut row, report);
         let shape = self.shape(data, &mut row);
         let phase = data.get("phase_element").filter(|phase| !phase.is_null());
         let kind = match (class(self.surface), phase) {
@@ -307,13 +308,35 @@ impl RowSource<'_> {
         row
     }
 
-    /// The radius of a centred circular aperture.
-    fn clip(&self, data: &Value) -> Option<f64> {
-        let aperture = data["clear_apertures"].as_array()?.first()?;
-        let numbers = attributes(aperture);
-        let centred = number(&numbers["x_offset"]) == 0.0 && number(&numbers["y_offset"]) == 0.0;
-        let radius = number(&numbers["radius"]) * self.unit;
-        (class(aperture) == "Circular" && centred && radius > 0.0).then_some(radius)
+    /// Writes the clear apertures into a row.
+    fn clip(&self, data: &Value, place: &str, row: &mut Row, report: &mut ConversionReport) {
+        for aperture in data["clear_apertures"].as_array().into_iter().flatten() {
+            let numbers = attributes(aperture);
+            let of = |key: &str| number(&numbers[key]);
+            let halves = [of("x_half_width"), of("y_half_width")];
+            let (form, half) = match class(aperture) {
+                "Circular" => (OutlineForm::Circle, [of("radius"); 2]),
+                "Rectangular" => (OutlineForm::Rectangle, halves),
+                "Elliptical" => (OutlineForm::Ellipse, halves),
+                kind => {
+                    let note = "an aperture of this form is not traced: it clips nothing here";
+                    report.add(ConversionOutcome::Dropped, &format!("{place}: {kind}"), note);
+                    continue;
+                }
+            };
+            if !half.iter().all(|half| *half > 0.0) {
+                continue;
+            }
+            let obscures = numbers["is_obscuration"] == true;
+            let blocks = if obscures { BlockedSide::Inside } else { BlockedSide::Outside };
+            let (offset, angle) = ([of("x_offset"), of("y_offset")], of("rotation") % 360.0);
+            let outline = ForeignOutline { form, half, offset, angle };
+            outline.add_to(row, blocks, self.unit);
+            if outline.centred_radius().is_none() {
+                let what = format!("{place}: aperture");
+                report.add(ConversionOutcome::Used, &what, outline.note(blocks));
+            }
+        }
     }
 
     /// Writes the shape into a row; the error is the class of a shape that cannot be traced.

@@ -13,8 +13,8 @@ use crate::files::report::{ConversionOutcome, ConversionReport};
 use crate::files::vignetting::beam_reach;
 use crate::lens::glass;
 use crate::lens::{
-    Aperture, AxisBreak, FieldKind, FreeformKind, Lens, LensError, Medium, MediumPlace, Object,
-    Row, SurfaceNumber,
+    Aperture, ApertureShape, AxisBreak, FieldKind, FreeformKind, Lens, LensError, Medium,
+    MediumPlace, Object, Row, SurfaceAperture, SurfaceNumber,
 };
 use serde_json::{Value, json};
 
@@ -67,8 +67,8 @@ fn unwritable_row(row: &Row) -> Option<&'static str> {
     if row.ideal.is_some() {
         return Some("the ideal element");
     }
-    if row.obstruction.is_some_and(|radius| radius > 0.0) {
-        return Some("the obstruction");
+    if row.apertures.iter().any(|own| figure(own).is_none()) {
+        return Some("an aperture, a polygon or arms,");
     }
     if matches!(row.medium, Medium::Grin(_)) {
         return Some("the gradient-index medium");
@@ -148,7 +148,11 @@ impl RayOpticsWriter {
         let mut surfaces = vec![plane("Obj", 0)];
         surfaces.extend((0..count).map(|i| self.surface(i, reach[i])));
         surfaces.push(plane("Img", count + 1));
-        let has_rims = self.lens.surfaces.iter().any(|row| row.semi_diameter.is_some());
+        let has_rims = self
+            .lens
+            .surfaces
+            .iter()
+            .any(|row| row.semi_diameter.is_some() || !row.apertures.is_empty());
         let attributes = json!({
             "ifcs": surfaces,
             "gaps": self.gaps(),
@@ -173,7 +177,11 @@ impl RayOpticsWriter {
         let row = self.lens.surfaces[i].clone();
         self.report.add_row_losses(SurfaceNumber::new(i), &row);
         self.report.add_aperture_loss(SurfaceNumber::new(i), &row);
-        let rims: Vec<Value> = row.semi_diameter.iter().map(|radius| circle(*radius)).collect();
+        let mut rims: Vec<Value> = row.semi_diameter.iter().map(|radius| circle(*radius)).collect();
+        let hole = row.obstruction.filter(|radius| *radius > 0.0);
+        let hole = hole.map(|radius| ApertureShape::Circle { radius });
+        let hole = hole.map(SurfaceAperture::obscuration);
+        rims.extend(hole.iter().chain(&row.apertures).filter_map(figure));
         let mirror = row.medium == Medium::Mirror;
         let mut attributes = json!({
             "label": row.comment,
@@ -363,6 +371,28 @@ fn plane(label: &str, profile: usize) -> Value {
 fn circle(radius: f64) -> Value {
     let attributes = json!({"radius": radius, "x_offset": 0.0, "y_offset": 0.0, "rotation": 0.0});
     instance("elem.surface", "Circular", attributes)
+}
+
+/// An aperture of another form; `None` for one that the format does not have.
+fn figure(own: &SurfaceAperture) -> Option<Value> {
+    let [x, y] = own.center;
+    let (class, mut attributes) = match own.shape {
+        ApertureShape::Circle { radius } => ("Circular", json!({"radius": radius})),
+        ApertureShape::Rectangle { half_width, half_height } => {
+            ("Rectangular", json!({"x_half_width": half_width, "y_half_width": half_height}))
+        }
+        ApertureShape::Ellipse { half_width, half_height } => {
+            ("Elliptical", json!({"x_half_width": half_width, "y_half_width": half_height}))
+        }
+        ApertureShape::Polygon { .. } | ApertureShape::Spider { .. } => return None,
+    };
+    for (key, value) in [("x_offset", x), ("y_offset", y), ("rotation", own.angle)] {
+        attributes[key] = json!(value);
+    }
+    if own.obscures() {
+        attributes["is_obscuration"] = json!(true);
+    }
+    Some(instance("elem.surface", class, attributes))
 }
 
 /// Decentre and tilt of a surface; angles about x and y are left-handed there.

@@ -122,6 +122,8 @@ pub(super) struct ZemaxSurface {
     pub(super) outline: Option<OutlineLine>,
     /// An obscuration that is no circle.
     pub(super) block: Option<OutlineLine>,
+    /// The number and the width of the arms of a spider, and its line.
+    pub(super) spider: Option<(usize, f64, usize)>,
     /// The lines of apertures of other forms.
     pub(super) other_apertures: Vec<usize>,
     pub(super) variable_thickness: Option<(f64, f64, usize)>,

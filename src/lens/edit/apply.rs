@@ -67,6 +67,9 @@ impl Lens {
             Edit::Replace(lens) => self.clone_from(lens),
             Edit::Sequence { edits, .. } => edits.iter().try_for_each(|edit| self.apply(edit))?,
             Edit::SetObstruction { surface, value } => self.row_mut(*surface)?.obstruction = *value,
+            Edit::SetApertures { surface, apertures } => {
+                self.row_mut(*surface)?.apertures.clone_from(apertures);
+            }
         }
         Ok(())
     }

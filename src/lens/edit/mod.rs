@@ -15,8 +15,8 @@ pub use element::ElementEdit;
 pub use error::EditError;
 
 use super::{
-    Aperture, Fields, Goal, Lens, Medium, Object, Parameter, Pickup, Quantity, Row, SurfaceNumber,
-    ToleranceSheet, Variable, Wavelength, ZoomPosition,
+    Aperture, Fields, Goal, Lens, Medium, Object, Parameter, Pickup, Quantity, Row,
+    SurfaceAperture, SurfaceNumber, ToleranceSheet, Variable, Wavelength, ZoomPosition,
 };
 use serde::{Deserialize, Serialize};
 
@@ -160,6 +160,13 @@ pub enum Edit {
         /// The radius, in mm.
         value: Option<f64>,
     },
+    /// Sets the apertures of a surface that are no circles about its vertex.
+    SetApertures {
+        /// The surface.
+        surface: usize,
+        /// All of them.
+        apertures: Vec<SurfaceAperture>,
+    },
 }
 
 /// The cell of a table to which an edit writes; consecutive edits of one cell are one undo step.
@@ -252,6 +259,9 @@ impl Edit {
             Self::Sequence { title, .. } => title.clone(),
             Self::SetObstruction { surface, .. } => {
                 format!("obstruction of surface {}", number(surface))
+            }
+            Self::SetApertures { surface, .. } => {
+                format!("apertures of surface {}", number(surface))
             }
         }
     }

@@ -30,6 +30,7 @@ pub(super) fn scale(lens: &mut Lens, factor: f64) -> Result<(), EditError> {
         row.thickness *= factor;
         row.semi_diameter = row.semi_diameter.map(|sd| sd * factor);
         row.obstruction = row.obstruction.map(|inner| inner * factor);
+        row.apertures.iter_mut().for_each(|own| *own = own.scaled(factor));
         row.decenter = row.decenter.map(|length| length * factor);
         for axis in [&mut row.break_before, &mut row.break_after].into_iter().flatten() {
             axis.decenter = axis.decenter.map(|length| length * factor);

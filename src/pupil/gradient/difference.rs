@@ -13,7 +13,9 @@
 //! the edge and four quadratures a number.
 
 use super::{PupilDerivative, QuadraticIntegrand};
-use crate::lens::{ProfileCoefficients, ProfileLaw, RADIAL_TERMS, System, SystemError};
+use crate::lens::{
+    APERTURE_NUMBERS, ProfileCoefficients, ProfileLaw, RADIAL_TERMS, System, SystemError,
+};
 use crate::pupil::region::{Region, RegionKind, TracedPupil};
 use crate::trace::{SurfaceParameter, SystemGradient};
 
@@ -51,7 +53,7 @@ impl Region<'_> {
                 let Some(step) = scales.step(system, i, slot) else { continue };
                 let by_slot = |system: &mut System<f64>, step: f64| {
                     slot.promote_shape(system, i);
-                    *slot.value_mut(system, i) += step;
+                    slot.shift(system, i, step);
                 };
                 let [by, error] = moved.derivative(step, by_slot);
                 found.gradient.surfaces[i].set(slot, by);
@@ -104,6 +106,9 @@ impl SurfaceScales {
             }
             // A change of the sag by a length r times the angle.
             SurfaceParameter::Freeform(k) => r.powi(row.freeform.as_ref()?.kind.power(k)),
+            // An angle in degrees that moves the edge as far as a shift of the others.
+            SurfaceParameter::Aperture(k) if k % APERTURE_NUMBERS == APERTURE_NUMBERS - 1 => 30.0,
+            SurfaceParameter::Aperture(_) => r,
         };
         let step = STEP * scale;
         (step.is_finite() && step > 0.0).then_some(step)

@@ -3,7 +3,7 @@
 //! pupil.
 
 use super::{PupilDerivative, QuadraticIntegrand, WarpSampling};
-use crate::lens::{RADIAL_TERMS, SurfaceNumber, SystemError};
+use crate::lens::{APERTURE_NUMBERS, RADIAL_TERMS, SurfaceNumber, SystemError};
 use crate::pupil::launch::LaunchError;
 use crate::pupil::ray_model::Aiming;
 use crate::pupil::region::{Accuracy, PupilMoments, Region, RegionKind, order_error};
@@ -402,10 +402,12 @@ fn natural_size(
             SurfaceParameter::Curvature => 1,
             SurfaceParameter::Conic | SurfaceParameter::Index => 0,
             SurfaceParameter::AsphereTerm(term) => 2 * term as i32 + 3,
+            SurfaceParameter::Aperture(k) if k % APERTURE_NUMBERS == APERTURE_NUMBERS - 1 => 0,
             // The power of the length depends on the kind of a form; rounding is far below.
             SurfaceParameter::Thickness
             | SurfaceParameter::SemiDiameter
-            | SurfaceParameter::Freeform(_) => -1,
+            | SurfaceParameter::Freeform(_)
+            | SurfaceParameter::Aperture(_) => -1,
             SurfaceParameter::GrinTerm(k) => match k.checked_sub(RADIAL_TERMS) {
                 None => 2 * (k as i32 + 1),
                 Some(j) => j as i32 + 1,

@@ -129,25 +129,19 @@ impl WarpSampling {
 
 /// The mean of the replicates and its standard error.
 fn derivative(replicates: &[SystemGradient<f64>], rays: usize) -> PupilDerivative {
-    let surfaces = replicates[0].surfaces.len();
-    let rows: Vec<Vec<f64>> = replicates.iter().map(|g| g.numbers().collect()).collect();
-    let count = rows.len() as f64;
-    let column = |i: usize| rows.iter().map(move |row| row[i]);
-    let mean = |i: usize| column(i).map(|v| v / count).sum::<f64>();
-    let error = |i: usize| {
-        let mean = mean(i);
+    let count = replicates.len() as f64;
+    let mean = |values: &[f64]| values.iter().map(|v| v / count).sum::<f64>();
+    let error = |values: &[f64]| {
+        let mean = mean(values);
         // Relative to the largest, so that squares do not overflow.
-        let largest = column(i).map(|v| (v - mean).abs()).fold(0.0, f64::max);
-        let square = |v: f64| if largest > 0.0 { ((v - mean) / largest).powi(2) } else { 0.0 };
-        largest * (column(i).map(square).sum::<f64>() / (count * (count - 1.0))).sqrt()
+        let largest = values.iter().map(|v| (v - mean).abs()).fold(0.0, f64::max);
+        let square = |v: &f64| if largest > 0.0 { ((v - mean) / largest).powi(2) } else { 0.0 };
+        largest * (values.iter().map(square).sum::<f64>() / (count * (count - 1.0))).sqrt()
     };
-    let numbers = 0..rows[0].len();
-    PupilDerivative {
-        gradient: SystemGradient::from_numbers(surfaces, numbers.clone().map(mean)),
-        error: SystemGradient::from_numbers(surfaces, numbers.map(error)),
-        rays,
-        reached: false,
-    }
+    let of = |what: &dyn Fn(&[f64]) -> f64| {
+        SystemGradient::combine(replicates, |values| what(&values.collect::<Vec<_>>()))
+    };
+    PupilDerivative { gradient: of(&mean), error: of(&error), rays, reached: false }
 }
 
 /// A pupil and an integrand, ready for sampling.
@@ -213,8 +207,7 @@ impl<'a, R: Real, C: Integrand> WarpEstimator<'a, R, C> {
             #[inline(always)]
             |points, block| weigh_limits(block, self.cost, disc, points),
         );
-        let surfaces = sum.surfaces.len();
-        Some(SystemGradient::from_numbers(surfaces, sum.numbers().map(Real::value)))
+        Some(SystemGradient::combine(&[sum], |numbers| numbers.map(Real::value).sum()))
     }
 
     /// The points whose rays get through, found by tracing without derivatives.
@@ -415,6 +408,7 @@ mod tests {
                 grin: graded,
                 semi_diameter,
                 obstruction,
+                apertures: Vec::new(),
                 mirror,
                 hyperhemisphere: hyper,
                 pose: None,

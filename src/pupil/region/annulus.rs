@@ -3,12 +3,11 @@
 //! An annulus is not star-shaped, but from the centre of the shadow both of its edges are functions
 //! of azimuth. Gauss nodes between them converge as fast as those of a star-shaped pupil.
 
-use super::boundary::{Boundary, PolarFrame, PupilLimit};
+use super::boundary::{Boundary, PolarFrame};
 use super::edge_search::{EdgeSearch, GUESS_SPREAD, LimitFilter};
 use super::nodes::{Nodes, RadialLine};
 use crate::pupil::gauss_rules::legendre;
 use crate::pupil::launch::Launch;
-use crate::trace::RayLimit;
 use std::f64::consts::PI;
 
 /// The two edges of an annulus, both about the same point inside the shadow.
@@ -36,8 +35,8 @@ impl Annulus {
             outer: edge(LimitFilter::WithoutObstructions)?,
             inner: edge(LimitFilter::Obstructions)?,
         };
-        let shadow = |limit| matches!(limit, PupilLimit::Surface(_, RayLimit::Obstruction));
-        let closed = annulus.inner.arcs.iter().all(|arc| shadow(arc.limit)) && annulus.is_open();
+        let closed =
+            annulus.inner.arcs.iter().all(|arc| arc.limit.is_shadow()) && annulus.is_open();
         closed.then_some(annulus)
     }
 

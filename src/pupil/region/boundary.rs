@@ -19,6 +19,11 @@ pub enum PupilLimit {
 }
 
 impl PupilLimit {
+    /// True if the limit ends a shadow, beyond which there may be light again.
+    pub fn is_shadow(self) -> bool {
+        matches!(self, Self::Surface(_, limit) if limit.is_shadow())
+    }
+
     /// True if a cosine vanishes at the limit, so that the ray direction varies without bound
     /// towards it.
     pub fn is_grazing(self) -> bool {

@@ -89,6 +89,7 @@ fn depth(
             let radius = at.semi_diameter.max(before);
             length(radius, (radius.powi(2) - margin).max(0.0).sqrt(), 1.0)
         }
+        RayLimit::Aperture(_) | RayLimit::Obscuration(_) => (-margin / size, -1.0 / size),
         RayLimit::Miss | RayLimit::Equator | RayLimit::TotalReflection => {
             let square = system.index_before(surface).powi(2);
             (-margin / square, -1.0 / square)

@@ -4,9 +4,10 @@
 //! rounding by a bracketed secant; where the margin that ends it changes, the edge has a corner.
 
 use super::boundary::{Boundary, BoundaryArc, EdgePoint, PolarFrame, PupilLimit};
+use super::dark_points::ClosedCurve;
 use super::limit_secant::{LimitSecant, SECANT_STEPS, SecantStep};
 use crate::pupil::launch::Launch;
-use crate::trace::RayLimit;
+use crate::trace::{Ray, RayLimit};
 use std::f64::consts::PI;
 
 /// The result of testing a ray against the limits.
@@ -38,7 +39,7 @@ const ENDING: f64 = 1e-6;
 const AT_GRAZING: f64 = 1.0 - 1e-9;
 /// A squared cosine that has fallen to this part of its value at the centre vanishes not far away.
 const NEAR_GRAZING: f64 = 0.3;
-/// The largest number of arcs: more are noise.
+/// The largest number of arcs, beside one for each side of an aperture: more are noise.
 pub(super) const MAX_ARCS: usize = 24;
 /// A pupil that reaches this far, in its frame, is unbounded.
 const UNBOUNDED: f64 = 1e4;
@@ -66,7 +67,7 @@ impl Launch<'_> {
         let Some(ray) = self.ray(p) else { return probe };
         let mut deepest: Option<(PupilLimit, f64)> = None;
         self.channel().tracer.margins(ray, |surface, ray_limit, margin| {
-            if ray_limit != RayLimit::Obstruction {
+            if !ray_limit.is_shadow() {
                 return;
             }
             let limit = PupilLimit::Surface(surface, ray_limit);
@@ -80,6 +81,9 @@ impl Launch<'_> {
             }
         });
         probe.failed = deepest.filter(|(_, d)| *d >= 0.0).map(|(limit, depth)| (limit, -depth));
+        if probe.margin_at_limit.is_nan() {
+            probe.margin_at_limit = -self.side_margin(ray, wanted);
+        }
         probe
     }
 
@@ -105,7 +109,21 @@ impl Launch<'_> {
                 probe.failed = Some((limit, if margin < 0.0 { margin } else { -1.0 }));
             }
         });
+        if probe.margin_at_limit.is_nan() {
+            probe.margin_at_limit = self.side_margin(ray, wanted);
+        }
         probe
+    }
+
+    /// The margin of a ray at a side of an aperture, whether it decides or not; NaN at any other limit.
+    fn side_margin(&self, ray: Ray<f64>, limit: PupilLimit) -> f64 {
+        match limit {
+            PupilLimit::Surface(
+                surface,
+                side @ (RayLimit::Aperture(_) | RayLimit::Obscuration(_)),
+            ) => self.channel().tracer.margin(ray, surface, side).unwrap_or(f64::NAN),
+            _ => f64::NAN,
+        }
     }
 
     /// The margins of a ray at every limit; `None` if it does not get through.
@@ -146,7 +164,7 @@ impl<'a> EdgeSearch<'a> {
         match self.limits {
             LimitFilter::All => self.launch.probe(p, wanted),
             LimitFilter::WithoutObstructions => {
-                self.launch.probe_filtered(p, wanted, |h| h != RayLimit::Obstruction)
+                self.launch.probe_filtered(p, wanted, |h| !h.is_shadow())
             }
             LimitFilter::Obstructions => self.launch.probe_obstructions(p, wanted),
         }
@@ -331,11 +349,13 @@ impl<'a> EdgeSearch<'a> {
     /// bracketed secant on the distance between the two; `None` if a third one intervenes.
     fn find_corner(&mut self, a: (f64, EdgePoint), b: (f64, EdgePoint)) -> Option<f64> {
         let (mut low, mut high) = (a.0, b.0);
+        // At the corner of an obscuration the far one of two sides makes the edge, not the near one.
+        let sense = if self.is_corner_of_shadow(a.1, b.1) { -1.0 } else { 1.0 };
         let gap = |search: &mut Self, azimuth: f64| {
             let share = (azimuth - a.0) / (b.0 - a.0);
             let guess = a.1.radius + share * (b.1.radius - a.1.radius);
             let ends = [a.1.limit, b.1.limit].map(|limit| search.limit_zero(limit, azimuth, guess));
-            Some((ends[1]? - ends[0]?, ends[0]?))
+            Some((sense * (ends[1]? - ends[0]?), ends[0]?))
         };
         let (mut at_low, mut at_high) = (gap(self, low)?.0, gap(self, high)?.0);
         for _ in 0..30 {
@@ -358,6 +378,14 @@ impl<'a> EdgeSearch<'a> {
             }
         }
         None
+    }
+
+    /// True if two edges next to a corner are sides of an obscuration, seen from the light.
+    fn is_corner_of_shadow(&self, a: EdgePoint, b: EdgePoint) -> bool {
+        let is_side = |edge: EdgePoint| {
+            matches!(edge.limit, PupilLimit::Surface(_, RayLimit::Obscuration(_)))
+        };
+        self.limits != LimitFilter::Obstructions && is_side(a) && is_side(b)
     }
 
     /// The whole edge, over azimuths from 0 to `end`; `None` if nothing limits the pupil or if its
@@ -469,7 +497,8 @@ impl<'a> EdgeSearch<'a> {
         if let Some(corner) = found {
             let end = arcs.last_mut().map(|arc| std::mem::replace(&mut arc.to, corner))?;
             arcs.push(BoundaryArc { from: corner, to: end, limit: b.1.limit });
-            return (arcs.len() <= MAX_ARCS).then_some(());
+            let most = MAX_ARCS + self.launch.channel().tracer.aperture_sides();
+            return (arcs.len() <= most).then_some(());
         }
         let guess = 0.5 * (a.1.radius + b.1.radius);
         let between = (middle, self.edge(middle, guess, 0.05 * (b.0 - a.0).min(0.2))?);
@@ -481,8 +510,7 @@ impl<'a> EdgeSearch<'a> {
 /// True if the edge jumps from the near side of a shadow to a limit behind it: there is light
 /// behind the shadow that is not visible from the centre. The two edges are next to a corner.
 fn hides_light(a: EdgePoint, b: EdgePoint) -> bool {
-    let shadow =
-        |edge: EdgePoint| matches!(edge.limit, PupilLimit::Surface(_, RayLimit::Obstruction));
+    let shadow = |edge: EdgePoint| matches!(edge.limit, PupilLimit::Surface(_, limit) if limit.may_hide_light());
     let jump = (a.radius - b.radius).abs() > JUMP * a.radius.max(b.radius);
     jump && (shadow(a) || shadow(b))
 }
@@ -600,7 +628,31 @@ fn join_ends(arcs: &mut Vec<BoundaryArc>, turn: f64) {
     }
 }
 
+/// The number of azimuths of a closed curve around a pupil, beside its corners.
+const CURVE: usize = 256;
+
 impl Boundary {
+    /// A closed polygon of points of the edge, its corners among them; `filter` as the edge was found.
+    pub(super) fn curve(&self, launch: &Launch<'_>, filter: LimitFilter) -> ClosedCurve {
+        let mut search = EdgeSearch::new(launch, self.frame).with_limits(filter);
+        let end = self.samples.last().map_or(0.0, |s| s.0);
+        let count = if launch.is_symmetric() { CURVE / 2 } else { CURVE };
+        let steps = (0..=count).map(|i| end * i as f64 / count as f64);
+        let corners = self.arcs.iter().map(|arc| if arc.to > end { arc.to - end } else { arc.to });
+        let mut azimuths: Vec<f64> = steps.chain(corners).collect();
+        azimuths.sort_by(f64::total_cmp);
+        let mut point = |azimuth: f64| {
+            let edge = search.edge(azimuth, self.radius_guess(azimuth), GUESS_SPREAD)?;
+            Some(self.frame.point(azimuth, edge.radius))
+        };
+        let mut points: ClosedCurve = azimuths.into_iter().filter_map(&mut point).collect();
+        if launch.is_symmetric() {
+            let mirrored: Vec<_> = points.iter().rev().map(|[x, y]| [-x, *y]).collect();
+            points.extend(mirrored);
+        }
+        points
+    }
+
     /// The points of the edge at some azimuths, their radii scaled by `inside`.
     pub fn points(&self, launch: &Launch<'_>, count: usize, inside: f64) -> Vec<[f64; 2]> {
         let mut search = EdgeSearch::new(launch, self.frame);

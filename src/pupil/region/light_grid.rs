@@ -2,6 +2,7 @@
 
 use super::annulus::Annulus;
 use super::boundary::{Boundary, EdgePoint, PolarFrame};
+use super::dark_points::DarkPoints;
 use super::edge_search::{EdgeSearch, GUESS_SPREAD, LimitFilter};
 use super::kind::RegionKind;
 use crate::pupil::launch::Launch;
@@ -49,8 +50,9 @@ pub(super) struct LightGrid {
 impl LightGrid {
     /// A grid that holds all of the light with enough lit rays; `None` if there is none.
     pub(super) fn around_light(launch: &Launch<'_>, rays: &mut usize) -> Option<Self> {
-        let mut grid =
-            SCANS.iter().find_map(|(cells, widest)| Self::scan(launch, *cells, *widest, rays))?;
+        let found =
+            SCANS.iter().find_map(|(cells, widest)| Self::scan(launch, *cells, *widest, rays));
+        let mut grid = found.or_else(|| Self::in_frame(launch, rays))?;
         for _ in 0..MAX_ZOOMS {
             let (center, half) = grid.bounding_square();
             if grid.count() >= ENOUGH_LIT || half > 0.9 * grid.half {
@@ -65,6 +67,16 @@ impl LightGrid {
             grid = closer.follow(launch, rays);
         }
         (grid.half > NARROWEST_PUPIL).then_some(grid)
+    }
+
+    /// A grid about the ray through the centre of an aperture that is no circle about the vertex, if that ray
+    /// gets through: the light of a narrow slit slips between the cells of any other grid.
+    fn in_frame(launch: &Launch<'_>, rays: &mut usize) -> Option<Self> {
+        let reach = if launch.model.ends_at_disc() { 1.0 } else { FIRST_REACH };
+        let lit = launch.frame_centers().into_iter().find(|p| launch.transmits(*p))?;
+        let grid = Self::sample(launch, SCANS[0].0, lit, reach);
+        *rays += grid.rays;
+        (grid.count() > 0).then_some(grid)
     }
 
     /// Doubles a grid about the axis until it holds light, and all of it. Light at the edge of a
@@ -160,12 +172,14 @@ impl LightGrid {
             return RegionKind::Unbounded;
         }
         let pieces = self.count_pieces();
+        let dark = DarkPoints::of(&launch.channel().system);
         let end = if launch.is_symmetric() { PI } else { TAU };
         let azimuths = if launch.is_symmetric() { AZIMUTHS } else { 2 * AZIMUTHS };
         if pieces == 1
             && let Some(boundary) =
                 EdgeSearch::new(launch, self.frame(launch)).trace_boundary(end, azimuths)
             && self.agrees(launch, &boundary, shadows)
+            && (dark.is_empty() || dark.allow(launch, &boundary))
         {
             return RegionKind::StarShaped(boundary);
         }
@@ -176,8 +190,10 @@ impl LightGrid {
             Annulus::around(launch, frame, end, azimuths)
         };
         let annuli = shadows.iter().flatten().filter_map(|middle| around(*middle));
-        let annulus =
-            annuli.into_iter().find(|annulus| self.agrees_with_annulus(launch, annulus, shadows));
+        let annulus = annuli.into_iter().find(|annulus| {
+            let agrees = self.agrees_with_annulus(launch, annulus, shadows);
+            agrees && (dark.is_empty() || dark.allow_annulus(launch, annulus))
+        });
         // A grid may be too coarse to show that a narrow annulus is connected.
         let pieces = if annulus.is_some() { 1 } else { pieces };
         RegionKind::Irregular {

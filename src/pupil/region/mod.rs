@@ -7,6 +7,7 @@
 mod annulus;
 mod boundary;
 mod boundary_tracking;
+mod dark_points;
 mod dark_pupil;
 mod edge_curve;
 mod edge_search;

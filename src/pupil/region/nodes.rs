@@ -2,7 +2,7 @@
 
 use super::boundary::{BoundaryArc, EdgePoint, PolarFrame};
 use crate::pupil::gauss_rules::{legendre, radial};
-use crate::pupil::patterns::additive_sequence;
+use crate::pupil::patterns::{SplitMix, additive_sequence};
 use std::f64::consts::PI;
 
 /// Quadrature nodes: points of the pupil with their weights.
@@ -17,6 +17,9 @@ pub struct Nodes {
     pub mirrored: bool,
     /// The number of rays traced to find them.
     pub rays: usize,
+    /// True for a part of the points of an order, by itself an estimate: the scatter of such parts tells the
+    /// error of the whole.
+    pub is_part: bool,
 }
 
 /// A radius of a pupil with a boundary, from the centre of its frame to its edge.
@@ -133,5 +136,36 @@ pub(super) fn irregular_nodes((center, half): ([f64; 2], f64), count: usize, rea
     };
     let weight = 4.0 * half * half / count as f64;
     let points: Vec<_> = (0..count).map(point).filter(|p| p[0].hypot(p[1]) <= reach).collect();
-    Nodes { weights: vec![weight; points.len()], points, mirrored: false, rays: 0 }
+    Nodes { weights: vec![weight; points.len()], points, ..Nodes::default() }
+}
+
+/// The number of independent parts that a pupil behind figures is sampled in.
+pub(super) const PARTS: usize = 8;
+
+/// Points of a square, one at random in each of `cells` × `cells` equal cells, by a seed. Unlike those of a
+/// sequence they have no pattern that a thin straight figure could be in step with, so that independent parts
+/// scatter as much as each of them errs. Points farther out than `reach` are omitted.
+pub(super) fn jittered_nodes(
+    (center, half): ([f64; 2], f64),
+    (cells, seed): (usize, usize),
+    reach: f64,
+) -> Nodes {
+    let mut random = SplitMix((cells * PARTS + seed) as u64);
+    let size = 2.0 * half / cells as f64;
+    let mut point = |i: usize| {
+        [i % cells, i / cells].map(|cell| size * (cell as f64 + random.uniform()) - half)
+    };
+    let all: Vec<_> = (0..cells * cells).map(&mut point).collect();
+    let placed = all.into_iter().map(|[x, y]| [center[0] + x, center[1] + y]);
+    let points: Vec<_> = placed.filter(|p| p[0].hypot(p[1]) <= reach).collect();
+    let weights = vec![size * size; points.len()];
+    Nodes { weights, points, is_part: true, ..Nodes::default() }
+}
+
+/// The points of independent parts together.
+pub(super) fn joined_nodes(parts: &[Nodes]) -> Nodes {
+    let share = 1.0 / parts.len() as f64;
+    let weights = parts.iter().flat_map(|part| &part.weights).map(|weight| share * weight);
+    let points = parts.iter().flat_map(|part| &part.points).copied();
+    Nodes { points: points.collect(), weights: weights.collect(), ..Nodes::default() }
 }

@@ -96,6 +96,8 @@ impl RayModel {
             RayLimit::Rim if surface == self.stop() => "stop,",
             RayLimit::Rim => "rim of",
             RayLimit::Obstruction => "obstruction of",
+            RayLimit::Aperture(_) => "aperture of",
+            RayLimit::Obscuration(_) => "obscuration of",
             RayLimit::Miss => "missed",
             RayLimit::Equator => "equator of",
             RayLimit::TotalReflection => "critical angle at",

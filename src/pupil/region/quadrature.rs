@@ -9,7 +9,10 @@ use super::boundary::{Boundary, PolarFrame};
 use super::edge_search::{EdgeSearch, INSIDE};
 use super::kind::{Region, RegionKind};
 use super::light_grid::AZIMUTHS;
-use super::nodes::{Grading, Nodes, RadialLine, clear_nodes, irregular_nodes, line_nodes};
+use super::nodes::{
+    Grading, Nodes, PARTS, RadialLine, clear_nodes, irregular_nodes, jittered_nodes, joined_nodes,
+    line_nodes,
+};
 use crate::math::quadrature::chebyshev_points;
 use crate::pupil::gauss_rules::{LARGEST, legendre};
 use crate::pupil::patterns::{PupilPattern, pattern_points};
@@ -76,6 +79,8 @@ const RADIUS_POINTS: usize = 9;
 /// sequence.
 const IRREGULAR_POINTS: usize = 1024;
 const IRREGULAR_ORDERS: usize = 8;
+/// The cells along a side of each independent part of the lowest order for a pupil behind figures.
+const PART_CELLS: usize = 12;
 /// The highest order that such a pupil is begun with: the next one takes 65,536 points.
 const SAMPLED_START: usize = 2;
 
@@ -194,10 +199,25 @@ impl Region<'_> {
                 (Nodes { mirrored, rays, ..nodes }, lines.into_iter().flatten().collect())
             }
             RegionKind::Irregular { square, .. } => {
+                if let Some(parts) = self.parts(order) {
+                    return (joined_nodes(&parts), Vec::new());
+                }
                 let reach = if self.launch.model.ends_at_disc() { 1.0 } else { f64::INFINITY };
                 (irregular_nodes(*square, IRREGULAR_POINTS << (2 * order), reach), Vec::new())
             }
         }
+    }
+
+    /// The independent parts of the points of an order, where a pupil behind figures is sampled; `None` for
+    /// any other pupil.
+    fn parts(&self, order: usize) -> Option<Vec<Nodes>> {
+        let RegionKind::Irregular { square, annulus: None, .. } = &self.kind else { return None };
+        if self.launch.channel().tracer.aperture_sides() == 0 {
+            return None;
+        }
+        let reach = if self.launch.model.ends_at_disc() { 1.0 } else { f64::INFINITY };
+        let cells = PART_CELLS << order.min(IRREGULAR_ORDERS - 1);
+        Some((0..PARTS).map(|part| jittered_nodes(*square, (cells, part), reach)).collect())
     }
 
     /// The radii at the Gauss nodes in azimuth of every arc, as many as `azimuths` says of its length, and the
@@ -256,7 +276,7 @@ impl Region<'_> {
         };
         let points: Vec<_> = pattern_points(chosen).iter().map(place).collect();
         let weight = PI * frame.area() / points.len() as f64;
-        Nodes { weights: vec![weight; points.len()], points, mirrored: false, rays: 0 }
+        Nodes { weights: vec![weight; points.len()], points, ..Nodes::default() }
     }
 
     /// Traces nodes into a sink.
@@ -415,6 +435,9 @@ fn converge_orders(
             break;
         }
         rays += cost;
+        let parts = region.parts(order).unwrap_or_default();
+        rays += parts.iter().map(|part| part.points.len()).sum::<usize>();
+        let scatter = PartScatter::new(parts.iter().map(&mut numbers));
         let Some(values) = numbers(&nodes) else { continue };
         let is_resolved = region.radial_nodes(order) >= least;
         let unresolved = |k: usize| if is_resolved { 0.0 } else { values[k].abs() };
@@ -423,7 +446,8 @@ fn converge_orders(
         if is_compared {
             compared.add(&values, unresolved);
         }
-        let error = |k: usize| every.error_of(k).max(compared.error_of(k));
+        let changes = |k: usize| every.error_of(k).max(compared.error_of(k));
+        let error = |k: usize| scatter.error_of(k).unwrap_or_else(|| changes(k));
         let errors: Vec<f64> = (0..values.len()).map(error).collect();
         let allowed = scales(&values).into_iter().map(|scale| accuracy.tolerance * scale.abs());
         let small = errors.iter().zip(allowed).all(|(error, allowed)| *error <= allowed);
@@ -435,6 +459,33 @@ fn converge_orders(
         before = Some(now);
     }
     before
+}
+
+/// The numbers of independent parts of the points of an order; of none where they are not sampled so.
+struct PartScatter(Vec<Option<Vec<f64>>>);
+
+/// The two-sided 99 % quantile of Student's distribution for one part less than there are.
+const STUDENT: f64 = 3.5;
+
+impl PartScatter {
+    fn new(parts: impl Iterator<Item = Option<Vec<f64>>>) -> Self {
+        Self(parts.collect())
+    }
+
+    /// The error of number `k` of all parts together, at 99 % confidence; `None` without parts.
+    fn error_of(&self, k: usize) -> Option<f64> {
+        if self.0.is_empty() {
+            return None;
+        }
+        let of_part = |part: &Option<Vec<f64>>| part.as_ref().and_then(|all| all.get(k)).copied();
+        let Some(values) = self.0.iter().map(of_part).collect::<Option<Vec<f64>>>() else {
+            return Some(f64::INFINITY);
+        };
+        let count = values.len() as f64;
+        let mean = values.iter().sum::<f64>() / count;
+        let square: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
+        Some(STUDENT * (square / (count * (count - 1.0))).sqrt())
+    }
 }
 
 /// The changes of some numbers from order to order, and the errors that follow from them.

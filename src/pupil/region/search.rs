@@ -4,6 +4,7 @@
 //! position of the light, the number of its pieces, and whether it is star-shaped about a point;
 //! then the edge is searched for from there.
 
+use super::dark_points::DarkPoints;
 use super::edge_search::margin_minima;
 use super::kind::{Region, RegionKind};
 use super::light_grid::LightGrid;
@@ -12,6 +13,9 @@ use std::f64::consts::{PI, TAU};
 
 /// The number of rays at the rim that decide whether a pupil is clear.
 const RIM_RAYS: usize = 16;
+/// The number of points of the rim that blocked points of surfaces are compared with.
+const RIM_CURVE: usize = 256;
+
 impl<'a> Region<'a> {
     /// The region of a launch, searched for unless the model remembers it.
     pub fn new(launch: Launch<'a>) -> Self {
@@ -56,12 +60,29 @@ fn nearest_in_disc([x, y]: [f64; 2]) -> [f64; 2] {
 }
 
 impl Launch<'_> {
-    /// The centre of the shadow of every obstruction, inside the pupil or not: the pupil point of
-    /// the ray through the vertex of the surface. `None` for one that was not found.
+    /// The centre of the shadow of every obstruction and obscuration, inside the pupil or not: the pupil
+    /// point of the ray through its middle. `None` for an obstruction that was not found.
     fn obstruction_centers(&self) -> Vec<Option<[f64; 2]>> {
+        let surfaces = || self.channel().system.surfaces.iter().enumerate();
+        let obstructed = surfaces().filter(|(_, surface)| surface.obstruction > 0.0);
+        let circles = obstructed.map(|(i, _)| self.through_point(i, [0.0; 2]));
+        let figures = surfaces().flat_map(|(i, surface)| {
+            let own = surface.apertures.iter();
+            own.filter(|own| own.obscures()).map(move |own| (i, own.middle()))
+        });
+        let middles = figures.filter_map(|(i, middle)| self.through_point(i, middle));
+        // The middle of a figure may lie outside of it.
+        circles.chain(middles.filter(|p| !self.transmits(*p)).map(Some)).collect()
+    }
+
+    /// The pupil points of the rays through the centres of all apertures that are no circles about a vertex.
+    pub(super) fn frame_centers(&self) -> Vec<[f64; 2]> {
         let surfaces = self.channel().system.surfaces.iter().enumerate();
-        let obstructed = surfaces.filter(|(_, surface)| surface.obstruction > 0.0);
-        obstructed.map(|(i, _)| self.through_vertex(i)).collect()
+        let frames = surfaces.flat_map(|(i, surface)| {
+            let own = surface.apertures.iter();
+            own.filter(|own| !own.obscures()).map(move |own| (i, own.middle()))
+        });
+        frames.filter_map(|(i, middle)| self.through_point(i, middle)).collect()
     }
 
     /// True if the whole disc gets through, judged by the margins of rays at its rim, at the minima
@@ -90,8 +111,12 @@ impl Launch<'_> {
         });
         let passes = |p: [f64; 2]| self.margins_if_passing(p).is_some();
         *rays += shadows.len();
+        let dark = DarkPoints::of(&self.channel().system);
+        let rim: Vec<_> =
+            (0..RIM_CURVE).map(|i| rim_point(TAU * i as f64 / RIM_CURVE as f64)).collect();
         passes([0.0, 0.0])
             && passes_dips
+            && (dark.is_empty() || !dark.are_lit(self, &rim, None))
             && shadows.iter().all(|shadow| shadow.is_some_and(|p| passes(nearest_in_disc(p))))
     }
 }

@@ -110,6 +110,7 @@ fn without_planes(lens: &mut Lens) -> f64 {
 /// Makes a row one of a draft: without rim, with a model glass.
 fn make_plain(row: &mut Row) {
     (row.semi_diameter, row.obstruction, row.stop) = (None, None, false);
+    row.apertures.clear();
     if let Medium::Glass(name) = &row.medium
         && let Some(glass) = glass::find(name)
     {

@@ -27,7 +27,8 @@ pub(super) fn is_zoomed(lens: &Lens, row: usize) -> bool {
 /// True if a surface is a plain sphere or plane.
 pub(super) fn is_plain(row: &Row) -> bool {
     let figured = row.conic != 0.0 || row.asphere.iter().any(|a| *a != 0.0);
-    !figured && !row.hyperhemisphere && row.obstruction.is_none()
+    let blocks = row.obstruction.is_some() || !row.apertures.is_empty();
+    !figured && !row.hyperhemisphere && !blocks
 }
 
 /// The minimum length of a gap over the zoom positions, positive along the light.

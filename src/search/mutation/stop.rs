@@ -18,7 +18,8 @@ fn plane_stop(lens: &Lens) -> Option<usize> {
     let stop = lens.stop()?;
     let glass = glass_gaps(lens);
     let row = &lens.surfaces[stop];
-    let bare = row.curvature == 0.0 && row.asphere.is_empty() && row.obstruction.is_none();
+    let blocks = row.obstruction.is_some() || !row.apertures.is_empty();
+    let bare = row.curvature == 0.0 && row.asphere.is_empty() && !blocks;
     let air = !glass[stop] && !glass[stop + 1];
     let mirror = row.medium == Medium::Mirror;
     (bare && air && !mirror).then_some(stop)

@@ -5,9 +5,10 @@ use super::refraction::{
     unrefract_at_sag,
 };
 use super::{GradientSink, LimitAdjoint};
-use crate::lens::ASPHERE_TERMS;
+use crate::lens::{APERTURE_NUMBERS, ASPHERE_TERMS};
 use crate::math::{Real, Vec3};
 use crate::trace::SurfaceParameter;
+use crate::trace::aperture::ApertureSet;
 use crate::trace::batch::{BLOCK, RayBlock};
 use crate::trace::interface::{Interface, SurfaceForm};
 
@@ -120,6 +121,37 @@ impl<R: Real> AdjointBlock<R> {
             let share = *by_limit * factor;
             self.by_x[j] += p.x * share;
             self.by_y[j] += p.y * share;
+        }
+    }
+
+    /// The adjoint of the sides of apertures, whose limit functions are minus the distances from them.
+    #[inline(never)]
+    pub(super) fn aperture_adjoint(
+        &mut self,
+        apertures: &ApertureSet<R>,
+        by_limits: &[[R; BLOCK]],
+        surface: usize,
+        sink: &mut impl GradientSink<R>,
+    ) {
+        let scale = R::from_f64(1.0 / apertures.extent());
+        for (side, by_limit) in by_limits.iter().enumerate() {
+            let side = side as u16;
+            let (mut first, mut numbers) = (0, [[R::ZERO; BLOCK]; APERTURE_NUMBERS]);
+            for (j, by_limit) in by_limit.iter().enumerate() {
+                let (p, _) = self.block.state(j);
+                let share = *by_limit * scale;
+                let share = if apertures.margin(side, p) < R::ZERO { share } else { -share };
+                let [x, y] = apertures.by_point(side, p);
+                self.by_x[j] += share * x;
+                self.by_y[j] += share * y;
+                let by = apertures.by_numbers(side, p);
+                first = by.0;
+                numbers.iter_mut().zip(by.1).for_each(|(lanes, by)| lanes[j] = share * by);
+            }
+            for (number, lanes) in numbers.iter().enumerate() {
+                let lanes = self.mask_lost(lanes);
+                sink.add_lanes(Some(surface), SurfaceParameter::Aperture(first + number), &lanes);
+            }
         }
     }
 

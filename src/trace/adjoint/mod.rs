@@ -62,6 +62,10 @@ pub struct SurfaceGradient<R> {
     pub grin_terms: [R; PROFILE_TERMS],
     /// By the numbers of a freeform; those that are missing are zero.
     pub freeform: Vec<R>,
+    /// By the numbers of the apertures that are no circles about the vertex, five for each
+    /// ([`crate::lens::SurfaceAperture::numbers`]); those that are missing are zero. Zero for given rays,
+    /// but not for the edge of a pupil.
+    pub apertures: Vec<R>,
 }
 
 impl<R: Real> SurfaceGradient<R> {
@@ -69,13 +73,19 @@ impl<R: Real> SurfaceGradient<R> {
     fn numbers(&self) -> impl Iterator<Item = R> {
         let plain = [self.curvature, self.conic, self.thickness, self.index, self.semi_diameter];
         let fixed = plain.into_iter().chain(self.terms).chain(self.grin_terms);
-        fixed.chain(self.freeform.iter().copied())
+        fixed.chain(self.freeform.iter().copied()).chain(self.apertures.iter().copied())
     }
 
     /// The derivative by a number of a freeform, mutable.
     pub(super) fn freeform_mut(&mut self, number: usize) -> &mut R {
         self.freeform.resize(self.freeform.len().max(number + 1), R::ZERO);
         &mut self.freeform[number]
+    }
+
+    /// The derivative by a number of an aperture, mutable.
+    pub(super) fn aperture_mut(&mut self, number: usize) -> &mut R {
+        self.apertures.resize(self.apertures.len().max(number + 1), R::ZERO);
+        &mut self.apertures[number]
     }
 }
 
@@ -94,14 +104,14 @@ impl<R: Real> SystemGradient<R> {
         Self { index_before: R::ZERO, surfaces: vec![SurfaceGradient::default(); surfaces] }
     }
 
-    /// All numbers, in a fixed order, those of a freeform after the others of its surface.
+    /// All numbers, in a fixed order, those of a freeform and of apertures after the others of a surface.
     pub fn numbers(&self) -> impl Iterator<Item = R> {
         let surfaces = self.surfaces.iter().flat_map(SurfaceGradient::numbers);
         std::iter::once(self.index_before).chain(surfaces)
     }
 
     /// The gradient by these numbers in the order of [`SystemGradient::numbers`], for a system of this
-    /// many surfaces without freeforms; missing numbers are zero.
+    /// many surfaces without freeforms and apertures; missing numbers are zero.
     pub fn from_numbers(surfaces: usize, numbers: impl IntoIterator<Item = R>) -> Self {
         let mut numbers = numbers.into_iter();
         let mut next = || numbers.next().unwrap_or_default();
@@ -110,7 +120,7 @@ impl<R: Real> SystemGradient<R> {
             let [curvature, conic, thickness, index, semi_diameter] = [(); 5].map(|()| next());
             let terms = [(); ASPHERE_TERMS].map(|()| next());
             let grin_terms = [(); PROFILE_TERMS].map(|()| next());
-            let freeform = Vec::new();
+            let (freeform, apertures) = (Vec::new(), Vec::new());
             SurfaceGradient {
                 curvature,
                 conic,
@@ -120,6 +130,7 @@ impl<R: Real> SystemGradient<R> {
                 semi_diameter,
                 grin_terms,
                 freeform,
+                apertures,
             }
         };
         Self { index_before, surfaces: (0..surfaces).map(surface).collect() }
@@ -138,6 +149,9 @@ impl<R: Real> SystemGradient<R> {
             to.grin_terms.iter_mut().zip(from.grin_terms).for_each(|(t, f)| *t += f * factor);
             for (number, by) in from.freeform.iter().enumerate() {
                 *to.freeform_mut(number) += *by * factor;
+            }
+            for (number, by) in from.apertures.iter().enumerate() {
+                *to.aperture_mut(number) += *by * factor;
             }
         }
     }
@@ -172,6 +186,17 @@ pub(super) struct LimitAdjoint<R> {
     pub(super) obstruction: Option<[R; BLOCK]>,
     /// `None` if the edge of the conic ends no ray.
     pub(super) conic_edge: Option<[R; BLOCK]>,
+    /// Those of the sides of apertures that are no circles about the vertex.
+    pub(super) apertures: Vec<[R; BLOCK]>,
+}
+
+impl<R: Real> LimitAdjoint<R> {
+    /// The column of a side of an aperture.
+    pub(super) fn side(&mut self, side: u16) -> &mut [R; BLOCK] {
+        let side = usize::from(side);
+        self.apertures.resize(self.apertures.len().max(side + 1), [R::ZERO; BLOCK]);
+        &mut self.apertures[side]
+    }
 }
 
 /// A receiver of the derivatives of a block of rays.
@@ -209,6 +234,7 @@ impl<R: Real> GradientSink<R> for SystemGradient<R> {
             SurfaceParameter::SemiDiameter => surface.semi_diameter += sum,
             SurfaceParameter::GrinTerm(k) => surface.grin_terms[k] += sum,
             SurfaceParameter::Freeform(k) => *surface.freeform_mut(k) += sum,
+            SurfaceParameter::Aperture(k) => *surface.aperture_mut(k) += sum,
         }
     }
 }
@@ -404,6 +430,7 @@ impl<R: Real> Tracer<R> {
                 block.cross_general(self, i, |j, arrived| distance[j] = arrived.met.s);
             } else {
                 block.cross_recording(interface, i as u32, distance);
+                self.clip_at_apertures(&mut block, i);
             }
         }
         block
@@ -432,6 +459,9 @@ impl<R: Real> Tracer<R> {
                 continue;
             }
             let limits = seeds.limit_adjoint(i);
+            if let (Some(limits), Some(apertures)) = (limits, self.apertures.of(i)) {
+                adjoint.aperture_adjoint(apertures, &limits.apertures, i, sink);
+            }
             // A factor that is known to be 1 costs nothing.
             if interface.sense > R::ZERO {
                 adjoint.retrace_surface(&Interface { sense: R::ONE, ..*interface }, limits);

@@ -4,7 +4,7 @@ use super::foreign;
 use aplanat::files::{self, ConversionOutcome, ConversionReport, LensFormat, OpenedLens};
 use aplanat::lens::{
     Aperture, AxisBreak, FieldKind, FreeformKind, IdealElement, Lens, Medium, Object, Parameter,
-    Pickup, Quantity,
+    Pickup, Quantity, SurfaceAperture,
 };
 use aplanat::math::Vec3;
 
@@ -228,32 +228,53 @@ fn every_zoom_position_is_written_and_read_back() {
 }
 
 #[test]
-fn apertures_that_are_no_centred_circles_have_circles_that_stand_for_them() {
+fn apertures_that_are_no_centred_circles_are_traced_and_written_again() {
+    let folder = super::folder("codev-figures");
     let read = |to: &str| {
         let opened = changed("  CIR 8.6", to);
-        let row = &opened.lens.surfaces[0];
-        let (sizes, decenter) = ((row.semi_diameter, row.obstruction), row.decenter);
-        assert_eq!(decenter, [0.0; 2], "the surface is curved");
-        (sizes, outcome(&opened.report.unwrap(), to.trim().split(';').next().unwrap()))
+        let row = opened.lens.surfaces[0].clone();
+        assert_eq!(row.decenter, [0.0; 2]);
+        files::save(&opened.lens, folder.join("a.seq")).unwrap();
+        let back = files::open(folder.join("a.seq")).unwrap().lens;
+        assert_eq!(back.surfaces[0].apertures, row.apertures, "{to}");
+        let sizes = (back.surfaces[0].semi_diameter, back.surfaces[0].obstruction);
+        assert_eq!(sizes, (row.semi_diameter, row.obstruction), "{to}");
+        let texts: Vec<String> = row.apertures.iter().map(SurfaceAperture::text).collect();
+        let command = to.trim().split(';').next().unwrap();
+        (sizes, texts.join("; "), outcome(&opened.report.unwrap(), command))
     };
-    let (used, approximated) = (ConversionOutcome::Used, ConversionOutcome::Approximated);
-    assert_eq!(read("  REX 3; REY 4"), ((Some(5.0), None), approximated));
-    assert_eq!(read("  ELX 3; ELY 2"), ((Some(3.0), None), approximated));
-    assert_eq!(read("  ELX 3; ELY 3"), ((Some(3.0), None), used));
-    assert_eq!(read("  ADX 1; CIR 6"), ((Some(7.0), None), approximated));
-    assert_eq!(read("  REX OBS 3; REY OBS 2; CIR 8.6"), ((Some(8.6), Some(2.0)), approximated));
-    assert_eq!(read("  REX EDG 3").1, ConversionOutcome::Preserved);
-    // Turned about its centre, a rectangle stays in the circle about it; without one nothing is turned.
-    assert_eq!(read("  ARO 30; REX 3; REY 4"), ((Some(5.0), None), approximated));
-    assert_eq!(read("  ARO 30").1, ConversionOutcome::Preserved);
-    // The fifth surface is a plane, but tilted and decentred itself.
-    let tilted = changed("  XDE 0.25; ADE 3.0; DAR", "  XDE 0.25; ADE 3.0; DAR; CIR 6; ADX 1");
-    assert_eq!(tilted.lens.surfaces[4].semi_diameter, Some(7.0));
-    // A plane moves with its aperture.
+    let used = ConversionOutcome::Used;
+    let clear = (None, None);
+    for (to, sizes, text) in [
+        ("  REX 3; REY 4", clear, "rectangle of half widths 3 and 4"),
+        ("  ELX 3; ELY 2", clear, "ellipse of semi-axes 3 and 2"),
+        ("  ELX 3; ELY 3", (Some(3.0), None), ""),
+        ("  CIR 6; ADX 1", clear, "circle of radius 6 at (1, 0)"),
+        ("  ADX 1; ADY -2; CIR 6", clear, "circle of radius 6 at (1, -2)"),
+        (
+            "  REX OBS 3; REY OBS 2; CIR 8.6",
+            (Some(8.6), None),
+            "obscuring rectangle of half widths 3 and 2",
+        ),
+        ("  CIR HOL 2; REX 3; REY 4", (None, Some(2.0)), "rectangle of half widths 3 and 4"),
+        ("  ARO 30; REX 3; REY 4", clear, "rectangle of half widths 3 and 4 turned by 30 deg"),
+        (
+            "  REX 3; REY S1 4; ADX 0.5; ARO 30",
+            clear,
+            "rectangle of half widths 3 and 4 at (0.5, 0) turned by 30 deg",
+        ),
+    ] {
+        assert_eq!(read(to), (sizes, text.to_owned(), used), "{to}");
+    }
+    assert_eq!(read("  REX EDG 3").2, ConversionOutcome::Preserved);
+    // Without an aperture nothing is turned.
+    assert_eq!(read("  ARO 30").2, ConversionOutcome::Preserved);
+    // A plane stays where it is.
     let third = "S     -154.5 30.0\n  ASP; A 1.5e-7; B -2.0E-10";
     let plane = changed(third, "S     0.0 30.0\n  CIR 6; ADX 1; ADY 2");
     let row = &plane.lens.surfaces[2];
-    assert_eq!((row.semi_diameter, row.decenter), (Some(6.0), [1.0, 2.0]));
+    assert_eq!((row.semi_diameter, row.decenter), (None, [0.0; 2]));
+    assert_eq!(row.apertures[0].center, [1.0, 2.0]);
     assert_eq!(outcome(&plane.report.unwrap(), "ADX"), used);
 }
 
@@ -399,23 +420,6 @@ fn surfaces_are_placed_by_others() {
     assert!(outcome(named.report.as_ref().unwrap(), "GLB") == ConversionOutcome::Used);
     let unknown = open(&format!("{start}S 0 6\n  GLB S9\n{end}"));
     assert!(outcome(unknown.report.as_ref().unwrap(), "GLB") == ConversionOutcome::Dropped);
-}
-
-#[test]
-fn apertures_of_other_forms_are_written_back() {
-    let lens = changed("  CIR 8.6", "  REX 3; REY S1 4; ADX 0.5; ARO 30").lens;
-    let path = super::folder("codev-apertures").join("aperture.seq");
-    files::save(&lens, &path).unwrap();
-    let text = std::fs::read_to_string(&path).unwrap();
-    for command in ["REX 3", "REY 4", "ADX 0.5", "ARO 30"] {
-        assert!(text.contains(command), "{command}: {text}");
-    }
-    assert_eq!(files::open(&path).unwrap().lens.surfaces[0], lens.surfaces[0]);
-    let mut wider = lens;
-    wider.surfaces[0].semi_diameter = Some(9.0);
-    let saved = files::save(&wider, &path).unwrap();
-    assert!(!std::fs::read_to_string(&path).unwrap().contains("REX"));
-    assert_eq!(outcome(&saved.report.unwrap(), "aperture of"), ConversionOutcome::Approximated);
 }
 
 /// Another maker's glass of the same name is another glass.

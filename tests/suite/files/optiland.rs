@@ -1,7 +1,10 @@
 //! The lenses of Optiland, on files written for the tests and by this program.
 
 use aplanat::files::{self, ConversionOutcome, LensFormat, OpenedLens};
-use aplanat::lens::{Aperture, FieldKind, FreeformKind, IdealElement, Lens, Medium, Object};
+use aplanat::lens::{
+    Aperture, ApertureShape, FieldKind, FreeformKind, IdealElement, Lens, Medium, Object,
+    SurfaceAperture,
+};
 use aplanat::math::Vec3;
 
 /// A geometry at a place along z, with its other entries.
@@ -78,6 +81,78 @@ fn a_lens_is_what_its_file_says() {
     let outcome = |text: &str| report.rows.iter().find(|row| row.text == text).unwrap().outcome;
     assert_eq!(outcome("vignetting factors"), ConversionOutcome::Dropped);
     assert_eq!(outcome("solves"), ConversionOutcome::Approximated);
+}
+
+/// Figures and what is common to two of them or in one alone, here and back.
+#[test]
+fn apertures_of_every_form_are_read_and_written_again() {
+    let read = |aperture: &str| {
+        let radial = r#"{"type": "RadialAperture", "r_max": 6.0, "r_min": 0.5}"#;
+        let opened = open(&singlet(PLANE).replace(radial, aperture));
+        let row = opened.lens.surfaces[0].clone();
+        let texts: Vec<String> = row.apertures.iter().map(SurfaceAperture::text).collect();
+        let dropped = opened.report.unwrap().count(ConversionOutcome::Dropped);
+        // One for the vignetting factors.
+        if dropped == 1 {
+            let path = super::folder("optiland-figures").join("a.optiland.json");
+            files::save(&opened.lens, &path).unwrap();
+            let back = files::open(&path).unwrap().lens.surfaces[0].clone();
+            assert_eq!(back.apertures, row.apertures, "{aperture}");
+            assert_eq!(back.semi_diameter, row.semi_diameter, "{aperture}");
+            assert_eq!(back.obstruction, row.obstruction, "{aperture}");
+        }
+        ((row.semi_diameter, row.obstruction), texts.join("; "), dropped)
+    };
+    let rectangle =
+        r#"{"type": "RectangularAperture", "x_min": -3, "x_max": 1, "y_min": -2, "y_max": 2}"#;
+    let ellipse =
+        r#"{"type": "EllipticalAperture", "a": 2, "b": 1, "offset_x": 0.5, "offset_y": 0}"#;
+    let ring =
+        r#"{"type": "OffsetRadialAperture", "r_max": 4, "r_min": 1, "offset_x": 1, "offset_y": 2}"#;
+    let polygon = r#"{"type": "PolygonAperture", "x": [0, -4, 4], "y": [5, -3, -3]}"#;
+    let circle = r#"{"type": "RadialAperture", "r_max": 5.0, "r_min": 0.0}"#;
+    let pair = |kind: &str, a: &str, b: &str| {
+        format!(r#"{{"type": "{kind}Aperture", "a": {a}, "b": {b}}}"#)
+    };
+    let none = (None, None);
+    for (aperture, sizes, text) in [
+        (rectangle.to_owned(), none, "rectangle of half widths 2 and 2 at (-1, 0)"),
+        (ellipse.to_owned(), none, "ellipse of semi-axes 2 and 1 at (0.5, 0)"),
+        (
+            ring.to_owned(),
+            none,
+            "obscuring circle of radius 1 at (1, 2); circle of radius 4 at (1, 2)",
+        ),
+        (polygon.to_owned(), none, "polygon of 3 corners"),
+        (
+            pair("Intersection", circle, rectangle),
+            (Some(5.0), None),
+            "rectangle of half widths 2 and 2 at (-1, 0)",
+        ),
+        (
+            pair("Difference", circle, ellipse),
+            (Some(5.0), None),
+            "obscuring ellipse of semi-axes 2 and 1 at (0.5, 0)",
+        ),
+        (
+            pair("Difference", rectangle, &pair("Union", ellipse, polygon)),
+            none,
+            "rectangle of half widths 2 and 2 at (-1, 0); \
+             obscuring ellipse of semi-axes 2 and 1 at (0.5, 0); obscuring polygon of 3 corners",
+        ),
+    ] {
+        assert_eq!(read(&aperture), (sizes, text.to_owned(), 1), "{aperture}");
+    }
+    // What is in one of two alone, or in either, is no such aperture.
+    assert_eq!(read(&pair("Union", circle, rectangle)), (none, String::new(), 2));
+    assert_eq!(read(&pair("Difference", circle, ring)), (none, String::new(), 2));
+    // A spider is written as rectangles.
+    let mut lens = open(&singlet(PLANE)).lens;
+    let arms = ApertureShape::Spider { arms: 3, width: 0.5 };
+    lens.surfaces[0].apertures = vec![SurfaceAperture::obscuration(arms)];
+    let path = super::folder("optiland-arms").join("a.optiland.json");
+    files::save(&lens, &path).unwrap();
+    assert_eq!(files::open(&path).unwrap().lens.surfaces[0].apertures.len(), 3);
 }
 
 #[test]

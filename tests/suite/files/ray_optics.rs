@@ -2,7 +2,9 @@
 
 use super::foreign;
 use aplanat::files::{self, ConversionOutcome, LensFormat};
-use aplanat::lens::{Aperture, FieldKind, FreeformKind, IdealElement, Medium, Object};
+use aplanat::lens::{
+    Aperture, ApertureShape, FieldKind, FreeformKind, IdealElement, Medium, Object, SurfaceAperture,
+};
 use serde_json::Value;
 
 fn text() -> String {
@@ -37,6 +39,37 @@ fn a_model_is_read() {
     let report = opened.report.unwrap();
     assert_eq!(report.count(ConversionOutcome::Locked), 0);
     assert_eq!(report.count(ConversionOutcome::Approximated), 1);
+}
+
+/// Apertures of every form, decentred, turned and as obscurations, here and back.
+#[test]
+fn apertures_of_every_form_are_read_and_written_again() {
+    let figure =
+        |shape, center, angle| SurfaceAperture { center, angle, ..SurfaceAperture::inside(shape) };
+    let rectangle = ApertureShape::Rectangle { half_width: 3.0, half_height: 2.0 };
+    let ellipse = ApertureShape::Ellipse { half_width: 1.0, half_height: 0.5 };
+    let mut lens = files::parse(text().as_bytes(), "a.roa").unwrap().lens;
+    // No file of the format has a paraxial lens.
+    lens.surfaces[3].ideal = None;
+    lens.surfaces[0].obstruction = Some(0.25);
+    lens.surfaces[0].apertures = vec![
+        figure(rectangle, [0.5, -0.25], 20.0),
+        SurfaceAperture::obscuration(ellipse),
+        figure(ApertureShape::Circle { radius: 4.0 }, [1.0, 0.0], 0.0),
+    ];
+    let path = super::folder("roa-figures").join("a.roa");
+    files::save(&lens, &path).unwrap();
+    let opened = files::open(&path).unwrap();
+    let back = &opened.lens.surfaces[0];
+    assert_eq!(back.apertures, lens.surfaces[0].apertures);
+    assert_eq!((back.semi_diameter, back.obstruction), (Some(7.0), Some(0.25)));
+    let report = opened.report.unwrap();
+    let traced = report.rows.iter().filter(|row| row.note.ends_with(": traced"));
+    assert_eq!(traced.count(), 3);
+    let arms = ApertureShape::Spider { arms: 3, width: 0.5 };
+    lens.surfaces[0].apertures = vec![SurfaceAperture::obscuration(arms)];
+    let refused = files::save(&lens, &path).unwrap_err().to_string();
+    assert!(refused.contains("an aperture, a polygon or arms, of surface 1"), "{refused}");
 }
 
 /// Coefficients are optical paths in the unit of the file at the wavelength of the element.

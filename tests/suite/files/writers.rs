@@ -3,7 +3,9 @@
 
 use super::{folder, foreign};
 use aplanat::files::{self, ConversionOutcome, FileError, LensFormat, json};
-use aplanat::lens::{Aperture, FreeformKind, Lens, Medium, Object, glass};
+use aplanat::lens::{
+    Aperture, ApertureShape, FreeformKind, Lens, Medium, Object, SurfaceAperture, glass,
+};
 use serde_json::Value;
 use std::fs;
 
@@ -100,9 +102,31 @@ fn what_rays_meet_and_a_format_does_not_have_is_refused_by_name() {
     assert!(files::save(&tilted, folder.join("a.roa")).is_ok());
     let mut obstructed = lens.clone();
     obstructed.surfaces[0].obstruction = Some(1.0);
-    for name in ["a.len", "b.roa"] {
-        let error = refusal(&obstructed, name);
-        assert!(error.contains("the obstruction of surface 1"), "{error}");
+    let error = refusal(&obstructed, "a.len");
+    assert!(error.contains("the obstruction of surface 1"), "{error}");
+    assert!(files::save(&obstructed, folder.join("b.roa")).is_ok());
+    // Each of these has a format that holds it.
+    let mut framed = lens.clone();
+    let rectangle = ApertureShape::Rectangle { half_width: 5.0, half_height: 4.0 };
+    let rectangle = SurfaceAperture { angle: 20.0, ..SurfaceAperture::inside(rectangle) };
+    let oval = ApertureShape::Ellipse { half_width: 5.0, half_height: 4.0 };
+    let oval = SurfaceAperture { angle: 20.0, ..SurfaceAperture::inside(oval) };
+    let arms = SurfaceAperture::obscuration(ApertureShape::Spider { arms: 3, width: 1.0 });
+    for (aperture, refused) in [
+        (rectangle, ["a.len", "a.zmx"].as_slice()),
+        (oval, ["a.len", "a.zmx", "a.optiland.json"].as_slice()),
+        (arms, ["a.len", "b.roa", "a.seq"].as_slice()),
+    ] {
+        framed.surfaces[0].apertures = vec![aperture];
+        for name in ["a.len", "a.zmx", "a.seq", "b.roa", "a.optiland.json", "a.json"] {
+            if refused.contains(&name) {
+                let error = refusal(&framed, name);
+                assert!(error.contains("aperture") && error.contains("surface 1"), "{error}");
+            } else {
+                let saved = files::save(&framed, folder.join(name));
+                assert!(saved.is_ok(), "{name}: {saved:?}");
+            }
+        }
     }
     assert!(!folder.join("a.len").exists());
     // A name of two makers means one of their glasses.

@@ -3,8 +3,8 @@
 use super::foreign;
 use aplanat::files::{self, ConversionOutcome, ConversionReport, FileError, OpenedLens};
 use aplanat::lens::{
-    Aperture, Edit, FieldKind, FreeformKind, GradientIndex, Lens, Medium, Object, Parameter,
-    Pickup, ProfileLaw, Quantity, Variable, apply_edit,
+    Aperture, ApertureShape, Edit, FieldKind, FreeformKind, GradientIndex, Lens, Medium, Object,
+    Parameter, Pickup, ProfileLaw, Quantity, SurfaceAperture, Variable, apply_edit,
 };
 use aplanat::math::Vec3;
 use aplanat::trace::{Fate, Ray, Tracer};
@@ -244,12 +244,10 @@ fn obscurations_and_inner_radii_obstruct() {
         read("  OBSC 1 2.5 0"),
         ((None, Some(8.6)), dropped, ConversionOutcome::Approximated)
     );
-    // The circle about a rectangle; the drawn semi-diameter does not clip beside it.
-    assert_eq!(
-        read("  SQAP 1.5 2 0"),
-        ((None, Some(2.5)), ConversionOutcome::Approximated, ConversionOutcome::Preserved)
-    );
-    assert_eq!(read("  SPID 1 2 0").1, dropped);
+    // The drawn semi-diameter does not clip beside a rectangle, which does.
+    assert_eq!(read("  SQAP 1.5 2 0"), ((None, None), used, ConversionOutcome::Preserved));
+    assert_eq!(read("  SPID 1 2 0").1, used);
+    assert_eq!(read("  SPID 0 2 0").1, dropped);
     let both = read("  CLAP 1 8.6 0\r\n  OBSC 0 2.5 0").0;
     assert_eq!(both, (Some(2.5), Some(8.6)));
     let inches = achromat().replace("UNIT MM", "UNIT IN").replace("CLAP 0 8.6", "CLAP 1 8.6");
@@ -263,57 +261,79 @@ fn obscurations_and_inner_radii_obstruct() {
     assert_eq!(outcome(&report, "OBSC").0, ConversionOutcome::Dropped);
 }
 
-/// A circle beside the vertex is exact on a plane, which moves with it; on a sphere the circle about the
-/// vertex stands for it that contains it.
+/// A circle beside the vertex clips there, on a plane as on a sphere.
 #[test]
-fn apertures_beside_the_vertex_are_exact_on_planes() {
+fn apertures_beside_the_vertex_clip_there() {
     let beside = "  CLAP 0 6 0\r\n  OBDC 1.5 -2 0";
-    let opened = changed("  CLAP 0 8.6 0", beside).unwrap();
-    let (row, report) = (opened.lens.surfaces[0].clone(), opened.report.unwrap());
-    assert_eq!((row.semi_diameter, row.decenter), (Some(8.5), [0.0; 2]));
-    for line in ["CLAP 0 6 0", "OBDC 1.5 -2 0"] {
-        let (outcome, note) = outcome(&report, line);
-        assert_eq!(outcome, ConversionOutcome::Approximated, "{line}");
-        assert!(note.contains("a circle of 6 at (1.5, -2)"), "{note}");
-    }
     let plane = achromat()
         .replace("CURV 2.0491803278688523E-2 1 0 0 0", "CURV 0 0 0 0 0")
         .replace("  CLAP 0 8.6 0", beside);
-    let opened = open(plane.as_bytes()).unwrap();
-    let (row, report) = (opened.lens.surfaces[0].clone(), opened.report.unwrap());
-    assert_eq!((row.semi_diameter, row.decenter), (Some(6.0), [1.5, -2.0]));
-    assert_eq!(outcome(&report, "OBDC").0, ConversionOutcome::Used);
-    // A ray passes if it meets the plane within 6 mm of (1.5, -2).
-    let system = opened.lens.resolve(0, 0.5875618).unwrap();
-    let tracer = Tracer::<f64>::new(&system).unwrap();
-    for i in 0..400 {
-        let [x, y] = [i % 20, i / 20].map(|k| f64::from(k) - 9.5);
-        let direction = Vec3::new(0.0, 0.0, 1.0);
-        let fate = tracer.trace(Ray { point: Vec3::new(x, y, -1.0), direction }).fate;
-        let inside = (x - 1.5).hypot(y + 2.0) <= 6.0;
-        assert_eq!(fate != Fate::Clipped(0), inside, "{x} {y}: {fate:?}");
+    for opened in [changed("  CLAP 0 8.6 0", beside), open(plane.as_bytes())] {
+        let opened = opened.unwrap();
+        let (row, report) = (opened.lens.surfaces[0].clone(), opened.report.unwrap());
+        assert_eq!((row.semi_diameter, row.decenter), (None, [0.0; 2]));
+        let circle = SurfaceAperture::inside(ApertureShape::Circle { radius: 6.0 });
+        assert_eq!(row.apertures, [SurfaceAperture { center: [1.5, -2.0], ..circle }]);
+        for line in ["CLAP 0 6 0", "OBDC 1.5 -2 0"] {
+            assert_eq!(outcome(&report, line).0, ConversionOutcome::Used, "{line}");
+        }
+        let note = outcome(&report, "CLAP 0 6 0").1;
+        assert_eq!(note, "circle of radius 6 at (1.5, -2): traced");
+        // A ray passes if it meets the surface within 6 mm of (1.5, -2).
+        let system = opened.lens.resolve(0, 0.5875618).unwrap();
+        let tracer = Tracer::<f64>::new(&system).unwrap();
+        for i in 0..400 {
+            let [x, y] = [i % 20, i / 20].map(|k| f64::from(k) - 9.5);
+            let direction = Vec3::new(0.0, 0.0, 1.0);
+            let fate = tracer.trace(Ray { point: Vec3::new(x, y, -1.0), direction }).fate;
+            let inside = (x - 1.5).hypot(y + 2.0) <= 6.0;
+            assert_eq!(fate != Fate::Clipped(0), inside, "{x} {y}: {fate:?}");
+        }
     }
 }
 
 #[test]
-fn rectangles_and_ellipses_have_circles_that_stand_for_them() {
+fn rectangles_ellipses_and_spiders_are_traced_and_written_again() {
+    let folder = super::folder("zemax-figures");
     let read = |to: &str| {
         let opened = changed("  CLAP 0 8.6 0", to).unwrap_or_else(|error| panic!("{error}"));
-        let row = &opened.lens.surfaces[0];
+        let row = opened.lens.surfaces[0].clone();
+        files::save(&opened.lens, folder.join("a.zmx")).unwrap();
+        let back = files::open(folder.join("a.zmx")).unwrap().lens;
+        assert_eq!(back.surfaces[0].apertures, row.apertures, "{to}");
+        assert_eq!(back.surfaces[0].obstruction, row.obstruction, "{to}");
         let sizes = (row.semi_diameter, row.obstruction);
         let report = opened.report.unwrap();
         let line = to.trim().lines().next().unwrap().trim().to_owned();
-        (sizes, outcome(&report, &line).0)
+        let texts: Vec<String> = row.apertures.iter().map(SurfaceAperture::text).collect();
+        (sizes, texts.join("; "), outcome(&report, &line).0)
     };
-    let (used, approximated) = (ConversionOutcome::Used, ConversionOutcome::Approximated);
-    assert_eq!(read("  ELAP 3 4 0"), ((Some(4.0), None), approximated));
-    assert_eq!(read("  ELAP 4 4 0"), ((Some(4.0), None), used));
-    assert_eq!(read("  SQAP 2 3 0\r\n  OBDC 1 -1 0"), ((Some(5.0), None), approximated));
-    // The largest circle inside an obscuration; the drawn semi-diameter clips here.
-    assert_eq!(read("  SQOB 2 3 0"), ((Some(8.6), Some(2.0)), approximated));
-    assert_eq!(read("  ELOB 2 3 0\r\n  OBDC 0 0.5 0"), ((Some(8.6), Some(1.5)), approximated));
-    assert_eq!(read("  ELOB 2 3 0\r\n  OBDC 0 5 0").1, ConversionOutcome::Dropped);
-    assert_eq!(read("  SQAP 0 3 0").1, ConversionOutcome::Dropped);
+    let used = ConversionOutcome::Used;
+    let clear = (None, None);
+    let text = |text: &str| text.to_owned();
+    assert_eq!(read("  ELAP 3 4 0"), (clear, text("ellipse of semi-axes 3 and 4"), used));
+    assert_eq!(read("  ELAP 4 4 0"), ((Some(4.0), None), String::new(), used));
+    assert_eq!(
+        read("  SQAP 2 3 0\r\n  OBDC 1 -1 0"),
+        (clear, text("rectangle of half widths 2 and 3 at (1, -1)"), used)
+    );
+    // The drawn semi-diameter clips here.
+    let drawn = (Some(8.6), None);
+    assert_eq!(
+        read("  SQOB 2 3 0"),
+        (drawn, text("obscuring rectangle of half widths 2 and 3"), used)
+    );
+    assert_eq!(read("  SPID 0.5 3 0"), (drawn, text("obscuring 3 arms of width 0.5"), used));
+    assert_eq!(read("  SQAP 0 3 0").2, ConversionOutcome::Dropped);
+    let inches = achromat().replace("UNIT MM", "UNIT IN").replace("CLAP 0 8.6", "SQAP 1 2");
+    let shape = ApertureShape::Rectangle { half_width: 25.4, half_height: 50.8 };
+    assert_eq!(lens(&inches).surfaces[0].apertures, [SurfaceAperture::inside(shape)]);
+    // The format has no second centre and no turned figure.
+    let mut two = changed("  CLAP 0 8.6 0", "  SQAP 2 3 0\r\n  OBDC 1 -1 0").unwrap().lens;
+    let turned = SurfaceAperture { angle: 30.0, ..two.surfaces[0].apertures[0].clone() };
+    two.surfaces[0].apertures.push(turned);
+    let error = files::save(&two, folder.join("b.zmx")).unwrap_err().to_string();
+    assert!(error.contains("aperture 2 of surface 1") && error.contains("30 deg"), "{error}");
 }
 
 #[test]
@@ -558,20 +578,20 @@ fn skew_angles_are_those_of_both_planes() {
     }
 }
 
-/// Nobody traces them, but the file that is written has them again.
+/// Nobody traces a user-defined aperture, but the file that is written has its line again.
 #[test]
 fn apertures_of_other_forms_are_written_back() {
     let lines = "  SQAP 3 4 0\r\n  SPID 0.5 3 0\r\n  UDAD 0 1 2 3\r\n  OBDC 0.5 0 0";
     let opened = changed("  CLAP 0 8.6 0", lines).unwrap();
     let report = opened.report.unwrap();
     for (line, expected) in [
-        ("SQAP", ConversionOutcome::Approximated),
-        ("SPID", ConversionOutcome::Dropped),
+        ("SQAP", ConversionOutcome::Used),
+        ("SPID", ConversionOutcome::Used),
         ("UDAD", ConversionOutcome::Dropped),
     ] {
         assert_eq!(outcome(&report, line).0, expected, "{line}");
     }
-    assert!(outcome(&report, "SPID").1.contains("writes the line back"));
+    assert!(outcome(&report, "UDAD").1.contains("writes the line back"));
     let (mut lens, folder) = (opened.lens, super::folder("zemax-apertures"));
     let written = |lens: &Lens| {
         let saved = files::save(lens, folder.join("aperture.zmx")).unwrap();
@@ -587,11 +607,11 @@ fn apertures_of_other_forms_are_written_back() {
     // The native format keeps them too.
     let native = files::json::read(&files::json::write(&lens), "a.json").unwrap();
     assert_eq!(native.surfaces, lens.surfaces);
-    // Another circle, another size: the lines are not those of this lens any more.
+    // Other apertures, another size: the lines are not those of this lens any more.
     let edit = Edit::Scale(2.0);
     assert_eq!(apply_edit(&lens, &edit).unwrap().surfaces[0].foreign_aperture, None);
-    lens.surfaces[0].semi_diameter = Some(9.0);
+    lens.surfaces[0].apertures.pop();
     let (text, report) = written(&lens);
-    assert!(!text.contains("SPID"));
+    assert!(!text.contains("SPID") && !text.contains("UDAD") && text.contains("SQAP"));
     assert_eq!(outcome(&report, "aperture of surface 1").0, ConversionOutcome::Approximated);
 }

@@ -7,10 +7,12 @@ mod surface;
 
 pub(in crate::files) use surface::place;
 
+use crate::files::outline::unwritten_aperture;
 use crate::files::report::{ConversionOutcome, ConversionReport};
 use crate::files::text::{number, numbers};
 use crate::lens::{
-    Aperture, FieldKind, Fields, Lens, LensError, Object, Parameter, Pickup, Quantity, SystemError,
+    Aperture, FieldKind, Fields, Lens, LensError, Object, Parameter, Pickup, Quantity, Row,
+    SystemError,
 };
 
 /// The commands of the numbers that can differ between the zoom positions.
@@ -58,6 +60,8 @@ pub fn write(lens: &Lens) -> Result<(String, ConversionReport), LensError> {
         let (what, hint) = ("the export as .seq", "; expected .zmx or the native format (.json)");
         return Err(SystemError::Posed { surface: surface.into(), what, hint }.into());
     }
+    let is_stop = |row: &Row| row.stop && matches!(lens.aperture, Aperture::StopSemiDiameter(_));
+    unwritten_aperture(lens, ".seq", |row| surface::figure_lines(row, is_stop(row)).err())?;
     let (lens, report) = (lens.with_pickups()?, ConversionReport::default());
     let mut writer = CodeVWriter { lens, text: String::new(), report };
     writer.solve_focus();

@@ -6,8 +6,8 @@ use crate::files::report::ConversionOutcome;
 use crate::files::zemax::{is_general, merged_powers};
 use crate::lens::glass::{self, Glass};
 use crate::lens::{
-    Aperture, AxisBreak, FreeformKind, IdealElement, Medium, MediumPlace, Quantity, Row,
-    SurfaceNumber,
+    Aperture, ApertureShape, AxisBreak, FreeformKind, IdealElement, Medium, MediumPlace, Quantity,
+    Row, SurfaceAperture, SurfaceNumber,
 };
 
 /// Decentre and tilt of a surface, and the word that says what they move.
@@ -79,6 +79,8 @@ impl CodeVWriter {
         if let Some(inner) = row.obstruction.filter(|inner| *inner > 0.0) {
             self.line(format!("  CIR OBS {}", number(inner)));
         }
+        let lines = figure_lines(row, stop.is_some()).unwrap_or_default();
+        lines.into_iter().for_each(|line| self.line(format!("  {line}")));
     }
 
     fn form(&mut self, row: &Row) {
@@ -277,4 +279,54 @@ fn fictitious(nd: f64, vd: f64) -> Option<String> {
     let [index, abbe] = [nd, vd].map(|value| format!("{value:?}"));
     let (index, abbe) = (index.strip_prefix("1.")?, abbe.replace('.', ""));
     Some(format!(" {index:0<6}.{abbe:0<6}"))
+}
+
+/// The commands of the apertures that are no circles about the vertex: one of each kind, all with the same
+/// centre and the same angle, which `ADX`, `ADY` and `ARO` give for all apertures of a surface. `is_stop` is
+/// true if the surface has a circle as the aperture of the lens.
+///
+/// # Errors
+/// The index of the first aperture that the format cannot hold beside the others.
+pub(super) fn figure_lines(row: &Row, is_stop: bool) -> Result<Vec<String>, usize> {
+    let has_circle = is_stop || row.semi_diameter.is_some() || row.obstruction.is_some();
+    let mut place = has_circle.then_some(([0.0; 2], None));
+    let (mut lines, mut kinds) = (Vec::new(), Vec::new());
+    for (k, own) in row.apertures.iter().enumerate() {
+        let is_round = matches!(own.shape, ApertureShape::Circle { .. });
+        let angle = (!is_round).then_some(own.angle);
+        let fits = place.is_none_or(|(center, turned): ([f64; 2], Option<f64>)| {
+            center == own.center && (turned.is_none() || angle.is_none() || turned == angle)
+        });
+        let kind = (is_round, own.obscures());
+        if !fits || kinds.contains(&kind) || (is_round && has_circle) {
+            return Err(k);
+        }
+        lines.extend(aperture_commands(own).ok_or(k)?);
+        kinds.push(kind);
+        place = Some((own.center, place.and_then(|(_, turned)| turned).or(angle)));
+    }
+    if let Some(([x, y], angle)) = place.filter(|_| !kinds.is_empty()) {
+        let places = [("ADX", x), ("ADY", y), ("ARO", angle.unwrap_or(0.0))];
+        let moved = places.iter().filter(|(_, value)| *value != 0.0);
+        lines.extend(moved.map(|(name, value)| format!("{name} {}", number(*value))));
+    }
+    Ok(lines)
+}
+
+/// The commands of an aperture without its place; `None` for one that the format does not have.
+fn aperture_commands(aperture: &SurfaceAperture) -> Option<Vec<String>> {
+    let kind = if aperture.obscures() { "OBS " } else { "" };
+    let pair = |name: &str, [x, y]: [f64; 2]| {
+        vec![format!("{name}X {kind}{}", number(x)), format!("{name}Y {kind}{}", number(y))]
+    };
+    match aperture.shape {
+        ApertureShape::Circle { radius } => Some(vec![format!("CIR {kind}{}", number(radius))]),
+        ApertureShape::Rectangle { half_width, half_height } => {
+            Some(pair("RE", [half_width, half_height]))
+        }
+        ApertureShape::Ellipse { half_width, half_height } => {
+            Some(pair("EL", [half_width, half_height]))
+        }
+        ApertureShape::Polygon { .. } | ApertureShape::Spider { .. } => None,
+    }
 }

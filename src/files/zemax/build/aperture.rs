@@ -1,11 +1,11 @@
 //! Apertures and obscurations of a surface.
 
-use crate::files::outline::{ForeignOutline, OutlineForm, StandIn, is_free_plane};
+use crate::files::outline::{ForeignOutline, OutlineForm};
 use crate::files::report::{ConversionOutcome, ConversionReport};
 use crate::files::zemax::file::{ApertureLine, OutlineLine, ZemaxFile, ZemaxSurface};
-use crate::lens::Row;
+use crate::lens::{ApertureShape, BlockedSide, Row, SurfaceAperture};
 
-/// Writes the rim and the obstruction of a surface into its row, whose shape and place are known.
+/// Writes the rim, the obstruction and the other apertures of a surface into its row.
 pub(super) fn apply(
     file: &ZemaxFile,
     number: usize,
@@ -14,32 +14,34 @@ pub(super) fn apply(
     report: &mut ConversionReport,
 ) {
     let surface = &file.surfaces[number];
-    let plane = is_free_plane(row);
-    let (rim, rim_line) = rim(surface, plane).unzip();
-    let (block, block_line) = obscuration(surface, plane).unzip();
-    let moves = [&rim, &block].into_iter().flatten().any(|own| own.moves);
-    for (own, line) in rim.iter().zip(rim_line).chain(block.iter().zip(block_line)) {
-        report.amend(line, own.outcome, own.note.clone());
+    let (outside, inside) = (BlockedSide::Outside, BlockedSide::Inside);
+    let rim = outline(surface, surface.clip, surface.outline).map(|found| (found, outside));
+    let block = outline(surface, surface.obstruction, surface.block).map(|found| (found, inside));
+    for ((found, line), blocks) in rim.iter().chain(&block) {
+        found.add_to(row, *blocks, file.unit);
+        report.amend(*line, ConversionOutcome::Used, found.note(*blocks));
     }
-    report_offset(surface, rim.iter().chain(&block), report);
-    let outer = match &rim {
-        Some(own) => {
-            report_drawn(surface, own, report);
-            own.radius
-        }
-        None => drawn(file, number, stop, report),
-    };
-    let unit = file.unit;
-    row.semi_diameter = outer.map(|radius| radius * unit);
-    row.obstruction = block.as_ref().and_then(|own| own.radius).map(|radius| radius * unit);
-    if let (true, Some((x, y, _))) = (moves, surface.aperture_offset) {
-        row.decenter = [x * unit, y * unit];
+    spider(surface, file.unit, row, report);
+    report_offset(surface, row, report);
+    if let Some(((found, _), _)) = &rim {
+        report_drawn(surface, found, report);
+    } else {
+        let outer = drawn(file, number, stop, report);
+        row.semi_diameter = outer.map(|radius| radius * file.unit);
     }
-    let is_exact =
-        [&rim, &block].into_iter().flatten().all(|own| own.outcome == ConversionOutcome::Used);
-    if !(is_exact && surface.other_apertures.is_empty()) {
+    if !surface.other_apertures.is_empty() {
         keep_lines(file, number, row, report);
     }
+}
+
+/// Writes the arms of a spider into the row.
+fn spider(surface: &ZemaxSurface, unit: f64, row: &mut Row, report: &mut ConversionReport) {
+    let Some((arms, width, line)) = surface.spider else { return };
+    let center = offset(surface);
+    let shape = ApertureShape::Spider { arms, width };
+    let figure = SurfaceAperture { center, ..SurfaceAperture::obscuration(shape) };
+    report.amend(line, ConversionOutcome::Used, format!("{}: traced", figure.text()));
+    row.apertures.push(figure.scaled(unit));
 }
 
 /// The keywords of apertures and obscurations.
@@ -62,60 +64,38 @@ fn keep_lines(file: &ZemaxFile, number: usize, row: &mut Row, report: &mut Conve
     }
 }
 
-fn circle(radius: f64, offset: [f64; 2]) -> ForeignOutline {
-    ForeignOutline { form: OutlineForm::Circle, half: [radius; 2], offset, turned: false }
-}
-
 /// The place of the apertures beside the vertex.
 fn offset(surface: &ZemaxSurface) -> [f64; 2] {
     surface.aperture_offset.map_or([0.0; 2], |(x, y, _)| [x, y])
 }
 
-/// The circle that stands for the aperture, with its line: of a circular one, else of another form.
-fn rim(surface: &ZemaxSurface, plane: bool) -> Option<(StandIn, usize)> {
+/// An aperture or an obscuration with its line: a circular one, else one of another form.
+fn outline(
+    surface: &ZemaxSurface,
+    circle: Option<(f64, usize)>,
+    other: Option<OutlineLine>,
+) -> Option<(ForeignOutline, usize)> {
     let offset = offset(surface);
-    let circle = surface.clip.map(|(radius, line)| {
-        let outline = circle(radius, offset);
-        (outline.aperture(plane), line)
-    });
-    circle.or_else(|| {
-        let OutlineLine { form, half, line } = surface.outline?;
-        Some((ForeignOutline { form, half, offset, turned: false }.aperture(plane), line))
-    })
-}
-
-/// The circle that stands for the obscuration, with its line.
-fn obscuration(surface: &ZemaxSurface, plane: bool) -> Option<(StandIn, usize)> {
-    let offset = offset(surface);
-    let circle = surface.obstruction.map(|(radius, line)| {
-        let outline = circle(radius, offset);
-        (outline.obscuration(plane), line)
-    });
-    circle.or_else(|| {
-        let OutlineLine { form, half, line } = surface.block?;
-        Some((ForeignOutline { form, half, offset, turned: false }.obscuration(plane), line))
-    })
+    let plain = |form, half| ForeignOutline { form, half, offset, angle: 0.0 };
+    let circle = circle.map(|(radius, line)| (plain(OutlineForm::Circle, [radius; 2]), line));
+    circle.or_else(|| other.map(|OutlineLine { form, half, line }| (plain(form, half), line)))
 }
 
 /// Reports the displacement of the apertures.
-fn report_offset<'a>(
-    surface: &ZemaxSurface,
-    apertures: impl Iterator<Item = &'a StandIn>,
-    report: &mut ConversionReport,
-) {
+fn report_offset(surface: &ZemaxSurface, row: &Row, report: &mut ConversionReport) {
     let Some((.., line)) = surface.aperture_offset else { return };
-    if let Some(own) = apertures.min_by_key(|own| own.outcome) {
-        report.amend(line, own.outcome, own.note.clone());
-    } else {
+    if row.apertures.is_empty() {
         let note = "there is no aperture on the surface that it could move";
         report.amend(line, ConversionOutcome::Preserved, note);
+    } else {
+        report.amend(line, ConversionOutcome::Used, "the place of the apertures of the surface");
     }
 }
 
 /// Reports the drawn semi-diameter of a surface with an aperture, which alone clips.
-fn report_drawn(surface: &ZemaxSurface, rim: &StandIn, report: &mut ConversionReport) {
+fn report_drawn(surface: &ZemaxSurface, rim: &ForeignOutline, report: &mut ConversionReport) {
     let Some(given) = surface.semi_diameter else { return };
-    if rim.outcome != ConversionOutcome::Used {
+    if rim.centred_radius().is_none() {
         let note = "drawn in the file; the aperture of the surface clips";
         report.amend(given.line, ConversionOutcome::Preserved, note);
     }

@@ -7,6 +7,7 @@ use crate::files::zemax::file::{
     CurvatureSolve, GlassLine, OutlineLine, PickupLine, SemiDiameterLine, ZemaxFile, ZemaxSurface,
 };
 use crate::files::zemax::line::ZemaxLine;
+use crate::lens::MAX_ARMS;
 
 /// The keywords that are valid only in a surface.
 pub(super) const KEYWORDS: &[&str] = &[
@@ -59,7 +60,8 @@ pub(super) fn read(
             let (x, y) = (line.number(0)?, line.number(1)?);
             surface.aperture_offset = (x != 0.0 || y != 0.0).then_some((x, y, line.number));
         }
-        "UDAD" | "UDOB" | "SPID" => surface.other_apertures.push(line.number),
+        "SPID" => return Ok(spider(surface, line)),
+        "UDAD" | "UDOB" => surface.other_apertures.push(line.number),
         "SCBD" => return own_break(surface, line),
         _ => return Ok(read_other(line)),
     }
@@ -197,6 +199,16 @@ fn outline(surface: &mut ZemaxSurface, line: &ZemaxLine<'_>) -> LineOutcome {
     } else {
         surface.block = found;
     }
+    used()
+}
+
+/// `SPID width arms`: straight arms from the centre, the first along x.
+fn spider(surface: &mut ZemaxSurface, line: &ZemaxLine<'_>) -> LineOutcome {
+    let (width, arms) = (line.number(0).unwrap_or(0.0), line.count(1).unwrap_or(0));
+    if !(width > 0.0 && (1..=MAX_ARMS).contains(&arms)) {
+        return dropped("its arms have no width, or their number is not 1 to 32");
+    }
+    surface.spider = Some((arms, width, line.number));
     used()
 }
 

@@ -8,6 +8,7 @@ mod place;
 mod surface;
 mod table;
 
+use crate::files::outline::unwritten_aperture;
 use crate::files::report::{ConversionOutcome, ConversionReport};
 use crate::files::text::{number, numbers};
 use crate::files::zemax::INFINITE_GAP;
@@ -33,6 +34,7 @@ pub fn write(lens: &Lens) -> Result<(String, ConversionReport), LensError> {
         let (what, hint) = ("the export as .zmx", "; expected the native format (.json)");
         return Err(SystemError::Posed { surface: surface.into(), what, hint }.into());
     }
+    unwritten_aperture(lens, ".zmx", |row| surface::figure_lines(row).err())?;
     let breaks = row_breaks(lens);
     let mut export = ZemaxWriter {
         lens: lens.with_pickups()?,

@@ -7,8 +7,8 @@ use crate::files::zemax::glass as zemax_glass;
 use crate::files::zemax::gradient;
 use crate::lens::glass;
 use crate::lens::{
-    Aperture, LockedSurface, Medium, MediumPlace, Object, Parameter, Pickup, Quantity, Row,
-    SurfaceNumber,
+    Aperture, ApertureShape, LockedSurface, Medium, MediumPlace, Object, Parameter, Pickup,
+    Quantity, Row, SurfaceAperture, SurfaceNumber,
 };
 
 impl ZemaxWriter {
@@ -271,6 +271,11 @@ impl ZemaxWriter {
             lines.iter().for_each(|line| self.surface_line(line));
             return;
         }
+        if !row.apertures.is_empty() {
+            let lines = figure_lines(row).unwrap_or_default();
+            lines.into_iter().for_each(|line| self.surface_line(line));
+            return;
+        }
         let inner = row.obstruction.filter(|radius| *radius > 0.0);
         match (row.semi_diameter, inner) {
             (Some(outer), Some(inner)) => self.clap(&number(inner), outer),
@@ -281,6 +286,64 @@ impl ZemaxWriter {
     }
 
     fn clap(&mut self, inner: &str, outer: f64) {
-        self.surface_line(format!("CLAP {inner} {} 0", number(outer)));
+        self.surface_line(clap_line(inner, outer));
     }
+}
+
+fn clap_line(inner: &str, outer: f64) -> String {
+    format!("CLAP {inner} {} 0", number(outer))
+}
+
+/// The lines of the apertures of a row with some that are no circles about the vertex: an aperture, an
+/// obscuration and a spider with the same centre, none of them turned.
+///
+/// # Errors
+/// The index of the first aperture that the format cannot hold beside the others.
+pub(super) fn figure_lines(row: &Row) -> Result<Vec<String>, usize> {
+    let (mut lines, mut kinds, mut center) = (Vec::new(), Vec::new(), None);
+    if let Some(radius) = row.semi_diameter {
+        let inner = row.obstruction.map_or_else(|| "0".to_owned(), number);
+        lines.push(clap_line(&inner, radius));
+        (kinds, center) = (vec!["AP"], Some([0.0; 2]));
+    } else if let Some(radius) = row.obstruction {
+        lines.push(format!("OBSC 0 {} 0", number(radius)));
+        (kinds, center) = (vec!["OB"], Some([0.0; 2]));
+    }
+    for (k, own) in row.apertures.iter().enumerate() {
+        let (kind, line) = aperture_line(own).ok_or(k)?;
+        if kinds.contains(&kind) || center.is_some_and(|at| at != own.center) {
+            return Err(k);
+        }
+        lines.push(line);
+        kinds.push(kind);
+        center = Some(own.center);
+    }
+    if let Some([x, y]) = center.filter(|at| *at != [0.0; 2]) {
+        lines.push(format!("OBDC {} 0", numbers([x, y])));
+    }
+    Ok(lines)
+}
+
+/// The kind and the line of an aperture without its place; `None` for one that the format does not have.
+fn aperture_line(aperture: &SurfaceAperture) -> Option<(&'static str, String)> {
+    let kind = if aperture.obscures() { "OB" } else { "AP" };
+    let is_round = matches!(aperture.shape, ApertureShape::Circle { .. });
+    if aperture.angle != 0.0 && !is_round {
+        return None;
+    }
+    let line = match (&aperture.shape, aperture.obscures()) {
+        (ApertureShape::Circle { radius }, true) => format!("OBSC 0 {} 0", number(*radius)),
+        (ApertureShape::Circle { radius }, false) => format!("CLAP 0 {} 0", number(*radius)),
+        (ApertureShape::Rectangle { half_width, half_height }, _) => {
+            format!("SQ{kind} {} 0", numbers([*half_width, *half_height]))
+        }
+        (ApertureShape::Ellipse { half_width, half_height }, _) => {
+            format!("EL{kind} {} 0", numbers([*half_width, *half_height]))
+        }
+        (ApertureShape::Spider { arms, width }, _) => {
+            return Some(("SPID", format!("SPID {} {arms} 0", number(*width))));
+        }
+        (ApertureShape::Polygon { .. }, _) => return None,
+    };
+    Some((kind, line))
 }

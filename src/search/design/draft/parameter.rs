@@ -80,7 +80,8 @@ impl DraftParameter {
             SurfaceParameter::Index => model(&draft.lens, row).0,
             SurfaceParameter::SemiDiameter
             | SurfaceParameter::GrinTerm(_)
-            | SurfaceParameter::Freeform(_) => 0.0,
+            | SurfaceParameter::Freeform(_)
+            | SurfaceParameter::Aperture(_) => 0.0,
         }
     }
 
@@ -111,7 +112,8 @@ impl DraftParameter {
             SurfaceParameter::Index => surface.medium = Medium::Model { nd: value, vd },
             SurfaceParameter::SemiDiameter
             | SurfaceParameter::GrinTerm(_)
-            | SurfaceParameter::Freeform(_) => {}
+            | SurfaceParameter::Freeform(_)
+            | SurfaceParameter::Aperture(_) => {}
         }
     }
 

@@ -60,6 +60,9 @@ impl CellPlace {
         };
         match self.column.parameter(lens, zoom, surface) {
             Some(parameter) => parameter_name(parameter),
+            None if self.column == TableColumn::Apertures => {
+                format!("Apertures of surface {}", self.row)
+            }
             None if self.column == TableColumn::Comment => {
                 format!("Remark on surface {}", self.row)
             }
@@ -75,6 +78,8 @@ impl CellPlace {
             TableColumn::Glass => glass::format_medium(&row.medium),
             TableColumn::Comment => row.comment.clone(),
             TableColumn::Obstruction => row.obstruction.map(show).unwrap_or_default(),
+            TableColumn::Apertures if row.apertures.is_empty() => String::new(),
+            TableColumn::Apertures => serde_json::to_string(&row.apertures).unwrap_or_default(),
             _ => {
                 let value = self.column.parameter(lens, zoom, surface).and_then(|p| lens.get(p));
                 let radius = self.column == TableColumn::Radius;
@@ -105,6 +110,11 @@ impl CellPlace {
                 let old = lens.surfaces.get(surface).and_then(|row| row.obstruction);
                 let value = optional(text, old)?;
                 Ok(Edit::SetObstruction { surface, value })
+            }
+            TableColumn::Apertures => {
+                let text = if text.trim().is_empty() { "[]" } else { text };
+                let apertures = serde_json::from_str(text).map_err(|error| error.to_string())?;
+                Ok(Edit::SetApertures { surface, apertures })
             }
             _ => match self.column.parameter(lens, zoom, surface) {
                 Some(parameter) => number_edit(lens, parameter, text),
@@ -138,6 +148,7 @@ impl CellPlace {
             TableColumn::Glass
             | TableColumn::SemiDiameter
             | TableColumn::Obstruction
+            | TableColumn::Apertures
             | TableColumn::Comment => "",
         }
     }

@@ -19,6 +19,7 @@ pub(super) enum TableColumn {
     SemiDiameter,
     Conic,
     Obstruction,
+    Apertures,
     Asphere(usize),
     Grin(usize),
     Comment,
@@ -49,6 +50,7 @@ impl TableColumn {
             Self::SemiDiameter => "Semi-diameter",
             Self::Conic => "Conic",
             Self::Obstruction => "Obstruction",
+            Self::Apertures => "Apertures",
             Self::Asphere(term) => ASPHERE_TITLES.get(term).copied().unwrap_or("r¹⁶"),
             Self::Grin(term) => GRIN_TITLES.get(term).copied().unwrap_or("GRIN z⁴"),
             Self::Comment => "Remark",
@@ -78,6 +80,11 @@ impl TableColumn {
                 "Rays that meet the surface nearer to the axis than this are blocked, in mm: a \
                  central obstruction, or the hole of a mirror; empty for none"
             }
+            Self::Apertures => {
+                "Apertures that are no circles about the vertex, as in a lens file: \
+                 [{\"shape\": \"rectangle\", \"half_width\": 3, \"half_height\": 2}]. \
+                 Clear the cell to remove them."
+            }
             Self::Asphere(_) => "Coefficient of the even asphere, in powers of mm",
             Self::Grin(_) => "Coefficient of the gradient behind the surface, in powers of mm",
             Self::Comment => "A remark on the surface",
@@ -93,6 +100,7 @@ impl TableColumn {
             Self::Conic => Width::initial(76.0).at_least(50.0),
             Self::Obstruction => Width::initial(86.0).at_least(60.0),
             Self::Asphere(_) | Self::Grin(_) => Width::initial(112.0).at_least(60.0),
+            Self::Apertures => Width::initial(150.0).at_least(60.0).clip(true),
             Self::Comment => Width::remainder().at_least(60.0).clip(true),
         }
     }
@@ -103,7 +111,7 @@ impl TableColumn {
 
     /// True for text, which stands to the left.
     pub(super) const fn is_text(self) -> bool {
-        matches!(self, Self::Glass | Self::Comment)
+        matches!(self, Self::Glass | Self::Comment | Self::Apertures)
     }
 
     /// The number in a row of this column; `None` for text, and for what no optimizer changes.
@@ -115,7 +123,7 @@ impl TableColumn {
             Self::Conic => Quantity::Conic,
             Self::Asphere(term) => Quantity::Asphere(term),
             Self::Grin(term) => Quantity::Grin(term),
-            Self::Glass | Self::Comment | Self::Obstruction => return None,
+            Self::Glass | Self::Comment | Self::Obstruction | Self::Apertures => return None,
         };
         Some(lens.parameter_at(zoom, surface, quantity))
     }
@@ -151,6 +159,9 @@ fn needed(lens: &Lens) -> Vec<TableColumn> {
     ];
     if lens.surfaces.iter().any(|row| row.obstruction.is_some()) {
         columns.push(TableColumn::Obstruction);
+    }
+    if lens.surfaces.iter().any(|row| !row.apertures.is_empty()) {
+        columns.push(TableColumn::Apertures);
     }
     let terms = lens.surfaces.iter().map(|row| row.asphere.len()).max().unwrap_or(0);
     columns.extend((0..terms).map(TableColumn::Asphere));

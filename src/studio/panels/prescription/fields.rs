@@ -52,7 +52,7 @@ impl PrescriptionTable<'_> {
                 };
                 Some(glass::describe_medium(medium))
             }
-            (TableColumn::SemiDiameter | TableColumn::Obstruction, _) => {
+            (TableColumn::SemiDiameter | TableColumn::Obstruction | TableColumn::Apertures, _) => {
                 Some(place.column.hint().to_owned())
             }
             _ => None,

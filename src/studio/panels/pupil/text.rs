@@ -33,6 +33,12 @@ pub(super) const fn hint(limit: PupilLimit) -> &'static str {
         PupilLimit::Surface(_, RayLimit::Obstruction) => {
             "The obstruction of this surface stops rays nearer to the axis. Click to select it."
         }
+        PupilLimit::Surface(_, RayLimit::Aperture(_)) => {
+            "An aperture of this surface stops rays outside of it. Click to select the surface."
+        }
+        PupilLimit::Surface(_, RayLimit::Obscuration(_)) => {
+            "An obscuration of this surface stops rays inside of it. Click to select the surface."
+        }
         PupilLimit::Surface(_, RayLimit::Miss | RayLimit::Equator) => {
             "Rays beyond miss this surface. Click to select it."
         }
@@ -148,6 +154,8 @@ impl PupilView<'_> {
             }
             PupilLimit::Surface(i, RayLimit::Rim) => (i + 1).to_string(),
             PupilLimit::Surface(i, RayLimit::Obstruction) => format!("{} obstructs", i + 1),
+            PupilLimit::Surface(i, RayLimit::Aperture(_)) => format!("{} aperture", i + 1),
+            PupilLimit::Surface(i, RayLimit::Obscuration(_)) => format!("{} obscures", i + 1),
             PupilLimit::Surface(i, RayLimit::Miss | RayLimit::Equator) => {
                 format!("{} missed", i + 1)
             }
