@@ -205,7 +205,8 @@ pub fn energy_irradiance(
     wavelength: usize,
     accuracy: Accuracy,
 ) -> Result<Estimate, AnalysisError> {
-    if model.channels[wavelength].system.has_poses() {
+    let system = &model.channels[wavelength].system;
+    if system.has_poses() || !system.has_round_apertures() {
         return Err(AnalysisError::NotSymmetric);
     }
     let element = FieldElement { model, field, wavelength, accuracy };

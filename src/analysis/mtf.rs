@@ -234,7 +234,7 @@ impl PhaseNodes {
             };
             let is_told = order > 1 || many;
             let converged = is_told && errors.iter().all(|error| *error <= accuracy.tolerance);
-            before = Some(ConvergedList { values, errors, rays, converged });
+            before = Some(ConvergedList { values, errors, rays, orders: order, converged });
             if converged {
                 break;
             }

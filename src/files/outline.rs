@@ -26,12 +26,16 @@ pub(super) struct ForeignOutline {
 }
 
 impl ForeignOutline {
-    /// Writes the outline into a row, its lengths times `unit`.
+    /// Writes the outline into a row, its lengths times `unit`: as the rim or the obstruction if it is a circle
+    /// about the vertex and that is still free, else as a further aperture.
     pub(super) fn add_to(&self, row: &mut Row, blocks: BlockedSide, unit: f64) {
-        match (self.centred_radius(), blocks) {
-            (Some(radius), BlockedSide::Outside) => row.semi_diameter = Some(radius * unit),
-            (Some(radius), BlockedSide::Inside) => row.obstruction = Some(radius * unit),
-            (None, _) => row.apertures.push(self.figure(blocks).scaled(unit)),
+        let circle = match blocks {
+            BlockedSide::Outside => &mut row.semi_diameter,
+            BlockedSide::Inside => &mut row.obstruction,
+        };
+        match self.centred_radius().filter(|_| circle.is_none()) {
+            Some(radius) => *circle = Some(radius * unit),
+            None => row.apertures.push(self.aperture(blocks).scaled(unit)),
         }
     }
 
@@ -45,7 +49,7 @@ impl ForeignOutline {
         round || self.form == OutlineForm::Circle
     }
 
-    fn figure(&self, blocks: BlockedSide) -> SurfaceAperture {
+    fn aperture(&self, blocks: BlockedSide) -> SurfaceAperture {
         let [half_width, half_height] = self.half;
         let shape = match self.form {
             _ if self.is_circle() => ApertureShape::Circle { radius: half_width },
@@ -62,7 +66,7 @@ impl ForeignOutline {
         if self.centred_radius().is_some() {
             return String::new();
         }
-        format!("{}: traced", self.figure(blocks).text())
+        format!("{}: traced", self.aperture(blocks).text())
     }
 }
 

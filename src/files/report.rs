@@ -94,7 +94,7 @@ impl ConversionReport {
     pub(super) fn add_aperture_loss(&mut self, surface: SurfaceNumber, row: &Row) {
         if row.foreign_aperture.is_some() {
             let what = format!("aperture of surface {surface}");
-            let note = "the circle that stands for it is written, not the form of its file";
+            let note = "the apertures traced here are written, not the lines of its file";
             self.add(ConversionOutcome::Approximated, &what, note);
         }
     }

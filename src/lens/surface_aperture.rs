@@ -16,6 +16,8 @@ pub const MAX_APERTURES: usize = 16;
 pub const MAX_CORNERS: usize = 256;
 /// The largest number of arms of a spider.
 pub const MAX_ARMS: usize = 32;
+/// The largest number of corners among [`SurfaceAperture::ends`].
+const MOST_ENDS: usize = 16;
 /// The number of numbers of an aperture, see [`SurfaceAperture::numbers`].
 pub const APERTURE_NUMBERS: usize = 5;
 
@@ -313,6 +315,24 @@ impl SurfaceAperture {
             ApertureShape::Spider { .. } => Vec::new(),
         };
         own.into_iter().map(|p| self.place(p)).collect()
+    }
+
+    /// The points of its edge that are farthest from its middle, on the surface: at most sixteen corners, or the
+    /// ends of both axes; none of a spider.
+    pub fn ends(&self) -> Vec<[f64; 2]> {
+        let axes =
+            |a: f64, b: f64| [[a, 0.0], [-a, 0.0], [0.0, b], [0.0, -b]].map(|p| self.place(p));
+        match &self.shape {
+            ApertureShape::Circle { radius } => axes(*radius, *radius).into(),
+            ApertureShape::Ellipse { half_width, half_height } => {
+                axes(*half_width, *half_height).into()
+            }
+            _ => {
+                let corners = self.corners();
+                let step = corners.len().div_ceil(MOST_ENDS).max(1);
+                corners.into_iter().step_by(step).collect()
+            }
+        }
     }
 
     /// The largest distance from the vertex in mm at which it lets light through; infinite for an

@@ -337,6 +337,14 @@ fn check_index(place: MediumPlace, found: f64) -> Result<(), SystemError> {
     if found > 0.0 && found <= LARGEST { Ok(()) } else { Err(SystemError::Index { place, found }) }
 }
 
+impl Surface<f64> {
+    /// The largest distance from the vertex in mm at which light passes: the semi-diameter, or what other
+    /// apertures leave of it.
+    pub fn outer_radius(&self) -> f64 {
+        self.apertures.iter().map(SurfaceAperture::reach).fold(self.semi_diameter, f64::min)
+    }
+}
+
 impl<R: Real> System<R> {
     /// Checks that rays can be traced through the system.
     ///
@@ -388,14 +396,14 @@ impl<R: Real> System<R> {
             let is_centred = surface.pose.is_none() && surface.axis.is_none();
             let is_grating = matches!(surface.ideal, Some(IdealAction::Grating { .. }));
             let is_round = surface.freeform.as_ref().is_none_or(|form| form.kind.is_round());
-            let is_clear = surface_aperture::are_round(&surface.apertures);
+            let is_clear = surface.has_round_apertures();
             is_centred && is_round && is_clear && surface.astigmatism.is_none() && !is_grating
         })
     }
 
     /// True if all apertures are the same after any turn about the vertex of their surface.
     pub fn has_round_apertures(&self) -> bool {
-        self.surfaces.iter().all(|surface| surface_aperture::are_round(&surface.apertures))
+        self.surfaces.iter().all(Surface::has_round_apertures)
     }
 
     /// True if the axis is broken at any surface.
@@ -537,6 +545,11 @@ impl<R: Real> Surface<R> {
     /// The index profile of the gap behind the surface; `None` for a homogeneous medium.
     pub fn grin_profile(&self) -> Option<RotationalProfile<R>> {
         self.grin.map(|grade| RotationalProfile { base: self.index, coefficients: grade })
+    }
+
+    /// True if all apertures are the same after any turn about the vertex.
+    pub fn has_round_apertures(&self) -> bool {
+        surface_aperture::are_round(&self.apertures)
     }
 
     /// Removes what clips: the clear aperture, the obstruction and the other apertures.

@@ -127,7 +127,7 @@ impl Operand<'_> {
     }
 
     fn has_rim(&self, surface: usize) -> bool {
-        self.context.systems.manufactured.surfaces[surface].semi_diameter.is_finite()
+        self.context.systems.manufactured.surfaces[surface].outer_radius().is_finite()
     }
 
     /// The fields whose chief rays are asked for, without those that have no light.

@@ -265,11 +265,7 @@ impl RaySampling {
         let asked = self.demand.wavefront;
         let reference = asked.then(|| ReferenceForm::of_region(&region).ok()).flatten();
         let accuracy = Accuracy { tolerance, ..Accuracy::default() };
-        let mut orders = 0_usize;
-        let numbers = |nodes: &Nodes| {
-            orders += usize::from(!nodes.is_part);
-            self.demand.numbers(&region, nodes, reference)
-        };
+        let numbers = |nodes: &Nodes| self.demand.numbers(&region, nodes, reference);
         let found =
             converge_every_order(&region, accuracy, numbers, |list| self.demand.scales(list));
         let relative = if reference.is_some() { 2 } else { 1 };
@@ -284,6 +280,12 @@ impl RaySampling {
             }
         }
         self.transfer_error = self.transfer_error.max(transfer_error);
+        // Without light no order is better than another one, and the highest would take millions of rays.
+        let orders = match &found {
+            Some(found) => found.orders,
+            None if region.is_sampled() => 1,
+            None => region.orders(),
+        };
         let (kind, moments) = (region.kind, PupilMoments::default());
         let order = orders.saturating_sub(1);
         self.pupils.push(SampledPupil {

@@ -33,6 +33,12 @@ pub enum PictureError {
          of light are tabulated over the distance from the axis"
     )]
     NotCentred(SurfaceNumber),
+    /// The lens has an aperture that a turn about the axis changes.
+    #[error(
+        "surface {0} has an aperture that is no circle about its vertex; expected a lens without one, since \
+         the directions of light are tabulated over the distance from the axis"
+    )]
+    NotRound(SurfaceNumber),
     /// The lens forms no image on a plane behind it.
     #[error("the lens has no focal length; expected a lens that forms an image")]
     Afocal,

@@ -125,7 +125,7 @@ impl<'a> ExactRenderer<'a> {
     /// A scene seen through the lens of a model in some colours.
     ///
     /// # Errors
-    /// A lens that is not centred or cannot be traced backwards, or no light.
+    /// A lens that is not centred, has apertures that are no circles, or cannot be traced backwards, or no light.
     pub fn new(
         model: &RayModel,
         bands: &[ColorBand],
@@ -135,6 +135,9 @@ impl<'a> ExactRenderer<'a> {
         let system = &model.channels[model.primary].system;
         if let Some(surface) = system.surfaces.iter().position(Surface::is_mounted) {
             return Err(PictureError::NotCentred(SurfaceNumber::new(surface)));
+        }
+        if let Some(surface) = system.surfaces.iter().position(|own| !own.has_round_apertures()) {
+            return Err(PictureError::NotRound(SurfaceNumber::new(surface)));
         }
         let directions = LitDirections::new(model, &outer(model, bands), frame.reach(), RINGS)?;
         let sampler = TileSampler::new(model, bands, directions)?;

@@ -174,7 +174,7 @@ impl<'a> GhostScene<'a> {
         let pairs: Vec<[usize; 2]> = ranked.iter().filter_map(carried).take(MOST_PAIRS).collect();
         let path = |w: &usize, pair: &[usize; 2]| GhostPath::new(&model.channels[*w].system, *pair);
         let paths = |w: &usize| pairs.iter().map(|pair| path(w, pair)).collect::<Result<_, _>>();
-        let first = model.channels[model.primary].system.surfaces[0].semi_diameter;
+        let first = model.channels[model.primary].system.surfaces[0].outer_radius();
         let pupil = 0.5 * model.first_order.entrance_pupil.diameter.unwrap_or(0.0).abs();
         let half = filling_size(model, &frame, None)?.map(|v| AROUND * v);
         Ok(Self {

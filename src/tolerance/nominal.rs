@@ -55,10 +55,10 @@ fn other(error: &dyn std::fmt::Display) -> ToleranceError {
     ToleranceError::Other(error.to_string())
 }
 
-/// True if all fields lie on one side of the axis of a centred lens.
+/// True if all fields lie on one side of the axis of a lens that a half turn does not change.
 fn has_one_side(model: &RayModel) -> bool {
-    let centred = !model.channels[model.primary].system.has_poses();
-    centred && lie_on_one_side(&model.fields)
+    let system = &model.channels[model.primary].system;
+    !system.has_poses() && system.has_round_apertures() && lie_on_one_side(&model.fields)
 }
 
 /// A field off the axis and the one opposite to it, with half of the weight each.
@@ -125,13 +125,12 @@ impl Sampler<'_> {
     fn colour(&mut self, launch: Launch<'_>, share: f64) -> Option<ColourRays> {
         let region = Region::new(launch);
         let accuracy = Accuracy { tolerance: self.tolerance, ..Accuracy::default() };
-        let mut orders = 0_usize;
         let radius = |nodes: &Nodes| {
-            orders += 1;
             let moments = region.moments(nodes);
             (moments.area > 0.0).then(|| [moments.rms_radius()])
         };
         let found = converge(&region, accuracy, radius, |values| *values)?;
+        let orders = found.orders;
         let error = found.errors[0] / found.values[0].max(f64::MIN_POSITIVE);
         // The order before the last differs from it by the error of that, which is half of its own.
         let spared = usize::from(found.converged && 2.0 * error <= self.tolerance && orders > 2);

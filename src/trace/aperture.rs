@@ -77,7 +77,7 @@ struct SideGroup {
     rule: GroupRule,
 }
 
-/// The rule by which sides make a figure.
+/// The rule by which sides make a aperture.
 #[derive(Debug, Clone)]
 enum GroupRule {
     /// A ray passes if it is inside of every side.

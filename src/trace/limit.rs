@@ -212,8 +212,8 @@ impl<R: Real> WarpTracer<R> {
         ];
         let all = |i: usize| {
             let sides = forward.apertures.of(i).map_or(0, ApertureSet::sides);
-            let figures = (0..sides).map(|side| LimitFunction::Aperture(side as u16));
-            kinds.into_iter().chain(figures).map(move |limit| (i, limit)).collect::<Vec<_>>()
+            let apertures = (0..sides).map(|side| LimitFunction::Aperture(side as u16));
+            kinds.into_iter().chain(apertures).map(move |limit| (i, limit)).collect::<Vec<_>>()
         };
         let limits = (0..forward.surfaces()).flat_map(all);
         let limits = limits.filter(|(i, limit)| forward.interfaces[*i].has(*limit)).collect();

@@ -216,6 +216,15 @@ impl<R: Real> SystemGradient<R> {
         fixed.numbers().collect()
     }
 
+    /// The kinds of numbers by which there are derivatives.
+    pub fn kinds(&self) -> impl Iterator<Item = SurfaceParameter> + use<R> {
+        let apertures = self.surfaces.iter().map(|own| own.apertures.len()).max().unwrap_or(0);
+        // Those of apertures come last.
+        SurfaceParameter::all().take_while(
+            move |kind| !matches!(kind, SurfaceParameter::Aperture(k) if *k >= apertures),
+        )
+    }
+
     /// The derivatives by the numbers of one kind, surface by surface; the index of object space is
     /// the first of the indices.
     pub fn of_kind(&self, parameter: SurfaceParameter) -> impl Iterator<Item = R> {

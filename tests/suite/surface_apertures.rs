@@ -139,11 +139,6 @@ fn areas_of_apertures_are_those_of_plane_figures() {
         ("obscurations of no size", vec![block(circle(0.0)), block(rectangle(0.0, 3.0))], disc()),
     ];
     for (name, apertures, area) in cases {
-        if let Ok(only) = std::env::var("ONLY") {
-            if only != name {
-                continue;
-            }
-        }
         let lens = lens(&apertures);
         for field in [0.0, 8.0] {
             let found = light(&lens, field, 1e-9);

@@ -84,6 +84,7 @@ fn diffraction_mtf_unless(
         values: flatten(frequencies, &values, offset),
         errors: values.iter().flatten().flat_map(|v| [v.modulus.error, 0.0]).collect(),
         rays: function.rays(),
+        orders: 1,
         converged: limit.is_none(),
     };
     Ok(curve(frequencies, origin, &list, limit))

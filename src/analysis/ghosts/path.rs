@@ -149,7 +149,7 @@ impl GhostPath {
     fn clip_factor(&self, heights: &[f64], radius: f64) -> (f64, Option<usize>) {
         let mut least = (1.0, None);
         for (k, step) in self.steps.iter().enumerate().take(self.steps.len() - 1) {
-            let factor = self.system.surfaces[k].semi_diameter / (heights[k] * radius).abs();
+            let factor = self.system.surfaces[k].outer_radius() / (heights[k] * radius).abs();
             if factor < least.0 {
                 least = (factor, Some(*step));
             }

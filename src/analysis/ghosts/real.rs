@@ -48,7 +48,7 @@ impl ArrivingBeam {
         count: usize,
     ) -> Self {
         let channel = &model.channels[wavelength];
-        let first = channel.system.surfaces[0].semi_diameter;
+        let first = channel.system.surfaces[0].outer_radius();
         let pupil = 0.5 * model.first_order.entrance_pupil.diameter.unwrap_or(0.0).abs();
         let reach = if first.is_finite() { first } else { pupil };
         let side = (count as f64 * 8.0 / TAU).sqrt().ceil().max(2.0) as usize;

@@ -4,7 +4,7 @@
 use super::number;
 use crate::files::outline::{ForeignOutline, OutlineForm};
 use crate::files::report::{ConversionOutcome, ConversionReport};
-use crate::lens::{ApertureShape, BlockedSide, Row, SurfaceAperture};
+use crate::lens::{ApertureShape, BlockedSide, MAX_APERTURES, Row, SurfaceAperture};
 use serde_json::{Value, json};
 
 /// A radius from which on nothing is clipped, in mm.
@@ -50,16 +50,20 @@ fn add(row: &mut Row, aperture: &Value, blocks: BlockedSide, depth: usize) -> Re
             Ok(())
         }
         "RectangularAperture" => {
-            let [x_min, x_max, y_min, y_max] =
-                ["x_min", "x_max", "y_min", "y_max"].map(|key| number(&aperture[key]));
+            // An infinite number is null.
+            let sides = ["x_min", "x_max", "y_min", "y_max"].map(|key| aperture[key].as_f64());
+            let [Some(x_min), Some(x_max), Some(y_min), Some(y_max)] = sides else {
+                let is_open = sides.iter().all(Option::is_none);
+                return if is_open { Ok(()) } else { refused() };
+            };
             let half = [0.5 * (x_max - x_min), 0.5 * (y_max - y_min)];
             let middle = [0.5 * (x_min + x_max), 0.5 * (y_min + y_max)];
-            place(row, &outline(OutlineForm::Rectangle, half, middle), blocks);
+            outline(OutlineForm::Rectangle, half, middle).add_to(row, blocks, 1.0);
             Ok(())
         }
         "EllipticalAperture" => {
             let half = ["a", "b"].map(|key| number(&aperture[key]));
-            place(row, &outline(OutlineForm::Ellipse, half, offset), blocks);
+            outline(OutlineForm::Ellipse, half, offset).add_to(row, blocks, 1.0);
             Ok(())
         }
         "PolygonAperture" => {
@@ -96,10 +100,10 @@ fn add_ring(row: &mut Row, [outer, inner]: [f64; 2], offset: [f64; 2], blocks: B
         angle: 0.0,
     };
     if inner > 0.0 {
-        place(row, &circle(inner), BlockedSide::Inside);
+        circle(inner).add_to(row, BlockedSide::Inside, 1.0);
     }
     if outer > 0.0 && outer < WIDE {
-        place(row, &circle(outer), blocks);
+        circle(outer).add_to(row, blocks, 1.0);
     }
 }
 
@@ -110,22 +114,6 @@ fn polygon(aperture: &Value) -> SurfaceAperture {
     };
     let points = column("x").into_iter().zip(column("y")).map(|(x, y)| [x, y]).collect();
     SurfaceAperture::inside(ApertureShape::Polygon { points })
-}
-
-/// Adds an outline: as the rim or the obstruction if that is still free, else as a further aperture.
-fn place(row: &mut Row, outline: &ForeignOutline, blocks: BlockedSide) {
-    let taken = match blocks {
-        BlockedSide::Outside => row.semi_diameter.is_some(),
-        BlockedSide::Inside => row.obstruction.is_some(),
-    };
-    let is_circle = outline.centred_radius().filter(|_| taken);
-    match is_circle {
-        Some(radius) => {
-            let shape = ApertureShape::Circle { radius };
-            row.apertures.push(SurfaceAperture { blocks, ..SurfaceAperture::inside(shape) });
-        }
-        None => outline.add_to(row, blocks, 1.0),
-    }
 }
 
 /// The aperture of a row; `null` for a surface that clips nothing. `stop` is the radius of the stop where
@@ -139,7 +127,7 @@ pub(super) fn write(row: &Row, stop: Option<f64>, infinite: &str) -> Value {
         whole = json!({"type": "RadialAperture", "r_max": outer, "r_min": inner.unwrap_or(0.0)});
     }
     for own in &row.apertures {
-        for part in figures(own) {
+        for part in parts(own) {
             whole = match (whole, own.obscures()) {
                 (Value::Null, false) => part,
                 (before, false) => json!({"type": "IntersectionAperture", "a": before, "b": part}),
@@ -156,11 +144,11 @@ pub(super) fn write(row: &Row, stop: Option<f64>, infinite: &str) -> Value {
 
 /// True for an aperture that the format has.
 pub(super) fn is_writable(own: &SurfaceAperture) -> bool {
-    !figures(own).is_empty()
+    (1..=MAX_APERTURES).contains(&parts(own).len())
 }
 
-/// The figures whose union is an aperture; none for one that the format does not have.
-fn figures(own: &SurfaceAperture) -> Vec<Value> {
+/// The apertures whose union is an aperture; none for one that the format does not have.
+fn parts(own: &SurfaceAperture) -> Vec<Value> {
     let [x, y] = own.center;
     let polygon = |corners: &[[f64; 2]]| {
         let column = |k: usize| corners.iter().map(|p| p[k]).collect::<Vec<f64>>();

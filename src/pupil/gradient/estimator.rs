@@ -343,7 +343,7 @@ impl PupilDerivative {
         };
         let change = self.gradient.zip_with(&before.gradient, |a, b| CHANGES * (a - b).abs());
         self.error = self.error.zip_with(&change, |a, b| a + b);
-        for slot in SurfaceParameter::all() {
+        for slot in self.error.kinds() {
             let worst = order_error(self.error.largest(slot), before.error.largest(slot));
             let largest = self.gradient.largest(slot);
             let share = if largest > 0.0 { (worst / largest).min(1.0) } else { 0.0 };
@@ -373,7 +373,7 @@ impl PupilDerivative {
     /// Sets the kinds of numbers to zero on which the integral depends by no more than rounding.
     fn drop_rounding(&mut self, rounding: f64, natural: impl Fn(SurfaceParameter) -> f64) {
         let Self { gradient: by, error, .. } = self;
-        for slot in SurfaceParameter::all() {
+        for slot in by.kinds() {
             if by.largest(slot) > rounding * natural(slot) {
                 continue;
             }

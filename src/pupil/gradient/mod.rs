@@ -115,7 +115,7 @@ impl PupilDerivative {
             let scale = self.gradient.largest(slot).max(floor(slot));
             if error == 0.0 { 0.0 } else { error / (tolerance * scale) }
         };
-        SurfaceParameter::all().map(excess).fold(0.0, f64::max)
+        self.error.kinds().map(excess).fold(0.0, f64::max)
     }
 }
 

@@ -1,7 +1,7 @@
 //! Points of surfaces that are blocked for certain, against a pupil that is taken for lit there.
 //!
 //! A coarse grid of rays does not see a thin obscuration, such as the arm of a spider, and the edge of a pupil
-//! that is searched for along radii may jump over it. The figures of a lens are known, however: points along
+//! that is searched for along radii may jump over it. The apertures of a lens are known, however: points along
 //! the edges of each, a little on the blocked side, must lie outside the footprint of the pupil on their
 //! surface. If one lies inside, the pupil has not the form that was found.
 
@@ -13,7 +13,7 @@ use crate::pupil::launch::Launch;
 
 /// The points along each straight side, and around an oval.
 const ON_SIDE: usize = 12;
-const ON_OVAL: usize = 16;
+const ON_OVAL: usize = 48;
 /// The distance of points from an edge, in sizes of the footprint; the part of an oval that they lie on.
 const INSET: f64 = 1e-3;
 const OVAL_PART: f64 = 0.8;
@@ -24,9 +24,9 @@ const LONGEST: f64 = 30.0;
 /// A closed polygon, of pupil points or of points of a surface.
 pub(super) type ClosedCurve = Vec<[f64; 2]>;
 
-/// The surfaces with figures that may hide in a pupil, and their figures.
+/// The surfaces with apertures that may hide in a pupil, and their apertures.
 pub(super) struct DarkPoints {
-    figures: Vec<(usize, Vec<SurfaceAperture>)>,
+    apertures: Vec<(usize, Vec<SurfaceAperture>)>,
 }
 
 impl DarkPoints {
@@ -38,12 +38,12 @@ impl DarkPoints {
             let own: Vec<_> = surface.apertures.iter().filter(hides).cloned().collect();
             (!own.is_empty()).then_some((i, own))
         };
-        Self { figures: system.surfaces.iter().enumerate().filter_map(of_surface).collect() }
+        Self { apertures: system.surfaces.iter().enumerate().filter_map(of_surface).collect() }
     }
 
-    /// True if the lens has no such figures.
+    /// True if the lens has no such apertures.
     pub(super) fn is_empty(&self) -> bool {
-        self.figures.is_empty()
+        self.apertures.is_empty()
     }
 
     /// True if a pupil may be star-shaped with this edge.
@@ -69,12 +69,12 @@ impl DarkPoints {
         light: &ClosedCurve,
         shadow: Option<&ClosedCurve>,
     ) -> bool {
-        self.figures.iter().any(|(surface, figures)| {
+        self.apertures.iter().any(|(surface, apertures)| {
             let footprint = footprint(launch, *surface, light);
             let hole = shadow.map(|shadow| footprint_of(launch, *surface, shadow));
             let Some(footprint) = footprint else { return true };
             let tracer = &launch.channel().tracer;
-            let blocked = figures.iter().flat_map(|figure| points(figure, &footprint));
+            let blocked = apertures.iter().flat_map(|aperture| points(aperture, &footprint));
             blocked.filter(|p| !tracer.passes_apertures(*surface, *p)).any(|p| {
                 let in_hole = hole.as_ref().is_some_and(|hole| contains(hole, p));
                 contains(&footprint, p) && !in_hole
@@ -122,38 +122,42 @@ fn contains(polygon: &[[f64; 2]], [x, y]: [f64; 2]) -> bool {
 }
 
 /// The smallest rectangle around points, as its lowest and highest corner.
-fn bounds(points: &[[f64; 2]]) -> [[f64; 2]; 2] {
+pub(super) fn bounds(points: impl IntoIterator<Item = [f64; 2]>) -> [[f64; 2]; 2] {
     let start = [[f64::INFINITY; 2], [f64::NEG_INFINITY; 2]];
-    points.iter().fold(start, |[low, high], p| {
+    points.into_iter().fold(start, |[low, high], p| {
         [[0, 1].map(|k| low[k].min(p[k])), [0, 1].map(|k| high[k].max(p[k]))]
     })
 }
 
-/// Points near the edge of a figure, on both sides of it, as far as the footprint reaches.
-fn points(figure: &SurfaceAperture, footprint: &[[f64; 2]]) -> Vec<[f64; 2]> {
-    let [low, high] = bounds(footprint);
+/// Points near the edge of a aperture, on both sides of it, as far as the footprint reaches.
+fn points(aperture: &SurfaceAperture, footprint: &[[f64; 2]]) -> Vec<[f64; 2]> {
+    let [low, high] = bounds(footprint.iter().copied());
     let size = (high[0] - low[0]).max(high[1] - low[1]);
     let oval = |a: f64, b: f64| {
-        let place = |i: usize| {
+        let place = |part: f64, i: usize| {
             let (sin, cos) = (std::f64::consts::TAU * i as f64 / ON_OVAL as f64).sin_cos();
-            figure.place([OVAL_PART * a * cos, OVAL_PART * b * sin])
+            aperture.place([part * a * cos, part * b * sin])
         };
-        (0..ON_OVAL).map(place).chain([figure.center]).collect()
+        // Just inside the edge, where it first reaches into the light, and deeper.
+        let near = 1.0 - (INSET * size / a.min(b)).min(1.0 - OVAL_PART);
+        let rings = [OVAL_PART, near].into_iter();
+        let points = rings.flat_map(|part| (0..ON_OVAL).map(move |i| place(part, i)));
+        points.chain([aperture.center]).collect()
     };
-    match &figure.shape {
+    match &aperture.shape {
         ApertureShape::Circle { radius } => oval(*radius, *radius),
         ApertureShape::Ellipse { half_width, half_height } => oval(*half_width, *half_height),
         ApertureShape::Rectangle { half_width, half_height } => {
-            along_sides(&figure.corners(), half_width.min(*half_height), [low, high], size)
+            along_sides(&aperture.corners(), half_width.min(*half_height), [low, high], size)
         }
-        ApertureShape::Polygon { .. } => along_sides(&figure.corners(), size, [low, high], size),
+        ApertureShape::Polygon { .. } => along_sides(&aperture.corners(), size, [low, high], size),
         ApertureShape::Spider { arms, width } => {
-            let [x, y] = figure.center;
+            let [x, y] = aperture.center;
             let away = (low[0] - x).abs().max((high[0] - x).abs());
             let length = size + away + (low[1] - y).abs().max((high[1] - y).abs());
             let arm = |k: usize| {
-                let angle = figure.angle + 360.0 * k as f64 / *arms as f64;
-                let turned = SurfaceAperture { angle, ..figure.clone() };
+                let angle = aperture.angle + 360.0 * k as f64 / *arms as f64;
+                let turned = SurfaceAperture { angle, ..aperture.clone() };
                 let half = 0.5 * width;
                 let corners = [[0.0, half], [0.0, -half], [length, -half], [length, half]];
                 let corners = corners.map(|p| turned.place(p));
@@ -179,7 +183,7 @@ fn along_sides(corners: &[[f64; 2]], half: f64, within: [[f64; 2]; 2], size: f64
         let along = edge.map(|v| v / length);
         let Some([from, to]) = inside_share(*a, edge, within) else { continue };
         let shares = (0..ON_SIDE).map(|k| from + (to - from) * (k as f64 + 0.5) / ON_SIDE as f64);
-        // Close to the corners too, where a figure reaches into the light first.
+        // Close to the corners too, where a aperture reaches into the light first.
         let corner = (inset / length).min(0.5);
         for share in shares.chain([corner, 1.0 - corner]) {
             for side in [inset, -inset] {

@@ -2,7 +2,7 @@
 
 use super::annulus::Annulus;
 use super::boundary::{Boundary, EdgePoint, PolarFrame};
-use super::dark_points::DarkPoints;
+use super::dark_points::{DarkPoints, bounds};
 use super::edge_search::{EdgeSearch, GUESS_SPREAD, LimitFilter};
 use super::kind::RegionKind;
 use crate::pupil::launch::Launch;
@@ -36,6 +36,24 @@ impl Launch<'_> {
         traced.iter().enumerate().for_each(|(ray, i)| lit[*i] = landed.fate(ray).is_imaged());
         lit
     }
+}
+
+/// The factor by which a square is larger than the points that it has to hold.
+const MARGIN: f64 = 1.1;
+
+/// A square around light, or a wider one if light gets through outside of it in an aperture that is no circle
+/// about the vertex: a narrow slit may be lit far from the few cells of a grid that meet it.
+fn widened_to_frames(launch: &Launch<'_>, (center, half): ([f64; 2], f64)) -> ([f64; 2], f64) {
+    let is_within = |p: &[f64; 2]| (0..2).all(|k| (p[k] - center[k]).abs() <= half);
+    let outside = launch.frame_points().into_iter().filter(|p| !is_within(p));
+    let lit: Vec<_> = outside.filter(|p| launch.transmits(*p)).collect();
+    if lit.is_empty() {
+        return (center, half);
+    }
+    let ends = [-1.0, 1.0].map(|side| center.map(|at| at + side * half));
+    let [low, high] = bounds(lit.into_iter().chain(ends));
+    let size = (high[0] - low[0]).max(high[1] - low[1]);
+    ([0, 1].map(|k| 0.5 * (low[k] + high[k])), 0.5 * MARGIN * size)
 }
 
 /// A coarse grid of rays over a square of the pupil plane, each lit or dark.
@@ -198,7 +216,7 @@ impl LightGrid {
         let pieces = if annulus.is_some() { 1 } else { pieces };
         RegionKind::Irregular {
             pieces,
-            square: self.bounding_square(),
+            square: widened_to_frames(launch, self.bounding_square()),
             annulus: annulus.map(Box::new),
         }
     }

@@ -17,9 +17,6 @@ pub struct Nodes {
     pub mirrored: bool,
     /// The number of rays traced to find them.
     pub rays: usize,
-    /// True for a part of the points of an order, by itself an estimate: the scatter of such parts tells the
-    /// error of the whole.
-    pub is_part: bool,
 }
 
 /// A radius of a pupil with a boundary, from the centre of its frame to its edge.
@@ -139,11 +136,11 @@ pub(super) fn irregular_nodes((center, half): ([f64; 2], f64), count: usize, rea
     Nodes { weights: vec![weight; points.len()], points, ..Nodes::default() }
 }
 
-/// The number of independent parts that a pupil behind figures is sampled in.
+/// The number of independent parts that a pupil behind apertures is sampled in.
 pub(super) const PARTS: usize = 8;
 
 /// Points of a square, one at random in each of `cells` × `cells` equal cells, by a seed. Unlike those of a
-/// sequence they have no pattern that a thin straight figure could be in step with, so that independent parts
+/// sequence they have no pattern that a thin straight aperture could be in step with, so that independent parts
 /// scatter as much as each of them errs. Points farther out than `reach` are omitted.
 pub(super) fn jittered_nodes(
     (center, half): ([f64; 2], f64),
@@ -159,7 +156,7 @@ pub(super) fn jittered_nodes(
     let placed = all.into_iter().map(|[x, y]| [center[0] + x, center[1] + y]);
     let points: Vec<_> = placed.filter(|p| p[0].hypot(p[1]) <= reach).collect();
     let weights = vec![size * size; points.len()];
-    Nodes { weights, points, is_part: true, ..Nodes::default() }
+    Nodes { weights, points, ..Nodes::default() }
 }
 
 /// The points of independent parts together.

@@ -8,6 +8,7 @@ use super::dark_points::DarkPoints;
 use super::edge_search::margin_minima;
 use super::kind::{Region, RegionKind};
 use super::light_grid::LightGrid;
+use crate::lens::SurfaceAperture;
 use crate::pupil::launch::Launch;
 use std::f64::consts::{PI, TAU};
 
@@ -15,6 +16,10 @@ use std::f64::consts::{PI, TAU};
 const RIM_RAYS: usize = 16;
 /// The number of points of the rim that blocked points of surfaces are compared with.
 const RIM_CURVE: usize = 256;
+/// The points between the middle of an aperture and each of its ends at which light is looked for.
+const FRAME_STEPS: usize = 16;
+/// The part of a step that the last point stays away from the end, so that rounding does not block it.
+const ROUNDED: f64 = 1e-6;
 
 impl<'a> Region<'a> {
     /// The region of a launch, searched for unless the model remembers it.
@@ -66,23 +71,43 @@ impl Launch<'_> {
         let surfaces = || self.channel().system.surfaces.iter().enumerate();
         let obstructed = surfaces().filter(|(_, surface)| surface.obstruction > 0.0);
         let circles = obstructed.map(|(i, _)| self.through_point(i, [0.0; 2]));
-        let figures = surfaces().flat_map(|(i, surface)| {
+        let apertures = surfaces().flat_map(|(i, surface)| {
             let own = surface.apertures.iter();
             own.filter(|own| own.obscures()).map(move |own| (i, own.middle()))
         });
-        let middles = figures.filter_map(|(i, middle)| self.through_point(i, middle));
-        // The middle of a figure may lie outside of it.
+        let middles = apertures.filter_map(|(i, middle)| self.through_point(i, middle));
+        // The middle of a aperture may lie outside of it.
         circles.chain(middles.filter(|p| !self.transmits(*p)).map(Some)).collect()
     }
 
     /// The pupil points of the rays through the centres of all apertures that are no circles about a vertex.
     pub(super) fn frame_centers(&self) -> Vec<[f64; 2]> {
+        let centers = self.frames().map(|(i, frame)| (i, frame.middle()));
+        centers.filter_map(|(i, middle)| self.through_point(i, middle)).collect()
+    }
+
+    /// The pupil points of rays through points of these apertures, from the middle to the ends of each.
+    pub(super) fn frame_points(&self) -> Vec<[f64; 2]> {
+        let along = |(i, frame): (usize, &SurfaceAperture)| {
+            let middle = frame.middle();
+            let ends = frame.ends();
+            let part = |k: usize| (k as f64 - ROUNDED) / FRAME_STEPS as f64;
+            let parts = move |end: [f64; 2]| {
+                let at = move |t: f64| [0, 1].map(|k| middle[k] + t * (end[k] - middle[k]));
+                (1..=FRAME_STEPS).map(move |k| at(part(k)))
+            };
+            let points: Vec<_> = ends.into_iter().flat_map(parts).collect();
+            points.into_iter().filter_map(move |p| self.through_point(i, p)).collect::<Vec<_>>()
+        };
+        self.frames().flat_map(along).collect()
+    }
+
+    /// The apertures of the lens that are no circles about a vertex and let light through inside.
+    fn frames(&self) -> impl Iterator<Item = (usize, &SurfaceAperture)> {
         let surfaces = self.channel().system.surfaces.iter().enumerate();
-        let frames = surfaces.flat_map(|(i, surface)| {
-            let own = surface.apertures.iter();
-            own.filter(|own| !own.obscures()).map(move |own| (i, own.middle()))
-        });
-        frames.filter_map(|(i, middle)| self.through_point(i, middle)).collect()
+        surfaces.flat_map(|(i, surface)| {
+            surface.apertures.iter().filter(|own| !own.obscures()).map(move |own| (i, own))
+        })
     }
 
     /// True if the whole disc gets through, judged by the margins of rays at its rim, at the minima
@@ -112,11 +137,12 @@ impl Launch<'_> {
         let passes = |p: [f64; 2]| self.margins_if_passing(p).is_some();
         *rays += shadows.len();
         let dark = DarkPoints::of(&self.channel().system);
-        let rim: Vec<_> =
-            (0..RIM_CURVE).map(|i| rim_point(TAU * i as f64 / RIM_CURVE as f64)).collect();
+        let rim = || -> Vec<[f64; 2]> {
+            (0..RIM_CURVE).map(|i| rim_point(TAU * i as f64 / RIM_CURVE as f64)).collect()
+        };
         passes([0.0, 0.0])
             && passes_dips
-            && (dark.is_empty() || !dark.are_lit(self, &rim, None))
+            && (dark.is_empty() || !dark.are_lit(self, &rim(), None))
             && shadows.iter().all(|shadow| shadow.is_some_and(|p| passes(nearest_in_disc(p))))
     }
 }

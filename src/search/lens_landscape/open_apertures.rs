@@ -38,6 +38,7 @@ fn is_diaphragm(lens: &Lens, i: usize) -> bool {
     inside
         && row.curvature == 0.0
         && row.asphere.is_empty()
+        && row.apertures.is_empty()
         && row.medium == lens.surfaces[i - 1].medium
         && row.medium != Medium::Mirror
         && !matches!(&row.medium, Medium::Grin(gradient) if gradient.is_axial())

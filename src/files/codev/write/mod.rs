@@ -61,7 +61,7 @@ pub fn write(lens: &Lens) -> Result<(String, ConversionReport), LensError> {
         return Err(SystemError::Posed { surface: surface.into(), what, hint }.into());
     }
     let is_stop = |row: &Row| row.stop && matches!(lens.aperture, Aperture::StopSemiDiameter(_));
-    unwritten_aperture(lens, ".seq", |row| surface::figure_lines(row, is_stop(row)).err())?;
+    unwritten_aperture(lens, ".seq", |row| surface::aperture_lines(row, is_stop(row)).err())?;
     let (lens, report) = (lens.with_pickups()?, ConversionReport::default());
     let mut writer = CodeVWriter { lens, text: String::new(), report };
     writer.solve_focus();

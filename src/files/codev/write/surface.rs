@@ -79,7 +79,7 @@ impl CodeVWriter {
         if let Some(inner) = row.obstruction.filter(|inner| *inner > 0.0) {
             self.line(format!("  CIR OBS {}", number(inner)));
         }
-        let lines = figure_lines(row, stop.is_some()).unwrap_or_default();
+        let lines = aperture_lines(row, stop.is_some()).unwrap_or_default();
         lines.into_iter().for_each(|line| self.line(format!("  {line}")));
     }
 
@@ -287,7 +287,7 @@ fn fictitious(nd: f64, vd: f64) -> Option<String> {
 ///
 /// # Errors
 /// The index of the first aperture that the format cannot hold beside the others.
-pub(super) fn figure_lines(row: &Row, is_stop: bool) -> Result<Vec<String>, usize> {
+pub(super) fn aperture_lines(row: &Row, is_stop: bool) -> Result<Vec<String>, usize> {
     let has_circle = is_stop || row.semi_diameter.is_some() || row.obstruction.is_some();
     let mut place = has_circle.then_some(([0.0; 2], None));
     let (mut lines, mut kinds) = (Vec::new(), Vec::new());

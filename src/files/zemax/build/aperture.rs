@@ -15,15 +15,16 @@ pub(super) fn apply(
 ) {
     let surface = &file.surfaces[number];
     let (outside, inside) = (BlockedSide::Outside, BlockedSide::Inside);
-    let rim = outline(surface, surface.clip, surface.outline).map(|found| (found, outside));
-    let block = outline(surface, surface.obstruction, surface.block).map(|found| (found, inside));
-    for ((found, line), blocks) in rim.iter().chain(&block) {
-        found.add_to(row, *blocks, file.unit);
-        report.amend(*line, ConversionOutcome::Used, found.note(*blocks));
+    let rims = outlines(surface, surface.clip, surface.outline);
+    let holes = outlines(surface, surface.obstruction, surface.block);
+    let own = rims.iter().map(|own| (own, outside)).chain(holes.iter().map(|own| (own, inside)));
+    for ((found, line), blocks) in own {
+        found.add_to(row, blocks, file.unit);
+        report.amend(*line, ConversionOutcome::Used, found.note(blocks));
     }
     spider(surface, file.unit, row, report);
     report_offset(surface, row, report);
-    if let Some(((found, _), _)) = &rim {
+    if let Some((found, _)) = rims.first() {
         report_drawn(surface, found, report);
     } else {
         let outer = drawn(file, number, stop, report);
@@ -39,9 +40,9 @@ fn spider(surface: &ZemaxSurface, unit: f64, row: &mut Row, report: &mut Convers
     let Some((arms, width, line)) = surface.spider else { return };
     let center = offset(surface);
     let shape = ApertureShape::Spider { arms, width };
-    let figure = SurfaceAperture { center, ..SurfaceAperture::obscuration(shape) };
-    report.amend(line, ConversionOutcome::Used, format!("{}: traced", figure.text()));
-    row.apertures.push(figure.scaled(unit));
+    let aperture = SurfaceAperture { center, ..SurfaceAperture::obscuration(shape) };
+    report.amend(line, ConversionOutcome::Used, format!("{}: traced", aperture.text()));
+    row.apertures.push(aperture.scaled(unit));
 }
 
 /// The keywords of apertures and obscurations.
@@ -69,16 +70,17 @@ fn offset(surface: &ZemaxSurface) -> [f64; 2] {
     surface.aperture_offset.map_or([0.0; 2], |(x, y, _)| [x, y])
 }
 
-/// An aperture or an obscuration with its line: a circular one, else one of another form.
-fn outline(
+/// The apertures or the obscurations, each with its line: a circular one and one of another form.
+fn outlines(
     surface: &ZemaxSurface,
     circle: Option<(f64, usize)>,
     other: Option<OutlineLine>,
-) -> Option<(ForeignOutline, usize)> {
+) -> Vec<(ForeignOutline, usize)> {
     let offset = offset(surface);
     let plain = |form, half| ForeignOutline { form, half, offset, angle: 0.0 };
     let circle = circle.map(|(radius, line)| (plain(OutlineForm::Circle, [radius; 2]), line));
-    circle.or_else(|| other.map(|OutlineLine { form, half, line }| (plain(form, half), line)))
+    let other = other.map(|OutlineLine { form, half, line }| (plain(form, half), line));
+    circle.into_iter().chain(other).collect()
 }
 
 /// Reports the displacement of the apertures.

@@ -34,7 +34,7 @@ pub fn write(lens: &Lens) -> Result<(String, ConversionReport), LensError> {
         let (what, hint) = ("the export as .zmx", "; expected the native format (.json)");
         return Err(SystemError::Posed { surface: surface.into(), what, hint }.into());
     }
-    unwritten_aperture(lens, ".zmx", |row| surface::figure_lines(row).err())?;
+    unwritten_aperture(lens, ".zmx", |row| surface::aperture_lines(row).err())?;
     let breaks = row_breaks(lens);
     let mut export = ZemaxWriter {
         lens: lens.with_pickups()?,

@@ -272,7 +272,7 @@ impl ZemaxWriter {
             return;
         }
         if !row.apertures.is_empty() {
-            let lines = figure_lines(row).unwrap_or_default();
+            let lines = aperture_lines(row).unwrap_or_default();
             lines.into_iter().for_each(|line| self.surface_line(line));
             return;
         }
@@ -299,12 +299,14 @@ fn clap_line(inner: &str, outer: f64) -> String {
 ///
 /// # Errors
 /// The index of the first aperture that the format cannot hold beside the others.
-pub(super) fn figure_lines(row: &Row) -> Result<Vec<String>, usize> {
+pub(super) fn aperture_lines(row: &Row) -> Result<Vec<String>, usize> {
     let (mut lines, mut kinds, mut center) = (Vec::new(), Vec::new(), None);
     if let Some(radius) = row.semi_diameter {
         let inner = row.obstruction.map_or_else(|| "0".to_owned(), number);
         lines.push(clap_line(&inner, radius));
-        (kinds, center) = (vec!["AP"], Some([0.0; 2]));
+        // A hole in the circle is an obscuration too.
+        kinds = if row.obstruction.is_some() { vec!["AP", "OB"] } else { vec!["AP"] };
+        center = Some([0.0; 2]);
     } else if let Some(radius) = row.obstruction {
         lines.push(format!("OBSC 0 {} 0", number(radius)));
         (kinds, center) = (vec!["OB"], Some([0.0; 2]));
