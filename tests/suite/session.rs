@@ -5,9 +5,9 @@ use aplanat::effects::{Effect, EffectOverride};
 use aplanat::experiments::{self, Effort, Experiment};
 use aplanat::files;
 use aplanat::lens::{
-    Aperture, Edit, ElementEdit, FieldKind, FieldPoint, Fields, Lens, Medium, Object, Parameter,
-    ParameterKind, Pickup, Quantity, Row, ToleranceSheet, Variable, ZoomNumber, ZoomPosition,
-    add_variables,
+    Aperture, ApertureShape, Edit, ElementEdit, FieldKind, FieldPoint, Fields, Lens, Medium,
+    Object, Parameter, ParameterKind, Pickup, Quantity, Row, SurfaceAperture, ToleranceSheet,
+    Variable, ZoomNumber, ZoomPosition, add_variables,
 };
 use aplanat::merit::{Goal, LimitTreatment, MeritError, PupilEdge, Term, TermValue, WeightedTerm};
 use aplanat::optimize::{DescentMethod, OptimizationProgress, Optimizer};
@@ -199,6 +199,10 @@ fn every_edit(lens: &Lens) -> Vec<Edit> {
             focus_travel: Some(0.2),
             ..ToleranceSheet::default()
         })),
+        Edit::SetApertures {
+            surface: 0,
+            apertures: vec![SurfaceAperture::inside(ApertureShape::Circle { radius: 3.0 })],
+        },
     ]
 }
 
@@ -240,6 +244,7 @@ fn kind(edit: &Edit) -> usize {
         Edit::Sequence { .. } => 32,
         Edit::SetObstruction { .. } => 33,
         Edit::SetTolerances(_) => 34,
+        Edit::SetApertures { .. } => 35,
     }
 }
 
@@ -247,7 +252,7 @@ fn kind(edit: &Edit) -> usize {
 fn every_kind_of_edit_is_undone_and_redone_exactly() {
     let mut session = session(double_gauss());
     let edits = every_edit(session.lens());
-    assert_eq!(edits.iter().map(kind).collect::<Vec<_>>(), (0..35).collect::<Vec<_>>());
+    assert_eq!(edits.iter().map(kind).collect::<Vec<_>>(), (0..36).collect::<Vec<_>>());
     let mut lenses = vec![Arc::clone(session.lens())];
     for edit in edits {
         let events = session.apply(edit.clone().into());
