@@ -714,6 +714,14 @@ fn a_dropped_lens_is_opened_and_remembered_and_another_file_refused_by_name() {
     drop_file(&mut harness, text);
     harness.get_by_label_contains("`letter.txt` is none of the files");
     press(&mut harness, "OK");
+    // Of many files at once, each that is refused is named.
+    for name in ["letter.txt", "picture.png", "achromat.json"] {
+        harness.input_mut().dropped_files.push(Arc::new(Dropped(folder.join(name))));
+    }
+    harness.run_steps(3);
+    harness.get_by_label_contains("`letter.txt` is none of the files");
+    harness.get_by_label_contains("`picture.png` is a picture");
+    press(&mut harness, "OK");
     let glasses = folder.join("glasses.agf");
     std::fs::write(&glasses, b"no glass").unwrap();
     drop_file(&mut harness, glasses);

@@ -9,6 +9,7 @@ use super::cells::{CellPlace, OBJECT};
 use super::clipboard::cells;
 use super::columns::TableColumn;
 use super::glass;
+use super::row_numbers;
 use super::table::{PrescriptionTable, room_in};
 use crate::lens::{Edit, Parameter};
 use crate::session::Command;
@@ -74,6 +75,11 @@ impl PrescriptionTable<'_> {
         let show = |ui: &mut Ui| self.buffers.show(ui, place.id(), field);
         let entry = ui.allocate_ui_with_layout(size, layout, show).inner;
         self.cursor.record(place, rect, entry.response.has_focus());
+        if entry.response.gained_focus() {
+            // The numbers of the rows would hide what is at the left edge.
+            let beside = rect.with_min_x(rect.left() - row_numbers::WIDTH);
+            ui.scroll_to_rect(beside, None);
+        }
         if entry.response.gained_focus() && place.surface() != self.view.selected {
             // Commands for an element mean that of the cursor.
             self.actions.push(Command::Select(place.surface()));

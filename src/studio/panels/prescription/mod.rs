@@ -17,6 +17,7 @@ mod details;
 mod fields;
 mod glass;
 mod radius_bounds;
+mod row_numbers;
 mod shapes;
 mod table;
 mod variables;
