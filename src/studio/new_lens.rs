@@ -3,7 +3,7 @@
 use egui::{Button, Context, DragValue, Grid, Id, Key, Modal, RichText, Ui};
 
 use super::actions::Actions;
-use super::form::{choice, dialog_frame, enter_number, is_confirmed, number_field};
+use super::form::{choice, confirms, dialog_frame, enter_number, is_confirmed, number_field};
 use super::number;
 use super::text::capitalize;
 use crate::lens::{
@@ -38,6 +38,8 @@ pub(super) struct NewLensDialog {
     entered: bool,
     /// True if a number had the cursor in the frame before: Escape takes it away before a frame begins.
     was_typing: bool,
+    /// True if Enter was pressed on a choice that was made before.
+    confirmed: bool,
 }
 
 impl Default for NewLensDialog {
@@ -55,6 +57,7 @@ impl Default for NewLensDialog {
             distance: 200.0,
             entered: false,
             was_typing: false,
+            confirmed: false,
         }
     }
 }
@@ -81,6 +84,7 @@ impl NewLensDialog {
     }
 
     fn rows(&mut self, ui: &mut Ui) {
+        self.confirmed = false;
         ui.label("Focal length");
         let first = number_field(ui, "Focal length", &mut self.focal_length, " mm");
         if !std::mem::replace(&mut self.entered, true) {
@@ -111,8 +115,10 @@ impl NewLensDialog {
 
     fn object(&mut self, ui: &mut Ui) {
         let before = self.at_infinity;
-        ui.radio_value(&mut self.at_infinity, true, "at infinity");
-        ui.radio_value(&mut self.at_infinity, false, "at");
+        for (choice, title) in [(true, "at infinity"), (false, "at")] {
+            let radio = ui.radio_value(&mut self.at_infinity, choice, title);
+            self.confirmed |= confirms(ui, &radio, before == choice);
+        }
         ui.add_enabled_ui(!self.at_infinity, |ui| {
             number_field(ui, "Object distance of the new lens", &mut self.distance, " mm")
                 .on_hover_text("In front of the lens");
@@ -218,7 +224,9 @@ impl NewLensDialog {
         ];
         for (form, title, meaning) in forms {
             ui.horizontal(|ui| {
-                ui.radio_value(&mut self.form, form, title);
+                let is_chosen = self.form == form;
+                let radio = ui.radio_value(&mut self.form, form, title);
+                self.confirmed |= confirms(ui, &radio, is_chosen);
                 ui.weak(meaning);
             });
         }
@@ -261,7 +269,8 @@ impl NewLensDialog {
         ui.horizontal(|ui| {
             let fill = ui.visuals().selection.bg_fill;
             let create = Button::new(RichText::new("Create").strong()).fill(fill);
-            let pressed = ui.add_enabled(lens.is_ok(), create).clicked() || is_confirmed(ui);
+            let pressed = ui.add_enabled(lens.is_ok(), create).clicked();
+            let pressed = pressed || self.confirmed || is_confirmed(ui);
             if pressed && lens.is_ok() {
                 actions.push(Command::Begin(Box::new(self.starting_lens())));
                 done = true;

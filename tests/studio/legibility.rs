@@ -154,6 +154,11 @@ fn the_legend_of_the_front_covers_no_lens() {
         let entry = harness.get_by_label(entry).rect();
         assert!(!plot.intersects(entry), "{entry:?} in {plot:?}");
     }
+    let texts = painted_places(&harness);
+    let title = texts.iter().find(|(text, _)| text.starts_with("RMS") && text.ends_with("µm"));
+    // It is turned: its length is along the axis.
+    let length = title.expect("the axis has a title").1.width();
+    assert!(length < plot.height(), "{length} along {}", plot.height());
 }
 
 /// An axis without numbers tells nothing, however little of it a front takes.

@@ -461,6 +461,7 @@ fn the_numbers_of_the_rows_stay_while_the_columns_are_scrolled() {
     harness.get_by_label("Remark on surface 2").focus();
     harness.run_steps(20);
     let moved = place(&harness, "Radius of surface 2");
+    assert!((moved.center().y - before.center().y).abs() < 3.0, "{moved:?} beside {before:?}");
     assert!(moved.left() < radius.left() - 100.0, "the table is scrolled: {radius:?} {moved:?}");
     assert_eq!(place(&harness, number), before);
     let header = painted_places(&harness).into_iter().find(|(text, _)| text == "Surf").unwrap().1;

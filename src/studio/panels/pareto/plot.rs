@@ -21,6 +21,8 @@ use crate::studio::panels::widgets::{plot_curve, round_axes};
 const NEAR: f32 = 14.0;
 /// The margin around the shown range, as a share of it.
 const MARGIN: f64 = 0.06;
+/// The height in points below which the title of the axis of spots is a short one.
+const LOW: f32 = 240.0;
 
 /// A lens that was clicked.
 pub(super) struct ClickedDesign {
@@ -48,15 +50,15 @@ pub(super) fn plot(
     let colors = ParetoColors::of(ui);
     let bounds = bounds(view, run);
     legend(ui, view, run, chosen.is_some(), &colors);
-    let spot = if run.start.as_built.is_some() {
-        format!("{RMS_OVER_FIELDS} as built, µm")
-    } else {
-        format!("{RMS_OVER_FIELDS}, µm")
-    };
+    let height = ui.available_height();
+    // A title longer than its axis would lie over the legend.
+    let what = if height < LOW { "RMS" } else { RMS_OVER_FIELDS };
+    let as_built = if run.start.as_built.is_some() { " as built" } else { "" };
+    let spot = format!("{what}{as_built}, µm");
     let light = AxisHints::new_x().label("light, mm²");
     let spot = AxisHints::new_y().label(spot).min_thickness(36.0);
     let plot = Plot::new("front")
-        .height(ui.available_height())
+        .height(height)
         .allow_scroll(false)
         .allow_double_click_reset(false)
         .show_crosshair(false)
@@ -228,7 +230,7 @@ fn legend_mark(ui: &mut Ui, mark: LegendMark, color: Color32) {
         }
         LegendMark::Cross => {
             for arm in [vec2(3.0, 3.0), vec2(3.0, -3.0)] {
-                painter.line_segment([center - arm, center + arm], stroke);
+                painter.line(vec![center - arm, center + arm], stroke);
             }
         }
         LegendMark::Ring => {

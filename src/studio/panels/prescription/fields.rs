@@ -9,7 +9,6 @@ use super::cells::{CellPlace, OBJECT};
 use super::clipboard::cells;
 use super::columns::TableColumn;
 use super::glass;
-use super::row_numbers;
 use super::table::{PrescriptionTable, room_in};
 use crate::lens::{Edit, Parameter};
 use crate::session::Command;
@@ -76,9 +75,7 @@ impl PrescriptionTable<'_> {
         let entry = ui.allocate_ui_with_layout(size, layout, show).inner;
         self.cursor.record(place, rect, entry.response.has_focus());
         if entry.response.gained_focus() {
-            // The numbers of the rows would hide what is at the left edge.
-            let beside = rect.with_min_x(rect.left() - row_numbers::WIDTH);
-            ui.scroll_to_rect(beside, None);
+            self.entered = Some(rect);
         }
         if entry.response.gained_focus() && place.surface() != self.view.selected {
             // Commands for an element mean that of the cursor.

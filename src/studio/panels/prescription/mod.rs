@@ -81,6 +81,7 @@ impl Panel for PrescriptionPanel {
             buffers: &mut self.buffers,
             cursor: &mut self.cursor,
             actions,
+            entered: None,
         };
         table.show(ui);
         if candidate.is_none() {

@@ -2,7 +2,9 @@
 
 use std::sync::Arc;
 
-use egui::{Align, Color32, Id, Label, Layout, RichText, ScrollArea, Sense, Stroke, Ui, vec2};
+use egui::{
+    Align, Color32, Id, Label, Layout, Rect, RichText, ScrollArea, Sense, Stroke, Ui, vec2,
+};
 use egui_extras::{TableBuilder, TableRow};
 
 use super::badge;
@@ -40,6 +42,8 @@ pub(super) struct PrescriptionTable<'a> {
     pub(super) buffers: &'a mut EditBuffers,
     pub(super) cursor: &'a mut CellCursor,
     pub(super) actions: &'a mut Actions,
+    /// The place of the cell that the cursor has come to.
+    pub(super) entered: Option<Rect>,
 }
 
 impl PrescriptionTable<'_> {
@@ -62,9 +66,15 @@ impl PrescriptionTable<'_> {
                 table = table.scroll_to_row(row, None);
             }
             let rows = self.lens.surfaces.len() + 2;
-            table.header(ROW, |row| header(row, columns)).body(|body| {
+            let body = table.header(ROW, |row| header(row, columns)).body(|body| {
                 body.rows(ROW, rows, |row| places.push(self.row(row)));
-            })
+            });
+            if let Some(cell) = self.entered {
+                // Beside the numbers of the rows, which would hide it. Inside the table that would scroll
+                // its rows alone.
+                ui.scroll_to_rect(cell.with_min_x(cell.left() - row_numbers::WIDTH), None);
+            }
+            body
         });
         let column = NumberColumn {
             viewport: area.inner_rect,
@@ -84,7 +94,7 @@ impl PrescriptionTable<'_> {
         let surface = index.checked_sub(1).filter(|surface| *surface < self.lens.surfaces.len());
         let chosen = surface.is_some() && surface == self.view.selected;
         row.set_selected(chosen);
-        let (number, _) = row.col(|_| {});
+        let (_, number) = row.col(|_| {});
         for column in self.columns {
             row.col(|ui| {
                 if chosen {
@@ -99,7 +109,7 @@ impl PrescriptionTable<'_> {
                 self.cell(ui, CellPlace::new(index, *column));
             });
         }
-        RowPlace { index, y: number.y_range() }
+        RowPlace { index, y: number.rect.y_range() }
     }
 
     fn cell(&mut self, ui: &mut Ui, place: CellPlace) {
