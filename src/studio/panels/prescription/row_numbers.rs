@@ -58,9 +58,13 @@ impl NumberColumn {
 impl PrescriptionTable<'_> {
     /// Shows the numbers of the rows at the left of what is seen of the table.
     pub(super) fn row_numbers(&mut self, ui: &mut Ui, column: &NumberColumn, rows: &[RowPlace]) {
-        column.paint_ground(ui);
         let layout = Layout::left_to_right(Align::Center);
         let header = column.cell(Rangef::new(column.viewport.top(), column.rows.min));
+        // A table that has no room yet has no places.
+        if !header.is_finite() {
+            return;
+        }
+        column.paint_ground(ui);
         ui.scope_builder(UiBuilder::new().max_rect(header).layout(layout), |ui| {
             let hint = "Surface number: the object is 0, the first surface 1";
             row_name(ui, "Surf").on_hover_text(hint);

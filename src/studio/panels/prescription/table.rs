@@ -67,7 +67,7 @@ impl PrescriptionTable<'_> {
             }
             let rows = self.lens.surfaces.len() + 2;
             let body = table.header(ROW, |row| header(row, columns)).body(|body| {
-                body.rows(ROW, rows, |row| places.push(self.row(row)));
+                body.rows(ROW, rows, |row| places.extend(self.row(row)));
             });
             if let Some(cell) = self.entered {
                 // Beside the numbers of the rows, which would hide it. Inside the table that would scroll
@@ -89,12 +89,13 @@ impl PrescriptionTable<'_> {
     }
 
     /// Shows a row but for its number, and returns the place of that.
-    fn row(&mut self, mut row: TableRow<'_, '_>) -> RowPlace {
+    fn row(&mut self, mut row: TableRow<'_, '_>) -> Option<RowPlace> {
         let index = row.index();
         let surface = index.checked_sub(1).filter(|surface| *surface < self.lens.surfaces.len());
         let chosen = surface.is_some() && surface == self.view.selected;
         row.set_selected(chosen);
-        let (_, number) = row.col(|_| {});
+        let mut number = Rect::NOTHING;
+        row.col(|ui| number = ui.max_rect());
         for column in self.columns {
             row.col(|ui| {
                 if chosen {
@@ -109,7 +110,8 @@ impl PrescriptionTable<'_> {
                 self.cell(ui, CellPlace::new(index, *column));
             });
         }
-        RowPlace { index, y: number.rect.y_range() }
+        // A row that only takes room has no place.
+        number.is_finite().then(|| RowPlace { index, y: number.y_range() })
     }
 
     fn cell(&mut self, ui: &mut Ui, place: CellPlace) {
