@@ -243,10 +243,11 @@ pub(super) fn moved_text(moved: &[MovedNumber]) -> Option<String> {
     Some(format!("{}{rest}", named.join(", ")))
 }
 
-/// The names of locked quantities, as in "focal length and the track".
-pub(super) fn lock_names(settings: &DragSettings) -> String {
+/// What has held the locked quantities, as in "the focal length was held by the …".
+pub(super) fn held_text(settings: &DragSettings, moved: &str) -> String {
     let names: Vec<String> = settings.locks.iter().map(ToString::to_string).collect();
-    names.join(" and the ")
+    let was = if names.len() > 1 { "were" } else { "was" };
+    format!("the {} {was} held by {moved}", names.join(" and the "))
 }
 
 /// A number with five significant digits.

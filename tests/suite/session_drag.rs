@@ -249,7 +249,7 @@ fn cementing_holds_what_is_locked() {
     let [kept, now] = [&before, &after].map(|lens| lens.total_track());
     assert!((now - kept).abs() < 1e-8 * kept, "{kept} {now}");
     let told = last_message(&session);
-    assert!(told.starts_with("the focal length and the track was held by "), "{told}");
+    assert!(told.starts_with("the focal length and the track were held by "), "{told}");
     session.apply(Command::Undo);
     assert_eq!(*session.lens(), before, "one step");
 }

@@ -2,7 +2,7 @@
 
 use super::Session;
 use crate::paraxial::{DragSettings, Handle};
-use crate::session::drag::lock_names;
+use crate::session::drag::held_text;
 use crate::session::history::VersionOrigin;
 use crate::session::journal::JournalEntry;
 use crate::session::view::Severity;
@@ -32,7 +32,7 @@ impl Session {
         }
         self.accept(Ok((*dragged).clone()), VersionOrigin::new(drag.title()));
         if let Some(moved) = drag.moved_text() {
-            let text = format!("the {} was held by {moved}", lock_names(&self.drag.settings));
+            let text = held_text(&self.drag.settings, &moved);
             self.post(Severity::Note, text);
         }
     }

@@ -5,7 +5,7 @@ use crate::files;
 use crate::lens::{Edit, ElementEdit, Lens};
 use crate::math::format_short;
 use crate::paraxial::hold_after_edit;
-use crate::session::drag::{lock_names, moved_text, rounded};
+use crate::session::drag::{held_text, moved_text, rounded};
 use crate::session::view::Severity;
 
 /// The least relative change of a focal length that is told: smaller ones are not seen in its digits.
@@ -29,9 +29,7 @@ impl Session {
         }
         match hold_after_edit(&self.lens, &lens, settings) {
             Ok(held) => {
-                let names = lock_names(settings);
-                let told =
-                    moved_text(&held.moved).map(|moved| format!("the {names} was held by {moved}"));
+                let told = moved_text(&held.moved).map(|moved| held_text(settings, &moved));
                 (held.lens, told.map(|text| (Severity::Note, text)))
             }
             Err(why) => {
@@ -55,11 +53,11 @@ impl Session {
         if (now - before).abs() <= TOLD_CHANGE * before.abs() {
             return None;
         }
-        Some(format!(
-            "the focal length has changed from {} to {} mm; Element > Scale to a focal length restores it",
-            text(before),
-            text(now)
-        ))
+        // Scaling changes no sign.
+        let remedy = "; Element > Scale to a focal length restores it";
+        let remedy = if now * before > 0.0 { remedy } else { "" };
+        let (before, now) = (text(before), text(now));
+        Some(format!("the focal length has changed from {before} to {now} mm{remedy}"))
     }
 }
 
