@@ -226,9 +226,9 @@ fn parted() -> (Session, usize) {
 #[test]
 fn cementing_tells_how_the_focal_length_has_changed() {
     let (mut session, surface) = parted();
-    let before = focal_length(&session.lens(), 0).unwrap();
+    let before = focal_length(session.lens(), 0).unwrap();
     session.apply(Edit::Element(ElementEdit::Cement(surface)).into());
-    let after = focal_length(&session.lens(), 0).unwrap();
+    let after = focal_length(session.lens(), 0).unwrap();
     assert!((after - before).abs() > 1e-3 * before, "{before} {after}");
     let told = last_message(&session);
     let says = |value: f64| told.contains(&format!("{value:.2}")[..4]);
