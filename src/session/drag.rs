@@ -243,7 +243,7 @@ pub(super) fn moved_text(moved: &[MovedNumber]) -> Option<String> {
     Some(format!("{}{rest}", named.join(", ")))
 }
 
-/// What has held the locked quantities, as in "the focal length was held by the …".
+/// The text on what has held the locked quantities, as in "the focal length was held by the …".
 pub(super) fn held_text(settings: &DragSettings, moved: &str) -> String {
     let names: Vec<String> = settings.locks.iter().map(ToString::to_string).collect();
     let was = if names.len() > 1 { "were" } else { "was" };

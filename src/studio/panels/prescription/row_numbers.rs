@@ -28,7 +28,7 @@ pub(super) struct RowPlace {
 /// The place of the column.
 #[derive(Debug)]
 pub(super) struct NumberColumn {
-    /// What is seen of the table, with its header.
+    /// The visible part of the table, with its header.
     pub(super) viewport: Rect,
     /// The heights between which rows are seen.
     pub(super) rows: Rangef,
