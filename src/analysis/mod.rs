@@ -40,8 +40,9 @@ pub use color_error::{
 };
 pub use diffraction::{
     DiffractionGate, PointSpread, PupilCurve, PupilFunction, PupilSamples, Strehl,
-    diffraction_gate, diffraction_mtf, encircled_energy, point_spread,
-    polychromatic_diffraction_mtf, polychromatic_diffraction_mtf_unless, strehl, through_focus_mtf,
+    diffraction_gate, diffraction_mtf, encircled_energy, encircled_energy_unless, point_spread,
+    point_spread_unless, polychromatic_diffraction_mtf, polychromatic_diffraction_mtf_unless,
+    strehl, strehl_unless, through_focus_mtf,
 };
 pub use distortion::{
     Distortion, FieldCurvature, GridPoint, chief_points, distortion, distortion_grid,

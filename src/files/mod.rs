@@ -56,7 +56,8 @@ pub use image_file::{ColorImage, GrayscaleImage, read_color, read_grayscale};
 pub use imported_file::ImportedFile;
 pub use library::{
     LensScaleError, LibraryLens, LibraryQuery, LibraryQueryError, ShortRange, StatedAperture,
-    StatedField, focal_length_factor, library_lenses, parse_range, scale_to_focal_length,
+    StatedField, focal_length, focal_length_factor, library_lenses, parse_range,
+    scale_to_focal_length,
 };
 pub use lock::{FileLock, check_unlocked};
 pub use own_glass::{

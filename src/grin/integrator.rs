@@ -59,6 +59,18 @@ impl Integrator {
         }
     }
 
+    /// The name in a text.
+    pub fn title(self) -> &'static str {
+        match self {
+            Self::SymplecticEuler => "symplectic Euler",
+            Self::LeapfrogDkd => "leapfrog (drift, kick, drift)",
+            Self::LeapfrogKdk => "leapfrog (kick, drift, kick)",
+            Self::Yoshida => "Yoshida",
+            Self::Pefrl => "PEFRL",
+            Self::BlanesMoan => "Blanes-Moan",
+        }
+    }
+
     /// The order of convergence in a smooth field.
     pub fn order(self) -> u32 {
         match self {

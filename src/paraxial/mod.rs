@@ -17,7 +17,8 @@ mod seidel;
 
 pub use drag::{
     DragError, DragLimit, DragOutcome, DragSettings, DragStop, FirstOrderLock, FreeNumbers, Handle,
-    HandleDrag, HandlePlaces, HandleUnit, LockError, MovedNumber, elements, short_name, tangents,
+    HandleDrag, HandlePlaces, HandleUnit, HeldEdit, HoldError, LockError, MovedNumber, elements,
+    hold_after_edit, short_name, tangents,
 };
 pub use first_order::{Beam, FirstOrder, ParaxialError, ParaxialPupil, first_order};
 pub use parametric::{ParametricLens, ParametricRay, free_parameters};

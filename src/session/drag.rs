@@ -218,28 +218,40 @@ impl DragProgress {
 
     /// The numbers that have moved to hold the locked quantities; `None` if none has.
     pub fn moved_text(&self) -> Option<String> {
-        if self.moved.is_empty() {
-            return None;
-        }
-        let change = |moved: &MovedNumber| {
-            let is_curvature = moved.parameter.quantity == Quantity::Curvature;
-            let shown = |value: f64| if is_curvature { value.recip() } else { value };
-            let text = |value| match shown(value) {
-                value if value.is_infinite() => "Infinity".to_owned(),
-                value => format_short(rounded(value)),
-            };
-            let [before, after] = [moved.before, moved.after].map(text);
-            format!("{} from {before} to {after}", moved.parameter.shown_name())
-        };
-        let named: Vec<String> = self.moved.iter().take(NAMED_NUMBERS).map(change).collect();
-        let more = self.moved.len().saturating_sub(NAMED_NUMBERS);
-        let rest = if more > 0 { format!(" and {more} more") } else { String::new() };
-        Some(format!("{}{rest}", named.join(", ")))
+        moved_text(&self.moved)
     }
 }
 
+/// Numbers that have moved to hold the locked quantities; `None` for none.
+pub(super) fn moved_text(moved: &[MovedNumber]) -> Option<String> {
+    if moved.is_empty() {
+        return None;
+    }
+    let change = |moved: &MovedNumber| {
+        let is_curvature = moved.parameter.quantity == Quantity::Curvature;
+        let shown = |value: f64| if is_curvature { value.recip() } else { value };
+        let text = |value| match shown(value) {
+            value if value.is_infinite() => "Infinity".to_owned(),
+            value => format_short(rounded(value)),
+        };
+        let [before, after] = [moved.before, moved.after].map(text);
+        format!("{} from {before} to {after}", moved.parameter.shown_name())
+    };
+    let named: Vec<String> = moved.iter().take(NAMED_NUMBERS).map(change).collect();
+    let more = moved.len().saturating_sub(NAMED_NUMBERS);
+    let rest = if more > 0 { format!(" and {more} more") } else { String::new() };
+    Some(format!("{}{rest}", named.join(", ")))
+}
+
+/// The text on what has held the locked quantities, as in "the focal length was held by the …".
+pub(super) fn held_text(settings: &DragSettings, moved: &str) -> String {
+    let names: Vec<String> = settings.locks.iter().map(ToString::to_string).collect();
+    let was = if names.len() > 1 { "were" } else { "was" };
+    format!("the {} {was} held by {moved}", names.join(" and the "))
+}
+
 /// A number with five significant digits.
-fn rounded(value: f64) -> f64 {
+pub(super) fn rounded(value: f64) -> f64 {
     if value == 0.0 || !value.is_finite() {
         return value;
     }

@@ -190,11 +190,16 @@ impl Studio {
     /// Opens the files that were dropped on the window, or says by name why one cannot be opened.
     fn receive_dropped_files(&mut self, context: &Context, actions: &mut Actions) {
         let files = context.input(|input| input.raw.dropped_files.clone());
+        let mut refused = Vec::new();
         for path in files.iter().map(|file| file.path().to_owned()) {
             match dropped::open_actions(&path) {
                 Ok(asked) => actions.extend(asked),
-                Err(why) => self.message = Some(why),
+                Err(why) => refused.push(why),
             }
+        }
+        // Each file that is refused is named.
+        if !refused.is_empty() {
+            self.message = Some(refused.join(" "));
         }
     }
 

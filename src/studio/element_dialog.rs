@@ -45,7 +45,8 @@ impl ElementDialog {
     pub(super) fn new(task: ElementTask, view: &SessionView) -> Self {
         let first = view.results.as_ref().and_then(|results| results.analyses.as_ref().ok());
         let first = first.map(Analyses::first_order);
-        let present = first.and_then(|first| first.efl).map_or(50.0, f64::abs);
+        let present = first.and_then(|first| first.efl).map(f64::abs);
+        let present = present.or_else(|| asked_without_glass(&view.lens)).unwrap_or(50.0);
         // A lens is scaled to what its merit function asks for, or exactly to what it has.
         let asked = if task == ElementTask::Scale { asked_focal_length(view) } else { None };
         let focal_length = asked.unwrap_or(present);
@@ -237,6 +238,12 @@ fn asked_focal_length(view: &SessionView) -> Option<f64> {
         Term::FocalLength(target) => Some(target.abs()),
         _ => None,
     })
+}
+
+/// The focal length that a lens without glass was begun for: its image plane lies there.
+fn asked_without_glass(lens: &Lens) -> Option<f64> {
+    let is_empty = lens.surfaces.iter().all(|row| row.medium == Medium::Air);
+    Some(lens.total_track()).filter(|track| is_empty && *track > 0.0)
 }
 
 fn rounded(value: f64) -> f64 {

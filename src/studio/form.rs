@@ -41,6 +41,11 @@ pub(super) fn is_confirmed(ui: &Ui) -> bool {
         && ui.memory(|memory| memory.focused().is_none())
 }
 
+/// True if Enter was pressed on a choice that is made already: it confirms the dialog, as on a number.
+pub(super) fn confirms(ui: &Ui, choice: &Response, is_chosen: bool) -> bool {
+    is_chosen && choice.has_focus() && ui.input(|input| input.key_pressed(Key::Enter))
+}
+
 /// Shows a choice from a few.
 pub(super) fn choice<T: PartialEq + Copy>(
     ui: &mut Ui,

@@ -3,7 +3,7 @@
 use egui::{Button, Context, DragValue, Grid, Id, Key, Modal, RichText, Ui};
 
 use super::actions::Actions;
-use super::form::{choice, dialog_frame, enter_number, is_confirmed, number_field};
+use super::form::{choice, confirms, dialog_frame, enter_number, is_confirmed, number_field};
 use super::number;
 use super::text::capitalize;
 use crate::lens::{
@@ -69,10 +69,11 @@ impl NewLensDialog {
             ui.set_width(430.0);
             ui.heading("New lens");
             ui.add_space(6.0);
-            Grid::new("new lens").num_columns(2).spacing([14.0, 7.0]).show(ui, |ui| self.rows(ui));
+            let grid = Grid::new("new lens").num_columns(2).spacing([14.0, 7.0]);
+            let confirmed = grid.show(ui, |ui| self.rows(ui)).inner;
             ui.add_space(6.0);
             ui.separator();
-            done = self.buttons(ui, actions);
+            done = self.buttons(ui, confirmed, actions);
         });
         // Escape leaves a number first, then the dialog.
         self.was_typing = context.egui_wants_keyboard_input();
@@ -80,7 +81,8 @@ impl NewLensDialog {
         done || (modal.should_close() && !(was_typing && escape))
     }
 
-    fn rows(&mut self, ui: &mut Ui) {
+    /// Shows the numbers and choices; true if Enter was pressed on a choice that was made before.
+    fn rows(&mut self, ui: &mut Ui) -> bool {
         ui.label("Focal length");
         let first = number_field(ui, "Focal length", &mut self.focal_length, " mm");
         if !std::mem::replace(&mut self.entered, true) {
@@ -88,7 +90,7 @@ impl NewLensDialog {
         }
         ui.end_row();
         ui.label("Object");
-        ui.horizontal(|ui| self.object(ui));
+        let on_object = ui.horizontal(|ui| self.object(ui)).inner;
         ui.end_row();
         ui.label("Aperture");
         ui.horizontal(|ui| self.aperture(ui));
@@ -105,14 +107,18 @@ impl NewLensDialog {
         choice(ui, "Wavelengths", &mut self.wavelengths, &presets);
         ui.end_row();
         ui.label("Begin with");
-        ui.vertical(|ui| self.forms(ui));
+        let on_form = ui.vertical(|ui| self.forms(ui)).inner;
         ui.end_row();
+        on_object || on_form
     }
 
-    fn object(&mut self, ui: &mut Ui) {
+    fn object(&mut self, ui: &mut Ui) -> bool {
         let before = self.at_infinity;
-        ui.radio_value(&mut self.at_infinity, true, "at infinity");
-        ui.radio_value(&mut self.at_infinity, false, "at");
+        let mut confirmed = false;
+        for (choice, title) in [(true, "at infinity"), (false, "at")] {
+            let radio = ui.radio_value(&mut self.at_infinity, choice, title);
+            confirmed |= confirms(ui, &radio, before == choice);
+        }
         ui.add_enabled_ui(!self.at_infinity, |ui| {
             number_field(ui, "Object distance of the new lens", &mut self.distance, " mm")
                 .on_hover_text("In front of the lens");
@@ -126,6 +132,7 @@ impl NewLensDialog {
         if self.at_infinity && self.field == FieldKind::ObjectHeight {
             (self.field, self.field_max) = (FieldKind::Angle, 10.0);
         }
+        confirmed
     }
 
     fn aperture(&mut self, ui: &mut Ui) {
@@ -206,7 +213,8 @@ impl NewLensDialog {
         ui.label("fields from the axis, in rings of equal area");
     }
 
-    fn forms(&mut self, ui: &mut Ui) {
+    fn forms(&mut self, ui: &mut Ui) -> bool {
+        let mut confirmed = false;
         let forms = [
             (
                 StartingForm::Element(ElementForm::CementedDoublet),
@@ -218,10 +226,13 @@ impl NewLensDialog {
         ];
         for (form, title, meaning) in forms {
             ui.horizontal(|ui| {
-                ui.radio_value(&mut self.form, form, title);
+                let is_chosen = self.form == form;
+                let radio = ui.radio_value(&mut self.form, form, title);
+                confirmed |= confirms(ui, &radio, is_chosen);
                 ui.weak(meaning);
             });
         }
+        confirmed
     }
 
     /// The lens that the numbers stand for.
@@ -252,7 +263,7 @@ impl NewLensDialog {
     }
 
     /// Shows the buttons, and above them why the lens cannot be made; true if it was.
-    fn buttons(&self, ui: &mut Ui, actions: &mut Actions) -> bool {
+    fn buttons(&self, ui: &mut Ui, confirmed: bool, actions: &mut Actions) -> bool {
         let lens = self.lens();
         if let Err(why) = &lens {
             ui.label(RichText::new(why).color(ui.visuals().warn_fg_color));
@@ -261,7 +272,8 @@ impl NewLensDialog {
         ui.horizontal(|ui| {
             let fill = ui.visuals().selection.bg_fill;
             let create = Button::new(RichText::new("Create").strong()).fill(fill);
-            let pressed = ui.add_enabled(lens.is_ok(), create).clicked() || is_confirmed(ui);
+            let pressed = ui.add_enabled(lens.is_ok(), create).clicked();
+            let pressed = pressed || confirmed || is_confirmed(ui);
             if pressed && lens.is_ok() {
                 actions.push(Command::Begin(Box::new(self.starting_lens())));
                 done = true;

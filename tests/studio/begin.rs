@@ -18,7 +18,9 @@ use egui::{Key, Modifiers};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
 
-use crate::harness::{PanelState, double_gauss, painted_texts, panel_harness, view_of};
+use crate::harness::{
+    PanelState, double_gauss, painted_galleys, painted_texts, panel_harness, view_of,
+};
 
 fn starting(form: StartingForm) -> Lens {
     let starting = StartingLens {
@@ -92,6 +94,32 @@ fn a_new_lens_comes_from_the_dialog() {
     assert!(harness.query_by_label("Create").is_none(), "the dialog is closed");
     assert!(harness.state().session().view().messages.is_empty());
     assert_eq!(harness.state().session().view().history[0].title, "new lens");
+}
+
+/// The first element of a lens that was begun from nothing has the focal length that was asked for.
+#[test]
+fn the_first_element_is_proposed_with_the_focal_length_that_was_asked_for() {
+    let asked = 35.0;
+    let mut begun = starting(StartingForm::Empty);
+    begun.surfaces[0].thickness = asked;
+    let mut harness = window(begun);
+    keys(&mut harness, Modifiers::COMMAND | Modifiers::SHIFT, Key::A);
+    keys(&mut harness, Modifiers::NONE, Key::Enter);
+    assert!((focal_length(&lens(&harness)) - asked).abs() < 1e-3 * asked);
+}
+
+/// Enter on a choice that is made already goes on, as on a number.
+#[test]
+fn enter_on_a_chosen_form_creates_the_lens() {
+    let mut harness = window(double_gauss());
+    keys(&mut harness, Modifiers::COMMAND, Key::N);
+    harness.get_by_label("Nothing").focus();
+    harness.run_steps(2);
+    keys(&mut harness, Modifiers::NONE, Key::Enter);
+    harness.get_by_label("New lens");
+    keys(&mut harness, Modifiers::NONE, Key::Enter);
+    assert!(harness.query_by_label("New lens").is_none(), "the second Enter confirms");
+    assert_eq!(lens(&harness).surfaces.len(), 1);
 }
 
 #[test]
@@ -524,6 +552,18 @@ fn the_system_panel_edits_aperture_fields_and_wavelengths() {
     assert_eq!(edited(&harness).wavelengths.iter().filter(|w| w.primary).count(), 1);
 }
 
+/// A note that is cut in one line is not read.
+#[test]
+fn long_notes_are_read_in_full() {
+    let notes = "Scaled from a patent; the rims are guesses from its drawing. ".repeat(3);
+    let harness = panel(SystemPanel::default(), Lens { notes: notes.clone(), ..achromat() });
+    let painted = painted_galleys(&harness);
+    let shown = painted.iter().find(|galley| galley.text() == notes).expect("the notes are shown");
+    assert!(shown.rows.len() > 1, "{} row", shown.rows.len());
+    let width = harness.get_by_label("Notes of the lens").rect().width();
+    assert!(shown.rect.width() <= width, "{} in {width}", shown.rect.width());
+}
+
 #[test]
 fn another_kind_of_aperture_keeps_the_beam() {
     let mut harness = panel(SystemPanel::default(), achromat());
@@ -714,6 +754,14 @@ fn a_dropped_lens_is_opened_and_remembered_and_another_file_refused_by_name() {
     drop_file(&mut harness, text);
     harness.get_by_label_contains("`letter.txt` is none of the files");
     press(&mut harness, "OK");
+    // Of many files at once, each that is refused is named.
+    for name in ["letter.txt", "picture.png", "achromat.json"] {
+        harness.input_mut().dropped_files.push(Arc::new(Dropped(folder.join(name))));
+    }
+    harness.run_steps(3);
+    harness.get_by_label_contains("`letter.txt` is none of the files");
+    harness.get_by_label_contains("`picture.png` is a picture");
+    press(&mut harness, "OK");
     let glasses = folder.join("glasses.agf");
     std::fs::write(&glasses, b"no glass").unwrap();
     drop_file(&mut harness, glasses);
@@ -791,7 +839,7 @@ fn the_system_shows_whole_coordinates_and_lines() {
     let mut harness = panel_harness(SystemPanel::default(), view_of(lens));
     harness.run();
     let cell = harness.get_by_label("Field 2 y");
-    let galleys = crate::harness::painted_galleys(&harness);
+    let galleys = painted_galleys(&harness);
     let number = galleys.iter().find(|galley| galley.text() == "-7.071068").unwrap();
     // The frame of a field has a margin of four points on each side.
     assert!(number.size().x + 8.0 <= cell.rect().width(), "{:?}", cell.rect());

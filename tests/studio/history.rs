@@ -93,6 +93,25 @@ fn versions_are_compared_named_and_gone_to() {
     assert_eq!(harness.state().commands[1..], [named, Command::GoTo(1)]);
 }
 
+/// The merit of a candidate is one number in all panels: that by the merit function of the design.
+#[test]
+fn versions_are_compared_by_one_merit_function() {
+    let mut view = branched();
+    let report = |lens: &Arc<Lens>, total: f64| {
+        let values = MeritValues { total, ..MeritValues::default() };
+        let goal = Arc::new(Goal::default_for(lens).unwrap());
+        let lens = Arc::clone(lens);
+        Some(Arc::new(MeritReport { lens, goal, values: Ok(values), ms: 1.0 }))
+    };
+    view.merit = report(&view.lens, 0.01);
+    view.preview_merit = report(&view.history[1].lens, 0.05);
+    let mut harness = panel_harness(HistoryPanel::default(), view);
+    harness.run();
+    harness.get_by_label_contains("Thickness of surface 3").click();
+    harness.run();
+    assert!(harness.query_all_by_label("+400.00 %").count() > 0, "not by the stored 0.03");
+}
+
 /// A row has what the version knows: time and seed too, and its title is not cut.
 #[test]
 fn a_version_is_told_in_full_in_a_narrow_panel() {

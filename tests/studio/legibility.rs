@@ -1,15 +1,17 @@
 //! Legibility of the window: texts stand out from the ground below them, and nothing covers the parts
 //! that a person needs to see.
 
+use aplanat::optimize::pareto::{Front, ParetoPoint};
 use aplanat::session::{Command, RunStatus, SessionView};
 use aplanat::studio::panels::ParetoPanel;
 use egui::epaint::{ClippedShape, TextShape};
 use egui::{Color32, Pos2, Rect, Rgba, Shape, Theme};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
-use crate::harness::{PanelState, panel_harness};
+use crate::harness::{LOWER, PanelState, painted_places, panel_harness, small_harness};
 use crate::panels::fronts;
 use crate::window::window;
 
@@ -131,6 +133,66 @@ fn the_legend_of_the_front_does_not_cover_the_start() {
         assert!(!starts.is_empty(), "the start is drawn");
         for start in starts {
             assert!(!legend.contains(start), "{spot} mm, {light} mm²: {start:?} in {legend:?}");
+        }
+    }
+}
+
+/// The default room of the panel in a window of 1280 by 800 points.
+fn small_front(view: SessionView) -> Harness<'static, PanelState<ParetoPanel>> {
+    let mut harness = small_harness(ParetoPanel::default(), view, LOWER);
+    harness.run();
+    harness
+}
+
+/// Wherever the lenses of a front lie, its legend is beside the plot.
+#[test]
+fn the_legend_of_the_front_covers_no_lens() {
+    let harness = small_front(fronts(RunStatus::Finished));
+    let plot = harness.get_by_label_contains("Front of ").rect();
+    assert!(plot.height() > 90.0, "{plot:?}");
+    for entry in ["tried", "start", "run 2: 0.5000", "fixed rays: 0.5000"] {
+        let entry = harness.get_by_label(entry).rect();
+        assert!(!plot.intersects(entry), "{entry:?} in {plot:?}");
+    }
+    let texts = painted_places(&harness);
+    let title = texts.iter().find(|(text, _)| text.starts_with("RMS") && text.ends_with("µm"));
+    // It is turned: its length is along the axis.
+    let length = title.expect("the axis has a title").1.width();
+    assert!(length < plot.height(), "{length} along {}", plot.height());
+}
+
+/// An axis without numbers tells nothing, however little of it a front takes.
+#[test]
+fn every_axis_of_the_front_has_two_numbers_at_least() {
+    for width in [0.02, 0.3, 1.9, 5.0] {
+        let mut view = fronts(RunStatus::Finished);
+        view.pareto.earlier.clear();
+        let run = Arc::make_mut(view.pareto.run.snapshot.as_mut().unwrap());
+        run.biased = None;
+        let near = |share: f64| {
+            let start = &run.start;
+            let (spot, light) = (0.024 + 1e-3 * share * width, 70.0 + share * width);
+            Arc::new(ParetoPoint { spot, light, ..ParetoPoint::clone(start) })
+        };
+        let (start, points) = (near(0.0), [0.4, 0.7, 1.0].map(near));
+        let mut front = Front::default();
+        points.iter().for_each(|point| {
+            front.insert(ParetoPoint::clone(point));
+        });
+        (run.start, run.main.front) = (start, Arc::new(front));
+        let harness = small_front(view);
+        let plot = harness.get_by_label_contains("Front of ").rect();
+        let numbers: Vec<_> = painted_places(&harness)
+            .into_iter()
+            .filter(|(text, place)| text.parse::<f64>().is_ok() && place.top() > plot.top() - 10.0)
+            .collect();
+        let left: Vec<_> =
+            numbers.iter().filter(|(_, place)| place.right() <= plot.left() + 1.0).collect();
+        let below: Vec<_> =
+            numbers.iter().filter(|(_, place)| place.top() >= plot.bottom() - 1.0).collect();
+        for axis in [left, below] {
+            let texts: BTreeSet<_> = axis.iter().map(|(text, _)| text).collect();
+            assert!(texts.len() >= 2 && texts.len() == axis.len(), "{width}: {axis:?}");
         }
     }
 }

@@ -8,7 +8,9 @@ use egui::{Event, Key, Modifiers};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
 
-use crate::harness::{PanelState, double_gauss, panel_harness, view_of};
+use crate::harness::{
+    LOWER, PanelState, double_gauss, painted_places, panel_harness, small_harness, view_of,
+};
 
 type Table = Harness<'static, PanelState<PrescriptionPanel>>;
 
@@ -442,4 +444,36 @@ fn a_candidate_shows_semi_diameters_and_badges() {
     ] {
         harness.get_by_label(&format!("Badge of {cell} of the candidate: {status}"));
     }
+}
+
+/// A table that is wider than its panel is read by the numbers of its rows.
+#[test]
+fn the_numbers_of_the_rows_stay_while_the_columns_are_scrolled() {
+    let mut lens = double_gauss();
+    lens.surfaces[0].asphere = vec![1e-7, 1e-9, 1e-11, 1e-13];
+    let panel = PrescriptionPanel::default();
+    let mut harness = small_harness(panel, view_of(lens), LOWER);
+    harness.run();
+    let number = "Row of surface 2";
+    let place = |harness: &Harness<'_, _>, label| harness.get_by_label(label).rect();
+    let (before, radius) = (place(&harness, number), place(&harness, "Radius of surface 2"));
+    // The cursor at the other end of its row brings that into view.
+    harness.get_by_label("Remark on surface 2").focus();
+    harness.run_steps(20);
+    let moved = place(&harness, "Radius of surface 2");
+    assert!((moved.center().y - before.center().y).abs() < 3.0, "{moved:?} beside {before:?}");
+    assert!(moved.left() < radius.left() - 100.0, "the table is scrolled: {radius:?} {moved:?}");
+    assert_eq!(place(&harness, number), before);
+    let header = painted_places(&harness).into_iter().find(|(text, _)| text == "Surf").unwrap().1;
+    assert!(header.left() < before.right(), "{header:?}");
+    // What the numbers would hide is brought beside them.
+    harness.get_by_label("Radius of surface 2").focus();
+    harness.run_steps(20);
+    assert!(place(&harness, "Radius of surface 2").left() >= before.right() - 1.0);
+    // The numbers can be clicked wherever the columns are.
+    harness.get_by_label("Remark on surface 2").focus();
+    harness.run_steps(20);
+    harness.get_by_label("Row of surface 3").click();
+    harness.run();
+    assert_eq!(harness.state().view.selected, Some(2));
 }

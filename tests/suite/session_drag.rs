@@ -1,10 +1,10 @@
 //! Drags of handles in a session: one undo step each, taken back by a command, with the slopes of
 //! the merit.
 
-use aplanat::files::{bundled_lenses, json};
-use aplanat::lens::{Edit, Lens};
+use aplanat::files::{bundled_lenses, focal_length, json};
+use aplanat::lens::{Edit, ElementEdit, Lens, Medium};
 use aplanat::merit::{Goal, Merit, Term, TermValue, WeightedTerm};
-use aplanat::paraxial::{DragSettings, FirstOrderLock, Handle};
+use aplanat::paraxial::{DragSettings, FirstOrderLock, FreeNumbers, Handle};
 use aplanat::session::{Command, MeritSlopes, Session};
 use std::thread;
 use std::time::Duration;
@@ -207,4 +207,62 @@ fn the_edges_of_a_dragged_lens_are_those_at_its_own_rims() {
     let [own, outdated] = [&dragged, &lens].map(|of| edges(&dragged, of));
     assert!((held / own - 1.0).abs() < 1e-9, "{held} {own}");
     assert!((outdated / own - 1.0).abs() > 1e-3, "the two are told apart: {outdated} {own}");
+}
+
+/// A lens with two elements that face each other with different radii, and the surface in front of the air
+/// between them.
+fn parted() -> (Session, usize) {
+    let mut session = Session::new(bundled("double_gauss_rudolph_50"), || {}).unwrap();
+    let rows = &session.lens().surfaces;
+    let is_cemented =
+        |i: &usize| rows[*i].medium != Medium::Air && rows[*i - 1].medium != Medium::Air;
+    let surface = (1..rows.len()).find(is_cemented).unwrap();
+    session.apply(Edit::Element(ElementEdit::Split(surface)).into());
+    let radius = 1.0 / session.lens().surfaces[surface].curvature;
+    session.apply(Edit::set_radius(surface, 2.0 * radius).into());
+    (session, surface)
+}
+
+#[test]
+fn cementing_tells_how_the_focal_length_has_changed() {
+    let (mut session, surface) = parted();
+    let before = focal_length(session.lens(), 0).unwrap();
+    session.apply(Edit::Element(ElementEdit::Cement(surface)).into());
+    let after = focal_length(session.lens(), 0).unwrap();
+    assert!((after - before).abs() > 1e-3 * before, "{before} {after}");
+    let told = last_message(&session);
+    let says = |value: f64| told.contains(&format!("{value:.2}")[..4]);
+    assert!(told.starts_with("the focal length has changed from "), "{told}");
+    assert!(says(before) && says(after), "{told}: {before} {after}");
+    assert!(told.contains("Scale to a focal length"), "it says what restores it: {told}");
+}
+
+#[test]
+fn cementing_holds_what_is_locked() {
+    let (mut session, surface) = parted();
+    let before = session.lens().clone();
+    lock(&mut session, &[FirstOrderLock::FocalLength, FirstOrderLock::Track]);
+    session.apply(Edit::Element(ElementEdit::Cement(surface)).into());
+    let after = session.lens().clone();
+    let [kept, now] = [&before, &after].map(|lens| focal_length(lens, 0).unwrap());
+    assert!((now - kept).abs() < 1e-8 * kept, "{kept} {now}");
+    let [kept, now] = [&before, &after].map(|lens| lens.total_track());
+    assert!((now - kept).abs() < 1e-8 * kept, "{kept} {now}");
+    let told = last_message(&session);
+    assert!(told.starts_with("the focal length and the track were held by "), "{told}");
+    session.apply(Command::Undo);
+    assert_eq!(*session.lens(), before, "one step");
+}
+
+#[test]
+fn an_edit_that_cannot_hold_what_is_locked_says_why_and_what_has_changed() {
+    let (mut session, surface) = parted();
+    let locks = vec![FirstOrderLock::FocalLength];
+    let settings = DragSettings { locks, free: FreeNumbers::Variables };
+    session.apply(Command::SetDragSettings(settings));
+    session.apply(Edit::SetVariables(Vec::new()).into());
+    session.apply(Edit::Element(ElementEdit::Cement(surface)).into());
+    let told = last_message(&session);
+    assert!(told.starts_with("the focal length cannot be held: "), "{told}");
+    assert!(told.contains("the focal length has changed from "), "{told}");
 }

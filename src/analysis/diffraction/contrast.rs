@@ -2,6 +2,7 @@
 
 use super::pupil_function::PupilFunction;
 use super::ray_pupil::RayPupil;
+use super::{Interruption, never};
 use crate::analysis::mtf::{curve, geometric_mtf, origin, sum_wavelengths};
 use crate::analysis::reference_sphere::{ReferenceForm, ReferenceSphere};
 use crate::analysis::{
@@ -28,13 +29,6 @@ pub fn diffraction_mtf(
     accuracy: Accuracy,
 ) -> Result<MtfCurve, AnalysisError> {
     diffraction_mtf_unless(model, field, wavelength, frequencies, accuracy, &never)
-}
-
-/// A test that is asked often whether a computation is to end early.
-type Interruption<'a> = dyn Fn() -> bool + Sync + 'a;
-
-fn never() -> bool {
-    false
 }
 
 fn diffraction_mtf_unless(

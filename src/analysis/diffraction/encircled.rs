@@ -2,6 +2,7 @@
 
 use super::pupil_function::PupilFunction;
 use super::pupil_samples::{Complex, PupilSamples};
+use super::{Interruption, never};
 use crate::analysis::reference_sphere::ReferenceSphere;
 use crate::analysis::{AnalysisError, Estimate, lit_region};
 use crate::lens::FieldPoint;
@@ -23,10 +24,25 @@ pub fn encircled_energy(
     radii: &[f64],
     accuracy: Accuracy,
 ) -> Result<Vec<Estimate>, AnalysisError> {
+    encircled_energy_unless(model, field, wavelength, (center, radii), accuracy, &never)
+}
+
+/// The same unless it is interrupted, which is asked for before every ring of the image.
+///
+/// # Errors
+/// The same, and [`AnalysisError::Interrupted`].
+pub fn encircled_energy_unless(
+    model: &RayModel,
+    field: FieldPoint,
+    wavelength: usize,
+    (center, radii): ([f64; 2], &[f64]),
+    accuracy: Accuracy,
+    interrupted: &Interruption<'_>,
+) -> Result<Vec<Estimate>, AnalysisError> {
     let region = lit_region(model, field, wavelength)?;
     let sphere = ReferenceSphere::for_region(&region)?;
-    let encircled = |light: &PupilSamples| light.encircled(center, radii);
-    let found = PupilSamples::converge(&region, &sphere, None, accuracy, encircled)?;
+    let encircled = |light: &PupilSamples| light.encircled_unless(center, radii, interrupted);
+    let found = PupilSamples::converge(&region, &sphere, None, accuracy, interrupted, encircled)?;
     let estimate = |k: usize| Estimate::new(found.values[k], found.errors[k], found.rays);
     Ok((0..radii.len()).map(estimate).collect())
 }
@@ -109,6 +125,16 @@ const LEAST_NODES: usize = 8;
 impl PupilSamples {
     /// The share of the energy within circles about a point.
     pub fn encircled(&self, center: [f64; 2], radii: &[f64]) -> Vec<f64> {
+        // What never is interrupted never fails.
+        self.encircled_unless(center, radii, &never).unwrap_or_default()
+    }
+
+    fn encircled_unless(
+        &self,
+        center: [f64; 2],
+        radii: &[f64],
+        interrupted: &Interruption<'_>,
+    ) -> Result<Vec<f64>, AnalysisError> {
         // ∫ |U|² dx dy over the whole plane is λ² ∫ A² dα dβ (Parseval).
         let total = self.wavelength.powi(2) * self.energy();
         let spread = self.spread();
@@ -121,10 +147,15 @@ impl PupilSamples {
             from = *radius;
         }
         let waves = self.polar_waves(center);
-        let part = |(r, weight): &(f64, f64)| weight * TAU * r * ring_intensity(&waves, *r);
-        let parts: Vec<f64> = nodes.par_iter().map(part).collect();
+        let part = |(r, weight): &(f64, f64)| {
+            if interrupted() {
+                return Err(AnalysisError::Interrupted);
+            }
+            Ok(weight * TAU * r * ring_intensity(&waves, *r))
+        };
+        let parts: Vec<f64> = nodes.par_iter().map(part).collect::<Result<_, _>>()?;
         let share = |end: &usize| parts[..*end].iter().sum::<f64>() / total;
-        ends.iter().map(share).collect()
+        Ok(ends.iter().map(share).collect())
     }
 
     /// The light of every point of the pupil as a plane wave about a point of the image. A common inclination

@@ -27,13 +27,20 @@ mod pupil_samples;
 mod ray_pupil;
 mod strehl;
 
+/// A test that is asked often whether a computation is to end early.
+type Interruption<'a> = dyn Fn() -> bool + Sync + 'a;
+
+fn never() -> bool {
+    false
+}
+
 pub use contrast::{
     DiffractionGate, diffraction_gate, diffraction_mtf, polychromatic_diffraction_mtf,
     polychromatic_diffraction_mtf_unless, through_focus_mtf,
 };
-pub use encircled::encircled_energy;
+pub use encircled::{encircled_energy, encircled_energy_unless};
 pub use outline::PupilCurve;
-pub use point_spread::{PointSpread, point_spread};
+pub use point_spread::{PointSpread, point_spread, point_spread_unless};
 pub use pupil_function::PupilFunction;
 pub use pupil_samples::PupilSamples;
-pub use strehl::{Strehl, strehl};
+pub use strehl::{Strehl, strehl, strehl_unless};

@@ -1,6 +1,7 @@
 //! The intensity at points of the image of a point.
 
 use super::pupil_samples::PupilSamples;
+use super::{Interruption, never};
 use crate::analysis::reference_sphere::{ReferenceForm, ReferenceSphere};
 use crate::analysis::{AnalysisError, Estimate, lit_region};
 use crate::lens::FieldPoint;
@@ -33,13 +34,34 @@ pub fn point_spread(
     points: &[[f64; 2]],
     accuracy: Accuracy,
 ) -> Result<PointSpread, AnalysisError> {
+    point_spread_unless(model, field, wavelength, points, accuracy, &never)
+}
+
+/// The same unless it is interrupted, which is asked for before every point of the image.
+///
+/// # Errors
+/// The same, and [`AnalysisError::Interrupted`].
+pub fn point_spread_unless(
+    model: &RayModel,
+    field: FieldPoint,
+    wavelength: usize,
+    points: &[[f64; 2]],
+    accuracy: Accuracy,
+    interrupted: &Interruption<'_>,
+) -> Result<PointSpread, AnalysisError> {
     let region = lit_region(model, field, wavelength)?;
     let sphere = ReferenceSphere::for_region(&region)?;
     let reach = points.iter().map(|[x, y]| x.hypot(*y)).fold(0.0, f64::max);
-    let found = PupilSamples::converge(&region, &sphere, Some(reach), accuracy, |light| {
+    let intensities = |light: &PupilSamples| {
         let all = std::iter::once([0.0; 2]).chain(points.iter().copied());
-        all.map(|point| light.intensity(point)).collect()
-    })?;
+        let intensity = |point| {
+            if interrupted() { Err(AnalysisError::Interrupted) } else { Ok(light.intensity(point)) }
+        };
+        all.map(intensity).collect()
+    };
+    let reach = Some(reach);
+    let found =
+        PupilSamples::converge(&region, &sphere, reach, accuracy, interrupted, intensities)?;
     let estimate = |k: usize| Estimate::new(found.values[k], found.errors[k], found.rays);
     Ok(PointSpread {
         intensities: (1..found.values.len()).map(estimate).collect(),

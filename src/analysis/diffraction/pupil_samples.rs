@@ -1,5 +1,6 @@
 //! The light of a pupil on the reference sphere, at the nodes of a quadrature.
 
+use super::Interruption;
 use crate::analysis::AnalysisError;
 use crate::analysis::reference_sphere::ReferenceSphere;
 use crate::math::Dual;
@@ -39,22 +40,29 @@ pub(super) type Complex = [f64; 2];
 impl PupilSamples {
     /// Numbers of the light of a pupil, of so many nodes that the tolerance is kept; errors are absolute.
     /// With the largest distance in mm from the centre of the sphere of the points that they belong to, the
-    /// first order resolves the phase of the light there.
+    /// first order resolves the phase of the light there. `interrupted` is asked before every order.
     ///
     /// # Errors
-    /// The pupil is dark or folds.
+    /// The pupil is dark or folds, or the computation was interrupted.
     pub(super) fn converge(
         region: &Region<'_>,
         sphere: &ReferenceSphere,
         reach: Option<f64>,
         accuracy: Accuracy,
-        mut numbers: impl FnMut(&Self) -> Vec<f64>,
+        interrupted: &Interruption<'_>,
+        mut numbers: impl FnMut(&Self) -> Result<Vec<f64>, AnalysisError>,
     ) -> Result<ConvergedList, AnalysisError> {
         // A pupil that folds does so for few rays already.
         let few = Self::of_nodes(region, sphere, &region.nodes(FEW))?;
         let mut refused = None;
-        let at_nodes = |nodes: &Nodes| match Self::of_nodes(region, sphere, nodes) {
-            Ok(light) => Some(numbers(&light)),
+        let mut of_order = |nodes: &Nodes| {
+            if interrupted() {
+                return Err(AnalysisError::Interrupted);
+            }
+            numbers(&Self::of_nodes(region, sphere, nodes)?)
+        };
+        let at_nodes = |nodes: &Nodes| match of_order(nodes) {
+            Ok(values) => Some(values),
             Err(why) => {
                 refused = Some(why);
                 None

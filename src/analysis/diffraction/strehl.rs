@@ -1,6 +1,7 @@
 //! The Strehl ratio: at the image point of the chief ray, and at the brightest point in space.
 
 use super::pupil_samples::PupilSamples;
+use super::{Interruption, never};
 use crate::analysis::reference_sphere::ReferenceSphere;
 use crate::analysis::{AnalysisError, Estimate, lit_region};
 use crate::lens::FieldPoint;
@@ -33,13 +34,28 @@ pub fn strehl(
     wavelength: usize,
     accuracy: Accuracy,
 ) -> Result<Strehl, AnalysisError> {
+    strehl_unless(model, field, wavelength, accuracy, &never)
+}
+
+/// The same unless it is interrupted, which is asked for before every order of the quadrature.
+///
+/// # Errors
+/// The same, and [`AnalysisError::Interrupted`].
+pub fn strehl_unless(
+    model: &RayModel,
+    field: FieldPoint,
+    wavelength: usize,
+    accuracy: Accuracy,
+    interrupted: &Interruption<'_>,
+) -> Result<Strehl, AnalysisError> {
     let region = lit_region(model, field, wavelength)?;
     let sphere = ReferenceSphere::for_region(&region)?;
     let mut best_at = [0.0; 3];
-    let found = PupilSamples::converge(&region, &sphere, None, accuracy, |light| {
+    let ratios = |light: &PupilSamples| {
         best_at = brightest(light);
-        vec![light.intensity([0.0; 2]), light.intensity_at(best_at)]
-    })?;
+        Ok(vec![light.intensity([0.0; 2]), light.intensity_at(best_at)])
+    };
+    let found = PupilSamples::converge(&region, &sphere, None, accuracy, interrupted, ratios)?;
     let estimate = |k: usize| Estimate::new(found.values[k], found.errors[k], found.rays);
     Ok(Strehl { at_chief: estimate(0), best: estimate(1), best_at, reached: found.converged })
 }

@@ -7,7 +7,7 @@ mod query;
 mod scale;
 
 pub use query::{LibraryQuery, LibraryQueryError, parse_range};
-pub use scale::{LensScaleError, focal_length_factor, scale_to_focal_length};
+pub use scale::{LensScaleError, focal_length, focal_length_factor, scale_to_focal_length};
 
 use super::{FileError, bundled_lenses, json};
 use crate::lens::Lens;

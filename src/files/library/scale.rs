@@ -48,11 +48,18 @@ pub fn focal_length_factor(lens: &Lens, zoom: usize, mm: f64) -> Result<f64, Len
     if !(mm > 0.0 && mm.is_finite()) {
         return Err(LensScaleError::FocalLength(mm));
     }
+    Ok(mm / focal_length(lens, zoom)?.abs())
+}
+
+/// The focal length of a lens in mm, at its primary wavelength and a zoom position.
+///
+/// # Errors
+/// An afocal lens, and one that cannot be resolved.
+pub fn focal_length(lens: &Lens, zoom: usize) -> Result<f64, LensScaleError> {
     let system = lens.resolve(zoom, lens.wavelengths[lens.primary()].um)?;
     // The focal length does not depend on the beam: a stop of some size has a meaning for any lens.
     let beam = Beam { aperture: Aperture::StopSemiDiameter(1.0), ..Beam::for_lens(lens, zoom) };
-    let efl = first_order(&system, &beam)?.efl.ok_or(LensScaleError::Afocal)?;
-    Ok(mm / efl.abs())
+    first_order(&system, &beam)?.efl.ok_or(LensScaleError::Afocal)
 }
 
 /// A number in notes, with six digits.

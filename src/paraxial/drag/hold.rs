@@ -61,11 +61,36 @@ impl HeldLens {
         let moves =
             |(parameter, _): &(Parameter, f64)| parameter.quantity != Quantity::SemiDiameter;
         let locks = if motion.iter().any(moves) { settings.locks.clone() } else { Vec::new() };
+        Self::locked(lens, motion, locks, settings.free)
+    }
+
+    /// A lens that is to have the locked quantities of another one.
+    pub(super) fn like(
+        before: &Lens,
+        after: &Lens,
+        settings: &DragSettings,
+    ) -> Result<Self, DragError> {
+        let mut held = Self::locked(after, &[], settings.locks.clone(), settings.free)?;
+        if let (Some(constraints), [first, ..]) = (&mut held.constraints, &held.locks[..]) {
+            let original = LockConstraints::new(before, &held.locks, &[]);
+            let original = original.map_err(|why| DragError::Lock(*first, why))?;
+            held.target = original.values(&[]);
+            constraints.take_quantities_of(original);
+        }
+        Ok(held)
+    }
+
+    fn locked(
+        lens: &Lens,
+        motion: &[(Parameter, f64)],
+        locks: Vec<FirstOrderLock>,
+        which: FreeNumbers,
+    ) -> Result<Self, DragError> {
         let free = match locks[..] {
             [] => Vec::new(),
             [first, ..] => {
                 let scale = length_scale(lens).map_err(|why| DragError::Lock(first, why))?;
-                free_numbers(lens, motion, settings.free, scale)
+                free_numbers(lens, motion, which, scale)
             }
         };
         let mut coordinates = vec![motion.to_vec()];

@@ -192,6 +192,11 @@ impl LockConstraints {
         }
     }
 
+    /// Holds the quantities of another lens, in the unit of that one.
+    pub(super) fn take_quantities_of(&mut self, other: Self) {
+        (self.constraints, self.scale) = (other.constraints, other.scale);
+    }
+
     /// The number of held quantities.
     pub(super) fn count(&self) -> usize {
         self.constraints.len()

@@ -8,12 +8,14 @@
 //! of `0.01 f`. Where no nearby lens has the locked quantities, or the handle has reached the end of
 //! its range, it stops and says why.
 
+mod after_edit;
 mod handle;
 mod hold;
 mod limit;
 mod lock;
 mod place;
 
+pub use after_edit::{HeldEdit, HoldError, hold_after_edit};
 pub use handle::{Handle, HandleUnit, elements};
 pub use limit::DragLimit;
 pub use lock::{FirstOrderLock, LockError};

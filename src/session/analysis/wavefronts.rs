@@ -2,7 +2,7 @@
 
 use crate::analysis::{
     self, AnalysisError, Estimate, Spot, SquareGrid, Strehl, Wavefront, ZernikeOrder, ZernikeSum,
-    encircled_energy, grid_nodes, path_map, point_spread, strehl, zernike,
+    encircled_energy_unless, grid_nodes, path_map, point_spread_unless, strehl_unless, zernike,
 };
 use crate::lens::FieldPoint;
 use crate::pupil::{Accuracy, RayModel};
@@ -66,7 +66,7 @@ pub(super) fn field_wavefronts(
     model: &RayModel,
     spots: &[Result<Spot, AnalysisError>],
     tolerance: f64,
-    interrupted: impl Fn() -> bool,
+    interrupted: &(dyn Fn() -> bool + Sync),
 ) -> Option<FieldWavefronts> {
     let accuracy = Accuracy { tolerance, ..Accuracy::default() };
     let mut fields = Vec::with_capacity(model.fields.len());
@@ -75,7 +75,7 @@ pub(super) fn field_wavefronts(
             return None;
         }
         let half_width = half_width(model, spot);
-        fields.push(time(|| field_wavefront(model, *field, half_width, accuracy, &interrupted)));
+        fields.push(time(|| field_wavefront(model, *field, half_width, accuracy, interrupted)));
     }
     (!interrupted()).then(|| FieldWavefronts { um: model.channels[model.primary].um, fields })
 }
@@ -85,7 +85,7 @@ fn field_wavefront(
     field: FieldPoint,
     half_width: f64,
     accuracy: Accuracy,
-    interrupted: &impl Fn() -> bool,
+    interrupted: &(dyn Fn() -> bool + Sync),
 ) -> Result<FieldWavefront, AnalysisError> {
     let wavefront = analysis::wavefront(model, field, model.primary, accuracy)?;
     let map = path_map(model, field, model.primary, MAP)?;
@@ -94,7 +94,7 @@ fn field_wavefront(
     let image = if interrupted() {
         Err(AnalysisError::Interrupted)
     } else {
-        point_image(model, field, half_width)
+        point_image(model, field, half_width, interrupted)
     };
     Ok(FieldWavefront { wavefront, map, zernike, image })
 }
@@ -103,15 +103,18 @@ fn point_image(
     model: &RayModel,
     field: FieldPoint,
     half_width: f64,
+    interrupted: &(dyn Fn() -> bool + Sync),
 ) -> Result<PointImage, AnalysisError> {
     let w = model.primary;
-    let spread = point_spread(model, field, w, &grid_nodes(IMAGE, half_width), LOOKED_AT)?;
+    let nodes = grid_nodes(IMAGE, half_width);
+    let spread = point_spread_unless(model, field, w, &nodes, LOOKED_AT, interrupted)?;
     let part = |k: usize| half_width * (k + 1) as f64 / CIRCLES as f64;
     let radii: Vec<f64> = (0..CIRCLES).map(part).collect();
-    let energy = encircled_energy(model, field, w, [0.0; 2], &radii, LOOKED_AT)?;
+    let circles = ([0.0; 2], radii.as_slice());
+    let energy = encircled_energy_unless(model, field, w, circles, LOOKED_AT, interrupted)?;
     let values = spread.intensities.iter().map(|intensity| intensity.value).collect();
     Ok(PointImage {
-        strehl: strehl(model, field, w, LOOKED_AT)?,
+        strehl: strehl_unless(model, field, w, LOOKED_AT, interrupted)?,
         intensity: SquareGrid { count: IMAGE, half_width, values },
         error: spread.intensities.iter().map(|intensity| intensity.error).fold(0.0, f64::max),
         energy: radii.into_iter().zip(energy).collect(),
@@ -126,4 +129,36 @@ fn half_width(model: &RayModel, spot: &Result<Spot, AnalysisError>) -> f64 {
     let color = spot.as_ref().ok().and_then(|spot| spot.channels.get(model.primary)?.as_ref().ok());
     let rms = color.map_or(0.0, |color| color.rms.value);
     (WIDTH[1] * rms).min(WIDEST * unit).max(WIDTH[0] * unit)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::files;
+    use std::sync::atomic::{AtomicUsize, Ordering};
+
+    /// The image of a point takes longest where it is blurred: the next version of the design waits neither
+    /// for the end of a field nor for the rest of its image.
+    #[test]
+    fn wavefronts_are_interrupted_within_the_image_of_a_point() {
+        let bundled = files::bundled_lenses().iter().find(|lens| lens.name == "singlet_la1131");
+        let lens = files::json::read(bundled.map_or("", |lens| lens.text), "singlet").unwrap();
+        let model = RayModel::from_lens(&lens, 0).unwrap();
+        let (field, unit) = (model.fields[0], half_width(&model, &Err(AnalysisError::NoLight)));
+        let whole = AtomicUsize::new(0);
+        let asked_of = |asked: &AtomicUsize, most: usize| {
+            let interrupted = || asked.fetch_add(1, Ordering::SeqCst) >= most;
+            point_image(&model, field, unit, &interrupted).map(|image| image.rays)
+        };
+        asked_of(&whole, usize::MAX).unwrap();
+        // Every point of the image and every ring is a place to end at.
+        let whole = whole.into_inner();
+        assert!(whole > IMAGE * IMAGE + CIRCLES, "it was asked {whole} times");
+        for most in [0, 1, IMAGE, whole - 2] {
+            let asked = AtomicUsize::new(0);
+            assert_eq!(asked_of(&asked, most), Err(AnalysisError::Interrupted), "after {most}");
+            let more = asked.into_inner() - most;
+            assert!(more < 100, "it was asked {more} times after {most}");
+        }
+    }
 }

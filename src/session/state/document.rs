@@ -26,7 +26,11 @@ impl Session {
                 let proposal = is_other.then(|| MeritProposal::of(&lens));
                 let cell = edit.cell();
                 let origin = VersionOrigin { cell, proposal, ..VersionOrigin::new(edit.title()) };
+                let (lens, told) = self.after_element_edit(edit, lens);
                 self.add_version(Arc::new(lens), origin);
+                if let Some((severity, told)) = told {
+                    self.post(severity, told);
+                }
             }
             Err(why) => self.post(Severity::Warning, why.to_string()),
         }
@@ -253,7 +257,8 @@ impl Session {
                 let (count, refused) = (catalogue.glasses.len(), catalogue.refused.len());
                 let saved: Vec<String> = saved.iter().map(|p| p.display().to_string()).collect();
                 let saved = saved.join(", ");
-                let text = format!("{count} glasses added, {refused} refused; kept as {saved}");
+                let glasses = if count == 1 { "glass" } else { "glasses" };
+                let text = format!("{count} {glasses} added, {refused} refused; kept as {saved}");
                 self.post(Severity::Note, text);
             }
             Err(why) => self.post(Severity::Error, why.to_string()),

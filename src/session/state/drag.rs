@@ -2,6 +2,7 @@
 
 use super::Session;
 use crate::paraxial::{DragSettings, Handle};
+use crate::session::drag::held_text;
 use crate::session::history::VersionOrigin;
 use crate::session::journal::JournalEntry;
 use crate::session::view::Severity;
@@ -31,9 +32,7 @@ impl Session {
         }
         self.accept(Ok((*dragged).clone()), VersionOrigin::new(drag.title()));
         if let Some(moved) = drag.moved_text() {
-            let locks: Vec<String> =
-                self.drag.settings.locks.iter().map(ToString::to_string).collect();
-            let text = format!("the {} was held by {moved}", locks.join(" and the "));
+            let text = held_text(&self.drag.settings, &moved);
             self.post(Severity::Note, text);
         }
     }

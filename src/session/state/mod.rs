@@ -3,6 +3,7 @@
 mod candidate;
 mod document;
 mod drag;
+mod element;
 mod found_lens;
 mod journaling;
 mod live_goal;

@@ -1,7 +1,7 @@
 //! Fields of a panel that edit the lens: what is typed becomes an edit once it is accepted, and stays
 //! with the reason where the lens would not be valid.
 
-use egui::{Align, Id, Layout as Arrange, Response, RichText, Ui, vec2};
+use egui::{Align, Color32, Id, Layout as Arrange, Response, RichText, TextStyle, Ui, vec2};
 
 use super::valid_edit;
 use crate::lens::Edit;
@@ -14,6 +14,8 @@ use crate::studio::text_input::{EditBuffers, InputPlacement, TextInput, error_co
 
 /// The digits of a number in a form.
 const DIGITS: i32 = 7;
+/// The width of a field beside its text, in points.
+const TEXT_MARGIN: f32 = 10.0;
 
 /// The fields of a panel for one frame.
 pub(super) struct EditForm<'a> {
@@ -34,6 +36,24 @@ impl EditForm<'_> {
         // A text that has several lines is shown as such.
         let has_lines = shown.contains('\n');
         let placement = if has_lines { InputPlacement::Paragraph } else { InputPlacement::Form };
+        let input = TextInput { name, value: shown, hint: "", align: Align::Min, placement };
+        self.field(ui, input, width, edit)
+    }
+
+    /// The same for a text that may be long: one that does not fit into a line is broken into several.
+    pub(super) fn paragraph(
+        &mut self,
+        ui: &mut Ui,
+        name: &str,
+        (shown, width): (&str, f32),
+        edit: impl Fn(&str) -> Result<Edit, String>,
+    ) -> Response {
+        let font = TextStyle::Body.resolve(ui.style());
+        let line = ui.painter().layout_no_wrap(shown.to_owned(), font, Color32::WHITE);
+        if line.size().x + TEXT_MARGIN <= width {
+            return self.text(ui, name, (shown, width), edit);
+        }
+        let placement = InputPlacement::Paragraph;
         let input = TextInput { name, value: shown, hint: "", align: Align::Min, placement };
         self.field(ui, input, width, edit)
     }

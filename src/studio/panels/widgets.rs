@@ -94,14 +94,25 @@ const MARKS: [f32; 2] = [8.0, 20.0];
 /// A plot that can be neither moved nor zoomed. Its marks are round, and each has its number.
 pub(super) fn fixed_plot(ui: &Ui, name: &str, height: f32) -> Plot<'static> {
     let plot = Plot::new(name).height(height).allow_drag(false).allow_scroll(false);
-    let plot = plot.allow_zoom(false).allow_boxed_zoom(false).grid_spacing(MARKS[0]..=MARKS[1]);
+    let plot = plot.allow_zoom(false).allow_boxed_zoom(false);
     let plot = plot.grid_color(ui.visuals().widgets.noninteractive.bg_stroke.color);
-    let numbered = |axis: AxisHints<'static>| {
+    round_axes(plot, [AxisHints::new_x(), AxisHints::new_y()])
+}
+
+/// Gives a plot axes with round numbers as their marks, two at least however short an axis is, and each with
+/// its number.
+pub(super) fn round_axes(plot: Plot<'static>, axes: [AxisHints<'static>; 2]) -> Plot<'static> {
+    let [x, y] = axes.map(|axis| {
         let axis = axis.label_spacing(MARKS[0]..=MARKS[1]);
-        axis.formatter(|mark, _| number::format_digits(mark.value, MARK_DIGITS))
-    };
-    plot.custom_x_axes(vec![numbered(AxisHints::new_x())])
-        .custom_y_axes(vec![numbered(AxisHints::new_y())])
+        axis.formatter(|mark, _| {
+            // Marks that are close to each other differ in what they show.
+            let digits = number::digits_between(mark.value, mark.step_size, MARK_DIGITS);
+            number::format_digits(mark.value, digits)
+        })
+    });
+    plot.custom_x_axes(vec![x])
+        .custom_y_axes(vec![y])
+        .grid_spacing(MARKS[0]..=MARKS[1])
         .x_grid_spacer(|input| round_marks(&input, APART[0]))
         .y_grid_spacer(|input| round_marks(&input, APART[1]))
 }

@@ -153,7 +153,7 @@ fn result_text(seen: &ViewReport) -> String {
 
 /// The method by which the rays of a view are traced, and its error.
 fn tracing_text(seen: &ViewReport) -> String {
-    let how = seen.integrator.name().replace('_', " ");
+    let how = seen.integrator.title();
     let how = format!("{how}, step {} mm", format_small(seen.step));
     match seen.error {
         Some(error) => {

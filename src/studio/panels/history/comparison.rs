@@ -1,11 +1,13 @@
 //! Two versions beside each other: the numbers that a designer asks first, and every parameter that
 //! differs.
 
+use std::sync::Arc;
+
 use egui::{Grid, Ui};
 
 use super::spots;
 use crate::lens::{Lens, Parameter, Quantity, SurfaceNumber};
-use crate::session::{Analyses, AnalysisResults, HistoryNode, SessionView};
+use crate::session::{Analyses, AnalysisResults, HistoryNode, MeritReport, SessionView};
 use crate::studio::number;
 use crate::studio::panels::{RMS_OVER_FIELDS, mean_pupil_area, rms_over_fields, total_track};
 
@@ -74,8 +76,7 @@ fn numbers(view: &SessionView, selected: &HistoryNode) -> Vec<ComparedNumber> {
             found.push(ComparedNumber { name: name.to_owned(), present, selected });
         }
     };
-    let present = view.history.iter().find(|node| node.id == view.version_id);
-    add("merit", present.and_then(|node| node.merit).zip(selected.merit));
+    add("merit", merits(view, selected));
     if let Some(((_, own), (_, other))) = both(view, selected) {
         let of = |value: fn(&Analyses) -> Option<f64>| value(own).zip(value(other));
         let rms = of(|numbers| rms_over_fields(numbers).map(|spot| 1e3 * spot));
@@ -87,6 +88,19 @@ fn numbers(view: &SessionView, selected: &HistoryNode) -> Vec<ComparedNumber> {
     add("total track, mm", track(&view.lens).zip(track(&selected.lens)));
     found.extend(differing_parameters(&view.lens, &selected.lens));
     found
+}
+
+/// The merits of the present version and of the selected one: by the merit function of the present one as soon
+/// as both are known, as the layout tells them. Until then each by that of its own time.
+fn merits(view: &SessionView, selected: &HistoryNode) -> Option<(f64, f64)> {
+    let total = |report: &Option<Arc<MeritReport>>, lens: &Arc<Lens>| {
+        let report = report.as_deref().filter(|report| report.lens == *lens)?;
+        report.values.as_ref().ok().map(|values| values.total)
+    };
+    let own = total(&view.merit, &view.lens);
+    let live = own.zip(total(&view.preview_merit, &selected.lens));
+    let present = view.history.iter().find(|node| node.id == view.version_id);
+    live.or_else(|| present.and_then(|node| node.merit).zip(selected.merit))
 }
 
 /// The numbers that differ, of lenses with as many surfaces; a curvature as its radius.

@@ -3,27 +3,26 @@
 
 use std::ops::RangeInclusive;
 
-use egui::{Color32, CursorIcon, PointerButton, Pos2, Role, Ui, WidgetInfo};
+use egui::{
+    Color32, CursorIcon, PointerButton, Pos2, RichText, Role, Sense, Shape, Stroke, Ui, WidgetInfo,
+    vec2,
+};
 use egui_plot::{
-    AxisHints, Corner, Legend, LineStyle, MarkerShape, Plot, PlotPoint, PlotTransform, PlotUi,
-    Points,
+    AxisHints, LineStyle, MarkerShape, Plot, PlotPoint, PlotTransform, PlotUi, Points,
 };
 
 use super::text;
 use crate::optimize::pareto::{Front, ParetoPoint};
-use crate::session::{ParetoRun, RunView, SessionView};
+use crate::session::{ParetoPass, ParetoRun, RunView, SessionView};
 use crate::studio::panels::RMS_OVER_FIELDS;
-use crate::studio::panels::widgets::plot_curve;
+use crate::studio::panels::widgets::{plot_curve, round_axes};
 
 /// The distance in points within which the pointer picks a lens.
 const NEAR: f32 = 14.0;
 /// The margin around the shown range, as a share of it.
 const MARGIN: f64 = 0.06;
-
-/// The share of the plot that a legend takes, across and up.
-const LEGEND: [f64; 2] = [0.5, 0.4];
-/// The points of a front that a mark counts for.
-const MARK: usize = 100;
+/// The height in points below which the title of the axis of spots is a short one.
+const LOW: f32 = 240.0;
 
 /// A lens that was clicked.
 pub(super) struct ClickedDesign {
@@ -50,23 +49,22 @@ pub(super) fn plot(
 ) -> Option<ClickedDesign> {
     let colors = ParetoColors::of(ui);
     let bounds = bounds(view, run);
-    let light = AxisHints::new_x().label("light, mm²").label_spacing(24.0..=44.0);
+    legend(ui, view, run, chosen.is_some(), &colors);
+    let height = ui.available_height();
+    // A title longer than its axis would lie over the legend.
+    let what = if height < LOW { "RMS" } else { RMS_OVER_FIELDS };
+    let as_built = if run.start.as_built.is_some() { " as built" } else { "" };
+    let spot = format!("{what}{as_built}, µm");
+    let light = AxisHints::new_x().label("light, mm²");
+    let spot = AxisHints::new_y().label(spot).min_thickness(36.0);
     let plot = Plot::new("front")
-        .height(ui.available_height())
-        .legend(Legend::default().position(free_corner(view, run, &bounds)).background_alpha(0.6))
-        .custom_x_axes(vec![light])
-        .y_axis_label(if run.start.as_built.is_some() {
-            format!("{RMS_OVER_FIELDS} as built, µm")
-        } else {
-            format!("{RMS_OVER_FIELDS}, µm")
-        })
-        .y_axis_min_width(36.0)
+        .height(height)
         .allow_scroll(false)
         .allow_double_click_reset(false)
         .show_crosshair(false)
         .label_formatter(|_| None)
-        .grid_color(ui.visuals().widgets.noninteractive.bg_stroke.color)
-        .grid_spacing(12.0..=70.0);
+        .grid_color(ui.visuals().widgets.noninteractive.bg_stroke.color);
+    let plot = round_axes(plot, [light, spot]);
     let fit = *fitted;
     let shown = plot.show(ui, |plot| {
         if fit {
@@ -101,6 +99,11 @@ fn earlier_runs(view: &SessionView) -> impl Iterator<Item = &ParetoRun> {
 fn run_name(view: &RunView<ParetoRun>, run: &ParetoRun) -> String {
     let number = view.id.map_or(0, |id| id.number);
     format!("run {number}: {:.4}", run.main.hypervolume)
+}
+
+/// The legend entry of the front of fixed rays.
+fn biased_name(pass: &ParetoPass) -> String {
+    format!("fixed rays: {:.4}", pass.hypervolume)
 }
 
 /// The lens nearest to a place on the screen: of the front, of the biased one, of earlier ones.
@@ -140,35 +143,6 @@ fn bounds(view: &SessionView, run: &ParetoRun) -> [RangeInclusive<f64>; 2] {
     })
 }
 
-/// The corner of the plot with the fewest points below a legend.
-fn free_corner(view: &SessionView, run: &ParetoRun, bounds: &[RangeInclusive<f64>; 2]) -> Corner {
-    let mut points = plot_points(&run.main.front);
-    // The start and the design are single marks: they count more than one lens of many.
-    for mark in [Some(plot_point(&run.start)), design_point(view)].into_iter().flatten() {
-        points.extend([mark; MARK]);
-    }
-    let share = |axis: usize, value: f64| {
-        let (low, high) = (*bounds[axis].start(), *bounds[axis].end());
-        (value - low) / (high - low)
-    };
-    let covered = |right: bool, top: bool| {
-        let side = |far: bool, share: f64| if far { 1.0 - share } else { share };
-        let below = |point: &&[f64; 2]| {
-            side(right, share(0, point[0])) < LEGEND[0] && side(top, share(1, point[1])) < LEGEND[1]
-        };
-        points.iter().filter(below).count()
-    };
-    [
-        (covered(false, true), Corner::LeftTop),
-        (covered(true, true), Corner::RightTop),
-        (covered(true, false), Corner::RightBottom),
-        (covered(false, false), Corner::LeftBottom),
-    ]
-    .into_iter()
-    .min_by_key(|corner| corner.0)
-    .map_or(Corner::LeftTop, |corner| corner.1)
-}
-
 /// The spot and the light of the design.
 fn design_point(view: &SessionView) -> Option<[f64; 2]> {
     let scored = view.design_score.as_deref()?;
@@ -197,6 +171,74 @@ impl ParetoColors {
     }
 }
 
+/// The marks of the plot as the legend shows them.
+#[derive(Clone, Copy)]
+enum LegendMark {
+    Dot,
+    Line,
+    Dashes,
+    Cross,
+    Ring,
+}
+
+/// Explains the marks above the plot, where they can cover no lens.
+fn legend(ui: &mut Ui, view: &SessionView, run: &ParetoRun, chosen: bool, colors: &ParetoColors) {
+    let mut entries = vec![("tried".to_owned(), LegendMark::Dot, colors.faint)];
+    for run in &view.pareto.earlier {
+        let Some(earlier) = &run.snapshot else { continue };
+        entries.push((run_name(run, earlier), LegendMark::Line, colors.faint));
+    }
+    if let Some(biased) = &run.biased {
+        entries.push((biased_name(biased), LegendMark::Dashes, colors.biased));
+    }
+    entries.push((run_name(&view.pareto.run, run), LegendMark::Line, colors.front));
+    entries.push(("start".to_owned(), LegendMark::Cross, colors.strong));
+    if design_point(view).is_some() {
+        entries.push(("design".to_owned(), LegendMark::Ring, colors.strong));
+    }
+    if chosen {
+        entries.push(("shown lens".to_owned(), LegendMark::Ring, colors.selected));
+    }
+    ui.horizontal_wrapped(|ui| {
+        ui.spacing_mut().item_spacing = vec2(4.0, 1.0);
+        for (name, mark, color) in entries {
+            // A mark and its name stay on one line.
+            ui.horizontal(|ui| {
+                legend_mark(ui, mark, color);
+                ui.label(RichText::new(name).small());
+                ui.add_space(4.0);
+            });
+        }
+    });
+}
+
+fn legend_mark(ui: &mut Ui, mark: LegendMark, color: Color32) {
+    let (rect, _) = ui.allocate_exact_size(vec2(14.0, 10.0), Sense::hover());
+    let (painter, stroke) = (ui.painter(), Stroke::new(1.5, color));
+    let center = rect.center();
+    match mark {
+        LegendMark::Dot => {
+            painter.circle_filled(center, 1.5, color);
+        }
+        LegendMark::Line => {
+            painter.hline(rect.x_range(), center.y, stroke);
+            painter.circle_filled(center, 2.6, color);
+        }
+        LegendMark::Dashes => {
+            let ends = [rect.left_center(), rect.right_center()];
+            painter.extend(Shape::dashed_line(&ends, stroke, 4.0, 2.0));
+        }
+        LegendMark::Cross => {
+            for arm in [vec2(3.0, 3.0), vec2(3.0, -3.0)] {
+                painter.line(vec![center - arm, center + arm], stroke);
+            }
+        }
+        LegendMark::Ring => {
+            painter.circle_stroke(center, 4.0, stroke);
+        }
+    }
+}
+
 fn draw(
     plot: &mut PlotUi<'_>,
     view: &SessionView,
@@ -213,7 +255,7 @@ fn draw(
         curve(plot, &name, &earlier.main.front, colors.faint, LineStyle::Solid);
     }
     if let Some(biased) = &run.biased {
-        let name = format!("fixed rays: {:.4}", biased.hypervolume);
+        let name = biased_name(biased);
         curve(plot, &name, &biased.front, colors.biased, LineStyle::dashed_dense());
     }
     let name = run_name(&view.pareto.run, run);

@@ -74,6 +74,9 @@ impl PrescriptionTable<'_> {
         let show = |ui: &mut Ui| self.buffers.show(ui, place.id(), field);
         let entry = ui.allocate_ui_with_layout(size, layout, show).inner;
         self.cursor.record(place, rect, entry.response.has_focus());
+        if entry.response.gained_focus() {
+            self.entered = Some(rect);
+        }
         if entry.response.gained_focus() && place.surface() != self.view.selected {
             // Commands for an element mean that of the cursor.
             self.actions.push(Command::Select(place.surface()));

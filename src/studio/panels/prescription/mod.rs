@@ -17,6 +17,7 @@ mod details;
 mod fields;
 mod glass;
 mod radius_bounds;
+mod row_numbers;
 mod shapes;
 mod table;
 mod variables;
@@ -80,6 +81,7 @@ impl Panel for PrescriptionPanel {
             buffers: &mut self.buffers,
             cursor: &mut self.cursor,
             actions,
+            entered: None,
         };
         table.show(ui);
         if candidate.is_none() {

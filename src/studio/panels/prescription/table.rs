@@ -3,24 +3,21 @@
 use std::sync::Arc;
 
 use egui::{
-    Align, Button, Color32, Id, Label, Layout, Response, RichText, ScrollArea, Sense, Stroke, Ui,
-    vec2,
+    Align, Color32, Id, Label, Layout, Rect, RichText, ScrollArea, Sense, Stroke, Ui, vec2,
 };
 use egui_extras::{TableBuilder, TableRow};
 
+use super::badge;
 use super::candidate::Candidate;
-use super::cells::{CellPlace, OBJECT};
+use super::cells::CellPlace;
 use super::columns::TableColumn;
 use super::cursor::{CellCursor, CellGrid};
-use super::{actions, badge};
-use crate::lens::{Edit, Lens, Medium};
-use crate::session::{Analyses, Command, SessionView};
+use super::row_numbers::{self, NumberColumn, RowPlace};
+use crate::lens::{Lens, Medium};
+use crate::session::{Analyses, SessionView};
 use crate::studio::actions::Actions;
-use crate::studio::menu::show_items;
-use crate::studio::menu_items::element_items;
 use crate::studio::number;
 use crate::studio::palette::{Palette, color32};
-use crate::studio::panels::widgets::hint_beside;
 use crate::studio::text_input::EditBuffers;
 
 /// The height of a row, in points.
@@ -45,20 +42,23 @@ pub(super) struct PrescriptionTable<'a> {
     pub(super) buffers: &'a mut EditBuffers,
     pub(super) cursor: &'a mut CellCursor,
     pub(super) actions: &'a mut Actions,
+    /// The place of the cell that the cursor has come to.
+    pub(super) entered: Option<Rect>,
 }
 
 impl PrescriptionTable<'_> {
     pub(super) fn show(mut self, ui: &mut Ui) {
         let columns = self.columns;
         ui.spacing_mut().item_spacing = vec2(0.0, 0.0);
-        ScrollArea::horizontal().auto_shrink([false, false]).show(ui, |ui| {
+        let mut places = Vec::new();
+        let area = ScrollArea::horizontal().auto_shrink([false, false]).show(ui, |ui| {
             let mut table = TableBuilder::new(ui)
                 .id_salt(columns.len())
                 .resizable(true)
                 .animate_scrolling(false)
                 .auto_shrink([false, false])
                 .cell_layout(Layout::left_to_right(Align::Center))
-                .column(egui_extras::Column::exact(62.0));
+                .column(egui_extras::Column::exact(row_numbers::WIDTH));
             for column in columns {
                 table = table.column(column.width());
             }
@@ -66,30 +66,36 @@ impl PrescriptionTable<'_> {
                 table = table.scroll_to_row(row, None);
             }
             let rows = self.lens.surfaces.len() + 2;
-            table.header(ROW, |row| header(row, columns)).body(|body| {
-                body.rows(ROW, rows, |row| self.row(row));
+            let body = table.header(ROW, |row| header(row, columns)).body(|body| {
+                body.rows(ROW, rows, |row| places.extend(self.row(row)));
             });
+            if let Some(cell) = self.entered {
+                // Beside the numbers of the rows, which would hide it. Inside the table that would scroll
+                // its rows alone.
+                ui.scroll_to_rect(cell.with_min_x(cell.left() - row_numbers::WIDTH), None);
+            }
+            body
         });
+        let column = NumberColumn {
+            viewport: area.inner_rect,
+            rows: area.inner.inner_rect.y_range(),
+            is_scrolled: area.state.clamped_offset().x > 0.0,
+        };
+        self.row_numbers(ui, &column, &places);
     }
 
     pub(super) fn grid(&self) -> CellGrid<'_> {
         CellGrid { columns: self.columns, lens: &self.lens }
     }
 
-    fn row(&mut self, mut row: TableRow<'_, '_>) {
+    /// Shows a row but for its number, and returns the place of that.
+    fn row(&mut self, mut row: TableRow<'_, '_>) -> Option<RowPlace> {
         let index = row.index();
         let surface = index.checked_sub(1).filter(|surface| *surface < self.lens.surfaces.len());
         let chosen = surface.is_some() && surface == self.view.selected;
         row.set_selected(chosen);
-        row.col(|ui| match surface {
-            Some(surface) => self.surface_name(ui, surface),
-            None if index == OBJECT => {
-                row_name(ui, "OBJ").on_hover_text("The object: row 0");
-            }
-            None => {
-                row_name(ui, "IMA").on_hover_text("The image plane");
-            }
-        });
+        let mut number = Rect::NOTHING;
+        row.col(|ui| number = ui.max_rect());
         for column in self.columns {
             row.col(|ui| {
                 if chosen {
@@ -104,6 +110,8 @@ impl PrescriptionTable<'_> {
                 self.cell(ui, CellPlace::new(index, *column));
             });
         }
+        // A row that only takes room has no place.
+        number.is_finite().then(|| RowPlace { index, y: number.y_range() })
     }
 
     fn cell(&mut self, ui: &mut Ui, place: CellPlace) {
@@ -152,55 +160,6 @@ impl PrescriptionTable<'_> {
         }
     }
 
-    fn surface_name(&mut self, ui: &mut Ui, surface: usize) {
-        let stop = self.lens.surfaces[surface].stop;
-        let text = if stop { format!("{} STO", surface + 1) } else { (surface + 1).to_string() };
-        let text = if stop { RichText::new(text).strong() } else { RichText::new(text) };
-        let chosen = self.view.selected == Some(surface);
-        let label = ui.selectable_label(chosen, text).accessible_name(row_label(surface));
-        if label.clicked() || label.secondary_clicked() {
-            self.actions.push(Command::Select(Some(surface)));
-        }
-        if self.candidate.is_some() {
-            return;
-        }
-        label.context_menu(|ui| self.row_menu(ui, surface));
-        label.on_hover_text(format!(
-            "Surface {} of the window, which counts from 1; files count from 0: {surface} there. \
-             Press the right button for what can be done with it.",
-            surface + 1
-        ));
-    }
-
-    fn row_menu(&mut self, ui: &mut Ui, surface: usize) {
-        for action in actions::ALL {
-            let edit = action.edit(&self.lens, surface);
-            let button = Button::new(action.title());
-            let item = ui.add_enabled(edit.is_some(), button);
-            if hint_beside(item, action.hint()).clicked() {
-                self.actions.extend(edit);
-                ui.close();
-            }
-        }
-        ui.menu_button("Element", |ui| {
-            let items = element_items(&self.view.lens, Some(surface));
-            show_items(ui, 260.0, items, self.actions);
-        });
-        ui.separator();
-        let hyper = self.lens.surfaces[surface].hyperhemisphere;
-        if ui.selectable_label(hyper, "Hyper-hemisphere").clicked() {
-            self.actions.push(Edit::SetHyperhemisphere { surface, hyper: !hyper });
-            ui.close();
-        }
-        super::shapes::menu(
-            ui,
-            &self.lens,
-            surface,
-            self.clear_semi_diameter(surface),
-            self.actions,
-        );
-    }
-
     /// The text of a cell as it is shown, with numbers that fit into some characters: a solved gap as
     /// it was traced.
     pub(super) fn shown_text(&self, place: CellPlace, room: usize) -> String {
@@ -242,10 +201,7 @@ pub(super) fn room_in(ui: &Ui, place: CellPlace) -> usize {
 }
 
 fn header(mut row: TableRow<'_, '_>, columns: &[TableColumn]) {
-    row.col(|ui| {
-        ui.add_space(6.0);
-        ui.weak("Surf").on_hover_text("Surface number: the object is 0, the first surface 1");
-    });
+    row.col(|_| {});
     for column in columns {
         row.col(|ui| {
             let badge_width = if column.has_badge() { badge::WIDTH } else { 0.0 };
@@ -260,16 +216,6 @@ fn header(mut row: TableRow<'_, '_>, columns: &[TableColumn]) {
             });
         });
     }
-}
-
-fn row_name(ui: &mut Ui, text: &str) -> Response {
-    ui.add_space(6.0);
-    ui.weak(text)
-}
-
-/// The accessible name of the number of a row.
-fn row_label(surface: usize) -> String {
-    format!("Row of surface {}", surface + 1)
 }
 
 /// Shows a value that cannot be edited.

@@ -69,6 +69,9 @@ impl Panel for SystemPanel {
     }
 }
 
+/// The name of the text that may be long.
+const NOTES: &str = "Notes";
+
 /// The name of a text of the lens, the text, and the edit that sets it.
 type LensText<'a> = (&'static str, &'a str, fn(String) -> Edit);
 
@@ -79,7 +82,7 @@ fn texts(ui: &mut Ui, form: &mut EditForm<'_>) {
     let texts: [LensText<'_>; 3] = [
         ("Name", &lens.name, Edit::SetName),
         ("Source", &lens.source, Edit::SetSource),
-        ("Notes", &lens.notes, Edit::SetNotes),
+        (NOTES, &lens.notes, Edit::SetNotes),
     ];
     for (name, shown, edit) in texts {
         ui.horizontal(|ui| {
@@ -90,8 +93,12 @@ fn texts(ui: &mut Ui, form: &mut EditForm<'_>) {
             });
             let width = ui.available_width();
             let accessible = format!("{name} of the lens");
-            let entry =
-                form.text(ui, &accessible, (shown, width), |text| Ok(edit(text.to_owned())));
+            let edit = |text: &str| Ok(edit(text.to_owned()));
+            let entry = if name == NOTES {
+                form.paragraph(ui, &accessible, (shown, width), edit)
+            } else {
+                form.text(ui, &accessible, (shown, width), edit)
+            };
             if !shown.is_empty() {
                 // A long one is cut in its field.
                 entry.on_hover_text(shown);

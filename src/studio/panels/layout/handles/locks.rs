@@ -19,7 +19,8 @@ pub(in crate::studio::panels::layout) fn locks_row(
 ) {
     ui.horizontal(|ui| {
         ui.weak("Hold").on_hover_text(
-            "Held while a handle of the drawing is dragged, by the least change of the other numbers",
+            "Held by the least change of the other numbers while a handle of the drawing is dragged, \
+             and when an element is cemented, split or reversed",
         );
         let before = &view.drag.settings;
         let mut settings = before.clone();
