@@ -531,3 +531,62 @@ fn scaling_scales_apertures_and_reversal_keeps_them_at_their_surface() {
     assert_eq!(reversed.surfaces[1].apertures, [own]);
     assert_eq!(BlockedSide::Outside, reversed.surfaces[1].apertures[0].blocks);
 }
+
+/// A slit that is far narrower than the cells of any grid of rays has its area, at whatever angle.
+#[test]
+fn narrow_slits_have_their_area_at_every_angle() {
+    for angle in (0..12).map(|i| 15.0 * f64::from(i) + 5.0) {
+        let slit = at(frame(rectangle(6.0, 0.01)), [0.0; 2], angle);
+        let found = light(&lens(&[slit]), 0.0, 1e-2);
+        let off = (found.area - 0.24).abs();
+        assert!(off <= found.errors[0] && found.errors[0] < 0.24, "{angle}: {} {off}", found.area);
+    }
+}
+
+#[test]
+fn surfaces_are_as_large_as_the_light_behind_apertures() {
+    let size = |apertures: &[SurfaceAperture]| {
+        let model = RayModel::from_lens(&lens(apertures), 0).unwrap();
+        aplanat::analysis::clear_semi_diameters([&model])[0]
+    };
+    let square = frame(rectangle(4.0, 4.0));
+    let corner = 32.0_f64.sqrt();
+    for apertures in [vec![square.clone()], vec![square, block(circle(1.0))]] {
+        let found = size(&apertures);
+        assert!(found <= corner && found >= 0.99 * corner, "{found}");
+    }
+    let aside = size(&[at(frame(circle(2.0)), [5.0, 0.0], 0.0)]);
+    assert!((aside - 7.0).abs() < 1e-3, "{aside}");
+}
+
+/// What is tabulated over the distance from the axis alone is refused by name.
+#[test]
+fn pictures_behind_apertures_that_are_no_circles_are_refused() {
+    let text = std::fs::read_to_string("lenses/achromat_ac254_100.json").unwrap();
+    let mut lens: serde_json::Value = serde_json::from_str(&text).unwrap();
+    lens["surfaces"][0]["apertures"] =
+        serde_json::json!([{"shape": "rectangle", "half_width": 3.0, "half_height": 2.0}]);
+    let framed = super::cli::Scratch::with("framed.json", &lens.to_string());
+    let out = super::cli::Scratch::new("framed.png");
+    let picture =
+        ["picture", framed.path(), "--scene", "star", "--pixels", "8x8", "--out", out.path()];
+    super::cli::refused(2, &picture, "", &["surface 1", "no circle about its vertex"]);
+}
+
+/// Tolerances use the rays that get through, on the side on which they do, and no more than their budget.
+#[test]
+fn tolerances_know_apertures_beside_the_axis() {
+    let spider = block(ApertureShape::Spider { arms: 3, width: 0.2 });
+    for aperture in [at(frame(circle(2.0)), [5.0, 0.0], 0.0), spider] {
+        let mut lens = lens(&[aperture]);
+        lens.fields.values = [1.0, 2.0].map(|y| FieldPoint { x: 0.0, y, weight: 1.0 }).into();
+        let scene = aplanat::tolerance::ToleranceScene::new(&lens, 0, 1e-2).unwrap();
+        let model = RayModel::from_lens(&lens, 0).unwrap();
+        assert_eq!(scene.beam.fields.len(), 2, "no field on the other side is like one of these");
+        for colour in scene.beam.fields.iter().flat_map(|field| &field.colours) {
+            let imaged = |ray: &&Ray<f64>| model.channels[0].tracer.trace(**ray).fate.is_imaged();
+            assert_eq!(colour.rays.iter().filter(imaged).count(), colour.rays.len());
+            assert!(colour.rays.len() < 200_000, "{}", colour.rays.len());
+        }
+    }
+}
