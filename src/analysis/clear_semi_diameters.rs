@@ -2,7 +2,7 @@
 //! positions meets each surface. They are the size of a surface whose semi-diameter nobody fixed.
 
 use crate::lens::FieldPoint;
-use crate::pupil::{Launch, RayModel, Region, RegionKind};
+use crate::pupil::{Launch, RayModel, Region};
 use crate::trace::{ImagePoints, Ray, Rays, TraceSink as _};
 use rayon::prelude::*;
 use std::f64::consts::{PI, TAU};
@@ -66,15 +66,12 @@ fn raise_to_edge(heights: &mut [f64], launch: &Launch<'_>) {
 /// Rays at the edge of a pupil of any form, or all of a sample where it is in pieces.
 fn edge_of_light(launch: &Launch<'_>) -> Vec<Ray<f64>> {
     let region = Region::new(launch.clone());
-    let points = match &region.kind {
-        RegionKind::Clear | RegionKind::StarShaped(_) => {
-            let azimuths =
-                (0..EDGE_AZIMUTHS).map(|i| TAU * f64::from(i) / f64::from(EDGE_AZIMUTHS));
-            let edges = azimuths.filter_map(|azimuth| region.pupil_radius(azimuth));
-            edges.map(|edge| edge.point(1.0 - ROUNDED_EDGE)).collect()
-        }
-        _ => region.nodes(SAMPLE_ORDER).points,
-    };
+    let azimuths = (0..EDGE_AZIMUTHS).map(|i| TAU * f64::from(i) / f64::from(EDGE_AZIMUTHS));
+    let edges = azimuths.filter_map(|azimuth| region.pupil_radius(azimuth));
+    let mut points: Vec<_> = edges.map(|edge| edge.point(1.0 - ROUNDED_EDGE)).collect();
+    if points.is_empty() {
+        points = region.nodes(SAMPLE_ORDER).points;
+    }
     let tracer = &launch.channel().tracer;
     let rays = points.into_iter().filter_map(|p| launch.ray(p));
     rays.filter(|ray| tracer.trace(*ray).fate.is_imaged()).collect()

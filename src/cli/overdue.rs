@@ -5,17 +5,18 @@
 use super::error::CliError;
 use super::exit_status;
 use super::progress::are_signals_of_host;
+use crate::measure::Stopwatch;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 /// The time that a command has for its regular end.
-const PATIENCE: Duration = Duration::from_secs(5);
+const PATIENCE: f64 = 5.0; // seconds
 /// The time between two looks at the flag.
 const INTERVAL: Duration = Duration::from_millis(50);
 
-/// What a command has found so far, for a thread that ends the process with it if the command itself is
+/// The result of a command so far, for a thread that ends the process with it if the command itself is
 /// too late. Dropping it leaves the end to the command.
 #[derive(Debug)]
 pub(super) struct FoundSoFar<T>(Arc<Mutex<Option<T>>>);
@@ -31,7 +32,11 @@ impl<T: Send + 'static> FoundSoFar<T> {
         let shared = Arc::new(Mutex::new(Some(found)));
         if !are_signals_of_host() {
             let (stop, watched) = (Arc::clone(stop), Arc::clone(&shared));
-            thread::spawn(move || end_when_late(&stop, &watched, finish));
+            let watch = thread::Builder::new().name("late end".to_owned());
+            let begun = watch.spawn(move || end_when_late(&stop, &watched, finish));
+            if let Err(error) = begun {
+                log::warn!("a step that does not end will not be ended: {error}");
+            }
         }
         Self(shared)
     }
@@ -49,6 +54,7 @@ impl<T> Drop for FoundSoFar<T> {
     }
 }
 
+#[expect(clippy::exit, reason = "the thread of the command itself is in a step that does not end")]
 fn end_when_late<T>(
     stop: &AtomicBool,
     found: &Mutex<Option<T>>,
@@ -58,13 +64,13 @@ fn end_when_late<T>(
     loop {
         thread::sleep(INTERVAL);
         if stop.load(Ordering::Relaxed) {
-            asked.get_or_insert_with(Instant::now);
+            asked.get_or_insert_with(Stopwatch::start);
         }
         let mut found = found.lock().unwrap_or_else(PoisonError::into_inner);
         if found.is_none() {
             return;
         }
-        if asked.is_some_and(|asked| asked.elapsed() >= PATIENCE)
+        if asked.is_some_and(|asked| asked.seconds() >= PATIENCE)
             && let Some(found) = found.take()
         {
             std::process::exit(i32::from(exit_status(finish(found))));

@@ -65,7 +65,7 @@ fn resolve_planned(
     colors: bool,
 ) -> Result<(Vec<ResolvedWavelength>, usize), LensError> {
     let primary = lens.primary();
-    let catalogued = (!plan.computes(Effect::Temperature)).then(|| at_room_temperature(lens));
+    let catalogued = plan.leaves_out(Effect::Temperature).then(|| at_room_temperature(lens));
     let lens = catalogued.as_ref().unwrap_or(lens);
     let wavelengths = if colors { &lens.wavelengths } else { &lens.wavelengths[primary..=primary] };
     let resolve = |w: &Wavelength| {
@@ -104,7 +104,7 @@ pub fn simplify(system: &mut System<f64>, plan: &EffectPlan) {
     for surface in &plan.homogeneous {
         system.surfaces[*surface].grin = None;
     }
-    if !plan.computes(Effect::Poses) {
+    if plan.leaves_out(Effect::Poses) {
         centre(system);
     }
 }

@@ -76,6 +76,13 @@ pub struct EffectDecision {
     pub cost: Option<EffectCost>,
 }
 
+impl EffectDecision {
+    /// True if the lens would have the effect and it is not computed.
+    fn is_left_out(&self) -> bool {
+        !self.computed && (self.residual > 0.0 || self.choice == EffectOverride::Off)
+    }
+}
+
 /// The time that an effect takes, measured by runs with it and without it.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct EffectCost {
@@ -116,6 +123,11 @@ impl EffectPlan {
     /// True if an effect is computed.
     pub fn computes(&self, effect: Effect) -> bool {
         self.decision(effect).is_none_or(|decision| decision.computed)
+    }
+
+    /// True if an effect has to be taken out of a lens.
+    pub(super) fn leaves_out(&self, effect: Effect) -> bool {
+        self.decision(effect).is_some_and(EffectDecision::is_left_out)
     }
 
     /// The changes by all that is left out together; that of light without the part of dispersion,

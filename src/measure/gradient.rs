@@ -290,10 +290,10 @@ fn with_primary_system(
 
 /// The field of the lens with the least light above zero; the last one if all are dark.
 fn most_vignetted(model: &RayModel, lens: &Lens, zoom: usize) -> f64 {
-    let heights = lens.fields_at(zoom).values.iter().map(|field| field.y);
+    let mut heights = lens.fields_at(zoom).values.iter().map(|field| field.y);
     let lit = heights.clone().filter_map(|y| Some((y, area(model, y)?)));
     let least = lit.min_by(|a, b| a.1.total_cmp(&b.1)).map(|(y, _)| y);
-    least.or(heights.last()).unwrap_or(0.0)
+    least.or(heights.next_back()).unwrap_or(0.0)
 }
 
 fn area(model: &RayModel, y: f64) -> Option<f64> {

@@ -4,7 +4,9 @@ use super::double_gauss::{bundle, double_gauss};
 use super::machine::{MemoryUse, peak_megabytes};
 use super::rounding::{Rounding, measure_rounding};
 use super::timing::{RateStatistics, TimedCase, time_interleaved};
-use crate::lens::{LensError, Shape, System, SystemError, glass::line};
+use crate::lens::{
+    ApertureShape, LensError, Pose, Shape, SurfaceAperture, System, SystemError, glass::line,
+};
 use crate::math::{Real, Vec3};
 use crate::merit::MeritError;
 use crate::trace::{AdjointSeed, ImagePoints, Ray, Rays, SimdWidth, Tracer};
@@ -94,6 +96,8 @@ struct TracerVariants {
     spheres: Tracer<f64>,
     conics: Tracer<f64>,
     aspheres: Tracer<f64>,
+    tilted: Tracer<f64>,
+    framed: Tracer<f64>,
 }
 
 impl TracerVariants {
@@ -111,9 +115,33 @@ impl TracerVariants {
             spheres: reshaped(|_, shape| Shape::Sphere { curvature: shape.curvature() })?,
             conics: reshaped(|_, shape| Shape::Conic { curvature: shape.curvature(), conic: 0.0 })?,
             aspheres: reshaped(with_asphere)?,
+            tilted: Tracer::new(&tilted(system))?,
+            framed: Tracer::new(&framed(system))?,
         })
     }
 }
+
+/// The system with every surface but the image plane decentred and tilted a little.
+fn tilted(system: &System<f64>) -> System<f64> {
+    let mut tilted = system.clone();
+    let (_, lens) = tilted.surfaces.split_last_mut().unzip();
+    for surface in lens.into_iter().flatten() {
+        surface.pose = Some(Pose::new([1e-3, -1e-3], [1e-4, -1e-4]));
+    }
+    tilted
+}
+
+/// The system with a square aperture around all rays on its first surface.
+fn framed(system: &System<f64>) -> System<f64> {
+    let mut framed = system.clone();
+    let (half_width, half_height) = (AROUND, AROUND);
+    let square = ApertureShape::Rectangle { half_width, half_height };
+    framed.surfaces[0].apertures.push(SurfaceAperture::inside(square));
+    framed
+}
+
+/// Half of the width of an aperture around all rays, in mm.
+const AROUND: f64 = 100.0;
 
 /// The shape of a surface, with the first and the last glass surface as aspheres.
 fn with_asphere(i: usize, shape: Shape<f64>) -> Shape<f64> {
@@ -158,19 +186,23 @@ fn timed_cases<'a>(
     tracers: &'a TracerVariants,
     pool: &'a ThreadPool,
 ) -> Vec<(&'static str, TimedCase<'a>)> {
-    let TracerVariants { plain, single_precision, spheres, conics, aspheres } = tracers;
+    let TracerVariants { plain, single_precision, spheres, conics, aspheres, tilted, framed } =
+        tracers;
     vec![
         (FORWARD, batch(plain, SimdWidth::Bits512)),
         ("f64_batch_2_threads", on_two_threads(plain, pool)),
         ("f64_batch_1_thread_spheres", batch(spheres, SimdWidth::Bits512)),
         ("f64_batch_1_thread_conics", batch(conics, SimdWidth::Bits512)),
         ("f64_batch_1_thread_2_aspheres", batch(aspheres, SimdWidth::Bits512)),
+        ("f64_batch_1_thread_tilted", batch(tilted, SimdWidth::Bits512)),
+        ("f64_batch_1_thread_square", batch(framed, SimdWidth::Bits512)),
         ("f64_batch_avx2", batch(plain, SimdWidth::Bits256)),
         ("f64_batch_baseline", batch(plain, SimdWidth::Baseline)),
         ("f64_single", single_rays(plain)),
         ("f32_batch_1_thread", batch(single_precision, SimdWidth::Bits512)),
         (GRADIENT, gradient(plain)),
         ("gradient_2_aspheres", gradient(aspheres)),
+        ("gradient_tilted", gradient(tilted)),
         ("gradient_2_threads", gradient_on_two_threads(plain, pool)),
     ]
 }

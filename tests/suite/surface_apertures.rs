@@ -143,10 +143,6 @@ fn areas_of_apertures_are_those_of_plane_figures() {
         for field in [0.0, 8.0] {
             let found = light(&lens, field, 1e-9);
             let error = (found.area - area).abs();
-            println!(
-                "{name} at {field}: {} +- {:.1e}, off by {error:.1e}",
-                found.area, found.errors[0]
-            );
             assert!(error <= 1e-9 * area, "{name} at {field}: {} and not {area}", found.area);
         }
     }
@@ -202,10 +198,6 @@ fn spiders_and_other_thin_figures_are_never_overlooked() {
         );
         let found = light(&lens, 0.0, 1e-4);
         let error = (found.area - (ring - dark)).abs();
-        println!(
-            "{arms} arms of {width}: {} +- {:.1e}, off by {error:.1e}",
-            found.area, found.errors[0]
-        );
         assert!(error <= found.errors[0] && found.errors[0] < 1e-3 * ring, "{arms} {width}");
     }
     // A bar through a beam without a hole, and one that only touches its middle.
@@ -218,10 +210,6 @@ fn spiders_and_other_thin_figures_are_never_overlooked() {
             .sqrt();
         let exact = disc() - 2.0 * height * chord.min(2.0 * half);
         let error = (found.area - exact).abs();
-        println!(
-            "bar {half} x {height}: {} +- {:.1e}, off by {error:.1e}",
-            found.area, found.errors[0]
-        );
         assert!(error <= found.errors[0] + 1e-5 && found.errors[0] > 0.0, "{half} {height}");
     }
 }
@@ -256,10 +244,12 @@ fn derivatives_behind_a_spider_are_sampled_with_their_error() {
         let parameter = SurfaceParameter::Aperture(number);
         let got = found.gradient.surfaces[0].by(parameter);
         let error = found.error.surfaces[0].by(parameter);
-        println!("{number}: {got} +- {error:.1e}, exactly {exact}");
         assert!((got - exact).abs() < 4.0 * error && error < 0.1 * exact.abs(), "{number}");
     }
 }
+
+/// A lens by its name and apertures, with the derivatives of its light by their numbers.
+type Case = (&'static str, Vec<SurfaceAperture>, Vec<(usize, f64)>);
 
 /// `L = −area`, by every number of the apertures, against closed forms, and all numbers of the lens against
 /// differences of pupils that were searched for again.
@@ -267,7 +257,6 @@ fn derivatives_behind_a_spider_are_sampled_with_their_error() {
 fn derivatives_follow_the_edges_of_apertures() {
     let accuracy = Accuracy { tolerance: 1e-7, max_rays: 500_000 };
     let triangle = [[0.0, 5.0], [-4.0, -3.0], [4.0, -3.0]];
-    type Case = (&'static str, Vec<SurfaceAperture>, Vec<(usize, f64)>);
     let cases: [Case; 8] = [
         ("rectangle", vec![frame(rectangle(4.0, 2.0))], vec![(0, -8.0), (1, -16.0)]),
         (

@@ -12,7 +12,7 @@ use serde::Serialize;
 use std::fmt::{self, Display};
 use std::path::PathBuf;
 
-/// What a run has found until now, and where it is saved.
+/// The best lens and the steps of a run until now, and the files for them.
 #[derive(Debug)]
 pub(super) struct BestSoFar {
     json: bool,

@@ -1,29 +1,49 @@
 //! The best lens of the rounds before one that does not end, saved and printed in place of the result.
 
-use super::SearchEnd;
+use super::{SearchEnd, lens_to_write};
 use crate::cli::error::CliError;
 use crate::cli::failures::Failures;
 use crate::cli::output::{Output, ShortNumber, print_note, write_saved};
+use crate::cli::overdue::FoundSoFar;
 use crate::files;
 use crate::lens::Lens;
+use crate::search::SearchRunOn;
+use crate::search::lens_landscape::LensLandscape;
 use serde::Serialize;
 use std::fmt::{self, Display};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 
-/// What a search has found until now, and where it is saved.
+/// The best lens of a search until now, and the file for it.
 #[derive(Debug)]
 pub(super) struct BestSoFar {
-    pub(super) json: bool,
-    pub(super) out: Option<PathBuf>,
+    json: bool,
+    out: Option<PathBuf>,
     /// The best lens as it is written, with its merit in mm².
-    pub(super) best: Option<(Lens, f64)>,
-    pub(super) gradients: u64,
+    best: Option<(Lens, f64)>,
+    gradients: u64,
 }
 
 impl BestSoFar {
-    /// True if `merit` is below that of the best lens so far.
-    pub(super) fn is_improved_by(&self, merit: f64) -> bool {
-        self.best.as_ref().is_none_or(|(_, best)| merit < *best)
+    /// Begins to watch a search that `stop` asks to end, without any lens yet.
+    pub(super) fn watch(
+        out: Option<&Path>,
+        output: &Output,
+        stop: &Arc<AtomicBool>,
+    ) -> FoundSoFar<Self> {
+        let (json, out) = (output.is_json(), out.map(Path::to_path_buf));
+        let none = Self { json, out, best: None, gradients: 0 };
+        FoundSoFar::watch(stop, none, Self::save_and_print)
+    }
+
+    /// Adds what the rounds of a run have found until now.
+    pub(super) fn add(&mut self, run: &SearchRunOn<LensLandscape>, original: &Lens) {
+        self.gradients = run.statistics().gradients;
+        let found = run.best();
+        if self.best.as_ref().is_none_or(|(_, merit)| found.loss < *merit) {
+            self.best = Some((lens_to_write(&found.point, original), found.loss));
+        }
     }
 
     /// Saves and prints what there is.

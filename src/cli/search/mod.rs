@@ -106,6 +106,21 @@ enum SearchEnd {
     Interrupted,
 }
 
+/// A run with its end and its clock, and what somebody learns of it who cannot wait.
+struct WatchedRun<'a> {
+    stop: &'a AtomicBool,
+    watch: Stopwatch,
+    so_far: &'a FoundSoFar<BestSoFar>,
+    /// The lens whose wavelengths and variables the best one is written with.
+    original: &'a Lens,
+}
+
+impl WatchedRun<'_> {
+    fn tell(&self, run: &SearchRunOn<LensLandscape>) {
+        self.so_far.update(|so_far| so_far.add(run, self.original));
+    }
+}
+
 /// Gives a search without a merit function that of the lens, if there is one, and says which terms a
 /// search cannot have.
 pub(super) fn give_goal(plan: &mut SearchPlan, lens: &Lens) -> Result<(), LandscapeError> {
@@ -123,9 +138,7 @@ impl SearchArgs {
         self.check()?;
         self.check_paths()?;
         let stop = stop_flag();
-        let (out, json) = (self.out.clone(), output.is_json());
-        let so_far = BestSoFar { json, out, best: None, gradients: 0 };
-        let so_far = FoundSoFar::watch(&stop, so_far, BestSoFar::save_and_print);
+        let so_far = BestSoFar::watch(self.out.as_deref(), output, &stop);
         let design = self.design_effects()?;
         let opened = self.lens.open()?;
         let _lock = self.checkpoint.as_deref().map(FileLock::acquire).transpose()?;
@@ -133,8 +146,7 @@ impl SearchArgs {
         let start = self.plan_args.start_lens(&opened.lens)?;
         let lens = design.working_lens(&start);
         let effects = design.report(&start, &opened.file)?;
-        let Lens { wavelengths, .. } = start;
-        let original = Lens { wavelengths, ..opened.lens.clone() };
+        let original = Lens { wavelengths: start.wavelengths, ..opened.lens.clone() };
         let refused = |cause: LandscapeError| self.landscape_error(&opened.file, cause);
         give_goal(&mut plan, &lens).map_err(refused)?;
         let landscape = plan.landscape(&lens).map_err(refused)?;
@@ -143,20 +155,10 @@ impl SearchArgs {
         limits::warn(&start_breaks);
         let idle = resumed.then(|| nothing_to_do(&run)).flatten();
         idle.iter().for_each(print_note);
-        let watch = Stopwatch::start();
-        let before = run.statistics().gradients;
+        let (watch, before) = (Stopwatch::start(), run.statistics().gradients);
         let mut failures = Failures::default();
-        let tell = |run: &SearchRunOn<LensLandscape>| {
-            let best = run.best();
-            so_far.update(|so_far| {
-                so_far.gradients = run.statistics().gradients;
-                if so_far.is_improved_by(best.loss) {
-                    so_far.best = Some((lens_to_write(&best.point, &original), best.loss));
-                }
-            });
-        };
-        tell(&run);
-        let ended = self.run_rounds(&landscape, &mut run, &stop, watch, &mut failures, tell);
+        let watched = WatchedRun { stop: &stop, watch, so_far: &so_far, original: &original };
+        let ended = self.run_rounds(&landscape, &mut run, &watched, &mut failures);
         let ms = 1e3 * watch.seconds();
         let mut unsaved = self.save_best(&run.best().point, &original, &mut failures);
         let stored = self.write_reservoir(&run, &original, &mut failures);
@@ -285,15 +287,15 @@ impl SearchArgs {
         &self,
         landscape: &LensLandscape,
         run: &mut SearchRunOn<LensLandscape>,
-        stop: &AtomicBool,
-        watch: Stopwatch,
+        watched: &WatchedRun<'_>,
         failures: &mut Failures,
-        tell: impl Fn(&SearchRunOn<LensLandscape>),
     ) -> SearchEnd {
+        let WatchedRun { stop, watch, .. } = *watched;
+        watched.tell(run);
         let bar = progress_bar(run.settings().gradients.unwrap_or(0) as usize);
         let (mut saved, mut is_failing) = (0.0, false);
         let flow = run.advance(landscape, |run, _| {
-            tell(run);
+            watched.tell(run);
             bar.set_position(run.statistics().gradients);
             bar.set_message(format!("merit {}", ShortNumber(run.best().loss)));
             if watch.seconds() - saved >= self.checkpoint_every {

@@ -156,7 +156,7 @@ pub(super) fn jittered_nodes(
     let placed = all.into_iter().map(|[x, y]| [center[0] + x, center[1] + y]);
     let points: Vec<_> = placed.filter(|p| p[0].hypot(p[1]) <= reach).collect();
     let weights = vec![size * size; points.len()];
-    Nodes { weights, points, ..Nodes::default() }
+    Nodes { points, weights, ..Nodes::default() }
 }
 
 /// The points of independent parts together.
