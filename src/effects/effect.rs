@@ -51,7 +51,7 @@ impl Effect {
             Self::Aiming => "ray aiming",
             Self::FiniteObject => "finite object",
             Self::GradientIndex => "gradient index",
-            Self::Poses => "tilts and decentres",
+            Self::Poses => "tilts, decentres",
             Self::Temperature => "temperature",
         }
     }

@@ -10,8 +10,8 @@ use super::timing::Stopwatch;
 use crate::lens::{Lens, Medium};
 use crate::merit::{DerivativeLevel, Merit, MeritError};
 use crate::optimize::{DescentMethod, start_from};
+use crate::search::Random;
 use crate::search::lens_landscape::{LensLandscape, SearchPlan, SearchSetupError};
-use crate::search::{Landscape as _, Random};
 use nalgebra::{DMatrix, DVector};
 use rand::SeedableRng as _;
 use rayon::prelude::*;
@@ -25,6 +25,9 @@ const MOST_EVALUATIONS: usize = 1000;
 const BATCH: u64 = 32;
 /// The curvature relative to the focal length below which a surface counts as plane.
 const PLANE: f64 = 0.05;
+/// The parts of the way from the lens to random numbers that are tried: of many surfaces few random ones
+/// form an image.
+const SPREADS: [f64; 4] = [1.0, 0.5, 0.25, 0.125];
 /// The square of the distance below which two minima are the same, and that above which they are not.
 const SAME: f64 = 1e-2;
 const DIFFERENT: f64 = 1.0;
@@ -158,7 +161,8 @@ fn descend(
 ) -> (DescentEnd, usize) {
     // Each start has random numbers of its own, whatever thread it is on.
     let mut random = Random::seed_from_u64(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ start);
-    let Ok(drawn) = landscape.draw(&mut random) else { return (DescentEnd::Lost, 0) };
+    let drawn = SPREADS.iter().find_map(|spread| landscape.draw_near(*spread, &mut random));
+    let Some(drawn) = drawn else { return (DescentEnd::Lost, 0) };
     let lens = landscape.with_variables(&drawn);
     let optimizer = landscape
         .merit(&drawn, tolerance)

@@ -236,6 +236,19 @@ impl LensLandscape {
         merit.map_or(0, |merit| merit.spot_samplings().iter().map(|spot| spot.rays).sum())
     }
 
+    /// A random lens with a merit, its numbers at most this part of the way from those of the start to any that
+    /// are permitted; `None` if none was found.
+    pub fn draw_near(&self, spread: f64, random: &mut Random) -> Option<Arc<Lens>> {
+        let free = self.with_variables(&self.start);
+        let range = (self.focal_length, spread);
+        (0..MAX_DRAWS).find_map(|_| {
+            let mut lens = random_start::random_lens(&free, &self.rules, range, random)?;
+            lens.variables.clone_from(&self.start.variables);
+            let lens = Arc::new(variables::clamp_to_bounds(&lens));
+            self.loss(&lens).is_finite().then_some(lens)
+        })
+    }
+
     /// The reference for losses: that of the start without the penalties of the manufacturing
     /// limits, which a search reduces first.
     pub fn loss_scale(&self) -> f64 {
@@ -327,20 +340,8 @@ impl Landscape for LensLandscape {
     }
 
     fn draw(&self, random: &mut Random) -> Result<Arc<Lens>, MutationError> {
-        let free = self.with_variables(&self.start);
-        for _ in 0..MAX_DRAWS {
-            let Some(mut lens) =
-                random_start::random_lens(&free, &self.rules, self.focal_length, random)
-            else {
-                continue;
-            };
-            lens.variables.clone_from(&self.start.variables);
-            let lens = Arc::new(variables::clamp_to_bounds(&lens));
-            if self.loss(&lens).is_finite() {
-                return Ok(lens);
-            }
-        }
-        Err(MutationError::new(MutationKind::Global, Refusal::NoRandomLens))
+        let none = || MutationError::new(MutationKind::Global, Refusal::NoRandomLens);
+        self.draw_near(1.0, random).ok_or_else(none)
     }
 
     fn mutate(

@@ -12,13 +12,14 @@ const MAX_GAP: f64 = 0.2;
 /// The maximum factor by which a random lens is scaled to the focal length.
 const MAX_RESCALING: f64 = 4.0;
 
-/// A random lens with the structure of `lens`. Variable curvatures and gaps are drawn uniformly;
+/// A random lens with the structure of `lens`. Variable curvatures and gaps are drawn uniformly, or, for a
+/// `spread` below 1, that part of the way from those of the lens to such ones;
 /// then the lens is scaled to a focal length in mm, focused, and its apertures opened as far as
 /// there is room. `None` if it does not focus.
 pub(super) fn random_lens(
     lens: &Lens,
     rules: &SearchRules,
-    focal_length: f64,
+    (focal_length, spread): (f64, f64),
     random: &mut Random,
 ) -> Option<Lens> {
     let mut drawn = lens.clone();
@@ -34,7 +35,9 @@ pub(super) fn random_lens(
             }
             _ => continue,
         };
-        drawn.set(*parameter, range[0] + (range[1] - range[0]) * random.random::<f64>());
+        let value = range[0] + (range[1] - range[0]) * random.random::<f64>();
+        let own = lens.get(*parameter).filter(|_| spread < 1.0);
+        drawn.set(*parameter, own.map_or(value, |own| own + spread * (value - own)));
     }
     let drawn = drawn.with_pickups().ok()?;
     let factor = focal_length / focal_length_of(&drawn)?;
