@@ -66,7 +66,7 @@ impl ForeignOutline {
         if self.centred_radius().is_some() {
             return String::new();
         }
-        format!("{}: traced", self.aperture(blocks).text())
+        format!("{}: traced", self.aperture(blocks))
     }
 }
 
@@ -81,7 +81,7 @@ pub(super) fn unwritten_aperture(
         let is_kept = row.kept_aperture(format.trim_start_matches('.')).is_some();
         let found = if is_kept || row.apertures.is_empty() { None } else { fault(row) };
         if let Some(k) = found {
-            let own = row.apertures[k].text();
+            let own = &row.apertures[k];
             let why = format!(
                 "({own}) is one that a {format} file cannot hold there; expected the native format (.json)"
             );
@@ -108,8 +108,8 @@ mod tests {
         let turned = outline(OutlineForm::Rectangle, [2.0, 1.0], [0.0; 2]);
         ForeignOutline { angle: 30.0, ..turned }.add_to(&mut row, inside, 1.0);
         let [circle, rectangle] = &row.apertures[..] else { panic!("{:?}", row.apertures) };
-        assert_eq!(circle.text(), "circle of radius 20 at (10, 0)");
-        let text = "obscuring rectangle of half widths 2 and 1 turned by 30 deg";
-        assert_eq!(rectangle.text(), text);
+        assert_eq!(circle.to_string(), "circle ±20 at 10, 0");
+        let text = "obscuring rectangle ±2 x ±1 turned 30";
+        assert_eq!(rectangle.to_string(), text);
     }
 }

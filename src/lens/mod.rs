@@ -7,6 +7,9 @@
 //! and medium of a row belong to the gap behind its surface; the last thickness leads to the image
 //! plane, which has no row. The curvature is stored, the radius is displayed.
 
+mod absorption;
+mod aperture_section;
+mod aperture_text;
 mod axis_break;
 mod check;
 mod compensator;
@@ -41,6 +44,8 @@ mod zoom;
 pub use crate::grin::field::{
     AXIAL_TERMS, PROFILE_TERMS, ProfileCoefficients, ProfileLaw, RADIAL_TERMS, RotationalProfile,
 };
+pub use aperture_section::HeightInterval;
+pub use aperture_text::{apertures_text, parse_apertures};
 pub use axis_break::AxisBreak;
 pub use check::LensError;
 pub use compensator::{AdjustedPart, Compensator};

@@ -5,7 +5,7 @@
 //! frame, projected along x. A surface without a semi-diameter extends to its outermost rays, or else as
 //! far as the largest surface.
 
-use super::{Pose, System};
+use super::{HeightInterval, Pose, System};
 use crate::math::Vec3;
 
 /// The section of a system. Points are `[z, y]` in mm from the first vertex.
@@ -86,6 +86,26 @@ impl<'a> LensSection<'a> {
         self.curve(surface, self.heights[surface], pieces)
     }
 
+    /// The parts of a surface at which its obstruction or an aperture blocks light, each in this number of
+    /// straight pieces.
+    pub fn blocked_parts(&self, surface: usize, pieces: u32) -> Vec<Vec<[f64; 2]>> {
+        let blocked = self.blocked_heights(surface);
+        blocked.into_iter().map(|heights| self.part(surface, heights, pieces)).collect()
+    }
+
+    /// The parts of a surface inside its rim that are left by its obstruction and its apertures.
+    pub fn open_parts(&self, surface: usize, pieces: u32) -> Vec<Vec<[f64; 2]>> {
+        let (height, blocked) = (self.heights[surface], self.blocked_heights(surface));
+        let starts = std::iter::once(-height).chain(blocked.iter().map(|own| own[1]));
+        let ends = blocked.iter().map(|own| own[0]).chain(std::iter::once(height));
+        let parts = starts.zip(ends).filter(|(start, end)| start < end || blocked.is_empty());
+        parts.map(|(start, end)| self.part(surface, [start, end], pieces)).collect()
+    }
+
+    fn blocked_heights(&self, surface: usize) -> Vec<HeightInterval> {
+        self.system.surfaces[surface].blocked_heights(self.heights[surface])
+    }
+
     /// The point of a surface at a height, flat beyond its own semi-diameter.
     pub fn point(&self, surface: usize, height: f64) -> [f64; 2] {
         let ground = height.abs().min(self.heights[surface]);
@@ -124,8 +144,13 @@ impl<'a> LensSection<'a> {
     }
 
     fn curve(&self, surface: usize, height: f64, pieces: u32) -> Vec<[f64; 2]> {
-        let share = |i: u32| 2.0 * f64::from(i) / f64::from(pieces) - 1.0;
-        (0..=pieces).map(|i| self.point(surface, height * share(i))).collect()
+        self.part(surface, [-height, height], pieces)
+    }
+
+    /// A surface between two heights.
+    fn part(&self, surface: usize, [low, high]: HeightInterval, pieces: u32) -> Vec<[f64; 2]> {
+        let share = |i: u32| f64::from(i) / f64::from(pieces);
+        (0..=pieces).map(|i| self.point(surface, low + (high - low) * share(i))).collect()
     }
 }
 

@@ -349,27 +349,6 @@ impl SurfaceAperture {
         }
     }
 
-    /// The words that name it in tables and reports, with its sizes in mm.
-    pub fn text(&self) -> String {
-        let form = match &self.shape {
-            ApertureShape::Circle { radius } => format!("circle of radius {radius}"),
-            ApertureShape::Ellipse { half_width, half_height } => {
-                format!("ellipse of semi-axes {half_width} and {half_height}")
-            }
-            ApertureShape::Rectangle { half_width, half_height } => {
-                format!("rectangle of half widths {half_width} and {half_height}")
-            }
-            ApertureShape::Polygon { points } => format!("polygon of {} corners", points.len()),
-            ApertureShape::Spider { arms, width } => format!("{arms} arms of width {width}"),
-        };
-        let [x, y] = self.center;
-        let place = if is_origin(&self.center) { String::new() } else { format!(" at ({x}, {y})") };
-        let angle = self.angle;
-        let turned = if angle == 0.0 { String::new() } else { format!(" turned by {angle} deg") };
-        let side = if self.obscures() { "obscuring " } else { "" };
-        format!("{side}{form}{place}{turned}")
-    }
-
     /// The fault of its numbers, as the rest of a sentence; `None` for one that can be traced with.
     pub fn fault(&self) -> Option<String> {
         let wrong = |what: &str, found: f64| {

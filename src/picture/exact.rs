@@ -14,12 +14,12 @@
 //! depend on the number of threads.
 
 use super::lit_directions::LitDirections;
-use super::losses::{LensLosses, LossReport};
+use super::losses::{LensLosses, LightLosses, LossReport};
 use super::sample_points::LONGEST;
 use super::scene::{Radiance, Scene};
 use super::tile_sampler::{PictureTile, SampledTile, TileSampler, TileWork};
 use super::{ColorBand, ImageFrame, Picture, PictureError};
-use crate::analysis::{Coating, irradiance};
+use crate::analysis::irradiance;
 use crate::lens::{Surface, SurfaceNumber};
 use crate::pupil::{Accuracy, RayModel};
 use crate::trace::Fates;
@@ -145,7 +145,7 @@ impl<'a> ExactRenderer<'a> {
         Ok(Self { scene, frame, sampler, white })
     }
 
-    /// The same with what the surfaces of the lens reflect taken away, for the model and the colours of
+    /// The same with what the surfaces of the lens reflect and its glasses absorb taken away, for the model and the colours of
     /// this renderer; one share for each colour where it varies by less than a tolerance.
     ///
     /// # Errors
@@ -154,17 +154,17 @@ impl<'a> ExactRenderer<'a> {
         mut self,
         model: &RayModel,
         bands: &[ColorBand],
-        coating: Coating,
+        taken: LightLosses<'_>,
         tolerance: f64,
     ) -> Result<Self, PictureError> {
         let light = (&self.sampler.directions, self.frame.reach());
-        let losses = LensLosses::new(model, bands, light, (coating, tolerance))?;
+        let losses = LensLosses::new(model, bands, light, (taken, tolerance))?;
         self.white *= losses.report.transmission;
         self.sampler.losses = Some(losses);
         Ok(self)
     }
 
-    /// The losses at the surfaces of the lens, if they are in the picture.
+    /// The losses at the surfaces and in the glasses of the lens, if they are in the picture.
     pub fn losses(&self) -> Option<&LossReport> {
         self.loss_table().map(|losses| &losses.report)
     }

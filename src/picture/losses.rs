@@ -1,4 +1,4 @@
-//! Fresnel losses in a picture: what the surfaces of a lens reflect does not arrive.
+//! Losses in a picture: what the surfaces of a lens reflect and what its glasses absorb does not arrive.
 //!
 //! The share of light that passes changes slowly over the directions at an image point, over the distance of
 //! that point from the axis and over the wavelength. It is tabulated, rays by rays with the cosines at every
@@ -9,6 +9,7 @@ use super::PictureError;
 use super::color_band::ColorBand;
 use super::lit_directions::LitDirections;
 use crate::analysis::{BackwardLens, CoatedLens, Coating, PassedLight};
+use crate::lens::{Lens, SurfaceNumber};
 use crate::pupil::RayModel;
 use rayon::prelude::*;
 use serde::Serialize;
@@ -19,6 +20,15 @@ const CELLS: usize = 10;
 /// The nodes along a side.
 const NODES: usize = CELLS + 1;
 
+/// What takes light away on its way through a lens.
+#[derive(Debug, Clone, Copy)]
+pub struct LightLosses<'a> {
+    /// The coating of all surfaces between air and glass.
+    pub coating: Coating,
+    /// The lens whose glasses absorb light, as far as that is known; `None` for clear glass.
+    pub glasses: Option<&'a Lens>,
+}
+
 /// The losses of a picture.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct LossReport {
@@ -26,6 +36,11 @@ pub struct LossReport {
     pub coating: String,
     /// The share of light that arrives on the axis at the middle colour, for a lit direction on average.
     pub transmission: f64,
+    /// The share of light on the axis at the middle colour that the glasses absorb.
+    pub absorbed: f64,
+    /// The surfaces in front of media whose absorption is not known at all colours, and is left out there.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub unknown_absorption: Vec<SurfaceNumber>,
     /// One minus the smallest share over the largest, over directions and image points of a colour: what is
     /// wrong if each colour has one share.
     pub variation: f64,
@@ -80,6 +95,37 @@ struct LossRange {
     polarisation: f64,
 }
 
+impl LightLosses<'_> {
+    /// The absorbance in 1/mm behind a surface, 0 where it is not known.
+    fn absorbance(&self, surface: usize, um: f64) -> f64 {
+        self.glasses.and_then(|lens| lens.absorbance(surface, um)).unwrap_or(0.0)
+    }
+
+    fn color_lens(&self, model: &RayModel, wavelength: usize) -> Result<ColorLens, PictureError> {
+        let um = model.channels[wavelength].um;
+        let coated = CoatedLens::new(model, wavelength, self.coating)?;
+        let coated = coated.with_absorption(|surface| self.absorbance(surface, um));
+        Ok(ColorLens { rays: BackwardLens::new(model, wavelength)?, coated })
+    }
+
+    /// The share of light on the axis that the glasses absorb at a wavelength.
+    fn absorbed(&self, model: &RayModel, wavelength: usize) -> f64 {
+        let channel = &model.channels[wavelength];
+        let gaps = channel.system.surfaces.iter().enumerate();
+        let along = gaps.map(|(i, row)| self.absorbance(i, channel.um) * row.thickness.abs());
+        1.0 - (-along.sum::<f64>()).exp()
+    }
+
+    fn unknown_absorption(&self, model: &RayModel) -> Vec<SurfaceNumber> {
+        let Some(lens) = self.glasses else { return Vec::new() };
+        let is_known = |surface: usize| {
+            model.channels.iter().all(|channel| lens.absorbance(surface, channel.um).is_some())
+        };
+        let unknown = (0..lens.surfaces.len()).filter(|surface| !is_known(*surface));
+        unknown.map(SurfaceNumber::new).collect()
+    }
+}
+
 impl LensLosses {
     /// The losses of a model in some colours, for image points up to `reach` mm from the axis.
     ///
@@ -89,12 +135,9 @@ impl LensLosses {
         model: &RayModel,
         bands: &[ColorBand],
         (directions, reach): (&LitDirections, f64),
-        (coating, tolerance): (Coating, f64),
+        (taken, tolerance): (LightLosses<'_>, f64),
     ) -> Result<Self, PictureError> {
-        let lens = |(wavelength, _): &(usize, f64)| {
-            let rays = BackwardLens::new(model, *wavelength)?;
-            Ok(ColorLens { rays, coated: CoatedLens::new(model, *wavelength, coating)? })
-        };
+        let lens = |(wavelength, _): &(usize, f64)| taken.color_lens(model, *wavelength);
         let all = bands.iter().flat_map(|band| &band.wavelengths);
         let lenses = all.map(lens).collect::<Result<Vec<_>, PictureError>>()?;
         let counts = bands.iter().map(|band| band.wavelengths.len());
@@ -119,8 +162,10 @@ impl LensLosses {
         let all: Vec<LossRange> = (0..lenses.len()).filter_map(range_of).collect();
         let variation = all.iter().map(|range| 1.0 - range.least / range.most).fold(0.0, f64::max);
         let report = LossReport {
-            coating: coating.to_string(),
+            coating: taken.coating.to_string(),
             transmission: 0.0,
+            absorbed: taken.absorbed(model, bands[bands.len() / 2].wavelengths[0].0),
+            unknown_absorption: taken.unknown_absorption(model),
             variation,
             by_ray: variation > tolerance,
             error: 0.0,

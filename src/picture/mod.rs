@@ -43,7 +43,7 @@ pub use focus::focused;
 pub use frame::{ImageFrame, field_diagonal, filling_size};
 pub use ghost_light::{GhostLight, GhostReport};
 pub use lit_directions::{DrawnDirection, LitDirections};
-pub use losses::LossReport;
+pub use losses::{LightLosses, LossReport};
 pub use omitted::{OmittedEffect, omitted_beside, omitted_effects};
 pub use pattern::{Paint, PaintedPoint, Pattern};
 pub use picture_data::Picture;

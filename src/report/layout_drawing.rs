@@ -132,6 +132,7 @@ impl<'a> LayoutScene<'a> {
             sheet.line(&points, Pen::colored(PALETTE[ray.field % PALETTE.len()]));
         }
         (0..=section.image()).for_each(|i| self.draw_surface(sheet, &section, i, scale));
+        (0..=section.image()).for_each(|i| self.draw_blocked(sheet, &section, i, scale));
         section.elements().for_each(|(front, _)| draw_rim(sheet, &section, front, scale));
         self.draw_stop(sheet, &section, scale);
         self.number_bodies(sheet, &section, scale);
@@ -156,8 +157,27 @@ impl<'a> LayoutScene<'a> {
         } else {
             Pen::THIN.with_pattern(LinePattern::Dashes)
         };
-        let points = section.surface(i, PIECES);
-        draw_curve(sheet, &points.iter().map(|p| scale.to_sheet(*p)).collect::<Vec<_>>(), pen);
+        let parts = if surface.mirror {
+            section.open_parts(i, PIECES)
+        } else {
+            vec![section.surface(i, PIECES)]
+        };
+        parts.iter().for_each(|part| draw_part(sheet, part, pen, scale));
+    }
+
+    /// The parts of a lens surface that its obstruction and its apertures block.
+    fn draw_blocked(
+        &self,
+        sheet: &mut VectorDrawing,
+        section: &LensSection<'_>,
+        i: usize,
+        scale: SheetScale,
+    ) {
+        if !self.system.surfaces[i].mirror {
+            let pen = Pen::OUTLINE.with_width(0.8);
+            let parts = section.blocked_parts(i, PIECES);
+            parts.iter().for_each(|part| draw_part(sheet, part, pen, scale));
+        }
     }
 
     /// Two ticks at the rim of the stop.
@@ -197,6 +217,10 @@ fn draw_rim(sheet: &mut VectorDrawing, section: &LensSection<'_>, front: usize, 
         ];
         sheet.line(&points.map(|p| scale.to_sheet(p)), Pen::OUTLINE);
     }
+}
+
+fn draw_part(sheet: &mut VectorDrawing, part: &[[f64; 2]], pen: Pen, scale: SheetScale) {
+    draw_curve(sheet, &part.iter().map(|p| scale.to_sheet(*p)).collect::<Vec<_>>(), pen);
 }
 
 /// Draws a curve as a straight line or an arc where it is one, and else as a polyline.

@@ -1,4 +1,5 @@
-//! The drawing of a lens section: glass with joined edges, the stop as ticks, mirrors, axis.
+//! The drawing of a lens section: glass with joined edges, the stop as ticks, mirrors where they
+//! reflect, what apertures block, axis.
 
 use glam::DVec2;
 
@@ -51,8 +52,15 @@ impl<'a> SectionDrawing<'a> {
         for (i, surface) in system.surfaces.iter().enumerate() {
             let refracts = system.index_before(i) != surface.index;
             if surface.mirror {
-                scene.polyline(&self.surface(i), 2.5, palette.mirror);
-            } else if i != self.section.image() && !refracts && system.stop != Some(i) {
+                for part in self.section.open_parts(i, PIECES) {
+                    scene.polyline(&points(part), 2.5, palette.mirror);
+                }
+                continue;
+            }
+            for part in self.section.blocked_parts(i, PIECES) {
+                scene.polyline(&points(part), 3.0, palette.strong);
+            }
+            if i != self.section.image() && !refracts && system.stop != Some(i) {
                 scene.polyline(&self.surface(i), 1.0, palette.faint);
             }
         }

@@ -1,11 +1,12 @@
 //! The shape and the place of a surface beside the table of the prescription.
 
 use aplanat::lens::{
-    AxisBreak, Edit, Freeform, FreeformKind, IdealElement, Lens, Parameter, Quantity, apply_edit,
+    ApertureShape, AxisBreak, BlockedSide, Edit, Freeform, FreeformKind, IdealElement, Lens,
+    Parameter, Quantity, SurfaceAperture, apply_edit,
 };
 use aplanat::session::Command;
 use aplanat::studio::panels::PrescriptionPanel;
-use egui::Key;
+use egui::{Key, Modifiers};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
 
@@ -19,7 +20,7 @@ fn details(lens: Lens) -> Bench {
     view.selected = Some(0);
     let mut harness = panel_harness(PrescriptionPanel::default(), view);
     harness.run();
-    press(&mut harness, "Shape, tilt");
+    press(&mut harness, "Shape, apertures, tilt");
     harness
 }
 
@@ -39,6 +40,17 @@ fn enter(harness: &mut Bench, field: &str, text: &str) {
     harness.get_by_label(field).type_text(text);
     harness.run();
     harness.key_press(Key::Enter);
+    harness.run();
+}
+
+/// The same for a text of several lines, which ends with the focus.
+fn replace_lines(harness: &mut Bench, field: &str, text: &str) {
+    harness.get_by_label(field).focus();
+    harness.run();
+    harness.key_press_modifiers(Modifiers::COMMAND, Key::A);
+    harness.get_by_label(field).type_text(text);
+    harness.run();
+    harness.key_press(Key::Tab);
     harness.run();
 }
 
@@ -156,4 +168,69 @@ fn a_surface_and_its_element_are_decentred_and_tilted() {
     let lens = edited(&mut harness);
     assert_eq!(lens.surfaces[0].break_after.unwrap().tilt, [0.0, 0.0, 30.0]);
     assert!(says(&harness, "has breaks"));
+}
+
+#[test]
+fn an_aperture_is_added_formed_placed_and_removed() {
+    let plain = double_gauss();
+    let mut harness = details(plain.clone());
+    press(&mut harness, "Add an aperture");
+    edited(&mut harness);
+    enter(&mut harness, "Half width of aperture 1 of surface 1", "9");
+    edited(&mut harness);
+    enter(&mut harness, "Centre y of aperture 1 of surface 1", "-2");
+    edited(&mut harness);
+    enter(&mut harness, "Turned, ° of aperture 1 of surface 1", "30");
+    edited(&mut harness);
+    choose(&mut harness, "Light at aperture 1 of surface 1", "Obscures");
+    edited(&mut harness);
+    choose(&mut harness, "Form of aperture 1 of surface 1", "Ellipse");
+    let own = edited(&mut harness).surfaces[0].apertures[0].clone();
+    let [half_width, half_height, place @ ..] = own.numbers();
+    assert_eq!((own.blocks, half_width, place), (BlockedSide::Inside, 9.0, [0.0, -2.0, 30.0]));
+    assert!(matches!(own.shape, ApertureShape::Ellipse { .. }) && half_height > 1.0);
+    choose(&mut harness, "Form of aperture 1 of surface 1", "Polygon");
+    edited(&mut harness);
+    replace_lines(&mut harness, "Corners of aperture 1 of surface 1", "(0, 0) (3, 0) (0, 2)");
+    let points = vec![[0.0, 0.0], [3.0, 0.0], [0.0, 2.0]];
+    let shape = edited(&mut harness).surfaces[0].apertures[0].shape.clone();
+    assert_eq!(shape, ApertureShape::Polygon { points });
+    press(&mut harness, "Remove aperture 1 of surface 1");
+    assert_eq!(edited(&mut harness), plain);
+}
+
+#[test]
+fn an_aperture_that_cannot_be_is_refused_in_words() {
+    let mut harness = details(double_gauss());
+    press(&mut harness, "Add an aperture");
+    edited(&mut harness);
+    enter(&mut harness, "Half width of aperture 1 of surface 1", "-1");
+    assert!(says(&harness, "has the half width -1"), "{:?}", painted_texts(&harness));
+    assert_eq!(harness.state().commands, []);
+    choose(&mut harness, "Form of aperture 1 of surface 1", "Spider");
+    let spider = edited(&mut harness).surfaces[0].apertures[0].clone();
+    assert!(spider.obscures() && matches!(spider.shape, ApertureShape::Spider { arms: 3, .. }));
+    enter(&mut harness, "Number of arms of aperture 1 of surface 1", "0");
+    assert!(says(&harness, "has 0 arms; expected 1 to 32"));
+}
+
+#[test]
+fn the_column_of_apertures_shows_and_takes_words() {
+    let mut lens = double_gauss();
+    let shape = ApertureShape::Rectangle { half_width: 9.5, half_height: 7.0 };
+    lens.surfaces[0].apertures = vec![SurfaceAperture::inside(shape.clone())];
+    let mut harness = panel_harness(PrescriptionPanel::default(), view_of(lens));
+    harness.run();
+    assert!(says(&harness, "rectangle ±9.5 x ±7"));
+    enter(&mut harness, "Apertures of surface 1", "rectangle 9.5 7; obscuring circle 2 at 1, 0");
+    let own = edited(&mut harness).surfaces[0].apertures.clone();
+    let beside = SurfaceAperture {
+        center: [1.0, 0.0],
+        ..SurfaceAperture::obscuration(ApertureShape::Circle { radius: 2.0 })
+    };
+    assert_eq!(own, [SurfaceAperture::inside(shape), beside]);
+    enter(&mut harness, "Apertures of surface 1", "square 3");
+    assert!(says(&harness, "found `square`"));
+    let edits = harness.state().commands.iter().filter(|c| !matches!(c, Command::Select(_)));
+    assert_eq!(edits.count(), 0);
 }

@@ -4,16 +4,21 @@ use crate::cli::{Scratch, done, done_json, refused};
 use crate::pictures::{bundled, render, samples};
 use crate::reference::number;
 use aplanat::analysis::{Coating, ghosts};
-use aplanat::lens::FieldPoint;
+use aplanat::lens::{FieldPoint, Lens, Medium, glass};
 use aplanat::picture::{
-    BuiltInScene, Coloring, ExactRenderer, GhostLight, GhostReport, ImageFrame, Pattern, Picture,
-    Scene, SceneLayer, picture_model,
+    BuiltInScene, Coloring, ExactRenderer, GhostLight, GhostReport, ImageFrame, LightLosses,
+    Pattern, Picture, Scene, SceneLayer, picture_model,
 };
 use std::ops::ControlFlow;
 
 /// The product of what surfaces let pass at normal incidence.
 fn passed(indices: &[f64]) -> f64 {
     indices.windows(2).map(|n| 1.0 - ((n[0] - n[1]) / (n[0] + n[1])).powi(2)).product()
+}
+
+/// Bare surfaces around clear glass, or around the glasses of a lens.
+fn bare(glasses: Option<&Lens>) -> LightLosses<'_> {
+    LightLosses { coating: Coating::Bare, glasses }
 }
 
 #[test]
@@ -26,7 +31,7 @@ fn losses_are_fresnel_s_near_the_axis_and_scale_a_picture() {
     let clear = renderer().render(&samples(64), &|_| ControlFlow::Continue(()));
     // One share for each colour, and each ray by itself.
     for (tolerance, close) in [(0.5, 1e-9), (1e-7, 2e-3)] {
-        let coated = renderer().with_losses(&model, &bands, Coating::Bare, tolerance).unwrap();
+        let coated = renderer().with_losses(&model, &bands, bare(None), tolerance).unwrap();
         let report = coated.losses().unwrap().clone();
         assert_eq!(report.by_ray, tolerance < 0.1, "{report:?}");
         let green = &model.channels[bands[1].wavelengths[0].0].system;
@@ -43,6 +48,46 @@ fn losses_are_fresnel_s_near_the_axis_and_scale_a_picture() {
         }
         assert!((dim.white / clear.white / report.transmission - 1.0).abs() < 1e-12);
     }
+}
+
+/// Nearly plane-parallel glasses take away what the catalogue says for their thickness; a glass without data is
+/// named and taken as clear.
+#[test]
+fn glasses_absorb_what_their_catalogue_says() {
+    let mut lens = bundled("achromat_ac254_100");
+    for row in &mut lens.surfaces {
+        row.curvature *= 0.01;
+    }
+    let (model, bands) = picture_model(&lens, 0, Coloring::Rgb(1)).unwrap();
+    let frame = ImageFrame::new(&model, [2, 2], 1.0).unwrap();
+    let scene = Scene::uniform(1.0);
+    let report = |glasses: Option<&Lens>| {
+        let renderer = ExactRenderer::new(&model, &bands, &scene, frame).unwrap();
+        let found = renderer.with_losses(&model, &bands, bare(glasses), 0.5).unwrap();
+        found.losses().unwrap().clone()
+    };
+    let [clear, real] = [report(None), report(Some(&lens))];
+    let um = model.channels[bands[1].wavelengths[0].0].um;
+    let expected: f64 = lens
+        .surfaces
+        .iter()
+        .map(|row| match &row.medium {
+            Medium::Glass(name) => {
+                let properties = glass::find(name).unwrap().properties().unwrap();
+                properties.internal_transmission(um, row.thickness).unwrap()
+            }
+            _ => 1.0,
+        })
+        .product();
+    assert!(expected < 0.9999 && clear.absorbed == 0.0, "{expected} {clear:?}");
+    assert!((real.absorbed - (1.0 - expected)).abs() < 1e-12, "{real:?} {expected}");
+    // Rays run at small angles.
+    let ratio = real.transmission / clear.transmission;
+    assert!((ratio / expected - 1.0).abs() < 1e-6, "{ratio} {expected}");
+    assert!(real.unknown_absorption.is_empty());
+    let mut model_glass = lens.clone();
+    model_glass.surfaces[0].medium = Medium::Index(1.5);
+    assert_eq!(report(Some(&model_glass)).unknown_absorption.len(), 1);
 }
 
 /// A small light on the axis, at infinity.
@@ -141,7 +186,8 @@ fn a_picture_through_a_coated_lens_says_so_in_its_file() {
     ];
     let report = done_json(&arguments, "");
     let losses = &report["losses"];
-    assert!((number(&losses["transmission"]) - 0.665).abs() < 5e-3, "{losses}");
+    let reflected = number(&losses["transmission"]) / (1.0 - number(&losses["absorbed"]));
+    assert!((reflected - 0.665).abs() < 5e-3, "{losses}");
     let left_out = report["left_out"].as_array().unwrap();
     assert!(left_out.iter().all(|effect| effect["effect"] != "losses"), "{left_out:?}");
     assert!(left_out.iter().any(|effect| effect["effect"] == "polarisation"), "{left_out:?}");

@@ -93,10 +93,8 @@ fn has_transmission(medium: &Medium) -> bool {
 
 /// The share of the light on the axis that passes the glass of some gaps.
 fn share(lens: &Lens, gaps: &[usize], um: f64) -> Option<f64> {
-    let through = |gap: &usize| {
-        let row = &lens.surfaces[*gap];
-        let Medium::Glass(name) = &row.medium else { return None };
-        glass::find(name)?.properties()?.internal_transmission(um, row.thickness.abs())
-    };
-    gaps.iter().map(through).product()
+    let absorbed =
+        |gap: &usize| Some(lens.absorbance(*gap, um)? * lens.surfaces[*gap].thickness.abs());
+    let absorbed: Option<f64> = gaps.iter().map(absorbed).sum();
+    absorbed.map(|absorbed| (-absorbed).exp())
 }

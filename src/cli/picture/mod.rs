@@ -18,8 +18,8 @@ use crate::lens::{Lens, Object};
 use crate::measure::time_ms;
 use crate::picture::{
     BitDepth, BuiltInScene, ColorBand, Coloring, ErrorMap, ExactRenderer, ExactSettings, Exposure,
-    GhostLight, GhostReport, ImageFrame, LossReport, MID_GREY, Picture, PictureError, QuickPicture,
-    QuickRenderer, Raster, Scene, SensorPreset, ToneCurve, encode_colors, encode_png,
+    GhostLight, GhostReport, ImageFrame, LightLosses, LossReport, MID_GREY, Picture, PictureError,
+    QuickPicture, QuickRenderer, Raster, Scene, SensorPreset, ToneCurve, encode_colors, encode_png,
     field_diagonal, focused, omitted_beside, photon_count, picture_model, quick_error,
 };
 use crate::pupil::RayModel;
@@ -79,7 +79,7 @@ pub(super) struct PictureArgs {
     focus: Option<f64>,
 
     /// The coating of all surfaces between air and glass: none (bare glass), single-layer, v, or a reflected
-    /// share as `0.3%`; with it losses count, and ghosts where they matter. Absent: nothing is reflected
+    /// share as `0.3%`; with it losses count, of glasses that absorb light too, and ghosts where they matter. Absent: nothing is lost
     #[arg(long, value_name = "COATING", value_parser = parse_coating)]
     coating: Option<Coating>,
 
@@ -227,7 +227,10 @@ impl PictureArgs {
         let CameraShot { model, bands, frame, .. } = &shot;
         let renderer = ExactRenderer::new(model, bands, &scene, *frame).map_err(refuse)?;
         let renderer = match self.coating {
-            Some(coating) => renderer.with_losses(model, bands, coating, self.error.0),
+            Some(coating) => {
+                let taken = LightLosses { coating, glasses: Some(&opened.lens) };
+                renderer.with_losses(model, bands, taken, self.error.0)
+            }
             None => Ok(renderer),
         };
         let renderer = renderer.map_err(refuse)?;

@@ -90,13 +90,7 @@ impl PictureReport {
             )?;
         }
         if let Some(losses) = &self.losses {
-            let LossReport { coating, transmission, variation, by_ray, .. } = losses;
-            let how = if *by_ray { "each ray by itself" } else { "one share for each colour" };
-            let (passed, varied) = (percent(*transmission), percent(*variation));
-            writeln!(
-                f,
-                "losses on: {coating}, {passed:.1} % arrives on the axis; it varies by {varied:.2} %: {how}"
-            )?;
+            writeln!(f, "{}", losses_text(losses))?;
         }
         if let Some(GhostReport { on: true, change, error, pairs, rays, .. }) = &self.ghosts {
             let (change, error) = (percent(*change), percent(*error));
@@ -159,4 +153,21 @@ impl Display for PictureReport {
         self.sensor.iter().try_for_each(|sensor| write!(f, "{sensor}"))?;
         self.out.as_ref().map_or(Ok(()), |out| writeln!(f, "saved as {out}"))
     }
+}
+
+/// The line of what surfaces and glasses take away.
+fn losses_text(losses: &LossReport) -> String {
+    let LossReport { coating, transmission, variation, absorbed, by_ray, .. } = losses;
+    let how = if *by_ray { "each ray by itself" } else { "one share for each colour" };
+    let [passed, varied, absorbed] = [transmission, variation, absorbed].map(|share| 100.0 * share);
+    let unknown: Vec<String> = losses.unknown_absorption.iter().map(ToString::to_string).collect();
+    let unknown = if unknown.is_empty() {
+        String::new()
+    } else {
+        format!(", none counted behind {} where it is not known", unknown.join(", "))
+    };
+    format!(
+        "losses on: {coating}, {passed:.1} % arrives on the axis; glass absorbs {absorbed:.2} % of \
+         it{unknown}; it varies by {varied:.2} %: {how}"
+    )
 }

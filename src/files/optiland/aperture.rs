@@ -20,7 +20,7 @@ pub(super) fn read(row: &mut Row, aperture: &Value, report: &mut ConversionRepor
     match add(&mut found, aperture, BlockedSide::Outside, DEPTH) {
         Ok(()) => {
             for own in &found.apertures {
-                let text = format!("{}: traced", own.text());
+                let text = format!("{own}: traced");
                 report.add(ConversionOutcome::Used, "aperture", text);
             }
             *row = found;

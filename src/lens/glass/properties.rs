@@ -67,18 +67,25 @@ pub struct GlassProperties {
 }
 
 impl GlassProperties {
-    /// The internal transmission through a thickness in mm at a wavelength in µm, from the absorbance
-    /// between the two nearest wavelengths of the catalogue; `None` outside them.
+    /// The internal transmission through a thickness in mm at a wavelength in µm; `None` outside of those of
+    /// the catalogue.
     pub fn internal_transmission(&self, um: f64, mm: f64) -> Option<f64> {
+        Some((-self.absorbance(um)? * mm).exp())
+    }
+
+    /// The absorbance in 1/mm at a wavelength in µm, the negative natural logarithm of the internal
+    /// transmission over the thickness, between the two nearest wavelengths of the catalogue; `None` outside
+    /// them.
+    pub fn absorbance(&self, um: f64) -> Option<f64> {
         let after = self.transmission.iter().position(|entry| entry[0] >= um)?;
         let absorbance = |entry: &[f64; 3]| -entry[1].max(f64::MIN_POSITIVE).ln() / entry[2];
         let [end, value] = [self.transmission[after][0], absorbance(&self.transmission[after])];
         if end == um {
-            return Some((-value * mm).exp());
+            return Some(value);
         }
         let before = &self.transmission[after.checked_sub(1)?];
         let part = (um - before[0]) / (end - before[0]);
-        Some((-(absorbance(before) * (1.0 - part) + value * part) * mm).exp())
+        Some(absorbance(before) * (1.0 - part) + value * part)
     }
 }
 

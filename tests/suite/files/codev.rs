@@ -4,7 +4,7 @@ use super::foreign;
 use aplanat::files::{self, ConversionOutcome, ConversionReport, LensFormat, OpenedLens};
 use aplanat::lens::{
     Aperture, AxisBreak, FieldKind, FreeformKind, IdealElement, Lens, Medium, Object, Parameter,
-    Pickup, Quantity, SurfaceAperture,
+    Pickup, Quantity,
 };
 use aplanat::math::Vec3;
 
@@ -239,30 +239,22 @@ fn apertures_that_are_no_centred_circles_are_traced_and_written_again() {
         assert_eq!(back.surfaces[0].apertures, row.apertures, "{to}");
         let sizes = (back.surfaces[0].semi_diameter, back.surfaces[0].obstruction);
         assert_eq!(sizes, (row.semi_diameter, row.obstruction), "{to}");
-        let texts: Vec<String> = row.apertures.iter().map(SurfaceAperture::text).collect();
+        let texts: Vec<String> = row.apertures.iter().map(ToString::to_string).collect();
         let command = to.trim().split(';').next().unwrap();
         (sizes, texts.join("; "), outcome(&opened.report.unwrap(), command))
     };
     let used = ConversionOutcome::Used;
     let clear = (None, None);
     for (to, sizes, text) in [
-        ("  REX 3; REY 4", clear, "rectangle of half widths 3 and 4"),
-        ("  ELX 3; ELY 2", clear, "ellipse of semi-axes 3 and 2"),
+        ("  REX 3; REY 4", clear, "rectangle ±3 x ±4"),
+        ("  ELX 3; ELY 2", clear, "ellipse ±3 x ±2"),
         ("  ELX 3; ELY 3", (Some(3.0), None), ""),
-        ("  CIR 6; ADX 1", clear, "circle of radius 6 at (1, 0)"),
-        ("  ADX 1; ADY -2; CIR 6", clear, "circle of radius 6 at (1, -2)"),
-        (
-            "  REX OBS 3; REY OBS 2; CIR 8.6",
-            (Some(8.6), None),
-            "obscuring rectangle of half widths 3 and 2",
-        ),
-        ("  CIR HOL 2; REX 3; REY 4", (None, Some(2.0)), "rectangle of half widths 3 and 4"),
-        ("  ARO 30; REX 3; REY 4", clear, "rectangle of half widths 3 and 4 turned by 30 deg"),
-        (
-            "  REX 3; REY S1 4; ADX 0.5; ARO 30",
-            clear,
-            "rectangle of half widths 3 and 4 at (0.5, 0) turned by 30 deg",
-        ),
+        ("  CIR 6; ADX 1", clear, "circle ±6 at 1, 0"),
+        ("  ADX 1; ADY -2; CIR 6", clear, "circle ±6 at 1, -2"),
+        ("  REX OBS 3; REY OBS 2; CIR 8.6", (Some(8.6), None), "obscuring rectangle ±3 x ±2"),
+        ("  CIR HOL 2; REX 3; REY 4", (None, Some(2.0)), "rectangle ±3 x ±4"),
+        ("  ARO 30; REX 3; REY 4", clear, "rectangle ±3 x ±4 turned 30"),
+        ("  REX 3; REY S1 4; ADX 0.5; ARO 30", clear, "rectangle ±3 x ±4 at 0.5, 0 turned 30"),
     ] {
         assert_eq!(read(to), (sizes, text.to_owned(), used), "{to}");
     }

@@ -41,7 +41,7 @@ fn spider(surface: &ZemaxSurface, unit: f64, row: &mut Row, report: &mut Convers
     let center = offset(surface);
     let shape = ApertureShape::Spider { arms, width };
     let aperture = SurfaceAperture { center, ..SurfaceAperture::obscuration(shape) };
-    report.amend(line, ConversionOutcome::Used, format!("{}: traced", aperture.text()));
+    report.amend(line, ConversionOutcome::Used, format!("{aperture}: traced"));
     row.apertures.push(aperture.scaled(unit));
 }
 

@@ -4,7 +4,7 @@ use egui::Id;
 
 use super::columns::{TableColumn, parameter_name};
 use super::glass;
-use crate::lens::{Edit, Lens, Object, Parameter, Quantity};
+use crate::lens::{Edit, Lens, Object, Parameter, Quantity, apertures_text, parse_apertures};
 use crate::math::expression::evaluate;
 use crate::studio::number;
 
@@ -78,8 +78,7 @@ impl CellPlace {
             TableColumn::Glass => glass::format_medium(&row.medium),
             TableColumn::Comment => row.comment.clone(),
             TableColumn::Obstruction => row.obstruction.map(show).unwrap_or_default(),
-            TableColumn::Apertures if row.apertures.is_empty() => String::new(),
-            TableColumn::Apertures => serde_json::to_string(&row.apertures).unwrap_or_default(),
+            TableColumn::Apertures => apertures_text(&row.apertures, show),
             _ => {
                 let value = self.column.parameter(lens, zoom, surface).and_then(|p| lens.get(p));
                 let radius = self.column == TableColumn::Radius;
@@ -112,9 +111,7 @@ impl CellPlace {
                 Ok(Edit::SetObstruction { surface, value })
             }
             TableColumn::Apertures => {
-                let text = if text.trim().is_empty() { "[]" } else { text };
-                let apertures = serde_json::from_str(text).map_err(|error| error.to_string())?;
-                Ok(Edit::SetApertures { surface, apertures })
+                Ok(Edit::SetApertures { surface, apertures: parse_apertures(text)? })
             }
             _ => match self.column.parameter(lens, zoom, surface) {
                 Some(parameter) => number_edit(lens, parameter, text),

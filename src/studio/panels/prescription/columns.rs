@@ -81,9 +81,9 @@ impl TableColumn {
                  central obstruction, or the hole of a mirror; empty for none"
             }
             Self::Apertures => {
-                "Apertures that are no circles about the vertex, as in a lens file: \
-                 [{\"shape\": \"rectangle\", \"half_width\": 3, \"half_height\": 2}]. \
-                 Clear the cell to remove them."
+                "Apertures that are no circles about the vertex, half widths in mm: rectangle ±3 x ±2 at \
+                 0, 1 turned 45; obscuring circle ±2; spider 3 x 0.5 (arms and their width). Clear the \
+                 cell to remove them. \"Shape, apertures, tilt\" has a field for each number."
             }
             Self::Asphere(_) => "Coefficient of the even asphere, in powers of mm",
             Self::Grin(_) => "Coefficient of the gradient behind the surface, in powers of mm",
@@ -100,7 +100,7 @@ impl TableColumn {
             Self::Conic => Width::initial(76.0).at_least(50.0),
             Self::Obstruction => Width::initial(86.0).at_least(60.0),
             Self::Asphere(_) | Self::Grin(_) => Width::initial(112.0).at_least(60.0),
-            Self::Apertures => Width::initial(150.0).at_least(60.0).clip(true),
+            Self::Apertures => Width::initial(170.0).at_least(60.0).clip(true),
             Self::Comment => Width::remainder().at_least(60.0).clip(true),
         }
     }

@@ -1,6 +1,7 @@
 //! The selected surface beyond the columns of the table: the form of its sag beyond a conic, the
-//! rule by which it deflects light, its decentre and tilt, those of its element, and breaks of the axis.
+//! rule by which it deflects light, its apertures, its decentre and tilt, those of its element, and breaks of the axis.
 
+mod apertures;
 mod forms;
 mod place;
 
@@ -46,8 +47,8 @@ impl SurfaceDetails {
     /// Opens and closes them.
     pub(super) fn toggle(&mut self, ui: &mut Ui) {
         let hint = "The form of the selected surface beyond a conic (biconic, toroid, polynomials, phase), \
-                    paraxial lens and grating, decentre and tilt, breaks of the axis";
-        ui.toggle_value(&mut self.open, "Shape, tilt").on_hover_text(hint);
+                    paraxial lens and grating, apertures that are no circles, decentre and tilt, breaks of the axis";
+        ui.toggle_value(&mut self.open, "Shape, apertures, tilt").on_hover_text(hint);
     }
 
     pub(super) fn is_typing(&self, context: &Context) -> bool {
@@ -92,8 +93,13 @@ impl SurfaceDetails {
         if let Some(rule) = row.ideal {
             self.rule(ui, view, (surface, rule), actions);
         }
+        let size = row.semi_diameter.or_else(|| clear_semi_diameter(view, surface));
         let mut fields = EditForm { view, buffers: &mut self.buffers, actions };
+        let asked = apertures::show(ui, &mut fields, (surface, size));
         place::show(ui, &mut fields, surface);
+        if let Some(edit) = asked {
+            self.try_edit(view, (surface, edit), actions);
+        }
     }
 
     /// Forgets what was typed into fields that are no longer shown, with its errors.
