@@ -215,6 +215,19 @@ mod tests {
     }
 
     #[test]
+    fn a_hole_leaves_two_parts_of_a_mirror() {
+        let mut system = singlet();
+        (system.surfaces[1].mirror, system.surfaces[1].obstruction) = (true, 2.0);
+        let section = LensSection::new(&system, &[]);
+        let [lower, upper] = &section.open_parts(1, 8)[..] else { panic!("two parts") };
+        let ends = [lower[0][1], lower[8][1], upper[0][1], upper[8][1]];
+        assert_eq!(ends, [-8.0, -2.0, 2.0, 8.0]);
+        assert_eq!(section.blocked_parts(1, 8)[0], section.part(1, [-2.0, 2.0], 8));
+        assert_eq!(section.open_parts(0, 8), [section.surface(0, 8)]);
+        assert!(section.blocked_parts(0, 8).is_empty());
+    }
+
+    #[test]
     fn a_surface_without_semi_diameter_reaches_as_far_as_its_rays() {
         let system = singlet();
         assert_eq!(LensSection::new(&system, &[9.0, 9.0, 3.0]).heights, [10.0, 8.0, 3.0]);

@@ -501,11 +501,12 @@ impl Merit {
     }
 }
 
-/// Refuses pupils whose edges' motion is unknown: irregular ones of a gradient-index lens.
+/// Refuses pupils whose edges' motion is unknown: irregular ones of a lens without a warp field.
 fn check_edge_motion(model: &RayModel, pupils: &[TracedPupil<'_>]) -> Result<(), MeritError> {
-    if model.has_grin() && pupils.iter().any(TracedPupil::is_irregular) {
-        let why = "the pupil is disconnected or not star-shaped, and in a gradient-index lens the \
-                   motion of its edge is unknown then; expected a goal with frozen pupils";
+    if !model.has_warp_field() && pupils.iter().any(TracedPupil::is_irregular) {
+        let why = "the pupil is disconnected or not star-shaped, and the motion of its edge is unknown \
+                   then in a lens with a gradient index, or with a tilted, decentred, freeform or ideal surface; \
+                   expected a goal with frozen pupils";
         return Err(MeritError::DoesNotApply { term: "pupil", why });
     }
     Ok(())

@@ -1,7 +1,7 @@
 //! A lens with its beam, ready for tracing.
 
 use super::found_pupils::FoundPupils;
-use crate::lens::{Aperture, FieldPoint, Lens, LensError, System, SystemError};
+use crate::lens::{Aperture, FieldPoint, Lens, LensError, Surface, System, SystemError};
 use crate::math::Dual;
 use crate::paraxial::{Beam, FirstOrder, ParaxialError, Seidel, first_order, seidel};
 use crate::trace::Tracer;
@@ -205,6 +205,13 @@ impl RayModel {
     /// True if a gap is filled with a gradient-index medium.
     pub fn has_grin(&self) -> bool {
         self.channels[self.primary].system.has_grin()
+    }
+
+    /// True if the warp field of the lens is known, by which the derivative of a pupil of any form can be
+    /// sampled.
+    pub fn has_warp_field(&self) -> bool {
+        let system = &self.channels[self.primary].system;
+        !system.has_grin() && !system.surfaces.iter().any(Surface::is_mounted)
     }
 
     /// The radius of the stop in mm: as given, or the height of the paraxial marginal ray there.

@@ -562,6 +562,22 @@ fn pictures_behind_apertures_that_are_no_circles_are_refused() {
     super::cli::refused(2, &picture, "", &["surface 1", "no circle about its vertex"]);
 }
 
+/// The motion of edges between pieces of a pupil is sampled by the warp field, which tilted surfaces do not have.
+#[test]
+fn a_tilted_lens_behind_a_spider_is_no_lens_to_optimize_without_its_edges() {
+    let text = std::fs::read_to_string("lenses/achromat_ac254_100.json").unwrap();
+    let mut lens: serde_json::Value = serde_json::from_str(&text).unwrap();
+    lens["surfaces"][0]["apertures"] =
+        serde_json::json!([{"shape": "spider", "arms": 3, "width": 0.5}]);
+    lens["surfaces"][2]["tilt"] = serde_json::json!([0.1, 0.0]);
+    let tilted = super::cli::Scratch::with("tilted_spider.json", &lens.to_string());
+    let out = super::cli::Scratch::new("tilted_spider_out.json");
+    let optimize =
+        ["optimize", tilted.path(), "--vary=curvatures", "--steps=2", "--out", out.path()];
+    let words = ["not star-shaped", "tilted", "frozen pupils"];
+    super::cli::refused(2, &optimize, "", &words);
+}
+
 /// Tolerances use the rays that get through, on the side on which they do, and no more than their budget.
 #[test]
 fn tolerances_know_apertures_beside_the_axis() {

@@ -82,6 +82,9 @@ pub(super) fn surface_column(of: &ElementTolerances<'_>, side: usize) -> Vec<Str
     let mut lines = vec![radius_text(&body.shapes[side], side)];
     lines.extend(form_lines(of, side));
     lines.push(format!("\u{d8}e {}", ShortNumber(2.0 * body.heights[side])));
+    let apertures = of.lens.surfaces.get(body.surfaces[side]).map(|row| &row.apertures);
+    let number = |value| ShortNumber(value).to_string();
+    lines.extend(apertures.into_iter().flatten().map(|own| format!("e {}", own.text_with(number))));
     lines.push("Protective chamfer -".to_owned());
     lines.push(of.form(side));
     lines.push(of.centring(side));

@@ -100,7 +100,7 @@ impl TableColumn {
             Self::Conic => Width::initial(76.0).at_least(50.0),
             Self::Obstruction => Width::initial(86.0).at_least(60.0),
             Self::Asphere(_) | Self::Grin(_) => Width::initial(112.0).at_least(60.0),
-            Self::Apertures => Width::initial(170.0).at_least(60.0).clip(true),
+            Self::Apertures => Width::initial(230.0).at_least(60.0).clip(true),
             Self::Comment => Width::remainder().at_least(60.0).clip(true),
         }
     }

@@ -162,11 +162,11 @@ impl ApertureEditor<'_, '_> {
             _ => {}
         }
         let sizes = size_names(&own.shape).iter().enumerate();
-        let placing = [(2, "Centre x"), (3, "Centre y"), (4, "Turned, °")];
-        let all: Vec<(usize, &str)> = sizes.map(|(k, name)| (k, *name)).chain(placing).collect();
+        let sizes: Vec<(usize, &str)> = sizes.map(|(k, name)| (k, *name)).collect();
+        let rows = [&sizes[..], &[(2, "Centre x"), (3, "Centre y")], &[(4, "Turned, °")]];
         Grid::new(name).num_columns(4).spacing([6.0, 2.0]).show(ui, |ui| {
-            for pair in all.chunks(2) {
-                for (number, title) in pair {
+            for row in rows.into_iter().filter(|row| !row.is_empty()) {
+                for (number, title) in row {
                     ui.label(*title);
                     self.number(ui, (index, own), (*number, &format!("{title} of {name}")));
                 }
