@@ -1,4 +1,4 @@
-//! What the apertures of a surface block of its section in the y-z plane.
+//! The parts of a section in the y-z plane that the apertures of a surface block.
 
 use super::surface_aperture::{ApertureShape, SurfaceAperture};
 use super::{Surface, turn};
@@ -73,7 +73,7 @@ fn oval_heights(aperture: &SurfaceAperture, semi_axes: [f64; 2]) -> Vec<HeightIn
     if half > 0.0 { vec![[middle - half, middle + half]] } else { Vec::new() }
 }
 
-/// What lies between disjoint intervals in ascending order, without end.
+/// The gaps between disjoint intervals in ascending order, without end.
 fn gaps_between(intervals: &[HeightInterval]) -> Vec<HeightInterval> {
     let starts = std::iter::once(f64::NEG_INFINITY).chain(intervals.iter().map(|own| own[1]));
     let ends = intervals.iter().map(|own| own[0]).chain(std::iter::once(f64::INFINITY));

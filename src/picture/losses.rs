@@ -20,7 +20,7 @@ const CELLS: usize = 10;
 /// The nodes along a side.
 const NODES: usize = CELLS + 1;
 
-/// What takes light away on its way through a lens.
+/// The coating and the glasses that take light away on its way through a lens.
 #[derive(Debug, Clone, Copy)]
 pub struct LightLosses<'a> {
     /// The coating of all surfaces between air and glass.
