@@ -21,6 +21,7 @@ mod glass;
 mod glass_exchange;
 mod gradient;
 mod grin;
+mod heap;
 mod help;
 mod info;
 mod input;
@@ -129,6 +130,7 @@ impl CliCommand {
 
 /// Runs the command that the arguments of the process name, or opens the studio.
 pub fn run() -> ExitCode {
+    heap::keep_free_memory();
     env_logger::init();
     // A catalogue that cannot be read is said, and is no reason to end.
     files::load_own_glasses().iter().for_each(|error| print_note(format!("note: {error}")));

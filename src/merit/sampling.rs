@@ -330,10 +330,11 @@ impl RaySampling {
             } else {
                 Region { launch, kind: pupil.kind.clone(), rays: 0 }
             };
+            let order = region.order_like(&pupil.kind, pupil.order);
             if self.demand.frequencies.is_empty() && !self.demand.as_built {
-                region.trace_pupil(pupil.order)
+                region.trace_pupil(order)
             } else {
-                region.trace_whole_pupil(pupil.order)
+                region.trace_whole_pupil(order)
             }
         };
         self.pupils.par_iter().map(traced).collect()

@@ -159,7 +159,7 @@ impl PerturbedIntegral<'_> {
         if region.kind == RegionKind::Unbounded {
             return None;
         }
-        let lit = region.trace_pupil(self.order);
+        let lit = region.trace_pupil(region.order_like(&self.region.kind, self.order));
         self.rays += region.rays + lit.rays_traced;
         Some(self.cost.integrate(&lit.moments))
     }

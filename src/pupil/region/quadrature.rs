@@ -99,6 +99,14 @@ impl Region<'_> {
         }
     }
 
+    /// The order to use in place of one that was found for a pupil of another kind: each order of a sampled
+    /// pupil takes four times the points of the one before, so that a high order of an edge that is known would
+    /// be billions of points.
+    pub fn order_like(&self, found_for: &RegionKind, order: usize) -> usize {
+        let was_sampled = matches!(found_for, RegionKind::Irregular { annulus: None, .. });
+        if self.is_sampled() && !was_sampled { order.min(SAMPLED_START) } else { order }
+    }
+
     /// The orders that [`converge`] compares with each other, ascending.
     fn compared_orders(&self) -> Vec<usize> {
         match self.kind {
@@ -205,7 +213,8 @@ impl Region<'_> {
                     return (joined_nodes(&parts), Vec::new());
                 }
                 let reach = if self.launch.model.ends_at_disc() { 1.0 } else { f64::INFINITY };
-                (irregular_nodes(*square, IRREGULAR_POINTS << (2 * order), reach), Vec::new())
+                let points = IRREGULAR_POINTS << (2 * order.min(IRREGULAR_ORDERS - 1));
+                (irregular_nodes(*square, points, reach), Vec::new())
             }
         }
     }
@@ -563,6 +572,22 @@ mod tests {
             |values| *values,
         );
         assert!(found.is_none() && points > 0 && points <= accuracy.max_rays, "{points}");
+    }
+
+    /// A pupil that falls into pieces while a lens changes keeps the order that its edge needed: of samples that
+    /// would be up to 2.7e11 points.
+    #[test]
+    fn an_order_of_a_known_edge_is_not_that_of_a_sample() {
+        let model = RayModel::from_lens(&blank(), 0).unwrap();
+        let field = FieldPoint { x: 0.0, y: 0.0, weight: 1.0 };
+        let launch = model.launch(field, 0).unwrap();
+        let sampled = RegionKind::Irregular { pieces: 2, square: ([0.0; 2], 0.5), annulus: None };
+        let region = Region { launch, kind: sampled.clone(), rays: 0 };
+        let order = region.order_like(&RegionKind::Clear, 14);
+        assert!(region.nodes(order).points.len() <= 16_384, "{order}");
+        assert_eq!(region.order_like(&sampled, 5), 5);
+        let clear = Region { kind: RegionKind::Clear, ..region };
+        assert_eq!(clear.order_like(&sampled, 5), 5);
     }
 
     #[test]
