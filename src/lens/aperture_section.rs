@@ -47,11 +47,14 @@ fn arm_corners(aperture: &SurfaceAperture, angle: f64, [length, width]: [f64; 2]
     [[0.0, half], [length, half], [length, -half], [0.0, -half]].map(|p| arm.place(p)).to_vec()
 }
 
-/// The heights at which the line x = 0 lies inside of a polygon.
+/// The heights at which the line x = 0 lies inside of a polygon. A polygon with a side on that line is met on
+/// the side on which it lies, since a ray that meets an edge exactly passes a frame.
 fn polygon_heights(corners: &[[f64; 2]]) -> Vec<HeightInterval> {
+    let least = corners.iter().map(|corner| corner[0]).fold(f64::INFINITY, f64::min);
+    let is_left = |x: f64| if least < 0.0 { x < 0.0 } else { x <= 0.0 };
     let side = |i: usize| (corners[i], corners[(i + 1) % corners.len()]);
     let crossing = |(a, b): ([f64; 2], [f64; 2])| {
-        let crosses = (a[0] < 0.0) != (b[0] < 0.0);
+        let crosses = is_left(a[0]) != is_left(b[0]);
         crosses.then(|| a[1] + (b[1] - a[1]) * a[0] / (a[0] - b[0]))
     };
     let mut heights: Vec<f64> = (0..corners.len()).map(side).filter_map(crossing).collect();
@@ -112,6 +115,16 @@ mod tests {
         (turned.angle, turned.center) = (90.0, [1.0, 2.0]);
         assert_eq!(blocked(vec![turned], 1.0), [[-2.0, 6.0]]);
         assert_eq!(blocked(Vec::new(), 0.0), [[0.0; 2]; 0]);
+    }
+
+    #[test]
+    fn a_frame_with_a_side_on_the_section_lets_light_through_on_either_side() {
+        for x in [-3.0, 3.0] {
+            let rectangle = ApertureShape::Rectangle { half_width: 3.0, half_height: 2.0 };
+            let mut frame = SurfaceAperture::inside(rectangle);
+            frame.center = [x, 0.0];
+            assert_eq!(blocked(vec![frame], 0.0), [[-10.0, -2.0], [2.0, 10.0]], "{x}");
+        }
     }
 
     #[test]

@@ -8,6 +8,7 @@ use std::fmt;
 use std::str::FromStr;
 
 use super::surface_aperture::{ApertureShape, BlockedSide, SurfaceAperture};
+use crate::math::ShortNumber;
 
 /// The forms as they are typed.
 const FORMS: &str = "circle ±3, ellipse ±3 x ±2, rectangle ±3 x ±2, polygon (0, 0) (3, 0) (0, 2) or \
@@ -40,6 +41,19 @@ impl SurfaceAperture {
     }
 }
 
+impl SurfaceAperture {
+    /// Its text in reports and drawings: six digits, and of a polygon the number of its corners.
+    pub fn short_text(&self) -> String {
+        match &self.shape {
+            ApertureShape::Polygon { points } => {
+                let side = if self.obscures() { "obscuring " } else { "" };
+                format!("{side}polygon of {} corners", points.len())
+            }
+            _ => self.text_with(|number| ShortNumber(number).to_string()),
+        }
+    }
+}
+
 impl fmt::Display for SurfaceAperture {
     /// The text with all digits, from which the same aperture is read.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -47,9 +61,9 @@ impl fmt::Display for SurfaceAperture {
     }
 }
 
-/// The apertures of a surface as one line, with numbers as `show` writes them.
-pub fn apertures_text(apertures: &[SurfaceAperture], show: impl Fn(f64) -> String) -> String {
-    let texts: Vec<_> = apertures.iter().map(|aperture| aperture.text_with(&show)).collect();
+/// The apertures of a surface as one line with all digits.
+pub fn apertures_text(apertures: &[SurfaceAperture]) -> String {
+    let texts: Vec<_> = apertures.iter().map(ToString::to_string).collect();
     texts.join("; ")
 }
 
@@ -63,6 +77,7 @@ impl FromStr for SurfaceAperture {
 
     fn from_str(text: &str) -> Result<Self, String> {
         let text = text.to_lowercase();
+        check_commas(&text)?;
         let mut words = words(&text);
         let obscures =
             words.first().is_some_and(|word| matches!(*word, "obscuring" | "obscuration"));
@@ -95,10 +110,28 @@ impl FromStr for SurfaceAperture {
     }
 }
 
+/// Refuses a comma in front of a digit outside of brackets: `3,5` may be one number or two.
+fn check_commas(text: &str) -> Result<(), String> {
+    let mut depth = 0;
+    for (c, next) in text.chars().zip(text.chars().skip(1)) {
+        depth += i32::from(c == '(') - i32::from(c == ')');
+        if c == ',' && depth == 0 && next.is_ascii_digit() {
+            return Err("expected a point in a number, or a space behind a comma".to_owned());
+        }
+    }
+    Ok(())
+}
+
 /// The words and numbers of a text without the signs between them.
 fn words(text: &str) -> Vec<&str> {
     let is_between = |c: char| c.is_whitespace() || matches!(c, '±' | '×' | ',' | '(' | ')');
-    text.split(is_between).filter(|word| !matches!(*word, "" | "x")).collect()
+    text.split(is_between).flat_map(split_sizes).filter(|word| !matches!(*word, "" | "x")).collect()
+}
+
+/// The numbers of `3x2` or `3x`, or the word as it is.
+fn split_sizes(word: &str) -> Vec<&str> {
+    let parts: Vec<&str> = word.split('x').filter(|part| !part.is_empty()).collect();
+    if parts.iter().all(|part| part.parse::<f64>().is_ok()) { parts } else { vec![word] }
 }
 
 /// The sizes, the centre and the angle behind the name of a form.
@@ -107,8 +140,9 @@ fn parts(words: &[&str]) -> Result<[Vec<f64>; 3], String> {
     let mut part = 0;
     for word in words {
         match *word {
-            "at" if part < 1 => part = 1,
-            "turned" | "rotated" if part < 2 => part = 2,
+            "at" if parts[1].is_empty() => part = 1,
+            "turned" | "rotated" if parts[2].is_empty() => part = 2,
+            "at" | "turned" | "rotated" => return Err(format!("expected `{word}` once")),
             "°" | "deg" | "mm" => {}
             number => parts[part].push(parse_number(number)?),
         }
@@ -166,8 +200,7 @@ mod tests {
             SurfaceAperture::obscuration(ApertureShape::Polygon { points }),
             SurfaceAperture::obscuration(ApertureShape::Spider { arms: 3, width: 0.5 }),
         ];
-        let text = apertures_text(&all, |number| number.to_string());
-        assert_eq!(parse_apertures(&text), Ok(all));
+        assert_eq!(parse_apertures(&apertures_text(&all)), Ok(all));
         assert_eq!(
             turned.text_with(|v| format!("{v:.1}")),
             "rectangle ±0.1 x ±2.0 at 0.3, -0.0 turned 12.5"
@@ -178,6 +211,8 @@ mod tests {
     fn the_signs_between_are_optional() {
         let plain = "rectangle 3 2 at 1 2 turned 45".parse::<SurfaceAperture>();
         assert_eq!(plain, "Rectangle ±3 × ±2 at (1, 2) turned 45°".parse());
+        assert_eq!(plain, "rectangle ±3x±2 turned 45 at (1,2)".parse());
+        assert_eq!(plain, "rectangle 3x2 turned 45 at 1, 2".parse());
         assert!(plain.is_ok());
         assert_eq!(parse_apertures(" ; "), Ok(Vec::new()));
     }
@@ -189,6 +224,8 @@ mod tests {
         assert_eq!(error("circle 1 2"), "a circle has one radius; found 2 numbers");
         assert_eq!(error("circle wide"), "expected a number, `at` or `turned`, found `wide`");
         assert_eq!(error("circle 1 at 2"), "expected `at x, y`, found 1 numbers");
+        assert_eq!(error("circle 1 turned 3 turned 4"), "expected `turned` once");
+        assert!(error("rectangle 3,5").contains("a point in a number"));
         assert!(error("spider 2.5 x 1").contains("whole number of arms"));
         assert!(error("obscuring").starts_with("expected an aperture"));
     }

@@ -36,7 +36,7 @@ pub struct LossReport {
     pub coating: String,
     /// The share of light that arrives on the axis at the middle colour, for a lit direction on average.
     pub transmission: f64,
-    /// The share of light on the axis at the middle colour that the glasses absorb.
+    /// The share of the light on the axis, at the middle colour, that the glasses absorb on its way.
     pub absorbed: f64,
     /// The surfaces in front of media whose absorption is not known at all colours, and is left out there.
     #[serde(skip_serializing_if = "Vec::is_empty")]
@@ -111,17 +111,21 @@ impl LightLosses<'_> {
     /// The share of light on the axis that the glasses absorb at a wavelength.
     fn absorbed(&self, model: &RayModel, wavelength: usize) -> f64 {
         let channel = &model.channels[wavelength];
-        let gaps = channel.system.surfaces.iter().enumerate();
+        let surfaces = &channel.system.surfaces;
+        // As for the rays, the space in front of the image is clear.
+        let gaps = surfaces.iter().enumerate().take(surfaces.len().saturating_sub(2));
         let along = gaps.map(|(i, row)| self.absorbance(i, channel.um) * row.thickness.abs());
         1.0 - (-along.sum::<f64>()).exp()
     }
 
-    fn unknown_absorption(&self, model: &RayModel) -> Vec<SurfaceNumber> {
+    fn unknown_absorption(&self, model: &RayModel, bands: &[ColorBand]) -> Vec<SurfaceNumber> {
         let Some(lens) = self.glasses else { return Vec::new() };
+        let colors = || bands.iter().flat_map(|band| &band.wavelengths);
         let is_known = |surface: usize| {
-            model.channels.iter().all(|channel| lens.absorbance(surface, channel.um).is_some())
+            colors().all(|(w, _)| lens.absorbance(surface, model.channels[*w].um).is_some())
         };
-        let unknown = (0..lens.surfaces.len()).filter(|surface| !is_known(*surface));
+        let unknown =
+            (0..lens.surfaces.len().saturating_sub(1)).filter(|surface| !is_known(*surface));
         unknown.map(SurfaceNumber::new).collect()
     }
 }
@@ -165,7 +169,7 @@ impl LensLosses {
             coating: taken.coating.to_string(),
             transmission: 0.0,
             absorbed: taken.absorbed(model, bands[bands.len() / 2].wavelengths[0].0),
-            unknown_absorption: taken.unknown_absorption(model),
+            unknown_absorption: taken.unknown_absorption(model, bands),
             variation,
             by_ray: variation > tolerance,
             error: 0.0,

@@ -72,6 +72,14 @@ pub fn omitted_beside(
             change: Some(ghosts.change),
             reason: "the light of all where it is brightest, as a share of mid grey",
         }),
+        Some(_) if losses.is_some_and(|losses| losses.absorbed > 0.0) => {
+            left_out.push(OmittedEffect {
+                effect: "absorption of ghosts",
+                change: losses.map(|losses| losses.absorbed),
+                reason: "ghosts lose nothing in glass, which they cross at least once more than the image; \
+                         of the light on the axis the image loses this share",
+            });
+        }
         Some(_) => {}
     }
     left_out

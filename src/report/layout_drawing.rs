@@ -165,7 +165,7 @@ impl<'a> LayoutScene<'a> {
         parts.iter().for_each(|part| draw_part(sheet, part, pen, scale));
     }
 
-    /// The parts of a lens surface that its obstruction and its apertures block.
+    /// The parts of a surface that its obstruction and its apertures block: thick at a lens, thin at a mirror.
     fn draw_blocked(
         &self,
         sheet: &mut VectorDrawing,
@@ -173,11 +173,10 @@ impl<'a> LayoutScene<'a> {
         i: usize,
         scale: SheetScale,
     ) {
-        if !self.system.surfaces[i].mirror {
-            let pen = Pen::OUTLINE.with_width(0.8);
-            let parts = section.blocked_parts(i, PIECES);
-            parts.iter().for_each(|part| draw_part(sheet, part, pen, scale));
-        }
+        let mirror = self.system.surfaces[i].mirror;
+        let pen = if mirror { Pen::THIN } else { Pen::OUTLINE.with_width(0.8) };
+        let parts = section.blocked_parts(i, PIECES);
+        parts.iter().for_each(|part| draw_part(sheet, part, pen, scale));
     }
 
     /// Two ticks at the rim of the stop.

@@ -2,7 +2,7 @@
 
 use super::first_order_table::first_order_numbers;
 use super::materials::{index_and_abbe, material_name};
-use crate::lens::{AxisBreak, Lens, Parameter, Quantity, Row, SurfaceNumber};
+use crate::lens::{AxisBreak, Lens, Parameter, Quantity, Row, SurfaceAperture, SurfaceNumber};
 use crate::math::ShortNumber;
 use crate::paraxial::FirstOrder;
 use crate::plot::{DocumentTable, ReportDocument};
@@ -68,7 +68,7 @@ fn remarks(row: &Row) -> Vec<String> {
     if let Some(radius) = row.obstruction {
         words.push(format!("obstructed to {}", ShortNumber(radius)));
     }
-    words.extend(row.apertures.iter().map(ToString::to_string));
+    words.extend(row.apertures.iter().map(SurfaceAperture::short_text));
     if row.hyperhemisphere {
         words.push("more than half a sphere".to_owned());
     }

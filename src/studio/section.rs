@@ -51,14 +51,16 @@ impl<'a> SectionDrawing<'a> {
         let system = self.section.system();
         for (i, surface) in system.surfaces.iter().enumerate() {
             let refracts = system.index_before(i) != surface.index;
+            let (width, color) =
+                if surface.mirror { (1.0, palette.faint) } else { (3.0, palette.strong) };
+            for part in self.section.blocked_parts(i, PIECES) {
+                scene.polyline(&points(part), width, color);
+            }
             if surface.mirror {
                 for part in self.section.open_parts(i, PIECES) {
                     scene.polyline(&points(part), 2.5, palette.mirror);
                 }
                 continue;
-            }
-            for part in self.section.blocked_parts(i, PIECES) {
-                scene.polyline(&points(part), 3.0, palette.strong);
             }
             if i != self.section.image() && !refracts && system.stop != Some(i) {
                 scene.polyline(&self.surface(i), 1.0, palette.faint);
@@ -147,7 +149,7 @@ fn glass_alpha(usual: u8, index: f64) -> u8 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::lens::blank;
+    use crate::lens::{ApertureShape, SurfaceAperture, blank};
 
     #[test]
     fn only_glass_is_filled() {
@@ -156,6 +158,23 @@ mod tests {
         SectionDrawing::new(&system, &[]).draw_glass(&mut scene, &Palette::DARK, &[]);
         let behind = scene.vertices.iter().map(|corner| corner.position.x).fold(0.0, f32::max);
         assert!(behind <= 5.01, "nothing is filled behind the plate");
+    }
+
+    /// A spider whose arms lie along y covers the whole section of the mirror that it is written at.
+    #[test]
+    fn a_mirror_is_drawn_where_it_is_blocked() {
+        let mut system = blank().resolve(0, 0.5875618).unwrap();
+        let spider = ApertureShape::Spider { arms: 4, width: 1.0 };
+        system.surfaces[1].mirror = true;
+        let drawn = |system: &System<f64>| {
+            let mut scene = Scene::default();
+            SectionDrawing::new(system, &[]).draw_outlines(&mut scene, &Palette::DARK);
+            scene.vertices.len()
+        };
+        let open = drawn(&system);
+        system.surfaces[1].apertures = vec![SurfaceAperture::obscuration(spider)];
+        assert!(LensSection::new(&system, &[]).open_parts(1, 8).len() <= 2);
+        assert!(drawn(&system) >= open, "{} {open}", drawn(&system));
     }
 
     #[test]

@@ -208,7 +208,9 @@ fn an_aperture_that_cannot_be_is_refused_in_words() {
     assert!(says(&harness, "has the half width -1"), "{:?}", painted_texts(&harness));
     assert_eq!(harness.state().commands, []);
     choose(&mut harness, "Form of aperture 1 of surface 1", "Spider");
-    let spider = edited(&mut harness).surfaces[0].apertures[0].clone();
+    let after = edited(&mut harness);
+    assert!(!says(&harness, "half width"), "{:?}", painted_texts(&harness));
+    let spider = after.surfaces[0].apertures[0].clone();
     assert!(spider.obscures() && matches!(spider.shape, ApertureShape::Spider { arms: 3, .. }));
     enter(&mut harness, "Number of arms of aperture 1 of surface 1", "0");
     assert!(says(&harness, "has 0 arms; expected 1 to 32"));

@@ -202,7 +202,7 @@ fn a_picture_through_a_coated_lens_says_so_in_its_file() {
     assert!(data.get_text().unwrap().contains("transmission"));
     let text = done(&arguments, "");
     assert!(
-        text.contains("losses on: no coating, 65.9 % arrives on the axis; glass absorbs 0.29 %")
+        text.contains("losses on: no coating, 65.9 % arrives on the axis, glass absorbs 0.29 %")
             && text.contains("error of all 2"),
         "{text}"
     );

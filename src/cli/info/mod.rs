@@ -188,7 +188,7 @@ impl Display for InfoReport {
         }
         for (i, own) in self.apertures.iter().enumerate() {
             for aperture in own {
-                writeln!(f, "aperture of {}   {}", i + 1, aperture)?;
+                writeln!(f, "aperture of {}   {}", i + 1, aperture.short_text())?;
             }
         }
         Ok(())

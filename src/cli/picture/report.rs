@@ -164,10 +164,10 @@ fn losses_text(losses: &LossReport) -> String {
     let unknown = if unknown.is_empty() {
         String::new()
     } else {
-        format!(", none counted behind {} where it is not known", unknown.join(", "))
+        format!(" (unknown behind surface {}, taken as none)", unknown.join(", "))
     };
     format!(
-        "losses on: {coating}, {passed:.1} % arrives on the axis; glass absorbs {absorbed:.2} % of \
-         it{unknown}; it varies by {varied:.2} %: {how}"
+        "losses on: {coating}, {passed:.1} % arrives on the axis, glass absorbs {absorbed:.2} \
+         %{unknown}; it varies by {varied:.2} %: {how}"
     )
 }

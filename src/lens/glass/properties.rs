@@ -78,7 +78,8 @@ impl GlassProperties {
     /// them.
     pub fn absorbance(&self, um: f64) -> Option<f64> {
         let after = self.transmission.iter().position(|entry| entry[0] >= um)?;
-        let absorbance = |entry: &[f64; 3]| -entry[1].max(f64::MIN_POSITIVE).ln() / entry[2];
+        // Some catalogues have a transmission above 1.
+        let absorbance = |entry: &[f64; 3]| -entry[1].clamp(f64::MIN_POSITIVE, 1.0).ln() / entry[2];
         let [end, value] = [self.transmission[after][0], absorbance(&self.transmission[after])];
         if end == um {
             return Some(value);

@@ -103,7 +103,7 @@ const MOST: f64 = 16.0;
 ///
 /// # Errors
 /// A pupil without light or edge; `Boundary` for a pupil that is neither star-shaped nor an
-/// annulus, `Warp` for a lens with an obstruction or a gradient-index gap.
+/// annulus, `Warp` for a lens without a warp field.
 pub fn differentiate(
     region: &Region<'_>,
     cost: &QuadraticIntegrand,
@@ -154,9 +154,11 @@ pub fn choose_estimator(
             DerivativeEstimator::Boundary,
             "the pupil is an annulus around an obstruction".to_owned(),
         )),
-        RegionKind::Irregular { pieces, .. } if region.launch.channel().system.has_grin() => {
-            let reason =
-                format!("{}, and a gradient-index gap has no warp field", describe_pieces(*pieces));
+        RegionKind::Irregular { pieces, .. } if !region.launch.model.has_warp_field() => {
+            let reason = format!(
+                "{}, and a gradient-index gap, a tilted or freeform surface has no warp field",
+                describe_pieces(*pieces)
+            );
             Ok((DerivativeEstimator::Difference, reason))
         }
         RegionKind::Irregular { pieces, .. } => {

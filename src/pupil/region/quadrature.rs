@@ -83,6 +83,8 @@ const IRREGULAR_POINTS: usize = 1024;
 const IRREGULAR_ORDERS: usize = 8;
 /// The cells along a side of each independent part of the lowest order for a pupil behind apertures.
 const PART_CELLS: usize = 12;
+/// The lowest order for a pupil with a known edge that was sampled before: 20 by 12 nodes of an arc.
+const KNOWN_START: usize = 6;
 /// The highest order that such a pupil is begun with: the next one takes 65,536 points.
 const SAMPLED_START: usize = 2;
 
@@ -104,7 +106,12 @@ impl Region<'_> {
     /// be billions of points.
     pub fn order_like(&self, found_for: &RegionKind, order: usize) -> usize {
         let was_sampled = matches!(found_for, RegionKind::Irregular { annulus: None, .. });
-        if self.is_sampled() && !was_sampled { order.min(SAMPLED_START) } else { order }
+        match (was_sampled, self.is_sampled()) {
+            (false, true) => order.min(SAMPLED_START),
+            // The same number is few nodes where the edge is known.
+            (true, false) => order.max(KNOWN_START),
+            _ => order,
+        }
     }
 
     /// The orders that [`converge`] compares with each other, ascending.
@@ -587,7 +594,8 @@ mod tests {
         assert!(region.nodes(order).points.len() <= 16_384, "{order}");
         assert_eq!(region.order_like(&sampled, 5), 5);
         let clear = Region { kind: RegionKind::Clear, ..region };
-        assert_eq!(clear.order_like(&sampled, 5), 5);
+        assert_eq!(clear.order_like(&sampled, 1), 6);
+        assert_eq!(clear.order_like(&RegionKind::Clear, 1), 1);
     }
 
     #[test]

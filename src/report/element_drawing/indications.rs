@@ -82,14 +82,24 @@ pub(super) fn surface_column(of: &ElementTolerances<'_>, side: usize) -> Vec<Str
     let mut lines = vec![radius_text(&body.shapes[side], side)];
     lines.extend(form_lines(of, side));
     lines.push(format!("\u{d8}e {}", ShortNumber(2.0 * body.heights[side])));
-    let apertures = of.lens.surfaces.get(body.surfaces[side]).map(|row| &row.apertures);
-    let number = |value| ShortNumber(value).to_string();
-    lines.extend(apertures.into_iter().flatten().map(|own| format!("e {}", own.text_with(number))));
+    lines.extend(aperture_line(of, side));
     lines.push("Protective chamfer -".to_owned());
     lines.push(of.form(side));
     lines.push(of.centring(side));
     lines.push("5/ -".to_owned());
     lines
+}
+
+/// The line of apertures that are no circles: the first one, and how many there are beside it.
+fn aperture_line(of: &ElementTolerances<'_>, side: usize) -> Option<String> {
+    let apertures = &of.lens.surfaces.get(of.body.surfaces[side])?.apertures;
+    let first = apertures.first()?;
+    let effective = if first.obscures() { "" } else { "e " };
+    let more = match apertures.len() - 1 {
+        0 => String::new(),
+        more => format!(" and {more} more"),
+    };
+    Some(format!("{effective}{}{more}", first.short_text()))
 }
 
 /// The radius with its sign: CX for a surface that bulges out of the glass, CC for a hollow one.

@@ -78,7 +78,8 @@ impl CellPlace {
             TableColumn::Glass => glass::format_medium(&row.medium),
             TableColumn::Comment => row.comment.clone(),
             TableColumn::Obstruction => row.obstruction.map(show).unwrap_or_default(),
-            TableColumn::Apertures => apertures_text(&row.apertures, show),
+            // What is edited here is read again as a whole: a number that was not touched keeps its digits.
+            TableColumn::Apertures => apertures_text(&row.apertures),
             _ => {
                 let value = self.column.parameter(lens, zoom, surface).and_then(|p| lens.get(p));
                 let radius = self.column == TableColumn::Radius;

@@ -16,7 +16,7 @@ const SIZE: f64 = 10.0;
 
 /// The form of an aperture, as it is chosen.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum ShapeChoice {
+pub(super) enum ShapeChoice {
     Rectangle,
     Ellipse,
     Circle,
@@ -28,7 +28,7 @@ impl ShapeChoice {
     const ALL: [Self; 5] =
         [Self::Rectangle, Self::Ellipse, Self::Circle, Self::Polygon, Self::Spider];
 
-    const fn of(shape: &ApertureShape) -> Self {
+    pub(super) const fn of(shape: &ApertureShape) -> Self {
         match shape {
             ApertureShape::Rectangle { .. } => Self::Rectangle,
             ApertureShape::Ellipse { .. } => Self::Ellipse,
@@ -90,7 +90,7 @@ pub(super) fn show(
     fields: &mut EditForm<'_>,
     (surface, semi_diameter): (usize, Option<f64>),
 ) -> Option<Edit> {
-    heading(ui, "Apertures beside the circular rim");
+    heading(ui, "Further apertures, in mm");
     let apertures = fields.view.lens.surfaces[surface].apertures.clone();
     let mut editor = ApertureEditor { fields, surface, apertures: &apertures, asked: None };
     for index in 0..apertures.len() {
@@ -215,8 +215,13 @@ impl ApertureEditor<'_, '_> {
         let shown = upright.text_with(|number| number.to_string());
         let shown = shown.trim_start_matches("polygon ");
         let (surface, all) = (self.surface, self.apertures);
+        ui.label("Corners (x, y)");
         self.fields.paragraph(ui, &format!("Corners of {name}"), (shown, LINE), |text| {
-            let typed: SurfaceAperture = format!("polygon {text}").parse()?;
+            let corners = text.trim_start().trim_start_matches("polygon");
+            let typed: SurfaceAperture = format!("polygon {corners}").parse()?;
+            if typed.center != [0.0; 2] || typed.angle != 0.0 {
+                return Err("expected corners alone: place and angle have fields".to_owned());
+            }
             let mut changed = all.to_vec();
             changed[index].shape = typed.shape;
             Ok(Edit::SetApertures { surface, apertures: changed })

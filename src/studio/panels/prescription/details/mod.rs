@@ -21,6 +21,7 @@ use crate::studio::panels::valid_edit;
 use crate::studio::panels::widgets::hint_beside;
 use crate::studio::text::capitalize;
 use crate::studio::text_input::{EditBuffers, error_color};
+use apertures::ShapeChoice;
 use forms::{FormChoice, NumberName, RuleChoice};
 
 /// The width of the part of the panel, in points.
@@ -40,7 +41,7 @@ pub(super) struct SurfaceDetails {
     /// The reason why the last choice was refused, and the surface that it was for.
     refused: Option<(usize, String)>,
     /// The surface and the choices whose fields were shown last.
-    shown: Option<(usize, FormChoice, RuleChoice)>,
+    shown: Option<(usize, FormChoice, RuleChoice, Vec<ShapeChoice>)>,
 }
 
 impl SurfaceDetails {
@@ -105,7 +106,8 @@ impl SurfaceDetails {
     /// Forgets what was typed into fields that are no longer shown, with its errors.
     fn forget_other_fields(&mut self, view: &SessionView, surface: usize) {
         let row = &view.lens.surfaces[surface];
-        let now = Some((surface, FormChoice::of(row), RuleChoice::of(row)));
+        let apertures = row.apertures.iter().map(|own| ShapeChoice::of(&own.shape)).collect();
+        let now = Some((surface, FormChoice::of(row), RuleChoice::of(row), apertures));
         if self.shown != now {
             self.shown = now;
             self.buffers = EditBuffers::default();
