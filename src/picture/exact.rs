@@ -19,7 +19,7 @@ use super::sample_points::LONGEST;
 use super::scene::{Radiance, Scene};
 use super::tile_sampler::{PictureTile, SampledTile, TileSampler, TileWork};
 use super::{ColorBand, ImageFrame, Picture, PictureError};
-use crate::analysis::irradiance;
+use crate::analysis::{irradiance, limited_by_rims};
 use crate::lens::{Surface, SurfaceNumber};
 use crate::pupil::{Accuracy, RayModel};
 use crate::trace::Fates;
@@ -139,6 +139,8 @@ impl<'a> ExactRenderer<'a> {
         if let Some(surface) = system.surfaces.iter().position(|own| !own.has_round_apertures()) {
             return Err(PictureError::NotRound(SurfaceNumber::new(surface)));
         }
+        let limited = limited_by_rims(model)?;
+        let model = &*limited;
         let directions = LitDirections::new(model, &outer(model, bands), frame.reach(), RINGS)?;
         let sampler = TileSampler::new(model, bands, directions)?;
         let white = brightest(model, frame.reach())?;
@@ -292,10 +294,8 @@ impl<'a> ExactRenderer<'a> {
             let pass = |(work, _): (&mut TileWork, &bool)| {
                 let first = FIRST.max(FIRST_OF_TILE / work.tile.len().max(1));
                 let count = if work.count == 0 { first } else { 2 * work.count };
-                let scene = |ray: &_, seconds| self.scene.radiance(ray, seconds);
-                self.sampler.sample(work, count.min(most), (&scene, settings.seconds), &|| {
-                    watch.is_stopped()
-                })
+                let scene = (self.scene, settings.seconds);
+                self.sampler.sample(work, count.min(most), scene, &|| watch.is_stopped())
             };
             let some = works.par_iter_mut().zip(&chosen).filter(|(_, is_chosen)| **is_chosen);
             if !some.map(pass).all(|ended| ended) {

@@ -29,8 +29,10 @@ mod quick;
 mod raster;
 mod sample_points;
 mod scene;
+mod seen_light;
 mod sensor;
 mod sensor_law;
+mod tent_line;
 mod tile_sampler;
 
 pub use built_in::BuiltInScene;
