@@ -179,12 +179,12 @@ impl ConstraintMargin {
         let zoom =
             if self.zoom > 0 { format!(" at zoom position {}", self.zoom) } else { String::new() };
         let bounds = match (self.min, self.max) {
-            (Some(min), Some(max)) if min == max => format!("= {min}"),
-            (Some(min), Some(max)) => format!("from {min} to {max}"),
-            (Some(min), None) => format!(">= {min}"),
-            (None, max) => format!("<= {}", max.unwrap_or(f64::INFINITY)),
+            (Some(min), Some(max)) if min == max => format!("= {}", rounded(min)),
+            (Some(min), Some(max)) => format!("from {} to {}", rounded(min), rounded(max)),
+            (Some(min), None) => format!(">= {}", rounded(min)),
+            (None, max) => format!("<= {}", rounded(max.unwrap_or(f64::INFINITY))),
         };
-        format!("{}{place}{zoom} {bounds}", self.term)
+        format!("{}{place}{zoom} {bounds}", self.term.replace('_', " "))
     }
 
     /// The distance to the nearest bound, negative if the constraint is violated.
@@ -192,6 +192,11 @@ impl ConstraintMargin {
         let below = self.min.map_or(f64::INFINITY, |min| self.value - min);
         below.min(self.max.map_or(f64::INFINITY, |max| max - self.value))
     }
+}
+
+/// A bound with six digits: one that was computed has as many as there are.
+fn rounded(bound: f64) -> f64 {
+    format!("{bound:.5e}").parse().unwrap_or(bound)
 }
 
 /// The constrained quantities of a lens for some terms, with their bounds.

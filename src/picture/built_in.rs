@@ -90,11 +90,12 @@ impl Scene {
     /// # Errors
     /// A lens without focal length, or a distance that is not in front of it.
     pub fn of_raster(
-        raster: Raster,
+        raster: impl Into<Arc<Raster>>,
         model: &RayModel,
         frame: &ImageFrame,
         distance: Option<f64>,
     ) -> Result<Self, PictureError> {
+        let raster = raster.into();
         let [width, height] = filling_size(model, frame, distance)?;
         let aspect = raster.aspect();
         let half_height = height.min(width / aspect);
@@ -103,7 +104,7 @@ impl Scene {
             center: [0.0; 2],
             half_size: [aspect * half_height, half_height],
             velocity: [0.0; 2],
-            pattern: Pattern::Raster(Arc::new(raster)),
+            pattern: Pattern::Raster(raster),
         };
         Self::new(vec![layer], [0.0; 3], 1.0)
     }

@@ -1,5 +1,6 @@
 //! The commands of a session.
 
+use super::analysis::SceneFile;
 use super::grin_design::GrinCommand;
 use super::specified_design::SpecifiedDesignCommand;
 use super::structure_search::StructureSearchCommand;
@@ -187,7 +188,7 @@ pub enum Command {
 }
 
 /// A setting of what panels show of the design.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum PanelSetting {
     /// The number of rays of each field in the layout.
@@ -214,8 +215,11 @@ pub enum PanelSetting {
     Ghost(Option<[usize; 2]>),
     /// True to compute the picture of a scene.
     Picture(bool),
-    /// The scene of the picture.
+    /// The scene of the picture, in place of a picture from a file too.
     Scene(BuiltInScene),
+    /// The picture from a file that is the scene of the picture; it is no part of a written command.
+    #[serde(skip)]
+    SceneFile(SceneFile),
     /// True to measure the error of the picture everywhere.
     PictureErrors(bool),
     /// True to compute the lens as it is made.

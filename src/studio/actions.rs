@@ -28,6 +28,8 @@ pub enum UiAction {
     ShowPanel(PanelKind),
     /// Shows a panel in front of the others, or hides it if it is there.
     TogglePanel(PanelKind),
+    /// Gives the keyboard to the panel this many places behind the one that was in front last.
+    StepPanel(isize),
     /// Gives one panel all the room of the others, or shows them again.
     MaximizePanel(Option<PanelKind>),
     /// Arranges all panels.

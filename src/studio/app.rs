@@ -22,14 +22,15 @@ use super::input_order::InputQueue;
 use super::menu;
 use super::menu_items::{MenuContext, PanelState};
 use super::panels::PanelKind;
+use super::run_items::panel_of_run;
 use super::text::capitalize;
 use super::unsaved::{PendingAction, PendingState};
 use super::window::Persistence;
 use crate::files;
 use crate::files::{BundledLens, LibraryLens};
 use crate::session::{
-    Analyses, AnalysisSettings, Command, DocumentSource, GrinCommand, Message, Session,
-    SessionEvent, SessionView, Severity, StructureSearchCommand,
+    Analyses, AnalysisSettings, Command, DocumentSource, GrinCommand, Message, PanelSetting,
+    SceneFile, Session, SessionEvent, SessionView, Severity, StructureSearchCommand,
 };
 
 /// The key under which the arrangement of the panels is stored.
@@ -155,7 +156,12 @@ impl Studio {
 
     fn dispatch(&mut self, context: &Context, view: &SessionView, action: UiAction) {
         match action {
-            UiAction::Run(command) => self.run_or_ask(context, PendingAction::Run(command), None),
+            UiAction::Run(command) => {
+                // A run that was asked for by words is seen.
+                let panel = panel_of_run(&command).filter(|_| self.dock.maximized().is_none());
+                panel.into_iter().for_each(|kind| self.dock.bring_forward(kind));
+                self.run_or_ask(context, PendingAction::Run(command), None);
+            }
             UiAction::AskPath(request) => self.ask_path(context, view, request),
             UiAction::OpenBundled(bundled) => self.open_bundled(context, bundled),
             UiAction::OpenLibrary(lens, scale) => self.open_library_lens(context, lens, scale),
@@ -166,6 +172,10 @@ impl Studio {
             }
             UiAction::ShowPanel(kind) => {
                 self.dock.show(kind);
+                self.dock.put_keyboard_in(context, kind);
+            }
+            UiAction::StepPanel(step) => {
+                let kind = self.dock.panel_beside(step);
                 self.dock.put_keyboard_in(context, kind);
             }
             UiAction::TogglePanel(kind) => {
@@ -288,6 +298,10 @@ impl Studio {
             }
             FileRequest::OpenField => Command::Grin(GrinCommand::OpenFile(path)),
             FileRequest::SaveField(nodes) => Command::Grin(GrinCommand::Save { path, nodes }),
+            FileRequest::OpenScene => match SceneFile::read(&path) {
+                Ok(file) => Command::Show(PanelSetting::SceneFile(file)),
+                Err(why) => return self.message = Some(why.to_string()),
+            },
             FileRequest::SavePicture => Command::SavePicture(path),
             FileRequest::ExportPaper(kind) => Command::ExportPaper { kind, path },
             FileRequest::ExportZemax | FileRequest::ExportJson => Command::Export(path),
@@ -300,6 +314,9 @@ impl Studio {
         for event in events {
             if let SessionEvent::Opened(path) = &event {
                 self.remember(path);
+                if self.dock.maximized().is_none() {
+                    self.dock.bring_forward(PanelKind::Layout);
+                }
                 if self.session.view().imported.is_some() {
                     self.dock.show(PanelKind::ImportReport);
                 }
@@ -464,10 +481,17 @@ fn likely_path(view: &SessionView, request: FileRequest) -> Option<PathBuf> {
     }
 }
 
-/// A file with the name of a lens, without the characters that some systems refuse.
+/// A file with the name of a lens, without the characters that some systems refuse. A decimal point stays.
 fn named_file(name: &str, extension: &str) -> PathBuf {
-    let kept = |c: char| c.is_alphanumeric() || matches!(c, ' ' | '-' | '_');
-    let name: String = name.chars().map(|c| if kept(c) { c } else { ' ' }).collect();
+    let letters: Vec<char> = name.chars().collect();
+    let is_digit =
+        |at: Option<usize>| at.and_then(|at| letters.get(at)).is_some_and(char::is_ascii_digit);
+    let is_kept = |at: usize, c: char| {
+        let is_point = c == '.' && is_digit(at.checked_sub(1)) && is_digit(Some(at + 1));
+        c.is_alphanumeric() || matches!(c, ' ' | '-' | '_') || is_point
+    };
+    let kept = letters.iter().enumerate().map(|(at, c)| if is_kept(at, *c) { *c } else { ' ' });
+    let name: String = kept.collect();
     let name = name.split_whitespace().take(NAME_WORDS).collect::<Vec<_>>().join(" ");
     let name = if name.is_empty() { "lens" } else { &name };
     PathBuf::from(format!("{name}.{extension}"))
@@ -590,6 +614,7 @@ mod tests {
         for (name, file) in [
             ("Double Gauss: 50/2", "Double Gauss 50 2.json"),
             ("  ..  ", "lens.json"),
+            ("New lens, 35 mm f/2.8", "New lens 35 mm f 2.8.json"),
             ("a b c d e f g h", "a b c d e f.json"),
         ] {
             assert_eq!(named_file(name, "json"), PathBuf::from(file));

@@ -8,6 +8,7 @@ use egui::{
 use super::actions::{Actions, UiAction};
 use super::form::dialog_frame;
 use super::menu_items::{MenuContext, MenuItem};
+use super::run_items::disabled_reason;
 use super::text_input::place_cursor_at_end;
 
 /// The number of items that are listed at most.
@@ -20,6 +21,8 @@ const LIST_HEIGHT: f32 = 380.0;
 pub(super) struct CommandPalette {
     text: String,
     selected: usize,
+    /// The reason why what was asked for last is not possible now.
+    refusal: Option<String>,
 }
 
 impl CommandPalette {
@@ -56,20 +59,31 @@ impl CommandPalette {
         let field = ui.add(line).accessible_name("Find a command");
         field.request_focus();
         if field.changed() || early {
-            self.selected = 0;
+            (self.selected, self.refusal) = (0, None);
         }
         let items = found(menus.all(), &self.text);
         let last = items.len().saturating_sub(1);
         self.selected = (self.selected + usize::from(down)).min(last);
         self.selected = self.selected.saturating_sub(usize::from(up));
+        if down || up {
+            self.refusal = None;
+        }
         ui.add_space(4.0);
         if items.is_empty() {
             ui.weak("Nothing has these words.");
             return None;
         }
+        if let Some(refusal) = &self.refusal {
+            ui.colored_label(ui.visuals().warn_fg_color, refusal);
+        }
         let pressed = self.list(ui, &items, down || up);
         let chosen = if enter { Some(self.selected) } else { pressed };
-        items.into_iter().nth(chosen?).filter(MenuItem::is_enabled)
+        let chosen = items.into_iter().nth(chosen?)?;
+        if !chosen.is_enabled() {
+            self.refusal = Some(disabled_reason(&chosen));
+            return None;
+        }
+        Some(chosen)
     }
 
     /// Takes what is typed before the field can: in the first frame the palette is only measured. True
@@ -136,17 +150,10 @@ fn show_item(ui: &mut Ui, item: &MenuItem, selected: bool) -> egui::Response {
     let layout = Layout::left_to_right(Align::Center).with_main_justify(true);
     let row =
         ui.allocate_ui_with_layout(size, layout, |ui| ui.add_enabled(item.is_enabled(), button));
-    let row = row.inner.on_disabled_hover_text(disabled_hint(item));
+    let row = row.inner;
+    let row =
+        if item.is_enabled() { row } else { row.on_disabled_hover_text(disabled_reason(item)) };
     if item.hint.is_empty() { row } else { row.on_hover_text(item.hint) }
-}
-
-/// The reason why an item makes no sense now.
-fn disabled_hint(item: &MenuItem) -> &'static str {
-    match item.menu {
-        "Element" => "Not possible now: select a surface of an element.",
-        "Edit" => "Nothing to undo or redo.",
-        _ => "Not possible now: it needs a run, a result or variables that are not there.",
-    }
 }
 
 /// The items that have all words of a text: those that can be asked for first, and among them those

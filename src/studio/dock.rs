@@ -131,6 +131,26 @@ impl Dock {
         context.request_repaint();
     }
 
+    /// Shows a panel in front of the others unless it is seen already.
+    pub fn bring_forward(&mut self, kind: PanelKind) {
+        if !self.is_visible(kind) {
+            self.show(kind);
+        }
+    }
+
+    /// The panel some places behind the one that was in front last, among those that are seen. It is the
+    /// one in front from now on.
+    pub fn panel_beside(&mut self, step: isize) -> PanelKind {
+        let shown: Vec<PanelKind> =
+            PanelKind::ALL.into_iter().filter(|kind| self.is_visible(*kind)).collect();
+        let at = shown.iter().position(|kind| *kind == self.front);
+        let count = shown.len().cast_signed();
+        let next = at.map(|at| (at.cast_signed() + step).rem_euclid(count.max(1)).cast_unsigned());
+        self.front =
+            next.and_then(|at| shown.get(at)).or(shown.first()).copied().unwrap_or(self.front);
+        self.front
+    }
+
     fn set_visible(&mut self, kind: PanelKind, open: bool) {
         self.maximized = None;
         self.front = kind;

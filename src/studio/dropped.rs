@@ -5,7 +5,7 @@ use std::path::Path;
 use super::actions::UiAction;
 use super::panels::PanelKind;
 use crate::files::{self, MAX_LENS_BYTES};
-use crate::session::{Command, GrinCommand, StructureSearchCommand};
+use crate::session::{Command, GrinCommand, PanelSetting, SceneFile, StructureSearchCommand};
 
 /// A kind of file, by its extension and, for JSON, by its keys.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -35,11 +35,11 @@ pub(super) fn open_actions(path: &Path) -> Result<Vec<UiAction>, String> {
             Ok(vec![GrinCommand::OpenFile(path).into(), panel(PanelKind::Slice)])
         }
         FileKind::Glasses => Ok(vec![Command::AddGlasses(path).into()]),
-        FileKind::Picture => Err(refusal(
-            &path,
-            "is a picture; a picture is the goal of a gradient-index task, whose file names it: drop \
-             that file",
-        )),
+        FileKind::Picture => {
+            let file = SceneFile::read(&path).map_err(|why| format!("{why}."))?;
+            let scene = Command::Show(PanelSetting::SceneFile(file));
+            Ok(vec![scene.into(), panel(PanelKind::Picture)])
+        }
     }
 }
 
@@ -64,7 +64,8 @@ fn file_kind(path: &Path) -> Result<FileKind, String> {
         _ => Err(refusal(
             path,
             "is none of the files that the window opens: a lens (.json, .zmx, .zar, .seq, .len, .roa), a search (.json), a \
-             gradient-index task (.json) or volume (.npz), a glass catalogue (.agf, .yml)",
+             gradient-index task (.json) or volume (.npz), a glass catalogue (.agf, .yml), a picture as a \
+             scene (.png, .jpg)",
         )),
     }
 }

@@ -7,6 +7,7 @@ use std::thread;
 
 use egui::Key;
 
+use super::text_input::select_characters;
 use crate::report::PaperKind;
 
 /// The purpose for which a path is asked.
@@ -40,6 +41,8 @@ pub enum FileRequest {
     OpenField,
     /// To write the gradient-index field, with this number of nodes along a side.
     SaveField(usize),
+    /// To read a picture as the scene of another one.
+    OpenScene,
     /// To write the picture of a scene.
     SavePicture,
     /// To write a report, the layout or the solids of the lens.
@@ -65,6 +68,7 @@ impl FileRequest {
             Self::ExportSearchLens(_) => "Export the lens of the search",
             Self::OpenField => "Open a GRIN task or a volume",
             Self::SaveField(_) => "Save the volume",
+            Self::OpenScene => "Open a picture as a scene",
             Self::SavePicture => "Save the picture",
             Self::ExportPaper(PaperKind::Report) => "Export the prescription report",
             Self::ExportPaper(PaperKind::Layout) => "Export the drawing of the layout",
@@ -83,6 +87,7 @@ impl FileRequest {
             Self::ExportZemax => &["zmx", "seq", "len", "roa"],
             Self::OpenField => &["json", "npz"],
             Self::SaveField(_) => &["npz", "json"],
+            Self::OpenScene => &["png", "PNG", "jpg", "JPG", "jpeg", "JPEG"],
             Self::SavePicture => &["png"],
             Self::SaveImportReport => &["txt"],
             Self::ExportPaper(kind) => kind.extensions(),
@@ -94,7 +99,7 @@ impl FileRequest {
     const fn filter_name(self) -> &'static str {
         match self {
             Self::OpenField | Self::SaveField(_) => "GRIN fields",
-            Self::SavePicture => "Pictures",
+            Self::OpenScene | Self::SavePicture => "Pictures",
             Self::AddGlasses => "Glass catalogues",
             Self::ExportPaper(PaperKind::Report) | Self::SaveImportReport => "Reports",
             Self::ExportPaper(PaperKind::Layout) => "Drawings",
@@ -110,8 +115,14 @@ impl FileRequest {
 
     /// True if the file is written.
     fn is_save(self) -> bool {
-        let reads =
-            [Self::Open, Self::InsertLens, Self::AddGlasses, Self::OpenSearch, Self::OpenField];
+        let reads = [
+            Self::Open,
+            Self::InsertLens,
+            Self::AddGlasses,
+            Self::OpenSearch,
+            Self::OpenField,
+            Self::OpenScene,
+        ];
         !reads.contains(&self)
     }
 
@@ -131,6 +142,8 @@ impl FileRequest {
 pub struct FileDialog {
     native: Option<(FileRequest, Receiver<Option<PathBuf>>)>,
     prompt: Option<(FileRequest, String)>,
+    /// True until the line has had the cursor.
+    is_new: bool,
     /// The path whose file may be replaced once the user says so again.
     existing: Option<PathBuf>,
 }
@@ -165,6 +178,7 @@ impl FileDialog {
             start.push(MAIN_SEPARATOR);
         }
         self.prompt = Some((purpose, start));
+        self.is_new = true;
     }
 
     /// Shows the line, if there is one, and gives the file once it is chosen.
@@ -194,6 +208,11 @@ impl FileDialog {
             let label = ui.label("Path");
             let line = egui::TextEdit::singleline(text).desired_width(420.0);
             let field = ui.add(line).labelled_by(label.id);
+            // A field that has no cursor yet forgets what is selected in it.
+            if self.is_new && field.has_focus() {
+                self.is_new = false;
+                select_characters(ui.ctx(), field.id, stem_of(text));
+            }
             if !field.lost_focus() {
                 field.request_focus();
             }
@@ -224,6 +243,15 @@ impl FileDialog {
     }
 }
 
+/// The characters of the name of a file in its path, without folder and extension: what is typed first
+/// replaces the name that is proposed.
+fn stem_of(path: &str) -> std::ops::Range<usize> {
+    let name = path.rfind(['/', MAIN_SEPARATOR]).map_or(0, |at| at + 1);
+    let dot = path[name..].rfind('.').filter(|at| *at > 0).map_or(path.len(), |at| name + at);
+    let count = |end: usize| path[..end].chars().count();
+    count(name)..count(dot)
+}
+
 /// The folder itself, or that of a file.
 fn folder_of(path: &Path) -> Option<&Path> {
     if path.is_dir() { Some(path) } else { path.parent() }
@@ -252,6 +280,7 @@ fn open_native(
             FileRequest::Open
             | FileRequest::InsertLens
             | FileRequest::OpenSearch
+            | FileRequest::OpenScene
             | FileRequest::OpenField => dialog.pick_file(),
             FileRequest::ExportFront | FileRequest::ExperimentFolder => dialog.pick_folder(),
             _ => dialog.save_file(),
@@ -276,6 +305,22 @@ fn has_native_dialogs() -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_name_of_a_file_is_what_is_typed_over() {
+        for (path, name) in [
+            ("/home/a b/New lens f 2.8.json", "New lens f 2.8"),
+            ("lens.json", "lens"),
+            ("/a.b/lens", "lens"),
+            ("/a/Prüf.ü/.lens", ".lens"),
+            ("/a/", ""),
+            ("", ""),
+        ] {
+            let chosen: String =
+                path.chars().take(stem_of(path).end).skip(stem_of(path).start).collect();
+            assert_eq!(chosen, name, "{path}");
+        }
+    }
 
     #[test]
     fn a_written_file_gets_its_extension() {

@@ -47,6 +47,12 @@ fn acts(event: &Event) -> bool {
                     | Key::F2
                     | Key::ArrowUp
                     | Key::ArrowDown
+                    | Key::ArrowLeft
+                    | Key::ArrowRight
+                    | Key::PageUp
+                    | Key::PageDown
+                    | Key::Home
+                    | Key::End
                     | Key::Insert
                     | Key::Delete
             );

@@ -11,6 +11,7 @@ use super::command_palette::shown_at_least;
 use super::experiment_window;
 use super::menu_items::{self, MenuContext, MenuItem};
 use super::panels::widgets::{hint_beside, hint_right_of};
+use super::run_items::disabled_reason;
 use crate::session::{Command, SessionView};
 
 /// Redo has a second shortcut, which other programs use.
@@ -70,7 +71,11 @@ fn show_item(ui: &mut Ui, item: MenuItem, actions: &mut Actions) {
         button = button.shortcut_text(ui.ctx().format_shortcut(key));
     }
     let response = ui.add_enabled(item.is_enabled(), button);
-    let response = if item.hint.is_empty() { response } else { hint_beside(response, item.hint) };
+    let response = if item.is_enabled() {
+        if item.hint.is_empty() { response } else { hint_beside(response, item.hint) }
+    } else {
+        response.on_disabled_hover_text(disabled_reason(&item))
+    };
     if response.clicked() {
         actions.extend(item.action);
         ui.close();

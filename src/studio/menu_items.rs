@@ -28,6 +28,8 @@ pub(super) struct MenuItem {
     /// `None` while it makes no sense.
     pub(super) action: Option<UiAction>,
     pub(super) hint: &'static str,
+    /// The reason why it makes no sense now, where it is not told by its title.
+    pub(super) why_not: &'static str,
     /// True for a line above it in its menu.
     pub(super) separated: bool,
     /// True for a shortcut that belongs to a text field while one is edited.
@@ -56,6 +58,7 @@ impl MenuItem {
             shortcut: None,
             action,
             hint: "",
+            why_not: "",
             separated: false,
             yields_to_text: false,
             checked: None,
@@ -245,7 +248,7 @@ impl MenuContext<'_> {
     }
 
     /// One panel alone, and the arrangements of all panels.
-    fn arrangements(&self) -> [MenuItem; 4] {
+    fn arrangements(&self) -> [MenuItem; 6] {
         const MENU: &str = "View";
         let front = self.panels.iter().find(|panel| panel.kind == self.front);
         let (title, kind) = if self.maximized {
@@ -262,6 +265,12 @@ impl MenuContext<'_> {
                 .key(Modifiers::NONE, Key::F11)
                 .separated()
                 .hint("The panel that was opened last has all the room, until all are shown again"),
+            MenuItem::new(MENU, "Next panel", UiAction::StepPanel(1))
+                .key(Modifiers::NONE, Key::F6)
+                .hint("Gives the keyboard to the next panel that is seen"),
+            MenuItem::new(MENU, "Previous panel", UiAction::StepPanel(-1))
+                .key(Modifiers::SHIFT, Key::F6)
+                .hint("Gives the keyboard to the previous panel that is seen"),
             arrange("Arrangement for a search", Arrangement::Search)
                 .hint("The layout large, and beside it the lenses that the search has found"),
             arrange("Arrangement for a large window", Arrangement::Large)

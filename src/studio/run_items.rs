@@ -13,7 +13,10 @@ use crate::session::{
     Command, GrinCommand, RunStatus, RunView, SessionView, SpecifiedDesignCommand,
     StructureSearchCommand,
 };
-use crate::studio::panels::{add_variables_edit, term_edits};
+use crate::studio::panels::{PanelKind, add_variables_edit, term_edits};
+
+/// The title of the request that starts an optimization.
+const OPTIMIZE: &str = "Optimize";
 
 /// A request with its title; `None` while it makes no sense.
 type Request = (&'static str, Option<Command>);
@@ -30,10 +33,12 @@ pub(super) fn commands(view: &SessionView, has_preview: bool) -> Vec<MenuItem> {
         ("Candidate", candidate(view, has_preview)),
         ("Variables", variables(&view.lens)),
     ];
+    let obstacle = optimize_obstacle(view);
     let items = |(menu, requests): (&'static str, Vec<Request>)| {
-        requests
-            .into_iter()
-            .map(move |(title, command)| MenuItem::maybe(menu, title, command.map(Into::into)))
+        requests.into_iter().map(move |(title, command)| {
+            let item = MenuItem::maybe(menu, title, command.map(Into::into));
+            MenuItem { why_not: if title == OPTIMIZE { obstacle } else { "" }, ..item }
+        })
     };
     let tasks = grin_design::BUILTIN_TASKS.iter().map(|task| {
         let open = GrinCommand::OpenBuiltin(task.name.to_owned());
@@ -53,6 +58,67 @@ fn watch(view: &SessionView) -> MenuItem {
     MenuItem::maybe("Search", "Watch the search in the whole window", watch)
 }
 
+/// The reason why no optimization can begin; empty if one can.
+fn optimize_obstacle(view: &SessionView) -> &'static str {
+    if view.optimization.is_active() {
+        "An optimization is running: stop it first."
+    } else if view.lens.variables.is_empty() {
+        "No number of the lens is variable: vary all curvatures, or press Ctrl+Shift+V on a number of the \
+         table."
+    } else if view.goal.is_none() {
+        "The lens has no merit function yet."
+    } else {
+        ""
+    }
+}
+
+/// The reason why an item makes no sense now, in words.
+pub(super) fn disabled_reason(item: &MenuItem) -> String {
+    if !item.why_not.is_empty() {
+        return item.why_not.to_owned();
+    }
+    let run = match item.menu {
+        "Element" => {
+            return "Select a surface of an element first, in the table or in the drawing.".into();
+        }
+        "Edit" if item.title.starts_with("Redo") => return "There is nothing to redo.".into(),
+        "Edit" => return "There is nothing to undo.".into(),
+        "File" => return "There is no front: start one in the panel Pareto front.".into(),
+        "Candidate" => return "There is no candidate: a run or the history shows one.".into(),
+        "Optimizer" => "optimization",
+        "Front" => "front",
+        "Search" => "search",
+        "Gradient index" => "design of a field",
+        "Specification" => "design from a specification",
+        _ => return "Not possible now.".into(),
+    };
+    match item.title.split(' ').next() {
+        Some("Start") => format!("A {run} is running: stop it first."),
+        Some("Pause") => format!("No {run} is running, or it is paused already."),
+        Some("Stop") => format!("No {run} is running."),
+        Some("Resume" | "Take") => format!("No {run} is paused."),
+        Some("Design") => "No field is open, or its design is running.".to_owned(),
+        Some("Close") => "No field is open.".to_owned(),
+        _ => format!("There is no result of a {run}: start one first."),
+    }
+}
+
+/// The panel that shows the run that a command starts.
+pub(super) fn panel_of_run(command: &Command) -> Option<PanelKind> {
+    match command {
+        Command::Optimize { .. } => Some(PanelKind::Optimizer),
+        Command::StartPareto { .. } => Some(PanelKind::Pareto),
+        Command::StructureSearch(
+            StructureSearchCommand::StartShown(_) | StructureSearchCommand::ResumeFrom(_),
+        ) => Some(PanelKind::Search),
+        Command::Grin(GrinCommand::Start | GrinCommand::OpenBuiltin(_)) => Some(PanelKind::Slice),
+        Command::SpecifiedDesign(
+            SpecifiedDesignCommand::Start(_) | SpecifiedDesignCommand::ResumeUnfinished,
+        ) => Some(PanelKind::Specification),
+        _ => None,
+    }
+}
+
 /// A command for a run that waits, or takes steps.
 fn for_run<S>(run: &RunView<S>, command: Command) -> Option<Command> {
     run.is_active().then_some(command)
@@ -68,7 +134,7 @@ fn optimizer(view: &SessionView) -> Vec<Request> {
         goal.map(|goal| Command::Optimize { method, goal: (**goal).clone(), glasses: None });
     let has_result = run.snapshot.is_some();
     vec![
-        ("Optimize", start),
+        (OPTIMIZE, start),
         ("Pause the optimization", for_run(run, Command::Pause).filter(|_| !is_paused)),
         ("Resume the optimization", is_paused.then_some(Command::Resume)),
         ("Take one step of the optimization", is_paused.then_some(Command::Step)),

@@ -5,7 +5,7 @@ use egui::{Align2, Context, Grid, Id, ScrollArea, Ui, Window, vec2};
 use super::menu_items::MenuContext;
 
 /// Keys that belong to the table of surfaces and to the drawings.
-const OTHERS: [(&str, &str, &str); 21] = [
+const OTHERS: [(&str, &str, &str); 23] = [
     ("Table", "Arrows", "Go to the next cell"),
     ("Table", "Shift+arrows", "Choose a range of cells"),
     ("Table", "F2", "Edit the text of a cell instead of replacing it"),
@@ -18,7 +18,9 @@ const OTHERS: [(&str, &str, &str); 21] = [
     ("Table", "Insert", "Insert a surface in front of the selected one"),
     ("Table", "Delete", "Delete the selected surface"),
     ("Table", "Ctrl+Shift+V", "Make the number with the cursor variable, or fix it"),
-    ("Drawing", "Double click", "Show the whole lens"),
+    ("Drawing", "Left, Right", "Select the previous or the next surface"),
+    ("Drawing", "+, -", "Bring it nearer, or further away"),
+    ("Drawing", "Home, double click", "Show the whole lens"),
     ("Handle", "Tab", "Go to the next handle of the selected surface or of the lens"),
     ("Handle", "Arrows", "Move the handle"),
     ("Handle", "Shift+arrows", "Move it in small steps"),

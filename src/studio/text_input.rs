@@ -3,6 +3,8 @@
 //! Enter, Tab and a click elsewhere end the editing of a line, Escape discards it. A rejected text remains in
 //! its field, marked, with the reason as a tooltip.
 
+use std::ops::Range;
+
 use egui::text::{CCursor, CCursorRange};
 use egui::text_edit::TextEditState;
 use egui::{
@@ -208,6 +210,12 @@ pub(in crate::studio) fn select_whole(context: &Context, field: Id) {
 /// Moves the cursor of a field behind its text.
 pub(in crate::studio) fn place_cursor_at_end(context: &Context, field: Id) {
     select_range(context, field, CCursorRange::one(CCursor::new(usize::MAX >> 1)));
+}
+
+/// Selects some characters of a field, so that typing replaces them.
+pub(in crate::studio) fn select_characters(context: &Context, field: Id, chosen: Range<usize>) {
+    let range = CCursorRange::two(CCursor::new(chosen.start), CCursor::new(chosen.end));
+    select_range(context, field, range);
 }
 
 /// Selects a part of the text of a field.

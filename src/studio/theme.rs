@@ -5,11 +5,21 @@ use egui::{
     Color32, Context, CornerRadius, FontId, Margin, Stroke, Style, TextStyle, Theme, Visuals, vec2,
 };
 
-/// Dresses a window in both themes.
+/// The longest click in seconds: a button goes down in one frame and up in another, and on a slow machine
+/// each takes a second.
+const CLICK_SECONDS: f64 = 4.0;
+/// The longest pause in seconds between two clicks that are one double click, as on most desktops.
+const DOUBLE_CLICK_SECONDS: f64 = 0.5;
+
+/// Dresses a window in both themes, and lets clicks count on a slow machine too.
 ///
 /// A text cursor that blinks repaints the window twice a second for ever, and animations many
 /// times after each click: neither moves.
 pub fn apply(context: &Context) {
+    context.options_mut(|options| {
+        options.input_options.max_click_duration = CLICK_SECONDS;
+        options.input_options.max_double_click_delay = DOUBLE_CLICK_SECONDS;
+    });
     context.all_styles_mut(|style| {
         style.animation_time = 0.0;
         style.scroll_animation = egui::style::ScrollAnimation::none();

@@ -72,6 +72,11 @@ fn keys(harness: &mut Harness<'_, Studio>, modifiers: Modifiers, key: Key) {
     harness.run_steps(3);
 }
 
+/// Waits until all numbers belong to the lens as it is.
+fn wait_for_numbers(harness: &mut Harness<'_, Studio>) {
+    crate::window::settle(harness);
+}
+
 fn lens(harness: &Harness<'_, Studio>) -> Arc<Lens> {
     Arc::clone(harness.state().session().lens())
 }
@@ -747,7 +752,7 @@ fn a_dropped_lens_is_opened_and_remembered_and_another_file_refused_by_name() {
     let other = folder.join("picture.png");
     std::fs::write(&other, b"no picture").unwrap();
     drop_file(&mut harness, other);
-    harness.get_by_label_contains("`picture.png` is a picture");
+    assert!(harness.query_all_by_label_contains("picture.png").next().is_some());
     press(&mut harness, "OK");
     let text = folder.join("letter.txt");
     std::fs::write(&text, b"dear").unwrap();
@@ -759,8 +764,9 @@ fn a_dropped_lens_is_opened_and_remembered_and_another_file_refused_by_name() {
         harness.input_mut().dropped_files.push(Arc::new(Dropped(folder.join(name))));
     }
     harness.run_steps(3);
-    harness.get_by_label_contains("`letter.txt` is none of the files");
-    harness.get_by_label_contains("`picture.png` is a picture");
+    for name in ["`letter.txt` is none of the files", "picture.png"] {
+        assert!(harness.query_all_by_label_contains(name).next().is_some(), "{name}");
+    }
     press(&mut harness, "OK");
     let glasses = folder.join("glasses.agf");
     std::fs::write(&glasses, b"no glass").unwrap();
@@ -768,6 +774,82 @@ fn a_dropped_lens_is_opened_and_remembered_and_another_file_refused_by_name() {
     let mut said = harness.query_all_by_label_contains("expected a glass catalogue .agf");
     assert!(said.next().is_some());
     std::fs::remove_dir_all(folder).unwrap();
+}
+
+/// What was opened is seen, whatever tab was in front.
+#[test]
+fn a_dropped_lens_brings_the_layout_forward() {
+    let path = std::env::temp_dir().join(format!("aplanat-forward-{}.json", std::process::id()));
+    aplanat::files::save(&achromat(), &path).unwrap();
+    let mut harness = window(double_gauss());
+    press(&mut harness, "GRIN slice");
+    assert!(harness.query_by_label_contains("Section of ").is_none());
+    drop_file(&mut harness, path.clone());
+    wait_for_numbers(&mut harness);
+    harness.get_by_label_contains("Section of ");
+    std::fs::remove_file(path).unwrap();
+}
+
+#[test]
+fn a_dropped_picture_is_the_scene_of_the_panel_picture() {
+    let path = std::env::temp_dir().join(format!("aplanat-scene-{}.png", std::process::id()));
+    image::RgbImage::from_pixel(24, 16, image::Rgb([200, 90, 30])).save(&path).unwrap();
+    let mut harness = window(achromat());
+    drop_file(&mut harness, path.clone());
+    wait_for_numbers(&mut harness);
+    let name = path.file_name().unwrap().to_string_lossy().into_owned();
+    harness.get_by_label(&format!("Picture of {name} through the lens"));
+    let results = harness.state().session().results().unwrap();
+    let picture = results.analyses.as_ref().unwrap().picture.clone().unwrap();
+    let picture = &picture.value.as_ref().unwrap().picture;
+    let [red, _, blue] = picture.values[picture.values.len() / 2 + picture.frame.pixels[0] / 2];
+    assert!(red > 2.0 * blue, "the colours are those of the file: {red} {blue}");
+    std::fs::remove_file(path).unwrap();
+}
+
+#[test]
+fn the_palette_says_why_a_command_is_not_possible() {
+    let mut harness = window(double_gauss());
+    for (words, why) in [
+        ("stop the search", "No search is running."),
+        ("reverse the element", "Select a surface of an element first"),
+        ("accept the candidate", "There is no candidate"),
+    ] {
+        keys(&mut harness, Modifiers::COMMAND, Key::K);
+        enter_text(&mut harness, "Find a command", words);
+        keys(&mut harness, Modifiers::NONE, Key::Enter);
+        harness.get_by_label_contains(why);
+        keys(&mut harness, Modifiers::NONE, Key::Escape);
+        assert!(harness.query_by_label("Find a command").is_none());
+    }
+}
+
+#[test]
+fn a_run_that_is_asked_for_by_words_is_seen() {
+    let mut harness = window(double_gauss());
+    wait_for_numbers(&mut harness);
+    let is_seen = |harness: &Harness<'_, Studio>| harness.query_by_label("Export…").is_some();
+    assert!(!is_seen(&harness));
+    keys(&mut harness, Modifiers::COMMAND, Key::K);
+    enter_text(&mut harness, "Find a command", "start a pareto front");
+    keys(&mut harness, Modifiers::NONE, Key::Enter);
+    assert!(is_seen(&harness), "the panel Pareto front");
+    harness.state_mut().session_mut().apply(Command::ClearPareto);
+}
+
+#[test]
+fn a_key_goes_from_panel_to_panel() {
+    let mut harness = window(double_gauss());
+    wait_for_numbers(&mut harness);
+    keys(&mut harness, Modifiers::NONE, Key::F6);
+    assert!(harness.get_by_label("Radius of surface 1").is_focused(), "behind the layout");
+    keys(&mut harness, Modifiers::SHIFT, Key::F6);
+    harness.run_steps(4);
+    assert!(harness.get_by_label("Fit").is_focused());
+    keys(&mut harness, Modifiers::SHIFT, Key::F6);
+    harness.run_steps(4);
+    let focused = harness.ctx.memory(egui::Memory::focused);
+    assert!(focused.is_some() && !harness.get_by_label("Fit").is_focused());
 }
 
 #[test]

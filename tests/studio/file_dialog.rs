@@ -34,6 +34,21 @@ fn a_typed_path_is_returned_after_confirmation() {
     assert!(harness.query_by_label("OK").is_none(), "the question is gone");
 }
 
+/// As in the dialogs of a desktop the folder and the extension stay.
+#[test]
+fn what_is_typed_first_replaces_the_name_of_the_file() {
+    let mut harness = harness(FileRequest::Save, "/home/designs/New lens.json");
+    harness.run();
+    for letter in ["m", "i", "n", "e"] {
+        harness.event(egui::Event::Text(letter.to_owned()));
+        harness.step();
+    }
+    harness.get_by_label("OK").click();
+    harness.run();
+    let path = PathBuf::from("/home/designs/mine.json");
+    assert_eq!(harness.state().1, Some((FileRequest::Save, path)));
+}
+
 #[test]
 fn a_confirmation_can_be_cancelled() {
     let mut harness = harness(FileRequest::Open, "lens.json");

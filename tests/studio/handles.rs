@@ -7,7 +7,7 @@ use egui::{Event, Key, Modifiers, PointerButton, Pos2, Vec2};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
 
-use crate::harness::double_gauss;
+use crate::harness::{double_gauss, painted_texts};
 use crate::window::{settle, window};
 
 /// The name of a handle in the accessibility tree.
@@ -153,6 +153,48 @@ fn arrow_keys_step_a_selected_handle_as_one_undo_step() {
     harness.key_press_modifiers(Modifiers::COMMAND, Key::Z);
     harness.run_steps(3);
     assert_eq!(*harness.state().session().lens().as_ref(), double_gauss());
+}
+
+/// The pointer rests in the drawing while a person goes through the handles by keys.
+#[test]
+fn the_tab_key_goes_through_the_handles_of_the_surface_that_arrows_select() {
+    let mut harness = window();
+    let layout = harness.get_by_label_contains("Section of ").rect();
+    move_to(&mut harness, layout.right_bottom() - Vec2::new(12.0, 12.0));
+    harness.get_by_label_contains("Section of ").focus();
+    harness.run_steps(2);
+    for selected in [0, 1] {
+        harness.key_press(Key::ArrowRight);
+        harness.run_steps(2);
+        assert_eq!(harness.state().session().view().selected, Some(selected));
+    }
+    for handle in [Handle::Vertex(1), Handle::Curvature(1), Handle::Rim(1)] {
+        harness.key_press(Key::Tab);
+        harness.run_steps(3);
+        assert!(harness.get_by_label(&name(handle)).is_focused(), "{handle}");
+        let told = painted_texts(&harness);
+        let what = handle.to_string();
+        assert!(told.iter().any(|text| text.starts_with(&what)), "{what}: {told:?}");
+    }
+}
+
+#[test]
+fn plus_and_home_zoom_a_drawing_with_the_keyboard() {
+    let mut harness = window();
+    let whole = center(&harness, Handle::ImagePlane).x - center(&harness, Handle::Vertex(0)).x;
+    let size = |harness: &Harness<'_, Studio>| {
+        center(harness, Handle::Vertex(4)).x - center(harness, Handle::Vertex(0)).x
+    };
+    let before = size(&harness);
+    harness.get_by_label_contains("Section of ").focus();
+    harness.run_steps(2);
+    harness.event(Event::Text("+".to_owned()));
+    harness.run_steps(2);
+    assert!((size(&harness) / before - 1.2).abs() < 0.01);
+    harness.key_press(Key::Home);
+    harness.run_steps(2);
+    let now = center(&harness, Handle::ImagePlane).x - center(&harness, Handle::Vertex(0)).x;
+    assert!((now - whole).abs() < 1.0);
 }
 
 #[test]

@@ -202,6 +202,13 @@ fn the_merit_of_the_design_and_its_limits_are_shown_without_asking() {
     harness.run();
     let commands = &harness.state().commands;
     assert_eq!(*commands, [Command::ShowZoom(0), Command::Select(Some(4))]);
+    // While a candidate is shown, they are not its limits.
+    let state = harness.state_mut();
+    state.view.preview_results.clone_from(&state.view.results);
+    harness.run();
+    for text in ["Merit of the design 0.0004", "3 limits of the design: 1 broken, 1 binding"] {
+        assert!(harness.query_all_by_label(text).count() > 0, "{text}");
+    }
 }
 
 /// Nothing of a term is cut at the right of the panel in a window of 1280 points.

@@ -884,7 +884,7 @@ fn counts_of_one_are_singular() {
 /// A view with the numbers that a setting asks for, once they are there.
 fn results_with(setting: PanelSetting, are_there: impl Fn(&Analyses) -> bool) -> SessionView {
     let mut session = Session::new(double_gauss(), || {}).unwrap();
-    session.apply(Command::Show(setting));
+    session.apply(Command::Show(setting.clone()));
     for _ in 0..1000 {
         session.poll();
         let (results, settings) = (session.view().results, session.view().settings);

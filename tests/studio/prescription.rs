@@ -74,6 +74,36 @@ fn arrows_go_from_cell_to_cell() {
     assert_eq!(edits(&harness), []);
 }
 
+/// A person who presses arrows quickly types into the cell they lead to.
+#[test]
+fn arrows_in_frames_after_each_other_keep_the_keyboard_in_the_table() {
+    let mut harness = table(double_gauss());
+    enter(&mut harness, "Radius of surface 1");
+    for pressed in [Key::ArrowDown, Key::ArrowRight, Key::ArrowRight, Key::ArrowDown] {
+        harness.input_mut().events.push(key(pressed, Modifiers::NONE));
+        harness.step();
+    }
+    harness.run();
+    assert!(harness.get_by_label("Glass of surface 3").is_focused());
+    harness.get_by_label("Glass of surface 3").type_text("n-lak33a");
+    harness.run();
+    harness.key_press(Key::Enter);
+    harness.run();
+    assert_eq!(edits(&harness).len(), 1, "what is typed is not lost");
+}
+
+#[test]
+fn the_tab_key_right_after_an_arrow_goes_on_from_its_cell() {
+    let mut harness = table(double_gauss());
+    enter(&mut harness, "Radius of surface 1");
+    for pressed in [Key::ArrowDown, Key::Tab] {
+        harness.input_mut().events.push(key(pressed, Modifiers::NONE));
+        harness.step();
+    }
+    harness.run();
+    assert!(harness.get_by_label("Thickness of surface 2").is_focused());
+}
+
 #[test]
 fn after_f2_arrows_move_in_the_text() {
     let mut harness = table(double_gauss());

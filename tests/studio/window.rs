@@ -63,6 +63,26 @@ fn type_radius(harness: &mut Harness<'_, Studio>, text: &str) {
     settle(harness);
 }
 
+/// Where each frame takes a second, as without a graphics card on a busy machine, a button goes down in one
+/// and up in a later one.
+#[test]
+fn a_click_counts_on_a_slow_machine() {
+    let builder = Harness::builder().with_step_dt(1.5).with_context_setup(theme::apply);
+    let mut clicks = builder.build_ui_state(
+        |ui, clicks: &mut usize| *clicks += usize::from(ui.button("Accept").clicked()),
+        0,
+    );
+    let pos = clicks.get_by_label("Accept").rect().center();
+    clicks.event(egui::Event::PointerMoved(pos));
+    clicks.step();
+    for pressed in [true, false] {
+        let (button, modifiers) = (egui::PointerButton::Primary, Modifiers::NONE);
+        clicks.event(egui::Event::PointerButton { pos, button, pressed, modifiers });
+        clicks.step();
+    }
+    assert_eq!(*clicks.state(), 1);
+}
+
 #[test]
 fn a_typed_radius_reaches_every_panel_and_undo_takes_it_back() {
     let mut harness = window();

@@ -8,6 +8,7 @@ mod as_built;
 mod contrast;
 mod ghosts;
 mod pupils;
+mod scene;
 mod scene_picture;
 mod slow;
 mod wavefronts;
@@ -16,6 +17,7 @@ pub use as_built::{AsBuiltLens, predict_as_built};
 pub use contrast::{FieldContrast, FieldContrasts};
 pub use ghosts::FieldGhosts;
 pub use pupils::FieldPupils;
+pub use scene::{PictureScene, SceneFile};
 pub use scene_picture::ScenePicture;
 pub use wavefronts::{FieldWavefront, FieldWavefronts, PointImage};
 
@@ -272,7 +274,7 @@ fn refine(mut results: AnalysisResults, output: &AnalysisOutput) -> AnalysisResu
     if !asked || !output.idle_for(IDLE_TIME) {
         return results;
     }
-    let AnalysisSettings { zoom, scene, .. } = settings;
+    let (zoom, scene) = (settings.zoom, settings.picture_scene());
     if settings.tolerances {
         let confirmed =
             time(|| catch_panic(|| as_built::confirm_as_built(&results.lens, &settings)));
@@ -281,7 +283,7 @@ fn refine(mut results: AnalysisResults, output: &AnalysisOutput) -> AnalysisResu
     if settings.picture && !output.is_interrupted() {
         let (lens, all) = (&results.lens, settings.picture_errors);
         let is_interrupted = output.interruption();
-        let draw = || scene_picture::fine_picture(lens, zoom, scene, all, &is_interrupted);
+        let draw = || scene_picture::fine_picture(lens, zoom, &scene, all, &is_interrupted);
         let fine = time(|| catch_panic(draw));
         analyses.picture = Some(Arc::new(fine));
     }
@@ -369,8 +371,8 @@ impl Analyses {
         let pupils = settings.pupils.then(|| time(|| field_pupils(&b, settings, accuracy)));
         unless_interrupted()?;
         let picture = settings.picture.then(|| {
-            let AnalysisSettings { zoom, scene, .. } = *settings;
-            Arc::new(time(|| scene_picture::coarse_picture(lens, zoom, scene)))
+            let scene = settings.picture_scene();
+            Arc::new(time(|| scene_picture::coarse_picture(lens, settings.zoom, &scene)))
         });
         unless_interrupted()?;
         let fans = settings.fans.then(|| time(|| field_fans(&b)));
@@ -509,6 +511,9 @@ pub struct AnalysisSettings {
     /// The scene of the picture.
     #[serde(default)]
     pub scene: BuiltInScene,
+    /// The picture from a file that takes the place of that scene.
+    #[serde(skip)]
+    pub scene_file: Option<SceneFile>,
     /// True if the error of the picture is measured everywhere, because a panel shows it.
     #[serde(default)]
     pub picture_errors: bool,
@@ -523,6 +528,14 @@ pub struct AnalysisSettings {
     pub good_rms: Option<f64>,
     /// The index of the wavelength of the pupils; `None` for the primary one.
     pub pupil_wavelength: Option<usize>,
+}
+
+impl AnalysisSettings {
+    /// The scene of the picture.
+    pub fn picture_scene(&self) -> PictureScene {
+        let built_in = PictureScene::BuiltIn(self.scene);
+        self.scene_file.clone().map_or(built_in, PictureScene::File)
+    }
 }
 
 impl Default for AnalysisSettings {
@@ -544,6 +557,7 @@ impl Default for AnalysisSettings {
             ghost: None,
             picture: false,
             scene: BuiltInScene::default(),
+            scene_file: None,
             picture_errors: false,
             tolerances: false,
             grade: ToleranceGrade::default(),

@@ -2,12 +2,13 @@
 //!
 //! It is made the quick way: coarse with every edit, and finer, with its error, once the lens is still.
 
+use super::PictureScene;
 use crate::analysis::Estimate;
 use crate::lens::{Lens, Object};
 use crate::measure::time_ms;
 use crate::picture::{
-    BuiltInScene, Coloring, ErrorMap, ExactRenderer, ImageFrame, Picture, PictureError,
-    QuickPicture, QuickRenderer, field_diagonal, focused, picture_model,
+    Coloring, ErrorMap, ExactRenderer, ImageFrame, Picture, PictureError, QuickPicture,
+    QuickRenderer, field_diagonal, focused, picture_model,
 };
 use crate::pupil::RayModel;
 use std::sync::atomic::AtomicBool;
@@ -16,7 +17,7 @@ use std::sync::atomic::AtomicBool;
 #[derive(Debug, Clone)]
 pub struct ScenePicture {
     /// The scene.
-    pub scene: BuiltInScene,
+    pub scene: PictureScene,
     /// The picture.
     pub picture: Picture,
     /// The root mean square error against rays from every pixel, as a share of mid grey, with the
@@ -45,7 +46,7 @@ const MAP_SAMPLES: usize = 16;
 pub(super) fn coarse_picture(
     lens: &Lens,
     zoom: usize,
-    scene: BuiltInScene,
+    scene: &PictureScene,
 ) -> Result<ScenePicture, String> {
     scene_picture(lens, zoom, scene, COARSE, None).map_err(|error| error.to_string())
 }
@@ -55,7 +56,7 @@ pub(super) fn coarse_picture(
 pub(super) fn fine_picture(
     lens: &Lens,
     zoom: usize,
-    scene: BuiltInScene,
+    scene: &PictureScene,
     all_tiles: bool,
     is_interrupted: &(dyn Fn() -> bool + Sync),
 ) -> Result<ScenePicture, String> {
@@ -74,7 +75,7 @@ struct ComparedTiles<'a> {
 fn scene_picture(
     lens: &Lens,
     zoom: usize,
-    scene: BuiltInScene,
+    scene: &PictureScene,
     pixels: [usize; 2],
     compared: Option<ComparedTiles<'_>>,
 ) -> Result<ScenePicture, PictureError> {
@@ -100,5 +101,5 @@ fn scene_picture(
     let error_map = compared.and_then(measure);
     let timed = |map: &ErrorMap| Estimate { milliseconds: Some(ms), ..map.rms() };
     let error = error_map.as_ref().map(timed);
-    Ok(ScenePicture { scene, picture, error, error_map, focus, device })
+    Ok(ScenePicture { scene: scene.clone(), picture, error, error_map, focus, device })
 }

@@ -303,7 +303,7 @@ impl Session {
         let error = error.map_or("not measured".to_owned(), |error| format!("{:.4}", error.value));
         let texts = [
             ("Software", "Aplanat".to_owned()),
-            ("Scene", scene.name().to_owned()),
+            ("Scene", scene.name()),
             ("Error", format!("{error} of mid grey (rms)")),
             ("Left out", "diffraction, losses, ghosts".to_owned()),
         ];

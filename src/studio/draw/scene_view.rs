@@ -1,10 +1,11 @@
-//! A scene that can be navigated: drag to move, wheel to zoom, double click or *Fit* to see it all,
-//! with a scale bar.
+//! A scene that can be navigated: drag to move, wheel or plus and minus to zoom, double click, Home or
+//! *Fit* to see it all, with a scale bar.
 
 use std::sync::Arc;
 
 use egui::{
-    Align2, CornerRadius, Event, MouseWheelUnit, Rect, Response, Sense, Stroke, Ui, WidgetInfo,
+    Align2, CornerRadius, Event, Key, MouseWheelUnit, Rect, Response, Sense, Stroke, StrokeKind,
+    Ui, WidgetInfo,
 };
 use glam::DVec2;
 
@@ -87,6 +88,10 @@ impl SceneView {
         self.canvas.show(ui, rect, backend, scene, camera);
         // The camera counts real pixels, the bar points.
         scale_bar(ui, rect, camera.scale / per_point);
+        if shown.response.has_focus() {
+            let stroke = ui.visuals().selection.stroke;
+            ui.painter().rect_stroke(rect, CornerRadius::ZERO, stroke, StrokeKind::Inside);
+        }
         shown
     }
 
@@ -98,7 +103,8 @@ impl SceneView {
         size: DVec2,
         per_point: f64,
     ) -> Camera {
-        if response.double_clicked() {
+        let has_keyboard = response.has_focus();
+        if response.double_clicked() || has_keyboard && ui.input(|i| i.key_pressed(Key::Home)) {
             self.fit();
         }
         let mut camera = self.user_camera.unwrap_or(fitted);
@@ -111,6 +117,10 @@ impl SceneView {
                 let px = per_point * to_dvec(pointer - response.rect.min);
                 camera = camera.zoomed(factor, px, size);
             }
+        }
+        let factor = if has_keyboard { zoom_by_keys(ui) } else { 1.0 };
+        if factor != 1.0 {
+            camera = camera.zoomed(factor, 0.5 * size, size);
         }
         if camera != self.user_camera.unwrap_or(fitted) {
             self.user_camera = Some(camera);
@@ -164,6 +174,17 @@ fn to_dvec(v: egui::Vec2) -> DVec2 {
     DVec2::new(v.x.into(), v.y.into())
 }
 
+/// By how much the keys plus and minus bring the scene nearer.
+fn zoom_by_keys(ui: &Ui) -> f64 {
+    ui.input(|input| {
+        input.events.iter().fold(1.0, |factor, event| match event {
+            Event::Text(text) if text == "+" => factor * NOTCH,
+            Event::Text(text) if text == "-" => factor / NOTCH,
+            _ => factor,
+        })
+    })
+}
+
 /// By how much the wheel or two fingers bring the scene nearer.
 ///
 /// The events themselves are read: the smoothed ones would draw the scene ten times for a notch.
@@ -193,7 +214,7 @@ fn scale_bar(ui: &Ui, rect: Rect, scale: f64) {
     let left = rect.left_bottom() + egui::vec2(10.0, -10.0);
     let color = ui.visuals().strong_text_color();
     let bar = Rect::from_min_size(left - egui::vec2(0.0, 3.0), egui::vec2(width, 3.0));
-    ui.painter().rect(bar, CornerRadius::ZERO, color, Stroke::NONE, egui::StrokeKind::Inside);
+    ui.painter().rect(bar, CornerRadius::ZERO, color, Stroke::NONE, StrokeKind::Inside);
     let font = egui::TextStyle::Body.resolve(ui.style());
     let above = bar.left_top() - egui::vec2(0.0, 2.0);
     ui.painter().text(above, Align2::LEFT_BOTTOM, length_text(length), font, color);

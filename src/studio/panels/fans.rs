@@ -36,7 +36,8 @@ impl Panel for FansPanel {
         let scale = scale(&fans.value);
         legend(ui, numbers, scale, fans.ms);
         let rows = fans.value.len().max(1) as f32;
-        let height = (ui.available_height() / rows - WORDS - 4.0).max(LOWEST);
+        let between = 2.0 * ui.spacing().item_spacing.y;
+        let height = (ui.available_height() / rows - WORDS - between - 1.0).max(LOWEST);
         let fields = results.lens.fields_at(results.settings.zoom);
         ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
             for (field, fans) in fans.value.iter().enumerate() {

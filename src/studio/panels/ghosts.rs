@@ -139,9 +139,9 @@ fn row(ui: &mut Ui, ghost: &Ghost, shown: Option<[usize; 2]>, actions: &mut Acti
         format!("{}, {}", number::format_digits(x, 3), number::format_digits(y, 3))
     });
     let focus = ghost.paraxial.focus.map(|focus| number::format_digits(focus, 4));
-    ui.label(format!("{:.2e}", patch.irradiance));
+    ui.label(number::format_digits(patch.irradiance, 3));
     ui.label(number::format_digits(patch.radius, 4));
-    ui.label(format!("{:.2e}", 0.5 * (patch.flux[0] + patch.flux[1])));
+    ui.label(number::format_digits(0.5 * (patch.flux[0] + patch.flux[1]), 3));
     ui.label(focus.unwrap_or_else(|| "none".to_owned()));
     ui.label(centre);
     ui.end_row();

@@ -9,7 +9,8 @@ mod lost_light;
 use std::sync::Arc;
 
 use egui::{
-    Align, ComboBox, Context, DragValue, Label, Layout as Arrange, RichText, Stroke, Ui, vec2,
+    Align, ComboBox, Context, DragValue, EventFilter, Key, Label, Layout as Arrange, Response,
+    RichText, Stroke, Ui, vec2,
 };
 use glam::DVec2;
 
@@ -111,6 +112,7 @@ impl Panel for LayoutPanel {
         let (scene, full_view) = (&drawing.scene, drawing.full_view);
         let shown = self.scene_view.show(ui, self.backend, scene, full_view, &label);
         let near = drawing.highlight_surface(ui, view, &shown);
+        select_by_keys(ui, view, &shown.response, actions);
         let frame = HandleFrame { view, shown: &shown, drawing, near };
         self.handles.ui(ui, &frame, actions);
         if shown.response.clicked() && near != view.selected {
@@ -327,6 +329,24 @@ impl LayoutDrawing {
             .map(|height| format!("\nrays reach {} mm", number::format_digits(*height, 5)));
         first + &limit.unwrap_or_default() + &reached.unwrap_or_default()
     }
+}
+
+/// Selects the next or the previous surface by an arrow key while the drawing has the keyboard: its handles
+/// are then those that the Tab key reaches.
+fn select_by_keys(ui: &Ui, view: &SessionView, drawing: &Response, actions: &mut Actions) {
+    if !drawing.has_focus() {
+        return;
+    }
+    let kept = EventFilter { horizontal_arrows: true, ..EventFilter::default() };
+    ui.memory_mut(|memory| memory.set_focus_lock_filter(drawing.id, kept));
+    let pressed = |key| ui.input(|input| input.key_pressed(key));
+    let last = view.lens.surfaces.len().saturating_sub(1);
+    let surface = match (pressed(Key::ArrowLeft), pressed(Key::ArrowRight), view.selected) {
+        (true, false, at) => at.map_or(last, |at| at.saturating_sub(1)),
+        (false, true, at) => at.map_or(0, |at| (at + 1).min(last)),
+        _ => return,
+    };
+    actions.push(Command::Select(Some(surface)));
 }
 
 /// The outlines of the design, to compare with.

@@ -63,7 +63,10 @@ pub(super) fn list(ui: &mut Ui, view: &SessionView, actions: &mut Actions) {
         (broken, binding) => format!("{broken} broken, {binding} binding"),
     };
     let color = limits.first().map_or(Color32::PLACEHOLDER, |(state, _)| state.color(ui));
-    let heading = RichText::new(format!("{}: {summary}", counted(limits.len() as u64, "limit")));
+    // The panels show the candidate, and these are the values before it.
+    let of = if view.preview_results.is_some() { " of the design" } else { "" };
+    let heading = format!("{}{of}: {summary}", counted(limits.len() as u64, "limit"));
+    let heading = RichText::new(heading);
     let header = CollapsingHeader::new(heading.color(color)).id_salt("limits");
     header.default_open(true).show(ui, |ui| {
         for (state, limit) in limits {

@@ -76,7 +76,8 @@ pub(super) fn show_total(ui: &mut Ui, view: &SessionView) {
     let Some(report) = &view.merit else { return };
     match &report.values {
         Ok(values) => {
-            let text = format!("Merit {}", number::format_digits(values.total, 5));
+            let of = if view.preview_results.is_some() { " of the design" } else { "" };
+            let text = format!("Merit{of} {}", number::format_digits(values.total, 5));
             ui.strong(text).on_hover_text("The weighted sum of all terms for the design");
         }
         Err(why) => drop(ui.colored_label(ui.visuals().error_fg_color, capitalize(why))),

@@ -14,7 +14,9 @@ use egui::{
 use super::widgets::hint_beside;
 use super::{Panel, displayed_results, show_missing_results};
 use crate::picture::{BitDepth, BuiltInScene, Picture, SensorPreset, photon_count};
-use crate::session::{AnalysisResults, Command, PanelSetting, ScenePicture, SessionView, Timed};
+use crate::session::{
+    AnalysisResults, Command, PanelSetting, PictureScene, ScenePicture, SessionView, Timed,
+};
 use crate::studio::actions::Actions;
 use crate::studio::cached::{ByAddress, Cached};
 use crate::studio::draw::zoom_factor;
@@ -177,7 +179,7 @@ impl PicturePanel {
         }
         let design = view.preview_results.is_some().then_some(view.results.as_ref()).flatten();
         let design = design.and_then(|results| NamedPicture::new("design", results));
-        let scene = |named: &NamedPicture| named.picture().map(|picture| picture.scene);
+        let scene = |named: &NamedPicture| named.picture().map(|picture| picture.scene.clone());
         let same = |other: &NamedPicture| scene(other) == scene(present);
         let other = self.kept.clone().filter(same).or(design.filter(same));
         let name = if view.preview_results.is_some() { "candidate" } else { "present" };
@@ -443,13 +445,18 @@ fn describe(response: &Response, pictures: &[NamedPicture], column: usize) {
 }
 
 fn choose_scene(ui: &mut Ui, view: &SessionView, actions: &mut Actions) {
-    let chosen = view.settings.scene;
+    let chosen = view.settings.picture_scene();
     let combo = ComboBox::from_id_salt("scene").selected_text(chosen.name());
     let shown = combo.show_ui(ui, |ui| {
         for (scene, name) in BuiltInScene::ALL {
-            if ui.selectable_label(chosen == scene, name).clicked() {
+            if ui.selectable_label(chosen == PictureScene::BuiltIn(scene), name).clicked() {
                 actions.push(Command::Show(PanelSetting::Scene(scene)));
             }
+        }
+        let hint = "A PNG or JPEG file; it can also be dropped on the window";
+        if ui.button("Picture from a file…").on_hover_text(hint).clicked() {
+            actions.push(FileRequest::OpenScene);
+            ui.close();
         }
     });
     named_list(ui, shown, "Scene");

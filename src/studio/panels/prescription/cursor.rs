@@ -3,7 +3,7 @@
 //! As in a spreadsheet a cell is either entered, so that typing replaces its content and arrows go
 //! to the next cell, or edited in place after F2 or a second click, so that arrows move in its text.
 
-use egui::{Event, Key, Modifiers, Rect, Ui};
+use egui::{Event, FocusDirection, Key, Modifiers, Rect, Ui};
 
 use super::cells::CellPlace;
 use super::columns::TableColumn;
@@ -155,7 +155,7 @@ impl CellCursor {
         let has_keyboard = |place: CellPlace| ui.memory(|memory| memory.has_focus(place.id()));
         self.has_keyboard = self.active.is_some_and(has_keyboard);
         if let Some((place, _)) = self.pending {
-            enter(ui, place);
+            self.arrive(ui, place);
         }
         let Some(active) = self.active else { return Vec::new() };
         if !ui.memory(|memory| memory.has_focus(active.id())) {
@@ -175,6 +175,24 @@ impl CellCursor {
         }
         self.read_arrows(ui, grid, active, typing);
         if typing { Vec::new() } else { range_commands(ui) }
+    }
+
+    /// Gives the cursor to the cell that waits for it. Keys of this frame are already its own: between
+    /// two cells no widget has the keyboard, and the toolkit would take an arrow as its own way to
+    /// another widget, and Tab as the way to the first one.
+    fn arrive(&mut self, ui: &Ui, place: CellPlace) {
+        enter(ui, place);
+        let direction =
+            ui.input(|input| match (input.key_pressed(Key::Tab), input.modifiers.shift) {
+                (false, _) => FocusDirection::None,
+                (true, false) => FocusDirection::Next,
+                (true, true) => FocusDirection::Previous,
+            });
+        ui.memory_mut(|memory| memory.move_focus(direction));
+        if self.active != Some(place) {
+            self.active = Some(place);
+            (self.edits_in_place, self.proposal) = (false, None);
+        }
     }
 
     /// Up and down choose from the list below a cell into which a name is typed.
@@ -224,8 +242,10 @@ impl CellCursor {
     pub(super) fn end(&mut self, ui: &Ui, before: Option<CellPlace>) {
         self.read_mouse(ui, before);
         let Some((place, frames)) = self.pending else { return };
-        let drawn = ui.memory(|memory| memory.has_focus(place.id()))
-            && self.rects.iter().any(|(other, _)| *other == place);
+        // The Tab key may have led on from it already.
+        let has_arrived = ui.memory(|memory| memory.has_focus(place.id()))
+            || frames > 0 && ui.input(|input| input.key_pressed(Key::Tab));
+        let drawn = has_arrived && self.rects.iter().any(|(other, _)| *other == place);
         self.pending = (!drawn && frames < MAX_WAIT).then_some((place, frames + 1));
         ui.ctx().request_repaint();
     }

@@ -11,7 +11,7 @@ pub(super) use locks::locks_row;
 
 use std::sync::Arc;
 
-use egui::{Id, Modifiers, Pos2, Rect, Response, Sense, Ui, Vec2, WidgetInfo};
+use egui::{Event, Id, Modifiers, Pos2, Rect, Response, Sense, Ui, Vec2, WidgetInfo};
 use glam::DVec2;
 
 use super::{LayoutDrawing, displayed_results};
@@ -41,6 +41,8 @@ pub(super) struct HandleLayer {
     grabbed: Option<GrabbedHandle>,
     /// The text that is being typed in place of a value.
     typed: Option<String>,
+    /// True if a key was the last to act, and not the pointer.
+    by_keys: bool,
 }
 
 /// The handle that is being dragged or stepped, with the lens as it was before.
@@ -90,6 +92,7 @@ impl HandleLayer {
             return;
         }
         self.forget_finished(frame.view);
+        self.by_keys = (self.by_keys || is_key_pressed(ui)) && !is_pointer_used(ui);
         for (handle, place) in self.handles(ui, frame) {
             let response = self.interact(ui, frame, handle, place);
             self.move_by_pointer(ui, frame, results, (handle, &response), actions);
@@ -100,8 +103,9 @@ impl HandleLayer {
         }
     }
 
-    /// The handles of this frame with their places on the screen, the one under the pointer last, so
-    /// that it lies on top; while one is dragged, that one alone.
+    /// The handles of this frame with their places on the screen, those under the pointer last, so that
+    /// the nearest lies on top; while one is dragged, that one alone. The Tab key goes through the others
+    /// in the order of the lens, wherever the pointer rests.
     fn handles(&self, ui: &Ui, frame: &HandleFrame<'_>) -> Vec<(Handle, Pos2)> {
         let place = |(handle, mm): &(Handle, DVec2)| (*handle, frame.shown.to_screen(*mm));
         let all = frame.drawing.handles.iter().map(place);
@@ -114,7 +118,10 @@ impl HandleLayer {
         };
         let mut offered: Vec<_> = all.filter(is_offered).collect();
         if let Some(pointer) = ui.input(|input| input.pointer.latest_pos()) {
-            let distance = |at: Pos2| at.distance_sq(pointer);
+            let distance = |at: Pos2| {
+                let distance = at.distance(pointer);
+                if distance < HIT_SIZE { distance } else { f32::INFINITY }
+            };
             offered.sort_by(|a, b| distance(b.1).total_cmp(&distance(a.1)));
         }
         offered
@@ -246,6 +253,15 @@ impl GrabbedHandle {
             Some(snapped(self.handle.unit(&self.before.lens, zoom), value, other))
         })
     }
+}
+
+fn is_key_pressed(ui: &Ui) -> bool {
+    let is_press = |event: &Event| matches!(event, Event::Key { pressed: true, .. });
+    ui.input(|input| input.events.iter().any(is_press))
+}
+
+fn is_pointer_used(ui: &Ui) -> bool {
+    ui.input(|input| input.pointer.delta() != Vec2::ZERO || input.pointer.any_pressed())
 }
 
 fn push_drag(grabbed: &GrabbedHandle, value: Option<f64>, actions: &mut Actions) {

@@ -86,7 +86,7 @@ impl HandleLayer {
         }
         if self.grabbed.is_some() || self.typed.is_some() && response.has_focus() {
             self.paint_progress(ui, frame, handle, center);
-        } else if response.hovered() || response.has_focus() && frame.shown.pointer().is_none() {
+        } else if response.hovered() || response.has_focus() && self.by_keys {
             let lines = vec![(hint(frame, slopes, handle), visuals.text_color())];
             paint_lines(ui, frame, center, &lines);
         }
