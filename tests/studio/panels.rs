@@ -884,7 +884,8 @@ fn counts_of_one_are_singular() {
 /// A view with the numbers that a setting asks for, once they are there.
 fn results_with(setting: PanelSetting, are_there: impl Fn(&Analyses) -> bool) -> SessionView {
     let mut session = Session::new(double_gauss(), || {}).unwrap();
-    session.apply(Command::Show(setting.clone()));
+    let name = format!("{setting:?}");
+    session.apply(Command::Show(setting));
     for _ in 0..1000 {
         session.poll();
         let (results, settings) = (session.view().results, session.view().settings);
@@ -894,7 +895,7 @@ fn results_with(setting: PanelSetting, are_there: impl Fn(&Analyses) -> bool) ->
         }
         std::thread::sleep(std::time::Duration::from_millis(100));
     }
-    panic!("no numbers for {setting:?}");
+    panic!("no numbers for {name}");
 }
 
 /// Every chart has numbers along both axes, in the notation of the titles.
