@@ -71,7 +71,7 @@ pub use path_map::{SquareGrid, grid_nodes, grid_sides, path_map};
 pub use pupil::{FieldPupil, PupilExtent, PupilShape, RayLoss, pupil};
 pub use ray_layout::{LayoutRay, RayLayout, ray_layout};
 pub use reference_sphere::ReferenceForm;
-pub use seen_from_image::{BackwardLens, limited_by_rims, lit_outline};
+pub use seen_from_image::{BackwardLens, lit_outline};
 pub use semi_diameters::{
     RimSensitivities, RimSensitivity, mean_rim_sensitivities, rim_sensitivities,
 };

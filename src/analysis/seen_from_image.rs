@@ -34,7 +34,7 @@ impl SeenFromImage {
         wavelength: usize,
         point: [f64; 2],
     ) -> Result<Self, AnalysisError> {
-        let limited = limited_by_rims(model).map_err(|_error| AnalysisError::NoLight)?;
+        let limited = limited(model).map_err(|_error| AnalysisError::NoLight)?;
         let channel = &limited.channels[wavelength];
         let [x, y] = point;
         let (image, lens) = channel.system.surfaces.split_last().ok_or(AnalysisError::NoLight)?;
@@ -96,12 +96,8 @@ impl SeenFromImage {
     }
 }
 
-/// The model limited by the rims of its surfaces alone, that of the stop among them: what the functions that
-/// look at a lens from its image make of any model. Who asks many of them does it once.
-///
-/// # Errors
-/// Numbers that cannot be traced.
-pub fn limited_by_rims(model: &RayModel) -> Result<Cow<'_, RayModel>, SystemError> {
+/// The model limited by the rims of its surfaces alone, that of the stop among them.
+pub(super) fn limited(model: &RayModel) -> Result<Cow<'_, RayModel>, SystemError> {
     if model.ends_at_disc() {
         model.limited_by_stop().map(Cow::Owned)
     } else {
@@ -202,7 +198,7 @@ impl BackwardLens {
     /// # Errors
     /// Numbers that cannot be traced.
     pub fn new(model: &RayModel, wavelength: usize) -> Result<Self, SystemError> {
-        let limited = limited_by_rims(model)?;
+        let limited = limited(model)?;
         let system = &limited.channels[wavelength].system;
         let [.., last, image] = &system.surfaces[..] else { return Err(SystemError::NoSurfaces) };
         let (reversed, radius) = surrounded(system);

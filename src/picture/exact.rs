@@ -19,7 +19,7 @@ use super::sample_points::LONGEST;
 use super::scene::{Radiance, Scene};
 use super::tile_sampler::{PictureTile, SampledTile, TileSampler, TileWork};
 use super::{ColorBand, ImageFrame, Picture, PictureError};
-use crate::analysis::{irradiance, limited_by_rims};
+use crate::analysis::irradiance;
 use crate::lens::{Surface, SurfaceNumber};
 use crate::pupil::{Accuracy, RayModel};
 use crate::trace::Fates;
@@ -139,8 +139,6 @@ impl<'a> ExactRenderer<'a> {
         if let Some(surface) = system.surfaces.iter().position(|own| !own.has_round_apertures()) {
             return Err(PictureError::NotRound(SurfaceNumber::new(surface)));
         }
-        let limited = limited_by_rims(model)?;
-        let model = &*limited;
         let directions = LitDirections::new(model, &outer(model, bands), frame.reach(), RINGS)?;
         let sampler = TileSampler::new(model, bands, directions)?;
         let white = brightest(model, frame.reach())?;

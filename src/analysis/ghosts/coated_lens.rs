@@ -4,7 +4,7 @@ use super::path::intensity;
 use super::{GhostError, check};
 use crate::analysis::{
     coating::Coating,
-    seen_from_image::{limited_by_rims, surrounded},
+    seen_from_image::{limited, surrounded},
 };
 use crate::lens::System;
 use crate::math::Vec3;
@@ -51,7 +51,7 @@ impl CoatedLens {
         let channel = &model.channels[wavelength];
         check(&channel.system)?;
         let not_traced = |_error| GhostError::NotPlain(0.into());
-        let limited = limited_by_rims(model).map_err(not_traced)?;
+        let limited = limited(model).map_err(not_traced)?;
         let (system, _) = surrounded(&limited.channels[wavelength].system);
         let tracer = Tracer::new(&system).map_err(not_traced)?;
         let sides = |k: usize| [system.index_before(k), system.surfaces[k].index];

@@ -22,7 +22,6 @@ use super::frame::filling_size;
 use super::mip_texture::MipTexture;
 use super::scene::SceneLayer;
 use super::{ColorBand, ImageFrame, Picture, PictureError};
-use crate::analysis::limited_by_rims;
 use crate::pupil::RayModel;
 use crate::trace::Fates;
 use blocks::{PictureBlock, blocks};
@@ -96,7 +95,7 @@ impl QuickRenderer {
         bands: &[ColorBand],
         exact: &ExactRenderer<'_>,
     ) -> Result<Self, PictureError> {
-        Self::of_subject(&*limited_by_rims(model)?, bands, &exact.subject())
+        Self::of_subject(model, bands, &exact.subject())
     }
 
     fn of_subject(
