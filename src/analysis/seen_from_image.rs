@@ -6,7 +6,7 @@
 
 use super::{AnalysisError, lit_region};
 use crate::lens::{FieldKind, FieldPoint, Object, Shape, Surface, System, SystemError};
-use crate::math::Vec3;
+use crate::math::{SimdWidth, Vec3, run_vectorized};
 use crate::paraxial::Beam;
 use crate::pupil::{Aiming, Dual2, Nodes, RayModel, Region, RegionKind};
 use crate::trace::{Landings, Ray, Rays, TraceSink as _, Tracer};
@@ -234,9 +234,36 @@ impl BackwardLens {
         self.tracer.trace_batch(rays, landings);
     }
 
+    /// The rays of the scene whose light traced rays follow, as [`BackwardLens::scene_ray`]; those of lost
+    /// rays have no direction.
+    pub fn scene_rays(&self, landed: &Landings<f64>, rays: &mut Rays<f64>) {
+        let count = landed.x.len();
+        let Rays { x, y, z, l, m, n } = rays;
+        [&mut *x, y, z, l, m, n].into_iter().for_each(|column| column.resize(count, 0.0));
+        let (x, y, z) = (&mut x[..count], &mut y[..count], &mut z[..count]);
+        let (l, m, n) = (&mut l[..count], &mut m[..count], &mut n[..count]);
+        let [px, py, pz] = [&landed.x[..count], &landed.y[..count], &landed.z[..count]];
+        let [dx, dy, dz] = [&landed.l[..count], &landed.m[..count], &landed.n[..count]];
+        run_vectorized(
+            SimdWidth::detect(),
+            #[inline(always)]
+            || {
+                for i in 0..count {
+                    let point = Vec3::new(px[i], py[i], pz[i]);
+                    let direction = Vec3::new(dx[i], dy[i], dz[i]);
+                    let found = self.scene_ray(Ray { point, direction });
+                    (x[i], y[i], z[i]) = (found.point.x, found.point.y, found.point.z);
+                    let d = found.direction;
+                    (l[i], m[i], n[i]) = (d.x, d.y, d.z);
+                }
+            },
+        );
+    }
+
     /// The ray of the scene whose light a traced ray follows, in the frame of the first vertex of the
     /// lens; its direction leads away from the lens. It starts in the plane through that vertex, or
     /// closest to the vertex if it grazes that plane.
+    #[inline(always)]
     pub fn scene_ray(&self, landed: Ray<f64>) -> Ray<f64> {
         let Ray { point: p, direction: d } = landed;
         let point = Vec3::new(p.x, p.y, self.turn * (p.z + self.radius));

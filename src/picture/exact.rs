@@ -292,10 +292,8 @@ impl<'a> ExactRenderer<'a> {
             let pass = |(work, _): (&mut TileWork, &bool)| {
                 let first = FIRST.max(FIRST_OF_TILE / work.tile.len().max(1));
                 let count = if work.count == 0 { first } else { 2 * work.count };
-                let scene = |ray: &_, seconds| self.scene.radiance(ray, seconds);
-                self.sampler.sample(work, count.min(most), (&scene, settings.seconds), &|| {
-                    watch.is_stopped()
-                })
+                let scene = (self.scene, settings.seconds);
+                self.sampler.sample(work, count.min(most), scene, &|| watch.is_stopped())
             };
             let some = works.par_iter_mut().zip(&chosen).filter(|(_, is_chosen)| **is_chosen);
             if !some.map(pass).all(|ended| ended) {

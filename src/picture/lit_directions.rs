@@ -16,7 +16,7 @@ use std::f64::consts::{PI, TAU};
 /// The number of corners of a polygon.
 const CORNERS: usize = 64;
 /// The number of equal shares of the area of a polygon whose first corner is known.
-const SHARES: usize = 256;
+const SHARES: usize = 512;
 /// The number of rays on an outline.
 const OUTLINE: usize = 128;
 /// The parts into which a side of an outline is divided, so that it reaches every corner.
@@ -45,9 +45,9 @@ struct RingPolygon {
     /// The centre at the inner and at the outer edge of the ring.
     centers: [[f64; 2]; 2],
     /// The corners, as seen from the centre.
-    corners: Vec<[f64; 2]>,
+    corners: [[f64; 2]; CORNERS],
     /// The areas of the triangles between the centre and the sides, summed up.
-    areas: Vec<f64>,
+    areas: [f64; CORNERS],
     /// For equal shares of the area, the first triangle that reaches into each.
     guide: [u8; SHARES],
 }
@@ -121,6 +121,7 @@ impl LitDirections {
 
     /// The direction at a distance from the axis for two numbers between 0 and 1, evenly distributed over
     /// the polygon there; `None` where it is dark.
+    #[inline]
     pub fn draw(&self, radius: f64, unit: [f64; 2]) -> Option<DrawnDirection> {
         let place = radius / self.step;
         let index = (place as usize).min(self.rings.len() - 1);
@@ -175,12 +176,12 @@ impl RingPolygon {
             outlines.iter().for_each(|outline| enclose(&mut radii, outline, center));
         }
         let widest = radii.iter().fold(0.0, |a: f64, b| a.max(*b));
-        let corner = |(i, radius): (usize, f64)| {
+        let corner = |i: usize| {
             let (sin, cos) = (TAU * i as f64 / CORNERS as f64).sin_cos();
-            let radius = if radius > 0.0 { radius } else { widest };
+            let radius = if radii[i] > 0.0 { radii[i] } else { widest };
             [sin, cos].map(|v| v * radius * WIDER / (PI / CORNERS as f64).cos())
         };
-        let corners: Vec<[f64; 2]> = radii.into_iter().enumerate().map(corner).collect();
+        let corners = std::array::from_fn(corner);
         let areas = areas(&corners);
         Some(Self { centers, guide: guide(&areas), areas, corners })
     }
@@ -202,14 +203,18 @@ impl RingPolygon {
         ((x * b[1] - y * b[0]) + (a[0] * y - a[1] * x)) / determinant
     }
 
+    #[inline(always)]
     fn draw(&self, part: f64, [u, v]: [f64; 2]) -> DrawnDirection {
         let area = self.areas[CORNERS - 1];
         let wanted = u * area;
-        let mut side = usize::from(self.guide[((u * SHARES as f64) as usize).min(SHARES - 1)]);
+        let share = ((u * SHARES as f64) as usize).min(SHARES - 1);
+        let mut side = usize::from(self.guide[share]) & (CORNERS - 1);
+        // At most one side ends in nearly every share, without a branch that is hard to foresee.
+        side = (side + usize::from(self.areas[side] <= wanted)).min(CORNERS - 1);
         while side < CORNERS - 1 && self.areas[side] <= wanted {
             side += 1;
         }
-        let before = side.checked_sub(1).map_or(0.0, |i| self.areas[i]);
+        let before = if side == 0 { 0.0 } else { self.areas[side - 1] };
         let along = ((wanted - before) / (self.areas[side] - before)).clamp(0.0, 1.0);
         let on_side = between([self.corners[side], self.corners[(side + 1) % CORNERS]], along);
         let center = between(self.centers, part);
@@ -241,7 +246,7 @@ fn enclose(radii: &mut [f64; CORNERS], outline: &[[f64; 2]], center: [f64; 2]) {
 }
 
 /// For equal shares of the area, the first triangle that reaches into each.
-fn guide(areas: &[f64]) -> [u8; SHARES] {
+fn guide(areas: &[f64; CORNERS]) -> [u8; SHARES] {
     let area = areas[CORNERS - 1];
     std::array::from_fn(|i| {
         let wanted = i as f64 / SHARES as f64 * area;
@@ -250,14 +255,13 @@ fn guide(areas: &[f64]) -> [u8; SHARES] {
 }
 
 /// The areas of the triangles between the centre and the sides, summed up.
-fn areas(corners: &[[f64; 2]]) -> Vec<f64> {
-    let next = corners.iter().skip(1).chain(corners.first());
-    let triangle = |(a, b): (&[f64; 2], &[f64; 2])| 0.5 * (a[0] * b[1] - a[1] * b[0]).abs();
-    let sum = |sum: &mut f64, area: f64| {
-        *sum += area;
-        Some(*sum)
-    };
-    corners.iter().zip(next).map(triangle).scan(0.0, sum).collect()
+fn areas(corners: &[[f64; 2]; CORNERS]) -> [f64; CORNERS] {
+    let mut sum = 0.0;
+    std::array::from_fn(|i| {
+        let (a, b) = (corners[i], corners[(i + 1) % CORNERS]);
+        sum += 0.5 * (a[0] * b[1] - a[1] * b[0]).abs();
+        sum
+    })
 }
 
 #[cfg(test)]

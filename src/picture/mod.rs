@@ -29,6 +29,7 @@ mod quick;
 mod raster;
 mod sample_points;
 mod scene;
+mod seen_light;
 mod sensor;
 mod sensor_law;
 mod tile_sampler;

@@ -2,6 +2,7 @@
 
 use super::raster::Raster;
 use super::scene::Radiance;
+use super::seen_light::{LINE, SeenColor};
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
@@ -82,6 +83,98 @@ pub enum Pattern {
     Raster(Arc<Raster>),
 }
 
+/// Places of a painting, as many as are looked at together, and the paint there in one colour.
+pub(super) struct PaintLine {
+    /// The number of places.
+    pub(super) count: usize,
+    /// To the right and upwards.
+    pub(super) place: [[f64; LINE]; 2],
+    /// 1 where a ray meets the painting, else 0.
+    pub(super) is_met: [f64; LINE],
+    pub(super) level: [f64; LINE],
+    pub(super) cover: [f64; LINE],
+}
+
+impl PaintLine {
+    #[inline(always)]
+    pub(super) fn new(count: usize) -> Self {
+        let zero = [0.0; LINE];
+        Self { count, place: [zero; 2], is_met: zero, level: zero, cover: [1.0; LINE] }
+    }
+
+    /// Point by point.
+    #[inline(never)]
+    pub(super) fn by_point(&mut self, pattern: &Pattern, half_size: [f64; 2], seen: SeenColor) {
+        for i in (0..self.count).filter(|i| self.is_met[*i] > 0.0) {
+            let place = [self.place[0][i], self.place[1][i]];
+            let paint = pattern.paint(PaintedPoint { place, half_size });
+            (self.level[i], self.cover[i]) = (seen.of(paint.radiance), paint.cover);
+        }
+    }
+
+    /// Levels of 1 and 0 of whether something is true at a place; covers all.
+    #[inline(always)]
+    fn white_where(&mut self, is_white: impl Fn(f64, f64) -> bool) {
+        for i in 0..LINE {
+            let white = is_white(self.place[0][i], self.place[1][i]);
+            self.level[i] = if white { 1.0 } else { 0.0 };
+        }
+        self.cover = [1.0; LINE];
+    }
+
+    #[inline(always)]
+    pub(super) fn checkerboard(&mut self, side: f64) {
+        self.white_where(|x, y| {
+            let square = (x / side).floor() + (y / side).floor();
+            square - 2.0 * (0.5 * square).floor() == 1.0
+        });
+    }
+
+    #[inline(always)]
+    pub(super) fn slanted_edge(&mut self) {
+        let [dark, bright] = EDGE_LEVELS;
+        self.white_where(|x, y| x > EDGE_SLOPE * y);
+        self.level.iter_mut().for_each(|level| *level = if *level > 0.0 { bright } else { dark });
+    }
+
+    /// [`is_white_sector`] within a circle, and white around it.
+    #[inline(always)]
+    pub(super) fn star(&mut self, sectors: u32, radius: f64) {
+        let [x, y] = &self.place;
+        let (mut re, mut im) = ([0.0; LINE], [0.0; LINE]);
+        let (mut power_re, mut power_im) = ([1.0; LINE], [0.0; LINE]);
+        for i in 0..LINE {
+            let largest = x[i].abs().max(y[i].abs());
+            (re[i], im[i]) = (x[i] / largest, y[i] / largest);
+        }
+        let mut rest = sectors;
+        while rest > 0 {
+            if rest & 1 == 1 {
+                for i in 0..LINE {
+                    let product = power_re[i] * re[i] - power_im[i] * im[i];
+                    power_im[i] = power_re[i] * im[i] + power_im[i] * re[i];
+                    power_re[i] = product;
+                }
+            }
+            for i in 0..LINE {
+                let product = re[i] * re[i] - im[i] * im[i];
+                im[i] = re[i] * im[i] + im[i] * re[i];
+                re[i] = product;
+            }
+            rest >>= 1;
+        }
+        for i in 0..LINE {
+            // The middle, which has no angle, belongs to the first sector.
+            let is_middle = !((x[i] != 0.0) | (y[i] != 0.0));
+            let is_right = (power_im[i] == 0.0) & (power_re[i] > 0.0);
+            let white = (power_im[i] > 0.0) | is_right | is_middle;
+            let is_outside = !(x[i] * x[i] + y[i] * y[i] <= radius * radius);
+            self.level[i] = if white | is_outside { 1.0 } else { 0.0 };
+        }
+        self.cover = [1.0; LINE];
+    }
+}
+
 fn grey(level: f64) -> Paint {
     Paint { radiance: [level; 3], cover: 1.0 }
 }
@@ -95,6 +188,11 @@ const EDGE_LEVELS: [f64; 2] = [0.2, 0.8];
 const MOST_SECTORS: f64 = 512.0;
 
 impl Pattern {
+    /// True if a star of so many sectors is a power of the place.
+    pub(super) fn is_whole_star(sectors: f64) -> bool {
+        sectors.fract() == 0.0 && (1.0..=MOST_SECTORS).contains(&sectors)
+    }
+
     /// True if red, green and blue are the same everywhere.
     pub(super) fn is_grey(&self) -> bool {
         match self {
@@ -155,7 +253,7 @@ impl Pattern {
 /// True in the first half of each of this many sectors, counted from the right upwards.
 fn is_white_sector([x, y]: [f64; 2], sectors: f64) -> bool {
     let largest = x.abs().max(y.abs());
-    if !(sectors.fract() == 0.0 && (1.0..=MOST_SECTORS).contains(&sectors) && largest > 0.0) {
+    if !(Pattern::is_whole_star(sectors) && largest > 0.0) {
         return (y.atan2(x) / TAU * sectors).rem_euclid(1.0) < 0.5;
     }
     // The sine of so many times the angle is the imaginary part of that power of x + iy, whose modulus is at

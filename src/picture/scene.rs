@@ -79,6 +79,11 @@ impl Scene {
         if colors == 3 { self.background[color] } else { luminance(self.background) }
     }
 
+    /// The radiance in every direction without a plane.
+    pub(super) fn background(&self) -> Radiance {
+        self.background
+    }
+
     /// The planes, from the nearest to the farthest.
     pub fn layers(&self) -> &[SceneLayer] {
         &self.layers

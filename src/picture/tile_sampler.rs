@@ -3,15 +3,16 @@
 //! The rays of a sample are the same in all colours and differ only in the wavelength at which they are
 //! traced. Of every sample, all pixels and replicates of a tile are done at once.
 
-use super::exact::{REPLICATES, luminance, mean_with_error};
-use super::lit_directions::{DrawnDirection, LitDirections};
+use super::exact::{REPLICATES, mean_with_error};
+use super::lit_directions::LitDirections;
 use super::losses::LensLosses;
-use super::sample_points::{SamplePoint, SamplePoints};
-use super::scene::Radiance;
+use super::sample_points::SamplePoints;
+use super::scene::{Radiance, Scene};
+use super::seen_light::SeenColor;
 use super::{ColorBand, ImageFrame, PictureError};
 use crate::analysis::BackwardLens;
 use crate::pupil::RayModel;
-use crate::trace::{Fates, Landings, Ray, Rays, TraceSink as _};
+use crate::trace::{Fates, Landings, Rays, TraceSink as _};
 use std::ops::Range;
 
 /// The number of rays that are traced together.
@@ -53,7 +54,9 @@ pub(super) struct TileWork {
     pub(super) tile: PictureTile,
     frame: ImageFrame,
     points: SamplePoints,
-    /// By pixel, replicate and colour.
+    /// The upper left corners of the pixels on the image, x and y in mm.
+    corners: [Vec<f64>; 2],
+    /// By replicate, pixel and colour.
     sums: Vec<f64>,
     fates: Fates,
     /// The samples of each replicate of a pixel that have ended.
@@ -70,28 +73,38 @@ struct SpectralPart {
     wavelengths: Vec<usize>,
 }
 
-/// Rays of one part of the spectrum that wait to be traced.
+/// Rays of one part of the spectrum that wait to be traced, as columns.
 #[derive(Debug, Default)]
 struct RayQueue {
     rays: Rays<f64>,
-    origins: Vec<RayOrigin>,
+    /// The index of the replicate and pixel of each.
+    sets: Vec<usize>,
+    /// The share of the irradiance that the light along each has.
+    weights: Vec<f64>,
+    /// The times.
+    seconds: Vec<f64>,
+    /// The distances of the image points from the axis, and the directions there.
+    radii: Vec<f64>,
+    cosines: Vec<[f64; 2]>,
     landings: Landings<f64>,
+    /// The rays beyond the lens, and the light along them.
+    outside: Rays<f64>,
+    light: Vec<f64>,
 }
 
-/// The sample that a ray belongs to.
-#[derive(Debug, Clone, Copy)]
-struct RayOrigin {
-    /// The index of its pixel and replicate.
-    set: usize,
-    weight: f64,
-    seconds: f64,
-    /// The distance of its image point from the axis, and its direction there.
-    radius: f64,
-    cosines: [f64; 2],
+impl RayQueue {
+    fn clear(&mut self) {
+        self.rays.clear();
+        self.sets.clear();
+        self.weights.clear();
+        self.seconds.clear();
+        self.radii.clear();
+        self.cosines.clear();
+    }
 }
 
-/// The scene that a ray meets at a time in seconds, and the time during which it moves.
-type MovingScene<'a> = (&'a dyn Fn(&Ray<f64>, f64) -> Radiance, f64);
+/// The scene, and the time during which it moves in seconds.
+type MovingScene<'a> = (&'a Scene, f64);
 
 /// A lens at the wavelengths of a picture, with the directions of light at its image.
 #[derive(Debug)]
@@ -125,14 +138,19 @@ impl TileSampler {
 
     /// A tile without samples.
     pub(super) fn begin(&self, frame: &ImageFrame, tile: PictureTile, seed: u32) -> TileWork {
-        let of_pixel = |[column, row]: [usize; 2]| {
-            let place = (row * frame.pixels[0] + column) * REPLICATES;
-            (0..REPLICATES).map(move |replicate| set_seed(place + replicate, seed))
+        let place = |[column, row]: [usize; 2]| (row * frame.pixels[0] + column) * REPLICATES;
+        let of_replicate = |replicate: usize| {
+            tile.pixels().map(move |pixel| set_seed(place(pixel) + replicate, seed))
         };
-        let seeds: Vec<u32> = tile.pixels().flat_map(of_pixel).collect();
+        let seeds: Vec<u32> = (0..REPLICATES).flat_map(of_replicate).collect();
+        let first = seeds.chunks(tile.len().max(1)).filter_map(|seeds| seeds.first().copied());
+        let color_seeds: Vec<u32> = first.collect();
+        let corner =
+            |k: usize| tile.pixels().map(|pixel| frame.point(pixel, [0.0; 2])[k]).collect();
         TileWork {
             sums: vec![0.0; seeds.len() * self.colors()],
-            points: SamplePoints::new(&seeds),
+            points: SamplePoints::new(&seeds, &color_seeds),
+            corners: [corner(0), corner(1)],
             frame: *frame,
             tile,
             fates: Fates::default(),
@@ -154,7 +172,7 @@ impl TileSampler {
             if is_stopped() {
                 return false;
             }
-            work.points.go_to(sample);
+            work.points.go_to(sample, scene.1 != 0.0);
             self.launch(work, &mut queues, scene);
         }
         for (queue, part) in queues.iter_mut().zip(&self.spectrum) {
@@ -168,74 +186,77 @@ impl TileSampler {
     /// Queues the rays of a sample of all pixels and replicates.
     fn launch(&self, work: &mut TileWork, queues: &mut [RayQueue], scene: MovingScene<'_>) {
         let last = self.spectrum.len() - 1;
-        let tile = work.tile.clone();
-        for (i, pixel) in tile.pixels().enumerate() {
-            for set in i * REPLICATES..(i + 1) * REPLICATES {
-                let point = work.points.get(set);
-                let part = self.spectrum.partition_point(|part| part.end <= point.color).min(last);
-                let queue = &mut queues[part];
-                let at = work.frame.point(pixel, point.place);
-                let Some((ray, origin)) = self.start(at, &point, part) else { continue };
-                queue.rays.push(ray);
-                queue.origins.push(RayOrigin { set, seconds: scene.1 * point.time, ..origin });
-                if queue.origins.len() >= BATCH {
-                    self.trace(work, queue, &self.spectrum[part], scene.0);
-                }
+        for replicate in 0..REPLICATES {
+            let color = work.points.color(replicate);
+            let part = self.spectrum.partition_point(|part| part.end <= color).min(last);
+            let queue = &mut queues[part];
+            self.start(work, replicate, (part, scene.1), queue);
+            if queue.sets.len() >= BATCH {
+                self.trace(work, queue, &self.spectrum[part], scene.0);
             }
         }
     }
 
-    /// The ray of a sample from a point of the image; `None` where it is dark.
+    /// Queues the rays of a sample of all pixels in a replicate, but those from where it is dark.
     fn start(
         &self,
-        [x, y]: [f64; 2],
-        point: &SamplePoint,
-        part: usize,
-    ) -> Option<(Ray<f64>, RayOrigin)> {
-        let radius = (x * x + y * y).sqrt();
-        let DrawnDirection { cosines, area } = self.directions.draw(radius, point.direction)?;
-        let [ex, ey] = if radius > 0.0 { [x / radius, y / radius] } else { [0.0, 1.0] };
-        let [across, outwards] = cosines;
-        let turned = [across * ey + outwards * ex, outwards * ey - across * ex];
+        work: &TileWork,
+        replicate: usize,
+        (part, seconds): (usize, f64),
+        queue: &mut RayQueue,
+    ) {
         // The rays of all wavelengths start alike.
-        let lens = self.lenses.first()?.get(self.spectrum[part].wavelengths[0])?;
-        let (ray, share) = lens.ray([x, y], turned)?;
-        let weight = area * share;
-        Some((ray, RayOrigin { set: 0, weight, seconds: 0.0, radius, cosines }))
+        let lens = &self.lenses[0][self.spectrum[part].wavelengths[0]];
+        let step = work.frame.point([0, 0], [1.0; 2]);
+        let corner = work.frame.point([0, 0], [0.0; 2]);
+        let step = [step[0] - corner[0], step[1] - corner[1]];
+        let first = replicate * work.tile.len();
+        let [right, down, across, along, time] =
+            work.points.columns().map(|column| &column[first..]);
+        for (i, (left, top)) in work.corners[0].iter().zip(&work.corners[1]).enumerate() {
+            let (x, y) = (left + step[0] * right[i], top + step[1] * down[i]);
+            let radius = (x * x + y * y).sqrt();
+            let Some(drawn) = self.directions.draw(radius, [across[i], along[i]]) else { continue };
+            let inverse = 1.0 / radius;
+            let [ex, ey] = if radius > 0.0 { [x * inverse, y * inverse] } else { [0.0, 1.0] };
+            let [right, outwards] = drawn.cosines;
+            let turned = [right * ey + outwards * ex, outwards * ey - right * ex];
+            let Some((ray, share)) = lens.ray([x, y], turned) else { continue };
+            queue.rays.push(ray);
+            queue.sets.push(first + i);
+            queue.weights.push(drawn.area * share);
+            queue.seconds.push(seconds * time[i]);
+            if self.losses.is_some() {
+                queue.radii.push(radius);
+                queue.cosines.push(drawn.cosines);
+            }
+        }
     }
 
     /// Traces the rays of a queue in every colour and adds their light.
-    fn trace(
-        &self,
-        work: &mut TileWork,
-        queue: &mut RayQueue,
-        part: &SpectralPart,
-        scene: &dyn Fn(&Ray<f64>, f64) -> Radiance,
-    ) {
+    fn trace(&self, work: &mut TileWork, queue: &mut RayQueue, part: &SpectralPart, scene: &Scene) {
         let colors = self.colors();
         for (color, wavelength) in part.wavelengths.iter().enumerate() {
             let lens = &self.lenses[color][*wavelength];
             lens.trace(&queue.rays, &mut queue.landings);
             work.fates.add(queue.landings.fates());
-            for (i, origin) in queue.origins.iter().enumerate() {
-                if !queue.landings.fate(i).is_imaged() {
-                    continue;
+            lens.scene_rays(&queue.landings, &mut queue.outside);
+            let seen = SeenColor { color, colors };
+            scene.light_along(&queue.outside, &queue.seconds, seen, &mut queue.light);
+            if let Some(losses) = &self.losses {
+                let ways = queue.radii.iter().zip(&queue.cosines);
+                for (light, (radius, cosines)) in queue.light.iter_mut().zip(ways) {
+                    *light *= losses.passed([color, *wavelength], *radius, *cosines);
                 }
-                let radiance = scene(&lens.scene_ray(queue.landings.ray(i)), origin.seconds);
-                let passed = self.losses.as_ref().map_or(1.0, |losses| {
-                    losses.passed([color, *wavelength], origin.radius, origin.cosines)
-                });
-                let weight = origin.weight * lens.index_ratio * passed;
-                work.sums[origin.set * colors + color] += weight * self.seen(radiance, color);
+            }
+            let rays = queue.sets.iter().zip(&queue.weights).zip(&queue.light);
+            for (i, ((set, weight), light)) in rays.enumerate() {
+                if queue.landings.fate(i).is_imaged() {
+                    work.sums[set * colors + color] += weight * lens.index_ratio * light;
+                }
             }
         }
-        queue.origins.clear();
-        queue.rays.clear();
-    }
-
-    /// The radiance that a colour sees.
-    fn seen(&self, radiance: Radiance, color: usize) -> f64 {
-        if self.colors() == 3 { radiance[color] } else { luminance(radiance) }
+        queue.clear();
     }
 
     /// Means and standard errors of the pixels of a tile.
@@ -243,11 +264,11 @@ impl TileSampler {
         let colors = self.colors();
         let mut sampled = SampledTile { fates: work.fates, ..SampledTile::default() };
         sampled.samples = work.fates.total();
-        for pixel in work.sums.chunks(REPLICATES * colors) {
+        let pixels = work.tile.len();
+        for pixel in 0..pixels {
             let statistics = |color: usize| {
-                let means: [f64; REPLICATES] =
-                    std::array::from_fn(|r| pixel[r * colors + color] / work.count as f64);
-                mean_with_error(means)
+                let sum = |replicate: usize| (replicate * pixels + pixel) * colors + color;
+                mean_with_error(std::array::from_fn(|r| work.sums[sum(r)] / work.count as f64))
             };
             let colors: [(f64, f64); 3] = std::array::from_fn(|c| statistics(c.min(colors - 1)));
             sampled.values.push(colors.map(|(mean, _)| mean));
