@@ -8,6 +8,7 @@
 use super::exact::luminance;
 use super::pattern::{Paint, PaintedPoint};
 use super::scene::SceneLayer;
+use super::tent_line::{LightView, split};
 use rayon::prelude::*;
 
 /// Light times cover, and cover.
@@ -33,6 +34,9 @@ pub(super) struct MipTexture {
     pub(super) texels: Vec<Texel>,
     /// The levels of a plane.
     pub(super) levels: Vec<MipLevel>,
+    /// The light of all texels, and the same with the even columns of each row before its odd ones; none if
+    /// something is behind the painting that its middle lets through.
+    lights: [Vec<f32>; 2],
     /// The number of texels of a plane: one for each colour, or one for all if the painting is grey.
     plane: usize,
     planes: usize,
@@ -80,11 +84,39 @@ impl MipTexture {
         let plane = levels.last().map_or(0, |level| level.first + level.len());
         let planes = if colors == 3 && !layer.pattern.is_grey() { 3 } else { 1 };
         let texels = vec![[0.0; 2]; plane * planes];
-        let mut texture = Self { corner, texel, texels, levels, plane, planes };
+        let lights = [Vec::new(), Vec::new()];
+        let mut texture = Self { corner, texel, texels, levels, lights, plane, planes };
         let canvas = PaintedTexels { layer, corner, texel, size: texture.levels[0].size };
         texture.paint(&canvas, colors);
         texture.halve();
+        if layer.pattern.covers_all() {
+            texture.keep_light();
+        }
         texture
+    }
+
+    /// Keeps the light of all texels by itself.
+    fn keep_light(&mut self) {
+        self.lights[0] = self.texels.par_iter().map(|[light, _]| *light).collect();
+        let part = |plane: usize, level: &MipLevel| {
+            let first = plane * self.plane + level.first;
+            split(&self.lights[0][first..first + level.len()], level.size[0])
+        };
+        let all: Vec<(usize, &MipLevel)> = (0..self.planes)
+            .flat_map(|plane| self.levels.iter().map(move |l| (plane, l)))
+            .collect();
+        let parts: Vec<Vec<f32>> =
+            all.par_iter().map(|(plane, level)| part(*plane, level)).collect();
+        self.lights[1] = parts.concat();
+    }
+
+    /// The light of a level for a colour, if the painting covers all behind it.
+    pub(super) fn light(&self, color: usize, level: usize) -> Option<LightView<'_>> {
+        let first = self.first(color, level);
+        let part = first..first + self.levels[level].len();
+        let [texels, halves] = &self.lights;
+        let width = self.levels[level].size[0];
+        Some(LightView { texels: texels.get(part.clone())?, halves: halves.get(part)?, width })
     }
 
     /// Paints the finest level of every plane.
@@ -307,18 +339,29 @@ impl MipView<'_> {
             along[i] = v - row;
             firsts[i] = whole(row).wrapping_mul(width).wrapping_add(whole(column));
         }
-        let [right, up] = self.next;
+        let mut mixed = [[0.0; 4]; LINE];
+        for i in 0..count {
+            let (lower, t) = (firsts[i] as usize, along[i]);
+            let (lower, upper) = (self.pair(lower), self.pair(lower + self.next[1]));
+            for k in 0..4 {
+                mixed[i][k] = lower[k] + t * (upper[k] - lower[k]);
+            }
+        }
         let [lights, covers] = sums;
         for i in 0..count {
-            let (lower, s, t) = (firsts[i] as usize, across[i], along[i]);
-            let upper = lower + up;
-            let ([a, p], [b, q]) = (self.texels[lower], self.texels[lower + right]);
-            let ([c, x], [d, y]) = (self.texels[upper], self.texels[upper + right]);
-            let (first, second) = (a + s * (b - a), c + s * (d - c));
-            lights[i] += share * (first + t * (second - first));
-            let (first, second) = (p + s * (q - p), x + s * (y - x));
-            covers[i] += share * (first + t * (second - first));
+            let ([a, p, b, q], s) = (mixed[i], across[i]);
+            lights[i] += share * (a + s * (b - a));
+            covers[i] += share * (p + s * (q - p));
         }
+    }
+
+    /// A texel and the next one in its row: four numbers beside each other, which are mixed by one vector
+    /// instruction.
+    #[inline(always)]
+    fn pair(&self, first: usize) -> [f32; 4] {
+        let [a, p] = self.texels[first];
+        let [b, q] = self.texels[first + self.next[0]];
+        [a, p, b, q]
     }
 }
 
@@ -388,5 +431,39 @@ mod tests {
         let orange = texture(Pattern::Uniform { radiance: [1.0, 0.5, 0.0], cover: 0.5 });
         let seen = [0, 1, 2].map(|color| tent(orange.view(color, 0), [9.0, 9.0]));
         assert_eq!(seen, [[0.5, 0.5], [0.25, 0.5], [0.0, 0.5]]);
+    }
+
+    /// A line whose places advance by nearly two texels, one, a half or a quarter has the same light as its
+    /// single places, and one that advances otherwise, or leaves the painting, is refused.
+    #[test]
+    fn a_line_of_neighbouring_texels_has_the_light_of_its_places() {
+        let texture = wave(0.07);
+        let (view, light) = (texture.view(1, 0), texture.light(1, 0).unwrap());
+        for (advance, count) in
+            [(1.93, 29), (1.0, 64), (1.04, 37), (0.97, 11), (0.52, 64), (0.26, 50)]
+        {
+            let line = [[11.3, advance, 1e-4], [40.2, -0.013, 2e-4]];
+            let mut places = [[0.0; LINE]; 2];
+            for (i, k) in (0..count).flat_map(|i| [(i, 0), (i, 1)]) {
+                let [a, b, c] = line[k];
+                places[k][i] = (a + i as f64 * (b + i as f64 * c)) as f32;
+            }
+            let (mut exact, mut found) = ([[0.0; LINE]; 2], [0.0; LINE]);
+            view.add_tents(&places, (1.0, [0.0; 2]), (0.7, count), &mut exact);
+            assert!(light.add_tents(line, (0.7, count), &mut found), "{advance}");
+            let pairs = exact[0].iter().zip(&found).take(count);
+            let off = pairs.map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+            assert!(off < 2e-5, "{advance} {count}: {off}");
+        }
+        let mut sums = [0.0; LINE];
+        for line in [[9.0, 5.0, 0.0], [9.0, -1.0, 0.0], [100.0, 1.0, 0.0], [-0.5, 1.0, 0.0]] {
+            assert!(!light.add_tents([line, [40.0, 0.0, 0.0]], (1.0, 40), &mut sums), "{line:?}");
+        }
+        let orange = texture_of_cover(0.5);
+        assert!(orange.light(0, 0).is_none(), "what is behind it can be seen");
+    }
+
+    fn texture_of_cover(cover: f64) -> MipTexture {
+        texture(Pattern::Uniform { radiance: [1.0; 3], cover })
     }
 }

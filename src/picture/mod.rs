@@ -32,6 +32,7 @@ mod scene;
 mod seen_light;
 mod sensor;
 mod sensor_law;
+mod tent_line;
 mod tile_sampler;
 
 pub use built_in::BuiltInScene;

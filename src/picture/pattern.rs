@@ -207,6 +207,22 @@ impl Pattern {
         }
     }
 
+    /// True if nothing behind the rectangle can be seen through it.
+    pub(super) fn covers_all(&self) -> bool {
+        match self {
+            Self::Uniform { cover, .. } => *cover == 1.0,
+            Self::Ball { .. } | Self::Flame(_) => false,
+            Self::Raster(raster) => raster.covers_all(),
+            Self::Wave { .. }
+            | Self::Checkerboard(_)
+            | Self::SlantedEdge
+            | Self::Star(_)
+            | Self::Bars
+            | Self::Lights { .. }
+            | Self::LitWall { .. } => true,
+        }
+    }
+
     /// The paint at a point.
     pub fn paint(&self, point: PaintedPoint) -> Paint {
         let PaintedPoint { place: [x, y], half_size: [half_width, half_height] } = point;

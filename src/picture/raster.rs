@@ -20,6 +20,11 @@ impl Raster {
         self.image.width as f64 / self.image.height as f64
     }
 
+    /// True if no pixel lets through what is behind it.
+    pub(super) fn covers_all(&self) -> bool {
+        self.image.light.iter().all(|[.., cover]| *cover == 1.0)
+    }
+
     /// The paint at a place, 0 to 1 to the right and downwards.
     pub(super) fn paint(&self, [right, down]: [f64; 2]) -> Paint {
         let [width, height] = [self.image.width, self.image.height];

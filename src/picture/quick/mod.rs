@@ -305,8 +305,12 @@ fn seen_texture(
     let spots = spots(table, layer);
     let seen = seen_part(frame, table, &spots, layer, pixel);
     let area = (seen[1][0] - seen[0][0]) * (seen[1][1] - seen[0][1]);
-    let texel = 2.0 * sharpest(&spots, pixel).sqrt();
-    let texel = texel.max(TEXEL * pixel).max((area / MAX_TEXELS).sqrt());
+    let wanted = (2.0 * sharpest(&spots, pixel).sqrt()).max(TEXEL * pixel);
+    // A power of two in pixels: neighbouring points then have neighbouring texels.
+    let mut texel = pixel * (wanted / pixel).log2().floor().exp2();
+    while texel * texel * MAX_TEXELS < area {
+        texel *= 2.0;
+    }
     MipTexture::new(layer, seen, texel, colors)
 }
 

@@ -14,6 +14,8 @@ use std::sync::Arc;
 /// The spacing of a lattice over the smaller standard deviation of the spot in pixels, at most: the spline
 /// then takes three quarters of the variance.
 const SPACING: f64 = 1.5;
+/// The texels at the border of a painting that may have less than full cover.
+const BORDER: f64 = 4.0;
 /// The side of a block over the largest spacing.
 const PARTS: usize = 4;
 /// The larger variance of a spot over the smaller up to which it is taken for round.
@@ -58,6 +60,8 @@ pub(super) struct BeamLook {
     pub(super) taps: usize,
     /// Their distance, in texels.
     pub(super) tap: [f32; 2],
+    /// True if the painting covers all that the beam sees.
+    pub(super) is_covered: bool,
 }
 
 /// The beams of a block.
@@ -183,14 +187,14 @@ impl PlanSource<'_> {
         let (level, coarser) = texture.level(blur.variance);
         let unit = texture.texel * 2_f64.powi(level as i32);
         let reach = 3.0 * blur.longest.sqrt() + 2.0 * unit;
-        let is_beside = |k: usize| {
-            // A lattice goes beyond its block by a quarter of it.
-            let wide: f64 = spot.place[k][1..].iter().map(|v| 1.5 * v.abs()).sum();
-            spot.place[k][0].abs() > half_size[k] + wide + reach
-        };
+        // A lattice goes beyond its block by a quarter of it.
+        let wide = |k: usize| spot.place[k][1..].iter().map(|v| 1.5 * v.abs()).sum::<f64>();
+        let is_beside = |k: usize| spot.place[k][0].abs() > half_size[k] + wide(k) + reach;
         if is_beside(0) || is_beside(1) {
             return None;
         }
+        let is_within =
+            |k: usize| spot.place[k][0].abs() + wide(k) + reach + BORDER * unit < half_size[k];
         let scaled = |k: usize| {
             let mut place = spot.place[k].map(|v| v / unit);
             place[0] -= texture.corner[k] / unit + 0.5;
@@ -205,6 +209,7 @@ impl PlanSource<'_> {
             coarser,
             taps: blur.taps,
             tap,
+            is_covered: texture.light(0, 0).is_some() && is_within(0) && is_within(1),
         })
     }
 }

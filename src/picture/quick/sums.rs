@@ -4,6 +4,7 @@ use super::blocks::{PictureBlock, Quadratic};
 use super::plan::{BeamLook, BlockBeam, BlockPlan, PlanSource};
 use crate::math::{SimdWidth, run_vectorized};
 use crate::picture::mip_texture::{LINE, MipView, PlaceLine};
+use crate::picture::tent_line::{LightView, LinePlace};
 
 /// The distance of probed pixels, and the first of them, which need not lie in a small block.
 const PROBE: usize = 5;
@@ -46,6 +47,13 @@ struct Lattice<'a> {
     rows: Vec<f32>,
     columns: usize,
     values: Vec<f32>,
+}
+
+/// The levels of a painting that a beam looks at: the finer and the coarser one.
+struct LookViews<'a> {
+    texels: [MipView<'a>; 2],
+    /// The light alone, if it covers all that the beam sees.
+    light: Option<[LightView<'a>; 2]>,
 }
 
 /// The colours of the pixels of a block, row by row. `background` is the radiance behind the paintings in
@@ -118,12 +126,17 @@ impl<'a> Lattice<'a> {
         looks: &[BeamLook],
         background: f32,
     ) {
-        let views: Vec<[MipView<'_>; 2]> = looks
+        let views: Vec<LookViews<'_>> = looks
             .iter()
             .map(|look| {
                 let texture = &source.planes[look.plane].texture;
-                let coarse = (look.level + 1).min(texture.levels.len() - 1);
-                [look.level, coarse].map(|level| texture.view(beam.color, level))
+                let levels = [look.level, (look.level + 1).min(texture.levels.len() - 1)];
+                let light = |level: usize| texture.light(beam.color, level);
+                let [fine, coarse] = levels.map(light);
+                LookViews {
+                    texels: levels.map(|level| texture.view(beam.color, level)),
+                    light: fine.zip(coarse).filter(|_| look.is_covered).map(|(a, b)| [a, b]),
+                }
             })
             .collect();
         run_vectorized(
@@ -137,23 +150,25 @@ impl<'a> Lattice<'a> {
     fn add_views(
         &mut self,
         beam: &BlockBeam,
-        (looks, views): (&[BeamLook], &[[MipView<'_>; 2]]),
+        (looks, views): (&[BeamLook], &[LookViews<'_>]),
         background: f32,
     ) {
         let columns = self.columns;
+        let middle = 0.5 * (self.block.size[0] as f64 - 1.0);
+        let advance = self.step as f64 / middle.max(0.5);
+        let first = f64::from(relative(self.first, self.block.size[0]));
         let mut across = [0.0; LINE];
         for (i, place) in across[..columns].iter_mut().enumerate() {
             *place = relative(self.first + (self.step * i) as f32, self.block.size[0]);
         }
-        let (mut weight, mut places) = ([0.0; LINE], [[0.0; LINE]; 2]);
+        let mut weight = [0.0; LINE];
         for (row, line) in self.rows.iter().zip(self.values.chunks_mut(columns)) {
             let along = relative(*row, self.block.size[1]);
             let (mut light, mut open) = ([0.0; LINE], [1.0; LINE]);
             for (look, views) in looks.iter().zip(views) {
-                on_line(&look.place[0], (&across[..columns], along), &mut places[0]);
-                on_line(&look.place[1], (&across[..columns], along), &mut places[1]);
                 let mut seen = [[0.0; LINE]; 2];
-                add_seen(look, views, (&places, columns), &mut seen);
+                let line = (&across[..columns], (first, advance), along);
+                add_look(look, views, line, &mut seen);
                 for i in 0..columns {
                     light[i] += open[i] * seen[0][i];
                     open[i] *= 1.0 - seen[1][i];
@@ -205,6 +220,72 @@ fn on_line(q: &Quadratic<f32>, (across, t): (&[f32], f32), values: &mut [f32; LI
     for (value, s) in values.iter_mut().zip(across) {
         *value = a + s * (b + s * c);
     }
+}
+
+/// Adds the mean light and cover that a beam sees along a line of a lattice: its points across the block, the
+/// first of them and their distance once more, and its place along the block.
+#[inline(always)]
+fn add_look(
+    look: &BeamLook,
+    views: &LookViews<'_>,
+    (across, at, along): (&[f32], (f64, f64), f32),
+    seen: &mut PlaceLine,
+) {
+    let columns = across.len();
+    let line = [line_place(&look.place[0], at, along), line_place(&look.place[1], at, along)];
+    if let Some(light_views) = &views.light {
+        if add_covered(look, light_views, (line, columns), &mut seen[0]) {
+            seen[1] = [1.0; LINE];
+            return;
+        }
+        seen[0] = [0.0; LINE];
+    }
+    let mut places = [[0.0; LINE]; 2];
+    on_line(&look.place[0], (across, along), &mut places[0]);
+    on_line(&look.place[1], (across, along), &mut places[1]);
+    add_seen(look, &views.texels, (&places, columns), seen);
+}
+
+/// A quadratic along a line of a lattice, whose first point and whose distance of points are given in the block.
+#[inline(always)]
+fn line_place(q: &Quadratic<f32>, (first, advance): (f64, f64), t: f32) -> LinePlace {
+    let (a, b, c) = (q[0] + t * (q[2] + t * q[5]), q[1] + t * q[4], q[3]);
+    let [a, b, c] = [f64::from(a), f64::from(b), f64::from(c)];
+    [a + first * (b + first * c), advance * (b + 2.0 * first * c), advance * advance * c]
+}
+
+/// Adds the mean light that a beam sees of a painting that covers all, along a line; false if that cannot be
+/// done, and something else may then have been added.
+#[inline(always)]
+fn add_covered(
+    look: &BeamLook,
+    [fine, coarse]: &[LightView<'_>; 2],
+    (places, count): ([LinePlace; 2], usize),
+    seen: &mut [f32; LINE],
+) -> bool {
+    for (offset, share) in taps(look.taps) {
+        let [across, along] = look.tap;
+        let shift = [offset * across, offset * along];
+        let shares = [share * (1.0 - look.coarser), share * look.coarser];
+        if !fine.add_tents(moved(&places, 1.0, shift), (shares[0], count), seen) {
+            return false;
+        }
+        // The first texel of the coarser level has its middle a quarter of its side farther in.
+        let shift = [0.5 * shift[0] - 0.25, 0.5 * shift[1] - 0.25];
+        let is_mixed = look.coarser > 0.0;
+        if is_mixed && !coarse.add_tents(moved(&places, 0.5, shift), (shares[1], count), seen) {
+            return false;
+        }
+    }
+    true
+}
+
+/// Places scaled and shifted.
+#[inline(always)]
+fn moved(places: &[LinePlace; 2], scale: f64, shift: [f32; 2]) -> [LinePlace; 2] {
+    let [[a, b, c], [d, e, f]] = *places;
+    let [across, along] = [f64::from(shift[0]), f64::from(shift[1])];
+    [[scale * a + across, scale * b, scale * c], [scale * d + along, scale * e, scale * f]]
 }
 
 /// Adds the mean light and cover that a beam sees of a painting at some places.
