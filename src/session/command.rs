@@ -203,6 +203,8 @@ pub enum PanelSetting {
     Contrasts(bool),
     /// True to compute the wavefronts of the fields.
     Wavefronts(bool),
+    /// True to compute the images of a point beside the wavefronts.
+    PointImages(bool),
     /// True to compute the footprints of the fields.
     Footprints(bool),
     /// True to compute the spot over the whole field.

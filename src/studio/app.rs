@@ -584,6 +584,10 @@ fn pending_numbers(settings: &AnalysisSettings, found: &Analyses) -> Option<&'st
     let waits = [
         (settings.contrasts && found.contrasts.is_none(), "MTF"),
         (settings.wavefronts && found.wavefronts.is_none(), "wavefronts"),
+        (
+            settings.wavefronts && settings.point_images && found.point_images.is_none(),
+            "images of a point",
+        ),
         (settings.field_curves && found.field_curves.is_none(), "field curves"),
         (settings.spot_map && found.spot_map.is_none(), "spot over the field"),
         (settings.ghosts && found.ghosts.is_none(), "ghosts"),

@@ -883,9 +883,19 @@ fn counts_of_one_are_singular() {
 
 /// A view with the numbers that a setting asks for, once they are there.
 fn results_with(setting: PanelSetting, are_there: impl Fn(&Analyses) -> bool) -> SessionView {
+    results_with_all(vec![setting], are_there)
+}
+
+/// The same for several settings.
+fn results_with_all(
+    settings: Vec<PanelSetting>,
+    are_there: impl Fn(&Analyses) -> bool,
+) -> SessionView {
     let mut session = Session::new(double_gauss(), || {}).unwrap();
-    let name = format!("{setting:?}");
-    session.apply(Command::Show(setting));
+    let name = format!("{settings:?}");
+    for setting in settings {
+        session.apply(Command::Show(setting));
+    }
     for _ in 0..1000 {
         session.poll();
         let (results, settings) = (session.view().results, session.view().settings);
@@ -1002,11 +1012,12 @@ fn a_ghost_of_the_list_is_shown_in_the_layout() {
     assert!(layout.state().commands.contains(&hidden), "{:?}", layout.state().commands);
 }
 
-/// Every page of the wavefront panel shows every field, with the numbers of the analyses.
+/// Every page of the wavefront panel shows every field, with the numbers of the analyses. Images of a point are
+/// asked for by the pages that show them, and no longer by the others.
 #[test]
 fn the_wavefront_panel_shows_maps_images_and_coefficients() {
-    let shown =
-        results_with(PanelSetting::Wavefronts(true), |numbers| numbers.wavefronts.is_some());
+    let settings = vec![PanelSetting::Wavefronts(true), PanelSetting::PointImages(true)];
+    let shown = results_with_all(settings, |numbers| numbers.point_images.is_some());
     let mut harness = panel_harness(WavefrontPanel::default(), shown);
     harness.run_steps(3);
     let numbers = harness.state().view.results.clone().unwrap();
@@ -1015,9 +1026,13 @@ fn the_wavefront_panel_shows_maps_images_and_coefficients() {
         harness.get_all_by_label_contains(what).count()
     };
     assert_eq!(maps(&harness, "Wavefront at "), waves.value.fields.len());
+    let no_images = Command::Show(PanelSetting::PointImages(false));
+    assert!(harness.state().commands.contains(&no_images), "{:?}", harness.state().commands);
+    harness.state_mut().commands.clear();
     harness.get_by_label("Point spread").click();
     harness.run_steps(3);
     assert_eq!(maps(&harness, "Point spread at "), waves.value.fields.len());
+    assert_eq!(harness.state().commands, []);
     harness.get_by_label("Logarithmic").click();
     harness.get_by_label("Encircled energy").click();
     harness.run_steps(3);

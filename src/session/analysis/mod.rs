@@ -19,7 +19,7 @@ pub use ghosts::FieldGhosts;
 pub use pupils::FieldPupils;
 pub use scene::{PictureScene, SceneFile};
 pub use scene_picture::ScenePicture;
-pub use wavefronts::{FieldWavefront, FieldWavefronts, PointImage};
+pub use wavefronts::{FieldWavefront, FieldWavefronts, PointImage, PointImages};
 
 use super::clock::{Timed, now, time};
 use super::run::{LatestRequestWorker, WorkerOutput, catch_panic};
@@ -90,6 +90,8 @@ pub struct Analyses {
     pub contrasts: Option<Arc<Timed<FieldContrasts>>>,
     /// The wavefronts of the fields; `None` while no panel shows them, and at first.
     pub wavefronts: Option<Arc<Timed<FieldWavefronts>>>,
+    /// The images of a point by diffraction; `None` while no panel shows them, and at first.
+    pub point_images: Option<Arc<Timed<PointImages>>>,
     /// A scene through the lens, or the reason why there is none; `None` while no panel shows it.
     pub picture: Option<Arc<Timed<Result<ScenePicture, String>>>>,
     /// The lens as it is made, or the reason why nothing is known of it; `None` while no panel shows it,
@@ -170,6 +172,7 @@ struct SlowAnalyses {
     spot_map: SlowAnalysis<Result<SpotMap, AnalysisError>>,
     contrasts: SlowAnalysis<FieldContrasts>,
     wavefronts: SlowAnalysis<FieldWavefronts>,
+    point_images: SlowAnalysis<PointImages>,
 }
 
 impl SlowAnalyses {
@@ -208,11 +211,19 @@ impl SlowAnalyses {
             wavefronts: SlowAnalysis {
                 is_asked: |settings| settings.wavefronts,
                 compute: |results, analyses, interrupted| {
-                    let (model, spots) = (&analyses.ray_model.value, &analyses.spots.value);
-                    let tolerance = results.settings.tolerance;
-                    wavefronts::field_wavefronts(model, spots, tolerance, interrupted)
+                    let model = &analyses.ray_model.value;
+                    wavefronts::field_wavefronts(model, results.settings.tolerance, interrupted)
                 },
                 slot: |analyses| &mut analyses.wavefronts,
+                known: None,
+            },
+            point_images: SlowAnalysis {
+                is_asked: |settings| settings.wavefronts && settings.point_images,
+                compute: |_, analyses, interrupted| {
+                    let (model, spots) = (&analyses.ray_model.value, &analyses.spots.value);
+                    wavefronts::point_images(model, spots, interrupted)
+                },
+                slot: |analyses| &mut analyses.point_images,
                 known: None,
             },
         }
@@ -222,7 +233,8 @@ impl SlowAnalyses {
         let results = self.ghosts.publish(results, output);
         let results = self.spot_map.publish(results, output);
         let results = self.contrasts.publish(results, output);
-        self.wavefronts.publish(results, output)
+        let results = self.wavefronts.publish(results, output);
+        self.point_images.publish(results, output)
     }
 }
 
@@ -398,6 +410,7 @@ impl Analyses {
             pupils,
             contrasts: None,
             wavefronts: None,
+            point_images: None,
             picture,
             as_built: None,
             fans,
@@ -483,6 +496,9 @@ pub struct AnalysisSettings {
     /// True if the wavefronts are computed, because a panel shows them.
     #[serde(default)]
     pub wavefronts: bool,
+    /// True if the images of a point are computed beside the wavefronts, because the panel shows them.
+    #[serde(default)]
+    pub point_images: bool,
     /// True if the ray fans are computed, because a panel shows them.
     #[serde(default)]
     pub fans: bool,
@@ -548,6 +564,7 @@ impl Default for AnalysisSettings {
             pupils: false,
             contrasts: false,
             wavefronts: false,
+            point_images: false,
             fans: false,
             field_curves: false,
             footprints: false,

@@ -17,7 +17,16 @@ pub struct FieldWavefronts {
     pub fields: Vec<Timed<Result<FieldWavefront, AnalysisError>>>,
 }
 
-/// The wavefront of a field, and the image of a point.
+/// The images of a point at all fields: they take far longer than the wavefronts.
+#[derive(Debug, Clone)]
+pub struct PointImages {
+    /// The wavelength in micrometres.
+    pub um: f64,
+    /// The image of each field, in order, or the reason why it has none.
+    pub fields: Vec<Timed<Result<PointImage, AnalysisError>>>,
+}
+
+/// The wavefront of a field.
 #[derive(Debug, Clone)]
 pub struct FieldWavefront {
     /// Its mean square against the reference sphere.
@@ -26,8 +35,6 @@ pub struct FieldWavefront {
     pub map: SquareGrid<Option<f64>>,
     /// The Zernike coefficients in Noll's order, or the reason why there are none.
     pub zernike: Result<ZernikeSum, AnalysisError>,
-    /// The image of a point, or the reason why there is none.
-    pub image: Result<PointImage, AnalysisError>,
 }
 
 /// The image of a point by diffraction.
@@ -64,39 +71,47 @@ const LOOKED_AT: Accuracy = Accuracy { tolerance: 1e-2, max_rays: 10_000 };
 /// The wavefronts of all fields; `None` if it was interrupted.
 pub(super) fn field_wavefronts(
     model: &RayModel,
-    spots: &[Result<Spot, AnalysisError>],
     tolerance: f64,
     interrupted: &(dyn Fn() -> bool + Sync),
 ) -> Option<FieldWavefronts> {
     let accuracy = Accuracy { tolerance, ..Accuracy::default() };
+    let mut fields = Vec::with_capacity(model.fields.len());
+    for field in &model.fields {
+        if interrupted() {
+            return None;
+        }
+        fields.push(time(|| field_wavefront(model, *field, accuracy)));
+    }
+    (!interrupted()).then(|| FieldWavefronts { um: model.channels[model.primary].um, fields })
+}
+
+/// The images of a point at all fields; `None` if it was interrupted.
+pub(super) fn point_images(
+    model: &RayModel,
+    spots: &[Result<Spot, AnalysisError>],
+    interrupted: &(dyn Fn() -> bool + Sync),
+) -> Option<PointImages> {
     let mut fields = Vec::with_capacity(model.fields.len());
     for (field, spot) in model.fields.iter().zip(spots) {
         if interrupted() {
             return None;
         }
         let half_width = half_width(model, spot);
-        fields.push(time(|| field_wavefront(model, *field, half_width, accuracy, interrupted)));
+        fields.push(time(|| point_image(model, *field, half_width, interrupted)));
     }
-    (!interrupted()).then(|| FieldWavefronts { um: model.channels[model.primary].um, fields })
+    (!interrupted()).then(|| PointImages { um: model.channels[model.primary].um, fields })
 }
 
 fn field_wavefront(
     model: &RayModel,
     field: FieldPoint,
-    half_width: f64,
     accuracy: Accuracy,
-    interrupted: &(dyn Fn() -> bool + Sync),
 ) -> Result<FieldWavefront, AnalysisError> {
     let wavefront = analysis::wavefront(model, field, model.primary, accuracy)?;
     let map = path_map(model, field, model.primary, MAP)?;
     let order = (ZernikeOrder::Noll, TERMS);
     let zernike = zernike(model, field, model.primary, order, accuracy);
-    let image = if interrupted() {
-        Err(AnalysisError::Interrupted)
-    } else {
-        point_image(model, field, half_width, interrupted)
-    };
-    Ok(FieldWavefront { wavefront, map, zernike, image })
+    Ok(FieldWavefront { wavefront, map, zernike })
 }
 
 fn point_image(

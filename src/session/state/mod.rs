@@ -286,6 +286,7 @@ impl Session {
             PanelSetting::Pupils(shown) => settings.pupils = shown,
             PanelSetting::Contrasts(shown) => settings.contrasts = shown,
             PanelSetting::Wavefronts(shown) => settings.wavefronts = shown,
+            PanelSetting::PointImages(shown) => settings.point_images = shown,
             PanelSetting::Fans(shown) => settings.fans = shown,
             PanelSetting::FieldCurves(shown) => settings.field_curves = shown,
             PanelSetting::Footprints(shown) => settings.footprints = shown,

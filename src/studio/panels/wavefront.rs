@@ -11,10 +11,11 @@ use super::widgets::{fixed_plot, plot_curve, swatch};
 use super::{
     Panel, displayed_results, field_name, plain_error, relative_error, show_missing_results,
 };
-use crate::analysis::{AnalysisError, Estimate, SquareGrid, ZernikeOrder, aberration_name};
+use crate::analysis::{Estimate, SquareGrid, ZernikeOrder, aberration_name};
 use crate::lens::Fields;
 use crate::session::{
-    AnalysisResults, FieldWavefront, FieldWavefronts, PointImage, SessionView, Timed,
+    AnalysisResults, Command, FieldWavefront, FieldWavefronts, PanelSetting, PointImage,
+    PointImages, SessionView, Timed,
 };
 use crate::studio::actions::Actions;
 use crate::studio::cached::{ByAddress, Cached};
@@ -43,6 +44,13 @@ enum WavefrontPage {
     Zernike,
 }
 
+impl WavefrontPage {
+    /// True if it shows images of a point, which take far longer than wavefronts.
+    const fn shows_images(self) -> bool {
+        matches!(self, Self::Image | Self::Energy)
+    }
+}
+
 const PAGES: [(WavefrontPage, &str, &str); 4] = [
     (WavefrontPage::Map, "Map", "Path differences over the pupil, in wavelengths"),
     (WavefrontPage::Image, "Point spread", "The image of a point by diffraction"),
@@ -63,15 +71,16 @@ struct PictureStyle {
 }
 
 /// The numbers and the style from which textures are made.
-type TextureKey = (ByAddress<Timed<FieldWavefronts>>, PictureStyle);
+type TextureKey = (ByAddress<AnalysisResults>, PictureStyle);
 
-/// The panel. It shows the last wavefronts, faint, until those of a changed lens are there.
+/// The panel. It shows the last numbers, faint, until those of a changed lens are there.
 #[derive(Default)]
 pub struct WavefrontPanel {
     page: WavefrontPage,
     /// True for intensities on a logarithmic scale.
     is_logarithmic: bool,
-    last: Option<Arc<AnalysisResults>>,
+    /// The last results with wavefronts, and the last ones with images of a point.
+    last: [Option<Arc<AnalysisResults>>; 2],
     textures: Cached<TextureKey, Vec<Option<TextureHandle>>>,
 }
 
@@ -86,31 +95,116 @@ impl Panel for WavefrontPanel {
         "Wavefront"
     }
 
-    fn ui(&mut self, ui: &mut Ui, view: &SessionView, _actions: &mut Actions) {
+    fn ui(&mut self, ui: &mut Ui, view: &SessionView, actions: &mut Actions) {
         let Some((results, numbers)) = displayed_results(view) else {
             return show_missing_results(ui, view);
         };
-        let is_current = numbers.wavefronts.is_some();
-        if is_current {
-            self.last = Some(Arc::clone(results));
-        }
         self.pages(ui);
-        let Some(results) = self.last.clone() else {
+        let images = self.page.shows_images();
+        if view.settings.point_images != images {
+            actions.push(Command::Show(PanelSetting::PointImages(images)));
+        }
+        let is_current =
+            if images { numbers.point_images.is_some() } else { numbers.wavefronts.is_some() };
+        let last = &mut self.last[usize::from(images)];
+        if is_current {
+            *last = Some(Arc::clone(results));
+        }
+        let Some(results) = last.clone() else {
             ui.weak("Computing …");
             return;
         };
-        let Some(waves) = results.analyses.as_ref().ok().and_then(|n| n.wavefronts.as_ref()) else {
-            return;
+        let Ok(numbers) = &results.analyses else { return };
+        let found = match (images, &numbers.wavefronts, &numbers.point_images) {
+            (false, Some(waves), _) => PageNumbers::Waves(waves),
+            (true, _, Some(images)) => PageNumbers::Images(images),
+            _ => return,
         };
-        summary(ui, waves, is_current);
+        found.summary(ui, is_current);
         if !is_current {
             ui.multiply_opacity(FAINT);
         }
         let fields = results.lens.fields_at(results.settings.zoom);
-        match self.page {
-            WavefrontPage::Map | WavefrontPage::Image => self.maps(ui, fields, waves),
-            WavefrontPage::Energy => energies(ui, fields, &waves.value),
-            WavefrontPage::Zernike => coefficients(ui, fields, &waves.value),
+        match (self.page, found) {
+            (WavefrontPage::Energy, PageNumbers::Images(images)) => {
+                energies(ui, fields, &images.value);
+            }
+            (WavefrontPage::Zernike, PageNumbers::Waves(waves)) => {
+                coefficients(ui, fields, &waves.value);
+            }
+            _ => self.maps(ui, fields, &results, found),
+        }
+    }
+}
+
+/// The numbers that a page shows.
+#[derive(Clone, Copy)]
+enum PageNumbers<'a> {
+    Waves(&'a Timed<FieldWavefronts>),
+    Images(&'a Timed<PointImages>),
+}
+
+impl PageNumbers<'_> {
+    /// The number of fields.
+    fn count(self) -> usize {
+        match self {
+            Self::Waves(waves) => waves.value.fields.len(),
+            Self::Images(images) => images.value.fields.len(),
+        }
+    }
+
+    /// The wavelength, the rays and the time; or that the numbers are those of the lens before.
+    fn summary(self, ui: &mut Ui, is_current: bool) {
+        let (um, ms) = match self {
+            Self::Waves(waves) => (waves.value.um, waves.ms),
+            Self::Images(images) => (images.value.um, images.ms),
+        };
+        let rays: usize = (0..self.count()).filter_map(|i| self.rays(i)).sum();
+        let text = if is_current {
+            format!("at {:.0} nm, {rays} rays, {ms:.1} ms", 1e3 * um)
+        } else {
+            "of the lens before; computing …".to_owned()
+        };
+        ui.label(RichText::new(text).small().weak());
+    }
+
+    /// The rays of a field; `None` for one without numbers.
+    fn rays(self, field: usize) -> Option<usize> {
+        match self {
+            Self::Waves(waves) => {
+                Some(waves.value.fields[field].value.as_ref().ok()?.wavefront.rms.rays)
+            }
+            Self::Images(images) => Some(images.value.fields[field].value.as_ref().ok()?.rays),
+        }
+    }
+
+    fn ms(self, field: usize) -> f64 {
+        match self {
+            Self::Waves(waves) => waves.value.fields[field].ms,
+            Self::Images(images) => images.value.fields[field].ms,
+        }
+    }
+
+    /// The lines below the picture of a field, or the reason why there is none.
+    fn lines(self, field: usize) -> Result<Vec<String>, String> {
+        match self {
+            Self::Waves(waves) => waves.value.fields[field].value.as_ref().map(map_lines),
+            Self::Images(images) => images.value.fields[field].value.as_ref().map(image_lines),
+        }
+        .map_err(ToString::to_string)
+    }
+
+    /// The picture of a field; `None` if there is none.
+    fn picture(self, field: usize, style: PictureStyle) -> Option<ColorImage> {
+        match self {
+            Self::Waves(waves) => {
+                let found = waves.value.fields[field].value.as_ref().ok()?;
+                Some(map_picture(found, style))
+            }
+            Self::Images(images) => {
+                let image = images.value.fields[field].value.as_ref().ok()?;
+                Some(image_picture(image, style))
+            }
         }
     }
 }
@@ -134,16 +228,22 @@ impl WavefrontPanel {
     }
 
     /// A picture of each field, as many beside each other as there is room for.
-    fn maps(&mut self, ui: &mut Ui, fields: &Fields, waves: &Arc<Timed<FieldWavefronts>>) {
+    fn maps(
+        &mut self,
+        ui: &mut Ui,
+        fields: &Fields,
+        results: &Arc<AnalysisResults>,
+        found: PageNumbers<'_>,
+    ) {
         let is_dark = ui.visuals().dark_mode;
         let style = PictureStyle { page: self.page, is_logarithmic: self.is_logarithmic, is_dark };
         let context = ui.ctx().clone();
-        let textures = self.textures.get((ByAddress::from(waves), style), |_| {
-            let texture = |(i, field): (usize, &Timed<Result<FieldWavefront, AnalysisError>>)| {
-                let image = picture(field.value.as_ref().ok()?, style)?;
+        let textures = self.textures.get((ByAddress::from(results), style), |_| {
+            let texture = |i: usize| {
+                let image = found.picture(i, style)?;
                 Some(context.load_texture(format!("wavefront {i}"), image, TextureOptions::LINEAR))
             };
-            waves.value.fields.iter().enumerate().map(texture).collect()
+            (0..found.count()).map(texture).collect()
         });
         let count = textures.len().max(1) as f32;
         let room = ui.available_size() - vec2(0.0, WORDS);
@@ -152,49 +252,33 @@ impl WavefrontPanel {
             let from_top = Layout::left_to_right(Align::Min).with_main_wrap(true);
             ui.with_layout(from_top, |ui| {
                 ui.spacing_mut().item_spacing = vec2(GAP, 4.0);
-                for (i, (texture, field)) in textures.iter().zip(&waves.value.fields).enumerate() {
-                    cell(ui, (fields, i), (style.page, field, texture.as_ref()), side);
+                for (i, texture) in textures.iter().enumerate() {
+                    cell(ui, (fields, i), (found, texture.as_ref()), side);
                 }
             });
         });
     }
 }
 
-/// The wavelength, the rays and the time; or that the numbers are those of the lens before.
-fn summary(ui: &mut Ui, waves: &Timed<FieldWavefronts>, is_current: bool) {
-    let text = if is_current {
-        let lit = waves.value.fields.iter().filter_map(|field| field.value.as_ref().ok());
-        let rays: usize = lit
-            .map(|field| {
-                let image = field.image.as_ref().map_or(0, |image| image.rays);
-                field.wavefront.rms.rays + image
-            })
-            .sum();
-        format!("at {:.0} nm, {rays} rays, {:.1} ms", 1e3 * waves.value.um, waves.ms)
-    } else {
-        "of the lens before; computing …".to_owned()
-    };
-    ui.label(RichText::new(text).small().weak());
+/// The path differences of a field as a picture.
+fn map_picture(found: &FieldWavefront, style: PictureStyle) -> ColorImage {
+    let most = largest(&found.map).max(f64::MIN_POSITIVE);
+    raster(&found.map, |value| {
+        let [r, g, b] = colormap::diverging((*value)? / most, style.is_dark);
+        Some(Color32::from_rgb(r, g, b))
+    })
 }
 
-/// The picture of a field; `None` if there is none.
-fn picture(field: &FieldWavefront, style: PictureStyle) -> Option<ColorImage> {
-    if style.page == WavefrontPage::Map {
-        let most = largest(&field.map).max(f64::MIN_POSITIVE);
-        return Some(raster(&field.map, |value| {
-            let [r, g, b] = colormap::diverging((*value)? / most, style.is_dark);
-            Some(Color32::from_rgb(r, g, b))
-        }));
-    }
-    let image = field.image.as_ref().ok()?;
+/// The image of a point as a picture.
+fn image_picture(image: &PointImage, style: PictureStyle) -> ColorImage {
     let peak = image.intensity.values.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
-    Some(raster(&image.intensity, |value| {
+    raster(&image.intensity, |value| {
         let share = value / peak;
         let share =
             if style.is_logarithmic { 1.0 + share.max(0.0).log10() / DECADES } else { share };
         let [r, g, b] = colormap::sequential(share);
         Some(Color32::from_rgb(r, g, b))
-    }))
+    })
 }
 
 /// The largest size of a path difference.
@@ -213,8 +297,7 @@ fn raster<T>(grid: &SquareGrid<T>, color: impl Fn(&T) -> Option<Color32>) -> Col
 }
 
 /// The content of the cell of a field.
-type CellContent<'a> =
-    (WavefrontPage, &'a Timed<Result<FieldWavefront, AnalysisError>>, Option<&'a TextureHandle>);
+type CellContent<'a> = (PageNumbers<'a>, Option<&'a TextureHandle>);
 
 /// A field, its picture and the numbers of it.
 fn cell(ui: &mut Ui, field: (&Fields, usize), content: CellContent<'_>, side: f32) {
@@ -222,33 +305,34 @@ fn cell(ui: &mut Ui, field: (&Fields, usize), content: CellContent<'_>, side: f3
     ui.allocate_ui_with_layout(vec2(side, side + WORDS), from_top, |ui| {
         ui.set_width(side);
         let name = heading(ui, field.0, field.1);
-        cell_content(ui, &name, content, side);
+        cell_content(ui, (&name, field.1), content, side);
     });
 }
 
-fn cell_content(ui: &mut Ui, name: &str, (page, field, texture): CellContent<'_>, side: f32) {
-    let Ok(found) = &field.value else {
-        return refusal(ui, field.value.as_ref().err());
-    };
-    let lines = match (page, &found.image) {
-        (WavefrontPage::Map, _) => map_lines(found),
-        (_, Ok(image)) => image_lines(image),
-        (_, Err(why)) => return refusal(ui, Some(why)),
+fn cell_content(
+    ui: &mut Ui,
+    (name, field): (&str, usize),
+    (found, texture): CellContent<'_>,
+    side: f32,
+) {
+    let lines = match found.lines(field) {
+        Ok(lines) => lines,
+        Err(why) => {
+            ui.label(RichText::new(why).small().color(ui.visuals().warn_fg_color));
+            return;
+        }
     };
     if let Some(texture) = texture {
-        let what = if page == WavefrontPage::Map { "Wavefront" } else { "Point spread" };
+        let is_map = matches!(found, PageNumbers::Waves(_));
+        let what = if is_map { "Wavefront" } else { "Point spread" };
         let words = format!("{what} at {name}: {}", lines.join(", "));
+        let rays = found.rays(field).unwrap_or(0);
         ui.add(Image::new(texture).fit_to_exact_size(vec2(side, side)).alt_text(words))
-            .on_hover_text(format!("{} rays, {:.1} ms", found.wavefront.rms.rays, field.ms));
+            .on_hover_text(format!("{rays} rays, {:.1} ms", found.ms(field)));
     }
     for line in lines {
         ui.label(RichText::new(line).small());
     }
-}
-
-fn refusal(ui: &mut Ui, why: Option<&AnalysisError>) {
-    let why = why.map(ToString::to_string).unwrap_or_default();
-    ui.label(RichText::new(why).small().color(ui.visuals().warn_fg_color));
 }
 
 /// The name of a field with its colour.
@@ -285,14 +369,16 @@ fn image_lines(image: &PointImage) -> Vec<String> {
 }
 
 /// The share of the light within circles, a curve for each field.
-fn energies(ui: &mut Ui, fields: &Fields, waves: &FieldWavefronts) {
+fn energies(ui: &mut Ui, fields: &Fields, found: &PointImages) {
     let palette = Palette::for_visuals(ui.visuals());
     ui.horizontal_wrapped(|ui| {
-        for i in 0..waves.fields.len() {
+        for i in 0..found.fields.len() {
             heading(ui, fields, i);
         }
     });
-    let lit: Vec<(usize, &PointImage)> = images(waves).collect();
+    let lit = found.fields.iter().enumerate();
+    let lit = lit.filter_map(|(i, field)| Some((i, field.value.as_ref().ok()?)));
+    let lit: Vec<(usize, &PointImage)> = lit.collect();
     if lit.is_empty() {
         ui.weak("No field has an image by diffraction.");
         return;
@@ -311,12 +397,6 @@ fn energies(ui: &mut Ui, fields: &Fields, waves: &FieldWavefronts) {
     let errors = lit.iter().flat_map(|(_, image)| image.energy.iter().map(|(_, e)| e.error));
     let error = errors.fold(0.0, f64::max);
     ui.label(RichText::new(plain_error(error, "")).small().weak());
-}
-
-/// The fields that have an image, with their indices.
-fn images(waves: &FieldWavefronts) -> impl Iterator<Item = (usize, &PointImage)> {
-    let fields = waves.fields.iter().enumerate();
-    fields.filter_map(|(i, field)| Some((i, field.value.as_ref().ok()?.image.as_ref().ok()?)))
 }
 
 /// A table of the coefficients, a column for each field.
