@@ -145,8 +145,8 @@ impl<'a> ExactRenderer<'a> {
         Ok(Self { scene, frame, sampler, white })
     }
 
-    /// The same with what the surfaces of the lens reflect and its glasses absorb taken away, for the model and the colours of
-    /// this renderer; one share for each colour where it varies by less than a tolerance.
+    /// The same with what the surfaces of the lens reflect and its glasses absorb taken away, for the model and
+    /// the colours of this renderer; one share for each colour where it varies by less than a tolerance.
     ///
     /// # Errors
     /// A lens with other surfaces than centred refracting ones.

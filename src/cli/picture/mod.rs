@@ -79,7 +79,8 @@ pub(super) struct PictureArgs {
     focus: Option<f64>,
 
     /// The coating of all surfaces between air and glass: none (bare glass), single-layer, v, or a reflected
-    /// share as `0.3%`; with it losses count, of glasses that absorb light too, and ghosts where they matter. Absent: nothing is lost
+    /// share as `0.3%`; with it losses count, of glasses that absorb light too, and ghosts where they matter.
+    /// Absent: nothing is lost
     #[arg(long, value_name = "COATING", value_parser = parse_coating)]
     coating: Option<Coating>,
 

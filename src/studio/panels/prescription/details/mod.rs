@@ -1,5 +1,6 @@
 //! The selected surface beyond the columns of the table: the form of its sag beyond a conic, the
-//! rule by which it deflects light, its apertures, its decentre and tilt, those of its element, and breaks of the axis.
+//! rule by which it deflects light, its apertures, its decentre and tilt, those of its element, and breaks of
+//! the axis.
 
 mod apertures;
 mod forms;
