@@ -52,6 +52,11 @@ pub(super) struct DesignArgs {
     #[arg(long, value_name = "NAME")]
     without: Vec<String>,
 
+    /// The class of care in making for which the lenses are refined at the end, in place of the
+    /// specification's: none, commercial, precision, shop_limit or moulded_plastic
+    #[arg(long, value_name = "GRADE")]
+    as_built: Option<String>,
+
     /// A file in which the run is saved after every round; resumes the run if it exists
     #[arg(long, value_name = "FILE", requires = "out")]
     checkpoint: Option<PathBuf>,
@@ -63,7 +68,8 @@ const DEFAULT_GRADIENTS: u64 = 200_000;
 impl DesignArgs {
     pub(super) fn run(&self, output: &Output) -> Result<(), CliError> {
         self.check()?;
-        let spec: LensSpecification = read_json(&self.spec)?;
+        let mut spec: LensSpecification = read_json(&self.spec)?;
+        spec.as_built = self.as_built.clone().or(spec.as_built);
         let file = display_name(&self.spec);
         let refuse = |error| CliError::Input(format!("{file}: {error}"));
         let (requirements, filled) = LensRequirements::complete(&spec).map_err(refuse)?;
@@ -114,10 +120,8 @@ impl DesignArgs {
         let judged = self.judge.as_deref().map(|path| ("--judge", path));
         let mut paths = OutputPaths::reading(read.into_iter().chain(judged));
         paths.file("--out", self.out.as_deref(), &["json", "zmx"])?;
-        let others = self
-            .out
-            .iter()
-            .flat_map(|out| DesignMerit::ALL.map(|merit| beside(out, report::merit_name(merit))));
+        let others =
+            self.out.iter().flat_map(|out| DesignMerit::ALL.map(|merit| beside(out, merit.name())));
         others.into_iter().try_for_each(|other| paths.take("--out", &other))?;
         paths.file("--checkpoint", self.checkpoint.as_deref(), &["json"])
     }
@@ -184,7 +188,7 @@ fn save_lenses(
     failures: &mut Failures,
 ) -> Vec<Option<String>> {
     let mut save = |(i, lens): (usize, &DesignedLens)| {
-        let path = if i == 0 { out.into() } else { beside(out, report::merit_name(lens.merit)) };
+        let path = if i == 0 { out.into() } else { beside(out, lens.merit.name()) };
         failures.note(files::save(&lens.lens, &path)).map(|_| path.display().to_string())
     };
     let saved = lenses.iter().enumerate().map(&mut save).collect();
@@ -233,8 +237,9 @@ mod tests {
             merit,
             origin: String::new(),
             judgement: judgement.clone(),
+            as_built: None,
             costs: Vec::new(),
-            lens: Lens { name: report::merit_name(merit).to_owned(), ..lens.clone() },
+            lens: Lens { name: merit.name().to_owned(), ..lens.clone() },
         };
         let folder = std::env::temp_dir().join(format!("aplanat-designed-{}", std::process::id()));
         std::fs::create_dir_all(&folder).unwrap();

@@ -1,9 +1,9 @@
 //! The report of `design`: the complete specification, and lenses beside it.
 
 use crate::cli::output::{ShortNumber, TextTable, write_saved};
-use crate::lens::SurfaceNumber;
+use crate::lens::{SurfaceNumber, ToleranceGrade};
 use crate::search::design::{
-    DesignMerit, DesignedLens, FilledValue, LensJudgement, LensRequirements, LimitCost,
+    DesignedAsBuilt, DesignedLens, FilledValue, LensJudgement, LensRequirements, LimitCost,
 };
 use serde::Serialize;
 use std::fmt::{self, Display};
@@ -86,8 +86,9 @@ impl Display for DesignReport {
         writeln!(f, "{} gradients", self.gradients)?;
         for (lens, out) in self.lenses.iter().zip(&self.out) {
             let file = out.as_deref().unwrap_or("not saved");
-            writeln!(f, "\n{}: {file} (from {})", merit_name(lens.merit), lens.origin)?;
+            writeln!(f, "\n{}: {file} (from {})", lens.merit.name(), lens.origin)?;
             write_judgement(f, &lens.judgement)?;
+            write_as_built(f, lens.as_built)?;
             write_costs(f, &lens.costs)?;
             write_saved(f, None, out.is_none().then_some(&lens.lens))?;
         }
@@ -105,11 +106,17 @@ fn write_costs(f: &mut fmt::Formatter<'_>, costs: &[LimitCost]) -> fmt::Result {
     Ok(())
 }
 
-/// The quality in which a lens is best, as in file names.
-pub(super) fn merit_name(merit: DesignMerit) -> &'static str {
-    match merit {
-        DesignMerit::Best => "best",
-        DesignMerit::Simplest => "simplest",
-        DesignMerit::Brightest => "brightest",
-    }
+/// Writes the spots of lenses that are made.
+fn write_as_built(f: &mut fmt::Formatter<'_>, made: Option<DesignedAsBuilt>) -> fmt::Result {
+    let Some(DesignedAsBuilt { grade, nominal, mean, within_90_percent }) = made else {
+        return Ok(());
+    };
+    let [nominal, mean, most] = [nominal, mean, within_90_percent].map(|rms| 1e3 * rms);
+    let named = ToleranceGrade::ALL.iter().find(|(other, _)| *other == grade);
+    let grade = named.map_or(String::new(), |(_, name)| name.to_lowercase());
+    writeln!(
+        f,
+        "as built with {grade} tolerances, refocused: mean {mean:.3} um, 90 % of the lenses at most \
+         {most:.3} um; as designed {nominal:.3} um"
+    )
 }

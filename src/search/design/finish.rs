@@ -1,6 +1,8 @@
-//! The end of a design: rims, beams that get through them, every limit kept, judgement.
+//! The end of a design: rims, beams that get through them, every limit kept, judgement, and the
+//! refinement of the lenses as they are made.
 
 use super::LensRequirements;
+use super::as_built::{DesignedAsBuilt, RefinedLens, most_robust, refined};
 use super::draft::{
     BeamPlan, Freedom, LensDraft, LimitCost, USED_TERMS, descend, limit_costs, traced_beams,
 };
@@ -22,11 +24,23 @@ pub enum DesignMerit {
     Simplest,
     /// The most light.
     Brightest,
+    /// The smallest spots of lenses that are made.
+    Robust,
 }
 
 impl DesignMerit {
     /// All of them.
-    pub const ALL: [Self; 3] = [Self::Best, Self::Simplest, Self::Brightest];
+    pub const ALL: [Self; 4] = [Self::Best, Self::Simplest, Self::Brightest, Self::Robust];
+
+    /// Its name in files and reports.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Best => "best",
+            Self::Simplest => "simplest",
+            Self::Brightest => "brightest",
+            Self::Robust => "robust",
+        }
+    }
 }
 
 /// A designed lens.
@@ -38,7 +52,9 @@ pub struct DesignedLens {
     pub origin: String,
     /// Its judgement.
     pub judgement: LensJudgement,
-    /// The costs of its binding limits.
+    /// Its spots as it is made; `None` if the requirements state no class of care in making.
+    pub as_built: Option<DesignedAsBuilt>,
+    /// The costs of its binding limits; once it is refined as it is made, of the expected spot.
     pub costs: Vec<LimitCost>,
     /// The lens.
     pub lens: Lens,
@@ -62,8 +78,9 @@ const FINISHED: usize = 4;
 /// The additional light of the brightest lens.
 const MORE_LIGHT: f64 = 1.15;
 
-/// The best, the simplest and the brightest lens of some candidates; one lens may be several of
-/// them, and is then listed once. Once `stop` is true, none is improved further.
+/// The best, the simplest and the brightest lens of some candidates, each refined as it is made, and the
+/// most robust one on the way; one lens may be several of them, and is then listed once. Once `stop` is
+/// true, none is improved further.
 pub(super) fn finished_lenses(
     pool: &[Candidate],
     asked: &LensRequirements,
@@ -79,28 +96,44 @@ pub(super) fn finished_lenses(
         .collect();
     all.sort_by(|a, b| rank(&a.1.judgement).total_cmp(&rank(&b.1.judgement)));
     let Some((best_price, best)) = all.first().cloned() else { return Vec::new() };
-    let mut lenses = vec![best];
+    let mut lenses = vec![(best, asked.clone())];
     let valid = |d: &&(f64, DesignedLens)| d.1.judgement.is_valid() && d.0 < best_price;
     let simplest = all.iter().filter(valid).min_by(|a, b| a.0.total_cmp(&b.0));
-    lenses.extend(
-        simplest.map(|(_, lens)| DesignedLens { merit: DesignMerit::Simplest, ..lens.clone() }),
-    );
+    let simplest =
+        simplest.map(|(_, lens)| DesignedLens { merit: DesignMerit::Simplest, ..lens.clone() });
+    lenses.extend(simplest.map(|lens| (lens, asked.clone())));
     if !stop.load(Ordering::Relaxed) {
         lenses.extend(brightest(&buildable, asked, stop));
     }
-    lenses
+    as_they_are_made(&lenses, stop)
 }
 
-/// The best candidate with more light than asked for, if it then keeps every limit.
+/// Lenses that are refined as they are made, each within its requirements, and the most robust one.
+fn as_they_are_made(
+    lenses: &[(DesignedLens, LensRequirements)],
+    stop: &AtomicBool,
+) -> Vec<DesignedLens> {
+    let found: Vec<RefinedLens> =
+        lenses.par_iter().map(|(lens, asked)| refined(lens, asked, stop)).collect();
+    let pairs = lenses.iter().zip(&found);
+    let mut listed: Vec<DesignedLens> =
+        pairs.map(|((lens, _), found)| found.same.as_ref().unwrap_or(lens).clone()).collect();
+    let robust = listed.first().and_then(|best| most_robust(found, best));
+    listed.extend(robust);
+    listed
+}
+
+/// The best candidate with more light than asked for, if it then keeps every limit, and its requirements.
 fn brightest(
     pool: &[&Candidate],
     asked: &LensRequirements,
     stop: &AtomicBool,
-) -> Option<DesignedLens> {
+) -> Option<(DesignedLens, LensRequirements)> {
     let clear_area = asked.clear_area.iter().map(|area| MORE_LIGHT * area).collect();
     let bright = LensRequirements { clear_area, ..asked.clone() };
     let lens = finish(pool.first()?, &bright, stop)?;
-    lens.judgement.is_valid().then_some(DesignedLens { merit: DesignMerit::Brightest, ..lens })
+    let is_valid = lens.judgement.is_valid();
+    is_valid.then_some((DesignedLens { merit: DesignMerit::Brightest, ..lens }, bright))
 }
 
 /// A number that orders judgements: valid lenses by their spots, then the others.
@@ -147,7 +180,8 @@ fn finish(
     }
     let (judgement, lens, costs) = best?;
     let origin = candidate.origin.clone();
-    Some(DesignedLens { merit: DesignMerit::Best, origin, judgement, costs, lens })
+    let as_built = asked.as_built.and_then(|grade| DesignedAsBuilt::new(&lens, grade).ok());
+    Some(DesignedLens { merit: DesignMerit::Best, origin, judgement, as_built, costs, lens })
 }
 
 /// Requirements that are tighter than what is asked for where a lens has broken them.

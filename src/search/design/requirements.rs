@@ -1,7 +1,8 @@
 //! A complete specification: what was written and, for everything else, the usual.
 
 use super::refusal::check;
-use super::{GlassList, LensSpecification, SpecificationError};
+use super::{AS_BUILT_GRADES, GlassList, LensSpecification, SpecificationError};
+use crate::lens::ToleranceGrade;
 use crate::lens::glass::{self, line};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
@@ -42,6 +43,15 @@ pub struct LensRequirements {
     pub glass_edge: f64,
     /// The smallest air space on the axis, in mm.
     pub air_center: f64,
+    /// The class of care in making for which the lenses are refined at the end; `None` for none.
+    #[serde(default = "usual_grade")]
+    pub as_built: Option<ToleranceGrade>,
+}
+
+/// The usual class of care in making.
+#[expect(clippy::unnecessary_wraps, reason = "the value of a key that may be none")]
+fn usual_grade() -> Option<ToleranceGrade> {
+    Some(ToleranceGrade::Precision)
 }
 
 /// The permitted glasses.
@@ -226,6 +236,7 @@ impl Filling {
         let (elements, aspheric_surfaces) = self.element_counts(spec, f_number, half);
         let (relative_illumination, clear_area) = self.light(spec, f_number, &fields);
         let [glass_center, glass_edge, air_center] = self.thinnest_gaps(spec);
+        let as_built = self.as_built(spec, glasses.plastics.is_some())?;
         let track = spec.max_track_mm.as_ref();
         let distortion = if half > 30.0 { 0.04 } else { 0.02 };
         let semi_diameter = usual_semi_diameter(f, f_number, half);
@@ -254,6 +265,7 @@ impl Filling {
             glass_center,
             glass_edge,
             air_center,
+            as_built,
             wavelengths,
             fields,
         })
@@ -298,6 +310,25 @@ impl Filling {
             self.or("min_edge_mm", edge, 0.8 * thin, "no chips"),
             self.or("min_air_mm", spec.min_air_mm.as_ref(), 0.05, "no contact"),
         ]
+    }
+
+    /// The class of care in making; moulded plastic where plastics are permitted.
+    fn as_built(
+        &mut self,
+        spec: &LensSpecification,
+        plastics: bool,
+    ) -> Result<Option<ToleranceGrade>, SpecificationError> {
+        let (usual, reason) = if plastics {
+            ("moulded_plastic", "plastics are moulded")
+        } else {
+            ("precision", "what a good shop keeps without a surcharge")
+        };
+        let key = self.or("as_built", spec.as_built.as_ref(), usual.to_owned(), reason);
+        let found = AS_BUILT_GRADES.iter().find(|(name, _)| *name == key);
+        found.map(|(_, grade)| *grade).ok_or_else(|| {
+            let expected = "none, commercial, precision, shop_limit or moulded_plastic";
+            SpecificationError::invalid("as_built", format!("`{key}`"), expected)
+        })
     }
 
     /// The wavelengths in um with their weights.

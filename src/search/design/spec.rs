@@ -1,6 +1,7 @@
 //! The specification of a lens as a customer writes it: everything but focal length, aperture and
 //! field may be missing.
 
+use crate::lens::ToleranceGrade;
 use serde::{Deserialize, Serialize};
 
 /// The specification of a lens for an object at infinity. Missing keys are filled by
@@ -70,7 +71,21 @@ pub struct LensSpecification {
     /// The smallest air space on the axis, in mm; surfaces may touch at their rims.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub min_air_mm: Option<f64>,
+    /// The class of care in making for which the lenses are refined at the end, one of
+    /// [`AS_BUILT_GRADES`].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub as_built: Option<String>,
 }
+
+/// The classes of care in making by their keys, each with its grade; `none` for lenses that are not
+/// refined as they are made.
+pub const AS_BUILT_GRADES: [(&str, Option<ToleranceGrade>); 5] = [
+    ("none", None),
+    ("commercial", Some(ToleranceGrade::Commercial)),
+    ("precision", Some(ToleranceGrade::Precision)),
+    ("shop_limit", Some(ToleranceGrade::ShopLimit)),
+    ("moulded_plastic", Some(ToleranceGrade::MouldedPlastic)),
+];
 
 /// The permitted glasses: in words, or by name.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

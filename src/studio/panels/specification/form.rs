@@ -5,7 +5,8 @@ use egui::{Context, DragValue, Grid, Id, TextEdit, Ui};
 use super::text::{filled_text, other_filled};
 use crate::lens::WavelengthPreset;
 use crate::search::design::{
-    DesignSettings, FilledValue, GlassList, LensRequirements, LensSpecification, SpecificationError,
+    AS_BUILT_GRADES, DesignSettings, FilledValue, GlassList, LensRequirements, LensSpecification,
+    SpecificationError,
 };
 use crate::session::SpecificationRequest;
 use crate::studio::form::{choice, number_field};
@@ -128,6 +129,8 @@ pub(super) struct SpecificationForm {
     counts: [Optional<usize>; 2],
     /// Names of glasses, separated by commas; empty for any.
     glasses: String,
+    /// The index of a class of care in making; `None` for the usual one.
+    as_built: Option<usize>,
     minutes: f64,
     seed: u64,
 }
@@ -144,6 +147,7 @@ impl Default for SpecificationForm {
             numbers: NUMBER_ROWS.map(|row| Optional::open(row.value)),
             counts: [Optional::open(4), Optional::open(0)],
             glasses: String::new(),
+            as_built: None,
             minutes: 5.0,
             seed: 1,
         }
@@ -191,6 +195,7 @@ impl SpecificationForm {
             max_elements: self.counts[0].stated(),
             max_aspheric_surfaces: self.counts[1].stated(),
             glasses: self.glass_list(),
+            as_built: self.as_built.map(|i| AS_BUILT_GRADES[i].0.to_owned()),
             ..self.with_wavelengths()
         };
         let light = number(ILLUMINATION).map(|least| vec![least; field_count(&spec)]);
@@ -228,6 +233,7 @@ impl SpecificationForm {
                 count_row(ui, *row, entry, filled);
             }
             self.glass_row(ui);
+            self.as_built_row(ui);
             self.run_rows(ui);
         });
         let others =
@@ -296,6 +302,22 @@ impl SpecificationForm {
             .desired_width(220.0);
         let hint = "Names, separated by commas: SCHOTT N-BK7, SCHOTT N-SF5";
         ui.add(line).on_hover_text(hint).accessible_name("Glasses of the specification");
+        ui.end_row();
+    }
+
+    fn as_built_row(&mut self, ui: &mut Ui) {
+        ui.label("As built").on_hover_text(
+            "The care in making for which the lenses are refined at the end, within all limits",
+        );
+        let grades = AS_BUILT_GRADES.iter().enumerate().map(|(i, (key, _))| {
+            let words =
+                if *key == "none" { "as designed alone".to_owned() } else { key.replace('_', " ") };
+            (Some(i), words)
+        });
+        let all: Vec<(Option<usize>, String)> =
+            std::iter::once((None, "not stated: precision".to_owned())).chain(grades).collect();
+        let all: Vec<(Option<usize>, &str)> = all.iter().map(|(i, text)| (*i, &**text)).collect();
+        choice(ui, "Care in making of the specification", &mut self.as_built, &all);
         ui.end_row();
     }
 

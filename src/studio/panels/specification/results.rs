@@ -81,6 +81,14 @@ fn show_lens(
             ui.label(value);
         });
     }
+    if let Some(made) = &found.designed.as_built {
+        for (name, value) in text::as_built_facts(made) {
+            ui.horizontal_wrapped(|ui| {
+                ui.weak(name).on_hover_text(AS_BUILT);
+                ui.label(value);
+            });
+        }
+    }
     show_limits(ui, judgement);
     show_costs(ui, found);
     ui.horizontal(|ui| {
@@ -123,5 +131,8 @@ fn show_costs(ui: &mut Ui, found: &OfferedLens) {
         ui.weak(format!("and {} more", costs.len() - COSTS)).on_hover_text(texts.join("\n"));
     }
 }
+
+const AS_BUILT: &str = "RMS spot radius over the fields of lenses with the errors of making that the \
+    specification states, each refocused: the expectation, and what nine in ten do not exceed.";
 
 const COST: &str = "The decrease of the RMS over the fields by a bound looser by 1 mm.";

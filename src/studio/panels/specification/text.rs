@@ -2,7 +2,8 @@
 
 use crate::lens::SurfaceNumber;
 use crate::search::design::{
-    DesignMerit, DesignStage, FilledValue, LensJudgement, LensRequirements, LimitCost,
+    DesignMerit, DesignStage, DesignedAsBuilt, FilledValue, LensJudgement, LensRequirements,
+    LimitCost,
 };
 use crate::session::SpecifiedDesign;
 use crate::studio::number::format_digits;
@@ -55,7 +56,7 @@ pub(super) fn summary_text(asked: &LensRequirements) -> String {
 /// The stage of a design.
 pub(super) fn stage_text(design: &SpecifiedDesign) -> &'static str {
     if design.is_finishing {
-        return "Rims, limits, focus";
+        return "Rims, limits, focus, errors of making";
     }
     match design.stage {
         DesignStage::Starts => "Leading starts to the full aperture and field",
@@ -91,6 +92,7 @@ pub(super) const fn merit_title(merit: DesignMerit) -> &'static str {
         DesignMerit::Best => "Best",
         DesignMerit::Simplest => "Simplest",
         DesignMerit::Brightest => "Brightest",
+        DesignMerit::Robust => "Most robust",
     }
 }
 
@@ -109,6 +111,15 @@ pub(super) fn facts(judgement: &LensJudgement, length: f64) -> Vec<(&'static str
         ("Light", format!("{} to {} mm²", light[0], light[1])),
         ("Elements", format!("{}{aspheres}", judgement.elements)),
         ("Length", format!("{} mm", format_digits(length, 4))),
+    ]
+}
+
+/// The spots of a lens as it is made, each with its name.
+pub(super) fn as_built_facts(made: &DesignedAsBuilt) -> [(&'static str, String); 2] {
+    let micrometres = |rms: f64| format!("{} µm", format_digits(1e3 * rms, 4));
+    [
+        ("As built, mean", micrometres(made.mean)),
+        ("As built, 90 % within", micrometres(made.within_90_percent)),
     ]
 }
 
