@@ -4,7 +4,7 @@ use super::error::CliError;
 use super::output::{Output, ShortNumber, TextTable};
 use super::output_paths::OutputPaths;
 use crate::files::{self, AgfCatalogue, AgfExport, GlassQuery};
-use crate::lens::glass::{self, Glass, GlassProperties, GlassStatus};
+use crate::lens::glass::{self, Glass, GlassProperties, GlassStatus, PriceSource};
 use serde::Serialize;
 use std::fmt;
 use std::path::PathBuf;
@@ -88,7 +88,9 @@ impl GlassArgs {
             let export = files::write_agf(meant, path)?;
             return output.print(&WrittenCatalogue { file: path.display().to_string(), export });
         }
-        output.print(&GlassList(meant.into_iter().map(GlassRow::new).collect()))
+        let named = glass::find(&self.words.join(" ")).filter(|glass| meant.contains(glass));
+        let twins = named.map(|glass| (glass, glass.twins()));
+        output.print(&GlassList { rows: meant.into_iter().map(GlassRow::new).collect(), twins })
     }
 }
 
@@ -178,7 +180,9 @@ struct GlassRow {
     #[serde(rename = "density_g_cm3")]
     density: Option<f64>,
     status: Option<GlassStatus>,
-    relative_cost: Option<f64>,
+    relative_cost: f64,
+    /// The origin of that: the maker, a person's list, or the class of the glass.
+    cost_source: PriceSource,
     /// The linear expansion in 1e-6/K.
     expansion: Option<f64>,
     /// The change of the index relative to air at the d line and 20 °C, in 1e-6/K.
@@ -187,12 +191,15 @@ struct GlassRow {
     /// The internal transmission of 10 mm at 420 nm.
     transmission_420_nm: Option<f64>,
     marked_lead_free: bool,
+    /// The other names of the same glass, of other makers too.
+    twins: Vec<String>,
 }
 
 impl GlassRow {
     fn new(glass: &'static Glass) -> Self {
         let none = GlassProperties::default();
         let known = glass.properties().unwrap_or(&none);
+        let price = glass.price();
         Self {
             maker: &glass.manufacturer,
             name: &glass.name,
@@ -202,19 +209,34 @@ impl GlassRow {
             range_um: glass.range_um,
             density: glass.density,
             status: known.status,
-            relative_cost: known.relative_cost,
+            relative_cost: price.relative,
+            cost_source: price.source,
             expansion: known.expansion,
             index_slope: known.thermal.map(|thermal| 1e6 * thermal.slope_at_d(glass.nd)),
             transmission_420_nm: known.internal_transmission(0.42, 10.0),
             marked_lead_free: glass.is_marked_lead_free(),
+            twins: glass.twins().into_iter().map(Glass::full_name).collect(),
         }
+    }
+}
+
+impl GlassRow {
+    /// The price, marked where it is that of a class.
+    fn price_text(&self) -> String {
+        let mark = if self.cost_source == PriceSource::Estimated { "~" } else { "" };
+        format!("{mark}{}", ShortNumber(self.relative_cost))
     }
 }
 
 /// Glasses, one line each.
 #[derive(Serialize)]
 #[serde(transparent)]
-struct GlassList(Vec<GlassRow>);
+struct GlassList {
+    rows: Vec<GlassRow>,
+    /// The glass that was named, with its twins.
+    #[serde(skip)]
+    twins: Option<(&'static Glass, Vec<&'static Glass>)>,
+}
 
 impl fmt::Display for GlassList {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -225,7 +247,7 @@ impl fmt::Display for GlassList {
         let mut table = TextTable::new(&head).left(&[1, 7]);
         let dash = || "-".to_owned();
         let short = |value: Option<f64>| value.map_or_else(dash, |v| ShortNumber(v).to_string());
-        for glass in &self.0 {
+        for glass in &self.rows {
             let [low, high] = glass.range_um.map(ShortNumber);
             table.row([
                 glass.maker.to_owned(),
@@ -236,15 +258,42 @@ impl fmt::Display for GlassList {
                 format!("{low}..{high}"),
                 glass.density.map_or_else(dash, |value| format!("{value:.2}")),
                 glass.status.map_or_else(dash, |status| status.to_string()),
-                short(glass.relative_cost),
+                glass.price_text(),
                 short(glass.expansion),
                 glass.index_slope.map_or_else(dash, |slope| format!("{slope:.2}")),
                 glass.transmission_420_nm.map_or_else(dash, |share| format!("{share:.3}")),
             ]);
         }
         write!(f, "{table}")?;
-        writeln!(f, "{}", counted_glasses(self.0.len()))
+        writeln!(f, "{}", counted_glasses(self.rows.len()))?;
+        if self.rows.iter().any(|glass| glass.cost_source == PriceSource::Estimated) {
+            writeln!(f, "~: a class, estimated from the family of the glass")?;
+        }
+        self.twins.as_ref().map_or(Ok(()), |(glass, twins)| write_twins(f, glass, twins))
     }
+}
+
+/// Writes the twins of a glass with their distances from it.
+fn write_twins(f: &mut fmt::Formatter<'_>, named: &Glass, twins: &[&'static Glass]) -> fmt::Result {
+    if twins.is_empty() {
+        return writeln!(f, "\nno other glass is a twin of {}", named.full_name());
+    }
+    writeln!(f, "\ntwins of {}, as differences from it", named.full_name())?;
+    let mut table = TextTable::new(&["glass", "nd", "vd", "PgF", "price", "status"]).left(&[0, 5]);
+    let dash = || "-".to_owned();
+    for glass in twins {
+        let partial = glass.partial_dispersion().zip(named.partial_dispersion());
+        let row = GlassRow::new(glass);
+        table.row([
+            glass.full_name(),
+            format!("{:+.5}", glass.nd - named.nd),
+            format!("{:+.2}", glass.vd - named.vd),
+            partial.map_or_else(dash, |(a, b)| format!("{:+.4}", a - b)),
+            row.price_text(),
+            row.status.map_or_else(dash, |status| status.to_string()),
+        ]);
+    }
+    write!(f, "{table}")
 }
 
 fn counted_glasses(count: usize) -> String {

@@ -16,7 +16,7 @@ enum GlassCondition {
     Word(String),
     Index(RangeInclusive<f64>),
     Abbe(RangeInclusive<f64>),
-    /// The price relative to that of N-BK7; a glass without a known price does not match.
+    /// The price relative to that of N-BK7, of its class where none is stated.
     Price(RangeInclusive<f64>),
     /// The density in g/cm³.
     Density(RangeInclusive<f64>),
@@ -83,10 +83,7 @@ impl GlassCondition {
             Self::Index(range) => range.contains(&glass.nd),
             Self::Abbe(range) => range.contains(&glass.vd),
             Self::Density(range) => glass.density.is_some_and(|density| range.contains(&density)),
-            Self::Price(range) => {
-                let price = glass.properties().and_then(|known| known.relative_cost);
-                price.is_some_and(|price| range.contains(&price))
-            }
+            Self::Price(range) => range.contains(&glass.price().relative),
             Self::Status(status) => {
                 glass.properties().and_then(|known| known.status) == Some(*status)
             }

@@ -15,6 +15,7 @@ mod error;
 mod first_order_beam;
 mod folder;
 mod foreign_lens;
+mod glass_prices;
 mod glass_query;
 mod identity;
 mod image_file;

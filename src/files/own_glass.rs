@@ -1,10 +1,11 @@
 //! The glass catalogues that a person has added: files `.agf` in a folder of the settings, and folders of
-//! materials `.yml`, one for each maker.
+//! materials `.yml`, one for each maker. A list of prices lies beside them.
 
 use super::agf::{AgfCatalogue, parse_agf, read_agf, write_agf};
 use super::atomic::write_atomic;
 use super::bounded::{MAX_LENS_BYTES, read_file};
 use super::error::FileError;
+use super::glass_prices::read_prices;
 use super::yaml_glass::{
     is_material, maker_of_folder, material_files, parse_material, read_materials,
 };
@@ -18,6 +19,8 @@ use std::sync::Once;
 
 /// The variable of the environment that names another folder.
 const FOLDER_VARIABLE: &str = "APLANAT_GLASSES";
+/// The list of prices.
+const PRICES: &str = "prices.csv";
 /// The catalogue of melts, which stands for their maker.
 const MELTS: &str = "MELT";
 /// The largest catalogue, in bytes.
@@ -42,8 +45,8 @@ pub fn own_catalogues() -> Vec<PathBuf> {
     paths
 }
 
-/// Makes the glasses of all catalogues that a person has added known, when it is called first; returns the
-/// errors of those that cannot be read.
+/// Makes the glasses of all catalogues that a person has added known, and the prices of the person's list,
+/// when it is called first; returns the errors of those that cannot be read.
 pub fn load_own_glasses() -> Vec<FileError> {
     static ONCE: Once = Once::new();
     let mut errors = Vec::new();
@@ -53,6 +56,10 @@ pub fn load_own_glasses() -> Vec<FileError> {
                 Ok(catalogue) => add_glasses(&catalogue),
                 Err(error) => errors.push(error),
             }
+        }
+        match glass_folder().map_or(Ok(None), |folder| read_prices(&folder.join(PRICES))) {
+            Ok(prices) => prices.into_iter().for_each(glass::set_prices),
+            Err(error) => errors.push(error),
         }
     });
     errors

@@ -8,12 +8,14 @@
 mod added;
 mod dispersion;
 mod melt;
+mod price;
 mod properties;
 mod thermal;
 
 pub use added::{add, added_glasses, additions};
 pub use dispersion::DispersionFormula;
 pub use melt::MeltError;
+pub use price::{GlassPrice, PriceSource, set_prices};
 pub use properties::{GlassProperties, GlassStatus};
 pub use thermal::{THERMAL_RANGE, ThermalDispersion};
 
@@ -111,6 +113,18 @@ impl Glass {
     /// True if another glass has nearly the same index and Abbe number: another maker's name for it.
     pub fn is_twin_of(&self, other: &Self) -> bool {
         (self.nd - other.nd).abs() < TWIN[0] && (self.vd - other.vd).abs() < TWIN[1]
+    }
+
+    /// The names of other makers for this glass, and its own others, in the order of [`known`].
+    pub fn twins(&self) -> Vec<&'static Self> {
+        let own = normalize(&self.full_name());
+        let is_other = |glass: &&'static Self| normalize(&glass.full_name()) != own;
+        let mut twins: Vec<_> = known().filter(|glass| self.is_twin_of(glass)).collect();
+        twins.retain(is_other);
+        // A catalogue that was added may name glasses of the program once more.
+        let mut names = std::collections::HashSet::new();
+        twins.retain(|glass| names.insert(normalize(&glass.full_name())));
+        twins
     }
 
     /// The manufacturer and the name, as in lens files.

@@ -4,7 +4,7 @@ use std::cmp::Ordering;
 
 use crate::files::GlassQuery;
 use crate::lens::Medium;
-use crate::lens::glass::{self, Glass, GlassProperties};
+use crate::lens::glass::{self, Glass, GlassPrice, GlassProperties, PriceSource};
 
 /// A glass of the table.
 #[derive(Debug, Clone, Copy)]
@@ -13,6 +13,7 @@ pub(super) struct ListedGlass {
     /// The partial dispersion `PgF`.
     pub(super) partial: Option<f64>,
     properties: Option<&'static GlassProperties>,
+    price: GlassPrice,
 }
 
 /// False for a glass that is not known at the lines of the Abbe number, as those for the infrared.
@@ -22,7 +23,8 @@ fn has_abbe_number(glass: &Glass) -> bool {
 
 impl ListedGlass {
     pub(super) fn new(glass: &'static Glass) -> Self {
-        Self { glass, partial: glass.partial_dispersion(), properties: glass.properties() }
+        let (partial, properties) = (glass.partial_dispersion(), glass.properties());
+        Self { glass, partial, properties, price: glass.price() }
     }
 
     pub(super) fn numbers(self) -> GlassNumbers {
@@ -39,7 +41,7 @@ impl ListedGlass {
             GlassColumn::Abbe => has_abbe_number(glass).then_some(CellValue::Number(glass.vd)),
             GlassColumn::Partial => self.partial.map(CellValue::Number),
             GlassColumn::Density => glass.density.map(CellValue::Number),
-            GlassColumn::Price => self.properties?.relative_cost.map(CellValue::Number),
+            GlassColumn::Price => Some(CellValue::Number(self.price.relative)),
             GlassColumn::Status => {
                 self.properties?.status.map(|status| CellValue::Word(status.name()))
             }
@@ -54,6 +56,11 @@ impl ListedGlass {
         match self.value(column, None) {
             None => "–".to_owned(),
             Some(CellValue::Word(word)) => word.to_owned(),
+            Some(CellValue::Number(number))
+                if column == GlassColumn::Price && self.price.source == PriceSource::Estimated =>
+            {
+                format!("~{number}")
+            }
             Some(CellValue::Number(number)) => format!("{number:.*}", column.decimals()),
         }
     }
@@ -78,8 +85,10 @@ impl ListedGlass {
         let passed = known
             .and_then(|known| known.internal_transmission(0.42, 10.0))
             .map(|share| format!("passes {:.1} % at 420 nm through 10 mm", 100.0 * share));
+        let twins: Vec<String> = self.glass.twins().iter().map(|twin| twin.full_name()).collect();
+        let twins = (!twins.is_empty()).then(|| format!("the same glass: {}", twins.join(", ")));
         let lines = [self.glass.full_name(), numbers, words.join(", ")];
-        let more = [expansion, slope, passed].into_iter().flatten();
+        let more = [expansion, slope, passed, twins].into_iter().flatten();
         lines.into_iter().chain(more).collect::<Vec<_>>().join("\n")
     }
 }
@@ -171,7 +180,8 @@ impl GlassColumn {
             }
             Self::Density => "Density",
             Self::Price => {
-                "Price relative to that of N-BK7, where a catalogue that was added states it"
+                "Price relative to that of N-BK7, of a catalogue that was added or of the list prices.csv \
+                 beside it; ~ marks a class, estimated from the family of the glass"
             }
             Self::Status => "Whether it is still made, where a catalogue that was added states it",
             Self::Distance => "0.001 in nd counts as much as 0.5 in vd",
