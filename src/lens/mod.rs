@@ -38,6 +38,7 @@ mod surface_number;
 mod system;
 mod thermal;
 mod tolerance;
+mod tolerance_units;
 mod variables;
 mod zoom;
 
@@ -75,6 +76,10 @@ pub use surface_number::{MediumPlace, SurfaceNumber};
 pub use system::{Shape, Surface, System, SystemError};
 pub use thermal::TemperatureChange;
 pub use tolerance::{ErrorDistribution, Tolerance, ToleranceGrade, ToleranceSheet};
+pub use tolerance_units::{
+    StatedTolerances, TEST_WAVELENGTH, conic_of_sag, curvature_of_fringes, fourth_of_sag,
+    fringes_of_curvature,
+};
 pub use variables::{ParameterKind, add_variable, add_variables, at_zoom};
 pub use zoom::{ZoomNumber, ZoomPosition};
 

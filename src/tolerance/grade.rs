@@ -6,14 +6,11 @@
 
 use super::NominalLens;
 use crate::lens::{
-    ErrorDistribution, Lens, Perturbation, PerturbationKind, Tolerance, ToleranceGrade,
-    ToleranceSheet,
+    ErrorDistribution, Lens, Perturbation, PerturbationKind, Quantity, Shape, TEST_WAVELENGTH,
+    Tolerance, ToleranceGrade, ToleranceSheet, conic_of_sag, curvature_of_fringes, fourth_of_sag,
 };
 use serde::Serialize;
 use std::collections::BTreeMap;
-
-/// The wavelength of the test plates, in mm.
-const TEST_WAVELENGTH: f64 = 0.000_632_8;
 
 /// The half ranges of a class.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -34,35 +31,49 @@ struct GradeNumbers {
     decenter: f64,
     /// Tilt of an element, in minutes of arc.
     tilt: f64,
+    /// The change of the sag of an aspheric surface at its rim, in mm.
+    sag: f64,
+    /// Decentre of an aspheric surface, in mm; of every surface of a moulded element.
+    surface_decenter: f64,
 }
 
 /// The half ranges of a class.
 fn grade_numbers(grade: ToleranceGrade) -> GradeNumbers {
     let of =
         |[fringes, irregularity, thickness, index, abbe, surface_tilt, decenter, tilt]: [f64;
-             8]| {
-            GradeNumbers {
-                fringes,
-                irregularity,
-                thickness,
-                index,
-                abbe,
-                surface_tilt,
-                decenter,
-                tilt,
-            }
+             8],
+         [sag, surface_decenter]: [f64; 2]| GradeNumbers {
+            fringes,
+            irregularity,
+            thickness,
+            index,
+            abbe,
+            surface_tilt,
+            decenter,
+            tilt,
+            sag,
+            surface_decenter,
         };
     match grade {
-        ToleranceGrade::Commercial => of([5.0, 1.0, 0.1, 1e-3, 0.008, 3.0, 0.1, 3.0]),
-        ToleranceGrade::Precision => of([3.0, 0.5, 0.05, 5e-4, 0.005, 1.0, 0.02, 1.0]),
-        ToleranceGrade::ShopLimit => of([1.0, 0.05, 0.02, 2e-4, 0.002, 0.25, 0.01, 0.25]),
-        ToleranceGrade::MouldedPlastic => of([2.0, 1.0, 0.005, 5e-4, 0.005, 1.0, 0.003, 2.0]),
+        ToleranceGrade::Commercial => of([5.0, 1.0, 0.1, 1e-3, 0.008, 3.0, 0.1, 3.0], [1e-3, 0.05]),
+        ToleranceGrade::Precision => {
+            of([3.0, 0.5, 0.05, 5e-4, 0.005, 1.0, 0.02, 1.0], [3e-4, 0.01])
+        }
+        ToleranceGrade::ShopLimit => {
+            of([1.0, 0.05, 0.02, 2e-4, 0.002, 0.25, 0.01, 0.25], [5e-5, 0.002])
+        }
+        ToleranceGrade::MouldedPlastic => {
+            of([2.0, 1.0, 0.005, 5e-4, 0.005, 1.0, 0.003, 2.0], [3e-4, 0.003])
+        }
     }
 }
 
-/// The tolerances of a class for every surface, gap and element of a lens.
+/// The tolerances of a class for every surface, gap and element of a lens, for the form and the axis of
+/// aspheric surfaces, and for the groups of several elements that move in a zoom lens.
 pub fn graded_sheet(lens: &Lens, nominal: &NominalLens, grade: ToleranceGrade) -> ToleranceSheet {
-    let mut sheet = GradedSheet { nominal, numbers: grade_numbers(grade), errors: Vec::new() };
+    let numbers = grade_numbers(grade);
+    let is_moulded = grade == ToleranceGrade::MouldedPlastic;
+    let mut sheet = GradedSheet { nominal, numbers, is_moulded, errors: Vec::new() };
     for surface in 0..lens.surfaces.len() {
         sheet.add_surface(surface);
     }
@@ -76,7 +87,38 @@ pub fn graded_sheet(lens: &Lens, nominal: &NominalLens, grade: ToleranceGrade) -
             _ => first += 1,
         }
     }
+    for (first, last) in moving_groups(lens) {
+        sheet.add_body(first, last);
+    }
     ToleranceSheet::of_errors(sheet.errors)
+}
+
+/// The first and the last surface of every group of several elements that moves as one between gaps that
+/// differ from one zoom position to another.
+fn moving_groups(lens: &Lens) -> Vec<(usize, usize)> {
+    let inner = lens.surfaces.len().saturating_sub(1);
+    let differs = |gap: &usize| {
+        lens.zoom.iter().any(|position| position.number(*gap, Quantity::Thickness).is_some())
+    };
+    let moving: Vec<usize> = (0..inner).filter(differs).collect();
+    if moving.is_empty() {
+        return Vec::new();
+    }
+    let mut groups = Vec::new();
+    let mut start = 0;
+    for end in moving.into_iter().chain([inner]) {
+        let elements: Vec<(usize, usize)> = (start..=end)
+            .filter_map(|surface| lens.element_around(surface))
+            .filter(|(first, last)| *first >= start && *last <= end)
+            .collect();
+        if let (Some(first), Some(last)) = (elements.first(), elements.last())
+            && first != last
+        {
+            groups.push((first.0, last.1));
+        }
+        start = end + 1;
+    }
+    groups
 }
 
 /// The price of a tolerance: the loosest class of care that keeps it.
@@ -164,6 +206,8 @@ pub fn bounded_tolerances(
 struct GradedSheet<'a> {
     nominal: &'a NominalLens,
     numbers: GradeNumbers,
+    /// True if a mould shapes each surface by itself.
+    is_moulded: bool,
     errors: Vec<Tolerance>,
 }
 
@@ -185,7 +229,7 @@ impl GradedSheet<'_> {
         let (alone, glass) = ((i, i), own.index != 1.0 && !own.mirror);
         let last = i + 2 >= system.surfaces.len();
         if refracts && radius > 0.0 {
-            let curvature = numbers.fringes * TEST_WAVELENGTH / (radius * radius);
+            let curvature = curvature_of_fringes(numbers.fringes, radius);
             self.add(PerturbationKind::Curvature, alone, curvature);
             if !touches_grin {
                 let depth = numbers.irregularity * 0.5 * TEST_WAVELENGTH;
@@ -193,6 +237,7 @@ impl GradedSheet<'_> {
                 let angle = (numbers.surface_tilt / 60.0).to_radians();
                 self.add(PerturbationKind::SurfaceTiltX, alone, angle);
                 self.add(PerturbationKind::SurfaceTiltY, alone, angle);
+                self.add_asphere(i, radius);
             }
         }
         if !last {
@@ -204,7 +249,34 @@ impl GradedSheet<'_> {
         }
     }
 
+    /// The tolerances of an aspheric surface: of its form, and of its own axis. The axes of moulded surfaces
+    /// are apart whatever their forms.
+    fn add_asphere(&mut self, i: usize, radius: f64) {
+        let system = &self.nominal.systems[self.nominal.primary];
+        let (numbers, shape, alone) = (self.numbers, &system.surfaces[i].shape, (i, i));
+        let form = match shape {
+            Shape::Plane | Shape::Sphere { .. } => None,
+            Shape::Conic { curvature, .. } => conic_of_sag(numbers.sag, *curvature, radius)
+                .map(|conic| (PerturbationKind::Conic, conic)),
+            Shape::Asphere { .. } => {
+                Some((PerturbationKind::Asphere, fourth_of_sag(numbers.sag, radius)))
+            }
+        };
+        if let Some((kind, half_range)) = form {
+            self.add(kind, alone, half_range);
+        }
+        if form.is_some() || self.is_moulded {
+            self.add(PerturbationKind::SurfaceDecenterX, alone, numbers.surface_decenter);
+            self.add(PerturbationKind::SurfaceDecenterY, alone, numbers.surface_decenter);
+        }
+    }
+
     fn add_element(&mut self, first: usize, last: usize) {
+        self.add_body(first, last);
+    }
+
+    /// The tolerances of the place of an element or a group.
+    fn add_body(&mut self, first: usize, last: usize) {
         let system = &self.nominal.systems[self.nominal.primary];
         let mut gaps = first.saturating_sub(1)..=last;
         if gaps.any(|gap| system.surfaces[gap].grin.is_some()) {

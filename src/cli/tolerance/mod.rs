@@ -1,6 +1,7 @@
 //! `tolerance`: what manufacturing errors do to a lens.
 
 mod compensators;
+mod power;
 
 use self::compensators::{CompensatorRow, compensator_rows, compensator_table, stop_warning};
 use crate::cli::error::CliError;
@@ -12,11 +13,12 @@ use crate::cli::progress::{note_if_stopped, stop_flag};
 use crate::files;
 use crate::lens::{Compensator, Lens, PerturbationKind, SurfaceNumber, Tolerance, ToleranceSheet};
 use crate::tolerance::{
-    AsBuiltSpot, Derivatives, PriceClass, QuadraticForm, StoppedLenses, ToleranceAnalysis,
-    ToleranceError, ToleranceGrade, ToleranceRequest, ToleranceScene, analyze_until,
-    bounded_tolerances, form_yield, graded_sheet, loosest_for_yield, loosest_tolerances,
-    price_classes, real_lenses, refuse_lost_lenses,
+    AsBuiltSpot, Derivatives, NominalLens, PriceClass, QuadraticForm, StoppedLenses,
+    ToleranceAnalysis, ToleranceError, ToleranceGrade, ToleranceRequest, ToleranceScene,
+    analyze_until, bounded_tolerances, form_yield, graded_sheet, loosest_for_yield,
+    loosest_tolerances, price_classes, real_lenses, refuse_lost_lenses,
 };
+use power::PowerUnits;
 use serde::Serialize;
 use std::fmt::{self, Display};
 use std::path::PathBuf;
@@ -285,6 +287,9 @@ struct SensitivityRow {
     first: usize,
     last: usize,
     half_range: f64,
+    /// A half range of power in other units.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    power: Option<PowerUnits>,
     /// The standard deviation.
     sigma: f64,
     fixed: ShareOfGrowth,
@@ -321,7 +326,7 @@ impl ToleranceReport {
             lost: analysis.lost,
             dark: analysis.dark,
             clipping: analysis.clipping,
-            sensitivities: rows(sheet, &analysis)?,
+            sensitivities: rows(sheet, &analysis, &scene.lens)?,
             compensators: compensator_rows(&analysis),
             stopped: analysis.stopped,
             spots: analysis.spots,
@@ -351,6 +356,7 @@ impl ToleranceReport {
 fn rows(
     sheet: &ToleranceSheet,
     analysis: &ToleranceAnalysis,
+    lens: &NominalLens,
 ) -> Result<Vec<SensitivityRow>, ToleranceError> {
     let shares = analysis.growth_shares(sheet)?;
     let adjusted = &analysis.forms[1];
@@ -368,6 +374,7 @@ fn rows(
                 first: tolerance.error.first,
                 last: tolerance.error.last,
                 half_range: tolerance.half_range,
+                power: PowerUnits::new(tolerance, lens),
                 sigma,
                 fixed: ShareOfGrowth { by: found.mean_square(), share: fixed },
                 refocused: ShareOfGrowth { by: by_adjusted, share: refocused },
@@ -498,7 +505,10 @@ impl ToleranceReport {
             table.row([
                 row.kind.name().to_owned(),
                 surfaces(row.first, row.last),
-                half_range(row.kind, row.half_range),
+                row.power.map_or_else(
+                    || half_range(row.kind, row.half_range),
+                    |power| power.to_string(),
+                ),
                 percent(row.fixed.share),
                 percent(row.refocused.share),
             ]);

@@ -3,8 +3,8 @@
 use super::medium::is_air;
 use super::{VERSION, required_number, serialize_numbers};
 use crate::lens::{
-    Aperture, Environment, Fields, Goal, Lens, Medium, Object, Pickup, Row, ToleranceSheet,
-    Variable, Wavelength, ZoomPosition,
+    Aperture, Environment, Fields, Goal, Lens, Medium, Object, Pickup, Row, StatedTolerances,
+    ToleranceSheet, Variable, Wavelength, ZoomPosition,
 };
 use serde::de::value::MapAccessDeserializer;
 use serde::de::{Error as _, MapAccess, Unexpected, Visitor};
@@ -46,12 +46,21 @@ struct LensJson {
     #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "required_goal")]
     merit: Option<Goal>,
     #[serde(default, skip_serializing_if = "Option::is_none", deserialize_with = "required_sheet")]
-    tolerances: Option<ToleranceSheet>,
+    tolerances: Option<SheetJson>,
+}
+
+/// Tolerances: as they are written, or as a file states them.
+#[derive(Serialize)]
+#[serde(untagged)]
+enum SheetJson {
+    Written(ToleranceSheet),
+    #[serde(skip)]
+    Stated(StatedTolerances),
 }
 
 /// Tolerances that are not null: a file without them has no key.
-fn required_sheet<'de, D: Deserializer<'de>>(from: D) -> Result<Option<ToleranceSheet>, D::Error> {
-    ToleranceSheet::deserialize(from).map(Some)
+fn required_sheet<'de, D: Deserializer<'de>>(from: D) -> Result<Option<SheetJson>, D::Error> {
+    StatedTolerances::deserialize(from).map(SheetJson::Stated).map(Some)
 }
 
 /// A merit function that is not null: a file without one has no key.
@@ -79,7 +88,7 @@ impl Serialize for Lens {
             pickups: self.pickups.clone(),
             environment: self.environment,
             merit: self.merit.clone(),
-            tolerances: self.tolerances.clone(),
+            tolerances: self.tolerances.clone().map(SheetJson::Written),
         }
         .serialize(to)
     }
@@ -92,6 +101,13 @@ impl<'de> Deserialize<'de> for Lens {
             let found = Unexpected::Unsigned(keys.aplanat);
             return Err(D::Error::invalid_value(found, &format!("version {VERSION}").as_str()));
         }
+        let tolerances = match keys.tolerances {
+            None => None,
+            Some(SheetJson::Written(sheet)) => Some(sheet),
+            Some(SheetJson::Stated(stated)) => {
+                Some(stated.resolved(&keys.surfaces).map_err(D::Error::custom)?)
+            }
+        };
         Ok(Self {
             name: keys.name,
             source: keys.source,
@@ -108,7 +124,7 @@ impl<'de> Deserialize<'de> for Lens {
             image_solve: keys.focus,
             environment: keys.environment,
             merit: keys.merit,
-            tolerances: keys.tolerances,
+            tolerances,
         })
     }
 }
