@@ -2,7 +2,7 @@
 
 use super::frame::filling_size;
 use super::pattern::Pattern;
-use super::scene::{Radiance, Scene, SceneLayer};
+use super::scene::{Radiance, Scene, SceneLayer, check_distance};
 use super::{ImageFrame, PictureError, Raster};
 use crate::pupil::RayModel;
 use serde::{Deserialize, Serialize};
@@ -68,6 +68,7 @@ impl BuiltInScene {
         frame: &ImageFrame,
         distance: Option<f64>,
     ) -> Result<Scene, PictureError> {
+        check_distance(distance)?;
         let half_size = filling_size(model, frame, distance)?;
         let pattern = match self {
             Self::White => return Ok(Scene::uniform(1.0)),

@@ -43,11 +43,11 @@ pub struct GhostReport {
     pub coating: String,
     /// True if ghosts are in the picture.
     pub on: bool,
-    /// The light of all ghosts where it is brightest, as a share of mid grey.
+    /// The light of all ghosts where it is surely brightest, or else brightest at all, as a share of mid grey.
     pub change: f64,
     /// Its standard error.
     pub error: f64,
-    /// The change above which they are in the picture.
+    /// The tolerance: they are in the picture if the change may be above it.
     pub tolerance: f64,
     /// The number of pairs of surfaces that were followed, and of all.
     pub pairs: [usize; 2],
@@ -98,7 +98,8 @@ impl GhostLight {
             let (values, rays) = ghosts.values(samples);
             let (change, error) = brightest(&values, MID_GREY * picture.white);
             let pairs = [ghosts.paths.first().map_or(0, Vec::len), all];
-            let on = change > tolerance;
+            // Ghosts that may matter are shown.
+            let on = change + SURE * error > tolerance;
             let coating = coating.to_string();
             let report = GhostReport { coating, on, change, error, tolerance, pairs, rays };
             Self { cells: ghosts.cells(), values, report }
@@ -145,11 +146,15 @@ impl GhostLight {
 }
 
 /// The light of the cell over mid grey that is surely brightest, and its standard error: of many cells the
-/// largest value is that of the largest error.
+/// largest value is that of the largest error. Where no cell surely has light, the largest value all the same:
+/// light that few rays have found is not none.
 fn brightest(values: &[[(f64, f64); 3]], grey: f64) -> (f64, f64) {
     let surely = |(value, error): (f64, f64)| value - SURE * error;
     let all = values.iter().flatten().copied();
-    let best = all.max_by(|a, b| surely(*a).total_cmp(&surely(*b)));
+    let sure = all.clone().max_by(|a, b| surely(*a).total_cmp(&surely(*b)));
+    let best = sure
+        .filter(|cell| surely(*cell) > 0.0)
+        .or_else(|| all.max_by(|a, b| a.0.total_cmp(&b.0)));
     best.map_or((0.0, 0.0), |(value, error)| (value / grey, error / grey))
 }
 

@@ -112,15 +112,21 @@ impl Scene {
     }
 }
 
+/// Refuses the distance of a plane that is not in front of the lens.
+pub(super) fn check_distance(distance: Option<f64>) -> Result<(), PictureError> {
+    match distance {
+        Some(found) if !(found > 0.0 && found <= 1e12) => {
+            let expected = "a positive number of mm in front of the first vertex, or infinity";
+            Err(PictureError::Size { what: "the distance of a plane", found, expected })
+        }
+        _ => Ok(()),
+    }
+}
+
 impl SceneLayer {
     fn check(&self) -> Result<(), PictureError> {
         let refuse = |what, found, expected| Err(PictureError::Size { what, found, expected });
-        if let Some(distance) = self.distance
-            && !(distance > 0.0 && distance <= 1e12)
-        {
-            let expected = "a positive number of mm in front of the first vertex, or infinity";
-            return refuse("the distance of a plane", distance, expected);
-        }
+        check_distance(self.distance)?;
         if let Some(size) = self.half_size.into_iter().find(|size| !(*size > 0.0)) {
             return refuse("the size of a plane", size, "a positive number");
         }

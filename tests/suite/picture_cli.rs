@@ -92,6 +92,8 @@ fn wrong_pictures_are_refused() {
         (vec!["--scene", "star", "--pixels", "0x4"], ["0x4", "columns"]),
         (vec!["--scene", "star", "--diagonal", "-1"], ["diagonal", "-1"]),
         (vec!["--scene", "star", "--distance", "0"], ["distance", "0"]),
+        (vec!["--scene", "white", "--distance", "-5"], ["distance", "-5"]),
+        (vec!["--scene", "white", "--distance", "nan"], ["distance", "NaN"]),
         (vec!["--scene", "star", "--focus", "10"], ["10 mm", "image"]),
         (vec!["--scene", "star", "--zoom", "3"], ["zoom", "3"]),
         (vec!["--scene", LENS], [LENS, "image"]),

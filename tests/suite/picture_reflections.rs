@@ -169,6 +169,20 @@ fn the_ghosts_of_small_lights_are_known() {
     assert!(change > 0.0 && error < 0.3 * change, "{change} {error}");
 }
 
+/// In many cells each has few rays; the light that they have found is not taken for none.
+#[test]
+fn the_ghosts_of_small_lights_in_many_cells_are_shown() {
+    for coating in ["none", "single-layer"] {
+        let out = Scratch::new("lights.png");
+        let coating = format!("--coating={coating}");
+        let asked = ["picture", LENS, "--scene=lights", "--pixels=96x64", "--quick", &coating];
+        let arguments = [&asked[..], &["--error=0.1%", "--device=cpu", "--out", out.path()]].concat();
+        let ghosts = &done_json(&arguments, "")["ghosts"];
+        let [change, error] = ["change", "error"].map(|key| ghosts[key].as_f64().unwrap());
+        assert!(ghosts["on"] == true && change > 0.0 && error > 0.0, "{coating}: {ghosts}");
+    }
+}
+
 #[test]
 fn a_picture_through_a_coated_lens_says_so_in_its_file() {
     let (out, map) = (Scratch::new("coated.png"), Scratch::new("errors.png"));
