@@ -1,11 +1,11 @@
-//! The gain by an exchange of glasses, and its cost.
+//! The gain by an exchange of glasses, its cost, and the gain at that cost without predictions.
 
 use super::limits::with_variables;
 use super::timing::Stopwatch;
 use crate::lens::Lens;
 use crate::lens::glass;
 use crate::merit::Goal;
-use crate::optimize::{DescentMethod, GlassSearch, GlassSearchError, start};
+use crate::optimize::{DescentMethod, GlassRound, GlassSearch, GlassSearchError, start};
 use serde::Serialize;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -27,6 +27,8 @@ pub struct GlassGain {
     pub evaluations: usize,
     /// The time of the exchange in seconds.
     pub seconds: f64,
+    /// The merit by exchanges in a random order with as many evaluations.
+    pub merit_random: f64,
 }
 
 /// Optimizes a lens, then exchanges its glasses for any of the catalogue, in an order by a seed. A lens
@@ -41,11 +43,11 @@ pub fn measure_glass_gain(
     tolerance: f64,
     stop: &AtomicBool,
 ) -> Result<Option<GlassGain>, GlassSearchError> {
-    let lens = with_variables(lens);
-    let goal = Goal::of_lens(&lens)?;
-    let mut search = GlassSearch::new(&lens, &goal, tolerance, glass::catalogue(), seed)?;
+    let first = with_variables(lens);
+    let goal = Goal::of_lens(&first)?;
+    let mut search = GlassSearch::new(&first, &goal, tolerance, glass::catalogue(), seed)?;
     let merit_before = search.merit();
-    let mut optimizer = start(DescentMethod::TrustRegion, &lens, &goal, tolerance)?;
+    let mut optimizer = start(DescentMethod::TrustRegion, &first, &goal, tolerance)?;
     for _ in 0..DESCENT_STEPS {
         if stop.load(Ordering::Relaxed) {
             return Ok(None);
@@ -55,24 +57,59 @@ pub fn measure_glass_gain(
         }
     }
     optimizer.verify_best();
-    search.restart(optimizer.best())?;
-    let (watch, mut exchanges) = (Stopwatch::start(), 0);
+    let lens = optimizer.best();
+    search.restart(lens)?;
+    let watch = Stopwatch::start();
     let merit_optimized = search.merit();
+    let Some((rounds, exchanges)) = search_to_end(&mut search, stop)? else { return Ok(None) };
+    let seconds = watch.seconds();
+    let mut random = GlassSearch::new(&first, &goal, tolerance, glass::catalogue(), seed)?;
+    random = random.without_predictions();
+    random.restart(lens)?;
+    let Some(merit_random) = merit_after(&mut random, rounds.evaluations, stop)? else {
+        return Ok(None);
+    };
+    Ok(Some(GlassGain {
+        merit_before,
+        merit_optimized,
+        merit: rounds.merit,
+        exchanges,
+        evaluations: rounds.evaluations,
+        seconds,
+        merit_random,
+    }))
+}
+
+/// The last round of a search, and the exchanges that were taken; `None` once `stop` is true.
+fn search_to_end(
+    search: &mut GlassSearch,
+    stop: &AtomicBool,
+) -> Result<Option<(GlassRound, usize)>, GlassSearchError> {
+    let mut exchanges = 0;
     while !stop.load(Ordering::Relaxed) {
         let round = search.round()?;
         exchanges += usize::from(round.accepted.is_some());
         if round.finished {
-            let (merit, evaluations) = (round.merit, round.evaluations);
-            let seconds = watch.seconds();
-            return Ok(Some(GlassGain {
-                merit_before,
-                merit_optimized,
-                merit,
-                exchanges,
-                evaluations,
-                seconds,
-            }));
+            return Ok(Some((round, exchanges)));
         }
+    }
+    Ok(None)
+}
+
+/// The merit of a search after this many evaluations, which begins anew from its best lens where it ends
+/// before; `None` once `stop` is true.
+fn merit_after(
+    search: &mut GlassSearch,
+    evaluations: usize,
+    stop: &AtomicBool,
+) -> Result<Option<f64>, GlassSearchError> {
+    let mut merit = search.merit();
+    while !stop.load(Ordering::Relaxed) {
+        let round = search.round()?;
+        if round.evaluations > evaluations {
+            return Ok(Some(merit));
+        }
+        merit = round.merit;
     }
     Ok(None)
 }

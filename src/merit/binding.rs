@@ -147,6 +147,30 @@ impl Configuration {
         }
     }
 
+    /// Adds a variable for the index of the gap behind each of some rows at each wavelength, row by row
+    /// behind the variables of the lens.
+    pub(super) fn vary_indices(&mut self, lens: &Lens, rows: &[usize]) {
+        let target = SurfaceParameter::Index;
+        for row in rows {
+            for bindings in &mut self.bindings {
+                let bound = |surface| {
+                    let variable = self.variables;
+                    ParameterBinding { variable, surface, target, factor: 1.0, offset: 0.0 }
+                };
+                bindings.extend(followers_of_index(lens, *row, target).into_iter().map(bound));
+                self.variables += 1;
+            }
+        }
+    }
+
+    /// The indices of the gaps behind some rows at each wavelength, row by row.
+    pub(super) fn indices(&self, rows: &[usize]) -> Vec<f64> {
+        let of_row = |row: &usize| -> Vec<f64> {
+            self.systems.iter().map(|system| system.surfaces[*row].index).collect()
+        };
+        rows.iter().flat_map(of_row).collect()
+    }
+
     /// Gives surfaces whose rims nobody has fixed the semi-diameters of the light.
     pub(super) fn set_clear_rims(&mut self, rims: &[f64]) {
         self.clear_rims = rims.to_vec();

@@ -236,6 +236,18 @@ impl Merit {
         self
     }
 
+    /// The same merit, which depends on the index of the gap behind each of some rows at each wavelength as
+    /// well: row by row behind the values of the variables, as [`Merit::indices`] gives them.
+    pub(crate) fn with_index_variables(mut self, lens: &Lens, rows: &[usize]) -> Self {
+        self.zooms.iter_mut().for_each(|zoom| zoom.vary_indices(lens, rows));
+        self
+    }
+
+    /// The indices of the gaps behind some rows at each wavelength, row by row.
+    pub(crate) fn indices(&self, rows: &[usize]) -> Vec<f64> {
+        self.zooms.first().map_or(Vec::new(), |zoom| zoom.indices(rows))
+    }
+
     /// The goal.
     pub fn goal(&self) -> &Goal {
         &self.goal

@@ -1,9 +1,12 @@
 //! Exchange of glasses: others of the catalogue are tried in place of each one, and what gains is kept.
 //!
 //! Another glass moves the focus by more than one step of the variables takes back, so the powers of its
-//! surfaces are held first: their curvatures follow the change of the index. The glasses are tried in a
-//! random order, eight at a time, each with some steps of optimization; the best of them goes on.
+//! surfaces are held first: their curvatures follow the change of the index. The merit with each glass at
+//! each place is predicted from one evaluation. The exchanges that promise a merit of the size of the present
+//! one are tried first, in a random order, since predictions tell what is hopeless better than what is best;
+//! eight at a time, each with some steps of optimization; the best of them goes on.
 
+use super::glass_prediction::GlassModel;
 use super::{DescentMethod, Optimizer, start_from};
 use crate::lens::glass::{self, Glass};
 use crate::lens::{Lens, Medium, Parameter, Quantity, SurfaceNumber, System};
@@ -21,6 +24,8 @@ const TRIAL_STEPS: usize = 20;
 const FINAL_STEPS: usize = 200;
 /// The merit of the best trial, relative to the present one, up to which it is optimized further.
 const PROMISING: f64 = 1.5;
+/// The predicted merit, relative to the present one, up to which an exchange is tried before others.
+const PROMISED: f64 = 3.0;
 /// The least gain of an exchange that is taken, relative to the merit.
 const LEAST_GAIN: f64 = 1e-3;
 /// The rounds without a gain after which the search ends.
@@ -39,6 +44,8 @@ pub struct GlassExchange {
     pub from: String,
     /// The glass in its place.
     pub to: String,
+    /// The merit after optimization as it was predicted; `None` if it was not.
+    pub predicted: Option<f64>,
     /// The merit after optimization; `None` if the lens with it cannot be optimized.
     pub merit: Option<f64>,
 }
@@ -82,6 +89,8 @@ pub struct GlassSearch {
     tolerance: f64,
     glasses: Vec<&'static Glass>,
     seed: u64,
+    /// True if exchanges that promise nothing wait.
+    is_guided: bool,
     /// The light of the first lens, which limits of light compare with.
     initial_light: Vec<Vec<f64>>,
     best: Lens,
@@ -138,12 +147,20 @@ impl GlassSearch {
             tolerance,
             glasses,
             seed,
+            is_guided: true,
             best: lens.clone(),
             waiting: None,
             evaluations: 1,
             rounds: 0,
             idle: 0,
         })
+    }
+
+    /// The same search with exchanges in a random order, whatever they promise.
+    #[must_use]
+    pub fn without_predictions(mut self) -> Self {
+        self.is_guided = false;
+        self
     }
 
     /// The best lens so far.
@@ -263,21 +280,44 @@ impl GlassSearch {
         (merit.is_finite() && lit).then(|| (optimizer.best().clone(), merit, evaluations))
     }
 
-    /// All exchanges of the best lens: in random order, or of a model glass for the nearest ones first.
-    fn exchanges(&self) -> Vec<Exchanged> {
+    /// All exchanges of the best lens in a random order, those first that promise something; without
+    /// predictions those of a model glass for the nearest ones first.
+    fn exchanges(&mut self) -> Vec<Exchanged> {
         let pairs: Vec<(usize, &Glass)> = sites(&self.best)
             .into_iter()
             .flat_map(|row| self.glasses.iter().map(move |glass| (row, *glass)))
             .collect();
         let with = |(row, glass): &(usize, &Glass)| exchanged(&self.best, *row, glass);
         let mut all: Vec<Exchanged> = pairs.par_iter().filter_map(with).collect();
-        if has_model_glass(&self.best) {
-            all.sort_by(|a, b| a.distance.total_cmp(&b.distance));
-            return all;
-        }
         let seed = self.seed.wrapping_add(self.rounds);
         all.shuffle(&mut Xoshiro256PlusPlus::seed_from_u64(seed));
+        if self.is_guided && self.predict(&mut all) {
+            let most = PROMISED * self.merit;
+            all.sort_by_key(|one| !one.exchange.predicted.is_some_and(|merit| merit <= most));
+        } else if has_model_glass(&self.best) {
+            all.sort_by(|a, b| a.distance.total_cmp(&b.distance));
+        }
         all
+    }
+
+    /// Predicts the merits of exchanges; false if the best lens allows no prediction.
+    fn predict(&mut self, all: &mut [Exchanged]) -> bool {
+        let Ok(merit) = Merit::new(&self.best, &self.goal, self.tolerance) else { return false };
+        let merit = merit.with_initial_light(&self.initial_light);
+        self.evaluations += 1;
+        let Ok(Some(model)) = GlassModel::new(merit, &self.best, &sites(&self.best)) else {
+            return false;
+        };
+        let waves = &self.best.wavelengths;
+        all.par_iter_mut().for_each(|one| {
+            let glass = glass::find(&one.exchange.to);
+            let indices: Option<Vec<f64>> =
+                glass.and_then(|glass| waves.iter().map(|wave| glass.index(wave.um)).collect());
+            let row = one.exchange.surface.index();
+            one.exchange.predicted =
+                indices.and_then(|indices| model.predict(&one.lens, row, &indices));
+        });
+        true
     }
 }
 
@@ -321,7 +361,7 @@ fn exchanged(lens: &Lens, row: usize, glass: &Glass) -> Option<Exchanged> {
     }
     let other = with_medium(lens, row, Medium::Glass(to.clone()))?;
     let surface = SurfaceNumber::new(row);
-    let exchange = GlassExchange { surface, from, to, merit: None };
+    let exchange = GlassExchange { surface, from, to, predicted: None, merit: None };
     Some(Exchanged { exchange, lens: other, distance: distance(lens, row, glass)? })
 }
 

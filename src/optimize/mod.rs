@@ -5,6 +5,7 @@
 
 mod adam;
 mod exchanging;
+mod glass_prediction;
 mod glasses;
 mod least_squares;
 mod limited;

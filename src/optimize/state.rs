@@ -343,7 +343,7 @@ pub(super) fn clamp(variable: &Variable, value: f64) -> f64 {
 
 /// The scale of a variable: a change that deflects rays about as much as the scale of any other
 /// variable does.
-fn scale(lens: &Lens, variable: &Variable) -> f64 {
+pub(super) fn scale(lens: &Lens, variable: &Variable) -> f64 {
     let size = lens.total_track().max(1e-6);
     let rim = lens.surfaces[variable.parameter.surface].semi_diameter.unwrap_or(0.1 * size);
     // A closed rim has to be able to open, by steps of the size of the others.

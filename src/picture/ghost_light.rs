@@ -152,9 +152,8 @@ fn brightest(values: &[[(f64, f64); 3]], grey: f64) -> (f64, f64) {
     let surely = |(value, error): (f64, f64)| value - SURE * error;
     let all = values.iter().flatten().copied();
     let sure = all.clone().max_by(|a, b| surely(*a).total_cmp(&surely(*b)));
-    let best = sure
-        .filter(|cell| surely(*cell) > 0.0)
-        .or_else(|| all.max_by(|a, b| a.0.total_cmp(&b.0)));
+    let best =
+        sure.filter(|cell| surely(*cell) > 0.0).or_else(|| all.max_by(|a, b| a.0.total_cmp(&b.0)));
     best.map_or((0.0, 0.0), |(value, error)| (value / grey, error / grey))
 }
 

@@ -73,6 +73,24 @@ fn other_glasses_make_a_double_gauss_sharper_within_its_limits() {
     assert!(now.contains(&exchanged.last().unwrap().to));
 }
 
+/// What a small exchange promises is what it brings, and the order of the others is foreseen.
+#[test]
+fn the_merit_with_another_glass_is_predicted() {
+    let lens = lens("cooke_triplet_100_f27");
+    let goal = Goal::default_for(&lens).unwrap();
+    let mut guided = search(&lens, &goal);
+    let before = guided.merit();
+    let round = guided.round().unwrap();
+    for tried in &round.tried {
+        let (predicted, found) = (tried.predicted.unwrap(), tried.merit.unwrap());
+        assert!(predicted > 0.0 && predicted <= 3.0 * before, "{tried:?}");
+        assert!((0.3..3.0).contains(&(found / predicted)), "{tried:?}");
+    }
+    let mut random = search(&lens, &goal).without_predictions();
+    let round = random.round().unwrap();
+    assert!(round.tried.iter().all(|tried| tried.predicted.is_none()), "{round:?}");
+}
+
 #[test]
 fn a_search_among_glasses_does_not_depend_on_threads() {
     let run = |threads: usize| -> GlassRound {

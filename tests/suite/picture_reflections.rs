@@ -176,7 +176,8 @@ fn the_ghosts_of_small_lights_in_many_cells_are_shown() {
         let out = Scratch::new("lights.png");
         let coating = format!("--coating={coating}");
         let asked = ["picture", LENS, "--scene=lights", "--pixels=96x64", "--quick", &coating];
-        let arguments = [&asked[..], &["--error=0.1%", "--device=cpu", "--out", out.path()]].concat();
+        let arguments =
+            [&asked[..], &["--error=0.1%", "--device=cpu", "--out", out.path()]].concat();
         let ghosts = &done_json(&arguments, "")["ghosts"];
         let [change, error] = ["change", "error"].map(|key| ghosts[key].as_f64().unwrap());
         assert!(ghosts["on"] == true && change > 0.0 && error > 0.0, "{coating}: {ghosts}");

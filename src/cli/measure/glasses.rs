@@ -55,9 +55,21 @@ struct GlassRow {
 
 impl Display for MeasureGlassesReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        writeln!(f, "{}\nmerit as it is, optimized, and with other glasses\n", self.machine)?;
-        let columns =
-            ["lens", "merit", "optimized", "other glasses", "exchanges", "evaluations", "s"];
+        writeln!(
+            f,
+            "{}\nmerit as it is, optimized, and with other glasses; at random with as many evaluations\n",
+            self.machine
+        )?;
+        let columns = [
+            "lens",
+            "merit",
+            "optimized",
+            "other glasses",
+            "exchanges",
+            "evaluations",
+            "s",
+            "random",
+        ];
         let mut table = TextTable::new(&columns);
         for GlassRow { file, found, .. } in &self.rows {
             let Some(found) = found else { continue };
@@ -66,7 +78,7 @@ impl Display for MeasureGlassesReport {
             let counts = [found.exchanges, found.evaluations].map(|count| count.to_string());
             let seconds = format!("{:.1}", found.seconds);
             let cells = std::iter::once(file.clone()).chain(merits).chain(counts);
-            table.row(cells.chain([seconds]));
+            table.row(cells.chain([seconds, ShortNumber(found.merit_random).to_string()]));
         }
         write!(f, "{table}")?;
         for row in &self.rows {

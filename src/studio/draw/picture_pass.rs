@@ -8,7 +8,7 @@ use crate::picture::{PackedPicture, PictureDevice};
 use std::sync::Mutex;
 use wgpu::util::{BufferInitDescriptor, DeviceExt};
 use wgpu::{
-    Adapter, BindGroupDescriptor, BindGroupEntry, Buffer, BufferDescriptor, BufferUsages,
+    Adapter, Backends, BindGroupDescriptor, BindGroupEntry, Buffer, BufferDescriptor, BufferUsages,
     CommandEncoder, CommandEncoderDescriptor, ComputePassDescriptor, ComputePipeline,
     ComputePipelineDescriptor, Device, DeviceDescriptor, DeviceType, ErrorFilter, Instance,
     InstanceDescriptor, PipelineCompilationOptions, PowerPreference, Queue, RequestAdapterOptions,
@@ -56,7 +56,11 @@ impl PicturePass {
     /// # Errors
     /// No adapter, or one that gives no device.
     pub async fn headless() -> Result<Self, GpuError> {
-        let instance = Instance::new(InstanceDescriptor::new_without_display_handle());
+        // OpenGL would look for a display, and complain where there is none.
+        let instance = Instance::new(InstanceDescriptor {
+            backends: Backends::PRIMARY,
+            ..InstanceDescriptor::new_without_display_handle()
+        });
         let options = RequestAdapterOptions {
             power_preference: PowerPreference::HighPerformance,
             ..RequestAdapterOptions::default()
