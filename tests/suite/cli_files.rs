@@ -145,7 +145,7 @@ fn a_scene_is_not_written_over_by_its_picture() {
 fn a_specification_is_not_written_over_by_a_lens_beside_the_best_one() {
     let folder = Folder::new("own-design");
     let text = r#"{"focal_length_mm": 100, "f_number": 10, "half_field_deg": 1}"#;
-    for merit in ["simplest", "brightest"] {
+    for merit in ["simplest", "brightest", "robust"] {
         let spec = folder.file(&format!("a_{merit}.json"), text);
         let design = ["design", &spec, "--out", &folder.path("a.json"), "--gradients", "1"];
         refused(2, &design, "", &[&spec, "is the specification; expected another file"]);

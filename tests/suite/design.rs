@@ -288,3 +288,28 @@ fn sheets_are_measured_by_name() {
     let arguments = ["measure", "design", sheets, "--seconds", "0"];
     refused(2, &arguments, "", &["--seconds: found 0; expected more than 0"]);
 }
+
+/// Every lens at the end is shown as it is made too.
+#[test]
+fn designed_lenses_come_with_their_spots_as_built() {
+    let file = Scratch::new("as-built.json");
+    let text =
+        r#"{"focal_length_mm": 100, "f_number": 10, "half_field_deg": 1, "max_elements": 2}"#;
+    std::fs::write(file.path(), text).unwrap();
+    let out = Scratch::new("as-built-lens.json");
+    let design = |grade: &str| {
+        let words = ["design", file.path(), "--out", out.path(), "--gradients", "300"];
+        done_json(&[&words[..], &["--as-built", grade]].concat(), "")
+    };
+    for lens in design("commercial")["lenses"].as_array().unwrap() {
+        let made = &lens["as_built"];
+        let [nominal, mean, most] =
+            ["nominal", "mean", "within_90_percent"].map(|key| made[key].as_f64().unwrap());
+        assert!(nominal < mean && mean < most && made["grade"] == "commercial", "{made}");
+        let rms = lens["judgement"]["rms"].as_f64().unwrap();
+        assert!((nominal / rms - 1.0).abs() < 0.01, "{nominal} {rms}");
+    }
+    assert!(design("none")["lenses"][0]["as_built"].is_null());
+    let wrong = ["design", file.path(), "--as-built", "perfect"];
+    refused(2, &wrong, "", &["as_built", "`perfect`", "shop_limit"]);
+}

@@ -452,3 +452,51 @@ fn a_catalogue_is_written_by_the_command_line() {
     assert_eq!(wrong.status.code(), Some(2));
     std::fs::remove_dir_all(folder).unwrap();
 }
+
+/// The price of the program's glasses is a class until a person or a maker says otherwise, and the twins
+/// of a glass that is named are listed.
+#[test]
+fn glasses_are_chosen_by_their_price_and_twins_are_listed() {
+    let folder = std::env::temp_dir().join(format!("aplanat-prices-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    let run = |words: &[&str]| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_aplanat"));
+        let output = command.args(words).env("APLANAT_GLASSES", &folder).output().unwrap();
+        let text = |bytes: Vec<u8>| String::from_utf8(bytes).unwrap();
+        (output.status.code(), text(output.stdout), text(output.stderr))
+    };
+    let listed = |words: &[&str]| -> Vec<Value> {
+        let (code, json, errors) = run(&[&["glass", "--json"], words].concat());
+        assert_eq!(code, Some(0), "{errors}");
+        serde_json::from_str(&json).unwrap()
+    };
+    let cheap = listed(&["price=..3", "schott"]);
+    assert!(cheap.len() > 30, "{}", cheap.len());
+    for glass in &cheap {
+        assert!(glass["relative_cost"].as_f64().unwrap() <= 3.0, "{glass}");
+        assert_eq!(glass["cost_source"], "estimated");
+    }
+    let price = |name: &str| {
+        let found = listed(&["schott", name]);
+        let own = found.iter().find(|glass| glass["name"] == *name).unwrap();
+        (own["relative_cost"].as_f64().unwrap(), own["cost_source"].as_str().unwrap().to_owned())
+    };
+    assert_eq!(price("N-BK7"), (1.0, "estimated".to_owned()));
+    std::fs::write(folder.join("prices.csv"), "# mine\nSCHOTT N-BK7,1.25\nschott f2, 2.5\n")
+        .unwrap();
+    assert_eq!(price("N-BK7"), (1.25, "person".to_owned()));
+    assert_eq!(price("F2"), (2.5, "person".to_owned()));
+    // The maker knows better.
+    let catalogue = folder.join("own").with_file_name("SCHOTT.agf");
+    std::fs::write(&catalogue, BK7).unwrap();
+    let (relative, source) = price("N-BK7");
+    assert_eq!(source, "maker", "{relative}");
+    std::fs::write(folder.join("prices.csv"), "SCHOTT N-BK7,cheap\n").unwrap();
+    let (code, text, errors) = run(&["glass", "N-BK7"]);
+    assert!(code == Some(0) && errors.contains("prices.csv, line 1"), "{errors}");
+    assert!(text.contains("twins of SCHOTT N-BK7") && text.contains("HOYA BSC7"), "{text}");
+    let twins = listed(&["schott", "N-BK7"])[0]["twins"].clone();
+    assert!(twins.as_array().unwrap().iter().any(|twin| twin == "CDGM H-K9L"), "{twins}");
+    assert!(!run(&["glass", "schott", "nd=1.5..1.6"]).1.contains("twins of"));
+    std::fs::remove_dir_all(&folder).unwrap();
+}

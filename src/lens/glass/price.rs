@@ -1,4 +1,4 @@
-//! What a glass costs, relative to N-BK7: by its maker, by a person's list, or estimated.
+//! The price of a glass relative to N-BK7: of its maker, of a person's list, or estimated.
 //!
 //! Free data have no prices. Makers' own catalogues have, and win; a person may state others. For the
 //! rest the family of a glass, as its place on the map of glasses gives it away, tells the order of
@@ -33,6 +33,9 @@ pub struct GlassPrice {
 
 /// The classes of estimated prices.
 const CLASSES: [f64; 11] = [1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 10.0, 15.0, 20.0, 30.0];
+
+/// Parts of the names that makers give lanthanum glasses.
+const LANTHANUM: [&str; 7] = ["LAK", "LAF", "LAS", "LAH", "LAM", "LAL", "LAC"];
 
 /// The prices of a person's list by normalized full names.
 static PERSON: RwLock<Option<HashMap<String, f64>>> = RwLock::new(None);
@@ -99,7 +102,7 @@ impl Glass {
         }
         // Barium glasses end, and lanthanum glasses begin, at this line.
         let beyond_barium = vd > 28.0 && nd > 1.64 + 0.0048 * (60.5 - vd);
-        if beyond_barium || name.contains("LA") {
+        if beyond_barium || LANTHANUM.iter().any(|part| name.contains(part)) {
             return 3.0 + 5.0 * share(1.65, 0.25);
         }
         if nd > 1.87 || deviation > 0.02 {
@@ -120,6 +123,7 @@ mod tests {
         for (name, [low, high]) in [
             ("SCHOTT N-BK7", [1.0, 1.0]),
             ("SCHOTT F2", [1.0, 4.0]),
+            ("CDGM H-K9LA", [1.0, 1.0]),
             ("SCHOTT N-SK16", [1.0, 4.0]),
             ("SCHOTT N-SF6", [1.0, 4.0]),
             ("SCHOTT N-LAK9", [3.0, 8.0]),

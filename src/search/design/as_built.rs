@@ -77,7 +77,7 @@ impl DesignedAsBuilt {
     }
 }
 
-/// What a refinement has found.
+/// The result of a refinement.
 #[derive(Debug, Clone, Default)]
 pub(super) struct RefinedLens {
     /// The lens in place of the one before, whose spot as designed is hardly larger.
@@ -268,7 +268,7 @@ fn field_terms(
     terms
 }
 
-/// What the limits that hold a refined lens cost: of the expected spot, whose mean radius is given.
+/// The costs of the limits that hold a refined lens: of the expected spot, whose mean radius is given.
 fn costs(prices: &[LimitPrice], mean: f64, found: &LensJudgement) -> Vec<LimitCost> {
     let is_length = |price: &&LimitPrice| price.limit.term != "light";
     let cost = |price: &LimitPrice| LimitCost {
