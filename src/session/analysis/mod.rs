@@ -13,7 +13,7 @@ mod scene_picture;
 mod slow;
 mod wavefronts;
 
-pub use as_built::{AsBuiltLens, predict_as_built};
+pub use as_built::{AsBuiltLens, confirm_as_built, predict_as_built};
 pub use contrast::{FieldContrast, FieldContrasts};
 pub use ghosts::FieldGhosts;
 pub use pupils::FieldPupils;
@@ -288,8 +288,7 @@ fn refine(mut results: AnalysisResults, output: &AnalysisOutput) -> AnalysisResu
     }
     let (zoom, scene) = (settings.zoom, settings.picture_scene());
     if settings.tolerances {
-        let confirmed =
-            time(|| catch_panic(|| as_built::confirm_as_built(&results.lens, &settings)));
+        let confirmed = time(|| catch_panic(|| confirm_as_built(&results.lens, &settings)));
         analyses.as_built = Some(Arc::new(confirmed));
     }
     if settings.picture && !output.is_interrupted() {
