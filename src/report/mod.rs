@@ -15,6 +15,7 @@ mod prescription;
 mod prescription_tables;
 mod sheet;
 mod step;
+mod surface_tolerances;
 
 pub use body::{BodyError, LensBody, lens_bodies};
 pub use element_drawing::element_drawing;
@@ -28,3 +29,4 @@ pub use paper_file::{
 pub use pareto::ParetoReport;
 pub use prescription::{ReportSettings, prescription_report};
 pub use sheet::scale_text;
+pub use surface_tolerances::surface_tolerances;
