@@ -35,6 +35,7 @@ mod error;
 mod folded;
 mod form;
 mod grade;
+mod histogram;
 mod inverse;
 mod made;
 mod merits;
@@ -63,6 +64,7 @@ pub use covariance::{
 pub use error::{ToleranceError, refuse_lost_lenses};
 pub use form::{AdjustedForm, FocusTreatment, QuadraticForm};
 pub use grade::{PriceClass, bounded_tolerances, graded_sheet, price_classes};
+pub use histogram::{SpotHistogram, yield_band};
 pub use inverse::{form_yield, loosest_for_yield, loosest_tolerances};
 pub use made::{MadeLens, made_lens, worst_lens};
 pub use merits::{MeritOptions, Merits, merits};

@@ -6,8 +6,8 @@
 use super::AnalysisSettings;
 use crate::lens::{Lens, ToleranceSheet};
 use crate::tolerance::{
-    MadeLens, ToleranceAnalysis, ToleranceError, ToleranceRequest, ToleranceScene, analyze,
-    graded_sheet, refuse_lost_lenses, worst_lens,
+    MadeLens, NominalLens, ToleranceAnalysis, ToleranceError, ToleranceRequest, ToleranceScene,
+    analyze, graded_sheet, refuse_lost_lenses, worst_lens,
 };
 
 /// The tolerances of a lens and what they do to it.
@@ -29,6 +29,8 @@ pub struct AsBuiltLens {
     /// The lens with the largest spot of those with random errors, or the reason why it cannot be written;
     /// `None` without such lenses.
     pub worst: Option<Result<MadeLens, String>>,
+    /// The lens as designed, resolved.
+    pub nominal: NominalLens,
 }
 
 /// The relative error of spots while the lens changes.
@@ -75,5 +77,6 @@ fn as_built(
         rays: scene.beam.rays(),
         sampling_error: scene.sampling_error,
         worst: worst.map_err(|why| why.to_string()).transpose(),
+        nominal: scene.lens,
     })
 }
