@@ -7,7 +7,7 @@ use aplanat::lens::{
     AdjustedPart, Edit, ErrorDistribution, Lens, PerturbationKind, ToleranceSheet,
 };
 use aplanat::session::{
-    AnalysisResults, AnalysisSettings, AsBuiltLens, Command, PanelSetting,
+    AnalysisResults, AnalysisSettings, AsBuiltLens, Command, LoosestGoal, PanelSetting,
     SessionView, Timed, confirm_as_built, predict_as_built,
 };
 use aplanat::studio::panels::TolerancesPanel;
@@ -51,8 +51,11 @@ fn tolerances(lens: Lens) -> Harness<'static, PanelState<TolerancesPanel>> {
 }
 
 /// The same with lenses whose rays were traced.
-fn confirmed(lens: Lens) -> Harness<'static, PanelState<TolerancesPanel>> {
-    let settings = AnalysisSettings { tolerance: 1e-2, ..AnalysisSettings::default() };
+fn confirmed(
+    lens: Lens,
+    loosest: Option<LoosestGoal>,
+) -> Harness<'static, PanelState<TolerancesPanel>> {
+    let settings = AnalysisSettings { tolerance: 1e-2, loosest, ..AnalysisSettings::default() };
     panel_of(lens, settings, confirm_as_built)
 }
 
@@ -132,7 +135,7 @@ fn the_class_and_the_limit_of_good_lenses_are_settings() {
 
 #[test]
 fn real_lenses_have_a_histogram_and_the_worst_of_them_is_opened() {
-    let mut harness = confirmed(achromat());
+    let mut harness = confirmed(achromat(), None);
     for text in ["Histogram of the RMS of 500 lenses, refocused", "By element", "By kind"] {
         harness.get_by_label(text);
     }
@@ -218,4 +221,28 @@ fn errors_of_one_barrel_are_correlated() {
     assert_eq!((correlation.errors.len(), correlation.coefficient), (3, 0.5));
     let kinds = correlation.errors.iter().map(|i| sheet.errors[*i].error.kind);
     assert!(kinds.into_iter().all(|kind| kind == PerturbationKind::ElementDecenterY));
+}
+
+#[test]
+fn the_loosest_tolerances_are_asked_for_and_applied() {
+    let mut harness = tolerances(achromat());
+    click(&mut harness, "Loosest tolerances");
+    click(&mut harness, "Find them");
+    let asked = harness.state().commands.iter().find_map(|command| match command {
+        Command::Show(PanelSetting::Loosest(goal)) => *goal,
+        _ => None,
+    });
+    let Some(LoosestGoal::Yield { rms, share }) = asked else { panic!("{asked:?}") };
+    assert!(rms > 0.0 && (share - 0.9).abs() < 1e-12);
+    let mut harness = confirmed(achromat(), asked);
+    let found = made(&harness).loosest.unwrap().unwrap();
+    assert!((found.good.unwrap()[0] - 0.9).abs() < 0.01, "{:?}", found.good);
+    click(&mut harness, "Loosest tolerances");
+    click(&mut harness, "Apply");
+    assert_eq!(last_sheet(&harness), found.sheet);
+    click(&mut harness, "Apply the classes");
+    let by_class = last_sheet(&harness);
+    assert_eq!(by_class, found.by_class());
+    let pairs = by_class.errors.iter().zip(&found.sheet.errors);
+    assert!(pairs.into_iter().all(|(class, own)| class.half_range <= own.half_range));
 }

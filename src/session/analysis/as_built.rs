@@ -3,7 +3,7 @@
 //! Sensitivities and the quadratic form follow every edit; once the lens is still, real lenses with
 //! random errors correct them.
 
-use super::AnalysisSettings;
+use super::{AnalysisSettings, LoosestTolerances};
 use crate::lens::{Lens, ToleranceSheet};
 use crate::tolerance::{
     MadeLens, NominalLens, ToleranceAnalysis, ToleranceError, ToleranceRequest, ToleranceScene,
@@ -29,6 +29,9 @@ pub struct AsBuiltLens {
     /// The lens with the largest spot of those with random errors, or the reason why it cannot be written;
     /// `None` without such lenses.
     pub worst: Option<Result<MadeLens, String>>,
+    /// The loosest tolerances for what is asked for, or the reason why there are none; `None` if nothing
+    /// is, and without lenses with random errors.
+    pub loosest: Option<Result<LoosestTolerances, String>>,
     /// The lens as designed, resolved.
     pub nominal: NominalLens,
 }
@@ -68,6 +71,9 @@ fn as_built(
     let request = ToleranceRequest { seed: SEED, samples, limit: settings.good_rms };
     let analysis = analyze(&scene, &sheet, request)?;
     refuse_lost_lenses(analysis.lost, analysis.samples, "these tolerances")?;
+    let goal = settings.loosest.filter(|_| samples > 0);
+    let form = &analysis.forms[1];
+    let loosest = goal.map(|goal| LoosestTolerances::new((lens, &scene), form, &sheet, goal));
     let worst = worst_lens((lens, settings.zoom), &scene, &sheet, &analysis.real);
     Ok(AsBuiltLens {
         shares: analysis.growth_shares(&sheet)?,
@@ -77,6 +83,7 @@ fn as_built(
         rays: scene.beam.rays(),
         sampling_error: scene.sampling_error,
         worst: worst.map_err(|why| why.to_string()).transpose(),
+        loosest: loosest.map(|found| found.map_err(|why| why.to_string())),
         nominal: scene.lens,
     })
 }

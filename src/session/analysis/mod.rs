@@ -7,6 +7,7 @@
 mod as_built;
 mod contrast;
 mod ghosts;
+mod loosest;
 mod pupils;
 mod scene;
 mod scene_picture;
@@ -16,6 +17,7 @@ mod wavefronts;
 pub use as_built::{AsBuiltLens, confirm_as_built, predict_as_built};
 pub use contrast::{FieldContrast, FieldContrasts};
 pub use ghosts::FieldGhosts;
+pub use loosest::{LoosestGoal, LoosestTolerances};
 pub use pupils::FieldPupils;
 pub use scene::{PictureScene, SceneFile};
 pub use scene_picture::ScenePicture;
@@ -541,6 +543,9 @@ pub struct AnalysisSettings {
     /// The largest rms spot radius of a good lens in mm; `None` for no yield.
     #[serde(default)]
     pub good_rms: Option<f64>,
+    /// What the loosest tolerances are to reach; `None` to find none.
+    #[serde(default)]
+    pub loosest: Option<LoosestGoal>,
     /// The index of the wavelength of the pupils; `None` for the primary one.
     pub pupil_wavelength: Option<usize>,
 }
@@ -578,6 +583,7 @@ impl Default for AnalysisSettings {
             tolerances: false,
             grade: ToleranceGrade::default(),
             good_rms: None,
+            loosest: None,
             pupil_wavelength: None,
         }
     }

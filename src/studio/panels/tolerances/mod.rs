@@ -5,6 +5,7 @@ mod charts;
 mod compensators;
 mod correlations;
 mod errors;
+mod inverse;
 mod shares;
 mod sheet_editor;
 mod summary;
@@ -18,6 +19,7 @@ use self::add_error::ErrorForm;
 use self::compensators::CompensatorList;
 use self::correlations::CorrelationList;
 use self::errors::ErrorList;
+use self::inverse::LoosestForm;
 use self::sheet_editor::{SheetEditor, refusal};
 use super::{Panel, displayed_results, show_missing_results};
 use crate::lens::{Edit, Lens, ToleranceSheet};
@@ -38,6 +40,7 @@ pub struct TolerancesPanel {
     form: ErrorForm,
     compensators: CompensatorList,
     correlations: CorrelationList,
+    loosest: LoosestForm,
     /// The reason why the last change of the tolerances was refused.
     refused: Option<String>,
     /// The treatment of the focus of the histogram: 0 for the fixed image plane, 1 refocused.
@@ -53,6 +56,7 @@ impl Default for TolerancesPanel {
             form: ErrorForm::default(),
             compensators: CompensatorList::default(),
             correlations: CorrelationList::default(),
+            loosest: LoosestForm::default(),
             refused: None,
             focus: 1,
             latest: None,
@@ -157,6 +161,13 @@ impl TolerancesPanel {
         let title = format!("Correlations ({})", sheet.correlations.len());
         CollapsingHeader::new(title).id_salt("correlations").show(ui, |ui| {
             self.correlations.show(ui, editable, &mut editor);
+        });
+        let asked = shown.view.settings.loosest;
+        let header = CollapsingHeader::new("Loosest tolerances").id_salt("loosest");
+        header.show(ui, |ui| {
+            ui.add_enabled_ui(editable, |ui| {
+                self.loosest.show(ui, shown.made, asked, &mut editor);
+            });
         });
         refusal(ui, self.refused.as_deref());
     }

@@ -4,7 +4,7 @@
 use egui::{Button, DragValue, Response, RichText, Ui};
 
 use crate::lens::{Edit, Lens, ToleranceSheet};
-use crate::session::Command;
+use crate::session::{Command, PanelSetting};
 use crate::studio::actions::Actions;
 use crate::studio::number;
 use crate::studio::panels::valid_edit;
@@ -39,6 +39,11 @@ impl SheetEditor<'_> {
     /// Shows why a change is not possible.
     pub(super) fn refuse(&mut self, why: &str) {
         *self.refused = Some(capitalize(why));
+    }
+
+    /// Asks for a setting.
+    pub(super) fn show(&mut self, setting: PanelSetting) {
+        self.actions.push(Command::Show(setting));
     }
 
     /// Highlights a surface in every panel.
