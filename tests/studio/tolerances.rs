@@ -6,10 +6,12 @@ use aplanat::files;
 use aplanat::lens::{
     AdjustedPart, Edit, ErrorDistribution, Lens, PerturbationKind, ToleranceSheet,
 };
+use aplanat::report::{PaperKind, tolerance_sheet, tolerance_table};
 use aplanat::session::{
     AnalysisResults, AnalysisSettings, AsBuiltLens, Command, LoosestGoal, PanelSetting,
     SessionView, Timed, confirm_as_built, predict_as_built,
 };
+use aplanat::studio::file_dialog::FileRequest;
 use aplanat::studio::panels::TolerancesPanel;
 use aplanat::tolerance::ToleranceGrade;
 use egui::Key;
@@ -245,4 +247,20 @@ fn the_loosest_tolerances_are_asked_for_and_applied() {
     assert_eq!(by_class, found.by_class());
     let pairs = by_class.errors.iter().zip(&found.sheet.errors);
     assert!(pairs.into_iter().all(|(class, own)| class.half_range <= own.half_range));
+}
+
+#[test]
+fn what_the_panel_shows_is_written_as_a_table_and_as_charts() {
+    let mut harness = confirmed(achromat(), None);
+    click(&mut harness, "CSV…");
+    click(&mut harness, "PNG…");
+    let kinds = [PaperKind::ToleranceTable, PaperKind::ToleranceCharts];
+    assert_eq!(harness.state().requests, kinds.map(FileRequest::ExportPaper));
+    let made = made(&harness);
+    let table = tolerance_table(&made.sheet, &made.analysis).unwrap();
+    assert_eq!(table.lines().count(), 1 + made.sheet.errors.len());
+    let columns = table.lines().map(|line| line.split(',').count());
+    assert!(columns.into_iter().all(|count| count == 12), "{table}");
+    let sheet = tolerance_sheet("achromat", &made.sheet, &made.analysis).unwrap();
+    assert!(sheet.canvas().png().unwrap().starts_with(b"\x89PNG"));
 }

@@ -23,8 +23,10 @@ use self::inverse::LoosestForm;
 use self::sheet_editor::{SheetEditor, refusal};
 use super::{Panel, displayed_results, show_missing_results};
 use crate::lens::{Edit, Lens, ToleranceSheet};
+use crate::report::PaperKind;
 use crate::session::{AsBuiltLens, Command, PanelSetting, SessionView, Timed};
 use crate::studio::actions::Actions;
+use crate::studio::file_dialog::FileRequest;
 use crate::studio::form::named_list;
 use crate::tolerance::ToleranceGrade;
 
@@ -130,6 +132,7 @@ impl TolerancesPanel {
                 ui.horizontal_wrapped(|ui| {
                     choose_grade(ui, shown.view, Some(shown.made), actions);
                     choose_limit(ui, shown.view, shown.made, actions);
+                    export_buttons(ui, actions);
                 });
             });
             summary::facts(ui, shown.made, shown.ms);
@@ -245,6 +248,18 @@ fn choose_grade(
     let hint = "Keeps these tolerances in the lens, so that they are saved and can be changed";
     if ui.button("Keep in the lens").on_hover_text(hint).clicked() {
         actions.push(Command::Edit(Edit::SetTolerances(Some(made.sheet.clone()))));
+    }
+}
+
+/// Asks for the files that hold what the panel shows.
+fn export_buttons(ui: &mut Ui, actions: &mut Actions) {
+    for (text, kind, hint) in [
+        ("CSV…", PaperKind::ToleranceTable, "Writes the table of errors with their effects"),
+        ("PNG…", PaperKind::ToleranceCharts, "Writes the histograms, the yield and the shares"),
+    ] {
+        if ui.button(text).on_hover_text(hint).clicked() {
+            actions.push(FileRequest::ExportPaper(kind));
+        }
     }
 }
 
