@@ -47,14 +47,14 @@ const fn short_name(kind: PerturbationKind) -> (&'static str, &'static str) {
         PerturbationKind::ThicknessAdjusted => ("t adjusted", ""),
         PerturbationKind::Index => ("n", ""),
         PerturbationKind::Abbe => ("v", ""),
-        PerturbationKind::SurfaceDecenterX => ("decentre", "x"),
-        PerturbationKind::SurfaceDecenterY => ("decentre", "y"),
-        PerturbationKind::SurfaceTiltX => ("tilt", "x"),
-        PerturbationKind::SurfaceTiltY => ("tilt", "y"),
-        PerturbationKind::ElementDecenterX => ("decentre", "x"),
-        PerturbationKind::ElementDecenterY => ("decentre", "y"),
-        PerturbationKind::ElementTiltX => ("tilt", "x"),
-        PerturbationKind::ElementTiltY => ("tilt", "y"),
+        PerturbationKind::SurfaceDecenterX | PerturbationKind::ElementDecenterX => {
+            ("decentre", "x")
+        }
+        PerturbationKind::SurfaceDecenterY | PerturbationKind::ElementDecenterY => {
+            ("decentre", "y")
+        }
+        PerturbationKind::SurfaceTiltX | PerturbationKind::ElementTiltX => ("tilt", "x"),
+        PerturbationKind::SurfaceTiltY | PerturbationKind::ElementTiltY => ("tilt", "y"),
         PerturbationKind::ElementRollX => ("roll", "x"),
         PerturbationKind::ElementRollY => ("roll", "y"),
     }
@@ -88,6 +88,7 @@ mod tests {
     use super::*;
     use crate::files::{bundled_lenses, json};
     use crate::lens::{ErrorDistribution, ToleranceSheet};
+    use PerturbationKind as Kind;
 
     #[test]
     fn a_surface_has_its_half_ranges_in_a_few_words() {
@@ -101,7 +102,6 @@ mod tests {
             half_range,
             distribution: ErrorDistribution::default(),
         };
-        use PerturbationKind as Kind;
         let errors = vec![
             tolerance(Kind::Curvature, (0, 0), 0.001 * c),
             tolerance(Kind::Thickness, (0, 0), 0.05),

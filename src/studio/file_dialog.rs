@@ -101,13 +101,14 @@ impl FileRequest {
     const fn filter_name(self) -> &'static str {
         match self {
             Self::OpenField | Self::SaveField(_) => "GRIN fields",
-            Self::OpenScene | Self::SavePicture => "Pictures",
+            Self::OpenScene | Self::SavePicture | Self::ExportPaper(PaperKind::ToleranceCharts) => {
+                "Pictures"
+            }
             Self::AddGlasses => "Glass catalogues",
             Self::ExportPaper(PaperKind::Report) | Self::SaveImportReport => "Reports",
             Self::ExportPaper(PaperKind::Layout) => "Drawings",
             Self::ExportPaper(PaperKind::Solids) => "Solids",
             Self::ExportPaper(PaperKind::ToleranceTable) => "Tables",
-            Self::ExportPaper(PaperKind::ToleranceCharts) => "Pictures",
             _ => "Lenses",
         }
     }

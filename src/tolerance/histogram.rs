@@ -45,7 +45,8 @@ impl SpotHistogram {
         let start = real.iter().copied().fold(ends[0], f64::min);
         let end = real.iter().copied().fold(ends[1], f64::max);
         let lenses = analysis.samples.max(1) as f64;
-        let count = (lenses.sqrt().round() as usize).clamp(BARS[0], BARS[1]);
+        let bars = (lenses.sqrt().round() as usize).clamp(BARS[0], BARS[1]);
+        let count = if real.is_empty() { BARS[1] } else { bars };
         let step = (end - start) / count as f64;
         if !(step > 0.0 && step.is_finite()) {
             return None;

@@ -89,10 +89,9 @@ fn proposed(lens: &Lens, nominal: &NominalLens, grade: ToleranceGrade, error: Pe
     let radius = nominal.semi_diameters.get(error.first).copied().filter(|r| *r > 0.0);
     like.map_or_else(
         || match error.kind {
-            PerturbationKind::Conic => CONIC,
+            PerturbationKind::Conic | PerturbationKind::Index | PerturbationKind::Abbe => CONIC,
             PerturbationKind::Asphere => SAG / radius.unwrap_or(1.0).powi(4),
             PerturbationKind::Curvature => SAG / radius.unwrap_or(1.0).powi(2),
-            PerturbationKind::Index | PerturbationKind::Abbe => CONIC,
             PerturbationKind::Irregularity => SAG,
             kind if kind.is_angle() => DISPLACEMENT / 60.0,
             _ => DISPLACEMENT,

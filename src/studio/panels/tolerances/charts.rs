@@ -3,7 +3,7 @@
 //! Bars and the band are those of lenses whose rays were traced; lines are those of the quadratic form. The
 //! band is the interval after Wilson in which the share of good lenses lies with 95 % confidence.
 
-use egui::{RichText, Role, Ui, WidgetInfo};
+use egui::{RichText, Role, Stroke, Ui, WidgetInfo};
 use egui_plot::{Bar, BarChart, FilledArea, Line, LineStyle, PlotPoints, VLine};
 
 use crate::session::AsBuiltLens;
@@ -13,8 +13,9 @@ use crate::tolerance::{SpotHistogram, yield_band};
 
 /// The height of a chart, in points.
 const PLOT: f32 = 110.0;
-/// The opacity of a band and of bars.
+/// The opacity of a band, and of bars.
 const FAINT: f32 = 0.3;
+const BARS: f32 = 0.45;
 
 /// The names of the treatments of the focus.
 pub(super) const FOCUS: [&str; 2] = ["fixed focus", "refocused"];
@@ -35,11 +36,12 @@ pub(super) fn histogram(ui: &mut Ui, made: &AsBuiltLens, which: &mut usize) {
     let color = color32(Palette::for_visuals(ui.visuals()).field(*which));
     let shown = fixed_plot(ui, "histogram as built", PLOT).include_y(0.0).show(ui, |plot| {
         let bar = |(i, share): (usize, &f64)| {
-            Bar::new(1e3 * found.middle(i), *share).width(1e3 * found.step)
+            let bar = Bar::new(1e3 * found.middle(i), *share).width(0.95e3 * found.step);
+            bar.fill(color.gamma_multiply(BARS)).stroke(Stroke::NONE)
         };
         let bars: Vec<Bar> = found.real.iter().enumerate().map(bar).collect();
         if !bars.is_empty() {
-            plot.bar_chart(BarChart::new("lenses", bars).color(color.gamma_multiply(FAINT)));
+            plot.bar_chart(BarChart::new("lenses", bars));
         }
         let line = found.form.iter().enumerate().map(|(i, share)| [1e3 * found.middle(i), *share]);
         let line = Line::new("quadratic form", line.collect::<PlotPoints<'_>>());

@@ -40,21 +40,30 @@ impl CompensatorList {
                 hint_beside(ui.weak(title), hint);
             }
             ui.end_row();
-            for (i, own) in adjustments(editor.sheet).into_iter().enumerate() {
-                ui.label(RichText::new(part_name(own.part)).small());
-                ui.add_enabled_ui(editable, |ui| self.travel(ui, (i, own), editor));
-                let found = made.analysis.travels.iter().find(|found| found.part == own.part);
-                used(ui, found);
-                if i > 0 && editable && remove_button(ui, &part_name(own.part)) {
-                    editor.change(|sheet| {
-                        sheet.compensators.remove(i - 1);
-                    });
-                }
+            for own in adjustments(editor.sheet).into_iter().enumerate() {
+                self.row(ui, own, made, editable, editor);
                 ui.end_row();
             }
         });
         if editable {
             self.form(ui, &made.nominal, editor);
+        }
+    }
+
+    fn row(
+        &mut self,
+        ui: &mut Ui,
+        (i, own): (usize, Compensator),
+        made: &AsBuiltLens,
+        editable: bool,
+        editor: &mut SheetEditor<'_>,
+    ) {
+        ui.label(RichText::new(part_name(own.part)).small());
+        ui.add_enabled_ui(editable, |ui| self.travel(ui, (i, own), editor));
+        let found = made.analysis.travels.iter().find(|found| found.part == own.part);
+        used(ui, found);
+        if i > 0 && editable && remove_button(ui, &part_name(own.part)) {
+            editor.change(|sheet| sheet.compensators.retain(|other| other.part != own.part));
         }
     }
 

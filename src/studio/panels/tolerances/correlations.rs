@@ -33,14 +33,13 @@ impl CorrelationList {
             for (i, own) in editor.sheet.correlations.iter().enumerate() {
                 let (short, all) = names(editor.sheet, own);
                 ui.label(RichText::new(&short).small()).on_hover_text(all);
-                ui.add_enabled_ui(editable, |ui| {
-                    let name = format!("Coefficient of {short}");
-                    let field =
-                        NumberField { name: &name, unit: "", least: -1.0, most: 1.0, speed: 0.01 };
-                    if let Some(value) = self.changing.show(ui, i, own.coefficient, &field) {
-                        editor.change(|sheet| sheet.correlations[i].coefficient = value);
-                    }
-                });
+                let name = format!("Coefficient of {short}");
+                let field =
+                    NumberField { name: &name, unit: "", least: -1.0, most: 1.0, speed: 0.01 };
+                let show = |ui: &mut Ui| self.changing.show(ui, i, own.coefficient, &field);
+                if let Some(value) = ui.add_enabled_ui(editable, show).inner {
+                    editor.change(|sheet| sheet.correlations[i].coefficient = value);
+                }
                 if editable && remove_button(ui, &format!("the correlation of {short}")) {
                     editor.change(|sheet| drop(sheet.correlations.remove(i)));
                 }

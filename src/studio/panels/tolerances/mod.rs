@@ -32,8 +32,13 @@ use crate::tolerance::ToleranceGrade;
 
 /// The least width of the panel at which charts stand beside numbers, and bars beside the list.
 const BESIDE: f32 = 560.0;
+/// The least width at which the two charts stand beside each other.
+const CHARTS_BESIDE: f32 = 640.0;
 /// The least width at which the bars of groups stand beside the list of errors.
 const BARS_BESIDE: f32 = 860.0;
+
+/// The lens as it is made, or the reason why nothing is known of it.
+type MadeResult = Arc<Timed<Result<AsBuiltLens, String>>>;
 
 /// The panel.
 #[derive(Debug)]
@@ -48,7 +53,7 @@ pub struct TolerancesPanel {
     /// The treatment of the focus of the histogram: 0 for the fixed image plane, 1 refocused.
     focus: usize,
     /// The lens as it is made, as last computed, and the lens as designed.
-    latest: Option<(Arc<Timed<Result<AsBuiltLens, String>>>, Arc<Lens>)>,
+    latest: Option<(MadeResult, Arc<Lens>)>,
 }
 
 impl Default for TolerancesPanel {
@@ -93,6 +98,12 @@ impl Panel for TolerancesPanel {
     }
 }
 
+/// True while the panels show the design.
+fn shows_design(view: &SessionView) -> bool {
+    let candidate = view.candidate.as_ref().is_some_and(|candidate| candidate.shown);
+    view.preview_results.is_none() && !candidate
+}
+
 /// What the panel shows.
 struct Shown<'a> {
     view: &'a SessionView,
@@ -107,7 +118,7 @@ struct Shown<'a> {
 impl Shown<'_> {
     /// True if what is shown is of the design, not of a candidate: only its tolerances can be changed.
     fn is_design(&self) -> bool {
-        self.view.preview_results.is_none()
+        shows_design(self.view)
     }
 
     /// The tolerances: those of the design as they are now, whose effects may still be computed.
@@ -149,7 +160,7 @@ impl TolerancesPanel {
         let Some(sheet) = view.lens.tolerances.as_ref() else { return };
         let refused = &mut self.refused;
         let mut editor = SheetEditor { lens: &view.lens, sheet, refused, actions };
-        let editable = view.preview_results.is_none();
+        let editable = shows_design(view);
         ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
             self.errors.show(ui, None, editable, &mut editor);
         });
@@ -176,23 +187,35 @@ impl TolerancesPanel {
     }
 
     fn results(&mut self, ui: &mut Ui, shown: &Shown<'_>, actions: &mut Actions) {
-        let (made, limit) = (shown.made, shown.view.settings.good_rms);
-        if ui.available_width() > BESIDE {
-            ui.horizontal_top(|ui| {
-                ui.vertical(|ui| {
-                    summary::summary(ui, made);
-                    summary::worst_lens(ui, made, actions);
-                });
-                ui.vertical(|ui| {
-                    charts::histogram(ui, made, &mut self.focus);
-                    charts::yield_curve(ui, made, limit);
-                });
-            });
-        } else {
+        let made = shown.made;
+        let numbers = |ui: &mut Ui| {
             summary::summary(ui, made);
             summary::worst_lens(ui, made, actions);
-            charts::histogram(ui, made, &mut self.focus);
-            charts::yield_curve(ui, made, limit);
+        };
+        if ui.available_width() > BESIDE {
+            ui.horizontal_top(|ui| {
+                ui.vertical(numbers);
+                self.charts(ui, shown);
+            });
+        } else {
+            ui.vertical(numbers);
+            self.charts(ui, shown);
+        }
+    }
+
+    /// The charts, beside each other where there is room.
+    fn charts(&mut self, ui: &mut Ui, shown: &Shown<'_>) {
+        let (made, limit) = (shown.made, shown.view.settings.good_rms);
+        if ui.available_width() > CHARTS_BESIDE {
+            ui.columns(2, |columns| {
+                charts::histogram(&mut columns[0], made, &mut self.focus);
+                charts::yield_curve(&mut columns[1], made, limit);
+            });
+        } else {
+            ui.vertical(|ui| {
+                charts::histogram(ui, made, &mut self.focus);
+                charts::yield_curve(ui, made, limit);
+            });
         }
     }
 
