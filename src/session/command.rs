@@ -230,7 +230,7 @@ pub enum PanelSetting {
     ToleranceGrade(ToleranceGrade),
     /// The largest rms spot radius of a good lens in mm; `None` for no yield.
     GoodRms(Option<f64>),
-    /// What the loosest tolerances are to reach; `None` to find none.
+    /// The aim of the loosest tolerances; `None` to find none.
     Loosest(Option<LoosestGoal>),
     /// The index of the wavelength of the pupils; `None` for the primary one.
     PupilWavelength(Option<usize>),

@@ -8,7 +8,7 @@ use crate::tolerance::{
 use serde::{Deserialize, Serialize};
 use std::sync::atomic::AtomicBool;
 
-/// What the loosest tolerances are to reach, refocused.
+/// The aim of the loosest tolerances, refocused.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum LoosestGoal {

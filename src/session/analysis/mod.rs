@@ -543,7 +543,7 @@ pub struct AnalysisSettings {
     /// The largest rms spot radius of a good lens in mm; `None` for no yield.
     #[serde(default)]
     pub good_rms: Option<f64>,
-    /// What the loosest tolerances are to reach; `None` to find none.
+    /// The aim of the loosest tolerances; `None` to find none.
     #[serde(default)]
     pub loosest: Option<LoosestGoal>,
     /// The index of the wavelength of the pupils; `None` for the primary one.

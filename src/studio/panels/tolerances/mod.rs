@@ -104,7 +104,7 @@ fn shows_design(view: &SessionView) -> bool {
     view.preview_results.is_none() && !candidate
 }
 
-/// What the panel shows.
+/// The lens that the panel shows, as designed and as it is made.
 struct Shown<'a> {
     view: &'a SessionView,
     /// The lens as designed.
@@ -166,7 +166,7 @@ impl TolerancesPanel {
         });
     }
 
-    /// What is adjusted, and which errors are not independent.
+    /// The compensators, the correlations of errors, and the loosest tolerances.
     fn adjustments(&mut self, ui: &mut Ui, shown: &Shown<'_>, actions: &mut Actions) {
         let (refused, editable) = (&mut self.refused, shown.is_design());
         let sheet = shown.sheet();
