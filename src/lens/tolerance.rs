@@ -156,6 +156,19 @@ impl ToleranceSheet {
         self.compensators.push(compensator);
     }
 
+    /// Removes an error, from correlations too; a number that is none changes nothing.
+    pub fn remove_error(&mut self, number: usize) {
+        if number >= self.errors.len() {
+            return;
+        }
+        self.errors.remove(number);
+        for ErrorCorrelation { errors, .. } in &mut self.correlations {
+            errors.retain(|own| *own != number);
+            errors.iter_mut().for_each(|own| *own -= usize::from(*own > number));
+        }
+        self.correlations.retain(|correlation| correlation.errors.len() > 1);
+    }
+
     fn check_compensators(&self, surfaces: usize) -> Result<(), LensError> {
         for (place, compensator) in self.compensators.iter().enumerate() {
             compensator.check(surfaces)?;
@@ -216,5 +229,28 @@ impl ToleranceSheet {
             Some(Compensator { part, ..*own })
         };
         self.compensators = self.compensators.iter().filter_map(compensator).collect();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn correlations_follow_the_errors_that_stay() {
+        let error = |surface| Tolerance {
+            error: Perturbation::of_surface(PerturbationKind::Thickness, surface),
+            half_range: 0.1,
+            distribution: ErrorDistribution::default(),
+        };
+        let mut sheet = ToleranceSheet::of_errors((0..4).map(error).collect());
+        let correlation =
+            |errors: &[usize]| ErrorCorrelation { errors: errors.to_vec(), coefficient: 0.5 };
+        sheet.correlations = vec![correlation(&[0, 1]), correlation(&[0, 2, 3])];
+        sheet.remove_error(1);
+        assert_eq!(sheet.errors.len(), 3);
+        assert_eq!(sheet.correlations, [correlation(&[0, 1, 2])]);
+        sheet.remove_error(7);
+        assert_eq!(sheet.errors.len(), 3);
     }
 }

@@ -1,6 +1,7 @@
 //! Results as files and drawings: Pareto fronts, GRIN fields and their images; the prescription report of
 //! a lens, its layout, its elements and its bill of material.
 
+mod as_built_file;
 mod body;
 mod element_drawing;
 mod error;
@@ -15,7 +16,9 @@ mod prescription;
 mod prescription_tables;
 mod sheet;
 mod step;
+mod surface_tolerances;
 
+pub use as_built_file::{tolerance_sheet, tolerance_table};
 pub use body::{BodyError, LensBody, lens_bodies};
 pub use element_drawing::element_drawing;
 pub use error::ReportError;
@@ -28,3 +31,4 @@ pub use paper_file::{
 pub use pareto::ParetoReport;
 pub use prescription::{ReportSettings, prescription_report};
 pub use sheet::scale_text;
+pub use surface_tolerances::surface_tolerances;

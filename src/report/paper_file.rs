@@ -21,6 +21,10 @@ pub enum PaperKind {
     Layout,
     /// The elements as solids: .step or .stp.
     Solids,
+    /// The errors of making with their effects: .csv.
+    ToleranceTable,
+    /// The lenses that are made: .png.
+    ToleranceCharts,
 }
 
 impl PaperKind {
@@ -30,6 +34,8 @@ impl PaperKind {
             Self::Report => &["pdf", "html"],
             Self::Layout => &["pdf", "svg", "dxf"],
             Self::Solids => &["step", "stp"],
+            Self::ToleranceTable => &["csv"],
+            Self::ToleranceCharts => &["png"],
         }
     }
 }

@@ -2,6 +2,7 @@
 
 use super::first_order_table::first_order_numbers;
 use super::materials::{index_and_abbe, material_name};
+use super::surface_tolerances::surface_tolerances;
 use crate::lens::{AxisBreak, Lens, Parameter, Quantity, Row, SurfaceAperture, SurfaceNumber};
 use crate::math::ShortNumber;
 use crate::paraxial::FirstOrder;
@@ -20,6 +21,9 @@ pub(super) fn add_prescription(document: &mut ReportDocument, lens: &Lens) {
     [form_table(lens), gradient_table(lens), place_table(lens), zoom_table(lens)]
         .into_iter()
         .for_each(|table| document.table(table));
+    if lens.tolerances.is_some() {
+        document.table(tolerance_table(lens));
+    }
     document.text(
         "Numbers are rounded to seven digits; the lens file has all of them. The thickness of the last \
          surface leads to the image plane. A semi-diameter clips rays.",
@@ -141,6 +145,19 @@ fn place_table(lens: &Lens) -> DocumentTable {
         }
         if let Some(axis) = &row.break_after {
             table.row(broken("axis behind", axis));
+        }
+    }
+    table
+}
+
+/// The half ranges of each surface that has some.
+fn tolerance_table(lens: &Lens) -> DocumentTable {
+    let heads = ["surface", "tolerances: half ranges in mm, angles in minutes of arc"];
+    let mut table = DocumentTable::new(&heads, &[0, 1]);
+    for i in 0..lens.surfaces.len() {
+        let text = surface_tolerances(lens, i);
+        if !text.is_empty() {
+            table.row([SurfaceNumber::new(i).to_string(), text]);
         }
     }
     table

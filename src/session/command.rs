@@ -1,6 +1,6 @@
 //! The commands of a session.
 
-use super::analysis::SceneFile;
+use super::analysis::{LoosestGoal, SceneFile};
 use super::grin_design::GrinCommand;
 use super::specified_design::SpecifiedDesignCommand;
 use super::structure_search::StructureSearchCommand;
@@ -230,6 +230,8 @@ pub enum PanelSetting {
     ToleranceGrade(ToleranceGrade),
     /// The largest rms spot radius of a good lens in mm; `None` for no yield.
     GoodRms(Option<f64>),
+    /// The aim of the loosest tolerances; `None` to find none.
+    Loosest(Option<LoosestGoal>),
     /// The index of the wavelength of the pupils; `None` for the primary one.
     PupilWavelength(Option<usize>),
 }

@@ -35,7 +35,8 @@ mod view;
 pub use analysis::{
     Analyses, AnalysisResults, AnalysisSettings, AsBuiltLens, FieldContrast, FieldContrasts,
     FieldFans, FieldFootprints, FieldGhosts, FieldPupils, FieldWavefront, FieldWavefronts,
-    PictureScene, PointImage, PointImages, SceneFile, ScenePicture, analyze, predict_as_built,
+    LoosestGoal, LoosestTolerances, PictureScene, PointImage, PointImages, SceneFile, ScenePicture,
+    analyze, confirm_as_built, predict_as_built,
 };
 pub use clock::Timed;
 pub use command::{Command, PanelSetting};

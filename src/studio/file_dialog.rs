@@ -73,6 +73,8 @@ impl FileRequest {
             Self::ExportPaper(PaperKind::Report) => "Export the prescription report",
             Self::ExportPaper(PaperKind::Layout) => "Export the drawing of the layout",
             Self::ExportPaper(PaperKind::Solids) => "Export the elements as solids",
+            Self::ExportPaper(PaperKind::ToleranceTable) => "Export the table of tolerances",
+            Self::ExportPaper(PaperKind::ToleranceCharts) => "Export the charts of tolerances",
         }
     }
 
@@ -99,11 +101,14 @@ impl FileRequest {
     const fn filter_name(self) -> &'static str {
         match self {
             Self::OpenField | Self::SaveField(_) => "GRIN fields",
-            Self::OpenScene | Self::SavePicture => "Pictures",
+            Self::OpenScene | Self::SavePicture | Self::ExportPaper(PaperKind::ToleranceCharts) => {
+                "Pictures"
+            }
             Self::AddGlasses => "Glass catalogues",
             Self::ExportPaper(PaperKind::Report) | Self::SaveImportReport => "Reports",
             Self::ExportPaper(PaperKind::Layout) => "Drawings",
             Self::ExportPaper(PaperKind::Solids) => "Solids",
+            Self::ExportPaper(PaperKind::ToleranceTable) => "Tables",
             _ => "Lenses",
         }
     }

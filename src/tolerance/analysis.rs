@@ -45,6 +45,8 @@ pub struct ToleranceAnalysis {
     /// The mean relative change of the mean square spot, at the fixed image plane and refocused, and
     /// the mean share of light lost where rims clip, which the spots leave out; `None` without rays.
     pub clipping: Option<[f64; 3]>,
+    /// The lenses with random errors whose rays were traced.
+    pub real: Vec<RealLens>,
 }
 
 /// The spot of lenses that are made, as an rms radius over all fields.
@@ -182,6 +184,7 @@ pub fn analyze_until(
         with_rims,
         dark,
         clipping,
+        real,
     })
 }
 

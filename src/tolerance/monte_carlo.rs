@@ -168,7 +168,7 @@ struct FieldColumns {
 }
 
 impl BeamColumns {
-    fn new(beam: &Beam) -> Self {
+    pub(super) fn new(beam: &Beam) -> Self {
         let colour = |colour: &super::ColourRays| {
             (colour.wavelength, colour.rays.iter().copied().collect(), colour.weights.clone())
         };

@@ -1,6 +1,12 @@
 //! The table of the prescription as a spreadsheet: cursor, ranges, clipboard, semi-diameters.
 
-use aplanat::lens::{Edit, Lens, Parameter, Quantity, Variable, blank};
+use std::path::Path;
+
+use aplanat::lens::{
+    Edit, ErrorDistribution, Lens, Parameter, Perturbation, PerturbationKind, Quantity, Tolerance,
+    ToleranceSheet, Variable, blank,
+};
+use aplanat::report::{ReportSettings, report_bytes};
 use aplanat::session::{CandidateSource, CandidateView, Command, SessionView};
 use aplanat::studio::panels::PrescriptionPanel;
 use egui::accesskit::Role;
@@ -506,4 +512,34 @@ fn the_numbers_of_the_rows_stay_while_the_columns_are_scrolled() {
     harness.get_by_label("Row of surface 3").click();
     harness.run();
     assert_eq!(harness.state().view.selected, Some(2));
+}
+
+/// The half ranges of a lens stand beside its surfaces, in the table and in the report; a lens without has
+/// no such column.
+#[test]
+fn tolerances_stand_beside_the_surfaces() {
+    let lens = double_gauss();
+    let harness = table(lens.clone());
+    assert!(harness.query_by_label("Tolerances").is_none());
+    let error = |kind| Perturbation::of_surface(kind, 0);
+    let tolerance = |kind, half_range| Tolerance {
+        error: error(kind),
+        half_range,
+        distribution: ErrorDistribution::default(),
+    };
+    let angle = (2.0_f64 / 60.0).to_radians();
+    let errors = vec![
+        tolerance(PerturbationKind::Curvature, 0.001 * lens.surfaces[0].curvature),
+        tolerance(PerturbationKind::Thickness, 0.05),
+        tolerance(PerturbationKind::SurfaceTiltX, angle),
+        tolerance(PerturbationKind::SurfaceTiltY, angle),
+    ];
+    let lens = Lens { tolerances: Some(ToleranceSheet::of_errors(errors)), ..lens };
+    let harness = table(lens.clone());
+    harness.get_by_label("Tolerances");
+    harness.get_by_label("Tolerances of surface 1: R 0.1 %, t 0.05, tilt 2'");
+    let settings = ReportSettings { tolerance: 0.01 };
+    let (bytes, _) = report_bytes(&lens, settings, Path::new("report.html")).unwrap();
+    let text = String::from_utf8(bytes).unwrap();
+    assert!(text.contains("R 0.1 %, t 0.05, tilt 2"), "no tolerances in the report");
 }

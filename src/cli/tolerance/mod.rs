@@ -13,10 +13,10 @@ use crate::cli::progress::{note_if_stopped, stop_flag};
 use crate::files;
 use crate::lens::{Compensator, Lens, PerturbationKind, SurfaceNumber, Tolerance, ToleranceSheet};
 use crate::tolerance::{
-    AsBuiltSpot, Derivatives, NominalLens, PriceClass, QuadraticForm, StoppedLenses,
-    ToleranceAnalysis, ToleranceError, ToleranceGrade, ToleranceRequest, ToleranceScene,
-    analyze_until, bounded_tolerances, form_yield, graded_sheet, loosest_for_yield,
-    loosest_tolerances, price_classes, real_lenses, refuse_lost_lenses,
+    AsBuiltSpot, Derivatives, MadeLens, NominalLens, PriceClass, QuadraticForm, RealLens,
+    StoppedLenses, ToleranceAnalysis, ToleranceError, ToleranceGrade, ToleranceRequest,
+    ToleranceScene, analyze_until, bounded_tolerances, form_yield, graded_sheet, loosest_for_yield,
+    loosest_tolerances, price_classes, real_lenses, refuse_lost_lenses, worst_lens,
 };
 use power::PowerUnits;
 use serde::Serialize;
@@ -76,15 +76,18 @@ pub(super) struct ToleranceArgs {
     /// A file for the table of sensitivities, as CSV
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
+
+    /// A file for the lens with the largest refocused spot of those with random errors, as a lens of its
+    /// own (.json, .zmx)
+    #[arg(long, value_name = "FILE")]
+    worst: Option<PathBuf>,
 }
 
 impl ToleranceArgs {
     pub(super) fn run(&self, output: &Output) -> Result<(), CliError> {
-        OutputPaths::reading([("the lens", self.lens.path())]).file(
-            "--csv",
-            self.csv.as_deref(),
-            &["csv"],
-        )?;
+        let mut paths = OutputPaths::reading([("the lens", self.lens.path())]);
+        paths.file("--csv", self.csv.as_deref(), &["csv"])?;
+        paths.file("--worst", self.worst.as_deref(), &["json", "zmx"])?;
         self.check_lengths()?;
         let opened = self.lens.open()?;
         opened.check_zoom(self.zoom)?;
@@ -109,14 +112,33 @@ impl ToleranceArgs {
             }
             None => None,
         };
-        let report =
+        let worst = self.worst(&opened, &scene, &sheet, &analysis.real).map_err(refuse)?;
+        let mut report =
             ToleranceReport::new(self, &scene, &sheet, analysis, loosest).map_err(refuse)?;
+        report.worst = worst.as_ref().map(WorstLens::new);
         let mut failures = Failures::default();
         if let Some(path) = &self.csv {
             failures.note(files::write_atomic(path, report.csv().as_bytes()));
         }
+        if let (Some(path), Some(worst)) = (&self.worst, &worst) {
+            failures.note(files::save(&worst.lens, path));
+        }
         failures.note(output.print(&report));
         failures.into_result()
+    }
+
+    /// The worst lens, if it is asked for.
+    fn worst(
+        &self,
+        opened: &LoadedLens,
+        scene: &ToleranceScene,
+        sheet: &ToleranceSheet,
+        real: &[RealLens],
+    ) -> Result<Option<MadeLens>, ToleranceError> {
+        if self.worst.is_none() {
+            return Ok(None);
+        }
+        worst_lens((&opened.lens, self.zoom), scene, sheet, real)
     }
 
     /// The loosest tolerances that are asked for.
@@ -187,7 +209,26 @@ struct ToleranceReport {
     sensitivities: Vec<SensitivityRow>,
     loosest: Option<Vec<Tolerance>>,
     prices: Option<LoosestPrices>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    worst: Option<WorstLens>,
     warnings: Vec<String>,
+}
+
+/// The worst of the lenses with random errors.
+#[derive(Serialize)]
+struct WorstLens {
+    /// Its number, counted from 0.
+    number: usize,
+    /// Its refocused rms spot radius in mm.
+    rms: f64,
+    /// The same by rays through the lens that is written.
+    written_rms: Option<f64>,
+}
+
+impl WorstLens {
+    fn new(made: &MadeLens) -> Self {
+        Self { number: made.number, rms: made.stated_rms, written_rms: made.traced_rms }
+    }
 }
 
 /// The loosest tolerances.
@@ -332,6 +373,7 @@ impl ToleranceReport {
             spots: analysis.spots,
             loosest,
             prices,
+            worst: None,
             warnings,
         })
     }
@@ -465,6 +507,13 @@ impl Display for ToleranceReport {
                      the quadratic model"
                 )?;
             }
+        }
+        if let Some(WorstLens { number, rms, written_rms }) = &self.worst {
+            let written = written_rms.map_or_else(String::new, |written| {
+                format!(", {} mm by the same rays as it is written", ShortNumber(written))
+            });
+            let (number, rms) = (number + 1, ShortNumber(*rms));
+            writeln!(f, "worst lens: number {number}, refocused rms {rms} mm{written}")?;
         }
         self.warnings.iter().try_for_each(|warning| writeln!(f, "warning: {warning}"))
     }

@@ -3,11 +3,11 @@
 //! Sensitivities and the quadratic form follow every edit; once the lens is still, real lenses with
 //! random errors correct them.
 
-use super::AnalysisSettings;
+use super::{AnalysisSettings, LoosestTolerances};
 use crate::lens::{Lens, ToleranceSheet};
 use crate::tolerance::{
-    ToleranceAnalysis, ToleranceError, ToleranceRequest, ToleranceScene, analyze, graded_sheet,
-    refuse_lost_lenses,
+    MadeLens, NominalLens, ToleranceAnalysis, ToleranceError, ToleranceRequest, ToleranceScene,
+    analyze, graded_sheet, refuse_lost_lenses, worst_lens,
 };
 
 /// The tolerances of a lens and what they do to it.
@@ -26,6 +26,14 @@ pub struct AsBuiltLens {
     pub rays: usize,
     /// The largest relative error of the radius of a spot by the sampling of its pupil.
     pub sampling_error: f64,
+    /// The lens with the largest spot of those with random errors, or the reason why it cannot be written;
+    /// `None` without such lenses.
+    pub worst: Option<Result<MadeLens, String>>,
+    /// The loosest tolerances for what is asked for, or the reason why there are none; `None` if nothing
+    /// is, and without lenses with random errors.
+    pub loosest: Option<Result<LoosestTolerances, String>>,
+    /// The lens as designed, resolved.
+    pub nominal: NominalLens,
 }
 
 /// The relative error of spots while the lens changes.
@@ -44,10 +52,10 @@ pub fn predict_as_built(lens: &Lens, settings: &AnalysisSettings) -> Result<AsBu
 }
 
 /// The lens as it is made, corrected by real lenses.
-pub(super) fn confirm_as_built(
-    lens: &Lens,
-    settings: &AnalysisSettings,
-) -> Result<AsBuiltLens, String> {
+///
+/// # Errors
+/// As those of [`predict_as_built`].
+pub fn confirm_as_built(lens: &Lens, settings: &AnalysisSettings) -> Result<AsBuiltLens, String> {
     as_built(lens, settings, settings.tolerance, REAL_LENSES).map_err(|why| why.to_string())
 }
 
@@ -63,6 +71,10 @@ fn as_built(
     let request = ToleranceRequest { seed: SEED, samples, limit: settings.good_rms };
     let analysis = analyze(&scene, &sheet, request)?;
     refuse_lost_lenses(analysis.lost, analysis.samples, "these tolerances")?;
+    let goal = settings.loosest.filter(|_| samples > 0);
+    let form = &analysis.forms[1];
+    let loosest = goal.map(|goal| LoosestTolerances::new((lens, &scene), form, &sheet, goal));
+    let worst = worst_lens((lens, settings.zoom), &scene, &sheet, &analysis.real);
     Ok(AsBuiltLens {
         shares: analysis.growth_shares(&sheet)?,
         sheet,
@@ -70,5 +82,8 @@ fn as_built(
         analysis,
         rays: scene.beam.rays(),
         sampling_error: scene.sampling_error,
+        worst: worst.map_err(|why| why.to_string()).transpose(),
+        loosest: loosest.map(|found| found.map_err(|why| why.to_string())),
+        nominal: scene.lens,
     })
 }

@@ -7,15 +7,17 @@
 mod as_built;
 mod contrast;
 mod ghosts;
+mod loosest;
 mod pupils;
 mod scene;
 mod scene_picture;
 mod slow;
 mod wavefronts;
 
-pub use as_built::{AsBuiltLens, predict_as_built};
+pub use as_built::{AsBuiltLens, confirm_as_built, predict_as_built};
 pub use contrast::{FieldContrast, FieldContrasts};
 pub use ghosts::FieldGhosts;
+pub use loosest::{LoosestGoal, LoosestTolerances};
 pub use pupils::FieldPupils;
 pub use scene::{PictureScene, SceneFile};
 pub use scene_picture::ScenePicture;
@@ -288,8 +290,7 @@ fn refine(mut results: AnalysisResults, output: &AnalysisOutput) -> AnalysisResu
     }
     let (zoom, scene) = (settings.zoom, settings.picture_scene());
     if settings.tolerances {
-        let confirmed =
-            time(|| catch_panic(|| as_built::confirm_as_built(&results.lens, &settings)));
+        let confirmed = time(|| catch_panic(|| confirm_as_built(&results.lens, &settings)));
         analyses.as_built = Some(Arc::new(confirmed));
     }
     if settings.picture && !output.is_interrupted() {
@@ -542,6 +543,9 @@ pub struct AnalysisSettings {
     /// The largest rms spot radius of a good lens in mm; `None` for no yield.
     #[serde(default)]
     pub good_rms: Option<f64>,
+    /// The aim of the loosest tolerances; `None` to find none.
+    #[serde(default)]
+    pub loosest: Option<LoosestGoal>,
     /// The index of the wavelength of the pupils; `None` for the primary one.
     pub pupil_wavelength: Option<usize>,
 }
@@ -579,6 +583,7 @@ impl Default for AnalysisSettings {
             tolerances: false,
             grade: ToleranceGrade::default(),
             good_rms: None,
+            loosest: None,
             pupil_wavelength: None,
         }
     }

@@ -60,11 +60,21 @@ impl Session {
         match self.number_in_search(lens) {
             Some(number) => format!("lens {number} of the search"),
             None if self.pareto.has_found(lens) => "a lens of the Pareto front".to_owned(),
+            None if self.is_worst_made(lens) => "the worst of the lenses as made".to_owned(),
             None if self.specified_design.has_found(lens) => {
                 "a lens from a specification".to_owned()
             }
             None => "a changed lens".to_owned(),
         }
+    }
+
+    /// True for the lens with the largest spot of those with random errors of making.
+    fn is_worst_made(&self, lens: &Lens) -> bool {
+        let results = self.analysis.latest();
+        let made = results.as_ref().and_then(|own| own.analyses.as_ref().ok()?.as_built.as_ref());
+        let made = made.and_then(|made| made.value.as_ref().ok());
+        let worst = made.and_then(|made| made.worst.as_ref()?.as_ref().ok());
+        worst.is_some_and(|worst| worst.lens == *lens)
     }
 
     /// The number of a lens in the structure search; `None` if the search has not found it.

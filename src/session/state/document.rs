@@ -8,6 +8,7 @@ use crate::picture::{BitDepth, ToneCurve, encode_png};
 use crate::pupil::{RayModel, limited_by_stop};
 use crate::report::{
     PaperKind, ReportSettings, drawing_bytes, has_extension, report_bytes, solids_file,
+    tolerance_sheet, tolerance_table,
 };
 use crate::session::ScenePicture;
 use crate::session::history::{DesignHistory, VersionOrigin};
@@ -265,6 +266,23 @@ impl Session {
         }
     }
 
+    /// The tolerances that the panel shows, as a table or as charts.
+    fn tolerance_bytes(&self, kind: PaperKind) -> Result<Vec<u8>, String> {
+        let results = self.results();
+        let analyses = results.as_ref().and_then(|results| results.analyses.as_ref().ok());
+        let made = analyses.and_then(|analyses| analyses.as_built.clone());
+        let made = made.ok_or("no tolerances are computed yet; open the panel Tolerances")?;
+        let made = made.value.as_ref().map_err(Clone::clone)?;
+        let (sheet, analysis) = (&made.sheet, &made.analysis);
+        if kind == PaperKind::ToleranceTable {
+            let table = tolerance_table(sheet, analysis).map_err(|why| why.to_string())?;
+            return Ok(table.into_bytes());
+        }
+        let charts = tolerance_sheet(&self.lens.name, sheet, analysis);
+        let canvas = charts.map_err(|why| why.to_string())?.canvas();
+        canvas.png().map_err(|why| why.to_string())
+    }
+
     fn write_paper(&self, kind: PaperKind, path: &Path) -> Result<(), String> {
         let allowed = kind.extensions();
         if !allowed.iter().any(|extension| has_extension(path, extension)) {
@@ -279,6 +297,10 @@ impl Session {
             }
             PaperKind::Solids => {
                 solids_file(&self.lens, zoom, None).map(|file| file.text.into_bytes())
+            }
+            PaperKind::ToleranceTable | PaperKind::ToleranceCharts => {
+                let bytes = self.tolerance_bytes(kind)?;
+                return files::write_atomic(path, &bytes).map_err(|why| why.to_string());
             }
         };
         let bytes = bytes.map_err(|why| why.to_string())?;

@@ -301,6 +301,7 @@ impl Session {
             PanelSetting::Tolerances(shown) => settings.tolerances = shown,
             PanelSetting::ToleranceGrade(grade) => settings.grade = grade,
             PanelSetting::GoodRms(rms) => settings.good_rms = rms,
+            PanelSetting::Loosest(goal) => settings.loosest = goal,
             PanelSetting::PupilWavelength(wavelength) => settings.pupil_wavelength = wavelength,
         });
         self.message_is_recent = is_recent;

@@ -8,3 +8,4 @@ mod derivatives;
 mod hard_cases;
 mod rays;
 mod reference;
+mod worst;

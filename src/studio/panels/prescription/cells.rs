@@ -6,6 +6,7 @@ use super::columns::{TableColumn, parameter_name};
 use super::glass;
 use crate::lens::{Edit, Lens, Object, Parameter, Quantity, apertures_text, parse_apertures};
 use crate::math::expression::evaluate;
+use crate::report::surface_tolerances;
 use crate::studio::number;
 
 /// The row of the object; surfaces follow from 1, and the image is the last row.
@@ -42,12 +43,13 @@ impl CellPlace {
         }
     }
 
-    /// True unless the column is one of gradients and the surface has none.
+    /// True unless the column is one of gradients and the surface has none, or one that is only shown.
     fn has_value(self, lens: &Lens, surface: usize) -> bool {
         match self.column {
             TableColumn::Grin(term) => {
                 lens.get(Parameter::new(surface, Quantity::Grin(term))).is_some()
             }
+            TableColumn::Tolerances => false,
             _ => true,
         }
     }
@@ -77,6 +79,7 @@ impl CellPlace {
         match self.column {
             TableColumn::Glass => glass::format_medium(&row.medium),
             TableColumn::Comment => row.comment.clone(),
+            TableColumn::Tolerances => surface_tolerances(lens, surface),
             TableColumn::Obstruction => row.obstruction.map(show).unwrap_or_default(),
             // What is edited here is read again as a whole: a number that was not touched keeps its digits.
             TableColumn::Apertures => apertures_text(&row.apertures),
@@ -147,6 +150,7 @@ impl CellPlace {
             | TableColumn::SemiDiameter
             | TableColumn::Obstruction
             | TableColumn::Apertures
+            | TableColumn::Tolerances
             | TableColumn::Comment => "",
         }
     }

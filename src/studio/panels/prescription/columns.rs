@@ -22,6 +22,7 @@ pub(super) enum TableColumn {
     Apertures,
     Asphere(usize),
     Grin(usize),
+    Tolerances,
     Comment,
 }
 
@@ -53,6 +54,7 @@ impl TableColumn {
             Self::Apertures => "Apertures",
             Self::Asphere(term) => ASPHERE_TITLES.get(term).copied().unwrap_or("r¹⁶"),
             Self::Grin(term) => GRIN_TITLES.get(term).copied().unwrap_or("GRIN z⁴"),
+            Self::Tolerances => "Tolerances",
             Self::Comment => "Remark",
         }
     }
@@ -87,6 +89,11 @@ impl TableColumn {
             }
             Self::Asphere(_) => "Coefficient of the even asphere, in powers of mm",
             Self::Grin(_) => "Coefficient of the gradient behind the surface, in powers of mm",
+            Self::Tolerances => {
+                "Half ranges of the surface, of the gap behind it and of the elements that begin with it: \
+                 R radius, t thickness, n index, v Abbe number, irr irregularity; lengths in mm. They are \
+                 changed in the panel Tolerances."
+            }
             Self::Comment => "A remark on the surface",
         }
     }
@@ -100,6 +107,7 @@ impl TableColumn {
             Self::Conic => Width::initial(76.0).at_least(50.0),
             Self::Obstruction => Width::initial(86.0).at_least(60.0),
             Self::Asphere(_) | Self::Grin(_) => Width::initial(112.0).at_least(60.0),
+            Self::Tolerances => Width::initial(190.0).at_least(60.0).clip(true),
             Self::Apertures => Width::initial(230.0).at_least(60.0).clip(true),
             Self::Comment => Width::remainder().at_least(60.0).clip(true),
         }
@@ -111,7 +119,7 @@ impl TableColumn {
 
     /// True for text, which stands to the left.
     pub(super) const fn is_text(self) -> bool {
-        matches!(self, Self::Glass | Self::Comment | Self::Apertures)
+        matches!(self, Self::Glass | Self::Comment | Self::Apertures | Self::Tolerances)
     }
 
     /// The number in a row of this column; `None` for text, and for what no optimizer changes.
@@ -123,7 +131,11 @@ impl TableColumn {
             Self::Conic => Quantity::Conic,
             Self::Asphere(term) => Quantity::Asphere(term),
             Self::Grin(term) => Quantity::Grin(term),
-            Self::Glass | Self::Comment | Self::Obstruction | Self::Apertures => return None,
+            Self::Glass
+            | Self::Comment
+            | Self::Obstruction
+            | Self::Apertures
+            | Self::Tolerances => return None,
         };
         Some(lens.parameter_at(zoom, surface, quantity))
     }
@@ -171,6 +183,9 @@ fn needed(lens: &Lens) -> Vec<TableColumn> {
     });
     let gradients: BTreeSet<usize> = written.flatten().collect();
     columns.extend(gradients.into_iter().map(TableColumn::Grin));
+    if lens.tolerances.is_some() {
+        columns.push(TableColumn::Tolerances);
+    }
     columns.push(TableColumn::Comment);
     columns
 }

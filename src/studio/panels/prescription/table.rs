@@ -3,7 +3,8 @@
 use std::sync::Arc;
 
 use egui::{
-    Align, Color32, Id, Label, Layout, Rect, RichText, ScrollArea, Sense, Stroke, Ui, vec2,
+    Align, Color32, Id, Label, Layout, Rect, RichText, Role, ScrollArea, Sense, Stroke, Ui,
+    WidgetInfo, vec2,
 };
 use egui_extras::{TableBuilder, TableRow};
 
@@ -127,7 +128,22 @@ impl PrescriptionTable<'_> {
                 self.range_border(ui, place);
             }
             self.editable_cell(ui, place);
+        } else if place.column == TableColumn::Tolerances {
+            self.tolerance_cell(ui, place);
         }
+    }
+
+    /// The half ranges of a surface, which are changed elsewhere.
+    fn tolerance_cell(&self, ui: &mut Ui, place: CellPlace) {
+        let text = place.text(&self.lens, self.view.settings.zoom, number::format_number);
+        if text.is_empty() {
+            return;
+        }
+        ui.add_space(MARGIN);
+        let label = Label::new(RichText::new(&text).small()).truncate().sense(Sense::hover());
+        let label = ui.add(label).on_hover_text(&text);
+        let name = format!("{}: {text}", place.name(&self.lens, self.view.settings.zoom));
+        label.widget_info(|| WidgetInfo::labeled(Role::Label, true, &name));
     }
 
     /// The border of the range, which stands out in the row that is selected too.
