@@ -6,8 +6,8 @@
 use super::AnalysisSettings;
 use crate::lens::{Lens, ToleranceSheet};
 use crate::tolerance::{
-    ToleranceAnalysis, ToleranceError, ToleranceRequest, ToleranceScene, analyze, graded_sheet,
-    refuse_lost_lenses,
+    ErrorModel, SecondDerivatives, StopTest, ToleranceAnalysis, ToleranceError, ToleranceRequest,
+    ToleranceScene, graded_sheet, refuse_lost_lenses,
 };
 
 /// The tolerances of a lens and what they do to it.
@@ -40,28 +40,51 @@ const SEED: u64 = 1;
 /// # Errors
 /// A lens that no light gets through, or a tolerance that is not possible, in words.
 pub fn predict_as_built(lens: &Lens, settings: &AnalysisSettings) -> Result<AsBuiltLens, String> {
-    as_built(lens, settings, COARSE.max(settings.tolerance), 0).map_err(|why| why.to_string())
+    let tolerance = COARSE.max(settings.tolerance);
+    as_built(lens, settings, (tolerance, 0), &|| false).map_err(|why| why.to_string())
 }
 
-/// The lens as it is made, corrected by real lenses.
+/// The same; `None` once `stop` says so.
+pub(super) fn predict_unless(
+    lens: &Lens,
+    settings: &AnalysisSettings,
+    stop: StopTest<'_>,
+) -> Option<Result<AsBuiltLens, String>> {
+    let tolerance = COARSE.max(settings.tolerance);
+    unless_stopped(as_built(lens, settings, (tolerance, 0), stop))
+}
+
+fn unless_stopped(
+    found: Result<AsBuiltLens, ToleranceError>,
+) -> Option<Result<AsBuiltLens, String>> {
+    match found {
+        Err(ToleranceError::Stopped) => None,
+        found => Some(found.map_err(|why| why.to_string())),
+    }
+}
+
+/// The lens as it is made, corrected by real lenses: by fewer of them, or not at all, once `stop` says
+/// so.
 pub(super) fn confirm_as_built(
     lens: &Lens,
     settings: &AnalysisSettings,
-) -> Result<AsBuiltLens, String> {
-    as_built(lens, settings, settings.tolerance, REAL_LENSES).map_err(|why| why.to_string())
+    stop: StopTest<'_>,
+) -> Option<Result<AsBuiltLens, String>> {
+    unless_stopped(as_built(lens, settings, (settings.tolerance, REAL_LENSES), stop))
 }
 
 fn as_built(
     lens: &Lens,
     settings: &AnalysisSettings,
-    tolerance: f64,
-    samples: usize,
+    (tolerance, samples): (f64, usize),
+    stop: StopTest<'_>,
 ) -> Result<AsBuiltLens, ToleranceError> {
-    let scene = ToleranceScene::new(lens, settings.zoom, tolerance)?;
+    let scene = ToleranceScene::new_until(lens, settings.zoom, tolerance, stop)?;
     let graded = || graded_sheet(lens, &scene.lens, settings.grade);
     let sheet = lens.tolerances.clone().unwrap_or_else(graded);
     let request = ToleranceRequest { seed: SEED, samples, limit: settings.good_rms };
-    let analysis = analyze(&scene, &sheet, request)?;
+    let model = ErrorModel::new(&scene, &sheet, SecondDerivatives::default(), stop)?;
+    let analysis = model.analyze(&scene, &sheet, request, stop)?;
     refuse_lost_lenses(analysis.lost, analysis.samples, "these tolerances")?;
     Ok(AsBuiltLens {
         shares: analysis.growth_shares(&sheet)?,

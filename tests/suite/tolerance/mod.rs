@@ -5,6 +5,8 @@ mod as_built_term;
 mod compensators;
 mod correlations;
 mod derivatives;
+mod further;
 mod hard_cases;
+mod many_errors;
 mod rays;
 mod reference;
