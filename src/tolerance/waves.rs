@@ -85,6 +85,14 @@ impl WavefrontModel {
         pairs.map(|(t, by)| by.map(|by| half(t.deviation()) * by.second)).collect()
     }
 
+    /// The share of each error in the sum of these.
+    pub fn growth_shares(&self, sheet: &ToleranceSheet) -> Vec<[f64; 2]> {
+        let growth = self.growth(sheet);
+        let total = |i: usize| growth.iter().map(|by| by[i]).sum::<f64>().abs();
+        let totals = [0, 1].map(|i| total(i).max(f64::MIN_POSITIVE));
+        growth.iter().map(|by| [by[0] / totals[0], by[1] / totals[1]]).collect()
+    }
+
     /// The root of the expected variance of lenses that are made in waves, at the fixed image plane and
     /// refocused: errors count as independent.
     pub fn expected_rms(&self, sheet: &ToleranceSheet) -> [f64; 2] {

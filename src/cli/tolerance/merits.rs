@@ -131,15 +131,6 @@ impl FurtherMerits {
         wavefront.chain(self.mtf.iter().map(|_| "MTF at worst")).collect()
     }
 
-    /// The cells of an error in these columns, refocused.
-    pub(super) fn cells(&self, row: &FurtherRow) -> Vec<String> {
-        let wavefront = row.wavefront.iter().map(|own| percent(own.refocused.share));
-        let worst = |own: &ContrastRow| {
-            own.refocused.map_or("lost".to_owned(), |[low, high]| format!("{:+.3}", low.min(high)))
-        };
-        wavefront.chain(row.mtf.iter().map(worst)).collect()
-    }
-
     /// The heads of further columns of CSV, each behind a comma.
     pub(super) fn csv_head(&self) -> String {
         let mut head = String::new();
@@ -153,17 +144,28 @@ impl FurtherMerits {
         }
         head
     }
+}
 
-    /// The cells of an error in these columns.
-    pub(super) fn csv_row(&self, row: &FurtherRow) -> String {
-        let mut cells = String::new();
-        for part in row.wavefront.iter().flat_map(|own| [&own.fixed, &own.refocused]) {
-            cells += &format!(",{},{},{}", part.by.first, part.by.second, part.share);
-        }
-        for ends in row.mtf.iter().flat_map(|own| [own.fixed, own.refocused]) {
-            cells += &ends.map_or(",,".to_owned(), |[low, high]| format!(",{low},{high}"));
-        }
-        cells
+impl FurtherRow {
+    /// The cells of the further columns of the text, refocused.
+    pub(super) fn cells(&self) -> Vec<String> {
+        let wavefront = self.wavefront.iter().map(|own| percent(own.refocused.share));
+        let worst = |own: &ContrastRow| {
+            own.refocused.map_or("lost".to_owned(), |[low, high]| format!("{:+.3}", low.min(high)))
+        };
+        wavefront.chain(self.mtf.iter().map(worst)).collect()
+    }
+
+    /// The cells of the further columns of CSV, each behind a comma.
+    pub(super) fn csv(&self) -> String {
+        let parts = self.wavefront.iter().flat_map(|own| [&own.fixed, &own.refocused]);
+        let derivatives =
+            |part: &ShareOfGrowth| format!(",{},{},{}", part.by.first, part.by.second, part.share);
+        let changes = self.mtf.iter().flat_map(|own| [own.fixed, own.refocused]);
+        let ends = |ends: Option<[f64; 2]>| {
+            ends.map_or(",,".to_owned(), |[low, high]| format!(",{low},{high}"))
+        };
+        parts.map(derivatives).chain(changes.map(ends)).collect()
     }
 }
 
@@ -177,11 +179,9 @@ fn unless_stopped<T>(
 }
 
 fn add_wavefronts(rows: &mut [FurtherRow], model: &WavefrontModel, sheet: &ToleranceSheet) {
-    let growth = model.growth(sheet);
-    let total = |i: usize| growth.iter().map(|by| by[i]).sum::<f64>().abs().max(f64::MIN_POSITIVE);
-    let totals = [total(0), total(1)];
-    for (row, (by, growth)) in rows.iter_mut().zip(model.errors.iter().zip(&growth)) {
-        let share = |i: usize| ShareOfGrowth { by: by[i], share: growth[i] / totals[i] };
+    let shares = model.growth_shares(sheet);
+    for (row, (by, shares)) in rows.iter_mut().zip(model.errors.iter().zip(&shares)) {
+        let share = |i: usize| ShareOfGrowth { by: by[i], share: shares[i] };
         row.wavefront = Some(WavefrontRow { fixed: share(0), refocused: share(1) });
     }
 }

@@ -429,7 +429,7 @@ impl ToleranceReport {
             let place = format!("{},{},{}", row.kind.name(), row.first, row.last);
             let range = format!("{},{}", row.half_range, row.sigma);
             text.push_str(&[place, range, numbers.join(",")].join(","));
-            text.push_str(&self.further.csv_row(&row.further));
+            text.push_str(&row.further.csv());
             text.push_str("\r\n");
         }
         text
@@ -594,7 +594,7 @@ impl ToleranceReport {
                 percent(row.fixed.share),
                 percent(row.refocused.share),
             ];
-            table.row(own.into_iter().chain(self.further.cells(&row.further)));
+            table.row(own.into_iter().chain(row.further.cells()));
         }
         let more = self.sensitivities.len().saturating_sub(SHOWN);
         if more > 0 {

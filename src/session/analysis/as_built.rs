@@ -7,7 +7,7 @@ use super::AnalysisSettings;
 use crate::lens::{Lens, ToleranceSheet};
 use crate::tolerance::{
     ErrorModel, SecondDerivatives, StopTest, ToleranceAnalysis, ToleranceError, ToleranceRequest,
-    ToleranceScene, graded_sheet, refuse_lost_lenses,
+    ToleranceScene, WavefrontModel, graded_sheet, refuse_lost_lenses,
 };
 
 /// The tolerances of a lens and what they do to it.
@@ -22,6 +22,13 @@ pub struct AsBuiltLens {
     pub shares: Vec<[f64; 2]>,
     /// The analysis.
     pub analysis: ToleranceAnalysis,
+    /// The RMS wavefront in waves at the primary wavelength, as designed and the root of the expected
+    /// variance, each at the fixed image plane and refocused; `None` where only derivatives of spots are
+    /// known yet, or for a lens without a wavefront.
+    pub wavefront: Option<[[f64; 2]; 2]>,
+    /// The share of each error in the growth of the variance of the wavefront, likewise; as many as
+    /// there are errors, or none.
+    pub wavefront_shares: Vec<[f64; 2]>,
     /// The number of rays of the lens as designed.
     pub rays: usize,
     /// The largest relative error of the radius of a spot by the sampling of its pupil.
@@ -86,7 +93,14 @@ fn as_built(
     let model = ErrorModel::new(&scene, &sheet, SecondDerivatives::default(), stop)?;
     let analysis = model.analyze(&scene, &sheet, request, stop)?;
     refuse_lost_lenses(analysis.lost, analysis.samples, "these tolerances")?;
+    let waves = (samples > 0)
+        .then(|| WavefrontModel::new((lens, settings.zoom), &scene, &sheet, stop).ok())
+        .flatten();
     Ok(AsBuiltLens {
+        wavefront: waves.as_ref().map(|waves| {
+            [waves.nominal.map(|variance| variance.max(0.0).sqrt()), waves.expected_rms(&sheet)]
+        }),
+        wavefront_shares: waves.map_or_else(Vec::new, |waves| waves.growth_shares(&sheet)),
         shares: analysis.growth_shares(&sheet)?,
         sheet,
         from_lens: lens.tolerances.is_some(),

@@ -94,9 +94,9 @@ fn the_sweep_gives_the_form_of_jets() {
             }
         }
         for (plane, share) in [(0, 1e-3), (1, 5e-3)] {
-            let [exact, found] = [&traced[plane], &swept[plane]]
-                .map(|form| form.expectation(&sheet).unwrap() - form.nominal);
-            assert_close(found, exact, share * exact, "growth");
+            let [exact, found] =
+                [&traced[plane], &swept[plane]].map(|form| form.expectation(&sheet).unwrap());
+            assert_close(found, exact, share * exact, "expectation");
         }
     }
 }
@@ -104,7 +104,8 @@ fn the_sweep_gives_the_form_of_jets() {
 /// Wherever it is stopped, an analysis ends without a result or with fewer lenses.
 #[test]
 fn an_analysis_stops_in_every_part() {
-    let (scene, sheet) = zoom(false);
+    let (scene, mut sheet) = zoom(false);
+    sheet.errors.truncate(12);
     let request = ToleranceRequest { seed: 1, samples: 4, limit: None };
     let stopped = analyze_until(&scene, &sheet, request, &AtomicBool::new(true));
     assert!(matches!(stopped, Err(ToleranceError::Stopped)), "{stopped:?}");
@@ -123,7 +124,7 @@ fn an_analysis_stops_in_every_part() {
     let (all, of_model, total) = run(usize::MAX);
     assert_eq!(all, Ok(4));
     assert!(of_model > sheet.errors.len() && total > of_model + 100, "{of_model} {total}");
-    for most in [0, 2, of_model / 2, of_model - 1, of_model + 1, of_model + 50] {
+    for most in [0, 2, of_model - 1, of_model + 1, of_model + 50] {
         assert_eq!(run(most).0, Err(ToleranceError::Stopped), "{most}");
     }
     assert!(run(total - 2).0.unwrap() < 4);
