@@ -12,9 +12,9 @@ use crate::merit::{
 };
 use crate::optimize::{DescentMethod, start};
 use crate::tolerance::{
-    Compensation, Derivatives, FocusTreatment, NominalLens, QuadraticForm, SweptSensitivity,
-    ToleranceError, ToleranceRequest, ToleranceScene, analyze, form_spots, graded_sheet, perturb,
-    real_lenses, sensitivities, swept_sensitivities,
+    Compensation, Derivatives, FocusTreatment, NominalLens, QuadraticForm, RayEffects,
+    SecondDerivatives, SweptSensitivity, ToleranceError, ToleranceRequest, ToleranceScene, analyze,
+    form_spots, graded_sheet, perturb, real_lenses, sensitivities, swept_sensitivities,
 };
 use rayon::ThreadPoolBuilder;
 use serde::Serialize;
@@ -114,8 +114,11 @@ pub fn measure_tolerances(
         return Ok(None);
     }
     let compensation = Compensation::new(&scene, &sheet)?;
+    let effects = RayEffects::new(&scene, &errors, SecondDerivatives::Neglected, &|| {
+        stop.load(Ordering::Relaxed)
+    })?;
     let form = || {
-        let form = QuadraticForm::new(&scene, &found, FocusTreatment::Refocused, &compensation);
+        let form = QuadraticForm::new(&effects, FocusTreatment::Refocused, &compensation);
         form_spots(&form, &sheet, 1).map(|spots| spots.len())
     };
     let (spots, form_ms) = one.install(|| time_median(3..=9, form));

@@ -24,8 +24,7 @@ pub fn tolerance_table(
     for (i, [fixed, refocused]) in sorted_shares(sheet, analysis)? {
         let own = &sheet.errors[i];
         let distribution = serde_json::to_value(own.distribution).unwrap_or_default();
-        let by = analysis.sensitivities[i].mean_square();
-        let adjusted = &analysis.forms[1];
+        let [by, adjusted] = &analysis.forms;
         let cells = [
             own.error.kind.name().replace(',', ""),
             own.error.first.to_string(),
@@ -33,11 +32,11 @@ pub fn tolerance_table(
             own.half_range.to_string(),
             own.deviation().to_string(),
             distribution.as_str().unwrap_or_default().to_owned(),
-            by.first.to_string(),
-            by.second.to_string(),
+            by.first[i].to_string(),
+            by.second.of(i, i).to_string(),
             fixed.to_string(),
             adjusted.first[i].to_string(),
-            adjusted.second[(i, i)].to_string(),
+            adjusted.second.of(i, i).to_string(),
             refocused.to_string(),
         ];
         text.push_str(&cells.join(","));

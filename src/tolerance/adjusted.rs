@@ -86,6 +86,26 @@ impl LensToAdjust<'_> {
         Ok(self.columns.landings(&self.systems(positions)?))
     }
 
+    /// The rays where they meet the sensor with some adjustments, from those without; `None` if one does
+    /// not arrive.
+    pub(super) fn on_sensor(
+        &self,
+        landed: &[LandedField],
+        positions: &[f64],
+    ) -> Result<Option<Vec<LandedField>>, ToleranceError> {
+        let sensor = Sensor::new(self.adjustments, positions);
+        let ray = |(ray, weight): &(ImageRay<f64>, f64)| {
+            let ([x, y, _], _) = sensor.meet(ray);
+            ([x, y, ray[2], ray[3]], *weight)
+        };
+        let field = |field: LandedField| LandedField {
+            rays: field.rays.iter().map(ray).collect(),
+            ..field
+        };
+        let fields = self.landings(landed, positions)?;
+        Ok(fields.map(|fields| fields.into_iter().map(field).collect()))
+    }
+
     fn distances(&self, fields: &[LandedField], positions: &[f64]) -> Distances {
         let sensor = Sensor::new(self.adjustments, positions);
         centred(fields, |ray| sensor.meet(ray).0)

@@ -1,13 +1,14 @@
 //! The whole analysis: sensitivities, the quadratic form, real lenses, and how well both agree.
 
+use super::monte_carlo::{KnownLens, RealLensRun};
 use super::travel::{AdjustmentTravel, StoppedLenses, stopped_lenses, travels};
 use super::{
-    Compensation, FocusTreatment, QuadraticForm, RealLens, Sensitivity, ToleranceError,
-    ToleranceScene, real_lenses, sensitivities, wilson_interval,
+    Compensation, FocusTreatment, QuadraticForm, RayEffects, RealLens, SecondDerivatives, StopTest,
+    ToleranceError, ToleranceScene, refuse_if_stopped, wilson_interval,
 };
 use crate::lens::{Perturbation, ToleranceSheet};
 use serde::Serialize;
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// The scope of an analysis.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -23,8 +24,8 @@ pub struct ToleranceRequest {
 /// The result.
 #[derive(Debug, Clone)]
 pub struct ToleranceAnalysis {
-    /// The effect of each error, in the order of the tolerances.
-    pub sensitivities: Vec<Sensitivity>,
+    /// True if the second derivatives of rays by errors are a part of the forms.
+    pub has_second_derivatives: bool,
     /// The quadratic forms at the fixed image plane and refocused.
     pub forms: [QuadraticForm; 2],
     /// The spots at the fixed image plane and refocused.
@@ -80,6 +81,9 @@ pub struct AsBuiltSpot {
     /// exceed.
     #[serde(skip)]
     pub distribution: Vec<Quantile>,
+    /// The rms of each real lens whose rays arrive in mm, the least first.
+    #[serde(skip)]
+    pub real_rms: Vec<f64>,
     /// The share of good lenses, if a limit was given.
     pub good: Option<YieldEstimate>,
 }
@@ -134,59 +138,138 @@ pub fn analyze(
 /// The same with fewer real lenses once `stop` is true.
 ///
 /// # Errors
-/// As those of [`analyze`].
+/// As those of [`analyze`], and [`ToleranceError::Stopped`] if it was stopped before the real lenses.
 pub fn analyze_until(
     scene: &ToleranceScene,
     sheet: &ToleranceSheet,
     request: ToleranceRequest,
     stop: &AtomicBool,
 ) -> Result<ToleranceAnalysis, ToleranceError> {
-    let errors: Vec<Perturbation> = sheet.errors.iter().map(|t| t.error).collect();
-    let found = sensitivities(&scene.lens, &scene.beam, scene.options, &errors)?;
-    if found.is_empty() {
-        return Err(ToleranceError::Other("no tolerances; expected at least one".to_owned()));
-    }
-    let treatments = [FocusTreatment::Fixed, FocusTreatment::Refocused];
-    let compensation = Compensation::new(scene, sheet)?;
-    let forms = treatments.map(|focus| QuadraticForm::new(scene, &found, focus, &compensation));
-    let real = real_lenses(scene, sheet, request.seed, request.samples, WITH_RIMS, stop)?;
-    let [fixed, refocused] =
-        forms.each_ref().map(|form| FormLenses::new(form, sheet, request.seed));
-    let (fixed, refocused) = (fixed?, refocused?);
-    let travels = travels(&compensation.adjustments, &forms[1], &refocused.adjustments, &real);
-    let stopped = stopped_lenses(&compensation.adjustments, &forms[1], &real);
-    let spot = |i: usize, lenses: FormLenses| {
-        let expected = forms[i].expectation(sheet)?;
-        Ok::<_, ToleranceError>(as_built(
-            treatments[i],
-            (&forms[i], expected),
-            lenses,
-            &real,
-            request,
-        ))
-    };
-    let spots = [spot(0, fixed)?, spot(1, refocused)?];
-    let lost = real.iter().filter(|lens| lens.mean_square.is_none()).count();
-    let clipping = clipping(&real);
-    let samples = real.len();
-    let with_rims = samples.min(WITH_RIMS);
-    let is_dark = |lens: &&RealLens| lens.mean_square.is_some() && lens.clipped.is_none();
-    let dark = real[..with_rims].iter().filter(is_dark).count();
-    let sensitivities = found;
-    Ok(ToleranceAnalysis {
-        sensitivities,
-        forms,
-        spots,
-        travels,
-        stopped,
-        samples,
-        lost,
-        with_rims,
-        dark,
-        clipping,
-        real,
-    })
+    let stop = || stop.load(Ordering::Relaxed);
+    let model = ErrorModel::new(scene, sheet, SecondDerivatives::default(), &stop)?;
+    model.analyze(scene, sheet, request, &stop)
 }
+
+/// What is known of the errors of a lens without random lenses: the quadratic forms.
+#[derive(Debug, Clone)]
+pub struct ErrorModel {
+    compensation: Compensation,
+    /// The forms at the fixed image plane and refocused.
+    pub forms: [QuadraticForm; 2],
+    has_second_derivatives: bool,
+}
+
+impl ErrorModel {
+    /// The model of a lens with its tolerances.
+    ///
+    /// # Errors
+    /// No tolerances, an error of making that is not possible, a lens as designed whose rays do not
+    /// arrive, and [`ToleranceError::Stopped`] once `stop` says so.
+    pub fn new(
+        scene: &ToleranceScene,
+        sheet: &ToleranceSheet,
+        second: SecondDerivatives,
+        stop: StopTest<'_>,
+    ) -> Result<Self, ToleranceError> {
+        if sheet.errors.is_empty() {
+            let text = "no tolerances; expected at least one".to_owned();
+            return Err(ToleranceError::Other(text));
+        }
+        let errors: Vec<Perturbation> = sheet.errors.iter().map(|t| t.error).collect();
+        let effects = RayEffects::new(scene, &errors, second, stop)?;
+        let compensation = Compensation::new(scene, sheet)?;
+        let forms = TREATMENTS.map(|focus| {
+            refuse_if_stopped(stop)?;
+            Ok::<_, ToleranceError>(QuadraticForm::new(&effects, focus, &compensation))
+        });
+        let [fixed, refocused] = forms;
+        let forms = [fixed?, refocused?];
+        let has_second_derivatives = effects.has_second_derivatives();
+        Ok(Self { compensation, forms, has_second_derivatives })
+    }
+
+    /// The analysis by random lenses: many by the forms, and some by their rays, fewer once `stop`
+    /// says so.
+    ///
+    /// # Errors
+    /// Correlations that no errors can have, and [`ToleranceError::Stopped`] if `stop` says so before
+    /// the real lenses.
+    pub fn analyze(
+        self,
+        scene: &ToleranceScene,
+        sheet: &ToleranceSheet,
+        request: ToleranceRequest,
+        stop: StopTest<'_>,
+    ) -> Result<ToleranceAnalysis, ToleranceError> {
+        self.analyze_on((scene, sheet), request, stop, (&[], |_| {}))
+    }
+
+    /// The same where the first real lenses are known; all lenses so far are shown to `visit` after every
+    /// part. The result does not depend on how many are known.
+    ///
+    /// # Errors
+    /// As those of [`ErrorModel::analyze`].
+    pub fn analyze_on(
+        self,
+        (scene, sheet): (&ToleranceScene, &ToleranceSheet),
+        request: ToleranceRequest,
+        stop: StopTest<'_>,
+        (known, visit): (&[KnownLens], impl FnMut(&[RealLens])),
+    ) -> Result<ToleranceAnalysis, ToleranceError> {
+        let by_form = self.lenses(sheet, request.seed, stop)?;
+        let run = RealLensRun::new(scene, sheet, request.seed)?.with_known(known);
+        let real = run.advance((request.samples, WITH_RIMS), stop, visit)?;
+        self.compared(sheet, request, (by_form, real))
+    }
+
+    /// Many lenses by the forms.
+    fn lenses(
+        &self,
+        sheet: &ToleranceSheet,
+        seed: u64,
+        stop: StopTest<'_>,
+    ) -> Result<[FormLenses; 2], ToleranceError> {
+        let [fixed, refocused] =
+            self.forms.each_ref().map(|form| FormLenses::new(form, sheet, seed, stop));
+        Ok([fixed?, refocused?])
+    }
+
+    /// The analysis from lenses by the forms and from real ones.
+    fn compared(
+        self,
+        sheet: &ToleranceSheet,
+        request: ToleranceRequest,
+        ([fixed, refocused], real): ([FormLenses; 2], Vec<RealLens>),
+    ) -> Result<ToleranceAnalysis, ToleranceError> {
+        let Self { compensation, forms, has_second_derivatives } = self;
+        let parts = &compensation.adjustments;
+        let travels = travels(parts, &forms[1], &refocused.adjustments, &real);
+        let stopped = stopped_lenses(parts, &forms[1], &real);
+        let spot = |i: usize, lenses: FormLenses| {
+            let form = (&forms[i], forms[i].expectation(sheet)?);
+            Ok::<_, ToleranceError>(as_built(TREATMENTS[i], form, lenses, &real, request))
+        };
+        let spots = [spot(0, fixed)?, spot(1, refocused)?];
+        let with_rims = real.len().min(WITH_RIMS);
+        let is_dark = |lens: &&RealLens| lens.mean_square.is_some() && lens.clipped.is_none();
+        Ok(ToleranceAnalysis {
+            has_second_derivatives,
+            forms,
+            spots,
+            travels,
+            stopped,
+            samples: real.len(),
+            lost: real.iter().filter(|lens| lens.mean_square.is_none()).count(),
+            with_rims,
+            dark: real[..with_rims].iter().filter(is_dark).count(),
+            clipping: clipping(&real),
+            real,
+        })
+    }
+}
+
+/// The image planes of both forms.
+const TREATMENTS: [FocusTreatment; 2] = [FocusTreatment::Fixed, FocusTreatment::Refocused];
 
 impl ToleranceAnalysis {
     /// The share of each error in the growth of the expected mean square spot, at the fixed image plane
@@ -261,6 +344,7 @@ fn as_built(
         rims_agree: clipping.is_none_or(is_small),
         quantiles: SHARES.map(at_share).to_vec(),
         distribution: (0..=STEPS).map(|i| at_share(i as f64 / STEPS as f64)).collect(),
+        real_rms: columns[0].clone(),
         good: request.limit.map(|limit| good_share(limit, &many, &pairs, real.len())),
     }
 }
@@ -278,11 +362,12 @@ impl FormLenses {
         form: &QuadraticForm,
         sheet: &ToleranceSheet,
         seed: u64,
+        stop: StopTest<'_>,
     ) -> Result<Self, ToleranceError> {
         let reduced = form.reduced(sheet)?;
         // Other errors than those of the real lenses.
         let other = seed ^ 0x5DEE_CE66_D1CE_CAFE;
-        let lenses = reduced.random_lenses(&sheet.errors, other, FORM_SAMPLES);
+        let lenses = reduced.random_lenses(&sheet.errors, other, FORM_SAMPLES, stop)?;
         Ok(Self {
             rms: lenses.iter().map(|errors| reduced.at_multiple(errors, 1.0).sqrt()).collect(),
             adjustments: lenses.iter().map(|errors| reduced.adjustments(errors)).collect(),
@@ -299,7 +384,7 @@ pub fn form_spots(
     sheet: &ToleranceSheet,
     seed: u64,
 ) -> Result<Vec<f64>, ToleranceError> {
-    Ok(FormLenses::new(form, sheet, seed)?.rms)
+    Ok(FormLenses::new(form, sheet, seed, &|| false)?.rms)
 }
 
 fn sorted(mut values: Vec<f64>) -> Vec<f64> {

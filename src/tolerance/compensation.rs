@@ -12,9 +12,6 @@ pub struct Compensation {
     pub adjustments: Vec<Compensator>,
     /// The effect of each but the focus; none for a lens that is only refocused.
     pub(super) effects: Vec<AdjustmentEffect>,
-    /// The distances of all rays from the centroids of their fields in mm, with their slopes; empty for
-    /// a lens that is only refocused.
-    pub(super) offsets: Vec<RaySensitivity>,
 }
 
 /// The effect of a compensator.
@@ -40,7 +37,7 @@ impl Compensation {
     pub fn new(scene: &ToleranceScene, sheet: &ToleranceSheet) -> Result<Self, ToleranceError> {
         let adjustments = adjustments(sheet);
         if sheet.compensators.is_empty() {
-            return Ok(Self { adjustments, effects: Vec::new(), offsets: Vec::new() });
+            return Ok(Self { adjustments, effects: Vec::new() });
         }
         let parts = || sheet.compensators.iter().map(|compensator| compensator.part);
         let in_lens: Vec<Perturbation> = parts().filter_map(AdjustedPart::in_lens).collect();
@@ -55,7 +52,7 @@ impl Compensation {
             tilt => Some(landings.tilt(tilt)),
         };
         let effects = parts().filter_map(effect).collect();
-        Ok(Self { adjustments, effects, offsets: landings.offsets() })
+        Ok(Self { adjustments, effects })
     }
 }
 
@@ -94,10 +91,6 @@ impl SensorRays {
             rays.iter().map(relative).collect::<Vec<_>>()
         };
         self.fields.iter().flat_map(field).collect()
-    }
-
-    fn offsets(&self) -> Vec<RaySensitivity> {
-        self.centred(|ray| *ray)
     }
 
     /// The effect of a tilt of the sensor: it moves each point along its ray in proportion to its height.

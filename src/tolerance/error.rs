@@ -15,6 +15,17 @@ pub fn refuse_lost_lenses(
     if 2 * lost <= samples { Ok(()) } else { Err(ToleranceError::MostLost { lost, samples, what }) }
 }
 
+/// Tells whether work is to stop; asked between its parts, from any thread.
+pub type StopTest<'a> = &'a (dyn Fn() -> bool + Sync);
+
+/// Ends work that is to stop.
+///
+/// # Errors
+/// [`ToleranceError::Stopped`] if it is.
+pub(super) fn refuse_if_stopped(stop: StopTest<'_>) -> Result<(), ToleranceError> {
+    if stop() { Err(ToleranceError::Stopped) } else { Ok(()) }
+}
+
 /// A fault that makes a tolerance analysis impossible.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ToleranceError {
@@ -69,6 +80,9 @@ pub enum ToleranceError {
         /// The tolerances, in words.
         what: &'static str,
     },
+    /// The analysis was told to stop before it had a result.
+    #[error("stopped before there is a result")]
+    Stopped,
     /// Something else about the lens or the request.
     #[error("{0}")]
     Other(String),

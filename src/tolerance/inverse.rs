@@ -37,7 +37,7 @@ fn equal_costs(
     sheet: &ToleranceSheet,
 ) -> Result<(Vec<f64>, f64), ToleranceError> {
     // What an error costs alone; what correlated ones cost together is in the sum.
-    let cost = |(i, t): (usize, &Tolerance)| 0.5 * form.second[(i, i)] * t.deviation().powi(2);
+    let cost = |(i, t): (usize, &Tolerance)| 0.5 * form.second.of(i, i) * t.deviation().powi(2);
     let costs: Vec<f64> = sheet.errors.iter().enumerate().map(cost).collect();
     let paid = costs.iter().filter(|cost| **cost > 0.0).count().max(1);
     let mean = costs.iter().filter(|cost| **cost > 0.0).sum::<f64>() / paid as f64;
@@ -82,7 +82,7 @@ fn yield_at_factor(
     limit: f64,
 ) -> Result<impl Fn(f64) -> f64 + use<>, ToleranceError> {
     let reduced = form.reduced(sheet)?;
-    let lenses = reduced.random_lenses(&sheet.errors, SEED, LENSES);
+    let lenses = reduced.random_lenses(&sheet.errors, SEED, LENSES, &|| false)?;
     Ok(move |factor| {
         let is_good = |errors| reduced.at_multiple(errors, factor) <= limit * limit;
         lenses.iter().filter(|errors| is_good(errors)).count() as f64 / LENSES as f64

@@ -8,7 +8,6 @@
 
 use super::ToleranceError;
 use crate::lens::{Tolerance, ToleranceSheet};
-use nalgebra::DMatrix;
 
 /// The errors of lenses as sums of as many independent ones, which have a half range of 1.
 #[derive(Debug, Clone)]
@@ -73,26 +72,9 @@ impl ErrorMixture {
         sums
     }
 
-    /// A matrix of second derivatives by the errors of a lens as one by independent errors in units of
-    /// their deviations.
-    pub(super) fn scaled(&self, second: &DMatrix<f64>) -> DMatrix<f64> {
-        let mut half = DMatrix::zeros(second.nrows(), second.ncols());
-        for (j, row) in self.rows.iter().enumerate() {
-            for (k, factor) in row {
-                let to = self.deviations[*k] * factor;
-                half.column_mut(*k).axpy(to, &second.column(j), 1.0);
-            }
-        }
-        // The same from the other side of a matrix that is now transposed.
-        let half = half.transpose();
-        let mut scaled = DMatrix::zeros(second.nrows(), second.ncols());
-        for (i, row) in self.rows.iter().enumerate() {
-            for (k, factor) in row {
-                let to = self.deviations[*k] * factor;
-                scaled.column_mut(*k).axpy(to, &half.column(i), 1.0);
-            }
-        }
-        scaled
+    /// The independent errors in one, and their factors.
+    pub(super) fn parts(&self, error: usize) -> &[(usize, f64)] {
+        &self.rows[error]
     }
 
     /// The standard deviation of each independent error.

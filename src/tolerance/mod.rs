@@ -9,12 +9,13 @@
 //! E[S] = S₀ + ½ Σ σᵢ² ∂²S/∂pᵢ² + O(σ⁴)
 //! ```
 //!
-//! [`sensitivities`] computes both derivatives of the spot, of the spot after refocusing and of the
-//! wavefront variance by second-order jets: rays are traced once over numbers that carry the
-//! derivatives by an error, from the first surface that it changes on.
+//! All but some 1e-4 of the second ones are mean products of what errors do to the rays, which one sweep
+//! of these back through the lens tells for all errors at once ([`RayEffects`]). [`sensitivities`]
+//! computes both derivatives of the spot, of the spot after refocusing and of the wavefront variance
+//! exactly, by second-order jets: rays are traced once over numbers that carry the derivatives by an
+//! error, from the first surface that it changes on.
 //!
-//! Between two errors the mean product of what they do to the rays completes the [`QuadraticForm`],
-//! whose distribution needs no further rays. [`real_lenses`] traces lenses with random errors; both
+//! The mean products are the [`QuadraticForm`], whose distribution needs no further rays. [`real_lenses`] traces lenses with random errors; both
 //! on the same draws tell how far the form is to be trusted, and their difference corrects it
 //! ([`analyze`]).
 //!
@@ -29,12 +30,15 @@ mod analysis;
 mod as_built;
 mod beam;
 mod compensation;
+mod contrast;
 mod covariance;
 mod draw;
+mod effects;
 mod error;
 mod folded;
 mod form;
 mod grade;
+mod groups;
 mod histogram;
 mod inverse;
 mod made;
@@ -43,32 +47,39 @@ mod mixture;
 mod monte_carlo;
 mod nominal;
 mod perturb;
+mod reduced;
 mod sensitivity;
 mod spot;
 mod sweep;
 mod travel;
 mod wavefront;
+mod waves;
+
+use error::refuse_if_stopped;
 
 pub use crate::lens::ToleranceGrade;
 pub use analysis::{
-    AsBuiltSpot, Quantile, ToleranceAnalysis, ToleranceRequest, YieldEstimate, analyze,
+    AsBuiltSpot, ErrorModel, Quantile, ToleranceAnalysis, ToleranceRequest, YieldEstimate, analyze,
     analyze_until, form_spots,
 };
 pub use as_built::{AsBuiltGradient, FixedAndRefocused, as_built_gradient};
 pub use beam::{Beam, ColourRays, FieldBeam};
 pub use compensation::{Compensation, adjustments};
+pub use contrast::ContrastChanges;
 pub use covariance::{
     IndependentError, LeverArm, MadeKind, MadeNumber, NumberCovariance, TiltingBody,
     independent_errors,
 };
-pub use error::{ToleranceError, refuse_lost_lenses};
-pub use form::{AdjustedForm, FocusTreatment, QuadraticForm};
+pub use effects::{RayEffects, SecondDerivatives};
+pub use error::{StopTest, ToleranceError, refuse_lost_lenses};
+pub use form::{AdjustedForm, ErrorProducts, FocusTreatment, QuadraticForm};
 pub use grade::{PriceClass, bounded_tolerances, graded_sheet, price_classes};
+pub use groups::{KindShare, LensPart, PartShare, shares_by_kind, shares_by_part};
 pub use histogram::{SpotHistogram, yield_band};
 pub use inverse::{form_yield, loosest_for_yield, loosest_tolerances};
 pub use made::{MadeLens, made_lens, worst_lens};
 pub use merits::{MeritOptions, Merits, merits};
-pub use monte_carlo::{RealLens, real_lenses, wilson_interval};
+pub use monte_carlo::{KnownLens, RealLens, real_lenses, wilson_interval};
 pub use nominal::ToleranceScene;
 pub use perturb::{NominalLens, perturb};
 pub use sensitivity::{Derivatives, Jet2, RaySensitivity, Sensitivity, sensitivities};
@@ -76,3 +87,4 @@ pub use spot::{SpotMoments, best_focus};
 pub use sweep::{SweptSensitivity, swept_sensitivities};
 pub use travel::{AdjustmentTravel, StoppedLenses, TravelStatistics};
 pub use wavefront::WavefrontVariance;
+pub use waves::WavefrontModel;

@@ -6,10 +6,11 @@ use super::draw::draw_errors;
 use super::merits::{image_ray, open_tracers};
 use super::mixture::ErrorMixture;
 use super::spot::ImageRay;
-use super::{Beam, ToleranceError, ToleranceScene, best_focus};
+use super::{Beam, StopTest, ToleranceError, ToleranceScene, best_focus};
 use crate::lens::{Compensator, Perturbation, System, ToleranceSheet};
 use crate::trace::{ImagePoints, Landings, Rays, TraceSink as _, Tracer};
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// A lens with random errors.
@@ -41,26 +42,93 @@ pub fn real_lenses(
     with_rims: usize,
     stop: &AtomicBool,
 ) -> Result<Vec<RealLens>, ToleranceError> {
-    let made = RandomLenses {
-        scene,
-        sheet,
-        seed,
-        mixture: ErrorMixture::new(sheet)?,
-        adjustments: adjustments(sheet),
-        columns: BeamColumns::new(&scene.beam),
-    };
-    let is_stopped = || stop.load(Ordering::Relaxed);
-    let lens = |i: usize| (!is_stopped()).then(|| made.lens(i, i < with_rims));
-    let mut lenses = Vec::new();
-    while lenses.len() < count && !is_stopped() {
-        let part = lenses.len()..count.min(lenses.len() + PART);
-        let part: Vec<Option<_>> = part.into_par_iter().map(lens).collect();
-        // Of a part that was broken off, the lenses in front of the first one that is missing.
-        for traced in part.into_iter().map_while(|traced| traced) {
-            lenses.push(traced?);
-        }
+    let stop = || stop.load(Ordering::Relaxed);
+    RealLensRun::new(scene, sheet, seed)?.advance((count, with_rims), &stop, |_| {})
+}
+
+/// Lenses with random errors, some of which may be known from before.
+pub(super) struct RealLensRun<'a> {
+    made: RandomLenses<'a>,
+    lenses: Vec<RealLens>,
+}
+
+impl<'a> RealLensRun<'a> {
+    /// No lenses yet.
+    ///
+    /// # Errors
+    /// Correlations that no errors can have.
+    pub(super) fn new(
+        scene: &'a ToleranceScene,
+        sheet: &'a ToleranceSheet,
+        seed: u64,
+    ) -> Result<Self, ToleranceError> {
+        let made = RandomLenses {
+            scene,
+            sheet,
+            seed,
+            mixture: ErrorMixture::new(sheet)?,
+            adjustments: adjustments(sheet),
+            columns: BeamColumns::new(&scene.beam),
+        };
+        Ok(Self { made, lenses: Vec::new() })
     }
-    Ok(lenses)
+
+    /// The same with the first lenses known.
+    pub(super) fn with_known(mut self, known: &[KnownLens]) -> Self {
+        let lens = |(number, own): (usize, &KnownLens)| RealLens {
+            errors: self.made.errors(number),
+            mean_square: own.mean_square,
+            adjustments: own.adjustments.clone(),
+            clipped: own.clipped,
+        };
+        self.lenses = known.iter().enumerate().map(lens).collect();
+        self
+    }
+
+    /// The first `count` lenses, fewer of them once `stop` says so; all lenses so far are shown to
+    /// `visit` after every part.
+    ///
+    /// # Errors
+    /// An error of making that is not possible.
+    pub(super) fn advance(
+        self,
+        (count, with_rims): (usize, usize),
+        stop: StopTest<'_>,
+        mut visit: impl FnMut(&[RealLens]),
+    ) -> Result<Vec<RealLens>, ToleranceError> {
+        let Self { made, mut lenses } = self;
+        let lens = |i: usize| (!stop()).then(|| made.lens(i, i < with_rims));
+        while lenses.len() < count && !stop() {
+            let part = lenses.len()..count.min(lenses.len() + PART);
+            let part: Vec<Option<_>> = part.into_par_iter().map(lens).collect();
+            // Of a part that was broken off, the lenses in front of the first one that is missing.
+            for traced in part.into_iter().map_while(|traced| traced) {
+                lenses.push(traced?);
+            }
+            visit(&lenses);
+        }
+        lenses.truncate(count);
+        Ok(lenses)
+    }
+}
+
+/// What the rays of a lens with random errors tell, without the errors: these follow from its number.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct KnownLens {
+    /// The mean square spot radius in mm² at the image plane, and adjusted; `None` if a ray does not
+    /// arrive.
+    pub mean_square: Option<[f64; 2]>,
+    /// The adjustments, focus first.
+    pub adjustments: Vec<f64>,
+    /// The mean squares with rims that clip, and the share of the light that they take.
+    pub clipped: Option<([f64; 2], f64)>,
+}
+
+impl From<&RealLens> for KnownLens {
+    fn from(lens: &RealLens) -> Self {
+        let RealLens { mean_square, adjustments, clipped, .. } = lens.clone();
+        Self { mean_square, adjustments, clipped }
+    }
 }
 
 /// The number of lenses that are traced in parallel before they are collected.
@@ -78,9 +146,13 @@ struct RandomLenses<'a> {
 }
 
 impl RandomLenses<'_> {
+    /// The errors of the lens with a number.
+    fn errors(&self, number: usize) -> Vec<f64> {
+        draw_errors((&self.sheet.errors, &self.mixture), self.seed, number as u64)
+    }
+
     fn lens(&self, number: usize, with_rims: bool) -> Result<RealLens, ToleranceError> {
-        let tolerances = &self.sheet.errors;
-        let errors = draw_errors((tolerances, &self.mixture), self.seed, number as u64);
+        let (tolerances, errors) = (&self.sheet.errors, self.errors(number));
         let set: Vec<(Perturbation, f64)> =
             tolerances.iter().zip(&errors).map(|(t, value)| (t.error, *value)).collect();
         let made = LensToAdjust {

@@ -4,7 +4,8 @@
 //! is symmetric about its axis is judged on both sides of it: its errors are not symmetric.
 
 use super::merits::open_tracers;
-use super::{Beam, ColourRays, FieldBeam, MeritOptions, NominalLens, ToleranceError};
+use super::refuse_if_stopped;
+use super::{Beam, ColourRays, FieldBeam, MeritOptions, NominalLens, StopTest, ToleranceError};
 use crate::lens::{Lens, System, lie_on_one_side};
 use crate::math::Vec3;
 use crate::pupil::{Accuracy, Launch, Nodes, RayModel, Region, converge};
@@ -30,8 +31,21 @@ impl ToleranceScene {
     /// # Errors
     /// A lens through which no light can be traced.
     pub fn new(lens: &Lens, zoom: usize, tolerance: f64) -> Result<Self, ToleranceError> {
+        Self::new_until(lens, zoom, tolerance, &|| false)
+    }
+
+    /// The same until `stop` says so.
+    ///
+    /// # Errors
+    /// A lens through which no light can be traced, and [`ToleranceError::Stopped`].
+    pub fn new_until(
+        lens: &Lens,
+        zoom: usize,
+        tolerance: f64,
+        stop: StopTest<'_>,
+    ) -> Result<Self, ToleranceError> {
         let model = RayModel::from_lens(lens, zoom).map_err(|e| other(&e))?;
-        let mut sampler = Sampler { model: &model, tolerance, worst: 0.0 };
+        let mut sampler = Sampler { model: &model, tolerance, worst: 0.0, stop };
         let mut fields = Vec::new();
         for (number, field) in model.fields.iter().enumerate() {
             if field.weight > 0.0 {
@@ -94,6 +108,7 @@ struct Sampler<'a> {
     model: &'a RayModel,
     tolerance: f64,
     worst: f64,
+    stop: StopTest<'a>,
 }
 
 impl Sampler<'_> {
@@ -101,6 +116,7 @@ impl Sampler<'_> {
         let field = self.model.fields[number];
         let (mut colours, mut shares, mut chief) = (Vec::new(), 0.0, None);
         for (wavelength, channel) in self.model.channels.iter().enumerate() {
+            refuse_if_stopped(self.stop)?;
             let launch = self.model.launch(field, wavelength).map_err(|e| other(&e))?;
             if wavelength == self.model.primary {
                 chief = launch.ray([0.0, 0.0]).map(|ray| (ray, launch.optical_path_to(ray)));
@@ -234,7 +250,7 @@ mod tests {
         let found = found.unwrap();
         let lens = crate::files::json::read(found.text, found.name).unwrap();
         let model = RayModel::from_lens(&lens, 0).unwrap();
-        let mut sampler = Sampler { model: &model, tolerance: 1e-2, worst: 0.0 };
+        let mut sampler = Sampler { model: &model, tolerance: 1e-2, worst: 0.0, stop: &|| false };
         let field = sampler.field(1).unwrap();
         for colour in &field.colours {
             let mean = |of: &dyn Fn(usize) -> f64| -> f64 {

@@ -8,6 +8,7 @@ use crate::lens::{
     Perturbation, PerturbationKind, Pose, RigidMotion, Surface, SurfaceAperture, System,
 };
 use crate::math::Real;
+use std::collections::HashMap;
 
 /// A lens as designed, resolved at its wavelengths.
 #[derive(Debug, Clone)]
@@ -34,7 +35,7 @@ pub fn perturb<R: Real>(
     lens: &NominalLens,
     errors: &[(Perturbation, R)],
 ) -> Result<Vec<System<R>>, ToleranceError> {
-    errors.iter().try_for_each(|(what, _)| check(lens, *what))?;
+    check_all(lens, errors.iter().map(|(what, _)| *what))?;
     let mut systems: Vec<System<R>> = lens.systems.iter().map(System::cast).collect();
     for (what, value) in errors {
         let semi_diameter = lens.semi_diameters.get(what.first).copied().unwrap_or(1.0);
@@ -45,10 +46,22 @@ pub fn perturb<R: Real>(
             change_dispersion(&mut systems, lens.primary, what.first, *value);
         }
     }
-    if errors.iter().any(|(what, _)| what.kind >= PerturbationKind::SurfaceDecenterX) {
-        systems.iter_mut().for_each(|system| place(system, lens, errors));
+    let moved = bodies(errors);
+    if !moved.is_empty() {
+        systems.iter_mut().for_each(|system| place(system, lens, &moved));
     }
     Ok(systems)
+}
+
+/// Checks that errors are possible.
+///
+/// # Errors
+/// An error of surfaces that do not exist, or that is not possible on its surface.
+pub(super) fn check_all(
+    lens: &NominalLens,
+    errors: impl IntoIterator<Item = Perturbation>,
+) -> Result<(), ToleranceError> {
+    errors.into_iter().try_for_each(|what| check(lens, what))
 }
 
 /// Checks that an error is possible.
@@ -146,10 +159,10 @@ struct Body<R> {
     tilt: [R; 2],
 }
 
-/// Places the surfaces by the errors that move them.
-fn place<R: Real>(system: &mut System<R>, lens: &NominalLens, errors: &[(Perturbation, R)]) {
+/// Places the surfaces of bodies that move.
+fn place<R: Real>(system: &mut System<R>, lens: &NominalLens, bodies: &[Body<R>]) {
     let vertices = system.vertex_positions();
-    for body in bodies(errors) {
+    for body in bodies {
         let pose = Pose::new(body.decenter, body.tilt);
         let curvature = lens.systems[lens.primary].surfaces[body.first].shape.curvature();
         let center = if body.rolls { 1.0 / curvature } else { 0.0 };
@@ -176,15 +189,15 @@ fn place<R: Real>(system: &mut System<R>, lens: &NominalLens, errors: &[(Perturb
 fn bodies<R: Real>(errors: &[(Perturbation, R)]) -> Vec<Body<R>> {
     let mut bodies: Vec<Body<R>> = Vec::new();
     let mut single = Vec::new();
+    let mut places = HashMap::new();
     for (what, value) in errors.iter().filter(|(w, _)| w.kind >= PerturbationKind::SurfaceDecenterX)
     {
         let rolls =
             matches!(what.kind, PerturbationKind::ElementRollX | PerturbationKind::ElementRollY);
         let list = if what.kind.moves_a_body() { &mut bodies } else { &mut single };
-        let same = |b: &Body<R>| (b.first, b.last, b.rolls) == (what.first, what.last, rolls);
-        let at = list.iter().position(same).unwrap_or_else(|| {
+        let alone = !what.kind.moves_a_body();
+        let at = *places.entry((what.first, what.last, rolls, alone)).or_insert_with(|| {
             let (decenter, tilt) = ([R::ZERO; 2], [R::ZERO; 2]);
-            let alone = !what.kind.moves_a_body();
             list.push(Body { first: what.first, last: what.last, rolls, alone, decenter, tilt });
             list.len() - 1
         });

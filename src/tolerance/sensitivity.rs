@@ -4,13 +4,14 @@
 //! the first surface that the error changes, over numbers that carry the first and second derivative
 //! by the error. Nothing is differenced.
 
-use super::merits::{Rear, merits, merits_of, open_tracers};
+use super::merits::{ImageRays, Rear, merits, merits_of, open_tracers};
 use super::spot::ImageRay;
 use super::{
-    Beam, ColourRays, FieldBeam, MeritOptions, Merits, NominalLens, ToleranceError, perturb,
+    Beam, ColourRays, FieldBeam, MeritOptions, Merits, NominalLens, StopTest, ToleranceError,
+    ToleranceScene, perturb, refuse_if_stopped,
 };
 use crate::lens::{Perturbation, System};
-use crate::math::{Dual, Vec3};
+use crate::math::{Dual, Real, Vec3};
 use crate::trace::{Ray, Tracer};
 use rayon::prelude::*;
 
@@ -90,6 +91,13 @@ impl Sensitivity {
         self.merits.mean_square_focused().into()
     }
 
+    /// The second derivative of the mean square spot in mm² per squared unit, at the image plane and at
+    /// one that is displaced by `shift` mm.
+    pub(super) fn second_at(&self, shift: f64) -> [f64; 2] {
+        let displaced = self.merits.mean.at(Jet2::from_f64(shift));
+        [self.merits.mean.a, displaced].map(|jet| jet.slope[0].slope[0])
+    }
+
     /// The displacement of the best common focus, in mm.
     pub fn focus(&self) -> Derivatives {
         self.merits.focus.into()
@@ -106,19 +114,59 @@ pub fn sensitivities(
     options: MeritOptions,
     errors: &[Perturbation],
 ) -> Result<Vec<Sensitivity>, ToleranceError> {
+    sensitivities_until(lens, beam, options, errors, &|| false)
+}
+
+/// The same until `stop` says so.
+///
+/// # Errors
+/// As those of [`sensitivities`], and [`ToleranceError::Stopped`].
+pub(super) fn sensitivities_until(
+    lens: &NominalLens,
+    beam: &Beam,
+    options: MeritOptions,
+    errors: &[Perturbation],
+    stop: StopTest<'_>,
+) -> Result<Vec<Sensitivity>, ToleranceError> {
     let stages = Stages::new(lens, beam, options)?;
-    let all = errors.par_iter().map(|error| stages.sensitivity(lens, options, *error));
-    all.collect()
+    let one = |error: &Perturbation| {
+        refuse_if_stopped(stop)?;
+        stages.sensitivity(lens, options, *error)
+    };
+    errors.par_iter().map(one).collect()
+}
+
+/// The second derivatives of the mean square spot by each error in mm² per squared unit, at the image
+/// plane and at one that is displaced by `shift` mm, until `stop` says so.
+///
+/// # Errors
+/// As those of [`sensitivities`], and [`ToleranceError::Stopped`].
+pub(super) fn second_derivatives(
+    scene: &ToleranceScene,
+    errors: &[Perturbation],
+    shift: f64,
+    stop: StopTest<'_>,
+) -> Result<Vec<[f64; 2]>, ToleranceError> {
+    let stages = Stages::new(&scene.lens, &scene.beam, scene.options)?;
+    let one = |error: &Perturbation| {
+        refuse_if_stopped(stop)?;
+        Ok(stages.sensitivity(&scene.lens, scene.options, *error)?.second_at(shift))
+    };
+    errors.par_iter().map(one).collect()
 }
 
 /// The beam as it arrives at each surface of the lens as designed.
-struct Stages {
+pub(super) struct Stages {
     /// The rays in the frame of each surface's vertex, in front of it.
     beams: Vec<Beam>,
 }
 
 impl Stages {
-    fn new(lens: &NominalLens, beam: &Beam, options: MeritOptions) -> Result<Self, ToleranceError> {
+    pub(super) fn new(
+        lens: &NominalLens,
+        beam: &Beam,
+        options: MeritOptions,
+    ) -> Result<Self, ToleranceError> {
         // Every ray has to arrive.
         merits(&lens.systems, beam, options)?;
         let tracers = open_tracers(&lens.systems)?;
@@ -142,19 +190,29 @@ impl Stages {
         error: Perturbation,
     ) -> Result<Sensitivity, ToleranceError> {
         let variable = Jet2::variable(Dual::variable(0.0, 0), 0);
-        let whole = perturb(lens, &[(error, variable)])?;
+        let (merits, rays) = self.merits(lens, options, &[(error, variable)])?;
+        let rays = rays.iter().flat_map(|rays| centred(rays)).collect();
+        Ok(Sensitivity { error, merits, rays })
+    }
+
+    /// The merits of the lens with some errors, and its rays at the image plane.
+    pub(super) fn merits<R: Real>(
+        &self,
+        lens: &NominalLens,
+        options: MeritOptions,
+        errors: &[(Perturbation, R)],
+    ) -> Result<(Merits<R>, ImageRays<R>), ToleranceError> {
+        let whole = perturb(lens, errors)?;
         let image = whole[lens.primary].vertex_positions().last().copied().unwrap_or_default();
-        let from = error.first.min(self.beams.len() - 1);
-        let rear = |system: &System<Jet2>| System {
+        let first = errors.iter().map(|(error, _)| error.first).min().unwrap_or(0);
+        let from = first.min(self.beams.len() - 1);
+        let rear = |system: &System<R>| System {
             index_before: system.index_before(from),
             surfaces: system.surfaces[from..].to_vec(),
             stop: None,
         };
         let systems: Vec<_> = whole.iter().map(rear).collect();
-        let rear = Rear { systems: &systems, image };
-        let (merits, rays) = merits_of(&rear, &self.beams[from], options)?;
-        let rays = rays.iter().flat_map(|rays| centred(rays)).collect();
-        Ok(Sensitivity { error, merits, rays })
+        merits_of(&Rear { systems: &systems, image }, &self.beams[from], options)
     }
 }
 

@@ -78,7 +78,7 @@ pub fn swept_sensitivities(
 
 /// The rays of one field with their derivatives by the numbers of surfaces, all wavelengths one after
 /// the other.
-struct SweptField {
+pub(super) struct SweptField {
     symmetry: RaySymmetry,
     colours: Vec<SweptColour>,
     /// The weight of each ray.
@@ -99,7 +99,7 @@ struct SweptColour {
 }
 
 impl SweptField {
-    fn new(
+    pub(super) fn new(
         scene: &ToleranceScene,
         tracers: &[Tracer<f64>],
         folded: &FoldedField<'_>,
@@ -138,6 +138,16 @@ impl SweptField {
             }
         }
         Ok(Self { symmetry, colours, weights, offsets, slopes })
+    }
+
+    /// The weight of each ray.
+    pub(super) fn weights(&self) -> &[f64] {
+        &self.weights
+    }
+
+    /// The derivative of x or y of each ray by a number.
+    pub(super) fn number_effect(&self, axis: usize, number: MadeNumber, effect: &mut [f64]) {
+        self.fill_effect(axis, &[(number, 1.0)], effect);
     }
 
     fn slope_square(&self) -> f64 {

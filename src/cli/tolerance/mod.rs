@@ -1,28 +1,34 @@
 //! `tolerance`: what manufacturing errors do to a lens.
 
+mod checkpoint;
 mod compensators;
+mod merits;
+mod plots;
 mod power;
 
+use self::checkpoint::RandomLensSource;
 use self::compensators::{CompensatorRow, compensator_rows, compensator_table, stop_warning};
+use self::merits::{FurtherMerits, FurtherRow, GroupedShares};
 use crate::cli::error::CliError;
 use crate::cli::failures::Failures;
 use crate::cli::input::{LensFile, LoadedLens, Tolerance as RelativeError};
 use crate::cli::output::{Output, ShortNumber, TextTable};
 use crate::cli::output_paths::OutputPaths;
 use crate::cli::progress::{note_if_stopped, stop_flag};
-use crate::files;
+use crate::files::{self, FileLock};
 use crate::lens::{Compensator, Lens, PerturbationKind, SurfaceNumber, Tolerance, ToleranceSheet};
 use crate::tolerance::{
-    AsBuiltSpot, Derivatives, MadeLens, NominalLens, PriceClass, QuadraticForm, RealLens,
-    StoppedLenses, ToleranceAnalysis, ToleranceError, ToleranceGrade, ToleranceRequest,
-    ToleranceScene, analyze_until, bounded_tolerances, form_yield, graded_sheet, loosest_for_yield,
-    loosest_tolerances, price_classes, real_lenses, refuse_lost_lenses, worst_lens,
+    AsBuiltSpot, Derivatives, ErrorModel, MadeLens, NominalLens, PriceClass, QuadraticForm,
+    RealLens, SecondDerivatives, StopTest, StoppedLenses, ToleranceAnalysis, ToleranceError,
+    ToleranceGrade, ToleranceRequest, ToleranceScene, bounded_tolerances, form_yield, graded_sheet,
+    loosest_for_yield, loosest_tolerances, price_classes, real_lenses, refuse_lost_lenses,
+    worst_lens,
 };
 use power::PowerUnits;
 use serde::Serialize;
 use std::fmt::{self, Display};
 use std::path::PathBuf;
-use std::sync::atomic::AtomicBool;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 fn parse_sample_count(text: &str) -> Result<usize, &'static str> {
     text.parse().ok().filter(|count| *count >= 2).ok_or("expected a whole number, 2 or more")
@@ -73,6 +79,24 @@ pub(super) struct ToleranceArgs {
     #[arg(long = "compensator", value_name = "KIND@SURFACES=TRAVEL")]
     compensators: Vec<Compensator>,
 
+    /// Adds the second derivatives of rays to the quadratic model, which leaves them out: one more pass of all
+    /// rays for each error
+    #[arg(long)]
+    second_derivatives: bool,
+
+    /// Adds what the errors do to the RMS wavefront at the primary wavelength
+    #[arg(long)]
+    wavefront: bool,
+
+    /// Adds what the errors do to the geometric contrast at this frequency in cycles/mm
+    #[arg(long, value_name = "FREQUENCY")]
+    mtf: Option<f64>,
+
+    /// A file in which the lenses of Monte Carlo are saved: a run that was stopped, or one with more
+    /// --samples, goes on from there
+    #[arg(long, value_name = "FILE")]
+    checkpoint: Option<PathBuf>,
+
     /// A file for the table of sensitivities, as CSV
     #[arg(long, value_name = "FILE")]
     csv: Option<PathBuf>,
@@ -81,23 +105,27 @@ pub(super) struct ToleranceArgs {
     /// own (.json, .zmx)
     #[arg(long, value_name = "FILE")]
     worst: Option<PathBuf>,
+
+    /// A file for the worst errors, the distribution and the yield as a picture: PNG or SVG
+    #[arg(long, value_name = "FILE")]
+    plot: Option<PathBuf>,
 }
 
 impl ToleranceArgs {
     pub(super) fn run(&self, output: &Output) -> Result<(), CliError> {
-        let mut paths = OutputPaths::reading([("the lens", self.lens.path())]);
-        paths.file("--csv", self.csv.as_deref(), &["csv"])?;
-        paths.file("--worst", self.worst.as_deref(), &["json", "zmx"])?;
-        self.check_lengths()?;
+        self.check_paths()?;
+        self.check_numbers()?;
         let opened = self.lens.open()?;
         opened.check_zoom(self.zoom)?;
+        let _lock = self.checkpoint.as_deref().map(FileLock::acquire).transpose()?;
         let refuse = |source: ToleranceError| tolerance_error(&opened, &source);
-        let scene = ToleranceScene::new(&opened.lens, self.zoom, self.error.0).map_err(refuse)?;
-        let sheet = self.sheet(&opened, &scene)?;
-        let request = ToleranceRequest { seed: self.seed, samples: self.samples, limit: self.rms };
         let stop = stop_flag();
-        let analysis = analyze_until(&scene, &sheet, request, &stop).map_err(refuse)?;
-        note_if_stopped(&stop);
+        let stops = || stop.load(Ordering::Relaxed);
+        let scene = ToleranceScene::new_until(&opened.lens, self.zoom, self.error.0, &stops);
+        let scene = scene.map_err(refuse)?;
+        let sheet = self.sheet(&opened, &scene)?;
+        let mut failures = Failures::default();
+        let analysis = self.analysis((&opened, &scene, &sheet), &stops, &mut failures)?;
         refuse_lost_lenses(analysis.lost, analysis.samples, "these tolerances").map_err(refuse)?;
         let form = &analysis.forms[1];
         let loosest = match self.loosest(form, &sheet).transpose().map_err(refuse)? {
@@ -112,16 +140,23 @@ impl ToleranceArgs {
             }
             None => None,
         };
+        let further = FurtherMerits::new(self, (&opened.lens, &scene, &sheet), &stops);
+        let further = further.map_err(refuse)?;
+        note_if_stopped(&stop);
         let worst = self.worst(&opened, &scene, &sheet, &analysis.real).map_err(refuse)?;
+        let lens = (&opened.lens, &scene, &sheet);
         let mut report =
-            ToleranceReport::new(self, &scene, &sheet, analysis, loosest).map_err(refuse)?;
+            ToleranceReport::new(self, lens, analysis, (loosest, further)).map_err(refuse)?;
         report.worst = worst.as_ref().map(WorstLens::new);
-        let mut failures = Failures::default();
         if let Some(path) = &self.csv {
             failures.note(files::write_atomic(path, report.csv().as_bytes()));
         }
         if let (Some(path), Some(worst)) = (&self.worst, &worst) {
             failures.note(files::save(&worst.lens, path));
+        }
+        if let Some(path) = &self.plot {
+            let spots = (&report.spots, report.samples);
+            failures.note(plots::save(path, &opened.lens.name, &report.sensitivities, spots));
         }
         failures.note(output.print(&report));
         failures.into_result()
@@ -141,6 +176,46 @@ impl ToleranceArgs {
         worst_lens((&opened.lens, self.zoom), scene, sheet, real)
     }
 
+    /// The analysis, whose real lenses are read from the checkpoint and saved there.
+    fn analysis(
+        &self,
+        (opened, scene, sheet): (&LoadedLens, &ToleranceScene, &ToleranceSheet),
+        stop: StopTest<'_>,
+        failures: &mut Failures,
+    ) -> Result<ToleranceAnalysis, CliError> {
+        let refuse = |source: ToleranceError| tolerance_error(opened, &source);
+        let lens = Lens { tolerances: Some(sheet.clone()), ..opened.lens.clone() };
+        let source = RandomLensSource::new(&lens, self.zoom, self.error.0, self.seed);
+        let known = match self.checkpoint.as_deref() {
+            Some(path) => source.known(path)?,
+            None => Vec::new(),
+        };
+        let second = if self.second_derivatives {
+            SecondDerivatives::Traced
+        } else {
+            SecondDerivatives::Neglected
+        };
+        let request = ToleranceRequest { seed: self.seed, samples: self.samples, limit: self.rms };
+        let model = ErrorModel::new(scene, sheet, second, stop).map_err(refuse)?;
+        let mut failed = None;
+        let save = |lenses: &[RealLens]| {
+            let saved = self.checkpoint.as_deref().map(|path| source.save(path, lenses));
+            failed = saved.and_then(Result::err);
+        };
+        let found = model.analyze_on((scene, sheet), request, stop, (&known, save));
+        let failed = failed.map(|why| CliError::Failed(why.to_string()));
+        failures.note(failed.map_or(Ok(()), Err));
+        found.map_err(refuse)
+    }
+
+    fn check_paths(&self) -> Result<(), CliError> {
+        let mut paths = OutputPaths::reading([("the lens", self.lens.path())]);
+        paths.file("--checkpoint", self.checkpoint.as_deref(), &["json"])?;
+        paths.file("--csv", self.csv.as_deref(), &["csv"])?;
+        paths.file("--worst", self.worst.as_deref(), &["json", "zmx"])?;
+        paths.file("--plot", self.plot.as_deref(), &plots::EXTENSIONS)
+    }
+
     /// The loosest tolerances that are asked for.
     fn loosest(
         &self,
@@ -156,10 +231,15 @@ impl ToleranceArgs {
         }
     }
 
-    fn check_lengths(&self) -> Result<(), CliError> {
-        for (name, value) in [("--rms", self.rms), ("--loosest", self.loosest)] {
+    fn check_numbers(&self) -> Result<(), CliError> {
+        let numbers = [
+            ("--rms", self.rms, "mm"),
+            ("--loosest", self.loosest, "mm"),
+            ("--mtf", self.mtf, "cycles/mm"),
+        ];
+        for (name, value, unit) in numbers {
             if let Some(found) = value.filter(|v| !(*v > 0.0 && v.is_finite())) {
-                let text = format!("{name}: found {found}; expected more than 0, in mm");
+                let text = format!("{name}: found {found}; expected more than 0, in {unit}");
                 return Err(CliError::Input(text));
             }
         }
@@ -186,7 +266,7 @@ impl ToleranceArgs {
 fn tolerance_error(opened: &LoadedLens, source: &ToleranceError) -> CliError {
     let text = format!("{}: {source}", opened.file);
     match source {
-        ToleranceError::MostLost { .. } => CliError::Failed(text),
+        ToleranceError::MostLost { .. } | ToleranceError::Stopped => CliError::Failed(text),
         _ => CliError::Input(text),
     }
 }
@@ -206,7 +286,11 @@ struct ToleranceReport {
     spots: [AsBuiltSpot; 2],
     compensators: Vec<CompensatorRow>,
     stopped: Option<StoppedLenses>,
+    second_derivatives: bool,
     sensitivities: Vec<SensitivityRow>,
+    groups: GroupedShares,
+    #[serde(flatten)]
+    further: FurtherMerits,
     loosest: Option<Vec<Tolerance>>,
     prices: Option<LoosestPrices>,
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -335,6 +419,8 @@ struct SensitivityRow {
     sigma: f64,
     fixed: ShareOfGrowth,
     refocused: ShareOfGrowth,
+    #[serde(flatten)]
+    further: FurtherRow,
 }
 
 /// The derivatives of the mean square spot by an error, and its share of the growth of the
@@ -349,14 +435,15 @@ struct ShareOfGrowth {
 impl ToleranceReport {
     fn new(
         arguments: &ToleranceArgs,
-        scene: &ToleranceScene,
-        sheet: &ToleranceSheet,
+        (lens, scene, sheet): (&Lens, &ToleranceScene, &ToleranceSheet),
         analysis: ToleranceAnalysis,
-        loosest: Option<Loosest>,
+        (loosest, mut further): (Option<Loosest>, FurtherMerits),
     ) -> Result<Self, ToleranceError> {
         let mut warnings = warnings(&analysis);
         warnings.extend(loosest.iter().flat_map(|loosest| loosest.warnings.clone()));
+        warnings.extend(further.warnings(sheet));
         let (loosest, prices) = loosest.map(|l| (l.sheet.errors, l.prices)).unzip();
+        let shares = analysis.growth_shares(sheet)?;
         Ok(Self {
             errors: sheet.errors.len(),
             correlations: sheet.correlations.len(),
@@ -367,10 +454,13 @@ impl ToleranceReport {
             lost: analysis.lost,
             dark: analysis.dark,
             clipping: analysis.clipping,
-            sensitivities: rows(sheet, &analysis, &scene.lens)?,
+            second_derivatives: analysis.has_second_derivatives,
+            sensitivities: rows(sheet, &analysis, (&shares, &mut further), &scene.lens),
+            groups: GroupedShares::new(lens, sheet, &shares),
             compensators: compensator_rows(&analysis),
             stopped: analysis.stopped,
             spots: analysis.spots,
+            further,
             loosest,
             prices,
             worst: None,
@@ -380,14 +470,17 @@ impl ToleranceReport {
 
     fn csv(&self) -> String {
         let mut text = "kind,first,last,half_range,sigma,fixed_first,fixed_second,fixed_share,\
-                        refocused_first,refocused_second,refocused_share\r\n"
+                        refocused_first,refocused_second,refocused_share"
             .to_owned();
+        text.push_str(&self.further.csv_head());
+        text.push_str("\r\n");
         for row in &self.sensitivities {
             let numbers = [&row.fixed, &row.refocused]
                 .map(|part| format!("{},{},{}", part.by.first, part.by.second, part.share));
             let place = format!("{},{},{}", row.kind.name(), row.first, row.last);
             let range = format!("{},{}", row.half_range, row.sigma);
             text.push_str(&[place, range, numbers.join(",")].join(","));
+            text.push_str(&row.further.csv());
             text.push_str("\r\n");
         }
         text
@@ -398,18 +491,17 @@ impl ToleranceReport {
 fn rows(
     sheet: &ToleranceSheet,
     analysis: &ToleranceAnalysis,
+    (shares, further): (&[[f64; 2]], &mut FurtherMerits),
     lens: &NominalLens,
-) -> Result<Vec<SensitivityRow>, ToleranceError> {
-    let shares = analysis.growth_shares(sheet)?;
-    let adjusted = &analysis.forms[1];
-    let both = sheet.errors.iter().zip(&analysis.sensitivities).zip(shares).enumerate();
+) -> Vec<SensitivityRow> {
+    let both = sheet.errors.iter().zip(shares.iter().copied()).enumerate();
     let mut rows: Vec<SensitivityRow> = both
-        .map(|(i, ((tolerance, found), [fixed, refocused]))| {
-            let by_adjusted = Derivatives {
-                value: adjusted.nominal,
-                first: adjusted.first[i],
-                second: adjusted.second[(i, i)],
-            };
+        .map(|(i, (tolerance, [fixed, refocused]))| {
+            let [by_fixed, by_adjusted] = analysis.forms.each_ref().map(|form| Derivatives {
+                value: form.nominal,
+                first: form.first[i],
+                second: form.second.of(i, i),
+            });
             let sigma = tolerance.deviation();
             SensitivityRow {
                 kind: tolerance.error.kind,
@@ -418,13 +510,14 @@ fn rows(
                 half_range: tolerance.half_range,
                 power: PowerUnits::new(tolerance, lens),
                 sigma,
-                fixed: ShareOfGrowth { by: found.mean_square(), share: fixed },
+                fixed: ShareOfGrowth { by: by_fixed, share: fixed },
                 refocused: ShareOfGrowth { by: by_adjusted, share: refocused },
+                further: further.row(i),
             }
         })
         .collect();
     rows.sort_by(|a, b| b.refocused.share.total_cmp(&a.refocused.share));
-    Ok(rows)
+    rows
 }
 
 fn warnings(analysis: &ToleranceAnalysis) -> Vec<String> {
@@ -487,6 +580,8 @@ impl Display for ToleranceReport {
         writeln!(f, "{}", self.spot_table())?;
         writeln!(f, "{}", compensator_table(&self.compensators))?;
         writeln!(f, "{}", self.sensitivity_table())?;
+        write!(f, "{}", self.groups)?;
+        write!(f, "{}", self.further)?;
         if let Some([fixed, refocused, light]) = self.clipping.map(|c| c.map(|v| 100.0 * v)) {
             writeln!(
                 f,
@@ -548,10 +643,11 @@ impl ToleranceReport {
     }
 
     fn sensitivity_table(&self) -> TextTable {
-        let head = ["error", "surfaces", "half range", "share fixed", "share refocused"];
+        let mut head = vec!["error", "surfaces", "half range", "share fixed", "share refocused"];
+        head.extend(self.further.heads());
         let mut table = TextTable::new(&head);
         for row in self.sensitivities.iter().take(SHOWN) {
-            table.row([
+            let own = [
                 row.kind.name().to_owned(),
                 surfaces(row.first, row.last),
                 row.power.map_or_else(
@@ -560,7 +656,8 @@ impl ToleranceReport {
                 ),
                 percent(row.fixed.share),
                 percent(row.refocused.share),
-            ]);
+            ];
+            table.row(own.into_iter().chain(row.further.cells()));
         }
         let more = self.sensitivities.len().saturating_sub(SHOWN);
         if more > 0 {
@@ -569,7 +666,9 @@ impl ToleranceReport {
             };
             let shares = [rest(|row| row.fixed.share), rest(|row| row.refocused.share)];
             let [fixed, refocused] = shares.map(percent);
-            table.row([format!("{more} more"), String::new(), String::new(), fixed, refocused]);
+            let own = [format!("{more} more"), String::new(), String::new(), fixed, refocused];
+            let none = self.further.heads().into_iter().map(|_| String::new());
+            table.row(own.into_iter().chain(none));
         }
         table
     }

@@ -6,8 +6,9 @@
 use super::{AnalysisSettings, LoosestTolerances};
 use crate::lens::{Lens, ToleranceSheet};
 use crate::tolerance::{
-    MadeLens, NominalLens, ToleranceAnalysis, ToleranceError, ToleranceRequest, ToleranceScene,
-    analyze, graded_sheet, refuse_lost_lenses, worst_lens,
+    ErrorModel, MadeLens, NominalLens, SecondDerivatives, StopTest, ToleranceAnalysis,
+    ToleranceError, ToleranceRequest, ToleranceScene, WavefrontModel, graded_sheet,
+    refuse_lost_lenses, worst_lens,
 };
 
 /// The tolerances of a lens and what they do to it.
@@ -22,6 +23,13 @@ pub struct AsBuiltLens {
     pub shares: Vec<[f64; 2]>,
     /// The analysis.
     pub analysis: ToleranceAnalysis,
+    /// The RMS wavefront in waves at the primary wavelength, as designed and the root of the expected
+    /// variance, each at the fixed image plane and refocused; `None` where only derivatives of spots are
+    /// known yet, or for a lens without a wavefront.
+    pub wavefront: Option<[[f64; 2]; 2]>,
+    /// The share of each error in the growth of the variance of the wavefront, likewise; as many as
+    /// there are errors, or none.
+    pub wavefront_shares: Vec<[f64; 2]>,
     /// The number of rays of the lens as designed.
     pub rays: usize,
     /// The largest relative error of the radius of a spot by the sampling of its pupil.
@@ -48,7 +56,27 @@ const SEED: u64 = 1;
 /// # Errors
 /// A lens that no light gets through, or a tolerance that is not possible, in words.
 pub fn predict_as_built(lens: &Lens, settings: &AnalysisSettings) -> Result<AsBuiltLens, String> {
-    as_built(lens, settings, COARSE.max(settings.tolerance), 0).map_err(|why| why.to_string())
+    let tolerance = COARSE.max(settings.tolerance);
+    as_built(lens, settings, (tolerance, 0), &|| false).map_err(|why| why.to_string())
+}
+
+/// The same; `None` once `stop` says so.
+pub(super) fn predict_unless(
+    lens: &Lens,
+    settings: &AnalysisSettings,
+    stop: StopTest<'_>,
+) -> Option<Result<AsBuiltLens, String>> {
+    let tolerance = COARSE.max(settings.tolerance);
+    unless_stopped(as_built(lens, settings, (tolerance, 0), stop))
+}
+
+fn unless_stopped(
+    found: Result<AsBuiltLens, ToleranceError>,
+) -> Option<Result<AsBuiltLens, String>> {
+    match found {
+        Err(ToleranceError::Stopped) => None,
+        found => Some(found.map_err(|why| why.to_string())),
+    }
 }
 
 /// The lens as it is made, corrected by real lenses.
@@ -56,26 +84,44 @@ pub fn predict_as_built(lens: &Lens, settings: &AnalysisSettings) -> Result<AsBu
 /// # Errors
 /// As those of [`predict_as_built`].
 pub fn confirm_as_built(lens: &Lens, settings: &AnalysisSettings) -> Result<AsBuiltLens, String> {
-    as_built(lens, settings, settings.tolerance, REAL_LENSES).map_err(|why| why.to_string())
+    let found = as_built(lens, settings, (settings.tolerance, REAL_LENSES), &|| false);
+    found.map_err(|why| why.to_string())
+}
+
+/// The same by fewer real lenses, or not at all, once `stop` says so.
+pub(super) fn confirm_unless(
+    lens: &Lens,
+    settings: &AnalysisSettings,
+    stop: StopTest<'_>,
+) -> Option<Result<AsBuiltLens, String>> {
+    unless_stopped(as_built(lens, settings, (settings.tolerance, REAL_LENSES), stop))
 }
 
 fn as_built(
     lens: &Lens,
     settings: &AnalysisSettings,
-    tolerance: f64,
-    samples: usize,
+    (tolerance, samples): (f64, usize),
+    stop: StopTest<'_>,
 ) -> Result<AsBuiltLens, ToleranceError> {
-    let scene = ToleranceScene::new(lens, settings.zoom, tolerance)?;
+    let scene = ToleranceScene::new_until(lens, settings.zoom, tolerance, stop)?;
     let graded = || graded_sheet(lens, &scene.lens, settings.grade);
     let sheet = lens.tolerances.clone().unwrap_or_else(graded);
     let request = ToleranceRequest { seed: SEED, samples, limit: settings.good_rms };
-    let analysis = analyze(&scene, &sheet, request)?;
+    let model = ErrorModel::new(&scene, &sheet, SecondDerivatives::default(), stop)?;
+    let analysis = model.analyze(&scene, &sheet, request, stop)?;
     refuse_lost_lenses(analysis.lost, analysis.samples, "these tolerances")?;
     let goal = settings.loosest.filter(|_| samples > 0);
     let form = &analysis.forms[1];
     let loosest = goal.map(|goal| LoosestTolerances::new((lens, &scene), form, &sheet, goal));
     let worst = worst_lens((lens, settings.zoom), &scene, &sheet, &analysis.real);
+    let waves = (samples > 0)
+        .then(|| WavefrontModel::new((lens, settings.zoom), &scene, &sheet, stop).ok())
+        .flatten();
     Ok(AsBuiltLens {
+        wavefront: waves.as_ref().map(|waves| {
+            [waves.nominal.map(|variance| variance.max(0.0).sqrt()), waves.expected_rms(&sheet)]
+        }),
+        wavefront_shares: waves.map_or_else(Vec::new, |waves| waves.growth_shares(&sheet)),
         shares: analysis.growth_shares(&sheet)?,
         sheet,
         from_lens: lens.tolerances.is_some(),

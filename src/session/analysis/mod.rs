@@ -267,13 +267,27 @@ fn answer(
     Some(results)
 }
 
+/// As [`catch_panic`], for work that may have no result.
+fn caught<T>(work: impl FnOnce() -> Option<Result<T, String>>) -> Option<Result<T, String>> {
+    catch_panic(|| Ok(work())).unwrap_or_else(|why| Some(Err(why)))
+}
+
+/// A prediction of lenses as they are made gives way to a newer request after this time only: else it
+/// would not follow a lens that is dragged.
+const LONGEST_PREDICTION: Duration = Duration::from_secs(1);
+
 /// Publishes the results once more with the lens as it is made if a panel shows it and no request
 /// waits.
 fn publish_prediction(mut results: AnalysisResults, output: &AnalysisOutput) -> AnalysisResults {
     let Ok(analyses) = &mut results.analyses else { return results };
     if results.settings.tolerances && !output.is_interrupted() {
-        let predicted = time(|| catch_panic(|| predict_as_built(&results.lens, &results.settings)));
-        analyses.as_built = Some(Arc::new(predicted));
+        let (is_interrupted, start) = (output.interruption(), now());
+        let stop = || start.elapsed() > LONGEST_PREDICTION && is_interrupted();
+        let (lens, settings) = (&results.lens, &results.settings);
+        let predict = || as_built::predict_unless(lens, settings, &stop);
+        let Timed { value, ms } = time(|| caught(predict));
+        let Some(value) = value else { return results };
+        analyses.as_built = Some(Arc::new(Timed { value, ms }));
         output.publish(results.clone());
     }
     results
@@ -290,8 +304,12 @@ fn refine(mut results: AnalysisResults, output: &AnalysisOutput) -> AnalysisResu
     }
     let (zoom, scene) = (settings.zoom, settings.picture_scene());
     if settings.tolerances {
-        let confirmed = time(|| catch_panic(|| confirm_as_built(&results.lens, &settings)));
-        analyses.as_built = Some(Arc::new(confirmed));
+        let is_interrupted = output.interruption();
+        let confirm = || as_built::confirm_unless(&results.lens, &settings, &is_interrupted);
+        let Timed { value, ms } = time(|| caught(confirm));
+        if let Some(value) = value {
+            analyses.as_built = Some(Arc::new(Timed { value, ms }));
+        }
     }
     if settings.picture && !output.is_interrupted() {
         let (lens, all) = (&results.lens, settings.picture_errors);

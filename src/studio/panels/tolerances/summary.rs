@@ -52,6 +52,11 @@ pub(super) fn summary(ui: &mut Ui, made: &AsBuiltLens) {
     if spots.iter().all(|spot| spot.good.is_some()) {
         rows.push(("Good lenses".into(), spots.each_ref().map(good_share)));
     }
+    if let Some([designed, expected]) = made.wavefront {
+        let waves = |rms: f64| format!("{} λ", number::format_digits(rms, 3));
+        rows.push(("Wavefront as designed".into(), designed.map(waves)));
+        rows.push(("Wavefront of the lenses".into(), expected.map(waves)));
+    }
     Grid::new("spots as made").num_columns(3).striped(true).show(ui, |ui| {
         ui.weak(RMS_OVER_FIELDS).on_hover_text(RMS_OVER_FIELDS_HINT);
         ui.weak("fixed focus");

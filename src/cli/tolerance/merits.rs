@@ -1,0 +1,265 @@
+//! What errors do to the wavefront and to the contrast, and sums of shares, in the results of
+//! `tolerance`.
+
+use super::{ShareOfGrowth, ToleranceArgs, percent, surfaces};
+use crate::cli::output::{ShortNumber, TextTable};
+use crate::lens::{Lens, ToleranceSheet};
+use crate::tolerance::{
+    ContrastChanges, KindShare, PartShare, StopTest, ToleranceError, ToleranceScene,
+    WavefrontModel, shares_by_kind, shares_by_part,
+};
+use serde::Serialize;
+use std::fmt::{self, Display};
+
+/// The wavefront and the contrast of lenses that are made, as far as they are asked for.
+#[derive(Serialize)]
+pub(super) struct FurtherMerits {
+    wavefront: Option<WavefrontSummary>,
+    mtf: Option<ContrastSummary>,
+    #[serde(skip)]
+    rows: Vec<FurtherRow>,
+    #[serde(skip)]
+    is_stopped: bool,
+}
+
+/// The RMS wavefront in waves, at the fixed image plane and refocused.
+#[derive(Serialize)]
+struct WavefrontSummary {
+    nominal_rms: [f64; 2],
+    expected_rms: [f64; 2],
+    /// The best position of the image plane in mm.
+    focus: f64,
+}
+
+/// The contrast, at the fixed image plane and refocused.
+#[derive(Serialize)]
+struct ContrastSummary {
+    /// In cycles/mm.
+    frequency: f64,
+    nominal: [f64; 2],
+    /// `None` if a ray does not arrive with an error at an end of its range.
+    expected: Option<[f64; 2]>,
+    sampling_error: f64,
+}
+
+/// What one error does.
+#[derive(Serialize, Default)]
+pub(super) struct FurtherRow {
+    #[serde(skip_serializing_if = "Option::is_none")]
+    wavefront: Option<WavefrontRow>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    mtf: Option<ContrastRow>,
+}
+
+/// The derivatives of the variance of the wavefront, and the share in its growth.
+#[derive(Serialize)]
+struct WavefrontRow {
+    fixed: ShareOfGrowth,
+    refocused: ShareOfGrowth,
+}
+
+/// The changes of the contrast at both ends of the range of an error.
+#[derive(Serialize)]
+struct ContrastRow {
+    fixed: Option<[f64; 2]>,
+    refocused: Option<[f64; 2]>,
+}
+
+impl FurtherMerits {
+    /// What the arguments ask for; nothing of what is stopped.
+    pub(super) fn new(
+        arguments: &ToleranceArgs,
+        (lens, scene, sheet): (&Lens, &ToleranceScene, &ToleranceSheet),
+        stop: StopTest<'_>,
+    ) -> Result<Self, ToleranceError> {
+        let wavefront = || WavefrontModel::new((lens, arguments.zoom), scene, sheet, stop);
+        let wavefront = unless_stopped(arguments.wavefront.then(wavefront).transpose())?;
+        let contrast = |frequency: f64| {
+            let place = (lens, arguments.zoom, arguments.error.0);
+            ContrastChanges::new(place, scene, (sheet, frequency), stop)
+        };
+        let contrast = unless_stopped(arguments.mtf.map(contrast).transpose())?;
+        let is_stopped = arguments.wavefront && wavefront.is_none()
+            || arguments.mtf.is_some() && contrast.is_none();
+        let mut rows: Vec<FurtherRow> =
+            sheet.errors.iter().map(|_| FurtherRow::default()).collect();
+        if let Some(model) = &wavefront {
+            add_wavefronts(&mut rows, model, sheet);
+        }
+        if let Some(found) = &contrast {
+            for (row, changes) in rows.iter_mut().zip(&found.changes) {
+                let of = |plane: usize| changes.map(|changes| changes[plane]);
+                row.mtf = Some(ContrastRow { fixed: of(0), refocused: of(1) });
+            }
+        }
+        let wavefront = wavefront.map(|model| WavefrontSummary {
+            nominal_rms: model.nominal.map(|variance| variance.max(0.0).sqrt()),
+            expected_rms: model.expected_rms(sheet),
+            focus: model.focus,
+        });
+        let mtf = contrast.map(|found| ContrastSummary {
+            frequency: found.frequency,
+            nominal: found.nominal,
+            expected: found.expected(sheet),
+            sampling_error: found.sampling_error,
+        });
+        Ok(Self { wavefront, mtf, rows, is_stopped })
+    }
+
+    /// What the error with a number does; once.
+    pub(super) fn row(&mut self, number: usize) -> FurtherRow {
+        self.rows.get_mut(number).map(std::mem::take).unwrap_or_default()
+    }
+
+    pub(super) fn warnings(&self, sheet: &ToleranceSheet) -> Vec<String> {
+        let mut warnings = Vec::new();
+        if self.is_stopped {
+            let text = "stopped before the wavefront or the contrast was known; they are left out";
+            warnings.push(text.to_owned());
+        }
+        let is_asked = self.wavefront.is_some() || self.mtf.is_some();
+        if is_asked && !sheet.correlations.is_empty() {
+            let text = "the expected wavefront and contrast count correlated errors as independent";
+            warnings.push(text.to_owned());
+        }
+        warnings
+    }
+
+    /// The heads of the columns of the text.
+    pub(super) fn heads(&self) -> Vec<&'static str> {
+        let wavefront = self.wavefront.iter().map(|_| "share wavefront");
+        wavefront.chain(self.mtf.iter().map(|_| "MTF at worst")).collect()
+    }
+
+    /// The heads of further columns of CSV, each behind a comma.
+    pub(super) fn csv_head(&self) -> String {
+        let mut head = String::new();
+        if self.wavefront.is_some() {
+            head += ",wavefront_fixed_first,wavefront_fixed_second,wavefront_fixed_share,\
+                     wavefront_refocused_first,wavefront_refocused_second,\
+                     wavefront_refocused_share";
+        }
+        if self.mtf.is_some() {
+            head += ",mtf_fixed_low,mtf_fixed_high,mtf_refocused_low,mtf_refocused_high";
+        }
+        head
+    }
+}
+
+impl FurtherRow {
+    /// The cells of the further columns of the text, refocused.
+    pub(super) fn cells(&self) -> Vec<String> {
+        let wavefront = self.wavefront.iter().map(|own| percent(own.refocused.share));
+        let worst = |own: &ContrastRow| {
+            own.refocused.map_or("lost".to_owned(), |[low, high]| format!("{:+.3}", low.min(high)))
+        };
+        wavefront.chain(self.mtf.iter().map(worst)).collect()
+    }
+
+    /// The cells of the further columns of CSV, each behind a comma.
+    pub(super) fn csv(&self) -> String {
+        let parts = self.wavefront.iter().flat_map(|own| [&own.fixed, &own.refocused]);
+        let derivatives =
+            |part: &ShareOfGrowth| format!(",{},{},{}", part.by.first, part.by.second, part.share);
+        let changes = self.mtf.iter().flat_map(|own| [own.fixed, own.refocused]);
+        let ends = |ends: Option<[f64; 2]>| {
+            ends.map_or(",,".to_owned(), |[low, high]| format!(",{low},{high}"))
+        };
+        parts.map(derivatives).chain(changes.map(ends)).collect()
+    }
+}
+
+fn unless_stopped<T>(
+    found: Result<Option<T>, ToleranceError>,
+) -> Result<Option<T>, ToleranceError> {
+    match found {
+        Err(ToleranceError::Stopped) => Ok(None),
+        found => found,
+    }
+}
+
+fn add_wavefronts(rows: &mut [FurtherRow], model: &WavefrontModel, sheet: &ToleranceSheet) {
+    let shares = model.growth_shares(sheet);
+    for (row, (by, shares)) in rows.iter_mut().zip(model.errors.iter().zip(&shares)) {
+        let share = |i: usize| ShareOfGrowth { by: by[i], share: shares[i] };
+        row.wavefront = Some(WavefrontRow { fixed: share(0), refocused: share(1) });
+    }
+}
+
+impl Display for FurtherMerits {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mut table = TextTable::new(&["", "fixed focus", "refocused"]);
+        let mut row = |name: String, [fixed, refocused]: [f64; 2]| {
+            table.row([name, ShortNumber(fixed).to_string(), ShortNumber(refocused).to_string()]);
+        };
+        if let Some(own) = &self.wavefront {
+            row("RMS wavefront as designed, waves".to_owned(), own.nominal_rms);
+            row("root of the expected variance, waves".to_owned(), own.expected_rms);
+        }
+        if let Some(own) = &self.mtf {
+            let ContrastSummary { frequency, nominal, expected, sampling_error } = own;
+            let at = format!("MTF at {} cycles/mm", ShortNumber(*frequency));
+            row(format!("{at} as designed ± {sampling_error:.0e}"), *nominal);
+            if let Some(expected) = expected {
+                row(format!("{at}, expected"), *expected);
+            }
+        }
+        if self.wavefront.is_none() && self.mtf.is_none() {
+            return Ok(());
+        }
+        writeln!(f, "{table}")
+    }
+}
+
+/// The shares of errors, summed over the parts of the lens and over the kinds of errors.
+#[derive(Serialize)]
+pub(super) struct GroupedShares {
+    by_part: Vec<PartShare>,
+    by_kind: Vec<KindShare>,
+}
+
+/// The number of parts in the text.
+const SHOWN: usize = 12;
+
+impl GroupedShares {
+    pub(super) fn new(lens: &Lens, sheet: &ToleranceSheet, shares: &[[f64; 2]]) -> Self {
+        Self {
+            by_part: shares_by_part(lens, sheet, shares),
+            by_kind: shares_by_kind(sheet, shares),
+        }
+    }
+}
+
+impl Display for GroupedShares {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let head = ["part", "surfaces", "errors", "share fixed", "share refocused"];
+        let mut table = TextTable::new(&head);
+        for own in self.by_part.iter().take(SHOWN) {
+            table.row([
+                own.part.name().to_owned(),
+                surfaces(own.first, own.last),
+                own.errors.to_string(),
+                percent(own.fixed),
+                percent(own.refocused),
+            ]);
+        }
+        if let Some(rest) = self.by_part.get(SHOWN..).filter(|rest| !rest.is_empty()) {
+            let sum = |of: fn(&PartShare) -> f64| percent(rest.iter().map(of).sum());
+            let errors: usize = rest.iter().map(|own| own.errors).sum();
+            let (fixed, refocused) = (sum(|own| own.fixed), sum(|own| own.refocused));
+            let name = format!("{} more", rest.len());
+            table.row([name, String::new(), errors.to_string(), fixed, refocused]);
+        }
+        writeln!(f, "{table}")?;
+        let mut table = TextTable::new(&["kind", "errors", "share fixed", "share refocused"]);
+        for own in &self.by_kind {
+            table.row([
+                own.kind.name().to_owned(),
+                own.errors.to_string(),
+                percent(own.fixed),
+                percent(own.refocused),
+            ]);
+        }
+        writeln!(f, "{table}")
+    }
+}

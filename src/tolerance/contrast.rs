@@ -1,0 +1,149 @@
+//! What errors of making do to the contrast at a frequency.
+//!
+//! The geometric contrast of the held rays, `|Σ w exp(2πi ν s)|` with `s` the place of a ray along the
+//! image of a field, tangential and sagittal, is computed for the lens with each error at both ends of
+//! its range, at the fixed image plane and with all compensators adjusted for the least spot. Its changes
+//! are differences of real rays, not derivatives; diffraction lowers the contrast before and after.
+
+use super::adjusted::LensToAdjust;
+use super::compensation::adjustments;
+use super::monte_carlo::{BeamColumns, LandedField};
+use super::{StopTest, ToleranceError, ToleranceScene, refuse_if_stopped};
+use crate::lens::{Compensator, Lens, Perturbation, ToleranceSheet};
+use rayon::prelude::*;
+use std::f64::consts::TAU;
+
+/// The contrast of a lens at a frequency and its changes by errors of making.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ContrastChanges {
+    /// The frequency in cycles/mm.
+    pub frequency: f64,
+    /// The contrast of the lens as designed at the fixed image plane and adjusted, the mean over fields
+    /// and over the tangential and the sagittal direction.
+    pub nominal: [f64; 2],
+    /// The error of the contrast by the sampling of the pupils: its change with more rays.
+    pub sampling_error: f64,
+    /// For each error the changes of the contrast at the lower and at the upper end of its range, at the
+    /// fixed image plane and adjusted; `None` if a ray does not arrive there.
+    pub changes: Vec<Option<[[f64; 2]; 2]>>,
+}
+
+/// More rays than those of the spots are taken until they change the contrast by less than this.
+const ENOUGH: f64 = 1e-3;
+/// The factor by which the tolerance of the spots falls for that, and how often it does.
+const FINER: f64 = 0.1;
+const ROUNDS: usize = 3;
+
+impl ContrastChanges {
+    /// The contrast of a lens at a zoom position at a frequency in cycles/mm, with its tolerances and
+    /// compensators; `tolerance` is that of the spots of `scene`.
+    ///
+    /// # Errors
+    /// A lens as designed of which a ray does not arrive, an error or a compensator that is not possible,
+    /// and [`ToleranceError::Stopped`] once `stop` says so.
+    pub fn new(
+        (lens, zoom, tolerance): (&Lens, usize, f64),
+        scene: &ToleranceScene,
+        (sheet, frequency): (&ToleranceSheet, f64),
+        stop: StopTest<'_>,
+    ) -> Result<Self, ToleranceError> {
+        let mut judge = ContrastJudge::new(scene.clone(), sheet, frequency);
+        let mut nominal = judge.as_designed()?;
+        let (mut tolerance, mut sampling_error) = (tolerance, f64::INFINITY);
+        for _ in 0..ROUNDS {
+            tolerance *= FINER;
+            let finer = ToleranceScene::new_until(lens, zoom, tolerance, stop)?;
+            judge = ContrastJudge::new(finer, sheet, frequency);
+            let found = judge.as_designed()?;
+            let apart = [0, 1].map(|i| (found[i] - nominal[i]).abs());
+            (nominal, sampling_error) = (found, apart[0].max(apart[1]));
+            if sampling_error < ENOUGH {
+                break;
+            }
+        }
+        let change = |t: &crate::lens::Tolerance| {
+            refuse_if_stopped(stop)?;
+            let end = |value: f64| judge.contrast(&[(t.error, value)]);
+            let ends = end(-t.half_range)?.zip(end(t.half_range)?);
+            let by_plane = |(low, high): ([f64; 2], [f64; 2])| {
+                [0, 1].map(|i| [low[i] - nominal[i], high[i] - nominal[i]])
+            };
+            Ok(ends.map(by_plane))
+        };
+        let changes = sheet.errors.par_iter().map(change);
+        let changes = changes.collect::<Result<_, ToleranceError>>()?;
+        Ok(Self { frequency, nominal, sampling_error, changes })
+    }
+
+    /// The expected contrast of lenses that are made, at the fixed image plane and adjusted: each error
+    /// adds the curvature of its changes at the ends. `None` if a ray does not arrive at an end.
+    pub fn expected(&self, sheet: &ToleranceSheet) -> Option<[f64; 2]> {
+        let mut sum = self.nominal;
+        for (tolerance, changes) in sheet.errors.iter().zip(&self.changes) {
+            let share = tolerance.distribution.deviation().powi(2);
+            let changes = (*changes)?;
+            for (sum, [low, high]) in sum.iter_mut().zip(changes) {
+                *sum += 0.5 * share * (low + high);
+            }
+        }
+        Some(sum)
+    }
+}
+
+/// The rays by which contrasts are judged.
+struct ContrastJudge {
+    scene: ToleranceScene,
+    columns: BeamColumns,
+    adjustments: Vec<Compensator>,
+    frequency: f64,
+}
+
+impl ContrastJudge {
+    fn new(scene: ToleranceScene, sheet: &ToleranceSheet, frequency: f64) -> Self {
+        let columns = BeamColumns::new(&scene.beam);
+        Self { scene, columns, adjustments: adjustments(sheet), frequency }
+    }
+
+    fn as_designed(&self) -> Result<[f64; 2], ToleranceError> {
+        let lost = || ToleranceError::Other("a ray of the lens as designed is lost".to_owned());
+        self.contrast(&[])?.ok_or_else(lost)
+    }
+
+    /// The contrast with some errors at the fixed image plane and adjusted; `None` if a ray does not
+    /// arrive.
+    fn contrast(&self, errors: &[(Perturbation, f64)]) -> Result<Option<[f64; 2]>, ToleranceError> {
+        let made = LensToAdjust {
+            lens: &self.scene.lens,
+            columns: &self.columns,
+            errors,
+            adjustments: &self.adjustments,
+        };
+        let Some(landed) = self.columns.landings(&made.systems(&[])?) else { return Ok(None) };
+        let positions = made.adjust(&landed)?.positions;
+        let adjusted = made.on_sensor(&landed, &positions)?;
+        let contrast = |fields: &[LandedField]| mean_contrast(fields, self.frequency);
+        Ok(adjusted.map(|adjusted| [contrast(&landed), contrast(&adjusted)]))
+    }
+}
+
+/// The mean over fields and over both directions.
+fn mean_contrast(fields: &[LandedField], frequency: f64) -> f64 {
+    let of = |field: &LandedField| {
+        let mean = |i: usize| field.rays.iter().map(|(ray, w)| w * ray[i]).sum::<f64>();
+        let [x, y] = [mean(0), mean(1)];
+        let far = x.hypot(y);
+        // A field on the axis has no direction of its own.
+        let [ux, uy] = if far > 0.0 { [x / far, y / far] } else { [0.0, 1.0] };
+        let along = |[ux, uy]: [f64; 2]| {
+            let (mut re, mut im) = (0.0, 0.0);
+            for (ray, weight) in &field.rays {
+                let phase = TAU * frequency * ((ray[0] - x) * ux + (ray[1] - y) * uy);
+                re += weight * phase.cos();
+                im += weight * phase.sin();
+            }
+            re.hypot(im)
+        };
+        field.weight * 0.5 * (along([ux, uy]) + along([uy, -ux]))
+    };
+    fields.iter().map(of).sum()
+}

@@ -1,0 +1,425 @@
+//! What errors of making do to each ray, told from as many rows of numbers as the lens is large.
+//!
+//! To first order an error is a combination of few numbers of surfaces. One sweep of the rays back
+//! through the lens gives their derivatives by all of these, a second one to another image plane those
+//! of their slopes: neither the rays nor the memory grow with the number of errors. A lens without such
+//! a sweep (GRIN media, surfaces that are decentred, tilted or irregular by design) is traced over
+//! second-order jets, once for each different error.
+
+use super::compensation::Compensation;
+use super::covariance::{MadeNumber, NumberChanges, number_changes};
+use super::folded::{ErrorParity, FoldedField, RaySymmetry, folded_fields};
+use super::merits::{ImageRays, Rear, merits_of, open_tracers};
+use super::perturb::check_all;
+use super::sensitivity::{RaySensitivity, Sensitivity, second_derivatives, sensitivities_until};
+use super::sweep::SweptField;
+use super::{StopTest, ToleranceError, ToleranceScene, refuse_if_stopped};
+use crate::lens::{Perturbation, System};
+use crate::math::dot;
+use crate::trace::Tracer;
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// The treatment of the second derivatives of rays by errors.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum SecondDerivatives {
+    /// Left out where the lens has a sweep back: the expected mean square spot misses some
+    /// 1e-4 of itself, refocused some 1e-3.
+    #[default]
+    Neglected,
+    /// Traced, by one more pass for each different error.
+    Traced,
+}
+
+/// The errors of a lens as combinations of few numbers: for each error the places of its numbers and
+/// their changes by one unit.
+pub(super) type ErrorCombinations = Arc<[Vec<(usize, f64)>]>;
+
+/// The effects of errors of making on the rays of a lens.
+#[derive(Debug, Clone)]
+pub struct RayEffects {
+    fields: Vec<FieldEffects>,
+    /// The parity of each number.
+    parities: Vec<ErrorParity>,
+    combinations: ErrorCombinations,
+    /// The best common focus of the lens as designed, in mm from its image plane.
+    focus: f64,
+    /// The second derivative of the mean square spot by each error, at the image plane and at the best
+    /// focus of the lens as designed, in mm² per squared unit; `None` where it is left out.
+    second: Option<Vec<[f64; 2]>>,
+}
+
+/// The effects on the rays of one field, x of all rays before y of all, times the roots of their weights
+/// and relative to their means.
+#[derive(Debug, Clone)]
+struct FieldEffects {
+    symmetry: RaySymmetry,
+    /// The place of each ray among those of all fields, and the root of its weight.
+    places: Vec<(usize, f64)>,
+    offsets: DVector<f64>,
+    slopes: DVector<f64>,
+    /// A column for each number: the displacement of rays at the image plane.
+    displacement: DMatrix<f64>,
+    /// The change of their slopes.
+    bend: DMatrix<f64>,
+}
+
+impl RayEffects {
+    /// The effects of some errors.
+    ///
+    /// # Errors
+    /// An error that is not possible, a ray that does not arrive, and [`ToleranceError::Stopped`] once
+    /// `stop` says so.
+    pub fn new(
+        scene: &ToleranceScene,
+        errors: &[Perturbation],
+        second: SecondDerivatives,
+        stop: StopTest<'_>,
+    ) -> Result<Self, ToleranceError> {
+        let lens = &scene.lens;
+        check_all(lens, errors.iter().copied())?;
+        let systems = &lens.systems;
+        let image = systems[lens.primary].vertex_positions().last().copied().unwrap_or_default();
+        let (merits, rays) = merits_of(&Rear { systems, image }, &scene.beam, scene.options)?;
+        let focus = merits.focus;
+        let (different, place_of) = different_errors(errors);
+        if open_tracers(systems)?.iter().all(Tracer::has_error_slopes) {
+            let mut effects = Self::swept(scene, errors, (&rays, focus), stop)?;
+            if second == SecondDerivatives::Traced {
+                let exact = second_derivatives(scene, &different, focus, stop)?;
+                effects.second = Some(place_of.iter().map(|place| exact[*place]).collect());
+            }
+            return Ok(effects);
+        }
+        let found = sensitivities_until(lens, &scene.beam, scene.options, &different, stop)?;
+        Ok(Self::by_jets(scene, (&found, &place_of), (&rays, focus)))
+    }
+
+    /// By sweeps back.
+    fn swept(
+        scene: &ToleranceScene,
+        errors: &[Perturbation],
+        (rays, focus): (&ImageRays<f64>, f64),
+        stop: StopTest<'_>,
+    ) -> Result<Self, ToleranceError> {
+        let (numbers, combinations) = combinations(scene, errors);
+        let parity = |number: &MadeNumber| ErrorParity {
+            odd: number.kind.is_odd(),
+            lateral: number.kind.is_lateral(),
+        };
+        let parities: Vec<ErrorParity> = numbers.iter().map(parity).collect();
+        let planes = TwoPlanes::new(scene, focus)?;
+        let folded = folded_fields(scene);
+        let field = |folded: &FoldedField<'_>| {
+            refuse_if_stopped(stop)?;
+            let mut field = FieldEffects::without_errors(scene, folded, rays);
+            let columns = planes.columns(scene, folded, (&numbers, &parities))?;
+            (field.displacement, field.bend) = columns;
+            Ok(field)
+        };
+        let fields = folded.par_iter().map(field).collect::<Result<_, ToleranceError>>()?;
+        Ok(Self { fields, parities, combinations, focus, second: None })
+    }
+
+    /// From the sensitivities to different errors, and the place of each error among these.
+    fn by_jets(
+        scene: &ToleranceScene,
+        (found, place_of): (&[Sensitivity], &[usize]),
+        (rays, focus): (&ImageRays<f64>, f64),
+    ) -> Self {
+        let field = |folded: &FoldedField<'_>| {
+            let mut field = FieldEffects::without_errors(scene, folded, rays);
+            let columns = |of: fn(&RaySensitivity) -> [f64; 2]| {
+                let columns: Vec<_> = found.iter().map(|own| field.column(&own.rays, of)).collect();
+                from_columns(2 * field.places.len(), &columns)
+            };
+            let both = (columns(|ray| ray.displacement), columns(|ray| ray.bend));
+            (field.displacement, field.bend) = both;
+            field
+        };
+        let exact: Vec<[f64; 2]> = found.iter().map(|own| own.second_at(focus)).collect();
+        Self {
+            fields: folded_fields(scene).iter().map(field).collect(),
+            parities: found.iter().map(|own| ErrorParity::of(own.error.kind)).collect(),
+            combinations: place_of.iter().map(|place| vec![(*place, 1.0)]).collect(),
+            focus,
+            second: Some(place_of.iter().map(|place| exact[*place]).collect()),
+        }
+    }
+
+    /// The number of errors.
+    pub fn errors(&self) -> usize {
+        self.combinations.len()
+    }
+
+    /// True if the second derivatives of rays by errors are traced.
+    pub fn has_second_derivatives(&self) -> bool {
+        self.second.is_some()
+    }
+
+    pub(super) fn combinations(&self) -> &ErrorCombinations {
+        &self.combinations
+    }
+
+    pub(super) fn numbers(&self) -> usize {
+        self.parities.len()
+    }
+
+    pub(super) fn focus(&self) -> f64 {
+        self.focus
+    }
+
+    /// The second derivatives of the mean square at the image plane (0) or at the best focus (1).
+    pub(super) fn second(&self, plane: usize) -> Option<Vec<f64>> {
+        Some(self.second.as_ref()?.iter().map(|both| both[plane]).collect())
+    }
+
+    /// The mean products at an image plane that is displaced by `shift`.
+    pub(super) fn products(&self, compensation: &Compensation, shift: f64) -> EffectProducts {
+        let mut parities = self.parities.clone();
+        parities.extend(compensation.effects.iter().map(|effect| effect.parity));
+        parities.extend([ErrorParity::EVEN; 2]);
+        let mut sum = EffectProducts {
+            products: DMatrix::zeros(parities.len(), parities.len()),
+            bends_with_offsets: DVector::zeros(self.numbers()),
+        };
+        for field in &self.fields {
+            sum.add(field, (&parities, compensation), shift);
+        }
+        sum
+    }
+}
+
+/// The errors without repetition, and for each error its place among these.
+fn different_errors(errors: &[Perturbation]) -> (Vec<Perturbation>, Vec<usize>) {
+    let (mut places, mut different) = (BTreeMap::new(), Vec::new());
+    let place = |error: &Perturbation| {
+        *places.entry(*error).or_insert_with(|| {
+            different.push(*error);
+            different.len() - 1
+        })
+    };
+    let place_of = errors.iter().map(place).collect();
+    (different, place_of)
+}
+
+/// The numbers that errors change, in order, and the errors as combinations of them.
+fn combinations(
+    scene: &ToleranceScene,
+    errors: &[Perturbation],
+) -> (Vec<MadeNumber>, ErrorCombinations) {
+    let lens = &scene.lens;
+    let primary = &lens.systems[lens.primary];
+    let vertices = primary.vertex_positions();
+    let of = |error: &Perturbation| {
+        let NumberChanges { changes, .. } =
+            number_changes(*error, primary, &vertices, &lens.semi_diameters);
+        changes
+    };
+    let changes: Vec<_> = errors.iter().map(of).collect();
+    let mut numbers: Vec<MadeNumber> =
+        changes.iter().flatten().map(|(number, _)| *number).collect();
+    numbers.sort_unstable();
+    numbers.dedup();
+    let place = |(number, by): (MadeNumber, f64)| Some((numbers.binary_search(&number).ok()?, by));
+    let row = |changes: Vec<(MadeNumber, f64)>| changes.into_iter().filter_map(place).collect();
+    let combinations = changes.into_iter().map(row).collect();
+    (numbers, combinations)
+}
+
+fn from_columns(rows: usize, columns: &[DVector<f64>]) -> DMatrix<f64> {
+    if columns.is_empty() { DMatrix::zeros(rows, 0) } else { DMatrix::from_columns(columns) }
+}
+
+/// The share of the length of a lens by which the second image plane is displaced where the best focus
+/// tells no better one.
+const PLANE: f64 = 1e-3;
+
+/// The lens in front of its image plane and of another one: rays are straight there.
+struct TwoPlanes {
+    near: Vec<Tracer<f64>>,
+    far: Vec<Tracer<f64>>,
+    /// The distance of the planes in mm.
+    distance: f64,
+}
+
+impl TwoPlanes {
+    fn new(scene: &ToleranceScene, focus: f64) -> Result<Self, ToleranceError> {
+        let systems = &scene.lens.systems;
+        let length = systems[scene.lens.primary].vertex_positions().last().map_or(1.0, |z| z.abs());
+        let least = PLANE * if length > 0.0 { length } else { 1.0 };
+        let distance = if focus.abs() > least { focus } else { least };
+        let displaced = |system: &System<f64>| {
+            let mut system = system.clone();
+            let last = system.surfaces.len().saturating_sub(2);
+            system.surfaces[last].thickness += distance;
+            system
+        };
+        let far: Vec<System<f64>> = systems.iter().map(displaced).collect();
+        Ok(Self { near: open_tracers(systems)?, far: open_tracers(&far)?, distance })
+    }
+
+    /// The displacements and the bends by each number, a column each.
+    fn columns(
+        &self,
+        scene: &ToleranceScene,
+        folded: &FoldedField<'_>,
+        (numbers, parities): (&[MadeNumber], &[ErrorParity]),
+    ) -> Result<(DMatrix<f64>, DMatrix<f64>), ToleranceError> {
+        let near = SweptField::new(scene, &self.near, folded)?;
+        let far = SweptField::new(scene, &self.far, folded)?;
+        let rays = near.weights().len();
+        let mut displacement = DMatrix::zeros(2 * rays, numbers.len());
+        let mut bend = DMatrix::zeros(2 * rays, numbers.len());
+        let roots: Vec<f64> = near.weights().iter().map(|w| (w * folded.weight).sqrt()).collect();
+        let mut rows = [vec![0.0; rays], vec![0.0; rays]];
+        let columns = numbers.iter().zip(parities).enumerate();
+        for (m, number, parity, axis) in
+            columns.flat_map(|(m, (number, parity))| [0, 1].map(|axis| (m, *number, *parity, axis)))
+        {
+            let cancels = folded.symmetry.cancels_mean(axis, parity);
+            centred_effect(&near, (axis, number), cancels, &mut rows[0]);
+            centred_effect(&far, (axis, number), cancels, &mut rows[1]);
+            for i in 0..rays {
+                let at = (axis * rays + i, m);
+                displacement[at] = roots[i] * rows[0][i];
+                bend[at] = roots[i] * (rows[1][i] - rows[0][i]) / self.distance;
+            }
+        }
+        Ok((displacement, bend))
+    }
+}
+
+/// The derivative of x or y of each ray by a number, relative to its mean, which is 0 where it cancels.
+fn centred_effect(
+    swept: &SweptField,
+    (axis, number): (usize, MadeNumber),
+    cancels: bool,
+    effect: &mut [f64],
+) {
+    swept.number_effect(axis, number, effect);
+    let mean = if cancels { 0.0 } else { dot(swept.weights(), effect) };
+    effect.iter_mut().for_each(|value| *value -= mean);
+}
+
+impl FieldEffects {
+    /// The rays of a field with their offsets from the centroid and their slopes.
+    fn without_errors(
+        scene: &ToleranceScene,
+        folded: &FoldedField<'_>,
+        rays: &ImageRays<f64>,
+    ) -> Self {
+        let before = scene.beam.fields[..folded.number].iter().flat_map(|field| &field.colours);
+        let start: usize = before.map(|colour| colour.rays.len()).sum();
+        let own = &rays[folded.number];
+        let mut mean = [0.0; 4];
+        for (ray, weight) in own {
+            mean.iter_mut().zip(ray).for_each(|(sum, value)| *sum += weight * value);
+        }
+        let (mut places, mut from) = (Vec::new(), 0);
+        for colour in &folded.field.colours {
+            let own = folded.rays(colour);
+            places.extend(own.map(|(i, weight)| (from + i, (weight * folded.weight).sqrt())));
+            from += colour.rays.len();
+        }
+        let column = |first: usize| {
+            let axis = |axis: usize| {
+                let of = move |(i, root): &(usize, f64)| {
+                    root * (own[*i].0[first + axis] - mean[first + axis])
+                };
+                places.iter().map(of)
+            };
+            DVector::from_iterator(2 * places.len(), axis(0).chain(axis(1)))
+        };
+        let (offsets, slopes) = (column(0), column(2));
+        let none = DMatrix::zeros(2 * places.len(), 0);
+        let places = places.iter().map(|(i, root)| (start + i, *root)).collect();
+        let symmetry = folded.symmetry;
+        Self { symmetry, places, offsets, slopes, displacement: none.clone(), bend: none }
+    }
+
+    /// The column of an effect that is known for all rays of all fields.
+    fn column(&self, rays: &[RaySensitivity], of: fn(&RaySensitivity) -> [f64; 2]) -> DVector<f64> {
+        let axis = |axis: usize| {
+            self.places.iter().map(move |(place, root)| root * of(&rays[*place])[axis])
+        };
+        DVector::from_iterator(2 * self.places.len(), axis(0).chain(axis(1)))
+    }
+}
+
+/// Mean products over the rays of all fields: of numbers, then compensators besides focus, then slopes,
+/// then distances from the centroids.
+pub(super) struct EffectProducts {
+    products: DMatrix<f64>,
+    bends_with_offsets: DVector<f64>,
+}
+
+impl EffectProducts {
+    fn add(
+        &mut self,
+        field: &FieldEffects,
+        (parities, compensation): (&[ErrorParity], &Compensation),
+        shift: f64,
+    ) {
+        let numbers = field.displacement.ncols();
+        let mut values = DMatrix::zeros(field.offsets.len(), parities.len());
+        let displaced = &field.displacement + shift * &field.bend;
+        values.columns_mut(0, numbers).copy_from(&displaced);
+        for (a, effect) in compensation.effects.iter().enumerate() {
+            let displacement = field.column(&effect.rays, |ray| ray.displacement);
+            let bend = field.column(&effect.rays, |ray| ray.bend);
+            values.set_column(numbers + a, &(displacement + shift * bend));
+        }
+        let last = parities.len() - 1;
+        let offsets = &field.offsets + shift * &field.slopes;
+        values.set_column(last - 1, &field.slopes);
+        values.set_column(last, &offsets);
+        let found = values.transpose() * &values;
+        for (i, parity) in parities.iter().enumerate() {
+            for (j, other) in parities.iter().enumerate() {
+                if !field.symmetry.cancels_product(*parity, *other) {
+                    self.products[(i, j)] += found[(i, j)];
+                }
+            }
+        }
+        let bends = field.bend.transpose() * &offsets;
+        for (m, parity) in parities[..numbers].iter().enumerate() {
+            if !field.symmetry.cancels_product(*parity, ErrorParity::EVEN) {
+                self.bends_with_offsets[m] += bends[m];
+            }
+        }
+    }
+
+    pub(super) fn of(&self, i: usize, j: usize) -> f64 {
+        self.products[(i, j)]
+    }
+
+    /// The products among the first rows.
+    pub(super) fn among(&self, rows: usize) -> DMatrix<f64> {
+        self.products.view((0, 0), (rows, rows)).into_owned()
+    }
+
+    pub(super) fn with_slopes(&self, i: usize) -> f64 {
+        self.products[(i, self.products.ncols() - 2)]
+    }
+
+    pub(super) fn with_offsets(&self, i: usize) -> f64 {
+        self.products[(i, self.products.ncols() - 1)]
+    }
+
+    pub(super) fn bend_with_offsets(&self, number: usize) -> f64 {
+        self.bends_with_offsets[number]
+    }
+
+    /// The mean square of the slopes.
+    pub(super) fn slopes(&self) -> f64 {
+        self.with_slopes(self.products.ncols() - 2)
+    }
+
+    /// The mean square of the distances from the centroids, in mm².
+    pub(super) fn offsets(&self) -> f64 {
+        self.with_offsets(self.products.ncols() - 1)
+    }
+}

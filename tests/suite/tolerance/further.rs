@@ -1,0 +1,170 @@
+//! What errors do to the wavefront and to the contrast; lenses that are saved; pictures and sums of shares.
+
+use crate::cli::{Scratch, done, done_json, refused};
+use crate::merit::bundled;
+use aplanat::analysis::polychromatic_geometric_mtf;
+use aplanat::lens::{
+    ErrorDistribution, Lens, Perturbation, PerturbationKind, Tolerance, ToleranceSheet,
+};
+use aplanat::pupil::{Accuracy, RayModel};
+use aplanat::tolerance::{ContrastChanges, NominalLens, ToleranceScene, WavefrontModel, perturb};
+
+fn never() -> bool {
+    false
+}
+
+fn sheet(errors: &[(PerturbationKind, usize, usize, f64)]) -> ToleranceSheet {
+    let distribution = ErrorDistribution::Ends;
+    let tolerance = |(kind, first, last, half_range): &(_, usize, usize, f64)| Tolerance {
+        error: Perturbation { kind: *kind, first: *first, last: *last },
+        half_range: *half_range,
+        distribution,
+    };
+    ToleranceSheet::of_errors(errors.iter().map(tolerance).collect())
+}
+
+fn triplet() -> Lens {
+    let mut lens = bundled("cooke_triplet_100_f27");
+    lens.fields.values.truncate(2);
+    lens
+}
+
+/// The derivatives of the variance of the wavefront are those of differences between lenses with errors,
+/// each at its own best focus.
+#[test]
+fn derivatives_of_the_wavefront_are_those_of_differences() {
+    let lens = triplet();
+    let scene = ToleranceScene::new(&lens, 0, 0.05).unwrap();
+    let sheet = sheet(&[
+        (PerturbationKind::Curvature, 1, 1, 2e-6),
+        (PerturbationKind::Index, 0, 0, 2e-5),
+        (PerturbationKind::ElementDecenterY, 2, 3, 2e-3),
+    ]);
+    let model =
+        |scene: &ToleranceScene| WavefrontModel::new((&lens, 0), scene, &sheet, &never).unwrap();
+    let found = model(&scene);
+    assert!(found.nominal[1] <= found.nominal[0] && found.nominal[1] > 0.0, "{:?}", found.nominal);
+    for (i, tolerance) in sheet.errors.iter().enumerate() {
+        let step = tolerance.half_range;
+        let at = |value: f64| {
+            let systems = perturb(&scene.lens, &[(tolerance.error, value)]).unwrap();
+            let lens = NominalLens { systems, ..scene.lens.clone() };
+            model(&ToleranceScene { lens, ..scene.clone() }).nominal
+        };
+        let (low, high) = (at(-step), at(step));
+        for plane in 0..2 {
+            let by = found.errors[i][plane];
+            let first = (high[plane] - low[plane]) / (2.0 * step);
+            let second = (high[plane] - 2.0 * found.nominal[plane] + low[plane]) / (step * step);
+            let scale = by.first.abs().max((found.nominal[plane] * by.second.abs()).sqrt());
+            let what = (tolerance.error.kind, plane, by, first, second);
+            assert!((by.first - first).abs() < 1e-3 * scale, "{what:?}");
+            assert!((by.second - second).abs() < 0.02 * by.second.abs(), "{what:?}");
+        }
+    }
+    let [fixed, refocused] = found.expected_rms(&sheet);
+    assert!(fixed > refocused && refocused >= found.nominal[1].sqrt(), "{fixed} {refocused}");
+}
+
+/// The contrast of a lens is that of its analysis; a gap in front of the image changes it as that gap
+/// does in the design, and focus takes it back.
+#[test]
+fn the_contrast_of_a_lens_with_errors_is_that_of_the_lens() {
+    let mut lens = triplet();
+    lens.fields.values.truncate(1);
+    let last = lens.surfaces.len() - 1;
+    let sheet = sheet(&[(PerturbationKind::Thickness, last, last, 0.1)]);
+    let contrast = |lens: &Lens| {
+        let scene = ToleranceScene::new(lens, 0, 0.01).unwrap();
+        ContrastChanges::new((lens, 0, 0.01), &scene, (&sheet, 10.0), &never).unwrap()
+    };
+    let found = contrast(&lens);
+    let model = RayModel::from_lens(&lens, 0).unwrap();
+    let accuracy = Accuracy { tolerance: 1e-4, ..Accuracy::default() };
+    let curve = polychromatic_geometric_mtf(&model, model.fields[0], &[10.0], accuracy).unwrap();
+    let exact = curve.points[0].tangential.modulus.value;
+    let error = found.sampling_error + 1e-3;
+    assert!((found.nominal[0] - exact).abs() < error, "{} {exact} {error}", found.nominal[0]);
+    let [fixed, refocused] = found.changes[0].unwrap();
+    let mut longer = lens.clone();
+    longer.surfaces[last].thickness += 0.1;
+    let expected = contrast(&longer).nominal[0] - found.nominal[0];
+    assert!((fixed[1] - expected).abs() < 2.0 * error, "{fixed:?} {expected}");
+    assert!(refocused.iter().all(|change| change.abs() < 1e-6), "{refocused:?}");
+    assert!(fixed.iter().any(|change| change.abs() > 0.01), "{fixed:?}");
+}
+
+const SINGLET: &str = r#"{ "aplanat": 1, "name": "Singlet", "object": "infinity",
+  "aperture": {"entrance_pupil_diameter": 10.0},
+  "fields": {"kind": "angle", "values": [{"y": 0.0}, {"y": 2.0}]},
+  "wavelengths": [{"um": 0.5875618}],
+  "surfaces": [
+    {"radius": 100, "thickness": 5.0, "glass": {"index": 1.5}, "semi_diameter": 6.0, "stop": true},
+    {"radius": -100, "thickness": 98.0, "semi_diameter": 6.0}],
+  "tolerances": {"errors": [
+    {"kind": "thickness", "first": 0, "half_range": 0.1},
+    {"kind": "thickness", "first": 1, "half_range": 0.1},
+    {"kind": "surface_tilt_x", "first": 1, "half_range": 0.05, "distribution": "uniform"}]} }"#;
+
+/// A run that goes on from saved lenses gives the same result; those of another lens or seed are refused.
+#[test]
+fn saved_lenses_give_the_result_of_one_run() {
+    let (lens, file) = (Scratch::with("saved_singlet.json", SINGLET), Scratch::new("saved.json"));
+    let run = |samples: &str, more: &[&str]| {
+        let few = ["tolerance", lens.path(), "--error", "10%", "--samples", samples];
+        done_json(&[&few[..], more].concat(), "")
+    };
+    let saved = ["--checkpoint", file.path()];
+    let whole = run("12", &[]);
+    assert_ne!(run("5", &saved), whole);
+    assert_eq!(run("12", &saved), whole);
+    assert_eq!(run("12", &saved), whole);
+    let few = ["tolerance", lens.path(), "--samples", "5"];
+    let other = |more: &[&str], words: &str| {
+        refused(2, &[&few[..], &saved[..], more].concat(), "", &[words]);
+    };
+    other(&["--error", "10%", "--seed", "2"], "another --seed");
+    other(&["--error", "20%"], "another --zoom or --error");
+    other(&["--grade", "commercial"], "another lens or other tolerances");
+    std::fs::write(file.path(), "{}").unwrap();
+    other(&[], "not a valid checkpoint");
+}
+
+/// The picture, the further merits and the sums of shares of the command.
+#[test]
+fn the_command_draws_and_groups() {
+    let lens = Scratch::with("drawn_singlet.json", SINGLET);
+    let (png, svg, csv) =
+        (Scratch::new("drawn.png"), Scratch::new("drawn.svg"), Scratch::new("drawn.csv"));
+    let few = ["tolerance", lens.path(), "--error", "10%", "--samples", "6"];
+    let merits = ["--wavefront", "--mtf", "5", "--csv", csv.path()];
+    let json = done_json(&[&few[..], &merits, &["--plot", png.path()]].concat(), "");
+    let groups = &json["groups"];
+    for list in [&groups["by_part"], &groups["by_kind"]] {
+        let sum = |key: &str| -> f64 {
+            list.as_array().unwrap().iter().map(|own| own[key].as_f64().unwrap()).sum()
+        };
+        assert!((sum("fixed") - 1.0).abs() < 1e-9 && (sum("refocused") - 1.0).abs() < 1e-9);
+        assert_eq!(sum("errors"), 3.0);
+    }
+    let parts: Vec<_> =
+        groups["by_part"].as_array().unwrap().iter().map(|own| &own["part"]).collect();
+    assert!(parts.len() == 2 && parts.iter().any(|part| *part == "gap"), "{parts:?}");
+    assert!(json["wavefront"]["expected_rms"][1].as_f64().unwrap() > 0.0);
+    assert!(json["mtf"]["nominal"][0].as_f64().unwrap() <= 1.0);
+    assert!(json["sensitivities"][0]["wavefront"]["refocused"]["share"].is_number());
+    assert_eq!(json["second_derivatives"], false);
+    let table = std::fs::read_to_string(csv.path()).unwrap();
+    let columns = |line: &str| line.split(',').count();
+    assert!(table.lines().all(|line| columns(line) == 11 + 6 + 4), "{table}");
+    assert!(std::fs::read(png.path()).unwrap().starts_with(b"\x89PNG"));
+    let drawn = ["--plot", svg.path(), "--second-derivatives"];
+    let text = done(&[&few[..], &drawn].concat(), "");
+    assert!(text.contains("element") && text.contains("thickness"), "{text}");
+    let drawing = std::fs::read_to_string(svg.path()).unwrap();
+    for words in ["<svg", "thickness 1", "yield", "share of the growth"] {
+        assert!(drawing.contains(words), "{words}");
+    }
+    refused(2, &[&few[..], &["--plot", "drawn.pdf"]].concat(), "", &["expected `.png` or `.svg`"]);
+    refused(2, &[&few[..], &["--mtf=0"]].concat(), "", &["--mtf", "cycles/mm"]);
+}
