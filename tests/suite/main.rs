@@ -48,6 +48,7 @@ mod optimize;
 mod paraxial;
 mod pareto;
 mod picture_cli;
+mod picture_diffraction;
 mod picture_reflections;
 mod pictures;
 mod plume;

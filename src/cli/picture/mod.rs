@@ -1,6 +1,7 @@
 //! `picture`: what a camera with a lens sees of a scene.
 
 mod device;
+mod render;
 mod report;
 
 pub(super) use device::DeviceChoice;
@@ -11,24 +12,22 @@ use super::failures::Failures;
 use super::input::{LensFile, LoadedLens, Tolerance};
 use super::output::{Output, print_note};
 use super::output_paths::OutputPaths;
-use super::progress::{progress_bar, stop_flag};
-use crate::analysis::{Coating, Estimate};
+use super::progress::stop_flag;
+use crate::analysis::Coating;
 use crate::files::{read_color, write_atomic};
 use crate::lens::{Lens, Object};
 use crate::measure::time_ms;
 use crate::picture::{
-    BitDepth, BuiltInScene, ColorBand, Coloring, ErrorMap, ExactRenderer, ExactSettings, Exposure,
-    GhostLight, GhostReport, ImageFrame, LightLosses, LossReport, MID_GREY, Picture, PictureError,
-    QuickPicture, QuickRenderer, Raster, Scene, SensorPreset, ToneCurve, encode_colors, encode_png,
-    field_diagonal, focused, omitted_beside, photon_count, picture_model, quick_error,
+    BitDepth, BuiltInScene, ColorBand, Coloring, ErrorMap, Exposure, ImageFrame, IncludedEffects,
+    MID_GREY, Picture, PictureError, Raster, Scene, SensorPreset, ToneCurve, encode_colors,
+    encode_png, field_diagonal, focused, omitted_beside, photon_count, picture_model,
 };
 use crate::pupil::RayModel;
+use render::RenderedPicture;
 use report::{ErrorMapReport, PictureReport, SensorReport};
 use std::env;
-use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::process;
-use std::sync::atomic::{AtomicBool, Ordering};
 
 /// A picture of a scene through the lens, by rays traced backwards, with its error
 #[derive(Debug, clap::Args)]
@@ -153,15 +152,6 @@ fn parse_tone_curve(text: &str) -> Result<ToneCurve, String> {
 /// The distance in mm at which a scene with depth is placed and focused if none is given.
 const NEAR: f64 = 1000.0;
 
-/// The tiles on which the quick way is compared with the exact one, and the samples of their pixels.
-const CHECKED_TILES: usize = 24;
-const CHECKED_SAMPLES: usize = 128;
-/// The samples of a pixel for the map of the error.
-const MAPPED_SAMPLES: usize = 64;
-
-/// The number of steps of the progress bar.
-const STEPS: usize = 1000;
-
 impl PictureArgs {
     pub(super) fn run(&self, output: &Output) -> Result<(), CliError> {
         let lens = [("the lens", self.lens.path())];
@@ -217,56 +207,6 @@ impl PictureArgs {
         }
     }
 
-    fn render(
-        &self,
-        opened: &LoadedLens,
-        stop: &AtomicBool,
-    ) -> Result<(RenderedPicture, CameraShot), CliError> {
-        let refuse = |error: PictureError| CliError::Input(format!("{}: {error}", opened.file));
-        let shot = self.shot(opened).map_err(refuse)?;
-        let scene = self.scene(&shot)?.map_err(refuse)?;
-        let CameraShot { model, bands, frame, .. } = &shot;
-        let renderer = ExactRenderer::new(model, bands, &scene, *frame).map_err(refuse)?;
-        let renderer = match self.coating {
-            Some(coating) => {
-                let taken = LightLosses { coating, glasses: Some(&opened.lens) };
-                renderer.with_losses(model, bands, taken, self.error.0)
-            }
-            None => Ok(renderer),
-        };
-        let renderer = renderer.map_err(refuse)?;
-        let quick = if self.exact { None } else { Some(quick_picture(&shot, &renderer, stop)) };
-        let quick = quick.transpose().map_err(refuse)?;
-        let is_stopped = || stop.load(Ordering::Relaxed);
-        let is_kept = |quick: &RenderedPicture| {
-            self.quick || quick.error.value <= self.error.0 || is_stopped()
-        };
-        let picture = quick.filter(is_kept);
-        let picture = picture.unwrap_or_else(|| self.exact_picture(&renderer, stop));
-        let map = |picture: &Picture| {
-            ErrorMap::measure_until(&renderer, picture, (usize::MAX, MAPPED_SAMPLES), is_stopped)
-        };
-        let error_map = self.error_map.as_ref().map(|_| map(&picture.picture));
-        // A part is no map.
-        let error_map = error_map.filter(ErrorMap::is_whole);
-        let losses = renderer.losses().cloned();
-        let mut picture = RenderedPicture { error_map, losses, ..picture };
-        if let Some(coating) = self.coating.filter(|_| !is_stopped()) {
-            let light = (coating, self.error.0);
-            let (ghosts, ms) =
-                time_ms(|| GhostLight::new((model, bands), &scene, &picture.picture, light));
-            let ghosts = ghosts.map_err(refuse)?;
-            ghosts.add_to(&mut picture.picture);
-            picture.ghosts = Some((ghosts.report, ms));
-        }
-        if !picture.picture.complete {
-            print_note("note: stopped; what was not sampled is black");
-        } else if is_stopped() {
-            print_note("note: stopped; an error map, ghosts or an exact picture may be missing");
-        }
-        Ok((picture, shot))
-    }
-
     /// Writes the map of the error if that is asked for.
     fn save_error_map(&self, map: Option<&ErrorMap>) -> Result<(), CliError> {
         let (Some(path), Some(map)) = (&self.error_map, map) else { return Ok(()) };
@@ -276,28 +216,6 @@ impl PictureArgs {
         let bytes = encode_colors(map.pixels(), &map.heat(white), &texts)
             .map_err(|error| CliError::Failed(format!("{}: {error}", path.display())))?;
         Ok(write_atomic(path, &bytes)?)
-    }
-
-    fn exact_picture(&self, renderer: &ExactRenderer<'_>, stop: &AtomicBool) -> RenderedPicture {
-        let settings = ExactSettings {
-            tolerance: self.error.0,
-            max_samples: self.max_samples,
-            seed: self.seed,
-            seconds: 0.0,
-        };
-        let bar = progress_bar(STEPS);
-        let watch = |done: f64| {
-            bar.set_position((STEPS as f64 * done) as u64);
-            if stop.load(Ordering::Relaxed) {
-                ControlFlow::Break(())
-            } else {
-                ControlFlow::Continue(())
-            }
-        };
-        let picture = renderer.render(&settings, &watch);
-        bar.finish_and_clear();
-        let error = Estimate::new(picture.rms_error(), 0.0, 0);
-        RenderedPicture::new(picture, error, "exact")
     }
 
     fn shot(&self, opened: &LoadedLens) -> Result<CameraShot, PictureError> {
@@ -385,9 +303,14 @@ impl PictureArgs {
         shot: &CameraShot,
         milliseconds: f64,
     ) -> PictureReport {
-        let RenderedPicture { picture, error, way, device, error_map, losses, ghosts } = rendered;
-        let found = ghosts.as_ref().map(|(report, _)| report);
+        let RenderedPicture { picture, sampling, split, way, device, error_map, .. } = rendered;
+        let found = rendered.ghosts.as_ref().map(|(report, _)| report);
         let pixels = (picture.frame.pixels[0] * picture.frame.pixels[1]) as f64;
+        let included = IncludedEffects {
+            diffraction: rendered.diffraction.as_ref(),
+            losses: rendered.losses.as_ref(),
+            ghosts: found,
+        };
         PictureReport {
             scene: self.scene.clone(),
             pixels: picture.frame.pixels,
@@ -396,25 +319,22 @@ impl PictureArgs {
             distance: shot.distance,
             way,
             device: device.clone(),
-            error: error.value,
-            error_of_error: error.error,
+            error: split.error(),
+            error_of_error: sampling.error,
+            errors: split.shares().to_vec(),
             tolerance: self.error.0,
-            reached: picture.reached && error.value <= self.error.0,
+            reached: picture.reached && split.error() <= self.error.0,
             complete: picture.complete,
             white: picture.white,
             mean: picture.mean(),
             rays: picture.rays,
             rays_per_pixel: picture.rays as f64 / pixels,
             fates: picture.fates,
-            left_out: omitted_beside(
-                &shot.model,
-                &picture.frame,
-                self.error.0,
-                (losses.as_ref(), found),
-            ),
-            losses: losses.clone(),
+            left_out: omitted_beside(&shot.model, &picture.frame, self.error.0, included),
+            diffraction: rendered.diffraction.clone(),
+            losses: rendered.losses.clone(),
             ghosts: found.cloned(),
-            ghosts_milliseconds: ghosts.as_ref().map(|(_, ms)| *ms),
+            ghosts_milliseconds: rendered.ghosts.as_ref().map(|(_, ms)| *ms),
             error_map: error_map.as_ref().map(|map| ErrorMapReport {
                 tiles: map.tiles(),
                 error: map.rms().value,
@@ -422,7 +342,7 @@ impl PictureArgs {
                 largest: map.largest(),
             }),
             sensor: None,
-            quick_milliseconds: error.milliseconds,
+            quick_milliseconds: sampling.milliseconds,
             milliseconds,
             out: Some(self.out.display().to_string()),
         }
@@ -446,45 +366,6 @@ impl PictureArgs {
         if write_atomic(&elsewhere, bytes).is_ok() {
             print_note(format!("note: the picture is kept as {}", elsewhere.display()));
         }
-    }
-}
-
-/// A picture by the quick way, with its error against the exact way on some of its tiles.
-fn quick_picture(
-    shot: &CameraShot,
-    exact: &ExactRenderer<'_>,
-    stop: &AtomicBool,
-) -> Result<RenderedPicture, PictureError> {
-    let quick = QuickRenderer::new(&shot.model, &shot.bands, exact)?;
-    let (made, ms) = time_ms(|| quick.render_fast(stop));
-    let QuickPicture { mut picture, device, refused } = made;
-    if let Some(why) = refused {
-        print_note(format!("note: {why}; the processor made the picture"));
-    }
-    let error = quick_error(exact, &picture, CHECKED_TILES, CHECKED_SAMPLES);
-    picture.rays = error.rays;
-    let error = Estimate { milliseconds: Some(ms), ..error };
-    Ok(RenderedPicture { device, ..RenderedPicture::new(picture, error, "quick") })
-}
-
-/// A picture with its error.
-struct RenderedPicture {
-    picture: Picture,
-    /// As a share of mid grey, or of the pixel where that is brighter; with the milliseconds of the
-    /// picture without its preparation and its error where it is made the quick way.
-    error: Estimate,
-    way: &'static str,
-    /// The name of the graphics card that made it; `None` for the processor.
-    device: Option<String>,
-    error_map: Option<ErrorMap>,
-    losses: Option<LossReport>,
-    /// With the time in milliseconds.
-    ghosts: Option<(GhostReport, f64)>,
-}
-
-impl RenderedPicture {
-    const fn new(picture: Picture, error: Estimate, way: &'static str) -> Self {
-        Self { picture, error, way, device: None, error_map: None, losses: None, ghosts: None }
     }
 }
 

@@ -1,7 +1,9 @@
 //! The printed result of `picture`.
 
 use crate::cli::output::ShortNumber;
-use crate::picture::{GhostReport, LossReport, OmittedEffect, SensorModel};
+use crate::picture::{
+    DiffractionReport, ErrorShare, GhostReport, LossReport, OmittedEffect, SensorModel,
+};
 use crate::trace::Fates;
 use serde::Serialize;
 use std::fmt::{self, Display};
@@ -18,6 +20,7 @@ pub(super) struct PictureReport {
     pub(super) device: Option<String>,
     pub(super) error: f64,
     pub(super) error_of_error: f64,
+    pub(super) errors: Vec<ErrorShare>,
     pub(super) tolerance: f64,
     pub(super) reached: bool,
     pub(super) complete: bool,
@@ -27,6 +30,7 @@ pub(super) struct PictureReport {
     pub(super) rays_per_pixel: f64,
     pub(super) fates: Fates,
     pub(super) left_out: Vec<OmittedEffect>,
+    pub(super) diffraction: Option<DiffractionReport>,
     pub(super) losses: Option<LossReport>,
     pub(super) ghosts: Option<GhostReport>,
     pub(super) ghosts_milliseconds: Option<f64>,
@@ -77,6 +81,34 @@ impl Display for SensorReport {
 }
 
 impl PictureReport {
+    /// What each effect uses of the tolerance.
+    fn write_errors(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for ErrorShare { effect, allowed, used } in &self.errors {
+            let (used, allowed) = (100.0 * used, 100.0 * allowed);
+            write!(f, "  {effect} {used:.3} % (its share {allowed:.3} %)")?;
+            match (*effect, self.quick_milliseconds) {
+                ("sampling", Some(ms)) => {
+                    let error = 100.0 * self.error_of_error;
+                    let device = self.device.as_deref().unwrap_or("the processor");
+                    write!(f, ": ± {error:.3} %, against the exact way on some tiles; ")?;
+                    writeln!(f, "made in {ms:.0} ms on {device}")?;
+                }
+                _ => writeln!(f)?,
+            }
+        }
+        match &self.diffraction {
+            Some(DiffractionReport { on: true, change, left, cut, points, reason, .. }) => {
+                let [change, left, cut] = [change, left, cut].map(|share| 100.0 * share);
+                writeln!(
+                    f,
+                    "diffraction on: contrast changes by up to {change:.2} %, {left:.2} % are left, {cut:.2} % of \
+                     the light is cut off, at {points} points: {reason}"
+                )
+            }
+            _ => Ok(()),
+        }
+    }
+
     /// The losses, the ghosts and the map of the error.
     fn write_reflections(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let percent = |share: f64| 100.0 * share;
@@ -116,20 +148,10 @@ impl Display for PictureReport {
         writeln!(f, "{columns} x {rows} pixels on {width:.3} x {height:.3} mm")?;
         let reached = if self.reached { "" } else { ", not reached" };
         let percent = 100.0 * self.tolerance;
-        let of_quick = self.quick_milliseconds.map(|ms| {
-            let error = 100.0 * self.error_of_error;
-            let device = self.device.as_deref().unwrap_or("the processor");
-            format!(
-                " ± {error:.3} %, against the exact way on some tiles; made in {ms:.0} ms on {device}"
-            )
-        });
-        let of_quick = of_quick.unwrap_or_else(|| " by sampling".to_owned());
-        writeln!(
-            f,
-            "error {:.3} % of mid grey (rms){of_quick}; asked for {} %{reached}",
-            100.0 * self.error,
-            ShortNumber(percent)
-        )?;
+        let tolerance = ShortNumber(percent);
+        let error = 100.0 * self.error;
+        writeln!(f, "error {error:.3} % of mid grey (rms); asked for {tolerance} %{reached}")?;
+        self.write_errors(f)?;
         writeln!(
             f,
             "on-axis image irradiance of a white card: {} of its radiance",
