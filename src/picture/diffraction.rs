@@ -169,7 +169,7 @@ fn lit_width(directions: &LitDirections) -> Option<f64> {
 }
 
 /// The field of a model whose chief ray lands at a distance in mm from the axis.
-fn field_at(model: &RayModel, radius: f64) -> Option<FieldPoint> {
+pub(super) fn field_at(model: &RayModel, radius: f64) -> Option<FieldPoint> {
     let field = |y: f64| FieldPoint { x: 0.0, y, weight: 1.0 };
     if radius == 0.0 {
         return Some(field(0.0));

@@ -50,6 +50,7 @@ mod pareto;
 mod picture_cli;
 mod picture_diffraction;
 mod picture_reflections;
+mod picture_scenes;
 mod pictures;
 mod plume;
 mod pupil;

@@ -1,5 +1,7 @@
 //! Light of a picture: the way that makes it, the effects that are in it, and what each uses of the tolerance.
 
+use super::effects::ColorChoice;
+use super::scene::{SceneSource, scene_error};
 use super::{CameraShot, PictureArgs};
 use crate::analysis::Estimate;
 use crate::cli::error::CliError;
@@ -8,9 +10,9 @@ use crate::cli::output::print_note;
 use crate::cli::progress::progress_bar;
 use crate::measure::time_ms;
 use crate::picture::{
-    DiffractionReport, ErrorMap, ExactRenderer, ExactSettings, GhostLight, GhostReport,
-    LightLosses, LossReport, MID_GREY, Picture, PictureError, QuickPicture, QuickRenderer, Scene,
-    ToleranceSplit, quick_error,
+    DiffractionReport, ErrorMap, ExactRenderer, ExactSettings, GateSubject, GhostLight,
+    GhostReport, LightLosses, LossReport, MID_GREY, Picture, PictureError, PictureGate,
+    QuickPicture, QuickRenderer, Scene, SceneFileError, ToleranceSplit, quick_error, tile_change,
 };
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -20,12 +22,17 @@ const CHECKED_TILES: usize = 24;
 const CHECKED_SAMPLES: usize = 128;
 /// The samples of a pixel for the map of the error.
 const MAPPED_SAMPLES: usize = 64;
+/// The tiles on which numbers of wavelengths are compared, and the samples of their pixels.
+pub(super) const TILES: (usize, usize) = (3, 32);
+/// The numbers of wavelengths of a colour, each the double of the one before less one.
+const WAVELENGTH_COUNTS: [usize; 4] = [1, 3, 5, 9];
 /// The number of steps of the progress bar.
 const STEPS: usize = 1000;
 
 /// The effects that share the tolerance.
 const SAMPLING: &str = "sampling";
 const DIFFRACTION: &str = "diffraction";
+const WAVELENGTHS: &str = "wavelengths";
 const LOSSES: &str = "losses";
 const GHOSTS: &str = "ghosts";
 
@@ -45,6 +52,10 @@ pub(super) struct RenderedPicture {
     pub(super) losses: Option<LossReport>,
     /// With the time in milliseconds.
     pub(super) ghosts: Option<(GhostReport, f64)>,
+    /// The wavelengths of a colour; `None` in grey.
+    pub(super) colors: Option<ColorChoice>,
+    /// Every effect, if that is asked for.
+    pub(super) gates: Option<Vec<PictureGate>>,
 }
 
 /// Light by one of both ways.
@@ -55,18 +66,49 @@ struct PictureLight {
     device: Option<String>,
 }
 
+impl RenderedPicture {
+    fn new(light: PictureLight, split: ToleranceSplit) -> Self {
+        let PictureLight { picture, sampling, way, device } = light;
+        Self {
+            picture,
+            sampling,
+            split,
+            way,
+            device,
+            error_map: None,
+            diffraction: None,
+            losses: None,
+            ghosts: None,
+            colors: None,
+            gates: None,
+        }
+    }
+}
+
 impl PictureArgs {
     pub(super) fn render(
         &self,
         opened: &LoadedLens,
+        source: &SceneSource,
         stop: &AtomicBool,
     ) -> Result<(RenderedPicture, CameraShot), CliError> {
         let refuse = |error: PictureError| CliError::Input(format!("{}: {error}", opened.file));
-        let shot = self.shot(opened).map_err(refuse)?;
-        let scene = self.scene(&shot)?.map_err(refuse)?;
         let mut split = self.split();
+        let shot = self.shot(opened, source, WAVELENGTH_COUNTS[1]).map_err(refuse)?;
+        let scene = self.scene(source, &shot).map_err(|error| match error {
+            SceneFileError::Picture(error) => refuse(error),
+            other => scene_error(other),
+        })?;
+        let chosen = self.colors(opened, (source, &scene), shot, &mut split).map_err(refuse)?;
+        let (shot, colors) = chosen;
+        let is_moving = self.is_moving(&shot, &scene);
+        if is_moving && (self.quick || self.error_map.is_some()) {
+            let text =
+                "--quick, --error-map: planes move during --seconds; expected the exact way alone";
+            return Err(CliError::Input(text.to_owned()));
+        }
         let renderer = self.renderer(&shot, &scene, opened, &mut split).map_err(refuse)?;
-        let light = self.light(&shot, &renderer, &mut split, stop).map_err(refuse)?;
+        let light = self.light(&shot, (&renderer, is_moving), &mut split, stop).map_err(refuse)?;
         let is_stopped = || stop.load(Ordering::Relaxed);
         let map = || {
             let samples = (usize::MAX, MAPPED_SAMPLES);
@@ -74,20 +116,19 @@ impl PictureArgs {
         };
         // A part is no map.
         let error_map = self.error_map.as_ref().map(|_| map()).filter(ErrorMap::is_whole);
-        let PictureLight { picture, sampling, way, device } = light;
         let mut rendered = RenderedPicture {
-            picture,
-            sampling,
-            split,
-            way,
-            device,
             error_map,
             diffraction: renderer.diffraction().cloned(),
             losses: renderer.losses().cloned(),
-            ghosts: None,
+            colors,
+            ..RenderedPicture::new(light, split)
         };
         if !is_stopped() {
             self.add_ghosts(&mut rendered, &shot, &scene).map_err(refuse)?;
+        }
+        if self.effects && !is_stopped() {
+            let gates = self.effect_table(&rendered, (&shot, &scene, source), opened);
+            rendered.gates = Some(gates.map_err(refuse)?);
         }
         if !rendered.picture.complete {
             print_note("note: stopped; what was not sampled is black");
@@ -99,9 +140,54 @@ impl PictureArgs {
 
     /// The tolerance, split over what may be wrong.
     fn split(&self) -> ToleranceSplit {
-        let coated: &[&str] = &[SAMPLING, DIFFRACTION, LOSSES, GHOSTS];
-        let effects = if self.coating.is_some() { coated } else { &coated[..2] };
-        ToleranceSplit::new(self.error.0, effects)
+        let all = [
+            (SAMPLING, true),
+            (DIFFRACTION, true),
+            (WAVELENGTHS, !self.gray),
+            (LOSSES, self.coating.is_some()),
+            (GHOSTS, self.coating.is_some()),
+        ];
+        let effects: Vec<&str> =
+            all.iter().filter(|(_, is_on)| *is_on).map(|(name, _)| *name).collect();
+        ToleranceSplit::new(self.error.0, &effects)
+    }
+
+    /// The lens at as few wavelengths as are enough: about twice as many change some tiles by less than the
+    /// share of the tolerance.
+    fn colors(
+        &self,
+        opened: &LoadedLens,
+        (source, scene): (&SceneSource, &Scene),
+        usual: CameraShot,
+        split: &mut ToleranceSplit,
+    ) -> Result<(CameraShot, Option<ColorChoice>), PictureError> {
+        if self.gray {
+            return Ok((usual, None));
+        }
+        let mut chosen = None;
+        for pair in WAVELENGTH_COUNTS.windows(2) {
+            let [few, many] = [pair[0], pair[1]].map(|count| self.shot(opened, source, count));
+            let (few, many) = (few?, many?);
+            let renderer =
+                |shot: &CameraShot| ExactRenderer::new(&shot.model, &shot.bands, scene, shot.frame);
+            let change = tile_change([&renderer(&many)?, &renderer(&few)?], [0.0; 2], TILES);
+            let choice = ColorChoice { count: pair[0], compared: pair[1], change };
+            split.note(WAVELENGTHS, change);
+            let is_enough = change <= split.allowed();
+            chosen = Some((few, Some(choice)));
+            if is_enough {
+                break;
+            }
+        }
+        Ok(chosen.unwrap_or((usual, None)))
+    }
+
+    /// True if something moves by as much as can be seen during the exposure.
+    fn is_moving(&self, shot: &CameraShot, scene: &Scene) -> bool {
+        let CameraShot { model, bands, frame, focus, .. } = shot;
+        let (focus, seconds) = (*focus, self.exposed.seconds.unwrap_or(0.0));
+        let tolerance = self.error.0;
+        GateSubject { model, bands, frame, scene, focus, seconds, tolerance }.is_moving()
     }
 
     /// The scene in front of the lens, with the effects that are not rays alone.
@@ -130,7 +216,7 @@ impl PictureArgs {
     fn light(
         &self,
         shot: &CameraShot,
-        renderer: &ExactRenderer<'_>,
+        (renderer, is_moving): (&ExactRenderer<'_>, bool),
         split: &mut ToleranceSplit,
         stop: &AtomicBool,
     ) -> Result<PictureLight, PictureError> {
@@ -138,9 +224,11 @@ impl PictureArgs {
         let is_kept = |quick: &PictureLight| {
             self.quick || quick.sampling.value <= allowed || stop.load(Ordering::Relaxed)
         };
-        let quick = if self.exact { None } else { Some(quick_picture(shot, renderer, stop)) };
+        let is_exact = self.exact || is_moving;
+        let quick = if is_exact { None } else { Some(quick_picture(shot, renderer, stop)) };
         let quick = quick.transpose()?.filter(is_kept);
-        let light = quick.unwrap_or_else(|| self.exact_picture(renderer, allowed, stop));
+        let light =
+            quick.unwrap_or_else(|| self.exact_picture((renderer, is_moving), allowed, stop));
         split.note(SAMPLING, light.sampling.value);
         let mean = light.picture.mean() / (MID_GREY * light.picture.white);
         split.note(DIFFRACTION, renderer.diffraction().map_or(0.0, |found| found.error(mean)));
@@ -168,16 +256,14 @@ impl PictureArgs {
 
     fn exact_picture(
         &self,
-        renderer: &ExactRenderer<'_>,
+        (renderer, is_moving): (&ExactRenderer<'_>, bool),
         tolerance: f64,
         stop: &AtomicBool,
     ) -> PictureLight {
-        let settings = ExactSettings {
-            tolerance,
-            max_samples: self.max_samples,
-            seed: self.seed,
-            seconds: 0.0,
-        };
+        // What moves by less than can be seen needs no samples of the time.
+        let seconds = self.exposed.seconds.filter(|_| is_moving).unwrap_or(0.0);
+        let (max_samples, seed) = (self.max_samples, self.seed);
+        let settings = ExactSettings { tolerance, max_samples, seed, seconds };
         let bar = progress_bar(STEPS);
         let watch = |done: f64| {
             bar.set_position((STEPS as f64 * done) as u64);

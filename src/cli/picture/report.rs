@@ -1,8 +1,9 @@
 //! The printed result of `picture`.
 
+use super::GroupMotion;
 use crate::cli::output::ShortNumber;
 use crate::picture::{
-    DiffractionReport, ErrorShare, GhostReport, LossReport, OmittedEffect, SensorModel,
+    DiffractionReport, ErrorShare, GhostReport, LossReport, OmittedEffect, PictureGate, SensorModel,
 };
 use crate::trace::Fates;
 use serde::Serialize;
@@ -15,6 +16,7 @@ pub(super) struct PictureReport {
     pub(super) pixels: [usize; 2],
     pub(super) size: [f64; 2],
     pub(super) focus: Option<f64>,
+    pub(super) focus_group: Option<GroupMotion>,
     pub(super) distance: Option<f64>,
     pub(super) way: &'static str,
     pub(super) device: Option<String>,
@@ -35,6 +37,7 @@ pub(super) struct PictureReport {
     pub(super) ghosts: Option<GhostReport>,
     pub(super) ghosts_milliseconds: Option<f64>,
     pub(super) error_map: Option<ErrorMapReport>,
+    pub(super) gates: Option<Vec<PictureGate>>,
     pub(super) sensor: Option<SensorReport>,
     pub(super) quick_milliseconds: Option<f64>,
     pub(super) milliseconds: f64,
@@ -53,8 +56,8 @@ pub(super) struct ErrorMapReport {
 /// The exposure of a sensor.
 #[derive(Serialize)]
 pub(super) struct SensorReport {
-    pub(super) name: &'static str,
-    pub(super) source: &'static str,
+    pub(super) name: String,
+    pub(super) source: String,
     #[serde(flatten)]
     pub(super) model: SensorModel,
     pub(super) bayer: bool,
@@ -145,6 +148,13 @@ impl Display for PictureReport {
         };
         let ([width, height], [columns, rows]) = (self.size, self.pixels);
         writeln!(f, "{} at {}, focus at {}", self.scene, place(self.distance), place(self.focus))?;
+        if let Some(GroupMotion { shift, breathing }) = self.focus_group {
+            let (shift, breathing) = (ShortNumber(shift), 100.0 * breathing);
+            writeln!(
+                f,
+                "focused by a group that moves {shift} mm; breathing: {breathing:+.2} % of the field of view"
+            )?;
+        }
         writeln!(f, "{columns} x {rows} pixels on {width:.3} x {height:.3} mm")?;
         let reached = if self.reached { "" } else { ", not reached" };
         let percent = 100.0 * self.tolerance;
@@ -172,9 +182,23 @@ impl Display for PictureReport {
             let change = change.map(|c| format!("{:.2} %, ", 100.0 * c)).unwrap_or_default();
             writeln!(f, "left out: {effect} ({change}{reason})")?;
         }
+        self.gates.iter().flatten().try_for_each(|gate| write_gate(f, gate))?;
         self.sensor.iter().try_for_each(|sensor| write!(f, "{sensor}"))?;
         self.out.as_ref().map_or(Ok(()), |out| writeln!(f, "saved as {out}"))
     }
+}
+
+/// The line of an effect.
+fn write_gate(f: &mut fmt::Formatter<'_>, gate: &PictureGate) -> fmt::Result {
+    let PictureGate { effect, on, number, unit, limit, reason, saved_milliseconds } = gate;
+    let state = if *on { "on " } else { "off" };
+    let number = number.map_or("unknown".to_owned(), |v| ShortNumber(v).to_string());
+    let saved = saved_milliseconds.map(|ms| {
+        let word = if *on { "would save" } else { "saves" };
+        format!("; off {word} {ms:.1} ms, measured on some tiles")
+    });
+    let saved = saved.unwrap_or_default();
+    writeln!(f, "{state} {effect}: {number} of {} {unit} ({reason}{saved})", ShortNumber(*limit))
 }
 
 /// The line of what surfaces and glasses take away.
