@@ -1,4 +1,4 @@
-//! Whether a picture needs diffraction, and what is left out of it.
+//! The decision whether a picture needs diffraction, and the part of it that is left out.
 //!
 //! A picture by rays has the geometric contrast G. Rays from points that are displaced as the light of the
 //! unaberrated pupil spreads (see the module of spreads) multiply it by the contrast H of that pupil. The
@@ -91,11 +91,9 @@ impl DiffractionLight {
             points: 0,
             reason,
         };
+        let off = |reason| Ok(Self { report: without(reason), parts: None });
         if bound <= tolerance {
-            return Ok(Self {
-                report: without("at most 1.27 nu lambda F of contrast"),
-                parts: None,
-            });
+            return off("at most 1.27 nu lambda F of contrast");
         }
         let lens = BackwardLens::new(model, model.primary)?;
         let reach = frame.reach();
@@ -107,9 +105,7 @@ impl DiffractionLight {
             Some((directions, spreads))
         };
         let Some((directions, spreads)) = MARGINS.into_iter().find_map(all) else {
-            let report =
-                without("left out: the directions of light around the picture are not known");
-            return Ok(Self { report, parts: None });
+            return off("left out: the directions of light around the picture are not known");
         };
         let least = (ACCURACY * tolerance).clamp(ACCURACIES[0], ACCURACIES[1]);
         let compare = |part: &f64| compare(model, (part * reach, frequency), &spreads, least);
@@ -117,9 +113,7 @@ impl DiffractionLight {
         let Some([change, left]) =
             found.iter().copied().reduce(|a, b| [a[0].max(b[0]), a[1].max(b[1])])
         else {
-            let report =
-                without("left out: contrast by diffraction is not known anywhere in the picture");
-            return Ok(Self { report, parts: None });
+            return off("left out: contrast by diffraction is not known anywhere in the picture");
         };
         let on = change > tolerance && left < change;
         let report = DiffractionReport {

@@ -80,7 +80,7 @@ pub struct ExactRenderer<'a> {
     sampler: TileSampler,
     /// The irradiance of a white card on the axis, or where the image is brightest.
     white: f64,
-    /// What diffraction does; `None` if nobody asked.
+    /// The effect of diffraction; `None` if nobody asked.
     diffraction: Option<DiffractionReport>,
 }
 
@@ -191,7 +191,7 @@ impl<'a> ExactRenderer<'a> {
         Ok(self)
     }
 
-    /// What diffraction does to the picture, if that was asked for.
+    /// The effect of diffraction on the picture, if that was asked for.
     pub fn diffraction(&self) -> Option<&DiffractionReport> {
         self.diffraction.as_ref()
     }

@@ -34,7 +34,7 @@ pub struct PictureGate {
     pub saved_milliseconds: Option<f64>,
 }
 
-/// What the gates of a picture are computed for.
+/// The lens, frame and scene that gates are computed for.
 #[derive(Debug, Clone, Copy)]
 pub struct GateSubject<'a> {
     /// The model of the focused lens.

@@ -20,7 +20,7 @@ pub struct OmittedEffect {
     pub reason: &'static str,
 }
 
-/// What a picture has of the effects that it may leave out; `None` where nothing of one was computed.
+/// The effects that a picture has of those it may leave out; `None` where nothing of one was computed.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct IncludedEffects<'a> {
     /// Diffraction.

@@ -98,7 +98,7 @@ pub enum SceneFileError {
         file: String,
         /// The entry.
         place: String,
-        /// What it holds.
+        /// The wrong value.
         found: String,
         /// The accepted values.
         expected: String,

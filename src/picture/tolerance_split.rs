@@ -8,9 +8,9 @@ use serde::Serialize;
 pub struct ErrorShare {
     /// The name of the effect.
     pub effect: &'static str,
-    /// What it may use: the tolerance over the square root of the number of effects.
+    /// The part that it may use: the tolerance over the square root of the number of effects.
     pub allowed: f64,
-    /// What it uses.
+    /// The part that it uses.
     pub used: f64,
 }
 
@@ -29,7 +29,7 @@ impl ToleranceSplit {
         Self { tolerance, shares: effects.iter().map(share).collect() }
     }
 
-    /// What every effect may use.
+    /// The part that every effect may use.
     pub fn allowed(&self) -> f64 {
         self.shares.first().map_or(self.tolerance, |share| share.allowed)
     }
@@ -39,7 +39,7 @@ impl ToleranceSplit {
         self.shares.iter_mut().filter(|s| s.effect == effect).for_each(|s| s.used = used);
     }
 
-    /// What is left for an effect by the others, and never less than its own share.
+    /// The part that the others leave for an effect, and never less than its own share.
     pub fn rest(&self, effect: &str) -> f64 {
         let others = self.shares.iter().filter(|share| share.effect != effect);
         let square: f64 = others.map(|share| share.used * share.used).sum();

@@ -140,7 +140,7 @@ fn diffraction_gate<'a>(
     })
 }
 
-/// What surfaces and glasses take, and its polarisation.
+/// The light that surfaces and glasses take, and its polarisation.
 fn losses_gates(
     rendered: &RenderedPicture,
     saved_milliseconds: Option<f64>,

@@ -249,7 +249,7 @@ impl PictureArgs {
         }
     }
 
-    /// What is not in the picture.
+    /// The effects that are not in the picture.
     fn left_out(
         &self,
         rendered: &RenderedPicture,

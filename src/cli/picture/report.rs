@@ -84,7 +84,7 @@ impl Display for SensorReport {
 }
 
 impl PictureReport {
-    /// What each effect uses of the tolerance.
+    /// The part of the tolerance that each effect uses.
     fn write_errors(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for ErrorShare { effect, allowed, used } in &self.errors {
             let (used, allowed) = (100.0 * used, 100.0 * allowed);
