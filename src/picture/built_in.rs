@@ -58,6 +58,25 @@ impl BuiltInScene {
         self == Self::StillLife
     }
 
+    /// The painting of a scene with one plane; a white card is a plane of that colour.
+    fn pattern(self) -> Option<Pattern> {
+        Some(match self {
+            Self::White => Pattern::Uniform { radiance: [1.0; 3], cover: 1.0 },
+            Self::Target => Pattern::Bars,
+            Self::Star => Pattern::Star(36.0),
+            Self::Edge => Pattern::SlantedEdge,
+            Self::Checkerboard => Pattern::Checkerboard(10.0),
+            Self::Lights => Pattern::Lights { count: LIGHTS, radiance: LIGHT },
+            Self::StillLife => return None,
+        })
+    }
+
+    /// The painting of the scene of this name if it has one plane.
+    pub(super) fn pattern_of(name: &str) -> Option<Pattern> {
+        let entry = Self::ALL.iter().find(|(_, own)| *own == name);
+        entry.and_then(|(scene, _)| scene.pattern())
+    }
+
     /// The scene at a distance in mm, or at infinity, of the size that fills a frame.
     ///
     /// # Errors
@@ -70,14 +89,10 @@ impl BuiltInScene {
     ) -> Result<Scene, PictureError> {
         check_distance(distance)?;
         let half_size = filling_size(model, frame, distance)?;
-        let pattern = match self {
-            Self::White => return Ok(Scene::uniform(1.0)),
-            Self::Target => Pattern::Bars,
-            Self::Star => Pattern::Star(36.0),
-            Self::Edge => Pattern::SlantedEdge,
-            Self::Checkerboard => Pattern::Checkerboard(10.0),
-            Self::Lights => Pattern::Lights { count: LIGHTS, radiance: LIGHT },
-            Self::StillLife => return still_life(half_size, distance),
+        let pattern = match self.pattern() {
+            Some(_) if self == Self::White => return Ok(Scene::uniform(1.0)),
+            Some(pattern) => pattern,
+            None => return still_life(half_size, distance),
         };
         let layer =
             SceneLayer { distance, center: [0.0; 2], half_size, velocity: [0.0; 2], pattern };
@@ -97,18 +112,29 @@ impl Scene {
         distance: Option<f64>,
     ) -> Result<Self, PictureError> {
         let raster = raster.into();
-        let [width, height] = filling_size(model, frame, distance)?;
-        let aspect = raster.aspect();
-        let half_height = height.min(width / aspect);
         let layer = SceneLayer {
             distance,
             center: [0.0; 2],
-            half_size: [aspect * half_height, half_height],
+            half_size: fitted_size(model, frame, distance, Some(raster.aspect()))?,
             velocity: [0.0; 2],
             pattern: Pattern::Raster(raster),
         };
         Self::new(vec![layer], [0.0; 3], 1.0)
     }
+}
+
+/// The half width and half height of the largest plane of an aspect that fits into a frame; of the frame itself
+/// without one.
+pub(super) fn fitted_size(
+    model: &RayModel,
+    frame: &ImageFrame,
+    distance: Option<f64>,
+    aspect: Option<f64>,
+) -> Result<[f64; 2], PictureError> {
+    let [width, height] = filling_size(model, frame, distance)?;
+    let Some(aspect) = aspect else { return Ok([width, height]) };
+    let half_height = height.min(width / aspect);
+    Ok([aspect * half_height, half_height])
 }
 
 /// The colour of a candle's light with the luminance 1.

@@ -51,6 +51,14 @@ pub enum PictureError {
         /// The distance, in mm.
         distance: f64,
     },
+    /// No way of the focus group focuses at the distance.
+    #[error(
+        "no way of the focus group within its gaps focuses at {distance} mm; expected another distance or group"
+    )]
+    NotFocused {
+        /// The distance, in mm.
+        distance: f64,
+    },
     /// A size of the picture is no positive number, or there are too many pixels.
     #[error("{what} is {found}; expected {expected}")]
     Size {

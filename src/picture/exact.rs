@@ -13,8 +13,10 @@
 //! The seed of a pixel is its place, and tiles and groups are of a fixed size, so that a picture does not
 //! depend on the number of threads.
 
+use super::diffraction::{DiffractionLight, DiffractionReport};
 use super::lit_directions::LitDirections;
 use super::losses::{LensLosses, LightLosses, LossReport};
+use super::pupil_spread::PupilSpreads;
 use super::sample_points::LONGEST;
 use super::scene::{Radiance, Scene};
 use super::tile_sampler::{PictureTile, SampledTile, TileSampler, TileWork};
@@ -78,6 +80,8 @@ pub struct ExactRenderer<'a> {
     sampler: TileSampler,
     /// The irradiance of a white card on the axis, or where the image is brightest.
     white: f64,
+    /// The effect of diffraction; `None` if nobody asked.
+    diffraction: Option<DiffractionReport>,
 }
 
 /// A scene in front of a lens as any way of making pictures sees it.
@@ -91,6 +95,8 @@ pub(super) struct PictureSubject<'a> {
     pub(super) losses: Option<&'a LensLosses>,
     /// The irradiance of a white card on the axis.
     pub(super) white: f64,
+    /// The spreads of light by diffraction.
+    pub(super) spreads: Option<&'a PupilSpreads>,
 }
 
 /// Asks whether to go on, and tells the share of the work that is done.
@@ -142,7 +148,7 @@ impl<'a> ExactRenderer<'a> {
         let directions = LitDirections::new(model, &outer(model, bands), frame.reach(), RINGS)?;
         let sampler = TileSampler::new(model, bands, directions)?;
         let white = brightest(model, frame.reach())?;
-        Ok(Self { scene, frame, sampler, white })
+        Ok(Self { scene, frame, sampler, white, diffraction: None })
     }
 
     /// The same with what the surfaces of the lens reflect and its glasses absorb taken away, for the model and
@@ -162,6 +168,32 @@ impl<'a> ExactRenderer<'a> {
         self.white *= losses.report.transmission;
         self.sampler.losses = Some(losses);
         Ok(self)
+    }
+
+    /// The same with diffraction put in where it changes contrast by more than a tolerance, for the model and the
+    /// colours of this renderer; the report says what is left out.
+    ///
+    /// # Errors
+    /// A lens that cannot be traced backwards.
+    pub fn with_diffraction(
+        mut self,
+        model: &RayModel,
+        bands: &[ColorBand],
+        tolerance: f64,
+    ) -> Result<Self, PictureError> {
+        let light = (self.directions(), &outer(model, bands)[..]);
+        let found = DiffractionLight::new((model, bands), &self.frame, light, tolerance)?;
+        if let Some((directions, spreads)) = found.parts {
+            self.sampler.directions = directions;
+            self.sampler.spreads = Some(spreads);
+        }
+        self.diffraction = Some(found.report);
+        Ok(self)
+    }
+
+    /// The effect of diffraction on the picture, if that was asked for.
+    pub fn diffraction(&self) -> Option<&DiffractionReport> {
+        self.diffraction.as_ref()
     }
 
     /// The losses at the surfaces and in the glasses of the lens, if they are in the picture.
@@ -192,6 +224,7 @@ impl<'a> ExactRenderer<'a> {
             directions: self.directions(),
             losses: self.loss_table(),
             white: self.white(),
+            spreads: self.sampler.spreads.as_ref(),
         }
     }
 

@@ -103,7 +103,7 @@ pub(super) fn image_scale(model: &RayModel) -> Result<f64, PictureError> {
 
 /// The tangent of the direction in which the entrance pupil sees the scene that is imaged at a height
 /// in mm, by first-order optics.
-fn tangent(model: &RayModel, height: f64) -> Result<f64, PictureError> {
+pub(super) fn tangent(model: &RayModel, height: f64) -> Result<f64, PictureError> {
     let size = (height / image_scale(model)?).abs();
     Ok(match model.beam.object {
         Object::Infinity => size,

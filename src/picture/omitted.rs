@@ -1,6 +1,7 @@
 //! The effects that a picture leaves out, each with the number that it rests on where there is one.
 
 use super::ImageFrame;
+use super::diffraction::DiffractionReport;
 use super::ghost_light::GhostReport;
 use super::losses::LossReport;
 use crate::analysis::{Coating, diffraction_gate, rank_ghosts};
@@ -19,31 +20,40 @@ pub struct OmittedEffect {
     pub reason: &'static str,
 }
 
-/// The effects that a picture by rays leaves out which counts neither losses nor ghosts; see
-/// [`omitted_beside`].
-pub fn omitted_effects(model: &RayModel, frame: &ImageFrame, tolerance: f64) -> Vec<OmittedEffect> {
-    omitted_beside(model, frame, tolerance, (None, None))
+/// The effects that a picture has of those it may leave out; `None` where nothing of one was computed.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct IncludedEffects<'a> {
+    /// Diffraction.
+    pub diffraction: Option<&'a DiffractionReport>,
+    /// The losses at surfaces and in glasses.
+    pub losses: Option<&'a LossReport>,
+    /// Ghosts.
+    pub ghosts: Option<&'a GhostReport>,
 }
 
-/// The effects that a picture by rays leaves out, given what it has of losses and ghosts. The change by
-/// diffraction is that of contrast on the axis, up to half of a period per pixel.
+/// The effects that a picture by rays leaves out which has neither diffraction nor losses nor ghosts; see
+/// [`omitted_beside`].
+pub fn omitted_effects(model: &RayModel, frame: &ImageFrame, tolerance: f64) -> Vec<OmittedEffect> {
+    omitted_beside(model, frame, tolerance, IncludedEffects::default())
+}
+
+/// The effects that a picture by rays leaves out, given what it has. The change by diffraction is that of
+/// contrast up to half of a period per pixel, on the axis if nobody computed more.
 pub fn omitted_beside(
     model: &RayModel,
     frame: &ImageFrame,
     tolerance: f64,
-    (losses, ghosts): (Option<&LossReport>, Option<&GhostReport>),
+    included: IncludedEffects<'_>,
 ) -> Vec<OmittedEffect> {
-    let axis = FieldPoint { x: 0.0, y: 0.0, weight: 1.0 };
-    let highest = 0.5 / frame.pitch;
-    let gate = diffraction_gate(model, axis, model.primary, highest, tolerance);
-    let (change, reason) = match gate {
-        Ok(gate) => match gate.change {
-            Some(change) => (Some(change.value), "the change of contrast on the axis, computed"),
-            None => (Some(gate.bound), "at most 1.27 nu lambda F"),
-        },
-        Err(_) => (None, "the change of contrast on the axis is not known"),
+    let IncludedEffects { diffraction, losses, ghosts } = included;
+    let diffraction = match diffraction {
+        None => Some(omitted_diffraction(model, frame, tolerance)),
+        Some(report) if report.on => None,
+        Some(DiffractionReport { change, reason, .. }) => {
+            Some(OmittedEffect { effect: "diffraction", change: Some(*change), reason })
+        }
     };
-    let mut left_out = vec![OmittedEffect { effect: "diffraction", change, reason }];
+    let mut left_out: Vec<_> = diffraction.into_iter().collect();
     left_out.push(match losses {
         // Bare surfaces on the axis.
         None => OmittedEffect {
@@ -51,8 +61,8 @@ pub fn omitted_beside(
             change: rank_ghosts(model, model.primary, Coating::Bare)
                 .ok()
                 .map(|ranking| 1.0 - ranking.direct),
-            reason: "surfaces and glasses take nothing away; of the light on the axis bare surfaces \
-                     would, and --coating counts it",
+            reason: "of the light on the axis bare surfaces would take this; white loses the same, so that \
+                     a picture exposed for white does not change; --coating counts it",
         },
         Some(losses) => OmittedEffect {
             effect: "polarisation",
@@ -83,4 +93,19 @@ pub fn omitted_beside(
         Some(_) => {}
     }
     left_out
+}
+
+/// Diffraction of which only the axis is known.
+fn omitted_diffraction(model: &RayModel, frame: &ImageFrame, tolerance: f64) -> OmittedEffect {
+    let axis = FieldPoint { x: 0.0, y: 0.0, weight: 1.0 };
+    let highest = 0.5 / frame.pitch;
+    let gate = diffraction_gate(model, axis, model.primary, highest, tolerance);
+    let (change, reason) = match gate {
+        Ok(gate) => match gate.change {
+            Some(change) => (Some(change.value), "the change of contrast on the axis, computed"),
+            None => (Some(gate.bound), "at most 1.27 nu lambda F"),
+        },
+        Err(_) => (None, "the change of contrast on the axis is not known"),
+    };
+    OmittedEffect { effect: "diffraction", change, reason }
 }

@@ -81,6 +81,15 @@ pub enum Pattern {
     },
     /// A picture.
     Raster(Arc<Raster>),
+    /// Another painting, brighter or darker, that covers less.
+    Veiled {
+        /// The painting.
+        pattern: Arc<Self>,
+        /// The factor of its radiance.
+        level: f64,
+        /// The factor of its cover, 0 to 1.
+        cover: f64,
+    },
 }
 
 /// Places of a painting, as many as are looked at together, and the paint there in one colour.
@@ -198,6 +207,7 @@ impl Pattern {
         match self {
             Self::Uniform { radiance: [red, green, blue], .. } => red == green && green == blue,
             Self::Ball { .. } | Self::Flame(_) | Self::LitWall { .. } | Self::Raster(_) => false,
+            Self::Veiled { pattern, .. } => pattern.is_grey(),
             Self::Wave { .. }
             | Self::Checkerboard(_)
             | Self::SlantedEdge
@@ -213,6 +223,7 @@ impl Pattern {
             Self::Uniform { cover, .. } => *cover == 1.0,
             Self::Ball { .. } | Self::Flame(_) => false,
             Self::Raster(raster) => raster.covers_all(),
+            Self::Veiled { pattern, cover, .. } => *cover == 1.0 && pattern.covers_all(),
             Self::Wave { .. }
             | Self::Checkerboard(_)
             | Self::SlantedEdge
@@ -261,6 +272,11 @@ impl Pattern {
             Self::Raster(raster) => {
                 let [u, v] = relative();
                 raster.paint([0.5 * (u + 1.0), 0.5 * (1.0 - v)])
+            }
+            Self::Veiled { pattern, level, cover } => {
+                let paint = pattern.paint(point);
+                let radiance = paint.radiance.map(|v| v * level);
+                Paint { radiance, cover: paint.cover * cover }
             }
         }
     }

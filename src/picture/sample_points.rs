@@ -1,4 +1,4 @@
-//! The points of samples: Sobol's sequence in six dimensions, scrambled after Owen by hashing (Burley,
+//! The points of samples: Sobol's sequence in eight dimensions, scrambled after Owen by hashing (Burley,
 //! JCGT 9, 2020), for many sets at once.
 //!
 //! A set is a replicate of a pixel with its own seed. All sets take the same point of the sequence and
@@ -9,10 +9,11 @@ use crate::math::{SimdWidth, run_vectorized};
 use sobol_burley::parts::{hash, owen_scramble_rev, sobol_rev};
 
 /// The dimensions in which every set is scrambled by itself, with their numbers in the sequence: the place in the
-/// pixel, the direction, and the time.
-const DIMENSIONS: [u32; 5] = [0, 1, 2, 3, 5];
-/// The number of them that a scene at rest needs.
-const AT_REST: usize = 4;
+/// pixel, the direction, the time, and the displacement by diffraction.
+const DIMENSIONS: [u32; 7] = [0, 1, 2, 3, 5, 6, 7];
+/// The dimension of the time, and the first of the displacement.
+const TIME: usize = 4;
+const DISPLACEMENT: usize = 5;
 /// The dimension of the wavelength, in which the pixels of a tile share a scramble: their rays are then traced at
 /// one wavelength, without being sorted.
 const COLOR: u32 = 4;
@@ -47,19 +48,25 @@ impl SamplePoints {
         }
     }
 
-    /// Moves on to a sample, counted from 0 and below [`LONGEST`]; the times stay 0 in a scene at rest.
-    pub(super) fn go_to(&mut self, sample: usize, is_moving: bool) {
+    /// Moves on to a sample, counted from 0 and below [`LONGEST`]; the times stay 0 in a scene at rest, and the
+    /// displacements without diffraction.
+    pub(super) fn go_to(&mut self, sample: usize, is_moving: bool, is_diffracted: bool) {
         let reversed = (sample as u32).reverse_bits();
-        let used = if is_moving { DIMENSIONS.len() } else { AT_REST };
-        for (d, (seeds, column)) in self.seeds.iter().zip(&mut self.columns).enumerate().take(used)
-        {
-            scramble_all(sobol_rev(reversed, DIMENSIONS[d]), seeds, column);
+        let is_used = |d: usize| match d {
+            TIME => is_moving,
+            DISPLACEMENT.. => is_diffracted,
+            _ => true,
+        };
+        for (d, (seeds, column)) in self.seeds.iter().zip(&mut self.columns).enumerate() {
+            if is_used(d) {
+                scramble_all(sobol_rev(reversed, DIMENSIONS[d]), seeds, column);
+            }
         }
         scramble_all(sobol_rev(reversed, COLOR), &self.color_seeds, &mut self.colors);
     }
 
-    /// The places in the pixels, to the right and downwards, the places in the sets of directions, and the times, each
-    /// from 0 to 1, by set.
+    /// The places in the pixels, to the right and downwards, the places in the sets of directions, the times, and
+    /// two numbers of the displacements, each from 0 to 1, by set.
     pub(super) fn columns(&self) -> [&[f64]; DIMENSIONS.len()] {
         self.columns.each_ref().map(|column| &column[..])
     }
@@ -98,12 +105,12 @@ mod tests {
         let mut points = SamplePoints::new(&[3, 99], &[7]);
         let found: Vec<Vec<f64>> = (0..256)
             .map(|i| {
-                points.go_to(i, true);
+                points.go_to(i, true, true);
                 let columns = points.columns().map(|column| column[1]);
                 columns.into_iter().chain([points.color(0)]).collect()
             })
             .collect();
-        for d in 0..6 {
+        for d in 0..8 {
             let mut parts: Vec<usize> = found.iter().map(|p| (256.0 * p[d]) as usize).collect();
             parts.sort_unstable();
             assert_eq!(parts, (0..256).collect::<Vec<_>>(), "dimension {d}");
@@ -120,12 +127,12 @@ mod tests {
     fn sets_with_other_seeds_are_independent() {
         let seeds: Vec<u32> = (0..1024).collect();
         let mut points = SamplePoints::new(&seeds, &[]);
-        points.go_to(5, false);
+        points.go_to(5, false, false);
         let off = |set: usize| points.columns()[0][set] - 0.5;
         let neighbours: f64 = (0..1023).map(|set| off(set) * off(set + 1)).sum::<f64>() / 1023.0;
         let mean: f64 = (0..1024).map(off).sum::<f64>() / 1024.0;
         assert!(neighbours.abs() < 4.0 / 12.0 / 32.0, "{neighbours}");
         assert!(mean.abs() < 4.0 * (1.0_f64 / 12.0 / 1024.0).sqrt(), "{mean}");
-        assert!(points.columns()[4].iter().all(|time| *time == 0.0), "a scene at rest");
+        assert!(points.columns()[TIME].iter().all(|time| *time == 0.0), "a scene at rest");
     }
 }

@@ -65,6 +65,27 @@ impl Scene {
         Ok(Self { layers, background, white })
     }
 
+    /// The same scene, whose only plane has this width in mm, and its height in proportion.
+    ///
+    /// # Errors
+    /// Not one plane at a finite distance, or a width that is not positive.
+    pub fn with_width(mut self, width: f64) -> Result<Self, PictureError> {
+        let what = "the width of the scene";
+        let refuse = |expected| Err(PictureError::Size { what, found: width, expected });
+        if !(width > 0.0 && width.is_finite()) {
+            return refuse("a positive number of mm");
+        }
+        let [layer] = &mut self.layers[..] else {
+            return refuse("a scene of one plane, or none for this scene");
+        };
+        if layer.distance.is_none() {
+            return refuse("a scene at a finite distance, as by --distance, or none at infinity");
+        }
+        let factor = 0.5 * width / layer.half_size[0];
+        layer.half_size = layer.half_size.map(|half| half * factor);
+        Ok(self)
+    }
+
     /// The same radiance in every direction.
     pub fn uniform(radiance: f64) -> Self {
         Self {

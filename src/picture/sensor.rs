@@ -15,10 +15,11 @@ use super::{Picture, PictureError};
 use rand::SeedableRng;
 use rand_distr::{Distribution, Poisson, StandardNormal};
 use rand_xoshiro::SplitMix64;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// A sensor at one setting of its gain.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct SensorModel {
     /// Electrons per photon, 0 to 1.
     pub quantum_efficiency: f64,

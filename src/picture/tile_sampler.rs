@@ -1,11 +1,14 @@
 //! Rays of the samples of a tile, traced in batches.
 //!
 //! The rays of a sample are the same in all colours and differ only in the wavelength at which they are
-//! traced. Of every sample, all pixels and replicates of a tile are done at once.
+//! traced; with diffraction each colour has its own, since displacements are proportional to the wavelength.
+//! Of every sample, all pixels and replicates of a tile are done at once.
 
+use super::diffraction::image_wavelength;
 use super::exact::{REPLICATES, mean_with_error};
 use super::lit_directions::LitDirections;
 use super::losses::LensLosses;
+use super::pupil_spread::PupilSpreads;
 use super::sample_points::SamplePoints;
 use super::scene::{Radiance, Scene};
 use super::seen_light::SeenColor;
@@ -73,6 +76,9 @@ struct SpectralPart {
     wavelengths: Vec<usize>,
 }
 
+/// A colour and the index of its wavelength.
+type ColorLight = (usize, usize);
+
 /// Rays of one part of the spectrum that wait to be traced, as columns.
 #[derive(Debug, Default)]
 struct RayQueue {
@@ -111,10 +117,14 @@ type MovingScene<'a> = (&'a Scene, f64);
 pub(super) struct TileSampler {
     /// By colour and wavelength.
     lenses: Vec<Vec<BackwardLens>>,
+    /// Their wavelengths in the image space in mm.
+    lengths: Vec<Vec<f64>>,
     spectrum: Vec<SpectralPart>,
     pub(super) directions: LitDirections,
     /// The light that surfaces reflect; `None` if they let all light pass.
     pub(super) losses: Option<LensLosses>,
+    /// The displacements of image points by diffraction; `None` if it is left out.
+    pub(super) spreads: Option<PupilSpreads>,
 }
 
 impl TileSampler {
@@ -128,7 +138,16 @@ impl TileSampler {
             band.wavelengths.iter().map(lens).collect::<Result<Vec<_>, PictureError>>()
         };
         let lenses = bands.iter().map(of_band).collect::<Result<_, _>>()?;
-        Ok(Self { lenses, spectrum: spectrum(bands), directions, losses: None })
+        let length = |(wavelength, _): &(usize, f64)| image_wavelength(model, *wavelength);
+        let lengths = bands.iter().map(|band| band.wavelengths.iter().map(length).collect());
+        Ok(Self {
+            lenses,
+            lengths: lengths.collect(),
+            spectrum: spectrum(bands),
+            directions,
+            losses: None,
+            spreads: None,
+        })
     }
 
     /// The number of colours.
@@ -167,61 +186,74 @@ impl TileSampler {
         scene: MovingScene<'_>,
         is_stopped: &dyn Fn() -> bool,
     ) -> bool {
-        let mut queues: Vec<RayQueue> = self.spectrum.iter().map(|_| RayQueue::default()).collect();
+        // By part of the spectrum, each with the colours that share rays.
+        let bundles: Vec<Vec<Vec<ColorLight>>> =
+            self.spectrum.iter().map(|part| self.bundles(part)).collect();
+        let queue = |bundles: &Vec<Vec<ColorLight>>| {
+            bundles.iter().map(|_| RayQueue::default()).collect::<Vec<_>>()
+        };
+        let mut queues: Vec<Vec<RayQueue>> = bundles.iter().map(queue).collect();
         for sample in work.count..count {
             if is_stopped() {
                 return false;
             }
-            work.points.go_to(sample, scene.1 != 0.0);
-            self.launch(work, &mut queues, scene);
+            work.points.go_to(sample, scene.1 != 0.0, self.spreads.is_some());
+            for replicate in 0..REPLICATES {
+                let color = work.points.color(replicate);
+                let part = self.spectrum.partition_point(|part| part.end <= color);
+                let part = part.min(self.spectrum.len() - 1);
+                for (queue, lights) in queues[part].iter_mut().zip(&bundles[part]) {
+                    self.start(work, replicate, (lights[0], scene.1), queue);
+                    if queue.sets.len() >= BATCH {
+                        self.trace(work, queue, lights, scene.0);
+                    }
+                }
+            }
         }
-        for (queue, part) in queues.iter_mut().zip(&self.spectrum) {
-            self.trace(work, queue, part, scene.0);
-        }
+        let all = queues.iter_mut().flatten().zip(bundles.iter().flatten());
+        all.for_each(|(queue, lights)| self.trace(work, queue, lights, scene.0));
         work.count = count;
         work.sampled = self.estimate(work);
         true
     }
 
-    /// Queues the rays of a sample of all pixels and replicates.
-    fn launch(&self, work: &mut TileWork, queues: &mut [RayQueue], scene: MovingScene<'_>) {
-        let last = self.spectrum.len() - 1;
-        for replicate in 0..REPLICATES {
-            let color = work.points.color(replicate);
-            let part = self.spectrum.partition_point(|part| part.end <= color).min(last);
-            let queue = &mut queues[part];
-            self.start(work, replicate, (part, scene.1), queue);
-            if queue.sets.len() >= BATCH {
-                self.trace(work, queue, &self.spectrum[part], scene.0);
-            }
+    /// The colours of a part of the spectrum that share their rays: all, but each by itself with diffraction.
+    fn bundles(&self, part: &SpectralPart) -> Vec<Vec<ColorLight>> {
+        let lights = part.wavelengths.iter().copied().enumerate();
+        if self.spreads.is_some() {
+            lights.map(|light| vec![light]).collect()
+        } else {
+            vec![lights.collect()]
         }
     }
 
-    /// Queues the rays of a sample of all pixels in a replicate, but those from where it is dark.
+    /// Queues the rays of a sample of all pixels in a replicate for a colour, but those from where it is dark.
     fn start(
         &self,
         work: &TileWork,
         replicate: usize,
-        (part, seconds): (usize, f64),
+        ((color, wavelength), seconds): (ColorLight, f64),
         queue: &mut RayQueue,
     ) {
         // The rays of all wavelengths start alike.
-        let lens = &self.lenses[0][self.spectrum[part].wavelengths[0]];
+        let lens = &self.lenses[color][wavelength];
+        let length = self.lengths[color][wavelength];
         let step = work.frame.point([0, 0], [1.0; 2]);
         let corner = work.frame.point([0, 0], [0.0; 2]);
         let step = [step[0] - corner[0], step[1] - corner[1]];
         let first = replicate * work.tile.len();
-        let [right, down, across, along, time] =
+        let [right, down, across, along, time, near, far] =
             work.points.columns().map(|column| &column[first..]);
         for (i, (left, top)) in work.corners[0].iter().zip(&work.corners[1]).enumerate() {
-            let (x, y) = (left + step[0] * right[i], top + step[1] * down[i]);
-            let radius = (x * x + y * y).sqrt();
+            let mut point = [left + step[0] * right[i], top + step[1] * down[i]];
+            if let Some(spreads) = &self.spreads {
+                let (radius, axes) = polar(point);
+                let by = turned(spreads.draw(radius, length, [near[i], far[i]]), axes);
+                point = [point[0] + by[0], point[1] + by[1]];
+            }
+            let (radius, axes) = polar(point);
             let Some(drawn) = self.directions.draw(radius, [across[i], along[i]]) else { continue };
-            let inverse = 1.0 / radius;
-            let [ex, ey] = if radius > 0.0 { [x * inverse, y * inverse] } else { [0.0, 1.0] };
-            let [right, outwards] = drawn.cosines;
-            let turned = [right * ey + outwards * ex, outwards * ey - right * ex];
-            let Some((ray, share)) = lens.ray([x, y], turned) else { continue };
+            let Some((ray, share)) = lens.ray(point, turned(drawn.cosines, axes)) else { continue };
             queue.rays.push(ray);
             queue.sets.push(first + i);
             queue.weights.push(drawn.area * share);
@@ -233,11 +265,18 @@ impl TileSampler {
         }
     }
 
-    /// Traces the rays of a queue in every colour and adds their light.
-    fn trace(&self, work: &mut TileWork, queue: &mut RayQueue, part: &SpectralPart, scene: &Scene) {
+    /// Traces the rays of a queue in some colours and adds their light.
+    fn trace(
+        &self,
+        work: &mut TileWork,
+        queue: &mut RayQueue,
+        lights: &[ColorLight],
+        scene: &Scene,
+    ) {
         let colors = self.colors();
-        for (color, wavelength) in part.wavelengths.iter().enumerate() {
-            let lens = &self.lenses[color][*wavelength];
+        for (color, wavelength) in lights {
+            let (color, wavelength) = (*color, *wavelength);
+            let lens = &self.lenses[color][wavelength];
             lens.trace(&queue.rays, &mut queue.landings);
             work.fates.add(queue.landings.fates());
             lens.scene_rays(&queue.landings, &mut queue.outside);
@@ -246,7 +285,7 @@ impl TileSampler {
             if let Some(losses) = &self.losses {
                 let ways = queue.radii.iter().zip(&queue.cosines);
                 for (light, (radius, cosines)) in queue.light.iter_mut().zip(ways) {
-                    *light *= losses.passed([color, *wavelength], *radius, *cosines);
+                    *light *= losses.passed([color, wavelength], *radius, *cosines);
                 }
             }
             let rays = queue.sets.iter().zip(&queue.weights).zip(&queue.light);
@@ -276,6 +315,20 @@ impl TileSampler {
         }
         sampled
     }
+}
+
+/// The distance of a point from the axis, and the direction to it.
+#[inline(always)]
+fn polar([x, y]: [f64; 2]) -> (f64, [f64; 2]) {
+    let radius = (x * x + y * y).sqrt();
+    let inverse = 1.0 / radius;
+    (radius, if radius > 0.0 { [x * inverse, y * inverse] } else { [0.0, 1.0] })
+}
+
+/// A vector at a point of the y axis, turned to a point in a direction from the axis.
+#[inline(always)]
+fn turned([right, outwards]: [f64; 2], [ex, ey]: [f64; 2]) -> [f64; 2] {
+    [right * ey + outwards * ex, outwards * ey - right * ex]
 }
 
 /// The seed of a set of samples (the finalizer of `MurmurHash3`).

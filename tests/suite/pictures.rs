@@ -44,6 +44,10 @@ pub(crate) fn render(
     ExactRenderer::new(model, bands, scene, frame).unwrap().render(&settings, &go_on)
 }
 
+pub(crate) fn render_by(renderer: &ExactRenderer<'_>, settings: &ExactSettings) -> Picture {
+    renderer.render(settings, &go_on)
+}
+
 /// Exactly this many samples of each pixel.
 pub(crate) fn samples(count: usize) -> ExactSettings {
     ExactSettings { tolerance: -1.0, max_samples: count, ..ExactSettings::default() }

@@ -1,34 +1,36 @@
 //! `picture`: what a camera with a lens sees of a scene.
 
 mod device;
+mod effects;
+mod render;
 mod report;
+mod scene;
+mod sensor;
 
 pub(super) use device::DeviceChoice;
 
 use super::analyze::parse_coating;
 use super::error::CliError;
 use super::failures::Failures;
-use super::input::{LensFile, LoadedLens, Tolerance};
+use super::input::{LensFile, Tolerance};
 use super::output::{Output, print_note};
 use super::output_paths::OutputPaths;
-use super::progress::{progress_bar, stop_flag};
-use crate::analysis::{Coating, Estimate};
-use crate::files::{read_color, write_atomic};
-use crate::lens::{Lens, Object};
+use super::progress::stop_flag;
+use crate::analysis::Coating;
+use crate::files::write_atomic;
 use crate::measure::time_ms;
 use crate::picture::{
-    BitDepth, BuiltInScene, ColorBand, Coloring, ErrorMap, ExactRenderer, ExactSettings, Exposure,
-    GhostLight, GhostReport, ImageFrame, LightLosses, LossReport, MID_GREY, Picture, PictureError,
-    QuickPicture, QuickRenderer, Raster, Scene, SensorPreset, ToneCurve, encode_colors, encode_png,
-    field_diagonal, focused, omitted_beside, photon_count, picture_model, quick_error,
+    BitDepth, ColorBand, ErrorMap, FocusGroup, ImageFrame, IncludedEffects, OmittedEffect, Picture,
+    ToneCurve, encode_colors, encode_png, omitted_beside,
 };
 use crate::pupil::RayModel;
-use report::{ErrorMapReport, PictureReport, SensorReport};
+use render::RenderedPicture;
+use report::{ErrorMapReport, PictureReport};
+use sensor::SensorArgs;
+use serde::Serialize;
 use std::env;
-use std::ops::ControlFlow;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::process;
-use std::sync::atomic::{AtomicBool, Ordering};
 
 /// A picture of a scene through the lens, by rays traced backwards, with its error
 #[derive(Debug, clap::Args)]
@@ -37,7 +39,8 @@ pub(super) struct PictureArgs {
     #[command(flatten)]
     lens: LensFile,
 
-    /// The scene: white, target, star, edge, checkerboard, lights, still-life, or a PNG or JPEG file
+    /// The scene: white, target, star, edge, checkerboard, lights, still-life, a PNG or JPEG file, or a JSON
+    /// file of planes
     #[arg(long, value_name = "SCENE")]
     scene: String,
 
@@ -74,15 +77,27 @@ pub(super) struct PictureArgs {
     #[arg(long, value_name = "MM", allow_negative_numbers = true)]
     distance: Option<f64>,
 
+    /// The width in mm of a scene that is one plane at a finite distance; absent: it fills the frame
+    #[arg(long, value_name = "MM", allow_negative_numbers = true)]
+    size: Option<f64>,
+
     /// Focuses at this distance in front of the first surface in mm, by moving the image plane
     #[arg(long, value_name = "MM", allow_negative_numbers = true)]
     focus: Option<f64>,
+
+    /// Focuses at --focus by moving these surfaces, counted from 1, with the image plane at rest
+    #[arg(long, value_name = "FIRST..LAST", value_parser = parse_group, requires = "focus")]
+    focus_group: Option<FocusGroup>,
 
     /// The coating of all surfaces between air and glass: none (bare glass), single-layer, v, or a reflected
     /// share as `0.3%`; with it losses count, of glasses that absorb light too, and ghosts where they matter.
     /// Absent: nothing is lost
     #[arg(long, value_name = "COATING", value_parser = parse_coating)]
     coating: Option<Coating>,
+
+    /// Prints every effect with its number, its limit and the time that leaving it out saves, measured
+    #[arg(long)]
+    effects: bool,
 
     /// Writes a map of the error into this file too, PNG: black without error, white at the largest
     #[arg(long, value_name = "FILE")]
@@ -116,31 +131,20 @@ pub(super) struct PictureArgs {
     zoom: usize,
 }
 
-/// The sensor that a picture falls on.
-#[derive(Debug, clap::Args)]
-struct SensorArgs {
-    /// Shows the numbers of a sensor with its noise: canon-7d, phone or industrial
-    #[arg(long, value_name = "NAME")]
-    sensor: Option<String>,
-
-    /// Gives the pixels of the sensor one colour filter each (Bayer) and interpolates the others
-    #[arg(long, requires = "sensor")]
-    bayer: bool,
-
-    /// The exposure time in seconds; absent: until white fills 80 % of the range of the sensor
-    #[arg(long, value_name = "S", requires = "sensor")]
-    seconds: Option<f64>,
-
-    /// The luminance of white in the scene in cd/m2; absent: 100, and 1 for still-life
-    #[arg(long, value_name = "CD")]
-    luminance: Option<f64>,
-}
-
 /// The numbers of columns and rows.
 pub(super) fn parse_pixels(text: &str) -> Result<[usize; 2], String> {
     let count = |part: &str| part.trim().parse::<usize>().ok().filter(|n| (1..=16_384).contains(n));
     let pair = text.split_once('x').and_then(|(w, h)| Some([count(w)?, count(h)?]));
     pair.ok_or_else(|| "expected columns and rows from 1 to 16384, as in `480x320`".to_owned())
+}
+
+/// The surfaces of a focus group.
+fn parse_group(text: &str) -> Result<FocusGroup, String> {
+    let index = |part: &str| part.trim().parse::<usize>().ok()?.checked_sub(1);
+    let pair = text.split_once("..").and_then(|(a, b)| Some((index(a)?, index(b)?)));
+    let group = pair.filter(|(first, last)| first <= last);
+    let group = group.map(|(first, last)| FocusGroup { first, last });
+    group.ok_or_else(|| "expected the first and the last surface, as in `7..10`".to_owned())
 }
 
 /// A tone curve.
@@ -150,35 +154,25 @@ fn parse_tone_curve(text: &str) -> Result<ToneCurve, String> {
     curve.ok_or_else(|| "expected srgb, or a number from 0.1 to 10".to_owned())
 }
 
-/// The distance in mm at which a scene with depth is placed and focused if none is given.
-const NEAR: f64 = 1000.0;
-
-/// The tiles on which the quick way is compared with the exact one, and the samples of their pixels.
-const CHECKED_TILES: usize = 24;
-const CHECKED_SAMPLES: usize = 128;
-/// The samples of a pixel for the map of the error.
-const MAPPED_SAMPLES: usize = 64;
-
-/// The number of steps of the progress bar.
-const STEPS: usize = 1000;
-
 impl PictureArgs {
     pub(super) fn run(&self, output: &Output) -> Result<(), CliError> {
         let lens = [("the lens", self.lens.path())];
-        let scene = self.scene_file().map(|file| ("the scene", file));
-        let mut paths = OutputPaths::reading(lens.into_iter().chain(scene));
+        let scene = self.scene_path().map(|file| ("the scene", file));
+        let sensor_file = self.exposed.file().map(|file| ("the sensor", file));
+        let mut paths = OutputPaths::reading(lens.into_iter().chain(scene).chain(sensor_file));
         paths.file("--out", Some(&self.out), &["png"])?;
         paths.file("--error-map", self.error_map.as_deref(), &["png"])?;
-        let sensor = self.sensor_preset()?;
+        let source = self.scene_source()?;
+        let sensor = self.exposed.sensor()?;
         if !self.exact {
             self.device.install()?;
         }
         let opened = self.lens.open()?;
         opened.check_zoom(self.zoom)?;
-        let (picture, ms) = time_ms(|| self.render(&opened, &stop_flag()));
+        let (picture, ms) = time_ms(|| self.render(&opened, &source, &stop_flag()));
         let (rendered, shot) = picture?;
         let picture = rendered.picture.clone();
-        let exposed = sensor.map(|preset| self.expose(preset, &picture));
+        let exposed = sensor.map(|sensor| self.expose(sensor, &source, &picture));
         let mut report = self.report(&rendered, &shot, ms);
         let shown = exposed.map_or(picture, |(image, exposed)| {
             report.sensor = Some(exposed);
@@ -189,82 +183,6 @@ impl PictureArgs {
         failures.note(self.save_error_map(rendered.error_map.as_ref()));
         failures.note(output.print(&report));
         failures.into_result()
-    }
-
-    fn built_in(&self) -> Option<BuiltInScene> {
-        BuiltInScene::ALL.iter().find(|(_, name)| *name == self.scene).map(|(scene, _)| *scene)
-    }
-
-    /// The file of the scene; `None` for a built-in one.
-    fn scene_file(&self) -> Option<&Path> {
-        self.built_in().is_none().then_some(Path::new(&self.scene))
-    }
-
-    /// The lens as it is focused, and the distance of the focus; `None` at infinity.
-    fn focused_lens(&self, opened: &LoadedLens) -> Result<(Lens, Option<f64>), PictureError> {
-        let needs_depth = self.built_in().is_some_and(BuiltInScene::has_depth);
-        let near = match opened.lens.object {
-            Object::Infinity => needs_depth.then_some(NEAR),
-            Object::Finite(_) => None,
-        };
-        match (self.focus.or(near), opened.lens.object) {
-            (Some(distance), _) => {
-                let lens = focused(&opened.lens, self.zoom, distance)?;
-                Ok((lens, Some(distance)))
-            }
-            (None, Object::Finite(distance)) => Ok((opened.lens.clone(), Some(distance))),
-            (None, Object::Infinity) => Ok((opened.lens.clone(), None)),
-        }
-    }
-
-    fn render(
-        &self,
-        opened: &LoadedLens,
-        stop: &AtomicBool,
-    ) -> Result<(RenderedPicture, CameraShot), CliError> {
-        let refuse = |error: PictureError| CliError::Input(format!("{}: {error}", opened.file));
-        let shot = self.shot(opened).map_err(refuse)?;
-        let scene = self.scene(&shot)?.map_err(refuse)?;
-        let CameraShot { model, bands, frame, .. } = &shot;
-        let renderer = ExactRenderer::new(model, bands, &scene, *frame).map_err(refuse)?;
-        let renderer = match self.coating {
-            Some(coating) => {
-                let taken = LightLosses { coating, glasses: Some(&opened.lens) };
-                renderer.with_losses(model, bands, taken, self.error.0)
-            }
-            None => Ok(renderer),
-        };
-        let renderer = renderer.map_err(refuse)?;
-        let quick = if self.exact { None } else { Some(quick_picture(&shot, &renderer, stop)) };
-        let quick = quick.transpose().map_err(refuse)?;
-        let is_stopped = || stop.load(Ordering::Relaxed);
-        let is_kept = |quick: &RenderedPicture| {
-            self.quick || quick.error.value <= self.error.0 || is_stopped()
-        };
-        let picture = quick.filter(is_kept);
-        let picture = picture.unwrap_or_else(|| self.exact_picture(&renderer, stop));
-        let map = |picture: &Picture| {
-            ErrorMap::measure_until(&renderer, picture, (usize::MAX, MAPPED_SAMPLES), is_stopped)
-        };
-        let error_map = self.error_map.as_ref().map(|_| map(&picture.picture));
-        // A part is no map.
-        let error_map = error_map.filter(ErrorMap::is_whole);
-        let losses = renderer.losses().cloned();
-        let mut picture = RenderedPicture { error_map, losses, ..picture };
-        if let Some(coating) = self.coating.filter(|_| !is_stopped()) {
-            let light = (coating, self.error.0);
-            let (ghosts, ms) =
-                time_ms(|| GhostLight::new((model, bands), &scene, &picture.picture, light));
-            let ghosts = ghosts.map_err(refuse)?;
-            ghosts.add_to(&mut picture.picture);
-            picture.ghosts = Some((ghosts.report, ms));
-        }
-        if !picture.picture.complete {
-            print_note("note: stopped; what was not sampled is black");
-        } else if is_stopped() {
-            print_note("note: stopped; an error map, ghosts or an exact picture may be missing");
-        }
-        Ok((picture, shot))
     }
 
     /// Writes the map of the error if that is asked for.
@@ -278,154 +196,83 @@ impl PictureArgs {
         Ok(write_atomic(path, &bytes)?)
     }
 
-    fn exact_picture(&self, renderer: &ExactRenderer<'_>, stop: &AtomicBool) -> RenderedPicture {
-        let settings = ExactSettings {
-            tolerance: self.error.0,
-            max_samples: self.max_samples,
-            seed: self.seed,
-            seconds: 0.0,
-        };
-        let bar = progress_bar(STEPS);
-        let watch = |done: f64| {
-            bar.set_position((STEPS as f64 * done) as u64);
-            if stop.load(Ordering::Relaxed) {
-                ControlFlow::Break(())
-            } else {
-                ControlFlow::Continue(())
-            }
-        };
-        let picture = renderer.render(&settings, &watch);
-        bar.finish_and_clear();
-        let error = Estimate::new(picture.rms_error(), 0.0, 0);
-        RenderedPicture::new(picture, error, "exact")
-    }
-
-    fn shot(&self, opened: &LoadedLens) -> Result<CameraShot, PictureError> {
-        let coloring = if self.gray { Coloring::Gray } else { Coloring::Rgb(3) };
-        let (lens, focus) = self.focused_lens(opened)?;
-        let unfocused = RayModel::from_lens(&opened.lens, self.zoom)?;
-        let diagonal = self.diagonal.map_or_else(|| field_diagonal(&unfocused), Ok)?;
-        let (model, bands) = picture_model(&lens, self.zoom, coloring)?;
-        let frame = ImageFrame::new(&model, self.pixels, diagonal)?;
-        Ok(CameraShot { model, bands, frame, focus, distance: self.distance.or(focus) })
-    }
-
-    /// The scene; the outer error is that of its file.
-    fn scene(&self, shot: &CameraShot) -> Result<Result<Scene, PictureError>, CliError> {
-        let CameraShot { model, frame, distance, .. } = shot;
-        if let Some(scene) = self.built_in() {
-            return Ok(scene.build(model, frame, *distance));
-        }
-        let path = Path::new(&self.scene);
-        if !path.exists() {
-            let names = BuiltInScene::ALL.map(|(_, name)| name).join(", ");
-            let text = format!(
-                "--scene: no scene or file `{}`; expected {names}, or a PNG or JPEG file",
-                self.scene
-            );
-            return Err(CliError::Input(text));
-        }
-        let raster = Raster::new(read_color(path)?);
-        Ok(Scene::of_raster(raster, model, frame, *distance))
-    }
-
-    /// The sensor, and a check of the numbers that belong to it.
-    fn sensor_preset(&self) -> Result<Option<&'static SensorPreset>, CliError> {
-        let is_positive = |v: &f64| *v > 0.0 && v.is_finite();
-        if let Some(wrong) = self.exposed.luminance.filter(|v| !is_positive(v)) {
-            let text = format!("--luminance: found {wrong}; expected a positive number of cd/m2");
-            return Err(CliError::Input(text));
-        }
-        if let Some(wrong) = self.exposed.seconds.filter(|v| !(*v >= 0.0 && v.is_finite())) {
-            return Err(CliError::Input(format!("--seconds: found {wrong}; expected 0 or more")));
-        }
-        let Some(name) = &self.exposed.sensor else { return Ok(None) };
-        let Some(preset) = SensorPreset::find(name) else {
-            let names = SensorPreset::ALL.map(|preset| preset.name).join(", ");
-            let text = format!("--sensor: no sensor `{name}`; expected one of {names}");
-            return Err(CliError::Input(text));
-        };
-        Ok(Some(preset))
-    }
-
-    /// The picture as a sensor sees it.
-    fn expose(&self, preset: &'static SensorPreset, picture: &Picture) -> (Picture, SensorReport) {
-        let of_scene = if self.built_in() == Some(BuiltInScene::StillLife) { 1.0 } else { 100.0 };
-        let luminance = self.exposed.luminance.unwrap_or(of_scene);
-        let sensor = &preset.model;
-        let seconds =
-            self.exposed.seconds.unwrap_or_else(|| sensor.normal_exposure(picture, luminance));
-        let exposure = Exposure { luminance, seconds, seed: u64::from(self.seed) };
-        let mut image = sensor.expose(picture, &exposure);
-        if self.exposed.bayer {
-            image = image.through_filters(picture.frame.pixels[0]);
-        }
-        let photons = |level: f64| {
-            photon_count(level * luminance * picture.white, picture.frame.pitch, seconds)
-        };
-        let dark = sensor.dark_current * seconds;
-        let report = SensorReport {
-            name: preset.name,
-            source: preset.source,
-            model: *sensor,
-            bayer: self.exposed.bayer,
-            luminance,
-            seconds,
-            white_photons: photons(1.0),
-            signal_to_noise: [1.0, MID_GREY, 0.01]
-                .map(|v| sensor.signal_to_noise(photons(v), dark)),
-            saturated: image.saturated,
-        };
-        (image.develop(picture), report)
-    }
-
     fn report(
         &self,
         rendered: &RenderedPicture,
         shot: &CameraShot,
         milliseconds: f64,
     ) -> PictureReport {
-        let RenderedPicture { picture, error, way, device, error_map, losses, ghosts } = rendered;
-        let found = ghosts.as_ref().map(|(report, _)| report);
+        let RenderedPicture { picture, sampling, split, way, device, error_map, .. } = rendered;
+        let found = rendered.ghosts.as_ref().map(|(report, _)| report);
         let pixels = (picture.frame.pixels[0] * picture.frame.pixels[1]) as f64;
+        let included = IncludedEffects {
+            diffraction: rendered.diffraction.as_ref(),
+            losses: rendered.losses.as_ref(),
+            ghosts: found,
+        };
         PictureReport {
             scene: self.scene.clone(),
             pixels: picture.frame.pixels,
             size: picture.frame.size(),
             focus: shot.focus,
+            focus_group: shot.group,
             distance: shot.distance,
             way,
             device: device.clone(),
-            error: error.value,
-            error_of_error: error.error,
+            error: split.error(),
+            error_of_error: sampling.error,
+            errors: split.shares().to_vec(),
             tolerance: self.error.0,
-            reached: picture.reached && error.value <= self.error.0,
+            reached: picture.reached && split.error() <= self.error.0,
             complete: picture.complete,
             white: picture.white,
             mean: picture.mean(),
             rays: picture.rays,
             rays_per_pixel: picture.rays as f64 / pixels,
             fates: picture.fates,
-            left_out: omitted_beside(
-                &shot.model,
-                &picture.frame,
-                self.error.0,
-                (losses.as_ref(), found),
-            ),
-            losses: losses.clone(),
+            left_out: self.left_out(rendered, shot, included),
+            diffraction: rendered.diffraction.clone(),
+            losses: rendered.losses.clone(),
             ghosts: found.cloned(),
-            ghosts_milliseconds: ghosts.as_ref().map(|(_, ms)| *ms),
+            ghosts_milliseconds: rendered.ghosts.as_ref().map(|(_, ms)| *ms),
             error_map: error_map.as_ref().map(|map| ErrorMapReport {
                 tiles: map.tiles(),
                 error: map.rms().value,
                 error_of_error: map.rms().error,
                 largest: map.largest(),
             }),
+            gates: rendered.gates.clone(),
             sensor: None,
-            quick_milliseconds: error.milliseconds,
+            quick_milliseconds: sampling.milliseconds,
             milliseconds,
             out: Some(self.out.display().to_string()),
         }
+    }
+
+    /// The effects that are not in the picture.
+    fn left_out(
+        &self,
+        rendered: &RenderedPicture,
+        shot: &CameraShot,
+        included: IncludedEffects<'_>,
+    ) -> Vec<OmittedEffect> {
+        let frame = &rendered.picture.frame;
+        let mut left_out = omitted_beside(&shot.model, frame, self.error.0, included);
+        if let Some(colors) = rendered.colors.filter(|colors| colors.count == 1) {
+            left_out.push(OmittedEffect {
+                effect: "change of wavelength within a colour",
+                change: Some(colors.change),
+                reason: "of some tiles with three wavelengths instead of one",
+            });
+        }
+        let off =
+            rendered.gates.iter().flatten().filter(|gate| !gate.on && gate.effect == "motion");
+        left_out.extend(off.map(|gate| OmittedEffect {
+            effect: gate.effect,
+            change: None,
+            reason: gate.reason,
+        }));
+        left_out
     }
 
     fn save(&self, picture: &Picture, report: &PictureReport) -> Result<String, CliError> {
@@ -449,45 +296,6 @@ impl PictureArgs {
     }
 }
 
-/// A picture by the quick way, with its error against the exact way on some of its tiles.
-fn quick_picture(
-    shot: &CameraShot,
-    exact: &ExactRenderer<'_>,
-    stop: &AtomicBool,
-) -> Result<RenderedPicture, PictureError> {
-    let quick = QuickRenderer::new(&shot.model, &shot.bands, exact)?;
-    let (made, ms) = time_ms(|| quick.render_fast(stop));
-    let QuickPicture { mut picture, device, refused } = made;
-    if let Some(why) = refused {
-        print_note(format!("note: {why}; the processor made the picture"));
-    }
-    let error = quick_error(exact, &picture, CHECKED_TILES, CHECKED_SAMPLES);
-    picture.rays = error.rays;
-    let error = Estimate { milliseconds: Some(ms), ..error };
-    Ok(RenderedPicture { device, ..RenderedPicture::new(picture, error, "quick") })
-}
-
-/// A picture with its error.
-struct RenderedPicture {
-    picture: Picture,
-    /// As a share of mid grey, or of the pixel where that is brighter; with the milliseconds of the
-    /// picture without its preparation and its error where it is made the quick way.
-    error: Estimate,
-    way: &'static str,
-    /// The name of the graphics card that made it; `None` for the processor.
-    device: Option<String>,
-    error_map: Option<ErrorMap>,
-    losses: Option<LossReport>,
-    /// With the time in milliseconds.
-    ghosts: Option<(GhostReport, f64)>,
-}
-
-impl RenderedPicture {
-    const fn new(picture: Picture, error: Estimate, way: &'static str) -> Self {
-        Self { picture, error, way, device: None, error_map: None, losses: None, ghosts: None }
-    }
-}
-
 /// A lens focused for a picture, with its sensor.
 struct CameraShot {
     model: RayModel,
@@ -497,4 +305,15 @@ struct CameraShot {
     focus: Option<f64>,
     /// The distance of the scene in mm; `None` at infinity.
     distance: Option<f64>,
+    /// The way of the focus group, if one moves.
+    group: Option<GroupMotion>,
+}
+
+/// The way of a focus group.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+struct GroupMotion {
+    /// Towards the image in mm.
+    shift: f64,
+    /// The change of the field of view.
+    breathing: f64,
 }

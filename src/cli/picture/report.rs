@@ -1,7 +1,10 @@
 //! The printed result of `picture`.
 
+use super::GroupMotion;
 use crate::cli::output::ShortNumber;
-use crate::picture::{GhostReport, LossReport, OmittedEffect, SensorModel};
+use crate::picture::{
+    DiffractionReport, ErrorShare, GhostReport, LossReport, OmittedEffect, PictureGate, SensorModel,
+};
 use crate::trace::Fates;
 use serde::Serialize;
 use std::fmt::{self, Display};
@@ -13,11 +16,13 @@ pub(super) struct PictureReport {
     pub(super) pixels: [usize; 2],
     pub(super) size: [f64; 2],
     pub(super) focus: Option<f64>,
+    pub(super) focus_group: Option<GroupMotion>,
     pub(super) distance: Option<f64>,
     pub(super) way: &'static str,
     pub(super) device: Option<String>,
     pub(super) error: f64,
     pub(super) error_of_error: f64,
+    pub(super) errors: Vec<ErrorShare>,
     pub(super) tolerance: f64,
     pub(super) reached: bool,
     pub(super) complete: bool,
@@ -27,10 +32,12 @@ pub(super) struct PictureReport {
     pub(super) rays_per_pixel: f64,
     pub(super) fates: Fates,
     pub(super) left_out: Vec<OmittedEffect>,
+    pub(super) diffraction: Option<DiffractionReport>,
     pub(super) losses: Option<LossReport>,
     pub(super) ghosts: Option<GhostReport>,
     pub(super) ghosts_milliseconds: Option<f64>,
     pub(super) error_map: Option<ErrorMapReport>,
+    pub(super) gates: Option<Vec<PictureGate>>,
     pub(super) sensor: Option<SensorReport>,
     pub(super) quick_milliseconds: Option<f64>,
     pub(super) milliseconds: f64,
@@ -49,8 +56,8 @@ pub(super) struct ErrorMapReport {
 /// The exposure of a sensor.
 #[derive(Serialize)]
 pub(super) struct SensorReport {
-    pub(super) name: &'static str,
-    pub(super) source: &'static str,
+    pub(super) name: String,
+    pub(super) source: String,
     #[serde(flatten)]
     pub(super) model: SensorModel,
     pub(super) bayer: bool,
@@ -77,6 +84,34 @@ impl Display for SensorReport {
 }
 
 impl PictureReport {
+    /// The part of the tolerance that each effect uses.
+    fn write_errors(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for ErrorShare { effect, allowed, used } in &self.errors {
+            let (used, allowed) = (100.0 * used, 100.0 * allowed);
+            write!(f, "  {effect} {used:.3} % (its share {allowed:.3} %)")?;
+            match (*effect, self.quick_milliseconds) {
+                ("sampling", Some(ms)) => {
+                    let error = 100.0 * self.error_of_error;
+                    let device = self.device.as_deref().unwrap_or("the processor");
+                    write!(f, ": ± {error:.3} %, against the exact way on some tiles; ")?;
+                    writeln!(f, "made in {ms:.0} ms on {device}")?;
+                }
+                _ => writeln!(f)?,
+            }
+        }
+        match &self.diffraction {
+            Some(DiffractionReport { on: true, change, left, cut, points, reason, .. }) => {
+                let [change, left, cut] = [change, left, cut].map(|share| 100.0 * share);
+                writeln!(
+                    f,
+                    "diffraction on: contrast changes by up to {change:.2} %, {left:.2} % are left, {cut:.2} % of \
+                     the light is cut off, at {points} points: {reason}"
+                )
+            }
+            _ => Ok(()),
+        }
+    }
+
     /// The losses, the ghosts and the map of the error.
     fn write_reflections(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let percent = |share: f64| 100.0 * share;
@@ -113,23 +148,20 @@ impl Display for PictureReport {
         };
         let ([width, height], [columns, rows]) = (self.size, self.pixels);
         writeln!(f, "{} at {}, focus at {}", self.scene, place(self.distance), place(self.focus))?;
+        if let Some(GroupMotion { shift, breathing }) = self.focus_group {
+            let (shift, breathing) = (ShortNumber(shift), 100.0 * breathing);
+            writeln!(
+                f,
+                "focused by a group that moves {shift} mm; breathing: {breathing:+.2} % of the field of view"
+            )?;
+        }
         writeln!(f, "{columns} x {rows} pixels on {width:.3} x {height:.3} mm")?;
         let reached = if self.reached { "" } else { ", not reached" };
         let percent = 100.0 * self.tolerance;
-        let of_quick = self.quick_milliseconds.map(|ms| {
-            let error = 100.0 * self.error_of_error;
-            let device = self.device.as_deref().unwrap_or("the processor");
-            format!(
-                " ± {error:.3} %, against the exact way on some tiles; made in {ms:.0} ms on {device}"
-            )
-        });
-        let of_quick = of_quick.unwrap_or_else(|| " by sampling".to_owned());
-        writeln!(
-            f,
-            "error {:.3} % of mid grey (rms){of_quick}; asked for {} %{reached}",
-            100.0 * self.error,
-            ShortNumber(percent)
-        )?;
+        let tolerance = ShortNumber(percent);
+        let error = 100.0 * self.error;
+        writeln!(f, "error {error:.3} % of mid grey (rms); asked for {tolerance} %{reached}")?;
+        self.write_errors(f)?;
         writeln!(
             f,
             "on-axis image irradiance of a white card: {} of its radiance",
@@ -150,9 +182,23 @@ impl Display for PictureReport {
             let change = change.map(|c| format!("{:.2} %, ", 100.0 * c)).unwrap_or_default();
             writeln!(f, "left out: {effect} ({change}{reason})")?;
         }
+        self.gates.iter().flatten().try_for_each(|gate| write_gate(f, gate))?;
         self.sensor.iter().try_for_each(|sensor| write!(f, "{sensor}"))?;
         self.out.as_ref().map_or(Ok(()), |out| writeln!(f, "saved as {out}"))
     }
+}
+
+/// The line of an effect.
+fn write_gate(f: &mut fmt::Formatter<'_>, gate: &PictureGate) -> fmt::Result {
+    let PictureGate { effect, on, number, unit, limit, reason, saved_milliseconds } = gate;
+    let state = if *on { "on " } else { "off" };
+    let number = number.map_or("unknown".to_owned(), |v| ShortNumber(v).to_string());
+    let saved = saved_milliseconds.map(|ms| {
+        let word = if *on { "would save" } else { "saves" };
+        format!("; off {word} {ms:.1} ms, measured on some tiles")
+    });
+    let saved = saved.unwrap_or_default();
+    writeln!(f, "{state} {effect}: {number} of {} {unit} ({reason}{saved})", ShortNumber(*limit))
 }
 
 /// The line of what surfaces and glasses take away.

@@ -11,6 +11,7 @@
 //! the scene is even, many where it has details as fine as the structure of spots. A graphics card does the same sums, where one is installed.
 
 mod blocks;
+mod blur;
 mod packed;
 mod plan;
 mod sums;
@@ -25,6 +26,7 @@ use super::{ColorBand, ImageFrame, Picture, PictureError};
 use crate::pupil::RayModel;
 use crate::trace::Fates;
 use blocks::{PictureBlock, blocks};
+use blur::FrameBlur;
 use plan::{BlockPlan, PlanSource, ScenePlane};
 use rayon::prelude::*;
 use std::sync::Arc;
@@ -65,6 +67,8 @@ pub struct QuickRenderer {
     background: [f64; 3],
     white: f64,
     overshoot: f64,
+    /// Diffraction, which needs a wider frame than is shown.
+    blur: Option<FrameBlur>,
 }
 
 /// A table, and what it shows of the scene.
@@ -103,7 +107,9 @@ impl QuickRenderer {
         bands: &[ColorBand],
         subject: &PictureSubject<'_>,
     ) -> Result<Self, PictureError> {
-        let PictureSubject { scene, frame, directions, losses, white } = *subject;
+        let PictureSubject { scene, frame, directions, losses, white, spreads } = *subject;
+        let blur = spreads.map(|spreads| FrameBlur::new(model, bands, spreads, frame));
+        let frame = blur.as_ref().map_or(frame, FrameBlur::rendered);
         let reach = frame.reach();
         let radii = (reach / frame.pitch / INTERVAL) as usize;
         let radii = radii.clamp(RADII[1], RADII[0]);
@@ -131,7 +137,7 @@ impl QuickRenderer {
         let levels = tables.into_iter().map(level).collect();
         let background = [0, 1, 2].map(|color| scene.seen_background(color, colors));
         let overshoot = directions.overshoot;
-        Ok(Self { frame, colors, levels, background, white, overshoot })
+        Ok(Self { frame, colors, levels, background, white, overshoot, blur })
     }
 
     /// The picture by the processor.
@@ -258,8 +264,12 @@ impl QuickRenderer {
     }
 
     fn picture(&self, values: Vec<[f64; 3]>) -> Picture {
+        let (frame, values) = match &self.blur {
+            Some(blur) => (blur.shown, blur.apply(&values)),
+            None => (self.frame, values),
+        };
         Picture {
-            frame: self.frame,
+            frame,
             errors: vec![[0.0; 3]; values.len()],
             values,
             white: self.white,

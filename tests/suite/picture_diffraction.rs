@@ -1,0 +1,153 @@
+//! Diffraction in pictures: against closed forms through a telescope without aberrations on its axis, and its
+//! gate.
+
+use super::cli::{done, done_json};
+use super::cli_files::Folder;
+use super::pictures::{bundled, render_by, samples};
+use aplanat::lens::Lens;
+use aplanat::picture::{
+    Coloring, ExactRenderer, ImageFrame, Pattern, Picture, QuickRenderer, Scene, SceneLayer,
+    picture_model, quick_error,
+};
+use std::f64::consts::PI;
+
+const RC: &str = "telescope_rc_f8";
+/// λF in mm of that telescope: 0.55 um at f/8.
+const LAMBDA_F: f64 = 0.55e-3 * 8.0;
+const EFL: f64 = 8.0 * 3962.4;
+
+/// A square light at infinity whose image has this side in mm.
+fn light(side: f64) -> Scene {
+    let layer = SceneLayer {
+        distance: None,
+        center: [0.0; 2],
+        half_size: [0.5 * side / EFL; 2],
+        velocity: [0.0; 2],
+        pattern: Pattern::Uniform { radiance: [1.0; 3], cover: 1.0 },
+    };
+    Scene::new(vec![layer], [0.0; 3], 1.0).unwrap()
+}
+
+/// The picture of a light as large as a pixel, in grey.
+fn picture_of_light(lens: &Lens, count: usize, pitch: f64, many: usize) -> Picture {
+    let (model, bands) = picture_model(lens, 0, Coloring::Gray).unwrap();
+    let frame = ImageFrame { pixels: [count; 2], pitch, center: [0.0; 2], inverted: true };
+    let scene = light(pitch);
+    let renderer = ExactRenderer::new(&model, &bands, &scene, frame).unwrap();
+    let renderer = renderer.with_diffraction(&model, &bands, 0.01).unwrap();
+    let report = renderer.diffraction().unwrap();
+    println!("{report:?}");
+    assert!(report.on && report.change > 0.3 && report.left < 5e-3, "{report:?}");
+    render_by(&renderer, &samples(many))
+}
+
+/// J1 by its integral.
+fn bessel(x: f64) -> f64 {
+    let at = |i: u32| {
+        let t = PI * (f64::from(i) + 0.5) / 64.0;
+        (t - x * t.sin()).cos()
+    };
+    (0..64).map(at).sum::<f64>() / 64.0
+}
+
+/// The share of the light of a point in 1/mm² at a distance in mm, behind an aperture with a dark middle of this
+/// ratio of radii (Airy).
+fn airy(distance: f64, ratio: f64) -> f64 {
+    let x = PI * distance.max(1e-9) / LAMBDA_F;
+    let field = 2.0 * (bessel(x) - ratio * bessel(ratio * x)) / x;
+    PI / (4.0 * LAMBDA_F * LAMBDA_F) * field * field / (1.0 - ratio * ratio)
+}
+
+/// The share of a square light that falls on a pixel of the same side, so far to the right and down.
+fn on_pixel([right, down]: [f64; 2], pitch: f64, ratio: f64) -> f64 {
+    let steps = 6;
+    let place = |i: i32| pitch * ((f64::from(i) + 0.5) / f64::from(steps) - 1.0);
+    // The convolution of two squares is a tent.
+    let tent = |v: f64| (1.0 - v.abs() / pitch).max(0.0);
+    let mut sum = 0.0;
+    for i in 0..2 * steps {
+        for j in 0..2 * steps {
+            let (x, y) = (place(i), place(j));
+            sum += tent(x) * tent(y) * airy((right + x).hypot(down + y), ratio);
+        }
+    }
+    sum * (pitch / f64::from(steps)).powi(2)
+}
+
+fn compare(lens: &Lens, ratio: f64) {
+    let (count, pitch) = (11, 1.5e-3);
+    let picture = picture_of_light(lens, count, pitch, 1 << 12);
+    let from_middle = |i: usize| (i as f64 - 5.0) * pitch;
+    let (mut sum, mut all) = (0.0, 0.0);
+    for (i, value) in picture.values.iter().enumerate() {
+        let at = [from_middle(i % count), from_middle(i / count)];
+        let exact = on_pixel(at, pitch, ratio);
+        let (found, error) = (value[0] / picture.white, picture.errors[i][0] / picture.white);
+        let peak = on_pixel([0.0; 2], pitch, ratio);
+        assert!(
+            (found - exact).abs() < 6.0 * error + 0.01 * peak,
+            "{at:?}: {found} {exact} {error}"
+        );
+        sum += found;
+        all += exact;
+    }
+    assert!((sum / all - 1.0).abs() < 0.01, "{sum} {all}");
+}
+
+#[test]
+fn a_small_light_is_an_airy_disc() {
+    compare(&bundled(RC), 0.0);
+}
+
+#[test]
+fn behind_a_ring_it_has_the_rings_of_one() {
+    let mut lens = bundled(RC);
+    lens.surfaces[0].obstruction = Some(0.5 * 1981.2);
+    compare(&lens, 0.5);
+}
+
+/// The quick way spreads light alike, and light is neither lost nor made.
+#[test]
+fn the_quick_way_spreads_light_as_the_exact_one() {
+    let (model, bands) = picture_model(&bundled(RC), 0, Coloring::Rgb(1)).unwrap();
+    let frame = ImageFrame { pixels: [40; 2], pitch: 4e-3, center: [0.0; 2], inverted: true };
+    let scene = light(40e-3);
+    let exact = ExactRenderer::new(&model, &bands, &scene, frame).unwrap();
+    let sharp = QuickRenderer::new(&model, &bands, &exact).unwrap().render();
+    let exact = exact.with_diffraction(&model, &bands, 0.01).unwrap();
+    let quick = QuickRenderer::new(&model, &bands, &exact).unwrap().render();
+    assert_eq!(quick.frame, frame);
+    let [spread, geometric] = [&quick, &sharp].map(|p| quick_error(&exact, p, 9, 512).value);
+    println!("quick {spread}, without {geometric}");
+    assert!(spread < 0.05 && geometric > 4.0 * spread, "{spread} {geometric}");
+    assert!((quick.mean() / sharp.mean() - 1.0).abs() < 0.05, "{} {}", quick.mean(), sharp.mean());
+}
+
+/// The error of a picture holds what diffraction leaves, and says what it is.
+#[test]
+fn a_picture_says_what_diffraction_changes() {
+    let folder = Folder::new("picture-diffraction");
+    let out = folder.path("star.png");
+    let base = ["picture", "lenses/telescope_rc_f8.json", "--scene", "star", "--out", &out];
+    let small = ["--diagonal", "0.2", "--pixels", "24x24", "--gray", "--error", "6%"];
+    let report = done_json(&[&base[..], &small].concat(), "");
+    let number = |value: &serde_json::Value| value.as_f64().unwrap();
+    let found = &report["diffraction"];
+    assert_eq!(found["on"], true, "{report}");
+    assert!(number(&found["change"]) > 0.3 && number(&found["left"]) < 0.01, "{found}");
+    assert!(report["left_out"].as_array().unwrap().iter().all(|e| e["effect"] != "diffraction"));
+    let errors = report["errors"].as_array().unwrap();
+    assert_eq!([&errors[0]["effect"], &errors[1]["effect"]], ["sampling", "diffraction"]);
+    let square: f64 = errors.iter().map(|error| number(&error["used"]).powi(2)).sum();
+    assert!((square.sqrt() - number(&report["error"])).abs() < 1e-12);
+    assert_eq!(report["reached"], number(&report["error"]) <= 0.06);
+    // An achromat with a part of a wavelength of aberrations has another spread than its pupil.
+    let base = ["picture", "lenses/achromat_ac254_100.json", "--scene", "star", "--out", &out];
+    let small = ["--diagonal", "0.1", "--pixels", "16x16", "--gray", "--quick"];
+    let report = done_json(&[&base[..], &small].concat(), "");
+    let left = number(&report["diffraction"]["left"]);
+    assert!(left > 0.01 && report["reached"] == false, "{report}");
+    assert!(number(&report["error"]) >= left);
+    let text = done(&[&base[..], &small].concat(), "");
+    assert!(text.contains("not reached") && text.contains("  diffraction "), "{text}");
+}
