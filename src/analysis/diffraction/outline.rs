@@ -19,15 +19,35 @@ pub(super) struct Segment {
     pub(super) begins_at_corner: bool,
 }
 
-/// The segments of a smooth arc: a cubic of half a circle is wrong by 6e-11 of the radius.
-const SEGMENTS: usize = 256;
+/// The number of cubics that stand for each smooth arc of a curve.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum ArcSteps {
+    /// Those of half a circle are wrong by 1.5e-8 of the radius.
+    Coarse,
+    /// Those of half a circle are wrong by 6e-11 of the radius.
+    Fine,
+}
+
+impl ArcSteps {
+    fn count(self) -> usize {
+        match self {
+            Self::Coarse => 64,
+            Self::Fine => 256,
+        }
+    }
+}
 
 impl PupilCurve {
     /// The curve of arcs given at their Chebyshev points, ends included; each begins where the one
     /// before ends, with true at a corner.
     pub fn from_arcs(arcs: &[(Vec<[f64; 2]>, bool)]) -> Self {
+        Self::in_steps(arcs, ArcSteps::Fine)
+    }
+
+    /// The same with the number of cubics of an arc.
+    pub(super) fn in_steps(arcs: &[(Vec<[f64; 2]>, bool)], steps: ArcSteps) -> Self {
         let mut curve = Self {
-            segments: arcs.iter().flat_map(|(nodes, corner)| arc(nodes, *corner)).collect(),
+            segments: arcs.iter().flat_map(|(nodes, corner)| arc(nodes, *corner, steps)).collect(),
         };
         if curve.signed_area() < 0.0 {
             curve.reverse();
@@ -103,6 +123,10 @@ pub(super) struct Chain {
     cubics: Vec<Cubic>,
     /// The largest t of each cubic.
     ends: Vec<f64>,
+    /// The first cubic that reaches into each of some equal parts of the range of t, and how many of these there
+    /// are to a unit of t.
+    firsts: Vec<u32>,
+    parts: f64,
     /// The least and the largest of either coordinate, t first.
     pub(super) range: [[f64; 2]; 2],
 }
@@ -152,24 +176,25 @@ impl PupilCurve {
 
 impl Segment {
     /// The parts of the segment along which the coordinate of an axis grows or falls.
-    fn growing(&self, axis: usize) -> Vec<Cubic> {
+    fn growing(&self, axis: usize) -> impl Iterator<Item = Cubic> {
         let powers = [axis, 1 - axis].map(|k| {
             let ([a, b], [c, d]) = (self.ends.map(|p| p[k]), self.slopes.map(|p| p[k]));
             [a, c, 3.0 * (b - a) - 2.0 * c - d, 2.0 * (a - b) + c + d]
         });
         let [_, b, c, d] = powers[0];
-        // The zeros of b + 2 c s + 3 d s², without cancellation.
+        // The zeros of b + 2 c s + 3 d s², without cancellation; one that is none lies at the end.
         let q = -(c + c.signum() * (c * c - 3.0 * b * d).max(0.0).sqrt());
         let is_turn = c * c > 3.0 * b * d;
-        let turns = [q / (3.0 * d), b / q].into_iter().filter(|s| is_turn && *s > 0.0 && *s < 1.0);
-        let mut ends: Vec<f64> = turns.chain([0.0, 1.0]).collect();
-        ends.sort_by(f64::total_cmp);
-        let part = |pair: &[f64]| {
-            let between = [pair[0], pair[1]];
+        let turn = |s: f64| if is_turn && s > 0.0 && s < 1.0 { s } else { 1.0 };
+        let (first, second) = (turn(q / (3.0 * d)), turn(b / q));
+        let ends = [0.0, first.min(second), first.max(second), 1.0];
+        let part = move |i: usize| {
+            let between = [ends[i], ends[i + 1]];
             let cubic = Cubic { powers, between, ends: [0.0; 2] };
-            Cubic { ends: between.map(|s| cubic.at(0, s)[0]), ..cubic }
+            (between[1] > between[0])
+                .then(|| Cubic { ends: between.map(|s| cubic.at(0, s)[0]), ..cubic })
         };
-        ends.windows(2).filter(|pair| pair[1] > pair[0]).map(part).collect()
+        (0..3).filter_map(part)
     }
 }
 
@@ -228,14 +253,25 @@ impl Chain {
         let values = || cubics.iter().flat_map(|c| c.between.map(|s| c.at(1, s)[0]));
         let low = values().fold(f64::INFINITY, f64::min);
         let high = values().fold(f64::NEG_INFINITY, f64::max);
-        let ends = cubics.iter().map(|cubic| cubic.ends[1]).collect();
-        Self { range: [[first.ends[0], last.ends[1]], [low, high]], cubics, ends }
+        let ends: Vec<f64> = cubics.iter().map(|cubic| cubic.ends[1]).collect();
+        let (from, to) = (first.ends[0], last.ends[1]);
+        let count = cubics.len();
+        let begin = |i: usize| from + (to - from) * i as f64 / count as f64;
+        let first = |i: usize| ends.partition_point(|end| *end < begin(i)) as u32;
+        let firsts = (0..count).map(first).collect();
+        let parts = count as f64 / (to - from);
+        Self { range: [[from, to], [low, high]], cubics, ends, firsts, parts }
     }
 
     /// The cubic at a value of t, and its parameter there.
     fn find(&self, t: f64) -> (&Cubic, f64) {
-        let after = self.ends.partition_point(|end| *end < t);
-        let cubic = &self.cubics[after.min(self.cubics.len() - 1)];
+        // Where the parts of t are no numbers, the first one.
+        let part = ((t - self.range[0][0]) * self.parts) as usize;
+        let mut at = self.firsts[part.min(self.firsts.len() - 1)] as usize;
+        while at + 1 < self.ends.len() && self.ends[at] < t {
+            at += 1;
+        }
+        let cubic = &self.cubics[at.min(self.cubics.len() - 1)];
         (cubic, cubic.parameter(t))
     }
 
@@ -258,8 +294,8 @@ impl Chain {
 }
 
 /// The segments of an arc.
-fn arc(nodes: &[[f64; 2]], corner: bool) -> Vec<Segment> {
-    let steps = if nodes.len() == 2 { 1 } else { SEGMENTS };
+fn arc(nodes: &[[f64; 2]], corner: bool, steps: ArcSteps) -> Vec<Segment> {
+    let steps = if nodes.len() == 2 { 1 } else { steps.count() };
     let axes = [0, 1].map(|k| nodes.iter().map(|node| node[k]).collect::<Vec<_>>());
     let slopes = axes.each_ref().map(|axis| derivative(axis));
     let places: Vec<f64> = chebyshev_points(nodes.len()).collect();

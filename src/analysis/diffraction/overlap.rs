@@ -8,7 +8,7 @@
 
 use super::outline::Chain;
 #[cfg(test)]
-use super::outline::PupilCurve;
+use super::outline::{ArcSteps, PupilCurve};
 use crate::math::quadrature::legendre_rule;
 
 /// A node of quadrature.
@@ -368,6 +368,26 @@ mod tests {
         }
         let apart = area([&circle, &circle], [0.25, 0.0], 0, OverlapHalf::None);
         assert_eq!(apart, 0.0);
+    }
+
+    /// Coarse steps along an edge are wrong by 1.5e-8 of the radius, far below the tolerances that they are for.
+    #[test]
+    fn coarse_steps_of_an_edge_leave_little() {
+        let half = |from: f64| {
+            let point = |t: f64| {
+                let (sin, cos) = (PI * (from + t)).sin_cos();
+                [0.02 + 0.25 * sin, 0.25 * cos - 0.01]
+            };
+            (crate::math::quadrature::chebyshev_points(40).map(point).collect(), false)
+        };
+        let arcs: [(Vec<[f64; 2]>, bool); 2] = [half(0.0), half(1.0)];
+        for (steps, allowed) in [(ArcSteps::Coarse, 1e-7), (ArcSteps::Fine, 1e-9)] {
+            let circle = PupilCurve::in_steps(&arcs, steps);
+            for axis in [0, 1] {
+                let found = area([&circle, &circle], [0.0; 2], axis, OverlapHalf::None);
+                assert!((found / (PI * 0.0625) - 1.0).abs() < allowed, "{steps:?} {found}");
+            }
+        }
     }
 
     /// Two circles of different size that hardly cross: what one cuts off from the other is a sliver.

@@ -1,7 +1,7 @@
 //! The complex amplitude over a pupil as polynomials between its edges, and its transfer function.
 
 use super::column_sum::ColumnPair;
-use super::outline::{Chain, PupilCurve};
+use super::outline::{ArcSteps, Chain, PupilCurve};
 use super::overlap::{OverlapHalf, Strip};
 use super::polynomial::{FitSample, PolynomialBasis, WavePolynomial};
 use super::pupil_samples::PupilSamples;
@@ -90,8 +90,9 @@ const SAMPLE_ORDERS: [[usize; 2]; 10] = [
     [112, 160],
     [160, 224],
 ];
-/// The points of an arc of the edge.
+/// The points of an arc of the edge, and the tolerance of contrast to which coarse steps along it are exact by far.
 const EDGE_POINTS: usize = 40;
+const COARSE_EDGE: f64 = 1e-5;
 /// The degree of the polynomials of a pupil that is given by a formula, and the samples that they are
 /// fitted to along a side of its box.
 const FORMULA_TERMS: usize = 100;
@@ -169,7 +170,8 @@ impl PupilFunction {
         tolerance: f64,
     ) -> Result<Self, AnalysisError> {
         let curves = region.edge_curves(EDGE_POINTS).ok_or(AnalysisError::IrregularPupil)?;
-        let curve = |arcs: &[EdgeArc]| project_curve(region, sphere, arcs);
+        let steps = if tolerance < COARSE_EDGE { ArcSteps::Fine } else { ArcSteps::Coarse };
+        let curve = |arcs: &[EdgeArc]| project_curve(region, sphere, arcs, steps);
         let mut pieces = vec![PupilPiece::new(curve(&curves.outer)?, 1.0)];
         if !curves.inner.is_empty() {
             pieces.push(PupilPiece::new(curve(&curves.inner)?, -1.0));
@@ -465,6 +467,7 @@ fn project_curve(
     region: &Region<'_>,
     sphere: &ReferenceSphere,
     arcs: &[EdgeArc],
+    steps: ArcSteps,
 ) -> Result<PupilCurve, AnalysisError> {
     let place = |(ray, path): (Ray<Dual2>, Dual2)| {
         let found = sphere.project(ray, path)?;
@@ -476,5 +479,6 @@ fn project_curve(
         Some((points?, arc.begins_at_corner))
     };
     let arcs: Option<Vec<_>> = arcs.iter().map(arc).collect();
-    Ok(PupilCurve::from_arcs(&arcs.ok_or(AnalysisError::IrregularPupil)?))
+    let arcs = arcs.ok_or(AnalysisError::IrregularPupil)?;
+    Ok(PupilCurve::in_steps(&arcs, steps))
 }
