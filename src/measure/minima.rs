@@ -1,17 +1,20 @@
 //! The number of different minima that descents from random lenses of one structure find in a time.
 //!
 //! A descent ends at a minimum when the optimizer says so: its gradient has vanished, or nothing can be
-//! gained at the tolerance of the spots. Two minima are the same if the signs of their curvatures and
-//! powers are, and if they are near in the metric of the residuals: `d² = dxᵀ Jᵀ J dx / F` predicts the
-//! relative change of the merit between them. Near a distance of 1 the merit between them decides: a
-//! hill above both means two.
+//! gained at the tolerance of the spots. With rays found anew, the derivatives must then promise less than
+//! the distance below which two minima are the same; otherwise the descent begins again from there.
+//!
+//! Two minima are the same if the signs of their curvatures and powers are, and if they are near in the
+//! metric of the residuals: `d² = dxᵀ Jᵀ J dx / F` predicts the relative change of the merit between
+//! them. Near a distance of 1 the merit between them decides: a hill above both means two.
 
 use super::timing::Stopwatch;
-use crate::lens::{Lens, Medium};
-use crate::merit::{DerivativeLevel, Merit, MeritError};
-use crate::optimize::{DescentMethod, start_from};
+use crate::lens::{Lens, Medium, Variable};
+use crate::merit::{DerivativeLevel, Merit, MeritError, SumOfSquares};
+use crate::optimize::{DescentMethod, Optimizer, start_from};
 use crate::search::Random;
 use crate::search::lens_landscape::{LensLandscape, SearchPlan, SearchSetupError};
+use crate::solve::{LeastSquaresPoint, TrustRegion};
 use nalgebra::{DMatrix, DVector};
 use rand::SeedableRng as _;
 use rayon::prelude::*;
@@ -45,6 +48,8 @@ pub struct MinimaCount {
     pub lost: u64,
     /// The descents that were given up.
     pub unfinished: u64,
+    /// The descents that came to a halt where the derivatives promise more: at no minimum.
+    pub stuck: u64,
     /// The descents that ended at a minimum.
     pub ended: u64,
     /// The different minima among these.
@@ -83,6 +88,7 @@ struct Minimum {
 enum DescentEnd {
     Lost,
     Unfinished,
+    Stuck,
     Minimum(Box<EndedDescent>),
 }
 
@@ -93,6 +99,8 @@ struct EndedDescent {
     values: DVector<f64>,
     normal: DMatrix<f64>,
     value: f64,
+    /// The decrease of the merit that the derivatives promise within the bounds of the variables.
+    promised: f64,
 }
 
 /// Counts the minima that descents from random lenses with the structure of a lens find. The same seed gives the same minima on any number of threads. Once
@@ -109,7 +117,8 @@ pub fn count_minima(
     let landscape = plan.landscape(lens)?;
     let (watch, tolerance) = (Stopwatch::start(), plan.local.tolerance);
     let mut families: BTreeMap<String, Vec<Minimum>> = BTreeMap::new();
-    let (mut begun, mut lost, mut unfinished, mut ended, mut evaluations) = (0, 0, 0, 0, 0);
+    let (mut begun, mut lost, mut unfinished, mut stuck) = (0, 0, 0, 0);
+    let (mut ended, mut evaluations) = (0, 0);
     while begun < starts && !stop.load(Ordering::Relaxed) {
         let batch = begun..(begun + BATCH).min(starts);
         begun = batch.end;
@@ -120,6 +129,7 @@ pub fn count_minima(
             match end {
                 DescentEnd::Lost => lost += 1,
                 DescentEnd::Unfinished => unfinished += 1,
+                DescentEnd::Stuck => stuck += 1,
                 DescentEnd::Minimum(found) => {
                     ended += 1;
                     enter(families.entry(found.signs.clone()).or_default(), &found);
@@ -138,6 +148,7 @@ pub fn count_minima(
         starts: begun,
         lost,
         unfinished,
+        stuck,
         ended,
         distinct: all.len(),
         families: families.len(),
@@ -163,21 +174,40 @@ fn descend(
     let mut random = Random::seed_from_u64(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ start);
     let drawn = SPREADS.iter().find_map(|spread| landscape.draw_near(*spread, &mut random));
     let Some(drawn) = drawn else { return (DescentEnd::Lost, 0) };
-    let lens = landscape.with_variables(&drawn);
-    let optimizer = landscape
-        .merit(&drawn, tolerance)
-        .and_then(|merit| start_from(DescentMethod::TrustRegion, merit, &lens, tolerance));
-    let Ok(mut optimizer) = optimizer else { return (DescentEnd::Lost, 0) };
+    let (mut lens, mut used, mut before) = ((*drawn).clone(), 0, f64::INFINITY);
+    loop {
+        let free = landscape.with_variables(&lens);
+        let optimizer = landscape
+            .merit(&lens, tolerance)
+            .and_then(|merit| start_from(DescentMethod::TrustRegion, merit, &free, tolerance));
+        let Ok(optimizer) = optimizer else { return (DescentEnd::Lost, used) };
+        let Some((mut halted, evaluations)) = halt(optimizer, MOST_EVALUATIONS - used) else {
+            return (DescentEnd::Unfinished, MOST_EVALUATIONS);
+        };
+        used += evaluations;
+        let Ok(found) = EndedDescent::new(landscape, &halted, tolerance) else {
+            return (DescentEnd::Lost, used);
+        };
+        if found.is_minimum() {
+            return (DescentEnd::Minimum(Box::new(found)), used);
+        }
+        if !(found.value < (1.0 - SAME) * before) || used >= MOST_EVALUATIONS {
+            return (DescentEnd::Stuck, used);
+        }
+        halted.variables.clone_from(&drawn.variables);
+        (lens, before) = (halted, found.value);
+    }
+}
+
+/// The lens where an optimizer comes to a halt, and its evaluations; `None` after too many.
+fn halt(mut optimizer: Box<dyn Optimizer>, most: usize) -> Option<(Lens, usize)> {
     loop {
         let progress = optimizer.step();
-        let used = progress.evaluations;
         if progress.finished {
-            let end = EndedDescent::new(landscape, optimizer.best(), tolerance);
-            let end = end.map_or(DescentEnd::Lost, |found| DescentEnd::Minimum(Box::new(found)));
-            return (end, used);
+            return Some((optimizer.best().clone(), progress.evaluations));
         }
-        if used >= MOST_EVALUATIONS {
-            return (DescentEnd::Unfinished, used);
+        if progress.evaluations >= most {
+            return None;
         }
     }
 }
@@ -189,12 +219,18 @@ impl EndedDescent {
         let values = merit.values(&lens);
         let sum = merit.evaluate(&values, DerivativeLevel::Normal)?;
         Ok(Self {
+            promised: promised_decrease(&merit, &values, &sum),
             signs: signs(&lens, landscape.focal_length()),
             values: DVector::from_vec(values),
             normal: sum.normal,
             value: sum.value,
             merit,
         })
+    }
+
+    /// True if the minimum that the derivatives predict is nearer than two that are the same may be apart.
+    fn is_minimum(&self) -> bool {
+        self.promised <= SAME * self.value
     }
 
     /// The square of the distance of another minimum.
@@ -222,6 +258,22 @@ impl EndedDescent {
             !self.merit.value(between.as_slice()).is_ok_and(|merit| merit <= top)
         })
     }
+}
+
+/// The decrease of the merit to the minimum of its model within the bounds of the variables.
+fn promised_decrease(merit: &Merit, values: &[f64], sum: &SumOfSquares) -> f64 {
+    let range = |(variable, value): (&Variable, &f64)| {
+        let low = variable.min.map_or(f64::NEG_INFINITY, |min| (min - value).min(0.0));
+        let high = variable.max.map_or(f64::INFINITY, |max| (max - value).max(0.0));
+        [low, high]
+    };
+    let room: Vec<[f64; 2]> = merit.variables().iter().zip(values).map(range).collect();
+    let half_gradient = &sum.gradient * 0.5;
+    let point = LeastSquaresPoint { value: sum.value, half_gradient, normal: sum.normal.clone() };
+    let mut region = TrustRegion::new(values.len());
+    // This sets the units of the variables.
+    region.projected_gradient(&point, &room);
+    region.attainable_decrease(&point, &room)
 }
 
 /// Enters a minimum among those with the same signs; of two that are the same the better one is kept.

@@ -41,7 +41,9 @@ pub use variable_system::VariableSystem;
 use crate::analysis::WavefrontCost;
 use crate::lens::{Lens, LensError, SurfaceNumber, Variable};
 use crate::math::Dual;
-use crate::pupil::{LaunchError, QuadraticIntegrand, RayModel, RayModelError, TracedPupil};
+use crate::pupil::{
+    LaunchError, QuadraticIntegrand, RayModel, RayModelError, RegionKind, TracedPupil,
+};
 use crate::trace::{Fate, SystemGradient};
 use as_built::MadeTolerances;
 use binding::Configuration;
@@ -147,6 +149,10 @@ pub struct TermValue {
     /// True if the rays of its pupils sample it to the tolerance that was asked for.
     pub reached: bool,
 }
+
+/// The forms of the pupils of a lens, by zoom position; none where pupils are frozen or not asked for.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PupilForms(Vec<Vec<RegionKind>>);
 
 /// The merit function of a lens: its goal, its variables, and the rays that sample it.
 #[derive(Debug, Clone)]
@@ -321,7 +327,7 @@ impl Merit {
         values: &[f64],
         level: DerivativeLevel,
     ) -> Result<(SumOfSquares, Vec<TermValue>), MeritError> {
-        let sums = self.evaluate_terms(values, level)?;
+        let (sums, _) = self.evaluate_terms(values, level)?;
         let term_value = |(sum, weighted): (&SumOfSquares, &WeightedTerm)| {
             let (error, rays) = self.error_and_rays(weighted.term, sum.value);
             let (term, weight) = (weighted.term.name(), weighted.weight);
@@ -330,6 +336,28 @@ impl Merit {
         };
         let terms = sums.iter().zip(&self.goal.terms).map(term_value).collect();
         Ok((self.weighted_sum(&sums, values.len(), level), terms))
+    }
+
+    /// The merit as [`Merit::evaluate`] gives it, and the forms of the pupils that it is an integral over:
+    /// [`Merit::follow_pupils`] takes them if the lens becomes the one to go on from.
+    ///
+    /// # Errors
+    /// As [`Merit::evaluate`].
+    pub fn evaluate_with_pupils(
+        &self,
+        values: &[f64],
+        level: DerivativeLevel,
+    ) -> Result<(SumOfSquares, PupilForms), MeritError> {
+        let (sums, forms) = self.evaluate_terms(values, level)?;
+        Ok((self.weighted_sum(&sums, values.len(), level), forms))
+    }
+
+    /// Tracks the edges of the pupils from these forms from now on. The rays stay: only the edges, which
+    /// are functions of the lens, are looked for near others.
+    pub fn follow_pupils(&mut self, forms: PupilForms) {
+        for (sampling, forms) in self.samplings.iter_mut().zip(forms.0) {
+            sampling.follow_pupils(forms);
+        }
     }
 
     /// The sum of the terms, each times its weight.
@@ -393,16 +421,20 @@ impl Merit {
         self.samplings.iter().map(RaySampling::chief_count).sum()
     }
 
-    /// The sum of squares of each term, averaged over the zoom positions.
+    /// The sum of squares of each term, averaged over the zoom positions, and the forms of the pupils.
     fn evaluate_terms(
         &self,
         values: &[f64],
         level: DerivativeLevel,
-    ) -> Result<Vec<SumOfSquares>, MeritError> {
+    ) -> Result<(Vec<SumOfSquares>, PupilForms), MeritError> {
         let mut sums = vec![SumOfSquares::zero(values.len(), level); self.goal.terms.len()];
-        self.visit_positions(values, |context| self.add_terms(context, |_| true, &mut sums))?;
+        let mut forms = Vec::with_capacity(self.zooms.len());
+        self.visit_positions(values, |context| {
+            forms.push(context.traced_pupils.iter().map(|pupil| pupil.form().clone()).collect());
+            self.add_terms(context, |_| true, &mut sums)
+        })?;
         self.average(&mut sums)?;
-        Ok(sums)
+        Ok((sums, PupilForms(forms)))
     }
 
     /// Makes means over the zoom positions of sums over them.

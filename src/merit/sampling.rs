@@ -110,6 +110,9 @@ pub(super) struct SampledPupil {
     /// The cosine of the angle with the axis at which a collimated beam arrives.
     cosine: Option<f64>,
     fixed_launch: FixedLaunch,
+    /// Its form when its rays were found: the one that the order of quadrature is for.
+    found: RegionKind,
+    /// Its form in the lens that is tracked from: the one whose rays were found, or one followed since.
     kind: RegionKind,
     /// The order of quadrature that reaches the tolerance.
     order: usize,
@@ -295,6 +298,7 @@ impl RaySampling {
             weight: share,
             cosine,
             fixed_launch,
+            found: kind.clone(),
             kind,
             order,
             reference,
@@ -330,7 +334,7 @@ impl RaySampling {
             } else {
                 Region { launch, kind: pupil.kind.clone(), rays: 0 }
             };
-            let order = region.order_like(&pupil.kind, pupil.order);
+            let order = region.order_like(&pupil.found, pupil.order);
             if self.demand.frequencies.is_empty() && !self.demand.as_built {
                 region.trace_pupil(order)
             } else {
@@ -338,6 +342,13 @@ impl RaySampling {
             }
         };
         self.pupils.par_iter().map(traced).collect()
+    }
+
+    /// Tracks the pupils from these forms from now on, one for each.
+    pub(super) fn follow_pupils(&mut self, forms: Vec<RegionKind>) {
+        for (pupil, form) in self.pupils.iter_mut().zip(forms) {
+            pupil.kind = form;
+        }
     }
 
     /// Returns an error if a pupil has gone dark since it was found: its spot would be empty, and

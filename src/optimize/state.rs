@@ -3,7 +3,7 @@
 
 use super::{OptimizationEnd, OptimizationProgress};
 use crate::lens::{ASPHERE_TERMS, Lens, Medium, Quantity, RADIAL_TERMS, Variable};
-use crate::merit::{DerivativeLevel, Merit, MeritError, SumOfSquares, TermValue};
+use crate::merit::{DerivativeLevel, Merit, MeritError, PupilForms, SumOfSquares, TermValue};
 use crate::solve::AdamMoments;
 use nalgebra::DVector;
 
@@ -92,8 +92,8 @@ impl OptimizerState {
             let found = self.evaluate(&proposal, detail);
             self.evaluations += usize::from(found.is_ok());
             match found {
-                Ok(sum) if accept(sum.value) => {
-                    self.accept_step(proposal, sum.value);
+                Ok((sum, pupils)) if accept(sum.value) => {
+                    self.accept_step(proposal, sum.value, pupils);
                     return (fraction, Some(sum));
                 }
                 Ok(_) => return (0.0, None),
@@ -134,14 +134,14 @@ impl OptimizerState {
         (0..values.len()).map(moved).collect()
     }
 
-    /// The merit at some values; an error if the lens that they define is invalid.
+    /// The merit at some values, and the pupils there; an error if the lens that they define is invalid.
     pub(super) fn evaluate(
         &self,
         values: &[f64],
         detail: DerivativeLevel,
-    ) -> Result<SumOfSquares, MeritError> {
+    ) -> Result<(SumOfSquares, PupilForms), MeritError> {
         self.check_finite(values)?;
-        self.merit.evaluate(values, detail)
+        self.merit.evaluate_with_pupils(values, detail)
     }
 
     /// Returns an error if a value of a variable is not finite.
@@ -156,7 +156,10 @@ impl OptimizerState {
         Ok(())
     }
 
-    pub(super) fn accept_step(&mut self, values: Vec<f64>, value: f64) {
+    /// Goes to values with their merit. Further trials track the pupils from there: tracked from the lens
+    /// whose rays were found last, an edge whose arcs have changed since would be searched for at every one.
+    pub(super) fn accept_step(&mut self, values: Vec<f64>, value: f64, pupils: PupilForms) {
+        self.merit.follow_pupils(pupils);
         self.values = values;
         self.value = value;
         self.current = self.merit.lens(&self.values);

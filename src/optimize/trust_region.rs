@@ -111,8 +111,8 @@ impl TrustRegionOptimizer {
     fn take(&mut self, step: &TrustRegionStep) -> bool {
         let change = step.change.as_slice();
         let values = self.state.proposal(change, 1.0);
-        let sum = match self.state.evaluate(&values, DerivativeLevel::Normal) {
-            Ok(sum) => sum,
+        let (sum, pupils) = match self.state.evaluate(&values, DerivativeLevel::Normal) {
+            Ok(found) => found,
             Err(cause) => {
                 self.state.record_refusal(change, &cause);
                 self.region.note_failure(step);
@@ -123,7 +123,7 @@ impl TrustRegionOptimizer {
         let to = scaled_point(&self.state, &sum);
         let accepted = self.region.note_trial(step, &self.point, &to);
         if accepted {
-            self.state.accept_step(values, sum.value);
+            self.state.accept_step(values, sum.value, pupils);
             self.point = to;
             self.unchecked += 1;
         }

@@ -72,7 +72,7 @@ fn descents_of_a_singlet_end_at_few_minima() {
     let count = |report: &Value, key: &str| report[key].as_u64().unwrap();
     let report = done_json(&command, "");
     let [ended, distinct] = ["ended", "distinct"].map(|key| count(&report, key));
-    let parts = ["lost", "unfinished", "ended"].map(|key| count(&report, key));
+    let parts = ["lost", "unfinished", "stuck", "ended"].map(|key| count(&report, key));
     assert_eq!(parts.iter().sum::<u64>(), 24, "{report}");
     assert!(ended >= 12 && distinct >= 1 && 3 * distinct <= ended, "{report}");
     assert!(count(&report, "found_once") + 2 * count(&report, "found_twice") <= ended, "{report}");

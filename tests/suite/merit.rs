@@ -615,3 +615,37 @@ fn the_strehl_ratio_is_that_of_the_diffraction_image() {
     let found = 1.0 - merit.value(&merit.values(&lens)).unwrap();
     assert!((found - exact).abs() < 1e-3, "{found} and {exact}");
 }
+
+/// Rims close step by step, as an optimizer moves them, until limits end the pupils that did not at the start.
+#[test]
+fn pupils_that_are_followed_step_by_step_are_those_of_the_lens() {
+    let mut lens = bundled("tessar_50_f28");
+    lens.variables.clear();
+    for surface in [0, 2, 7] {
+        vary(&mut lens, surface, Quantity::SemiDiameter);
+    }
+    let merit = Merit::new(&lens, &goal_of(Term::Light(1.0)), 1e-2).unwrap();
+    let mut followed = merit.clone();
+    let at = |part: f64| -> Vec<f64> { merit.values(&lens).iter().map(|v| v * part).collect() };
+    let mut forms = Vec::new();
+    for step in 1..=8 {
+        let values = at(1.0 - 0.02 * f64::from(step));
+        let (there, pupils) =
+            followed.evaluate_with_pupils(&values, DerivativeLevel::Gradient).unwrap();
+        forms.push(pupils.clone());
+        followed.follow_pupils(pupils);
+        // From their own lens the pupils are tracked to themselves.
+        let again = followed.evaluate(&values, DerivativeLevel::Gradient).unwrap();
+        assert!((again.value / there.value - 1.0).abs() < 1e-9, "{step}");
+        assert!((&again.gradient - &there.gradient).norm() < 1e-8 * there.gradient.norm());
+        // Those of the start give the same, as far as the nodes resolve the pupils, and so do new ones.
+        let far = merit.value(&values).unwrap();
+        let mut anew = merit.clone();
+        anew.resample(&merit.lens(&values)).unwrap();
+        let anew = anew.value(&values).unwrap();
+        for other in [far, anew] {
+            assert!((other / there.value - 1.0).abs() < 1e-2, "{step}: {other} {}", there.value);
+        }
+    }
+    assert!(forms.windows(2).any(|pair| pair[0] != pair[1]));
+}

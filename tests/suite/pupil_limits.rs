@@ -58,6 +58,36 @@ fn corners_between_the_pupil_and_a_rim_are_followed_with_few_rays() {
     }
 }
 
+/// A rim that passes into the pupil changes the arcs of the edge: it is searched for around the former light.
+#[test]
+fn an_edge_whose_arcs_have_changed_is_found_near_the_former_light() {
+    let before = with_rim(4.0, 5.0);
+    let before = region(&before).kind;
+    for (shift, rim) in [(0.1, 4.0), (-4.0, 5.0), (6.0, 1.5), (9.5, 5.0)] {
+        let model = with_rim(shift, rim);
+        let tracked = Region::track(&before, model.launch(model.fields[0], 0).unwrap());
+        let area = tracked.trace_pupil(8).moments.area;
+        let inside = rim + f64::abs(shift) <= RADIUS;
+        let exact = if inside { PI * rim * rim } else { overlap(RADIUS, rim, f64::abs(shift)) };
+        assert!((area / exact - 1.0).abs() < 1e-9, "{shift} {rim}: {area} {exact}");
+    }
+}
+
+#[test]
+fn light_comes_back_to_a_dark_pupil_and_darkness_takes_few_rays_to_see() {
+    for (shift, rim) in [(4.0, 5.0), (0.1, 4.0), (9.5, 5.0)] {
+        let model = with_rim(shift, rim);
+        let launch = || model.launch(model.fields[0], 0).unwrap();
+        let tracked = Region::track(&RegionKind::Dark, launch());
+        assert_eq!(tracked.kind, Region::new(launch()).kind, "{shift} {rim}");
+    }
+    let dark = with_rim(12.0, 5.0);
+    let launch = || dark.launch(dark.fields[0], 0).unwrap();
+    let [tracked, searched] = [Region::track(&RegionKind::Dark, launch()), Region::new(launch())];
+    assert!(tracked.is_dark() && searched.is_dark());
+    assert!(30 * tracked.rays < searched.rays, "{} {}", tracked.rays, searched.rays);
+}
+
 /// A field beside the plane of the drawing has a pupil without a mirrored half: its arcs close.
 #[test]
 fn corners_all_around_a_pupil_are_followed_with_few_rays() {

@@ -58,15 +58,18 @@ struct MeasureMinimaReport {
 
 impl Display for MeasureMinimaReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let MinimaCount { starts, lost, unfinished, ended, distinct, families, .. } = &self.found;
-        let MinimaCount { found_once, found_twice, evaluations, seconds, .. } = &self.found;
+        let MinimaCount { starts, lost, unfinished, stuck, ended, .. } = &self.found;
+        let MinimaCount {
+            distinct, families, found_once, found_twice, evaluations, seconds, ..
+        } = &self.found;
         writeln!(f, "{}", self.machine)?;
         writeln!(
             f,
             "{starts} random lenses, seed {}, {seconds:.1} s, {evaluations} evaluations",
             self.seed
         )?;
-        writeln!(f, "  {ended} descents ended, {unfinished} were given up, {lost} were lost")?;
+        writeln!(f, "  {ended} descents ended at a minimum, {stuck} elsewhere")?;
+        writeln!(f, "  {unfinished} were given up, {lost} were lost")?;
         writeln!(f, "  {distinct} different minima with {families} patterns of signs")?;
         writeln!(f, "  {found_once} were found once, {found_twice} twice")?;
         if let Some(unseen) = self.found.unseen {

@@ -3,6 +3,7 @@
 
 use super::boundary::{Boundary, BoundaryArc, PupilLimit};
 use super::kind::{Region, RegionKind};
+use super::light_grid::LightGrid;
 use crate::pupil::launch::Launch;
 use std::f64::consts::PI;
 
@@ -23,7 +24,8 @@ const GRID_REACH: f64 = 1.5;
 
 impl<'a> Region<'a> {
     /// The region of a launch whose lens has changed little since its region was `before`: the
-    /// boundary is tracked, or searched for again if its arcs have changed.
+    /// boundary is tracked, or searched for again around the former light if its arcs have changed; in a
+    /// dark pupil light is looked for by a coarse grid.
     pub fn track(before: &RegionKind, launch: Launch<'a>) -> Self {
         match before {
             RegionKind::StarShaped(boundary) => match boundary.track(&launch) {
@@ -33,17 +35,19 @@ impl<'a> Region<'a> {
                 }
                 None => Self::search_near(boundary, launch),
             },
-            RegionKind::Clear
-            | RegionKind::Dark
-            | RegionKind::Irregular { .. }
-            | RegionKind::Unbounded => Self::new(launch),
+            // The narrowest light is not worth the rays at every step: a search that is not for a
+            // small change finds it.
+            RegionKind::Dark => Self::around(launch, LightGrid::around_wide_light),
+            RegionKind::Clear | RegionKind::Irregular { .. } | RegionKind::Unbounded => {
+                Self::new(launch)
+            }
         }
     }
 }
 
 impl<'a> Region<'a> {
-    /// The region of a launch, searched for again unless no ray gets through around the former
-    /// light: then it is dark, and a larger search would waste rays.
+    /// The region of a launch, searched for again around the former light, unless no ray gets through
+    /// there: then it is dark, and a larger search would waste rays.
     fn search_near(before: &Boundary, launch: Launch<'a>) -> Self {
         let cover = before.enclosing_disc();
         let place = |i: usize| {
@@ -52,10 +56,17 @@ impl<'a> Region<'a> {
             [0, 1].map(|k| cover.center[k] + u * cover.axes[0][k] + v * cover.axes[1][k])
         };
         let points: Vec<_> = (0..CELLS * CELLS).map(place).collect();
-        if launch.transmission_mask(&points).into_iter().any(|lit| lit) {
-            return Self::new(launch);
+        if !launch.transmission_mask(&points).into_iter().any(|lit| lit) {
+            return Self { launch, kind: RegionKind::Dark, rays: points.len() };
         }
-        Self { launch, kind: RegionKind::Dark, rays: points.len() }
+        let [a, b] = cover.axes;
+        let half = GRID_REACH * (a[0].abs() + b[0].abs()).max(a[1].abs() + b[1].abs());
+        let around = |launch: &Launch<'_>, rays: &mut usize| {
+            let near = LightGrid::near_light(launch, (cover.center, half), rays);
+            near.or_else(|| LightGrid::around_light(launch, rays))
+        };
+        let found = Self::around(launch, around);
+        Self { rays: found.rays + points.len(), ..found }
     }
 }
 

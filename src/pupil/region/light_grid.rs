@@ -68,9 +68,47 @@ pub(super) struct LightGrid {
 impl LightGrid {
     /// A grid that holds all of the light with enough lit rays; `None` if there is none.
     pub(super) fn around_light(launch: &Launch<'_>, rays: &mut usize) -> Option<Self> {
+        Self::around_first_light(launch, &SCANS, rays)
+    }
+
+    /// The same by the coarsest cells alone, a thirtieth of the rays of a search for the narrowest light.
+    pub(super) fn around_wide_light(launch: &Launch<'_>, rays: &mut usize) -> Option<Self> {
+        Self::around_first_light(launch, &SCANS[..1], rays)
+    }
+
+    /// The same from a square about a point near the light; `None` also if the light goes on too far.
+    pub(super) fn near_light(
+        launch: &Launch<'_>,
+        (center, half): ([f64; 2], f64),
+        rays: &mut usize,
+    ) -> Option<Self> {
+        let (center, half) = if launch.is_symmetric() {
+            ([0.0, center[1]], half + center[0].abs())
+        } else {
+            (center, half)
+        };
+        let grid = Self::sample(launch, SCANS[0].0, center, half);
+        *rays += grid.rays;
+        if grid.count() == 0 {
+            return None;
+        }
+        let grid = grid.follow(launch, rays);
+        if grid.touches_its_edge() { None } else { grid.narrowed(launch, rays) }
+    }
+
+    fn around_first_light(
+        launch: &Launch<'_>,
+        scans: &[(usize, f64)],
+        rays: &mut usize,
+    ) -> Option<Self> {
         let found =
-            SCANS.iter().find_map(|(cells, widest)| Self::scan(launch, *cells, *widest, rays));
-        let mut grid = found.or_else(|| Self::in_frame(launch, rays))?;
+            scans.iter().find_map(|(cells, widest)| Self::scan(launch, *cells, *widest, rays));
+        found.or_else(|| Self::in_frame(launch, rays))?.narrowed(launch, rays)
+    }
+
+    /// A grid laid around the light until enough cells are lit.
+    fn narrowed(self, launch: &Launch<'_>, rays: &mut usize) -> Option<Self> {
+        let mut grid = self;
         for _ in 0..MAX_ZOOMS {
             let (center, half) = grid.bounding_square();
             if grid.count() >= ENOUGH_LIT || half > 0.9 * grid.half {

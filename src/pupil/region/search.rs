@@ -31,8 +31,26 @@ impl<'a> Region<'a> {
     }
 }
 
+impl<'a> Region<'a> {
+    /// The region of a launch whose light is looked for by `light` in place of a search of the whole plane.
+    pub(super) fn around(
+        launch: Launch<'a>,
+        light: impl FnOnce(&Launch<'_>, &mut usize) -> Option<LightGrid>,
+    ) -> Self {
+        let (kind, rays) = search_around(&launch, light);
+        Self { launch, kind, rays }
+    }
+}
+
 /// Searches for the region of a launch.
 fn search(launch: &Launch<'_>) -> (RegionKind, usize) {
+    search_around(launch, LightGrid::around_light)
+}
+
+fn search_around(
+    launch: &Launch<'_>,
+    light: impl FnOnce(&Launch<'_>, &mut usize) -> Option<LightGrid>,
+) -> (RegionKind, usize) {
     let mut rays = 0;
     if launch.model.stop_radius() == 0.0 {
         return (RegionKind::Dark, rays);
@@ -41,7 +59,7 @@ fn search(launch: &Launch<'_>) -> (RegionKind, usize) {
     if launch.model.ends_at_disc() && launch.is_clear(&shadows, &mut rays) {
         return (RegionKind::Clear, rays);
     }
-    let Some(grid) = LightGrid::around_light(launch, &mut rays) else {
+    let Some(grid) = light(launch, &mut rays) else {
         return (RegionKind::Dark, rays);
     };
     let kind = grid.classify(launch, &shadows);

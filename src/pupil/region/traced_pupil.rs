@@ -68,6 +68,11 @@ impl<'a> Region<'a> {
 }
 
 impl TracedPupil<'_> {
+    /// The form of the pupil.
+    pub fn form(&self) -> &RegionKind {
+        &self.region.kind
+    }
+
     /// True if the pupil is neither star-shaped nor an annulus: its edge is then unknown.
     pub fn is_irregular(&self) -> bool {
         matches!(self.region.kind, RegionKind::Irregular { annulus: None, .. })
