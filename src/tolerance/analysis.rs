@@ -150,7 +150,7 @@ pub fn analyze_until(
     model.analyze(scene, sheet, request, &stop)
 }
 
-/// What is known of the errors of a lens without random lenses: the quadratic forms.
+/// The quadratic forms of a lens with its errors, before any random lens.
 #[derive(Debug, Clone)]
 pub struct ErrorModel {
     compensation: Compensation,

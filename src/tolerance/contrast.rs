@@ -1,4 +1,4 @@
-//! What errors of making do to the contrast at a frequency.
+//! The contrast at a frequency of lenses with errors of making.
 //!
 //! The geometric contrast of the held rays, `|Σ w exp(2πi ν s)|` with `s` the place of a ray along the
 //! image of a field, tangential and sagittal, is computed for the lens with each error at both ends of

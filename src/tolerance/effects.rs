@@ -1,4 +1,4 @@
-//! What errors of making do to each ray, told from as many rows of numbers as the lens is large.
+//! The effects of errors of making on each ray, in as many rows of numbers as the lens is large.
 //!
 //! To first order an error is a combination of few numbers of surfaces. One sweep of the rays back
 //! through the lens gives their derivatives by all of these, a second one to another image plane those

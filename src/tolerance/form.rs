@@ -60,7 +60,7 @@ pub struct ErrorProducts {
     combinations: ErrorCombinations,
     /// The second derivatives by the numbers of which errors are combinations.
     among: DMatrix<f64>,
-    /// What each error adds on the diagonal; none if nothing.
+    /// The addition of each error on the diagonal; none if there is nothing to add.
     own: Vec<f64>,
 }
 
@@ -83,7 +83,7 @@ impl ErrorProducts {
         &self.among
     }
 
-    /// What an error adds on the diagonal.
+    /// The addition of an error on the diagonal.
     pub(super) fn own(&self, error: usize) -> f64 {
         self.own.get(error).copied().unwrap_or(0.0)
     }
@@ -238,7 +238,7 @@ impl FixedForm {
         self.combinations.iter().map(sum)
     }
 
-    /// What second derivatives of rays add on the diagonal.
+    /// The additions of second derivatives of rays on the diagonal.
     fn own(&self) -> Vec<f64> {
         let combinations = ErrorCombinations::clone(&self.combinations);
         let products = ErrorProducts { combinations, among: self.among.clone(), own: Vec::new() };

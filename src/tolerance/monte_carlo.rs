@@ -112,7 +112,7 @@ impl<'a> RealLensRun<'a> {
     }
 }
 
-/// What the rays of a lens with random errors tell, without the errors: these follow from its number.
+/// The results of a lens with random errors, without the errors: these follow from its number.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct KnownLens {
     /// The mean square spot radius in mm² at the image plane, and adjusted; `None` if a ray does not

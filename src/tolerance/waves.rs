@@ -1,4 +1,4 @@
-//! What errors of making do to the wavefront.
+//! The wavefront of lenses with errors of making.
 //!
 //! The mean over all fields of the wavefront's variance at the primary wavelength, less piston and tilt,
 //! is a smooth function of an error and of the position of the image plane: second-order jets by both

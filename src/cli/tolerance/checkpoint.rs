@@ -11,7 +11,7 @@ use std::path::Path;
 const FORMAT: CheckpointFormat =
     CheckpointFormat { key: "aplanat_tolerance", version: 1, first_with_checksum: 1 };
 
-/// What real lenses depend on.
+/// The data on which real lenses depend.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct RandomLensSource {
     /// The lens with its tolerances and compensators, as its file has it.

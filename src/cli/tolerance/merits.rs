@@ -1,5 +1,4 @@
-//! What errors do to the wavefront and to the contrast, and sums of shares, in the results of
-//! `tolerance`.
+//! Wavefront and contrast of lenses with errors, and sums of shares, in the results of `tolerance`.
 
 use super::{ShareOfGrowth, ToleranceArgs, percent, surfaces};
 use crate::cli::output::{ShortNumber, TextTable};
@@ -42,7 +41,7 @@ struct ContrastSummary {
     sampling_error: f64,
 }
 
-/// What one error does.
+/// The effect of one error on wavefront and contrast.
 #[derive(Serialize, Default)]
 pub(super) struct FurtherRow {
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -66,7 +65,7 @@ struct ContrastRow {
 }
 
 impl FurtherMerits {
-    /// What the arguments ask for; nothing of what is stopped.
+    /// The merits that the arguments ask for, without those that are stopped.
     pub(super) fn new(
         arguments: &ToleranceArgs,
         (lens, scene, sheet): (&Lens, &ToleranceScene, &ToleranceSheet),
@@ -106,7 +105,7 @@ impl FurtherMerits {
         Ok(Self { wavefront, mtf, rows, is_stopped })
     }
 
-    /// What the error with a number does; once.
+    /// Takes the effect of the error with a number.
     pub(super) fn row(&mut self, number: usize) -> FurtherRow {
         self.rows.get_mut(number).map(std::mem::take).unwrap_or_default()
     }

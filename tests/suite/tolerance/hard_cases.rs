@@ -175,7 +175,7 @@ fn a_form_that_fails_says_so() {
     errors.retain(|t| t.error.kind == PerturbationKind::ElementDecenterY);
     errors.iter_mut().for_each(|t| t.half_range *= 10.0);
     let sheet = ToleranceSheet::of_errors(errors);
-    let request = ToleranceRequest { seed: 2, samples: 40, limit: None };
+    let request = ToleranceRequest { seed: 2, samples: 120, limit: None };
     let found = analyze(&scene, &sheet, request).unwrap();
     assert!(!found.spots[1].form_agrees, "{:?}", found.spots[1].difference);
 }
