@@ -53,7 +53,7 @@ pub(super) struct DesignArgs {
     without: Vec<String>,
 
     /// The class of care in making for which the lenses are refined at the end, in place of the
-    /// specification's: none, commercial, precision, shop_limit or moulded_plastic
+    /// specification's: none, commercial, precision, `shop_limit` or `moulded_plastic`
     #[arg(long, value_name = "GRADE")]
     as_built: Option<String>,
 
