@@ -92,11 +92,33 @@ impl TransferValue {
 }
 
 /// The geometric contrast of a field at one wavelength and some frequencies in cycles/mm;
-/// errors are absolute.
+/// errors are absolute. Frequencies whose phase no affordable nodes resolve leave the others their own error.
 ///
 /// # Errors
 /// The field is dark.
 pub fn geometric_mtf(
+    model: &RayModel,
+    field: FieldPoint,
+    wavelength: usize,
+    frequencies: &[f64],
+    accuracy: Accuracy,
+) -> Result<MtfCurve, AnalysisError> {
+    let mut curve = common_mtf(model, field, wavelength, frequencies, accuracy)?;
+    let highest = frequencies.iter().fold(0.0f64, |highest, nu| highest.max(nu.abs()));
+    let is_low = |nu: &f64| nu.abs() < 0.5 * highest;
+    let low: Vec<f64> = frequencies.iter().copied().filter(is_low).collect();
+    if curve.reached || low.is_empty() {
+        return Ok(curve);
+    }
+    let lower = geometric_mtf(model, field, wavelength, &low, accuracy)?;
+    let points = curve.points.iter_mut().filter(|point| is_low(&point.frequency));
+    points.zip(lower.points).for_each(|(point, own)| *point = own);
+    curve.rays += lower.rays;
+    Ok(curve)
+}
+
+/// The same from nodes that all frequencies share.
+fn common_mtf(
     model: &RayModel,
     field: FieldPoint,
     wavelength: usize,

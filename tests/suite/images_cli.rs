@@ -468,3 +468,25 @@ fn a_wide_circle_about_the_image_of_a_pupil_that_is_not_round_has_all_light() {
     let (energy, error) = (number(&circle["energy"]), number(&circle["error"]));
     assert!(energy <= 1.0 && energy > 0.9 && energy + error >= 1.0 - 1e-12, "{circle}");
 }
+
+/// A frequency that no rays resolve takes nothing from the others.
+#[test]
+fn a_high_frequency_spoils_no_other() {
+    let points = |frequencies: &str| {
+        let list = format!("--frequencies={frequencies}");
+        let asked = ["analyze", "lenses/double_gauss_rudolph_50.json", "mtf", "--field=17", &list];
+        done_json(&asked, "")["fields"][0]["geometric"]["points"].clone()
+    };
+    let (alone, beside) = (points("0,10"), points("0,10,5000"));
+    for (i, most) in [(0, 1e-12), (1, 2e-3)] {
+        for direction in ["tangential", "sagittal"] {
+            let of = |points: &Value| {
+                let modulus = &points[i][direction]["modulus"];
+                ["value", "error"].map(|key| modulus[key].as_f64().unwrap())
+            };
+            let ([own, _], [found, error]) = (of(&alone), of(&beside));
+            assert!(error <= most, "{found} {error}");
+            assert!((found - own).abs() <= error + 1e-12, "{found} {own}");
+        }
+    }
+}
