@@ -28,11 +28,14 @@ fn light(side: f64) -> Scene {
     Scene::new(vec![layer], [0.0; 3], 1.0).unwrap()
 }
 
-/// The picture of a light as large as a pixel, in grey.
+/// The side of a light in pixels.
+const SIDE: f64 = 3.0;
+
+/// The picture of a light of some pixels, in grey.
 fn picture_of_light(lens: &Lens, count: usize, pitch: f64, many: usize) -> Picture {
     let (model, bands) = picture_model(lens, 0, Coloring::Gray).unwrap();
     let frame = ImageFrame { pixels: [count; 2], pitch, center: [0.0; 2], inverted: true };
-    let scene = light(pitch);
+    let scene = light(SIDE * pitch);
     let renderer = ExactRenderer::new(&model, &bands, &scene, frame).unwrap();
     let renderer = renderer.with_diffraction(&model, &bands, 0.01).unwrap();
     let report = renderer.diffraction().unwrap();
@@ -58,40 +61,39 @@ fn airy(distance: f64, ratio: f64) -> f64 {
     PI / (4.0 * LAMBDA_F * LAMBDA_F) * field * field / (1.0 - ratio * ratio)
 }
 
-/// The share of a square light that falls on a pixel of the same side, so far to the right and down.
+/// The light of a pixel, so far to the right and down from a square light, over that of a white card.
 fn on_pixel([right, down]: [f64; 2], pitch: f64, ratio: f64) -> f64 {
-    let steps = 6;
-    let place = |i: i32| pitch * ((f64::from(i) + 0.5) / f64::from(steps) - 1.0);
-    // The convolution of two squares is a tent.
-    let tent = |v: f64| (1.0 - v.abs() / pitch).max(0.0);
+    let (steps, half) = (24, 0.5 * (SIDE + 1.0) * pitch);
+    let width = 2.0 * half / f64::from(steps);
+    let place = |i: i32| width * (f64::from(i) + 0.5) - half;
+    // The part of a pixel over which a light and the pixel meet that are so far apart.
+    let common = |v: f64| ((half - v.abs()) / pitch).clamp(0.0, 1.0);
     let mut sum = 0.0;
-    for i in 0..2 * steps {
-        for j in 0..2 * steps {
+    for i in 0..steps {
+        for j in 0..steps {
             let (x, y) = (place(i), place(j));
-            sum += tent(x) * tent(y) * airy((right + x).hypot(down + y), ratio);
+            sum += common(x) * common(y) * airy((right + x).hypot(down + y), ratio);
         }
     }
-    sum * (pitch / f64::from(steps)).powi(2)
+    sum * width * width
 }
 
+/// Every ray meets the light or does not, so that their numbers scatter by their roots at most.
 fn compare(lens: &Lens, ratio: f64) {
-    let (count, pitch) = (11, 1.5e-3);
-    let picture = picture_of_light(lens, count, pitch, 1 << 12);
+    let (count, pitch, many) = (11, 1.5e-3, 1 << 12);
+    let picture = picture_of_light(lens, count, pitch, many);
     let from_middle = |i: usize| (i as f64 - 5.0) * pitch;
     let (mut sum, mut all) = (0.0, 0.0);
     for (i, value) in picture.values.iter().enumerate() {
         let at = [from_middle(i % count), from_middle(i / count)];
-        let exact = on_pixel(at, pitch, ratio);
-        let (found, error) = (value[0] / picture.white, picture.errors[i][0] / picture.white);
-        let peak = on_pixel([0.0; 2], pitch, ratio);
-        assert!(
-            (found - exact).abs() < 6.0 * error + 0.01 * peak,
-            "{at:?}: {found} {exact} {error}"
-        );
+        let (found, exact) = (value[0] / picture.white, on_pixel(at, pitch, ratio));
+        let scatter = 5.0 * (exact / many as f64).sqrt();
+        assert!((found - exact).abs() < scatter + 4e-3, "{at:?}: {found} {exact}");
         sum += found;
         all += exact;
     }
-    assert!((sum / all - 1.0).abs() < 0.01, "{sum} {all}");
+    println!("{sum} {all}");
+    assert!((sum / all - 1.0).abs() < 0.02, "{sum} {all}");
 }
 
 #[test]

@@ -36,7 +36,7 @@ fn planes_of_a_file_have_their_light_and_move() {
     write(&format!(r#"{{"pattern": "white", "distance": 800, "size": [400, 400]}}, {veil}"#));
     assert!((level(&[]) - 0.6).abs() < 0.02, "{}", level(&[]));
     // It leaves the picture after half of the time.
-    write(r#"{"pattern": "white", "distance": 900, "size": [40, 40], "velocity": [4000, 0]}"#);
+    write(r#"{"pattern": "white", "distance": 900, "size": [400, 400], "velocity": [40000, 0]}"#);
     assert!((level(&[]) - 1.0).abs() < 0.02);
     assert!((level(&["--seconds", "0.01"]) - 0.625).abs() < 0.05);
     let quick: Vec<&str> = base.iter().copied().filter(|word| *word != "--exact").collect();

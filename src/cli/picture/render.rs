@@ -165,7 +165,9 @@ impl PictureArgs {
             return Ok((usual, None));
         }
         let mut chosen = None;
-        for pair in WAVELENGTH_COUNTS.windows(2) {
+        // Coatings and glasses change light with the wavelength as well.
+        let least = usize::from(self.coating.is_some());
+        for pair in WAVELENGTH_COUNTS.windows(2).skip(least) {
             let [few, many] = [pair[0], pair[1]].map(|count| self.shot(opened, source, count));
             let (few, many) = (few?, many?);
             let renderer =
