@@ -147,12 +147,14 @@ impl PupilSpread {
         plane.iter_mut().for_each(|v| *v = [v[0] * v[0] + v[1] * v[1], 0.0]);
         let cell = 1.0 / (PLANE as f64 * ray_step);
         let tail = tail(lit, ray_step, count);
-        let (rows, cells) = cumulated(&plane);
         transform_plane(&mut plane, PLANE, FourierSense::Inverse);
         let side = 2 * RAYS;
         let at = |i: usize| if i < RAYS { i } else { PLANE + i - side };
         let overlap = |i: usize| plane[at(i / side) * PLANE + at(i % side)][0] / count;
         let overlap = (0..side * side).map(overlap).collect();
+        sharpen(&mut plane);
+        transform_plane(&mut plane, PLANE, FourierSense::Forward);
+        let (rows, cells) = cumulated(&plane);
         Some(Self { ray_step, overlap, cell, rows, cells, tail })
     }
 
@@ -210,6 +212,18 @@ fn tail(lit: &[bool], ray_step: f64, count: f64) -> f64 {
     edge / (2.0 * PI * PI * count * ray_step * ray_step)
 }
 
+/// Takes from an overlap the blur that even draws from a cell make.
+fn sharpen(overlap: &mut [ComplexPair]) {
+    let kept = |i: usize| {
+        let turns = PI * i.min(PLANE - i) as f64 / PLANE as f64;
+        if i == 0 { 1.0 } else { turns.sin() / turns }
+    };
+    let kept: Vec<f64> = (0..PLANE).map(kept).collect();
+    for (i, value) in overlap.iter_mut().enumerate() {
+        *value = value.map(|v| v / (kept[i / PLANE] * kept[i % PLANE]));
+    }
+}
+
 /// The energies of rows and of the cells of each, summed up, as shares, from a plane of intensities whose middle
 /// is its first corner; of the cells within a circle.
 fn cumulated(plane: &[ComplexPair]) -> (Vec<f64>, Vec<f32>) {
@@ -220,7 +234,7 @@ fn cumulated(plane: &[ComplexPair]) -> (Vec<f64>, Vec<f32>) {
     for y in 0..SIDE {
         let light = |x: usize| {
             let is_inside = square(x) + square(y) <= CELLS * CELLS;
-            if is_inside { plane[wrapped(y) * PLANE + wrapped(x)][0] } else { 0.0 }
+            if is_inside { plane[wrapped(y) * PLANE + wrapped(x)][0].max(0.0) } else { 0.0 }
         };
         let sums: Vec<f64> = (0..SIDE)
             .scan(0.0, |sum, x| {
