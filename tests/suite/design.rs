@@ -83,7 +83,8 @@ fn refusal(text: &str) -> String {
 fn the_references_of_the_sheets_have_their_figures() {
     for sheet in sheets() {
         let (asked, filled) = LensRequirements::complete(&sheet.spec).unwrap();
-        assert!(filled.is_empty(), "{}: {filled:?}", sheet.id);
+        // How a lens is made is no part of a sheet.
+        assert!(filled.iter().all(|value| value.key == "as_built"), "{}: {filled:?}", sheet.id);
         let found = judge_lens(&reference(&sheet), &asked, 1e-3).unwrap();
         let near = |what: &str, value: f64, stated: &Value, within: f64| {
             let stated = stated.as_f64().unwrap();
