@@ -122,24 +122,25 @@ impl DiffractionLight {
             left: if on { left } else { change },
             cut: if on { spreads.cut(longest) } else { 0.0 },
             points: found.len(),
-            reason: reason(on, change > tolerance, left > tolerance),
+            reason: reason([on, change > tolerance, left > tolerance]),
             ..without("")
         };
         Ok(Self { report, parts: on.then_some((directions, spreads)) })
     }
 }
 
-fn reason(on: bool, matters: bool, much_is_left: bool) -> &'static str {
-    match (on, matters, much_is_left) {
-        (true, _, false) => "it changes contrast; the spread of the unaberrated pupil is put in",
-        (true, _, true) => {
+/// The reason for a spread that is `on` or not, by whether it matters and whether much is left.
+fn reason(decided: [bool; 3]) -> &'static str {
+    match decided {
+        [true, _, false] => "it changes contrast; the spread of the unaberrated pupil is put in",
+        [true, _, true] => {
             "it changes contrast; the spread of the unaberrated pupil is put in, and aberrations change \
              that spread"
         }
-        (false, true, _) => {
+        [false, true, _] => {
             "left out although it changes contrast: the spread of the unaberrated pupil would be no better"
         }
-        (false, false, _) => "the change of contrast is small",
+        [false, false, _] => "the change of contrast is small",
     }
 }
 

@@ -50,7 +50,7 @@ impl SamplePoints {
 
     /// Moves on to a sample, counted from 0 and below [`LONGEST`]; the times stay 0 in a scene at rest, and the
     /// displacements without diffraction.
-    pub(super) fn go_to(&mut self, sample: usize, is_moving: bool, is_diffracted: bool) {
+    pub(super) fn go_to(&mut self, sample: usize, [is_moving, is_diffracted]: [bool; 2]) {
         let reversed = (sample as u32).reverse_bits();
         let is_used = |d: usize| match d {
             TIME => is_moving,
@@ -105,7 +105,7 @@ mod tests {
         let mut points = SamplePoints::new(&[3, 99], &[7]);
         let found: Vec<Vec<f64>> = (0..256)
             .map(|i| {
-                points.go_to(i, true, true);
+                points.go_to(i, [true, true]);
                 let columns = points.columns().map(|column| column[1]);
                 columns.into_iter().chain([points.color(0)]).collect()
             })
@@ -127,7 +127,7 @@ mod tests {
     fn sets_with_other_seeds_are_independent() {
         let seeds: Vec<u32> = (0..1024).collect();
         let mut points = SamplePoints::new(&seeds, &[]);
-        points.go_to(5, false, false);
+        points.go_to(5, [false, false]);
         let off = |set: usize| points.columns()[0][set] - 0.5;
         let neighbours: f64 = (0..1023).map(|set| off(set) * off(set + 1)).sum::<f64>() / 1023.0;
         let mean: f64 = (0..1024).map(off).sum::<f64>() / 1024.0;

@@ -209,12 +209,11 @@ impl PlaneEntry {
             Some(size) => size.map(|side| 0.5 * side),
             None => fitted_size(model, frame, distance, aspect)?,
         };
-        let pattern = match picture {
-            Some(image) => Pattern::Raster(Arc::new(Raster::new(image))),
-            None => {
-                let named = self.pattern.as_deref().and_then(BuiltInScene::pattern_of);
-                named.unwrap_or(Pattern::Uniform { radiance: [1.0; 3], cover: 1.0 })
-            }
+        let pattern = if let Some(image) = picture {
+            Pattern::Raster(Arc::new(Raster::new(image)))
+        } else {
+            let named = self.pattern.as_deref().and_then(BuiltInScene::pattern_of);
+            named.unwrap_or(Pattern::Uniform { radiance: [1.0; 3], cover: 1.0 })
         };
         let level = self.luminance.unwrap_or(white) / white;
         let pattern = if level == 1.0 && self.alpha == 1.0 {

@@ -197,16 +197,14 @@ impl TileSampler {
             if is_stopped() {
                 return false;
             }
-            work.points.go_to(sample, scene.1 != 0.0, self.spreads.is_some());
+            work.points.go_to(sample, [scene.1 != 0.0, self.spreads.is_some()]);
             for replicate in 0..REPLICATES {
                 let color = work.points.color(replicate);
                 let part = self.spectrum.partition_point(|part| part.end <= color);
                 let part = part.min(self.spectrum.len() - 1);
                 for (queue, lights) in queues[part].iter_mut().zip(&bundles[part]) {
                     self.start(work, replicate, (lights[0], scene.1), queue);
-                    if queue.sets.len() >= BATCH {
-                        self.trace(work, queue, lights, scene.0);
-                    }
+                    self.trace_if_full(work, queue, lights, scene.0);
                 }
             }
         }
@@ -262,6 +260,19 @@ impl TileSampler {
                 queue.radii.push(radius);
                 queue.cosines.push(drawn.cosines);
             }
+        }
+    }
+
+    /// Traces the rays of a queue that is full.
+    fn trace_if_full(
+        &self,
+        work: &mut TileWork,
+        queue: &mut RayQueue,
+        lights: &[ColorLight],
+        scene: &Scene,
+    ) {
+        if queue.sets.len() >= BATCH {
+            self.trace(work, queue, lights, scene);
         }
     }
 

@@ -35,6 +35,7 @@ use std::process;
 /// A picture of a scene through the lens, by rays traced backwards, with its error
 #[derive(Debug, clap::Args)]
 #[command(after_long_help = include_str!("../help/picture.txt"))]
+#[expect(clippy::struct_excessive_bools, reason = "each is a switch of the command line")]
 pub(super) struct PictureArgs {
     #[command(flatten)]
     lens: LensFile,
