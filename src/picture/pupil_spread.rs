@@ -225,16 +225,22 @@ fn sharpen(overlap: &mut [ComplexPair]) {
 }
 
 /// The energies of rows and of the cells of each, summed up, as shares, from a plane of intensities whose middle
-/// is its first corner; of the cells within a circle.
+/// is its first corner; of the cells within a circle. A set of points spreads light in periods, as far as the plane
+/// reaches; that of squares around them has an envelope, without which what lies beyond would be folded in.
 fn cumulated(plane: &[ComplexPair]) -> (Vec<f64>, Vec<f32>) {
     let (mut rows, mut cells) = (Vec::with_capacity(SIDE), Vec::with_capacity(SIDE * SIDE));
     let wrapped = |i: usize| (i + PLANE - CELLS) % PLANE;
     let square = |i: usize| i.abs_diff(CELLS).pow(2);
+    let envelope = |i: usize| {
+        let turns = PI * i.abs_diff(CELLS) as f64 / PLANE as f64;
+        if turns == 0.0 { 1.0 } else { (turns.sin() / turns).powi(2) }
+    };
     let mut all = 0.0;
     for y in 0..SIDE {
         let light = |x: usize| {
             let is_inside = square(x) + square(y) <= CELLS * CELLS;
-            if is_inside { plane[wrapped(y) * PLANE + wrapped(x)][0].max(0.0) } else { 0.0 }
+            let light = plane[wrapped(y) * PLANE + wrapped(x)][0].max(0.0);
+            if is_inside { light * envelope(x) * envelope(y) } else { 0.0 }
         };
         let sums: Vec<f64> = (0..SIDE)
             .scan(0.0, |sum, x| {
