@@ -224,6 +224,7 @@ pub(super) fn add_growth(
     scope: TermScope,
     sum: &mut SumOfSquares,
 ) -> Result<(), MeritError> {
+    let context = &context.with_error_rays();
     let mut growth = Growth::new(context, tolerances, scope)?;
     sum.value += growth.value;
     if sum.level == DerivativeLevel::Value {
@@ -237,6 +238,15 @@ pub(super) fn add_growth(
         sum.normal.ger(0.25 / growth.value, &gradient, &gradient, 1.0);
     }
     Ok(())
+}
+
+/// The growth of the mean square spots by errors of making, in mm².
+pub(super) fn growth(
+    context: &EvaluationContext<'_>,
+    tolerances: &MadeTolerances,
+    scope: TermScope,
+) -> Result<f64, MeritError> {
+    Growth::new(&context.with_error_rays(), tolerances, scope).map(|growth| growth.value)
 }
 
 impl<'a> Growth<'a> {

@@ -17,6 +17,7 @@ mod binding;
 mod constraints;
 mod contrast;
 mod defaults;
+mod error_rays;
 mod first_order;
 mod goal;
 mod light;
@@ -47,6 +48,7 @@ use crate::pupil::{
 use crate::trace::{Fate, SystemGradient};
 use as_built::MadeTolerances;
 use binding::Configuration;
+use error_rays::ErrorRays;
 use nalgebra::DVector;
 use rayon::prelude::*;
 use sampling::{RaySampling, SampledPupil, SamplingDemand, TRANSFER_SCALE};
@@ -167,6 +169,8 @@ pub struct Merit {
     /// The tolerances of terms about lenses that are made, by zoom position and term; `None` for
     /// other terms.
     tolerances: Vec<Vec<Option<MadeTolerances>>>,
+    /// The rays of these terms, by zoom position; `None` where there is none.
+    error_rays: Vec<Option<ErrorRays>>,
     tolerance: f64,
 }
 
@@ -187,6 +191,7 @@ impl Merit {
             samplings: Vec::new(),
             initial_areas: Vec::new(),
             tolerances: Vec::new(),
+            error_rays: Vec::new(),
             tolerance,
         };
         merit.goal.check(lens)?;
@@ -216,7 +221,7 @@ impl Merit {
         };
         let tolerances: Result<_, _> = self.samplings.iter().enumerate().map(of_zoom).collect();
         self.tolerances = tolerances?;
-        Ok(())
+        self.find_error_rays(lens)
     }
 
     /// Takes the edges of glass and air at the automatic rims of a lens of the same structure, which
@@ -385,8 +390,12 @@ impl Merit {
         let worst = sampled.iter().fold(0.0, |e: f64, s| e.max(s.error));
         let rays = sampled.iter().map(|s| s.rays).sum();
         match term {
-            Term::Spot | Term::AsBuilt { .. } | Term::SpotIntegral | Term::Wavefront => {
-                (2.0 * worst * value, rays)
+            Term::Spot | Term::SpotIntegral | Term::Wavefront => (2.0 * worst * value, rays),
+            Term::AsBuilt { .. } => {
+                let of_errors = || self.error_rays.iter().flatten();
+                let thinned = of_errors().map(|rays| rays.error).fold(0.0, f64::max);
+                let more: usize = of_errors().map(|rays| rays.sampling.rays()).sum();
+                ((2.0 * worst + thinned) * value, rays + more)
             }
             Term::Strehl => (self.transfer_error(), rays),
             Term::GeometricMtf { .. } => {
@@ -467,7 +476,14 @@ impl Merit {
             sampling.check_light(traced_pupils)?;
             check_edge_motion(&model, traced_pupils)?;
             let sampling = &sampling.with_pupils(&model, traced_pupils);
-            visit(&EvaluationContext { sampling, traced_pupils, ..*context })
+            let of_errors = context.errors.map(|rays| {
+                let traced = rays.sampling.trace_forms(&model, traced_pupils);
+                (rays.sampling.with_pupils(&model, &traced), traced)
+            });
+            let errors = of_errors
+                .as_ref()
+                .map(|(sampling, traced_pupils)| PupilRays { sampling, traced_pupils });
+            visit(&EvaluationContext { sampling, traced_pupils, errors, ..*context })
         })
     }
 
@@ -478,8 +494,11 @@ impl Merit {
         mut visit: impl FnMut(&EvaluationContext<'_>) -> Result<(), MeritError>,
     ) -> Result<(), MeritError> {
         let positions = self.zooms.iter().zip(&self.samplings).zip(&self.initial_areas);
-        for ((zoom, sampling), initial_areas) in positions {
+        for (((zoom, sampling), initial_areas), error_rays) in positions.zip(&self.error_rays) {
             let systems = &zoom.at(values)?;
+            let errors = error_rays
+                .as_ref()
+                .map(|rays| PupilRays { sampling: &rays.sampling, traced_pupils: &[] });
             visit(&EvaluationContext {
                 zoom,
                 sampling,
@@ -487,6 +506,7 @@ impl Merit {
                 values,
                 initial_areas,
                 traced_pupils: &[],
+                errors,
             })?;
         }
         Ok(())
@@ -566,9 +586,29 @@ struct EvaluationContext<'a> {
     initial_areas: &'a [f64],
     /// The traced pupils of the sampling; empty if pupils are frozen.
     traced_pupils: &'a [TracedPupil<'a>],
+    /// The rays of errors of making, where a term asks for them.
+    errors: Option<PupilRays<'a>>,
 }
 
-impl EvaluationContext<'_> {
+/// The rays of all pupils of a lens.
+#[derive(Clone, Copy)]
+struct PupilRays<'a> {
+    sampling: &'a RaySampling,
+    /// Empty if pupils are frozen.
+    traced_pupils: &'a [TracedPupil<'a>],
+}
+
+impl<'a> EvaluationContext<'a> {
+    /// The same with the rays of errors of making.
+    fn with_error_rays(&self) -> EvaluationContext<'a> {
+        match self.errors {
+            Some(PupilRays { sampling, traced_pupils }) => {
+                EvaluationContext { sampling, traced_pupils, ..*self }
+            }
+            None => EvaluationContext { ..*self },
+        }
+    }
+
     /// The derivatives by the variables that the motion of the pupils' edges contributes to
     /// integrals with these integrands, one for each pupil; zeros if pupils are frozen.
     fn edge_motion(&self, costs: impl Iterator<Item = QuadraticIntegrand>) -> DVector<f64> {

@@ -45,8 +45,8 @@ pub(super) struct SamplingDemand {
     pub(super) strehl: bool,
     /// The spatial frequencies of terms about contrast, in cycles/mm.
     pub(super) frequencies: Vec<f64>,
-    /// True if a term asks for lenses that are made, which are not symmetric about their axis.
-    pub(super) as_built: bool,
+    /// True if the rays are for errors of making, in which a lens is not symmetric about its axis.
+    pub(super) errors: bool,
 }
 
 impl SamplingDemand {
@@ -57,7 +57,6 @@ impl SamplingDemand {
                 Term::Wavefront => demand.wavefront = true,
                 Term::Strehl => (demand.wavefront, demand.strehl) = (true, true),
                 Term::GeometricMtf { frequency, .. } => demand.frequencies.push(frequency),
-                Term::AsBuilt { .. } => demand.as_built = true,
                 _ => {}
             }
         }
@@ -334,14 +333,53 @@ impl RaySampling {
             } else {
                 Region { launch, kind: pupil.kind.clone(), rays: 0 }
             };
-            let order = region.order_like(&pupil.found, pupil.order);
-            if self.demand.frequencies.is_empty() && !self.demand.as_built {
-                region.trace_pupil(order)
-            } else {
-                region.trace_whole_pupil(order)
-            }
+            self.trace_region(pupil, &region)
         };
         self.pupils.par_iter().map(traced).collect()
+    }
+
+    /// Traces pupils whose forms are known, one for each of the sampling.
+    pub(super) fn trace_forms<'a>(
+        &self,
+        model: &'a RayModel,
+        known: &[TracedPupil<'_>],
+    ) -> Vec<TracedPupil<'a>> {
+        let traced = |(pupil, known): (&SampledPupil, &TracedPupil<'_>)| {
+            let launch = pupil.fixed_launch.launch(model);
+            let region = Region { launch, kind: known.form().clone(), rays: 0 };
+            self.trace_region(pupil, &region)
+        };
+        self.pupils.par_iter().zip(known).map(traced).collect()
+    }
+
+    fn trace_region<'a>(&self, pupil: &SampledPupil, region: &Region<'a>) -> TracedPupil<'a> {
+        let order = region.order_like(&pupil.found, pupil.order);
+        if self.demand.frequencies.is_empty() && !self.demand.errors {
+            region.trace_pupil(order)
+        } else {
+            region.trace_whole_pupil(order)
+        }
+    }
+
+    /// The rays of the same pupils for errors of making, of an order of quadrature that is lower by
+    /// `fewer`.
+    pub(super) fn for_errors(&self, model: &RayModel, fewer: usize) -> Self {
+        let mut sampling = self.clone();
+        sampling.demand = SamplingDemand { errors: true, ..SamplingDemand::default() };
+        let pupils = sampling.pupils.iter_mut();
+        pupils.for_each(|pupil| pupil.order = pupil.order.saturating_sub(fewer));
+        let traced = sampling.trace_pupils(model, false);
+        sampling.with_pupils(model, &traced)
+    }
+
+    /// The highest order of quadrature.
+    pub(super) fn highest_order(&self) -> usize {
+        self.pupils.iter().map(|pupil| pupil.order).max().unwrap_or(0)
+    }
+
+    /// The rays of all pupils.
+    pub(super) fn rays(&self) -> usize {
+        self.channels.iter().map(|channel| channel.weights.len()).sum()
     }
 
     /// Tracks the pupils from these forms from now on, one for each.

@@ -162,10 +162,11 @@ impl ParetoPoint {
             limits: LimitTreatment::Penalties,
         };
         let merit = Merit::new(&lens, &goal, tolerance)?;
-        let square = merit.value(&merit.values(&lens))?;
+        let terms = merit.terms(&merit.values(&lens))?;
+        let [square, error] = terms.first().map_or([0.0; 2], |term| [term.value, term.error]);
         let value = square.max(0.0).sqrt();
-        let relative = merit.spot_samplings().iter().map(|spot| spot.error).fold(0.0, f64::max);
-        Ok(Self { as_built: Some(AsBuiltRadius { value, error: relative * value }), ..self })
+        let error = if value > 0.0 { 0.5 * error / value } else { 0.0 };
+        Ok(Self { as_built: Some(AsBuiltRadius { value, error }), ..self })
     }
 
     /// Evaluates the sharpness and light of a lens; spot radii are accurate to a relative tolerance.
