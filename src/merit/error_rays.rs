@@ -2,17 +2,17 @@
 //!
 //! What an error does to a ray varies less over the pupil than the aberrations of the lens, and only a part
 //! of the merit is due to errors: fewer rays are enough for them than for the spot. Orders of quadrature
-//! are lowered, all pupils by the same number, as long as the terms with their errors change by less than
-//! their tolerance.
+//! are lowered, all pupils by the same number, as long as what errors add changes by less than a part of the
+//! tolerance.
 
 use super::as_built::{MadeTolerances, growth};
 use super::sampling::RaySampling;
 use super::{DerivativeLevel, EvaluationContext, Merit, MeritError, PupilRays, SumOfSquares, spot};
 use crate::lens::{Lens, TermScope};
 
-/// The largest change by having fewer rays, as a part of the tolerance: comparisons of lenses that are
-/// nearly equal are not to be about rays.
-const SHARE: f64 = 0.1;
+/// The largest change of what errors add by having fewer rays, relative to it and as a part of the
+/// tolerance: comparisons of lenses that are nearly equal are not to be about rays.
+const SHARE: f64 = 0.3;
 
 /// The rays of the errors of making at one zoom position.
 #[derive(Debug, Clone)]
@@ -77,12 +77,13 @@ impl Merit {
             let sampling = context.sampling.for_errors(&model, fewer);
             // A ray that is lost at a lower order is a reason for the higher one.
             let Ok(found) = growths(&sampling) else { break };
-            let changes = found.iter().zip(&most).zip(&merits);
-            let error =
-                changes.map(|((few, most), merit)| (few - most).abs() / merit).fold(0.0, f64::max);
-            if !(error <= SHARE * self.tolerance) {
+            let changes = || found.iter().zip(&most).map(|(few, most)| (few - most).abs());
+            let mut allowed = most.iter().map(|growth| SHARE * self.tolerance * growth);
+            if !changes().all(|change| allowed.next().is_some_and(|allowed| change <= allowed)) {
                 break;
             }
+            let relative = changes().zip(&merits).map(|(change, merit)| change / merit);
+            let error = relative.fold(0.0, f64::max);
             thinned = ErrorRays { sampling, error };
         }
         Ok(Some(thinned))

@@ -72,6 +72,28 @@ fn graded(lens: &Lens) -> ToleranceSheet {
     graded_sheet(lens, &scene.lens, ToleranceGrade::Commercial)
 }
 
+/// What errors do is judged on fewer rays than the spot: the error of the term counts that.
+#[test]
+fn the_error_of_the_term_covers_that_of_fewer_rays() {
+    for name in ["cooke_triplet_100_f27", "phone_us7558005_1", "double_gauss_canon_ef50_f18"] {
+        let lens = lens(name);
+        let exact = value(&lens, GRADED, 1e-8);
+        for tolerance in [1e-2, 1e-3, 1e-4] {
+            let merit = Merit::new(&lens, &goal(GRADED), tolerance).unwrap();
+            let found = merit.terms(&merit.values(&lens)).unwrap().remove(0);
+            let spot_rays: usize = merit.spot_samplings().iter().map(|spot| spot.rays).sum();
+            let apart = (found.value - exact).abs();
+            assert!(apart <= found.error, "{name} to {tolerance}: {apart} beside {}", found.error);
+            assert!(
+                found.error <= 3.0 * tolerance * exact && found.reached,
+                "{name}: {}",
+                found.error
+            );
+            assert!(found.rays > spot_rays && found.rays < 2 * spot_rays, "{name}: {}", found.rays);
+        }
+    }
+}
+
 /// Every kind of error by itself, on a double Gauss with cemented elements; a group of two of them.
 #[test]
 fn each_kind_of_error_adds_to_the_term_what_jets_say() {
