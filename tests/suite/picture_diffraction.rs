@@ -39,7 +39,6 @@ fn picture_of_light(lens: &Lens, count: usize, pitch: f64, many: usize) -> Pictu
     let renderer = ExactRenderer::new(&model, &bands, &scene, frame).unwrap();
     let renderer = renderer.with_diffraction(&model, &bands, 0.01).unwrap();
     let report = renderer.diffraction().unwrap();
-    println!("{report:?}");
     assert!(report.on && report.change > 0.3 && report.left < 5e-3, "{report:?}");
     render_by(&renderer, &samples(many))
 }
@@ -119,7 +118,6 @@ fn the_quick_way_spreads_light_as_the_exact_one() {
     let quick = QuickRenderer::new(&model, &bands, &exact).unwrap().render();
     assert_eq!(quick.frame, frame);
     let [spread, geometric] = [&quick, &sharp].map(|p| quick_error(&exact, p, 9, 512).value);
-    println!("quick {spread}, without {geometric}");
     assert!(spread < 0.05 && geometric > 4.0 * spread, "{spread} {geometric}");
     assert!((quick.mean() / sharp.mean() - 1.0).abs() < 0.05, "{} {}", quick.mean(), sharp.mean());
 }

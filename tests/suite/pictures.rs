@@ -105,7 +105,6 @@ fn compare_white(name: &str, shares: &[f64]) {
         let (found, error) = (picture.values[0][0], picture.errors[0][0]);
         let exact = exact.value;
         let place = format!("{name} at {share}: {found} ± {error:e} of {exact}");
-        println!("{place}");
         assert!((found - exact).abs() < 6.0 * error + 1e-4 * exact, "{place}");
         assert!(error < 5e-3 * exact, "{place}");
     }
@@ -252,7 +251,6 @@ fn quick(lens: &Lens, build: impl Fn(&RayModel, &ImageFrame) -> Scene) -> (f64, 
     let exact = ExactRenderer::new(&model, &bands, &scene, frame).unwrap();
     let picture = QuickRenderer::new(&model, &bands, &exact).unwrap().render();
     let error = quick_error(&exact, &picture, 2, 64);
-    println!("{error:?}");
     assert!(picture.values.iter().flatten().all(|v| v.is_finite() && *v >= 0.0));
     (error.value, picture)
 }
