@@ -90,8 +90,9 @@ pub(super) struct PictureArgs {
     #[arg(long, value_name = "FIRST..LAST", value_parser = parse_group, requires = "focus")]
     focus_group: Option<FocusGroup>,
 
-    /// The coating of all surfaces between air and glass: none (bare glass), single-layer, v, or a reflected
-    /// share as `0.3%`; with it losses count, of glasses that absorb light too, and ghosts where they matter.
+    /// The coating of all surfaces between air and glass: none (bare glass), single-layer, v, a reflected
+    /// share as `0.3%`, or layers from the air as index:nm, `1.38:125.9+2.05:19.4`; with it losses count, of
+    /// glasses that absorb light too, and ghosts where they matter.
     /// Absent: nothing is lost
     #[arg(long, value_name = "COATING", value_parser = parse_coating)]
     coating: Option<Coating>,
