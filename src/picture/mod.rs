@@ -36,6 +36,7 @@ mod scene_file;
 mod seen_light;
 mod sensor;
 mod sensor_law;
+mod smear;
 mod tent_line;
 mod tile_sampler;
 mod tolerance_split;

@@ -12,7 +12,7 @@ use crate::measure::time_ms;
 use crate::picture::{
     DiffractionReport, ErrorMap, ExactRenderer, ExactSettings, GateSubject, GhostLight,
     GhostReport, LightLosses, LossReport, MID_GREY, Picture, PictureError, PictureGate,
-    QuickPicture, QuickRenderer, Scene, SceneFileError, ToleranceSplit, quick_error, tile_change,
+    QuickPicture, QuickRenderer, Scene, SceneFileError, ToleranceSplit, tile_change,
 };
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -101,18 +101,15 @@ impl PictureArgs {
         })?;
         let chosen = self.colors(opened, (source, &scene), shot, &mut split).map_err(refuse)?;
         let (shot, colors) = chosen;
+        // What moves by less than can be seen needs no samples of the time.
         let is_moving = self.is_moving(&shot, &scene);
-        if is_moving && (self.quick || self.error_map.is_some()) {
-            let text =
-                "--quick, --error-map: planes move during --seconds; expected the exact way alone";
-            return Err(CliError::Input(text.to_owned()));
-        }
+        let seconds = self.exposed.seconds.filter(|_| is_moving).unwrap_or(0.0);
         let renderer = self.renderer(&shot, &scene, opened, &mut split).map_err(refuse)?;
-        let light = self.light(&shot, (&renderer, is_moving), &mut split, stop).map_err(refuse)?;
+        let light = self.light(&shot, (&renderer, seconds), &mut split, stop).map_err(refuse)?;
         let is_stopped = || stop.load(Ordering::Relaxed);
         let map = || {
-            let samples = (usize::MAX, MAPPED_SAMPLES);
-            ErrorMap::measure_until(&renderer, &light.picture, samples, is_stopped)
+            let samples = ((usize::MAX, MAPPED_SAMPLES), seconds);
+            ErrorMap::of_exposure(&renderer, &light.picture, samples, is_stopped)
         };
         // A part is no map.
         let error_map = self.error_map.as_ref().map(|_| map()).filter(ErrorMap::is_whole);
@@ -218,7 +215,7 @@ impl PictureArgs {
     fn light(
         &self,
         shot: &CameraShot,
-        (renderer, is_moving): (&ExactRenderer<'_>, bool),
+        (renderer, seconds): (&ExactRenderer<'_>, f64),
         split: &mut ToleranceSplit,
         stop: &AtomicBool,
     ) -> Result<PictureLight, PictureError> {
@@ -226,11 +223,10 @@ impl PictureArgs {
         let is_kept = |quick: &PictureLight| {
             self.quick || quick.sampling.value <= allowed || stop.load(Ordering::Relaxed)
         };
-        let is_exact = self.exact || is_moving;
-        let quick = if is_exact { None } else { Some(quick_picture(shot, renderer, stop)) };
+        let quick =
+            if self.exact { None } else { Some(quick_picture(shot, (renderer, seconds), stop)) };
         let quick = quick.transpose()?.filter(is_kept);
-        let light =
-            quick.unwrap_or_else(|| self.exact_picture((renderer, is_moving), allowed, stop));
+        let light = quick.unwrap_or_else(|| self.exact_picture((renderer, seconds), allowed, stop));
         split.note(SAMPLING, light.sampling.value);
         let mean = light.picture.mean() / (MID_GREY * light.picture.white);
         split.note(DIFFRACTION, renderer.diffraction().map_or(0.0, |found| found.error(mean)));
@@ -258,12 +254,10 @@ impl PictureArgs {
 
     fn exact_picture(
         &self,
-        (renderer, is_moving): (&ExactRenderer<'_>, bool),
+        (renderer, seconds): (&ExactRenderer<'_>, f64),
         tolerance: f64,
         stop: &AtomicBool,
     ) -> PictureLight {
-        // What moves by less than can be seen needs no samples of the time.
-        let seconds = self.exposed.seconds.filter(|_| is_moving).unwrap_or(0.0);
         let (max_samples, seed) = (self.max_samples, self.seed);
         let settings = ExactSettings { tolerance, max_samples, seed, seconds };
         let bar = progress_bar(STEPS);
@@ -285,16 +279,17 @@ impl PictureArgs {
 /// A picture by the quick way, with its error against the exact way on some of its tiles.
 fn quick_picture(
     shot: &CameraShot,
-    exact: &ExactRenderer<'_>,
+    (exact, seconds): (&ExactRenderer<'_>, f64),
     stop: &AtomicBool,
 ) -> Result<PictureLight, PictureError> {
-    let quick = QuickRenderer::new(&shot.model, &shot.bands, exact)?;
+    let quick = QuickRenderer::exposed(&shot.model, &shot.bands, exact, seconds)?;
     let (made, ms) = time_ms(|| quick.render_fast(stop));
     let QuickPicture { mut picture, device, refused } = made;
     if let Some(why) = refused {
         print_note(format!("note: {why}; the processor made the picture"));
     }
-    let error = quick_error(exact, &picture, CHECKED_TILES, CHECKED_SAMPLES);
+    let checked = ((CHECKED_TILES, CHECKED_SAMPLES), seconds);
+    let error = ErrorMap::of_exposure(exact, &picture, checked, || false).rms();
     picture.rays = error.rays;
     let sampling = Estimate { milliseconds: Some(ms), ..error };
     Ok(PictureLight { picture, sampling, way: "quick", device })
