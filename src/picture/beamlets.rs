@@ -11,9 +11,11 @@
 //! radius; other points of the image are turned.
 
 use super::PictureError;
+use super::aimed_light::AimedLight;
 use super::color_band::ColorBand;
 use super::lit_directions::LitDirections;
 use super::losses::LensLosses;
+use super::pupil_spread::PupilSpreads;
 use crate::analysis::BackwardLens;
 use crate::pupil::RayModel;
 use crate::trace::{Landings, Ray, Rays, TraceSink as _};
@@ -29,6 +31,9 @@ pub(super) struct TableSize<'a> {
     /// The number of intervals over the distance from the axis.
     pub(super) radii: usize,
 }
+
+/// The direction cosine along the axis above which a ray meets no plane of the scene.
+const SIDEWAYS: f64 = -1e-3;
 
 /// Sums over rays: the weight, its products with the place in the plane of the first vertex and the slope
 /// of a ray (x, y, p, q), and those with their ten products (xx, xy, xp, xq, yy, ...).
@@ -218,6 +223,51 @@ impl BeamletTable {
         Ok(size.windows.iter().enumerate().map(table).collect())
     }
 
+    /// The same with one beamlet a colour, which is the ray that stands for all light of a point.
+    ///
+    /// # Errors
+    /// Numbers that cannot be traced.
+    pub(super) fn aimed(
+        model: &RayModel,
+        bands: &[ColorBand],
+        (spreads, aimed): (&PupilSpreads, &AimedLight),
+        losses: Option<&LensLosses>,
+        (reach, radii): (f64, usize),
+    ) -> Result<Self, PictureError> {
+        let step = reach / radii as f64;
+        let mut rows = Vec::with_capacity(radii + 1);
+        for i in 0..=radii {
+            let radius = step * i as f64;
+            let cosines = aimed.chief(radius);
+            let mut row = BeamletRow { beamlets: Vec::new(), sideways: vec![0.0; bands.len()] };
+            for (color, band) in bands.iter().enumerate() {
+                let mut moments = RayMoments::default();
+                for (w, (wavelength, share)) in band.wavelengths.iter().enumerate() {
+                    let light = aimed.light(spreads.number([color, w]), radius);
+                    let passed = losses.map_or(1.0, |own| own.passed([color, w], radius, cosines));
+                    let lens = BackwardLens::new(model, *wavelength)?;
+                    let Some((ray, _)) = lens.ray([0.0, radius], cosines) else { continue };
+                    let (mut rays, mut landings) = (Rays::default(), Landings::default());
+                    rays.push(ray);
+                    lens.trace(&rays, &mut landings);
+                    let ray = lens.scene_ray(landings.ray(0));
+                    if !landings.fate(0).is_imaged() {
+                        continue;
+                    }
+                    let weight = share * light * passed;
+                    if ray.direction.z < SIDEWAYS {
+                        moments.add(&RayMoments::of_ray(&ray), weight);
+                    } else {
+                        row.sideways[color] += weight;
+                    }
+                }
+                row.beamlets.push(moments.beamlet());
+            }
+            rows.push(row);
+        }
+        Ok(Self { step, windows: 1, rows })
+    }
+
     /// The place of a point of the image in the table.
     pub(super) fn place(&self, [x, y]: [f64; 2]) -> TablePlace {
         let radius = x.hypot(y);
@@ -311,7 +361,7 @@ impl<'a> TracedBox<'a> {
         for (i, (place, weight)) in origins.iter().enumerate() {
             if landings.fate(i).is_imaged() {
                 let ray = lens.scene_ray(landings.ray(i));
-                if ray.direction.z < -1e-3 {
+                if ray.direction.z < SIDEWAYS {
                     self.add_ray(&ray, *weight, place[0]);
                 } else {
                     self.sideways += weight;

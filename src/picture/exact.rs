@@ -182,7 +182,8 @@ impl<'a> ExactRenderer<'a> {
         tolerance: f64,
     ) -> Result<Self, PictureError> {
         let light = (self.directions(), &outer(model, bands)[..]);
-        let found = DiffractionLight::new((model, bands), &self.frame, light, tolerance)?;
+        let found =
+            DiffractionLight::new((model, bands), &self.frame, light, (tolerance, self.scene))?;
         if let Some((directions, spreads)) = found.parts {
             self.sampler.directions = directions;
             self.sampler.spreads = Some(spreads);

@@ -7,6 +7,7 @@
 //! is left out (losses at surfaces and ghosts without a coating) is named in the metadata of the file. A
 //! [`SensorModel`] makes noisy numbers of the light.
 
+mod aimed_light;
 mod bayer;
 mod beamlets;
 mod built_in;

@@ -4,6 +4,7 @@
 //! traced; with diffraction each colour has its own, since displacements are proportional to the wavelength.
 //! Of every sample, all pixels and replicates of a tile are done at once.
 
+use super::aimed_light::AimedLight;
 use super::diffraction::image_wavelength;
 use super::exact::{REPLICATES, mean_with_error};
 use super::lit_directions::LitDirections;
@@ -74,6 +75,13 @@ pub(super) struct TileWork {
 struct SpectralPart {
     end: f64,
     wavelengths: Vec<usize>,
+}
+
+/// What a ray stands for: directions of an area in cosines, or all light of its point, by its irradiance.
+#[derive(Debug, Clone, Copy)]
+enum RayShare {
+    Area(f64),
+    Irradiance(f64),
 }
 
 /// A colour and the index of its wavelength.
@@ -246,21 +254,51 @@ impl TileSampler {
             let mut point = [left + step[0] * right[i], top + step[1] * down[i]];
             if let Some(spreads) = &self.spreads {
                 let (radius, axes) = polar(point);
-                let by = turned(spreads.draw(radius, length, [near[i], far[i]]), axes);
-                point = [point[0] + by[0], point[1] + by[1]];
+                let light = [color, wavelength];
+                let by = turned(spreads.draw(light, (radius, length), [near[i], far[i]]), axes);
+                // Light that is spread that far to here comes from there.
+                point = [point[0] - by[0], point[1] - by[1]];
             }
             let (radius, axes) = polar(point);
-            let Some(drawn) = self.directions.draw(radius, [across[i], along[i]]) else { continue };
-            let Some((ray, share)) = lens.ray(point, turned(drawn.cosines, axes)) else { continue };
+            let place = (radius, [across[i], along[i]]);
+            let Some((cosines, share_of)) = self.direction([color, wavelength], place) else {
+                continue;
+            };
+            let Some((ray, share)) = lens.ray(point, turned(cosines, axes)) else { continue };
             queue.rays.push(ray);
             queue.sets.push(first + i);
-            queue.weights.push(drawn.area * share);
+            queue.weights.push(match share_of {
+                RayShare::Area(area) => area * share,
+                RayShare::Irradiance(all) => all / lens.index_ratio,
+            });
             queue.seconds.push(seconds * time[i]);
             if self.losses.is_some() {
                 queue.radii.push(radius);
-                queue.cosines.push(drawn.cosines);
+                queue.cosines.push(cosines);
             }
         }
+    }
+
+    /// The direction of a ray at a distance from the axis, for a point of the y axis, and what it stands for; `None`
+    /// where it is dark.
+    #[inline(always)]
+    fn direction(
+        &self,
+        [color, wavelength]: [usize; 2],
+        (radius, unit): (f64, [f64; 2]),
+    ) -> Option<([f64; 2], RayShare)> {
+        if let Some((spreads, aimed)) = self.aimed() {
+            let light = aimed.light(spreads.number([color, wavelength]), radius);
+            return Some((aimed.chief(radius), RayShare::Irradiance(light)));
+        }
+        let drawn = self.directions.draw(radius, unit)?;
+        Some((drawn.cosines, RayShare::Area(drawn.area)))
+    }
+
+    /// The rays that stand for all light of a point, if spreads have its aberrations.
+    fn aimed(&self) -> Option<(&PupilSpreads, &AimedLight)> {
+        let spreads = self.spreads.as_ref()?;
+        Some((spreads, spreads.aimed.as_ref()?))
     }
 
     /// Traces the rays of a queue that is full.

@@ -130,7 +130,13 @@ impl QuickRenderer {
         let is_small = radii < RADII[0];
         let windows = if is_small { &WINDOWS[..SMALL] } else { &WINDOWS[..] };
         let size = TableSize { windows, rays: RAYS[usize::from(is_small)], radii };
-        let tables = BeamletTable::several(model, bands, (directions, losses), reach, size)?;
+        let aimed = spreads.and_then(|spreads| Some((spreads, spreads.aimed.as_ref()?)));
+        let tables = match aimed {
+            Some(aimed) => {
+                vec![BeamletTable::aimed(model, bands, aimed, losses, (reach, radii))?]
+            }
+            None => BeamletTable::several(model, bands, (directions, losses), reach, size)?,
+        };
         let Some(finest) = tables.last() else { return Err(PictureError::NoLight) };
         let colors = bands.len();
         let texture = |layer: &SceneLayer| {
