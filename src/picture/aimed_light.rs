@@ -6,10 +6,10 @@
 //! of backward rays: the optical path from the image point to the wave of the object point that the chief ray
 //! meets. It belongs to one distance of the scene, and to aberrations that the raster of directions resolves.
 
-use super::ColorBand;
 use super::diffraction::{field_at, offsets};
 use super::lit_directions::LitDirections;
 use super::pupil_spread::{DirectionRaster, PupilSpread, PupilSpreads, RAYS};
+use super::{ColorBand, Scene};
 use crate::analysis::{BackwardLens, irradiance};
 use crate::math::Vec3;
 use crate::pupil::{Accuracy, RayModel};
@@ -33,6 +33,8 @@ pub(super) struct AimedLight {
     chiefs: Vec<f64>,
     /// The irradiance for radiance 1, by wavelength of every colour.
     lights: Vec<Vec<f64>>,
+    /// The number of wavelengths of each colour that come before it.
+    offsets: Vec<usize>,
 }
 
 /// A number between knots.
@@ -50,62 +52,54 @@ impl AimedLight {
         [0.0, between(&self.chiefs, self.steps[0], radius)]
     }
 
-    /// The irradiance there for radiance 1, at the wavelength of this number.
+    /// The irradiance there for radiance 1, at a wavelength of a colour.
     #[inline(always)]
-    pub(super) fn light(&self, number: usize, radius: f64) -> f64 {
-        between(&self.lights[number], self.steps[1], radius)
+    pub(super) fn light(&self, [color, wavelength]: [usize; 2], radius: f64) -> f64 {
+        between(&self.lights[self.offsets[color] + wavelength], self.steps[1], radius)
+    }
+
+    /// The chief rays of a model up to `reach` mm from the axis, and their light in some colours; `None` where one
+    /// is not known.
+    pub(super) fn new(model: &RayModel, bands: &[ColorBand], reach: f64) -> Option<Self> {
+        let steps = [reach / (KNOTS - 1) as f64, reach / (LIGHTS - 1) as f64];
+        let chiefs = (0..KNOTS).map(|i| chief(model, steps[0] * i as f64));
+        let chiefs = chiefs.collect::<Option<Vec<f64>>>()?;
+        let all: Vec<usize> = wavelengths(bands);
+        let light = |i: usize| {
+            let at = [0.0, steps[1] * (i % LIGHTS) as f64];
+            irradiance(model, all[i / LIGHTS], at, ACCURACY).map_or(0.0, |found| found.value)
+        };
+        let lights: Vec<f64> = (0..all.len() * LIGHTS).into_par_iter().map(light).collect();
+        let lights = lights.chunks(LIGHTS).map(<[f64]>::to_vec).collect();
+        Some(Self { steps, chiefs, lights, offsets: offsets(bands) })
     }
 }
 
-/// A lens whose spreads are tabulated, and the distance of its scene in mm, `None` at infinity.
+/// A lens whose spreads are tabulated, and its scene, which is at the distance of its first plane.
 pub(super) struct AberratedLens<'a> {
     pub(super) model: &'a RayModel,
     pub(super) bands: &'a [ColorBand],
     pub(super) directions: &'a LitDirections,
-    pub(super) distance: Option<f64>,
+    pub(super) scene: &'a Scene,
 }
 
 impl AberratedLens<'_> {
     /// The spreads at points up to `reach` mm from the axis, with displacements up to `margin` mm; `None` where a
     /// chief ray is lost or the aberrations are too large for the raster.
     pub(super) fn spreads(&self, reach: f64, margin: f64) -> Option<PupilSpreads> {
-        let wavelengths: Vec<usize> =
-            self.bands.iter().flat_map(|band| &band.wavelengths).map(|(w, _)| *w).collect();
-        let step = reach / (KNOTS - 1) as f64;
-        let chiefs: Option<Vec<f64>> = (0..KNOTS).map(|i| self.chief(step * i as f64)).collect();
-        let chiefs = chiefs?;
+        let aimed = AimedLight::new(self.model, self.bands, reach)?;
+        let wavelengths = wavelengths(self.bands);
         let lens = |w: &usize| BackwardLens::new(self.model, *w).ok();
-        let lenses: Option<Vec<BackwardLens>> = wavelengths.iter().map(lens).collect();
-        let lenses = lenses?;
+        let lenses = wavelengths.iter().map(lens).collect::<Option<Vec<BackwardLens>>>()?;
         let one = |i: usize| {
             let (set, knot) = (i / KNOTS, i % KNOTS);
-            self.spread((&lenses[set], wavelengths[set]), step * knot as f64, chiefs[knot])
+            let radius = aimed.steps[0] * knot as f64;
+            self.spread((&lenses[set], wavelengths[set]), radius, aimed.chiefs[knot])
         };
         let found: Option<Vec<PupilSpread>> =
             (0..lenses.len() * KNOTS).into_par_iter().map(one).collect();
         let sets = found?.chunks(KNOTS).map(<[PupilSpread]>::to_vec).collect();
-        let bright = reach / (LIGHTS - 1) as f64;
-        let light = |i: usize| {
-            let (set, knot) = (i / LIGHTS, i % LIGHTS);
-            let at = [0.0, bright * knot as f64];
-            irradiance(self.model, wavelengths[set], at, ACCURACY).map_or(0.0, |found| found.value)
-        };
-        let lights: Vec<f64> = (0..lenses.len() * LIGHTS).into_par_iter().map(light).collect();
-        let lights = lights.chunks(LIGHTS).map(<[f64]>::to_vec).collect();
-        let aimed = AimedLight { steps: [step, bright], chiefs, lights };
         PupilSpreads::aberrated((sets, offsets(self.bands)), aimed, [reach, margin])
-    }
-
-    /// The direction cosine along y, backwards, of the chief ray that lands at a distance from the axis.
-    fn chief(&self, radius: f64) -> Option<f64> {
-        let field = field_at(self.model, radius)?;
-        let launch = self.model.launch(field, self.model.primary).ok()?;
-        let landed = launch.unclipped_landing([0.0; 2])?.ray;
-        let [height, cosine, ahead] =
-            [landed.point.y, landed.direction.y, landed.direction.z].map(|v| v.value);
-        // Light goes the other way; on the other side of the axis it is mirrored.
-        let side = if height < 0.0 { -1.0 } else { 1.0 };
-        (ahead.abs() > 0.0).then_some(-side * cosine)
     }
 
     /// The spread at a distance from the axis about a chief ray.
@@ -128,7 +122,7 @@ impl AberratedLens<'_> {
             chief: lens.exit(landed.ray(0)),
             path: landed.opl[0],
             index: channel.system.index_before,
-            distance: self.distance,
+            distance: self.scene.layers().first().and_then(|layer| layer.distance),
         };
         let raster = DirectionRaster::new(self.directions, radius)?;
         let (landed, places) = raster.trace(lens, radius);
@@ -143,6 +137,23 @@ impl AberratedLens<'_> {
         is_resolved(&lit, &waves)
             .then(|| PupilSpread::of_raster(&lit, Some(&waves), raster.step))?
     }
+}
+
+/// The wavelengths of all colours, one after the other.
+fn wavelengths(bands: &[ColorBand]) -> Vec<usize> {
+    bands.iter().flat_map(|band| &band.wavelengths).map(|(wavelength, _)| *wavelength).collect()
+}
+
+/// The direction cosine along y, backwards, of the chief ray that lands at a distance from the axis.
+fn chief(model: &RayModel, radius: f64) -> Option<f64> {
+    let field = field_at(model, radius)?;
+    let launch = model.launch(field, model.primary).ok()?;
+    let landed = launch.unclipped_landing([0.0; 2])?.ray;
+    let [height, cosine, ahead] =
+        [landed.point.y, landed.direction.y, landed.direction.z].map(|v| v.value);
+    // Light goes the other way; on the other side of the axis it is mirrored.
+    let side = if height < 0.0 { -1.0 } else { 1.0 };
+    (ahead.abs() > 0.0).then_some(-side * cosine)
 }
 
 /// The wave of the object point that a chief ray meets.

@@ -15,7 +15,6 @@ use super::aimed_light::AimedLight;
 use super::color_band::ColorBand;
 use super::lit_directions::LitDirections;
 use super::losses::LensLosses;
-use super::pupil_spread::PupilSpreads;
 use crate::analysis::BackwardLens;
 use crate::pupil::RayModel;
 use crate::trace::{Landings, Ray, Rays, TraceSink as _};
@@ -230,7 +229,7 @@ impl BeamletTable {
     pub(super) fn aimed(
         model: &RayModel,
         bands: &[ColorBand],
-        (spreads, aimed): (&PupilSpreads, &AimedLight),
+        aimed: &AimedLight,
         losses: Option<&LensLosses>,
         (reach, radii): (f64, usize),
     ) -> Result<Self, PictureError> {
@@ -243,7 +242,7 @@ impl BeamletTable {
             for (color, band) in bands.iter().enumerate() {
                 let mut moments = RayMoments::default();
                 for (w, (wavelength, share)) in band.wavelengths.iter().enumerate() {
-                    let light = aimed.light(spreads.number([color, w]), radius);
+                    let light = aimed.light([color, w], radius);
                     let passed = losses.map_or(1.0, |own| own.passed([color, w], radius, cosines));
                     let lens = BackwardLens::new(model, *wavelength)?;
                     let Some((ray, _)) = lens.ray([0.0, radius], cosines) else { continue };

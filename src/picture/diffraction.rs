@@ -105,67 +105,95 @@ impl DiffractionLight {
         if bound <= tolerance {
             return off("at most 1.27 nu lambda F of contrast");
         }
-        let lens = BackwardLens::new(model, model.primary)?;
         let reach = frame.reach();
         let longest = longest(model, bands);
-        let all = |factor: f64| {
-            let margin = factor * longest / lit_width(inside)?;
-            let directions = LitDirections::new(model, wavelengths, reach + margin, RINGS).ok()?;
-            let lens = (&lens, offsets(bands));
-            let spreads = PupilSpreads::new(lens, &directions, reach, margin).ok()?;
-            Some((directions, spreads))
-        };
-        let Some((directions, spreads)) = MARGINS.into_iter().find_map(all) else {
+        let size = (reach, longest / lit_width(inside).unwrap_or(0.0));
+        let Some((directions, spreads)) = unaberrated((model, bands), wavelengths, size)? else {
             return off("left out: the directions of light around the picture are not known");
         };
         let least = (ACCURACY * tolerance).clamp(ACCURACIES[0], ACCURACIES[1]);
         let contrasts = PLACES.par_iter().filter_map(|part| {
             PlaceContrast::new((model, bands), (part * reach, frequency), least)
         });
-        let contrasts: Vec<PlaceContrast> = contrasts.collect();
-        let largest = |errors: &dyn Fn(&PlaceContrast) -> f64| {
-            contrasts.iter().map(errors).fold(0.0, f64::max)
-        };
-        if contrasts.is_empty() {
+        let contrasts = Contrasts(contrasts.collect());
+        if contrasts.0.is_empty() {
             return off("left out: contrast by diffraction is not known anywhere in the picture");
         }
-        let change = largest(&PlaceContrast::change);
-        let mut left = largest(&|place| place.left(&spreads, true));
-        let mut spreads = spreads;
-        if change > tolerance && left > tolerance && scene.is_at_one_distance() {
-            let distance = scene.layers()[0].distance;
-            let lens = AberratedLens { model, bands, directions: &directions, distance };
-            let aberrated = lens.spreads(reach, spreads.margin);
-            let better = aberrated
-                .map(|own| (largest(&|place| place.left(&own, false)), own))
-                .filter(|(other, _)| *other < left);
-            if let Some((other, own)) = better {
-                (left, spreads) = (other, own);
-            }
-        }
-        let on = change > tolerance && left < change;
+        let change = contrasts.largest(PlaceContrast::change);
+        let matters = change > tolerance;
+        let lens = AberratedLens { model, bands, directions: &directions, scene };
+        let (mut spreads, left) = contrasts.better(spreads, &lens, (reach, tolerance), matters);
+        let on = matters && left < change;
+        let aberrated = on && spreads.aimed.is_some();
         let shifts = COMPARED.map(|part| part * frequency * wavelength);
         let shifts: Vec<_> = shifts.iter().flat_map(|v| [[*v, 0.0], [0.0, *v]]).collect();
         let report = DiffractionReport {
             on,
-            aberrated: on && spreads.aimed.is_some(),
+            aberrated,
             variation: spreads.variation(&shifts),
             change,
             left: if on { left } else { change },
             cut: if on { spreads.cut(longest) } else { 0.0 },
-            points: contrasts.len(),
-            reason: match (on, spreads.aimed.is_some()) {
-                (true, true) => {
-                    "it changes contrast; the spread of the pupil with its aberrations is put in"
-                }
-                _ => reason([on, change > tolerance, left > tolerance]),
-            },
+            points: contrasts.0.len(),
+            reason: if aberrated { ABERRATED } else { reason([on, matters, left > tolerance]) },
             ..without("")
         };
         spreads.is_even = report.variation <= tolerance;
         Ok(Self { report, parts: on.then_some((directions, spreads)) })
     }
 }
+
+/// Directions of light as far as it spreads, and the spreads of pupils without aberrations, up to `reach` mm from the
+/// axis; the longest wavelength over the width of the light is given. `None` where directions are not known.
+fn unaberrated(
+    (model, bands): (&RayModel, &[ColorBand]),
+    wavelengths: &[usize],
+    (reach, unit): (f64, f64),
+) -> Result<Option<(LitDirections, PupilSpreads)>, PictureError> {
+    if !unit.is_finite() {
+        return Ok(None);
+    }
+    let lens = BackwardLens::new(model, model.primary)?;
+    let all = |factor: f64| {
+        let margin = factor * unit;
+        let directions = LitDirections::new(model, wavelengths, reach + margin, RINGS).ok()?;
+        let lens = (&lens, offsets(bands));
+        let spreads = PupilSpreads::new(lens, &directions, reach, margin).ok()?;
+        Some((directions, spreads))
+    };
+    Ok(MARGINS.into_iter().find_map(all))
+}
+
+/// Contrasts at places of a picture.
+struct Contrasts(Vec<PlaceContrast>);
+
+impl Contrasts {
+    fn largest(&self, error: impl Fn(&PlaceContrast) -> f64) -> f64 {
+        self.0.iter().map(error).fold(0.0, f64::max)
+    }
+
+    /// These spreads of pupils alone, or those with aberrations where they matter and leave less; and what they leave.
+    fn better(
+        &self,
+        plain: PupilSpreads,
+        lens: &AberratedLens<'_>,
+        (reach, tolerance): (f64, f64),
+        matters: bool,
+    ) -> (PupilSpreads, f64) {
+        let left = self.largest(|place| place.left(&plain, true));
+        let tried = matters && left > tolerance && lens.scene.is_at_one_distance();
+        let found = tried.then(|| lens.spreads(reach, plain.margin)).flatten();
+        let other = found.map(|own| (self.largest(|place| place.left(&own, false)), own));
+        match other {
+            Some((less, own)) if less < left => (own, less),
+            _ => (plain, left),
+        }
+    }
+}
+
+/// The reason for a spread with aberrations.
+const ABERRATED: &str =
+    "it changes contrast; the spread of the pupil with its aberrations is put in";
 
 /// The number of wavelengths of each colour that come before it.
 pub(super) fn offsets(bands: &[ColorBand]) -> Vec<usize> {

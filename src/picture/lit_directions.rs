@@ -26,6 +26,10 @@ const WIDER: f64 = 1.01;
 /// The same of the boxes, which are known at fewer places.
 const BOX_WIDER: f64 = 1.03;
 
+/// The area of a polygon over that of the smallest outline in it up to which one ring serves: the widening takes
+/// the half of it.
+const ALIKE: f64 = 1.05;
+
 /// The polygons from which directions are drawn, one for every ring of the image.
 #[derive(Debug, Clone)]
 pub struct LitDirections {
@@ -63,7 +67,7 @@ pub struct DrawnDirection {
 
 impl LitDirections {
     /// The directions at the points of an image up to `reach` mm from the axis at some wavelengths of a
-    /// model, in rings of equal width.
+    /// model, in at most so many rings of equal width: in one where the light of all points is nearly alike.
     ///
     /// # Errors
     /// The edge of the light is not known somewhere, or there is none anywhere.
@@ -73,6 +77,28 @@ impl LitDirections {
         reach: f64,
         rings: usize,
     ) -> Result<Self, PictureError> {
+        let one = Self::of_rings(model, wavelengths, reach, 1);
+        match one {
+            Ok((table, spare)) if spare < ALIKE => Ok(table),
+            _ => Ok(Self::of_rings(model, wavelengths, reach, rings)?.0),
+        }
+    }
+
+    /// The number of rings.
+    pub fn rings(&self) -> usize {
+        self.rings.len()
+    }
+
+    /// The directions in so many rings, and the largest area of a polygon over that of an outline in it.
+    ///
+    /// # Errors
+    /// As [`LitDirections::new`].
+    pub fn of_rings(
+        model: &RayModel,
+        wavelengths: &[usize],
+        reach: f64,
+        rings: usize,
+    ) -> Result<(Self, f64), PictureError> {
         let step = reach / rings as f64;
         let at = |part: f64| outlines(model, wavelengths, part * step);
         let found: Result<Vec<_>, _> =
@@ -90,7 +116,13 @@ impl LitDirections {
         let checked: Result<Vec<_>, PictureError> =
             between.into_par_iter().map(|part| Ok((part, at(part)?))).collect();
         table.widen_to(&checked?);
-        Ok(table)
+        let areas = found.iter().enumerate().map(|(i, outlines)| {
+            let ring = table.rings[(i / 2).min(rings - 1)].as_ref();
+            let least = outlines.iter().map(|outline| area(outline)).fold(f64::INFINITY, f64::min);
+            ring.map_or(f64::INFINITY, |ring| ring.areas[CORNERS - 1] / least.max(0.0))
+        });
+        let spare = areas.fold(1.0, f64::max);
+        Ok((table, spare))
     }
 
     /// Widens all polygons if an outline between the tabulated ones lies outside its own.
@@ -144,6 +176,12 @@ fn outlines(
         Err(source) => Err(PictureError::Directions { radius, source }),
     };
     wavelengths.iter().map(outline).collect()
+}
+
+/// The area that an outline encloses.
+fn area(outline: &[[f64; 2]]) -> f64 {
+    let next = outline.iter().skip(1).chain(outline.first());
+    0.5 * outline.iter().zip(next).map(|(a, b)| a[0] * b[1] - a[1] * b[0]).sum::<f64>().abs()
 }
 
 /// The smallest rectangle around outlines: its middle and half of its sides; `None` if all are dark.

@@ -6,10 +6,12 @@
 //! width).
 
 use super::exact::luminance;
-use super::pattern::{Paint, PaintedPoint};
+use super::pattern::{Paint, PaintLine, PaintedPoint};
 use super::scene::SceneLayer;
+use super::seen_light::{LINE as PAINTED, SeenColor};
 use super::smear::{PaintTexel, SmearedTexels, margins};
 use super::tent_line::{LightView, split};
+use crate::math::{SimdWidth, run_vectorized};
 use rayon::prelude::*;
 
 /// Light times cover, and cover.
@@ -275,9 +277,8 @@ impl PaintedTexels<'_> {
         let [width, height] = self.size;
         let to = (from + ROWS).min(height);
         let first = from.saturating_sub(1);
-        let middles: Vec<Vec<PaintTexel>> = (first..(to + 1).min(height))
-            .map(|row| (0..width).map(|column| self.sample([column, row], [0.5; 2])).collect())
-            .collect();
+        let middles: Vec<Vec<PaintTexel>> =
+            (first..(to + 1).min(height)).map(|row| self.middles(row)).collect();
         let row = |row: usize| &middles[row.clamp(first, first + middles.len() - 1) - first];
         let texel = |y: usize, x: usize| {
             let here = row(y)[x];
@@ -291,6 +292,39 @@ impl PaintedTexels<'_> {
             if is_smooth { here } else { self.mean([x, y]) }
         };
         (from..to).flat_map(|y| (0..width).map(move |x| (y, x))).map(|(y, x)| texel(y, x)).collect()
+    }
+
+    /// The paint in the middles of the texels of a row; many at once where the painting is grey.
+    fn middles(&self, row: usize) -> Vec<PaintTexel> {
+        let width = self.size[0];
+        if !self.layer.pattern.is_grey() {
+            return (0..width).map(|column| self.sample([column, row], [0.5; 2])).collect();
+        }
+        let half_size = self.layer.half_size;
+        let at = |k: usize, i: usize| self.corner[k] + self.texel * (i as f64 + 0.5);
+        let (seen, y) = (SeenColor { color: 0, colors: 3 }, at(1, row));
+        let mut middles = Vec::with_capacity(width);
+        for from in (0..width).step_by(PAINTED) {
+            let count = PAINTED.min(width - from);
+            let mut paint = PaintLine::new(count);
+            for i in 0..count {
+                let x = at(0, from + i);
+                (paint.place[0][i], paint.place[1][i]) = (x, y);
+                let is_inside = x.abs() <= half_size[0] && y.abs() <= half_size[1];
+                paint.is_met[i] = if is_inside { 1.0 } else { 0.0 };
+            }
+            run_vectorized(
+                SimdWidth::detect(),
+                #[inline(always)]
+                || self.layer.pattern.paint_line(half_size, seen, &mut paint),
+            );
+            middles.extend((0..count).map(|i| {
+                let cover = if paint.is_met[i] > 0.0 { paint.cover[i] } else { 0.0 };
+                let light = if cover > 0.0 { (paint.level[i] * cover) as f32 } else { 0.0 };
+                [light, light, light, cover as f32]
+            }));
+        }
+        middles
     }
 
     /// The mean over a texel.

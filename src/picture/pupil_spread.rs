@@ -101,14 +101,10 @@ impl PupilSpreads {
         is_whole.then_some(Self { step, sets, offsets, margin, aimed, is_even: false })
     }
 
-    /// The number of a wavelength of a colour among all.
-    pub(super) fn number(&self, [color, wavelength]: [usize; 2]) -> usize {
-        self.offsets[color] + wavelength
-    }
-
     /// The knots around a distance from the axis for a wavelength of a colour, and the share of the outer one.
-    fn between(&self, light: [usize; 2], radius: f64) -> ([&PupilSpread; 2], f64) {
-        let knots = &self.sets[self.number(light).min(self.sets.len() - 1)];
+    fn between(&self, [color, wavelength]: [usize; 2], radius: f64) -> ([&PupilSpread; 2], f64) {
+        let number = self.offsets[color] + wavelength;
+        let knots = &self.sets[number.min(self.sets.len() - 1)];
         let last = knots.len() - 1;
         let place = (radius / self.step).clamp(0.0, last as f64);
         let index = (place as usize).min(last - 1);

@@ -6,7 +6,7 @@
 
 use super::aimed_light::AimedLight;
 use super::diffraction::image_wavelength;
-use super::exact::{REPLICATES, mean_with_error};
+use super::exact::{REPLICATES, TILE, mean_with_error};
 use super::lit_directions::LitDirections;
 use super::losses::LensLosses;
 use super::pupil_spread::PupilSpreads;
@@ -127,12 +127,16 @@ pub(super) struct TileSampler {
     lenses: Vec<Vec<BackwardLens>>,
     /// Their wavelengths in the image space in mm.
     lengths: Vec<Vec<f64>>,
+    /// The numbers of these in the model: colours that have one in common share its rays.
+    numbers: Vec<Vec<usize>>,
     spectrum: Vec<SpectralPart>,
     pub(super) directions: LitDirections,
     /// The light that surfaces reflect; `None` if they let all light pass.
     pub(super) losses: Option<LensLosses>,
     /// The displacements of image points by diffraction; `None` if it is left out.
     pub(super) spreads: Option<PupilSpreads>,
+    /// The rays that stand for all light of a point where blur is left out.
+    pub(super) sharp: Option<AimedLight>,
 }
 
 impl TileSampler {
@@ -148,13 +152,16 @@ impl TileSampler {
         let lenses = bands.iter().map(of_band).collect::<Result<_, _>>()?;
         let length = |(wavelength, _): &(usize, f64)| image_wavelength(model, *wavelength);
         let lengths = bands.iter().map(|band| band.wavelengths.iter().map(length).collect());
+        let numbers = |band: &ColorBand| band.wavelengths.iter().map(|(w, _)| *w).collect();
         Ok(Self {
             lenses,
             lengths: lengths.collect(),
+            numbers: bands.iter().map(numbers).collect(),
             spectrum: spectrum(bands),
             directions,
             losses: None,
             spreads: None,
+            sharp: None,
         })
     }
 
@@ -170,8 +177,10 @@ impl TileSampler {
             tile.pixels().map(move |pixel| set_seed(place(pixel) + replicate, seed))
         };
         let seeds: Vec<u32> = (0..REPLICATES).flat_map(of_replicate).collect();
-        let first = seeds.chunks(tile.len().max(1)).filter_map(|seeds| seeds.first().copied());
-        let color_seeds: Vec<u32> = first.collect();
+        // Tiles of any size in a cell of the largest have the wavelengths of that cell.
+        let cell = [tile.columns.start, tile.rows.start].map(|v| v / TILE * TILE);
+        let color_seeds: Vec<u32> =
+            (0..REPLICATES).map(|replicate| set_seed(place(cell) + replicate, seed)).collect();
         let corner =
             |k: usize| tile.pixels().map(|pixel| frame.point(pixel, [0.0; 2])[k]).collect();
         TileWork {
@@ -287,18 +296,18 @@ impl TileSampler {
         [color, wavelength]: [usize; 2],
         (radius, unit): (f64, [f64; 2]),
     ) -> Option<([f64; 2], RayShare)> {
-        if let Some((spreads, aimed)) = self.aimed() {
-            let light = aimed.light(spreads.number([color, wavelength]), radius);
+        if let Some(aimed) = self.aimed() {
+            let light = aimed.light([color, wavelength], radius);
             return Some((aimed.chief(radius), RayShare::Irradiance(light)));
         }
         let drawn = self.directions.draw(radius, unit)?;
         Some((drawn.cosines, RayShare::Area(drawn.area)))
     }
 
-    /// The rays that stand for all light of a point, if spreads have its aberrations.
-    fn aimed(&self) -> Option<(&PupilSpreads, &AimedLight)> {
-        let spreads = self.spreads.as_ref()?;
-        Some((spreads, spreads.aimed.as_ref()?))
+    /// The rays that stand for all light of a point, if spreads have its aberrations, or if it has none.
+    pub(super) fn aimed(&self) -> Option<&AimedLight> {
+        let of_spreads = self.spreads.as_ref().map(|spreads| spreads.aimed.as_ref());
+        of_spreads.unwrap_or(self.sharp.as_ref())
     }
 
     /// Traces the rays of a queue that is full.
@@ -322,13 +331,17 @@ impl TileSampler {
         lights: &[ColorLight],
         scene: &Scene,
     ) {
-        let colors = self.colors();
+        let (colors, mut traced) = (self.colors(), None);
         for (color, wavelength) in lights {
             let (color, wavelength) = (*color, *wavelength);
             let lens = &self.lenses[color][wavelength];
-            lens.trace(&queue.rays, &mut queue.landings);
-            work.fates.add(queue.landings.fates());
-            lens.scene_rays(&queue.landings, &mut queue.outside);
+            let number = Some(self.numbers[color][wavelength]);
+            if traced != number {
+                lens.trace(&queue.rays, &mut queue.landings);
+                work.fates.add(queue.landings.fates());
+                lens.scene_rays(&queue.landings, &mut queue.outside);
+                traced = number;
+            }
             let seen = SeenColor { color, colors };
             scene.light_along(&queue.outside, &queue.seconds, seen, &mut queue.light);
             if let Some(losses) = &self.losses {

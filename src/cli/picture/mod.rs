@@ -260,11 +260,24 @@ impl PictureArgs {
     ) -> Vec<OmittedEffect> {
         let frame = &rendered.picture.frame;
         let mut left_out = omitted_beside(&shot.model, frame, self.error.0, included);
-        if let Some(colors) = rendered.colors.filter(|colors| colors.count == 1) {
+        if let Some(colors) = rendered.colors.filter(|colors| colors.count <= 1) {
+            let (effect, reason) = if colors.count == 0 {
+                (
+                    "colour errors",
+                    "of some tiles with a wavelength for each colour instead of one for all",
+                )
+            } else {
+                let effect = "change of wavelength within a colour";
+                (effect, "of some tiles with three wavelengths instead of one")
+            };
+            left_out.push(OmittedEffect { effect, change: Some(colors.change), reason });
+        }
+        if rendered.is_sharp {
+            let used = rendered.split.shares().iter().find(|share| share.effect == "blur");
             left_out.push(OmittedEffect {
-                effect: "change of wavelength within a colour",
-                change: Some(colors.change),
-                reason: "of some tiles with three wavelengths instead of one",
+                effect: "blur",
+                change: used.map(|share| share.used),
+                reason: "of some tiles with rays from all of the pupil instead of one",
             });
         }
         let off =

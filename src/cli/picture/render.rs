@@ -24,8 +24,11 @@ const CHECKED_SAMPLES: usize = 128;
 const MAPPED_SAMPLES: usize = 64;
 /// The tiles on which numbers of wavelengths are compared, and the samples of their pixels.
 pub(super) const TILES: (usize, usize) = (3, 32);
-/// The numbers of wavelengths of a colour, each the double of the one before less one.
-const WAVELENGTH_COUNTS: [usize; 4] = [1, 3, 5, 9];
+/// The numbers of wavelengths of a colour: none of its own, one, and then each the double of the one before less
+/// one.
+const WAVELENGTH_COUNTS: [usize; 5] = [0, 1, 3, 5, 9];
+/// The place of the number for a picture that nothing was compared for, and of the first with coatings.
+const USUAL: usize = 2;
 /// The number of steps of the progress bar.
 const STEPS: usize = 1000;
 
@@ -33,6 +36,7 @@ const STEPS: usize = 1000;
 const SAMPLING: &str = "sampling";
 const DIFFRACTION: &str = "diffraction";
 const WAVELENGTHS: &str = "wavelengths";
+const BLUR: &str = "blur";
 const LOSSES: &str = "losses";
 const GHOSTS: &str = "ghosts";
 
@@ -54,6 +58,10 @@ pub(super) struct RenderedPicture {
     pub(super) ghosts: Option<(GhostReport, f64)>,
     /// The wavelengths of a colour; `None` in grey.
     pub(super) colors: Option<ColorChoice>,
+    /// True if blur is left out.
+    pub(super) is_sharp: bool,
+    /// The number of rings of the image whose directions of light are told apart.
+    pub(super) rings: usize,
     /// Every effect, if that is asked for.
     pub(super) gates: Option<Vec<PictureGate>>,
 }
@@ -80,6 +88,8 @@ impl RenderedPicture {
             losses: None,
             ghosts: None,
             colors: None,
+            is_sharp: false,
+            rings: 0,
             gates: None,
         }
     }
@@ -94,7 +104,7 @@ impl PictureArgs {
     ) -> Result<(RenderedPicture, CameraShot), CliError> {
         let refuse = |error: PictureError| CliError::Input(format!("{}: {error}", opened.file));
         let mut split = self.split();
-        let shot = self.shot(opened, source, WAVELENGTH_COUNTS[1]).map_err(refuse)?;
+        let shot = self.shot(opened, source, WAVELENGTH_COUNTS[USUAL]).map_err(refuse)?;
         let scene = self.scene(source, &shot).map_err(|error| match error {
             SceneFileError::Picture(error) => refuse(error),
             other => scene_error(other),
@@ -118,6 +128,8 @@ impl PictureArgs {
             diffraction: renderer.diffraction().cloned(),
             losses: renderer.losses().cloned(),
             colors,
+            is_sharp: renderer.is_sharp(),
+            rings: renderer.rings(),
             ..RenderedPicture::new(light, split)
         };
         if !is_stopped() {
@@ -163,7 +175,7 @@ impl PictureArgs {
         }
         let mut chosen = None;
         // Coatings and glasses change light with the wavelength as well.
-        let least = usize::from(self.coating.is_some());
+        let least = if self.coating.is_some() { USUAL } else { 0 };
         for pair in WAVELENGTH_COUNTS.windows(2).skip(least) {
             let [few, many] = [pair[0], pair[1]].map(|count| self.shot(opened, source, count));
             let (few, many) = (few?, many?);
@@ -199,16 +211,44 @@ impl PictureArgs {
     ) -> Result<ExactRenderer<'a>, PictureError> {
         let CameraShot { model, bands, frame, .. } = shot;
         let renderer = ExactRenderer::new(model, bands, scene, *frame)?;
-        let renderer = renderer.with_diffraction(model, bands, split.allowed())?;
+        let mut renderer = renderer.with_diffraction(model, bands, split.allowed())?;
         split.note(DIFFRACTION, renderer.diffraction().map_or(0.0, |found| found.error(1.0)));
+        let is_spread = renderer.diffraction().is_some_and(|found| found.on);
+        if !is_spread && let Some(change) = self.blur_change(shot, scene, split.allowed())? {
+            split.share_with(BLUR);
+            split.note(BLUR, change);
+            renderer = renderer.without_blur(model, bands);
+        }
         let Some(coating) = self.coating else { return Ok(renderer) };
         let taken = LightLosses { coating, glasses: Some(&opened.lens) };
         let renderer = renderer.with_losses(model, bands, taken, split.allowed())?;
+        // Where one ray stands for all light of a point, its share does.
+        let is_aimed = renderer.is_sharp() || renderer.diffraction().is_some_and(|d| d.aberrated);
         let wrong = |losses: &LossReport| {
-            if losses.by_ray { losses.error } else { losses.variation }
+            if losses.by_ray && !is_aimed { losses.error } else { losses.variation }
         };
         split.note(LOSSES, renderer.losses().map_or(0.0, wrong));
         Ok(renderer)
+    }
+
+    /// The change of some tiles if all light of a point follows one ray, if that is small enough to leave out blur.
+    fn blur_change(
+        &self,
+        shot: &CameraShot,
+        scene: &Scene,
+        allowed: f64,
+    ) -> Result<Option<f64>, PictureError> {
+        let CameraShot { model, bands, frame, focus, .. } = shot;
+        let (focus, seconds, tolerance) = (*focus, 0.0, allowed);
+        let subject = GateSubject { model, bands, frame, scene, focus, seconds, tolerance };
+        if subject.is_blurred() {
+            return Ok(None);
+        }
+        let blurred = ExactRenderer::new(model, bands, scene, *frame)?;
+        let sharp = ExactRenderer::new(model, bands, scene, *frame)?.without_blur(model, bands);
+        let change = tile_change([&blurred, &sharp], [0.0; 2], TILES);
+        // One more effect shares the tolerance then.
+        Ok((sharp.is_sharp() && change <= 0.7 * allowed).then_some(change))
     }
 
     /// The picture by the quick way if its error allows it, else by the exact one.

@@ -121,7 +121,7 @@ impl QuickRenderer {
         subject: &PictureSubject<'_>,
         seconds: f64,
     ) -> Result<Self, PictureError> {
-        let PictureSubject { scene, frame, directions, losses, white, spreads } = *subject;
+        let PictureSubject { scene, frame, directions, losses, white, spreads, aimed } = *subject;
         let blur = spreads.map(|spreads| FrameBlur::new(model, bands, spreads, frame));
         let frame = blur.as_ref().map_or(frame, FrameBlur::rendered);
         let reach = frame.reach();
@@ -130,7 +130,6 @@ impl QuickRenderer {
         let is_small = radii < RADII[0];
         let windows = if is_small { &WINDOWS[..SMALL] } else { &WINDOWS[..] };
         let size = TableSize { windows, rays: RAYS[usize::from(is_small)], radii };
-        let aimed = spreads.and_then(|spreads| Some((spreads, spreads.aimed.as_ref()?)));
         let tables = match aimed {
             Some(aimed) => {
                 vec![BeamletTable::aimed(model, bands, aimed, losses, (reach, radii))?]
