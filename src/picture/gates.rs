@@ -133,7 +133,7 @@ impl GateSubject<'_> {
     pub fn tabulate_directions(&self, is_even: bool) -> Result<LitDirections, PictureError> {
         let rings = if is_even { 1 } else { RINGS };
         let colors = outer(self.model, self.bands);
-        Ok(LitDirections::of_rings(self.model, &colors, self.frame.reach(), rings)?.0)
+        LitDirections::of_rings(self.model, &colors, self.frame.reach(), rings)
     }
 
     /// True if something moves by as much as can be seen.

@@ -77,11 +77,10 @@ impl LitDirections {
         reach: f64,
         rings: usize,
     ) -> Result<Self, PictureError> {
-        let one = Self::of_rings(model, wavelengths, reach, 1);
-        match one {
-            Ok((table, spare)) if spare < ALIKE => Ok(table),
-            _ => Ok(Self::of_rings(model, wavelengths, reach, rings)?.0),
-        }
+        let at = |part: f64| outlines(model, wavelengths, part * reach);
+        let ends = [0.0, 0.5, 1.0].into_par_iter().map(at).collect::<Result<Vec<_>, _>>()?;
+        let rings = if is_alike(&ends) { 1 } else { rings };
+        Self::between_outlines((model, wavelengths), reach, rings, &ends)
     }
 
     /// The number of rings.
@@ -89,7 +88,7 @@ impl LitDirections {
         self.rings.len()
     }
 
-    /// The directions in so many rings, and the largest area of a polygon over that of an outline in it.
+    /// The directions in so many rings.
     ///
     /// # Errors
     /// As [`LitDirections::new`].
@@ -98,11 +97,24 @@ impl LitDirections {
         wavelengths: &[usize],
         reach: f64,
         rings: usize,
-    ) -> Result<(Self, f64), PictureError> {
+    ) -> Result<Self, PictureError> {
+        Self::between_outlines((model, wavelengths), reach, rings, &[])
+    }
+
+    /// The directions in rings, whose outlines on the axis, half way and at the end may be known.
+    fn between_outlines(
+        (model, wavelengths): (&RayModel, &[usize]),
+        reach: f64,
+        rings: usize,
+        known: &[Vec<Outline>],
+    ) -> Result<Self, PictureError> {
         let step = reach / rings as f64;
         let at = |part: f64| outlines(model, wavelengths, part * step);
-        let found: Result<Vec<_>, _> =
-            (0..=2 * rings).into_par_iter().map(|i| at(0.5 * i as f64)).collect();
+        let found = |i: usize| match known.get(i / rings) {
+            Some(known) if i.is_multiple_of(rings) => Ok(known.clone()),
+            _ => at(0.5 * i as f64),
+        };
+        let found: Result<Vec<_>, _> = (0..=2 * rings).into_par_iter().map(found).collect();
         let found = found?;
         let ring =
             |i: usize| RingPolygon::new([&found[2 * i], &found[2 * i + 1], &found[2 * i + 2]]);
@@ -116,13 +128,7 @@ impl LitDirections {
         let checked: Result<Vec<_>, PictureError> =
             between.into_par_iter().map(|part| Ok((part, at(part)?))).collect();
         table.widen_to(&checked?);
-        let areas = found.iter().enumerate().map(|(i, outlines)| {
-            let ring = table.rings[(i / 2).min(rings - 1)].as_ref();
-            let least = outlines.iter().map(|outline| area(outline)).fold(f64::INFINITY, f64::min);
-            ring.map_or(f64::INFINITY, |ring| ring.areas[CORNERS - 1] / least.max(0.0))
-        });
-        let spare = areas.fold(1.0, f64::max);
-        Ok((table, spare))
+        Ok(table)
     }
 
     /// Widens all polygons if an outline between the tabulated ones lies outside its own.
@@ -176,6 +182,14 @@ fn outlines(
         Err(source) => Err(PictureError::Directions { radius, source }),
     };
     wavelengths.iter().map(outline).collect()
+}
+
+/// True if one polygon holds the outlines on the axis, half way and at the end of an image with little to spare.
+fn is_alike(ends: &[Vec<Outline>]) -> bool {
+    let [axis, middle, end] = ends else { return false };
+    let Some(ring) = RingPolygon::new([axis, middle, end]) else { return false };
+    let areas = ends.iter().flatten().map(|outline| area(outline));
+    ring.areas[CORNERS - 1] < ALIKE * areas.fold(f64::INFINITY, f64::min)
 }
 
 /// The area that an outline encloses.
