@@ -233,38 +233,16 @@ impl BeamletTable {
         losses: Option<&LensLosses>,
         (reach, radii): (f64, usize),
     ) -> Result<Self, PictureError> {
+        let lenses = |band: &ColorBand| {
+            let lens = |(wavelength, share): &(usize, f64)| {
+                Ok((*share, BackwardLens::new(model, *wavelength)?))
+            };
+            band.wavelengths.iter().map(lens).collect::<Result<Vec<_>, PictureError>>()
+        };
+        let lenses = bands.iter().map(lenses).collect::<Result<Vec<_>, PictureError>>()?;
         let step = reach / radii as f64;
-        let mut rows = Vec::with_capacity(radii + 1);
-        for i in 0..=radii {
-            let radius = step * i as f64;
-            let cosines = aimed.chief(radius);
-            let mut row = BeamletRow { beamlets: Vec::new(), sideways: vec![0.0; bands.len()] };
-            for (color, band) in bands.iter().enumerate() {
-                let mut moments = RayMoments::default();
-                for (w, (wavelength, share)) in band.wavelengths.iter().enumerate() {
-                    let light = aimed.light([color, w], radius);
-                    let passed = losses.map_or(1.0, |own| own.passed([color, w], radius, cosines));
-                    let lens = BackwardLens::new(model, *wavelength)?;
-                    let Some((ray, _)) = lens.ray([0.0, radius], cosines) else { continue };
-                    let (mut rays, mut landings) = (Rays::default(), Landings::default());
-                    rays.push(ray);
-                    lens.trace(&rays, &mut landings);
-                    let ray = lens.scene_ray(landings.ray(0));
-                    if !landings.fate(0).is_imaged() {
-                        continue;
-                    }
-                    let weight = share * light * passed;
-                    if ray.direction.z < SIDEWAYS {
-                        moments.add(&RayMoments::of_ray(&ray), weight);
-                    } else {
-                        row.sideways[color] += weight;
-                    }
-                }
-                row.beamlets.push(moments.beamlet());
-            }
-            rows.push(row);
-        }
-        Ok(Self { step, windows: 1, rows })
+        let row = |i: usize| BeamletRow::aimed(&lenses, (aimed, losses), step * i as f64);
+        Ok(Self { step, windows: 1, rows: (0..=radii).map(row).collect() })
     }
 
     /// The place of a point of the image in the table.
@@ -278,6 +256,32 @@ impl BeamletTable {
 }
 
 impl BeamletRow {
+    /// The rays that stand for all light at a distance from the axis.
+    fn aimed(
+        lenses: &[Vec<(f64, BackwardLens)>],
+        (aimed, losses): (&AimedLight, Option<&LensLosses>),
+        radius: f64,
+    ) -> Self {
+        let cosines = aimed.chief(radius);
+        let mut row = Self { beamlets: Vec::new(), sideways: vec![0.0; lenses.len()] };
+        for (color, lenses) in lenses.iter().enumerate() {
+            let mut moments = RayMoments::default();
+            for (w, (share, lens)) in lenses.iter().enumerate() {
+                let passed = losses.map_or(1.0, |own| own.passed([color, w], radius, cosines));
+                let weight = share * passed * aimed.light([color, w], radius);
+                match single_ray(lens, radius, cosines) {
+                    Some(ray) if ray.direction.z < SIDEWAYS => {
+                        moments.add(&RayMoments::of_ray(&ray), weight);
+                    }
+                    Some(_) => row.sideways[color] += weight,
+                    None => {}
+                }
+            }
+            row.beamlets.push(moments.beamlet());
+        }
+        row
+    }
+
     fn new(colors: &[TracedBox<'_>], level: usize) -> Self {
         let windows = colors.iter().flat_map(|color| &color.windows[level]);
         Self {
@@ -285,6 +289,14 @@ impl BeamletRow {
             sideways: colors.iter().map(|color| color.sideways).collect(),
         }
     }
+}
+
+/// The ray of the scene whose light arrives at a point of the y axis in a direction.
+fn single_ray(lens: &BackwardLens, radius: f64, cosines: [f64; 2]) -> Option<Ray<f64>> {
+    let (mut rays, mut landings) = (Rays::default(), Landings::default());
+    rays.push(lens.ray([0.0, radius], cosines)?.0);
+    lens.trace(&rays, &mut landings);
+    landings.fate(0).is_imaged().then(|| lens.scene_ray(landings.ray(0)))
 }
 
 /// The rays of one colour at an image point, added up in windows.
