@@ -118,20 +118,24 @@ impl AberratedLens<'_> {
         if !landed.fate(0).is_imaged() {
             return None;
         }
-        let target = ObjectWave {
-            chief: lens.exit(landed.ray(0)),
-            path: landed.opl[0],
-            index: channel.system.index_before,
-            distance: self.scene.layers().first().and_then(|layer| layer.distance),
+        let index = channel.system.index_before;
+        // Paths end in front of the lens: beyond it, what rays miss the object by would count with the square.
+        let ended = |landed: &Landings<f64>, i: usize| {
+            let (far, near) = (lens.exit(landed.ray(i)), lens.scene_ray(landed.ray(i)));
+            let back = (far.point - near.point).dot(near.direction);
+            (near, landed.opl[i] - index * back)
         };
+        let (chief, path) = ended(&landed, 0);
+        let distance = self.scene.layers().first().and_then(|layer| layer.distance);
+        let target = ObjectWave { chief, path, index, distance };
         let raster = DirectionRaster::new(self.directions, radius)?;
         let (landed, places) = raster.trace(lens, radius);
         let (mut lit, mut waves) = (vec![false; RAYS * RAYS], vec![0.0; RAYS * RAYS]);
         for (ray, place) in places.into_iter().enumerate() {
             lit[place] = landed.fate(ray).is_imaged();
             if lit[place] {
-                waves[place] =
-                    target.difference(lens.exit(landed.ray(ray)), landed.opl[ray])? / wave;
+                let (ray, path) = ended(&landed, ray);
+                waves[place] = target.difference(ray, path)? / wave;
             }
         }
         is_resolved(&lit, &waves)
