@@ -69,7 +69,9 @@ impl From<FilmStack> for Vec<ThinFilm> {
 impl fmt::Display for FilmStack {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for (i, film) in self.films().iter().enumerate() {
-            let (index, nm) = (format_short(film.index), format_short(1e6 * film.thickness));
+            // To the picometre: what a conversion from nanometres rounds is none of the thickness.
+            let picometres = (1e9 * film.thickness).round();
+            let (index, nm) = (format_short(film.index), format_short(picometres / 1e3));
             let before = if i == 0 { "" } else { " on " };
             write!(f, "{before}{nm} nm of index {index}")?;
         }
