@@ -12,6 +12,7 @@
 //! Filters*, 2010, section 2.6). Cosines are complex beyond the critical angle, on the branch that decays.
 //! Nothing is absorbed: what is not reflected passes.
 
+use super::film_stack::FilmStack;
 use crate::math::format_short;
 use nalgebra::Complex;
 use serde::{Deserialize, Serialize};
@@ -19,7 +20,7 @@ use std::f64::consts::{PI, TAU};
 use std::fmt;
 
 /// A homogeneous film.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct ThinFilm {
     /// The refractive index.
     pub index: f64,
@@ -41,6 +42,8 @@ pub enum Coating {
     VCoat,
     /// The same share of the light at any angle and wavelength.
     Flat(f64),
+    /// The same films on every surface.
+    Layers(FilmStack),
 }
 
 /// The index of the outer film.
@@ -97,6 +100,7 @@ impl Coating {
             Self::Bare | Self::Flat(_) => Vec::new(),
             Self::SingleLayer => single(),
             Self::VCoat => v_films(glass).unwrap_or_else(single),
+            Self::Layers(stack) => stack.films().to_vec(),
         }
     }
 
@@ -121,12 +125,13 @@ impl Coating {
         }
     }
 
-    /// The coating of a name or of a share: `none`, `single-layer`, `v`, `0.3%`.
+    /// The coating of a name, of a share or of layers: `none`, `single-layer`, `v`, `0.3%`, `1.38:125.9+2.05:19.4`.
     pub fn parse(text: &str) -> Option<Self> {
         match text {
             "none" => Some(Self::Bare),
             "single-layer" => Some(Self::SingleLayer),
             "v" => Some(Self::VCoat),
+            _ if text.contains(':') => FilmStack::parse(text).map(Self::Layers),
             _ => {
                 let share = match text.strip_suffix('%') {
                     Some(percent) => percent.trim().parse::<f64>().ok()? / 100.0,
@@ -144,6 +149,7 @@ impl fmt::Display for Coating {
             Self::Bare => f.write_str("no coating"),
             Self::SingleLayer => f.write_str("a quarter wave of MgF2 at 550 nm"),
             Self::VCoat => f.write_str("a V coat for 550 nm"),
+            Self::Layers(stack) => write!(f, "{stack}"),
             Self::Flat(share) => {
                 write!(f, "coatings that reflect {} %", format_short(100.0 * share))
             }

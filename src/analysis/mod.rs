@@ -13,6 +13,7 @@ mod diffraction;
 mod distortion;
 mod fan;
 mod field_curves;
+mod film_stack;
 mod fitted_wavefront;
 mod footprint;
 mod geometric_radius;
@@ -50,6 +51,7 @@ pub use distortion::{
 };
 pub use fan::{Fan, FanPoint, fan};
 pub use field_curves::{FieldCurvePoint, FieldCurves, field_curves};
+pub use film_stack::FilmStack;
 pub use fitted_wavefront::{
     FittedWavefront, ImageRay, WavefrontCost, WavefrontReference, brightest_strehl, image_rays,
     rms_without_tilt,

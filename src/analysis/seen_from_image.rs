@@ -260,6 +260,16 @@ impl BackwardLens {
         );
     }
 
+    /// A traced ray in the frame of the first vertex of the lens, where its optical path ends; its direction
+    /// leads away from the lens.
+    pub(crate) fn exit(&self, landed: Ray<f64>) -> Ray<f64> {
+        let Ray { point: p, direction: d } = landed;
+        Ray {
+            point: Vec3::new(p.x, p.y, self.turn * (p.z + self.radius)),
+            direction: Vec3::new(d.x, d.y, self.turn * d.z),
+        }
+    }
+
     /// The ray of the scene whose light a traced ray follows, in the frame of the first vertex of the
     /// lens; its direction leads away from the lens. It starts in the plane through that vertex, or
     /// closest to the vertex if it grazes that plane.

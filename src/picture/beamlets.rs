@@ -11,6 +11,7 @@
 //! radius; other points of the image are turned.
 
 use super::PictureError;
+use super::aimed_light::AimedLight;
 use super::color_band::ColorBand;
 use super::lit_directions::LitDirections;
 use super::losses::LensLosses;
@@ -29,6 +30,9 @@ pub(super) struct TableSize<'a> {
     /// The number of intervals over the distance from the axis.
     pub(super) radii: usize,
 }
+
+/// The direction cosine along the axis above which a ray meets no plane of the scene.
+const SIDEWAYS: f64 = -1e-3;
 
 /// Sums over rays: the weight, its products with the place in the plane of the first vertex and the slope
 /// of a ray (x, y, p, q), and those with their ten products (xx, xy, xp, xq, yy, ...).
@@ -218,6 +222,29 @@ impl BeamletTable {
         Ok(size.windows.iter().enumerate().map(table).collect())
     }
 
+    /// The same with one beamlet a colour, which is the ray that stands for all light of a point.
+    ///
+    /// # Errors
+    /// Numbers that cannot be traced.
+    pub(super) fn aimed(
+        model: &RayModel,
+        bands: &[ColorBand],
+        aimed: &AimedLight,
+        losses: Option<&LensLosses>,
+        (reach, radii): (f64, usize),
+    ) -> Result<Self, PictureError> {
+        let lenses = |band: &ColorBand| {
+            let lens = |(wavelength, share): &(usize, f64)| {
+                Ok((*share, BackwardLens::new(model, *wavelength)?))
+            };
+            band.wavelengths.iter().map(lens).collect::<Result<Vec<_>, PictureError>>()
+        };
+        let lenses = bands.iter().map(lenses).collect::<Result<Vec<_>, PictureError>>()?;
+        let step = reach / radii as f64;
+        let row = |i: usize| BeamletRow::aimed(&lenses, (aimed, losses), step * i as f64);
+        Ok(Self { step, windows: 1, rows: (0..=radii).map(row).collect() })
+    }
+
     /// The place of a point of the image in the table.
     pub(super) fn place(&self, [x, y]: [f64; 2]) -> TablePlace {
         let radius = x.hypot(y);
@@ -229,6 +256,32 @@ impl BeamletTable {
 }
 
 impl BeamletRow {
+    /// The rays that stand for all light at a distance from the axis.
+    fn aimed(
+        lenses: &[Vec<(f64, BackwardLens)>],
+        (aimed, losses): (&AimedLight, Option<&LensLosses>),
+        radius: f64,
+    ) -> Self {
+        let cosines = aimed.chief(radius);
+        let mut row = Self { beamlets: Vec::new(), sideways: vec![0.0; lenses.len()] };
+        for (color, lenses) in lenses.iter().enumerate() {
+            let mut moments = RayMoments::default();
+            for (w, (share, lens)) in lenses.iter().enumerate() {
+                let passed = losses.map_or(1.0, |own| own.passed([color, w], radius, cosines));
+                let weight = share * passed * aimed.light([color, w], radius);
+                match single_ray(lens, radius, cosines) {
+                    Some(ray) if ray.direction.z < SIDEWAYS => {
+                        moments.add(&RayMoments::of_ray(&ray), weight);
+                    }
+                    Some(_) => row.sideways[color] += weight,
+                    None => {}
+                }
+            }
+            row.beamlets.push(moments.beamlet());
+        }
+        row
+    }
+
     fn new(colors: &[TracedBox<'_>], level: usize) -> Self {
         let windows = colors.iter().flat_map(|color| &color.windows[level]);
         Self {
@@ -236,6 +289,14 @@ impl BeamletRow {
             sideways: colors.iter().map(|color| color.sideways).collect(),
         }
     }
+}
+
+/// The ray of the scene whose light arrives at a point of the y axis in a direction.
+fn single_ray(lens: &BackwardLens, radius: f64, cosines: [f64; 2]) -> Option<Ray<f64>> {
+    let (mut rays, mut landings) = (Rays::default(), Landings::default());
+    rays.push(lens.ray([0.0, radius], cosines)?.0);
+    lens.trace(&rays, &mut landings);
+    landings.fate(0).is_imaged().then(|| lens.scene_ray(landings.ray(0)))
 }
 
 /// The rays of one colour at an image point, added up in windows.
@@ -311,7 +372,7 @@ impl<'a> TracedBox<'a> {
         for (i, (place, weight)) in origins.iter().enumerate() {
             if landings.fate(i).is_imaged() {
                 let ray = lens.scene_ray(landings.ray(i));
-                if ray.direction.z < -1e-3 {
+                if ray.direction.z < SIDEWAYS {
                     self.add_ray(&ray, *weight, place[0]);
                 } else {
                     self.sideways += weight;

@@ -18,6 +18,8 @@ pub enum Coloring {
     /// Red, green and blue: 0.6 to 0.7, 0.5 to 0.6 and 0.4 to 0.5 micrometres, each evenly, by this many
     /// wavelengths (Gauss).
     Rgb(usize),
+    /// The same colours, all at the primary wavelength of the lens: without its colour errors.
+    Primary,
     /// Grey: the wavelengths of the lens with their weights.
     Gray,
 }
@@ -35,14 +37,21 @@ pub fn picture_model(
     zoom: usize,
     coloring: Coloring,
 ) -> Result<(RayModel, Vec<ColorBand>), PictureError> {
-    let Coloring::Rgb(count) = coloring else {
-        let model = RayModel::from_lens(lens, zoom)?;
-        let all: f64 = model.channels.iter().map(|channel| channel.weight).sum();
-        let shares = model.channels.iter().map(|channel| channel.weight / all).enumerate();
-        let band = ColorBand { wavelengths: shares.filter(|(_, share)| *share > 0.0).collect() };
-        return Ok((model, vec![band]));
+    let count = match coloring {
+        Coloring::Rgb(count) => count.max(1),
+        Coloring::Gray => {
+            let model = RayModel::from_lens(lens, zoom)?;
+            let all: f64 = model.channels.iter().map(|channel| channel.weight).sum();
+            let shares = model.channels.iter().map(|channel| channel.weight / all).enumerate();
+            let wavelengths = shares.filter(|(_, share)| *share > 0.0).collect();
+            return Ok((model, vec![ColorBand { wavelengths }]));
+        }
+        Coloring::Primary => {
+            let model = RayModel::from_lens(lens, zoom)?;
+            let band = ColorBand { wavelengths: vec![(model.primary, 1.0)] };
+            return Ok((model, vec![band; EDGES.len()]));
+        }
     };
-    let count = count.max(1);
     let primary = Wavelength { primary: true, ..lens.wavelengths[lens.primary()] };
     let nodes = EDGES.iter().flat_map(|[from, to]| gauss_legendre(count, *from, *to));
     let nodes = nodes.map(|(um, _)| Wavelength { um, weight: 1.0, primary: false });

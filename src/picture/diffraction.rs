@@ -5,13 +5,17 @@
 //! contrast by diffraction D is near `G H` where aberrations are small or large, and exactly that without
 //! any; in between it is not. All three are computed at some points of the picture and some frequencies: the change
 //! `|D − G|` decides whether diffraction is put in, and what is left, `|D − G H|`, is an error of the picture.
+//! Where that is too much, and the whole scene is at one distance, the spread of the pupil with its aberrations A
+//! takes the place of both (see the module of aimed light), and `|D − A|` is left.
 
+use super::aimed_light::AberratedLens;
 use super::frame::ImageFrame;
 use super::lit_directions::LitDirections;
 use super::pupil_spread::PupilSpreads;
-use super::{ColorBand, PictureError};
+use super::{ColorBand, PictureError, Scene};
 use crate::analysis::{BackwardLens, MtfCurve, diffraction_mtf, geometric_mtf};
 use crate::lens::FieldPoint;
+use crate::math::ComplexPair;
 use crate::pupil::{Accuracy, RayModel};
 use rayon::prelude::*;
 use serde::Serialize;
@@ -19,8 +23,12 @@ use serde::Serialize;
 /// Diffraction in a picture.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct DiffractionReport {
-    /// True if it is in the picture: each point spreads its light as the unaberrated pupil of its place does.
+    /// True if it is in the picture: each point spreads its light as the pupil of its place does.
     pub on: bool,
+    /// True if that is the pupil with its aberrations, in place of rays from all of it.
+    pub aberrated: bool,
+    /// The largest change of the spread's contrast over the picture.
+    pub variation: f64,
     /// The largest change of contrast that diffraction makes, or a bound of it if nothing was computed.
     pub change: f64,
     /// The largest error of contrast that is left.
@@ -75,7 +83,7 @@ impl DiffractionLight {
         (model, bands): (&RayModel, &[ColorBand]),
         frame: &ImageFrame,
         (inside, wavelengths): (&LitDirections, &[usize]),
-        tolerance: f64,
+        (tolerance, scene): (f64, &Scene),
     ) -> Result<Self, PictureError> {
         let f_number = model.first_order.working_f_number.map_or(f64::INFINITY, f64::abs);
         let wavelength = image_wavelength(model, model.primary);
@@ -84,6 +92,8 @@ impl DiffractionLight {
         let bound = (LARGEST_CHANGE * frequency / cutoff).min(1.0);
         let without = |reason| DiffractionReport {
             on: false,
+            aberrated: false,
+            variation: 0.0,
             change: bound,
             left: bound,
             cut: 0.0,
@@ -95,38 +105,105 @@ impl DiffractionLight {
         if bound <= tolerance {
             return off("at most 1.27 nu lambda F of contrast");
         }
-        let lens = BackwardLens::new(model, model.primary)?;
         let reach = frame.reach();
         let longest = longest(model, bands);
-        let all = |factor: f64| {
-            let margin = factor * longest / lit_width(inside)?;
-            let directions = LitDirections::new(model, wavelengths, reach + margin, RINGS).ok()?;
-            let spreads = PupilSpreads::new(&lens, &directions, reach, margin).ok()?;
-            Some((directions, spreads))
-        };
-        let Some((directions, spreads)) = MARGINS.into_iter().find_map(all) else {
+        let size = (reach, longest / lit_width(inside).unwrap_or(0.0));
+        let Some((directions, spreads)) = unaberrated((model, bands), wavelengths, size)? else {
             return off("left out: the directions of light around the picture are not known");
         };
         let least = (ACCURACY * tolerance).clamp(ACCURACIES[0], ACCURACIES[1]);
-        let compare = |part: &f64| compare(model, (part * reach, frequency), &spreads, least);
-        let found: Vec<_> = PLACES.par_iter().filter_map(compare).collect();
-        let Some([change, left]) =
-            found.iter().copied().reduce(|a, b| [a[0].max(b[0]), a[1].max(b[1])])
-        else {
+        let contrasts = PLACES.par_iter().filter_map(|part| {
+            PlaceContrast::new((model, bands), (part * reach, frequency), least)
+        });
+        let contrasts = Contrasts(contrasts.collect());
+        if contrasts.0.is_empty() {
             return off("left out: contrast by diffraction is not known anywhere in the picture");
-        };
-        let on = change > tolerance && left < change;
+        }
+        let change = contrasts.largest(PlaceContrast::change);
+        let matters = change > tolerance;
+        let lens = AberratedLens { model, bands, directions: &directions, scene };
+        let (mut spreads, left) = contrasts.better(spreads, &lens, (reach, tolerance), matters);
+        let on = matters && left < change;
+        let aberrated = on && spreads.aimed.is_some();
+        let shifts = COMPARED.map(|part| part * frequency * wavelength);
+        let shifts: Vec<_> = shifts.iter().flat_map(|v| [[*v, 0.0], [0.0, *v]]).collect();
         let report = DiffractionReport {
             on,
+            aberrated,
+            variation: spreads.variation(&shifts),
             change,
             left: if on { left } else { change },
             cut: if on { spreads.cut(longest) } else { 0.0 },
-            points: found.len(),
-            reason: reason([on, change > tolerance, left > tolerance]),
+            points: contrasts.0.len(),
+            reason: if aberrated { ABERRATED } else { reason([on, matters, left > tolerance]) },
             ..without("")
         };
+        spreads.is_even = report.variation <= tolerance;
         Ok(Self { report, parts: on.then_some((directions, spreads)) })
     }
+}
+
+/// Directions of light as far as it spreads, and the spreads of pupils without aberrations, up to `reach` mm from the
+/// axis; the longest wavelength over the width of the light is given. `None` where directions are not known.
+fn unaberrated(
+    (model, bands): (&RayModel, &[ColorBand]),
+    wavelengths: &[usize],
+    (reach, unit): (f64, f64),
+) -> Result<Option<(LitDirections, PupilSpreads)>, PictureError> {
+    if !unit.is_finite() {
+        return Ok(None);
+    }
+    let lens = BackwardLens::new(model, model.primary)?;
+    let all = |factor: f64| {
+        let margin = factor * unit;
+        let directions = LitDirections::new(model, wavelengths, reach + margin, RINGS).ok()?;
+        let lens = (&lens, offsets(bands));
+        let spreads = PupilSpreads::new(lens, &directions, reach, margin).ok()?;
+        Some((directions, spreads))
+    };
+    Ok(MARGINS.into_iter().find_map(all))
+}
+
+/// Contrasts at places of a picture.
+struct Contrasts(Vec<PlaceContrast>);
+
+impl Contrasts {
+    fn largest(&self, error: impl Fn(&PlaceContrast) -> f64) -> f64 {
+        self.0.iter().map(error).fold(0.0, f64::max)
+    }
+
+    /// These spreads of pupils alone, or those with aberrations where they matter and leave less; and what they leave.
+    fn better(
+        &self,
+        plain: PupilSpreads,
+        lens: &AberratedLens<'_>,
+        (reach, tolerance): (f64, f64),
+        matters: bool,
+    ) -> (PupilSpreads, f64) {
+        let left = self.largest(|place| place.left(&plain, true));
+        let tried = matters && left > tolerance && lens.scene.is_at_one_distance();
+        let found = tried.then(|| lens.spreads(reach, plain.margin)).flatten();
+        let other = found.map(|own| (self.largest(|place| place.left(&own, false)), own));
+        match other {
+            Some((less, own)) if less < left => (own, less),
+            _ => (plain, left),
+        }
+    }
+}
+
+/// The reason for a spread with aberrations.
+const ABERRATED: &str =
+    "it changes contrast; the spread of the pupil with its aberrations is put in";
+
+/// The number of wavelengths of each colour that come before it.
+pub(super) fn offsets(bands: &[ColorBand]) -> Vec<usize> {
+    let counts = bands.iter().map(|band| band.wavelengths.len());
+    counts
+        .scan(0, |sum, count| {
+            *sum += count;
+            Some(*sum - count)
+        })
+        .collect()
 }
 
 /// The reason for a spread that is `on` or not, by whether it matters and whether much is left.
@@ -182,42 +259,74 @@ pub(super) fn field_at(model: &RayModel, radius: f64) -> Option<FieldPoint> {
     Some(field(y)).filter(|_| y.is_finite())
 }
 
-/// The largest change of contrast by diffraction at a distance from the axis up to a frequency, and the largest
-/// that is left of it; `None` if a contrast is not known.
-fn compare(
-    model: &RayModel,
-    (radius, highest): (f64, f64),
-    spreads: &PupilSpreads,
-    tolerance: f64,
-) -> Option<[f64; 2]> {
-    let field = field_at(model, radius)?;
-    let frequencies = COMPARED.map(|part| part * highest);
-    let accuracy = Accuracy { tolerance, ..Accuracy::default() };
-    let wave = diffraction_mtf(model, field, model.primary, &frequencies, accuracy).ok()?;
-    let rays = geometric_mtf(model, field, model.primary, &frequencies, accuracy).ok()?;
-    Some(differences((&wave, &rays), image_wavelength(model, model.primary), |shift| {
-        spreads.transfer(radius, shift)
-    }))
+/// The contrasts of a lens at a distance from the axis.
+struct PlaceContrast {
+    radius: f64,
+    /// Their colour and the number of its wavelength, and that in the image space in mm.
+    light: [usize; 2],
+    wavelength: f64,
+    wave: MtfCurve,
+    rays: MtfCurve,
+    /// −1 if they are those of a point on the other side of the axis, else 1.
+    side: f64,
 }
 
-/// The largest differences of contrasts by diffraction and by rays, and by rays times those of a pupil.
-fn differences(
-    (wave, rays): (&MtfCurve, &MtfCurve),
-    wavelength: f64,
-    of_pupil: impl Fn([f64; 2]) -> f64,
-) -> [f64; 2] {
-    let mut largest = [0.0_f64; 2];
-    for (d, g) in wave.points.iter().zip(&rays.points) {
-        let shift = wavelength * d.frequency;
-        let pairs = [
-            (&d.tangential, &g.tangential, of_pupil([0.0, shift])),
-            (&d.sagittal, &g.sagittal, of_pupil([shift, 0.0])),
-        ];
-        for (d, g, h) in pairs {
-            let error = d.modulus.error + g.modulus.error;
-            let apart = |share: f64| (d.re - share * g.re).hypot(d.im - share * g.im) + error;
-            largest = [largest[0].max(apart(1.0)), largest[1].max(apart(h))];
-        }
+impl PlaceContrast {
+    /// The contrasts of the middle colour up to a frequency; `None` if one is not known.
+    fn new(
+        (model, bands): (&RayModel, &[ColorBand]),
+        (radius, highest): (f64, f64),
+        tolerance: f64,
+    ) -> Option<Self> {
+        let color = bands.len() / 2;
+        let middle = bands[color].wavelengths.len() / 2;
+        let wavelength = bands[color].wavelengths[middle].0;
+        let field = field_at(model, radius)?;
+        let frequencies = COMPARED.map(|part| part * highest);
+        let accuracy = Accuracy { tolerance, ..Accuracy::default() };
+        let launch = model.launch(field, wavelength).ok()?;
+        let height = launch.unclipped_landing([0.0; 2])?.ray.point.y.value;
+        Some(Self {
+            radius,
+            light: [color, middle],
+            wavelength: image_wavelength(model, wavelength),
+            wave: diffraction_mtf(model, field, wavelength, &frequencies, accuracy).ok()?,
+            rays: geometric_mtf(model, field, wavelength, &frequencies, accuracy).ok()?,
+            side: if height < 0.0 { -1.0 } else { 1.0 },
+        })
     }
-    largest
+
+    /// The largest change of contrast by diffraction.
+    fn change(&self) -> f64 {
+        self.largest(|rays, _| rays)
+    }
+
+    /// The largest part of the contrast that is left by spreads, times that by rays or without it.
+    fn left(&self, spreads: &PupilSpreads, with_rays: bool) -> f64 {
+        self.largest(|[re, im], shift| {
+            let [a, b] = spreads.transfer(self.light, self.radius, shift);
+            // Mirrored on the other side of the axis, which along x changes nothing.
+            let b = self.side * b;
+            if with_rays { [a * re, a * im] } else { [a, b] }
+        })
+    }
+
+    /// The largest difference of the contrast by diffraction from what is made of that by rays and of a shift in
+    /// cosines.
+    fn largest(&self, made: impl Fn(ComplexPair, [f64; 2]) -> ComplexPair) -> f64 {
+        let mut largest = 0.0_f64;
+        for (d, g) in self.wave.points.iter().zip(&self.rays.points) {
+            let shift = self.wavelength * d.frequency;
+            let pairs = [
+                (&d.tangential, &g.tangential, [0.0, shift]),
+                (&d.sagittal, &g.sagittal, [shift, 0.0]),
+            ];
+            for (d, g, shift) in pairs {
+                let error = d.modulus.error + g.modulus.error;
+                let [re, im] = made([g.re, g.im], shift);
+                largest = largest.max((d.re - re).hypot(d.im - im) + error);
+            }
+        }
+        largest
+    }
 }

@@ -47,10 +47,21 @@ impl ErrorMap {
         (count, samples): (usize, usize),
         is_stopped: impl Fn() -> bool + Sync,
     ) -> Self {
+        Self::of_exposure(exact, picture, ((count, samples), 0.0), is_stopped)
+    }
+
+    /// The same for a scene that moves for some seconds.
+    pub fn of_exposure(
+        exact: &ExactRenderer<'_>,
+        picture: &Picture,
+        ((count, samples), seconds): ((usize, usize), f64),
+        is_stopped: impl Fn() -> bool + Sync,
+    ) -> Self {
         let tiles = exact.tiles();
         let chosen = spread_out(tiles.len(), count).into_par_iter();
         let chosen = chosen.filter(|_| !is_stopped());
-        let measured = chosen.map(|i| TileError::measure(exact, picture, &tiles[i], samples));
+        let measured =
+            chosen.map(|i| TileError::measure(exact, picture, &tiles[i], (samples, seconds)));
         Self { pixels: picture.frame.pixels, tiles: measured.collect() }
     }
 
@@ -117,15 +128,10 @@ impl TileError {
         exact: &ExactRenderer<'_>,
         picture: &Picture,
         tile: &PictureTile,
-        samples: usize,
+        (samples, seconds): (usize, f64),
     ) -> Self {
         let render = |seed: u32| {
-            let settings = ExactSettings {
-                tolerance: -1.0,
-                max_samples: samples,
-                seed,
-                ..ExactSettings::default()
-            };
+            let settings = ExactSettings { tolerance: -1.0, max_samples: samples, seed, seconds };
             exact.sample_tile(tile, &settings)
         };
         let (a, b) = (render(0x5EED_0001), render(0x5EED_0002));

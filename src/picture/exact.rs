@@ -13,6 +13,7 @@
 //! The seed of a pixel is its place, and tiles and groups are of a fixed size, so that a picture does not
 //! depend on the number of threads.
 
+use super::aimed_light::AimedLight;
 use super::diffraction::{DiffractionLight, DiffractionReport};
 use super::lit_directions::LitDirections;
 use super::losses::{LensLosses, LightLosses, LossReport};
@@ -32,7 +33,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 /// The number of independent sets of samples.
 pub const REPLICATES: usize = 4;
 /// The side of a tile, in pixels.
-const TILE: usize = 16;
+pub(super) const TILE: usize = 16;
 /// The number of tiles that share an error.
 const GROUP: usize = 1024;
 /// The samples of the first pass: at least so many for each replicate of a tile, so that its error is not
@@ -47,7 +48,7 @@ const FIRST_SHARE: f64 = 0.1;
 /// The reflectance of mid grey.
 pub const MID_GREY: f64 = 0.18;
 /// The number of rings of the image for which directions are tabulated.
-const RINGS: usize = 12;
+pub(super) const RINGS: usize = 12;
 
 /// The accuracy of a picture, and what it is made with.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -84,6 +85,13 @@ pub struct ExactRenderer<'a> {
     diffraction: Option<DiffractionReport>,
 }
 
+/// A picture of which some groups of tiles are sampled.
+#[derive(Debug, Clone)]
+pub struct PictureRun {
+    picture: Picture,
+    groups: usize,
+}
+
 /// A scene in front of a lens as any way of making pictures sees it.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct PictureSubject<'a> {
@@ -97,6 +105,8 @@ pub(super) struct PictureSubject<'a> {
     pub(super) white: f64,
     /// The spreads of light by diffraction.
     pub(super) spreads: Option<&'a PupilSpreads>,
+    /// The rays that stand for all light of a point.
+    pub(super) aimed: Option<&'a AimedLight>,
 }
 
 /// Asks whether to go on, and tells the share of the work that is done.
@@ -123,6 +133,10 @@ impl<'a> RenderWatch<'a> {
         if !self.stopped.load(Ordering::Relaxed) && (self.progress)(share).is_break() {
             self.stopped.store(true, Ordering::Relaxed);
         }
+        self.has_stopped()
+    }
+
+    fn has_stopped(&self) -> bool {
         self.stopped.load(Ordering::Relaxed)
     }
 }
@@ -182,13 +196,33 @@ impl<'a> ExactRenderer<'a> {
         tolerance: f64,
     ) -> Result<Self, PictureError> {
         let light = (self.directions(), &outer(model, bands)[..]);
-        let found = DiffractionLight::new((model, bands), &self.frame, light, tolerance)?;
+        let found =
+            DiffractionLight::new((model, bands), &self.frame, light, (tolerance, self.scene))?;
         if let Some((directions, spreads)) = found.parts {
             self.sampler.directions = directions;
             self.sampler.spreads = Some(spreads);
         }
         self.diffraction = Some(found.report);
         Ok(self)
+    }
+
+    /// The same without blur: all light of a point follows its chief ray, for the model and the colours of this
+    /// renderer. Unchanged where a chief ray is not known.
+    #[must_use]
+    pub fn without_blur(mut self, model: &RayModel, bands: &[ColorBand]) -> Self {
+        self.sampler.sharp = AimedLight::new(model, bands, self.frame.reach());
+        self
+    }
+
+    /// The number of rings of the image whose directions of light are told apart: one where vignetting and obliquity
+    /// hardly change them.
+    pub fn rings(&self) -> usize {
+        self.directions().rings()
+    }
+
+    /// True if all light of a point follows one ray.
+    pub fn is_sharp(&self) -> bool {
+        self.sampler.sharp.is_some()
     }
 
     /// The effect of diffraction on the picture, if that was asked for.
@@ -225,6 +259,7 @@ impl<'a> ExactRenderer<'a> {
             losses: self.loss_table(),
             white: self.white(),
             spreads: self.sampler.spreads.as_ref(),
+            aimed: self.sampler.aimed(),
         }
     }
 
@@ -240,18 +275,38 @@ impl<'a> ExactRenderer<'a> {
 
     /// The picture; what is missing when the work is ended early stays black, and the picture says so.
     pub fn render(&self, settings: &ExactSettings, progress: PictureProgress<'_>) -> Picture {
+        self.resume(&mut self.begin(), settings, progress)
+    }
+
+    /// A picture of which nothing is sampled.
+    pub fn begin(&self) -> PictureRun {
+        PictureRun { picture: self.black(), groups: 0 }
+    }
+
+    /// The picture from where a run of it was ended early, with the same settings: to the bit as if it never was.
+    pub fn resume(
+        &self,
+        run: &mut PictureRun,
+        settings: &ExactSettings,
+        progress: PictureProgress<'_>,
+    ) -> Picture {
         let tiles = self.tiles();
         let watch = RenderWatch::new(progress);
-        let mut picture = self.black();
-        for (done, group) in tiles.chunks(GROUP).enumerate() {
+        for group in tiles.chunks(GROUP).skip(run.groups) {
             let part = |share: f64| {
-                ((done * GROUP) as f64 + share * group.len() as f64) / tiles.len() as f64
+                ((run.groups * GROUP) as f64 + share * group.len() as f64) / tiles.len() as f64
             };
             let sampled = self.sample_group(group, settings, &watch, &part);
-            self.add(&mut picture, group, sampled, settings.tolerance);
+            if watch.has_stopped() {
+                // Shown as far as it is, and sampled anew when the run goes on.
+                let mut shown = run.picture.clone();
+                self.add(&mut shown, group, sampled, settings.tolerance);
+                return Picture { complete: false, reached: false, ..shown };
+            }
+            self.add(&mut run.picture, group, sampled, settings.tolerance);
+            run.groups += 1;
         }
-        picture.reached &= picture.complete;
-        picture
+        run.picture.clone()
     }
 
     fn black(&self) -> Picture {
@@ -391,7 +446,7 @@ pub(super) fn luminance([red, green, blue]: Radiance) -> f64 {
 }
 
 /// The wavelengths whose light the others lie between: the shortest, the longest and a middle one.
-fn outer(model: &RayModel, bands: &[ColorBand]) -> Vec<usize> {
+pub(super) fn outer(model: &RayModel, bands: &[ColorBand]) -> Vec<usize> {
     let all = bands.iter().flat_map(|band| &band.wavelengths).map(|(wavelength, _)| *wavelength);
     let mut all: Vec<usize> = all.collect();
     all.sort_by(|a, b| model.channels[*a].um.total_cmp(&model.channels[*b].um));
@@ -422,6 +477,36 @@ mod tests {
         assert_eq!(mean_with_error([2.0; 4]), (2.0, 0.0));
         let (mean, error) = mean_with_error([1.0, 2.0, 3.0, 4.0]);
         assert!((mean - 2.5).abs() < 1e-15 && (error - (5.0_f64 / 12.0).sqrt()).abs() < 1e-15);
+    }
+
+    /// Tiles of other sizes have the same bits.
+    #[test]
+    fn a_pixel_does_not_depend_on_its_tile() {
+        let lens = crate::files::open(std::path::Path::new("lenses/double_gauss_rudolph_50.json"));
+        let coloring = crate::picture::Coloring::Rgb(3);
+        let (model, bands) =
+            crate::picture::picture_model(&lens.unwrap().lens, 0, coloring).unwrap();
+        let frame = ImageFrame::new(&model, [40, 16], 30.0).unwrap();
+        let scene = crate::picture::BuiltInScene::Star.build(&model, &frame, None).unwrap();
+        let renderer = ExactRenderer::new(&model, &bands, &scene, frame).unwrap();
+        let settings =
+            ExactSettings { tolerance: -1.0, max_samples: 32, ..ExactSettings::default() };
+        let sampled = |columns: Range<usize>, rows: Range<usize>| {
+            let tile = PictureTile::new(columns, rows);
+            let found = renderer.sample_tile(&tile, &settings);
+            // As many samples for every size: a small tile begins with more.
+            assert_eq!(found.samples, tile.len() * 32 * 3);
+            tile.pixels().zip(found.values).collect::<Vec<_>>()
+        };
+        let whole = sampled(16..32, 0..16);
+        for side in [4, 8] {
+            for i in 0..(16 / side) * (16 / side) {
+                let [x, y] = [i % (16 / side), i / (16 / side)].map(|v| v * side);
+                for part in sampled(16 + x..16 + x + side, y..y + side) {
+                    assert!(whole.contains(&part), "{part:?}");
+                }
+            }
+        }
     }
 
     #[test]

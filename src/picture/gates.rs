@@ -1,13 +1,15 @@
 //! The effects of a picture as gates: the number of each, the limit that it is compared with, and the reason.
 //!
-//! Numbers are those of the lens, the frame and the scene. Rays carry distortion, lateral colour, blur,
-//! vignetting and depth at no cost of their own; what costs time by itself is left out where its gate is off. The
-//! time that this saves is measured by whoever has a clock, with [`tile_change`] on both sides.
+//! Numbers are those of the lens, the frame and the scene. What costs time by itself is left out where its gate is
+//! off: lateral colour (one wavelength for all colours), blur (one ray for all light of a point) and vignetting (one
+//! set of directions for all points) as well. Rays carry distortion and depth at no cost of their own: a ray
+//! through the lens ends where it ends, and every plane of the scene is met once, wherever it is. The time that
+//! leaving something out saves is measured by whoever has a clock, with [`tile_change`] on both sides.
 
 use super::diffraction::{field_at, image_wavelength};
-use super::exact::{ExactRenderer, ExactSettings, MID_GREY};
+use super::exact::{ExactRenderer, ExactSettings, MID_GREY, RINGS, outer};
 use super::frame::image_scale;
-use super::{ColorBand, ImageFrame, Radiance, Scene, SceneLayer};
+use super::{ColorBand, ImageFrame, LitDirections, PictureError, Radiance, Scene, SceneLayer};
 use crate::analysis::{geometric_mtf, irradiance};
 use crate::lens::Object;
 use crate::pupil::{Accuracy, RayModel};
@@ -29,8 +31,8 @@ pub struct PictureGate {
     pub limit: f64,
     /// The meaning of the number, and the reason.
     pub reason: &'static str,
-    /// The time in milliseconds that leaving it out saves or would save, measured with and without; `None` for an
-    /// effect that every ray carries, which cannot be left out.
+    /// The time in milliseconds that leaving it out saves or would save, measured with and without; `None` for what
+    /// every ray carries at no cost of its own, and for what is never simulated.
     pub saved_milliseconds: Option<f64>,
 }
 
@@ -116,6 +118,22 @@ impl GateSubject<'_> {
             gate.on = !is_small;
         }
         gates
+    }
+
+    /// True if rays from all of the pupil change contrast by more than the tolerance, or if that is not known.
+    pub fn is_blurred(&self) -> bool {
+        self.blur().0.is_none_or(|blur| blur > self.tolerance)
+    }
+
+    /// Tabulates the directions of light in one ring or in as many as vignetting may need: to measure what these
+    /// cost.
+    ///
+    /// # Errors
+    /// As [`LitDirections::new`].
+    pub fn tabulate_directions(&self, is_even: bool) -> Result<LitDirections, PictureError> {
+        let rings = if is_even { 1 } else { RINGS };
+        let colors = outer(self.model, self.bands);
+        LitDirections::of_rings(self.model, &colors, self.frame.reach(), rings)
     }
 
     /// True if something moves by as much as can be seen.
@@ -241,6 +259,15 @@ pub fn render_tiles(
     let step = (tiles.len() / count.clamp(1, tiles.len().max(1))).max(1);
     let chosen = tiles.iter().skip(step / 2).step_by(step).take(count);
     let settings = ExactSettings { tolerance: -1.0, max_samples: samples, seed, seconds };
+    chosen.flat_map(|tile| renderer.sample_tile(tile, &settings).values).collect()
+}
+
+/// The pixels of some tiles of a picture at rest, sampled until a tolerance is reached.
+pub fn reach_tiles(renderer: &ExactRenderer<'_>, tolerance: f64, count: usize) -> Vec<Radiance> {
+    let tiles = renderer.tiles();
+    let step = (tiles.len() / count.clamp(1, tiles.len().max(1))).max(1);
+    let chosen = tiles.iter().skip(step / 2).step_by(step).take(count);
+    let settings = ExactSettings { tolerance, ..ExactSettings::default() };
     chosen.flat_map(|tile| renderer.sample_tile(tile, &settings).values).collect()
 }
 

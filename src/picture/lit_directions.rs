@@ -26,6 +26,10 @@ const WIDER: f64 = 1.01;
 /// The same of the boxes, which are known at fewer places.
 const BOX_WIDER: f64 = 1.03;
 
+/// The area of a polygon over that of the smallest outline in it up to which one ring serves: the widening takes
+/// the half of it.
+const ALIKE: f64 = 1.05;
+
 /// The polygons from which directions are drawn, one for every ring of the image.
 #[derive(Debug, Clone)]
 pub struct LitDirections {
@@ -63,7 +67,7 @@ pub struct DrawnDirection {
 
 impl LitDirections {
     /// The directions at the points of an image up to `reach` mm from the axis at some wavelengths of a
-    /// model, in rings of equal width.
+    /// model, in at most so many rings of equal width: in one where the light of all points is nearly alike.
     ///
     /// # Errors
     /// The edge of the light is not known somewhere, or there is none anywhere.
@@ -73,10 +77,44 @@ impl LitDirections {
         reach: f64,
         rings: usize,
     ) -> Result<Self, PictureError> {
+        let at = |part: f64| outlines(model, wavelengths, part * reach);
+        let ends = [0.0, 0.5, 1.0].into_par_iter().map(at).collect::<Result<Vec<_>, _>>()?;
+        let rings = if is_alike(&ends) { 1 } else { rings };
+        Self::between_outlines((model, wavelengths), reach, rings, &ends)
+    }
+
+    /// The number of rings.
+    pub fn rings(&self) -> usize {
+        self.rings.len()
+    }
+
+    /// The directions in so many rings.
+    ///
+    /// # Errors
+    /// As [`LitDirections::new`].
+    pub fn of_rings(
+        model: &RayModel,
+        wavelengths: &[usize],
+        reach: f64,
+        rings: usize,
+    ) -> Result<Self, PictureError> {
+        Self::between_outlines((model, wavelengths), reach, rings, &[])
+    }
+
+    /// The directions in rings, whose outlines on the axis, half way and at the end may be known.
+    fn between_outlines(
+        (model, wavelengths): (&RayModel, &[usize]),
+        reach: f64,
+        rings: usize,
+        known: &[Vec<Outline>],
+    ) -> Result<Self, PictureError> {
         let step = reach / rings as f64;
         let at = |part: f64| outlines(model, wavelengths, part * step);
-        let found: Result<Vec<_>, _> =
-            (0..=2 * rings).into_par_iter().map(|i| at(0.5 * i as f64)).collect();
+        let found = |i: usize| match known.get(i / rings) {
+            Some(known) if i.is_multiple_of(rings) => Ok(known.clone()),
+            _ => at(0.5 * i as f64),
+        };
+        let found: Result<Vec<_>, _> = (0..=2 * rings).into_par_iter().map(found).collect();
         let found = found?;
         let ring =
             |i: usize| RingPolygon::new([&found[2 * i], &found[2 * i + 1], &found[2 * i + 2]]);
@@ -144,6 +182,20 @@ fn outlines(
         Err(source) => Err(PictureError::Directions { radius, source }),
     };
     wavelengths.iter().map(outline).collect()
+}
+
+/// True if one polygon holds the outlines on the axis, half way and at the end of an image with little to spare.
+fn is_alike(ends: &[Vec<Outline>]) -> bool {
+    let [axis, middle, end] = ends else { return false };
+    let Some(ring) = RingPolygon::new([axis, middle, end]) else { return false };
+    let areas = ends.iter().flatten().map(|outline| area(outline));
+    ring.areas[CORNERS - 1] < ALIKE * areas.fold(f64::INFINITY, f64::min)
+}
+
+/// The area that an outline encloses.
+fn area(outline: &[[f64; 2]]) -> f64 {
+    let next = outline.iter().skip(1).chain(outline.first());
+    0.5 * outline.iter().zip(next).map(|(a, b)| a[0] * b[1] - a[1] * b[0]).sum::<f64>().abs()
 }
 
 /// The smallest rectangle around outlines: its middle and half of its sides; `None` if all are dark.

@@ -6,9 +6,12 @@
 //! width).
 
 use super::exact::luminance;
-use super::pattern::{Paint, PaintedPoint};
+use super::pattern::{Paint, PaintLine, PaintedPoint};
 use super::scene::SceneLayer;
+use super::seen_light::{LINE as PAINTED, SeenColor};
+use super::smear::{PaintTexel, SmearedTexels, margins};
 use super::tent_line::{LightView, split};
+use crate::math::{SimdWidth, run_vectorized};
 use rayon::prelude::*;
 
 /// Light times cover, and cover.
@@ -72,11 +75,11 @@ pub(super) type PlaceLine = [[f32; LINE]; 2];
 
 impl MipTexture {
     /// The painting of a layer within a rectangle, given by its lower left and its upper right corner, with
-    /// texels of this size, for three colours or one.
+    /// texels of this size, for three colours or one; its mean over the way that it goes during an exposure.
     pub(super) fn new(
         layer: &SceneLayer,
         [corner, end]: [[f64; 2]; 2],
-        texel: f64,
+        (texel, way): (f64, [f64; 2]),
         colors: usize,
     ) -> Self {
         let count = |k: usize| ((end[k] - corner[k]) / texel).ceil().max(1.0) as usize;
@@ -86,8 +89,14 @@ impl MipTexture {
         let texels = vec![[0.0; 2]; plane * planes];
         let lights = [Vec::new(), Vec::new()];
         let mut texture = Self { corner, texel, texels, levels, lights, plane, planes };
-        let canvas = PaintedTexels { layer, corner, texel, size: texture.levels[0].size };
-        texture.paint(&canvas, colors);
+        let size = texture.levels[0].size;
+        let canvas = PaintedTexels { layer, corner, texel, size };
+        if way == [0.0; 2] {
+            texture.paint(|from| canvas.rows(from), colors);
+        } else {
+            let moved = canvas.smeared(way.map(|way| way / texel));
+            texture.paint(|from| moved.rows(from, (ROWS.min(size[1] - from), size[0])), colors);
+        }
         texture.halve();
         if layer.pattern.covers_all() {
             texture.keep_light();
@@ -119,9 +128,9 @@ impl MipTexture {
         Some(LightView { texels: texels.get(part.clone())?, halves: halves.get(part)?, width })
     }
 
-    /// Paints the finest level of every plane.
-    fn paint(&mut self, canvas: &PaintedTexels<'_>, colors: usize) {
-        let (width, plane, planes) = (canvas.size[0], self.plane, self.planes);
+    /// Paints the finest level of every plane with what a function has for the rows from one on.
+    fn paint(&mut self, rows: impl Fn(usize) -> Vec<PaintTexel> + Sync, colors: usize) {
+        let (width, plane, planes) = (self.levels[0].size[0], self.plane, self.planes);
         let finest = self.levels[0].len();
         let mut parts: Vec<_> = self
             .texels
@@ -132,7 +141,7 @@ impl MipTexture {
         let bands: Vec<Vec<&mut [Texel]>> =
             (0..bands).map(|_| parts.iter_mut().filter_map(Iterator::next).collect()).collect();
         bands.into_par_iter().enumerate().for_each(|(band, mut parts)| {
-            let painted = canvas.rows(band * ROWS);
+            let painted = rows(band * ROWS);
             for (color, part) in parts.iter_mut().enumerate() {
                 for (texel, [red, green, blue, cover]) in part.iter_mut().zip(&painted) {
                     let light = match (planes, colors) {
@@ -250,15 +259,26 @@ struct PaintedTexels<'a> {
 }
 
 impl PaintedTexels<'_> {
+    /// The texels as their mean over a way in texels.
+    fn smeared(&self, way: [f64; 2]) -> SmearedTexels {
+        let [[left, right], [below, above]] = margins(way);
+        let corner =
+            [self.corner[0] - self.texel * left as f64, self.corner[1] - self.texel * below as f64];
+        let size = [self.size[0] + left + right, self.size[1] + below + above];
+        let wide = PaintedTexels { corner, size, ..*self };
+        let starts = (0..size[1]).into_par_iter().step_by(ROWS);
+        let rows: Vec<Vec<PaintTexel>> = starts.map(|from| wide.rows(from)).collect();
+        SmearedTexels::new(rows.concat(), size[0], way)
+    }
+
     /// Red, green, blue times cover, and cover, of the rows that belong together, from this one on: sampled
     /// in the middle of a texel, and at more places where its neighbours differ.
-    fn rows(&self, from: usize) -> Vec<[f32; 4]> {
+    fn rows(&self, from: usize) -> Vec<PaintTexel> {
         let [width, height] = self.size;
         let to = (from + ROWS).min(height);
         let first = from.saturating_sub(1);
-        let middles: Vec<Vec<[f32; 4]>> = (first..(to + 1).min(height))
-            .map(|row| (0..width).map(|column| self.sample([column, row], [0.5; 2])).collect())
-            .collect();
+        let middles: Vec<Vec<PaintTexel>> =
+            (first..(to + 1).min(height)).map(|row| self.middles(row)).collect();
         let row = |row: usize| &middles[row.clamp(first, first + middles.len() - 1) - first];
         let texel = |y: usize, x: usize| {
             let here = row(y)[x];
@@ -274,8 +294,41 @@ impl PaintedTexels<'_> {
         (from..to).flat_map(|y| (0..width).map(move |x| (y, x))).map(|(y, x)| texel(y, x)).collect()
     }
 
+    /// The paint in the middles of the texels of a row; many at once where the painting is grey.
+    fn middles(&self, row: usize) -> Vec<PaintTexel> {
+        let width = self.size[0];
+        if !self.layer.pattern.is_grey() {
+            return (0..width).map(|column| self.sample([column, row], [0.5; 2])).collect();
+        }
+        let half_size = self.layer.half_size;
+        let at = |k: usize, i: usize| self.corner[k] + self.texel * (i as f64 + 0.5);
+        let (seen, y) = (SeenColor { color: 0, colors: 3 }, at(1, row));
+        let mut middles = Vec::with_capacity(width);
+        for from in (0..width).step_by(PAINTED) {
+            let count = PAINTED.min(width - from);
+            let mut paint = PaintLine::new(count);
+            for i in 0..count {
+                let x = at(0, from + i);
+                (paint.place[0][i], paint.place[1][i]) = (x, y);
+                let is_inside = x.abs() <= half_size[0] && y.abs() <= half_size[1];
+                paint.is_met[i] = if is_inside { 1.0 } else { 0.0 };
+            }
+            run_vectorized(
+                SimdWidth::detect(),
+                #[inline(always)]
+                || self.layer.pattern.paint_line(half_size, seen, &mut paint),
+            );
+            middles.extend((0..count).map(|i| {
+                let cover = if paint.is_met[i] > 0.0 { paint.cover[i] } else { 0.0 };
+                let light = if cover > 0.0 { (paint.level[i] * cover) as f32 } else { 0.0 };
+                [light, light, light, cover as f32]
+            }));
+        }
+        middles
+    }
+
     /// The mean over a texel.
-    fn mean(&self, cell: [usize; 2]) -> [f32; 4] {
+    fn mean(&self, cell: [usize; 2]) -> PaintTexel {
         let mut sum = [0.0; 4];
         for i in 0..SAMPLES * SAMPLES {
             let part = [i % SAMPLES, i / SAMPLES].map(|k| (k as f64 + 0.5) / SAMPLES as f64);
@@ -286,7 +339,7 @@ impl PaintedTexels<'_> {
     }
 
     /// The paint at a place within a texel.
-    fn sample(&self, cell: [usize; 2], part: [f64; 2]) -> [f32; 4] {
+    fn sample(&self, cell: [usize; 2], part: [f64; 2]) -> PaintTexel {
         let half_size = self.layer.half_size;
         let place = [0, 1].map(|k| self.corner[k] + self.texel * (cell[k] as f64 + part[k]));
         if place[0].abs() > half_size[0] || place[1].abs() > half_size[1] {
@@ -298,7 +351,7 @@ impl PaintedTexels<'_> {
     }
 }
 
-fn is_close(a: [f32; 4], b: [f32; 4]) -> bool {
+fn is_close(a: PaintTexel, b: PaintTexel) -> bool {
     a.iter().zip(b).all(|(a, b)| (a - b).abs() <= SMOOTH * (a.abs() + b.abs()))
 }
 
@@ -374,7 +427,7 @@ mod tests {
         let half_size = [64.0; 2];
         let layer =
             SceneLayer { distance: None, center: [0.0; 2], half_size, velocity: [0.0; 2], pattern };
-        MipTexture::new(&layer, [[-64.0; 2], [64.0; 2]], 1.0, 3)
+        MipTexture::new(&layer, [[-64.0; 2], [64.0; 2]], (1.0, [0.0; 2]), 3)
     }
 
     fn wave(frequency: f64) -> MipTexture {

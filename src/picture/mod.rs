@@ -7,6 +7,7 @@
 //! is left out (losses at surfaces and ghosts without a coating) is named in the metadata of the file. A
 //! [`SensorModel`] makes noisy numbers of the light.
 
+mod aimed_light;
 mod bayer;
 mod beamlets;
 mod built_in;
@@ -36,6 +37,7 @@ mod scene_file;
 mod seen_light;
 mod sensor;
 mod sensor_law;
+mod smear;
 mod tent_line;
 mod tile_sampler;
 mod tolerance_split;
@@ -46,10 +48,10 @@ pub use device::{PackedPicture, PictureDevice, install_picture_device, picture_d
 pub use diffraction::DiffractionReport;
 pub use error::PictureError;
 pub use error_map::{ErrorMap, quick_error};
-pub use exact::{ExactRenderer, ExactSettings, MID_GREY, PictureProgress, REPLICATES};
+pub use exact::{ExactRenderer, ExactSettings, MID_GREY, PictureProgress, PictureRun, REPLICATES};
 pub use focus::{FocusGroup, GroupFocus, focused};
 pub use frame::{ImageFrame, field_diagonal, filling_size};
-pub use gates::{GateSubject, PictureGate, render_tiles, tile_change};
+pub use gates::{GateSubject, PictureGate, reach_tiles, render_tiles, tile_change};
 pub use ghost_light::{GhostLight, GhostReport};
 pub use lit_directions::{DrawnDirection, LitDirections};
 pub use losses::{LightLosses, LossReport};

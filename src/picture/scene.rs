@@ -110,6 +110,13 @@ impl Scene {
         &self.layers
     }
 
+    /// True if there are planes, all at the distance of the first.
+    pub(super) fn is_at_one_distance(&self) -> bool {
+        self.layers
+            .first()
+            .is_some_and(|first| self.layers.iter().all(|layer| layer.distance == first.distance))
+    }
+
     /// True if something moves.
     pub fn is_moving(&self) -> bool {
         self.layers.iter().any(|layer| layer.velocity != [0.0; 2])

@@ -115,7 +115,7 @@ impl SceneLayer {
 impl Pattern {
     /// The paint at the places of a line, in a colour.
     #[inline(always)]
-    fn paint_line(&self, half_size: [f64; 2], seen: SeenColor, paint: &mut PaintLine) {
+    pub(super) fn paint_line(&self, half_size: [f64; 2], seen: SeenColor, paint: &mut PaintLine) {
         match self {
             Self::Uniform { radiance, cover } => {
                 paint.level.fill(seen.of(*radiance));

@@ -230,7 +230,9 @@ impl SensorModel {
 impl SensorImage {
     /// The light that the numbers stand for, white being that of a picture: what a file shows of them.
     pub fn develop(&self, picture: &Picture) -> Picture {
-        let light = |number: u16| (f64::from(number) - self.black) / self.white * picture.white;
+        // Without exposure numbers stand for no light.
+        let scale = if self.white > 0.0 { picture.white / self.white } else { 0.0 };
+        let light = |number: u16| (f64::from(number) - self.black) * scale;
         let values = self.numbers.iter().map(|pixel| pixel.map(light)).collect();
         Picture { values, ..picture.clone() }
     }

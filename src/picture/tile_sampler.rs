@@ -4,8 +4,9 @@
 //! traced; with diffraction each colour has its own, since displacements are proportional to the wavelength.
 //! Of every sample, all pixels and replicates of a tile are done at once.
 
+use super::aimed_light::AimedLight;
 use super::diffraction::image_wavelength;
-use super::exact::{REPLICATES, mean_with_error};
+use super::exact::{REPLICATES, TILE, mean_with_error};
 use super::lit_directions::LitDirections;
 use super::losses::LensLosses;
 use super::pupil_spread::PupilSpreads;
@@ -76,6 +77,13 @@ struct SpectralPart {
     wavelengths: Vec<usize>,
 }
 
+/// What a ray stands for: directions of an area in cosines, or all light of its point, by its irradiance.
+#[derive(Debug, Clone, Copy)]
+enum RayShare {
+    Area(f64),
+    Irradiance(f64),
+}
+
 /// A colour and the index of its wavelength.
 type ColorLight = (usize, usize);
 
@@ -119,12 +127,16 @@ pub(super) struct TileSampler {
     lenses: Vec<Vec<BackwardLens>>,
     /// Their wavelengths in the image space in mm.
     lengths: Vec<Vec<f64>>,
+    /// The numbers of these in the model: colours that have one in common share its rays.
+    numbers: Vec<Vec<usize>>,
     spectrum: Vec<SpectralPart>,
     pub(super) directions: LitDirections,
     /// The light that surfaces reflect; `None` if they let all light pass.
     pub(super) losses: Option<LensLosses>,
     /// The displacements of image points by diffraction; `None` if it is left out.
     pub(super) spreads: Option<PupilSpreads>,
+    /// The rays that stand for all light of a point where blur is left out.
+    pub(super) sharp: Option<AimedLight>,
 }
 
 impl TileSampler {
@@ -140,13 +152,16 @@ impl TileSampler {
         let lenses = bands.iter().map(of_band).collect::<Result<_, _>>()?;
         let length = |(wavelength, _): &(usize, f64)| image_wavelength(model, *wavelength);
         let lengths = bands.iter().map(|band| band.wavelengths.iter().map(length).collect());
+        let numbers = |band: &ColorBand| band.wavelengths.iter().map(|(w, _)| *w).collect();
         Ok(Self {
             lenses,
             lengths: lengths.collect(),
+            numbers: bands.iter().map(numbers).collect(),
             spectrum: spectrum(bands),
             directions,
             losses: None,
             spreads: None,
+            sharp: None,
         })
     }
 
@@ -162,8 +177,10 @@ impl TileSampler {
             tile.pixels().map(move |pixel| set_seed(place(pixel) + replicate, seed))
         };
         let seeds: Vec<u32> = (0..REPLICATES).flat_map(of_replicate).collect();
-        let first = seeds.chunks(tile.len().max(1)).filter_map(|seeds| seeds.first().copied());
-        let color_seeds: Vec<u32> = first.collect();
+        // Tiles of any size in a cell of the largest have the wavelengths of that cell.
+        let cell = [tile.columns.start, tile.rows.start].map(|v| v / TILE * TILE);
+        let color_seeds: Vec<u32> =
+            (0..REPLICATES).map(|replicate| set_seed(place(cell) + replicate, seed)).collect();
         let corner =
             |k: usize| tile.pixels().map(|pixel| frame.point(pixel, [0.0; 2])[k]).collect();
         TileWork {
@@ -246,21 +263,51 @@ impl TileSampler {
             let mut point = [left + step[0] * right[i], top + step[1] * down[i]];
             if let Some(spreads) = &self.spreads {
                 let (radius, axes) = polar(point);
-                let by = turned(spreads.draw(radius, length, [near[i], far[i]]), axes);
-                point = [point[0] + by[0], point[1] + by[1]];
+                let light = [color, wavelength];
+                let by = turned(spreads.draw(light, (radius, length), [near[i], far[i]]), axes);
+                // Light that is spread that far to here comes from there.
+                point = [point[0] - by[0], point[1] - by[1]];
             }
             let (radius, axes) = polar(point);
-            let Some(drawn) = self.directions.draw(radius, [across[i], along[i]]) else { continue };
-            let Some((ray, share)) = lens.ray(point, turned(drawn.cosines, axes)) else { continue };
+            let place = (radius, [across[i], along[i]]);
+            let Some((cosines, share_of)) = self.direction([color, wavelength], place) else {
+                continue;
+            };
+            let Some((ray, share)) = lens.ray(point, turned(cosines, axes)) else { continue };
             queue.rays.push(ray);
             queue.sets.push(first + i);
-            queue.weights.push(drawn.area * share);
+            queue.weights.push(match share_of {
+                RayShare::Area(area) => area * share,
+                RayShare::Irradiance(all) => all / lens.index_ratio,
+            });
             queue.seconds.push(seconds * time[i]);
             if self.losses.is_some() {
                 queue.radii.push(radius);
-                queue.cosines.push(drawn.cosines);
+                queue.cosines.push(cosines);
             }
         }
+    }
+
+    /// The direction of a ray at a distance from the axis, for a point of the y axis, and what it stands for; `None`
+    /// where it is dark.
+    #[inline(always)]
+    fn direction(
+        &self,
+        [color, wavelength]: [usize; 2],
+        (radius, unit): (f64, [f64; 2]),
+    ) -> Option<([f64; 2], RayShare)> {
+        if let Some(aimed) = self.aimed() {
+            let light = aimed.light([color, wavelength], radius);
+            return Some((aimed.chief(radius), RayShare::Irradiance(light)));
+        }
+        let drawn = self.directions.draw(radius, unit)?;
+        Some((drawn.cosines, RayShare::Area(drawn.area)))
+    }
+
+    /// The rays that stand for all light of a point, if spreads have its aberrations, or if it has none.
+    pub(super) fn aimed(&self) -> Option<&AimedLight> {
+        let of_spreads = self.spreads.as_ref().map(|spreads| spreads.aimed.as_ref());
+        of_spreads.unwrap_or(self.sharp.as_ref())
     }
 
     /// Traces the rays of a queue that is full.
@@ -284,13 +331,17 @@ impl TileSampler {
         lights: &[ColorLight],
         scene: &Scene,
     ) {
-        let colors = self.colors();
+        let (colors, mut traced) = (self.colors(), None);
         for (color, wavelength) in lights {
             let (color, wavelength) = (*color, *wavelength);
             let lens = &self.lenses[color][wavelength];
-            lens.trace(&queue.rays, &mut queue.landings);
-            work.fates.add(queue.landings.fates());
-            lens.scene_rays(&queue.landings, &mut queue.outside);
+            let number = Some(self.numbers[color][wavelength]);
+            if traced != number {
+                lens.trace(&queue.rays, &mut queue.landings);
+                work.fates.add(queue.landings.fates());
+                lens.scene_rays(&queue.landings, &mut queue.outside);
+                traced = number;
+            }
             let seen = SeenColor { color, colors };
             scene.light_along(&queue.outside, &queue.seconds, seen, &mut queue.light);
             if let Some(losses) = &self.losses {

@@ -29,6 +29,13 @@ impl ToleranceSplit {
         Self { tolerance, shares: effects.iter().map(share).collect() }
     }
 
+    /// Lets one more effect share the tolerance.
+    pub fn share_with(&mut self, effect: &'static str) {
+        let allowed = self.tolerance / ((self.shares.len() + 1) as f64).sqrt();
+        self.shares.iter_mut().for_each(|share| share.allowed = allowed);
+        self.shares.push(ErrorShare { effect, allowed, used: allowed });
+    }
+
     /// The part that every effect may use.
     pub fn allowed(&self) -> f64 {
         self.shares.first().map_or(self.tolerance, |share| share.allowed)
@@ -73,5 +80,8 @@ mod tests {
         assert_eq!(split.rest("sampling"), split.allowed());
         split.note("sampling", 0.0);
         assert!((split.error() - 0.2).abs() < 1e-15);
+        split.share_with("blur");
+        assert!((split.allowed() - 0.05 / 3.0_f64.sqrt()).abs() < 1e-15);
+        assert_eq!(split.shares()[2].used, split.allowed());
     }
 }

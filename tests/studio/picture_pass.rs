@@ -46,7 +46,6 @@ fn the_gpu_makes_the_pictures_of_the_processor() {
     ];
     for (scene, coloring) in scenes {
         let found = difference(&pass, &lens, scene, coloring);
-        println!("{}: {found:.1e}", scene.name());
         assert!(found < TOLERANCE, "{}: {found:.1e}", scene.name());
     }
 }

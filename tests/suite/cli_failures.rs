@@ -510,13 +510,24 @@ fn every_benchmark_ends_when_it_is_asked_to() {
 #[cfg(unix)]
 #[test]
 fn pictures_and_designs_are_saved_when_they_are_asked_to_end() {
-    let folder = Folder::new("ended");
+    // A busy machine may need longer until the work begins.
+    let ended = [1500, 6000, 30000].into_iter().any(|wait| {
+        // A try leaves its files behind even if one of its programs had not begun: each has a folder of its own.
+        are_saved_when_asked_to_end(&Folder::new(&format!("ended-{wait}")), wait)
+    });
+    assert!(ended, "the work never began");
+}
+
+/// Asks two pictures and a design to end after some milliseconds; false if that was before their work began.
+#[cfg(unix)]
+fn are_saved_when_asked_to_end(folder: &Folder, wait: u64) -> bool {
     let asked =
         r#"{"focal_length_mm": 60.0, "f_number": 4.0, "half_field_deg": 10.0, "max_elements": 4}"#;
     let spec = folder.file("spec.json", asked);
     let outs = ["gone/exact.png", "quick.png", "lens.json"].map(|name| folder.path(name));
     let (error_map, spare) = (folder.path("error.png"), folder.path("spare"));
     fs::create_dir(&spare).unwrap();
+    fs::create_dir(folder.path("gone")).unwrap();
     let scene = ["--scene", "target", "--pixels", "1200x800"];
     let exact = ["--exact", "--error", "1e-6", "--max-samples", "100000000", "--out", &outs[0]];
     let mapped = ["--quick", "--error-map", &error_map, "--out", &outs[1]];
@@ -529,29 +540,26 @@ fn pictures_and_designs_are_saved_when_they_are_asked_to_end() {
         let mut program = Command::new(env!("CARGO_BIN_EXE_aplanat"));
         Running::of(program.args(command).env("TMPDIR", &spare))
     };
-    // A busy machine may need longer until the work begins.
-    for wait in [1500, 6000, 30000] {
-        fs::create_dir(folder.path("gone")).unwrap();
-        let running: Vec<Running> = commands.iter().map(start).collect();
-        std::thread::sleep(Duration::from_millis(wait));
-        fs::remove_dir_all(folder.path("gone")).unwrap();
-        running.iter().for_each(|running| running.signal("-TERM"));
-        let ended: Vec<Output> = running.into_iter().map(Running::output).collect();
-        let said: Vec<String> = ended.iter().map(|output| text(&output.stderr)).collect();
-        let is_early = ended.iter().any(|output| output.status.code().is_none());
-        if is_early || said[2].contains("no start led to a lens") {
-            continue;
-        }
-        let codes: Vec<_> = ended.iter().map(|output| output.status.code()).collect();
-        assert_eq!(codes, [Some(1), Some(0), Some(0)], "{said:?}");
-        let words = ["stopped; what was not sampled is black", "the picture is kept as"];
-        assert!(words.iter().all(|word| said[0].contains(word)), "{}", said[0]);
-        assert_eq!(fs::read_dir(&spare).unwrap().count(), 1);
-        assert!(outs[1..].iter().all(|path| Path::new(path).exists()), "{said:?}");
-        aplanat::files::open(&outs[2]).unwrap();
-        return;
+    let running: Vec<Running> = commands.iter().map(start).collect();
+    std::thread::sleep(Duration::from_millis(wait));
+    fs::remove_dir_all(folder.path("gone")).unwrap();
+    running.iter().for_each(|running| running.signal("-TERM"));
+    let ended: Vec<Output> = running.into_iter().map(Running::output).collect();
+    let said: Vec<String> = ended.iter().map(|output| text(&output.stderr)).collect();
+    let is_early = ended.iter().any(|output| output.status.code().is_none());
+    if is_early || said[2].contains("no start led to a lens") {
+        return false;
     }
-    panic!("the work never began");
+    let codes: Vec<_> = ended.iter().map(|output| output.status.code()).collect();
+    assert_eq!(codes, [Some(1), Some(0), Some(0)], "{said:?}");
+    let words = ["stopped; what was not sampled is black", "the picture is kept as"];
+    assert!(words.iter().all(|word| said[0].contains(word)), "{}", said[0]);
+    let kept = fs::read_dir(&spare).unwrap().map(|entry| entry.unwrap().file_name());
+    let kept: Vec<_> = kept.collect();
+    assert_eq!(kept.len(), 1, "{kept:?} {said:?}");
+    assert!(outs[1..].iter().all(|path| Path::new(path).exists()), "{said:?}");
+    aplanat::files::open(&outs[2]).unwrap();
+    true
 }
 
 /// A benchmark of nothing has no result.

@@ -106,7 +106,6 @@ fn the_irradiance_is_that_of_the_directions_at_the_image_point() {
             let energy =
                 energy_irradiance(&model, field, w, Accuracy { tolerance: 1e-8, ..ACCURACY });
             let (energy, light) = (energy.unwrap().value, light.irradiance.value);
-            println!("{} {place}: {light:.9} by energy {:.1e}", lens.id(), energy / light - 1.0);
             worst.note(energy, light, 1.5e-3 * light, format!("energy {place}"));
         }
         compared += worst.check(&format!("irradiance {}", lens.id()), 1.0);

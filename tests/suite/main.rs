@@ -49,6 +49,7 @@ mod paraxial;
 mod pareto;
 mod picture_cli;
 mod picture_diffraction;
+mod picture_hard_cases;
 mod picture_reflections;
 mod picture_scenes;
 mod pictures;

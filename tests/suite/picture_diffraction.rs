@@ -4,11 +4,13 @@
 use super::cli::{done, done_json};
 use super::cli_files::Folder;
 use super::pictures::{bundled, render_by, samples};
-use aplanat::lens::Lens;
+use aplanat::analysis::diffraction_mtf;
+use aplanat::lens::{FieldPoint, Lens};
 use aplanat::picture::{
-    Coloring, ExactRenderer, ImageFrame, Pattern, Picture, QuickRenderer, Scene, SceneLayer,
-    picture_model, quick_error,
+    ColorBand, Coloring, ExactRenderer, ImageFrame, Pattern, Picture, QuickRenderer, Scene,
+    SceneLayer, picture_model, quick_error,
 };
+use aplanat::pupil::{Accuracy, RayModel};
 use std::f64::consts::PI;
 
 const RC: &str = "telescope_rc_f8";
@@ -39,7 +41,6 @@ fn picture_of_light(lens: &Lens, count: usize, pitch: f64, many: usize) -> Pictu
     let renderer = ExactRenderer::new(&model, &bands, &scene, frame).unwrap();
     let renderer = renderer.with_diffraction(&model, &bands, 0.01).unwrap();
     let report = renderer.diffraction().unwrap();
-    println!("{report:?}");
     assert!(report.on && report.change > 0.3 && report.left < 5e-3, "{report:?}");
     render_by(&renderer, &samples(many))
 }
@@ -119,7 +120,6 @@ fn the_quick_way_spreads_light_as_the_exact_one() {
     let quick = QuickRenderer::new(&model, &bands, &exact).unwrap().render();
     assert_eq!(quick.frame, frame);
     let [spread, geometric] = [&quick, &sharp].map(|p| quick_error(&exact, p, 9, 512).value);
-    println!("quick {spread}, without {geometric}");
     assert!(spread < 0.05 && geometric > 4.0 * spread, "{spread} {geometric}");
     assert!((quick.mean() / sharp.mean() - 1.0).abs() < 0.05, "{} {}", quick.mean(), sharp.mean());
 }
@@ -142,13 +142,75 @@ fn a_picture_says_what_diffraction_changes() {
     let square: f64 = errors.iter().map(|error| number(&error["used"]).powi(2)).sum();
     assert!((square.sqrt() - number(&report["error"])).abs() < 1e-12);
     assert_eq!(report["reached"], number(&report["error"]) <= 0.06);
-    // An achromat with a part of a wavelength of aberrations has another spread than its pupil.
+    // An achromat with a part of a wavelength of aberrations has another spread than its pupil: that one is put in.
     let base = ["picture", "lenses/achromat_ac254_100.json", "--scene", "star", "--out", &out];
-    let small = ["--diagonal", "0.1", "--pixels", "16x16", "--gray", "--quick"];
+    let small = ["--diagonal", "0.1", "--pixels", "16x16", "--gray", "--quick", "--error", "3%"];
     let report = done_json(&[&base[..], &small].concat(), "");
-    let left = number(&report["diffraction"]["left"]);
-    assert!(left > 0.01 && report["reached"] == false, "{report}");
-    assert!(number(&report["error"]) >= left);
+    let found = &report["diffraction"];
+    assert_eq!([&found["on"], &found["aberrated"]], [true, true], "{report}");
+    assert!(number(&found["left"]) < 0.01 && report["reached"] == true, "{report}");
+    assert!(number(&report["error"]) >= number(&found["left"]));
     let text = done(&[&base[..], &small].concat(), "");
-    assert!(text.contains("not reached") && text.contains("  diffraction "), "{text}");
+    assert!(text.contains("with its aberrations") && text.contains("  diffraction "), "{text}");
+}
+
+/// The contrast and the phase of waves of this frequency in the image about a point, along x or y, in a picture.
+fn wave(renderer: &ExactRenderer<'_>, many: usize, (count, along): (usize, usize)) -> [f64; 2] {
+    let picture = render_by(renderer, &samples(many));
+    let mut sums = [0.0; 3];
+    let columns = picture.frame.pixels[0];
+    for (i, value) in picture.values.iter().enumerate() {
+        let at = [i % columns, i / columns][along];
+        let (sin, cos) = (2.0 * PI * (at as f64 + 0.5) / count as f64).sin_cos();
+        sums = [sums[0] + value[0], sums[1] + value[0] * cos, sums[2] + value[0] * sin];
+    }
+    let half = PI / count as f64;
+    let pixel = half.sin() / half;
+    [2.0 * sums[1].hypot(sums[2]) / sums[0] / pixel, sums[2].atan2(sums[1])]
+}
+
+/// Waves through an achromat with aberrations of a part of a wavelength, on the axis and off it, have the contrast of
+/// diffraction, and are where rays have them.
+#[test]
+fn aberrations_of_a_part_of_a_wave_have_the_contrast_of_diffraction() {
+    let lens = bundled("achromat_ac254_100");
+    let model = RayModel::from_lens(&lens, 0).unwrap();
+    let bands = vec![ColorBand { wavelengths: vec![(model.primary, 1.0)] }];
+    let focal = model.first_order.efl.unwrap();
+    let count = 16;
+    for (height, along, nu) in [(0.0, 1, 120.0), (0.8, 1, 60.0), (0.8, 1, 150.0), (0.8, 0, 120.0)] {
+        let mut pixels = [2; 2];
+        pixels[along] = count;
+        let pitch = 1.0 / nu / count as f64;
+        let frame = ImageFrame { pixels, pitch, center: [0.0, height], inverted: true };
+        let mut frequency = [0.0; 2];
+        frequency[along] = nu * focal;
+        let layer = SceneLayer {
+            distance: None,
+            center: [0.0; 2],
+            half_size: [f64::INFINITY; 2],
+            velocity: [0.0; 2],
+            pattern: Pattern::Wave { contrast: 1.0, frequency, phase: 0.0 },
+        };
+        let scene = Scene::new(vec![layer], [0.0; 3], 1.0).unwrap();
+        let by_rays = ExactRenderer::new(&model, &bands, &scene, frame).unwrap();
+        let [_, straight] = wave(&by_rays, 4096, (count, along));
+        let spread = by_rays.with_diffraction(&model, &bands, 0.003).unwrap();
+        let report = spread.diffraction().unwrap().clone();
+        let place = format!("{height} {along} {nu}: {report:?}");
+        assert!(report.on && report.aberrated && report.left < 0.01, "{place}");
+        let [found, phase] = wave(&spread, 4096, (count, along));
+        let angle = (height / focal).atan().to_degrees();
+        let field = FieldPoint { x: 0.0, y: angle, weight: 1.0 };
+        let curve = diffraction_mtf(&model, field, model.primary, &[nu], Accuracy::default());
+        let point = &curve.unwrap().points[0];
+        let exact = [&point.sagittal, &point.tangential][along].modulus.value;
+        assert!((found - exact).abs() < 0.015, "{found} {exact} {place}");
+        let off = (phase - straight + PI).rem_euclid(2.0 * PI) - PI;
+        // At low frequencies the middle of a spread is that of its rays.
+        assert!(nu > 100.0 || off.abs() < 0.05, "{phase} {straight} {place}");
+        let quick = QuickRenderer::new(&model, &bands, &spread).unwrap().render();
+        let error = quick_error(&spread, &quick, 1, 512).value;
+        assert!(error < 0.05, "{error} {place}");
+    }
 }

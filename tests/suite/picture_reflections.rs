@@ -151,6 +151,34 @@ fn ghosts_are_in_a_picture_only_where_they_matter() {
     assert!(weak.change < 0.1 * bare.change, "{bare:?} {weak:?}");
 }
 
+/// The layers of a class, given one by one, take and throw back the same light: losses and ghosts see layers.
+#[test]
+fn a_coating_by_its_layers_is_that_of_its_class() {
+    let lens = bundled("double_gauss_rudolph_50");
+    let (model, bands) = picture_model(&lens, 0, Coloring::Gray).unwrap();
+    let frame = ImageFrame::new(&model, [12, 8], 20.0).unwrap();
+    let scene = Scene::uniform(1.0);
+    let picture = render(&model, &bands, &scene, frame, samples(16));
+    let quarter = format!("1.38:{}", 550.0 / 4.0 / 1.38);
+    let layers = Coating::parse(&quarter).unwrap();
+    let [by_class, by_layers, bare] =
+        [Coating::SingleLayer, layers, Coating::Bare].map(|coating| {
+            let taken = LightLosses { coating, glasses: None };
+            let renderer = ExactRenderer::new(&model, &bands, &scene, frame).unwrap();
+            let renderer = renderer.with_losses(&model, &bands, taken, 0.01).unwrap();
+            let ghosts =
+                GhostLight::new((&model, &bands), &scene, &picture, (coating, 0.01)).unwrap();
+            [renderer.losses().unwrap().transmission, ghosts.report.change]
+        });
+    for (found, exact) in by_layers.iter().zip(by_class) {
+        assert!((found / exact - 1.0).abs() < 1e-9, "{by_layers:?} {by_class:?}");
+    }
+    assert!(bare[0] < 0.9 * by_layers[0] && bare[1] > 2.0 * by_layers[1], "{bare:?} {by_layers:?}");
+    let out = Scratch::new("layers.png");
+    let wrong = ["picture", LENS, "--scene=white", "--coating=1.38:100+", "--out", out.path()];
+    refused(2, &wrong, "", &["1.38:100+", "index:nm"]);
+}
+
 const LENS: &str = "lenses/double_gauss_rudolph_50.json";
 
 /// Small lights on black are found by the rays that look for them, so that no cell is the noise of a few.

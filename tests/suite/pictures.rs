@@ -6,8 +6,8 @@ use aplanat::analysis::irradiance;
 use aplanat::files;
 use aplanat::lens::{Lens, Object};
 use aplanat::picture::{
-    BuiltInScene, ColorBand, Coloring, ExactRenderer, ExactSettings, ImageFrame, Pattern, Picture,
-    PictureError, QuickRenderer, Scene, SceneLayer, field_diagonal, filling_size, focused,
+    BuiltInScene, ColorBand, Coloring, ErrorMap, ExactRenderer, ExactSettings, ImageFrame, Pattern,
+    Picture, PictureError, QuickRenderer, Scene, SceneLayer, field_diagonal, filling_size, focused,
     picture_model, quick_error,
 };
 use aplanat::pupil::{Accuracy, RayModel};
@@ -105,7 +105,6 @@ fn compare_white(name: &str, shares: &[f64]) {
         let (found, error) = (picture.values[0][0], picture.errors[0][0]);
         let exact = exact.value;
         let place = format!("{name} at {share}: {found} ± {error:e} of {exact}");
-        println!("{place}");
         assert!((found - exact).abs() < 6.0 * error + 1e-4 * exact, "{place}");
         assert!(error < 5e-3 * exact, "{place}");
     }
@@ -252,7 +251,6 @@ fn quick(lens: &Lens, build: impl Fn(&RayModel, &ImageFrame) -> Scene) -> (f64, 
     let exact = ExactRenderer::new(&model, &bands, &scene, frame).unwrap();
     let picture = QuickRenderer::new(&model, &bands, &exact).unwrap().render();
     let error = quick_error(&exact, &picture, 2, 64);
-    println!("{error:?}");
     assert!(picture.values.iter().flatten().all(|v| v.is_finite() && *v >= 0.0));
     (error.value, picture)
 }
@@ -295,6 +293,35 @@ fn the_quick_way_sees_depth() {
         Scene::new(vec![near, far], [0.0; 3], 1.0).unwrap()
     });
     assert!(error < 0.06, "{error}");
+}
+
+/// A star that moves by some pixels during the exposure is smeared as the exact way smears it, and what stands
+/// still behind it is not.
+#[test]
+fn the_quick_way_sees_motion() {
+    let (model, bands) =
+        picture_model(&bundled("double_gauss_rudolph_50"), 0, Coloring::Rgb(1)).unwrap();
+    let frame = ImageFrame::new(&model, [48, 32], 30.0).unwrap();
+    let [width, height] = filling_size(&model, &frame, None).unwrap();
+    let plane = |half_size: [f64; 2], velocity: [f64; 2], pattern| SceneLayer {
+        distance: None,
+        center: [0.0; 2],
+        half_size,
+        velocity,
+        pattern,
+    };
+    let moving = plane([0.4 * width, 0.4 * height], [0.3, 0.2], Pattern::Star(12.0));
+    let behind = plane([2.0 * width, 2.0 * height], [0.0; 2], Pattern::SlantedEdge);
+    let scene = Scene::new(vec![moving, behind], [0.0; 3], 1.0).unwrap();
+    let exact = ExactRenderer::new(&model, &bands, &scene, frame).unwrap();
+    let seconds = 0.3;
+    let error = |picture: &Picture| {
+        ErrorMap::of_exposure(&exact, picture, ((6, 256), seconds), || false).rms().value
+    };
+    let smeared = QuickRenderer::exposed(&model, &bands, &exact, seconds).unwrap().render();
+    let still = QuickRenderer::new(&model, &bands, &exact).unwrap().render();
+    let [smeared, still] = [error(&smeared), error(&still)];
+    assert!(smeared < 0.06 && still > 5.0 * smeared, "{smeared} {still}");
 }
 
 /// A picture that is too bright by a tenth everywhere is wrong by as much everywhere, and from several

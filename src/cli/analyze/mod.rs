@@ -90,7 +90,8 @@ pub(super) struct AnalyzeArgs {
     #[arg(long, value_name = "MM", requires = "wave")]
     distance: Option<f64>,
 
-    /// The coating of `ghosts` between air and glass: none, single-layer, v, or a reflected share as `0.3%`
+    /// The coating of `ghosts` between air and glass: none, single-layer, v, a reflected share as `0.3%`, or layers
+    /// from the air as index:nm, `1.38:125.9+2.05:19.4`
     #[arg(long, value_name = "COATING", default_value = "none", value_parser = parse_coating)]
     coating: Coating,
 
@@ -142,7 +143,8 @@ fn parse_wave(text: &str) -> Result<[f64; 3], String> {
 
 /// A coating.
 pub(super) fn parse_coating(text: &str) -> Result<Coating, String> {
-    let expected = "expected none, single-layer, v, or a reflected share as in `0.3%`";
+    let expected = "expected none, single-layer, v, a reflected share as in `0.3%`, or layers from the \
+                    air as index:nm, `1.38:125.9+2.05:19.4`";
     Coating::parse(text).ok_or_else(|| expected.to_owned())
 }
 

@@ -8,7 +8,7 @@ use crate::cli::input::LoadedLens;
 use crate::measure::time_ms;
 use crate::picture::{
     ColorBand, ExactRenderer, GateSubject, GhostReport, LightLosses, MID_GREY, PictureError,
-    PictureGate, Scene, photon_count, render_tiles,
+    PictureGate, Scene, photon_count, reach_tiles, render_tiles,
 };
 use crate::pupil::RayModel;
 
@@ -40,8 +40,28 @@ impl PictureArgs {
         let mut gates = subject.gates();
         let plain = || ExactRenderer::new(model, bands, scene, *frame);
         let rest = tile_ms(plain, 0.0)?;
-        for gate in gates.iter_mut().filter(|gate| gate.effect == "motion") {
-            gate.saved_milliseconds = Some(tile_ms(plain, seconds)? - rest);
+        for gate in &mut gates {
+            match gate.effect {
+                "motion" => gate.saved_milliseconds = Some(tile_ms(plain, seconds)? - rest),
+                "blur" => {
+                    let sharp = || Ok(plain()?.without_blur(model, bands));
+                    let saved = reach_ms(plain, tolerance)? - reach_ms(sharp, tolerance)?;
+                    gate.on = !rendered.is_sharp;
+                    gate.saved_milliseconds = Some(saved);
+                }
+                "vignetting" => {
+                    let ms = |is_even| time_ms(|| subject.tabulate_directions(is_even)).1;
+                    gate.on = rendered.rings > 1;
+                    gate.saved_milliseconds = Some(ms(false) - ms(true));
+                }
+                "lateral colour" if rendered.colors.is_some() => {
+                    let primary = self.shot(opened, source, 0)?;
+                    let one = || ExactRenderer::new(&primary.model, &primary.bands, scene, *frame);
+                    gate.on = rendered.colors.is_some_and(|colors| colors.count > 0);
+                    gate.saved_milliseconds = Some(rest - tile_ms(one, 0.0)?);
+                }
+                _ => {}
+            }
         }
         gates.extend(self.colors_gate(rendered, shot, (scene, source), opened, tolerance)?);
         gates.push(diffraction_gate(rendered, (model, bands), plain, (rest, tolerance))?);
@@ -72,17 +92,17 @@ impl PictureArgs {
             let build = || ExactRenderer::new(&other.model, &other.bands, scene, shot.frame);
             tile_ms(build, 0.0)
         };
-        let [few, many] = [colors.count.min(colors.compared), colors.count.max(colors.compared)];
+        let [few, many] = [colors.count, colors.compared];
         Ok(Some(PictureGate {
             effect: "number of wavelengths",
             on: colors.count > 1,
             number: Some(colors.change),
             unit: "share",
             limit,
-            reason: if colors.count == 1 {
-                "one for each colour: change of some tiles with three"
-            } else {
-                "several for each colour: change of some tiles with about twice as many"
+            reason: match colors.count {
+                0 => "one for all colours: change of some tiles with one for each",
+                1 => "one for each colour: change of some tiles with three",
+                _ => "several for each colour: change of some tiles with about twice as many",
             },
             saved_milliseconds: Some(ms(many)? - ms(few)?),
         }))
@@ -117,6 +137,15 @@ fn tile_ms<'a>(
     seconds: f64,
 ) -> Result<f64, PictureError> {
     let (made, ms) = time_ms(|| build().map(|renderer| render_tiles(&renderer, seconds, 1, TILES)));
+    made.map(|_| ms)
+}
+
+/// The time of some tiles of a picture at a tolerance and of its preparation, in milliseconds.
+fn reach_ms<'a>(
+    build: impl Fn() -> Result<ExactRenderer<'a>, PictureError>,
+    tolerance: f64,
+) -> Result<f64, PictureError> {
+    let (made, ms) = time_ms(|| build().map(|own| reach_tiles(&own, tolerance, TILES.0)));
     made.map(|_| ms)
 }
 
@@ -168,7 +197,8 @@ fn losses_gates(
             number: losses.map(|losses| losses.polarisation),
             unit: "share",
             limit,
-            reason: "difference of both polarisations over their sum; light is taken for unpolarised",
+            reason: "difference of both polarisations over their sum; light is taken for unpolarised, which \
+                     costs nothing",
             saved_milliseconds: None,
         },
     ]

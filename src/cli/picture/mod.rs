@@ -90,8 +90,9 @@ pub(super) struct PictureArgs {
     #[arg(long, value_name = "FIRST..LAST", value_parser = parse_group, requires = "focus")]
     focus_group: Option<FocusGroup>,
 
-    /// The coating of all surfaces between air and glass: none (bare glass), single-layer, v, or a reflected
-    /// share as `0.3%`; with it losses count, of glasses that absorb light too, and ghosts where they matter.
+    /// The coating of all surfaces between air and glass: none (bare glass), single-layer, v, a reflected
+    /// share as `0.3%`, or layers from the air as index:nm, `1.38:125.9+2.05:19.4`; with it losses count, of
+    /// glasses that absorb light too, and ghosts where they matter.
     /// Absent: nothing is lost
     #[arg(long, value_name = "COATING", value_parser = parse_coating)]
     coating: Option<Coating>,
@@ -259,11 +260,24 @@ impl PictureArgs {
     ) -> Vec<OmittedEffect> {
         let frame = &rendered.picture.frame;
         let mut left_out = omitted_beside(&shot.model, frame, self.error.0, included);
-        if let Some(colors) = rendered.colors.filter(|colors| colors.count == 1) {
+        if let Some(colors) = rendered.colors.filter(|colors| colors.count <= 1) {
+            let (effect, reason) = if colors.count == 0 {
+                (
+                    "colour errors",
+                    "of some tiles with a wavelength for each colour instead of one for all",
+                )
+            } else {
+                let effect = "change of wavelength within a colour";
+                (effect, "of some tiles with three wavelengths instead of one")
+            };
+            left_out.push(OmittedEffect { effect, change: Some(colors.change), reason });
+        }
+        if rendered.is_sharp {
+            let used = rendered.split.shares().iter().find(|share| share.effect == "blur");
             left_out.push(OmittedEffect {
-                effect: "change of wavelength within a colour",
-                change: Some(colors.change),
-                reason: "of some tiles with three wavelengths instead of one",
+                effect: "blur",
+                change: used.map(|share| share.used),
+                reason: "of some tiles with rays from all of the pupil instead of one",
             });
         }
         let off =

@@ -12,7 +12,7 @@ use crate::measure::time_ms;
 use crate::picture::{
     DiffractionReport, ErrorMap, ExactRenderer, ExactSettings, GateSubject, GhostLight,
     GhostReport, LightLosses, LossReport, MID_GREY, Picture, PictureError, PictureGate,
-    QuickPicture, QuickRenderer, Scene, SceneFileError, ToleranceSplit, quick_error, tile_change,
+    QuickPicture, QuickRenderer, Scene, SceneFileError, ToleranceSplit, tile_change,
 };
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -24,8 +24,11 @@ const CHECKED_SAMPLES: usize = 128;
 const MAPPED_SAMPLES: usize = 64;
 /// The tiles on which numbers of wavelengths are compared, and the samples of their pixels.
 pub(super) const TILES: (usize, usize) = (3, 32);
-/// The numbers of wavelengths of a colour, each the double of the one before less one.
-const WAVELENGTH_COUNTS: [usize; 4] = [1, 3, 5, 9];
+/// The numbers of wavelengths of a colour: none of its own, one, and then each the double of the one before less
+/// one.
+const WAVELENGTH_COUNTS: [usize; 5] = [0, 1, 3, 5, 9];
+/// The place of the number for a picture that nothing was compared for, and of the first with coatings.
+const USUAL: usize = 2;
 /// The number of steps of the progress bar.
 const STEPS: usize = 1000;
 
@@ -33,6 +36,7 @@ const STEPS: usize = 1000;
 const SAMPLING: &str = "sampling";
 const DIFFRACTION: &str = "diffraction";
 const WAVELENGTHS: &str = "wavelengths";
+const BLUR: &str = "blur";
 const LOSSES: &str = "losses";
 const GHOSTS: &str = "ghosts";
 
@@ -54,6 +58,10 @@ pub(super) struct RenderedPicture {
     pub(super) ghosts: Option<(GhostReport, f64)>,
     /// The wavelengths of a colour; `None` in grey.
     pub(super) colors: Option<ColorChoice>,
+    /// True if blur is left out.
+    pub(super) is_sharp: bool,
+    /// The number of rings of the image whose directions of light are told apart.
+    pub(super) rings: usize,
     /// Every effect, if that is asked for.
     pub(super) gates: Option<Vec<PictureGate>>,
 }
@@ -80,6 +88,8 @@ impl RenderedPicture {
             losses: None,
             ghosts: None,
             colors: None,
+            is_sharp: false,
+            rings: 0,
             gates: None,
         }
     }
@@ -94,25 +104,22 @@ impl PictureArgs {
     ) -> Result<(RenderedPicture, CameraShot), CliError> {
         let refuse = |error: PictureError| CliError::Input(format!("{}: {error}", opened.file));
         let mut split = self.split();
-        let shot = self.shot(opened, source, WAVELENGTH_COUNTS[1]).map_err(refuse)?;
+        let shot = self.shot(opened, source, WAVELENGTH_COUNTS[USUAL]).map_err(refuse)?;
         let scene = self.scene(source, &shot).map_err(|error| match error {
             SceneFileError::Picture(error) => refuse(error),
             other => scene_error(other),
         })?;
         let chosen = self.colors(opened, (source, &scene), shot, &mut split).map_err(refuse)?;
         let (shot, colors) = chosen;
+        // What moves by less than can be seen needs no samples of the time.
         let is_moving = self.is_moving(&shot, &scene);
-        if is_moving && (self.quick || self.error_map.is_some()) {
-            let text =
-                "--quick, --error-map: planes move during --seconds; expected the exact way alone";
-            return Err(CliError::Input(text.to_owned()));
-        }
+        let seconds = self.exposed.seconds.filter(|_| is_moving).unwrap_or(0.0);
         let renderer = self.renderer(&shot, &scene, opened, &mut split).map_err(refuse)?;
-        let light = self.light(&shot, (&renderer, is_moving), &mut split, stop).map_err(refuse)?;
+        let light = self.light(&shot, (&renderer, seconds), &mut split, stop).map_err(refuse)?;
         let is_stopped = || stop.load(Ordering::Relaxed);
         let map = || {
-            let samples = (usize::MAX, MAPPED_SAMPLES);
-            ErrorMap::measure_until(&renderer, &light.picture, samples, is_stopped)
+            let samples = ((usize::MAX, MAPPED_SAMPLES), seconds);
+            ErrorMap::of_exposure(&renderer, &light.picture, samples, is_stopped)
         };
         // A part is no map.
         let error_map = self.error_map.as_ref().map(|_| map()).filter(ErrorMap::is_whole);
@@ -121,6 +128,8 @@ impl PictureArgs {
             diffraction: renderer.diffraction().cloned(),
             losses: renderer.losses().cloned(),
             colors,
+            is_sharp: renderer.is_sharp(),
+            rings: renderer.rings(),
             ..RenderedPicture::new(light, split)
         };
         if !is_stopped() {
@@ -166,7 +175,7 @@ impl PictureArgs {
         }
         let mut chosen = None;
         // Coatings and glasses change light with the wavelength as well.
-        let least = usize::from(self.coating.is_some());
+        let least = if self.coating.is_some() { USUAL } else { 0 };
         for pair in WAVELENGTH_COUNTS.windows(2).skip(least) {
             let [few, many] = [pair[0], pair[1]].map(|count| self.shot(opened, source, count));
             let (few, many) = (few?, many?);
@@ -202,23 +211,51 @@ impl PictureArgs {
     ) -> Result<ExactRenderer<'a>, PictureError> {
         let CameraShot { model, bands, frame, .. } = shot;
         let renderer = ExactRenderer::new(model, bands, scene, *frame)?;
-        let renderer = renderer.with_diffraction(model, bands, split.allowed())?;
+        let mut renderer = renderer.with_diffraction(model, bands, split.allowed())?;
         split.note(DIFFRACTION, renderer.diffraction().map_or(0.0, |found| found.error(1.0)));
+        let is_spread = renderer.diffraction().is_some_and(|found| found.on);
+        if !is_spread && let Some(change) = self.blur_change(shot, scene, split.allowed())? {
+            split.share_with(BLUR);
+            split.note(BLUR, change);
+            renderer = renderer.without_blur(model, bands);
+        }
         let Some(coating) = self.coating else { return Ok(renderer) };
         let taken = LightLosses { coating, glasses: Some(&opened.lens) };
         let renderer = renderer.with_losses(model, bands, taken, split.allowed())?;
+        // Where one ray stands for all light of a point, its share does.
+        let is_aimed = renderer.is_sharp() || renderer.diffraction().is_some_and(|d| d.aberrated);
         let wrong = |losses: &LossReport| {
-            if losses.by_ray { losses.error } else { losses.variation }
+            if losses.by_ray && !is_aimed { losses.error } else { losses.variation }
         };
         split.note(LOSSES, renderer.losses().map_or(0.0, wrong));
         Ok(renderer)
+    }
+
+    /// The change of some tiles if all light of a point follows one ray, if that is small enough to leave out blur.
+    fn blur_change(
+        &self,
+        shot: &CameraShot,
+        scene: &Scene,
+        allowed: f64,
+    ) -> Result<Option<f64>, PictureError> {
+        let CameraShot { model, bands, frame, focus, .. } = shot;
+        let (focus, seconds, tolerance) = (*focus, 0.0, allowed);
+        let subject = GateSubject { model, bands, frame, scene, focus, seconds, tolerance };
+        if subject.is_blurred() {
+            return Ok(None);
+        }
+        let blurred = ExactRenderer::new(model, bands, scene, *frame)?;
+        let sharp = ExactRenderer::new(model, bands, scene, *frame)?.without_blur(model, bands);
+        let change = tile_change([&blurred, &sharp], [0.0; 2], TILES);
+        // One more effect shares the tolerance then.
+        Ok((sharp.is_sharp() && change <= 0.7 * allowed).then_some(change))
     }
 
     /// The picture by the quick way if its error allows it, else by the exact one.
     fn light(
         &self,
         shot: &CameraShot,
-        (renderer, is_moving): (&ExactRenderer<'_>, bool),
+        (renderer, seconds): (&ExactRenderer<'_>, f64),
         split: &mut ToleranceSplit,
         stop: &AtomicBool,
     ) -> Result<PictureLight, PictureError> {
@@ -226,11 +263,10 @@ impl PictureArgs {
         let is_kept = |quick: &PictureLight| {
             self.quick || quick.sampling.value <= allowed || stop.load(Ordering::Relaxed)
         };
-        let is_exact = self.exact || is_moving;
-        let quick = if is_exact { None } else { Some(quick_picture(shot, renderer, stop)) };
+        let quick =
+            if self.exact { None } else { Some(quick_picture(shot, (renderer, seconds), stop)) };
         let quick = quick.transpose()?.filter(is_kept);
-        let light =
-            quick.unwrap_or_else(|| self.exact_picture((renderer, is_moving), allowed, stop));
+        let light = quick.unwrap_or_else(|| self.exact_picture((renderer, seconds), allowed, stop));
         split.note(SAMPLING, light.sampling.value);
         let mean = light.picture.mean() / (MID_GREY * light.picture.white);
         split.note(DIFFRACTION, renderer.diffraction().map_or(0.0, |found| found.error(mean)));
@@ -258,12 +294,10 @@ impl PictureArgs {
 
     fn exact_picture(
         &self,
-        (renderer, is_moving): (&ExactRenderer<'_>, bool),
+        (renderer, seconds): (&ExactRenderer<'_>, f64),
         tolerance: f64,
         stop: &AtomicBool,
     ) -> PictureLight {
-        // What moves by less than can be seen needs no samples of the time.
-        let seconds = self.exposed.seconds.filter(|_| is_moving).unwrap_or(0.0);
         let (max_samples, seed) = (self.max_samples, self.seed);
         let settings = ExactSettings { tolerance, max_samples, seed, seconds };
         let bar = progress_bar(STEPS);
@@ -285,16 +319,17 @@ impl PictureArgs {
 /// A picture by the quick way, with its error against the exact way on some of its tiles.
 fn quick_picture(
     shot: &CameraShot,
-    exact: &ExactRenderer<'_>,
+    (exact, seconds): (&ExactRenderer<'_>, f64),
     stop: &AtomicBool,
 ) -> Result<PictureLight, PictureError> {
-    let quick = QuickRenderer::new(&shot.model, &shot.bands, exact)?;
+    let quick = QuickRenderer::exposed(&shot.model, &shot.bands, exact, seconds)?;
     let (made, ms) = time_ms(|| quick.render_fast(stop));
     let QuickPicture { mut picture, device, refused } = made;
     if let Some(why) = refused {
         print_note(format!("note: {why}; the processor made the picture"));
     }
-    let error = quick_error(exact, &picture, CHECKED_TILES, CHECKED_SAMPLES);
+    let checked = ((CHECKED_TILES, CHECKED_SAMPLES), seconds);
+    let error = ErrorMap::of_exposure(exact, &picture, checked, || false).rms();
     picture.rays = error.rays;
     let sampling = Estimate { milliseconds: Some(ms), ..error };
     Ok(PictureLight { picture, sampling, way: "quick", device })

@@ -80,14 +80,18 @@ impl PictureArgs {
         }
     }
 
-    /// The lens with its sensor, and so many wavelengths for a colour.
+    /// The lens with its sensor, and so many wavelengths for a colour, or one for all colours if that is 0.
     pub(super) fn shot(
         &self,
         opened: &LoadedLens,
         source: &SceneSource,
         wavelengths: usize,
     ) -> Result<CameraShot, PictureError> {
-        let coloring = if self.gray { Coloring::Gray } else { Coloring::Rgb(wavelengths) };
+        let coloring = match wavelengths {
+            _ if self.gray => Coloring::Gray,
+            0 => Coloring::Primary,
+            count => Coloring::Rgb(count),
+        };
         let (lens, focus, group) = self.focused_lens(opened, source)?;
         let unfocused = RayModel::from_lens(&opened.lens, self.zoom)?;
         let diagonal = match (self.exposed.pitch_mm(), self.diagonal) {

@@ -2,6 +2,13 @@
 //!
 //! The optimization uses different rays in every step and none of those by which its result is
 //! evaluated here: more rays, traced with half of its step.
+//!
+//! These images are not made by the renderer of pictures, and cannot be. That one follows light backwards: from a
+//! pixel, through the surfaces of a lens, into a scene that radiates in all directions. Here a beam has one direction
+//! at every point, which no ray that begins on the screen has but by chance, and light has to be followed forwards
+//! from the beam, through a field of indices without surfaces, and counted where it lands. The image is the very sum
+//! over rays that the loss is made of, so that what is shown is what was optimized; a second renderer would show
+//! something else. Shared with other pictures is how images are drawn in rows and in grey levels (`plot`).
 
 pub(super) mod caustic;
 pub(super) mod display;

@@ -99,15 +99,29 @@ impl QuickRenderer {
         bands: &[ColorBand],
         exact: &ExactRenderer<'_>,
     ) -> Result<Self, PictureError> {
-        Self::of_subject(model, bands, &exact.subject())
+        Self::exposed(model, bands, exact, 0.0)
+    }
+
+    /// The same for a scene that moves for some seconds: each plane is painted as its mean over its way.
+    ///
+    /// # Errors
+    /// Numbers that cannot be traced.
+    pub fn exposed(
+        model: &RayModel,
+        bands: &[ColorBand],
+        exact: &ExactRenderer<'_>,
+        seconds: f64,
+    ) -> Result<Self, PictureError> {
+        Self::of_subject(model, bands, &exact.subject(), seconds)
     }
 
     fn of_subject(
         model: &RayModel,
         bands: &[ColorBand],
         subject: &PictureSubject<'_>,
+        seconds: f64,
     ) -> Result<Self, PictureError> {
-        let PictureSubject { scene, frame, directions, losses, white, spreads } = *subject;
+        let PictureSubject { scene, frame, directions, losses, white, spreads, aimed } = *subject;
         let blur = spreads.map(|spreads| FrameBlur::new(model, bands, spreads, frame));
         let frame = blur.as_ref().map_or(frame, FrameBlur::rendered);
         let reach = frame.reach();
@@ -116,20 +130,27 @@ impl QuickRenderer {
         let is_small = radii < RADII[0];
         let windows = if is_small { &WINDOWS[..SMALL] } else { &WINDOWS[..] };
         let size = TableSize { windows, rays: RAYS[usize::from(is_small)], radii };
-        let tables = BeamletTable::several(model, bands, (directions, losses), reach, size)?;
+        let tables = match aimed {
+            Some(aimed) => {
+                vec![BeamletTable::aimed(model, bands, aimed, losses, (reach, radii))?]
+            }
+            None => BeamletTable::several(model, bands, (directions, losses), reach, size)?,
+        };
         let Some(finest) = tables.last() else { return Err(PictureError::NoLight) };
         let colors = bands.len();
         let texture = |layer: &SceneLayer| {
             // The side of a pixel on the plane, by first-order optics.
             let [half_width, _] = filling_size(model, &frame, layer.distance)?;
             let pixel = 2.0 * half_width / frame.pixels[0] as f64;
-            Ok(Arc::new(seen_texture(finest, &frame, layer, (colors, pixel))))
+            let seen = SeenLayer { layer, way: way(layer, seconds), pixel };
+            Ok(Arc::new(seen.texture(finest, &frame, colors)))
         };
         let textures =
             scene.layers().iter().map(texture).collect::<Result<Vec<_>, PictureError>>()?;
         let level = |table: BeamletTable| {
             let plane = |(layer, texture): (&SceneLayer, &Arc<MipTexture>)| {
-                ScenePlane::new(&table, layer, colors, Arc::clone(texture))
+                let moved = (layer, way(layer, seconds));
+                ScenePlane::new(&table, moved, colors, Arc::clone(texture))
             };
             let planes = scene.layers().iter().zip(&textures).map(plane).collect();
             QuickLevel { table, planes }
@@ -282,17 +303,22 @@ impl QuickRenderer {
     }
 }
 
+/// The way of a plane in some seconds, to the right and upwards in its unit.
+fn way(layer: &SceneLayer, seconds: f64) -> [f64; 2] {
+    layer.velocity.map(|speed| speed * seconds)
+}
+
 impl ScenePlane {
-    /// A plane for a number of colours, with its painting.
+    /// A plane for a number of colours, with its way and its painting.
     fn new(
         table: &BeamletTable,
-        layer: &SceneLayer,
+        (layer, way): (&SceneLayer, [f64; 2]),
         colors: usize,
         texture: Arc<MipTexture>,
     ) -> Self {
         let spots = spots(table, layer);
         let scales = (0..colors).map(|color| scale(table, &spots[1], color)).collect();
-        Self { spots, scales, center: layer.center, half_size: layer.half_size, texture }
+        Self { spots, scales, center: layer.center, half_size: layer.half_size, way, texture }
     }
 }
 
@@ -304,24 +330,67 @@ fn spots(table: &BeamletTable, layer: &SceneLayer) -> Vec<Vec<BeamletSpot>> {
     table.rows.iter().map(of_row).collect()
 }
 
-/// The painting of a plane for a number of colours, as far as beamlets reach, and as fine as they see it; a
-/// pixel has this side on it.
-fn seen_texture(
-    table: &BeamletTable,
-    frame: &ImageFrame,
-    layer: &SceneLayer,
-    (colors, pixel): (usize, f64),
-) -> MipTexture {
-    let spots = spots(table, layer);
-    let seen = seen_part(frame, table, &spots, layer, pixel);
-    let area = (seen[1][0] - seen[0][0]) * (seen[1][1] - seen[0][1]);
-    let wanted = (2.0 * sharpest(&spots, pixel).sqrt()).max(TEXEL * pixel);
-    // A power of two in pixels: neighbouring points then have neighbouring texels.
-    let mut texel = pixel * (wanted / pixel).log2().floor().exp2();
-    while texel * texel * MAX_TEXELS < area {
-        texel *= 2.0;
+/// A plane as a picture sees it.
+struct SeenLayer<'a> {
+    layer: &'a SceneLayer,
+    /// Its way during the exposure, in its unit.
+    way: [f64; 2],
+    /// The side of a pixel on it.
+    pixel: f64,
+}
+
+impl SeenLayer<'_> {
+    /// The painting for a number of colours, as far as beamlets reach, and as fine as they see it.
+    fn texture(&self, table: &BeamletTable, frame: &ImageFrame, colors: usize) -> MipTexture {
+        let spots = spots(table, self.layer);
+        let seen = self.seen_part(frame, table, &spots);
+        let side = |k: usize| seen[1][k] - seen[0][k] + self.way[k].abs();
+        let area = side(0) * side(1);
+        let wanted = (2.0 * sharpest(&spots, self.pixel).sqrt()).max(TEXEL * self.pixel);
+        // A power of two in pixels: neighbouring points then have neighbouring texels.
+        let mut texel = self.pixel * (wanted / self.pixel).log2().floor().exp2();
+        while texel * texel * MAX_TEXELS < area {
+            texel *= 2.0;
+        }
+        MipTexture::new(self.layer, seen, (texel, self.way), colors)
     }
-    MipTexture::new(layer, seen, texel, colors)
+
+    /// The part of a painting that a picture sees, with a margin, from its middle: the lower left and the upper
+    /// right corner. No more than a margin around the painting itself, so that its ends are in the texels.
+    fn seen_part(
+        &self,
+        frame: &ImageFrame,
+        table: &BeamletTable,
+        spots: &[Vec<BeamletSpot>],
+    ) -> [[f64; 2]; 2] {
+        let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
+        let part = |i: usize| i as f64 / (PROBES - 1) as f64;
+        let last = frame.pixels.map(|count| count as f64);
+        for i in 0..PROBES * PROBES {
+            let (right, down) = (part(i % PROBES) * last[0], part(i / PROBES) * last[1]);
+            let place = table.place(frame.point([0, 0], [right, down]));
+            for (inner, outer) in spots[place.row].iter().zip(&spots[place.row + 1]) {
+                let spot = inner.mixed(outer, place.part).turned(place.turn);
+                if !(spot.weight > 0.0) {
+                    continue;
+                }
+                for k in [0, 1] {
+                    let margin = 4.0 * spot.variance[2 * k].max(0.0).sqrt();
+                    low[k] = low[k].min(spot.place[k] - margin - self.layer.center[k]);
+                    high[k] = high[k].max(spot.place[k] + margin - self.layer.center[k]);
+                }
+            }
+        }
+        let margin = 8.0 * self.pixel;
+        let inside = |k: usize, v: f64, end: f64| {
+            let reach = self.layer.half_size[k] + self.way[k].abs() + margin;
+            if v.is_finite() { v.clamp(-reach, reach) } else { end * margin }
+        };
+        [
+            [0, 1].map(|k| inside(k, low[k] - margin, -1.0)),
+            [0, 1].map(|k| inside(k, high[k] + margin, 1.0)),
+        ]
+    }
 }
 
 /// The mean place of the rays of a colour in the first row off the axis over the distance of that row.
@@ -352,42 +421,4 @@ fn sharpest(spots: &[Vec<BeamletSpot>], pixel: f64) -> f64 {
         }
     }
     0.0
-}
-
-/// The part of a painting that a picture sees, with a margin, from its middle: the lower left and the upper
-/// right corner. No more than a margin around the painting itself, so that its ends are in the texels.
-fn seen_part(
-    frame: &ImageFrame,
-    table: &BeamletTable,
-    spots: &[Vec<BeamletSpot>],
-    layer: &SceneLayer,
-    pixel: f64,
-) -> [[f64; 2]; 2] {
-    let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
-    let part = |i: usize| i as f64 / (PROBES - 1) as f64;
-    let last = frame.pixels.map(|count| count as f64);
-    for i in 0..PROBES * PROBES {
-        let (right, down) = (part(i % PROBES) * last[0], part(i / PROBES) * last[1]);
-        let place = table.place(frame.point([0, 0], [right, down]));
-        for (inner, outer) in spots[place.row].iter().zip(&spots[place.row + 1]) {
-            let spot = inner.mixed(outer, place.part).turned(place.turn);
-            if !(spot.weight > 0.0) {
-                continue;
-            }
-            for k in [0, 1] {
-                let margin = 4.0 * spot.variance[2 * k].max(0.0).sqrt();
-                low[k] = low[k].min(spot.place[k] - margin - layer.center[k]);
-                high[k] = high[k].max(spot.place[k] + margin - layer.center[k]);
-            }
-        }
-    }
-    let margin = 8.0 * pixel;
-    let inside = |k: usize, v: f64, end: f64| {
-        let reach = layer.half_size[k] + margin;
-        if v.is_finite() { v.clamp(-reach, reach) } else { end * margin }
-    };
-    [
-        [0, 1].map(|k| inside(k, low[k] - margin, -1.0)),
-        [0, 1].map(|k| inside(k, high[k] + margin, 1.0)),
-    ]
 }

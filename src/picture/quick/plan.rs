@@ -33,6 +33,8 @@ pub(super) struct ScenePlane {
     /// The middle of the painting, and half of its sides.
     pub(super) center: [f64; 2],
     pub(super) half_size: [f64; 2],
+    /// The way of the painting during the exposure.
+    pub(super) way: [f64; 2],
     pub(super) texture: Arc<MipTexture>,
 }
 
@@ -182,19 +184,22 @@ impl PlanSource<'_> {
 
     /// The view of a painting by a beam on a lattice; `None` far beside the painting.
     fn look(&self, spot: &SeenSpot, step: usize) -> Option<BeamLook> {
-        let ScenePlane { texture, half_size, .. } = &self.planes[spot.plane];
+        let ScenePlane { texture, half_size, way, .. } = &self.planes[spot.plane];
         let blur = RoundSpots::new(spot.blurred(step), texture.finest());
         let (level, coarser) = texture.level(blur.variance);
         let unit = texture.texel * 2_f64.powi(level as i32);
         let reach = 3.0 * blur.longest.sqrt() + 2.0 * unit;
         // A lattice goes beyond its block by a quarter of it.
         let wide = |k: usize| spot.place[k][1..].iter().map(|v| 1.5 * v.abs()).sum::<f64>();
-        let is_beside = |k: usize| spot.place[k][0].abs() > half_size[k] + wide(k) + reach;
+        let is_beside =
+            |k: usize| spot.place[k][0].abs() > half_size[k] + way[k].abs() + wide(k) + reach;
         if is_beside(0) || is_beside(1) {
             return None;
         }
-        let is_within =
-            |k: usize| spot.place[k][0].abs() + wide(k) + reach + BORDER * unit < half_size[k];
+        let is_within = |k: usize| {
+            let inside = half_size[k] - way[k].abs();
+            spot.place[k][0].abs() + wide(k) + reach + BORDER * unit < inside
+        };
         let scaled = |k: usize| {
             let mut place = spot.place[k].map(|v| v / unit);
             place[0] -= texture.corner[k] / unit + 0.5;

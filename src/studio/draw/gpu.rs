@@ -7,18 +7,19 @@ use thiserror::Error;
 use wgpu::util::{BufferInitDescriptor, DeviceExt};
 use wgpu::vertex_attr_array as attributes;
 use wgpu::{
-    BindGroup, BindGroupDescriptor, BindGroupEntry, BindGroupLayout, BindGroupLayoutDescriptor,
-    BindGroupLayoutEntry, BindingType, BlendState, Buffer, BufferAsyncError, BufferBindingType,
-    BufferDescriptor, BufferUsages, COPY_BYTES_PER_ROW_ALIGNMENT, Color, ColorTargetState,
-    ColorWrites, CommandEncoder, CommandEncoderDescriptor, Device, DeviceDescriptor, Extent3d,
-    FragmentState, Instance, InstanceDescriptor, LoadOp, MapMode, MapRangeError, MultisampleState,
-    Operations, PipelineCompilationOptions, PipelineLayoutDescriptor, PollError, PollType,
-    PrimitiveState, PrimitiveTopology, Queue, RenderPass, RenderPassColorAttachment,
-    RenderPassDescriptor, RenderPipeline, RenderPipelineDescriptor, RequestAdapterError,
-    RequestAdapterOptions, RequestDeviceError, ShaderModule, ShaderStages, StoreOp,
-    TexelCopyBufferInfo, TexelCopyBufferLayout, Texture, TextureDescriptor, TextureDimension,
-    TextureFormat, TextureUsages, TextureView, TextureViewDescriptor, VertexBufferLayout,
-    VertexState, VertexStepMode, include_wgsl,
+    Backends, BindGroup, BindGroupDescriptor, BindGroupEntry, BindGroupLayout,
+    BindGroupLayoutDescriptor, BindGroupLayoutEntry, BindingType, BlendState, Buffer,
+    BufferAsyncError, BufferBindingType, BufferDescriptor, BufferUsages,
+    COPY_BYTES_PER_ROW_ALIGNMENT, Color, ColorTargetState, ColorWrites, CommandEncoder,
+    CommandEncoderDescriptor, Device, DeviceDescriptor, Extent3d, FragmentState, Instance,
+    InstanceDescriptor, LoadOp, MapMode, MapRangeError, MultisampleState, Operations,
+    PipelineCompilationOptions, PipelineLayoutDescriptor, PollError, PollType, PrimitiveState,
+    PrimitiveTopology, Queue, RenderPass, RenderPassColorAttachment, RenderPassDescriptor,
+    RenderPipeline, RenderPipelineDescriptor, RequestAdapterError, RequestAdapterOptions,
+    RequestDeviceError, ShaderModule, ShaderStages, StoreOp, TexelCopyBufferInfo,
+    TexelCopyBufferLayout, Texture, TextureDescriptor, TextureDimension, TextureFormat,
+    TextureUsages, TextureView, TextureViewDescriptor, VertexBufferLayout, VertexState,
+    VertexStepMode, include_wgsl,
 };
 
 use super::{Camera, Rgba, RgbaImage, Scene, Segment, TriangleVertex};
@@ -256,11 +257,20 @@ fn begin_pass<'a>(
     })
 }
 
+/// The graphics interfaces that need no display.
+pub(super) fn headless_instance() -> Instance {
+    // OpenGL would look for a display, and complain where there is none.
+    Instance::new(InstanceDescriptor {
+        backends: Backends::PRIMARY,
+        ..InstanceDescriptor::new_without_display_handle()
+    })
+}
+
 /// A device without a window, with all that its adapter can do.
 ///
 /// A software adapter serves as well as a graphics card.
 pub async fn headless_device() -> Result<(Device, Queue), GpuError> {
-    let instance = Instance::new(InstanceDescriptor::new_without_display_handle());
+    let instance = headless_instance();
     let adapter = instance.request_adapter(&RequestAdapterOptions::default()).await?;
     let descriptor =
         DeviceDescriptor { required_limits: adapter.limits(), ..DeviceDescriptor::default() };

@@ -3,16 +3,16 @@
 //! The tables are made on the processor by [`crate::picture`], which knows no graphics; here they are
 //! copied to the card, on which one pass sums the light of beams and a second one that of lattices.
 
-use super::gpu::{GpuError, read_buffer};
+use super::gpu::{GpuError, headless_instance, read_buffer};
 use crate::picture::{PackedPicture, PictureDevice};
 use std::sync::Mutex;
 use wgpu::util::{BufferInitDescriptor, DeviceExt};
 use wgpu::{
-    Adapter, Backends, BindGroupDescriptor, BindGroupEntry, Buffer, BufferDescriptor, BufferUsages,
+    Adapter, BindGroupDescriptor, BindGroupEntry, Buffer, BufferDescriptor, BufferUsages,
     CommandEncoder, CommandEncoderDescriptor, ComputePassDescriptor, ComputePipeline,
-    ComputePipelineDescriptor, Device, DeviceDescriptor, DeviceType, ErrorFilter, Instance,
-    InstanceDescriptor, PipelineCompilationOptions, PowerPreference, Queue, RequestAdapterOptions,
-    ShaderModule, include_wgsl,
+    ComputePipelineDescriptor, Device, DeviceDescriptor, DeviceType, ErrorFilter,
+    PipelineCompilationOptions, PowerPreference, Queue, RequestAdapterOptions, ShaderModule,
+    include_wgsl,
 };
 
 /// The number of points that a group of the shader works on.
@@ -56,11 +56,7 @@ impl PicturePass {
     /// # Errors
     /// No adapter, or one that gives no device.
     pub async fn headless() -> Result<Self, GpuError> {
-        // OpenGL would look for a display, and complain where there is none.
-        let instance = Instance::new(InstanceDescriptor {
-            backends: Backends::PRIMARY,
-            ..InstanceDescriptor::new_without_display_handle()
-        });
+        let instance = headless_instance();
         let options = RequestAdapterOptions {
             power_preference: PowerPreference::HighPerformance,
             ..RequestAdapterOptions::default()
