@@ -41,6 +41,7 @@ fn option_name(effect: Effect) -> &'static str {
         Effect::GradientIndex => "gradient",
         Effect::Poses => "poses",
         Effect::Temperature => "temperature",
+        Effect::Absorption => "absorption",
     }
 }
 
@@ -92,6 +93,13 @@ const REFLECTION: EffectRule = EffectRule {
     effect: Effect::TotalReflection,
     allowed: AllowedSetting::AlwaysOn,
     reason: "the test is part of refraction and costs nothing",
+};
+
+/// The rule of every command with effects for absorption.
+const ABSORPTION: EffectRule = EffectRule {
+    effect: Effect::Absorption,
+    allowed: AllowedSetting::AlwaysOff,
+    reason: "no number here is of the light that glasses absorb; `picture --coating` asks for it",
 };
 
 impl EffectRule {
@@ -150,7 +158,8 @@ impl EffectArgs {
     /// The settings of the user for a command with these rules; an error names a switch that the
     /// command cannot follow.
     pub(super) fn choices(&self, rules: &[EffectRule]) -> Result<EffectChoices, CliError> {
-        let rules: Vec<EffectRule> = rules.iter().copied().chain([REFLECTION]).collect();
+        let rules: Vec<EffectRule> =
+            rules.iter().copied().chain([REFLECTION, ABSORPTION]).collect();
         let rule_of = |effect| rules.iter().find(|rule| rule.effect == effect);
         let mut chosen = EffectOverrides::default();
         for switch in self.effects.iter().filter(|switch| switch.effect.is_none()) {

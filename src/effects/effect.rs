@@ -25,11 +25,13 @@ pub enum Effect {
     Poses,
     /// The lens is at another temperature than its glasses are catalogued for.
     Temperature,
+    /// The glasses absorb light: rays have weights by their ways through them.
+    Absorption,
 }
 
 impl Effect {
     /// Every effect, in the order of a table.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 10] = [
         Self::Dispersion,
         Self::Asphere,
         Self::Clipping,
@@ -39,6 +41,7 @@ impl Effect {
         Self::GradientIndex,
         Self::Poses,
         Self::Temperature,
+        Self::Absorption,
     ];
 
     /// The name in reports and menus.
@@ -53,6 +56,7 @@ impl Effect {
             Self::GradientIndex => "gradient index",
             Self::Poses => "tilts, decentres",
             Self::Temperature => "temperature",
+            Self::Absorption => "absorption",
         }
     }
 }

@@ -4,6 +4,7 @@
 //! move and how near they come to a rim, are smooth over the pupil. The root mean square of a shift
 //! bounds the change of the RMS radius of a spot, by the triangle inequality.
 
+use super::absorption::absorbed_on_axis;
 use super::aiming::{AimingDifference, CoarseSpot, aiming_difference};
 use super::simplify::{
     at_room_temperature, centre, collimate_fields, placed_surfaces, reduce_to_conic,
@@ -54,6 +55,8 @@ pub struct EffectMeasurements {
     /// The temperature of a lens that is not at that of its catalogues, in °C, and the shift of rays
     /// with the indices of these, in mm.
     pub temperature: Option<(f64, f64)>,
+    /// The largest share of light on the axis that the glasses absorb, over the wavelengths.
+    pub absorption: f64,
 }
 
 /// The surfaces that are tilted or decentred, or at which the axis is broken.
@@ -137,6 +140,7 @@ pub fn measure_effects_at(
         grin_gaps: grin_gaps(&model, &bundles)?,
         poses: poses(&model, &bundles)?,
         temperature: temperature(lens, zoom, &model, &bundles)?,
+        absorption: absorbed_on_axis(lens, &model),
     })
 }
 

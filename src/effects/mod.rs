@@ -8,6 +8,7 @@
 //!
 //! Every effect can be forced on or off ([`EffectOverrides`]).
 
+mod absorption;
 mod aiming;
 mod apply;
 mod dispersion;
@@ -16,6 +17,7 @@ mod measure;
 mod plan;
 mod simplify;
 
+pub use absorption::transmitted_light;
 pub use aiming::AimingDifference;
 pub use apply::{build_ray_model, build_ray_model_at, simplify};
 pub use effect::{Effect, EffectOverride, EffectOverrides};

@@ -169,6 +169,7 @@ pub fn plan(
         grin,
         poses(measured, allowed, overrides.get(Effect::Poses)),
         temperature(measured, allowed, overrides.get(Effect::Temperature)),
+        absorption(measured, overrides.get(Effect::Absorption)),
     ];
     let mut plan = EffectPlan { decisions, as_conic, unclipped, homogeneous, aiming_light: 0.0 };
     if !plan.computes(Effect::Aiming) {
@@ -482,6 +483,21 @@ fn temperature(
     };
     let computed = decision.computed && measured.temperature.is_some();
     EffectDecision { computed, reason, ..decision }
+}
+
+/// No ray moves and no spot changes by what glasses absorb: it is left out unless it is asked for.
+fn absorption(measured: &EffectMeasurements, choice: EffectOverride) -> EffectDecision {
+    let share = measured.absorption;
+    let unit = "of the light";
+    let decision = lens_decision(Effect::Absorption, choice, share, f64::INFINITY, unit);
+    let reason = if share > 0.0 {
+        let share = percent(share);
+        format!("spots count rays and not their light, of which glasses absorb {share} on the axis")
+    } else {
+        "no glass of the lens is known to absorb light".to_owned()
+    };
+    let computed = decision.computed && share > 0.0;
+    EffectDecision { computed, residual: 0.0, reason, ..decision }
 }
 
 #[cfg(test)]

@@ -16,6 +16,10 @@ pub enum PerturbationKind {
     /// Adds `A/2 (ρ⁴ + ρy²)` to the sag, half spherical aberration and half astigmatism, where ρ is the
     /// distance from the axis in semi-diameters; A in mm.
     Irregularity,
+    /// Adds `s/2 (ρ⁴ − ρ²)` semi-diameters to the sag, a zone between centre and rim whose slope at the rim is s:
+    /// what a slope error is beyond power. To first order that is a curvature and a coefficient of r⁴; s is an
+    /// angle.
+    AsphereSlope,
     /// Adds to the gap behind the surface, in mm; everything behind moves, the image plane included.
     Thickness,
     /// Adds to the gap behind the surface and takes as much from the next gap, in mm.
@@ -60,11 +64,12 @@ pub struct Perturbation {
 
 impl PerturbationKind {
     /// All kinds.
-    pub const ALL: [Self; 18] = [
+    pub const ALL: [Self; 19] = [
         Self::Curvature,
         Self::Conic,
         Self::Asphere,
         Self::Irregularity,
+        Self::AsphereSlope,
         Self::Thickness,
         Self::ThicknessAdjusted,
         Self::Index,
@@ -91,11 +96,12 @@ impl PerturbationKind {
         matches!(self, Self::Thickness | Self::ThicknessAdjusted | Self::Index | Self::Abbe)
     }
 
-    /// True for a tilt, whose value is an angle.
+    /// True for a tilt or a slope, whose value is an angle.
     pub fn is_angle(self) -> bool {
         matches!(
             self,
-            Self::SurfaceTiltX
+            Self::AsphereSlope
+                | Self::SurfaceTiltX
                 | Self::SurfaceTiltY
                 | Self::ElementTiltX
                 | Self::ElementTiltY
@@ -116,6 +122,7 @@ impl PerturbationKind {
             Self::Conic => "conic",
             Self::Asphere => "asphere r^4",
             Self::Irregularity => "irregularity",
+            Self::AsphereSlope => "asphere slope",
             Self::Thickness => "thickness",
             Self::ThicknessAdjusted => "thickness, gap adjusted",
             Self::Index => "index",

@@ -120,12 +120,14 @@ impl Row {
     }
 
     /// The frame of the axis behind the surface in that of the axis in front of it; `None` where the
-    /// axis is not broken.
+    /// axis is not broken, or goes on as it was behind two breaks.
     pub fn axis(&self) -> Option<Pose<f64>> {
         match [self.break_before, self.break_after] {
             [None, None] => None,
             [Some(only), None] | [None, Some(only)] => Some(only.pose()),
-            [Some(before), Some(after)] => Some(before.pose().then(&after.pose())),
+            [Some(before), Some(after)] => {
+                Some(before.pose().then(&after.pose())).filter(|pose| !pose.is_nearly_centred())
+            }
         }
     }
 

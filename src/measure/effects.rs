@@ -9,6 +9,7 @@ use crate::effects::{
 use crate::lens::Lens;
 use crate::pupil::{Accuracy, RayModelError};
 use rayon::ThreadPoolBuilder;
+use std::hint::black_box;
 use std::ops::ControlFlow;
 
 /// The fewest pairs of measurements, with an effect and without it. Of each kind the shortest counts:
@@ -119,8 +120,11 @@ impl EffectTask<'_> {
     /// The number of spots of the lens resolved by a plan; 0 if it cannot be.
     fn compute_spots(&self, plan: &EffectPlan) -> usize {
         let accuracy = Accuracy { tolerance: self.tolerance, max_rays: MAX_RAYS };
-        effects::build_ray_model(self.lens, self.zoom, plan)
-            .map_or(0, |model| analysis::spots(&model, accuracy).len())
+        let Ok(model) = effects::build_ray_model(self.lens, self.zoom, plan) else { return 0 };
+        if plan.computes(Effect::Absorption) {
+            black_box(effects::transmitted_light(self.lens, &model));
+        }
+        analysis::spots(&model, accuracy).len()
     }
 }
 

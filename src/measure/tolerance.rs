@@ -12,9 +12,9 @@ use crate::merit::{
 };
 use crate::optimize::{DescentMethod, start};
 use crate::tolerance::{
-    Compensation, Derivatives, FocusTreatment, NominalLens, QuadraticForm, RayEffects,
-    SecondDerivatives, SweptSensitivity, ToleranceError, ToleranceRequest, ToleranceScene, analyze,
-    form_spots, graded_sheet, perturb, real_lenses, sensitivities, swept_sensitivities,
+    Compensation, Derivatives, ErrorModel, FocusTreatment, NominalLens, QuadraticForm, RayEffects,
+    SecondDerivatives, ToleranceError, ToleranceRequest, ToleranceScene, analyze, form_spots,
+    graded_sheet, perturb, sensitivities, traced_lenses,
 };
 use rayon::ThreadPoolBuilder;
 use serde::Serialize;
@@ -49,8 +49,11 @@ pub struct ToleranceBenchmark {
     /// The largest relative difference of the growth by an error from that by rays a hundred times as
     /// accurate.
     pub sampling_error: f64,
-    /// The time of the sensitivities by one sweep, on one core, in milliseconds.
+    /// The time of the sensitivities and of both forms as `tolerance` finds them, by sweeps back and with the
+    /// motion of the edges of pupils, on one core, in milliseconds.
     pub sweep_ms: f64,
+    /// True if pupils move.
+    pub moving_pupils: bool,
     /// The time of all derivatives by second-order jets, on one core, in milliseconds.
     pub jets_ms: f64,
     /// The time of the distribution and the yield by the quadratic form, on one core, in
@@ -105,28 +108,32 @@ pub fn measure_tolerances(
     let jets = || sensitivities(&scene.lens, &scene.beam, scene.options, &errors);
     let [one, two] = [1, 2].map(|threads| ThreadPoolBuilder::new().num_threads(threads).build());
     let (one, two) = (one.map_err(BenchmarkError::from)?, two.map_err(BenchmarkError::from)?);
-    let (swept, sweep_ms) =
-        one.install(|| time_median(3..=50, || swept_sensitivities(&scene, &errors)));
-    let (found, jets_ms) = one.install(|| time_median(1..=5, jets));
-    let (swept, found) = (swept?, found?);
+    let never = || false;
     let is_stopped = || stop.load(Ordering::Relaxed);
+    let model = || ErrorModel::new(&scene, &sheet, SecondDerivatives::Neglected, &never);
+    let (found_model, sweep_ms) = one.install(|| time_median(3..=50, model));
+    let moves = found_model?.pupils.moves;
+    // Jets know no edges.
+    let held = scene.clone().with_held_pupils();
+    let swept = ErrorModel::new(&held, &sheet, SecondDerivatives::Neglected, &never)?;
+    let (found, jets_ms) = one.install(|| time_median(1..=5, jets));
+    let found = found?;
     if is_stopped() {
         return Ok(None);
     }
     let compensation = Compensation::new(&scene, &sheet)?;
-    let effects = RayEffects::new(&scene, &errors, SecondDerivatives::Neglected, &|| {
-        stop.load(Ordering::Relaxed)
-    })?;
+    let effects = RayEffects::new(&scene, &errors, SecondDerivatives::Neglected, &is_stopped)?;
     let form = || {
         let form = QuadraticForm::new(&effects, FocusTreatment::Refocused, &compensation);
         form_spots(&form, &sheet, 1).map(|spots| spots.len())
     };
     let (spots, form_ms) = one.install(|| time_median(3..=9, form));
     spots?;
-    let real = || real_lenses(&scene, &sheet, 1, samples, 0, stop).map(|lenses| lenses.len());
+    let real =
+        || traced_lenses((&scene, moves), &sheet, (1, samples), &is_stopped).map(|own| own.len());
     let (traced, samples_ms) = two.install(|| time_median(1..=5, real));
-    let pairs = found.iter().zip(&swept);
-    let first_error = pairs.map(|(jet, swept)| first_difference(jet.mean_square(), swept.first));
+    let pairs = found.iter().zip(&swept.forms[0].first);
+    let first_error = pairs.map(|(jet, swept)| first_difference(jet.mean_square(), *swept));
     if is_stopped() {
         return Ok(None);
     }
@@ -135,7 +142,8 @@ pub fn measure_tolerances(
         rays: scene.beam.rays(),
         first_error: first_error.fold(0.0, f64::max),
         second_error: second_error(&scene, &sheet)?,
-        sampling_error: sampling_error(lens, &errors, &swept)?,
+        sampling_error: sampling_error(lens, &sheet, &swept.forms[0])?,
+        moving_pupils: moves,
         sweep_ms,
         jets_ms,
         form_ms,
@@ -149,12 +157,16 @@ pub fn measure_tolerances(
 /// hundred times as accurate.
 fn sampling_error(
     lens: &Lens,
-    errors: &[Perturbation],
-    found: &[SweptSensitivity],
+    sheet: &ToleranceSheet,
+    found: &QuadraticForm,
 ) -> Result<f64, ToleranceError> {
-    let exact = swept_sensitivities(&ToleranceScene::new(lens, 0, 1e-2 * ACCURACY)?, errors)?;
-    let pairs = found.iter().zip(&exact).filter(|(_, exact)| exact.growth[0] > 0.0);
-    let apart = pairs.map(|(found, exact)| (found.growth[0] / exact.growth[0] - 1.0).abs());
+    let scene = ToleranceScene::new(lens, 0, 1e-2 * ACCURACY)?.with_held_pupils();
+    let exact = ErrorModel::new(&scene, sheet, SecondDerivatives::Neglected, &|| false)?;
+    let growth = |form: &QuadraticForm, i: usize| form.second.of(i, i);
+    let apart = (0..sheet.errors.len()).filter_map(|i| {
+        let exact = growth(&exact.forms[0], i);
+        (exact > 0.0).then(|| (growth(found, i) / exact - 1.0).abs())
+    });
     Ok(apart.fold(0.0, f64::max))
 }
 

@@ -5,22 +5,17 @@
 //! the variables of the lens then take back: one factorization serves all glasses at all places. Limits that
 //! hold the lens are stiff springs, and steps are damped, since a lens follows its linear model only so far.
 
+use super::limited::add_springs;
 use super::state::scale;
 use crate::lens::{Lens, Parameter, Quantity, Variable};
-use crate::merit::{DerivativeLevel, Limit, LimitedSum, Merit, MeritError, SumOfSquares};
+use crate::merit::{DerivativeLevel, LimitedSum, Merit, MeritError, SumOfSquares};
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 /// The damping of steps: a step that changes the residuals by their own size, or a variable by its scale,
 /// costs this share of the merit.
 const DAMPING: f64 = 3e-4;
-/// The cost, in merits, of a step of all variables by their scales that leaves a limit.
-const STIFFNESS: f64 = 1e4;
 /// The damping of a variable that cannot follow, in merits.
 const FIXED: f64 = 1e12;
-/// The distance from a bound within which a limit holds a lens, relative to the bound, and the least one in
-/// mm.
-const NEAR: f64 = 1e-6;
-const LEAST_BOUND: f64 = 1e-3;
 
 /// The quadratic model of a merit by the variables of a lens and the indices of its glasses.
 #[derive(Debug)]
@@ -70,11 +65,9 @@ impl GlassModel {
             .map(|(i, variable)| scaled(lens, (variable, values[i]), rows, (&objective, i)))
             .collect();
         let least = objective.value;
-        for limit in limits.iter().filter(|limit| holds(limit)) {
-            stiffen(&mut objective, limit, &variables, least);
-        }
-        let scales = variables.iter().map(|variable| variable.scale);
-        let scales: Vec<f64> = scales.chain(indices.iter().map(|_| 1.0)).collect();
+        let own: Vec<f64> = variables.iter().map(|variable| variable.scale).collect();
+        add_springs(&mut objective, &limits, &own);
+        let scales: Vec<f64> = own.into_iter().chain(indices.iter().map(|_| 1.0)).collect();
         let scales = DVector::from_vec(scales);
         let half_gradient = objective.gradient.component_mul(&scales) * 0.5;
         let normal = objective.normal.component_mul(&(&scales * scales.transpose()));
@@ -137,26 +130,4 @@ fn scaled(
         scale: if measured > 0.0 { measured.min(natural) } else { natural },
         is_free: !is_replaced && !is_at_bound,
     }
-}
-
-/// Adds the spring of a limit to a sum of squares whose least value is `least`.
-fn stiffen(sum: &mut SumOfSquares, limit: &Limit, variables: &[ScaledVariable], least: f64) {
-    let slopes = limit.slope.iter().zip(variables);
-    let size: f64 = slopes.map(|(slope, variable)| (slope * variable.scale).powi(2)).sum();
-    if size > 0.0 {
-        sum.add_residual(STIFFNESS * least / size, excess(limit), &limit.slope);
-    }
-}
-
-/// True if a limit is broken or holds the lens.
-fn holds(limit: &Limit) -> bool {
-    let bound = limit.margin.min.or(limit.margin.max).unwrap_or(0.0);
-    limit.margin.slack() <= NEAR * bound.abs().max(LEAST_BOUND)
-}
-
-/// The distance of a limited number from its nearest bound, negative below a lower one.
-fn excess(limit: &Limit) -> f64 {
-    let value = limit.margin.value;
-    let distances = [limit.margin.min, limit.margin.max].into_iter().flatten().map(|b| value - b);
-    distances.min_by(|a, b| a.abs().total_cmp(&b.abs())).unwrap_or(0.0)
 }

@@ -95,6 +95,8 @@ pub struct GlassSearch {
     initial_light: Vec<Vec<f64>>,
     best: Lens,
     merit: f64,
+    /// The merit function of the best lens with its pupils, until they are predicted with.
+    judged: Option<Merit>,
     /// The rays of one evaluation of the first lens.
     rays: usize,
     /// The exchanges of the best lens that were not tried yet.
@@ -112,6 +114,19 @@ struct Exchanged {
     lens: Lens,
     /// The distance of the two glasses: 0.01 in index count as much as 1.5 in Abbe number.
     distance: f64,
+    /// The merit function of the lens with its pupils, once it is optimized.
+    judged: Option<Merit>,
+}
+
+/// A lens after some steps of optimization.
+struct Descended {
+    lens: Lens,
+    /// Its merit with its limits as penalties.
+    merit: f64,
+    /// The merit function with its pupils.
+    judged: Merit,
+    /// The evaluations of the merit.
+    evaluations: usize,
 }
 
 /// A trial and the evaluations that it took.
@@ -149,6 +164,7 @@ impl GlassSearch {
             seed,
             is_guided: true,
             best: lens.clone(),
+            judged: Some(merit),
             waiting: None,
             evaluations: 1,
             rounds: 0,
@@ -178,8 +194,10 @@ impl GlassSearch {
     /// # Errors
     /// A lens without a merit.
     pub fn resume(&self) -> Result<Box<dyn Optimizer>, MeritError> {
-        let merit = Merit::new(&self.best, &self.goal, self.tolerance)?;
-        let merit = merit.with_initial_light(&self.initial_light);
+        let merit = match self.judged.clone() {
+            Some(merit) => merit,
+            None => self.judge(&self.best)?,
+        };
         start_from(DescentMethod::TrustRegion, merit, &self.best, self.tolerance)
     }
 
@@ -189,10 +207,9 @@ impl GlassSearch {
     /// # Errors
     /// A lens without a merit.
     pub fn restart(&mut self, lens: &Lens) -> Result<(), MeritError> {
-        let merit = Merit::new(lens, &self.goal, self.tolerance)?;
-        let merit = merit.with_initial_light(&self.initial_light);
+        let merit = self.judge(lens)?;
         self.merit = merit.value(&merit.values(lens))?;
-        self.best = lens.clone();
+        (self.best, self.judged) = (lens.clone(), Some(merit));
         (self.waiting, self.idle) = (None, 0);
         Ok(())
     }
@@ -243,21 +260,29 @@ impl GlassSearch {
         if !is_forced && merit > (1.0 - LEAST_GAIN) * self.merit {
             return None;
         }
-        (self.best, self.merit) = (found.lens, merit);
+        (self.best, self.merit, self.judged) = (found.lens, merit, found.judged);
         Some(found.exchange)
     }
 
     /// A lens with another glass after some steps; its merit is `None` if it cannot be optimized.
     fn optimized(&self, mut exchanged: Exchanged, steps: usize) -> Trial {
-        let found = self.descend(&exchanged.lens, steps);
-        exchanged.exchange.merit = found.as_ref().map(|(_, merit, _)| *merit);
-        let used = found.as_ref().map_or(1, |(_, _, used)| *used);
-        exchanged.lens = found.map_or(exchanged.lens, |(lens, _, _)| lens);
-        (exchanged, used)
+        let Some(found) = self.descend(&exchanged.lens, steps) else {
+            exchanged.exchange.merit = None;
+            return (exchanged, 1);
+        };
+        exchanged.exchange.merit = Some(found.merit);
+        (exchanged.lens, exchanged.judged) = (found.lens, Some(found.judged));
+        (exchanged, found.evaluations)
     }
 
-    /// A lens after some steps, its merit with its limits as penalties, and the evaluations.
-    fn descend(&self, lens: &Lens, steps: usize) -> Option<(Lens, f64, usize)> {
+    /// The merit function of a lens, whose light is compared with that of the first one.
+    fn judge(&self, lens: &Lens) -> Result<Merit, MeritError> {
+        let merit = Merit::new(lens, &self.goal, self.tolerance)?;
+        Ok(merit.with_initial_light(&self.initial_light))
+    }
+
+    /// A lens after some steps; `None` if it cannot be optimized.
+    fn descend(&self, lens: &Lens, steps: usize) -> Option<Descended> {
         let merit = Merit::new(lens, &self.goal, self.tolerance).ok()?;
         if rays(&merit) > MOST_RAYS * self.rays {
             return None;
@@ -276,8 +301,10 @@ impl GlassSearch {
         optimizer.verify_best();
         let terms = optimizer.terms().ok()?;
         let merit = terms.iter().map(|term| term.weight * term.value).sum::<f64>();
-        let lit = Merit::new(optimizer.best(), &self.goal, self.tolerance).ok()?.has_light();
-        (merit.is_finite() && lit).then(|| (optimizer.best().clone(), merit, evaluations))
+        let judged = self.judge(optimizer.best()).ok()?;
+        let lens = optimizer.best().clone();
+        let is_lit = judged.has_light();
+        (merit.is_finite() && is_lit).then_some(Descended { lens, merit, judged, evaluations })
     }
 
     /// All exchanges of the best lens in a random order, those first that promise something; without
@@ -302,8 +329,8 @@ impl GlassSearch {
 
     /// Predicts the merits of exchanges; false if the best lens allows no prediction.
     fn predict(&mut self, all: &mut [Exchanged]) -> bool {
-        let Ok(merit) = Merit::new(&self.best, &self.goal, self.tolerance) else { return false };
-        let merit = merit.with_initial_light(&self.initial_light);
+        let judged = self.judged.take().map_or_else(|| self.judge(&self.best), Ok);
+        let Ok(merit) = judged else { return false };
         self.evaluations += 1;
         let Ok(Some(model)) = GlassModel::new(merit, &self.best, &sites(&self.best)) else {
             return false;
@@ -362,7 +389,8 @@ fn exchanged(lens: &Lens, row: usize, glass: &Glass) -> Option<Exchanged> {
     let other = with_medium(lens, row, Medium::Glass(to.clone()))?;
     let surface = SurfaceNumber::new(row);
     let exchange = GlassExchange { surface, from, to, predicted: None, merit: None };
-    Some(Exchanged { exchange, lens: other, distance: distance(lens, row, glass)? })
+    let distance = distance(lens, row, glass)?;
+    Some(Exchanged { exchange, lens: other, distance, judged: None })
 }
 
 /// The distance of a glass from that behind a row.

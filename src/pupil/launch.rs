@@ -136,6 +136,24 @@ impl<'a> Launch<'a> {
         }
     }
 
+    /// The field in object space, whatever the lens behind: the angle of its beam with the axis for a distant
+    /// object, else the height of the object point.
+    pub fn object_field(&self) -> (FieldKind, FieldPoint) {
+        let weight = self.field.weight;
+        match self.source {
+            FieldSource::Collimated { direction, .. } => {
+                let across = direction.x.hypot(direction.y);
+                let angle = across.atan2(direction.z).to_degrees();
+                let scale = if across > 0.0 { angle / across } else { 0.0 };
+                let (x, y) = (scale * direction.x, scale * direction.y);
+                (FieldKind::Angle, FieldPoint { x, y, weight })
+            }
+            FieldSource::Point { from, .. } | FieldSource::Slopes { from } => {
+                (FieldKind::ObjectHeight, FieldPoint { x: from.x, y: from.y, weight })
+            }
+        }
+    }
+
     /// True for a field on the axis: all azimuths of its pupil are alike.
     pub(super) fn is_axial(&self) -> bool {
         let system = &self.channel().system;

@@ -157,6 +157,31 @@ impl RayModel {
         })
     }
 
+    /// The same beam through other systems, one for each wavelength, with rims of their own.
+    ///
+    /// # Errors
+    /// Numbers that cannot be traced.
+    pub fn with_systems(&self, systems: &[System<f64>]) -> Result<Self, SystemError> {
+        let stop = self.stop();
+        let channel = |(own, system): (&Channel, &System<f64>)| {
+            let tracer = Tracer::new(system)?;
+            let unclipped = Tracer::new(&system.cast::<Dual2>())?.without_rims();
+            let open = tracer.clone().without_rims();
+            let to_stop = open.up_to(stop);
+            let (um, weight, system) = (own.um, own.weight, system.clone());
+            Ok(Channel { um, weight, system, tracer, unclipped, open, to_stop })
+        };
+        let channels: Result<_, SystemError> =
+            self.channels.iter().zip(systems).map(channel).collect();
+        Ok(Self {
+            channels: channels?,
+            fields: self.fields.clone(),
+            first_order: self.first_order.clone(),
+            found: FoundPupils::default(),
+            ..*self
+        })
+    }
+
     /// Leaves out all wavelengths but the primary one, which then has all the weight.
     pub(crate) fn keep_primary_wavelength(&mut self) {
         self.channels.swap(0, self.primary);

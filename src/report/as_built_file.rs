@@ -1,6 +1,6 @@
 //! Tolerances and the lenses that are made as files: a table as CSV, charts as PNG.
 
-use crate::lens::ToleranceSheet;
+use crate::lens::{Perturbation, SurfaceNumber, ToleranceSheet};
 use crate::plot::{ChartCurve, CurveChart, CurveSheet};
 use crate::tolerance::{AsBuiltSpot, SpotHistogram, ToleranceAnalysis, ToleranceError, yield_band};
 
@@ -8,6 +8,20 @@ use crate::tolerance::{AsBuiltSpot, SpotHistogram, ToleranceAnalysis, ToleranceE
 const FOCUS: [&str; 2] = ["fixed focus", "refocused"];
 /// The number of errors in the chart of shares.
 const SHOWN: usize = 20;
+/// The number of those that have a colour and a name of their own.
+const NAMED: usize = 7;
+/// The lines that fill a bar, and its width.
+const LINES: usize = 16;
+const WIDTH: f64 = 0.7;
+
+/// Further columns of the table of tolerances.
+#[derive(Debug, Clone, Default)]
+pub struct FurtherColumns {
+    /// The heads, each behind a comma.
+    pub heads: String,
+    /// The cells of each error, likewise; none for no columns.
+    pub cells: Vec<String>,
+}
 
 /// The tolerances with their effects, a line each, that with the largest refocused share first; angles
 /// are in radians and surfaces are counted from 0.
@@ -17,10 +31,13 @@ const SHOWN: usize = 20;
 pub fn tolerance_table(
     sheet: &ToleranceSheet,
     analysis: &ToleranceAnalysis,
+    further: &FurtherColumns,
 ) -> Result<String, ToleranceError> {
     let mut text = "kind,first,last,half_range,sigma,distribution,fixed_first,fixed_second,\
-                    fixed_share,refocused_first,refocused_second,refocused_share\r\n"
+                    fixed_share,refocused_first,refocused_second,refocused_share"
         .to_owned();
+    text.push_str(&further.heads);
+    text.push_str("\r\n");
     for (i, [fixed, refocused]) in sorted_shares(sheet, analysis)? {
         let own = &sheet.errors[i];
         let distribution = serde_json::to_value(own.distribution).unwrap_or_default();
@@ -40,6 +57,7 @@ pub fn tolerance_table(
             refocused.to_string(),
         ];
         text.push_str(&cells.join(","));
+        text.push_str(further.cells.get(i).map_or("", String::as_str));
         text.push_str("\r\n");
     }
     Ok(text)
@@ -66,20 +84,43 @@ pub fn tolerance_sheet(
 ) -> Result<CurveSheet, ToleranceError> {
     let histograms = [0, 1].map(|which| histogram(analysis, which));
     let yields = [0, 1].map(|which| yield_chart(analysis, which));
-    let shares = sorted_shares(sheet, analysis)?;
-    let bars = [0, 1].map(|which| {
-        let shown = shares.iter().take(SHOWN).enumerate();
-        let points: Vec<[f64; 2]> =
-            shown.map(|(place, (_, own))| [(place + 1) as f64, 100.0 * own[which]]).collect();
-        ChartCurve::bars(FOCUS[which], which, &points, 0.0)
-    });
-    let title_of_bars = format!("largest shares of {} errors", shares.len());
-    let bars =
-        CurveChart::new(title_of_bars, ["error, by its refocused share", "share, %"], bars.into());
+    let bars = pareto(sheet, &sorted_shares(sheet, analysis)?);
     Ok(CurveSheet {
         title: format!("{title}: lenses as made"),
         rows: vec![histograms.into(), yields.into(), vec![bars]],
     })
+}
+
+/// The largest shares of the growth after refocusing, and their sum.
+fn pareto(sheet: &ToleranceSheet, shares: &[(usize, [f64; 2])]) -> CurveChart {
+    let mut curves = Vec::new();
+    let mut sums = vec![(0.0, Some(0.0))];
+    let mut sum = 0.0;
+    for (rank, (i, [_, refocused])) in shares.iter().take(SHOWN).enumerate() {
+        let (place, share) = ((rank + 1) as f64, 100.0 * refocused);
+        let Perturbation { kind, first, last } = sheet.errors[*i].error;
+        let name = match rank {
+            NAMED.. => "further errors".to_owned(),
+            _ if first == last => format!("{} {}", kind.name(), SurfaceNumber::new(first)),
+            _ => {
+                let ends = [first, last].map(SurfaceNumber::new);
+                format!("{} {}-{}", kind.name(), ends[0], ends[1])
+            }
+        };
+        curves.push(bar(name, rank.min(NAMED), [place, share]));
+        sum += share;
+        sums.push((place, Some(sum)));
+    }
+    curves.push(ChartCurve::new("sum", 1, sums).dashed());
+    let title = format!("the worst of {} errors, refocused", shares.len());
+    CurveChart::new(title, ["rank", "share of the growth in %"], curves)
+}
+
+/// A bar of a height about a place, filled by upright lines.
+fn bar(name: String, color: usize, [x, y]: [f64; 2]) -> ChartCurve {
+    let line = |i: usize| [x + WIDTH * (i as f64 / (LINES - 1) as f64 - 0.5), y];
+    let points: Vec<[f64; 2]> = (0..LINES).map(line).collect();
+    ChartCurve::bars(name, color, &points, 0.0)
 }
 
 /// The shares of lenses by their spot: steps of the real ones, a line by the form.

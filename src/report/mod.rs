@@ -18,7 +18,7 @@ mod sheet;
 mod step;
 mod surface_tolerances;
 
-pub use as_built_file::{tolerance_sheet, tolerance_table};
+pub use as_built_file::{FurtherColumns, tolerance_sheet, tolerance_table};
 pub use body::{BodyError, LensBody, lens_bodies};
 pub use element_drawing::element_drawing;
 pub use error::ReportError;

@@ -43,6 +43,7 @@ const fn short_name(kind: PerturbationKind) -> (&'static str, &'static str) {
         PerturbationKind::Conic => ("conic", ""),
         PerturbationKind::Asphere => ("r\u{2074}", ""),
         PerturbationKind::Irregularity => ("irr", ""),
+        PerturbationKind::AsphereSlope => ("slope", ""),
         PerturbationKind::Thickness => ("t", ""),
         PerturbationKind::ThicknessAdjusted => ("t adjusted", ""),
         PerturbationKind::Index => ("n", ""),

@@ -1,6 +1,6 @@
 //! The commands of a session.
 
-use super::analysis::{LoosestGoal, SceneFile};
+use super::analysis::SceneFile;
 use super::grin_design::GrinCommand;
 use super::specified_design::SpecifiedDesignCommand;
 use super::structure_search::StructureSearchCommand;
@@ -14,7 +14,7 @@ use crate::optimize::{DescentMethod, pareto};
 use crate::paraxial::{DragSettings, Handle};
 use crate::picture::BuiltInScene;
 use crate::report::PaperKind;
-use crate::tolerance::ToleranceGrade;
+use crate::tolerance::{LoosestGoal, ToleranceGrade};
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 

@@ -32,11 +32,12 @@ mod state;
 mod structure_search;
 mod view;
 
+pub use crate::tolerance::{LoosestGoal, LoosestTolerances};
 pub use analysis::{
     Analyses, AnalysisResults, AnalysisSettings, AsBuiltLens, FieldContrast, FieldContrasts,
     FieldFans, FieldFootprints, FieldGhosts, FieldPupils, FieldWavefront, FieldWavefronts,
-    LoosestGoal, LoosestTolerances, PictureScene, PointImage, PointImages, SceneFile, ScenePicture,
-    analyze, confirm_as_built, predict_as_built,
+    PictureScene, PointImage, PointImages, SceneFile, ScenePicture, analyze, confirm_as_built,
+    predict_as_built,
 };
 pub use clock::Timed;
 pub use command::{Command, PanelSetting};

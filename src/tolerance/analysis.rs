@@ -1,14 +1,15 @@
 //! The whole analysis: sensitivities, the quadratic form, real lenses, and how well both agree.
 
 use super::monte_carlo::{KnownLens, RealLensRun};
+use super::pupils::PupilTreatment;
 use super::travel::{AdjustmentTravel, StoppedLenses, stopped_lenses, travels};
 use super::{
-    Compensation, FocusTreatment, QuadraticForm, RayEffects, RealLens, SecondDerivatives, StopTest,
-    ToleranceError, ToleranceScene, refuse_if_stopped, wilson_interval,
+    Compensation, FocusTreatment, PupilMotion, QuadraticForm, RayEffects, RealLens,
+    SecondDerivatives, StopTest, ToleranceError, ToleranceScene, refuse_if_stopped,
+    wilson_interval,
 };
 use crate::lens::{Perturbation, ToleranceSheet};
 use serde::Serialize;
-use std::sync::atomic::{AtomicBool, Ordering};
 
 /// The scope of an analysis.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -44,8 +45,11 @@ pub struct ToleranceAnalysis {
     /// The number of the latter.
     pub dark: usize,
     /// The mean relative change of the mean square spot, at the fixed image plane and refocused, and
-    /// the mean share of light lost where rims clip, which the spots leave out; `None` without rays.
+    /// the mean share of light lost where rims clip, which the spots leave out; `None` without rays, and
+    /// where pupils move.
     pub clipping: Option<[f64; 3]>,
+    /// The decision whether the pupils of lenses with errors are found anew.
+    pub pupils: PupilMotion,
     /// The lenses with random errors whose rays were traced.
     pub real: Vec<RealLens>,
 }
@@ -65,7 +69,7 @@ pub struct AsBuiltSpot {
     /// the standard error and, beyond it, what rims would clip.
     pub mean_rms: [f64; 2],
     /// The mean change of the rms where rims clip, with its standard error, in mm; `None` without
-    /// rays.
+    /// rays, and where pupils move.
     pub clipping: Option<[f64; 2]>,
     /// The mean of the rms of the real lenses minus that of the form on the same errors, in mm, with
     /// its standard error.
@@ -132,22 +136,8 @@ pub fn analyze(
     sheet: &ToleranceSheet,
     request: ToleranceRequest,
 ) -> Result<ToleranceAnalysis, ToleranceError> {
-    analyze_until(scene, sheet, request, &AtomicBool::new(false))
-}
-
-/// The same with fewer real lenses once `stop` is true.
-///
-/// # Errors
-/// As those of [`analyze`], and [`ToleranceError::Stopped`] if it was stopped before the real lenses.
-pub fn analyze_until(
-    scene: &ToleranceScene,
-    sheet: &ToleranceSheet,
-    request: ToleranceRequest,
-    stop: &AtomicBool,
-) -> Result<ToleranceAnalysis, ToleranceError> {
-    let stop = || stop.load(Ordering::Relaxed);
-    let model = ErrorModel::new(scene, sheet, SecondDerivatives::default(), &stop)?;
-    model.analyze(scene, sheet, request, &stop)
+    let model = ErrorModel::new(scene, sheet, SecondDerivatives::default(), &|| false)?;
+    model.analyze(scene, sheet, request, &|| false)
 }
 
 /// The quadratic forms of a lens with its errors, before any random lens.
@@ -157,6 +147,8 @@ pub struct ErrorModel {
     /// The forms at the fixed image plane and refocused.
     pub forms: [QuadraticForm; 2],
     has_second_derivatives: bool,
+    /// The decision whether the pupils of lenses with errors are found anew.
+    pub pupils: PupilMotion,
 }
 
 impl ErrorModel {
@@ -176,16 +168,33 @@ impl ErrorModel {
             return Err(ToleranceError::Other(text));
         }
         let errors: Vec<Perturbation> = sheet.errors.iter().map(|t| t.error).collect();
-        let effects = RayEffects::new(scene, &errors, second, stop)?;
+        let mut effects = RayEffects::with_moving_pupils(scene, &errors, second, stop)?;
         let compensation = Compensation::new(scene, sheet)?;
-        let forms = TREATMENTS.map(|focus| {
+        let forms = |effects: &RayEffects| {
             refuse_if_stopped(stop)?;
-            Ok::<_, ToleranceError>(QuadraticForm::new(&effects, focus, &compensation))
-        });
-        let [fixed, refocused] = forms;
-        let forms = [fixed?, refocused?];
+            Ok::<_, ToleranceError>(
+                TREATMENTS.map(|focus| QuadraticForm::new(effects, focus, &compensation)),
+            )
+        };
+        let mut found = forms(&effects)?;
+        let pupils = match &scene.pupils {
+            PupilTreatment::Held(why) => PupilMotion::held(why),
+            PupilTreatment::Known(own) if effects.has_moving_pupils() => {
+                let moving = effects.clone();
+                effects.hold_pupils();
+                let held = forms(&effects)?;
+                let motion = PupilMotion::new(own, &moving, sheet, (&found, &held))?;
+                if !motion.moves {
+                    found = held;
+                }
+                motion
+            }
+            PupilTreatment::Known(_) => {
+                PupilMotion::held("a ray on the edge of a pupil does not arrive")
+            }
+        };
         let has_second_derivatives = effects.has_second_derivatives();
-        Ok(Self { compensation, forms, has_second_derivatives })
+        Ok(Self { compensation, forms: found, has_second_derivatives, pupils })
     }
 
     /// The analysis by random lenses: many by the forms, and some by their rays, fewer once `stop`
@@ -217,9 +226,15 @@ impl ErrorModel {
         (known, visit): (&[KnownLens], impl FnMut(&[RealLens])),
     ) -> Result<ToleranceAnalysis, ToleranceError> {
         let by_form = self.lenses(sheet, request.seed, stop)?;
-        let run = RealLensRun::new(scene, sheet, request.seed)?.with_known(known);
-        let real = run.advance((request.samples, WITH_RIMS), stop, visit)?;
+        let run = RealLensRun::new(scene, sheet, request.seed)?;
+        let run = run.with_pupils(self.pupils.moves).with_known(known);
+        let real = run.advance((request.samples, self.with_rims(request.samples)), stop, visit)?;
         self.compared(sheet, request, (by_form, real))
+    }
+
+    /// The number of lenses that are traced with rims: all of them where pupils move.
+    fn with_rims(&self, samples: usize) -> usize {
+        if self.pupils.moves { samples } else { samples.min(WITH_RIMS) }
     }
 
     /// Many lenses by the forms.
@@ -241,16 +256,18 @@ impl ErrorModel {
         request: ToleranceRequest,
         ([fixed, refocused], real): ([FormLenses; 2], Vec<RealLens>),
     ) -> Result<ToleranceAnalysis, ToleranceError> {
-        let Self { compensation, forms, has_second_derivatives } = self;
+        let with_rims = self.with_rims(real.len());
+        let Self { compensation, forms, has_second_derivatives, pupils } = self;
         let parts = &compensation.adjustments;
         let travels = travels(parts, &forms[1], &refocused.adjustments, &real);
         let stopped = stopped_lenses(parts, &forms[1], &real);
         let spot = |i: usize, lenses: FormLenses| {
             let form = (&forms[i], forms[i].expectation(sheet)?);
-            Ok::<_, ToleranceError>(as_built(TREATMENTS[i], form, lenses, &real, request))
+            let clipping = if pupils.moves { None } else { rms_changes(&real, i) };
+            let known = (&real[..], clipping);
+            Ok::<_, ToleranceError>(as_built(TREATMENTS[i], form, lenses, known, request))
         };
         let spots = [spot(0, fixed)?, spot(1, refocused)?];
-        let with_rims = real.len().min(WITH_RIMS);
         let is_dark = |lens: &&RealLens| lens.mean_square.is_some() && lens.clipped.is_none();
         Ok(ToleranceAnalysis {
             has_second_derivatives,
@@ -262,7 +279,8 @@ impl ErrorModel {
             lost: real.iter().filter(|lens| lens.mean_square.is_none()).count(),
             with_rims,
             dark: real[..with_rims].iter().filter(is_dark).count(),
-            clipping: clipping(&real),
+            clipping: if pupils.moves { None } else { clipping(&real) },
+            pupils,
             real,
         })
     }
@@ -311,7 +329,7 @@ fn as_built(
     focus: FocusTreatment,
     (form, expected): (&QuadraticForm, f64),
     lenses: FormLenses,
-    real: &[RealLens],
+    (real, clipping): (&[RealLens], Option<[f64; 2]>),
     request: ToleranceRequest,
 ) -> AsBuiltSpot {
     let many = sorted(lenses.rms);
@@ -326,7 +344,6 @@ fn as_built(
     let difference = mean_with_error(&differences);
     let is_small =
         |change: [f64; 2]| change[0].abs() <= (2.0 * change[1]).max(NEGLIGIBLE * form_mean_rms);
-    let clipping = rms_changes(real, which);
     let clipped = clipping.map_or(0.0, |[change, _]| change.abs());
     let spread = mean_with_error(&many)[1];
     let corrected = form_mean_rms + difference[0];

@@ -1,5 +1,6 @@
 //! The rays by which a lens is judged: launched once for the lens as designed, and held.
 
+use super::nominal::mirror_image;
 use crate::trace::Ray;
 
 /// The rays of all fields.
@@ -46,6 +47,18 @@ impl ColourRays {
     /// No rays yet.
     pub fn new(wavelength: usize) -> Self {
         Self { wavelength, ..Self::default() }
+    }
+
+    /// Adds a ray and its mirror image in the plane x = 0, with half of the weight each.
+    pub(super) fn push_both_sides(
+        &mut self,
+        ray: Ray<f64>,
+        weight: f64,
+        pupil: [f64; 2],
+        path: f64,
+    ) {
+        self.push(ray, 0.5 * weight, pupil, path);
+        self.push(mirror_image(ray), 0.5 * weight, [-pupil[0], pupil[1]], path);
     }
 
     /// Adds a ray.

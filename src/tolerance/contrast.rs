@@ -8,7 +8,9 @@
 use super::adjusted::LensToAdjust;
 use super::compensation::adjustments;
 use super::monte_carlo::{BeamColumns, LandedField};
-use super::{StopTest, ToleranceError, ToleranceScene, refuse_if_stopped};
+use super::{
+    RealMerit, RealMeritRequest, StopTest, ToleranceError, ToleranceScene, refuse_if_stopped,
+};
 use crate::lens::{Compensator, Lens, Perturbation, ToleranceSheet};
 use rayon::prelude::*;
 use std::f64::consts::TAU;
@@ -47,6 +49,31 @@ impl ContrastChanges {
         (sheet, frequency): (&ToleranceSheet, f64),
         stop: StopTest<'_>,
     ) -> Result<Self, ToleranceError> {
+        Ok(Self::with_judge((lens, zoom, tolerance), scene, (sheet, frequency), stop)?.0)
+    }
+
+    /// The same with the contrast of lenses with random errors by their rays.
+    ///
+    /// # Errors
+    /// As those of [`ContrastChanges::new`]; once `stop` says so there are fewer lenses.
+    pub fn with_real_lenses(
+        place: (&Lens, usize, f64),
+        scene: &ToleranceScene,
+        (sheet, frequency): (&ToleranceSheet, f64),
+        request: RealMeritRequest,
+        stop: StopTest<'_>,
+    ) -> Result<(Self, RealMerit), ToleranceError> {
+        let (found, judge) = Self::with_judge(place, scene, (sheet, frequency), stop)?;
+        let real = RealMerit::new(sheet, request, stop, |errors| judge.contrast(errors))?;
+        Ok((found, real))
+    }
+
+    fn with_judge(
+        (lens, zoom, tolerance): (&Lens, usize, f64),
+        scene: &ToleranceScene,
+        (sheet, frequency): (&ToleranceSheet, f64),
+        stop: StopTest<'_>,
+    ) -> Result<(Self, ContrastJudge), ToleranceError> {
         let mut judge = ContrastJudge::new(scene.clone(), sheet, frequency);
         let mut nominal = judge.as_designed()?;
         let (mut tolerance, mut sampling_error) = (tolerance, f64::INFINITY);
@@ -72,7 +99,7 @@ impl ContrastChanges {
         };
         let changes = sheet.errors.par_iter().map(change);
         let changes = changes.collect::<Result<_, ToleranceError>>()?;
-        Ok(Self { frequency, nominal, sampling_error, changes })
+        Ok((Self { frequency, nominal, sampling_error, changes }, judge))
     }
 
     /// The expected contrast of lenses that are made, at the fixed image plane and adjusted: each error

@@ -7,6 +7,7 @@
 //! the covariance is as large as the lens, however many tolerances there are.
 
 use super::ToleranceError;
+use super::perturb::slope_changes;
 use crate::lens::{Perturbation, PerturbationKind, System, ToleranceSheet};
 use crate::trace::ErrorNumber;
 use std::collections::BTreeMap;
@@ -264,6 +265,11 @@ pub(super) fn number_changes(
             let square = semi_diameters[first].powi(2);
             let fourth = (at(first, ErrorNumber::Fourth), 0.5 / (square * square));
             vec![fourth, (at(first, ErrorNumber::Astigmatism), 0.5 / square)]
+        }
+        PerturbationKind::AsphereSlope => {
+            let [curvature, fourth] = slope_changes(semi_diameters[first]);
+            let numbers = [ErrorNumber::Curvature, ErrorNumber::Fourth].map(|own| at(first, own));
+            vec![(numbers[0], curvature), (numbers[1], fourth)]
         }
         PerturbationKind::Thickness => alone(ErrorNumber::Thickness),
         PerturbationKind::ThicknessAdjusted => {

@@ -11,15 +11,19 @@ use super::covariance::{MadeNumber, NumberChanges, number_changes};
 use super::folded::{ErrorParity, FoldedField, RaySymmetry, folded_fields};
 use super::merits::{ImageRays, Rear, merits_of, open_tracers};
 use super::perturb::check_all;
+use super::pupil_edge::{EdgeProducts, EdgeReference, FieldEdge, InnerRays, set_motions};
+use super::pupils::{FieldPupils, PupilTreatment, ScenePupils};
 use super::sensitivity::{RaySensitivity, Sensitivity, second_derivatives, sensitivities_until};
 use super::sweep::SweptField;
 use super::{StopTest, ToleranceError, ToleranceScene, refuse_if_stopped};
 use crate::lens::{Perturbation, System};
 use crate::math::dot;
+use crate::pupil::EdgeRay;
 use crate::trace::Tracer;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
+use std::ops::Range;
 use std::sync::Arc;
 
 /// The treatment of the second derivatives of rays by errors.
@@ -58,12 +62,19 @@ struct FieldEffects {
     symmetry: RaySymmetry,
     /// The place of each ray among those of all fields, and the root of its weight.
     places: Vec<(usize, f64)>,
+    /// The rays of each colour, by their numbers among those of the field.
+    colours: Vec<Range<usize>>,
+    roots: Vec<f64>,
+    /// The mean point and slopes.
+    center: [f64; 4],
     offsets: DVector<f64>,
     slopes: DVector<f64>,
     /// A column for each number: the displacement of rays at the image plane.
     displacement: DMatrix<f64>,
     /// The change of their slopes.
     bend: DMatrix<f64>,
+    /// The edge of the pupils; `None` where these are held.
+    edge: Option<FieldEdge>,
 }
 
 impl RayEffects {
@@ -97,6 +108,101 @@ impl RayEffects {
         Ok(Self::by_jets(scene, (&found, &place_of), (&rays, focus)))
     }
 
+    /// The same with the edges of the pupils, which move; without them where they are not known.
+    ///
+    /// # Errors
+    /// As those of [`RayEffects::new`].
+    pub fn with_moving_pupils(
+        scene: &ToleranceScene,
+        errors: &[Perturbation],
+        second: SecondDerivatives,
+        stop: StopTest<'_>,
+    ) -> Result<Self, ToleranceError> {
+        let mut effects = Self::new(scene, errors, second, stop)?;
+        let PupilTreatment::Known(pupils) = &scene.pupils else { return Ok(effects) };
+        let systems = &scene.lens.systems;
+        if open_tracers(systems)?.iter().all(Tracer::has_error_slopes) {
+            refuse_if_stopped(stop)?;
+            let (numbers, _) = combinations(scene, errors);
+            if let Some(edges) = effects.edges(scene, pupils, &numbers)? {
+                let fields = effects.fields.iter_mut().zip(edges);
+                fields.for_each(|(field, edge)| field.edge = Some(edge));
+            }
+        }
+        Ok(effects)
+    }
+
+    /// The edges of all fields; `None` where a ray on one of them does not arrive.
+    fn edges(
+        &self,
+        scene: &ToleranceScene,
+        pupils: &ScenePupils,
+        numbers: &[MadeNumber],
+    ) -> Result<Option<Vec<FieldEdge>>, ToleranceError> {
+        let folded = folded_fields(scene);
+        let same = |(own, field): (&FoldedField<'_>, &FieldPupils)| own.number == field.first;
+        if folded.len() != pupils.fields.len() || !folded.iter().zip(&pupils.fields).all(same) {
+            return Ok(None);
+        }
+        let planes = TwoPlanes::new(scene, self.focus)?;
+        let mut edges = Vec::with_capacity(folded.len());
+        for ((own, pupils), field) in folded.iter().zip(&pupils.fields).zip(&self.fields) {
+            let (_, means) = planes.columns(scene, own, (numbers, &self.parities))?;
+            let reference = EdgeReference {
+                numbers,
+                planes: [&planes.near, &planes.far],
+                distance: planes.distance,
+                means: &means,
+                center: field.center,
+            };
+            let Some(edge) = FieldEdge::at_rest(scene, pupils, &reference) else {
+                return Ok(None);
+            };
+            edges.push(edge);
+        }
+        let known = set_motions(scene, pupils, &folded, numbers, &mut edges)?;
+        Ok(known.then_some(edges))
+    }
+
+    /// True if the edges of the pupils are a part of the effects.
+    pub fn has_moving_pupils(&self) -> bool {
+        self.fields.iter().all(|field| field.edge.is_some())
+    }
+
+    /// Holds the pupils.
+    pub(super) fn hold_pupils(&mut self) {
+        self.fields.iter_mut().for_each(|field| field.edge = None);
+    }
+
+    /// The share of the light that each error moves by one unit at the edges of pupils, whether it comes or goes.
+    pub(super) fn moved_light(&self) -> Vec<f64> {
+        let mut moved = vec![0.0; self.combinations.len()];
+        for edge in self.fields.iter().filter_map(|field| field.edge.as_ref()) {
+            for (sum, combination) in moved.iter_mut().zip(self.combinations.iter()) {
+                *sum += edge.moved_light(combination);
+            }
+        }
+        moved
+    }
+
+    /// For each field the limits of its edge, each with a ray there and the derivatives of the mean square
+    /// spot by errors through that part of the edge, at the best focus.
+    pub(super) fn edges_by_limit(&self) -> Vec<Vec<(EdgeRay, Vec<f64>)>> {
+        let field = |field: &FieldEffects| {
+            let Some(edge) = &field.edge else { return Vec::new() };
+            let displaced = &field.displacement + self.focus * &field.bend;
+            let offsets = &field.offsets + self.focus * &field.slopes;
+            let found =
+                edge.by_limit(&field.inner(&self.parities, (&displaced, &offsets)), self.focus);
+            let by_errors = |(ray, by): (EdgeRay, DVector<f64>)| {
+                let sum = |row: &Vec<(usize, f64)>| row.iter().map(|(m, f)| f * by[*m]).sum();
+                (ray, self.combinations.iter().map(sum).collect())
+            };
+            found.into_iter().map(by_errors).collect()
+        };
+        self.fields.iter().map(field).collect()
+    }
+
     /// By sweeps back.
     fn swept(
         scene: &ToleranceScene,
@@ -115,7 +221,7 @@ impl RayEffects {
         let field = |folded: &FoldedField<'_>| {
             refuse_if_stopped(stop)?;
             let mut field = FieldEffects::without_errors(scene, folded, rays);
-            let columns = planes.columns(scene, folded, (&numbers, &parities))?;
+            let (columns, _) = planes.columns(scene, folded, (&numbers, &parities))?;
             (field.displacement, field.bend) = columns;
             Ok(field)
         };
@@ -184,6 +290,7 @@ impl RayEffects {
         let mut sum = EffectProducts {
             products: DMatrix::zeros(parities.len(), parities.len()),
             bends_with_offsets: DVector::zeros(self.numbers()),
+            edge: EdgeProducts::none(self.numbers()),
         };
         for field in &self.fields {
             sum.add(field, (&parities, compensation), shift);
@@ -261,13 +368,13 @@ impl TwoPlanes {
         Ok(Self { near: open_tracers(systems)?, far: open_tracers(&far)?, distance })
     }
 
-    /// The displacements and the bends by each number, a column each.
+    /// The displacements and the bends by each number, a column each, and the mean effects.
     fn columns(
         &self,
         scene: &ToleranceScene,
         folded: &FoldedField<'_>,
         (numbers, parities): (&[MadeNumber], &[ErrorParity]),
-    ) -> Result<(DMatrix<f64>, DMatrix<f64>), ToleranceError> {
+    ) -> Result<(NumberColumns, NumberMeans), ToleranceError> {
         let near = SweptField::new(scene, &self.near, folded)?;
         let far = SweptField::new(scene, &self.far, folded)?;
         let rays = near.weights().len();
@@ -275,33 +382,44 @@ impl TwoPlanes {
         let mut bend = DMatrix::zeros(2 * rays, numbers.len());
         let roots: Vec<f64> = near.weights().iter().map(|w| (w * folded.weight).sqrt()).collect();
         let mut rows = [vec![0.0; rays], vec![0.0; rays]];
+        let mut means = vec![[[0.0; 2]; 2]; numbers.len()];
         let columns = numbers.iter().zip(parities).enumerate();
         for (m, number, parity, axis) in
             columns.flat_map(|(m, (number, parity))| [0, 1].map(|axis| (m, *number, *parity, axis)))
         {
             let cancels = folded.symmetry.cancels_mean(axis, parity);
-            centred_effect(&near, (axis, number), cancels, &mut rows[0]);
-            centred_effect(&far, (axis, number), cancels, &mut rows[1]);
+            means[m][axis] = [
+                centred_effect(&near, (axis, number), cancels, &mut rows[0]),
+                centred_effect(&far, (axis, number), cancels, &mut rows[1]),
+            ];
             for i in 0..rays {
                 let at = (axis * rays + i, m);
                 displacement[at] = roots[i] * rows[0][i];
                 bend[at] = roots[i] * (rows[1][i] - rows[0][i]) / self.distance;
             }
         }
-        Ok((displacement, bend))
+        Ok(((displacement, bend), means))
     }
 }
 
-/// The derivative of x or y of each ray by a number, relative to its mean, which is 0 where it cancels.
+/// The displacements and the bends of rays, a column for each number.
+type NumberColumns = (DMatrix<f64>, DMatrix<f64>);
+
+/// For each number, along x and along y, the mean effect at the image plane and at the other one.
+type NumberMeans = Vec<[[f64; 2]; 2]>;
+
+/// The derivative of x or y of each ray by a number, relative to its mean, which is 0 where it cancels; the
+/// mean is returned.
 fn centred_effect(
     swept: &SweptField,
     (axis, number): (usize, MadeNumber),
     cancels: bool,
     effect: &mut [f64],
-) {
+) -> f64 {
     swept.number_effect(axis, number, effect);
     let mean = if cancels { 0.0 } else { dot(swept.weights(), effect) };
     effect.iter_mut().for_each(|value| *value -= mean);
+    mean
 }
 
 impl FieldEffects {
@@ -318,10 +436,11 @@ impl FieldEffects {
         for (ray, weight) in own {
             mean.iter_mut().zip(ray).for_each(|(sum, value)| *sum += weight * value);
         }
-        let (mut places, mut from) = (Vec::new(), 0);
+        let (mut places, mut from, mut colours) = (Vec::new(), 0, Vec::new());
         for colour in &folded.field.colours {
-            let own = folded.rays(colour);
+            let (own, first) = (folded.rays(colour), places.len());
             places.extend(own.map(|(i, weight)| (from + i, (weight * folded.weight).sqrt())));
+            colours.push(first..places.len());
             from += colour.rays.len();
         }
         let column = |first: usize| {
@@ -335,9 +454,36 @@ impl FieldEffects {
         };
         let (offsets, slopes) = (column(0), column(2));
         let none = DMatrix::zeros(2 * places.len(), 0);
-        let places = places.iter().map(|(i, root)| (start + i, *root)).collect();
-        let symmetry = folded.symmetry;
-        Self { symmetry, places, offsets, slopes, displacement: none.clone(), bend: none }
+        let roots = places.iter().map(|(_, root)| *root).collect();
+        Self {
+            symmetry: folded.symmetry,
+            places: places.iter().map(|(i, root)| (start + i, *root)).collect(),
+            colours,
+            roots,
+            center: mean,
+            offsets,
+            slopes,
+            displacement: none.clone(),
+            bend: none,
+            edge: None,
+        }
+    }
+
+    /// The rays inside the pupils at an image plane where they have these displacements and distances.
+    fn inner<'a>(
+        &'a self,
+        parities: &'a [ErrorParity],
+        (displacement, offsets): (&'a DMatrix<f64>, &'a DVector<f64>),
+    ) -> InnerRays<'a> {
+        InnerRays {
+            symmetry: self.symmetry,
+            parities,
+            colours: &self.colours,
+            roots: &self.roots,
+            offsets,
+            slopes: &self.slopes,
+            displacement,
+        }
     }
 
     /// The column of an effect that is known for all rays of all fields.
@@ -354,6 +500,8 @@ impl FieldEffects {
 pub(super) struct EffectProducts {
     products: DMatrix<f64>,
     bends_with_offsets: DVector<f64>,
+    /// The addition by the motion of the edges of pupils.
+    edge: EdgeProducts,
 }
 
 impl EffectProducts {
@@ -384,12 +532,21 @@ impl EffectProducts {
                 }
             }
         }
+        if let Some(edge) = &field.edge {
+            let inner = field.inner(&parities[..numbers], (&displaced, &offsets));
+            self.edge.add(edge, &inner, shift);
+        }
         let bends = field.bend.transpose() * &offsets;
         for (m, parity) in parities[..numbers].iter().enumerate() {
             if !field.symmetry.cancels_product(*parity, ErrorParity::EVEN) {
                 self.bends_with_offsets[m] += bends[m];
             }
         }
+    }
+
+    /// The addition to the products of numbers by the motion of the edges of pupils.
+    pub(super) fn edge(&self) -> &EdgeProducts {
+        &self.edge
     }
 
     pub(super) fn of(&self, i: usize, j: usize) -> f64 {

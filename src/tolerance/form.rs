@@ -181,7 +181,9 @@ struct FixedForm {
     nominal: f64,
     first: DVector<f64>,
     among: DMatrix<f64>,
-    /// The second derivative of the mean square by each error, where it is known.
+    /// The same with the pupils held.
+    held: DMatrix<f64>,
+    /// The second derivative of the mean square by each error with the pupils held, where it is known.
     exact: Option<Vec<f64>>,
     combinations: ErrorCombinations,
     /// The best focus without errors, in mm from the image plane.
@@ -200,11 +202,17 @@ impl FixedForm {
         };
         let products = effects.products(compensation, shift);
         let (count, adjustments) = (effects.numbers(), compensation.adjustments.len());
-        let by_focus = |m: usize| products.with_slopes(m) + products.bend_with_offsets(m);
+        let edge = products.edge();
+        let by_focus = |m: usize| {
+            products.with_slopes(m) + products.bend_with_offsets(m) + edge.with_slopes[m]
+        };
+        let held = 2.0 * products.among(count);
+        let first = |m: usize| 2.0 * (products.with_offsets(m) + edge.with_offsets[m]);
         let mut form = Self {
             nominal: products.offsets(),
-            first: DVector::from_fn(count, |m, _| 2.0 * products.with_offsets(m)),
-            among: 2.0 * products.among(count),
+            first: DVector::from_fn(count, |m, _| first(m)),
+            among: &held + 2.0 * &edge.among,
+            held,
             exact: effects.second(plane),
             combinations: ErrorCombinations::clone(effects.combinations()),
             focus: shift,
@@ -241,7 +249,7 @@ impl FixedForm {
     /// The additions of second derivatives of rays on the diagonal.
     fn own(&self) -> Vec<f64> {
         let combinations = ErrorCombinations::clone(&self.combinations);
-        let products = ErrorProducts { combinations, among: self.among.clone(), own: Vec::new() };
+        let products = ErrorProducts { combinations, among: self.held.clone(), own: Vec::new() };
         let exact = self.exact.iter().flatten().enumerate();
         exact.map(|(i, exact)| exact - products.of(i, i)).collect()
     }

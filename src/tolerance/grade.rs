@@ -33,6 +33,8 @@ struct GradeNumbers {
     tilt: f64,
     /// The change of the sag of an aspheric surface at its rim, in mm.
     sag: f64,
+    /// Slope error of an aspheric surface, in minutes of arc.
+    slope: f64,
     /// Decentre of an aspheric surface, in mm; of every surface of a moulded element.
     surface_decenter: f64,
 }
@@ -42,7 +44,7 @@ fn grade_numbers(grade: ToleranceGrade) -> GradeNumbers {
     let of =
         |[fringes, irregularity, thickness, index, abbe, surface_tilt, decenter, tilt]: [f64;
              8],
-         [sag, surface_decenter]: [f64; 2]| GradeNumbers {
+         [sag, slope, surface_decenter]: [f64; 3]| GradeNumbers {
             fringes,
             irregularity,
             thickness,
@@ -52,18 +54,21 @@ fn grade_numbers(grade: ToleranceGrade) -> GradeNumbers {
             decenter,
             tilt,
             sag,
+            slope,
             surface_decenter,
         };
     match grade {
-        ToleranceGrade::Commercial => of([5.0, 1.0, 0.1, 1e-3, 0.008, 3.0, 0.1, 3.0], [1e-3, 0.05]),
+        ToleranceGrade::Commercial => {
+            of([5.0, 1.0, 0.1, 1e-3, 0.008, 3.0, 0.1, 3.0], [1e-3, 3.0, 0.05])
+        }
         ToleranceGrade::Precision => {
-            of([3.0, 0.5, 0.05, 5e-4, 0.005, 1.0, 0.02, 1.0], [3e-4, 0.01])
+            of([3.0, 0.5, 0.05, 5e-4, 0.005, 1.0, 0.02, 1.0], [3e-4, 1.0, 0.01])
         }
         ToleranceGrade::ShopLimit => {
-            of([1.0, 0.05, 0.02, 2e-4, 0.002, 0.25, 0.01, 0.25], [5e-5, 0.002])
+            of([1.0, 0.05, 0.02, 2e-4, 0.002, 0.25, 0.01, 0.25], [5e-5, 0.3, 0.002])
         }
         ToleranceGrade::MouldedPlastic => {
-            of([2.0, 1.0, 0.005, 5e-4, 0.005, 1.0, 0.003, 2.0], [3e-4, 0.003])
+            of([2.0, 1.0, 0.005, 5e-4, 0.005, 1.0, 0.003, 2.0], [3e-4, 1.0, 0.003])
         }
     }
 }
@@ -264,6 +269,10 @@ impl GradedSheet<'_> {
         };
         if let Some((kind, half_range)) = form {
             self.add(kind, alone, half_range);
+        }
+        if matches!(shape, Shape::Asphere { .. }) {
+            let slope = (numbers.slope / 60.0).to_radians();
+            self.add(PerturbationKind::AsphereSlope, alone, slope);
         }
         if form.is_some() || self.is_moulded {
             self.add(PerturbationKind::SurfaceDecenterX, alone, numbers.surface_decenter);

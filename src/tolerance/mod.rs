@@ -22,8 +22,10 @@
 //! What is adjusted after assembly, focus first, is adjusted within its travel in both alike; errors that
 //! are correlated are sums of independent ones.
 //!
-//! Rays are held: an error changes the lens and not the rays in object space, and rims clip nothing;
-//! what rims would clip is measured and shown.
+//! An error changes the lens and not the rays in object space, but it may change which of them get
+//! through: the edge of the pupil moves. Where that matters ([`PupilMotion`]) the form has the edge's part
+//! of the derivatives, and real lenses find their pupils anew; elsewhere the rays of the lens as designed
+//! are held, and what rims would clip is measured and shown.
 
 mod adjusted;
 mod analysis;
@@ -41,12 +43,17 @@ mod grade;
 mod groups;
 mod histogram;
 mod inverse;
+mod loosest;
 mod made;
 mod merits;
 mod mixture;
 mod monte_carlo;
 mod nominal;
 mod perturb;
+mod pupil_edge;
+mod pupil_motion;
+mod pupils;
+mod real_merit;
 mod reduced;
 mod sensitivity;
 mod spot;
@@ -60,7 +67,7 @@ use error::refuse_if_stopped;
 pub use crate::lens::ToleranceGrade;
 pub use analysis::{
     AsBuiltSpot, ErrorModel, Quantile, ToleranceAnalysis, ToleranceRequest, YieldEstimate, analyze,
-    analyze_until, form_spots,
+    form_spots,
 };
 pub use as_built::{AsBuiltGradient, FixedAndRefocused, as_built_gradient};
 pub use beam::{Beam, ColourRays, FieldBeam};
@@ -77,14 +84,17 @@ pub use grade::{PriceClass, bounded_tolerances, graded_sheet, price_classes};
 pub use groups::{KindShare, LensPart, PartShare, shares_by_kind, shares_by_part};
 pub use histogram::{SpotHistogram, yield_band};
 pub use inverse::{form_yield, loosest_for_yield, loosest_tolerances};
+pub use loosest::{LoosestGoal, LoosestRequest, LoosestTolerances};
 pub use made::{MadeLens, made_lens, worst_lens};
 pub use merits::{MeritOptions, Merits, merits};
-pub use monte_carlo::{KnownLens, RealLens, real_lenses, wilson_interval};
+pub use monte_carlo::{KnownLens, RealLens, real_lenses, traced_lenses, wilson_interval};
 pub use nominal::ToleranceScene;
 pub use perturb::{NominalLens, perturb};
+pub use pupil_motion::PupilMotion;
+pub use pupils::{PupilTreatment, ScenePupils};
+pub use real_merit::{RealMerit, RealMeritRequest};
 pub use sensitivity::{Derivatives, Jet2, RaySensitivity, Sensitivity, sensitivities};
 pub use spot::{SpotMoments, best_focus};
-pub use sweep::{SweptSensitivity, swept_sensitivities};
 pub use travel::{AdjustmentTravel, StoppedLenses, TravelStatistics};
 pub use wavefront::WavefrontVariance;
 pub use waves::WavefrontModel;

@@ -5,6 +5,7 @@ use super::compensation::adjustments;
 use super::draw::draw_errors;
 use super::merits::{image_ray, open_tracers};
 use super::mixture::ErrorMixture;
+use super::pupils::{PupilFinder, PupilTreatment, with_rims};
 use super::spot::ImageRay;
 use super::{Beam, StopTest, ToleranceError, ToleranceScene, best_focus};
 use crate::lens::{Compensator, Perturbation, System, ToleranceSheet};
@@ -24,7 +25,9 @@ pub struct RealLens {
     /// The adjustments, focus first, in mm or radians; none if a ray does not arrive.
     pub adjustments: Vec<f64>,
     /// The mean squares with the rims that clip, of the rays that they leave, and the share of the light that
-    /// they take; `None` if it was not asked for or no light is left.
+    /// they take; the former are those above where the pupils of the lens were found anew. `None` if it was
+    /// not asked for or no light is left: the mean squares above are then of the rays of the lens as
+    /// designed.
     pub clipped: Option<([f64; 2], f64)>,
 }
 
@@ -44,6 +47,20 @@ pub fn real_lenses(
 ) -> Result<Vec<RealLens>, ToleranceError> {
     let stop = || stop.load(Ordering::Relaxed);
     RealLensRun::new(scene, sheet, seed)?.advance((count, with_rims), &stop, |_| {})
+}
+
+/// The same without rims, with the pupils of every lens found anew if they are to move.
+///
+/// # Errors
+/// An error of making that is not possible.
+pub fn traced_lenses(
+    (scene, moving_pupils): (&ToleranceScene, bool),
+    sheet: &ToleranceSheet,
+    (seed, count): (u64, usize),
+    stop: StopTest<'_>,
+) -> Result<Vec<RealLens>, ToleranceError> {
+    let run = RealLensRun::new(scene, sheet, seed)?.with_pupils(moving_pupils);
+    run.advance((count, 0), stop, |_| {})
 }
 
 /// Lenses with random errors, some of which may be known from before.
@@ -69,8 +86,17 @@ impl<'a> RealLensRun<'a> {
             mixture: ErrorMixture::new(sheet)?,
             adjustments: adjustments(sheet),
             columns: BeamColumns::new(&scene.beam),
+            finder: None,
         };
         Ok(Self { made, lenses: Vec::new() })
+    }
+
+    /// The same with the pupils of every lens found anew, if they are to move.
+    pub(super) fn with_pupils(mut self, move_them: bool) -> Self {
+        if let (true, PupilTreatment::Known(pupils)) = (move_them, &self.made.scene.pupils) {
+            self.made.finder = PupilFinder::new(self.made.scene, pupils);
+        }
+        self
     }
 
     /// The same with the first lenses known.
@@ -143,6 +169,8 @@ struct RandomLenses<'a> {
     /// The compensators, focus first.
     adjustments: Vec<Compensator>,
     columns: BeamColumns,
+    /// Finds the pupils of each lens; `None` if they are held.
+    finder: Option<PupilFinder<'a>>,
 }
 
 impl RandomLenses<'_> {
@@ -164,12 +192,26 @@ impl RandomLenses<'_> {
         let unadjusted = made.systems(&[])?;
         let mut lens =
             RealLens { errors, mean_square: None, adjustments: Vec::new(), clipped: None };
+        if let Some(finder) = &self.finder
+            && let Some((beam, lost)) = finder.beam(unadjusted.clone())
+        {
+            let columns = BeamColumns::new(&beam);
+            let made = LensToAdjust { columns: &columns, ..made };
+            if let Some(landed) = columns.landings(&unadjusted) {
+                let adjusted = made.adjust(&landed)?;
+                let squares = [mean_spot(&landed).a, adjusted.mean_square];
+                lens.mean_square = Some(squares);
+                lens.adjustments = adjusted.positions;
+                lens.clipped = Some((squares, lost));
+            }
+            return Ok(lens);
+        }
         if let Some(landed) = self.columns.landings(&unadjusted) {
             let adjusted = made.adjust(&landed)?;
             lens.mean_square = Some([mean_spot(&landed).a, adjusted.mean_square]);
             lens.adjustments = adjusted.positions;
         }
-        if with_rims {
+        if with_rims && self.finder.is_none() {
             lens.clipped = self.clipped(&made, unadjusted, &lens.adjustments)?;
         }
         Ok(lens)
@@ -204,15 +246,9 @@ impl RandomLenses<'_> {
 /// is dark.
 fn clipped_rays(
     scene: &ToleranceScene,
-    mut systems: Vec<System<f64>>,
+    systems: Vec<System<f64>>,
 ) -> Option<(Vec<LandedField>, f64)> {
-    for system in &mut systems {
-        let rims = system.surfaces.iter_mut().zip(&scene.lens.rims);
-        for (surface, (rim, obstruction, apertures)) in rims {
-            (surface.semi_diameter, surface.obstruction) = (*rim, *obstruction);
-            surface.apertures.clone_from(apertures);
-        }
-    }
+    let systems = with_rims(&scene.lens, systems);
     let tracers: Result<Vec<_>, _> = systems.iter().map(Tracer::new).collect();
     let (beam, lost) = transmitted(&scene.beam, &tracers.ok()?)?;
     Some((BeamColumns::new(&beam).landings(&systems)?, lost))

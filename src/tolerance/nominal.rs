@@ -4,12 +4,14 @@
 //! is symmetric about its axis is judged on both sides of it: its errors are not symmetric.
 
 use super::merits::open_tracers;
+use super::pupils::{ColourPupil, FieldPupils, PupilTreatment, ScenePupils};
 use super::refuse_if_stopped;
 use super::{Beam, ColourRays, FieldBeam, MeritOptions, NominalLens, StopTest, ToleranceError};
 use crate::lens::{Lens, System, lie_on_one_side};
 use crate::math::Vec3;
 use crate::pupil::{Accuracy, Launch, Nodes, RayModel, Region, converge};
 use crate::trace::{ImagePoints, Ray};
+use std::sync::Arc;
 
 /// A lens as designed, the rays by which it is judged, and their accuracy.
 #[derive(Debug, Clone)]
@@ -22,6 +24,8 @@ pub struct ToleranceScene {
     pub options: MeritOptions,
     /// The largest relative error of the radius of a spot by the quadrature over its pupil.
     pub sampling_error: f64,
+    /// The pupils, if they can move with errors.
+    pub pupils: PupilTreatment,
 }
 
 impl ToleranceScene {
@@ -45,23 +49,36 @@ impl ToleranceScene {
         stop: StopTest<'_>,
     ) -> Result<Self, ToleranceError> {
         let model = RayModel::from_lens(lens, zoom).map_err(|e| other(&e))?;
-        let mut sampler = Sampler { model: &model, tolerance, worst: 0.0, stop };
-        let mut fields = Vec::new();
-        for (number, field) in model.fields.iter().enumerate() {
-            if field.weight > 0.0 {
-                fields.push(sampler.field(number)?);
+        let mut sampler = Sampler::new(&model, tolerance, stop);
+        let (mut fields, mut pupils) = (Vec::new(), Vec::new());
+        let has_one_side = has_one_side(&model);
+        for (number, point) in model.fields.iter().enumerate() {
+            if !(point.weight > 0.0) {
+                continue;
             }
+            let (first, field) = (fields.len(), sampler.field(number)?);
+            let sides = if has_one_side { both_sides(&field) } else { vec![field] };
+            let place = (first, sides.len() > 1);
+            let colours = std::mem::take(&mut sampler.pupils);
+            pupils.push(FieldPupils::new((number, *point), place, colours));
+            fields.extend(sides);
         }
-        let worst = sampler.worst;
-        if has_one_side(&model) {
-            fields = fields.into_iter().flat_map(|field| both_sides(&field)).collect();
-        }
+        let Sampler { worst, held, .. } = sampler;
         let total: f64 = fields.iter().map(|field| field.weight).sum();
         fields.iter_mut().for_each(|field| field.weight /= total);
         let beam = Beam { fields };
         let lens = NominalLens::new(lens, &model, &beam)?;
         let options = MeritOptions { primary: model.primary, wavefront: None };
-        Ok(Self { lens, beam, options, sampling_error: worst })
+        let known = held.map_or_else(|| ScenePupils::new(model, pupils), Err);
+        let pupils =
+            known.map_or_else(PupilTreatment::Held, |own| PupilTreatment::Known(Arc::new(own)));
+        Ok(Self { lens, beam, options, sampling_error: worst, pupils })
+    }
+
+    /// The same with the rays of the lens as designed in all lenses with errors, whatever their rims.
+    #[must_use]
+    pub fn with_held_pupils(self) -> Self {
+        Self { pupils: PupilTreatment::Held("it was asked for"), ..self }
     }
 }
 
@@ -70,7 +87,7 @@ fn other(error: &dyn std::fmt::Display) -> ToleranceError {
 }
 
 /// True if all fields lie on one side of the axis of a lens that a half turn does not change.
-fn has_one_side(model: &RayModel) -> bool {
+pub(super) fn has_one_side(model: &RayModel) -> bool {
     let system = &model.channels[model.primary].system;
     !system.has_poses() && system.has_round_apertures() && lie_on_one_side(&model.fields)
 }
@@ -109,9 +126,17 @@ struct Sampler<'a> {
     tolerance: f64,
     worst: f64,
     stop: StopTest<'a>,
+    /// The pupils of the field.
+    pupils: Vec<ColourPupil>,
+    /// The reason why a pupil cannot move, if so.
+    held: Option<&'static str>,
 }
 
-impl Sampler<'_> {
+impl<'a> Sampler<'a> {
+    fn new(model: &'a RayModel, tolerance: f64, stop: StopTest<'a>) -> Self {
+        Self { model, tolerance, worst: 0.0, stop, pupils: Vec::new(), held: None }
+    }
+
     fn field(&mut self, number: usize) -> Result<FieldBeam, ToleranceError> {
         let field = self.model.fields[number];
         let (mut colours, mut shares, mut chief) = (Vec::new(), 0.0, None);
@@ -134,6 +159,7 @@ impl Sampler<'_> {
         for colour in &mut colours {
             colour.weights.iter_mut().for_each(|w| *w /= shares);
         }
+        self.pupils.iter_mut().for_each(|pupil| pupil.share /= shares);
         Ok(FieldBeam { weight: field.weight, colours, chief })
     }
 
@@ -151,7 +177,12 @@ impl Sampler<'_> {
         // The order before the last differs from it by the error of that, which is half of its own.
         let spared = usize::from(found.converged && 2.0 * error <= self.tolerance && orders > 2);
         self.worst = self.worst.max(error * (1 + spared) as f64);
-        let nodes = region.nodes(orders.saturating_sub(1 + spared));
+        let order = orders.saturating_sub(1 + spared);
+        match ColourPupil::new(&region, order, share) {
+            Ok(pupil) => self.pupils.push(pupil),
+            Err(why) => self.held = Some(why),
+        }
+        let nodes = region.nodes(order);
         let traced = region.trace::<ImagePoints<f64>>(&nodes);
         let total: f64 = traced.arrivals().map(|(_, w)| w).sum();
         let mut colour = ColourRays::new(region.launch.wavelength);
@@ -161,8 +192,7 @@ impl Sampler<'_> {
             let (pupil, ray) = launched[i];
             let (weight, path) = (share * weight / total, region.launch.optical_path_to(ray));
             if nodes.mirrored {
-                colour.push(ray, 0.5 * weight, pupil, path);
-                colour.push(mirror_image(ray), 0.5 * weight, [-pupil[0], pupil[1]], path);
+                colour.push_both_sides(ray, weight, pupil, path);
             } else {
                 colour.push(ray, weight, pupil, path);
             }
@@ -250,7 +280,7 @@ mod tests {
         let found = found.unwrap();
         let lens = crate::files::json::read(found.text, found.name).unwrap();
         let model = RayModel::from_lens(&lens, 0).unwrap();
-        let mut sampler = Sampler { model: &model, tolerance: 1e-2, worst: 0.0, stop: &|| false };
+        let mut sampler = Sampler::new(&model, 1e-2, &|| false);
         let field = sampler.field(1).unwrap();
         for colour in &field.colours {
             let mean = |of: &dyn Fn(usize) -> f64| -> f64 {

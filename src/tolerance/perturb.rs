@@ -79,15 +79,17 @@ fn check(lens: &NominalLens, what: Perturbation) -> Result<(), ToleranceError> {
         PerturbationKind::ThicknessAdjusted if first + 1 >= surfaces => {
             refuse("has no gap behind the next surface that could take it up")
         }
-        _ if kind.moves_a_body() && system.surfaces[first..=last].iter().any(breaks_axis) => {
-            refuse("holds a break of the axis, which is not supported")
-        }
+        _ if kind.moves_a_body() && breaks_axis_inside(&system.surfaces[first..=last]) => refuse(
+            "holds a break of the axis between its surfaces, which do not move as one body then",
+        ),
         PerturbationKind::ElementRollX | PerturbationKind::ElementRollY
             if own.shape.curvature() == 0.0 =>
         {
             refuse("needs a centre of curvature, which a plane does not have")
         }
-        PerturbationKind::Irregularity if !(lens.semi_diameters[first] > 0.0) => {
+        PerturbationKind::Irregularity | PerturbationKind::AsphereSlope
+            if !(lens.semi_diameters[first] > 0.0) =>
+        {
             refuse("needs the semi-diameter of the surface, which is not known")
         }
         _ if touches_grin && kind.breaks_symmetry() => {
@@ -97,8 +99,11 @@ fn check(lens: &NominalLens, what: Perturbation) -> Result<(), ToleranceError> {
     }
 }
 
-fn breaks_axis(surface: &Surface<f64>) -> bool {
-    surface.axis.is_some()
+/// True if the surfaces of a body do not stand on one axis. A break of the axis in front of the first one
+/// places all of it, and one behind the last one nothing of it.
+fn breaks_axis_inside(body: &[Surface<f64>]) -> bool {
+    let inner = body.len().saturating_sub(1);
+    body.iter().take(inner).skip(1).any(|surface| surface.axis.is_some())
 }
 
 /// Adds an error to the numbers of its surface; poses and dispersion are no such numbers.
@@ -118,6 +123,12 @@ fn add_to_surface<R: Real>(
             own.shape = own.shape.as_asphere().with_added(R::ZERO, R::ZERO, value);
         }
         PerturbationKind::Irregularity => add_irregularity(own, value, semi_diameter),
+        PerturbationKind::AsphereSlope => {
+            let [curvature, fourth] = slope_changes(semi_diameter);
+            let (curvature, fourth) = (R::from_f64(curvature), R::from_f64(fourth));
+            own.shape =
+                own.shape.as_asphere().with_added(value * curvature, R::ZERO, value * fourth);
+        }
         PerturbationKind::Thickness => own.thickness += value,
         PerturbationKind::ThicknessAdjusted => {
             own.thickness += value;
@@ -126,6 +137,12 @@ fn add_to_surface<R: Real>(
         PerturbationKind::Index => own.index += value,
         _ => {}
     }
+}
+
+/// The changes of the curvature and of the coefficient of r⁴ by a slope error of one radian: the sag
+/// `s/2 (r⁴/h³ − r²/h)` for the semi-diameter h.
+pub(super) fn slope_changes(semi_diameter: f64) -> [f64; 2] {
+    [-1.0 / semi_diameter, 0.5 / semi_diameter.powi(3)]
 }
 
 /// Adds `A/2 (ρ⁴ + ρy²)` to the sag.
@@ -167,6 +184,7 @@ fn place<R: Real>(system: &mut System<R>, lens: &NominalLens, bodies: &[Body<R>]
         let curvature = lens.systems[lens.primary].surfaces[body.first].shape.curvature();
         let center = if body.rolls { 1.0 / curvature } else { 0.0 };
         let motion = RigidMotion { pivot: vertices[body.first] + R::from_f64(center), pose };
+        let mut is_first = true;
         for (surface, vertex) in system
             .surfaces
             .iter_mut()
@@ -175,8 +193,13 @@ fn place<R: Real>(system: &mut System<R>, lens: &NominalLens, bodies: &[Body<R>]
             .skip(body.first)
         {
             let own = surface.pose.unwrap_or_else(Pose::centred);
+            // The first surface of several stands on the axis in front of its break, the others on that behind.
+            let axis = surface.axis.filter(|_| is_first && body.first < body.last);
+            is_first = false;
             surface.pose = Some(if body.alone {
                 pose.carried(&RigidMotion { pivot: vertex, pose: own }, vertex)
+            } else if let Some(axis) = axis {
+                axis.then(&axis.inverse().then(&own).carried(&motion, vertex))
             } else {
                 own.carried(&motion, vertex)
             });
@@ -223,5 +246,25 @@ impl<R: Real> Body<R> {
             | PerturbationKind::ElementRollX => &mut self.tilt[0],
             _ => &mut self.tilt[1],
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::lens::Shape;
+
+    /// A slope error leaves the sag at the centre and at the rim, and has its slope there.
+    #[test]
+    fn a_slope_error_is_a_zone_with_its_slope_at_the_rim() {
+        let (rim, slope) = (8.0_f64, 1e-3);
+        let [curvature, fourth] = slope_changes(rim).map(|by| by * slope);
+        let sag = |r: f64| 0.5 * curvature * r * r + fourth * r.powi(4);
+        assert!(sag(rim).abs() < 1e-15 && sag(0.5 * rim) < -1e-4);
+        let step = 1e-5;
+        let found = (sag(rim + step) - sag(rim - step)) / (2.0 * step);
+        assert!((found - slope).abs() < 1e-9, "{found}");
+        let shape = Shape::Sphere { curvature: 0.02 }.as_asphere();
+        assert_eq!(shape.with_added(curvature, 0.0, fourth).curvature(), 0.02 + curvature);
     }
 }

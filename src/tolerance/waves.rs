@@ -8,10 +8,10 @@
 use super::merits::merits;
 use super::sensitivity::Stages;
 use super::{
-    Beam, Derivatives, FieldBeam, Jet2, MeritOptions, Merits, NominalLens, StopTest,
-    ToleranceError, ToleranceScene, refuse_if_stopped,
+    Beam, Derivatives, FieldBeam, Jet2, MeritOptions, Merits, NominalLens, RealMerit,
+    RealMeritRequest, StopTest, ToleranceError, ToleranceScene, perturb, refuse_if_stopped,
 };
-use crate::lens::{Lens, Perturbation, PerturbationKind, ToleranceSheet};
+use crate::lens::{Lens, Perturbation, PerturbationKind, System, ToleranceSheet};
 use crate::math::{Dual, Real};
 use crate::pupil::RayModel;
 use rayon::prelude::*;
@@ -31,6 +31,7 @@ pub struct WavefrontModel {
     /// The derivatives of the variance by each error at the fixed image plane and refocused, in squared
     /// waves per unit and squared unit of the error.
     pub errors: Vec<[Derivatives; 2]>,
+    judge: WavefrontJudge,
 }
 
 impl WavefrontModel {
@@ -74,6 +75,24 @@ impl WavefrontModel {
             nominal: [fixed?, refocused?],
             focus,
             errors: sheet.errors.iter().map(|t| of(t.error)).collect(),
+            judge,
+        })
+    }
+
+    /// The variance of lenses with random errors by their rays, in squared waves: as the model has it, each
+    /// refocused for its own least variance, other compensators at rest.
+    ///
+    /// # Errors
+    /// Those of [`RealMerit::new`].
+    pub fn real_lenses(
+        &self,
+        scene: &ToleranceScene,
+        sheet: &ToleranceSheet,
+        request: RealMeritRequest,
+        stop: StopTest<'_>,
+    ) -> Result<RealMerit, ToleranceError> {
+        RealMerit::new(sheet, request, stop, |errors| {
+            self.judge.lens((&scene.lens, self.focus), errors)
         })
     }
 
@@ -176,6 +195,7 @@ fn without_focus(jet: TwoJet) -> Derivatives {
 }
 
 /// The rays by which wavefronts are judged.
+#[derive(Debug, Clone)]
 struct WavefrontJudge {
     options: MeritOptions,
     beam: Beam,
@@ -183,6 +203,8 @@ struct WavefrontJudge {
 
 /// Steps to the best image plane: the variance is nearly a quadratic function of its position.
 const STEPS: usize = 4;
+/// The same for a lens with errors, which begins near it.
+const LENS_STEPS: usize = 2;
 
 impl WavefrontJudge {
     /// The mean variance over all fields.
@@ -191,6 +213,43 @@ impl WavefrontJudge {
         weighted.fold(R::ZERO, |sum, (wavefront, field)| {
             sum + wavefront.tilt_removed * R::from_f64(field.weight)
         })
+    }
+
+    /// The variance of a lens with errors at its image plane, and at its own best one, which is looked for from
+    /// a displacement; `None` if a ray does not arrive.
+    fn lens(
+        &self,
+        (lens, focus): (&NominalLens, f64),
+        errors: &[(Perturbation, f64)],
+    ) -> Result<Option<[f64; 2]>, ToleranceError> {
+        let arrived = |found: Result<f64, ToleranceError>| match found {
+            Err(ToleranceError::RayLost { .. }) => Ok(None),
+            other => other.map(Some),
+        };
+        let systems = perturb(lens, errors)?;
+        let judged = merits(&systems, &self.beam, self.options);
+        let Some(fixed) = arrived(judged.map(|own| self.mean(&own)))? else { return Ok(None) };
+        let mut focus = focus;
+        let mut least = fixed;
+        for _ in 0..LENS_STEPS {
+            let mut moved: Vec<System<Jet2>> = systems.iter().map(System::cast).collect();
+            let last = image_plane(lens).first;
+            let variable = Jet2::variable(Dual::variable(0.0, 0), 0);
+            let shift = Jet2::from_f64(focus) + variable;
+            moved.iter_mut().for_each(|system| system.surfaces[last].thickness += shift);
+            let judged = match merits(&moved, &self.beam, self.options) {
+                Err(ToleranceError::RayLost { .. }) => return Ok(None),
+                judged => judged?,
+            };
+            let Derivatives { value, first, second } = self.mean(&judged).into();
+            if !(second > 0.0) {
+                least = least.min(value);
+                break;
+            }
+            focus -= first / second;
+            least = value - 0.5 * first * first / second;
+        }
+        Ok(Some([fixed, least.max(0.0)]))
     }
 
     /// The displacement of the image plane in mm at which the mean variance is least.

@@ -6,7 +6,7 @@ use aplanat::files;
 use aplanat::lens::{
     AdjustedPart, Edit, ErrorDistribution, Lens, PerturbationKind, ToleranceSheet,
 };
-use aplanat::report::{PaperKind, tolerance_sheet, tolerance_table};
+use aplanat::report::{FurtherColumns, PaperKind, tolerance_sheet, tolerance_table};
 use aplanat::session::{
     AnalysisResults, AnalysisSettings, AsBuiltLens, Command, LoosestGoal, PanelSetting,
     SessionView, Timed, confirm_as_built, predict_as_built,
@@ -257,7 +257,7 @@ fn what_the_panel_shows_is_written_as_a_table_and_as_charts() {
     let kinds = [PaperKind::ToleranceTable, PaperKind::ToleranceCharts];
     assert_eq!(harness.state().requests, kinds.map(FileRequest::ExportPaper));
     let made = made(&harness);
-    let table = tolerance_table(&made.sheet, &made.analysis).unwrap();
+    let table = tolerance_table(&made.sheet, &made.analysis, &FurtherColumns::default()).unwrap();
     assert_eq!(table.lines().count(), 1 + made.sheet.errors.len());
     let columns = table.lines().map(|line| line.split(',').count());
     assert!(columns.into_iter().all(|count| count == 12), "{table}");

@@ -148,7 +148,7 @@ fn info_gives_first_order_data() {
     ];
     has_keys(&info, &keys);
     let effects = info["effects"].as_array().unwrap();
-    assert_eq!(effects.len(), 9);
+    assert_eq!(effects.len(), 10);
     for effect in effects {
         has_keys(effect, &["effect", "needed", "computed", "error", "reason", "saves", "saved_ms"]);
     }

@@ -189,7 +189,7 @@ fn numbers_left_to_the_plan_agree_with_those_of_all_effects() {
             let on = done_json(&[&arguments[..], &["--effects", "all=on"]].concat(), "");
             numbers += agree(&auto, &on, &format!("{lens} {what}"));
             let effects = auto["effects"].as_array().unwrap();
-            assert_eq!(effects.len(), 9);
+            assert_eq!(effects.len(), 10);
             let differ = |(a, b): &(&Value, &Value)| a["computed"] != b["computed"];
             let on = on["effects"].as_array().unwrap();
             left_out += effects.iter().zip(on).filter(differ).count();

@@ -20,6 +20,9 @@ pub(super) struct RandomLensSource {
     /// The tolerance of spots, on which the rays depend.
     error: f64,
     seed: u64,
+    /// True if the pupils of the lens as designed are held.
+    #[serde(default)]
+    hold_pupils: bool,
 }
 
 #[derive(Debug, PartialEq, Serialize, Deserialize)]
@@ -31,7 +34,12 @@ struct SavedLenses {
 
 impl RandomLensSource {
     pub(super) fn new(lens: &Lens, zoom: usize, error: f64, seed: u64) -> Self {
-        Self { lens: json::write(lens), zoom, error, seed }
+        Self { lens: json::write(lens), zoom, error, seed, hold_pupils: false }
+    }
+
+    /// The same with the pupils of the lens as designed, if they are held.
+    pub(super) fn with_held_pupils(self, hold_pupils: bool) -> Self {
+        Self { hold_pupils, ..self }
     }
 
     /// The lenses of a file, none if there is no file yet.
@@ -46,7 +54,7 @@ impl RandomLensSource {
         } else if saved.source.seed != self.seed {
             "another --seed"
         } else if saved.source != *self {
-            "another --zoom or --error"
+            "another --zoom, --error or --hold-pupils"
         } else {
             return Ok(saved.lenses);
         };

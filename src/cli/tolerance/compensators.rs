@@ -1,6 +1,6 @@
 //! Compensators in the results of `tolerance`: how far they travel, and what their stops cost.
 
-use super::{surfaces, with_error};
+use super::tables::{percent, surfaces, with_error};
 use crate::cli::output::{ShortNumber, TextTable};
 use crate::lens::AdjustedPart;
 use crate::tolerance::{AdjustmentTravel, StoppedLenses, ToleranceAnalysis, TravelStatistics};
@@ -64,7 +64,7 @@ pub(super) fn compensator_table(rows: &[CompensatorRow]) -> TextTable {
             number(row.nominal),
             spread,
             number(found.largest),
-            super::percent(found.at_stop),
+            percent(found.at_stop),
         ]);
     }
     table
@@ -79,7 +79,7 @@ pub(super) fn stop_warning(stopped: Option<StoppedLenses>) -> Option<String> {
     Some(format!(
         "in {} of the lenses a compensator ends at its stop, where the spot is no quadratic function of \
          the errors; the rms of these by their rays differs from the model by {} mm",
-        super::percent(share),
+        percent(share),
         with_error(difference)
     ))
 }

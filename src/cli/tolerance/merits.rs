@@ -1,14 +1,22 @@
 //! Wavefront and contrast of lenses with errors, and sums of shares, in the results of `tolerance`.
 
-use super::{ShareOfGrowth, ToleranceArgs, percent, surfaces};
+use super::ToleranceArgs;
+use super::report::ShareOfGrowth;
+use super::tables::{percent, surfaces};
 use crate::cli::output::{ShortNumber, TextTable};
 use crate::lens::{Lens, ToleranceSheet};
+use crate::report::FurtherColumns;
 use crate::tolerance::{
-    ContrastChanges, KindShare, PartShare, StopTest, ToleranceError, ToleranceScene,
-    WavefrontModel, shares_by_kind, shares_by_part,
+    ContrastChanges, KindShare, PartShare, RealMerit, RealMeritRequest, StopTest, ToleranceError,
+    ToleranceScene, WavefrontModel, shares_by_kind, shares_by_part,
 };
 use serde::Serialize;
 use std::fmt::{self, Display};
+
+/// The standard error of the mean merit of real lenses, relative to it, at which there are enough of them.
+const ENOUGH: f64 = 0.01;
+/// The share of that mean up to which a difference from what is expected is no matter.
+const AGREES: f64 = 0.02;
 
 /// The wavefront and the contrast of lenses that are made, as far as they are asked for.
 #[derive(Serialize)]
@@ -28,6 +36,8 @@ struct WavefrontSummary {
     expected_rms: [f64; 2],
     /// The best position of the image plane in mm.
     focus: f64,
+    /// The root of the mean variance of lenses with random errors by their rays.
+    real: RealMerit,
 }
 
 /// The contrast, at the fixed image plane and refocused.
@@ -39,6 +49,8 @@ struct ContrastSummary {
     /// `None` if a ray does not arrive with an error at an end of its range.
     expected: Option<[f64; 2]>,
     sampling_error: f64,
+    /// The mean over lenses with random errors by their rays.
+    real: RealMerit,
 }
 
 /// The effect of one error on wavefront and contrast.
@@ -71,36 +83,44 @@ impl FurtherMerits {
         (lens, scene, sheet): (&Lens, &ToleranceScene, &ToleranceSheet),
         stop: StopTest<'_>,
     ) -> Result<Self, ToleranceError> {
-        let wavefront = || WavefrontModel::new((lens, arguments.zoom), scene, sheet, stop);
+        let request =
+            RealMeritRequest { seed: arguments.seed, most: arguments.samples, error: ENOUGH };
+        let wavefront = || {
+            let model = WavefrontModel::new((lens, arguments.zoom), scene, sheet, stop)?;
+            let real = model.real_lenses(scene, sheet, request, stop)?;
+            Ok((model, real))
+        };
         let wavefront = unless_stopped(arguments.wavefront.then(wavefront).transpose())?;
         let contrast = |frequency: f64| {
             let place = (lens, arguments.zoom, arguments.error.0);
-            ContrastChanges::new(place, scene, (sheet, frequency), stop)
+            ContrastChanges::with_real_lenses(place, scene, (sheet, frequency), request, stop)
         };
         let contrast = unless_stopped(arguments.mtf.map(contrast).transpose())?;
         let is_stopped = arguments.wavefront && wavefront.is_none()
             || arguments.mtf.is_some() && contrast.is_none();
         let mut rows: Vec<FurtherRow> =
             sheet.errors.iter().map(|_| FurtherRow::default()).collect();
-        if let Some(model) = &wavefront {
+        if let Some((model, _)) = &wavefront {
             add_wavefronts(&mut rows, model, sheet);
         }
-        if let Some(found) = &contrast {
+        if let Some((found, _)) = &contrast {
             for (row, changes) in rows.iter_mut().zip(&found.changes) {
                 let of = |plane: usize| changes.map(|changes| changes[plane]);
                 row.mtf = Some(ContrastRow { fixed: of(0), refocused: of(1) });
             }
         }
-        let wavefront = wavefront.map(|model| WavefrontSummary {
+        let wavefront = wavefront.map(|(model, real)| WavefrontSummary {
             nominal_rms: model.nominal.map(|variance| variance.max(0.0).sqrt()),
             expected_rms: model.expected_rms(sheet),
             focus: model.focus,
+            real: real.root(),
         });
-        let mtf = contrast.map(|found| ContrastSummary {
+        let mtf = contrast.map(|(found, real)| ContrastSummary {
             frequency: found.frequency,
             nominal: found.nominal,
             expected: found.expected(sheet),
             sampling_error: found.sampling_error,
+            real,
         });
         Ok(Self { wavefront, mtf, rows, is_stopped })
     }
@@ -116,6 +136,22 @@ impl FurtherMerits {
             let text = "stopped before the wavefront or the contrast was known; they are left out";
             warnings.push(text.to_owned());
         }
+        let wavefront = self.wavefront.as_ref().map(|own| (own.expected_rms, own.real));
+        let contrast = self.mtf.as_ref().and_then(|own| Some((own.expected?, own.real)));
+        for (name, (expected, real)) in wavefront
+            .map(|own| ("wavefront", own))
+            .into_iter()
+            .chain(contrast.map(|own| ("MTF", own)))
+        {
+            if let Some([fixed, refocused]) = real.differs_from(expected, AGREES) {
+                let [fixed, refocused] = [fixed, refocused].map(|apart| 100.0 * apart);
+                warnings.push(format!(
+                    "{name}: {} lenses by their rays differ from what the derivatives expect by \
+                     {fixed:.1} % (refocused {refocused:.1} %); those by rays count",
+                    real.lenses
+                ));
+            }
+        }
         let is_asked = self.wavefront.is_some() || self.mtf.is_some();
         if is_asked && !sheet.correlations.is_empty() {
             let text = "the expected wavefront and contrast count correlated errors as independent";
@@ -130,8 +166,14 @@ impl FurtherMerits {
         wavefront.chain(self.mtf.iter().map(|_| "MTF at worst")).collect()
     }
 
-    /// The heads of further columns of CSV, each behind a comma.
-    pub(super) fn csv_head(&self) -> String {
+    /// The further columns of the table as CSV.
+    pub(super) fn columns(&self) -> FurtherColumns {
+        let cells = self.rows.iter().map(FurtherRow::csv).collect();
+        FurtherColumns { heads: self.csv_head(), cells }
+    }
+
+    /// Their heads, each behind a comma.
+    fn csv_head(&self) -> String {
         let mut head = String::new();
         if self.wavefront.is_some() {
             head += ",wavefront_fixed_first,wavefront_fixed_second,wavefront_fixed_share,\
@@ -156,7 +198,7 @@ impl FurtherRow {
     }
 
     /// The cells of the further columns of CSV, each behind a comma.
-    pub(super) fn csv(&self) -> String {
+    fn csv(&self) -> String {
         let parts = self.wavefront.iter().flat_map(|own| [&own.fixed, &own.refocused]);
         let derivatives =
             |part: &ShareOfGrowth| format!(",{},{},{}", part.by.first, part.by.second, part.share);
@@ -194,20 +236,30 @@ impl Display for FurtherMerits {
         if let Some(own) = &self.wavefront {
             row("RMS wavefront as designed, waves".to_owned(), own.nominal_rms);
             row("root of the expected variance, waves".to_owned(), own.expected_rms);
+            real_row(&mut row, "the same", own.real);
         }
         if let Some(own) = &self.mtf {
-            let ContrastSummary { frequency, nominal, expected, sampling_error } = own;
+            let ContrastSummary { frequency, nominal, expected, sampling_error, real } = own;
             let at = format!("MTF at {} cycles/mm", ShortNumber(*frequency));
             row(format!("{at} as designed ± {sampling_error:.0e}"), *nominal);
             if let Some(expected) = expected {
                 row(format!("{at}, expected"), *expected);
             }
+            real_row(&mut row, &at, *real);
         }
         if self.wavefront.is_none() && self.mtf.is_none() {
             return Ok(());
         }
         writeln!(f, "{table}")
     }
+}
+
+/// The row of a merit of real lenses, with the larger of its two errors.
+fn real_row(row: &mut impl FnMut(String, [f64; 2]), name: &str, real: RealMerit) {
+    let RealMerit { mean, error, lenses, lost, .. } = real;
+    let lost = if lost > 0 { format!(", {lost} more lose rays") } else { String::new() };
+    let error = error[0].max(error[1]);
+    row(format!("{name}, {lenses} lenses by rays ± {error:.0e}{lost}"), mean);
 }
 
 /// The shares of errors, summed over the parts of the lens and over the kinds of errors.

@@ -181,6 +181,9 @@ impl ToleranceWriter<'_> {
                 return Err("the surface has no aspheric terms there");
             }
             PerturbationKind::Asphere => ("TPAR", [here.surface, FOURTH_POWER], half),
+            PerturbationKind::AsphereSlope => {
+                return Err("no operand has the slope of a zone between centre and rim");
+            }
             PerturbationKind::Abbe => {
                 let abbe = abbe_number(self.lens, first).ok_or("the gap has no Abbe number")?;
                 ("TABB", [here.surface, 0], half * abbe)

@@ -8,6 +8,9 @@
 mod conflict;
 mod price;
 mod settlement;
+mod springs;
+
+pub(super) use springs::add_springs;
 
 use super::state::OptimizerState;
 use super::{LimitPrice, OptimizationEnd, OptimizationProgress, Optimizer};

@@ -5,7 +5,7 @@ use super::kind::RegionKind;
 use super::nodes::RadialLine;
 use super::traced_pupil::TracedPupil;
 use crate::pupil::ray_model::Dual2;
-use crate::trace::{RayLimit, Rays};
+use crate::trace::{Ray, RayLimit, Rays};
 
 /// The rays on the part of the edge of a pupil that a limit makes.
 #[derive(Debug, Clone)]
@@ -19,6 +19,20 @@ pub(in crate::pupil) struct LimitEdge {
     pub(in crate::pupil) landings: Vec<[f64; 2]>,
 }
 
+/// A ray on the edge of a pupil.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct EdgeRay {
+    /// The surface that ends the light there, counted from 0.
+    pub surface: usize,
+    /// Its limit.
+    pub limit: RayLimit,
+    /// The ray.
+    pub ray: Ray<f64>,
+    /// The derivative of the area of the pupil, in mm² of the first vertex plane, by the margin of the ray: a
+    /// number of the lens that changes margins by `dM` adds the sum of these times `dM` to the area.
+    pub by_margin: f64,
+}
+
 impl LimitEdge {
     fn new(surface: usize, limit: RayLimit) -> Self {
         let (by_margin, landings) = (Vec::new(), Vec::new());
@@ -30,6 +44,18 @@ impl TracedPupil<'_> {
     /// The rays on the edge, by the limits that make it; `None` if the edge is unknown.
     pub(in crate::pupil) fn edges(&self) -> Option<&[LimitEdge]> {
         self.edges.get_or_init(|| self.find_edges()).as_deref()
+    }
+
+    /// The same as one list, half of it with twice the weight for a pupil that is its own mirror image.
+    pub fn edge_rays(&self) -> Option<Vec<EdgeRay>> {
+        let of_limit = |edge: &LimitEdge| {
+            let LimitEdge { surface, limit, .. } = *edge;
+            let rays = (0..edge.rays.len()).map(|i| edge.rays.get(i));
+            let rays = rays.zip(edge.by_margin.clone());
+            rays.map(move |(ray, by_margin)| EdgeRay { surface, limit, ray, by_margin })
+                .collect::<Vec<_>>()
+        };
+        Some(self.edges()?.iter().flat_map(of_limit).collect())
     }
 
     fn find_edges(&self) -> Option<Vec<LimitEdge>> {

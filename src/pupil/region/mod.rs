@@ -22,12 +22,14 @@ mod pupil_radius;
 mod quadrature;
 mod search;
 mod traced_pupil;
+mod whole_turn;
 
 pub use annulus::Annulus;
 pub use boundary::{Boundary, BoundaryArc, EdgePoint, PolarFrame, PupilLimit};
 pub use dark_pupil::DarkPupil;
 pub use edge_curve::{EdgeArc, EdgeCurves};
 pub use kind::{Region, RegionKind};
+pub use limit_edge::EdgeRay;
 pub(super) use limit_edge::LimitEdge;
 pub use moments::PupilMoments;
 pub use nodes::Nodes;

@@ -187,6 +187,20 @@ impl Region<'_> {
         }
     }
 
+    /// The nodes of an order with twice the azimuths on each arc: as fine as those of the half of a pupil that
+    /// was its own mirror image, where arcs end on the line of symmetry.
+    pub fn nodes_of_both_halves(&self, order: usize) -> Nodes {
+        let (azimuths, radii) = STAR_ORDERS[order.min(STAR_ORDERS.len() - 1)];
+        match &self.kind {
+            RegionKind::StarShaped(boundary) => {
+                let (lines, rays) = self.radial_lines(boundary, |_| 2 * azimuths);
+                let nodes = line_nodes(&lines, &boundary.frame, radii);
+                Nodes { mirrored: self.launch.is_symmetric(), rays, ..nodes }
+            }
+            _ => self.nodes(order),
+        }
+    }
+
     /// The nodes of an order, counted from 0; none if there is no light.
     pub fn nodes(&self, order: usize) -> Nodes {
         self.nodes_and_lines(order, false).0

@@ -3,12 +3,12 @@
 //! Sensitivities and the quadratic form follow every edit; once the lens is still, real lenses with
 //! random errors correct them.
 
-use super::{AnalysisSettings, LoosestTolerances};
+use super::AnalysisSettings;
 use crate::lens::{Lens, ToleranceSheet};
 use crate::tolerance::{
-    ErrorModel, MadeLens, NominalLens, SecondDerivatives, StopTest, ToleranceAnalysis,
-    ToleranceError, ToleranceRequest, ToleranceScene, WavefrontModel, graded_sheet,
-    refuse_lost_lenses, worst_lens,
+    ErrorModel, LoosestRequest, LoosestTolerances, MadeLens, NominalLens, RealMerit,
+    RealMeritRequest, SecondDerivatives, StopTest, ToleranceAnalysis, ToleranceError,
+    ToleranceRequest, ToleranceScene, WavefrontModel, graded_sheet, refuse_lost_lenses, worst_lens,
 };
 
 /// The tolerances of a lens and what they do to it.
@@ -27,6 +27,8 @@ pub struct AsBuiltLens {
     /// variance, each at the fixed image plane and refocused; `None` where only derivatives of spots are
     /// known yet, or for a lens without a wavefront.
     pub wavefront: Option<[[f64; 2]; 2]>,
+    /// The root of the mean variance of lenses with random errors by their rays, in waves, likewise.
+    pub real_wavefront: Option<RealMerit>,
     /// The share of each error in the growth of the variance of the wavefront, likewise; as many as
     /// there are errors, or none.
     pub wavefront_shares: Vec<[f64; 2]>,
@@ -48,6 +50,8 @@ pub struct AsBuiltLens {
 const COARSE: f64 = 1e-2;
 /// The number of real lenses of one that is still.
 const REAL_LENSES: usize = 500;
+/// The standard error of the mean variance of their wavefronts, relative to it, at which there are enough.
+const ENOUGH: f64 = 0.02;
 /// The seed of their errors.
 const SEED: u64 = 1;
 
@@ -112,12 +116,20 @@ fn as_built(
     refuse_lost_lenses(analysis.lost, analysis.samples, "these tolerances")?;
     let goal = settings.loosest.filter(|_| samples > 0);
     let form = &analysis.forms[1];
-    let loosest = goal.map(|goal| LoosestTolerances::new((lens, &scene), form, &sheet, goal));
+    let form = (form, analysis.pupils.moves);
+    let loosest = goal.map(|goal| {
+        let request = LoosestRequest { goal, limit: goal.limit(), seed: SEED };
+        LoosestTolerances::new((lens, &scene), form, &sheet, request, stop)
+    });
     let worst = worst_lens((lens, settings.zoom), &scene, &sheet, &analysis.real);
     let waves = (samples > 0)
         .then(|| WavefrontModel::new((lens, settings.zoom), &scene, &sheet, stop).ok())
         .flatten();
+    let request = RealMeritRequest { seed: SEED, most: REAL_LENSES, error: ENOUGH };
+    let real_wavefront =
+        waves.as_ref().and_then(|waves| waves.real_lenses(&scene, &sheet, request, stop).ok());
     Ok(AsBuiltLens {
+        real_wavefront: real_wavefront.map(|real| real.root()),
         wavefront: waves.as_ref().map(|waves| {
             [waves.nominal.map(|variance| variance.max(0.0).sqrt()), waves.expected_rms(&sheet)]
         }),

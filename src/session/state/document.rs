@@ -7,8 +7,8 @@ use crate::math::format_short;
 use crate::picture::{BitDepth, ToneCurve, encode_png};
 use crate::pupil::{RayModel, limited_by_stop};
 use crate::report::{
-    PaperKind, ReportSettings, drawing_bytes, has_extension, report_bytes, solids_file,
-    tolerance_sheet, tolerance_table,
+    FurtherColumns, PaperKind, ReportSettings, drawing_bytes, has_extension, report_bytes,
+    solids_file, tolerance_sheet, tolerance_table,
 };
 use crate::session::ScenePicture;
 use crate::session::history::{DesignHistory, VersionOrigin};
@@ -275,7 +275,8 @@ impl Session {
         let made = made.value.as_ref().map_err(Clone::clone)?;
         let (sheet, analysis) = (&made.sheet, &made.analysis);
         if kind == PaperKind::ToleranceTable {
-            let table = tolerance_table(sheet, analysis).map_err(|why| why.to_string())?;
+            let table = tolerance_table(sheet, analysis, &FurtherColumns::default())
+                .map_err(|why| why.to_string())?;
             return Ok(table.into_bytes());
         }
         let charts = tolerance_sheet(&self.lens.name, sheet, analysis);

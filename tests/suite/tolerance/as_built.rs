@@ -4,8 +4,8 @@ use super::reference::{ToleranceCase, assert_close, kind, lenses, tolerances};
 use crate::reference::{number, numbers};
 use aplanat::lens::{ErrorDistribution, Perturbation, ToleranceSheet};
 use aplanat::tolerance::{
-    ToleranceRequest, ToleranceScene, analyze, as_built_gradient, form_yield, loosest_for_yield,
-    loosest_tolerances,
+    PupilTreatment, ToleranceRequest, ToleranceScene, analyze, as_built_gradient, form_yield,
+    loosest_for_yield, loosest_tolerances,
 };
 
 /// The lens with the rays of the Monte Carlo of the file, or fewer.
@@ -15,6 +15,7 @@ fn scene(lens: &ToleranceCase, rule: (usize, usize)) -> ToleranceScene {
         beam: lens.beam(rule.0, rule.1),
         options: aplanat::tolerance::MeritOptions { wavefront: None, ..lens.options() },
         sampling_error: 0.0,
+        pupils: PupilTreatment::Held("the rays are given"),
     }
 }
 

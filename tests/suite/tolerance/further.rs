@@ -7,7 +7,9 @@ use aplanat::lens::{
     ErrorDistribution, Lens, Perturbation, PerturbationKind, Tolerance, ToleranceSheet,
 };
 use aplanat::pupil::{Accuracy, RayModel};
-use aplanat::tolerance::{ContrastChanges, NominalLens, ToleranceScene, WavefrontModel, perturb};
+use aplanat::tolerance::{
+    ContrastChanges, NominalLens, RealMeritRequest, ToleranceScene, WavefrontModel, perturb,
+};
 
 fn never() -> bool {
     false
@@ -64,6 +66,33 @@ fn derivatives_of_the_wavefront_are_those_of_differences() {
     }
     let [fixed, refocused] = found.expected_rms(&sheet);
     assert!(fixed > refocused && refocused >= found.nominal[1].sqrt(), "{fixed} {refocused}");
+}
+
+/// Errors that lie at the ends of their ranges: the mean variance of real lenses is that of the derivatives,
+/// by as many lenses as it needs and no more.
+#[test]
+fn real_lenses_confirm_the_expected_wavefront() {
+    let lens = triplet();
+    let scene = ToleranceScene::new(&lens, 0, 0.05).unwrap();
+    let sheet = sheet(&[
+        (PerturbationKind::ElementDecenterX, 2, 3, 0.01),
+        (PerturbationKind::ElementTiltY, 0, 1, 5e-5),
+        (PerturbationKind::Curvature, 1, 1, 2e-6),
+    ]);
+    let model = WavefrontModel::new((&lens, 0), &scene, &sheet, &never).unwrap();
+    let real = |most: usize, error: f64| {
+        let request = RealMeritRequest { seed: 3, most, error };
+        model.real_lenses(&scene, &sheet, request, &never).unwrap()
+    };
+    let found = real(256, 0.02);
+    let expected = model.expected_rms(&sheet).map(|rms| rms * rms);
+    assert!(found.reached && found.lost == 0, "{found:?}");
+    assert_eq!(found.differs_from(expected, 0.01), None, "{found:?} {expected:?}");
+    assert!(found.differs_from(expected.map(|value| 1.5 * value), 0.01).is_some(), "{found:?}");
+    let few = real(2, 0.0);
+    assert!(few.lenses == 2 && !few.reached, "{few:?}");
+    let root = found.root();
+    assert!((root.mean[1] * root.mean[1] / found.mean[1] - 1.0).abs() < 1e-12);
 }
 
 /// The contrast of a lens is that of its analysis; a gap in front of the image changes it as that gap
@@ -124,7 +153,7 @@ fn saved_lenses_give_the_result_of_one_run() {
         refused(2, &[&few[..], &saved[..], more].concat(), "", &[words]);
     };
     other(&["--error", "10%", "--seed", "2"], "another --seed");
-    other(&["--error", "20%"], "another --zoom or --error");
+    other(&["--error", "20%"], "another --zoom");
     other(&["--grade", "commercial"], "another lens or other tolerances");
     std::fs::write(file.path(), "{}").unwrap();
     other(&[], "not a valid checkpoint");
@@ -152,11 +181,19 @@ fn the_command_draws_and_groups() {
     assert!(parts.len() == 2 && parts.iter().any(|part| *part == "gap"), "{parts:?}");
     assert!(json["wavefront"]["expected_rms"][1].as_f64().unwrap() > 0.0);
     assert!(json["mtf"]["nominal"][0].as_f64().unwrap() <= 1.0);
+    for merit in ["wavefront", "mtf"] {
+        let real = &json[merit]["real"];
+        assert_eq!(real["lenses"].as_u64().unwrap() + real["lost"].as_u64().unwrap(), 6);
+        let [mean, error] = ["mean", "error"].map(|key| real[key][1].as_f64().unwrap());
+        let expected =
+            json[merit][if merit == "mtf" { "expected" } else { "expected_rms" }][1].as_f64();
+        assert!((mean - expected.unwrap()).abs() < 5.0 * error + 0.02 * mean, "{merit}: {real}");
+    }
     assert!(json["sensitivities"][0]["wavefront"]["refocused"]["share"].is_number());
     assert_eq!(json["second_derivatives"], false);
     let table = std::fs::read_to_string(csv.path()).unwrap();
     let columns = |line: &str| line.split(',').count();
-    assert!(table.lines().all(|line| columns(line) == 11 + 6 + 4), "{table}");
+    assert!(table.lines().all(|line| columns(line) == 12 + 6 + 4), "{table}");
     assert!(std::fs::read(png.path()).unwrap().starts_with(b"\x89PNG"));
     let drawn = ["--plot", svg.path(), "--second-derivatives"];
     let text = done(&[&few[..], &drawn].concat(), "");

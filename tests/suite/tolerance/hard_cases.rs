@@ -6,8 +6,8 @@ use aplanat::lens::{
     ErrorDistribution, FieldPoint, Perturbation, PerturbationKind, ToleranceSheet, lie_on_one_side,
 };
 use aplanat::tolerance::{
-    MeritOptions, ToleranceError, ToleranceGrade, ToleranceRequest, ToleranceScene, analyze,
-    graded_sheet, merits, perturb,
+    MeritOptions, PupilTreatment, ToleranceError, ToleranceGrade, ToleranceRequest, ToleranceScene,
+    analyze, graded_sheet, merits, perturb,
 };
 
 pub(super) fn scene(number: usize, rule: (usize, usize)) -> ToleranceScene {
@@ -17,6 +17,7 @@ pub(super) fn scene(number: usize, rule: (usize, usize)) -> ToleranceScene {
         beam: lens.beam(rule.0, rule.1),
         options: MeritOptions { wavefront: None, ..lens.options() },
         sampling_error: 0.0,
+        pupils: PupilTreatment::Held("the rays are given"),
     }
 }
 
@@ -102,11 +103,17 @@ fn a_rim_that_closes_the_pupil_is_counted() {
     "half_range": {half_range}, "distribution": "ends"}}]}} }}"#
         )
     };
-    let run = |half_range: f64| {
+    let run = |half_range: f64, more: &[&str]| {
         let file = Scratch::with("stop_in_front.json", &lens(half_range));
-        done_json(&["tolerance", file.path(), "--samples", "6", "--error", "1%"], "")
+        let own = ["tolerance", file.path(), "--samples", "6", "--error", "1%"];
+        done_json(&[&own[..], more].concat(), "")
     };
-    let (closed, open) = (run(20.0), run(0.5));
+    // The pupil goes with the stop, as long as the lens behind is wide enough, and takes all of its light.
+    let (closed, open) = (run(20.0, &[]), run(0.5, &[]));
+    assert_eq!((closed["dark"].as_u64(), open["dark"].as_u64()), (Some(6), Some(0)));
+    assert!(closed["pupils"]["moves"] == true && open["pupils"]["moves"] == true);
+    assert!(closed["warnings"].to_string().contains("gets no light"), "{}", closed["warnings"]);
+    let (closed, open) = (run(20.0, &["--hold-pupils"]), run(0.5, &["--hold-pupils"]));
     assert_eq!((closed["dark"].as_u64(), open["dark"].as_u64()), (Some(6), Some(0)));
     assert_eq!(closed["lost"].as_u64(), Some(0));
     assert!(closed["clipping"].is_null() && open["clipping"][2].as_f64().unwrap() > 0.01);
@@ -209,7 +216,7 @@ fn the_command_shows_sensitivities_and_spots() {
         "element decenter x",
         "1-2",
         "3'",
-        "the pupil is held",
+        "moving pupils: o",
     ] {
         assert!(text.contains(word), "{word}: {text}");
     }

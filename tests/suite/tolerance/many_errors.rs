@@ -8,9 +8,9 @@ use aplanat::lens::{
 };
 use aplanat::tolerance::{
     Compensation, ErrorModel, FocusTreatment, QuadraticForm, RayEffects, SecondDerivatives,
-    ToleranceError, ToleranceRequest, ToleranceScene, analyze_until, graded_sheet, sensitivities,
+    ToleranceError, ToleranceRequest, ToleranceScene, graded_sheet, sensitivities,
 };
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 fn never() -> bool {
     false
@@ -107,7 +107,8 @@ fn an_analysis_stops_in_every_part() {
     let (scene, mut sheet) = zoom(false);
     sheet.errors.truncate(12);
     let request = ToleranceRequest { seed: 1, samples: 4, limit: None };
-    let stopped = analyze_until(&scene, &sheet, request, &AtomicBool::new(true));
+    let model = ErrorModel::new(&scene, &sheet, SecondDerivatives::Neglected, &|| true);
+    let stopped = model.map(|own| own.pupils);
     assert!(matches!(stopped, Err(ToleranceError::Stopped)), "{stopped:?}");
     let lens = bundled("zoom_nikkor_28_80");
     let scene_too = ToleranceScene::new_until(&lens, 0, 0.1, &|| true);

@@ -8,6 +8,7 @@ mod derivatives;
 mod further;
 mod hard_cases;
 mod many_errors;
+mod moving_pupil;
 mod rays;
 mod reference;
 mod worst;

@@ -26,7 +26,7 @@ impl ErrorList {
     pub(super) fn show(
         &mut self,
         ui: &mut Ui,
-        shares: Option<&[[f64; 2]]>,
+        (shares, semi_diameters): (Option<&[[f64; 2]]>, &[f64]),
         editable: bool,
         editor: &mut SheetEditor<'_>,
     ) {
@@ -42,7 +42,7 @@ impl ErrorList {
             }
             ui.end_row();
             for i in order {
-                self.error_row(ui, i, editable, editor);
+                self.error_row(ui, (i, semi_diameters), editable, editor);
                 match shares.and_then(|shares| shares.get(i)) {
                     Some([fixed, refocused]) if wide => {
                         share_bar(ui, *fixed);
@@ -66,7 +66,13 @@ impl ErrorList {
         });
     }
 
-    fn error_row(&mut self, ui: &mut Ui, i: usize, editable: bool, editor: &mut SheetEditor<'_>) {
+    fn error_row(
+        &mut self,
+        ui: &mut Ui,
+        (i, semi_diameters): (usize, &[f64]),
+        editable: bool,
+        editor: &mut SheetEditor<'_>,
+    ) {
         let tolerance = editor.sheet.errors[i];
         let Perturbation { kind, first, .. } = tolerance.error;
         let name = Button::new(RichText::new(title(kind)).small()).frame(false);
@@ -74,7 +80,7 @@ impl ErrorList {
             editor.select(first);
         }
         ui.label(RichText::new(surfaces(tolerance.error)).small());
-        ui.add_enabled_ui(editable, |ui| self.half_range(ui, i, editor));
+        ui.add_enabled_ui(editable, |ui| self.half_range(ui, (i, semi_diameters), editor));
         ui.add_enabled_ui(editable, |ui| {
             let name = format!("Distribution of {}", error_name(tolerance.error));
             if let Some(chosen) = distribution(ui, &name, tolerance.distribution) {
@@ -84,9 +90,14 @@ impl ErrorList {
     }
 
     /// The half range of an error; a changed one becomes a tolerance of the lens.
-    fn half_range(&mut self, ui: &mut Ui, i: usize, editor: &mut SheetEditor<'_>) {
+    fn half_range(
+        &mut self,
+        ui: &mut Ui,
+        (i, semi_diameters): (usize, &[f64]),
+        editor: &mut SheetEditor<'_>,
+    ) {
         let Tolerance { error, half_range, .. } = editor.sheet.errors[i];
-        let (factor, unit) = shown_unit(error.kind);
+        let (factor, unit) = shown_unit(error, semi_diameters);
         let stored = factor * half_range;
         let name = format!("Half range of {}", error_name(error));
         let field =

@@ -30,8 +30,6 @@ impl Default for LoosestForm {
 
 /// The spot that is proposed, relative to the mean of lenses as they are made now.
 const PROPOSED: f64 = 1.2;
-/// The share of the spot up to which rays confirm it.
-const CONFIRMED: f64 = 0.025;
 
 impl LoosestForm {
     /// Shows the form, and the tolerances that were found.
@@ -44,7 +42,9 @@ impl LoosestForm {
     ) {
         self.goal(ui, made, asked, editor);
         match &made.loosest {
-            Some(Ok(found)) if asked.is_some() => table(ui, found, editor),
+            Some(Ok(found)) if asked.is_some() => {
+                table(ui, (found, &made.nominal.semi_diameters), editor);
+            }
             Some(Err(why)) if asked.is_some() => {
                 ui.label(RichText::new(why).color(ui.visuals().warn_fg_color));
             }
@@ -91,7 +91,11 @@ impl LoosestForm {
 }
 
 /// The tolerances with their prices, and buttons that make them those of the lens.
-fn table(ui: &mut Ui, found: &LoosestTolerances, editor: &mut SheetEditor<'_>) {
+fn table(
+    ui: &mut Ui,
+    (found, semi_diameters): (&LoosestTolerances, &[f64]),
+    editor: &mut SheetEditor<'_>,
+) {
     remarks(ui, found);
     ui.horizontal_wrapped(|ui| {
         let by_class = found.by_class();
@@ -116,14 +120,16 @@ fn table(ui: &mut Ui, found: &LoosestTolerances, editor: &mut SheetEditor<'_>) {
         }
         ui.end_row();
         for (own, price) in found.sheet.errors.iter().zip(&found.prices) {
-            let kind = own.error.kind;
             let before = editor.sheet.errors.iter().find(|before| before.error == own.error);
-            let now = before.map(|before| half_range_text(kind, before.half_range));
+            let now =
+                before.map(|before| half_range_text(own.error, semi_diameters, before.half_range));
             ui.label(RichText::new(error_name(own.error)).small());
             ui.label(now.unwrap_or_default());
-            ui.label(half_range_text(kind, own.half_range));
+            ui.label(half_range_text(own.error, semi_diameters, own.half_range));
             ui.label(price.map_or("", |(class, _)| class.name()));
-            ui.label(price.map_or_else(String::new, |(_, range)| half_range_text(kind, range)));
+            ui.label(price.map_or_else(String::new, |(_, range)| {
+                half_range_text(own.error, semi_diameters, range)
+            }));
             ui.end_row();
         }
     });
@@ -144,8 +150,9 @@ fn remarks(ui: &mut Ui, found: &LoosestTolerances) {
     let warn = ui.visuals().warn_fg_color;
     if let Some([real, form]) = found.confirmed {
         let [a, b] = [real, form].map(|mm| number::format_digits(1e3 * mm, 3));
-        let text = format!("Refocused RMS of 100 lenses {a} µm by rays, {b} µm by the form");
-        let agrees = (real / form - 1.0).abs() <= CONFIRMED;
+        let count = found.lenses;
+        let text = format!("Refocused RMS of {count} lenses {a} µm by rays, {b} µm by the form");
+        let agrees = found.disagreement().is_none();
         let text = if agrees { RichText::new(text) } else { RichText::new(text).color(warn) };
         ui.label(text);
     }

@@ -162,7 +162,9 @@ impl TolerancesPanel {
         let mut editor = SheetEditor { lens: &view.lens, sheet, refused, actions };
         let editable = shows_design(view);
         ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
-            self.errors.show(ui, None, editable, &mut editor);
+            let rims: Vec<f64> =
+                view.lens.surfaces.iter().map(|row| row.semi_diameter.unwrap_or(0.0)).collect();
+            self.errors.show(ui, (None, &rims), editable, &mut editor);
         });
     }
 
@@ -223,7 +225,8 @@ impl TolerancesPanel {
     fn error_list(&mut self, ui: &mut Ui, shown: &Shown<'_>, actions: &mut Actions) {
         let Shown { view, made, lens, .. } = shown;
         let editable = shown.is_design();
-        let (shares, refused) = (shown.shares(), &mut self.refused);
+        let rims = &made.nominal.semi_diameters[..];
+        let (shares, refused) = ((shown.shares(), rims), &mut self.refused);
         let mut editor = SheetEditor { lens: &view.lens, sheet: shown.sheet(), refused, actions };
         if editable {
             self.form.show(ui, &made.nominal, view.settings.grade, &mut editor);

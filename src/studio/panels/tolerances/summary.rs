@@ -20,9 +20,11 @@ pub(super) fn facts(ui: &mut Ui, made: &AsBuiltLens, ms: f64) {
     let text = format!("{errors} errors, {rays} rays, {by}, {ms:.0} ms");
     let hover = format!(
         "Each spot is sampled to {:.1e} of its radius. The mean square spot is a quadratic form in \
-         the errors; real lenses with random errors tell how far it is to be trusted. Rims clip \
-         nothing",
-        made.sampling_error
+         the errors; real lenses with random errors tell how far it is to be trusted. Moving pupils: \
+         {}, {}",
+        made.sampling_error,
+        if made.analysis.pupils.moves { "on" } else { "off" },
+        made.analysis.pupils.reason
     );
     ui.label(RichText::new(text).small().weak()).on_hover_text(hover);
     let lost = made.analysis.lost;
@@ -56,6 +58,11 @@ pub(super) fn summary(ui: &mut Ui, made: &AsBuiltLens) {
         let waves = |rms: f64| format!("{} λ", number::format_digits(rms, 3));
         rows.push(("Wavefront as designed".into(), designed.map(waves)));
         rows.push(("Wavefront of the lenses".into(), expected.map(waves)));
+        if let Some(real) = made.real_wavefront {
+            let by_rays =
+                [0, 1].map(|i| format!("{} λ", number::with_error(real.mean[i], real.error[i])));
+            rows.push((format!("The same of {} lenses by rays", real.lenses), by_rays));
+        }
     }
     Grid::new("spots as made").num_columns(3).striped(true).show(ui, |ui| {
         ui.weak(RMS_OVER_FIELDS).on_hover_text(RMS_OVER_FIELDS_HINT);
@@ -93,12 +100,12 @@ pub(super) fn worst_lens(ui: &mut Ui, made: &AsBuiltLens, actions: &mut Actions)
     let Some(worst) = &made.worst else { return };
     ui.horizontal_wrapped(|ui| match worst {
         Ok(worst) => {
-            let rms = number::format_digits(1e3 * worst.stated_rms, 3);
+            let rms = number::format_digits(1e3 * worst.opened_rms.unwrap_or(worst.stated_rms), 3);
             let (number, samples) = (worst.number + 1, made.analysis.samples);
             ui.label(format!("Worst lens: {rms} µm refocused, number {number} of {samples}"));
             let hint = "Shows it as a candidate: its errors as numbers and places of its surfaces, its \
-                        compensators adjusted. Its pupil is found anew, so that its spot in other \
-                        panels may differ a little";
+                        compensators adjusted, its fields those on both sides of the axis. Other panels \
+                        show this number for it";
             if ui.button("Open the worst lens").on_hover_text(hint).clicked() {
                 let lens: Box<Lens> = Box::new(worst.lens.clone());
                 actions.push(Command::Preview(Some(lens)));

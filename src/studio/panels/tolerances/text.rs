@@ -1,12 +1,20 @@
 //! Names and units of errors of making, as the panel shows them.
 
-use crate::lens::{AdjustedPart, ErrorDistribution, Perturbation, PerturbationKind, SurfaceNumber};
+use crate::lens::{
+    AdjustedPart, ErrorDistribution, Perturbation, PerturbationKind, SurfaceNumber,
+    fringes_of_curvature,
+};
 use crate::studio::number;
 
-/// The factor and the unit in which half ranges of a kind are shown.
-pub(super) fn shown_unit(kind: PerturbationKind) -> (f64, &'static str) {
-    match kind {
-        _ if kind.is_angle() => ANGLE,
+/// The factor and the unit in which the half range of an error is shown; that of power in fringes where its
+/// surface has a semi-diameter.
+pub(super) fn shown_unit(error: Perturbation, semi_diameters: &[f64]) -> (f64, &'static str) {
+    let rim = semi_diameters.get(error.first).copied().filter(|rim| *rim > 0.0);
+    if let (PerturbationKind::Curvature, Some(rim)) = (error.kind, rim) {
+        return (fringes_of_curvature(1.0, rim), " fringes");
+    }
+    match error.kind {
+        kind if kind.is_angle() => ANGLE,
         PerturbationKind::Abbe => (100.0, " %"),
         PerturbationKind::Curvature => (1.0, " /mm"),
         PerturbationKind::Conic | PerturbationKind::Asphere | PerturbationKind::Index => (1.0, ""),
@@ -35,8 +43,12 @@ pub(super) fn error_name(error: Perturbation) -> String {
 }
 
 /// A half range with its unit.
-pub(super) fn half_range_text(kind: PerturbationKind, half_range: f64) -> String {
-    let (factor, unit) = shown_unit(kind);
+pub(super) fn half_range_text(
+    error: Perturbation,
+    semi_diameters: &[f64],
+    half_range: f64,
+) -> String {
+    let (factor, unit) = shown_unit(error, semi_diameters);
     format!("{}{unit}", number::format_digits(factor * half_range, 3))
 }
 
@@ -47,6 +59,7 @@ pub(super) const fn title(kind: PerturbationKind) -> &'static str {
         PerturbationKind::Conic => "Conic constant",
         PerturbationKind::Asphere => "Asphere, r⁴",
         PerturbationKind::Irregularity => "Irregularity",
+        PerturbationKind::AsphereSlope => "Slope of asphere",
         PerturbationKind::Thickness => "Thickness",
         PerturbationKind::ThicknessAdjusted => "Thickness, adjusted",
         PerturbationKind::Index => "Index",

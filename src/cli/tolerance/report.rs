@@ -1,0 +1,244 @@
+//! The results of `tolerance` as JSON and as text.
+
+use super::ToleranceArgs;
+use super::compensators::{CompensatorRow, compensator_rows, compensator_table, stop_warning};
+use super::loosest::LoosestReport;
+use super::merits::{FurtherMerits, FurtherRow, GroupedShares};
+use super::power::PowerUnits;
+use crate::cli::output::ShortNumber;
+use crate::lens::{Lens, PerturbationKind, ToleranceSheet};
+use crate::tolerance::{
+    AsBuiltSpot, Derivatives, MadeLens, NominalLens, PupilMotion, StoppedLenses, ToleranceAnalysis,
+    ToleranceError, ToleranceScene,
+};
+use serde::Serialize;
+use std::fmt::{self, Display};
+
+/// The result.
+#[derive(Serialize)]
+pub(super) struct ToleranceReport {
+    errors: usize,
+    correlations: usize,
+    rays: usize,
+    sampling_error: f64,
+    samples: usize,
+    seed: u64,
+    lost: usize,
+    dark: usize,
+    clipping: Option<[f64; 3]>,
+    pupils: PupilMotion,
+    pub(super) spots: [AsBuiltSpot; 2],
+    compensators: Vec<CompensatorRow>,
+    stopped: Option<StoppedLenses>,
+    second_derivatives: bool,
+    pub(super) sensitivities: Vec<SensitivityRow>,
+    groups: GroupedShares,
+    #[serde(flatten)]
+    pub(super) further: FurtherMerits,
+    #[serde(flatten)]
+    loosest: LoosestReport,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) worst: Option<WorstLens>,
+    warnings: Vec<String>,
+}
+
+/// The worst of the lenses with random errors.
+#[derive(Serialize)]
+pub(super) struct WorstLens {
+    /// Its number, counted from 0.
+    number: usize,
+    /// Its refocused rms spot radius in mm.
+    rms: f64,
+    /// The rms spot radius that the lens shows when its file is opened.
+    written_rms: Option<f64>,
+}
+
+impl WorstLens {
+    pub(super) fn new(made: &MadeLens) -> Self {
+        Self { number: made.number, rms: made.stated_rms, written_rms: made.opened_rms }
+    }
+}
+
+/// The effect of one error.
+#[derive(Serialize)]
+pub(super) struct SensitivityRow {
+    pub(super) kind: PerturbationKind,
+    pub(super) first: usize,
+    pub(super) last: usize,
+    pub(super) half_range: f64,
+    /// A half range of power in other units.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(super) power: Option<PowerUnits>,
+    /// The standard deviation.
+    sigma: f64,
+    pub(super) fixed: ShareOfGrowth,
+    pub(super) refocused: ShareOfGrowth,
+    #[serde(flatten)]
+    pub(super) further: FurtherRow,
+}
+
+/// The derivatives of the mean square spot by an error, and its share of the growth of the
+/// expectation.
+#[derive(Serialize)]
+pub(super) struct ShareOfGrowth {
+    #[serde(flatten)]
+    pub(super) by: Derivatives,
+    pub(super) share: f64,
+}
+
+impl ToleranceReport {
+    pub(super) fn new(
+        arguments: &ToleranceArgs,
+        (lens, scene, sheet): (&Lens, &ToleranceScene, &ToleranceSheet),
+        analysis: ToleranceAnalysis,
+        (loosest, mut further): (LoosestReport, FurtherMerits),
+    ) -> Result<Self, ToleranceError> {
+        let mut warnings = warnings(&analysis);
+        warnings.extend(loosest.warnings());
+        warnings.extend(further.warnings(sheet));
+        let shares = analysis.growth_shares(sheet)?;
+        Ok(Self {
+            errors: sheet.errors.len(),
+            correlations: sheet.correlations.len(),
+            rays: scene.beam.rays(),
+            sampling_error: scene.sampling_error,
+            samples: analysis.samples,
+            seed: arguments.seed,
+            lost: analysis.lost,
+            dark: analysis.dark,
+            clipping: analysis.clipping,
+            pupils: analysis.pupils.clone(),
+            second_derivatives: analysis.has_second_derivatives,
+            sensitivities: rows(sheet, &analysis, (&shares, &mut further), &scene.lens),
+            groups: GroupedShares::new(lens, sheet, &shares),
+            compensators: compensator_rows(&analysis),
+            stopped: analysis.stopped,
+            spots: analysis.spots,
+            further,
+            loosest,
+            worst: None,
+            warnings,
+        })
+    }
+}
+
+/// The sensitivities, sorted by their share after refocusing.
+fn rows(
+    sheet: &ToleranceSheet,
+    analysis: &ToleranceAnalysis,
+    (shares, further): (&[[f64; 2]], &mut FurtherMerits),
+    lens: &NominalLens,
+) -> Vec<SensitivityRow> {
+    let both = sheet.errors.iter().zip(shares.iter().copied()).enumerate();
+    let mut rows: Vec<SensitivityRow> = both
+        .map(|(i, (tolerance, [fixed, refocused]))| {
+            let [by_fixed, by_adjusted] = analysis.forms.each_ref().map(|form| Derivatives {
+                value: form.nominal,
+                first: form.first[i],
+                second: form.second.of(i, i),
+            });
+            let sigma = tolerance.deviation();
+            SensitivityRow {
+                kind: tolerance.error.kind,
+                first: tolerance.error.first,
+                last: tolerance.error.last,
+                half_range: tolerance.half_range,
+                power: PowerUnits::new(tolerance, lens),
+                sigma,
+                fixed: ShareOfGrowth { by: by_fixed, share: fixed },
+                refocused: ShareOfGrowth { by: by_adjusted, share: refocused },
+                further: further.row(i),
+            }
+        })
+        .collect();
+    rows.sort_by(|a, b| b.refocused.share.total_cmp(&a.refocused.share));
+    rows
+}
+
+fn warnings(analysis: &ToleranceAnalysis) -> Vec<String> {
+    let mut warnings = Vec::new();
+    for spot in analysis.spots.iter().filter(|spot| !spot.form_agrees) {
+        let [apart, error] = spot.difference.map(|v| 100.0 * v / spot.form_mean_rms);
+        warnings.push(format!(
+            "{}: the quadratic model differs from Monte Carlo by {apart:.2} % ± {error:.2} %; the \
+             corrected numbers count",
+            focus_name(spot)
+        ));
+    }
+    warnings.extend(stop_warning(analysis.stopped));
+    for spot in analysis.spots.iter().filter(|spot| !spot.rims_agree) {
+        let [change, error] =
+            spot.clipping.unwrap_or_default().map(|v| 100.0 * v / spot.form_mean_rms);
+        warnings.push(format!(
+            "{}: rims that clip change the mean rms by {change:.2} % ± {error:.2} %; the errors of the \
+             means count that, the quantiles and the yield leave it out",
+            focus_name(spot)
+        ));
+    }
+    if analysis.dark > 0 {
+        warnings.push(format!(
+            "in {} of {} lenses with rims a field gets no light; what rims change leaves these out",
+            analysis.dark, analysis.with_rims
+        ));
+    }
+    if analysis.lost > 0 {
+        warnings.push(format!(
+            "{} of {} lenses lose rays and count as bad; the means leave them out",
+            analysis.lost, analysis.samples
+        ));
+    }
+    warnings
+}
+
+fn focus_name(spot: &AsBuiltSpot) -> String {
+    let name = serde_json::to_value(spot.focus).unwrap_or_default();
+    name.as_str().unwrap_or_default().to_owned()
+}
+
+impl Display for ToleranceReport {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        writeln!(
+            f,
+            "{} manufacturing errors, {}{} rays, {} lenses by Monte Carlo; spots as rms in mm\n",
+            self.errors,
+            match self.correlations {
+                0 => String::new(),
+                1 => "1 correlation, ".to_owned(),
+                count => format!("{count} correlations, "),
+            },
+            self.rays,
+            self.samples
+        )?;
+        writeln!(f, "{}", self.spot_table())?;
+        writeln!(f, "{}", compensator_table(&self.compensators))?;
+        writeln!(f, "{}", self.sensitivity_table())?;
+        write!(f, "{}", self.groups)?;
+        write!(f, "{}", self.further)?;
+        writeln!(f, "{}", pupil_line(&self.pupils))?;
+        if let Some([fixed, refocused, light]) = self.clipping.map(|c| c.map(|v| 100.0 * v)) {
+            writeln!(
+                f,
+                "rims would change the mean square by {fixed:.2} % (refocused \
+                 {refocused:.2} %) and take {light:.2} % of the light"
+            )?;
+        }
+        write!(f, "{}", self.loosest)?;
+        if let Some(WorstLens { number, rms, written_rms }) = &self.worst {
+            let written = written_rms.map_or_else(String::new, |written| {
+                format!(", {} mm as its file is opened", ShortNumber(written))
+            });
+            let (number, rms) = (number + 1, ShortNumber(*rms));
+            writeln!(f, "worst lens: number {number}, refocused rms {rms} mm{written}")?;
+        }
+        self.warnings.iter().try_for_each(|warning| writeln!(f, "warning: {warning}"))
+    }
+}
+
+/// The decision about moving pupils with its reason and what it costs or saves.
+fn pupil_line(pupils: &PupilMotion) -> String {
+    let PupilMotion { moves, reason, rays, .. } = pupils;
+    let cost = rays.map_or_else(String::new, |[found, held]| {
+        format!("; {found} rays a lens with its pupils found anew, {held} with those of the design")
+    });
+    format!("moving pupils: {}, {reason}{cost}", if *moves { "on" } else { "off" })
+}

@@ -1,0 +1,100 @@
+//! The tables of `tolerance` as text, and how their numbers are written.
+
+use super::report::{SensitivityRow, ToleranceReport};
+use crate::cli::output::{ShortNumber, TextTable};
+use crate::lens::{PerturbationKind, SurfaceNumber};
+use crate::tolerance::AsBuiltSpot;
+
+/// The number of sensitivities in the text.
+const SHOWN: usize = 20;
+
+impl ToleranceReport {
+    pub(super) fn spot_table(&self) -> TextTable {
+        let mut table = TextTable::new(&["", "fixed focus", "refocused"]);
+        let both = |of: &dyn Fn(&AsBuiltSpot) -> String| [of(&self.spots[0]), of(&self.spots[1])];
+        let mut row = |name: String, of: &dyn Fn(&AsBuiltSpot) -> String| {
+            let [fixed, refocused] = both(of);
+            table.row([name, fixed, refocused]);
+        };
+        let short = |value: f64| ShortNumber(value).to_string();
+        row("as designed".into(), &|s| short(s.nominal_rms));
+        row("root of the expected mean square".into(), &|s| short(s.form_root_mean_square));
+        row("mean, quadratic model".into(), &|s| short(s.form_mean_rms));
+        row("mean, corrected by Monte Carlo".into(), &|s| with_error(s.mean_rms));
+        row("Monte Carlo minus quadratic model".into(), &|s| with_error(s.difference));
+        for (i, quantile) in self.spots[0].quantiles.iter().enumerate() {
+            let name = format!("{:.0} % of the lenses, at most", 100.0 * quantile.share);
+            row(name, &|s| short(s.quantiles[i].corrected));
+        }
+        if self.spots[0].good.is_some() {
+            row("yield".into(), &|s| s.good.map_or(String::new(), |g| percent(g.corrected)));
+            row("yield by Monte Carlo, 95 % interval".into(), &|s| {
+                let ends = s.good.map_or([0.0; 2], |g| g.interval);
+                format!("{} to {}", percent(ends[0]), percent(ends[1]))
+            });
+        }
+        table
+    }
+
+    pub(super) fn sensitivity_table(&self) -> TextTable {
+        let mut head = vec!["error", "surfaces", "half range", "share fixed", "share refocused"];
+        head.extend(self.further.heads());
+        let mut table = TextTable::new(&head);
+        for row in self.sensitivities.iter().take(SHOWN) {
+            let own = [
+                row.kind.name().to_owned(),
+                surfaces(row.first, row.last),
+                row.power.map_or_else(
+                    || half_range(row.kind, row.half_range),
+                    |power| power.to_string(),
+                ),
+                percent(row.fixed.share),
+                percent(row.refocused.share),
+            ];
+            table.row(own.into_iter().chain(row.further.cells()));
+        }
+        let more = self.sensitivities.len().saturating_sub(SHOWN);
+        if more > 0 {
+            let rest = |of: fn(&SensitivityRow) -> f64| {
+                self.sensitivities[SHOWN..].iter().map(of).sum::<f64>()
+            };
+            let shares = [rest(|row| row.fixed.share), rest(|row| row.refocused.share)];
+            let [fixed, refocused] = shares.map(percent);
+            let own = [format!("{more} more"), String::new(), String::new(), fixed, refocused];
+            let none = self.further.heads().into_iter().map(|_| String::new());
+            table.row(own.into_iter().chain(none));
+        }
+        table
+    }
+}
+
+/// A share in percent, without the sign of a number that rounds to 0.
+pub(super) fn percent(share: f64) -> String {
+    let rounded = (1e3 * share).round() / 10.0 + 0.0;
+    format!("{rounded:.1} %")
+}
+
+pub(super) fn with_error([value, error]: [f64; 2]) -> String {
+    format!("{} ± {error:.1e}", ShortNumber(value))
+}
+
+pub(super) fn surfaces(first: usize, last: usize) -> String {
+    let number = SurfaceNumber::new;
+    if first == last {
+        number(first).to_string()
+    } else {
+        format!("{}-{}", number(first), number(last))
+    }
+}
+
+/// A half range with its unit; angles in minutes of arc.
+pub(super) fn half_range(kind: PerturbationKind, value: f64) -> String {
+    let unit = match kind {
+        _ if kind.is_angle() => return format!("{}'", ShortNumber(60.0 * value.to_degrees())),
+        PerturbationKind::Abbe => return format!("{} %", ShortNumber(100.0 * value)),
+        PerturbationKind::Curvature => " /mm",
+        PerturbationKind::Conic | PerturbationKind::Asphere | PerturbationKind::Index => "",
+        _ => " mm",
+    };
+    format!("{}{unit}", ShortNumber(value))
+}
