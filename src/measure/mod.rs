@@ -4,6 +4,7 @@
 //! that a busy machine slows all of them alike and ratios remain meaningful. A rate is the median
 //! of many short repetitions, reported with the slowest and the fastest.
 
+mod accuracy;
 mod arrival;
 mod design;
 mod double_gauss;
@@ -25,6 +26,7 @@ mod timing;
 mod tolerance;
 mod trace;
 
+pub use accuracy::{AccuracyPoint, point_spread_accuracy, transfer_accuracy};
 pub use arrival::{ArrivalComparison, ArrivalRow, measure_arrival};
 pub use design::{SheetReference, SheetScore, SpecificationSheet, measure_design};
 pub use double_gauss::double_gauss;

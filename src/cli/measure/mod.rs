@@ -11,6 +11,7 @@ mod mtf;
 mod optimize;
 mod picture;
 mod plot;
+mod psf;
 mod search;
 mod spot;
 mod tolerance;
@@ -34,6 +35,7 @@ enum BenchmarkCommand {
     Trace(trace::MeasureTraceArgs),
     Spot(spot::MeasureSpotArgs),
     Mtf(mtf::MeasureMtfArgs),
+    Psf(psf::MeasurePsfArgs),
     Gradient(gradient::MeasureGradientArgs),
     Picture(picture::MeasurePictureArgs),
     Grin(grin::MeasureGrinArgs),
@@ -53,6 +55,7 @@ impl MeasureArgs {
             BenchmarkCommand::Trace(trace) => trace.run(output),
             BenchmarkCommand::Spot(spot) => spot.run(output),
             BenchmarkCommand::Mtf(mtf) => mtf.run(output),
+            BenchmarkCommand::Psf(psf) => psf.run(output),
             BenchmarkCommand::Gradient(gradient) => gradient.run(output),
             BenchmarkCommand::Picture(picture) => picture.run(output),
             BenchmarkCommand::Grin(grin) => grin.run(output),
