@@ -22,6 +22,7 @@ mod picture;
 mod rounding;
 mod search;
 mod spot;
+mod term_cost;
 mod timing;
 mod tolerance;
 mod trace;
@@ -55,6 +56,7 @@ pub use spot::{
     Precision, PupilClipping, PupilSampling, SpotCurves, SpotCurvesError, SpotRow,
     measure_spot_curves,
 };
+pub use term_cost::{TermCost, TermCosts, measure_term_costs};
 pub use timing::{RateStatistics, Stopwatch, time_ms};
 pub use tolerance::{
     AsBuiltComparison, AsBuiltCost, MadeDesign, ToleranceBenchmark, ToleranceBenchmarkError,

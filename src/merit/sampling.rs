@@ -1,7 +1,7 @@
 //! The rays that spots are computed from: the pupils, sampled once to a tolerance.
 
 use super::{Goal, MeritError, Term};
-use crate::analysis::{ReferenceForm, brightest_strehl, rms_without_tilt, transfer};
+use crate::analysis::{ReferenceForm, TransferRays, brightest_strehl, rms_without_tilt, transfer};
 use crate::lens::{FieldPoint, Lens, TermScope, TermSelection};
 use crate::pupil::{
     Accuracy, Aiming, FixedLaunch, Launch, Nodes, PupilMoments, RayModel, Region, RegionKind,
@@ -45,6 +45,8 @@ pub(super) struct SamplingDemand {
     pub(super) strehl: bool,
     /// The spatial frequencies of terms about contrast, in cycles/mm.
     pub(super) frequencies: Vec<f64>,
+    /// True if a term asks for contrast by diffraction.
+    pub(super) diffraction: bool,
     /// True if a term asks for lenses that are made, which are not symmetric about their axis.
     pub(super) as_built: bool,
 }
@@ -57,6 +59,7 @@ impl SamplingDemand {
                 Term::Wavefront => demand.wavefront = true,
                 Term::Strehl => (demand.wavefront, demand.strehl) = (true, true),
                 Term::GeometricMtf { frequency, .. } => demand.frequencies.push(frequency),
+                Term::Mtf { .. } => demand.diffraction = true,
                 Term::AsBuilt { .. } => demand.as_built = true,
                 _ => {}
             }
@@ -118,6 +121,8 @@ pub(super) struct SampledPupil {
     order: usize,
     /// The form of its reference sphere; `None` if no term asks for the wavefront.
     pub(super) reference: Option<ReferenceForm>,
+    /// The rays of its transfer by diffraction; `None` if no term asks for it, or if it has none.
+    pub(super) transfer: Option<TransferRays>,
     pub(super) moments: PupilMoments,
     /// [`TracedPupil::signed_area`], in mm².
     pub(super) area: f64,
@@ -282,6 +287,9 @@ impl RaySampling {
                 transfer_error = transfer_error.max(*change);
             }
         }
+        let find = || TransferRays::find(&region, TRANSFER_SCALE * tolerance).ok();
+        let transfer = self.demand.diffraction.then(find).flatten();
+        transfer_error = transfer_error.max(transfer.map_or(0.0, |rays| rays.error));
         self.transfer_error = self.transfer_error.max(transfer_error);
         // Without light no order is better than another one, and the highest would take millions of rays.
         let orders = match &found {
@@ -302,6 +310,7 @@ impl RaySampling {
             kind,
             order,
             reference,
+            transfer,
             moments,
             area: 0.0,
             ideal_area,

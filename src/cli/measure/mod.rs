@@ -8,6 +8,7 @@ mod grin;
 mod limits;
 mod minima;
 mod mtf;
+mod optiland;
 mod optimize;
 mod picture;
 mod plot;
