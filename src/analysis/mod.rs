@@ -40,10 +40,10 @@ pub use color_error::{
     LateralColor, LongitudinalAberration, ZoneFocus, lateral_color, longitudinal_aberration,
 };
 pub use diffraction::{
-    DiffractionGate, PointSpread, PupilCurve, PupilFunction, PupilSamples, Strehl,
-    diffraction_gate, diffraction_mtf, encircled_energy, encircled_energy_unless, point_spread,
-    point_spread_unless, polychromatic_diffraction_mtf, polychromatic_diffraction_mtf_unless,
-    strehl, strehl_unless, through_focus_mtf,
+    DiffractionGate, PointSpread, PupilCurve, PupilFunction, PupilSamples, RayTransfer, Strehl,
+    TransferRays, TransferSlopes, diffraction_gate, diffraction_mtf, encircled_energy,
+    encircled_energy_unless, point_spread, point_spread_unless, polychromatic_diffraction_mtf,
+    polychromatic_diffraction_mtf_unless, strehl, strehl_unless, through_focus_mtf,
 };
 pub use distortion::{
     Distortion, FieldCurvature, GridPoint, chief_points, distortion, distortion_grid,

@@ -11,7 +11,7 @@ use crate::math::{SimdWidth, run_vectorized, sin_cos_turns};
 use crate::pupil::{Accuracy, ConvergedList, Nodes, RayModel, Region, converge_resolved};
 use crate::trace::{ImagePoints, TraceSink as _};
 use serde::Serialize;
-use std::f64::consts::FRAC_2_PI;
+use std::f64::consts::{FRAC_2_PI, TAU};
 use std::fmt::{self, Display};
 
 /// The optical transfer function at one spatial frequency.
@@ -132,8 +132,8 @@ fn common_mtf(
     let ones = |list: &[f64]| vec![1.0; list.len()];
     let phase = PhaseNodes::new(&region, frequencies);
     let found = phase.converge(&region, half, frequencies, numbers);
-    let found = found
-        .or_else(|| converge_resolved(&region, half, phase.along.ceil() as usize, numbers, ones));
+    let least = phase.most_along().ceil() as usize;
+    let found = found.or_else(|| converge_resolved(&region, half, least, numbers, ones));
     let mut found = found.ok_or(AnalysisError::NoLight)?;
     found.errors.iter_mut().for_each(|error| *error *= CHANGES);
     let largest = found.errors.iter().copied().fold(0.0, f64::max);
@@ -147,28 +147,34 @@ fn common_mtf(
 const CHANGES: f64 = 2.0;
 
 /// The Gauss nodes that resolve the phase of a frequency over a pupil.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 struct PhaseNodes {
-    /// The nodes along a radius.
-    along: f64,
+    /// The azimuths of some radii and the nodes along each, and the largest distance between two of them.
+    along: Vec<(f64, f64)>,
+    apart: f64,
     /// The azimuths for each radian of an arc.
     around: f64,
 }
 
-/// The nodes of each order beyond those that resolve the phase, which grow by a part as well: along a radius,
-/// and azimuths along an arc.
-const ORDERS: [[f64; 2]; 9] = [
-    [4.0, 6.0],
-    [7.0, 10.0],
-    [10.0, 14.0],
-    [14.0, 20.0],
-    [20.0, 28.0],
-    [28.0, 40.0],
-    [40.0, 56.0],
-    [56.0, 80.0],
-    [80.0, 112.0],
+/// The nodes of each order: the share of those that resolve the phase of the highest frequency everywhere, and more
+/// of them along a radius and along an arc. The first order is for coarse tolerances: few parts of a pupil have the
+/// steepest phase, and a change of the order tells when it has too few nodes.
+const ORDERS: [[f64; 3]; 10] = [
+    [0.88, 3.0, 5.0],
+    [1.0, 5.0, 8.0],
+    [1.15, 7.0, 10.0],
+    [1.3, 10.0, 14.0],
+    [1.45, 14.0, 20.0],
+    [1.6, 20.0, 28.0],
+    [1.75, 28.0, 40.0],
+    [1.9, 40.0, 56.0],
+    [2.05, 56.0, 80.0],
+    [2.2, 80.0, 112.0],
 ];
-const GROWTH: f64 = 0.15;
+/// The tolerance of a change from which on the first order is for.
+const COARSE: f64 = 1e-4;
+/// Radii are near to each other if they are not farther apart than those looked at, but for rounding.
+const NEAR: f64 = 1.0 + 1e-9;
 /// The numbers of so many frequencies do not all agree by chance; of fewer, a part of the error before a change of
 /// the order is left at least.
 const MANY: usize = 6;
@@ -198,30 +204,54 @@ impl PhaseNodes {
     /// Chebyshev points, looked at on some radii.
     fn new(region: &Region<'_>, frequencies: &[f64]) -> Self {
         let radii = region.radii();
-        let points: Vec<[f64; 2]> = radii.iter().flatten().copied().collect();
+        let points: Vec<[f64; 2]> = radii.iter().flat_map(|(_, points)| points).copied().collect();
         let (launched, landed) = region.launch.trace_points(&points);
         let mut places = vec![None; points.len()];
         for (ray, point) in launched.into_iter().enumerate() {
             let arrives = landed.fate(ray).is_imaged();
             places[point] = arrives.then(|| [landed.x[ray], landed.y[ray]]);
         }
-        let count = radii.first().map_or(1, Vec::len);
-        let change = |apart: usize, is_pair: &dyn Fn(usize) -> bool| {
-            let pairs = places.iter().zip(places.iter().skip(apart)).enumerate();
-            let near = pairs.filter(|(i, _)| is_pair(*i)).filter_map(|(_, (a, b))| a.zip(*b));
+        let count = radii.first().map_or(1, |(_, points)| points.len());
+        let change = |a: &[Option<[f64; 2]>], b: &[Option<[f64; 2]>]| {
+            let near = a.iter().zip(b).filter_map(|(a, b)| (*a).zip(*b));
             near.map(|([a, b], [c, d])| (a - c).abs().max((b - d).abs())).fold(0.0, f64::max)
         };
         let highest = frequencies.iter().fold(0.0f64, |highest, nu| highest.max(nu.abs()));
-        let along = change(1, &|i| i % count != count - 1);
-        let around = change(count, &|_| true);
         // Eight steps of angle along a radius, and of azimuth over half a turn.
-        Self { along: 8.0 * highest * along, around: 4.0 * highest * around }
+        let along = places.chunks(count).map(|line| 8.0 * highest * change(line, &line[1..]));
+        let around = 4.0 * highest * change(&places, &places[count.min(places.len())..]);
+        let azimuths = radii.iter().map(|(azimuth, _)| *azimuth);
+        let apart = radii.windows(2).map(|pair| pair[1].0 - pair[0].0).fold(0.0, f64::max);
+        Self { along: azimuths.zip(along).collect(), apart, around }
+    }
+
+    /// The nodes along a radius at an azimuth: those of the radii looked at on both sides, or of all.
+    fn along(&self, azimuth: f64) -> f64 {
+        let is_near = |other: f64| {
+            let off = (other - azimuth).abs();
+            off.min(TAU - off) <= NEAR * self.apart
+        };
+        let near = self.along.iter().filter(|(other, _)| is_near(*other)).map(|(_, nodes)| *nodes);
+        near.reduce(f64::max).unwrap_or_else(|| self.most_along())
+    }
+
+    /// The nodes along any radius.
+    fn most_along(&self) -> f64 {
+        self.along.iter().map(|(_, nodes)| *nodes).fold(0.0, f64::max)
+    }
+
+    /// The nodes of an order; `None` if rules have not so many.
+    fn nodes(&self, region: &Region<'_>, order: usize) -> Option<Nodes> {
+        let [growth, radii, azimuths] = ORDERS[order];
+        let azimuths = |arc: f64| (growth * self.around * arc + azimuths).ceil() as usize;
+        let radii = |azimuth: f64| (growth * self.along(azimuth) + radii).ceil() as usize;
+        region.nodes_along(azimuths, radii)
     }
 
     /// Raises the order until some numbers change by less than the tolerance; `None` if no order has so many
     /// nodes.
     fn converge(
-        self,
+        &self,
         region: &Region<'_>,
         accuracy: Accuracy,
         frequencies: &[f64],
@@ -229,18 +259,16 @@ impl PhaseNodes {
     ) -> Option<ConvergedList> {
         let mut rays = region.rays;
         let mut before: Option<ConvergedList> = None;
-        for (order, [radii, azimuths]) in ORDERS.into_iter().enumerate() {
-            let growth = 1.0 + GROWTH * order as f64;
-            let azimuths = |arc: f64| (growth * self.around * arc + azimuths).ceil() as usize;
-            let radii = (growth * self.along + radii).ceil() as usize;
-            let Some(nodes) = region.nodes_along(azimuths, radii) else { break };
+        let many = frequencies.len() >= MANY;
+        let start = usize::from(!many || accuracy.tolerance < COARSE);
+        for order in start..ORDERS.len() {
+            let Some(nodes) = self.nodes(region, order) else { break };
             let cost = nodes.points.len() + nodes.rays;
-            if order > 1 && rays + cost > accuracy.max_rays {
+            if order > start + 1 && rays + cost > accuracy.max_rays {
                 break;
             }
             rays += cost;
             let values = numbers(&nodes)?;
-            let many = frequencies.len() >= MANY;
             let (times, fall) = if many { (1.0, 0.0) } else { (FEW_CHANGES, LEAST_FALL) };
             let errors = match &before {
                 None => vec![f64::INFINITY; values.len()],
@@ -254,9 +282,9 @@ impl PhaseNodes {
                     changes.into_iter().zip(&before.errors).map(error).collect()
                 }
             };
-            let is_told = order > 1 || many;
+            let is_told = order > start + 1 || many;
             let converged = is_told && errors.iter().all(|error| *error <= accuracy.tolerance);
-            before = Some(ConvergedList { values, errors, rays, orders: order, converged });
+            before = Some(ConvergedList { values, errors, rays, orders: order - start, converged });
             if converged {
                 break;
             }
@@ -489,7 +517,6 @@ pub(super) fn sum_wavelengths(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::f64::consts::TAU;
 
     #[test]
     fn phases_turned_in_steps_are_those_of_each_frequency() {

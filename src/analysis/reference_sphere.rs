@@ -81,6 +81,8 @@ impl ReferenceForm {
 #[derive(Debug, Clone)]
 pub(super) struct ReferenceSphere {
     pub(super) center: Vec3<f64>,
+    /// The pupil point of the ray that ends there.
+    pub(super) chief: [f64; 2],
     direction: Vec3<f64>,
     /// The optical path of the chief ray to the image, in mm.
     pub(super) path: f64,
@@ -170,7 +172,12 @@ impl ReferenceSphere {
         };
         let index = system.surfaces[last].index;
         let wavelength = launch.channel().um * 1e-3;
-        Some(Self { center, direction, path, form, index, wavelength })
+        Some(Self { center, chief: p, direction, path, form, index, wavelength })
+    }
+
+    /// The same about the same point, in another form.
+    pub(super) fn with_form(self, form: ReferenceForm) -> Self {
+        Self { form, ..self }
     }
 
     /// Replaces a sphere that rays with errors up to `farthest` may miss.

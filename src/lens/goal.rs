@@ -119,6 +119,23 @@ pub enum Term {
         /// The minimum modulation, at most 1.
         min: f64,
     },
+    /// The same of the modulation transfer by diffraction.
+    Mtf {
+        /// The spatial frequency at the image, in cycles/mm.
+        frequency: f64,
+        /// The minimum modulation, at most 1.
+        min: f64,
+    },
+    /// The mean squared shortfall of the widths of ghosts by first-order optics, relative to the width at which
+    /// their irradiance is a share of that at the entrance of the lens, over all pairs of surfaces that reflect. A
+    /// ghost that is wide enough asks for nothing.
+    Ghosts {
+        /// The largest irradiance inside a ghost over that at the entrance of the lens.
+        irradiance: f64,
+        /// The share that every surface next to air reflects; `None` for bare glass.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        reflectance: Option<f64>,
+    },
     /// The negative area of the pupil in the first vertex plane, in mm²: (3.25), the weighted mean
     /// over fields and wavelengths.
     Throughput,
@@ -210,6 +227,8 @@ impl Term {
             Self::Wavefront => "wavefront",
             Self::Strehl => "strehl",
             Self::GeometricMtf { .. } => "geometric_mtf",
+            Self::Mtf { .. } => "mtf",
+            Self::Ghosts { .. } => "ghosts",
             Self::Throughput => "throughput",
             Self::ThroughputLoss(_) => "throughput_loss",
             Self::Light(_) => "light",
@@ -243,7 +262,12 @@ impl Term {
             | Self::Strehl
             | Self::Throughput
             | Self::Distortion => Vec::new(),
-            Self::GeometricMtf { frequency, min } => vec![frequency, min],
+            Self::GeometricMtf { frequency, min } | Self::Mtf { frequency, min } => {
+                vec![frequency, min]
+            }
+            Self::Ghosts { irradiance, reflectance } => {
+                std::iter::once(irradiance).chain(reflectance).collect()
+            }
             Self::GlassCenter { min, max }
             | Self::AirCenter { min, max }
             | Self::SemiDiameter { min, max } => vec![min, max],
@@ -272,6 +296,7 @@ impl Term {
             | Self::Wavefront
             | Self::Strehl
             | Self::GeometricMtf { .. }
+            | Self::Mtf { .. }
             | Self::Throughput
             | Self::ThroughputLoss(_)
             | Self::Light(_)
@@ -287,7 +312,8 @@ impl Term {
             | Self::FNumber(_)
             | Self::FocalLength(_)
             | Self::TotalTrack(_)
-            | Self::BackFocus(_) => &[Zooms],
+            | Self::BackFocus(_)
+            | Self::Ghosts { .. } => &[Zooms],
             Self::Operand { kind, .. } => kind.selections(),
         }
     }
@@ -326,7 +352,9 @@ impl Term {
                 *max *= factor;
             }
             Self::ThroughputLoss(area) => *area *= factor * factor,
-            Self::GeometricMtf { frequency, .. } => *frequency /= factor,
+            Self::GeometricMtf { frequency, .. } | Self::Mtf { frequency, .. } => {
+                *frequency /= factor;
+            }
             Self::Operand { kind, min, max } if !kind.is_angle() => {
                 min.iter_mut().chain(max).for_each(|bound| *bound *= factor);
             }
@@ -341,6 +369,7 @@ impl Term {
             | Self::RelativeIllumination { .. }
             | Self::FNumber(_)
             | Self::Distortion
+            | Self::Ghosts { .. }
             | Self::Operand { .. }
             | Self::Steepness(_) => {}
         }
@@ -352,6 +381,8 @@ impl Term {
             Self::SpotIntegral => 4,
             Self::ThroughputLoss(_)
             | Self::GeometricMtf { .. }
+            | Self::Mtf { .. }
+            | Self::Ghosts { .. }
             | Self::Light(_)
             | Self::MeanLight(_)
             | Self::RelativeIllumination { .. }

@@ -4,6 +4,7 @@
 //! that a busy machine slows all of them alike and ratios remain meaningful. A rate is the median
 //! of many short repetitions, reported with the slowest and the fastest.
 
+mod accuracy;
 mod arrival;
 mod design;
 mod double_gauss;
@@ -21,10 +22,12 @@ mod picture;
 mod rounding;
 mod search;
 mod spot;
+mod term_cost;
 mod timing;
 mod tolerance;
 mod trace;
 
+pub use accuracy::{AccuracyPoint, point_spread_accuracy, transfer_accuracy};
 pub use arrival::{ArrivalComparison, ArrivalRow, measure_arrival};
 pub use design::{SheetReference, SheetScore, SpecificationSheet, measure_design};
 pub use double_gauss::double_gauss;
@@ -53,6 +56,7 @@ pub use spot::{
     Precision, PupilClipping, PupilSampling, SpotCurves, SpotCurvesError, SpotRow,
     measure_spot_curves,
 };
+pub use term_cost::{TermCost, TermCosts, measure_term_costs};
 pub use timing::{RateStatistics, Stopwatch, time_ms};
 pub use tolerance::{
     AsBuiltComparison, AsBuiltCost, MadeDesign, ToleranceBenchmark, ToleranceBenchmarkError,

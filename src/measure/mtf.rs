@@ -13,12 +13,12 @@ use crate::analysis::{
 use crate::lens::FieldPoint;
 use crate::pupil::{Accuracy, RayModel, Region};
 use rayon::ThreadPool;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::hint::black_box;
 use std::ops::ControlFlow;
 
 /// The way of computing contrast.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum TransferMethod {
     /// By rays alone.

@@ -34,6 +34,9 @@ const PRIMARY: f64 = 5.5e-4;
 /// film.
 const MTF_FREQUENCY: f64 = 30.0;
 const MTF_MIN: f64 = 0.5;
+/// The largest irradiance of a proposed ghost over that at the entrance of the lens: an average ghost of bare glass
+/// as wide as the entrance pupil.
+const GHOST_IRRADIANCE: f64 = 2e-3;
 
 /// The limits that a lens has to satisfy, with the weight 1 for squared violations in mm².
 #[derive(Debug, Clone, PartialEq)]
@@ -197,6 +200,8 @@ pub fn default_terms(lens: &Lens, zoom: usize, figures: &LensFigures) -> Vec<Wei
         weighted(Term::Strehl, (STREHL_BLUR * f_number * PRIMARY).powi(2)),
         weighted(Term::Wavefront, (WAVE_BLUR * f_number * PRIMARY).powi(2)),
         weighted(Term::GeometricMtf { frequency: MTF_FREQUENCY, min: MTF_MIN }, spot),
+        weighted(Term::Mtf { frequency: MTF_FREQUENCY, min: MTF_MIN }, spot),
+        weighted(Term::Ghosts { irradiance: GHOST_IRRADIANCE, reflectance: None }, given_away),
         weighted(Term::Light(1.0), given_away),
         weighted(Term::MeanLight(1.0), given_away),
         weighted(Term::FNumber(f_number), given_away / f_number.powi(2)),

@@ -36,6 +36,7 @@ impl Term {
                 | Self::Wavefront
                 | Self::Strehl
                 | Self::GeometricMtf { .. }
+                | Self::Mtf { .. }
         )
     }
 
@@ -49,6 +50,8 @@ impl Term {
                 | Self::Wavefront
                 | Self::Strehl
                 | Self::GeometricMtf { .. }
+                | Self::Mtf { .. }
+                | Self::Ghosts { .. }
                 | Self::Throughput
                 | Self::ThroughputLoss(_)
                 | Self::Distortion
@@ -59,11 +62,18 @@ impl Term {
     fn check_bounds(self) -> Result<(), MeritError> {
         let refuse = |why| Err(MeritError::DoesNotApply { term: self.name(), why });
         match (self, &self.numbers()[..]) {
-            (Self::GeometricMtf { frequency, min }, _) => {
+            (Self::GeometricMtf { frequency, min } | Self::Mtf { frequency, min }, _) => {
                 if frequency > 0.0 && min > 0.0 && min <= 1.0 {
                     return Ok(());
                 }
                 refuse("its frequency is not positive, or its minimum is not between 0 and 1")
+            }
+            (Self::Ghosts { irradiance, reflectance }, _) => {
+                let is_share = |share: f64| share > 0.0 && share < 1.0;
+                if irradiance > 0.0 && reflectance.is_none_or(is_share) {
+                    return Ok(());
+                }
+                refuse("its irradiance is not positive, or its reflectance is not between 0 and 1")
             }
             (_, [min, max]) if min > max => refuse("its minimum is larger than its maximum"),
             _ => Ok(()),
@@ -127,8 +137,17 @@ impl Goal {
             term.check_bounds()?;
             let focal = matches!(
                 term,
-                Term::FocalLength(_) | Term::FNumber(_) | Term::Wavefront | Term::Strehl
+                Term::FocalLength(_)
+                    | Term::FNumber(_)
+                    | Term::Wavefront
+                    | Term::Strehl
+                    | Term::Mtf { .. }
             );
+            if matches!(term, Term::Mtf { .. }) && self.pupil == PupilEdge::Frozen {
+                return refuse(
+                    "it needs the edges of the pupils; expected a goal with moving pupils",
+                );
+            }
             if focal && focal_lengths(lens)?.contains(&None) {
                 return refuse("the lens is afocal");
             }

@@ -19,6 +19,7 @@ mod contrast;
 mod defaults;
 mod error_rays;
 mod first_order;
+mod ghosts;
 mod goal;
 mod light;
 mod limits;
@@ -27,6 +28,7 @@ mod sampling;
 mod scoped_part;
 mod spot;
 mod sum;
+mod transfer;
 mod variable_system;
 mod wavefront;
 
@@ -398,7 +400,7 @@ impl Merit {
                 ((2.0 * worst + thinned) * value, rays + more)
             }
             Term::Strehl => (self.transfer_error(), rays),
-            Term::GeometricMtf { .. } => {
+            Term::GeometricMtf { .. } | Term::Mtf { .. } => {
                 let worst = self.transfer_error();
                 (worst * (2.0 * value.max(0.0).sqrt() + worst), rays)
             }
@@ -418,7 +420,7 @@ impl Merit {
     fn is_sampled(&self, term: Term) -> bool {
         let worst = self.spot_samplings().iter().fold(0.0, |e: f64, s| e.max(s.error));
         match term {
-            Term::GeometricMtf { .. } | Term::Strehl => {
+            Term::GeometricMtf { .. } | Term::Mtf { .. } | Term::Strehl => {
                 self.transfer_error() <= TRANSFER_SCALE * self.tolerance
             }
             _ if term.is_of_rays() || term.concerns_light() => worst <= self.tolerance,
@@ -550,6 +552,14 @@ impl Merit {
                 }
                 Term::GeometricMtf { frequency, min } => {
                     contrast::add_contrast_shortfall(context, [frequency, min], scope, sum)?;
+                }
+                Term::Mtf { frequency, min } => {
+                    let tolerance = TRANSFER_SCALE * self.tolerance;
+                    let asked = transfer::TransferAsked { frequency, min, tolerance };
+                    transfer::add_transfer_shortfall(context, asked, scope, sum)?;
+                }
+                Term::Ghosts { irradiance, reflectance } => {
+                    ghosts::add_ghosts(context, irradiance, reflectance, sum)?;
                 }
                 Term::Distortion => spot::add_distortion(context, scope, sum)?,
                 Term::FocalLength(target) => {

@@ -1,7 +1,7 @@
 //! The rays that spots are computed from: the pupils, sampled once to a tolerance.
 
 use super::{Goal, MeritError, Term};
-use crate::analysis::{ReferenceForm, brightest_strehl, rms_without_tilt, transfer};
+use crate::analysis::{ReferenceForm, TransferRays, brightest_strehl, rms_without_tilt, transfer};
 use crate::lens::{FieldPoint, Lens, TermScope, TermSelection};
 use crate::pupil::{
     Accuracy, Aiming, FixedLaunch, Launch, Nodes, PupilMoments, RayModel, Region, RegionKind,
@@ -47,6 +47,8 @@ pub(super) struct SamplingDemand {
     pub(super) frequencies: Vec<f64>,
     /// True if the rays are for errors of making, in which a lens is not symmetric about its axis.
     pub(super) errors: bool,
+    /// True if a term asks for contrast by diffraction.
+    pub(super) diffraction: bool,
 }
 
 impl SamplingDemand {
@@ -57,6 +59,7 @@ impl SamplingDemand {
                 Term::Wavefront => demand.wavefront = true,
                 Term::Strehl => (demand.wavefront, demand.strehl) = (true, true),
                 Term::GeometricMtf { frequency, .. } => demand.frequencies.push(frequency),
+                Term::Mtf { .. } => demand.diffraction = true,
                 _ => {}
             }
         }
@@ -117,6 +120,8 @@ pub(super) struct SampledPupil {
     order: usize,
     /// The form of its reference sphere; `None` if no term asks for the wavefront.
     pub(super) reference: Option<ReferenceForm>,
+    /// The rays of its transfer by diffraction; `None` if no term asks for it, or if it has none.
+    pub(super) transfer: Option<TransferRays>,
     pub(super) moments: PupilMoments,
     /// [`TracedPupil::signed_area`], in mm².
     pub(super) area: f64,
@@ -281,6 +286,9 @@ impl RaySampling {
                 transfer_error = transfer_error.max(*change);
             }
         }
+        let find = || TransferRays::find(&region, TRANSFER_SCALE * tolerance).ok();
+        let transfer = self.demand.diffraction.then(find).flatten();
+        transfer_error = transfer_error.max(transfer.map_or(0.0, |rays| rays.error));
         self.transfer_error = self.transfer_error.max(transfer_error);
         // Without light no order is better than another one, and the highest would take millions of rays.
         let orders = match &found {
@@ -301,6 +309,7 @@ impl RaySampling {
             kind,
             order,
             reference,
+            transfer,
             moments,
             area: 0.0,
             ideal_area,

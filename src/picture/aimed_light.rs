@@ -162,7 +162,7 @@ fn chief(model: &RayModel, radius: f64) -> Option<f64> {
 
 /// The wave of the object point that a chief ray meets.
 struct ObjectWave {
-    /// Where and how the chief ray leaves the lens, its optical path until there, and the index there.
+    /// The chief ray where it leaves the lens, its optical path until there, and the index there.
     chief: Ray<f64>,
     path: f64,
     index: f64,

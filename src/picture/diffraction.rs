@@ -125,12 +125,10 @@ impl DiffractionLight {
         let (mut spreads, left) = contrasts.better(spreads, &lens, (reach, tolerance), matters);
         let on = matters && left < change;
         let aberrated = on && spreads.aimed.is_some();
-        let shifts = COMPARED.map(|part| part * frequency * wavelength);
-        let shifts: Vec<_> = shifts.iter().flat_map(|v| [[*v, 0.0], [0.0, *v]]).collect();
         let report = DiffractionReport {
             on,
             aberrated,
-            variation: spreads.variation(&shifts),
+            variation: spreads.variation(&compared_shifts(frequency * wavelength)),
             change,
             left: if on { left } else { change },
             cut: if on { spreads.cut(longest) } else { 0.0 },
@@ -141,6 +139,12 @@ impl DiffractionLight {
         spreads.is_even = report.variation <= tolerance;
         Ok(Self { report, parts: on.then_some((directions, spreads)) })
     }
+}
+
+/// The shifts of the pupil along both axes, in cosines, at which contrasts are compared, given the largest.
+fn compared_shifts(largest: f64) -> Vec<[f64; 2]> {
+    let along = COMPARED.iter().map(|part| part * largest);
+    along.flat_map(|shift| [[shift, 0.0], [0.0, shift]]).collect()
 }
 
 /// Directions of light as far as it spreads, and the spreads of pupils without aberrations, up to `reach` mm from the

@@ -77,7 +77,7 @@ struct SpectralPart {
     wavelengths: Vec<usize>,
 }
 
-/// What a ray stands for: directions of an area in cosines, or all light of its point, by its irradiance.
+/// The light that a ray stands for: that of directions of an area in cosines, or all of its point, by its irradiance.
 #[derive(Debug, Clone, Copy)]
 enum RayShare {
     Area(f64),

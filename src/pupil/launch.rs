@@ -10,7 +10,7 @@ use super::found_pupils::FoundPupils;
 use super::ray_aiming::{AimedRay, aim_all_from_chief_ray, aim_at, aim_from_chief_ray};
 use super::ray_model::{Aiming, Channel, Dual2, PupilMeasure, RayModel};
 use crate::lens::{FieldKind, FieldPoint};
-use crate::math::Real;
+use crate::math::{Real, SimdWidth, run_vectorized};
 use crate::trace::{ImagePoints, Landings, Ray, Rays, TraceSink, TracedRay};
 use serde::Serialize;
 
@@ -299,6 +299,31 @@ impl<'a> Launch<'a> {
     #[inline(always)]
     pub(super) fn mapped_ray<R: Real>(&self, p: [R; 2]) -> Ray<R> {
         self.source.ray(self.map.map(p))
+    }
+
+    /// The rays at some pupil coordinates if none of them has to be searched for; the beam then has the share 1
+    /// everywhere.
+    pub(super) fn mapped_rays(&self, points: &[[f64; 2]]) -> Option<Rays<f64>> {
+        if self.aiming == Aiming::Stop {
+            return None;
+        }
+        let column = || vec![0.0; points.len()];
+        let mut rays =
+            Rays { x: column(), y: column(), z: column(), l: column(), m: column(), n: column() };
+        run_vectorized(
+            SimdWidth::detect(),
+            #[inline(always)]
+            || {
+                let starts = rays.x.iter_mut().zip(&mut rays.y).zip(&mut rays.z);
+                let directions = rays.l.iter_mut().zip(&mut rays.m).zip(&mut rays.n);
+                for (p, (((x, y), z), ((l, m), n))) in points.iter().zip(starts.zip(directions)) {
+                    let ray = self.mapped_ray(*p);
+                    (*x, *y, *z) = (ray.point.x, ray.point.y, ray.point.z);
+                    (*l, *m, *n) = (ray.direction.x, ray.direction.y, ray.direction.z);
+                }
+            },
+        );
+        Some(rays)
     }
 
     /// Traces the rays of some pupil points: the indices of those points from which a ray could be

@@ -824,7 +824,7 @@ fn measure_gradient_draws_the_error_of_every_estimator_against_time() {
     let plot = Scratch::new("gradients.png");
     let singlet = "lenses/singlet_la1131.json";
     let measured = done_json(&["measure", "gradient", singlet, "--plot", plot.path()], "");
-    has_keys(&measured, &["machine", "lens", "fields", "costs"]);
+    has_keys(&measured, &["machine", "lens", "fields", "costs", "terms"]);
     let fields = measured["fields"].as_array().unwrap();
     assert_eq!(fields[0]["y"], 0.0);
     for field in fields {
@@ -845,6 +845,13 @@ fn measure_gradient_draws_the_error_of_every_estimator_against_time() {
     assert!(cost(3, "numbers") > 2.0 * cost(0, "numbers"));
     for key in ["integral_ms", "boundary", "difference", "warp", "warp_single"] {
         assert!(cost(3, key) > 0.0, "{measured}");
+    }
+    let terms = measured["terms"]["rows"].as_array().unwrap();
+    let names: Vec<&str> = terms.iter().map(|row| row["term"].as_str().unwrap()).collect();
+    assert_eq!(names, ["spot", "wavefront", "strehl", "geometric_mtf", "mtf"]);
+    for row in terms {
+        assert!(row["refused"].is_null() && row["value_ms"].as_f64().unwrap() > 0.0, "{row}");
+        assert!(row["difference"].as_f64().unwrap() < 0.05, "{row}");
     }
     assert!(std::fs::read(&plot.0).unwrap().starts_with(b"\x89PNG"));
     refused(2, &["measure", "gradient", singlet, "--plot", "x.gif"], "", &["`gif`", "`.png`"]);

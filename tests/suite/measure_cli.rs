@@ -32,6 +32,53 @@ fn contrast_is_measured_both_ways_at_four_tolerances() {
 }
 
 #[test]
+fn point_spreads_are_measured_at_four_tolerances() {
+    let report = done_json(&["measure", "psf", LENS], "");
+    let fields = report["fields"].as_array().unwrap();
+    assert_eq!(fields.len(), 3);
+    for row in fields.iter().flat_map(|field| field["rows"].as_array().unwrap()) {
+        let [error, tolerance] = ["error", "tolerance"].map(|key| row[key].as_f64().unwrap());
+        assert!(row["reached"] == true && error <= tolerance, "{row}");
+        assert!(row["ms"].as_f64().unwrap() > 0.0 && row["rays"].as_u64().unwrap() > 0, "{row}");
+    }
+    assert!(fields.iter().all(|field| field["rows"].as_array().unwrap().len() == 4), "{report}");
+}
+
+/// An interpreter that answers with a contrast of one half everywhere: the error is the largest difference from it.
+#[cfg(unix)]
+#[test]
+fn another_program_is_compared_in_the_same_run() {
+    use std::os::unix::fs::PermissionsExt as _;
+    let python = Scratch::new("python");
+    let field = "[[0.5],[0.5]]";
+    let color = format!("[{field},{field},{field}]");
+    let row = |method: &str| {
+        format!(r#"{{"method":"{method}","rays":64,"ms":12.5,"values":[{color},{color},{color}]}}"#)
+    };
+    let answer =
+        format!(r#"{{"version":"0.0","rows":[{},{}]}}"#, row("geometric"), row("diffraction"));
+    std::fs::write(&python.0, format!("#!/bin/sh\necho '{answer}'\n")).unwrap();
+    std::fs::set_permissions(&python.0, std::fs::Permissions::from_mode(0o755)).unwrap();
+    let path = python.0.to_str().unwrap();
+    let asked = ["measure", "mtf", LENS, "--count", "1", "--highest", "2", "--optiland", path];
+    let report = done_json(&asked, "");
+    let found = &report["lenses"][0]["optiland"];
+    assert_eq!(found["version"], "0.0");
+    for row in found["rows"].as_array().unwrap() {
+        let error = row["error"].as_f64().unwrap();
+        assert!(error > 0.4 && error <= 0.5 && row["ms"] == 12.5, "{row}");
+    }
+    let text = done(&["measure", "mtf", LENS, "--count", "1", "--highest", "2"], "");
+    assert!(text.contains("pip install optiland"), "{text}");
+    refused(
+        1,
+        &["measure", "mtf", LENS, "--count", "1", "--optiland", "no-python"],
+        "",
+        &["no-python"],
+    );
+}
+
+#[test]
 fn pictures_are_measured_the_quick_way_and_the_exact_one() {
     let small = ["--pixels", "24x16", "--exact-pixels", "12x8", "--scene", "edge"];
     let report = done_json(&[&["measure", "picture", LENS], &small[..]].concat(), "");
@@ -94,6 +141,8 @@ fn wrong_measurements_are_refused() {
         (vec!["mtf", LENS, "--highest", "0"], ["--highest", "positive"]),
         (vec!["mtf", LENS, "--highest", "NaN"], ["--highest", "positive"]),
         (vec!["mtf", LENS, "--count", "0"], ["--count", "1 to"]),
+        (vec!["gradient", LENS, "--frequency", "0"], ["--frequency", "positive"]),
+        (vec!["psf", LENS, "--zoom", "3"], ["zoom", "3"]),
         (vec!["mtf", LENS, "--zoom", "3"], ["zoom", "3"]),
         (vec!["mtf", LENS, "--plot", "chart.gif"], ["chart.gif", "png"]),
         (vec!["picture", LENS, "--scene", "moon"], ["moon", "star"]),

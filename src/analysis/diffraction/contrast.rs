@@ -1,6 +1,7 @@
 //! The diffraction MTF of a field, and whether diffraction matters.
 
 use super::pupil_function::PupilFunction;
+use super::pupil_traces::PupilTraces;
 use super::ray_pupil::RayPupil;
 use super::{Interruption, never};
 use crate::analysis::mtf::{curve, geometric_mtf, origin, sum_wavelengths};
@@ -45,25 +46,32 @@ fn diffraction_mtf_unless(
     let region = lit_region(model, field, wavelength)?;
     let sphere = ReferenceSphere::for_region(&region)?;
     let origin = origin(model, field, &region)?;
-    let wave = |sphere: &ReferenceSphere, tolerance: f64| {
-        let function = PupilFunction::of_region(&region, sphere, tolerance)?;
+    let mut traces = PupilTraces::new(&region);
+    let mut wave = |sphere: &ReferenceSphere, frequencies: &[f64], tolerance: f64| {
+        let function = PupilFunction::of_traces(&mut traces, sphere, tolerance)?;
         let values = function.values(frequencies, 0.0, tolerance, interrupted)?;
         Ok::<_, AnalysisError>((function, values))
     };
     let uncertain = is_uncertain(&sphere, &region);
     let mut tolerance = accuracy.tolerance.max(if uncertain { COARSE } else { 0.0 });
-    let (mut function, mut values) = wave(&sphere, tolerance)?;
+    let (mut function, mut values) = wave(&sphere, frequencies, tolerance)?;
     let mut changes = vec![0.0; 2 * frequencies.len()];
     if uncertain {
-        let (_, far) = wave(&sphere.doubled(), tolerance)?;
-        let pairs = values.iter().flatten().zip(far.iter().flatten());
-        changes = pairs.map(|(a, b)| (a.re - b.re).hypot(a.im - b.im)).collect();
+        let chosen = some_of(frequencies);
+        let some: Vec<f64> = chosen.iter().map(|i| frequencies[*i]).collect();
+        let (_, far) = wave(&sphere.doubled(), &some, tolerance)?;
+        let change = |(i, [t, s]): (&usize, &[TransferValue; 2])| {
+            let off = |a: &TransferValue, b: &TransferValue| (a.re - b.re).hypot(a.im - b.im);
+            [off(&values[*i][0], t), off(&values[*i][1], s)]
+        };
+        let found: Vec<[f64; 2]> = chosen.iter().zip(&far).map(change).collect();
+        changes = spread_changes(frequencies, &some, &found);
         // More digits than the choice of the sphere leaves are not worth the time, unless somebody asks for
         // those of this sphere.
         let is_worth_it = largest(&changes) <= HOPELESS || accuracy.tolerance < BY_RAYS;
         if accuracy.tolerance < tolerance && is_worth_it {
             tolerance = accuracy.tolerance;
-            (function, values) = wave(&sphere, tolerance)?;
+            (function, values) = wave(&sphere, frequencies, tolerance)?;
         }
     }
     if tolerance < BY_RAYS && function.transfer_error() > tolerance {
@@ -82,6 +90,43 @@ fn diffraction_mtf_unless(
         converged: limit.is_none(),
     };
     Ok(curve(frequencies, origin, &list, limit))
+}
+
+/// So many frequencies are compared on two spheres one by one; of more, every third.
+const EACH: usize = 12;
+const EVERY: usize = 3;
+/// The change between frequencies that are compared is at most this times the largest of those nearby, and so many
+/// on either side are near.
+const BETWEEN: f64 = 1.5;
+const NEAR: usize = 2;
+
+/// The indices of the frequencies that are compared on two spheres.
+fn some_of(frequencies: &[f64]) -> Vec<usize> {
+    let mut all: Vec<usize> = (0..frequencies.len()).collect();
+    if all.len() <= EACH {
+        return all;
+    }
+    all.sort_by(|i, j| frequencies[*i].abs().total_cmp(&frequencies[*j].abs()));
+    let last = all.len() - 1;
+    (0..=last).filter(|k| k % EVERY == 0 || *k == last).map(|k| all[k]).collect()
+}
+
+/// The changes at all frequencies, tangential and sagittal one after the other, from those at some: between them
+/// from the largest of the nearest ones.
+fn spread_changes(frequencies: &[f64], some: &[f64], changes: &[[f64; 2]]) -> Vec<f64> {
+    if some.len() == frequencies.len() {
+        return changes.iter().flatten().copied().collect();
+    }
+    let at = |nu: &f64| {
+        if let Some(k) = some.iter().position(|known| known == nu) {
+            return changes[k];
+        }
+        let next = some.partition_point(|known| known.abs() < nu.abs());
+        let near = next.saturating_sub(NEAR)..(next + NEAR).min(some.len());
+        let most = |part: usize| near.clone().map(|k| changes[k][part]).fold(0.0, f64::max);
+        [BETWEEN * most(0), BETWEEN * most(1)]
+    };
+    frequencies.iter().flat_map(at).collect()
 }
 
 fn largest(errors: &[f64]) -> f64 {

@@ -24,7 +24,9 @@ mod point_spread;
 mod polynomial;
 mod pupil_function;
 mod pupil_samples;
+mod pupil_traces;
 mod ray_pupil;
+mod ray_transfer;
 mod strehl;
 
 /// A test that is asked often whether a computation is to end early.
@@ -43,4 +45,5 @@ pub use outline::PupilCurve;
 pub use point_spread::{PointSpread, point_spread, point_spread_unless};
 pub use pupil_function::PupilFunction;
 pub use pupil_samples::PupilSamples;
+pub use ray_transfer::{RayTransfer, TransferRays, TransferSlopes};
 pub use strehl::{Strehl, strehl, strehl_unless};

@@ -275,6 +275,13 @@ impl Chain {
         (cubic, cubic.parameter(t))
     }
 
+    /// True if it runs below a point, t first.
+    pub(super) fn is_below(&self, [t, v]: [f64; 2]) -> bool {
+        let [[from, to], [low, high]] = self.range;
+        // Most points are told by the range.
+        from <= t && t < to && v > low && (v > high || self.value(t) < v)
+    }
+
     /// The value of v at a value of t.
     pub(super) fn value(&self, t: f64) -> f64 {
         let (cubic, s) = self.find(t);
@@ -317,7 +324,7 @@ fn arc(nodes: &[[f64; 2]], corner: bool, steps: ArcSteps) -> Vec<Segment> {
 
 /// The derivatives at the Chebyshev points from 0 to 1 of the polynomial through values there
 /// (Trefethen, *Spectral Methods in MATLAB*, 2000, chapter 6).
-fn derivative(values: &[f64]) -> Vec<f64> {
+pub(super) fn derivative(values: &[f64]) -> Vec<f64> {
     let nodes: Vec<f64> = chebyshev_points(values.len()).collect();
     let last = values.len() - 1;
     let end = |i: usize| {

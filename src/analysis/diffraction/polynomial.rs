@@ -23,7 +23,36 @@ pub(super) struct WavePolynomial {
     terms: [Vec<([usize; 2], f64)>; 2],
 }
 
+/// Polynomials through numbers at the samples of a pupil by least squares, and the way back: derivatives by the
+/// numbers from those by the coefficients.
+#[derive(Debug, Clone)]
+pub(super) struct SampleFit {
+    basis: PolynomialBasis,
+    /// The degrees in both cosines of every term.
+    degrees: Vec<[usize; 2]>,
+    /// The orthogonal columns, and the columns of the triangular matrix.
+    columns: Vec<Vec<f64>>,
+    triangle: Vec<Vec<f64>>,
+    roots: Vec<f64>,
+}
+
+/// Even or odd powers of the first cosine, or all.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Parity {
+    All,
+    Even,
+    Odd,
+}
+
+/// The Chebyshev polynomials of both coordinates at a point, and their derivatives by these.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct BasisPoint {
+    values: [[f64; LARGEST_DEGREE + 1]; 2],
+    slopes: [[f64; LARGEST_DEGREE + 1]; 2],
+}
+
 /// A sample of a pupil: its cosines, the two values there, and its weight.
+#[derive(Debug, Clone, Copy)]
 pub(super) struct FitSample {
     pub(super) cosines: [f64; 2],
     pub(super) values: [f64; 2],
@@ -65,6 +94,30 @@ impl PolynomialBasis {
         let with = |degree| Self { center, half, degree, even };
         let degree = (0..=LARGEST_DEGREE).rev().find(|degree| with(*degree).terms() <= terms);
         with(degree.unwrap_or(0))
+    }
+
+    /// The same of a degree.
+    pub(super) fn of_degree(
+        points: impl Iterator<Item = [f64; 2]>,
+        degree: usize,
+        even: bool,
+    ) -> Self {
+        Self { degree: degree.min(LARGEST_DEGREE), ..Self::new(points, 0, even) }
+    }
+
+    /// The Chebyshev polynomials at a point and their derivatives.
+    pub(super) fn at_point(&self, p: [f64; 2]) -> BasisPoint {
+        let values = self.factors(p);
+        let slopes = [0, 1].map(|k| {
+            let x = (p[k] - self.center[k]) / self.half[k];
+            let mut slopes = [0.0; LARGEST_DEGREE + 1];
+            slopes[1] = 1.0;
+            for i in 2..=self.degree {
+                slopes[i] = 2.0 * (values[k][i - 1] + x * slopes[i - 1]) - slopes[i - 2];
+            }
+            slopes.map(|slope| slope / self.half[k])
+        });
+        BasisPoint { values, slopes }
     }
 
     /// The point of the box at fractions of its sides.
@@ -140,12 +193,7 @@ impl PolynomialBasis {
             }
             (used, left) = (fewer, square.sqrt());
         }
-        let mut solution = parts[..used].to_vec();
-        for k in (0..used).rev() {
-            solution[k] /= triangle[k][k];
-            let (known, value) = (&triangle[k], solution[k]);
-            solution[..k].iter_mut().zip(known).for_each(|(part, r)| *part -= r * value);
-        }
+        let solution = back_substituted(triangle, &parts[..used]);
         solution.iter().all(|v| v.is_finite()).then_some((solution, left))
     }
 }
@@ -179,7 +227,118 @@ fn orthogonalize(columns: &mut [Vec<f64>]) -> Vec<Vec<f64>> {
     triangle
 }
 
+impl SampleFit {
+    /// The terms of a parity through samples, and the polynomials through the values of these for terms that are
+    /// not odd; `None` for fewer samples than terms.
+    pub(super) fn new(
+        basis: &PolynomialBasis,
+        parity: Parity,
+        samples: &[FitSample],
+    ) -> Option<(Self, WavePolynomial)> {
+        let (first, step) = match parity {
+            Parity::All => (0, 1),
+            Parity::Even => (0, 2),
+            Parity::Odd => (1, 2),
+        };
+        let of_degree = |n: usize| (first..=n).step_by(step).map(move |i| [i, n - i]);
+        let degrees: Vec<[usize; 2]> = (0..=basis.degree).flat_map(of_degree).collect();
+        let count = degrees.len();
+        if samples.len() < count {
+            return None;
+        }
+        let roots: Vec<f64> = samples.iter().map(|sample| sample.weight.sqrt()).collect();
+        let mut columns = vec![Vec::with_capacity(samples.len()); count + 2];
+        for (sample, root) in samples.iter().zip(&roots) {
+            let [u, v] = basis.factors(sample.cosines);
+            let terms = degrees.iter().map(|[i, j]| u[*i] * v[*j]).chain(sample.values);
+            columns.iter_mut().zip(terms).for_each(|(column, term)| column.push(root * term));
+        }
+        let mut triangle = orthogonalize(&mut columns);
+        let solution = |k: usize| -> Vec<([usize; 2], f64)> {
+            let parts = &triangle[count + k][..count];
+            degrees.iter().copied().zip(back_substituted(&triangle, parts)).collect()
+        };
+        let polynomial = WavePolynomial { basis: basis.clone(), terms: [0, 1].map(solution) };
+        columns.truncate(count);
+        triangle.truncate(count);
+        let is_finite = triangle.iter().flatten().all(|v| v.is_finite());
+        let basis = basis.clone();
+        is_finite.then_some((Self { basis, degrees, columns, triangle, roots }, polynomial))
+    }
+
+    pub(super) fn basis(&self) -> &PolynomialBasis {
+        &self.basis
+    }
+
+    /// The number of terms.
+    pub(super) fn terms(&self) -> usize {
+        self.degrees.len()
+    }
+
+    /// Adds `value` times every term at a point, and `slopes` times its derivatives by both cosines.
+    pub(super) fn add_terms(
+        &self,
+        at: &BasisPoint,
+        value: f64,
+        slopes: [f64; 2],
+        sums: &mut [f64],
+    ) {
+        let ([u, v], [du, dv]) = (&at.values, &at.slopes);
+        for (sum, [i, j]) in sums.iter_mut().zip(&self.degrees) {
+            let along = slopes[0] * du[*i] * v[*j] + slopes[1] * u[*i] * dv[*j];
+            *sum += value * u[*i] * v[*j] + along;
+        }
+    }
+
+    /// The derivatives by the numbers at the samples from those by the coefficients of their polynomial.
+    pub(super) fn by_samples(&self, by_coefficient: &[f64]) -> Vec<f64> {
+        let mut parts = by_coefficient.to_vec();
+        for k in 0..parts.len() {
+            let (known, row) = (&parts[..k], &self.triangle[k]);
+            let rest: f64 = known.iter().zip(row).map(|(part, r)| part * r).sum();
+            parts[k] = (parts[k] - rest) / row[k];
+        }
+        let mut by = vec![0.0; self.roots.len()];
+        for (column, part) in self.columns.iter().zip(&parts) {
+            by.iter_mut().zip(column).for_each(|(by, unit)| *by += part * unit);
+        }
+        by.iter_mut().zip(&self.roots).for_each(|(by, root)| *by *= root);
+        by
+    }
+}
+
+/// The solution of a triangular system that is given by its columns.
+fn back_substituted(triangle: &[Vec<f64>], right: &[f64]) -> Vec<f64> {
+    let mut solution = right.to_vec();
+    for k in (0..solution.len()).rev() {
+        solution[k] /= triangle[k][k];
+        let (known, value) = (&triangle[k], solution[k]);
+        solution[..k].iter_mut().zip(known).for_each(|(part, r)| *part -= r * value);
+    }
+    solution
+}
+
 impl WavePolynomial {
+    /// The path difference in waves and the amplitude at a point, each with its derivatives by both cosines.
+    pub(super) fn with_slopes(&self, at: &BasisPoint) -> [[f64; 3]; 2] {
+        let ([u, v], [du, dv]) = (&at.values, &at.slopes);
+        self.terms.each_ref().map(|terms| {
+            terms.iter().fold([0.0; 3], |sum, ([i, j], c)| {
+                [
+                    sum[0] + c * u[*i] * v[*j],
+                    sum[1] + c * du[*i] * v[*j],
+                    sum[2] + c * u[*i] * dv[*j],
+                ]
+            })
+        })
+    }
+
+    /// The largest total degree of a term.
+    pub(super) fn degree(&self) -> usize {
+        let terms = self.terms.iter().flatten();
+        terms.map(|([i, j], _)| i + j).max().unwrap_or(0)
+    }
+
     /// The path difference in waves and the amplitude at a point.
     #[inline(always)]
     pub(super) fn at(&self, p: [f64; 2]) -> [f64; 2] {

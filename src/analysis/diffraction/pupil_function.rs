@@ -5,11 +5,11 @@ use super::outline::{ArcSteps, Chain, PupilCurve};
 use super::overlap::{OverlapHalf, Strip};
 use super::polynomial::{FitSample, PolynomialBasis, WavePolynomial};
 use super::pupil_samples::PupilSamples;
+use super::pupil_traces::{PupilTraces, TracedLight};
 use super::ray_pupil::RayPupil;
 use crate::analysis::reference_sphere::ReferenceSphere;
 use crate::analysis::{AnalysisError, TransferValue};
-use crate::pupil::{Dual2, EdgeArc, Nodes, Region};
-use crate::trace::Ray;
+use crate::pupil::Region;
 use std::cell::Cell;
 use std::f64::consts::TAU;
 
@@ -27,6 +27,8 @@ pub struct PupilFunction {
     fit_error: [f64; 2],
     /// The number of rays traced.
     rays: usize,
+    /// The order of quadrature whose rays the polynomials are fitted to.
+    order: usize,
 }
 
 /// A piece of a pupil.
@@ -46,6 +48,17 @@ pub(super) struct TransferShift {
     pub(super) defocus: f64,
 }
 
+/// An overlap integral over the energy of a pupil.
+#[derive(Debug, Clone, Copy)]
+struct Overlap {
+    /// The complex transfer.
+    value: [f64; 2],
+    /// Its last change.
+    change: f64,
+    /// The order of its quadrature.
+    order: usize,
+}
+
 /// A strip of the common part of two shifted pieces.
 struct OverlapPart<'a> {
     strip: Strip<'a>,
@@ -55,22 +68,27 @@ struct OverlapPart<'a> {
     resolved: [f64; 2],
 }
 
-/// The columns of each order and the nodes of a column beyond those that resolve the phase, which grow by a part
-/// as well. Columns come in multiples of eight, which fill vector instructions, and more of them each time, so
-/// that a change of the order tells both errors.
-const ORDERS: [[f64; 2]; 10] = [
-    [6.0, 6.0],
-    [14.0, 10.0],
-    [22.0, 15.0],
-    [30.0, 21.0],
-    [40.0, 29.0],
-    [52.0, 40.0],
-    [68.0, 56.0],
-    [92.0, 80.0],
-    [124.0, 112.0],
-    [172.0, 160.0],
+/// The share of the columns and of the nodes of a column that resolve the phase, and more columns and nodes, of each
+/// order. Columns come in multiples of eight, which fill vector instructions, and more of them each time, so that a
+/// change of the order tells both errors. The first two are for coarse tolerances, and the third is left out then.
+const ORDERS: [[f64; 3]; 12] = [
+    [0.85, 2.0, 4.0],
+    [1.0, 9.0, 7.0],
+    [1.0, 6.0, 6.0],
+    [1.12, 14.0, 10.0],
+    [1.24, 22.0, 15.0],
+    [1.36, 30.0, 21.0],
+    [1.48, 40.0, 29.0],
+    [1.6, 52.0, 40.0],
+    [1.72, 68.0, 56.0],
+    [1.84, 92.0, 80.0],
+    [1.96, 124.0, 112.0],
+    [2.08, 172.0, 160.0],
 ];
-const GROWTH: f64 = 0.12;
+/// The orders of coarse and of finer tolerances, and the tolerance from which on one is coarse.
+const COARSE_ORDERS: [usize; 11] = [0, 1, 3, 4, 5, 6, 7, 8, 9, 10, 11];
+const FINE_ORDERS: [usize; 10] = [2, 3, 4, 5, 6, 7, 8, 9, 10, 11];
+const COARSE_SUM: f64 = 3e-4;
 /// The error of a sum in changes by the last raising of the order: two orders may agree by chance.
 const CHANGES: f64 = 2.0;
 const TOGETHER: usize = 8;
@@ -92,6 +110,7 @@ const SAMPLE_ORDERS: [[usize; 2]; 10] = [
 ];
 /// The points of an arc of the edge, and the tolerance of contrast to which coarse steps along it are exact by far.
 const EDGE_POINTS: usize = 40;
+const COARSE_EDGE_POINTS: usize = 20;
 const COARSE_EDGE: f64 = 1e-5;
 /// The degree of the polynomials of a pupil that is given by a formula, and the samples that they are
 /// fitted to along a side of its box.
@@ -154,6 +173,7 @@ impl PupilFunction {
             energy: 1.0,
             fit_error,
             rays: 0,
+            order: 0,
         };
         function.energy = function.overlap_energy();
         Ok(function)
@@ -169,16 +189,20 @@ impl PupilFunction {
         sphere: &ReferenceSphere,
         tolerance: f64,
     ) -> Result<Self, AnalysisError> {
-        let curves = region.edge_curves(EDGE_POINTS).ok_or(AnalysisError::IrregularPupil)?;
-        let steps = if tolerance < COARSE_EDGE { ArcSteps::Fine } else { ArcSteps::Coarse };
-        let curve = |arcs: &[EdgeArc]| project_curve(region, sphere, arcs, steps);
-        let mut pieces = vec![PupilPiece::new(curve(&curves.outer)?, 1.0)];
-        if !curves.inner.is_empty() {
-            pieces.push(PupilPiece::new(curve(&curves.inner)?, -1.0));
-        }
-        let mut rays = region.rays + 2 * curves.rays;
+        Self::of_traces(&mut PupilTraces::new(region), sphere, tolerance)
+    }
+
+    /// The same from rays that may have been traced for another sphere.
+    pub(super) fn of_traces(
+        traces: &mut PupilTraces<'_>,
+        sphere: &ReferenceSphere,
+        tolerance: f64,
+    ) -> Result<Self, AnalysisError> {
+        let (pieces, edge_rays) = PupilPiece::of_traces(traces, sphere, tolerance)?;
+        let orders = traces.region.orders();
+        let mut rays = traces.region.rays + edge_rays;
         // What a fit leaves over what is allowed.
-        let mut best: Option<(WavePolynomial, [f64; 2], f64)> = None;
+        let mut best: Option<(WavePolynomial, [f64; 2], f64, usize)> = None;
         let mut energy = 0.0;
         let allowed = [
             (FIT_SHARE * tolerance / TAU).max(0.1 * sphere.rounding()),
@@ -186,32 +210,36 @@ impl PupilFunction {
         ];
         let mut order = FIRST_FIT;
         // The rays of the order before tell what a fit leaves between its own.
-        let before = region.nodes(FIRST_FIT - 1);
-        rays += before.rays + 2 * before.points.len();
-        let mut others = FitLight::new(region, sphere, &before)?;
-        while order < region.orders() {
-            let nodes = region.nodes(order);
-            rays += nodes.rays + 2 * nodes.points.len();
-            if nodes.points.len() > MOST_SAMPLES {
+        if orders < FIRST_FIT {
+            return Err(AnalysisError::IrregularPupil);
+        }
+        let before = traces.light(FIRST_FIT - 1);
+        rays += before.cost;
+        let mut others = FitLight::new(before, sphere)?;
+        while order < orders {
+            let traced = traces.light(order);
+            rays += traced.cost;
+            if traced.count > MOST_SAMPLES {
                 break;
             }
-            let light = FitLight::new(region, sphere, &nodes)?;
+            let light = FitLight::new(traced, sphere)?;
             energy = light.energy;
             let fit = light.fit(&others, allowed);
             others = light;
+            let at_order = order;
             order += 1;
             let Some(fit) = fit else { continue };
             let excess = (fit.1[0] / allowed[0]).max(fit.1[1] / allowed[1]);
             // The next order would not do.
             order += usize::from(excess > FAR && best.is_some());
-            if best.as_ref().is_none_or(|(_, _, least)| excess < *least) {
-                best = Some((fit.0, fit.1, excess));
+            if best.as_ref().is_none_or(|(_, _, least, _)| excess < *least) {
+                best = Some((fit.0, fit.1, excess, at_order));
             }
             if excess < 1.0 {
                 break;
             }
         }
-        let (polynomial, fit_error, _) = best.ok_or(AnalysisError::IrregularPupil)?;
+        let (polynomial, fit_error, _, order) = best.ok_or(AnalysisError::IrregularPupil)?;
         Ok(Self {
             pieces,
             polynomial,
@@ -219,13 +247,94 @@ impl PupilFunction {
             energy,
             fit_error,
             rays,
+            order,
         })
+    }
+
+    /// The function of polynomials with this energy between the arcs of closed curves, given at their Chebyshev
+    /// points, with true at a corner, and with 1 around light or −1 around a shadow.
+    pub(super) fn of_fit(
+        (polynomial, energy): (WavePolynomial, f64),
+        wavelength: f64,
+        (arcs, steps): (impl Iterator<Item = (Vec<[f64; 2]>, bool, f64)>, ArcSteps),
+    ) -> Self {
+        let (light, shadow): (Vec<_>, Vec<_>) = arcs.partition(|(.., sign)| *sign > 0.0);
+        let piece = |(arcs, sign): (Vec<(Vec<[f64; 2]>, bool, f64)>, f64)| {
+            let arcs: Vec<_> = arcs.into_iter().map(|(nodes, corner, _)| (nodes, corner)).collect();
+            PupilPiece::new(PupilCurve::in_steps(&arcs, steps), sign)
+        };
+        let curves =
+            [(light, 1.0), (shadow, -1.0)].into_iter().filter(|(arcs, _)| !arcs.is_empty());
+        let pieces = curves.map(piece).collect();
+        Self { pieces, polynomial, wavelength, energy, fit_error: [0.0; 2], rays: 0, order: 0 }
+    }
+
+    /// The points of an arc of the edge, and the steps along it, for a tolerance of contrast.
+    pub(super) fn edge_points(tolerance: f64) -> usize {
+        if tolerance < COARSE_EDGE { EDGE_POINTS } else { COARSE_EDGE_POINTS }
+    }
+
+    /// The steps along an arc of the edge for a tolerance of contrast.
+    pub(super) fn edge_steps(tolerance: f64) -> ArcSteps {
+        if tolerance < COARSE_EDGE { ArcSteps::Fine } else { ArcSteps::Coarse }
+    }
+
+    /// The order of quadrature and the largest degree of the polynomials.
+    pub(super) fn order_and_degree(&self) -> (usize, usize) {
+        (self.order, self.polynomial.degree())
+    }
+
+    pub(super) fn polynomial(&self) -> &WavePolynomial {
+        &self.polynomial
+    }
+
+    pub(super) fn energy(&self) -> f64 {
+        self.energy
+    }
+
+    /// True if it is even in the first cosine.
+    pub(super) fn is_even(&self) -> bool {
+        self.polynomial.is_even()
+    }
+
+    /// True if there is light at a point.
+    pub(super) fn covers(&self, p: [f64; 2]) -> bool {
+        let inside = |piece: &PupilPiece| {
+            let below = piece.chains[0].iter().filter(|chain| chain.is_below(p)).count();
+            if below % 2 == 1 { piece.sign } else { 0.0 }
+        };
+        self.pieces.iter().map(inside).sum::<f64>() > 0.5
+    }
+
+    /// The transfer at a frequency, and the order of the quadrature of its integral.
+    pub(super) fn transfer_and_order(
+        &self,
+        frequency: [f64; 2],
+        tolerance: f64,
+    ) -> ([f64; 2], usize) {
+        let shift = self.shift(frequency, 0.0);
+        let sum = |part: &OverlapPart<'_>, counts| self.column_sum(part, shift, counts);
+        let found = self.converge(shift, tolerance, self.energy, &sum);
+        found.map_or(([0.0; 2], 0), |found| (found.value, found.order))
+    }
+
+    /// The nodes of an order of the overlap of two shifted pupils, each with its weight; those of half of it count
+    /// twice.
+    pub(super) fn overlap_nodes(&self, shift: TransferShift, order: usize) -> Vec<([f64; 2], f64)> {
+        let of_part = |part: &OverlapPart<'_>| {
+            let factor = part.factor;
+            let nodes = part.strip.nodes(part.counts(order)).into_iter();
+            nodes.map(move |node| (node.at, factor * node.weight)).collect::<Vec<_>>()
+        };
+        self.parts(shift).iter().flat_map(of_part).collect()
     }
 
     /// The integral of the squared amplitude between the curves.
     fn overlap_energy(&self) -> f64 {
         let shift = TransferShift { cosines: [0.0; 2], defocus: 0.0 };
-        self.converge(shift, 1e-13, 1.0, &|part, counts| self.column_sum(part, shift, counts)).0[0]
+        let whole =
+            self.converge(shift, 1e-13, 1.0, &|part, counts| self.column_sum(part, shift, counts));
+        whole.map_or(0.0, |whole| whole.value[0])
     }
 
     /// The light at the nodes of a quadrature between the curves, of an order from 0 to 9.
@@ -257,11 +366,15 @@ impl PupilFunction {
         let left = self.transfer_error();
         // The sum takes what the polynomials leave of the tolerance, or of half of it.
         let tolerance = (tolerance - left).max(0.5 * tolerance);
-        let ([re, im], change) = self.converge(shift, tolerance, self.energy, &sum);
-        TransferValue::new(re, im, change + left, self.rays)
+        // Shifted pupils that are apart have nothing in common, whatever is left out of them.
+        let Some(found) = self.converge(shift, tolerance, self.energy, &sum) else {
+            return TransferValue::new(0.0, 0.0, 0.0, self.rays);
+        };
+        let [re, im] = found.value;
+        TransferValue::new(re, im, found.change + left, self.rays)
     }
 
-    fn shift(&self, frequency: [f64; 2], defocus: f64) -> TransferShift {
+    pub(super) fn shift(&self, frequency: [f64; 2], defocus: f64) -> TransferShift {
         let cosines = frequency.map(|nu| 0.5 * self.wavelength * nu);
         TransferShift { cosines, defocus: defocus / self.wavelength }
     }
@@ -300,9 +413,11 @@ impl PupilFunction {
                 [re + amplitude * cos, im - amplitude * sin]
             })
         };
-        let ([re, im], change) = self.converge(shift, tolerance, self.energy, &sum);
-        let rays = self.rays + traced.get();
-        (!lost.get()).then(|| TransferValue::new(re, im, change, rays))
+        let Some(found) = self.converge(shift, tolerance, self.energy, &sum) else {
+            return Some(TransferValue::new(0.0, 0.0, 0.0, self.rays));
+        };
+        let ([re, im], rays) = (found.value, self.rays + traced.get());
+        (!lost.get()).then(|| TransferValue::new(re, im, found.change, rays))
     }
 
     /// The strips of the common parts of all pairs of pieces.
@@ -332,7 +447,7 @@ impl PupilFunction {
         parts
     }
 
-    /// The sum over the strips of overlap integrals divided by an energy, and its last change. A sum with too
+    /// The sum over the strips of overlap integrals divided by an energy; `None` if there is no overlap. A sum with too
     /// few nodes for its phase is none, and its error is that of any contrast.
     fn converge(
         &self,
@@ -340,15 +455,16 @@ impl PupilFunction {
         tolerance: f64,
         energy: f64,
         sum: &impl Fn(&OverlapPart<'_>, [usize; 2]) -> [f64; 2],
-    ) -> ([f64; 2], f64) {
+    ) -> Option<Overlap> {
         let parts = self.parts(shift);
         // The mirror image cancels the sine if the shift is across the line of symmetry.
         let sine = if self.polynomial.is_even() && shift.cosines[1] == 0.0 { 0.0 } else { 1.0 };
-        let (mut last, mut change) = ([0.0; 2], 1.0);
+        let mut last = Overlap { value: [0.0; 2], change: 1.0, order: 0 };
         if parts.is_empty() {
-            return (last, 0.0);
+            return None;
         }
-        for order in 0..ORDERS.len() {
+        let orders: &[usize] = if tolerance < COARSE_SUM { &FINE_ORDERS } else { &COARSE_ORDERS };
+        for order in orders.iter().copied() {
             let nodes = |part: &OverlapPart<'_>| part.counts(order).iter().product::<usize>();
             if parts.iter().any(|part| nodes(part) > MOST_NODES) {
                 break;
@@ -359,15 +475,16 @@ impl PupilFunction {
                 now[0] += part.factor * re / energy;
                 now[1] += sine * part.factor * im / energy;
             }
-            if order > 0 {
-                change = CHANGES * (now[0] - last[0]).hypot(now[1] - last[1]);
-            }
-            last = now;
-            if change <= tolerance && order > 0 {
-                break;
+            let before = last.value;
+            (last.value, last.order) = (now, order);
+            if order > orders[0] {
+                last.change = CHANGES * (now[0] - before[0]).hypot(now[1] - before[1]);
+                if last.change <= tolerance {
+                    break;
+                }
             }
         }
-        (last, change)
+        Some(last)
     }
 
     /// The overlap integral of the polynomials over a strip.
@@ -396,6 +513,19 @@ impl PupilFunction {
 }
 
 impl PupilPiece {
+    /// The light and, if there is one, the shadow in it, on a sphere; and the number of rays.
+    fn of_traces(
+        traces: &mut PupilTraces<'_>,
+        sphere: &ReferenceSphere,
+        tolerance: f64,
+    ) -> Result<(Vec<Self>, usize), AnalysisError> {
+        let points = PupilFunction::edge_points(tolerance);
+        let (curves, rays) =
+            traces.curves(sphere, (points, PupilFunction::edge_steps(tolerance)))?;
+        let pieces = curves.into_iter().zip([1.0, -1.0]);
+        Ok((pieces.map(|(curve, sign)| Self::new(curve, sign)).collect(), rays))
+    }
+
     fn new(curve: PupilCurve, sign: f64) -> Self {
         Self { chains: [0, 1].map(|axis| curve.chains(axis)), curve, sign }
     }
@@ -404,9 +534,8 @@ impl PupilPiece {
 impl OverlapPart<'_> {
     /// The columns and the nodes of each, of an order.
     fn counts(&self, order: usize) -> [usize; 2] {
-        let count = |k: usize| {
-            (self.resolved[k] * (1.0 + GROWTH * order as f64) + ORDERS[order][k]).ceil() as usize
-        };
+        let [share, columns, nodes] = ORDERS[order];
+        let count = |k: usize| (self.resolved[k] * share + [columns, nodes][k]).ceil() as usize;
         [count(0).next_multiple_of(TOGETHER), count(1)]
     }
 }
@@ -430,12 +559,8 @@ struct FitLight {
 }
 
 impl FitLight {
-    fn new(
-        region: &Region<'_>,
-        sphere: &ReferenceSphere,
-        nodes: &Nodes,
-    ) -> Result<Self, AnalysisError> {
-        let light = PupilSamples::of_nodes(region, sphere, nodes)?;
+    fn new(traced: &TracedLight, sphere: &ReferenceSphere) -> Result<Self, AnalysisError> {
+        let light = traced.on(sphere)?;
         let sample = |i: usize| FitSample {
             cosines: light.cosines[i],
             values: [light.waves[i], light.energies[i] / light.amplitudes[i]],
@@ -460,25 +585,4 @@ impl FitLight {
         let left = [0, 1].map(|k| own[k].max(between[k]));
         Some((polynomial, [left[0], left[1] * self.scale]))
     }
-}
-
-/// A curve of the pupil in cosines.
-fn project_curve(
-    region: &Region<'_>,
-    sphere: &ReferenceSphere,
-    arcs: &[EdgeArc],
-    steps: ArcSteps,
-) -> Result<PupilCurve, AnalysisError> {
-    let place = |(ray, path): (Ray<Dual2>, Dual2)| {
-        let found = sphere.project(ray, path)?;
-        Some(found.cosines.map(|cosine| cosine.value))
-    };
-    let arc = |arc: &EdgeArc| {
-        let ends = region.launch.unclipped_landings(arc.points.iter().copied());
-        let points: Option<Vec<_>> = ends.into_iter().map(|end| place(end?)).collect();
-        Some((points?, arc.begins_at_corner))
-    };
-    let arcs: Option<Vec<_>> = arcs.iter().map(arc).collect();
-    let arcs = arcs.ok_or(AnalysisError::IrregularPupil)?;
-    Ok(PupilCurve::in_steps(&arcs, steps))
 }

@@ -1,11 +1,10 @@
 //! The light of a pupil on the reference sphere, at the nodes of a quadrature.
 
 use super::Interruption;
+use super::pupil_traces::TracedLight;
 use crate::analysis::AnalysisError;
 use crate::analysis::reference_sphere::ReferenceSphere;
-use crate::math::Dual;
 use crate::pupil::{Accuracy, ConvergedList, Nodes, Region, converge_resolved};
-use crate::trace::TraceSink as _;
 use std::f64::consts::{PI, TAU};
 
 /// The light of a pupil at some of its points.
@@ -105,41 +104,7 @@ impl PupilSamples {
         sphere: &ReferenceSphere,
         nodes: &Nodes,
     ) -> Result<Self, AnalysisError> {
-        let launch = &region.launch;
-        let mut samples = Self {
-            mirrored: nodes.mirrored,
-            wavelength: sphere.medium_wavelength(),
-            ..Self::default()
-        };
-        let (launched, landed) = launch.trace_points(&nodes.points);
-        let lit = launched.into_iter().enumerate().filter(|(ray, _)| landed.fate(*ray).is_imaged());
-        let lit: Vec<usize> = lit.map(|(_, node)| node).collect();
-        let ends = launch.unclipped_landings(lit.iter().map(|node| nodes.points[*node]));
-        let (mut least, mut most) = (f64::INFINITY, f64::NEG_INFINITY);
-        for (node, end) in lit.into_iter().zip(ends) {
-            let p = nodes.points[node];
-            let (Some(start), Some((ray, path))) = (launch.ray(p), end) else { continue };
-            let path = Dual::constant(launch.optical_path_to(start)) + path;
-            let Some(found) = sphere.project(ray, path) else { continue };
-            let [a, b] = found.cosines;
-            let share = launch.beam_share(p);
-            // The area of cosines by that of the beam.
-            let area = (a.slope[0] * b.slope[1] - a.slope[1] * b.slope[0]) / share;
-            (least, most) = (least.min(area), most.max(area));
-            let energy = nodes.weights[node] * share;
-            samples.cosines.push([a.value, b.value]);
-            samples.points.push(p);
-            samples.waves.push(found.waves.value);
-            samples.amplitudes.push(energy * area.abs().sqrt());
-            samples.energies.push(energy);
-        }
-        if samples.cosines.is_empty() {
-            return Err(AnalysisError::NoLight);
-        }
-        if least < 0.0 && most > 0.0 {
-            return Err(AnalysisError::FoldedPupil);
-        }
-        Ok(samples)
+        TracedLight::new(region, nodes).on(sphere)
     }
 
     /// The integral of the squared amplitude over the cosines.

@@ -8,7 +8,7 @@ use crate::cli::output::{Output, ShortNumber, TextTable};
 use crate::cli::progress::{stop_flag, with_bar};
 use crate::measure::{
     GradientBenchmark, GradientCost, GradientCurves, GradientRow, Integral, Machine, Precision,
-    measure_gradients,
+    TermCost, TermCosts, measure_gradients, measure_term_costs,
 };
 use crate::pupil::DerivativeEstimator;
 use image::ImageError;
@@ -30,12 +30,22 @@ pub(super) struct MeasureGradientArgs {
     #[arg(long, value_name = "N", default_value_t = 0)]
     zoom: usize,
 
+    /// The spatial frequency of the terms about contrast, in cycles/mm
+    #[arg(long, value_name = "NU", default_value_t = 20.0)]
+    frequency: f64,
+
     #[command(flatten)]
     plot: PlotArgs,
 }
 
 impl MeasureGradientArgs {
     pub(super) fn run(&self, output: &Output) -> Result<(), CliError> {
+        if !(self.frequency > 0.0 && self.frequency.is_finite()) {
+            let found = self.frequency;
+            let text =
+                format!("--frequency: found {found}; expected a positive number of cycles/mm");
+            return Err(CliError::Input(text));
+        }
         let opened = self.lens.open()?;
         self.plot.check([("the lens", self.lens.path())])?;
         opened.ray_model(self.zoom)?;
@@ -44,12 +54,17 @@ impl MeasureGradientArgs {
             measure_gradients(&opened.lens, self.zoom, self.field, report)
         });
         let measured = measured.map_err(|e| CliError::Input(format!("{}: {e}", opened.file)))?;
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build();
+        let pool = pool.map_err(|error| CliError::Failed(error.to_string()))?;
+        let terms = measure_term_costs(&opened.lens, self.zoom, self.frequency, &pool);
+        let terms = terms.map_err(|e| CliError::Input(format!("{}: {e}", opened.file)))?;
         let mut failures = Failures::default();
         failures.note(self.plot.write(|| draw_curves(&measured, &opened.lens.name)));
         failures.note(output.print(&MeasureGradientReport {
             machine: Machine::detect(),
             lens: opened.file,
             measured,
+            terms,
         }));
         failures.into_result()
     }
@@ -95,18 +110,53 @@ struct MeasureGradientReport {
     lens: String,
     #[serde(flatten)]
     measured: GradientBenchmark,
+    terms: TermCosts,
 }
 
 impl Display for MeasureGradientReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { machine, lens, measured } = self;
+        let Self { machine, lens, measured, terms } = self;
         writeln!(f, "{machine}\n{lens}: relative errors of derivatives, one thread")?;
         for curves in &measured.fields {
             write_curves(f, curves)?;
         }
         writeln!(f, "\ncost of derivatives, relative to the integral or trace itself:\n")?;
-        write!(f, "{}", costs(&measured.costs))
+        write!(f, "{}", costs(&measured.costs))?;
+        let TermCosts { variables, tolerance, frequency, rows } = terms;
+        writeln!(
+            f,
+            "\nterms of a merit, rays good to {tolerance}, contrast at {} cycles/mm; derivatives by all \
+             {variables} numbers:\n",
+            ShortNumber(*frequency)
+        )?;
+        write!(f, "{}", term_costs(rows))?;
+        let refused = rows.iter().filter_map(|row| Some((row.term, row.refused.as_ref()?)));
+        refused.into_iter().try_for_each(|(term, why)| writeln!(f, "{term}: {why}"))
     }
+}
+
+fn term_costs(rows: &[TermCost]) -> TextTable {
+    let mut table = TextTable::new(&[
+        "term",
+        "value",
+        "error",
+        "value ms",
+        "with gradient",
+        "ratio",
+        "off differences",
+    ]);
+    for row in rows.iter().filter(|row| row.refused.is_none()) {
+        table.row([
+            row.term.to_owned(),
+            ShortNumber(row.value).to_string(),
+            format!("{:.0e}", row.error),
+            format!("{:.3}", row.value_ms),
+            format!("{:.3}", row.gradient_ms),
+            format!("{:.2}", row.gradient_ms / row.value_ms),
+            format!("{:.0e}", row.difference),
+        ]);
+    }
+    table
 }
 
 fn write_curves(f: &mut fmt::Formatter<'_>, curves: &GradientCurves) -> fmt::Result {

@@ -8,9 +8,11 @@ mod grin;
 mod limits;
 mod minima;
 mod mtf;
+mod optiland;
 mod optimize;
 mod picture;
 mod plot;
+mod psf;
 mod search;
 mod spot;
 mod tolerance;
@@ -34,6 +36,7 @@ enum BenchmarkCommand {
     Trace(trace::MeasureTraceArgs),
     Spot(spot::MeasureSpotArgs),
     Mtf(mtf::MeasureMtfArgs),
+    Psf(psf::MeasurePsfArgs),
     Gradient(gradient::MeasureGradientArgs),
     Picture(picture::MeasurePictureArgs),
     Grin(grin::MeasureGrinArgs),
@@ -53,6 +56,7 @@ impl MeasureArgs {
             BenchmarkCommand::Trace(trace) => trace.run(output),
             BenchmarkCommand::Spot(spot) => spot.run(output),
             BenchmarkCommand::Mtf(mtf) => mtf.run(output),
+            BenchmarkCommand::Psf(psf) => psf.run(output),
             BenchmarkCommand::Gradient(gradient) => gradient.run(output),
             BenchmarkCommand::Picture(picture) => picture.run(output),
             BenchmarkCommand::Grin(grin) => grin.run(output),

@@ -1,5 +1,6 @@
 //! `measure mtf`: contrast, its error and its time.
 
+use super::optiland::{self, OptilandCurves, OptilandRow};
 use super::plot::{self, Color, ErrorChart, ErrorCurve, LegendEntry, PlotArgs, Stroke};
 use crate::cli::error::CliError;
 use crate::cli::failures::Failures;
@@ -31,6 +32,11 @@ pub(super) struct MeasureMtfArgs {
     /// The zoom position, counted from 0
     #[arg(long, value_name = "N", default_value_t = 0)]
     zoom: usize,
+
+    /// A Python that has Optiland: its FFTMTF and GeometricMTF of the same lens are timed and compared in the
+    /// same run
+    #[arg(long, value_name = "PYTHON")]
+    optiland: Option<PathBuf>,
 
     #[command(flatten)]
     plot: PlotArgs,
@@ -79,7 +85,13 @@ impl MeasureMtfArgs {
             measure_transfer(&model, (self.highest, self.count), pool, report)
         });
         let curves = found.map_err(|why| CliError::Input(format!("{}: {why}", opened.file)))?;
-        Ok(LensCurves { lens: opened.file.clone(), name: opened.lens.name.clone(), curves })
+        let beside = |python: &PathBuf| {
+            let asked = (self.highest, self.count);
+            optiland::measure(python, opened, (&model, &curves.fields), asked)
+        };
+        let optiland = self.optiland.as_ref().map(beside).transpose()?;
+        let (lens, name) = (opened.file.clone(), opened.lens.name.clone());
+        Ok(LensCurves { lens, name, curves, optiland })
     }
 }
 
@@ -91,6 +103,7 @@ struct LensCurves {
     name: String,
     #[serde(flatten)]
     curves: TransferCurves,
+    optiland: Option<OptilandCurves>,
 }
 
 /// The printed result.
@@ -123,7 +136,7 @@ fn draw(lenses: &[LensCurves]) -> Result<Vec<u8>, ImageError> {
 impl Display for MeasureMtfReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "{}", self.machine)?;
-        for LensCurves { lens, curves, .. } in &self.lenses {
+        for LensCurves { lens, curves, optiland, .. } in &self.lenses {
             let [low, high] = curves.frequencies.map(ShortNumber);
             let (count, fields, colors) = (curves.count, curves.fields.len(), curves.colors);
             writeln!(
@@ -134,13 +147,31 @@ impl Display for MeasureMtfReport {
             )?;
             let mut table = TextTable::new(&["", "tolerance", "error", "stated", "rays", "ms", ""]);
             curves.rows.iter().for_each(|row| table.row(cells(row)));
+            let others = optiland.iter().flat_map(|found| &found.rows);
+            others.for_each(|row| table.row(optiland_cells(row)));
             write!(f, "{table}")?;
             if let Some(refused) = &curves.refused {
                 writeln!(f, "diffraction: {refused}")?;
             }
+            match optiland {
+                Some(found) => writeln!(f, "Optiland {}, each wavelength alone", found.version)?,
+                None => writeln!(f, "{}", optiland::HOW_TO_GET)?,
+            }
         }
         Ok(())
     }
+}
+
+fn optiland_cells(row: &OptilandRow) -> Vec<String> {
+    vec![
+        format!("Optiland, {}", row.method.name()),
+        String::new(),
+        format!("{:.1e}", row.error),
+        String::new(),
+        format!("{0} x {0}", row.rays),
+        format!("{:.2}", row.ms),
+        String::new(),
+    ]
 }
 
 fn cells(row: &TransferRow) -> Vec<String> {

@@ -34,16 +34,22 @@ pub(super) struct RadialLine {
 /// A cosine that vanishes beyond this, in lengths of the radius, does not matter.
 const FAR: f64 = 1.5;
 
-/// The nodes on some radii. If a cosine vanishes at the edge or close behind it, the image point
-/// varies with the square root of the distance from there: Gauss nodes are then taken in a variable
-/// that makes it smooth.
-pub(super) fn line_nodes(lines: &[RadialLine], frame: &PolarFrame, radii: usize) -> Nodes {
+/// The nodes on some radii, as many as `radii` says of the azimuth of each. If a cosine vanishes at the edge or
+/// close behind it, the image point varies with the square root of the distance from there: Gauss nodes are then
+/// taken in a variable that makes it smooth.
+pub(super) fn line_nodes(
+    lines: &[RadialLine],
+    frame: &PolarFrame,
+    radii: impl Fn(f64) -> usize,
+) -> Nodes {
     let mut nodes = Nodes::default();
     for line in lines {
-        let radius = line.edge.radius;
+        let (radius, radii) = (line.edge.radius, radii(line.azimuth));
+        let direction = frame.direction(line.azimuth);
+        let place = |r: f64| [0, 1].map(|i| frame.center[i] + r * radius * direction[i]);
         let sector = line.share * radius * radius;
         let mut add = |r: f64, weight: f64| {
-            nodes.points.push(frame.point(line.azimuth, r * radius));
+            nodes.points.push(place(r));
             nodes.weights.push(sector * weight);
         };
         let beyond = line.grazing_distance - 1.0;

@@ -137,12 +137,13 @@ impl Region<'_> {
         matches!(self.kind, RegionKind::Irregular { annulus: None, .. })
     }
 
-    /// Points on radii about a sixteenth of a turn apart, on each at the nine Chebyshev points of the way from
-    /// the centre, or from the edge of a central shadow, to the edge; none if that is not known.
-    pub fn radii(&self) -> Vec<Vec<[f64; 2]>> {
+    /// Points on radii about a sixteenth of a turn apart, each with its azimuth in the frame of the edge, at the
+    /// nine Chebyshev points of the way from the centre, or from the edge of a central shadow, to the edge; none
+    /// if that is not known.
+    pub fn radii(&self) -> Vec<(f64, Vec<[f64; 2]>)> {
         let radius = |frame: &PolarFrame, azimuth: f64, [from, to]: [f64; 2]| {
             let place = |u: f64| frame.point(azimuth, from + u * (1.0 - INSIDE) * (to - from));
-            chebyshev_points(RADIUS_POINTS).map(place).collect()
+            (azimuth, chebyshev_points(RADIUS_POINTS).map(place).collect())
         };
         match &self.kind {
             RegionKind::Clear => {
@@ -164,16 +165,22 @@ impl Region<'_> {
         }
     }
 
-    /// Nodes along radii, `radii` on each, at as many azimuths for each smooth arc of the edge as `azimuths` says
-    /// of its length in radians; `None` if the edge is not known or rules have not so many nodes.
-    pub fn nodes_along(&self, azimuths: impl Fn(f64) -> usize, radii: usize) -> Option<Nodes> {
+    /// Nodes along radii, as many on each as `radii` says of its azimuth, or of any where the rule is the same for
+    /// all, at as many azimuths for each smooth arc of the edge as `azimuths` says of its length in radians;
+    /// `None` if the edge is not known or rules have not so many nodes.
+    pub fn nodes_along(
+        &self,
+        azimuths: impl Fn(f64) -> usize,
+        radii: impl Fn(f64) -> usize,
+    ) -> Option<Nodes> {
         let mirrored = self.launch.is_symmetric();
         let most = azimuths(if mirrored { PI } else { TAU });
-        if most.max(radii) > LARGEST {
+        let longest = self.radii().iter().map(|(azimuth, _)| radii(*azimuth)).max().unwrap_or(0);
+        if most.max(longest) > LARGEST {
             return None;
         }
         match &self.kind {
-            RegionKind::Clear => Some(clear_nodes(radii, azimuths(PI), mirrored)),
+            RegionKind::Clear => Some(clear_nodes(longest, azimuths(PI), mirrored)),
             RegionKind::StarShaped(boundary) => {
                 let (lines, rays) = self.radial_lines(boundary, azimuths);
                 let nodes = line_nodes(&lines, &boundary.frame, radii);
@@ -181,7 +188,7 @@ impl Region<'_> {
             }
             RegionKind::Irregular { annulus: Some(annulus), .. } => {
                 let (lines, rays) = annulus.radial_lines(&self.launch, most);
-                Some(Nodes { mirrored, rays, ..annulus.nodes(&lines, radii) })
+                Some(Nodes { mirrored, rays, ..annulus.nodes(&lines, longest) })
             }
             RegionKind::Dark | RegionKind::Unbounded | RegionKind::Irregular { .. } => None,
         }
@@ -221,7 +228,7 @@ impl Region<'_> {
                 let alike = alike && self.launch.is_axial() && boundary.arcs.len() == 1;
                 let azimuths = if alike { 1 } else { azimuths };
                 let (lines, rays) = self.radial_lines(boundary, |_| azimuths);
-                let nodes = line_nodes(&lines, &boundary.frame, radii);
+                let nodes = line_nodes(&lines, &boundary.frame, |_| radii);
                 (Nodes { mirrored, rays, ..nodes }, lines)
             }
             RegionKind::Irregular { annulus: Some(annulus), .. } => {
@@ -327,6 +334,11 @@ impl Region<'_> {
             lost: 0,
             mirrored: nodes.mirrored,
         };
+        if let Some(rays) = self.launch.mapped_rays(&nodes.points) {
+            landed.weights.clone_from(&nodes.weights);
+            self.launch.channel().tracer.trace_batch(&rays, &mut landed.sink);
+            return (rays, landed);
+        }
         let mut rays = Rays::with_capacity(nodes.points.len());
         for (p, weight) in nodes.points.iter().zip(&nodes.weights) {
             match self.launch.ray(*p) {

@@ -67,6 +67,13 @@ impl<'a> Region<'a> {
     }
 }
 
+impl<'a> TracedPupil<'a> {
+    /// The pupil.
+    pub fn region(&self) -> &Region<'a> {
+        &self.region
+    }
+}
+
 impl TracedPupil<'_> {
     /// The form of the pupil.
     pub fn form(&self) -> &RegionKind {

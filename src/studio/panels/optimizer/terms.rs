@@ -19,6 +19,8 @@ pub(super) const fn title(term: Term) -> &'static str {
         Term::Wavefront => "RMS wavefront",
         Term::Strehl => "Strehl ratio",
         Term::GeometricMtf { .. } => "Geometric MTF",
+        Term::Mtf { .. } => "Diffraction MTF",
+        Term::Ghosts { .. } => "Ghosts",
         Term::Throughput => "Throughput",
         Term::ThroughputLoss(_) => "Throughput loss",
         Term::Light(_) => "Light",
@@ -59,9 +61,9 @@ pub(super) const fn hint(term: Term) -> &'static str {
             "What the Strehl ratio about the brightest image point lacks of 1: for a lens close to the \
              diffraction limit"
         }
-        Term::GeometricMtf { .. } => {
-            "Contrast of rays at a spatial frequency below this minimum, tangential and sagittal"
-        }
+        Term::GeometricMtf { .. } => "Contrast of rays at a spatial frequency below this minimum",
+        Term::Mtf { .. } => "Contrast by diffraction at a spatial frequency below this minimum",
+        Term::Ghosts { .. } => "Ghosts brighter than this share of the light at the entrance",
         Term::Throughput => {
             "As much light as possible: minus the mean area of the pupils. It has no target; its \
              weight sets how much blur a square millimetre is worth"
@@ -113,6 +115,8 @@ pub(super) const fn unit(term: Term) -> &'static str {
         | Term::Wavefront
         | Term::Strehl
         | Term::GeometricMtf { .. }
+        | Term::Mtf { .. }
+        | Term::Ghosts { .. }
         | Term::Throughput
         | Term::Distortion
         | Term::FNumber(_)
@@ -141,8 +145,12 @@ pub(super) fn targets(term: &mut Term) -> Vec<(&'static str, &mut f64)> {
         | Term::Throughput
         | Term::Distortion
         | Term::Operand { .. } => Vec::new(),
-        Term::GeometricMtf { frequency, min } => {
+        Term::GeometricMtf { frequency, min } | Term::Mtf { frequency, min } => {
             vec![("Cycles/mm", frequency), ("Minimum", min)]
+        }
+        Term::Ghosts { irradiance, reflectance } => {
+            let reflectance = reflectance.as_mut().map(|share| ("Reflectance", share));
+            std::iter::once(("Irradiance", irradiance)).chain(reflectance).collect()
         }
         Term::GlassCenter { min, max }
         | Term::AirCenter { min, max }
@@ -174,7 +182,9 @@ pub(super) fn value_text(term: Term, value: f64) -> String {
             format!("{} % short", short(100.0 * root))
         }
         Term::FNumber(_) => format!("off by {}", short(root)),
-        Term::GeometricMtf { .. } => format!("{} short", short(root)),
+        Term::GeometricMtf { .. } | Term::Mtf { .. } | Term::Ghosts { .. } => {
+            format!("{} short", short(root))
+        }
         Term::Steepness(_) => format!("{} over", short(root)),
         Term::Operand { kind, .. } if kind.is_angle() => format!("{}° off", short(root)),
         _ => format!("{}{}", length_text(root), deviation(term)),

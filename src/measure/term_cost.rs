@@ -1,0 +1,183 @@
+//! The cost of the derivatives of merit terms of sharpness, by every number of a lens.
+//!
+//! The value of a term and its gradient are timed on one thread with the rays that reach a tolerance; both find the
+//! edges of the pupils anew. The gradient is compared with central differences of the fourth order.
+
+use super::timing::time_median;
+use crate::lens::{Lens, Parameter, Quantity, Variable, at_zoom};
+use crate::merit::{
+    DerivativeLevel, Goal, LimitTreatment, Merit, MeritError, PupilEdge, Term, WeightedTerm,
+};
+use crate::paraxial::{Beam, first_order};
+use rayon::ThreadPool;
+use serde::Serialize;
+
+/// The cost of the derivatives of a term.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct TermCost {
+    /// The name of the term.
+    pub term: &'static str,
+    /// Its value.
+    pub value: f64,
+    /// The error that it states.
+    pub error: f64,
+    /// The median time of a value, in milliseconds.
+    pub value_ms: f64,
+    /// The median time of a value with its gradient, in milliseconds.
+    pub gradient_ms: f64,
+    /// The largest difference of a derivative from central differences, over the largest one; each times a step of
+    /// its variable.
+    pub difference: f64,
+    /// The reason why there is no such term; the numbers are 0 then.
+    pub refused: Option<String>,
+}
+
+/// The costs of the derivatives of some terms.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct TermCosts {
+    /// The number of variables.
+    pub variables: usize,
+    /// The tolerance of the rays.
+    pub tolerance: f64,
+    /// The spatial frequency of contrast, in cycles/mm.
+    pub frequency: f64,
+    /// A row for each term.
+    pub rows: Vec<TermCost>,
+}
+
+/// The tolerance of the rays: of contrast five times this.
+const TOLERANCE: f64 = 2e-4;
+/// The times that a value is timed.
+const TURNS: usize = 15;
+
+/// Measures the terms of sharpness of a lens at a zoom position, with contrast at a frequency in cycles/mm, by every
+/// curvature, conic, asphere coefficient, thickness, index and semi-diameter that the lens has, on the thread of a
+/// pool.
+///
+/// # Errors
+/// A lens without a merit.
+pub fn measure_term_costs(
+    lens: &Lens,
+    zoom: usize,
+    frequency: f64,
+    pool: &ThreadPool,
+) -> Result<TermCosts, MeritError> {
+    let lens = with_all_variables(&at_zoom(lens, zoom));
+    let steps = Steps::new(&lens)?;
+    let terms = [
+        Term::Spot,
+        Term::Wavefront,
+        Term::Strehl,
+        Term::GeometricMtf { frequency, min: 1.0 },
+        Term::Mtf { frequency, min: 1.0 },
+    ];
+    let row = |term: Term| {
+        let found = pool.install(|| cost(&lens, term, &steps));
+        found.unwrap_or_else(|why| TermCost {
+            term: term.name(),
+            value: 0.0,
+            error: 0.0,
+            value_ms: 0.0,
+            gradient_ms: 0.0,
+            difference: 0.0,
+            refused: Some(why.to_string()),
+        })
+    };
+    let rows = terms.into_iter().map(row).collect();
+    Ok(TermCosts { variables: lens.variables.len(), tolerance: TOLERANCE, frequency, rows })
+}
+
+/// The lens with every number of its surfaces as a variable.
+fn with_all_variables(lens: &Lens) -> Lens {
+    let mut lens = lens.with_pickups().unwrap_or_else(|_| lens.clone());
+    lens.pickups.clear();
+    let quantities = |i: usize| {
+        let row = &lens.surfaces[i];
+        let conic = (row.conic != 0.0).then_some(Quantity::Conic);
+        let powers = row.asphere.iter().enumerate().filter(|(_, value)| **value != 0.0);
+        let powers: Vec<Quantity> = powers.map(|(k, _)| Quantity::Asphere(k)).collect();
+        let index = lens.get(Parameter::new(i, Quantity::Index)).map(|_| Quantity::Index);
+        let rim = row.semi_diameter.map(|_| Quantity::SemiDiameter);
+        let always = [Quantity::Curvature, Quantity::Thickness];
+        always.into_iter().chain(conic).chain(powers).chain(index).chain(rim).collect::<Vec<_>>()
+    };
+    let of_surface = |i: usize| {
+        quantities(i).into_iter().map(move |quantity| Variable {
+            parameter: Parameter::new(i, quantity),
+            min: None,
+            max: None,
+        })
+    };
+    let variables: Vec<Variable> = (0..lens.surfaces.len()).flat_map(of_surface).collect();
+    lens.variables = variables;
+    lens
+}
+
+/// The steps of central differences, from the size of a lens.
+struct Steps {
+    focal_length: f64,
+    largest_rim: f64,
+}
+
+impl Steps {
+    fn new(lens: &Lens) -> Result<Self, MeritError> {
+        let system = lens.resolve(0, lens.wavelengths[lens.primary()].um)?;
+        let data = first_order(&system, &Beam::for_lens(lens, 0));
+        let data = data.map_err(crate::pupil::RayModelError::from)?;
+        let rims = lens.surfaces.iter().filter_map(|row| row.semi_diameter);
+        let focal_length = data.efl.map_or(100.0, f64::abs);
+        let largest = rims.fold(0.0, f64::max);
+        let largest_rim = if largest > 0.0 { largest } else { 0.2 * focal_length };
+        Ok(Self { focal_length, largest_rim })
+    }
+
+    /// A step that changes a ray by about the same whatever the number.
+    fn of(&self, quantity: Quantity) -> f64 {
+        let length = STEP * self.focal_length;
+        let sag = |power: i32| length / self.largest_rim.powi(power);
+        match quantity {
+            Quantity::Curvature => 2.0 * sag(2),
+            Quantity::Conic => 8.0 * sag(4) * self.focal_length.powi(3),
+            Quantity::Asphere(term) => sag(2 * term as i32 + 4),
+            Quantity::Thickness => length,
+            Quantity::SemiDiameter => length,
+            Quantity::Index | Quantity::Grin(_) | Quantity::Freeform(_) => STEP,
+        }
+    }
+}
+
+/// The share of the focal length by which differences change a sag.
+const STEP: f64 = 3e-6;
+
+fn cost(lens: &Lens, term: Term, steps: &Steps) -> Result<TermCost, MeritError> {
+    let goal = Goal {
+        terms: vec![WeightedTerm::new(term, 1.0)],
+        zoom_ratios: Vec::new(),
+        limits: LimitTreatment::default(),
+        pupil: PupilEdge::Moving,
+    };
+    let merit = Merit::new(lens, &goal, TOLERANCE)?;
+    let values = merit.values(lens);
+    let found = merit.terms(&values)?;
+    let at = |level| time_median(3..=TURNS, || merit.evaluate(&values, level));
+    let (value, value_ms) = at(DerivativeLevel::Value);
+    let (sum, gradient_ms) = at(DerivativeLevel::Gradient);
+    let (value, sum) = (value?.value, sum?);
+    let mut largest = 0.0f64;
+    let mut difference = 0.0f64;
+    for (i, variable) in merit.variables().iter().enumerate() {
+        let step = steps.of(variable.parameter.quantity);
+        let moved = |offset: f64| {
+            let mut moved = values.clone();
+            moved[i] += offset * step;
+            merit.value(&moved)
+        };
+        let change = (8.0 * (moved(1.0)? - moved(-1.0)?) - (moved(2.0)? - moved(-2.0)?)) / 12.0;
+        largest = largest.max(change.abs());
+        difference = difference.max((change - step * sum.gradient[i]).abs());
+    }
+    let error = found.first().map_or(0.0, |term| term.error);
+    let difference = if largest > 0.0 { difference / largest } else { 0.0 };
+    let (term, refused) = (term.name(), None);
+    Ok(TermCost { term, value, error, value_ms, gradient_ms, difference, refused })
+}
