@@ -201,7 +201,7 @@ impl Region<'_> {
         match &self.kind {
             RegionKind::StarShaped(boundary) => {
                 let (lines, rays) = self.radial_lines(boundary, |_| 2 * azimuths);
-                let nodes = line_nodes(&lines, &boundary.frame, radii);
+                let nodes = line_nodes(&lines, &boundary.frame, |_| radii);
                 Nodes { mirrored: self.launch.is_symmetric(), rays, ..nodes }
             }
             _ => self.nodes(order),
