@@ -9,6 +9,7 @@ mod aberration_names;
 mod clear_semi_diameters;
 mod coating;
 mod color_error;
+mod contrast_over_field;
 mod diffraction;
 mod distortion;
 mod fan;
@@ -21,8 +22,10 @@ mod ghosts;
 mod illumination;
 mod image_quality;
 mod mtf;
+mod path_fan;
 mod path_map;
 mod pupil;
+mod ray_image;
 mod ray_layout;
 mod reference_sphere;
 mod seen_from_image;
@@ -39,6 +42,7 @@ pub use coating::{Coating, ThinFilm, film_reflectance};
 pub use color_error::{
     LateralColor, LongitudinalAberration, ZoneFocus, lateral_color, longitudinal_aberration,
 };
+pub use contrast_over_field::{ContrastAtHeight, contrast_over_field};
 pub use diffraction::{
     DiffractionGate, PointSpread, PupilCurve, PupilFunction, PupilSamples, RayTransfer, Strehl,
     TransferRays, TransferSlopes, diffraction_gate, diffraction_mtf, encircled_energy,
@@ -69,8 +73,10 @@ pub use mtf::{
     ContrastLimit, MtfCurve, MtfPoint, TransferValue, geometric_mtf, perfect_contrast,
     polychromatic_geometric_mtf, transfer,
 };
+pub use path_fan::{PathFan, PathFanPoint, path_fans};
 pub use path_map::{SquareGrid, grid_nodes, grid_sides, path_map};
 pub use pupil::{FieldPupil, PupilExtent, PupilShape, RayLoss, pupil};
+pub use ray_image::{RayImage, RayImageRequest, ray_image};
 pub use ray_layout::{LayoutRay, RayLayout, ray_layout};
 pub use reference_sphere::ReferenceForm;
 pub use seen_from_image::{BackwardLens, lit_outline};

@@ -86,6 +86,19 @@ impl Scene {
         Ok(self)
     }
 
+    /// The same scene, all of whose planes move to the right and upwards, in mm per second or, at infinity, in
+    /// tangents of directions per second.
+    ///
+    /// # Errors
+    /// A velocity that is not finite.
+    pub fn moving(mut self, velocity: [f64; 2]) -> Result<Self, PictureError> {
+        if velocity != [0.0; 2] {
+            self.layers.iter_mut().for_each(|layer| layer.velocity = velocity);
+            self.layers.iter().try_for_each(SceneLayer::check)?;
+        }
+        Ok(self)
+    }
+
     /// The same radiance in every direction.
     pub fn uniform(radiance: f64) -> Self {
         Self {

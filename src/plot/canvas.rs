@@ -129,6 +129,7 @@ impl Canvas {
 
     /// Draws a line of text; the position is at its top.
     pub fn text(&mut self, [x, y]: [f64; 2], text: &str, color: Color, align: TextAlign) {
+        let text = &plain_letters(text);
         let width = DOT * ADVANCE * text.chars().count() as i32;
         let start = x.round() as i32
             - match align {
@@ -167,6 +168,21 @@ impl Canvas {
 
 fn length(from: [f64; 2], to: [f64; 2]) -> f64 {
     (to[0] - from[0]).hypot(to[1] - from[1])
+}
+
+/// A text in the letters that have dots: units and signs in words.
+fn plain_letters(text: &str) -> String {
+    let plain = [
+        ("°", " deg"),
+        ("µ", "u"),
+        ("λ", "lambda"),
+        ("ε", "e"),
+        ("θ", "theta"),
+        ("±", "+-"),
+        ("²", "2"),
+        ("\u{2212}", "-"),
+    ];
+    plain.into_iter().fold(text.to_owned(), |text, (from, to)| text.replace(from, to))
 }
 
 /// The approximate side of an image, in pixels.

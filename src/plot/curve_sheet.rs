@@ -1,8 +1,8 @@
 //! Charts of curves in rows, one row for each field of a lens, as pixels and on paper.
 
 use super::{
-    Axis, BLACK, Canvas, Chart, Legend, LinePattern, PALETTE, PaperChart, Pen, Stroke, TextAlign,
-    VectorDrawing,
+    Axis, BLACK, Canvas, Chart, Color, GREY, Legend, LinePattern, PALETTE, PaperChart, Pen, Stroke,
+    TextAlign, VectorDrawing,
 };
 
 /// A curve in pieces: it is not drawn where a quantity has no value.
@@ -10,7 +10,7 @@ use super::{
 pub struct ChartCurve {
     /// Its name in the legend.
     pub name: String,
-    /// Its colour, by its number in [`PALETTE`].
+    /// Its colour, by its number in [`PALETTE`]; [`ChartCurve::NEUTRAL`] for grey.
     pub color: usize,
     /// Dashes instead of a full line.
     pub dashed: bool,
@@ -50,6 +50,20 @@ impl ChartCurve {
     pub fn bars(name: impl Into<String>, color: usize, points: &[[f64; 2]], floor: f64) -> Self {
         let pieces = points.iter().map(|[x, y]| vec![[*x, floor], [*x, *y]]).collect();
         Self { name: name.into(), color: color % PALETTE.len(), dashed: false, pieces }
+    }
+
+    /// The colour of a curve that belongs to no field and no wavelength, as a limit.
+    pub const NEUTRAL: usize = usize::MAX;
+
+    /// The same in grey.
+    #[must_use]
+    pub fn neutral(self) -> Self {
+        Self { color: Self::NEUTRAL, ..self }
+    }
+
+    /// Its colour on paper.
+    fn drawn_color(&self) -> Color {
+        if self.color == Self::NEUTRAL { GREY } else { PALETTE[self.color % PALETTE.len()] }
     }
 
     /// The same with dashes.
@@ -162,7 +176,7 @@ impl CurveSheet {
         sheet.text([0.5 * ROOM[0], 0.6 * TITLE], self.title.clone(), 3.4, TextAlign::Left);
         let pen = |curve: &ChartCurve| {
             let pattern = if curve.dashed { LinePattern::Dashes } else { LinePattern::Full };
-            Pen::colored(PALETTE[curve.color]).with_width(0.35).with_pattern(pattern)
+            Pen::colored(curve.drawn_color()).with_width(0.35).with_pattern(pattern)
         };
         for (corner, chart) in self.charts() {
             let axes = PaperChart::new(corner, CHART, chart.drawn_axes());
@@ -200,14 +214,14 @@ impl CurveSheet {
             axes.draw(&mut canvas, &chart.title);
             for curve in &chart.curves {
                 for piece in &curve.pieces {
-                    canvas.curve(&axes.to_pixels(piece), PALETTE[curve.color], stroke(curve));
+                    canvas.curve(&axes.to_pixels(piece), curve.drawn_color(), stroke(curve));
                 }
             }
         }
         for (corner, chart) in self.legends() {
             let mut legend = Legend::new(scaled(corner));
             for curve in chart.named_curves() {
-                legend.curve(&mut canvas, &curve.name, PALETTE[curve.color], stroke(curve));
+                legend.curve(&mut canvas, &curve.name, curve.drawn_color(), stroke(curve));
             }
         }
         canvas

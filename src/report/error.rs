@@ -21,6 +21,15 @@ pub enum ReportError {
     /// The PDF file cannot be made.
     #[error(transparent)]
     Pdf(#[from] PdfError),
+    /// The PNG file cannot be made.
+    #[error("the picture cannot be written as PNG: {0}")]
+    Png(String),
+    /// The name of the file of a figure has another ending.
+    #[error("expected a name that ends with .csv, .png, .svg or .pdf")]
+    FigureEnding,
+    /// A figure without curves.
+    #[error("there is nothing to draw")]
+    NothingDrawn,
     /// The DXF file cannot be made.
     #[error(transparent)]
     Dxf(#[from] DxfError),

@@ -1,6 +1,7 @@
 //! Results as files and drawings: Pareto fronts, GRIN fields and their images; the prescription report of
 //! a lens, its layout, its elements and its bill of material.
 
+mod analysis_figure;
 mod as_built_file;
 mod body;
 mod element_drawing;
@@ -18,6 +19,7 @@ mod sheet;
 mod step;
 mod surface_tolerances;
 
+pub use analysis_figure::{AnalysisFigure, CurveColors, FigureFormat, FigureKind, note_number};
 pub use as_built_file::{FurtherColumns, tolerance_sheet, tolerance_table};
 pub use body::{BodyError, LensBody, lens_bodies};
 pub use element_drawing::element_drawing;

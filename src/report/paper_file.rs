@@ -1,5 +1,6 @@
 //! The files of reports, drawings and solids, each in the form that the ending of its name says.
 
+use super::analysis_figure::FigureKind;
 use super::body::LensBody;
 use super::element_drawing::{chosen_body, element_drawing};
 use super::error::ReportError;
@@ -25,6 +26,8 @@ pub enum PaperKind {
     ToleranceTable,
     /// The lenses that are made: .png.
     ToleranceCharts,
+    /// The charts of an analysis: .csv, .png, .svg or .pdf.
+    Figure(FigureKind),
 }
 
 impl PaperKind {
@@ -36,6 +39,7 @@ impl PaperKind {
             Self::Solids => &["step", "stp"],
             Self::ToleranceTable => &["csv"],
             Self::ToleranceCharts => &["png"],
+            Self::Figure(_) => &["csv", "png", "svg", "pdf"],
         }
     }
 }

@@ -1,6 +1,6 @@
 //! The commands of a session.
 
-use super::analysis::SceneFile;
+use super::analysis::{ContrastPage, FieldPage, PictureOptions, SceneFile};
 use super::grin_design::GrinCommand;
 use super::specified_design::SpecifiedDesignCommand;
 use super::structure_search::StructureSearchCommand;
@@ -89,7 +89,8 @@ pub enum Command {
     Save(Option<PathBuf>),
     /// Writes a copy in the format of the extension.
     Export(PathBuf),
-    /// Writes a report, the layout or the solids of the lens, in the format of the extension.
+    /// Writes a report, the layout, the solids of the lens or what an analysis shows, in the format of the
+    /// extension.
     ExportPaper {
         /// The kind of the file.
         kind: PaperKind,
@@ -197,14 +198,29 @@ pub enum PanelSetting {
     Pupils(bool),
     /// True to compute the ray fans.
     Fans(bool),
-    /// True to compute distortion, field curvature and illumination over the field.
+    /// True to compute the fans of path differences.
+    PathFans(bool),
+    /// True to compute results over the field.
     FieldCurves(bool),
+    /// The page of these that is shown.
+    FieldPage(FieldPage),
     /// True to compute the contrast of the fields.
     Contrasts(bool),
+    /// The page of the contrast that is shown.
+    ContrastPage(ContrastPage),
+    /// The spatial frequency in cycles/mm of contrast over the field and through focus; `None` for one that the
+    /// lens resolves well.
+    ContrastFrequency(Option<f64>),
+    /// True to measure error against time of contrast.
+    ContrastAccuracy(bool),
+    /// True to measure error against time of pictures.
+    PictureAccuracy(bool),
     /// True to compute the wavefronts of the fields.
     Wavefronts(bool),
     /// True to compute the images of a point beside the wavefronts.
     PointImages(bool),
+    /// True to compute the images of a point by rays.
+    RayImages(bool),
     /// True to compute the footprints of the fields.
     Footprints(bool),
     /// True to compute the spot over the whole field.
@@ -222,6 +238,8 @@ pub enum PanelSetting {
     /// The picture from a file that is the scene of the picture; it is no part of a written command.
     #[serde(skip)]
     SceneFile(SceneFile),
+    /// The options of the picture.
+    PictureOptions(Box<PictureOptions>),
     /// True to measure the error of the picture everywhere.
     PictureErrors(bool),
     /// True to compute the lens as it is made.

@@ -16,6 +16,7 @@ mod clock;
 mod command;
 mod drag;
 mod experiment;
+mod figures;
 mod grin_design;
 mod history;
 mod journal;
@@ -34,15 +35,18 @@ mod view;
 
 pub use crate::tolerance::{LoosestGoal, LoosestTolerances};
 pub use analysis::{
-    Analyses, AnalysisResults, AnalysisSettings, AsBuiltLens, FieldContrast, FieldContrasts,
-    FieldFans, FieldFootprints, FieldGhosts, FieldPupils, FieldWavefront, FieldWavefronts,
-    PictureScene, PointImage, PointImages, SceneFile, ScenePicture, analyze, confirm_as_built,
-    predict_as_built,
+    AccuracyCurves, AccuracyPoint, Analyses, AnalysisResults, AnalysisSettings, AsBuiltLens,
+    ContrastPage, FieldContrast, FieldContrastCurves, FieldContrasts, FieldFans, FieldFootprints,
+    FieldGhosts, FieldPage, FieldPathFans, FieldPupils, FieldRayImage, FieldWavefront,
+    FieldWavefronts, FocusContrasts, PictureEffect, PictureFocus,
+    PictureOptions, PictureScene, PointImage, PointImages, RayImages, SceneFile, ScenePicture,
+    analyze, confirm_as_built, predict_as_built,
 };
 pub use clock::Timed;
 pub use command::{Command, PanelSetting};
 pub use drag::{DragProgress, DragView, HandleSlopes, MeritSlopes};
 pub use experiment::{ExperimentRun, ExperimentStatus};
+pub use figures::analysis_figure;
 pub use grin_design::{
     Contour, DocumentSource, GrinAnalysis, GrinCommand, GrinDocument, GrinRun, GrinView,
     IndexProfile, LossSample, MAX_NODES, Slice, SliceQuantity, SliceSettings,

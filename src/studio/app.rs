@@ -23,18 +23,24 @@ use super::menu;
 use super::menu_items::{MenuContext, PanelState};
 use super::panels::PanelKind;
 use super::run_items::panel_of_run;
+use super::stored_picture::StoredPicture;
 use super::text::capitalize;
 use super::unsaved::{PendingAction, PendingState};
 use super::window::Persistence;
 use crate::files;
 use crate::files::{BundledLens, LibraryLens};
+use crate::report::PaperKind;
 use crate::session::{
-    Analyses, AnalysisSettings, Command, DocumentSource, GrinCommand, Message, PanelSetting,
-    SceneFile, Session, SessionEvent, SessionView, Severity, StructureSearchCommand,
+    Analyses, AnalysisSettings, Command, ContrastPage, DocumentSource, FieldPage, GrinCommand,
+    Message, PanelSetting, SceneFile, Session, SessionEvent, SessionView, Severity,
+    StructureSearchCommand,
 };
 
 /// The key under which the arrangement of the panels is stored.
 const DOCK: &str = "dock";
+
+/// The key under which the scene of the picture is stored.
+const PICTURE: &str = "picture";
 
 /// The key under which the files that were opened last are stored.
 const RECENT: &str = "recent files";
@@ -80,6 +86,11 @@ impl Studio {
         storage: Option<&dyn Storage>,
     ) -> Self {
         let tree = storage.and_then(|storage| eframe::get_value(storage, DOCK));
+        let picture: Option<StoredPicture> = storage.and_then(|s| eframe::get_value(s, PICTURE));
+        let mut session = session;
+        for command in picture.into_iter().flat_map(StoredPicture::commands) {
+            session.apply(command);
+        }
         Self {
             session,
             dock: Dock::new(backend, tree),
@@ -304,6 +315,9 @@ impl Studio {
             },
             FileRequest::SavePicture => Command::SavePicture(path),
             FileRequest::ExportPaper(kind) => Command::ExportPaper { kind, path },
+            FileRequest::ExportFigure(kind, _) => {
+                Command::ExportPaper { kind: PaperKind::Figure(kind), path }
+            }
             FileRequest::ExportZemax | FileRequest::ExportJson => Command::Export(path),
         };
         self.run_or_ask(context, PendingAction::Run(command), None);
@@ -411,6 +425,8 @@ impl App for Studio {
         if self.persistence == Persistence::Enabled {
             eframe::set_value(storage, DOCK, self.dock.tree());
             eframe::set_value(storage, RECENT, &self.recent);
+            let picture = StoredPicture::of(&self.session.view().settings);
+            eframe::set_value(storage, PICTURE, &picture);
         }
     }
 
@@ -458,6 +474,12 @@ fn likely_path(view: &SessionView, request: FileRequest) -> Option<PathBuf> {
             let name = || named_file(&view.lens.name, "pdf");
             let beside = view.path.clone().unwrap_or_else(name);
             Some(beside.with_extension(kind.extensions().first().unwrap_or(&"pdf")))
+        }
+        FileRequest::ExportFigure(kind, format) => {
+            let lens = named_file(&view.lens.name, "");
+            let stem = lens.file_stem().unwrap_or(lens.as_os_str()).to_string_lossy();
+            let name = PathBuf::from(format!("{stem} {}.{}", kind.name(), format.extension()));
+            Some(view.path.as_ref().map(|path| path.with_file_name(&name)).unwrap_or(name))
         }
         FileRequest::OpenSearch => checkpoint().or_else(|| search.unfinished.clone()),
         FileRequest::SaveSearch => checkpoint().or_else(|| search.save_path.clone()),
@@ -581,14 +603,27 @@ fn timing_text(view: &SessionView) -> String {
 
 /// The numbers that a visible panel waits for after the others are there.
 fn pending_numbers(settings: &AnalysisSettings, found: &Analyses) -> Option<&'static str> {
+    let shows_curves = settings.field_curves && settings.field_page == FieldPage::Curves;
     let waits = [
-        (settings.contrasts && found.contrasts.is_none(), "MTF"),
+        (settings.shows_contrast(ContrastPage::Frequency) && found.contrasts.is_none(), "MTF"),
+        (
+            settings.shows_contrast(ContrastPage::Field) && found.field_contrast.is_none(),
+            "MTF over the field",
+        ),
+        (
+            settings.shows_contrast(ContrastPage::Focus) && found.focus_contrasts.is_none(),
+            "MTF through focus",
+        ),
         (settings.wavefronts && found.wavefronts.is_none(), "wavefronts"),
         (
             settings.wavefronts && settings.point_images && found.point_images.is_none(),
             "images of a point",
         ),
-        (settings.field_curves && found.field_curves.is_none(), "field curves"),
+        (
+            settings.wavefronts && settings.ray_images && found.ray_images.is_none(),
+            "images of a point by rays",
+        ),
+        (shows_curves && found.field_curves.is_none(), "field curves"),
         (settings.spot_map && found.spot_map.is_none(), "spot over the field"),
         (settings.ghosts && found.ghosts.is_none(), "ghosts"),
         (settings.tolerances && found.as_built.is_none(), "tolerances"),

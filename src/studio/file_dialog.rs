@@ -8,7 +8,7 @@ use std::thread;
 use egui::Key;
 
 use super::text_input::select_characters;
-use crate::report::PaperKind;
+use crate::report::{FigureFormat, FigureKind, PaperKind};
 
 /// The purpose for which a path is asked.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -47,6 +47,8 @@ pub enum FileRequest {
     SavePicture,
     /// To write a report, the layout or the solids of the lens.
     ExportPaper(PaperKind),
+    /// To write what an analysis shows.
+    ExportFigure(FigureKind, FigureFormat),
 }
 
 impl FileRequest {
@@ -75,6 +77,9 @@ impl FileRequest {
             Self::ExportPaper(PaperKind::Solids) => "Export the elements as solids",
             Self::ExportPaper(PaperKind::ToleranceTable) => "Export the table of tolerances",
             Self::ExportPaper(PaperKind::ToleranceCharts) => "Export the charts of tolerances",
+            Self::ExportPaper(PaperKind::Figure(_)) => "Export the analysis",
+            Self::ExportFigure(_, FigureFormat::Table) => "Export the numbers of the analysis",
+            Self::ExportFigure(..) => "Export the charts of the analysis",
         }
     }
 
@@ -93,6 +98,10 @@ impl FileRequest {
             Self::SavePicture => &["png"],
             Self::SaveImportReport => &["txt"],
             Self::ExportPaper(kind) => kind.extensions(),
+            Self::ExportFigure(_, FigureFormat::Table) => &["csv", "png", "svg", "pdf"],
+            Self::ExportFigure(_, FigureFormat::Image) => &["png", "csv", "svg", "pdf"],
+            Self::ExportFigure(_, FigureFormat::Vector) => &["svg", "csv", "png", "pdf"],
+            Self::ExportFigure(_, FigureFormat::Page) => &["pdf", "csv", "png", "svg"],
             Self::ExportFront | Self::ExperimentFolder => &[],
         }
     }
@@ -109,6 +118,7 @@ impl FileRequest {
             Self::ExportPaper(PaperKind::Layout) => "Drawings",
             Self::ExportPaper(PaperKind::Solids) => "Solids",
             Self::ExportPaper(PaperKind::ToleranceTable) => "Tables",
+            Self::ExportFigure(..) | Self::ExportPaper(PaperKind::Figure(_)) => "Tables and charts",
             _ => "Lenses",
         }
     }

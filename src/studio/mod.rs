@@ -30,6 +30,7 @@ mod run_items;
 pub mod section;
 mod session_benchmark;
 mod shortcut_list;
+mod stored_picture;
 pub mod text;
 pub mod text_input;
 pub mod theme;

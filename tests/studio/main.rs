@@ -5,6 +5,7 @@
 
 mod begin;
 mod drawing;
+mod figures;
 mod file_dialog;
 mod glass;
 mod grin;

@@ -641,7 +641,7 @@ fn seidel_sums_are_shown_for_every_surface_within_the_narrowest_panel() {
         .build_ui_state(
             |ui, view: &mut SessionView| {
                 let mut actions = aplanat::studio::Actions::default();
-                SeidelPanel.ui(ui, view, &mut actions);
+                SeidelPanel::default().ui(ui, view, &mut actions);
             },
             view(),
         );
@@ -887,7 +887,7 @@ fn results_with(setting: PanelSetting, are_there: impl Fn(&Analyses) -> bool) ->
 }
 
 /// The same for several settings.
-fn results_with_all(
+pub(super) fn results_with_all(
     settings: Vec<PanelSetting>,
     are_there: impl Fn(&Analyses) -> bool,
 ) -> SessionView {

@@ -508,6 +508,10 @@ fn a_lens_without_light_is_refused_by_every_analysis_and_by_the_report() {
         "encircled-energy",
         "mtf",
         "through-focus-mtf",
+        "field-mtf",
+        "geometric-psf",
+        "geometric-energy",
+        "seidel",
         "ghosts",
     ];
     for kind in kinds {

@@ -22,6 +22,7 @@ mod effects;
 mod elements;
 mod every_lens;
 mod experiments;
+mod figures;
 mod files;
 mod freeform;
 mod freeform_sag;

@@ -4,6 +4,7 @@ mod charts;
 mod chief;
 mod color;
 mod contrast;
+mod contrast_over_field;
 mod csv;
 mod fan;
 mod field_charts;
@@ -11,6 +12,8 @@ mod focus;
 mod ghosts;
 mod illumination;
 mod point_spread;
+mod ray_image;
+mod seidel;
 mod spot;
 mod spot_map;
 mod thermal;
@@ -58,7 +61,7 @@ pub(super) struct AnalyzeArgs {
     #[arg(long, value_name = "N", default_value_t = 0)]
     zoom: usize,
 
-    /// Spatial frequencies of `mtf` and `through-focus-mtf`, in cycles/mm
+    /// Spatial frequencies of `mtf`, `field-mtf` and `through-focus-mtf`, in cycles/mm
     #[arg(long, value_name = "NU", value_delimiter = ',', default_value = "10,20,30,40,50")]
     frequencies: Vec<f64>,
 
@@ -76,7 +79,8 @@ pub(super) struct AnalyzeArgs {
     #[arg(long = "pupil", value_name = "PX,PY", value_parser = parse_point, allow_hyphen_values = true)]
     pupil_points: Vec<[f64; 2]>,
 
-    /// The radii of the circles of `encircled-energy` in mm; absent: ten up to 6 lambda F
+    /// The radii of the circles of `encircled-energy` and `geometric-energy` in mm; absent: ten, up to 6 lambda F
+    /// or all of the spot
     #[arg(long, value_name = "MM", value_delimiter = ',')]
     radii: Vec<f64>,
 
@@ -188,6 +192,14 @@ enum AnalysisKind {
     Mtf,
     /// Contrast by diffraction at displaced image planes
     ThroughFocusMtf,
+    /// Contrast from the axis to the edge of the field, at all wavelengths
+    FieldMtf,
+    /// Density of rays in the image of a point
+    GeometricPsf,
+    /// Share of the light within circles, by rays
+    GeometricEnergy,
+    /// Third-order sums of every surface
+    Seidel,
     /// Light that two surfaces reflect: size, irradiance, focus and the surfaces
     Ghosts,
     /// Focus and RMS radius at several temperatures, with the image plane where the mount holds it
@@ -253,11 +265,16 @@ impl AnalysisKind {
     /// The effects that the analysis does not leave to the plan.
     fn effect_rules(self) -> &'static [EffectRule] {
         match self {
-            Self::Spot | Self::Fan | Self::ThroughFocus | Self::Mtf => &[],
+            Self::Spot
+            | Self::Fan
+            | Self::ThroughFocus
+            | Self::Mtf
+            | Self::GeometricPsf
+            | Self::GeometricEnergy => &[],
             Self::Thermal => &[TEMPERATURES],
-            Self::LateralColor | Self::Longitudinal => &[COLORS],
+            Self::LateralColor | Self::Longitudinal | Self::Seidel => &[COLORS],
             Self::Distortion | Self::DistortionGrid => &[ONE_WAVELENGTH, OBJECT_IN_PLACE],
-            Self::SpotMap => &[ALL_FIELDS],
+            Self::SpotMap | Self::FieldMtf => &[ALL_FIELDS],
             Self::Ghosts => &GHOST_RULES,
             Self::Illumination => &IRRADIANCE_RULES,
             _ => &[ONE_WAVELENGTH],
@@ -328,6 +345,14 @@ impl AnalyzeArgs {
             AnalysisKind::ThroughFocusMtf => {
                 self.finish(&run, contrast::through_focus(&run), output)
             }
+            AnalysisKind::FieldMtf => {
+                self.finish(&run, contrast_over_field::over_field(&run), output)
+            }
+            AnalysisKind::GeometricPsf => self.finish(&run, ray_image::images(&run), output),
+            AnalysisKind::GeometricEnergy => {
+                self.finish(&run, ray_image::energies(&run, &self.radii), output)
+            }
+            AnalysisKind::Seidel => self.finish(&run, seidel::sums(&run)?, output),
             AnalysisKind::Ghosts => {
                 let lists = ghosts::ghost_lists(&run, self.coating, self.ghosts)?;
                 self.finish(&run, lists, output)

@@ -94,7 +94,7 @@ fn cutoff(model: &RayModel) -> Option<f64> {
 }
 
 /// A round frequency up to which the sharpest field has contrast.
-fn highest_frequency(model: &RayModel, spots: &[Result<Spot, AnalysisError>]) -> f64 {
+pub(super) fn highest_frequency(model: &RayModel, spots: &[Result<Spot, AnalysisError>]) -> f64 {
     let radii = spots.iter().filter_map(|spot| spot.as_ref().ok()).map(|spot| spot.rms);
     let sharpest = radii.map(|Estimate { value, .. }| value).fold(f64::INFINITY, f64::min);
     let seen = REACH / sharpest;

@@ -4,19 +4,30 @@
 //! the contrast also between two frequencies.
 //! Results carry the version of the design that they belong to and the time of each analysis.
 
+mod accuracy;
 mod as_built;
 mod contrast;
+mod contrast_pages;
 mod ghosts;
+mod pages;
+mod picture_options;
 mod pupils;
+mod ray_images;
 mod scene;
 mod scene_picture;
 mod slow;
+mod slow_analyses;
 mod wavefronts;
 
+pub use accuracy::{AccuracyCurves, AccuracyPoint};
 pub use as_built::{AsBuiltLens, confirm_as_built, predict_as_built};
 pub use contrast::{FieldContrast, FieldContrasts};
+pub use contrast_pages::{FieldContrastCurves, FocusContrasts};
 pub use ghosts::FieldGhosts;
+pub use pages::{ContrastPage, FieldPage};
+pub use picture_options::{PictureEffect, PictureFocus, PictureOptions};
 pub use pupils::FieldPupils;
+pub use ray_images::{FieldRayImage, RayImages};
 pub use scene::{PictureScene, SceneFile};
 pub use scene_picture::ScenePicture;
 pub use wavefronts::{FieldWavefront, FieldWavefronts, PointImage, PointImages};
@@ -24,8 +35,8 @@ pub use wavefronts::{FieldWavefront, FieldWavefronts, PointImage, PointImages};
 use super::clock::{Timed, now, time};
 use super::run::{LatestRequestWorker, WorkerOutput, catch_panic};
 use crate::analysis::{
-    self, AnalysisError, Coating, Fan, FieldCurves, Footprint, GhostError, RayLayout, Spot,
-    SpotMap, SpotPoints,
+    self, AnalysisError, Coating, Fan, FieldCurves, Footprint, GhostError, GridPoint,
+    LongitudinalAberration, PathFan, RayLayout, Spot, SpotMap, SpotPoints,
 };
 use crate::effects::{self, Effect, EffectOverride, EffectOverrides, EffectPlan, TracePurpose};
 use crate::lens::{FieldPoint, Lens};
@@ -37,13 +48,16 @@ use crate::pupil::{Accuracy, RayModel, RayModelError};
 use crate::tolerance::{LoosestGoal, ToleranceGrade};
 use pupils::{field_pupils, for_each_field};
 use serde::{Deserialize, Serialize};
-use slow::SlowAnalysis;
+use slow_analyses::SlowAnalyses;
 use std::io;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 /// The ray fans of each field, or the reason why it has none.
 pub type FieldFans = Vec<Result<Vec<Fan>, AnalysisError>>;
+
+/// The fans of path differences of each field, or the reason why it has none.
+pub type FieldPathFans = Vec<Result<Vec<PathFan>, AnalysisError>>;
 
 /// The footprints of each field, or the reason why it has none.
 pub type FieldFootprints = Vec<Result<Vec<Footprint>, AnalysisError>>;
@@ -88,10 +102,21 @@ pub struct Analyses {
     /// The contrast of the fields; `None` while no panel shows it, and at first: it may take longer than
     /// all else.
     pub contrasts: Option<Arc<Timed<FieldContrasts>>>,
+    /// The contrast over the field; `None` while no panel shows it, and at first.
+    pub field_contrast: Option<Arc<Timed<FieldContrastCurves>>>,
+    /// The contrast through focus; `None` while no panel shows it, and at first.
+    pub focus_contrasts: Option<Arc<Timed<FocusContrasts>>>,
     /// The wavefronts of the fields; `None` while no panel shows them, and at first.
     pub wavefronts: Option<Arc<Timed<FieldWavefronts>>>,
     /// The images of a point by diffraction; `None` while no panel shows them, and at first.
     pub point_images: Option<Arc<Timed<PointImages>>>,
+    /// The images of a point by rays alone; `None` while no panel shows them, and at first.
+    pub ray_images: Option<Arc<Timed<RayImages>>>,
+    /// Error against time of contrast, or the reason why it is not known; `None` while no panel shows it, and
+    /// at first.
+    pub contrast_accuracy: Option<Arc<Timed<Result<AccuracyCurves, String>>>>,
+    /// The same of pictures.
+    pub picture_accuracy: Option<Arc<Timed<Result<AccuracyCurves, String>>>>,
     /// A scene through the lens, or the reason why there is none; `None` while no panel shows it.
     pub picture: Option<Arc<Timed<Result<ScenePicture, String>>>>,
     /// The lens as it is made, or the reason why nothing is known of it; `None` while no panel shows it,
@@ -99,8 +124,14 @@ pub struct Analyses {
     pub as_built: Option<Arc<Timed<Result<AsBuiltLens, String>>>>,
     /// The ray fans of each field; `None` while no panel shows them.
     pub fans: Option<Timed<FieldFans>>,
+    /// The fans of path differences of each field; `None` while no panel shows them.
+    pub path_fans: Option<Timed<FieldPathFans>>,
     /// Distortion, field curvature and illumination over the field; `None` while no panel shows them.
     pub field_curves: Option<Timed<FieldCurves>>,
+    /// The crossings of rays with the axis over the pupil; `None` while no panel shows them.
+    pub longitudinal: Option<Timed<Result<Vec<LongitudinalAberration>, AnalysisError>>>,
+    /// The image of a square grid; `None` while no panel shows it.
+    pub grid: Option<Timed<Result<Vec<GridPoint>, AnalysisError>>>,
     /// The footprints of each field on all surfaces, the image plane last; `None` while no panel shows
     /// them.
     pub footprints: Option<Timed<FieldFootprints>>,
@@ -164,78 +195,6 @@ pub(super) fn spawn_analysis(
             measure(results, output);
         }
     })
-}
-
-/// The analyses that take longer than all else, in the order in which they follow.
-struct SlowAnalyses {
-    ghosts: SlowAnalysis<Result<FieldGhosts, GhostError>>,
-    spot_map: SlowAnalysis<Result<SpotMap, AnalysisError>>,
-    contrasts: SlowAnalysis<FieldContrasts>,
-    wavefronts: SlowAnalysis<FieldWavefronts>,
-    point_images: SlowAnalysis<PointImages>,
-}
-
-impl SlowAnalyses {
-    fn new() -> Self {
-        Self {
-            ghosts: SlowAnalysis {
-                is_asked: |settings| settings.ghosts,
-                compute: |results, analyses, interrupted| {
-                    let model = &analyses.ray_model.value;
-                    ghosts::field_ghosts(model, &results.settings, interrupted)
-                },
-                slot: |analyses| &mut analyses.ghosts,
-                known: None,
-            },
-            spot_map: SlowAnalysis {
-                is_asked: |settings| settings.spot_map,
-                compute: |AnalysisResults { lens, settings, .. }, analyses, interrupted| {
-                    let (model, plan) = (&analyses.ray_model.value, &analyses.plan.value);
-                    let model = model_with_all_rims(lens, settings.zoom, model, plan);
-                    let map = analysis::spot_map(&model, MAP_COLUMNS, LOOKED_AT, interrupted);
-                    (map != Err(AnalysisError::Interrupted)).then_some(map)
-                },
-                slot: |analyses| &mut analyses.spot_map,
-                known: None,
-            },
-            contrasts: SlowAnalysis {
-                is_asked: |settings| settings.contrasts,
-                compute: |results, analyses, interrupted| {
-                    let (model, spots) = (&analyses.ray_model.value, &analyses.spots.value);
-                    let tolerance = results.settings.tolerance;
-                    contrast::field_contrasts(model, spots, tolerance, interrupted)
-                },
-                slot: |analyses| &mut analyses.contrasts,
-                known: None,
-            },
-            wavefronts: SlowAnalysis {
-                is_asked: |settings| settings.wavefronts,
-                compute: |results, analyses, interrupted| {
-                    let model = &analyses.ray_model.value;
-                    wavefronts::field_wavefronts(model, results.settings.tolerance, interrupted)
-                },
-                slot: |analyses| &mut analyses.wavefronts,
-                known: None,
-            },
-            point_images: SlowAnalysis {
-                is_asked: |settings| settings.wavefronts && settings.point_images,
-                compute: |_, analyses, interrupted| {
-                    let (model, spots) = (&analyses.ray_model.value, &analyses.spots.value);
-                    wavefronts::point_images(model, spots, interrupted)
-                },
-                slot: |analyses| &mut analyses.point_images,
-                known: None,
-            },
-        }
-    }
-
-    fn publish(&mut self, results: AnalysisResults, output: &AnalysisOutput) -> AnalysisResults {
-        let results = self.ghosts.publish(results, output);
-        let results = self.spot_map.publish(results, output);
-        let results = self.contrasts.publish(results, output);
-        let results = self.wavefronts.publish(results, output);
-        self.point_images.publish(results, output)
-    }
 }
 
 /// The number of columns of a map of the field.
@@ -312,9 +271,13 @@ fn refine(mut results: AnalysisResults, output: &AnalysisOutput) -> AnalysisResu
     if settings.picture && !output.is_interrupted() {
         let (lens, all) = (&results.lens, settings.picture_errors);
         let is_interrupted = output.interruption();
-        let draw = || scene_picture::fine_picture(lens, zoom, &scene, all, &is_interrupted);
+        let subject = (&scene, &settings.picture_options);
+        let draw = || scene_picture::fine_picture(lens, zoom, subject, all, &is_interrupted);
         let fine = time(|| catch_panic(draw));
-        analyses.picture = Some(Arc::new(fine));
+        // A part of a picture is worth less than a coarse one.
+        if fine.value.as_ref().map_or(true, |fine| fine.picture.complete) {
+            analyses.picture = Some(Arc::new(fine));
+        }
     }
     output.publish(results.clone());
     results
@@ -375,6 +338,10 @@ fn plan_effects(lens: &Lens, settings: &AnalysisSettings) -> Result<EffectPlan, 
 
 /// The number of points of a ray fan.
 const FAN_POINTS: usize = 65;
+/// The number of zones of the longitudinal aberration.
+const ZONES: usize = 40;
+/// The number of squares along a side of the grid of distortion.
+const SQUARES: usize = 10;
 
 impl Analyses {
     /// Computes all analyses, those that are looked at first in front. `None` if interrupted.
@@ -401,21 +368,11 @@ impl Analyses {
         unless_interrupted()?;
         let picture = settings.picture.then(|| {
             let scene = settings.picture_scene();
-            Arc::new(time(|| scene_picture::coarse_picture(lens, settings.zoom, &scene)))
+            let options = &settings.picture_options;
+            Arc::new(time(|| scene_picture::coarse_picture(lens, settings.zoom, &scene, options)))
         });
         unless_interrupted()?;
-        let fans = settings.fans.then(|| time(|| field_fans(&b)));
-        unless_interrupted()?;
-        let field_curves = settings.field_curves.then(|| {
-            time(|| {
-                let model = model_with_all_rims(lens, settings.zoom, &b, &plan.value);
-                analysis::field_curves(&model, accuracy)
-            })
-        });
-        unless_interrupted()?;
-        let footprints = settings.footprints.then(|| time(|| field_footprints(&b)));
-        unless_interrupted()?;
-        Some(Self {
+        let numbers = Self {
             seidel: time(|| b.seidel()),
             airy: analysis::airy_radius(&b),
             ray_model,
@@ -426,22 +383,65 @@ impl Analyses {
             spots,
             pupils,
             contrasts: None,
+            field_contrast: None,
+            focus_contrasts: None,
             wavefronts: None,
             point_images: None,
+            ray_images: None,
+            contrast_accuracy: None,
+            picture_accuracy: None,
             picture,
             as_built: None,
-            fans,
-            field_curves,
-            footprints,
+            fans: None,
+            path_fans: None,
+            field_curves: None,
+            longitudinal: None,
+            grid: None,
+            footprints: None,
             spot_map: None,
             ghosts: None,
             ghost_rays,
-        })
+        };
+        numbers.with_charts(lens, settings, interrupted)
+    }
+
+    /// The same with the charts that panels show. `None` if interrupted.
+    fn with_charts(
+        self,
+        lens: &Lens,
+        settings: &AnalysisSettings,
+        interrupted: impl Fn() -> bool,
+    ) -> Option<Self> {
+        let unless_interrupted = || (!interrupted()).then_some(());
+        let b = Arc::clone(&self.ray_model.value);
+        let accuracy = Accuracy { tolerance: settings.tolerance, ..Accuracy::default() };
+        let fans = settings.fans.then(|| time(|| field_fans(&b)));
+        let path_fans = settings.path_fans.then(|| time(|| field_path_fans(&b)));
+        unless_interrupted()?;
+        let shows = |page| settings.field_curves && settings.field_page == page;
+        let field_curves = shows(FieldPage::Curves).then(|| {
+            time(|| {
+                let model = model_with_all_rims(lens, settings.zoom, &b, &self.plan.value);
+                analysis::field_curves(&model, accuracy)
+            })
+        });
+        let longitudinal = shows(FieldPage::Longitudinal)
+            .then(|| time(|| analysis::longitudinal_aberration(&b, ZONES)));
+        let grid = shows(FieldPage::Grid)
+            .then(|| time(|| analysis::distortion_grid(&b, b.primary, SQUARES)));
+        unless_interrupted()?;
+        let footprints = settings.footprints.then(|| time(|| field_footprints(&b)));
+        unless_interrupted()?;
+        Some(Self { fans, path_fans, field_curves, longitudinal, grid, footprints, ..self })
     }
 }
 
 fn field_fans(model: &RayModel) -> FieldFans {
     for_each_field(model, |field| analysis::fan(model, field, FAN_POINTS))
+}
+
+fn field_path_fans(model: &RayModel) -> FieldPathFans {
+    for_each_field(model, |field| analysis::path_fans(model, field, FAN_POINTS))
 }
 
 fn field_footprints(model: &RayModel) -> FieldFootprints {
@@ -510,19 +510,37 @@ pub struct AnalysisSettings {
     /// True if the contrast is computed, because a panel shows it.
     #[serde(default)]
     pub contrasts: bool,
+    /// The page of the contrast that is computed.
+    #[serde(default)]
+    pub contrast_page: ContrastPage,
+    /// The highest spatial frequency of the contrast over the field, and that through focus, in cycles/mm;
+    /// `None` for one that the lens resolves well.
+    #[serde(default)]
+    pub contrast_frequency: Option<f64>,
+    /// True if error against time of contrast is measured, because the panel shows it.
+    #[serde(default)]
+    pub contrast_accuracy: bool,
     /// True if the wavefronts are computed, because a panel shows them.
     #[serde(default)]
     pub wavefronts: bool,
     /// True if the images of a point are computed beside the wavefronts, because the panel shows them.
     #[serde(default)]
     pub point_images: bool,
+    /// True if the images of a point by rays are computed, because the panel shows them.
+    #[serde(default)]
+    pub ray_images: bool,
     /// True if the ray fans are computed, because a panel shows them.
     #[serde(default)]
     pub fans: bool,
-    /// True if distortion, field curvature and illumination are computed over the field, because a panel
-    /// shows them.
+    /// True if the fans of path differences are computed, because a panel shows them.
+    #[serde(default)]
+    pub path_fans: bool,
+    /// True if results over the field are computed, because a panel shows them.
     #[serde(default)]
     pub field_curves: bool,
+    /// The page of these results that is computed.
+    #[serde(default)]
+    pub field_page: FieldPage,
     /// True if the footprints are computed, because a panel shows them.
     #[serde(default)]
     pub footprints: bool,
@@ -547,6 +565,12 @@ pub struct AnalysisSettings {
     /// The picture from a file that takes the place of that scene.
     #[serde(skip)]
     pub scene_file: Option<SceneFile>,
+    /// The options of the picture.
+    #[serde(default)]
+    pub picture_options: PictureOptions,
+    /// True if error against time of pictures is measured, because the panel shows it.
+    #[serde(default)]
+    pub picture_accuracy: bool,
     /// True if the error of the picture is measured everywhere, because a panel shows it.
     #[serde(default)]
     pub picture_errors: bool,
@@ -567,6 +591,11 @@ pub struct AnalysisSettings {
 }
 
 impl AnalysisSettings {
+    /// True if a panel shows this page of the contrast.
+    pub fn shows_contrast(&self, page: ContrastPage) -> bool {
+        self.contrasts && self.contrast_page == page
+    }
+
     /// The scene of the picture.
     pub fn picture_scene(&self) -> PictureScene {
         let built_in = PictureScene::BuiltIn(self.scene);
@@ -583,10 +612,16 @@ impl Default for AnalysisSettings {
             overrides: EffectOverrides::default(),
             pupils: false,
             contrasts: false,
+            contrast_page: ContrastPage::default(),
+            contrast_frequency: None,
+            contrast_accuracy: false,
             wavefronts: false,
             point_images: false,
+            ray_images: false,
             fans: false,
+            path_fans: false,
             field_curves: false,
+            field_page: FieldPage::default(),
             footprints: false,
             spot_map: false,
             ghosts: false,
@@ -595,6 +630,8 @@ impl Default for AnalysisSettings {
             picture: false,
             scene: BuiltInScene::default(),
             scene_file: None,
+            picture_options: PictureOptions::default(),
+            picture_accuracy: false,
             picture_errors: false,
             tolerances: false,
             grade: ToleranceGrade::default(),

@@ -31,6 +31,11 @@ impl SceneFile {
         Ok(Self { path: path.to_owned(), raster })
     }
 
+    /// The file.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
     /// The name of the file.
     pub fn name(&self) -> String {
         self.path.file_name().unwrap_or(self.path.as_os_str()).to_string_lossy().into_owned()
@@ -52,6 +57,14 @@ impl PictureScene {
         match self {
             Self::BuiltIn(scene) => scene.name().to_owned(),
             Self::File(file) => file.name(),
+        }
+    }
+
+    /// The scene that needs no file; `None` for a picture from one.
+    pub const fn built_in(&self) -> Option<BuiltInScene> {
+        match self {
+            Self::BuiltIn(scene) => Some(*scene),
+            Self::File(_) => None,
         }
     }
 

@@ -36,6 +36,7 @@ impl<T> KnownNumbers<T> {
             && own.tolerance == other.tolerance
             && own.overrides == other.overrides
             && own.coating == other.coating
+            && own.contrast_frequency == other.contrast_frequency
     }
 }
 

@@ -35,6 +35,8 @@ pub struct FieldWavefront {
     pub map: SquareGrid<Option<f64>>,
     /// The Zernike coefficients in Noll's order, or the reason why there are none.
     pub zernike: Result<ZernikeSum, AnalysisError>,
+    /// The same in the fringe order.
+    pub fringe: Result<ZernikeSum, AnalysisError>,
 }
 
 /// The image of a point by diffraction.
@@ -109,9 +111,9 @@ fn field_wavefront(
 ) -> Result<FieldWavefront, AnalysisError> {
     let wavefront = analysis::wavefront(model, field, model.primary, accuracy)?;
     let map = path_map(model, field, model.primary, MAP)?;
-    let order = (ZernikeOrder::Noll, TERMS);
-    let zernike = zernike(model, field, model.primary, order, accuracy);
-    Ok(FieldWavefront { wavefront, map, zernike })
+    let sum = |order| zernike(model, field, model.primary, (order, TERMS), accuracy);
+    let (zernike, fringe) = (sum(ZernikeOrder::Noll), sum(ZernikeOrder::Fringe));
+    Ok(FieldWavefront { wavefront, map, zernike, fringe })
 }
 
 fn point_image(
@@ -138,7 +140,7 @@ fn point_image(
 }
 
 /// The half width of an image in mm: that of diffraction, or of a spot that is somewhat larger.
-fn half_width(model: &RayModel, spot: &Result<Spot, AnalysisError>) -> f64 {
+pub(super) fn half_width(model: &RayModel, spot: &Result<Spot, AnalysisError>) -> f64 {
     let f_number = model.first_order.working_f_number.unwrap_or(1.0).abs();
     let unit = model.channels[model.primary].um * 1e-3 * f_number;
     let color = spot.as_ref().ok().and_then(|spot| spot.channels.get(model.primary)?.as_ref().ok());

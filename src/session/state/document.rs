@@ -7,10 +7,11 @@ use crate::math::format_short;
 use crate::picture::{BitDepth, ToneCurve, encode_png};
 use crate::pupil::{RayModel, limited_by_stop};
 use crate::report::{
-    FurtherColumns, PaperKind, ReportSettings, drawing_bytes, has_extension, report_bytes,
+    FigureKind, FurtherColumns, PaperKind, ReportSettings, drawing_bytes, has_extension, report_bytes,
     solids_file, tolerance_sheet, tolerance_table,
 };
 use crate::session::ScenePicture;
+use crate::session::figures::analysis_figure;
 use crate::session::history::{DesignHistory, VersionOrigin};
 use crate::session::journal::JournalEntry;
 use crate::session::proposal::MeritProposal;
@@ -251,6 +252,15 @@ impl Session {
         }
     }
 
+    /// Writes what an analysis shows of the lens that the panels show.
+    fn write_figure(&self, kind: FigureKind, path: &Path) -> Result<(), String> {
+        let results = self.preview_results().or_else(|| self.results());
+        let results = results.ok_or("nothing is computed yet")?;
+        let figure = analysis_figure(kind, &results)?;
+        let bytes = figure.bytes(&results.lens.name, path).map_err(|why| why.to_string())?;
+        files::write_atomic(path, &bytes).map_err(|why| why.to_string())
+    }
+
     /// Adds a glass catalogue for good.
     pub(super) fn add_glasses(&mut self, path: &Path) {
         match files::add_catalogue(path) {
@@ -299,6 +309,7 @@ impl Session {
             PaperKind::Solids => {
                 solids_file(&self.lens, zoom, None).map(|file| file.text.into_bytes())
             }
+            PaperKind::Figure(kind) => return self.write_figure(kind, path),
             PaperKind::ToleranceTable | PaperKind::ToleranceCharts => {
                 let bytes = self.tolerance_bytes(kind)?;
                 return files::write_atomic(path, &bytes).map_err(|why| why.to_string());
@@ -321,14 +332,14 @@ impl Session {
         let analyses = results.as_ref().and_then(|results| results.analyses.as_ref().ok());
         let shown = analyses.and_then(|analyses| analyses.picture.clone());
         let shown = shown.ok_or("there is no picture yet; open the panel Picture")?;
-        let ScenePicture { picture, scene, error, .. } =
+        let ScenePicture { picture, scene, error, left_out, .. } =
             shown.value.as_ref().map_err(Clone::clone)?;
         let error = error.map_or("not measured".to_owned(), |error| format!("{:.4}", error.value));
         let texts = [
             ("Software", "Aplanat".to_owned()),
             ("Scene", scene.name()),
             ("Error", format!("{error} of mid grey (rms)")),
-            ("Left out", "diffraction, losses, ghosts".to_owned()),
+            ("Left out", left_out.join("; ")),
         ];
         let bytes = encode_png(picture, BitDepth::Sixteen, ToneCurve::Srgb, &texts)
             .map_err(|why| why.to_string())?;

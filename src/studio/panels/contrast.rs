@@ -1,15 +1,21 @@
-//! The modulation transfer function of every field, with the limit that diffraction sets.
+//! The modulation transfer function of every field: against spatial frequency with the limit that diffraction
+//! sets, over the field, and through focus.
 
 use std::sync::Arc;
 
-use egui::{Response, RichText, Ui, WidgetInfo};
+use egui::{Button, DragValue, Response, RichText, ScrollArea, Ui, WidgetInfo};
 use egui_plot::{Line, LineStyle, PlotPoints};
 
+use super::figure_view::{ChartForm, accuracy_section, export_menu, notes, titled_chart};
 use super::widgets::{fixed_plot, plot_curve, swatch};
 use super::{Panel, displayed_results, field_name, plain_error, show_missing_results};
 use crate::analysis::{AnalysisError, MtfCurve, TransferValue};
 use crate::lens::Fields;
-use crate::session::{AnalysisResults, FieldContrast, FieldContrasts, SessionView, Timed};
+use crate::report::FigureKind;
+use crate::session::{
+    Analyses, AnalysisResults, Command, ContrastPage, FieldContrast, FieldContrasts, PanelSetting,
+    SessionView, Timed, analysis_figure,
+};
 use crate::studio::actions::Actions;
 use crate::studio::number;
 use crate::studio::palette::{Palette, color32};
@@ -21,10 +27,22 @@ const LOWEST: f32 = 120.0;
 /// The opacity of what belongs to the lens before.
 const FAINT: f32 = 0.45;
 
+/// The pages with their names.
+const PAGES: [(ContrastPage, &str, &str); 3] = [
+    (ContrastPage::Frequency, "Frequency", "Contrast against spatial frequency"),
+    (
+        ContrastPage::Field,
+        "Field",
+        "Contrast at a few frequencies from the axis to the edge of the field",
+    ),
+    (ContrastPage::Focus, "Focus", "Contrast at a frequency against the shift of the image plane"),
+];
+
 /// The panel. It shows the last contrasts, faint, until those of a changed lens are there.
 #[derive(Debug, Default)]
 pub struct ContrastPanel {
-    last: Option<Arc<AnalysisResults>>,
+    /// The last results of each page.
+    last: [Option<Arc<AnalysisResults>>; 3],
 }
 
 impl Panel for ContrastPanel {
@@ -32,34 +50,134 @@ impl Panel for ContrastPanel {
         "MTF"
     }
 
-    fn ui(&mut self, ui: &mut Ui, view: &SessionView, _actions: &mut Actions) {
+    fn ui(&mut self, ui: &mut Ui, view: &SessionView, actions: &mut Actions) {
         let Some((results, numbers)) = displayed_results(view) else {
             return show_missing_results(ui, view);
         };
-        let is_current = numbers.contrasts.is_some();
-        if is_current {
-            self.last = Some(Arc::clone(results));
+        let page = view.settings.contrast_page;
+        header(ui, view, numbers, actions);
+        let known = numbers.contrast_accuracy.is_some();
+        let subject = (&**results, known);
+        let open = accuracy_section(ui, FigureKind::ContrastAccuracy, subject, actions);
+        if open != view.settings.contrast_accuracy {
+            actions.push(Command::Show(PanelSetting::ContrastAccuracy(open)));
         }
-        let shown = self.last.as_ref().and_then(|last| Some((last, last.analyses.as_ref().ok()?)));
-        let shown = shown.and_then(|(last, numbers)| Some((last, numbers.contrasts.as_ref()?)));
-        let Some((results, contrasts)) = shown else {
+        let is_current = is_computed(numbers, page);
+        let last = &mut self.last[page as usize];
+        if is_current {
+            *last = Some(Arc::clone(results));
+        }
+        let Some(results) = last.clone() else {
             ui.weak("Computing …");
             return;
         };
-        let lines = 2 + contrasts.value.fields.len();
-        let height = (ui.available_height() - LINE * lines as f32).max(LOWEST);
-        legend(ui, is_current);
+        if page == ContrastPage::Frequency {
+            return over_frequency(ui, &results, is_current);
+        }
         if !is_current {
+            ui.label(RichText::new("of the lens before; computing …").small());
             ui.multiply_opacity(FAINT);
         }
-        plot(ui, &contrasts.value, height);
-        let fields = results.lens.fields_at(results.settings.zoom);
-        egui::ScrollArea::vertical().show(ui, |ui| {
-            for (i, field) in contrasts.value.fields.iter().enumerate() {
-                field_line(ui, fields, field, i);
-            }
-        });
+        other_page(ui, &results, page);
     }
+}
+
+const fn figure_kind(page: ContrastPage) -> FigureKind {
+    match page {
+        ContrastPage::Frequency => FigureKind::Contrast,
+        ContrastPage::Field => FigureKind::FieldContrast,
+        ContrastPage::Focus => FigureKind::FocusContrast,
+    }
+}
+
+const fn is_computed(numbers: &Analyses, page: ContrastPage) -> bool {
+    match page {
+        ContrastPage::Frequency => numbers.contrasts.is_some(),
+        ContrastPage::Field => numbers.field_contrast.is_some(),
+        ContrastPage::Focus => numbers.focus_contrasts.is_some(),
+    }
+}
+
+/// The choice of the page, the frequency, and the menu of files.
+fn header(ui: &mut Ui, view: &SessionView, numbers: &Analyses, actions: &mut Actions) {
+    let shown = view.settings.contrast_page;
+    ui.horizontal_wrapped(|ui| {
+        ui.spacing_mut().item_spacing.x = 2.0;
+        for (page, name, hint) in PAGES {
+            let button = Button::selectable(shown == page, name);
+            if ui.add(button).on_hover_text(hint).clicked() && page != shown {
+                actions.push(Command::Show(PanelSetting::ContrastPage(page)));
+            }
+        }
+        if shown != ContrastPage::Frequency {
+            frequency(ui, view, numbers, actions);
+        }
+        export_menu(ui, figure_kind(shown), actions);
+    });
+}
+
+/// The frequency of contrast over the field and through focus.
+fn frequency(ui: &mut Ui, view: &SessionView, numbers: &Analyses, actions: &mut Actions) {
+    let over_field = || numbers.field_contrast.as_ref()?.value.frequencies.last().copied();
+    let in_focus = || numbers.focus_contrasts.as_ref().map(|found| found.value.frequency);
+    let present =
+        if view.settings.contrast_page == ContrastPage::Field { over_field() } else { in_focus() };
+    let asked = view.settings.contrast_frequency;
+    let Some(mut frequency) = asked.or(present) else { return };
+    let speed = (0.01 * frequency).max(0.01);
+    let drag = DragValue::new(&mut frequency)
+        .speed(speed)
+        .range(0.01..=1e5)
+        .suffix(" /mm")
+        .custom_formatter(|value, _| number::format_digits(value, 4));
+    let hint = "Cycles/mm; over the field also at a half and a quarter of it";
+    let field = ui.add(drag).on_hover_text(hint);
+    if field.accessible_name("Spatial frequency").changed() {
+        actions.push(Command::Show(PanelSetting::ContrastFrequency(Some(frequency))));
+    }
+    if asked.is_some()
+        && ui.button("Auto").on_hover_text("A frequency that the lens resolves well").clicked()
+    {
+        actions.push(Command::Show(PanelSetting::ContrastFrequency(None)));
+    }
+}
+
+/// The contrast of the fields against frequency, with a line of numbers for each.
+fn over_frequency(ui: &mut Ui, results: &AnalysisResults, is_current: bool) {
+    let Ok(numbers) = &results.analyses else { return };
+    let Some(contrasts) = &numbers.contrasts else { return };
+    let lines = 2 + contrasts.value.fields.len();
+    let height = (ui.available_height() - LINE * lines as f32).max(LOWEST);
+    legend(ui, is_current);
+    if !is_current {
+        ui.multiply_opacity(FAINT);
+    }
+    plot(ui, &contrasts.value, height);
+    let fields = results.lens.fields_at(results.settings.zoom);
+    ScrollArea::vertical().show(ui, |ui| {
+        for (i, field) in contrasts.value.fields.iter().enumerate() {
+            field_line(ui, fields, field, i);
+        }
+    });
+}
+
+/// The contrast over the field or through focus, with its notes.
+fn other_page(ui: &mut Ui, results: &AnalysisResults, page: ContrastPage) {
+    let figure = match analysis_figure(figure_kind(page), results) {
+        Ok(figure) => figure,
+        Err(why) => return drop(ui.weak(why)),
+    };
+    let text = "tangential solid, sagittal dashed";
+    ui.label(RichText::new(text).small().weak());
+    let words = LINE * (2 + figure.notes.len()) as f32;
+    let height = (ui.available_height() - words).max(LOWEST);
+    ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
+        for chart in figure.rows.iter().flatten() {
+            let form = ChartForm { contains: [&[], &[0.0, 1.0]], ..ChartForm::new(height) };
+            titled_chart(ui, (chart, &figure.colors), "", form);
+        }
+        notes(ui, &figure);
+    });
 }
 
 fn legend(ui: &mut Ui, is_current: bool) {

@@ -1,12 +1,17 @@
-//! Ray fans: the transverse aberration of every field across two sections of its pupil.
+//! Ray fans: the transverse aberration of every field across two sections of its pupil, or its path
+//! differences.
 
-use egui::{Response, RichText, ScrollArea, Ui, WidgetInfo};
+use egui::{Button, RichText, ScrollArea, Ui};
 
-use super::widgets::{fixed_plot, plot_curve, swatch};
+use super::figure_view::{ChartForm, bare_chart, export_menu};
+use super::widgets::swatch;
 use super::{Panel, displayed_results, field_name, show_missing_results};
-use crate::analysis::{AnalysisError, Fan, FanPoint};
 use crate::lens::Fields;
-use crate::session::{Analyses, SessionView};
+use crate::plot::CurveChart;
+use crate::report::{AnalysisFigure, FigureKind};
+use crate::session::{
+    Analyses, AnalysisResults, Command, PanelSetting, SessionView, analysis_figure,
+};
 use crate::studio::actions::Actions;
 use crate::studio::number;
 use crate::studio::palette::{Palette, color32};
@@ -14,7 +19,7 @@ use crate::studio::palette::{Palette, color32};
 /// The height of the words of a field.
 const WORDS: f32 = 22.0;
 /// The lowest plot.
-const LOWEST: f32 = 80.0;
+const LOWEST: f32 = 62.0;
 
 /// The panel.
 #[derive(Debug, Default)]
@@ -25,152 +30,173 @@ impl Panel for FansPanel {
         "Ray fans"
     }
 
-    fn ui(&mut self, ui: &mut Ui, view: &SessionView, _actions: &mut Actions) {
+    fn ui(&mut self, ui: &mut Ui, view: &SessionView, actions: &mut Actions) {
         let Some((results, numbers)) = displayed_results(view) else {
             return show_missing_results(ui, view);
         };
-        let Some(fans) = &numbers.fans else {
+        let paths = view.settings.path_fans;
+        let page = if paths { FansPage::PATHS } else { FansPage::RAYS };
+        header(ui, page, actions);
+        let Some((errors, ms)) = page.outcomes(numbers) else {
             ui.weak("Computing …");
             return;
         };
-        let scale = scale(&fans.value);
-        legend(ui, numbers, scale, fans.ms);
-        let rows = fans.value.len().max(1) as f32;
+        match analysis_figure(page.kind, results) {
+            Ok(figure) => page.show(ui, results, (&figure, &errors, ms)),
+            Err(why) => drop(ui.weak(why)),
+        }
+    }
+}
+
+/// The quantity that fans show.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct FansPage {
+    kind: FigureKind,
+    paths: bool,
+    unit: &'static str,
+    hint: &'static str,
+    legend: &'static str,
+}
+
+impl FansPage {
+    const RAYS: Self = Self {
+        kind: FigureKind::Fans,
+        paths: false,
+        unit: "µm",
+        hint: "Distance from the image point of the chief ray of the primary wavelength, on one scale, \
+               against the coordinate in the stop from rim to rim",
+        legend: "left: εy along y, right: εx along x of the stop",
+    };
+    const PATHS: Self = Self {
+        kind: FigureKind::PathFans,
+        paths: true,
+        unit: "wavelengths",
+        hint: "Path of the chief ray less that of the ray on the reference sphere about its image point, each \
+               wavelength in its own waves and about its own chief ray, on one scale, against the pupil",
+        legend: "left: along y, right: along x of the pupil",
+    };
+
+    /// The reason for each field why it has no fan, and the time; `None` while they are computed.
+    fn outcomes(self, numbers: &Analyses) -> Option<(Vec<Option<String>>, f64)> {
+        fn errors<T, E: ToString>(fields: &[Result<T, E>]) -> Vec<Option<String>> {
+            fields.iter().map(|field| field.as_ref().err().map(ToString::to_string)).collect()
+        }
+        if self.paths {
+            let found = numbers.path_fans.as_ref()?;
+            return Some((errors(&found.value), found.ms));
+        }
+        let found = numbers.fans.as_ref()?;
+        Some((errors(&found.value), found.ms))
+    }
+
+    fn show(
+        self,
+        ui: &mut Ui,
+        results: &AnalysisResults,
+        (figure, errors, ms): (&AnalysisFigure, &[Option<String>], f64),
+    ) {
+        let scale = scale(&figure.rows);
+        let Ok(numbers) = &results.analyses else { return };
+        self.legend(ui, numbers, scale, ms);
+        let count = errors.len().max(1) as f32;
         let between = 2.0 * ui.spacing().item_spacing.y;
-        let height = (ui.available_height() / rows - WORDS - between - 1.0).max(LOWEST);
+        let height = (ui.available_height() / count - WORDS - between - 1.0).max(LOWEST);
         let fields = results.lens.fields_at(results.settings.zoom);
+        let mut lit = figure.rows.iter();
         ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
-            for (field, fans) in fans.value.iter().enumerate() {
-                name(ui, fields, field);
-                match fans {
-                    Ok(fans) => sections(ui, numbers, fans, (field, scale, height)),
-                    Err(why) => warn(ui, *why),
+            for (field, error) in errors.iter().enumerate() {
+                self.name(ui, fields, field);
+                match (error, if error.is_none() { lit.next() } else { None }) {
+                    (None, Some(row)) => sections(ui, figure, row, (scale, height)),
+                    (Some(why), _) => warn(ui, why),
+                    (None, None) => {}
                 }
             }
         });
     }
+
+    fn legend(self, ui: &mut Ui, numbers: &Analyses, scale: f64, ms: f64) {
+        let palette = Palette::for_visuals(ui.visuals());
+        ui.horizontal_wrapped(|ui| {
+            for channel in &numbers.ray_model.value.channels {
+                swatch(ui, color32(palette.wavelength(channel.um)));
+                ui.label(RichText::new(format!("{:.0} nm", 1e3 * channel.um)).small());
+            }
+            let unit = self.unit;
+            let scale = number::format_digits(scale, 3);
+            let text = format!("in {unit}, all plots to {scale}; {ms:.1} ms");
+            ui.label(RichText::new(text).small().weak()).on_hover_text(self.hint);
+        });
+    }
+
+    fn name(self, ui: &mut Ui, fields: &Fields, field: usize) {
+        let palette = Palette::for_visuals(ui.visuals());
+        let Some(point) = fields.values.get(field) else { return };
+        let color = color32(palette.field(field));
+        ui.horizontal(|ui| {
+            swatch(ui, color);
+            ui.label(RichText::new(field_name(fields.kind, *point)).color(color));
+            ui.label(RichText::new(self.legend).small().weak());
+        });
+    }
 }
 
-fn warn(ui: &mut Ui, why: AnalysisError) {
-    let text = RichText::new(why.to_string()).small();
-    ui.label(text.color(ui.visuals().warn_fg_color));
-}
-
-/// The largest aberration that some fan shows, in µm.
-fn scale(fans: &[Result<Vec<Fan>, AnalysisError>]) -> f64 {
-    let fans = fans.iter().filter_map(|fans| fans.as_ref().ok()).flatten();
-    let points = fans.flat_map(|fan| fan.tangential.iter().chain(&fan.sagittal));
-    let sizes = points.filter_map(|point| point.error).flatten().map(f64::abs);
-    1e3 * sizes.fold(1e-6, f64::max)
-}
-
-fn legend(ui: &mut Ui, numbers: &Analyses, scale: f64, ms: f64) {
-    let palette = Palette::for_visuals(ui.visuals());
+/// The choice between rays and paths, and the menu of files.
+fn header(ui: &mut Ui, page: FansPage, actions: &mut Actions) {
     ui.horizontal(|ui| {
-        for channel in &numbers.ray_model.value.channels {
-            swatch(ui, color32(palette.wavelength(channel.um)));
-            ui.label(RichText::new(format!("{:.0} nm", 1e3 * channel.um)).small());
+        ui.spacing_mut().item_spacing.x = 2.0;
+        for (paths, name, hint) in [
+            (false, "Transverse", "Distances of the rays from the chief ray in the image plane"),
+            (true, "OPD", "Optical path differences in wavelengths"),
+        ] {
+            let button = Button::selectable(page.paths == paths, name);
+            if ui.add(button).on_hover_text(hint).clicked() && page.paths != paths {
+                actions.push(Command::Show(PanelSetting::PathFans(paths)));
+            }
         }
-        let text = format!("in µm, all plots to {}; {ms:.1} ms", number::format_digits(scale, 3));
-        ui.label(RichText::new(text).small().weak()).on_hover_text(
-            "Distance from the image point of the chief ray of the primary wavelength, on one scale, \
-             against the coordinate in the stop from rim to rim",
-        );
+        export_menu(ui, page.kind, actions);
     });
 }
 
-fn name(ui: &mut Ui, fields: &Fields, field: usize) {
-    let palette = Palette::for_visuals(ui.visuals());
-    let Some(point) = fields.values.get(field) else { return };
-    let color = color32(palette.field(field));
-    ui.horizontal(|ui| {
-        swatch(ui, color);
-        ui.label(RichText::new(field_name(fields.kind, *point)).color(color));
-        ui.label(RichText::new("left: εy along y, right: εx along x of the stop").small().weak());
-    });
+fn warn(ui: &mut Ui, why: &str) {
+    ui.label(RichText::new(why).small().color(ui.visuals().warn_fg_color));
+}
+
+/// The largest number that some fan shows.
+fn scale(rows: &[Vec<CurveChart>]) -> f64 {
+    let curves = rows.iter().flatten().flat_map(|chart| &chart.curves);
+    let points = curves.flat_map(|curve| curve.pieces.iter().flatten());
+    points.map(|[_, value]| value.abs()).fold(1e-3, f64::max)
 }
 
 /// The tangential section beside the sagittal one.
-fn sections(
-    ui: &mut Ui,
-    numbers: &Analyses,
-    fans: &[Fan],
-    (field, scale, height): (usize, f64, f32),
-) {
-    ui.columns_const(|[left, right]| {
-        let tangential = |fan: &Fan| curves(&fan.tangential, 1);
-        section(
-            left,
-            numbers,
-            fans,
-            (&format!("Tangential fan {field}"), scale, height),
-            tangential,
-        );
-        let sagittal = |fan: &Fan| curves(&fan.sagittal, 0);
-        section(right, numbers, fans, (&format!("Sagittal fan {field}"), scale, height), sagittal);
-    });
-}
-
-fn section(
-    ui: &mut Ui,
-    numbers: &Analyses,
-    fans: &[Fan],
-    (name, scale, height): (&str, f64, f32),
-    curves: impl Fn(&Fan) -> Vec<Vec<[f64; 2]>>,
-) {
-    let palette = Palette::for_visuals(ui.visuals());
-    let plot = fixed_plot(ui, name, height).include_x(-1.0).include_x(1.0);
-    let plot = plot.include_y(-scale).include_y(scale).show_axes([false, true]);
-    let shown = plot.show(ui, |plot| {
-        for fan in fans {
-            let um = numbers.ray_model.value.channels[fan.wavelength].um;
-            let color = color32(palette.wavelength(um));
-            for points in curves(fan) {
-                let line = plot_curve(format!("{:.0} nm", 1e3 * um), points);
-                plot.line(line.color(color).width(1.4));
-            }
+fn sections(ui: &mut Ui, figure: &AnalysisFigure, row: &[CurveChart], (scale, height): (f64, f32)) {
+    let ends = [-scale, scale];
+    let form = ChartForm {
+        contains: [&[-1.0, 1.0], &ends],
+        numbers: [false, true],
+        has_name: false,
+        width: 1.4,
+        ..ChartForm::new(height)
+    };
+    ui.columns(2, |uis| {
+        for (ui, chart) in uis.iter_mut().zip(row) {
+            bare_chart(ui, (chart, &figure.colors), form);
         }
     });
-    describe(&shown.response, name, scale);
-}
-
-/// The parts of a fan between rays that are lost: the coordinate in the stop and the error along an axis
-/// of the image in µm.
-fn curves(points: &[FanPoint], axis: usize) -> Vec<Vec<[f64; 2]>> {
-    let arrived = |point: &FanPoint| point.error.map(|error| [point.pupil, 1e3 * error[axis]]);
-    let parts = points.chunk_by(|a, b| a.error.is_some() == b.error.is_some());
-    let parts = parts.map(|part| part.iter().filter_map(arrived).collect::<Vec<_>>());
-    parts.filter(|part| !part.is_empty()).collect()
-}
-
-fn describe(response: &Response, name: &str, scale: f64) {
-    let label = format!("{name}: up to {} µm", number::format_digits(scale, 3));
-    response.widget_info(|| WidgetInfo::labeled(egui::Role::Image, true, &label));
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::plot::ChartCurve;
 
     #[test]
-    fn lost_rays_part_a_fan() {
-        let point = |pupil: f64, error: Option<[f64; 2]>| FanPoint { pupil, error, fate: None };
-        let points = [
-            point(-1.0, None),
-            point(-0.5, Some([1e-3, 2e-3])),
-            point(0.0, Some([0.0, 0.0])),
-            point(0.5, None),
-            point(1.0, Some([3e-3, -4e-3])),
-        ];
-        assert_eq!(curves(&points, 1), [vec![[-0.5, 2.0], [0.0, 0.0]], vec![[1.0, -4.0]]]);
-        assert_eq!(curves(&points, 0), [vec![[-0.5, 1.0], [0.0, 0.0]], vec![[1.0, 3.0]]]);
-    }
-
-    #[test]
-    fn the_scale_holds_the_largest_aberration_of_any_fan() {
-        let point = |error| FanPoint { pupil: 0.0, error: Some(error), fate: None };
-        let fan = |error| Fan { wavelength: 0, tangential: vec![point(error)], sagittal: vec![] };
-        let fans = [Ok(vec![fan([1e-3, -7e-3])]), Err(AnalysisError::NoLight), Ok(vec![])];
-        assert_eq!(scale(&fans), 7.0);
+    fn the_scale_holds_the_largest_number_of_any_fan() {
+        let chart = |value: f64| {
+            let curve = ChartCurve::new("", 0, [(0.0, Some(0.5)), (1.0, Some(value))]);
+            vec![CurveChart::new("", ["", ""], vec![curve])]
+        };
+        assert_eq!(scale(&[chart(1.0), chart(-7.0), Vec::new()]), 7.0);
     }
 }

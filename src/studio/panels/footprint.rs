@@ -5,10 +5,12 @@ use std::f64::consts::TAU;
 use egui::{ComboBox, RichText, Role, Ui, WidgetInfo};
 use egui_plot::{Line, LineStyle, PlotPoints};
 
+use super::figure_view::export_menu;
 use super::widgets::{fixed_plot, swatch};
 use super::{Panel, displayed_results, field_name, show_missing_results};
 use crate::analysis::Footprint;
 use crate::lens::{Lens, Quantity};
+use crate::report::FigureKind;
 use crate::session::{AnalysisResults, FieldFootprints, SessionView};
 use crate::studio::actions::Actions;
 use crate::studio::form::named_list;
@@ -34,7 +36,7 @@ impl Panel for FootprintPanel {
         "Footprint"
     }
 
-    fn ui(&mut self, ui: &mut Ui, view: &SessionView, _actions: &mut Actions) {
+    fn ui(&mut self, ui: &mut Ui, view: &SessionView, actions: &mut Actions) {
         let Some((results, numbers)) = displayed_results(view) else {
             return show_missing_results(ui, view);
         };
@@ -44,7 +46,7 @@ impl Panel for FootprintPanel {
         };
         let image = results.lens.surfaces.len();
         let surface = self.surface.or(view.selected).unwrap_or(0).min(image);
-        self.header(ui, &results.lens, surface, footprints.ms);
+        self.header(ui, &results.lens, (surface, footprints.ms), actions);
         let zoom = results.settings.zoom;
         let rim = results.lens.parameter_at(zoom, surface, Quantity::SemiDiameter);
         let rim = results.lens.get(rim);
@@ -55,7 +57,13 @@ impl Panel for FootprintPanel {
 
 impl FootprintPanel {
     /// The choice of the surface, and the time.
-    fn header(&mut self, ui: &mut Ui, lens: &Lens, shown: usize, ms: f64) {
+    fn header(
+        &mut self,
+        ui: &mut Ui,
+        lens: &Lens,
+        (shown, ms): (usize, f64),
+        actions: &mut Actions,
+    ) {
         ui.horizontal(|ui| {
             let combo = ComboBox::from_id_salt("footprint surface").height(MENU);
             let combo = combo.selected_text(surface_name(lens, shown)).show_ui(ui, |ui| {
@@ -66,6 +74,7 @@ impl FootprintPanel {
                 }
             });
             named_list(ui, combo, "Surface of the footprint");
+            export_menu(ui, FigureKind::Footprint(shown), actions);
             ui.label(RichText::new(format!("primary wavelength, {ms:.1} ms")).small().weak());
         });
     }

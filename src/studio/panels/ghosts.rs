@@ -3,9 +3,11 @@
 
 use egui::{ComboBox, Grid, RichText, ScrollArea, Ui};
 
+use super::figure_view::export_menu;
 use super::{Panel, displayed_results, field_name, show_missing_results};
 use crate::analysis::{Coating, Ghost};
 use crate::lens::{Fields, SurfaceNumber};
+use crate::report::FigureKind;
 use crate::session::{Command, FieldGhosts, PanelSetting, SessionView};
 use crate::studio::actions::Actions;
 use crate::studio::form::named_list;
@@ -72,6 +74,7 @@ impl GhostsPanel {
             for (i, point) in fields.values.iter().enumerate() {
                 ui.selectable_value(&mut self.field, i, field_name(fields.kind, *point));
             }
+            export_menu(ui, FigureKind::Ghosts, actions);
         });
     }
 

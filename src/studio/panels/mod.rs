@@ -6,6 +6,7 @@ mod edit_form;
 mod effects;
 mod fans;
 mod field_curves;
+mod figure_view;
 mod first_order;
 mod footprint;
 mod ghosts;
@@ -183,13 +184,15 @@ impl PanelKind {
             Self::Prescription => "Lens data: radii, thicknesses, glasses, variables, pickups",
             Self::Spot => "Where the rays of each field land: RMS and GEO radius",
             Self::Pupil => "Vignetting: the part of the pupil that gets through, and its limits",
-            Self::Contrast => "Modulation transfer function: contrast against spatial frequency",
+            Self::Contrast => {
+                "Modulation transfer function: contrast against spatial frequency, field and focus"
+            }
             Self::Wavefront => {
                 "OPD maps, point spread (PSF), Strehl ratio, encircled energy, Zernike"
             }
-            Self::Fans => "Transverse aberration over the pupil",
+            Self::Fans => "Transverse aberration over the pupil, OPD fans",
             Self::FieldCurves => {
-                "Distortion, field curvature, astigmatism, lateral colour, relative illumination"
+                "Distortion, field curvature, astigmatism, colour, relative illumination, grid"
             }
             Self::Footprint => "The beam of each field on a surface, with its rim",
             Self::SpotMap => "A map of the RMS radius, full field",
@@ -237,7 +240,7 @@ impl PanelKind {
             Self::Search => Box::new(SearchPanel::default()),
             Self::History => Box::new(HistoryPanel::default()),
             Self::FirstOrder => Box::new(FirstOrderPanel),
-            Self::Seidel => Box::new(SeidelPanel),
+            Self::Seidel => Box::new(SeidelPanel::default()),
             Self::Effects => Box::new(EffectsPanel),
             Self::System => Box::new(SystemPanel::default()),
             Self::Zoom => Box::new(ZoomPanel::default()),

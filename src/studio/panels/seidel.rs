@@ -2,30 +2,85 @@
 
 use egui::{Align, Color32, Grid, Layout as Arrange, RichText, ScrollArea, Ui, Vec2, vec2};
 
+use super::figure_view::{ChartForm, export_menu, notes, titled_chart};
 use super::{Panel, displayed_results, show_missing_results};
 use crate::lens::Lens;
 use crate::paraxial::{Seidel, SeidelSums};
-use crate::session::SessionView;
+use crate::report::{AnalysisFigure, FigureKind};
+use crate::session::{SessionView, analysis_figure};
 use crate::studio::actions::Actions;
 
 /// The panel.
-#[derive(Debug)]
-pub struct SeidelPanel;
+#[derive(Debug, Default)]
+pub struct SeidelPanel {
+    /// True for bars in place of numbers.
+    bars: bool,
+}
 
 impl Panel for SeidelPanel {
     fn title(&self) -> &'static str {
         "Seidel sums"
     }
 
-    fn ui(&mut self, ui: &mut Ui, view: &SessionView, _actions: &mut Actions) {
+    fn ui(&mut self, ui: &mut Ui, view: &SessionView, actions: &mut Actions) {
         let Some((results, numbers)) = displayed_results(view) else {
             return show_missing_results(ui, view);
         };
+        if numbers.seidel.value.is_some() {
+            self.header(ui, actions);
+        }
+        if self.bars
+            && let Ok(figure) = analysis_figure(FigureKind::Seidel, results)
+        {
+            return bars(ui, &figure);
+        }
         ScrollArea::both().auto_shrink([false, false]).show(ui, |ui| match &numbers.seidel.value {
             Some(seidel) => sums(ui, &results.lens, seidel),
             None => drop(ui.weak(missing_sums(numbers.ray_model.value.has_grin()))),
         });
     }
+}
+
+impl SeidelPanel {
+    fn header(&mut self, ui: &mut Ui, actions: &mut Actions) {
+        ui.horizontal(|ui| {
+            ui.spacing_mut().item_spacing.x = 2.0;
+            let table = "The sums of every surface as numbers";
+            ui.selectable_value(&mut self.bars, false, "Table").on_hover_text(table);
+            let bars = "The sums of every surface as bars, that of the lens last";
+            ui.selectable_value(&mut self.bars, true, "Bars").on_hover_text(bars);
+            export_menu(ui, FigureKind::Seidel, actions);
+        });
+    }
+}
+
+/// The lowest and the narrowest chart of bars, and the height of its title.
+const LOWEST: f32 = 70.0;
+const NARROWEST: f32 = 190.0;
+const TITLE: f32 = 24.0;
+/// The widest bar.
+const BAR: f32 = 12.0;
+
+/// A chart of bars for each sum.
+fn bars(ui: &mut Ui, figure: &AnalysisFigure) {
+    let charts: Vec<_> = figure.rows.iter().flatten().collect();
+    let columns = ((ui.available_width() / NARROWEST) as usize).clamp(1, 4);
+    let rows = charts.len().div_ceil(columns);
+    let height = (ui.available_height() / rows as f32 - TITLE).max(LOWEST);
+    let surfaces = charts.first().map_or(1, |chart| chart.curves[0].pieces.len());
+    let width = 0.6 * ui.available_width() / columns as f32 / (surfaces + 3) as f32;
+    let ends = [0.0, (surfaces + 2) as f64];
+    ScrollArea::vertical().auto_shrink([false, false]).show(ui, |ui| {
+        ui.columns(columns, |uis| {
+            for (i, chart) in charts.into_iter().enumerate() {
+                let contains: [&[f64]; 2] = [&ends, &[0.0]];
+                let width = width.clamp(1.5, BAR);
+                let form = ChartForm { contains, width, ..ChartForm::new(height) };
+                titled_chart(&mut uis[i % columns], (chart, &figure.colors), "", form);
+            }
+        });
+        notes(ui, figure);
+    });
 }
 
 /// The reason why a lens has no sums.

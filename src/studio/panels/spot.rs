@@ -13,12 +13,14 @@ use egui::{
 use glam::DVec2;
 
 use super::cell_layout::{CellLayout, scale_bar, show_within};
+use super::figure_view::export_menu;
 use super::widgets::swatch;
 use super::{
     Panel, displayed_results, field_name, pupil_share, relative_error, show_missing_results,
 };
 use crate::analysis::{Estimate, Spot};
 use crate::lens::Fields;
+use crate::report::FigureKind;
 use crate::session::{Analyses, AnalysisResults, Command, SessionView};
 use crate::studio::actions::Actions;
 use crate::studio::cached::{ByAddress, Cached};
@@ -109,6 +111,7 @@ fn header(ui: &mut Ui, view: &SessionView, actions: &mut Actions) {
             ui.label(format!("{:.0} nm", 1e3 * wavelength.um));
         }
         ui.with_layout(Arrange::right_to_left(Align::Center), |ui| {
+            export_menu(ui, FigureKind::Spots, actions);
             tolerance(ui, view, actions);
         });
     });

@@ -5,10 +5,12 @@ use egui::{
 };
 use egui_plot::{PlotImage, PlotPoint};
 
+use super::figure_view::export_menu;
 use super::widgets::fixed_plot;
 use super::{Panel, displayed_results, plain_error, show_missing_results};
 use crate::analysis::{AnalysisError, Estimate, SpotMap};
 use crate::lens::FieldKind;
+use crate::report::FigureKind;
 use crate::session::{SessionView, Timed};
 use crate::studio::actions::Actions;
 use crate::studio::cached::{ByAddress, Cached};
@@ -40,7 +42,7 @@ impl Panel for SpotMapPanel {
         "Spot over the field"
     }
 
-    fn ui(&mut self, ui: &mut Ui, view: &SessionView, _actions: &mut Actions) {
+    fn ui(&mut self, ui: &mut Ui, view: &SessionView, actions: &mut Actions) {
         let Some((results, numbers)) = displayed_results(view) else {
             return show_missing_results(ui, view);
         };
@@ -59,7 +61,7 @@ impl Panel for SpotMapPanel {
             ui.weak("No field has light");
             return;
         };
-        summary(ui, map, range, found.ms);
+        summary(ui, map, (range, found.ms), actions);
         let context = ui.ctx().clone();
         let texture = self.texture.get(ByAddress::from(found), |_| {
             Some(context.load_texture("spot map", raster(map, range), TextureOptions::NEAREST))
@@ -86,8 +88,9 @@ fn range(map: &SpotMap) -> Option<[f64; 2]> {
 }
 
 /// The scale of colours, the error, the rays and the time.
-fn summary(ui: &mut Ui, map: &SpotMap, range: [f64; 2], ms: f64) {
+fn summary(ui: &mut Ui, map: &SpotMap, (range, ms): ([f64; 2], f64), actions: &mut Actions) {
     ui.horizontal_wrapped(|ui| {
+        export_menu(ui, FigureKind::SpotMap, actions);
         let [least, most] = range.map(|radius| number::format_digits(1e3 * radius, 4));
         ui.label(least);
         let (rect, _) = ui.allocate_exact_size(vec2(SCALE[0], SCALE[1]), egui::Sense::hover());

@@ -7,15 +7,17 @@ use egui::{
     TextureOptions, Ui, vec2,
 };
 
-use super::widgets::{fixed_plot, plot_curve, swatch};
+use super::figure_view::{ChartForm, bare_chart, export_menu};
+use super::widgets::swatch;
 use super::{
     Panel, displayed_results, field_name, plain_error, relative_error, show_missing_results,
 };
 use crate::analysis::{Estimate, SquareGrid, ZernikeOrder, aberration_name};
 use crate::lens::Fields;
+use crate::report::FigureKind;
 use crate::session::{
-    AnalysisResults, Command, FieldWavefront, FieldWavefronts, PanelSetting, PointImage,
-    PointImages, SessionView, Timed,
+    Analyses, AnalysisResults, Command, FieldRayImage, FieldWavefront, FieldWavefronts,
+    PanelSetting, PointImage, PointImages, RayImages, SessionView, Timed, analysis_figure,
 };
 use crate::studio::actions::Actions;
 use crate::studio::cached::{ByAddress, Cached};
@@ -49,15 +51,35 @@ impl WavefrontPage {
     const fn shows_images(self) -> bool {
         matches!(self, Self::Image | Self::Energy)
     }
+
+    /// The figure of the page, of images by rays or by diffraction.
+    const fn figure(self, by_rays: bool) -> FigureKind {
+        match (self, by_rays) {
+            (Self::Map, _) => FigureKind::Wavefront,
+            (Self::Zernike, _) => FigureKind::Zernike,
+            (Self::Image, false) => FigureKind::PointSpread,
+            (Self::Image, true) => FigureKind::RayImage,
+            (Self::Energy, false) => FigureKind::Energy,
+            (Self::Energy, true) => FigureKind::RayEnergy,
+        }
+    }
+}
+
+/// The numbers that a page needs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum NumberKind {
+    Waves,
+    Images,
+    RayImages,
 }
 
 const PAGES: [(WavefrontPage, &str, &str); 4] = [
     (WavefrontPage::Map, "Map", "Path differences over the pupil, in wavelengths"),
-    (WavefrontPage::Image, "Point spread", "The image of a point by diffraction"),
+    (WavefrontPage::Image, "Point spread", "The image of a point, by diffraction or by rays"),
     (
         WavefrontPage::Energy,
         "Encircled energy",
-        "Share of the light within circles, by diffraction",
+        "Share of the light within circles, by diffraction or by rays",
     ),
     (WavefrontPage::Zernike, "Zernike", "Coefficients in Noll's order, in wavelengths"),
 ];
@@ -79,8 +101,12 @@ pub struct WavefrontPanel {
     page: WavefrontPage,
     /// True for intensities on a logarithmic scale.
     is_logarithmic: bool,
-    /// The last results with wavefronts, and the last ones with images of a point.
-    last: [Option<Arc<AnalysisResults>>; 2],
+    /// True for the fringe order of Zernike coefficients in place of Noll's.
+    is_fringe: bool,
+    /// True for images by rays in place of those by diffraction.
+    by_rays: bool,
+    /// The last results with wavefronts, with images of a point by diffraction, and by rays.
+    last: [Option<Arc<AnalysisResults>>; 3],
     textures: Cached<TextureKey, Vec<Option<TextureHandle>>>,
 }
 
@@ -99,14 +125,11 @@ impl Panel for WavefrontPanel {
         let Some((results, numbers)) = displayed_results(view) else {
             return show_missing_results(ui, view);
         };
-        self.pages(ui);
-        let images = self.page.shows_images();
-        if view.settings.point_images != images {
-            actions.push(Command::Show(PanelSetting::PointImages(images)));
-        }
-        let is_current =
-            if images { numbers.point_images.is_some() } else { numbers.wavefronts.is_some() };
-        let last = &mut self.last[usize::from(images)];
+        self.pages(ui, actions);
+        self.ask(view, actions);
+        let kind = self.kind();
+        let is_current = PageNumbers::of(numbers, kind).is_some();
+        let last = &mut self.last[kind as usize];
         if is_current {
             *last = Some(Arc::clone(results));
         }
@@ -115,22 +138,16 @@ impl Panel for WavefrontPanel {
             return;
         };
         let Ok(numbers) = &results.analyses else { return };
-        let found = match (images, &numbers.wavefronts, &numbers.point_images) {
-            (false, Some(waves), _) => PageNumbers::Waves(waves),
-            (true, _, Some(images)) => PageNumbers::Images(images),
-            _ => return,
-        };
+        let Some(found) = PageNumbers::of(numbers, kind) else { return };
         found.summary(ui, is_current);
         if !is_current {
             ui.multiply_opacity(FAINT);
         }
         let fields = results.lens.fields_at(results.settings.zoom);
         match (self.page, found) {
-            (WavefrontPage::Energy, PageNumbers::Images(images)) => {
-                energies(ui, fields, &images.value);
-            }
+            (WavefrontPage::Energy, _) => energies(ui, &results, self.page.figure(self.by_rays)),
             (WavefrontPage::Zernike, PageNumbers::Waves(waves)) => {
-                coefficients(ui, fields, &waves.value);
+                coefficients(ui, fields, &waves.value, self.is_fringe);
             }
             _ => self.maps(ui, fields, &results, found),
         }
@@ -142,26 +159,39 @@ impl Panel for WavefrontPanel {
 enum PageNumbers<'a> {
     Waves(&'a Timed<FieldWavefronts>),
     Images(&'a Timed<PointImages>),
+    Rays(&'a Timed<RayImages>),
 }
 
-impl PageNumbers<'_> {
+impl<'a> PageNumbers<'a> {
+    /// The numbers of a kind; `None` while they are computed.
+    fn of(numbers: &'a Analyses, kind: NumberKind) -> Option<Self> {
+        match kind {
+            NumberKind::Waves => Some(Self::Waves(numbers.wavefronts.as_ref()?)),
+            NumberKind::Images => Some(Self::Images(numbers.point_images.as_ref()?)),
+            NumberKind::RayImages => Some(Self::Rays(numbers.ray_images.as_ref()?)),
+        }
+    }
+
     /// The number of fields.
     fn count(self) -> usize {
         match self {
             Self::Waves(waves) => waves.value.fields.len(),
             Self::Images(images) => images.value.fields.len(),
+            Self::Rays(images) => images.value.fields.len(),
         }
     }
 
     /// The wavelength, the rays and the time; or that the numbers are those of the lens before.
     fn summary(self, ui: &mut Ui, is_current: bool) {
-        let (um, ms) = match self {
-            Self::Waves(waves) => (waves.value.um, waves.ms),
-            Self::Images(images) => (images.value.um, images.ms),
+        let at = |um: f64| format!("at {:.0} nm", 1e3 * um);
+        let (light, ms) = match self {
+            Self::Waves(waves) => (at(waves.value.um), waves.ms),
+            Self::Images(images) => (at(images.value.um), images.ms),
+            Self::Rays(images) => ("all wavelengths".to_owned(), images.ms),
         };
         let rays: usize = (0..self.count()).filter_map(|i| self.rays(i)).sum();
         let text = if is_current {
-            format!("at {:.0} nm, {rays} rays, {ms:.1} ms", 1e3 * um)
+            format!("{light}, {rays} rays, {ms:.1} ms")
         } else {
             "of the lens before; computing …".to_owned()
         };
@@ -175,6 +205,7 @@ impl PageNumbers<'_> {
                 Some(waves.value.fields[field].value.as_ref().ok()?.wavefront.rms.rays)
             }
             Self::Images(images) => Some(images.value.fields[field].value.as_ref().ok()?.rays),
+            Self::Rays(images) => Some(images.value.fields[field].value.as_ref().ok()?.image.rays),
         }
     }
 
@@ -182,6 +213,7 @@ impl PageNumbers<'_> {
         match self {
             Self::Waves(waves) => waves.value.fields[field].ms,
             Self::Images(images) => images.value.fields[field].ms,
+            Self::Rays(images) => images.value.fields[field].ms,
         }
     }
 
@@ -190,6 +222,7 @@ impl PageNumbers<'_> {
         match self {
             Self::Waves(waves) => waves.value.fields[field].value.as_ref().map(map_lines),
             Self::Images(images) => images.value.fields[field].value.as_ref().map(image_lines),
+            Self::Rays(images) => images.value.fields[field].value.as_ref().map(ray_lines),
         }
         .map_err(ToString::to_string)
     }
@@ -203,14 +236,40 @@ impl PageNumbers<'_> {
             }
             Self::Images(images) => {
                 let image = images.value.fields[field].value.as_ref().ok()?;
-                Some(image_picture(image, style))
+                Some(intensity_picture(&image.intensity, style))
+            }
+            Self::Rays(images) => {
+                let found = images.value.fields[field].value.as_ref().ok()?;
+                Some(intensity_picture(&found.image.density, style))
             }
         }
     }
 }
 
 impl WavefrontPanel {
-    fn pages(&mut self, ui: &mut Ui) {
+    /// The numbers of the page.
+    const fn kind(&self) -> NumberKind {
+        match (self.page.shows_images(), self.by_rays) {
+            (false, _) => NumberKind::Waves,
+            (true, false) => NumberKind::Images,
+            (true, true) => NumberKind::RayImages,
+        }
+    }
+
+    /// Asks for the images that the page shows, and no others.
+    fn ask(&self, view: &SessionView, actions: &mut Actions) {
+        let (settings, kind) = (&view.settings, self.kind());
+        let images = kind == NumberKind::Images;
+        if settings.point_images != images {
+            actions.push(Command::Show(PanelSetting::PointImages(images)));
+        }
+        let by_rays = kind == NumberKind::RayImages;
+        if settings.ray_images != by_rays {
+            actions.push(Command::Show(PanelSetting::RayImages(by_rays)));
+        }
+    }
+
+    fn pages(&mut self, ui: &mut Ui, actions: &mut Actions) {
         ui.horizontal_wrapped(|ui| {
             ui.spacing_mut().item_spacing.x = 2.0;
             for (page, name, hint) in PAGES {
@@ -219,11 +278,25 @@ impl WavefrontPanel {
                     self.page = page;
                 }
             }
+            if self.page.shows_images() {
+                let diffraction = "By diffraction at the primary wavelength";
+                ui.selectable_value(&mut self.by_rays, false, "Diffraction")
+                    .on_hover_text(diffraction);
+                let rays = "By rays alone, over all wavelengths";
+                ui.selectable_value(&mut self.by_rays, true, "Rays").on_hover_text(rays);
+            }
+            if self.page == WavefrontPage::Zernike {
+                let noll = "Noll's order, whose terms have an RMS of 1";
+                ui.selectable_value(&mut self.is_fringe, false, "Noll").on_hover_text(noll);
+                let fringe = "The fringe order, whose terms are 1 at the rim";
+                ui.selectable_value(&mut self.is_fringe, true, "Fringe").on_hover_text(fringe);
+            }
             if self.page == WavefrontPage::Image {
                 let hint =
                     format!("Intensities down to {:.0e} of the largest", 10f64.powf(-DECADES));
                 ui.checkbox(&mut self.is_logarithmic, "Logarithmic").on_hover_text(hint);
             }
+            export_menu(ui, self.page.figure(self.by_rays), actions);
         });
     }
 
@@ -270,9 +343,9 @@ fn map_picture(found: &FieldWavefront, style: PictureStyle) -> ColorImage {
 }
 
 /// The image of a point as a picture.
-fn image_picture(image: &PointImage, style: PictureStyle) -> ColorImage {
-    let peak = image.intensity.values.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
-    raster(&image.intensity, |value| {
+fn intensity_picture(image: &SquareGrid<f64>, style: PictureStyle) -> ColorImage {
+    let peak = image.values.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
+    raster(image, |value| {
         let share = value / peak;
         let share =
             if style.is_logarithmic { 1.0 + share.max(0.0).log10() / DECADES } else { share };
@@ -323,8 +396,11 @@ fn cell_content(
         }
     };
     if let Some(texture) = texture {
-        let is_map = matches!(found, PageNumbers::Waves(_));
-        let what = if is_map { "Wavefront" } else { "Point spread" };
+        let what = match found {
+            PageNumbers::Waves(_) => "Wavefront",
+            PageNumbers::Images(_) => "Point spread",
+            PageNumbers::Rays(_) => "Point spread by rays",
+        };
         let words = format!("{what} at {name}: {}", lines.join(", "));
         let rays = found.rays(field).unwrap_or(0);
         ui.add(Image::new(texture).fit_to_exact_size(vec2(side, side)).alt_text(words))
@@ -368,49 +444,85 @@ fn image_lines(image: &PointImage) -> Vec<String> {
     ]
 }
 
+fn ray_lines(found: &FieldRayImage) -> Vec<String> {
+    let width = number::format_digits(2e3 * found.image.density.half_width, 3);
+    let half = half_energy(found);
+    vec![
+        half.map_or("half the light: beyond the image".to_owned(), |radius| {
+            format!("half the light within {} µm", number::format_digits(1e3 * radius, 3))
+        }),
+        format!("{width} µm wide, {} of the peak", plain_error(100.0 * found.image.error, " %")),
+    ]
+}
+
+/// The radius of the circle with half of the light, between the circles that are known, in mm.
+fn half_energy(found: &FieldRayImage) -> Option<f64> {
+    let circles = found.radii.iter().zip(&found.image.energy);
+    let mut before = (0.0, 0.0);
+    for (radius, share) in circles {
+        if share.value >= 0.5 {
+            let part = (0.5 - before.1) / (share.value - before.1);
+            return Some(before.0 + part * (radius - before.0));
+        }
+        before = (*radius, share.value);
+    }
+    None
+}
+
 /// The share of the light within circles, a curve for each field.
-fn energies(ui: &mut Ui, fields: &Fields, found: &PointImages) {
-    let palette = Palette::for_visuals(ui.visuals());
+fn energies(ui: &mut Ui, results: &AnalysisResults, kind: FigureKind) {
+    let figure = match analysis_figure(kind, results) {
+        Ok(figure) => figure,
+        Err(why) => return drop(ui.weak(why)),
+    };
+    let fields = results.lens.fields_at(results.settings.zoom);
     ui.horizontal_wrapped(|ui| {
-        for i in 0..found.fields.len() {
+        for i in 0..fields.values.len() {
             heading(ui, fields, i);
         }
     });
-    let lit = found.fields.iter().enumerate();
-    let lit = lit.filter_map(|(i, field)| Some((i, field.value.as_ref().ok()?)));
-    let lit: Vec<(usize, &PointImage)> = lit.collect();
-    if lit.is_empty() {
-        ui.weak("No field has an image by diffraction.");
-        return;
-    }
     let height = (ui.available_height() - 24.0).max(SIDE[0]);
-    let plot =
-        fixed_plot(ui, "encircled energy", height).include_x(0.0).include_y(0.0).include_y(1.0);
-    let plot = plot.x_axis_label("radius, µm").y_axis_label("share of the light");
-    plot.show(ui, |plot| {
-        for (i, image) in &lit {
-            let circles = image.energy.iter().map(|(radius, share)| [1e3 * radius, share.value]);
-            let points = std::iter::once([0.0; 2]).chain(circles);
-            plot.line(plot_curve(format!("field {i}"), points).color(color32(palette.field(*i))));
+    for chart in figure.rows.iter().flatten() {
+        if chart.curves.is_empty() {
+            ui.weak("No field has an image of a point.");
+            continue;
         }
-    });
-    let errors = lit.iter().flat_map(|(_, image)| image.energy.iter().map(|(_, e)| e.error));
-    let error = errors.fold(0.0, f64::max);
-    ui.label(RichText::new(plain_error(error, "")).small().weak());
+        let form = ChartForm { contains: [&[0.0], &[0.0, 1.0]], ..ChartForm::new(height) };
+        bare_chart(ui, (chart, &figure.colors), form);
+    }
+    ui.label(RichText::new(energy_error(results, kind)).small().weak());
+}
+
+/// The largest error of the shares of a kind.
+fn energy_error(results: &AnalysisResults, kind: FigureKind) -> String {
+    let Ok(numbers) = &results.analyses else { return String::new() };
+    let rays = || {
+        let found = numbers.ray_images.as_ref()?;
+        let lit = found.value.fields.iter().filter_map(|field| field.value.as_ref().ok());
+        Some(lit.flat_map(|lit| lit.image.energy.iter().map(|e| e.error)).fold(0.0, f64::max))
+    };
+    let waves = || {
+        let found = numbers.point_images.as_ref()?;
+        let lit = found.value.fields.iter().filter_map(|field| field.value.as_ref().ok());
+        Some(lit.flat_map(|lit| lit.energy.iter().map(|(_, e)| e.error)).fold(0.0, f64::max))
+    };
+    let error = if kind == FigureKind::RayEnergy { rays() } else { waves() };
+    plain_error(error.unwrap_or(0.0), "")
 }
 
 /// A table of the coefficients, a column for each field.
-fn coefficients(ui: &mut Ui, fields: &Fields, waves: &FieldWavefronts) {
-    let sums: Vec<_> = waves
-        .fields
-        .iter()
-        .map(|field| field.value.as_ref().ok().and_then(|field| field.zernike.as_ref().ok()))
-        .collect();
+fn coefficients(ui: &mut Ui, fields: &Fields, waves: &FieldWavefronts, is_fringe: bool) {
+    let order = if is_fringe { ZernikeOrder::Fringe } else { ZernikeOrder::Noll };
+    let sum = |field: &FieldWavefront| {
+        if is_fringe { field.fringe.clone().ok() } else { field.zernike.clone().ok() }
+    };
+    let sums: Vec<_> =
+        waves.fields.iter().map(|field| field.value.as_ref().ok().and_then(sum)).collect();
     let count = sums.iter().flatten().map(|sum| sum.coefficients.len()).max().unwrap_or(0);
-    let indices = ZernikeOrder::Noll.indices(count);
+    let indices = order.indices(count);
     ScrollArea::both().auto_shrink([false, false]).show(ui, |ui| {
         Grid::new("zernike").striped(true).spacing([12.0, 2.0]).show(ui, |ui| {
-            ui.weak("Noll");
+            ui.weak("No.");
             ui.weak("Aberration");
             for i in 0..sums.len() {
                 heading(ui, fields, i);
@@ -420,7 +532,7 @@ fn coefficients(ui: &mut Ui, fields: &Fields, waves: &FieldWavefronts) {
                 ui.label((k + 1).to_string());
                 ui.label(aberration_name(index));
                 for sum in &sums {
-                    let found = sum.and_then(|sum| sum.coefficients.get(k).copied());
+                    let found = sum.as_ref().and_then(|sum| sum.coefficients.get(k).copied());
                     ui.label(found.map_or("-".to_owned(), |e| format!("{:.4}", e.value)));
                 }
                 ui.end_row();
@@ -428,7 +540,8 @@ fn coefficients(ui: &mut Ui, fields: &Fields, waves: &FieldWavefronts) {
             ui.label("");
             ui.label("RMS of the rest");
             for sum in &sums {
-                ui.label(sum.map_or("-".to_owned(), |sum| format!("{:.4}", sum.rest.value)));
+                let rest = sum.as_ref().map(|sum| format!("{:.4}", sum.rest.value));
+                ui.label(rest.unwrap_or_else(|| "-".to_owned()));
             }
             ui.end_row();
         });

@@ -1,19 +1,21 @@
 //! A scene seen through the lens: coarse while the lens changes, finer when it is still; beside that of
 //! another lens, or with its error.
 
+mod camera;
 mod histogram;
 mod magnifier;
 
 use std::sync::Arc;
 
 use egui::{
-    Color32, ColorImage, ComboBox, Pos2, Rect, Response, RichText, Sense, Slider, TextureFilter,
-    TextureHandle, TextureOptions, Ui, Vec2, WidgetInfo, pos2, vec2,
+    Color32, ColorImage, ComboBox, Pos2, Rect, Response, RichText, ScrollArea, Sense, Slider,
+    TextureFilter, TextureHandle, TextureOptions, Ui, Vec2, WidgetInfo, pos2, vec2,
 };
 
-use super::widgets::hint_beside;
+use super::figure_view::accuracy_section;
 use super::{Panel, displayed_results, show_missing_results};
-use crate::picture::{BitDepth, BuiltInScene, Picture, SensorPreset, photon_count};
+use crate::picture::{BitDepth, BuiltInScene, Exposure, Picture, photon_count};
+use crate::report::FigureKind;
 use crate::session::{
     AnalysisResults, Command, PanelSetting, PictureScene, ScenePicture, SessionView, Timed,
 };
@@ -86,7 +88,6 @@ pub struct PicturePanel {
     line: f32,
     /// A picture that was kept to compare others with.
     kept: Option<NamedPicture>,
-    sensor: usize,
 }
 
 impl Default for PicturePanel {
@@ -98,7 +99,6 @@ impl Default for PicturePanel {
             magnifier: Magnifier::default(),
             line: 0.5,
             kept: None,
-            sensor: 0,
         }
     }
 }
@@ -115,11 +115,21 @@ impl Panel for PicturePanel {
     }
 
     fn ui(&mut self, ui: &mut Ui, view: &SessionView, actions: &mut Actions) {
-        let Some((results, _)) = displayed_results(view) else {
+        let Some((results, numbers)) = displayed_results(view) else {
             return show_missing_results(ui, view);
         };
         let present = NamedPicture::new("present", results);
         self.controls(ui, view, present.as_ref(), actions);
+        let most = OPTIONS * ui.available_height();
+        ScrollArea::vertical().id_salt("options").max_height(most).show(ui, |ui| {
+            let picture = present.as_ref().and_then(NamedPicture::picture);
+            camera::options(ui, view, picture, actions);
+            let subject = (&**results, numbers.picture_accuracy.is_some());
+            let open = accuracy_section(ui, FigureKind::PictureAccuracy, subject, actions);
+            if open != view.settings.picture_accuracy {
+                actions.push(Command::Show(PanelSetting::PictureAccuracy(open)));
+            }
+        });
         let Some(present) = present else {
             ui.weak("Computing …");
             return;
@@ -237,22 +247,12 @@ impl PicturePanel {
         }
     }
 
-    fn sensor(&self) -> &'static SensorPreset {
-        &SensorPreset::ALL[self.sensor]
-    }
-
-    /// The sensor, the line of a wipe, and the way back to the whole picture.
+    /// The line of a wipe, and the way back to the whole picture.
     fn settings(&mut self, ui: &mut Ui) {
+        if self.mode != PictureMode::Wipe && self.magnifier.is_whole() {
+            return;
+        }
         ui.horizontal(|ui| {
-            ui.label("Sensor");
-            let combo = ComboBox::from_id_salt("sensor").selected_text(self.sensor().name);
-            let shown = combo.show_ui(ui, |ui| {
-                for (i, preset) in SensorPreset::ALL.iter().enumerate() {
-                    let item = ui.selectable_value(&mut self.sensor, i, preset.name);
-                    hint_beside(item, preset.source);
-                }
-            });
-            named_list(ui, shown, "Sensor of the signal-to-noise ratio");
             if self.mode == PictureMode::Wipe {
                 let slider = Slider::new(&mut self.line, 0.0..=1.0).show_value(false).text("Line");
                 ui.add(slider);
@@ -349,7 +349,7 @@ impl PicturePanel {
     ) -> egui::TextureId {
         let key = (ByAddress::from(&named.shown), white.to_bits());
         let texture = self.textures[slot].get(key, |_| {
-            let picture = named.picture().map(|shown| Picture { white, ..shown.picture.clone() });
+            let picture = named.picture().map(|shown| Picture { white, ..developed(shown) });
             let (size, bytes) = picture.map_or(([1, 1], vec![0; 3]), |picture| {
                 (picture.frame.pixels, picture.srgb_bytes(BitDepth::Eight))
             });
@@ -377,14 +377,15 @@ impl PicturePanel {
         (seen, white): (&[&Picture], f64),
         at: Pos2,
     ) {
-        let sensor = &self.sensor().model;
+        let Some(first) = pictures.first().and_then(NamedPicture::picture) else { return };
+        let sensor = &first.options.sensor().model;
         // The same exposure for all: normal for the first.
-        let seconds = sensor.normal_exposure(seen[0], LUMINANCE);
+        let (luminance, seconds) = exposure(first);
         for (named, picture) in pictures.iter().zip(seen) {
             let [column, row] = pixel_at(picture, at);
             let values = picture.values[row * picture.frame.pixels[0] + column];
             let [red, green, blue] = values.map(|value| 100.0 * value / white);
-            let lux = LUMINANCE * picture.gray([column, row]);
+            let lux = luminance * picture.gray([column, row]);
             let photons = photon_count(lux, picture.frame.pitch, seconds);
             let noise = sensor.signal_to_noise(photons, sensor.dark_current * seconds);
             let text = format!(
@@ -401,13 +402,32 @@ impl PicturePanel {
 const BESIDE: f32 = 230.0;
 /// The height of a line of numbers below the picture, in points.
 const WORDS: f32 = 18.0;
-/// The luminance of white in the scene, in cd/m²: a room by day.
-const LUMINANCE: f64 = 100.0;
+/// The largest share of the height of the panel that the options of a picture take.
+const OPTIONS: f32 = 0.5;
 const POINT: &str =
     "Point at the picture: light and signal-to-noise ratio of a pixel; the wheel magnifies";
-const EXPOSURE: &str = "The signal-to-noise ratio of a pixel of the sensor, by the mean of its colours: white \
-                        has 100 cd/m², and the exposure is that at which white of the first picture \
-                        fills 80 % of the range; the same time for both";
+const EXPOSURE: &str = "The signal-to-noise ratio of a pixel of the sensor, by the mean of its colours; without an \
+                        exposure in the camera it is that at which white of the first picture fills 80 % of the \
+                        range; the same time for both";
+
+/// The luminance of white in cd/m² and the exposure in seconds of a picture.
+fn exposure(shown: &ScenePicture) -> (f64, f64) {
+    let options = &shown.options;
+    let luminance = options.luminance_of(shown.scene.built_in());
+    let normal = || options.sensor().model.normal_exposure(&shown.picture, luminance);
+    (luminance, options.seconds.unwrap_or_else(normal))
+}
+
+/// The picture as light, or by the numbers of the sensor with their noise.
+fn developed(shown: &ScenePicture) -> Picture {
+    if !shown.options.noise {
+        return shown.picture.clone();
+    }
+    let (luminance, seconds) = exposure(shown);
+    let exposure = Exposure { luminance, seconds, seed: 0 };
+    let sensor = &shown.options.sensor().model;
+    sensor.expose(&shown.picture, &exposure).develop(&shown.picture)
+}
 
 /// The columns and rows of a picture.
 fn shape(picture: &Picture) -> Vec2 {
@@ -473,9 +493,16 @@ fn facts(ui: &mut Ui, picture: &ScenePicture, ms: f64) {
         format!(", at most {:.1} % in {} tiles", 100.0 * map.largest(), map.tiles())
     });
     let device = picture.device.as_deref().unwrap_or("processor");
-    let text =
-        format!("{width} x {height}, {error}{largest}, focus at {focus}, {ms:.0} ms, {device}");
-    let hover = "The error is measured against rays from every pixel of the tiles. Diffraction, losses and \
-                 ghosts are left out";
+    let way = if picture.is_exact { "exact" } else { "quick" };
+    let breathing = picture.breathing.map(|share| format!(", breathing {:.2} %", 100.0 * share));
+    let breathing = breathing.unwrap_or_default();
+    let text = format!(
+        "{width} x {height}, {way}, {error}{largest}, focus at {focus}{breathing}, {ms:.0} ms, {device}"
+    );
+    let left_out = picture.left_out.join("; ");
+    let hover = format!(
+        "The error of the quick way is measured against rays from every pixel of the tiles, that of the exact way \
+         is its noise. Left out: {left_out}"
+    );
     ui.label(RichText::new(text).small().weak()).on_hover_text(hover);
 }
