@@ -10,7 +10,7 @@ use crate::picture::{
 use crate::pupil::RayModel;
 
 /// The tiles on which effects are timed, and the samples of their pixels.
-pub const EFFECT_TILES: (usize, usize) = (3, 32);
+const EFFECT_TILES: (usize, usize) = (3, 32);
 
 /// A picture whose effects are listed.
 #[derive(Debug, Clone, Copy)]
@@ -128,7 +128,7 @@ impl<'a> PictureEffects<'a> {
                 unit: "share",
                 limit,
                 reason: match (losses.is_some(), by_ray) {
-                    (false, _) => "no --coating: white loses as much as the picture",
+                    (false, _) => "no coating is chosen: white loses as much as the picture",
                     (true, true) => "variation over pupil and picture: each ray has its share",
                     (true, false) => "variation over pupil and picture: one share for each colour",
                 },
@@ -156,7 +156,7 @@ impl<'a> PictureEffects<'a> {
             unit: "share",
             limit: self.tolerance,
             reason: match report {
-                None => "no --coating: surfaces reflect nothing",
+                None => "no coating is chosen: surfaces reflect nothing",
                 Some(_) => "light of all ghosts where it is brightest, over mid grey",
             },
             saved_milliseconds: self.ghosts.map(|(_, ms)| ms),
@@ -165,10 +165,7 @@ impl<'a> PictureEffects<'a> {
 }
 
 /// The time of some tiles of a picture and of its preparation, in milliseconds.
-///
-/// # Errors
-/// Those of the preparation.
-pub fn tile_ms<'a>(
+fn tile_ms<'a>(
     build: impl Fn() -> Result<ExactRenderer<'a>, PictureError>,
     seconds: f64,
 ) -> Result<f64, PictureError> {

@@ -161,7 +161,8 @@ impl AnalysisFigure {
             for curve in &chart.curves {
                 let (title, name) = (quoted(&chart.title), quoted(&curve.name));
                 for [x, y] in curve.pieces.iter().flatten() {
-                    text.push_str(&format!("{title},{name},{x_name},{y_name},{x},{y}\r\n"));
+                    let line = [&title, &name, &x_name, &y_name, &x.to_string(), &y.to_string()];
+                    text.extend([&line.map(String::as_str).join(","), "\r\n"]);
                 }
             }
         }

@@ -16,6 +16,7 @@ mod import_report;
 mod legibility;
 mod panels;
 mod picture;
+mod picture_options;
 mod picture_pass;
 mod prescription;
 mod search;

@@ -69,6 +69,7 @@ impl PictureEffect {
 /// The options of a picture.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
+#[expect(clippy::struct_excessive_bools, reason = "each is a switch of the panel")]
 pub struct PictureOptions {
     /// The distance of the scene in front of the first surface in mm; `None` for that of the focus.
     pub distance: Option<f64>,

@@ -233,7 +233,7 @@ impl Camera {
         let renderer = self.renderer(painted, (lens, options), &mut split, &mut left_out)?;
         let seconds = self.moving_seconds(painted, options, &mut left_out);
         let mut taken = if options.exact || seconds > 0.0 {
-            self.exact(&renderer, (split.rest(SAMPLING), seconds), is_interrupted)
+            exact_picture(&renderer, (split.rest(SAMPLING), seconds), is_interrupted)
         } else {
             let compared = if all_tiles { (usize::MAX, MAP_SAMPLES) } else { (TILES, SAMPLES) };
             self.compared(&renderer, options, compared, is_interrupted)?
@@ -260,6 +260,8 @@ impl Camera {
                 coating: options.coating,
                 diffraction: renderer.diffraction(),
                 losses: renderer.losses(),
+                is_sharp: None,
+                rings: None,
                 ghosts: ghosts.as_ref().map(|(report, ms)| (report, *ms)),
             };
             taken.gates = Some([effects.of_scene()?, effects.of_light()?].concat());
@@ -326,23 +328,6 @@ impl Camera {
         0.0
     }
 
-    /// Rays from every pixel.
-    fn exact(
-        &self,
-        renderer: &ExactRenderer<'_>,
-        (tolerance, seconds): (f64, f64),
-        is_interrupted: Interruption<'_>,
-    ) -> TakenPicture {
-        let settings = ExactSettings { tolerance, max_samples: MAX_SAMPLES, seed: 0, seconds };
-        let watch = |_: f64| {
-            if is_interrupted() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
-        };
-        let (picture, ms) = time_ms(|| renderer.render(&settings, &watch));
-        let error = Estimate::new(picture.rms_error(), 0.0, picture.rays);
-        let error = Some(Estimate { milliseconds: Some(ms), ..error });
-        TakenPicture { error, is_exact: true, ..TakenPicture::new(picture) }
-    }
-
     /// The quick way, with its error against rays on some tiles.
     fn compared(
         &self,
@@ -393,6 +378,22 @@ impl Camera {
             }
         }
     }
+}
+
+/// Rays from every pixel.
+fn exact_picture(
+    renderer: &ExactRenderer<'_>,
+    (tolerance, seconds): (f64, f64),
+    is_interrupted: Interruption<'_>,
+) -> TakenPicture {
+    let settings = ExactSettings { tolerance, max_samples: MAX_SAMPLES, seed: 0, seconds };
+    let watch = |_: f64| {
+        if is_interrupted() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    };
+    let (picture, ms) = time_ms(|| renderer.render(&settings, &watch));
+    let error = Estimate::new(picture.rms_error(), 0.0, picture.rays);
+    let error = Some(Estimate { milliseconds: Some(ms), ..error });
+    TakenPicture { error, is_exact: true, ..TakenPicture::new(picture) }
 }
 
 /// The tolerance, split over what may be wrong.

@@ -202,7 +202,7 @@ pub(super) fn seidel(subject: &Subject<'_>) -> Result<AnalysisFigure, String> {
         CurveChart::new(format!("{name}, µm"), ["surface", "µm"], curves)
     };
     let charts: Vec<CurveChart> = SUMS.iter().enumerate().map(chart).collect();
-    let tables = charts.iter().map(|chart| without_floors(chart)).collect();
+    let tables = charts.iter().map(without_floors).collect();
     let about = "third-order wave aberrations at the edge of pupil and field, after Welford";
     Ok(AnalysisFigure {
         rows: charts.chunks(2).map(<[CurveChart]>::to_vec).collect(),

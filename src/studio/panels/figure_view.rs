@@ -124,7 +124,8 @@ pub(super) fn bare_chart(
         }
         for (color, curve) in drawn {
             let style = if curve.dashed { LineStyle::dashed_loose() } else { LineStyle::Solid };
-            for piece in &curve.pieces {
+            // A bar without height would be a dot.
+            for piece in curve.pieces.iter().filter(|piece| piece.iter().any(|p| *p != piece[0])) {
                 let line = plot_curve(curve.name.clone(), piece.iter().copied());
                 plot.line(line.color(color).style(style).width(form.width));
             }

@@ -58,6 +58,8 @@ impl SeidelPanel {
 const LOWEST: f32 = 70.0;
 const NARROWEST: f32 = 190.0;
 const TITLE: f32 = 24.0;
+/// The height of the notes below the charts.
+const WORDS: f32 = 40.0;
 /// The widest bar.
 const BAR: f32 = 12.0;
 
@@ -66,7 +68,8 @@ fn bars(ui: &mut Ui, figure: &AnalysisFigure) {
     let charts: Vec<_> = figure.rows.iter().flatten().collect();
     let columns = ((ui.available_width() / NARROWEST) as usize).clamp(1, 4);
     let rows = charts.len().div_ceil(columns);
-    let height = (ui.available_height() / rows as f32 - TITLE).max(LOWEST);
+    let room = ui.available_height() - WORDS;
+    let height = (room / rows as f32 - TITLE).max(LOWEST);
     let surfaces = charts.first().map_or(1, |chart| chart.curves[0].pieces.len());
     let width = 0.6 * ui.available_width() / columns as f32 / (surfaces + 3) as f32;
     let ends = [0.0, (surfaces + 2) as f64];

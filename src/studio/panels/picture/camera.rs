@@ -33,6 +33,7 @@ const LIST: f32 = 170.0;
 const NEAR: f64 = 1000.0;
 /// The exposure in seconds and the luminance in cd/m² that are proposed.
 const EXPOSURE: f64 = 0.01;
+const DAYLIGHT: f64 = 100.0;
 
 /// The options of the picture, folded, and its effects.
 pub(super) fn options(
@@ -54,32 +55,42 @@ pub(super) fn options(
     }
 }
 
-/// Distance, focus, exposure, light, motion, sensor and accuracy, two pairs to a row.
+/// The width from which two pairs of a name and its number stand in a row, in points.
+const PAIRS: f32 = 430.0;
+
+/// Distance, focus, exposure, light, motion, sensor and accuracy.
 fn camera(ui: &mut Ui, lens: &Lens, options: &mut PictureOptions) {
-    Grid::new("camera").num_columns(4).spacing([8.0, 4.0]).show(ui, |ui| {
-        ui.label("Focus");
-        focus(ui, lens, &mut options.focus);
-        ui.label("Scene at");
-        let hint = "The distance of the scene in front of the first surface; absent: where the lens is focused";
-        optional(ui, (&mut options.distance, NEAR), ("Distance of the scene", " mm", hint));
-        ui.end_row();
-        ui.label("Exposure");
-        let hint = "Seconds; absent: until white fills 80 % of the range of the sensor";
-        optional(ui, (&mut options.seconds, EXPOSURE), ("Exposure", " s", hint));
-        ui.label("White");
-        let hint = "The luminance of white in the scene; absent: that of the scene, 100 cd/m² by day";
-        optional(ui, (&mut options.luminance, 100.0), ("Luminance of white", " cd/m²", hint));
-        ui.end_row();
-        ui.label("Sensor");
-        sensor(ui, options);
-        ui.label("Motion");
-        velocity(ui, &mut options.velocity);
-        ui.end_row();
-        ui.label("Error");
-        tolerance(ui, options);
-        ui.label("Way");
-        ways(ui, options);
-        ui.end_row();
+    type Field<'a> = (&'static str, &'a dyn Fn(&mut Ui, &mut PictureOptions));
+    let fields: [Field<'_>; 8] = [
+        ("Focus", &|ui, options| focus(ui, lens, &mut options.focus)),
+        ("Scene at", &|ui, options| {
+            let hint = "The distance of the scene in front of the first surface; absent: where the lens is focused";
+            optional(ui, (&mut options.distance, NEAR), ("Distance of the scene", " mm", hint));
+        }),
+        ("Exposure", &|ui, options| {
+            let hint = "Seconds; absent: until white fills 80 % of the range of the sensor";
+            optional(ui, (&mut options.seconds, EXPOSURE), ("Exposure", " s", hint));
+        }),
+        ("White", &|ui, options| {
+            let hint =
+                "The luminance of white in the scene; absent: that of the scene, 100 cd/m² by day";
+            let words = ("Luminance of white", " cd/m²", hint);
+            optional(ui, (&mut options.luminance, DAYLIGHT), words);
+        }),
+        ("Sensor", &sensor),
+        ("Motion", &|ui, options| velocity(ui, &mut options.velocity)),
+        ("Error", &tolerance),
+        ("Way", &ways),
+    ];
+    let pairs = if ui.available_width() < PAIRS { 1 } else { 2 };
+    Grid::new("camera").num_columns(2 * pairs).spacing([8.0, 4.0]).show(ui, |ui| {
+        for (i, (name, field)) in fields.into_iter().enumerate() {
+            ui.label(name);
+            field(ui, options);
+            if (i + 1) % pairs == 0 {
+                ui.end_row();
+            }
+        }
     });
 }
 
@@ -163,7 +174,7 @@ fn velocity(ui: &mut Ui, velocity: &mut [f64; 2]) {
     ui.horizontal(|ui| {
         for (value, name) in velocity.iter_mut().zip(["Motion to the right", "Motion upwards"]) {
             let speed = (0.01 * value.abs()).max(0.1);
-            let drag = DragValue::new(value).speed(speed).suffix(" mm/s");
+            let drag = DragValue::new(value).speed(speed).suffix(" mm/s").max_decimals(3);
             ui.add(drag.range(-1e6..=1e6)).accessible_name(name).on_hover_text(
                 "The velocity of the scene to the right and upwards during the exposure, which has to be given; of \
                  a scene at infinity in tangents of its direction per second",
@@ -220,7 +231,11 @@ fn ways(ui: &mut Ui, options: &mut PictureOptions) {
 fn effects(ui: &mut Ui, options: &mut PictureOptions, shown: Option<&ScenePicture>) {
     ui.horizontal_wrapped(|ui| {
         let name = |coating: Option<Coating>| {
-            coating.map_or("Nothing is lost".to_owned(), |coating| capitalize(&coating.to_string()))
+            match coating {
+                None => "Nothing is lost".to_owned(),
+                Some(Coating::Bare) => "Bare glass".to_owned(),
+                Some(coating) => capitalize(&coating.to_string()),
+            }
         };
         let combo = ComboBox::from_id_salt("picture coating").selected_text(name(options.coating));
         let list = combo.show_ui(ui, |ui| {

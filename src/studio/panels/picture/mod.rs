@@ -14,6 +14,7 @@ use egui::{
 
 use super::figure_view::accuracy_section;
 use super::{Panel, displayed_results, show_missing_results};
+use crate::math::format_short;
 use crate::picture::{BitDepth, BuiltInScene, Exposure, Picture, photon_count};
 use crate::report::FigureKind;
 use crate::session::{
@@ -24,6 +25,7 @@ use crate::studio::cached::{ByAddress, Cached};
 use crate::studio::draw::zoom_factor;
 use crate::studio::file_dialog::FileRequest;
 use crate::studio::form::named_list;
+use crate::studio::number;
 use crate::studio::text::capitalize;
 use histogram::histogram;
 use magnifier::Magnifier;
@@ -75,6 +77,9 @@ impl NamedPicture {
     }
 }
 
+/// Shows the options of the picture in at most so many points of height.
+type OptionList<'a> = &'a mut dyn FnMut(&mut Ui, f32);
+
 /// The picture whose texture is kept, and the white that it is shown with.
 type TextureKey = (ByAddress<ShownPicture>, u64);
 
@@ -120,16 +125,25 @@ impl Panel for PicturePanel {
         };
         let present = NamedPicture::new("present", results);
         self.controls(ui, view, present.as_ref(), actions);
-        let most = OPTIONS * ui.available_height();
-        ScrollArea::vertical().id_salt("options").max_height(most).show(ui, |ui| {
-            let picture = present.as_ref().and_then(NamedPicture::picture);
-            camera::options(ui, view, picture, actions);
-            let subject = (&**results, numbers.picture_accuracy.is_some());
-            let open = accuracy_section(ui, FigureKind::PictureAccuracy, subject, actions);
-            if open != view.settings.picture_accuracy {
-                actions.push(Command::Show(PanelSetting::PictureAccuracy(open)));
-            }
-        });
+        let subject = (&**results, numbers.picture_accuracy.is_some());
+        let named = present.clone();
+        let mut options = |ui: &mut Ui, most: f32| {
+            ScrollArea::vertical().id_salt("options").max_height(most).show(ui, |ui| {
+                let picture = named.as_ref().and_then(NamedPicture::picture);
+                camera::options(ui, view, picture, actions);
+                let open = accuracy_section(ui, FigureKind::PictureAccuracy, subject, actions);
+                if open != view.settings.picture_accuracy {
+                    actions.push(Command::Show(PanelSetting::PictureAccuracy(open)));
+                }
+            });
+        };
+        // A wide panel has room for the options beside the picture.
+        let room = ui.available_size();
+        let has_picture = present.as_ref().is_some_and(|named| named.picture().is_some());
+        let is_wide = has_picture && room.x - self.columns() * ASPECT * room.y > BESIDE;
+        if !is_wide {
+            options(ui, OPTIONS * room.y);
+        }
         let Some(present) = present else {
             ui.weak("Computing …");
             return;
@@ -138,7 +152,9 @@ impl Panel for PicturePanel {
             Ok(picture) => {
                 facts(ui, picture, present.shown.ms);
                 let others = self.compared(view, &present);
-                self.show(ui, &others);
+                let options: Option<OptionList<'_>> =
+                    if is_wide { Some(&mut options) } else { None };
+                self.show(ui, &others, options);
             }
             Err(why) => {
                 ui.label(RichText::new(why).color(ui.visuals().warn_fg_color));
@@ -198,7 +214,13 @@ impl PicturePanel {
         pictures
     }
 
-    fn show(&mut self, ui: &mut Ui, pictures: &[NamedPicture]) {
+    /// The columns of pictures beside each other.
+    fn columns(&self) -> f32 {
+        if self.mode == PictureMode::Beside { 2.0 } else { 1.0 }
+    }
+
+    /// Shows the pictures, with the options beside them where they are given.
+    fn show(&mut self, ui: &mut Ui, pictures: &[NamedPicture], options: Option<OptionList<'_>>) {
         let Some(first) = pictures.first().and_then(NamedPicture::picture) else { return };
         let compares = matches!(self.mode, PictureMode::Beside | PictureMode::Wipe);
         if compares && pictures.len() < 2 {
@@ -214,45 +236,36 @@ impl PicturePanel {
         let room = ui.available_size();
         let aspect = columns as f32 * shape(seen[0]).x / shape(seen[0]).y;
         // A wide panel has room for the numbers at the right.
-        if room.x - aspect * room.y > BESIDE {
+        if options.is_some() || room.x - aspect * room.y > BESIDE {
             ui.horizontal_top(|ui| {
-                let at = self.areas(ui, pictures, (&seen, white), room);
+                let beside = vec2(room.x - BESIDE, room.y);
+                let at = self.areas(ui, pictures, (&seen, white), beside);
                 ui.vertical(|ui| {
                     histogram(ui, &seen, white);
-                    self.settings(ui);
-                    self.numbers(ui, pictures, (&seen, white), at);
+                    self.settings(ui, first);
+                    numbers(ui, pictures, (&seen, white), at);
+                    let most = ui.available_height();
+                    options.into_iter().for_each(|options| options(ui, most));
                 });
             });
         } else {
             histogram(ui, &seen, white);
-            self.settings(ui);
+            self.settings(ui, first);
             let words = WORDS * (1 + seen.len()) as f32;
             let room = ui.available_size() - vec2(0.0, words);
             let at = self.areas(ui, pictures, (&seen, white), room);
-            self.numbers(ui, pictures, (&seen, white), at);
+            numbers(ui, pictures, (&seen, white), at);
         }
     }
 
-    /// Shows the numbers of the place under the pointer, or a hint to point there.
-    fn numbers(
-        &self,
-        ui: &mut Ui,
-        pictures: &[NamedPicture],
-        (seen, white): (&[&Picture], f64),
-        at: Option<Pos2>,
-    ) {
-        match at {
-            Some(at) => self.readout(ui, pictures, (seen, white), at),
-            None => drop(ui.weak(POINT)),
-        }
-    }
-
-    /// The line of a wipe, and the way back to the whole picture.
-    fn settings(&mut self, ui: &mut Ui) {
-        if self.mode != PictureMode::Wipe && self.magnifier.is_whole() {
-            return;
-        }
+    /// The exposure, the line of a wipe, and the way back to the whole picture.
+    fn settings(&mut self, ui: &mut Ui, first: &ScenePicture) {
         ui.horizontal(|ui| {
+            let (luminance, seconds) = exposure(first);
+            let [luminance, seconds] = [luminance, seconds].map(|v| number::format_digits(v, 3));
+            let sensor = first.options.sensor();
+            let text = format!("{}, {seconds} s at {luminance} cd/m²", sensor.name);
+            ui.label(RichText::new(text).small()).on_hover_text(sensor.source);
             if self.mode == PictureMode::Wipe {
                 let slider = Slider::new(&mut self.line, 0.0..=1.0).show_value(false).text("Line");
                 ui.add(slider);
@@ -368,38 +381,47 @@ impl PicturePanel {
         });
         Some(texture.id())
     }
+}
 
-    /// The numbers of the pixels at a place in shares of the pictures.
-    fn readout(
-        &self,
-        ui: &mut Ui,
-        pictures: &[NamedPicture],
-        (seen, white): (&[&Picture], f64),
-        at: Pos2,
-    ) {
-        let Some(first) = pictures.first().and_then(NamedPicture::picture) else { return };
-        let sensor = &first.options.sensor().model;
-        // The same exposure for all: normal for the first.
-        let (luminance, seconds) = exposure(first);
-        for (named, picture) in pictures.iter().zip(seen) {
-            let [column, row] = pixel_at(picture, at);
-            let values = picture.values[row * picture.frame.pixels[0] + column];
-            let [red, green, blue] = values.map(|value| 100.0 * value / white);
-            let lux = luminance * picture.gray([column, row]);
-            let photons = photon_count(lux, picture.frame.pitch, seconds);
-            let noise = sensor.signal_to_noise(photons, sensor.dark_current * seconds);
-            let text = format!(
-                "{}, pixel {column}, {row}: red {red:.1}, green {green:.1}, blue {blue:.1} % of white, \
-                 SNR {noise:.1}",
-                capitalize(named.name)
-            );
-            ui.label(RichText::new(text).small()).on_hover_text(EXPOSURE);
-        }
+/// Shows the numbers of the place under the pointer, or a hint to point there.
+fn numbers(
+    ui: &mut Ui,
+    pictures: &[NamedPicture],
+    (seen, white): (&[&Picture], f64),
+    at: Option<Pos2>,
+) {
+    match at {
+        Some(at) => readout(ui, pictures, (seen, white), at),
+        None => drop(ui.weak(POINT)),
+    }
+}
+
+/// The numbers of the pixels at a place in shares of the pictures.
+fn readout(ui: &mut Ui, pictures: &[NamedPicture], (seen, white): (&[&Picture], f64), at: Pos2) {
+    let Some(first) = pictures.first().and_then(NamedPicture::picture) else { return };
+    let sensor = &first.options.sensor().model;
+    // The same exposure for all: normal for the first.
+    let (luminance, seconds) = exposure(first);
+    for (named, picture) in pictures.iter().zip(seen) {
+        let [column, row] = pixel_at(picture, at);
+        let values = picture.values[row * picture.frame.pixels[0] + column];
+        let [red, green, blue] = values.map(|value| 100.0 * value / white);
+        let lux = luminance * picture.gray([column, row]);
+        let photons = photon_count(lux, picture.frame.pitch, seconds);
+        let noise = sensor.signal_to_noise(photons, sensor.dark_current * seconds);
+        let text = format!(
+            "{}, pixel {column}, {row}: red {red:.1}, green {green:.1}, blue {blue:.1} % of white, \
+             SNR {noise:.1}",
+            capitalize(named.name)
+        );
+        ui.label(RichText::new(text).small()).on_hover_text(EXPOSURE);
     }
 }
 
 /// The width that is left beside the picture for its numbers to stand there, in points.
-const BESIDE: f32 = 230.0;
+const BESIDE: f32 = 240.0;
+/// The width of a picture over its height.
+const ASPECT: f32 = 1.5;
 /// The height of a line of numbers below the picture, in points.
 const WORDS: f32 = 18.0;
 /// The largest share of the height of the panel that the options of a picture take.
@@ -504,5 +526,14 @@ fn facts(ui: &mut Ui, picture: &ScenePicture, ms: f64) {
         "The error of the quick way is measured against rays from every pixel of the tiles, that of the exact way \
          is its noise. Left out: {left_out}"
     );
-    ui.label(RichText::new(text).small().weak()).on_hover_text(hover);
+    ui.horizontal_wrapped(|ui| {
+        ui.label(RichText::new(text).small().weak()).on_hover_text(hover);
+        let asked = picture.options.tolerance;
+        if picture.error.is_some_and(|error| error.value > asked) && !picture.is_exact {
+            let text = format!("more than the {} % asked for", format_short(100.0 * asked));
+            let hint = "Exact, in the camera, follows rays from every pixel to that error";
+            let color = ui.visuals().warn_fg_color;
+            ui.label(RichText::new(text).small().color(color)).on_hover_text(hint);
+        }
+    });
 }
