@@ -430,7 +430,7 @@ impl Merit {
         let mut sums = vec![SumOfSquares::zero(values.len(), level); self.goal.terms.len()];
         let mut forms = Vec::with_capacity(self.zooms.len());
         self.visit_positions(values, |context| {
-            forms.push(context.traced_pupils.iter().map(|pupil| pupil.form().clone()).collect());
+            forms.push(context.pupil_forms());
             self.add_terms(context, |_| true, &mut sums)
         })?;
         self.average(&mut sums)?;
@@ -569,6 +569,11 @@ struct EvaluationContext<'a> {
 }
 
 impl EvaluationContext<'_> {
+    /// The forms of the pupils; none if pupils are frozen.
+    fn pupil_forms(&self) -> Vec<RegionKind> {
+        self.traced_pupils.iter().map(|pupil| pupil.form().clone()).collect()
+    }
+
     /// The derivatives by the variables that the motion of the pupils' edges contributes to
     /// integrals with these integrands, one for each pupil; zeros if pupils are frozen.
     fn edge_motion(&self, costs: impl Iterator<Item = QuadraticIntegrand>) -> DVector<f64> {
