@@ -327,7 +327,7 @@ impl Term {
             }
             Self::ThroughputLoss(area) => *area *= factor * factor,
             Self::GeometricMtf { frequency, .. } => *frequency /= factor,
-            Self::Operand { kind, min, max } if !kind.is_angle() => {
+            Self::Operand { kind, min, max } if kind.is_length() => {
                 min.iter_mut().chain(max).for_each(|bound| *bound *= factor);
             }
             Self::Spot
@@ -357,7 +357,7 @@ impl Term {
             | Self::RelativeIllumination { .. }
             | Self::FNumber(_)
             | Self::Steepness(_) => 0,
-            Self::Operand { kind, .. } if kind.is_angle() => 0,
+            Self::Operand { kind, .. } if !kind.is_length() => 0,
             _ => 2,
         }
     }

@@ -1,6 +1,7 @@
 //! The title, the unit, the explanation and the default of every term.
 
 use super::scope;
+use crate::lens::OperandKind;
 use crate::merit::{self, LensFigures, Term, WeightedTerm};
 use crate::session::{Analyses, SessionView};
 use crate::studio::number;
@@ -118,6 +119,7 @@ pub(super) const fn unit(term: Term) -> &'static str {
         | Term::FNumber(_)
         | Term::Steepness(_) => "",
         Term::Operand { kind, .. } if kind.is_angle() => "°",
+        Term::Operand { kind: OperandKind::Distortion, .. } => "%",
         Term::FocalLength(_)
         | Term::GlassCenter { .. }
         | Term::GlassEdge(_)
@@ -177,6 +179,7 @@ pub(super) fn value_text(term: Term, value: f64) -> String {
         Term::GeometricMtf { .. } => format!("{} short", short(root)),
         Term::Steepness(_) => format!("{} over", short(root)),
         Term::Operand { kind, .. } if kind.is_angle() => format!("{}° off", short(root)),
+        Term::Operand { kind: OperandKind::Distortion, .. } => format!("{} % off", short(root)),
         _ => format!("{}{}", length_text(root), deviation(term)),
     }
 }
