@@ -355,7 +355,7 @@ impl Term {
             Self::GeometricMtf { frequency, .. } | Self::Mtf { frequency, .. } => {
                 *frequency /= factor;
             }
-            Self::Operand { kind, min, max } if !kind.is_angle() => {
+            Self::Operand { kind, min, max } if kind.is_length() => {
                 min.iter_mut().chain(max).for_each(|bound| *bound *= factor);
             }
             Self::Spot
@@ -388,7 +388,7 @@ impl Term {
             | Self::RelativeIllumination { .. }
             | Self::FNumber(_)
             | Self::Steepness(_) => 0,
-            Self::Operand { kind, .. } if kind.is_angle() => 0,
+            Self::Operand { kind, .. } if !kind.is_length() => 0,
             _ => 2,
         }
     }

@@ -20,6 +20,8 @@ pub enum OperandKind {
     Sag,
     /// The height at which a chief ray meets a surface, in mm; at the image if none is chosen.
     ChiefRayHeight,
+    /// The height of a chief ray in the image over that without distortion, minus 1, in percent.
+    Distortion,
     /// The angle between a chief ray and the axis behind a surface, in degrees; in image space if
     /// none is chosen.
     ChiefRayAngle,
@@ -53,11 +55,12 @@ pub enum OperandKind {
 
 impl OperandKind {
     /// All kinds, in the order in which an editor lists them.
-    pub const ALL: [Self; 16] = [
+    pub const ALL: [Self; 17] = [
         Self::Gap,
         Self::Track,
         Self::Sag,
         Self::ChiefRayHeight,
+        Self::Distortion,
         Self::ChiefRayAngle,
         Self::IncidenceAngle,
         Self::Telecentricity,
@@ -79,6 +82,7 @@ impl OperandKind {
             Self::Track => "track",
             Self::Sag => "sag",
             Self::ChiefRayHeight => "chief_ray_height",
+            Self::Distortion => "distortion",
             Self::ChiefRayAngle => "chief_ray_angle",
             Self::IncidenceAngle => "incidence_angle",
             Self::Telecentricity => "telecentricity",
@@ -94,14 +98,20 @@ impl OperandKind {
         }
     }
 
-    /// True if it is an angle in degrees; all others are lengths in mm.
+    /// True if it is a length in mm, which grows with the lens.
+    pub const fn is_length(self) -> bool {
+        !self.is_angle() && !matches!(self, Self::Distortion)
+    }
+
+    /// True if it is an angle in degrees.
     pub const fn is_angle(self) -> bool {
         matches!(self, Self::ChiefRayAngle | Self::IncidenceAngle | Self::Telecentricity)
     }
 
     /// True if it is a property of chief rays.
     pub const fn traces_chief_rays(self) -> bool {
-        self.is_angle() || matches!(self, Self::ChiefRayHeight | Self::LateralColor)
+        self.is_angle()
+            || matches!(self, Self::ChiefRayHeight | Self::Distortion | Self::LateralColor)
     }
 
     /// True if it is a third-order sum.
@@ -124,6 +134,7 @@ impl OperandKind {
                 &[Surfaces, Fields, Wavelengths, Zooms]
             }
             Self::Telecentricity | Self::LateralColor => &[Fields, Wavelengths, Zooms],
+            Self::Distortion => &[Fields, Zooms],
             Self::AxialColor | Self::SecondarySpectrum => &[Wavelengths, Zooms],
             Self::ThermalFocus => &[Zooms],
             // Distances, sags and third-order sums.

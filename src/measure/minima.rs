@@ -9,11 +9,11 @@
 //! them. Near a distance of 1 the merit between them decides: a hill above both means two.
 
 use super::timing::Stopwatch;
-use crate::lens::{Lens, Medium, Variable};
+use crate::lens::{Lens, Variable};
 use crate::merit::{DerivativeLevel, Merit, MeritError, SumOfSquares};
 use crate::optimize::{DescentMethod, Optimizer, start_from};
 use crate::search::Random;
-use crate::search::lens_landscape::{LensLandscape, SearchPlan, SearchSetupError};
+use crate::search::lens_landscape::{LensLandscape, SearchPlan, SearchSetupError, curvature_signs};
 use crate::solve::{LeastSquaresPoint, TrustRegion};
 use nalgebra::{DMatrix, DVector};
 use rand::SeedableRng as _;
@@ -26,8 +26,6 @@ use std::sync::atomic::{AtomicBool, Ordering};
 const MOST_EVALUATIONS: usize = 1000;
 /// The starts between two looks at the flag.
 const BATCH: u64 = 32;
-/// The curvature relative to the focal length below which a surface counts as plane.
-const PLANE: f64 = 0.05;
 /// The parts of the way from the lens to random numbers that are tried: of many surfaces few random ones
 /// form an image.
 const SPREADS: [f64; 4] = [1.0, 0.5, 0.25, 0.125];
@@ -220,7 +218,7 @@ impl EndedDescent {
         let sum = merit.evaluate(&values, DerivativeLevel::Normal)?;
         Ok(Self {
             promised: promised_decrease(&merit, &values, &sum),
-            signs: signs(&lens, landscape.focal_length()),
+            signs: curvature_signs(&lens, landscape.focal_length()),
             values: DVector::from_vec(values),
             normal: sum.normal,
             value: sum.value,
@@ -288,17 +286,4 @@ fn enter(family: &mut Vec<Minimum>, found: &EndedDescent) {
         }
         None => family.push(Minimum { values: found.values.clone(), merit: found.value, found: 1 }),
     }
-}
-
-/// The signs of the curvatures of a lens and of the powers of its glasses, with 0 for planes.
-fn signs(lens: &Lens, focal_length: f64) -> String {
-    let sign = |curvature: f64| match curvature * focal_length {
-        c if c.abs() < PLANE => '0',
-        c if c > 0.0 => '+',
-        _ => '-',
-    };
-    let curvatures = lens.surfaces.iter().map(|row| sign(row.curvature));
-    let powers = lens.surfaces.windows(2).filter(|pair| pair[0].medium != Medium::Air);
-    let powers = powers.map(|pair| sign(pair[0].curvature - pair[1].curvature));
-    curvatures.chain(['/']).chain(powers).collect()
 }

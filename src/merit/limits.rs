@@ -11,7 +11,7 @@ use super::light::{
 };
 use super::operands::operand_values;
 use super::sum::{DerivativeLevel, SumOfSquares};
-use super::{EvaluationContext, Merit, MeritError, Term, VariableDual, WeightedTerm};
+use super::{EvaluationContext, Merit, MeritError, PupilForms, Term, VariableDual, WeightedTerm};
 use crate::lens::{System, TermSelection};
 use nalgebra::DVector;
 
@@ -33,6 +33,8 @@ pub struct LimitedSum {
     pub objective: SumOfSquares,
     /// The limits.
     pub limits: Vec<Limit>,
+    /// The forms of the pupils, which [`Merit::follow_pupils`] takes.
+    pub pupils: PupilForms,
 }
 
 /// A number of a resolved lens that is limited and needs no rays.
@@ -74,7 +76,9 @@ impl Merit {
     ) -> Result<LimitedSum, MeritError> {
         let mut sums = vec![SumOfSquares::zero(values.len(), level); self.goal.terms.len()];
         let (mut limits, mut of_light) = (Vec::new(), Vec::new());
+        let mut forms = Vec::with_capacity(self.zooms.len());
         self.visit_positions(values, |context| {
+            forms.push(context.pupil_forms());
             self.add_terms(context, |term| !self.goal.is_constraint(term), &mut sums)?;
             self.add_mechanical_limits(context, level, &mut limits);
             self.add_light_limits(context, level, &mut of_light);
@@ -85,7 +89,7 @@ impl Merit {
         limits.append(&mut of_light);
         match limits.iter().find(|limit| !limit.is_finite()) {
             Some(limit) => Err(MeritError::NotFinite { term: limit.margin.term }),
-            None => Ok(LimitedSum { objective, limits }),
+            None => Ok(LimitedSum { objective, limits, pupils: PupilForms(forms) }),
         }
     }
 

@@ -441,7 +441,7 @@ impl Merit {
         let mut sums = vec![SumOfSquares::zero(values.len(), level); self.goal.terms.len()];
         let mut forms = Vec::with_capacity(self.zooms.len());
         self.visit_positions(values, |context| {
-            forms.push(context.traced_pupils.iter().map(|pupil| pupil.form().clone()).collect());
+            forms.push(context.pupil_forms());
             self.add_terms(context, |_| true, &mut sums)
         })?;
         self.average(&mut sums)?;
@@ -617,6 +617,11 @@ impl<'a> EvaluationContext<'a> {
             }
             None => EvaluationContext { ..*self },
         }
+    }
+
+    /// The forms of the pupils; none if pupils are frozen.
+    fn pupil_forms(&self) -> Vec<RegionKind> {
+        self.traced_pupils.iter().map(|pupil| pupil.form().clone()).collect()
     }
 
     /// The derivatives by the variables that the motion of the pupils' edges contributes to

@@ -4,7 +4,8 @@
 //! distortion do; it is the same ray at all wavelengths.
 
 use super::constraints::{ConstraintMargin, along_light, sag_at};
-use super::spot::lost_chief_error;
+use super::first_order::image_scale;
+use super::spot::{lost_chief_error, paraxial_heights};
 use super::sum::{DerivativeLevel, SumOfSquares};
 use super::{EvaluationContext, MeritError, Term, WeightedTerm};
 use crate::lens::{
@@ -136,8 +137,13 @@ impl Operand<'_> {
             return vec![None];
         }
         let sampling = self.context.sampling;
+        let is_off_axis = |field: usize| {
+            let point = sampling.fields[field];
+            self.kind != OperandKind::Distortion || point.x != 0.0 || point.y != 0.0
+        };
         let asked = |field: &usize| {
-            self.scope.has(TermSelection::Fields, *field) && !sampling.is_dark(*field)
+            let is_chosen = self.scope.has(TermSelection::Fields, *field);
+            is_chosen && !sampling.is_dark(*field) && is_off_axis(*field)
         };
         (0..sampling.chief_rays.len()).filter(asked).map(Some).collect()
     }
@@ -199,12 +205,23 @@ impl Operand<'_> {
             OperandKind::ChiefRayHeight => {
                 self.chief(system, site)?.height(site.surface.unwrap_or(self.rows()))?
             }
+            OperandKind::Distortion => self.distortion(system, site)?,
             OperandKind::ChiefRayAngle | OperandKind::Telecentricity => {
                 self.chief(system, site)?.angle_behind(surface)?
             }
             OperandKind::IncidenceAngle => self.chief(system, site)?.incidence(surface)?,
             kind => self.third_order(kind, systems, system)?,
         })
+    }
+
+    /// The height of a chief ray in the image over that without distortion, minus 1, in percent.
+    fn distortion<R: Real>(&self, system: &System<R>, site: OperandSite) -> Result<R, MeritError> {
+        let chief = self.chief(system, site)?;
+        let ideal = paraxial_heights(self.context)?[site.field.unwrap_or(0)];
+        let along = ideal[0] * chief.along[0] + ideal[1] * chief.along[1];
+        let ideal = image_scale(system, self.context.zoom.object) * R::from_f64(along);
+        let ratio = chief.height(self.rows())? * (R::ONE / ideal);
+        Ok((ratio - R::ONE) * R::from_f64(100.0))
     }
 
     /// The distance from the image plane to the paraxial image, in mm.

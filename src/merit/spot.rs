@@ -374,7 +374,9 @@ pub(super) fn lost_chief_error(
 
 /// The vector proportional to the paraxial image point, per field: `tan θ` along the direction of the
 /// field, or the object height in mm.
-fn paraxial_heights(context: &EvaluationContext<'_>) -> Result<Vec<[f64; 2]>, MeritError> {
+pub(super) fn paraxial_heights(
+    context: &EvaluationContext<'_>,
+) -> Result<Vec<[f64; 2]>, MeritError> {
     let refuse = |why| Err(MeritError::DoesNotApply { term: "distortion", why });
     let mut heights = Vec::new();
     for field in &context.sampling.fields {

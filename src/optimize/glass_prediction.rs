@@ -56,7 +56,7 @@ impl GlassModel {
         let merit = merit.with_index_variables(lens, rows);
         let indices = merit.indices(rows);
         let values: Vec<f64> = merit.values(lens).into_iter().chain(indices.clone()).collect();
-        let LimitedSum { mut objective, limits } =
+        let LimitedSum { mut objective, limits, .. } =
             merit.evaluate_with_limits(&values, DerivativeLevel::Normal)?;
         let variables: Vec<ScaledVariable> = merit
             .variables()

@@ -37,6 +37,11 @@ pub trait Optimizer: Send + Sync + Debug {
     fn current(&self) -> &Lens;
     /// Every term of the merit function for the best lens so far.
     fn terms(&self) -> Result<Vec<TermValue>, MeritError>;
+    /// The number of evaluations of the merit with its derivatives so far; 0 for a method that tells it with
+    /// its steps alone.
+    fn evaluations(&self) -> usize {
+        0
+    }
     /// The limits that hold the best lens verified last; empty for a method or a goal without
     /// constraints.
     fn binding_limits(&self) -> &[LimitPrice] {

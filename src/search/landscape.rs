@@ -78,6 +78,17 @@ pub trait Landscape: Sync {
         0
     }
 
+    /// A point near another one that keeps every limit: a loss may count limits as penalties, which points
+    /// break a little. By default there are no limits.
+    fn settle(&self, _point: &Self::Point) -> Settlement<Self::Point> {
+        Settlement::Kept
+    }
+
+    /// True if two points of one topology lie at the same minimum; by default all of them do.
+    fn is_same_minimum(&self, _one: &Self::Point, _other: &Self::Point) -> bool {
+        true
+    }
+
     /// The data that distinguish this landscape from others, like its rules and its objective. A
     /// checkpoint of another landscape is refused, naming the first field that differs. The
     /// optional field `start` holds the start of the search and is compared first.
@@ -139,4 +150,27 @@ pub struct MutatedPoint<P> {
     /// determinant of the map, as Metropolis–Hastings needs it; `None` if the mutation is not
     /// reversible.
     pub log_ratio: Option<f64>,
+    /// The gradients that were made to choose it.
+    pub gradients: u64,
+}
+
+/// The outcome of keeping the limits of a point.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Settlement<P> {
+    /// The point keeps them as it is.
+    Kept,
+    /// A point near it keeps them.
+    Restored {
+        /// That point.
+        point: P,
+        /// Its loss.
+        loss: f64,
+        /// The gradients that were made to find it.
+        gradients: u64,
+    },
+    /// No point was found near it that keeps them.
+    Broken {
+        /// The gradients that were made.
+        gradients: u64,
+    },
 }

@@ -15,6 +15,7 @@ mod error;
 mod landscape;
 pub mod lens_landscape;
 pub mod mutation;
+mod predicted_gain;
 mod projection;
 mod rules;
 mod sampler;
@@ -26,7 +27,7 @@ pub use bookkeeping::{
 };
 pub use checkpoint::SEARCH_CHECKPOINT;
 pub use error::SearchError;
-pub use landscape::{Landscape, LossGradient, MutatedPoint, SearchPoint};
+pub use landscape::{Landscape, LossGradient, MutatedPoint, SearchPoint, Settlement};
 pub use mutation::{
     MutatedLens, MutationError, MutationKind, MutationRecord, MutationWeights, Refusal,
     StructureChange, mutate, perturb, propose,

@@ -43,6 +43,18 @@ pub struct SearchRules {
     pub track: Option<f64>,
     /// The minimum back focal distance, in mm.
     pub back_focus: Option<f64>,
+    /// The largest number of aspheric surfaces; 0 for a search that adds none. One counts as half an
+    /// element.
+    #[serde(skip_serializing_if = "is_zero")]
+    pub aspheres: usize,
+    /// True to add elements at saddle points of the merit.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub saddles: bool,
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "the form that serde asks for")]
+fn is_zero(count: &usize) -> bool {
+    *count == 0
 }
 
 impl Default for SearchRules {
@@ -61,6 +73,8 @@ impl Default for SearchRules {
             semi_diameter: None,
             track: None,
             back_focus: None,
+            aspheres: 0,
+            saddles: false,
         }
     }
 }
@@ -111,8 +125,12 @@ impl SearchRules {
         }
     }
 
-    /// The relative frequency of a kind of mutation.
+    /// The relative frequency of a kind of mutation; 0 for those about aspheric surfaces where none is
+    /// permitted.
     pub fn weight(&self, kind: MutationKind) -> f64 {
+        if kind.is_about_aspheres() && self.aspheres == 0 {
+            return 0.0;
+        }
         let listed = self.weights.iter().find(|(listed, _)| *listed == kind);
         listed.map_or(1.0, |(_, weight)| *weight)
     }
@@ -130,13 +148,13 @@ impl SearchRules {
         surface >= self.fixed_ends[0] && surface + self.fixed_ends[1] < rows
     }
 
-    /// The same rules with the default range of elements widened to include `pieces`; a range that
-    /// was set explicitly is kept.
+    /// The same rules with the default range of elements widened to include `pieces` and the price of the
+    /// permitted aspheric surfaces; a range that was set explicitly is kept.
     #[must_use]
     pub fn admit_element_count(mut self, pieces: usize) -> Self {
         if self.elements == Self::default().elements {
             let [min, max] = self.elements;
-            self.elements = [min.min(pieces), max.max(pieces)];
+            self.elements = [min.min(pieces), max.max(pieces + self.aspheres.div_ceil(2))];
         }
         self
     }

@@ -147,6 +147,7 @@ impl ToyLandscape {
             kind: MutationKind::AddSinglet,
             record: StructureChange::Text("a singlet more in front".to_owned()).into(),
             log_ratio,
+            gradients: 0,
         }
     }
 
@@ -155,7 +156,7 @@ impl ToyLandscape {
         let log_ratio = Some(-(range[1] - range[0]).ln());
         let change = StructureChange::Text("without the first singlet".to_owned());
         let (point, record) = (vec![gaps[1]], change.into());
-        MutatedPoint { point, kind: MutationKind::RemoveSinglet, record, log_ratio }
+        MutatedPoint { point, kind: MutationKind::RemoveSinglet, record, log_ratio, gradients: 0 }
     }
 
     fn shift(&self, gaps: &[f64], random: &mut Random) -> MutatedPoint<Vec<f64>> {
@@ -166,6 +167,7 @@ impl ToyLandscape {
             kind: MutationKind::Bend,
             record: StructureChange::Text("shifted".to_owned()).into(),
             log_ratio: Some(0.0),
+            gradients: 0,
         }
     }
 }

@@ -58,7 +58,7 @@ fn three_numbers_suffice_and_the_rest_is_filled_and_shown() {
     harness.get_by_label_contains("Also taken: fields in °: 0, 14, 20");
     press(&mut harness, "Design a lens");
     let expected = LensSpecification {
-        focal_length_mm: 50.0,
+        focal_length_mm: Some(50.0),
         f_number: Some(2.8),
         half_field_deg: Some(20.0),
         ..LensSpecification::default()
@@ -83,7 +83,7 @@ fn limits_are_stated_in_their_units() {
     enter(&mut harness, "Glasses of the specification", "SCHOTT N-BK7, SCHOTT N-SF5");
     press(&mut harness, "Design a lens");
     let spec = &started(&harness).specification;
-    assert_eq!((spec.focal_length_mm, spec.max_semi_diameter_mm), (80.0, Some(30.0)));
+    assert_eq!((spec.focal_length_mm, spec.max_semi_diameter_mm), (Some(80.0), Some(30.0)));
     assert_eq!(spec.max_abs_distortion, Some(0.01));
     assert_eq!(spec.min_relative_illumination, Some(vec![0.25; 3]));
     assert_eq!(spec.max_elements, Some(5));
@@ -123,7 +123,7 @@ fn what_no_lens_can_do_is_refused_in_the_panel_and_starts_nothing() {
 fn designed(minutes: f64, end: RunStatus) -> SpecifiedDesignView {
     let mut session = Session::new(double_gauss(), || {}).unwrap();
     let specification = LensSpecification {
-        focal_length_mm: 50.0,
+        focal_length_mm: Some(50.0),
         f_number: Some(8.0),
         half_field_deg: Some(2.0),
         max_elements: Some(1),

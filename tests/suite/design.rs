@@ -1,9 +1,13 @@
 //! A lens from a specification: what is filled, what is refused, how a lens is judged.
 
 use super::cli::{Scratch, done, done_json, refused};
-use aplanat::lens::{Aperture, Lens, Medium, Row, blank, glass};
+use aplanat::analysis::polychromatic_geometric_mtf;
+use aplanat::lens::{Aperture, Lens, Medium, Object, Row, blank, glass};
+use aplanat::paraxial::{Beam, first_order};
+use aplanat::pupil::{Accuracy, RayModel};
 use aplanat::search::design::{
-    DesignRun, DesignSettings, LensRequirements, LensSpecification, SpecificationError, judge_lens,
+    DesignRun, DesignSettings, DesignedLens, LensRequirements, LensSpecification, LensWish,
+    SpecificationError, judge_lens,
 };
 use serde::Deserialize;
 use serde_json::Value;
@@ -83,8 +87,9 @@ fn refusal(text: &str) -> String {
 fn the_references_of_the_sheets_have_their_figures() {
     for sheet in sheets() {
         let (asked, filled) = LensRequirements::complete(&sheet.spec).unwrap();
-        // How a lens is made is no part of a sheet.
-        assert!(filled.iter().all(|value| value.key == "as_built"), "{}: {filled:?}", sheet.id);
+        // How a lens is made, and what it is to be good at, is no part of a sheet.
+        let is_other = |key: &str| ["as_built", "wish"].contains(&key);
+        assert!(filled.iter().all(|value| is_other(value.key)), "{}: {filled:?}", sheet.id);
         let found = judge_lens(&reference(&sheet), &asked, 1e-3).unwrap();
         let near = |what: &str, value: f64, stated: &Value, within: f64| {
             let stated = stated.as_f64().unwrap();
@@ -220,7 +225,7 @@ fn values_that_cannot_be_meant_are_refused_by_key() {
         (r#""glasses": ["N-BK99"]"#, "glasses: found `N-BK99`; expected manufacturer"),
         (r#""glasses": "cheap ones""#, "glasses: found `cheap ones`"),
         (r#""max_track_mm": -1"#, "max_track_mm: found -1; expected a number above 0"),
-        (r#""object": "near""#, "object: found `near`; expected `infinity`"),
+        (r#""object": "near""#, "object: found `near`; expected `infinity`, or `finite`"),
         (r#""numerical_aperture": 0.1"#, "both `f_number` and `numerical_aperture`"),
     ] {
         let text = refusal(&with(rest));
@@ -313,4 +318,129 @@ fn designed_lenses_come_with_their_spots_as_built() {
     assert!(design("none")["lenses"][0]["as_built"].is_null());
     let wrong = ["design", file.path(), "--as-built", "perfect"];
     refused(2, &wrong, "", &["as_built", "`perfect`", "shop_limit"]);
+}
+
+/// The lenses of a small design from achromats alone.
+fn designed(text: &str) -> (LensRequirements, Vec<DesignedLens>) {
+    let (asked, _) = LensRequirements::complete(&spec(text)).unwrap();
+    let settings = DesignSettings { starts: [0, 0], ..DesignSettings::with_seed(2) };
+    let mut run = DesignRun::new(&asked, &settings);
+    let go_on = AtomicBool::new(false);
+    while run.gradients() < 600 && run.advance(0.0, &go_on) {}
+    let lenses = run.finish(&go_on);
+    (asked, lenses)
+}
+
+/// The magnification times the distance of the object stands for the focal length; the rest follows as for
+/// a distant object.
+#[test]
+fn a_near_object_is_specified_by_its_magnification() {
+    let text = r#"{"magnification": -0.5, "object_distance_mm": 150, "numerical_aperture": 0.05,
+                   "image_height_mm": 5}"#;
+    let (asked, _) = LensRequirements::complete(&spec(text)).unwrap();
+    let object = asked.object.unwrap();
+    assert_eq!((object.distance, object.magnification, asked.focal_length), (150.0, -0.5, 75.0));
+    assert!((asked.thin_focal_length() - 50.0).abs() < 1e-12 && asked.f_number == 10.0);
+    // The object of 10 mm from the first vertex.
+    assert!((asked.half_field().to_radians().tan() - 10.0 / 150.0).abs() < 1e-12);
+    // Of a thin lens: 1/s + 1/s' = 1/f, and s' = s/2.
+    let text =
+        r#"{"magnification": 0.5, "focal_length_mm": 50, "f_number": 8, "half_field_deg": 2}"#;
+    let (asked, filled) = LensRequirements::complete(&spec(text)).unwrap();
+    assert!((asked.object.unwrap().distance - 150.0).abs() < 1e-12);
+    assert!(filled.iter().any(|value| value.key == "object_distance_mm"), "{filled:?}");
+    for (text, words) in [
+        (
+            r#""magnification": -1, "object": "infinity""#,
+            "a magnification of an object at infinity",
+        ),
+        (r#""focal_length_mm": 50, "object": "finite""#, "no key `magnification`"),
+        (r#""focal_length_mm": 50, "object_distance_mm": 100"#, "no key `magnification`"),
+        (r#""magnification": -1"#, "no key `object_distance_mm`"),
+        (r#""magnification": 0, "object_distance_mm": 100"#, "magnification: found 0"),
+        (
+            r#""magnification": -1, "focal_length_mm": 50, "object_distance_mm": 300"#,
+            "at 100.000 mm",
+        ),
+    ] {
+        let text = refusal(&format!(r#"{{"f_number": 8, "half_field_deg": 2, {text}}}"#));
+        assert!(text.contains(words), "{text}");
+    }
+}
+
+#[test]
+fn a_lens_for_a_near_object_has_its_magnification() {
+    let (asked, lenses) = designed(
+        r#"{"magnification": -1, "object_distance_mm": 100, "f_number": 10, "half_field_deg": 1.5,
+            "max_elements": 2, "as_built": "none"}"#,
+    );
+    let best = &lenses[0];
+    assert!(best.judgement.is_valid(), "{:?}", best.judgement.failures());
+    assert_eq!(best.lens.object, Object::Finite(100.0));
+    let um = best.lens.wavelengths[best.lens.primary()].um;
+    let system = best.lens.resolve(0, um).unwrap();
+    let first = first_order(&system, &Beam::for_lens(&best.lens, 0)).unwrap();
+    let magnification = first.magnification.unwrap();
+    assert!((magnification + 1.0).abs() < 0.0101, "{magnification}");
+    let judged = best.judgement.magnification.unwrap();
+    assert!((judged - magnification).abs() < 2e-3, "{judged} {magnification}");
+    // The cone of the image is that of the working f-number, 2 % of its light may be missing.
+    let working = first.working_f_number.unwrap();
+    assert!((working / 10.0 - 1.0).abs() < 0.03, "{working}");
+    assert!(best.judgement.rms < 0.05, "{}", best.judgement.rms);
+    let light: Vec<f64> = best.judgement.fields.iter().map(|field| field.clear_area).collect();
+    assert!(light.iter().zip(&asked.clear_area).all(|(found, least)| found >= least), "{light:?}");
+}
+
+/// A lens is judged by the contrast that is wished, and none is taken that has less of it.
+#[test]
+fn a_wish_for_contrast_is_judged_and_served() {
+    let text = |wish: &str| {
+        format!(
+            r#"{{"focal_length_mm": 60, "f_number": 5, "half_field_deg": 3, "max_elements": 2,
+                "as_built": "none"{wish}}}"#
+        )
+    };
+    let (asked, filled) = LensRequirements::complete(&spec(&text(""))).unwrap();
+    assert_eq!(asked.wish, LensWish::Rms);
+    assert!(filled.iter().any(|value| value.key == "wish" && value.value == "rms"));
+    let (asked, wished) = designed(&text(r#", "wish": {"mtf": 30}"#));
+    assert_eq!(asked.wish, LensWish::Mtf(30.0));
+    let best = &wished[0];
+    assert!(best.judgement.is_valid(), "{:?}", best.judgement.failures());
+    let model = RayModel::from_lens(&best.lens, 0).unwrap();
+    let contrast = |field: &aplanat::lens::FieldPoint| {
+        let accuracy = Accuracy { tolerance: 1e-3, ..Accuracy::default() };
+        let point =
+            polychromatic_geometric_mtf(&model, *field, &[30.0], accuracy).unwrap().points[0];
+        0.5 * (point.tangential.modulus.value + point.sagittal.modulus.value)
+    };
+    let mean = model.fields.iter().map(contrast).sum::<f64>() / model.fields.len() as f64;
+    let judged = best.judgement.contrast.unwrap();
+    assert!((judged - mean).abs() < 5e-3, "{judged} {mean}");
+    let (_, sharp) = designed(&text(""));
+    assert!(sharp[0].judgement.contrast.is_none());
+    let of_sharp = judge_lens(&sharp[0].lens, &asked, 1e-3).unwrap().contrast.unwrap();
+    assert!(judged >= of_sharp - 1e-3, "{judged} {of_sharp}");
+    let refused = refusal(&text(r#", "wish": {"mtf": 0}"#));
+    assert!(refused.contains("wish: found 0"), "{refused}");
+}
+
+/// What every limit costs is in the report of every lens: lengths by the millimetre, light by the percent.
+#[test]
+fn the_report_of_a_design_has_the_costs_of_its_limits() {
+    let file = Scratch::new("costs.json");
+    let text = r#"{"focal_length_mm": 60, "f_number": 5, "half_field_deg": 3, "max_elements": 2,
+                   "max_track_mm": 62, "min_back_focus_mm": 50, "as_built": "none"}"#;
+    std::fs::write(file.path(), text).unwrap();
+    let out = Scratch::new("costs-lens.json");
+    let words = ["design", file.path(), "--out", out.path(), "--gradients", "300"];
+    for lens in done_json(&words, "")["lenses"].as_array().unwrap() {
+        let costs = lens["costs"].as_array().unwrap();
+        let has =
+            |key: &str| costs.iter().any(|cost| cost[key].as_f64().is_some_and(|um| um > 0.0));
+        assert!(has("um_per_mm") && has("um_per_percent"), "{costs:?}");
+    }
+    let told = done(&words, "");
+    assert!(told.contains(" um per mm") && told.contains("light costs "), "{told}");
 }

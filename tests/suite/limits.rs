@@ -1,13 +1,15 @@
 //! Limits that the optimizer keeps.
 
 use super::merit::{bundled, vary, vary_at};
+use aplanat::analysis::distortion;
 use aplanat::lens::{
-    Lens, Parameter, ParameterKind, Quantity, ZoomNumber, ZoomPosition, add_variables,
+    Lens, OperandKind, Parameter, ParameterKind, Quantity, ZoomNumber, ZoomPosition, add_variables,
 };
 use aplanat::merit::{
     DerivativeLevel, Goal, Limit, LimitTreatment, Merit, MeritError, PupilEdge, Term, WeightedTerm,
 };
 use aplanat::optimize::{DescentMethod, OptimizationEnd, Optimizer, start};
+use aplanat::pupil::RayModel;
 
 /// The largest violation at the end.
 const KEPT: f64 = 1e-9;
@@ -346,4 +348,37 @@ fn an_edge_is_measured_where_the_light_ends_if_no_rim_is_fixed() {
     let fixed = aplanat::merit::constraint_margins(&lens, terms.into_iter()).unwrap();
     let fixed = fixed.iter().find(|margin| margin.term == "glass_edge").unwrap().value;
     assert!((fixed - edge).abs() < 1e-12, "{fixed}");
+}
+
+/// The largest distortion of the fields of a lens, in percent.
+fn largest_distortion(lens: &Lens) -> f64 {
+    let model = RayModel::from_lens(lens, 0).unwrap();
+    let off_axis = model.fields.iter().filter(|field| field.y != 0.0);
+    let percent = |field: &aplanat::lens::FieldPoint| {
+        100.0 * distortion(&model, *field, model.primary).unwrap().distortion.unwrap()
+    };
+    off_axis.map(percent).map(f64::abs).fold(0.0, f64::max)
+}
+
+/// Distortion within bounds is a limit: it is kept as it is measured, and its price is told if it holds.
+#[test]
+fn distortion_is_kept_within_its_limit() {
+    let lens = free("double_gauss_nikkor_s_50");
+    let before = largest_distortion(&lens);
+    let most = 0.5 * before;
+    let operand =
+        Term::Operand { kind: OperandKind::Distortion, min: Some(-most), max: Some(most) };
+    let mut goal = default_goal(&lens);
+    goal.terms.push(WeightedTerm::new(operand, 1.0));
+    let (start_violation, _) = judge(&lens, &lens, &goal);
+    assert!(before > 0.01 && start_violation > 0.4 * before, "{before} {start_violation}");
+    let optimizer = run(&lens, &goal, 60);
+    let best = optimizer.best();
+    let (violation, merit) = judge(best, &lens, &goal);
+    assert!(violation <= KEPT && merit.is_finite(), "{violation:e}");
+    assert!(largest_distortion(best) < most + 1e-4, "{} {most}", largest_distortion(best));
+    let held = |price: &&aplanat::optimize::LimitPrice| price.limit.term == "distortion";
+    for price in optimizer.binding_limits().iter().filter(held) {
+        assert!(price.price >= 0.0 && price.bound.abs() == most, "{price:?}");
+    }
 }

@@ -17,7 +17,7 @@ fn session() -> Session {
 /// A small design that ends after this time.
 fn request(minutes: f64) -> Box<SpecificationRequest> {
     let specification = LensSpecification {
-        focal_length_mm: 50.0,
+        focal_length_mm: Some(50.0),
         f_number: Some(8.0),
         half_field_deg: Some(2.0),
         max_elements: Some(1),

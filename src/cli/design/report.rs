@@ -51,16 +51,25 @@ pub(super) fn write_judgement(f: &mut fmt::Formatter<'_>, found: &LensJudgement)
         ShortNumber(*focal_length),
         ShortNumber(*refocus)
     )?;
-    let mut table =
-        TextTable::new(&["field deg", "rms um", "clear area mm^2", "illumination", "distortion"]);
+    if let Some(magnification) = found.magnification {
+        writeln!(f, "magnification {magnification:.5}")?;
+    }
+    if let Some(contrast) = found.contrast {
+        writeln!(f, "mean contrast {contrast:.4} at the frequency that is wished")?;
+    }
+    let mut heads = vec!["field deg", "rms um", "clear area mm^2", "illumination", "distortion"];
+    heads.extend(found.contrast.map(|_| "contrast"));
+    let mut table = TextTable::new(&heads);
     for field in &found.fields {
-        table.row([
+        let cells = [
             ShortNumber(field.degrees).to_string(),
             format!("{:.3}", 1e3 * field.rms),
             format!("{:.2}", field.clear_area),
             format!("{:.4}", field.relative_illumination),
             format!("{:.5}", field.distortion),
-        ]);
+        ];
+        let contrast = field.contrast.map(|contrast| format!("{contrast:.4}"));
+        table.row(cells.into_iter().chain(contrast));
     }
     write!(f, "{table}")?;
     match found.failures()[..] {
@@ -98,10 +107,12 @@ impl Display for DesignReport {
 
 /// Writes what the limits cost.
 fn write_costs(f: &mut fmt::Formatter<'_>, costs: &[LimitCost]) -> fmt::Result {
-    for LimitCost { term, surface, um_per_mm } in costs {
+    for LimitCost { term, surface, um_per_mm, um_per_percent } in costs {
         let place =
             surface.map_or(String::new(), |row| format!(" of surface {}", SurfaceNumber::new(row)));
-        writeln!(f, "{term}{place} costs {} um per mm", ShortNumber(*um_per_mm))?;
+        let of = |um: Option<f64>, unit| um.map(|um| format!("{} um per {unit}", ShortNumber(um)));
+        let price = of(*um_per_mm, "mm").or_else(|| of(*um_per_percent, "percent of it"));
+        writeln!(f, "{term}{place} costs {}", price.unwrap_or_default())?;
     }
     Ok(())
 }

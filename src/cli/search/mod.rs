@@ -21,7 +21,7 @@ use crate::lens::Lens;
 use crate::measure::Stopwatch;
 use crate::merit::MeritError;
 use crate::search::lens_landscape::{
-    LandscapeError, LensLandscape, SearchPlan, describe_left_out, finalize,
+    FinalizedLens, LandscapeError, LensLandscape, SearchPlan, describe_left_out, finalize,
 };
 use crate::search::{FoundPoint, RunEnd, SearchError, SearchMethod, SearchRun, SearchRunOn};
 use best_so_far::BestSoFar;
@@ -91,6 +91,8 @@ pub(super) struct SearchArgs {
 
 /// Maximum number of gradients if neither it nor a duration is given.
 const DEFAULT_ITERATIONS: u64 = 12_000;
+/// The number of minima that an iterated local search holds.
+const MINIMA: usize = 16;
 /// Seconds between two checkpoints.
 const SAVED: f64 = 3.0;
 
@@ -142,8 +144,8 @@ impl SearchArgs {
         let design = self.design_effects()?;
         let opened = self.lens.open()?;
         let _lock = self.checkpoint.as_deref().map(FileLock::acquire).transpose()?;
-        let mut plan = self.plan(&opened.lens)?;
-        let start = self.plan_args.start_lens(&opened.lens)?;
+        let (mut plan, start) =
+            (self.plan(&opened.lens)?, self.plan_args.start_lens(&opened.lens)?);
         let lens = design.working_lens(&start);
         let effects = design.report(&start, &opened.file)?;
         let original = Lens { wavelengths: start.wavelengths, ..opened.lens.clone() };
@@ -159,21 +161,21 @@ impl SearchArgs {
         let mut failures = Failures::default();
         let watched = WatchedRun { stop: &stop, watch, so_far: &so_far, original: &original };
         let ended = self.run_rounds(&landscape, &mut run, &watched, &mut failures);
-        let ms = 1e3 * watch.seconds();
-        let mut unsaved = self.save_best(&run.best().point, &original, &mut failures);
-        let stored = self.write_reservoir(&run, &original, &mut failures);
-        let stale = self.stale_files(&stored);
-        let finished = self.finish.then(|| finalize(&landscape, &run.best().point));
-        let finished = finished.and_then(|lens| failures.note(lens.map_err(refused)));
-        if let Some(finished) = &finished {
-            unsaved = self.save_best(&finished.lens, &original, &mut failures);
+        let (ms, best) = (1e3 * watch.seconds(), landscape.settled(&run.best().point));
+        let mut unsaved = self.save_best(&best, &original, &mut failures);
+        let stored = self.write_reservoir(&landscape, &run, &original, &mut failures);
+        let finished = self.finish.then(|| finalize(&landscape, &best).map_err(refused));
+        let finished = finished.and_then(|found| failures.note(found));
+        if let Some(FinalizedLens { lens, .. }) = &finished {
+            unsaved = self.save_best(lens, &original, &mut failures);
         }
-        let unsaved = unsaved.or_else(|| self.unstored_best(&run, &stored, &original));
-        let printed = Stopwatch::start();
-        let compared = StartAgainstBest::new(&landscape, &run.best().point).map_err(refused)?;
+        let unsaved = unsaved.or_else(|| self.unstored_best(&best, &stored, &original));
+        let watch = Stopwatch::start();
+        let compared = StartAgainstBest::new(&landscape, &best).map_err(refused)?;
         let report = SearchReport::new(report::SearchResults {
             landscape: &landscape,
             run: &run,
+            best: &best,
             ended,
             resumed,
             idle,
@@ -181,9 +183,9 @@ impl SearchArgs {
             gradients: run.statistics().gradients - before,
             start_breaks,
             compared,
-            compared_ms: 1e3 * printed.seconds(),
+            compared_ms: 1e3 * watch.seconds(),
+            stale: self.stale_files(&stored),
             stored,
-            stale,
             out: self.out.as_deref().filter(|_| unsaved.is_none()),
             unsaved,
             finished,
@@ -251,6 +253,9 @@ impl SearchArgs {
         let (descent, sampler) = stored.unzip();
         plan.local.method = self.plan_args.descent.or(descent).unwrap_or(plan.local.method);
         plan.settings.method = self.method.or(sampler).unwrap_or(plan.settings.method);
+        if plan.settings.method == SearchMethod::IteratedLocalSearch {
+            plan.settings.reservoir = self.plan_args.reservoir.unwrap_or(MINIMA);
+        }
         let usual = if self.minutes.is_none() { Some(DEFAULT_ITERATIONS) } else { None };
         plan.settings.gradients = self.iterations.or(usual);
         plan.settings.check().map_err(search_error)?;
@@ -341,14 +346,9 @@ impl SearchArgs {
     }
 
     /// The best lens, if the folder of the reservoir was the only place for it and took none.
-    fn unstored_best(
-        &self,
-        run: &SearchRunOn<LensLandscape>,
-        stored: &[PathBuf],
-        original: &Lens,
-    ) -> Option<Lens> {
+    fn unstored_best(&self, best: &Lens, stored: &[PathBuf], original: &Lens) -> Option<Lens> {
         let lost = self.out.is_none() && self.reservoir_dir.is_some() && stored.is_empty();
-        lost.then(|| lens_to_write(&run.best().point, original))
+        lost.then(|| lens_to_write(best, original))
     }
 
     /// The lenses of an earlier run in the folder of the reservoir.
@@ -359,9 +359,11 @@ impl SearchArgs {
         stale
     }
 
-    /// Writes the lenses of the reservoir, best first, until one fails; returns the paths.
+    /// Writes the lenses of the reservoir, best first, until one fails; returns the paths. Each keeps every
+    /// limit if a lens near it does.
     fn write_reservoir(
         &self,
+        landscape: &LensLandscape,
         run: &SearchRunOn<LensLandscape>,
         original: &Lens,
         failures: &mut Failures,
@@ -372,7 +374,8 @@ impl SearchArgs {
             let running = if running { "_running" } else { "" };
             let name = format!("{:02}_generation_{}{running}.json", i + 1, entry.number);
             let path = folder.join(name);
-            let saved = files::save(&lens_to_write(&entry.point, original), &path);
+            let lens = lens_to_write(&landscape.settled(&entry.point), original);
+            let saved = files::save(&lens, &path);
             if failures.note(saved).is_none() {
                 break;
             }

@@ -53,12 +53,16 @@ pub(in crate::cli) struct SearchPlanArgs {
     #[arg(long, value_name = "MM", allow_negative_numbers = true)]
     min_back_focus: Option<f64>,
 
+    /// The largest number of aspheric surfaces, each of which counts as half an element; absent: none is added
+    #[arg(long, value_name = "N")]
+    aspheres: Option<usize>,
+
     /// Mutations without paraxial projection
     #[arg(long)]
     no_projection: bool,
 
     /// Kinds of mutations to exclude: `add_singlet`, `remove_singlet`, `glue`, `split`, `drop_layer`,
-    /// `bend`, `flip`, `exchange_glass`, `move_stop`, `global_draw`
+    /// `bend`, `flip`, `exchange_glass`, `move_stop`, `add_asphere`, `remove_asphere`, `global_draw`
     #[arg(long, value_name = "KINDS", value_delimiter = ',')]
     forbid: Vec<MutationArg>,
 
@@ -87,9 +91,9 @@ pub(in crate::cli) struct SearchPlanArgs {
     #[arg(long, value_name = "N")]
     trials: Option<usize>,
 
-    /// The number of lenses in the reservoir
+    /// The number of lenses in the reservoir; absent: 5, or 16 different minima of an iterated local search
     #[arg(long, value_name = "N")]
-    reservoir: Option<usize>,
+    pub(in crate::cli) reservoir: Option<usize>,
 
     /// Temperature, 0 or more, or `infinite`; absent: the density of the start is one half
     #[arg(long, value_name = "T", allow_negative_numbers = true)]
@@ -217,6 +221,7 @@ impl SearchPlanArgs {
     fn rules(&self, lens: &Lens) -> Result<SearchRules, CliError> {
         let read = self.rules.as_deref().map(input::read_json).transpose()?;
         let mut rules: SearchRules = read.unwrap_or_default();
+        rules.aspheres = self.aspheres.unwrap_or(rules.aspheres);
         rules = match self.elements {
             Some(ElementRange(elements)) => SearchRules { elements, ..rules },
             None if self.rules.is_none() => rules.admit_element_count(element::piece_count(lens)),

@@ -9,15 +9,18 @@ use crate::cli::output::{ShortNumber, TextTable, write_saved};
 use crate::lens::Lens;
 use crate::merit::ConstraintMargin;
 use crate::search::lens_landscape::{FinalizedLens, LensLandscape};
-use crate::search::{FoundPoint, MutationStatistics, RunEnd, SearchRunOn};
+use crate::search::{FoundPoint, Landscape as _, MutationStatistics, RunEnd, SearchRunOn};
 use serde::Serialize;
 use std::fmt::{self, Display};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// Everything that the report is made from.
 pub(super) struct SearchResults<'a> {
     pub(super) landscape: &'a LensLandscape,
     pub(super) run: &'a SearchRunOn<LensLandscape>,
+    /// The best lens, which keeps every limit if one near it does.
+    pub(super) best: &'a Arc<Lens>,
     pub(super) ended: SearchEnd,
     pub(super) resumed: bool,
     /// The reason why a resumed run had nothing to do.
@@ -48,6 +51,9 @@ pub(super) struct SearchReport {
     ms: f64,
     gradients: u64,
     gradients_in_all: u64,
+    gradients_beside: u64,
+    /// The largest number of aspheric surfaces.
+    aspheres: usize,
     moves: u64,
     better: u64,
     generations: u64,
@@ -112,13 +118,15 @@ impl SearchReport {
             ms,
             gradients,
             gradients_in_all: statistics.gradients,
+            gradients_beside: statistics.gradients_beside,
+            aspheres: landscape.rules().aspheres,
             moves: statistics.moves,
             better: statistics.better,
             generations: run.lineage().total(),
-            rays_of_a_gradient: landscape.rays_per_gradient(&run.best().point),
+            rays_of_a_gradient: landscape.rays_per_gradient(searched.best),
             temperature: run.temperature().value(),
             merit_start: run.start().loss,
-            merit_best: run.best().loss,
+            merit_best: landscape.loss(searched.best),
             start_breaks: ViolatedLimit::all(searched.start_breaks),
             compared: searched.compared,
             figures_ms: searched.compared_ms,
@@ -166,6 +174,14 @@ impl Display for SearchReport {
         writeln!(f, "in {:.2} s: {ended}", 1e-3 * self.ms)?;
         if self.resumed {
             writeln!(f, "{gradients_in_all} gradients in all, since the search began")?;
+        }
+        if self.gradients_beside > 0 {
+            let beside = self.gradients_beside;
+            writeln!(f, "{beside} gradients beside them, to choose mutations and to keep limits")?;
+        }
+        match self.aspheres {
+            0 => writeln!(f, "no aspheric surfaces are tried; --aspheres permits some")?,
+            count => writeln!(f, "at most {count} aspheric surfaces")?,
         }
         let share = 100.0 * *better as f64 / (*moves).max(1) as f64;
         writeln!(

@@ -15,7 +15,9 @@ pub(super) use springs::add_springs;
 use super::state::OptimizerState;
 use super::{LimitPrice, OptimizationEnd, OptimizationProgress, Optimizer};
 use crate::lens::Lens;
-use crate::merit::{DerivativeLevel, Limit, Merit, MeritError, SumOfSquares, Term, TermValue};
+use crate::merit::{
+    DerivativeLevel, Limit, LimitedSum, Merit, MeritError, SumOfSquares, Term, TermValue,
+};
 use crate::solve::{LimitValues, LimitedPoint, LimitedStep, LimitedTrustRegion, SLACK};
 use nalgebra::{DMatrix, DVector};
 
@@ -188,9 +190,9 @@ impl LimitedOptimizer {
         let proposed = self.state.proposal(step.change.as_slice(), 1.0);
         let values = self.restored(&step, &proposed);
         step.change = self.state.scaled_change(&values);
-        let Some((to, limits)) = self.evaluate(&values, &step) else { return false };
+        let Some((to, found)) = self.evaluate(&values, &step) else { return false };
         if self.method.note_trial(&step, &self.point, &to) {
-            self.accept(values, to, limits);
+            self.accept(values, to, found);
             return true;
         }
         // The limits are curved: a second trial that follows them may succeed.
@@ -205,10 +207,10 @@ impl LimitedOptimizer {
         };
         let mut step = step.clone();
         step.change = self.state.scaled_change(&values);
-        let Some((to, limits)) = self.evaluate(&values, &step) else { return false };
+        let Some((to, found)) = self.evaluate(&values, &step) else { return false };
         let accepted = self.method.note_trial(&step, &self.point, &to);
         if accepted {
-            self.accept(values, to, limits);
+            self.accept(values, to, found);
         }
         accepted
     }
@@ -217,7 +219,7 @@ impl LimitedOptimizer {
         &mut self,
         values: &[f64],
         step: &LimitedStep,
-    ) -> Option<(LimitedPoint, Vec<Limit>)> {
+    ) -> Option<(LimitedPoint, LimitedSum)> {
         let found = self
             .state
             .check_finite(values)
@@ -226,7 +228,7 @@ impl LimitedOptimizer {
             Ok(found) if found.limits.len() == self.limits.len() => {
                 self.state.evaluations += 1;
                 let point = scaled_point(&self.state, &found.objective, &found.limits);
-                Some((point, found.limits))
+                Some((point, found))
             }
             Ok(_) => {
                 self.method.note_failure(step);
@@ -240,11 +242,14 @@ impl LimitedOptimizer {
         }
     }
 
-    fn accept(&mut self, values: Vec<f64>, point: LimitedPoint, limits: Vec<Limit>) {
+    /// Goes to a lens. Further trials track the pupils from there: an edge that has changed since the
+    /// rays were found would be searched for at every one.
+    fn accept(&mut self, values: Vec<f64>, point: LimitedPoint, found: LimitedSum) {
+        self.state.merit.follow_pupils(found.pupils);
         self.state.values = values;
         self.state.value = point.objective.value;
         self.state.current = self.state.merit.lens(&self.state.values);
-        (self.point, self.limits) = (point, limits);
+        (self.point, self.limits) = (point, found.limits);
         self.unchecked += 1;
         self.note_best();
     }
@@ -382,6 +387,10 @@ impl Optimizer for LimitedOptimizer {
 
     fn terms(&self) -> Result<Vec<TermValue>, MeritError> {
         self.state.terms()
+    }
+
+    fn evaluations(&self) -> usize {
+        self.state.evaluations
     }
 
     fn binding_limits(&self) -> &[LimitPrice] {

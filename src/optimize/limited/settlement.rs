@@ -93,6 +93,7 @@ impl LimitedOptimizer {
         let to = &point.limits.with_bounds(&limits.bounds);
         let [accepted, met_kink] = self.method.note_restoration(&change, [limits, to]);
         if accepted {
+            self.state.merit.follow_pupils(found.pupils);
             self.state.values = values;
             self.state.value = point.objective.value;
             self.state.current = self.state.merit.lens(&self.state.values);

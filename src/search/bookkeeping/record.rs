@@ -1,8 +1,10 @@
 //! Applies the events of a round to lineage, reservoir, statistics and best point.
 
 use super::{DescentEnd, LineageNode, OfferOutcome, ReservoirEntry};
-use crate::search::sampler::chain::{LocalMove, NewDescent, TurnEvent};
-use crate::search::{Landscape, SearchEvent, SearchPoint, SearchRun, StructureChange};
+use crate::search::sampler::chain::{Chain, LocalMove, NewDescent, TurnEvent};
+use crate::search::{
+    Landscape, SearchEvent, SearchMethod, SearchPoint, SearchRun, Settlement, StructureChange,
+};
 
 impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
     /// Admits a point that another run on the same landscape has found, between two rounds. Its loss
@@ -16,7 +18,16 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
         let offer = self.reservoir.offer(entry.clone());
         if offer.is_accepted() {
             let record = StructureChange::Received.into();
-            let start = NewDescent { parent: None, kind: None, record, before: None, loss, point };
+            let gradients = 0;
+            let start = NewDescent {
+                parent: None,
+                kind: None,
+                record,
+                before: None,
+                loss,
+                point,
+                gradients,
+            };
             let node = LineageNode { offer: Some(offer), ..self.new_node(0, start) };
             self.lineage.add(node);
             self.update_best(&entry);
@@ -43,6 +54,7 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
                 statistics.rejected += 1;
             }
             TurnEvent::Started(started) => {
+                self.statistics.gradients_beside += started.gradients;
                 if let Some(kind) = started.kind {
                     self.statistics.kind(kind).tried += 1;
                 }
@@ -54,7 +66,8 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
             TurnEvent::Ended { end, point, loss } => {
                 let number = self.chains[chain].generation;
                 events.push(SearchEvent::Ended(number));
-                if self.record_end(ReservoirEntry::new(landscape, number, loss, point), end) {
+                let entry = ReservoirEntry::new(landscape, number, loss, point);
+                if self.record_end(entry, end, landscape) {
                     events.push(SearchEvent::NewBest(number));
                 }
             }
@@ -76,11 +89,30 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
     /// Offers the best point of a descent to the reservoir and records the outcome; true if it is
     /// the best of all. Algorithm 1 offers the last point, which is worse if the descent ended with
     /// a bad move.
-    fn record_end(&mut self, entry: ReservoirEntry<P>, end: DescentEnd) -> bool {
+    ///
+    /// An iterated local search retains only points that keep every limit.
+    fn record_end<L>(&mut self, entry: ReservoirEntry<P>, end: DescentEnd, landscape: &L) -> bool
+    where
+        L: Landscape<Point = P, Memory = M>,
+    {
         *self.statistics.ended.entry(end).or_default() += 1;
+        let is_iterated = self.settings.method == SearchMethod::IteratedLocalSearch;
+        let mut entry = entry;
+        let breaks_limits = is_iterated
+            && self.reservoir.would_accept(&entry)
+            && !self.keep_limits(landscape, &mut entry);
         let (number, loss, point) = (entry.number, entry.loss, entry.point.clone());
-        let best = self.update_best(&entry);
-        let offer = self.reservoir.offer(entry);
+        let best = !breaks_limits && self.update_best(&entry);
+        let offer = if breaks_limits {
+            OfferOutcome::RejectedLimits
+        } else if is_iterated && self.settings.minima {
+            self.reservoir.offer_minimum(entry, |one, other| landscape.is_same_minimum(one, other))
+        } else {
+            self.reservoir.offer(entry)
+        };
+        if is_iterated && self.best.number == number && self.best.point != point {
+            self.find_best_again(landscape);
+        }
         let Some(node) = self.lineage.node_mut(number) else { return best };
         node.end = Some(end);
         node.offer = Some(offer);
@@ -96,6 +128,46 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
             statistics.entered += u64::from(offer.is_accepted());
         }
         best
+    }
+
+    /// Moves an entry to a point that keeps every limit; false if none was found near it.
+    pub(in crate::search) fn keep_limits<L>(
+        &mut self,
+        landscape: &L,
+        entry: &mut ReservoirEntry<P>,
+    ) -> bool
+    where
+        L: Landscape<Point = P, Memory = M>,
+    {
+        match landscape.settle(&entry.point) {
+            Settlement::Kept => true,
+            Settlement::Restored { point, loss, gradients } => {
+                self.statistics.gradients_beside += gradients;
+                (entry.point, entry.loss) = (point, loss);
+                loss.is_finite()
+            }
+            Settlement::Broken { gradients } => {
+                self.statistics.gradients_beside += gradients;
+                false
+            }
+        }
+    }
+
+    /// Takes the best of the descents in progress and of the retained points as the best one, after one
+    /// that was taken for it has turned out to break limits.
+    pub(in crate::search) fn find_best_again<L>(&mut self, landscape: &L)
+    where
+        L: Landscape<Point = P, Memory = M>,
+    {
+        let entry = |chain: &Chain<P, M>| {
+            let (point, loss) = chain.best()?;
+            Some(ReservoirEntry::new(landscape, chain.generation, loss, point.clone()))
+        };
+        let running = self.chains.iter().filter_map(entry);
+        let all = running.chain(self.reservoir.entries().iter().cloned());
+        if let Some(best) = all.min_by(ReservoirEntry::rank) {
+            self.best = best;
+        }
     }
 
     /// Replaces the best point by a better one; true if it is better.

@@ -60,12 +60,16 @@ pub enum OfferOutcome {
     /// Rejected: the same point is already in the reservoir, under this generation.
     #[serde(rename = "same")]
     AlreadyPresent(u64),
-    /// Rejected: this generation has the same topology and is at least as good.
+    /// Rejected: this generation has the same topology, or lies at the same minimum, and is at least as
+    /// good.
     #[serde(rename = "behind_twin")]
     RejectedSameTopology(u64),
     /// Rejected: the reservoir is full and all its points are at least as good.
     #[serde(rename = "behind_all")]
     RejectedWorse,
+    /// Rejected: no point near it keeps every limit.
+    #[serde(rename = "breaks_limits")]
+    RejectedLimits,
     /// Rejected: the loss is not finite.
     #[serde(rename = "worthless")]
     RejectedNonFinite,
@@ -109,6 +113,35 @@ impl<P: Clone + PartialEq> Reservoir<P> {
         self.entries.iter().any(|entry| entry.number == number)
     }
 
+    /// True if an offer may be accepted: the loss is finite, and there is room or a worse point.
+    pub(in crate::search) fn would_accept(&self, entry: &ReservoirEntry<P>) -> bool {
+        let has_room = self.entries.len() < self.size;
+        entry.loss.is_finite()
+            && (has_room || self.entries.iter().any(|old| entry.is_better_than(old)))
+    }
+
+    /// Offers a point to a reservoir of different minima: it replaces the one at the same minimum if it is
+    /// better; otherwise it takes a free place, or that of the worst point if it is better.
+    pub(in crate::search) fn offer_minimum(
+        &mut self,
+        entry: ReservoirEntry<P>,
+        is_same: impl Fn(&P, &P) -> bool,
+    ) -> OfferOutcome {
+        if !entry.loss.is_finite() {
+            return OfferOutcome::RejectedNonFinite;
+        }
+        if let Some(same) = self.entries.iter().find(|old| old.point == entry.point) {
+            return OfferOutcome::AlreadyPresent(same.number);
+        }
+        let is_near = |old: &ReservoirEntry<P>| {
+            old.topology == entry.topology && is_same(&old.point, &entry.point)
+        };
+        if let Some(same) = self.entries.iter_mut().find(|old| is_near(old)) {
+            return replace_if_better(same, entry, OfferOutcome::RejectedSameTopology);
+        }
+        self.take_place(entry)
+    }
+
     /// Offers a point. With one point per topology it replaces the one of the same topology if it
     /// is better; otherwise it takes a free place, or that of the worst point if it is better.
     pub fn offer(&mut self, entry: ReservoirEntry<P>) -> OfferOutcome {
@@ -122,6 +155,11 @@ impl<P: Clone + PartialEq> Reservoir<P> {
         if let Some(same_topology) = same_topology.filter(|_| self.one_per_topology) {
             return replace_if_better(same_topology, entry, OfferOutcome::RejectedSameTopology);
         }
+        self.take_place(entry)
+    }
+
+    /// Takes a free place, or that of the worst point for a better one.
+    fn take_place(&mut self, entry: ReservoirEntry<P>) -> OfferOutcome {
         if self.entries.len() < self.size {
             self.entries.push(entry);
             return OfferOutcome::Entered;

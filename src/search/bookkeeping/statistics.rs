@@ -16,6 +16,9 @@ pub struct SearchStatistics {
     pub better: u64,
     /// Gradients evaluated by all chains.
     pub gradients: u64,
+    /// Gradients besides those of descents: to choose mutations, and to keep the limits of retained points.
+    #[serde(default)]
+    pub gradients_beside: u64,
     /// Rejected Langevin steps; Metropolis–Hastings only.
     pub rejected: u64,
     /// Consecutive rounds without a move.

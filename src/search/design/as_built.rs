@@ -6,9 +6,9 @@
 //! lenses on its way the judgement by real rays chooses.
 
 use super::draft::LimitCost;
-use super::finish::DesignedLens;
+use super::finish::{DesignedLens, rank};
 use super::judge::{JUDGEMENT_TOLERANCE, LensJudgement, judge_lens};
-use super::{DesignMerit, LensRequirements};
+use super::{DesignMerit, LensRequirements, LensWish};
 use crate::lens::{
     Lens, Medium, OperandKind, Parameter, ParameterKind, Quantity, TermScope, ToleranceGrade,
     add_variables,
@@ -42,6 +42,8 @@ const CHUNK: usize = 5;
 const TOLERANCE: f64 = 2e-3;
 /// The growth of the spot as designed that a refined lens may have.
 const NOMINAL_GROWTH: f64 = 1.02;
+/// The contrast that a refined lens may lose where it is wished for.
+const CONTRAST_LOSS: f64 = 0.01;
 /// The share of the mean radius that a robust lens gains at least to be one of its own.
 const ROBUST_GAIN: f64 = 0.97;
 /// The excess of light over what is asked for, against the error of its area on the way.
@@ -99,18 +101,20 @@ pub(super) fn refined(
         return result;
     }
     let start_lens = with_variables(&found.lens, asked);
-    let goal = goal(&found.lens, asked, &found.judgement, grade);
+    let term = Term::AsBuilt { grade: Some(grade) };
+    let goal = goal(&found.lens, asked, &found.judgement, term);
     let method = DescentMethod::TrustRegion;
     let Ok(mut optimizer) = start(method, &start_lens, &goal, TOLERANCE) else { return result };
     for _ in 0..STEPS / CHUNK {
         let ended = take_steps(optimizer.as_mut(), stop);
-        if let Some(next) = judged(found, optimizer.as_ref(), asked, grade)
+        if let Some(next) = judged(found, optimizer.as_ref(), asked, Some(grade))
             && let Some(made) = next.as_built
         {
             let best = |so_far: &Option<DesignedLens>| {
                 so_far.as_ref().and_then(|lens| lens.as_built).map_or(before.mean, |made| made.mean)
             };
-            let is_near = next.judgement.rms <= NOMINAL_GROWTH * found.judgement.rms;
+            let is_near = next.judgement.rms <= NOMINAL_GROWTH * found.judgement.rms
+                && next.judgement.contrast >= found.judgement.contrast.map(|c| c - CONTRAST_LOSS);
             if is_near && made.mean < best(&result.same) {
                 result.same = Some(next.clone());
             }
@@ -123,6 +127,36 @@ pub(super) fn refined(
         }
     }
     result
+}
+
+/// The lens refined for the contrast that is wished, if any is and if that gains some; the lens itself
+/// otherwise.
+pub(super) fn with_contrast(
+    found: &DesignedLens,
+    asked: &LensRequirements,
+    stop: &AtomicBool,
+) -> DesignedLens {
+    let mut best = found.clone();
+    let LensWish::Mtf(frequency) = asked.wish else { return best };
+    if !found.judgement.is_valid() || stop.load(Ordering::Relaxed) {
+        return best;
+    }
+    let start_lens = with_variables(&found.lens, asked);
+    let term = Term::GeometricMtf { frequency, min: 1.0 };
+    let goal = goal(&found.lens, asked, &found.judgement, term);
+    let method = DescentMethod::TrustRegion;
+    let Ok(mut optimizer) = start(method, &start_lens, &goal, TOLERANCE) else { return best };
+    for _ in 0..STEPS / CHUNK {
+        let ended = take_steps(optimizer.as_mut(), stop);
+        let next = judged(found, optimizer.as_ref(), asked, asked.as_built);
+        if let Some(next) = next.filter(|next| rank(&next.judgement) < rank(&best.judgement)) {
+            best = next;
+        }
+        if ended || stop.load(Ordering::Relaxed) {
+            break;
+        }
+    }
+    best
 }
 
 /// The most robust of some refined lenses; `None` unless it is better as built than the best of those
@@ -153,7 +187,7 @@ fn judged(
     before: &DesignedLens,
     optimizer: &dyn Optimizer,
     asked: &LensRequirements,
-    grade: ToleranceGrade,
+    grade: Option<ToleranceGrade>,
 ) -> Option<DesignedLens> {
     let mut lens = optimizer.best().clone();
     lens.variables.clear();
@@ -164,10 +198,19 @@ fn judged(
     if let Some(last) = lens.surfaces.last_mut() {
         last.thickness += judgement.refocus;
     }
-    let as_built = DesignedAsBuilt::new(&lens, grade).ok()?;
-    let costs = costs(optimizer.binding_limits(), as_built.mean, &judgement);
+    let as_built = match grade {
+        Some(grade) => Some(DesignedAsBuilt::new(&lens, grade).ok()?),
+        None => None,
+    };
     let (merit, origin) = (before.merit, before.origin.clone());
-    Some(DesignedLens { merit, origin, judgement, as_built: Some(as_built), costs, lens })
+    // The prices are those of the objective: of spots as built if lenses are refined for them.
+    let costs = match as_built {
+        Some(made) if judgement.contrast.is_none() => {
+            costs(optimizer.binding_limits(), made.mean, &judgement)
+        }
+        _ => before.costs.clone(),
+    };
+    Some(DesignedLens { merit, origin, judgement, as_built, costs, lens })
 }
 
 /// The lens with curvatures, gaps, aspheres and rims as variables.
@@ -200,15 +243,10 @@ fn with_variables(lens: &Lens, asked: &LensRequirements) -> Lens {
     lens
 }
 
-/// The spots as built, and the limits of the requirements that a lens of this judgement keeps.
-fn goal(
-    lens: &Lens,
-    asked: &LensRequirements,
-    found: &LensJudgement,
-    grade: ToleranceGrade,
-) -> Goal {
+/// What is to become small, and the limits of the requirements that a lens of this judgement keeps.
+fn goal(lens: &Lens, asked: &LensRequirements, found: &LensJudgement, objective: Term) -> Goal {
     let mut terms = vec![
-        WeightedTerm::new(Term::AsBuilt { grade: Some(grade) }, 1.0),
+        WeightedTerm::new(objective, 1.0),
         WeightedTerm::new(Term::FocalLength(found.focal_length), 1.0),
         WeightedTerm::new(Term::BackFocus(asked.back_focus), 1.0),
         WeightedTerm::new(Term::TotalTrack(asked.track), 1.0),
@@ -258,7 +296,11 @@ fn field_terms(
     let share = if field == 0 { area } else { area.max(relative) };
     let term = Term::Light((MORE_LIGHT * share).min(1.0));
     let mut terms = vec![WeightedTerm { term, weight: 1.0, scope: light }];
-    let ideal = found.focal_length * now.degrees.to_radians().tan();
+    let scale = match (asked.object, found.magnification) {
+        (Some(object), Some(magnification)) => -magnification * object.distance,
+        _ => found.focal_length,
+    };
+    let ideal = scale * now.degrees.to_radians().tan();
     if ideal > 0.0 {
         let [min, max] = [-1.0, 1.0].map(|sign| Some(ideal * (1.0 + sign * asked.distortion)));
         let term = Term::Operand { kind: OperandKind::ChiefRayHeight, min, max };
@@ -271,13 +313,13 @@ fn field_terms(
 /// The costs of the limits that hold a refined lens: of the expected spot, whose mean radius is given.
 fn costs(prices: &[LimitPrice], mean: f64, found: &LensJudgement) -> Vec<LimitCost> {
     let is_length = |price: &&LimitPrice| price.limit.term != "light";
-    let cost = |price: &LimitPrice| LimitCost {
-        term: match price.limit.term {
+    let um = |price: f64| 1e3 * price.abs() / (2.0 * mean);
+    let cost = |price: &LimitPrice| {
+        let term = match price.limit.term {
             "chief_ray_height" => "distortion",
             term => term,
-        },
-        surface: price.limit.surface,
-        um_per_mm: 1e3 * price.price.abs() / (2.0 * mean),
+        };
+        LimitCost::of_length(term, price.limit.surface, um(price.price))
     };
     let mut costs: Vec<LimitCost> = prices.iter().filter(is_length).map(cost).collect();
     // The focal length is held wherever it is; it costs only at an end of its range.
@@ -287,7 +329,11 @@ fn costs(prices: &[LimitPrice], mean: f64, found: &LensJudgement) -> Vec<LimitCo
     if found.limits.iter().any(is_free) {
         costs.retain(|cost| cost.term != "focal_length");
     }
-    costs.sort_by(|a, b| b.um_per_mm.total_cmp(&a.um_per_mm));
+    costs.sort_by(|a, b| b.size().total_cmp(&a.size()));
+    // A percent less light at every field at which it holds the lens.
+    let of_light = prices.iter().filter(|price| !is_length(price));
+    let light: f64 = of_light.map(|price| um(0.01 * price.bound * price.price)).sum();
+    costs.extend((light > 0.0).then(|| LimitCost::of_light(light)));
     costs
 }
 

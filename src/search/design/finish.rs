@@ -2,7 +2,7 @@
 //! refinement of the lenses as they are made.
 
 use super::LensRequirements;
-use super::as_built::{DesignedAsBuilt, RefinedLens, most_robust, refined};
+use super::as_built::{DesignedAsBuilt, RefinedLens, most_robust, refined, with_contrast};
 use super::draft::{
     BeamPlan, Freedom, LensDraft, LimitCost, USED_TERMS, descend, limit_costs, traced_beams,
 };
@@ -113,6 +113,10 @@ fn as_they_are_made(
     lenses: &[(DesignedLens, LensRequirements)],
     stop: &AtomicBool,
 ) -> Vec<DesignedLens> {
+    let wished = |(lens, asked): &(DesignedLens, LensRequirements)| {
+        (with_contrast(lens, asked, stop), asked.clone())
+    };
+    let lenses: Vec<(DesignedLens, LensRequirements)> = lenses.par_iter().map(wished).collect();
     let found: Vec<RefinedLens> =
         lenses.par_iter().map(|(lens, asked)| refined(lens, asked, stop)).collect();
     let pairs = lenses.iter().zip(&found);
@@ -136,9 +140,11 @@ fn brightest(
     is_valid.then_some((DesignedLens { merit: DesignMerit::Brightest, ..lens }, bright))
 }
 
-/// A number that orders judgements: valid lenses by their spots, then the others.
-fn rank(judgement: &LensJudgement) -> f64 {
-    if judgement.is_valid() { judgement.rms } else { 1e3 * (1.0 + judgement.rms) }
+/// A number that orders judgements: valid lenses by what is wished of them, the contrast that they lack or
+/// their spots, then the others.
+pub(super) fn rank(judgement: &LensJudgement) -> f64 {
+    let lacking = judgement.contrast.map_or(judgement.rms, |contrast| 1.0 - contrast);
+    if judgement.is_valid() { lacking } else { 1e3 * (1.0 + lacking) }
 }
 
 /// A lens that can be built; `None` if no light gets through. In every round the limits that the lens
@@ -315,8 +321,11 @@ mod tests {
         asked.track = lens.total_track() - 2.0;
         let costs = limit_costs(&draft, &asked, &settling(), freedom(&asked));
         let track = costs.iter().find(|cost| cost.term == "total_track").unwrap();
-        assert!(track.um_per_mm > 0.0 && track.surface.is_none(), "{costs:?}");
-        assert!(costs.windows(2).all(|pair| pair[0].um_per_mm >= pair[1].um_per_mm), "{costs:?}");
+        assert!(track.um_per_mm > Some(0.0) && track.surface.is_none(), "{costs:?}");
+        let lengths = &costs[..costs.len() - 1];
+        assert!(lengths.windows(2).all(|pair| pair[0].um_per_mm >= pair[1].um_per_mm), "{costs:?}");
+        let light = costs.last().unwrap();
+        assert!(light.term == "light" && light.um_per_percent > Some(0.0), "{costs:?}");
     }
 
     /// A lens without a simpler one beside it is not the simplest as well.

@@ -3,9 +3,11 @@
 //! Every colour has the light that gets through at its own wavelength and the weight that is asked
 //! for; the image plane stands where the sum over the fields of the mean squares is least.
 
-use super::LensRequirements;
-use super::requirements::FOCAL_LENGTH_TOLERANCE;
-use crate::analysis::{AnalysisError, Spot, distortion, image_cone, spots};
+use super::requirements::{FOCAL_LENGTH_TOLERANCE, NearObject};
+use super::{LensRequirements, LensWish};
+use crate::analysis::{
+    AnalysisError, Spot, distortion, image_cone, polychromatic_geometric_mtf, spots,
+};
 use crate::lens::{
     FieldKind, FieldPoint, Fields, Lens, Medium, Object, Row, Wavelength,
     glass::{self, line},
@@ -54,8 +56,12 @@ pub struct FieldJudgement {
     pub clear_area: f64,
     /// The area of the image's cone in direction cosines relative to that on the axis.
     pub relative_illumination: f64,
-    /// The height of the chief ray in the image relative to `f tan θ`, minus 1; 0 on the axis.
+    /// The height of the chief ray in the image relative to `f tan θ`, or to the magnification of a near
+    /// object, minus 1; 0 on the axis.
     pub distortion: f64,
+    /// The mean of tangential and sagittal contrast by rays at the frequency of a wish for it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub contrast: Option<f64>,
 }
 
 /// A quantity with its bounds and its slack.
@@ -82,6 +88,12 @@ pub struct LensJudgement {
     pub refocus: f64,
     /// The focal length, in mm.
     pub focal_length: f64,
+    /// The magnification of a near object; `None` for a distant one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub magnification: Option<f64>,
+    /// The mean contrast over the fields, tangential and sagittal, by rays, at the frequency of a wish for it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub contrast: Option<f64>,
     /// The number of pieces of glass.
     pub elements: usize,
     /// The number of aspheric surfaces.
@@ -142,7 +154,7 @@ pub fn judge_lens(
 ) -> Result<LensJudgement, JudgementError> {
     let accuracy = Accuracy { tolerance, ..Accuracy::default() };
     let mut lens = as_asked(lens, asked, &asked.fields)?;
-    let first = traced_spots(&RayModel::from_lens(&lens, 0)?, accuracy)?;
+    let first = traced_spots(&RayModel::from_lens(&lens, 0)?, asked, accuracy)?;
     let refocus = common_focus(&first, asked).ok_or(JudgementError::Afocal)?;
     if let Some(last) = lens.surfaces.last_mut() {
         last.thickness += refocus;
@@ -151,6 +163,7 @@ pub fn judge_lens(
     let focal_length = model.first_order.efl.ok_or(JudgementError::Afocal)?;
     let fields = judge_fields(&model, &first, refocus, asked, accuracy)?;
     let mean = fields.iter().map(|f| f.rms * f.rms).sum::<f64>() / fields.len() as f64;
+    let contrasts: Option<Vec<f64>> = fields.iter().map(|field| field.contrast).collect();
     let largest = fields.iter().map(|f| f.rms).fold(0.0, f64::max);
     let between = largest_between(&lens, asked, accuracy);
     let mut judgement = LensJudgement {
@@ -158,6 +171,8 @@ pub fn judge_lens(
         worst_between: between.as_ref().map_or(f64::INFINITY, |rms| rms / largest),
         refocus,
         focal_length,
+        magnification: asked.object.and(model.first_order.magnification),
+        contrast: contrasts.map(|all| all.iter().sum::<f64>() / all.len() as f64),
         elements: piece_count(&lens),
         aspheric_surfaces: lens.surfaces.iter().filter(|row| is_aspheric(row)).count(),
         limits: Vec::new(),
@@ -181,8 +196,8 @@ pub fn judge_lens(
 fn as_asked(lens: &Lens, asked: &LensRequirements, fields: &[f64]) -> Result<Lens, RayModelError> {
     let mut lens = lens.clone();
     lens.wavelengths = asked_wavelengths(asked);
-    lens.fields = asked_fields(fields);
-    (lens.object, lens.merit) = (Object::Infinity, None);
+    lens.fields = asked_fields(asked, fields);
+    (lens.object, lens.merit) = (asked_object(asked), None);
     lens.variables.clear();
     let solved = lens.resolve(0, line::D)?;
     for (row, surface) in lens.surfaces.iter_mut().zip(&solved.surfaces) {
@@ -205,15 +220,39 @@ pub(super) fn asked_wavelengths(asked: &LensRequirements) -> Vec<Wavelength> {
     all().map(wavelength).collect()
 }
 
-/// Fields at these angles in degrees.
-pub(super) fn asked_fields(degrees: &[f64]) -> Fields {
-    let point = |y: &f64| FieldPoint { x: 0.0, y: *y, weight: 1.0 };
-    Fields { kind: FieldKind::Angle, values: degrees.iter().map(point).collect() }
+/// The object that is asked for.
+pub(super) fn asked_object(asked: &LensRequirements) -> Object {
+    asked.object.map_or(Object::Infinity, |object| Object::Finite(object.distance))
 }
 
-fn traced_spots(model: &RayModel, accuracy: Accuracy) -> Result<Vec<Spot>, JudgementError> {
+/// Fields at these angles in degrees; of a near object the points that the first vertex sees there, below
+/// the axis as a distant point at a positive angle is.
+pub(super) fn asked_fields(asked: &LensRequirements, degrees: &[f64]) -> Fields {
+    let point = |y: f64| FieldPoint { x: 0.0, y, weight: 1.0 };
+    let (kind, values) = match asked.object {
+        None => (FieldKind::Angle, degrees.iter().map(|angle| point(*angle)).collect()),
+        Some(object) => {
+            let height = |angle: &f64| point(-object.distance * angle.to_radians().tan());
+            (FieldKind::ObjectHeight, degrees.iter().map(height).collect())
+        }
+    };
+    Fields { kind, values }
+}
+
+/// The angle of a field in degrees.
+fn field_angle(asked: &LensRequirements, field: &FieldPoint) -> f64 {
+    let of_near = |object: NearObject| (-field.y / object.distance).atan().to_degrees();
+    asked.object.map_or(field.y, of_near)
+}
+
+fn traced_spots(
+    model: &RayModel,
+    asked: &LensRequirements,
+    accuracy: Accuracy,
+) -> Result<Vec<Spot>, JudgementError> {
     let named = |(spot, field): (Result<Spot, AnalysisError>, &FieldPoint)| {
-        let dark = |cause| JudgementError::Field { degrees: field.y, cause };
+        let degrees = field_angle(asked, field);
+        let dark = |cause| JudgementError::Field { degrees, cause };
         let spot = spot.map_err(dark)?;
         if spot.is_fully_lit { Ok(spot) } else { Err(dark(AnalysisError::NoLight)) }
     };
@@ -259,11 +298,12 @@ fn judge_fields(
     let axis = FieldPoint { x: 0.0, y: 0.0, weight: 1.0 };
     let cone = |field: FieldPoint| {
         let cone = image_cone(model, field, model.primary, accuracy);
-        cone.map_err(|cause| JudgementError::Field { degrees: field.y, cause })
+        let degrees = field_angle(asked, &field);
+        cone.map_err(|cause| JudgementError::Field { degrees, cause })
     };
     let full = cone(axis)?.value;
     let judged = |spot: &Spot| {
-        let degrees = spot.field.y;
+        let degrees = field_angle(asked, &spot.field);
         let dark = |cause| JudgementError::Field { degrees, cause };
         let primary = spot.channels[model.primary].as_ref().map_err(|cause| dark(*cause))?;
         let height = distortion(model, spot.field, model.primary).map_err(dark)?;
@@ -273,9 +313,23 @@ fn judge_fields(
             clear_area: primary.light.value,
             relative_illumination: cone(spot.field)?.value / full,
             distortion: height.distortion.unwrap_or(0.0),
+            contrast: wished_contrast(model, spot.field, asked, accuracy).map_err(dark)?,
         })
     };
     spots.iter().map(judged).collect()
+}
+
+/// The mean of tangential and sagittal contrast of a field at the frequency of a wish for it.
+fn wished_contrast(
+    model: &RayModel,
+    field: FieldPoint,
+    asked: &LensRequirements,
+    accuracy: Accuracy,
+) -> Result<Option<f64>, AnalysisError> {
+    let LensWish::Mtf(frequency) = asked.wish else { return Ok(None) };
+    let curve = polychromatic_geometric_mtf(model, field, &[frequency], accuracy)?;
+    let point = curve.points.first().ok_or(AnalysisError::NoLight)?;
+    Ok(Some(0.5 * (point.tangential.modulus.value + point.sagittal.modulus.value)))
 }
 
 /// The largest RMS spot radius over the field in steps of a tenth, in mm.
@@ -287,7 +341,7 @@ fn largest_between(
     let half = asked.half_field();
     let steps = (0..=FIELD_STEPS).map(|i| half * i as f64 / FIELD_STEPS as f64);
     let between = as_asked(lens, asked, &steps.collect::<Vec<_>>())?;
-    let spots = traced_spots(&RayModel::from_lens(&between, 0)?, accuracy)?;
+    let spots = traced_spots(&RayModel::from_lens(&between, 0)?, asked, accuracy)?;
     let squares = spots.iter().map(|spot| mean_square(spot, asked, 0.0));
     Ok(squares.fold(0.0, f64::max).max(0.0).sqrt())
 }
@@ -373,7 +427,17 @@ fn limits(lens: &Lens, asked: &LensRequirements, found: &LensJudgement) -> Vec<R
     };
     let f = asked.focal_length;
     let [shortest, longest] = [-1.0, 1.0].map(|sign| f * (1.0 + sign * FOCAL_LENGTH_TOLERANCE));
-    add("focal_length", None, found.focal_length, Some(shortest), Some(longest));
+    match (asked.object, found.magnification) {
+        (Some(object), magnification) => {
+            let range = [1.0, -1.0]
+                .map(|sign| Some(object.magnification * (1.0 + sign * FOCAL_LENGTH_TOLERANCE)));
+            let magnification = magnification.unwrap_or(0.0);
+            add("magnification", None, magnification, range[0], range[1]);
+        }
+        (None, _) => {
+            add("focal_length", None, found.focal_length, Some(shortest), Some(longest));
+        }
+    }
     let back = lens.surfaces.last().map_or(0.0, |row| row.thickness);
     add("back_focus", None, back, Some(asked.back_focus), None);
     add("total_track", None, lens.total_track(), None, Some(asked.track));

@@ -17,6 +17,8 @@ mod rims;
 mod run;
 mod spec;
 mod starts;
+mod thin_structures;
+mod thin_triplet;
 
 pub use as_built::DesignedAsBuilt;
 pub use draft::LimitCost;
@@ -26,6 +28,8 @@ pub use judge::{
     judge_lens,
 };
 pub use refusal::SpecificationError;
-pub use requirements::{FOCAL_LENGTH_TOLERANCE, FilledValue, GlassChoice, LensRequirements};
+pub use requirements::{
+    FOCAL_LENGTH_TOLERANCE, FilledValue, GlassChoice, LensRequirements, NearObject,
+};
 pub use run::{DesignRun, DesignSettings, DesignStage};
-pub use spec::{AS_BUILT_GRADES, GlassList, LensSpecification};
+pub use spec::{AS_BUILT_GRADES, GlassList, LensSpecification, LensWish};

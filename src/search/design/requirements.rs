@@ -1,7 +1,7 @@
 //! A complete specification: what was written and, for everything else, the usual.
 
 use super::refusal::check;
-use super::{AS_BUILT_GRADES, GlassList, LensSpecification, SpecificationError};
+use super::{AS_BUILT_GRADES, GlassList, LensSpecification, LensWish, SpecificationError};
 use crate::lens::ToleranceGrade;
 use crate::lens::glass::{self, line};
 use serde::{Deserialize, Serialize};
@@ -11,8 +11,14 @@ use std::f64::consts::PI;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LensRequirements {
-    /// The focal length, in mm; a lens may deviate from it by [`FOCAL_LENGTH_TOLERANCE`].
+    /// The focal length, in mm; a lens may deviate from it by [`FOCAL_LENGTH_TOLERANCE`]. Of a near object
+    /// the height of an image point over the slope at which the first vertex sees its object point: the
+    /// magnification times the distance of the object. A beam that is as wide at the first vertex has the same
+    /// f-number then, and a field the same image height, as those of a distant object at this focal length.
     pub focal_length: f64,
+    /// The near object; `None` for a distant one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub object: Option<NearObject>,
     /// The f-number.
     pub f_number: f64,
     /// The fields in degrees from the axis, ascending from 0.
@@ -43,9 +49,22 @@ pub struct LensRequirements {
     pub glass_edge: f64,
     /// The smallest air space on the axis, in mm.
     pub air_center: f64,
+    /// What the lens is to be good at.
+    #[serde(default)]
+    pub wish: LensWish,
     /// The class of care in making for which the lenses are refined at the end; `None` for none.
     #[serde(default = "usual_grade")]
     pub as_built: Option<ToleranceGrade>,
+}
+
+/// An object at a finite distance.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct NearObject {
+    /// Its distance in front of the first vertex, in mm.
+    pub distance: f64,
+    /// The magnification of its real image, below 0.
+    pub magnification: f64,
 }
 
 /// The usual class of care in making.
@@ -77,6 +96,8 @@ pub struct FilledValue {
 
 /// The relative deviation of the focal length that a lens may have.
 pub const FOCAL_LENGTH_TOLERANCE: f64 = 0.01;
+/// The relative difference between the distance of an object from a first vertex and from a thin lens.
+const THICKNESS: f64 = 0.5;
 /// The share of the area of an unvignetted beam that has to be clear on the axis.
 const CLEAR_ON_AXIS: f64 = 0.98;
 
@@ -90,9 +111,11 @@ impl LensRequirements {
     ) -> Result<(Self, Vec<FilledValue>), SpecificationError> {
         check::check_numbers(spec)?;
         let mut fill = Filling::default();
+        let (focal_length, object) = fill.scale(spec)?;
+        fill.focal_length = focal_length;
         let f_number = fill.f_number(spec)?;
         let fields = fill.fields(spec)?;
-        let complete = fill.rest(spec, f_number, fields)?;
+        let complete = fill.rest(spec, object, (f_number, fields))?;
         check::check_feasible(spec, &complete)?;
         Ok((complete, fill.filled))
     }
@@ -100,6 +123,17 @@ impl LensRequirements {
     /// The largest field, in degrees.
     pub fn half_field(&self) -> f64 {
         self.fields.last().copied().unwrap_or(0.0)
+    }
+
+    /// The focal length of a thin lens that does what is asked for, in mm.
+    pub fn thin_focal_length(&self) -> f64 {
+        let nearness = self.object.map_or(0.0, |object| self.focal_length / object.distance);
+        self.focal_length / (1.0 + nearness)
+    }
+
+    /// The slope at the edge of the first vertex, per mm of it, of a ray from the axial object point.
+    pub(super) fn object_slope(&self) -> f64 {
+        self.object.map_or(0.0, |object| 1.0 / object.distance)
     }
 
     /// The radius of the beam on the axis that has the required area, in mm.
@@ -165,6 +199,8 @@ fn full_name(name: &str) -> Result<String, SpecificationError> {
 #[derive(Debug, Default)]
 struct Filling {
     filled: Vec<FilledValue>,
+    /// The focal length, or what stands for it with a near object, in mm.
+    focal_length: f64,
 }
 
 impl Filling {
@@ -183,10 +219,51 @@ impl Filling {
         value.clone()
     }
 
+    /// The focal length, or what stands for it with a near object, and that object.
+    fn scale(
+        &mut self,
+        spec: &LensSpecification,
+    ) -> Result<(f64, Option<NearObject>), SpecificationError> {
+        let Some(size) = spec.magnification.map(f64::abs) else {
+            let focal = spec.focal_length_mm;
+            let focal = focal.ok_or(SpecificationError::Missing("focal_length_mm"))?;
+            return match (&spec.object, spec.object_distance_mm) {
+                (Some(object), _) if object == "finite" => {
+                    Err(SpecificationError::Missing("magnification"))
+                }
+                (_, Some(_)) => Err(SpecificationError::Missing("magnification")),
+                _ => Ok((focal, None)),
+            };
+        };
+        if spec.object.as_deref() == Some("infinity") {
+            return Err(SpecificationError::Contradiction(
+                "a magnification of an object at infinity; expected a focal length, or `finite`"
+                    .to_owned(),
+            ));
+        }
+        let of_thin = spec.focal_length_mm.map(|focal| focal * (1.0 + size) / size);
+        let distance = match (spec.object_distance_mm, of_thin) {
+            (Some(stated), Some(thin)) if (stated / thin - 1.0).abs() > THICKNESS => {
+                return Err(SpecificationError::Contradiction(format!(
+                    "an object at {stated} mm; a thin lens of this focal length has this magnification \
+                     at {thin:.3} mm"
+                )));
+            }
+            (Some(stated), _) => stated,
+            (None, Some(thin)) => {
+                let reason = "a thin lens of this focal length and magnification";
+                self.or("object_distance_mm", None, thin, reason)
+            }
+            (None, None) => return Err(SpecificationError::Missing("object_distance_mm")),
+        };
+        Ok((size * distance, Some(NearObject { distance, magnification: -size })))
+    }
+
     fn f_number(&mut self, spec: &LensSpecification) -> Result<f64, SpecificationError> {
+        let focal_length = self.focal_length;
         let of_light = || {
             let area = spec.min_clear_area_mm2.as_ref()?.first()?;
-            Some(spec.focal_length_mm / (2.0 * (area / PI).sqrt()))
+            Some(focal_length / (2.0 * (area / PI).sqrt()))
         };
         let of_aperture = spec.numerical_aperture.map(|na| 0.5 / na);
         if let (Some(_), Some(_)) = (spec.f_number, of_aperture) {
@@ -205,8 +282,8 @@ impl Filling {
     }
 
     fn fields(&mut self, spec: &LensSpecification) -> Result<Vec<f64>, SpecificationError> {
-        let of_image =
-            || spec.image_height_mm.map(|h| (h / spec.focal_length_mm).atan().to_degrees());
+        let focal_length = self.focal_length;
+        let of_image = || spec.image_height_mm.map(|h| (h / focal_length).atan().to_degrees());
         let of_list = || spec.fields_deg.as_ref().and_then(|list| list.last().copied());
         let half = match (spec.half_field_deg, of_list().or_else(of_image)) {
             (Some(stated), _) => stated,
@@ -223,11 +300,11 @@ impl Filling {
     fn rest(
         &mut self,
         spec: &LensSpecification,
-        f_number: f64,
-        fields: Vec<f64>,
+        object: Option<NearObject>,
+        (f_number, fields): (f64, Vec<f64>),
     ) -> Result<LensRequirements, SpecificationError> {
-        let f = spec.focal_length_mm;
-        if spec.object.is_none() {
+        let f = self.focal_length;
+        if spec.object.is_none() && object.is_none() {
             self.or("object", None, "infinity".to_owned(), "a distant object");
         }
         let wavelengths = self.wavelengths(spec);
@@ -236,12 +313,15 @@ impl Filling {
         let (elements, aspheric_surfaces) = self.element_counts(spec, f_number, half);
         let (relative_illumination, clear_area) = self.light(spec, f_number, &fields);
         let [glass_center, glass_edge, air_center] = self.thinnest_gaps(spec);
+        let wish = self.wish(spec);
         let as_built = self.as_built(spec, glasses.plastics.is_some())?;
         let track = spec.max_track_mm.as_ref();
         let distortion = if half > 30.0 { 0.04 } else { 0.02 };
         let semi_diameter = usual_semi_diameter(f, f_number, half);
         Ok(LensRequirements {
             focal_length: f,
+            object,
+            wish,
             f_number,
             back_focus: self.or("min_back_focus_mm", spec.min_back_focus_mm.as_ref(), 0.0, "none"),
             track: self.or("max_track_mm", track, 2.5 * f, "2.5 focal lengths"),
@@ -296,20 +376,29 @@ impl Filling {
         let reason = "vignetting of a good camera lens";
         let stated = spec.min_relative_illumination.as_ref();
         let relative = self.or("min_relative_illumination", stated, usual_light(fields), reason);
-        let usual = usual_areas(spec.focal_length_mm, f_number, fields);
+        let usual = usual_areas(self.focal_length, f_number, fields);
         let stated = spec.min_clear_area_mm2.as_ref();
         (relative, self.or("min_clear_area_mm2", stated, usual, reason))
     }
 
     /// The least thickness of glass at its center, of glass at its edge and of air, in mm.
     fn thinnest_gaps(&mut self, spec: &LensSpecification) -> [f64; 3] {
-        let thin = (0.02 * spec.focal_length_mm).clamp(0.25, 1.0);
+        let thin = (0.02 * self.focal_length).clamp(0.25, 1.0);
         let (center, edge) = (spec.min_glass_center_mm.as_ref(), spec.min_edge_mm.as_ref());
         [
             self.or("min_glass_center_mm", center, thin, "what can be polished"),
             self.or("min_edge_mm", edge, 0.8 * thin, "no chips"),
             self.or("min_air_mm", spec.min_air_mm.as_ref(), 0.05, "no contact"),
         ]
+    }
+
+    /// What the lens is to be good at.
+    fn wish(&mut self, spec: &LensSpecification) -> LensWish {
+        spec.wish.unwrap_or_else(|| {
+            let (key, value) = ("wish", "rms".to_owned());
+            self.filled.push(FilledValue { key, value, reason: "the smallest spots" });
+            LensWish::Rms
+        })
     }
 
     /// The class of care in making; moulded plastic where plastics are permitted.

@@ -3,7 +3,7 @@
 
 use super::LensRequirements;
 use super::draft::LensDraft;
-use super::judge::{asked_fields, asked_wavelengths};
+use super::judge::{asked_fields, asked_object, asked_wavelengths};
 use crate::analysis::lit_region;
 use crate::lens::{Aperture, Lens, Row, Surface, System};
 use crate::pupil::RayModel;
@@ -85,7 +85,8 @@ impl StopPlace {
 pub(super) fn with_rims(draft: &LensDraft, asked: &LensRequirements) -> Option<Lens> {
     let mut lens = draft.lens.clone();
     lens.wavelengths = asked_wavelengths(asked);
-    lens.fields = asked_fields(&asked.fields);
+    lens.fields = asked_fields(asked, &asked.fields);
+    lens.object = asked_object(asked);
     let um = lens.wavelengths[lens.primary()].um;
     let place = StopPlace::find(&lens.resolve(0, um).ok()?, draft.pupil);
     let lens = place.in_lens(&lens);

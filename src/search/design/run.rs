@@ -4,13 +4,16 @@
 //! between two rounds and resumed, and has the same result on any number of threads.
 
 use super::LensRequirements;
-use super::draft::{BeamPlan, Freedom, LensDraft, USED_TERMS, descend};
+use super::draft::{BeamPlan, Freedom, LensDraft, USED_TERMS, asphere_gains, descend};
 use super::finish::{DesignedLens, finished_lenses};
 use super::glasses::{exchanged, in_catalogue, snapped};
+use super::judge::is_aspheric;
 use super::rims::with_rims;
 use super::starts::{NamedDraft, achromats, draft_of, library_starts, random_starts};
+use super::thin_triplet::triplets;
 use crate::lens::{Aperture, Lens, Parameter, Quantity, Variable};
 use crate::search::element::piece_count;
+use crate::search::predicted_gain::drawn_by_weight;
 use crate::search::{MutationKind, Random, SearchRules, propose};
 use rand::{RngExt as _, SeedableRng as _};
 use rayon::prelude::*;
@@ -75,6 +78,8 @@ pub struct DesignRun {
 const STARTS: [usize; 2] = [32, 12];
 /// The number of random lenses of which the best one is a start.
 const TRIES: usize = 60;
+/// The largest number of elements for which a triplet is a start.
+const LARGEST_FROM_TRIPLET: usize = 6;
 /// The share of aperture and field at which a start is tried first.
 const FIRST_LEVEL: f64 = 0.35;
 /// The largest increase of that share at once, and the smallest one that is tried.
@@ -90,6 +95,11 @@ const MUTANTS: usize = 12;
 const CHOSEN: usize = 4;
 const MUTANT_TRIALS: usize = 36;
 const CHOSEN_TRIALS: usize = 120;
+/// The share of mutants with an aspheric figure on another surface, the least gain that one promises, and
+/// the conic constant and coefficient that mark it.
+const FIGURED: f64 = 0.25;
+const LEAST_GAIN: f64 = 0.02;
+const MARK: [f64; 2] = [1e-9, 1e-18];
 /// The shares of the budget at which mutations end and at which the glasses are settled.
 const MUTATIONS_END: f64 = 0.5;
 const GLASSES_END: f64 = 0.9;
@@ -200,6 +210,9 @@ impl DesignRun {
         starts.truncate(library);
         if self.asked.elements <= 4 {
             starts.extend(achromats(&self.asked).into_iter().filter(|_| self.asked.elements > 1));
+        }
+        if self.asked.elements <= LARGEST_FROM_TRIPLET {
+            starts.extend(triplets(&self.asked));
         }
         starts.extend(random_starts(&self.asked, random, TRIES, &mut self.random(0), stop));
         let led: Vec<(Option<Candidate>, usize)> =
@@ -322,6 +335,12 @@ impl DesignRun {
             left < 0.0
         });
         let parent = drawn.map(|(_, parent)| parent).or(self.pool.first())?;
+        if self.asked.aspheric_surfaces > 0
+            && random.random::<f64>() < FIGURED
+            && let Some(mutant) = self.figured_mutant(parent, random)
+        {
+            return Some(mutant);
+        }
         let rules = self.rules();
         let mut lens = with_rims(&parent.draft, &self.asked)?;
         lens.aperture = Aperture::EntrancePupilDiameter(2.0 * self.asked.beam_radius());
@@ -333,6 +352,31 @@ impl DesignRun {
             return Some(Candidate { origin, draft, value: f64::INFINITY });
         }
         None
+    }
+
+    /// A mutant with an aspheric figure on another surface, drawn in proportion to what the derivatives
+    /// promise there; `None` if nothing is promised.
+    fn figured_mutant(&self, parent: &Candidate, random: &mut Random) -> Option<Candidate> {
+        let mut draft = parent.draft.clone();
+        let rows = draft.lens.surfaces.iter().enumerate();
+        let present: Vec<usize> =
+            rows.filter(|(_, row)| is_aspheric(row)).map(|(i, _)| i).collect();
+        if present.len() >= self.asked.aspheric_surfaces {
+            let dropped = &mut draft.lens.surfaces[present[random.random_range(0..present.len())]];
+            (dropped.conic, dropped.asphere) = (0.0, Vec::new());
+        }
+        let mut gains = asphere_gains(&draft, &self.asked, &BeamPlan::full(FIRM));
+        gains.retain(|(row, gain)| *gain > LEAST_GAIN && !present.contains(row));
+        let row = drawn_by_weight(&gains, random.random())?;
+        // Hardly anything: the mark of a surface that a descent makes aspheric.
+        let figured = &mut draft.lens.surfaces[row];
+        if figured.curvature == 0.0 {
+            figured.asphere = vec![MARK[1]];
+        } else {
+            figured.conic = MARK[0];
+        }
+        let origin = format!("{}, {}", parent.origin, MutationKind::AddAsphere.name());
+        Some(Candidate { origin, draft, value: f64::INFINITY })
     }
 
     fn rules(&self) -> SearchRules {
@@ -429,7 +473,7 @@ impl Candidate {
     /// The number of elements, an aspheric surface counted as half of one.
     pub(super) fn price(&self) -> f64 {
         let rows = self.draft.lens.surfaces.iter();
-        let aspheric = rows.filter(|row| super::judge::is_aspheric(row)).count();
+        let aspheric = rows.filter(|row| is_aspheric(row)).count();
         piece_count(&self.draft.lens) as f64 + 0.5 * aspheric as f64
     }
 

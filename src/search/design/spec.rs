@@ -4,23 +4,32 @@
 use crate::lens::ToleranceGrade;
 use serde::{Deserialize, Serialize};
 
-/// The specification of a lens for an object at infinity. Missing keys are filled by
+/// The specification of a lens. Missing keys are filled by
 /// [`LensRequirements::complete`](super::LensRequirements::complete).
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct LensSpecification {
-    /// The object; only `infinity` is supported.
+    /// The object: `infinity`, or `finite` with a magnification.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub object: Option<String>,
-    /// The focal length, in mm.
-    pub focal_length_mm: f64,
-    /// The f-number: the focal length over the diameter of the beam on the axis.
+    /// The focal length, in mm; may be missing beside a magnification and the distance of the object.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub focal_length_mm: Option<f64>,
+    /// The magnification of a near object, whose real image is inverted: its sign does not matter.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub magnification: Option<f64>,
+    /// The distance of a near object from the first vertex, in mm; from the focal length and the
+    /// magnification of a thin lens if it is missing.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub object_distance_mm: Option<f64>,
+    /// The f-number: the focal length over the diameter of the beam on the axis; of a near object the
+    /// working f-number, the reciprocal of twice the numerical aperture of the image.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub f_number: Option<f64>,
     /// The numerical aperture on the side of the image, in place of the f-number.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub numerical_aperture: Option<f64>,
-    /// The largest field, in degrees from the axis.
+    /// The largest field, in degrees from the axis; of a near object as the first vertex sees it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub half_field_deg: Option<f64>,
     /// The fields at which the lens is judged, in degrees from the axis, ascending from 0.
@@ -71,6 +80,9 @@ pub struct LensSpecification {
     /// The smallest air space on the axis, in mm; surfaces may touch at their rims.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub min_air_mm: Option<f64>,
+    /// What the lens is to be good at; by default small spots.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub wish: Option<LensWish>,
     /// The class of care in making for which the lenses are refined at the end, one of
     /// [`AS_BUILT_GRADES`].
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -86,6 +98,17 @@ pub const AS_BUILT_GRADES: [(&str, Option<ToleranceGrade>); 5] = [
     ("shop_limit", Some(ToleranceGrade::ShopLimit)),
     ("moulded_plastic", Some(ToleranceGrade::MouldedPlastic)),
 ];
+
+/// What a lens is to be good at.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum LensWish {
+    /// The smallest RMS spot radii.
+    #[default]
+    Rms,
+    /// The largest contrast, tangential and sagittal, over the fields, at a frequency in cycles/mm.
+    Mtf(f64),
+}
 
 /// The permitted glasses: in words, or by name.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

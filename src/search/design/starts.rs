@@ -3,9 +3,10 @@
 
 use super::LensRequirements;
 use super::draft::{BeamPlan, DraftMerit, Freedom, LensDraft, USED_TERMS};
-use super::judge::{asked_fields, asked_wavelengths, is_aspheric};
+use super::judge::{asked_fields, asked_object, asked_wavelengths, is_aspheric};
+use super::thin_structures::{ThinStructure, screened_structures};
 use crate::files::{LibraryLens, library_lenses, scale_to_focal_length};
-use crate::lens::{Lens, Medium, Object, Row, blank, glass};
+use crate::lens::{Lens, Medium, Row, blank, glass, paraxial_image_distance};
 use crate::paraxial::{Beam, first_order};
 use crate::search::Random;
 use crate::search::element::piece_count;
@@ -68,7 +69,7 @@ pub(super) fn draft_of(lens: &Lens, asked: &LensRequirements) -> Option<LensDraf
     if !lens.zoom.is_empty() || !LensDraft::is_plain(lens) || piece_count(lens) > asked.elements {
         return None;
     }
-    let mut lens = scale_to_focal_length(lens, asked.focal_length).ok()?;
+    let mut lens = scaled(lens, asked)?;
     let solved = lens.resolve(0, lens.wavelengths[lens.primary()].um).ok()?;
     let first = first_order(&solved, &Beam::for_lens(&lens, 0)).ok()?;
     if first.efl? < 0.0 {
@@ -79,6 +80,10 @@ pub(super) fn draft_of(lens: &Lens, asked: &LensRequirements) -> Option<LensDraf
         row.thickness = surface.thickness;
     }
     pupil -= without_planes(&mut lens);
+    if asked.object.is_some() {
+        let image = image_distance(&lens, asked)?;
+        lens.surfaces.last_mut()?.thickness = image;
+    }
     lens.surfaces.iter_mut().for_each(make_plain);
     if lens.surfaces.iter().filter(|row| is_aspheric(row)).count() > asked.aspheric_surfaces {
         for row in &mut lens.surfaces {
@@ -87,6 +92,31 @@ pub(super) fn draft_of(lens: &Lens, asked: &LensRequirements) -> Option<LensDraf
     }
     Some(LensDraft { lens: cleared(lens, asked), pupil })
 }
+
+/// The lens at the focal length that is asked for. One for a near object that has it but for the thickness
+/// of a lens stays as it is.
+fn scaled(lens: &Lens, asked: &LensRequirements) -> Option<Lens> {
+    let thin = asked.thin_focal_length();
+    if asked.object.is_some() {
+        let solved = lens.resolve(0, lens.wavelengths[lens.primary()].um).ok()?;
+        let focal = first_order(&solved, &Beam::for_lens(lens, 0)).ok()?.efl?;
+        if (focal / thin).ln().abs() < THICK {
+            return Some(lens.clone());
+        }
+    }
+    scale_to_focal_length(lens, thin).ok()
+}
+
+/// The distance behind the last vertex of the image of a near object, in mm; `None` if it is not real.
+fn image_distance(lens: &Lens, asked: &LensRequirements) -> Option<f64> {
+    let system = lens.resolve(0, lens.wavelengths[lens.primary()].um).ok()?;
+    let image = paraxial_image_distance(&system, asked_object(asked));
+    (image > 0.0 && image < 10.0 * asked.track).then_some(image)
+}
+
+/// The logarithm of the ratio of the focal length of a lens for a near object to that of a thin one up to
+/// which it stays.
+const THICK: f64 = 0.25;
 
 /// Removes planes in air, and returns the length in front of the first refracting surface.
 fn without_planes(lens: &mut Lens) -> f64 {
@@ -119,10 +149,10 @@ fn make_plain(row: &mut Row) {
 }
 
 /// The lens without what a draft does not need.
-fn cleared(lens: Lens, asked: &LensRequirements) -> Lens {
+pub(super) fn cleared(lens: Lens, asked: &LensRequirements) -> Lens {
     let mut lens = Lens {
-        object: Object::Infinity,
-        fields: asked_fields(&asked.fields),
+        object: asked_object(asked),
+        fields: asked_fields(asked, &asked.fields),
         wavelengths: asked_wavelengths(asked),
         variables: Vec::new(),
         pickups: Vec::new(),
@@ -152,7 +182,7 @@ fn is_copy(a: &LensDraft, b: &LensDraft) -> bool {
 const CROWNS: [(f64, f64); 4] = [(1.5168, 64.17), (1.6204, 60.3), (1.6968, 55.5), (1.788, 47.4)];
 const FLINTS: [(f64, f64); 4] = [(1.6727, 32.2), (1.7282, 28.3), (1.7847, 26.1), (1.62, 36.4)];
 
-/// Random lenses of a number of elements, each the best of several by its merit at a small aperture
+/// Random lenses of a number of elements, a third of them screened as thin lenses, each the best of several by its merit at a small aperture
 /// and field; fewer once `stop` is true.
 pub(super) fn random_starts(
     asked: &LensRequirements,
@@ -162,10 +192,15 @@ pub(super) fn random_starts(
     stop: &AtomicBool,
 ) -> Vec<NamedDraft> {
     let mut found = Vec::new();
+    let draws = THIN_DRAWS * count;
+    let thin = screened_structures(asked, draws, count.div_ceil(3), random);
     for i in (0..count).take_while(|_| !stop.load(Ordering::Relaxed)) {
-        let draw = if i % 2 == 0 { two_group_lens } else { random_lens };
         let tried = (0..tries).filter_map(|_| {
-            let draft = draw(asked, random)?;
+            let draft = match (i % 3, thin.get(i / 3)) {
+                (2, Some(structure)) => lens_of(structure, asked, random)?,
+                (0, _) => two_group_lens(asked, random)?,
+                _ => random_lens(asked, random)?,
+            };
             Some((screened(&draft, asked)?, draft))
         });
         let best = tried.min_by(|a, b| a.0.total_cmp(&b.0));
@@ -173,6 +208,27 @@ pub(super) fn random_starts(
         found.extend(best.map(|(_, draft)| NamedDraft { name, draft }));
     }
     found
+}
+
+/// The thin lenses that are screened for each random start.
+const THIN_DRAWS: usize = 8192;
+
+/// A lens of thick elements with the powers and the gaps of thin ones, and random glasses and bendings.
+fn lens_of(
+    structure: &ThinStructure,
+    asked: &LensRequirements,
+    random: &mut Random,
+) -> Option<LensDraft> {
+    let mut rows = Vec::new();
+    let thick = (0.05 * asked.thin_focal_length()).max(1.5 * asked.glass_center);
+    for lens in &structure.lenses {
+        let gap = (lens.gap - thick).max(asked.air_center);
+        // Lenses in contact may be cemented.
+        let cemented = if lens.gap < thick { 0.5 } else { 0.0 };
+        let element = ThinElement { crown: lens.power > 0.0, power: lens.power, gap, cemented };
+        push_element(&mut rows, &element, asked, random);
+    }
+    focused(rows, asked, random)
 }
 
 /// The merit of a draft at a small aperture and field; `None` if its beams do not get through.
@@ -197,7 +253,7 @@ struct ThinElement {
 /// A random lens whose last curvature gives it the focal length; almost half of the elements are
 /// cemented to the one before.
 fn random_lens(asked: &LensRequirements, random: &mut Random) -> Option<LensDraft> {
-    let f = asked.focal_length;
+    let f = asked.thin_focal_length();
     let free = (asked.track - asked.back_focus).max(0.1 * f);
     let mut rows = Vec::new();
     for i in 0..piece_number(asked, random) {
@@ -212,7 +268,7 @@ fn random_lens(asked: &LensRequirements, random: &mut Random) -> Option<LensDraf
 /// A random lens of two groups that have the focal length and the back focus as thin lenses: a
 /// negative group in front where the back focus exceeds the focal length, a positive one otherwise.
 fn two_group_lens(asked: &LensRequirements, random: &mut Random) -> Option<LensDraft> {
-    let f = asked.focal_length;
+    let f = asked.thin_focal_length();
     let pieces = piece_number(asked, random);
     if pieces < 2 {
         return None;
@@ -307,7 +363,7 @@ fn push_element(
 fn focused(rows: Vec<Row>, asked: &LensRequirements, random: &mut Random) -> Option<LensDraft> {
     let lens = cleared(Lens { surfaces: rows, ..blank() }, asked);
     let system = lens.resolve(0, lens.wavelengths[lens.primary()].um).ok()?;
-    let (mut y, mut nu, mut before) = (1.0, 0.0, 1.0);
+    let (mut y, mut nu, mut before) = (1.0, asked.object_slope(), 1.0);
     let last = lens.surfaces.len() - 1;
     for surface in &system.surfaces[..last] {
         nu -= y * (surface.index - before) * surface.shape.curvature();
@@ -330,7 +386,7 @@ fn focused(rows: Vec<Row>, asked: &LensRequirements, random: &mut Random) -> Opt
 
 /// Cemented achromats by the thin-lens formulas, with either glass in front, in several bendings.
 pub(super) fn achromats(asked: &LensRequirements) -> Vec<NamedDraft> {
-    let f = asked.focal_length;
+    let f = asked.thin_focal_length();
     let mut found = Vec::new();
     for (crown_first, bend) in [(true, 0.0), (true, 1.5), (false, 0.0), (false, 1.5)] {
         let ((n1, v1), (n2, v2)) = (CROWNS[0], FLINTS[0]);
@@ -349,7 +405,8 @@ pub(super) fn achromats(asked: &LensRequirements) -> Vec<NamedDraft> {
             medium: Medium::Model { nd, vd },
             ..Row::default()
         };
-        let last = Row { curvature: front - a - b, thickness: f, ..Row::default() };
+        let image = asked.focal_length;
+        let last = Row { curvature: front - a - b, thickness: image, ..Row::default() };
         let rows = vec![row(front, first), row(front - a, second), last];
         let lens = cleared(Lens { surfaces: rows, ..blank() }, asked);
         let name =

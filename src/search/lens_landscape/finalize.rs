@@ -194,7 +194,7 @@ impl LensLandscape {
                 Term::Steepness(max) => Term::Steepness(max * (1.0 - part)),
                 Term::Light(share) => Term::Light(share * (1.0 + part)),
                 Term::Operand { kind, min, max } if min != max => {
-                    let step = if kind.is_angle() { part } else { mm };
+                    let step = if kind.is_length() { mm } else { part };
                     let (min, max) = (min.map(|min| min + step), max.map(|max| max - step));
                     Term::Operand { kind, min, max }
                 }

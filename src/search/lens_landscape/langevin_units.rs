@@ -34,10 +34,16 @@ pub(super) fn loss_gradient(landscape: &LensLandscape, lens: &Lens) -> Option<Lo
         langevin_unit(lens, merit.variables()[i].parameter, landscape.variable_rules.size)
     };
     let units: Vec<f64> = (0..values.len()).map(unit).collect();
+    let price = landscape.priced(lens, sum.value.signum()) * sum.value.signum();
     Some(LossGradient {
-        loss: sum.value,
+        loss: landscape.priced(lens, sum.value),
         values: values.iter().zip(&units).map(|(value, unit)| value / unit).collect(),
-        gradient: sum.gradient.iter().zip(&units).map(|(slope, unit)| slope * unit).collect(),
+        gradient: sum
+            .gradient
+            .iter()
+            .zip(&units)
+            .map(|(slope, unit)| price * slope * unit)
+            .collect(),
     })
 }
 

@@ -6,26 +6,33 @@
 //! motion of the pupils. It is evaluated with the pupils of the new lens; a move that made the lens
 //! worse is undone.
 
+mod aspheres;
 mod descent_settings;
 mod finalize;
 mod langevin_units;
+mod minimum;
 mod open_apertures;
 mod plan;
 mod random_start;
+mod saddle;
+mod settle;
 mod summary;
 mod variables;
 mod violations;
 
+pub use aspheres::AsphereGain;
 pub use descent_settings::DescentSettings;
 pub use finalize::{CrossCheck, FinalizedLens, GlassSubstitution, UnlistedGlass, finalize};
+pub use minimum::{curvature_signs, has_same_glasses};
 pub use open_apertures::with_open_apertures;
 pub use plan::{SearchPlan, SearchSetupError, describe_left_out, run};
+pub use saddle::SaddlePoint;
 pub use summary::{FieldSummary, LensSummary};
 pub use violations::describe_violation;
 
 use super::{
-    Landscape, LossGradient, MutatedPoint, MutationError, MutationKind, MutationWeights, Random,
-    Refusal, RuleError, SearchRules, element, mutation,
+    Landscape, LossGradient, MutatedLens, MutatedPoint, MutationError, MutationKind,
+    MutationWeights, Random, Refusal, RuleError, SearchRules, Settlement, element, mutation,
 };
 use crate::lens::{Lens, LensError, Parameter, Quantity};
 use crate::merit::{Goal, Merit, MeritError};
@@ -274,7 +281,22 @@ impl LensLandscape {
     /// The loss of a lens with its own pupils.
     fn evaluate(&self, lens: &Lens) -> Result<f64, MeritError> {
         let merit = self.merit(lens, self.local.tolerance)?;
-        merit.value(&merit.values(lens))
+        Ok(self.priced(lens, merit.value(&merit.values(lens))?))
+    }
+
+    /// A mutation of a kind drawn by the weights of these rules, as `usual` makes it unless the landscape
+    /// chooses its place by derivatives.
+    fn mutated(
+        &self,
+        lens: &Arc<Lens>,
+        rules: &SearchRules,
+        random: &mut Random,
+        usual: UsualMutation,
+    ) -> Result<MutatedPoint<Arc<Lens>>, MutationError> {
+        match mutation::draw_kind(rules, random)? {
+            MutationKind::AddAsphere => self.add_asphere(lens, rules, random),
+            kind => usual(kind, lens, rules, random).map(Into::into),
+        }
     }
 
     /// A local move of at most `most` steps: the new lens, its loss, and the number of gradients.
@@ -288,8 +310,9 @@ impl LensLandscape {
         let is_coarse = memory.steps < self.local.coarse_steps;
         let merit = self.merit(lens, if is_coarse { coarse } else { tolerance })?;
         let asked = SegmentSettings { method, steps: steps.min(most), rate };
-        let SegmentResult { lens: mut there, initial_merit: before, gradients } =
+        let SegmentResult { lens: mut there, initial_merit, gradients } =
             run_segment(merit, &self.with_variables(lens), asked, memory)?;
+        let before = self.priced(lens, initial_merit);
         there.variables.clone_from(&lens.variables);
         match self.evaluate(&there) {
             Ok(after) if after < before || is_coarse => {
@@ -311,6 +334,10 @@ impl LensLandscape {
 
 /// The relative increase of the loss that a move may make, since the rays of two lenses differ.
 const SLACK: f64 = 0.05;
+
+/// A mutation of a kind.
+type UsualMutation =
+    fn(MutationKind, &Lens, &SearchRules, &mut Random) -> Result<MutatedLens, MutationError>;
 
 /// The maximum number of random lenses that are tried.
 const MAX_DRAWS: usize = 200;
@@ -350,7 +377,7 @@ impl Landscape for LensLandscape {
         weights: &MutationWeights,
         random: &mut Random,
     ) -> Result<MutatedPoint<Arc<Lens>>, MutationError> {
-        mutation::propose(lens, &self.weighted_rules(weights), random).map(Into::into)
+        self.mutated(lens, &self.weighted_rules(weights), random, mutation::mutate)
     }
 
     fn perturb(
@@ -359,17 +386,42 @@ impl Landscape for LensLandscape {
         weights: &MutationWeights,
         random: &mut Random,
     ) -> Result<MutatedPoint<Arc<Lens>>, MutationError> {
-        mutation::perturb(lens, &self.weighted_rules(weights), random).map(Into::into)
+        let rules = self.weighted_rules(weights);
+        let usual = |kind, lens: &Lens, rules: &SearchRules, random: &mut Random| {
+            mutation::perturb_as(kind, lens, rules, random)
+        };
+        if !rules.saddles {
+            return self.mutated(lens, &rules, random, usual);
+        }
+        match mutation::draw_kind(&rules, random)? {
+            MutationKind::AddAsphere => self.add_asphere(lens, &rules, random),
+            MutationKind::AddSinglet => self.add_at_saddle(lens, &rules, random),
+            kind => usual(kind, lens, &rules, random).map(Into::into),
+        }
     }
 
     fn topology(&self, lens: &Arc<Lens>) -> String {
-        element::topology(lens)
+        let glass = element::topology(lens);
+        match self.priced_aspheres(lens) {
+            0 => glass,
+            count => format!("{glass}, {count} aspheric"),
+        }
+    }
+
+    fn settle(&self, lens: &Arc<Lens>) -> Settlement<Arc<Lens>> {
+        self.settlement(lens)
+    }
+
+    fn is_same_minimum(&self, one: &Arc<Lens>, other: &Arc<Lens>) -> bool {
+        self.are_at_one_minimum(one, other)
     }
 
     fn structure_violation(&self, lens: &Arc<Lens>) -> u64 {
         let [min, max] = self.rules.elements;
-        let pieces = element::piece_count(lens);
-        (min.saturating_sub(pieces) + pieces.saturating_sub(max)) as u64
+        let (pieces, aspheres) = (element::piece_count(lens), self.priced_aspheres(lens));
+        let excess = (2 * pieces + aspheres).saturating_sub(2 * max).div_ceil(2);
+        let many = aspheres.saturating_sub(self.rules.aspheres);
+        (min.saturating_sub(pieces) + excess + many) as u64
     }
 
     fn fingerprint(&self) -> serde_json::Value {

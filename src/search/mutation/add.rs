@@ -58,7 +58,7 @@ pub(super) fn sites(lens: &Lens, rules: &SearchRules) -> Result<Vec<SingletSite>
 }
 
 impl SingletSite {
-    fn neighbour(self) -> Neighbour {
+    pub(super) fn neighbour(self) -> Neighbour {
         let row = match self.gap {
             Some(gap) if self.behind => gap,
             Some(gap) => gap + 1,
@@ -131,7 +131,7 @@ fn draw_with(
 }
 
 /// Inserts the rows of a singlet and returns the first one.
-fn insert(
+pub(super) fn insert(
     draft: &mut MutationDraft,
     site: SingletSite,
     glass: &Glass,

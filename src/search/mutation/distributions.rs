@@ -26,6 +26,11 @@ impl ShiftedExponential {
         -(-self.range / self.mean).exp_m1()
     }
 
+    /// The smallest length.
+    pub(super) fn least(self) -> f64 {
+        self.least
+    }
+
     pub(super) fn draw(self, random: &mut Random) -> f64 {
         let excess = -self.mean * (-random.random::<f64>() * self.share()).ln_1p();
         self.least + excess.min(self.range)

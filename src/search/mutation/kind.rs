@@ -25,13 +25,17 @@ pub enum MutationKind {
     ExchangeGlass,
     /// Moves the stop.
     MoveStop,
+    /// Lets a surface become aspheric, or an aspheric one have a higher power.
+    AddAsphere,
+    /// Makes an aspheric surface spherical.
+    RemoveAsphere,
     /// Draws a random lens.
     Global,
 }
 
 impl MutationKind {
     /// All kinds that change a lens, in display order.
-    pub const MUTATIONS: [Self; 9] = [
+    pub const MUTATIONS: [Self; 11] = [
         Self::AddSinglet,
         Self::RemoveSinglet,
         Self::Glue,
@@ -41,7 +45,14 @@ impl MutationKind {
         Self::Flip,
         Self::ExchangeGlass,
         Self::MoveStop,
+        Self::AddAsphere,
+        Self::RemoveAsphere,
     ];
+
+    /// True for the kinds that change which surfaces are aspheric.
+    pub fn is_about_aspheres(self) -> bool {
+        matches!(self, Self::AddAsphere | Self::RemoveAsphere)
+    }
 
     /// The display name.
     pub fn name(self) -> &'static str {
@@ -55,6 +66,8 @@ impl MutationKind {
             Self::Flip => "flip",
             Self::ExchangeGlass => "exchange glass",
             Self::MoveStop => "move stop",
+            Self::AddAsphere => "add asphere",
+            Self::RemoveAsphere => "remove asphere",
             Self::Global => "global draw",
         }
     }

@@ -7,6 +7,7 @@
 //! drawn or dropped, all others are mapped one to one, and semi-diameters are treated as dependent.
 
 mod add;
+mod add_asphere;
 mod bend;
 mod distributions;
 mod draft;
@@ -15,17 +16,23 @@ mod exchange;
 mod flip;
 mod glue;
 mod kind;
+mod null_meniscus;
 mod queries;
 mod record;
 mod refusal;
 mod remove;
+mod remove_asphere;
 mod repair;
 mod singlet;
 mod spacing;
 mod split;
 mod stop;
 
+pub(super) use add_asphere::{
+    aspheric_rows, marked as with_aspheric_number, sites as asphere_sites,
+};
 pub use kind::{MutationKind, MutationWeights};
+pub(super) use null_meniscus::NullMeniscus;
 pub(super) use record::read_record;
 pub use record::{MutationRecord, StructureChange};
 pub(super) use refusal::read_counts;
@@ -66,6 +73,7 @@ impl From<MutatedLens> for MutatedPoint<Arc<Lens>> {
             kind,
             record: MutationRecord { change, projection },
             log_ratio,
+            gradients: 0,
         }
     }
 }
@@ -93,7 +101,19 @@ pub fn perturb(
     rules: &SearchRules,
     random: &mut Random,
 ) -> Result<MutatedLens, MutationError> {
-    let kind = draw_kind(rules, random)?;
+    perturb_as(draw_kind(rules, random)?, lens, rules, random)
+}
+
+/// As [`perturb`], by a mutation of this kind.
+///
+/// # Errors
+/// As those of [`propose`].
+pub(super) fn perturb_as(
+    kind: MutationKind,
+    lens: &Lens,
+    rules: &SearchRules,
+    random: &mut Random,
+) -> Result<MutatedLens, MutationError> {
     let draw = match kind {
         MutationKind::AddSinglet => add::draw_meniscus,
         MutationKind::ExchangeGlass => exchange::draw_any,
@@ -104,7 +124,10 @@ pub fn perturb(
 }
 
 /// Draws a kind by the weights of the rules.
-fn draw_kind(rules: &SearchRules, random: &mut Random) -> Result<MutationKind, MutationError> {
+pub(super) fn draw_kind(
+    rules: &SearchRules,
+    random: &mut Random,
+) -> Result<MutationKind, MutationError> {
     let weight = |kind: &MutationKind| rules.weight(*kind).max(0.0);
     let sum: f64 = MutationKind::MUTATIONS.iter().map(weight).sum();
     let mut left = random.random::<f64>() * sum;
@@ -143,6 +166,18 @@ fn apply(
     random: &mut Random,
 ) -> Result<MutatedLens, MutationError> {
     let refuse = |refusal| MutationError { kind, refusal };
+    let context = context_of(kind, lens, rules)?;
+    let draft = draw(&context, random).map_err(refuse)?;
+    complete(&context, kind, draft).map_err(refuse)
+}
+
+/// The input of a mutation of a lens.
+fn context_of<'a>(
+    kind: MutationKind,
+    lens: &Lens,
+    rules: &'a SearchRules,
+) -> Result<MutationContext<'a>, MutationError> {
+    let refuse = |refusal| MutationError { kind, refusal };
     lens.check().map_err(|error| refuse(error.into()))?;
     let resolved = lens.with_pickups().map_err(|error| refuse(error.into()))?;
     let size = match scale(&resolved) {
@@ -150,9 +185,7 @@ fn apply(
         Err(ProjectionError::Afocal(_)) if !rules.projection => half_track(&resolved),
         Err(error) => return Err(refuse(Refusal::from(&error))),
     };
-    let context = MutationContext::new(resolved, rules, size);
-    let draft = draw(&context, random).map_err(refuse)?;
-    complete(&context, kind, draft).map_err(refuse)
+    Ok(MutationContext::new(resolved, rules, size))
 }
 
 /// The implementation of a kind of mutation.
@@ -177,7 +210,7 @@ macro_rules! mutations {
 }
 
 /// All mutations, in the order of [`MutationKind::MUTATIONS`].
-const MUTATIONS: [MutationOperator; 9] = mutations! {
+const MUTATIONS: [MutationOperator; 11] = mutations! {
     AddSinglet: add,
     RemoveSinglet: remove,
     Glue: glue,
@@ -187,6 +220,8 @@ const MUTATIONS: [MutationOperator; 9] = mutations! {
     Flip: flip,
     ExchangeGlass: exchange,
     MoveStop: stop,
+    AddAsphere: add_asphere,
+    RemoveAsphere: remove_asphere,
 };
 
 /// Half the track of a lens, the scale of an afocal one.

@@ -1,6 +1,6 @@
 //! The description of a mutation as data; its text is made where it is displayed.
 
-use crate::lens::SurfaceNumber;
+use crate::lens::{Parameter, Quantity, SurfaceNumber};
 use crate::search::projection::Projection;
 use serde::{Deserialize, Deserializer, Serialize};
 use std::fmt::{self, Display};
@@ -79,6 +79,18 @@ pub enum StructureChange {
         /// The distance of the stop from that surface along the light, in mm.
         distance: f64,
     },
+    /// Let a surface become aspheric.
+    AddAsphere {
+        /// The surface.
+        surface: SurfaceNumber,
+        /// The number that varies from now on: the conic constant, or a coefficient.
+        quantity: Quantity,
+    },
+    /// Made an aspheric surface spherical.
+    RemoveAsphere {
+        /// The surface.
+        surface: SurfaceNumber,
+    },
     /// A change of another landscape, or one that an earlier version recorded as text.
     Text(String),
 }
@@ -114,6 +126,11 @@ impl Display for StructureChange {
             Self::MoveStop { surface, distance } => {
                 write!(f, "moved the stop to {distance:.3} mm behind surface {surface}")
             }
+            Self::AddAsphere { surface, quantity } => {
+                let parameter = Parameter::new(surface.index(), *quantity);
+                write!(f, "made the {parameter} variable")
+            }
+            Self::RemoveAsphere { surface } => write!(f, "made surface {surface} spherical"),
             Self::Text(text) => f.write_str(text),
         }
     }

@@ -106,6 +106,18 @@ pub enum Refusal {
     /// The axial beam has no height at the new stop.
     #[error("the axial beam has no height at the new stop")]
     NoAxialHeight,
+    /// The rules permit no more aspheric surfaces.
+    #[error("the lens has as many aspheric surfaces as the rules allow")]
+    TooManyAspheres,
+    /// No surface may be aspheric, or have a further power.
+    #[error("no surface that may have a further aspheric number")]
+    NoSurfaceForAsphere,
+    /// No aspheric number promises a gain.
+    #[error("no aspheric number promises a gain")]
+    NoAsphereGain,
+    /// No aspheric surface may become spherical.
+    #[error("no aspheric surface that may change")]
+    NoAsphere,
     /// The prescription is invalid or cannot be resolved.
     #[error("the lens cannot be resolved")]
     InvalidLens,

@@ -43,6 +43,18 @@ impl SingletParameters {
         Self { curvatures, thickness: thickness.draw(random), air: air.draw(random) }
     }
 
+    /// A singlet of these curvatures that is as thin, and as near to a surface, as the rules permit.
+    pub(super) fn thinnest(
+        lens: &Lens,
+        neighbour: Neighbour,
+        rules: &SearchRules,
+        scale: f64,
+        curvatures: [f64; 2],
+    ) -> Self {
+        let (thickness, air) = length_distributions(lens, neighbour, curvatures, rules, scale);
+        Self { curvatures, thickness: thickness.least(), air: air.least() }
+    }
+
     /// The logarithm of the density of these numbers for a lens without the singlet and of a scale;
     /// `None` if they cannot be drawn.
     pub(super) fn log_density(

@@ -127,6 +127,8 @@ pub(in crate::search) struct NewDescent<P> {
     pub(in crate::search) before: Option<f64>,
     pub(in crate::search) loss: f64,
     pub(in crate::search) point: P,
+    /// The gradients that were made to choose the mutation.
+    pub(in crate::search) gradients: u64,
 }
 
 /// The outcome of a local move.
@@ -203,7 +205,10 @@ impl<L: Landscape> RoundContext<'_, L> {
         if anywhere && self.pinned.is_none() && self.weights.of(MutationKind::Global) > 0.0 {
             let point = self.landscape.draw(random)?;
             let (kind, record) = (MutationKind::Global, StructureChange::RandomDraw.into());
-            return self.new_descent(None, MutatedPoint { point, kind, record, log_ratio: None });
+            return self.new_descent(
+                None,
+                MutatedPoint { point, kind, record, log_ratio: None, gradients: 0 },
+            );
         }
         let parent = self.choose_parent(random)?;
         let mutated = self.landscape.mutate(&parent.point, self.weights, random)?;
@@ -245,8 +250,8 @@ impl<L: Landscape> RoundContext<'_, L> {
             return Err(MutationError::new(new.kind, Refusal::NoLoss));
         }
         let (parent, before) = parent.unzip();
-        let MutatedPoint { point, kind, record, .. } = new;
-        Ok(NewDescent { parent, kind: Some(kind), record, before, loss, point })
+        let MutatedPoint { point, kind, record, gradients, .. } = new;
+        Ok(NewDescent { parent, kind: Some(kind), record, before, loss, point, gradients })
     }
 
     /// A local move, and the end of the descent if it ends after it: lines 2 to 8 of algorithm 1.

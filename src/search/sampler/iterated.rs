@@ -94,7 +94,7 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
     }
 
     /// The points that are mutated in the next round, the best one first: the pinned one alone, or the
-    /// best one and the best ones of other structures.
+    /// best one, the best ones of other structures, and another minimum of its own.
     pub(super) fn parents<L>(&self, landscape: &L) -> Vec<ReservoirEntry<P>>
     where
         L: Landscape<Point = P, Memory = M>,
@@ -106,12 +106,25 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
             return vec![pinned.clone()];
         }
         let Some(best) = self.entry_of(0, landscape) else { return Vec::new() };
-        let entries = self.reservoir.entries().iter();
-        let mut others: Vec<_> =
-            entries.filter(|entry| entry.topology != best.topology).cloned().collect();
-        others.sort_by(ReservoirEntry::rank);
-        others.truncate(MAX_PARENTS - 1);
-        std::iter::once(best).chain(others).collect()
+        let mut entries = self.reservoir.entries().to_vec();
+        entries.sort_by(ReservoirEntry::rank);
+        let mut parents = vec![best];
+        for entry in &entries {
+            let is_other = parents.iter().all(|parent| parent.topology != entry.topology);
+            if is_other && parents.len() < MAX_PARENTS {
+                parents.push(entry.clone());
+            }
+        }
+        // Another minimum of the best structure where there are few structures.
+        if parents.len() < MAX_PARENTS {
+            let is_twin = |entry: &&ReservoirEntry<P>| entry.topology == parents[0].topology;
+            let apart = |entry: &&ReservoirEntry<P>| {
+                !landscape.is_same_minimum(&entry.point, &parents[0].point)
+            };
+            let twin = entries.iter().filter(is_twin).find(apart).cloned();
+            parents.extend(twin);
+        }
+        parents
     }
 
     /// The best point of the descent of a chain.
@@ -153,7 +166,21 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
     where
         L: Landscape<Point = P, Memory = M>,
     {
-        let Some(descent) = &mut self.chains[0].descent else { return };
+        if self.best_pauses(race, landscape) {
+            race.breaks_limits = !self.keep_limits_of(0, landscape);
+            if let Some(descent) = &self.chains[0].descent {
+                race.settle(descent.best_loss, descent.gradients);
+            }
+            race.stage = RaceStage::Trials(0);
+        }
+    }
+
+    /// True after a move of the best point if its descent pauses.
+    fn best_pauses<L>(&mut self, race: &mut Race, landscape: &L) -> bool
+    where
+        L: Landscape<Point = P, Memory = M>,
+    {
+        let Some(descent) = &mut self.chains[0].descent else { return false };
         let (gradients, loss) = (descent.gradients, descent.best_loss);
         let is_lost = !descent.loss.is_finite();
         if is_lost {
@@ -163,12 +190,27 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
         }
         let is_outside = landscape.structure_violation(&descent.best) > 0;
         let ended = (is_lost || is_outside).then_some(0.0);
-        let Some(rate) = ended.or_else(|| race.measured(gradients, loss)) else { return };
+        let Some(rate) = ended.or_else(|| race.measured(gradients, loss)) else { return false };
         race.best_rate = rate;
-        if rate <= self.required_rate(race) {
-            race.settle(loss, gradients);
-            race.stage = RaceStage::Trials(0);
+        rate <= self.required_rate(race)
+    }
+
+    /// Moves the best point of the descent of a chain to one that keeps every limit, and the descent with
+    /// it; false if none was found near it.
+    fn keep_limits_of<L>(&mut self, chain: usize, landscape: &L) -> bool
+    where
+        L: Landscape<Point = P, Memory = M>,
+    {
+        let Some(mut entry) = self.entry_of(chain, landscape) else { return true };
+        let is_kept = self.keep_limits(landscape, &mut entry);
+        if let Some(descent) = self.chains[chain].descent.as_mut().filter(|_| is_kept)
+            && descent.best != entry.point
+        {
+            (descent.best, descent.best_loss) = (entry.point.clone(), entry.loss);
+            (descent.point, descent.loss) = (entry.point, entry.loss);
+            self.find_best_again(landscape);
         }
+        is_kept
     }
 
     /// The rate below which the descent of the best point pauses: that of races, or 0 once there are
@@ -273,10 +315,19 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
         L: Landscape<Point = P, Memory = M>,
     {
         let [best, challenger] = [0, chain].map(|i| self.entry_of(i, landscape));
-        let Some(challenger) = challenger else { return false };
-        if best.as_ref().is_some_and(|best| !challenger.is_better_than(best)) {
+        let is_better = |challenger: &ReservoirEntry<P>| {
+            best.as_ref().is_none_or(|best| challenger.is_better_than(best))
+        };
+        if !challenger.is_some_and(|challenger| is_better(&challenger)) {
             return false;
         }
+        let keeps_limits = self.keep_limits_of(chain, landscape);
+        let challenger = self.entry_of(chain, landscape);
+        let is_next = keeps_limits || race.breaks_limits;
+        let Some(challenger) = challenger.filter(|found| is_next && is_better(found)) else {
+            return false;
+        };
+        race.breaks_limits = !keeps_limits;
         let node = self.lineage.node_mut(challenger.number);
         let kind = node.and_then(|node| {
             node.chain = 0;

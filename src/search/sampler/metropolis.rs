@@ -123,7 +123,8 @@ fn continue_as_new_descent<P: Clone, M>(
     let (parent, loss) = (Some(chain.generation), next.loss);
     let (point, record) = (next.point.clone(), StructureChange::Continuation.into());
     end_descent(chain, DescentEnd::MaxMoves, events);
-    let started = NewDescent { parent, kind: None, record, before: Some(loss), loss, point };
+    let before = Some(loss);
+    let started = NewDescent { parent, kind: None, record, before, loss, point, gradients: 0 };
     events.push(TurnEvent::Started(started));
     chain.descent = Some(next);
 }

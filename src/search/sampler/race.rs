@@ -101,6 +101,9 @@ pub(in crate::search) struct Race {
     gradients: u64,
     rate: GainRate,
     kinds: BTreeMap<MutationKind, GainRate>,
+    /// True if no point near the best one keeps every limit.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub(super) breaks_limits: bool,
 }
 
 impl Race {
@@ -114,6 +117,7 @@ impl Race {
             gradients: 0,
             rate: GainRate::expected(EXPECTATION_GRADIENTS),
             kinds: BTreeMap::new(),
+            breaks_limits: false,
         }
     }
 

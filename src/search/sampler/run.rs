@@ -295,7 +295,7 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
 
     /// The lineage node of a new descent.
     pub(in crate::search) fn new_node(&self, chain: usize, start: NewDescent<P>) -> LineageNode<P> {
-        let NewDescent { parent, kind, record, before, loss, point } = start;
+        let NewDescent { parent, kind, record, before, loss, point, .. } = start;
         LineageNode {
             number: self.lineage.total(),
             parent,
@@ -322,6 +322,7 @@ impl<P: SearchPoint, M: SearchPoint + Default> SearchRun<P, M> {
             before: None,
             loss,
             point,
+            gradients: 0,
         }
     }
 

@@ -25,6 +25,9 @@ pub struct SearchSettings {
     pub reservoir: usize,
     /// True to hold at most one point of each topology in the reservoir.
     pub one_per_topology: bool,
+    /// True for an iterated local search that holds different minima in its reservoir, in place of one point
+    /// of each topology.
+    pub minima: bool,
     /// The probability that a regeneration draws a random point: γ of (4.14). The thesis says
     /// "small"; 0.02 is the value of its program with a full reservoir.
     pub gamma: f64,
@@ -60,6 +63,7 @@ impl Default for SearchSettings {
             trials: 8,
             reservoir: 5,
             one_per_topology: true,
+            minima: true,
             gamma: 0.02,
             termination: Termination::Ratio,
             c: 0.05,

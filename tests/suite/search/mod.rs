@@ -2,6 +2,7 @@
 //! lineage and checkpoints, and the distribution that they sample; the landscape of lenses and its
 //! rules.
 
+mod aspheres;
 mod budget;
 mod chain;
 mod checkpoint;
@@ -9,12 +10,14 @@ mod density;
 mod gradients;
 mod iterated;
 mod lens;
+mod limits;
 mod mutations;
 mod projection;
 mod proposal_density;
 mod reservoir;
 mod rugged;
 mod rules;
+mod saddle;
 mod sampling;
 
 use aplanat::search::{Random, SearchRules};

@@ -83,7 +83,7 @@ impl Rugged {
         let x = if self.fault == Fault::AllWorthless { f64::INFINITY } else { spot.x + noise };
         let change = StructureChange::Text(format!("{} at {elements}", kind.name()));
         let (point, record) = (Spot { elements, x }, change.into());
-        Ok(MutatedPoint { point, kind, record, log_ratio: Some(0.0) })
+        Ok(MutatedPoint { point, kind, record, log_ratio: Some(0.0), gradients: 0 })
     }
 }
 

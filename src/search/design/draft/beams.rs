@@ -1,6 +1,6 @@
 //! The beams of a draft: for every field an ellipse with the area that is asked for.
 
-use crate::lens::Lens;
+use crate::lens::{Lens, Object};
 use crate::math::Vec3;
 use crate::pupil::RayModel;
 use crate::search::design::LensRequirements;
@@ -26,6 +26,8 @@ pub(in crate::search::design) struct BeamPlan {
 pub(in crate::search::design) struct FieldBeam {
     /// The angle with the axis, in radians.
     pub(in crate::search::design) angle: f64,
+    /// The distance of a near object in front of the first vertex, in mm; `None` for a distant one.
+    pub(in crate::search::design) object: Option<f64>,
     /// The weight of the field.
     pub(in crate::search::design) weight: f64,
     /// The points relative to its centre in the plane of the first vertex, in mm, each with its part
@@ -62,6 +64,21 @@ impl BeamPlan {
         Self { difficulty: [1.0, 1.0], limit_weight, margin: 0.0, edge_margin: 0.0, traced: None }
     }
 
+    /// The same with this share less light.
+    pub(super) fn dimmed(&self, share: f64) -> Self {
+        let factor = (1.0 - share).sqrt();
+        let mut plan = self.clone();
+        plan.difficulty[0] *= factor;
+        for beam in plan.traced.iter_mut().flatten() {
+            beam.axes = beam.axes.map(|axis| factor * axis);
+            for (point, _) in &mut beam.points {
+                let chief = beam.chief;
+                *point = [0, 1].map(|i| chief[i] + factor * (point[i] - chief[i]));
+            }
+        }
+        plan
+    }
+
     /// The beams of all fields.
     pub(super) fn beams(&self, asked: &LensRequirements) -> Vec<FieldBeam> {
         if let Some(traced) = &self.traced {
@@ -81,7 +98,9 @@ impl BeamPlan {
             let angle = (self.difficulty[1] * field).to_radians();
             let [x, y] = [radius * share.max(1.0).sqrt(), radius * share.min(share.sqrt())];
             let points = ellipse(field, [x, y], asked.f_number);
-            FieldBeam { angle, weight, points, axes: [x, y], chief: [0.0; 2], center: 0.0 }
+            let object = asked.object.map(|object| object.distance);
+            let (axes, chief, center) = ([x, y], [0.0; 2], 0.0);
+            FieldBeam { angle, object, weight, points, axes, chief, center }
         };
         fields.iter().map(beam).collect()
     }
@@ -123,9 +142,16 @@ fn ellipse(field: f64, [a, b]: [f64; 2], f_number: f64) -> Vec<([f64; 2], f64)> 
 
 impl FieldBeam {
     /// The ray through a point of the beam, for an entrance pupil at this distance behind the first
-    /// vertex; it starts well in front of the lens.
+    /// vertex; it starts well in front of the lens, or at a near object.
     pub(super) fn ray(&self, [x, y]: [f64; 2], pupil: f64, back: f64) -> Ray<f64> {
         let slope = self.angle.tan();
+        if let Some(distance) = self.object {
+            let object = Vec3::new(0.0, -distance * slope, -distance);
+            // The line from the object point to the middle of the pupil crosses the first vertex plane here.
+            let chief = -pupil * slope * distance / (distance + pupil);
+            let to = Vec3::new(x, y + self.center + chief, 0.0) - object;
+            return Ray { point: object, direction: to * (1.0 / to.dot(to).sqrt()) };
+        }
         let y = y + self.center - (pupil + back) * slope;
         let direction = Vec3::new(0.0, self.angle.sin(), self.angle.cos());
         Ray { point: Vec3::new(x, y, -back), direction }
@@ -137,11 +163,16 @@ impl FieldBeam {
     }
 
     /// A beam of given points.
-    fn of_points(angle: f64, weight: f64, points: Vec<([f64; 2], f64)>, chief: [f64; 2]) -> Self {
+    fn of_points(
+        (angle, object): (f64, Option<f64>),
+        weight: f64,
+        points: Vec<([f64; 2], f64)>,
+        chief: [f64; 2],
+    ) -> Self {
         let reach = |i: usize| points.iter().map(|(p, _)| p[i].abs()).fold(0.0, f64::max);
         // The outermost nodes lie inside the edge.
         let axes = [1.04 * reach(0), 1.04 * reach(1)];
-        Self { angle, weight, points, axes, chief, center: 0.0 }
+        Self { angle, object, weight, points, axes, chief, center: 0.0 }
     }
 }
 
@@ -152,7 +183,11 @@ pub(in crate::search::design) fn traced_beams(lens: &Lens) -> Option<Vec<FieldBe
     let beam = |field: &crate::lens::FieldPoint| {
         let region = crate::analysis::lit_region(&model, *field, model.primary).ok()?;
         let traced = region.trace_pupil(TRACED_ORDER);
-        let angle = field.y.to_radians();
+        // The angle at which the first vertex sees the point of a near object.
+        let (angle, object) = match lens.object {
+            Object::Infinity => (field.y.to_radians(), None),
+            Object::Finite(distance) => ((-field.y / distance).atan(), Some(distance)),
+        };
         let total: f64 = traced.landed.arrivals().map(|(_, w)| w).sum();
         let all_imaged = (0..traced.rays.len()).all(|i| traced.landed.sink.fate(i).is_imaged());
         let crossing = |ray: &Ray<f64>| {
@@ -165,7 +200,7 @@ pub(in crate::search::design) fn traced_beams(lens: &Lens) -> Option<Vec<FieldBe
         let chief = crossing(&region.launch.ray([0.0; 2])?);
         let points: Vec<_> = traced.landed.arrivals().map(point).collect();
         (total > 0.0 && all_imaged)
-            .then(|| FieldBeam::of_points(angle, field.weight, points, chief))
+            .then(|| FieldBeam::of_points((angle, object), field.weight, points, chief))
     };
     model.fields.iter().map(beam).collect()
 }
@@ -209,7 +244,7 @@ mod tests {
     #[test]
     fn the_axes_of_a_beam_of_points_hold_them_with_little_room() {
         let points = vec![([3.0, -1.0], 0.5), ([-1.0, 7.0], 0.5)];
-        let beam = FieldBeam::of_points(0.0, 1.0, points, [0.0; 2]);
+        let beam = FieldBeam::of_points((0.0, None), 1.0, points, [0.0; 2]);
         let [x, y] = beam.axes;
         assert!((3.0..3.3).contains(&x) && (7.0..7.7).contains(&y), "{x} {y}");
     }

@@ -5,8 +5,9 @@ use super::parameter::model;
 use super::{BeamPlan, DraftParameter, Freedom, LensDraft, LimitCost, USED_TERMS};
 use crate::lens::{Lens, Medium, System, glass::model_index};
 use crate::search::design::LensRequirements;
-use crate::search::design::judge::asked_wavelengths;
+use crate::search::design::judge::{asked_wavelengths, is_aspheric};
 use crate::search::design::rims::StopPlace;
+use crate::search::predicted_gain::QuadraticModel;
 use crate::solve::LeastSquaresPoint;
 use crate::trace::{ImagePoints, Rays, SurfaceParameter, TraceSink as _, Tracer};
 use nalgebra::{DMatrix, DVector};
@@ -177,6 +178,37 @@ impl<'a> DraftMerit<'a> {
         sum.point.value.is_finite().then_some(sum)
     }
 
+    /// The RMS spot radius over the fields, in mm.
+    pub(super) fn rms(&mut self) -> Option<f64> {
+        let values = self.start();
+        let sum = self.sum(&values)?;
+        let squares: f64 = sum.broken.iter().map(|(_, _, v)| v * v).sum();
+        Some((sum.point.value - self.plan.limit_weight * squares).max(0.0).sqrt())
+    }
+
+    /// What aspheric figures promise, by row.
+    pub(super) fn asphere_gains(&mut self) -> Option<Vec<(usize, f64)>> {
+        let values = self.start();
+        let point = self.evaluate(&values)?;
+        let is_plain = |row: usize| !is_aspheric(&self.draft.lens.surfaces[row]);
+        let row_of = |number: usize| match self.parameters[number] {
+            DraftParameter::Surface(
+                row,
+                SurfaceParameter::Conic | SurfaceParameter::AsphereTerm(_),
+            ) if is_plain(row) => Some(row),
+            _ => None,
+        };
+        let is_new = |number: usize| row_of(number).is_some();
+        let model = QuadraticModel::new(&point.half_gradient, &point.normal, is_new)?;
+        let mut gains = vec![0.0; self.draft.lens.surfaces.len()];
+        for number in 0..values.len() {
+            if let Some((row, gain)) = row_of(number).zip(model.gain(number)) {
+                gains[row] = f64::max(gains[row], gain / point.value.max(f64::MIN_POSITIVE));
+            }
+        }
+        Some(gains.into_iter().enumerate().collect())
+    }
+
     /// The costs of the limits of the draft at a minimum of the merit: by their multipliers.
     pub(super) fn limit_costs(&mut self) -> Option<Vec<LimitCost>> {
         let values = self.start();
@@ -185,7 +217,7 @@ impl<'a> DraftMerit<'a> {
         let squares: f64 = sum.broken.iter().map(|(_, _, v)| weight * v * v).sum();
         let rms = (sum.point.value - squares).max(0.0).sqrt().max(1e-9);
         let of_penalty = |&(term, surface, violation): &(&'static str, Option<usize>, f64)| {
-            LimitCost { term, surface, um_per_mm: 1e3 * weight * violation.abs() / rms }
+            LimitCost::of_length(term, surface, 1e3 * weight * violation.abs() / rms)
         };
         let mut costs: Vec<LimitCost> = sum.broken.iter().map(of_penalty).collect();
         for (i, parameter) in self.parameters.iter().enumerate() {
@@ -197,7 +229,7 @@ impl<'a> DraftMerit<'a> {
             if values[i] <= least && slope > 0.0 {
                 let air = self.draft.lens.surfaces[row].medium == Medium::Air;
                 let term = if air { "air_center" } else { "glass_center" };
-                costs.push(LimitCost { term, surface: Some(row), um_per_mm: 1e3 * slope / rms });
+                costs.push(LimitCost::of_length(term, Some(row), 1e3 * slope / rms));
             }
         }
         Some(costs)
@@ -337,11 +369,11 @@ impl<'a> DraftMerit<'a> {
     }
 
     /// The focal length in mm with its derivatives, from a paraxial ray traced forwards and its
-    /// adjoint traced backwards.
+    /// adjoint traced backwards; of a near object the magnification times its distance.
     pub(super) fn focal_length(&self) -> (f64, Vec<(DraftParameter, f64)>) {
         let system = &self.systems[self.primary].system;
         let surfaces = &system.surfaces[..system.surfaces.len() - 1];
-        let (mut y, mut w) = (1.0, 0.0);
+        let (mut y, mut w) = (1.0, self.asked.object_slope());
         let mut states = Vec::new();
         let mut before = 1.0;
         for surface in surfaces {

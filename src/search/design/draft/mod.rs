@@ -46,8 +46,30 @@ pub struct LimitCost {
     /// The surface, or the one in front of the gap, counted from 0; `None` for the whole lens.
     pub surface: Option<usize>,
     /// The decrease of the RMS spot radius over the fields, in µm, by a bound looser by 1 mm; for a
-    /// distortion in mm of the image.
-    pub um_per_mm: f64,
+    /// distortion in mm of the image. `None` for what is no length.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub um_per_mm: Option<f64>,
+    /// The same by 1 % less light at every field; `None` for a length.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub um_per_percent: Option<f64>,
+}
+
+impl LimitCost {
+    /// The cost of a length.
+    pub(super) fn of_length(term: &'static str, surface: Option<usize>, um_per_mm: f64) -> Self {
+        Self { term, surface, um_per_mm: Some(um_per_mm), um_per_percent: None }
+    }
+
+    /// The cost of the light of all fields.
+    pub(super) fn of_light(um_per_percent: f64) -> Self {
+        let (term, surface) = ("light", None);
+        Self { term, surface, um_per_mm: None, um_per_percent: Some(um_per_percent) }
+    }
+
+    /// The number by which costs are ordered.
+    pub(super) fn size(&self) -> f64 {
+        self.um_per_mm.or(self.um_per_percent).unwrap_or(0.0)
+    }
 }
 
 /// The costs of all limits that hold a draft, those that cost most first; empty if its beams do not
@@ -60,8 +82,35 @@ pub(super) fn limit_costs(
 ) -> Vec<LimitCost> {
     let merit = DraftMerit::new(draft, asked, plan, freedom);
     let mut costs = merit.and_then(|mut merit| merit.limit_costs()).unwrap_or_default();
-    costs.sort_by(|a, b| b.um_per_mm.total_cmp(&a.um_per_mm));
+    costs.sort_by(|a, b| b.size().total_cmp(&a.size()));
+    costs.extend(light_cost(draft, asked, plan, freedom).map(LimitCost::of_light));
     costs
+}
+
+/// The decrease of the RMS spot radius in µm by beams of 1 % less light: by the lens as it is, since at a
+/// minimum what its variables gain is of second order.
+fn light_cost(
+    draft: &LensDraft,
+    asked: &LensRequirements,
+    plan: &BeamPlan,
+    freedom: Freedom,
+) -> Option<f64> {
+    let rms = |plan: &BeamPlan| DraftMerit::new(draft, asked, plan, freedom)?.rms();
+    let gain = 1e3 * (rms(plan)? - rms(&plan.dimmed(0.01))?);
+    (gain > 0.0).then_some(gain)
+}
+
+/// What an aspheric figure of each surface without one promises, by row: the predicted decrease of the merit
+/// relative to it by the conic constant or by the coefficient of r⁴, whichever is larger.
+pub(super) fn asphere_gains(
+    draft: &LensDraft,
+    asked: &LensRequirements,
+    plan: &BeamPlan,
+) -> Vec<(usize, f64)> {
+    let aspheric_surfaces = draft.lens.surfaces.len();
+    let freedom = Freedom { glasses: false, aspheric_surfaces, terms: 1, pupil: true };
+    let merit = DraftMerit::new(draft, asked, plan, freedom);
+    merit.and_then(|mut merit| merit.asphere_gains()).unwrap_or_default()
 }
 
 /// The result of a descent.

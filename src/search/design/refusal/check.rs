@@ -2,7 +2,7 @@
 
 use super::SpecificationError;
 use crate::search::design::requirements::{FOCAL_LENGTH_TOLERANCE, LensRequirements};
-use crate::search::design::spec::LensSpecification;
+use crate::search::design::spec::{LensSpecification, LensWish};
 use std::f64::consts::PI;
 
 /// The f-number of an image in air at which the beam fills a hemisphere (sine condition): its edge grazes
@@ -20,8 +20,9 @@ const LARGEST_BLUR: f64 = 0.01;
 pub(in crate::search::design) fn check_numbers(
     spec: &LensSpecification,
 ) -> Result<(), SpecificationError> {
-    if let Some(object) = spec.object.as_ref().filter(|object| *object != "infinity") {
-        let expected = "`infinity`; lenses for near objects are not designed from a specification";
+    let is_known = |object: &&String| ["infinity", "finite"].contains(&object.as_str());
+    if let Some(object) = spec.object.as_ref().filter(|object| !is_known(object)) {
+        let expected = "`infinity`, or `finite` beside a magnification";
         return Err(SpecificationError::invalid("object", format!("`{object}`"), expected));
     }
     check_positive(spec)?;
@@ -39,7 +40,10 @@ fn check_positive(spec: &LensSpecification) -> Result<(), SpecificationError> {
         ("min_air_mm", spec.min_air_mm),
     ];
     let more = [
-        ("focal_length_mm", Some(spec.focal_length_mm)),
+        ("focal_length_mm", spec.focal_length_mm),
+        ("magnification", spec.magnification.map(f64::abs)),
+        ("object_distance_mm", spec.object_distance_mm),
+        ("wish", wished_frequency(spec)),
         ("f_number", spec.f_number),
         ("numerical_aperture", spec.numerical_aperture),
         ("image_height_mm", spec.image_height_mm),
@@ -57,6 +61,14 @@ fn check_positive(spec: &LensSpecification) -> Result<(), SpecificationError> {
         }
     }
     Ok(())
+}
+
+/// The frequency of a wish for contrast, in cycles/mm.
+fn wished_frequency(spec: &LensSpecification) -> Option<f64> {
+    match spec.wish {
+        Some(LensWish::Mtf(frequency)) => Some(frequency),
+        _ => None,
+    }
 }
 
 fn check_fields(spec: &LensSpecification) -> Result<(), SpecificationError> {

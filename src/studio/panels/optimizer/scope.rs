@@ -16,6 +16,7 @@ pub(super) const GROUPS: &[(&str, &[OperandKind])] = &[
         "Chief rays",
         &[
             OperandKind::ChiefRayHeight,
+            OperandKind::Distortion,
             OperandKind::ChiefRayAngle,
             OperandKind::IncidenceAngle,
             OperandKind::Telecentricity,
@@ -45,6 +46,7 @@ pub(super) const fn title(kind: OperandKind) -> &'static str {
         OperandKind::Track => "Length",
         OperandKind::Sag => "Sag",
         OperandKind::ChiefRayHeight => "Chief-ray height",
+        OperandKind::Distortion => "Limited distortion",
         OperandKind::ChiefRayAngle => "Chief-ray angle",
         OperandKind::IncidenceAngle => "Angle of incidence",
         OperandKind::Telecentricity => "Telecentricity",
@@ -71,6 +73,9 @@ pub(super) const fn hint(kind: OperandKind) -> &'static str {
         OperandKind::Sag => "The sag of surfaces at their rims",
         OperandKind::ChiefRayHeight => {
             "The height of the chief rays at the chosen surfaces, or at the image"
+        }
+        OperandKind::Distortion => {
+            "The height of chief rays in the image relative to that without distortion, minus 1, in percent"
         }
         OperandKind::ChiefRayAngle => {
             "The angle between chief rays and the axis behind the chosen surfaces, or in image space"

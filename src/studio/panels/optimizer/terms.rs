@@ -1,6 +1,7 @@
 //! The title, the unit, the explanation and the default of every term.
 
 use super::scope;
+use crate::lens::OperandKind;
 use crate::merit::{self, LensFigures, Term, WeightedTerm};
 use crate::session::{Analyses, SessionView};
 use crate::studio::number;
@@ -122,6 +123,7 @@ pub(super) const fn unit(term: Term) -> &'static str {
         | Term::FNumber(_)
         | Term::Steepness(_) => "",
         Term::Operand { kind, .. } if kind.is_angle() => "°",
+        Term::Operand { kind: OperandKind::Distortion, .. } => "%",
         Term::FocalLength(_)
         | Term::GlassCenter { .. }
         | Term::GlassEdge(_)
@@ -187,6 +189,7 @@ pub(super) fn value_text(term: Term, value: f64) -> String {
         }
         Term::Steepness(_) => format!("{} over", short(root)),
         Term::Operand { kind, .. } if kind.is_angle() => format!("{}° off", short(root)),
+        Term::Operand { kind: OperandKind::Distortion, .. } => format!("{} % off", short(root)),
         _ => format!("{}{}", length_text(root), deviation(term)),
     }
 }

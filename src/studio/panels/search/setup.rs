@@ -164,6 +164,10 @@ impl SearchSetup {
             ui.weak(format!("({} now)", piece_count(&view.lens)));
         });
         ui.end_row();
+        ui.weak("Aspheres");
+        let hint = "The largest number of aspheric surfaces, each of which counts as half an element; 0: none is tried";
+        drag(ui, "Aspheric surfaces at most", &mut rules.aspheres, 0..=40, 0.05, hint);
+        ui.end_row();
         ui.weak("Fixed ends").on_hover_text("Surfaces that mutations do not change");
         fixed_ends(ui, &mut rules.fixed_ends, view.lens.surfaces.len());
         ui.end_row();

@@ -173,6 +173,7 @@ pub(super) fn outcome_text<P>(node: &LineageNode<P>) -> String {
         Some(OfferOutcome::Entered) => "; retained".to_owned(),
         Some(OfferOutcome::Replaced(other)) => format!("; retained in place of lens {other}"),
         Some(OfferOutcome::AlreadyPresent(other)) => format!("; the same as lens {other}"),
+        Some(OfferOutcome::RejectedLimits) => "; no lens near it keeps every limit".to_owned(),
         Some(OfferOutcome::RejectedSameTopology(other)) => {
             format!("; not retained: lens {other} of the same pattern is at least as good")
         }

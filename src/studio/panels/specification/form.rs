@@ -6,7 +6,7 @@ use super::text::{filled_text, other_filled};
 use crate::lens::WavelengthPreset;
 use crate::search::design::{
     AS_BUILT_GRADES, DesignSettings, FilledValue, GlassList, LensRequirements, LensSpecification,
-    SpecificationError,
+    LensWish, SpecificationError,
 };
 use crate::session::SpecificationRequest;
 use crate::studio::form::{choice, number_field};
@@ -44,8 +44,10 @@ const TRACK: usize = 1;
 const DIAMETER: usize = 2;
 const DISTORTION: usize = 3;
 const ILLUMINATION: usize = 4;
+const MAGNIFICATION: usize = 5;
+const CONTRAST: usize = 6;
 
-const NUMBER_ROWS: [NumberRow; 5] = [
+const NUMBER_ROWS: [NumberRow; 7] = [
     NumberRow {
         title: "Back focus at least",
         key: "min_back_focus_mm",
@@ -86,6 +88,23 @@ const NUMBER_ROWS: [NumberRow; 5] = [
         value: 30.0,
         hint: "Of every field, relative to the axis",
     },
+    NumberRow {
+        title: "Near object, magnified by",
+        key: "magnification",
+        unit: "",
+        scale: 1.0,
+        value: 0.5,
+        hint: "Of a near object at the distance that a thin lens of this focal length needs; a distant one if \
+            it is not stated",
+    },
+    NumberRow {
+        title: "Contrast at cycles/mm",
+        key: "wish",
+        unit: "",
+        scale: 1.0,
+        value: 30.0,
+        hint: "The frequency at which contrast is wished in place of small spots",
+    },
 ];
 
 /// A limit that is a count, as a row of the form.
@@ -125,7 +144,7 @@ pub(super) struct SpecificationForm {
     field_value: f64,
     /// The index of a preset; `None` for the usual ones.
     wavelengths: Option<usize>,
-    numbers: [Optional<f64>; 5],
+    numbers: [Optional<f64>; 7],
     counts: [Optional<usize>; 2],
     /// Names of glasses, separated by commas; empty for any.
     glasses: String,
@@ -183,7 +202,9 @@ impl SpecificationForm {
             FieldQuantity::ImageHeight => [None, Some(self.field_value)],
         };
         let spec = LensSpecification {
-            focal_length_mm: self.focal_length,
+            focal_length_mm: Some(self.focal_length),
+            magnification: number(MAGNIFICATION),
+            wish: number(CONTRAST).map(LensWish::Mtf),
             f_number,
             numerical_aperture,
             half_field_deg,

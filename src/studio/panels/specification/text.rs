@@ -25,7 +25,7 @@ fn scaled(value: &str, scale: f64) -> String {
 }
 
 /// The values taken for those that have no row of their own.
-pub(super) fn other_filled(filled: &[FilledValue], rows: [&str; 5], counts: [&str; 2]) -> String {
+pub(super) fn other_filled(filled: &[FilledValue], rows: [&str; 7], counts: [&str; 2]) -> String {
     let has_row = |key: &str| rows.contains(&key) || counts.contains(&key);
     let others = filled.iter().filter(|value| !has_row(value.key));
     let texts: Vec<String> = others
@@ -129,7 +129,9 @@ pub(super) fn cost_text(cost: &LimitCost) -> String {
     let place = cost
         .surface
         .map_or(String::new(), |row| format!(" of surface {}", SurfaceNumber::new(row)));
-    format!("{name}{place}: {} µm per mm", format_digits(cost.um_per_mm, 3))
+    let of = |um: Option<f64>, unit| um.map(|um| format!("{} µm per {unit}", format_digits(um, 3)));
+    let price = of(cost.um_per_mm, "mm").or_else(|| of(cost.um_per_percent, "percent"));
+    format!("{name}{place}: {}", price.unwrap_or_default())
 }
 
 #[cfg(test)]
