@@ -43,7 +43,7 @@ impl QuadraticModel {
         Some(Self { half_gradient, normal, base, factor, solved })
     }
 
-    /// What a new variable takes from the sum after the others have followed; `None` if it has no effect.
+    /// The part of the sum that a new variable takes after the others have followed; `None` if it has no effect.
     pub(super) fn gain(&self, number: usize) -> Option<f64> {
         let column = self.normal.column(number).into_owned().select_rows(&self.base);
         let own = self.normal[(number, number)];

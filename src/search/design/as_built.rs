@@ -243,7 +243,7 @@ fn with_variables(lens: &Lens, asked: &LensRequirements) -> Lens {
     lens
 }
 
-/// What is to become small, and the limits of the requirements that a lens of this judgement keeps.
+/// The objective, and the limits of the requirements that a lens of this judgement keeps.
 fn goal(lens: &Lens, asked: &LensRequirements, found: &LensJudgement, objective: Term) -> Goal {
     let mut terms = vec![
         WeightedTerm::new(objective, 1.0),

@@ -49,7 +49,7 @@ pub struct LensRequirements {
     pub glass_edge: f64,
     /// The smallest air space on the axis, in mm.
     pub air_center: f64,
-    /// What the lens is to be good at.
+    /// The quality that the lens is to excel in.
     #[serde(default)]
     pub wish: LensWish,
     /// The class of care in making for which the lenses are refined at the end; `None` for none.
@@ -392,7 +392,7 @@ impl Filling {
         ]
     }
 
-    /// What the lens is to be good at.
+    /// The quality that the lens is to excel in.
     fn wish(&mut self, spec: &LensSpecification) -> LensWish {
         spec.wish.unwrap_or_else(|| {
             let (key, value) = ("wish", "rms".to_owned());

@@ -80,7 +80,7 @@ pub struct LensSpecification {
     /// The smallest air space on the axis, in mm; surfaces may touch at their rims.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub min_air_mm: Option<f64>,
-    /// What the lens is to be good at; by default small spots.
+    /// The quality that the lens is to excel in; by default small spots.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub wish: Option<LensWish>,
     /// The class of care in making for which the lenses are refined at the end, one of
@@ -99,7 +99,7 @@ pub const AS_BUILT_GRADES: [(&str, Option<ToleranceGrade>); 5] = [
     ("moulded_plastic", Some(ToleranceGrade::MouldedPlastic)),
 ];
 
-/// What a lens is to be good at.
+/// The quality that a lens is to excel in.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum LensWish {

@@ -103,7 +103,7 @@ fn draw(asked: &LensRequirements, random: &mut Random) -> Option<ThinStructure> 
     Some(ThinStructure { lenses, score, back })
 }
 
-/// What is against thin lenses: colour, the Petzval sum, and rays that are bent much.
+/// The faults of thin lenses: colour, the Petzval sum, and rays that are bent much.
 fn score(lenses: &[ThinLens], asked: &LensRequirements) -> f64 {
     let f = asked.thin_focal_length();
     let middle = 0.5 * lenses.iter().map(|lens| lens.gap).sum::<f64>();

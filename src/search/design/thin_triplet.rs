@@ -74,7 +74,7 @@ impl ThinTriplet {
         Self { powers: [at[0], at[1], at[2]], gaps: [at[3], at[4]] }
     }
 
-    /// What is left of the five conditions.
+    /// The remainders of the five conditions.
     fn errors(&self, [outer, middle]: [(f64, f64); 2]) -> SVector<f64, 5> {
         let Self { powers: [a, b, c], gaps: [front, rear] } = *self;
         let (indices, abbe) = ([outer.0, middle.0, outer.0], [outer.1, middle.1, outer.1]);

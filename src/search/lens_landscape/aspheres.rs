@@ -19,7 +19,7 @@ const PRICE: f64 = 0.01;
 /// The gain relative to the merit from which an aspheric number is tried.
 const LEAST_GAIN: f64 = 0.02;
 
-/// What an aspheric number promises.
+/// The gain that an aspheric number promises.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AsphereGain {
     /// The number.
@@ -40,7 +40,7 @@ impl LensLandscape {
         merit + PRICE * self.priced_aspheres(lens) as f64 * merit.abs()
     }
 
-    /// What each aspheric number promises that may vary in addition.
+    /// The gain of each aspheric number that may vary in addition.
     ///
     /// # Errors
     /// The lens has no merit.
@@ -81,7 +81,7 @@ impl LensLandscape {
         let kind = MutationKind::AddAsphere;
         let refuse = |refusal| MutationError::new(kind, refusal);
         let sites = mutation::asphere_sites(lens, rules).map_err(refuse)?;
-        let gains = self.gains_of(lens, &sites).map_err(|_| refuse(Refusal::NoLoss))?;
+        let gains = self.gains_of(lens, &sites).ok().ok_or_else(|| refuse(Refusal::NoLoss))?;
         let promising = gains.iter().filter(|found| found.gain > LEAST_GAIN);
         let promising: Vec<_> = promising.map(|found| (found.parameter, found.gain)).collect();
         let drawn = drawn_by_weight(&promising, random.random());

@@ -7,7 +7,7 @@ use crate::lens::{Lens, Parameter, Quantity, Variable, glass};
 use crate::merit::{DerivativeLevel, Goal, Merit, Term};
 use crate::search::mutation::NullMeniscus;
 use crate::search::{MutatedPoint, MutationError, MutationKind, Random, SearchRules, mutation};
-use nalgebra::{Matrix2, SymmetricEigen, Vector2};
+use nalgebra::Vector2;
 use rand::RngExt as _;
 use std::sync::Arc;
 
@@ -52,23 +52,26 @@ impl LensLandscape {
         let merit = Merit::new(&lens, &self.optical_goal(), self.local.tolerance).ok()?;
         let merit = merit.with_initial_light(&self.light);
         let step = DIFFERENCE / self.focal_length.abs();
-        let slope = |i: usize, step: f64| {
-            let mut values = [null.curvature; 2];
-            values[i] += step;
+        let slope = |direction: Vector2<f64>, step: f64| {
+            let values = [0, 1].map(|i| null.curvature + step * direction[i]);
             let sum = merit.evaluate(&values, DerivativeLevel::Gradient).ok()?;
             Some(Vector2::new(sum.gradient[0], sum.gradient[1]))
         };
-        let column = |i: usize| Some((slope(i, step)? - slope(i, -step)?) / (2.0 * step));
-        let hessian = Matrix2::from_columns(&[column(0)?, column(1)?]);
-        let found = SymmetricEigen::new(0.5 * (hessian + hessian.transpose()));
-        let least = if found.eigenvalues[0] < found.eigenvalues[1] { 0 } else { 1 };
-        let direction = found.eigenvectors.column(least);
-        let second_derivatives = [found.eigenvalues[least], found.eigenvalues[1 - least]];
-        (second_derivatives[0] < 0.0).then(|| SaddlePoint {
+        let change = |direction: Vector2<f64>| {
+            Some((slope(direction, step)? - slope(direction, -step)?) / (2.0 * step))
+        };
+        let half = std::f64::consts::FRAC_1_SQRT_2;
+        let [bending, power] = [1.0, -1.0].map(|sign| Vector2::new(half, sign * half));
+        // Along equal curvatures the merit is constant, so that its second derivative there is none of rounding.
+        let mixed = power.dot(&change(bending)?);
+        let own = power.dot(&change(power)?);
+        let (least, largest) = eigenvalues(mixed, own);
+        let direction = (bending * mixed + power * least).normalize();
+        (least < 0.0 && direction.iter().all(|part| part.is_finite())).then(|| SaddlePoint {
             lens: null.lens.clone(),
             first: null.first,
             direction: [direction[0], direction[1]],
-            second_derivatives,
+            second_derivatives: [least, largest],
         })
     }
 
@@ -97,5 +100,32 @@ impl LensLandscape {
         let mutated = null.thickened(lens, rules, curvatures)?;
         let mutated: MutatedPoint<Arc<Lens>> = mutated.into();
         Ok(MutatedPoint { log_ratio: None, gradients: GRADIENTS, ..mutated })
+    }
+}
+
+/// The eigenvalues of a symmetric matrix of two rows, of which the first element is 0: the negative one
+/// first, by a form that loses no digits.
+fn eigenvalues(mixed: f64, own: f64) -> (f64, f64) {
+    let half = 0.5 * own;
+    let root = half.hypot(mixed);
+    if half > 0.0 {
+        (-mixed * mixed / (half + root), half + root)
+    } else {
+        (half - root, -mixed * mixed / (half - root))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_form_that_vanishes_in_one_direction_has_eigenvalues_of_both_signs() {
+        for (mixed, own) in [(1.0, 3.0), (-1e-6, 2.0), (0.5, -4.0), (2.0, 0.0)] {
+            let (least, largest) = eigenvalues(mixed, own);
+            assert!(least < 0.0 && largest > 0.0, "{least} {largest}");
+            assert!((least + largest - own).abs() < 1e-12);
+            assert!((least * largest / (mixed * mixed) + 1.0).abs() < 1e-12);
+        }
     }
 }

@@ -78,7 +78,7 @@ impl NullMeniscus {
         let none = SingletParameters { curvatures: [curvature; 2], thickness: 0.0, air: 0.0 };
         let first = insert(&mut draft, site, glass, none, true)?;
         draft.lens.surfaces[first..=first + 1].iter_mut().for_each(|row| row.semi_diameter = rim);
-        draft.lens.check().map_err(|_| Refusal::InvalidLens)?;
+        draft.lens.check().map_err(Refusal::from)?;
         Ok(Self { site, glass, lens: draft.lens, first, curvature })
     }
 

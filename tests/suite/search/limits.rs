@@ -69,7 +69,8 @@ fn a_lens_that_breaks_a_limit_is_moved_to_where_it_holds() {
     let landscape = plan.landscape(&lens).unwrap();
     let settled = landscape.settled(landscape.start());
     assert!(matches!(landscape.settle(&settled), Settlement::Kept));
-    let tight = SearchRules { track: Some(lens.total_track() - 0.2), ..SearchRules::default() };
+    let track = settled.total_track() - 0.2;
+    let tight = SearchRules { track: Some(track), ..SearchRules::default() };
     let tight = SearchPlan { rules: tight, ..plan }.landscape(&lens).unwrap();
     let before = tight.limit_violation(&settled).unwrap();
     let Settlement::Restored { point, loss, gradients } = tight.settle(&settled) else {
@@ -93,7 +94,7 @@ fn minima_are_told_apart_by_signs_glasses_and_distance() {
     assert!(landscape.is_same_minimum(start, start));
     let near = changed(&|lens| lens.surfaces[0].curvature *= 1.0 + 1e-6);
     assert!(landscape.is_same_minimum(start, &near));
-    let bent = changed(&|lens| lens.surfaces[1].curvature *= -1.0);
+    let bent = changed(&|lens| lens.surfaces[0].curvature *= -1.0);
     assert!(!landscape.is_same_minimum(start, &bent));
     let far = changed(&|lens| lens.surfaces[0].curvature *= 1.1);
     assert!(!landscape.is_same_minimum(start, &far));

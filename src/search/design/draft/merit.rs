@@ -186,7 +186,7 @@ impl<'a> DraftMerit<'a> {
         Some((sum.point.value - self.plan.limit_weight * squares).max(0.0).sqrt())
     }
 
-    /// What aspheric figures promise, by row.
+    /// The gains that aspheric figures promise, by row.
     pub(super) fn asphere_gains(&mut self) -> Option<Vec<(usize, f64)>> {
         let values = self.start();
         let point = self.evaluate(&values)?;

@@ -100,8 +100,8 @@ fn light_cost(
     (gain > 0.0).then_some(gain)
 }
 
-/// What an aspheric figure of each surface without one promises, by row: the predicted decrease of the merit
-/// relative to it by the conic constant or by the coefficient of r⁴, whichever is larger.
+/// The gain that an aspheric figure of each surface without one promises, by row: the predicted decrease of
+/// the merit relative to it by the conic constant or by the coefficient of r⁴, whichever is larger.
 pub(super) fn asphere_gains(
     draft: &LensDraft,
     asked: &LensRequirements,
