@@ -48,7 +48,7 @@ pub use minima::{MinimaCount, count_minima};
 pub use mtf::{TransferCurves, TransferMethod, TransferRow, measure_transfer};
 pub use optimize::{StepCosts, StepRow, measure_step_costs};
 pub use picture::{PictureCurves, PictureRow, PictureWay, measure_picture};
-pub use picture_effects::PictureEffects;
+pub use picture_effects::{EFFECT_TILES, PictureEffects, tile_ms};
 pub use rounding::{Rounding, measure_rounding};
 pub use search::{
     MeritQuantiles, SearchBenchmark, SearchBudget, SearchContender, SearchLength, SearchRow,

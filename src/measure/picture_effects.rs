@@ -10,7 +10,7 @@ use crate::picture::{
 use crate::pupil::RayModel;
 
 /// The tiles on which effects are timed, and the samples of their pixels.
-const EFFECT_TILES: (usize, usize) = (3, 32);
+pub const EFFECT_TILES: (usize, usize) = (3, 32);
 
 /// A picture whose effects are listed.
 #[derive(Debug, Clone, Copy)]
@@ -165,7 +165,10 @@ impl<'a> PictureEffects<'a> {
 }
 
 /// The time of some tiles of a picture and of its preparation, in milliseconds.
-fn tile_ms<'a>(
+///
+/// # Errors
+/// Those of the preparation.
+pub fn tile_ms<'a>(
     build: impl Fn() -> Result<ExactRenderer<'a>, PictureError>,
     seconds: f64,
 ) -> Result<f64, PictureError> {

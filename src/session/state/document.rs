@@ -7,8 +7,8 @@ use crate::math::format_short;
 use crate::picture::{BitDepth, ToneCurve, encode_png};
 use crate::pupil::{RayModel, limited_by_stop};
 use crate::report::{
-    FigureKind, FurtherColumns, PaperKind, ReportSettings, drawing_bytes, has_extension, report_bytes,
-    solids_file, tolerance_sheet, tolerance_table,
+    FigureKind, FurtherColumns, PaperKind, ReportSettings, drawing_bytes, has_extension,
+    report_bytes, solids_file, tolerance_sheet, tolerance_table,
 };
 use crate::session::ScenePicture;
 use crate::session::figures::analysis_figure;
