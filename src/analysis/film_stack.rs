@@ -11,7 +11,7 @@ use std::fmt;
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Vec<ThinFilm>", into = "Vec<ThinFilm>")]
 pub struct FilmStack {
-    films: [ThinFilm; FilmStack::MOST],
+    films: [ThinFilm; Self::MOST],
     count: usize,
 }
 
@@ -108,7 +108,7 @@ mod tests {
         for wrong in ["", "1.38", "0:100", "1.38:-1", "NaN:1", "1.38:1e9", "1.38:1+"] {
             assert!(FilmStack::parse(wrong).is_none(), "{wrong}");
         }
-        let many = vec!["1.4:10"; FilmStack::MOST + 1].join("+");
+        let many = ["1.4:10"; FilmStack::MOST + 1].join("+");
         assert!(FilmStack::parse(&many).is_none());
         assert!(serde_json::from_str::<Coating>(r#"{"layers": []}"#).is_err());
     }

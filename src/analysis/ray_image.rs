@@ -165,10 +165,12 @@ impl LightSums {
         self.cells.iter().copied().fold(0.0, f64::max)
     }
 
-    /// The errors of the circles, and that of the largest density as a share of it.
+    /// The largest error of the circles for each of them, and that of the largest density as a share of it.
     fn errors(&self, before: &Self) -> (Vec<f64>, f64) {
         let change = |(a, b): (&f64, &f64)| CHANGES * (a - b).abs();
-        let circles = self.circles.iter().zip(&before.circles).map(change).collect();
+        // A circle jumps over whole rows of rays: that of one alone may stand still by chance.
+        let circles = self.circles.iter().zip(&before.circles).map(change).fold(0.0, f64::max);
+        let circles = vec![circles; self.circles.len()];
         let peak = self.peak().max(f64::MIN_POSITIVE);
         let cells = self.cells.iter().zip(&before.cells).map(change);
         (circles, cells.fold(0.0, f64::max) / peak)

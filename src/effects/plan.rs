@@ -489,7 +489,8 @@ fn temperature(
 fn absorption(measured: &EffectMeasurements, choice: EffectOverride) -> EffectDecision {
     let share = measured.absorption;
     let unit = "of the light";
-    let decision = lens_decision(Effect::Absorption, choice, share, f64::INFINITY, unit);
+    // No share is above all of the light.
+    let decision = lens_decision(Effect::Absorption, choice, share, 1.0, unit);
     let reason = if share > 0.0 {
         let share = percent(share);
         format!("spots count rays and not their light, of which glasses absorb {share} on the axis")

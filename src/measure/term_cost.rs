@@ -139,8 +139,7 @@ impl Steps {
             Quantity::Curvature => 2.0 * sag(2),
             Quantity::Conic => 8.0 * sag(4) * self.focal_length.powi(3),
             Quantity::Asphere(term) => sag(2 * term as i32 + 4),
-            Quantity::Thickness => length,
-            Quantity::SemiDiameter => length,
+            Quantity::Thickness | Quantity::SemiDiameter => length,
             Quantity::Index | Quantity::Grin(_) | Quantity::Freeform(_) => STEP,
         }
     }

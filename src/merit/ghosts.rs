@@ -72,7 +72,7 @@ struct Ghost {
 }
 
 impl Ghost {
-    /// What its width lacks of the one asked for, relative to that; negative if it is wider.
+    /// The part of the width asked for that it lacks; negative if it is wider.
     fn shortfall<R: Real>(&self, system: &System<R>) -> R {
         let spread = self.spread(system);
         let width = if spread < R::ZERO { -spread } else { spread };

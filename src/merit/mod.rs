@@ -608,9 +608,9 @@ struct PupilRays<'a> {
     traced_pupils: &'a [TracedPupil<'a>],
 }
 
-impl<'a> EvaluationContext<'a> {
+impl EvaluationContext<'_> {
     /// The same with the rays of errors of making.
-    fn with_error_rays(&self) -> EvaluationContext<'a> {
+    fn with_error_rays(&self) -> Self {
         match self.errors {
             Some(PupilRays { sampling, traced_pupils }) => {
                 EvaluationContext { sampling, traced_pupils, ..*self }

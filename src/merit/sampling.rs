@@ -36,13 +36,22 @@ pub struct SpotSampling {
 /// oscillates, and a hundredth of contrast is more than a designer can tell.
 pub(super) const TRANSFER_SCALE: f64 = 5.0;
 
+/// The numbers of wavefronts that terms ask for, each with those before.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
+pub(super) enum WaveDemand {
+    #[default]
+    Nothing,
+    /// The RMS wavefront, and so optical paths.
+    Wavefront,
+    /// The Strehl ratio, which needs more rays.
+    Strehl,
+}
+
 /// The demands of terms on the rays, besides spots.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(super) struct SamplingDemand {
-    /// True if a term asks for wavefronts, and so for optical paths.
-    pub(super) wavefront: bool,
-    /// True if a term asks for the Strehl ratio, which needs more rays.
-    pub(super) strehl: bool,
+    /// The numbers of wavefronts that terms ask for.
+    pub(super) waves: WaveDemand,
     /// The spatial frequencies of terms about contrast, in cycles/mm.
     pub(super) frequencies: Vec<f64>,
     /// True if the rays are for errors of making, in which a lens is not symmetric about its axis.
@@ -52,12 +61,17 @@ pub(super) struct SamplingDemand {
 }
 
 impl SamplingDemand {
+    /// True if a term asks for wavefronts.
+    pub(super) fn has_waves(&self) -> bool {
+        self.waves > WaveDemand::Nothing
+    }
+
     pub(super) fn of_goal(goal: &Goal) -> Self {
         let mut demand = Self::default();
         for weighted in &goal.terms {
             match weighted.term {
-                Term::Wavefront => demand.wavefront = true,
-                Term::Strehl => (demand.wavefront, demand.strehl) = (true, true),
+                Term::Wavefront => demand.waves = demand.waves.max(WaveDemand::Wavefront),
+                Term::Strehl => demand.waves = WaveDemand::Strehl,
                 Term::GeometricMtf { frequency, .. } => demand.frequencies.push(frequency),
                 Term::Mtf { .. } => demand.diffraction = true,
                 _ => {}
@@ -81,7 +95,7 @@ impl SamplingDemand {
         let mut numbers = vec![moments.rms_radius()];
         if let Some(form) = reference {
             numbers.push(rms_without_tilt(region, nodes, form).unwrap_or(0.0));
-            if self.strehl {
+            if self.waves == WaveDemand::Strehl {
                 numbers.push(brightest_strehl(region, nodes, form).unwrap_or(0.0));
             }
         }
@@ -94,7 +108,7 @@ impl SamplingDemand {
     /// The scales of [`SamplingDemand::numbers`]: lengths and waves are relative, a Strehl
     /// ratio and a transfer are not.
     fn scales(&self, numbers: &[f64]) -> Vec<f64> {
-        let relative = 1 + usize::from(self.wavefront);
+        let relative = 1 + usize::from(self.has_waves());
         let scale = |(i, value): (usize, &f64)| if i < relative { *value } else { TRANSFER_SCALE };
         numbers.iter().enumerate().map(scale).collect()
     }
@@ -269,7 +283,7 @@ impl RaySampling {
         let (fixed_launch, cosine) = (launch.to_fixed(), launch.axis_cosine());
         let ideal_area = PI * launch.area();
         let region = Region::new(launch);
-        let asked = self.demand.wavefront;
+        let asked = self.demand.has_waves();
         let reference = asked.then(|| ReferenceForm::of_region(&region).ok()).flatten();
         let accuracy = Accuracy { tolerance, ..Accuracy::default() };
         let numbers = |nodes: &Nodes| self.demand.numbers(&region, nodes, reference);
@@ -431,7 +445,7 @@ impl RaySampling {
                 };
                 let mine = self.pupils.iter().zip(traced).filter(is_same);
                 mine.for_each(|(pupil, traced)| {
-                    channel.add_pupil(traced, pupil.share, self.demand.wavefront);
+                    channel.add_pupil(traced, pupil.share, self.demand.has_waves());
                 });
                 channel.ends.push(channel.weights.len());
             }

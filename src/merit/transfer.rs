@@ -12,7 +12,7 @@ use crate::lens::TermScope;
 use nalgebra::DVector;
 use rayon::prelude::*;
 
-/// What is asked of the transfer.
+/// The transfer that is asked for.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct TransferAsked {
     /// The spatial frequency, in cycles/mm.
@@ -90,7 +90,7 @@ fn modulation_slope(
     slopes.into_iter().fold(zero, |total, slope| total + slope)
 }
 
-/// What the derivatives of some pupils need.
+/// The numbers that the derivatives of some pupils need.
 fn slopes_of<'t, 'a>(
     pupils: &[&'t PupilPart<'a>],
 ) -> Result<Vec<TransferSlopes<'t, 'a>>, MeritError> {

@@ -479,9 +479,9 @@ mod tests {
         assert!((mean - 2.5).abs() < 1e-15 && (error - (5.0_f64 / 12.0).sqrt()).abs() < 1e-15);
     }
 
-    /// Tiles of other sizes have the same bits.
+    /// Tiles of other sizes have the same values but for rounding: other rays share the lanes of a processor.
     #[test]
-    fn a_pixel_does_not_depend_on_its_tile() {
+    fn a_pixel_depends_on_its_tile_by_rounding_alone() {
         let lens = crate::files::open(std::path::Path::new("lenses/double_gauss_rudolph_50.json"));
         let coloring = crate::picture::Coloring::Rgb(3);
         let (model, bands) =
@@ -503,7 +503,10 @@ mod tests {
             for i in 0..(16 / side) * (16 / side) {
                 let [x, y] = [i % (16 / side), i / (16 / side)].map(|v| v * side);
                 for part in sampled(16 + x..16 + x + side, y..y + side) {
-                    assert!(whole.contains(&part), "{part:?}");
+                    let (_, same) = whole.iter().find(|(pixel, _)| *pixel == part.0).unwrap();
+                    for (one, other) in part.1.iter().zip(same) {
+                        assert!((one - other).abs() <= 4.0 * f64::EPSILON * other, "{part:?}");
+                    }
                 }
             }
         }

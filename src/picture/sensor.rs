@@ -177,13 +177,19 @@ impl SensorModel {
     /// The digital number of a pixel for a mean number of photons and of dark electrons, drawn from a
     /// generator.
     pub fn number(&self, photons: f64, dark: f64, random: &mut SplitMix64) -> u16 {
+        self.read(photons, dark, random).0
+    }
+
+    /// The same, with true if the pixel is full or its number the largest.
+    fn read(&self, photons: f64, dark: f64, random: &mut SplitMix64) -> (u16, bool) {
         let mean = self.quantum_efficiency * photons.max(0.0) + dark;
         // The law does not exist for no electrons, nor for so many that their noise is nothing.
         let electrons = Poisson::new(mean).map_or(mean, |law| law.sample(random));
         let noise: f64 = StandardNormal.sample(random);
         let read = electrons.min(self.full_well) + self.read_noise * noise;
         let number = (self.gain * read + self.black_level + 0.5).floor();
-        number.clamp(0.0, self.largest()) as u16
+        let is_full = electrons >= self.full_well || number >= self.largest();
+        (number.clamp(0.0, self.largest()) as u16, is_full)
     }
 
     /// The signal-to-noise ratio for a mean number of photons and of dark electrons by the linear model:
@@ -210,14 +216,14 @@ impl SensorModel {
         let pixel = |(i, value): (usize, &Radiance)| {
             let color = |c: usize| {
                 let mut random = generator(exposure.seed, 3 * i + c);
-                self.number(photons(value[c]), dark, &mut random)
+                self.read(photons(value[c]), dark, &mut random)
             };
             [color(0), color(1), color(2)]
         };
-        let numbers: Vec<[u16; 3]> = picture.values.iter().enumerate().map(pixel).collect();
-        let full = (self.gain * self.full_well + self.black_level).min(self.largest()).floor();
-        let saturated =
-            numbers.iter().flatten().filter(|number| f64::from(**number) >= full).count();
+        let read: Vec<[(u16, bool); 3]> = picture.values.iter().enumerate().map(pixel).collect();
+        let saturated = read.iter().flatten().filter(|(_, is_full)| *is_full).count();
+        let numbers: Vec<[u16; 3]> =
+            read.iter().map(|pixel| pixel.map(|(number, _)| number)).collect();
         SensorImage {
             white: self.gain * self.quantum_efficiency * photons(picture.white),
             black: self.black_level,

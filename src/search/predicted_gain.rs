@@ -1,4 +1,4 @@
-//! What further variables take from a sum of squares, predicted from its normal equations.
+//! The gain of further variables in a sum of squares, predicted from its normal equations.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 

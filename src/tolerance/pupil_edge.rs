@@ -106,14 +106,30 @@ impl FieldEdge {
             near.number_effect(axis, numbers[m], &mut rows[0]);
             far.number_effect(axis, numbers[m], &mut rows[1]);
             let [at_near, at_far] = reference.means[m][axis];
-            for k in 0..count {
-                let by = [rows[0][k] - at_near, rows[1][k] - at_far];
+            for (k, (near, far)) in rows[0].iter().zip(&rows[1]).enumerate() {
+                let by = [near - at_near, far - at_far];
                 edge.displacement[(axis * count + k, m)] = by[0];
                 edge.bend[(axis * count + k, m)] = (by[1] - by[0]) / reference.distance;
             }
         }
         let is_finite = edge.offsets.iter().chain(edge.bend.iter()).all(|value| value.is_finite());
         is_finite.then_some(edge)
+    }
+
+    /// Sets the motion of some rays by the numbers of a part from the slopes of their margins, times a weight.
+    fn set_motion(
+        &mut self,
+        rays: Range<usize>,
+        weight: f64,
+        part: &[usize],
+        slopes: &[[f64; LANES]],
+    ) {
+        for k in rays {
+            let factor = weight * self.rays[k].by_margin;
+            for (number, slope) in part.iter().zip(&slopes[k]) {
+                self.motion[(k, *number)] = factor * slope;
+            }
+        }
     }
 
     /// The products of x and of y of each ray with those of other numbers of it, summed.
@@ -150,12 +166,7 @@ pub(super) fn set_motions(
             let (edge, own) = (&mut edges[field], &pupils.fields[field]);
             for (colour, pupil) in own.colours.iter().enumerate() {
                 let weight = folded[field].weight * pupil.share / pupil.area;
-                for k in edge.colours[colour].clone() {
-                    let factor = weight * edge.rays[k].by_margin;
-                    for (number, slope) in part.iter().zip(&slopes[k]) {
-                        edge.motion[(k, *number)] = factor * slope;
-                    }
-                }
+                edge.set_motion(edge.colours[colour].clone(), weight, part, &slopes);
             }
         }
     }

@@ -31,6 +31,9 @@ pub struct PupilFunction {
     order: usize,
 }
 
+/// An arc of an edge: its points, true at a corner, and 1 around light or −1 around a shadow.
+type SignedArc = (Vec<[f64; 2]>, bool, f64);
+
 /// A piece of a pupil.
 #[derive(Debug, Clone)]
 struct PupilPiece {
@@ -256,10 +259,10 @@ impl PupilFunction {
     pub(super) fn of_fit(
         (polynomial, energy): (WavePolynomial, f64),
         wavelength: f64,
-        (arcs, steps): (impl Iterator<Item = (Vec<[f64; 2]>, bool, f64)>, ArcSteps),
+        (arcs, steps): (impl Iterator<Item = SignedArc>, ArcSteps),
     ) -> Self {
         let (light, shadow): (Vec<_>, Vec<_>) = arcs.partition(|(.., sign)| *sign > 0.0);
-        let piece = |(arcs, sign): (Vec<(Vec<[f64; 2]>, bool, f64)>, f64)| {
+        let piece = |(arcs, sign): (Vec<SignedArc>, f64)| {
             let arcs: Vec<_> = arcs.into_iter().map(|(nodes, corner, _)| (nodes, corner)).collect();
             PupilPiece::new(PupilCurve::in_steps(&arcs, steps), sign)
         };

@@ -174,7 +174,7 @@ impl<'a> RayTransfer<'a> {
         [cos, sin]
     }
 
-    /// What its derivatives need.
+    /// The numbers that its derivatives need.
     ///
     /// # Errors
     /// The rays do not tell the polynomials.

@@ -33,8 +33,7 @@ pub(super) struct MeasureMtfArgs {
     #[arg(long, value_name = "N", default_value_t = 0)]
     zoom: usize,
 
-    /// A Python that has Optiland: its FFTMTF and GeometricMTF of the same lens are timed and compared in the
-    /// same run
+    /// A Python that has Optiland: its two contrasts of the same lens are timed and compared in the same run
     #[arg(long, value_name = "PYTHON")]
     optiland: Option<PathBuf>,
 

@@ -33,7 +33,7 @@ pub(super) struct OptilandRow {
     pub(super) ms: f64,
 }
 
-/// What Optiland found.
+/// The results of Optiland.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct OptilandCurves {
     pub(super) version: String,

@@ -214,7 +214,7 @@ impl PictureArgs {
         let mut renderer = renderer.with_diffraction(model, bands, split.allowed())?;
         split.note(DIFFRACTION, renderer.diffraction().map_or(0.0, |found| found.error(1.0)));
         let is_spread = renderer.diffraction().is_some_and(|found| found.on);
-        if !is_spread && let Some(change) = self.blur_change(shot, scene, split.allowed())? {
+        if !is_spread && let Some(change) = Self::blur_change(shot, scene, split.allowed())? {
             split.share_with(BLUR);
             split.note(BLUR, change);
             renderer = renderer.without_blur(model, bands);
@@ -233,7 +233,6 @@ impl PictureArgs {
 
     /// The change of some tiles if all light of a point follows one ray, if that is small enough to leave out blur.
     fn blur_change(
-        &self,
         shot: &CameraShot,
         scene: &Scene,
         allowed: f64,

@@ -110,6 +110,12 @@ impl SearchReport {
         let finished = searched
             .finished
             .map(|finished| FinishedReport { failures: finished.failures(), finished });
+        let merit_best = landscape.loss(searched.best);
+        let mut reservoir: Vec<ReservoirRow> = run.found_points().into_iter().map(row).collect();
+        if let Some(best) = reservoir.first_mut() {
+            // It was moved to where limits hold.
+            best.merit = best.merit.min(merit_best);
+        }
         Self {
             ended,
             resumed,
@@ -126,11 +132,11 @@ impl SearchReport {
             rays_of_a_gradient: landscape.rays_per_gradient(searched.best),
             temperature: run.temperature().value(),
             merit_start: run.start().loss,
-            merit_best: landscape.loss(searched.best),
+            merit_best,
             start_breaks: ViolatedLimit::all(searched.start_breaks),
             compared: searched.compared,
             figures_ms: searched.compared_ms,
-            reservoir: run.found_points().into_iter().map(row).collect(),
+            reservoir,
             mutations: mutations.collect(),
             effects: searched.effects,
             ended_by: statistics.ended.clone(),

@@ -243,9 +243,11 @@ impl LimitedOptimizer {
     }
 
     /// Goes to a lens. Further trials track the pupils from there: an edge that has changed since the
-    /// rays were found would be searched for at every one.
+    /// rays were found would be searched for at every one. Where a field was dark light is looked for everywhere.
     fn accept(&mut self, values: Vec<f64>, point: LimitedPoint, found: LimitedSum) {
-        self.state.merit.follow_pupils(found.pupils);
+        if self.state.merit.has_light() {
+            self.state.merit.follow_pupils(found.pupils);
+        }
         self.state.values = values;
         self.state.value = point.objective.value;
         self.state.current = self.state.merit.lens(&self.state.values);

@@ -76,11 +76,11 @@ impl Region<'_> {
         let mut total = SystemGradient::zero(channel.tracer.surfaces());
         for (arc, weights) in arcs.iter().zip(weights) {
             let PupilLimit::Surface(surface, limit) = arc.limit else { continue };
-            let start = |((p, sweep), weight): ((&[f64; 2], &([f64; 2], f64)), &f64)| {
-                Some((self.launch.ray(*p)?, self.launch.dual_ray(*p)?, *sweep, *weight))
+            let start = |k: usize| {
+                let p = arc.points[k];
+                Some((self.launch.ray(p)?, self.launch.dual_ray(p)?, arc.sweep[k], weights[k]))
             };
-            let points = arc.points.iter().zip(&arc.sweep).zip(weights);
-            let ends: Vec<_> = points.filter_map(start).collect();
+            let ends: Vec<_> = (0..arc.points.len()).filter_map(start).collect();
             let dual: Rays<Dual2> = ends.iter().map(|(_, ray, ..)| *ray).collect();
             let margins = channel.unclipped.margins_at(&dual, surface, limit);
             let (mut rays, mut by_margin) = (Rays::default(), Vec::new());

@@ -136,10 +136,21 @@ impl<P: Clone + PartialEq> Reservoir<P> {
         let is_near = |old: &ReservoirEntry<P>| {
             old.topology == entry.topology && is_same(&old.point, &entry.point)
         };
-        if let Some(same) = self.entries.iter_mut().find(|old| is_near(old)) {
-            return replace_if_better(same, entry, OfferOutcome::RejectedSameTopology);
+        let near: Vec<usize> =
+            (0..self.entries.len()).filter(|i| is_near(&self.entries[*i])).collect();
+        let Some(best) =
+            near.iter().copied().min_by(|i, k| self.entries[*i].rank(&self.entries[*k]))
+        else {
+            return self.take_place(entry);
+        };
+        let (number, outcome) = (entry.number, OfferOutcome::RejectedSameTopology);
+        let outcome = replace_if_better(&mut self.entries[best], entry, outcome);
+        if self.entries[best].number == number {
+            // A point between two minima that seemed different shows that they are one.
+            let mut place = 0..;
+            self.entries.retain(|_| place.next().is_some_and(|i| i == best || !near.contains(&i)));
         }
-        self.take_place(entry)
+        outcome
     }
 
     /// Offers a point. With one point per topology it replaces the one of the same topology if it

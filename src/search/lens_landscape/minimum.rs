@@ -1,5 +1,5 @@
-//! When two lenses lie at the same minimum: their curvatures and powers have the same signs, their glasses
-//! are alike, and they are near in the metric of the residuals, `d² = dxᵀ Jᵀ J dx / F`, which predicts the
+//! The comparison of minima. Two lenses lie at the same one if their curvatures and powers have the same
+//! signs, their glasses are alike, and they are near in the metric of the residuals, `d² = dxᵀ Jᵀ J dx / F`, which predicts the
 //! relative change of the merit between them. Near a distance of 1 the merit between them decides: a hill
 //! above both means two minima (hill-valley test; Maree et al., GECCO 2018).
 

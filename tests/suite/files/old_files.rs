@@ -69,14 +69,14 @@ fn an_old_checkpoint_is_resumed() {
     let base = ["search", lens, "--rules", rules, "--checkpoint", checkpoint.path()];
     let idle = done_json(&[&base[..], &["--iterations", "12"]].concat(), "");
     assert_eq!((&idle["resumed"], &idle["gradients_in_all"]), (&true.into(), &12.into()));
-    // The best lens is judged anew by the rays of this version, which fill the real stop: within the errors
-    // that its terms state.
+    // The best lens is judged anew by the rays of this version, and moved to where its limits hold: it has lost
+    // nothing beyond the errors that its terms state.
     let best = idle["merit_best"].as_f64().unwrap();
     let number = |value: &Value| value.as_f64().unwrap();
     let stated = |term: &Value| number(&term["weight"]) * number(&term["after"]["error"]);
     let error: f64 = idle["terms"].as_array().unwrap().iter().map(stated).sum();
-    let change = (best - 0.024163391142644257).abs();
-    assert!(change < error && change < 1e-3 * best, "{best} ± {error}");
+    assert!(best < 0.024163391142644257 + error && error < 2e-2 * best, "{best} ± {error}");
+    assert_eq!(idle["best_breaks"], json!([]));
     let refused = |report: &Value, kind: &str| {
         let rows = report["mutations"].as_array().unwrap();
         rows.iter().find(|row| row["kind"] == kind).unwrap()["refused"].clone()

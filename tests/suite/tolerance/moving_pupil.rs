@@ -13,7 +13,7 @@ use aplanat::tolerance::{
 /// A lens at its primary wavelength, with a stop of fixed size and fields on both sides, one of which
 /// weighs little, so that errors across the axis have first derivatives.
 fn lens(name: &str, field: f64) -> Lens {
-    let mut lens = aplanat::files::open(&format!("lenses/{name}.json")).unwrap().lens;
+    let mut lens = aplanat::files::open(format!("lenses/{name}.json")).unwrap().lens;
     let radius = RayModel::from_lens(&lens, 0).unwrap().stop_radius();
     lens.aperture = Aperture::StopSemiDiameter(radius);
     let primary = lens.primary();
