@@ -504,9 +504,9 @@ mod tests {
                 let [x, y] = [i % (16 / side), i / (16 / side)].map(|v| v * side);
                 for part in sampled(16 + x..16 + x + side, y..y + side) {
                     let (_, same) = whole.iter().find(|(pixel, _)| *pixel == part.0).unwrap();
-                    for (one, other) in part.1.iter().zip(same) {
-                        assert!((one - other).abs() <= 4.0 * f64::EPSILON * other, "{part:?}");
-                    }
+                    let mut pairs = part.1.iter().zip(same);
+                    let is_near = |(a, b): (&f64, &f64)| (a - b).abs() <= 4.0 * f64::EPSILON * b;
+                    assert!(pairs.all(is_near), "{part:?}");
                 }
             }
         }
