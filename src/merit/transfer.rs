@@ -2,7 +2,7 @@
 //!
 //! The transfer of a field is the sum of the complex transfers of its wavelengths by weight, with phases about one
 //! image point; with `O = |O| exp(iθ)` the derivative of its modulus is `Re(exp(−iθ) dO)`, which the
-//! [derivative of each pupil's transfer](crate::analysis::RayTransfer::gradient) gives by one trace back.
+//! [derivative of each pupil's transfer](crate::analysis::TransferSlopes::gradient) gives by one trace back.
 
 use super::scoped_part::ScopedPart;
 use super::sum::{DerivativeLevel, SumOfSquares};

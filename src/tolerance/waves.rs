@@ -83,7 +83,8 @@ impl WavefrontModel {
     /// refocused for its own least variance, other compensators at rest.
     ///
     /// # Errors
-    /// Those of [`RealMerit::new`].
+    /// Correlations that no errors can have, an error of making that is not possible, and
+    /// [`ToleranceError::Stopped`] if there is no lens yet.
     pub fn real_lenses(
         &self,
         scene: &ToleranceScene,
