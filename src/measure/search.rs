@@ -248,7 +248,7 @@ impl SearchLength {
     fn passed(self, watch: Stopwatch, run: &SearchRunOn<LensLandscape>) -> f64 {
         match self {
             Self::Seconds(_) => watch.seconds(),
-            Self::Gradients(_) => run.statistics().gradients as f64,
+            Self::Gradients(_) => all_gradients(run) as f64,
         }
     }
 }
@@ -285,5 +285,10 @@ fn run_seed(
     for (merits, lens) in found.iter_mut().zip(&best) {
         merits.push(merit_of(&landscape, lens).unwrap_or(f64::INFINITY));
     }
-    Ok(run.statistics().gradients)
+    Ok(all_gradients(&run))
+}
+
+/// The gradients of a run, those that moved its retained lenses to where the limits hold included.
+fn all_gradients(run: &SearchRunOn<LensLandscape>) -> u64 {
+    run.statistics().gradients + run.statistics().gradients_beside
 }

@@ -23,4 +23,4 @@ pub use drag::{
 pub use first_order::{Beam, FirstOrder, ParaxialError, ParaxialPupil, first_order};
 pub use parametric::{ParametricLens, ParametricRay, free_parameters};
 pub use ray::{ParaxialRay, paraxial_ray, signed_indices};
-pub use seidel::{Seidel, SeidelSums, seidel};
+pub use seidel::{SEIDEL_SUM_NAMES, Seidel, SeidelSums, seidel};

@@ -33,10 +33,25 @@ pub struct SeidelSums<R> {
     pub c2: R,
 }
 
+/// The symbol and the meaning of each sum, in the order of [`SeidelSums::to_array`].
+pub const SEIDEL_SUM_NAMES: [(&str, &str); 7] = [
+    ("S1", "spherical aberration"),
+    ("S2", "coma"),
+    ("S3", "astigmatism"),
+    ("S4", "Petzval"),
+    ("S5", "distortion"),
+    ("C1", "axial colour"),
+    ("C2", "lateral colour"),
+];
+
 impl<R: Real> SeidelSums<R> {
+    /// S1 to S5, C1 and C2.
+    pub const fn to_array(&self) -> [R; 7] {
+        [self.s1, self.s2, self.s3, self.s4, self.s5, self.c1, self.c2]
+    }
+
     fn is_finite(&self) -> bool {
-        let Self { s1, s2, s3, s4, s5, c1, c2 } = *self;
-        [s1, s2, s3, s4, s5, c1, c2].into_iter().all(|sum| sum.value().is_finite())
+        self.to_array().into_iter().all(|sum| sum.value().is_finite())
     }
 
     fn plus(self, o: &Self) -> Self {

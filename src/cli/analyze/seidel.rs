@@ -6,7 +6,7 @@ use crate::cli::error::CliError;
 use crate::cli::output::ShortNumber;
 use crate::lens::{FieldPoint, SurfaceNumber};
 use crate::measure::time_ms;
-use crate::paraxial::SeidelSums;
+use crate::paraxial::{SEIDEL_SUM_NAMES, SeidelSums};
 use crate::plot::{ChartCurve, CurveChart};
 use serde::Serialize;
 
@@ -29,23 +29,6 @@ struct SurfaceSumsJson {
     sums: SeidelSums<f64>,
 }
 
-/// The names of the sums.
-const SUMS: [&str; 7] = ["S1", "S2", "S3", "S4", "S5", "C1", "C2"];
-/// The meanings of the sums, as titles of charts.
-const TITLES: [&str; 7] = [
-    "S1 spherical aberration",
-    "S2 coma",
-    "S3 astigmatism",
-    "S4 Petzval",
-    "S5 distortion",
-    "C1 axial colour",
-    "C2 lateral colour",
-];
-
-const fn row(sums: &SeidelSums<f64>) -> [f64; 7] {
-    [sums.s1, sums.s2, sums.s3, sums.s4, sums.s5, sums.c1, sums.c2]
-}
-
 /// The sums of a lens.
 ///
 /// # Errors
@@ -61,7 +44,8 @@ pub(super) fn sums(run: &AnalysisRun) -> Result<Vec<AtField<SeidelJson>>, CliErr
         let text = format!("{}: no third-order sums: {why}", run.opened.file);
         return Err(CliError::Input(text));
     };
-    let largest = seidel.surfaces.iter().flat_map(row).map(f64::abs).fold(0.0, f64::max);
+    let largest =
+        seidel.surfaces.iter().flat_map(SeidelSums::to_array).map(f64::abs).fold(0.0, f64::max);
     let surface =
         |(surface, sums): (usize, &SeidelSums<f64>)| SurfaceSumsJson { surface, sums: *sums };
     let found = SeidelJson {
@@ -83,10 +67,11 @@ impl TextLines for SeidelJson {
 
     fn lines(&self) -> Vec<String> {
         let cells = |first: &str, sums: &SeidelSums<f64>| {
-            let numbers = row(sums).map(|v| format!("{:>14}", ShortNumber(v + 0.0).to_string()));
+            let numbers =
+                sums.to_array().map(|v| format!("{:>14}", ShortNumber(v + 0.0).to_string()));
             format!("{first:>7}{}", numbers.concat())
         };
-        let heads = SUMS.map(|name| format!("{name:>14}")).concat();
+        let heads = SEIDEL_SUM_NAMES.map(|(symbol, _)| format!("{symbol:>14}")).concat();
         let mut lines = vec![
             format!("exact but for rounding ({:.0e} mm), {:.3} ms", self.error, self.milliseconds),
             format!("{:>7}{heads}", "surface"),
@@ -99,16 +84,16 @@ impl TextLines for SeidelJson {
 
     /// Bars over the surfaces, the sum behind them.
     fn charts(&self) -> Vec<CurveChart> {
-        let chart = |(k, title): (usize, &&str)| {
-            let bar = |s: &SurfaceSumsJson| [(s.surface + 1) as f64, 1e3 * row(&s.sums)[k]];
+        let chart = |(k, (symbol, meaning)): (usize, &(&str, &str))| {
+            let bar = |s: &SurfaceSumsJson| [(s.surface + 1) as f64, 1e3 * s.sums.to_array()[k]];
             let bars: Vec<[f64; 2]> = self.surfaces.iter().map(bar).collect();
-            let sum = [[(self.surfaces.len() + 1) as f64, 1e3 * row(&self.total)[k]]];
+            let sum = [[(self.surfaces.len() + 1) as f64, 1e3 * self.total.to_array()[k]]];
             let curves = vec![
                 ChartCurve::bars("surface", 0, &bars, 0.0),
                 ChartCurve::bars("sum", 1, &sum, 0.0),
             ];
-            CurveChart::new(*title, ["surface", "um"], curves)
+            CurveChart::new(format!("{symbol} {meaning}"), ["surface", "um"], curves)
         };
-        TITLES.iter().enumerate().map(chart).collect()
+        SEIDEL_SUM_NAMES.iter().enumerate().map(chart).collect()
     }
 }

@@ -161,11 +161,10 @@ const LARGEST_PLAIN_SUM: f64 = 1e5;
 
 /// A row of the table of Seidel sums.
 fn seidel_row(name: String, sums: &SeidelSums<f64>) -> impl Iterator<Item = String> {
-    let SeidelSums { s1, s2, s3, s4, s5, c1, c2 } = *sums;
     let cell = |sum: f64| {
         if sum.abs() < LARGEST_PLAIN_SUM { format!("{sum:.6}") } else { format!("{sum:.5e}") }
     };
-    let cells = [s1, s2, s3, s4, s5, c1, c2].map(cell);
+    let cells = sums.to_array().map(cell);
     std::iter::once(name).chain(cells)
 }
 

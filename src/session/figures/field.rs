@@ -2,7 +2,7 @@
 
 use super::{Subject, ms_text};
 use crate::analysis::{FieldCurvePoint, GridPoint, LongitudinalAberration};
-use crate::paraxial::SeidelSums;
+use crate::paraxial::{SEIDEL_SUM_NAMES, SeidelSums};
 use crate::plot::{ChartCurve, CurveChart};
 use crate::report::{AnalysisFigure, CurveColors, note_number};
 
@@ -171,21 +171,6 @@ fn grid_tables(points: &[GridPoint]) -> Vec<CurveChart> {
     vec![CurveChart::map("points, row by row from below", ["x, mm", "y, mm"], curves)]
 }
 
-/// The names of the third-order sums.
-pub(super) const SUMS: [&str; 7] = [
-    "S1 spherical aberration",
-    "S2 coma",
-    "S3 astigmatism",
-    "S4 Petzval",
-    "S5 distortion",
-    "C1 axial colour",
-    "C2 lateral colour",
-];
-
-const fn sums_of(sums: &SeidelSums<f64>) -> [f64; 7] {
-    [sums.s1, sums.s2, sums.s3, sums.s4, sums.s5, sums.c1, sums.c2]
-}
-
 /// The third-order sums as bars over the surfaces, the whole lens last, in micrometres.
 pub(super) fn seidel(subject: &Subject<'_>) -> Result<AnalysisFigure, String> {
     let found = &subject.numbers.seidel;
@@ -193,15 +178,15 @@ pub(super) fn seidel(subject: &Subject<'_>) -> Result<AnalysisFigure, String> {
         return Err("the lens has no third-order sums".to_owned());
     };
     let count = seidel.surfaces.len();
-    let chart = |(k, name): (usize, &&str)| {
-        let bar = |(i, sums): (usize, &SeidelSums<f64>)| [(i + 1) as f64, 1e3 * sums_of(sums)[k]];
+    let chart = |(k, (symbol, meaning)): (usize, &(&str, &str))| {
+        let bar = |(i, sums): (usize, &SeidelSums<f64>)| [(i + 1) as f64, 1e3 * sums.to_array()[k]];
         let bars: Vec<[f64; 2]> = seidel.surfaces.iter().enumerate().map(bar).collect();
-        let sum = [[(count + 1) as f64, 1e3 * sums_of(&seidel.total)[k]]];
+        let sum = [[(count + 1) as f64, 1e3 * seidel.total.to_array()[k]]];
         let curves =
             vec![ChartCurve::bars("surface", 0, &bars, 0.0), ChartCurve::bars("sum", 1, &sum, 0.0)];
-        CurveChart::new(format!("{name}, µm"), ["surface", "µm"], curves)
+        CurveChart::new(format!("{symbol} {meaning}, µm"), ["surface", "µm"], curves)
     };
-    let charts: Vec<CurveChart> = SUMS.iter().enumerate().map(chart).collect();
+    let charts: Vec<CurveChart> = SEIDEL_SUM_NAMES.iter().enumerate().map(chart).collect();
     let tables = charts.iter().map(without_floors).collect();
     let about = "third-order wave aberrations at the edge of pupil and field, after Welford";
     Ok(AnalysisFigure {

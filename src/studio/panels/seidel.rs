@@ -5,7 +5,7 @@ use egui::{Align, Color32, Grid, Layout as Arrange, RichText, ScrollArea, Ui, Ve
 use super::figure_view::{ChartForm, export_menu, notes, titled_chart};
 use super::{Panel, displayed_results, show_missing_results};
 use crate::lens::Lens;
-use crate::paraxial::{Seidel, SeidelSums};
+use crate::paraxial::{SEIDEL_SUM_NAMES, Seidel, SeidelSums};
 use crate::report::{AnalysisFigure, FigureKind};
 use crate::session::{SessionView, analysis_figure};
 use crate::studio::actions::Actions;
@@ -102,33 +102,19 @@ const GAP: f32 = 6.0;
 /// The width of the column of surfaces.
 const SURFACE: f32 = 48.0;
 
-/// The columns of the sums with their explanations.
-const SUMS: [(&str, &str); 7] = [
-    ("S1", "Spherical aberration"),
-    ("S2", "Coma"),
-    ("S3", "Astigmatism"),
-    ("S4", "Petzval curvature"),
-    ("S5", "Distortion"),
-    ("C1", "Axial colour between the outer wavelengths"),
-    ("C2", "Lateral colour between the outer wavelengths"),
-];
-
-const fn row_of(sums: &SeidelSums<f64>) -> [f64; 7] {
-    [sums.s1, sums.s2, sums.s3, sums.s4, sums.s5, sums.c1, sums.c2]
-}
-
 fn sums(ui: &mut Ui, lens: &Lens, seidel: &Seidel<f64>) {
     ui.label(RichText::new("Seidel sums, µm").strong()).on_hover_text(
         "Third-order wave aberrations at the edge of pupil and field, surface by surface \
          (Welford's S1 to S5, C1, C2); the tint shows where they come from",
     );
     ui.spacing_mut().interact_size.y = ROW;
-    let width = ((ui.available_width() - SURFACE) / SUMS.len() as f32 - GAP).clamp(34.0, 80.0);
+    let width =
+        ((ui.available_width() - SURFACE) / SEIDEL_SUM_NAMES.len() as f32 - GAP).clamp(34.0, 80.0);
     let cell = vec2(width, ROW);
     Grid::new("seidel").num_columns(8).spacing([GAP, 2.0]).striped(true).show(ui, |ui| {
         ui.weak("Surf");
-        for (name, meaning) in SUMS {
-            right(ui, cell, |ui| drop(ui.weak(name).on_hover_text(meaning)));
+        for (symbol, meaning) in SEIDEL_SUM_NAMES {
+            right(ui, cell, |ui| drop(ui.weak(symbol).on_hover_text(meaning)));
         }
         ui.end_row();
         for (i, sums) in seidel.surfaces.iter().enumerate() {
@@ -145,7 +131,7 @@ fn sums(ui: &mut Ui, lens: &Lens, seidel: &Seidel<f64>) {
 fn largest(seidel: &Seidel<f64>) -> [f64; 7] {
     let mut most = [0.0_f64; 7];
     for sums in &seidel.surfaces {
-        for (most, value) in most.iter_mut().zip(row_of(sums)) {
+        for (most, value) in most.iter_mut().zip(sums.to_array()) {
             *most = most.max(value.abs());
         }
     }
@@ -153,7 +139,7 @@ fn largest(seidel: &Seidel<f64>) -> [f64; 7] {
 }
 
 fn numbers(ui: &mut Ui, cell: Vec2, sums: &SeidelSums<f64>, largest: &[f64; 7]) {
-    for (value, largest) in row_of(sums).into_iter().zip(largest) {
+    for (value, largest) in sums.to_array().into_iter().zip(largest) {
         let share = if *largest > 0.0 { value / largest } else { 0.0 };
         right(ui, cell, |ui| {
             let text = RichText::new(fixed(1e3 * value)).small();
