@@ -5,6 +5,9 @@ use super::plan::{BeamLook, BlockBeam, BlockPlan, PlanSource};
 use super::sums::lattice_size;
 use crate::picture::device::PackedPicture;
 
+/// The words of a view of a painting.
+const LOOK_WORDS: usize = 24;
+
 impl PlanSource<'_> {
     /// All that a device needs for a picture of these blocks with their plans, whose groups work on so many points.
     pub(super) fn pack(
@@ -53,24 +56,26 @@ impl PlanSource<'_> {
     }
 
     fn pack_beams(&self, plan: &BlockPlan, offsets: &[usize], packed: &mut PackedPicture<'_>) {
-        let before = (packed.looks.len() / 24) as u32;
+        // Views are packed in the order of beams, which is not that of the plan: beams are sorted by their steps.
+        let count = |packed: &PackedPicture<'_>| (packed.looks.len() / LOOK_WORDS) as u32;
         for beam in &plan.beams {
-            packed.beams.extend(beam.weight.map(f32::to_bits));
-            packed.beams.extend(beam.looks.map(|look| before + look as u32));
+            let first = count(packed);
             for look in &plan.looks[beam.looks[0]..beam.looks[1]] {
                 packed.looks.extend(self.look_words(beam, look, offsets[look.plane]));
             }
+            packed.beams.extend(beam.weight.map(f32::to_bits));
+            packed.beams.extend([first, count(packed)]);
         }
     }
 
-    fn look_words(&self, beam: &BlockBeam, look: &BeamLook, offset: usize) -> [u32; 24] {
+    fn look_words(&self, beam: &BlockBeam, look: &BeamLook, offset: usize) -> [u32; LOOK_WORDS] {
         let texture = &self.planes[look.plane].texture;
         let level = |level: usize| {
             let [width, height] = texture.levels[level].size.map(|v| v as u32);
             [(offset + texture.first(beam.color, level)) as u32, width, height]
         };
         let coarse = (look.level + 1).min(texture.levels.len() - 1);
-        let mut words = [0; 24];
+        let mut words = [0; LOOK_WORDS];
         let numbers = look.place.iter().flatten().chain(&look.tap).chain([&look.coarser]);
         words.iter_mut().zip(numbers).for_each(|(word, v)| *word = v.to_bits());
         words[15] = look.taps as u32;
@@ -108,5 +113,42 @@ fn pack_lattices(
 fn share(points: usize, owner: usize, group: usize, shares: &mut Vec<u32>) {
     for first in (0..points).step_by(group) {
         shares.extend([owner as u32, first as u32]);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::QuickRenderer;
+    use super::super::blocks::blocks;
+    use super::*;
+    use crate::files;
+    use crate::picture::{
+        BuiltInScene, Coloring, ExactRenderer, ImageFrame, field_diagonal, picture_model,
+    };
+
+    /// The beams of a plan are sorted by the spacing of their lattices, their views are in the order of windows.
+    #[test]
+    fn a_beam_keeps_its_own_views_in_any_order_of_beams() {
+        let bundled = files::bundled_lenses().iter().find(|lens| lens.name == "achromat_ac254_100");
+        let bundled = bundled.unwrap();
+        let lens = files::parse(bundled.text.as_bytes(), bundled.name).unwrap().lens;
+        let (model, bands) = picture_model(&lens, 0, Coloring::Rgb(1)).unwrap();
+        let frame = ImageFrame::new(&model, [64, 48], field_diagonal(&model).unwrap()).unwrap();
+        let scene = BuiltInScene::Star.build(&model, &frame, None).unwrap();
+        let exact = ExactRenderer::new(&model, &bands, &scene, frame).unwrap();
+        let renderer = QuickRenderer::new(&model, &bands, &exact).unwrap();
+        let (source, all) = (renderer.source(&renderer.levels[0]), blocks(&frame));
+        let mut plan = source.plan(&all[0], usize::MAX);
+        plan.beams.reverse();
+        assert!(plan.beams.len() > 2 && plan.beams[0].looks[0] > 0);
+        let plans = [plan];
+        let packed = source.pack((&all[..1], &plans), [0.0; 3], 64);
+        for (beam, words) in plans[0].beams.iter().zip(packed.beams.chunks_exact(8)) {
+            let looks = &plans[0].looks[beam.looks[0]..beam.looks[1]];
+            let own: Vec<u32> =
+                looks.iter().flat_map(|look| source.look_words(beam, look, 0)).collect();
+            let [first, end] = [words[6], words[7]].map(|look| LOOK_WORDS * look as usize);
+            assert_eq!(packed.looks[first..end], own);
+        }
     }
 }
