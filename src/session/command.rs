@@ -248,6 +248,8 @@ pub enum PanelSetting {
     ToleranceGrade(ToleranceGrade),
     /// The largest rms spot radius of a good lens in mm; `None` for no yield.
     GoodRms(Option<f64>),
+    /// The frequency in cycles/mm at which lenses as made have a contrast; `None` for none.
+    ToleranceFrequency(Option<f64>),
     /// The aim of the loosest tolerances; `None` to find none.
     Loosest(Option<LoosestGoal>),
     /// The index of the wavelength of the pupils; `None` for the primary one.

@@ -13,6 +13,7 @@ use super::{
 };
 use crate::lens::{Compensator, Lens, Perturbation, ToleranceSheet};
 use rayon::prelude::*;
+use serde::Serialize;
 use std::f64::consts::TAU;
 
 /// The contrast of a lens at a frequency and its changes by errors of making.
@@ -28,6 +29,23 @@ pub struct ContrastChanges {
     /// For each error the changes of the contrast at the lower and at the upper end of its range, at the
     /// fixed image plane and adjusted; `None` if a ray does not arrive there.
     pub changes: Vec<Option<[[f64; 2]; 2]>>,
+}
+
+/// The contrast at a frequency of lenses that are made, the mean over fields and over the tangential and the
+/// sagittal direction; each at the fixed image plane and refocused.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct ContrastSummary {
+    /// The frequency in cycles/mm.
+    pub frequency: f64,
+    /// The contrast of the lens as designed.
+    pub nominal: [f64; 2],
+    /// The contrast that is expected by the changes at both ends of the range of each error; `None` if a ray
+    /// does not arrive at an end.
+    pub expected: Option<[f64; 2]>,
+    /// The error by the sampling of the pupils.
+    pub sampling_error: f64,
+    /// The mean over lenses with random errors by their rays.
+    pub real: RealMerit,
 }
 
 /// More rays than those of the spots are taken until they change the contrast by less than this.
@@ -100,6 +118,17 @@ impl ContrastChanges {
         let changes = sheet.errors.par_iter().map(change);
         let changes = changes.collect::<Result<_, ToleranceError>>()?;
         Ok((Self { frequency, nominal, sampling_error, changes }, judge))
+    }
+
+    /// These changes with the contrast of lenses with random errors.
+    pub fn summary(&self, sheet: &ToleranceSheet, real: RealMerit) -> ContrastSummary {
+        ContrastSummary {
+            frequency: self.frequency,
+            nominal: self.nominal,
+            expected: self.expected(sheet),
+            sampling_error: self.sampling_error,
+            real,
+        }
     }
 
     /// The expected contrast of lenses that are made, at the fixed image plane and adjusted: each error

@@ -72,7 +72,7 @@ pub use analysis::{
 pub use as_built::{AsBuiltGradient, FixedAndRefocused, as_built_gradient};
 pub use beam::{Beam, ColourRays, FieldBeam};
 pub use compensation::{Compensation, adjustments};
-pub use contrast::ContrastChanges;
+pub use contrast::{ContrastChanges, ContrastSummary};
 pub use covariance::{
     IndependentError, LeverArm, MadeKind, MadeNumber, NumberCovariance, TiltingBody,
     independent_errors,

@@ -136,6 +136,31 @@ fn the_class_and_the_limit_of_good_lenses_are_settings() {
 }
 
 #[test]
+fn the_contrast_of_lenses_as_made_stands_beside_that_of_the_design() {
+    let settings = AnalysisSettings {
+        tolerance: 1e-2,
+        tolerance_frequency: Some(30.0),
+        ..AnalysisSettings::default()
+    };
+    let mut harness = panel_of(achromat(), settings, confirm_as_built);
+    for text in ["MTF at 30 cycles/mm as designed", "MTF of the lenses"] {
+        harness.get_by_label(text);
+    }
+    let contrast = made(&harness).contrast.unwrap().unwrap();
+    let expected = contrast.expected.unwrap();
+    for i in 0..2 {
+        let [nominal, real] = [contrast.nominal[i], contrast.real.mean[i]];
+        assert!(0.0 < real && real < nominal && nominal < 1.0, "{contrast:?}");
+        let allowed = 3.0 * contrast.real.error[i] + 0.02;
+        assert!((real - expected[i]).abs() < allowed, "{contrast:?}");
+    }
+    harness.get_by_label("MTF at").click();
+    harness.run();
+    let wanted = Command::Show(PanelSetting::ToleranceFrequency(None));
+    assert!(harness.state().commands.contains(&wanted));
+}
+
+#[test]
 fn real_lenses_have_a_histogram_and_the_worst_of_them_is_opened() {
     let mut harness = confirmed(achromat(), None);
     for text in ["Histogram of the RMS of 500 lenses, refocused", "By element", "By kind"] {

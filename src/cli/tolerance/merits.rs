@@ -7,8 +7,8 @@ use crate::cli::output::{ShortNumber, TextTable};
 use crate::lens::{Lens, ToleranceSheet};
 use crate::report::FurtherColumns;
 use crate::tolerance::{
-    ContrastChanges, KindShare, PartShare, RealMerit, RealMeritRequest, StopTest, ToleranceError,
-    ToleranceScene, WavefrontModel, shares_by_kind, shares_by_part,
+    ContrastChanges, ContrastSummary, KindShare, PartShare, RealMerit, RealMeritRequest, StopTest,
+    ToleranceError, ToleranceScene, WavefrontModel, shares_by_kind, shares_by_part,
 };
 use serde::Serialize;
 use std::fmt::{self, Display};
@@ -37,19 +37,6 @@ struct WavefrontSummary {
     /// The best position of the image plane in mm.
     focus: f64,
     /// The root of the mean variance of lenses with random errors by their rays.
-    real: RealMerit,
-}
-
-/// The contrast, at the fixed image plane and refocused.
-#[derive(Serialize)]
-struct ContrastSummary {
-    /// In cycles/mm.
-    frequency: f64,
-    nominal: [f64; 2],
-    /// `None` if a ray does not arrive with an error at an end of its range.
-    expected: Option<[f64; 2]>,
-    sampling_error: f64,
-    /// The mean over lenses with random errors by their rays.
     real: RealMerit,
 }
 
@@ -115,13 +102,7 @@ impl FurtherMerits {
             focus: model.focus,
             real: real.root(),
         });
-        let mtf = contrast.map(|(found, real)| ContrastSummary {
-            frequency: found.frequency,
-            nominal: found.nominal,
-            expected: found.expected(sheet),
-            sampling_error: found.sampling_error,
-            real,
-        });
+        let mtf = contrast.map(|(found, real)| found.summary(sheet, real));
         Ok(Self { wavefront, mtf, rows, is_stopped })
     }
 

@@ -6,9 +6,10 @@
 use super::AnalysisSettings;
 use crate::lens::{Lens, ToleranceSheet};
 use crate::tolerance::{
-    ErrorModel, LoosestRequest, LoosestTolerances, MadeLens, NominalLens, RealMerit,
-    RealMeritRequest, SecondDerivatives, StopTest, ToleranceAnalysis, ToleranceError,
-    ToleranceRequest, ToleranceScene, WavefrontModel, graded_sheet, refuse_lost_lenses, worst_lens,
+    ContrastChanges, ContrastSummary, ErrorModel, LoosestRequest, LoosestTolerances, MadeLens,
+    NominalLens, RealMerit, RealMeritRequest, SecondDerivatives, StopTest, ToleranceAnalysis,
+    ToleranceError, ToleranceRequest, ToleranceScene, WavefrontModel, graded_sheet,
+    refuse_lost_lenses, worst_lens,
 };
 
 /// The tolerances of a lens and what they do to it.
@@ -32,6 +33,9 @@ pub struct AsBuiltLens {
     /// The share of each error in the growth of the variance of the wavefront, likewise; as many as
     /// there are errors, or none.
     pub wavefront_shares: Vec<[f64; 2]>,
+    /// The contrast at the frequency that is asked for, or the reason why there is none; `None` if nothing is,
+    /// and without lenses with random errors.
+    pub contrast: Option<Result<ContrastSummary, String>>,
     /// The number of rays of the lens as designed.
     pub rays: usize,
     /// The largest relative error of the radius of a spot by the sampling of its pupil.
@@ -50,7 +54,7 @@ pub struct AsBuiltLens {
 const COARSE: f64 = 1e-2;
 /// The number of real lenses of one that is still.
 const REAL_LENSES: usize = 500;
-/// The standard error of the mean variance of their wavefronts, relative to it, at which there are enough.
+/// The standard error of the mean of their wavefronts and contrasts, relative to it, at which there are enough.
 const ENOUGH: f64 = 0.02;
 /// The seed of their errors.
 const SEED: u64 = 1;
@@ -128,7 +132,15 @@ fn as_built(
     let request = RealMeritRequest { seed: SEED, most: REAL_LENSES, error: ENOUGH };
     let real_wavefront =
         waves.as_ref().and_then(|waves| waves.real_lenses(&scene, &sheet, request, stop).ok());
+    let frequency = settings.tolerance_frequency.filter(|_| samples > 0);
+    let contrast = frequency.map(|frequency| {
+        let place = (lens, settings.zoom, tolerance);
+        let found =
+            ContrastChanges::with_real_lenses(place, &scene, (&sheet, frequency), request, stop);
+        found.map(|(changes, real)| changes.summary(&sheet, real)).map_err(|why| why.to_string())
+    });
     Ok(AsBuiltLens {
+        contrast,
         real_wavefront: real_wavefront.map(|real| real.root()),
         wavefront: waves.as_ref().map(|waves| {
             [waves.nominal.map(|variance| variance.max(0.0).sqrt()), waves.expected_rms(&sheet)]

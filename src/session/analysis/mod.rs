@@ -583,6 +583,9 @@ pub struct AnalysisSettings {
     /// The largest rms spot radius of a good lens in mm; `None` for no yield.
     #[serde(default)]
     pub good_rms: Option<f64>,
+    /// The frequency in cycles/mm at which lenses as made have a contrast; `None` for none.
+    #[serde(default)]
+    pub tolerance_frequency: Option<f64>,
     /// The aim of the loosest tolerances; `None` to find none.
     #[serde(default)]
     pub loosest: Option<LoosestGoal>,
@@ -636,6 +639,7 @@ impl Default for AnalysisSettings {
             tolerances: false,
             grade: ToleranceGrade::default(),
             good_rms: None,
+            tolerance_frequency: None,
             loosest: None,
             pupil_wavelength: None,
         }

@@ -309,6 +309,7 @@ impl Session {
             PanelSetting::Tolerances(shown) => settings.tolerances = shown,
             PanelSetting::ToleranceGrade(grade) => settings.grade = grade,
             PanelSetting::GoodRms(rms) => settings.good_rms = rms,
+            PanelSetting::ToleranceFrequency(nu) => settings.tolerance_frequency = nu,
             PanelSetting::Loosest(goal) => settings.loosest = goal,
             PanelSetting::PupilWavelength(wavelength) => settings.pupil_wavelength = wavelength,
         });

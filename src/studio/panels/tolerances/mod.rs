@@ -143,6 +143,7 @@ impl TolerancesPanel {
                 ui.horizontal_wrapped(|ui| {
                     choose_grade(ui, shown.view, Some(shown.made), actions);
                     choose_limit(ui, shown.view, shown.made, actions);
+                    choose_frequency(ui, shown.view, actions);
                     export_buttons(ui, actions);
                 });
             });
@@ -303,6 +304,28 @@ fn choose_limit(ui: &mut Ui, view: &SessionView, made: &AsBuiltLens, actions: &m
         let drag = DragValue::new(&mut um).speed(speed).range(1e-6..=1e6).suffix(" µm");
         if ui.add(drag).changed() {
             actions.push(Command::Show(PanelSetting::GoodRms(Some(1e-3 * um))));
+        }
+    }
+}
+
+/// The frequency that is proposed, in cycles/mm.
+const PROPOSED_FREQUENCY: f64 = 20.0;
+
+/// Chooses the frequency of the contrast.
+fn choose_frequency(ui: &mut Ui, view: &SessionView, actions: &mut Actions) {
+    let chosen = view.settings.tolerance_frequency;
+    let mut asks = chosen.is_some();
+    let hint = "Adds the contrast by rays at this frequency, the mean over fields and over tangential and \
+                sagittal: as designed and of real lenses";
+    if ui.checkbox(&mut asks, "MTF at").on_hover_text(hint).changed() {
+        let asked = asks.then_some(PROPOSED_FREQUENCY);
+        actions.push(Command::Show(PanelSetting::ToleranceFrequency(asked)));
+    }
+    if let Some(mut nu) = chosen {
+        let speed = 0.01 * nu;
+        let drag = DragValue::new(&mut nu).speed(speed).range(1e-3..=1e6).suffix(" cycles/mm");
+        if ui.add(drag).changed() {
+            actions.push(Command::Show(PanelSetting::ToleranceFrequency(Some(nu))));
         }
     }
 }

@@ -7,7 +7,7 @@ use crate::session::{AsBuiltLens, Command};
 use crate::studio::actions::Actions;
 use crate::studio::number;
 use crate::studio::panels::{RMS_OVER_FIELDS, RMS_OVER_FIELDS_HINT};
-use crate::tolerance::AsBuiltSpot;
+use crate::tolerance::{AsBuiltSpot, ContrastSummary};
 
 /// Errors, rays, real lenses, time.
 pub(super) fn facts(ui: &mut Ui, made: &AsBuiltLens, ms: f64) {
@@ -64,6 +64,9 @@ pub(super) fn summary(ui: &mut Ui, made: &AsBuiltLens) {
             rows.push((format!("The same of {} lenses by rays", real.lenses), by_rays));
         }
     }
+    if let Some(Ok(contrast)) = &made.contrast {
+        rows.extend(contrast_rows(contrast));
+    }
     Grid::new("spots as made").num_columns(3).striped(true).show(ui, |ui| {
         ui.weak(RMS_OVER_FIELDS).on_hover_text(RMS_OVER_FIELDS_HINT);
         ui.weak("fixed focus");
@@ -77,6 +80,23 @@ pub(super) fn summary(ui: &mut Ui, made: &AsBuiltLens) {
             ui.end_row();
         }
     });
+    if let Some(Err(why)) = &made.contrast {
+        ui.label(RichText::new(format!("No MTF: {why}")).weak());
+    }
+}
+
+/// The contrast of the lens as designed and as made.
+fn contrast_rows(contrast: &ContrastSummary) -> Vec<(String, [String; 2])> {
+    let nu = number::format_digits(contrast.frequency, 3);
+    let of = |value: f64| number::with_error(value, contrast.sampling_error);
+    let expected = contrast.expected.map(|expected| {
+        ("MTF of the lenses".to_owned(), expected.map(|value| number::format_digits(value, 3)))
+    });
+    let real = contrast.real;
+    let by_rays = [0, 1].map(|i| number::with_error(real.mean[i], real.error[i]));
+    let designed = (format!("MTF at {nu} cycles/mm as designed"), contrast.nominal.map(of));
+    let real = (format!("The same of {} lenses by rays", real.lenses), by_rays);
+    std::iter::once(designed).chain(expected).chain([real]).collect()
 }
 
 fn with_error([value, error]: [f64; 2]) -> String {
