@@ -9,8 +9,9 @@
 //!
 //! where `εᵢ` is the derivative of `ε` by the error, the middle part what refocusing wins back, and `f`
 //! the mean square that a focus of bounded travel leaves ([`excess_beyond`]; the displacements of the
-//! best focus are taken as normal). The products of `ε` and its second derivatives are left out: they
-//! are less than a thousandth of the growth of common lenses.
+//! best focus are taken as normal). Left out are the products of `ε` and its second derivatives, less than
+//! a thousandth of the growth of common lenses, and the motion of pupils with errors: rays keep their
+//! places in the stop. [`crate::tolerance`] counts both, and says how much they change.
 //!
 //! Errors are combinations of few numbers of surfaces ([`NumberCovariance`]): one sweep back for each
 //! coordinate gives all `εᵢ`. Held in the direction in which the growth weighs them, they are

@@ -100,7 +100,8 @@ impl SearchReport {
         let statistics = run.statistics();
         let row = |FoundPoint { entry, running }: FoundPoint<'_, _>| ReservoirRow {
             generation: entry.number,
-            merit: entry.loss,
+            // As it is written: moved to where its limits hold.
+            merit: landscape.loss(&landscape.settled(&entry.point)),
             topology: entry.topology.clone(),
             running,
         };
@@ -111,11 +112,7 @@ impl SearchReport {
             .finished
             .map(|finished| FinishedReport { failures: finished.failures(), finished });
         let merit_best = landscape.loss(searched.best);
-        let mut reservoir: Vec<ReservoirRow> = run.found_points().into_iter().map(row).collect();
-        if let Some(best) = reservoir.first_mut() {
-            // It was moved to where limits hold.
-            best.merit = best.merit.min(merit_best);
-        }
+        let reservoir = run.found_points().into_iter().map(row).collect();
         Self {
             ended,
             resumed,
