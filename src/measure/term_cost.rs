@@ -28,6 +28,8 @@ pub struct TermCost {
     /// The largest difference of a derivative from central differences, over the largest one; each times a step of
     /// its variable.
     pub difference: f64,
+    /// The variable whose derivative differs most; `None` where nothing does.
+    pub at: Option<String>,
     /// The reason why there is no such term; the numbers are 0 then.
     pub refused: Option<String>,
 }
@@ -45,21 +47,19 @@ pub struct TermCosts {
     pub rows: Vec<TermCost>,
 }
 
-/// The tolerance of the rays: of contrast five times this.
-const TOLERANCE: f64 = 2e-4;
 /// The times that a value is timed.
 const TURNS: usize = 15;
 
-/// Measures the terms of sharpness of a lens at a zoom position, with contrast at a frequency in cycles/mm, by every
-/// curvature, conic, asphere coefficient, thickness, index and semi-diameter that the lens has, on the thread of a
-/// pool.
+/// Measures the terms of sharpness of a lens at a zoom position, with contrast at a frequency in cycles/mm and rays
+/// that reach a tolerance, of contrast five times that, by every curvature, conic, asphere coefficient, thickness, index
+/// and semi-diameter that the lens has, on the thread of a pool.
 ///
 /// # Errors
 /// A lens without a merit.
 pub fn measure_term_costs(
     lens: &Lens,
     zoom: usize,
-    frequency: f64,
+    (frequency, tolerance): (f64, f64),
     pool: &ThreadPool,
 ) -> Result<TermCosts, MeritError> {
     let lens = with_all_variables(&at_zoom(lens, zoom));
@@ -72,7 +72,7 @@ pub fn measure_term_costs(
         Term::Mtf { frequency, min: 1.0 },
     ];
     let row = |term: Term| {
-        let found = pool.install(|| cost(&lens, term, &steps));
+        let found = pool.install(|| cost(&lens, term, &steps, tolerance));
         found.unwrap_or_else(|why| TermCost {
             term: term.name(),
             value: 0.0,
@@ -80,11 +80,12 @@ pub fn measure_term_costs(
             value_ms: 0.0,
             gradient_ms: 0.0,
             difference: 0.0,
+            at: None,
             refused: Some(why.to_string()),
         })
     };
     let rows = terms.into_iter().map(row).collect();
-    Ok(TermCosts { variables: lens.variables.len(), tolerance: TOLERANCE, frequency, rows })
+    Ok(TermCosts { variables: lens.variables.len(), tolerance, frequency, rows })
 }
 
 /// The lens with every number of its surfaces as a variable.
@@ -148,22 +149,26 @@ impl Steps {
 /// The share of the focal length by which differences change a sag.
 const STEP: f64 = 3e-6;
 
-fn cost(lens: &Lens, term: Term, steps: &Steps) -> Result<TermCost, MeritError> {
+fn cost(
+    lens: &Lens,
+    term: Term,
+    steps: &Steps,
+    tolerance: f64,
+) -> Result<TermCost, MeritError> {
     let goal = Goal {
         terms: vec![WeightedTerm::new(term, 1.0)],
         zoom_ratios: Vec::new(),
         limits: LimitTreatment::default(),
         pupil: PupilEdge::Moving,
     };
-    let merit = Merit::new(lens, &goal, TOLERANCE)?;
+    let merit = Merit::new(lens, &goal, tolerance)?;
     let values = merit.values(lens);
     let found = merit.terms(&values)?;
-    let at = |level| time_median(3..=TURNS, || merit.evaluate(&values, level));
-    let (value, value_ms) = at(DerivativeLevel::Value);
-    let (sum, gradient_ms) = at(DerivativeLevel::Gradient);
+    let timed = |level| time_median(3..=TURNS, || merit.evaluate(&values, level));
+    let (value, value_ms) = timed(DerivativeLevel::Value);
+    let (sum, gradient_ms) = timed(DerivativeLevel::Gradient);
     let (value, sum) = (value?.value, sum?);
-    let mut largest = 0.0f64;
-    let mut difference = 0.0f64;
+    let (mut largest, mut difference, mut at) = (0.0f64, 0.0f64, None);
     for (i, variable) in merit.variables().iter().enumerate() {
         let step = steps.of(variable.parameter.quantity);
         let moved = |offset: f64| {
@@ -173,10 +178,13 @@ fn cost(lens: &Lens, term: Term, steps: &Steps) -> Result<TermCost, MeritError> 
         };
         let change = (8.0 * (moved(1.0)? - moved(-1.0)?) - (moved(2.0)? - moved(-2.0)?)) / 12.0;
         largest = largest.max(change.abs());
-        difference = difference.max((change - step * sum.gradient[i]).abs());
+        let off = (change - step * sum.gradient[i]).abs();
+        if off > difference {
+            (difference, at) = (off, Some(variable.parameter.to_string()));
+        }
     }
     let error = found.first().map_or(0.0, |term| term.error);
     let difference = if largest > 0.0 { difference / largest } else { 0.0 };
     let (term, refused) = (term.name(), None);
-    Ok(TermCost { term, value, error, value_ms, gradient_ms, difference, refused })
+    Ok(TermCost { term, value, error, value_ms, gradient_ms, difference, at, refused })
 }
