@@ -45,7 +45,7 @@ pub use color_error::{
 pub use contrast_over_field::{ContrastAtHeight, contrast_over_field};
 pub use diffraction::{
     DiffractionGate, PointSpread, PupilCurve, PupilFunction, PupilSamples, RayTransfer, Strehl,
-    TransferRays, TransferSlopes, diffraction_gate, diffraction_mtf, encircled_energy,
+    TransferAtFrequency, TransferRays, diffraction_gate, diffraction_mtf, encircled_energy,
     encircled_energy_unless, point_spread, point_spread_unless, polychromatic_diffraction_mtf,
     polychromatic_diffraction_mtf_unless, strehl, strehl_unless, through_focus_mtf,
 };

@@ -114,47 +114,50 @@ fn with_all_variables(lens: &Lens) -> Lens {
     lens
 }
 
-/// The steps of central differences, from the size of a lens.
+/// The steps of central differences: a small part of a wavelength in paths. Phases turn by a whole wavelength, so that
+/// steps that are small against the lens but not against that differ from a derivative by themselves.
 struct Steps {
+    /// The change of a sag at the largest rim, in mm.
+    length: f64,
     focal_length: f64,
     largest_rim: f64,
 }
 
+/// The change of a sag, in wavelengths: differences of the fourth order are wrong by 1e-5 of the change of a phase of
+/// several times that, and paths are rounded at 1e-10 wavelengths.
+const WAVES: f64 = 0.01;
+/// The change of a semi-diameter as a part of the largest one: only what is on the edge changes.
+const RIM_STEP: f64 = 1e-4;
+
 impl Steps {
     fn new(lens: &Lens) -> Result<Self, MeritError> {
-        let system = lens.resolve(0, lens.wavelengths[lens.primary()].um)?;
+        let um = lens.wavelengths[lens.primary()].um;
+        let system = lens.resolve(0, um)?;
         let data = first_order(&system, &Beam::for_lens(lens, 0));
         let data = data.map_err(crate::pupil::RayModelError::from)?;
         let rims = lens.surfaces.iter().filter_map(|row| row.semi_diameter);
         let focal_length = data.efl.map_or(100.0, f64::abs);
         let largest = rims.fold(0.0, f64::max);
         let largest_rim = if largest > 0.0 { largest } else { 0.2 * focal_length };
-        Ok(Self { focal_length, largest_rim })
+        Ok(Self { length: WAVES * 1e-3 * um, focal_length, largest_rim })
     }
 
-    /// A step that changes a ray by about the same whatever the number.
+    /// A step that changes a path by about the same whatever the number.
     fn of(&self, quantity: Quantity) -> f64 {
-        let length = STEP * self.focal_length;
-        let sag = |power: i32| length / self.largest_rim.powi(power);
+        let sag = |power: i32| self.length / self.largest_rim.powi(power);
         match quantity {
             Quantity::Curvature => 2.0 * sag(2),
             Quantity::Conic => 8.0 * sag(4) * self.focal_length.powi(3),
             Quantity::Asphere(term) => sag(2 * term as i32 + 4),
-            Quantity::Thickness | Quantity::SemiDiameter => length,
-            Quantity::Index | Quantity::Grin(_) | Quantity::Freeform(_) => STEP,
+            // A defocus changes paths by half of the square of the aperture.
+            Quantity::Thickness => self.length * (self.focal_length / self.largest_rim).powi(2),
+            Quantity::SemiDiameter => RIM_STEP * self.largest_rim,
+            Quantity::Index | Quantity::Grin(_) | Quantity::Freeform(_) => sag(1),
         }
     }
 }
 
-/// The share of the focal length by which differences change a sag.
-const STEP: f64 = 3e-6;
-
-fn cost(
-    lens: &Lens,
-    term: Term,
-    steps: &Steps,
-    tolerance: f64,
-) -> Result<TermCost, MeritError> {
+fn cost(lens: &Lens, term: Term, steps: &Steps, tolerance: f64) -> Result<TermCost, MeritError> {
     let goal = Goal {
         terms: vec![WeightedTerm::new(term, 1.0)],
         zoom_ratios: Vec::new(),
