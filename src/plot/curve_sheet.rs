@@ -2,8 +2,9 @@
 
 use super::{
     Axis, BLACK, Canvas, Chart, Color, GREY, Legend, LinePattern, PALETTE, PaperChart, Pen, Stroke,
-    TextAlign, VectorDrawing,
+    TextAlign, VectorDrawing, described_svg, wrapped_letters,
 };
+use png::EncodingError;
 
 /// A curve in pieces: it is not drawn where a quantity has no value.
 #[derive(Debug, Clone, PartialEq)]
@@ -128,6 +129,8 @@ pub struct CurveSheet {
     pub title: String,
     /// The charts of each row; those of a row share the legend of the first one.
     pub rows: Vec<Vec<CurveChart>>,
+    /// What is said below the charts, as the error, the rays and the time of their numbers.
+    pub caption: Vec<String>,
 }
 
 /// The size of a chart and the room around it, in mm.
@@ -136,15 +139,59 @@ const ROOM: [f64; 2] = [24.0, 24.0];
 /// The height of the title, and the width of the legend, in mm.
 const TITLE: f64 = 10.0;
 const LEGEND: f64 = 52.0;
+/// The height of a line of the caption and of its letters, in mm.
+const CAPTION: [f64; 2] = [3.6, 2.4];
 /// The number of pixels of a millimetre.
 const PIXELS: f64 = 8.0;
 
 impl CurveSheet {
     /// Width and height, in mm.
     fn size(&self) -> [f64; 2] {
+        let lines = self.caption_lines().len() as f64;
+        [self.width(), self.caption_top() + lines * CAPTION[0]]
+    }
+
+    fn width(&self) -> f64 {
         let columns = self.rows.iter().map(Vec::len).max().unwrap_or(0).max(1) as f64;
-        let rows = self.rows.len().max(1) as f64;
-        [columns * (CHART[0] + ROOM[0]) + LEGEND, TITLE + rows * (CHART[1] + ROOM[1])]
+        columns * (CHART[0] + ROOM[0]) + LEGEND
+    }
+
+    /// The upper edge of the caption, in mm.
+    fn caption_top(&self) -> f64 {
+        TITLE + self.rows.len().max(1) as f64 * (CHART[1] + ROOM[1])
+    }
+
+    /// The caption in one text.
+    fn description(&self) -> String {
+        self.caption.join("; ")
+    }
+
+    /// The lines of the caption, each no wider than the sheet in the letters of pixels, which are wider than
+    /// those on paper.
+    fn caption_lines(&self) -> Vec<String> {
+        let width = PIXELS * (self.width() - ROOM[0]);
+        wrapped_letters(&self.description(), Canvas::letters(width as usize))
+    }
+
+    /// The lines of the caption with their left upper corners, in mm.
+    fn placed_caption(&self) -> impl Iterator<Item = ([f64; 2], String)> {
+        let top = self.caption_top();
+        let lines = self.caption_lines().into_iter().enumerate();
+        lines.map(move |(i, line)| ([0.5 * ROOM[0], top + CAPTION[0] * i as f64], line))
+    }
+
+    /// The sheet as PNG, with title and caption as texts of the file too.
+    ///
+    /// # Errors
+    /// A text that PNG does not hold.
+    pub fn png(&self) -> Result<Vec<u8>, EncodingError> {
+        let texts = [("Title", self.title.clone()), ("Description", self.description())];
+        self.canvas().described_png(&texts)
+    }
+
+    /// The sheet as SVG, with title and caption as elements of the file too.
+    pub fn svg(&self) -> String {
+        described_svg(&self.drawing(), &self.title, &self.description())
     }
 
     /// The upper left corner of a chart, in mm.
@@ -195,6 +242,9 @@ impl CurveSheet {
                 sheet.text([x + 10.0, y + 0.9], curve.name.clone(), 2.6, TextAlign::Left);
             }
         }
+        for ([x, y], line) in self.placed_caption() {
+            sheet.text([x, y + CAPTION[1]], line, CAPTION[1], TextAlign::Left);
+        }
         sheet
     }
 
@@ -224,6 +274,9 @@ impl CurveSheet {
                 legend.curve(&mut canvas, &curve.name, curve.drawn_color(), stroke(curve));
             }
         }
+        for (corner, line) in self.placed_caption() {
+            canvas.text(scaled(corner), &line, GREY, TextAlign::Left);
+        }
         canvas
     }
 }
@@ -241,7 +294,32 @@ mod tests {
         CurveSheet {
             title: "fans".to_owned(),
             rows: vec![vec![chart.clone(), chart.clone()], vec![chart]],
+            caption: Vec::new(),
         }
+    }
+
+    /// The caption is in the drawing, in the pixels and in the texts of the files, and no line leaves the sheet.
+    #[test]
+    fn the_caption_stands_below_the_charts_and_in_the_texts_of_the_files() {
+        let note = "RMS 4.25 ± 1.0e-3 µm, 1024 rays, 2.50 ms".to_owned();
+        let sheet = CurveSheet { caption: vec![note; 9], ..sheet() };
+        let lines = sheet.caption_lines();
+        assert!(lines.len() > 1 && sheet.description() == lines.join(" "), "{lines:?}");
+        let bare = self::sheet().size();
+        assert_eq!(sheet.size(), [bare[0], bare[1] + lines.len() as f64 * CAPTION[0]]);
+        for line in &lines {
+            assert!(crate::plot::text_width(line, CAPTION[1]) < sheet.width() - ROOM[0], "{line}");
+        }
+        let svg = sheet.svg();
+        assert!(svg.contains("<title>fans</title>\n<desc>RMS 4.25 ± 1.0e-3"), "{svg}");
+        assert!(svg.contains(&format!(">{}</text>", lines[0])), "{svg}");
+        let bytes = sheet.png().unwrap();
+        let reader = png::Decoder::new(std::io::Cursor::new(&bytes)).read_info().unwrap();
+        let texts = &reader.info().utf8_text;
+        assert_eq!(texts[1].get_text().unwrap(), sheet.description());
+        let below =
+            sheet.canvas().pixels()[3 * (8.0 * bare[0] * 8.0 * bare[1]) as usize..].to_vec();
+        assert!(below.contains(&GREY[0]), "no letter below the charts");
     }
 
     #[test]
@@ -250,7 +328,8 @@ mod tests {
         assert_eq!(pieces, [vec![[0.0, 1.0], [1.0, 3.0]], vec![[3.0, 5.0], [4.0, 4.0]]]);
         let none = ChartCurve::new("", 0, [(0.0, None), (1.0, None)]);
         assert_eq!(none.pieces, Vec::<Vec<[f64; 2]>>::new());
-        assert_eq!(CurveSheet { title: String::new(), rows: Vec::new() }.drawing().marks.len(), 1);
+        let bare = CurveSheet { title: String::new(), rows: Vec::new(), caption: Vec::new() };
+        assert_eq!(bare.drawing().marks.len(), 1);
     }
 
     /// The axes end at whole steps: 0 to 4 and 1 to 5.
