@@ -6,7 +6,7 @@
 use super::{PictureEffect, PictureOptions, PictureScene};
 use crate::analysis::Estimate;
 use crate::lens::{Lens, Object};
-use crate::measure::{PictureEffects, time_ms};
+use crate::measure::{PictureEffects, tile_ms, time_ms};
 use crate::picture::{
     ColorBand, Coloring, ErrorMap, ErrorShare, ExactRenderer, ExactSettings, GateSubject,
     GhostLight, GhostReport, GroupFocus, ImageFrame, LightLosses, LossReport, MID_GREY, Picture,
@@ -82,7 +82,7 @@ pub(super) fn coarse_picture(
         let camera = Camera::new((lens, zoom), scene, options, (COARSE, 1))?;
         let painted = scene.build(&camera.model, &camera.frame, camera.distance)?;
         let exact = camera.plain(&painted)?;
-        let (picture, device, _) = camera.quick(&exact, options)?;
+        let (picture, device, _) = camera.quick(&exact, options, 0.0)?;
         let left_out = vec!["all but rays: it is coarse".to_owned()];
         let taken = TakenPicture { device, left_out, ..TakenPicture::new(picture) };
         Ok(camera.finish(scene, options, taken))
@@ -201,15 +201,17 @@ impl Camera {
         }
     }
 
-    /// A picture the quick way, the device that made it, and its time in milliseconds.
+    /// A picture the quick way of a scene that moves for some seconds, the device that made it, and its time in
+    /// milliseconds.
     fn quick(
         &self,
         exact: &ExactRenderer<'_>,
         options: &PictureOptions,
+        seconds: f64,
     ) -> Result<(Picture, Option<String>, f64), PictureError> {
         let go_on = AtomicBool::new(false);
         let (made, ms) = time_ms(|| -> Result<QuickPicture, PictureError> {
-            let quick = QuickRenderer::new(&self.model, &self.bands, exact)?;
+            let quick = QuickRenderer::exposed(&self.model, &self.bands, exact, seconds)?;
             if options.processor {
                 let picture = quick.render_until(&go_on);
                 return Ok(QuickPicture { picture, device: None, refused: None });
@@ -232,11 +234,11 @@ impl Camera {
         let mut left_out = Vec::new();
         let renderer = self.renderer(painted, (lens, options), &mut split, &mut left_out)?;
         let seconds = self.moving_seconds(painted, options, &mut left_out);
-        let mut taken = if options.exact || seconds > 0.0 {
+        let mut taken = if options.exact {
             exact_picture(&renderer, (split.rest(SAMPLING), seconds), is_interrupted)
         } else {
             let compared = if all_tiles { (usize::MAX, MAP_SAMPLES) } else { (TILES, SAMPLES) };
-            self.compared(&renderer, options, compared, is_interrupted)?
+            self.compared(&renderer, (options, seconds), compared, is_interrupted)?
         };
         taken.left_out = left_out;
         if is_interrupted() {
@@ -260,13 +262,29 @@ impl Camera {
                 coating: options.coating,
                 diffraction: renderer.diffraction(),
                 losses: renderer.losses(),
-                is_sharp: None,
-                rings: None,
+                is_sharp: Some(renderer.is_sharp()),
+                rings: Some(renderer.rings()),
                 ghosts: ghosts.as_ref().map(|(report, ms)| (report, *ms)),
             };
-            taken.gates = Some([effects.of_scene()?, effects.of_light()?].concat());
+            let mut gates = [effects.of_scene()?, effects.of_light()?].concat();
+            if let Some(gate) = gates.iter_mut().find(|gate| gate.effect == "lateral colour") {
+                // The picture has a wavelength for each colour at least.
+                gate.on = true;
+                gate.saved_milliseconds = Some(self.color_ms(painted)?);
+            }
+            taken.gates = Some(gates);
         }
         Ok(taken)
+    }
+
+    /// The time in milliseconds that one wavelength for all colours saves on some tiles.
+    fn color_ms(&self, painted: &Scene) -> Result<f64, PictureError> {
+        let one =
+            vec![ColorBand { wavelengths: vec![(self.model.primary, 1.0)] }; self.bands.len()];
+        let with = |bands: &[ColorBand]| {
+            tile_ms(|| ExactRenderer::new(&self.model, bands, painted, self.frame), 0.0)
+        };
+        Ok(with(&self.bands)? - with(&one)?)
     }
 
     /// Rays with diffraction and losses as far as the options and the lens allow them.
@@ -332,12 +350,12 @@ impl Camera {
     fn compared(
         &self,
         renderer: &ExactRenderer<'_>,
-        options: &PictureOptions,
+        (options, seconds): (&PictureOptions, f64),
         tiles: (usize, usize),
         is_interrupted: Interruption<'_>,
     ) -> Result<TakenPicture, PictureError> {
-        let (picture, device, ms) = self.quick(renderer, options)?;
-        let map = ErrorMap::measure_until(renderer, &picture, tiles, is_interrupted);
+        let (picture, device, ms) = self.quick(renderer, options, seconds)?;
+        let map = ErrorMap::of_exposure(renderer, &picture, (tiles, seconds), is_interrupted);
         let error_map = (!is_interrupted()).then_some(map);
         let timed = |map: &ErrorMap| Estimate { milliseconds: Some(ms), ..map.rms() };
         let error = error_map.as_ref().map(timed);
