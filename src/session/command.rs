@@ -213,6 +213,8 @@ pub enum PanelSetting {
     ContrastFrequency(Option<f64>),
     /// True to measure error against time of contrast.
     ContrastAccuracy(bool),
+    /// True to measure error against time of the point spread.
+    PointSpreadAccuracy(bool),
     /// True to measure error against time of pictures.
     PictureAccuracy(bool),
     /// True to compute the wavefronts of the fields.

@@ -19,6 +19,7 @@ mod slow;
 mod slow_analyses;
 mod wavefronts;
 
+pub(super) use accuracy::field_name;
 pub use accuracy::{AccuracyCurves, AccuracyPoint};
 pub use as_built::{AsBuiltLens, confirm_as_built, predict_as_built};
 pub use contrast::{FieldContrast, FieldContrasts};
@@ -115,6 +116,8 @@ pub struct Analyses {
     /// Error against time of contrast, or the reason why it is not known; `None` while no panel shows it, and
     /// at first.
     pub contrast_accuracy: Option<Arc<Timed<Result<AccuracyCurves, String>>>>,
+    /// The same of the point spread.
+    pub point_spread_accuracy: Option<Arc<Timed<Result<AccuracyCurves, String>>>>,
     /// The same of pictures.
     pub picture_accuracy: Option<Arc<Timed<Result<AccuracyCurves, String>>>>,
     /// A scene through the lens, or the reason why there is none; `None` while no panel shows it.
@@ -389,6 +392,7 @@ impl Analyses {
             point_images: None,
             ray_images: None,
             contrast_accuracy: None,
+            point_spread_accuracy: None,
             picture_accuracy: None,
             picture,
             as_built: None,
@@ -568,6 +572,9 @@ pub struct AnalysisSettings {
     /// The options of the picture.
     #[serde(default)]
     pub picture_options: PictureOptions,
+    /// True if error against time of the point spread is measured, because the panel shows it.
+    #[serde(default)]
+    pub point_spread_accuracy: bool,
     /// True if error against time of pictures is measured, because the panel shows it.
     #[serde(default)]
     pub picture_accuracy: bool,
@@ -631,6 +638,7 @@ impl Default for AnalysisSettings {
             scene: BuiltInScene::default(),
             scene_file: None,
             picture_options: PictureOptions::default(),
+            point_spread_accuracy: false,
             picture_accuracy: false,
             picture_errors: false,
             tolerances: false,

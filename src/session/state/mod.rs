@@ -294,6 +294,9 @@ impl Session {
             PanelSetting::ContrastPage(page) => settings.contrast_page = page,
             PanelSetting::ContrastFrequency(nu) => settings.contrast_frequency = nu,
             PanelSetting::ContrastAccuracy(shown) => settings.contrast_accuracy = shown,
+            PanelSetting::PointSpreadAccuracy(shown) => {
+                settings.point_spread_accuracy = shown;
+            }
             PanelSetting::PictureAccuracy(shown) => settings.picture_accuracy = shown,
             PanelSetting::RayImages(shown) => settings.ray_images = shown,
             PanelSetting::Footprints(shown) => settings.footprints = shown,

@@ -7,7 +7,7 @@ use egui::{
     TextureOptions, Ui, vec2,
 };
 
-use super::figure_view::{ChartForm, bare_chart, export_menu};
+use super::figure_view::{ChartForm, accuracy_section, bare_chart, export_menu};
 use super::widgets::swatch;
 use super::{
     Panel, displayed_results, field_name, plain_error, relative_error, show_missing_results,
@@ -128,6 +128,13 @@ impl Panel for WavefrontPanel {
         self.pages(ui, actions);
         self.ask(view, actions);
         let kind = self.kind();
+        if self.page == WavefrontPage::Image && !self.by_rays {
+            let subject = (&**results, numbers.point_spread_accuracy.is_some());
+            let open = accuracy_section(ui, FigureKind::PointSpreadAccuracy, subject, actions);
+            if open != view.settings.point_spread_accuracy {
+                actions.push(Command::Show(PanelSetting::PointSpreadAccuracy(open)));
+            }
+        }
         let is_current = PageNumbers::of(numbers, kind).is_some();
         let last = &mut self.last[kind as usize];
         if is_current {
