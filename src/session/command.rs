@@ -244,6 +244,8 @@ pub enum PanelSetting {
     PictureOptions(Box<PictureOptions>),
     /// True to measure the error of the picture everywhere.
     PictureErrors(bool),
+    /// True to compute the images of points over the picture.
+    PicturePoints(bool),
     /// True to compute the lens as it is made.
     Tolerances(bool),
     /// The class of care in making of a lens without tolerances of its own.

@@ -101,7 +101,14 @@ pub(super) fn point_spread_accuracy(
             || measure::point_spread_accuracy(model, *traced, model.primary, is_interrupted);
         let name = field_name(fields.kind, *given);
         match pool.install(measure) {
-            Ok(rows) => ways.push((name, rows.iter().map(AccuracyPoint::of_row).collect())),
+            Ok(rows) => {
+                if rows.iter().any(|row| !row.reached) {
+                    refused.push(format!(
+                        "{name}: a tolerance is not reached, the error is the stated one"
+                    ));
+                }
+                ways.push((name, rows.iter().map(AccuracyPoint::of_row).collect()));
+            }
             Err(AnalysisError::Interrupted) => return None,
             Err(why) => refused.push(format!("{name}: {why}")),
         }
@@ -116,8 +123,10 @@ pub(super) fn point_spread_accuracy(
 }
 
 impl AccuracyPoint {
+    /// Where a tolerance is not reached, the reference is not better: only the error that is stated counts.
     fn of_row(row: &measure::AccuracyPoint) -> Self {
-        Self { tolerance: Some(row.tolerance), error: row.error, ms: row.ms }
+        let error = if row.reached { row.error } else { row.stated.max(row.error) };
+        Self { tolerance: Some(row.tolerance), error, ms: row.ms }
     }
 }
 

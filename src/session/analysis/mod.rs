@@ -30,6 +30,7 @@ pub use picture_options::{PictureEffect, PictureFocus, PictureOptions};
 pub use pupils::FieldPupils;
 pub use ray_images::{FieldRayImage, RayImages};
 pub use scene::{PictureScene, SceneFile};
+use scene_picture::PictureExtras;
 pub use scene_picture::ScenePicture;
 pub use wavefronts::{FieldWavefront, FieldWavefronts, PointImage, PointImages};
 
@@ -272,10 +273,12 @@ fn refine(mut results: AnalysisResults, output: &AnalysisOutput) -> AnalysisResu
         }
     }
     if settings.picture && !output.is_interrupted() {
-        let (lens, all) = (&results.lens, settings.picture_errors);
+        let lens = &results.lens;
+        let extras =
+            PictureExtras { all_tiles: settings.picture_errors, points: settings.picture_points };
         let is_interrupted = output.interruption();
         let subject = (&scene, &settings.picture_options);
-        let draw = || scene_picture::fine_picture(lens, zoom, subject, all, &is_interrupted);
+        let draw = || scene_picture::fine_picture(lens, zoom, subject, extras, &is_interrupted);
         let fine = time(|| catch_panic(draw));
         // A part of a picture is worth less than a coarse one.
         if fine.value.as_ref().map_or(true, |fine| fine.picture.complete) {
@@ -581,6 +584,9 @@ pub struct AnalysisSettings {
     /// True if the error of the picture is measured everywhere, because a panel shows it.
     #[serde(default)]
     pub picture_errors: bool,
+    /// True if the images of points over the picture are computed, because a panel shows them.
+    #[serde(default)]
+    pub picture_points: bool,
     /// True if the lens as it is made is computed, because a panel shows it.
     #[serde(default)]
     pub tolerances: bool,
@@ -641,6 +647,7 @@ impl Default for AnalysisSettings {
             point_spread_accuracy: false,
             picture_accuracy: false,
             picture_errors: false,
+            picture_points: false,
             tolerances: false,
             grade: ToleranceGrade::default(),
             good_rms: None,

@@ -10,8 +10,8 @@ use crate::measure::{PictureEffects, tile_ms, time_ms};
 use crate::picture::{
     ColorBand, Coloring, ErrorMap, ErrorShare, ExactRenderer, ExactSettings, GateSubject,
     GhostLight, GhostReport, GroupFocus, ImageFrame, LightLosses, LossReport, MID_GREY, Picture,
-    PictureError, PictureGate, QuickPicture, QuickRenderer, Scene, ToleranceSplit, field_diagonal,
-    focused, picture_model,
+    PictureError, PictureGate, PlacedPoints, PointGrid, QuickPicture, QuickRenderer, Scene,
+    ToleranceSplit, field_diagonal, focused, picture_model,
 };
 use crate::pupil::RayModel;
 use std::ops::ControlFlow;
@@ -31,6 +31,8 @@ pub struct ScenePicture {
     pub error: Option<Estimate>,
     /// The error tile by tile; `None` where it is not measured.
     pub error_map: Option<ErrorMap>,
+    /// The images of points over the frame; `None` where nobody asked.
+    pub points: Option<PlacedPoints>,
     /// The parts of the tolerance that effects use; none of a coarse picture.
     pub shares: Vec<ErrorShare>,
     /// The distance in mm to which the lens is focused; `None` at infinity.
@@ -57,6 +59,8 @@ const TILES: usize = 4;
 const SAMPLES: usize = 32;
 /// The samples of a pixel if all tiles are compared.
 const MAP_SAMPLES: usize = 16;
+/// The places of images of points, their cells and their rays.
+const POINTS: PointGrid = PointGrid { places: [5, 3], cells: 33, samples: 4096 };
 /// The wavelengths of a colour where a coating changes light with the wavelength.
 const COATED: usize = 3;
 /// The most rays of a colour of a pixel.
@@ -90,13 +94,22 @@ pub(super) fn coarse_picture(
     make().map_err(|error| error.to_string())
 }
 
+/// What is computed beside a fine picture.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct PictureExtras {
+    /// Its error on all tiles.
+    pub(super) all_tiles: bool,
+    /// The images of points over its frame.
+    pub(super) points: bool,
+}
+
 /// A fine picture of a lens with its error on some tiles, or on all of them; without an error, or incomplete, once
 /// `is_interrupted` is true.
 pub(super) fn fine_picture(
     lens: &Lens,
     zoom: usize,
     (scene, options): (&PictureScene, &PictureOptions),
-    all_tiles: bool,
+    extras: PictureExtras,
     is_interrupted: Interruption<'_>,
 ) -> Result<ScenePicture, String> {
     let make = || -> Result<ScenePicture, PictureError> {
@@ -104,7 +117,7 @@ pub(super) fn fine_picture(
         let camera = Camera::new((lens, zoom), scene, options, (FINE, colors))?;
         let painted = scene.build(&camera.model, &camera.frame, camera.distance)?;
         let painted = painted.moving(options.velocity)?;
-        let taken = camera.take(&painted, (lens, options), all_tiles, is_interrupted)?;
+        let taken = camera.take(&painted, (lens, options), extras, is_interrupted)?;
         Ok(camera.finish(scene, options, taken))
     };
     make().map_err(|error| error.to_string())
@@ -126,6 +139,7 @@ struct TakenPicture {
     device: Option<String>,
     error: Option<Estimate>,
     error_map: Option<ErrorMap>,
+    points: Option<PlacedPoints>,
     shares: Vec<ErrorShare>,
     is_exact: bool,
     gates: Option<Vec<PictureGate>>,
@@ -139,6 +153,7 @@ impl TakenPicture {
             device: None,
             error: None,
             error_map: None,
+            points: None,
             shares: Vec::new(),
             is_exact: false,
             gates: None,
@@ -183,14 +198,15 @@ impl Camera {
         options: &PictureOptions,
         taken: TakenPicture,
     ) -> ScenePicture {
-        let TakenPicture { picture, device, error, error_map, shares, is_exact, gates, left_out } =
-            taken;
+        let TakenPicture { picture, device, error, error_map, .. } = taken;
+        let TakenPicture { points, shares, is_exact, gates, left_out, .. } = taken;
         ScenePicture {
             scene: scene.clone(),
             options: options.clone(),
             picture,
             error,
             error_map,
+            points,
             shares,
             focus: self.focus,
             breathing: self.breathing,
@@ -227,7 +243,7 @@ impl Camera {
         &self,
         painted: &Scene,
         (lens, options): (&Lens, &PictureOptions),
-        all_tiles: bool,
+        extras: PictureExtras,
         is_interrupted: Interruption<'_>,
     ) -> Result<TakenPicture, PictureError> {
         let mut split = split(options);
@@ -237,7 +253,8 @@ impl Camera {
         let mut taken = if options.exact {
             exact_picture(&renderer, (split.rest(SAMPLING), seconds), is_interrupted)
         } else {
-            let compared = if all_tiles { (usize::MAX, MAP_SAMPLES) } else { (TILES, SAMPLES) };
+            let compared =
+                if extras.all_tiles { (usize::MAX, MAP_SAMPLES) } else { (TILES, SAMPLES) };
             self.compared(&renderer, (options, seconds), compared, is_interrupted)?
         };
         taken.left_out = left_out;
@@ -249,6 +266,10 @@ impl Camera {
         let mean = taken.picture.mean() / (MID_GREY * taken.picture.white);
         split.note(DIFFRACTION, renderer.diffraction().map_or(0.0, |found| found.error(mean)));
         taken.shares = split.shares().to_vec();
+        if extras.points {
+            taken.points =
+                renderer.placed_points(&self.bands, POINTS, self.distance, is_interrupted);
+        }
         if options.effects && !is_interrupted() {
             let effects = PictureEffects {
                 lens,

@@ -309,6 +309,7 @@ impl Session {
             PanelSetting::SceneFile(file) => settings.scene_file = Some(file),
             PanelSetting::PictureOptions(options) => settings.picture_options = *options,
             PanelSetting::PictureErrors(shown) => settings.picture_errors = shown,
+            PanelSetting::PicturePoints(shown) => settings.picture_points = shown,
             PanelSetting::Tolerances(shown) => settings.tolerances = shown,
             PanelSetting::ToleranceGrade(grade) => settings.grade = grade,
             PanelSetting::GoodRms(rms) => settings.good_rms = rms,

@@ -433,6 +433,10 @@ fn heading(ui: &mut Ui, fields: &Fields, index: usize) -> String {
 /// A number with its unit and its error.
 fn estimate_text(estimate: Estimate, unit: &str) -> String {
     let value = number::format_digits(estimate.value, 3);
+    if estimate.error > estimate.value.abs() {
+        // More than a whole of itself is no share.
+        return format!("{value}{unit} ± {}{unit}", number::format_digits(estimate.error, 1));
+    }
     format!("{value}{unit}{}", relative_error(estimate))
 }
 
@@ -447,7 +451,7 @@ fn image_lines(image: &PointImage) -> Vec<String> {
     vec![
         format!("Strehl {}", estimate_text(image.strehl.at_chief, "")),
         format!("best {}", estimate_text(image.strehl.best, "")),
-        format!("{width} µm wide, {}", plain_error(image.error, "")),
+        format!("{width} µm wide, intensity {}", plain_error(image.error, "")),
     ]
 }
 
