@@ -204,8 +204,8 @@ const FIELD_STEP: f64 = 0.01;
 /// that its brightness varies within a spot.
 ///
 /// # Errors
-/// No light arrives from the field or its neighbours, the lens has no image of it, or the lens is not
-/// symmetric about its axis: an element of its field is no annulus.
+/// No light arrives from the field or its neighbours, or that of another field arrives at the same point, the lens
+/// has no image of it, or the lens is not symmetric about its axis: an element of its field is no annulus.
 pub fn energy_irradiance(
     model: &RayModel,
     field: FieldPoint,
@@ -216,8 +216,10 @@ pub fn energy_irradiance(
     if system.has_poses() || !system.has_round_apertures() {
         return Err(AnalysisError::NotSymmetric);
     }
-    let element = FieldElement { model, field, wavelength, accuracy };
     let region = lit_region(model, field, wavelength)?;
+    let [x, y] = centroid(&region, accuracy)?;
+    ImageFold::refuse(model, wavelength, [x, y])?;
+    let element = FieldElement { model, field, wavelength, accuracy, square: x * x + y * y };
     let accepted = element.acceptance(&region)?;
     let [wide, narrow] =
         [element.magnification(FIELD_STEP)?, element.magnification(0.5 * FIELD_STEP)?];
@@ -234,6 +236,8 @@ struct FieldElement<'a> {
     field: FieldPoint,
     wavelength: usize,
     accuracy: Accuracy,
+    /// The square of the image height, in mm².
+    square: f64,
 }
 
 impl FieldElement<'_> {
@@ -276,6 +280,10 @@ impl FieldElement<'_> {
             self.squares(FieldPoint { x: factor * x, y: factor * y, weight })
         };
         let ([outer, far], [inner, near]) = (scaled(1.0 + step)?, scaled(1.0 - step)?);
+        // At a turn of the height an element of the field has no area to fall on.
+        if (far - self.square) * (self.square - near) < 0.0 {
+            return Err(AnalysisError::FoldedImage);
+        }
         Ok(((outer - inner) / (far - near)).abs())
     }
 

@@ -138,20 +138,25 @@ impl PointSubject<'_> {
     /// `None` where it is dark or where the image has no scale.
     fn arrived(&self, place: [f64; 2], samples: usize) -> Option<(Vec<ArrivedSpot>, usize)> {
         let (middle, to_image) = self.middle(place, samples)?;
+        let lights = self.bands.iter().enumerate().flat_map(|(color, band)| {
+            let of_band = band.wavelengths.iter().enumerate();
+            of_band.map(move |(wavelength, (_, share))| ([color, wavelength], *share))
+        });
         let mut spots = Vec::new();
-        let mut rays = 2 * samples * self.bands[self.middle_color()].wavelengths.len();
-        for (color, band) in self.bands.iter().enumerate() {
-            for (wavelength, (_, share)) in band.wavelengths.iter().enumerate() {
-                let seen = self.seen([color, wavelength], [place; 2], samples);
-                rays += samples;
-                for (i, point) in seen.into_iter().enumerate() {
-                    let Some((light, [x, y], by)) = point else { continue };
-                    let [dx, dy] = [middle[0] - x, middle[1] - y];
-                    let off = to_image.map(|row| row[0] * dx + row[1] * dy);
-                    let off = [off[0] + by[0], off[1] + by[1]];
-                    spots.push(ArrivedSpot { color, off, light: share * light, half: i % 2 });
-                }
-            }
+        // The middle colour is traced from three points.
+        let mut rays = 3 * samples * self.bands[self.middle_color()].wavelengths.len();
+        for (light, share) in lights {
+            let seen = self.seen(light, [place; 2], samples);
+            rays += seen.len();
+            let spot = |(i, seen): (usize, Option<SeenPoint>)| {
+                let (light_along, [x, y], by) = seen?;
+                let [dx, dy] = [middle[0] - x, middle[1] - y];
+                let off = to_image.map(|row| row[0] * dx + row[1] * dy);
+                let off = [off[0] + by[0], off[1] + by[1]];
+                let half = i % 2;
+                Some(ArrivedSpot { color: light[0], off, light: share * light_along, half })
+            };
+            spots.extend(seen.into_iter().enumerate().filter_map(spot));
         }
         (!spots.is_empty()).then_some((spots, rays))
     }

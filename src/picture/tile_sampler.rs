@@ -84,6 +84,9 @@ enum RayShare {
     Irradiance(f64),
 }
 
+/// The share of the irradiance that a ray stands for, the ray of the scene, and its displacement by diffraction in mm.
+pub(super) type SeenRay = (f64, Ray<f64>, [f64; 2]);
+
 /// A colour and the index of its wavelength.
 type ColorLight = (usize, usize);
 
@@ -319,7 +322,7 @@ impl TileSampler {
         light: [usize; 2],
         [point, beside]: [[f64; 2]; 2],
         numbers: impl Iterator<Item = [f64; 4]>,
-    ) -> Vec<Option<(f64, Ray<f64>, [f64; 2])>> {
+    ) -> Vec<Option<SeenRay>> {
         let [color, wavelength] = light;
         let (lens, length) = (&self.lenses[color][wavelength], self.lengths[color][wavelength]);
         let (radius, axes) = polar(point);

@@ -136,11 +136,14 @@ pub struct CurveSheet {
 /// The size of a chart and the room around it, in mm.
 const CHART: [f64; 2] = [80.0, 50.0];
 const ROOM: [f64; 2] = [24.0, 24.0];
-/// The height of the title, and the width of the legend, in mm.
+/// The height of a title of one line, that of each further line, and the width of the legend, in mm.
 const TITLE: f64 = 10.0;
+const TITLE_LINE: f64 = 4.4;
 const LEGEND: f64 = 52.0;
 /// The height of a line of the caption and of its letters, in mm.
 const CAPTION: [f64; 2] = [3.6, 2.4];
+/// The sentences of a caption up to which each begins on a line of its own.
+const MOST_SENTENCES: usize = 12;
 /// The number of pixels of a millimetre.
 const PIXELS: f64 = 8.0;
 
@@ -158,7 +161,7 @@ impl CurveSheet {
 
     /// The upper edge of the caption, in mm.
     fn caption_top(&self) -> f64 {
-        TITLE + self.rows.len().max(1) as f64 * (CHART[1] + ROOM[1])
+        self.title_height() + self.rows.len().max(1) as f64 * (CHART[1] + ROOM[1])
     }
 
     /// The caption in one text.
@@ -166,11 +169,29 @@ impl CurveSheet {
         self.caption.join("; ")
     }
 
-    /// The lines of the caption, each no wider than the sheet in the letters of pixels, which are wider than
-    /// those on paper.
-    fn caption_lines(&self) -> Vec<String> {
+    /// The lines of a text, each no wider than the sheet in the letters of pixels, which are wider than those on
+    /// paper.
+    fn lines(&self, text: &str) -> Vec<String> {
         let width = PIXELS * (self.width() - ROOM[0]);
-        wrapped_letters(&self.description(), Canvas::letters(width as usize))
+        wrapped_letters(text, Canvas::letters(width as usize))
+    }
+
+    /// The lines of the caption; its sentences begin on lines of their own unless they are many.
+    fn caption_lines(&self) -> Vec<String> {
+        if self.caption.len() > MOST_SENTENCES {
+            return self.lines(&self.description());
+        }
+        self.caption.iter().flat_map(|sentence| self.lines(sentence)).collect()
+    }
+
+    /// The lines of the title with the height of each above the first chart, in mm.
+    fn placed_title(&self) -> impl Iterator<Item = (f64, String)> {
+        let lines = self.lines(&self.title).into_iter().enumerate();
+        lines.map(|(i, line)| (TITLE_LINE * i as f64, line))
+    }
+
+    fn title_height(&self) -> f64 {
+        TITLE + TITLE_LINE * self.lines(&self.title).len().saturating_sub(1) as f64
     }
 
     /// The lines of the caption with their left upper corners, in mm.
@@ -195,16 +216,17 @@ impl CurveSheet {
     }
 
     /// The upper left corner of a chart, in mm.
-    fn corner(row: usize, column: usize) -> [f64; 2] {
+    fn corner(&self, row: usize, column: usize) -> [f64; 2] {
         let [width, height] = [0, 1].map(|k| CHART[k] + ROOM[k]);
-        [0.75 * ROOM[0] + column as f64 * width, TITLE + 0.4 * ROOM[1] + row as f64 * height]
+        let top = self.title_height() + 0.4 * ROOM[1];
+        [0.75 * ROOM[0] + column as f64 * width, top + row as f64 * height]
     }
 
     /// All charts with their corners, in mm.
     fn charts(&self) -> impl Iterator<Item = ([f64; 2], &CurveChart)> {
-        self.rows.iter().enumerate().flat_map(|(row, charts)| {
+        self.rows.iter().enumerate().flat_map(move |(row, charts)| {
             let of_row = charts.iter().enumerate();
-            of_row.map(move |(column, chart)| (Self::corner(row, column), chart))
+            of_row.map(move |(column, chart)| (self.corner(row, column), chart))
         })
     }
 
@@ -213,14 +235,16 @@ impl CurveSheet {
         let left = self.size()[0] - LEGEND;
         let rows = self.rows.iter().enumerate();
         rows.filter_map(move |(row, charts)| {
-            Some(([left, Self::corner(row, 0)[1]], charts.first()?))
+            Some(([left, self.corner(row, 0)[1]], charts.first()?))
         })
     }
 
     /// The sheet on paper.
     pub fn drawing(&self) -> VectorDrawing {
         let mut sheet = VectorDrawing::new(self.size());
-        sheet.text([0.5 * ROOM[0], 0.6 * TITLE], self.title.clone(), 3.4, TextAlign::Left);
+        for (down, line) in self.placed_title() {
+            sheet.text([0.5 * ROOM[0], 0.6 * TITLE + down], line, 3.4, TextAlign::Left);
+        }
         let pen = |curve: &ChartCurve| {
             let pattern = if curve.dashed { LinePattern::Dashes } else { LinePattern::Full };
             Pen::colored(curve.drawn_color()).with_width(0.35).with_pattern(pattern)
@@ -255,8 +279,10 @@ impl CurveSheet {
         let stroke = |curve: &ChartCurve| {
             if curve.dashed { Stroke::Dashed } else { Stroke::Solid }
         };
-        let title = scaled([0.5 * ROOM[0], 0.2 * TITLE]);
-        canvas.text(title, &self.title, BLACK, TextAlign::Left);
+        for (down, line) in self.placed_title() {
+            let at = scaled([0.5 * ROOM[0], 0.2 * TITLE + down]);
+            canvas.text(at, &line, BLACK, TextAlign::Left);
+        }
         for (corner, chart) in self.charts() {
             let end = [corner[0] + CHART[0], corner[1] + CHART[1]];
             let [x, y] = chart.drawn_axes();
@@ -304,7 +330,9 @@ mod tests {
         let note = "RMS 4.25 ± 1.0e-3 µm, 1024 rays, 2.50 ms".to_owned();
         let sheet = CurveSheet { caption: vec![note; 9], ..sheet() };
         let lines = sheet.caption_lines();
-        assert!(lines.len() > 1 && sheet.description() == lines.join(" "), "{lines:?}");
+        assert!(lines.len() > 1 && sheet.caption.join(" ") == lines.join(" "), "{lines:?}");
+        let joined = CurveSheet { caption: vec![sheet.caption[0].clone(); 20], ..self::sheet() };
+        assert_eq!(joined.caption_lines().join(" "), joined.description());
         let bare = self::sheet().size();
         assert_eq!(sheet.size(), [bare[0], bare[1] + lines.len() as f64 * CAPTION[0]]);
         for line in &lines {
@@ -329,14 +357,14 @@ mod tests {
         let none = ChartCurve::new("", 0, [(0.0, None), (1.0, None)]);
         assert_eq!(none.pieces, Vec::<Vec<[f64; 2]>>::new());
         let bare = CurveSheet { title: String::new(), rows: Vec::new(), caption: Vec::new() };
-        assert_eq!(bare.drawing().marks.len(), 1);
+        assert!(bare.drawing().marks.is_empty());
     }
 
     /// The axes end at whole steps: 0 to 4 and 1 to 5.
     #[test]
     fn the_points_of_a_curve_lie_at_their_places_on_paper() {
         let drawing = sheet().drawing();
-        let [x, y] = CurveSheet::corner(1, 0);
+        let [x, y] = sheet().corner(1, 0);
         let first = [x, y + CHART[1]];
         let found = drawing.marks.iter().any(|mark| match mark {
             Mark::Line { points, .. } => {

@@ -442,3 +442,56 @@ fn split(options: &PictureOptions) -> ToleranceSplit {
     let effects: Vec<&str> = all.iter().filter(|(_, on)| *on).map(|(name, _)| *name).collect();
     ToleranceSplit::new(options.tolerance, &effects)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::measure::double_gauss;
+    use crate::picture::BuiltInScene;
+
+    /// A small picture of a star that moves to the right by some hundredths of its distance while it is exposed.
+    fn taken(speed: f64, exact: bool) -> TakenPicture {
+        let lens = double_gauss();
+        let velocity = [speed, 0.0];
+        let seconds = Some(0.5);
+        let options = PictureOptions {
+            velocity,
+            seconds,
+            exact,
+            processor: true,
+            effects: !exact,
+            ..PictureOptions::default()
+        };
+        let scene = PictureScene::BuiltIn(BuiltInScene::Star);
+        let camera = Camera::new((&lens, 0), &scene, &options, ([24, 16], 1)).unwrap();
+        let painted = scene.build(&camera.model, &camera.frame, camera.distance).unwrap();
+        let painted = painted.moving(options.velocity).unwrap();
+        let extras = PictureExtras { all_tiles: true, points: false };
+        camera.take(&painted, (&lens, &options), extras, &|| false).unwrap()
+    }
+
+    /// What moves is smeared the quick way too, as rays from every pixel smear it; and every effect that costs time by
+    /// itself has its time, lateral colour among them.
+    #[test]
+    fn a_scene_that_moves_is_smeared_the_quick_way() {
+        let [still, moving, exact] =
+            [(0.0, false), (0.1, false), (0.1, true)].map(|(v, e)| taken(v, e));
+        assert!(!still.is_exact && !moving.is_exact && exact.is_exact);
+        let apart = |a: &TakenPicture, b: &TakenPicture| {
+            let pairs = a.picture.values.iter().flatten().zip(b.picture.values.iter().flatten());
+            let count = 3.0 * a.picture.values.len() as f64;
+            (pairs.map(|(a, b)| (a - b).powi(2)).sum::<f64>() / count).sqrt()
+                / (MID_GREY * a.picture.white)
+        };
+        let (smeared, wrong) = (apart(&still, &moving), apart(&moving, &exact));
+        assert!(smeared > 0.2 && wrong < 0.3 * smeared, "{smeared} {wrong}");
+        let measured = moving.error.unwrap().value;
+        assert!(measured < 2.0 * wrong + 0.03, "{measured} {wrong}");
+        let gates = moving.gates.unwrap();
+        let saved =
+            |name: &str| gates.iter().find(|gate| gate.effect == name).unwrap().saved_milliseconds;
+        for name in ["lateral colour", "blur", "vignetting", "motion", "diffraction"] {
+            assert!(saved(name).is_some_and(f64::is_finite), "{name}");
+        }
+    }
+}

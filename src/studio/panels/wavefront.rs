@@ -12,7 +12,7 @@ use super::widgets::swatch;
 use super::{
     Panel, displayed_results, field_name, plain_error, relative_error, show_missing_results,
 };
-use crate::analysis::{Estimate, SquareGrid, ZernikeOrder, aberration_name};
+use crate::analysis::{Estimate, SquareGrid, ZernikeOrder, ZernikeSum, aberration_name};
 use crate::lens::Fields;
 use crate::report::FigureKind;
 use crate::session::{
@@ -488,6 +488,7 @@ fn energies(ui: &mut Ui, results: &AnalysisResults, kind: FigureKind) {
     };
     let fields = results.lens.fields_at(results.settings.zoom);
     ui.horizontal_wrapped(|ui| {
+        ui.label(RichText::new("share of the light").small());
         for i in 0..fields.values.len() {
             heading(ui, fields, i);
         }
@@ -501,7 +502,8 @@ fn energies(ui: &mut Ui, results: &AnalysisResults, kind: FigureKind) {
         let form = ChartForm { contains: [&[0.0], &[0.0, 1.0]], ..ChartForm::new(height) };
         bare_chart(ui, (chart, &figure.colors), form);
     }
-    ui.label(RichText::new(energy_error(results, kind)).small().weak());
+    let error = format!("share {}", energy_error(results, kind));
+    ui.label(RichText::new(error).small().weak());
 }
 
 /// The largest error of the shares of a kind.
@@ -534,7 +536,7 @@ fn coefficients(ui: &mut Ui, fields: &Fields, waves: &FieldWavefronts, is_fringe
     ScrollArea::both().auto_shrink([false, false]).show(ui, |ui| {
         Grid::new("zernike").striped(true).spacing([12.0, 2.0]).show(ui, |ui| {
             ui.weak("No.");
-            ui.weak("Aberration");
+            ui.weak("Aberration, λ");
             for i in 0..sums.len() {
                 heading(ui, fields, i);
             }
@@ -543,18 +545,39 @@ fn coefficients(ui: &mut Ui, fields: &Fields, waves: &FieldWavefronts, is_fringe
                 ui.label((k + 1).to_string());
                 ui.label(aberration_name(index));
                 for sum in &sums {
-                    let found = sum.as_ref().and_then(|sum| sum.coefficients.get(k).copied());
-                    ui.label(found.map_or("-".to_owned(), |e| format!("{:.4}", e.value)));
+                    let found = sum.as_ref().and_then(|sum| sum.coefficients.get(k));
+                    coefficient(ui, found.map(|e| e.value));
                 }
                 ui.end_row();
             }
-            ui.label("");
-            ui.label("RMS of the rest");
-            for sum in &sums {
-                let rest = sum.as_ref().map(|sum| format!("{:.4}", sum.rest.value));
-                ui.label(rest.unwrap_or_else(|| "-".to_owned()));
+            let rows: [(&str, SumNumber); 2] = [
+                ("RMS of the rest", |sum| sum.rest.value),
+                ("largest error", |sum| {
+                    sum.coefficients.iter().map(|e| e.error).fold(0.0, f64::max)
+                }),
+            ];
+            for (name, number) in rows {
+                ui.label("");
+                ui.label(name);
+                sums.iter().for_each(|sum| coefficient(ui, sum.as_ref().map(number)));
+                ui.end_row();
             }
-            ui.end_row();
         });
     });
+}
+
+/// A number of a sum of polynomials.
+type SumNumber = fn(&ZernikeSum) -> f64;
+
+/// The least size of a number of the table that is not zero to its four digits.
+const SEEN: f64 = 5e-5;
+
+/// A number of the table with its point below those of the others.
+fn coefficient(ui: &mut Ui, number: Option<f64>) {
+    let text = match number {
+        None => "-     ".to_owned(),
+        Some(waves) if waves.abs() < SEEN => "0     ".to_owned(),
+        Some(waves) => format!("{waves:.4}"),
+    };
+    ui.label(RichText::new(format!("{text:>9}")).monospace());
 }

@@ -281,6 +281,16 @@ impl PicturePanel {
             let words = words.unwrap_or_else(|| "Computing the images of points …".to_owned());
             ui.label(RichText::new(words).small());
         }
+        if self.mode == PictureMode::Errors {
+            let words = first.error_map.as_ref().map_or_else(
+                || "Measuring the error …".to_owned(),
+                |map| {
+                    let most = number::format_digits(100.0 * map.largest(), 3);
+                    format!("Black is no error, white {most} % of mid grey, grey not measured")
+                },
+            );
+            ui.label(RichText::new(words).small());
+        }
         ui.horizontal(|ui| {
             let (luminance, seconds) = exposure(first);
             let [luminance, seconds] = [luminance, seconds].map(|v| number::format_digits(v, 3));
