@@ -129,7 +129,7 @@ pub struct CurveSheet {
     pub title: String,
     /// The charts of each row; those of a row share the legend of the first one.
     pub rows: Vec<Vec<CurveChart>>,
-    /// What is said below the charts, as the error, the rays and the time of their numbers.
+    /// The sentences below the charts, as of the error, the rays and the time of their numbers.
     pub caption: Vec<String>,
 }
 

@@ -123,7 +123,8 @@ pub(super) fn point_spread_accuracy(
 }
 
 impl AccuracyPoint {
-    /// Where a tolerance is not reached, the reference is not better: only the error that is stated counts.
+    /// The point of a row. The reference is no better where a tolerance is not reached: only the error that is stated
+    /// counts there.
     fn of_row(row: &measure::AccuracyPoint) -> Self {
         let error = if row.reached { row.error } else { row.stated.max(row.error) };
         Self { tolerance: Some(row.tolerance), error, ms: row.ms }

@@ -94,7 +94,7 @@ pub(super) fn coarse_picture(
     make().map_err(|error| error.to_string())
 }
 
-/// What is computed beside a fine picture.
+/// The results that are computed beside a fine picture.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct PictureExtras {
     /// Its error on all tiles.
@@ -460,6 +460,7 @@ mod tests {
             exact,
             processor: true,
             effects: !exact,
+            tolerance: 0.03,
             ..PictureOptions::default()
         };
         let scene = PictureScene::BuiltIn(BuiltInScene::Star);
@@ -470,7 +471,7 @@ mod tests {
         camera.take(&painted, (&lens, &options), extras, &|| false).unwrap()
     }
 
-    /// What moves is smeared the quick way too, as rays from every pixel smear it; and every effect that costs time by
+    /// A scene that moves is smeared the quick way too, as rays from every pixel smear it; and every effect that costs time by
     /// itself has its time, lateral colour among them.
     #[test]
     fn a_scene_that_moves_is_smeared_the_quick_way() {
