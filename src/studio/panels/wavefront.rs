@@ -572,12 +572,11 @@ type SumNumber = fn(&ZernikeSum) -> f64;
 /// The least size of a number of the table that is not zero to its four digits.
 const SEEN: f64 = 5e-5;
 
-/// A number of the table with its point below those of the others.
+/// A number of the table at the right of its column, so that the points of all are below each other.
 fn coefficient(ui: &mut Ui, number: Option<f64>) {
-    let text = match number {
-        None => "-     ".to_owned(),
-        Some(waves) if waves.abs() < SEEN => "0     ".to_owned(),
-        Some(waves) => format!("{waves:.4}"),
-    };
-    ui.label(RichText::new(format!("{text:>9}")).monospace());
+    // Rounding has no sign.
+    let seen = number.map(|waves| if waves.abs() < SEEN { 0.0 } else { waves });
+    let text = seen.map_or("-".to_owned(), |waves| format!("{waves:.4}"));
+    let right = Layout::right_to_left(Align::Center);
+    ui.with_layout(right, |ui| ui.label(text));
 }
