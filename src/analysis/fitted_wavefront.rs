@@ -104,6 +104,8 @@ const SETTLED: f64 = 1e-12;
 /// The steps to the brightest image point, and the shorter ones that are tried in place of each.
 const BRIGHTENINGS: usize = 20;
 const HALVINGS: usize = 6;
+/// The largest RMS tilt of the phases by such a step, in rad.
+const LONGEST: f64 = 1.0;
 /// A tilt is told from the mean square slope of the waves above this share of the larger one.
 const TILTED: f64 = 1e-12;
 
@@ -219,41 +221,54 @@ impl FittedWavefront {
         best
     }
 
-    /// The displacement of the image point to where the Strehl ratio is largest by its derivatives, in mm;
-    /// uphill if these do not describe a maximum.
+    /// The displacement of the image point to where the Strehl ratio is largest by its derivatives, in mm; uphill, by
+    /// the sizes of its curvatures, where these do not describe a maximum.
     fn brighter(&self, weights: &[f64], mirrored: bool) -> [f64; 2] {
+        let (gradient, curvatures, squares) = self.strehl_slopes(weights);
+        // A half pupil, or one radius of a round one, cannot tell the tilt across it.
+        let told = [0, 1].map(|k| squares[(k, k)] > TILTED * squares[(0, 0)].max(squares[(1, 1)]));
+        let free = [told[0] && !mirrored, told[1]];
+        let held = |i: usize, j: usize| if free[i] && free[j] { curvatures[(i, j)] } else { 0.0 };
+        let eigen = Matrix2::from_fn(held).symmetric_eigen();
+        let rise = Vector2::from_fn(|i, _| if free[i] { gradient[i] } else { 0.0 });
+        let mut step = Vector2::zeros();
+        for (direction, curvature) in eigen.eigenvectors.column_iter().zip(&eigen.eigenvalues) {
+            let along = direction.dot(&rise);
+            if along != 0.0 {
+                step += direction * (along / curvature.abs().max(f64::MIN_POSITIVE));
+            }
+        }
+        let tilt = step.dot(&(squares * step)).sqrt();
+        let shorter = if tilt > LONGEST { LONGEST / tilt } else { 1.0 };
+        (step * shorter).into()
+    }
+
+    /// The derivatives of the Strehl ratio by the image point, the second ones, and the mean products of those of the
+    /// phases.
+    fn strehl_slopes(&self, weights: &[f64]) -> (Vector2<f64>, Matrix2<f64>, Matrix2<f64>) {
         let total: f64 = weights.iter().sum();
+        let slope = |wave: &WaveDual| Vector2::new(TAU * wave.slope[0], TAU * wave.slope[1]);
+        let shares = weights.iter().map(|weight| weight / total);
+        let rays = || self.waves.iter().zip(shares.clone());
+        let mean = rays().fold(Vector2::zeros(), |sum, (wave, share)| sum + slope(wave) * share);
         let [re, im] = self.phasor;
-        let (mut first, mut cross, mut second) = ([[0.0; 2]; 2], [0.0; 2], [0.0; 3]);
-        for (wave, weight) in self.waves.iter().zip(weights) {
+        let (mut gradient, mut first) = (Vector2::zeros(), [Vector2::zeros(); 2]);
+        let (mut second, mut squares) = (Matrix2::zeros(), Matrix2::zeros());
+        for (wave, share) in rays() {
             let (sin, cos) = (TAU * wave.value).sin_cos();
-            let [x, y] = [0, 1].map(|axis| TAU * wave.slope[axis]);
-            let share = weight / total;
+            // What all phases have in common changes nothing.
+            let slope = slope(wave) - mean;
             // exp(2πi W) turned by the phase of the mean: U* exp(2πi W).
             let (along, across) = (re * cos + im * sin, re * sin - im * cos);
-            for (axis, slope) in [x, y].into_iter().enumerate() {
-                cross[axis] -= share * slope * across;
-                first[axis] =
-                    [first[axis][0] - share * slope * sin, first[axis][1] + share * slope * cos];
-            }
-            for (sum, product) in second.iter_mut().zip([x * x, x * y, y * y]) {
-                *sum -= share * product * along;
-            }
+            gradient -= slope * (2.0 * share * across);
+            first[0] -= slope * (share * sin);
+            first[1] += slope * (share * cos);
+            let product = slope * slope.transpose() * share;
+            squares += product;
+            second -= product * along;
         }
-        let dot = |a: [f64; 2], b: [f64; 2]| a[0] * b[0] + a[1] * b[1];
-        let gradient = [0, 1].map(|axis| 2.0 * cross[axis]);
-        let xx = 2.0 * (dot(first[0], first[0]) + second[0]);
-        let xy = 2.0 * (dot(first[0], first[1]) + second[1]);
-        let yy = 2.0 * (dot(first[1], first[1]) + second[2]);
-        if mirrored || !(xx < TILTED * yy) {
-            return [0.0, if yy < 0.0 { -gradient[1] / yy } else { 0.0 }];
-        }
-        let determinant = xx * yy - xy * xy;
-        if xx < 0.0 && determinant > 0.0 {
-            let [gx, gy] = gradient;
-            return [(xy * gy - yy * gx) / determinant, (xy * gx - xx * gy) / determinant];
-        }
-        [0.0; 2]
+        let products = first.map(|part| part * part.transpose());
+        (gradient, (products[0] + products[1] + second) * 2.0, squares)
     }
 
     /// The Strehl ratio about the brightest image point: the intensity at the image point over that without path differences.

@@ -11,7 +11,7 @@
 //! where the image is sharp, since rays of other fields arrive at the same point too.
 
 use super::seen_from_image::{BackwardLens, SeenFromImage};
-use super::{AnalysisError, Estimate, lit_region};
+use super::{AnalysisError, Estimate, ImageFold, lit_region};
 use crate::lens::{FieldKind, FieldPoint};
 use crate::math::Vec3;
 use crate::pupil::{Accuracy, ConvergedValues, Nodes, RayModel, Region, converge};
@@ -24,9 +24,9 @@ pub struct Illumination {
     /// The field.
     pub field: FieldPoint,
     /// The irradiance at the centroid of the field's spot over the radiance of a uniform scene; 0 if
-    /// no light gets through.
+    /// no light gets through, and with an infinite error if it is not known how much does.
     pub irradiance: Estimate,
-    /// The same relative to the first field; `None` if that one is dark.
+    /// The same relative to the first field; `None` if that one is dark or this one is not known.
     pub relative: Option<Estimate>,
     /// The centroid of the spot, x and y in mm: the point of the irradiance.
     pub point: [f64; 2],
@@ -35,7 +35,7 @@ pub struct Illumination {
     pub cone: Estimate,
     /// The same relative to the first field; `None` if that one is dark.
     pub relative_cone: Option<Estimate>,
-    /// The reason if there is no light.
+    /// The reason if there is no light, or no number of it.
     pub error: Option<AnalysisError>,
 }
 
@@ -54,8 +54,13 @@ pub fn illumination(model: &RayModel, wavelength: usize, accuracy: Accuracy) -> 
     let first = lights.first().and_then(|light| light.ok());
     let dark = Estimate::new(0.0, 0.0, 0);
     let dark = FieldLight { irradiance: dark, point: [0.0; 2], cone: dark };
+    // A field that has light, but not this number.
+    let unknown = Estimate::new(0.0, f64::INFINITY, 0);
+    let unknown = FieldLight { irradiance: unknown, point: [0.0; 2], cone: unknown };
     let result = |(field, light): (&FieldPoint, &Result<FieldLight, AnalysisError>)| {
-        let FieldLight { irradiance, point, cone } = light.unwrap_or(dark);
+        let without = |why: AnalysisError| if why.is_loss_of_light() { dark } else { unknown };
+        let FieldLight { irradiance, point, cone } = light.unwrap_or_else(without);
+        let first = first.filter(|_| irradiance.error.is_finite());
         Illumination {
             field: *field,
             irradiance,
@@ -143,13 +148,14 @@ fn centroid(region: &Region<'_>, accuracy: Accuracy) -> Result<[f64; 2], Analysi
 /// `n'²/n²` times the projected solid angle of the directions from which light arrives.
 ///
 /// # Errors
-/// No light arrives at the point.
+/// No light arrives at the point, or that of two fields.
 pub fn irradiance(
     model: &RayModel,
     wavelength: usize,
     point: [f64; 2],
     accuracy: Accuracy,
 ) -> Result<Estimate, AnalysisError> {
+    ImageFold::refuse(model, wavelength, point)?;
     let seen = SeenFromImage::new(model, wavelength, point)?;
     let region = lit_region(&seen.model, seen.model.fields[0], 0)?;
     let numbers = |nodes: &Nodes| seen.solid_angle(&region, nodes);
@@ -162,7 +168,7 @@ pub fn irradiance(
 /// away from the lens, in the frame of the first vertex.
 ///
 /// # Errors
-/// No light arrives at the point.
+/// No light arrives at the point, or that of two fields.
 pub fn scene_irradiance(
     model: &RayModel,
     wavelength: usize,
@@ -170,6 +176,7 @@ pub fn scene_irradiance(
     radiance: impl Fn(&Ray<f64>) -> f64,
     accuracy: Accuracy,
 ) -> Result<Estimate, AnalysisError> {
+    ImageFold::refuse(model, wavelength, point)?;
     let seen = SeenFromImage::new(model, wavelength, point)?;
     let backward = BackwardLens::new(model, wavelength).map_err(|_error| AnalysisError::NoLight)?;
     let region = lit_region(&seen.model, seen.model.fields[0], 0)?;
@@ -197,8 +204,8 @@ const FIELD_STEP: f64 = 0.01;
 /// that its brightness varies within a spot.
 ///
 /// # Errors
-/// No light arrives from the field or its neighbours, the lens has no image of it, or the lens is not
-/// symmetric about its axis: an element of its field is no annulus.
+/// No light arrives from the field or its neighbours, or that of another field arrives at the same point, the lens
+/// has no image of it, or the lens is not symmetric about its axis: an element of its field is no annulus.
 pub fn energy_irradiance(
     model: &RayModel,
     field: FieldPoint,
@@ -209,8 +216,10 @@ pub fn energy_irradiance(
     if system.has_poses() || !system.has_round_apertures() {
         return Err(AnalysisError::NotSymmetric);
     }
-    let element = FieldElement { model, field, wavelength, accuracy };
     let region = lit_region(model, field, wavelength)?;
+    let [x, y] = centroid(&region, accuracy)?;
+    ImageFold::refuse(model, wavelength, [x, y])?;
+    let element = FieldElement { model, field, wavelength, accuracy, square: x * x + y * y };
     let accepted = element.acceptance(&region)?;
     let [wide, narrow] =
         [element.magnification(FIELD_STEP)?, element.magnification(0.5 * FIELD_STEP)?];
@@ -227,6 +236,8 @@ struct FieldElement<'a> {
     field: FieldPoint,
     wavelength: usize,
     accuracy: Accuracy,
+    /// The square of the image height, in mm².
+    square: f64,
 }
 
 impl FieldElement<'_> {
@@ -269,6 +280,10 @@ impl FieldElement<'_> {
             self.squares(FieldPoint { x: factor * x, y: factor * y, weight })
         };
         let ([outer, far], [inner, near]) = (scaled(1.0 + step)?, scaled(1.0 - step)?);
+        // At a turn of the height an element of the field has no area to fall on.
+        if (far - self.square) * (self.square - near) < 0.0 {
+            return Err(AnalysisError::FoldedImage);
+        }
         Ok(((outer - inner) / (far - near)).abs())
     }
 

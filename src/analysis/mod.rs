@@ -20,6 +20,7 @@ mod footprint;
 mod geometric_radius;
 mod ghosts;
 mod illumination;
+mod image_fold;
 mod image_quality;
 mod mtf;
 mod path_fan;
@@ -45,7 +46,7 @@ pub use color_error::{
 pub use contrast_over_field::{ContrastAtHeight, contrast_over_field};
 pub use diffraction::{
     DiffractionGate, PointSpread, PupilCurve, PupilFunction, PupilSamples, RayTransfer, Strehl,
-    TransferRays, TransferSlopes, diffraction_gate, diffraction_mtf, encircled_energy,
+    TransferAtFrequency, TransferRays, diffraction_gate, diffraction_mtf, encircled_energy,
     encircled_energy_unless, point_spread, point_spread_unless, polychromatic_diffraction_mtf,
     polychromatic_diffraction_mtf_unless, strehl, strehl_unless, through_focus_mtf,
 };
@@ -68,6 +69,7 @@ pub use ghosts::{
 pub use illumination::{
     Illumination, energy_irradiance, illumination, image_cone, irradiance, scene_irradiance,
 };
+pub use image_fold::ImageFold;
 pub use image_quality::{ImageQuality, field_qualities, field_quality, image_quality};
 pub use mtf::{
     ContrastLimit, MtfCurve, MtfPoint, TransferValue, geometric_mtf, perfect_contrast,
@@ -144,6 +146,12 @@ pub enum AnalysisError {
     /// The edge of the pupil is not known, or it cannot be divided into parts about one point each.
     #[error("the pupil is irregular: diffraction needs an edge that is known and star-shaped")]
     IrregularPupil,
+    /// Light of two fields arrives at a point of the image.
+    #[error(
+        "the image folds: its height turns round within the field, and light of two fields arrives at this point, \
+         of which one alone would be counted"
+    )]
+    FoldedImage,
     /// The lens is not symmetric about an axis.
     #[error("the lens is not symmetric about its axis, as this number needs")]
     NotSymmetric,
@@ -167,6 +175,7 @@ impl AnalysisError {
         match self {
             Self::NoLight | Self::NoRays(_) | Self::Unbounded | Self::NoChief => true,
             Self::FoldedPupil
+            | Self::FoldedImage
             | Self::IrregularPupil
             | Self::NotSymmetric
             | Self::OnlyAxis

@@ -28,6 +28,8 @@ pub struct TermCost {
     /// The largest difference of a derivative from central differences, over the largest one; each times a step of
     /// its variable.
     pub difference: f64,
+    /// The variable whose derivative differs most; `None` where nothing does.
+    pub at: Option<String>,
     /// The reason why there is no such term; the numbers are 0 then.
     pub refused: Option<String>,
 }
@@ -45,21 +47,19 @@ pub struct TermCosts {
     pub rows: Vec<TermCost>,
 }
 
-/// The tolerance of the rays: of contrast five times this.
-const TOLERANCE: f64 = 2e-4;
 /// The times that a value is timed.
 const TURNS: usize = 15;
 
-/// Measures the terms of sharpness of a lens at a zoom position, with contrast at a frequency in cycles/mm, by every
-/// curvature, conic, asphere coefficient, thickness, index and semi-diameter that the lens has, on the thread of a
-/// pool.
+/// Measures the terms of sharpness of a lens at a zoom position, with contrast at a frequency in cycles/mm and rays
+/// that reach a tolerance, of contrast five times that, by every curvature, conic, asphere coefficient, thickness, index
+/// and semi-diameter that the lens has, on the thread of a pool.
 ///
 /// # Errors
 /// A lens without a merit.
 pub fn measure_term_costs(
     lens: &Lens,
     zoom: usize,
-    frequency: f64,
+    (frequency, tolerance): (f64, f64),
     pool: &ThreadPool,
 ) -> Result<TermCosts, MeritError> {
     let lens = with_all_variables(&at_zoom(lens, zoom));
@@ -72,7 +72,7 @@ pub fn measure_term_costs(
         Term::Mtf { frequency, min: 1.0 },
     ];
     let row = |term: Term| {
-        let found = pool.install(|| cost(&lens, term, &steps));
+        let found = pool.install(|| cost(&lens, term, &steps, tolerance));
         found.unwrap_or_else(|why| TermCost {
             term: term.name(),
             value: 0.0,
@@ -80,11 +80,12 @@ pub fn measure_term_costs(
             value_ms: 0.0,
             gradient_ms: 0.0,
             difference: 0.0,
+            at: None,
             refused: Some(why.to_string()),
         })
     };
     let rows = terms.into_iter().map(row).collect();
-    Ok(TermCosts { variables: lens.variables.len(), tolerance: TOLERANCE, frequency, rows })
+    Ok(TermCosts { variables: lens.variables.len(), tolerance, frequency, rows })
 }
 
 /// The lens with every number of its surfaces as a variable.
@@ -113,57 +114,64 @@ fn with_all_variables(lens: &Lens) -> Lens {
     lens
 }
 
-/// The steps of central differences, from the size of a lens.
+/// The steps of central differences: a small part of a wavelength in paths. Phases turn by a whole wavelength, so that
+/// steps that are small against the lens but not against that differ from a derivative by themselves.
 struct Steps {
+    /// The change of a sag at the largest rim, in mm.
+    length: f64,
     focal_length: f64,
     largest_rim: f64,
 }
 
+/// The change of a sag, in wavelengths: differences of the fourth order are wrong by 1e-5 of the change of a phase of
+/// several times that, and paths are rounded at 1e-10 wavelengths.
+const WAVES: f64 = 0.01;
+/// The change of a semi-diameter as a part of the largest one: only what is on the edge changes.
+const RIM_STEP: f64 = 1e-4;
+
 impl Steps {
     fn new(lens: &Lens) -> Result<Self, MeritError> {
-        let system = lens.resolve(0, lens.wavelengths[lens.primary()].um)?;
+        let um = lens.wavelengths[lens.primary()].um;
+        let system = lens.resolve(0, um)?;
         let data = first_order(&system, &Beam::for_lens(lens, 0));
         let data = data.map_err(crate::pupil::RayModelError::from)?;
         let rims = lens.surfaces.iter().filter_map(|row| row.semi_diameter);
         let focal_length = data.efl.map_or(100.0, f64::abs);
         let largest = rims.fold(0.0, f64::max);
         let largest_rim = if largest > 0.0 { largest } else { 0.2 * focal_length };
-        Ok(Self { focal_length, largest_rim })
+        Ok(Self { length: WAVES * 1e-3 * um, focal_length, largest_rim })
     }
 
-    /// A step that changes a ray by about the same whatever the number.
+    /// A step that changes a path by about the same whatever the number.
     fn of(&self, quantity: Quantity) -> f64 {
-        let length = STEP * self.focal_length;
-        let sag = |power: i32| length / self.largest_rim.powi(power);
+        let sag = |power: i32| self.length / self.largest_rim.powi(power);
         match quantity {
             Quantity::Curvature => 2.0 * sag(2),
             Quantity::Conic => 8.0 * sag(4) * self.focal_length.powi(3),
             Quantity::Asphere(term) => sag(2 * term as i32 + 4),
-            Quantity::Thickness | Quantity::SemiDiameter => length,
-            Quantity::Index | Quantity::Grin(_) | Quantity::Freeform(_) => STEP,
+            // A defocus changes paths by half of the square of the aperture.
+            Quantity::Thickness => self.length * (self.focal_length / self.largest_rim).powi(2),
+            Quantity::SemiDiameter => RIM_STEP * self.largest_rim,
+            Quantity::Index | Quantity::Grin(_) | Quantity::Freeform(_) => sag(1),
         }
     }
 }
 
-/// The share of the focal length by which differences change a sag.
-const STEP: f64 = 3e-6;
-
-fn cost(lens: &Lens, term: Term, steps: &Steps) -> Result<TermCost, MeritError> {
+fn cost(lens: &Lens, term: Term, steps: &Steps, tolerance: f64) -> Result<TermCost, MeritError> {
     let goal = Goal {
         terms: vec![WeightedTerm::new(term, 1.0)],
         zoom_ratios: Vec::new(),
         limits: LimitTreatment::default(),
         pupil: PupilEdge::Moving,
     };
-    let merit = Merit::new(lens, &goal, TOLERANCE)?;
+    let merit = Merit::new(lens, &goal, tolerance)?;
     let values = merit.values(lens);
     let found = merit.terms(&values)?;
-    let at = |level| time_median(3..=TURNS, || merit.evaluate(&values, level));
-    let (value, value_ms) = at(DerivativeLevel::Value);
-    let (sum, gradient_ms) = at(DerivativeLevel::Gradient);
+    let timed = |level| time_median(3..=TURNS, || merit.evaluate(&values, level));
+    let (value, value_ms) = timed(DerivativeLevel::Value);
+    let (sum, gradient_ms) = timed(DerivativeLevel::Gradient);
     let (value, sum) = (value?.value, sum?);
-    let mut largest = 0.0f64;
-    let mut difference = 0.0f64;
+    let (mut largest, mut difference, mut at) = (0.0f64, 0.0f64, None);
     for (i, variable) in merit.variables().iter().enumerate() {
         let step = steps.of(variable.parameter.quantity);
         let moved = |offset: f64| {
@@ -173,10 +181,13 @@ fn cost(lens: &Lens, term: Term, steps: &Steps) -> Result<TermCost, MeritError> 
         };
         let change = (8.0 * (moved(1.0)? - moved(-1.0)?) - (moved(2.0)? - moved(-2.0)?)) / 12.0;
         largest = largest.max(change.abs());
-        difference = difference.max((change - step * sum.gradient[i]).abs());
+        let off = (change - step * sum.gradient[i]).abs();
+        if off > difference {
+            (difference, at) = (off, Some(variable.parameter.to_string()));
+        }
     }
     let error = found.first().map_or(0.0, |term| term.error);
     let difference = if largest > 0.0 { difference / largest } else { 0.0 };
     let (term, refused) = (term.name(), None);
-    Ok(TermCost { term, value, error, value_ms, gradient_ms, difference, refused })
+    Ok(TermCost { term, value, error, value_ms, gradient_ms, difference, at, refused })
 }

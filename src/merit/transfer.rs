@@ -2,12 +2,12 @@
 //!
 //! The transfer of a field is the sum of the complex transfers of its wavelengths by weight, with phases about one
 //! image point; with `O = |O| exp(iθ)` the derivative of its modulus is `Re(exp(−iθ) dO)`, which the
-//! [derivative of each pupil's transfer](crate::analysis::TransferSlopes::gradient) gives by one trace back.
+//! [derivative of each pupil's transfer](RayTransfer::gradient) gives by one trace back, of both directions together.
 
 use super::scoped_part::ScopedPart;
 use super::sum::{DerivativeLevel, SumOfSquares};
 use super::{EvaluationContext, MeritError};
-use crate::analysis::{AnalysisError, RayTransfer, TransferSlopes};
+use crate::analysis::{AnalysisError, RayTransfer, TransferAtFrequency};
 use crate::lens::TermScope;
 use nalgebra::DVector;
 use rayon::prelude::*;
@@ -34,68 +34,84 @@ struct PupilPart<'a> {
 /// Adds the mean squared shortfalls, tangential and sagittal, of the modulation from a minimum.
 pub(super) fn add_transfer_shortfall(
     context: &EvaluationContext<'_>,
-    asked: TransferAsked,
+    wanted: TransferAsked,
     scope: TermScope,
     sum: &mut SumOfSquares,
 ) -> Result<(), MeritError> {
     let part = ScopedPart::new(context, scope)?;
-    let pupils = transfers(context, asked.tolerance, part)?;
+    let pupils = transfers(context, wanted.tolerance, part)?;
     for field in 0..context.sampling.fields.len() {
         let own: Vec<&PupilPart<'_>> = pupils.iter().filter(|pupil| pupil.field == field).collect();
         let share: f64 = own.iter().map(|pupil| pupil.weight).sum();
         let Some(first) = own.first().filter(|_| share > 0.0) else { continue };
         let origin = first.transfer.center();
-        let mut slopes = None;
-        for frequency in [[asked.frequency, 0.0], [0.0, asked.frequency]] {
-            let value = |pupil: &&PupilPart<'_>| {
-                pupil.transfer.value(frequency, origin).map(|part| pupil.weight / share * part)
-            };
-            let values: Vec<[f64; 2]> = own.par_iter().map(value).collect();
-            let [re, im] = values.iter().fold([0.0; 2], |sum, v| [sum[0] + v[0], sum[1] + v[1]]);
+        let mut asked = Vec::with_capacity(2);
+        for frequency in [[wanted.frequency, 0.0], [0.0, wanted.frequency]] {
+            let found = |pupil: &&PupilPart<'_>| pupil.transfer.at(frequency, origin);
+            let found: Vec<TransferAtFrequency> = own.par_iter().map(found).collect();
+            let [re, im] = [0, 1].map(|k| {
+                let parts = own.iter().zip(&found);
+                parts.map(|(pupil, at)| pupil.weight / share * at.value[k]).sum::<f64>()
+            });
             let modulation = re.hypot(im);
-            let shortfall = asked.min - modulation;
-            if !(shortfall > 0.0) {
-                continue;
+            let shortfall = wanted.min - modulation;
+            if shortfall > 0.0 {
+                let conjugate = if modulation > 0.0 { [re, -im] } else { [0.0; 2] };
+                let factor = conjugate.map(|part| part / modulation.max(f64::MIN_POSITIVE) / share);
+                asked.push(Shortfall { found, factor, shortfall });
             }
-            let mut slope = DVector::zeros(context.values.len());
-            if sum.level > DerivativeLevel::Value && modulation > 0.0 {
-                let slopes = match &mut slopes {
-                    Some(known) => known,
-                    empty => empty.insert(slopes_of(&own)?),
-                };
-                let turned = [re, -im].map(|part| part / modulation / share);
-                slope = modulation_slope(context, (&own, slopes), (frequency, origin), turned);
-            }
-            sum.add_residual(0.5 * share, shortfall, &-slope);
         }
+        add_shortfalls(context, &own, &asked, share, sum);
     }
     Ok(())
 }
 
-/// The derivatives of a modulation by the variables; `factor` is the conjugate of its phase over the weight of all
-/// pupils.
-fn modulation_slope(
-    context: &EvaluationContext<'_>,
-    (pupils, slopes): (&[&PupilPart<'_>], &[TransferSlopes<'_, '_>]),
-    (frequency, origin): ([f64; 2], [f64; 2]),
+/// A modulation below its minimum: the transfer of each pupil, the conjugate of the phase of all over their weight, and
+/// what is lacking.
+struct Shortfall {
+    found: Vec<TransferAtFrequency>,
     factor: [f64; 2],
-) -> DVector<f64> {
-    let slope = |(pupil, slopes): (&&PupilPart<'_>, &TransferSlopes<'_, '_>)| {
-        let factor = factor.map(|part| pupil.weight * part);
-        let by_number = slopes.gradient(frequency, origin, factor);
-        context.zoom.by_variables(context.systems, pupil.wavelength, &by_number)
-    };
-    let slopes: Vec<DVector<f64>> = pupils.par_iter().zip(slopes).map(slope).collect();
-    let zero = DVector::zeros(context.values.len());
-    slopes.into_iter().fold(zero, |total, slope| total + slope)
+    shortfall: f64,
 }
 
-/// The numbers that the derivatives of some pupils need.
-fn slopes_of<'t, 'a>(
-    pupils: &[&'t PupilPart<'a>],
-) -> Result<Vec<TransferSlopes<'t, 'a>>, MeritError> {
-    let slopes = |pupil: &&'t PupilPart<'a>| pupil.transfer.slopes().map_err(refusal);
-    pupils.par_iter().map(slopes).collect()
+/// Adds the mean square of the shortfalls of a field of some weight.
+fn add_shortfalls(
+    context: &EvaluationContext<'_>,
+    pupils: &[&PupilPart<'_>],
+    asked: &[Shortfall],
+    share: f64,
+    sum: &mut SumOfSquares,
+) {
+    if sum.level == DerivativeLevel::Normal {
+        for one in asked {
+            let slope = modulation_slope(context, pupils, [(one, 1.0)].into_iter());
+            sum.add_residual(0.5 * share, one.shortfall, &-slope);
+        }
+        return;
+    }
+    sum.value += asked.iter().map(|one| 0.5 * share * one.shortfall * one.shortfall).sum::<f64>();
+    if sum.level == DerivativeLevel::Gradient && !asked.is_empty() {
+        let by_modulation = asked.iter().map(|one| (one, -share * one.shortfall));
+        sum.gradient += modulation_slope(context, pupils, by_modulation);
+    }
+}
+
+/// The derivatives by the variables of the sum of some modulations, each times a number.
+fn modulation_slope<'s>(
+    context: &EvaluationContext<'_>,
+    pupils: &[&PupilPart<'_>],
+    asked: impl Iterator<Item = (&'s Shortfall, f64)> + Clone + Sync + Send,
+) -> DVector<f64> {
+    let slope = |(number, pupil): (usize, &&PupilPart<'_>)| {
+        let transfers = asked.clone().map(|(one, times)| {
+            (one.found[number], one.factor.map(|part| times * pupil.weight * part))
+        });
+        let by_number = pupil.transfer.gradient(transfers);
+        context.zoom.by_variables(context.systems, pupil.wavelength, &by_number)
+    };
+    let slopes: Vec<DVector<f64>> = pupils.par_iter().enumerate().map(slope).collect();
+    let zero = DVector::zeros(context.values.len());
+    slopes.into_iter().fold(zero, |total, slope| total + slope)
 }
 
 /// The transfers of the pupils that a term is about, those without light left out.

@@ -250,6 +250,14 @@ impl<'a> ExactRenderer<'a> {
         &self.sampler.directions
     }
 
+    pub(super) const fn frame(&self) -> ImageFrame {
+        self.frame
+    }
+
+    pub(super) const fn sampler(&self) -> &TileSampler {
+        &self.sampler
+    }
+
     /// The scene and the light of the pictures.
     pub(super) fn subject(&self) -> PictureSubject<'_> {
         PictureSubject {

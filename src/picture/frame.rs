@@ -69,6 +69,13 @@ impl ImageFrame {
         [0.5 + facing * (x - self.center[0]) / width, 0.5 - facing * (y - self.center[1]) / height]
     }
 
+    /// The point of the image plane, x and y in mm, at shares of the picture's width and height from its upper
+    /// left corner; the inverse of [`ImageFrame::place`].
+    pub fn at_share(&self, [right, down]: [f64; 2]) -> [f64; 2] {
+        let [columns, rows] = self.pixels;
+        self.point([0, 0], [right * columns as f64, down * rows as f64])
+    }
+
     /// The largest distance of a point of the frame from the axis, in mm.
     pub fn reach(&self) -> f64 {
         let side = |k: usize| self.center[k].abs() + 0.5 * self.pitch * self.pixels[k] as f64;

@@ -8,7 +8,7 @@
 //! the polygons, which are widened if light would be left out.
 
 use super::PictureError;
-use crate::analysis::{AnalysisError, lit_outline};
+use crate::analysis::{AnalysisError, ImageFold, lit_outline};
 use crate::pupil::RayModel;
 use rayon::prelude::*;
 use std::f64::consts::{PI, TAU};
@@ -70,13 +70,17 @@ impl LitDirections {
     /// model, in at most so many rings of equal width: in one where the light of all points is nearly alike.
     ///
     /// # Errors
-    /// The edge of the light is not known somewhere, or there is none anywhere.
+    /// The edge of the light is not known somewhere, there is none anywhere, or that of two fields somewhere.
     pub fn new(
         model: &RayModel,
         wavelengths: &[usize],
         reach: f64,
         rings: usize,
     ) -> Result<Self, PictureError> {
+        let fold = ImageFold::find(model, model.primary);
+        if let Some(ImageFold { radii: [radius, _] }) = fold.filter(|fold| fold.radii[0] < reach) {
+            return Err(PictureError::Directions { radius, source: AnalysisError::FoldedImage });
+        }
         let at = |part: f64| outlines(model, wavelengths, part * reach);
         let ends = [0.0, 0.5, 1.0].into_par_iter().map(at).collect::<Result<Vec<_>, _>>()?;
         let rings = if is_alike(&ends) { 1 } else { rings };

@@ -28,6 +28,7 @@ mod omitted;
 mod pattern;
 mod picture_data;
 mod png_file;
+mod point_images;
 mod pupil_spread;
 mod quick;
 mod raster;
@@ -59,6 +60,7 @@ pub use omitted::{IncludedEffects, OmittedEffect, omitted_beside, omitted_effect
 pub use pattern::{Paint, PaintedPoint, Pattern};
 pub use picture_data::Picture;
 pub use png_file::{BitDepth, ToneCurve, encode_colors, encode_png};
+pub use point_images::{PlacedPoint, PlacedPoints, PointGrid};
 pub use quick::{QuickPicture, QuickRenderer};
 pub use raster::Raster;
 pub use scene::{Radiance, Scene, SceneLayer};

@@ -16,7 +16,7 @@ use super::seen_light::SeenColor;
 use super::{ColorBand, ImageFrame, PictureError};
 use crate::analysis::BackwardLens;
 use crate::pupil::RayModel;
-use crate::trace::{Fates, Landings, Rays, TraceSink as _};
+use crate::trace::{Fates, Landings, Ray, Rays, TraceSink as _};
 use std::ops::Range;
 
 /// The number of rays that are traced together.
@@ -83,6 +83,9 @@ enum RayShare {
     Area(f64),
     Irradiance(f64),
 }
+
+/// The share of the irradiance that a ray stands for, the ray of the scene, and its displacement by diffraction in mm.
+pub(super) type SeenRay = (f64, Ray<f64>, [f64; 2]);
 
 /// A colour and the index of its wavelength.
 type ColorLight = (usize, usize);
@@ -308,6 +311,45 @@ impl TileSampler {
     pub(super) fn aimed(&self) -> Option<&AimedLight> {
         let of_spreads = self.spreads.as_ref().map(|spreads| spreads.aimed.as_ref());
         of_spreads.unwrap_or(self.sharp.as_ref())
+    }
+
+    /// The light that arrives at a point of the image at a wavelength of a colour, a ray for each set of numbers from
+    /// 0 to 1 that draw a direction and a displacement by diffraction: its share of the irradiance, the ray of the
+    /// scene, and the displacement in mm; `None` for one that is lost. The rays begin at a point beside it, along the
+    /// directions of the first.
+    pub(super) fn seen_from(
+        &self,
+        light: [usize; 2],
+        [point, beside]: [[f64; 2]; 2],
+        numbers: impl Iterator<Item = [f64; 4]>,
+    ) -> Vec<Option<SeenRay>> {
+        let [color, wavelength] = light;
+        let (lens, length) = (&self.lenses[color][wavelength], self.lengths[color][wavelength]);
+        let (radius, axes) = polar(point);
+        let start = |[across, along, near, far]: [f64; 4]| {
+            let by = self.spreads.as_ref().map_or([0.0; 2], |spreads| {
+                turned(spreads.draw(light, (radius, length), [near, far]), axes)
+            });
+            let (cosines, share_of) = self.direction(light, (radius, [across, along]))?;
+            let (ray, share) = lens.ray(beside, turned(cosines, axes))?;
+            let weight = match share_of {
+                RayShare::Area(area) => area * share * lens.index_ratio,
+                RayShare::Irradiance(all) => all,
+            };
+            let passed = |losses: &LensLosses| losses.passed(light, radius, cosines);
+            Some((ray, weight * self.losses.as_ref().map_or(1.0, passed), by))
+        };
+        let started: Vec<_> = numbers.map(start).collect();
+        let rays: Rays<f64> = started.iter().flatten().map(|(ray, ..)| *ray).collect();
+        let (mut landings, mut outside) = (Landings::default(), Rays::default());
+        lens.trace(&rays, &mut landings);
+        lens.scene_rays(&landings, &mut outside);
+        let mut traced = 0..rays.len();
+        let mut end = |(_, weight, by): &(Ray<f64>, f64, [f64; 2])| {
+            let i = traced.next()?;
+            landings.fate(i).is_imaged().then(|| (*weight, outside.get(i), *by))
+        };
+        started.iter().map(|started| end(started.as_ref()?)).collect()
     }
 
     /// Traces the rays of a queue that is full.

@@ -3,6 +3,7 @@
 use super::color::{BLACK, Color, GREY, gray_level};
 use super::font::glyph;
 use image::{ImageError, ImageFormat, Rgb, RgbImage};
+use png::{ColorType, Encoder, EncodingError};
 use std::io::Cursor;
 
 /// The size of a dot of a letter, in pixels.
@@ -164,6 +165,23 @@ impl Canvas {
         self.0.write_to(&mut bytes, ImageFormat::Png)?;
         Ok(bytes.into_inner())
     }
+
+    /// The same with texts by their keywords.
+    ///
+    /// # Errors
+    /// A text that PNG does not hold.
+    pub fn described_png(&self, texts: &[(&str, String)]) -> Result<Vec<u8>, EncodingError> {
+        let mut bytes = Vec::new();
+        let mut encoder = Encoder::new(&mut bytes, self.0.width(), self.0.height());
+        encoder.set_color(ColorType::Rgb);
+        for (keyword, text) in texts {
+            encoder.add_itxt_chunk((*keyword).to_owned(), text.clone())?;
+        }
+        let mut writer = encoder.write_header()?;
+        writer.write_image_data(self.pixels())?;
+        writer.finish()?;
+        Ok(bytes)
+    }
 }
 
 fn length(from: [f64; 2], to: [f64; 2]) -> f64 {
@@ -183,6 +201,24 @@ fn plain_letters(text: &str) -> String {
         ("\u{2212}", "-"),
     ];
     plain.into_iter().fold(text.to_owned(), |text, (from, to)| text.replace(from, to))
+}
+
+/// A text in lines of at most so many letters as they are drawn in pixels, broken at blanks; a longer word
+/// has a line of its own.
+pub fn wrapped_letters(text: &str, most: usize) -> Vec<String> {
+    let mut lines: Vec<(String, usize)> = Vec::new();
+    for word in text.split_whitespace() {
+        let count = plain_letters(word).chars().count();
+        match lines.last_mut() {
+            Some((line, letters)) if *letters + 1 + count <= most => {
+                line.push(' ');
+                line.push_str(word);
+                *letters += 1 + count;
+            }
+            _ => lines.push((word.to_owned(), count)),
+        }
+    }
+    lines.into_iter().map(|(line, _)| line).collect()
 }
 
 /// The approximate side of an image, in pixels.

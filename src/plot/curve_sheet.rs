@@ -2,8 +2,9 @@
 
 use super::{
     Axis, BLACK, Canvas, Chart, Color, GREY, Legend, LinePattern, PALETTE, PaperChart, Pen, Stroke,
-    TextAlign, VectorDrawing,
+    TextAlign, VectorDrawing, described_svg, wrapped_letters,
 };
+use png::EncodingError;
 
 /// A curve in pieces: it is not drawn where a quantity has no value.
 #[derive(Debug, Clone, PartialEq)]
@@ -128,36 +129,104 @@ pub struct CurveSheet {
     pub title: String,
     /// The charts of each row; those of a row share the legend of the first one.
     pub rows: Vec<Vec<CurveChart>>,
+    /// The sentences below the charts, as of the error, the rays and the time of their numbers.
+    pub caption: Vec<String>,
 }
 
 /// The size of a chart and the room around it, in mm.
 const CHART: [f64; 2] = [80.0, 50.0];
 const ROOM: [f64; 2] = [24.0, 24.0];
-/// The height of the title, and the width of the legend, in mm.
+/// The height of a title of one line, that of each further line, and the width of the legend, in mm.
 const TITLE: f64 = 10.0;
+const TITLE_LINE: f64 = 4.4;
 const LEGEND: f64 = 52.0;
+/// The height of a line of the caption and of its letters, in mm.
+const CAPTION: [f64; 2] = [3.6, 2.4];
+/// The sentences of a caption up to which each begins on a line of its own.
+const MOST_SENTENCES: usize = 12;
 /// The number of pixels of a millimetre.
 const PIXELS: f64 = 8.0;
 
 impl CurveSheet {
     /// Width and height, in mm.
     fn size(&self) -> [f64; 2] {
+        let lines = self.caption_lines().len() as f64;
+        [self.width(), self.caption_top() + lines * CAPTION[0]]
+    }
+
+    fn width(&self) -> f64 {
         let columns = self.rows.iter().map(Vec::len).max().unwrap_or(0).max(1) as f64;
-        let rows = self.rows.len().max(1) as f64;
-        [columns * (CHART[0] + ROOM[0]) + LEGEND, TITLE + rows * (CHART[1] + ROOM[1])]
+        columns * (CHART[0] + ROOM[0]) + LEGEND
+    }
+
+    /// The upper edge of the caption, in mm.
+    fn caption_top(&self) -> f64 {
+        self.title_height() + self.rows.len().max(1) as f64 * (CHART[1] + ROOM[1])
+    }
+
+    /// The caption in one text.
+    fn description(&self) -> String {
+        self.caption.join("; ")
+    }
+
+    /// The lines of a text, each no wider than the sheet in the letters of pixels, which are wider than those on
+    /// paper.
+    fn lines(&self, text: &str) -> Vec<String> {
+        let width = PIXELS * (self.width() - ROOM[0]);
+        wrapped_letters(text, Canvas::letters(width as usize))
+    }
+
+    /// The lines of the caption; its sentences begin on lines of their own unless they are many.
+    fn caption_lines(&self) -> Vec<String> {
+        if self.caption.len() > MOST_SENTENCES {
+            return self.lines(&self.description());
+        }
+        self.caption.iter().flat_map(|sentence| self.lines(sentence)).collect()
+    }
+
+    /// The lines of the title with the height of each above the first chart, in mm.
+    fn placed_title(&self) -> impl Iterator<Item = (f64, String)> {
+        let lines = self.lines(&self.title).into_iter().enumerate();
+        lines.map(|(i, line)| (TITLE_LINE * i as f64, line))
+    }
+
+    fn title_height(&self) -> f64 {
+        TITLE + TITLE_LINE * self.lines(&self.title).len().saturating_sub(1) as f64
+    }
+
+    /// The lines of the caption with their left upper corners, in mm.
+    fn placed_caption(&self) -> impl Iterator<Item = ([f64; 2], String)> {
+        let top = self.caption_top();
+        let lines = self.caption_lines().into_iter().enumerate();
+        lines.map(move |(i, line)| ([0.5 * ROOM[0], top + CAPTION[0] * i as f64], line))
+    }
+
+    /// The sheet as PNG, with title and caption as texts of the file too.
+    ///
+    /// # Errors
+    /// A text that PNG does not hold.
+    pub fn png(&self) -> Result<Vec<u8>, EncodingError> {
+        let texts = [("Title", self.title.clone()), ("Description", self.description())];
+        self.canvas().described_png(&texts)
+    }
+
+    /// The sheet as SVG, with title and caption as elements of the file too.
+    pub fn svg(&self) -> String {
+        described_svg(&self.drawing(), &self.title, &self.description())
     }
 
     /// The upper left corner of a chart, in mm.
-    fn corner(row: usize, column: usize) -> [f64; 2] {
+    fn corner(&self, row: usize, column: usize) -> [f64; 2] {
         let [width, height] = [0, 1].map(|k| CHART[k] + ROOM[k]);
-        [0.75 * ROOM[0] + column as f64 * width, TITLE + 0.4 * ROOM[1] + row as f64 * height]
+        let top = self.title_height() + 0.4 * ROOM[1];
+        [0.75 * ROOM[0] + column as f64 * width, top + row as f64 * height]
     }
 
     /// All charts with their corners, in mm.
     fn charts(&self) -> impl Iterator<Item = ([f64; 2], &CurveChart)> {
-        self.rows.iter().enumerate().flat_map(|(row, charts)| {
+        self.rows.iter().enumerate().flat_map(move |(row, charts)| {
             let of_row = charts.iter().enumerate();
-            of_row.map(move |(column, chart)| (Self::corner(row, column), chart))
+            of_row.map(move |(column, chart)| (self.corner(row, column), chart))
         })
     }
 
@@ -166,14 +235,16 @@ impl CurveSheet {
         let left = self.size()[0] - LEGEND;
         let rows = self.rows.iter().enumerate();
         rows.filter_map(move |(row, charts)| {
-            Some(([left, Self::corner(row, 0)[1]], charts.first()?))
+            Some(([left, self.corner(row, 0)[1]], charts.first()?))
         })
     }
 
     /// The sheet on paper.
     pub fn drawing(&self) -> VectorDrawing {
         let mut sheet = VectorDrawing::new(self.size());
-        sheet.text([0.5 * ROOM[0], 0.6 * TITLE], self.title.clone(), 3.4, TextAlign::Left);
+        for (down, line) in self.placed_title() {
+            sheet.text([0.5 * ROOM[0], 0.6 * TITLE + down], line, 3.4, TextAlign::Left);
+        }
         let pen = |curve: &ChartCurve| {
             let pattern = if curve.dashed { LinePattern::Dashes } else { LinePattern::Full };
             Pen::colored(curve.drawn_color()).with_width(0.35).with_pattern(pattern)
@@ -195,6 +266,9 @@ impl CurveSheet {
                 sheet.text([x + 10.0, y + 0.9], curve.name.clone(), 2.6, TextAlign::Left);
             }
         }
+        for ([x, y], line) in self.placed_caption() {
+            sheet.text([x, y + CAPTION[1]], line, CAPTION[1], TextAlign::Left);
+        }
         sheet
     }
 
@@ -205,8 +279,10 @@ impl CurveSheet {
         let stroke = |curve: &ChartCurve| {
             if curve.dashed { Stroke::Dashed } else { Stroke::Solid }
         };
-        let title = scaled([0.5 * ROOM[0], 0.2 * TITLE]);
-        canvas.text(title, &self.title, BLACK, TextAlign::Left);
+        for (down, line) in self.placed_title() {
+            let at = scaled([0.5 * ROOM[0], 0.2 * TITLE + down]);
+            canvas.text(at, &line, BLACK, TextAlign::Left);
+        }
         for (corner, chart) in self.charts() {
             let end = [corner[0] + CHART[0], corner[1] + CHART[1]];
             let [x, y] = chart.drawn_axes();
@@ -223,6 +299,9 @@ impl CurveSheet {
             for curve in chart.named_curves() {
                 legend.curve(&mut canvas, &curve.name, curve.drawn_color(), stroke(curve));
             }
+        }
+        for (corner, line) in self.placed_caption() {
+            canvas.text(scaled(corner), &line, GREY, TextAlign::Left);
         }
         canvas
     }
@@ -241,7 +320,34 @@ mod tests {
         CurveSheet {
             title: "fans".to_owned(),
             rows: vec![vec![chart.clone(), chart.clone()], vec![chart]],
+            caption: Vec::new(),
         }
+    }
+
+    /// The caption is in the drawing, in the pixels and in the texts of the files, and no line leaves the sheet.
+    #[test]
+    fn the_caption_stands_below_the_charts_and_in_the_texts_of_the_files() {
+        let note = "RMS 4.25 ± 1.0e-3 µm, 1024 rays, 2.50 ms".to_owned();
+        let sheet = CurveSheet { caption: vec![note; 9], ..sheet() };
+        let lines = sheet.caption_lines();
+        assert!(lines.len() > 1 && sheet.caption.join(" ") == lines.join(" "), "{lines:?}");
+        let joined = CurveSheet { caption: vec![sheet.caption[0].clone(); 20], ..self::sheet() };
+        assert_eq!(joined.caption_lines().join(" "), joined.description());
+        let bare = self::sheet().size();
+        assert_eq!(sheet.size(), [bare[0], bare[1] + lines.len() as f64 * CAPTION[0]]);
+        for line in &lines {
+            assert!(crate::plot::text_width(line, CAPTION[1]) < sheet.width() - ROOM[0], "{line}");
+        }
+        let svg = sheet.svg();
+        assert!(svg.contains("<title>fans</title>\n<desc>RMS 4.25 ± 1.0e-3"), "{svg}");
+        assert!(svg.contains(&format!(">{}</text>", lines[0])), "{svg}");
+        let bytes = sheet.png().unwrap();
+        let reader = png::Decoder::new(std::io::Cursor::new(&bytes)).read_info().unwrap();
+        let texts = &reader.info().utf8_text;
+        assert_eq!(texts[1].get_text().unwrap(), sheet.description());
+        let below =
+            sheet.canvas().pixels()[3 * (8.0 * bare[0] * 8.0 * bare[1]) as usize..].to_vec();
+        assert!(below.contains(&GREY[0]), "no letter below the charts");
     }
 
     #[test]
@@ -250,14 +356,15 @@ mod tests {
         assert_eq!(pieces, [vec![[0.0, 1.0], [1.0, 3.0]], vec![[3.0, 5.0], [4.0, 4.0]]]);
         let none = ChartCurve::new("", 0, [(0.0, None), (1.0, None)]);
         assert_eq!(none.pieces, Vec::<Vec<[f64; 2]>>::new());
-        assert_eq!(CurveSheet { title: String::new(), rows: Vec::new() }.drawing().marks.len(), 1);
+        let bare = CurveSheet { title: String::new(), rows: Vec::new(), caption: Vec::new() };
+        assert!(bare.drawing().marks.is_empty());
     }
 
     /// The axes end at whole steps: 0 to 4 and 1 to 5.
     #[test]
     fn the_points_of_a_curve_lie_at_their_places_on_paper() {
         let drawing = sheet().drawing();
-        let [x, y] = CurveSheet::corner(1, 0);
+        let [x, y] = sheet().corner(1, 0);
         let first = [x, y + CHART[1]];
         let found = drawing.marks.iter().any(|mark| match mark {
             Mark::Line { points, .. } => {

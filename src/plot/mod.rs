@@ -13,7 +13,9 @@ mod document;
 mod font;
 mod vector;
 
-pub use canvas::{Canvas, NamedPlot, Stroke, TextAlign, draw_image_row, gray_levels};
+pub use canvas::{
+    Canvas, NamedPlot, Stroke, TextAlign, draw_image_row, gray_levels, wrapped_letters,
+};
 pub use chart::{Axis, Chart, Legend, round_step};
 pub use color::{BLACK, Color, GREY, GRID, PALETTE, diverging, glow, gray_level};
 pub use contour::{ContourGrid, contour_curves};
@@ -21,5 +23,5 @@ pub use curve_sheet::{ChartCurve, CurveChart, CurveSheet};
 pub use document::{DocumentBlock, DocumentTable, ReportDocument, html_text, paper_pages};
 pub use vector::{
     DxfError, LinePattern, Mark, PaperChart, PdfError, Pen, SheetArc, SheetScale, VectorDrawing,
-    dxf_bytes, pdf_bytes, svg_text, text_width, wrapped,
+    described_svg, dxf_bytes, pdf_bytes, svg_text, text_width, wrapped,
 };

@@ -3,7 +3,7 @@
 use super::error::ReportError;
 use super::has_extension;
 use crate::math::ShortNumber;
-use crate::plot::{CurveChart, CurveSheet, pdf_bytes, svg_text};
+use crate::plot::{CurveChart, CurveSheet, pdf_bytes};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -61,6 +61,8 @@ pub enum FigureKind {
     Ghosts,
     /// Error against time of contrast.
     ContrastAccuracy,
+    /// Error against time of the point spread.
+    PointSpreadAccuracy,
     /// Error against time of pictures.
     PictureAccuracy,
 }
@@ -89,6 +91,7 @@ impl FigureKind {
             Self::SpotMap => "Spot over the field",
             Self::Ghosts => "Ghosts",
             Self::ContrastAccuracy => "Accuracy of MTF",
+            Self::PointSpreadAccuracy => "Accuracy of the point spread",
             Self::PictureAccuracy => "Accuracy of pictures",
         }
     }
@@ -169,9 +172,10 @@ impl AnalysisFigure {
         text
     }
 
-    /// The charts on a sheet with the name of the lens.
+    /// The charts on a sheet with the name of the lens, and the notes below them.
     pub fn sheet(&self, lens: &str) -> CurveSheet {
-        CurveSheet { title: format!("{lens}: {}", self.title), rows: self.rows.clone() }
+        let title = format!("{lens}: {}", self.title);
+        CurveSheet { title, rows: self.rows.clone(), caption: self.notes.clone() }
     }
 
     /// The bytes of a file, in the form that the ending of its name says.
@@ -184,15 +188,23 @@ impl AnalysisFigure {
         if is_drawn && self.rows.iter().flatten().all(|chart| chart.curves.is_empty()) {
             return Err(ReportError::NothingDrawn);
         }
-        Ok(match format {
-            FigureFormat::Table => self.csv().into_bytes(),
-            FigureFormat::Image => {
-                let png = self.sheet(lens).canvas().png();
-                png.map_err(|why| ReportError::Png(why.to_string()))?
-            }
-            FigureFormat::Vector => svg_text(&self.sheet(lens).drawing()).into_bytes(),
-            FigureFormat::Page => pdf_bytes(lens, &[self.sheet(lens).drawing()])?,
-        })
+        if !is_drawn {
+            return Ok(self.csv().into_bytes());
+        }
+        sheet_bytes(&self.sheet(lens), lens, path)
+    }
+}
+
+/// The bytes of the file of a sheet: .png, .svg or .pdf, as the ending of its name says.
+///
+/// # Errors
+/// Another ending, or a file that cannot be made.
+pub fn sheet_bytes(sheet: &CurveSheet, lens: &str, path: &Path) -> Result<Vec<u8>, ReportError> {
+    match FigureFormat::of(path) {
+        Some(FigureFormat::Image) => sheet.png().map_err(|why| ReportError::Png(why.to_string())),
+        Some(FigureFormat::Vector) => Ok(sheet.svg().into_bytes()),
+        Some(FigureFormat::Page) => Ok(pdf_bytes(lens, &[sheet.drawing()])?),
+        Some(FigureFormat::Table) | None => Err(ReportError::FigureEnding),
     }
 }
 
@@ -237,6 +249,8 @@ mod tests {
         assert_eq!(begins("a.pdf").unwrap(), b"%PDF");
         assert!(begins("a.svg").unwrap().starts_with(b"<"));
         assert_eq!(begins("a.txt"), Err(ReportError::FigureEnding));
+        let svg = String::from_utf8(figure().bytes("lens", Path::new("a.svg")).unwrap()).unwrap();
+        assert!(svg.contains("<desc>65 rays</desc>") && svg.contains(">65 rays</text>"), "{svg}");
         let empty = AnalysisFigure::default();
         assert_eq!(empty.bytes("lens", Path::new("a.png")), Err(ReportError::NothingDrawn));
     }

@@ -88,6 +88,7 @@ pub fn tolerance_sheet(
     Ok(CurveSheet {
         title: format!("{title}: lenses as made"),
         rows: vec![histograms.into(), yields.into(), vec![bars]],
+        caption: Vec::new(),
     })
 }
 

@@ -19,7 +19,9 @@ mod sheet;
 mod step;
 mod surface_tolerances;
 
-pub use analysis_figure::{AnalysisFigure, CurveColors, FigureFormat, FigureKind, note_number};
+pub use analysis_figure::{
+    AnalysisFigure, CurveColors, FigureFormat, FigureKind, note_number, sheet_bytes,
+};
 pub use as_built_file::{FurtherColumns, tolerance_sheet, tolerance_table};
 pub use body::{BodyError, LensBody, lens_bodies};
 pub use element_drawing::element_drawing;

@@ -213,6 +213,8 @@ pub enum PanelSetting {
     ContrastFrequency(Option<f64>),
     /// True to measure error against time of contrast.
     ContrastAccuracy(bool),
+    /// True to measure error against time of the point spread.
+    PointSpreadAccuracy(bool),
     /// True to measure error against time of pictures.
     PictureAccuracy(bool),
     /// True to compute the wavefronts of the fields.
@@ -242,6 +244,8 @@ pub enum PanelSetting {
     PictureOptions(Box<PictureOptions>),
     /// True to measure the error of the picture everywhere.
     PictureErrors(bool),
+    /// True to compute the images of points over the picture.
+    PicturePoints(bool),
     /// True to compute the lens as it is made.
     Tolerances(bool),
     /// The class of care in making of a lens without tolerances of its own.

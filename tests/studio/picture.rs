@@ -117,3 +117,14 @@ fn the_error_is_measured_everywhere_only_while_it_is_shown() {
     harness.run_steps(2);
     assert!(asked(&harness));
 }
+
+/// The images of points are computed while they are shown, and the picture says that they are.
+#[test]
+fn images_of_points_are_asked_for_while_they_are_shown() {
+    let mut harness = bench(double_gauss());
+    harness.get_by_label("Points").click();
+    harness.run_steps(2);
+    let last = harness.state().commands.last().cloned();
+    assert!(matches!(last, Some(Command::Show(PanelSetting::PicturePoints(true)))), "{last:?}");
+    harness.get_by_label("Computing the images of points …");
+}

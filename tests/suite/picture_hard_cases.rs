@@ -1,7 +1,7 @@
 //! Hard cases of pictures that are about sums, noise and threads: a number with its error, never a NaN.
 //!
 //! The cases of wavefronts and of rays are in `image_hard_cases`: 1, 3, 5, 7, 10, 12, 13, 14, 16 and a smear longer
-//! than the frame (19). Case 15 is `planes_close_to_the_lens_have_numbers` in `pictures` and the unit tests of scenes,
+//! than the frame (19). Case 11 is in `folded_image`. Case 15 is `planes_close_to_the_lens_have_numbers` in `pictures` and the unit tests of scenes,
 //! 17 those of coatings, and 18 that of sensors and the exposure without time below.
 
 use crate::pictures::{bundled, samples};

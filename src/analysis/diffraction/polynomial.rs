@@ -27,29 +27,22 @@ pub(super) struct WavePolynomial {
 /// numbers from those by the coefficients.
 #[derive(Debug, Clone)]
 pub(super) struct SampleFit {
-    basis: PolynomialBasis,
-    /// The degrees in both cosines of every term.
-    degrees: Vec<[usize; 2]>,
     /// The orthogonal columns, and the columns of the triangular matrix.
     columns: Vec<Vec<f64>>,
     triangle: Vec<Vec<f64>>,
     roots: Vec<f64>,
 }
 
-/// Even or odd powers of the first cosine, or all.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Parity {
-    All,
-    Even,
-    Odd,
+/// The Chebyshev polynomials of one cosine at some places, and their derivatives by it.
+#[derive(Debug, Clone)]
+pub(super) struct ChebyshevLanes {
+    pub(super) values: [Lanes; LARGEST_DEGREE + 1],
+    pub(super) slopes: [Lanes; LARGEST_DEGREE + 1],
 }
 
-/// The Chebyshev polynomials of both coordinates at a point, and their derivatives by these.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct BasisPoint {
-    values: [[f64; LARGEST_DEGREE + 1]; 2],
-    slopes: [[f64; LARGEST_DEGREE + 1]; 2],
-}
+/// A number of each of some places or columns that are computed together.
+pub(super) type Lanes = [f64; LANES];
+pub(super) const LANES: usize = 8;
 
 /// A sample of a pupil: its cosines, the two values there, and its weight.
 #[derive(Debug, Clone, Copy)]
@@ -76,6 +69,15 @@ pub(super) struct ColumnPolynomials {
 /// The largest number of columns that are computed together, and a number of each.
 pub(super) const WIDTH: usize = 64;
 pub(super) type Row = [f64; WIDTH];
+
+impl ChebyshevLanes {
+    pub(super) fn zero() -> Self {
+        Self {
+            values: [[0.0; LANES]; LARGEST_DEGREE + 1],
+            slopes: [[0.0; LANES]; LARGEST_DEGREE + 1],
+        }
+    }
+}
 
 impl PolynomialBasis {
     /// The basis of the largest degree with at most `terms` terms over the box of some points.
@@ -105,19 +107,31 @@ impl PolynomialBasis {
         Self { degree: degree.min(LARGEST_DEGREE), ..Self::new(points, 0, even) }
     }
 
-    /// The Chebyshev polynomials at a point and their derivatives.
-    pub(super) fn at_point(&self, p: [f64; 2]) -> BasisPoint {
-        let values = self.factors(p);
-        let slopes = [0, 1].map(|k| {
-            let x = (p[k] - self.center[k]) / self.half[k];
-            let mut slopes = [0.0; LARGEST_DEGREE + 1];
-            slopes[1] = 1.0;
-            for i in 2..=self.degree {
-                slopes[i] = 2.0 * (values[k][i - 1] + x * slopes[i - 1]) - slopes[i - 2];
+    /// The Chebyshev polynomials of a coordinate at some places, with their derivatives; meant for [`run_vectorized`].
+    #[inline(always)]
+    pub(super) fn fill(&self, axis: usize, places: &Lanes, found: &mut ChebyshevLanes) {
+        let inverse = 1.0 / self.half[axis];
+        let twice = places.map(|place| 2.0 * inverse * (place - self.center[axis]));
+        let ChebyshevLanes { values, slopes } = found;
+        (values[0], slopes[0]) = ([1.0; LANES], [0.0; LANES]);
+        (values[1], slopes[1]) = (twice.map(|v| 0.5 * v), [inverse; LANES]);
+        for n in 2..=self.degree {
+            for k in 0..LANES {
+                values[n][k] = twice[k] * values[n - 1][k] - values[n - 2][k];
+                slopes[n][k] = 2.0 * inverse * values[n - 1][k] + twice[k] * slopes[n - 1][k]
+                    - slopes[n - 2][k];
             }
-            slopes.map(|slope| slope / self.half[k])
-        });
-        BasisPoint { values, slopes }
+        }
+    }
+
+    /// The largest total degree.
+    pub(super) fn degree(&self) -> usize {
+        self.degree
+    }
+
+    /// True if only even powers of the first cosine occur.
+    pub(super) fn is_even(&self) -> bool {
+        self.even
     }
 
     /// The point of the box at fractions of its sides.
@@ -126,7 +140,7 @@ impl PolynomialBasis {
     }
 
     /// The degrees in both cosines of every term, by rising total degree.
-    fn degrees(&self) -> impl Iterator<Item = [usize; 2]> + use<> {
+    pub(super) fn degrees(&self) -> impl Iterator<Item = [usize; 2]> + use<> {
         let step = if self.even { 2 } else { 1 };
         (0..=self.degree).flat_map(move |n| (0..=n).step_by(step).map(move |i| [i, n - i]))
     }
@@ -228,20 +242,13 @@ fn orthogonalize(columns: &mut [Vec<f64>]) -> Vec<Vec<f64>> {
 }
 
 impl SampleFit {
-    /// The terms of a parity through samples, and the polynomials through the values of these for terms that are
-    /// not odd; `None` for fewer samples than terms.
+    /// The terms of a basis through samples, and the polynomials through the values of these; `None` for fewer
+    /// samples than terms.
     pub(super) fn new(
         basis: &PolynomialBasis,
-        parity: Parity,
         samples: &[FitSample],
     ) -> Option<(Self, WavePolynomial)> {
-        let (first, step) = match parity {
-            Parity::All => (0, 1),
-            Parity::Even => (0, 2),
-            Parity::Odd => (1, 2),
-        };
-        let of_degree = |n: usize| (first..=n).step_by(step).map(move |i| [i, n - i]);
-        let degrees: Vec<[usize; 2]> = (0..=basis.degree).flat_map(of_degree).collect();
+        let degrees: Vec<[usize; 2]> = basis.degrees().collect();
         let count = degrees.len();
         if samples.len() < count {
             return None;
@@ -262,32 +269,12 @@ impl SampleFit {
         columns.truncate(count);
         triangle.truncate(count);
         let is_finite = triangle.iter().flatten().all(|v| v.is_finite());
-        let basis = basis.clone();
-        is_finite.then_some((Self { basis, degrees, columns, triangle, roots }, polynomial))
-    }
-
-    pub(super) fn basis(&self) -> &PolynomialBasis {
-        &self.basis
+        is_finite.then_some((Self { columns, triangle, roots }, polynomial))
     }
 
     /// The number of terms.
     pub(super) fn terms(&self) -> usize {
-        self.degrees.len()
-    }
-
-    /// Adds `value` times every term at a point, and `slopes` times its derivatives by both cosines.
-    pub(super) fn add_terms(
-        &self,
-        at: &BasisPoint,
-        value: f64,
-        slopes: [f64; 2],
-        sums: &mut [f64],
-    ) {
-        let ([u, v], [du, dv]) = (&at.values, &at.slopes);
-        for (sum, [i, j]) in sums.iter_mut().zip(&self.degrees) {
-            let along = slopes[0] * du[*i] * v[*j] + slopes[1] * u[*i] * dv[*j];
-            *sum += value * u[*i] * v[*j] + along;
-        }
+        self.columns.len()
     }
 
     /// The derivatives by the numbers at the samples from those by the coefficients of their polynomial.
@@ -299,10 +286,16 @@ impl SampleFit {
             parts[k] = (parts[k] - rest) / row[k];
         }
         let mut by = vec![0.0; self.roots.len()];
-        for (column, part) in self.columns.iter().zip(&parts) {
-            by.iter_mut().zip(column).for_each(|(by, unit)| *by += part * unit);
-        }
-        by.iter_mut().zip(&self.roots).for_each(|(by, root)| *by *= root);
+        run_vectorized(
+            SimdWidth::detect(),
+            #[inline(always)]
+            || {
+                for (column, part) in self.columns.iter().zip(&parts) {
+                    by.iter_mut().zip(column).for_each(|(by, unit)| *by += part * unit);
+                }
+                by.iter_mut().zip(&self.roots).for_each(|(by, root)| *by *= root);
+            },
+        );
         by
     }
 }
@@ -319,18 +312,13 @@ fn back_substituted(triangle: &[Vec<f64>], right: &[f64]) -> Vec<f64> {
 }
 
 impl WavePolynomial {
-    /// The path difference in waves and the amplitude at a point, each with its derivatives by both cosines.
-    pub(super) fn with_slopes(&self, at: &BasisPoint) -> [[f64; 3]; 2] {
-        let ([u, v], [du, dv]) = (&at.values, &at.slopes);
-        self.terms.each_ref().map(|terms| {
-            terms.iter().fold([0.0; 3], |sum, ([i, j], c)| {
-                [
-                    sum[0] + c * u[*i] * v[*j],
-                    sum[1] + c * du[*i] * v[*j],
-                    sum[2] + c * u[*i] * dv[*j],
-                ]
-            })
-        })
+    /// The terms of the path difference in waves and of the amplitude: the degrees in both cosines and the coefficient.
+    pub(super) fn terms(&self) -> &[Vec<([usize; 2], f64)>; 2] {
+        &self.terms
+    }
+
+    pub(super) fn basis(&self) -> &PolynomialBasis {
+        &self.basis
     }
 
     /// The largest total degree of a term.

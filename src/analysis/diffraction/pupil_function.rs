@@ -3,6 +3,7 @@
 use super::column_sum::ColumnPair;
 use super::outline::{ArcSteps, Chain, PupilCurve};
 use super::overlap::{OverlapHalf, Strip};
+use super::overlap_slopes::{OverlapSlopes, TermSlopes};
 use super::polynomial::{FitSample, PolynomialBasis, WavePolynomial};
 use super::pupil_samples::PupilSamples;
 use super::pupil_traces::{PupilTraces, TracedLight};
@@ -321,15 +322,22 @@ impl PupilFunction {
         found.map_or(([0.0; 2], 0), |found| (found.value, found.order))
     }
 
-    /// The nodes of an order of the overlap of two shifted pupils, each with its weight; those of half of it count
-    /// twice.
-    pub(super) fn overlap_nodes(&self, shift: TransferShift, order: usize) -> Vec<([f64; 2], f64)> {
-        let of_part = |part: &OverlapPart<'_>| {
-            let factor = part.factor;
-            let nodes = part.strip.nodes(part.counts(order)).into_iter();
-            nodes.map(move |node| (node.at, factor * node.weight)).collect::<Vec<_>>()
-        };
-        self.parts(shift).iter().flat_map(of_part).collect()
+    /// Adds the derivatives of the real part of a complex factor times the overlap integral of an order, by what a
+    /// displacement of the light does; the nodes along an arc of the edge that resolve the phase there as well.
+    pub(super) fn add_overlap_slopes(
+        &self,
+        (shift, order): (TransferShift, usize),
+        factor: [f64; 2],
+        by: &mut TermSlopes,
+    ) -> usize {
+        let mut slopes = OverlapSlopes::new(&self.polynomial, shift, factor);
+        let mut along_edge = 0;
+        for part in self.parts(shift) {
+            let counts = part.counts(order);
+            slopes.add(&part.strip, part.factor, counts, by);
+            along_edge = along_edge.max(counts[0] + counts[1]);
+        }
+        along_edge
     }
 
     /// The integral of the squared amplitude between the curves.

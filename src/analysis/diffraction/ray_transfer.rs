@@ -10,11 +10,14 @@
 //! and the edge moves by the rays that make it and by those that begin or cease to pass. The transfer
 //! `∫ f(α + s) f*(α − s)` changes by the integral of this over the overlap of the two pupils, and along its edges.
 //! `δα` and `δW` are polynomials through their values at the rays of a quadrature, as f is: what the integrals ask of
-//! the coefficients is carried back to the rays, and the rays back through the lens, all variables at once. The
+//! the coefficients is carried back to the rays, and the rays back through the lens, all variables and frequencies at
+//! once. The
 //! centre of the reference sphere moves with the chief ray, unless that is blocked; its radius is held.
 
 use super::outline::{ArcSteps, derivative};
-use super::polynomial::{FitSample, Parity, PolynomialBasis, SampleFit};
+use super::overlap::rule;
+use super::overlap_slopes::{PupilPoints, TermSlopes};
+use super::polynomial::{FitSample, LANES, Lanes, PolynomialBasis, SampleFit};
 use super::pupil_function::{PupilFunction, TransferShift};
 use super::pupil_traces::TracedLight;
 use crate::analysis::AnalysisError;
@@ -64,22 +67,27 @@ pub struct RayTransfer<'a> {
     region: Region<'a>,
     sphere: ReferenceSphere,
     function: PupilFunction,
-    /// The polynomials of what is even in the first cosine of a pupil that is its own mirror image, or of all.
-    even: SampleFit,
-    samples: Vec<FitSample>,
-    /// The pupil point of each sample, and the end of its ray with its path.
+    /// The polynomials through the samples; even in the first cosine of a pupil that is its own mirror image.
+    fit: SampleFit,
+    /// The first cosine of each sample, its pupil point, and the end of its ray with its path.
+    first_cosines: Vec<f64>,
     points: Vec<[f64; 2]>,
     ends: Vec<(Ray<f64>, f64)>,
     arcs: Vec<CosineArc>,
     tolerance: f64,
 }
 
-/// The derivatives of a transfer function.
-#[derive(Debug)]
-pub struct TransferSlopes<'t, 'a> {
-    transfer: &'t RayTransfer<'a>,
-    /// The polynomials of what is odd in the first cosine, where they are others.
-    odd: Option<SampleFit>,
+/// A transfer at a spatial frequency, with what its derivatives need.
+#[derive(Debug, Clone, Copy)]
+pub struct TransferAtFrequency {
+    /// The complex transfer, with phases counted from an image point.
+    pub value: [f64; 2],
+    frequency: [f64; 2],
+    /// The factor that counts phases from that point in place of the centre of the sphere.
+    turn: Complex,
+    /// The transfer about the centre of the sphere, and the order of its overlap integral.
+    centered: Complex,
+    order: usize,
 }
 
 /// An arc of the edge in direction cosines.
@@ -100,8 +108,7 @@ struct CosineArc {
 /// Derivatives of a number by the coefficients of the path difference and of the cosines, and by the motion of the
 /// points of each arc.
 struct CoefficientSlopes {
-    waves: Vec<f64>,
-    cosines: [Vec<f64>; 2],
+    terms: TermSlopes,
     motion: Vec<Vec<f64>>,
     /// By the centre of the sphere, which turns the phase.
     center: [f64; 2],
@@ -112,8 +119,17 @@ struct CoefficientSlopes {
 struct Asked {
     shift: TransferShift,
     factor: Complex,
-    /// The order of the overlap integral.
-    order: usize,
+    /// The nodes that resolve the phase along an arc of the edge.
+    along_edge: usize,
+}
+
+/// An arc that is looked at.
+#[derive(Debug, Clone, Copy)]
+struct LookedArc<'t> {
+    arc: &'t CosineArc,
+    /// The places of its points from 0 to 1, and the cosines at the ends of its parts.
+    places: &'t [f64],
+    ends: &'t [[f64; 2]],
 }
 
 impl<'a> RayTransfer<'a> {
@@ -137,9 +153,8 @@ impl<'a> RayTransfer<'a> {
         let samples: Vec<FitSample> = (0..light.cosines.len()).map(sample).collect();
         let points = samples.iter().map(|sample| sample.cosines);
         let basis = PolynomialBasis::of_degree(points, rays.degree, light.mirrored);
-        let parity = if light.mirrored { Parity::Even } else { Parity::All };
-        let fit = SampleFit::new(&basis, parity, &samples);
-        let (even, polynomial) = fit.ok_or(AnalysisError::IrregularPupil)?;
+        let fit = SampleFit::new(&basis, &samples);
+        let (fit, polynomial) = fit.ok_or(AnalysisError::IrregularPupil)?;
         let (arcs, steps) = cosine_arcs(region, &sphere, tolerance)?;
         let curves = arcs.iter().map(|arc| (arc.nodes(), arc.edge.begins_at_corner, arc.sign));
         let energy = light.energy();
@@ -147,7 +162,8 @@ impl<'a> RayTransfer<'a> {
         let function = PupilFunction::of_fit((polynomial, energy), wavelength, (curves, steps));
         let (region, points) = (region.clone(), light.points);
         let ends = traced.ends_of(&points);
-        Ok(Self { region, sphere, function, even, samples, points, ends, arcs, tolerance })
+        let first_cosines = samples.iter().map(|sample| sample.cosines[0]).collect();
+        Ok(Self { region, sphere, function, fit, first_cosines, points, ends, arcs, tolerance })
     }
 
     /// The image point that phases are counted from, x and y in mm.
@@ -160,10 +176,12 @@ impl<'a> RayTransfer<'a> {
         self.points.len()
     }
 
-    /// The complex transfer at a spatial frequency in cycles/mm, with phases counted from an image point.
-    pub fn value(&self, frequency: [f64; 2], origin: [f64; 2]) -> Complex {
-        let found = self.function.transfer(frequency, 0.0, self.tolerance);
-        product([found.re, found.im], self.turn(frequency, origin))
+    /// The transfer at a spatial frequency in cycles/mm, with phases counted from an image point.
+    pub fn at(&self, frequency: [f64; 2], origin: [f64; 2]) -> TransferAtFrequency {
+        let (centered, order) = self.function.transfer_and_order(frequency, self.tolerance);
+        let turn = self.turn(frequency, origin);
+        let value = product(centered, turn);
+        TransferAtFrequency { value, frequency, turn, centered, order }
     }
 
     /// The factor that counts phases from an image point in place of the centre of the sphere.
@@ -172,20 +190,6 @@ impl<'a> RayTransfer<'a> {
         let along = |k: usize| frequency[k] * (center[k] - origin[k]);
         let (sin, cos) = (-TAU * (along(0) + along(1))).sin_cos();
         [cos, sin]
-    }
-
-    /// The numbers that its derivatives need.
-    ///
-    /// # Errors
-    /// The rays do not tell the polynomials.
-    pub fn slopes(&self) -> Result<TransferSlopes<'_, 'a>, AnalysisError> {
-        let odd = if self.function.is_even() {
-            let fit = SampleFit::new(self.even.basis(), Parity::Odd, &self.samples);
-            Some(fit.ok_or(AnalysisError::IrregularPupil)?.0)
-        } else {
-            None
-        };
-        Ok(TransferSlopes { transfer: self, odd })
     }
 
     /// The derivatives of numbers of a ray on the sphere by its landing: of its path difference and of its cosines.
@@ -205,107 +209,47 @@ impl<'a> RayTransfer<'a> {
         AdjointSeed { point: vector(0), direction: vector(3), opl: slope(6) }
     }
 
-    /// The parts of an arc whose points moved back by the whole shift lie in the pupil.
-    fn lit_parts(
-        &self,
-        arc: &CosineArc,
-        places: &[f64],
-        shift: TransferShift,
-        sense: f64,
-    ) -> Vec<(f64, f64)> {
-        let is_lit = |u: f64| {
-            let place = arc.place(&chebyshev_weights(places, u));
-            self.function.covers([0, 1].map(|k| place[k] - 2.0 * sense * shift.cosines[k]))
-        };
-        let step = 1.0 / ARC_PARTS as f64;
-        let lit: Vec<bool> = (0..=ARC_PARTS).map(|i| is_lit(step * i as f64)).collect();
-        let mut parts = Vec::new();
-        for i in 0..ARC_PARTS {
-            let (from, to) = (step * i as f64, step * (i + 1) as f64);
-            match (lit[i], lit[i + 1]) {
-                (true, true) => parts.push((from, to)),
-                (false, false) => {}
-                (true, false) => parts.push((from, change(is_lit, from, to))),
-                (false, true) => parts.push((change(is_lit, to, from), to)),
-            }
-        }
-        parts
-    }
-}
-
-impl TransferSlopes<'_, '_> {
-    /// The polynomials of what is even in the first cosine, and of what is odd.
-    fn fits(&self) -> [&SampleFit; 2] {
-        let even = &self.transfer.even;
-        [even, self.odd.as_ref().unwrap_or(even)]
-    }
-
-    /// The derivative of the real part of `factor` times the transfer at a frequency, by every number of the lens.
+    /// The derivatives of a sum by every number of the lens: of the real parts of transfers, each times a complex
+    /// factor.
     pub fn gradient(
         &self,
-        frequency: [f64; 2],
-        origin: [f64; 2],
-        factor: [f64; 2],
+        asked: impl IntoIterator<Item = (TransferAtFrequency, [f64; 2])>,
     ) -> SystemGradient<f64> {
-        let transfer = self.transfer;
-        let factor = product(factor, transfer.turn(frequency, origin));
-        let [even, odd] = self.fits();
+        let function = &self.function;
         let mut by = CoefficientSlopes {
-            waves: vec![0.0; even.terms()],
-            cosines: [odd, even].map(|fit| vec![0.0; fit.terms()]),
-            motion: transfer.arcs.iter().map(|arc| vec![0.0; arc.shares.len()]).collect(),
+            terms: TermSlopes::zero(self.fit.terms()),
+            motion: self.arcs.iter().map(|arc| vec![0.0; arc.shares.len()]).collect(),
             center: [0.0; 2],
         };
-        let function = &transfer.function;
-        let shift = function.shift(frequency, 0.0);
-        let (value, order) = function.transfer_and_order(frequency, transfer.tolerance);
-        // Where the mirror image cancels the sine, its factor asks for nothing.
-        let is_real = function.is_even() && frequency[1] == 0.0;
-        let factor = if is_real { [factor[0], 0.0] } else { factor };
-        let factor = factor.map(|part| part / function.energy());
-        let asked = Asked { shift, factor, order };
-        self.add_interior(asked, &mut by);
-        let [value, turned] = product(factor, value);
-        by.center = frequency.map(|nu| TAU * nu * turned * function.energy());
-        for (arc, number) in transfer.arcs.iter().zip(0..) {
-            self.add_arc(asked, (arc, number), value, &mut by);
+        let mut parts = Vec::new();
+        let mut value = 0.0;
+        for (at, factor) in asked {
+            let factor = product(factor, at.turn);
+            let shift = function.shift(at.frequency, 0.0);
+            // Where the mirror image cancels the sine, its factor asks for nothing.
+            let is_real = function.is_even() && at.frequency[1] == 0.0;
+            let factor = if is_real { [factor[0], 0.0] } else { factor };
+            let factor = factor.map(|part| part / function.energy());
+            let along_edge = function.add_overlap_slopes((shift, at.order), factor, &mut by.terms);
+            let [own, turned] = product(factor, at.centered);
+            value += own;
+            for k in [0, 1] {
+                by.center[k] += TAU * at.frequency[k] * turned * function.energy();
+            }
+            parts.push(Asked { shift, factor, along_edge });
+        }
+        for (arc, number) in self.arcs.iter().zip(0..) {
+            self.add_arc((&parts, value), (arc, number), &mut by);
         }
         self.by_numbers(&by)
-    }
-
-    /// Adds the integral over the overlap of the two pupils.
-    fn add_interior(&self, Asked { shift, factor, order }: Asked, by: &mut CoefficientSlopes) {
-        let [even, odd] = self.fits();
-        let function = &self.transfer.function;
-        for (node, weight) in function.overlap_nodes(shift, order) {
-            let [plus, minus] = [1.0, -1.0].map(|sign| {
-                let place = [0, 1].map(|k| node[k] + sign * shift.cosines[k]);
-                let at = even.basis().at_point(place);
-                (function.polynomial().with_slopes(&at), at)
-            });
-            let ([w_plus, a_plus], [w_minus, a_minus]) = (plus.0, minus.0);
-            let (sin, cos) = (-TAU * (w_plus[0] - w_minus[0])).sin_cos();
-            let size = weight * a_plus[0] * a_minus[0];
-            let [re, im] = product(factor, [size * cos, size * sin]);
-            for (sign, at, w, a) in
-                [(1.0, &plus.1, w_plus, a_plus), (-1.0, &minus.1, w_minus, a_minus)]
-            {
-                even.add_terms(at, sign * TAU * im, [0.0; 2], &mut by.waves);
-                // −Re(c ∂f/f) of the first factor, of the conjugate of the second.
-                let along = |k: usize| -(re * a[1 + k] / a[0] + sign * TAU * im * w[1 + k]);
-                odd.add_terms(at, along(0), [-0.5 * re, 0.0], &mut by.cosines[0]);
-                even.add_terms(at, along(1), [0.0, -0.5 * re], &mut by.cosines[1]);
-            }
-        }
     }
 
     /// Adds what an arc of the edge brings: the flux of its rays through it, and that of its motion among the rays,
     /// which changes the energy as well.
     fn add_arc(
         &self,
-        asked: Asked,
+        (asked, value): (&[Asked], f64),
         (arc, number): (&CosineArc, usize),
-        value: f64,
         by: &mut CoefficientSlopes,
     ) {
         let places: Vec<f64> = chebyshev_points(arc.shares.len()).collect();
@@ -318,78 +262,124 @@ impl TransferSlopes<'_, '_> {
                 *by -= arc.sign * weight * value * share * energy;
             });
         }
-        for sense in [1.0, -1.0] {
-            for (from, to) in self.transfer.lit_parts(arc, &places, asked.shift, sense) {
-                for (u, weight) in legendre_rule(ARC_NODES) {
-                    let at = chebyshev_weights(&places, from + u * (to - from));
-                    self.add_edge_node(
-                        asked,
-                        (arc, number),
-                        (&at, weight * (to - from), sense),
-                        by,
-                    );
+        let end = |i| arc.place(&chebyshev_weights(&places, i as f64 / ARC_PARTS as f64));
+        let ends: Vec<[f64; 2]> = (0..=ARC_PARTS).map(end).collect();
+        let looked = LookedArc { arc, places: &places, ends: &ends };
+        let mut points = PupilPoints::new(self.function.polynomial());
+        for one in asked {
+            for sense in [1.0, -1.0] {
+                for (from, to) in self.lit_parts(looked, one.shift, sense) {
+                    let count = ((to - from) * one.along_edge as f64).ceil() as usize + EDGE_NODES;
+                    let node = |(u, weight)| (from + u * (to - from), weight * (to - from));
+                    let nodes: Vec<(f64, f64)> = rule(count).into_iter().map(node).collect();
+                    for nodes in nodes.chunks(LANES) {
+                        let part = (*one, sense);
+                        self.add_edge_nodes(part, (looked, nodes), &mut points, (number, by));
+                    }
                 }
             }
         }
     }
 
-    /// Adds a node of the edge, given by the shares of the points of its arc.
-    fn add_edge_node(
+    /// The parts of an arc whose points moved back by the whole shift lie in the pupil.
+    fn lit_parts(
         &self,
-        Asked { shift, factor, .. }: Asked,
-        (arc, number): (&CosineArc, usize),
-        (at, weight, sense): (&[f64], f64, f64),
-        by: &mut CoefficientSlopes,
+        LookedArc { arc, places, ends }: LookedArc<'_>,
+        shift: TransferShift,
+        sense: f64,
+    ) -> Vec<(f64, f64)> {
+        let is_lit = |place: [f64; 2]| {
+            self.function.covers([0, 1].map(|k| place[k] - 2.0 * sense * shift.cosines[k]))
+        };
+        let is_lit_at = |u: f64| is_lit(arc.place(&chebyshev_weights(places, u)));
+        let lit: Vec<bool> = ends.iter().map(|place| is_lit(*place)).collect();
+        let end = |i: usize| i as f64 / ARC_PARTS as f64;
+        let mut parts = Vec::new();
+        let mut from = 0.0;
+        for i in 0..ARC_PARTS {
+            match (lit[i], lit[i + 1]) {
+                (true, false) => parts.push((from, change(is_lit_at, end(i), end(i + 1)))),
+                (false, true) => from = change(is_lit_at, end(i + 1), end(i)),
+                _ => {}
+            }
+        }
+        if lit[ARC_PARTS] {
+            parts.push((from, 1.0));
+        }
+        parts
+    }
+
+    /// Adds some nodes of the edge, each given by its place on the arc from 0 to 1 and by its weight.
+    fn add_edge_nodes(
+        &self,
+        (Asked { shift, factor, .. }, sense): (Asked, f64),
+        (LookedArc { arc, places, .. }, nodes): (LookedArc<'_>, &[(f64, f64)]),
+        points: &mut PupilPoints<'_>,
+        (number, by): (usize, &mut CoefficientSlopes),
     ) {
-        let [even, odd] = self.fits();
-        let function = &self.transfer.function;
-        let (place, slope) = (arc.place(at), arc.slope(at));
-        let basis = even.basis().at_point(place);
-        let other = [0, 1].map(|k| place[k] - 2.0 * sense * shift.cosines[k]);
-        let [waves, amplitude] = function.polynomial().at(place);
-        let [other_waves, other_amplitude] = function.polynomial().at(other);
-        let (sin, cos) = (-TAU * sense * (waves - other_waves)).sin_cos();
-        let size = weight * arc.sign * amplitude * other_amplitude;
-        let flux = product(factor, [size * cos, size * sin])[0];
-        let outwards = arc.sense * flux;
-        odd.add_terms(&basis, -outwards * slope[1], [0.0; 2], &mut by.cosines[0]);
-        even.add_terms(&basis, outwards * slope[0], [0.0; 2], &mut by.cosines[1]);
-        let moved = by.motion[number].iter_mut().zip(at.iter().zip(&arc.shares));
-        let density = flux / (amplitude * amplitude);
-        moved.for_each(|(by, (share, energy))| *by += density * share * energy);
+        let shares: Vec<Vec<f64>> =
+            nodes.iter().map(|(u, _)| chebyshev_weights(places, *u)).collect();
+        // Nodes that are not there repeat the last one without a weight.
+        let lanes = |of: &dyn Fn(usize) -> f64| -> Lanes {
+            std::array::from_fn(|k| of(k.min(nodes.len() - 1)))
+        };
+        let weights: Lanes =
+            std::array::from_fn(|k| nodes.get(k).map_or(0.0, |(_, weight)| *weight));
+        let place = [0, 1].map(|k| lanes(&|i| mixed(&arc.cosines[k], &shares[i])));
+        let slope = [0, 1].map(|k| lanes(&|i| mixed(&arc.slopes[k], &shares[i])));
+        let other = [0, 1].map(|k| place[k].map(|v| v - 2.0 * sense * shift.cosines[k]));
+        let [other_waves, other_amplitude] = points.go_to(&other);
+        let [waves, amplitude] = points.go_to(&place);
+        let flux: Lanes = std::array::from_fn(|k| {
+            let (sin, cos) = (-TAU * sense * (waves[k] - other_waves[k])).sin_cos();
+            let size = weights[k] * arc.sign * amplitude[k] * other_amplitude[k];
+            product(factor, [size * cos, size * sin])[0]
+        });
+        let outwards = |sign: f64, axis: usize| -> Lanes {
+            std::array::from_fn(|k| sign * arc.sense * flux[k] * slope[axis][k])
+        };
+        points.add_displacements([outwards(-1.0, 1), outwards(1.0, 0)], &mut by.terms);
+        for (k, shares) in shares.iter().enumerate() {
+            let density = flux[k] / (amplitude[k] * amplitude[k]);
+            let moved = by.motion[number].iter_mut().zip(shares.iter().zip(&arc.shares));
+            moved.for_each(|(by, (share, energy))| *by += density * share * energy);
+        }
     }
 
     /// The derivatives by every number of the lens.
     fn by_numbers(&self, by: &CoefficientSlopes) -> SystemGradient<f64> {
-        let [even, odd] = self.fits();
-        let transfer = self.transfer;
-        let waves = even.by_samples(&by.waves);
-        let across = odd.by_samples(&by.cosines[0]);
-        let along = even.by_samples(&by.cosines[1]);
-        let launch = &transfer.region.launch;
-        let chief = &transfer.sphere.chief;
-        let points = transfer.points.iter().chain([chief]);
+        let waves = self.fit.by_samples(&by.terms.waves);
+        let [mut across, along] = by.terms.cosines.each_ref().map(|list| self.fit.by_samples(list));
+        if self.function.is_even() {
+            // Its polynomial is that of the displacement over the first cosine; none of half of a pupil is 0.
+            let over = across.iter_mut().zip(&self.first_cosines);
+            over.for_each(|(by, cosine)| *by /= cosine);
+        }
+        let launch = &self.region.launch;
+        let chief = &self.sphere.chief;
+        let points = self.points.iter().chain([chief]);
         let rays: Rays<f64> = points.filter_map(|p| launch.ray(*p)).collect();
         let seed = |(i, (ray, path)): (usize, &(Ray<f64>, f64))| {
-            transfer.seed(*ray, *path, [waves[i], across[i], along[i]])
+            self.seed(*ray, *path, [waves[i], across[i], along[i]])
         };
-        let mut seeds: Vec<AdjointSeed<f64>> = transfer.ends.iter().enumerate().map(seed).collect();
+        let mut seeds: Vec<AdjointSeed<f64>> = self.ends.iter().enumerate().map(seed).collect();
         // Numbers of rays on the sphere depend on their distance from its centre.
         let mut center = seeds.iter().fold(Vec3::default(), |sum, seed| sum - seed.point);
-        center.x = if transfer.function.is_even() { 0.0 } else { center.x + by.center[0] };
+        center.x = if self.function.is_even() { 0.0 } else { center.x + by.center[0] };
         center.y += by.center[1];
         seeds.push(AdjointSeed { point: center, ..AdjointSeed::default() });
         let seed = |i: usize| seeds.get(i).copied().unwrap_or_default();
         let mut total = launch.channel().tracer.gradient(&rays, seed);
-        let arcs: Vec<&EdgeArc> = transfer.arcs.iter().map(|arc| &arc.edge).collect();
-        total.add(&transfer.region.motion_of_arcs(&arcs, &by.motion), 1.0);
+        let arcs: Vec<&EdgeArc> = self.arcs.iter().map(|arc| &arc.edge).collect();
+        total.add(&self.region.motion_of_arcs(&arcs, &by.motion), 1.0);
         total
     }
 }
 
-/// The parts of an arc that are looked at for light across it, and the nodes of each.
+/// The parts of an arc that are looked at for light across it, and the nodes of a whole arc besides those that its
+/// phase needs.
 const ARC_PARTS: usize = 24;
-const ARC_NODES: usize = 5;
+const EDGE_NODES: usize = 10;
 /// The halvings that find where light across an arc ends.
 const HALVINGS: usize = 34;
 
@@ -414,10 +404,6 @@ impl CosineArc {
 
     fn place(&self, shares: &[f64]) -> [f64; 2] {
         self.cosines.each_ref().map(|values| mixed(values, shares))
-    }
-
-    fn slope(&self, shares: &[f64]) -> [f64; 2] {
-        self.slopes.each_ref().map(|values| mixed(values, shares))
     }
 }
 

@@ -1,19 +1,20 @@
 //! The curves of an analysis as a picture or on paper: a row of charts for each field.
 
-use super::{AnalysisReport, AnalysisRun, FieldOutcome, TextLines, field_charts};
+use super::{AnalysisReport, AnalysisRun, FieldOutcome, TextLines, caption, field_charts};
 use crate::cli::error::CliError;
 use crate::cli::output::ShortNumber;
 use crate::files;
 use crate::lens::FieldKind;
-use crate::plot::{CurveChart, CurveSheet, pdf_bytes, svg_text};
-use crate::report::has_extension;
+use crate::plot::{CurveChart, CurveSheet};
+use crate::report::sheet_bytes;
+use serde::Serialize;
 use std::path::Path;
 
 /// The extensions of the files that can be written.
 pub(super) const EXTENSIONS: [&str; 3] = ["png", "svg", "pdf"];
 
 /// Draws a result into a file: over the field, or for each field that has light.
-pub(super) fn save<T: TextLines>(
+pub(super) fn save<T: TextLines + Serialize>(
     run: &AnalysisRun,
     report: &AnalysisReport<T>,
     path: &Path,
@@ -27,23 +28,24 @@ pub(super) fn save<T: TextLines>(
     }
     // The rest of the title explains the printed table.
     let title = T::TITLE.split([';', ':']).next().unwrap_or_default();
-    let sheet = CurveSheet { title: format!("{lens}: {title}"), rows };
-    let bytes = if has_extension(path, "png") {
-        sheet.canvas().png().map_err(|why| fail(why.to_string()))?
-    } else if has_extension(path, "svg") {
-        svg_text(&sheet.drawing()).into_bytes()
-    } else {
-        pdf_bytes(lens, &[sheet.drawing()]).map_err(|why| fail(why.to_string()))?
-    };
+    let value = serde_json::to_value(report).map_err(|why| fail(why.to_string()))?;
+    let caption = caption::caption(&value, unit(report.field_kind));
+    let sheet = CurveSheet { title: format!("{lens}: {title}"), rows, caption };
+    let bytes = sheet_bytes(&sheet, lens, path).map_err(|why| fail(why.to_string()))?;
     Ok(files::write_atomic(path, &bytes)?)
+}
+
+/// The unit of the fields, as it follows a number.
+const fn unit(kind: FieldKind) -> &'static str {
+    match kind {
+        FieldKind::Angle => " deg",
+        FieldKind::ObjectHeight | FieldKind::ImageHeight => " mm",
+    }
 }
 
 /// The charts of each field, with its name before their titles.
 fn rows<T: TextLines>(report: &AnalysisReport<T>) -> Vec<Vec<CurveChart>> {
-    let unit = match report.field_kind {
-        FieldKind::Angle => " deg",
-        FieldKind::ObjectHeight | FieldKind::ImageHeight => " mm",
-    };
+    let unit = unit(report.field_kind);
     let row = |field: &super::AtField<T>| {
         let FieldOutcome::Transmitted(found) = &field.outcome else { return None };
         let (x, y) = (ShortNumber(field.x), ShortNumber(field.y));

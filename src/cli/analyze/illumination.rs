@@ -28,12 +28,14 @@ pub(super) struct IlluminationJson {
     points: Vec<PointLight>,
 }
 
-/// The irradiance at a point of the image, in mm; `None` where no light arrives.
+/// The irradiance at a point of the image, in mm; `None` where no light arrives or where it is not known.
 #[derive(Clone, Serialize)]
 struct PointLight {
     x: f64,
     y: f64,
     irradiance: Option<Estimate>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    refused: Option<String>,
 }
 
 /// The contrast of a wave.
@@ -71,7 +73,13 @@ fn point_lights(run: &AnalysisRun, scene: Option<&Scene>) -> Vec<PointLight> {
             }
         });
         let timed = |e| Estimate { milliseconds: Some(ms), ..e };
-        PointLight { x: point[0], y: point[1], irradiance: found.ok().map(timed) }
+        let refused = found.as_ref().err().filter(|why| !why.is_loss_of_light());
+        PointLight {
+            x: point[0],
+            y: point[1],
+            refused: refused.map(ToString::to_string),
+            irradiance: found.ok().map(timed),
+        }
     };
     run.points.iter().map(at).collect()
 }
@@ -130,11 +138,12 @@ impl TextLines for IlluminationJson {
         lines.extend(self.energy.iter().map(|e| estimate_text("by energy", e)));
         lines.push(estimate_text("cone", &self.cone));
         lines.extend(self.relative_cone.iter().map(|e| estimate_text("relative cone", e)));
-        lines.extend(self.points.iter().map(|PointLight { x, y, irradiance }| {
+        lines.extend(self.points.iter().map(|PointLight { x, y, irradiance, refused }| {
             let place = format!("at {}, {} mm", ShortNumber(*x), ShortNumber(*y));
+            let why = refused.as_deref().unwrap_or("no light");
             irradiance
                 .as_ref()
-                .map_or_else(|| format!("{place}: no light"), |light| estimate_text(&place, light))
+                .map_or_else(|| format!("{place}: {why}"), |light| estimate_text(&place, light))
         }));
         lines.extend(self.dark.clone());
         lines

@@ -1,5 +1,6 @@
 //! `analyze`: the results that a designer reads, each number with its error, rays and milliseconds.
 
+mod caption;
 mod charts;
 mod chief;
 mod color;

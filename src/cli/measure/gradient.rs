@@ -3,7 +3,7 @@
 use super::plot::{self, Color, ErrorChart, ErrorCurve, LegendEntry, PlotArgs, Stroke};
 use crate::cli::error::CliError;
 use crate::cli::failures::Failures;
-use crate::cli::input::LensFile;
+use crate::cli::input::{LensFile, Tolerance};
 use crate::cli::output::{Output, ShortNumber, TextTable};
 use crate::cli::progress::{stop_flag, with_bar};
 use crate::measure::{
@@ -34,6 +34,10 @@ pub(super) struct MeasureGradientArgs {
     #[arg(long, value_name = "NU", default_value_t = 20.0)]
     frequency: f64,
 
+    /// Tolerance of the rays of the terms, of contrast five times that: `0.1%` or `1e-3`
+    #[arg(long, value_name = "TOLERANCE", default_value = "2e-4")]
+    tolerance: Tolerance,
+
     #[command(flatten)]
     plot: PlotArgs,
 }
@@ -56,7 +60,8 @@ impl MeasureGradientArgs {
         let measured = measured.map_err(|e| CliError::Input(format!("{}: {e}", opened.file)))?;
         let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build();
         let pool = pool.map_err(|error| CliError::Failed(error.to_string()))?;
-        let terms = measure_term_costs(&opened.lens, self.zoom, self.frequency, &pool);
+        let asked = (self.frequency, self.tolerance.0);
+        let terms = measure_term_costs(&opened.lens, self.zoom, asked, &pool);
         let terms = terms.map_err(|e| CliError::Input(format!("{}: {e}", opened.file)))?;
         let mut failures = Failures::default();
         failures.note(self.plot.write(|| draw_curves(&measured, &opened.lens.name)));
@@ -144,6 +149,7 @@ fn term_costs(rows: &[TermCost]) -> TextTable {
         "with gradient",
         "ratio",
         "off differences",
+        "by the",
     ]);
     for row in rows.iter().filter(|row| row.refused.is_none()) {
         table.row([
@@ -154,6 +160,7 @@ fn term_costs(rows: &[TermCost]) -> TextTable {
             format!("{:.3}", row.gradient_ms),
             format!("{:.2}", row.gradient_ms / row.value_ms),
             format!("{:.0e}", row.difference),
+            row.at.clone().unwrap_or_default(),
         ]);
     }
     table

@@ -14,7 +14,7 @@ pub use dxf_file::{DxfError, dxf_bytes};
 pub use letters::{text_width, wrapped};
 pub use pdf_file::{PdfError, pdf_bytes};
 pub(in crate::plot) use svg_file::escaped;
-pub use svg_file::svg_text;
+pub use svg_file::{described_svg, svg_text};
 
 use super::canvas::TextAlign;
 use super::color::{BLACK, Color, GREY};

@@ -8,10 +8,24 @@ const FAMILY: &str = "Ubuntu, 'DejaVu Sans', Helvetica, Arial, sans-serif";
 
 /// The drawing as SVG, which is also what an HTML page contains.
 pub fn svg_text(drawing: &VectorDrawing) -> String {
+    svg_file(drawing, "")
+}
+
+/// The same with a title and a description, which viewers show and search engines read.
+pub fn described_svg(drawing: &VectorDrawing, title: &str, description: &str) -> String {
+    let element = |name: &str, text: &str| match text {
+        "" => String::new(),
+        text => format!("<{name}>{}</{name}>\n", escaped(text)),
+    };
+    svg_file(drawing, &(element("title", title) + &element("desc", description)))
+}
+
+/// The file with elements before its marks.
+fn svg_file(drawing: &VectorDrawing, first: &str) -> String {
     let [w, h] = drawing.size.map(number);
     let mut svg = format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{w}mm\" height=\"{h}mm\" \
-         viewBox=\"0 0 {w} {h}\" font-family=\"{FAMILY}\">\n\
+         viewBox=\"0 0 {w} {h}\" font-family=\"{FAMILY}\">\n{first}\
          <rect width=\"{w}\" height=\"{h}\" fill=\"#ffffff\"/>\n"
     );
     for mark in &drawing.marks {

@@ -19,6 +19,7 @@ mod slow;
 mod slow_analyses;
 mod wavefronts;
 
+pub(super) use accuracy::field_name;
 pub use accuracy::{AccuracyCurves, AccuracyPoint};
 pub use as_built::{AsBuiltLens, confirm_as_built, predict_as_built};
 pub use contrast::{FieldContrast, FieldContrasts};
@@ -29,6 +30,7 @@ pub use picture_options::{PictureEffect, PictureFocus, PictureOptions};
 pub use pupils::FieldPupils;
 pub use ray_images::{FieldRayImage, RayImages};
 pub use scene::{PictureScene, SceneFile};
+use scene_picture::PictureExtras;
 pub use scene_picture::ScenePicture;
 pub use wavefronts::{FieldWavefront, FieldWavefronts, PointImage, PointImages};
 
@@ -115,6 +117,8 @@ pub struct Analyses {
     /// Error against time of contrast, or the reason why it is not known; `None` while no panel shows it, and
     /// at first.
     pub contrast_accuracy: Option<Arc<Timed<Result<AccuracyCurves, String>>>>,
+    /// The same of the point spread.
+    pub point_spread_accuracy: Option<Arc<Timed<Result<AccuracyCurves, String>>>>,
     /// The same of pictures.
     pub picture_accuracy: Option<Arc<Timed<Result<AccuracyCurves, String>>>>,
     /// A scene through the lens, or the reason why there is none; `None` while no panel shows it.
@@ -269,10 +273,12 @@ fn refine(mut results: AnalysisResults, output: &AnalysisOutput) -> AnalysisResu
         }
     }
     if settings.picture && !output.is_interrupted() {
-        let (lens, all) = (&results.lens, settings.picture_errors);
+        let lens = &results.lens;
+        let extras =
+            PictureExtras { all_tiles: settings.picture_errors, points: settings.picture_points };
         let is_interrupted = output.interruption();
         let subject = (&scene, &settings.picture_options);
-        let draw = || scene_picture::fine_picture(lens, zoom, subject, all, &is_interrupted);
+        let draw = || scene_picture::fine_picture(lens, zoom, subject, extras, &is_interrupted);
         let fine = time(|| catch_panic(draw));
         // A part of a picture is worth less than a coarse one.
         if fine.value.as_ref().map_or(true, |fine| fine.picture.complete) {
@@ -389,6 +395,7 @@ impl Analyses {
             point_images: None,
             ray_images: None,
             contrast_accuracy: None,
+            point_spread_accuracy: None,
             picture_accuracy: None,
             picture,
             as_built: None,
@@ -568,12 +575,18 @@ pub struct AnalysisSettings {
     /// The options of the picture.
     #[serde(default)]
     pub picture_options: PictureOptions,
+    /// True if error against time of the point spread is measured, because the panel shows it.
+    #[serde(default)]
+    pub point_spread_accuracy: bool,
     /// True if error against time of pictures is measured, because the panel shows it.
     #[serde(default)]
     pub picture_accuracy: bool,
     /// True if the error of the picture is measured everywhere, because a panel shows it.
     #[serde(default)]
     pub picture_errors: bool,
+    /// True if the images of points over the picture are computed, because a panel shows them.
+    #[serde(default)]
+    pub picture_points: bool,
     /// True if the lens as it is made is computed, because a panel shows it.
     #[serde(default)]
     pub tolerances: bool,
@@ -634,8 +647,10 @@ impl Default for AnalysisSettings {
             scene: BuiltInScene::default(),
             scene_file: None,
             picture_options: PictureOptions::default(),
+            point_spread_accuracy: false,
             picture_accuracy: false,
             picture_errors: false,
+            picture_points: false,
             tolerances: false,
             grade: ToleranceGrade::default(),
             good_rms: None,

@@ -6,12 +6,12 @@
 use super::{PictureEffect, PictureOptions, PictureScene};
 use crate::analysis::Estimate;
 use crate::lens::{Lens, Object};
-use crate::measure::{PictureEffects, time_ms};
+use crate::measure::{PictureEffects, tile_ms, time_ms};
 use crate::picture::{
     ColorBand, Coloring, ErrorMap, ErrorShare, ExactRenderer, ExactSettings, GateSubject,
     GhostLight, GhostReport, GroupFocus, ImageFrame, LightLosses, LossReport, MID_GREY, Picture,
-    PictureError, PictureGate, QuickPicture, QuickRenderer, Scene, ToleranceSplit, field_diagonal,
-    focused, picture_model,
+    PictureError, PictureGate, PlacedPoints, PointGrid, QuickPicture, QuickRenderer, Scene,
+    ToleranceSplit, field_diagonal, focused, picture_model,
 };
 use crate::pupil::RayModel;
 use std::ops::ControlFlow;
@@ -31,6 +31,8 @@ pub struct ScenePicture {
     pub error: Option<Estimate>,
     /// The error tile by tile; `None` where it is not measured.
     pub error_map: Option<ErrorMap>,
+    /// The images of points over the frame; `None` where nobody asked.
+    pub points: Option<PlacedPoints>,
     /// The parts of the tolerance that effects use; none of a coarse picture.
     pub shares: Vec<ErrorShare>,
     /// The distance in mm to which the lens is focused; `None` at infinity.
@@ -57,6 +59,8 @@ const TILES: usize = 4;
 const SAMPLES: usize = 32;
 /// The samples of a pixel if all tiles are compared.
 const MAP_SAMPLES: usize = 16;
+/// The places of images of points, their cells and their rays.
+const POINTS: PointGrid = PointGrid { places: [5, 3], cells: 33, samples: 4096 };
 /// The wavelengths of a colour where a coating changes light with the wavelength.
 const COATED: usize = 3;
 /// The most rays of a colour of a pixel.
@@ -82,12 +86,21 @@ pub(super) fn coarse_picture(
         let camera = Camera::new((lens, zoom), scene, options, (COARSE, 1))?;
         let painted = scene.build(&camera.model, &camera.frame, camera.distance)?;
         let exact = camera.plain(&painted)?;
-        let (picture, device, _) = camera.quick(&exact, options)?;
+        let (picture, device, _) = camera.quick(&exact, options, 0.0)?;
         let left_out = vec!["all but rays: it is coarse".to_owned()];
         let taken = TakenPicture { device, left_out, ..TakenPicture::new(picture) };
         Ok(camera.finish(scene, options, taken))
     };
     make().map_err(|error| error.to_string())
+}
+
+/// The results that are computed beside a fine picture.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct PictureExtras {
+    /// Its error on all tiles.
+    pub(super) all_tiles: bool,
+    /// The images of points over its frame.
+    pub(super) points: bool,
 }
 
 /// A fine picture of a lens with its error on some tiles, or on all of them; without an error, or incomplete, once
@@ -96,7 +109,7 @@ pub(super) fn fine_picture(
     lens: &Lens,
     zoom: usize,
     (scene, options): (&PictureScene, &PictureOptions),
-    all_tiles: bool,
+    extras: PictureExtras,
     is_interrupted: Interruption<'_>,
 ) -> Result<ScenePicture, String> {
     let make = || -> Result<ScenePicture, PictureError> {
@@ -104,7 +117,7 @@ pub(super) fn fine_picture(
         let camera = Camera::new((lens, zoom), scene, options, (FINE, colors))?;
         let painted = scene.build(&camera.model, &camera.frame, camera.distance)?;
         let painted = painted.moving(options.velocity)?;
-        let taken = camera.take(&painted, (lens, options), all_tiles, is_interrupted)?;
+        let taken = camera.take(&painted, (lens, options), extras, is_interrupted)?;
         Ok(camera.finish(scene, options, taken))
     };
     make().map_err(|error| error.to_string())
@@ -126,6 +139,7 @@ struct TakenPicture {
     device: Option<String>,
     error: Option<Estimate>,
     error_map: Option<ErrorMap>,
+    points: Option<PlacedPoints>,
     shares: Vec<ErrorShare>,
     is_exact: bool,
     gates: Option<Vec<PictureGate>>,
@@ -139,6 +153,7 @@ impl TakenPicture {
             device: None,
             error: None,
             error_map: None,
+            points: None,
             shares: Vec::new(),
             is_exact: false,
             gates: None,
@@ -183,14 +198,15 @@ impl Camera {
         options: &PictureOptions,
         taken: TakenPicture,
     ) -> ScenePicture {
-        let TakenPicture { picture, device, error, error_map, shares, is_exact, gates, left_out } =
-            taken;
+        let TakenPicture { picture, device, error, error_map, .. } = taken;
+        let TakenPicture { points, shares, is_exact, gates, left_out, .. } = taken;
         ScenePicture {
             scene: scene.clone(),
             options: options.clone(),
             picture,
             error,
             error_map,
+            points,
             shares,
             focus: self.focus,
             breathing: self.breathing,
@@ -201,15 +217,17 @@ impl Camera {
         }
     }
 
-    /// A picture the quick way, the device that made it, and its time in milliseconds.
+    /// A picture the quick way of a scene that moves for some seconds, the device that made it, and its time in
+    /// milliseconds.
     fn quick(
         &self,
         exact: &ExactRenderer<'_>,
         options: &PictureOptions,
+        seconds: f64,
     ) -> Result<(Picture, Option<String>, f64), PictureError> {
         let go_on = AtomicBool::new(false);
         let (made, ms) = time_ms(|| -> Result<QuickPicture, PictureError> {
-            let quick = QuickRenderer::new(&self.model, &self.bands, exact)?;
+            let quick = QuickRenderer::exposed(&self.model, &self.bands, exact, seconds)?;
             if options.processor {
                 let picture = quick.render_until(&go_on);
                 return Ok(QuickPicture { picture, device: None, refused: None });
@@ -225,18 +243,19 @@ impl Camera {
         &self,
         painted: &Scene,
         (lens, options): (&Lens, &PictureOptions),
-        all_tiles: bool,
+        extras: PictureExtras,
         is_interrupted: Interruption<'_>,
     ) -> Result<TakenPicture, PictureError> {
         let mut split = split(options);
         let mut left_out = Vec::new();
         let renderer = self.renderer(painted, (lens, options), &mut split, &mut left_out)?;
         let seconds = self.moving_seconds(painted, options, &mut left_out);
-        let mut taken = if options.exact || seconds > 0.0 {
+        let mut taken = if options.exact {
             exact_picture(&renderer, (split.rest(SAMPLING), seconds), is_interrupted)
         } else {
-            let compared = if all_tiles { (usize::MAX, MAP_SAMPLES) } else { (TILES, SAMPLES) };
-            self.compared(&renderer, options, compared, is_interrupted)?
+            let compared =
+                if extras.all_tiles { (usize::MAX, MAP_SAMPLES) } else { (TILES, SAMPLES) };
+            self.compared(&renderer, (options, seconds), compared, is_interrupted)?
         };
         taken.left_out = left_out;
         if is_interrupted() {
@@ -247,6 +266,10 @@ impl Camera {
         let mean = taken.picture.mean() / (MID_GREY * taken.picture.white);
         split.note(DIFFRACTION, renderer.diffraction().map_or(0.0, |found| found.error(mean)));
         taken.shares = split.shares().to_vec();
+        if extras.points {
+            taken.points =
+                renderer.placed_points(&self.bands, POINTS, self.distance, is_interrupted);
+        }
         if options.effects && !is_interrupted() {
             let effects = PictureEffects {
                 lens,
@@ -260,13 +283,29 @@ impl Camera {
                 coating: options.coating,
                 diffraction: renderer.diffraction(),
                 losses: renderer.losses(),
-                is_sharp: None,
-                rings: None,
+                is_sharp: Some(renderer.is_sharp()),
+                rings: Some(renderer.rings()),
                 ghosts: ghosts.as_ref().map(|(report, ms)| (report, *ms)),
             };
-            taken.gates = Some([effects.of_scene()?, effects.of_light()?].concat());
+            let mut gates = [effects.of_scene()?, effects.of_light()?].concat();
+            if let Some(gate) = gates.iter_mut().find(|gate| gate.effect == "lateral colour") {
+                // The picture has a wavelength for each colour at least.
+                gate.on = true;
+                gate.saved_milliseconds = Some(self.color_ms(painted)?);
+            }
+            taken.gates = Some(gates);
         }
         Ok(taken)
+    }
+
+    /// The time in milliseconds that one wavelength for all colours saves on some tiles.
+    fn color_ms(&self, painted: &Scene) -> Result<f64, PictureError> {
+        let one =
+            vec![ColorBand { wavelengths: vec![(self.model.primary, 1.0)] }; self.bands.len()];
+        let with = |bands: &[ColorBand]| {
+            tile_ms(|| ExactRenderer::new(&self.model, bands, painted, self.frame), 0.0)
+        };
+        Ok(with(&self.bands)? - with(&one)?)
     }
 
     /// Rays with diffraction and losses as far as the options and the lens allow them.
@@ -332,12 +371,12 @@ impl Camera {
     fn compared(
         &self,
         renderer: &ExactRenderer<'_>,
-        options: &PictureOptions,
+        (options, seconds): (&PictureOptions, f64),
         tiles: (usize, usize),
         is_interrupted: Interruption<'_>,
     ) -> Result<TakenPicture, PictureError> {
-        let (picture, device, ms) = self.quick(renderer, options)?;
-        let map = ErrorMap::measure_until(renderer, &picture, tiles, is_interrupted);
+        let (picture, device, ms) = self.quick(renderer, options, seconds)?;
+        let map = ErrorMap::of_exposure(renderer, &picture, (tiles, seconds), is_interrupted);
         let error_map = (!is_interrupted()).then_some(map);
         let timed = |map: &ErrorMap| Estimate { milliseconds: Some(ms), ..map.rms() };
         let error = error_map.as_ref().map(timed);
@@ -402,4 +441,58 @@ fn split(options: &PictureOptions) -> ToleranceSplit {
     let all = [(SAMPLING, true), (DIFFRACTION, true), (LOSSES, coated), (GHOSTS, coated)];
     let effects: Vec<&str> = all.iter().filter(|(_, on)| *on).map(|(name, _)| *name).collect();
     ToleranceSplit::new(options.tolerance, &effects)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::measure::double_gauss;
+    use crate::picture::BuiltInScene;
+
+    /// A small picture of a star that moves to the right by some hundredths of its distance while it is exposed.
+    fn taken(speed: f64, exact: bool) -> TakenPicture {
+        let lens = double_gauss();
+        let velocity = [speed, 0.0];
+        let seconds = Some(0.5);
+        let options = PictureOptions {
+            velocity,
+            seconds,
+            exact,
+            processor: true,
+            effects: !exact,
+            tolerance: 0.03,
+            ..PictureOptions::default()
+        };
+        let scene = PictureScene::BuiltIn(BuiltInScene::Star);
+        let camera = Camera::new((&lens, 0), &scene, &options, ([24, 16], 1)).unwrap();
+        let painted = scene.build(&camera.model, &camera.frame, camera.distance).unwrap();
+        let painted = painted.moving(options.velocity).unwrap();
+        let extras = PictureExtras { all_tiles: true, points: false };
+        camera.take(&painted, (&lens, &options), extras, &|| false).unwrap()
+    }
+
+    /// A scene that moves is smeared the quick way too, as rays from every pixel smear it; and every effect that costs time by
+    /// itself has its time, lateral colour among them.
+    #[test]
+    fn a_scene_that_moves_is_smeared_the_quick_way() {
+        let [still, moving, exact] =
+            [(0.0, false), (0.1, false), (0.1, true)].map(|(v, e)| taken(v, e));
+        assert!(!still.is_exact && !moving.is_exact && exact.is_exact);
+        let apart = |a: &TakenPicture, b: &TakenPicture| {
+            let pairs = a.picture.values.iter().flatten().zip(b.picture.values.iter().flatten());
+            let count = 3.0 * a.picture.values.len() as f64;
+            (pairs.map(|(a, b)| (a - b).powi(2)).sum::<f64>() / count).sqrt()
+                / (MID_GREY * a.picture.white)
+        };
+        let (smeared, wrong) = (apart(&still, &moving), apart(&moving, &exact));
+        assert!(smeared > 0.2 && wrong < 0.3 * smeared, "{smeared} {wrong}");
+        let measured = moving.error.unwrap().value;
+        assert!(measured < 2.0 * wrong + 0.03, "{measured} {wrong}");
+        let gates = moving.gates.unwrap();
+        let saved =
+            |name: &str| gates.iter().find(|gate| gate.effect == name).unwrap().saved_milliseconds;
+        for name in ["lateral colour", "blur", "vignetting", "motion", "diffraction"] {
+            assert!(saved(name).is_some_and(f64::is_finite), "{name}");
+        }
+    }
 }

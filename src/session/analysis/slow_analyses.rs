@@ -23,6 +23,7 @@ pub(super) struct SlowAnalyses {
     point_images: SlowAnalysis<PointImages>,
     ray_images: SlowAnalysis<RayImages>,
     contrast_accuracy: SlowAnalysis<Result<AccuracyCurves, String>>,
+    point_spread_accuracy: SlowAnalysis<Result<AccuracyCurves, String>>,
     picture_accuracy: SlowAnalysis<Result<AccuracyCurves, String>>,
 }
 
@@ -56,6 +57,7 @@ impl SlowAnalyses {
             point_images: point_images(),
             ray_images: ray_images(),
             contrast_accuracy: contrast_accuracy(),
+            point_spread_accuracy: point_spread_accuracy(),
             picture_accuracy: picture_accuracy(),
         }
     }
@@ -74,6 +76,7 @@ impl SlowAnalyses {
         let results = self.ray_images.publish(results, output);
         let results = self.point_images.publish(results, output);
         let results = self.contrast_accuracy.publish(results, output);
+        let results = self.point_spread_accuracy.publish(results, output);
         self.picture_accuracy.publish(results, output)
     }
 }
@@ -86,6 +89,20 @@ fn contrast_accuracy() -> SlowAnalysis<Result<AccuracyCurves, String>> {
             accuracy::contrast_accuracy(model, spots, interrupted)
         },
         slot: |analyses| &mut analyses.contrast_accuracy,
+        known: None,
+    }
+}
+
+fn point_spread_accuracy() -> SlowAnalysis<Result<AccuracyCurves, String>> {
+    SlowAnalysis {
+        is_asked: |settings| {
+            settings.wavefronts && settings.point_images && settings.point_spread_accuracy
+        },
+        compute: |AnalysisResults { lens, settings, .. }, analyses, interrupted| {
+            let fields = lens.fields_at(settings.zoom);
+            accuracy::point_spread_accuracy(&analyses.ray_model.value, fields, interrupted)
+        },
+        slot: |analyses| &mut analyses.point_spread_accuracy,
         known: None,
     }
 }

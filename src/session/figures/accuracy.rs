@@ -12,6 +12,12 @@ pub(super) fn contrast(subject: &Subject<'_>) -> Result<Option<AnalysisFigure>, 
     found.map(|found| figure(found, "lg error of contrast")).transpose()
 }
 
+/// The error of the point spread against the time that it takes.
+pub(super) fn point_spread(subject: &Subject<'_>) -> Result<Option<AnalysisFigure>, String> {
+    let found = subject.numbers.point_spread_accuracy.as_deref();
+    found.map(|found| figure(found, "lg error, share of a perfect peak")).transpose()
+}
+
 /// The error of a picture against the time that it takes.
 pub(super) fn picture(subject: &Subject<'_>) -> Result<Option<AnalysisFigure>, String> {
     let found = subject.numbers.picture_accuracy.as_deref();
@@ -27,14 +33,14 @@ fn figure(
 ) -> Result<AnalysisFigure, String> {
     let curves = found.value.as_ref().map_err(Clone::clone)?;
     let chart = |axes: [&'static str; 2], of: fn(&AccuracyPoint) -> [f64; 2]| {
-        let curve = |(i, (name, points)): (usize, &(&'static str, Vec<AccuracyPoint>))| {
+        let curve = |(i, (name, points)): (usize, &(String, Vec<AccuracyPoint>))| {
             let mut places: Vec<[f64; 2]> = points.iter().map(of).collect();
             // One way has one error: a cross in place of a curve.
             if let [place] = places[..] {
-                return ChartCurve::crosses(*name, i, &[place], 0.1);
+                return ChartCurve::crosses(name, i, &[place], 0.1);
             }
             places.sort_by(|a, b| a[0].total_cmp(&b[0]));
-            ChartCurve::new(*name, i, places.into_iter().map(|[x, y]| (x, Some(y))))
+            ChartCurve::new(name, i, places.into_iter().map(|[x, y]| (x, Some(y))))
         };
         let drawn = curves.ways.iter().enumerate().filter(|(_, (_, points))| !points.is_empty());
         CurveChart::new("Accuracy and time", axes, drawn.map(curve).collect())

@@ -7,9 +7,9 @@ mod fans;
 mod field;
 mod wavefront;
 
-use super::analysis::{Analyses, AnalysisResults};
+use super::analysis::{Analyses, AnalysisResults, field_name};
 use crate::analysis::Estimate;
-use crate::lens::{FieldKind, FieldPoint, Fields};
+use crate::lens::{FieldKind, Fields};
 use crate::report::{AnalysisFigure, FigureKind, note_number};
 
 /// The figure of an analysis.
@@ -44,6 +44,7 @@ pub fn analysis_figure(
         FigureKind::SpotMap => beams::spot_map(&subject)?,
         FigureKind::Ghosts => beams::ghosts(&subject)?,
         FigureKind::ContrastAccuracy => accuracy::contrast(&subject)?,
+        FigureKind::PointSpreadAccuracy => accuracy::point_spread(&subject)?,
         FigureKind::PictureAccuracy => accuracy::picture(&subject)?,
     };
     let figure = figure.ok_or_else(|| {
@@ -63,7 +64,7 @@ impl Subject<'_> {
     /// The name of a field.
     fn field(&self, index: usize) -> String {
         let point = self.fields.values.get(index);
-        point.map_or_else(String::new, |point| field_text(self.fields.kind, *point))
+        point.map_or_else(String::new, |point| field_name(self.fields.kind, *point))
     }
 
     /// The wavelengths in micrometres.
@@ -92,16 +93,6 @@ impl Subject<'_> {
             FieldKind::ObjectHeight => "field, mm in the object",
             FieldKind::ImageHeight => "field, mm in the image",
         }
-    }
-}
-
-fn field_text(kind: FieldKind, field: FieldPoint) -> String {
-    let unit = if kind == FieldKind::Angle { "°" } else { " mm" };
-    let y = note_number(field.y);
-    if field.x == 0.0 {
-        format!("{y}{unit}")
-    } else {
-        format!("({}, {y}){unit}", note_number(field.x))
     }
 }
 

@@ -294,6 +294,9 @@ impl Session {
             PanelSetting::ContrastPage(page) => settings.contrast_page = page,
             PanelSetting::ContrastFrequency(nu) => settings.contrast_frequency = nu,
             PanelSetting::ContrastAccuracy(shown) => settings.contrast_accuracy = shown,
+            PanelSetting::PointSpreadAccuracy(shown) => {
+                settings.point_spread_accuracy = shown;
+            }
             PanelSetting::PictureAccuracy(shown) => settings.picture_accuracy = shown,
             PanelSetting::RayImages(shown) => settings.ray_images = shown,
             PanelSetting::Footprints(shown) => settings.footprints = shown,
@@ -306,6 +309,7 @@ impl Session {
             PanelSetting::SceneFile(file) => settings.scene_file = Some(file),
             PanelSetting::PictureOptions(options) => settings.picture_options = *options,
             PanelSetting::PictureErrors(shown) => settings.picture_errors = shown,
+            PanelSetting::PicturePoints(shown) => settings.picture_points = shown,
             PanelSetting::Tolerances(shown) => settings.tolerances = shown,
             PanelSetting::ToleranceGrade(grade) => settings.grade = grade,
             PanelSetting::GoodRms(rms) => settings.good_rms = rms,

@@ -23,6 +23,8 @@ pub(super) struct ChartForm<'a> {
     pub(super) numbers: [bool; 2],
     /// True if the axis to the right has its name.
     pub(super) has_name: bool,
+    /// True if zero upwards is a place of its own, which is in the chart and has a line; false for logarithms.
+    pub(super) has_zero: bool,
     /// The width of lines in points.
     pub(super) width: f32,
 }
@@ -30,7 +32,8 @@ pub(super) struct ChartForm<'a> {
 impl ChartForm<'_> {
     /// A chart of this height with all its words.
     pub(super) const fn new(height: f32) -> Self {
-        Self { height, contains: [&[], &[]], numbers: [true; 2], has_name: true, width: 1.6 }
+        let contains: [&[f64]; 2] = [&[], &[]];
+        Self { height, contains, numbers: [true; 2], has_name: true, has_zero: true, width: 1.6 }
     }
 }
 
@@ -119,7 +122,7 @@ pub(super) fn bare_chart(
     let drawn: Vec<(Color32, &ChartCurve)> =
         chart.curves.iter().map(|curve| (curve_color(ui, curve, colors), curve)).collect();
     let shown = plot.show(ui, |plot| {
-        if !chart.is_map {
+        if !chart.is_map && form.has_zero {
             plot.hline(HLine::new("", 0.0).color(weak).allow_hover(false));
         }
         for (color, curve) in drawn {
@@ -163,10 +166,14 @@ pub(super) fn accuracy_section(
     let header = CollapsingHeader::new("Accuracy and time").id_salt(kind.name());
     let shown = header.show(ui, |ui| match analysis_figure(kind, results) {
         Ok(figure) => {
-            export_menu(ui, kind, actions);
             for chart in figure.rows.iter().flatten() {
-                bare_chart(ui, (chart, &figure.colors), ChartForm::new(ACCURACY));
-                ui.horizontal(|ui| curve_names(ui, chart, &figure.colors));
+                ui.horizontal_wrapped(|ui| {
+                    ui.label(RichText::new(chart.axes[1]).small());
+                    curve_names(ui, chart, &figure.colors);
+                    export_menu(ui, kind, actions);
+                });
+                let form = ChartForm { has_zero: false, ..ChartForm::new(ACCURACY) };
+                bare_chart(ui, (chart, &figure.colors), form);
             }
             notes(ui, &figure);
         }

@@ -7,12 +7,12 @@ use egui::{
     TextureOptions, Ui, vec2,
 };
 
-use super::figure_view::{ChartForm, bare_chart, export_menu};
+use super::figure_view::{ChartForm, accuracy_section, bare_chart, export_menu};
 use super::widgets::swatch;
 use super::{
     Panel, displayed_results, field_name, plain_error, relative_error, show_missing_results,
 };
-use crate::analysis::{Estimate, SquareGrid, ZernikeOrder, aberration_name};
+use crate::analysis::{Estimate, SquareGrid, ZernikeOrder, ZernikeSum, aberration_name};
 use crate::lens::Fields;
 use crate::report::FigureKind;
 use crate::session::{
@@ -128,6 +128,13 @@ impl Panel for WavefrontPanel {
         self.pages(ui, actions);
         self.ask(view, actions);
         let kind = self.kind();
+        if self.page == WavefrontPage::Image && !self.by_rays {
+            let subject = (&**results, numbers.point_spread_accuracy.is_some());
+            let open = accuracy_section(ui, FigureKind::PointSpreadAccuracy, subject, actions);
+            if open != view.settings.point_spread_accuracy {
+                actions.push(Command::Show(PanelSetting::PointSpreadAccuracy(open)));
+            }
+        }
         let is_current = PageNumbers::of(numbers, kind).is_some();
         let last = &mut self.last[kind as usize];
         if is_current {
@@ -426,6 +433,10 @@ fn heading(ui: &mut Ui, fields: &Fields, index: usize) -> String {
 /// A number with its unit and its error.
 fn estimate_text(estimate: Estimate, unit: &str) -> String {
     let value = number::format_digits(estimate.value, 3);
+    if estimate.error > estimate.value.abs() {
+        // More than a whole of itself is no share.
+        return format!("{value}{unit} ± {}{unit}", number::format_digits(estimate.error, 1));
+    }
     format!("{value}{unit}{}", relative_error(estimate))
 }
 
@@ -440,7 +451,7 @@ fn image_lines(image: &PointImage) -> Vec<String> {
     vec![
         format!("Strehl {}", estimate_text(image.strehl.at_chief, "")),
         format!("best {}", estimate_text(image.strehl.best, "")),
-        format!("{width} µm wide, {}", plain_error(image.error, "")),
+        format!("{width} µm wide, intensity {}", plain_error(image.error, "")),
     ]
 }
 
@@ -477,6 +488,7 @@ fn energies(ui: &mut Ui, results: &AnalysisResults, kind: FigureKind) {
     };
     let fields = results.lens.fields_at(results.settings.zoom);
     ui.horizontal_wrapped(|ui| {
+        ui.label(RichText::new("share of the light").small());
         for i in 0..fields.values.len() {
             heading(ui, fields, i);
         }
@@ -490,7 +502,8 @@ fn energies(ui: &mut Ui, results: &AnalysisResults, kind: FigureKind) {
         let form = ChartForm { contains: [&[0.0], &[0.0, 1.0]], ..ChartForm::new(height) };
         bare_chart(ui, (chart, &figure.colors), form);
     }
-    ui.label(RichText::new(energy_error(results, kind)).small().weak());
+    let error = format!("share {}", energy_error(results, kind));
+    ui.label(RichText::new(error).small().weak());
 }
 
 /// The largest error of the shares of a kind.
@@ -523,7 +536,7 @@ fn coefficients(ui: &mut Ui, fields: &Fields, waves: &FieldWavefronts, is_fringe
     ScrollArea::both().auto_shrink([false, false]).show(ui, |ui| {
         Grid::new("zernike").striped(true).spacing([12.0, 2.0]).show(ui, |ui| {
             ui.weak("No.");
-            ui.weak("Aberration");
+            ui.weak("Aberration, λ");
             for i in 0..sums.len() {
                 heading(ui, fields, i);
             }
@@ -532,18 +545,38 @@ fn coefficients(ui: &mut Ui, fields: &Fields, waves: &FieldWavefronts, is_fringe
                 ui.label((k + 1).to_string());
                 ui.label(aberration_name(index));
                 for sum in &sums {
-                    let found = sum.as_ref().and_then(|sum| sum.coefficients.get(k).copied());
-                    ui.label(found.map_or("-".to_owned(), |e| format!("{:.4}", e.value)));
+                    let found = sum.as_ref().and_then(|sum| sum.coefficients.get(k));
+                    coefficient(ui, found.map(|e| e.value));
                 }
                 ui.end_row();
             }
-            ui.label("");
-            ui.label("RMS of the rest");
-            for sum in &sums {
-                let rest = sum.as_ref().map(|sum| format!("{:.4}", sum.rest.value));
-                ui.label(rest.unwrap_or_else(|| "-".to_owned()));
+            let rows: [(&str, SumNumber); 2] = [
+                ("RMS of the rest", |sum| sum.rest.value),
+                ("largest error", |sum| {
+                    sum.coefficients.iter().map(|e| e.error).fold(0.0, f64::max)
+                }),
+            ];
+            for (name, number) in rows {
+                ui.label("");
+                ui.label(name);
+                sums.iter().for_each(|sum| coefficient(ui, sum.as_ref().map(number)));
+                ui.end_row();
             }
-            ui.end_row();
         });
     });
+}
+
+/// A number of a sum of polynomials.
+type SumNumber = fn(&ZernikeSum) -> f64;
+
+/// The least size of a number of the table that is not zero to its four digits.
+const SEEN: f64 = 5e-5;
+
+/// A number of the table at the right of its column, so that the points of all are below each other.
+fn coefficient(ui: &mut Ui, number: Option<f64>) {
+    // Rounding has no sign.
+    let seen = number.map(|waves| if waves.abs() < SEEN { 0.0 } else { waves });
+    let text = seen.map_or("-".to_owned(), |waves| format!("{waves:.4}"));
+    let right = Layout::right_to_left(Align::Center);
+    ui.with_layout(right, |ui| ui.label(text));
 }

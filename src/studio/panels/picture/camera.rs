@@ -45,7 +45,9 @@ pub(super) fn options(
     let before = &view.settings.picture_options;
     let mut options = before.clone();
     CollapsingHeader::new("Camera").id_salt("camera").show(ui, |ui| {
-        camera(ui, &view.lens, &mut options);
+        let is_near = |shown: &ScenePicture| shown.focus.is_some();
+        let is_far = options.distance.is_none() && !shown.is_some_and(is_near);
+        camera(ui, (&view.lens, is_far), &mut options);
     });
     CollapsingHeader::new("Coating and effects").id_salt("effects").show(ui, |ui| {
         effects(ui, &mut options, shown);
@@ -58,8 +60,8 @@ pub(super) fn options(
 /// The width from which two pairs of a name and its number stand in a row, in points.
 const PAIRS: f32 = 430.0;
 
-/// Distance, focus, exposure, light, motion, sensor and accuracy.
-fn camera(ui: &mut Ui, lens: &Lens, options: &mut PictureOptions) {
+/// Distance, focus, exposure, light, motion, sensor and accuracy, of a scene that is at infinity or not.
+fn camera(ui: &mut Ui, (lens, is_far): (&Lens, bool), options: &mut PictureOptions) {
     type Field<'a> = (&'static str, &'a dyn Fn(&mut Ui, &mut PictureOptions));
     let fields: [Field<'_>; 8] = [
         ("Focus", &|ui, options| focus(ui, lens, &mut options.focus)),
@@ -78,7 +80,7 @@ fn camera(ui: &mut Ui, lens: &Lens, options: &mut PictureOptions) {
             optional(ui, (&mut options.luminance, DAYLIGHT), words);
         }),
         ("Sensor", &sensor),
-        ("Motion", &|ui, options| velocity(ui, &mut options.velocity)),
+        ("Motion", &|ui, options| velocity(ui, is_far, options)),
         ("Error", &tolerance),
         ("Way", &ways),
     ];
@@ -169,16 +171,22 @@ fn surface(ui: &mut Ui, index: &mut usize, most: usize, name: &str) {
     }
 }
 
-/// The velocity of the scene in mm/s, which blurs it during an exposure that is given.
-fn velocity(ui: &mut Ui, velocity: &mut [f64; 2]) {
+/// The velocity of the scene in mm/s, or in tangents per second if it is at infinity, which blurs it during an
+/// exposure that is given.
+fn velocity(ui: &mut Ui, is_far: bool, options: &mut PictureOptions) {
+    let (unit, least) = if is_far { (" /s", 0.001) } else { (" mm/s", 0.1) };
     ui.horizontal(|ui| {
+        let velocity = &mut options.velocity;
         for (value, name) in velocity.iter_mut().zip(["Motion to the right", "Motion upwards"]) {
-            let speed = (0.01 * value.abs()).max(0.1);
-            let drag = DragValue::new(value).speed(speed).suffix(" mm/s").max_decimals(3);
+            let speed = (0.01 * value.abs()).max(least);
+            let drag = DragValue::new(value).speed(speed).suffix(unit).max_decimals(4);
             ui.add(drag.range(-1e6..=1e6)).accessible_name(name).on_hover_text(
                 "The velocity of the scene to the right and upwards during the exposure, which has to be given; of \
                  a scene at infinity in tangents of its direction per second",
             );
+        }
+        if options.velocity != [0.0; 2] && options.seconds.is_none() {
+            ui.weak("needs an exposure");
         }
     });
 }

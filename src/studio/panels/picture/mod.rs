@@ -4,12 +4,13 @@
 mod camera;
 mod histogram;
 mod magnifier;
+mod points;
 
 use std::sync::Arc;
 
 use egui::{
-    Color32, ColorImage, ComboBox, Pos2, Rect, Response, RichText, ScrollArea, Sense, Slider,
-    TextureFilter, TextureHandle, TextureOptions, Ui, Vec2, WidgetInfo, pos2, vec2,
+    Color32, ColorImage, ComboBox, Painter, Pos2, Rect, Response, RichText, ScrollArea, Sense,
+    Slider, Stroke, TextureFilter, TextureHandle, TextureOptions, Ui, Vec2, WidgetInfo, pos2, vec2,
 };
 
 use super::figure_view::accuracy_section;
@@ -44,10 +45,12 @@ enum PictureMode {
     Wipe,
     /// The error of the picture.
     Errors,
+    /// The images of points over the picture.
+    Points,
 }
 
 impl PictureMode {
-    const ALL: [(Self, &'static str, &'static str); 4] = [
+    const ALL: [(Self, &'static str, &'static str); 5] = [
         (Self::One, "One", "The picture alone"),
         (Self::Beside, "Side by side", "Beside the picture of the other lens, as bright as it is"),
         (Self::Wipe, "Wipe", "The other lens to the left of a line"),
@@ -55,6 +58,11 @@ impl PictureMode {
             Self::Errors,
             "Error",
             "The error against rays from every pixel, tile by tile: black is none, white the largest",
+        ),
+        (
+            Self::Points,
+            "Points",
+            "The images of points of light, enlarged at their places, as they are in the picture",
         ),
     ];
 }
@@ -87,6 +95,7 @@ type TextureKey = (ByAddress<ShownPicture>, u64);
 pub struct PicturePanel {
     textures: [Cached<TextureKey, TextureHandle>; 2],
     heat: Cached<ByAddress<ShownPicture>, TextureHandle>,
+    points: Cached<ByAddress<ShownPicture>, TextureHandle>,
     mode: PictureMode,
     magnifier: Magnifier,
     /// The place of the line of a wipe, as a share of the width.
@@ -100,6 +109,7 @@ impl Default for PicturePanel {
         Self {
             textures: Default::default(),
             heat: Cached::new(),
+            points: Cached::new(),
             mode: PictureMode::default(),
             magnifier: Magnifier::default(),
             line: 0.5,
@@ -195,6 +205,10 @@ impl PicturePanel {
         if measured != view.settings.picture_errors {
             actions.push(Command::Show(PanelSetting::PictureErrors(measured)));
         }
+        let points = self.mode == PictureMode::Points;
+        if points != view.settings.picture_points {
+            actions.push(Command::Show(PanelSetting::PicturePoints(points)));
+        }
     }
 
     /// The pictures that are compared: the design and the candidate, or the one kept and the present one;
@@ -260,6 +274,23 @@ impl PicturePanel {
 
     /// The exposure, the line of a wipe, and the way back to the whole picture.
     fn settings(&mut self, ui: &mut Ui, first: &ScenePicture) {
+        if self.mode == PictureMode::Points {
+            let words = first.points.as_ref().map(|found| {
+                points::words(found, &first.picture.frame, self.magnifier.part().width().recip())
+            });
+            let words = words.unwrap_or_else(|| "Computing the images of points …".to_owned());
+            ui.label(RichText::new(words).small());
+        }
+        if self.mode == PictureMode::Errors {
+            let words = first.error_map.as_ref().map_or_else(
+                || "Measuring the error …".to_owned(),
+                |map| {
+                    let most = number::format_digits(100.0 * map.largest(), 3);
+                    format!("Black is no error, white {most} % of mid grey, grey not measured")
+                },
+            );
+            ui.label(RichText::new(words).small());
+        }
         ui.horizontal(|ui| {
             let (luminance, seconds) = exposure(first);
             let [luminance, seconds] = [luminance, seconds].map(|v| number::format_digits(v, 3));
@@ -336,7 +367,11 @@ impl PicturePanel {
             return;
         }
         let id = self.texture(ui, column, &pictures[column], white);
-        painter.image(id, rect, part, Color32::WHITE);
+        let shows_points = self.mode == PictureMode::Points;
+        painter.image(id, rect, part, if shows_points { points::BEHIND } else { Color32::WHITE });
+        if shows_points {
+            self.paint_points(ui, (&painter, rect), &pictures[column]);
+        }
         if self.mode == PictureMode::Wipe && pictures.len() > 1 {
             let id = self.texture(ui, 1, &pictures[1], white);
             let at = rect.left() + self.line * rect.width();
@@ -350,6 +385,19 @@ impl PicturePanel {
             );
             painter.vline(at, rect.y_range(), (1.0, ui.visuals().strong_text_color()));
         }
+    }
+
+    /// Paints the images of points over a picture, once they are computed.
+    fn paint_points(&mut self, ui: &Ui, (painter, rect): (&Painter, Rect), named: &NamedPicture) {
+        let Some(shown) = named.picture() else { return };
+        let Some(found) = &shown.points else { return };
+        let texture = self.points.get(ByAddress::from(&named.shown), |_| {
+            let options = TextureOptions::LINEAR;
+            ui.ctx().load_texture("picture points", points::atlas(found), options)
+        });
+        let stroke = Stroke::new(1.0, Color32::from_gray(120));
+        let subject = (found, &shown.picture.frame);
+        points::paint((painter, rect, stroke), self.magnifier, subject, texture.id());
     }
 
     /// The texture of a picture with the white of another.
