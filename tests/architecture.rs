@@ -10,10 +10,9 @@ use std::path::{Path, PathBuf};
 const CLOCK: [&str; 2] = ["measure", "session"];
 
 /// Files that may contain `unsafe`, and why.
-const UNSAFE: [(&str, &str); 3] = [
+const UNSAFE: [(&str, &str); 2] = [
     ("src/math/lanes.rs", "vector instructions that the processor was asked for before"),
     ("src/cli/heap.rs", "the allocator of the system is told to keep free memory"),
-    ("src/cli/graphics.rs", "a graphics layer has its switch in the environment"),
 ];
 
 /// Names of the top modules, lowest first.

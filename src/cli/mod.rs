@@ -20,7 +20,6 @@ mod failures;
 mod glass;
 mod glass_exchange;
 mod gradient;
-mod graphics;
 mod grin;
 mod heap;
 mod help;
@@ -132,7 +131,6 @@ impl CliCommand {
 /// Runs the command that the arguments of the process name, or opens the studio.
 pub fn run() -> ExitCode {
     heap::keep_free_memory();
-    graphics::look_for_no_display();
     env_logger::init();
     // A catalogue that cannot be read is said, and is no reason to end.
     files::load_own_glasses().iter().for_each(|error| print_note(format!("note: {error}")));
