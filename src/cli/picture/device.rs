@@ -2,6 +2,7 @@
 
 use crate::cli::error::CliError;
 use crate::picture::{PictureDevice, install_picture_device};
+use std::path::Path;
 use std::sync::Arc;
 
 /// The device of quick pictures that a person asks for.
@@ -16,6 +17,15 @@ pub(in crate::cli) enum DeviceChoice {
     Cpu,
 }
 
+/// What Linux shows of graphics cards: of all with a driver of the kernel, of NVIDIA, of a Windows host, and of
+/// mobile ones.
+const CARDS: [&str; 5] = ["/dev/dri", "/dev/nvidia0", "/dev/dxg", "/dev/mali0", "/dev/kgsl-3d0"];
+
+/// False if there is certainly no graphics card.
+fn may_have_card() -> bool {
+    cfg!(not(target_os = "linux")) || CARDS.iter().any(|card| Path::new(card).exists())
+}
+
 /// A device, and true if it is the processor in disguise.
 type FoundDevice = (Arc<dyn PictureDevice>, bool);
 
@@ -27,6 +37,8 @@ impl DeviceChoice {
     pub(in crate::cli) fn install(self) -> Result<(), CliError> {
         let found = match self {
             Self::Cpu => None,
+            // A search where there is no card costs time, and some drivers print what nobody can act on.
+            Self::Auto if !may_have_card() => None,
             Self::Auto => find().ok().filter(|(_, is_software)| !is_software),
             Self::Gpu => {
                 let refuse = |why| CliError::Failed(format!("--device gpu: {why}"));
