@@ -19,7 +19,7 @@ pub(in crate::cli) enum DeviceChoice {
 
 /// What Linux shows of graphics cards: of all with a driver of the kernel, of NVIDIA, of a Windows host, and of
 /// mobile ones.
-const CARDS: [&str; 5] = ["/dev/dri", "/dev/nvidia0", "/dev/dxg", "/dev/mali0", "/dev/kgsl-3d0"];
+const CARDS: [&str; 5] = ["/dev/dri", "/dev/nvidiactl", "/dev/dxg", "/dev/mali0", "/dev/kgsl-3d0"];
 
 /// False if there is certainly no graphics card.
 fn may_have_card() -> bool {
