@@ -429,4 +429,47 @@ mod tests {
             assert!((slope - off / height).abs() < 1e-12, "{slope} {}", off / height);
         }
     }
+
+    /// Rays to one point from a round pupil, with a path difference in waves at each place of the unit disc.
+    fn aberrated(waves: impl Fn(f64, f64) -> f64) -> (WavefrontReference, Vec<ImageRay>) {
+        let wavelength = 5e-4;
+        let (form, image) = (ReferenceForm::Infinite, Shape::Plane);
+        let reference = WavefrontReference { form, image, index: 1.0, wavelength };
+        let ray = |i: usize| {
+            // Of equal area each, those of one radius around it.
+            let (radius, azimuth) =
+                ((0.05 * ((i / 40) as f64 + 0.5)).sqrt(), 0.05 * (i % 40) as f64);
+            let (sin, cos) = (std::f64::consts::PI * azimuth).sin_cos();
+            let (x, y) = (radius * sin, radius * cos);
+            let [l, m] = [-0.1 * x, -0.1 * y];
+            let direction = Vec3::new(l, m, (1.0 - l * l - m * m).sqrt());
+            let ray = Ray { point: Vec3::default(), direction };
+            ImageRay { ray, path: -wavelength * waves(x, y) }
+        };
+        (reference, (0..800).map(ray).collect())
+    }
+
+    /// Where the image is a ring, as with waves of defocus, the point of the least mean square is darker than those
+    /// around it; the way from there to the brightest one is uphill, and leads to a maximum.
+    #[test]
+    fn the_brightest_point_is_a_maximum_where_the_best_one_by_squares_is_none() {
+        for defocus in [1.0, 2.2, 3.0] {
+            let (reference, rays) = aberrated(|x, y| {
+                let square = x * x + y * y;
+                defocus * square + 0.8 * (square - 2.0 / 3.0) * y + 0.1 * x * y
+            });
+            let weights = vec![1.0; rays.len()];
+            let start = FittedWavefront::new(reference, &rays, &weights, false).unwrap();
+            let start = start.with_phasor(&weights);
+            let (_, curvatures, _) = start.strehl_slopes(&weights);
+            assert!(curvatures.symmetric_eigenvalues().max() > 0.0, "a maximum from the start");
+            let found = start.clone().brightest(&rays, &weights, false);
+            let (gradient, curvatures, _) = found.strehl_slopes(&weights);
+            // By a displacement of the radius of the image without aberrations, 0.61 λ/NA.
+            let slope = 0.61 * 5e-4 / 0.1 * gradient.norm();
+            let strehl = found.strehl();
+            assert!(slope < 1e-6 * strehl, "{defocus}: {slope:e} of {strehl}");
+            assert!(strehl > start.strehl() && curvatures.symmetric_eigenvalues().max() < 0.0);
+        }
+    }
 }

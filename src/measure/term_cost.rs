@@ -21,6 +21,9 @@ pub struct TermCost {
     pub value: f64,
     /// The error that it states.
     pub error: f64,
+    /// True if the rays reach the tolerance. If they do not, as where too few resolve the phase of many waves, the
+    /// gradient of the integral and differences of the sum have little to do with each other.
+    pub reached: bool,
     /// The median time of a value, in milliseconds.
     pub value_ms: f64,
     /// The median time of a value with its gradient, in milliseconds.
@@ -77,6 +80,7 @@ pub fn measure_term_costs(
             term: term.name(),
             value: 0.0,
             error: 0.0,
+            reached: false,
             value_ms: 0.0,
             gradient_ms: 0.0,
             difference: 0.0,
@@ -127,7 +131,7 @@ struct Steps {
 /// several times that, and paths are rounded at 1e-10 wavelengths.
 const WAVES: f64 = 0.01;
 /// The change of a semi-diameter as a part of the largest one: only what is on the edge changes.
-const RIM_STEP: f64 = 1e-4;
+const RIM_STEP: f64 = 1e-5;
 
 impl Steps {
     fn new(lens: &Lens) -> Result<Self, MeritError> {
@@ -186,8 +190,8 @@ fn cost(lens: &Lens, term: Term, steps: &Steps, tolerance: f64) -> Result<TermCo
             (difference, at) = (off, Some(variable.parameter.to_string()));
         }
     }
-    let error = found.first().map_or(0.0, |term| term.error);
+    let (error, reached) = found.first().map_or((0.0, false), |term| (term.error, term.reached));
     let difference = if largest > 0.0 { difference / largest } else { 0.0 };
     let (term, refused) = (term.name(), None);
-    Ok(TermCost { term, value, error, value_ms, gradient_ms, difference, at, refused })
+    Ok(TermCost { term, value, error, reached, value_ms, gradient_ms, difference, at, refused })
 }

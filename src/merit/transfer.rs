@@ -58,7 +58,7 @@ pub(super) fn add_transfer_shortfall(
             if shortfall > 0.0 {
                 let conjugate = if modulation > 0.0 { [re, -im] } else { [0.0; 2] };
                 let factor = conjugate.map(|part| part / modulation.max(f64::MIN_POSITIVE) / share);
-                asked.push(Shortfall { found, factor, shortfall });
+                asked.push(Shortfall { found, factor, lacking: shortfall });
             }
         }
         add_shortfalls(context, &own, &asked, share, sum);
@@ -71,7 +71,7 @@ pub(super) fn add_transfer_shortfall(
 struct Shortfall {
     found: Vec<TransferAtFrequency>,
     factor: [f64; 2],
-    shortfall: f64,
+    lacking: f64,
 }
 
 /// Adds the mean square of the shortfalls of a field of some weight.
@@ -84,15 +84,15 @@ fn add_shortfalls(
 ) {
     if sum.level == DerivativeLevel::Normal {
         for one in asked {
-            let slope = modulation_slope(context, pupils, [(one, 1.0)].into_iter());
-            sum.add_residual(0.5 * share, one.shortfall, &-slope);
+            let slope = modulation_slope(context, pupils, &[(one, 1.0)].into_iter());
+            sum.add_residual(0.5 * share, one.lacking, &-slope);
         }
         return;
     }
-    sum.value += asked.iter().map(|one| 0.5 * share * one.shortfall * one.shortfall).sum::<f64>();
+    sum.value += asked.iter().map(|one| 0.5 * share * one.lacking * one.lacking).sum::<f64>();
     if sum.level == DerivativeLevel::Gradient && !asked.is_empty() {
-        let by_modulation = asked.iter().map(|one| (one, -share * one.shortfall));
-        sum.gradient += modulation_slope(context, pupils, by_modulation);
+        let by_modulation = asked.iter().map(|one| (one, -share * one.lacking));
+        sum.gradient += modulation_slope(context, pupils, &by_modulation);
     }
 }
 
@@ -100,7 +100,7 @@ fn add_shortfalls(
 fn modulation_slope<'s>(
     context: &EvaluationContext<'_>,
     pupils: &[&PupilPart<'_>],
-    asked: impl Iterator<Item = (&'s Shortfall, f64)> + Clone + Sync + Send,
+    asked: &(impl Iterator<Item = (&'s Shortfall, f64)> + Clone + Sync),
 ) -> DVector<f64> {
     let slope = |(number, pupil): (usize, &&PupilPart<'_>)| {
         let transfers = asked.clone().map(|(one, times)| {

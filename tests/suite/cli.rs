@@ -855,9 +855,10 @@ fn measure_gradient_draws_the_error_of_every_estimator_against_time() {
     assert_eq!(names, ["spot", "wavefront", "strehl", "geometric_mtf", "mtf"]);
     for row in terms {
         assert!(row["refused"].is_null() && row["value_ms"].as_f64().unwrap() > 0.0, "{row}");
-        // The derivative of the Strehl ratio is off its differences by up to 7 %: it is not known yet which is wrong.
-        let most = if row["term"] == "strehl" { 0.1 } else { 0.05 };
-        assert!(row["difference"].as_f64().unwrap() < most, "{row}");
+        // No affordable rays resolve the phase of forty waves: that Strehl ratio is not known, nor its derivative.
+        let is_resolved = row["term"] != "strehl";
+        assert!(is_resolved || row["reached"] == false, "{row}");
+        assert!(!is_resolved || row["difference"].as_f64().unwrap() < 2e-3, "{row}");
     }
     assert!(std::fs::read(&plot.0).unwrap().starts_with(b"\x89PNG"));
     refused(2, &["measure", "gradient", singlet, "--plot", "x.gif"], "", &["`gif`", "`.png`"]);

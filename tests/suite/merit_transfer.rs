@@ -23,6 +23,11 @@ fn gradient_error(lens: &Lens, term: Term, tolerance: f64, scale: f64) -> f64 {
     let values = merit.values(lens);
     let sum = merit.evaluate(&values, DerivativeLevel::Normal).unwrap();
     assert!(sum.value > 0.0, "{term:?} asks for nothing");
+    // Without the matrix, both directions go back through the lens together.
+    let alone = merit.evaluate(&values, DerivativeLevel::Gradient).unwrap();
+    let apart = (&alone.gradient - &sum.gradient).amax();
+    assert!((alone.value / sum.value - 1.0).abs() < 1e-12, "{} {}", alone.value, sum.value);
+    assert!(apart < 1e-9 * sum.gradient.amax(), "{apart:e}");
     let mut pairs = Vec::new();
     for (i, variable) in merit.variables().iter().enumerate() {
         let step = scale * step(variable.parameter.quantity);

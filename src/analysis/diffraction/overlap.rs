@@ -38,7 +38,7 @@ struct MovedChain<'a> {
 }
 
 /// The columns of a strip, each with its t, its weight and its ends.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(super) struct Columns {
     pub(super) t: Vec<f64>,
     pub(super) weight: Vec<f64>,
@@ -62,6 +62,9 @@ const PANEL: usize = 192;
 /// Nodes from 0 to 1 with their weights, at least as many as asked for.
 pub(super) fn rule(count: usize) -> Vec<(f64, f64)> {
     let panels = count.div_ceil(PANEL).max(1);
+    if panels == 1 {
+        return legendre_rule(count).clone();
+    }
     let width = 1.0 / panels as f64;
     let panel = |i: usize| {
         let nodes = legendre_rule(count.div_ceil(panels)).iter();
@@ -139,7 +142,8 @@ impl Strip<'_> {
 
     /// The columns at shares of the strip from 0 to 1, each with its weight.
     pub(super) fn columns(&self, shares: &[(f64, f64)]) -> Columns {
-        let mut columns = Columns::default();
+        let list = || Vec::with_capacity(shares.len());
+        let mut columns = Columns { t: list(), weight: list(), ends: [list(), list()] };
         for (u, share) in shares {
             let (t, slope) = self.place(*u);
             columns.t.push(t);
@@ -234,12 +238,13 @@ fn crossings(
         let u = i as f64 / COMPARED as f64;
         from + (to - from) * u * u * (3.0 - 2.0 * u)
     };
-    let mut samples: Vec<[f64; 2]> =
-        (0..=COMPARED).map(|i| [place(i), difference(place(i))]).collect();
-    let dips: Vec<[f64; 2]> =
-        samples.windows(3).filter_map(|near| dip(near, &difference)).collect();
-    samples.extend(dips);
-    samples.sort_by(|a, b| a[0].total_cmp(&b[0]));
+    let compared: [[f64; 2]; COMPARED + 1] =
+        std::array::from_fn(|i| [place(i), difference(place(i))]);
+    let mut samples = compared.to_vec();
+    samples.extend(compared.windows(3).filter_map(|near| dip(near, &difference)));
+    if samples.len() > compared.len() {
+        samples.sort_by(|a, b| a[0].total_cmp(&b[0]));
+    }
     for pair in samples.windows(2).filter(|pair| pair[0][1] * pair[1][1] < 0.0) {
         let ([a, fa], [b, fb]) = (pair[0], pair[1]);
         found.push(crossing(&difference, [a, b], [fa, fb]));

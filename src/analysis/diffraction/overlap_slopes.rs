@@ -22,7 +22,7 @@ pub(super) struct TermSlopes {
 }
 
 /// A number for each degree along columns, for some columns.
-type Line = [Lanes; LARGEST_DEGREE + 1];
+type Line = Vec<Lanes>;
 
 const ZERO: Lanes = [0.0; LANES];
 
@@ -49,7 +49,7 @@ pub(super) struct OverlapSlopes<'p> {
     shift: TransferShift,
     /// The complex factor of the transfer in the number that is differentiated.
     factor: [f64; 2],
-    pupils: Box<[PupilLines; 2]>,
+    pupils: [PupilLines; 2],
 }
 
 /// Some columns: each with its coordinate, its weight, its lower end and its length.
@@ -90,8 +90,8 @@ impl PupilLines {
         Self {
             across: ChebyshevLanes::zero(),
             along: ChebyshevLanes::zero(),
-            light: [[ZERO; LARGEST_DEGREE + 1]; 4],
-            asked: [[ZERO; LARGEST_DEGREE + 1]; 4],
+            light: [0; 4].map(|_| vec![ZERO; LARGEST_DEGREE + 1]),
+            asked: [0; 4].map(|_| vec![ZERO; LARGEST_DEGREE + 1]),
         }
     }
 
@@ -157,7 +157,9 @@ impl PupilLines {
         let basis = polynomial.basis();
         if basis.is_even() && axis == 0 {
             let [_, across, divergence, _] = &mut self.asked;
-            for (across, divergence) in across.iter_mut().zip(divergence).take(basis.degree() + 1) {
+            for (across, divergence) in
+                across.iter_mut().zip(divergence.iter_mut()).take(basis.degree() + 1)
+            {
                 for k in 0..LANES {
                     across[k] = t[k] * across[k] + divergence[k];
                     divergence[k] *= t[k];
@@ -186,7 +188,7 @@ impl<'p> OverlapSlopes<'p> {
         shift: TransferShift,
         factor: [f64; 2],
     ) -> Self {
-        let pupils = Box::new([PupilLines::new(), PupilLines::new()]);
+        let pupils = [PupilLines::new(), PupilLines::new()];
         Self { polynomial, shift, factor, pupils }
     }
 
@@ -239,11 +241,8 @@ impl<'p> OverlapSlopes<'p> {
         let step = if is_odd_along { 2 } else { 1 };
         let degrees = || (0..=basis.degree()).step_by(step);
         let off = self.shift.cosines[1 - axis];
-        let mut v = [ZERO; 2];
-        for k in 0..LANES {
-            let middle = columns.low[k] + share * columns.length[k];
-            (v[0][k], v[1][k]) = (middle + off, middle - off);
-        }
+        let middle: Lanes = std::array::from_fn(|k| columns.low[k] + share * columns.length[k]);
+        let v = [off, -off].map(|off| middle.map(|v| v + off));
         for (pupil, v) in self.pupils.iter_mut().zip(&v) {
             basis.fill(1 - axis, v, &mut pupil.along);
         }
@@ -280,12 +279,12 @@ impl<'p> OverlapSlopes<'p> {
 #[derive(Debug)]
 pub(super) struct PupilPoints<'p> {
     polynomial: &'p WavePolynomial,
-    factors: Box<[ChebyshevLanes; 2]>,
+    factors: [ChebyshevLanes; 2],
 }
 
 impl<'p> PupilPoints<'p> {
     pub(super) fn new(polynomial: &'p WavePolynomial) -> Self {
-        let factors = Box::new([ChebyshevLanes::zero(), ChebyshevLanes::zero()]);
+        let factors = [ChebyshevLanes::zero(), ChebyshevLanes::zero()];
         Self { polynomial, factors }
     }
 
@@ -296,33 +295,35 @@ impl<'p> PupilPoints<'p> {
             SimdWidth::detect(),
             #[inline(always)]
             || {
-                for ((axis, place), factors) in places.iter().enumerate().zip(&mut *self.factors) {
+                for ((axis, place), factors) in places.iter().enumerate().zip(&mut self.factors) {
                     self.polynomial.basis().fill(axis, place, factors);
                 }
-                let [first, second] = &*self.factors;
-                self.polynomial.terms().each_ref().map(|terms| {
-                    let mut sum = ZERO;
-                    for ([i, j], c) in terms {
-                        for k in 0..LANES {
-                            sum[k] += c * first.values[*i][k] * second.values[*j][k];
-                        }
-                    }
-                    sum
-                })
+                self.polynomial.terms().each_ref().map(|terms| self.sum_of(terms))
             },
         )
     }
 
+    /// The sum of some terms at the points.
+    #[inline(always)]
+    fn sum_of(&self, terms: &[([usize; 2], f64)]) -> Lanes {
+        let [first, second] = &self.factors;
+        let mut sum = ZERO;
+        for ([i, j], c) in terms {
+            let factors = first.values[*i].iter().zip(&second.values[*j]);
+            sum.iter_mut().zip(factors).for_each(|(sum, (u, v))| *sum += c * u * v);
+        }
+        sum
+    }
+
     /// Adds to the derivatives by the coefficients of the displacement those by the displacement of each point.
     pub(super) fn add_displacements(&self, by_point: [Lanes; 2], by: &mut TermSlopes) {
-        let [first, second] = &*self.factors;
+        let [first, second] = &self.factors;
         let basis = self.polynomial.basis();
         let [mut across, along] = by_point;
         if basis.is_even() {
             // The first Chebyshev polynomial times half of the width of the box is the cosine itself.
-            for k in 0..LANES {
-                across[k] *= first.values[1][k] / first.slopes[1][k];
-            }
+            let cosines = first.values[1].iter().zip(&first.slopes[1]);
+            across.iter_mut().zip(cosines).for_each(|(by, (value, slope))| *by *= value / slope);
         }
         run_vectorized(
             SimdWidth::detect(),

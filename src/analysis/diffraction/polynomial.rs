@@ -36,8 +36,8 @@ pub(super) struct SampleFit {
 /// The Chebyshev polynomials of one cosine at some places, and their derivatives by it.
 #[derive(Debug, Clone)]
 pub(super) struct ChebyshevLanes {
-    pub(super) values: [Lanes; LARGEST_DEGREE + 1],
-    pub(super) slopes: [Lanes; LARGEST_DEGREE + 1],
+    pub(super) values: Vec<Lanes>,
+    pub(super) slopes: Vec<Lanes>,
 }
 
 /// A number of each of some places or columns that are computed together.
@@ -72,10 +72,8 @@ pub(super) type Row = [f64; WIDTH];
 
 impl ChebyshevLanes {
     pub(super) fn zero() -> Self {
-        Self {
-            values: [[0.0; LANES]; LARGEST_DEGREE + 1],
-            slopes: [[0.0; LANES]; LARGEST_DEGREE + 1],
-        }
+        let zeros = vec![[0.0; LANES]; LARGEST_DEGREE + 1];
+        Self { values: zeros.clone(), slopes: zeros }
     }
 }
 

@@ -268,15 +268,25 @@ impl<'a> RayTransfer<'a> {
         let mut points = PupilPoints::new(self.function.polynomial());
         for one in asked {
             for sense in [1.0, -1.0] {
-                for (from, to) in self.lit_parts(looked, one.shift, sense) {
-                    let count = ((to - from) * one.along_edge as f64).ceil() as usize + EDGE_NODES;
-                    let node = |(u, weight)| (from + u * (to - from), weight * (to - from));
-                    let nodes: Vec<(f64, f64)> = rule(count).into_iter().map(node).collect();
-                    for nodes in nodes.chunks(LANES) {
-                        let part = (*one, sense);
-                        self.add_edge_nodes(part, (looked, nodes), &mut points, (number, by));
-                    }
-                }
+                self.add_lit_parts((*one, sense), looked, &mut points, (number, by));
+            }
+        }
+    }
+
+    /// Adds the nodes of an arc that have light across it.
+    fn add_lit_parts(
+        &self,
+        (asked, sense): (Asked, f64),
+        looked: LookedArc<'_>,
+        points: &mut PupilPoints<'_>,
+        (number, by): (usize, &mut CoefficientSlopes),
+    ) {
+        for (from, to) in self.lit_parts(looked, asked.shift, sense) {
+            let count = ((to - from) * asked.along_edge as f64).ceil() as usize + EDGE_NODES;
+            let node = |(u, weight)| (from + u * (to - from), weight * (to - from));
+            let nodes: Vec<(f64, f64)> = rule(count).into_iter().map(node).collect();
+            for nodes in nodes.chunks(LANES) {
+                Self::add_edge_nodes((asked, sense), (looked, nodes), points, (number, by));
             }
         }
     }
@@ -311,7 +321,6 @@ impl<'a> RayTransfer<'a> {
 
     /// Adds some nodes of the edge, each given by its place on the arc from 0 to 1 and by its weight.
     fn add_edge_nodes(
-        &self,
         (Asked { shift, factor, .. }, sense): (Asked, f64),
         (LookedArc { arc, places, .. }, nodes): (LookedArc<'_>, &[(f64, f64)]),
         points: &mut PupilPoints<'_>,

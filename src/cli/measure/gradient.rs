@@ -155,7 +155,7 @@ fn term_costs(rows: &[TermCost]) -> TextTable {
         table.row([
             row.term.to_owned(),
             ShortNumber(row.value).to_string(),
-            format!("{:.0e}", row.error),
+            format!("{:.0e}{}", row.error, if row.reached { "" } else { " not reached" }),
             format!("{:.3}", row.value_ms),
             format!("{:.3}", row.gradient_ms),
             format!("{:.2}", row.gradient_ms / row.value_ms),
