@@ -42,36 +42,41 @@ pub struct Illumination {
 /// The light at a field that has some.
 #[derive(Debug, Clone, Copy)]
 struct FieldLight {
-    irradiance: Estimate,
+    /// The reason if it is not known.
+    irradiance: Result<Estimate, AnalysisError>,
     point: [f64; 2],
     cone: Estimate,
 }
 
 /// The illumination of all fields at a wavelength; a field without light has 0 and the reason.
 pub fn illumination(model: &RayModel, wavelength: usize, accuracy: Accuracy) -> Vec<Illumination> {
-    let light = |field: &FieldPoint| field_light(model, *field, wavelength, accuracy);
+    let fold = ImageFold::find(model, wavelength);
+    let light = |field: &FieldPoint| field_light(model, *field, (wavelength, fold), accuracy);
     let lights: Vec<_> = model.fields.par_iter().map(light).collect();
     let first = lights.first().and_then(|light| light.ok());
-    let dark = Estimate::new(0.0, 0.0, 0);
-    let dark = FieldLight { irradiance: dark, point: [0.0; 2], cone: dark };
-    // A field that has light, but not this number.
-    let unknown = Estimate::new(0.0, f64::INFINITY, 0);
-    let unknown = FieldLight { irradiance: unknown, point: [0.0; 2], cone: unknown };
     let result = |(field, light): (&FieldPoint, &Result<FieldLight, AnalysisError>)| {
-        let without = |why: AnalysisError| if why.is_loss_of_light() { dark } else { unknown };
-        let FieldLight { irradiance, point, cone } = light.unwrap_or_else(without);
-        let first = first.filter(|_| irradiance.error.is_finite());
+        let dark = Estimate::new(0.0, 0.0, 0);
+        let dark = |why| FieldLight { irradiance: Err(why), point: [0.0; 2], cone: dark };
+        let FieldLight { irradiance, point, cone } = light.unwrap_or_else(dark);
+        let of_first = first.and_then(|first| first.irradiance.ok());
+        let is_known = irradiance.map_or_else(|why| why.is_loss_of_light(), |_| true);
+        let irradiance_or_none = irradiance.unwrap_or_else(|why| without_number(why));
         Illumination {
             field: *field,
-            irradiance,
-            relative: first.map(|first| ratio(irradiance, first.irradiance)),
+            irradiance: irradiance_or_none,
+            relative: of_first.filter(|_| is_known).map(|first| ratio(irradiance_or_none, first)),
             point,
             cone,
             relative_cone: first.map(|first| ratio(cone, first.cone)),
-            error: light.err(),
+            error: irradiance.err(),
         }
     };
     model.fields.iter().zip(&lights).map(result).collect()
+}
+
+/// No irradiance, or one that is not known.
+fn without_number(why: AnalysisError) -> Estimate {
+    Estimate::new(0.0, if why.is_loss_of_light() { 0.0 } else { f64::INFINITY }, 0)
 }
 
 fn ratio(light: Estimate, first: Estimate) -> Estimate {
@@ -83,14 +88,16 @@ fn ratio(light: Estimate, first: Estimate) -> Estimate {
 fn field_light(
     model: &RayModel,
     field: FieldPoint,
-    wavelength: usize,
+    (wavelength, fold): (usize, Option<ImageFold>),
     accuracy: Accuracy,
 ) -> Result<FieldLight, AnalysisError> {
     let region = lit_region(model, field, wavelength)?;
     let cone = region_cone(&region, accuracy)?;
     let point = centroid(&region, accuracy)?;
-    let irradiance = irradiance(model, wavelength, point, accuracy)?;
-    Ok(FieldLight { irradiance, point, cone })
+    match irradiance_beside(fold, model, wavelength, point, accuracy) {
+        Err(why) if why.is_loss_of_light() => Err(why),
+        irradiance => Ok(FieldLight { irradiance, point, cone }),
+    }
 }
 
 /// The area of the cone of a field's rays at the image in direction cosines, π sin² of the half
@@ -155,7 +162,21 @@ pub fn irradiance(
     point: [f64; 2],
     accuracy: Accuracy,
 ) -> Result<Estimate, AnalysisError> {
-    ImageFold::refuse(model, wavelength, point)?;
+    irradiance_beside(ImageFold::find(model, wavelength), model, wavelength, point, accuracy)
+}
+
+/// The same for a fold of the image that is known.
+///
+/// # Errors
+/// As [`irradiance`].
+pub(crate) fn irradiance_beside(
+    fold: Option<ImageFold>,
+    model: &RayModel,
+    wavelength: usize,
+    point: [f64; 2],
+    accuracy: Accuracy,
+) -> Result<Estimate, AnalysisError> {
+    ImageFold::refuse(fold, point)?;
     let seen = SeenFromImage::new(model, wavelength, point)?;
     let region = lit_region(&seen.model, seen.model.fields[0], 0)?;
     let numbers = |nodes: &Nodes| seen.solid_angle(&region, nodes);
@@ -176,7 +197,7 @@ pub fn scene_irradiance(
     radiance: impl Fn(&Ray<f64>) -> f64,
     accuracy: Accuracy,
 ) -> Result<Estimate, AnalysisError> {
-    ImageFold::refuse(model, wavelength, point)?;
+    ImageFold::refuse(ImageFold::find(model, wavelength), point)?;
     let seen = SeenFromImage::new(model, wavelength, point)?;
     let backward = BackwardLens::new(model, wavelength).map_err(|_error| AnalysisError::NoLight)?;
     let region = lit_region(&seen.model, seen.model.fields[0], 0)?;
@@ -217,12 +238,13 @@ pub fn energy_irradiance(
         return Err(AnalysisError::NotSymmetric);
     }
     let region = lit_region(model, field, wavelength)?;
-    let [x, y] = centroid(&region, accuracy)?;
-    ImageFold::refuse(model, wavelength, [x, y])?;
-    let element = FieldElement { model, field, wavelength, accuracy, square: x * x + y * y };
+    let element = FieldElement { model, field, wavelength, accuracy };
+    let [_, square] = element.squares(field)?;
+    ImageFold::refuse(ImageFold::find(model, wavelength), [0.0, square.sqrt()])?;
     let accepted = element.acceptance(&region)?;
     let [wide, narrow] =
-        [element.magnification(FIELD_STEP)?, element.magnification(0.5 * FIELD_STEP)?];
+        [FIELD_STEP, 0.5 * FIELD_STEP].map(|step| element.magnification(step, square));
+    let [wide, narrow] = [wide?, narrow?];
     // Richardson: both are wrong by the square of the step.
     let best = (4.0 * narrow - wide) / 3.0;
     let value = accepted.value * best;
@@ -236,8 +258,6 @@ struct FieldElement<'a> {
     field: FieldPoint,
     wavelength: usize,
     accuracy: Accuracy,
-    /// The square of the image height, in mm².
-    square: f64,
 }
 
 impl FieldElement<'_> {
@@ -266,8 +286,9 @@ impl FieldElement<'_> {
         Ok(Estimate::new(found.values[0], found.errors[0], found.rays))
     }
 
-    /// The size of an annulus of the field over the area of its image, for a step of the field.
-    fn magnification(&self, step: f64) -> Result<f64, AnalysisError> {
+    /// The size of an annulus of the field over the area of its image, for a step of the field, whose own image height
+    /// has this square in mm².
+    fn magnification(&self, step: f64, square: f64) -> Result<f64, AnalysisError> {
         let size = self.field.x.hypot(self.field.y);
         if size == 0.0 {
             let edge = self.model.beam.edge.abs();
@@ -281,7 +302,7 @@ impl FieldElement<'_> {
         };
         let ([outer, far], [inner, near]) = (scaled(1.0 + step)?, scaled(1.0 - step)?);
         // At a turn of the height an element of the field has no area to fall on.
-        if (far - self.square) * (self.square - near) < 0.0 {
+        if (far - square) * (square - near) < 0.0 {
             return Err(AnalysisError::FoldedImage);
         }
         Ok(((outer - inner) / (far - near)).abs())

@@ -66,6 +66,7 @@ pub use ghosts::{
     CoatedLens, Ghost, GhostError, GhostPatch, GhostPath, GhostRanking, GhostRay, ParaxialGhost,
     PassedLight, ghost_section, ghosts, rank_ghosts,
 };
+pub(crate) use illumination::irradiance_beside;
 pub use illumination::{
     Illumination, energy_irradiance, illumination, image_cone, irradiance, scene_irradiance,
 };
@@ -148,7 +149,7 @@ pub enum AnalysisError {
     IrregularPupil,
     /// Light of two fields arrives at a point of the image.
     #[error(
-        "the image folds: its height turns round within the field, and light of two fields arrives at this point, \
+        "the image folds: its height decreases again with the field, and light of two fields arrives at this point, \
          of which one alone would be counted"
     )]
     FoldedImage,

@@ -10,7 +10,7 @@ use super::diffraction::{field_at, offsets};
 use super::lit_directions::LitDirections;
 use super::pupil_spread::{DirectionRaster, PupilSpread, PupilSpreads, RAYS};
 use super::{ColorBand, Scene};
-use crate::analysis::{BackwardLens, irradiance};
+use crate::analysis::{BackwardLens, ImageFold, irradiance_beside};
 use crate::math::Vec3;
 use crate::pupil::{Accuracy, RayModel};
 use crate::trace::{Landings, Ray, Rays, TraceSink as _};
@@ -65,11 +65,17 @@ impl AimedLight {
         let chiefs = (0..KNOTS).map(|i| chief(model, steps[0] * i as f64));
         let chiefs = chiefs.collect::<Option<Vec<f64>>>()?;
         let all: Vec<usize> = wavelengths(bands);
+        let folds: Vec<_> =
+            all.iter().map(|wavelength| ImageFold::find(model, *wavelength)).collect();
         let light = |i: usize| {
-            let at = [0.0, steps[1] * (i % LIGHTS) as f64];
-            irradiance(model, all[i / LIGHTS], at, ACCURACY).map_or(0.0, |found| found.value)
+            let (set, at) = (i / LIGHTS, [0.0, steps[1] * (i % LIGHTS) as f64]);
+            match irradiance_beside(folds[set], model, all[set], at, ACCURACY) {
+                Ok(found) => Some(found.value),
+                Err(why) => why.is_loss_of_light().then_some(0.0),
+            }
         };
-        let lights: Vec<f64> = (0..all.len() * LIGHTS).into_par_iter().map(light).collect();
+        let lights: Option<Vec<f64>> = (0..all.len() * LIGHTS).into_par_iter().map(light).collect();
+        let lights = lights?;
         let lights = lights.chunks(LIGHTS).map(<[f64]>::to_vec).collect();
         Some(Self { steps, chiefs, lights, offsets: offsets(bands) })
     }

@@ -77,8 +77,9 @@ impl LitDirections {
         reach: f64,
         rings: usize,
     ) -> Result<Self, PictureError> {
-        let fold = ImageFold::find(model, model.primary);
-        if let Some(ImageFold { radii: [radius, _] }) = fold.filter(|fold| fold.radii[0] < reach) {
+        let folds = wavelengths.iter().filter_map(|wavelength| ImageFold::find(model, *wavelength));
+        let radius = folds.map(|fold| fold.radii[0]).fold(f64::INFINITY, f64::min);
+        if radius < reach {
             return Err(PictureError::Directions { radius, source: AnalysisError::FoldedImage });
         }
         let at = |part: f64| outlines(model, wavelengths, part * reach);

@@ -1,4 +1,4 @@
-//! Hard case 11 of images: the height turns round within the field, where the solid angle of an element of the image
+//! Hard case 11 of images: the height decreases again within the field, where the solid angle of an element of the image
 //! is infinite and two fields arrive at the same points.
 //!
 //! A lens of 100 mm behind a stop of 4 mm, and an aspheric plate in front of its image that bends the chief rays of
@@ -69,6 +69,9 @@ fn beyond_the_turn_the_light_of_one_field_is_no_irradiance() {
     let last = lights.last().unwrap();
     assert_eq!(last.error, Some(AnalysisError::FoldedImage));
     assert!(last.irradiance.error.is_infinite() && last.relative.is_none(), "{last:?}");
+    // What needs no ray backwards is known all the same.
+    assert!(last.cone.value > 0.0 && (last.point[1] - 7.866).abs() < 0.1, "{last:?}");
+    assert!(last.relative_cone.is_some());
 
     let lens = folded(10.0);
     let (model, bands) = picture_model(&lens, 0, Coloring::Gray).unwrap();
@@ -103,6 +106,11 @@ fn at_the_turn_spots_have_numbers_and_an_element_has_no_area() {
         if height(a) < height(b) { low = a } else { high = b }
     }
     let turn = FieldPoint { x: 0.0, y: low, weight: 1.0 };
+    // Just below the largest height two fields arrive, which no sampled field need have.
+    let [_, most] = ImageFold::find(&model, 0).unwrap().radii;
+    assert!((most - height(turn.y)).abs() < 1e-9, "{most}");
+    let refused = irradiance(&model, 0, [0.0, height(turn.y) - 1e-6], ACCURACY).unwrap_err();
+    assert_eq!(refused, AnalysisError::FoldedImage);
     let found = spot(&model, turn, ACCURACY).unwrap();
     assert!(found.rms.value > 0.1 && found.rms.error < 1e-3 * found.rms.value, "{:?}", found.rms);
     for y in [turn.y, 9.0, 6.5] {
@@ -112,4 +120,18 @@ fn at_the_turn_spots_have_numbers_and_an_element_has_no_area() {
     }
     let field = FieldPoint { y: 3.0, ..turn };
     assert!(energy_irradiance(&model, field, 0, ACCURACY).unwrap().error < 1e-5);
+}
+
+/// A turn between the last two compared fields is found; one beyond the last field is none.
+#[test]
+fn a_turn_just_before_the_farthest_field_is_found() {
+    let most = |edge: f64| ImageFold::find(&model(edge), 0).map(|fold| fold.radii[1]);
+    let top = most(10.0).unwrap();
+    let mut edge = 7.5;
+    while most(edge).is_none() {
+        edge += 0.02;
+    }
+    assert!((most(edge).unwrap() - top).abs() < 1e-6, "{edge}: {:?} {top}", most(edge));
+    let (below, past) = (edge - 0.02, edge + 1.0);
+    assert_eq!((most(below), most(past).map(|v| (v - top).abs() < 1e-6)), (None, Some(true)));
 }

@@ -133,7 +133,11 @@ impl TextLines for IlluminationJson {
          that of the rays of one field";
 
     fn lines(&self) -> Vec<String> {
-        let mut lines = vec![estimate_text("irradiance", &self.irradiance)];
+        let mut lines = vec![if self.irradiance.error.is_finite() {
+            estimate_text("irradiance", &self.irradiance)
+        } else {
+            "irradiance not known".to_owned()
+        }];
         lines.extend(self.relative.iter().map(|e| estimate_text("relative", e)));
         lines.extend(self.energy.iter().map(|e| estimate_text("by energy", e)));
         lines.push(estimate_text("cone", &self.cone));
