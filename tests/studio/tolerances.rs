@@ -143,7 +143,7 @@ fn the_contrast_of_lenses_as_made_stands_beside_that_of_the_design() {
         ..AnalysisSettings::default()
     };
     let mut harness = panel_of(achromat(), settings, confirm_as_built);
-    for text in ["MTF at 30 cycles/mm as designed", "MTF of the lenses"] {
+    for text in ["MTF at 30 cycles/mm as designed", "MTF expected as made"] {
         harness.get_by_label(text);
     }
     let contrast = made(&harness).contrast.unwrap().unwrap();
