@@ -34,7 +34,7 @@ struct PupilLines {
     along: ChebyshevLanes,
     /// The path difference and the amplitude along the columns, each followed by its derivative across them.
     light: [Line; 4],
-    /// What nodes ask of the terms: of the path difference, of the displacement across the columns and of its
+    /// The sums that nodes ask of the terms: of the path difference, of the displacement across the columns and of its
     /// derivative, and of that along them.
     asked: [Line; 4],
 }
