@@ -449,7 +449,7 @@ mod tests {
         (reference, (0..800).map(ray).collect())
     }
 
-    /// Where the image is a ring, as with waves of defocus, the point of the least mean square is darker than those
+    /// In an image that is a ring, as with waves of defocus, the point of the least mean square is darker than those
     /// around it; the way from there to the brightest one is uphill, and leads to a maximum.
     #[test]
     fn the_brightest_point_is_a_maximum_where_the_best_one_by_squares_is_none() {

@@ -45,7 +45,7 @@ pub(super) fn add_transfer_shortfall(
         let share: f64 = own.iter().map(|pupil| pupil.weight).sum();
         let Some(first) = own.first().filter(|_| share > 0.0) else { continue };
         let origin = first.transfer.center();
-        let mut asked = Vec::with_capacity(2);
+        let mut shortfalls = Vec::with_capacity(2);
         for frequency in [[wanted.frequency, 0.0], [0.0, wanted.frequency]] {
             let found = |pupil: &&PupilPart<'_>| pupil.transfer.at(frequency, origin);
             let found: Vec<TransferAtFrequency> = own.par_iter().map(found).collect();
@@ -58,10 +58,10 @@ pub(super) fn add_transfer_shortfall(
             if shortfall > 0.0 {
                 let conjugate = if modulation > 0.0 { [re, -im] } else { [0.0; 2] };
                 let factor = conjugate.map(|part| part / modulation.max(f64::MIN_POSITIVE) / share);
-                asked.push(Shortfall { found, factor, lacking: shortfall });
+                shortfalls.push(Shortfall { found, factor, lacking: shortfall });
             }
         }
-        add_shortfalls(context, &own, &asked, share, sum);
+        add_shortfalls(context, &own, &shortfalls, share, sum);
     }
     Ok(())
 }
@@ -78,32 +78,33 @@ struct Shortfall {
 fn add_shortfalls(
     context: &EvaluationContext<'_>,
     pupils: &[&PupilPart<'_>],
-    asked: &[Shortfall],
+    shortfalls: &[Shortfall],
     share: f64,
     sum: &mut SumOfSquares,
 ) {
     if sum.level == DerivativeLevel::Normal {
-        for one in asked {
-            let slope = modulation_slope(context, pupils, &[(one, 1.0)].into_iter());
+        for one in shortfalls {
+            let slope = modulation_slope(context, pupils, &[(one, 1.0)]);
             sum.add_residual(0.5 * share, one.lacking, &-slope);
         }
         return;
     }
-    sum.value += asked.iter().map(|one| 0.5 * share * one.lacking * one.lacking).sum::<f64>();
-    if sum.level == DerivativeLevel::Gradient && !asked.is_empty() {
-        let by_modulation = asked.iter().map(|one| (one, -share * one.lacking));
+    sum.value += shortfalls.iter().map(|one| 0.5 * share * one.lacking * one.lacking).sum::<f64>();
+    if sum.level == DerivativeLevel::Gradient && !shortfalls.is_empty() {
+        let slope = |one: &Shortfall| -share * one.lacking;
+        let by_modulation: Vec<_> = shortfalls.iter().map(|one| (one, slope(one))).collect();
         sum.gradient += modulation_slope(context, pupils, &by_modulation);
     }
 }
 
 /// The derivatives by the variables of the sum of some modulations, each times a number.
-fn modulation_slope<'s>(
+fn modulation_slope(
     context: &EvaluationContext<'_>,
     pupils: &[&PupilPart<'_>],
-    asked: &(impl Iterator<Item = (&'s Shortfall, f64)> + Clone + Sync),
+    modulations: &[(&Shortfall, f64)],
 ) -> DVector<f64> {
     let slope = |(number, pupil): (usize, &&PupilPart<'_>)| {
-        let transfers = asked.clone().map(|(one, times)| {
+        let transfers = modulations.iter().map(|(one, times)| {
             (one.found[number], one.factor.map(|part| times * pupil.weight * part))
         });
         let by_number = pupil.transfer.gradient(transfers);

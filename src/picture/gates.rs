@@ -36,6 +36,23 @@ pub struct PictureGate {
     pub saved_milliseconds: Option<f64>,
 }
 
+impl PictureGate {
+    /// The gate of lateral colour among others.
+    pub fn of_lateral_color(gates: &mut [Self]) -> Option<&mut Self> {
+        gates.iter_mut().find(|gate| gate.effect == LATERAL_COLOR)
+    }
+
+    /// Enters that a picture has a wavelength or more for each colour, or one for all, whatever the number says.
+    pub fn decide_colors(&mut self, has_one_for_each: bool) {
+        self.on = has_one_for_each;
+        self.reason = if has_one_for_each {
+            "spread of chief rays; the picture has a wavelength for each colour"
+        } else {
+            "spread of chief rays; the picture has one wavelength for all colours"
+        };
+    }
+}
+
 /// The lens, frame and scene that gates are computed for.
 #[derive(Debug, Clone, Copy)]
 pub struct GateSubject<'a> {
@@ -55,6 +72,8 @@ pub struct GateSubject<'a> {
     pub tolerance: f64,
 }
 
+/// The effect that takes wavelengths of each colour.
+const LATERAL_COLOR: &str = "lateral colour";
 /// Limits in pixels: of distortion and lateral colour, of motion, and of depth.
 const SHIFTED: f64 = 0.1;
 const MOVED: f64 = 0.2;
@@ -87,7 +106,7 @@ impl GateSubject<'_> {
                 SHIFTED,
                 "image height against the first-order one",
             ),
-            carried("lateral colour", self.lateral_color(), "px", SHIFTED, "spread of chief rays"),
+            carried(LATERAL_COLOR, self.lateral_color(), "px", SHIFTED, "spread of chief rays"),
             carried("blur", blur, "share", share, "1 - contrast by rays at half a period a pixel"),
             carried(
                 "field variation",

@@ -67,15 +67,15 @@ struct ArrivedSpot {
     color: usize,
     off: [f64; 2],
     light: f64,
-    /// One of two independent halves.
+    /// One of two halves of the rays, each with a seed of its own.
     half: usize,
 }
 
 /// The share of the light of the widest image that its square has to hold, and the room around it.
 const HELD: f64 = 0.9;
 const ROOM: f64 = 1.15;
-/// The seed of the rays.
-const SEED: u32 = 0x50_1A7;
+/// The seeds of the two halves of the rays, whose difference is the error.
+const SEEDS: [u32; 2] = [0x50_1A7, 0x7A_105];
 /// The shift of the image point over which `A` is measured, as a share of the frame's reach.
 const SHIFT: f64 = 1e-4;
 
@@ -105,7 +105,7 @@ impl ExactRenderer<'_> {
         let side = (2.0 * ROOM * reach.fold(0.0, f64::max)).max(frame.pitch);
         let rays = found.iter().flatten().map(|(_, rays)| rays).sum();
         let image = |spots: &(Vec<ArrivedSpot>, usize)| {
-            PlacedPoint::of(&spots.0, (grid.cells, side), frame.inverted)
+            PlacedPoint::of((&spots.0, bands.len()), (grid.cells, side), frame.inverted)
         };
         let images: Vec<_> = found.iter().map(|found| found.as_ref().and_then(image)).collect();
         let error = images.iter().flatten().map(|image| image.error).fold(0.0, f64::max);
@@ -205,8 +205,9 @@ impl PointSubject<'_> {
         places: [[f64; 2]; 2],
         samples: usize,
     ) -> Vec<Option<SeenPoint>> {
-        let numbers =
-            |i: usize| [0, 1, 2, 3].map(|d| f64::from(sobol_burley::sample(i as u32, d, SEED)));
+        let numbers = |i: usize| {
+            [0, 1, 2, 3].map(|d| f64::from(sobol_burley::sample(i as u32 / 2, d, SEEDS[i % 2])))
+        };
         let seen = self.sampler.seen_from(light, places, (0..samples).map(numbers));
         seen.into_iter()
             .map(|ray| {
@@ -247,8 +248,13 @@ fn centroid(spots: &[ArrivedSpot]) -> [f64; 2] {
 }
 
 impl PlacedPoint {
-    /// The image of light in a square of cells with a side in mm; `None` if none of it arrives there.
-    fn of(spots: &[ArrivedSpot], (cells, side): (usize, f64), inverted: bool) -> Option<Self> {
+    /// The image of light of so many colours, one for grey, in a square of cells with a side in mm; `None` if none of
+    /// it arrives there.
+    fn of(
+        (spots, colors): (&[ArrivedSpot], usize),
+        (cells, side): (usize, f64),
+        inverted: bool,
+    ) -> Option<Self> {
         let facing = if inverted { -1.0 } else { 1.0 };
         let mut halves = [0, 1].map(|_| vec![[0.0; 3]; cells * cells]);
         let (mut all, mut inside) = (0.0, 0.0);
@@ -271,8 +277,7 @@ impl PlacedPoint {
         let (first, second) = (&halves[0], &halves[1]);
         let mut values: Vec<Radiance> =
             first.iter().zip(second).map(|(a, b)| [0, 1, 2].map(|k| a[k] + b[k])).collect();
-        if spots.iter().all(|spot| spot.color == 0) {
-            // Grey has one colour.
+        if colors == 1 {
             values.iter_mut().for_each(|value| *value = [value[0]; 3]);
         }
         let peak = values.iter().flatten().copied().fold(0.0, f64::max);
@@ -282,8 +287,27 @@ impl PlacedPoint {
         values.iter_mut().flatten().for_each(|value| *value /= peak);
         let apart = first.iter().flatten().zip(second.iter().flatten());
         let square: f64 = apart.map(|(a, b)| (a - b).powi(2)).sum();
-        let error = (square / (3 * cells * cells) as f64).sqrt() / peak;
+        let error = (square / (colors * cells * cells) as f64).sqrt() / peak;
         let half_light = radius_about(spots, centroid(spots), 0.5);
         Some(Self { values, inside: inside / all, half_light, error })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The only light of an RGB picture may be red; in grey the same light is white, and its error is a mean over one
+    /// colour in place of three.
+    #[test]
+    fn red_light_alone_is_not_grey() {
+        let spot = |half: usize, light: f64| ArrivedSpot { color: 0, off: [0.0; 2], light, half };
+        let spots = [spot(0, 3.0), spot(1, 1.0)];
+        let [red, grey] =
+            [3, 1].map(|colors| PlacedPoint::of((&spots, colors), (3, 1.0), false).unwrap());
+        assert_eq!((red.values[4], grey.values[4]), ([1.0, 0.0, 0.0], [1.0; 3]));
+        assert!((grey.error - 0.5 / 3.0).abs() < 1e-12, "{}", grey.error);
+        assert!((red.error * 3.0_f64.sqrt() - grey.error).abs() < 1e-12, "{}", red.error);
+        assert_eq!((grey.inside, grey.half_light), (1.0, 0.0));
     }
 }

@@ -148,6 +148,11 @@ impl Canvas {
         width / (DOT * ADVANCE) as usize
     }
 
+    /// The number of letters of a text as it is drawn.
+    pub fn letters_of(text: &str) -> usize {
+        plain_letters(text).chars().count()
+    }
+
     fn draw_glyph(&mut self, [x, y]: [i32; 2], letter: char, color: Color) {
         for (column, bits) in glyph(letter).into_iter().enumerate() {
             for row in (0..8).filter(|row| bits >> row & 1 == 1) {
@@ -201,24 +206,6 @@ fn plain_letters(text: &str) -> String {
         ("\u{2212}", "-"),
     ];
     plain.into_iter().fold(text.to_owned(), |text, (from, to)| text.replace(from, to))
-}
-
-/// A text in lines of at most so many letters as they are drawn in pixels, broken at blanks; a longer word
-/// has a line of its own.
-pub fn wrapped_letters(text: &str, most: usize) -> Vec<String> {
-    let mut lines: Vec<(String, usize)> = Vec::new();
-    for word in text.split_whitespace() {
-        let count = plain_letters(word).chars().count();
-        match lines.last_mut() {
-            Some((line, letters)) if *letters + 1 + count <= most => {
-                line.push(' ');
-                line.push_str(word);
-                *letters += 1 + count;
-            }
-            _ => lines.push((word.to_owned(), count)),
-        }
-    }
-    lines.into_iter().map(|(line, _)| line).collect()
 }
 
 /// The approximate side of an image, in pixels.

@@ -2,7 +2,7 @@
 
 use super::{
     Axis, BLACK, Canvas, Chart, Color, GREY, Legend, LinePattern, PALETTE, PaperChart, Pen, Stroke,
-    TextAlign, VectorDrawing, described_svg, wrapped_letters,
+    TextAlign, VectorDrawing, described_svg, wrapped,
 };
 use png::EncodingError;
 
@@ -173,7 +173,7 @@ impl CurveSheet {
     /// paper.
     fn lines(&self, text: &str) -> Vec<String> {
         let width = PIXELS * (self.width() - ROOM[0]);
-        wrapped_letters(text, Canvas::letters(width as usize))
+        wrapped(text, Canvas::letters(width as usize), Canvas::letters_of)
     }
 
     /// The lines of the caption; its sentences begin on lines of their own unless they are many.

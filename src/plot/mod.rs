@@ -13,9 +13,7 @@ mod document;
 mod font;
 mod vector;
 
-pub use canvas::{
-    Canvas, NamedPlot, Stroke, TextAlign, draw_image_row, gray_levels, wrapped_letters,
-};
+pub use canvas::{Canvas, NamedPlot, Stroke, TextAlign, draw_image_row, gray_levels};
 pub use chart::{Axis, Chart, Legend, round_step};
 pub use color::{BLACK, Color, GREY, GRID, PALETTE, diverging, glow, gray_level};
 pub use contour::{ContourGrid, contour_curves};

@@ -1,9 +1,13 @@
 //! The panel of pictures: two lenses beside each other, a line between them, light and noise of a pixel.
 
 use aplanat::lens::{Aperture, Lens};
-use aplanat::picture::BuiltInScene;
+use aplanat::picture::{
+    BuiltInScene, Coloring, ExactRenderer, ImageFrame, PlacedPoints, PointGrid, field_diagonal,
+    picture_model,
+};
 use aplanat::session::{
-    AnalysisResults, AnalysisSettings, Command, PanelSetting, SessionView, analyze,
+    AnalysisResults, AnalysisSettings, Command, PanelSetting, PictureOptions, SessionView, Timed,
+    analyze,
 };
 use aplanat::studio::panels::PicturePanel;
 use egui_kittest::Harness;
@@ -127,4 +131,65 @@ fn images_of_points_are_asked_for_while_they_are_shown() {
     let last = harness.state().commands.last().cloned();
     assert!(matches!(last, Some(Command::Show(PanelSetting::PicturePoints(true)))), "{last:?}");
     harness.get_by_label("Computing the images of points …");
+}
+
+/// Images of points over the frame of the double Gauss, by few rays.
+fn few_points() -> PlacedPoints {
+    let (model, bands) = picture_model(&double_gauss(), 0, Coloring::Rgb(1)).unwrap();
+    let frame = ImageFrame::new(&model, [6, 4], field_diagonal(&model).unwrap()).unwrap();
+    let scene = BuiltInScene::White.build(&model, &frame, None).unwrap();
+    let renderer = ExactRenderer::new(&model, &bands, &scene, frame).unwrap();
+    let grid = PointGrid { places: [3, 1], cells: 9, samples: 128 };
+    renderer.placed_points(&bands, grid, None, &|| false).unwrap()
+}
+
+/// The words below a picture with images of points: their scale, their error, and their sizes.
+#[test]
+fn images_of_points_have_their_sizes_in_words() {
+    let points = few_points();
+    let mut view = seen(double_gauss());
+    let mut results = (*view.results.take().unwrap()).clone();
+    let analyses = results.analyses.as_mut().unwrap();
+    let shown = analyses.picture.take().unwrap();
+    let mut picture = shown.value.clone().unwrap();
+    picture.points = Some(points.clone());
+    analyses.picture = Some(Arc::new(Timed { value: Ok(picture), ms: shown.ms }));
+    view.results = Some(Arc::new(results));
+    let mut harness = panel_harness(PicturePanel::default(), view);
+    harness.run();
+    press(&mut harness, "Points");
+    let texts = painted_texts(&harness);
+    let words = texts.iter().find(|text| text.starts_with("Points at infinity, enlarged")).unwrap();
+    let parts = [
+        "each normalized to its own peak; sampling error".to_owned(),
+        format!("% of the peak (rms), {} rays", points.rays),
+        "µm of the centroid, at least".to_owned(),
+    ];
+    for part in parts {
+        assert!(words.contains(&part), "{words}");
+    }
+    let radii = points.images.iter().flatten().map(|image| 1e3 * image.half_light);
+    let said = words.split("half of the light within ").nth(1).unwrap();
+    let least: f64 = said.split(' ').next().unwrap().parse().unwrap();
+    let expected = radii.reduce(f64::min).unwrap();
+    assert!((least / expected - 1.0).abs() < 0.01, "{words}: {expected}");
+}
+
+/// An exact picture has no error against itself.
+#[test]
+fn an_exact_picture_says_that_there_is_nothing_to_compare_with() {
+    let mut view = seen(double_gauss());
+    let settings = AnalysisSettings {
+        picture_options: PictureOptions { exact: true, ..PictureOptions::default() },
+        ..view.settings.clone()
+    };
+    let mut results = (*view.results.take().unwrap()).clone();
+    results.analyses = analyze(&results.lens, &settings);
+    results.settings = settings.clone();
+    (view.results, view.settings) = (Some(Arc::new(results)), settings);
+    let mut harness = panel_harness(PicturePanel::default(), view);
+    harness.run();
+    press(&mut harness, "Error");
+    harness.get_by_label_contains("Exact: rays are followed from every pixel");
+    assert!(harness.query_by_label("Measuring the error …").is_none());
 }

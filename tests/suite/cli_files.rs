@@ -171,6 +171,20 @@ fn curves_of_an_analysis_are_drawn() {
     let samples = 3 * 3;
     assert_eq!(curves.count(), 2 * 3 * 3 + samples, "{text}");
     assert!(["tangential", "dy, mm", "0.5875618 um"].iter().all(|word| text.contains(word)));
+    // The caption of each field, drawn and as an element of the file.
+    let caption = |text: &str| {
+        text.split("<desc>").nth(1).map(|t| t.split("</desc>").next().unwrap().to_owned())
+    };
+    let sentences = caption(&text).unwrap();
+    assert!(
+        sentences.split("; ").count() == 3 && sentences.starts_with("y 0 deg: error "),
+        "{sentences}"
+    );
+    assert!(
+        sentences.contains(" mm, ")
+            && sentences.contains(" rays, ")
+            && !sentences.contains("up to")
+    );
     assert!(fs::read(&pdf).unwrap().starts_with(b"%PDF"));
     assert!(image::open(&png).unwrap().width() > 1000);
     for kind in ["opd-fan", "longitudinal", "through-focus", "mtf", "through-focus-mtf"] {
@@ -194,6 +208,10 @@ fn curves_of_an_analysis_are_drawn() {
         done_json(&["analyze", lens, kind, "--error", "1%", "--plot", &svg], "");
         let text = fs::read_to_string(&svg).unwrap();
         assert!(text.matches("0.35").count() >= lines && text.contains(word), "{kind}: {text}");
+        // The report of the fields is not that of curves over the field.
+        let is_over_field =
+            ["distortion", "field-curvature", "lateral-color", "illumination"].contains(&kind);
+        assert_eq!(caption(&text).is_none(), is_over_field, "{kind}");
     }
     refused(
         2,

@@ -34,7 +34,7 @@ struct PupilLines {
     along: ChebyshevLanes,
     /// The path difference and the amplitude along the columns, each followed by its derivative across them.
     light: [Line; 4],
-    /// What nodes ask of the terms: of the path difference, of the displacement across the columns and of its
+    /// The sums that nodes ask of the terms: of the path difference, of the displacement across the columns and of its
     /// derivative, and of that along them.
     asked: [Line; 4],
 }
@@ -288,19 +288,25 @@ impl<'p> PupilPoints<'p> {
         Self { polynomial, factors }
     }
 
-    /// Goes to other points, given by their first and by their second cosines; the path differences in waves and the
-    /// amplitudes there.
-    pub(super) fn go_to(&mut self, places: &[Lanes; 2]) -> [Lanes; 2] {
+    /// The path differences in waves and the amplitudes at points that are given by their first and by their second
+    /// cosines.
+    pub(super) fn light_at(&mut self, places: &[Lanes; 2]) -> [Lanes; 2] {
         run_vectorized(
             SimdWidth::detect(),
             #[inline(always)]
             || {
-                for ((axis, place), factors) in places.iter().enumerate().zip(&mut self.factors) {
-                    self.polynomial.basis().fill(axis, place, factors);
-                }
+                self.fill(places);
                 self.polynomial.terms().each_ref().map(|terms| self.sum_of(terms))
             },
         )
+    }
+
+    /// Computes the polynomials at points.
+    #[inline(always)]
+    fn fill(&mut self, places: &[Lanes; 2]) {
+        for ((axis, place), factors) in places.iter().enumerate().zip(&mut self.factors) {
+            self.polynomial.basis().fill(axis, place, factors);
+        }
     }
 
     /// The sum of some terms at the points.
@@ -315,8 +321,19 @@ impl<'p> PupilPoints<'p> {
         sum
     }
 
-    /// Adds to the derivatives by the coefficients of the displacement those by the displacement of each point.
-    pub(super) fn add_displacements(&self, by_point: [Lanes; 2], by: &mut TermSlopes) {
+    /// Adds to the derivatives by the coefficients of the displacement those by the displacement of each of some
+    /// points, given by their cosines.
+    pub(super) fn add_displacements(
+        &mut self,
+        places: &[Lanes; 2],
+        by_point: [Lanes; 2],
+        by: &mut TermSlopes,
+    ) {
+        run_vectorized(
+            SimdWidth::detect(),
+            #[inline(always)]
+            || self.fill(places),
+        );
         let [first, second] = &self.factors;
         let basis = self.polynomial.basis();
         let [mut across, along] = by_point;

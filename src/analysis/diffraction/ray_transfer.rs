@@ -150,7 +150,10 @@ impl<'a> RayTransfer<'a> {
             values: [light.waves[i], light.energies[i] / light.amplitudes[i]],
             weight: light.energies[i],
         };
-        let samples: Vec<FitSample> = (0..light.cosines.len()).map(sample).collect();
+        // The displacement of a mirrored pupil is divided by the first cosine.
+        let usable = |i: &usize| !light.mirrored || light.cosines[*i][0] != 0.0;
+        let usable: Vec<usize> = (0..light.cosines.len()).filter(usable).collect();
+        let samples: Vec<FitSample> = usable.iter().map(|i| sample(*i)).collect();
         let points = samples.iter().map(|sample| sample.cosines);
         let basis = PolynomialBasis::of_degree(points, rays.degree, light.mirrored);
         let fit = SampleFit::new(&basis, &samples);
@@ -160,7 +163,8 @@ impl<'a> RayTransfer<'a> {
         let energy = light.energy();
         let wavelength = sphere.medium_wavelength();
         let function = PupilFunction::of_fit((polynomial, energy), wavelength, (curves, steps));
-        let (region, points) = (region.clone(), light.points);
+        let points: Vec<[f64; 2]> = usable.iter().map(|i| light.points[*i]).collect();
+        let region = region.clone();
         let ends = traced.ends_of(&points);
         let first_cosines = samples.iter().map(|sample| sample.cosines[0]).collect();
         Ok(Self { region, sphere, function, fit, first_cosines, points, ends, arcs, tolerance })
@@ -337,8 +341,8 @@ impl<'a> RayTransfer<'a> {
         let place = [0, 1].map(|k| lanes(&|i| mixed(&arc.cosines[k], &shares[i])));
         let slope = [0, 1].map(|k| lanes(&|i| mixed(&arc.slopes[k], &shares[i])));
         let other = [0, 1].map(|k| place[k].map(|v| v - 2.0 * sense * shift.cosines[k]));
-        let [other_waves, other_amplitude] = points.go_to(&other);
-        let [waves, amplitude] = points.go_to(&place);
+        let [other_waves, other_amplitude] = points.light_at(&other);
+        let [waves, amplitude] = points.light_at(&place);
         let flux: Lanes = std::array::from_fn(|k| {
             let (sin, cos) = (-TAU * sense * (waves[k] - other_waves[k])).sin_cos();
             let size = weights[k] * arc.sign * amplitude[k] * other_amplitude[k];
@@ -347,7 +351,7 @@ impl<'a> RayTransfer<'a> {
         let outwards = |sign: f64, axis: usize| -> Lanes {
             std::array::from_fn(|k| sign * arc.sense * flux[k] * slope[axis][k])
         };
-        points.add_displacements([outwards(-1.0, 1), outwards(1.0, 0)], &mut by.terms);
+        points.add_displacements(&place, [outwards(-1.0, 1), outwards(1.0, 0)], &mut by.terms);
         for (k, shares) in shares.iter().enumerate() {
             let density = flux[k] / (amplitude[k] * amplitude[k]);
             let moved = by.motion[number].iter_mut().zip(shares.iter().zip(&arc.shares));
@@ -360,7 +364,7 @@ impl<'a> RayTransfer<'a> {
         let waves = self.fit.by_samples(&by.terms.waves);
         let [mut across, along] = by.terms.cosines.each_ref().map(|list| self.fit.by_samples(list));
         if self.function.is_even() {
-            // Its polynomial is that of the displacement over the first cosine; none of half of a pupil is 0.
+            // Its polynomial is that of the displacement over the first cosine.
             let over = across.iter_mut().zip(&self.first_cosines);
             over.for_each(|(by, cosine)| *by /= cosine);
         }

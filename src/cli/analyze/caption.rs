@@ -1,39 +1,84 @@
 //! The caption of a drawn result: the errors, the rays and the time of the numbers of each field.
 
-use crate::cli::output::ShortNumber;
+use crate::cli::output::{ShortNumber, counted};
 use serde_json::Value;
 
-/// A sentence for each field with light of a report: the largest error of each kind of number in the unit of
-/// the printed table, the rays of the number that takes most of them, and milliseconds.
-pub(super) fn caption(report: &Value, unit: &str) -> Vec<String> {
-    report["fields"].as_array().into_iter().flatten().filter_map(|f| sentence(f, unit)).collect()
+/// The units as they follow a number: that of the fields, and that of an error by the key of its number, the empty
+/// key for an error of all numbers.
+#[derive(Clone, Copy)]
+pub(super) struct CaptionUnits {
+    pub(super) field: &'static str,
+    pub(super) error: fn(&str) -> &'static str,
+}
+
+/// A sentence for each field with light of a report: the largest error of each kind of number, and the rays and the
+/// milliseconds, of the number that takes most of them where they differ.
+pub(super) fn caption(report: &Value, units: CaptionUnits) -> Vec<String> {
+    report["fields"].as_array().into_iter().flatten().filter_map(|f| sentence(f, units)).collect()
 }
 
 /// The errors by their names, the rays and the milliseconds of a field.
 #[derive(Default)]
 struct FieldCosts {
-    /// The largest error of each name; `None` if one is not known.
-    errors: Vec<(String, Option<f64>)>,
-    rays: u64,
-    ms: f64,
+    errors: Vec<NamedError>,
+    rays: CostRange,
+    ms: CostRange,
 }
 
-fn sentence(field: &Value, unit: &str) -> Option<String> {
+/// The largest error of the numbers of a name.
+struct NamedError {
+    name: String,
+    /// The key of the numbers; empty for an error of all numbers.
+    key: String,
+    /// `None` if one of them is not known.
+    largest: Option<f64>,
+}
+
+/// The least and the most of a cost; `None` where nothing has any.
+#[derive(Default)]
+struct CostRange(Option<[f64; 2]>);
+
+impl CostRange {
+    /// Takes a cost into account, unless it is none.
+    fn note(&mut self, value: &Value) {
+        let Some(cost) = value.as_f64().filter(|cost| *cost > 0.0) else { return };
+        let [least, most] = self.0.unwrap_or([cost; 2]);
+        self.0 = Some([least.min(cost), most.max(cost)]);
+    }
+
+    /// The cost in words: the most of it where it differs.
+    fn words(&self, words: impl Fn(f64) -> String) -> Option<String> {
+        let [least, most] = self.0?;
+        Some(if least < most { format!("up to {}", words(most)) } else { words(most) })
+    }
+}
+
+impl NamedError {
+    fn words(&self, units: CaptionUnits) -> String {
+        let unit = (units.error)(&self.key);
+        match (self.key.is_empty(), self.largest) {
+            (true, Some(error)) => format!("error {error:.1e}{unit}"),
+            (true, None) => "error unknown".to_owned(),
+            (false, Some(error)) => format!("{} ± {error:.1e}{unit}", self.name),
+            (false, None) => format!("{} of unknown error", self.name),
+        }
+    }
+}
+
+fn sentence(field: &Value, units: CaptionUnits) -> Option<String> {
     let mut costs = FieldCosts::default();
     costs.gather(field, &[]);
-    if costs.rays == 0 && costs.errors.is_empty() {
+    if costs.rays.0.is_none() && costs.errors.is_empty() {
         return None;
     }
+    let unit = units.field;
     let place = |key: &str| field[key].as_f64().unwrap_or(0.0);
     let (x, y) = (place("x"), ShortNumber(place("y")));
     let across = if x == 0.0 { String::new() } else { format!("x {}{unit}, ", ShortNumber(x)) };
-    let error = |(name, error): &(String, Option<f64>)| match error {
-        Some(error) => format!("{name} ± {error:.1e}"),
-        None => format!("{name} of unknown error"),
-    };
-    let errors = costs.errors.iter().map(error);
-    let work = [format!("{} rays", costs.rays), format!("{:.2} ms", costs.ms)];
-    let facts: Vec<String> = errors.chain(work).collect();
+    let errors = costs.errors.iter().map(|error| error.words(units));
+    let rays = costs.rays.words(|rays| counted(rays as usize, "ray"));
+    let ms = costs.ms.words(|ms| format!("{ms:.2} ms"));
+    let facts: Vec<String> = errors.chain(rays).chain(ms).collect();
     Some(format!("{across}y {y}{unit}: {}", facts.join(", ")))
 }
 
@@ -46,8 +91,8 @@ impl FieldCosts {
                 for (key, value) in keys {
                     match key.as_str() {
                         "error" => self.error(path, value),
-                        "rays" => self.rays = self.rays.max(value.as_u64().unwrap_or(0)),
-                        "milliseconds" => self.ms = self.ms.max(value.as_f64().unwrap_or(0.0)),
+                        "rays" => self.rays.note(value),
+                        "milliseconds" => self.ms.note(value),
                         // A decision has no place among the numbers.
                         "gate" => {}
                         key => self.gather(value, &[path, &[key]].concat()),
@@ -61,14 +106,15 @@ impl FieldCosts {
     /// Keeps the largest error of a name: the first and the last key of its path.
     fn error(&mut self, path: &[&str], value: &Value) {
         let name = match path {
-            [] => "all".to_owned(),
+            [] => String::new(),
             [only] => (*only).to_owned(),
             [first, .., last] => format!("{first} {last}"),
         };
+        let key = path.last().copied().unwrap_or_default().to_owned();
         let (name, error) = (name.replace('_', " "), value.as_f64());
-        match self.errors.iter_mut().find(|(known, _)| *known == name) {
-            Some((_, largest)) => *largest = largest.zip(error).map(|(a, b)| a.max(b)),
-            None => self.errors.push((name, error)),
+        match self.errors.iter_mut().find(|known| known.name == name) {
+            Some(known) => known.largest = known.largest.zip(error).map(|(a, b)| a.max(b)),
+            None => self.errors.push(NamedError { name, key, largest: error }),
         }
     }
 }
@@ -86,11 +132,14 @@ mod tests {
              "colors": [{"um": 0.5, "lit_area": estimate(1e-5, 60)}, {"um": 0.6, "lit_area": estimate(2e-5, 50)}]},
             {"x": 0.0, "y": 20.0, "dark": "no light"},
             {"x": 3.0, "y": 0.0, "error": null, "rays": 7, "milliseconds": 0.125},
+            {"x": 0.0, "y": 1.0, "error": 2e-16, "rays": 0, "milliseconds": 0.5},
         ]});
         let expected = [
-            "y 14 deg: colors lit area ± 2.0e-5, rms ± 1.0e-3, 60 rays, 2.50 ms",
-            "x 3 deg, y 0 deg: all of unknown error, 7 rays, 0.12 ms",
+            "y 14 deg: colors lit area ± 2.0e-5, rms ± 1.0e-3 mm, up to 60 rays, 2.50 ms",
+            "x 3 deg, y 0 deg: error unknown, 7 rays, 0.12 ms",
+            "y 1 deg: error 2.0e-16 mm, 0.50 ms",
         ];
-        assert_eq!(caption(&report, " deg"), expected);
+        let error = |key: &str| if key == "lit_area" { "" } else { " mm" };
+        assert_eq!(caption(&report, CaptionUnits { field: " deg", error }), expected);
     }
 }

@@ -1,6 +1,7 @@
 //! The curves of an analysis as a picture or on paper: a row of charts for each field.
 
-use super::{AnalysisReport, AnalysisRun, FieldOutcome, TextLines, caption, field_charts};
+use super::caption::{CaptionUnits, caption};
+use super::{AnalysisReport, AnalysisRun, FieldOutcome, TextLines, field_charts};
 use crate::cli::error::CliError;
 use crate::cli::output::ShortNumber;
 use crate::files;
@@ -21,15 +22,22 @@ pub(super) fn save<T: TextLines + Serialize>(
 ) -> Result<(), CliError> {
     let lens = run.opened.lens.name.as_str();
     let over_field = field_charts::charts(run);
-    let rows = if over_field.is_empty() { rows(report) } else { vec![over_field] };
+    let is_over_field = !over_field.is_empty();
+    let rows = if is_over_field { vec![over_field] } else { rows(report) };
     let fail = |why: String| CliError::Failed(format!("{}: {why}", path.display()));
     if rows.iter().flatten().all(|chart| chart.curves.is_empty()) {
         return Err(fail("there is nothing to draw".to_owned()));
     }
     // The rest of the title explains the printed table.
     let title = T::TITLE.split([';', ':']).next().unwrap_or_default();
-    let value = serde_json::to_value(report).map_err(|why| fail(why.to_string()))?;
-    let caption = caption::caption(&value, unit(report.field_kind));
+    let caption = if is_over_field {
+        // The report is that of the fields of the lens, not that of the places of the curves.
+        Vec::new()
+    } else {
+        let value = serde_json::to_value(report).map_err(|why| fail(why.to_string()))?;
+        let units = CaptionUnits { field: unit(report.field_kind), error: T::error_unit };
+        caption(&value, units)
+    };
     let sheet = CurveSheet { title: format!("{lens}: {title}"), rows, caption };
     let bytes = sheet_bytes(&sheet, lens, path).map_err(|why| fail(why.to_string()))?;
     Ok(files::write_atomic(path, &bytes)?)

@@ -81,6 +81,10 @@ impl TextLines for MtfJson {
     const TITLE: &'static str =
         "MTF: tangential (lines across y) and sagittal, frequencies in cycles/mm";
 
+    fn error_unit(_key: &str) -> &'static str {
+        ""
+    }
+
     fn lines(&self) -> Vec<String> {
         let mut lines = vec![match &self.gate {
             GateJson::Decided(gate) => gate_text(gate),
@@ -190,6 +194,10 @@ pub(super) fn through_focus(run: &AnalysisRun) -> Vec<AtField<FocusContrastJson>
 impl TextLines for FocusContrastJson {
     const TITLE: &'static str = "MTF by diffraction at the primary wavelength against the shift of the \
          image plane, tangential and sagittal";
+
+    fn error_unit(_key: &str) -> &'static str {
+        ""
+    }
 
     fn lines(&self) -> Vec<String> {
         let frequency = ShortNumber(self.frequency);

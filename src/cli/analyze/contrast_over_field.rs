@@ -73,6 +73,10 @@ impl TextLines for FieldMtfJson {
     const TITLE: &'static str = "MTF over the field, all wavelengths: tangential and sagittal at each frequency in \
          cycles/mm, heights in the unit of the fields";
 
+    fn error_unit(_key: &str) -> &'static str {
+        ""
+    }
+
     fn lines(&self) -> Vec<String> {
         let Self { rays, milliseconds, frequencies, heights } = self;
         let mut lines = vec![format!("{}, {milliseconds:.3} ms", counted(*rays, "ray"))];

@@ -615,6 +615,11 @@ trait TextLines {
     fn charts(&self) -> Vec<CurveChart> {
         Vec::new()
     }
+    /// The unit, as it follows a number, of the errors of a result that is drawn for each field: by the key of a
+    /// number, or with an empty key of all numbers together. Empty for shares.
+    fn error_unit(_key: &str) -> &'static str {
+        " mm"
+    }
 }
 
 impl<T: TextLines> Display for AnalysisReport<T> {

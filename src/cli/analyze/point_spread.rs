@@ -117,6 +117,10 @@ impl TextLines for PointSpreadJson {
     const TITLE: &'static str = "diffraction image of a point at the primary wavelength, relative to \
          the peak without aberrations; x and y in mm from the image point of the chief ray";
 
+    fn error_unit(_key: &str) -> &'static str {
+        ""
+    }
+
     fn lines(&self) -> Vec<String> {
         let [x, y, z] = self.best_at.map(|v| ShortNumber(without_rounding(v, self.rounding)));
         let mut lines = vec![
@@ -194,6 +198,10 @@ pub(super) fn encircled(run: &AnalysisRun, asked: &[f64]) -> Vec<AtField<Encircl
 impl TextLines for EncircledJson {
     const TITLE: &'static str = "encircled energy by diffraction at the primary wavelength: share of \
          the light within circles about the image point of the chief ray, radii in mm";
+
+    fn error_unit(_key: &str) -> &'static str {
+        ""
+    }
 
     fn lines(&self) -> Vec<String> {
         let line = |circle: &CircleJson| {

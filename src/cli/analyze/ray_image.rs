@@ -88,6 +88,10 @@ impl TextLines for RayImageJson {
     const TITLE: &'static str = "image of a point by rays, all wavelengths: share of the light in 1/mm2, places in mm \
          from the image point of the chief ray";
 
+    fn error_unit(_key: &str) -> &'static str {
+        " of the peak"
+    }
+
     fn lines(&self) -> Vec<String> {
         let Self { error, rays, milliseconds, .. } = self;
         let rays = counted(*rays, "ray");
@@ -168,6 +172,10 @@ pub(super) fn energies(run: &AnalysisRun, asked: &[f64]) -> Vec<AtField<RayEnerg
 impl TextLines for RayEnergyJson {
     const TITLE: &'static str = "encircled energy by rays, all wavelengths: share of the light within circles about \
          the image point of the chief ray, radii in mm";
+
+    fn error_unit(_key: &str) -> &'static str {
+        ""
+    }
 
     fn lines(&self) -> Vec<String> {
         let line = |circle: &RayCircleJson| {

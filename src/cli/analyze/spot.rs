@@ -125,6 +125,10 @@ impl ColorSpotJson {
 impl TextLines for SpotJson {
     const TITLE: &'static str = "spot, in mm; the centroid is that of all colours";
 
+    fn error_unit(key: &str) -> &'static str {
+        if key == "lit_area" { "" } else { " mm" }
+    }
+
     fn lines(&self) -> Vec<String> {
         let mut lines = vec![
             estimate_text("rms radius", &self.rms),

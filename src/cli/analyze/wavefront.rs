@@ -123,6 +123,10 @@ impl TextLines for WavefrontJson {
     const TITLE: &'static str =
         "wavefront at the primary wavelength, in wavelengths; --json lists the map";
 
+    fn error_unit(_key: &str) -> &'static str {
+        " waves"
+    }
+
     fn lines(&self) -> Vec<String> {
         let mut lines = vec![estimate_text("rms", &self.rms)];
         let without_tilt = self.rms_without_tilt.iter();
@@ -193,6 +197,10 @@ impl TextLines for PathFanJson {
     const TITLE: &'static str =
         "fans of path differences at the primary wavelength, in wavelengths";
 
+    fn error_unit(_key: &str) -> &'static str {
+        " waves"
+    }
+
     fn lines(&self) -> Vec<String> {
         let Self { error, rays, milliseconds, .. } = self;
         let mut lines = vec![format!(
@@ -255,6 +263,10 @@ impl TextLines for ZernikeJson {
     const TITLE: &'static str = "Zernike coefficients of the wavefront at the primary wavelength over \
          the unit disc of the pupil, in wavelengths: Noll's order (RMS 1) and the fringe order (1 at \
          the rim)";
+
+    fn error_unit(_key: &str) -> &'static str {
+        " waves"
+    }
 
     fn lines(&self) -> Vec<String> {
         let method = match self.method {

@@ -149,7 +149,7 @@ fn term_costs(rows: &[TermCost]) -> TextTable {
         "with gradient",
         "ratio",
         "off differences",
-        "by the",
+        "variable",
     ]);
     for row in rows.iter().filter(|row| row.refused.is_none()) {
         table.row([

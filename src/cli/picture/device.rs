@@ -17,7 +17,7 @@ pub(in crate::cli) enum DeviceChoice {
     Cpu,
 }
 
-/// What Linux shows of graphics cards: of all with a driver of the kernel, of NVIDIA, of a Windows host, and of
+/// The files by which Linux shows graphics cards: of all with a driver of the kernel, of NVIDIA, of a Windows host, and of
 /// mobile ones.
 const CARDS: [&str; 5] = ["/dev/dri", "/dev/nvidiactl", "/dev/dxg", "/dev/mali0", "/dev/kgsl-3d0"];
 

@@ -48,12 +48,12 @@ impl PictureArgs {
         };
         let mut gates = effects.of_scene()?;
         if let (Some(colors), Some(gate)) =
-            (rendered.colors, gates.iter_mut().find(|gate| gate.effect == "lateral colour"))
+            (rendered.colors, PictureGate::of_lateral_color(&mut gates))
         {
             let all = || ExactRenderer::new(model, bands, scene, *frame);
             let primary = self.shot(opened, source, 0)?;
             let one = || ExactRenderer::new(&primary.model, &primary.bands, scene, *frame);
-            gate.on = colors.count > 0;
+            gate.decide_colors(colors.count > 0);
             gate.saved_milliseconds = Some(tile_ms(all, 0.0)? - tile_ms(one, 0.0)?);
         }
         gates.extend(self.colors_gate(rendered, shot, (scene, source), opened, tolerance)?);

@@ -4,8 +4,7 @@
 use crate::cli::error::CliError;
 use crate::files;
 use crate::lens::ToleranceSheet;
-use crate::plot::svg_text;
-use crate::report::{has_extension, tolerance_sheet};
+use crate::report::{sheet_bytes, tolerance_sheet};
 use crate::tolerance::ToleranceAnalysis;
 use std::path::Path;
 
@@ -21,10 +20,6 @@ pub(super) fn save(
 ) -> Result<(), CliError> {
     let fail = |why: String| CliError::Failed(format!("{}: {why}", path.display()));
     let charts = tolerance_sheet(lens, sheet, analysis).map_err(|why| fail(why.to_string()))?;
-    let bytes = if has_extension(path, "png") {
-        charts.canvas().png().map_err(|why| fail(why.to_string()))?
-    } else {
-        svg_text(&charts.drawing()).into_bytes()
-    };
+    let bytes = sheet_bytes(&charts, lens, path).map_err(|why| fail(why.to_string()))?;
     Ok(files::write_atomic(path, &bytes)?)
 }

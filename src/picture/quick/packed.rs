@@ -118,12 +118,12 @@ fn share(points: usize, owner: usize, group: usize, shares: &mut Vec<u32>) {
 
 #[cfg(test)]
 mod tests {
-    use super::super::QuickRenderer;
-    use super::super::blocks::blocks;
     use super::*;
     use crate::files;
+    use crate::picture::quick::blocks::blocks;
     use crate::picture::{
-        BuiltInScene, Coloring, ExactRenderer, ImageFrame, field_diagonal, picture_model,
+        BuiltInScene, Coloring, ExactRenderer, ImageFrame, QuickRenderer, field_diagonal,
+        picture_model,
     };
 
     /// The beams of a plan are sorted by the spacing of their lattices, their views are in the order of windows.

@@ -84,7 +84,7 @@ impl PageLayout {
     }
 
     fn lines(&mut self, text: &str, size: f64) {
-        for line in wrapped(text, size, WIDTH) {
+        for line in wrapped(text, WIDTH, |line| text_width(line, size)) {
             self.reserve(LEADING * size);
             self.y += size;
             let at = [LEFT, self.y];

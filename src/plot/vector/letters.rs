@@ -24,13 +24,17 @@ pub fn text_width(text: &str, size: f64) -> f64 {
     size * text.chars().map(width).sum::<f64>()
 }
 
-/// A text in lines that are no wider than this, in mm, broken at blanks; a longer word has a line of
+/// A text in lines that are no wider than this by a measure of lines, broken at blanks; a longer word has a line of
 /// its own.
-pub fn wrapped(text: &str, size: f64, width: f64) -> Vec<String> {
+pub fn wrapped<W: PartialOrd + Copy>(
+    text: &str,
+    most: W,
+    width: impl Fn(&str) -> W,
+) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     for word in text.split_whitespace() {
         match lines.last_mut() {
-            Some(line) if text_width(&format!("{line} {word}"), size) <= width => {
+            Some(line) if width(&format!("{line} {word}")) <= most => {
                 line.push(' ');
                 line.push_str(word);
             }
@@ -50,7 +54,7 @@ mod tests {
         assert!(width > 3.0 && width < 8.0, "{width}");
         assert!(('1'..='9').all(|digit| text_width(&digit.to_string(), 10.0) == width));
         let text = "the quick brown fox jumps over the lazy dog ".repeat(5);
-        let lines = wrapped(&text, 3.0, 40.0);
+        let lines = wrapped(&text, 40.0, |line| text_width(line, 3.0));
         assert!(lines.len() > 3 && lines.iter().all(|line| text_width(line, 3.0) <= 40.0));
         assert_eq!(lines.join(" "), text.trim_end());
     }

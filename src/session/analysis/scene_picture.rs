@@ -288,10 +288,11 @@ impl Camera {
                 ghosts: ghosts.as_ref().map(|(report, ms)| (report, *ms)),
             };
             let mut gates = [effects.of_scene()?, effects.of_light()?].concat();
-            if let Some(gate) = gates.iter_mut().find(|gate| gate.effect == "lateral colour") {
-                // The picture has a wavelength for each colour at least.
-                gate.on = true;
-                gate.saved_milliseconds = Some(self.color_ms(painted)?);
+            if let Some(gate) = PictureGate::of_lateral_color(&mut gates) {
+                gate.decide_colors(true);
+                if !is_interrupted() {
+                    gate.saved_milliseconds = Some(self.color_ms(painted)?);
+                }
             }
             taken.gates = Some(gates);
         }
@@ -491,6 +492,8 @@ mod tests {
         let gates = moving.gates.unwrap();
         let saved =
             |name: &str| gates.iter().find(|gate| gate.effect == name).unwrap().saved_milliseconds;
+        let colors = gates.iter().find(|gate| gate.effect == "lateral colour").unwrap();
+        assert!(colors.on && colors.reason.contains("a wavelength for each colour"), "{colors:?}");
         for name in ["lateral colour", "blur", "vignetting", "motion", "diffraction"] {
             assert!(saved(name).is_some_and(f64::is_finite), "{name}");
         }

@@ -182,7 +182,7 @@ fn velocity(ui: &mut Ui, is_far: bool, options: &mut PictureOptions) {
             let drag = DragValue::new(value).speed(speed).suffix(unit).max_decimals(4);
             ui.add(drag.range(-1e6..=1e6)).accessible_name(name).on_hover_text(
                 "The velocity of the scene to the right and upwards during the exposure, which has to be given; of \
-                 a scene at infinity in tangents of its direction per second",
+                 a scene at infinity in tan(angle) per second",
             );
         }
         if options.velocity != [0.0; 2] && options.seconds.is_none() {

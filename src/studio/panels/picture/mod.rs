@@ -282,14 +282,7 @@ impl PicturePanel {
             ui.label(RichText::new(words).small());
         }
         if self.mode == PictureMode::Errors {
-            let words = first.error_map.as_ref().map_or_else(
-                || "Measuring the error …".to_owned(),
-                |map| {
-                    let most = number::format_digits(100.0 * map.largest(), 3);
-                    format!("Black is no error, white {most} % of mid grey, grey not measured")
-                },
-            );
-            ui.label(RichText::new(words).small());
+            ui.label(RichText::new(error_words(first)).small());
         }
         ui.horizontal(|ui| {
             let (luminance, seconds) = exposure(first);
@@ -532,6 +525,21 @@ fn describe(response: &Response, pictures: &[NamedPicture], column: usize) {
         format!("Picture of {scene} through the lens")
     };
     response.widget_info(|| WidgetInfo::labeled(egui::Role::Image, true, &label));
+}
+
+/// The scale of the map of errors, or why there is none.
+fn error_words(shown: &ScenePicture) -> String {
+    if shown.options.exact {
+        return "Exact: rays are followed from every pixel, there is nothing to compare with"
+            .to_owned();
+    }
+    shown.error_map.as_ref().map_or_else(
+        || "Measuring the error …".to_owned(),
+        |map| {
+            let most = number::format_digits(100.0 * map.largest(), 3);
+            format!("Black is no error, white {most} % of mid grey, grey not measured")
+        },
+    )
 }
 
 fn choose_scene(ui: &mut Ui, view: &SessionView, actions: &mut Actions) {

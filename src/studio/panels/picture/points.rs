@@ -63,7 +63,7 @@ fn side(points: &PlacedPoints, frame: &ImageFrame) -> f64 {
     SHARE * apart[0].min(apart[1])
 }
 
-/// The enlargement over the picture, the scale, the distance and the error.
+/// The enlargement over the picture, the scale, the distance, the error, and the size of the images.
 pub(super) fn words(points: &PlacedPoints, frame: &ImageFrame, magnification: f32) -> String {
     let times = side(points, frame) / points.side / f64::from(magnification);
     let [times, width, pixels, error] =
@@ -71,8 +71,22 @@ pub(super) fn words(points: &PlacedPoints, frame: &ImageFrame, magnification: f3
             .map(|v| number::format_digits(v, 3));
     let at = points.distance.map_or("infinity".to_owned(), |mm| format!("{mm:.0} mm"));
     format!(
-        "Points at {at}, enlarged {times} times: squares of {width} µm ({pixels} px), each over its own peak \
-         ± {error} %, {} rays",
-        points.rays
+        "Points at {at}, enlarged {times} times: squares of {width} µm ({pixels} px), each normalized to its own \
+         peak; sampling error {error} % of the peak (rms), {} rays{}",
+        points.rays,
+        sizes(points).unwrap_or_default()
     )
+}
+
+/// The sizes of the images, and the least share of their light that is shown; `None` where all is dark.
+fn sizes(points: &PlacedPoints) -> Option<String> {
+    let images = || points.images.iter().flatten();
+    let radii = || images().map(|image| 1e3 * image.half_light);
+    let sharp = radii().reduce(f64::min)?;
+    let blurred = radii().reduce(f64::max)?;
+    let inside = images().map(|image| 100.0 * image.inside).reduce(f64::min)?;
+    let [sharp, blurred, inside] = [sharp, blurred, inside].map(|v| number::format_digits(v, 3));
+    Some(format!(
+        "; half of the light within {sharp} to {blurred} µm of the centroid, at least {inside} % of it in the square"
+    ))
 }

@@ -90,7 +90,7 @@ fn contrast_rows(contrast: &ContrastSummary) -> Vec<(String, [String; 2])> {
     let nu = number::format_digits(contrast.frequency, 3);
     let of = |value: f64| number::with_error(value, contrast.sampling_error);
     let expected = contrast.expected.map(|expected| {
-        ("MTF of the lenses".to_owned(), expected.map(|value| number::format_digits(value, 3)))
+        ("MTF expected as made".to_owned(), expected.map(|value| number::format_digits(value, 3)))
     });
     let real = contrast.real;
     let by_rays = [0, 1].map(|i| number::with_error(real.mean[i], real.error[i]));
