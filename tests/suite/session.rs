@@ -18,7 +18,7 @@ use aplanat::session::{
 };
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// A lens of the library.
 fn lens(name: &str) -> Lens {
@@ -115,6 +115,9 @@ fn spot_goal() -> Goal {
     }
 }
 
+/// How long something in the background may take while other tests take the processors.
+const PATIENCE: Duration = Duration::from_secs(120);
+
 /// Waits until something has happened in the background.
 fn wait(
     session: &mut Session,
@@ -122,14 +125,15 @@ fn wait(
     happened: impl Fn(&SessionView, &[SessionEvent]) -> bool,
 ) {
     let mut events = Vec::new();
-    for _ in 0..10_000 {
+    let begun = Instant::now();
+    while begun.elapsed() < PATIENCE {
         events.extend(session.poll());
         if happened(&session.view(), &events) {
             return;
         }
         std::thread::sleep(Duration::from_millis(2));
     }
-    panic!("{what} never happened");
+    panic!("{what} did not happen in {} s", PATIENCE.as_secs());
 }
 
 fn step_of(view: &SessionView) -> usize {
