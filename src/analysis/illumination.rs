@@ -60,7 +60,7 @@ pub fn illumination(model: &RayModel, wavelength: usize, accuracy: Accuracy) -> 
         let FieldLight { irradiance, point, cone } = light.unwrap_or_else(dark);
         let of_first = first.and_then(|first| first.irradiance.ok());
         let is_known = irradiance.map_or_else(|why| why.is_loss_of_light(), |_| true);
-        let irradiance_or_none = irradiance.unwrap_or_else(|why| without_number(why));
+        let irradiance_or_none = irradiance.unwrap_or_else(without_number);
         Illumination {
             field: *field,
             irradiance: irradiance_or_none,
