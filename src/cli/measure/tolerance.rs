@@ -1,5 +1,7 @@
 //! `measure tolerance`: the exactness and the cost of tolerances, and the gain of designs as built.
 
+use super::optiland::HOW_TO_GET;
+use super::optiland::tolerance::{self as optiland, OptilandTolerances};
 use crate::cli::error::CliError;
 use crate::cli::input::LensFile;
 use crate::cli::output::{Output, ShortNumber, TextTable};
@@ -33,6 +35,10 @@ pub(super) struct MeasureToleranceArgs {
     /// The maximum number of steps of each descent; 0 for none
     #[arg(long, value_name = "N", default_value_t = 1000)]
     steps: usize,
+
+    /// A Python that has Optiland: its tolerancing of the same lens and errors is timed in the same run
+    #[arg(long, value_name = "PYTHON")]
+    optiland: Option<PathBuf>,
 }
 
 /// The lens without a file: that of costs, and that which is optimized.
@@ -49,6 +55,8 @@ impl MeasureToleranceArgs {
             let text = "stopped before the costs were measured".to_owned();
             return Err(CliError::Failed(text));
         };
+        let beside = |python: &PathBuf| optiland::measure(python, (&lens, &file), self.grade);
+        let optiland = self.optiland.as_ref().map(beside).transpose()?;
         // The bundled lens on which costs are measured has little to gain: its spot as designed is
         // nine tenths of that as built.
         let designed = if self.lens.is_some() { lens } else { bundled(SENSITIVE)?.0 };
@@ -59,7 +67,7 @@ impl MeasureToleranceArgs {
             None
         };
         let machine = Machine::detect();
-        output.print(&MeasureToleranceReport { machine, file, cost, designs })
+        output.print(&MeasureToleranceReport { machine, file, cost, optiland, designs })
     }
 
     /// The lens and its name.
@@ -86,6 +94,7 @@ struct MeasureToleranceReport {
     machine: Machine,
     file: String,
     cost: ToleranceBenchmark,
+    optiland: Option<OptilandTolerances>,
     designs: Option<AsBuiltComparison>,
 }
 
@@ -119,9 +128,32 @@ impl MeasureToleranceReport {
     }
 }
 
+/// The table of both programs, and how far they differ.
+fn beside_optiland(found: &OptilandTolerances) -> String {
+    let OptilandTolerances { version, own, growth, rays, median_difference, .. } = found;
+    let mut table =
+        TextTable::new(&["the same errors, one core", "sensitivities", "rays", "a lens by rays"]);
+    let mut row = |program: String, sensitivities: f64, rays: usize, lens: f64| {
+        let ms = |ms: f64| format!("{} ms", ShortNumber(ms));
+        table.row([program, ms(sensitivities), rays.to_string(), ms(lens)]);
+    };
+    row("this program".into(), own.sensitivities_ms, own.rays, own.lens_ms);
+    let other = format!("Optiland {version}");
+    row(other, found.sensitivities_ms, *rays, found.lens_ms);
+    let apart = median_difference.map_or_else(
+        || "no growth was found by both".to_owned(),
+        |share| format!("growths of the spot differ by {:.1} % in the median", 100.0 * share),
+    );
+    format!("{table}{} errors of single surfaces, image plane fixed; {apart}\n", growth.len())
+}
+
 impl Display for MeasureToleranceReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "{}\n{}\n\n{}", self.machine, self.file, self.costs())?;
+        match &self.optiland {
+            Some(found) => writeln!(f, "{}", beside_optiland(found))?,
+            None => writeln!(f, "{HOW_TO_GET}\n")?,
+        }
         let Some(designs) = &self.designs else { return Ok(()) };
         let AsBuiltComparison { name, samples, nominal, as_built, .. } = designs;
         writeln!(f, "{name}: refocused rms spots in mm, {samples} lenses by Monte Carlo:\n")?;
