@@ -32,7 +32,7 @@ pub struct TermCost {
     /// its variable.
     pub difference: f64,
     /// The error of the gradient by its rays: the largest difference of a derivative from that by rays that are
-    /// [`FINER`] times as accurate, over the largest one; each times a step of its variable. `None` if those have no
+    /// twenty times as accurate, over the largest one; each times a step of its variable. `None` if those have no
     /// such term.
     pub gradient_error: Option<f64>,
     /// The variable whose derivative differs most from central differences; `None` where nothing does.
@@ -55,7 +55,7 @@ pub struct TermCosts {
 }
 
 /// How many times as accurate the rays are by which the error of a gradient is found.
-pub const FINER: f64 = 20.0;
+const FINER: f64 = 20.0;
 /// The times that a value is timed.
 const TURNS: usize = 15;
 
@@ -186,7 +186,8 @@ fn cost(lens: &Lens, term: Term, steps: &Steps, tolerance: f64) -> Result<TermCo
     let finer = finer.evaluate(&values, DerivativeLevel::Gradient).map(|sum| sum.gradient);
     let step_of = |variable: &Variable| steps.of(variable.parameter.quantity);
     let scales: Vec<f64> = merit.variables().iter().map(step_of).collect();
-    let gradient_error = finer.ok().map(|exact| largest_change(&sum.gradient, &exact, &scales));
+    let gradient_error =
+        finer.ok().map(|exact| largest_change(sum.gradient.as_slice(), exact.as_slice(), &scales));
     let (mut largest, mut difference, mut at) = (0.0f64, 0.0f64, None);
     for (i, variable) in merit.variables().iter().enumerate() {
         let step = scales[i];

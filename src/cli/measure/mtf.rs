@@ -1,6 +1,6 @@
 //! `measure mtf`: contrast, its error and its time.
 
-use super::HOW_TO_GET;
+use super::optiland::HOW_TO_GET;
 use super::optiland::mtf::{self, OptilandCurves, OptilandRow};
 use super::plot::{self, Color, ErrorChart, ErrorCurve, LegendEntry, PlotArgs, Stroke};
 use crate::cli::error::CliError;

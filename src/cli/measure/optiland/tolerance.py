@@ -25,7 +25,7 @@ def tolerancing(optic, rings):
     task = Tolerancing(optic)
     for zone in ZONES:
         about = {"optic": optic, "surface_number": -1, "Hx": 0.0, "Hy": zone}
-        about |= {"num_rays": rings, "wavelength": "all", "distribution": "hexapolar"}
+        about |= {"num_rays": rings, "wavelength": "all", "nan_policy": "omit"}
         task.add_operand("rms_spot_size", about, target=0.0)
     return task
 
@@ -38,7 +38,7 @@ def where(error):
 
 def value_of(optic, error):
     kind, place = where(error)
-    return float(Variable(optic, kind, scaler=IdentityScaler(), **place).get_value())
+    return float(Variable(optic, kind, scaler=IdentityScaler(), **place).variable.get_value())
 
 
 def growths(optic, errors, rings):
