@@ -128,23 +128,26 @@ impl MeasureToleranceReport {
     }
 }
 
-/// The table of both programs, and how far they differ.
+/// The table of both programs.
 fn beside_optiland(found: &OptilandTolerances) -> String {
-    let OptilandTolerances { version, own, growth, rays, median_difference, .. } = found;
-    let mut table =
-        TextTable::new(&["the same errors, one core", "sensitivities", "rays", "a lens by rays"]);
-    let mut row = |program: String, sensitivities: f64, rays: usize, lens: f64| {
-        let ms = |ms: f64| format!("{} ms", ShortNumber(ms));
-        table.row([program, ms(sensitivities), rays.to_string(), ms(lens)]);
+    let OptilandTolerances { version, own, rows } = found;
+    let head =
+        ["the same errors, one core", "sensitivities", "rays", "a lens by rays", "growth off by"];
+    let mut table = TextTable::new(&head);
+    let mut row = |program: String, times: [f64; 2], rays: usize, apart: Option<f64>| {
+        let [sensitivities, lens] = times.map(|ms| format!("{} ms", ShortNumber(ms)));
+        let apart = apart.map_or(String::new(), |share| format!("{:.1} %", 100.0 * share));
+        table.row([program, sensitivities, rays.to_string(), lens, apart]);
     };
-    row("this program".into(), own.sensitivities_ms, own.rays, own.lens_ms);
-    let other = format!("Optiland {version}");
-    row(other, found.sensitivities_ms, *rays, found.lens_ms);
-    let apart = median_difference.map_or_else(
-        || "no growth was found by both".to_owned(),
-        |share| format!("growths of the spot differ by {:.1} % in the median", 100.0 * share),
-    );
-    format!("{table}{} errors of single surfaces, image plane fixed; {apart}\n", growth.len())
+    row("this program".into(), [own.sensitivities_ms, own.lens_ms], own.rays, None);
+    for other in rows {
+        let times = [other.sensitivities_ms, other.lens_ms];
+        row(format!("Optiland {version}"), times, other.rays, other.median_difference);
+    }
+    let errors = own.growth.len();
+    format!(
+        "{table}{errors} errors of single surfaces, image plane fixed; growth: of the mean square spot, median\n"
+    )
 }
 
 impl Display for MeasureToleranceReport {

@@ -1,7 +1,7 @@
 """Tolerances of a lens by Optiland: SensitivityAnalysis and MonteCarlo, timed, as JSON.
 
 Arguments: the lens in Optiland's own format, the errors as JSON [[type, surface, axis or null, half range], ...],
-the number of rings of rays, the number of random lenses.
+the numbers of rings of rays as JSON, the number of random lenses.
 """
 
 import json
@@ -16,14 +16,20 @@ from optiland.optimization.variable import Variable
 from optiland.tolerancing import DistributionSampler, RangeSampler, SensitivityAnalysis, Tolerancing
 from optiland.tolerancing.monte_carlo import MonteCarlo
 
-ZONES = [0.0, 0.7, 1.0]
 # SensitivityAnalysis takes no more at once.
 AT_ONCE = 6
 
 
+def zones(optic):
+    """The heights of the fields relative to the farthest one."""
+    heights = [float(field.y) for field in optic.fields.fields]
+    farthest = max(map(abs, heights))
+    return [height / farthest if farthest > 0.0 else 0.0 for height in heights]
+
+
 def tolerancing(optic, rings):
     task = Tolerancing(optic)
-    for zone in ZONES:
+    for zone in zones(optic):
         about = {"optic": optic, "surface_number": -1, "Hx": 0.0, "Hy": zone}
         about |= {"num_rays": rings, "wavelength": "all", "nan_policy": "omit"}
         task.add_operand("rms_spot_size", about, target=0.0)
@@ -73,17 +79,21 @@ def milliseconds(work, *arguments):
     return result, 1e3 * (time.perf_counter() - start)
 
 
-def main():
-    optic = load_optiland_file(sys.argv[1])
-    errors = json.loads(sys.argv[2])
-    rings, count = int(sys.argv[3]), int(sys.argv[4])
-    growths(optic, errors[:1], rings)  # Whatever is compiled on first use.
+def row(optic, errors, rings, count):
     found, growth_ms = milliseconds(growths, optic, errors, rings)
     _, lenses_ms = milliseconds(random_lenses, optic, errors, rings, count)
-    rays = 3 * len(ZONES) * (1 + 3 * rings * (rings + 1))
+    waves = len(optic.wavelengths.get_wavelengths())
+    rays = waves * len(zones(optic)) * (1 + 3 * rings * (rings + 1))
     growth = [value if np.isfinite(value) else None for value in found]
-    times = {"sensitivities_ms": growth_ms, "lens_ms": lenses_ms / count}
-    print(json.dumps({"version": version("optiland"), "rays": rays, "growth": growth} | times))
+    return {"rays": rays, "growth": growth, "sensitivities_ms": growth_ms, "lens_ms": lenses_ms / count}
+
+
+def main():
+    optic = load_optiland_file(sys.argv[1])
+    errors, rings = json.loads(sys.argv[2]), json.loads(sys.argv[3])
+    growths(optic, errors[:1], rings[0])  # Whatever is compiled on first use.
+    rows = [row(optic, errors, number, int(sys.argv[4])) for number in rings]
+    print(json.dumps({"version": version("optiland"), "rows": rows}))
 
 
 main()

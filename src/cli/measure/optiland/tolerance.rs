@@ -1,7 +1,8 @@
 //! Tolerances of the same lens by Optiland: the same errors, one by one and at random.
 //!
 //! Optiland moves single surfaces only, fills the pupil of paraxial optics, and finds the growth of a spot by
-//! three values of every error; no focus is adjusted there, which would cost it an optimization for each.
+//! three values of every error; no focus is adjusted there, which would cost it an optimization for each. Its rays in
+//! rings weigh the rim of the pupil too much, less so with more rings.
 
 use super::{ask, wrong_shape};
 use crate::cli::error::CliError;
@@ -12,8 +13,8 @@ use serde_json::json;
 use std::path::Path;
 
 const SCRIPT: &str = include_str!("tolerance.py");
-/// The rings of Optiland's rays in a pupil.
-const RINGS: usize = 6;
+/// The numbers of rings of Optiland's rays in a pupil: its own default, and four times as many.
+const RINGS: [usize; 2] = [6, 24];
 /// The relative accuracy of this program's spot radii: growths are squares, and are to be good to 1e-4.
 const ACCURACY: f64 = 4e-5;
 /// The lenses with random errors of this program and of Optiland, which takes a fifth of a second for one.
@@ -36,12 +37,20 @@ pub(in crate::cli::measure) struct OptilandTolerances {
     pub(in crate::cli::measure) version: String,
     /// By this program.
     pub(in crate::cli::measure) own: SomeTolerances,
-    /// By Optiland; `null` where it finds no spot.
-    pub(in crate::cli::measure) growth: Vec<Option<f64>>,
+    /// By Optiland, with more and more rays.
+    pub(in crate::cli::measure) rows: Vec<OptilandRow>,
+}
+
+/// The tolerances by Optiland with a number of rays.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(in crate::cli::measure) struct OptilandRow {
     pub(in crate::cli::measure) rays: usize,
+    /// The growth of the mean square spot by each error; `null` where it finds no spot.
+    growth: Vec<Option<f64>>,
     pub(in crate::cli::measure) sensitivities_ms: f64,
     pub(in crate::cli::measure) lens_ms: f64,
-    /// The median of the relative differences of growths.
+    /// The median of the relative differences of growths from those by this program.
+    #[serde(default)]
     pub(in crate::cli::measure) median_difference: Option<f64>,
 }
 
@@ -49,10 +58,7 @@ pub(in crate::cli::measure) struct OptilandTolerances {
 #[derive(Deserialize)]
 struct ScriptOutput {
     version: String,
-    rays: usize,
-    growth: Vec<Option<f64>>,
-    sensitivities_ms: f64,
-    lens_ms: f64,
+    rows: Vec<OptilandRow>,
 }
 
 /// Measures the tolerances of a class on a lens by this program and by Optiland in an interpreter of Python.
@@ -67,23 +73,15 @@ pub(in crate::cli::measure) fn measure(
     let fail = |e: ToleranceBenchmarkError| CliError::Failed(format!("{file}: {e}"));
     let own = own.map_err(fail)?;
     let errors: Vec<serde_json::Value> = own.tolerances.iter().filter_map(name_error).collect();
-    let errors = json!(errors).to_string();
-    let found: ScriptOutput =
-        ask(python, SCRIPT, lens, &[errors, RINGS.to_string(), few.to_string()])?;
-    if found.growth.len() != own.growth.len() {
-        return Err(wrong_shape(python));
+    let asked = [json!(errors).to_string(), json!(RINGS).to_string(), few.to_string()];
+    let mut found: ScriptOutput = ask(python, SCRIPT, lens, &asked)?;
+    for row in &mut found.rows {
+        if row.growth.len() != own.growth.len() {
+            return Err(wrong_shape(python));
+        }
+        row.median_difference = median_difference(&own.growth, &row.growth);
     }
-    let median_difference = median_difference(&own.growth, &found.growth);
-    let ScriptOutput { version, rays, growth, sensitivities_ms, lens_ms } = found;
-    Ok(OptilandTolerances {
-        version,
-        own,
-        growth,
-        rays,
-        sensitivities_ms,
-        lens_ms,
-        median_difference,
-    })
+    Ok(OptilandTolerances { version: found.version, own, rows: found.rows })
 }
 
 /// An error in Optiland's terms: its surfaces are counted from the object.
