@@ -25,7 +25,10 @@ pub struct RoundTripCheck {
 impl fmt::Display for RoundTripCheck {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let Self { rays, imaged, worst_mm } = self;
-        write!(f, "read back and traced: {rays} rays, {imaged} imaged, at most {worst_mm} mm apart")
+        write!(
+            f,
+            "read back and traced: {rays} rays, {imaged} imaged, at most {worst_mm:.1e} mm apart"
+        )
     }
 }
 

@@ -36,11 +36,13 @@ impl<R: Real> Vec3<R> {
     }
 
     /// The values without derivatives.
+    #[inline(always)]
     pub fn value(self) -> Vec3<f64> {
         Vec3::new(self.x.value(), self.y.value(), self.z.value())
     }
 
     /// True if every component is finite.
+    #[inline(always)]
     pub fn is_finite(self) -> bool {
         self.x.is_finite() && self.y.is_finite() && self.z.is_finite()
     }

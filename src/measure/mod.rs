@@ -22,6 +22,7 @@ mod picture;
 mod picture_effects;
 mod rounding;
 mod search;
+mod some_tolerances;
 mod spot;
 mod term_cost;
 mod timing;
@@ -54,6 +55,7 @@ pub use search::{
     MeritQuantiles, SearchBenchmark, SearchBudget, SearchContender, SearchLength, SearchRow,
     SignTest, compare_searches,
 };
+pub use some_tolerances::{SomeTolerances, measure_some_tolerances};
 pub use spot::{
     Precision, PupilClipping, PupilSampling, SpotCurves, SpotCurvesError, SpotRow,
     measure_spot_curves,

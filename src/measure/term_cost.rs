@@ -31,7 +31,11 @@ pub struct TermCost {
     /// The largest difference of a derivative from central differences, over the largest one; each times a step of
     /// its variable.
     pub difference: f64,
-    /// The variable whose derivative differs most; `None` where nothing does.
+    /// The error of the gradient by its rays: the largest difference of a derivative from that by rays that are
+    /// twenty times as accurate, over the largest one; each times a step of its variable. `None` if those have no
+    /// such term.
+    pub gradient_error: Option<f64>,
+    /// The variable whose derivative differs most from central differences; `None` where nothing does.
     pub at: Option<String>,
     /// The reason why there is no such term; the numbers are 0 then.
     pub refused: Option<String>,
@@ -50,6 +54,8 @@ pub struct TermCosts {
     pub rows: Vec<TermCost>,
 }
 
+/// How many times as accurate the rays are by which the error of a gradient is found.
+const FINER: f64 = 20.0;
 /// The times that a value is timed.
 const TURNS: usize = 15;
 
@@ -84,6 +90,7 @@ pub fn measure_term_costs(
             value_ms: 0.0,
             gradient_ms: 0.0,
             difference: 0.0,
+            gradient_error: None,
             at: None,
             refused: Some(why.to_string()),
         })
@@ -169,15 +176,21 @@ fn cost(lens: &Lens, term: Term, steps: &Steps, tolerance: f64) -> Result<TermCo
         pupil: PupilEdge::Moving,
     };
     let merit = Merit::new(lens, &goal, tolerance)?;
+    let finer = Merit::new(lens, &goal, tolerance / FINER)?;
     let values = merit.values(lens);
     let found = merit.terms(&values)?;
     let timed = |level| time_median(3..=TURNS, || merit.evaluate(&values, level));
     let (value, value_ms) = timed(DerivativeLevel::Value);
     let (sum, gradient_ms) = timed(DerivativeLevel::Gradient);
     let (value, sum) = (value?.value, sum?);
+    let finer = finer.evaluate(&values, DerivativeLevel::Gradient).map(|sum| sum.gradient);
+    let step_of = |variable: &Variable| steps.of(variable.parameter.quantity);
+    let scales: Vec<f64> = merit.variables().iter().map(step_of).collect();
+    let gradient_error =
+        finer.ok().map(|exact| largest_change(sum.gradient.as_slice(), exact.as_slice(), &scales));
     let (mut largest, mut difference, mut at) = (0.0f64, 0.0f64, None);
     for (i, variable) in merit.variables().iter().enumerate() {
-        let step = steps.of(variable.parameter.quantity);
+        let step = scales[i];
         let moved = |offset: f64| {
             let mut moved = values.clone();
             moved[i] += offset * step;
@@ -192,6 +205,37 @@ fn cost(lens: &Lens, term: Term, steps: &Steps, tolerance: f64) -> Result<TermCo
     }
     let (error, reached) = found.first().map_or((0.0, false), |term| (term.error, term.reached));
     let difference = if largest > 0.0 { difference / largest } else { 0.0 };
-    let (term, refused) = (term.name(), None);
-    Ok(TermCost { term, value, error, reached, value_ms, gradient_ms, difference, at, refused })
+    Ok(TermCost {
+        term: term.name(),
+        value,
+        error,
+        reached,
+        value_ms,
+        gradient_ms,
+        difference,
+        gradient_error,
+        at,
+        refused: None,
+    })
+}
+
+/// The largest difference of a derivative from the exact one over the largest exact one, each times its scale.
+fn largest_change(found: &[f64], exact: &[f64], scales: &[f64]) -> f64 {
+    let largest =
+        |numbers: &mut dyn Iterator<Item = f64>| numbers.map(f64::abs).fold(0.0, f64::max);
+    let size = largest(&mut exact.iter().zip(scales).map(|(exact, scale)| exact * scale));
+    let apart = found.iter().zip(exact).zip(scales).map(|((a, b), scale)| (a - b) * scale);
+    let apart = largest(&mut { apart });
+    if size > 0.0 { apart / size } else { apart }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_change_is_relative_to_the_largest_derivative_in_its_scale() {
+        assert_eq!(largest_change(&[1.0, 9.0], &[2.0, 8.0], &[1.0, 0.5]), 0.25);
+        assert_eq!(largest_change(&[1.0], &[0.0], &[2.0]), 2.0);
+    }
 }

@@ -43,6 +43,7 @@ pub(super) fn sag_range<R: Real>(shape: &Shape<R>, radius: f64) -> (f64, f64) {
 }
 
 /// A bound of the slope between two distances from the axis, from a number of intervals.
+#[inline]
 pub(super) fn slope_bound_between(
     c: f64,
     conic: f64,
@@ -64,6 +65,7 @@ pub(super) fn slope_bound_between(
 }
 
 /// `dz/dr` at a distance from the axis.
+#[inline]
 fn slope_at(c: f64, conic: f64, terms: &[f64], r: f64) -> f64 {
     let r2 = r * r;
     let polynomial = terms.iter().enumerate().rev();
@@ -72,6 +74,7 @@ fn slope_at(c: f64, conic: f64, terms: &[f64], r: f64) -> f64 {
 }
 
 /// A bound of `|d²z/dr²|` within `radius` of the axis.
+#[inline]
 pub(super) fn second_derivative_bound(c: f64, conic: f64, terms: &[f64], radius: f64) -> f64 {
     let r2 = radius * radius;
     let radicand = 1.0 - (1.0 + conic) * c * c * r2;
@@ -92,6 +95,7 @@ pub(super) fn second_derivative_bound(c: f64, conic: f64, terms: &[f64], radius:
 impl Interface<f64> {
     /// A lower and an upper bound of the sag between two distances from the axis at which the surface
     /// exists, and the size of the numbers that it is the sum of, in mm.
+    #[inline]
     pub(super) fn sag_bounds(&self, (from, to): (f64, f64)) -> (f64, f64, f64) {
         let conic = Self { terms: [0.0; ASPHERE_TERMS], ..*self };
         // A conic rises or falls all the way to its edge.

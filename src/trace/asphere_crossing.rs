@@ -78,6 +78,7 @@ impl RayAtAsphere {
         4.0 * start.max(at_vertex_plane).max(self.p.z.abs())
     }
 
+    #[inline]
     fn r2(&self, s: f64) -> f64 {
         let (x, y) = (self.p.x + s * self.k.x, self.p.y + s * self.k.y);
         x * x + y * y
@@ -85,6 +86,7 @@ impl RayAtAsphere {
 
     /// The least and the largest distance from the axis on a part of the ray that lies within
     /// `radius`.
+    #[inline]
     fn distances(&self, from: f64, to: f64, radius: f64) -> (f64, f64) {
         let nearest = (-self.slant / (self.across * self.across)).max(from).min(to);
         let low = if nearest.is_finite() { self.r2(nearest).sqrt() } else { 0.0 };
@@ -93,12 +95,14 @@ impl RayAtAsphere {
     }
 
     /// A bound of the slope of the surface between two distances from the axis.
+    #[inline]
     fn slope_bound(&self, distances: (f64, f64)) -> f64 {
         let surface = &self.surface;
         slope_bound_between(surface.curvature, surface.conic, &surface.terms, distances, 2)
     }
 
     /// A bound of the second derivative of the height along the ray, within `radius` of the axis.
+    #[inline]
     fn bend_bound(&self, radius: f64) -> f64 {
         let Interface { curvature, conic, terms, .. } = &self.surface;
         self.across * self.across * second_derivative_bound(*curvature, *conic, terms, radius)
@@ -106,6 +110,7 @@ impl RayAtAsphere {
 
     /// True if the heights of a part of the ray are all above or all below those of the surface at its
     /// distances from the axis, by more than rounding.
+    #[inline]
     fn is_apart(&self, from: f64, to: f64, distances: (f64, f64)) -> bool {
         let (low, high, size) = self.surface.sag_bounds(distances);
         let (a, b) = (self.p.z + from * self.k.z, self.p.z + to * self.k.z);
@@ -114,6 +119,7 @@ impl RayAtAsphere {
     }
 
     /// The height of the surface above the ray, and its derivative along the ray.
+    #[inline]
     fn height(&self, s: f64) -> (f64, f64) {
         let (z, dz_dr2) = self.surface.sag(self.r2(s));
         let along = self.slant + s * self.across * self.across;
@@ -154,6 +160,7 @@ impl RayAtAsphere {
 
     /// True if a part of the ray whose ends are on one side of the surface cannot cross it in between:
     /// the ends are too far from it for its slope or its curvature, or all of the part is.
+    #[inline]
     fn stays_on_its_side(
         &self,
         from: IntervalEnd,
@@ -168,6 +175,7 @@ impl RayAtAsphere {
             || self.is_apart(from.s, to.s, distances)
     }
 
+    #[inline]
     fn endpoint(&self, s: f64) -> IntervalEnd {
         IntervalEnd { s, height: self.surface.sense * self.height(s).0 }
     }

@@ -107,11 +107,12 @@ impl Display for DesignReport {
 
 /// Writes what the limits cost.
 fn write_costs(f: &mut fmt::Formatter<'_>, costs: &[LimitCost]) -> fmt::Result {
-    for LimitCost { term, surface, um_per_mm, um_per_percent } in costs {
+    for LimitCost { term, surface, um_per_mm, um_per_percent, um_per_element } in costs {
         let place =
             surface.map_or(String::new(), |row| format!(" of surface {}", SurfaceNumber::new(row)));
         let of = |um: Option<f64>, unit| um.map(|um| format!("{} um per {unit}", ShortNumber(um)));
         let price = of(*um_per_mm, "mm").or_else(|| of(*um_per_percent, "percent of it"));
+        let price = price.or_else(|| of(*um_per_element, "element fewer"));
         writeln!(f, "{term}{place} costs {}", price.unwrap_or_default())?;
     }
     Ok(())

@@ -148,6 +148,7 @@ fn term_costs(rows: &[TermCost]) -> TextTable {
         "value ms",
         "with gradient",
         "ratio",
+        "gradient error",
         "off differences",
         "variable",
     ]);
@@ -159,6 +160,7 @@ fn term_costs(rows: &[TermCost]) -> TextTable {
             format!("{:.3}", row.value_ms),
             format!("{:.3}", row.gradient_ms),
             format!("{:.2}", row.gradient_ms / row.value_ms),
+            row.gradient_error.map_or("-".to_owned(), |error| format!("{error:.0e}")),
             format!("{:.0e}", row.difference),
             row.at.clone().unwrap_or_default(),
         ]);

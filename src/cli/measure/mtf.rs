@@ -1,6 +1,7 @@
 //! `measure mtf`: contrast, its error and its time.
 
-use super::optiland::{self, OptilandCurves, OptilandRow};
+use super::optiland::HOW_TO_GET;
+use super::optiland::mtf::{self, OptilandCurves, OptilandRow};
 use super::plot::{self, Color, ErrorChart, ErrorCurve, LegendEntry, PlotArgs, Stroke};
 use crate::cli::error::CliError;
 use crate::cli::failures::Failures;
@@ -86,7 +87,7 @@ impl MeasureMtfArgs {
         let curves = found.map_err(|why| CliError::Input(format!("{}: {why}", opened.file)))?;
         let beside = |python: &PathBuf| {
             let asked = (self.highest, self.count);
-            optiland::measure(python, opened, (&model, &curves.fields), asked)
+            mtf::measure(python, opened, (&model, &curves.fields), asked)
         };
         let optiland = self.optiland.as_ref().map(beside).transpose()?;
         let (lens, name) = (opened.file.clone(), opened.lens.name.clone());
@@ -154,7 +155,7 @@ impl Display for MeasureMtfReport {
             }
             match optiland {
                 Some(found) => writeln!(f, "Optiland {}, each wavelength alone", found.version)?,
-                None => writeln!(f, "{}", optiland::HOW_TO_GET)?,
+                None => writeln!(f, "{}", HOW_TO_GET)?,
             }
         }
         Ok(())

@@ -1,5 +1,7 @@
 //! `measure tolerance`: the exactness and the cost of tolerances, and the gain of designs as built.
 
+use super::optiland::HOW_TO_GET;
+use super::optiland::tolerance::{self as optiland, OptilandTolerances};
 use crate::cli::error::CliError;
 use crate::cli::input::LensFile;
 use crate::cli::output::{Output, ShortNumber, TextTable};
@@ -33,6 +35,10 @@ pub(super) struct MeasureToleranceArgs {
     /// The maximum number of steps of each descent; 0 for none
     #[arg(long, value_name = "N", default_value_t = 1000)]
     steps: usize,
+
+    /// A Python that has Optiland: its tolerancing of the same lens and errors is timed in the same run
+    #[arg(long, value_name = "PYTHON")]
+    optiland: Option<PathBuf>,
 }
 
 /// The lens without a file: that of costs, and that which is optimized.
@@ -49,6 +55,8 @@ impl MeasureToleranceArgs {
             let text = "stopped before the costs were measured".to_owned();
             return Err(CliError::Failed(text));
         };
+        let beside = |python: &PathBuf| optiland::measure(python, (&lens, &file), self.grade);
+        let optiland = self.optiland.as_ref().map(beside).transpose()?;
         // The bundled lens on which costs are measured has little to gain: its spot as designed is
         // nine tenths of that as built.
         let designed = if self.lens.is_some() { lens } else { bundled(SENSITIVE)?.0 };
@@ -59,7 +67,7 @@ impl MeasureToleranceArgs {
             None
         };
         let machine = Machine::detect();
-        output.print(&MeasureToleranceReport { machine, file, cost, designs })
+        output.print(&MeasureToleranceReport { machine, file, cost, optiland, designs })
     }
 
     /// The lens and its name.
@@ -86,6 +94,7 @@ struct MeasureToleranceReport {
     machine: Machine,
     file: String,
     cost: ToleranceBenchmark,
+    optiland: Option<OptilandTolerances>,
     designs: Option<AsBuiltComparison>,
 }
 
@@ -119,9 +128,35 @@ impl MeasureToleranceReport {
     }
 }
 
+/// The table of both programs.
+fn beside_optiland(found: &OptilandTolerances) -> String {
+    let OptilandTolerances { version, own, rows } = found;
+    let head =
+        ["the same errors, one core", "sensitivities", "rays", "a lens by rays", "growth off by"];
+    let mut table = TextTable::new(&head);
+    let mut row = |program: String, times: [f64; 2], rays: usize, apart: Option<f64>| {
+        let [sensitivities, lens] = times.map(|ms| format!("{} ms", ShortNumber(ms)));
+        let apart = apart.map_or(String::new(), |share| format!("{:.1} %", 100.0 * share));
+        table.row([program, sensitivities, rays.to_string(), lens, apart]);
+    };
+    row("this program".into(), [own.sensitivities_ms, own.lens_ms], own.rays, None);
+    for other in rows {
+        let times = [other.sensitivities_ms, other.lens_ms];
+        row(format!("Optiland {version}"), times, other.rays, other.median_difference);
+    }
+    let errors = own.growth.len();
+    format!(
+        "{table}{errors} errors of single surfaces, image plane fixed; growth: of the mean square spot, median\n"
+    )
+}
+
 impl Display for MeasureToleranceReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         writeln!(f, "{}\n{}\n\n{}", self.machine, self.file, self.costs())?;
+        match &self.optiland {
+            Some(found) => writeln!(f, "{}", beside_optiland(found))?,
+            None => writeln!(f, "{HOW_TO_GET}\n")?,
+        }
         let Some(designs) = &self.designs else { return Ok(()) };
         let AsBuiltComparison { name, samples, nominal, as_built, .. } = designs;
         writeln!(f, "{name}: refocused rms spots in mm, {samples} lenses by Monte Carlo:\n")?;

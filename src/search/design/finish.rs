@@ -105,7 +105,25 @@ pub(super) fn finished_lenses(
     if !stop.load(Ordering::Relaxed) {
         lenses.extend(brightest(&buildable, asked, stop));
     }
-    as_they_are_made(&lenses, stop)
+    let mut lenses = as_they_are_made(&lenses, stop);
+    add_element_cost(&mut lenses);
+    lenses
+}
+
+/// Adds to the costs of the best lens what an element fewer costs, by the simplest lens beside it.
+fn add_element_cost(lenses: &mut [DesignedLens]) {
+    let simplest = lenses.iter().find(|lens| lens.merit == DesignMerit::Simplest);
+    let Some((fewer, wider)) = simplest.map(|lens| (lens.judgement.elements, lens.judgement.rms))
+    else {
+        return;
+    };
+    if let Some(best) = lenses.first_mut()
+        && best.judgement.elements > fewer
+        && wider > best.judgement.rms
+    {
+        let elements = (best.judgement.elements - fewer) as f64;
+        best.costs.push(LimitCost::of_element(1e3 * (wider - best.judgement.rms) / elements));
+    }
 }
 
 /// Lenses that are refined as they are made, each within its requirements, and the most robust one.
@@ -326,6 +344,29 @@ mod tests {
         assert!(lengths.windows(2).all(|pair| pair[0].um_per_mm >= pair[1].um_per_mm), "{costs:?}");
         let light = costs.last().unwrap();
         assert!(light.term == "light" && light.um_per_percent > Some(0.0), "{costs:?}");
+    }
+
+    #[test]
+    fn an_element_fewer_costs_what_the_simplest_lens_lacks() {
+        let (asked, draft, lens) = finished();
+        let judgement = judge_lens(&lens, &asked, JUDGEMENT_TOLERANCE).unwrap();
+        let candidate = Candidate { origin: "an achromat".to_owned(), draft, value: 0.0 };
+        let lens = finish(&candidate, &asked, &AtomicBool::new(true)).unwrap();
+        let of = |merit, elements: usize, rms: f64| DesignedLens {
+            merit,
+            judgement: LensJudgement { elements, rms, ..judgement.clone() },
+            costs: Vec::new(),
+            ..lens.clone()
+        };
+        let cost = |elements: usize, rms: f64| {
+            let best = of(DesignMerit::Best, 6, 0.010);
+            let mut lenses = [best, of(DesignMerit::Simplest, elements, rms)];
+            add_element_cost(&mut lenses);
+            lenses[0].costs.first().and_then(|cost| cost.um_per_element)
+        };
+        assert!((cost(4, 0.016).unwrap() - 3.0).abs() < 1e-9);
+        assert_eq!(cost(6, 0.016), None);
+        assert_eq!(cost(4, 0.009), None);
     }
 
     /// A lens without a simpler one beside it is not the simplest as well.

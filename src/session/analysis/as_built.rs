@@ -78,9 +78,8 @@ pub(super) fn predict_unless(
     unless_stopped(as_built(lens, settings, (tolerance, 0), stop))
 }
 
-fn unless_stopped(
-    found: Result<AsBuiltLens, ToleranceError>,
-) -> Option<Result<AsBuiltLens, String>> {
+/// What was found, or the reason why it was not in words; `None` if it was stopped.
+fn unless_stopped<T>(found: Result<T, ToleranceError>) -> Option<Result<T, String>> {
     match found {
         Err(ToleranceError::Stopped) => None,
         found => Some(found.map_err(|why| why.to_string())),
@@ -133,11 +132,11 @@ fn as_built(
     let real_wavefront =
         waves.as_ref().and_then(|waves| waves.real_lenses(&scene, &sheet, request, stop).ok());
     let frequency = settings.tolerance_frequency.filter(|_| samples > 0);
-    let contrast = frequency.map(|frequency| {
+    let contrast = frequency.and_then(|frequency| {
         let place = (lens, settings.zoom, tolerance);
         let found =
             ContrastChanges::with_real_lenses(place, &scene, (&sheet, frequency), request, stop);
-        found.map(|(changes, real)| changes.summary(&sheet, real)).map_err(|why| why.to_string())
+        unless_stopped(found.map(|(changes, real)| changes.summary(&sheet, real)))
     });
     Ok(AsBuiltLens {
         contrast,

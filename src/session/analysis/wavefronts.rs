@@ -67,8 +67,9 @@ const WIDEST: f64 = 15.0;
 const CIRCLES: usize = 16;
 /// The number of Zernike coefficients.
 const TERMS: usize = 15;
-/// The tolerance of what is looked at, and the rays that it may take.
-const LOOKED_AT: Accuracy = Accuracy { tolerance: 1e-2, max_rays: 10_000 };
+/// The tolerance of what is looked at, and the rays that it may take: an image of ten waves of aberration folds
+/// with less than 25,000.
+const LOOKED_AT: Accuracy = Accuracy { tolerance: 1e-2, max_rays: 100_000 };
 
 /// The wavefronts of all fields; `None` if it was interrupted.
 pub(super) fn field_wavefronts(

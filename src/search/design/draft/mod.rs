@@ -52,18 +52,31 @@ pub struct LimitCost {
     /// The same by 1 % less light at every field; `None` for a length.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub um_per_percent: Option<f64>,
+    /// The growth of the RMS spot radius by one element fewer, in µm, as far as the simplest lens tells; `None` for
+    /// every other limit.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub um_per_element: Option<f64>,
 }
 
 impl LimitCost {
     /// The cost of a length.
     pub(super) fn of_length(term: &'static str, surface: Option<usize>, um_per_mm: f64) -> Self {
-        Self { term, surface, um_per_mm: Some(um_per_mm), um_per_percent: None }
+        let um_per_mm = Some(um_per_mm);
+        Self { term, surface, um_per_mm, um_per_percent: None, um_per_element: None }
     }
 
     /// The cost of the light of all fields.
     pub(super) fn of_light(um_per_percent: f64) -> Self {
         let (term, surface) = ("light", None);
-        Self { term, surface, um_per_mm: None, um_per_percent: Some(um_per_percent) }
+        let um_per_percent = Some(um_per_percent);
+        Self { term, surface, um_per_mm: None, um_per_percent, um_per_element: None }
+    }
+
+    /// The cost of one element fewer.
+    pub(super) fn of_element(um_per_element: f64) -> Self {
+        let (term, surface) = ("elements", None);
+        let um_per_element = Some(um_per_element);
+        Self { term, surface, um_per_mm: None, um_per_percent: None, um_per_element }
     }
 
     /// The number by which costs are ordered.

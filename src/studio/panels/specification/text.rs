@@ -131,6 +131,7 @@ pub(super) fn cost_text(cost: &LimitCost) -> String {
         .map_or(String::new(), |row| format!(" of surface {}", SurfaceNumber::new(row)));
     let of = |um: Option<f64>, unit| um.map(|um| format!("{} µm per {unit}", format_digits(um, 3)));
     let price = of(cost.um_per_mm, "mm").or_else(|| of(cost.um_per_percent, "percent"));
+    let price = price.or_else(|| of(cost.um_per_element, "element fewer"));
     format!("{name}{place}: {}", price.unwrap_or_default())
 }
 

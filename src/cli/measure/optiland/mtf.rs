@@ -1,43 +1,39 @@
-//! Contrast of the same lens by Optiland, timed beside, against the exact one.
+//! Contrast of the same lens by Optiland against the exact one.
 //!
 //! Optiland computes one wavelength at a time; its numbers are compared wavelength by wavelength with those of this
-//! program to a tight tolerance. A script runs in the interpreter that is named, on one thread.
+//! program to a tight tolerance.
 
+use super::{ask, wrong_shape};
 use crate::analysis::{AnalysisError, MtfCurve, diffraction_mtf, geometric_mtf};
 use crate::cli::error::CliError;
 use crate::cli::input::LoadedLens;
-use crate::files;
 use crate::lens::FieldPoint;
 use crate::measure::TransferMethod;
 use crate::pupil::{Accuracy, RayModel};
 use serde::{Deserialize, Serialize};
-use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::path::Path;
 
-/// The script, and how to get the program that it needs.
-const SCRIPT: &str = include_str!("optiland_mtf.py");
-pub(super) const HOW_TO_GET: &str = "Optiland: not run; `python -m venv optiland`, \
-     `optiland/bin/pip install optiland`, then --optiland optiland/bin/python";
+const SCRIPT: &str = include_str!("mtf.py");
 /// The tolerance of the contrast that others are compared with.
 const EXACT: f64 = 1e-5;
 
 /// A chart of contrast by Optiland.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub(super) struct OptilandRow {
-    pub(super) method: TransferMethod,
+pub(in crate::cli::measure) struct OptilandRow {
+    pub(in crate::cli::measure) method: TransferMethod,
     /// The number of rays along a side of the pupil.
-    pub(super) rays: usize,
+    pub(in crate::cli::measure) rays: usize,
     /// The largest difference of a modulus from the exact one.
-    pub(super) error: f64,
+    pub(in crate::cli::measure) error: f64,
     /// The time of the chart, in milliseconds.
-    pub(super) ms: f64,
+    pub(in crate::cli::measure) ms: f64,
 }
 
 /// The results of Optiland.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub(super) struct OptilandCurves {
-    pub(super) version: String,
-    pub(super) rows: Vec<OptilandRow>,
+pub(in crate::cli::measure) struct OptilandCurves {
+    pub(in crate::cli::measure) version: String,
+    pub(in crate::cli::measure) rows: Vec<OptilandRow>,
 }
 
 /// The output of the script.
@@ -56,43 +52,16 @@ struct ScriptRow {
     values: Vec<Vec<[Vec<f64>; 2]>>,
 }
 
-/// A file that is removed in the end.
-struct ScratchFile(PathBuf);
-
-impl Drop for ScratchFile {
-    fn drop(&mut self) {
-        // One that is gone already is no fault.
-        drop(std::fs::remove_file(&self.0));
-    }
-}
-
 /// The charts of a lens by Optiland in an interpreter of Python, at some heights of the field and so many
 /// frequencies up to one in cycles/mm.
-pub(super) fn measure(
+pub(in crate::cli::measure) fn measure(
     python: &Path,
     opened: &LoadedLens,
     (model, heights): (&RayModel, &[f64]),
     (highest, count): (f64, usize),
 ) -> Result<OptilandCurves, CliError> {
-    let name = format!("aplanat_mtf_{}.optiland.json", std::process::id());
-    let file = ScratchFile(std::env::temp_dir().join(name));
-    files::save(&opened.lens, &file.0)?;
-    let mut command = Command::new(python);
-    command.arg("-c").arg(SCRIPT).arg(&file.0).arg(highest.to_string()).arg(count.to_string());
-    for threads in ["OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"] {
-        command.env(threads, "1");
-    }
-    let wrong = |what: String| CliError::Failed(format!("{}: {what}", python.display()));
-    let output = command.output().map_err(|error| wrong(error.to_string()))?;
-    if !output.status.success() {
-        let text = String::from_utf8_lossy(&output.stderr);
-        let last = text.lines().rfind(|line| !line.trim().is_empty()).unwrap_or("no message");
-        return Err(wrong(last.to_owned()));
-    }
-    let text = String::from_utf8_lossy(&output.stdout);
-    let line = text.lines().last().unwrap_or_default();
-    let found: ScriptOutput =
-        serde_json::from_str(line).map_err(|error| wrong(error.to_string()))?;
+    let asked = [highest.to_string(), count.to_string()];
+    let found: ScriptOutput = ask(python, SCRIPT, &opened.lens, &asked)?;
     let frequencies: Vec<f64> = (1..=count).map(|i| highest * i as f64 / count as f64).collect();
     let exact = |method| exact_curves(model, heights, method, &frequencies);
     let (geometric, diffraction) =
@@ -103,8 +72,7 @@ pub(super) fn measure(
             TransferMethod::Diffraction => &diffraction,
         };
         let exact = exact.as_ref().map_err(|why| CliError::Failed(why.to_string()))?;
-        let error = largest_difference(&row.values, exact)
-            .ok_or_else(|| wrong("its answer has not the shape of the question".to_owned()))?;
+        let error = largest_difference(&row.values, exact).ok_or_else(|| wrong_shape(python))?;
         Ok(OptilandRow { method: row.method, rays: row.rays, error, ms: row.ms })
     };
     let rows: Result<Vec<OptilandRow>, CliError> = found.rows.iter().map(row).collect();
