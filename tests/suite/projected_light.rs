@@ -1,13 +1,14 @@
 //! Images of beams by light that is followed forwards: against exact ones, with errors that cover what is missing,
 //! and in cases where there is little or nothing to see.
 
-use aplanat::grin::field::{Luneburg, ProfileField};
+use aplanat::grin::field::{Luneburg, Parabolic, ProfileField};
 use aplanat::grin::{
     EndCondition, Face, GrinFate, GrinRegion, GrinSetup, IndexField, Integrator, LastStep,
     LaunchMode,
 };
 use aplanat::grin_design::{
-    self, GrinField, GrinTask, LightGoal, LightSource, RefinementLevel, SquareBeam,
+    self, GrinField, GrinOptimizer, GrinTask, InitialField, LightGoal, LightSource,
+    RefinementLevel, SquareBeam,
 };
 use aplanat::math::Vec3;
 use aplanat::picture::{
@@ -30,9 +31,30 @@ fn setup(region: GrinRegion<f64>, screen: Option<f64>) -> GrinSetup<f64> {
     }
 }
 
+/// A built-in task with few rays and pixels, of a few steps with a coarse field.
+fn quick(name: &str, steps: usize) -> GrinTask {
+    let mut task = grin_design::find_builtin(name).unwrap().task().unwrap();
+    task.levels = vec![RefinementLevel { nodes: 5, steps }];
+    for view in &mut task.views {
+        if let LightSource::Beam { rays, .. } = &mut view.source {
+            *rays = 32;
+        }
+        if let LightGoal::Image { pixels, .. } = &mut view.goal {
+            *pixels = 16;
+        }
+    }
+    task
+}
+
+fn solved(task: &GrinTask) -> GrinField {
+    let mut runner = GrinOptimizer::new(task).unwrap();
+    while !runner.step().unwrap().finished {}
+    runner.current().clone()
+}
+
 fn air() -> GrinField {
-    let task = grin_design::find_builtin("display").unwrap().task().unwrap();
-    GrinField::from_function(task.field, 5, |_| 1.0).unwrap()
+    let task = GrinTask { start: InitialField::Uniform(1.0), ..quick("display", 1) };
+    GrinOptimizer::new(&task).unwrap().best().clone()
 }
 
 fn luneburg() -> ProfileField<Luneburg<f64>> {
@@ -61,9 +83,9 @@ fn along_z<'a>(
 
 /// The root mean square difference from an exact image over what the errors of an image allow.
 fn off(image: &ProjectedImage, exact: &[f64]) -> f64 {
-    let square = |pairs: &mut dyn Iterator<Item = f64>| pairs.map(|v| v * v).sum::<f64>();
-    let found = square(&mut image.values.iter().zip(exact).map(|(a, b)| a - b));
-    (found / square(&mut image.errors.iter().copied())).sqrt()
+    let found: f64 = image.values.iter().zip(exact).map(|(a, b)| (a - b).powi(2)).sum();
+    let allowed: f64 = image.errors.iter().map(|error| error * error).sum();
+    if found > 1e-20 { (found / allowed).sqrt() } else { 0.0 }
 }
 
 /// The share of a pixel that a beam covers along one axis, each from minus to plus half a side.
@@ -86,12 +108,15 @@ fn air_leaves_the_beam_as_it_is() {
             density * along(i % pixels) * along(i / pixels)
         };
         let exact: Vec<f64> = (0..pixels * pixels).map(at).collect();
-        for ((value, error), exact) in image.values.iter().zip(&image.errors).zip(&exact) {
-            // An error from four replicates is itself known to some tens of percent.
-            assert!((value - exact).abs() <= 8.0 * error + 1e-12, "{value} ± {error}: {exact}");
-        }
         let error = image.rms_error().unwrap();
-        assert!(error < 0.02, "{half} {pixels}: {error}");
+        let mean = image.mean();
+        for (value, exact) in image.values.iter().zip(&exact) {
+            // Four replicates of one pixel may agree by chance, those of all pixels do not.
+            let allowed = 6.0 * error * exact.max(mean) + 1e-12;
+            assert!((value - exact).abs() <= allowed, "{value} ± {error}: {exact}");
+        }
+        println!("{half} {pixels}: error {error:.1e}, off {:.2}", off(&image, &exact));
+        assert!(error < 0.02 && off(&image, &exact) < 1.5, "{half} {pixels}: {error}");
         let light = (half / 0.9).min(1.0).powi(2);
         assert!((image.light().value - light).abs() <= 8.0 * image.light().error + 1e-12);
     }
@@ -104,13 +129,18 @@ fn air_leaves_the_beam_as_it_is() {
 }
 
 /// The square of light of Luneburg's lens at infinity: a ray at height `h` leaves at the angle whose sine is `h`, so
-/// that the irradiance over tangents `t` falls as `1/(1 + t²)²`. Means over pixels by many points of each.
+/// that the irradiance over tangents `t` falls as `1/(1 + t²)²`.
 fn luneburg_at_infinity(frame: f64, pixels: usize, beam: f64) -> Vec<f64> {
+    pixel_means(frame, pixels, |t| (frame / beam).powi(2) * (1.0 + t * t).powi(-2))
+}
+
+/// Means over pixels of an irradiance by the distance from the axis, by many points of each.
+fn pixel_means(frame: f64, pixels: usize, irradiance: impl Fn(f64) -> f64) -> Vec<f64> {
     const FINE: usize = 16;
     let at = |i: usize, k: usize| {
         frame * (2.0 * (i as f64 + (k as f64 + 0.5) / FINE as f64) / pixels as f64 - 1.0)
     };
-    let density = |u: f64, v: f64| (frame / beam).powi(2) * (1.0 + u * u + v * v).powi(-2);
+    let density = |u: f64, v: f64| irradiance(u.hypot(v));
     let mean = |n: usize| {
         let points = (0..FINE * FINE).map(|k| {
             density(at(n % pixels, k % FINE), at(n / pixels, k / FINE))
@@ -139,6 +169,45 @@ fn a_luneburg_lens_forms_its_exact_image_at_infinity() {
     let light = image.values.iter().sum::<f64>() / image.values.len() as f64;
     let beside = image.beside as f64 / image.rays as f64;
     assert!((light + beside - 1.0).abs() < 1e-12, "{light} {beside}");
+}
+
+/// In a fibre with `η² = n² (1 - g² r²)` a ray that starts along the axis at `r` is at `r cos(n g z/η(r))`, and goes on
+/// straight behind it. The irradiance is that of the beam over the change of area.
+#[test]
+fn a_parabolic_fibre_forms_its_exact_image_behind_it() {
+    let (axis, g, length, distance) = (1.5, 0.5_f64, 1.0, 0.5);
+    let field = ProfileField::cylinder(Parabolic::new(axis, g));
+    let (frame, pixels, beam) = (0.45_f64, 9, 0.8);
+    let setup = GrinSetup {
+        launch: LaunchMode::Scaled,
+        ..setup(GrinRegion::rod(1.2, 0.0, length), Some(length + distance))
+    };
+    let image_of = |r: f64| {
+        let index = axis * (1.0 - (g * r).powi(2)).sqrt();
+        let phase = axis * g * length / index;
+        r * (phase.cos() - distance * axis * g / index * phase.sin())
+    };
+    let start_of = |image: f64| {
+        let (mut low, mut high) = (0.0, 1.2);
+        for _ in 0..60 {
+            let middle = 0.5 * (low + high);
+            *(if image_of(middle) < image { &mut low } else { &mut high }) = middle;
+        }
+        0.5 * (low + high)
+    };
+    let irradiance = |image: f64| {
+        let r = start_of(image);
+        let slope = (image_of(r + 1e-5) - image_of(r - 1e-5)) / 2e-5;
+        (frame / beam).powi(2) * r / (image * slope)
+    };
+    // Pixels on the axis have no point there.
+    let exact = pixel_means(frame, pixels, irradiance);
+    let projection = along_z(&field, setup, beam, (frame, pixels));
+    let settings = ProjectionSettings { tolerance: 0.01, ..ProjectionSettings::default() };
+    let image = render(&projection, &settings);
+    println!("{} rays, off {:.2}, {:?}", image.rays, off(&image, &exact), exact[40]);
+    assert!(image.reached && off(&image, &exact) < 1.4, "{}", off(&image, &exact));
+    assert!(exact[0] > 1.2 * exact[40], "an image that is not even: {exact:?}");
 }
 
 /// The errors are those that repeated seeds have: neither too small nor far too large.
@@ -265,20 +334,10 @@ fn what_cannot_be_followed_is_refused_by_name() {
     assert!(image.rays == 4 && image.rms_error().is_some_and(f64::is_finite), "{image:?}");
 }
 
-/// A task with few rays, and an even field.
+/// A task with a field that bends light.
 fn display() -> (GrinTask, GrinField) {
-    let mut task = grin_design::find_builtin("display").unwrap().task().unwrap();
-    task.levels = vec![RefinementLevel { nodes: 5, steps: 1 }];
-    for view in &mut task.views {
-        if let LightSource::Beam { rays, .. } = &mut view.source {
-            *rays = 32;
-        }
-        if let LightGoal::Image { pixels, .. } = &mut view.goal {
-            *pixels = 16;
-        }
-    }
-    let bent = |p: Vec3<f64>| 1.1 - 0.05 * (p.x * p.x + 0.5 * p.y * p.y + p.y * p.z * p.z);
-    let field = GrinField::from_function(task.field, 5, bent).unwrap();
+    let task = quick("display", 25);
+    let field = solved(&task);
     (task, field)
 }
 
@@ -316,16 +375,15 @@ fn views_are_rendered_as_their_loss_sees_them() {
         let other = turned.iter().zip(&loss.formed).map(|(a, b)| (a - b).powi(2));
         let other = (other.sum::<f64>() / loss.formed.len() as f64).sqrt();
         println!("unlike {unlike:.3}, turned {other:.3}");
-        assert!(unlike < 0.25 && unlike < 0.5 * other, "{unlike} {other}");
+        assert!(unlike < 0.15 && other > 1.5 * unlike, "{unlike} {other}");
         assert!(view.quality().error < 0.5 && view.correlation().error < 0.05);
     }
 }
 
 #[test]
 fn goals_without_an_image_have_none() {
-    let mut task = grin_design::find_builtin("caustic").unwrap().task().unwrap();
-    task.levels = vec![RefinementLevel { nodes: 5, steps: 1 }];
-    let field = GrinField::from_function(task.field, 5, |_| 1.1).unwrap();
+    let task = quick("caustic", 1);
+    let field = solved(&task);
     let settings = ProjectionSettings::default();
     let views = project_views(&task, &field, &settings, &mut |_| ControlFlow::Continue(()));
     assert_eq!(views.unwrap(), [None]);
