@@ -27,6 +27,6 @@ pub use solver::{FieldScore, GrinOptimizer, GrinProgress};
 pub use task::{
     BUILTIN_TASKS, BoundaryCondition, BuiltinTask, Domain, FieldRepresentation, GrinMethod,
     GrinTask, InitialField, LightGoal, LightSource, LightView, ManufacturingLimits, ReferenceField,
-    RefinementLevel, SourceDirections, SquareBeam, TASK_VERSION, TargetImage, TaskFile, TracingSettings,
-    VolumeFile, find_builtin, read_task,
+    RefinementLevel, SourceDirections, SquareBeam, TASK_VERSION, TargetImage, TaskFile,
+    TracingSettings, VolumeFile, find_builtin, read_task,
 };

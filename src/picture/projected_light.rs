@@ -237,9 +237,10 @@ impl<'a> LightProjection<'a> {
         if !(along > 0.0) {
             return None;
         }
-        let place = self.beam.axes.map(|axis| {
-            if self.is_far { axis.dot(exit.v) / along } else { axis.dot(exit.x) }
-        });
+        let place = self
+            .beam
+            .axes
+            .map(|axis| if self.is_far { axis.dot(exit.v) / along } else { axis.dot(exit.x) });
         let [right, down] = self.frame.place(place);
         let [columns, rows] = self.frame.pixels;
         let number = |share: f64, count: usize| {

@@ -152,7 +152,8 @@ impl ExitBeam {
             ([start.x, start.y], [v.x, v.y])
         };
         let beam = task.views[0].source.beam(space);
-        let beam = beam.ok_or_else(|| ExperimentError::Failed("rings without a beam".to_owned()))?;
+        let beam =
+            beam.ok_or_else(|| ExperimentError::Failed("rings without a beam".to_owned()))?;
         Ok(Self { rays: arrived.map(ray).collect(), all: rays.len(), beam, setup, back })
     }
 

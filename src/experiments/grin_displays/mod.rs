@@ -160,11 +160,7 @@ const COLUMNS: [&str; 13] = [
 
 /// The claims that two independent images of the same light have the error that was asked for, and
 /// differ by no more than that.
-fn sampling_claims(
-    name: &str,
-    [image, again]: [&ProjectedImage; 2],
-    effort: Effort,
-) -> [Claim; 2] {
+fn sampling_claims(name: &str, [image, again]: [&ProjectedImage; 2], effort: Effort) -> [Claim; 2] {
     let [fine, coarse] = SAMPLING;
     let error = image.rms_error().unwrap_or(f64::INFINITY);
     let says = format!("{name}: error of sampling, relative to the mean of the image");
@@ -180,7 +176,8 @@ impl EvaluatedView {
         let light = &picture.light;
         let found = picture.quality();
         let says = format!("{name}: peak signal to noise, by independent rays");
-        let good = Claim::at_least(says, found.value, quality).in_unit("dB").with_error(found.error);
+        let good =
+            Claim::at_least(says, found.value, quality).in_unit("dB").with_error(found.error);
         let found = picture.correlation();
         let says = format!("{name}: correlation with the target");
         let alike = Claim::at_least(says, found.value, correlation).with_error(found.error);
@@ -265,7 +262,9 @@ impl EvaluatedField {
     /// The number of rays traced forwards.
     fn rays(&self) -> usize {
         let rendering: usize = self.views.iter().map(EvaluatedView::rays).sum();
-        usize::try_from(self.optimizer.rays_traced()).unwrap_or(usize::MAX).saturating_add(rendering)
+        usize::try_from(self.optimizer.rays_traced())
+            .unwrap_or(usize::MAX)
+            .saturating_add(rendering)
     }
 }
 

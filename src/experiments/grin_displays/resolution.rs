@@ -6,14 +6,12 @@
 //! rough fields it misleads the optimization, and the smoothed one is better. A spline has no
 //! jumps.
 
-use super::{
-    EvaluatedView, SOLVING, evaluate, part_of, reduced, sampling_claims, solve_from,
-};
+use super::{EvaluatedView, SOLVING, evaluate, part_of, reduced, sampling_claims, solve_from};
+use crate::analysis::Estimate;
 use crate::experiments::{
     Claim, DataTable, Effort, Experiment, ExperimentError, ExperimentOutcome, ExperimentResult,
     NamedPlot, ProgressFn, builtin_task, report_progress,
 };
-use crate::analysis::Estimate;
 use crate::grin_design::{FieldRepresentation, GrinOptimizer, GrinTask};
 use crate::plot::{Axis, Canvas, Chart, Legend, PALETTE, Stroke, draw_image_row, gray_levels};
 

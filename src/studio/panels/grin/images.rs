@@ -97,7 +97,8 @@ fn image_pairs(
 ) -> Vec<ImagePair> {
     let views = analysis.views.value.iter().enumerate();
     let rendered = |view| Some(&picture_of(pictures?, view)?.image);
-    let images = views.filter_map(|(view, seen)| Some((view, rendered(view).or(seen.image.as_ref())?)));
+    let images =
+        views.filter_map(|(view, seen)| Some((view, rendered(view).or(seen.image.as_ref())?)));
     let pair = |(view, image): (usize, &ViewImage)| {
         // Both to one scale: the brightest of the picture is white.
         let white = image.target.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
