@@ -1,5 +1,5 @@
-//! What the image of a beam is made of: the square of light, the way it is traced, and the screen
-//! with its target. A renderer of pictures follows more light through it than a loss needs.
+//! The light that makes the image of a beam: its square, the way it is traced, and the screen with
+//! its target. A renderer of pictures follows more of it than a loss needs.
 
 use crate::grin::GrinSetup;
 use crate::grin_design::evaluation::screen::image_screen;

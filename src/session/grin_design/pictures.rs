@@ -3,11 +3,11 @@
 //! While a design takes steps, its images are those of its loss, which are traced anyway; a rendered image takes many
 //! times as many rays, which the design would lack. It is made once the field rests, and ended early for a newer one.
 
-use super::super::clock::{Timed, time};
-use super::super::run::{LatestRequestWorker, WorkerOutput, catch_panic};
 use super::GrinDocument;
 use crate::grin_design::GrinField;
 use crate::picture::{ProjectedView, ProjectionSettings, project_views};
+use crate::session::clock::{Timed, time};
+use crate::session::run::{LatestRequestWorker, WorkerOutput, catch_panic};
 use std::io;
 use std::ops::ControlFlow;
 use std::sync::Arc;
