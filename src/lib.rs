@@ -69,7 +69,8 @@ pub mod plot;
 // prescription report of a lens, its drawings and its solids.
 pub mod report;
 
-// Pictures through a lens: scenes, pixels by rays backwards, the sensor.
+// Pictures through a lens: scenes, pixels by rays backwards, the sensor; images of beams through
+// one gradient-index field, by rays forwards.
 pub mod picture;
 
 // Benchmarks: accuracy against time, throughput, memory.

@@ -38,7 +38,7 @@ use crate::grin_design::{self, GrinOptimizer, GrinTask, GrinTaskError, Reference
 use crate::lens::{Lens, LensError};
 use crate::merit::MeritError;
 use crate::optimize::pareto::ParetoError;
-use crate::picture::PictureError;
+use crate::picture::{PictureError, ProjectionError};
 use crate::plot::NamedPlot;
 use crate::pupil::{LaunchError, RayModelError};
 use crate::search::MutationError;
@@ -165,6 +165,7 @@ fail_on!(
     MutationError,
     ParetoError,
     PictureError,
+    ProjectionError,
     RayModelError,
     ReferenceFieldError,
     SearchSetupError,

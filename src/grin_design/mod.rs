@@ -20,13 +20,13 @@ pub use error::{GrinTaskError, ReferenceFieldError};
 pub use evaluation::{RayCounts, StraightRays, ViewMeasurement, ViewResult};
 pub use field::GrinField;
 pub use report::{
-    FieldDifference, FieldExtremes, LimitCheck, RayPath, RayPaths, SlicePlane, SpatialAxis,
-    ViewImage, ViewReport,
+    FieldDifference, FieldExtremes, ImageLight, LimitCheck, RayPath, RayPaths, SlicePlane,
+    SpatialAxis, ViewImage, ViewReport,
 };
 pub use solver::{FieldScore, GrinOptimizer, GrinProgress};
 pub use task::{
     BUILTIN_TASKS, BoundaryCondition, BuiltinTask, Domain, FieldRepresentation, GrinMethod,
     GrinTask, InitialField, LightGoal, LightSource, LightView, ManufacturingLimits, ReferenceField,
-    RefinementLevel, SourceDirections, TASK_VERSION, TargetImage, TaskFile, TracingSettings,
-    VolumeFile, find_builtin, read_task,
+    RefinementLevel, SourceDirections, SquareBeam, TASK_VERSION, TargetImage, TaskFile,
+    TracingSettings, VolumeFile, find_builtin, read_task,
 };

@@ -1,6 +1,8 @@
 //! The reasons for which there is no picture.
 
 use crate::analysis::{AnalysisError, GhostError};
+use crate::grin::GrinSetupError;
+use crate::grin_design::GrinTaskError;
 use crate::lens::{SurfaceNumber, SystemError};
 use crate::pupil::RayModelError;
 
@@ -69,4 +71,25 @@ pub enum PictureError {
         /// The accepted values.
         expected: &'static str,
     },
+}
+
+/// Light that cannot be followed onto a screen.
+#[derive(Debug, thiserror::Error)]
+pub enum ProjectionError {
+    /// A size of the beam or of the image is no number that light can be followed with.
+    #[error("{what} is {found}; expected {expected}")]
+    Size {
+        /// The name of the size.
+        what: &'static str,
+        /// The value.
+        found: f64,
+        /// The accepted values.
+        expected: &'static str,
+    },
+    /// No ray can be traced through the field.
+    #[error(transparent)]
+    Setup(#[from] GrinSetupError),
+    /// The light of a task is not known.
+    #[error(transparent)]
+    Task(#[from] GrinTaskError),
 }

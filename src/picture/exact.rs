@@ -443,9 +443,14 @@ pub(super) fn mean_with_error(values: [f64; REPLICATES]) -> (f64, f64) {
 
 /// The root mean square of errors, each over mid grey, or over its value where that is brighter.
 pub(super) fn relative_rms(values: &[Radiance], errors: &[Radiance], grey: f64) -> f64 {
-    let pairs = values.iter().flatten().zip(errors.iter().flatten());
+    gray_rms(values.as_flattened(), errors.as_flattened(), grey)
+}
+
+/// The same of values without colours.
+pub(super) fn gray_rms(values: &[f64], errors: &[f64], grey: f64) -> f64 {
+    let pairs = values.iter().zip(errors);
     let squares: f64 = pairs.map(|(value, error)| (error / value.max(grey)).powi(2)).sum();
-    (squares / (3 * values.len().max(1)) as f64).sqrt()
+    (squares / values.len().max(1) as f64).sqrt()
 }
 
 /// The luminance of a colour of sRGB's primaries (IEC 61966-2-1).

@@ -6,6 +6,10 @@
 //! unaberrated pupil at every place, with the error that this leaves. The error is stated; what
 //! is left out (losses at surfaces and ghosts without a coating) is named in the metadata of the file. A
 //! [`SensorModel`] makes noisy numbers of the light.
+//!
+//! A beam has one direction at each point, which no ray from a pixel has but by chance. Its image is made by
+//! following it forwards: a [`LightProjection`] samples the beam as an [`ExactRenderer`] samples a pixel, and
+//! states its error by the same law.
 
 mod aimed_light;
 mod bayer;
@@ -29,6 +33,9 @@ mod pattern;
 mod picture_data;
 mod png_file;
 mod point_images;
+mod projected_image;
+mod projected_light;
+mod projected_view;
 mod pupil_spread;
 mod quick;
 mod raster;
@@ -47,7 +54,7 @@ pub use built_in::BuiltInScene;
 pub use color_band::{ColorBand, Coloring, picture_model};
 pub use device::{PackedPicture, PictureDevice, install_picture_device, picture_device};
 pub use diffraction::DiffractionReport;
-pub use error::PictureError;
+pub use error::{PictureError, ProjectionError};
 pub use error_map::{ErrorMap, quick_error};
 pub use exact::{ExactRenderer, ExactSettings, MID_GREY, PictureProgress, PictureRun, REPLICATES};
 pub use focus::{FocusGroup, GroupFocus, focused};
@@ -61,6 +68,9 @@ pub use pattern::{Paint, PaintedPoint, Pattern};
 pub use picture_data::Picture;
 pub use png_file::{BitDepth, ToneCurve, encode_colors, encode_png};
 pub use point_images::{PlacedPoint, PlacedPoints, PointGrid};
+pub use projected_image::ProjectedImage;
+pub use projected_light::{LightProjection, ProjectionProgress, ProjectionSettings, screen_frame};
+pub use projected_view::{ProjectedView, project_views};
 pub use quick::{QuickPicture, QuickRenderer};
 pub use raster::Raster;
 pub use scene::{Radiance, Scene, SceneLayer};

@@ -436,7 +436,7 @@ fn turned([right, outwards]: [f64; 2], [ex, ey]: [f64; 2]) -> [f64; 2] {
 }
 
 /// The seed of a set of samples (the finalizer of `MurmurHash3`).
-fn set_seed(set: usize, seed: u32) -> u32 {
+pub(super) fn set_seed(set: usize, seed: u32) -> u32 {
     let mut hash = (set as u32) ^ seed.wrapping_mul(0x9E37_79B9);
     hash = (hash ^ (hash >> 16)).wrapping_mul(0x85EB_CA6B);
     hash = (hash ^ (hash >> 13)).wrapping_mul(0xC2B2_AE35);

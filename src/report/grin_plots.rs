@@ -16,15 +16,13 @@ const POINTS: usize = 300;
 const RAYS: usize = 13;
 
 /// Plots the target image at the left and the image by traced rays at the right, both with white
-/// for the brightest pixel of the target.
-pub fn plot_grin_image(name: &str, image: &ViewImage, quality: f64) -> Canvas {
-    let correlation = image.correlation();
-    let subtitle = format!("{quality:.1} dB, correlation {correlation:.3}");
+/// for the brightest pixel of the target, under a name and the numbers of the image.
+pub fn plot_grin_image(name: &str, image: &ViewImage, numbers: &str) -> Canvas {
     let panels = [("target", &image.target), ("image", &image.formed)];
     let peak = image.target.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
     let panels =
         panels.map(|(title, light)| (title.to_owned(), gray_levels(light, image.pixels, peak)));
-    draw_image_row(&format!("{name}: {subtitle}"), image.pixels, &panels)
+    draw_image_row(&format!("{name}: {numbers}"), image.pixels, &panels)
 }
 
 /// Plots a field: its index along the x axis with the exact one, and a section through the z axis

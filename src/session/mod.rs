@@ -48,8 +48,8 @@ pub use drag::{DragProgress, DragView, HandleSlopes, MeritSlopes};
 pub use experiment::{ExperimentRun, ExperimentStatus};
 pub use figures::analysis_figure;
 pub use grin_design::{
-    Contour, DocumentSource, GrinAnalysis, GrinCommand, GrinDocument, GrinRun, GrinView,
-    IndexProfile, LossSample, MAX_NODES, Slice, SliceQuantity, SliceSettings,
+    Contour, DocumentSource, GrinAnalysis, GrinCommand, GrinDocument, GrinPictures, GrinRun,
+    GrinView, IndexProfile, LossSample, MAX_NODES, Slice, SliceQuantity, SliceSettings,
 };
 pub use history::HistoryNode;
 pub use live_merit::{MeritReport, MeritValues};

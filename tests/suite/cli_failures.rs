@@ -188,6 +188,22 @@ fn failed_json(arguments: &[&str], words: &[&str]) -> Value {
     serde_json::from_slice(&output.stdout).unwrap()
 }
 
+/// Images are rendered until their error is small, and state it with their rays and their time.
+#[test]
+fn images_of_a_grin_task_state_their_error() {
+    let folder = Folder::new("grin-images");
+    let grin = ["grin", "caustic-near", "--iterations", "1", "--png", &folder.path("")];
+    let report = done_json(&grin, "");
+    assert_eq!(report["files"].as_array().unwrap().len(), 3, "{report}");
+    let [image] = &report["images"].as_array().unwrap()[..] else { panic!("{report}") };
+    has_keys(image, &["view", "quality_db", "correlation", "light", "lost", "beside", "ms"]);
+    assert!(image["error"].as_f64().unwrap() <= 0.02 && image["reached"] == true, "{image}");
+    let rays = image["rays"].as_u64().unwrap();
+    let [light, off] = [0, 1].map(|i| image["light"][i].as_f64().unwrap());
+    let beside = image["beside"].as_u64().unwrap() as f64 / rays as f64;
+    assert!((light + beside - 1.0).abs() < 1e-9 && off < 0.01, "{image}");
+}
+
 /// The lenses of a front that cannot be saved are printed; lenses of a reservoir and images that
 /// could be saved are the result of this run, not of an earlier one.
 #[cfg(unix)]

@@ -59,6 +59,7 @@ mod picture_scenes;
 mod pictures;
 mod placed_points;
 mod plume;
+mod projected_light;
 mod pupil;
 mod pupil_limits;
 mod real_beam;

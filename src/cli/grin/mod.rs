@@ -13,11 +13,13 @@ use super::progress::{progress_bar, stop_flag};
 use crate::files::{self, Volume};
 use crate::grin_design::{self, GrinField, GrinOptimizer, GrinTask};
 use crate::measure::{Stopwatch, peak_megabytes, processor_ms};
+use crate::picture::{ProjectedView, ProjectionSettings};
 use crate::plot::Canvas;
 use crate::report::{plot_grin_field, plot_grin_image};
-use report::{GrinCostSummary, GrinReport, UnsavedField};
+use report::{GrinCostSummary, GrinReport, ImageReport, UnsavedField};
 use serde::Serialize;
 use std::fmt::{self, Display};
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use straight_rays::StraightRaySolver;
@@ -84,13 +86,14 @@ impl GrinArgs {
         // The field is saved before anything else is computed from it.
         let mut failures = Failures::default();
         let (volume, unsaved) = self.write_or_keep(&task, runner.best(), &mut failures);
-        let mut images = Vec::new();
-        failures.note(self.write_images(&task, runner.best(), &mut images));
+        let (mut images, mut shown) = (Vec::new(), Vec::new());
+        failures.note(self.write_images(&task, runner.best(), (&mut images, &mut shown)));
         let mut report =
             GrinReport::new(&runner, &GrinCostSummary { ms, processor_ms, memory, stopped })
                 .map_err(|error| CliError::Failed(format!("{}: {error}", source_name(name))))?;
         let nodes = runner.best().nodes();
         report.field = unsaved.map(UnsavedField::from);
+        report.images = shown;
         let lines = lines.map(|lines| lines.solve(source_name(name), &task, nodes, &stop));
         report.lines = lines.and_then(|lines| failures.note(lines)).flatten();
         if let Some(folder) = &self.png {
@@ -130,12 +133,13 @@ impl GrinArgs {
         }
     }
 
-    /// Writes the images until one fails; adds the paths to `written`.
+    /// Writes the images until one fails; adds the paths to `written`, and the numbers of the images of light to
+    /// `shown`.
     fn write_images(
         &self,
         task: &GrinTask,
         best: &GrinField,
-        written: &mut Vec<PathBuf>,
+        (written, shown): (&mut Vec<PathBuf>, &mut Vec<ImageReport>),
     ) -> Result<(), CliError> {
         let Some(folder) = &self.png else { return Ok(()) };
         let mut write = |name: String, canvas: &Canvas| -> Result<(), CliError> {
@@ -147,10 +151,17 @@ impl GrinArgs {
         for picture in plot_grin_field(task, best) {
             write(format!("{}.png", picture.name), &picture.canvas)?;
         }
-        let seen = task.report_views(best).map_err(|error| failed(&error))?;
-        for (i, (view, seen)) in task.views.iter().zip(&seen).enumerate() {
-            let Some(image) = &seen.image else { continue };
-            let canvas = plot_grin_image(&view.name, image, seen.result.psnr.unwrap_or(0.0));
+        let lights = task.image_light(best).map_err(|error| failed(&error))?;
+        for (i, (view, light)) in task.views.iter().zip(lights).enumerate() {
+            let Some(light) = light else { continue };
+            let clock = Stopwatch::start();
+            // Ctrl-C ends the search, whose result is then still shown.
+            let mut go_on = |_| ControlFlow::Continue(());
+            let seen = ProjectedView::new(best, light, &ProjectionSettings::default(), &mut go_on);
+            let seen = seen.map_err(|error| failed(&error))?;
+            let report = ImageReport::new(&view.name, &seen, 1e3 * clock.seconds());
+            let canvas = plot_grin_image(&view.name, &seen.image, &report.to_string());
+            shown.push(report);
             write(format!("view-{}.png", i + 1), &canvas)?;
         }
         Ok(())

@@ -1,12 +1,14 @@
 //! The report of a gradient-index design: result, limits, time and memory.
 
 use super::straight_rays::StraightRayResult;
+use crate::analysis::Estimate;
 use crate::cli::output::{ShortNumber, TextTable};
 use crate::files::{self, Volume};
 use crate::grin_design::{
     self, FieldDifference, FieldScore, GrinOptimizer, LimitCheck, ViewResult,
 };
 use crate::measure::MemoryUse;
+use crate::picture::ProjectedView;
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::fmt::{self, Display};
@@ -41,6 +43,9 @@ pub(super) struct GrinReport {
     ms: f64,
     processor_ms: Option<f64>,
     memory: Option<MemoryUse>,
+    /// The images that are written.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub(super) images: Vec<ImageReport>,
     pub(super) files: Vec<PathBuf>,
     /// The best field, if it could not be saved.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -77,6 +82,58 @@ struct ViewSummary {
     rays: usize,
     excluded: BTreeMap<&'static str, usize>,
     retrace_error: f64,
+}
+
+/// The image of a view as it is written, with its error by sampling.
+#[derive(Serialize)]
+pub(super) struct ImageReport {
+    view: String,
+    /// Peak signal to noise and correlation with the target, each with its error.
+    quality_db: [f64; 2],
+    correlation: [f64; 2],
+    /// The share of the light that lands on the image, and its error.
+    light: [f64; 2],
+    /// The error of the pixels as a share of the mean of the image; none of a black image.
+    error: Option<f64>,
+    /// True if that is as small as it was asked to be.
+    reached: bool,
+    rays: usize,
+    lost: BTreeMap<&'static str, usize>,
+    beside: usize,
+    ms: f64,
+}
+
+impl ImageReport {
+    pub(super) fn new(view: &str, seen: &ProjectedView, ms: f64) -> Self {
+        let pair = |found: Estimate| [found.value, found.error];
+        let light = &seen.light;
+        let lost = light.fates.iter().filter(|(fate, _)| !fate.has_arrived());
+        Self {
+            view: view.to_owned(),
+            quality_db: pair(seen.quality()),
+            correlation: pair(seen.correlation()),
+            light: pair(light.light()),
+            error: light.rms_error(),
+            reached: light.reached,
+            rays: light.rays,
+            lost: lost.map(|(fate, count)| (fate.name(), count)).collect(),
+            beside: light.beside,
+            ms,
+        }
+    }
+}
+
+impl Display for ImageReport {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { quality_db: [quality, off], correlation: [alike, unsure], .. } = self;
+        let Self { rays, ms, .. } = self;
+        let Some(error) = self.error else {
+            return write!(f, "no light on the screen by {rays} rays, {ms:.0} ms");
+        };
+        write!(f, "{quality:.2} ± {off:.2} dB, correlation {alike:.4} ± {unsure:.4}; ")?;
+        let short = if self.reached { "" } else { ", more than asked for" };
+        write!(f, "pixels ± {:.1} % of the mean{short}, {rays} rays, {ms:.0} ms", 100.0 * error)
+    }
 }
 
 /// A manufacturing limit and the extreme of the field.
@@ -147,6 +204,7 @@ impl GrinReport {
             ms: cost.ms,
             processor_ms: cost.processor_ms,
             memory: cost.memory,
+            images: Vec::new(),
             files: Vec::new(),
             field: None,
             stale: Vec::new(),
@@ -194,6 +252,7 @@ impl Display for GrinReport {
             ]);
         }
         write!(f, "{table}")?;
+        self.images.iter().try_for_each(|image| writeln!(f, "image {}: {image}", image.view))?;
         self.files.iter().try_for_each(|file| writeln!(f, "written: {}", file.display()))?;
         let Some(field) = &self.field else { return Ok(()) };
         let json = files::json::pretty(field);

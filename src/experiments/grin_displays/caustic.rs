@@ -5,15 +5,21 @@
 //! through the other (5.36 and 5.37). That loss does not ask for even brightness, so some parts are
 //! brighter than others.
 
-use super::{COLUMNS, EvaluatedField, independent_task, solve_and_evaluate, task};
-use crate::experiments::{
-    Claim, DataTable, Effort, Experiment, ExperimentError, ExperimentOutcome, ExperimentResult,
-    NamedPlot, ProgressFn, solve,
+use super::{
+    COLUMNS, EvaluatedField, SOLVING, independent_task, part_of, sampling_claims, settings,
+    solve_and_evaluate, task,
 };
-use crate::grin::{GrinTracer, RayExit, plan_tracing};
-use crate::grin_design::{GrinField, GrinTask, LightGoal};
+use crate::experiments::{
+    Claim, DataTable, Effort, Experiment, ExperimentError, ExperimentOutcome, ExperimentProgress,
+    ExperimentResult, NamedPlot, ProgressFn, solve,
+};
+use crate::grin::{Face, GrinSetup, GrinTracer, RayExit, plan_tracing};
+use crate::grin_design::{GrinField, GrinTask, LightGoal, SquareBeam};
+use crate::math::Vec3;
+use crate::picture::{LightProjection, ProjectedImage, screen_frame};
 use crate::plot::{Canvas, draw_image_row, gray_levels};
 use crate::report::plot_grin_field;
+use std::ops::ControlFlow;
 
 pub(in crate::experiments) const EXPERIMENT: Experiment = Experiment {
     id: "5.7",
@@ -48,9 +54,9 @@ fn run(effort: Effort, progress: &mut ProgressFn<'_>) -> ExperimentResult {
         [("caustic-near", NEAR), ("caustic-far", FAR)].into_iter().enumerate()
     {
         let part = [0, 1].map(|k| (i + k) as f64 / 3.0);
-        let evaluated = solve_and_evaluate(&task(name, effort, 2)?, part, progress)?;
+        let evaluated = solve_and_evaluate(&task(name, effort, 2)?, effort, part, progress)?;
         evaluated.rows(&mut table);
-        outcome.claims.extend(evaluated.claims(quality, correlation));
+        outcome.claims.extend(evaluated.claims([quality, correlation], effort));
         outcome.claims.extend(evaluated.manufacturability());
         outcome.pictures.extend(pictures_of(&evaluated, pictures));
         outcome.rays = outcome.rays.saturating_add(evaluated.rays());
@@ -78,7 +84,8 @@ fn rings(
     progress: &mut ProgressFn<'_>,
 ) -> ExperimentResult<()> {
     let task = task("caustic", effort, 2)?;
-    let optimizer = solve(&task, [2.0 / 3.0, 1.0], progress)?;
+    let part = [2.0 / 3.0, 1.0];
+    let optimizer = solve(&task, part_of(part, [0.0, SOLVING]), progress)?;
     let beam = ExitBeam::behind(&task, optimizer.best())?;
     let [full, test] = MISSED;
     let [near, far] = effort.select(full, test);
@@ -106,9 +113,13 @@ fn rings(
         }
     }
     outcome.tables.push(table);
-    outcome.pictures.push(NamedPlot { name: "planes", canvas: beam.draw() });
+    let part = part_of(part, [SOLVING, 1.0]);
+    let screens = beam.screens(optimizer.best(), effort, part, progress)?;
+    outcome.claims.extend(screens.iter().flat_map(|screen| screen.claims(effort)));
+    outcome.pictures.push(NamedPlot { name: "planes", canvas: draw(&screens) });
     let rays = usize::try_from(optimizer.rays_traced()).unwrap_or(usize::MAX);
-    outcome.rays = outcome.rays.saturating_add(rays).saturating_add(beam.all);
+    let rendering: usize = screens.iter().map(|screen| screen.light.rays + screen.again.rays).sum();
+    outcome.rays = outcome.rays.saturating_add(rays).saturating_add(beam.all + rendering);
     Ok(())
 }
 
@@ -117,6 +128,10 @@ fn rings(
 struct ExitBeam {
     rays: Vec<([f64; 2], [f64; 2])>,
     all: usize,
+    /// The light before the field, the way it is traced, and the z at which the field ends.
+    beam: SquareBeam,
+    setup: GrinSetup<f64>,
+    back: f64,
 }
 
 impl ExitBeam {
@@ -127,7 +142,7 @@ impl ExitBeam {
         let plan =
             plan_tracing(medium.index_field(), &space.region(), task.launch, &rays, TOLERANCE);
         let setup = plan?.setup;
-        let tracer = GrinTracer::new(medium.index_field(), setup)?;
+        let tracer = GrinTracer::new(medium.index_field(), setup.clone())?;
         let exits = tracer.trace_batch(&rays);
         let arrived = exits.iter().filter(|exit| exit.fate.has_arrived() && exit.v.z > 0.0);
         let back = space.corners()[1].z;
@@ -136,7 +151,10 @@ impl ExitBeam {
             let start = exit.x + v * (back - exit.x.z);
             ([start.x, start.y], [v.x, v.y])
         };
-        Ok(Self { rays: arrived.map(ray).collect(), all: rays.len() })
+        let beam = task.views[0].source.beam(space);
+        let beam =
+            beam.ok_or_else(|| ExperimentError::Failed("rings without a beam".to_owned()))?;
+        Ok(Self { rays: arrived.map(ray).collect(), all: rays.len(), beam, setup, back })
     }
 
     /// The positions of the rays at a distance behind the field.
@@ -154,40 +172,84 @@ impl ExitBeam {
         self.rays.iter().map(|(_, [u, v])| u.hypot(*v).atan().to_degrees()).collect()
     }
 
-    /// Draws the light on every screen, scaled to the ring, and at infinity.
-    fn draw(&self) -> Canvas {
-        let panel = |title: String, places: &[[f64; 2]]| {
-            let radii: Vec<f64> = places.iter().map(|[x, y]| x.hypot(*y)).collect();
-            let light = count_in_cells(places, ROOM * mean_and_deviation(&radii).0);
-            // A caustic has peaks that would make the rest black.
-            let evaluated: Vec<f64> = light.iter().map(|light| light.sqrt()).collect();
-            let peak = evaluated.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
-            (title, gray_levels(&evaluated, CELLS, peak))
+    /// The images on every screen, each scaled to its ring, and at infinity.
+    fn screens(
+        &self,
+        medium: &GrinField,
+        effort: Effort,
+        [from, to]: [f64; 2],
+        progress: &mut ProgressFn<'_>,
+    ) -> ExperimentResult<Vec<RingScreen>> {
+        let places = PLANES.into_iter().map(Some).chain([None]);
+        let count = PLANES.len() as f64 + 1.0;
+        let mut screen = |(i, place): (usize, Option<f64>)| {
+            let mut tell = |share: f64| {
+                let done = from + (to - from) * (i as f64 + share) / count;
+                progress(ExperimentProgress { done, doing: "rings by light onto screens" })
+            };
+            self.screen(medium, effort, place, &mut tell)
         };
-        let screens =
-            PLANES.iter().map(|plane| panel(format!("{plane} mm behind"), &self.positions(*plane)));
-        let slopes: Vec<[f64; 2]> = self.rays.iter().map(|(_, v)| *v).collect();
-        let panels: Vec<_> = screens.chain([panel("at infinity".to_owned(), &slopes)]).collect();
-        draw_image_row(
-            "the ring on screens behind the field, each scaled to its ring",
-            CELLS,
-            &panels,
-        )
+        places.enumerate().map(&mut screen).collect()
+    }
+
+    /// The image at a distance behind the field; at infinity if there is none.
+    fn screen(
+        &self,
+        medium: &GrinField,
+        effort: Effort,
+        distance: Option<f64>,
+        tell: &mut dyn FnMut(f64) -> ControlFlow<()>,
+    ) -> ExperimentResult<RingScreen> {
+        let slopes = || self.rays.iter().map(|(_, [u, v])| u.hypot(*v)).collect();
+        let radii: Vec<f64> = distance.map_or_else(slopes, |distance| self.radii(distance));
+        let frame = screen_frame(ROOM * mean_and_deviation(&radii).0, CELLS)?;
+        let plane = |distance| Face::plane(Vec3::new(0.0, 0.0, 1.0), self.back + distance);
+        let setup = GrinSetup { screen: distance.map(plane), ..self.setup.clone() };
+        let light = LightProjection::new(medium.index_field(), setup, self.beam, frame)?;
+        let mut render = |seed: u32, from: f64| {
+            let mut part = |share: f64| tell(from + 0.5 * share);
+            light.render(&settings(effort, seed), &mut part)
+        };
+        let [light, again] = [render(0, 0.0)?, render(1, 0.5)?];
+        // An image that was ended early is none.
+        if !(light.complete && again.complete) {
+            return Err(ExperimentError::Stopped);
+        }
+        let name = |distance| format!("{distance} mm behind");
+        let name = distance.map_or_else(|| "at infinity".to_owned(), name);
+        Ok(RingScreen { name, light, again })
     }
 }
 
-/// The number of points in each cell of a square, rows from the bottom.
-fn count_in_cells(places: &[[f64; 2]], half: f64) -> Vec<f64> {
-    let mut light = vec![0.0; CELLS * CELLS];
-    let cell = |x: f64| (x / half + 1.0) * 0.5 * CELLS as f64;
-    for place in places {
-        let [column, row] = place.map(cell);
-        let inside = |u: f64| u >= 0.0 && u < CELLS as f64;
-        if inside(column) && inside(row) {
-            light[row as usize * CELLS + column as usize] += 1.0;
-        }
+/// The image of a ring on a screen, and the same by other samples.
+struct RingScreen {
+    name: String,
+    light: ProjectedImage,
+    again: ProjectedImage,
+}
+
+impl RingScreen {
+    fn claims(&self, effort: Effort) -> [Claim; 2] {
+        sampling_claims(&format!("ring {}", self.name), [&self.light, &self.again], effort)
     }
-    light
+}
+
+/// Draws the light on every screen.
+fn draw(screens: &[RingScreen]) -> Canvas {
+    let panel = |screen: &RingScreen| {
+        // A caustic has peaks that would make the rest black.
+        let rows = screen.light.values.chunks(CELLS).rev();
+        let light: Vec<f64> = rows.flatten().map(|light| light.sqrt()).collect();
+        let peak = light.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
+        (screen.name.clone(), gray_levels(&light, CELLS, peak))
+    };
+    let panels: Vec<_> = screens.iter().map(panel).collect();
+    let errors = screens.iter().filter_map(|screen| screen.light.rms_error());
+    let error = 100.0 * errors.fold(0.0, f64::max);
+    let title = format!(
+        "the ring on screens behind the field, each scaled to its ring; sampling error {error:.1} % or less"
+    );
+    draw_image_row(&title, CELLS, &panels)
 }
 
 /// Mean and standard deviation.

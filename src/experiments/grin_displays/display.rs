@@ -23,10 +23,11 @@ const LEAST: [[f64; 2]; 2] = [[24.0, 0.97], [14.0, 0.75]];
 
 fn run(effort: Effort, progress: &mut ProgressFn<'_>) -> ExperimentResult {
     let task = task("display", effort, 2)?;
-    let evaluated = solve_and_evaluate(&task, [0.0, 1.0], progress)?;
+    let evaluated = solve_and_evaluate(&task, effort, [0.0, 1.0], progress)?;
     let [nodes, few] = NODES;
     let [least, less] = LEAST;
-    let mut outcome = outcome_of(&evaluated, &["face", "letter"], effort.select(least, less));
+    let names = ["face", "letter"];
+    let mut outcome = outcome_of(&evaluated, &names, effort.select(least, less), effort);
     let found = evaluated.optimizer.best().nodes();
     let says = "nodes along a side of the best field";
     outcome.claims.push(Claim::exactly(says, found as f64, effort.select(nodes, few) as f64));

@@ -1,14 +1,15 @@
 //! Figures 5.4 to 5.7: GRIN fields as displays, for one beam or for two.
 //!
 //! The optimization uses different rays in every step and none of those by which its result is
-//! evaluated here: more rays, traced with half of its step.
+//! evaluated here: those are traced with half of its step, and are as many as the error of an image
+//! needs.
 //!
-//! These images are not made by the renderer of pictures, and cannot be. That one follows light backwards: from a
-//! pixel, through the surfaces of a lens, into a scene that radiates in all directions. Here a beam has one direction
-//! at every point, which no ray that begins on the screen has but by chance, and light has to be followed forwards
-//! from the beam, through a field of indices without surfaces, and counted where it lands. The image is the very sum
-//! over rays that the loss is made of, so that what is shown is what was optimized; a second renderer would show
-//! something else. Shared with other pictures is how images are drawn in rows and in grey levels (`plot`).
+//! The images are pictures ([`picture`](crate::picture)), with the sampler and the law of error of those
+//! through a lens. Light is only followed the other way, from the beam onto the screen: a beam has one
+//! direction at every point, which no ray that begins in a pixel has but by chance. A pixel is the light
+//! on its area, where the loss spreads each ray over nine pixels so that it can be differentiated; the
+//! numbers of an image are those of its pixels, without the noise of sampling. Every image is rendered
+//! twice, with samples that are independent, to see that the stated errors cover the difference.
 
 pub(super) mod caustic;
 pub(super) mod display;
@@ -16,15 +17,25 @@ pub(super) mod multifocal;
 pub(super) mod resolution;
 
 use super::{
-    Claim, DataTable, Effort, ExperimentOutcome, ExperimentResult, NamedPlot, ProgressFn,
-    builtin_task, solve, solve_from,
+    Claim, DataTable, Effort, ExperimentError, ExperimentOutcome, ExperimentProgress,
+    ExperimentResult, NamedPlot, ProgressFn, builtin_task, solve, solve_from,
 };
-use crate::grin_design::{GrinField, GrinOptimizer, GrinTask, LightGoal, LightSource, ViewReport};
+use crate::grin_design::{
+    GrinField, GrinOptimizer, GrinTask, LightGoal, LightSource, LightView, ViewReport,
+};
+use crate::picture::{ProjectedImage, ProjectedView, ProjectionSettings, project_views};
 use crate::report::{plot_grin_field, plot_grin_image};
 
 /// The rays along a side of a beam in the evaluation, relative to the optimization.
 const FINER: f64 = 1.57;
-/// The largest fraction of excluded rays.
+/// The error of sampling that an image is rendered to as a share of its mean, in full and as a test.
+const SAMPLING: [f64; 2] = [0.02, 0.1];
+/// The largest difference of two independent images relative to what their errors allow: 1 and its
+/// own scatter, since an error from four replicates is known to a third of it for one pixel.
+const DIFFERENCE: f64 = 1.2;
+/// The share of the work that the optimization takes; the images take the rest.
+const SOLVING: f64 = 0.8;
+/// The largest fraction of lost rays.
 const LEFT_OUT: f64 = 1e-3;
 /// The tolerance of the lowest index for rounding.
 const ROUNDING: f64 = 1e-9;
@@ -60,32 +71,86 @@ fn independent_task(task: &GrinTask) -> GrinTask {
 /// A solved task with the images of its field by independent rays.
 struct EvaluatedField {
     optimizer: GrinOptimizer,
-    views: Vec<ViewReport>,
+    views: Vec<EvaluatedView>,
+}
+
+/// The image of a view by independent rays.
+struct EvaluatedView {
+    name: String,
+    picture: ProjectedView,
+    /// The same image by other samples.
+    again: ProjectedImage,
+    /// The largest change of an exit when the step is halved, in mm.
+    tracing_error: Option<f64>,
+}
+
+/// The part of a work between two shares of it.
+fn part_of([from, to]: [f64; 2], shares: [f64; 2]) -> [f64; 2] {
+    shares.map(|share| from + share * (to - from))
 }
 
 /// Solves a task, which is a part of the whole work, and evaluates it.
 fn solve_and_evaluate(
     task: &GrinTask,
+    effort: Effort,
     part: [f64; 2],
     progress: &mut ProgressFn<'_>,
 ) -> ExperimentResult<EvaluatedField> {
-    let optimizer = solve(task, part, progress)?;
-    let views = evaluate(task, optimizer.best())?;
+    let optimizer = solve(task, part_of(part, [0.0, SOLVING]), progress)?;
+    let rest = part_of(part, [SOLVING, 1.0]);
+    let views = evaluate(task, optimizer.best(), effort, rest, progress)?;
     Ok(EvaluatedField { optimizer, views })
 }
 
-/// Evaluates a field with rays that its optimization has not used.
-fn evaluate(task: &GrinTask, medium: &GrinField) -> ExperimentResult<Vec<ViewReport>> {
-    Ok(independent_task(task).report_views(medium)?)
+/// The settings of an image, by samples of their own.
+fn settings(effort: Effort, seed: u32) -> ProjectionSettings {
+    let [fine, coarse] = SAMPLING;
+    let tolerance = effort.select(fine, coarse);
+    ProjectionSettings { tolerance, seed, ..ProjectionSettings::default() }
+}
+
+/// Follows the light of a field with rays that its optimization has not used, onto every image.
+fn evaluate(
+    task: &GrinTask,
+    medium: &GrinField,
+    effort: Effort,
+    part: [f64; 2],
+    progress: &mut ProgressFn<'_>,
+) -> ExperimentResult<Vec<EvaluatedView>> {
+    let task = independent_task(task);
+    let reports = task.report_views(medium)?;
+    let mut project = |seed: u32, [from, to]: [f64; 2]| {
+        let mut tell = |share: f64| {
+            let done = from + share * (to - from);
+            progress(ExperimentProgress { done, doing: "images by light onto a screen" })
+        };
+        project_views(&task, medium, &settings(effort, seed), &mut tell)
+    };
+    let pictures = project(0, part_of(part, [0.0, 0.5]))?;
+    let again = project(1, part_of(part, [0.5, 1.0]))?;
+    let both = task.views.iter().zip(reports).zip(pictures.into_iter().zip(again));
+    let view = |((view, report), (picture, again)): (_, (Option<_>, Option<ProjectedView>))| {
+        let (view, report): (&LightView, ViewReport) = (view, report);
+        let (picture, again): (ProjectedView, _) = picture.zip(again)?;
+        let (name, again) = (view.name.clone(), again.light);
+        Some(EvaluatedView { name, picture, again, tracing_error: report.error })
+    };
+    let views: Vec<EvaluatedView> = both.filter_map(view).collect();
+    // An image that was ended early is none.
+    let is_whole = |view: &EvaluatedView| view.picture.light.complete && view.again.complete;
+    views.iter().all(is_whole).then_some(views).ok_or(ExperimentError::Stopped)
 }
 
 /// The columns of the table of views.
-const COLUMNS: [&str; 10] = [
+const COLUMNS: [&str; 13] = [
     "view",
     "nodes",
     "quality_db",
+    "quality_error_db",
     "correlation",
+    "correlation_error",
     "light",
+    "sampling_error",
     "rays",
     "left_out",
     "tracing_error_mm",
@@ -93,46 +158,89 @@ const COLUMNS: [&str; 10] = [
     "index_high",
 ];
 
+/// The claims that two independent images of the same light have the error that was asked for, and
+/// differ by no more than that.
+fn sampling_claims(name: &str, [image, again]: [&ProjectedImage; 2], effort: Effort) -> [Claim; 2] {
+    let [fine, coarse] = SAMPLING;
+    let error = image.rms_error().unwrap_or(f64::INFINITY);
+    let says = format!("{name}: error of sampling, relative to the mean of the image");
+    let sampled = Claim::at_most(says, error, effort.select(fine, coarse));
+    let says = format!("{name}: difference of an independent image, relative to the stated errors");
+    [sampled, Claim::at_most(says, image.difference(again), DIFFERENCE)]
+}
+
+impl EvaluatedView {
+    /// The claims about the image: its quality, its correlation, few lost rays, and its error.
+    fn claims(&self, [quality, correlation]: [f64; 2], effort: Effort) -> Vec<Claim> {
+        let Self { name, picture, again, .. } = self;
+        let light = &picture.light;
+        let found = picture.quality();
+        let says = format!("{name}: peak signal to noise, by independent rays");
+        let good =
+            Claim::at_least(says, found.value, quality).in_unit("dB").with_error(found.error);
+        let found = picture.correlation();
+        let says = format!("{name}: correlation with the target");
+        let alike = Claim::at_least(says, found.value, correlation).with_error(found.error);
+        let says = format!("{name}: fraction of lost rays");
+        let kept = Claim::at_most(says, light.lost_share(), LEFT_OUT);
+        let mut claims = vec![good, alike, kept];
+        claims.extend(sampling_claims(name, [light, again], effort));
+        claims
+    }
+
+    /// The plot of the image beside its target.
+    fn plot(&self, name: &'static str) -> NamedPlot {
+        let image = &self.picture.image;
+        let canvas = plot_grin_image(name, image, &self.numbers());
+        NamedPlot { name, canvas }
+    }
+
+    /// Quality, correlation and error, in one line.
+    fn numbers(&self) -> String {
+        let [quality, correlation] = [self.picture.quality(), self.picture.correlation()];
+        let error = self.picture.light.rms_error().map_or("none".to_owned(), |error| {
+            format!("{:.1} % by {} rays", 100.0 * error, self.picture.light.rays)
+        });
+        format!(
+            "{:.1} ± {:.1} dB, correlation {:.3}; sampling error {error}",
+            quality.value, quality.error, correlation.value
+        )
+    }
+
+    /// The number of rays followed.
+    fn rays(&self) -> usize {
+        self.picture.light.rays + self.again.rays
+    }
+}
+
 impl EvaluatedField {
     /// Adds a row for every image.
     fn rows(&self, table: &mut DataTable) {
-        let task = self.optimizer.task();
-        let extremes = task.extremes(self.optimizer.best());
-        for (view, views) in task.views.iter().zip(&self.views) {
-            let Some(image) = &views.image else { continue };
-            let counts = views.result.counts;
+        let extremes = self.optimizer.task().extremes(self.optimizer.best());
+        for view in &self.views {
+            let [quality, correlation] = [view.picture.quality(), view.picture.correlation()];
+            let light = &view.picture.light;
             table.push_row([
                 view.name.clone().into(),
                 self.optimizer.best().nodes().into(),
-                views.result.psnr.unwrap_or(f64::NAN).into(),
-                image.correlation().into(),
-                image.light_share().into(),
-                counts.fates.total().into(),
-                (counts.fates.total() - counts.valid()).into(),
-                views.error.unwrap_or(f64::NAN).into(),
+                quality.value.into(),
+                quality.error.into(),
+                correlation.value.into(),
+                correlation.error.into(),
+                light.mean().into(),
+                light.rms_error().unwrap_or(f64::NAN).into(),
+                light.rays.into(),
+                light.lost_share().into(),
+                view.tracing_error.unwrap_or(f64::NAN).into(),
                 extremes.low.into(),
                 extremes.high.into(),
             ]);
         }
     }
 
-    /// The claims about every image: its quality, its correlation, and few excluded rays.
-    fn claims(&self, quality: f64, correlation: f64) -> Vec<Claim> {
-        let mut claims = Vec::new();
-        for (view, views) in self.optimizer.task().views.iter().zip(&self.views) {
-            let Some(image) = &views.image else { continue };
-            let name = &view.name;
-            let found = views.result.psnr.unwrap_or(f64::NAN);
-            let says = format!("{name}: peak signal to noise, by independent rays");
-            claims.push(Claim::at_least(says, found, quality).in_unit("dB"));
-            let says = format!("{name}: correlation with the target");
-            claims.push(Claim::at_least(says, image.correlation(), correlation));
-            let counts = views.result.counts;
-            let left_out = 1.0 - counts.valid() as f64 / counts.fates.total() as f64;
-            let says = format!("{name}: fraction of excluded rays");
-            claims.push(Claim::at_most(says, left_out, LEFT_OUT));
-        }
-        claims
+    /// The claims about every image.
+    fn claims(&self, limits: [f64; 2], effort: Effort) -> Vec<Claim> {
+        self.views.iter().flat_map(|view| view.claims(limits, effort)).collect()
     }
 
     /// The claims that the field can be manufactured.
@@ -148,31 +256,28 @@ impl EvaluatedField {
 
     /// The plots of its images beside the target images.
     fn pictures(&self, names: &[&'static str]) -> Vec<NamedPlot> {
-        let images = self.views.iter().filter_map(|views| Some((views, views.image.as_ref()?)));
-        let picture = |((views, image), name): ((&ViewReport, _), &&'static str)| {
-            let quality = views.result.psnr.unwrap_or(f64::NAN);
-            let canvas = plot_grin_image(name, image, quality);
-            NamedPlot { name, canvas }
-        };
-        images.zip(names).map(picture).collect()
+        self.views.iter().zip(names).map(|(view, name)| view.plot(name)).collect()
     }
 
     /// The number of rays traced forwards.
     fn rays(&self) -> usize {
-        let judging: usize = self.views.iter().map(|views| views.result.counts.fates.total()).sum();
-        usize::try_from(self.optimizer.rays_traced()).unwrap_or(usize::MAX).saturating_add(judging)
+        let rendering: usize = self.views.iter().map(EvaluatedView::rays).sum();
+        usize::try_from(self.optimizer.rays_traced())
+            .unwrap_or(usize::MAX)
+            .saturating_add(rendering)
     }
 }
 
-/// The outcome of one field that shows images.
+/// The outcome of one field that shows images of at least some quality in dB and correlation.
 fn outcome_of(
     evaluated: &EvaluatedField,
     names: &[&'static str],
-    [quality, correlation]: [f64; 2],
+    limits: [f64; 2],
+    effort: Effort,
 ) -> ExperimentOutcome {
     let mut table = DataTable::new("views", &COLUMNS);
     evaluated.rows(&mut table);
-    let mut claims = evaluated.claims(quality, correlation);
+    let mut claims = evaluated.claims(limits, effort);
     claims.extend(evaluated.manufacturability());
     let mut pictures = evaluated.pictures(names);
     pictures.extend(plot_grin_field(evaluated.optimizer.task(), evaluated.optimizer.best()));

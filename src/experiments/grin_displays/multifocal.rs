@@ -8,6 +8,7 @@
 
 use super::{EvaluatedField, outcome_of, solve_and_evaluate, task};
 use crate::experiments::{Claim, Effort, Experiment, ExperimentResult, ProgressFn};
+use crate::grin_design::ViewImage;
 
 pub(in crate::experiments) const EXPERIMENT: Experiment = Experiment {
     id: "5.6",
@@ -23,10 +24,10 @@ const LEAST: [[f64; 2]; 2] = [[23.0, 0.9], [16.0, 0.6]];
 
 fn run(effort: Effort, progress: &mut ProgressFn<'_>) -> ExperimentResult {
     let task = task("multifocal", effort, 2)?;
-    let evaluated = solve_and_evaluate(&task, [0.0, 1.0], progress)?;
+    let evaluated = solve_and_evaluate(&task, effort, [0.0, 1.0], progress)?;
     let [least, less] = LEAST;
     let names = ["front", "middle", "back"];
-    let mut outcome = outcome_of(&evaluated, &names, effort.select(least, less));
+    let mut outcome = outcome_of(&evaluated, &names, effort.select(least, less), effort);
     // The coarse field of a test is too smooth for images that differ that much.
     if effort == Effort::Full {
         outcome.claims.extend(own_plane_claims(&evaluated));
@@ -36,18 +37,20 @@ fn run(effort: Effort, progress: &mut ProgressFn<'_>) -> ExperimentResult {
 
 /// The claims that every image resembles the target of its own plane more than that of any other.
 fn own_plane_claims(evaluated: &EvaluatedField) -> Vec<Claim> {
-    let images: Vec<_> = evaluated.views.iter().filter_map(|views| views.image.as_ref()).collect();
-    let views = &evaluated.optimizer.task().views;
-    let off = |a: usize, b: usize| {
-        let pairs = images[a].formed.iter().zip(&images[b].target);
+    let views = &evaluated.views;
+    let off = |image: &ViewImage, target: usize| {
+        let pairs = image.formed.iter().zip(&views[target].picture.image.target);
         pairs.map(|(made, wanted)| (made - wanted) * (made - wanted)).sum::<f64>()
     };
     let claim = |i: usize| {
-        let others = (0..images.len()).filter(|k| *k != i).map(|k| off(i, k));
-        let nearest = others.fold(f64::INFINITY, f64::min);
+        let ratio = |image: &ViewImage| {
+            let others = (0..views.len()).filter(|k| *k != i).map(|k| off(image, k));
+            others.fold(f64::INFINITY, f64::min) / off(image, i)
+        };
+        let found = views[i].picture.estimate(ratio);
         let name = &views[i].name;
         let says = format!("{name}: difference from another plane's target, relative to its own");
-        Claim::at_least(says, nearest / off(i, i), 1.0)
+        Claim::at_least(says, found.value, 1.0).with_error(found.error)
     };
-    (0..images.len()).map(claim).collect()
+    (0..views.len()).map(claim).collect()
 }

@@ -6,12 +6,13 @@
 //! rough fields it misleads the optimization, and the smoothed one is better. A spline has no
 //! jumps.
 
-use super::{evaluate, reduced, solve_from};
+use super::{EvaluatedView, SOLVING, evaluate, part_of, reduced, sampling_claims, solve_from};
+use crate::analysis::Estimate;
 use crate::experiments::{
     Claim, DataTable, Effort, Experiment, ExperimentError, ExperimentOutcome, ExperimentResult,
     NamedPlot, ProgressFn, builtin_task, report_progress,
 };
-use crate::grin_design::{FieldRepresentation, GrinOptimizer, GrinTask, ViewImage, ViewReport};
+use crate::grin_design::{FieldRepresentation, GrinOptimizer, GrinTask};
 use crate::plot::{Axis, Canvas, Chart, Legend, PALETTE, Stroke, draw_image_row, gray_levels};
 
 pub(in crate::experiments) const EXPERIMENT: Experiment = Experiment {
@@ -66,7 +67,7 @@ impl InterpolationKind {
 struct ResolutionRow {
     kind: InterpolationKind,
     optimizer: GrinOptimizer,
-    views: ViewReport,
+    view: EvaluatedView,
 }
 
 impl ResolutionRow {
@@ -74,12 +75,15 @@ impl ResolutionRow {
         self.optimizer.current().nodes()
     }
 
-    fn quality(&self) -> f64 {
-        self.views.result.psnr.unwrap_or(f64::NAN)
+    /// The claims about the error of the image.
+    fn sampling_claims(&self, effort: Effort) -> [Claim; 2] {
+        let name = format!("{}, {} nodes", self.kind.name(), self.nodes());
+        sampling_claims(&name, [&self.view.picture.light, &self.view.again], effort)
     }
 
-    fn image(&self) -> Option<&ViewImage> {
-        self.views.image.as_ref()
+    /// The peak signal to noise in dB.
+    fn quality(&self) -> Estimate {
+        self.view.picture.quality()
     }
 }
 
@@ -91,12 +95,13 @@ fn run(effort: Effort, progress: &mut ProgressFn<'_>) -> ExperimentResult {
     for kind in KINDS {
         for levels in 1..=task.levels.len() {
             let part = [0, 1].map(|i| (rows.len() + i) as f64 / count as f64);
-            rows.push(find(&task, kind, levels, part, progress)?);
+            rows.push(find(&task, (kind, levels), effort, part, progress)?);
         }
     }
     let mut outcome =
         ExperimentOutcome { claims: claims(&rows, effort), ..ExperimentOutcome::default() };
-    outcome.rays = rows.iter().map(|row| row.optimizer.rays_traced() as usize).sum();
+    let rays = |row: &ResolutionRow| row.optimizer.rays_traced() as usize + row.view.rays();
+    outcome.rays = rows.iter().map(rays).sum();
     outcome.tables.push(table(&rows));
     outcome.pictures.push(NamedPlot { name: "quality", canvas: chart(&rows) });
     outcome.pictures.push(NamedPlot { name: "images", canvas: images(&rows) });
@@ -106,8 +111,8 @@ fn run(effort: Effort, progress: &mut ProgressFn<'_>) -> ExperimentResult {
 /// Solves the first levels of a task, with one of its views.
 fn find(
     task: &GrinTask,
-    kind: InterpolationKind,
-    levels: usize,
+    (kind, levels): (InterpolationKind, usize),
+    effort: Effort,
     part: [f64; 2],
     progress: &mut ProgressFn<'_>,
 ) -> ExperimentResult<ResolutionRow> {
@@ -121,11 +126,12 @@ fn find(
     let optimizer = GrinOptimizer::new(&task)?;
     let optimizer =
         if kind == InterpolationKind::Exact { optimizer.with_exact_hessian() } else { optimizer };
-    let optimizer = solve_from(optimizer, part, progress)?;
-    let views = evaluate(&task, optimizer.current())?;
+    let optimizer = solve_from(optimizer, part_of(part, [0.0, SOLVING]), progress)?;
+    let rest = part_of(part, [SOLVING, 1.0]);
+    let views = evaluate(&task, optimizer.current(), effort, rest, progress)?;
     let first = views.into_iter().next();
-    let views = first.ok_or_else(|| ExperimentError::Failed("a task without views".to_owned()))?;
-    Ok(ResolutionRow { kind, optimizer, views })
+    let view = first.ok_or_else(|| ExperimentError::Failed("a task without images".to_owned()))?;
+    Ok(ResolutionRow { kind, optimizer, view })
 }
 
 fn rows_of(rows: &[ResolutionRow], kind: InterpolationKind) -> Vec<&ResolutionRow> {
@@ -139,34 +145,51 @@ fn claims(rows: &[ResolutionRow], effort: Effort) -> Vec<Claim> {
             let name = kind.name();
             let says =
                 format!("{name}: gain from {} to {} nodes", pair[0].nodes(), pair[1].nodes());
-            let gain = pair[1].quality() - pair[0].quality();
-            claims.push(Claim::at_least(says, gain, GAIN).in_unit("dB"));
+            let gain = gain(says, [pair[0].quality(), pair[1].quality()], GAIN);
+            claims.push(gain);
         }
     }
-    let last =
-        |kind: InterpolationKind| rows_of(rows, kind).last().map_or(f64::NAN, |row| row.quality());
+    let unknown = Estimate::new(f64::NAN, 0.0, 0);
+    let last = |kind| rows_of(rows, kind).last().map_or(unknown, |row| row.quality());
     let [exact, smoothed, tricubic] = KINDS.map(last);
     let nodes = rows.last().map_or(0, ResolutionRow::nodes);
     let [far, near] = SMOOTHER;
     let says = format!("gain of tricubic splines over trilinear grids, {nodes} nodes");
-    let gain = Claim::at_least(says, tricubic - smoothed, effort.select(far, near));
-    claims.push(gain.in_unit("dB"));
+    claims.push(gain(says, [smoothed, tricubic], effort.select(far, near)));
     let says = format!("gain of the smoothed Hessian over the exact one, {nodes} nodes");
-    let gain = Claim::at_least(says, smoothed - exact, effort.select(SMOOTHED, -SMOOTHED));
-    claims.push(gain.in_unit("dB"));
+    claims.push(gain(says, [exact, smoothed], effort.select(SMOOTHED, -SMOOTHED)));
+    claims.extend(rows.iter().flat_map(|row| row.sampling_claims(effort)));
     claims
 }
 
+/// The claim that a quality in dB exceeds another one.
+fn gain(says: String, [less, more]: [Estimate; 2], limit: f64) -> Claim {
+    let gain = Claim::at_least(says, more.value - less.value, limit).in_unit("dB");
+    gain.with_error(more.error.hypot(less.error))
+}
+
 fn table(rows: &[ResolutionRow]) -> DataTable {
-    let columns = ["field", "nodes", "numbers", "quality_db", "correlation", "steps", "rays"];
+    let columns = [
+        "field",
+        "nodes",
+        "numbers",
+        "quality_db",
+        "quality_error_db",
+        "correlation",
+        "sampling_error",
+        "steps",
+        "rays",
+    ];
     let mut table = DataTable::new("resolutions", &columns);
     for row in rows {
         table.push_row([
             row.kind.name().into(),
             row.nodes().into(),
             row.optimizer.current().index_field().parameters().len().into(),
-            row.quality().into(),
-            row.image().map_or(f64::NAN, ViewImage::correlation).into(),
+            row.quality().value.into(),
+            row.quality().error.into(),
+            row.view.picture.correlation().value.into(),
+            row.view.picture.light.rms_error().unwrap_or(f64::NAN).into(),
             row.optimizer.steps().into(),
             (row.optimizer.rays_traced() as usize).into(),
         ]);
@@ -175,7 +198,7 @@ fn table(rows: &[ResolutionRow]) -> DataTable {
 }
 
 fn chart(rows: &[ResolutionRow]) -> Canvas {
-    let place = |row: &ResolutionRow| [row.nodes() as f64, row.quality()];
+    let place = |row: &ResolutionRow| [row.nodes() as f64, row.quality().value];
     let mut canvas = Canvas::new([1400, 760]);
     let x = Axis::linear("nodes along a side", rows.iter().map(|row| place(row)[0]));
     let y = Axis::linear("peak signal to noise, dB", rows.iter().map(|row| place(row)[1]));
@@ -193,15 +216,19 @@ fn chart(rows: &[ResolutionRow]) -> Canvas {
 /// Draws the images of the tricubic fields and the target image.
 fn images(rows: &[ResolutionRow]) -> Canvas {
     let rows = rows_of(rows, InterpolationKind::Tricubic);
-    let all: Vec<(&ResolutionRow, &ViewImage)> =
-        rows.into_iter().filter_map(|row| Some((row, row.image()?))).collect();
-    let Some((_, first)) = all.first() else { return Canvas::new([640, 480]) };
+    let Some(first) = rows.first().map(|row| &row.view.picture.image) else {
+        return Canvas::new([640, 480]);
+    };
     let peak = first.target.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
-    let panel = |(row, image): &(&ResolutionRow, &ViewImage)| {
-        let title = format!("{} nodes, {:.1} dB", row.nodes(), row.quality());
+    let panel = |row: &&ResolutionRow| {
+        let title = format!("{} nodes, {:.1} dB", row.nodes(), row.quality().value);
+        let image = &row.view.picture.image;
         (title, gray_levels(&image.formed, image.pixels, peak))
     };
-    let mut panels: Vec<_> = all.iter().map(panel).collect();
+    let mut panels: Vec<_> = rows.iter().map(panel).collect();
     panels.push(("target".to_owned(), gray_levels(&first.target, first.pixels, peak)));
-    draw_image_row("tricubic fields", first.pixels, &panels)
+    let errors = rows.iter().filter_map(|row| row.view.picture.light.rms_error());
+    let error = 100.0 * errors.fold(0.0, f64::max);
+    let title = format!("tricubic fields; sampling error {error:.1} % or less");
+    draw_image_row(&title, first.pixels, &panels)
 }

@@ -110,8 +110,7 @@ impl Screen {
 
     /// The peak signal-to-noise ratio of that difference, in dB.
     pub(super) fn psnr(&self, difference: f64) -> f64 {
-        let peak = self.wanted.iter().copied().fold(0.0, f64::max);
-        10.0 * (peak * peak / difference).log10()
+        peak_signal_to_noise(&self.wanted, difference)
     }
 
     /// The derivative of that difference with respect to the exit of a ray.
@@ -141,6 +140,12 @@ impl Screen {
     }
 }
 
+/// The peak signal-to-noise ratio of a mean squared difference from a target, in dB.
+pub(in crate::grin_design) fn peak_signal_to_noise(target: &[f64], difference: f64) -> f64 {
+    let peak = target.iter().copied().fold(0.0, f64::max);
+    10.0 * (peak * peak / difference).log10()
+}
+
 /// The plane behind the domain in which the light of a view is evaluated; `None` for its boundary
 /// or infinity.
 pub(super) fn screen_face(view: &LightView, space: Domain) -> Option<Face<f64>> {
@@ -153,7 +158,7 @@ pub(super) fn screen_face(view: &LightView, space: Domain) -> Option<Face<f64>> 
 }
 
 /// The image screen of a view.
-pub(super) fn image_screen(
+pub(in crate::grin_design) fn image_screen(
     view: &LightView,
     space: Domain,
 ) -> Result<Option<Screen>, GrinTaskError> {

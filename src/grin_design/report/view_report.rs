@@ -5,6 +5,7 @@ use crate::grin::{GrinRay, GrinSetup, GrinTracer, IndexField, Integrator, RayExi
 use crate::grin_design::GrinTaskError;
 use crate::grin_design::evaluation::loss::ViewResult;
 use crate::grin_design::evaluation::outcome::is_valid;
+use crate::grin_design::evaluation::screen::peak_signal_to_noise;
 use crate::grin_design::evaluation::targets::measure_targets;
 use crate::grin_design::evaluation::views::{ViewRays, plan_views, view_rays};
 use crate::grin_design::field::GrinField;
@@ -93,6 +94,13 @@ fn step_error(
 }
 
 impl ViewImage {
+    /// The peak signal-to-noise ratio in dB: the square of the target's peak over the mean squared
+    /// difference of image and target.
+    pub fn psnr(&self) -> f64 {
+        let squares = self.formed.iter().zip(&self.target).map(|(a, b)| (a - b) * (a - b));
+        peak_signal_to_noise(&self.target, squares.sum::<f64>() / self.formed.len() as f64)
+    }
+
     /// The fraction of the light that falls on the screen.
     pub fn light_share(&self) -> f64 {
         mean(&self.formed)
@@ -133,5 +141,7 @@ mod tests {
         assert!((of(wanted.iter().map(|w| 2.0 - w).collect()).correlation() + 1.0).abs() < 1e-12);
         assert_eq!(of(vec![0.5; 4]).correlation(), 0.0);
         assert_eq!(of(vec![0.5; 4]).light_share(), 0.5);
+        let off = of(wanted.iter().map(|w| w + 0.175).collect());
+        assert!((off.psnr() - 20.0).abs() < 1e-12, "a tenth of the peak: {}", off.psnr());
     }
 }

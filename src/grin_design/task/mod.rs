@@ -10,6 +10,7 @@ mod task_file;
 mod validate;
 
 pub use builtin::{BUILTIN_TASKS, BuiltinTask, find_builtin, read_task};
+pub use source::SquareBeam;
 pub use target_image::TargetImage;
 pub use task_file::TaskFile;
 

@@ -28,6 +28,37 @@ pub(in crate::grin_design) struct SourceRay {
     pub(in crate::grin_design) antipode: Vec3<f64>,
 }
 
+/// A square of parallel light of even density, which begins in a plane before the origin.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SquareBeam {
+    /// The unit direction of the light.
+    pub direction: Vec3<f64>,
+    /// The unit vectors along the sides of the square, perpendicular to the direction: to the right
+    /// and upwards for an eye that looks against the light.
+    pub axes: [Vec3<f64>; 2],
+    /// Half the side, in mm.
+    pub half: f64,
+    /// The distance of the plane before the origin, in mm.
+    pub back: f64,
+}
+
+impl SquareBeam {
+    /// A square about the line through the origin in a direction of any length but 0; half the side
+    /// and the distance of the plane in mm.
+    pub fn new(direction: Vec3<f64>, half: f64, back: f64) -> Self {
+        let direction = unit(direction);
+        Self { direction, axes: orthogonal_axes(direction), half, back }
+    }
+
+    /// The ray that begins at a place of the square, which counts from 0 to 1 to the right and
+    /// upwards.
+    pub fn ray(&self, place: [f64; 2]) -> GrinRay<f64> {
+        let [u, v] = self.axes;
+        let [right, up] = place.map(|share| self.half * (2.0 * share - 1.0));
+        GrinRay { x: u * right + v * up - self.direction * self.back, v: self.direction }
+    }
+}
+
 impl SourceDirections {
     /// Unit vectors.
     fn unit_vectors(&self, set: RaySet) -> Vec<Vec3<f64>> {
@@ -66,6 +97,12 @@ impl LightSource {
     pub(in crate::grin_design) fn axis(&self) -> Option<Vec3<f64>> {
         let Self::Beam { direction: [x, y, z], .. } = self else { return None };
         Some(unit(Vec3::new(*x, *y, *z)))
+    }
+
+    /// The square of a beam that lights a domain; `None` for other sources.
+    pub fn beam(&self, space: Domain) -> Option<SquareBeam> {
+        let Self::Beam { direction: [x, y, z], half, .. } = self else { return None };
+        Some(SquareBeam::new(Vec3::new(*x, *y, *z), *half, space.diameter()))
     }
 
     /// True if its rays differ from step to step.
@@ -108,8 +145,8 @@ impl LightSource {
                     RaySet::Step(step) if *fresh => (step + 1) * rays * rays,
                     RaySet::Step(_) | RaySet::Scoring => 0,
                 };
-                let d = unit(Vec3::new(*x, *y, *z));
-                square(d, *half, *rays, (space.diameter(), first))
+                let beam = SquareBeam::new(Vec3::new(*x, *y, *z), *half, space.diameter());
+                square(&beam, *rays, first)
             }
         }
     }
@@ -153,13 +190,12 @@ fn ray_cone(
 
 /// A square beam, one ray in each cell of a grid; the positions in the cells follow a sequence from
 /// its member `first` on.
-fn square(d: Vec3<f64>, half: f64, side: usize, (back, first): (f64, usize)) -> Vec<SourceRay> {
-    let [u, v] = orthogonal_axes(d);
+fn square(beam: &SquareBeam, side: usize, first: usize) -> Vec<SourceRay> {
     let ray = |n: usize| {
         let (a, b) = square_sequence(first + n);
-        let at = |i: usize, jitter: f64| half * (2.0 * (i as f64 + jitter) / side as f64 - 1.0);
-        let x = u * at(n % side, a) + v * at(n / side, b) - d * back;
-        SourceRay { ray: GrinRay { x, v: d }, antipode: d }
+        let at = |i: usize, jitter: f64| (i as f64 + jitter) / side as f64;
+        let ray = beam.ray([at(n % side, a), at(n / side, b)]);
+        SourceRay { ray, antipode: beam.direction }
     };
     (0..side * side).map(ray).collect()
 }

@@ -1,25 +1,28 @@
 //! The gradient-index field of a session: a task that is designed in the background or a volume, and
 //! the slices and images that show it.
 //!
-//! Three threads share the work: one takes the steps of the design, one computes slices, one traces
-//! all light of the task. Nothing is open at first, and nothing is computed while no panel shows it.
+//! Four threads share the work: one takes the steps of the design, one computes slices, one traces
+//! all light of the task, one renders the images of a field at rest. Nothing is open at first, and nothing is computed while no panel shows it.
 
 mod backup;
 mod contour;
 mod document;
 mod engine;
+mod pictures;
 mod slice;
 
 pub use contour::Contour;
 pub use document::{DocumentSource, GrinDocument};
 pub(super) use engine::GrinExport;
 pub use engine::{GrinRun, LossSample, MAX_NODES};
+pub use pictures::GrinPictures;
 pub use slice::{IndexProfile, Slice, SliceQuantity, SliceSettings};
 
 use super::clock::{Throttle, Timed, time};
 use super::run::{BackgroundRun, LatestRequestWorker, RunEvent, RunStatus, RunView};
 use crate::grin_design::{GrinField, ViewReport};
 use engine::{GrinEngine, GrinInput, GrinRequest};
+use pictures::PictureWorker;
 use serde::{Deserialize, Serialize};
 use slice::{SliceRequest, compute_slice};
 use std::io;
@@ -58,6 +61,9 @@ pub struct GrinView {
     pub slice: Option<Arc<Result<Slice, String>>>,
     /// The light of the task, maybe of an earlier step; or the reason why it cannot be traced.
     pub analysis: Option<Arc<Result<GrinAnalysis, String>>>,
+    /// The rendered images of the field that the newest analysis is of, once it is at rest; or the
+    /// reason why there are none.
+    pub pictures: Option<Arc<Result<GrinPictures, String>>>,
 }
 
 /// The gradient-index field of a session.
@@ -67,6 +73,7 @@ pub(super) struct GrinState {
     slices: LatestRequestWorker<SliceRequest, Result<Slice, String>>,
     analyses:
         LatestRequestWorker<(Arc<GrinDocument>, Arc<GrinField>), Result<GrinAnalysis, String>>,
+    pictures: PictureWorker,
     writing: bool,
     slice_settings: SliceSettings,
     is_active: bool,
@@ -87,7 +94,8 @@ impl GrinState {
         Ok(Self {
             run: BackgroundRun::spawn(wake.clone(), open)?,
             slices: LatestRequestWorker::spawn_function("slice", wake.clone(), slice)?,
-            analyses: LatestRequestWorker::spawn_function("light", wake, analyze)?,
+            analyses: LatestRequestWorker::spawn_function("light", wake.clone(), analyze)?,
+            pictures: PictureWorker::spawn(wake)?,
             writing: false,
             slice_settings: SliceSettings::default(),
             is_active: false,
@@ -156,6 +164,7 @@ impl GrinState {
     fn reset_requests(&mut self) {
         self.requested_slice = None;
         self.requested_field = None;
+        self.pictures.reset();
     }
 
     /// The events of the document and its design since the last call.
@@ -192,6 +201,10 @@ impl GrinState {
             self.slices.request(request);
         }
         self.request_analysis(&run);
+        let has_task = run.document.task.is_some();
+        if has_task && self.run.status() != RunStatus::Running {
+            self.pictures.request(&run.document, &run.field);
+        }
     }
 
     /// Requests the light of the task: seldom while the field changes all the time.
@@ -214,13 +227,16 @@ impl GrinState {
             run.snapshot.as_ref().is_some_and(|run| Arc::ptr_eq(&slice.document, &run.document))
         };
         let slice = self.slices.latest().filter(|_| self.requested_slice.is_some());
+        let analysis = self.analysis();
+        let seen = analysis.as_deref().and_then(|analysis| analysis.as_ref().ok());
         GrinView {
+            pictures: seen.and_then(|analysis| self.pictures.of(&analysis.field)),
             opening: self.run.is_starting(),
             writing: self.writing,
             slice_settings: self.slice_settings,
             is_active: self.is_active,
             slice: slice.filter(|slice| slice.as_ref().as_ref().map_or(true, is_shown)),
-            analysis: self.analysis(),
+            analysis,
             run,
         }
     }

@@ -1,4 +1,5 @@
-//! The images of all views that make one, each beside its target.
+//! The images of all views that make one, each beside its target: as the loss sees them while a design takes steps,
+//! and rendered, with their error, once the field rests.
 
 use egui::{
     Color32, ColorImage, Image as Shown, RichText, TextureHandle, TextureOptions, Ui, vec2,
@@ -6,14 +7,19 @@ use egui::{
 
 use super::text;
 use crate::grin_design::ViewImage;
-use crate::session::{GrinAnalysis, GrinRun, SessionView};
+use crate::picture::ProjectedView;
+use crate::session::{GrinAnalysis, GrinPictures, GrinRun, SessionView};
 use crate::studio::cached::{ByAddress, Cached};
 
 /// The images as textures.
 #[derive(Default)]
 pub(super) struct ViewImages {
-    pairs: Cached<ByAddress<Result<GrinAnalysis, String>>, Vec<ImagePair>>,
+    pairs: Cached<ImageKey, Vec<ImagePair>>,
 }
+
+/// The light that is shown: that of the loss, and the rendered images.
+type ImageKey =
+    (ByAddress<Result<GrinAnalysis, String>>, Option<ByAddress<Result<GrinPictures, String>>>);
 
 /// The target image and the resulting image of a view.
 struct ImagePair {
@@ -35,7 +41,10 @@ impl ViewImages {
             return;
         };
         let Ok(analysis) = source.as_ref() else { return };
-        let pairs = self.pairs.get(source.into(), |_| image_pairs(ui, analysis));
+        let rendered = view.grin.pictures.as_ref();
+        let pictures = rendered.and_then(|pictures| pictures.as_ref().as_ref().ok());
+        let key = (source.into(), rendered.map(ByAddress::from));
+        let pairs = self.pairs.get(key, |_| image_pairs(ui, analysis, pictures));
         if pairs.is_empty() {
             ui.weak("No view of this task makes an image.");
             return;
@@ -43,8 +52,17 @@ impl ViewImages {
         for pair in pairs {
             let name = run.document.task.as_ref().and_then(|task| task.views.get(pair.view));
             let name = name.map_or("", |view| view.name.as_str());
-            ui.label(text::image_text(name, &analysis.views.value[pair.view]));
+            ui.label(match pictures.and_then(|pictures| picture_of(pictures, pair.view)) {
+                Some(picture) => text::picture_text(name, picture),
+                None => text::image_text(name, &analysis.views.value[pair.view]),
+            });
             pair.ui(ui, name);
+        }
+        if let Some(pictures) = pictures {
+            let text = format!("Images in {:.0} ms", pictures.views.ms);
+            ui.label(RichText::new(text).small().weak());
+        } else if let Some(Err(why)) = rendered.map(AsRef::as_ref) {
+            ui.weak(format!("No rendered images: {why}"));
         }
     }
 }
@@ -67,9 +85,20 @@ impl ImagePair {
     }
 }
 
-fn image_pairs(ui: &Ui, analysis: &GrinAnalysis) -> Vec<ImagePair> {
+/// The rendered image of a view.
+fn picture_of(pictures: &GrinPictures, view: usize) -> Option<&ProjectedView> {
+    pictures.views.value.get(view)?.as_ref()
+}
+
+fn image_pairs(
+    ui: &Ui,
+    analysis: &GrinAnalysis,
+    pictures: Option<&GrinPictures>,
+) -> Vec<ImagePair> {
     let views = analysis.views.value.iter().enumerate();
-    let images = views.filter_map(|(view, seen)| Some((view, seen.image.as_ref()?)));
+    let rendered = |view| Some(&picture_of(pictures?, view)?.image);
+    let images =
+        views.filter_map(|(view, seen)| Some((view, rendered(view).or(seen.image.as_ref())?)));
     let pair = |(view, image): (usize, &ViewImage)| {
         // Both to one scale: the brightest of the picture is white.
         let white = image.target.iter().copied().fold(f64::MIN_POSITIVE, f64::max);

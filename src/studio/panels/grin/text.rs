@@ -6,6 +6,7 @@ use crate::grin_design::{
     GrinField, LightGoal, RayCounts, RayPath, RayPaths, SpatialAxis, ViewReport,
 };
 use crate::math::Vec3;
+use crate::picture::ProjectedView;
 use crate::session::{GrinAnalysis, GrinDocument, GrinRun, RunStatus, SessionView, Slice};
 use crate::studio::number::format_digits;
 use crate::studio::text::{self, counted};
@@ -161,6 +162,25 @@ fn tracing_text(seen: &ViewReport) -> String {
         }
         None => format!("{how}; error unknown: no ray of the sample arrives"),
     }
+}
+
+/// A view's rendered image in one line, each number with its error by sampling.
+pub(super) fn picture_text(name: &str, picture: &ProjectedView) -> String {
+    let light = &picture.light;
+    let lost = count_text((light.rays - light.fates.arrived_count()) as u64);
+    let rays = format!("{} rays, {lost} lost", count_text(light.rays as u64));
+    let Some(error) = light.rms_error() else {
+        return format!("{name}: no light on the screen, {rays}");
+    };
+    let [quality, share] = [picture.quality(), light.light()];
+    format!(
+        "{name}: {:.2} ± {:.2} dB PSNR, {:.2} ± {:.2} % of the light, pixels ± {:.1} % of the mean, {rays}",
+        quality.value,
+        quality.error,
+        100.0 * share.value,
+        100.0 * share.error,
+        100.0 * error
+    )
 }
 
 /// A view's image in one line.

@@ -1,0 +1,83 @@
+//! The images of the views of a design task in a gradient-index field, as pictures: with a stated error, and beside
+//! their targets.
+//!
+//! The loss of a task forms its image of the rays that it needs for a gradient, each spread over some pixels so that
+//! the image changes smoothly. Here a pixel is the light on its area, and there are as many rays as its error needs.
+
+use super::projected_light::{
+    LightProjection, ProjectionProgress, ProjectionSettings, screen_frame,
+};
+use super::{ProjectedImage, ProjectionError};
+use crate::analysis::Estimate;
+use crate::grin_design::{GrinField, GrinTask, ImageLight, ViewImage};
+
+/// The image of a view beside its target.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ProjectedView {
+    /// The image and its target, rows from the bottom.
+    pub image: ViewImage,
+    /// The image with its errors and the fates of its rays.
+    pub light: ProjectedImage,
+}
+
+impl ProjectedView {
+    /// Follows the light of a view through a field.
+    ///
+    /// # Errors
+    /// A screen that is too large, a domain without extent, or fewer rays than replicates.
+    pub fn new(
+        field: &GrinField,
+        light: ImageLight,
+        settings: &ProjectionSettings,
+        progress: ProjectionProgress<'_>,
+    ) -> Result<Self, ProjectionError> {
+        let ImageLight { beam, setup, dark } = light;
+        let frame = screen_frame(dark.half, dark.pixels)?;
+        let projection = LightProjection::new(field.index_field(), setup, beam, frame)?;
+        let light = projection.render(settings, progress)?;
+        let image = with_light(&dark, &light.values);
+        Ok(Self { image, light })
+    }
+
+    /// The peak signal-to-noise ratio in dB. The noise of sampling is taken away: it is that of the image with any
+    /// number of rays.
+    pub fn quality(&self) -> Estimate {
+        self.estimate(ViewImage::psnr)
+    }
+
+    /// The correlation coefficient of image and target.
+    pub fn correlation(&self) -> Estimate {
+        self.estimate(ViewImage::correlation)
+    }
+
+    /// A number of the image beside its target, with its error by sampling.
+    pub fn estimate(&self, number: impl Fn(&ViewImage) -> f64) -> Estimate {
+        self.light.estimate(|values| number(&with_light(&self.image, values)))
+    }
+}
+
+/// The screen of an image with other light, whose rows are from the top.
+fn with_light(image: &ViewImage, values: &[f64]) -> ViewImage {
+    let rows = values.chunks(image.pixels.max(1)).rev();
+    ViewImage { formed: rows.flatten().copied().collect(), ..image.clone() }
+}
+
+/// The images of all views of a task in a field; `None` for a view whose goal is no image.
+///
+/// # Errors
+/// A target that is not available, or an image that cannot be made.
+pub fn project_views(
+    task: &GrinTask,
+    field: &GrinField,
+    settings: &ProjectionSettings,
+    progress: ProjectionProgress<'_>,
+) -> Result<Vec<Option<ProjectedView>>, ProjectionError> {
+    let lights = task.image_light(field)?;
+    let count = lights.len() as f64;
+    let mut project = |(i, light): (usize, Option<ImageLight>)| {
+        let mut part = |share: f64| progress((i as f64 + share) / count);
+        let view = light.map(|light| ProjectedView::new(field, light, settings, &mut part));
+        view.transpose()
+    };
+    lights.into_iter().enumerate().map(&mut project).collect()
+}
