@@ -21,6 +21,8 @@ pub struct SomeTolerances {
     pub growth: Vec<f64>,
     /// The number of rays.
     pub rays: usize,
+    /// The time in which the lens is made ready: its pupils, and rays that reach the accuracy, in milliseconds.
+    pub setup_ms: f64,
     /// The time of all sensitivities, refocused ones included, in milliseconds.
     pub sensitivities_ms: f64,
     /// The time of a lens with all errors at random, by its own rays, in milliseconds.
@@ -37,12 +39,14 @@ pub fn measure_some_tolerances(
     (kinds, grade): (&[PerturbationKind], ToleranceGrade),
     (accuracy, samples): (f64, usize),
 ) -> Result<SomeTolerances, ToleranceBenchmarkError> {
-    let scene = ToleranceScene::new(lens, 0, accuracy)?;
+    let pool = ThreadPoolBuilder::new().num_threads(1).build().map_err(BenchmarkError::from)?;
+    let ready = || ToleranceScene::new(lens, 0, accuracy);
+    let (scene, setup_ms) = pool.install(|| time_median(1..=5, ready));
+    let scene = scene?;
     let graded = graded_sheet(lens, &scene.lens, grade);
     let of_kinds = |t: &&Tolerance| kinds.contains(&t.error.kind) && t.half_range > 0.0;
     let tolerances: Vec<Tolerance> = graded.errors.iter().filter(of_kinds).copied().collect();
     let sheet = ToleranceSheet::of_errors(tolerances.clone());
-    let pool = ThreadPoolBuilder::new().num_threads(1).build().map_err(BenchmarkError::from)?;
     let model = || ErrorModel::new(&scene, &sheet, SecondDerivatives::Neglected, &|| false);
     let (model, sensitivities_ms) = pool.install(|| time_median(3..=50, model));
     let model = model?;
@@ -56,6 +60,7 @@ pub fn measure_some_tolerances(
         growth: tolerances.iter().enumerate().map(growth).collect(),
         tolerances,
         rays: scene.beam.rays(),
+        setup_ms,
         sensitivities_ms,
         lens_ms: samples_ms / traced as f64,
     })

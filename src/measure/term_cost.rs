@@ -32,8 +32,8 @@ pub struct TermCost {
     /// its variable.
     pub difference: f64,
     /// The error of the gradient by its rays: the largest difference of a derivative from that by rays that are
-    /// twenty times as accurate, over the largest one; each times a step of its variable. `None` if those have no
-    /// such term.
+    /// twenty times as accurate, over the largest one; each times a step of its variable. `None` if there are no rays
+    /// that accurate, or if all derivatives are 0.
     pub gradient_error: Option<f64>,
     /// The variable whose derivative differs most from central differences; `None` where nothing does.
     pub at: Option<String>,
@@ -176,18 +176,17 @@ fn cost(lens: &Lens, term: Term, steps: &Steps, tolerance: f64) -> Result<TermCo
         pupil: PupilEdge::Moving,
     };
     let merit = Merit::new(lens, &goal, tolerance)?;
-    let finer = Merit::new(lens, &goal, tolerance / FINER)?;
     let values = merit.values(lens);
     let found = merit.terms(&values)?;
     let timed = |level| time_median(3..=TURNS, || merit.evaluate(&values, level));
     let (value, value_ms) = timed(DerivativeLevel::Value);
     let (sum, gradient_ms) = timed(DerivativeLevel::Gradient);
     let (value, sum) = (value?.value, sum?);
-    let finer = finer.evaluate(&values, DerivativeLevel::Gradient).map(|sum| sum.gradient);
     let step_of = |variable: &Variable| steps.of(variable.parameter.quantity);
     let scales: Vec<f64> = merit.variables().iter().map(step_of).collect();
+    let exact = exact_gradient(lens, &goal, (&values, tolerance / FINER));
     let gradient_error =
-        finer.ok().map(|exact| largest_change(sum.gradient.as_slice(), exact.as_slice(), &scales));
+        exact.and_then(|exact| largest_change(sum.gradient.as_slice(), &exact, &scales));
     let (mut largest, mut difference, mut at) = (0.0f64, 0.0f64, None);
     for (i, variable) in merit.variables().iter().enumerate() {
         let step = scales[i];
@@ -219,14 +218,28 @@ fn cost(lens: &Lens, term: Term, steps: &Steps, tolerance: f64) -> Result<TermCo
     })
 }
 
-/// The largest difference of a derivative from the exact one over the largest exact one, each times its scale.
-fn largest_change(found: &[f64], exact: &[f64], scales: &[f64]) -> f64 {
-    let largest =
-        |numbers: &mut dyn Iterator<Item = f64>| numbers.map(f64::abs).fold(0.0, f64::max);
-    let size = largest(&mut exact.iter().zip(scales).map(|(exact, scale)| exact * scale));
-    let apart = found.iter().zip(exact).zip(scales).map(|((a, b), scale)| (a - b) * scale);
-    let apart = largest(&mut { apart });
-    if size > 0.0 { apart / size } else { apart }
+/// The gradient by rays that reach a tolerance; `None` if none do.
+fn exact_gradient(
+    lens: &Lens,
+    goal: &Goal,
+    (values, tolerance): (&[f64], f64),
+) -> Option<Vec<f64>> {
+    let merit = Merit::new(lens, goal, tolerance).ok()?;
+    let is_reached = merit.terms(values).ok()?.iter().all(|term| term.reached);
+    let found = merit.evaluate(values, DerivativeLevel::Gradient).ok().filter(|_| is_reached)?;
+    Some(found.gradient.as_slice().to_vec())
+}
+
+/// The largest difference of a derivative from the exact one over the largest exact one, each times its scale; `None`
+/// if that is 0.
+fn largest_change(found: &[f64], exact: &[f64], scales: &[f64]) -> Option<f64> {
+    let sizes = exact.iter().zip(scales).map(|(exact, scale)| (exact * scale).abs());
+    let size = sizes.fold(0.0, f64::max);
+    let pairs = found.iter().zip(exact).zip(scales);
+    let mut changes = pairs.map(|((a, b), scale)| ((a - b) * scale).abs());
+    // `max` would ignore NaN.
+    let change = changes.try_fold(0.0, |most: f64, x| x.is_finite().then(|| most.max(x)));
+    (size > 0.0).then(|| change.map_or(f64::INFINITY, |change| change / size))
 }
 
 #[cfg(test)]
@@ -235,7 +248,9 @@ mod tests {
 
     #[test]
     fn a_change_is_relative_to_the_largest_derivative_in_its_scale() {
-        assert_eq!(largest_change(&[1.0, 9.0], &[2.0, 8.0], &[1.0, 0.5]), 0.25);
-        assert_eq!(largest_change(&[1.0], &[0.0], &[2.0]), 2.0);
+        assert_eq!(largest_change(&[1.0, 9.0], &[2.0, 8.0], &[1.0, 0.5]), Some(0.25));
+        assert_eq!(largest_change(&[1.0], &[0.0], &[2.0]), None);
+        let lost = largest_change(&[f64::NAN, 1.0], &[1.0, 1.0], &[1.0, 1.0]);
+        assert_eq!(lost, Some(f64::INFINITY));
     }
 }

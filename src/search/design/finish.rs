@@ -112,18 +112,24 @@ pub(super) fn finished_lenses(
 
 /// Adds to the costs of the best lens what an element fewer costs, by the simplest lens beside it.
 fn add_element_cost(lenses: &mut [DesignedLens]) {
-    let simplest = lenses.iter().find(|lens| lens.merit == DesignMerit::Simplest);
-    let Some((fewer, wider)) = simplest.map(|lens| (lens.judgement.elements, lens.judgement.rms))
-    else {
-        return;
-    };
-    if let Some(best) = lenses.first_mut()
-        && best.judgement.elements > fewer
-        && wider > best.judgement.rms
-    {
-        let elements = (best.judgement.elements - fewer) as f64;
-        best.costs.push(LimitCost::of_element(1e3 * (wider - best.judgement.rms) / elements));
+    let simplest = lenses.iter().find(|lens| lens.merit == DesignMerit::Simplest).cloned();
+    let best = lenses.first_mut().filter(|best| best.merit == DesignMerit::Best);
+    if let (Some(best), Some(simplest)) = (best, simplest) {
+        let cost = element_cost(best, &simplest);
+        best.costs.extend(cost.filter(|um| *um > 0.0).map(LimitCost::of_element));
     }
+}
+
+/// The growth of the RMS spot radius for each element that a simpler lens has fewer, in µm, as built if that is known of
+/// both; `None` of lenses that differ in their aspheres or not in elements, or were chosen by their contrast.
+fn element_cost(best: &DesignedLens, simpler: &DesignedLens) -> Option<f64> {
+    let (a, b) = (&best.judgement, &simpler.judgement);
+    let fewer = a.elements.checked_sub(b.elements).filter(|count| *count > 0)?;
+    if a.aspheric_surfaces != b.aspheric_surfaces || a.contrast.is_some() {
+        return None;
+    }
+    let made = best.as_built.zip(simpler.as_built).map(|(a, b)| b.mean - a.mean);
+    Some(1e3 * made.unwrap_or(b.rms - a.rms) / fewer as f64)
 }
 
 /// Lenses that are refined as they are made, each within its requirements, and the most robust one.
@@ -356,6 +362,7 @@ mod tests {
             merit,
             judgement: LensJudgement { elements, rms, ..judgement.clone() },
             costs: Vec::new(),
+            as_built: None,
             ..lens.clone()
         };
         let cost = |elements: usize, rms: f64| {

@@ -34,7 +34,7 @@ pub struct AsBuiltLens {
     /// there are errors, or none.
     pub wavefront_shares: Vec<[f64; 2]>,
     /// The contrast at the frequency that is asked for, or the reason why there is none; `None` if nothing is,
-    /// and without lenses with random errors.
+    /// if it was stopped, and without lenses with random errors.
     pub contrast: Option<Result<ContrastSummary, String>>,
     /// The number of rays of the lens as designed.
     pub rays: usize,

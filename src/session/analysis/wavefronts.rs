@@ -67,8 +67,8 @@ const WIDEST: f64 = 15.0;
 const CIRCLES: usize = 16;
 /// The number of Zernike coefficients.
 const TERMS: usize = 15;
-/// The tolerance of what is looked at, and the rays that it may take: an image of ten waves of aberration folds
-/// with less than 25,000.
+/// The tolerance of what is looked at, and the rays that it may take: with fewer than 25,000 an image of ten waves of
+/// aberration aliases, and rays grow with the square of the waves.
 const LOOKED_AT: Accuracy = Accuracy { tolerance: 1e-2, max_rays: 100_000 };
 
 /// The wavefronts of all fields; `None` if it was interrupted.

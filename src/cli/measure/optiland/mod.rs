@@ -37,7 +37,8 @@ fn ask<T: DeserializeOwned>(
     files::save(lens, &file.0)?;
     let mut command = Command::new(python);
     command.arg("-c").arg(script).arg(&file.0).args(arguments);
-    for threads in ["OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS"] {
+    for library in ["OMP", "OPENBLAS", "MKL", "NUMBA"] {
+        let threads = format!("{library}_NUM_THREADS");
         command.env(threads, "1");
     }
     let output = command.output().map_err(|error| wrong(python, error.to_string()))?;

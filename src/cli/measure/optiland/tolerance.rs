@@ -49,9 +49,9 @@ pub(in crate::cli::measure) struct OptilandRow {
     growth: Vec<Option<f64>>,
     pub(in crate::cli::measure) sensitivities_ms: f64,
     pub(in crate::cli::measure) lens_ms: f64,
-    /// The median of the relative differences of growths from those by this program.
+    /// The median of the relative differences of growths from those by this program, and how many there are.
     #[serde(default)]
-    pub(in crate::cli::measure) median_difference: Option<f64>,
+    pub(in crate::cli::measure) median_difference: Option<(f64, usize)>,
 }
 
 /// The output of the script.
@@ -90,15 +90,16 @@ fn name_error(tolerance: &Tolerance) -> Option<serde_json::Value> {
     Some(json!([name, tolerance.error.first + 1, axis, tolerance.half_range]))
 }
 
-/// The median of the differences relative to the own growths; `None` without any.
-fn median_difference(own: &[f64], others: &[Option<f64>]) -> Option<f64> {
+/// The median of the differences relative to the own growths, the upper one of two, and their number; `None` without
+/// any.
+fn median_difference(own: &[f64], others: &[Option<f64>]) -> Option<(f64, usize)> {
     let apart = |(own, other): (&f64, &Option<f64>)| {
         let relative = (other.as_ref()? / own - 1.0).abs();
         relative.is_finite().then_some(relative)
     };
     let mut apart: Vec<f64> = own.iter().zip(others).filter_map(apart).collect();
     apart.sort_by(f64::total_cmp);
-    apart.get(apart.len() / 2).copied()
+    Some((*apart.get(apart.len() / 2)?, apart.len()))
 }
 
 #[cfg(test)]
@@ -119,7 +120,7 @@ mod tests {
     fn the_median_leaves_out_what_was_not_found() {
         let own = [1.0, 2.0, 4.0, 0.0];
         let others = [Some(1.5), None, Some(4.0), Some(1.0)];
-        assert_eq!(median_difference(&own, &others), Some(0.5));
+        assert_eq!(median_difference(&own, &others), Some((0.5, 2)));
         assert_eq!(median_difference(&own, &[None; 4]), None);
     }
 }

@@ -81,7 +81,7 @@ impl LimitCost {
 
     /// The number by which costs are ordered.
     pub(super) fn size(&self) -> f64 {
-        self.um_per_mm.or(self.um_per_percent).unwrap_or(0.0)
+        self.um_per_mm.or(self.um_per_percent).or(self.um_per_element).unwrap_or(0.0)
     }
 }
 
