@@ -5,9 +5,9 @@ use super::exact::{REPLICATES, gray_rms, mean_with_error};
 use crate::analysis::Estimate;
 use crate::grin::GrinFateCounts;
 
-/// With this many times the light of one ray, an image on which no ray landed is darker in 19 cases of 20: the
-/// chance of none is `exp(-3)`.
-const UNSEEN: f64 = 3.0;
+/// The rays for each pixel, on average, with which the spread of replicates tells the error: where fewer land,
+/// most pixels are black in all replicates, which then agree.
+const RAYS_OF_PIXEL: f64 = 4.0;
 
 /// The image of a beam on a screen.
 #[derive(Debug, Clone, PartialEq)]
@@ -53,13 +53,16 @@ impl ProjectedImage {
         mean(&self.values)
     }
 
-    /// The share of the light that lands on the image. Where not one ray lands, the error is the share that would
-    /// still be seen in 19 cases of 20.
+    /// The share of the light that lands on the image; its error is at least the light of one ray.
     pub fn light(&self) -> Estimate {
-        if self.mean() > 0.0 {
-            return self.estimate(mean);
-        }
-        Estimate::new(0.0, (UNSEEN / self.rays.max(1) as f64).min(1.0), self.rays)
+        let found = self.estimate(mean);
+        Estimate { error: found.error.max(1.0 / self.rays.max(1) as f64), ..found }
+    }
+
+    /// The number of rays that land on a pixel, on average.
+    pub fn rays_of_pixel(&self) -> f64 {
+        let landed = self.fates.arrived_count() - self.beside;
+        landed as f64 / self.values.len().max(1) as f64
     }
 
     /// The share of the light that arrives nowhere: rays that are lost on the way.
@@ -69,10 +72,12 @@ impl ProjectedImage {
     }
 
     /// The root mean square error by sampling, as a share of the mean of the image, or of the pixel where that is
-    /// brighter; `None` of a black image, which has no mean.
+    /// brighter; `None` of a black image, which has no mean. Of few rays it is at least what counting them leaves.
     pub fn rms_error(&self) -> Option<f64> {
         let mean = self.mean();
-        (mean > 0.0).then(|| gray_rms(&self.values, &self.errors, mean))
+        let spread = (mean > 0.0).then(|| gray_rms(&self.values, &self.errors, mean))?;
+        let count = self.rays_of_pixel();
+        Some(if count < RAYS_OF_PIXEL { spread.max(count.sqrt().recip()) } else { spread })
     }
 
     /// A number of the image, such as its correlation with another one, with its error by sampling.
@@ -82,6 +87,9 @@ impl ProjectedImage {
     pub fn estimate(&self, number: impl Fn(&[f64]) -> f64) -> Estimate {
         let n = REPLICATES as f64;
         let whole = number(&self.values);
+        if !whole.is_finite() {
+            return Estimate::new(whole, 0.0, self.rays);
+        }
         let parts: [f64; REPLICATES] = std::array::from_fn(|left| number(&self.without(left)));
         let middle = parts.iter().sum::<f64>() / n;
         let squares: f64 = parts.iter().map(|part| (part - middle).powi(2)).sum();
@@ -150,10 +158,28 @@ mod tests {
     }
 
     #[test]
+    fn a_number_that_is_infinite_has_no_jackknife() {
+        let image = image([[1.0, 3.0], [2.0, 4.0], [3.0, 5.0], [4.0, 6.0]]);
+        let found = image.estimate(|_| f64::INFINITY);
+        assert_eq!((found.value, found.error), (f64::INFINITY, 0.0));
+    }
+
+    /// One ray of eight on two pixels: the replicates agree that one of them is black.
+    #[test]
+    fn an_image_of_few_rays_has_the_error_of_their_number() {
+        let frame = ImageFrame { pixels: [2, 1], pitch: 1.0, center: [0.0; 2], inverted: false };
+        let fates = [GrinFate::Left; 8].into_iter().collect();
+        let replicates = [[1.0, 0.0], [0.0; 2], [0.0; 2], [0.0; 2]].map(Vec::from);
+        let image = ProjectedImage::new(frame, replicates, (fates, 7));
+        assert_eq!(image.rays_of_pixel(), 0.5);
+        assert!(image.rms_error() >= Some(2.0_f64.sqrt()), "{:?}", image.rms_error());
+    }
+
+    #[test]
     fn a_black_image_states_what_it_would_have_seen() {
         let image = image([[0.0; 2]; REPLICATES]);
         assert_eq!(image.rms_error(), None);
-        assert_eq!((image.light().value, image.light().error), (0.0, 3.0 / 8.0));
+        assert_eq!((image.light().value, image.light().error), (0.0, 1.0 / 8.0));
         assert_eq!(image.difference(&image), 0.0);
     }
 }

@@ -88,11 +88,7 @@ struct ProjectionWork {
 /// # Errors
 /// No pixels, too many, or a square without a size.
 pub fn screen_frame(half: f64, pixels: usize) -> Result<ImageFrame, ProjectionError> {
-    let all = pixels.saturating_mul(pixels);
-    if all == 0 || all > MAX_PIXELS {
-        let expected = "from 1 to 4194304";
-        return Err(size_error("the number of pixels", all as f64, expected));
-    }
+    check_pixels([pixels; 2])?;
     check_positive("half the side of the image", half)?;
     let pitch = 2.0 * half / pixels as f64;
     Ok(ImageFrame { pixels: [pixels; 2], pitch, center: [0.0; 2], inverted: false })
@@ -102,9 +98,19 @@ fn size_error(what: &'static str, found: f64, expected: &'static str) -> Project
     ProjectionError::Size { what, found, expected }
 }
 
+fn check_pixels([columns, rows]: [usize; 2]) -> Result<(), ProjectionError> {
+    let all = columns.saturating_mul(rows);
+    if all == 0 || all > MAX_PIXELS {
+        return Err(size_error("the number of pixels", all as f64, "from 1 to 4194304"));
+    }
+    Ok(())
+}
+
 fn check_positive(what: &'static str, found: f64) -> Result<(), ProjectionError> {
-    let is_valid = found > 0.0 && found.is_finite();
-    is_valid.then_some(()).ok_or_else(|| size_error(what, found, "a number above 0"))
+    if !(found > 0.0 && found.is_finite()) {
+        return Err(size_error(what, found, "a number above 0"));
+    }
+    Ok(())
 }
 
 fn check_beam(beam: &SquareBeam) -> Result<(), ProjectionError> {
@@ -113,11 +119,10 @@ fn check_beam(beam: &SquareBeam) -> Result<(), ProjectionError> {
     if !((length - 1.0).abs() < 1e-9) {
         return Err(size_error("the length of the direction of the beam", length.sqrt(), "1"));
     }
-    let back = beam.back;
-    let is_known = back.is_finite();
-    is_known
-        .then_some(())
-        .ok_or_else(|| size_error("the distance of the beam", back, "a finite number"))
+    if !beam.back.is_finite() {
+        return Err(size_error("the distance of the beam", beam.back, "a finite number"));
+    }
+    Ok(())
 }
 
 impl<'a> LightProjection<'a> {
@@ -133,10 +138,7 @@ impl<'a> LightProjection<'a> {
         frame: ImageFrame,
     ) -> Result<Self, ProjectionError> {
         check_beam(&beam)?;
-        let all = frame.pixels[0].saturating_mul(frame.pixels[1]);
-        if all == 0 || all > MAX_PIXELS {
-            return Err(size_error("the number of pixels", all as f64, "from 1 to 4194304"));
-        }
+        check_pixels(frame.pixels)?;
         check_positive("the side of a pixel", frame.pitch)?;
         let is_far = setup.screen.is_none();
         Ok(Self { tracer: GrinTracer::new(field, setup)?, beam, frame, is_far })

@@ -45,9 +45,25 @@ impl ProjectedView {
         self.estimate(ViewImage::psnr)
     }
 
-    /// The correlation coefficient of image and target.
+    /// The correlation coefficient of image and target, at most 1.
     pub fn correlation(&self) -> Estimate {
-        self.estimate(ViewImage::correlation)
+        let found = self.estimate(ViewImage::correlation);
+        Estimate { value: found.value.clamp(-1.0, 1.0), ..found }
+    }
+
+    /// Quality, correlation and error of the pixels for a title.
+    pub fn summary(&self) -> String {
+        let Some(error) = self.light.rms_error() else {
+            return "no light on the screen".to_owned();
+        };
+        let [quality, correlation] = [self.quality(), self.correlation()];
+        format!(
+            "{:.1} ± {:.1} dB, correlation {:.3}, pixels ± {:.1} %",
+            quality.value,
+            quality.error,
+            correlation.value,
+            100.0 * error
+        )
     }
 
     /// A number of the image beside its target, with its error by sampling.
@@ -62,7 +78,8 @@ fn with_light(image: &ViewImage, values: &[f64]) -> ViewImage {
     ViewImage { formed: rows.flatten().copied().collect(), ..image.clone() }
 }
 
-/// The images of all views of a task in a field; `None` for a view whose goal is no image.
+/// The images of all views of a task in a field; `None` for a view whose goal is no image. An image that is ended
+/// early is the last one.
 ///
 /// # Errors
 /// A target that is not available, or an image that cannot be made.
@@ -74,10 +91,16 @@ pub fn project_views(
 ) -> Result<Vec<Option<ProjectedView>>, ProjectionError> {
     let lights = task.image_light(field)?;
     let count = lights.len() as f64;
-    let mut project = |(i, light): (usize, Option<ImageLight>)| {
+    let mut views = Vec::new();
+    for (i, light) in lights.into_iter().enumerate() {
         let mut part = |share: f64| progress((i as f64 + share) / count);
         let view = light.map(|light| ProjectedView::new(field, light, settings, &mut part));
-        view.transpose()
-    };
-    lights.into_iter().enumerate().map(&mut project).collect()
+        let view = view.transpose()?;
+        let is_ended = view.as_ref().is_some_and(|view| !view.light.complete);
+        views.push(view);
+        if is_ended {
+            break;
+        }
+    }
+    Ok(views)
 }

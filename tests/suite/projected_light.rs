@@ -162,11 +162,12 @@ fn a_luneburg_lens_forms_its_exact_image_at_infinity() {
     println!("{} rays, error {error:.4}, off {:.2}", image.rays, off(&image, &exact));
     assert!(image.reached && error <= 0.01 && image.rays < 1 << 22, "{error} {}", image.rays);
     assert!(off(&image, &exact) < 1.4, "{}", off(&image, &exact));
-    // All of it arrives, and what is beside the frame is counted.
+    // All of it arrives, and the exact share of it beside the frame.
     assert_eq!(image.fates.count_of(GrinFate::Left), image.rays);
-    let light = image.values.iter().sum::<f64>() / image.values.len() as f64;
+    let inside = exact.iter().sum::<f64>() / exact.len() as f64;
     let beside = image.beside as f64 / image.rays as f64;
-    assert!((light + beside - 1.0).abs() < 1e-12, "{light} {beside}");
+    let allowed = 6.0 * image.light().error;
+    assert!((inside + beside - 1.0).abs() < allowed, "{inside} {beside} {allowed}");
 }
 
 /// In a fibre with `η² = n² (1 - g² r²)` a ray that starts along the axis at `r` is at `r cos(n g z/η(r))`, and goes on
@@ -217,25 +218,32 @@ fn stated_errors_cover_the_true_ones() {
     let exact = luneburg_at_infinity(frame, pixels, beam);
     let light = exact.iter().sum::<f64>() / exact.len() as f64;
     let projection = along_z(&field, setup(GrinRegion::ball(1.0), None), beam, (frame, pixels));
-    let (mut squares, mut covered, mut pairs) = (0.0, 0, 0.0);
+    let (mut squares, mut shares, mut pairs, mut stopped) = (0.0, 0.0, 0.0, 0.0);
     let mut last: Option<ProjectedImage> = None;
     for seed in 0..SEEDS {
         let image = render(&projection, &all(4096, seed));
         squares += off(&image, &exact).powi(2);
         let found = image.light();
-        covered += usize::from((found.value - light).abs() <= 2.0 * found.error);
+        shares += ((found.value - light) / found.error).powi(2);
+        let settings = ProjectionSettings { tolerance: 0.03, seed, ..Default::default() };
+        stopped += off(&render(&projection, &settings), &exact).powi(2);
         if let Some(last) = &last {
             pairs += image.difference(last);
         }
         last = Some(image);
     }
-    let rms = (squares / f64::from(SEEDS)).sqrt();
+    let [rms, shares, stopped] =
+        [squares, shares, stopped].map(|sum| (sum / f64::from(SEEDS)).sqrt());
     let pairs = pairs / f64::from(SEEDS - 1);
-    println!("true over stated {rms:.3}, between seeds {pairs:.3}, light covered {covered}");
+    println!(
+        "true over stated {rms:.3}, between seeds {pairs:.3}, light {shares:.3}, until a tolerance {stopped:.3}"
+    );
     assert!((0.8..1.2).contains(&rms), "{rms}");
     assert!((0.8..1.2).contains(&pairs), "{pairs}");
-    // Two standard errors of four replicates: 86 of 100.
-    assert!(covered >= 16, "{covered} of {SEEDS}");
+    // Images end where their error happens to look small.
+    assert!((0.8..1.3).contains(&stopped), "{stopped}");
+    // The error of one number by four replicates has Student's distribution, whose deviation is 1.7.
+    assert!((0.6..3.0).contains(&shares), "{shares}");
 }
 
 #[test]
@@ -279,6 +287,20 @@ fn light_that_lands_nowhere_is_counted_and_makes_a_black_image() {
     let projection = LightProjection::new(field.index_field(), setup, beam, far).unwrap();
     let image = render(&projection, &ProjectionSettings::default());
     assert!(image.beside == image.rays && image.lost_share() == 0.0 && image.rms_error().is_none());
+}
+
+/// A beam of which one ray in four thousand lands: replicates that agree on black pixels do not make it known.
+#[test]
+fn an_image_of_few_rays_is_not_reached() {
+    let field = air();
+    let setup = setup(GrinRegion::cube(1.0), Some(1.5));
+    let frame = screen_frame(0.01, 64).unwrap();
+    let beam = SquareBeam::new(Z, 0.64, 5.0);
+    let projection = LightProjection::new(field.index_field(), setup, beam, frame).unwrap();
+    let settings = ProjectionSettings { max_rays: 1 << 18, ..Default::default() };
+    let image = render(&projection, &settings);
+    assert!(image.mean() > 0.0 && !image.reached, "{:?}", image.rms_error());
+    assert!(image.rms_error() > Some(1.0), "{:?}", image.rms_error());
 }
 
 /// Half of the light is kept inside for more steps than it may take, or does not meet the domain.

@@ -62,6 +62,9 @@ pub(super) struct GrinArgs {
     show: bool,
 }
 
+/// The largest number of rays of an image once the search was stopped: who presses Ctrl-C waits for no accuracy.
+const FEW_RAYS: usize = 1 << 18;
+
 impl GrinArgs {
     pub(super) fn run(&self, output: &Output) -> Result<(), CliError> {
         let Some(name) = &self.task else { return output.print(&TaskList) };
@@ -87,7 +90,9 @@ impl GrinArgs {
         let mut failures = Failures::default();
         let (volume, unsaved) = self.write_or_keep(&task, runner.best(), &mut failures);
         let (mut images, mut shown) = (Vec::new(), Vec::new());
-        failures.note(self.write_images(&task, runner.best(), (&mut images, &mut shown)));
+        let files = (&mut images, &mut shown);
+        let is_stopped = stop.load(Ordering::Relaxed);
+        failures.note(self.write_images(&task, runner.best(), is_stopped, files));
         let mut report =
             GrinReport::new(&runner, &GrinCostSummary { ms, processor_ms, memory, stopped })
                 .map_err(|error| CliError::Failed(format!("{}: {error}", source_name(name))))?;
@@ -133,12 +138,13 @@ impl GrinArgs {
         }
     }
 
-    /// Writes the images until one fails; adds the paths to `written`, and the numbers of the images of light to
-    /// `shown`.
+    /// Writes the images until one fails, those of light by fewer rays after a search that was stopped; adds the
+    /// paths to `written`, and the numbers of the images of light to `shown`.
     fn write_images(
         &self,
         task: &GrinTask,
         best: &GrinField,
+        is_stopped: bool,
         (written, shown): (&mut Vec<PathBuf>, &mut Vec<ImageReport>),
     ) -> Result<(), CliError> {
         let Some(folder) = &self.png else { return Ok(()) };
@@ -155,14 +161,16 @@ impl GrinArgs {
         for (i, (view, light)) in task.views.iter().zip(lights).enumerate() {
             let Some(light) = light else { continue };
             let clock = Stopwatch::start();
-            // Ctrl-C ends the search, whose result is then still shown.
+            let default = ProjectionSettings::default();
+            let max_rays = if is_stopped { FEW_RAYS } else { default.max_rays };
+            let settings = ProjectionSettings { max_rays, ..default };
             let mut go_on = |_| ControlFlow::Continue(());
-            let seen = ProjectedView::new(best, light, &ProjectionSettings::default(), &mut go_on);
+            let seen = ProjectedView::new(best, light, &settings, &mut go_on);
             let seen = seen.map_err(|error| failed(&error))?;
             let report = ImageReport::new(&view.name, &seen, 1e3 * clock.seconds());
-            let canvas = plot_grin_image(&view.name, &seen.image, &report.to_string());
-            shown.push(report);
+            let canvas = plot_grin_image(&view.name, &seen.image, &seen.summary());
             write(format!("view-{}.png", i + 1), &canvas)?;
+            shown.push(report);
         }
         Ok(())
     }

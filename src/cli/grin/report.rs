@@ -88,9 +88,9 @@ struct ViewSummary {
 #[derive(Serialize)]
 pub(super) struct ImageReport {
     view: String,
-    /// Peak signal to noise and correlation with the target, each with its error.
-    quality_db: [f64; 2],
-    correlation: [f64; 2],
+    /// Peak signal to noise and correlation with the target, each with its error; none of a black image.
+    quality_db: Option<[f64; 2]>,
+    correlation: Option<[f64; 2]>,
     /// The share of the light that lands on the image, and its error.
     light: [f64; 2],
     /// The error of the pixels as a share of the mean of the image; none of a black image.
@@ -110,8 +110,8 @@ impl ImageReport {
         let lost = light.fates.iter().filter(|(fate, _)| !fate.has_arrived());
         Self {
             view: view.to_owned(),
-            quality_db: pair(seen.quality()),
-            correlation: pair(seen.correlation()),
+            quality_db: light.rms_error().map(|_| pair(seen.quality())),
+            correlation: light.rms_error().map(|_| pair(seen.correlation())),
             light: pair(light.light()),
             error: light.rms_error(),
             reached: light.reached,
@@ -125,12 +125,13 @@ impl ImageReport {
 
 impl Display for ImageReport {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { quality_db: [quality, off], correlation: [alike, unsure], .. } = self;
-        let Self { rays, ms, .. } = self;
-        let Some(error) = self.error else {
+        let Self { rays, ms, error, quality_db, correlation, .. } = self;
+        let (Some(error), Some(quality), Some(correlation)) = (error, quality_db, correlation)
+        else {
             return write!(f, "no light on the screen by {rays} rays, {ms:.0} ms");
         };
-        write!(f, "{quality:.2} ± {off:.2} dB, correlation {alike:.4} ± {unsure:.4}; ")?;
+        write!(f, "{:.2} ± {:.2} dB, ", quality[0], quality[1])?;
+        write!(f, "correlation {:.4} ± {:.4}; ", correlation[0], correlation[1])?;
         let short = if self.reached { "" } else { ", more than asked for" };
         write!(f, "pixels ± {:.1} % of the mean{short}, {rays} rays, {ms:.0} ms", 100.0 * error)
     }

@@ -1,11 +1,11 @@
 //! Figures 5.4 to 5.7: GRIN fields as displays, for one beam or for two.
 //!
 //! The optimization uses different rays in every step and none of those by which its result is
-//! evaluated here: those are traced with half of its step, and are as many as the error of an image
-//! needs.
+//! evaluated here: those are as many as the error of an image needs, and are traced with half of its step where the
+//! task names one.
 //!
-//! The images are pictures ([`picture`](crate::picture)), with the sampler and the law of error of those
-//! through a lens. Light is only followed the other way, from the beam onto the screen: a beam has one
+//! The images are pictures ([`picture`](crate::picture)), with the sampler of those through a lens and their error by
+//! independent replicates. Light is only followed the other way, from the beam onto the screen: a beam has one
 //! direction at every point, which no ray that begins in a pixel has but by chance. A pixel is the light
 //! on its area, where the loss spreads each ray over nine pixels so that it can be differentiated; the
 //! numbers of an image are those of its pixels, without the noise of sampling. Every image is rendered
@@ -33,6 +33,8 @@ const SAMPLING: [f64; 2] = [0.02, 0.1];
 /// The largest difference of two independent images relative to what their errors allow: 1 and its
 /// own scatter, since an error from four replicates is known to a third of it for one pixel.
 const DIFFERENCE: f64 = 1.2;
+/// The smallest number of rays on a pixel, on average.
+const LANDED: f64 = 16.0;
 /// The share of the work that the optimization takes; the images take the rest.
 const SOLVING: f64 = 0.8;
 /// The largest fraction of lost rays.
@@ -80,8 +82,9 @@ struct EvaluatedView {
     picture: ProjectedView,
     /// The same image by other samples.
     again: ProjectedImage,
-    /// The largest change of an exit when the step is halved, in mm.
+    /// The largest change of an exit when the step is halved, in mm, and the rays that tell it.
     tracing_error: Option<f64>,
+    tracing_rays: usize,
 }
 
 /// The part of a work between two shares of it.
@@ -127,13 +130,17 @@ fn evaluate(
         project_views(&task, medium, &settings(effort, seed), &mut tell)
     };
     let pictures = project(0, part_of(part, [0.0, 0.5]))?;
+    if pictures.iter().flatten().any(|picture| !picture.light.complete) {
+        return Err(ExperimentError::Stopped);
+    }
     let again = project(1, part_of(part, [0.5, 1.0]))?;
     let both = task.views.iter().zip(reports).zip(pictures.into_iter().zip(again));
     let view = |((view, report), (picture, again)): (_, (Option<_>, Option<ProjectedView>))| {
         let (view, report): (&LightView, ViewReport) = (view, report);
         let (picture, again): (ProjectedView, _) = picture.zip(again)?;
         let (name, again) = (view.name.clone(), again.light);
-        Some(EvaluatedView { name, picture, again, tracing_error: report.error })
+        let (tracing_error, tracing_rays) = (report.error, report.result.counts.fates.total());
+        Some(EvaluatedView { name, picture, again, tracing_error, tracing_rays })
     };
     let views: Vec<EvaluatedView> = both.filter_map(view).collect();
     // An image that was ended early is none.
@@ -158,15 +165,17 @@ const COLUMNS: [&str; 13] = [
     "index_high",
 ];
 
-/// The claims that two independent images of the same light have the error that was asked for, and
+/// The claims that two independent images of the same light have enough rays and the error that was asked for, and
 /// differ by no more than that.
-fn sampling_claims(name: &str, [image, again]: [&ProjectedImage; 2], effort: Effort) -> [Claim; 2] {
+fn sampling_claims(name: &str, [image, again]: [&ProjectedImage; 2], effort: Effort) -> [Claim; 3] {
     let [fine, coarse] = SAMPLING;
     let error = image.rms_error().unwrap_or(f64::INFINITY);
     let says = format!("{name}: error of sampling, relative to the mean of the image");
     let sampled = Claim::at_most(says, error, effort.select(fine, coarse));
     let says = format!("{name}: difference of an independent image, relative to the stated errors");
-    [sampled, Claim::at_most(says, image.difference(again), DIFFERENCE)]
+    let different = Claim::at_most(says, image.difference(again), DIFFERENCE);
+    let says = format!("{name}: rays that land on a pixel, on average");
+    [sampled, different, Claim::at_least(says, image.rays_of_pixel(), LANDED)]
 }
 
 impl EvaluatedView {
@@ -191,25 +200,13 @@ impl EvaluatedView {
     /// The plot of the image beside its target.
     fn plot(&self, name: &'static str) -> NamedPlot {
         let image = &self.picture.image;
-        let canvas = plot_grin_image(name, image, &self.numbers());
+        let canvas = plot_grin_image(name, image, &self.picture.summary());
         NamedPlot { name, canvas }
-    }
-
-    /// Quality, correlation and error, in one line.
-    fn numbers(&self) -> String {
-        let [quality, correlation] = [self.picture.quality(), self.picture.correlation()];
-        let error = self.picture.light.rms_error().map_or("none".to_owned(), |error| {
-            format!("{:.1} % by {} rays", 100.0 * error, self.picture.light.rays)
-        });
-        format!(
-            "{:.1} ± {:.1} dB, correlation {:.3}; sampling error {error}",
-            quality.value, quality.error, correlation.value
-        )
     }
 
     /// The number of rays followed.
     fn rays(&self) -> usize {
-        self.picture.light.rays + self.again.rays
+        self.picture.light.rays + self.again.rays + self.tracing_rays
     }
 }
 

@@ -2,7 +2,8 @@
 //! the slices and images that show it.
 //!
 //! Four threads share the work: one takes the steps of the design, one computes slices, one traces
-//! all light of the task, one renders the images of a field at rest. Nothing is open at first, and nothing is computed while no panel shows it.
+//! all light of the task, one renders the images of a field while no step is taken. Nothing is open at first, and
+//! nothing is computed while no panel shows it.
 
 mod backup;
 mod contour;
@@ -193,7 +194,9 @@ impl GrinState {
 
     /// Requests what panels show of the field.
     pub(super) fn sync(&mut self) {
-        let Some(run) = self.run.snapshot().filter(|_| self.is_active) else { return };
+        let Some(run) = self.run.snapshot().filter(|_| self.is_active) else {
+            return self.pictures.pause();
+        };
         let (document, field) = (Arc::clone(&run.document), Arc::clone(&run.field));
         let request = SliceRequest { document, field, settings: self.slice_settings };
         if !self.requested_slice.as_ref().is_some_and(|last| last.matches(&request)) {
@@ -204,6 +207,8 @@ impl GrinState {
         let has_task = run.document.task.is_some();
         if has_task && self.run.status() != RunStatus::Running {
             self.pictures.request(&run.document, &run.field);
+        } else {
+            self.pictures.pause();
         }
     }
 
