@@ -71,7 +71,7 @@ fn render(
     output: &WorkerOutput<PictureRequest, Result<GrinPictures, String>>,
 ) {
     let is_interrupted = output.interruption();
-    match catch_panic(|| pictures(document, field, &is_interrupted)) {
+    match catch_panic(|| pictures(&document, field, &is_interrupted)) {
         Ok(Some(pictures)) => output.publish(Ok(pictures)),
         Ok(None) => {}
         Err(why) => output.publish(Err(why)),
@@ -80,7 +80,7 @@ fn render(
 
 /// The images of a task in a field; `None` if that was interrupted.
 fn pictures(
-    document: Arc<GrinDocument>,
+    document: &Arc<GrinDocument>,
     field: Arc<GrinField>,
     is_interrupted: &dyn Fn() -> bool,
 ) -> Result<Option<GrinPictures>, String> {
@@ -92,5 +92,5 @@ fn pictures(
     let value = value.map_err(|why| why.to_string())?;
     let is_whole = value.iter().flatten().all(|view| view.light.complete);
     let views = Timed { value, ms };
-    Ok(is_whole.then(|| GrinPictures { document: Arc::clone(&document), field, views }))
+    Ok(is_whole.then(|| GrinPictures { document: Arc::clone(document), field, views }))
 }
