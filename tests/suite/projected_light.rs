@@ -71,12 +71,12 @@ fn render(projection: &LightProjection<'_>, settings: &ProjectionSettings) -> Pr
 }
 
 /// A beam of half a side along z through a field, on a frame of half a side.
-fn along_z<'a>(
-    field: &'a dyn IndexField<f64>,
+fn along_z(
+    field: &dyn IndexField<f64>,
     setup: GrinSetup<f64>,
     half: f64,
     (frame, pixels): (f64, usize),
-) -> LightProjection<'a> {
+) -> LightProjection<'_> {
     let frame = screen_frame(frame, pixels).unwrap();
     LightProjection::new(field, setup, SquareBeam::new(Z, half, 2.0), frame).unwrap()
 }

@@ -41,8 +41,8 @@ const WIDTH: [f64; 2] = [0.15, 0.4];
 const PLANES: [f64; 5] = [0.5, 1.0, 2.0, 4.0, 8.0];
 /// The tolerance of the rays, in mm.
 const TOLERANCE: f64 = 1e-3;
-/// The number of cells along a side of an image, and its side relative to the diameter of the ring.
-const CELLS: usize = 96;
+/// The number of pixels along a side of an image, and its side relative to the diameter of the ring.
+const CELLS: usize = 64;
 const ROOM: f64 = 1.6;
 
 fn run(effort: Effort, progress: &mut ProgressFn<'_>) -> ExperimentResult {
