@@ -229,7 +229,7 @@ struct RingScreen {
 }
 
 impl RingScreen {
-    fn claims(&self, effort: Effort) -> [Claim; 2] {
+    fn claims(&self, effort: Effort) -> [Claim; 3] {
         sampling_claims(&format!("ring {}", self.name), [&self.light, &self.again], effort)
     }
 }
