@@ -172,7 +172,7 @@ mod tests {
         let replicates = [[1.0, 0.0], [0.0; 2], [0.0; 2], [0.0; 2]].map(Vec::from);
         let image = ProjectedImage::new(frame, replicates, (fates, 7));
         assert_eq!(image.rays_of_pixel(), 0.5);
-        assert!(image.rms_error() >= Some(2.0_f64.sqrt()), "{:?}", image.rms_error());
+        assert!(image.rms_error() > Some(1.41), "{:?}", image.rms_error());
     }
 
     #[test]
