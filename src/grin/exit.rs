@@ -59,6 +59,16 @@ impl<R: Real> RayExit<R> {
     }
 }
 
+impl<R: Real> RayExit<R> {
+    /// The distance along `v`, in units of its length, from here to a screen in air; `None` if the ray does not go
+    /// there. A screen that touches the boundary may lie behind the exit by a rounding error: by less than a step of
+    /// the tracer.
+    pub fn flight_to(&self, screen: &Face<R>, step: R) -> Option<R> {
+        let ahead = |t: &R| *t >= -step && t.is_finite();
+        screen.crossings(self.x, self.v)?.into_iter().find(ahead)
+    }
+}
+
 /// The entry of a ray into the region.
 pub(super) struct RegionEntry<R> {
     pub(super) state: RayState<R>,
@@ -243,10 +253,7 @@ impl<R: Real, F: IndexField<R> + ?Sized> GrinTracer<'_, R, F> {
         let Some(screen) = self.setup.screen.filter(|_| exit.fate.has_arrived()) else {
             return exit;
         };
-        // A screen that touches the boundary may lie behind the exit by a rounding error.
-        let ahead = |t: &R| *t >= -self.setup.step && t.is_finite();
-        let Some(t) = screen.crossings(exit.x, exit.v).and_then(|t| t.into_iter().find(ahead))
-        else {
+        let Some(t) = exit.flight_to(&screen, self.setup.step) else {
             exit.fate = GrinFate::MissedScreen;
             return exit;
         };

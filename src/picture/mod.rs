@@ -69,7 +69,9 @@ pub use picture_data::Picture;
 pub use png_file::{BitDepth, ToneCurve, encode_colors, encode_png};
 pub use point_images::{PlacedPoint, PlacedPoints, PointGrid};
 pub use projected_image::ProjectedImage;
-pub use projected_light::{LightProjection, ProjectionProgress, ProjectionSettings, screen_frame};
+pub use projected_light::{
+    LightProjection, LightScreen, ProjectionProgress, ProjectionSettings, screen_frame,
+};
 pub use projected_view::{ProjectedView, project_views};
 pub use quick::{QuickPicture, QuickRenderer};
 pub use raster::Raster;

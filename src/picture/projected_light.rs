@@ -1,4 +1,4 @@
-//! Images by rays forwards: a beam through a gradient-index field onto a screen.
+//! Images by rays forwards: a beam through a gradient-index field onto screens.
 //!
 //! The value of a pixel is the irradiance averaged over its area, as that of an [`ExactRenderer`], but light is
 //! followed from its source: all rays of a beam of even density carry the same light, and a pixel gathers those
@@ -16,7 +16,9 @@ use super::projected_image::ProjectedImage;
 use super::sample_points::{LONGEST, SamplePoints};
 use super::tile_sampler::set_seed;
 use super::{ImageFrame, ProjectionError};
-use crate::grin::{GrinFateCounts, GrinRay, GrinSetup, GrinTracer, IndexField, RayExit};
+use crate::grin::{
+    Face, GrinFate, GrinFateCounts, GrinRay, GrinSetup, GrinTracer, IndexField, RayExit,
+};
 use crate::grin_design::SquareBeam;
 use std::ops::ControlFlow;
 
@@ -52,19 +54,30 @@ impl Default for ProjectionSettings {
 /// Told the share of the work that is done, about; ends it early.
 pub type ProjectionProgress<'a> = &'a mut dyn FnMut(f64) -> ControlFlow<()>;
 
-/// A beam in front of a field, and the screen behind it, ready to be sampled.
+/// A part of a plane behind a field, or of all directions, in which light is counted.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LightScreen {
+    /// The plane; `None` for one at infinity, where a direction has a place.
+    pub face: Option<Face<f64>>,
+    /// The pixels across the direction of the beam: x along its first axis, y along its second, in mm, or in tangents
+    /// of angles at infinity.
+    pub frame: ImageFrame,
+}
+
+/// A beam in front of a field, and screens behind it, ready to be sampled.
 pub struct LightProjection<'a> {
     tracer: GrinTracer<'a, f64, dyn IndexField<f64> + 'a>,
+    /// The step of a ray, in mm.
+    step: f64,
     beam: SquareBeam,
-    frame: ImageFrame,
-    is_far: bool,
+    screens: Vec<LightScreen>,
 }
 
 impl std::fmt::Debug for LightProjection<'_> {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("LightProjection")
             .field("beam", &self.beam)
-            .field("frame", &self.frame)
+            .field("screens", &self.screens)
             .finish_non_exhaustive()
     }
 }
@@ -76,6 +89,12 @@ struct ProjectionWork {
     cells: usize,
     /// The points of each cell of each replicate.
     count: usize,
+    /// By screen.
+    gathered: Vec<GatheredLight>,
+}
+
+/// The rays that have reached a screen, or not.
+struct GatheredLight {
     /// The rays that landed, by replicate and pixel.
     landed: Vec<u32>,
     fates: GrinFateCounts,
@@ -88,22 +107,14 @@ struct ProjectionWork {
 /// # Errors
 /// No pixels, too many, or a square without a size.
 pub fn screen_frame(half: f64, pixels: usize) -> Result<ImageFrame, ProjectionError> {
-    check_pixels([pixels; 2])?;
     check_positive("half the side of the image", half)?;
-    let pitch = 2.0 * half / pixels as f64;
-    Ok(ImageFrame { pixels: [pixels; 2], pitch, center: [0.0; 2], inverted: false })
+    let pitch = 2.0 * half / pixels.max(1) as f64;
+    let frame = ImageFrame { pixels: [pixels; 2], pitch, center: [0.0; 2], inverted: false };
+    check_frame(&frame).map(|()| frame)
 }
 
 fn size_error(what: &'static str, found: f64, expected: &'static str) -> ProjectionError {
     ProjectionError::Size { what, found, expected }
-}
-
-fn check_pixels([columns, rows]: [usize; 2]) -> Result<(), ProjectionError> {
-    let all = columns.saturating_mul(rows);
-    if all == 0 || all > MAX_PIXELS {
-        return Err(size_error("the number of pixels", all as f64, "from 1 to 4194304"));
-    }
-    Ok(())
 }
 
 fn check_positive(what: &'static str, found: f64) -> Result<(), ProjectionError> {
@@ -125,26 +136,37 @@ fn check_beam(beam: &SquareBeam) -> Result<(), ProjectionError> {
     Ok(())
 }
 
+fn check_frame(frame: &ImageFrame) -> Result<(), ProjectionError> {
+    let all = frame.pixels[0].saturating_mul(frame.pixels[1]);
+    if all == 0 || all > MAX_PIXELS {
+        return Err(size_error("the number of pixels", all as f64, "from 1 to 4194304"));
+    }
+    check_positive("the side of a pixel", frame.pitch)
+}
+
 impl<'a> LightProjection<'a> {
-    /// A beam whose rays are traced through a field onto the plane at the end of the setup, or into their directions
-    /// if it has none. The frame is across the direction of the beam: x along its first axis, y along its second.
+    /// A beam whose rays are traced through a field, and go on straight to every screen behind it.
     ///
     /// # Errors
-    /// A beam or a frame without a size, no pixels or too many, or a domain without extent.
+    /// A beam or a frame without a size, no pixels or too many, no screen, or a domain without extent.
     pub fn new(
         field: &'a (dyn IndexField<f64> + 'a),
         setup: GrinSetup<f64>,
         beam: SquareBeam,
-        frame: ImageFrame,
+        screens: Vec<LightScreen>,
     ) -> Result<Self, ProjectionError> {
         check_beam(&beam)?;
-        check_pixels(frame.pixels)?;
-        check_positive("the side of a pixel", frame.pitch)?;
-        let is_far = setup.screen.is_none();
-        Ok(Self { tracer: GrinTracer::new(field, setup)?, beam, frame, is_far })
+        screens.iter().try_for_each(|screen| check_frame(&screen.frame))?;
+        if screens.is_empty() {
+            return Err(size_error("the number of screens", 0.0, "1 or more"));
+        }
+        let setup = GrinSetup { screen: None, ..setup };
+        let step = setup.step;
+        Ok(Self { tracer: GrinTracer::new(field, setup)?, step, beam, screens })
     }
 
-    /// The image. Once the work is ended early it is as far as it is, and says so.
+    /// The image on every screen, by the same rays: as many as the one with the largest error needs. Once the work is
+    /// ended early they are as far as they are, and say so.
     ///
     /// An image on which not one ray of the first pass lands is left black.
     ///
@@ -154,20 +176,18 @@ impl<'a> LightProjection<'a> {
         &self,
         settings: &ProjectionSettings,
         progress: ProjectionProgress<'_>,
-    ) -> Result<ProjectedImage, ProjectionError> {
+    ) -> Result<Vec<ProjectedImage>, ProjectionError> {
         let mut work = self.begin(settings)?;
         let of_count = REPLICATES * work.cells * work.cells;
         let most = (settings.max_rays / of_count).clamp(1, LONGEST);
         let (mut count, mut done) = (FIRST.min(most), 0.0_f64);
         loop {
             let completed = self.sample(&mut work, count, done, &mut *progress);
-            let mut image = work.image(self.frame);
-            image.complete = completed;
-            let error = image.rms_error();
-            let reached = error.is_some_and(|error| error <= settings.tolerance);
-            if !completed || reached || error.is_none() || count == most {
-                image.reached = completed && reached;
-                return Ok(image);
+            let images = self.images(&work, completed, settings.tolerance);
+            let error = images.iter().filter_map(ProjectedImage::rms_error).reduce(f64::max);
+            let reached = error.is_none_or(|error| error <= settings.tolerance);
+            if !completed || reached || count == most {
+                return Ok(images);
             }
             let spent = count as f64 / most as f64;
             done = done.max(spent).max(expected_share(error, settings.tolerance));
@@ -175,23 +195,33 @@ impl<'a> LightProjection<'a> {
         }
     }
 
+    fn images(&self, work: &ProjectionWork, complete: bool, tolerance: f64) -> Vec<ProjectedImage> {
+        let rays = work.count * work.cells * work.cells;
+        let image = |(screen, light): (&LightScreen, &GatheredLight)| {
+            let mut image = light.image(screen.frame, rays);
+            image.complete = complete;
+            image.reached = complete && image.rms_error().is_some_and(|error| error <= tolerance);
+            image
+        };
+        self.screens.iter().zip(&work.gathered).map(image).collect()
+    }
+
     fn begin(&self, settings: &ProjectionSettings) -> Result<ProjectionWork, ProjectionError> {
         let rays = settings.max_rays;
         if rays < REPLICATES {
             return Err(size_error("the largest number of rays", rays as f64, "4 or more"));
         }
-        let [columns, rows] = self.frame.pixels;
+        let pixels = self.screens.iter().map(|screen| screen.frame.pixels);
+        let side = pixels.flatten().max().unwrap_or(1);
         // About as many cells as pixels: rays of a cell land in few of them.
         let [few, many] = CELLS;
-        let cells = columns.max(rows).clamp(few, many).min((rays / REPLICATES).isqrt());
+        let cells = side.clamp(few, many).min((rays / REPLICATES).isqrt());
         let sets = (0..cells * cells * REPLICATES).map(|set| set_seed(set, settings.seed));
         Ok(ProjectionWork {
             points: SamplePoints::new(&sets.collect::<Vec<_>>(), &[]),
             cells,
             count: 0,
-            landed: vec![0; REPLICATES * columns * rows],
-            fates: GrinFateCounts::default(),
-            beside: 0,
+            gathered: self.screens.iter().map(GatheredLight::none).collect(),
         })
     }
 
@@ -211,46 +241,59 @@ impl<'a> LightProjection<'a> {
             work.points.go_to(work.count, [false, false]);
             let rays = work.rays(&self.beam);
             let exits = self.tracer.trace_batch(&rays);
-            let sets = exits.iter().enumerate();
-            sets.for_each(|(set, exit)| self.gather(work, set % REPLICATES, exit));
+            for (screen, light) in self.screens.iter().zip(&mut work.gathered) {
+                let sets = exits.iter().enumerate();
+                sets.for_each(|(set, exit)| self.gather(light, screen, (set % REPLICATES, exit)));
+            }
             work.count += 1;
         }
         true
     }
 
-    /// Adds a ray of a replicate to its pixel.
-    fn gather(&self, work: &mut ProjectionWork, replicate: usize, exit: &RayExit<f64>) {
-        work.fates.add(exit.fate);
-        if !exit.fate.has_arrived() {
-            return;
-        }
-        let [columns, rows] = self.frame.pixels;
-        match self.pixel(exit) {
-            Some([column, row]) => {
-                work.landed[(replicate * rows + row) * columns + column] += 1;
+    /// Adds a ray of a replicate to its pixel of a screen.
+    fn gather(
+        &self,
+        light: &mut GatheredLight,
+        screen: &LightScreen,
+        (replicate, exit): (usize, &RayExit<f64>),
+    ) {
+        let place = match screen.face {
+            _ if !exit.fate.has_arrived() => return light.fates.add(exit.fate),
+            None => self.direction(exit),
+            Some(face) => {
+                let Some(flight) = exit.flight_to(&face, self.step) else {
+                    return light.fates.add(GrinFate::MissedScreen);
+                };
+                let there = exit.x + exit.v * flight;
+                Some(self.beam.axes.map(|axis| axis.dot(there)))
             }
-            None => work.beside += 1,
+        };
+        light.fates.add(exit.fate);
+        match place.and_then(|place| pixel(&screen.frame, place)) {
+            Some([column, row]) => {
+                let [columns, rows] = screen.frame.pixels;
+                light.landed[(replicate * rows + row) * columns + column] += 1;
+            }
+            None => light.beside += 1,
         }
     }
 
-    /// Column and row of the pixel in which a ray lands; `None` beside the image.
-    fn pixel(&self, exit: &RayExit<f64>) -> Option<[usize; 2]> {
+    /// The tangents of the direction of a ray along both axes; `None` if it goes back.
+    fn direction(&self, exit: &RayExit<f64>) -> Option<[f64; 2]> {
         let along = exit.v.dot(self.beam.direction);
-        if !(along > 0.0) {
-            return None;
-        }
-        let place = self
-            .beam
-            .axes
-            .map(|axis| if self.is_far { axis.dot(exit.v) / along } else { axis.dot(exit.x) });
-        let [right, down] = self.frame.place(place);
-        let [columns, rows] = self.frame.pixels;
-        let number = |share: f64, count: usize| {
-            let is_inside = (0.0..1.0).contains(&share);
-            is_inside.then(|| ((share * count as f64) as usize).min(count - 1))
-        };
-        Some([number(right, columns)?, number(down, rows)?])
+        (along > 0.0).then(|| self.beam.axes.map(|axis| axis.dot(exit.v) / along))
     }
+}
+
+/// Column and row of the pixel at a place; `None` beside the frame.
+fn pixel(frame: &ImageFrame, place: [f64; 2]) -> Option<[usize; 2]> {
+    let [right, down] = frame.place(place);
+    let [columns, rows] = frame.pixels;
+    let number = |share: f64, count: usize| {
+        let is_inside = (0.0..1.0).contains(&share);
+        is_inside.then(|| ((share * count as f64) as usize).min(count - 1))
+    };
+    Some([number(right, columns)?, number(down, rows)?])
 }
 
 /// The share of the rays of a tolerance that an error is expected to have taken.
@@ -270,11 +313,21 @@ impl ProjectionWork {
         };
         right.iter().zip(up).enumerate().map(ray).collect()
     }
+}
 
-    /// The image so far.
-    fn image(&self, frame: ImageFrame) -> ProjectedImage {
+impl GatheredLight {
+    fn none(screen: &LightScreen) -> Self {
+        let [columns, rows] = screen.frame.pixels;
+        Self {
+            landed: vec![0; REPLICATES * columns * rows],
+            fates: GrinFateCounts::default(),
+            beside: 0,
+        }
+    }
+
+    /// The image by so many rays of each replicate.
+    fn image(&self, frame: ImageFrame, rays: usize) -> ProjectedImage {
         let pixels = frame.pixels[0] * frame.pixels[1];
-        let rays = self.count * self.cells * self.cells;
         // The mean is 1 where all light arrives.
         let unit = pixels as f64 / rays.max(1) as f64;
         let replicate = |r: usize| {

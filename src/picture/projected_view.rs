@@ -5,7 +5,7 @@
 //! the image changes smoothly. Here a pixel is the light on its area, and there are as many rays as its error needs.
 
 use super::projected_light::{
-    LightProjection, ProjectionProgress, ProjectionSettings, screen_frame,
+    LightProjection, LightScreen, ProjectionProgress, ProjectionSettings, screen_frame,
 };
 use super::{ProjectedImage, ProjectionError};
 use crate::analysis::Estimate;
@@ -33,8 +33,9 @@ impl ProjectedView {
     ) -> Result<Self, ProjectionError> {
         let ImageLight { beam, setup, dark } = light;
         let frame = screen_frame(dark.half, dark.pixels)?;
-        let projection = LightProjection::new(field.index_field(), setup, beam, frame)?;
-        let light = projection.render(settings, progress)?;
+        let screens = vec![LightScreen { face: setup.screen, frame }];
+        let projection = LightProjection::new(field.index_field(), setup, beam, screens)?;
+        let light = projection.render(settings, progress)?.swap_remove(0);
         let image = with_light(&dark, &light.values);
         Ok(Self { image, light })
     }

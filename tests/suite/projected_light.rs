@@ -12,8 +12,8 @@ use aplanat::grin_design::{
 };
 use aplanat::math::Vec3;
 use aplanat::picture::{
-    LightProjection, ProjectedImage, ProjectionError, ProjectionSettings, project_views,
-    screen_frame,
+    ImageFrame, LightProjection, LightScreen, ProjectedImage, ProjectionError, ProjectionSettings,
+    project_views, screen_frame,
 };
 use rayon::ThreadPoolBuilder;
 use std::ops::ControlFlow;
@@ -67,7 +67,12 @@ fn all(max_rays: usize, seed: u32) -> ProjectionSettings {
 }
 
 fn render(projection: &LightProjection<'_>, settings: &ProjectionSettings) -> ProjectedImage {
-    projection.render(settings, &mut |_| ControlFlow::Continue(())).unwrap()
+    projection.render(settings, &mut |_| ControlFlow::Continue(())).unwrap().remove(0)
+}
+
+/// One screen at the end of a setup.
+fn on(setup: &GrinSetup<f64>, frame: ImageFrame) -> Vec<LightScreen> {
+    vec![LightScreen { face: setup.screen, frame }]
 }
 
 /// A beam of half a side along z through a field, on a frame of half a side.
@@ -78,7 +83,8 @@ fn along_z(
     (frame, pixels): (f64, usize),
 ) -> LightProjection<'_> {
     let frame = screen_frame(frame, pixels).unwrap();
-    LightProjection::new(field, setup, SquareBeam::new(Z, half, 2.0), frame).unwrap()
+    LightProjection::new(field, setup.clone(), SquareBeam::new(Z, half, 2.0), on(&setup, frame))
+        .unwrap()
 }
 
 /// The root mean square difference from an exact image over what the errors of an image allow.
@@ -209,6 +215,31 @@ fn a_parabolic_fibre_forms_its_exact_image_behind_it() {
     assert!(exact[0] > 1.2 * exact[40], "an image that is not even: {exact:?}");
 }
 
+/// Several screens of one beam have the same images as each by itself, one that the light misses among them.
+#[test]
+fn screens_of_one_beam_share_its_rays() {
+    let field = luneburg();
+    let frame = |half: f64, pixels| screen_frame(half, pixels).unwrap();
+    let plane = |z: f64| Some(Face::plane(Z, z));
+    let screens = [
+        LightScreen { face: plane(1.5), frame: frame(0.5, 8) },
+        LightScreen { face: None, frame: frame(0.5, 16) },
+        LightScreen { face: plane(-5.0), frame: frame(0.5, 4) },
+    ];
+    let beam = SquareBeam::new(Z, 0.69, 2.0);
+    let images = |screens: &[LightScreen]| {
+        let setup = setup(GrinRegion::ball(1.0), None);
+        let projection = LightProjection::new(&field, setup, beam, screens.to_vec()).unwrap();
+        projection.render(&all(1 << 14, 5), &mut |_| ControlFlow::Continue(())).unwrap()
+    };
+    let together = images(&screens);
+    for (screen, image) in screens.iter().zip(&together) {
+        assert_eq!(images(&[*screen]), std::slice::from_ref(image));
+    }
+    assert_eq!(together[2].fates.count_of(GrinFate::MissedScreen), together[2].rays);
+    assert!(together[0].mean() > 0.1 && together[1].mean() > 0.1);
+}
+
 /// The errors are those that repeated seeds have: neither too small nor far too large.
 #[test]
 fn stated_errors_cover_the_true_ones() {
@@ -266,7 +297,8 @@ fn light_that_lands_nowhere_is_counted_and_makes_a_black_image() {
     let field = air();
     let dark = |setup: GrinSetup<f64>, beam: SquareBeam, fate: GrinFate| {
         let frame = screen_frame(1.0, 4).unwrap();
-        let projection = LightProjection::new(field.index_field(), setup, beam, frame).unwrap();
+        let screens = on(&setup, frame);
+        let projection = LightProjection::new(field.index_field(), setup, beam, screens).unwrap();
         let image = render(&projection, &ProjectionSettings::default());
         assert_eq!(image.fates.count_of(fate), image.rays, "{:?}", image.fates);
         assert!(image.rays >= 4096 && image.values.iter().all(|value| *value == 0.0));
@@ -282,9 +314,10 @@ fn light_that_lands_nowhere_is_counted_and_makes_a_black_image() {
     let across = SquareBeam::new(Vec3::new(1.0, 0.0, 0.0), 0.5, 5.0);
     dark(setup(GrinRegion::rod(0.4, 3.0, 4.0), Some(5.0)), across, GrinFate::NeverEntered);
     // Light on the plane of the screen, but beside a frame far from it.
-    let far = aplanat::picture::ImageFrame { center: [9.0, 0.0], ..screen_frame(1.0, 4).unwrap() };
+    let far = ImageFrame { center: [9.0, 0.0], ..screen_frame(1.0, 4).unwrap() };
     let setup = setup(GrinRegion::cube(1.0), Some(1.5));
-    let projection = LightProjection::new(field.index_field(), setup, beam, far).unwrap();
+    let screens = on(&setup, far);
+    let projection = LightProjection::new(field.index_field(), setup, beam, screens).unwrap();
     let image = render(&projection, &ProjectionSettings::default());
     assert!(image.beside == image.rays && image.lost_share() == 0.0 && image.rms_error().is_none());
 }
@@ -294,9 +327,7 @@ fn light_that_lands_nowhere_is_counted_and_makes_a_black_image() {
 fn an_image_of_few_rays_is_not_reached() {
     let field = air();
     let setup = setup(GrinRegion::cube(1.0), Some(1.5));
-    let frame = screen_frame(0.01, 64).unwrap();
-    let beam = SquareBeam::new(Z, 0.64, 5.0);
-    let projection = LightProjection::new(field.index_field(), setup, beam, frame).unwrap();
+    let projection = along_z(field.index_field(), setup, 0.64, (0.01, 64));
     let settings = ProjectionSettings { max_rays: 1 << 18, ..Default::default() };
     let image = render(&projection, &settings);
     assert!(image.mean() > 0.0 && !image.reached, "{:?}", image.rms_error());
@@ -328,7 +359,8 @@ fn what_cannot_be_followed_is_refused_by_name() {
     let field = air();
     let refused = |setup: GrinSetup<f64>, beam: SquareBeam, pixels: usize| {
         let frame = screen_frame(1.0, pixels)?;
-        LightProjection::new(field.index_field(), setup, beam, frame).map(|_| ())
+        let screens = on(&setup, frame);
+        LightProjection::new(field.index_field(), setup, beam, screens).map(|_| ())
     };
     let good = || setup(GrinRegion::cube(1.0), Some(1.5));
     let beam = SquareBeam::new(Z, 0.5, 5.0);
@@ -345,6 +377,8 @@ fn what_cannot_be_followed_is_refused_by_name() {
     says(refused(good(), SquareBeam::new(Vec3::default(), 0.5, 5.0), 4), "direction");
     says(refused(good(), SquareBeam { back: f64::NAN, ..beam }, 4), "distance of the beam");
     says(refused(setup(GrinRegion::cube(0.0), Some(1.5)), beam, 4), "empty");
+    let none = LightProjection::new(field.index_field(), good(), beam, Vec::new());
+    says(none.map(|_| ()), "number of screens");
     let projection = along_z(field.index_field(), good(), 0.5, (1.0, 4));
     let few = projection.render(&all(3, 0), &mut |_| ControlFlow::Continue(()));
     says(few.map(|_| ()), "number of rays is 3");
@@ -442,7 +476,8 @@ fn an_image_that_is_stopped_is_as_far_as_it_is_and_says_so() {
                 (asked, last) = (asked + 1, done);
                 if asked > passes { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
             })
-            .unwrap();
+            .unwrap()
+            .remove(0);
         assert!(!image.complete && !image.reached);
         assert_eq!(image.rays, passes * 4 * 16 * 16);
         assert!(image.values.iter().chain(&image.errors).all(|value| value.is_finite()));

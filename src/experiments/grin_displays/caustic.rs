@@ -16,10 +16,9 @@ use crate::experiments::{
 use crate::grin::{Face, GrinSetup, GrinTracer, RayExit, plan_tracing};
 use crate::grin_design::{GrinField, GrinTask, LightGoal, SquareBeam};
 use crate::math::Vec3;
-use crate::picture::{LightProjection, ProjectedImage, screen_frame};
+use crate::picture::{LightProjection, LightScreen, ProjectedImage, ProjectionError, screen_frame};
 use crate::plot::{Canvas, draw_image_row, gray_levels};
 use crate::report::plot_grin_field;
-use std::ops::ControlFlow;
 
 pub(in crate::experiments) const EXPERIMENT: Experiment = Experiment {
     id: "5.7",
@@ -118,7 +117,8 @@ fn rings(
     outcome.claims.extend(screens.iter().flat_map(|screen| screen.claims(effort)));
     outcome.pictures.push(NamedPlot { name: "planes", canvas: draw(&screens) });
     let rays = usize::try_from(optimizer.rays_traced()).unwrap_or(usize::MAX);
-    let rendering: usize = screens.iter().map(|screen| screen.light.rays + screen.again.rays).sum();
+    // The same rays light all screens.
+    let rendering = screens.first().map_or(0, |screen| screen.light.rays + screen.again.rays);
     outcome.rays = outcome.rays.saturating_add(rays).saturating_add(beam.all + rendering);
     Ok(())
 }
@@ -177,47 +177,41 @@ impl ExitBeam {
         &self,
         medium: &GrinField,
         effort: Effort,
-        [from, to]: [f64; 2],
+        part: [f64; 2],
         progress: &mut ProgressFn<'_>,
     ) -> ExperimentResult<Vec<RingScreen>> {
-        let places = PLANES.into_iter().map(Some).chain([None]);
-        let count = PLANES.len() as f64 + 1.0;
-        let mut screen = |(i, place): (usize, Option<f64>)| {
+        let places = || PLANES.into_iter().map(Some).chain([None]);
+        let screens = places().map(|place| self.screen(place)).collect::<Result<_, _>>()?;
+        let (field, setup) = (medium.index_field(), self.setup.clone());
+        let projection = LightProjection::new(field, setup, self.beam, screens)?;
+        let mut render = |seed: u32, [from, to]: [f64; 2]| {
             let mut tell = |share: f64| {
-                let done = from + (to - from) * (i as f64 + share) / count;
+                let done = from + (to - from) * share;
                 progress(ExperimentProgress { done, doing: "rings by light onto screens" })
             };
-            self.screen(medium, effort, place, &mut tell)
+            projection.render(&settings(effort, seed), &mut tell)
         };
-        places.enumerate().map(&mut screen).collect()
+        let images = render(0, part_of(part, [0.0, 0.5]))?;
+        let again = render(1, part_of(part, [0.5, 1.0]))?;
+        // An image that was ended early is none.
+        if images.iter().chain(&again).any(|image| !image.complete) {
+            return Err(ExperimentError::Stopped);
+        }
+        let name = |place: Option<f64>| {
+            place.map_or_else(|| "at infinity".to_owned(), |at| format!("{at} mm behind"))
+        };
+        let pairs = images.into_iter().zip(again).zip(places());
+        let screen = |((light, again), place)| RingScreen { name: name(place), light, again };
+        Ok(pairs.map(screen).collect())
     }
 
-    /// The image at a distance behind the field; at infinity if there is none.
-    fn screen(
-        &self,
-        medium: &GrinField,
-        effort: Effort,
-        distance: Option<f64>,
-        tell: &mut dyn FnMut(f64) -> ControlFlow<()>,
-    ) -> ExperimentResult<RingScreen> {
+    /// The screen at a distance behind the field; at infinity if there is none.
+    fn screen(&self, distance: Option<f64>) -> Result<LightScreen, ProjectionError> {
         let slopes = || self.rays.iter().map(|(_, [u, v])| u.hypot(*v)).collect();
         let radii: Vec<f64> = distance.map_or_else(slopes, |distance| self.radii(distance));
         let frame = screen_frame(ROOM * mean_and_deviation(&radii).0, CELLS)?;
         let plane = |distance| Face::plane(Vec3::new(0.0, 0.0, 1.0), self.back + distance);
-        let setup = GrinSetup { screen: distance.map(plane), ..self.setup.clone() };
-        let light = LightProjection::new(medium.index_field(), setup, self.beam, frame)?;
-        let mut render = |seed: u32, from: f64| {
-            let mut part = |share: f64| tell(from + 0.5 * share);
-            light.render(&settings(effort, seed), &mut part)
-        };
-        let [light, again] = [render(0, 0.0)?, render(1, 0.5)?];
-        // An image that was ended early is none.
-        if !(light.complete && again.complete) {
-            return Err(ExperimentError::Stopped);
-        }
-        let name = |distance| format!("{distance} mm behind");
-        let name = distance.map_or_else(|| "at infinity".to_owned(), name);
-        Ok(RingScreen { name, light, again })
+        Ok(LightScreen { face: distance.map(plane), frame })
     }
 }
 
