@@ -223,7 +223,7 @@ struct RingScreen {
 }
 
 impl RingScreen {
-    fn claims(&self, effort: Effort) -> [Claim; 3] {
+    fn claims(&self, effort: Effort) -> [Claim; 2] {
         sampling_claims(&format!("ring {}", self.name), [&self.light, &self.again], effort)
     }
 }

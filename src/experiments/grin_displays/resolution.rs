@@ -76,7 +76,7 @@ impl ResolutionRow {
     }
 
     /// The claims about the error of the image.
-    fn sampling_claims(&self, effort: Effort) -> [Claim; 3] {
+    fn sampling_claims(&self, effort: Effort) -> [Claim; 2] {
         let name = format!("{}, {} nodes", self.kind.name(), self.nodes());
         sampling_claims(&name, [&self.view.picture.light, &self.view.again], effort)
     }
