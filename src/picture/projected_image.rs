@@ -60,7 +60,7 @@ impl ProjectedImage {
     }
 
     /// The number of rays that land on a pixel, on average.
-    pub fn rays_of_pixel(&self) -> f64 {
+    fn rays_of_pixel(&self) -> f64 {
         let landed = self.fates.arrived_count() - self.beside;
         landed as f64 / self.values.len().max(1) as f64
     }
